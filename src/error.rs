@@ -1,0 +1,107 @@
+//! What can go wrong, in words a user can act on. Every error is one line that names the thing and the remedy, and has a
+//! documented exit code (`skylit --help` and the README list them).
+
+use std::path::{Path, PathBuf};
+
+/// `Result` with this crate's [`Error`].
+pub type Result<T, E = Error> = std::result::Result<T, E>;
+
+/// Everything skylit reports to its user.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// A value on the command line, or a combination of values, that makes no sense.
+    #[error("{0}")]
+    Usage(String),
+
+    /// No Vulkan loader, no device, or a device below the floor. The text names the missing feature.
+    #[error("{0}")]
+    Device(String),
+
+    /// A file that is missing, unreadable or broken, or that needs something skylit does not have.
+    #[error("{}: {message}", path.display())]
+    Input {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it and what helps.
+        message: String,
+    },
+
+    /// A scene that cannot be rendered (no triangles, NaN in the vertices), whichever file it came from.
+    #[error("{0}")]
+    Scene(String),
+
+    /// A file that could not be written. Nothing half-written is left behind.
+    #[error("{}: cannot write: {message}", path.display())]
+    Output {
+        /// The file.
+        path: PathBuf,
+        /// The system's reason and what helps.
+        message: String,
+    },
+
+    /// Host or device memory ran out.
+    #[error("out of memory: {0}")]
+    OutOfMemory(String),
+
+    /// The driver gave up on the device (`VK_ERROR_DEVICE_LOST`).
+    #[error("the Vulkan device was lost: {0}")]
+    DeviceLost(String),
+
+    /// Any other Vulkan call that failed; `validation` messages end here too.
+    #[error("Vulkan: {0}")]
+    Vulkan(String),
+
+    /// The user pressed Ctrl-C (or sent SIGTERM).
+    #[error("interrupted")]
+    Interrupted,
+
+    /// A check that skylit was asked to make did not hold (tracers disagree, images differ).
+    #[error("{0}")]
+    CheckFailed(String),
+}
+
+impl Error {
+    /// The exit code of the process for this error.
+    pub fn exit_code(&self) -> u8 {
+        match self {
+            Error::CheckFailed(_) | Error::Vulkan(_) => 1,
+            Error::Device(_) => 2,
+            Error::Input { .. } | Error::Scene(_) => 3,
+            Error::Output { .. } => 4,
+            Error::OutOfMemory(_) => 5,
+            Error::DeviceLost(_) => 6,
+            Error::Usage(_) => 64,
+            Error::Interrupted => 130,
+        }
+    }
+
+    /// An input file that is wrong in the way `message` says.
+    pub fn input(path: impl AsRef<Path>, message: impl Into<String>) -> Self {
+        Error::Input { path: path.as_ref().to_owned(), message: message.into() }
+    }
+
+    /// A file that could not be read, with the system's reason in plain words.
+    pub fn read(path: impl AsRef<Path>, error: &std::io::Error) -> Self {
+        let message = match error.kind() {
+            std::io::ErrorKind::NotFound => "no such file".to_owned(),
+            std::io::ErrorKind::PermissionDenied => "permission denied".to_owned(),
+            std::io::ErrorKind::IsADirectory => "is a folder, not a file".to_owned(),
+            std::io::ErrorKind::UnexpectedEof => "ends too early (truncated?)".to_owned(),
+            _ => format!("cannot read: {error}"),
+        };
+        Self::input(path, message)
+    }
+
+    /// A file that could not be written.
+    pub fn write(path: impl AsRef<Path>, error: &std::io::Error) -> Self {
+        let message = match error.kind() {
+            std::io::ErrorKind::StorageFull => "the disk is full".to_owned(),
+            std::io::ErrorKind::NotFound => "its folder does not exist (create it first)".to_owned(),
+            std::io::ErrorKind::PermissionDenied => "permission denied".to_owned(),
+            std::io::ErrorKind::ReadOnlyFilesystem => "the file system is read-only".to_owned(),
+            std::io::ErrorKind::IsADirectory => "is a folder".to_owned(),
+            _ => error.to_string(),
+        };
+        Error::Output { path: path.as_ref().to_owned(), message }
+    }
+}

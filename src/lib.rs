@@ -1,0 +1,17 @@
+//! skylit traces ambient occlusion in real time, path-traces the reference it stands in for, and measures how far apart the
+//! two are. ARCHITECTURE.md draws the whole; each module's first lines say what it is for.
+
+pub mod bvh;
+pub mod cli;
+pub mod error;
+pub mod gpu;
+pub mod measure;
+pub mod oracle;
+pub mod output;
+pub mod ray;
+pub mod render;
+pub mod sampling;
+pub mod scene;
+pub mod tracer;
+
+pub use error::{Error, Result};

@@ -1,0 +1,51 @@
+//! Lights that are no surfaces of a mesh, and what surrounds the scene.
+
+use glam::{DVec3, Vec3};
+
+/// Shape and falloff of a light (KHR_lights_punctual, `.brhan` SphericalLight).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum LightKind {
+    /// `intensity` in candela.
+    Point,
+    /// `intensity` in candela along the axis.
+    Spot {
+        /// Radians from the axis where the falloff starts.
+        inner_angle: f32,
+        /// Radians from the axis where it ends.
+        outer_angle: f32,
+    },
+    /// `intensity` in lux.
+    Directional,
+    /// `intensity` is emitted radiance; the sphere itself is visible.
+    Sphere {
+        /// World units.
+        radius: f64,
+    },
+}
+
+/// One light.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Light {
+    /// Name in the file; may be empty.
+    pub name: String,
+    /// Shape and falloff.
+    pub kind: LightKind,
+    /// Linear colour times intensity; see [`LightKind`] for the unit.
+    pub intensity: Vec3,
+    /// World position.
+    pub position: DVec3,
+    /// World direction in which it shines, of unit length.
+    pub direction: DVec3,
+    /// World units beyond which it has no effect (KHR_lights_punctual range); infinite by default.
+    pub range: f64,
+}
+
+/// What a ray that leaves the scene sees.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub enum Environment {
+    /// Nothing.
+    #[default]
+    Black,
+    /// The same radiance from everywhere.
+    Uniform(Vec3),
+}

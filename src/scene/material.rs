@@ -1,0 +1,217 @@
+//! Materials as files describe them: glTF metallic-roughness with its extensions, and the named materials of `.brhan`.
+
+use glam::{Affine2, Vec3, Vec4};
+
+/// Use of a texture by a material.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TextureSlot {
+    /// Index into [`super::Scene::textures`].
+    pub texture: usize,
+    /// Which set of texture coordinates: 0 or 1.
+    pub texcoord: usize,
+    /// KHR_texture_transform, applied to the coordinates; identity without it.
+    pub transform: Affine2,
+}
+
+/// What the alpha of the base colour means.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum AlphaMode {
+    /// Alpha is ignored.
+    #[default]
+    Opaque,
+    /// Present where alpha >= the cutoff.
+    Mask {
+        /// Usually 0.5.
+        cutoff: f32,
+    },
+    /// Coverage. Occlusion streams treat it as a mask at 0.5.
+    Blend,
+}
+
+/// The family of reflection model.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum MaterialKind {
+    /// glTF 2.0 metallic-roughness and extensions.
+    #[default]
+    MetallicRoughness,
+    /// `.brhan` matte: Lambert.
+    Matte,
+    /// `.brhan` mirror: perfect specular reflection.
+    Mirror,
+    /// `.brhan` glass: smooth dielectric.
+    Glass,
+    /// `.brhan` copper: Beckmann conductor.
+    Copper,
+    /// `.brhan` gold: Beckmann conductor.
+    Gold,
+}
+
+/// KHR_materials_clearcoat.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Clearcoat {
+    /// Strength, 0 to 1.
+    pub factor: f32,
+    /// Multiplies `factor` (red).
+    pub texture: Option<TextureSlot>,
+    /// Roughness, 0 to 1.
+    pub roughness: f32,
+    /// Multiplies `roughness` (green).
+    pub roughness_texture: Option<TextureSlot>,
+    /// Normal map of the coat.
+    pub normal_texture: Option<TextureSlot>,
+}
+
+/// KHR_materials_sheen.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Sheen {
+    /// Linear colour.
+    pub color: Vec3,
+    /// Multiplies `color` (sRGB texture).
+    pub color_texture: Option<TextureSlot>,
+    /// 0 to 1.
+    pub roughness: f32,
+    /// Multiplies `roughness` (alpha).
+    pub roughness_texture: Option<TextureSlot>,
+}
+
+/// KHR_materials_transmission and KHR_materials_volume.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Transmission {
+    /// Share of light that is transmitted, 0 to 1.
+    pub factor: f32,
+    /// Multiplies `factor` (red).
+    pub texture: Option<TextureSlot>,
+    /// Thickness in object units; 0 = thin-walled.
+    pub thickness: f32,
+    /// Multiplies `thickness` (green).
+    pub thickness_texture: Option<TextureSlot>,
+    /// Linear colour that white light takes after `attenuation_distance`.
+    pub attenuation_color: Vec3,
+    /// World units; infinite = no absorption.
+    pub attenuation_distance: f32,
+}
+
+impl Default for Transmission {
+    fn default() -> Self {
+        Self {
+            factor: 0.0,
+            texture: None,
+            thickness: 0.0,
+            thickness_texture: None,
+            attenuation_color: Vec3::ONE,
+            attenuation_distance: f32::INFINITY,
+        }
+    }
+}
+
+/// KHR_materials_specular.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Specular {
+    /// 0 to 1.
+    pub factor: f32,
+    /// Multiplies `factor` (alpha).
+    pub texture: Option<TextureSlot>,
+    /// Linear colour at normal incidence.
+    pub color: Vec3,
+    /// Multiplies `color` (sRGB texture).
+    pub color_texture: Option<TextureSlot>,
+}
+
+impl Default for Specular {
+    fn default() -> Self {
+        Self { factor: 1.0, texture: None, color: Vec3::ONE, color_texture: None }
+    }
+}
+
+/// KHR_materials_anisotropy.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Anisotropy {
+    /// 0 to 1.
+    pub strength: f32,
+    /// Radians, counter-clockwise from the tangent.
+    pub rotation: f32,
+    /// Direction (red, green) and strength (blue).
+    pub texture: Option<TextureSlot>,
+}
+
+/// A surface's appearance. Colours are linear.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Material {
+    /// Name in the file; may be empty.
+    pub name: String,
+    /// Family of reflection model.
+    pub kind: MaterialKind,
+    /// Linear base colour and alpha; for `.brhan` and MTL the diffuse colour.
+    pub base_color: Vec4,
+    /// Multiplies `base_color` (sRGB texture, linear alpha).
+    pub base_color_texture: Option<TextureSlot>,
+    /// 0 to 1.
+    pub metallic: f32,
+    /// Perceptual roughness, 0 to 1.
+    pub roughness: f32,
+    /// Multiplies metallic (blue) and roughness (green).
+    pub metallic_roughness_texture: Option<TextureSlot>,
+    /// Tangent-space normal map.
+    pub normal_texture: Option<TextureSlot>,
+    /// Scale of the normal map's x and y.
+    pub normal_scale: f32,
+    /// Baked occlusion (red): shown, never used in transport.
+    pub occlusion_texture: Option<TextureSlot>,
+    /// Linear emitted radiance, KHR_materials_emissive_strength included.
+    pub emissive: Vec3,
+    /// Multiplies `emissive` (sRGB texture).
+    pub emissive_texture: Option<TextureSlot>,
+    /// Meaning of alpha.
+    pub alpha_mode: AlphaMode,
+    /// Both faces are shaded. Visibility never depends on it: rays meet both faces.
+    pub double_sided: bool,
+    /// Index of refraction (KHR_materials_ior, `Ni`).
+    pub ior: f32,
+    /// Specular colour of MTL/.brhan (`Ks`, `specular[]`, `reflectance[]`).
+    pub specular_color: Vec3,
+    /// Transmitted colour of MTL/.brhan (`Tf`, `transmittance[]`).
+    pub transmittance: Vec3,
+    /// KHR_materials_unlit.
+    pub unlit: bool,
+    /// KHR_materials_clearcoat.
+    pub clearcoat: Clearcoat,
+    /// KHR_materials_sheen.
+    pub sheen: Sheen,
+    /// KHR_materials_transmission and KHR_materials_volume.
+    pub transmission: Transmission,
+    /// KHR_materials_specular.
+    pub specular: Specular,
+    /// KHR_materials_anisotropy.
+    pub anisotropy: Anisotropy,
+}
+
+impl Default for Material {
+    /// glTF's default material, except for roughness-irrelevant extras: white, rough, not metallic.
+    fn default() -> Self {
+        Self {
+            name: String::new(),
+            kind: MaterialKind::default(),
+            base_color: Vec4::ONE,
+            base_color_texture: None,
+            metallic: 0.0,
+            roughness: 1.0,
+            metallic_roughness_texture: None,
+            normal_texture: None,
+            normal_scale: 1.0,
+            occlusion_texture: None,
+            emissive: Vec3::ZERO,
+            emissive_texture: None,
+            alpha_mode: AlphaMode::default(),
+            double_sided: false,
+            ior: 1.5,
+            specular_color: Vec3::ZERO,
+            transmittance: Vec3::ZERO,
+            unlit: false,
+            clearcoat: Clearcoat::default(),
+            sheen: Sheen::default(),
+            transmission: Transmission::default(),
+            specular: Specular::default(),
+            anisotropy: Anisotropy::default(),
+        }
+    }
+}

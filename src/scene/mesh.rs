@@ -1,0 +1,78 @@
+//! Shapes in object space.
+
+use glam::{DVec3, Vec2, Vec3, Vec4};
+
+/// An indexed triangle mesh. All vertex arrays are empty or as long as `positions`.
+#[derive(Clone, Debug, Default)]
+pub struct TriangleMesh {
+    /// Object-space positions. All finite.
+    pub positions: Vec<Vec3>,
+    /// Corners, counter-clockwise seen from the front; every index is below `positions.len()`.
+    pub indices: Vec<[u32; 3]>,
+    /// Unit shading normals; empty means flat shading by the geometric normal.
+    pub normals: Vec<Vec3>,
+    /// Unit tangents with handedness in w (glTF convention); empty unless a normal map needs them.
+    pub tangents: Vec<Vec4>,
+    /// Texture coordinate sets 0 and 1, glTF convention (v down).
+    pub texcoords: [Vec<Vec2>; 2],
+    /// Linear vertex colours with alpha.
+    pub colors: Vec<Vec4>,
+}
+
+/// An analytic sphere in object space.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sphere {
+    /// Centre.
+    pub center: Vec3,
+    /// Radius, above 0.
+    pub radius: f32,
+}
+
+/// What a mesh is made of.
+#[derive(Clone, Debug)]
+pub enum Geometry {
+    /// Indexed triangles.
+    Triangles(TriangleMesh),
+    /// Analytic spheres.
+    Spheres(Vec<Sphere>),
+}
+
+impl Geometry {
+    /// Object-space bounds `(min, max)`, or `None` when empty. Only corners that a triangle uses count.
+    pub fn bounds(&self) -> Option<(DVec3, DVec3)> {
+        let mut b: Option<(Vec3, Vec3)> = None;
+        let mut add = |lo: Vec3, hi: Vec3| b = Some(b.map_or((lo, hi), |(l, h)| (l.min(lo), h.max(hi))));
+        match self {
+            Geometry::Triangles(t) => {
+                for p in t.indices.iter().flatten().map(|&i| t.positions[i as usize]) {
+                    add(p, p);
+                }
+            }
+            Geometry::Spheres(s) => {
+                for s in s {
+                    add(s.center - s.radius, s.center + s.radius);
+                }
+            }
+        }
+        b.map(|(l, h)| (l.as_dvec3(), h.as_dvec3()))
+    }
+
+    /// Number of triangles or spheres.
+    pub fn primitive_count(&self) -> usize {
+        match self {
+            Geometry::Triangles(t) => t.indices.len(),
+            Geometry::Spheres(s) => s.len(),
+        }
+    }
+}
+
+/// A shape with one material (a glTF primitive is one mesh here).
+#[derive(Clone, Debug)]
+pub struct Mesh {
+    /// Name in the file; may be empty.
+    pub name: String,
+    /// Triangles or spheres.
+    pub geometry: Geometry,
+    /// Index into [`super::Scene::materials`].
+    pub material: usize,
+}

@@ -1,0 +1,134 @@
+//! The scene: plain host data, no Vulkan. Loaders make it, [`flatten`] turns it into what tracers consume.
+//!
+//! Conventions, everywhere: right-handed, lengths in world units (metres in glTF), angles in radians, colours linear with
+//! sRGB primaries, triangles counter-clockwise seen from their front.
+
+pub mod builtin;
+pub mod camera;
+pub mod features;
+pub mod flatten;
+pub mod light;
+pub mod load;
+pub mod material;
+pub mod mesh;
+pub mod texture;
+
+pub use camera::{Camera, Projection};
+pub use light::{Environment, Light, LightKind};
+pub use material::{AlphaMode, Material, TextureSlot};
+pub use mesh::{Geometry, Mesh, Sphere, TriangleMesh};
+pub use texture::{Filter, Texture, Wrap};
+
+use glam::{DAffine3, DVec3};
+
+/// A mesh placed in the world.
+#[derive(Clone, Debug)]
+pub struct Instance {
+    /// Name of the node it came from; may be empty.
+    pub name: String,
+    /// Index into [`Scene::meshes`].
+    pub mesh: usize,
+    /// Object to world, composed on the host in f64. World here is the file's world, before rebasing by [`Scene::origin`].
+    pub object_to_world: DAffine3,
+}
+
+/// What a loader noticed on the way: shown by the commands, never fatal.
+#[derive(Clone, Debug, Default)]
+pub struct LoadReport {
+    /// One line each: ignored optional extensions, missing textures, ...
+    pub warnings: Vec<String>,
+    /// Triangles dropped because two of their corners coincide or their area is zero.
+    pub degenerate_triangles: usize,
+    /// Meshes whose normals were computed because the file had none.
+    pub normals_computed: usize,
+    /// Meshes whose tangents were computed (MikkTSpace) because a normal map needs them and the file had none.
+    pub tangents_computed: usize,
+}
+
+/// Wishes of a scene file about how to render it (`.brhan` has them); the command line wins.
+#[derive(Clone, Debug, Default)]
+pub struct RenderHints {
+    /// Image size in pixels.
+    pub size: Option<[u32; 2]>,
+    /// Samples per pixel.
+    pub spp: Option<u32>,
+    /// Longest path, in bounces.
+    pub max_depth: Option<u32>,
+    /// Samples per pixel at which intermediate images are to be saved.
+    pub save_intervals: Vec<u32>,
+    /// The file asks for the 1-ray depth image.
+    pub depth_image: bool,
+}
+
+/// Everything that a file, or a built-in scene, describes.
+#[derive(Clone, Debug, Default)]
+pub struct Scene {
+    /// File name or name of the built-in scene.
+    pub name: String,
+    /// Shapes in their own (object) space.
+    pub meshes: Vec<Mesh>,
+    /// Placed meshes. The order is the order of ids in hits and images.
+    pub instances: Vec<Instance>,
+    /// Materials; [`Mesh::material`] indexes them. Never empty once loaded.
+    pub materials: Vec<Material>,
+    /// Decoded images with their samplers.
+    pub textures: Vec<Texture>,
+    /// Punctual and spherical lights.
+    pub lights: Vec<Light>,
+    /// Cameras of the file; may be empty.
+    pub cameras: Vec<Camera>,
+    /// What surrounds the scene.
+    pub environment: Environment,
+    /// Wishes of the file about how to render it.
+    pub hints: RenderHints,
+    /// What the loader noticed.
+    pub report: LoadReport,
+}
+
+impl Scene {
+    /// Number of triangles over all instances.
+    pub fn triangle_count(&self) -> u64 {
+        self.count(|g| match g {
+            Geometry::Triangles(t) => t.indices.len(),
+            Geometry::Spheres(_) => 0,
+        })
+    }
+
+    /// Number of analytic spheres over all instances.
+    pub fn sphere_count(&self) -> u64 {
+        self.count(|g| match g {
+            Geometry::Triangles(_) => 0,
+            Geometry::Spheres(s) => s.len(),
+        })
+    }
+
+    fn count(&self, f: impl Fn(&Geometry) -> usize) -> u64 {
+        self.instances.iter().map(|i| f(&self.meshes[i.mesh].geometry) as u64).sum()
+    }
+
+    /// World-space bounds `(min, max)` over all instances, or `None` when nothing is placed.
+    pub fn bounds(&self) -> Option<(DVec3, DVec3)> {
+        let local: Vec<_> = self.meshes.iter().map(|m| m.geometry.bounds()).collect();
+        let mut world: Option<(DVec3, DVec3)> = None;
+        for i in &self.instances {
+            let Some((lo, hi)) = local[i.mesh] else { continue };
+            for k in 0..8 {
+                let pick = |b: u32, l: f64, h: f64| if k >> b & 1 == 0 { l } else { h };
+                let corner = DVec3::new(pick(0, lo.x, hi.x), pick(1, lo.y, hi.y), pick(2, lo.z, hi.z));
+                let p = i.object_to_world.transform_point3(corner);
+                world = Some(world.map_or((p, p), |(a, b)| (a.min(p), b.max(p))));
+            }
+        }
+        world
+    }
+
+    /// The point that tracers use as their origin, in the file's world space: zero for a scene around the origin, the
+    /// centre of the bounds for one that lies far away from it compared with its size, so that single precision is spent
+    /// on the scene and not on its distance. Rounded to f32, so that subtracting it is exact where it can be.
+    pub fn origin(&self) -> DVec3 {
+        let Some((lo, hi)) = self.bounds() else { return DVec3::ZERO };
+        let (centre, extent) = ((lo + hi) * 0.5, (hi - lo).max_element());
+        // up to four times its own size away costs two bits; leave such scenes where they are
+        if centre.abs().max_element() <= 4.0 * extent { DVec3::ZERO } else { centre.as_vec3().as_dvec3() }
+    }
+}
