@@ -22,7 +22,7 @@ struct Hit {
 };
 
 const uint INVALID = 0xffffffffu;
-const float INFINITY = uintBitsToFloat(0x7f800000u);
+const float INFINITY = 1.0 / 0.0;
 
 Ray no_ray() { return Ray(vec3(0.0), 0.0, vec3(0.0, 0.0, 1.0), -1.0); }
 bool is_ray(Ray ray) { return ray.tmax > ray.tmin; }

@@ -272,7 +272,8 @@ impl<'a> Source<'a> {
             Source::Balanced(mut leaves) => {
                 // the median along the longest axis of the centres
                 let centre = |l: &LeafBox| l.0.min * 0.5 + l.0.max * 0.5;
-                let (lo, hi) = leaves.iter().fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(a, b), l| (a.min(centre(l)), b.max(centre(l))));
+                let (lo, hi) =
+                    leaves.iter().fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(a, b), l| (a.min(centre(l)), b.max(centre(l))));
                 let axis = (hi - lo).max_position();
                 let middle = leaves.len() / 2;
                 leaves.select_nth_unstable_by(middle, |a, b| centre(a)[axis].total_cmp(&centre(b)[axis]));
@@ -326,7 +327,11 @@ mod tests {
     #[test]
     fn trees_of_every_small_size_are_valid() {
         for n in 0..70 {
-            let b = boxes(n, |i| Vec3::new((i * 37 % 101) as f32, (i * 61 % 89) as f32, (i * 17 % 97) as f32), |i| 0.1 + i as f32 * 0.01);
+            let b = boxes(
+                n,
+                |i| Vec3::new((i * 37 % 101) as f32, (i * 61 % 89) as f32, (i * 17 % 97) as f32),
+                |i| 0.1 + i as f32 * 0.01,
+            );
             for max_leaf in [1, 3, 8] {
                 let tree = Bvh2::build(&b, BuildPreset::Default, max_leaf);
                 tree.validate(&b).unwrap_or_else(|e| panic!("{n} boxes, leaf {max_leaf}: {e}"));
@@ -346,7 +351,8 @@ mod tests {
         let n = 240;
         let b: Vec<_> = boxes(n, |_| Vec3::ZERO, |i| 1.15f32.powi(i as i32));
         // obvhs itself may balance them: make the chain by hand
-        let node = |b: Aabb, prim_count, first_index| obvhs::bvh2::node::Bvh2Node { min: b.min, max: b.max, prim_count, first_index };
+        let node =
+            |b: Aabb, prim_count, first_index| obvhs::bvh2::node::Bvh2Node { min: b.min, max: b.max, prim_count, first_index };
         let mut nodes = vec![node(b[n - 1], 0, 1)];
         for i in (1..n).rev() {
             let next = nodes.len() as u32 + 2;

@@ -2,7 +2,7 @@
 
 pub mod bvh2;
 
-pub use bvh2::{Bvh2, BuildPreset};
+pub use bvh2::{BuildPreset, Bvh2};
 
 /// An axis-aligned box in f32.
 #[derive(Clone, Copy, Debug, PartialEq)]

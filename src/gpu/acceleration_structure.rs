@@ -60,14 +60,17 @@ pub struct AccelerationStructure {
 impl AccelerationStructure {
     fn allocate(device: &Arc<Device>, name: &str, ty: vk::AccelerationStructureTypeKHR, size: u64) -> Result<Self> {
         let functions = functions(device)?;
-        let buffer = Buffer::with_usage(device, name, size, Memory::Device, vk::BufferUsageFlags::ACCELERATION_STRUCTURE_STORAGE_KHR)?;
+        let buffer =
+            Buffer::with_usage(device, name, size, Memory::Device, vk::BufferUsageFlags::ACCELERATION_STRUCTURE_STORAGE_KHR)?;
         let info = vk::AccelerationStructureCreateInfoKHR::default().buffer(buffer.raw).size(size).ty(ty);
         // SAFETY: the buffer holds `size` bytes; offset 0 is aligned
         let raw = unsafe { functions.create_acceleration_structure(&info, None) }.context(name)?;
         device.name(raw, name);
         // SAFETY: just made
         let address = unsafe {
-            functions.get_acceleration_structure_device_address(&vk::AccelerationStructureDeviceAddressInfoKHR::default().acceleration_structure(raw))
+            functions.get_acceleration_structure_device_address(
+                &vk::AccelerationStructureDeviceAddressInfoKHR::default().acceleration_structure(raw),
+            )
         };
         Ok(Self { raw, address, buffer, device: device.clone() })
     }
@@ -75,7 +78,8 @@ impl AccelerationStructure {
     /// Builds one bottom level, compacted where that pays. `refittable` structures can be updated later and are not compacted.
     pub fn bottom_level(device: &Arc<Device>, commands: &mut Commands, name: &str, input: &BottomLevelInput) -> Result<Self> {
         let (geometries, ranges) = bottom_level_geometry(input);
-        let flags = vk::BuildAccelerationStructureFlagsKHR::PREFER_FAST_TRACE | vk::BuildAccelerationStructureFlagsKHR::ALLOW_COMPACTION;
+        let flags = vk::BuildAccelerationStructureFlagsKHR::PREFER_FAST_TRACE
+            | vk::BuildAccelerationStructureFlagsKHR::ALLOW_COMPACTION;
         let built = build(device, commands, name, vk::AccelerationStructureTypeKHR::BOTTOM_LEVEL, flags, &geometries, &ranges)?;
         built.compacted(commands, name)
     }
@@ -83,7 +87,10 @@ impl AccelerationStructure {
     /// Builds a top level.
     pub fn top_level(device: &Arc<Device>, commands: &mut Commands, entries: &[TopLevelEntry]) -> Result<Self> {
         if entries.len() >= 1 << 24 {
-            return Err(Error::Scene(format!("{} instances: Vulkan's top level numbers at most 2^24; use --tracer compute", entries.len())));
+            return Err(Error::Scene(format!(
+                "{} instances: Vulkan's top level numbers at most 2^24; use --tracer compute",
+                entries.len()
+            )));
         }
         let mut records = Buffer::new(device, "top-level entries", 64 * entries.len() as u64, Memory::Upload)?;
         let bytes = records.bytes_mut().ok_or_else(|| Error::Vulkan("the top-level entries are not mapped".into()))?;
@@ -117,7 +124,9 @@ impl AccelerationStructure {
 
     fn compacted(self, commands: &mut Commands, name: &str) -> Result<Self> {
         let functions = functions(&self.device)?.clone();
-        let info = vk::QueryPoolCreateInfo::default().query_type(vk::QueryType::ACCELERATION_STRUCTURE_COMPACTED_SIZE_KHR).query_count(1);
+        let info = vk::QueryPoolCreateInfo::default()
+            .query_type(vk::QueryType::ACCELERATION_STRUCTURE_COMPACTED_SIZE_KHR)
+            .query_count(1);
         // SAFETY: one query, reset, written by the submission below and read after it; the pool is destroyed here
         let size = unsafe {
             let pool = self.device.raw.create_query_pool(&info, None).context("the compaction query")?;
@@ -144,7 +153,10 @@ impl AccelerationStructure {
             return Ok(self);
         }
         let compact = Self::allocate(&self.device, name, vk::AccelerationStructureTypeKHR::BOTTOM_LEVEL, size)?;
-        let copy = vk::CopyAccelerationStructureInfoKHR::default().src(self.raw).dst(compact.raw).mode(vk::CopyAccelerationStructureModeKHR::COMPACT);
+        let copy = vk::CopyAccelerationStructureInfoKHR::default()
+            .src(self.raw)
+            .dst(compact.raw)
+            .mode(vk::CopyAccelerationStructureModeKHR::COMPACT);
         commands.run(|r| {
             // SAFETY: the source was built with ALLOW_COMPACTION, the target has the compacted size
             unsafe { functions.cmd_copy_acceleration_structure(r.buffer, &copy) };
@@ -218,7 +230,14 @@ fn build(
     let counts: Vec<u32> = ranges.iter().map(|r| r.primitive_count).collect();
     let mut sizes = vk::AccelerationStructureBuildSizesInfoKHR::default();
     // SAFETY: geometries and counts match
-    unsafe { functions.get_acceleration_structure_build_sizes(vk::AccelerationStructureBuildTypeKHR::DEVICE, &info, &counts, &mut sizes) };
+    unsafe {
+        functions.get_acceleration_structure_build_sizes(
+            vk::AccelerationStructureBuildTypeKHR::DEVICE,
+            &info,
+            &counts,
+            &mut sizes,
+        )
+    };
     let structure = AccelerationStructure::allocate(device, name, ty, sizes.acceleration_structure_size)?;
     // VUID-vkCmdBuildAccelerationStructuresKHR-pInfos-03710: the address itself has to be aligned, so leave room for it
     let alignment = device.info.limits.scratch_alignment.max(1) as u64;

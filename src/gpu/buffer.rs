@@ -43,7 +43,13 @@ impl Buffer {
         Self::with_usage(device, name, size, memory, vk::BufferUsageFlags::empty())
     }
 
-    pub(super) fn with_usage(device: &Arc<Device>, name: &str, size: u64, memory: Memory, extra: vk::BufferUsageFlags) -> Result<Self> {
+    pub(super) fn with_usage(
+        device: &Arc<Device>,
+        name: &str,
+        size: u64,
+        memory: Memory,
+        extra: vk::BufferUsageFlags,
+    ) -> Result<Self> {
         let size = size.max(16).next_multiple_of(16);
         if size > device.info.limits.max_allocation {
             return Err(Error::OutOfMemory(format!(
@@ -76,8 +82,18 @@ impl Buffer {
         };
         let allocation = device
             .allocator()
-            .allocate(&AllocationCreateDesc { name, requirements, location, linear: true, allocation_scheme: AllocationScheme::GpuAllocatorManaged })
-            .map_err(|e| Error::OutOfMemory(format!("no device memory left for {what}: {e}; use a smaller image or scene, or another --device")))?;
+            .allocate(&AllocationCreateDesc {
+                name,
+                requirements,
+                location,
+                linear: true,
+                allocation_scheme: AllocationScheme::GpuAllocatorManaged,
+            })
+            .map_err(|e| {
+                Error::OutOfMemory(format!(
+                    "no device memory left for {what}: {e}; use a smaller image or scene, or another --device"
+                ))
+            })?;
         // SAFETY: fresh memory that fits the buffer's requirements
         unsafe { device.raw.bind_buffer_memory(raw, allocation.memory(), allocation.offset()) }.context(&what)?;
         buffer.allocation = Some(allocation);
@@ -90,7 +106,9 @@ impl Buffer {
     pub fn from_slice<T: bytemuck::NoUninit>(device: &Arc<Device>, name: &str, data: &[T]) -> Result<Self> {
         let bytes: &[u8] = bytemuck::cast_slice(data);
         let mut buffer = Self::new(device, name, bytes.len() as u64, Memory::Device)?;
-        buffer.fill(bytes.len() as u64, 1, |first, chunk| chunk.copy_from_slice(&bytes[first as usize..first as usize + chunk.len()]))?;
+        buffer.fill(bytes.len() as u64, 1, |first, chunk| {
+            chunk.copy_from_slice(&bytes[first as usize..first as usize + chunk.len()])
+        })?;
         Ok(buffer)
     }
 

@@ -12,7 +12,9 @@ fn folder() -> Option<PathBuf> {
 
 fn file(info: &DeviceInfo) -> Option<PathBuf> {
     let uuid: String = info.pipeline_cache_uuid.iter().map(|b| format!("{b:02x}")).collect();
-    folder().map(|f| f.join(format!("pipelines-{:04x}-{:04x}-{:08x}-{uuid}.bin", info.vendor_id, info.device_id, info.driver_version)))
+    folder().map(|f| {
+        f.join(format!("pipelines-{:04x}-{:04x}-{:08x}-{uuid}.bin", info.vendor_id, info.device_id, info.driver_version))
+    })
 }
 
 /// Is this the header that Vulkan prescribes (VkPipelineCacheHeaderVersionOne), for this very device?

@@ -91,8 +91,15 @@ impl Commands {
         let Some(queries) = self.queries.filter(|_| !labels.is_empty()) else { return Ok(Vec::new()) };
         let mut ticks = vec![0u64; 2 * labels.len()];
         // SAFETY: the queries were written by the work that was waited for
-        unsafe { self.device.raw.get_query_pool_results(queries, 0, &mut ticks, vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WAIT) }
-            .context("reading timestamps")?;
+        unsafe {
+            self.device.raw.get_query_pool_results(
+                queries,
+                0,
+                &mut ticks,
+                vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WAIT,
+            )
+        }
+        .context("reading timestamps")?;
         let period = self.device.info.limits.timestamp_period as f64 * 1e-9;
         Ok(labels
             .iter()
@@ -144,7 +151,12 @@ impl Recorder<'_> {
     /// between passes costs microseconds; a missing one costs days.
     pub fn barrier(&mut self) {
         let stages = vk::PipelineStageFlags2::ALL_COMMANDS;
-        self.memory_barrier(stages, vk::AccessFlags2::MEMORY_WRITE, stages, vk::AccessFlags2::MEMORY_READ | vk::AccessFlags2::MEMORY_WRITE);
+        self.memory_barrier(
+            stages,
+            vk::AccessFlags2::MEMORY_WRITE,
+            stages,
+            vk::AccessFlags2::MEMORY_READ | vk::AccessFlags2::MEMORY_WRITE,
+        );
     }
 
     fn barrier_to_host(&mut self) {
@@ -152,8 +164,18 @@ impl Recorder<'_> {
         self.memory_barrier(all, vk::AccessFlags2::MEMORY_WRITE, vk::PipelineStageFlags2::HOST, vk::AccessFlags2::HOST_READ);
     }
 
-    fn memory_barrier(&mut self, from: vk::PipelineStageFlags2, write: vk::AccessFlags2, to: vk::PipelineStageFlags2, read: vk::AccessFlags2) {
-        let barrier = [vk::MemoryBarrier2::default().src_stage_mask(from).src_access_mask(write).dst_stage_mask(to).dst_access_mask(read)];
+    fn memory_barrier(
+        &mut self,
+        from: vk::PipelineStageFlags2,
+        write: vk::AccessFlags2,
+        to: vk::PipelineStageFlags2,
+        read: vk::AccessFlags2,
+    ) {
+        let barrier = [vk::MemoryBarrier2::default()
+            .src_stage_mask(from)
+            .src_access_mask(write)
+            .dst_stage_mask(to)
+            .dst_access_mask(read)];
         // SAFETY: recording state
         unsafe { self.device.raw.cmd_pipeline_barrier2(self.buffer, &vk::DependencyInfo::default().memory_barriers(&barrier)) };
     }

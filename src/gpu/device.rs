@@ -7,10 +7,10 @@ use ash::{ext, khr, vk};
 use gpu_allocator::AllocationSizes;
 use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
 
+use super::cache;
 use super::info::{DeviceInfo, enumerate};
 use super::instance::{Instance, ValidationLog, no_driver};
 use super::result::Context;
-use super::cache;
 use crate::error::{Error, Result};
 use crate::tracer::TracerKind;
 
@@ -171,7 +171,11 @@ fn pick(devices: Vec<DeviceInfo>, wanted: Option<&str>) -> Result<DeviceInfo> {
         return Err(Error::Device(format!("no device '{}' here; there is {}", wanted.unwrap_or_default(), names())));
     };
     if !info.missing_floor.is_empty() {
-        return Err(Error::Device(format!("device '{}' lacks {}, which skylit needs; `skylit doctor` lists what is there", info.name, info.missing_floor.join(", "))));
+        return Err(Error::Device(format!(
+            "device '{}' lacks {}, which skylit needs; `skylit doctor` lists what is there",
+            info.name,
+            info.missing_floor.join(", ")
+        )));
     }
     Ok(info.clone())
 }

@@ -192,7 +192,10 @@ fn describe(instance: &Instance, index: usize, physical: vk::PhysicalDevice) -> 
     };
     let with_structure = |own: (&'static str, bool)| [own, structure_needs[0], structure_needs[1]];
     let tracers = vec![
-        needs(TracerKind::Pipeline, &with_structure(("VK_KHR_ray_tracing_pipeline", f_pipeline.ray_tracing_pipeline == vk::TRUE))),
+        needs(
+            TracerKind::Pipeline,
+            &with_structure(("VK_KHR_ray_tracing_pipeline", f_pipeline.ray_tracing_pipeline == vk::TRUE)),
+        ),
         needs(TracerKind::Query, &with_structure(("VK_KHR_ray_query", f_query.ray_query == vk::TRUE))),
         needs(TracerKind::Compute, &[("bufferDeviceAddress", vulkan13 && f12.buffer_device_address == vk::TRUE)]),
     ];
@@ -235,7 +238,11 @@ fn describe(instance: &Instance, index: usize, physical: vk::PhysicalDevice) -> 
             max_allocation: v13_limits.max_buffer_size.min(v11_limits.max_memory_allocation_size),
             device_memory,
             max_push_constants: properties.limits.max_push_constants_size,
-            timestamp_period: if properties.limits.timestamp_compute_and_graphics == vk::TRUE { properties.limits.timestamp_period } else { 0.0 },
+            timestamp_period: if properties.limits.timestamp_compute_and_graphics == vk::TRUE {
+                properties.limits.timestamp_period
+            } else {
+                0.0
+            },
             scratch_alignment: structure.min_acceleration_structure_scratch_offset_alignment,
             shader_group_handle_size: pipeline.shader_group_handle_size,
             shader_group_handle_alignment: pipeline.shader_group_handle_alignment,

@@ -43,10 +43,15 @@ impl Instance {
     /// [`Error::Device`] without a loader, without a driver for Vulkan 1.3, or without the layer that was asked for.
     pub fn new(validation: bool) -> Result<Arc<Self>> {
         // SAFETY: the loader's own initialisation code runs, as in every Vulkan program
-        let entry = unsafe { ash::Entry::load() }
-            .map_err(|e| Error::Device(format!("no Vulkan loader (libvulkan.so.1) on this machine: run ./scripts/setup.sh or install libvulkan1 ({e})")))?;
+        let entry = unsafe { ash::Entry::load() }.map_err(|e| {
+            Error::Device(format!(
+                "no Vulkan loader (libvulkan.so.1) on this machine: run ./scripts/setup.sh or install libvulkan1 ({e})"
+            ))
+        })?;
         // SAFETY: no preconditions
-        let version = unsafe { entry.try_enumerate_instance_version() }.context("asking for the Vulkan version")?.unwrap_or(vk::API_VERSION_1_0);
+        let version = unsafe { entry.try_enumerate_instance_version() }
+            .context("asking for the Vulkan version")?
+            .unwrap_or(vk::API_VERSION_1_0);
         if version < vk::API_VERSION_1_3 {
             return Err(Error::Device(format!(
                 "the Vulkan loader is for version {}.{}, skylit needs 1.3: install a newer libvulkan1",
@@ -57,7 +62,10 @@ impl Instance {
         // SAFETY: no preconditions
         let layers = unsafe { entry.enumerate_instance_layer_properties() }.context("listing Vulkan layers")?;
         if validation && !layers.iter().any(|l| l.layer_name_as_c_str() == Ok(VALIDATION_LAYER)) {
-            return Err(Error::Device("validation was asked for, but VK_LAYER_KHRONOS_validation is not installed: install vulkan-validationlayers".into()));
+            return Err(Error::Device(
+                "validation was asked for, but VK_LAYER_KHRONOS_validation is not installed: install vulkan-validationlayers"
+                    .into(),
+            ));
         }
         // SAFETY: no preconditions
         let extensions = unsafe { entry.enumerate_instance_extension_properties(None) }.context("listing Vulkan extensions")?;
@@ -88,7 +96,8 @@ impl Instance {
             Some(log) => {
                 let utils = ext::debug_utils::Instance::new(&entry, &raw);
                 // SAFETY: the log is kept alive by Self, which destroys the messenger first
-                let messenger = unsafe { utils.create_debug_utils_messenger(&messenger_info_owned(log), None) }.context("creating the debug messenger")?;
+                let messenger = unsafe { utils.create_debug_utils_messenger(&messenger_info_owned(log), None) }
+                    .context("creating the debug messenger")?;
                 Some((utils, messenger))
             }
             None => None,

@@ -51,9 +51,11 @@ struct Module<'a> {
 
 impl<'a> Module<'a> {
     fn new(device: &'a Device, name: &str, spirv: &[u8]) -> Result<Self> {
-        let words = ash::util::read_spv(&mut std::io::Cursor::new(spirv)).map_err(|e| Error::Vulkan(format!("shader {name} is no SPIR-V: {e}")))?;
+        let words = ash::util::read_spv(&mut std::io::Cursor::new(spirv))
+            .map_err(|e| Error::Vulkan(format!("shader {name} is no SPIR-V: {e}")))?;
         // SAFETY: valid SPIR-V from the build script's compiler
-        let raw = unsafe { device.raw.create_shader_module(&vk::ShaderModuleCreateInfo::default().code(&words), None) }.context(name)?;
+        let raw = unsafe { device.raw.create_shader_module(&vk::ShaderModuleCreateInfo::default().code(&words), None) }
+            .context(name)?;
         device.name(raw, name);
         Ok(Self { raw, device })
     }
@@ -69,7 +71,8 @@ impl Drop for Module<'_> {
 fn layout(device: &Device, stages: vk::ShaderStageFlags) -> Result<vk::PipelineLayout> {
     let ranges = [vk::PushConstantRange { stage_flags: stages, offset: 0, size: PUSH_BYTES }];
     // SAFETY: a plain layout
-    unsafe { device.raw.create_pipeline_layout(&vk::PipelineLayoutCreateInfo::default().push_constant_ranges(&ranges), None) }.context("the pipeline layout")
+    unsafe { device.raw.create_pipeline_layout(&vk::PipelineLayoutCreateInfo::default().push_constant_ranges(&ranges), None) }
+        .context("the pipeline layout")
 }
 
 /// A compute pipeline.
@@ -83,7 +86,8 @@ impl ComputePipeline {
     /// Compiles a compute shader with the entry point `main`.
     pub fn new(device: &Arc<Device>, name: &str, spirv: &[u8], specialization: &Specialization) -> Result<Self> {
         let module = Module::new(device, name, spirv)?;
-        let mut pipeline = Self { raw: vk::Pipeline::null(), layout: layout(device, vk::ShaderStageFlags::COMPUTE)?, device: device.clone() };
+        let mut pipeline =
+            Self { raw: vk::Pipeline::null(), layout: layout(device, vk::ShaderStageFlags::COMPUTE)?, device: device.clone() };
         pipeline.raw = specialization.with(|s| {
             let stage = vk::PipelineShaderStageCreateInfo::default()
                 .stage(vk::ShaderStageFlags::COMPUTE)
@@ -135,8 +139,15 @@ pub struct RayTracingPipeline {
 
 impl RayTracingPipeline {
     /// Compiles a ray generation shader together with the shared ones.
-    pub fn new(device: &Arc<Device>, name: &str, raygen: &[u8], shared: &HitShaders, specialization: &Specialization) -> Result<Self> {
-        let functions = device.pipelines.as_ref().ok_or_else(|| Error::Device("the device has no VK_KHR_ray_tracing_pipeline".into()))?;
+    pub fn new(
+        device: &Arc<Device>,
+        name: &str,
+        raygen: &[u8],
+        shared: &HitShaders,
+        specialization: &Specialization,
+    ) -> Result<Self> {
+        let functions =
+            device.pipelines.as_ref().ok_or_else(|| Error::Device("the device has no VK_KHR_ray_tracing_pipeline".into()))?;
         let mut modules = vec![
             (Module::new(device, name, raygen)?, vk::ShaderStageFlags::RAYGEN_KHR),
             (Module::new(device, "miss", shared.miss)?, vk::ShaderStageFlags::MISS_KHR),
@@ -188,7 +199,13 @@ impl RayTracingPipeline {
         pipeline.raw = specialization.with(|s| {
             let stages: Vec<_> = modules
                 .iter()
-                .map(|(m, stage)| vk::PipelineShaderStageCreateInfo::default().stage(*stage).module(m.raw).name(c"main").specialization_info(s))
+                .map(|(m, stage)| {
+                    vk::PipelineShaderStageCreateInfo::default()
+                        .stage(*stage)
+                        .module(m.raw)
+                        .name(c"main")
+                        .specialization_info(s)
+                })
                 .collect();
             let info = [vk::RayTracingPipelineCreateInfoKHR::default()
                 .stages(&stages)
@@ -196,9 +213,11 @@ impl RayTracingPipeline {
                 .max_pipeline_ray_recursion_depth(1)
                 .layout(pipeline.layout)];
             // SAFETY: modules and layout are of this device
-            unsafe { functions.create_ray_tracing_pipelines(vk::DeferredOperationKHR::null(), device.pipeline_cache, &info, None) }
-                .map_err(|e| e.1)
-                .context(name)
+            unsafe {
+                functions.create_ray_tracing_pipelines(vk::DeferredOperationKHR::null(), device.pipeline_cache, &info, None)
+            }
+            .map_err(|e| e.1)
+            .context(name)
         })?[0];
         device.name(pipeline.raw, name);
         pipeline.make_table(functions, groups.len() as u32)?;
@@ -210,7 +229,8 @@ impl RayTracingPipeline {
         let limits = &self.device.info.limits;
         let size = limits.shader_group_handle_size as usize;
         // SAFETY: the pipeline has this many groups
-        let handles = unsafe { functions.get_ray_tracing_shader_group_handles(self.raw, 0, groups, size * groups as usize) }.context("the shader group handles")?;
+        let handles = unsafe { functions.get_ray_tracing_shader_group_handles(self.raw, 0, groups, size * groups as usize) }
+            .context("the shader group handles")?;
         let base = limits.shader_group_base_alignment as u64;
         let stride = (size as u64).next_multiple_of(limits.shader_group_handle_alignment as u64);
         let regions = [1u64, 1, groups as u64 - 2];
@@ -239,7 +259,8 @@ impl RayTracingPipeline {
             }
             offset += sizes[k];
         }
-        let region = |k: usize, stride: u64| vk::StridedDeviceAddressRegionKHR { device_address: addresses[k], stride, size: sizes[k] };
+        let region =
+            |k: usize, stride: u64| vk::StridedDeviceAddressRegionKHR { device_address: addresses[k], stride, size: sizes[k] };
         // the ray generation table's size must be its stride
         self.raygen = region(0, sizes[0]);
         self.miss = region(1, stride);

@@ -88,7 +88,10 @@ impl SceneFeatures {
     pub fn explain(&self, flat: &FlatScene) -> Vec<String> {
         let mut lines = Vec::new();
         if !self.alpha {
-            lines.push("no alpha test: no primitive is partly transparent; geometry is opaque, any-hit code is not compiled".to_owned());
+            lines.push(
+                "no alpha test: no primitive is partly transparent; geometry is opaque, any-hit code is not compiled"
+                    .to_owned(),
+            );
         } else {
             let (all, opaque) = flat.groups.iter().fold((0, 0), |(a, o), g| (a + g.primitive_count, o + g.opaque_count));
             lines.push(format!("alpha test on {} of {all} primitives only", all - opaque));
@@ -98,7 +101,10 @@ impl SceneFeatures {
         }
         if self.single_level {
             let n = flat.groups.first().map_or(0, |g| g.parts.len());
-            lines.push(format!("one level: {n} mesh{} baked into world space, the top level is skipped", if n == 1 { "" } else { "es" }));
+            lines.push(format!(
+                "one level: {n} mesh{} baked into world space, the top level is skipped",
+                if n == 1 { "" } else { "es" }
+            ));
         } else {
             lines.push(format!("two levels: {} groups, {} entries in the top level", flat.groups.len(), flat.placements.len()));
         }
