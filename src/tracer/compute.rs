@@ -124,7 +124,8 @@ impl Trees {
 /// How far a tree's boxes are widened: four half-ulps of its largest coordinate. A ray that runs within the plane of flat
 /// geometry is then strictly inside the box, and the traversal needs no special case for it.
 fn padding(tree: &Bvh2) -> f32 {
-    let reach = tree.nodes.first().map_or(0.0, |n| n.boxes.as_flattened().as_flattened().iter().fold(0.0f32, |m, x| m.max(x.abs())));
+    let reach =
+        tree.nodes.first().map_or(0.0, |n| n.boxes.as_flattened().as_flattened().iter().fold(0.0f32, |m, x| m.max(x.abs())));
     (2.0 * f32::EPSILON * reach).max(1e-30)
 }
 

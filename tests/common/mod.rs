@@ -27,7 +27,12 @@ pub fn tracers(device: &Device) -> Vec<TracerKind> {
     let there: Vec<_> = TracerKind::ALL.into_iter().filter(|&k| device.info.supports(k)).collect();
     if let Ok(expected) = std::env::var("SKYLIT_EXPECT_TRACERS") {
         for name in expected.split(',').filter(|n| !n.is_empty()) {
-            assert!(there.iter().any(|k| k.name() == name), "tracer '{name}' is expected here, but '{}' ({}) has only {there:?}", device.info.name, device.info.driver);
+            assert!(
+                there.iter().any(|k| k.name() == name),
+                "tracer '{name}' is expected here, but '{}' ({}) has only {there:?}",
+                device.info.name,
+                device.info.driver
+            );
         }
     }
     there
