@@ -1,0 +1,201 @@
+// The compute tracer: a two-level BVH2 in plain memory, one ray per lane, and a lane that is done takes the next ray.
+// This is the readable reference; it supplies main() around the stream's ray(), closest() or any().
+#ifndef TRACE_COMPUTE
+#define TRACE_COMPUTE
+#include "scene/material.glsl"
+#include "scene/sphere.glsl"
+#include "trace/triangle.glsl"
+
+layout(local_size_x = LANES) in;
+
+// The host sets this to what the scene's trees need at most: every inner node pushes at most one child, so depth of the
+// top level + 1 + depth of the deepest group can never be exceeded. See src/bvh/bvh2.rs for the bound on the depth.
+layout(constant_id = 3) const uint STACK_SIZE = 64;
+layout(constant_id = 4) const uint RAYS_PER_LANE = 1;
+
+// References. A leaf holds count - 1 in bits 27-30 and its first primitive in bits 0-26; a leaf of the top level holds an
+// InstanceRecord.
+const uint LEAF = 0x80000000u;
+const uint FINISHED = 0x7fffffffu;
+const uint LEAVE_INSTANCE = 0x7ffffffeu;
+const uint NEXT = 0x7ffffffdu;
+const uint LAST_NODE = 0x7ffffff0u;
+// Primitive flags, above the primitive's number in its group.
+const uint ALPHA_TESTED = 0x80000000u;
+const uint SPHERE = 0x40000000u;
+const uint NUMBER = 0x3fffffffu;
+
+// On a CPU driver a divergent load is one gather, of 32 or of 64 bits alike: load pairs where 64-bit integers exist.
+#ifdef LOAD64
+layout(buffer_reference, std430, buffer_reference_align = 8) readonly buffer Words64 { uint64_t v[]; };
+#define LOAD_PAIR(base, i) uintBitsToFloat(unpackUint2x32(Words64(base).v[i]))
+#else
+#define LOAD_PAIR(base, i) uintBitsToFloat(Pairs(base).v[i])
+#endif
+
+// Slabs are widened by 16 half-ulps: Ize, "Robust BVH Ray Traversal" (JCGT 2013) needs 2 * gamma(3) for its own rounding;
+// the rest covers the rounding of the sheared triangle test, so that a ray which that test sends into a triangle is never
+// kept out of the triangle's box.
+const float SLAB_SCALE = 1.0 + 16.0 * 5.9604645e-8;
+
+// Entry distance of a box, or INFINITY when it is missed. A ray within a slab's plane makes 0 * inf = NaN; the comparisons
+// are ordered so that NaN leaves the interval as it was.
+float enter_box(vec3 lo, vec3 hi, vec3 origin, vec3 inverse, bvec3 negative, float tmin, float tmax) {
+    vec3 t0 = (lo - origin) * inverse;
+    vec3 t1 = (hi - origin) * inverse;
+    vec3 n = mix(t0, t1, negative);
+    vec3 f = mix(t1, t0, negative) * SLAB_SCALE;
+    float near = tmin;
+    near = n.x > near ? n.x : near;
+    near = n.y > near ? n.y : near;
+    near = n.z > near ? n.z : near;
+    float far = tmax;
+    far = f.x < far ? f.x : far;
+    far = f.y < far ? f.y : far;
+    far = f.z < far ? f.z : far;
+    return near <= far ? near : INFINITY;
+}
+
+vec3 safe_inverse(vec3 d) {
+    // division by zero is undefined in the shading language: say infinity
+    return mix(1.0 / d, vec3(INFINITY), equal(d, vec3(0.0)));
+}
+
+void main() {
+    uint next = gl_WorkGroupID.x * (LANES * RAYS_PER_LANE) + gl_LocalInvocationID.x;
+    uint end = min((gl_WorkGroupID.x + 1u) * (LANES * RAYS_PER_LANE), push.count);
+    if (next >= end) return;
+
+    SceneRoot root = SceneRoot(push.scene);
+    uvec2 nodes = root.nodes;
+    uvec2 primitives = root.primitives;
+    InstanceRecords instances = InstanceRecords(root.instances);
+
+    uint stack[STACK_SIZE];
+    float stack_near[STACK_SIZE];
+    uint depth = 0u;
+
+    uint index = push.first + next;
+    Ray world = ray(index);
+    Shear shear = make_shear(world.direction);
+    vec3 origin = world.origin;
+    vec3 inverse = safe_inverse(world.direction);
+    bvec3 negative = lessThan(inverse, vec3(0.0));
+    uint instance = 0u;
+    bool in_group = SINGLE_LEVEL;
+    uint current = is_ray(world) ? root.root : FINISHED;
+    float best = world.tmax;
+    uint best_instance = INVALID;
+    uint best_primitive = INVALID;
+    vec2 best_uv = vec2(0.0);
+
+    while (true) {
+        if (current < LAST_NODE) {
+            vec2 a = LOAD_PAIR(nodes, 8u * current), b = LOAD_PAIR(nodes, 8u * current + 1u), c = LOAD_PAIR(nodes, 8u * current + 2u);
+            vec2 d = LOAD_PAIR(nodes, 8u * current + 3u), e = LOAD_PAIR(nodes, 8u * current + 4u), f = LOAD_PAIR(nodes, 8u * current + 5u);
+            uvec2 children = floatBitsToUint(LOAD_PAIR(nodes, 8u * current + 6u));
+            float near0 = enter_box(vec3(a, b.x), vec3(b.y, c), origin, inverse, negative, world.tmin, best);
+            float near1 = enter_box(vec3(d, e.x), vec3(e.y, f), origin, inverse, negative, world.tmin, best);
+            bool swap = near1 < near0;
+            float first = swap ? near1 : near0;
+            float second = swap ? near0 : near1;
+            current = first < INFINITY ? (swap ? children.y : children.x) : NEXT;
+            if (second < INFINITY) {
+                stack[depth] = swap ? children.x : children.y;
+                stack_near[depth] = second;
+                depth++;
+            }
+        }
+        if ((current & LEAF) != 0u) {
+            if (in_group) {
+                uint i = current & 0x07ffffffu;
+                vec2 a = LOAD_PAIR(primitives, 5u * i), b = LOAD_PAIR(primitives, 5u * i + 1u), c = LOAD_PAIR(primitives, 5u * i + 2u);
+                vec2 d = LOAD_PAIR(primitives, 5u * i + 3u), e = LOAD_PAIR(primitives, 5u * i + 4u);
+                uint id = floatBitsToUint(e.y);
+                float t;
+                vec2 uv;
+                bool met;
+                if (HAS_SPHERES && (id & SPHERE) != 0u) {
+                    // the direction is not kept: a sphere is rarely tested, a triangle often
+                    vec3 direction = in_group && !SINGLE_LEVEL ? transform_vector(instances.v[instance].world_to_group, world.direction) : world.direction;
+                    t = intersect_sphere(origin, direction, world.tmin, best, vec3(a, b.x), b.y);
+                    uv = vec2(0.0);
+                    met = t > world.tmin && t < best;
+                } else {
+                    met = intersect_triangle(shear, origin, vec3(a, b.x), vec3(b.y, c), vec3(d, e.x), world.tmin, best, t, uv);
+                }
+                if (HAS_ALPHA) {
+                    if (met && (id & ALPHA_TESTED) != 0u) met = alpha_passes(instance, id & NUMBER, uv);
+                }
+                if (met) {
+                    best = t;
+                    best_instance = instance;
+                    best_primitive = id & NUMBER;
+                    best_uv = uv;
+                }
+                // the next primitive of the leaf: one more, and one fewer to come
+                current = (current & 0x78000000u) == 0u ? NEXT : current + 1u - 0x08000000u;
+#ifdef STREAM_ANY
+                if (met) {
+                    current = FINISHED;
+                    depth = 0u;
+                }
+#endif
+            } else {
+                instance = current & 0x07ffffffu;
+                InstanceRecord record = instances.v[instance];
+                vec3 direction = transform_vector(record.world_to_group, world.direction);
+                origin = transform_point(record.world_to_group, world.origin);
+                shear = make_shear(direction);
+                inverse = safe_inverse(direction);
+                negative = lessThan(inverse, vec3(0.0));
+                in_group = true;
+                stack[depth] = LEAVE_INSTANCE;
+                stack_near[depth] = world.tmin;
+                depth++;
+                current = record.root;
+            }
+        }
+        if (current == LEAVE_INSTANCE) {
+            origin = world.origin;
+            inverse = safe_inverse(world.direction);
+            negative = lessThan(inverse, vec3(0.0));
+            in_group = false;
+            current = NEXT;
+        }
+        if (current == NEXT) {
+            if (depth == 0u) {
+                current = FINISHED;
+            } else {
+                depth--;
+                // what lies behind the nearest hit so far is not entered
+                current = stack_near[depth] <= best ? stack[depth] : NEXT;
+            }
+        }
+        if (current == FINISHED) {
+            bool met = best_primitive != INVALID;
+#ifdef STREAM_ANY
+            any(index, met);
+#else
+            if (met) closest(index, scene_hit(best, best_instance, best_primitive, best_uv));
+            else closest(index, miss());
+#endif
+            next += LANES;
+            if (next >= end) return;
+            index = push.first + next;
+            world = ray(index);
+            shear = make_shear(world.direction);
+            origin = world.origin;
+            inverse = safe_inverse(world.direction);
+            negative = lessThan(inverse, vec3(0.0));
+            instance = 0u;
+            in_group = SINGLE_LEVEL;
+            depth = 0u;
+            current = is_ray(world) ? root.root : FINISHED;
+            best = world.tmax;
+            best_primitive = INVALID;
+        }
+    }
+}
+
+#endif
