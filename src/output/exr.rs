@@ -40,8 +40,8 @@ pub fn write(image: &Image, path: &Path) -> Result<()> {
 
 fn encode(image: &Image, file: &mut File) -> io::Result<()> {
     let channels = image.channels.iter().map(|c| AnyChannel::new(text(&c.name), Borrowed(&c.samples))).collect();
-    let mut attributes = LayerAttributes::default();
-    attributes.software_name = Some(text(concat!("skylit ", env!("CARGO_PKG_VERSION"))));
+    let software = text(concat!("skylit ", env!("CARGO_PKG_VERSION")));
+    let mut attributes = LayerAttributes { software_name: Some(software), ..Default::default() };
     for (key, value) in &image.metadata {
         attributes.other.insert(text(&format!("{PREFIX}{key}")), AttributeValue::Text(text(value)));
     }

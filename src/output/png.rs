@@ -26,8 +26,8 @@ pub fn srgb_decode(coded: f32) -> f32 {
 
 /// A linear value to 8-bit sRGB, rounded to nearest. NaN is black, so that it can be seen on a bright image.
 pub fn srgb_byte(linear: f32) -> u8 {
-    // max() before min(): f32::max takes the other operand for NaN
-    (srgb_encode(linear.max(0.0).min(1.0)) * 255.0).round() as u8
+    // a cast from NaN gives 0
+    (srgb_encode(linear.clamp(0.0, 1.0)) * 255.0).round() as u8
 }
 
 /// Writes the colour channels of an image, brightened by `exposure` stops (0 = as they are, 1 = twice as bright).
