@@ -23,8 +23,8 @@ mkdir -p "$out"
 for scene in "${scenes[@]}"; do
   for tracer in "${tracers[@]}"; do
     say "$scene, tracer $tracer"
-    "$skylit" render "builtin:$scene" --tracer "$tracer" --spp "$spp" --size "$size" -o "$out/$scene-$tracer.exr"
-    "$skylit" render "builtin:$scene" --tracer "$tracer" --spp "$spp" --size "$size" -o "$out/$scene-$tracer.png" --quiet
+    "$skylit" render "builtin:$scene" --tracer "$tracer" --spp "$spp" --size "$size" \
+      -o "$out/$scene-$tracer.exr" -o "$out/$scene-$tracer.png"
   done
 done
 
@@ -41,8 +41,9 @@ report=$out/report.md
     printf '\n\nDifferences of the accessibility (channel Y, 0 to 1):\n\n'
     for pair in "pipeline query" "pipeline compute" "query compute"; do
       a=${pair% *} b=${pair#* }
-      printf -- '- %s and %s: %s\n' "$a" "$b" \
-        "$("$skylit" diff "$out/$scene-$a.exr" "$out/$scene-$b.exr" --max-rmse 0.005 | sed -n 's/^Y  *//p')"
+      # an assignment of its own: inside printf's arguments a failure would go unnoticed
+      numbers=$("$skylit" diff "$out/$scene-$a.exr" "$out/$scene-$b.exr" --max-rmse 0.005 | sed -n 's/^Y  *//p')
+      printf -- '- %s and %s: %s\n' "$a" "$b" "$numbers"
     done
   done
 } > "$report.new"

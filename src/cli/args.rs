@@ -153,9 +153,9 @@ impl DeviceArgs {
 pub struct RenderArgs {
     /// Scene: a .gltf, .glb, .obj or .brhan file, or builtin:NAME (`skylit scenes` lists them)
     pub scene: String,
-    /// Image to write: .exr (all channels, metadata) or .png (8-bit sRGB)
-    #[arg(long, short, value_name = "FILE", value_hint = ValueHint::FilePath)]
-    pub output: PathBuf,
+    /// Image to write: .exr (all channels, metadata) or .png (8-bit sRGB); may be given more than once
+    #[arg(long, short, value_name = "FILE", value_hint = ValueHint::FilePath, required = true)]
+    pub output: Vec<PathBuf>,
     /// What to render
     #[arg(long, value_enum, default_value = "ao")]
     pub integrator: Integrator,
@@ -219,10 +219,15 @@ pub struct RenderArgs {
 }
 
 impl RenderArgs {
+    /// Will an .exr be written?
+    pub fn writes_exr(&self) -> bool {
+        self.output.iter().any(|p| ImageFormat::of(p).is_ok_and(|f| f == ImageFormat::Exr))
+    }
+
     /// Checks what concerns more than one option.
     pub fn check(&self) -> Result<()> {
-        let format = ImageFormat::of(&self.output)?;
-        if !self.aov.is_empty() && format != ImageFormat::Exr {
+        let formats = self.output.iter().map(|p| ImageFormat::of(p)).collect::<Result<Vec<_>>>()?;
+        if !self.aov.is_empty() && !formats.contains(&ImageFormat::Exr) {
             return Err(Error::Usage("--aov needs an .exr output: PNG holds colour only".into()));
         }
         if let Some(path) = &self.depth_image {
@@ -259,7 +264,7 @@ impl RenderArgs {
     /// Every file that will be written.
     pub fn outputs(&self) -> Vec<PathBuf> {
         let dumps = self.dump_rays.iter().flat_map(|p| [dump_path(p, "primary"), dump_path(p, "ao")]);
-        [self.output.clone()].into_iter().chain(self.depth_image.clone()).chain(dumps).collect()
+        self.output.iter().chain(&self.depth_image).cloned().chain(dumps).collect()
     }
 }
 

@@ -98,7 +98,9 @@ pub fn run(args: &RenderArgs, start: Instant) -> Result<()> {
         channels: channels(result.film, args, &pixels, origin),
         metadata: report.metadata(),
     };
-    output::save(&image, &args.output)?;
+    for path in &args.output {
+        output::save(&image, path)?;
+    }
     device.save_pipeline_cache();
     report.seconds.write = write_start.elapsed().as_secs_f64();
     report.seconds.total = start.elapsed().as_secs_f64();
@@ -149,7 +151,7 @@ fn covered_mean(film: &crate::render::film::Film) -> f64 {
 fn channels(film: crate::render::film::Film, args: &RenderArgs, pixels: &[AovPixel], origin: glam::DVec3) -> Vec<Channel> {
     let f32s = |name: &str, samples| Channel { name: name.into(), samples: Samples::F32(samples) };
     let mut out = vec![f32s("Y", film.mean)];
-    if ImageFormat::of(&args.output).is_ok_and(|f| f == ImageFormat::Png) {
+    if !args.writes_exr() {
         return out;
     }
     out.push(f32s("A", film.coverage));

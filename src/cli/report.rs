@@ -109,7 +109,7 @@ impl Report<'_> {
         let mut lines = vec![
             format!(
                 "{}: {width}x{height}, {} spp, tracer {} on {}; mean accessibility {:.5} +- {:.5} ({:.5} where the scene is)",
-                self.args.output.display(),
+                self.args.output.iter().map(|p| p.display().to_string()).collect::<Vec<_>>().join(", "),
                 self.spp,
                 self.tracer,
                 self.device.name,
