@@ -55,7 +55,7 @@ pub fn sphere_over_plane(radius: f64, height: f64, side: f64, at: Placement) -> 
 pub fn parallel_planes(width: f64, depth: f64, gap: f64, at: Placement) -> Scene {
     let floor = shapes::rectangle(DVec3::ZERO, DVec3::Z * depth, DVec3::X * width);
     let ceiling = shapes::rectangle(DVec3::Y * gap, DVec3::X * width, DVec3::Z * depth);
-    let eye = DVec3::new(0.2 * width, 0.6 * gap, 0.5 * depth + 0.4 * width);
+    let eye = DVec3::new(0.1 * width, 0.7 * gap, 0.5 * depth + 0.5 * gap);
     let target = DVec3::new(0.0, 0.35 * gap, 0.0);
     scene_of("parallel-planes", vec![("floor", floor), ("ceiling", ceiling)], eye, target, 50.0, at)
 }
