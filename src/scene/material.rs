@@ -215,3 +215,38 @@ impl Default for Material {
         }
     }
 }
+
+impl Material {
+    /// Every texture slot, filled or not, for changing.
+    pub fn texture_slots_mut(&mut self) -> [&mut Option<TextureSlot>; 15] {
+        [
+            &mut self.base_color_texture,
+            &mut self.metallic_roughness_texture,
+            &mut self.normal_texture,
+            &mut self.occlusion_texture,
+            &mut self.emissive_texture,
+            &mut self.clearcoat.texture,
+            &mut self.clearcoat.roughness_texture,
+            &mut self.clearcoat.normal_texture,
+            &mut self.sheen.color_texture,
+            &mut self.sheen.roughness_texture,
+            &mut self.transmission.texture,
+            &mut self.transmission.thickness_texture,
+            &mut self.specular.texture,
+            &mut self.specular.color_texture,
+            &mut self.anisotropy.texture,
+        ]
+    }
+
+    /// The filled texture slots.
+    pub fn textures(&self) -> impl Iterator<Item = TextureSlot> {
+        let mut copy = self.clone();
+        let slots = copy.texture_slots_mut().map(|slot| *slot);
+        slots.into_iter().flatten()
+    }
+
+    /// Whether shading needs the tangents of a mesh: a normal map, or anisotropy.
+    pub fn needs_tangents(&self) -> bool {
+        self.normal_texture.is_some() || self.clearcoat.normal_texture.is_some() || self.anisotropy.strength > 0.0
+    }
+}

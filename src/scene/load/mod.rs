@@ -1,12 +1,74 @@
-//! Files to [`Scene`].
+//! Files to [`Scene`]: a reader for each format, then [`finish`], which makes the promises that every scene keeps.
+
+mod brhan;
+mod find;
+mod finish;
+mod gltf;
+mod normals;
+mod obj;
+mod picture;
+mod tangents;
 
 use std::path::Path;
 
 use crate::error::{Error, Result};
-use crate::scene::Scene;
+use crate::scene::{Scene, builtin};
 
-/// Loads a scene: a built-in one by name (`builtin:NAME`), or a file by its extension (.gltf, .glb, .obj, .brhan).
+/// Loads a scene: a built-in one by name (`builtin:NAME`, or `NAME` alone where no such file exists), or a file by its
+/// extension, in either case of letters: `.gltf`, `.glb`, `.obj`, `.brhan`.
+///
+/// What is loaded keeps these promises: at least one triangle or sphere is placed; at least one material exists; all
+/// indices are in range; positions, normals, texture coordinates and transforms are finite; transforms can be inverted;
+/// no triangle is degenerate; normals have unit length; tangents exist where a material needs them. What had to be done
+/// for that, short of an error, is in [`Scene::report`].
+///
+/// # Errors
+/// [`Error::Input`] for a file that is missing, broken or needs what skylit does not have; [`Error::Scene`] when nothing
+/// is left to render; [`Error::Usage`] for a built-in scene that does not exist.
 pub fn load(source: &str) -> Result<Scene> {
+    if let Some(name) = source.strip_prefix("builtin:") {
+        return builtin::by_name(name)
+            .ok_or_else(|| Error::Usage(format!("no built-in scene is called `{name}`; `skylit scenes` lists them")));
+    }
     let path = Path::new(source);
-    Err(Error::input(path, "unknown kind of scene file"))
+    if path.extension().is_none() && !path.exists() {
+        if let Some(scene) = builtin::by_name(source) {
+            return Ok(scene);
+        }
+        return Err(Error::input(path, "no such file, and no built-in scene of that name (`skylit scenes` lists them)"));
+    }
+    load_file(path)
+}
+
+/// Loads a scene file by its extension; see [`load`].
+///
+/// # Errors
+/// As [`load`].
+pub fn load_file(path: &Path) -> Result<Scene> {
+    let mut scene = read(path)?;
+    scene.name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    finish::finish(&mut scene, path)?;
+    Ok(scene)
+}
+
+/// Reads any format, without [`finish`].
+fn read(path: &Path) -> Result<Scene> {
+    match extension(path).as_str() {
+        "brhan" => brhan::read(path),
+        _ => read_model(path),
+    }
+}
+
+/// Reads the formats that hold models and may be named by another file, without [`finish`].
+fn read_model(path: &Path) -> Result<Scene> {
+    match extension(path).as_str() {
+        "gltf" | "glb" => gltf::read(path),
+        "obj" => obj::read(path),
+        "" => Err(Error::input(path, "has no extension; skylit reads .gltf, .glb, .obj and .brhan")),
+        other => Err(Error::input(path, format!("cannot read .{other} files; skylit reads .gltf, .glb, .obj and .brhan"))),
+    }
+}
+
+fn extension(path: &Path) -> String {
+    path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase()
 }

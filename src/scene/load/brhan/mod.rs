@@ -1,0 +1,238 @@
+//! `.brhan`: the text scenes of Larsen's reference path tracer. A camera, wishes for rendering, OBJ (or glTF) models with
+//! transforms and materials, spheres.
+//!
+//! Spheres stay analytic. A `SphericalLight` is a sphere with an emissive material and nothing else: it is seen by camera
+//! rays and counted once, as an emissive surface, not again in [`Scene::lights`].
+
+mod parse;
+
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+
+use glam::{DAffine3, DMat3, DVec3, Vec3};
+
+use parse::Statement;
+
+use super::{find, finish};
+use crate::error::{Error, Result};
+use crate::scene::material::{Material, MaterialKind, Transmission};
+use crate::scene::{Camera, Geometry, Instance, Mesh, Scene, Sphere};
+
+/// Reads a `.brhan` file and the models that it names.
+pub(super) fn read(path: &Path) -> Result<Scene> {
+    let bytes = std::fs::read(path).map_err(|e| Error::read(path, &e))?;
+    let text = String::from_utf8_lossy(&bytes);
+    let statements = parse::statements(&text).map_err(|e| Error::input(path, e))?;
+    let mut loader = Loader { path, scene: Scene::default(), models: HashMap::new() };
+    for mut statement in statements {
+        loader.statement(&mut statement)?;
+        statement.done().map_err(|e| Error::input(path, e))?;
+    }
+    Ok(loader.scene)
+}
+
+struct Loader<'a> {
+    path: &'a Path,
+    scene: Scene,
+    /// What was made of each model with each material: meshes and their places in the model.
+    models: HashMap<(PathBuf, Option<String>), Vec<Instance>>,
+}
+
+impl Loader<'_> {
+    fn statement(&mut self, s: &mut Statement) -> Result<()> {
+        if s.key == "Model" {
+            return self.model(s);
+        }
+        let made = match s.key {
+            "Camera" => self.camera(s),
+            "Integrator" => self.integrator(s),
+            "Sphere" => self.sphere(s),
+            "SphericalLight" => self.light(s),
+            "SaveIntervals" => s.own_counts().map(|n| self.scene.hints.save_intervals = n),
+            "GenDepthImage" => match s.own() {
+                Ok("true" | "false") => {
+                    self.scene.hints.depth_image = s.own() == Ok("true");
+                    Ok(())
+                }
+                Ok(other) => Err(format!("line {}: GenDepthImage[{other}]: true or false expected", s.line)),
+                Err(e) => Err(e),
+            },
+            key => Err(format!(
+                "line {}: unknown key `{key}` (Camera, Integrator, Model, Sphere, SphericalLight, SaveIntervals and \
+                 GenDepthImage are known)",
+                s.line
+            )),
+        };
+        made.map_err(|e| Error::input(self.path, e))
+    }
+
+    fn camera(&mut self, s: &mut Statement) -> Result<(), String> {
+        let line = s.line;
+        let eye = s.vector("position")?.unwrap_or(DVec3::ZERO);
+        let direction = s.vector("view_direction")?.unwrap_or(DVec3::NEG_Z);
+        let fov = s.number("vertical_fov")?.unwrap_or(45.0);
+        let direction = direction.try_normalize().ok_or_else(|| format!("line {line}: Camera: view_direction[] is zero"))?;
+        if !(fov > 0.0 && fov < 180.0) {
+            return Err(format!("line {line}: Camera: vertical_fov[{fov}]: between 0 and 180 degrees expected"));
+        }
+        let mut camera = Camera::look_at(eye, eye + direction, DVec3::Y, fov.to_radians());
+        if let (Some(width), Some(height)) = (s.count("width", 1)?, s.count("height", 1)?) {
+            self.scene.hints.size = Some([width, height]);
+            camera.aspect = Some(f64::from(width) / f64::from(height));
+        }
+        self.scene.cameras.push(camera);
+        Ok(())
+    }
+
+    fn integrator(&mut self, s: &mut Statement) -> Result<(), String> {
+        if let Some(other) = s.text("type").filter(|t| *t != "path") {
+            let warning = format!("line {}: the integrator `{other}` is not known: ignored", s.line);
+            self.scene.report.warnings.push(warning);
+        }
+        self.scene.hints.spp = s.count("spp", 1)?;
+        self.scene.hints.max_depth = s.count("max_depth", 0)?;
+        Ok(())
+    }
+
+    fn sphere(&mut self, s: &mut Statement) -> Result<(), String> {
+        let sphere = sphere(s)?;
+        let material = material(s)?.unwrap_or_else(|| Material { kind: MaterialKind::Matte, ..Material::default() });
+        self.push_sphere("Sphere", sphere, material);
+        Ok(())
+    }
+
+    fn light(&mut self, s: &mut Statement) -> Result<(), String> {
+        let sphere = sphere(s)?;
+        let emissive = s.color("emittance")?.unwrap_or(Vec3::ONE);
+        let black = Vec3::ZERO.extend(1.0);
+        let material = Material { kind: MaterialKind::Matte, base_color: black, emissive, ..Material::default() };
+        self.push_sphere("SphericalLight", sphere, material);
+        Ok(())
+    }
+
+    fn push_sphere(&mut self, name: &str, sphere: Sphere, material: Material) {
+        let scene = &mut self.scene;
+        let mesh = scene.meshes.len();
+        scene.instances.push(Instance { name: name.to_owned(), mesh, object_to_world: DAffine3::IDENTITY });
+        scene.meshes.push(Mesh {
+            name: name.to_owned(),
+            geometry: Geometry::Spheres(vec![sphere]),
+            material: scene.materials.len(),
+        });
+        scene.materials.push(Material { name: name.to_owned(), ..material });
+    }
+
+    fn model(&mut self, s: &mut Statement) -> Result<()> {
+        let here = |e: String| Error::input(self.path, e);
+        let file = s.need("file").map_err(here)?;
+        let to_world = transform(s).map_err(here)?;
+        let material = material(s).map_err(here)?;
+        let found = find::find(file, &[self.path]).map_err(|searched| {
+            let searched = find::list(&searched);
+            here(format!("line {}: the model {file} does not exist; searched in {searched}", s.line))
+        })?;
+        // a file that is placed twice in one material is read once
+        let key = (found, material.as_ref().map(|m| format!("{m:?}")));
+        if !self.models.contains_key(&key) {
+            let mut model = super::read_model(&key.0)?;
+            finish::check(&model, &key.0)?;
+            if let Some(material) = material {
+                for mesh in &mut model.meshes {
+                    mesh.material = 0;
+                }
+                (model.materials, model.textures) = (vec![material], Vec::new());
+            }
+            let placed = append(&mut self.scene, model);
+            self.models.insert(key.clone(), placed);
+        }
+        for placed in &self.models[&key] {
+            let object_to_world = to_world * placed.object_to_world;
+            self.scene.instances.push(Instance { object_to_world, ..placed.clone() });
+        }
+        Ok(())
+    }
+}
+
+/// Moves a model's meshes, materials and textures into `scene`; returns its instances, which are not placed yet.
+fn append(scene: &mut Scene, model: Scene) -> Vec<Instance> {
+    let (meshes, materials, textures) = (scene.meshes.len(), scene.materials.len(), scene.textures.len());
+    scene.textures.extend(model.textures);
+    scene.materials.extend(model.materials.into_iter().map(|mut material| {
+        for slot in material.texture_slots_mut().into_iter().flatten() {
+            slot.texture += textures;
+        }
+        material
+    }));
+    scene.meshes.extend(model.meshes.into_iter().map(|mesh| Mesh { material: mesh.material + materials, ..mesh }));
+    scene.report.warnings.extend(model.report.warnings);
+    model.instances.into_iter().map(|i| Instance { mesh: i.mesh + meshes, ..i }).collect()
+}
+
+fn sphere(s: &mut Statement) -> Result<Sphere, String> {
+    let line = s.line;
+    let center = s.vector("center")?.unwrap_or(DVec3::ZERO).as_vec3();
+    let radius = s.number("radius")?.unwrap_or(1.0) as f32;
+    if !(radius > 0.0 && radius.is_finite()) {
+        return Err(format!("line {line}: {}: radius[{radius}]: a number above zero expected", s.key));
+    }
+    Ok(Sphere { center, radius })
+}
+
+/// `translate * rotate_z * rotate_y * rotate_x * scale`: a point is scaled, turned about x, y and z in the order in which
+/// the angles are written, and moved. No description of the format says so; turning about one axis, as most samples do,
+/// is the same in any order, and the one sample that turns about three comes out closest to upright in this one.
+fn transform(s: &mut Statement) -> Result<DAffine3, String> {
+    let translate = s.vector("translate")?.unwrap_or(DVec3::ZERO);
+    let degrees = s.vector("rotate")?.unwrap_or(DVec3::ZERO);
+    let scale = s.vector("scale")?.unwrap_or(DVec3::ONE);
+    let [x, y, z] = degrees.to_array().map(f64::to_radians);
+    let rotate = DMat3::from_rotation_z(z) * DMat3::from_rotation_y(y) * DMat3::from_rotation_x(x);
+    Ok(DAffine3::from_mat3_translation(rotate * DMat3::from_diagonal(scale), translate))
+}
+
+/// The material that a statement asks for, if it does.
+fn material(s: &mut Statement) -> Result<Option<Material>, String> {
+    let line = s.line;
+    let name = s.text("material");
+    let diffuse = s.color("diffuse")?;
+    let specular = s.color("specular")?;
+    let reflectance = s.color("reflectance")?;
+    let transmittance = s.color("transmittance")?;
+    let Some(name) = name else { return Ok(None) };
+    let kind = match name {
+        "matte" => MaterialKind::Matte,
+        "mirror" => MaterialKind::Mirror,
+        "glass" => MaterialKind::Glass,
+        "copper" => MaterialKind::Copper,
+        "gold" => MaterialKind::Gold,
+        other => {
+            let known = "matte, mirror, glass, copper and gold are known";
+            return Err(format!("line {line}: unknown material `{other}` ({known})"));
+        }
+    };
+    let metal = matches!(kind, MaterialKind::Mirror | MaterialKind::Copper | MaterialKind::Gold);
+    // what the kind stands for, so that renderers that know metallic-roughness only come close
+    let tint = match kind {
+        MaterialKind::Copper => Vec3::new(0.955, 0.638, 0.538),
+        MaterialKind::Gold => Vec3::new(1.0, 0.782, 0.344),
+        _ => Vec3::ONE,
+    };
+    let specular_color = specular.or(reflectance).unwrap_or(if kind == MaterialKind::Matte { Vec3::ZERO } else { tint });
+    let glass = kind == MaterialKind::Glass;
+    Ok(Some(Material {
+        name: name.to_owned(),
+        kind,
+        base_color: diffuse.unwrap_or(tint).extend(1.0),
+        metallic: if metal { 1.0 } else { 0.0 },
+        roughness: match kind {
+            MaterialKind::Mirror | MaterialKind::Glass => 0.0,
+            MaterialKind::Copper | MaterialKind::Gold => 0.3,
+            _ => 1.0,
+        },
+        specular_color,
+        transmittance: if glass { transmittance.unwrap_or(Vec3::ONE) } else { Vec3::ZERO },
+        transmission: Transmission { factor: if glass { 1.0 } else { 0.0 }, ..Default::default() },
+        double_sided: true,
+        ..Material::default()
+    }))
+}

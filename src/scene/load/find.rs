@@ -1,0 +1,40 @@
+//! Files named by other files, which were written on other machines, in other folders.
+
+use std::path::{Path, PathBuf};
+
+/// How far above the naming file's folder to look.
+const ANCESTORS: usize = 3;
+
+/// Looks for `name` beside the files in `beside` and in up to three folders above each, with and without a leading
+/// `models/`. Backslashes count as slashes. The first that exists wins.
+///
+/// # Errors
+/// The folders that were searched, each once, for the message.
+pub(super) fn find(name: &str, beside: &[&Path]) -> Result<PathBuf, Vec<PathBuf>> {
+    let name = name.replace('\\', "/");
+    let mut names = vec![name.clone()];
+    match name.strip_prefix("models/") {
+        Some(short) => names.push(short.to_owned()),
+        None => names.push(format!("models/{name}")),
+    }
+    let mut searched: Vec<PathBuf> = Vec::new();
+    for file in beside {
+        // absolute, because "scene.obj" has no ancestors to climb to
+        let file = std::path::absolute(file).unwrap_or_else(|_| file.to_path_buf());
+        for folder in file.ancestors().skip(1).take(1 + ANCESTORS) {
+            if searched.iter().any(|s| s == folder) {
+                continue;
+            }
+            if let Some(found) = names.iter().map(|n| folder.join(n)).find(|p| p.is_file()) {
+                return Ok(found);
+            }
+            searched.push(folder.to_owned());
+        }
+    }
+    Err(searched)
+}
+
+/// The folders of a failed [`find`] as words.
+pub(super) fn list(searched: &[PathBuf]) -> String {
+    searched.iter().map(|p| p.display().to_string()).collect::<Vec<_>>().join(", ")
+}

@@ -1,0 +1,223 @@
+//! The promises that every loaded scene keeps, whichever format it came from; [`super::load`] lists them.
+
+use std::path::Path;
+
+use glam::{DAffine3, DVec3};
+use rayon::prelude::*;
+
+use super::{normals, tangents};
+use crate::error::{Error, Result};
+use crate::scene::{Geometry, Material, Mesh, Scene, TriangleMesh};
+
+/// Largest coordinate, in object and world space: beyond it, squared lengths overflow single precision.
+const MAX_COORDINATE: f64 = 1e18;
+
+/// Largest element of an inverse transform, for the same reason.
+const MAX_INVERSE: f64 = 1e30;
+
+/// Makes `scene` keep the promises, or says why it cannot. `path` is the file it came from.
+pub(super) fn finish(scene: &mut Scene, path: &Path) -> Result<()> {
+    check(scene, path)?;
+    if scene.materials.is_empty() {
+        scene.materials.push(Material::default());
+    }
+    texcoord_sets(scene);
+    bake_singular(scene);
+    drop_unplaced(scene);
+
+    let materials = &scene.materials;
+    let notes: Vec<Notes> = scene.meshes.par_iter_mut().map(|mesh| repair(mesh, &materials[mesh.material])).collect();
+    for note in notes {
+        scene.report.warnings.extend(note.warnings);
+        scene.report.degenerate_triangles += note.degenerate;
+        scene.report.normals_computed += usize::from(note.flat);
+        scene.report.tangents_computed += usize::from(note.tangents);
+    }
+    drop_empty(scene);
+    extent(scene, path)
+}
+
+/// Checks what no repair helps: positions that are not finite, indices out of range.
+pub(super) fn check(scene: &Scene, path: &Path) -> Result<()> {
+    for (m, mesh) in scene.meshes.iter().enumerate() {
+        check_mesh(mesh).map_err(|e| Error::input(path, format!("mesh {m} `{}`: {e}", mesh.name)))?;
+    }
+    match scene.instances.iter().find(|i| !i.object_to_world.is_finite()) {
+        Some(i) => Err(Error::input(path, format!("node `{}` has a transform that is not finite", i.name))),
+        None => Ok(()),
+    }
+}
+
+fn check_mesh(mesh: &Mesh) -> Result<(), String> {
+    const REMEDY: &str = "repair the model and export it again";
+    let triangles = match &mesh.geometry {
+        Geometry::Triangles(triangles) => triangles,
+        Geometry::Spheres(spheres) => {
+            let good = |s: &crate::scene::Sphere| s.center.is_finite() && s.radius.is_finite() && s.radius > 0.0;
+            return match spheres.iter().position(|s| !good(s)) {
+                Some(i) => Err(format!("sphere {i} has a radius that is not above zero, or a value that is not finite")),
+                None => Ok(()),
+            };
+        }
+    };
+    let far = |p: &glam::Vec3| f64::from(p.abs().max_element()) > MAX_COORDINATE;
+    if let Some(i) = triangles.positions.iter().position(|p| !p.is_finite()) {
+        return Err(format!("the position of vertex {i} is not finite (NaN or infinite): {REMEDY}"));
+    }
+    if let Some(i) = triangles.positions.iter().position(far) {
+        return Err(format!("the position of vertex {i} is beyond {MAX_COORDINATE:e} units: scale the model down"));
+    }
+    let count = triangles.positions.len();
+    if let Some(t) = triangles.indices.iter().position(|t| t.iter().any(|&i| i as usize >= count)) {
+        let index = triangles.indices[t].iter().max().copied().unwrap_or(0);
+        return Err(format!("triangle {t} refers to vertex {index}, but there are only {count}: {REMEDY}"));
+    }
+    Ok(())
+}
+
+/// Slots that ask for a third or later set of texture coordinates get the first: we keep two.
+fn texcoord_sets(scene: &mut Scene) {
+    for material in &mut scene.materials {
+        for slot in material.texture_slots_mut().into_iter().flatten().filter(|s| s.texcoord > 1) {
+            let set = std::mem::take(&mut slot.texcoord);
+            scene.report.warnings.push(format!("texture coordinates {set} are not read (0 and 1 are): 0 taken"));
+        }
+    }
+}
+
+/// Tracers invert transforms. A mesh that its transform squashes flat gets it applied to its vertices instead.
+fn bake_singular(scene: &mut Scene) {
+    for instance in &mut scene.instances {
+        let inverse = instance.object_to_world.inverse();
+        let largest = inverse
+            .to_cols_array()
+            .into_iter()
+            .fold(0.0, |a: f64, x| if x.is_finite() { a.max(x.abs()) } else { f64::INFINITY });
+        if largest <= MAX_INVERSE {
+            continue;
+        }
+        let source = &scene.meshes[instance.mesh];
+        let geometry = match &source.geometry {
+            Geometry::Triangles(t) => {
+                let place = |p: &glam::Vec3| instance.object_to_world.transform_point3(p.as_dvec3()).as_vec3();
+                let positions = t.positions.iter().map(place).collect();
+                Geometry::Triangles(TriangleMesh { positions, normals: Vec::new(), tangents: Vec::new(), ..t.clone() })
+            }
+            Geometry::Spheres(_) => Geometry::Spheres(Vec::new()),
+        };
+        let mesh = Mesh { name: source.name.clone(), geometry, material: source.material };
+        instance.mesh = scene.meshes.len();
+        instance.object_to_world = DAffine3::IDENTITY;
+        scene.meshes.push(mesh);
+    }
+}
+
+#[derive(Default)]
+struct Notes {
+    warnings: Vec<String>,
+    degenerate: usize,
+    flat: bool,
+    tangents: bool,
+}
+
+fn repair(mesh: &mut Mesh, material: &Material) -> Notes {
+    let mut notes = Notes::default();
+    let Geometry::Triangles(triangles) = &mut mesh.geometry else { return notes };
+    let before = triangles.indices.len();
+    let positions = &triangles.positions;
+    triangles.indices.retain(|&t| !is_degenerate(t, positions));
+    notes.degenerate = before - triangles.indices.len();
+    if triangles.indices.is_empty() {
+        return notes;
+    }
+    let mut warn = |text: String| notes.warnings.push(format!("mesh `{}`: {text}", mesh.name));
+
+    for slot in material.textures() {
+        let set = &mut triangles.texcoords[slot.texcoord];
+        if set.is_empty() {
+            warn(format!("has no texture coordinates {}, which its material uses: taken as zero", slot.texcoord));
+            set.resize(triangles.positions.len(), glam::Vec2::ZERO);
+        }
+    }
+    let texcoords = triangles.texcoords.iter_mut().flatten();
+    let bad: usize = texcoords.filter(|t| !t.is_finite()).map(|t| *t = glam::Vec2::ZERO).count();
+    let bad_colors = triangles.colors.iter_mut().filter(|c| !c.is_finite()).map(|c| *c = glam::Vec4::ONE).count();
+    if bad + bad_colors > 0 {
+        warn(format!("{bad} texture coordinates and {bad_colors} colours were not finite: replaced"));
+    }
+    if triangles.normals.is_empty() {
+        notes.flat = true;
+    } else {
+        let repaired = normals::repair(triangles);
+        if repaired > 0 {
+            notes.warnings.push(format!("mesh `{}`: {repaired} normals had no direction: computed", mesh.name));
+        }
+    }
+    if !material.needs_tangents() {
+        triangles.tangents = Vec::new();
+    } else if !tangents::normalize(triangles) {
+        let slot = material.normal_texture.or(material.clearcoat.normal_texture).or(material.anisotropy.texture);
+        tangents::compute(triangles, slot.map_or(0, |s| s.texcoord));
+        notes.tangents = true;
+    }
+    notes
+}
+
+/// Two corners coincide, or all three lie on a line: exactly, in f64.
+fn is_degenerate(t: [u32; 3], positions: &[glam::Vec3]) -> bool {
+    if t[0] == t[1] || t[1] == t[2] || t[2] == t[0] {
+        return true;
+    }
+    let [a, b, c] = t.map(|i| positions[i as usize].as_dvec3());
+    (b - a).cross(c - a) == DVec3::ZERO
+}
+
+/// Forgets meshes that nothing places.
+fn drop_unplaced(scene: &mut Scene) {
+    let mut keep = vec![false; scene.meshes.len()];
+    for instance in &scene.instances {
+        keep[instance.mesh] = true;
+    }
+    retain_meshes(scene, &keep);
+}
+
+/// Forgets meshes without a triangle or sphere, and where they are placed: acceleration structures must not be empty.
+fn drop_empty(scene: &mut Scene) {
+    let keep: Vec<bool> = scene.meshes.iter().map(|m| m.geometry.primitive_count() > 0).collect();
+    for mesh in scene.meshes.iter().zip(&keep).filter(|(_, keep)| !**keep).map(|(m, _)| m) {
+        scene.report.warnings.push(format!("mesh `{}` has nothing to show: left out", mesh.name));
+    }
+    scene.instances.retain(|i| keep[i.mesh]);
+    retain_meshes(scene, &keep);
+}
+
+fn retain_meshes(scene: &mut Scene, keep: &[bool]) {
+    if keep.iter().all(|&k| k) {
+        return;
+    }
+    let mut index = Vec::with_capacity(keep.len());
+    let mut next = 0;
+    for &k in keep {
+        index.push(next);
+        next += usize::from(k);
+    }
+    for instance in &mut scene.instances {
+        instance.mesh = index[instance.mesh];
+    }
+    let mut keep = keep.iter();
+    scene.meshes.retain(|_| keep.next().copied().unwrap_or(true));
+}
+
+/// The scene must have an extent that single precision can hold.
+fn extent(scene: &Scene, path: &Path) -> Result<()> {
+    let Some((lo, hi)) = scene.bounds() else {
+        let dropped = scene.report.degenerate_triangles;
+        let why = if dropped > 0 { format!(" ({dropped} degenerate ones were dropped)") } else { String::new() };
+        let name = path.display();
+        return Err(Error::Scene(format!("{name}: the scene has no triangles and no spheres{why}: nothing to render")));
+    };
+    if lo.abs().max(hi.abs()).max_element() <= MAX_COORDINATE {
+        return Ok(());
+    }
+    Err(Error::Scene(format!("{}: the scene reaches beyond {MAX_COORDINATE:e} units: scale it down", path.display())))
+}

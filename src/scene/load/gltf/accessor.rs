@@ -1,0 +1,285 @@
+//! Typed arrays in buffers. Every range is checked against the buffer view and the buffer before a byte is read.
+
+use std::borrow::Cow;
+
+use super::schema::{Accessor, Document};
+
+/// Elements that an accessor without data (all zeros, or sparse over zeros) may have; nothing in the file bounds them.
+const MAX_EMPTY: u64 = 1 << 24;
+
+/// Reads accessors. Errors are in words and name the accessor; the caller adds the file.
+pub(super) struct Reader<'a> {
+    pub document: &'a Document,
+    pub buffers: &'a [Cow<'a, [u8]>],
+}
+
+#[derive(Clone, Copy, PartialEq)]
+enum Component {
+    I8,
+    U8,
+    I16,
+    U16,
+    U32,
+    F32,
+}
+
+impl Component {
+    fn new(code: u32) -> Option<Self> {
+        Some(match code {
+            5120 => Component::I8,
+            5121 => Component::U8,
+            5122 => Component::I16,
+            5123 => Component::U16,
+            5125 => Component::U32,
+            5126 => Component::F32,
+            _ => return None,
+        })
+    }
+
+    fn size(self) -> usize {
+        match self {
+            Component::I8 | Component::U8 => 1,
+            Component::I16 | Component::U16 => 2,
+            Component::U32 | Component::F32 => 4,
+        }
+    }
+
+    /// The float at the start of `b`; normalised integers map to [0, 1] or [-1, 1] as the specification says.
+    #[inline(always)]
+    fn float(self, b: &[u8], normalized: bool) -> f32 {
+        match (self, normalized) {
+            (Component::F32, _) => f32::from_le_bytes([b[0], b[1], b[2], b[3]]),
+            (Component::I8, false) => f32::from(b[0] as i8),
+            (Component::U8, false) => f32::from(b[0]),
+            (Component::I16, false) => f32::from(i16::from_le_bytes([b[0], b[1]])),
+            (Component::U16, false) => f32::from(u16::from_le_bytes([b[0], b[1]])),
+            (Component::I8, true) => (f32::from(b[0] as i8) / 127.0).max(-1.0),
+            (Component::U8, true) => f32::from(b[0]) / 255.0,
+            (Component::I16, true) => (f32::from(i16::from_le_bytes([b[0], b[1]])) / 32767.0).max(-1.0),
+            (Component::U16, true) => f32::from(u16::from_le_bytes([b[0], b[1]])) / 65535.0,
+            (Component::U32, false) => u32::from_le_bytes([b[0], b[1], b[2], b[3]]) as f32,
+            (Component::U32, true) => (f64::from(u32::from_le_bytes([b[0], b[1], b[2], b[3]])) / f64::from(u32::MAX)) as f32,
+        }
+    }
+
+    /// The unsigned integer at the start of `b`.
+    #[inline(always)]
+    fn index(self, b: &[u8]) -> u32 {
+        match self {
+            Component::U8 => u32::from(b[0]),
+            Component::U16 => u32::from(u16::from_le_bytes([b[0], b[1]])),
+            _ => u32::from_le_bytes([b[0], b[1], b[2], b[3]]),
+        }
+    }
+
+    fn is_index(self) -> bool {
+        matches!(self, Component::U8 | Component::U16 | Component::U32)
+    }
+}
+
+/// Equally spaced elements, in range by construction.
+struct Elements<'a> {
+    bytes: &'a [u8],
+    stride: usize,
+}
+
+/// The numbers of a scalar accessor of unsigned integers, read where they lie.
+pub(super) enum Indices<'a> {
+    /// No copy.
+    InPlace { bytes: &'a [u8], count: usize, stride: usize, size: usize },
+    /// A sparse accessor's, put together.
+    Owned(Vec<u32>),
+}
+
+impl Indices<'_> {
+    pub(super) fn len(&self) -> usize {
+        match self {
+            Indices::InPlace { count, .. } => *count,
+            Indices::Owned(v) => v.len(),
+        }
+    }
+
+    /// The index at `i`, which must be below `len`.
+    #[inline(always)]
+    pub(super) fn get(&self, i: usize) -> u32 {
+        match self {
+            Indices::InPlace { bytes, stride, size, .. } => {
+                let b = &bytes[i * stride..];
+                match size {
+                    1 => Component::U8.index(b),
+                    2 => Component::U16.index(b),
+                    _ => Component::U32.index(b),
+                }
+            }
+            Indices::Owned(v) => v[i],
+        }
+    }
+}
+
+impl<'a> Reader<'a> {
+    fn accessor(&self, index: usize) -> Result<&'a Accessor, String> {
+        self.document
+            .accessors
+            .get(index)
+            .ok_or_else(|| format!("accessor {index} does not exist (the file has {})", self.document.accessors.len()))
+    }
+
+    /// Number of elements.
+    pub(super) fn count(&self, index: usize) -> Result<usize, String> {
+        usize::try_from(self.accessor(index)?.count).map_err(|_| format!("accessor {index} has too many elements"))
+    }
+
+    /// The bytes and stride of a buffer view.
+    pub(super) fn view(&self, index: usize) -> Result<(&'a [u8], Option<usize>), String> {
+        let views = &self.document.buffer_views;
+        let view =
+            views.get(index).ok_or_else(|| format!("buffer view {index} does not exist (the file has {})", views.len()))?;
+        let buffer = self
+            .buffers
+            .get(view.buffer)
+            .ok_or_else(|| format!("buffer view {index} refers to buffer {}, which does not exist", view.buffer))?;
+        // the declared length counts, not the padding that may follow
+        let declared = self.document.buffers[view.buffer].byte_length.min(buffer.len() as u64);
+        match view.byte_offset.checked_add(view.byte_length) {
+            Some(end) if end <= declared => {
+                Ok((&buffer[view.byte_offset as usize..end as usize], view.byte_stride.map(|s| s as usize).filter(|&s| s > 0)))
+            }
+            _ => Err(format!(
+                "buffer view {index} lies outside of its buffer (bytes {} + {} of {declared})",
+                view.byte_offset, view.byte_length
+            )),
+        }
+    }
+
+    /// `count` elements of `size` bytes from `offset` on in a buffer view.
+    fn elements(&self, view: usize, offset: u64, count: u64, size: usize) -> Result<Elements<'a>, String> {
+        let (bytes, stride) = self.view(view)?;
+        let stride = stride.unwrap_or(size);
+        if stride < size {
+            return Err(format!("buffer view {view} has a stride of {stride} bytes for elements of {size}"));
+        }
+        if count == 0 {
+            return Ok(Elements { bytes: &[], stride });
+        }
+        let end = (count - 1).checked_mul(stride as u64).and_then(|n| n.checked_add(size as u64)?.checked_add(offset));
+        match end {
+            Some(end) if end <= bytes.len() as u64 => Ok(Elements { bytes: &bytes[offset as usize..end as usize], stride }),
+            _ => Err(format!("{count} elements lie outside of buffer view {view} ({} bytes)", bytes.len())),
+        }
+    }
+
+    /// Reads an accessor of floats or (normalised) integers with `N` components (`shape` is its glTF name).
+    pub(super) fn floats<const N: usize, T>(
+        &self,
+        index: usize,
+        shape: &str,
+        make: impl Fn([f32; N]) -> T,
+    ) -> Result<Vec<T>, String> {
+        let accessor = self.accessor(index)?;
+        if accessor.shape != shape {
+            return Err(format!("accessor {index} is of type {} where {shape} is needed", accessor.shape));
+        }
+        self.try_floats(accessor, make).map_err(|e| format!("accessor {index}: {e}"))
+    }
+
+    fn try_floats<const N: usize, T>(&self, accessor: &Accessor, make: impl Fn([f32; N]) -> T) -> Result<Vec<T>, String> {
+        let component = self.component(accessor)?;
+        let mut out = match accessor.buffer_view {
+            Some(view) => {
+                let elements = self.elements(view, accessor.byte_offset, accessor.count, N * component.size())?;
+                gather(&elements, accessor.count as usize, component, accessor.normalized, &make)
+            }
+            None => {
+                check_empty(accessor)?;
+                (0..accessor.count).map(|_| make([0.0; N])).collect()
+            }
+        };
+        if let Some((at, values)) = self.sparse(accessor, N * component.size())? {
+            let values = gather(&values, at.len(), component, accessor.normalized, &make);
+            for (i, value) in at.into_iter().zip(values) {
+                out[i] = value;
+            }
+        }
+        Ok(out)
+    }
+
+    /// Reads a scalar accessor of unsigned integers.
+    pub(super) fn indices(&self, index: usize) -> Result<Indices<'a>, String> {
+        let accessor = self.accessor(index)?;
+        self.try_indices(accessor).map_err(|e| format!("accessor {index}: {e}"))
+    }
+
+    fn try_indices(&self, accessor: &Accessor) -> Result<Indices<'a>, String> {
+        let component = self.component(accessor)?;
+        if accessor.shape != "SCALAR" || !component.is_index() {
+            return Err("holds no indices (unsigned scalars)".to_owned());
+        }
+        let base = match accessor.buffer_view {
+            Some(view) => {
+                let Elements { bytes, stride } = self.elements(view, accessor.byte_offset, accessor.count, component.size())?;
+                Indices::InPlace { bytes, count: accessor.count as usize, stride, size: component.size() }
+            }
+            None => {
+                check_empty(accessor)?;
+                Indices::Owned(vec![0; accessor.count as usize])
+            }
+        };
+        let Some((at, values)) = self.sparse(accessor, component.size())? else { return Ok(base) };
+        let mut all: Vec<u32> = (0..base.len()).map(|i| base.get(i)).collect();
+        for (k, i) in at.into_iter().enumerate() {
+            all[i] = component.index(&values.bytes[k * values.stride..]);
+        }
+        Ok(Indices::Owned(all))
+    }
+
+    fn component(&self, accessor: &Accessor) -> Result<Component, String> {
+        Component::new(accessor.component_type)
+            .ok_or_else(|| format!("has the unknown component type {}", accessor.component_type))
+    }
+
+    /// Which elements a sparse accessor replaces, and by what.
+    fn sparse(&self, accessor: &Accessor, size: usize) -> Result<Option<(Vec<usize>, Elements<'a>)>, String> {
+        let Some(sparse) = &accessor.sparse else { return Ok(None) };
+        let component = Component::new(sparse.indices.component_type)
+            .filter(|c| c.is_index())
+            .ok_or("has sparse indices of an unknown component type")?;
+        let at = self.elements(sparse.indices.buffer_view, sparse.indices.byte_offset, sparse.count, component.size())?;
+        let values = self.elements(sparse.values.buffer_view, sparse.values.byte_offset, sparse.count, size)?;
+        let at: Vec<usize> = (0..sparse.count as usize).map(|i| component.index(&at.bytes[i * at.stride..]) as usize).collect();
+        match at.iter().find(|&&i| i as u64 >= accessor.count) {
+            Some(i) => Err(format!("replaces element {i} of only {} (sparse)", accessor.count)),
+            None => Ok(Some((at, values))),
+        }
+    }
+}
+
+/// Refuses counts that nothing in the file bounds and that would only fill memory with zeros.
+fn check_empty(accessor: &Accessor) -> Result<(), String> {
+    match accessor.count > MAX_EMPTY {
+        true => Err(format!("has {} elements but no data", accessor.count)),
+        false => Ok(()),
+    }
+}
+
+fn gather<const N: usize, T>(
+    elements: &Elements,
+    count: usize,
+    component: Component,
+    normalized: bool,
+    make: impl Fn([f32; N]) -> T,
+) -> Vec<T> {
+    let size = component.size();
+    let element = |i: usize| {
+        let b = &elements.bytes[i * elements.stride..][..N * size];
+        make(std::array::from_fn(|k| component.float(&b[k * size..], normalized)))
+    };
+    // the common case apart, so that the compiler sees its constants
+    if component == Component::F32 {
+        let element = |i: usize| {
+            let b = &elements.bytes[i * elements.stride..][..N * 4];
+            make(std::array::from_fn(|k| Component::F32.float(&b[k * 4..k * 4 + 4], false)))
+        };
+        return (0..count).map(element).collect();
+    }
+    (0..count).map(element).collect()
+}

@@ -1,0 +1,136 @@
+//! The node hierarchy: world transforms in f64, placed meshes, cameras and lights.
+
+use glam::{DAffine3, DMat3, DMat4, DQuat, DVec3};
+
+use super::schema::{Document, Node};
+use crate::scene::{Camera, Light, LightKind, Projection};
+
+/// A node of the scene that is shown.
+pub(super) struct Placed {
+    pub node: usize,
+    pub to_world: DAffine3,
+}
+
+/// Every node of the scene with its world transform, parents before children, in the order of the file.
+///
+/// # Errors
+/// What is wrong, in words: indices out of range, nodes reached twice.
+pub(super) fn place(document: &Document) -> Result<Vec<Placed>, String> {
+    let nodes = &document.nodes;
+    let mut parents = vec![0u32; nodes.len()];
+    for (i, node) in nodes.iter().enumerate() {
+        for &child in &node.children {
+            *parents.get_mut(child).ok_or_else(|| format!("node {i} has the child {child}, which does not exist"))? += 1;
+        }
+    }
+    // a node under two parents is no tree; a few of them in a row would mean exponentially many instances
+    if let Some(i) = parents.iter().position(|&p| p > 1) {
+        return Err(format!("node {i} is the child of more than one node"));
+    }
+    let no_scene = document.scenes.is_empty();
+    let roots: Vec<usize> = match document.scene {
+        Some(s) if s >= document.scenes.len() => return Err(format!("the default scene {s} does not exist")),
+        _ if no_scene => (0..nodes.len()).filter(|&i| parents[i] == 0).collect(),
+        s => document.scenes[s.unwrap_or(0)].nodes.clone(),
+    };
+    let mut placed = Vec::new();
+    let mut seen = vec![false; nodes.len()];
+    // a stack and no recursion: files may nest deeper than the call stack
+    let mut stack: Vec<(usize, DAffine3)> = roots.iter().rev().map(|&r| (r, DAffine3::IDENTITY)).collect();
+    while let Some((i, parent)) = stack.pop() {
+        let node = nodes.get(i).ok_or_else(|| format!("the scene names node {i}, which does not exist"))?;
+        if std::mem::replace(&mut seen[i], true) {
+            return Err(format!("node {i} is its own ancestor, or the scene lists it twice"));
+        }
+        let to_world = parent * local(node, i)?;
+        if !to_world.is_finite() {
+            return Err(format!("node {i} has a transform that is not finite"));
+        }
+        placed.push(Placed { node: i, to_world });
+        stack.extend(node.children.iter().rev().map(|&c| (c, to_world)));
+    }
+    if no_scene && let Some(i) = seen.iter().position(|s| !s) {
+        return Err(format!("node {i} is its own ancestor"));
+    }
+    Ok(placed)
+}
+
+fn local(node: &Node, index: usize) -> Result<DAffine3, String> {
+    if let Some(m) = node.matrix {
+        let m = DMat4::from_cols_array(&m);
+        // affine by the specification; a perspective matrix would silently lose its last row
+        if (m.row(3) - glam::DVec4::W).abs().max_element() > 1e-6 {
+            return Err(format!("node {index} has a matrix that is not affine"));
+        }
+        return Ok(DAffine3::from_mat4(m));
+    }
+    let rotation = node.rotation.map_or(DQuat::IDENTITY, DQuat::from_array);
+    // exporters round; and a zero quaternion stands for no rotation
+    let rotation = if rotation.length_squared() > 1e-30 { rotation.normalize() } else { DQuat::IDENTITY };
+    Ok(DAffine3::from_scale_rotation_translation(
+        node.scale.map_or(DVec3::ONE, DVec3::from_array),
+        rotation,
+        node.translation.map_or(DVec3::ZERO, DVec3::from_array),
+    ))
+}
+
+/// Position and orientation of `to_world` without its scale, shear and mirroring. Keeps -z and as much of +y as it can.
+fn rigid(to_world: &DAffine3) -> DAffine3 {
+    let back = to_world.matrix3.z_axis.try_normalize().unwrap_or(DVec3::Z);
+    let right = to_world.matrix3.y_axis.cross(back).try_normalize().unwrap_or_else(|| back.any_orthonormal_vector());
+    DAffine3::from_mat3_translation(DMat3::from_cols(right, back.cross(right), back), to_world.translation)
+}
+
+/// The camera of a node.
+///
+/// # Errors
+/// What is wrong, in words.
+pub(super) fn camera(document: &Document, placed: &Placed, index: usize) -> Result<Camera, String> {
+    let camera = document.cameras.get(index).ok_or_else(|| format!("camera {index} does not exist"))?;
+    let positive = |x: f64| Some(x.abs()).filter(|x| x.is_finite() && *x > 0.0);
+    let (projection, aspect) = match (&camera.perspective, &camera.orthographic) {
+        (Some(p), _) if p.yfov > 0.0 && p.yfov < std::f64::consts::PI => {
+            (Projection::Perspective { fov_y: p.yfov }, p.aspect_ratio.and_then(positive))
+        }
+        (Some(p), _) => return Err(format!("camera {index} has a field of view of {} radians", p.yfov)),
+        (None, Some(o)) => match (positive(o.xmag), positive(o.ymag)) {
+            (x, Some(y)) => (Projection::Orthographic { half_height: y }, x.map(|x| x / y)),
+            _ => return Err(format!("camera {index} has a height of {}", o.ymag)),
+        },
+        (None, None) => return Err(format!("camera {index} is neither perspective nor orthographic")),
+    };
+    let node = &document.nodes[placed.node];
+    // the node tells apart the uses of one camera
+    let name = if node.name.is_empty() { &camera.name } else { &node.name };
+    Ok(Camera { name: name.clone(), camera_to_world: rigid(&placed.to_world), projection, aspect })
+}
+
+/// The punctual light of a node.
+///
+/// # Errors
+/// What is wrong, in words.
+pub(super) fn light(document: &Document, placed: &Placed, index: usize) -> Result<Light, String> {
+    let light = document.extensions.lights.lights.get(index).ok_or_else(|| format!("light {index} does not exist"))?;
+    let kind = match light.kind.as_str() {
+        "point" => LightKind::Point,
+        "directional" => LightKind::Directional,
+        "spot" => {
+            let outer = light.spot.outer_cone_angle.clamp(0.0, std::f32::consts::FRAC_PI_2);
+            LightKind::Spot { inner_angle: light.spot.inner_cone_angle.clamp(0.0, outer), outer_angle: outer }
+        }
+        other => return Err(format!("light {index} is of the unknown type `{other}`")),
+    };
+    let intensity = glam::Vec3::from(light.color) * light.intensity;
+    if !intensity.is_finite() {
+        return Err(format!("light {index} has an intensity that is not finite"));
+    }
+    let node = &document.nodes[placed.node];
+    Ok(Light {
+        name: if light.name.is_empty() { &node.name } else { &light.name }.clone(),
+        kind,
+        intensity,
+        position: placed.to_world.translation,
+        direction: -rigid(&placed.to_world).matrix3.z_axis,
+        range: light.range.filter(|&r| r > 0.0).unwrap_or(f64::INFINITY),
+    })
+}

@@ -1,0 +1,72 @@
+//! Shading normals: unit length, and a direction for those that have none.
+
+use glam::{DVec3, Vec3};
+
+use crate::scene::TriangleMesh;
+
+/// Brings all normals to unit length. Those that are zero or not finite become the mean of the adjacent triangles' normals,
+/// weighted by area. Returns how many those were.
+///
+/// The mesh must have normals, and indices in range.
+pub(super) fn repair(mesh: &mut TriangleMesh) -> usize {
+    let mut bad = 0;
+    for n in &mut mesh.normals {
+        let wide = n.as_dvec3();
+        let squared = wide.length_squared();
+        if !(squared.is_finite() && squared > 0.0) {
+            bad += 1;
+            *n = Vec3::ZERO;
+        } else if (squared - 1.0).abs() > 1e-5 {
+            // what is unit but for rounding stays bit by bit as the file has it
+            *n = (wide / squared.sqrt()).as_vec3();
+        }
+    }
+    if bad > 0 {
+        from_triangles(mesh);
+    }
+    bad
+}
+
+/// Replaces the normals that are zero.
+fn from_triangles(mesh: &mut TriangleMesh) {
+    let mut sums = vec![DVec3::ZERO; mesh.normals.len()];
+    for t in &mesh.indices {
+        let [a, b, c] = t.map(|i| mesh.positions[i as usize].as_dvec3());
+        let area = (b - a).cross(c - a);
+        for &i in t {
+            sums[i as usize] += area;
+        }
+    }
+    for (n, sum) in mesh.normals.iter_mut().zip(sums) {
+        if *n == Vec3::ZERO {
+            // a vertex that no triangle uses needs some direction, too
+            *n = sum.try_normalize().unwrap_or(DVec3::Z).as_vec3();
+        }
+    }
+}
+
+/// The geometric unit normal of each corner, with every corner made a vertex of its own: flat shading as explicit normals.
+pub(super) fn make_flat(mesh: &mut TriangleMesh) {
+    fn expand<T: Copy>(values: &mut Vec<T>, indices: &[[u32; 3]]) {
+        if !values.is_empty() {
+            *values = indices.iter().flatten().map(|&i| values[i as usize]).collect();
+        }
+    }
+    let indices = &mesh.indices;
+    expand(&mut mesh.positions, indices);
+    expand(&mut mesh.colors, indices);
+    for set in &mut mesh.texcoords {
+        expand(set, indices);
+    }
+    mesh.normals = mesh
+        .positions
+        .chunks_exact(3)
+        .flat_map(|p| {
+            let [a, b, c] = [p[0], p[1], p[2]].map(|p| p.as_dvec3());
+            [(b - a).cross(c - a).try_normalize().unwrap_or(DVec3::Z).as_vec3(); 3]
+        })
+        .collect();
+    for (t, triangle) in mesh.indices.iter_mut().enumerate() {
+        *triangle = [3 * t as u32, 3 * t as u32 + 1, 3 * t as u32 + 2];
+    }
+}
