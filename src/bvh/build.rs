@@ -196,6 +196,7 @@ mod tests {
         for i in (1..n).rev() {
             let next = nodes.len() as u32 + 2;
             nodes.push(node(bounds(i), 1, i as u32));
+            // obvhs numbers children after their parents, side by side
             nodes.push(if i == 1 { node(bounds(0), 1, 0) } else { node(bounds(i - 1), 0, next) });
         }
         let tree = Bvh2 { nodes, primitive_indices: (0..n as u32).collect(), ..Default::default() };
