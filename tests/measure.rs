@@ -84,9 +84,11 @@ mod parity {
 
     /// A tracer in single precision, the way a GPU would do it: object-space rays by an f32 inverse, brute force.
     struct Narrow {
-        /// Per instance: object-space triangles or spheres, and the f32 inverse.
-        parts: Vec<(glam::Affine3A, Vec<[Vec3; 3]>, Vec<(Vec3, f32)>)>,
+        parts: Vec<Part>,
     }
+
+    /// The f32 inverse of an instance, and its object-space triangles or spheres.
+    type Part = (glam::Affine3A, Vec<[Vec3; 3]>, Vec<(Vec3, f32)>);
 
     impl Narrow {
         fn new(scene: &Scene, origin: DVec3) -> Self {

@@ -272,7 +272,7 @@ mod ao {
             let got = accessibility(&o, point, normal, &settings, SAMPLES, Sampler { seed }, [3, 4]);
             let difference = (got.mean - want).abs();
             println!("{what}: {:.6} want {want:.6}, difference {difference:.1e}", got.mean);
-            assert!(difference <= (3.0 * got.standard_error).min(5e-4).max(1e-12), "{what}: {got:?}, want {want}");
+            assert!(difference <= (3.0 * got.standard_error).clamp(1e-12, 5e-4), "{what}: {got:?}, want {want}");
         }
     }
 

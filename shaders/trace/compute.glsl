@@ -38,27 +38,28 @@ layout(buffer_reference, std430, buffer_reference_align = 8) readonly buffer Wor
 // kept out of the triangle's box.
 const float SLAB_SCALE = 1.0 + 16.0 * 5.9604645e-8;
 
-// Entry distance of a box, or INFINITY when it is missed. A ray within a slab's plane makes 0 * inf = NaN; the comparisons
-// are ordered so that NaN leaves the interval as it was.
-float enter_box(vec3 lo, vec3 hi, vec3 origin, vec3 inverse, bvec3 negative, float tmin, float tmax) {
+// Minimum and maximum of floats by their bits: one instruction, where NaN-safe ones take three on a CPU driver. Right for the
+// slab test because tmin >= 0: among negative numbers the wrong one may win, but then the interval is empty either way.
+#define MIN(a, b) intBitsToFloat(min(floatBitsToInt(a), floatBitsToInt(b)))
+#define MAX(a, b) intBitsToFloat(max(floatBitsToInt(a), floatBitsToInt(b)))
+
+// Entry distance of a box, or INFINITY when it is missed.
+float enter_box(vec3 lo, vec3 hi, vec3 origin, vec3 inverse, float tmin, float tmax) {
     vec3 t0 = (lo - origin) * inverse;
     vec3 t1 = (hi - origin) * inverse;
-    vec3 n = mix(t0, t1, negative);
-    vec3 f = mix(t1, t0, negative) * SLAB_SCALE;
-    float near = tmin;
-    near = n.x > near ? n.x : near;
-    near = n.y > near ? n.y : near;
-    near = n.z > near ? n.z : near;
-    float far = tmax;
-    far = f.x < far ? f.x : far;
-    far = f.y < far ? f.y : far;
-    far = f.z < far ? f.z : far;
+    vec3 n = MIN(t0, t1);
+    vec3 f = MAX(t0, t1);
+    float near = MAX(MAX(n.x, n.y), MAX(n.z, tmin));
+    float far = MIN(MIN(MIN(f.x, f.y), f.z) * SLAB_SCALE, tmax);
     return near <= far ? near : INFINITY;
 }
 
+// Finite even where the ray runs along a slab, so that no 0 * inf = NaN arises. The host pads the boxes: a ray in the plane of
+// flat geometry is strictly inside the slab, and lo < 0 < hi times a huge number lets it pass.
 vec3 safe_inverse(vec3 d) {
-    // division by zero is undefined in the shading language: say infinity
-    return mix(1.0 / d, vec3(INFINITY), equal(d, vec3(0.0)));
+    vec3 a = abs(d);
+    float least = max(1e-24 * max(max(a.x, a.y), a.z), 1e-37);
+    return 1.0 / mix(d, mix(vec3(least), vec3(-least), lessThan(d, vec3(0.0))), lessThan(a, vec3(least)));
 }
 
 void main() {
@@ -72,7 +73,9 @@ void main() {
     InstanceRecords instances = InstanceRecords(root.instances);
 
     uint stack[STACK_SIZE];
+#ifndef STREAM_ANY
     float stack_near[STACK_SIZE];
+#endif
     uint depth = 0u;
 
     uint index = push.first + next;
@@ -80,7 +83,6 @@ void main() {
     Shear shear = make_shear(world.direction);
     vec3 origin = world.origin;
     vec3 inverse = safe_inverse(world.direction);
-    bvec3 negative = lessThan(inverse, vec3(0.0));
     uint instance = 0u;
     bool in_group = SINGLE_LEVEL;
     uint current = is_ray(world) ? root.root : FINISHED;
@@ -94,20 +96,22 @@ void main() {
             vec2 a = LOAD_PAIR(nodes, 8u * current), b = LOAD_PAIR(nodes, 8u * current + 1u), c = LOAD_PAIR(nodes, 8u * current + 2u);
             vec2 d = LOAD_PAIR(nodes, 8u * current + 3u), e = LOAD_PAIR(nodes, 8u * current + 4u), f = LOAD_PAIR(nodes, 8u * current + 5u);
             uvec2 children = floatBitsToUint(LOAD_PAIR(nodes, 8u * current + 6u));
-            float near0 = enter_box(vec3(a, b.x), vec3(b.y, c), origin, inverse, negative, world.tmin, best);
-            float near1 = enter_box(vec3(d, e.x), vec3(e.y, f), origin, inverse, negative, world.tmin, best);
+            float near0 = enter_box(vec3(a, b.x), vec3(b.y, c), origin, inverse, world.tmin, best);
+            float near1 = enter_box(vec3(d, e.x), vec3(e.y, f), origin, inverse, world.tmin, best);
             bool swap = near1 < near0;
             float first = swap ? near1 : near0;
             float second = swap ? near0 : near1;
             current = first < INFINITY ? (swap ? children.y : children.x) : NEXT;
             if (second < INFINITY) {
                 stack[depth] = swap ? children.x : children.y;
+#ifndef STREAM_ANY
                 stack_near[depth] = second;
+#endif
                 depth++;
             }
         }
         if ((current & LEAF) != 0u) {
-            if (in_group) {
+            if (SINGLE_LEVEL || in_group) {
                 uint i = current & 0x07ffffffu;
                 vec2 a = LOAD_PAIR(primitives, 5u * i), b = LOAD_PAIR(primitives, 5u * i + 1u), c = LOAD_PAIR(primitives, 5u * i + 2u);
                 vec2 d = LOAD_PAIR(primitives, 5u * i + 3u), e = LOAD_PAIR(primitives, 5u * i + 4u);
@@ -148,18 +152,18 @@ void main() {
                 origin = transform_point(record.world_to_group, world.origin);
                 shear = make_shear(direction);
                 inverse = safe_inverse(direction);
-                negative = lessThan(inverse, vec3(0.0));
                 in_group = true;
                 stack[depth] = LEAVE_INSTANCE;
+#ifndef STREAM_ANY
                 stack_near[depth] = world.tmin;
+#endif
                 depth++;
                 current = record.root;
             }
         }
-        if (current == LEAVE_INSTANCE) {
+        if (!SINGLE_LEVEL && current == LEAVE_INSTANCE) {
             origin = world.origin;
             inverse = safe_inverse(world.direction);
-            negative = lessThan(inverse, vec3(0.0));
             in_group = false;
             current = NEXT;
         }
@@ -168,8 +172,12 @@ void main() {
                 current = FINISHED;
             } else {
                 depth--;
+#ifdef STREAM_ANY
+                current = stack[depth];
+#else
                 // what lies behind the nearest hit so far is not entered
                 current = stack_near[depth] <= best ? stack[depth] : NEXT;
+#endif
             }
         }
         if (current == FINISHED) {
@@ -187,7 +195,6 @@ void main() {
             shear = make_shear(world.direction);
             origin = world.origin;
             inverse = safe_inverse(world.direction);
-            negative = lessThan(inverse, vec3(0.0));
             instance = 0u;
             in_group = SINGLE_LEVEL;
             depth = 0u;

@@ -23,7 +23,7 @@ impl<'a> ImagePair<'a> {
     /// 0 count, `None` counts all.
     pub fn new(image: &'a [f32], reference: &'a [f32], channels: usize, coverage: Option<&'a [f32]>) -> Result<Self> {
         let wrong = |what: &str| Err(Error::Usage(format!("cannot compare images: {what}")));
-        if channels == 0 || image.len() % channels != 0 {
+        if channels == 0 || !image.len().is_multiple_of(channels) {
             return wrong("the number of values is no multiple of the number of channels");
         }
         if image.len() != reference.len() {

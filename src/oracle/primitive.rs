@@ -4,7 +4,7 @@ use super::OracleRay;
 use glam::{DAffine3, DVec3};
 
 /// Hits are accepted whose point on the primitive lies within this share of the distance to its farthest vertex from the ray.
-/// Only a ray that lies in the triangle's plane to about seven digits fails it: its hit point is rounding noise, and the
+/// Only a ray that lies in the triangle's plane to about six digits can fail it: its hit point is rounding noise, and the
 /// traversal of boxes could not promise to find it.
 pub const RESIDUAL: f64 = 1e-10;
 

@@ -10,7 +10,7 @@ use crate::gpu::{Buffer, Device, Memory};
 use crate::scene::flatten::{FlatScene, Group};
 
 /// Rays that a lane takes one after the other on a CPU driver, where idle lanes of a vector cost most.
-pub const RAYS_PER_LANE_CPU: u32 = 1;
+pub const RAYS_PER_LANE_CPU: u32 = 8;
 /// On a GPU enough rays fill the machine; long loops per lane only lengthen the tail.
 pub const RAYS_PER_LANE_GPU: u32 = 1;
 
@@ -92,7 +92,12 @@ impl Trees {
             .iter()
             .flat_map(|top| top.nodes.iter().map(move |n| bvh2::Node { children: n.children.map(|c| entry(top, c)), ..*n }));
         let group_iter = self.groups.iter().zip(&bases).flat_map(|(g, b)| {
-            g.nodes.iter().map(move |n| bvh2::Node { children: n.children.map(|c| bvh2::rebase(c, b.0, b.1)), ..*n })
+            let pad = padding(g);
+            g.nodes.iter().map(move |n| bvh2::Node {
+                boxes: padded(n.boxes, pad),
+                children: n.children.map(|c| bvh2::rebase(c, b.0, b.1)),
+                ..*n
+            })
         });
         let mut all = top_iter.chain(group_iter);
         nodes.fill(size * node as u64, size, |_, bytes| {
@@ -114,6 +119,18 @@ impl Trees {
         })?;
         Ok(Hierarchy { nodes, primitives, root, instance_roots, stack_entries })
     }
+}
+
+/// How far a tree's boxes are widened: four half-ulps of its largest coordinate. A ray that runs within the plane of flat
+/// geometry is then strictly inside the box, and the traversal needs no special case for it.
+fn padding(tree: &Bvh2) -> f32 {
+    let reach =
+        tree.nodes.first().map_or(0.0, |n| n.boxes.as_flattened().as_flattened().iter().fold(0.0f32, |m, x| m.max(x.abs())));
+    (2.0 * f32::EPSILON * reach).max(1e-30)
+}
+
+fn padded(boxes: [[[f32; 3]; 2]; 2], pad: f32) -> [[[f32; 3]; 2]; 2] {
+    boxes.map(|[lo, hi]| [lo.map(|x| x - pad), hi.map(|x| x + pad)])
 }
 
 fn primitive_boxes(flat: &FlatScene, group: &Group) -> Vec<Aabb> {

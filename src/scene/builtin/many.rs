@@ -53,7 +53,7 @@ fn leaf_texture(size: u32, wrap: Wrap, filter: Filter) -> Texture {
             let along = (0.98 - v) / 0.95;
             let across = (u - 0.5).abs();
             let teeth = 0.02 * (along * 40.0).fract();
-            let width = 1.5 * (along.clamp(0.0, 1.0) * (1.0 - along).clamp(0.0, 1.0)).powf(0.8) - teeth;
+            let width = 0.95 * (along.clamp(0.0, 1.0) * (1.0 - along).clamp(0.0, 1.0)).powf(0.8) - teeth;
             let inside = (width - across) * size as f32 / 6.0 + 0.5;
             let stem = (0.012 - across) * size as f32 / 3.0 + 0.5;
             let alpha = if (0.0..=1.0).contains(&along) { inside.max(stem) } else { 0.0 };
@@ -127,7 +127,7 @@ pub fn leaf_cards() -> Scene {
             scene.add_instance("tuft", mesh, DAffine3::from_scale_rotation_translation(scale, turn, at));
         }
     }
-    scene.add_camera(DVec3::new(1.2, 2.0, 4.6), DVec3::new(0.0, 0.75, 0.0), 40.0);
+    scene.add_camera(DVec3::new(1.3, 2.0, 5.8), DVec3::new(0.0, 0.85, 0.0), 40.0);
     scene
 }
 
