@@ -14,7 +14,7 @@ use crate::ray::Ray;
 use crate::scene::flatten::{FlatScene, Group};
 
 /// Rays that a lane of the fast kernel takes one after the other on a CPU driver, where idle lanes of a vector cost most.
-pub const RAYS_PER_LANE_CPU: u32 = 32;
+pub const RAYS_PER_LANE_CPU: u32 = 8;
 /// On a GPU enough rays fill the machine; long loops per lane only lengthen the tail.
 pub const RAYS_PER_LANE_GPU: u32 = 2;
 
