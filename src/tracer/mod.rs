@@ -201,7 +201,8 @@ impl Tracer {
             .set(2, self.features.single_level as u32);
         match &self.structure {
             Structure::Compute(h) => {
-                let rays_per_lane = if self.device.info.is_cpu() { compute::RAYS_PER_LANE_CPU } else { compute::RAYS_PER_LANE_GPU };
+                let rays_per_lane =
+                    if self.device.info.is_cpu() { compute::RAYS_PER_LANE_CPU } else { compute::RAYS_PER_LANE_GPU };
                 let specialization = specialization.set(3, h.stack_entries.max(1)).set(4, rays_per_lane);
                 if h.kernel == Kernel::Reference {
                     return Stream::reference(&self.device, shaders, &specialization);
