@@ -96,7 +96,7 @@ impl Instance {
             Some(log) => {
                 let utils = ext::debug_utils::Instance::new(&entry, &raw);
                 // SAFETY: the log is kept alive by Self, which destroys the messenger first
-                let messenger = unsafe { utils.create_debug_utils_messenger(&messenger_info_owned(log), None) }
+                let messenger = unsafe { utils.create_debug_utils_messenger(&messenger_info(log), None) }
                     .context("creating the debug messenger")?;
                 Some((utils, messenger))
             }
@@ -111,10 +111,6 @@ pub(super) fn no_driver() -> Error {
 }
 
 fn messenger_info(log: &Arc<ValidationLog>) -> vk::DebugUtilsMessengerCreateInfoEXT<'static> {
-    messenger_info_owned(log)
-}
-
-fn messenger_info_owned(log: &Arc<ValidationLog>) -> vk::DebugUtilsMessengerCreateInfoEXT<'static> {
     use vk::{DebugUtilsMessageSeverityFlagsEXT as Severity, DebugUtilsMessageTypeFlagsEXT as Type};
     vk::DebugUtilsMessengerCreateInfoEXT::default()
         .message_severity(Severity::WARNING | Severity::ERROR)

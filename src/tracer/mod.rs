@@ -95,7 +95,7 @@ impl BuildStats {
 }
 
 enum Structure {
-    Compute(compute::Hierarchy),
+    Compute(Box<compute::Hierarchy>),
     /// Held because the top level's address in the scene's root leads here.
     Hardware {
         _levels: hardware::Structures,
@@ -148,7 +148,7 @@ impl Tracer {
                 scene.set_hierarchy(&h)?;
                 stats.stack_entries = h.stack_entries;
                 stats.structure_bytes = h.bytes();
-                Structure::Compute(h)
+                Structure::Compute(Box::new(h))
             }
             None => {
                 let upload = start.elapsed();
