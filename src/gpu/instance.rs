@@ -78,12 +78,12 @@ impl Instance {
         let layer_names = if validation { vec![VALIDATION_LAYER.as_ptr()] } else { vec![] };
         let extension_names = if debug_names { vec![ext::debug_utils::NAME.as_ptr()] } else { vec![] };
         let log = validation.then(|| Arc::new(ValidationLog::default()));
-        let mut messenger_info = log.as_ref().map(messenger_info);
+        let mut create_messenger = log.as_ref().map(messenger_info);
         let mut info = vk::InstanceCreateInfo::default()
             .application_info(&application)
             .enabled_layer_names(&layer_names)
             .enabled_extension_names(&extension_names);
-        if let Some(m) = messenger_info.as_mut() {
+        if let Some(m) = create_messenger.as_mut() {
             // also hears what happens inside vkCreateInstance and vkDestroyInstance
             info = info.push_next(m);
         }
