@@ -5,6 +5,7 @@
 
 pub mod builtin;
 pub mod camera;
+pub mod export;
 pub mod features;
 pub mod flatten;
 pub mod light;

@@ -44,7 +44,7 @@ pub(super) fn resolve(reader: &Reader, path: &Path, materials: &mut [Material], 
         let Some(Ok(picture)) = decoded.get(&source) else { continue };
         let (wrap, filter) = sampler(document, texture.sampler);
         let image = &document.images[source];
-        let name = [&image.name, &texture.name].into_iter().find(|n| !n.is_empty()).cloned();
+        let name = [&texture.name, &image.name].into_iter().find(|n| !n.is_empty()).cloned();
         let name = name.or_else(|| image.uri.clone().filter(|u| !u.starts_with("data:"))).unwrap_or_default();
         *place = Some(textures.len());
         textures.push(Texture {
