@@ -224,6 +224,30 @@ fn degenerate_triangles_are_dropped_and_counted() {
 }
 
 #[test]
+fn shared_vertex_arrays_are_cut_to_what_is_used() {
+    let mut doc = Doc::new();
+    let points: Vec<[f32; 3]> = (0..100).flat_map(|i| TRIANGLE.map(|p| [p[0] + i as f32, p[1], p[2]])).collect();
+    let position = doc.positions(&points);
+    let normal = doc.accessor(&bytes(&[[0.0, 0.0, 1.0f32]; 300]), F32, "VEC3", 300);
+    let texcoord = doc.accessor(&bytes(&points.iter().map(|p| [p[0], p[1]]).collect::<Vec<_>>()), F32, "VEC2", 300);
+    for i in 0..100u16 {
+        let corners: Vec<u8> = [3 * i, 3 * i + 1, 3 * i + 2].into_iter().flat_map(u16::to_le_bytes).collect();
+        let indices = doc.accessor(&corners, U16, "SCALAR", 3);
+        doc.primitive(
+            json!({ "attributes": { "POSITION": position, "NORMAL": normal, "TEXCOORD_0": texcoord }, "indices": indices }),
+        );
+    }
+    let scene = doc.load();
+    assert_eq!(scene.meshes.len(), 100);
+    for i in 0..100 {
+        let m = mesh(&scene, i);
+        assert_eq!((m.positions.len(), m.normals.len(), m.texcoords[0].len()), (3, 3, 3));
+        assert_eq!(corners(m)[0], TRIANGLE.map(|p| [p[0] + i as f32, p[1], p[2]]));
+        assert_eq!(m.texcoords[0][1].x, i as f32 + 1.0);
+    }
+}
+
+#[test]
 fn normals_are_repaired() {
     let mut doc = Doc::triangle();
     let normal = doc.accessor(&bytes(&[[0.0, 0.0, 9.0], [0.0; 3], [f32::NAN, 0.0, 0.0]]), F32, "VEC3", 3);

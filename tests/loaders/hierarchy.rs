@@ -104,7 +104,8 @@ fn squashed_instances_are_baked() {
     doc.json["nodes"] =
         json!([{ "mesh": 0, "children": [1, 2] }, { "mesh": 0, "scale": [2, 2, 0] }, { "mesh": 0, "scale": [0, 0, 0] }]);
     let scene = doc.load();
-    assert_eq!((scene.meshes.len(), scene.instances.len(), scene.report.degenerate_triangles), (2, 2, 1));
+    assert_eq!((scene.meshes.len(), scene.instances.len(), scene.report.degenerate_triangles), (2, 2, 0));
+    assert!(scene.report.warnings[0].contains("scaled to nothing"), "{:?}", scene.report.warnings);
     assert_eq!(scene.instances[1].object_to_world, DAffine3::IDENTITY);
     assert_eq!(corners(mesh(&scene, 1))[0], TRIANGLE.map(|p| p.map(|x| 2.0 * x)));
 }

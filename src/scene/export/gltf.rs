@@ -63,6 +63,14 @@ pub fn export_gltf(scene: &Scene, path: &Path) -> Result<()> {
     atomic::write(path, |out| out.write_all(text.as_bytes()))
 }
 
+/// JSON arrays.
+#[derive(Default)]
+struct Textures {
+    textures: Vec<Value>,
+    images: Vec<Value>,
+    samplers: Vec<Value>,
+}
+
 #[derive(Default)]
 struct Writer {
     embed: bool,
@@ -78,7 +86,7 @@ impl Writer {
     fn scene(&mut self, scene: &Scene, path: &Path) -> Result<(), String> {
         let mut used = BTreeSet::new();
         let mut materials: Vec<Value> = scene.materials.iter().map(|m| material::material(m, &mut used)).collect();
-        let (textures, images, samplers) = self.textures(&scene.textures, path)?;
+        let Textures { textures, images, samplers } = self.textures(&scene.textures, path)?;
         let spheres = scene.meshes.iter().map(|m| match &m.geometry {
             Geometry::Triangles(_) => 0,
             Geometry::Spheres(s) => s.len() as u64,
@@ -235,10 +243,10 @@ impl Writer {
     }
 
     /// JSON of textures, images and samplers. Textures that share pixels share the image.
-    fn textures(&mut self, textures: &[Texture], path: &Path) -> Result<(Vec<Value>, Vec<Value>, Vec<Value>), String> {
-        let (mut made, mut images, mut samplers) = (Vec::new(), Vec::new(), Vec::<Value>::new());
+    fn textures(&mut self, all: &[Texture], path: &Path) -> Result<Textures, String> {
+        let Textures { mut textures, mut images, mut samplers } = Textures::default();
         let mut pixels: Vec<&Arc<[u8]>> = Vec::new();
-        for texture in textures {
+        for texture in all {
             let source = match pixels.iter().position(|p| Arc::ptr_eq(p, &texture.rgba8)) {
                 Some(known) => known,
                 None => {
@@ -262,9 +270,9 @@ impl Writer {
                 samplers.push(sampler);
                 samplers.len() - 1
             });
-            made.push(json!({ "name": texture.name, "sampler": index, "source": source }));
+            textures.push(json!({ "name": texture.name, "sampler": index, "source": source }));
         }
-        Ok((made, images, samplers))
+        Ok(Textures { textures, images, samplers })
     }
 }
 

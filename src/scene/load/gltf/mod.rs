@@ -18,6 +18,7 @@ use std::path::Path;
 use accessor::Reader;
 use schema::Document;
 
+use super::compact;
 use crate::error::{Error, Result};
 use crate::scene::{Geometry, Instance, Mesh, Scene};
 
@@ -134,8 +135,9 @@ impl Meshes<'_> {
             }
             let tangents = scene.materials[material].needs_tangents();
             let read = mesh::read(self.reader, primitive, tangents, &mut |w| warnings.push(format!("{place} {w}")));
-            if let Some(triangles) = read.map_err(|e| Error::input(self.path, format!("{place}: {e}")))? {
+            if let Some(mut triangles) = read.map_err(|e| Error::input(self.path, format!("{place}: {e}")))? {
                 let name = if mesh.primitives.len() == 1 { mesh.name.clone() } else { format!("{}#{nth}", mesh.name) };
+                compact::compact(&mut triangles);
                 made.push(scene.meshes.len());
                 scene.meshes.push(Mesh { name, geometry: Geometry::Triangles(triangles), material });
             }
