@@ -113,8 +113,8 @@ fn courtyard() -> Scene {
     }
     let size = 32;
     let tile = |x: u32, y: u32| {
-        let joint = x % 16 == 0 || y % 16 == 0;
-        let dark = (x / 16 + y / 16) % 2 == 0;
+        let joint = x.is_multiple_of(16) || y.is_multiple_of(16);
+        let dark = (x / 16 + y / 16).is_multiple_of(2);
         let grain = (x * 7 + y * 13) % 9;
         let value = if joint {
             70

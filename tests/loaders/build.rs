@@ -126,7 +126,7 @@ impl Doc {
 
     pub fn try_load(&self) -> Result<Scene> {
         let folder = Folder::new();
-        folder.load("scene.gltf", &self.gltf())
+        folder.load("scene.gltf", self.gltf())
     }
 
     /// The error of loading as one line.
