@@ -1,1 +1,211 @@
-fn main() {}
+//! Compiles the shaders: each pass's stream once per tracer and mode, and the shaders that the tracers share.
+//!
+//! A pass is a file `shaders/NAME.glsl` whose head says `// stream: any`, `// stream: closest` or both. The generated
+//! `shaders.rs` holds a constant `NAME_ANY` / `NAME_CLOSEST` for each (see `src/tracer/stream.rs`).
+
+use std::cell::RefCell;
+use std::collections::BTreeSet;
+use std::fmt::Write as _;
+use std::path::PathBuf;
+
+use shaderc::{
+    CompileOptions, Compiler, EnvVersion, IncludeType, OptimizationLevel, ResolvedInclude, ShaderKind, SpirvVersion, TargetEnv,
+};
+
+// Debian's libshaderc_combined.a leaves glslang and SPIRV-Tools out; their order is that of their dependencies.
+#[cfg(not(feature = "build-shaderc"))]
+#[link(name = "glslang")]
+#[link(name = "SPIRV")]
+#[link(name = "MachineIndependent")]
+#[link(name = "GenericCodeGen")]
+#[link(name = "OSDependent")]
+#[link(name = "OGLCompiler")]
+#[link(name = "HLSL")]
+#[link(name = "SPIRV-Tools-opt")]
+#[link(name = "SPIRV-Tools")]
+#[link(name = "stdc++")]
+unsafe extern "C" {}
+
+/// Threads of a work-group of a stream.
+const LANES: u32 = 64;
+
+const EXTENSIONS: &str = "#extension GL_EXT_buffer_reference : require\n#extension GL_EXT_buffer_reference_uvec2 : require\n";
+
+struct Build {
+    compiler: Compiler,
+    shaders: PathBuf,
+    out: PathBuf,
+    // every file that was included by any shader
+    seen: RefCell<BTreeSet<PathBuf>>,
+    errors: Vec<String>,
+}
+
+/// How a tracer turns a stream into a shader.
+struct Variant {
+    field: &'static str,
+    template: &'static str,
+    head: &'static str,
+    kind: ShaderKind,
+}
+
+const VARIANTS: [Variant; 5] = [
+    Variant { field: "generate", template: "trace/generate.glsl", head: "", kind: ShaderKind::Compute },
+    Variant { field: "deliver", template: "trace/deliver.glsl", head: "", kind: ShaderKind::Compute },
+    Variant { field: "reference", template: "trace/reference.glsl", head: "", kind: ShaderKind::Compute },
+    Variant { field: "query", template: "trace/query.glsl", head: "#extension GL_EXT_ray_query : require\n", kind: ShaderKind::Compute },
+    Variant {
+        field: "raygen",
+        template: "trace/pipeline.glsl",
+        head: "#extension GL_EXT_ray_tracing : require\n",
+        kind: ShaderKind::RayGeneration,
+    },
+];
+
+fn main() {
+    println!("cargo:rerun-if-changed=build.rs");
+    let manifest = PathBuf::from(std::env::var_os("CARGO_MANIFEST_DIR").expect("cargo sets it"));
+    let mut build = Build {
+        compiler: Compiler::new().unwrap_or_else(|e| panic!("shaderc does not start: {e}")),
+        shaders: manifest.join("shaders"),
+        out: PathBuf::from(std::env::var_os("OUT_DIR").expect("cargo sets it")),
+        seen: RefCell::new(BTreeSet::new()),
+        errors: Vec::new(),
+    };
+    let table = build.streams() + &build.kernels() + &build.shared();
+    std::fs::write(build.out.join("shaders.rs"), table).expect("OUT_DIR can be written");
+    println!("cargo:rerun-if-changed={}", build.shaders.display());
+    for file in build.seen.borrow().iter() {
+        println!("cargo:rerun-if-changed={}", file.display());
+    }
+    if !build.errors.is_empty() {
+        for line in build.errors.iter().flat_map(|e| e.lines()) {
+            println!("cargo:warning={line}");
+        }
+        eprintln!("{}", build.errors.join("\n"));
+        std::process::exit(1);
+    }
+}
+
+impl Build {
+    /// All passes, for all tracers.
+    fn streams(&mut self) -> String {
+        let mut table = String::new();
+        let mut files: Vec<_> = std::fs::read_dir(&self.shaders)
+            .expect("shaders/ is there")
+            .filter_map(|e| e.ok().map(|e| e.path()))
+            .filter(|p| p.extension().is_some_and(|e| e == "glsl"))
+            .collect();
+        files.sort();
+        for file in files {
+            let name = file.file_stem().and_then(|s| s.to_str()).expect("shader names are plain").to_owned();
+            let text = std::fs::read_to_string(&file).expect("a shader can be read");
+            let Some(modes) = text.lines().find_map(|l| l.strip_prefix("// stream:")) else {
+                self.errors.push(format!("{}: no line '// stream: any' or '// stream: closest' at its head", file.display()));
+                continue;
+            };
+            for mode in modes.split_whitespace() {
+                let constant = format!("{}_{}", name.to_uppercase(), mode.to_uppercase());
+                let _ = write!(
+                    table,
+                    "/// The stream `shaders/{name}.glsl`, mode `{mode}`.\npub static {constant}: StreamShaders = StreamShaders {{\n    name: \"{name} {mode}\",\n    mode: Mode::{},\n",
+                    if mode == "any" { "Any" } else { "Closest" }
+                );
+                for v in &VARIANTS {
+                    let define = if mode == "any" { "#define STREAM_ANY\n" } else { "#define STREAM_CLOSEST\n" };
+                    let source = format!(
+                        "#version 460\n{EXTENSIONS}{}#define LANES {LANES}\n{define}#include \"{name}.glsl\"\n#include \"{}\"\n",
+                        v.head, v.template
+                    );
+                    let output = format!("{name}_{mode}_{}.spv", v.field);
+                    self.compile(&source, v.kind, &format!("{name}.glsl as {} ({mode})", v.template), &output);
+                    let _ = writeln!(table, "    {}: include_bytes!(concat!(env!(\"OUT_DIR\"), \"/{output}\")),", v.field);
+                }
+                table.push_str("};\n");
+            }
+        }
+        let _ = writeln!(table, "/// Threads of a work-group of a stream.\npub const LANES: u32 = {LANES};");
+        table
+    }
+
+    /// The compute tracer's fast kernel: no stream's code is in it.
+    fn kernels(&mut self) -> String {
+        let mut table = String::new();
+        for mode in ["any", "closest"] {
+            for (bits, head) in [(32, ""), (64, "#extension GL_EXT_shader_explicit_arithmetic_types_int64 : require\n#define LOAD64\n")] {
+                let source = format!(
+                    "#version 460\n{EXTENSIONS}#extension GL_EXT_control_flow_attributes : require\n{head}#define LANES {LANES}\n\
+                     #define STREAM_{}\n#include \"trace/wide.glsl\"\n",
+                    mode.to_uppercase()
+                );
+                let (constant, output) = (format!("WIDE_{}_{bits}", mode.to_uppercase()), format!("wide_{mode}_{bits}.spv"));
+                self.compile(&source, ShaderKind::Compute, &format!("trace/wide.glsl ({mode}, {bits}-bit loads)"), &output);
+                let _ = writeln!(
+                    table,
+                    "/// `shaders/trace/wide.glsl`, mode `{mode}`, {bits}-bit loads.\npub static {constant}: &[u8] = include_bytes!(concat!(env!(\"OUT_DIR\"), \"/{output}\"));"
+                );
+            }
+        }
+        table
+    }
+
+    /// The shaders that every stream of the pipeline tracer shares.
+    fn shared(&mut self) -> String {
+        let mut table = String::new();
+        for (constant, file, kind) in [
+            ("MISS", "trace/miss.rmiss", ShaderKind::Miss),
+            ("TRIANGLE_CLOSEST", "trace/triangle.rchit", ShaderKind::ClosestHit),
+            ("TRIANGLE_ANY", "trace/triangle.rahit", ShaderKind::AnyHit),
+            ("SPHERE_CLOSEST", "trace/sphere.rchit", ShaderKind::ClosestHit),
+            ("SPHERE_INTERSECTION", "trace/sphere.rint", ShaderKind::Intersection),
+        ] {
+            let path = self.shaders.join(file);
+            let source = std::fs::read_to_string(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
+            let output = format!("{}.spv", constant.to_lowercase());
+            self.compile(&source, kind, file, &output);
+            let _ = writeln!(
+                table,
+                "/// `shaders/{file}`.\npub static {constant}: &[u8] = include_bytes!(concat!(env!(\"OUT_DIR\"), \"/{output}\"));"
+            );
+        }
+        table
+    }
+
+    fn compile(&mut self, source: &str, kind: ShaderKind, name: &str, output: &str) {
+        // who included what, to name the chain when a file does not compile
+        let chain: RefCell<Vec<(String, String)>> = RefCell::new(Vec::new());
+        let mut options = CompileOptions::new().expect("options can be made");
+        options.set_target_env(TargetEnv::Vulkan, EnvVersion::Vulkan1_3 as u32);
+        options.set_target_spirv(SpirvVersion::V1_5);
+        options.set_optimization_level(OptimizationLevel::Performance);
+        options.set_warnings_as_errors();
+        let (shaders, seen) = (&self.shaders, &self.seen);
+        options.set_include_callback(|requested, _: IncludeType, from, _| {
+            let path = shaders.join(requested);
+            let content = std::fs::read_to_string(&path).map_err(|e| format!("{}: {e}", path.display()))?;
+            seen.borrow_mut().insert(path);
+            chain.borrow_mut().push((requested.to_owned(), from.to_owned()));
+            // glslang numbers lines per file and names the file through this
+            Ok(ResolvedInclude { resolved_name: requested.to_owned(), content })
+        });
+        match self.compiler.compile_into_spirv(source, kind, name, "main", Some(&options)) {
+            Ok(artifact) => std::fs::write(self.out.join(output), artifact.as_binary_u8()).expect("OUT_DIR can be written"),
+            Err(error) => {
+                let text = error.to_string();
+                let mut message = format!("shader {name} does not compile:\n{text}");
+                let chain = chain.borrow();
+                // the file that the first message names, and how it came in
+                if let Some(mut file) =
+                    text.lines().find_map(|l| chain.iter().find(|c| l.starts_with(&format!("{}:", c.0))).map(|c| c.0.clone()))
+                {
+                    while let Some((_, from)) = chain.iter().find(|c| c.0 == file) {
+                        let _ = write!(message, "\n  {file} was included from {from}");
+                        file = from.clone();
+                    }
+                }
+                self.errors.push(message);
+                // so that the table's include_bytes! does not add a second, misleading error
+                let _ = std::fs::write(self.out.join(output), []);
+            }
+        }
+    }
+}

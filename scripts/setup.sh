@@ -31,7 +31,7 @@ TXT
   exit 1
 }
 
-command -v apt-get >/dev/null 2>&1 && command -v dpkg-query >/dev/null 2>&1 || needed_elsewhere
+if ! command -v apt-get >/dev/null 2>&1 || ! command -v dpkg-query >/dev/null 2>&1; then needed_elsewhere; fi
 # shellcheck disable=SC1091  # the file is the machine's own
 . /etc/os-release
 codename=${VERSION_CODENAME:-unknown}
@@ -63,8 +63,11 @@ if ! dpkg --compare-versions "$(version_of mesa-vulkan-drivers)" ge $want_mesa; 
   [ $check_only = 1 ] && die "mesa-vulkan-drivers $want_mesa or newer is missing"
   update_once
   if [ "$codename" = bookworm ]; then
+    # apt expands these, not the shell
+    # shellcheck disable=SC2016
     if ! apt-get indextargets --format '$(RELEASE)' | grep -qx bookworm-backports; then
       # the archive that serves "bookworm" serves its backports too
+      # shellcheck disable=SC2016
       site=$(apt-get indextargets --format '$(RELEASE) $(IDENTIFIER) $(SITE)' | awk '$1=="bookworm" && $2=="Packages" {print $3; exit}')
       [ -n "$site" ] || die "no apt source for bookworm on this machine: cannot tell where its backports are"
       say "adding the bookworm-backports suite of this machine's own mirror"

@@ -1,1 +1,5 @@
-fn main() {}
+//! The `skylit` program: everything is in [`skylit::cli`].
+
+fn main() -> std::process::ExitCode {
+    skylit::cli::run()
+}

@@ -1,1 +1,150 @@
-//! (being written)
+//! The command line: one file a command. Every failure ends as one line on stderr (and a record on stdout with `--json`) and
+//! an exit code of [`EXIT_CODES`].
+
+mod args;
+mod console;
+mod diff;
+mod doctor;
+mod export;
+mod interrupt;
+mod panic;
+mod progress;
+mod rays;
+mod render;
+mod report;
+mod scenes;
+
+use std::ffi::OsString;
+use std::process::ExitCode;
+use std::time::Instant;
+
+use clap::Parser;
+use clap::error::ErrorKind;
+
+use crate::error::{Error, Result};
+use console::Console;
+
+/// What the process returns; part of `--help`.
+pub const EXIT_CODES: &str = "\
+Exit codes:
+  0    done
+  1    a check did not hold (images differ, validation messages), or a Vulkan call failed
+  2    no Vulkan loader, no device, or a device below what is needed; see `skylit doctor`
+  3    an input file is missing or broken, or the scene cannot be rendered
+  4    an output file cannot be written; nothing half-written is left
+  5    out of memory
+  6    the Vulkan device was lost
+  64   wrong usage of the command line
+  70   a bug in skylit
+  130  interrupted (Ctrl-C)";
+
+#[derive(Debug, Parser)]
+#[command(name = "skylit", version, about, after_help = EXIT_CODES, disable_help_subcommand = true)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, clap::Subcommand)]
+enum Command {
+    /// Render the ambient occlusion of a scene to an image file
+    Render(Box<args::RenderArgs>),
+    /// Trace a raw set of rays against a mesh and report how fast that was
+    Rays(args::RaysArgs),
+    /// Write a scene as glTF (.glb, .gltf) or as a world-space triangle soup (.bin)
+    Export(args::ExportArgs),
+    /// List the built-in scenes
+    Scenes(args::ScenesArgs),
+    /// Show the Vulkan devices, what each tracer needs and has, and which one `auto` picks
+    Doctor(args::DoctorArgs),
+    /// Compare two images in numbers
+    Diff(args::DiffArgs),
+}
+
+/// Runs the command that the process' arguments name.
+pub fn run() -> ExitCode {
+    run_from(std::env::args_os().collect())
+}
+
+fn run_from(arguments: Vec<OsString>) -> ExitCode {
+    let start = Instant::now();
+    // before parsing: a wrong command line is to be reported as asked, too
+    let json = arguments.iter().any(|a| a == "--json");
+    panic::install();
+    let outcome = panic::catch(|| match Cli::try_parse_from(arguments) {
+        Ok(cli) => dispatch(cli.command, start),
+        Err(e) => explain(&e),
+    });
+    let (message, code) = match outcome {
+        Ok(Ok(())) => return ExitCode::SUCCESS,
+        Ok(Err(e)) => (one_line(&e.to_string()), e.exit_code()),
+        Err(bug) => (bug, panic::EXIT_CODE),
+    };
+    console::error(&message);
+    if json {
+        // nothing can be done about a stdout that fails now
+        let _ = console::json(&serde_json::json!({ "error": message, "exit_code": code }));
+    }
+    ExitCode::from(code)
+}
+
+fn dispatch(command: Command, start: Instant) -> Result<()> {
+    match command {
+        Command::Render(args) => render::run(&args, start),
+        Command::Rays(args) => rays::run(&args),
+        Command::Export(args) => export::run(&args),
+        Command::Scenes(args) => scenes::run(&args),
+        Command::Doctor(args) => doctor::run(&args),
+        Command::Diff(args) => diff::run(&args),
+    }
+}
+
+/// Help and version go to stdout; everything else that clap says becomes a usage error of one line.
+fn explain(error: &clap::Error) -> Result<()> {
+    match error.kind() {
+        ErrorKind::DisplayHelp | ErrorKind::DisplayVersion => console::print(&error.render().to_string()),
+        ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand => {
+            Err(Error::Usage("no command given; `skylit --help` lists the commands".into()))
+        }
+        _ => {
+            let text = error.render().to_string();
+            let lines = text.lines().map(str::trim).take_while(|l| !l.starts_with("Usage:") && !l.starts_with("For more"));
+            let words = lines.filter(|l| !l.is_empty()).collect::<Vec<_>>().join(" ");
+            Err(Error::Usage(words.trim_start_matches("error: ").to_owned()))
+        }
+    }
+}
+
+fn one_line(text: &str) -> String {
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+/// Shows what a loader noticed.
+fn warn(console: &Console, scene: &crate::scene::Scene) {
+    let report = &scene.report;
+    for warning in &report.warnings {
+        console.warning(&one_line(warning));
+    }
+    if report.degenerate_triangles > 0 {
+        console.warning(&format!("{} triangles without area were dropped", report.degenerate_triangles));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn definitions_are_sound() {
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn help_lists_every_exit_code() {
+        let help = Cli::command().render_help().to_string();
+        for code in [0, 1, 2, 3, 4, 5, 6, 64, 70, 130] {
+            assert!(help.contains(&format!("\n  {code:<4} ")), "{code}");
+        }
+    }
+}

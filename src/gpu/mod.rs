@@ -1,1 +1,20 @@
-//! (being written)
+//! A thin, safe layer over Vulkan: device, memory, pipelines, submission, timing. Everything here may be called wrongly only
+//! where a comment says so; `unsafe` stays in this folder and in `tracer/`.
+
+mod acceleration_structure;
+mod buffer;
+mod cache;
+mod commands;
+mod device;
+mod info;
+mod instance;
+mod pipeline;
+mod result;
+
+pub use acceleration_structure::{AccelerationStructure, BottomLevelInput, TopLevelEntry};
+pub use buffer::{Buffer, Memory};
+pub use commands::{Commands, Recorder, Timing};
+pub use device::{Device, Options};
+pub use info::{DeviceInfo, Limits, TracerNeeds, enumerate};
+pub use instance::Instance;
+pub use pipeline::{ComputePipeline, HitShaders, RayTracingPipeline, Specialization};

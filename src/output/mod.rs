@@ -1,6 +1,19 @@
 //! Images in files: EXR with named float channels, PNG for looking. Files are written beside their target and renamed, so
 //! that a run that is broken off leaves no half-written file.
 
+mod atomic;
+pub mod exr;
+pub mod png;
+
+use std::path::Path;
+
+pub use atomic::{check_writable, write_atomically};
+
+use crate::error::{Error, Result};
+
+/// Most pixels an image may have: 16384 x 16384. More would overflow the 32-bit indices of the tracers.
+pub const MAX_PIXELS: u64 = 1 << 28;
+
 /// Samples of one channel, rows from the top, `width * height` of them.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Samples {
@@ -8,6 +21,21 @@ pub enum Samples {
     F32(Vec<f32>),
     /// 32-bit unsigned integers (ids).
     U32(Vec<u32>),
+}
+
+impl Samples {
+    /// How many samples there are.
+    pub fn len(&self) -> usize {
+        match self {
+            Samples::F32(s) => s.len(),
+            Samples::U32(s) => s.len(),
+        }
+    }
+
+    /// Are there none?
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
 }
 
 /// A named channel of an image.
@@ -40,4 +68,83 @@ impl Image {
             Samples::U32(_) => None,
         })
     }
+
+    /// `width * height`.
+    pub fn pixel_count(&self) -> usize {
+        self.width as usize * self.height as usize
+    }
+
+    /// The value of a metadata entry.
+    pub fn metadata(&self, key: &str) -> Option<&str> {
+        self.metadata.iter().find(|(k, _)| k == key).map(|(_, v)| v.as_str())
+    }
+
+    /// Does every channel have as many samples as there are pixels, and each a name of its own? Writers rely on it.
+    fn check(&self) -> Result<()> {
+        let bad = |what: String| Err(Error::Usage(what));
+        if self.pixel_count() == 0 || self.channels.is_empty() {
+            return bad(format!("an image of {} x {} pixels and {} channels", self.width, self.height, self.channels.len()));
+        }
+        for (i, c) in self.channels.iter().enumerate() {
+            if c.samples.len() != self.pixel_count() {
+                return bad(format!("channel {:?} has {} samples for {} pixels", c.name, c.samples.len(), self.pixel_count()));
+            }
+            // 255 is the limit of the EXR format
+            if c.name.is_empty() || c.name.len() > 255 || self.channels[..i].iter().any(|d| d.name == c.name) {
+                return bad(format!("channel name {:?} is empty, too long or used twice", c.name));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// A kind of image file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ImageFormat {
+    /// OpenEXR: every channel, 32 bits, metadata.
+    Exr,
+    /// PNG: 8-bit sRGB of the colour channels, for looking.
+    Png,
+}
+
+impl ImageFormat {
+    /// The kind that the extension of `path` names.
+    pub fn of(path: &Path) -> Result<Self> {
+        let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
+        match extension.as_deref() {
+            Some("exr") => Ok(Self::Exr),
+            Some("png") => Ok(Self::Png),
+            _ => Err(Error::Usage(format!("{}: unknown kind of image: the name must end in .exr or .png", path.display()))),
+        }
+    }
+}
+
+/// Writes an image, as the extension of the path says: `.exr` (everything) or `.png` (colour, 8-bit sRGB). On failure
+/// nothing is left behind, and a file that was there before is unchanged.
+pub fn save(image: &Image, path: &Path) -> Result<()> {
+    match ImageFormat::of(path)? {
+        ImageFormat::Exr => exr::write(image, path),
+        ImageFormat::Png => png::write(image, path, 0.0),
+    }
+}
+
+/// Reads an image that [`save`] or another program wrote. PNG values become linear.
+pub fn load(path: &Path) -> Result<Image> {
+    match ImageFormat::of(path)? {
+        ImageFormat::Exr => exr::read(path),
+        ImageFormat::Png => png::read(path),
+    }
+}
+
+/// Refuses image sizes of zero or more than [`MAX_PIXELS`] pixels.
+pub fn check_size(width: u32, height: u32) -> Result<()> {
+    if width == 0 || height == 0 {
+        return Err(Error::Usage(format!("image size {width}x{height}: both sides must be at least 1")));
+    }
+    if u64::from(width) * u64::from(height) > MAX_PIXELS {
+        return Err(Error::Usage(format!(
+            "image size {width}x{height}: more than {MAX_PIXELS} pixels (16384x16384 is the most)"
+        )));
+    }
+    Ok(())
 }

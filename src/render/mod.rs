@@ -1,1 +1,30 @@
-//! (being written)
+//! The passes. One file a pass, with the same name as its shader; [`ao`] puts them together into an image.
+
+pub mod ao;
+pub mod aov;
+pub mod block;
+pub mod camera;
+pub mod film;
+pub mod pace;
+pub mod rays;
+
+use crate::error::Result;
+
+/// How a long piece of work talks to whoever started it.
+pub trait Control {
+    /// `done` of `total` units are finished. Called a few times a second.
+    fn progress(&mut self, done: u64, total: u64) {
+        let _ = (done, total);
+    }
+
+    /// Asked between submissions. `Ok(true)`: stop here and keep what there is; an error (usually
+    /// [`crate::Error::Interrupted`]): stop and keep nothing.
+    fn should_stop(&mut self) -> Result<bool> {
+        Ok(false)
+    }
+}
+
+/// Never stops, shows nothing.
+pub struct Uncontrolled;
+
+impl Control for Uncontrolled {}

@@ -1,1 +1,9 @@
-//! (being written)
+//! Where random numbers come from, and how they become directions.
+//!
+//! [`sobol`] draws points in integer arithmetic only: the shaders hold the same functions, and both sides give the same bits.
+//! [`warp`] maps points of the unit square to disks, hemispheres and frames; `f32`, mirrored by the shaders line by line.
+
+pub mod sobol;
+pub mod warp;
+
+pub use sobol::{AO_DIRECTION, CAMERA_FILM, CAMERA_LENS, Sampler, to_unit};

@@ -1,1 +1,234 @@
-//! (being written)
+//! The seam: a pass describes a stream of rays, a tracer runs it. Nothing outside this folder knows which tracer runs.
+//!
+//! A pass's shader defines `ray_count`, `ray(i)` and `closest(i, hit)` or `any(i, occluded)`; the build compiles it once per
+//! tracer ([`stream`]). A [`Tracer`] holds a scene in device memory ([`gpu_scene`]) together with what it is traced through:
+//! a hierarchy of our own ([`compute`]) or acceleration structures ([`hardware`]).
+
+mod compute;
+pub mod gpu_scene;
+mod hardware;
+pub mod stream;
+
+use std::sync::{Arc, OnceLock};
+use std::time::Instant;
+
+pub use compute::Kernel;
+pub use gpu_scene::Needs;
+pub use stream::{Push, Stream, StreamShaders};
+
+use crate::error::{Error, Result};
+use crate::gpu::{ComputePipeline, Device, DeviceInfo, Specialization};
+use crate::scene::features::SceneFeatures;
+use crate::scene::flatten::FlatScene;
+use gpu_scene::GpuScene;
+
+/// Which tracer runs the streams.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum TracerKind {
+    /// VK_KHR_ray_tracing_pipeline.
+    Pipeline,
+    /// VK_KHR_ray_query in compute shaders.
+    Query,
+    /// Compute shaders over our own hierarchy.
+    Compute,
+}
+
+impl TracerKind {
+    /// All of them, in the order in which they are listed to users.
+    pub const ALL: [TracerKind; 3] = [TracerKind::Pipeline, TracerKind::Query, TracerKind::Compute];
+
+    /// As on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            TracerKind::Pipeline => "pipeline",
+            TracerKind::Query => "query",
+            TracerKind::Compute => "compute",
+        }
+    }
+
+    /// What `auto` means on a device, and why.
+    pub fn auto(info: &DeviceInfo) -> (TracerKind, String) {
+        if info.is_cpu() {
+            (
+                TracerKind::Compute,
+                "the device is a CPU: its ray-tracing extensions, where it has them, are slower than our own hierarchy".into(),
+            )
+        } else if info.supports(TracerKind::Pipeline) {
+            (TracerKind::Pipeline, "the device has VK_KHR_ray_tracing_pipeline".into())
+        } else if info.supports(TracerKind::Query) {
+            (TracerKind::Query, "the device has VK_KHR_ray_query but no ray-tracing pipelines".into())
+        } else {
+            (TracerKind::Compute, "the device has no ray-tracing extension".into())
+        }
+    }
+}
+
+impl std::fmt::Display for TracerKind {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+/// What making a tracer's structures took.
+#[derive(Clone, Copy, Debug, Default, serde::Serialize)]
+pub struct BuildStats {
+    /// Seconds to build the hierarchy or the acceleration structures.
+    pub build_seconds: f64,
+    /// Seconds to write the scene into device memory.
+    pub upload_seconds: f64,
+    /// Bytes that tracing touches: nodes and primitives, or acceleration structures.
+    pub structure_bytes: u64,
+    /// Bytes of the scene besides: vertices, indices, attributes, textures, records.
+    pub scene_bytes: u64,
+    /// Triangles and spheres in the structures (each group once).
+    pub primitives: u64,
+    /// Entries that the compute tracer's stack holds; 0 for the hardware tracers.
+    pub stack_entries: u32,
+}
+
+impl BuildStats {
+    /// Bytes that tracing touches, per primitive.
+    pub fn bytes_per_primitive(&self) -> f64 {
+        self.structure_bytes as f64 / self.primitives.max(1) as f64
+    }
+}
+
+enum Structure {
+    Compute(compute::Hierarchy),
+    /// Held because the top level's address in the scene's root leads here.
+    Hardware {
+        _levels: hardware::Structures,
+    },
+}
+
+/// A scene in device memory and what traces it.
+pub struct Tracer {
+    kind: TracerKind,
+    device: Arc<Device>,
+    scene: GpuScene,
+    structure: Structure,
+    features: SceneFeatures,
+    stats: BuildStats,
+    // by mode
+    kernels: [OnceLock<Arc<ComputePipeline>>; 2],
+}
+
+impl Tracer {
+    /// Uploads a scene and builds what `kind` traces.
+    ///
+    /// # Errors
+    /// [`Error::Device`] when the device lacks what the tracer needs, naming it; [`Error::OutOfMemory`]; [`Error::Scene`] when
+    /// the scene has more primitives than the tracer can number.
+    pub fn new(device: &Arc<Device>, kind: TracerKind, flat: &FlatScene, needs: Needs) -> Result<Self> {
+        Self::with_kernel(device, kind, flat, needs, Kernel::default())
+    }
+
+    /// As [`Tracer::new`], with a choice of the compute tracer's kernel.
+    pub fn with_kernel(device: &Arc<Device>, kind: TracerKind, flat: &FlatScene, needs: Needs, kernel: Kernel) -> Result<Self> {
+        if !device.info.supports(kind) {
+            let missing =
+                device.info.tracers.iter().find(|t| t.tracer == kind).map(|t| t.missing.join(", ")).unwrap_or_default();
+            return Err(Error::Device(format!(
+                "tracer '{kind}' needs {missing}, which '{}' ({}) lacks; use --tracer auto, or see `skylit doctor`",
+                device.info.name, device.info.driver
+            )));
+        }
+        let features = SceneFeatures::of(flat);
+        let mut stats = BuildStats { primitives: flat.primitive_count() as u64, ..Default::default() };
+        // the hierarchy first: its build needs the most host memory, the scene's buffers come after that is freed
+        let start = Instant::now();
+        let hierarchy = if kind == TracerKind::Compute { Some(compute::Trees::build(flat, kernel)?) } else { None };
+        stats.build_seconds = start.elapsed().as_secs_f64();
+        let start = Instant::now();
+        let mut scene = GpuScene::new(device, flat, needs)?;
+        let structure = match hierarchy {
+            Some(trees) => {
+                let h = trees.upload(device, flat)?;
+                scene.set_hierarchy(&h)?;
+                stats.stack_entries = h.stack_entries;
+                stats.structure_bytes = h.bytes();
+                Structure::Compute(h)
+            }
+            None => {
+                let upload = start.elapsed();
+                let start = Instant::now();
+                let s = hardware::Structures::build(device, flat, &scene)?;
+                scene.set_top_level(s.address())?;
+                stats.build_seconds = start.elapsed().as_secs_f64();
+                stats.upload_seconds = upload.as_secs_f64();
+                stats.structure_bytes = s.bytes();
+                Structure::Hardware { _levels: s }
+            }
+        };
+        if kind == TracerKind::Compute {
+            stats.upload_seconds = start.elapsed().as_secs_f64();
+        }
+        stats.scene_bytes = scene.bytes();
+        Ok(Self { kind, device: device.clone(), scene, structure, features, stats, kernels: Default::default() })
+    }
+
+    /// Which tracer this is.
+    pub fn kind(&self) -> TracerKind {
+        self.kind
+    }
+
+    /// The device it runs on.
+    pub fn device(&self) -> &Arc<Device> {
+        &self.device
+    }
+
+    /// What the scene needs.
+    pub fn features(&self) -> SceneFeatures {
+        self.features
+    }
+
+    /// What making it took.
+    pub fn stats(&self) -> BuildStats {
+        self.stats
+    }
+
+    /// Address of the scene's root: [`Push::scene`].
+    pub fn scene_address(&self) -> u64 {
+        self.scene.root_address()
+    }
+
+    /// Compiles a stream for this tracer and scene.
+    pub fn stream(&self, shaders: &'static StreamShaders) -> Result<Stream> {
+        let specialization = Specialization::default()
+            .set(0, self.features.alpha as u32)
+            .set(1, self.features.spheres as u32)
+            .set(2, self.features.single_level as u32);
+        match &self.structure {
+            Structure::Compute(h) => {
+                let rays_per_lane = if self.device.info.is_cpu() { compute::RAYS_PER_LANE_CPU } else { compute::RAYS_PER_LANE_GPU };
+                let specialization = specialization.set(3, h.stack_entries.max(1)).set(4, rays_per_lane);
+                if h.kernel == Kernel::Reference {
+                    return Stream::reference(&self.device, shaders, &specialization);
+                }
+                let kernel = self.kernel(shaders.mode(), &specialization)?;
+                Stream::steps(&self.device, shaders, &specialization, kernel, rays_per_lane)
+            }
+            Structure::Hardware { .. } if self.kind == TracerKind::Query => {
+                Stream::query(&self.device, shaders, &specialization)
+            }
+            Structure::Hardware { .. } => Stream::pipeline(&self.device, shaders, &specialization, self.features),
+        }
+    }
+
+    /// The fast kernel, compiled once for all streams of a mode.
+    fn kernel(&self, mode: stream::Mode, specialization: &Specialization) -> Result<Arc<ComputePipeline>> {
+        let slot = &self.kernels[mode as usize];
+        if let Some(kernel) = slot.get() {
+            return Ok(kernel.clone());
+        }
+        let spirv = match (mode, self.device.info.int64) {
+            (stream::Mode::Any, true) => stream::WIDE_ANY_64,
+            (stream::Mode::Any, false) => stream::WIDE_ANY_32,
+            (stream::Mode::Closest, true) => stream::WIDE_CLOSEST_64,
+            (stream::Mode::Closest, false) => stream::WIDE_CLOSEST_32,
+        };
+        let kernel = Arc::new(ComputePipeline::new(&self.device, "wide kernel", spirv, specialization)?);
+        Ok(slot.get_or_init(|| kernel).clone())
+    }
+}

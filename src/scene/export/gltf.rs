@@ -8,7 +8,7 @@ use std::sync::Arc;
 use glam::{DAffine3, DQuat, DVec3, Vec3};
 use serde_json::{Value, json};
 
-use super::{atomic, icosphere, material};
+use super::{icosphere, material, write_buffered};
 use crate::error::{Error, Result};
 use crate::scene::{
     Camera, Filter, Geometry, Light, LightKind, Material, Projection, Scene, Sphere, Texture, TriangleMesh, Wrap,
@@ -39,7 +39,7 @@ pub fn export_gltf(scene: &Scene, path: &Path) -> Result<()> {
         return Err(fail("the scene is larger than 4 GiB, the limit of .glb".to_owned()));
     }
     if embed {
-        return atomic::write(path, |out| {
+        return write_buffered(path, |out| {
             let json_size = text.len().next_multiple_of(4);
             let bin_size = bin.len().next_multiple_of(4);
             let words = [2, 12 + 8 + json_size + 8 + bin_size, json_size].map(|n| (n as u32).to_le_bytes());
@@ -55,12 +55,12 @@ pub fn export_gltf(scene: &Scene, path: &Path) -> Result<()> {
         });
     }
     for (name, png) in &images {
-        atomic::write(&path.with_file_name(name), |out| out.write_all(png))?;
+        write_buffered(&path.with_file_name(name), |out| out.write_all(png))?;
     }
     if !bin.is_empty() {
-        atomic::write(&path.with_extension("bin"), |out| out.write_all(&bin))?;
+        write_buffered(&path.with_extension("bin"), |out| out.write_all(&bin))?;
     }
-    atomic::write(path, |out| out.write_all(text.as_bytes()))
+    write_buffered(path, |out| out.write_all(text.as_bytes()))
 }
 
 /// JSON arrays.

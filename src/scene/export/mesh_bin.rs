@@ -4,7 +4,7 @@ use std::path::Path;
 
 use glam::{DAffine3, Vec3};
 
-use super::{atomic, icosphere};
+use super::{icosphere, write_buffered};
 use crate::error::{Error, Result};
 use crate::scene::{Geometry, Instance, Material, Mesh, Scene, TriangleMesh};
 
@@ -61,7 +61,7 @@ pub fn mesh_bin(scene: &Scene) -> Result<(Vec<Vec3>, Vec<[u32; 3]>)> {
 /// As [`mesh_bin`], and [`Error::Output`].
 pub fn write_mesh_bin(scene: &Scene, path: &Path) -> Result<usize> {
     let (positions, indices) = mesh_bin(scene)?;
-    atomic::write(path, |out| {
+    write_buffered(path, |out| {
         for n in [positions.len(), indices.len()] {
             out.write_all(&(n as u32).to_le_bytes())?;
         }

@@ -1,0 +1,54 @@
+#!/usr/bin/env bash
+# Sets up, builds, and renders the ambient occlusion of built-in scenes with each of the three tracers; prints how far apart
+# the tracers' images are, and where the images lie.
+#
+#   ./scripts/demo.sh [SPP]         samples per pixel, 64 unless given
+set -euo pipefail
+cd "$(dirname "$0")/.."
+spp=${1:-${SKYLIT_DEMO_SPP:-64}}
+out=${SKYLIT_DEMO_DIR:-target/demo}
+size=640x360
+scenes=(cornell-box stairs leaf-cards)
+tracers=(pipeline query compute)
+
+say() { printf 'demo: %s\n' "$*"; }
+
+./scripts/setup.sh
+say "building"
+cargo build --release --locked
+skylit=${CARGO_TARGET_DIR:-target}/release/skylit
+mkdir -p "$out"
+"$skylit" doctor
+
+for scene in "${scenes[@]}"; do
+  for tracer in "${tracers[@]}"; do
+    say "$scene, tracer $tracer"
+    "$skylit" render "builtin:$scene" --tracer "$tracer" --spp "$spp" --size "$size" \
+      -o "$out/$scene-$tracer.exr" -o "$out/$scene-$tracer.png"
+  done
+done
+
+report=$out/report.md
+{
+  echo "# skylit: ambient occlusion by three tracers"
+  echo
+  "$skylit" doctor | tail -n 1
+  for scene in "${scenes[@]}"; do
+    printf '\n## %s, %s, %s samples per pixel\n\n' "$scene" "$size" "$spp"
+    printf '| %s | %s | %s |\n|---|---|---|\n' "${tracers[@]}"
+    printf '|'
+    for tracer in "${tracers[@]}"; do printf ' ![%s](%s-%s.png) |' "$tracer" "$scene" "$tracer"; done
+    printf '\n\nDifferences of the accessibility (channel Y, 0 to 1):\n\n'
+    for pair in "pipeline query" "pipeline compute" "query compute"; do
+      a=${pair% *} b=${pair#* }
+      # an assignment of its own: inside printf's arguments a failure would go unnoticed
+      numbers=$("$skylit" diff "$out/$scene-$a.exr" "$out/$scene-$b.exr" --max-rmse 0.02 | sed -n 's/^Y  *//p')
+      printf -- '- %s and %s: %s\n' "$a" "$b" "$numbers"
+    done
+  done
+} > "$report.new"
+mv "$report.new" "$report"
+
+say "differences between the tracers"
+grep -E '^(## |- )' "$report"
+say "done: look at $out/*.png (the same values as floats are in $out/*.exr), side by side in $report"

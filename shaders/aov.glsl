@@ -1,0 +1,38 @@
+// aov: one ray through each pixel's centre; writes what it met.
+// stream: closest
+#include "common/camera.glsl"
+#include "scene/surface.glsl"
+
+layout(buffer_reference, std430, buffer_reference_align = 16) writeonly buffer Aov { uvec4 v[]; };
+
+uint ray_count() { return push.count; }
+
+Ray centre_ray(BlockParams p, uint index) {
+    uvec2 pixel = block_pixel(p, index);
+    if (!in_block(p, pixel)) return no_ray();
+    return camera_ray(p, vec2(pixel + p.block_origin) + 0.5);
+}
+
+Ray ray(uint index) {
+    return centre_ray(BlockParams(push.pass), index);
+}
+
+// Mirrors AovPixel in src/render/aov.rs.
+void closest(uint index, Hit hit) {
+    BlockParams p = BlockParams(push.pass);
+    Aov aov = Aov(p.aov);
+    uint at = 4u * (index - push.first);
+    if (!is_hit(hit)) {
+        aov.v[at] = uvec4(floatBitsToUint(INFINITY), INVALID, INVALID, INVALID);
+        aov.v[at + 1u] = aov.v[at + 2u] = aov.v[at + 3u] = uvec4(0u);
+        return;
+    }
+    Surface s = surface_at(centre_ray(p, index), hit);
+    SceneRoot root = SceneRoot(push.scene);
+    PartRecord part = PartRecords(root.parts).v[s.part];
+    vec4 color = base_color(part, MaterialRecords(root.materials).v[part.material], s.primitive, s.uv);
+    aov.v[at] = uvec4(floatBitsToUint(hit.t), hit.instance, hit.primitive, part.material);
+    aov.v[at + 1u] = uvec4(floatBitsToUint(s.position), floatBitsToUint(color.r));
+    aov.v[at + 2u] = uvec4(floatBitsToUint(s.ng), floatBitsToUint(color.g));
+    aov.v[at + 3u] = uvec4(floatBitsToUint(s.ns), floatBitsToUint(color.b));
+}

@@ -1,0 +1,68 @@
+// Pixels of a block of the image, and the camera's rays through them. Mirrors BlockParams in src/render/block.rs.
+#ifndef COMMON_CAMERA
+#define COMMON_CAMERA
+#include "common/types.glsl"
+#include "common/sampler.glsl"
+
+layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer BlockParams {
+    vec4 camera_to_world[3];  // relative to the scene's origin
+    vec2 view;                // half width and half height of the view: tangents, or world units when orthographic
+    uint orthographic;
+    uint seed;
+    uvec2 image_size;
+    uvec2 block_origin;       // pixels
+    uvec2 block_size;         // pixels
+    uint tiles_x;             // 8x8 tiles in a row of the block
+    uint hemisphere;          // 0: about the geometric normal, 1: about the shading normal
+    float falloff_log2;       // a hit at distance d counts 2^(-d * falloff_log2)
+    float radius;             // world units beyond which nothing occludes
+    uvec2 film;               // FilmPixel per ray index of the block
+    uvec2 gbuffer;            // three uvec4 per ray of a launch
+    uvec2 aov;                // AovPixel per ray of a launch
+    uvec2 ray_dump;           // where to write the rays of this pass, or null
+};
+
+// Ray index to pixel within the block: 8x8 tiles, Morton order within, so that eight neighbouring lanes are a 4x2 patch.
+uvec2 block_pixel(BlockParams p, uint index) {
+    uint tile = index >> 6;
+    uint k = index & 63u;
+    uvec2 inside = uvec2((k & 1u) | (k >> 1 & 2u) | (k >> 2 & 4u), (k >> 1 & 1u) | (k >> 2 & 2u) | (k >> 3 & 4u));
+    return uvec2(tile % p.tiles_x, tile / p.tiles_x) * 8u + inside;
+}
+
+bool in_block(BlockParams p, uvec2 pixel) {
+    return all(lessThan(pixel, p.block_size));
+}
+
+// Ray through a point of the image, in pixels from the upper left corner.
+Ray camera_ray(BlockParams p, vec2 at) {
+    vec2 ndc = 2.0 * at / vec2(p.image_size) - 1.0;
+    vec2 plane = vec2(ndc.x, -ndc.y) * p.view;
+    vec4 rows[3] = p.camera_to_world;
+    vec3 eye = vec3(rows[0].w, rows[1].w, rows[2].w);
+    if (p.orthographic != 0u) {
+        vec3 offset = vec3(rows[0].x, rows[1].x, rows[2].x) * plane.x + vec3(rows[0].y, rows[1].y, rows[2].y) * plane.y;
+        return Ray(eye + offset, 0.0, -vec3(rows[0].z, rows[1].z, rows[2].z), INFINITY);
+    }
+    vec3 d = vec3(plane, -1.0);
+    return Ray(eye, 0.0, normalize(vec3(dot(rows[0].xyz, d), dot(rows[1].xyz, d), dot(rows[2].xyz, d))), INFINITY);
+}
+
+layout(buffer_reference, std430, buffer_reference_align = 4) writeonly buffer RayDump { float v[]; };
+
+// For --dump-rays: what the pass is about to trace.
+void dump_ray(BlockParams p, uint index, Ray ray) {
+    if (is_null(p.ray_dump)) return;
+    RayDump dump = RayDump(p.ray_dump);
+    uint at = 8u * (index - push.first);
+    dump.v[at] = ray.origin.x;
+    dump.v[at + 1u] = ray.origin.y;
+    dump.v[at + 2u] = ray.origin.z;
+    dump.v[at + 3u] = ray.tmin;
+    dump.v[at + 4u] = ray.direction.x;
+    dump.v[at + 5u] = ray.direction.y;
+    dump.v[at + 6u] = ray.direction.z;
+    dump.v[at + 7u] = ray.tmax;
+}
+
+#endif

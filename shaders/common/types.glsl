@@ -1,0 +1,59 @@
+// Rays, hits and raw memory: what every stream and every tracer speaks.
+#ifndef COMMON_TYPES
+#define COMMON_TYPES
+
+// The points origin + t * direction with tmin < t < tmax. A ray with tmax <= tmin is no ray: it is not traced, and its
+// callback reports a miss.
+struct Ray {
+    vec3 origin;
+    float tmin;
+    vec3 direction;
+    float tmax;
+};
+
+// What a ray met. t = inf and ids = INVALID for a miss. Ids are those of the scene: placed mesh, and triangle or sphere
+// in it; u, v are the barycentric weights of the triangle's second and third corner.
+struct Hit {
+    float t;
+    uint instance;
+    uint primitive;
+    float u;
+    float v;
+};
+
+const uint INVALID = 0xffffffffu;
+const float INFINITY = 1.0 / 0.0;
+
+Ray no_ray() { return Ray(vec3(0.0), 0.0, vec3(0.0, 0.0, 1.0), -1.0); }
+bool is_ray(Ray ray) { return ray.tmax > ray.tmin; }
+Hit miss() { return Hit(INFINITY, INVALID, INVALID, 0.0, 0.0); }
+bool is_hit(Hit hit) { return hit.t < INFINITY; }
+
+// Memory by device address. The address is a uvec2 so that no 64-bit integer is needed in shaders.
+layout(buffer_reference, std430, buffer_reference_align = 4) readonly buffer Words { uint v[]; };
+layout(buffer_reference, std430, buffer_reference_align = 4) readonly buffer Floats { float v[]; };
+layout(buffer_reference, std430, buffer_reference_align = 8) readonly buffer Pairs { uvec2 v[]; };
+layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Quads { uvec4 v[]; };
+
+bool is_null(uvec2 address) { return (address.x | address.y) == 0u; }
+
+vec3 load_vec3(uvec2 base, uint index) {
+    Floats f = Floats(base);
+    return vec3(f.v[3u * index], f.v[3u * index + 1u], f.v[3u * index + 2u]);
+}
+
+vec2 load_vec2(uvec2 base, uint index) {
+    return uintBitsToFloat(Pairs(base).v[index]);
+}
+
+// Every stream has this block; `pass` is the address of the pass's own parameters.
+layout(push_constant) uniform Push {
+    uvec2 scene;  // SceneRoot
+    uvec2 pass;
+    uint first;   // index of the first ray of this launch
+    uint count;   // rays in this launch
+    uint sample_index;
+    uint reserved;
+} push;
+
+#endif

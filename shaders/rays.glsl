@@ -1,0 +1,33 @@
+// rays: traces a set of rays from memory; writes a hit record each, or whether the way is blocked.
+// stream: any closest
+#include "common/types.glsl"
+
+layout(buffer_reference, std430, buffer_reference_align = 8) readonly buffer RaySet {
+    uvec2 rays;     // 8 floats each: origin, tmin, direction, tmax
+    uvec2 results;  // closest: 5 words each, as HITS.bin; any: a word each, 1 = occluded
+};
+layout(buffer_reference, std430, buffer_reference_align = 4) writeonly buffer Results { uint v[]; };
+
+uint ray_count() { return push.count; }
+
+Ray ray(uint index) {
+    Quads q = Quads(RaySet(push.pass).rays);
+    vec4 a = uintBitsToFloat(q.v[2u * index]);
+    vec4 b = uintBitsToFloat(q.v[2u * index + 1u]);
+    return Ray(a.xyz, a.w, b.xyz, b.w);
+}
+
+#ifdef STREAM_ANY
+void any(uint index, bool occluded) {
+    Results(RaySet(push.pass).results).v[index] = occluded ? 1u : 0u;
+}
+#else
+void closest(uint index, Hit hit) {
+    Results r = Results(RaySet(push.pass).results);
+    r.v[5u * index] = floatBitsToUint(hit.t);
+    r.v[5u * index + 1u] = hit.instance;
+    r.v[5u * index + 2u] = hit.primitive;
+    r.v[5u * index + 3u] = floatBitsToUint(hit.u);
+    r.v[5u * index + 4u] = floatBitsToUint(hit.v);
+}
+#endif

@@ -1,0 +1,51 @@
+// Base colour and alpha of a point on a part.
+#ifndef SCENE_MATERIAL
+#define SCENE_MATERIAL
+#include "scene/texture.glsl"
+
+// Vertex numbers of a triangle, within the group. `primitive` counts in the group.
+uvec3 triangle_indices(PartRecord part, uint primitive) {
+    Words w = Words(part.indices);
+    return uvec3(w.v[3u * primitive], w.v[3u * primitive + 1u], w.v[3u * primitive + 2u]);
+}
+
+vec2 texcoord_at(PartRecord part, uvec3 corners, vec2 uv, uint set) {
+    uvec2 base = set == 1u ? part.texcoords1 : part.texcoords0;
+    if (is_null(base)) return vec2(0.0);
+    corners -= part.first_vertex;
+    return load_vec2(base, corners.x) * (1.0 - uv.x - uv.y) + load_vec2(base, corners.y) * uv.x + load_vec2(base, corners.z) * uv.y;
+}
+
+vec4 vertex_color(PartRecord part, uvec3 corners, vec2 uv) {
+    if (is_null(part.colors)) return vec4(1.0);
+    corners -= part.first_vertex;
+    Quads q = Quads(part.colors);
+    return uintBitsToFloat(q.v[corners.x]) * (1.0 - uv.x - uv.y) + uintBitsToFloat(q.v[corners.y]) * uv.x +
+           uintBitsToFloat(q.v[corners.z]) * uv.y;
+}
+
+// Linear base colour with alpha at barycentrics uv of a primitive (counted in the group). Spheres have no coordinates.
+vec4 base_color(PartRecord part, MaterialRecord material, uint primitive, vec2 uv) {
+    vec4 color = material.base_color;
+    if (is_null(part.indices)) return color;
+    uvec3 corners = triangle_indices(part, primitive);
+    color *= vertex_color(part, corners, uv);
+    if (material.base_color_texture != INVALID) {
+        vec2 st = texcoord_at(part, corners, uv, material.texcoord_set);
+        vec4 m = material.texcoord_transform;
+        st = vec2(m.x * st.x + m.z * st.y, m.y * st.x + m.w * st.y) + material.texcoord_offset;
+        color *= sample_texture(material.base_color_texture, st, true);
+    }
+    return color;
+}
+
+// Is there a surface at this point of an alpha-tested primitive?
+bool alpha_passes(uint instance, uint primitive, vec2 uv) {
+    SceneRoot root = SceneRoot(push.scene);
+    InstanceRecords instances = InstanceRecords(root.instances);
+    PartRecord part = PartRecords(root.parts).v[part_index(instances, instance, primitive)];
+    MaterialRecord material = MaterialRecords(root.materials).v[part.material];
+    return base_color(part, material, primitive, uv).a >= material.alpha_cutoff;
+}
+
+#endif

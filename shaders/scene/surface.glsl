@@ -1,0 +1,96 @@
+// From a hit to the point on the surface, with an offset for new rays that comes from an error bound.
+#ifndef SCENE_SURFACE
+#define SCENE_SURFACE
+#include "scene/material.glsl"
+
+struct Surface {
+    vec3 position;   // world
+    vec3 ng;         // unit geometric normal, world, on the front (counter-clockwise) side
+    vec3 ns;         // unit shading normal, on the side of ng
+    float offset;    // distance along +-ng at which a new ray cannot meet this surface again
+    uint part;       // PartRecord
+    uint primitive;  // in the group
+    vec2 uv;
+};
+
+// Object- and world-space rounding as bounded by Moreau, "Solving Self-Intersection Artifacts in DirectX Raytracing" (2022):
+// the reconstruction of the point from barycentrics, the intersection test, and the two transforms. c0..c2 are his
+// constants: 1, 3 and 2 half-ulps with margin.
+const float C0 = 5.9604645e-8;
+const float C1 = 1.7881394e-7;
+const float C2 = 1.1920930e-7;
+
+vec3 abs_transform_vector(vec4 rows[3], vec3 v) {
+    return vec3(dot(abs(rows[0].xyz), v), dot(abs(rows[1].xyz), v), dot(abs(rows[2].xyz), v));
+}
+
+// Offset along the unit world normal, from the object-space error per axis, for a point with unnormalised normals.
+float spawn_offset(vec4 group_to_world[3], vec4 world_to_group[3], vec3 p, vec3 world, vec3 error, vec3 normal, vec3 ng, float scale) {
+    vec3 translation = vec3(group_to_world[0].w, group_to_world[1].w, group_to_world[2].w);
+    vec3 world_error = C1 * abs_transform_vector(group_to_world, abs(p)) + C2 * abs(translation);
+    vec3 back = vec3(world_to_group[0].w, world_to_group[1].w, world_to_group[2].w);
+    error += C2 * (abs_transform_vector(world_to_group, abs(world)) + abs(back));
+    return dot(error, abs(normal)) * scale + dot(world_error, abs(ng));
+}
+
+// Everything about the point that `ray` met. The triangle's own corners are used, not origin + t * direction, whose error
+// grows with t.
+Surface surface_at(Ray ray, Hit hit) {
+    SceneRoot root = SceneRoot(push.scene);
+    uvec2 placement = Pairs(root.placements).v[hit.instance];
+    InstanceRecord instance = InstanceRecords(root.instances).v[placement.x];
+    PartRecord part = PartRecords(root.parts).v[placement.y];
+    Surface s;
+    s.part = placement.y;
+    s.primitive = hit.primitive + part.first_primitive;
+    s.uv = vec2(hit.u, hit.v);
+
+    vec3 p, normal, error;
+    vec3 shading = vec3(0.0);
+    if (HAS_SPHERES && is_null(part.indices)) {
+        vec4 sphere = uintBitsToFloat(Quads(part.positions).v[s.primitive]);
+        vec3 at = transform_point(instance.world_to_group, ray.origin) + hit.t * transform_vector(instance.world_to_group, ray.direction);
+        normal = normalize(at - sphere.xyz);
+        p = sphere.xyz + sphere.w * normal;
+        // pbrt-v4 6.8.5 for the reprojected point, and the rounding of the centre's sum
+        error = 5.0 * C0 * (abs(p) + vec3(sphere.w)) + 4.0 * C0 * abs(sphere.xyz);
+    } else {
+        uvec3 corners = triangle_indices(part, s.primitive);
+        vec3 v0 = load_vec3(part.positions, corners.x);
+        vec3 edge1 = load_vec3(part.positions, corners.y) - v0;
+        vec3 edge2 = load_vec3(part.positions, corners.z) - v0;
+        // the base corner last: its rounding is the smallest that way
+        p = v0 + (s.uv.x * edge1 + s.uv.y * edge2);
+        normal = cross(edge1, edge2);
+        vec3 extents = abs(edge1) + abs(edge2) + abs(abs(edge1) - abs(edge2));
+        float extent = max(max(extents.x, extents.y), extents.z);
+        error = C0 * abs(v0) + vec3(C1 * extent);
+        if (!is_null(part.normals)) {
+            corners -= part.first_vertex;
+            shading = load_vec3(part.normals, corners.x) * (1.0 - s.uv.x - s.uv.y) + load_vec3(part.normals, corners.y) * s.uv.x +
+                      load_vec3(part.normals, corners.z) * s.uv.y;
+        }
+        // a tiny triangle's cross product underflows: normalise before the transform
+        float largest = max(max(abs(normal.x), abs(normal.y)), abs(normal.z));
+        normal = largest > 0.0 ? normalize(normal / largest) : vec3(0.0, 0.0, 1.0);
+    }
+    s.position = transform_point(instance.group_to_world, p);
+    vec3 n = transform_transposed(instance.world_to_group, normal);
+    float scale = inversesqrt(dot(n, n));
+    s.ng = n * scale;
+    s.offset = spawn_offset(instance.group_to_world, instance.world_to_group, p, s.position, error, normal, s.ng, scale);
+    vec3 ns = transform_transposed(instance.world_to_group, shading);
+    float ns2 = dot(ns, ns);
+    // a mirroring transform that was baked into the vertices has turned their winding (glTF 2.0, 3.7.4)
+    s.ng *= part.mirrored != 0u ? -1.0 : 1.0;
+    s.ns = ns2 > 0.0 ? ns * inversesqrt(ns2) : s.ng;
+    s.ns *= dot(s.ns, s.ng) < 0.0 ? -1.0 : 1.0;
+    return s;
+}
+
+// Origin of a ray that leaves the surface on the side of `direction`.
+vec3 spawn_origin(Surface s, vec3 direction) {
+    return s.position + s.ng * (dot(s.ng, direction) < 0.0 ? -s.offset : s.offset);
+}
+
+#endif

@@ -1,0 +1,59 @@
+// Textures in plain memory, filtered here: no limit on their number or size, no descriptor indexing, and the same value on
+// every driver (the oracle computes it too).
+#ifndef SCENE_TEXTURE
+#define SCENE_TEXTURE
+#include "scene/scene.glsl"
+
+uint wrap_texel(int i, uint size, uint mode) {
+    int n = int(size);
+    if (mode == 2u) return uint(clamp(i, 0, n - 1));
+    if (mode == 1u) {
+        int m = i % (2 * n);
+        m += m < 0 ? 2 * n : 0;
+        return uint(m < n ? m : 2 * n - 1 - m);
+    }
+    int m = i % n;
+    return uint(m < 0 ? m + n : m);
+}
+
+// One texel as stored: sRGB is not decoded.
+vec4 texel(TextureRecord texture, int x, int y) {
+    uint i = wrap_texel(y, texture.height, texture.wrap_v) * texture.width + wrap_texel(x, texture.width, texture.wrap_u);
+    return unpackUnorm4x8(Words(texture.texels).v[i]);
+}
+
+// sRGB to linear, exact (IEC 61966-2-1)
+vec3 srgb_to_linear(vec3 c) {
+    return mix(c / 12.92, pow((c + 0.055) / 1.055, vec3(2.4)), greaterThan(c, vec3(0.04045)));
+}
+
+vec4 decoded_texel(TextureRecord texture, int x, int y, bool srgb) {
+    vec4 c = texel(texture, x, y);
+    return srgb ? vec4(srgb_to_linear(c.rgb), c.a) : c;
+}
+
+// Coordinates far outside [0, 1] would overflow the integer texel index: fold them first. Repeating with period 2 holds for
+// repeat and mirror; clamp needs no more than the neighbourhood.
+vec2 fold(vec2 uv, TextureRecord texture) {
+    vec2 folded = uv - 2.0 * floor(uv * 0.5);
+    return vec2(texture.wrap_u == 2u ? clamp(uv.x, -1.0, 2.0) : folded.x, texture.wrap_v == 2u ? clamp(uv.y, -1.0, 2.0) : folded.y);
+}
+
+// Filtered value at uv (v down). sRGB is decoded before filtering.
+vec4 sample_texture(uint index, vec2 uv, bool srgb) {
+    TextureRecord texture = TextureRecords(SceneRoot(push.scene).textures).v[index];
+    vec2 p = fold(uv, texture) * vec2(texture.width, texture.height);
+    if (texture.nearest != 0u) {
+        ivec2 i = ivec2(floor(p));
+        return decoded_texel(texture, i.x, i.y, srgb);
+    }
+    p -= 0.5;
+    ivec2 i = ivec2(floor(p));
+    vec2 f = p - vec2(i);
+    return mix(
+        mix(decoded_texel(texture, i.x, i.y, srgb), decoded_texel(texture, i.x + 1, i.y, srgb), f.x),
+        mix(decoded_texel(texture, i.x, i.y + 1, srgb), decoded_texel(texture, i.x + 1, i.y + 1, srgb), f.x),
+        f.y);
+}
+
+#endif

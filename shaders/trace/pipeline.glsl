@@ -1,0 +1,41 @@
+// The pipeline tracer's ray generation shader: VK_KHR_ray_tracing_pipeline, one invocation a ray.
+#ifndef TRACE_PIPELINE
+#define TRACE_PIPELINE
+#include "scene/scene.glsl"
+#include "trace/payload.glsl"
+
+layout(location = 0) rayPayloadEXT Payload payload;
+
+void main() {
+    uint index = push.first + gl_LaunchIDEXT.x;
+    Ray world = ray(index);
+    if (!is_ray(world)) {
+#ifdef STREAM_ANY
+        any(index, false);
+#else
+        closest(index, miss());
+#endif
+        return;
+    }
+    payload.t = 0.0;
+    payload.instance = INVALID;
+    payload.primitive = INVALID;
+    payload.u = 0.0;
+    payload.v = 0.0;
+#ifdef STREAM_ANY
+    // the miss shader alone reports
+    const uint flags = gl_RayFlagsTerminateOnFirstHitEXT | gl_RayFlagsSkipClosestHitShaderEXT;
+#else
+    const uint flags = gl_RayFlagsNoneEXT;
+#endif
+    traceRayEXT(accelerationStructureEXT(SceneRoot(push.scene).top_level), flags, 0xffu, 0, 1, 0, world.origin, world.tmin,
+        world.direction, world.tmax, 0);
+#ifdef STREAM_ANY
+    any(index, payload.t < INFINITY);
+#else
+    if (payload.t < INFINITY) closest(index, scene_hit(payload.t, payload.instance, payload.primitive, vec2(payload.u, payload.v)));
+    else closest(index, miss());
+#endif
+}
+
+#endif

@@ -1,0 +1,65 @@
+// The query tracer: VK_KHR_ray_query in a compute shader, one thread a ray.
+#ifndef TRACE_QUERY
+#define TRACE_QUERY
+#include "scene/material.glsl"
+#include "scene/sphere.glsl"
+
+layout(local_size_x = LANES) in;
+
+void main() {
+    if (gl_GlobalInvocationID.x >= push.count) return;
+    uint index = push.first + gl_GlobalInvocationID.x;
+    Ray world = ray(index);
+    if (!is_ray(world)) {
+#ifdef STREAM_ANY
+        any(index, false);
+#else
+        closest(index, miss());
+#endif
+        return;
+    }
+    SceneRoot root = SceneRoot(push.scene);
+    InstanceRecords instances = InstanceRecords(root.instances);
+    rayQueryEXT query;
+#ifdef STREAM_ANY
+    const uint flags = gl_RayFlagsTerminateOnFirstHitEXT;
+#else
+    const uint flags = gl_RayFlagsNoneEXT;
+#endif
+    rayQueryInitializeEXT(query, accelerationStructureEXT(root.top_level), flags, 0xffu, world.origin, world.tmin, world.direction, world.tmax);
+    while (rayQueryProceedEXT(query)) {
+        uint type = rayQueryGetIntersectionTypeEXT(query, false);
+        uint instance = uint(rayQueryGetIntersectionInstanceCustomIndexEXT(query, false));
+        uint primitive = uint(rayQueryGetIntersectionPrimitiveIndexEXT(query, false));
+        if (type == gl_RayQueryCandidateIntersectionTriangleEXT) {
+            // only alpha-tested triangles are not opaque, and they are the second geometry
+            if (HAS_ALPHA && alpha_passes(instance, instances.v[instance].opaque_count + primitive, rayQueryGetIntersectionBarycentricsEXT(query, false)))
+                rayQueryConfirmIntersectionEXT(query);
+        } else if (HAS_SPHERES) {
+            PartRecords parts = PartRecords(root.parts);
+            vec4 sphere = uintBitsToFloat(Quads(parts.v[instances.v[instance].first_part].positions).v[primitive]);
+            float far = rayQueryGetIntersectionTypeEXT(query, true) == gl_RayQueryCommittedIntersectionNoneEXT
+                ? world.tmax : rayQueryGetIntersectionTEXT(query, true);
+            float t = intersect_sphere(rayQueryGetIntersectionObjectRayOriginEXT(query, false),
+                rayQueryGetIntersectionObjectRayDirectionEXT(query, false), world.tmin, far, sphere.xyz, sphere.w);
+            if (t > world.tmin && t < far) rayQueryGenerateIntersectionEXT(query, t);
+        }
+    }
+    uint type = rayQueryGetIntersectionTypeEXT(query, true);
+#ifdef STREAM_ANY
+    any(index, type != gl_RayQueryCommittedIntersectionNoneEXT);
+#else
+    if (type == gl_RayQueryCommittedIntersectionNoneEXT) {
+        closest(index, miss());
+    } else {
+        uint instance = uint(rayQueryGetIntersectionInstanceCustomIndexEXT(query, true));
+        uint primitive = uint(rayQueryGetIntersectionPrimitiveIndexEXT(query, true));
+        bool sphere = type == gl_RayQueryCommittedIntersectionGeneratedEXT;
+        if (rayQueryGetIntersectionGeometryIndexEXT(query, true) != 0) primitive += instances.v[instance].opaque_count;
+        vec2 uv = sphere ? vec2(0.0) : rayQueryGetIntersectionBarycentricsEXT(query, true);
+        closest(index, scene_hit(rayQueryGetIntersectionTEXT(query, true), instance, primitive, uv));
+    }
+#endif
+}
+
+#endif

@@ -1,0 +1,181 @@
+// The compute tracer's readable reference: a two-level binary hierarchy, one ray per lane. It supplies main() around the
+// stream's ray(), closest() or any(). The fast kernel is wide.glsl.
+#ifndef TRACE_REFERENCE
+#define TRACE_REFERENCE
+#include "scene/material.glsl"
+#include "scene/sphere.glsl"
+#include "trace/records.glsl"
+#include "trace/slab.glsl"
+#include "trace/triangle.glsl"
+
+layout(local_size_x = LANES) in;
+
+// The host sets this to what the scene's trees need at most: every inner node pushes at most one child, so depth of the
+// top level + 1 + depth of the deepest group can never be exceeded. See src/bvh/bvh2.rs for the bound on the depth.
+layout(constant_id = 3) const uint STACK_SIZE = 64;
+layout(constant_id = 4) const uint RAYS_PER_LANE = 1;
+
+// References. A leaf holds count - 1 in bits 27-30 and its first primitive in bits 0-26; a leaf of the top level holds an
+// InstanceRecord.
+const uint LEAF = 0x80000000u;
+const uint FINISHED = 0x7fffffffu;
+const uint LEAVE_INSTANCE = 0x7ffffffeu;
+const uint NEXT = 0x7ffffffdu;
+const uint LAST_NODE = 0x7ffffff0u;
+#define LOAD_FLOATS(base, i) uintBitsToFloat(LOAD_PAIR(base, i))
+
+// Entry distance of a box, or INFINITY when it is missed.
+float enter_box(vec3 lo, vec3 hi, vec3 origin, vec3 inverse, float tmin, float tmax) {
+    vec3 t0 = (lo - origin) * inverse;
+    vec3 t1 = (hi - origin) * inverse;
+    vec3 n = MIN(t0, t1);
+    vec3 f = MAX(t0, t1);
+    float near = MAX(MAX(n.x, n.y), MAX(n.z, tmin));
+    float far = MIN(MIN(MIN(f.x, f.y), f.z) * SLAB_SCALE, tmax);
+    return near <= far ? near : INFINITY;
+}
+
+void main() {
+    uint next = gl_WorkGroupID.x * (LANES * RAYS_PER_LANE) + gl_LocalInvocationID.x;
+    uint end = min((gl_WorkGroupID.x + 1u) * (LANES * RAYS_PER_LANE), push.count);
+    if (next >= end) return;
+
+    SceneRoot root = SceneRoot(push.scene);
+    uvec2 nodes = root.nodes;
+    uvec2 primitives = root.primitives;
+    InstanceRecords instances = InstanceRecords(root.instances);
+
+    uint stack[STACK_SIZE];
+#ifndef STREAM_ANY
+    float stack_near[STACK_SIZE];
+#endif
+    uint depth = 0u;
+
+    uint index = push.first + next;
+    Ray world = ray(index);
+    Shear shear = make_shear(world.direction);
+    vec3 origin = world.origin;
+    vec3 inverse = safe_inverse(world.direction);
+    uint instance = 0u;
+    bool in_group = SINGLE_LEVEL;
+    uint current = is_ray(world) ? root.root : FINISHED;
+    float best = world.tmax;
+    uint best_instance = INVALID;
+    uint best_primitive = INVALID;
+    vec2 best_uv = vec2(0.0);
+
+    while (true) {
+        if (current < LAST_NODE) {
+            vec2 a = LOAD_FLOATS(nodes, 8u * current), b = LOAD_FLOATS(nodes, 8u * current + 1u), c = LOAD_FLOATS(nodes, 8u * current + 2u);
+            vec2 d = LOAD_FLOATS(nodes, 8u * current + 3u), e = LOAD_FLOATS(nodes, 8u * current + 4u), f = LOAD_FLOATS(nodes, 8u * current + 5u);
+            uvec2 children = LOAD_PAIR(nodes, 8u * current + 6u);
+            float near0 = enter_box(vec3(a, b.x), vec3(b.y, c), origin, inverse, world.tmin, best);
+            float near1 = enter_box(vec3(d, e.x), vec3(e.y, f), origin, inverse, world.tmin, best);
+            bool swap = near1 < near0;
+            float first = swap ? near1 : near0;
+            float second = swap ? near0 : near1;
+            current = first < INFINITY ? (swap ? children.y : children.x) : NEXT;
+            if (second < INFINITY) {
+                stack[depth] = swap ? children.x : children.y;
+#ifndef STREAM_ANY
+                stack_near[depth] = second;
+#endif
+                depth++;
+            }
+        }
+        if ((current & LEAF) != 0u) {
+            if (SINGLE_LEVEL || in_group) {
+                uint i = current & 0x07ffffffu;
+                vec2 a = LOAD_FLOATS(primitives, 5u * i), b = LOAD_FLOATS(primitives, 5u * i + 1u), c = LOAD_FLOATS(primitives, 5u * i + 2u);
+                vec2 d = LOAD_FLOATS(primitives, 5u * i + 3u), e = LOAD_FLOATS(primitives, 5u * i + 4u);
+                uint id = floatBitsToUint(e.y);
+                float t;
+                vec2 uv;
+                bool met;
+                if (HAS_SPHERES && (id & SPHERE) != 0u) {
+                    // the direction is not kept: a sphere is rarely tested, a triangle often
+                    vec3 direction = in_group && !SINGLE_LEVEL ? transform_vector(instances.v[instance].world_to_group, world.direction) : world.direction;
+                    t = intersect_sphere(origin, direction, world.tmin, best, vec3(a, b.x), b.y);
+                    uv = vec2(0.0);
+                    met = t > world.tmin && t < best;
+                } else {
+                    met = intersect_triangle(shear, origin, vec3(a, b.x), vec3(b.y, c), vec3(d, e.x), world.tmin, best, t, uv);
+                }
+                if (HAS_ALPHA) {
+                    if (met && (id & ALPHA_TESTED) != 0u) met = alpha_passes(instance, id & NUMBER, uv);
+                }
+                if (met) {
+                    best = t;
+                    best_instance = instance;
+                    best_primitive = id & NUMBER;
+                    best_uv = uv;
+                }
+                // the next primitive of the leaf: one more, and one fewer to come
+                current = (current & 0x78000000u) == 0u ? NEXT : current + 1u - 0x08000000u;
+#ifdef STREAM_ANY
+                if (met) {
+                    current = FINISHED;
+                    depth = 0u;
+                }
+#endif
+            } else {
+                instance = current & 0x07ffffffu;
+                InstanceRecord record = instances.v[instance];
+                vec3 direction = transform_vector(record.world_to_group, world.direction);
+                origin = transform_point(record.world_to_group, world.origin);
+                shear = make_shear(direction);
+                inverse = safe_inverse(direction);
+                in_group = true;
+                stack[depth] = LEAVE_INSTANCE;
+#ifndef STREAM_ANY
+                stack_near[depth] = world.tmin;
+#endif
+                depth++;
+                current = record.root;
+            }
+        }
+        if (!SINGLE_LEVEL && current == LEAVE_INSTANCE) {
+            origin = world.origin;
+            inverse = safe_inverse(world.direction);
+            in_group = false;
+            current = NEXT;
+        }
+        if (current == NEXT) {
+            if (depth == 0u) {
+                current = FINISHED;
+            } else {
+                depth--;
+#ifdef STREAM_ANY
+                current = stack[depth];
+#else
+                // what lies behind the nearest hit so far is not entered
+                current = stack_near[depth] <= best ? stack[depth] : NEXT;
+#endif
+            }
+        }
+        if (current == FINISHED) {
+            bool met = best_primitive != INVALID;
+#ifdef STREAM_ANY
+            any(index, met);
+#else
+            if (met) closest(index, scene_hit(best, best_instance, best_primitive, best_uv));
+            else closest(index, miss());
+#endif
+            next += LANES;
+            if (next >= end) return;
+            index = push.first + next;
+            world = ray(index);
+            shear = make_shear(world.direction);
+            origin = world.origin;
+            inverse = safe_inverse(world.direction);
+            instance = 0u;
+            in_group = SINGLE_LEVEL;
+            depth = 0u;
+            current = is_ray(world) ? root.root : FINISHED;
+            best = world.tmax;
+            best_primitive = INVALID;
+        }
+    }
+}
+
+#endif

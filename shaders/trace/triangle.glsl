@@ -1,0 +1,67 @@
+// Watertight ray against triangle: Woop, Benthin, Wald, "Watertight Ray/Triangle Intersection" (JCGT 2013).
+#ifndef TRACE_TRIANGLE
+#define TRACE_TRIANGLE
+
+// The ray's frame: z is the axis along which the direction is longest, and the shear that makes the ray the z axis.
+struct Shear {
+    uint axis;
+    vec3 s;
+};
+
+// cyclic rotation of the axes that brings the ray's main axis to z
+vec3 permute(vec3 v, uint axis) {
+    return axis == 0u ? v.yzx : axis == 1u ? v.zxy : v.xyz;
+}
+
+Shear make_shear(vec3 d) {
+    vec3 a = abs(d);
+    uint axis = a.x > a.y ? (a.x > a.z ? 0u : 2u) : (a.y > a.z ? 1u : 2u);
+    vec3 p = permute(d, axis);
+    return Shear(axis, vec3(p.xy / p.z, 1.0 / p.z));
+}
+
+// Why no ray slips between two triangles that share an edge: a corner's sheared position depends on the corner and the ray
+// alone, so both triangles see the same numbers; and the sign of fl(a*b) - fl(c*d) is never wrong, at worst zero, because
+// rounding is monotonic. Zero counts as inside. `precise` keeps the compiler from fusing a product into the difference,
+// which would break the symmetry. (The paper resolves zeros in double precision to hit exactly one of the two triangles;
+// here both are hit, at the same t, which no stream can tell apart.)
+bool intersect_triangle(Shear shear, vec3 origin, vec3 v0, vec3 v1, vec3 v2, float tmin, float tmax, out float t, out vec2 uv) {
+    precise vec3 a = permute(v0 - origin, shear.axis);
+    precise vec3 b = permute(v1 - origin, shear.axis);
+    precise vec3 c = permute(v2 - origin, shear.axis);
+    precise vec2 pa = a.xy - shear.s.xy * a.z;
+    precise vec2 pb = b.xy - shear.s.xy * b.z;
+    precise vec2 pc = c.xy - shear.s.xy * c.z;
+    precise float u0 = pc.x * pb.y;
+    precise float u1 = pc.y * pb.x;
+    precise float v0_ = pa.x * pc.y;
+    precise float v1_ = pa.y * pc.x;
+    precise float w0 = pb.x * pa.y;
+    precise float w1 = pb.y * pa.x;
+    precise float u = u0 - u1;
+    precise float v = v0_ - v1_;
+    precise float w = w0 - w1;
+    bool outside = (u < 0.0 || v < 0.0 || w < 0.0) && (u > 0.0 || v > 0.0 || w > 0.0);
+    float det = u + v + w;
+    float inverse_det = 1.0 / det;
+    t = (u * a.z + v * b.z + w * c.z) * shear.s.z * inverse_det;
+    uv = vec2(v, w) * inverse_det;
+    // ordered comparisons: NaN from det = 0 is no hit
+    bool met = !outside && det != 0.0 && t > tmin && t < tmax;
+    if (met) {
+        // A ray that has just left this surface may find it again at a t that is all rounding, thin triangles above all. The
+        // bound on the error of t is that of pbrt-v4, 6.8.7 (gamma(n) = n half-ulps).
+        const float GAMMA = 5.9604645e-8;
+        vec3 x = abs(vec3(pa.x, pb.x, pc.x)), y = abs(vec3(pa.y, pb.y, pc.y));
+        vec3 z = abs(vec3(a.z, b.z, c.z) * shear.s.z), e = abs(vec3(u, v, w));
+        float max_x = max(max(x.x, x.y), x.z), max_y = max(max(y.x, y.y), y.z), max_z = max(max(z.x, z.y), z.z);
+        float max_e = max(max(e.x, e.y), e.z);
+        float delta_x = 5.0 * GAMMA * (max_x + max_z), delta_y = 5.0 * GAMMA * (max_y + max_z), delta_z = 3.0 * GAMMA * max_z;
+        float delta_e = 2.0 * (2.0 * GAMMA * max_x * max_y + delta_y * max_x + delta_x * max_y);
+        float delta_t = 3.0 * (3.0 * GAMMA * max_e * max_z + delta_e * max_z + delta_z * max_e) * abs(inverse_det);
+        met = t > delta_t;
+    }
+    return met;
+}
+
+#endif

@@ -1,0 +1,214 @@
+//! The binary hierarchy that `shaders/trace/reference.glsl` walks.
+//!
+//! Laid out so that a node holds the boxes of both its children: a visit is one load of 64 bytes, and no box is loaded for
+//! nothing. The traversal's stack cannot overflow: every inner node pushes at most one child, so a tree of depth d needs d
+//! entries, and the shader's stack is specialised to the depth that is there.
+
+use bytemuck::{Pod, Zeroable};
+use glam::Vec3;
+
+use super::build::MAX_DEPTH;
+use super::{Aabb, BuildPreset, build};
+
+/// Most primitives that a leaf reference can hold.
+pub const MAX_LEAF: u32 = 16;
+/// Primitives that a reference can number, over all trees of a scene.
+pub const MAX_PRIMITIVES: usize = 1 << 27;
+/// Reference of a tree without primitives: the traversal goes on with what is on its stack.
+pub const EMPTY: u32 = 0x7fff_fffd;
+
+const LEAF: u32 = 0x8000_0000;
+
+/// An inner node: boxes of both children, then the references to them.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+pub struct Node {
+    /// Lower and upper corner of both children.
+    pub boxes: [[[f32; 3]; 2]; 2],
+    /// Bit 31 set: a leaf with count - 1 in bits 27-30 and the first primitive in bits 0-26; otherwise an inner node.
+    pub children: [u32; 2],
+    /// To 64 bytes: one cache line.
+    pub reserved: [u32; 2],
+}
+
+/// A binary hierarchy in the layout of the compute tracer.
+#[derive(Clone, Debug, Default)]
+pub struct Bvh2 {
+    /// Inner nodes, parents before their children; references are relative to this tree.
+    pub nodes: Vec<Node>,
+    /// For each slot of the leaves, the number of the primitive that lies there.
+    pub primitives: Vec<u32>,
+    /// Where traversal begins: an inner node, a leaf, or [`EMPTY`].
+    pub root: u32,
+    /// Inner nodes on the longest path from the root: what the traversal's stack must hold.
+    pub depth: u32,
+}
+
+fn leaf_reference(first: u32, count: u32) -> u32 {
+    debug_assert!((1..=MAX_LEAF).contains(&count));
+    LEAF | (count - 1) << 27 | first
+}
+
+/// Splits a leaf reference into its first primitive and their number.
+pub fn leaf_range(reference: u32) -> Option<(u32, u32)> {
+    (reference & LEAF != 0).then_some((reference & 0x07ff_ffff, (reference >> 27 & 0xf) + 1))
+}
+
+/// A reference as seen from a buffer in which this tree's nodes begin at `first_node` and its primitives at `first_primitive`.
+pub fn rebase(reference: u32, first_node: u32, first_primitive: u32) -> u32 {
+    if reference & LEAF != 0 {
+        reference + first_primitive
+    } else if reference == EMPTY {
+        EMPTY
+    } else {
+        reference + first_node
+    }
+}
+
+impl Bvh2 {
+    /// Builds the tree of `boxes`; none may be empty or NaN, and there are at most [`MAX_PRIMITIVES`]. `max_leaf` (1 to
+    /// [`MAX_LEAF`]) bounds the primitives of a leaf.
+    pub fn build(boxes: &[Aabb], preset: BuildPreset, max_leaf: u32) -> Self {
+        assert!(boxes.len() <= MAX_PRIMITIVES);
+        if boxes.is_empty() {
+            return Self { root: EMPTY, ..Default::default() };
+        }
+        Self::lay_out(build::tree(boxes, preset, Some(max_leaf.clamp(1, MAX_LEAF))))
+    }
+
+    /// Lays obvhs's tree out depth first.
+    fn lay_out(tree: obvhs::bvh2::Bvh2) -> Self {
+        let mut out = Self { nodes: Vec::with_capacity(tree.nodes.len() / 2), primitives: Vec::new(), root: 0, depth: 0 };
+        // what to emit, its depth, and the node and side that will refer to it
+        let mut work = vec![(0usize, 0u32, None::<(usize, usize)>)];
+        while let Some((at, depth, parent)) = work.pop() {
+            let n = &tree.nodes[at];
+            let reference = if n.is_leaf() {
+                leaf_reference(n.first_index, n.prim_count)
+            } else {
+                let (index, first) = (out.nodes.len(), n.first_index as usize);
+                out.depth = out.depth.max(depth + 1);
+                let corners = |k: usize| [tree.nodes[k].min.to_array(), tree.nodes[k].max.to_array()];
+                out.nodes.push(Node { boxes: [corners(first), corners(first + 1)], children: [0; 2], reserved: [0; 2] });
+                work.push((first + 1, depth + 1, Some((index, 1))));
+                work.push((first, depth + 1, Some((index, 0))));
+                index as u32
+            };
+            match parent {
+                Some((node, side)) => out.nodes[node].children[side] = reference,
+                None => out.root = reference,
+            }
+        }
+        out.primitives = tree.primitive_indices;
+        out
+    }
+
+    /// Checks the whole structure against the boxes it was built from: every primitive in exactly one leaf, every box holds
+    /// what is below it, the depth as stated. The error says what is wrong.
+    pub fn validate(&self, boxes: &[Aabb]) -> Result<(), String> {
+        let mut seen = vec![false; boxes.len()];
+        let mut depth = 0;
+        let all = Aabb { min: Vec3::NEG_INFINITY, max: Vec3::INFINITY };
+        let mut work = vec![(self.root, all, 0u32)];
+        while let Some((reference, bounds, level)) = work.pop() {
+            if reference == EMPTY {
+                continue;
+            }
+            if let Some((first, count)) = leaf_range(reference) {
+                for slot in first..first + count {
+                    let &p = self.primitives.get(slot as usize).ok_or(format!("slot {slot} is outside"))?;
+                    let seen = seen.get_mut(p as usize).ok_or(format!("primitive {p} is outside"))?;
+                    if std::mem::replace(seen, true) {
+                        return Err(format!("primitive {p} is in two leaves"));
+                    }
+                    if !bounds.contains(&boxes[p as usize]) {
+                        return Err(format!("primitive {p} sticks out of its leaf"));
+                    }
+                }
+                continue;
+            }
+            depth = depth.max(level + 1);
+            let node = self.nodes.get(reference as usize).ok_or(format!("node {reference} is outside"))?;
+            for side in 0..2 {
+                let [lo, hi] = node.boxes[side];
+                let child = Aabb { min: lo.into(), max: hi.into() };
+                if !bounds.contains(&child) {
+                    return Err(format!("child {side} of node {reference} sticks out of its parent"));
+                }
+                work.push((node.children[side], child, level + 1));
+            }
+        }
+        if let Some(p) = seen.iter().position(|s| !s) {
+            return Err(format!("primitive {p} is in no leaf"));
+        }
+        if depth != self.depth || depth > MAX_DEPTH {
+            return Err(format!("depth is {depth}, said to be {}, at most {MAX_DEPTH}", self.depth));
+        }
+        Ok(())
+    }
+
+    /// Expected cost of a random ray by the surface area heuristic: nodes visited plus primitives tested, each counted 1.
+    pub fn sah_cost(&self) -> f32 {
+        let root = self.nodes.first().map(|n| bounds_of(&n.boxes[0]).union(bounds_of(&n.boxes[1])).half_area()).unwrap_or(0.0);
+        if root <= 0.0 {
+            return self.primitives.len() as f32;
+        }
+        let children = self.nodes.iter().flat_map(|n| (0..2).map(move |k| (n.boxes[k], n.children[k])));
+        let sum: f64 = children
+            .map(|(b, child)| {
+                let cost = leaf_range(child).map_or(1.0, |(_, count)| count as f64);
+                bounds_of(&b).half_area() as f64 * cost
+            })
+            .sum();
+        1.0 + (sum / root as f64) as f32
+    }
+}
+
+fn bounds_of(b: &[[f32; 3]; 2]) -> Aabb {
+    Aabb { min: b[0].into(), max: b[1].into() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn boxes(n: usize, place: impl Fn(usize) -> Vec3, size: impl Fn(usize) -> f32) -> Vec<Aabb> {
+        (0..n).map(|i| Aabb { min: place(i) - size(i), max: place(i) + size(i) }).collect()
+    }
+
+    #[test]
+    fn trees_of_every_small_size_are_valid() {
+        for n in 0..70 {
+            let b = boxes(
+                n,
+                |i| Vec3::new((i * 37 % 101) as f32, (i * 61 % 89) as f32, (i * 17 % 97) as f32),
+                |i| 0.1 + i as f32 * 0.01,
+            );
+            for max_leaf in [1, 3, 8] {
+                let tree = Bvh2::build(&b, BuildPreset::Default, max_leaf);
+                tree.validate(&b).unwrap_or_else(|e| panic!("{n} boxes, leaf {max_leaf}: {e}"));
+            }
+        }
+    }
+
+    #[test]
+    fn coincident_boxes_are_valid() {
+        let b = boxes(1000, |_| Vec3::ONE, |_| 0.5);
+        Bvh2::build(&b, BuildPreset::Fast, 4).validate(&b).unwrap();
+    }
+
+    #[test]
+    fn validate_sees_damage() {
+        let b = boxes(50, |i| Vec3::splat(i as f32), |_| 0.4);
+        let good = Bvh2::build(&b, BuildPreset::Default, 2);
+        let mut bad = good.clone();
+        bad.nodes[0].boxes[0][1][0] -= 30.0;
+        assert!(bad.validate(&b).is_err());
+        let mut bad = good.clone();
+        bad.primitives[3] = bad.primitives[4];
+        assert!(bad.validate(&b).is_err());
+        let mut bad = good;
+        bad.depth += 1;
+        assert!(bad.validate(&b).is_err());
+    }
+}

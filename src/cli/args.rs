@@ -1,0 +1,427 @@
+//! What each command takes, checked as far as that goes without looking at a scene or a device.
+
+use std::path::PathBuf;
+use std::time::Duration;
+
+use clap::{Args, ValueEnum, ValueHint};
+use glam::DVec3;
+
+use super::console::Console;
+use crate::error::{Error, Result};
+use crate::output::{self, ImageFormat};
+use crate::render::ao::Hemisphere;
+use crate::render::camera::Choice;
+use crate::render::rays::Mode;
+use crate::tracer::TracerKind;
+
+/// Samples per pixel when neither the command line nor the scene says.
+pub const DEFAULT_SPP: u32 = 16;
+/// Image size when neither the command line nor the scene says.
+pub const DEFAULT_SIZE: [u32; 2] = [1280, 720];
+/// Degrees.
+pub const DEFAULT_FOV_Y: f64 = 45.0;
+
+/// Which tracer to use.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum TracerChoice {
+    /// The fastest on the device
+    Auto,
+    /// VK_KHR_ray_tracing_pipeline
+    Pipeline,
+    /// VK_KHR_ray_query
+    Query,
+    /// Compute shaders over our own hierarchy: any device
+    Compute,
+}
+
+impl TracerChoice {
+    /// The tracer, and why, on a device.
+    pub fn on(self, info: &crate::gpu::DeviceInfo) -> (TracerKind, String) {
+        let asked = |kind| (kind, "asked for with --tracer".to_owned());
+        match self {
+            Self::Auto => TracerKind::auto(info),
+            Self::Pipeline => asked(TracerKind::Pipeline),
+            Self::Query => asked(TracerKind::Query),
+            Self::Compute => asked(TracerKind::Compute),
+        }
+    }
+}
+
+/// What is rendered.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Integrator {
+    /// Ambient occlusion
+    Ao,
+}
+
+/// Axis of the hemisphere that occlusion rays fill.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum AoNormal {
+    /// The triangle's own, on the viewer's side
+    Geometric,
+    /// The interpolated one
+    Shading,
+}
+
+impl From<AoNormal> for Hemisphere {
+    fn from(n: AoNormal) -> Self {
+        match n {
+            AoNormal::Geometric => Hemisphere::Geometric,
+            AoNormal::Shading => Hemisphere::Shading,
+        }
+    }
+}
+
+/// An auxiliary output.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Aov {
+    /// Distance along the ray: depth.Z
+    Depth,
+    /// World position: position.X, .Y, .Z
+    Position,
+    /// Geometric normal: Ng.X, .Y, .Z
+    Ng,
+    /// Shading normal: Ns.X, .Y, .Z
+    Ns,
+    /// Indices: id.instance, id.primitive, id.material
+    Ids,
+    /// Base colour: albedo.R, .G, .B
+    Albedo,
+    /// All of these
+    All,
+}
+
+/// What to find of each ray.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum RayMode {
+    /// Whether something is in the way
+    Any,
+    /// The nearest hit
+    Closest,
+}
+
+impl From<RayMode> for Mode {
+    fn from(m: RayMode) -> Self {
+        match m {
+            RayMode::Any => Mode::Any,
+            RayMode::Closest => Mode::Closest,
+        }
+    }
+}
+
+/// How results are shown.
+#[derive(Clone, Copy, Debug, Args)]
+pub struct Verbosity {
+    /// Print one JSON record on stdout instead of text
+    #[arg(long)]
+    pub json: bool,
+    /// Print nothing but errors
+    #[arg(long, short)]
+    pub quiet: bool,
+}
+
+impl Verbosity {
+    /// Where to say things.
+    pub fn console(&self) -> Console {
+        Console { json: self.json, quiet: self.quiet }
+    }
+}
+
+/// What it runs on.
+#[derive(Clone, Debug, Args)]
+pub struct DeviceArgs {
+    /// How rays are traced
+    #[arg(long, value_enum, default_value = "auto")]
+    pub tracer: TracerChoice,
+    /// Vulkan device, by index or part of its name (`skylit doctor` lists them)
+    #[arg(long, value_name = "INDEX|NAME")]
+    pub device: Option<String>,
+    /// Run with the Vulkan validation layer; a message of it fails the run
+    #[arg(long)]
+    pub validation: bool,
+}
+
+impl DeviceArgs {
+    /// How to open the device.
+    pub fn options(&self) -> crate::gpu::Options {
+        crate::gpu::Options { device: self.device.clone(), validation: self.validation, ..Default::default() }
+    }
+}
+
+/// `skylit render`.
+#[derive(Clone, Debug, Args)]
+pub struct RenderArgs {
+    /// Scene: a .gltf, .glb, .obj or .brhan file, or builtin:NAME (`skylit scenes` lists them)
+    pub scene: String,
+    /// Image to write: .exr (all channels, metadata) or .png (8-bit sRGB); may be given more than once
+    #[arg(long, short, value_name = "FILE", value_hint = ValueHint::FilePath, required = true)]
+    pub output: Vec<PathBuf>,
+    /// What to render
+    #[arg(long, value_enum, default_value = "ao")]
+    pub integrator: Integrator,
+    /// Samples per pixel: one camera ray and one occlusion ray each [default: the scene's, or 16]
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1 << 24))]
+    pub spp: Option<u32>,
+    /// Image size in pixels [default: the scene's, or 1280x720]
+    #[arg(long, value_name = "WxH", value_parser = parse_size)]
+    pub size: Option<[u32; 2]>,
+    /// Camera of the scene, by index or name [default: the first one, or one that sees the whole scene]
+    #[arg(long, value_name = "INDEX|NAME", conflicts_with = "eye")]
+    pub camera: Option<String>,
+    /// Camera position
+    #[arg(long, value_name = "X,Y,Z", value_parser = parse_vector, requires = "target", allow_hyphen_values = true)]
+    pub eye: Option<DVec3>,
+    /// Point in the middle of the image
+    #[arg(long, value_name = "X,Y,Z", value_parser = parse_vector, requires = "eye", allow_hyphen_values = true)]
+    pub target: Option<DVec3>,
+    /// Up in the image [default: 0,1,0]
+    #[arg(long, value_name = "X,Y,Z", value_parser = parse_vector, requires = "eye", allow_hyphen_values = true)]
+    pub up: Option<DVec3>,
+    /// Vertical field of view in degrees [default: the camera's, or 45]
+    #[arg(long, value_name = "DEG", value_parser = parse_fov, allow_hyphen_values = true)]
+    pub fov_y: Option<f64>,
+    /// Distance, in world units, beyond which nothing occludes
+    #[arg(long, value_name = "R", default_value = "inf", value_parser = parse_radius, allow_hyphen_values = true)]
+    pub ao_radius: f64,
+    /// A hit at distance d occludes by C^-d; 1 is binary
+    #[arg(long, value_name = "C", default_value = "1", value_parser = parse_falloff, allow_hyphen_values = true)]
+    pub ao_falloff: f64,
+    /// Axis of the hemisphere of occlusion rays
+    #[arg(long, value_enum, default_value = "geometric")]
+    pub ao_normal: AoNormal,
+    /// What it runs on
+    #[command(flatten)]
+    pub device: DeviceArgs,
+    /// Seed of the sampler
+    #[arg(long, default_value_t = 0)]
+    pub seed: u32,
+    /// Stop after this time and write the samples taken so far (one per pixel at least)
+    #[arg(long, value_name = "SECONDS", value_parser = parse_seconds, allow_hyphen_values = true)]
+    pub time_limit: Option<Duration>,
+    /// On Ctrl-C, too, write the samples taken so far (and still exit with 130)
+    #[arg(long)]
+    pub keep_partial: bool,
+    /// Auxiliary outputs to add to the .exr, separated by commas
+    #[arg(long, value_name = "LIST", value_enum, value_delimiter = ',')]
+    pub aov: Vec<Aov>,
+    /// Also write the 1-ray depth image: .png (near white, far and background black) or .exr (depth.Z)
+    #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
+    pub depth_image: Option<PathBuf>,
+    /// Also write the rays of the first sample to PREFIX.primary.bin and PREFIX.ao.bin
+    #[arg(long, value_name = "PREFIX")]
+    pub dump_rays: Option<PathBuf>,
+    /// Print what the scene and the options made it skip, and what that saved
+    #[arg(long)]
+    pub explain: bool,
+    /// How results are shown
+    #[command(flatten)]
+    pub verbosity: Verbosity,
+}
+
+impl RenderArgs {
+    /// Will an .exr be written?
+    pub fn writes_exr(&self) -> bool {
+        self.output.iter().any(|p| ImageFormat::of(p).is_ok_and(|f| f == ImageFormat::Exr))
+    }
+
+    /// Checks what concerns more than one option.
+    pub fn check(&self) -> Result<()> {
+        let formats = self.output.iter().map(|p| ImageFormat::of(p)).collect::<Result<Vec<_>>>()?;
+        if !self.aov.is_empty() && !formats.contains(&ImageFormat::Exr) {
+            return Err(Error::Usage("--aov needs an .exr output: PNG holds colour only".into()));
+        }
+        if let Some(path) = &self.depth_image {
+            ImageFormat::of(path)?;
+        }
+        if self.eye.is_some() && self.eye == self.target {
+            return Err(Error::Usage("--eye and --target are the same point: the view has no direction".into()));
+        }
+        if self.up == Some(DVec3::ZERO) {
+            return Err(Error::Usage("--up 0,0,0 is no direction".into()));
+        }
+        Ok(())
+    }
+
+    /// The camera asked for.
+    pub fn camera_choice(&self) -> Choice {
+        match (self.eye, self.target, &self.camera) {
+            (Some(eye), Some(target), _) => Choice::LookAt {
+                eye,
+                target,
+                up: self.up.unwrap_or(DVec3::Y),
+                fov_y: self.fov_y.unwrap_or(DEFAULT_FOV_Y).to_radians(),
+            },
+            (_, _, Some(name)) => Choice::Named(name.clone()),
+            _ => Choice::Auto,
+        }
+    }
+
+    /// Was this auxiliary output asked for?
+    pub fn wants(&self, aov: Aov) -> bool {
+        self.aov.contains(&aov) || self.aov.contains(&Aov::All)
+    }
+
+    /// Every file that will be written.
+    pub fn outputs(&self) -> Vec<PathBuf> {
+        let dumps = self.dump_rays.iter().flat_map(|p| [dump_path(p, "primary"), dump_path(p, "ao")]);
+        self.output.iter().chain(&self.depth_image).cloned().chain(dumps).collect()
+    }
+}
+
+/// PREFIX.KIND.bin; the prefix may hold dots itself.
+pub fn dump_path(prefix: &std::path::Path, kind: &str) -> PathBuf {
+    let mut name = prefix.as_os_str().to_owned();
+    name.push(format!(".{kind}.bin"));
+    name.into()
+}
+
+/// `skylit rays`.
+#[derive(Clone, Debug, Args)]
+pub struct RaysArgs {
+    /// Mesh: .bin (u32 vertices, u32 triangles, f32 xyz[], u32 abc[]) or any scene that `render` takes
+    #[arg(long, value_name = "MESH", value_hint = ValueHint::FilePath)]
+    pub mesh: String,
+    /// Rays: f32 origin[3], tmin, direction[3], tmax each
+    #[arg(long, value_name = "RAYS.bin", value_hint = ValueHint::FilePath)]
+    pub rays: PathBuf,
+    /// What to find
+    #[arg(long, value_enum, default_value = "closest")]
+    pub mode: RayMode,
+    /// What it runs on
+    #[command(flatten)]
+    pub device: DeviceArgs,
+    /// Where to write the hits: f32 t (inf = miss), u32 instance, u32 primitive, f32 u, f32 v each
+    #[arg(long, value_name = "HITS.bin", value_hint = ValueHint::FilePath)]
+    pub hits: Option<PathBuf>,
+    /// How often to trace the set, after a first pass that warms up
+    #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    pub repeats: u32,
+    /// How results are shown
+    #[command(flatten)]
+    pub verbosity: Verbosity,
+}
+
+/// `skylit export`.
+#[derive(Clone, Debug, Args)]
+pub struct ExportArgs {
+    /// Scene, as `render` takes it
+    pub scene: String,
+    /// File to write: .bin (triangle soup in world space), .glb or .gltf
+    #[arg(value_hint = ValueHint::FilePath)]
+    pub output: PathBuf,
+    /// How results are shown
+    #[command(flatten)]
+    pub verbosity: Verbosity,
+}
+
+/// `skylit scenes`.
+#[derive(Clone, Debug, Args)]
+pub struct ScenesArgs {
+    /// Print one JSON record on stdout instead of text
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// `skylit doctor`.
+#[derive(Clone, Debug, Args)]
+pub struct DoctorArgs {
+    /// The device to judge, by index or part of its name [default: the most capable]
+    #[arg(long, value_name = "INDEX|NAME")]
+    pub device: Option<String>,
+    /// Print one JSON record on stdout instead of text
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// `skylit diff`.
+#[derive(Clone, Debug, Args)]
+pub struct DiffArgs {
+    /// First image, .exr or .png
+    pub a: PathBuf,
+    /// Second image: the reference where it matters
+    pub b: PathBuf,
+    /// Fail (exit code 1) when the RMSE of a channel is above this
+    #[arg(long, value_name = "X", value_parser = parse_limit, allow_hyphen_values = true)]
+    pub max_rmse: Option<f64>,
+    /// How results are shown
+    #[command(flatten)]
+    pub verbosity: Verbosity,
+}
+
+type Parsed<T> = std::result::Result<T, String>;
+
+fn parse_size(text: &str) -> Parsed<[u32; 2]> {
+    let side = |s: &str| s.trim().parse::<u32>().map_err(|_| "expected WIDTHxHEIGHT in pixels, like 1280x720".to_owned());
+    let (w, h) = text.split_once(['x', 'X']).ok_or("expected WIDTHxHEIGHT in pixels, like 1280x720")?;
+    let size = [side(w)?, side(h)?];
+    output::check_size(size[0], size[1]).map_err(|e| e.to_string())?;
+    Ok(size)
+}
+
+fn parse_number(text: &str) -> Parsed<f64> {
+    text.trim().parse::<f64>().ok().filter(|v| !v.is_nan()).ok_or_else(|| "expected a number".to_owned())
+}
+
+fn parse_vector(text: &str) -> Parsed<DVec3> {
+    let parts = text.split(',').map(parse_number).collect::<Parsed<Vec<_>>>().map_err(|_| "expected X,Y,Z".to_owned())?;
+    match parts[..] {
+        [x, y, z] if parts.iter().all(|v| v.is_finite()) => Ok(DVec3::new(x, y, z)),
+        _ => Err("expected three finite numbers X,Y,Z".into()),
+    }
+}
+
+fn parse_where(text: &str, holds: impl Fn(f64) -> bool, rule: &str) -> Parsed<f64> {
+    parse_number(text).and_then(|v| if holds(v) { Ok(v) } else { Err(rule.to_owned()) })
+}
+
+fn parse_fov(text: &str) -> Parsed<f64> {
+    // beyond this the tangent of single precision loses the image
+    parse_where(text, |v| (0.001..=179.0).contains(&v), "must be between 0.001 and 179 degrees")
+}
+
+fn parse_radius(text: &str) -> Parsed<f64> {
+    parse_where(text, |v| v > 0.0, "must be above 0 (`inf` for no limit)")
+}
+
+fn parse_falloff(text: &str) -> Parsed<f64> {
+    parse_where(text, |v| v >= 1.0 && v.is_finite(), "must be at least 1 (1 = binary) and finite")
+}
+
+fn parse_seconds(text: &str) -> Parsed<Duration> {
+    parse_where(text, |v| v > 0.0 && v <= 1e9, "must be above 0 seconds").map(Duration::from_secs_f64)
+}
+
+fn parse_limit(text: &str) -> Parsed<f64> {
+    parse_where(text, |v| v >= 0.0, "must not be negative")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sizes() {
+        assert_eq!(parse_size("1x1"), Ok([1, 1]));
+        assert_eq!(parse_size("16384x16384"), Ok([16384, 16384]));
+        for bad in ["0x5", "5x0", "16385x16384", "5", "x", "-1x5", "1x2x3", "4294967296x1", ""] {
+            assert!(parse_size(bad).is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn numbers() {
+        assert_eq!(parse_vector("1,-2.5,3e2"), Ok(DVec3::new(1.0, -2.5, 300.0)));
+        for bad in ["1,2", "1,2,3,4", "a,b,c", "nan,0,0", "inf,0,0", ""] {
+            assert!(parse_vector(bad).is_err(), "{bad}");
+        }
+        assert!(parse_fov("nan").is_err() && parse_fov("0").is_err() && parse_fov("180").is_err() && parse_fov("45").is_ok());
+        assert!(parse_falloff("0.9").is_err() && parse_falloff("inf").is_err() && parse_falloff("1").is_ok());
+        assert!(parse_radius("-1").is_err() && parse_radius("0").is_err() && parse_radius("inf").is_ok());
+        assert!(parse_seconds("-1").is_err() && parse_seconds("1e300").is_err() && parse_seconds("0.5").is_ok());
+    }
+
+    #[test]
+    fn dump_names_keep_dots() {
+        assert_eq!(dump_path("a/b.c".as_ref(), "ao"), PathBuf::from("a/b.c.ao.bin"));
+    }
+}

@@ -1,0 +1,61 @@
+//! What goes to the terminal: results on stdout, everything else on stderr. A reader that went away is no error.
+
+use std::io::{self, Write};
+
+use serde::Serialize;
+
+use crate::error::{Error, Result};
+
+/// How much a command says.
+#[derive(Clone, Copy, Debug)]
+pub struct Console {
+    /// One JSON record on stdout instead of text.
+    pub json: bool,
+    /// Only errors.
+    pub quiet: bool,
+}
+
+impl Console {
+    /// A line of the result, for people.
+    pub fn line(&self, text: &str) -> Result<()> {
+        if self.json || self.quiet { Ok(()) } else { print(&format!("{text}\n")) }
+    }
+
+    /// The result, for programs.
+    pub fn record(&self, value: &impl Serialize) -> Result<()> {
+        if self.json { json(value) } else { Ok(()) }
+    }
+
+    /// Something to know that is no failure. In JSON mode it is part of the record instead.
+    pub fn warning(&self, text: &str) {
+        if !self.json && !self.quiet {
+            stderr(&format!("skylit: warning: {text}"));
+        }
+    }
+}
+
+/// The line that ends a failed run.
+pub fn error(text: &str) {
+    stderr(&format!("skylit: error: {text}"));
+}
+
+fn stderr(line: &str) {
+    // not eprintln!, which panics when stderr is closed
+    let _ = writeln!(io::stderr().lock(), "{line}");
+}
+
+/// Writes to stdout.
+pub fn print(text: &str) -> Result<()> {
+    let mut out = io::stdout().lock();
+    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+        Err(e) if e.kind() != io::ErrorKind::BrokenPipe => Err(Error::write("standard output", &e)),
+        _ => Ok(()),
+    }
+}
+
+/// Writes a JSON record to stdout, on one line.
+pub fn json(value: &impl Serialize) -> Result<()> {
+    let text =
+        serde_json::to_string(value).map_err(|e| Error::CheckFailed(format!("cannot express the result as JSON: {e}")))?;
+    print(&(text + "\n"))
+}

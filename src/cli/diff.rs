@@ -1,0 +1,149 @@
+//! `skylit diff`: two images in numbers, channel by channel.
+
+use serde_json::json;
+
+use super::args::DiffArgs;
+use crate::error::{Error, Result};
+use crate::measure::metrics::ImagePair;
+use crate::output::{self, Channel, Image, Samples};
+
+/// How far apart two channels are, over the pixels where both are finite and at least one image has something.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+struct Difference {
+    /// Pixels compared.
+    pixels: u64,
+    /// Pixels whose values are not the same.
+    differing: u64,
+    /// Pixels where one image is finite and the other is not, or both are infinite in different ways.
+    broken: u64,
+    /// The metrics of [`crate::measure::metrics`]; ids have none.
+    #[serde(flatten)]
+    numbers: Option<Numbers>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+struct Numbers {
+    rmse: f64,
+    bias: f64,
+    max: f64,
+    rel_mse: f64,
+    psnr: f64,
+    minimum_ratio: f64,
+    tanimoto: f64,
+}
+
+/// Compares and prints; fails when a limit was given and is passed.
+pub fn run(args: &DiffArgs) -> Result<()> {
+    let console = args.verbosity.console();
+    let (a, b) = (output::load(&args.a)?, output::load(&args.b)?);
+    if (a.width, a.height) != (b.width, b.height) {
+        return Err(Error::Usage(format!("the images differ in size: {}x{} and {}x{}", a.width, a.height, b.width, b.height)));
+    }
+    let mask = coverage(&a, &b);
+    let mut worst = 0f64;
+    let mut records = Vec::new();
+    for (x, y) in pairs(&a, &b) {
+        let d = compare(&x.samples, &y.samples, mask.as_deref())?;
+        let mut line = format!("{:12} ", x.name);
+        if let Some(n) = &d.numbers {
+            // a pixel that is broken in one image only is no small difference
+            worst = worst.max(if d.broken > 0 { f64::INFINITY } else { n.rmse });
+            line += &format!("rmse {:.3e}  bias {:+.3e}  max {:.3e}  psnr {:.1} dB  ", n.rmse, n.bias, n.max, n.psnr);
+        }
+        console.line(&format!("{line}differing {} of {}, broken {}", d.differing, d.pixels, d.broken))?;
+        let mut record = json!(d);
+        record["channel"] = json!(x.name);
+        records.push(record);
+    }
+    if records.is_empty() {
+        return Err(Error::Usage("the images have no channel in common".into()));
+    }
+    let covered = mask.is_some();
+    console.record(&json!({ "a": args.a, "b": args.b, "covered_pixels_only": covered, "channels": records }))?;
+    match args.max_rmse {
+        Some(limit) if worst > limit => {
+            Err(Error::CheckFailed(format!("the images differ by an RMSE of {worst:.3e}, more than {limit:e}")))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Channels of the same name and type; a grey image (`Y`) also goes with one that calls it `R`.
+fn pairs<'a>(a: &'a Image, b: &'a Image) -> Vec<(&'a Channel, &'a Channel)> {
+    let same_type = |x: &Channel, y: &Channel| std::mem::discriminant(&x.samples) == std::mem::discriminant(&y.samples);
+    let find = |image: &'a Image, name: &str| image.channels.iter().find(|c| c.name == name);
+    let mut found: Vec<_> =
+        a.channels.iter().filter_map(|x| find(b, &x.name).filter(|y| same_type(x, y)).map(|y| (x, y))).collect();
+    if found.is_empty() {
+        for (p, q) in [("Y", "R"), ("R", "Y")] {
+            found.extend(find(a, p).zip(find(b, q)));
+        }
+    }
+    found
+}
+
+/// 1 for pixels that at least one image covers, when both know their coverage: background flatters every mean.
+fn coverage(a: &Image, b: &Image) -> Option<Vec<f32>> {
+    let (a, b) = (a.f32("A")?, b.f32("A")?);
+    Some(a.iter().zip(b).map(|(x, y)| x.max(*y)).collect())
+}
+
+fn compare(a: &Samples, b: &Samples, mask: Option<&[f32]>) -> Result<Difference> {
+    let inside = |i: usize| mask.is_none_or(|m| m[i] > 0.0);
+    let mut d = Difference { pixels: 0, differing: 0, broken: 0, numbers: None };
+    match (a, b) {
+        (Samples::F32(a), Samples::F32(b)) => {
+            let finite: Vec<f32> =
+                (0..a.len()).map(|i| f32::from(u8::from(inside(i) && a[i].is_finite() && b[i].is_finite()))).collect();
+            for i in (0..a.len()).filter(|&i| inside(i)) {
+                // both infinite alike (background depth), or both NaN: nothing differs
+                let same = a[i] == b[i] || a[i].is_nan() && b[i].is_nan();
+                if finite[i] > 0.0 { d.differing += u64::from(!same) } else { d.broken += u64::from(!same) }
+            }
+            let pair = ImagePair::new(a, b, 1, Some(&finite))?;
+            d.pixels = pair.count();
+            d.numbers = (d.pixels > 0).then(|| Numbers {
+                rmse: pair.rmse(),
+                bias: pair.bias(),
+                max: pair.max_abs_difference(),
+                rel_mse: pair.rel_mse(),
+                psnr: pair.psnr(),
+                minimum_ratio: pair.minimum_ratio(),
+                tanimoto: pair.tanimoto(),
+            });
+        }
+        (Samples::U32(a), Samples::U32(b)) => {
+            for i in (0..a.len()).filter(|&i| inside(i)) {
+                d.pixels += 1;
+                d.differing += u64::from(a[i] != b[i]);
+            }
+        }
+        _ => {}
+    }
+    // no pixel in common, but some broken: the limit must still be passed
+    if d.numbers.is_none() && d.broken > 0 {
+        let nan = f64::NAN;
+        d.numbers =
+            Some(Numbers { rmse: nan, bias: nan, max: nan, rel_mse: nan, psnr: nan, minimum_ratio: nan, tanimoto: nan });
+    }
+    Ok(d)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn known_differences() {
+        let inf = f32::INFINITY;
+        let (a, b) = (Samples::F32(vec![1.0, 2.0, inf, inf, f32::NAN]), Samples::F32(vec![1.0, 4.0, inf, 1.0, f32::NAN]));
+        let d = compare(&a, &b, None).unwrap();
+        let n = d.numbers.unwrap();
+        assert_eq!((d.pixels, d.differing, d.broken, n.max, n.bias), (2, 1, 1, 2.0, -1.0));
+        assert!((n.rmse - 2f64.sqrt()).abs() < 1e-12);
+        let masked = compare(&a, &b, Some(&[1.0, 0.0, 1.0, 0.0, 1.0])).unwrap();
+        assert_eq!((masked.pixels, masked.differing, masked.broken), (1, 0, 0));
+        let ids = compare(&Samples::U32(vec![1, 2]), &Samples::U32(vec![1, 3]), None).unwrap();
+        assert_eq!((ids.pixels, ids.differing, ids.numbers), (2, 1, None));
+    }
+}

@@ -1,0 +1,108 @@
+//! `skylit rays`: one raw set of rays, traced and timed. It joins skylit to any other tracer: both read the same files.
+
+use std::io::Write;
+use std::path::Path;
+
+use glam::DVec3;
+
+use super::args::RaysArgs;
+use super::interrupt::{self, Keyboard};
+use super::progress::Progress;
+use crate::error::{Error, Result};
+use crate::gpu::Device;
+use crate::output;
+use crate::ray::Ray;
+use crate::render::rays;
+use crate::scene::flatten::FlatScene;
+use crate::scene::{Scene, export, load};
+use crate::tracer::{Needs, Tracer};
+
+/// Loads, traces, reports.
+pub fn run(args: &RaysArgs) -> Result<()> {
+    interrupt::install();
+    let console = args.verbosity.console();
+    if let Some(hits) = &args.hits {
+        output::check_writable(hits)?;
+    }
+    let mut set = read_rays(&args.rays)?;
+    rays::check(&set)?;
+    let scene = read_mesh(&args.mesh)?;
+    super::warn(&console, &scene);
+    let flat = FlatScene::new(&scene);
+    move_rays(&mut set, -flat.origin);
+    let device = Device::open(&args.device.options())?;
+    let (kind, _) = args.device.tracer.on(&device.info);
+    let tracer = Tracer::new(&device, kind, &flat, Needs::default())?;
+    let stats = tracer.stats();
+    let mut control = Keyboard { progress: Progress::new("tracing", &console), keep_partial: false };
+    let (hits, times) = rays::trace(&tracer, &set, args.mode.into(), args.repeats, &mut control)?;
+    drop(control);
+    if let Some(path) = &args.hits {
+        output::write_atomically(path, |file| file.write_all(bytemuck::cast_slice(&hits)))?;
+    }
+    device.check_validation()?;
+    device.save_pipeline_cache();
+
+    let hit_count = hits.iter().filter(|h| h.is_hit()).count();
+    let rate = |seconds: f64| if seconds > 0.0 { set.len() as f64 / seconds / 1e6 } else { 0.0 };
+    let (on_device, on_wall) = (rate(median(&times.device)), rate(median(&times.wall)));
+    console.line(&format!(
+        "{} rays, {hit_count} hit; tracer {kind} on {}: {on_device:.2} Mrays/s on the device, {on_wall:.2} by the clock \
+         (median of {}); built in {:.3} s, {:.1} bytes per primitive",
+        set.len(),
+        device.info.name,
+        args.repeats,
+        stats.build_seconds,
+        stats.bytes_per_primitive(),
+    ))?;
+    console.record(&serde_json::json!({
+        "tracer": kind.name(),
+        "device": device.info.name,
+        "driver": device.info.driver,
+        "mode": rays::Mode::from(args.mode),
+        "triangles": scene.triangle_count(),
+        "spheres": scene.sphere_count(),
+        "rays": set.len(),
+        "hits": hit_count,
+        "build_seconds": stats.build_seconds,
+        "upload_seconds": stats.upload_seconds,
+        "bytes_per_triangle": stats.bytes_per_primitive(),
+        "mrays_s": on_device,
+        "mrays_s_wall": on_wall,
+        "device_seconds": times.device,
+        "wall_seconds": times.wall,
+        "warnings": scene.report.warnings,
+    }))
+}
+
+/// A triangle soup by its extension, or any scene.
+fn read_mesh(source: &str) -> Result<Scene> {
+    let path = Path::new(source);
+    let soup = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("bin"));
+    if soup { export::read_mesh_bin(path) } else { load::load(source) }
+}
+
+/// Reads RAYS.bin.
+fn read_rays(path: &Path) -> Result<Vec<Ray>> {
+    let bytes = std::fs::read(path).map_err(|e| Error::read(path, &e))?;
+    if bytes.is_empty() || bytes.len() % size_of::<Ray>() != 0 {
+        let message = format!("{} bytes: not a whole number of rays of {} bytes, or none", bytes.len(), size_of::<Ray>());
+        return Err(Error::input(path, message));
+    }
+    Ok(bytemuck::pod_collect_to_vec(&bytes))
+}
+
+/// Between the world of files and the tracers' coordinates, which differ for a scene far from the origin.
+pub fn move_rays(rays: &mut [Ray], by: DVec3) {
+    if by != DVec3::ZERO {
+        for r in rays {
+            r.origin = (DVec3::from(r.origin.map(f64::from)) + by).as_vec3().to_array();
+        }
+    }
+}
+
+fn median(values: &[f64]) -> f64 {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    sorted.get(sorted.len() / 2).copied().unwrap_or(0.0)
+}

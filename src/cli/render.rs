@@ -1,0 +1,220 @@
+//! `skylit render`: a scene to an image file.
+
+use std::io::Write;
+use std::path::Path;
+use std::time::Instant;
+
+use super::args::{Aov, DEFAULT_SIZE, DEFAULT_SPP, RenderArgs, dump_path};
+use super::console::Console;
+use super::interrupt::{self, Keyboard};
+use super::progress::Progress;
+use super::rays::move_rays;
+use super::report::{Report, Seconds};
+use crate::error::{Error, Result};
+use crate::gpu::Device;
+use crate::output::{self, Channel, Image, ImageFormat, Samples, png};
+use crate::ray::Ray;
+use crate::render::ao::{self, AoOptions, Hemisphere};
+use crate::render::aov::{self, AovPixel};
+use crate::render::camera::{self, CameraRecord};
+use crate::scene::flatten::FlatScene;
+use crate::scene::{Projection, Scene, load};
+use crate::tracer::{Needs, Tracer};
+
+/// Loads, renders, writes, reports.
+pub fn run(args: &RenderArgs, start: Instant) -> Result<()> {
+    args.check()?;
+    for path in args.outputs() {
+        output::check_writable(&path)?;
+    }
+    interrupt::install();
+    let console = args.verbosity.console();
+    let (scene, device, seconds) = open(args)?;
+    super::warn(&console, &scene);
+    interrupt::check()?;
+
+    let size = args.size.or(scene.hints.size).unwrap_or(DEFAULT_SIZE);
+    output::check_size(size[0], size[1])?;
+    let aspect = f64::from(size[0]) / f64::from(size[1]);
+    let camera = choose_camera(args, &scene, aspect)?;
+    let flat = FlatScene::new(&scene);
+    let record = CameraRecord::new(&camera, flat.origin, aspect);
+    let (kind, why) = args.device.tracer.on(&device.info);
+    let options = AoOptions {
+        size,
+        spp: args.spp.or(scene.hints.spp).unwrap_or(DEFAULT_SPP).max(1),
+        seed: args.seed,
+        radius: args.ao_radius,
+        falloff: args.ao_falloff,
+        hemisphere: args.ao_normal.into(),
+        time_limit: args.time_limit,
+        keep_rays: args.dump_rays.is_some(),
+    };
+    let needs =
+        Needs { normals: options.hemisphere == Hemisphere::Shading || args.wants(Aov::Ns), albedo: args.wants(Aov::Albedo) };
+    let tracer = Tracer::new(&device, kind, &flat, needs)?;
+
+    let mut control = Keyboard { progress: Progress::new("rendering", &console), keep_partial: args.keep_partial };
+    let mut result = ao::render(&tracer, &record, &options, &mut control)?;
+    let aov_start = Instant::now();
+    let pixels = match args.aov.is_empty() && args.depth_image.is_none() {
+        true => Vec::new(),
+        false => aov::render(&tracer, &record, size, &mut control)?,
+    };
+    let seconds = Seconds { trace: result.trace_seconds, aov: aov_start.elapsed().as_secs_f64(), ..seconds };
+    drop(control);
+    device.check_validation()?;
+
+    let write_start = Instant::now();
+    let (mean, error) = result.film.mean_and_error();
+    let mut report = Report {
+        args,
+        scene: &scene,
+        camera: &camera,
+        device: &device.info,
+        tracer: kind,
+        why,
+        options: &options,
+        spp: result.spp,
+        stopped_early: result.stopped_early,
+        mean,
+        mean_standard_error: error,
+        covered_mean: covered_mean(&result.film),
+        rays: [result.primary_rays, result.occlusion_rays, result.skipped_rays],
+        device_seconds: std::mem::take(&mut result.device_seconds),
+        longest_launch: result.longest_launch,
+        stats: tracer.stats(),
+        features: tracer.features().explain(&flat),
+        seconds,
+    };
+    let origin = flat.origin;
+    write_rays(args, &mut result.kept_primary, &mut result.kept_occlusion, origin)?;
+    if let Some(path) = &args.depth_image {
+        write_depth(path, &pixels, size)?;
+    }
+    let image = Image {
+        width: size[0],
+        height: size[1],
+        channels: channels(result.film, args, &pixels, origin),
+        metadata: report.metadata(),
+    };
+    for path in &args.output {
+        output::save(&image, path)?;
+    }
+    device.save_pipeline_cache();
+    report.seconds.write = write_start.elapsed().as_secs_f64();
+    report.seconds.total = start.elapsed().as_secs_f64();
+    report.print(&console)?;
+    if args.keep_partial && interrupt::requested() { Err(Error::Interrupted) } else { Ok(()) }
+}
+
+/// Loads the scene while the driver starts: on small scenes they take equally long.
+fn open(args: &RenderArgs) -> Result<(Scene, std::sync::Arc<Device>, Seconds)> {
+    let timed = |start: Instant| start.elapsed().as_secs_f64();
+    std::thread::scope(|scope| {
+        let device = scope.spawn(|| {
+            let start = Instant::now();
+            (Device::open(&args.device.options()), timed(start))
+        });
+        let start = Instant::now();
+        let scene = load::load(&args.scene);
+        let load = timed(start);
+        let (device, open) = match device.join() {
+            Ok(done) => done,
+            Err(panic) => std::panic::resume_unwind(panic),
+        };
+        Ok((scene?, device?, Seconds { load, device: open, ..Default::default() }))
+    })
+}
+
+fn choose_camera(args: &RenderArgs, scene: &Scene, aspect: f64) -> Result<crate::scene::Camera> {
+    let mut camera = camera::choose(scene, &args.camera_choice(), aspect)?;
+    if let Some(degrees) = args.fov_y {
+        match &mut camera.projection {
+            Projection::Perspective { fov_y } => *fov_y = degrees.to_radians(),
+            Projection::Orthographic { .. } => {
+                return Err(Error::Usage("--fov-y: the camera is orthographic and has no field of view".into()));
+            }
+        }
+    }
+    Ok(camera)
+}
+
+/// Mean over what the scene covers.
+fn covered_mean(film: &crate::render::film::Film) -> f64 {
+    let sum = |v: &[f32]| v.iter().map(|&x| f64::from(x)).sum::<f64>();
+    let covered = sum(&film.coverage);
+    if covered > 0.0 { sum(&film.mean) / covered } else { 0.0 }
+}
+
+/// The film and the auxiliary outputs that were asked for, as named channels.
+fn channels(film: crate::render::film::Film, args: &RenderArgs, pixels: &[AovPixel], origin: glam::DVec3) -> Vec<Channel> {
+    let f32s = |name: &str, samples| Channel { name: name.into(), samples: Samples::F32(samples) };
+    let mut out = vec![f32s("Y", film.mean)];
+    if !args.writes_exr() {
+        return out;
+    }
+    out.push(f32s("A", film.coverage));
+    out.push(f32s("variance", film.variance));
+    out.push(Channel { name: "samples".into(), samples: Samples::U32(film.samples) });
+    let plane = |name: &str, f: &dyn Fn(&AovPixel) -> f32| f32s(name, pixels.iter().map(f).collect());
+    let ids = |name: &str, f: &dyn Fn(&AovPixel) -> u32| Channel {
+        name: name.into(),
+        samples: Samples::U32(pixels.iter().map(f).collect()),
+    };
+    if args.wants(Aov::Depth) {
+        out.push(plane("depth.Z", &|p| p.depth));
+    }
+    for (k, axis) in ["X", "Y", "Z"].into_iter().enumerate() {
+        if args.wants(Aov::Position) {
+            out.push(plane(&format!("position.{axis}"), &|p| (f64::from(p.position[k]) + origin[k]) as f32));
+        }
+        if args.wants(Aov::Ng) {
+            out.push(plane(&format!("Ng.{axis}"), &|p| p.ng[k]));
+        }
+        if args.wants(Aov::Ns) {
+            out.push(plane(&format!("Ns.{axis}"), &|p| p.ns[k]));
+        }
+    }
+    if args.wants(Aov::Ids) {
+        out.push(ids("id.instance", &|p| p.instance));
+        out.push(ids("id.primitive", &|p| p.primitive));
+        out.push(ids("id.material", &|p| p.material));
+    }
+    if args.wants(Aov::Albedo) {
+        out.push(plane("albedo.R", &|p| p.red));
+        out.push(plane("albedo.G", &|p| p.green));
+        out.push(plane("albedo.B", &|p| p.blue));
+    }
+    out
+}
+
+fn write_depth(path: &Path, pixels: &[AovPixel], size: [u32; 2]) -> Result<()> {
+    let depth: Vec<f32> = pixels.iter().map(|p| p.depth).collect();
+    match ImageFormat::of(path)? {
+        ImageFormat::Png => png::write_grey(path, &png::depth_to_grey(&depth), size[0], size[1]),
+        ImageFormat::Exr => {
+            let channels = vec![Channel { name: "depth.Z".into(), samples: Samples::F32(depth) }];
+            output::save(&Image { width: size[0], height: size[1], channels, metadata: Vec::new() }, path)
+        }
+    }
+}
+
+fn write_rays(args: &RenderArgs, primary: &mut [Ray], occlusion: &mut [Ray], origin: glam::DVec3) -> Result<()> {
+    let Some(prefix) = &args.dump_rays else { return Ok(()) };
+    for (kind, rays) in [("primary", primary), ("ao", occlusion)] {
+        // files are in the scene's world, as its exported mesh is
+        move_rays(rays, origin);
+        output::write_atomically(&dump_path(prefix, kind), |file| file.write_all(bytemuck::cast_slice(rays)))?;
+    }
+    Ok(())
+}
+
+impl Report<'_> {
+    fn print(&self, console: &Console) -> Result<()> {
+        for line in self.lines() {
+            console.line(&line)?;
+        }
+        console.record(&self.record())
+    }
+}

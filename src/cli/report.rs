@@ -1,0 +1,227 @@
+//! What `skylit render` tells: metadata of the image, lines for people, a record for programs.
+
+use serde_json::{Value, json};
+
+use super::args::RenderArgs;
+use crate::gpu::DeviceInfo;
+use crate::render::ao::{AoOptions, Hemisphere};
+use crate::scene::{Camera, Projection, Scene};
+use crate::tracer::{BuildStats, TracerKind};
+
+/// Seconds of each part of a run. Loading and starting the device overlap.
+#[derive(Clone, Copy, Debug, Default, serde::Serialize)]
+pub struct Seconds {
+    /// Reading the scene.
+    pub load: f64,
+    /// Starting the device.
+    pub device: f64,
+    /// Ambient occlusion, compiling included.
+    pub trace: f64,
+    /// Auxiliary outputs.
+    pub aov: f64,
+    /// Writing files.
+    pub write: f64,
+    /// From the start of the process' `main`.
+    pub total: f64,
+}
+
+/// All there is to say about a render.
+pub struct Report<'a> {
+    /// What was asked for.
+    pub args: &'a RenderArgs,
+    /// The scene.
+    pub scene: &'a Scene,
+    /// The camera that was used.
+    pub camera: &'a Camera,
+    /// The device.
+    pub device: &'a DeviceInfo,
+    /// The tracer.
+    pub tracer: TracerKind,
+    /// Why this tracer.
+    pub why: String,
+    /// The options of the pass.
+    pub options: &'a AoOptions,
+    /// Samples that every pixel got.
+    pub spp: u32,
+    /// Fewer than asked for.
+    pub stopped_early: bool,
+    /// Mean accessibility over all pixels; background counts 0.
+    pub mean: f64,
+    /// Of the mean, from the pixels' own variances.
+    pub mean_standard_error: f64,
+    /// Mean accessibility over what the scene covers.
+    pub covered_mean: f64,
+    /// Camera rays, occlusion rays, occlusion rays not traced.
+    pub rays: [u64; 3],
+    /// Device seconds of each pass.
+    pub device_seconds: Vec<(&'static str, f64)>,
+    /// Longest launch in device seconds.
+    pub longest_launch: f64,
+    /// What building took.
+    pub stats: BuildStats,
+    /// What the scene made skip.
+    pub features: Vec<String>,
+    /// Times.
+    pub seconds: Seconds,
+}
+
+impl Report<'_> {
+    /// Text attributes of the image. Nothing in it differs between two runs of the same command.
+    pub fn metadata(&self) -> Vec<(String, String)> {
+        let hemisphere = self.hemisphere();
+        [
+            ("camera", self.camera_text()),
+            ("device", format!("{} ({})", self.device.name, self.device.driver)),
+            ("integrator", "ao".into()),
+            ("ao.radius", self.options.radius.to_string()),
+            ("ao.falloff", self.options.falloff.to_string()),
+            ("ao.normal", hemisphere.into()),
+            ("scene", self.args.scene.clone()),
+            ("seed", self.options.seed.to_string()),
+            ("spp", self.spp.to_string()),
+            ("tracer", self.tracer.name().into()),
+            ("version", env!("CARGO_PKG_VERSION").into()),
+        ]
+        .map(|(k, v)| (k.to_owned(), v))
+        .to_vec()
+    }
+
+    fn hemisphere(&self) -> &'static str {
+        match self.options.hemisphere {
+            Hemisphere::Geometric => "geometric",
+            Hemisphere::Shading => "shading",
+        }
+    }
+
+    fn camera_text(&self) -> String {
+        let m = &self.camera.camera_to_world;
+        let lens = match self.camera.projection {
+            Projection::Perspective { fov_y } => format!("perspective, fov_y {} degrees", fov_y.to_degrees()),
+            Projection::Orthographic { half_height } => format!("orthographic, half height {half_height}"),
+        };
+        format!("{:?} eye {}, forward {}, up {}; {lens}", self.camera.name, m.translation, -m.matrix3.z_axis, m.matrix3.y_axis)
+    }
+
+    /// Lines for people.
+    pub fn lines(&self) -> Vec<String> {
+        let [width, height] = self.options.size;
+        let s = &self.seconds;
+        let mut lines = vec![
+            format!(
+                "{}: {width}x{height}, {} spp, tracer {} on {}; mean accessibility {:.5} +- {:.5} ({:.5} where the scene is)",
+                self.args.output.iter().map(|p| p.display().to_string()).collect::<Vec<_>>().join(", "),
+                self.spp,
+                self.tracer,
+                self.device.name,
+                self.mean,
+                self.mean_standard_error,
+                self.covered_mean,
+            ),
+            format!(
+                "seconds: load {:.3}, device {:.3} (at the same time), build {:.3}, upload {:.3}, trace {:.3}, aov {:.3}, write {:.3}, \
+                 total {:.3}; {:.1} Mrays/s",
+                s.load,
+                s.device,
+                self.stats.build_seconds,
+                self.stats.upload_seconds,
+                s.trace,
+                s.aov,
+                s.write,
+                s.total,
+                self.mrays_s(),
+            ),
+        ];
+        if self.stopped_early {
+            lines.push(format!("stopped early: {} of {} samples per pixel", self.spp, self.options.spp));
+        }
+        if self.scene.hints.depth_image && self.args.depth_image.is_none() {
+            lines.push("the scene asks for a depth image: add --depth-image FILE".into());
+        }
+        if self.args.explain {
+            lines.extend(self.explanations().into_iter().map(|l| format!("explain: {l}")));
+        }
+        lines
+    }
+
+    /// What was skipped, and what that saved.
+    fn explanations(&self) -> Vec<String> {
+        let [_, occlusion, skipped] = self.rays;
+        let mut lines = vec![format!("tracer {}: {}", self.tracer, self.why)];
+        lines.extend(self.features.iter().cloned());
+        lines.push(match self.options.binary() {
+            true => "binary occlusion: any hit ends a ray, no nearest one is looked for".into(),
+            false => "occlusion falls off with distance: the nearest hit is looked for".into(),
+        });
+        lines.push(match self.options.reach() {
+            r if r.is_finite() => {
+                format!("occlusion rays end at distance {r:.6}: what is beyond changes nothing that can be seen")
+            }
+            _ => "occlusion rays have no end: no radius and no falloff was given".into(),
+        });
+        let all = (occlusion + skipped).max(1);
+        let share = 100.0 * skipped as f64 / all as f64;
+        lines.push(format!("{skipped} of {all} occlusion rays ({share:.1} %) not traced: their camera ray met nothing"));
+        lines
+    }
+
+    /// All rays of the image by the clock.
+    fn mrays_s(&self) -> f64 {
+        if self.seconds.trace > 0.0 { (self.rays[0] + self.rays[1]) as f64 / self.seconds.trace / 1e6 } else { 0.0 }
+    }
+
+    /// A record for programs.
+    pub fn record(&self) -> Value {
+        let device_seconds: serde_json::Map<_, _> =
+            self.device_seconds.iter().map(|(label, s)| ((*label).to_owned(), json!(s))).collect();
+        let finite = |v: f64| if v.is_finite() { json!(v) } else { Value::Null };
+        let mut record = json!({
+            "scene": self.args.scene,
+            "output": self.args.output,
+            "width": self.options.size[0],
+            "height": self.options.size[1],
+            "spp": self.spp,
+            "spp_asked": self.options.spp,
+            "stopped_early": self.stopped_early,
+            "seed": self.options.seed,
+            "camera": self.camera_text(),
+            "ao": {
+                "radius": finite(self.options.radius),
+                "falloff": self.options.falloff,
+                "normal": self.hemisphere(),
+                "reach": finite(self.options.reach()),
+            },
+            "tracer": self.tracer.name(),
+            "tracer_reason": self.why,
+            "device": self.device.name,
+            "driver": self.device.driver,
+            "mean": self.mean,
+            "mean_standard_error": self.mean_standard_error,
+            "covered_mean": self.covered_mean,
+            "triangles": self.scene.triangle_count(),
+            "spheres": self.scene.sphere_count(),
+            "degenerate_triangles": self.scene.report.degenerate_triangles,
+            "warnings": self.scene.report.warnings,
+            "rays": { "primary": self.rays[0], "occlusion": self.rays[1], "skipped": self.rays[2] },
+            "mrays_s_wall": self.mrays_s(),
+            "build": self.stats_record(),
+            "seconds": self.seconds,
+            "device_seconds": device_seconds,
+            "longest_launch_seconds": self.longest_launch,
+        });
+        record["seconds"]["build"] = json!(self.stats.build_seconds);
+        record["seconds"]["upload"] = json!(self.stats.upload_seconds);
+        if self.args.explain {
+            record["explain"] = json!(self.explanations());
+        }
+        record
+    }
+
+    fn stats_record(&self) -> Value {
+        json!({
+            "structure_bytes": self.stats.structure_bytes,
+            "scene_bytes": self.stats.scene_bytes,
+            "bytes_per_primitive": self.stats.bytes_per_primitive(),
+            "stack_entries": self.stats.stack_entries,
+        })
+    }
+}

@@ -1,0 +1,264 @@
+//! Bottom- and top-level acceleration structures of VK_KHR_acceleration_structure.
+
+use std::sync::Arc;
+
+use ash::vk;
+
+use super::buffer::{Buffer, Memory};
+use super::commands::{Commands, Recorder};
+use super::device::Device;
+use super::result::Context;
+use crate::error::{Error, Result};
+
+/// A structure is copied to its compact size when that saves at least this share.
+const COMPACTION_PAYS: f64 = 0.1;
+
+/// What a bottom-level structure is built over.
+pub enum BottomLevelInput<'a> {
+    /// Indexed triangles: opaque ones first, alpha-tested ones behind them as a second geometry.
+    Triangles {
+        /// 3 floats a vertex.
+        positions: &'a Buffer,
+        /// Number of vertices.
+        vertex_count: u32,
+        /// 3 uints a triangle.
+        indices: &'a Buffer,
+        /// Triangles that need no any-hit shader.
+        opaque: u32,
+        /// Triangles behind them that do.
+        alpha_tested: u32,
+    },
+    /// Boxes of 6 floats: procedural geometry, opaque.
+    Boxes {
+        /// `VkAabbPositionsKHR` each.
+        boxes: &'a Buffer,
+        /// Their number.
+        count: u32,
+    },
+}
+
+/// An entry of the top level.
+pub struct TopLevelEntry {
+    /// Group to world, three rows.
+    pub transform: [f32; 12],
+    /// What shaders see as the custom index; below 2^24.
+    pub index: u32,
+    /// First hit group.
+    pub hit_group: u32,
+    /// Address of the bottom level ([`AccelerationStructure::address`]).
+    pub bottom_level: u64,
+}
+
+/// A built acceleration structure.
+pub struct AccelerationStructure {
+    raw: vk::AccelerationStructureKHR,
+    address: u64,
+    buffer: Buffer,
+    device: Arc<Device>,
+}
+
+impl AccelerationStructure {
+    fn allocate(device: &Arc<Device>, name: &str, ty: vk::AccelerationStructureTypeKHR, size: u64) -> Result<Self> {
+        let functions = functions(device)?;
+        let buffer =
+            Buffer::with_usage(device, name, size, Memory::Device, vk::BufferUsageFlags::ACCELERATION_STRUCTURE_STORAGE_KHR)?;
+        let info = vk::AccelerationStructureCreateInfoKHR::default().buffer(buffer.raw).size(size).ty(ty);
+        // SAFETY: the buffer holds `size` bytes; offset 0 is aligned
+        let raw = unsafe { functions.create_acceleration_structure(&info, None) }.context(name)?;
+        device.name(raw, name);
+        // SAFETY: just made
+        let address = unsafe {
+            functions.get_acceleration_structure_device_address(
+                &vk::AccelerationStructureDeviceAddressInfoKHR::default().acceleration_structure(raw),
+            )
+        };
+        Ok(Self { raw, address, buffer, device: device.clone() })
+    }
+
+    /// Builds one bottom level, compacted where that pays. `refittable` structures can be updated later and are not compacted.
+    pub fn bottom_level(device: &Arc<Device>, commands: &mut Commands, name: &str, input: &BottomLevelInput) -> Result<Self> {
+        let (geometries, ranges) = bottom_level_geometry(input);
+        let flags = vk::BuildAccelerationStructureFlagsKHR::PREFER_FAST_TRACE
+            | vk::BuildAccelerationStructureFlagsKHR::ALLOW_COMPACTION;
+        let built = build(device, commands, name, vk::AccelerationStructureTypeKHR::BOTTOM_LEVEL, flags, &geometries, &ranges)?;
+        built.compacted(commands, name)
+    }
+
+    /// Builds a top level.
+    pub fn top_level(device: &Arc<Device>, commands: &mut Commands, entries: &[TopLevelEntry]) -> Result<Self> {
+        if entries.len() >= 1 << 24 {
+            return Err(Error::Scene(format!(
+                "{} instances: Vulkan's top level numbers at most 2^24; use --tracer compute",
+                entries.len()
+            )));
+        }
+        let mut records = Buffer::new(device, "top-level entries", 64 * entries.len() as u64, Memory::Upload)?;
+        let bytes = records.bytes_mut().ok_or_else(|| Error::Vulkan("the top-level entries are not mapped".into()))?;
+        for (entry, record) in entries.iter().zip(bytes.chunks_exact_mut(64)) {
+            // VkAccelerationStructureInstanceKHR: transform, index | mask, hit group | flags, address
+            record[..48].copy_from_slice(bytemuck::cast_slice(&entry.transform));
+            record[48..52].copy_from_slice(&(entry.index | 0xff << 24).to_le_bytes());
+            let cull_disable = vk::GeometryInstanceFlagsKHR::TRIANGLE_FACING_CULL_DISABLE.as_raw();
+            record[52..56].copy_from_slice(&(entry.hit_group | cull_disable << 24).to_le_bytes());
+            record[56..].copy_from_slice(&entry.bottom_level.to_le_bytes());
+        }
+        let instances = vk::AccelerationStructureGeometryInstancesDataKHR::default()
+            .data(vk::DeviceOrHostAddressConstKHR { device_address: records.address() });
+        let geometry = [vk::AccelerationStructureGeometryKHR::default()
+            .geometry_type(vk::GeometryTypeKHR::INSTANCES)
+            .geometry(vk::AccelerationStructureGeometryDataKHR { instances })];
+        let ranges = [vk::AccelerationStructureBuildRangeInfoKHR::default().primitive_count(entries.len() as u32)];
+        let flags = vk::BuildAccelerationStructureFlagsKHR::PREFER_FAST_TRACE;
+        build(device, commands, "top level", vk::AccelerationStructureTypeKHR::TOP_LEVEL, flags, &geometry, &ranges)
+    }
+
+    /// What shaders and top-level entries refer to it by.
+    pub fn address(&self) -> u64 {
+        self.address
+    }
+
+    /// Bytes it takes.
+    pub fn size(&self) -> u64 {
+        self.buffer.size()
+    }
+
+    fn compacted(self, commands: &mut Commands, name: &str) -> Result<Self> {
+        let functions = functions(&self.device)?.clone();
+        let info = vk::QueryPoolCreateInfo::default()
+            .query_type(vk::QueryType::ACCELERATION_STRUCTURE_COMPACTED_SIZE_KHR)
+            .query_count(1);
+        // SAFETY: one query, reset, written by the submission below and read after it; the pool is destroyed here
+        let size = unsafe {
+            let pool = self.device.raw.create_query_pool(&info, None).context("the compaction query")?;
+            self.device.raw.reset_query_pool(pool, 0, 1);
+            let submitted = commands.run(|r| {
+                functions.cmd_write_acceleration_structures_properties(
+                    r.buffer,
+                    &[self.raw],
+                    vk::QueryType::ACCELERATION_STRUCTURE_COMPACTED_SIZE_KHR,
+                    pool,
+                    0,
+                )
+            });
+            let mut size = [0u64];
+            let read = submitted.and_then(|_| {
+                let flags = vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WAIT;
+                self.device.raw.get_query_pool_results(pool, 0, &mut size, flags).context("the compacted size")
+            });
+            self.device.raw.destroy_query_pool(pool, None);
+            read?;
+            size[0]
+        };
+        if size == 0 || size as f64 > (1.0 - COMPACTION_PAYS) * self.size() as f64 {
+            return Ok(self);
+        }
+        let compact = Self::allocate(&self.device, name, vk::AccelerationStructureTypeKHR::BOTTOM_LEVEL, size)?;
+        let copy = vk::CopyAccelerationStructureInfoKHR::default()
+            .src(self.raw)
+            .dst(compact.raw)
+            .mode(vk::CopyAccelerationStructureModeKHR::COMPACT);
+        commands.run(|r| {
+            // SAFETY: the source was built with ALLOW_COMPACTION, the target has the compacted size
+            unsafe { functions.cmd_copy_acceleration_structure(r.buffer, &copy) };
+        })?;
+        Ok(compact)
+    }
+}
+
+fn functions(device: &Device) -> Result<&ash::khr::acceleration_structure::Device> {
+    device.structures.as_ref().ok_or_else(|| Error::Device("the device has no VK_KHR_acceleration_structure".into()))
+}
+
+type Geometry<'a> = vk::AccelerationStructureGeometryKHR<'a>;
+type Range = vk::AccelerationStructureBuildRangeInfoKHR;
+
+fn bottom_level_geometry<'a>(input: &BottomLevelInput) -> (Vec<Geometry<'a>>, Vec<Range>) {
+    match *input {
+        BottomLevelInput::Triangles { positions, vertex_count, indices, opaque, alpha_tested } => {
+            let triangles = vk::AccelerationStructureGeometryTrianglesDataKHR::default()
+                .vertex_format(vk::Format::R32G32B32_SFLOAT)
+                .vertex_data(vk::DeviceOrHostAddressConstKHR { device_address: positions.address() })
+                .vertex_stride(12)
+                .max_vertex(vertex_count.saturating_sub(1))
+                .index_type(vk::IndexType::UINT32)
+                .index_data(vk::DeviceOrHostAddressConstKHR { device_address: indices.address() });
+            let geometry = |flags| {
+                vk::AccelerationStructureGeometryKHR::default()
+                    .geometry_type(vk::GeometryTypeKHR::TRIANGLES)
+                    .geometry(vk::AccelerationStructureGeometryDataKHR { triangles })
+                    .flags(flags)
+            };
+            let mut out = (Vec::new(), Vec::new());
+            if opaque > 0 || alpha_tested == 0 {
+                out.0.push(geometry(vk::GeometryFlagsKHR::OPAQUE));
+                out.1.push(Range::default().primitive_count(opaque));
+            }
+            if alpha_tested > 0 {
+                out.0.push(geometry(vk::GeometryFlagsKHR::empty()));
+                out.1.push(Range::default().primitive_count(alpha_tested).primitive_offset(12 * opaque));
+            }
+            out
+        }
+        BottomLevelInput::Boxes { boxes, count } => {
+            let aabbs = vk::AccelerationStructureGeometryAabbsDataKHR::default()
+                .data(vk::DeviceOrHostAddressConstKHR { device_address: boxes.address() })
+                .stride(24);
+            let geometry = vk::AccelerationStructureGeometryKHR::default()
+                .geometry_type(vk::GeometryTypeKHR::AABBS)
+                .geometry(vk::AccelerationStructureGeometryDataKHR { aabbs })
+                .flags(vk::GeometryFlagsKHR::OPAQUE);
+            (vec![geometry], vec![Range::default().primitive_count(count)])
+        }
+    }
+}
+
+fn build(
+    device: &Arc<Device>,
+    commands: &mut Commands,
+    name: &str,
+    ty: vk::AccelerationStructureTypeKHR,
+    flags: vk::BuildAccelerationStructureFlagsKHR,
+    geometries: &[Geometry],
+    ranges: &[Range],
+) -> Result<AccelerationStructure> {
+    let functions = functions(device)?;
+    let mut info = vk::AccelerationStructureBuildGeometryInfoKHR::default()
+        .ty(ty)
+        .flags(flags)
+        .mode(vk::BuildAccelerationStructureModeKHR::BUILD)
+        .geometries(geometries);
+    let counts: Vec<u32> = ranges.iter().map(|r| r.primitive_count).collect();
+    let mut sizes = vk::AccelerationStructureBuildSizesInfoKHR::default();
+    // SAFETY: geometries and counts match
+    unsafe {
+        functions.get_acceleration_structure_build_sizes(
+            vk::AccelerationStructureBuildTypeKHR::DEVICE,
+            &info,
+            &counts,
+            &mut sizes,
+        )
+    };
+    let structure = AccelerationStructure::allocate(device, name, ty, sizes.acceleration_structure_size)?;
+    // VUID-vkCmdBuildAccelerationStructuresKHR-pInfos-03710: the address itself has to be aligned, so leave room for it
+    let alignment = device.info.limits.scratch_alignment.max(1) as u64;
+    let scratch = Buffer::new(device, "acceleration-structure scratch", sizes.build_scratch_size + alignment, Memory::Device)?;
+    info = info
+        .dst_acceleration_structure(structure.raw)
+        .scratch_data(vk::DeviceOrHostAddressKHR { device_address: scratch.address().next_multiple_of(alignment) });
+    commands.run(|r: &mut Recorder| {
+        r.timed("build", |r| {
+            // SAFETY: inputs, target and scratch live until the submission is waited for
+            unsafe { functions.cmd_build_acceleration_structures(r.buffer, &[info], &[ranges]) };
+        })
+    })?;
+    Ok(structure)
+}
+
+impl Drop for AccelerationStructure {
+    fn drop(&mut self) {
+        if let Ok(functions) = functions(&self.device) {
+            // SAFETY: submissions are waited for; its buffer is dropped after it
+            unsafe { functions.destroy_acceleration_structure(self.raw, None) };
+        }
+    }
+}

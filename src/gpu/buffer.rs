@@ -1,0 +1,202 @@
+//! Buffers with a device address.
+
+use std::sync::Arc;
+
+use ash::vk;
+use gpu_allocator::MemoryLocation;
+use gpu_allocator::vulkan::{Allocation, AllocationCreateDesc, AllocationScheme};
+
+use super::commands::Commands;
+use super::device::Device;
+use super::result::Context;
+use crate::error::{Error, Result};
+
+/// Who reads and writes a buffer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Memory {
+    /// The device; the host fills it at most once, through [`Buffer::fill`].
+    Device,
+    /// The host writes, the device reads.
+    Upload,
+    /// The device writes, the host reads.
+    Readback,
+}
+
+/// Bytes that go through a staging buffer at a time, where the host cannot write device memory.
+const STAGING: u64 = 32 << 20;
+
+/// A buffer that shaders reach by its address.
+pub struct Buffer {
+    pub(super) raw: vk::Buffer,
+    allocation: Option<Allocation>,
+    size: u64,
+    address: u64,
+    device: Arc<Device>,
+}
+
+impl Buffer {
+    /// Allocates `size` bytes (at least 16 are taken, so that an empty array still has an address).
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`], naming the buffer.
+    pub fn new(device: &Arc<Device>, name: &str, size: u64, memory: Memory) -> Result<Self> {
+        Self::with_usage(device, name, size, memory, vk::BufferUsageFlags::empty())
+    }
+
+    pub(super) fn with_usage(
+        device: &Arc<Device>,
+        name: &str,
+        size: u64,
+        memory: Memory,
+        extra: vk::BufferUsageFlags,
+    ) -> Result<Self> {
+        let size = size.max(16).next_multiple_of(16);
+        if size > device.info.limits.max_allocation {
+            return Err(Error::OutOfMemory(format!(
+                "{name} needs {} MiB, this device allows {} MiB in one buffer; use a smaller image or scene, or another --device",
+                size >> 20,
+                device.info.limits.max_allocation >> 20
+            )));
+        }
+        let mut usage = vk::BufferUsageFlags::STORAGE_BUFFER
+            | vk::BufferUsageFlags::SHADER_DEVICE_ADDRESS
+            | vk::BufferUsageFlags::TRANSFER_SRC
+            | vk::BufferUsageFlags::TRANSFER_DST
+            | extra;
+        if device.structures.is_some() {
+            usage |= vk::BufferUsageFlags::ACCELERATION_STRUCTURE_BUILD_INPUT_READ_ONLY_KHR;
+        }
+        let info = vk::BufferCreateInfo::default().size(size).usage(usage).sharing_mode(vk::SharingMode::EXCLUSIVE);
+        let what = format!("{name} ({} MiB)", size.div_ceil(1 << 20));
+        // SAFETY: a plain buffer of the living device
+        let raw = unsafe { device.raw.create_buffer(&info, None) }.context(&what)?;
+        device.name(raw, name);
+        let mut buffer = Self { raw, allocation: None, size, address: 0, device: device.clone() };
+        // SAFETY: the buffer is of this device
+        let requirements = unsafe { device.raw.get_buffer_memory_requirements(raw) };
+        let location = match memory {
+            Memory::Device if device.info.unified_memory => MemoryLocation::CpuToGpu,
+            Memory::Device => MemoryLocation::GpuOnly,
+            Memory::Upload => MemoryLocation::CpuToGpu,
+            Memory::Readback => MemoryLocation::GpuToCpu,
+        };
+        let allocation = device
+            .allocator()
+            .allocate(&AllocationCreateDesc {
+                name,
+                requirements,
+                location,
+                linear: true,
+                allocation_scheme: AllocationScheme::GpuAllocatorManaged,
+            })
+            .map_err(|e| {
+                Error::OutOfMemory(format!(
+                    "no device memory left for {what}: {e}; use a smaller image or scene, or another --device"
+                ))
+            })?;
+        // SAFETY: fresh memory that fits the buffer's requirements
+        unsafe { device.raw.bind_buffer_memory(raw, allocation.memory(), allocation.offset()) }.context(&what)?;
+        buffer.allocation = Some(allocation);
+        // SAFETY: created with SHADER_DEVICE_ADDRESS, bound above
+        buffer.address = unsafe { device.raw.get_buffer_device_address(&vk::BufferDeviceAddressInfo::default().buffer(raw)) };
+        Ok(buffer)
+    }
+
+    /// A device buffer with these contents.
+    pub fn from_slice<T: bytemuck::NoUninit>(device: &Arc<Device>, name: &str, data: &[T]) -> Result<Self> {
+        let bytes: &[u8] = bytemuck::cast_slice(data);
+        let mut buffer = Self::new(device, name, bytes.len() as u64, Memory::Device)?;
+        buffer.fill(bytes.len() as u64, 1, |first, chunk| {
+            chunk.copy_from_slice(&bytes[first as usize..first as usize + chunk.len()])
+        })?;
+        Ok(buffer)
+    }
+
+    /// Where shaders find it.
+    pub fn address(&self) -> u64 {
+        self.address
+    }
+
+    /// Its size in bytes.
+    pub fn size(&self) -> u64 {
+        self.size
+    }
+
+    /// The bytes, where the host can see them (always for [`Memory::Upload`] and [`Memory::Readback`]). The device must not
+    /// be using the buffer: every submission of this layer is waited for, so it is not.
+    pub fn bytes(&self) -> Option<&[u8]> {
+        self.allocation.as_ref().and_then(|a| a.mapped_slice()).map(|s| &s[..self.size as usize])
+    }
+
+    /// The bytes for writing; see [`Buffer::bytes`].
+    pub fn bytes_mut(&mut self) -> Option<&mut [u8]> {
+        let size = self.size as usize;
+        self.allocation.as_mut().and_then(|a| a.mapped_slice_mut()).map(|s| &mut s[..size])
+    }
+
+    /// Fills the first `size` bytes with records of `record` bytes: `write(first record, bytes)` is called with consecutive
+    /// pieces, each a whole number of records. Where the host sees the memory there is one piece and no copy.
+    pub fn fill(&mut self, size: u64, record: u64, mut write: impl FnMut(u64, &mut [u8])) -> Result<()> {
+        debug_assert!(size <= self.size && size.is_multiple_of(record.max(1)));
+        if size == 0 {
+            return Ok(());
+        }
+        if let Some(bytes) = self.bytes_mut() {
+            write(0, &mut bytes[..size as usize]);
+            return Ok(());
+        }
+        let piece = (STAGING / record).max(1) * record;
+        let mut staging = Buffer::new(&self.device, "staging", piece.min(size), Memory::Upload)?;
+        let mut commands = Commands::new(&self.device)?;
+        let mut at = 0;
+        while at < size {
+            let n = piece.min(size - at);
+            let bytes = staging.bytes_mut().ok_or_else(|| Error::Vulkan("the staging buffer is not mapped".into()))?;
+            write(at / record, &mut bytes[..n as usize]);
+            commands.run(|r| r.copy(&staging, 0, self, at, n))?;
+            at += n;
+        }
+        Ok(())
+    }
+
+    /// Reads `size` bytes from `offset`, through a staging buffer where the host cannot see the memory.
+    pub fn read(&self, offset: u64, size: u64) -> Result<Vec<u8>> {
+        let mut out = Vec::with_capacity(size as usize);
+        self.read_with(offset, size, 1, |_, bytes| out.extend_from_slice(bytes))?;
+        Ok(out)
+    }
+
+    /// As [`Buffer::read`], in pieces of whole records: `take(first record, bytes)`. Without a copy where there is no need.
+    pub fn read_with(&self, offset: u64, size: u64, record: u64, mut take: impl FnMut(u64, &[u8])) -> Result<()> {
+        if size == 0 {
+            return Ok(());
+        }
+        if let Some(bytes) = self.bytes() {
+            take(0, &bytes[offset as usize..(offset + size) as usize]);
+            return Ok(());
+        }
+        let piece = (STAGING / record).max(1) * record;
+        let staging = Buffer::new(&self.device, "read-back staging", piece.min(size), Memory::Readback)?;
+        let mut commands = Commands::new(&self.device)?;
+        let mut at = 0;
+        while at < size {
+            let n = piece.min(size - at);
+            commands.run(|r| r.copy(self, offset + at, &staging, 0, n))?;
+            let bytes = staging.bytes().ok_or_else(|| Error::Vulkan("the read-back buffer is not mapped".into()))?;
+            take(at / record, &bytes[..n as usize]);
+            at += n;
+        }
+        Ok(())
+    }
+}
+
+impl Drop for Buffer {
+    fn drop(&mut self) {
+        if let Some(allocation) = self.allocation.take() {
+            // a failed free can only leak
+            let _ = self.device.allocator().free(allocation);
+        }
+        // SAFETY: submissions are waited for, so the device is not using it
+        unsafe { self.device.raw.destroy_buffer(self.raw, None) };
+    }
+}

@@ -1,0 +1,49 @@
+//! The pipeline cache on disk: one file per device and driver version, written beside and renamed, ignored when foreign.
+
+use std::path::PathBuf;
+
+use super::info::DeviceInfo;
+
+/// `$XDG_CACHE_HOME/skylit`, or `~/.cache/skylit`.
+fn folder() -> Option<PathBuf> {
+    let base = std::env::var_os("XDG_CACHE_HOME").map(PathBuf::from).filter(|p| p.is_absolute());
+    base.or_else(|| std::env::var_os("HOME").map(|h| PathBuf::from(h).join(".cache"))).map(|p| p.join("skylit"))
+}
+
+fn file(info: &DeviceInfo) -> Option<PathBuf> {
+    let uuid: String = info.pipeline_cache_uuid.iter().map(|b| format!("{b:02x}")).collect();
+    folder().map(|f| {
+        f.join(format!("pipelines-{:04x}-{:04x}-{:08x}-{uuid}.bin", info.vendor_id, info.device_id, info.driver_version))
+    })
+}
+
+/// Is this the header that Vulkan prescribes (VkPipelineCacheHeaderVersionOne), for this very device?
+fn fits(info: &DeviceInfo, data: &[u8]) -> bool {
+    let word = |k: usize| data.get(4 * k..4 * k + 4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
+    word(0).is_some_and(|n| n >= 32)
+        && word(1) == Some(1)
+        && word(2) == Some(info.vendor_id)
+        && word(3) == Some(info.device_id)
+        && data.get(16..32) == Some(&info.pipeline_cache_uuid[..])
+}
+
+/// What an earlier run stored for this device and driver, or nothing.
+pub fn load(info: &DeviceInfo) -> Vec<u8> {
+    file(info).and_then(|f| std::fs::read(f).ok()).filter(|d| fits(info, d)).unwrap_or_default()
+}
+
+/// Stores the cache. Failing costs the next run some time, no more.
+pub fn store(info: &DeviceInfo, data: &[u8]) {
+    let Some(path) = file(info) else { return };
+    if !fits(info, data) || std::fs::read(&path).is_ok_and(|old| old == data) {
+        return;
+    }
+    let Some(folder) = path.parent() else { return };
+    let written = std::fs::create_dir_all(folder)
+        .and_then(|()| tempfile::NamedTempFile::new_in(folder))
+        .and_then(|mut f| std::io::Write::write_all(&mut f, data).map(|()| f))
+        .and_then(|f| f.persist(&path).map_err(|e| e.error));
+    if let Err(e) = written {
+        tracing::debug!("pipeline cache not stored: {e}");
+    }
+}

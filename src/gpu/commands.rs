@@ -1,0 +1,227 @@
+//! Recording and submitting work, with a timestamp pair around each pass.
+
+use std::sync::Arc;
+
+use ash::vk;
+
+use super::buffer::Buffer;
+use super::device::Device;
+use super::pipeline::{ComputePipeline, RayTracingPipeline};
+use super::result::Context;
+use crate::error::Result;
+
+/// Timed regions that one submission can hold.
+const MAX_REGIONS: u32 = 512;
+
+/// Device time of a region.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Timing {
+    /// What was timed.
+    pub label: &'static str,
+    /// Seconds between its first and last command.
+    pub seconds: f64,
+}
+
+/// A command buffer that is recorded, submitted and waited for, again and again.
+pub struct Commands {
+    pool: vk::CommandPool,
+    buffer: vk::CommandBuffer,
+    fence: vk::Fence,
+    queries: Option<vk::QueryPool>,
+    device: Arc<Device>,
+}
+
+impl Commands {
+    /// Makes the pool, buffer, fence and timestamp queries.
+    pub fn new(device: &Arc<Device>) -> Result<Self> {
+        let raw = &device.raw;
+        let pool_info = vk::CommandPoolCreateInfo::default()
+            .queue_family_index(device.queue_family)
+            .flags(vk::CommandPoolCreateFlags::RESET_COMMAND_BUFFER);
+        // SAFETY (all calls below): plain objects of the living device; on an early return Drop destroys null handles too
+        let mut commands = Self {
+            pool: unsafe { raw.create_command_pool(&pool_info, None) }.context("the command pool")?,
+            buffer: vk::CommandBuffer::null(),
+            fence: vk::Fence::null(),
+            queries: None,
+            device: device.clone(),
+        };
+        let info = vk::CommandBufferAllocateInfo::default().command_pool(commands.pool).command_buffer_count(1);
+        commands.buffer = unsafe { raw.allocate_command_buffers(&info) }.context("the command buffer")?[0];
+        commands.fence = unsafe { raw.create_fence(&vk::FenceCreateInfo::default(), None) }.context("the fence")?;
+        if device.info.limits.timestamp_period > 0.0 {
+            let info = vk::QueryPoolCreateInfo::default().query_type(vk::QueryType::TIMESTAMP).query_count(2 * MAX_REGIONS);
+            commands.queries = Some(unsafe { raw.create_query_pool(&info, None) }.context("the timestamp queries")?);
+        }
+        Ok(commands)
+    }
+
+    /// Records with `record`, submits, waits until the device is done, and returns the timed regions in order. Writes of the
+    /// work are visible to the host and to later submissions.
+    pub fn run(&mut self, record: impl FnOnce(&mut Recorder)) -> Result<Vec<Timing>> {
+        let raw = &self.device.raw;
+        // SAFETY (all calls below): the buffer is not in use, because every submission was waited for; recording and
+        // submission follow the specification's order; the queue is locked
+        unsafe {
+            if let Some(queries) = self.queries {
+                raw.reset_query_pool(queries, 0, 2 * MAX_REGIONS);
+            }
+            let begin = vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
+            raw.begin_command_buffer(self.buffer, &begin).context("recording commands")?;
+        }
+        let mut recorder = Recorder { device: &self.device, buffer: self.buffer, queries: self.queries, labels: Vec::new() };
+        record(&mut recorder);
+        recorder.barrier_to_host();
+        let labels = recorder.labels;
+        unsafe {
+            raw.end_command_buffer(self.buffer).context("recording commands")?;
+            let buffers = [self.buffer];
+            let submit = [vk::SubmitInfo::default().command_buffers(&buffers)];
+            {
+                let queue = self.device.queue.lock().unwrap_or_else(|e| e.into_inner());
+                raw.queue_submit(*queue, &submit, self.fence).context("submitting work")?;
+            }
+            raw.wait_for_fences(&[self.fence], true, u64::MAX).context("waiting for the device")?;
+            raw.reset_fences(&[self.fence]).context("waiting for the device")?;
+        }
+        self.timings(&labels)
+    }
+
+    fn timings(&self, labels: &[&'static str]) -> Result<Vec<Timing>> {
+        let Some(queries) = self.queries.filter(|_| !labels.is_empty()) else { return Ok(Vec::new()) };
+        let mut ticks = vec![0u64; 2 * labels.len()];
+        // SAFETY: the queries were written by the work that was waited for
+        unsafe {
+            self.device.raw.get_query_pool_results(
+                queries,
+                0,
+                &mut ticks,
+                vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WAIT,
+            )
+        }
+        .context("reading timestamps")?;
+        let period = self.device.info.limits.timestamp_period as f64 * 1e-9;
+        Ok(labels
+            .iter()
+            .zip(ticks.chunks_exact(2))
+            .map(|(&label, t)| Timing { label, seconds: t[1].saturating_sub(t[0]) as f64 * period })
+            .collect())
+    }
+}
+
+impl Drop for Commands {
+    fn drop(&mut self) {
+        // SAFETY: nothing is in flight: every submission was waited for (or the device is lost)
+        unsafe {
+            if let Some(queries) = self.queries {
+                self.device.raw.destroy_query_pool(queries, None);
+            }
+            self.device.raw.destroy_fence(self.fence, None);
+            self.device.raw.destroy_command_pool(self.pool, None);
+        }
+    }
+}
+
+/// Records commands into a buffer that is being built.
+pub struct Recorder<'a> {
+    pub(super) device: &'a Device,
+    pub(super) buffer: vk::CommandBuffer,
+    queries: Option<vk::QueryPool>,
+    labels: Vec<&'static str>,
+}
+
+impl Recorder<'_> {
+    /// Times what `record` records. Regions do not nest; beyond the first few hundred of a submission they are not timed.
+    pub fn timed(&mut self, label: &'static str, record: impl FnOnce(&mut Self)) {
+        let region = self.labels.len() as u32;
+        let Some(queries) = self.queries.filter(|_| region < MAX_REGIONS) else { return record(self) };
+        self.labels.push(label);
+        let stamp = |stage, k| {
+            // SAFETY: the query was reset and is written once
+            unsafe { self.device.raw.cmd_write_timestamp2(self.buffer, stage, queries, 2 * region + k) }
+        };
+        stamp(vk::PipelineStageFlags2::ALL_COMMANDS, 0);
+        record(self);
+        let (device, buffer) = (self.device, self.buffer);
+        // SAFETY: as above
+        unsafe { device.raw.cmd_write_timestamp2(buffer, vk::PipelineStageFlags2::ALL_COMMANDS, queries, 2 * region + 1) };
+    }
+
+    /// Everything recorded before is finished, and its writes visible, before anything recorded after. One full barrier
+    /// between passes costs microseconds; a missing one costs days.
+    pub fn barrier(&mut self) {
+        let stages = vk::PipelineStageFlags2::ALL_COMMANDS;
+        self.memory_barrier(
+            stages,
+            vk::AccessFlags2::MEMORY_WRITE,
+            stages,
+            vk::AccessFlags2::MEMORY_READ | vk::AccessFlags2::MEMORY_WRITE,
+        );
+    }
+
+    fn barrier_to_host(&mut self) {
+        let all = vk::PipelineStageFlags2::ALL_COMMANDS;
+        self.memory_barrier(all, vk::AccessFlags2::MEMORY_WRITE, vk::PipelineStageFlags2::HOST, vk::AccessFlags2::HOST_READ);
+    }
+
+    fn memory_barrier(
+        &mut self,
+        from: vk::PipelineStageFlags2,
+        write: vk::AccessFlags2,
+        to: vk::PipelineStageFlags2,
+        read: vk::AccessFlags2,
+    ) {
+        let barrier = [vk::MemoryBarrier2::default()
+            .src_stage_mask(from)
+            .src_access_mask(write)
+            .dst_stage_mask(to)
+            .dst_access_mask(read)];
+        // SAFETY: recording state
+        unsafe { self.device.raw.cmd_pipeline_barrier2(self.buffer, &vk::DependencyInfo::default().memory_barriers(&barrier)) };
+    }
+
+    /// Copies bytes between buffers.
+    pub fn copy(&mut self, from: &Buffer, from_offset: u64, to: &Buffer, to_offset: u64, size: u64) {
+        let region = [vk::BufferCopy { src_offset: from_offset, dst_offset: to_offset, size }];
+        assert!(from_offset + size <= from.size() && to_offset + size <= to.size());
+        // SAFETY: the ranges lie within the buffers
+        unsafe { self.device.raw.cmd_copy_buffer(self.buffer, from.raw, to.raw, &region) };
+    }
+
+    /// Sets the whole buffer to zero.
+    pub fn clear(&mut self, buffer: &Buffer) {
+        // SAFETY: the whole buffer, whose size is a multiple of 4
+        unsafe { self.device.raw.cmd_fill_buffer(self.buffer, buffer.raw, 0, vk::WHOLE_SIZE, 0) };
+    }
+
+    /// Runs a compute pipeline over `groups` work-groups. The addresses within `push` must lead to living buffers of the
+    /// layout that the shader expects.
+    pub fn dispatch<P: bytemuck::NoUninit>(&mut self, pipeline: &ComputePipeline, push: &P, groups: u32) {
+        assert!(groups <= self.device.info.limits.max_workgroups_x);
+        // SAFETY: recording state; the push constants have the size that the layout was made with (asserted there)
+        unsafe {
+            self.device.raw.cmd_bind_pipeline(self.buffer, vk::PipelineBindPoint::COMPUTE, pipeline.raw);
+            self.push(pipeline.layout, vk::ShaderStageFlags::COMPUTE, push);
+            self.device.raw.cmd_dispatch(self.buffer, groups, 1, 1);
+        }
+    }
+
+    /// Runs a ray-tracing pipeline over `rays` invocations; see [`Recorder::dispatch`] for `push`.
+    pub fn trace_rays<P: bytemuck::NoUninit>(&mut self, pipeline: &RayTracingPipeline, push: &P, rays: u32) {
+        let Some(functions) = &self.device.pipelines else { return };
+        // SAFETY: as above; the tables were made for this pipeline
+        unsafe {
+            self.device.raw.cmd_bind_pipeline(self.buffer, vk::PipelineBindPoint::RAY_TRACING_KHR, pipeline.raw);
+            self.push(pipeline.layout, super::pipeline::RAY_STAGES, push);
+            let none = vk::StridedDeviceAddressRegionKHR::default();
+            functions.cmd_trace_rays(self.buffer, &pipeline.raygen, &pipeline.miss, &pipeline.hit, &none, rays, 1, 1);
+        }
+    }
+
+    fn push<P: bytemuck::NoUninit>(&self, layout: vk::PipelineLayout, stages: vk::ShaderStageFlags, push: &P) {
+        let bytes = bytemuck::bytes_of(push);
+        assert_eq!(bytes.len() as u32, super::pipeline::PUSH_BYTES);
+        // SAFETY: the layout has one range of this size for these stages
+        unsafe { self.device.raw.cmd_push_constants(self.buffer, layout, stages, 0, bytes) };
+    }
+}

@@ -1,0 +1,193 @@
+//! The logical device: one queue, one allocator, one pipeline cache.
+
+use std::mem::ManuallyDrop;
+use std::sync::{Arc, Mutex, MutexGuard};
+
+use ash::{ext, khr, vk};
+use gpu_allocator::AllocationSizes;
+use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
+
+use super::cache;
+use super::info::{DeviceInfo, enumerate};
+use super::instance::{Instance, ValidationLog, no_driver};
+use super::result::Context;
+use crate::error::{Error, Result};
+use crate::tracer::TracerKind;
+
+/// How to open a device.
+#[derive(Clone, Debug, Default)]
+pub struct Options {
+    /// Index, or part of the name (case does not matter); `None`: the most capable.
+    pub device: Option<String>,
+    /// Run with the validation layer.
+    pub validation: bool,
+    /// Use 32-bit loads even where shaderInt64 is there: to test that path.
+    pub no_int64: bool,
+}
+
+/// An open device.
+pub struct Device {
+    pub(super) raw: ash::Device,
+    /// Functions of VK_KHR_acceleration_structure, where a tracer can use them.
+    pub(super) structures: Option<khr::acceleration_structure::Device>,
+    /// Functions of VK_KHR_ray_tracing_pipeline, likewise.
+    pub(super) pipelines: Option<khr::ray_tracing_pipeline::Device>,
+    debug: Option<ext::debug_utils::Device>,
+    allocator: ManuallyDrop<Mutex<Allocator>>,
+    pub(super) queue: Mutex<vk::Queue>,
+    pub(super) queue_family: u32,
+    pub(super) pipeline_cache: vk::PipelineCache,
+    /// What the device is and can do. `int64` says what is used, not only what is there.
+    pub info: DeviceInfo,
+    validation: Option<Arc<ValidationLog>>,
+    // destroyed last
+    _instance: Arc<Instance>,
+}
+
+impl Device {
+    /// Opens the device that `options` name, or the most capable one.
+    ///
+    /// # Errors
+    /// [`Error::Device`] when there is none, it is not found, or it is below the floor; the text names the feature.
+    pub fn open(options: &Options) -> Result<Arc<Self>> {
+        let instance = Instance::new(options.validation)?;
+        let mut info = pick(enumerate(&instance)?, options.device.as_deref())?;
+        info.int64 &= !options.no_int64;
+        let queue_family = info.queue_family.ok_or_else(no_driver)?;
+
+        let pipeline = info.supports(TracerKind::Pipeline);
+        let query = info.supports(TracerKind::Query);
+        let mut extensions = Vec::new();
+        let mut f12 = vk::PhysicalDeviceVulkan12Features::default().buffer_device_address(true).host_query_reset(true);
+        let mut f13 = vk::PhysicalDeviceVulkan13Features::default().maintenance4(true).synchronization2(true);
+        let mut f_structure = vk::PhysicalDeviceAccelerationStructureFeaturesKHR::default().acceleration_structure(true);
+        let mut f_pipeline = vk::PhysicalDeviceRayTracingPipelineFeaturesKHR::default().ray_tracing_pipeline(true);
+        let mut f_query = vk::PhysicalDeviceRayQueryFeaturesKHR::default().ray_query(true);
+        let priorities = [1.0];
+        let queues = [vk::DeviceQueueCreateInfo::default().queue_family_index(queue_family).queue_priorities(&priorities)];
+        let features = vk::PhysicalDeviceFeatures::default().shader_int64(info.int64);
+        let mut create = vk::DeviceCreateInfo::default()
+            .queue_create_infos(&queues)
+            .enabled_features(&features)
+            .push_next(&mut f12)
+            .push_next(&mut f13);
+        if pipeline || query {
+            extensions.extend([khr::acceleration_structure::NAME.as_ptr(), khr::deferred_host_operations::NAME.as_ptr()]);
+            create = create.push_next(&mut f_structure);
+        }
+        if pipeline {
+            extensions.push(khr::ray_tracing_pipeline::NAME.as_ptr());
+            create = create.push_next(&mut f_pipeline);
+        }
+        if query {
+            extensions.push(khr::ray_query::NAME.as_ptr());
+            create = create.push_next(&mut f_query);
+        }
+        create = create.enabled_extension_names(&extensions);
+        // SAFETY: the physical device is of this instance; everything enabled was reported as there
+        let raw = unsafe { instance.raw.create_device(info.physical, &create, None) }.context("opening the Vulkan device")?;
+        // SAFETY: the family was asked for above with one queue
+        let queue = unsafe { raw.get_device_queue(queue_family, 0) };
+        let allocator = Allocator::new(&AllocatorCreateDesc {
+            instance: instance.raw.clone(),
+            device: raw.clone(),
+            physical_device: info.physical,
+            debug_settings: Default::default(),
+            buffer_device_address: true,
+            // buffers above a block get their own allocation: small blocks waste little
+            allocation_sizes: AllocationSizes::new(16 << 20, 16 << 20),
+        })
+        .map_err(|e| Error::Vulkan(format!("creating the allocator failed: {e}")))?;
+        let data = cache::load(&info);
+        let cache_info = vk::PipelineCacheCreateInfo::default().initial_data(&data);
+        // SAFETY: the data's header was checked to be of this device and driver
+        let pipeline_cache = unsafe { raw.create_pipeline_cache(&cache_info, None) }.context("creating the pipeline cache")?;
+        Ok(Arc::new(Self {
+            structures: (pipeline || query).then(|| khr::acceleration_structure::Device::new(&instance.raw, &raw)),
+            pipelines: pipeline.then(|| khr::ray_tracing_pipeline::Device::new(&instance.raw, &raw)),
+            debug: instance.debug_names.then(|| ext::debug_utils::Device::new(&instance.raw, &raw)),
+            allocator: ManuallyDrop::new(Mutex::new(allocator)),
+            queue: Mutex::new(queue),
+            queue_family,
+            pipeline_cache,
+            info,
+            validation: instance.validation.clone(),
+            raw,
+            _instance: instance,
+        }))
+    }
+
+    pub(super) fn allocator(&self) -> MutexGuard<'_, Allocator> {
+        // a poisoned lock means that a thread panicked within the allocator: its state is what it is
+        self.allocator.lock().unwrap_or_else(|e| e.into_inner())
+    }
+
+    /// Names an object for validation messages and debuggers.
+    pub(super) fn name<T: vk::Handle>(&self, object: T, name: &str) {
+        if let Some(debug) = &self.debug
+            && let Ok(name) = std::ffi::CString::new(name)
+        {
+            let info = vk::DebugUtilsObjectNameInfoEXT::default().object_handle(object).object_name(&name);
+            // SAFETY: the object is of this device. A failure costs a name only
+            let _ = unsafe { debug.set_debug_utils_object_name(&info) };
+        }
+    }
+
+    /// Takes the messages of the validation layer since the last call.
+    pub fn validation_messages(&self) -> Vec<String> {
+        self.validation.as_ref().map(|v| v.take()).unwrap_or_default()
+    }
+
+    /// Fails when the validation layer had something to say.
+    pub fn check_validation(&self) -> Result<()> {
+        match self.validation_messages().as_slice() {
+            [] => Ok(()),
+            [first, rest @ ..] => Err(Error::Vulkan(format!("validation: {first} (and {} more)", rest.len()))),
+        }
+    }
+
+    /// Writes the pipeline cache to disk, for the next run. Not being able to costs time only.
+    pub fn save_pipeline_cache(&self) {
+        // SAFETY: the cache is of this device
+        if let Ok(data) = unsafe { self.raw.get_pipeline_cache_data(self.pipeline_cache) } {
+            cache::store(&self.info, &data);
+        }
+    }
+}
+
+fn pick(devices: Vec<DeviceInfo>, wanted: Option<&str>) -> Result<DeviceInfo> {
+    let names = || devices.iter().map(|d| format!("{}: {}", d.index, d.name)).collect::<Vec<_>>().join("; ");
+    if devices.is_empty() {
+        return Err(no_driver());
+    }
+    let found = match wanted {
+        None => devices.iter().max_by_key(|d| (d.missing_floor.is_empty(), d.preference(), std::cmp::Reverse(d.index))),
+        Some(w) => match w.parse::<usize>() {
+            Ok(index) => devices.iter().find(|d| d.index == index),
+            Err(_) => devices.iter().find(|d| d.name.to_lowercase().contains(&w.to_lowercase())),
+        },
+    };
+    let Some(info) = found else {
+        return Err(Error::Device(format!("no device '{}' here; there is {}", wanted.unwrap_or_default(), names())));
+    };
+    if !info.missing_floor.is_empty() {
+        return Err(Error::Device(format!(
+            "device '{}' lacks {}, which skylit needs; `skylit doctor` lists what is there",
+            info.name,
+            info.missing_floor.join(", ")
+        )));
+    }
+    Ok(info.clone())
+}
+
+impl Drop for Device {
+    fn drop(&mut self) {
+        // SAFETY: every object of the device holds an Arc of it, so all are gone; the allocator goes before the device
+        unsafe {
+            let _ = self.raw.device_wait_idle();
+            self.raw.destroy_pipeline_cache(self.pipeline_cache, None);
+            ManuallyDrop::drop(&mut self.allocator);
+            self.raw.destroy_device(None);
+        }
+    }
+}

@@ -1,0 +1,253 @@
+//! What the devices of a machine are and can do: for picking one, and for `doctor`.
+
+use std::ffi::CStr;
+
+use ash::{khr, vk};
+
+use super::instance::Instance;
+use super::result::Context;
+use crate::error::Result;
+use crate::tracer::TracerKind;
+
+/// Limits that matter to skylit.
+#[derive(Clone, Debug, serde::Serialize)]
+pub struct Limits {
+    /// Invocations that run in lockstep.
+    pub subgroup_size: u32,
+    /// Work-groups in x of one dispatch.
+    pub max_workgroups_x: u32,
+    /// Bytes of one allocation.
+    pub max_allocation: u64,
+    /// Bytes of all device-local heaps.
+    pub device_memory: u64,
+    /// Bytes of push constants.
+    pub max_push_constants: u32,
+    /// Nanoseconds per timestamp tick; 0: no timestamps.
+    pub timestamp_period: f32,
+    /// Alignment of acceleration-structure scratch memory; 0 without ray tracing.
+    pub scratch_alignment: u32,
+    /// Bytes of a shader group handle; 0 without ray tracing.
+    pub shader_group_handle_size: u32,
+    /// Alignment of shader group handles.
+    pub shader_group_handle_alignment: u32,
+    /// Alignment of the tables of the shader binding table.
+    pub shader_group_base_alignment: u32,
+}
+
+/// One physical device.
+#[derive(Clone, Debug, serde::Serialize)]
+pub struct DeviceInfo {
+    #[serde(skip)]
+    pub(super) physical: vk::PhysicalDevice,
+    /// Place in Vulkan's list: what `--device INDEX` takes.
+    pub index: usize,
+    /// Name that the driver gives.
+    pub name: String,
+    /// "discrete", "integrated", "virtual", "cpu" or "other".
+    pub kind: &'static str,
+    /// Vulkan version, as "1.3.230".
+    pub api_version: String,
+    /// Driver and its version.
+    pub driver: String,
+    /// Vendor id of PCI or Khronos.
+    pub vendor_id: u32,
+    /// Device id of the vendor.
+    pub device_id: u32,
+    /// The driver's own number.
+    pub driver_version: u32,
+    #[serde(skip)]
+    pub(super) pipeline_cache_uuid: [u8; 16],
+    /// Features of the floor that it lacks, by name; empty: usable.
+    pub missing_floor: Vec<String>,
+    /// shaderInt64.
+    pub int64: bool,
+    /// The device reads host memory as fast as its own.
+    pub unified_memory: bool,
+    /// What each tracer needs and does not find here; empty: it runs.
+    pub tracers: Vec<TracerNeeds>,
+    /// Limits that matter.
+    pub limits: Limits,
+    #[serde(skip)]
+    pub(super) queue_family: Option<u32>,
+}
+
+/// What a tracer misses on a device.
+#[derive(Clone, Debug, serde::Serialize)]
+pub struct TracerNeeds {
+    /// Which tracer.
+    pub tracer: TracerKind,
+    /// Extensions and features it needs.
+    pub needs: Vec<String>,
+    /// Those that the device lacks; empty: the tracer runs.
+    pub missing: Vec<String>,
+}
+
+impl DeviceInfo {
+    /// Can this tracer run here?
+    pub fn supports(&self, tracer: TracerKind) -> bool {
+        self.missing_floor.is_empty() && self.tracers.iter().any(|t| t.tracer == tracer && t.missing.is_empty())
+    }
+
+    /// Does the device run its shaders on the CPU?
+    pub fn is_cpu(&self) -> bool {
+        self.kind == "cpu"
+    }
+
+    /// Higher is picked first.
+    pub(super) fn preference(&self) -> u32 {
+        match self.kind {
+            "discrete" => 4,
+            "integrated" => 3,
+            "virtual" => 2,
+            "cpu" => 1,
+            _ => 0,
+        }
+    }
+}
+
+fn text(s: &[std::ffi::c_char]) -> String {
+    let bytes: Vec<u8> = s.iter().map(|&c| c as u8).take_while(|&c| c != 0).collect();
+    String::from_utf8_lossy(&bytes).into_owned()
+}
+
+/// All devices of the machine, usable or not.
+pub fn enumerate(instance: &Instance) -> Result<Vec<DeviceInfo>> {
+    // SAFETY: the instance lives
+    let devices = unsafe { instance.raw.enumerate_physical_devices() }.context("listing Vulkan devices")?;
+    devices.into_iter().enumerate().map(|(index, d)| describe(instance, index, d)).collect()
+}
+
+fn describe(instance: &Instance, index: usize, physical: vk::PhysicalDevice) -> Result<DeviceInfo> {
+    let raw = &instance.raw;
+    // SAFETY (all queries below): the physical device belongs to the living instance
+    let extensions = unsafe { raw.enumerate_device_extension_properties(physical) }.context("listing device extensions")?;
+    let has = |name: &CStr| extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(name));
+
+    let mut driver = vk::PhysicalDeviceDriverProperties::default();
+    let mut v11 = vk::PhysicalDeviceVulkan11Properties::default();
+    let mut structure = vk::PhysicalDeviceAccelerationStructurePropertiesKHR::default();
+    let mut pipeline = vk::PhysicalDeviceRayTracingPipelinePropertiesKHR::default();
+    let mut properties2 = vk::PhysicalDeviceProperties2::default().push_next(&mut driver).push_next(&mut v11);
+    if has(khr::acceleration_structure::NAME) {
+        properties2 = properties2.push_next(&mut structure);
+    }
+    if has(khr::ray_tracing_pipeline::NAME) {
+        properties2 = properties2.push_next(&mut pipeline);
+    }
+    unsafe { raw.get_physical_device_properties2(physical, &mut properties2) };
+    let properties = properties2.properties;
+
+    let mut f12 = vk::PhysicalDeviceVulkan12Features::default();
+    let mut f13 = vk::PhysicalDeviceVulkan13Features::default();
+    let mut f_structure = vk::PhysicalDeviceAccelerationStructureFeaturesKHR::default();
+    let mut f_pipeline = vk::PhysicalDeviceRayTracingPipelineFeaturesKHR::default();
+    let mut f_query = vk::PhysicalDeviceRayQueryFeaturesKHR::default();
+    let mut features2 = vk::PhysicalDeviceFeatures2::default();
+    let vulkan13 = properties.api_version >= vk::API_VERSION_1_3;
+    if vulkan13 {
+        features2 = features2.push_next(&mut f12).push_next(&mut f13);
+    }
+    if has(khr::acceleration_structure::NAME) {
+        features2 = features2.push_next(&mut f_structure);
+    }
+    if has(khr::ray_tracing_pipeline::NAME) {
+        features2 = features2.push_next(&mut f_pipeline);
+    }
+    if has(khr::ray_query::NAME) {
+        features2 = features2.push_next(&mut f_query);
+    }
+    unsafe { raw.get_physical_device_features2(physical, &mut features2) };
+    let int64 = features2.features.shader_int64 == vk::TRUE;
+
+    let families = unsafe { raw.get_physical_device_queue_family_properties(physical) };
+    let queue_family = families.iter().position(|f| f.queue_flags.contains(vk::QueueFlags::COMPUTE)).map(|k| k as u32);
+
+    let mut missing_floor = Vec::new();
+    if !vulkan13 {
+        missing_floor.push("Vulkan 1.3".to_owned());
+    } else {
+        for (there, name) in [
+            (f12.buffer_device_address, "bufferDeviceAddress"),
+            (f12.host_query_reset, "hostQueryReset"),
+            (f13.maintenance4, "maintenance4"),
+            (f13.synchronization2, "synchronization2"),
+        ] {
+            if there == vk::FALSE {
+                missing_floor.push(name.to_owned());
+            }
+        }
+    }
+    if queue_family.is_none() {
+        missing_floor.push("a compute queue".to_owned());
+    }
+
+    let structure_needs = [
+        ("VK_KHR_acceleration_structure", f_structure.acceleration_structure == vk::TRUE),
+        ("VK_KHR_deferred_host_operations", has(khr::deferred_host_operations::NAME)),
+    ];
+    let needs = |tracer: TracerKind, list: &[(&str, bool)]| TracerNeeds {
+        tracer,
+        needs: list.iter().map(|n| n.0.to_owned()).collect(),
+        missing: list.iter().filter(|n| !n.1).map(|n| n.0.to_owned()).collect(),
+    };
+    let with_structure = |own: (&'static str, bool)| [own, structure_needs[0], structure_needs[1]];
+    let tracers = vec![
+        needs(
+            TracerKind::Pipeline,
+            &with_structure(("VK_KHR_ray_tracing_pipeline", f_pipeline.ray_tracing_pipeline == vk::TRUE)),
+        ),
+        needs(TracerKind::Query, &with_structure(("VK_KHR_ray_query", f_query.ray_query == vk::TRUE))),
+        needs(TracerKind::Compute, &[("bufferDeviceAddress", vulkan13 && f12.buffer_device_address == vk::TRUE)]),
+    ];
+
+    let memory = unsafe { raw.get_physical_device_memory_properties(physical) };
+    let heaps = &memory.memory_heaps[..memory.memory_heap_count as usize];
+    let device_memory = heaps.iter().filter(|h| h.flags.contains(vk::MemoryHeapFlags::DEVICE_LOCAL)).map(|h| h.size).sum();
+    let kind = match properties.device_type {
+        vk::PhysicalDeviceType::DISCRETE_GPU => "discrete",
+        vk::PhysicalDeviceType::INTEGRATED_GPU => "integrated",
+        vk::PhysicalDeviceType::VIRTUAL_GPU => "virtual",
+        vk::PhysicalDeviceType::CPU => "cpu",
+        _ => "other",
+    };
+    let mut v13_limits = vk::PhysicalDeviceVulkan13Properties::default();
+    let mut v11_limits = vk::PhysicalDeviceVulkan11Properties::default();
+    if vulkan13 {
+        let mut p = vk::PhysicalDeviceProperties2::default().push_next(&mut v13_limits).push_next(&mut v11_limits);
+        unsafe { raw.get_physical_device_properties2(physical, &mut p) };
+    }
+    let api = properties.api_version;
+    Ok(DeviceInfo {
+        physical,
+        index,
+        name: text(&properties.device_name),
+        kind,
+        api_version: format!("{}.{}.{}", vk::api_version_major(api), vk::api_version_minor(api), vk::api_version_patch(api)),
+        driver: format!("{} {}", text(&driver.driver_name), text(&driver.driver_info)),
+        vendor_id: properties.vendor_id,
+        device_id: properties.device_id,
+        driver_version: properties.driver_version,
+        pipeline_cache_uuid: properties.pipeline_cache_uuid,
+        missing_floor,
+        int64,
+        unified_memory: matches!(kind, "cpu" | "integrated"),
+        tracers,
+        limits: Limits {
+            subgroup_size: v11.subgroup_size,
+            max_workgroups_x: properties.limits.max_compute_work_group_count[0],
+            max_allocation: v13_limits.max_buffer_size.min(v11_limits.max_memory_allocation_size),
+            device_memory,
+            max_push_constants: properties.limits.max_push_constants_size,
+            timestamp_period: if properties.limits.timestamp_compute_and_graphics == vk::TRUE {
+                properties.limits.timestamp_period
+            } else {
+                0.0
+            },
+            scratch_alignment: structure.min_acceleration_structure_scratch_offset_alignment,
+            shader_group_handle_size: pipeline.shader_group_handle_size,
+            shader_group_handle_alignment: pipeline.shader_group_handle_alignment,
+            shader_group_base_alignment: pipeline.shader_group_base_alignment,
+        },
+        queue_family,
+    })
+}

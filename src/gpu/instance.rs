@@ -1,0 +1,152 @@
+//! The Vulkan loader and instance, with the validation layer as an option.
+
+use std::ffi::{CStr, c_void};
+use std::sync::{Arc, Mutex};
+
+use ash::{ext, vk};
+
+use super::result::Context;
+use crate::error::{Error, Result};
+
+const VALIDATION_LAYER: &CStr = c"VK_LAYER_KHRONOS_validation";
+
+/// Messages of the validation layer, kept so that one of them can fail a run.
+#[derive(Default)]
+pub(super) struct ValidationLog(Mutex<Vec<String>>);
+
+impl ValidationLog {
+    fn push(&self, message: String) {
+        if let Ok(mut log) = self.0.lock() {
+            log.push(message);
+        }
+    }
+
+    pub(super) fn take(&self) -> Vec<String> {
+        self.0.lock().map(|mut log| std::mem::take(&mut *log)).unwrap_or_default()
+    }
+}
+
+/// A Vulkan instance.
+pub struct Instance {
+    pub(super) raw: ash::Instance,
+    pub(super) validation: Option<Arc<ValidationLog>>,
+    messenger: Option<(ext::debug_utils::Instance, vk::DebugUtilsMessengerEXT)>,
+    pub(super) debug_names: bool,
+    // unloads the library when dropped: last
+    _entry: ash::Entry,
+}
+
+impl Instance {
+    /// Loads Vulkan. With `validation`, every message of VK_LAYER_KHRONOS_validation is kept and can fail the run.
+    ///
+    /// # Errors
+    /// [`Error::Device`] without a loader, without a driver for Vulkan 1.3, or without the layer that was asked for.
+    pub fn new(validation: bool) -> Result<Arc<Self>> {
+        // SAFETY: the loader's own initialisation code runs, as in every Vulkan program
+        let entry = unsafe { ash::Entry::load() }.map_err(|e| {
+            Error::Device(format!(
+                "no Vulkan loader (libvulkan.so.1) on this machine: run ./scripts/setup.sh or install libvulkan1 ({e})"
+            ))
+        })?;
+        // SAFETY: no preconditions
+        let version = unsafe { entry.try_enumerate_instance_version() }
+            .context("asking for the Vulkan version")?
+            .unwrap_or(vk::API_VERSION_1_0);
+        if version < vk::API_VERSION_1_3 {
+            return Err(Error::Device(format!(
+                "the Vulkan loader is for version {}.{}, skylit needs 1.3: install a newer libvulkan1",
+                vk::api_version_major(version),
+                vk::api_version_minor(version)
+            )));
+        }
+        // SAFETY: no preconditions
+        let layers = unsafe { entry.enumerate_instance_layer_properties() }.context("listing Vulkan layers")?;
+        if validation && !layers.iter().any(|l| l.layer_name_as_c_str() == Ok(VALIDATION_LAYER)) {
+            return Err(Error::Device(
+                "validation was asked for, but VK_LAYER_KHRONOS_validation is not installed: install vulkan-validationlayers"
+                    .into(),
+            ));
+        }
+        // SAFETY: no preconditions
+        let extensions = unsafe { entry.enumerate_instance_extension_properties(None) }.context("listing Vulkan extensions")?;
+        let debug_names = validation || extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(ext::debug_utils::NAME));
+
+        let application = vk::ApplicationInfo::default()
+            .application_name(c"skylit")
+            .application_version(vk::make_api_version(0, 0, 1, 0))
+            .api_version(vk::API_VERSION_1_3);
+        let layer_names = if validation { vec![VALIDATION_LAYER.as_ptr()] } else { vec![] };
+        let extension_names = if debug_names { vec![ext::debug_utils::NAME.as_ptr()] } else { vec![] };
+        let log = validation.then(|| Arc::new(ValidationLog::default()));
+        let mut messenger_info = log.as_ref().map(messenger_info);
+        let mut info = vk::InstanceCreateInfo::default()
+            .application_info(&application)
+            .enabled_layer_names(&layer_names)
+            .enabled_extension_names(&extension_names);
+        if let Some(m) = messenger_info.as_mut() {
+            // also hears what happens inside vkCreateInstance and vkDestroyInstance
+            info = info.push_next(m);
+        }
+        // SAFETY: all pointers in `info` outlive the call
+        let raw = unsafe { entry.create_instance(&info, None) }.map_err(|r| match r {
+            vk::Result::ERROR_INCOMPATIBLE_DRIVER => no_driver(),
+            r => super::result::explain("creating the Vulkan instance", r),
+        })?;
+        let messenger = match &log {
+            Some(log) => {
+                let utils = ext::debug_utils::Instance::new(&entry, &raw);
+                // SAFETY: the log is kept alive by Self, which destroys the messenger first
+                let messenger = unsafe { utils.create_debug_utils_messenger(&messenger_info_owned(log), None) }
+                    .context("creating the debug messenger")?;
+                Some((utils, messenger))
+            }
+            None => None,
+        };
+        Ok(Arc::new(Self { raw, validation: log, messenger, debug_names, _entry: entry }))
+    }
+}
+
+pub(super) fn no_driver() -> Error {
+    Error::Device("no Vulkan device on this machine: install a driver (./scripts/setup.sh installs Mesa's lavapipe, which runs on the CPU)".into())
+}
+
+fn messenger_info(log: &Arc<ValidationLog>) -> vk::DebugUtilsMessengerCreateInfoEXT<'static> {
+    messenger_info_owned(log)
+}
+
+fn messenger_info_owned(log: &Arc<ValidationLog>) -> vk::DebugUtilsMessengerCreateInfoEXT<'static> {
+    use vk::{DebugUtilsMessageSeverityFlagsEXT as Severity, DebugUtilsMessageTypeFlagsEXT as Type};
+    vk::DebugUtilsMessengerCreateInfoEXT::default()
+        .message_severity(Severity::WARNING | Severity::ERROR)
+        .message_type(Type::VALIDATION | Type::PERFORMANCE)
+        .pfn_user_callback(Some(on_message))
+        .user_data(Arc::as_ptr(log) as *mut c_void)
+}
+
+/// # Safety
+/// `user` points to the [`ValidationLog`] of a living [`Instance`], `data` to a message, as Vulkan promises.
+unsafe extern "system" fn on_message(
+    severity: vk::DebugUtilsMessageSeverityFlagsEXT,
+    _types: vk::DebugUtilsMessageTypeFlagsEXT,
+    data: *const vk::DebugUtilsMessengerCallbackDataEXT,
+    user: *mut c_void,
+) -> vk::Bool32 {
+    // SAFETY: see above
+    let (data, log) = unsafe { (&*data, &*(user as *const ValidationLog)) };
+    // SAFETY: Vulkan's strings end with NUL
+    let message = unsafe { data.message_as_c_str() }.map(|m| m.to_string_lossy().into_owned()).unwrap_or_default();
+    log.push(format!("{severity:?}: {message}"));
+    vk::FALSE
+}
+
+impl Drop for Instance {
+    fn drop(&mut self) {
+        // SAFETY: devices hold an Arc of the instance, so they are gone
+        unsafe {
+            if let Some((utils, messenger)) = &self.messenger {
+                utils.destroy_debug_utils_messenger(*messenger, None);
+            }
+            self.raw.destroy_instance(None);
+        }
+    }
+}

@@ -1,0 +1,281 @@
+//! Compute and ray-tracing pipelines. There are no descriptor sets: everything is reached by address from push constants.
+
+use std::sync::Arc;
+
+use ash::vk;
+
+use super::buffer::{Buffer, Memory};
+use super::device::Device;
+use super::result::Context;
+use crate::error::{Error, Result};
+
+/// Size of the push-constant block that every stream has (`Push` in shaders/common/types.glsl).
+pub(super) const PUSH_BYTES: u32 = 32;
+
+pub(super) const RAY_STAGES: vk::ShaderStageFlags = vk::ShaderStageFlags::from_raw(
+    vk::ShaderStageFlags::RAYGEN_KHR.as_raw()
+        | vk::ShaderStageFlags::MISS_KHR.as_raw()
+        | vk::ShaderStageFlags::CLOSEST_HIT_KHR.as_raw()
+        | vk::ShaderStageFlags::ANY_HIT_KHR.as_raw()
+        | vk::ShaderStageFlags::INTERSECTION_KHR.as_raw(),
+);
+
+/// Specialisation constants by id.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Specialization {
+    entries: Vec<(u32, u32)>,
+}
+
+impl Specialization {
+    /// Sets the 32-bit constant (a bool is 0 or 1) with this id.
+    pub fn set(mut self, id: u32, value: u32) -> Self {
+        self.entries.push((id, value));
+        self
+    }
+
+    fn with<R>(&self, f: impl FnOnce(&vk::SpecializationInfo) -> R) -> R {
+        let map: Vec<_> = (0..)
+            .zip(&self.entries)
+            .map(|(k, (id, _))| vk::SpecializationMapEntry { constant_id: *id, offset: 4 * k, size: 4 })
+            .collect();
+        let data: Vec<u32> = self.entries.iter().map(|e| e.1).collect();
+        f(&vk::SpecializationInfo::default().map_entries(&map).data(bytemuck::cast_slice(&data)))
+    }
+}
+
+/// A shader module that lives while pipelines are made from it.
+struct Module<'a> {
+    raw: vk::ShaderModule,
+    device: &'a Device,
+}
+
+impl<'a> Module<'a> {
+    fn new(device: &'a Device, name: &str, spirv: &[u8]) -> Result<Self> {
+        let words = ash::util::read_spv(&mut std::io::Cursor::new(spirv))
+            .map_err(|e| Error::Vulkan(format!("shader {name} is no SPIR-V: {e}")))?;
+        // SAFETY: valid SPIR-V from the build script's compiler
+        let raw = unsafe { device.raw.create_shader_module(&vk::ShaderModuleCreateInfo::default().code(&words), None) }
+            .context(name)?;
+        device.name(raw, name);
+        Ok(Self { raw, device })
+    }
+}
+
+impl Drop for Module<'_> {
+    fn drop(&mut self) {
+        // SAFETY: pipelines keep no reference to modules once made
+        unsafe { self.device.raw.destroy_shader_module(self.raw, None) };
+    }
+}
+
+fn layout(device: &Device, stages: vk::ShaderStageFlags) -> Result<vk::PipelineLayout> {
+    let ranges = [vk::PushConstantRange { stage_flags: stages, offset: 0, size: PUSH_BYTES }];
+    // SAFETY: a plain layout
+    unsafe { device.raw.create_pipeline_layout(&vk::PipelineLayoutCreateInfo::default().push_constant_ranges(&ranges), None) }
+        .context("the pipeline layout")
+}
+
+/// A compute pipeline.
+pub struct ComputePipeline {
+    pub(super) raw: vk::Pipeline,
+    pub(super) layout: vk::PipelineLayout,
+    device: Arc<Device>,
+}
+
+impl ComputePipeline {
+    /// Compiles a compute shader with the entry point `main`.
+    pub fn new(device: &Arc<Device>, name: &str, spirv: &[u8], specialization: &Specialization) -> Result<Self> {
+        let module = Module::new(device, name, spirv)?;
+        let mut pipeline =
+            Self { raw: vk::Pipeline::null(), layout: layout(device, vk::ShaderStageFlags::COMPUTE)?, device: device.clone() };
+        pipeline.raw = specialization.with(|s| {
+            let stage = vk::PipelineShaderStageCreateInfo::default()
+                .stage(vk::ShaderStageFlags::COMPUTE)
+                .module(module.raw)
+                .name(c"main")
+                .specialization_info(s);
+            let info = [vk::ComputePipelineCreateInfo::default().stage(stage).layout(pipeline.layout)];
+            // SAFETY: module and layout are of this device
+            unsafe { device.raw.create_compute_pipelines(device.pipeline_cache, &info, None) }.map_err(|e| e.1).context(name)
+        })?[0];
+        device.name(pipeline.raw, name);
+        Ok(pipeline)
+    }
+}
+
+impl Drop for ComputePipeline {
+    fn drop(&mut self) {
+        // SAFETY: submissions are waited for
+        unsafe {
+            self.device.raw.destroy_pipeline(self.raw, None);
+            self.device.raw.destroy_pipeline_layout(self.layout, None);
+        }
+    }
+}
+
+/// The shaders that all streams of the pipeline tracer share, as SPIR-V.
+pub struct HitShaders<'a> {
+    /// Miss.
+    pub miss: &'a [u8],
+    /// Closest hit on a triangle.
+    pub triangle_closest: &'a [u8],
+    /// Any hit on an alpha-tested triangle; `None` where the scene has none.
+    pub triangle_any: Option<&'a [u8]>,
+    /// Closest hit on a sphere and its intersection shader; `None` where the scene has none.
+    pub sphere: Option<[&'a [u8]; 2]>,
+}
+
+/// A ray-tracing pipeline with its shader binding table. Hit groups: 0 opaque triangles, 1 alpha-tested triangles, 2 spheres
+/// (groups that the scene does not need repeat group 0, so that the numbers hold).
+pub struct RayTracingPipeline {
+    pub(super) raw: vk::Pipeline,
+    pub(super) layout: vk::PipelineLayout,
+    pub(super) raygen: vk::StridedDeviceAddressRegionKHR,
+    pub(super) miss: vk::StridedDeviceAddressRegionKHR,
+    pub(super) hit: vk::StridedDeviceAddressRegionKHR,
+    _table: Option<Buffer>,
+    device: Arc<Device>,
+}
+
+impl RayTracingPipeline {
+    /// Compiles a ray generation shader together with the shared ones.
+    pub fn new(
+        device: &Arc<Device>,
+        name: &str,
+        raygen: &[u8],
+        shared: &HitShaders,
+        specialization: &Specialization,
+    ) -> Result<Self> {
+        let functions =
+            device.pipelines.as_ref().ok_or_else(|| Error::Device("the device has no VK_KHR_ray_tracing_pipeline".into()))?;
+        let mut modules = vec![
+            (Module::new(device, name, raygen)?, vk::ShaderStageFlags::RAYGEN_KHR),
+            (Module::new(device, "miss", shared.miss)?, vk::ShaderStageFlags::MISS_KHR),
+            (Module::new(device, "triangle closest hit", shared.triangle_closest)?, vk::ShaderStageFlags::CLOSEST_HIT_KHR),
+        ];
+        let unused = vk::SHADER_UNUSED_KHR;
+        let general = |index| {
+            vk::RayTracingShaderGroupCreateInfoKHR::default()
+                .ty(vk::RayTracingShaderGroupTypeKHR::GENERAL)
+                .general_shader(index)
+                .closest_hit_shader(unused)
+                .any_hit_shader(unused)
+                .intersection_shader(unused)
+        };
+        let triangles = |any| {
+            vk::RayTracingShaderGroupCreateInfoKHR::default()
+                .ty(vk::RayTracingShaderGroupTypeKHR::TRIANGLES_HIT_GROUP)
+                .general_shader(unused)
+                .closest_hit_shader(2)
+                .any_hit_shader(any)
+                .intersection_shader(unused)
+        };
+        let mut groups = vec![general(0), general(1), triangles(unused), triangles(unused), triangles(unused)];
+        if let Some(any) = shared.triangle_any {
+            groups[3] = triangles(modules.len() as u32);
+            modules.push((Module::new(device, "triangle any hit", any)?, vk::ShaderStageFlags::ANY_HIT_KHR));
+        }
+        if let Some([closest, intersection]) = shared.sphere {
+            let first = modules.len() as u32;
+            groups[4] = vk::RayTracingShaderGroupCreateInfoKHR::default()
+                .ty(vk::RayTracingShaderGroupTypeKHR::PROCEDURAL_HIT_GROUP)
+                .general_shader(unused)
+                .closest_hit_shader(first)
+                .any_hit_shader(unused)
+                .intersection_shader(first + 1);
+            modules.push((Module::new(device, "sphere closest hit", closest)?, vk::ShaderStageFlags::CLOSEST_HIT_KHR));
+            modules.push((Module::new(device, "sphere intersection", intersection)?, vk::ShaderStageFlags::INTERSECTION_KHR));
+        }
+        let none = vk::StridedDeviceAddressRegionKHR::default();
+        let mut pipeline = Self {
+            raw: vk::Pipeline::null(),
+            layout: layout(device, RAY_STAGES)?,
+            raygen: none,
+            miss: none,
+            hit: none,
+            _table: None,
+            device: device.clone(),
+        };
+        pipeline.raw = specialization.with(|s| {
+            let stages: Vec<_> = modules
+                .iter()
+                .map(|(m, stage)| {
+                    vk::PipelineShaderStageCreateInfo::default()
+                        .stage(*stage)
+                        .module(m.raw)
+                        .name(c"main")
+                        .specialization_info(s)
+                })
+                .collect();
+            let info = [vk::RayTracingPipelineCreateInfoKHR::default()
+                .stages(&stages)
+                .groups(&groups)
+                .max_pipeline_ray_recursion_depth(1)
+                .layout(pipeline.layout)];
+            // SAFETY: modules and layout are of this device
+            unsafe {
+                functions.create_ray_tracing_pipelines(vk::DeferredOperationKHR::null(), device.pipeline_cache, &info, None)
+            }
+            .map_err(|e| e.1)
+            .context(name)
+        })?[0];
+        device.name(pipeline.raw, name);
+        pipeline.make_table(functions, groups.len() as u32)?;
+        Ok(pipeline)
+    }
+
+    /// Lays the group handles out as the device's own sizes ask: raygen, miss, then the hit groups.
+    fn make_table(&mut self, functions: &ash::khr::ray_tracing_pipeline::Device, groups: u32) -> Result<()> {
+        let limits = &self.device.info.limits;
+        let size = limits.shader_group_handle_size as usize;
+        // SAFETY: the pipeline has this many groups
+        let handles = unsafe { functions.get_ray_tracing_shader_group_handles(self.raw, 0, groups, size * groups as usize) }
+            .context("the shader group handles")?;
+        let base = limits.shader_group_base_alignment as u64;
+        let stride = (size as u64).next_multiple_of(limits.shader_group_handle_alignment as u64);
+        let regions = [1u64, 1, groups as u64 - 2];
+        let sizes = regions.map(|n| (n * stride).next_multiple_of(base));
+        let table = Buffer::with_usage(
+            &self.device,
+            "shader binding table",
+            // room to align its beginning
+            sizes.iter().sum::<u64>() + base,
+            Memory::Upload,
+            vk::BufferUsageFlags::SHADER_BINDING_TABLE_KHR,
+        )?;
+        let mut table = table;
+        let start = table.address().next_multiple_of(base);
+        let mut offset = start - table.address();
+        let mut addresses = [0; 3];
+        let mut handle = 0;
+        let table_address = table.address();
+        let bytes = table.bytes_mut().ok_or_else(|| Error::Vulkan("the shader binding table is not mapped".into()))?;
+        for (k, n) in regions.into_iter().enumerate() {
+            addresses[k] = table_address + offset;
+            for g in 0..n {
+                let at = (offset + g * stride) as usize;
+                bytes[at..at + size].copy_from_slice(&handles[handle * size..][..size]);
+                handle += 1;
+            }
+            offset += sizes[k];
+        }
+        let region =
+            |k: usize, stride: u64| vk::StridedDeviceAddressRegionKHR { device_address: addresses[k], stride, size: sizes[k] };
+        // the ray generation table's size must be its stride
+        self.raygen = region(0, sizes[0]);
+        self.miss = region(1, stride);
+        self.hit = region(2, stride);
+        self._table = Some(table);
+        Ok(())
+    }
+}
+
+impl Drop for RayTracingPipeline {
+    fn drop(&mut self) {
+        // SAFETY: submissions are waited for
+        unsafe {
+            self.device.raw.destroy_pipeline(self.raw, None);
+            self.device.raw.destroy_pipeline_layout(self.layout, None);
+        }
+    }
+}

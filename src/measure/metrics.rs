@@ -1,0 +1,123 @@
+//! How far apart two images are.
+//!
+//! Two images in, numbers out: `image` is judged against `reference`, both linear, over the pixels that `coverage` counts. A
+//! metric of a pair that holds a value that is not finite is NaN ([`ImagePair::non_finite`] counts them): a broken pixel must
+//! not be averaged away. A metric of no pixels is NaN too.
+
+use crate::{Error, Result};
+
+/// Denominator's floor in [`ImagePair::rel_mse`], as is customary (Rousselle et al. 2011).
+pub const REL_MSE_EPSILON: f64 = 1e-2;
+
+/// Two images of the same size, and which of their pixels count.
+#[derive(Clone, Copy, Debug)]
+pub struct ImagePair<'a> {
+    image: &'a [f32],
+    reference: &'a [f32],
+    channels: usize,
+    coverage: Option<&'a [f32]>,
+}
+
+impl<'a> ImagePair<'a> {
+    /// `image` and `reference` are interleaved with the given number of channels. `coverage` has one value a pixel: those above
+    /// 0 count, `None` counts all.
+    pub fn new(image: &'a [f32], reference: &'a [f32], channels: usize, coverage: Option<&'a [f32]>) -> Result<Self> {
+        let wrong = |what: &str| Err(Error::Usage(format!("cannot compare images: {what}")));
+        if channels == 0 || !image.len().is_multiple_of(channels) {
+            return wrong("the number of values is no multiple of the number of channels");
+        }
+        if image.len() != reference.len() {
+            return wrong(&format!("they differ in size ({} and {} values)", image.len(), reference.len()));
+        }
+        if coverage.is_some_and(|c| c.len() != image.len() / channels) {
+            return wrong("the coverage is of another size");
+        }
+        Ok(Self { image, reference, channels, coverage })
+    }
+
+    /// All counted pairs of values.
+    fn values(&self) -> impl Iterator<Item = (f64, f64)> + '_ {
+        let counts = move |i: usize| self.coverage.is_none_or(|c| c[i / self.channels] > 0.0);
+        let pairs = self.image.iter().zip(self.reference).enumerate();
+        pairs.filter(move |(i, _)| counts(*i)).map(|(_, (a, b))| (*a as f64, *b as f64))
+    }
+
+    fn mean(&self, f: impl Fn(f64, f64) -> f64) -> f64 {
+        let (sum, n) = self.values().fold((0.0, 0u64), |(sum, n), (a, b)| (sum + f(a, b), n + 1));
+        sum / n as f64
+    }
+
+    /// NaN when any counted value is not finite, else `x`.
+    fn guarded(&self, x: f64) -> f64 {
+        if self.non_finite() > 0 { f64::NAN } else { x }
+    }
+
+    /// Number of values (pixels times channels) that count.
+    pub fn count(&self) -> u64 {
+        self.values().count() as u64
+    }
+
+    /// Number of counted pairs in which either value is infinite or not a number.
+    pub fn non_finite(&self) -> u64 {
+        self.values().filter(|(a, b)| !(a.is_finite() && b.is_finite())).count() as u64
+    }
+
+    /// Mean squared error.
+    pub fn mse(&self) -> f64 {
+        self.guarded(self.mean(|a, b| (a - b) * (a - b)))
+    }
+
+    /// Root of the mean squared error.
+    pub fn rmse(&self) -> f64 {
+        self.mse().sqrt()
+    }
+
+    /// Mean of image - reference.
+    pub fn bias(&self) -> f64 {
+        self.guarded(self.mean(|a, b| a - b))
+    }
+
+    /// Greatest absolute difference; 0 for no pixels.
+    pub fn max_abs_difference(&self) -> f64 {
+        self.guarded(self.values().map(|(a, b)| (a - b).abs()).fold(0.0, f64::max))
+    }
+
+    /// Mean of (image - reference)^2 / (reference^2 + [`REL_MSE_EPSILON`]).
+    pub fn rel_mse(&self) -> f64 {
+        self.guarded(self.mean(|a, b| (a - b) * (a - b) / (b * b + REL_MSE_EPSILON)))
+    }
+
+    /// Peak signal-to-noise ratio in dB for a peak of 1; infinite for equal images.
+    pub fn psnr(&self) -> f64 {
+        -10.0 * self.mse().log10()
+    }
+
+    /// Mean of min(a/b, b/a) (Larsen 2019). Two zeros are alike and count 1 (there, 0); a zero against anything else counts 0, and
+    /// so do values of opposite sign.
+    pub fn minimum_ratio(&self) -> f64 {
+        self.guarded(self.mean(|a, b| {
+            if a == b {
+                1.0
+            } else if a * b <= 0.0 {
+                0.0
+            } else {
+                (a / b).min(b / a)
+            }
+        }))
+    }
+
+    /// The Tanimoto coefficient a.b / (|a|^2 + |b|^2 - a.b) of the images as vectors; 1 for two black images.
+    pub fn tanimoto(&self) -> f64 {
+        let (ab, aa, bb) = self.values().fold((0.0, 0.0, 0.0), |(ab, aa, bb), (a, b)| (ab + a * b, aa + a * a, bb + b * b));
+        let x = if aa == 0.0 && bb == 0.0 { 1.0 } else { ab / (aa + bb - ab) };
+        self.guarded(x)
+    }
+}
+
+/// Coverage of the pixels that are below 250/255 in the first channel of either image: Larsen's mask against flattery by
+/// white pixels.
+pub fn not_white(image: &[f32], reference: &[f32], channels: usize) -> Vec<f32> {
+    let channels = channels.max(1);
+    let limit = 250.0 / 255.0;
+    image.chunks(channels).zip(reference.chunks(channels)).map(|(a, b)| (a[0] < limit || b[0] < limit) as u8 as f32).collect()
+}

@@ -1,0 +1,83 @@
+//! Files that are there as a whole or not at all.
+
+use std::fs::{self, File, OpenOptions, Permissions};
+use std::io::{self, Seek};
+use std::path::{Path, PathBuf};
+
+use crate::error::{Error, Result};
+
+/// Where a path leads, and how to write there.
+enum Target {
+    /// A regular file, there already or not: write beside it, then rename.
+    File { path: PathBuf, permissions: Option<Permissions> },
+    /// A device, FIFO or socket: renaming would replace it by a file, so copy into it.
+    Stream,
+}
+
+fn target(path: &Path) -> io::Result<Target> {
+    match fs::metadata(path) {
+        Ok(m) if m.is_dir() => Err(io::ErrorKind::IsADirectory.into()),
+        Ok(m) if !m.is_file() => Ok(Target::Stream),
+        Ok(m) => {
+            // renaming would succeed on a write-protected file in a folder of ours: ask the file itself
+            OpenOptions::new().write(true).open(path)?;
+            // a symbolic link stays; what it points to is replaced
+            Ok(Target::File { path: fs::canonicalize(path)?, permissions: Some(m.permissions()) })
+        }
+        Err(e) if e.kind() == io::ErrorKind::NotFound => {
+            if path.file_name().is_none() {
+                return Err(io::Error::new(io::ErrorKind::InvalidInput, "not the name of a file"));
+            }
+            Ok(Target::File { path: path.to_owned(), permissions: None })
+        }
+        Err(e) => Err(e),
+    }
+}
+
+/// An empty file in the folder of `path`, removed again unless it is renamed.
+fn temporary_beside(path: &Path) -> io::Result<tempfile::NamedTempFile> {
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".skylit-").suffix(".tmp");
+    // what the umask leaves of it: the mode any newly made file would have
+    #[cfg(unix)]
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+    builder.tempfile_in(folder).map_err(|e| match e.kind() {
+        // the folder is a file
+        io::ErrorKind::NotADirectory => io::ErrorKind::NotFound.into(),
+        kind => kind.into(), // without the name of the temporary file, which says nothing to the user
+    })
+}
+
+/// Can `path` be written? Asked before long work starts: its folder must exist and take new files, and what is there
+/// already must be a file that may be overwritten (or a device). Leaves nothing behind.
+pub fn check_writable(path: &Path) -> Result<()> {
+    let check = || match target(path)? {
+        Target::File { path, .. } => temporary_beside(&path).map(drop),
+        Target::Stream => Ok(()),
+    };
+    check().map_err(|e| Error::write(path, &e))
+}
+
+/// Lets `write` fill a file that takes the place of `path` once it is complete. On failure nothing is left behind, and
+/// what was there before stays. An existing file keeps its permissions, a symbolic link stays a link; a device or FIFO
+/// receives the bytes once they are all there.
+pub fn write_atomically(path: &Path, write: impl FnOnce(&mut File) -> io::Result<()>) -> Result<()> {
+    let run = || match target(path)? {
+        Target::File { path, permissions } => {
+            let mut file = temporary_beside(&path)?;
+            write(file.as_file_mut())?;
+            if let Some(permissions) = permissions {
+                file.as_file().set_permissions(permissions)?;
+            }
+            file.persist(&path).map(drop).map_err(|e| e.error)
+        }
+        Target::Stream => {
+            let mut file = tempfile::tempfile()?;
+            write(&mut file)?;
+            file.rewind()?;
+            io::copy(&mut file, &mut OpenOptions::new().write(true).open(path)?).map(drop)
+        }
+    };
+    run().map_err(|e| Error::write(path, &e))
+}

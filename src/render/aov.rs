@@ -1,0 +1,79 @@
+//! Auxiliary outputs: what a ray through each pixel's centre meets.
+
+use bytemuck::{Pod, Zeroable};
+
+use super::Control;
+use super::block::{Block, BlockParams};
+use super::camera::CameraRecord;
+use super::pace::{MOST, Pace};
+use crate::error::Result;
+use crate::gpu::{Buffer, Commands, Memory};
+use crate::tracer::{Push, Tracer, stream};
+
+/// What a pixel's centre shows; `AovPixel` of shaders/aov.glsl.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+pub struct AovPixel {
+    /// Distance along the ray (world units); infinite where nothing is met.
+    pub depth: f32,
+    /// Index into the scene's instances; `u32::MAX` where nothing is met.
+    pub instance: u32,
+    /// Triangle or sphere of the instance's mesh.
+    pub primitive: u32,
+    /// Index into the scene's materials.
+    pub material: u32,
+    /// World position relative to the scene's origin.
+    pub position: [f32; 3],
+    /// Linear base colour: red.
+    pub red: f32,
+    /// Unit geometric normal, world, front side.
+    pub ng: [f32; 3],
+    /// Linear base colour: green.
+    pub green: f32,
+    /// Unit shading normal, on the side of `ng`.
+    pub ns: [f32; 3],
+    /// Linear base colour: blue.
+    pub blue: f32,
+}
+
+/// Renders the outputs of an image, rows from the top. The tracer's [`crate::tracer::Needs`] must cover what is looked at.
+pub fn render(tracer: &Tracer, camera: &CameraRecord, size: [u32; 2], control: &mut dyn Control) -> Result<Vec<AovPixel>> {
+    let device = tracer.device();
+    let stream = tracer.stream(&stream::AOV_CLOSEST)?;
+    let mut commands = Commands::new(device)?;
+    let blocks = Block::cut(size);
+    let record = size_of::<AovPixel>() as u64;
+    let most = blocks.iter().map(Block::rays).max().unwrap_or(0).min(MOST);
+    let target = Buffer::new(device, "auxiliary outputs", record * most as u64, Memory::Readback)?;
+    let mut params_buffer = Buffer::new(device, "block parameters", size_of::<BlockParams>() as u64, Memory::Upload)?;
+    let mut out = vec![AovPixel::zeroed(); size[0] as usize * size[1] as usize];
+    let mut pace = Pace::default();
+    for block in &blocks {
+        let params = BlockParams { aov: target.address(), ..block.params(size, camera, 0) };
+        if let Some(bytes) = params_buffer.bytes_mut() {
+            bytes[..size_of::<BlockParams>()].copy_from_slice(bytemuck::bytes_of(&params));
+        }
+        let mut first = 0;
+        while first < block.rays() {
+            let rays = pace.rays();
+            let count = rays.min(block.rays() - first);
+            let push =
+                Push { scene: tracer.scene_address(), pass: params_buffer.address(), first, count, ..Default::default() };
+            let start = std::time::Instant::now();
+            let timings = commands.run(|r| r.timed("aov", |r| stream.record(r, &push)))?;
+            if count == rays {
+                pace.learn(rays, &timings, start.elapsed().as_secs_f64(), 1);
+            }
+            target.read_with(0, record * count as u64, record, |begin, bytes| {
+                for (k, pixel) in bytes.chunks_exact(record as usize).enumerate() {
+                    if let Some(at) = block.image_index(first + begin as u32 + k as u32, size[0]) {
+                        out[at] = bytemuck::pod_read_unaligned(pixel);
+                    }
+                }
+            })?;
+            control.should_stop()?;
+            first += count;
+        }
+    }
+    Ok(out)
+}

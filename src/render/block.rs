@@ -1,0 +1,136 @@
+//! A block of the image: what one set of device buffers holds. Images larger than a block are rendered block by block, so
+//! that device memory does not grow with the image.
+
+use bytemuck::{Pod, Zeroable};
+
+use super::camera::CameraRecord;
+
+/// Pixels of a block at most (1920x1080 fits).
+const MOST_PIXELS: u64 = 1 << 21;
+/// Edge of the tiles in which pixels are numbered; shaders/common/camera.glsl.
+const TILE: u32 = 8;
+
+/// `BlockParams` of shaders/common/camera.glsl.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+pub struct BlockParams {
+    /// Three rows, relative to the scene's origin.
+    pub camera_to_world: [[f32; 4]; 3],
+    /// Half extents of the view.
+    pub view: [f32; 2],
+    /// 1: parallel rays.
+    pub orthographic: u32,
+    /// Of the sampler.
+    pub seed: u32,
+    /// Pixels.
+    pub image_size: [u32; 2],
+    /// Pixels.
+    pub block_origin: [u32; 2],
+    /// Pixels.
+    pub block_size: [u32; 2],
+    /// Tiles in a row.
+    pub tiles_x: u32,
+    /// 1: hemisphere about the shading normal.
+    pub hemisphere: u32,
+    /// Exponent per world unit.
+    pub falloff_log2: f32,
+    /// World units; infinite for no limit.
+    pub radius: f32,
+    /// Film pixels.
+    pub film: u64,
+    /// G-buffer of a launch.
+    pub gbuffer: u64,
+    /// Auxiliary outputs of a launch.
+    pub aov: u64,
+    /// Where rays are written, or 0.
+    pub ray_dump: u64,
+    /// To a multiple of 16 bytes.
+    pub reserved: u64,
+}
+
+/// A rectangle of the image whose pixels are numbered in 8x8 tiles, Morton order within.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Block {
+    /// Upper left pixel.
+    pub origin: [u32; 2],
+    /// Pixels.
+    pub size: [u32; 2],
+}
+
+impl Block {
+    /// Cuts an image into blocks.
+    pub fn cut(size: [u32; 2]) -> Vec<Block> {
+        let step = |n: u32, most: u64| (n as u64).min(most).max(1) as u32;
+        let width = step(size[0], MOST_PIXELS / TILE as u64);
+        let rows = MOST_PIXELS / (width.next_multiple_of(TILE) as u64) / TILE as u64 * TILE as u64;
+        let height = step(size[1], rows.max(TILE as u64));
+        let mut blocks = Vec::new();
+        for y in (0..size[1]).step_by(height as usize) {
+            for x in (0..size[0]).step_by(width as usize) {
+                blocks.push(Block { origin: [x, y], size: [width.min(size[0] - x), height.min(size[1] - y)] });
+            }
+        }
+        blocks
+    }
+
+    /// Tiles in a row.
+    pub fn tiles_x(&self) -> u32 {
+        self.size[0].div_ceil(TILE)
+    }
+
+    /// Ray indices: those of whole tiles, so some lie outside.
+    pub fn rays(&self) -> u32 {
+        self.tiles_x() * self.size[1].div_ceil(TILE) * TILE * TILE
+    }
+
+    /// Pixel within the block of a ray index; outside of `size` for padding. The shaders' `block_pixel`.
+    pub fn pixel(&self, index: u32) -> [u32; 2] {
+        let (tile, k) = (index >> 6, index & 63);
+        let x = (k & 1) | (k >> 1 & 2) | (k >> 2 & 4);
+        let y = (k >> 1 & 1) | (k >> 2 & 2) | (k >> 3 & 4);
+        [tile % self.tiles_x() * TILE + x, tile / self.tiles_x() * TILE + y]
+    }
+
+    /// Place of a ray index in an image of the given width, or `None` for padding.
+    pub fn image_index(&self, index: u32, image_width: u32) -> Option<usize> {
+        let [x, y] = self.pixel(index);
+        (x < self.size[0] && y < self.size[1])
+            .then(|| (self.origin[1] + y) as usize * image_width as usize + (self.origin[0] + x) as usize)
+    }
+
+    /// Parameters of its passes, buffers not yet set.
+    pub fn params(&self, image_size: [u32; 2], camera: &CameraRecord, seed: u32) -> BlockParams {
+        BlockParams {
+            camera_to_world: camera.camera_to_world,
+            view: camera.view,
+            orthographic: camera.orthographic as u32,
+            seed,
+            image_size,
+            block_origin: self.origin,
+            block_size: self.size,
+            tiles_x: self.tiles_x(),
+            ..Default::default()
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn blocks_and_their_pixels_cover_the_image_once() {
+        for size in [[1, 1], [7, 3], [64, 64], [1280, 720], [3001, 1403], [1, 20000], [20000, 1]] {
+            let mut seen = vec![0u8; size[0] as usize * size[1] as usize];
+            for b in Block::cut(size) {
+                assert!(b.rays() as u64 <= MOST_PIXELS + 8 * 20000 * 8);
+                for k in 0..b.rays() {
+                    if let Some(i) = b.image_index(k, size[0]) {
+                        seen[i] += 1;
+                    }
+                }
+            }
+            assert!(seen.iter().all(|&s| s == 1), "{size:?}");
+        }
+    }
+}

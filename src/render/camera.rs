@@ -1,0 +1,79 @@
+//! Which camera an image is taken with, and what of it the shaders get.
+
+use glam::{DAffine3, DVec3};
+
+use crate::error::{Error, Result};
+use crate::scene::{Camera, Projection, Scene};
+
+/// How the user chose the camera.
+#[derive(Clone, Debug, Default)]
+pub enum Choice {
+    /// The first camera of the file; a framing of the whole scene when it has none.
+    #[default]
+    Auto,
+    /// By index or name.
+    Named(String),
+    /// Given in numbers. `up` need not be perpendicular; `fov_y` in radians.
+    LookAt {
+        /// Position.
+        eye: DVec3,
+        /// Point in the middle of the image.
+        target: DVec3,
+        /// Up in the image.
+        up: DVec3,
+        /// Full vertical field of view, radians.
+        fov_y: f64,
+    },
+}
+
+/// Finds the camera for an image of `aspect` = width / height.
+pub fn choose(scene: &Scene, choice: &Choice, aspect: f64) -> Result<Camera> {
+    match choice {
+        Choice::LookAt { eye, target, up, fov_y } => Ok(Camera::look_at(*eye, *target, *up, *fov_y)),
+        Choice::Named(wanted) => {
+            let by_index = wanted.parse::<usize>().ok().and_then(|k| scene.cameras.get(k));
+            by_index.or_else(|| scene.cameras.iter().find(|c| &c.name == wanted)).cloned().ok_or_else(|| {
+                let names: Vec<_> = scene.cameras.iter().enumerate().map(|(k, c)| format!("{k} '{}'", c.name)).collect();
+                let there = if names.is_empty() {
+                    "the scene has none; use --eye and --target".to_owned()
+                } else {
+                    format!("there is {}", names.join(", "))
+                };
+                Error::Usage(format!("--camera {wanted}: no such camera; {there}"))
+            })
+        }
+        Choice::Auto => match (scene.cameras.first(), scene.bounds()) {
+            (Some(camera), _) => Ok(camera.clone()),
+            (None, Some((lo, hi))) => Ok(Camera::framing(lo, hi, aspect)),
+            (None, None) => Err(Error::Scene("nothing to look at: the scene has no geometry".into())),
+        },
+    }
+}
+
+/// A camera as shaders take it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CameraRecord {
+    /// Camera to world relative to the scene's origin, three rows.
+    pub camera_to_world: [[f32; 4]; 3],
+    /// Half width and half height of the view: tangents, or world units when orthographic.
+    pub view: [f32; 2],
+    /// Parallel rays.
+    pub orthographic: bool,
+}
+
+impl CameraRecord {
+    /// For an image of `aspect` = width / height; the vertical field of view is the camera's own.
+    pub fn new(camera: &Camera, origin: DVec3, aspect: f64) -> Self {
+        let t = camera.camera_to_world;
+        let relative = DAffine3 { translation: t.translation - origin, ..t };
+        let (half, orthographic) = match camera.projection {
+            Projection::Perspective { fov_y } => ((fov_y * 0.5).tan(), false),
+            Projection::Orthographic { half_height } => (half_height, true),
+        };
+        Self {
+            camera_to_world: crate::tracer::gpu_scene::rows(&relative),
+            view: [(half * aspect) as f32, half as f32],
+            orthographic,
+        }
+    }
+}

@@ -1,0 +1,70 @@
+//! How much work goes into one launch: no dispatch runs longer than about a tenth of a second, because drivers reset devices
+//! that do not answer and users want to cancel.
+
+use crate::gpu::Timing;
+
+/// Seconds that a launch should take.
+const TARGET: f64 = 0.05;
+/// Rays of the first launch: it also compiles the shaders on drivers that do so late.
+const FIRST: u32 = 1 << 13;
+/// Rays of a launch at most.
+pub const MOST: u32 = 1 << 19;
+
+/// Finds the size of launches from the time that earlier ones took.
+#[derive(Clone, Debug)]
+pub struct Pace {
+    rays: u32,
+    seen: bool,
+}
+
+impl Default for Pace {
+    fn default() -> Self {
+        Self { rays: FIRST, seen: false }
+    }
+}
+
+impl Pace {
+    /// Rays of the next launch; a multiple of 64.
+    pub fn rays(&self) -> u32 {
+        self.rays
+    }
+
+    /// Launches of this many rays that fit into one submission, so that the host is asked about ten times a second.
+    pub fn launches(&self) -> u32 {
+        // a launch takes at most TARGET once the pace is found
+        if self.rays < MOST { 2 } else { 4 }
+    }
+
+    /// Learns from the longest region of a submission whose launches had at most `rays` rays.
+    pub fn learn(&mut self, rays: u32, timings: &[Timing], wall: f64, launches: u32) {
+        let longest = timings.iter().map(|t| t.seconds).fold(0.0, f64::max);
+        // without timestamps: all launches of the submission alike
+        let seconds = if longest > 0.0 { longest } else { wall / launches.max(1) as f64 };
+        let fit = rays as f64 * TARGET / seconds.max(1e-6);
+        // the first launch may have compiled the shader: its time is an upper bound that says little
+        let growth = if self.seen { 2.0 } else { 4.0 };
+        let next = fit.clamp(self.rays as f64 * 0.25, self.rays as f64 * growth).clamp(64.0 * 16.0, MOST as f64);
+        self.rays = (next as u32) & !63;
+        self.seen = true;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn converges_to_the_target_from_below_and_above() {
+        for rate in [1e5, 5e6, 1e12] {
+            let mut pace = Pace::default();
+            for _ in 0..40 {
+                let rays = pace.rays();
+                pace.learn(rays, &[Timing { label: "x", seconds: rays as f64 / rate }], 0.0, 1);
+            }
+            let seconds = pace.rays() as f64 / rate;
+            assert!(seconds <= 0.06, "{rate}: {seconds}");
+            assert!(pace.rays() == MOST || seconds > 0.03, "{rate}: {seconds}");
+            assert_eq!(pace.rays() % 64, 0);
+        }
+    }
+}

@@ -1,0 +1,197 @@
+//! Scenes written in code, for tests and for a first picture without any file.
+//!
+//! [`by_name`] makes the scenes as the command line names them; [`analytic`] has those with a known answer, parameterised for
+//! tests; [`shapes`] the meshes they are made of.
+
+pub mod analytic;
+pub mod cornell;
+pub mod many;
+pub mod shapes;
+
+use super::{Camera, Geometry, Instance, Material, Mesh, Scene};
+use glam::{DAffine3, DVec3, Vec3};
+
+/// Name and one-line description of a built-in scene.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct BuiltinInfo {
+    /// What [`by_name`] takes, before any `:PARAMETER`.
+    pub name: &'static str,
+    /// What it shows, and its parameter with default and range, if it has one.
+    pub description: &'static str,
+}
+
+const fn info(name: &'static str, description: &'static str) -> BuiltinInfo {
+    BuiltinInfo { name, description }
+}
+
+const NAMES: &[BuiltinInfo] = &[
+    info("cornell-box", "the Cornell box with its two blocks"),
+    info("cornell-empty", "the Cornell box without blocks"),
+    info("cornell-mirror", "the Cornell box, its tall block a mirror"),
+    info("cornell-glass-sphere", "the Cornell box with a tall block and an analytic sphere of glass"),
+    info("cornell-spheres", "the Cornell box with analytic spheres: mirror, glass and matte"),
+    info("sphere-over-plane", "an analytic sphere that floats over a plane; AO has a closed form"),
+    info("v-groove", "two walls that meet at ANGLE degrees (v-groove:ANGLE, 1 to 180, default 90); AO is (1 - cos ANGLE) / 2"),
+    info("closed-box", "the inside of a closed box; AO is 0 everywhere"),
+    info("parallel-planes", "a floor and a ceiling; AO has a closed form"),
+    info("plane", "a single plane; AO is 1 everywhere"),
+    info("grid", "N x N x N turned and stretched instances of a torus over a floor (grid:N, 1 to 128, default 6)"),
+    info("spheres", "N random analytic spheres over a floor (spheres:N, 1 to 10000000, default 1000)"),
+    info("leaf-cards", "bushes of leaves cut from quads by alpha masks, some of them blended"),
+    info("stairs", "stairs, a column and a rail: contact detail"),
+    info("far-away", "the stairs, placed more than a million units from the origin"),
+];
+
+/// All built-in scenes.
+pub fn names() -> &'static [BuiltinInfo] {
+    NAMES
+}
+
+/// The built-in scene `name`, which may end in `:PARAMETER` where its description says so. `None` when there is no such scene
+/// or the parameter is out of its range.
+pub fn by_name(name: &str) -> Option<Scene> {
+    let (base, parameter) = match name.split_once(':') {
+        Some((base, parameter)) => (base, Some(parameter)),
+        None => (name, None),
+    };
+    // a parameter that is missing takes the default; one that does not parse, or is not wanted, is an error
+    let number = |default: f64, lo: f64, hi: f64| match parameter {
+        None => Some(default),
+        Some(p) => p.parse::<f64>().ok().filter(|v| (lo..=hi).contains(v)),
+    };
+    let count = |default: u32, hi: u32| match parameter {
+        None => Some(default),
+        Some(p) => p.parse::<u32>().ok().filter(|v| (1..=hi).contains(v)),
+    };
+    let mut scene = match base {
+        "v-groove" => analytic::v_groove(number(90.0, 1.0, 180.0)?.to_radians(), 4.0, 12.0, Placement::default()),
+        "grid" => many::grid(count(6, 128)?),
+        "spheres" => many::spheres(count(1000, 10_000_000)?),
+        _ if parameter.is_some() => return None,
+        "cornell-box" => cornell::cornell_box(),
+        "cornell-empty" => cornell::cornell_empty(),
+        "cornell-mirror" => cornell::cornell_mirror(),
+        "cornell-glass-sphere" => cornell::cornell_glass_sphere(),
+        "cornell-spheres" => cornell::cornell_spheres(),
+        "sphere-over-plane" => analytic::sphere_over_plane(1.0, 1.25, 60.0, Placement::default()),
+        "closed-box" => analytic::closed_box(2.0, Placement::default()),
+        "parallel-planes" => analytic::parallel_planes(8.0, 6.0, 1.0, Placement::default()),
+        "plane" => analytic::plane(20.0, Placement::default()),
+        "leaf-cards" => many::leaf_cards(),
+        "stairs" => many::stairs(DVec3::ZERO),
+        "far-away" => many::stairs(DVec3::new(1.0e6, -5.0e5, 1.5e6)),
+        _ => return None,
+    };
+    scene.name = name.to_owned();
+    Some(scene)
+}
+
+/// Where a scene for tests lies: scaled about its own origin, then moved. It goes into the instances' transforms.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Placement {
+    /// Uniform scale.
+    pub scale: f64,
+    /// World position of the scene's own origin.
+    pub offset: DVec3,
+}
+
+impl Default for Placement {
+    fn default() -> Self {
+        Self { scale: 1.0, offset: DVec3::ZERO }
+    }
+}
+
+impl Placement {
+    /// The world point of a point in the scene's own units.
+    pub fn point(&self, p: DVec3) -> DVec3 {
+        p * self.scale + self.offset
+    }
+
+    /// The transform of the scene's instances.
+    pub fn transform(&self) -> DAffine3 {
+        DAffine3::from_translation(self.offset) * DAffine3::from_scale(DVec3::splat(self.scale))
+    }
+}
+
+/// The same scene with every instance's transform applied to its vertices, rounded to `f32`: what a file without transforms
+/// would hold. Sphere meshes keep their instance's transform (it may make ellipsoids of them).
+pub fn bake(scene: &Scene) -> Scene {
+    let mut out = scene.clone();
+    out.meshes.clear();
+    for instance in &mut out.instances {
+        let mut mesh = scene.meshes[instance.mesh].clone();
+        if let Geometry::Triangles(t) = &mut mesh.geometry {
+            for p in &mut t.positions {
+                *p = instance.object_to_world.transform_point3(p.as_dvec3()).as_vec3();
+            }
+            let normal_matrix = instance.object_to_world.matrix3.inverse().transpose();
+            for n in &mut t.normals {
+                *n = (normal_matrix * n.as_dvec3()).normalize_or_zero().as_vec3();
+            }
+            instance.object_to_world = DAffine3::IDENTITY;
+        }
+        instance.mesh = out.meshes.len();
+        out.meshes.push(mesh);
+    }
+    out
+}
+
+impl Scene {
+    /// Adds a matte material with a linear base colour; returns its index.
+    fn add_matte(&mut self, name: &str, color: Vec3) -> usize {
+        self.add_material(Material { name: name.to_owned(), base_color: color.extend(1.0), ..Material::default() })
+    }
+
+    fn add_material(&mut self, material: Material) -> usize {
+        self.materials.push(material);
+        self.materials.len() - 1
+    }
+
+    /// Adds a mesh without placing it; returns its index.
+    fn add_mesh(&mut self, name: &str, geometry: Geometry, material: usize) -> usize {
+        self.meshes.push(Mesh { name: name.to_owned(), geometry, material });
+        self.meshes.len() - 1
+    }
+
+    fn add_instance(&mut self, name: &str, mesh: usize, object_to_world: DAffine3) {
+        self.instances.push(Instance { name: name.to_owned(), mesh, object_to_world });
+    }
+
+    /// Adds a mesh and places it once.
+    fn add_object(&mut self, name: &str, geometry: Geometry, material: usize, object_to_world: DAffine3) {
+        let mesh = self.add_mesh(name, geometry, material);
+        self.add_instance(name, mesh, object_to_world);
+    }
+
+    fn add_camera(&mut self, eye: DVec3, target: DVec3, fov_y_degrees: f64) {
+        let mut camera = Camera::look_at(eye, target, DVec3::Y, fov_y_degrees.to_radians());
+        camera.name = "main".to_owned();
+        self.cameras.push(camera);
+    }
+}
+
+/// Random numbers for the layout of scenes, the same on every machine.
+struct Rng {
+    seed: u32,
+    counter: u32,
+}
+
+impl Rng {
+    fn new(seed: u32) -> Self {
+        Self { seed, counter: 0 }
+    }
+
+    /// Uniform in [lo, hi).
+    fn range(&mut self, lo: f64, hi: f64) -> f64 {
+        self.counter = self.counter.wrapping_add(1);
+        let x = crate::sampling::sobol::hash_combine(self.seed, self.counter);
+        lo + (hi - lo) * crate::sampling::to_unit(x) as f64
+    }
+
+    /// A uniformly distributed rotation (Shoemake 1992).
+    fn rotation(&mut self) -> glam::DQuat {
+        let (a, b, c) = (self.range(0.0, 1.0), self.range(0.0, std::f64::consts::TAU), self.range(0.0, std::f64::consts::TAU));
+        let (p, q) = ((1.0 - a).sqrt(), a.sqrt());
+        glam::DQuat::from_xyzw(p * b.sin(), p * b.cos(), q * c.sin(), q * c.cos()).normalize()
+    }
+}

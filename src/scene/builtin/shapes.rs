@@ -1,0 +1,143 @@
+//! The meshes that built-in scenes are made of. Counter-clockwise seen from outside; closed shapes share their vertices.
+
+use crate::scene::{Geometry, Sphere, TriangleMesh};
+use glam::{DVec3, Vec3};
+use std::collections::HashMap;
+use std::f64::consts::TAU;
+
+/// One analytic sphere.
+pub fn sphere(center: DVec3, radius: f64) -> Geometry {
+    Geometry::Spheres(vec![Sphere { center: center.as_vec3(), radius: radius as f32 }])
+}
+
+/// A triangle mesh of quads, four corners each, counter-clockwise.
+pub fn quads(corners: &[[DVec3; 4]]) -> Geometry {
+    let mut mesh = TriangleMesh::default();
+    for (q, corner) in (0u32..).zip(corners) {
+        mesh.positions.extend(corner.iter().map(|p| p.as_vec3()));
+        mesh.indices.extend([[4 * q, 4 * q + 1, 4 * q + 2], [4 * q, 4 * q + 2, 4 * q + 3]]);
+    }
+    Geometry::Triangles(mesh)
+}
+
+/// A horizontal square of the given side, centred at `center`, seen from above.
+pub fn floor(center: DVec3, side: f64) -> Geometry {
+    rectangle(center, DVec3::Z * side, DVec3::X * side)
+}
+
+/// A parallelogram around `center` with edges `u` and `v`; it faces `u x v`.
+pub fn rectangle(center: DVec3, u: DVec3, v: DVec3) -> Geometry {
+    let (u, v) = (u * 0.5, v * 0.5);
+    quads(&[[center - u - v, center + u - v, center + u + v, center - u + v]])
+}
+
+/// A closed box with eight shared vertices.
+pub fn cuboid(lo: DVec3, hi: DVec3) -> Geometry {
+    let pick = |bit: bool, l: f64, h: f64| if bit { h } else { l };
+    let positions = (0..8)
+        .map(|k| DVec3::new(pick(k & 1 != 0, lo.x, hi.x), pick(k & 2 != 0, lo.y, hi.y), pick(k & 4 != 0, lo.z, hi.z)).as_vec3())
+        .collect();
+    // corners by bits zyx; each face counter-clockwise from outside
+    let faces: [[u32; 4]; 6] = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
+    let indices = faces.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
+    Geometry::Triangles(TriangleMesh { positions, indices, ..TriangleMesh::default() })
+}
+
+/// A sphere of `20 * 4^levels` triangles around the origin, closed, with smooth normals.
+pub fn icosphere(radius: f64, levels: u32) -> Geometry {
+    let g = (1.0 + 5f64.sqrt()) / 2.0;
+    let mut points: Vec<DVec3> = [
+        [-1.0, g, 0.0],
+        [1.0, g, 0.0],
+        [-1.0, -g, 0.0],
+        [1.0, -g, 0.0],
+        [0.0, -1.0, g],
+        [0.0, 1.0, g],
+        [0.0, -1.0, -g],
+        [0.0, 1.0, -g],
+        [g, 0.0, -1.0],
+        [g, 0.0, 1.0],
+        [-g, 0.0, -1.0],
+        [-g, 0.0, 1.0],
+    ]
+    .map(|p| DVec3::from_array(p).normalize())
+    .to_vec();
+    let mut faces: Vec<[u32; 3]> = vec![
+        [0, 11, 5],
+        [0, 5, 1],
+        [0, 1, 7],
+        [0, 7, 10],
+        [0, 10, 11],
+        [1, 5, 9],
+        [5, 11, 4],
+        [11, 10, 2],
+        [10, 7, 6],
+        [7, 1, 8],
+        [3, 9, 4],
+        [3, 4, 2],
+        [3, 2, 6],
+        [3, 6, 8],
+        [3, 8, 9],
+        [4, 9, 5],
+        [2, 4, 11],
+        [6, 2, 10],
+        [8, 6, 7],
+        [9, 8, 1],
+    ];
+    for _ in 0..levels {
+        let mut middle_of = HashMap::new();
+        let mut middle = |points: &mut Vec<DVec3>, a: u32, b: u32| {
+            *middle_of.entry((a.min(b), a.max(b))).or_insert_with(|| {
+                points.push((points[a as usize] + points[b as usize]).normalize());
+                points.len() as u32 - 1
+            })
+        };
+        faces = faces
+            .iter()
+            .flat_map(|&[a, b, c]| {
+                let (ab, bc, ca) = (middle(&mut points, a, b), middle(&mut points, b, c), middle(&mut points, c, a));
+                [[a, ab, ca], [b, bc, ab], [c, ca, bc], [ab, bc, ca]]
+            })
+            .collect();
+    }
+    Geometry::Triangles(TriangleMesh {
+        positions: points.iter().map(|p| (*p * radius).as_vec3()).collect(),
+        normals: points.iter().map(|p| p.as_vec3()).collect(),
+        indices: faces,
+        ..TriangleMesh::default()
+    })
+}
+
+/// A torus around the y axis, closed, with `2 * around * across` triangles and smooth normals.
+pub fn torus(major: f64, minor: f64, around: u32, across: u32) -> Geometry {
+    let mut mesh = TriangleMesh::default();
+    for i in 0..around {
+        let (sin_a, cos_a) = (TAU * i as f64 / around as f64).sin_cos();
+        for j in 0..across {
+            let (sin_b, cos_b) = (TAU * j as f64 / across as f64).sin_cos();
+            let normal = DVec3::new(cos_a * cos_b, sin_b, -sin_a * cos_b);
+            let ring = DVec3::new(cos_a, 0.0, -sin_a) * major;
+            mesh.positions.push((ring + normal * minor).as_vec3());
+            mesh.normals.push(normal.as_vec3());
+            let at = |i: u32, j: u32| (i % around) * across + j % across;
+            let (a, b, c, d) = (at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1));
+            mesh.indices.extend([[a, b, c], [a, c, d]]);
+        }
+    }
+    Geometry::Triangles(mesh)
+}
+
+/// A closed cylinder around the y axis from `y = 0` to `height`, its caps fans.
+pub fn cylinder(radius: f64, height: f64, segments: u32) -> Geometry {
+    let mut mesh = TriangleMesh { positions: vec![Vec3::ZERO, Vec3::Y * height as f32], ..TriangleMesh::default() };
+    for i in 0..segments {
+        let (s, c) = (TAU * i as f64 / segments as f64).sin_cos();
+        for y in [0.0, height] {
+            mesh.positions.push(DVec3::new(c * radius, y, -s * radius).as_vec3());
+        }
+        let j = (i + 1) % segments;
+        let (a, b, c, d) = (2 + 2 * i, 2 + 2 * j, 3 + 2 * j, 3 + 2 * i);
+        mesh.indices.extend([[a, b, c], [a, c, d], [0, b, a], [1, d, c]]);
+    }
+    Geometry::Triangles(mesh)
+}

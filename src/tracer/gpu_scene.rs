@@ -1,0 +1,479 @@
+//! The scene in device memory. The records mirror shaders/scene/scene.glsl field by field.
+
+use std::borrow::Cow;
+use std::sync::Arc;
+
+use bytemuck::{Pod, Zeroable};
+use glam::{DAffine3, Vec3};
+
+use super::compute::Hierarchy;
+use crate::error::{Error, Result};
+use crate::gpu::{Buffer, Device, Memory};
+use crate::scene::features::alpha_cutoff;
+use crate::scene::flatten::{FlatScene, Group, Part};
+use crate::scene::{Filter, Geometry, Material, TriangleMesh, Wrap};
+
+/// What the passes will ask of the scene; the rest is not uploaded.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Needs {
+    /// Shading normals.
+    pub normals: bool,
+    /// Base colour of every surface, not only of alpha-tested ones.
+    pub albedo: bool,
+}
+
+#[repr(C)]
+#[derive(Clone, Copy, Default, Pod, Zeroable)]
+struct SceneRoot {
+    instances: u64,
+    parts: u64,
+    placements: u64,
+    materials: u64,
+    textures: u64,
+    nodes: u64,
+    primitives: u64,
+    top_level: u64,
+    launch_rays: u64,
+    launch_hits: u64,
+    root: u32,
+    reserved: [u32; 3],
+}
+
+#[repr(C)]
+#[derive(Clone, Copy, Default, Pod, Zeroable)]
+struct InstanceRecord {
+    group_to_world: [[f32; 4]; 3],
+    world_to_group: [[f32; 4]; 3],
+    part_of: u64,
+    first_part: u32,
+    scene_instance: u32,
+    root: u32,
+    opaque_count: u32,
+    reserved: [u32; 2],
+}
+
+#[repr(C)]
+#[derive(Clone, Copy, Default, Pod, Zeroable)]
+struct PartRecord {
+    indices: u64,
+    positions: u64,
+    normals: u64,
+    texcoords: [u64; 2],
+    colors: u64,
+    first_primitive: u32,
+    first_vertex: u32,
+    material: u32,
+    scene_instance: u32,
+    mirrored: u32,
+    reserved: [u32; 3],
+}
+
+#[repr(C)]
+#[derive(Clone, Copy, Default, Pod, Zeroable)]
+struct MaterialRecord {
+    base_color: [f32; 4],
+    texcoord_transform: [f32; 4],
+    texcoord_offset: [f32; 2],
+    base_color_texture: u32,
+    texcoord_set: u32,
+    alpha_cutoff: f32,
+    reserved: [u32; 3],
+}
+
+#[repr(C)]
+#[derive(Clone, Copy, Default, Pod, Zeroable)]
+struct TextureRecord {
+    texels: u64,
+    width: u32,
+    height: u32,
+    wrap: [u32; 2],
+    nearest: u32,
+    reserved: u32,
+}
+
+const INVALID: u32 = u32::MAX;
+
+/// The three rows of an affine map in single precision, as shaders and Vulkan's instances take it.
+pub fn rows(t: &DAffine3) -> [[f32; 4]; 3] {
+    let (m, o) = (t.matrix3, t.translation);
+    std::array::from_fn(|k| [m.x_axis[k] as f32, m.y_axis[k] as f32, m.z_axis[k] as f32, o[k] as f32])
+}
+
+/// Buffers of a group: what its bottom level is built over.
+pub(super) struct GroupBuffers {
+    /// 3 floats a vertex; 4 a sphere.
+    pub positions: Buffer,
+    /// 3 uints a triangle; none for spheres.
+    pub indices: Option<Buffer>,
+    part_of: Option<Buffer>,
+}
+
+/// A scene in device memory, without what it is traced through.
+pub struct GpuScene {
+    root: SceneRoot,
+    root_buffer: Buffer,
+    instances: Vec<InstanceRecord>,
+    instance_buffer: Buffer,
+    pub(super) groups: Vec<GroupBuffers>,
+    others: Vec<Buffer>,
+}
+
+impl GpuScene {
+    /// Writes what `needs` and the scene itself call for.
+    pub fn new(device: &Arc<Device>, flat: &FlatScene, needs: Needs) -> Result<Self> {
+        let groups = flat.groups.iter().map(|g| group_buffers(device, flat, g)).collect::<Result<Vec<_>>>()?;
+        let (mut parts, mut first_part) = (Vec::new(), Vec::new());
+        let mut others = Vec::new();
+        let attributes = Attributes::upload(device, flat, needs)?;
+        for (group, buffers) in flat.groups.iter().zip(&groups) {
+            first_part.push(parts.len() as u32);
+            for (k, part) in group.parts.iter().enumerate() {
+                parts.push(PartRecord {
+                    indices: buffers.indices.as_ref().map_or(0, Buffer::address),
+                    positions: buffers.positions.address(),
+                    normals: attributes.address(part, k, Attribute::Normals),
+                    texcoords: [
+                        attributes.address(part, k, Attribute::Texcoords(0)),
+                        attributes.address(part, k, Attribute::Texcoords(1)),
+                    ],
+                    colors: attributes.address(part, k, Attribute::Colors),
+                    first_primitive: part.first_primitive as u32,
+                    first_vertex: part.first_vertex as u32,
+                    material: flat.scene.meshes[part.mesh].material as u32,
+                    scene_instance: part.scene_instance.map_or(INVALID, |i| i as u32),
+                    mirrored: part.mirrored as u32,
+                    reserved: [0; 3],
+                });
+            }
+        }
+        let instances: Vec<_> = flat
+            .placements
+            .iter()
+            .map(|p| InstanceRecord {
+                group_to_world: rows(&p.to_world),
+                world_to_group: rows(&p.to_world.inverse()),
+                part_of: groups[p.group].part_of.as_ref().map_or(0, Buffer::address),
+                first_part: first_part[p.group],
+                scene_instance: p.scene_instance.map_or(INVALID, |i| i as u32),
+                root: 0,
+                opaque_count: flat.groups[p.group].opaque_count as u32,
+                reserved: [0; 2],
+            })
+            .collect();
+        if let Some(bad) =
+            instances.iter().position(|i| !i.group_to_world.iter().chain(&i.world_to_group).flatten().all(|x| x.is_finite()))
+        {
+            let name = flat.placements[bad].scene_instance.map_or("", |i| flat.scene.instances[i].name.as_str());
+            return Err(Error::Scene(format!(
+                "instance {bad} '{name}' has a transform that cannot be inverted (a scale of zero?)"
+            )));
+        }
+        // which record and part stand for each instance of the scene
+        let mut placements = vec![[0u32; 2]; flat.scene.instances.len()];
+        for (k, p) in flat.placements.iter().enumerate() {
+            match p.scene_instance {
+                Some(i) => placements[i] = [k as u32, first_part[p.group]],
+                None => {
+                    for (j, part) in flat.groups[p.group].parts.iter().enumerate() {
+                        if let Some(i) = part.scene_instance {
+                            placements[i] = [k as u32, first_part[p.group] + j as u32];
+                        }
+                    }
+                }
+            }
+        }
+        let textures = Textures::upload(device, flat, needs)?;
+        let materials: Vec<_> = flat.scene.materials.iter().map(|m| textures.material(m)).collect();
+        let instance_buffer = Buffer::from_slice(device, "instance records", &instances)?;
+        let mut keep = |buffer: Buffer| {
+            let address = buffer.address();
+            others.push(buffer);
+            address
+        };
+        let mut root = SceneRoot { instances: instance_buffer.address(), ..Default::default() };
+        root.parts = keep(Buffer::from_slice(device, "part records", &parts)?);
+        root.placements = keep(Buffer::from_slice(device, "placements", &placements)?);
+        root.materials = keep(Buffer::from_slice(device, "material records", &materials)?);
+        root.textures = keep(Buffer::from_slice(device, "texture records", &textures.records)?);
+        keep(textures.texels);
+        keep(attributes.buffer);
+        let root_buffer = Buffer::from_slice(device, "scene root", &[root])?;
+        Ok(Self { root, root_buffer, instances, instance_buffer, groups, others })
+    }
+
+    /// Where shaders begin.
+    pub fn root_address(&self) -> u64 {
+        self.root_buffer.address()
+    }
+
+    /// Bytes of device memory.
+    pub fn bytes(&self) -> u64 {
+        let groups = self.groups.iter().flat_map(|g| [Some(&g.positions), g.indices.as_ref(), g.part_of.as_ref()]).flatten();
+        groups.chain(&self.others).map(Buffer::size).sum::<u64>() + self.instance_buffer.size()
+    }
+
+    /// Says where the compute tracer's hierarchy lies.
+    pub(super) fn set_hierarchy(&mut self, h: &Hierarchy) -> Result<()> {
+        for (record, root) in self.instances.iter_mut().zip(&h.instance_roots) {
+            record.root = *root;
+        }
+        write_all(&mut self.instance_buffer, &self.instances)?;
+        self.root.nodes = h.nodes.address();
+        self.root.primitives = h.primitives.address();
+        self.root.root = h.root;
+        self.root.launch_rays = h.launch_rays.as_ref().map_or(0, Buffer::address);
+        self.root.launch_hits = h.launch_hits.as_ref().map_or(0, Buffer::address);
+        write_all(&mut self.root_buffer, &[self.root])
+    }
+
+    /// Says where the hardware's top level lies.
+    pub(super) fn set_top_level(&mut self, address: u64) -> Result<()> {
+        self.root.top_level = address;
+        write_all(&mut self.root_buffer, &[self.root])
+    }
+}
+
+fn write_all<T: Pod>(buffer: &mut Buffer, data: &[T]) -> Result<()> {
+    let bytes: &[u8] = bytemuck::cast_slice(data);
+    buffer.fill(bytes.len() as u64, 1, |first, chunk| chunk.copy_from_slice(&bytes[first as usize..][..chunk.len()]))
+}
+
+fn group_buffers(device: &Arc<Device>, flat: &FlatScene, group: &Group) -> Result<GroupBuffers> {
+    let n = group.primitive_count as u64;
+    if group.spheres {
+        let mut positions = Buffer::new(device, "spheres", 16 * n, Memory::Device)?;
+        positions.fill(16 * n, 16, |first, bytes| {
+            for (k, out) in bytes.chunks_exact_mut(16).enumerate() {
+                let primitive = first as usize + k;
+                let part = flat.part_of(group, primitive);
+                let s = flat.sphere(part, primitive - part.first_primitive);
+                out.copy_from_slice(bytemuck::bytes_of(&[s.center.x, s.center.y, s.center.z, s.radius]));
+            }
+        })?;
+        return Ok(GroupBuffers { positions, indices: None, part_of: part_of(device, group)? });
+    }
+    let triangles = |part: &Part| match &flat.scene.meshes[part.mesh].geometry {
+        Geometry::Triangles(t) => t,
+        Geometry::Spheres(_) => unreachable!("a triangle group holds triangles"),
+    };
+    let mut positions = Buffer::new(device, "vertices", 12 * group.vertex_count as u64, Memory::Device)?;
+    let mut cursor = Cursor::new(group.parts.iter().map(|p| triangles(p).positions.len()));
+    positions.fill(12 * group.vertex_count as u64, 12, |_, bytes| {
+        for out in bytes.chunks_exact_mut(12) {
+            let (part, vertex) = cursor.next();
+            out.copy_from_slice(bytemuck::bytes_of(&flat.vertex(&group.parts[part], vertex).to_array()));
+        }
+    })?;
+    let mut indices = Buffer::new(device, "indices", 12 * n, Memory::Device)?;
+    let mut cursor = Cursor::new(group.parts.iter().map(|p| triangles(p).indices.len()));
+    indices.fill(12 * n, 12, |_, bytes| {
+        for out in bytes.chunks_exact_mut(12) {
+            let (part, triangle) = cursor.next();
+            let part = &group.parts[part];
+            let corners = triangles(part).indices[triangle].map(|i| i + part.first_vertex as u32);
+            out.copy_from_slice(bytemuck::bytes_of(&corners));
+        }
+    })?;
+    Ok(GroupBuffers { positions, indices: Some(indices), part_of: part_of(device, group)? })
+}
+
+/// The part of each primitive, where there is more than one.
+fn part_of(device: &Arc<Device>, group: &Group) -> Result<Option<Buffer>> {
+    if group.parts.len() <= 1 {
+        return Ok(None);
+    }
+    let ends = group.parts.iter().skip(1).map(|p| p.first_primitive).chain([group.primitive_count]);
+    let sizes: Vec<_> = group.parts.iter().zip(ends).map(|(p, end)| end - p.first_primitive).collect();
+    let mut buffer = Buffer::new(device, "part of each primitive", 4 * group.primitive_count as u64, Memory::Device)?;
+    let mut cursor = Cursor::new(sizes.into_iter());
+    buffer.fill(4 * group.primitive_count as u64, 4, |_, bytes| {
+        for out in bytes.chunks_exact_mut(4) {
+            out.copy_from_slice(&(cursor.next().0 as u32).to_le_bytes());
+        }
+    })?;
+    Ok(Some(buffer))
+}
+
+/// Walks over the items of consecutive ranges of given lengths: (range, item within it).
+struct Cursor<I> {
+    lengths: I,
+    range: usize,
+    item: usize,
+    length: usize,
+}
+
+impl<I: Iterator<Item = usize>> Cursor<I> {
+    fn new(mut lengths: I) -> Self {
+        let length = lengths.next().unwrap_or(0);
+        Self { lengths, range: 0, item: 0, length }
+    }
+
+    fn next(&mut self) -> (usize, usize) {
+        while self.item >= self.length {
+            self.length = self.lengths.next().unwrap_or(usize::MAX);
+            self.range += 1;
+            self.item = 0;
+        }
+        self.item += 1;
+        (self.range, self.item - 1)
+    }
+}
+
+/// Several arrays in one buffer, each aligned to 16 bytes; returns their addresses.
+fn concatenate(device: &Arc<Device>, name: &str, arrays: &[Cow<[u8]>]) -> Result<(Buffer, Vec<u64>)> {
+    let mut offsets = Vec::with_capacity(arrays.len());
+    let mut size = 0u64;
+    for a in arrays {
+        offsets.push(size);
+        size += (a.len() as u64).next_multiple_of(16);
+    }
+    let mut buffer = Buffer::new(device, name, size, Memory::Device)?;
+    buffer.fill(size, 16, |first, bytes| {
+        let (start, end) = (16 * first, 16 * first + bytes.len() as u64);
+        for (a, &offset) in arrays.iter().zip(&offsets) {
+            let (lo, hi) = (offset.max(start), (offset + a.len() as u64).min(end));
+            if lo < hi {
+                bytes[(lo - start) as usize..(hi - start) as usize]
+                    .copy_from_slice(&a[(lo - offset) as usize..(hi - offset) as usize]);
+            }
+        }
+    })?;
+    let base = buffer.address();
+    Ok((buffer, offsets.into_iter().map(|o| base + o).collect()))
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, Hash)]
+enum Attribute {
+    Normals,
+    Texcoords(usize),
+    Colors,
+}
+
+/// Vertex attributes of all parts in one buffer.
+struct Attributes {
+    buffer: Buffer,
+    // by mesh, whether baked (then by part), and attribute
+    addresses: std::collections::HashMap<(usize, Option<usize>, Attribute), u64>,
+}
+
+impl Attributes {
+    /// Baked normals differ from part to part; everything else is the mesh's own.
+    fn key(part: &Part, index: usize, attribute: Attribute) -> (usize, Option<usize>, Attribute) {
+        let baked = attribute == Attribute::Normals && part.to_group.matrix3 != glam::DMat3::IDENTITY;
+        (part.mesh, baked.then_some(index), attribute)
+    }
+
+    fn upload(device: &Arc<Device>, flat: &FlatScene, needs: Needs) -> Result<Self> {
+        let (mut keys, mut arrays) = (Vec::new(), Vec::new());
+        let mut seen = std::collections::HashSet::new();
+        for (index, part) in flat.groups.iter().flat_map(|g| g.parts.iter().enumerate()) {
+            let mesh = &flat.scene.meshes[part.mesh];
+            let Geometry::Triangles(t) = &mesh.geometry else { continue };
+            let color = needs.albedo || part.alpha_tested;
+            let textured = color && flat.scene.materials[mesh.material].base_color_texture.is_some();
+            for (attribute, wanted) in [
+                (Attribute::Normals, needs.normals),
+                (Attribute::Texcoords(0), textured),
+                (Attribute::Texcoords(1), textured),
+                (Attribute::Colors, color),
+            ] {
+                let key = Self::key(part, index, attribute);
+                let bytes = if wanted { attribute_bytes(t, part, attribute) } else { Cow::Borrowed(&[][..]) };
+                if !bytes.is_empty() && seen.insert(key) {
+                    keys.push(key);
+                    arrays.push(bytes);
+                }
+            }
+        }
+        let (buffer, addresses) = concatenate(device, "vertex attributes", &arrays)?;
+        Ok(Self { buffer, addresses: keys.into_iter().zip(addresses).collect() })
+    }
+
+    fn address(&self, part: &Part, index: usize, attribute: Attribute) -> u64 {
+        self.addresses.get(&Self::key(part, index, attribute)).copied().unwrap_or(0)
+    }
+}
+
+fn attribute_bytes<'a>(t: &'a TriangleMesh, part: &Part, attribute: Attribute) -> Cow<'a, [u8]> {
+    match attribute {
+        Attribute::Normals if part.to_group.matrix3 == glam::DMat3::IDENTITY => Cow::Borrowed(bytemuck::cast_slice(&t.normals)),
+        Attribute::Normals => {
+            let m = part.to_group.matrix3.inverse().transpose();
+            let baked: Vec<Vec3> = t.normals.iter().map(|n| (m * n.as_dvec3()).normalize_or_zero().as_vec3()).collect();
+            Cow::Owned(bytemuck::cast_slice(&baked).to_vec())
+        }
+        Attribute::Texcoords(set) => Cow::Borrowed(bytemuck::cast_slice(&t.texcoords[set])),
+        Attribute::Colors => Cow::Borrowed(bytemuck::cast_slice(&t.colors)),
+    }
+}
+
+/// Textures that something asks for, in one buffer.
+struct Textures {
+    texels: Buffer,
+    records: Vec<TextureRecord>,
+    // record of each texture of the scene
+    record_of: Vec<u32>,
+}
+
+impl Textures {
+    fn upload(device: &Arc<Device>, flat: &FlatScene, needs: Needs) -> Result<Self> {
+        let mut record_of = vec![INVALID; flat.scene.textures.len()];
+        let mut used = Vec::new();
+        for part in flat.groups.iter().flat_map(|g| &g.parts) {
+            let material = &flat.scene.materials[flat.scene.meshes[part.mesh].material];
+            if let Some(slot) = material.base_color_texture.filter(|_| needs.albedo || part.alpha_tested)
+                && record_of[slot.texture] == INVALID
+            {
+                record_of[slot.texture] = used.len() as u32;
+                used.push(slot.texture);
+            }
+        }
+        // two textures may share an image: it is stored once
+        let mut images: Vec<Cow<[u8]>> = Vec::new();
+        let mut image_of = std::collections::HashMap::new();
+        let mut image = Vec::new();
+        for &t in &used {
+            let texture = &flat.scene.textures[t];
+            image.push(*image_of.entry(Arc::as_ptr(&texture.rgba8)).or_insert_with(|| {
+                images.push(Cow::Borrowed(&texture.rgba8[..]));
+                images.len() - 1
+            }));
+        }
+        let (texels, addresses) = concatenate(device, "texels", &images)?;
+        let wrap = |w: Wrap| match w {
+            Wrap::Repeat => 0,
+            Wrap::Mirror => 1,
+            Wrap::Clamp => 2,
+        };
+        let records = used
+            .iter()
+            .zip(image)
+            .map(|(&t, image)| {
+                let texture = &flat.scene.textures[t];
+                TextureRecord {
+                    texels: addresses[image],
+                    width: texture.width,
+                    height: texture.height,
+                    wrap: texture.wrap.map(wrap),
+                    nearest: (texture.filter == Filter::Nearest) as u32,
+                    reserved: 0,
+                }
+            })
+            .collect();
+        Ok(Self { texels, records, record_of })
+    }
+
+    fn material(&self, m: &Material) -> MaterialRecord {
+        let slot = m.base_color_texture.filter(|s| self.record_of[s.texture] != INVALID);
+        let transform = slot.map_or(glam::Affine2::IDENTITY, |s| s.transform);
+        MaterialRecord {
+            base_color: m.base_color.to_array(),
+            texcoord_transform: transform.matrix2.to_cols_array(),
+            texcoord_offset: transform.translation.to_array(),
+            base_color_texture: slot.map_or(INVALID, |s| self.record_of[s.texture]),
+            texcoord_set: slot.map_or(0, |s| s.texcoord as u32),
+            alpha_cutoff: alpha_cutoff(m).unwrap_or(-1.0),
+            reserved: [0; 3],
+        }
+    }
+}

@@ -1,0 +1,234 @@
+//! The program from outside: what it prints, where, and how it ends.
+
+use std::path::Path;
+use std::process::{Command, Output, Stdio};
+
+use serde_json::Value;
+
+fn skylit(args: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_skylit"));
+    command.args(args).env_remove("RUST_BACKTRACE").stdin(Stdio::null());
+    command
+}
+
+fn run(args: &[&str]) -> Output {
+    skylit(args).output().unwrap()
+}
+
+/// Runs a command that must fail with `code`, saying one line that contains `says`.
+fn fails(args: &[&str], code: i32, says: &str) {
+    expect_failure(&run(args), code, says, args);
+}
+
+fn expect_failure(out: &Output, code: i32, says: &str, args: &[&str]) {
+    let stderr = String::from_utf8_lossy(&out.stderr);
+    assert_eq!(out.status.code(), Some(code), "{args:?}: {stderr}");
+    let errors: Vec<_> = stderr.lines().filter(|l| l.starts_with("skylit: error: ")).collect();
+    assert_eq!(errors.len(), 1, "{args:?}: {stderr}");
+    assert_eq!(stderr.lines().last(), errors.first().copied(), "{args:?}: {stderr}");
+    assert!(errors[0].contains(says), "{args:?}: {stderr}");
+    assert!(out.stdout.is_empty() || args.contains(&"--json"), "{args:?}");
+}
+
+fn path(p: &Path) -> &str {
+    p.to_str().unwrap()
+}
+
+fn json(out: &Output) -> Value {
+    assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+    serde_json::from_slice(&out.stdout).unwrap()
+}
+
+#[test]
+fn help_and_version() {
+    for args in [&["--help"][..], &["-h"], &["--version"], &["render", "--help"], &["doctor", "-h"], &["diff", "--help"]] {
+        let out = run(args);
+        assert!(out.status.success() && out.stderr.is_empty() && !out.stdout.is_empty(), "{args:?}");
+    }
+    let help = String::from_utf8(run(&["--help"]).stdout).unwrap();
+    assert!(help.contains("Exit codes") && help.contains("130"));
+}
+
+#[test]
+fn usage_errors() {
+    let out = "/nonexistent/a.exr";
+    let render = |extra: &[&'static str]| [&["render", "builtin:plane", "-o", out], extra].concat();
+    fails(&[], 64, "no command");
+    fails(&["fly"], 64, "fly");
+    fails(&["render", "builtin:plane"], 64, "--output");
+    fails(&["render", "builtin:plane", "-o", "a.jpg"], 64, ".exr or .png");
+    fails(&["render", "builtin:plane", "-o", "a.png", "--aov", "depth"], 64, "--aov needs an .exr");
+    fails(&render(&["--tracer", "magic"]), 64, "pipeline, query, compute");
+    fails(&render(&["--size", "0x5"]), 64, "at least 1");
+    fails(&render(&["--size", "20000x20000"]), 64, "16384x16384 is the most");
+    fails(&render(&["--size", "5"]), 64, "WIDTHxHEIGHT");
+    fails(&render(&["--spp", "0"]), 64, "--spp");
+    fails(&render(&["--fov-y", "nan"]), 64, "--fov-y");
+    fails(&render(&["--ao-falloff", "0.5"]), 64, "at least 1");
+    fails(&render(&["--ao-radius", "-1"]), 64, "above 0");
+    fails(&render(&["--time-limit", "-3"]), 64, "above 0");
+    fails(&render(&["--eye", "1,2,3"]), 64, "--target");
+    fails(&render(&["--eye", "1,2", "--target", "0,0,0"]), 64, "X,Y,Z");
+    fails(&render(&["--eye", "1,2,3", "--target", "1,2,3"]), 64, "same point");
+    fails(&render(&["--aov", "depth,smell"]), 64, "smell");
+    fails(&["diff", "a.exr"], 64, "<B>");
+    fails(&["export", "builtin:plane", "a.txt"], 64, ".bin, .glb or .gltf");
+}
+
+#[test]
+fn missing_inputs_and_bad_places() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = |name: &str| path(&dir.path().join(name)).to_owned();
+    // before any work is done, so no device is needed
+    fails(&["render", "builtin:plane", "-o", &at("no/such/folder.exr")], 4, "folder does not exist");
+    std::fs::create_dir(dir.path().join("folder.exr")).unwrap();
+    fails(&["render", "builtin:plane", "-o", &at("folder.exr")], 4, "is a folder");
+    fails(&["rays", "--mesh", "builtin:plane", "--rays", &at("none.bin")], 3, "no such file");
+    std::fs::write(dir.path().join("odd.bin"), [0; 33]).unwrap();
+    fails(&["rays", "--mesh", "builtin:plane", "--rays", &at("odd.bin")], 3, "32 bytes");
+    fails(&["diff", &at("none.exr"), &at("none.exr")], 3, "no such file");
+    std::fs::write(dir.path().join("text.exr"), "not an image").unwrap();
+    fails(&["diff", &at("text.exr"), &at("text.exr")], 3, "text.exr");
+    std::fs::write(dir.path().join("text.png"), "not an image").unwrap();
+    fails(&["diff", &at("text.png"), &at("text.png")], 3, "text.png");
+    assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 4);
+}
+
+#[test]
+fn failures_as_json() {
+    let args = ["render", "builtin:plane", "-o", "a.jpg", "--json"];
+    let out = run(&args);
+    expect_failure(&out, 64, ".exr", &args);
+    let record: Value = serde_json::from_slice(&out.stdout).unwrap();
+    assert_eq!(record["exit_code"], 64);
+    assert!(record["error"].as_str().unwrap().contains(".png"));
+}
+
+#[test]
+fn scenes_are_listed() {
+    let out = run(&["scenes"]);
+    let text = String::from_utf8(out.stdout).unwrap();
+    assert!(text.lines().any(|l| l.starts_with("builtin:cornell-box ")));
+    let list = json(&run(&["scenes", "--json"]));
+    assert_eq!(list.as_array().unwrap().len(), text.lines().count());
+}
+
+#[cfg(unix)]
+#[test]
+fn a_reader_that_goes_away_is_no_error() {
+    let mut child = skylit(&["scenes"]).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    drop(child.stdout.take());
+    let out = child.wait_with_output().unwrap();
+    assert!(out.status.success() && out.stderr.is_empty(), "{}", String::from_utf8_lossy(&out.stderr));
+    if let Ok(full) = std::fs::OpenOptions::new().write(true).open("/dev/full") {
+        let out = skylit(&["scenes"]).stdout(full).output().unwrap();
+        expect_failure(&out, 4, "the disk is full", &["scenes"]);
+    }
+}
+
+#[test]
+fn no_driver_is_exit_code_2() {
+    let dir = tempfile::tempdir().unwrap();
+    let file = dir.path().join("a.png");
+    for args in [&["doctor"][..], &["render", "builtin:plane", "-o", path(&file)]] {
+        let out = skylit(args).env("VK_DRIVER_FILES", "/nonexistent").env("VK_ICD_FILENAMES", "/nonexistent").output().unwrap();
+        expect_failure(&out, 2, "Vulkan", args);
+    }
+    assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 0);
+}
+
+/// From a scene to files and back to numbers, on whatever device there is.
+#[test]
+fn gpu_render_end_to_end() {
+    if !run(&["doctor"]).status.success() {
+        assert!(std::env::var_os("SKYLIT_EXPECT_TRACERS").is_none(), "no usable Vulkan device");
+        println!("skipped: no usable Vulkan device");
+        return;
+    }
+    let dir = tempfile::tempdir().unwrap();
+    let at = |name: &str| path(&dir.path().join(name)).to_owned();
+    let (exr, png, depth, rays) = (at("a.exr"), at("a.png"), at("d.png"), at("r"));
+    let base = ["render", "builtin:cornell-box", "--size", "64x48", "--spp", "4", "--validation", "-o"];
+    let extra = ["--aov", "all", "--depth-image", &depth, "--dump-rays", &rays, "--explain", "--json"];
+    let record = json(&run(&[&base[..], &[&exr], &extra].concat()));
+    assert_eq!((record["spp"].as_u64(), record["width"].as_u64()), (Some(4), Some(64)));
+    assert!(record["explain"].as_array().is_some_and(|a| !a.is_empty()));
+    let mean = record["mean"].as_f64().unwrap();
+    assert!(mean > 0.0 && mean < 1.0);
+
+    // the file says the same
+    let image = skylit::output::load(exr.as_ref()).unwrap();
+    let y = image.f32("Y").unwrap();
+    assert!((y.iter().map(|&v| f64::from(v)).sum::<f64>() / y.len() as f64 - mean).abs() < 1e-6);
+    for name in ["A", "variance", "depth.Z", "position.Y", "Ng.Z", "Ns.X", "albedo.G"] {
+        assert!(image.f32(name).is_some(), "{name}");
+    }
+    for key in ["scene", "camera", "spp", "tracer", "device", "version"] {
+        assert!(image.metadata(key).is_some(), "{key}");
+    }
+
+    // the same command gives the same bytes
+    json(&run(&[&base[..], &[&at("b.exr")], &["--aov", "all", "--json"]].concat()));
+    assert_eq!(std::fs::read(&exr).unwrap(), std::fs::read(at("b.exr")).unwrap());
+
+    // PNG, and the difference between the two is what 8 bits lose
+    let quiet = run(&[&base[..], &[&png], &["--quiet"]].concat());
+    assert!(quiet.status.success() && quiet.stdout.is_empty());
+    let difference = json(&run(&["diff", &png, &exr, "--json"]));
+    let channel = &difference["channels"][0];
+    assert!(channel["max"].as_f64().unwrap() < 0.005, "{channel}");
+    fails(&["diff", &png, &exr, "--max-rmse", "0", "--quiet"], 1, "RMSE");
+
+    // the rays that were dumped, traced again
+    let mesh = at("mesh.bin");
+    assert!(run(&["export", "builtin:cornell-box", &mesh]).status.success());
+    let traced = json(&run(&[
+        "rays",
+        "--mesh",
+        &mesh,
+        "--rays",
+        &format!("{rays}.primary.bin"),
+        "--hits",
+        &at("h.bin"),
+        "--repeats",
+        "1",
+        "--json",
+    ]));
+    assert_eq!(traced["rays"].as_u64(), Some(64 * 48));
+    assert_eq!(std::fs::metadata(at("h.bin")).unwrap().len(), 64 * 48 * 20);
+    // each hit of a camera ray started one occlusion ray
+    let occlusion = std::fs::metadata(format!("{rays}.ao.bin")).unwrap().len() / 32;
+    assert_eq!(traced["hits"].as_u64(), Some(occlusion));
+
+    let missing = ["--camera", "nobody"];
+    fails(&[&base[..], &[&png], &missing].concat(), 64, "no such camera");
+    fails(&[&base[..], &[&png], &["--device", "no such device"]].concat(), 2, "no such device");
+    fails(&["render", "builtin:no-such-scene", "-o", &png], 64, "no-such-scene");
+}
+
+/// A time limit writes what there is; Ctrl-C does only when asked.
+#[cfg(unix)]
+#[test]
+fn gpu_stopping_early() {
+    if !run(&["doctor"]).status.success() {
+        println!("skipped: no usable Vulkan device");
+        return;
+    }
+    let dir = tempfile::tempdir().unwrap();
+    let out = dir.path().join("a.exr");
+    let base = ["render", "builtin:stairs", "--size", "320x200", "--spp", "100000", "-o", path(&out)];
+    let record = json(&run(&[&base[..], &["--time-limit", "0.5", "--json"]].concat()));
+    assert_eq!(record["stopped_early"], true);
+    assert!(out.exists());
+    std::fs::remove_file(&out).unwrap();
+    for keep in [false, true] {
+        let args = if keep { [&base[..], &["--keep-partial"]].concat() } else { base.to_vec() };
+        let child = skylit(&args).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+        std::thread::sleep(std::time::Duration::from_secs(3));
+        assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
+        let done = child.wait_with_output().unwrap();
+        assert_eq!(done.status.code(), Some(130), "{}", String::from_utf8_lossy(&done.stderr));
+        assert!(String::from_utf8_lossy(&done.stderr).contains("skylit: error: interrupted"));
+        assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), usize::from(keep));
+    }
+}

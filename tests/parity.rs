@@ -1,0 +1,154 @@
+//! The parity gate: one ray set through every tracer and the f64 oracle. Rays per scene: at least a million.
+
+mod common;
+
+use common::{assert_validation_clean, device, tracer, tracers};
+use skylit::gpu::Device;
+use skylit::measure::parity::{judge_any, judge_closest, judge_pair};
+use skylit::measure::ray_sets::{ao_rays, camera_rays, leak_rays, random_rays};
+use skylit::oracle::Oracle;
+use skylit::oracle::rounding::Rounding;
+use skylit::ray::Ray;
+use skylit::render::rays::{Mode, trace};
+use skylit::render::{Uncontrolled, camera};
+use skylit::scene::builtin::by_name;
+use skylit::scene::{Camera, Scene};
+use std::sync::Arc;
+
+/// Unexplained mismatches that the gate lets pass.
+const BOUND: f64 = 1e-5;
+
+fn scene(name: &str) -> Scene {
+    by_name(name).unwrap_or_else(|| panic!("no built-in scene {name}"))
+}
+
+/// A third random, a third from the camera, a third ambient occlusion rays of the camera's hits.
+fn ray_set(oracle: &Oracle, scene: &Scene, total: usize) -> Vec<Ray> {
+    let camera: Camera = camera::choose(scene, &camera::Choice::Auto, 1.0).unwrap();
+    let edge = ((total / 3) as f64).sqrt().ceil() as u32;
+    let mut rays = camera_rays(oracle, &camera, [edge, edge], 1);
+    let hits = oracle.trace_closest(&rays);
+    let covered = hits.iter().filter(|h| h.is_hit()).count().max(1);
+    rays.extend(ao_rays(oracle, &rays.clone(), &hits, (total / 3).div_ceil(covered) as u32, f32::INFINITY as f64, 2));
+    let missing = total.saturating_sub(rays.len()).max(total / 3);
+    rays.extend(random_rays(oracle, missing, 3));
+    rays
+}
+
+fn gate(device: &Arc<Device>, name: &str, scene: &Scene, total: usize) {
+    let oracle = Oracle::new(scene, scene.origin());
+    let rays = ray_set(&oracle, scene, total);
+    assert!(rays.len() >= total);
+    let (truth, occluded) = (oracle.trace_closest(&rays), oracle.trace_any(&rays));
+    let rounding = Rounding::default();
+    let mut first: Option<Vec<_>> = None;
+    for kind in tracers(device) {
+        let tracer = tracer(device, kind, scene);
+        let (hits, _) = trace(&tracer, &rays, Mode::Closest, 1, &mut Uncontrolled).unwrap();
+        let report = judge_closest(&oracle, &rays, &hits, &truth, rounding);
+        println!("{name} {kind} closest against the oracle: {report}");
+        assert!(report.unexplained_fraction() <= BOUND, "{name} {kind}: {report}");
+        assert!(report.hits > report.rays / 10, "{name}: the set hardly meets the scene");
+        // ties are for edges: were they common, the judge would be too kind
+        assert!(report.ties < report.rays / 50, "{name} {kind}: {report}");
+        let (any, _) = trace(&tracer, &rays, Mode::Any, 1, &mut Uncontrolled).unwrap();
+        let any: Vec<bool> = any.iter().map(|h| h.is_hit()).collect();
+        let report = judge_any(&oracle, &rays, &any, &occluded, rounding);
+        println!("{name} {kind} any     against the oracle: {report}");
+        assert!(report.unexplained_fraction() <= BOUND, "{name} {kind} any: {report}");
+        if let Some(first) = &first {
+            let report = judge_pair(&oracle, &rays, &hits, first, rounding);
+            println!("{name} {kind} closest against the first tracer: {report}");
+            assert!(report.unexplained_fraction() <= BOUND, "{name} {kind} pair: {report}");
+        } else {
+            first = Some(hits);
+        }
+    }
+    assert_validation_clean(device);
+}
+
+#[test]
+fn gpu_parity_cornell() {
+    gate(&device(), "cornell-box", &scene("cornell-box"), 1_000_000);
+}
+
+#[test]
+fn gpu_parity_sphere_over_plane() {
+    gate(&device(), "sphere-over-plane", &scene("sphere-over-plane"), 1_000_000);
+}
+
+#[test]
+fn gpu_parity_instances() {
+    gate(&device(), "grid:8", &scene("grid:8"), 1_000_000);
+}
+
+#[test]
+fn gpu_parity_alpha_masks() {
+    gate(&device(), "leaf-cards", &scene("leaf-cards"), 1_000_000);
+}
+
+#[test]
+fn gpu_parity_spheres() {
+    gate(&device(), "spheres:500", &scene("spheres:500"), 1_000_000);
+}
+
+#[test]
+fn gpu_parity_far_from_the_origin() {
+    gate(&device(), "far-away", &scene("far-away"), 1_000_000);
+}
+
+#[test]
+fn gpu_parity_sponza() {
+    let Some(folder) = common::shared_scenes() else { return };
+    let path = folder.join("sponza/sponza.glb");
+    gate(&device(), "sponza", &skylit::scene::load::load(&path.to_string_lossy()).unwrap(), 1_000_000);
+}
+
+/// The 32-bit loads that devices without shaderInt64 take give the same hits, bit for bit.
+#[test]
+fn gpu_parity_without_int64() {
+    let narrow = common::open(skylit::gpu::Options { no_int64: true, validation: true, ..Default::default() });
+    let wide = device();
+    assert!(!narrow.info.int64);
+    let scene = scene("leaf-cards");
+    let oracle = Oracle::new(&scene, scene.origin());
+    let rays = ray_set(&oracle, &scene, 100_000);
+    let hits = |d: &Arc<Device>| {
+        let t = tracer(d, skylit::tracer::TracerKind::Compute, &scene);
+        trace(&t, &rays, Mode::Closest, 1, &mut Uncontrolled).unwrap().0
+    };
+    assert_eq!(hits(&narrow), hits(&wide));
+    assert_validation_clean(&narrow);
+}
+
+/// Rays aimed at shared edges and corners of a closed mesh, at scales of 1e-3 to 1e6 and offsets to 1e6: the compute tracer
+/// lets none through. What the hardware tracers let through is the driver's affair: Vulkan asks for watertight triangles, but
+/// lavapipe 25.0 leaks a few in a thousand of such rays. It is printed, and bounded so that a fault of ours would show.
+#[test]
+fn gpu_nothing_leaks() {
+    use glam::DVec3;
+    use skylit::scene::builtin::{self, Placement};
+    let device = device();
+    for (scale, offset) in [(1.0, 0.0), (1e-3, 0.0), (1e3, 0.0), (1e6, 0.0), (1.0, 1e6), (1e-3, 1.0), (1e3, -1e6)] {
+        let place = Placement { scale, offset: DVec3::new(offset, offset * 0.37, -offset * 0.71) };
+        // as placed (the origin is moved to the scene), and with the offset baked into the vertices
+        let cube = builtin::analytic::closed_box(1.0, place);
+        let mut sphere = cube.clone();
+        sphere.meshes[0].geometry = builtin::shapes::icosphere(1.0, 5);
+        for scene in [builtin::bake(&cube), cube, builtin::bake(&sphere), sphere] {
+            let oracle = Oracle::new(&scene, scene.origin());
+            let rays = leak_rays(&oracle, 100_000, 7);
+            for kind in tracers(&device) {
+                let tracer = tracer(&device, kind, &scene);
+                let (any, _) = trace(&tracer, &rays, Mode::Any, 1, &mut Uncontrolled).unwrap();
+                let (closest, _) = trace(&tracer, &rays, Mode::Closest, 1, &mut Uncontrolled).unwrap();
+                let leaks = |hits: &[skylit::ray::Hit]| hits.iter().filter(|h| !h.is_hit()).count();
+                let (a, c) = (leaks(&any), leaks(&closest));
+                println!("scale {scale} offset {offset} {kind}: {a} leaks of {} any, {c} closest", rays.len());
+                let allowed = if kind == skylit::tracer::TracerKind::Compute { 0 } else { rays.len() / 50 };
+                assert!(a <= allowed && c <= allowed, "{kind} scale {scale} offset {offset}: {a} and {c} leaks");
+            }
+        }
+    }
+    assert_validation_clean(&device);
+}
