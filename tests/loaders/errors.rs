@@ -44,6 +44,57 @@ fn truncated_glb() {
 }
 
 #[test]
+fn odd_glb() {
+    let folder = Folder::new();
+    let glb = Doc::triangle().glb();
+    for length in 0..20u32 {
+        let mut short = glb.clone();
+        short[8..12].copy_from_slice(&length.to_le_bytes());
+        assert!(message(folder.load("a.glb", &short)).contains("truncated"), "{length}");
+        short[4] = 3;
+        assert!(message(folder.load("a.glb", &short)).contains("version 3"), "{length}");
+    }
+    // what follows the length is not looked at
+    let mut long = glb.clone();
+    long.extend_from_slice(b"more");
+    assert!(folder.load("a.glb", &long).is_ok());
+    // chunks of other kinds are skipped: after the binary one, and in its place
+    let mut more = glb;
+    more.extend_from_slice(b"\x04\0\0\0MORE1234");
+    let length = more.len() as u32;
+    more[8..12].copy_from_slice(&length.to_le_bytes());
+    assert!(folder.load("a.glb", &more).is_ok());
+    let mut text = Doc::triangle().gltf();
+    text.resize(text.len().next_multiple_of(4), b' ');
+    let chunk = |kind: &[u8], body: &[u8]| [&(body.len() as u32).to_le_bytes(), kind, body].concat();
+    let whole = |chunks: Vec<u8>| [b"glTF\x02\0\0\0", &(12 + chunks.len() as u32).to_le_bytes()[..], &chunks].concat();
+    assert!(folder.load("a.glb", whole(chunk(b"JSON", &text))).is_ok());
+    assert!(folder.load("a.glb", whole([chunk(b"JSON", &text), chunk(b"MORE", b"1234")].concat())).is_ok());
+    assert!(message(folder.load("a.glb", whole(chunk(b"MORE", &text)))).contains("first chunk"));
+    assert!(message(folder.load("a.glb", whole(chunk(b"BIN\0", &text)))).contains("broken"));
+}
+
+/// What the specification allows and the crate `gltf` does not.
+#[test]
+fn lenient_where_the_specification_is() {
+    let mut doc = Doc::triangle();
+    doc.push("scenes", json!({ "name": "empty" }));
+    doc.push(
+        "animations",
+        json!({ "samplers": [{ "input": 0, "output": 0 }],
+        "channels": [{ "sampler": 0, "target": { "path": "pointer" } }] }),
+    );
+    doc.json["nodes"][0]["extras"] = json!("text");
+    assert!(doc.load().report.warnings[0].contains("animations"));
+    // an extension that is not known where it is used, and one that is broken
+    doc.push("materials", json!({ "name": "m", "extensions": { "EXT_new": { "a": [1] } } }));
+    assert!(doc.try_load().is_ok());
+    doc.json["materials"][0]["extensions"] = json!({ "KHR_materials_sheen": { "sheenColorFactor": "red" } });
+    let text = doc.error();
+    assert!(text.contains("material 0") && text.contains("KHR_materials_sheen"), "{text}");
+}
+
+#[test]
 fn bad_json_and_versions() {
     let folder = Folder::new();
     assert!(message(folder.load("a.gltf", "{ \"asset\": ")).contains("JSON"));
@@ -84,7 +135,7 @@ fn accessors_out_of_range() {
         (json!({ "byteOffset": 4 }), "accessor 0"),
         (json!({ "byteOffset": u64::MAX }), "accessor 0"),
         (json!({ "bufferView": 9 }), "buffer view 9"),
-        (json!({ "componentType": 5124 }), "component type 5124"),
+        (json!({ "componentType": 5124 }), "component type"),
         (json!({ "type": "VEC2" }), "VEC3 is needed"),
     ];
     for (change, expected) in cases {

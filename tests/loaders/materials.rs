@@ -137,6 +137,13 @@ fn texture_transform() {
     let s = slot(json!({ "scale": [2, 3], "texCoord": 1 }));
     assert_eq!(s.transform.transform_point2(Vec2::ONE), Vec2::new(2.0, 3.0));
     assert_eq!(s.texcoord, 1);
+    // the same on every kind of texture
+    let transform = json!({ "index": 0, "extensions": { "KHR_texture_transform": { "scale": [2, 3], "texCoord": 1 } } });
+    let doc = with_material(json!({
+        "normalTexture": transform, "occlusionTexture": transform, "emissiveTexture": transform,
+        "extensions": { "KHR_materials_clearcoat": { "clearcoatTexture": transform, "clearcoatNormalTexture": transform } },
+    }));
+    assert_eq!(material(&doc.load()).textures().filter(|t| *t == s).count(), 5);
 }
 
 #[test]
