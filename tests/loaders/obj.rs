@@ -48,6 +48,100 @@ fn vertices_are_welded_by_position_texcoord_and_normal() {
     assert_eq!(m.normals[6], Vec3::Z);
 }
 
+/// The outline is counter-clockwise.
+fn check_cut(outline: &[[f32; 2]]) {
+    let n = outline.len();
+    let cross = |a: [f32; 2], b: [f32; 2]| a[0] * b[1] - a[1] * b[0];
+    let area: f32 = (0..n).map(|i| cross(outline[i], outline[(i + 1) % n]) / 2.0).sum();
+    assert!(area > 0.0);
+    // whichever corner comes first, whichever way it turns, in whichever plane, near and far
+    for case in 0..n * 2 * 3 * 2 {
+        let (start, case) = (case % n, case / n);
+        let (reversed, axis, far) = (case % 2 == 1, case / 2 % 3, case / 6 == 1);
+        let at = |i: usize| {
+            let i = (start + i) % n;
+            outline[if reversed { n - 1 - i } else { i }]
+        };
+        let place = |[x, y]: [f32; 2]| {
+            // a slope, so that the plane is no axis plane
+            let mut p = [x, y, 0.25 * x + 0.125 * y];
+            p.rotate_right(axis);
+            p.map(|c| c + if far { 1024.0 } else { 0.0 })
+        };
+        let mut text = String::new();
+        let mut face = "f".to_owned();
+        for (i, p) in (0..n).map(at).enumerate() {
+            let [x, y, z] = place(p);
+            text += &format!("v {x} {y} {z}\nvt {} {}\n", p[0], 1.0 - p[1]);
+            face += &format!(" {0}/{0}", i + 1);
+        }
+        let scene = Folder::new().load("a.obj", text + &face).unwrap();
+        let m = mesh(&scene, 0);
+        assert_eq!(m.indices.len(), n - 2);
+        let mut sum = 0.0;
+        for t in &m.indices {
+            let [a, b, c] = t.map(|i| m.texcoords[0][i as usize]);
+            let signed = (b - a).perp_dot(c - a) / 2.0;
+            assert!(if reversed { signed < 0.0 } else { signed > 0.0 }, "{t:?} of {outline:?} from {start}");
+            sum += signed.abs();
+            // texture coordinates stay with their corners
+            for &i in t {
+                assert_eq!(m.positions[i as usize].to_array(), place(m.texcoords[0][i as usize].into()));
+            }
+        }
+        // all turn the same way and add up: they cover the polygon once
+        assert!((sum - area).abs() < 1e-4, "{sum} for {area}: {outline:?} from {start}");
+    }
+}
+
+#[test]
+fn concave_polygons() {
+    let dart = [[-1.0, -1.0], [0.0, -0.5], [1.0, -1.0], [0.0, 1.0]];
+    let l = [[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [1.0, 1.0], [1.0, 3.0], [0.0, 3.0]];
+    let star: Vec<[f32; 2]> = (0..10)
+        .map(|i| {
+            let (s, c) = (i as f32 * std::f32::consts::TAU / 10.0).sin_cos();
+            // digits that f32 text, the shift to far away and the slope keep
+            [s, c].map(|x| ((if i % 2 == 0 { 64.0 } else { 16.0 }) * -x).round() / 32.0)
+        })
+        .rev()
+        .collect();
+    let comb = [
+        [0.0, 0.0],
+        [7.0, 0.0],
+        [7.0, 4.0],
+        [6.0, 4.0],
+        [6.0, 1.0],
+        [4.0, 1.5],
+        [4.0, 4.0],
+        [3.0, 4.0],
+        [3.0, 1.0],
+        [1.0, 1.5],
+        [1.0, 4.0],
+        [0.0, 4.5],
+    ];
+    let square = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
+    for outline in [&dart[..], &l, &star, &comb, &square] {
+        check_cut(outline);
+    }
+}
+
+#[test]
+fn convex_polygons_stay_fans() {
+    let text = "v 0 0 0\nv 2 0 0\nv 3 1 0\nv 2 2 0\nv 0 2 0\nf 2 3 4 5 1\n";
+    let scene = Folder::new().load("a.obj", text).unwrap();
+    assert_eq!(mesh(&scene, 0).indices, [[0, 1, 2], [0, 2, 3], [0, 3, 4]]);
+}
+
+#[test]
+fn polygons_that_are_none() {
+    // crossing itself, on a line, one point, there and back
+    for face in ["1 3 2 4", "1 2 5 2", "1 1 1 1 1", "1 2 3 2 1", "1 3 2 4 1 3 2 4 5"] {
+        let text = format!("v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 2 0 0\nf {face}\nf 1 2 3\n");
+        assert!(Folder::new().load("a.obj", text).unwrap().triangle_count() >= 1);
+    }
+}
+
 #[test]
 fn vertex_colors() {
     let scene = Folder::new().load("a.obj", "v 0 0 0 1 0.5 0\nv 1 0 0 1 1 1\nv 0 1 0\nf 1 2 3\n").unwrap();
