@@ -21,7 +21,7 @@ pub(super) fn finish(scene: &mut Scene, path: &Path) -> Result<()> {
     if scene.materials.is_empty() {
         scene.materials.push(Material::default());
     }
-    texcoord_sets(scene);
+    materials(scene);
     bake_singular(scene);
     drop_unplaced(scene);
 
@@ -75,9 +75,22 @@ fn check_mesh(mesh: &Mesh) -> Result<(), String> {
     Ok(())
 }
 
-/// Slots that ask for a third or later set of texture coordinates get the first: we keep two.
-fn texcoord_sets(scene: &mut Scene) {
+/// Brings the numbers of materials into the ranges that [`Material`] documents, as far as rendering depends on it.
+fn materials(scene: &mut Scene) {
     for material in &mut scene.materials {
+        if !material.base_color.is_finite() || !material.emissive.is_finite() {
+            let name = &material.name;
+            scene.report.warnings.push(format!("material `{name}` has a colour that is not finite: replaced"));
+            material.base_color = glam::Vec4::ONE;
+            material.emissive = glam::Vec3::ZERO;
+        }
+        for share in [&mut material.metallic, &mut material.roughness] {
+            *share = share.clamp(0.0, 1.0);
+        }
+        for slot in material.texture_slots_mut().into_iter().flatten().filter(|s| !s.transform.is_finite()) {
+            slot.transform = glam::Affine2::IDENTITY;
+        }
+        // we keep two sets of texture coordinates; slots that ask for others get the first
         for slot in material.texture_slots_mut().into_iter().flatten().filter(|s| s.texcoord > 1) {
             let set = std::mem::take(&mut slot.texcoord);
             scene.report.warnings.push(format!("texture coordinates {set} are not read (0 and 1 are): 0 taken"));
@@ -85,15 +98,22 @@ fn texcoord_sets(scene: &mut Scene) {
     }
 }
 
-/// Tracers invert transforms. A mesh that its transform squashes flat gets it applied to its vertices instead.
+/// Tracers invert transforms. A mesh that its transform squashes flat gets it applied to its vertices instead; one that is
+/// squashed to a line or a point, which is a way of hiding it, has nothing to show and is not placed.
 fn bake_singular(scene: &mut Scene) {
+    let before = scene.instances.len();
+    scene.instances.retain(|i| {
+        let m = &i.object_to_world.matrix3;
+        let [x, y, z] = [m.x_axis, m.y_axis, m.z_axis];
+        [x.cross(y), y.cross(z), z.cross(x)].iter().any(|n| *n != DVec3::ZERO)
+    });
+    let hidden = before - scene.instances.len();
+    if hidden > 0 {
+        scene.report.warnings.push(format!("{hidden} meshes are scaled to nothing: left out"));
+    }
     for instance in &mut scene.instances {
-        let inverse = instance.object_to_world.inverse();
-        let largest = inverse
-            .to_cols_array()
-            .into_iter()
-            .fold(0.0, |a: f64, x| if x.is_finite() { a.max(x.abs()) } else { f64::INFINITY });
-        if largest <= MAX_INVERSE {
+        let inverse = instance.object_to_world.inverse().to_cols_array();
+        if inverse.iter().all(|x| x.abs() <= MAX_INVERSE) {
             continue;
         }
         let source = &scene.meshes[instance.mesh];
@@ -101,6 +121,7 @@ fn bake_singular(scene: &mut Scene) {
             Geometry::Triangles(t) => {
                 let place = |p: &glam::Vec3| instance.object_to_world.transform_point3(p.as_dvec3()).as_vec3();
                 let positions = t.positions.iter().map(place).collect();
+                // empty normals: the inverse that would turn them does not exist
                 Geometry::Triangles(TriangleMesh { positions, normals: Vec::new(), tangents: Vec::new(), ..t.clone() })
             }
             Geometry::Spheres(_) => Geometry::Spheres(Vec::new()),

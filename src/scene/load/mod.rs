@@ -1,6 +1,7 @@
-//! Files to [`Scene`]: a reader for each format, then [`finish`], which makes the promises that every scene keeps.
+//! Files to [`Scene`]: a reader for each format, then `finish`, which makes the promises that every scene keeps.
 
 mod brhan;
+mod compact;
 mod find;
 mod finish;
 mod gltf;
@@ -13,6 +14,9 @@ use std::path::Path;
 
 use crate::error::{Error, Result};
 use crate::scene::{Scene, builtin};
+
+/// Extensions of scene files.
+const FORMATS: [&str; 4] = ["gltf", "glb", "obj", "brhan"];
 
 /// Loads a scene: a built-in one by name (`builtin:NAME`, or `NAME` alone where no such file exists), or a file by its
 /// extension, in either case of letters: `.gltf`, `.glb`, `.obj`, `.brhan`.
@@ -31,11 +35,14 @@ pub fn load(source: &str) -> Result<Scene> {
             .ok_or_else(|| Error::Usage(format!("no built-in scene is called `{name}`; `skylit scenes` lists them")));
     }
     let path = Path::new(source);
-    if path.extension().is_none() && !path.exists() {
+    let extension = extension(path);
+    if !FORMATS.contains(&extension.as_str()) && !path.is_file() {
         if let Some(scene) = builtin::by_name(source) {
             return Ok(scene);
         }
-        return Err(Error::input(path, "no such file, and no built-in scene of that name (`skylit scenes` lists them)"));
+        if extension.is_empty() && !path.exists() {
+            return Err(Error::input(path, "no such file, and no built-in scene of that name (`skylit scenes` lists them)"));
+        }
     }
     load_file(path)
 }
@@ -64,6 +71,7 @@ fn read_model(path: &Path) -> Result<Scene> {
     match extension(path).as_str() {
         "gltf" | "glb" => gltf::read(path),
         "obj" => obj::read(path),
+        "brhan" => Err(Error::input(path, "is a whole scene, not a model")),
         "" => Err(Error::input(path, "has no extension; skylit reads .gltf, .glb, .obj and .brhan")),
         other => Err(Error::input(path, format!("cannot read .{other} files; skylit reads .gltf, .glb, .obj and .brhan"))),
     }

@@ -2,78 +2,58 @@
 
 use std::borrow::Cow;
 
-use super::schema::{Accessor, Document};
+use ::gltf::json::accessor::{Accessor, ComponentType, Type};
+use ::gltf::json::{Index, Root, buffer};
+
+use super::valid;
 
 /// Elements that an accessor without data (all zeros, or sparse over zeros) may have; nothing in the file bounds them.
 const MAX_EMPTY: u64 = 1 << 24;
 
 /// Reads accessors. Errors are in words and name the accessor; the caller adds the file.
 pub(super) struct Reader<'a> {
-    pub document: &'a Document,
+    pub document: &'a Root,
     pub buffers: &'a [Cow<'a, [u8]>],
 }
 
-#[derive(Clone, Copy, PartialEq)]
-enum Component {
-    I8,
-    U8,
-    I16,
-    U16,
-    U32,
-    F32,
+/// Reads one component of an element.
+trait Decode {
+    /// The float at the start of `b`; normalised integers map to [0, 1] or [-1, 1] as the specification says.
+    fn float(self, b: &[u8], normalized: bool) -> f32;
+    /// The unsigned integer at the start of `b`.
+    fn index(self, b: &[u8]) -> u32;
+    fn is_index(&self) -> bool;
 }
 
-impl Component {
-    fn new(code: u32) -> Option<Self> {
-        Some(match code {
-            5120 => Component::I8,
-            5121 => Component::U8,
-            5122 => Component::I16,
-            5123 => Component::U16,
-            5125 => Component::U32,
-            5126 => Component::F32,
-            _ => return None,
-        })
-    }
-
-    fn size(self) -> usize {
-        match self {
-            Component::I8 | Component::U8 => 1,
-            Component::I16 | Component::U16 => 2,
-            Component::U32 | Component::F32 => 4,
-        }
-    }
-
-    /// The float at the start of `b`; normalised integers map to [0, 1] or [-1, 1] as the specification says.
+impl Decode for ComponentType {
     #[inline(always)]
     fn float(self, b: &[u8], normalized: bool) -> f32 {
         match (self, normalized) {
-            (Component::F32, _) => f32::from_le_bytes([b[0], b[1], b[2], b[3]]),
-            (Component::I8, false) => f32::from(b[0] as i8),
-            (Component::U8, false) => f32::from(b[0]),
-            (Component::I16, false) => f32::from(i16::from_le_bytes([b[0], b[1]])),
-            (Component::U16, false) => f32::from(u16::from_le_bytes([b[0], b[1]])),
-            (Component::I8, true) => (f32::from(b[0] as i8) / 127.0).max(-1.0),
-            (Component::U8, true) => f32::from(b[0]) / 255.0,
-            (Component::I16, true) => (f32::from(i16::from_le_bytes([b[0], b[1]])) / 32767.0).max(-1.0),
-            (Component::U16, true) => f32::from(u16::from_le_bytes([b[0], b[1]])) / 65535.0,
-            (Component::U32, false) => u32::from_le_bytes([b[0], b[1], b[2], b[3]]) as f32,
-            (Component::U32, true) => (f64::from(u32::from_le_bytes([b[0], b[1], b[2], b[3]])) / f64::from(u32::MAX)) as f32,
+            (Self::F32, _) => f32::from_le_bytes([b[0], b[1], b[2], b[3]]),
+            (Self::I8, false) => f32::from(b[0] as i8),
+            (Self::U8, false) => f32::from(b[0]),
+            (Self::I16, false) => f32::from(i16::from_le_bytes([b[0], b[1]])),
+            (Self::U16, false) => f32::from(u16::from_le_bytes([b[0], b[1]])),
+            (Self::I8, true) => (f32::from(b[0] as i8) / 127.0).max(-1.0),
+            (Self::U8, true) => f32::from(b[0]) / 255.0,
+            (Self::I16, true) => (f32::from(i16::from_le_bytes([b[0], b[1]])) / 32767.0).max(-1.0),
+            (Self::U16, true) => f32::from(u16::from_le_bytes([b[0], b[1]])) / 65535.0,
+            (Self::U32, false) => u32::from_le_bytes([b[0], b[1], b[2], b[3]]) as f32,
+            (Self::U32, true) => (f64::from(u32::from_le_bytes([b[0], b[1], b[2], b[3]])) / f64::from(u32::MAX)) as f32,
         }
     }
 
-    /// The unsigned integer at the start of `b`.
     #[inline(always)]
     fn index(self, b: &[u8]) -> u32 {
         match self {
-            Component::U8 => u32::from(b[0]),
-            Component::U16 => u32::from(u16::from_le_bytes([b[0], b[1]])),
+            Self::U8 => u32::from(b[0]),
+            Self::U16 => u32::from(u16::from_le_bytes([b[0], b[1]])),
             _ => u32::from_le_bytes([b[0], b[1], b[2], b[3]]),
         }
     }
 
-    fn is_index(self) -> bool {
-        matches!(self, Component::U8 | Component::U16 | Component::U32)
+    fn is_index(&self) -> bool {
+        matches!(self, Self::U8 | Self::U16 | Self::U32)
     }
 }
 
@@ -106,9 +86,9 @@ impl Indices<'_> {
             Indices::InPlace { bytes, stride, size, .. } => {
                 let b = &bytes[i * stride..];
                 match size {
-                    1 => Component::U8.index(b),
-                    2 => Component::U16.index(b),
-                    _ => Component::U32.index(b),
+                    1 => ComponentType::U8.index(b),
+                    2 => ComponentType::U16.index(b),
+                    _ => ComponentType::U32.index(b),
                 }
             }
             Indices::Owned(v) => v[i],
@@ -117,42 +97,44 @@ impl Indices<'_> {
 }
 
 impl<'a> Reader<'a> {
-    fn accessor(&self, index: usize) -> Result<&'a Accessor, String> {
-        self.document
-            .accessors
-            .get(index)
-            .ok_or_else(|| format!("accessor {index} does not exist (the file has {})", self.document.accessors.len()))
+    fn accessor(&self, index: Index<Accessor>) -> Result<&'a Accessor, String> {
+        let all = &self.document.accessors;
+        all.get(index.value()).ok_or_else(|| format!("accessor {index} does not exist (the file has {})", all.len()))
     }
 
     /// Number of elements.
-    pub(super) fn count(&self, index: usize) -> Result<usize, String> {
-        usize::try_from(self.accessor(index)?.count).map_err(|_| format!("accessor {index} has too many elements"))
+    pub(super) fn count(&self, index: Index<Accessor>) -> Result<usize, String> {
+        usize::try_from(self.accessor(index)?.count.0).map_err(|_| format!("accessor {index} has too many elements"))
+    }
+
+    /// What an element is.
+    pub(super) fn shape(&self, index: Index<Accessor>) -> Result<Option<Type>, String> {
+        Ok(valid(self.accessor(index)?.type_))
     }
 
     /// The bytes and stride of a buffer view.
-    pub(super) fn view(&self, index: usize) -> Result<(&'a [u8], Option<usize>), String> {
+    pub(super) fn view(&self, index: Index<buffer::View>) -> Result<(&'a [u8], Option<usize>), String> {
         let views = &self.document.buffer_views;
-        let view =
-            views.get(index).ok_or_else(|| format!("buffer view {index} does not exist (the file has {})", views.len()))?;
+        let view = views
+            .get(index.value())
+            .ok_or_else(|| format!("buffer view {index} does not exist (the file has {})", views.len()))?;
         let buffer = self
             .buffers
-            .get(view.buffer)
+            .get(view.buffer.value())
             .ok_or_else(|| format!("buffer view {index} refers to buffer {}, which does not exist", view.buffer))?;
         // the declared length counts, not the padding that may follow
-        let declared = self.document.buffers[view.buffer].byte_length.min(buffer.len() as u64);
-        match view.byte_offset.checked_add(view.byte_length) {
+        let declared = self.document.buffers[view.buffer.value()].byte_length.0.min(buffer.len() as u64);
+        let (offset, length) = (view.byte_offset.unwrap_or_default().0, view.byte_length.0);
+        match offset.checked_add(length) {
             Some(end) if end <= declared => {
-                Ok((&buffer[view.byte_offset as usize..end as usize], view.byte_stride.map(|s| s as usize).filter(|&s| s > 0)))
+                Ok((&buffer[offset as usize..end as usize], view.byte_stride.map(|s| s.0).filter(|&s| s > 0)))
             }
-            _ => Err(format!(
-                "buffer view {index} lies outside of its buffer (bytes {} + {} of {declared})",
-                view.byte_offset, view.byte_length
-            )),
+            _ => Err(format!("buffer view {index} lies outside of its buffer (bytes {offset} + {length} of {declared})")),
         }
     }
 
     /// `count` elements of `size` bytes from `offset` on in a buffer view.
-    fn elements(&self, view: usize, offset: u64, count: u64, size: usize) -> Result<Elements<'a>, String> {
+    fn elements(&self, view: Index<buffer::View>, offset: u64, count: u64, size: usize) -> Result<Elements<'a>, String> {
         let (bytes, stride) = self.view(view)?;
         let stride = stride.unwrap_or(size);
         if stride < size {
@@ -168,16 +150,18 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// Reads an accessor of floats or (normalised) integers with `N` components (`shape` is its glTF name).
+    /// Reads an accessor of floats or (normalised) integers with the `N` components of `shape`.
     pub(super) fn floats<const N: usize, T>(
         &self,
-        index: usize,
-        shape: &str,
+        index: Index<Accessor>,
+        shape: Type,
         make: impl Fn([f32; N]) -> T,
     ) -> Result<Vec<T>, String> {
         let accessor = self.accessor(index)?;
-        if accessor.shape != shape {
-            return Err(format!("accessor {index} is of type {} where {shape} is needed", accessor.shape));
+        match valid(accessor.type_) {
+            Some(found) if found == shape => {}
+            Some(found) => return Err(format!("accessor {index} is of type {} where {} is needed", name(found), name(shape))),
+            None => return Err(format!("accessor {index} is of an unknown type where {} is needed", name(shape))),
         }
         self.try_floats(accessor, make).map_err(|e| format!("accessor {index}: {e}"))
     }
@@ -186,12 +170,13 @@ impl<'a> Reader<'a> {
         let component = self.component(accessor)?;
         let mut out = match accessor.buffer_view {
             Some(view) => {
-                let elements = self.elements(view, accessor.byte_offset, accessor.count, N * component.size())?;
-                gather(&elements, accessor.count as usize, component, accessor.normalized, &make)
+                let elements =
+                    self.elements(view, accessor.byte_offset.unwrap_or_default().0, accessor.count.0, N * component.size())?;
+                gather(&elements, accessor.count.0 as usize, component, accessor.normalized, &make)
             }
             None => {
                 check_empty(accessor)?;
-                (0..accessor.count).map(|_| make([0.0; N])).collect()
+                (0..accessor.count.0).map(|_| make([0.0; N])).collect()
             }
         };
         if let Some((at, values)) = self.sparse(accessor, N * component.size())? {
@@ -204,24 +189,25 @@ impl<'a> Reader<'a> {
     }
 
     /// Reads a scalar accessor of unsigned integers.
-    pub(super) fn indices(&self, index: usize) -> Result<Indices<'a>, String> {
+    pub(super) fn indices(&self, index: Index<Accessor>) -> Result<Indices<'a>, String> {
         let accessor = self.accessor(index)?;
         self.try_indices(accessor).map_err(|e| format!("accessor {index}: {e}"))
     }
 
     fn try_indices(&self, accessor: &Accessor) -> Result<Indices<'a>, String> {
         let component = self.component(accessor)?;
-        if accessor.shape != "SCALAR" || !component.is_index() {
+        if valid(accessor.type_) != Some(Type::Scalar) || !component.is_index() {
             return Err("holds no indices (unsigned scalars)".to_owned());
         }
         let base = match accessor.buffer_view {
             Some(view) => {
-                let Elements { bytes, stride } = self.elements(view, accessor.byte_offset, accessor.count, component.size())?;
-                Indices::InPlace { bytes, count: accessor.count as usize, stride, size: component.size() }
+                let Elements { bytes, stride } =
+                    self.elements(view, accessor.byte_offset.unwrap_or_default().0, accessor.count.0, component.size())?;
+                Indices::InPlace { bytes, count: accessor.count.0 as usize, stride, size: component.size() }
             }
             None => {
                 check_empty(accessor)?;
-                Indices::Owned(vec![0; accessor.count as usize])
+                Indices::Owned(vec![0; accessor.count.0 as usize])
             }
         };
         let Some((at, values)) = self.sparse(accessor, component.size())? else { return Ok(base) };
@@ -232,31 +218,34 @@ impl<'a> Reader<'a> {
         Ok(Indices::Owned(all))
     }
 
-    fn component(&self, accessor: &Accessor) -> Result<Component, String> {
-        Component::new(accessor.component_type)
-            .ok_or_else(|| format!("has the unknown component type {}", accessor.component_type))
+    fn component(&self, accessor: &Accessor) -> Result<ComponentType, String> {
+        valid(accessor.component_type).map(|c| c.0).ok_or_else(|| "has an unknown component type".to_owned())
     }
 
     /// Which elements a sparse accessor replaces, and by what.
     fn sparse(&self, accessor: &Accessor, size: usize) -> Result<Option<(Vec<usize>, Elements<'a>)>, String> {
         let Some(sparse) = &accessor.sparse else { return Ok(None) };
-        let component = Component::new(sparse.indices.component_type)
-            .filter(|c| c.is_index())
-            .ok_or("has sparse indices of an unknown component type")?;
-        let at = self.elements(sparse.indices.buffer_view, sparse.indices.byte_offset, sparse.count, component.size())?;
-        let values = self.elements(sparse.values.buffer_view, sparse.values.byte_offset, sparse.count, size)?;
-        let at: Vec<usize> = (0..sparse.count as usize).map(|i| component.index(&at.bytes[i * at.stride..]) as usize).collect();
-        match at.iter().find(|&&i| i as u64 >= accessor.count) {
-            Some(i) => Err(format!("replaces element {i} of only {} (sparse)", accessor.count)),
+        let (indices, values, count) = (&sparse.indices, &sparse.values, sparse.count.0);
+        let component = valid(indices.component_type).ok_or("has sparse indices of an unknown component type")?.0;
+        let at = self.elements(indices.buffer_view, indices.byte_offset.0, count, component.size())?;
+        let values = self.elements(values.buffer_view, values.byte_offset.0, count, size)?;
+        let at: Vec<usize> = (0..count as usize).map(|i| component.index(&at.bytes[i * at.stride..]) as usize).collect();
+        match at.iter().find(|&&i| i as u64 >= accessor.count.0) {
+            Some(i) => Err(format!("replaces element {i} of only {} (sparse)", accessor.count.0)),
             None => Ok(Some((at, values))),
         }
     }
 }
 
+/// The type as glTF writes it.
+fn name(shape: Type) -> String {
+    format!("{shape:?}").to_uppercase()
+}
+
 /// Refuses counts that nothing in the file bounds and that would only fill memory with zeros.
 fn check_empty(accessor: &Accessor) -> Result<(), String> {
-    match accessor.count > MAX_EMPTY {
-        true => Err(format!("has {} elements but no data", accessor.count)),
+    match accessor.count.0 > MAX_EMPTY {
+        true => Err(format!("has {} elements but no data", accessor.count.0)),
         false => Ok(()),
     }
 }
@@ -264,7 +253,7 @@ fn check_empty(accessor: &Accessor) -> Result<(), String> {
 fn gather<const N: usize, T>(
     elements: &Elements,
     count: usize,
-    component: Component,
+    component: ComponentType,
     normalized: bool,
     make: impl Fn([f32; N]) -> T,
 ) -> Vec<T> {
@@ -274,10 +263,10 @@ fn gather<const N: usize, T>(
         make(std::array::from_fn(|k| component.float(&b[k * size..], normalized)))
     };
     // the common case apart, so that the compiler sees its constants
-    if component == Component::F32 {
+    if component == ComponentType::F32 {
         let element = |i: usize| {
             let b = &elements.bytes[i * elements.stride..][..N * 4];
-            make(std::array::from_fn(|k| Component::F32.float(&b[k * 4..k * 4 + 4], false)))
+            make(std::array::from_fn(|k| ComponentType::F32.float(&b[k * 4..k * 4 + 4], false)))
         };
         return (0..count).map(element).collect();
     }

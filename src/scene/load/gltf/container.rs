@@ -3,14 +3,18 @@
 use std::borrow::Cow;
 use std::path::Path;
 
-use super::schema::{Asset, Document};
+use ::gltf::binary::{self, Glb};
+use ::gltf::json::{Buffer, Root};
+use serde_json::{Value, json};
+
+use super::node::Doubles;
 use super::uri::{self, Uri};
 use crate::error::{Error, Result};
 
 /// A file's JSON and, in a `.glb`, the binary chunk.
 pub(super) struct Chunks<'a> {
-    pub json: &'a [u8],
-    pub bin: Option<&'a [u8]>,
+    pub json: Cow<'a, [u8]>,
+    pub bin: Option<Cow<'a, [u8]>>,
 }
 
 /// Splits a `.glb`; anything that does not start with its magic is taken for JSON.
@@ -19,59 +23,84 @@ pub(super) fn split<'a>(file: &'a [u8], path: &Path) -> Result<Chunks<'a>> {
     if !file.starts_with(b"glTF") {
         return match is_glb {
             true => Err(Error::input(path, "is no .glb file (it does not begin with `glTF`)")),
-            false => Ok(Chunks { json: file, bin: None }),
+            false => Ok(Chunks { json: file.into(), bin: None }),
         };
     }
-    let word = |at: usize| file.get(at..at + 4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
+    let word = |at: usize| file.get(at..at + 4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]) as usize);
     let truncated = || Error::input(path, "is truncated: the .glb ends before its header says so");
-    let (Some(version), Some(length)) = (word(4), word(8)) else { return Err(truncated()) };
-    if version != 2 {
+    if let Some(version) = word(4).filter(|&v| v != 2) {
         return Err(Error::input(path, format!("is a .glb of version {version}; skylit reads version 2 (glTF 2.0)")));
     }
-    let file = file.get(..length as usize).ok_or_else(truncated)?;
-    let mut chunks = Chunks { json: &[], bin: None };
-    let (mut at, mut nth) = (12, 0);
-    while at < file.len() {
-        let (Some(size), Some(kind)) = (word(at), word(at + 4)) else { return Err(truncated()) };
-        let body = (at + 8).checked_add(size as usize).and_then(|end| file.get(at + 8..end)).ok_or_else(truncated)?;
-        match (nth, &kind.to_le_bytes()) {
-            (0, b"JSON") => chunks.json = body,
-            (0, _) => return Err(Error::input(path, "is broken: the first chunk of the .glb is not JSON")),
-            (1, b"BIN\0") => chunks.bin = Some(body),
-            // chunks of other kinds must be skipped, says the specification
-            _ => {}
-        }
-        // chunks are padded to four bytes; some writers forget it on the last one
-        at += 8 + (size as usize).next_multiple_of(4);
-        nth += 1;
+    // the crate subtracts the header's size from the length without a look, which panics below 12; and it takes what
+    // follows the length for a chunk
+    let whole = word(8).filter(|&length| length >= 12).and_then(|length| file.get(..length)).ok_or_else(truncated)?;
+    let broken = |what: &str| Error::input(path, format!("is broken: {what}"));
+    match Glb::from_slice(whole) {
+        Ok(glb) => Ok(Chunks { json: glb.json, bin: glb.bin }),
+        Err(::gltf::Error::Binary(e)) => match e {
+            binary::Error::Io(_) | binary::Error::Length { .. } | binary::Error::ChunkLength { .. } => Err(truncated()),
+            // chunks of other kinds must be skipped, says the specification; the crate refuses one in the place of the
+            // binary chunk, though it has found the JSON
+            binary::Error::UnknownChunkType(_) if whole.get(16..20) == Some(b"JSON") => {
+                let json = word(12).and_then(|size| whole[20..].get(..size)).ok_or_else(truncated)?;
+                Ok(Chunks { json: json.into(), bin: None })
+            }
+            binary::Error::UnknownChunkType(_) => Err(broken("the first chunk of the .glb is not JSON")),
+            e => Err(broken(&e.to_string())),
+        },
+        Err(e) => Err(broken(&e.to_string())),
     }
-    Ok(chunks)
 }
 
 /// Parses the JSON and refuses other versions of glTF.
-pub(super) fn document(json: &[u8], path: &Path) -> Result<Document> {
-    #[derive(serde::Deserialize, Default)]
+pub(super) fn document(json: &[u8], path: &Path) -> Result<(Root, Doubles)> {
+    #[derive(serde::Deserialize)]
     struct AssetOnly {
         #[serde(default)]
-        asset: Asset,
+        asset: Version,
     }
+    #[derive(serde::Deserialize, Default)]
+    struct Version {
+        #[serde(default)]
+        version: String,
+    }
+    // the crate leaves a byte order mark to us
     let text = json.strip_prefix(b"\xef\xbb\xbf").unwrap_or(json);
-    let parsed = serde_json::from_slice::<Document>(text);
-    // glTF 1.0 has another structure: it does not parse, but deserves a better answer than a type error
-    let asset = match &parsed {
-        Ok(document) => Asset { version: document.asset.version.clone(), min_version: document.asset.min_version.clone() },
-        Err(_) => serde_json::from_slice::<AssetOnly>(text).unwrap_or_default().asset,
+    let document = Root::from_slice(text).or_else(|e| lenient(text).ok_or(e));
+    let document = match document.and_then(|document| Ok((document, serde_json::from_slice(text)?))) {
+        Ok(document) => document,
+        // glTF 1.0 has another structure: it does not parse, but deserves a better answer than a type error
+        Err(e) => match serde_json::from_slice::<AssetOnly>(text).map(|a| a.asset.version) {
+            Ok(version) if version.is_empty() => return Err(Error::input(path, "is no glTF: it names no version")),
+            Ok(version) if !version.starts_with("2.") => return Err(other_version(&version, path)),
+            _ => return Err(Error::input(path, format!("is no valid glTF JSON: {e}"))),
+        },
     };
-    if asset.version.starts_with("1.") {
-        return Err(Error::input(path, format!("is glTF {}; skylit reads glTF 2.0: convert it", asset.version)));
+    match (&document.0.asset.version, &document.0.asset.min_version) {
+        (_, Some(needed)) if needed != "2.0" => Err(other_version(needed, path)),
+        (found, None) if !found.starts_with("2.") => Err(other_version(found, path)),
+        _ => Ok(document),
     }
-    let document = parsed.map_err(|e| Error::input(path, format!("is no valid glTF JSON: {e}")))?;
-    let needed = asset.min_version.as_deref().unwrap_or(&asset.version);
-    if needed != "2.0" && (asset.min_version.is_some() || !needed.starts_with("2.")) {
-        let found = if needed.is_empty() { "no version".to_owned() } else { format!("version {needed}") };
-        return Err(Error::input(path, format!("asks for glTF of {found}; skylit reads 2.0")));
+}
+
+fn other_version(version: &str, path: &Path) -> Error {
+    let remedy = if version.starts_with("1.") { ": convert it" } else { "" };
+    Error::input(path, format!("is glTF {version}; skylit reads glTF 2.0{remedy}"))
+}
+
+/// The document without what a still image does not need and the crate is too strict about: it wants `nodes` in a scene
+/// and `node` in the target of an animation, both optional by the specification (for scenes without content, and for
+/// KHR_animation_pointer), and it refuses numbers beyond the range of single precision. `None` if that does not help.
+fn lenient(text: &[u8]) -> Option<Root> {
+    let mut root: Value = serde_json::from_slice(text).ok()?;
+    for scene in root.get_mut("scenes").and_then(Value::as_array_mut).into_iter().flatten() {
+        scene.as_object_mut()?.entry("nodes").or_insert_with(|| json!([]));
     }
-    Ok(document)
+    for animation in root.get_mut("animations").and_then(Value::as_array_mut).into_iter().flatten() {
+        *animation = json!({ "channels": [], "samplers": [] });
+    }
+    root.as_object_mut()?.remove("skins");
+    serde_json::from_value(root).ok()
 }
 
 /// Reads the file that `uri` names.
@@ -92,8 +121,8 @@ pub(super) fn read_uri(uri: &str, gltf: &Path) -> Result<Vec<u8>, String> {
 }
 
 /// The bytes of every buffer, each as long as it declares.
-pub(super) fn buffers<'a>(document: &Document, bin: Option<&'a [u8]>, path: &Path) -> Result<Vec<Cow<'a, [u8]>>> {
-    let buffer = |(i, buffer): (usize, &super::schema::Buffer)| -> Result<Cow<'a, [u8]>> {
+pub(super) fn buffers<'a>(document: &Root, bin: Option<&'a [u8]>, path: &Path) -> Result<Vec<Cow<'a, [u8]>>> {
+    let buffer = |(i, buffer): (usize, &Buffer)| -> Result<Cow<'a, [u8]>> {
         let bytes: Cow<'a, [u8]> = match (&buffer.uri, bin) {
             (Some(uri), _) => {
                 read_uri(uri, path).map(Cow::Owned).map_err(|e| Error::input(path, format!("buffer {i}: {e}")))?
@@ -101,8 +130,8 @@ pub(super) fn buffers<'a>(document: &Document, bin: Option<&'a [u8]>, path: &Pat
             (None, Some(bin)) if i == 0 => Cow::Borrowed(bin),
             (None, _) => return Err(Error::input(path, format!("buffer {i} has neither a URI nor a binary chunk"))),
         };
-        if (bytes.len() as u64) < buffer.byte_length {
-            let (have, want) = (bytes.len(), buffer.byte_length);
+        if (bytes.len() as u64) < buffer.byte_length.0 {
+            let (have, want) = (bytes.len(), buffer.byte_length.0);
             return Err(Error::input(path, format!("buffer {i} is truncated: {have} bytes of {want}")));
         }
         Ok(bytes)

@@ -1,9 +1,50 @@
 //! The node hierarchy: world transforms in f64, placed meshes, cameras and lights.
 
-use glam::{DAffine3, DMat3, DMat4, DQuat, DVec3};
+use std::f32::consts::{FRAC_PI_2, FRAC_PI_4};
 
-use super::schema::{Document, Node};
+use ::gltf::json::extensions::scene::khr_lights_punctual::Type as LightType;
+use ::gltf::json::{Index, Node, Root};
+use glam::{DAffine3, DMat3, DMat4, DQuat, DVec3};
+use serde::Deserialize;
+
+use super::{text, valid};
 use crate::scene::{Camera, Light, LightKind, Projection};
+
+/// The numbers that place things, in double precision: the crate rounds them to single, in which far-away scenes fall apart
+/// and what we write does not come back as it was.
+#[derive(Deserialize, Default)]
+#[serde(default)]
+pub(super) struct Doubles {
+    nodes: Vec<Transform>,
+    cameras: Vec<Lens>,
+}
+
+#[derive(Deserialize)]
+struct Transform {
+    matrix: Option<[f64; 16]>,
+    translation: Option<[f64; 3]>,
+    rotation: Option<[f64; 4]>,
+    scale: Option<[f64; 3]>,
+}
+
+#[derive(Deserialize)]
+struct Lens {
+    perspective: Option<Perspective>,
+    orthographic: Option<Orthographic>,
+}
+
+#[derive(Deserialize)]
+#[serde(rename_all = "camelCase")]
+struct Perspective {
+    yfov: f64,
+    aspect_ratio: Option<f64>,
+}
+
+#[derive(Deserialize)]
+struct Orthographic {
+    xmag: f64,
+    ymag: f64,
+}
 
 /// A node of the scene that is shown.
 pub(super) struct Placed {
@@ -15,11 +56,11 @@ pub(super) struct Placed {
 ///
 /// # Errors
 /// What is wrong, in words: indices out of range, nodes reached twice.
-pub(super) fn place(document: &Document) -> Result<Vec<Placed>, String> {
+pub(super) fn place(document: &Root, doubles: &Doubles) -> Result<Vec<Placed>, String> {
     let nodes = &document.nodes;
     let mut parents = vec![0u32; nodes.len()];
     for (i, node) in nodes.iter().enumerate() {
-        for &child in &node.children {
+        for child in children(node) {
             *parents.get_mut(child).ok_or_else(|| format!("node {i} has the child {child}, which does not exist"))? += 1;
         }
     }
@@ -28,10 +69,10 @@ pub(super) fn place(document: &Document) -> Result<Vec<Placed>, String> {
         return Err(format!("node {i} is the child of more than one node"));
     }
     let no_scene = document.scenes.is_empty();
-    let roots: Vec<usize> = match document.scene {
+    let roots: Vec<usize> = match document.scene.map(|s| s.value()) {
         Some(s) if s >= document.scenes.len() => return Err(format!("the default scene {s} does not exist")),
         _ if no_scene => (0..nodes.len()).filter(|&i| parents[i] == 0).collect(),
-        s => document.scenes[s.unwrap_or(0)].nodes.clone(),
+        s => document.scenes[s.unwrap_or(0)].nodes.iter().map(Index::value).collect(),
     };
     let mut placed = Vec::new();
     let mut seen = vec![false; nodes.len()];
@@ -42,12 +83,12 @@ pub(super) fn place(document: &Document) -> Result<Vec<Placed>, String> {
         if std::mem::replace(&mut seen[i], true) {
             return Err(format!("node {i} is its own ancestor, or the scene lists it twice"));
         }
-        let to_world = parent * local(node, i)?;
+        let to_world = parent * doubles.nodes.get(i).map_or(Ok(DAffine3::IDENTITY), |t| local(t, i))?;
         if !to_world.is_finite() {
             return Err(format!("node {i} has a transform that is not finite"));
         }
         placed.push(Placed { node: i, to_world });
-        stack.extend(node.children.iter().rev().map(|&c| (c, to_world)));
+        stack.extend(children(node).rev().map(|c| (c, to_world)));
     }
     if no_scene && let Some(i) = seen.iter().position(|s| !s) {
         return Err(format!("node {i} is its own ancestor"));
@@ -55,7 +96,11 @@ pub(super) fn place(document: &Document) -> Result<Vec<Placed>, String> {
     Ok(placed)
 }
 
-fn local(node: &Node, index: usize) -> Result<DAffine3, String> {
+fn children(node: &Node) -> impl DoubleEndedIterator<Item = usize> {
+    node.children.iter().flatten().map(Index::value)
+}
+
+fn local(node: &Transform, index: usize) -> Result<DAffine3, String> {
     if let Some(m) = node.matrix {
         let m = DMat4::from_cols_array(&m);
         // affine by the specification; a perspective matrix would silently lose its last row
@@ -85,10 +130,12 @@ fn rigid(to_world: &DAffine3) -> DAffine3 {
 ///
 /// # Errors
 /// What is wrong, in words.
-pub(super) fn camera(document: &Document, placed: &Placed, index: usize) -> Result<Camera, String> {
-    let camera = document.cameras.get(index).ok_or_else(|| format!("camera {index} does not exist"))?;
+pub(super) fn camera(document: &Root, doubles: &Doubles, placed: &Placed, index: usize) -> Result<Camera, String> {
+    let (Some(camera), Some(lens)) = (document.cameras.get(index), doubles.cameras.get(index)) else {
+        return Err(format!("camera {index} does not exist"));
+    };
     let positive = |x: f64| Some(x.abs()).filter(|x| x.is_finite() && *x > 0.0);
-    let (projection, aspect) = match (&camera.perspective, &camera.orthographic) {
+    let (projection, aspect) = match (&lens.perspective, &lens.orthographic) {
         (Some(p), _) if p.yfov > 0.0 && p.yfov < std::f64::consts::PI => {
             (Projection::Perspective { fov_y: p.yfov }, p.aspect_ratio.and_then(positive))
         }
@@ -101,24 +148,27 @@ pub(super) fn camera(document: &Document, placed: &Placed, index: usize) -> Resu
     };
     let node = &document.nodes[placed.node];
     // the node tells apart the uses of one camera
-    let name = if node.name.is_empty() { &camera.name } else { &node.name };
-    Ok(Camera { name: name.clone(), camera_to_world: rigid(&placed.to_world), projection, aspect })
+    let name = [&node.name, &camera.name].map(text).into_iter().find(|n| !n.is_empty()).unwrap_or_default();
+    Ok(Camera { name: name.to_owned(), camera_to_world: rigid(&placed.to_world), projection, aspect })
 }
 
 /// The punctual light of a node.
 ///
 /// # Errors
 /// What is wrong, in words.
-pub(super) fn light(document: &Document, placed: &Placed, index: usize) -> Result<Light, String> {
-    let light = document.extensions.lights.lights.get(index).ok_or_else(|| format!("light {index} does not exist"))?;
-    let kind = match light.kind.as_str() {
-        "point" => LightKind::Point,
-        "directional" => LightKind::Directional,
-        "spot" => {
-            let outer = light.spot.outer_cone_angle.clamp(0.0, std::f32::consts::FRAC_PI_2);
-            LightKind::Spot { inner_angle: light.spot.inner_cone_angle.clamp(0.0, outer), outer_angle: outer }
+pub(super) fn light(document: &Root, placed: &Placed, index: usize) -> Result<Light, String> {
+    let lights = document.extensions.as_ref().and_then(|e| e.khr_lights_punctual.as_ref()).map_or(&[][..], |l| &l.lights);
+    let light = lights.get(index).ok_or_else(|| format!("light {index} does not exist"))?;
+    let kind = match valid(light.type_) {
+        Some(LightType::Point) => LightKind::Point,
+        Some(LightType::Directional) => LightKind::Directional,
+        Some(LightType::Spot) => {
+            // not the crate's default for lights without `spot`, whose outer angle is zero
+            let (inner, outer) = light.spot.as_ref().map_or((0.0, FRAC_PI_4), |s| (s.inner_cone_angle, s.outer_cone_angle));
+            let outer = outer.clamp(0.0, FRAC_PI_2);
+            LightKind::Spot { inner_angle: inner.clamp(0.0, outer), outer_angle: outer }
         }
-        other => return Err(format!("light {index} is of the unknown type `{other}`")),
+        None => return Err(format!("light {index} is of an unknown type")),
     };
     let intensity = glam::Vec3::from(light.color) * light.intensity;
     if !intensity.is_finite() {
@@ -126,11 +176,11 @@ pub(super) fn light(document: &Document, placed: &Placed, index: usize) -> Resul
     }
     let node = &document.nodes[placed.node];
     Ok(Light {
-        name: if light.name.is_empty() { &node.name } else { &light.name }.clone(),
+        name: [&light.name, &node.name].map(text).into_iter().find(|n| !n.is_empty()).unwrap_or_default().to_owned(),
         kind,
         intensity,
         position: placed.to_world.translation,
         direction: -rigid(&placed.to_world).matrix3.z_axis,
-        range: light.range.filter(|&r| r > 0.0).unwrap_or(f64::INFINITY),
+        range: light.range.filter(|&r| r > 0.0).map_or(f64::INFINITY, f64::from),
     })
 }

@@ -3,11 +3,13 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use ::gltf::json::texture::{MagFilter, MinFilter, Sampler, WrappingMode};
+use ::gltf::json::validation::Checked;
+use ::gltf::json::{self, Index, Root};
 use rayon::prelude::*;
 
 use super::accessor::Reader;
-use super::container;
-use super::schema::{Document, Sampler};
+use super::{container, text, valid};
 use crate::scene::load::picture::{self, Picture};
 use crate::scene::{Filter, Material, Texture, Wrap};
 
@@ -21,7 +23,10 @@ pub(super) fn resolve(reader: &Reader, path: &Path, materials: &mut [Material], 
     for slot in materials.iter_mut().flat_map(Material::texture_slots_mut).flatten() {
         used.insert(slot.texture, None);
     }
-    let image_of = |texture: usize| document.textures.get(texture).and_then(|t| t.source);
+    // the crate's stand-in for a texture without a source, which is for extensions with other formats to give
+    const NO_SOURCE: usize = u32::MAX as usize;
+    let source_of = |texture: &json::Texture| Some(texture.source.value()).filter(|&s| s != NO_SOURCE);
+    let image_of = |texture: usize| document.textures.get(texture).and_then(source_of);
     let mut wanted: Vec<usize> = used.keys().filter_map(|&t| image_of(t)).collect();
     wanted.sort_unstable();
     wanted.dedup();
@@ -37,18 +42,18 @@ pub(super) fn resolve(reader: &Reader, path: &Path, materials: &mut [Material], 
             warn(format!("texture {index} does not exist: shown without it"));
             continue;
         };
-        let Some(source) = texture.source else {
+        let Some(source) = source_of(texture) else {
             warn(format!("texture {index} has no PNG or JPEG image: shown without it"));
             continue;
         };
         let Some(Ok(picture)) = decoded.get(&source) else { continue };
         let (wrap, filter) = sampler(document, texture.sampler);
         let image = &document.images[source];
-        let name = [&image.name, &texture.name].into_iter().find(|n| !n.is_empty()).cloned();
-        let name = name.or_else(|| image.uri.clone().filter(|u| !u.starts_with("data:"))).unwrap_or_default();
+        let uri = image.uri.as_deref().filter(|u| !u.starts_with("data:")).unwrap_or_default();
+        let name = [text(&texture.name), text(&image.name), uri].into_iter().find(|n| !n.is_empty()).unwrap_or_default();
         *place = Some(textures.len());
         textures.push(Texture {
-            name,
+            name: name.to_owned(),
             width: picture.width,
             height: picture.height,
             rgba8: picture.rgba8.clone(),
@@ -70,28 +75,31 @@ pub(super) fn resolve(reader: &Reader, path: &Path, materials: &mut [Material], 
 fn image(reader: &Reader, path: &Path, index: usize) -> Result<Picture, String> {
     let image = reader.document.images.get(index).ok_or("does not exist")?;
     match (&image.uri, image.buffer_view) {
-        (_, Some(view)) => picture::decode(reader.view(view)?.0, &image.name),
+        (_, Some(view)) => picture::decode(reader.view(view)?.0, text(&image.name)),
         (Some(uri), None) => {
             let bytes = container::read_uri(uri, path).map_err(|e| format!("cannot be read ({e})"))?;
-            let name = if uri.starts_with("data:") { &image.name } else { uri };
+            let name = if uri.starts_with("data:") { text(&image.name) } else { uri };
             picture::decode(&bytes, name)
         }
         (None, None) => Err("has neither a URI nor a buffer view".to_owned()),
     }
 }
 
-fn sampler(document: &Document, index: Option<usize>) -> ([Wrap; 2], Filter) {
+fn sampler(document: &Root, index: Option<Index<Sampler>>) -> ([Wrap; 2], Filter) {
     let default = Sampler::default();
-    let sampler = index.and_then(|i| document.samplers.get(i)).unwrap_or(&default);
-    let wrap = |code: Option<u32>| match code {
-        Some(33071) => Wrap::Clamp,
-        Some(33648) => Wrap::Mirror,
-        _ => Wrap::Repeat,
+    let sampler = index.and_then(|i| document.samplers.get(i.value())).unwrap_or(&default);
+    let wrap = |mode: Checked<WrappingMode>| match valid(mode) {
+        Some(WrappingMode::ClampToEdge) => Wrap::Clamp,
+        Some(WrappingMode::MirroredRepeat) => Wrap::Mirror,
+        Some(WrappingMode::Repeat) | None => Wrap::Repeat,
     };
     // without mip maps one filter serves both ways; magnification says more about what the author wants to see
-    let filter = match sampler.mag_filter.or(sampler.min_filter) {
-        Some(9728 | 9984 | 9986) => Filter::Nearest,
-        _ => Filter::Linear,
+    let nearest = match sampler.mag_filter {
+        Some(filter) => valid(filter) == Some(MagFilter::Nearest),
+        None => matches!(
+            sampler.min_filter.and_then(valid),
+            Some(MinFilter::Nearest | MinFilter::NearestMipmapNearest | MinFilter::NearestMipmapLinear)
+        ),
     };
-    ([wrap(sampler.wrap_s), wrap(sampler.wrap_t)], filter)
+    ([wrap(sampler.wrap_s), wrap(sampler.wrap_t)], if nearest { Filter::Nearest } else { Filter::Linear })
 }

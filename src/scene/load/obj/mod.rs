@@ -1,12 +1,16 @@
 //! Wavefront OBJ with MTL.
 //!
-//! Read by a parser of our own: it names the line of an error, takes files in which only some faces have normals or
-//! texture coordinates, and survives any input. Each run of faces with one object or group name and one material becomes
-//! a mesh. Polygons are cut into fans. A mesh without `vn` is shaded flat.
+//! Read by a parser of our own, because no crate is fit for what users have: tobj and obj-rs name no line of an error, and
+//! tobj panics on `Kd 1 2` and refuses continued lines, wavefront_obj refuses vertex colours and relative indices, and
+//! nobject-rs and wavefront take broken numbers without a word.
+//!
+//! Each run of faces with one object or group name and one material becomes a mesh. Polygons are cut into fans, or by ear
+//! clipping where a fan would reach outside of them. A mesh without `vn` is shaded flat.
 
 mod material;
 mod mtl;
 mod parse;
+mod polygon;
 
 use std::collections::HashMap;
 use std::path::Path;

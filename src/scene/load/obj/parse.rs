@@ -7,6 +7,7 @@ use std::str::SplitAsciiWhitespace;
 
 use glam::{Vec2, Vec3, Vec4};
 
+use super::polygon::Cutter;
 use crate::error::{Error, Result};
 
 /// No such index.
@@ -87,6 +88,7 @@ struct Parser {
     /// Whether name or material changed since the last face.
     changed: bool,
     polygon: Vec<Corner>,
+    cutter: Cutter,
 }
 
 impl Parser {
@@ -160,7 +162,11 @@ impl Parser {
             }
         }
         if let Some(group) = self.file.groups.last_mut() {
-            group.triangles.extend(self.polygon[1..].windows(2).map(|w| [first, w[0], w[1]]));
+            let (polygon, positions) = (&self.polygon, &self.file.positions);
+            match self.cutter.cut(polygon.iter().map(|c| positions[c.position as usize])) {
+                Some(triangles) => group.triangles.extend(triangles.map(|t| t.map(|i| polygon[i]))),
+                None => group.triangles.extend(polygon[1..].windows(2).map(|w| [first, w[0], w[1]])),
+            }
         }
         Ok(())
     }

@@ -1,0 +1,399 @@
+//! glTF 2.0 writer.
+
+use std::collections::BTreeSet;
+use std::io::Cursor;
+use std::path::Path;
+use std::sync::Arc;
+
+use glam::{DAffine3, DQuat, DVec3, Vec3};
+use serde_json::{Value, json};
+
+use super::{icosphere, material, write_buffered};
+use crate::error::{Error, Result};
+use crate::scene::{
+    Camera, Filter, Geometry, Light, LightKind, Material, Projection, Scene, Sphere, Texture, TriangleMesh, Wrap,
+};
+
+/// Writes `scene` as glTF 2.0: one `.glb` file with everything in it, or a `.gltf` with a `.bin` and PNG files of the same
+/// name beside it. The extension of `path` decides. Each file appears only when it is complete, the `.gltf` last.
+///
+/// Triangles, transforms, materials (core and KHR_materials extensions), textures, cameras and punctual lights come back
+/// from the loader as they were. Spheres are tessellated, with a warning in the log; what glTF has no words for (the
+/// environment, wishes for rendering, the `.brhan` kind of a material) is left out.
+///
+/// # Errors
+/// [`Error::Output`], also for another extension or more than 4 GiB.
+pub fn export_gltf(scene: &Scene, path: &Path) -> Result<()> {
+    let fail = |message: String| Error::Output { path: path.to_owned(), message };
+    let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
+    let embed = match extension.to_str() {
+        Some("glb") => true,
+        Some("gltf") => false,
+        _ => return Err(fail("glTF files end in .glb or .gltf".to_owned())),
+    };
+    let mut writer = Writer { embed, ..Writer::default() };
+    writer.scene(scene, path).map_err(fail)?;
+    let Writer { bin, json, images, .. } = writer;
+    let text = json.to_string();
+    if u32::try_from(bin.len() + text.len() + 64).is_err() {
+        return Err(fail("the scene is larger than 4 GiB, the limit of .glb".to_owned()));
+    }
+    if embed {
+        return write_buffered(path, |out| {
+            let json_size = text.len().next_multiple_of(4);
+            let bin_size = bin.len().next_multiple_of(4);
+            let words = [2, 12 + 8 + json_size + 8 + bin_size, json_size].map(|n| (n as u32).to_le_bytes());
+            out.write_all(b"glTF")?;
+            out.write_all(&words.concat())?;
+            out.write_all(b"JSON")?;
+            out.write_all(text.as_bytes())?;
+            out.write_all(&b"    "[..json_size - text.len()])?;
+            out.write_all(&(bin_size as u32).to_le_bytes())?;
+            out.write_all(b"BIN\0")?;
+            out.write_all(&bin)?;
+            out.write_all(&[0; 4][..bin_size - bin.len()])
+        });
+    }
+    for (name, png) in &images {
+        write_buffered(&path.with_file_name(name), |out| out.write_all(png))?;
+    }
+    if !bin.is_empty() {
+        write_buffered(&path.with_extension("bin"), |out| out.write_all(&bin))?;
+    }
+    write_buffered(path, |out| out.write_all(text.as_bytes()))
+}
+
+/// JSON arrays.
+#[derive(Default)]
+struct Textures {
+    textures: Vec<Value>,
+    images: Vec<Value>,
+    samplers: Vec<Value>,
+}
+
+#[derive(Default)]
+struct Writer {
+    embed: bool,
+    bin: Vec<u8>,
+    json: Value,
+    views: Vec<Value>,
+    accessors: Vec<Value>,
+    /// File name and bytes of each image that is not embedded.
+    images: Vec<(String, Vec<u8>)>,
+}
+
+impl Writer {
+    fn scene(&mut self, scene: &Scene, path: &Path) -> Result<(), String> {
+        let mut used = BTreeSet::new();
+        let mut materials: Vec<Value> = scene.materials.iter().map(|m| material::material(m, &mut used)).collect();
+        let Textures { textures, images, samplers } = self.textures(&scene.textures, path)?;
+        let spheres = scene.meshes.iter().map(|m| match &m.geometry {
+            Geometry::Triangles(_) => 0,
+            Geometry::Spheres(s) => s.len() as u64,
+        });
+        let lamps = scene.lights.iter().filter(|l| matches!(l.kind, LightKind::Sphere { .. })).count();
+        let spheres = spheres.sum::<u64>() + lamps as u64;
+        let level = icosphere::level(spheres).min(4);
+        if spheres > 0 {
+            tracing::warn!("{spheres} spheres become {} triangles each: glTF has no spheres", 20 << (2 * level));
+        }
+        let mut meshes = Vec::new();
+        for mesh in &scene.meshes {
+            let tessellated;
+            let triangles = match &mesh.geometry {
+                Geometry::Triangles(t) => t,
+                Geometry::Spheres(s) => {
+                    tessellated = tessellate(s, level);
+                    &tessellated
+                }
+            };
+            meshes.push(self.mesh(&mesh.name, triangles, mesh.material));
+        }
+        let mut nodes: Vec<Value> = scene.instances.iter().map(|i| with_mesh(&i.name, i.mesh, &i.object_to_world)).collect();
+        let mut lights = Vec::new();
+        for light in &scene.lights {
+            match light.kind {
+                LightKind::Sphere { radius } => {
+                    let black =
+                        Material { base_color: Vec3::ZERO.extend(1.0), emissive: light.intensity, ..Default::default() };
+                    materials.push(material::material(&black, &mut used));
+                    let unit = tessellate(&[Sphere { center: Vec3::ZERO, radius: 1.0 }], level);
+                    meshes.push(self.mesh(&light.name, &unit, materials.len() - 1));
+                    let to_world = DAffine3::from_translation(light.position) * DAffine3::from_scale(DVec3::splat(radius));
+                    nodes.push(with_mesh(&light.name, meshes.len() - 1, &to_world));
+                }
+                _ => {
+                    nodes.push(light_node(light, lights.len()));
+                    lights.push(punctual(light));
+                }
+            }
+        }
+        let cameras: Vec<Value> = scene.cameras.iter().map(camera).collect();
+        nodes.extend(scene.cameras.iter().enumerate().map(|(i, c)| {
+            let mut node = node(&c.name, &c.camera_to_world);
+            node["camera"] = json!(i);
+            node
+        }));
+
+        let roots: Vec<usize> = (0..nodes.len()).collect();
+        let mut json = json!({
+            "asset": { "version": "2.0", "generator": concat!("skylit ", env!("CARGO_PKG_VERSION")) },
+            "scene": 0,
+        });
+        let mut put = |key: &str, values: Vec<Value>| {
+            // empty arrays are not allowed
+            if !values.is_empty() {
+                json[key] = Value::Array(values);
+            }
+        };
+        if !self.bin.is_empty() {
+            let mut buffer = json!({ "byteLength": self.bin.len() });
+            if !self.embed {
+                let name = path.with_extension("bin");
+                buffer["uri"] = json!(encode(&name.file_name().unwrap_or_default().to_string_lossy()));
+            }
+            put("buffers", vec![buffer]);
+        }
+        put("bufferViews", std::mem::take(&mut self.views));
+        put("accessors", std::mem::take(&mut self.accessors));
+        put("images", images);
+        put("samplers", samplers);
+        put("textures", textures);
+        put("materials", materials);
+        put("meshes", meshes);
+        put("cameras", cameras);
+        put("nodes", nodes);
+        json["scenes"] = if roots.is_empty() { json!([{}]) } else { json!([{ "nodes": roots }]) };
+        if !lights.is_empty() {
+            used.insert("KHR_lights_punctual");
+            json["extensions"] = json!({ "KHR_lights_punctual": { "lights": lights } });
+        }
+        if !used.is_empty() {
+            json["extensionsUsed"] = json!(used);
+        }
+        self.json = json;
+        Ok(())
+    }
+
+    /// Appends bytes as a buffer view of their own.
+    fn view(&mut self, bytes: &[u8], target: Option<u32>) -> usize {
+        self.bin.resize(self.bin.len().next_multiple_of(4), 0);
+        let mut view = json!({ "buffer": 0, "byteOffset": self.bin.len(), "byteLength": bytes.len() });
+        if let Some(target) = target {
+            view["target"] = json!(target);
+        }
+        self.bin.extend_from_slice(bytes);
+        self.views.push(view);
+        self.views.len() - 1
+    }
+
+    /// Appends an accessor of `N` floats an element.
+    fn floats<const N: usize>(&mut self, values: impl Iterator<Item = [f32; N]>, bounds: bool) -> usize {
+        let (mut bytes, mut count) = (Vec::new(), 0);
+        let (mut min, mut max) = ([f32::INFINITY; N], [f32::NEG_INFINITY; N]);
+        for value in values {
+            count += 1;
+            for (k, x) in value.into_iter().enumerate() {
+                (min[k], max[k]) = (min[k].min(x), max[k].max(x));
+                bytes.extend_from_slice(&x.to_le_bytes());
+            }
+        }
+        let view = self.view(&bytes, Some(34962));
+        let shape = ["SCALAR", "VEC2", "VEC3", "VEC4"][N - 1];
+        let mut accessor = json!({ "bufferView": view, "componentType": 5126, "count": count, "type": shape });
+        if bounds {
+            (accessor["min"], accessor["max"]) = (json!(min.as_slice()), json!(max.as_slice()));
+        }
+        self.accessors.push(accessor);
+        self.accessors.len() - 1
+    }
+
+    fn mesh(&mut self, name: &str, mesh: &TriangleMesh, material: usize) -> Value {
+        let mut attributes = json!({ "POSITION": self.floats(mesh.positions.iter().map(|p| p.to_array()), true) });
+        if !mesh.normals.is_empty() {
+            attributes["NORMAL"] = json!(self.floats(mesh.normals.iter().map(|n| n.to_array()), false));
+        }
+        if !mesh.tangents.is_empty() {
+            attributes["TANGENT"] = json!(self.floats(mesh.tangents.iter().map(|t| t.to_array()), false));
+        }
+        for (key, set) in ["TEXCOORD_0", "TEXCOORD_1"].into_iter().zip(&mesh.texcoords) {
+            if !set.is_empty() {
+                attributes[key] = json!(self.floats(set.iter().map(|t| t.to_array()), false));
+            }
+        }
+        if !mesh.colors.is_empty() {
+            attributes["COLOR_0"] = json!(self.floats(mesh.colors.iter().map(|c| c.to_array()), false));
+        }
+        let corners = mesh.indices.iter().flatten();
+        // 0xffff means something else to some readers
+        let small = mesh.positions.len() <= 0xffff;
+        let bytes: Vec<u8> = match small {
+            true => corners.flat_map(|&i| (i as u16).to_le_bytes()).collect(),
+            false => corners.flat_map(|i| i.to_le_bytes()).collect(),
+        };
+        let view = self.view(&bytes, Some(34963));
+        self.accessors.push(json!({
+            "bufferView": view,
+            "componentType": if small { 5123 } else { 5125 },
+            "count": mesh.indices.len() * 3,
+            "type": "SCALAR",
+        }));
+        let indices = self.accessors.len() - 1;
+        json!({ "name": name, "primitives": [{ "attributes": attributes, "indices": indices, "material": material }] })
+    }
+
+    /// JSON of textures, images and samplers. Textures that share pixels share the image.
+    fn textures(&mut self, all: &[Texture], path: &Path) -> Result<Textures, String> {
+        let Textures { mut textures, mut images, mut samplers } = Textures::default();
+        let mut pixels: Vec<&Arc<[u8]>> = Vec::new();
+        for texture in all {
+            let source = match pixels.iter().position(|p| Arc::ptr_eq(p, &texture.rgba8)) {
+                Some(known) => known,
+                None => {
+                    let png = png(texture)?;
+                    let mut image = json!({ "name": texture.name, "mimeType": "image/png" });
+                    if self.embed {
+                        image["bufferView"] = json!(self.view(&png, None));
+                    } else {
+                        let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+                        let name = format!("{stem}_{}.png", images.len());
+                        image["uri"] = json!(encode(&name));
+                        self.images.push((name, png));
+                    }
+                    images.push(image);
+                    pixels.push(&texture.rgba8);
+                    images.len() - 1
+                }
+            };
+            let sampler = sampler(texture);
+            let index = samplers.iter().position(|s| *s == sampler).unwrap_or_else(|| {
+                samplers.push(sampler);
+                samplers.len() - 1
+            });
+            textures.push(json!({ "name": texture.name, "sampler": index, "source": source }));
+        }
+        Ok(Textures { textures, images, samplers })
+    }
+}
+
+fn png(texture: &Texture) -> Result<Vec<u8>, String> {
+    let mut png = Vec::new();
+    let (width, height) = (texture.width, texture.height);
+    let opaque = texture.rgba8.chunks_exact(4).all(|p| p[3] == 255);
+    let encoded = if opaque {
+        let rgb: Vec<u8> = texture.rgba8.chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]]).collect();
+        image::write_buffer_with_format(
+            &mut Cursor::new(&mut png),
+            &rgb,
+            width,
+            height,
+            image::ExtendedColorType::Rgb8,
+            image::ImageFormat::Png,
+        )
+    } else {
+        image::write_buffer_with_format(
+            &mut Cursor::new(&mut png),
+            &texture.rgba8,
+            width,
+            height,
+            image::ExtendedColorType::Rgba8,
+            image::ImageFormat::Png,
+        )
+    };
+    encoded.map_err(|e| format!("the texture `{}` cannot be encoded: {e}", texture.name))?;
+    Ok(png)
+}
+
+fn sampler(texture: &Texture) -> Value {
+    let wrap = |w: Wrap| match w {
+        Wrap::Repeat => 10497,
+        Wrap::Mirror => 33648,
+        Wrap::Clamp => 33071,
+    };
+    let (mag, min) = match texture.filter {
+        Filter::Nearest => (9728, 9728),
+        Filter::Linear => (9729, 9987),
+    };
+    json!({ "magFilter": mag, "minFilter": min, "wrapS": wrap(texture.wrap[0]), "wrapT": wrap(texture.wrap[1]) })
+}
+
+/// Spheres as one smooth mesh.
+fn tessellate(spheres: &[Sphere], level: u32) -> TriangleMesh {
+    let (points, triangles) = icosphere::icosphere(level);
+    let mut mesh = TriangleMesh::default();
+    for s in spheres {
+        let first = mesh.positions.len() as u32;
+        mesh.positions.extend(points.iter().map(|&p| s.center + s.radius * p));
+        mesh.normals.extend_from_slice(&points);
+        mesh.indices.extend(triangles.iter().map(|t| t.map(|i| i + first)));
+    }
+    mesh
+}
+
+fn node(name: &str, to_world: &DAffine3) -> Value {
+    let mut node = json!({ "name": name });
+    if *to_world != DAffine3::IDENTITY {
+        let m = glam::DMat4::from(*to_world).to_cols_array();
+        node["matrix"] = json!(m);
+    }
+    node
+}
+
+fn with_mesh(name: &str, mesh: usize, to_world: &DAffine3) -> Value {
+    let mut node = node(name, to_world);
+    node["mesh"] = json!(mesh);
+    node
+}
+
+fn camera(camera: &Camera) -> Value {
+    match camera.projection {
+        Projection::Perspective { fov_y } => {
+            let mut perspective = json!({ "yfov": fov_y, "znear": 0.01 });
+            if let Some(aspect) = camera.aspect {
+                perspective["aspectRatio"] = json!(aspect);
+            }
+            json!({ "name": camera.name, "type": "perspective", "perspective": perspective })
+        }
+        Projection::Orthographic { half_height } => {
+            let xmag = half_height * camera.aspect.unwrap_or(1.0);
+            let orthographic = json!({ "xmag": xmag, "ymag": half_height, "znear": 0.0, "zfar": 1e6 });
+            json!({ "name": camera.name, "type": "orthographic", "orthographic": orthographic })
+        }
+    }
+}
+
+fn light_node(light: &Light, index: usize) -> Value {
+    let turn = DQuat::from_rotation_arc(DVec3::NEG_Z, light.direction.try_normalize().unwrap_or(DVec3::NEG_Z));
+    let mut node = node(&light.name, &DAffine3::from_rotation_translation(turn, light.position));
+    node["extensions"] = json!({ "KHR_lights_punctual": { "light": index } });
+    node
+}
+
+fn punctual(light: &Light) -> Value {
+    let (color, intensity) = material::split(light.intensity);
+    let mut out = json!({ "name": light.name, "color": color.to_array(), "intensity": intensity });
+    if light.range.is_finite() {
+        out["range"] = json!(light.range);
+    }
+    match light.kind {
+        LightKind::Directional => out["type"] = json!("directional"),
+        LightKind::Spot { inner_angle, outer_angle } => {
+            out["type"] = json!("spot");
+            out["spot"] = json!({ "innerConeAngle": inner_angle, "outerConeAngle": outer_angle });
+        }
+        LightKind::Point | LightKind::Sphere { .. } => out["type"] = json!("point"),
+    }
+    out
+}
+
+/// A file name as a URI.
+fn encode(name: &str) -> String {
+    let mut out = String::new();
+    for b in name.bytes() {
+        match b {
+            b'A'..=b'Z' | b'a'..=b'z' | b'0'..=b'9' | b'-' | b'_' | b'.' | b'~' => out.push(char::from(b)),
+            _ => out.push_str(&format!("%{b:02X}")),
+        }
+    }
+    out
+}

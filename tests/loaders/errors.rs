@@ -1,0 +1,224 @@
+//! Bad input: one clear line each.
+
+use serde_json::json;
+use skylit::Error;
+
+use crate::build::*;
+
+fn message(result: skylit::Result<skylit::scene::Scene>) -> String {
+    let error = result.map(|_| ()).unwrap_err();
+    assert_eq!(error.exit_code(), 3, "{error}");
+    let text = error.to_string();
+    assert!(!text.contains('\n') && text.len() < 500, "{text}");
+    text
+}
+
+#[test]
+fn files_that_are_not_there_or_not_scenes() {
+    let folder = Folder::new();
+    for name in ["a.gltf", "a.glb", "a.obj", "a.brhan"] {
+        let text = message(load(&folder.path(name)));
+        assert!(text.contains(name) && text.contains("no such file"), "{text}");
+    }
+    std::fs::create_dir(folder.path("dir.glb")).unwrap();
+    assert!(message(load(&folder.path("dir.glb"))).contains("folder"));
+    assert!(message(folder.load("a.fbx", "")).contains(".fbx"));
+    assert!(message(folder.load("noext", "")).contains("no extension"));
+    assert!(message(skylit::scene::load::load("no-such-scene")).contains("no built-in scene"));
+    let error = skylit::scene::load::load("builtin:no-such-scene").map(|_| ()).unwrap_err();
+    assert!(matches!(error, Error::Usage(_)), "{error}");
+}
+
+#[test]
+fn truncated_glb() {
+    let folder = Folder::new();
+    let glb = Doc::triangle().glb();
+    for length in 0..glb.len() {
+        let text = message(folder.load("cut.glb", &glb[..length]));
+        assert!(length < 4 || text.contains("truncated"), "{length}: {text}");
+    }
+    let mut other = glb.clone();
+    other[4] = 1;
+    assert!(message(folder.load("v1.glb", &other)).contains("version 1"));
+    assert!(message(folder.load("json.glb", Doc::triangle().gltf())).contains("no .glb"));
+}
+
+#[test]
+fn odd_glb() {
+    let folder = Folder::new();
+    let glb = Doc::triangle().glb();
+    for length in 0..20u32 {
+        let mut short = glb.clone();
+        short[8..12].copy_from_slice(&length.to_le_bytes());
+        assert!(message(folder.load("a.glb", &short)).contains("truncated"), "{length}");
+        short[4] = 3;
+        assert!(message(folder.load("a.glb", &short)).contains("version 3"), "{length}");
+    }
+    // what follows the length is not looked at
+    let mut long = glb.clone();
+    long.extend_from_slice(b"more");
+    assert!(folder.load("a.glb", &long).is_ok());
+    // chunks of other kinds are skipped: after the binary one, and in its place
+    let mut more = glb;
+    more.extend_from_slice(b"\x04\0\0\0MORE1234");
+    let length = more.len() as u32;
+    more[8..12].copy_from_slice(&length.to_le_bytes());
+    assert!(folder.load("a.glb", &more).is_ok());
+    let mut text = Doc::triangle().gltf();
+    text.resize(text.len().next_multiple_of(4), b' ');
+    let chunk = |kind: &[u8], body: &[u8]| [&(body.len() as u32).to_le_bytes(), kind, body].concat();
+    let whole = |chunks: Vec<u8>| [b"glTF\x02\0\0\0", &(12 + chunks.len() as u32).to_le_bytes()[..], &chunks].concat();
+    assert!(folder.load("a.glb", whole(chunk(b"JSON", &text))).is_ok());
+    assert!(folder.load("a.glb", whole([chunk(b"JSON", &text), chunk(b"MORE", b"1234")].concat())).is_ok());
+    assert!(message(folder.load("a.glb", whole(chunk(b"MORE", &text)))).contains("first chunk"));
+    assert!(message(folder.load("a.glb", whole(chunk(b"BIN\0", &text)))).contains("broken"));
+}
+
+/// What the specification allows and the crate `gltf` does not.
+#[test]
+fn lenient_where_the_specification_is() {
+    let mut doc = Doc::triangle();
+    doc.push("scenes", json!({ "name": "empty" }));
+    doc.push(
+        "animations",
+        json!({ "samplers": [{ "input": 0, "output": 0 }],
+        "channels": [{ "sampler": 0, "target": { "path": "pointer" } }] }),
+    );
+    doc.json["nodes"][0]["extras"] = json!("text");
+    assert!(doc.load().report.warnings[0].contains("animations"));
+    // an extension that is not known where it is used, and one that is broken
+    doc.push("materials", json!({ "name": "m", "extensions": { "EXT_new": { "a": [1] } } }));
+    assert!(doc.try_load().is_ok());
+    doc.json["materials"][0]["extensions"] = json!({ "KHR_materials_sheen": { "sheenColorFactor": "red" } });
+    let text = doc.error();
+    assert!(text.contains("material 0") && text.contains("KHR_materials_sheen"), "{text}");
+}
+
+#[test]
+fn bad_json_and_versions() {
+    let folder = Folder::new();
+    assert!(message(folder.load("a.gltf", "{ \"asset\": ")).contains("JSON"));
+    assert!(message(folder.load("a.gltf", "")).contains("JSON"));
+    assert!(message(folder.load("a.gltf", "[".repeat(100_000))).contains("JSON"));
+    let one = r#"{ "asset": { "version": "1.0" }, "meshes": { "a": {} } }"#;
+    assert!(message(folder.load("a.gltf", one)).contains("glTF 1.0"));
+    let mut doc = Doc::triangle();
+    doc.json["asset"] = json!({ "version": "2.1" });
+    assert!(doc.try_load().is_ok());
+    doc.json["asset"]["minVersion"] = json!("2.1");
+    assert!(doc.error().contains("2.1"));
+    doc.json["asset"] = json!({});
+    assert!(doc.error().contains("no version"));
+}
+
+#[test]
+fn buffers() {
+    let folder = Folder::new();
+    let mut doc = Doc::triangle();
+    doc.json["buffers"] = json!([{ "byteLength": 36, "uri": "gone.bin" }]);
+    let text = message(folder.load("a.gltf", doc.gltf()));
+    assert!(text.contains("buffer 0") && text.contains("gone.bin") && text.contains("no such file"), "{text}");
+    folder.write("gone.bin", [0; 20]);
+    let text = message(folder.load("a.gltf", doc.gltf()));
+    assert!(text.contains("truncated: 20 bytes of 36"), "{text}");
+    doc.json["buffers"] = json!([{ "byteLength": 36 }]);
+    assert!(message(folder.load("a.gltf", doc.gltf())).contains("neither"));
+    doc.json["buffers"] = json!([{ "byteLength": 36, "uri": "https://example.org/a.bin" }]);
+    assert!(message(folder.load("a.gltf", doc.gltf())).contains("download"));
+}
+
+#[test]
+fn accessors_out_of_range() {
+    let cases = [
+        (json!({ "count": 4 }), "accessor 0"),
+        (json!({ "count": u64::MAX }), "accessor 0"),
+        (json!({ "byteOffset": 4 }), "accessor 0"),
+        (json!({ "byteOffset": u64::MAX }), "accessor 0"),
+        (json!({ "bufferView": 9 }), "buffer view 9"),
+        (json!({ "componentType": 5124 }), "component type"),
+        (json!({ "type": "VEC2" }), "VEC3 is needed"),
+    ];
+    for (change, expected) in cases {
+        let mut doc = Doc::triangle();
+        for (key, value) in change.as_object().unwrap() {
+            doc.json["accessors"][0][key] = value.clone();
+        }
+        let text = doc.error();
+        assert!(text.contains(expected) && text.contains("accessor 0"), "{change}: {text}");
+    }
+    let mut doc = Doc::triangle();
+    doc.first()["attributes"]["POSITION"] = json!(5);
+    assert!(doc.error().contains("accessor 5 does not exist"));
+    let mut doc = Doc::triangle();
+    doc.json["bufferViews"][0]["byteLength"] = json!(37);
+    assert!(doc.error().contains("buffer view 0 lies outside"), "{}", doc.error());
+    doc.json["bufferViews"][0] = json!({ "buffer": 3, "byteLength": 36 });
+    assert!(doc.error().contains("buffer 3"), "{}", doc.error());
+    doc.json["bufferViews"][0] = json!({ "buffer": 0, "byteLength": 36, "byteStride": 4 });
+    assert!(doc.error().contains("stride"), "{}", doc.error());
+    // nothing bounds an accessor without data
+    let mut doc = Doc::triangle();
+    doc.json["accessors"][0] = json!({ "componentType": F32, "type": "VEC3", "count": 4_000_000_000u64 });
+    assert!(doc.error().contains("no data"), "{}", doc.error());
+    // attributes of other lengths
+    let mut doc = Doc::triangle();
+    let normal = doc.accessor(&bytes(&[[0.0, 0.0, 1.0f32]; 2]), F32, "VEC3", 2);
+    doc.first()["attributes"]["NORMAL"] = json!(normal);
+    assert!(doc.error().contains("2 elements for 3 vertices"), "{}", doc.error());
+    // indices
+    let mut doc = Doc::triangle();
+    let indices = doc.accessor(&[0, 1, 3], U8, "SCALAR", 3);
+    doc.first()["indices"] = json!(indices);
+    assert!(doc.error().contains("vertex 3, but there are only 3"), "{}", doc.error());
+    doc.json["accessors"][indices]["componentType"] = json!(I8);
+    assert!(doc.error().contains("holds no indices"), "{}", doc.error());
+    let mut doc = Doc::triangle();
+    doc.first()["material"] = json!(0);
+    assert!(doc.error().contains("material 0"), "{}", doc.error());
+}
+
+#[test]
+fn nan_and_infinite_positions() {
+    for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+        let mut doc = Doc::new();
+        let position = doc.positions(&[TRIANGLE[0], [0.0, bad, 0.0], TRIANGLE[2]]);
+        doc.primitive(json!({ "attributes": { "POSITION": position } }));
+        let text = doc.error();
+        assert!(text.contains("mesh 0 `mesh`: the position of vertex 1 is not finite"), "{text}");
+    }
+    let mut doc = Doc::triangle();
+    doc.json["nodes"][0]["scale"] = json!([1e300, 1, 1]);
+    doc.json["nodes"][0]["children"] = json!([1]);
+    doc.push("nodes", json!({ "scale": [1e300, 1, 1], "mesh": 0 }));
+    assert!(doc.error().contains("not finite"), "{}", doc.error());
+    let mut doc = Doc::triangle();
+    doc.json["nodes"][0]["translation"] = json!([1e30, 0, 0]);
+    assert!(doc.error().contains("scale it down"), "{}", doc.error());
+}
+
+#[test]
+fn nothing_to_render() {
+    let mut doc = Doc::triangle();
+    doc.json["meshes"][0]["primitives"] = json!([]);
+    let text = doc.error();
+    assert!(text.contains("no triangles and no spheres"), "{text}");
+    let mut doc = Doc::new();
+    let position = doc.positions(&[[0.0; 3]; 3]);
+    doc.primitive(json!({ "attributes": { "POSITION": position } }));
+    assert!(doc.error().contains("1 degenerate"), "{}", doc.error());
+    assert!(matches!(doc.try_load().map(|_| ()).unwrap_err(), Error::Scene(_)));
+    let folder = Folder::new();
+    assert!(message(folder.load("a.obj", "v 0 0 0\n")).contains("no triangles"));
+    assert!(message(folder.load("a.brhan", "# nothing\n")).contains("no triangles"));
+}
+
+#[test]
+fn extensions() {
+    let mut doc = Doc::triangle();
+    doc.json["extensionsUsed"] = json!(["KHR_draco_mesh_compression"]);
+    let scene = doc.load();
+    assert!(scene.report.warnings[0].contains("KHR_draco_mesh_compression"));
+    doc.json["extensionsRequired"] = json!(["KHR_draco_mesh_compression"]);
+    let text = doc.error();
+    assert!(text.contains("KHR_draco_mesh_compression") && text.contains("without mesh compression"), "{text}");
+}

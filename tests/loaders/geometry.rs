@@ -1,0 +1,319 @@
+//! Accessors, index types, modes, attributes.
+
+use glam::{Vec2, Vec3, Vec4};
+use serde_json::json;
+
+use crate::build::*;
+
+const QUAD: [[f32; 3]; 4] = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 1.0, 0.0]];
+
+#[test]
+fn not_indexed_in_every_container() {
+    let folder = Folder::new();
+    let doc = Doc::triangle();
+    let mut external = doc.json.clone();
+    external["buffers"] = json!([{ "byteLength": doc.bin.len(), "uri": "my%20buffer.bin" }]);
+    folder.write("my buffer.bin", &doc.bin);
+    for (name, data) in [("a.gltf", doc.gltf()), ("a.GLB", doc.glb()), ("b.glTF", external.to_string().into_bytes())] {
+        let scene = folder.load(name, data).unwrap();
+        assert_eq!(scene.triangle_count(), 1, "{name}");
+        assert_eq!(corners(mesh(&scene, 0))[0], TRIANGLE, "{name}");
+        assert_eq!((scene.name.as_str(), scene.meshes[0].name.as_str()), (name, "mesh"));
+        assert_eq!(scene.materials.len(), 1);
+        // no normals: flat, and said so
+        assert!(mesh(&scene, 0).normals.is_empty());
+        assert_eq!(scene.report.normals_computed, 1);
+        assert!(scene.report.warnings.is_empty(), "{:?}", scene.report.warnings);
+    }
+}
+
+#[test]
+fn index_types() {
+    let indices = [2u32, 1, 3, 0, 1, 2];
+    let data: [(u32, Vec<u8>); 3] = [
+        (U8, indices.iter().map(|&i| i as u8).collect()),
+        (U16, indices.iter().flat_map(|&i| (i as u16).to_le_bytes()).collect()),
+        (U32, indices.iter().flat_map(|&i| i.to_le_bytes()).collect()),
+    ];
+    for (component, data) in data {
+        let mut doc = Doc::new();
+        let position = doc.positions(&QUAD);
+        let accessor = doc.accessor(&data, component, "SCALAR", 6);
+        doc.primitive(json!({ "attributes": { "POSITION": position }, "indices": accessor }));
+        assert_eq!(mesh(&doc.load(), 0).indices, [[2, 1, 3], [0, 1, 2]], "{component}");
+    }
+}
+
+#[test]
+fn strips_fans_points_and_lines() {
+    let strip = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 1.0, 0.0], [0.0, 2.0, 0.0]];
+    let fan = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0], [-1.0, 1.0, 0.0]];
+    for (mode, points, indexed) in [(5, strip, false), (5, strip, true), (6, fan, false), (6, fan, true)] {
+        let mut doc = Doc::new();
+        let position = doc.positions(&points);
+        doc.primitive(json!({ "attributes": { "POSITION": position }, "mode": mode }));
+        if indexed {
+            let indices = doc.accessor(&[0, 1, 2, 3, 4], U8, "SCALAR", 5);
+            doc.first()["indices"] = json!(indices);
+        }
+        let scene = doc.load();
+        assert_eq!(scene.triangle_count(), 3);
+        for [a, b, c] in corners(mesh(&scene, 0)).into_iter().map(|t| t.map(Vec3::from)) {
+            assert!((b - a).cross(c - a).z > 0.0, "mode {mode} must stay counter-clockwise");
+        }
+    }
+    for mode in 0..4 {
+        let mut doc = Doc::triangle();
+        let position = doc.first()["attributes"]["POSITION"].clone();
+        doc.primitive(json!({ "attributes": { "POSITION": position }, "mode": mode }));
+        let scene = doc.load();
+        assert_eq!((scene.meshes.len(), scene.report.warnings.len()), (1, 1), "{:?}", scene.report.warnings);
+    }
+}
+
+#[test]
+fn incomplete_triangles_are_ignored() {
+    let mut doc = Doc::new();
+    let position = doc.positions(&QUAD);
+    doc.primitive(json!({ "attributes": { "POSITION": position } }));
+    let scene = doc.load();
+    assert_eq!((scene.triangle_count(), scene.report.warnings.len()), (1, 1));
+}
+
+#[test]
+fn interleaved_attributes() {
+    let mut doc = Doc::new();
+    let mut data = Vec::new();
+    for p in TRIANGLE {
+        data.extend(bytes(&[p]));
+        data.extend(bytes(&[[0.0, 0.0, 1.0f32]]));
+        data.extend(bytes(&[[p[0], 1.0 - p[1]]]));
+    }
+    let view = doc.view(&data, Some(32));
+    let mut part = |offset: usize, shape: &str| {
+        doc.push(
+            "accessors",
+            json!({ "bufferView": view, "byteOffset": offset, "componentType": F32, "type": shape, "count": 3 }),
+        )
+    };
+    let (position, normal, texcoord) = (part(0, "VEC3"), part(12, "VEC3"), part(24, "VEC2"));
+    doc.primitive(json!({ "attributes": { "POSITION": position, "NORMAL": normal, "TEXCOORD_0": texcoord } }));
+    let scene = doc.load();
+    let mesh = mesh(&scene, 0);
+    assert_eq!(corners(mesh)[0], TRIANGLE);
+    assert_eq!(mesh.normals, [Vec3::Z; 3]);
+    assert_eq!(mesh.texcoords[0], [Vec2::new(0.0, 1.0), Vec2::new(1.0, 1.0), Vec2::new(0.0, 0.0)]);
+    assert_eq!(scene.report.normals_computed, 0);
+}
+
+#[test]
+fn sparse_accessors() {
+    // over a buffer view
+    let mut doc = Doc::triangle();
+    let at = doc.view(&1u16.to_le_bytes(), None);
+    let values = doc.view(&bytes(&[[7.0, 0.0, 0.0f32]]), None);
+    let sparse = json!({
+        "count": 1,
+        "indices": { "bufferView": at, "componentType": U16 },
+        "values": { "bufferView": values },
+    });
+    doc.json["accessors"][0]["sparse"] = sparse;
+    assert_eq!(corners(mesh(&doc.load(), 0))[0], [TRIANGLE[0], [7.0, 0.0, 0.0], TRIANGLE[2]]);
+
+    // over zeros
+    let mut doc = Doc::new();
+    let at = doc.view(&[1, 2], None);
+    let values = doc.view(&bytes(&TRIANGLE[1..]), None);
+    let accessor = doc.push(
+        "accessors",
+        json!({
+            "componentType": F32, "type": "VEC3", "count": 3,
+            "sparse": {
+                "count": 2,
+                "indices": { "bufferView": at, "componentType": U8 },
+                "values": { "bufferView": values },
+            },
+        }),
+    );
+    doc.primitive(json!({ "attributes": { "POSITION": accessor } }));
+    assert_eq!(corners(mesh(&doc.load(), 0))[0], TRIANGLE);
+
+    // indices
+    let mut doc = Doc::new();
+    let position = doc.positions(&QUAD);
+    let indices = doc.accessor(&[0, 1, 1], U8, "SCALAR", 3);
+    let at = doc.view(&2u32.to_le_bytes(), None);
+    let values = doc.view(&[3], None);
+    doc.json["accessors"][indices]["sparse"] = json!({
+        "count": 1,
+        "indices": { "bufferView": at, "componentType": U32 },
+        "values": { "bufferView": values },
+    });
+    doc.primitive(json!({ "attributes": { "POSITION": position }, "indices": indices }));
+    assert_eq!(mesh(&doc.load(), 0).indices, [[0, 1, 3]]);
+    doc.json["accessors"][indices]["sparse"]["indices"]["byteOffset"] = json!(1);
+    assert!(doc.error().contains(&format!("accessor {indices}")), "{}", doc.error());
+}
+
+#[test]
+fn quantized_positions_normals_and_texcoords() {
+    let mut doc = Doc::new();
+    doc.json["extensionsUsed"] = json!(["KHR_mesh_quantization"]);
+    doc.json["extensionsRequired"] = json!(["KHR_mesh_quantization"]);
+    let short = |v: &[i16]| v.iter().flat_map(|x| x.to_le_bytes()).collect::<Vec<u8>>();
+    // i16, padded to 8 bytes
+    let data = short(&[0, 0, 0, 0, 100, 0, 0, 0, 0, -100, 0, 0]);
+    let view = doc.view(&data, Some(8));
+    let position = doc.push("accessors", json!({ "bufferView": view, "componentType": I16, "type": "VEC3", "count": 3 }));
+    // normalised i8, padded to 4 bytes
+    let normals = [0u8, 0, 127, 0, 0, 0, 127, 0, 0, 129, 0, 0];
+    let view = doc.view(&normals, Some(4));
+    let normal = doc
+        .push("accessors", json!({ "bufferView": view, "componentType": I8, "normalized": true, "type": "VEC3", "count": 3 }));
+    let view = doc.view(&[0, 0, 0, 0, 255, 255, 0, 0, 0, 0, 255, 255], Some(4));
+    let texcoord = doc
+        .push("accessors", json!({ "bufferView": view, "componentType": U16, "normalized": true, "type": "VEC2", "count": 3 }));
+    doc.primitive(json!({ "attributes": { "POSITION": position, "NORMAL": normal, "TEXCOORD_0": texcoord } }));
+    let scene = doc.load();
+    let m = mesh(&scene, 0);
+    assert_eq!(corners(m)[0], [[0.0; 3], [100.0, 0.0, 0.0], [0.0, -100.0, 0.0]]);
+    assert_eq!(m.normals, [Vec3::Z, Vec3::Z, Vec3::NEG_Y]);
+    assert_eq!(m.texcoords[0], [Vec2::ZERO, Vec2::new(1.0, 0.0), Vec2::new(0.0, 1.0)]);
+
+    // normalised u8 and i16 positions
+    for (component, data) in [(U8, vec![0u8, 0, 0, 255, 0, 0, 0, 255, 0]), (I16, short(&[0, 0, 0, 32767, 0, 0, 0, 32767, 0]))] {
+        let mut doc = Doc::new();
+        let position = doc.accessor(&data, component, "VEC3", 3);
+        doc.json["accessors"][0]["normalized"] = json!(true);
+        doc.primitive(json!({ "attributes": { "POSITION": position } }));
+        assert_eq!(corners(mesh(&doc.load(), 0))[0], TRIANGLE);
+    }
+}
+
+#[test]
+fn vertex_colors() {
+    let colors: [(u32, &str, Vec<u8>, bool); 3] = [
+        (F32, "VEC3", bytes(&[[1.0, 0.5, 0.0f32]; 3]), false),
+        (U8, "VEC4", [255, 128, 0, 255].repeat(3), true),
+        (U16, "VEC4", [255, 255, 0, 128, 0, 0, 255, 255].repeat(3), true),
+    ];
+    for (component, shape, data, normalized) in colors {
+        let mut doc = Doc::triangle();
+        let color = doc.accessor(&data, component, shape, 3);
+        doc.json["accessors"][color]["normalized"] = json!(normalized);
+        doc.first()["attributes"]["COLOR_0"] = json!(color);
+        let scene = doc.load();
+        for c in &mesh(&scene, 0).colors {
+            assert!(c.abs_diff_eq(Vec4::new(1.0, 0.5, 0.0, 1.0), 0.003), "{component} {shape}: {c}");
+        }
+    }
+}
+
+#[test]
+fn degenerate_triangles_are_dropped_and_counted() {
+    let mut doc = Doc::new();
+    let mut points = QUAD.to_vec();
+    points.push([2.0, 0.0, 0.0]); // on a line with 0 and 1
+    points.push([0.0, 0.0, 0.0]); // coincides with 0
+    let position = doc.positions(&points);
+    let indices = doc.accessor(&[0, 1, 2, 0, 0, 1, 0, 1, 4, 0, 5, 2, 1, 3, 2], U8, "SCALAR", 15);
+    doc.primitive(json!({ "attributes": { "POSITION": position }, "indices": indices }));
+    let scene = doc.load();
+    assert_eq!((scene.triangle_count(), scene.report.degenerate_triangles), (2, 3));
+    assert_eq!(mesh(&scene, 0).indices, [[0, 1, 2], [1, 3, 2]]);
+}
+
+#[test]
+fn shared_vertex_arrays_are_cut_to_what_is_used() {
+    let mut doc = Doc::new();
+    let points: Vec<[f32; 3]> = (0..100).flat_map(|i| TRIANGLE.map(|p| [p[0] + i as f32, p[1], p[2]])).collect();
+    let position = doc.positions(&points);
+    let normal = doc.accessor(&bytes(&[[0.0, 0.0, 1.0f32]; 300]), F32, "VEC3", 300);
+    let texcoord = doc.accessor(&bytes(&points.iter().map(|p| [p[0], p[1]]).collect::<Vec<_>>()), F32, "VEC2", 300);
+    for i in 0..100u16 {
+        let corners: Vec<u8> = [3 * i, 3 * i + 1, 3 * i + 2].into_iter().flat_map(u16::to_le_bytes).collect();
+        let indices = doc.accessor(&corners, U16, "SCALAR", 3);
+        doc.primitive(
+            json!({ "attributes": { "POSITION": position, "NORMAL": normal, "TEXCOORD_0": texcoord }, "indices": indices }),
+        );
+    }
+    let scene = doc.load();
+    assert_eq!(scene.meshes.len(), 100);
+    for i in 0..100 {
+        let m = mesh(&scene, i);
+        assert_eq!((m.positions.len(), m.normals.len(), m.texcoords[0].len()), (3, 3, 3));
+        assert_eq!(corners(m)[0], TRIANGLE.map(|p| [p[0] + i as f32, p[1], p[2]]));
+        assert_eq!(m.texcoords[0][1].x, i as f32 + 1.0);
+    }
+}
+
+#[test]
+fn normals_are_repaired() {
+    let mut doc = Doc::triangle();
+    let normal = doc.accessor(&bytes(&[[0.0, 0.0, 9.0], [0.0; 3], [f32::NAN, 0.0, 0.0]]), F32, "VEC3", 3);
+    doc.first()["attributes"]["NORMAL"] = json!(normal);
+    let scene = doc.load();
+    assert_eq!(mesh(&scene, 0).normals, [Vec3::Z; 3]);
+    assert!(scene.report.warnings[0].contains("2 normals"), "{:?}", scene.report.warnings);
+}
+
+#[test]
+fn tangents_only_where_a_normal_map_needs_them() {
+    let mut doc = Doc::triangle();
+    let normal = doc.accessor(&bytes(&[[0.0, 0.0, 1.0f32]; 3]), F32, "VEC3", 3);
+    // u along x, v down along -y: the bitangent is +y
+    let texcoord = doc.accessor(&bytes(&TRIANGLE.map(|p| [p[0], 1.0 - p[1]])), F32, "VEC2", 3);
+    let tangent = doc.accessor(&bytes(&[[0.0, 2.0, 0.0, -1.0f32]; 3]), F32, "VEC4", 3);
+    doc.first()["attributes"]["NORMAL"] = json!(normal);
+    doc.first()["attributes"]["TEXCOORD_0"] = json!(texcoord);
+    doc.first()["attributes"]["TANGENT"] = json!(tangent);
+    assert!(mesh(&doc.load(), 0).tangents.is_empty());
+
+    let uri = format!("data:image/png;base64,{}", base64(&png(2, 2, [128, 128, 255, 255])));
+    doc.push("images", json!({ "uri": uri }));
+    doc.push("textures", json!({ "source": 0 }));
+    doc.push("materials", json!({ "normalTexture": { "index": 0, "scale": 0.5 } }));
+    doc.first()["material"] = json!(0);
+    let scene = doc.load();
+    assert_eq!(mesh(&scene, 0).tangents, [Vec4::new(0.0, 1.0, 0.0, -1.0); 3]);
+    assert_eq!((scene.report.tangents_computed, scene.materials[0].normal_scale), (0, 0.5));
+
+    doc.first()["attributes"].as_object_mut().unwrap().remove("TANGENT");
+    let scene = doc.load();
+    assert_eq!(mesh(&scene, 0).tangents, [Vec4::new(1.0, 0.0, 0.0, 1.0); 3]);
+    assert_eq!(scene.report.tangents_computed, 1);
+
+    // without normals the tangents of flat shading are needed
+    doc.first()["attributes"].as_object_mut().unwrap().remove("NORMAL");
+    let scene = doc.load();
+    assert_eq!(mesh(&scene, 0).tangents, [Vec4::new(1.0, 0.0, 0.0, 1.0); 3]);
+    assert_eq!(mesh(&scene, 0).normals, [Vec3::Z; 3]);
+}
+
+#[test]
+fn tangents_split_vertices_where_texcoords_mirror() {
+    // two triangles share the edge 1-2; u runs one way in the first and back in the second
+    let mut doc = Doc::new();
+    let position = doc.positions(&QUAD);
+    let normal = doc.accessor(&bytes(&[[0.0, 0.0, 1.0f32]; 4]), F32, "VEC3", 4);
+    let uv = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [0.0, 0.0f32]];
+    let texcoord = doc.accessor(&bytes(&uv), F32, "VEC2", 4);
+    let indices = doc.accessor(&[0, 1, 2, 1, 3, 2], U8, "SCALAR", 6);
+    let view = doc.view(&png(1, 1, [128, 128, 255, 255]), None);
+    doc.push("images", json!({ "bufferView": view, "mimeType": "image/png" }));
+    doc.push("textures", json!({ "source": 0 }));
+    doc.push("materials", json!({ "normalTexture": { "index": 0 } }));
+    doc.primitive(json!({
+        "attributes": { "POSITION": position, "NORMAL": normal, "TEXCOORD_0": texcoord },
+        "indices": indices, "material": 0,
+    }));
+    let scene = doc.load();
+    let m = mesh(&scene, 0);
+    assert_eq!(m.positions.len(), 6);
+    for array in [m.normals.len(), m.texcoords[0].len(), m.tangents.len()] {
+        assert_eq!(array, 6);
+    }
+    assert_eq!(corners(m)[1], [QUAD[1], QUAD[3], QUAD[2]]);
+    let handedness = |t: usize| m.indices[t].map(|i| m.tangents[i as usize].w);
+    assert_eq!((handedness(0), handedness(1)), ([-1.0; 3], [1.0; 3]));
+}

@@ -1,0 +1,187 @@
+//! Nodes, scenes, cameras, lights.
+
+use std::f64::consts::FRAC_1_SQRT_2;
+
+use glam::{DAffine3, DVec3, Vec3};
+use serde_json::json;
+use skylit::scene::{LightKind, Projection, Scene};
+
+use crate::build::*;
+
+fn place(scene: &Scene, instance: usize, p: DVec3) -> DVec3 {
+    scene.instances[instance].object_to_world.transform_point3(p)
+}
+
+#[test]
+fn transforms_compose_in_f64() {
+    let mut doc = Doc::triangle();
+    // a millionth at a million away is lost in f32
+    doc.json["nodes"] = json!([
+        { "name": "far", "translation": [1e6, 0, 0], "children": [1] },
+        { "name": "turned", "rotation": [0, 0, FRAC_1_SQRT_2, FRAC_1_SQRT_2], "scale": [2, 3, 4], "children": [2] },
+        { "name": "leaf", "matrix": [1,0,0,0, 0,1,0,0, 0,0,1,0, 1e-6,0,0,1], "mesh": 0 },
+    ]);
+    let scene = doc.load();
+    assert_eq!((scene.instances.len(), scene.instances[0].name.as_str()), (1, "leaf"));
+    // x -> scaled by 2 -> turned to y
+    let p = place(&scene, 0, DVec3::new(1.0, 0.0, 0.0));
+    assert!((p - DVec3::new(1e6, 2.0 + 2e-6, 0.0)).length() < 1e-9, "{p}");
+}
+
+#[test]
+fn meshes_are_shared_by_nodes() {
+    let mut doc = Doc::triangle();
+    doc.json["nodes"] = json!([
+        { "mesh": 0, "children": [1, 2] },
+        { "mesh": 0, "translation": [1, 0, 0] },
+        { "mesh": 0, "scale": [-1, 1, 1] },
+    ]);
+    let scene = doc.load();
+    assert_eq!((scene.meshes.len(), scene.instances.len(), scene.triangle_count()), (1, 3, 3));
+    // a mirrored transform stays one
+    assert!(scene.instances[2].object_to_world.matrix3.determinant() < 0.0);
+}
+
+#[test]
+fn each_primitive_is_a_mesh() {
+    let mut doc = Doc::triangle();
+    let primitive = doc.first().clone();
+    doc.push("materials", json!({ "name": "red" }));
+    doc.primitive(primitive);
+    doc.json["meshes"][0]["primitives"][1]["material"] = json!(0);
+    let scene = doc.load();
+    assert_eq!((scene.meshes.len(), scene.instances.len()), (2, 2));
+    assert_eq!(scene.materials[scene.meshes[1].material].name, "red");
+    // glTF's default material is metallic
+    assert_eq!(scene.materials[scene.meshes[0].material].metallic, 1.0);
+    assert_ne!(scene.meshes[0].material, scene.meshes[1].material);
+}
+
+#[test]
+fn which_scene() {
+    let mut doc = Doc::triangle();
+    doc.json["nodes"] =
+        json!([{ "name": "a", "mesh": 0 }, { "name": "b", "mesh": 0, "children": [2] }, { "name": "c", "mesh": 0 }]);
+    let names = |doc: &Doc| doc.load().instances.iter().map(|i| i.name.clone()).collect::<Vec<_>>().concat();
+    doc.json["scenes"] = json!([{ "nodes": [0] }, { "nodes": [1] }]);
+    doc.json["scene"] = json!(1);
+    assert_eq!(names(&doc), "bc");
+    doc.json.as_object_mut().unwrap().remove("scene");
+    assert_eq!(names(&doc), "a");
+    doc.json.as_object_mut().unwrap().remove("scenes");
+    assert_eq!(names(&doc), "abc");
+}
+
+#[test]
+fn broken_hierarchies() {
+    let mut doc = Doc::triangle();
+    doc.json["nodes"] = json!([{ "mesh": 0, "children": [1] }, { "children": [0] }]);
+    assert!(doc.error().contains("ancestor"), "{}", doc.error());
+    doc.json.as_object_mut().unwrap().remove("scenes");
+    doc.json.as_object_mut().unwrap().remove("scene");
+    assert!(doc.error().contains("ancestor"), "{}", doc.error());
+    doc.json["nodes"] = json!([{ "children": [2] }, { "children": [2] }, { "mesh": 0 }]);
+    assert!(doc.error().contains("child of more than one"), "{}", doc.error());
+    doc.json["nodes"] = json!([{ "children": [7], "mesh": 0 }]);
+    assert!(doc.error().contains("child 7"), "{}", doc.error());
+    doc.json["nodes"] = json!([{ "mesh": 3 }]);
+    assert!(doc.error().contains("mesh 3"), "{}", doc.error());
+}
+
+#[test]
+fn deep_hierarchies_do_not_overflow_the_stack() {
+    let mut doc = Doc::triangle();
+    let n = 100_000;
+    let mut nodes: Vec<_> = (1..n).map(|i| json!({ "children": [i], "translation": [0, 0, 1] })).collect();
+    nodes.push(json!({ "mesh": 0 }));
+    doc.json["nodes"] = json!(nodes);
+    assert_eq!(place(&doc.load(), 0, DVec3::ZERO).z, f64::from(n - 1));
+}
+
+#[test]
+fn squashed_instances_are_baked() {
+    let mut doc = Doc::triangle();
+    doc.json["nodes"] =
+        json!([{ "mesh": 0, "children": [1, 2] }, { "mesh": 0, "scale": [2, 2, 0] }, { "mesh": 0, "scale": [0, 0, 0] }]);
+    let scene = doc.load();
+    assert_eq!((scene.meshes.len(), scene.instances.len(), scene.report.degenerate_triangles), (2, 2, 0));
+    assert!(scene.report.warnings[0].contains("scaled to nothing"), "{:?}", scene.report.warnings);
+    assert_eq!(scene.instances[1].object_to_world, DAffine3::IDENTITY);
+    assert_eq!(corners(mesh(&scene, 1))[0], TRIANGLE.map(|p| p.map(|x| 2.0 * x)));
+}
+
+#[test]
+fn cameras() {
+    let mut doc = Doc::triangle();
+    doc.json["cameras"] = json!([
+        { "name": "cam", "type": "perspective", "perspective": { "yfov": 0.7, "znear": 0.1, "aspectRatio": 1.5 } },
+        { "type": "orthographic", "orthographic": { "xmag": 4, "ymag": 2, "znear": 0, "zfar": 10 } },
+        { "type": "perspective", "perspective": { "yfov": 4.0, "znear": 0.1 } },
+    ]);
+    let s = FRAC_1_SQRT_2;
+    doc.json["nodes"] = json!([{ "mesh": 0, "children": [1, 2, 3] },
+        { "camera": 0, "translation": [1, 2, 3], "rotation": [0, s, 0, s], "scale": [5, 2, 9] },
+        { "name": "flat", "camera": 1, "scale": [-1, 1, 1] },
+        { "camera": 2 }]);
+    let scene = doc.load();
+    assert_eq!((scene.cameras.len(), scene.report.warnings.len()), (2, 1), "{:?}", scene.report.warnings);
+    let camera = &scene.cameras[0];
+    assert_eq!((camera.name.as_str(), camera.aspect), ("cam", Some(1.5)));
+    assert_eq!(camera.projection, Projection::Perspective { fov_y: 0.7 });
+    let m = &camera.camera_to_world;
+    // turned left by 90 degrees: looks along -x
+    assert!((m.matrix3 * DVec3::NEG_Z - DVec3::NEG_X).length() < 1e-12);
+    assert_eq!(m.translation, DVec3::new(1.0, 2.0, 3.0));
+    for m in scene.cameras.iter().map(|c| c.camera_to_world.matrix3) {
+        assert!(
+            (m.determinant() - 1.0).abs() < 1e-12
+                && (m.transpose() * m - glam::DMat3::IDENTITY).abs_diff_eq(glam::DMat3::ZERO, 1e-12)
+        );
+    }
+    assert_eq!(scene.cameras[1].projection, Projection::Orthographic { half_height: 2.0 });
+    assert_eq!((scene.cameras[1].name.as_str(), scene.cameras[1].aspect), ("flat", Some(2.0)));
+}
+
+#[test]
+fn punctual_lights() {
+    let mut doc = Doc::triangle();
+    doc.json["extensionsUsed"] = json!(["KHR_lights_punctual"]);
+    doc.json["extensionsRequired"] = json!(["KHR_lights_punctual"]);
+    doc.json["extensions"] = json!({ "KHR_lights_punctual": { "lights": [
+        { "type": "point", "color": [1, 0.5, 0], "intensity": 10, "range": 7, "name": "lamp" },
+        { "type": "spot", "spot": { "innerConeAngle": 0.1, "outerConeAngle": 0.3 } },
+        { "type": "directional" },
+        { "type": "area" },
+    ] } });
+    let with = |i: usize| json!({ "KHR_lights_punctual": { "light": i } });
+    let s = FRAC_1_SQRT_2;
+    doc.json["nodes"] = json!([{ "mesh": 0, "children": [1, 2, 3, 4, 5] },
+        { "extensions": with(0), "translation": [1, 2, 3] },
+        { "extensions": with(1), "rotation": [-s, 0, 0, s] },
+        { "extensions": with(2), "name": "sun" },
+        { "extensions": with(3) }, { "extensions": with(9) }]);
+    let scene = doc.load();
+    assert_eq!((scene.lights.len(), scene.report.warnings.len()), (3, 2), "{:?}", scene.report.warnings);
+    let [lamp, spot, sun] = &scene.lights[..] else { panic!() };
+    assert_eq!((lamp.kind, lamp.intensity, lamp.range), (LightKind::Point, Vec3::new(10.0, 5.0, 0.0), 7.0));
+    assert_eq!((lamp.position, lamp.name.as_str()), (DVec3::new(1.0, 2.0, 3.0), "lamp"));
+    assert_eq!(spot.kind, LightKind::Spot { inner_angle: 0.1, outer_angle: 0.3 });
+    // turned by -90 degrees about x: shines down
+    assert!((spot.direction - DVec3::NEG_Y).length() < 1e-12, "{}", spot.direction);
+    assert_eq!((sun.kind, sun.direction, sun.range), (LightKind::Directional, DVec3::NEG_Z, f64::INFINITY));
+    assert_eq!(sun.name, "sun");
+}
+
+#[test]
+fn what_is_not_shown_is_said() {
+    let mut doc = Doc::triangle();
+    let position = doc.first()["attributes"]["POSITION"].clone();
+    doc.first()["targets"] = json!([{ "POSITION": position }]);
+    doc.json["nodes"][0]["skin"] = json!(0);
+    doc.json["animations"] = json!([{ "channels": [], "samplers": [] }]);
+    doc.json["extensionsUsed"] = json!(["EXT_mesh_gpu_instancing"]);
+    let warnings = doc.load().report.warnings.join("; ");
+    for word in ["morph", "skin", "animation", "EXT_mesh_gpu_instancing"] {
+        assert!(warnings.contains(word), "{word}: {warnings}");
+    }
+}

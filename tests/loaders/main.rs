@@ -1,0 +1,13 @@
+//! Loaders and exporter: every glTF feature, OBJ, `.brhan`, bad input, round trips, and the scenes of others where present.
+
+mod brhan;
+mod build;
+mod errors;
+mod export;
+mod fuzz;
+mod geometry;
+mod hierarchy;
+mod materials;
+mod obj;
+mod own;
+mod shared;

@@ -1,0 +1,214 @@
+//! Materials, textures, images, samplers.
+
+use glam::{Vec2, Vec3, Vec4};
+use serde_json::{Value, json};
+use skylit::scene::material::{AlphaMode, Material};
+use skylit::scene::{Filter, Scene, Wrap};
+
+use crate::build::*;
+
+/// A textured triangle with three embedded images and this material.
+fn with_material(material: Value) -> Doc {
+    let mut doc = Doc::triangle();
+    let texcoord = doc.accessor(&bytes(&TRIANGLE.map(|p| [p[0], p[1]])), F32, "VEC2", 3);
+    doc.first()["attributes"]["TEXCOORD_0"] = json!(texcoord);
+    doc.first()["attributes"]["TEXCOORD_1"] = json!(texcoord);
+    let normal = doc.accessor(&bytes(&[[0.0, 0.0, 1.0f32]; 3]), F32, "VEC3", 3);
+    doc.first()["attributes"]["NORMAL"] = json!(normal);
+    for i in 0..3 {
+        let view = doc.view(&png(1 + i, 2, [i as u8, 2, 3, 4]), None);
+        doc.push("images", json!({ "bufferView": view, "mimeType": "image/png", "name": format!("image {i}") }));
+        doc.push("textures", json!({ "source": i }));
+    }
+    doc.push("materials", material);
+    doc.first()["material"] = json!(0);
+    doc
+}
+
+fn material(scene: &Scene) -> &Material {
+    &scene.materials[0]
+}
+
+#[test]
+fn core() {
+    let doc = with_material(json!({
+        "name": "m", "doubleSided": true, "alphaMode": "MASK", "alphaCutoff": 0.25, "emissiveFactor": [1, 0.5, 0],
+        "pbrMetallicRoughness": {
+            "baseColorFactor": [0.1, 0.2, 0.3, 0.4], "metallicFactor": 0.5, "roughnessFactor": 0.25,
+            "baseColorTexture": { "index": 2 }, "metallicRoughnessTexture": { "index": 1, "texCoord": 1 },
+        },
+        "occlusionTexture": { "index": 1 }, "emissiveTexture": { "index": 0 },
+    }));
+    let scene = doc.load();
+    let m = material(&scene);
+    assert_eq!((m.name.as_str(), m.double_sided, m.alpha_mode), ("m", true, AlphaMode::Mask { cutoff: 0.25 }));
+    assert_eq!((m.base_color, m.metallic, m.roughness), (Vec4::new(0.1, 0.2, 0.3, 0.4), 0.5, 0.25));
+    assert_eq!(m.emissive, Vec3::new(1.0, 0.5, 0.0));
+    assert_eq!(scene.textures.len(), 3);
+    let texture = &scene.textures[m.base_color_texture.unwrap().texture];
+    assert_eq!((texture.name.as_str(), texture.width, texture.height), ("image 2", 3, 2));
+    assert_eq!(texture.rgba8[..4], [2, 2, 3, 4]);
+    assert_eq!(m.metallic_roughness_texture.unwrap().texcoord, 1);
+    assert_eq!(m.occlusion_texture.unwrap().texture, m.metallic_roughness_texture.unwrap().texture);
+}
+
+#[test]
+fn defaults_and_alpha_modes() {
+    let scene = with_material(json!({})).load();
+    let m = material(&scene);
+    assert_eq!((m.base_color, m.metallic, m.roughness, m.ior), (Vec4::ONE, 1.0, 1.0, 1.5));
+    assert_eq!((m.alpha_mode, m.double_sided, m.unlit), (AlphaMode::Opaque, false, false));
+    // images that nothing uses are not decoded
+    assert!(scene.textures.is_empty());
+    let scene = with_material(json!({ "alphaMode": "MASK" })).load();
+    assert_eq!(material(&scene).alpha_mode, AlphaMode::Mask { cutoff: 0.5 });
+    let scene = with_material(json!({ "alphaMode": "BLEND" })).load();
+    assert_eq!(material(&scene).alpha_mode, AlphaMode::Blend);
+}
+
+#[test]
+fn extensions() {
+    let doc = with_material(json!({ "emissiveFactor": [1, 1, 0], "extensions": {
+        "KHR_materials_clearcoat": {
+            "clearcoatFactor": 0.5, "clearcoatTexture": { "index": 0 }, "clearcoatRoughnessFactor": 0.25,
+            "clearcoatRoughnessTexture": { "index": 1 }, "clearcoatNormalTexture": { "index": 2 },
+        },
+        "KHR_materials_sheen": {
+            "sheenColorFactor": [0.1, 0.2, 0.3], "sheenColorTexture": { "index": 0 }, "sheenRoughnessFactor": 0.7,
+            "sheenRoughnessTexture": { "index": 1 },
+        },
+        "KHR_materials_transmission": { "transmissionFactor": 0.9, "transmissionTexture": { "index": 0 } },
+        "KHR_materials_volume": {
+            "thicknessFactor": 2, "thicknessTexture": { "index": 1 }, "attenuationDistance": 3,
+            "attenuationColor": [0.5, 1, 1],
+        },
+        "KHR_materials_ior": { "ior": 1.33 },
+        "KHR_materials_specular": {
+            "specularFactor": 0.4, "specularTexture": { "index": 0 }, "specularColorFactor": [1, 0, 0],
+            "specularColorTexture": { "index": 1 },
+        },
+        "KHR_materials_anisotropy": {
+            "anisotropyStrength": 0.6, "anisotropyRotation": 0.3, "anisotropyTexture": { "index": 2 },
+        },
+        "KHR_materials_emissive_strength": { "emissiveStrength": 8 },
+        "KHR_materials_unlit": {},
+    } }));
+    let scene = doc.load();
+    let m = material(&scene);
+    assert_eq!((m.clearcoat.factor, m.clearcoat.roughness), (0.5, 0.25));
+    assert_eq!((m.sheen.color, m.sheen.roughness), (Vec3::new(0.1, 0.2, 0.3), 0.7));
+    assert_eq!((m.transmission.factor, m.transmission.thickness), (0.9, 2.0));
+    assert_eq!((m.transmission.attenuation_distance, m.transmission.attenuation_color), (3.0, Vec3::new(0.5, 1.0, 1.0)));
+    assert_eq!((m.ior, m.specular.factor, m.specular.color), (1.33, 0.4, Vec3::X));
+    assert_eq!((m.anisotropy.strength, m.anisotropy.rotation), (0.6, 0.3));
+    assert_eq!((m.emissive, m.unlit), (Vec3::new(8.0, 8.0, 0.0), true));
+    assert_eq!(m.textures().count(), 10);
+    let uses = |t: usize| m.textures().filter(|s| s.texture == t).count();
+    assert_eq!([uses(0), uses(1), uses(2)], [4, 4, 2]);
+    // a coat's normal map needs tangents
+    assert_eq!(scene.report.tangents_computed, 1);
+    assert!(scene.report.warnings.is_empty(), "{:?}", scene.report.warnings);
+}
+
+#[test]
+fn extensions_have_defaults() {
+    let scene = with_material(json!({ "extensions": {
+        "KHR_materials_specular": {}, "KHR_materials_volume": {}, "KHR_materials_ior": {}, "KHR_materials_clearcoat": {},
+    } }))
+    .load();
+    let m = material(&scene);
+    assert_eq!((m.specular.factor, m.specular.color, m.ior, m.clearcoat.factor), (1.0, Vec3::ONE, 1.5, 0.0));
+    assert_eq!((m.transmission.attenuation_color, m.transmission.attenuation_distance), (Vec3::ONE, f32::INFINITY));
+}
+
+#[test]
+fn texture_transform() {
+    let slot = |transform: Value| {
+        let doc = with_material(json!({ "pbrMetallicRoughness": { "baseColorTexture": {
+            "index": 0, "extensions": { "KHR_texture_transform": transform } } } }));
+        material(&doc.load()).base_color_texture.unwrap()
+    };
+    // the specification's example: the lower left quadrant of the image, turned
+    let s = slot(json!({ "offset": [0, 1], "rotation": std::f32::consts::FRAC_PI_2, "scale": [0.5, 0.5] }));
+    let at = |u: f32, v: f32| s.transform.transform_point2(Vec2::new(u, v));
+    assert!(at(0.0, 0.0).abs_diff_eq(Vec2::new(0.0, 1.0), 1e-6));
+    assert!(at(1.0, 0.0).abs_diff_eq(Vec2::new(0.0, 0.5), 1e-6), "{}", at(1.0, 0.0));
+    assert!(at(0.0, 1.0).abs_diff_eq(Vec2::new(0.5, 1.0), 1e-6), "{}", at(0.0, 1.0));
+    let s = slot(json!({ "scale": [2, 3], "texCoord": 1 }));
+    assert_eq!(s.transform.transform_point2(Vec2::ONE), Vec2::new(2.0, 3.0));
+    assert_eq!(s.texcoord, 1);
+    // the same on every kind of texture
+    let transform = json!({ "index": 0, "extensions": { "KHR_texture_transform": { "scale": [2, 3], "texCoord": 1 } } });
+    let doc = with_material(json!({
+        "normalTexture": transform, "occlusionTexture": transform, "emissiveTexture": transform,
+        "extensions": { "KHR_materials_clearcoat": { "clearcoatTexture": transform, "clearcoatNormalTexture": transform } },
+    }));
+    assert_eq!(material(&doc.load()).textures().filter(|t| *t == s).count(), 5);
+}
+
+#[test]
+fn third_texture_coordinates_are_refused_politely() {
+    let scene = with_material(json!({ "emissiveTexture": { "index": 0, "texCoord": 2 } })).load();
+    assert_eq!(material(&scene).emissive_texture.unwrap().texcoord, 0);
+    assert_eq!(scene.report.warnings.len(), 1);
+}
+
+#[test]
+fn missing_texture_coordinates_are_zero() {
+    let mut doc = with_material(json!({ "emissiveTexture": { "index": 0, "texCoord": 1 } }));
+    doc.first()["attributes"].as_object_mut().unwrap().remove("TEXCOORD_1");
+    let scene = doc.load();
+    assert_eq!(mesh(&scene, 0).texcoords[1], [Vec2::ZERO; 3]);
+    assert_eq!(scene.report.warnings.len(), 1);
+}
+
+#[test]
+fn samplers() {
+    let mut doc = with_material(json!({ "emissiveTexture": { "index": 0 }, "occlusionTexture": { "index": 1 } }));
+    doc.json["samplers"] = json!([{ "magFilter": 9728, "minFilter": 9987, "wrapS": 33071, "wrapT": 33648 }]);
+    doc.json["textures"][0]["sampler"] = json!(0);
+    doc.json["textures"][1]["source"] = json!(0);
+    let scene = doc.load();
+    let [a, b] = &scene.textures[..] else { panic!() };
+    assert_eq!((a.wrap, a.filter), ([Wrap::Clamp, Wrap::Mirror], Filter::Nearest));
+    assert_eq!((b.wrap, b.filter), ([Wrap::Repeat; 2], Filter::Linear));
+    // one image, decoded once
+    assert!(std::sync::Arc::ptr_eq(&a.rgba8, &b.rgba8));
+}
+
+#[test]
+fn images_from_everywhere() {
+    let mut jpeg = std::io::Cursor::new(Vec::new());
+    image::RgbImage::from_pixel(8, 8, image::Rgb([200, 100, 50])).write_to(&mut jpeg, image::ImageFormat::Jpeg).unwrap();
+    let folder = Folder::new();
+    folder.write("sub dir/a b.png", png(4, 4, [9, 8, 7, 6]));
+    let mut doc = with_material(json!({
+        "emissiveTexture": { "index": 0 }, "occlusionTexture": { "index": 1 },
+        "pbrMetallicRoughness": { "baseColorTexture": { "index": 2 } },
+    }));
+    doc.json["images"][0] = json!({ "uri": format!("data:image/jpeg;base64,{}", base64(jpeg.get_ref())) });
+    doc.json["images"][1] = json!({ "uri": "sub%20dir/a%20b.png" });
+    let scene = folder.load("scene.gltf", doc.gltf()).unwrap();
+    let m = material(&scene);
+    let texture = |slot: &Option<skylit::scene::TextureSlot>| &scene.textures[slot.unwrap().texture];
+    let jpeg = texture(&m.emissive_texture);
+    assert!(jpeg.rgba8[0].abs_diff(200) < 4 && jpeg.rgba8[1].abs_diff(100) < 4 && jpeg.rgba8[3] == 255);
+    assert_eq!(texture(&m.occlusion_texture).rgba8[..4], [9, 8, 7, 6]);
+    assert_eq!(texture(&m.base_color_texture).width, 3);
+}
+
+#[test]
+fn missing_and_broken_images_are_left_out() {
+    let mut doc = with_material(json!({
+        "emissiveTexture": { "index": 0 }, "occlusionTexture": { "index": 1 }, "normalTexture": { "index": 7 },
+        "pbrMetallicRoughness": { "baseColorTexture": { "index": 2 } },
+    }));
+    doc.json["images"][0] = json!({ "uri": "gone.png" });
+    doc.json["images"][1] = json!({ "uri": "data:image/png;base64,AAAA" });
+    let scene = doc.load();
+    let m = material(&scene);
+    assert!(m.emissive_texture.is_none() && m.occlusion_texture.is_none() && m.normal_texture.is_none());
+    assert_eq!(m.base_color_texture.unwrap().texture, 0);
+    assert_eq!(scene.report.warnings.len(), 3, "{:?}", scene.report.warnings);
+    assert!(scene.report.warnings[0].contains("gone.png"), "{:?}", scene.report.warnings);
+}

@@ -1,0 +1,47 @@
+//! The scenes that come with the repository.
+
+use std::path::Path;
+
+use skylit::scene::{AlphaMode, LightKind, Scene};
+
+use crate::build::*;
+
+fn own(name: &str) -> Scene {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(name);
+    let scene = load(&path).unwrap();
+    assert!(scene.report.warnings.is_empty(), "{name}: {:?}", scene.report.warnings);
+    assert_eq!(scene.report.degenerate_triangles, 0);
+    scene
+}
+
+#[test]
+fn leaves() {
+    let scene = own("leaves.glb");
+    assert_eq!((scene.triangle_count(), scene.instances.len(), scene.meshes.len()), (2 + 24 * 6, 25, 2));
+    assert_eq!(scene.materials[1].alpha_mode, AlphaMode::Mask { cutoff: 0.5 });
+    let alpha = |f: fn(u8) -> bool| scene.textures[0].rgba8.chunks(4).filter(|p| f(p[3])).count();
+    assert!(alpha(|a| a == 0) > 1000 && alpha(|a| a == 255) > 1000);
+}
+
+#[test]
+fn courtyard() {
+    let scene = own("courtyard.gltf");
+    assert_eq!((scene.triangle_count(), scene.instances.len()), (2 + 15 * 12, 16));
+    assert_eq!((scene.cameras.len(), scene.lights.len(), scene.textures.len()), (2, 2, 1));
+    assert_eq!(scene.lights[0].kind, LightKind::Directional);
+}
+
+#[test]
+fn alcove() {
+    let scene = own("alcove.brhan");
+    assert_eq!((scene.sphere_count(), scene.cameras.len(), scene.hints.size), (3, 1, Some([512, 512])));
+    assert_eq!(scene.triangle_count(), 8 + 8 + 10 + 2 * 12);
+}
+
+#[test]
+fn files_are_small() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");
+    for file in std::fs::read_dir(folder).unwrap().flatten() {
+        assert!(file.metadata().unwrap().len() < 100_000, "{:?}", file.path());
+    }
+}
