@@ -13,12 +13,6 @@ void store_ray(SceneRoot root, uint k, Ray r) {
     rays.v[2u * k + 1u] = floatBitsToUint(vec4(r.direction, r.tmax));
 }
 
-Ray load_ray(SceneRoot root, uint k) {
-    LaunchRays rays = LaunchRays(root.launch_rays);
-    vec4 a = uintBitsToFloat(rays.v[2u * k]), b = uintBitsToFloat(rays.v[2u * k + 1u]);
-    return Ray(a.xyz, a.w, b.xyz, b.w);
-}
-
 void store_any(SceneRoot root, uint k, bool occluded) {
     LaunchFlags(root.launch_hits).v[k] = occluded ? 1u : 0u;
 }

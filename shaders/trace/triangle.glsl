@@ -112,11 +112,14 @@ bool intersect_triangle(Shear shear, vec3 origin, vec3 direction, vec3 v0, vec3 
     precise float w = w0 - w1;
     bool outside = (u < 0.0 || v < 0.0 || w < 0.0) && (u > 0.0 || v > 0.0 || w > 0.0);
     float det = u + v + w;
-    float inverse_det = 1.0 / det;
-    t = (u * a.z + v * b.z + w * c.z) * shear.s.z * inverse_det;
-    uv = vec2(v, w) * inverse_det;
-    // ordered comparisons: NaN from det = 0 is no hit
-    bool met = !outside && det != 0.0 && t > tmin && t < tmax;
+    // Lanes that have no triangle in hand compute too, on whatever they hold; and a denormal number, made from that, costs a CPU
+    // a hundred times the cycles of a normal one. So only plausible determinants are divided by.
+    bool plausible = !outside && abs(det) > 1e-37 && abs(det) < 1e37;
+    float inverse_det = 1.0 / (plausible ? det : 1.0);
+    float scaled = u * a.z + v * b.z + w * c.z;
+    t = (plausible ? scaled : 0.0) * shear.s.z * inverse_det;
+    bool met = plausible && t > tmin && t < tmax;
+    uv = vec2(met ? v : 0.0, met ? w : 0.0) * inverse_det;
     vec3 z = abs(vec3(a.z, b.z, c.z) * shear.s.z);
     float max_z = max(max(z.x, z.y), z.z);
     // A ray that has just left this surface may find it again at a t that is all rounding, thin triangles above all; and a

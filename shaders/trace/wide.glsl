@@ -36,6 +36,12 @@ const uint ROOT_GROUP = 0x80000000u;
     negative = lessThan(inverse, vec3(0.0));                                                                   \
     octant = (7u - ((negative.x ? 4u : 0u) | (negative.y ? 2u : 0u) | (negative.z ? 1u : 0u))) * 0x01010101u;
 
+Ray take_ray(SceneRoot root, uint k) {
+    vec2 a = uintBitsToFloat(LOAD_PAIR(root.launch_rays, 4u * k)), b = uintBitsToFloat(LOAD_PAIR(root.launch_rays, 4u * k + 1u));
+    vec2 c = uintBitsToFloat(LOAD_PAIR(root.launch_rays, 4u * k + 2u)), d = uintBitsToFloat(LOAD_PAIR(root.launch_rays, 4u * k + 3u));
+    return Ray(vec3(a, b.x), b.y, vec3(c, d.x), d.y);
+}
+
 // One primitive record against the ray; the corners are a, b, c.
 bool intersect_record(uint id, vec3 a, vec3 b, vec3 c, Shear shear, vec3 origin, vec3 direction, Ray world,
         uint instance, float best, out float t, out vec2 uv) {
@@ -66,7 +72,7 @@ void main() {
     uint stack_bits[STACK_SIZE];
     uint depth = 0u;
 
-    Ray world = load_ray(root, index);
+    Ray world = take_ray(root, index);
     vec3 origin, direction, inverse;
     Shear shear;
     bvec3 negative;
@@ -208,7 +214,7 @@ void main() {
 #endif
                 index += LANES;
                 if (index >= end) return;
-                world = load_ray(root, index);
+                world = take_ray(root, index);
                 SET_RAY(world.origin, world.direction)
                 in_group = SINGLE_LEVEL;
                 instance = 0u;
