@@ -23,6 +23,8 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Sc
     uint root_reserved0;
     uint root_reserved1;
     uint root_reserved2;
+    vec4 bounds_min;   // compute tracer: of everything, padded as the hierarchy's boxes are
+    vec4 bounds_max;
 };
 
 // Matrices are three rows of an affine map. Group space is the space of the bottom level's vertices.

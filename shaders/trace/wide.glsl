@@ -42,6 +42,22 @@ Ray take_ray(SceneRoot root, uint k) {
     return Ray(vec3(a, b.x), b.y, vec3(c, d.x), d.y);
 }
 
+#ifdef STREAM_ANY
+#define STORE_MISS store_any(root, index, false);
+#else
+#define STORE_MISS store_closest(root, index, INFINITY, INVALID, INVALID, vec2(0.0));
+#endif
+
+// The lane's next ray; what is no ray has missed.
+#define NEXT_RAY                              \
+    while (true) {                            \
+        if (index >= end) return;             \
+        world = take_ray(root, index);        \
+        if (is_ray(world)) break;             \
+        STORE_MISS                            \
+        index += LANES;                       \
+    }
+
 // One primitive record against the ray; the corners are a, b, c.
 bool intersect_record(uint id, vec3 a, vec3 b, vec3 c, Shear shear, vec3 origin, vec3 direction, Ray world,
         uint instance, float best, out float t, out vec2 uv) {
@@ -72,7 +88,8 @@ void main() {
     uint stack_bits[STACK_SIZE];
     uint depth = 0u;
 
-    Ray world = take_ray(root, index);
+    Ray world;
+    NEXT_RAY
     vec3 origin, direction, inverse;
     Shear shear;
     bvec3 negative;
@@ -81,7 +98,7 @@ void main() {
     uint instance = 0u;
     bool in_group = SINGLE_LEVEL;
     // the group of children and the group of primitives in hand
-    uint node_base = root.root, node_bits = is_ray(world) ? ROOT_GROUP : 0u;
+    uint node_base = root.root, node_bits = ROOT_GROUP;
     uint primitive_base = 0u, primitive_bits = 0u;
     float best = world.tmax;
     uint best_instance = INVALID, best_primitive = INVALID;
@@ -213,13 +230,12 @@ void main() {
                 store_closest(root, index, best_primitive != INVALID ? best : INFINITY, best_instance, best_primitive, best_uv);
 #endif
                 index += LANES;
-                if (index >= end) return;
-                world = take_ray(root, index);
+                NEXT_RAY
                 SET_RAY(world.origin, world.direction)
                 in_group = SINGLE_LEVEL;
                 instance = 0u;
                 node_base = root.root;
-                node_bits = is_ray(world) ? ROOT_GROUP : 0u;
+                node_bits = ROOT_GROUP;
                 best = world.tmax;
                 best_primitive = INVALID;
                 best_instance = INVALID;

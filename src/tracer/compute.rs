@@ -60,6 +60,8 @@ pub(super) struct Hierarchy {
     /// Where it begins within each entry of the top level.
     pub instance_roots: Vec<u32>,
     pub stack_entries: u32,
+    /// Of everything, padded.
+    pub bounds: Aabb,
     /// Between the steps of a launch (fast kernel only).
     pub launch_rays: Option<Buffer>,
     pub launch_hits: Option<Buffer>,
@@ -128,6 +130,11 @@ impl Trees {
     }
 
     pub fn upload(self, device: &Arc<Device>, flat: &FlatScene) -> Result<Hierarchy> {
+        let bounds = match (&self.top, self.groups.first()) {
+            (Some(top), _) => top.bounds(placement_boxes(flat, &self.groups).into_iter()),
+            (None, Some(group)) => group.bounds(flat.groups.iter().flat_map(|g| primitive_boxes(flat, g))),
+            (None, None) => Aabb::EMPTY,
+        };
         let group_depth = self.groups.iter().map(Tree::depth).max().unwrap_or(0);
         let kernel = match self.groups.first().or(self.top.as_ref()) {
             Some(Tree::Reference(_)) => Kernel::Reference,
@@ -235,7 +242,7 @@ impl Trees {
             Kernel::Reference => Ok(None),
         };
         let (launch_rays, launch_hits) = (launch("launch rays", size_of::<Ray>() as u64)?, launch("launch hits", HIT_BYTES)?);
-        Ok(Hierarchy { kernel, nodes, primitives, root, instance_roots, stack_entries, launch_rays, launch_hits })
+        Ok(Hierarchy { kernel, nodes, primitives, root, instance_roots, stack_entries, bounds, launch_rays, launch_hits })
     }
 }
 

@@ -37,6 +37,8 @@ struct SceneRoot {
     launch_hits: u64,
     root: u32,
     reserved: [u32; 3],
+    bounds_min: [f32; 4],
+    bounds_max: [f32; 4],
 }
 
 #[repr(C)]
@@ -221,6 +223,8 @@ impl GpuScene {
         self.root.nodes = h.nodes.address();
         self.root.primitives = h.primitives.address();
         self.root.root = h.root;
+        self.root.bounds_min = h.bounds.min.extend(0.0).to_array();
+        self.root.bounds_max = h.bounds.max.extend(0.0).to_array();
         self.root.launch_rays = h.launch_rays.as_ref().map_or(0, Buffer::address);
         self.root.launch_hits = h.launch_hits.as_ref().map_or(0, Buffer::address);
         write_all(&mut self.root_buffer, &[self.root])
