@@ -410,17 +410,16 @@ fn gpu_ao_plane_is_one() {
         check_exact(&device, &format!("{what}, baked"), &baked, &baked.cameras[0], 1.0, |_| 0.0);
         // turned by its instance's transform, which is baked into the vertices, or, with a second instance out of sight, is not
         let turn = DQuat::from_euler(glam::EulerRot::XYZ, 0.7, -0.4, 1.1);
-        let about = DAffine3::from_translation(place.offset)
-            * DAffine3::from_quat(turn)
-            * DAffine3::from_translation(-place.offset);
+        let about =
+            DAffine3::from_translation(place.offset) * DAffine3::from_quat(turn) * DAffine3::from_translation(-place.offset);
         let mut tilted = scene.clone();
         tilted.instances[0].object_to_world = about * tilted.instances[0].object_to_world;
         tilted.cameras[0].camera_to_world = about * tilted.cameras[0].camera_to_world;
         check_exact(&device, &format!("{what}, tilted"), &tilted, &tilted.cameras[0], 1.0, |_| 0.0);
         let mut two = tilted.clone();
         let mut second = two.instances[0].clone();
-        second.object_to_world = DAffine3::from_translation(about.transform_vector3(DVec3::Y) * (-20.0 * place.scale))
-            * second.object_to_world;
+        second.object_to_world =
+            DAffine3::from_translation(about.transform_vector3(DVec3::Y) * (-20.0 * place.scale)) * second.object_to_world;
         two.instances.push(second);
         check_exact(&device, &format!("{what}, tilted, instanced"), &two, &two.cameras[0], 1.0, |_| 0.0);
     }
@@ -508,7 +507,8 @@ fn gpu_ao_closed_box_is_zero() {
         let baked = builtin::bake(&scene);
         check_exact(&device, &format!("{what}, baked"), &baked, &baked.cameras[0], 0.0, spare);
         let mut ball = scene.clone();
-        ball.meshes[0].geometry = shapes::icosphere(1.0, 3);
+        // around the camera too
+        ball.meshes[0].geometry = shapes::icosphere(1.5, 3);
         check_exact(&device, &format!("inside of an icosphere, scale {}", place.scale), &ball, &ball.cameras[0], 0.0, spare);
     }
     assert_validation_clean(&device);
