@@ -272,8 +272,9 @@ fn gpu_images_of_several_blocks() {
 #[test]
 fn gpu_film_keeps_its_digits() {
     let device = device();
-    let scene = analytic::parallel_planes(40.0, 40.0, 0.5, Placement::default());
-    let camera = Camera::look_at(DVec3::new(0.2, 0.3, 0.1), DVec3::ZERO, DVec3::X, 0.7);
+    // a small floor: rays start above it by a few ulp of its size, and that much less is met
+    let scene = analytic::sphere_over_plane(1.0, 1.5, 0.25, Placement::default());
+    let camera = Camera::look_at(DVec3::new(1.0, 0.2, 0.0), DVec3::ZERO, DVec3::Y, 0.02);
     let options = AoOptions { size: [3, 2], spp: 20_000, falloff: 1.7, ..Default::default() };
     let oracle = Oracle::new(&scene, scene.origin());
     let want = oracle_image(&oracle, &camera, &options);
@@ -587,7 +588,9 @@ fn gpu_auxiliary_outputs_equal_the_oracles() {
                         wrong[1] = !((a.depth - b.depth).abs() <= 2e-5 * b.depth);
                         wrong[2] = far(a.position, b.position) > 1e-5 * extent;
                         wrong[3] = far(a.ng, b.ng) > 1e-4;
-                        wrong[4] = far(a.ns, b.ns) > 1e-4;
+                        // a mesh that is placed once has its normals scaled to unit length before they are interpolated, others
+                        // after: under a stretching transform that differs by a little of a triangle's curvature
+                        wrong[4] = far(a.ns, b.ns) > 2e-3;
                         wrong[5] = far([a.red, a.green, a.blue], [b.red, b.green, b.blue]) > 2e-3;
                     }
                     for k in 0..6 {
