@@ -48,20 +48,11 @@ struct Variant {
     kind: ShaderKind,
 }
 
-const VARIANTS: [Variant; 4] = [
-    Variant { field: "compute32", template: "trace/compute.glsl", head: "", kind: ShaderKind::Compute },
-    Variant {
-        field: "compute64",
-        template: "trace/compute.glsl",
-        head: "#extension GL_EXT_shader_explicit_arithmetic_types_int64 : require\n#define LOAD64\n",
-        kind: ShaderKind::Compute,
-    },
-    Variant {
-        field: "query",
-        template: "trace/query.glsl",
-        head: "#extension GL_EXT_ray_query : require\n",
-        kind: ShaderKind::Compute,
-    },
+const VARIANTS: [Variant; 5] = [
+    Variant { field: "generate", template: "trace/generate.glsl", head: "", kind: ShaderKind::Compute },
+    Variant { field: "deliver", template: "trace/deliver.glsl", head: "", kind: ShaderKind::Compute },
+    Variant { field: "reference", template: "trace/reference.glsl", head: "", kind: ShaderKind::Compute },
+    Variant { field: "query", template: "trace/query.glsl", head: "#extension GL_EXT_ray_query : require\n", kind: ShaderKind::Compute },
     Variant {
         field: "raygen",
         template: "trace/pipeline.glsl",
@@ -80,7 +71,7 @@ fn main() {
         seen: RefCell::new(BTreeSet::new()),
         errors: Vec::new(),
     };
-    let table = build.streams() + &build.shared();
+    let table = build.streams() + &build.kernels() + &build.shared();
     std::fs::write(build.out.join("shaders.rs"), table).expect("OUT_DIR can be written");
     println!("cargo:rerun-if-changed={}", build.shaders.display());
     for file in build.seen.borrow().iter() {
@@ -116,7 +107,8 @@ impl Build {
                 let constant = format!("{}_{}", name.to_uppercase(), mode.to_uppercase());
                 let _ = write!(
                     table,
-                    "/// The stream `shaders/{name}.glsl`, mode `{mode}`.\npub static {constant}: StreamShaders = StreamShaders {{\n    name: \"{name} {mode}\",\n"
+                    "/// The stream `shaders/{name}.glsl`, mode `{mode}`.\npub static {constant}: StreamShaders = StreamShaders {{\n    name: \"{name} {mode}\",\n    mode: Mode::{},\n",
+                    if mode == "any" { "Any" } else { "Closest" }
                 );
                 for v in &VARIANTS {
                     let define = if mode == "any" { "#define STREAM_ANY\n" } else { "#define STREAM_CLOSEST\n" };
@@ -132,6 +124,27 @@ impl Build {
             }
         }
         let _ = writeln!(table, "/// Threads of a work-group of a stream.\npub const LANES: u32 = {LANES};");
+        table
+    }
+
+    /// The compute tracer's fast kernel: no stream's code is in it.
+    fn kernels(&mut self) -> String {
+        let mut table = String::new();
+        for mode in ["any", "closest"] {
+            for (bits, head) in [(32, ""), (64, "#extension GL_EXT_shader_explicit_arithmetic_types_int64 : require\n#define LOAD64\n")] {
+                let source = format!(
+                    "#version 460\n{EXTENSIONS}#extension GL_EXT_control_flow_attributes : require\n{head}#define LANES {LANES}\n\
+                     #define STREAM_{}\n#include \"trace/wide.glsl\"\n",
+                    mode.to_uppercase()
+                );
+                let (constant, output) = (format!("WIDE_{}_{bits}", mode.to_uppercase()), format!("wide_{mode}_{bits}.spv"));
+                self.compile(&source, ShaderKind::Compute, &format!("trace/wide.glsl ({mode}, {bits}-bit loads)"), &output);
+                let _ = writeln!(
+                    table,
+                    "/// `shaders/trace/wide.glsl`, mode `{mode}`, {bits}-bit loads.\npub static {constant}: &[u8] = include_bytes!(concat!(env!(\"OUT_DIR\"), \"/{output}\"));"
+                );
+            }
+        }
         table
     }
 

@@ -12,13 +12,21 @@ filter=${1:-}
 
 say() { printf 'test: %s\n' "$*"; }
 
-# Runs the tests whose names contain one of the arguments; all without arguments.
+log=$(mktemp)
+summaries=$(mktemp)
+trap 'rm -f "$log" "$summaries"' EXIT
+
+# run_tests LABEL [NAME...]: runs the tests whose names contain one of the NAMEs; all without. Keeps the summary for the end.
 run_tests() {
+  local label=$1 status=0
+  shift
   if cargo nextest --version >/dev/null 2>&1; then
-    cargo nextest run --locked --no-tests=pass --no-fail-fast "$@"
+    cargo nextest run --locked --no-tests=pass --no-fail-fast "$@" 2>&1 | tee "$log" || status=$?
   else
-    cargo test --locked --no-fail-fast -- "$@"
+    cargo test --locked --no-fail-fast -- "$@" 2>&1 | tee "$log" || status=$?
   fi
+  grep -E '^ *Summary |^test result:' "$log" | sed "s/^ */test: $label: /" >> "$summaries" || true
+  return "$status"
 }
 
 ./scripts/setup.sh
@@ -34,14 +42,19 @@ fi
 
 say "tests on the default driver"
 export SKYLIT_EXPECT_TRACERS=${SKYLIT_EXPECT_TRACERS-pipeline,query,compute}
-run_tests ${filter:+"$filter"}
+status=0
+run_tests "default driver" ${filter:+"$filter"} || status=1
 
 floor=${SKYLIT_DRIVERS_DIR:-$PWD/target/drivers}/mesa-22.3.6/lvp_icd.json
 if [ -f "$floor" ]; then
   say "device tests on the floor driver, $floor"
   export VK_DRIVER_FILES=$floor VK_ICD_FILENAMES=$floor SKYLIT_EXPECT_TRACERS=compute SKYLIT_REQUIRE_DRIVER=22.3.6
-  if [ -n "$filter" ]; then run_tests "$filter"; else run_tests gpu_ floor_; fi
+  if [ -n "$filter" ]; then names=("$filter"); else names=(gpu_ floor_); fi
+  run_tests "floor driver" "${names[@]}" || status=1
 else
   say "no floor driver here (setup.sh unpacks it on Debian 12): its tests are left out"
 fi
+
+cat "$summaries"
+if [ "$status" != 0 ]; then say "FAILED"; exit 1; fi
 say "all passed"

@@ -10,8 +10,8 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer GB
 struct FilmPixel {
     vec2 sum;          // of accessibility, and its compensation
     vec2 sum_squares;  // likewise
-    uint covered;      // samples that met the scene
-    uint samples;
+    uint covered;      // samples that met the scene; the others count 0 and are not written
+    uint reserved;
 };
 layout(buffer_reference, std430, buffer_reference_align = 8) buffer Film { FilmPixel v[]; };
 layout(buffer_reference, std430, buffer_reference_align = 4) buffer Counters { uint v[]; };
@@ -50,17 +50,14 @@ vec2 kahan_add(vec2 sum, float x) {
 
 void add_sample(uint index, float occlusion) {
     BlockParams p = BlockParams(push.pass);
-    if (!in_block(p, block_pixel(p, index))) return;
+    // padding of a tile has no coverage either
+    if (GBuffer(p.gbuffer).v[3u * (index - push.first) + 1u].w == 0u) return;
     Film film = Film(p.film);
-    bool covered = GBuffer(p.gbuffer).v[3u * (index - push.first) + 1u].w != 0u;
+    float accessibility = 1.0 - occlusion;
     FilmPixel pixel = film.v[index];
-    if (covered) {
-        float accessibility = 1.0 - occlusion;
-        pixel.sum = kahan_add(pixel.sum, accessibility);
-        pixel.sum_squares = kahan_add(pixel.sum_squares, accessibility * accessibility);
-        pixel.covered++;
-    }
-    pixel.samples++;
+    pixel.sum = kahan_add(pixel.sum, accessibility);
+    pixel.sum_squares = kahan_add(pixel.sum_squares, accessibility * accessibility);
+    pixel.covered++;
     film.v[index] = pixel;
 }
 

@@ -27,13 +27,13 @@ void closest(uint index, Hit hit) {
     GBuffer g = GBuffer(p.gbuffer);
     uint at = 3u * (index - push.first);
     if (!is_hit(hit)) {
-        g.v[at + 1u] = uvec4(0u);
+        g.v[at + 1u].w = 0u;
         return;
     }
-    Ray r = primary_ray(p, index);
-    Surface s = surface_at(r, hit);
+    // the point on a triangle follows from its corners; only a sphere asks for the ray again
+    Surface s = surface_at(HAS_SPHERES ? primary_ray(p, index) : no_ray(), hit);
     // the side that the viewer sees
-    float side = dot(s.ng, r.direction) > 0.0 ? -1.0 : 1.0;
+    float side = dot(s.ng, view_direction(p, s.position)) > 0.0 ? -1.0 : 1.0;
     g.v[at] = floatBitsToUint(vec4(s.position, s.offset));
     g.v[at + 1u] = uvec4(floatBitsToUint(side * s.ng), 1u);
     if (p.hemisphere != 0u) g.v[at + 2u] = uvec4(floatBitsToUint(side * s.ns), 0u);

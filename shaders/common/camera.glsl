@@ -48,6 +48,12 @@ Ray camera_ray(BlockParams p, vec2 at) {
     return Ray(eye, 0.0, normalize(vec3(dot(rows[0].xyz, d), dot(rows[1].xyz, d), dot(rows[2].xyz, d))), INFINITY);
 }
 
+// From the camera towards a point, of any length.
+vec3 view_direction(BlockParams p, vec3 position) {
+    vec4 rows[3] = p.camera_to_world;
+    return p.orthographic != 0u ? -vec3(rows[0].z, rows[1].z, rows[2].z) : position - vec3(rows[0].w, rows[1].w, rows[2].w);
+}
+
 layout(buffer_reference, std430, buffer_reference_align = 4) writeonly buffer RayDump { float v[]; };
 
 // For --dump-rays: what the pass is about to trace.

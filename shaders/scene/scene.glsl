@@ -14,9 +14,11 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Sc
     uvec2 placements;  // uvec2 per instance of the scene: its InstanceRecord and its PartRecord
     uvec2 materials;   // MaterialRecord
     uvec2 textures;    // TextureRecord
-    uvec2 nodes;       // compute tracer: Bvh2Node
+    uvec2 nodes;       // compute tracer: nodes of its hierarchy
     uvec2 primitives;  // compute tracer: PrimitiveRecord
     uvec2 top_level;   // hardware tracers: address of the top-level acceleration structure
+    uvec2 launch_rays; // compute tracer: rays of a launch between its steps
+    uvec2 launch_hits; // compute tracer: what they met
     uint root;         // compute tracer: where traversal begins
     uint root_reserved0;
     uint root_reserved1;

@@ -1,21 +1,15 @@
-//! The binary hierarchy that `shaders/trace/compute.glsl` walks.
+//! The binary hierarchy that `shaders/trace/reference.glsl` walks.
 //!
-//! Built by obvhs: PLOC (Meister and Bittner, "Parallel Locally-Ordered Clustering for Bounding Volume Hierarchy
-//! Construction", TVCG 2018) with reinsertion (Meister and Bittner, "Parallel Reinsertion for Bounding Volume Hierarchy
-//! Optimization", EG 2018). Then laid out so that a node holds the boxes of both its children: a visit is one load of 64
-//! bytes, and no box is loaded for nothing.
-//!
-//! The traversal's stack cannot overflow: every inner node pushes at most one child, so a tree of depth d needs d entries;
-//! the depth is limited here ([`MAX_DEPTH`]) and the shader's stack is specialised to the depth that is there. A subtree
-//! that would grow deeper is replaced by a balanced one over the same leaves.
+//! Laid out so that a node holds the boxes of both its children: a visit is one load of 64 bytes, and no box is loaded for
+//! nothing. The traversal's stack cannot overflow: every inner node pushes at most one child, so a tree of depth d needs d
+//! entries, and the shader's stack is specialised to the depth that is there.
 
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
-use super::Aabb;
+use super::build::MAX_DEPTH;
+use super::{Aabb, BuildPreset, build};
 
-/// No tree is deeper than this (inner nodes on the longest path). 2^27 primitives in a balanced tree need 27.
-pub const MAX_DEPTH: u32 = 48;
 /// Most primitives that a leaf reference can hold.
 pub const MAX_LEAF: u32 = 16;
 /// Primitives that a reference can number, over all trees of a scene.
@@ -35,16 +29,6 @@ pub struct Node {
     pub children: [u32; 2],
     /// To 64 bytes: one cache line.
     pub reserved: [u32; 2],
-}
-
-/// How much time to spend on a tree.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum BuildPreset {
-    /// Least build time.
-    Fast,
-    /// Balanced.
-    #[default]
-    Default,
 }
 
 /// A binary hierarchy in the layout of the compute tracer.
@@ -81,72 +65,42 @@ pub fn rebase(reference: u32, first_node: u32, first_primitive: u32) -> u32 {
     }
 }
 
-impl obvhs::Boundable for Aabb {
-    fn aabb(&self) -> obvhs::aabb::Aabb {
-        obvhs::aabb::Aabb::new(self.min.to_vec3a(), self.max.to_vec3a())
-    }
-}
-
 impl Bvh2 {
     /// Builds the tree of `boxes`; none may be empty or NaN, and there are at most [`MAX_PRIMITIVES`]. `max_leaf` (1 to
     /// [`MAX_LEAF`]) bounds the primitives of a leaf.
-    pub fn build<T: obvhs::Boundable + Sync + Send>(boxes: &[T], preset: BuildPreset, max_leaf: u32) -> Self {
+    pub fn build(boxes: &[Aabb], preset: BuildPreset, max_leaf: u32) -> Self {
         assert!(boxes.len() <= MAX_PRIMITIVES);
         if boxes.is_empty() {
             return Self { root: EMPTY, ..Default::default() };
         }
-        let mut config = match preset {
-            BuildPreset::Fast => obvhs::BvhBuildParams::fast_build(),
-            BuildPreset::Default => obvhs::BvhBuildParams::medium_build(),
-        };
-        config.pre_split = false;
-        config.max_prims_per_leaf = max_leaf.clamp(1, MAX_LEAF);
-        let tree = obvhs::bvh2::builder::build_bvh2(boxes, config, &mut std::time::Duration::default());
-        Self::lay_out(&tree)
+        Self::lay_out(build::tree(boxes, preset, Some(max_leaf.clamp(1, MAX_LEAF))))
     }
 
-    fn lay_out(tree: &obvhs::bvh2::Bvh2) -> Self {
+    /// Lays obvhs's tree out depth first.
+    fn lay_out(tree: obvhs::bvh2::Bvh2) -> Self {
         let mut out = Self { nodes: Vec::with_capacity(tree.nodes.len() / 2), primitives: Vec::new(), root: 0, depth: 0 };
-        if depth_of(tree) <= MAX_DEPTH {
-            out.root = out.emit(Source::Tree { tree, node: 0 }, 0, None);
-        } else {
-            let leaves = leaf_counts(tree);
-            out.root = out.emit(Source::Tree { tree, node: 0 }, 0, Some(&leaves));
-        }
-        out.primitives = tree.primitive_indices.clone();
-        out
-    }
-
-    /// Emits a subtree depth first, iteratively, and returns the reference to it.
-    fn emit(&mut self, root: Source, depth: u32, leaves: Option<&[u32]>) -> u32 {
-        let mut result = 0;
         // what to emit, its depth, and the node and side that will refer to it
-        let mut work = vec![(root, depth, None::<(usize, usize)>)];
-        while let Some((source, depth, parent)) = work.pop() {
-            let source = source.limited(depth, leaves);
-            let reference = match source.split() {
-                Err(leaf) => leaf,
-                Ok(children) => {
-                    let index = self.nodes.len();
-                    self.depth = self.depth.max(depth + 1);
-                    let corners = |b: Aabb| [b.min.to_array(), b.max.to_array()];
-                    self.nodes.push(Node {
-                        boxes: [corners(children[0].bounds()), corners(children[1].bounds())],
-                        children: [0; 2],
-                        reserved: [0; 2],
-                    });
-                    let [a, b] = children;
-                    work.push((b, depth + 1, Some((index, 1))));
-                    work.push((a, depth + 1, Some((index, 0))));
-                    index as u32
-                }
+        let mut work = vec![(0usize, 0u32, None::<(usize, usize)>)];
+        while let Some((at, depth, parent)) = work.pop() {
+            let n = &tree.nodes[at];
+            let reference = if n.is_leaf() {
+                leaf_reference(n.first_index, n.prim_count)
+            } else {
+                let (index, first) = (out.nodes.len(), n.first_index as usize);
+                out.depth = out.depth.max(depth + 1);
+                let corners = |k: usize| [tree.nodes[k].min.to_array(), tree.nodes[k].max.to_array()];
+                out.nodes.push(Node { boxes: [corners(first), corners(first + 1)], children: [0; 2], reserved: [0; 2] });
+                work.push((first + 1, depth + 1, Some((index, 1))));
+                work.push((first, depth + 1, Some((index, 0))));
+                index as u32
             };
             match parent {
-                Some((node, side)) => self.nodes[node].children[side] = reference,
-                None => result = reference,
+                Some((node, side)) => out.nodes[node].children[side] = reference,
+                None => out.root = reference,
             }
         }
-        result
+        out.primitives = tree.primitive_indices;
+        out
     }
 
     /// Checks the whole structure against the boxes it was built from: every primitive in exactly one leaf, every box holds
@@ -214,108 +168,6 @@ fn bounds_of(b: &[[f32; 3]; 2]) -> Aabb {
     Aabb { min: b[0].into(), max: b[1].into() }
 }
 
-/// A leaf of obvhs's tree: its box and reference.
-type LeafBox = (Aabb, u32);
-
-/// A subtree yet to be laid out.
-enum Source<'a> {
-    /// As obvhs built it.
-    Tree { tree: &'a obvhs::bvh2::Bvh2, node: usize },
-    /// Balanced over these leaves, because obvhs's subtree is too deep.
-    Balanced(Vec<LeafBox>),
-}
-
-fn node_box(node: &obvhs::bvh2::node::Bvh2Node) -> Aabb {
-    Aabb { min: node.min, max: node.max }
-}
-
-impl<'a> Source<'a> {
-    fn bounds(&self) -> Aabb {
-        match self {
-            Source::Tree { tree, node } => node_box(&tree.nodes[*node]),
-            Source::Balanced(leaves) => leaves.iter().fold(Aabb::EMPTY, |b, l| b.union(l.0)),
-        }
-    }
-
-    /// Itself while there is room below for anything it may hold, otherwise balanced. With d inner nodes above and n leaves
-    /// below, a balanced tree needs d + ceil(log2 n); descending keeps that bound as long as it is below the limit.
-    fn limited(self, depth: u32, leaves: Option<&[u32]>) -> Self {
-        match (&self, leaves) {
-            (Source::Tree { tree, node }, Some(counts)) if depth + counts[*node].next_power_of_two().ilog2() >= MAX_DEPTH => {
-                let (mut found, mut work) = (Vec::new(), vec![*node]);
-                while let Some(n) = work.pop() {
-                    let n = &tree.nodes[n];
-                    if n.is_leaf() {
-                        found.push((node_box(n), leaf_reference(n.first_index, n.prim_count)));
-                    } else {
-                        work.extend([n.first_index as usize, n.first_index as usize + 1]);
-                    }
-                }
-                Source::Balanced(found)
-            }
-            _ => self,
-        }
-    }
-
-    /// Both children, or the reference of a leaf.
-    fn split(self) -> Result<[Source<'a>; 2], u32> {
-        match self {
-            Source::Tree { tree, node } => {
-                let n = &tree.nodes[node];
-                if n.is_leaf() {
-                    return Err(leaf_reference(n.first_index, n.prim_count));
-                }
-                let first = n.first_index as usize;
-                Ok([Source::Tree { tree, node: first }, Source::Tree { tree, node: first + 1 }])
-            }
-            Source::Balanced(leaves) if leaves.len() == 1 => Err(leaves[0].1),
-            Source::Balanced(mut leaves) => {
-                // the median along the longest axis of the centres
-                let centre = |l: &LeafBox| l.0.min * 0.5 + l.0.max * 0.5;
-                let (lo, hi) =
-                    leaves.iter().fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(a, b), l| (a.min(centre(l)), b.max(centre(l))));
-                let axis = (hi - lo).max_position();
-                let middle = leaves.len() / 2;
-                leaves.select_nth_unstable_by(middle, |a, b| centre(a)[axis].total_cmp(&centre(b)[axis]));
-                let upper = leaves.split_off(middle);
-                Ok([Source::Balanced(leaves), Source::Balanced(upper)])
-            }
-        }
-    }
-}
-
-fn depth_of(tree: &obvhs::bvh2::Bvh2) -> u32 {
-    let (mut deepest, mut work) = (0, vec![(0usize, 0u32)]);
-    while let Some((node, level)) = work.pop() {
-        let n = &tree.nodes[node];
-        if !n.is_leaf() {
-            deepest = deepest.max(level + 1);
-            work.extend([(n.first_index as usize, level + 1), (n.first_index as usize + 1, level + 1)]);
-        }
-    }
-    deepest
-}
-
-/// Number of leaves below every node of obvhs's tree, in post-order (its depth may be anything: no recursion).
-fn leaf_counts(tree: &obvhs::bvh2::Bvh2) -> Vec<u32> {
-    let mut order = Vec::with_capacity(tree.nodes.len());
-    let mut work = vec![0usize];
-    while let Some(node) = work.pop() {
-        order.push(node);
-        let n = &tree.nodes[node];
-        if !n.is_leaf() {
-            work.extend([n.first_index as usize, n.first_index as usize + 1]);
-        }
-    }
-    let mut counts = vec![0; tree.nodes.len()];
-    for &node in order.iter().rev() {
-        let n = &tree.nodes[node];
-        let first = n.first_index as usize;
-        counts[node] = if n.is_leaf() { 1 } else { counts[first] + counts[first + 1] };
-    }
-    counts
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -343,27 +195,6 @@ mod tests {
     fn coincident_boxes_are_valid() {
         let b = boxes(1000, |_| Vec3::ONE, |_| 0.5);
         Bvh2::build(&b, BuildPreset::Fast, 4).validate(&b).unwrap();
-    }
-
-    /// Boxes whose sizes grow geometrically make a chain; the layout must cut it at the limit.
-    #[test]
-    fn a_chain_is_cut_at_the_limit() {
-        let n = 240;
-        let b: Vec<_> = boxes(n, |_| Vec3::ZERO, |i| 1.15f32.powi(i as i32));
-        // obvhs itself may balance them: make the chain by hand
-        let node =
-            |b: Aabb, prim_count, first_index| obvhs::bvh2::node::Bvh2Node { min: b.min, max: b.max, prim_count, first_index };
-        let mut nodes = vec![node(b[n - 1], 0, 1)];
-        for i in (1..n).rev() {
-            let next = nodes.len() as u32 + 2;
-            nodes.push(node(b[i], 1, i as u32));
-            nodes.push(if i == 1 { node(b[0], 1, 0) } else { node(b[i - 1], 0, next) });
-        }
-        let tree = obvhs::bvh2::Bvh2 { nodes, primitive_indices: (0..n as u32).collect(), ..Default::default() };
-        assert_eq!(depth_of(&tree), n as u32 - 1);
-        let out = Bvh2::lay_out(&tree);
-        out.validate(&b).unwrap();
-        assert!(out.depth <= MAX_DEPTH, "{}", out.depth);
     }
 
     #[test]

@@ -1,8 +1,12 @@
 //! Bounding volume hierarchies on the host. No Vulkan in here.
 
+pub mod build;
 pub mod bvh2;
+pub mod cwbvh;
 
-pub use bvh2::{BuildPreset, Bvh2};
+pub use build::BuildPreset;
+pub use bvh2::Bvh2;
+pub use cwbvh::Cwbvh;
 
 /// An axis-aligned box in f32.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -188,7 +188,7 @@ pub fn render(tracer: &Tracer, camera: &CameraRecord, options: &AoOptions, contr
         out.stopped_early |= sample < options.spp;
         out.primary_rays += pixels * sample as u64;
         let film_size = film.size() / size_of::<FilmPixel>() as u64 * size_of::<FilmPixel>() as u64;
-        read_film(&mut film, film_size, block, &mut out)?;
+        read_film(&mut film, film_size, block, sample, &mut out)?;
     }
     out.trace_seconds = start.elapsed().as_secs_f64();
     Ok(out)
@@ -263,7 +263,7 @@ fn take_rays(from: &Buffer, count: u32, to: &mut Vec<Ray>) -> Result<()> {
     })
 }
 
-fn read_film(film: &mut Buffer, size: u64, block: &Block, out: &mut AoResult) -> Result<()> {
+fn read_film(film: &mut Buffer, size: u64, block: &Block, samples: u32, out: &mut AoResult) -> Result<()> {
     let record = size_of::<FilmPixel>() as u64;
     let width = out.film.width;
     film.read_with(0, size, record, |first, bytes| {
@@ -274,8 +274,8 @@ fn read_film(film: &mut Buffer, size: u64, block: &Block, out: &mut AoResult) ->
             {
                 let pixel: FilmPixel = bytemuck::pod_read_unaligned(pixel);
                 out.occlusion_rays += pixel.covered as u64;
-                out.skipped_rays += (pixel.samples - pixel.covered) as u64;
-                out.film.set(at, &pixel);
+                out.skipped_rays += (samples - pixel.covered) as u64;
+                out.film.set(at, &pixel, samples);
             }
         }
     })

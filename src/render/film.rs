@@ -10,31 +10,31 @@ pub struct FilmPixel {
     pub sum: [f32; 2],
     /// Sum of squares and its compensation.
     pub sum_squares: [f32; 2],
-    /// Samples that met the scene.
+    /// Samples that met the scene. The others count 0 and are not written; how many were taken the host knows.
     pub covered: u32,
-    /// All samples.
-    pub samples: u32,
+    /// To a multiple of 8 bytes.
+    pub reserved: u32,
 }
 
 impl FilmPixel {
     /// Mean over all samples; those that missed count 0.
-    pub fn mean(&self) -> f64 {
-        self.total() / self.samples.max(1) as f64
+    pub fn mean(&self, samples: u32) -> f64 {
+        self.total() / samples.max(1) as f64
     }
 
     /// Unbiased variance of one sample (not of the mean); 0 with fewer than two samples.
-    pub fn variance(&self) -> f64 {
-        if self.samples < 2 {
+    pub fn variance(&self, samples: u32) -> f64 {
+        if samples < 2 {
             return 0.0;
         }
-        let n = self.samples as f64;
+        let n = samples as f64;
         let squares = self.sum_squares[0] as f64 - self.sum_squares[1] as f64;
         ((squares - self.total() * self.total() / n) / (n - 1.0)).max(0.0)
     }
 
     /// Share of samples that met the scene.
-    pub fn coverage(&self) -> f64 {
-        self.covered as f64 / self.samples.max(1) as f64
+    pub fn coverage(&self, samples: u32) -> f64 {
+        self.covered as f64 / samples.max(1) as f64
     }
 
     fn total(&self) -> f64 {
@@ -67,12 +67,12 @@ impl Film {
         Self { width, height, mean: vec![0.0; n], coverage: vec![0.0; n], variance: vec![0.0; n], samples: vec![0; n] }
     }
 
-    /// Puts a pixel in its place.
-    pub fn set(&mut self, index: usize, pixel: &FilmPixel) {
-        self.mean[index] = pixel.mean() as f32;
-        self.coverage[index] = pixel.coverage() as f32;
-        self.variance[index] = pixel.variance() as f32;
-        self.samples[index] = pixel.samples;
+    /// Puts a pixel of which `samples` were taken in its place.
+    pub fn set(&mut self, index: usize, pixel: &FilmPixel, samples: u32) {
+        self.mean[index] = pixel.mean(samples) as f32;
+        self.coverage[index] = pixel.coverage(samples) as f32;
+        self.variance[index] = pixel.variance(samples) as f32;
+        self.samples[index] = samples;
     }
 
     /// Mean of all pixels and its standard error, from the pixels' own variances. Stratified sampling makes the true error

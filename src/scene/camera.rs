@@ -45,14 +45,46 @@ impl Camera {
         }
     }
 
-    /// A 45-degree camera that sees all of the given bounds from the front, slightly above and to the side; `aspect` is
-    /// width over height.
+    /// A 45-degree camera that sees all of the given bounds from the front, slightly above and to the side, as large as fits;
+    /// `aspect` is width over height.
     pub fn framing(lo: DVec3, hi: DVec3, aspect: f64) -> Self {
-        let (centre, radius) = ((lo + hi) * 0.5, ((hi - lo).length() * 0.5).max(1e-30));
+        let centre = (lo + hi) * 0.5;
+        let half = ((hi - lo) * 0.5).max(DVec3::splat(1e-30));
         let fov_y = 45f64.to_radians();
-        // the narrower of both fields of view must hold the bounding sphere
-        let half = (fov_y * 0.5).min(((fov_y * 0.5).tan() * aspect).atan());
         let direction = DVec3::new(0.35, 0.3, 1.0).normalize();
-        Self::look_at(centre + direction * (radius / half.sin()), centre, DVec3::Y, fov_y)
+        let basis = Self::look_at(centre + direction, centre, DVec3::Y, fov_y).camera_to_world.matrix3;
+        // least distance at which every corner of the box lies within the four planes of the view
+        let tan = (fov_y * 0.5).tan();
+        let corners = (0..8u32).map(|k| DVec3::from_array([0, 1, 2].map(|a| if k >> a & 1 == 0 { -half[a] } else { half[a] })));
+        let distance = corners
+            .map(|c| {
+                let c = basis.transpose() * c;
+                c.z + (c.x.abs() / (tan * aspect)).max(c.y.abs() / tan)
+            })
+            .fold(0.0, f64::max);
+        // a little air around it
+        Self::look_at(centre + direction * (distance * 1.05), centre, DVec3::Y, fov_y)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn framing_holds_every_corner_and_wastes_little() {
+        let (lo, hi) = (DVec3::new(-3.0, 0.0, 10.0), DVec3::new(4.0, 1.0, 11.0));
+        for aspect in [0.3, 1.0, 2.5] {
+            let camera = Camera::framing(lo, hi, aspect);
+            let world_to_camera = camera.camera_to_world.inverse();
+            let tan = 22.5f64.to_radians().tan();
+            let mut most = 0.0f64;
+            for k in 0..8u32 {
+                let corner = DVec3::from_array([0, 1, 2].map(|a| if k >> a & 1 == 0 { lo[a] } else { hi[a] }));
+                let p = world_to_camera.transform_point3(corner);
+                most = most.max(p.x.abs() / (-p.z * tan * aspect)).max(p.y.abs() / (-p.z * tan));
+            }
+            assert!((0.8..=1.0).contains(&most), "aspect {aspect}: {most}");
+        }
     }
 }

@@ -33,6 +33,8 @@ struct SceneRoot {
     nodes: u64,
     primitives: u64,
     top_level: u64,
+    launch_rays: u64,
+    launch_hits: u64,
     root: u32,
     reserved: [u32; 3],
 }
@@ -219,6 +221,8 @@ impl GpuScene {
         self.root.nodes = h.nodes.address();
         self.root.primitives = h.primitives.address();
         self.root.root = h.root;
+        self.root.launch_rays = h.launch_rays.as_ref().map_or(0, Buffer::address);
+        self.root.launch_hits = h.launch_hits.as_ref().map_or(0, Buffer::address);
         write_all(&mut self.root_buffer, &[self.root])
     }
 

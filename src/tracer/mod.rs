@@ -9,14 +9,15 @@ pub mod gpu_scene;
 mod hardware;
 pub mod stream;
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 use std::time::Instant;
 
+pub use compute::Kernel;
 pub use gpu_scene::Needs;
 pub use stream::{Push, Stream, StreamShaders};
 
 use crate::error::{Error, Result};
-use crate::gpu::{Device, DeviceInfo, Specialization};
+use crate::gpu::{ComputePipeline, Device, DeviceInfo, Specialization};
 use crate::scene::features::SceneFeatures;
 use crate::scene::flatten::FlatScene;
 use gpu_scene::GpuScene;
@@ -109,6 +110,8 @@ pub struct Tracer {
     structure: Structure,
     features: SceneFeatures,
     stats: BuildStats,
+    // by mode
+    kernels: [OnceLock<Arc<ComputePipeline>>; 2],
 }
 
 impl Tracer {
@@ -118,6 +121,11 @@ impl Tracer {
     /// [`Error::Device`] when the device lacks what the tracer needs, naming it; [`Error::OutOfMemory`]; [`Error::Scene`] when
     /// the scene has more primitives than the tracer can number.
     pub fn new(device: &Arc<Device>, kind: TracerKind, flat: &FlatScene, needs: Needs) -> Result<Self> {
+        Self::with_kernel(device, kind, flat, needs, Kernel::default())
+    }
+
+    /// As [`Tracer::new`], with a choice of the compute tracer's kernel.
+    pub fn with_kernel(device: &Arc<Device>, kind: TracerKind, flat: &FlatScene, needs: Needs, kernel: Kernel) -> Result<Self> {
         if !device.info.supports(kind) {
             let missing =
                 device.info.tracers.iter().find(|t| t.tracer == kind).map(|t| t.missing.join(", ")).unwrap_or_default();
@@ -130,7 +138,7 @@ impl Tracer {
         let mut stats = BuildStats { primitives: flat.primitive_count() as u64, ..Default::default() };
         // the hierarchy first: its build needs the most host memory, the scene's buffers come after that is freed
         let start = Instant::now();
-        let hierarchy = if kind == TracerKind::Compute { Some(compute::Trees::build(flat)?) } else { None };
+        let hierarchy = if kind == TracerKind::Compute { Some(compute::Trees::build(flat, kernel)?) } else { None };
         stats.build_seconds = start.elapsed().as_secs_f64();
         let start = Instant::now();
         let mut scene = GpuScene::new(device, flat, needs)?;
@@ -157,7 +165,7 @@ impl Tracer {
             stats.upload_seconds = start.elapsed().as_secs_f64();
         }
         stats.scene_bytes = scene.bytes();
-        Ok(Self { kind, device: device.clone(), scene, structure, features, stats })
+        Ok(Self { kind, device: device.clone(), scene, structure, features, stats, kernels: Default::default() })
     }
 
     /// Which tracer this is.
@@ -193,15 +201,34 @@ impl Tracer {
             .set(2, self.features.single_level as u32);
         match &self.structure {
             Structure::Compute(h) => {
-                let rays_per_lane =
-                    if self.device.info.is_cpu() { compute::RAYS_PER_LANE_CPU } else { compute::RAYS_PER_LANE_GPU };
+                let rays_per_lane = if self.device.info.is_cpu() { compute::RAYS_PER_LANE_CPU } else { compute::RAYS_PER_LANE_GPU };
                 let specialization = specialization.set(3, h.stack_entries.max(1)).set(4, rays_per_lane);
-                Stream::compute(&self.device, shaders, &specialization, rays_per_lane)
+                if h.kernel == Kernel::Reference {
+                    return Stream::reference(&self.device, shaders, &specialization);
+                }
+                let kernel = self.kernel(shaders.mode(), &specialization)?;
+                Stream::steps(&self.device, shaders, &specialization, kernel, rays_per_lane)
             }
             Structure::Hardware { .. } if self.kind == TracerKind::Query => {
                 Stream::query(&self.device, shaders, &specialization)
             }
             Structure::Hardware { .. } => Stream::pipeline(&self.device, shaders, &specialization, self.features),
         }
+    }
+
+    /// The fast kernel, compiled once for all streams of a mode.
+    fn kernel(&self, mode: stream::Mode, specialization: &Specialization) -> Result<Arc<ComputePipeline>> {
+        let slot = &self.kernels[mode as usize];
+        if let Some(kernel) = slot.get() {
+            return Ok(kernel.clone());
+        }
+        let spirv = match (mode, self.device.info.int64) {
+            (stream::Mode::Any, true) => stream::WIDE_ANY_64,
+            (stream::Mode::Any, false) => stream::WIDE_ANY_32,
+            (stream::Mode::Closest, true) => stream::WIDE_CLOSEST_64,
+            (stream::Mode::Closest, false) => stream::WIDE_CLOSEST_32,
+        };
+        let kernel = Arc::new(ComputePipeline::new(&self.device, "wide kernel", spirv, specialization)?);
+        Ok(slot.get_or_init(|| kernel).clone())
     }
 }

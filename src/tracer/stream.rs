@@ -8,12 +8,23 @@ use crate::error::Result;
 use crate::gpu::{ComputePipeline, Device, HitShaders, RayTracingPipeline, Recorder, Specialization};
 use crate::scene::features::SceneFeatures;
 
+/// What a stream asks of its rays.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Mode {
+    /// Whether something is in the way.
+    Any,
+    /// The nearest hit.
+    Closest,
+}
+
 /// A stream's SPIR-V for each tracer.
 pub struct StreamShaders {
     /// Pass and mode.
     pub name: &'static str,
-    compute32: &'static [u8],
-    compute64: &'static [u8],
+    mode: Mode,
+    generate: &'static [u8],
+    deliver: &'static [u8],
+    reference: &'static [u8],
     query: &'static [u8],
     raygen: &'static [u8],
 }
@@ -38,29 +49,47 @@ pub struct Push {
     pub reserved: u32,
 }
 
+/// Rays that the compute tracer's buffers hold between the steps of a launch.
+pub(super) const LAUNCH_RAYS: u32 = 1 << 19;
+
 enum Pipeline {
-    Compute { pipeline: ComputePipeline, rays_per_group: u32 },
+    /// One compute shader over all rays.
+    Single { pipeline: ComputePipeline, rays_per_group: u32 },
+    /// Generate, trace, deliver.
+    Steps { generate: ComputePipeline, trace: Arc<ComputePipeline>, deliver: ComputePipeline, rays_per_group: u32 },
     RayTracing(RayTracingPipeline),
 }
 
 /// A stream, ready to run.
 pub struct Stream(Pipeline);
 
+impl StreamShaders {
+    /// What the stream asks of its rays.
+    pub(super) fn mode(&self) -> Mode {
+        self.mode
+    }
+}
+
 impl Stream {
-    pub(super) fn compute(
-        device: &Arc<Device>,
-        shaders: &StreamShaders,
-        s: &Specialization,
-        rays_per_lane: u32,
-    ) -> Result<Self> {
-        let spirv = if device.info.int64 { shaders.compute64 } else { shaders.compute32 };
-        let pipeline = ComputePipeline::new(device, shaders.name, spirv, s)?;
-        Ok(Self(Pipeline::Compute { pipeline, rays_per_group: LANES * rays_per_lane }))
+    /// For the compute tracer's fast kernel, which streams share.
+    pub(super) fn steps(device: &Arc<Device>, shaders: &StreamShaders, s: &Specialization, trace: Arc<ComputePipeline>, rays_per_lane: u32) -> Result<Self> {
+        Ok(Self(Pipeline::Steps {
+            generate: ComputePipeline::new(device, shaders.name, shaders.generate, s)?,
+            trace,
+            deliver: ComputePipeline::new(device, shaders.name, shaders.deliver, s)?,
+            rays_per_group: LANES * rays_per_lane,
+        }))
+    }
+
+    /// For the compute tracer's readable reference.
+    pub(super) fn reference(device: &Arc<Device>, shaders: &StreamShaders, s: &Specialization) -> Result<Self> {
+        let pipeline = ComputePipeline::new(device, shaders.name, shaders.reference, s)?;
+        Ok(Self(Pipeline::Single { pipeline, rays_per_group: LANES }))
     }
 
     pub(super) fn query(device: &Arc<Device>, shaders: &StreamShaders, s: &Specialization) -> Result<Self> {
         let pipeline = ComputePipeline::new(device, shaders.name, shaders.query, s)?;
-        Ok(Self(Pipeline::Compute { pipeline, rays_per_group: LANES }))
+        Ok(Self(Pipeline::Single { pipeline, rays_per_group: LANES }))
     }
 
     pub(super) fn pipeline(
@@ -82,8 +111,20 @@ impl Stream {
     /// tracer that made the stream and of parameters of the stream's pass.
     pub fn record(&self, recorder: &mut Recorder, push: &Push) {
         match &self.0 {
-            Pipeline::Compute { pipeline, rays_per_group } => {
+            Pipeline::Single { pipeline, rays_per_group } => {
                 recorder.dispatch(pipeline, push, push.count.div_ceil(*rays_per_group))
+            }
+            Pipeline::Steps { generate, trace, deliver, rays_per_group } => {
+                for first in (0..push.count).step_by(LAUNCH_RAYS as usize) {
+                    let push = Push { first: push.first + first, count: LAUNCH_RAYS.min(push.count - first), ..*push };
+                    // the steps hand rays and hits on in memory, and so does one launch to the next
+                    recorder.barrier();
+                    recorder.dispatch(generate, &push, push.count.div_ceil(LANES));
+                    recorder.barrier();
+                    recorder.dispatch(trace, &push, push.count.div_ceil(*rays_per_group));
+                    recorder.barrier();
+                    recorder.dispatch(deliver, &push, push.count.div_ceil(LANES));
+                }
             }
             Pipeline::RayTracing(pipeline) => recorder.trace_rays(pipeline, push, push.count),
         }

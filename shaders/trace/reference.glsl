@@ -1,9 +1,11 @@
-// The compute tracer: a two-level BVH2 in plain memory, one ray per lane, and a lane that is done takes the next ray.
-// This is the readable reference; it supplies main() around the stream's ray(), closest() or any().
-#ifndef TRACE_COMPUTE
-#define TRACE_COMPUTE
+// The compute tracer's readable reference: a two-level binary hierarchy, one ray per lane. It supplies main() around the
+// stream's ray(), closest() or any(). The fast kernel is wide.glsl.
+#ifndef TRACE_REFERENCE
+#define TRACE_REFERENCE
 #include "scene/material.glsl"
 #include "scene/sphere.glsl"
+#include "trace/records.glsl"
+#include "trace/slab.glsl"
 #include "trace/triangle.glsl"
 
 layout(local_size_x = LANES) in;
@@ -20,28 +22,7 @@ const uint FINISHED = 0x7fffffffu;
 const uint LEAVE_INSTANCE = 0x7ffffffeu;
 const uint NEXT = 0x7ffffffdu;
 const uint LAST_NODE = 0x7ffffff0u;
-// Primitive flags, above the primitive's number in its group.
-const uint ALPHA_TESTED = 0x80000000u;
-const uint SPHERE = 0x40000000u;
-const uint NUMBER = 0x3fffffffu;
-
-// On a CPU driver a divergent load is one gather, of 32 or of 64 bits alike: load pairs where 64-bit integers exist.
-#ifdef LOAD64
-layout(buffer_reference, std430, buffer_reference_align = 8) readonly buffer Words64 { uint64_t v[]; };
-#define LOAD_PAIR(base, i) uintBitsToFloat(unpackUint2x32(Words64(base).v[i]))
-#else
-#define LOAD_PAIR(base, i) uintBitsToFloat(Pairs(base).v[i])
-#endif
-
-// Slabs are widened by 16 half-ulps: Ize, "Robust BVH Ray Traversal" (JCGT 2013) needs 2 * gamma(3) for its own rounding;
-// the rest covers the rounding of the sheared triangle test, so that a ray which that test sends into a triangle is never
-// kept out of the triangle's box.
-const float SLAB_SCALE = 1.0 + 16.0 * 5.9604645e-8;
-
-// Minimum and maximum of floats by their bits: one instruction, where NaN-safe ones take three on a CPU driver. Right for the
-// slab test because tmin >= 0: among negative numbers the wrong one may win, but then the interval is empty either way.
-#define MIN(a, b) intBitsToFloat(min(floatBitsToInt(a), floatBitsToInt(b)))
-#define MAX(a, b) intBitsToFloat(max(floatBitsToInt(a), floatBitsToInt(b)))
+#define LOAD_FLOATS(base, i) uintBitsToFloat(LOAD_PAIR(base, i))
 
 // Entry distance of a box, or INFINITY when it is missed.
 float enter_box(vec3 lo, vec3 hi, vec3 origin, vec3 inverse, float tmin, float tmax) {
@@ -52,14 +33,6 @@ float enter_box(vec3 lo, vec3 hi, vec3 origin, vec3 inverse, float tmin, float t
     float near = MAX(MAX(n.x, n.y), MAX(n.z, tmin));
     float far = MIN(MIN(MIN(f.x, f.y), f.z) * SLAB_SCALE, tmax);
     return near <= far ? near : INFINITY;
-}
-
-// Finite even where the ray runs along a slab, so that no 0 * inf = NaN arises. The host pads the boxes: a ray in the plane of
-// flat geometry is strictly inside the slab, and lo < 0 < hi times a huge number lets it pass.
-vec3 safe_inverse(vec3 d) {
-    vec3 a = abs(d);
-    float least = max(1e-24 * max(max(a.x, a.y), a.z), 1e-37);
-    return 1.0 / mix(d, mix(vec3(least), vec3(-least), lessThan(d, vec3(0.0))), lessThan(a, vec3(least)));
 }
 
 void main() {
@@ -93,9 +66,9 @@ void main() {
 
     while (true) {
         if (current < LAST_NODE) {
-            vec2 a = LOAD_PAIR(nodes, 8u * current), b = LOAD_PAIR(nodes, 8u * current + 1u), c = LOAD_PAIR(nodes, 8u * current + 2u);
-            vec2 d = LOAD_PAIR(nodes, 8u * current + 3u), e = LOAD_PAIR(nodes, 8u * current + 4u), f = LOAD_PAIR(nodes, 8u * current + 5u);
-            uvec2 children = floatBitsToUint(LOAD_PAIR(nodes, 8u * current + 6u));
+            vec2 a = LOAD_FLOATS(nodes, 8u * current), b = LOAD_FLOATS(nodes, 8u * current + 1u), c = LOAD_FLOATS(nodes, 8u * current + 2u);
+            vec2 d = LOAD_FLOATS(nodes, 8u * current + 3u), e = LOAD_FLOATS(nodes, 8u * current + 4u), f = LOAD_FLOATS(nodes, 8u * current + 5u);
+            uvec2 children = LOAD_PAIR(nodes, 8u * current + 6u);
             float near0 = enter_box(vec3(a, b.x), vec3(b.y, c), origin, inverse, world.tmin, best);
             float near1 = enter_box(vec3(d, e.x), vec3(e.y, f), origin, inverse, world.tmin, best);
             bool swap = near1 < near0;
@@ -113,8 +86,8 @@ void main() {
         if ((current & LEAF) != 0u) {
             if (SINGLE_LEVEL || in_group) {
                 uint i = current & 0x07ffffffu;
-                vec2 a = LOAD_PAIR(primitives, 5u * i), b = LOAD_PAIR(primitives, 5u * i + 1u), c = LOAD_PAIR(primitives, 5u * i + 2u);
-                vec2 d = LOAD_PAIR(primitives, 5u * i + 3u), e = LOAD_PAIR(primitives, 5u * i + 4u);
+                vec2 a = LOAD_FLOATS(primitives, 5u * i), b = LOAD_FLOATS(primitives, 5u * i + 1u), c = LOAD_FLOATS(primitives, 5u * i + 2u);
+                vec2 d = LOAD_FLOATS(primitives, 5u * i + 3u), e = LOAD_FLOATS(primitives, 5u * i + 4u);
                 uint id = floatBitsToUint(e.y);
                 float t;
                 vec2 uv;

@@ -1,0 +1,19 @@
+// Last step of a launch of the fast kernel: what the rays met goes to the stream.
+#ifndef TRACE_DELIVER
+#define TRACE_DELIVER
+#include "trace/launch.glsl"
+
+layout(local_size_x = LANES) in;
+
+void main() {
+    uint k = gl_GlobalInvocationID.x;
+    if (k >= push.count) return;
+    SceneRoot root = SceneRoot(push.scene);
+#ifdef STREAM_ANY
+    any(push.first + k, load_any(root, k));
+#else
+    closest(push.first + k, load_closest(root, k));
+#endif
+}
+
+#endif
