@@ -52,7 +52,12 @@ const VARIANTS: [Variant; 5] = [
     Variant { field: "generate", template: "trace/generate.glsl", head: "", kind: ShaderKind::Compute },
     Variant { field: "deliver", template: "trace/deliver.glsl", head: "", kind: ShaderKind::Compute },
     Variant { field: "reference", template: "trace/reference.glsl", head: "", kind: ShaderKind::Compute },
-    Variant { field: "query", template: "trace/query.glsl", head: "#extension GL_EXT_ray_query : require\n", kind: ShaderKind::Compute },
+    Variant {
+        field: "query",
+        template: "trace/query.glsl",
+        head: "#extension GL_EXT_ray_query : require\n",
+        kind: ShaderKind::Compute,
+    },
     Variant {
         field: "raygen",
         template: "trace/pipeline.glsl",
@@ -131,7 +136,9 @@ impl Build {
     fn kernels(&mut self) -> String {
         let mut table = String::new();
         for mode in ["any", "closest"] {
-            for (bits, head) in [(32, ""), (64, "#extension GL_EXT_shader_explicit_arithmetic_types_int64 : require\n#define LOAD64\n")] {
+            for (bits, head) in
+                [(32, ""), (64, "#extension GL_EXT_shader_explicit_arithmetic_types_int64 : require\n#define LOAD64\n")]
+            {
                 let source = format!(
                     "#version 460\n{EXTENSIONS}#extension GL_EXT_control_flow_attributes : require\n{head}#define LANES {LANES}\n\
                      #define STREAM_{}\n#include \"trace/wide.glsl\"\n",

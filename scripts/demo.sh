@@ -42,7 +42,7 @@ report=$out/report.md
     for pair in "pipeline query" "pipeline compute" "query compute"; do
       a=${pair% *} b=${pair#* }
       # an assignment of its own: inside printf's arguments a failure would go unnoticed
-      numbers=$("$skylit" diff "$out/$scene-$a.exr" "$out/$scene-$b.exr" --max-rmse 0.02 | sed -n 's/^Y  *//p')
+      numbers=$("$skylit" diff "$out/$scene-$a.exr" "$out/$scene-$b.exr" --max-rmse 0.005 | sed -n 's/^Y  *//p')
       printf -- '- %s and %s: %s\n' "$a" "$b" "$numbers"
     done
   done

@@ -55,6 +55,7 @@ void main() {
     Ray world = ray(index);
     Shear shear = make_shear(world.direction);
     vec3 origin = world.origin;
+    vec3 direction = world.direction;
     vec3 inverse = safe_inverse(world.direction);
     uint instance = 0u;
     bool in_group = SINGLE_LEVEL;
@@ -93,13 +94,11 @@ void main() {
                 vec2 uv;
                 bool met;
                 if (HAS_SPHERES && (id & SPHERE) != 0u) {
-                    // the direction is not kept: a sphere is rarely tested, a triangle often
-                    vec3 direction = in_group && !SINGLE_LEVEL ? transform_vector(instances.v[instance].world_to_group, world.direction) : world.direction;
                     t = intersect_sphere(origin, direction, world.tmin, best, vec3(a, b.x), b.y);
                     uv = vec2(0.0);
                     met = t > world.tmin && t < best;
                 } else {
-                    met = intersect_triangle(shear, origin, vec3(a, b.x), vec3(b.y, c), vec3(d, e.x), world.tmin, best, t, uv);
+                    met = intersect_triangle(shear, origin, direction, vec3(a, b.x), vec3(b.y, c), vec3(d, e.x), world.tmin, best, t, uv);
                 }
                 if (HAS_ALPHA) {
                     if (met && (id & ALPHA_TESTED) != 0u) met = alpha_passes(instance, id & NUMBER, uv);
@@ -121,7 +120,7 @@ void main() {
             } else {
                 instance = current & 0x07ffffffu;
                 InstanceRecord record = instances.v[instance];
-                vec3 direction = transform_vector(record.world_to_group, world.direction);
+                direction = transform_vector(record.world_to_group, world.direction);
                 origin = transform_point(record.world_to_group, world.origin);
                 shear = make_shear(direction);
                 inverse = safe_inverse(direction);
@@ -136,6 +135,7 @@ void main() {
         }
         if (!SINGLE_LEVEL && current == LEAVE_INSTANCE) {
             origin = world.origin;
+            direction = world.direction;
             inverse = safe_inverse(world.direction);
             in_group = false;
             current = NEXT;
@@ -167,6 +167,7 @@ void main() {
             world = ray(index);
             shear = make_shear(world.direction);
             origin = world.origin;
+            direction = world.direction;
             inverse = safe_inverse(world.direction);
             instance = 0u;
             in_group = SINGLE_LEVEL;

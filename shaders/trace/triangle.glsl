@@ -20,12 +20,81 @@ Shear make_shear(vec3 d) {
     return Shear(axis, vec3(p.xy / p.z, 1.0 / p.z));
 }
 
+// Numbers of twice the digits, as an unevaluated sum hi + lo: Dekker, "A floating-point technique for extending the available
+// precision" (1971). The product splits its factors, because fma is not fused on every device.
+struct Wide3 {
+    vec3 hi;
+    vec3 lo;
+};
+
+Wide3 two_difference(vec3 a, vec3 b) {
+    precise vec3 s = a - b;
+    precise vec3 bb = s - a;
+    precise vec3 aa = s - bb;
+    precise vec3 ra = a - aa;
+    precise vec3 rb = b + bb;
+    precise vec3 r = ra - rb;
+    return Wide3(s, r);
+}
+
+Wide3 wide_sum(Wide3 a, Wide3 b) {
+    precise vec3 s = a.hi + b.hi;
+    precise vec3 bb = s - a.hi;
+    precise vec3 aa = s - bb;
+    precise vec3 ra = a.hi - aa;
+    precise vec3 rb = b.hi - bb;
+    precise vec3 r = ra + rb;
+    precise vec3 low = a.lo + b.lo;
+    precise vec3 lo = r + low;
+    precise vec3 hi = s + lo;
+    precise vec3 back = hi - s;
+    precise vec3 rest = lo - back;
+    return Wide3(hi, rest);
+}
+
+vec3 upper_half(vec3 a) {
+    precise vec3 c = 4097.0 * a;
+    precise vec3 d = c - a;
+    precise vec3 hi = c - d;
+    return hi;
+}
+
+Wide3 wide_product(Wide3 a, Wide3 b) {
+    precise vec3 p = a.hi * b.hi;
+    precise vec3 ah = upper_half(a.hi), bh = upper_half(b.hi);
+    precise vec3 al = a.hi - ah, bl = b.hi - bh;
+    precise vec3 e0 = ah * bh;
+    precise vec3 e1 = e0 - p;
+    precise vec3 e2 = e1 + ah * bl;
+    precise vec3 e3 = e2 + al * bh;
+    precise vec3 e4 = e3 + al * bl;
+    precise vec3 lo = e4 + (a.hi * b.lo + a.lo * b.hi);
+    return Wide3(p, lo);
+}
+
+Wide3 negated(Wide3 a) { return Wide3(-a.hi, -a.lo); }
+
+float wide_dot(Wide3 a, Wide3 b) {
+    Wide3 p = wide_product(a, b);
+    Wide3 s = wide_sum(wide_sum(p, Wide3(p.hi.yzx, p.lo.yzx)), Wide3(p.hi.zxy, p.lo.zxy));
+    return s.hi.x;
+}
+
+// t at which the ray meets the triangle's plane; NaN or infinite when it runs within it.
+float plane_distance(vec3 origin, vec3 direction, vec3 v0, vec3 v1, vec3 v2) {
+    Wide3 e1 = two_difference(v1, v0), e2 = two_difference(v2, v0);
+    Wide3 normal = wide_sum(
+        wide_product(Wide3(e1.hi.yzx, e1.lo.yzx), Wide3(e2.hi.zxy, e2.lo.zxy)),
+        negated(wide_product(Wide3(e1.hi.zxy, e1.lo.zxy), Wide3(e2.hi.yzx, e2.lo.yzx))));
+    return wide_dot(two_difference(v0, origin), normal) / wide_dot(Wide3(direction, vec3(0.0)), normal);
+}
+
 // Why no ray slips between two triangles that share an edge: a corner's sheared position depends on the corner and the ray
 // alone, so both triangles see the same numbers; and the sign of fl(a*b) - fl(c*d) is never wrong, at worst zero, because
 // rounding is monotonic. Zero counts as inside. `precise` keeps the compiler from fusing a product into the difference,
 // which would break the symmetry. (The paper resolves zeros in double precision to hit exactly one of the two triangles;
 // here both are hit, at the same t, which no stream can tell apart.)
-bool intersect_triangle(Shear shear, vec3 origin, vec3 v0, vec3 v1, vec3 v2, float tmin, float tmax, out float t, out vec2 uv) {
+bool intersect_triangle(Shear shear, vec3 origin, vec3 direction, vec3 v0, vec3 v1, vec3 v2, float tmin, float tmax, out float t, out vec2 uv) {
     precise vec3 a = permute(v0 - origin, shear.axis);
     precise vec3 b = permute(v1 - origin, shear.axis);
     precise vec3 c = permute(v2 - origin, shear.axis);
@@ -50,9 +119,10 @@ bool intersect_triangle(Shear shear, vec3 origin, vec3 v0, vec3 v1, vec3 v2, flo
     bool met = !outside && det != 0.0 && t > tmin && t < tmax;
     vec3 z = abs(vec3(a.z, b.z, c.z) * shear.s.z);
     float max_z = max(max(z.x, z.y), z.z);
-    // A ray that has just left this surface may find it again at a t that is all rounding, thin triangles above all. The bound
-    // on the error of t is that of pbrt-v4, 6.8.7 (gamma(n) = n half-ulps). It matters only where t is small beside the
-    // distance of the triangle's corners, and most hits are spared it.
+    // A ray that has just left this surface may find it again at a t that is all rounding, thin triangles above all; and a
+    // surface just in front of it must not be lost. Where t is below the bound on its error (pbrt-v4, 6.8.7; gamma(n) = n
+    // half-ulps) it is computed again with twice the digits. That matters only where t is small beside the distance of the
+    // triangle's corners, so most hits are spared even the bound.
     if (met && t < 0.05 * max_z) {
         const float GAMMA = 5.9604645e-8;
         vec3 x = abs(vec3(pa.x, pb.x, pc.x)), y = abs(vec3(pa.y, pb.y, pc.y)), e = abs(vec3(u, v, w));
@@ -61,7 +131,10 @@ bool intersect_triangle(Shear shear, vec3 origin, vec3 v0, vec3 v1, vec3 v2, flo
         float delta_x = 5.0 * GAMMA * (max_x + max_z), delta_y = 5.0 * GAMMA * (max_y + max_z), delta_z = 3.0 * GAMMA * max_z;
         float delta_e = 2.0 * (2.0 * GAMMA * max_x * max_y + delta_y * max_x + delta_x * max_y);
         float delta_t = 3.0 * (3.0 * GAMMA * max_e * max_z + delta_e * max_z + delta_z * max_e) * abs(inverse_det);
-        met = t > delta_t;
+        if (t < tmin + delta_t) {
+            t = plane_distance(origin, direction, v0, v1, v2);
+            met = t > tmin && t < tmax;
+        }
     }
     return met;
 }

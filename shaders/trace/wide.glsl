@@ -30,23 +30,22 @@ const uint ROOT_GROUP = 0x80000000u;
 
 #define SET_RAY(o, d)                                                                                          \
     origin = (o);                                                                                              \
-    shear = make_shear(d);                                                                                     \
-    inverse = safe_inverse(d);                                                                                 \
+    direction = (d);                                                                                           \
+    shear = make_shear(direction);                                                                             \
+    inverse = safe_inverse(direction);                                                                              \
     negative = lessThan(inverse, vec3(0.0));                                                                   \
     octant = (7u - ((negative.x ? 4u : 0u) | (negative.y ? 2u : 0u) | (negative.z ? 1u : 0u))) * 0x01010101u;
 
 // One primitive record against the ray; the corners are a, b, c.
-bool intersect_record(uint id, vec3 a, vec3 b, vec3 c, Shear shear, vec3 origin, Ray world, uint instance, float best, out float t, out vec2 uv) {
+bool intersect_record(uint id, vec3 a, vec3 b, vec3 c, Shear shear, vec3 origin, vec3 direction, Ray world,
+        uint instance, float best, out float t, out vec2 uv) {
     bool met;
     if (HAS_SPHERES && (id & SPHERE) != 0u) {
-        // the direction is not kept: spheres are rarely mixed with enough triangles for it to pay
-        vec3 direction = world.direction;
-        if (!SINGLE_LEVEL) direction = transform_vector(InstanceRecords(SceneRoot(push.scene).instances).v[instance].world_to_group, direction);
         t = intersect_sphere(origin, direction, world.tmin, best, a, b.x);
         uv = vec2(0.0);
         met = t > world.tmin && t < best;
     } else {
-        met = intersect_triangle(shear, origin, a, b, c, world.tmin, best, t, uv);
+        met = intersect_triangle(shear, origin, direction, a, b, c, world.tmin, best, t, uv);
     }
     if (HAS_ALPHA) {
         if (met && (id & ALPHA_TESTED) != 0u) met = alpha_passes(instance, id & NUMBER, uv);
@@ -68,7 +67,7 @@ void main() {
     uint depth = 0u;
 
     Ray world = load_ray(root, index);
-    vec3 origin, inverse;
+    vec3 origin, direction, inverse;
     Shear shear;
     bvec3 negative;
     uint octant;
@@ -145,8 +144,7 @@ void main() {
             depth++;
             instance = w4.y;
             InstanceRecord record = InstanceRecords(root.instances).v[instance];
-            vec3 direction = transform_vector(record.world_to_group, world.direction);
-            SET_RAY(transform_point(record.world_to_group, world.origin), direction)
+            SET_RAY(transform_point(record.world_to_group, world.origin), transform_vector(record.world_to_group, world.direction))
             in_group = true;
             node_base = record.root;
             node_bits = ROOT_GROUP;
@@ -157,14 +155,14 @@ void main() {
             float t;
             vec2 uv;
             if (intersect_record(w4.y, uintBitsToFloat(uvec3(w0, w1.x)), uintBitsToFloat(uvec3(w1.y, w2)), uintBitsToFloat(uvec3(w3, w4.x)),
-                    shear, origin, world, instance, best, t, uv)) {
+                    shear, origin, direction, world, instance, best, t, uv)) {
                 best = t;
                 best_uv = uv;
                 best_instance = instance;
                 best_primitive = w4.y & NUMBER;
             }
             if (intersect_record(w9.y, uintBitsToFloat(uvec3(w5, w6.x)), uintBitsToFloat(uvec3(w6.y, w7)), uintBitsToFloat(uvec3(w8, w9.x)),
-                    shear, origin, world, instance, best, t, uv) && two) {
+                    shear, origin, direction, world, instance, best, t, uv) && two) {
                 best = t;
                 best_uv = uv;
                 best_instance = instance;

@@ -45,8 +45,10 @@ pub(super) fn tree(boxes: &[Aabb], preset: BuildPreset, collapse: Option<u32>) -
         }
         None => {
             let indices = (0..boxes.len() as u32).collect();
-            let (distance, precision, threshold) = (config.ploc_search_distance, config.sort_precision, config.search_depth_threshold);
-            let mut tree = obvhs::ploc::PlocBuilder::with_capacity(boxes.len()).build(distance, boxes, indices, precision, threshold);
+            let (distance, precision, threshold) =
+                (config.ploc_search_distance, config.sort_precision, config.search_depth_threshold);
+            let mut tree =
+                obvhs::ploc::PlocBuilder::with_capacity(boxes.len()).build(distance, boxes, indices, precision, threshold);
             obvhs::bvh2::reinsertion::ReinsertionOptimizer::default().run(&mut tree, config.reinsertion_batch_ratio, None);
             tree
         }

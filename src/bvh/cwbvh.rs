@@ -48,7 +48,11 @@ impl Cwbvh {
     /// A node as it lies in a buffer in which this tree's nodes begin at `first_node` and its primitives at `first_primitive`.
     pub fn rebased(&self, index: usize, first_node: u32, first_primitive: u32) -> CwBvhNode {
         let n = self.nodes[index];
-        CwBvhNode { child_base_idx: n.child_base_idx + first_node, primitive_base_idx: n.primitive_base_idx + first_primitive, ..n }
+        CwBvhNode {
+            child_base_idx: n.child_base_idx + first_node,
+            primitive_base_idx: n.primitive_base_idx + first_primitive,
+            ..n
+        }
     }
 
     /// Calls `see` for every child with the node's index and its slot; returns the nodes on the longest path.
@@ -115,7 +119,8 @@ impl Cwbvh {
                         let Some(count) = seen.get_mut(p as usize) else { return Err(format!("primitive {p} is outside")) };
                         *count += 1;
                         let b = boxes[p as usize];
-                        let inside = |c: &[[f64; 2]; 3]| (0..3).all(|a| c[a][0] <= b.min[a] as f64 && c[a][1] >= b.max[a] as f64);
+                        let inside =
+                            |c: &[[f64; 2]; 3]| (0..3).all(|a| c[a][0] <= b.min[a] as f64 && c[a][1] >= b.max[a] as f64);
                         if !chain.iter().all(inside) {
                             wrong = Some(format!("primitive {p} sticks out of a box above it"));
                         }

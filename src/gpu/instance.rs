@@ -78,12 +78,12 @@ impl Instance {
         let layer_names = if validation { vec![VALIDATION_LAYER.as_ptr()] } else { vec![] };
         let extension_names = if debug_names { vec![ext::debug_utils::NAME.as_ptr()] } else { vec![] };
         let log = validation.then(|| Arc::new(ValidationLog::default()));
-        let mut messenger_info = log.as_ref().map(messenger_info);
+        let mut create_messenger = log.as_ref().map(messenger_info);
         let mut info = vk::InstanceCreateInfo::default()
             .application_info(&application)
             .enabled_layer_names(&layer_names)
             .enabled_extension_names(&extension_names);
-        if let Some(m) = messenger_info.as_mut() {
+        if let Some(m) = create_messenger.as_mut() {
             // also hears what happens inside vkCreateInstance and vkDestroyInstance
             info = info.push_next(m);
         }
@@ -96,7 +96,7 @@ impl Instance {
             Some(log) => {
                 let utils = ext::debug_utils::Instance::new(&entry, &raw);
                 // SAFETY: the log is kept alive by Self, which destroys the messenger first
-                let messenger = unsafe { utils.create_debug_utils_messenger(&messenger_info_owned(log), None) }
+                let messenger = unsafe { utils.create_debug_utils_messenger(&messenger_info(log), None) }
                     .context("creating the debug messenger")?;
                 Some((utils, messenger))
             }
@@ -111,10 +111,6 @@ pub(super) fn no_driver() -> Error {
 }
 
 fn messenger_info(log: &Arc<ValidationLog>) -> vk::DebugUtilsMessengerCreateInfoEXT<'static> {
-    messenger_info_owned(log)
-}
-
-fn messenger_info_owned(log: &Arc<ValidationLog>) -> vk::DebugUtilsMessengerCreateInfoEXT<'static> {
     use vk::{DebugUtilsMessageSeverityFlagsEXT as Severity, DebugUtilsMessageTypeFlagsEXT as Type};
     vk::DebugUtilsMessengerCreateInfoEXT::default()
         .message_severity(Severity::WARNING | Severity::ERROR)

@@ -121,7 +121,8 @@ impl Trees {
                 bvh2::MAX_PRIMITIVES
             )));
         }
-        let groups: Vec<_> = flat.groups.iter().map(|g| Tree::build(kernel, primitive_boxes(flat, g).collect(), REFERENCE_LEAF)).collect();
+        let groups: Vec<_> =
+            flat.groups.iter().map(|g| Tree::build(kernel, primitive_boxes(flat, g).collect(), REFERENCE_LEAF)).collect();
         let top = (!flat.is_single_level()).then(|| Tree::build(kernel, placement_boxes(flat, &groups), 1));
         Ok(Self { groups, top })
     }
@@ -169,29 +170,58 @@ impl Trees {
             None => roots.first().copied().unwrap_or(bvh2::EMPTY),
         };
 
-        let trees: Vec<(&Tree, (u32, u32), bool)> =
-            self.top.iter().map(|t| (t, (0, 0), true)).chain(self.groups.iter().zip(&bases).map(|(t, &b)| (t, b, false))).collect();
+        let trees: Vec<(&Tree, (u32, u32), bool)> = self
+            .top
+            .iter()
+            .map(|t| (t, (0, 0), true))
+            .chain(self.groups.iter().zip(&bases).map(|(t, &b)| (t, b, false)))
+            .collect();
         let nodes = match kernel {
-            Kernel::Wide => write_records(device, "hierarchy nodes", cwbvh::NODE_BYTES, node as u64, &mut trees.iter().flat_map(|&(t, b, _)| {
-                let Tree::Wide(t) = t else { unreachable!("all trees are of one kernel") };
-                (0..t.nodes.len()).map(move |k| t.rebased(k, b.0, b.1))
-            }))?,
-            Kernel::Reference => write_records(device, "hierarchy nodes", size_of::<bvh2::Node>() as u64, node as u64, &mut trees.iter().flat_map(|&(t, b, is_top)| {
-                let Tree::Reference(t) = t else { unreachable!("all trees are of one kernel") };
-                let pad = padding(t.nodes.first().into_iter().flat_map(|n| n.boxes.map(|b| Aabb { min: b[0].into(), max: b[1].into() })).collect::<Vec<_>>().iter());
-                t.nodes.iter().map(move |n| bvh2::Node {
-                    boxes: n.boxes.map(|[lo, hi]| [lo.map(|x| x - pad), hi.map(|x| x + pad)]),
-                    children: n.children.map(|c| if is_top { top_reference(t, c) } else { bvh2::rebase(c, b.0, b.1) }),
-                    ..*n
-                })
-            }))?,
+            Kernel::Wide => write_records(
+                device,
+                "hierarchy nodes",
+                cwbvh::NODE_BYTES,
+                node as u64,
+                &mut trees.iter().flat_map(|&(t, b, _)| {
+                    let Tree::Wide(t) = t else { unreachable!("all trees are of one kernel") };
+                    (0..t.nodes.len()).map(move |k| t.rebased(k, b.0, b.1))
+                }),
+            )?,
+            Kernel::Reference => write_records(
+                device,
+                "hierarchy nodes",
+                size_of::<bvh2::Node>() as u64,
+                node as u64,
+                &mut trees.iter().flat_map(|&(t, b, is_top)| {
+                    let Tree::Reference(t) = t else { unreachable!("all trees are of one kernel") };
+                    let pad = padding(
+                        t.nodes
+                            .first()
+                            .into_iter()
+                            .flat_map(|n| n.boxes.map(|b| Aabb { min: b[0].into(), max: b[1].into() }))
+                            .collect::<Vec<_>>()
+                            .iter(),
+                    );
+                    t.nodes.iter().map(move |n| bvh2::Node {
+                        boxes: n.boxes.map(|[lo, hi]| [lo.map(|x| x - pad), hi.map(|x| x + pad)]),
+                        children: n.children.map(|c| if is_top { top_reference(t, c) } else { bvh2::rebase(c, b.0, b.1) }),
+                        ..*n
+                    })
+                }),
+            )?,
         };
-        let top_records = self.top.iter().filter(|_| kernel == Kernel::Wide).flat_map(|t| t.primitives().iter().map(|&entry| {
-            let mut r = [0u32; 10];
-            r[9] = entry;
-            r
-        }));
-        let group_records = self.groups.iter().zip(&flat.groups).flat_map(|(t, group)| t.primitives().iter().map(move |&p| record(flat, group, p)));
+        let top_records = self.top.iter().filter(|_| kernel == Kernel::Wide).flat_map(|t| {
+            t.primitives().iter().map(|&entry| {
+                let mut r = [0u32; 10];
+                r[9] = entry;
+                r
+            })
+        });
+        let group_records = self
+            .groups
+            .iter()
+            .zip(&flat.groups)
+            .flat_map(|(t, group)| t.primitives().iter().map(move |&p| record(flat, group, p)));
         // one more: the fast kernel loads records in pairs
         let primitives = write_records(
             device,
@@ -217,7 +247,13 @@ fn top_reference(top: &Bvh2, reference: u32) -> u32 {
     }
 }
 
-fn write_records<T: bytemuck::NoUninit>(device: &Arc<Device>, name: &str, size: u64, count: u64, records: &mut dyn Iterator<Item = T>) -> Result<Buffer> {
+fn write_records<T: bytemuck::NoUninit>(
+    device: &Arc<Device>,
+    name: &str,
+    size: u64,
+    count: u64,
+    records: &mut dyn Iterator<Item = T>,
+) -> Result<Buffer> {
     let mut buffer = Buffer::new(device, name, size * count, Memory::Device)?;
     buffer.fill(size * count, size, |_, bytes| {
         for (out, r) in bytes.chunks_exact_mut(size as usize).zip(&mut *records) {

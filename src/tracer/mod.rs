@@ -95,7 +95,7 @@ impl BuildStats {
 }
 
 enum Structure {
-    Compute(compute::Hierarchy),
+    Compute(Box<compute::Hierarchy>),
     /// Held because the top level's address in the scene's root leads here.
     Hardware {
         _levels: hardware::Structures,
@@ -148,7 +148,7 @@ impl Tracer {
                 scene.set_hierarchy(&h)?;
                 stats.stack_entries = h.stack_entries;
                 stats.structure_bytes = h.bytes();
-                Structure::Compute(h)
+                Structure::Compute(Box::new(h))
             }
             None => {
                 let upload = start.elapsed();
@@ -201,7 +201,8 @@ impl Tracer {
             .set(2, self.features.single_level as u32);
         match &self.structure {
             Structure::Compute(h) => {
-                let rays_per_lane = if self.device.info.is_cpu() { compute::RAYS_PER_LANE_CPU } else { compute::RAYS_PER_LANE_GPU };
+                let rays_per_lane =
+                    if self.device.info.is_cpu() { compute::RAYS_PER_LANE_CPU } else { compute::RAYS_PER_LANE_GPU };
                 let specialization = specialization.set(3, h.stack_entries.max(1)).set(4, rays_per_lane);
                 if h.kernel == Kernel::Reference {
                     return Stream::reference(&self.device, shaders, &specialization);

@@ -54,9 +54,17 @@ pub(super) const LAUNCH_RAYS: u32 = 1 << 19;
 
 enum Pipeline {
     /// One compute shader over all rays.
-    Single { pipeline: ComputePipeline, rays_per_group: u32 },
+    Single {
+        pipeline: ComputePipeline,
+        rays_per_group: u32,
+    },
     /// Generate, trace, deliver.
-    Steps { generate: ComputePipeline, trace: Arc<ComputePipeline>, deliver: ComputePipeline, rays_per_group: u32 },
+    Steps {
+        generate: ComputePipeline,
+        trace: Arc<ComputePipeline>,
+        deliver: ComputePipeline,
+        rays_per_group: u32,
+    },
     RayTracing(RayTracingPipeline),
 }
 
@@ -72,7 +80,13 @@ impl StreamShaders {
 
 impl Stream {
     /// For the compute tracer's fast kernel, which streams share.
-    pub(super) fn steps(device: &Arc<Device>, shaders: &StreamShaders, s: &Specialization, trace: Arc<ComputePipeline>, rays_per_lane: u32) -> Result<Self> {
+    pub(super) fn steps(
+        device: &Arc<Device>,
+        shaders: &StreamShaders,
+        s: &Specialization,
+        trace: Arc<ComputePipeline>,
+        rays_per_lane: u32,
+    ) -> Result<Self> {
         Ok(Self(Pipeline::Steps {
             generate: ComputePipeline::new(device, shaders.name, shaders.generate, s)?,
             trace,

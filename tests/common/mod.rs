@@ -16,6 +16,10 @@ pub fn device() -> Arc<Device> {
 
 pub fn open(options: Options) -> Arc<Device> {
     match Device::open(&options) {
+        // the floor run means one driver and no other
+        Ok(device) if std::env::var("SKYLIT_REQUIRE_DRIVER").is_ok_and(|d| !device.info.driver.contains(&d)) => {
+            panic!("SKYLIT_REQUIRE_DRIVER is not what runs here: {}", device.info.driver)
+        }
         Ok(device) => device,
         Err(Error::Device(m)) if m.contains("validation") => panic!("{m}: run ./scripts/setup.sh"),
         Err(e) => panic!("{e}"),
