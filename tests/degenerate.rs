@@ -233,7 +233,9 @@ fn gpu_degenerate_needles() {
             count += 1;
             let wide = skylit::oracle::OracleRay::from(r);
             let corners = oracle.triangles()[hit.primitive as usize].v;
-            let depth = corners.map(|v| (v - wide.origin).dot(wide.direction) / wide.direction.length_squared());
+            // depth as tracers weigh it: along the direction's longest axis
+            let axis = wide.direction.abs().max_position();
+            let depth = corners.map(|v| (v - wide.origin)[axis] / wide.direction[axis]);
             let slack = 1e-4 / wide.direction.length();
             let (lo, hi) = (depth.iter().copied().fold(f64::MAX, f64::min), depth.iter().copied().fold(f64::MIN, f64::max));
             assert!((lo - slack..=hi + slack).contains(&(hit.t as f64)), "{kind}: {r:?} {hit:?}, between {lo} and {hi}");
