@@ -299,7 +299,6 @@ fn gpu_degenerate_coincident_triangles() {
 }
 
 #[test]
-#[ignore = "the tree builder takes quadratic time for coincident boxes, and its debug check recurses as deep as they are many"]
 fn gpu_degenerate_very_many_coincident_triangles() {
     coincident(100_000);
 }

@@ -3,11 +3,12 @@
 //! Hierarchy Optimization", EG 2018).
 //!
 //! The depth of what comes out is bounded, whatever the input: a subtree that would grow deeper is replaced by a balanced one
-//! over the same leaves.
+//! over the same leaves, and equal boxes are clustered as one.
 
 use glam::Vec3;
 use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::node::Bvh2Node;
+use rayon::prelude::*;
 
 use super::Aabb;
 
@@ -33,12 +34,71 @@ impl obvhs::Boundable for Aabb {
 /// The tree of some boxes (at least one). `collapse`: leaves hold up to so many primitives, where that lowers the cost; else
 /// one each.
 pub(super) fn tree(boxes: &[Aabb], preset: BuildPreset, collapse: Option<u32>) -> Bvh2 {
+    if !seems_to_repeat(boxes) {
+        return limit_depth(distinct_tree(boxes, preset, collapse));
+    }
+    // clustering pairs one of k equal boxes at a time: k^2 work for a chain of depth k. Build over one of each instead.
+    let copies = Copies::of(boxes);
+    let unique: Vec<Aabb> = copies.groups().map(|g| boxes[g[0] as usize]).collect();
+    limit_depth(copies.expand(&distinct_tree(&unique, preset, None)))
+}
+
+/// Are there equal boxes among some of them, evenly spread? What a sample of this size overlooks is too few to matter.
+fn seems_to_repeat(boxes: &[Aabb]) -> bool {
+    let mut seen = std::collections::HashSet::new();
+    boxes.iter().step_by(boxes.len().div_ceil(4096).max(1)).any(|b| !seen.insert(key(b)))
+}
+
+fn key(b: &Aabb) -> [u32; 6] {
+    // equal as numbers is equal as bits, once -0 is 0
+    let bits = |v: Vec3| (v + 0.0).to_array().map(f32::to_bits);
+    let ([a, b, c], [d, e, f]) = (bits(b.min), bits(b.max));
+    [a, b, c, d, e, f]
+}
+
+/// Boxes sorted so that equal ones lie side by side.
+struct Copies {
+    order: Vec<u32>,
+    /// Where each group of equal boxes begins in `order`, and the end.
+    begins: Vec<usize>,
+}
+
+impl Copies {
+    fn of(boxes: &[Aabb]) -> Self {
+        let mut order: Vec<u32> = (0..boxes.len() as u32).collect();
+        order.par_sort_unstable_by_key(|&i| (key(&boxes[i as usize]), i));
+        let mut begins = vec![0];
+        begins.extend((1..order.len()).filter(|&k| key(&boxes[order[k - 1] as usize]) != key(&boxes[order[k] as usize])));
+        begins.push(order.len());
+        Self { order, begins }
+    }
+
+    fn groups(&self) -> impl Iterator<Item = &[u32]> {
+        self.begins.windows(2).map(|w| &self.order[w[0]..w[1]])
+    }
+
+    /// A tree over one of each, with every leaf replaced by a balanced tree over its copies.
+    fn expand(self, tree: &Bvh2) -> Bvh2 {
+        let nodes = emit(Source::Tree { tree, node: 0 }, |source, _| match source {
+            Source::Tree { tree, node } if tree.nodes[node].is_leaf() => {
+                let leaf = tree.nodes[node];
+                let group = tree.primitive_indices[leaf.first_index as usize] as usize;
+                let slots = self.begins[group]..self.begins[group + 1];
+                Source::Balanced(slots.map(|s| Bvh2Node { first_index: s as u32, prim_count: 1, ..leaf }).collect())
+            }
+            other => other,
+        });
+        Bvh2 { nodes, primitive_indices: self.order, ..Default::default() }
+    }
+}
+
+fn distinct_tree(boxes: &[Aabb], preset: BuildPreset, collapse: Option<u32>) -> Bvh2 {
     let mut config = match preset {
         BuildPreset::Fast => obvhs::BvhBuildParams::fast_build(),
         BuildPreset::Default => obvhs::BvhBuildParams::medium_build(),
     };
     config.pre_split = false;
-    let tree = match collapse {
+    match collapse {
         Some(max_leaf) => {
             config.max_prims_per_leaf = max_leaf;
             obvhs::bvh2::builder::build_bvh2(boxes, config, &mut std::time::Duration::default())
@@ -52,8 +112,7 @@ pub(super) fn tree(boxes: &[Aabb], preset: BuildPreset, collapse: Option<u32>) -
             obvhs::bvh2::reinsertion::ReinsertionOptimizer::default().run(&mut tree, config.reinsertion_batch_ratio, None);
             tree
         }
-    };
-    limit_depth(tree)
+    }
 }
 
 /// The same leaves in a tree that is no deeper than [`MAX_DEPTH`].
@@ -62,11 +121,16 @@ fn limit_depth(tree: Bvh2) -> Bvh2 {
         return tree;
     }
     let counts = leaf_counts(&tree);
-    // the root has slot 0, children lie side by side
+    let nodes = emit(Source::Tree { tree: &tree, node: 0 }, |source, depth| source.limited(depth, &counts));
+    Bvh2 { nodes, primitive_indices: tree.primitive_indices, ..Default::default() }
+}
+
+/// Nodes of a subtree, each passed through `change` first with its depth. The root has slot 0, children lie side by side.
+fn emit<'a>(root: Source<'a>, change: impl Fn(Source<'a>, u32) -> Source<'a>) -> Vec<Bvh2Node> {
     let mut nodes = vec![Bvh2Node::default()];
-    let mut work = vec![(Source::Tree { tree: &tree, node: 0 }, 0u32, 0usize)];
+    let mut work = vec![(root, 0u32, 0usize)];
     while let Some((source, depth, slot)) = work.pop() {
-        let source = source.limited(depth, &counts);
+        let source = change(source, depth);
         let bounds = source.bounds();
         nodes[slot] = match source.split() {
             Err(leaf) => leaf,
@@ -79,7 +143,7 @@ fn limit_depth(tree: Bvh2) -> Bvh2 {
             }
         };
     }
-    Bvh2 { nodes, primitive_indices: tree.primitive_indices, ..Default::default() }
+    nodes
 }
 
 /// A subtree yet to be emitted.

@@ -403,7 +403,7 @@ fn attribute_bytes<'a>(t: &'a TriangleMesh, part: &Part, attribute: Attribute) -
         Attribute::Normals if part.to_group.matrix3 == glam::DMat3::IDENTITY => Cow::Borrowed(bytemuck::cast_slice(&t.normals)),
         Attribute::Normals => {
             let m = part.to_group.matrix3.inverse().transpose();
-            let baked: Vec<Vec3> = t.normals.iter().map(|n| (m * n.as_dvec3()).normalize_or_zero().as_vec3()).collect();
+            let baked: Vec<Vec3> = t.normals.iter().map(|n| (m * n.as_dvec3()).as_vec3()).collect();
             Cow::Owned(bytemuck::cast_slice(&baked).to_vec())
         }
         Attribute::Texcoords(set) => Cow::Borrowed(bytemuck::cast_slice(&t.texcoords[set])),
