@@ -2,7 +2,7 @@
 //!
 //! A pass's shader defines `ray_count`, `ray(i)` and `closest(i, hit)` or `any(i, occluded)`; the build compiles it once per
 //! tracer ([`stream`]). A [`Tracer`] holds a scene in device memory ([`gpu_scene`]) together with what it is traced through:
-//! a hierarchy of our own ([`compute`]) or acceleration structures ([`hardware`]).
+//! a hierarchy of our own (`compute`) or acceleration structures (`hardware`).
 
 mod compute;
 pub mod gpu_scene;
