@@ -8,6 +8,7 @@ use std::sync::Arc;
 use common::{assert_validation_clean, device, tracer, tracers};
 use glam::{DAffine3, DVec3, Vec3};
 use rayon::prelude::*;
+use skylit::Error;
 use skylit::gpu::Device;
 use skylit::measure::parity::{judge_any, judge_closest};
 use skylit::measure::ray_sets::{leak_rays, random_rays};
@@ -21,7 +22,7 @@ use skylit::render::{Uncontrolled, aov};
 use skylit::sampling::sobol::hash_combine;
 use skylit::sampling::to_unit;
 use skylit::scene::{Camera, Geometry, Instance, Material, Mesh, Scene, Sphere, TriangleMesh};
-use skylit::tracer::Tracer;
+use skylit::tracer::{Tracer, TracerKind};
 
 fn scene(parts: Vec<(Geometry, Vec<DAffine3>)>) -> Scene {
     let mut scene = Scene { materials: vec![Material::default()], ..Scene::default() };
@@ -318,8 +319,18 @@ fn coincident(count: u32) {
         let start = std::time::Instant::now();
         let tracer = tracer(&device, kind, &scene);
         let built = start.elapsed();
+        let traced = trace(&tracer, &rays, Mode::Closest, 1, &mut Uncontrolled);
+        // Mesa 22.3 leaves loops after 65,535 turns: then the right answer is to say so
+        if let Err(Error::Vulkan(message)) = &traced
+            && message.contains("cut the traversal")
+            && count > 65_535
+            && kind == TracerKind::Compute
+        {
+            println!("{count} coincident triangles {kind}: {message}");
+            continue;
+        }
         // which of them is met is not said: as if all had the first's number
-        let mut got = hits(&tracer, &rays, Mode::Closest);
+        let mut got = traced.unwrap_or_else(|e| panic!("{kind}: {e}")).0;
         for hit in got.iter_mut().filter(|h| h.is_hit()) {
             assert!(hit.primitive < count, "{kind}: {hit:?}");
             hit.primitive = 0;

@@ -20,9 +20,8 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Sc
     uvec2 launch_rays; // compute tracer: rays of a launch between its steps
     uvec2 launch_hits; // compute tracer: what they met
     uint root;         // compute tracer: where traversal begins
-    uint root_reserved0;
-    uint root_reserved1;
-    uint root_reserved2;
+    uint root_reserved;
+    uvec2 unfinished;  // compute tracer: counts rays whose traversal the driver cut short
     vec4 bounds_min;   // compute tracer: of everything, padded as the hierarchy's boxes are
     vec4 bounds_max;
 };

@@ -1,6 +1,7 @@
 // Last step of a launch of the fast kernel: what the rays met goes to the stream.
 #ifndef TRACE_DELIVER
 #define TRACE_DELIVER
+#include "trace/callback.glsl"
 #include "trace/launch.glsl"
 
 layout(local_size_x = LANES) in;
@@ -9,6 +10,10 @@ void main() {
     uint k = gl_GlobalInvocationID.x;
     if (k >= push.count) return;
     SceneRoot root = SceneRoot(push.scene);
+    if (!is_finished(root, k)) {
+        deliver_miss(push.first + k);
+        return;
+    }
 #ifdef STREAM_ANY
     any(push.first + k, load_any(root, k));
 #else

@@ -19,6 +19,7 @@ void main() {
     float far = MIN(MIN(MIN(f.x, f.y), f.z) * SLAB_SCALE, r.tmax);
     r.tmax = near <= far ? r.tmax : -1.0;
     store_ray(root, k, r);
+    mark_unfinished(root, k);
 }
 
 #endif

@@ -13,6 +13,28 @@ void store_ray(SceneRoot root, uint k, Ray r) {
     rays.v[2u * k + 1u] = floatBitsToUint(vec4(r.direction, r.tmax));
 }
 
+// Stands where a result will be. Some CPU drivers leave any loop after 65,535 turns: a ray that this happens to keeps the mark,
+// and is reported instead of delivering what an earlier launch left there.
+const uint UNFINISHED = 0x7fc0dead;
+
+void mark_unfinished(SceneRoot root, uint k) {
+#ifdef STREAM_ANY
+    LaunchFlags(root.launch_hits).v[k] = UNFINISHED;
+#else
+    LaunchHits(root.launch_hits).v[3u * k].x = UNFINISHED;
+#endif
+}
+
+bool is_finished(SceneRoot root, uint k) {
+#ifdef STREAM_ANY
+    bool finished = LaunchFlags(root.launch_hits).v[k] != UNFINISHED;
+#else
+    bool finished = LaunchHits(root.launch_hits).v[3u * k].x != UNFINISHED;
+#endif
+    if (!finished) atomicAdd(LaunchFlags(root.unfinished).v[0], 1u);
+    return finished;
+}
+
 void store_any(SceneRoot root, uint k, bool occluded) {
     LaunchFlags(root.launch_hits).v[k] = occluded ? 1u : 0u;
 }

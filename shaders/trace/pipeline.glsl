@@ -2,6 +2,7 @@
 #ifndef TRACE_PIPELINE
 #define TRACE_PIPELINE
 #include "scene/scene.glsl"
+#include "trace/callback.glsl"
 #include "trace/payload.glsl"
 
 layout(location = 0) rayPayloadEXT Payload payload;
@@ -10,11 +11,7 @@ void main() {
     uint index = push.first + gl_LaunchIDEXT.x;
     Ray world = ray(index);
     if (!is_ray(world)) {
-#ifdef STREAM_ANY
-        any(index, false);
-#else
-        closest(index, miss());
-#endif
+        deliver_miss(index);
         return;
     }
     payload.t = 0.0;
@@ -34,7 +31,7 @@ void main() {
     any(index, payload.t < INFINITY);
 #else
     if (payload.t < INFINITY) closest(index, scene_hit(payload.t, payload.instance, payload.primitive, vec2(payload.u, payload.v)));
-    else closest(index, miss());
+    else deliver_miss(index);
 #endif
 }
 

@@ -3,6 +3,7 @@
 #define TRACE_QUERY
 #include "scene/material.glsl"
 #include "scene/sphere.glsl"
+#include "trace/callback.glsl"
 
 layout(local_size_x = LANES) in;
 
@@ -11,11 +12,7 @@ void main() {
     uint index = push.first + gl_GlobalInvocationID.x;
     Ray world = ray(index);
     if (!is_ray(world)) {
-#ifdef STREAM_ANY
-        any(index, false);
-#else
-        closest(index, miss());
-#endif
+        deliver_miss(index);
         return;
     }
     SceneRoot root = SceneRoot(push.scene);
@@ -50,7 +47,7 @@ void main() {
     any(index, type != gl_RayQueryCommittedIntersectionNoneEXT);
 #else
     if (type == gl_RayQueryCommittedIntersectionNoneEXT) {
-        closest(index, miss());
+        deliver_miss(index);
     } else {
         uint instance = uint(rayQueryGetIntersectionInstanceCustomIndexEXT(query, true));
         uint primitive = uint(rayQueryGetIntersectionPrimitiveIndexEXT(query, true));

@@ -190,6 +190,7 @@ pub fn render(tracer: &Tracer, camera: &CameraRecord, options: &AoOptions, contr
         let film_size = film.size() / size_of::<FilmPixel>() as u64 * size_of::<FilmPixel>() as u64;
         read_film(&mut film, film_size, block, sample, &mut out)?;
     }
+    tracer.check_finished()?;
     out.trace_seconds = start.elapsed().as_secs_f64();
     Ok(out)
 }

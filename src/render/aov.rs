@@ -75,5 +75,6 @@ pub fn render(tracer: &Tracer, camera: &CameraRecord, size: [u32; 2], control: &
             first += count;
         }
     }
+    tracer.check_finished()?;
     Ok(out)
 }

@@ -112,6 +112,7 @@ pub fn trace(
             times.wall.push(wall_seconds);
         }
     }
+    tracer.check_finished()?;
     let mut hits = Vec::with_capacity(rays.len());
     results.read_with(0, record * n as u64, record, |_, bytes| match mode {
         Mode::Closest => hits.extend(bytemuck::pod_collect_to_vec::<u8, Hit>(bytes)),

@@ -62,12 +62,27 @@ pub(super) struct Hierarchy {
     pub stack_entries: u32,
     /// Of everything, padded.
     pub bounds: Aabb,
+    /// A u32: rays whose traversal the driver cut short.
+    pub unfinished: Buffer,
     /// Between the steps of a launch (fast kernel only).
     pub launch_rays: Option<Buffer>,
     pub launch_hits: Option<Buffer>,
 }
 
 impl Hierarchy {
+    /// Fails when the driver cut a traversal short.
+    pub fn check_finished(&self) -> Result<()> {
+        let mut count = 0u32;
+        self.unfinished.read_with(0, 4, 4, |_, bytes| count = bytemuck::pod_read_unaligned(bytes))?;
+        match count {
+            0 => Ok(()),
+            n => Err(Error::Vulkan(format!(
+                "the driver cut the traversal of {n} rays short (Mesa before 23 leaves a loop after 65,535 turns; the scene has \
+                 very many surfaces in one place): use a newer driver, or --tracer pipeline"
+            ))),
+        }
+    }
+
     pub fn bytes(&self) -> u64 {
         self.nodes.size() + self.primitives.size()
     }
@@ -242,7 +257,20 @@ impl Trees {
             Kernel::Reference => Ok(None),
         };
         let (launch_rays, launch_hits) = (launch("launch rays", size_of::<Ray>() as u64)?, launch("launch hits", HIT_BYTES)?);
-        Ok(Hierarchy { kernel, nodes, primitives, root, instance_roots, stack_entries, bounds, launch_rays, launch_hits })
+        let mut unfinished = Buffer::new(device, "unfinished rays", 4, Memory::Readback)?;
+        unfinished.fill(4, 4, |_, bytes| bytes.fill(0))?;
+        Ok(Hierarchy {
+            unfinished,
+            kernel,
+            nodes,
+            primitives,
+            root,
+            instance_roots,
+            stack_entries,
+            bounds,
+            launch_rays,
+            launch_hits,
+        })
     }
 }
 

@@ -36,7 +36,8 @@ struct SceneRoot {
     launch_rays: u64,
     launch_hits: u64,
     root: u32,
-    reserved: [u32; 3],
+    reserved: u32,
+    unfinished: u64,
     bounds_min: [f32; 4],
     bounds_max: [f32; 4],
 }
@@ -223,6 +224,7 @@ impl GpuScene {
         self.root.nodes = h.nodes.address();
         self.root.primitives = h.primitives.address();
         self.root.root = h.root;
+        self.root.unfinished = h.unfinished.address();
         self.root.bounds_min = h.bounds.min.extend(0.0).to_array();
         self.root.bounds_max = h.bounds.max.extend(0.0).to_array();
         self.root.launch_rays = h.launch_rays.as_ref().map_or(0, Buffer::address);

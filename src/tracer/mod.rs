@@ -193,6 +193,17 @@ impl Tracer {
         self.scene.root_address()
     }
 
+    /// To be called after streams have run and before their results are used: did every ray get its answer?
+    ///
+    /// # Errors
+    /// [`Error::Vulkan`] when the driver cut a traversal short, which no result shows.
+    pub fn check_finished(&self) -> Result<()> {
+        match &self.structure {
+            Structure::Compute(h) => h.check_finished(),
+            Structure::Hardware { .. } => Ok(()),
+        }
+    }
+
     /// Compiles a stream for this tracer and scene.
     pub fn stream(&self, shaders: &'static StreamShaders) -> Result<Stream> {
         let specialization = Specialization::default()
