@@ -5,8 +5,6 @@
 
 layout(buffer_reference, std430, buffer_reference_align = 16) writeonly buffer Aov { uvec4 v[]; };
 
-uint ray_count() { return push.count; }
-
 Ray centre_ray(BlockParams p, uint index) {
     uvec2 pixel = block_pixel(p, index);
     if (!in_block(p, pixel)) return no_ray();

@@ -16,8 +16,6 @@ struct FilmPixel {
 layout(buffer_reference, std430, buffer_reference_align = 8) buffer Film { FilmPixel v[]; };
 layout(buffer_reference, std430, buffer_reference_align = 4) buffer Counters { uint v[]; };
 
-uint ray_count() { return push.count; }
-
 Ray occlusion_ray(BlockParams p, uint index) {
     uint at = 3u * (index - push.first);
     GBuffer g = GBuffer(p.gbuffer);

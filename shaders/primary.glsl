@@ -5,8 +5,6 @@
 
 layout(buffer_reference, std430, buffer_reference_align = 16) writeonly buffer GBuffer { uvec4 v[]; };
 
-uint ray_count() { return push.count; }
-
 // The index is of the block, the G-buffer's is of the launch.
 Ray primary_ray(BlockParams p, uint index) {
     uvec2 pixel = block_pixel(p, index);

@@ -8,8 +8,6 @@ layout(buffer_reference, std430, buffer_reference_align = 8) readonly buffer Ray
 };
 layout(buffer_reference, std430, buffer_reference_align = 4) writeonly buffer Results { uint v[]; };
 
-uint ray_count() { return push.count; }
-
 Ray ray(uint index) {
     Quads q = Quads(RaySet(push.pass).rays);
     vec4 a = uintBitsToFloat(q.v[2u * index]);

@@ -11,8 +11,6 @@ layout(buffer_reference, std430, buffer_reference_align = 8) readonly buffer Pro
 };
 layout(buffer_reference, std430, buffer_reference_align = 16) writeonly buffer ProbeOutputs { uvec4 v[]; };
 
-uint ray_count() { return push.count; }
-
 Ray ray(uint index) { return no_ray(); }
 
 void any(uint index, bool occluded) {

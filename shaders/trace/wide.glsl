@@ -184,8 +184,9 @@ void main() {
                 best_instance = instance;
                 best_primitive = w4.y & NUMBER;
             }
-            if (intersect_record(w9.y, uintBitsToFloat(uvec3(w5, w6.x)), uintBitsToFloat(uvec3(w6.y, w7)), uintBitsToFloat(uvec3(w8, w9.x)),
-                    shear, origin, direction, world, instance, best, t, uv) && two) {
+            // where there is no second, the next record may be of another group: its alpha must not be asked with this instance
+            if (two && intersect_record(w9.y, uintBitsToFloat(uvec3(w5, w6.x)), uintBitsToFloat(uvec3(w6.y, w7)), uintBitsToFloat(uvec3(w8, w9.x)),
+                    shear, origin, direction, world, instance, best, t, uv)) {
                 best = t;
                 best_uv = uv;
                 best_instance = instance;

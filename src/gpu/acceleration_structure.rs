@@ -75,7 +75,8 @@ impl AccelerationStructure {
         Ok(Self { raw, address, buffer, device: device.clone() })
     }
 
-    /// Builds one bottom level, compacted where that pays. `refittable` structures can be updated later and are not compacted.
+    /// Builds one bottom level, compacted where that pays (on lavapipe it never does; it is asked there too, so that the
+    /// software driver tests the path).
     pub fn bottom_level(device: &Arc<Device>, commands: &mut Commands, name: &str, input: &BottomLevelInput) -> Result<Self> {
         let (geometries, ranges) = bottom_level_geometry(input);
         let flags = vk::BuildAccelerationStructureFlagsKHR::PREFER_FAST_TRACE

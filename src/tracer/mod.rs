@@ -1,6 +1,6 @@
 //! The seam: a pass describes a stream of rays, a tracer runs it. Nothing outside this folder knows which tracer runs.
 //!
-//! A pass's shader defines `ray_count`, `ray(i)` and `closest(i, hit)` or `any(i, occluded)`; the build compiles it once per
+//! A pass's shader defines `ray(i)` and `closest(i, hit)` or `any(i, occluded)`; the build compiles it once per
 //! tracer ([`stream`]). A [`Tracer`] holds a scene in device memory ([`gpu_scene`]) together with what it is traced through:
 //! a hierarchy of our own (`compute`) or acceleration structures (`hardware`).
 
