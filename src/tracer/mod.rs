@@ -7,7 +7,9 @@
 mod compute;
 pub mod gpu_scene;
 mod hardware;
+mod reference;
 pub mod stream;
+mod wide;
 
 use std::sync::{Arc, OnceLock};
 use std::time::Instant;
@@ -214,7 +216,7 @@ impl Tracer {
             Structure::Compute(h) => {
                 let rays_per_lane =
                     if self.device.info.is_cpu() { compute::RAYS_PER_LANE_CPU } else { compute::RAYS_PER_LANE_GPU };
-                let specialization = specialization.set(3, h.stack_entries.max(1)).set(4, rays_per_lane);
+                let specialization = specialization.set(3, h.stack_constant()).set(4, rays_per_lane);
                 if h.kernel == Kernel::Reference {
                     return Stream::reference(&self.device, shaders, &specialization);
                 }
