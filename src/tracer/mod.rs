@@ -7,6 +7,7 @@
 mod compute;
 pub mod gpu_scene;
 mod hardware;
+mod reference;
 pub mod stream;
 
 use std::sync::{Arc, OnceLock};
