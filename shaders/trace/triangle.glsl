@@ -2,6 +2,10 @@
 #ifndef TRACE_TRIANGLE
 #define TRACE_TRIANGLE
 
+// For benchmarks the host can choose the other test, to show what watertightness costs and what it is worth
+// (docs/traversal.md).
+layout(constant_id = 6) const bool WATERTIGHT = true;
+
 // The ray's frame: z is the axis along which the direction is longest, and the shear that makes the ray the z axis.
 struct Shear {
     uint axis;
@@ -94,7 +98,7 @@ float plane_distance(vec3 origin, vec3 direction, vec3 v0, vec3 v1, vec3 v2) {
 // rounding is monotonic. Zero counts as inside. `precise` keeps the compiler from fusing a product into the difference,
 // which would break the symmetry. (The paper resolves zeros in double precision to hit exactly one of the two triangles;
 // here both are hit, at the same t, which no stream can tell apart.)
-bool intersect_triangle(Shear shear, vec3 origin, vec3 direction, vec3 v0, vec3 v1, vec3 v2, float tmin, float tmax, out float t, out vec2 uv) {
+bool intersect_watertight(Shear shear, vec3 origin, vec3 direction, vec3 v0, vec3 v1, vec3 v2, float tmin, float tmax, out float t, out vec2 uv) {
     precise vec3 a = permute(v0 - origin, shear.axis);
     precise vec3 b = permute(v1 - origin, shear.axis);
     precise vec3 c = permute(v2 - origin, shear.axis);
@@ -140,6 +144,27 @@ bool intersect_triangle(Shear shear, vec3 origin, vec3 direction, vec3 v0, vec3 
         }
     }
     return met;
+}
+
+// Moeller, Trumbore, "Fast, Minimum Storage Ray/Triangle Intersection" (JGT 1997), double-sided. Each triangle rounds the shared
+// edge in its own way, so rays slip between neighbours; and t is as rounding leaves it.
+bool intersect_moller_trumbore(vec3 origin, vec3 direction, vec3 v0, vec3 v1, vec3 v2, float tmin, float tmax, out float t, out vec2 uv) {
+    vec3 e1 = v1 - v0, e2 = v2 - v0;
+    vec3 p = cross(direction, e2);
+    float det = dot(e1, p);
+    // as above: no denormals from lanes that hold no triangle
+    bool plausible = abs(det) > 1e-37 && abs(det) < 1e37;
+    float inverse_det = 1.0 / (plausible ? det : 1.0);
+    vec3 s = origin - v0;
+    vec3 q = cross(s, e1);
+    uv = vec2(dot(s, p), dot(direction, q)) * inverse_det;
+    t = dot(e2, q) * inverse_det;
+    return plausible && uv.x >= 0.0 && uv.y >= 0.0 && uv.x + uv.y <= 1.0 && t > tmin && t < tmax;
+}
+
+bool intersect_triangle(Shear shear, vec3 origin, vec3 direction, vec3 v0, vec3 v1, vec3 v2, float tmin, float tmax, out float t, out vec2 uv) {
+    if (!WATERTIGHT) return intersect_moller_trumbore(origin, direction, v0, v1, v2, tmin, tmax, t, uv);
+    return intersect_watertight(shear, origin, direction, v0, v1, v2, tmin, tmax, t, uv);
 }
 
 #endif

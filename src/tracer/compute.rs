@@ -1,12 +1,13 @@
 //! What the compute tracer walks: a hierarchy per group and one over the placed groups, all in one node array. Here is the fast
-//! kernel's; the readable kernels' are in `reference.rs`.
+//! kernel's and what all share; the readable kernel's is in `reference.rs`, and `brute.rs` has none.
 
 use std::sync::Arc;
 
 use glam::Vec3;
 
-use super::reference;
+use super::kernel::Kernel;
 use super::stream::LAUNCH_RAYS;
+use super::{brute, reference};
 use crate::bvh::build::MAX_DEPTH;
 use crate::bvh::{Aabb, BuildPreset, Cwbvh, bvh2, cwbvh};
 use crate::error::{Error, Result};
@@ -19,17 +20,6 @@ pub const RAYS_PER_LANE_CPU: u32 = 8;
 /// On a GPU enough rays fill the machine; long loops per lane only lengthen the tail.
 pub const RAYS_PER_LANE_GPU: u32 = 2;
 
-/// Which kernel traces.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Kernel {
-    /// Eight-wide quantised nodes, lanes that refill: `shaders/trace/wide.glsl`.
-    #[default]
-    Wide,
-    /// The readable one: binary nodes, one ray a lane: `shaders/trace/reference.glsl`.
-    Reference,
-}
-
 /// Bytes of a primitive record.
 pub(super) const PRIMITIVE_BYTES: u64 = 40;
 const ALPHA_TESTED: u32 = 0x8000_0000;
@@ -37,10 +27,11 @@ const SPHERE: u32 = 0x4000_0000;
 /// Bytes of a closest hit between the steps of a launch.
 const HIT_BYTES: u64 = 24;
 
-/// Hierarchies on the host, of one kernel or the other.
+/// Hierarchies on the host.
 pub(super) enum Trees {
     Wide(WideTrees),
-    Reference(reference::Trees),
+    Binary(reference::Trees, Kernel),
+    None,
 }
 
 /// Those of the fast kernel.
@@ -99,14 +90,19 @@ impl Trees {
         }
         Ok(match kernel {
             Kernel::Wide => Trees::Wide(WideTrees::build(flat)),
-            Kernel::Reference => Trees::Reference(reference::Trees::build(flat)),
+            Kernel::Nearest | Kernel::Direction => Trees::Binary(reference::Trees::build(flat), kernel),
+            Kernel::Brute => {
+                brute::check(flat)?;
+                Trees::None
+            }
         })
     }
 
     pub fn upload(self, device: &Arc<Device>, flat: &FlatScene) -> Result<Hierarchy> {
         match self {
             Trees::Wide(trees) => trees.upload(device, flat),
-            Trees::Reference(trees) => trees.upload(device, flat),
+            Trees::Binary(trees, kernel) => trees.upload(device, flat, kernel),
+            Trees::None => brute::upload(device, flat),
         }
     }
 }
