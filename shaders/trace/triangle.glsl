@@ -2,6 +2,10 @@
 #ifndef TRACE_TRIANGLE
 #define TRACE_TRIANGLE
 
+// For benchmarks the host can choose the other test, to show what watertightness costs and what it is worth
+// (docs/traversal.md).
+layout(constant_id = 6) const bool WATERTIGHT = true;
+
 // The ray's frame: z is the axis along which the direction is longest, and the shear that makes the ray the z axis.
 struct Shear {
     uint axis;
@@ -155,6 +159,22 @@ bool meets_between(Shear shear, vec3 origin, vec3 direction, vec3 v0, vec3 v1, v
     return met;
 }
 
+// Moeller, Trumbore, "Fast, Minimum Storage Ray/Triangle Intersection" (JGT 1997), double-sided. Each triangle rounds the shared
+// edge in its own way, so rays slip between neighbours; and t is as rounding leaves it.
+bool intersect_moller_trumbore(vec3 origin, vec3 direction, vec3 v0, vec3 v1, vec3 v2, float tmin, float tmax, out float t, out vec2 uv) {
+    vec3 e1 = v1 - v0, e2 = v2 - v0;
+    vec3 p = cross(direction, e2);
+    float det = dot(e1, p);
+    // as above: no denormals from lanes that hold no triangle
+    bool plausible = abs(det) > 1e-37 && abs(det) < 1e37;
+    float inverse_det = 1.0 / (plausible ? det : 1.0);
+    vec3 s = origin - v0;
+    vec3 q = cross(s, e1);
+    uv = vec2(dot(s, p), dot(direction, q)) * inverse_det;
+    t = dot(e2, q) * inverse_det;
+    return plausible && uv.x >= 0.0 && uv.y >= 0.0 && uv.x + uv.y <= 1.0 && t > tmin && t < tmax;
+}
+
 // Why no ray slips between two triangles that share an edge: a corner's sheared position depends on the corner and the ray
 // alone, so both triangles see the same numbers; and the sign of fl(a*b) - fl(c*d) is never wrong, at worst zero, because
 // rounding is monotonic. Zero counts as inside. `precise` keeps the compiler from fusing a product into the difference,
@@ -166,6 +186,7 @@ bool intersect_triangle(Shear shear, vec3 origin, vec3 direction, vec3 v0, vec3 
     bool met = false;
     t = tmax;
     uv = vec2(0.0);
+    if (!WATERTIGHT) return intersect_moller_trumbore(origin, direction, v0, v1, v2, tmin, tmax, t, uv);
     if (is_inside(u, v, w)) {
         float inverse_det;
         met = meets_between(shear, origin, direction, v0, v1, v2, a, b, c, u, v, w, tmin, tmax, t, inverse_det);

@@ -99,22 +99,37 @@ Ray take_ray(SceneRoot root, uint k) {
     best_primitive = id & NUMBER;
 #endif
 
-// One triangle of a pair: corners named a, b, c with edge functions eu, ev, ew.
+// A triangle is met at `t` with barycentric `weights`: unless its alpha says otherwise, take it.
+#define OFFER(turn)                                                                                                  \
+    vec2 uv = vec2(pick_weight(weights, (turn)), pick_weight(weights, (turn) >> 2));                                 \
+    bool met = true;                                                                                                 \
+    if (HAS_ALPHA) {                                                                                                 \
+        if ((id & ALPHA_TESTED) != 0u) met = alpha_passes(instance, id & NUMBER, uv);                                \
+    }                                                                                                                \
+    if (met) {                                                                                                       \
+        ACCEPT                                                                                                       \
+    }
+
+// One triangle of a pair: its number, the places of its second and third corner, corners as they lie and as the ray sees them, edges.
 #define TEST_TRIANGLE(id_, turn, v0_, v1_, v2_, a, b, c, eu, ev, ew)                                                     \
     {                                                                                                                    \
         uint id = (id_);                                                                                                 \
         float t, inverse_det;                                                                                            \
         if (meets_between(shear, origin, direction, v0_, v1_, v2_, a, b, c, eu, ev, ew, world.tmin, best, t, inverse_det)) { \
             vec3 weights = vec3(eu, ev, ew) * inverse_det;                                                               \
-            vec2 uv = vec2(pick_weight(weights, (turn)), pick_weight(weights, (turn) >> 2));                             \
-            bool met = true;                                                                                             \
-            if (HAS_ALPHA) {                                                                                             \
-                if ((id & ALPHA_TESTED) != 0u) met = alpha_passes(instance, id & NUMBER, uv);                            \
-            }                                                                                                            \
-            if (met) {                                                                                                   \
-                ACCEPT                                                                                                   \
-            }                                                                                                            \
+            OFFER(turn)                                                                                                  \
         }                                                                                                                \
+    }
+
+#define TEST_MOLLER_TRUMBORE(id_, turn, v0_, v1_, v2_)                                                      \
+    {                                                                                                       \
+        uint id = (id_);                                                                                    \
+        float t;                                                                                            \
+        vec2 vw;                                                                                            \
+        if (intersect_moller_trumbore(origin, direction, v0_, v1_, v2_, world.tmin, best, t, vw)) {         \
+            vec3 weights = vec3(1.0 - vw.x - vw.y, vw);                                                     \
+            OFFER(turn)                                                                                     \
+        }                                                                                                   \
     }
 
 #define TEST_SPHERE(id_, center, radius)                                                             \
@@ -224,6 +239,11 @@ void main() {
                 Corner c = make_corner(shear, origin, v2), d = make_corner(shear, origin, v3);
                 float ab = edge(b, a), bc = edge(c, b), ca = edge(a, c), cd = edge(d, c), da = edge(a, d);
                 bool first = is_inside(bc, ca, ab), second = is_inside(cd, da, -ca) && w6.y != INVALID;
+                if (!WATERTIGHT) {
+                    TEST_MOLLER_TRUMBORE(w6.x, w7.x, v0, v1, v2)
+                    if (w6.y != INVALID) TEST_MOLLER_TRUMBORE(w6.y, w7.x >> 4, v0, v2, v3)
+                    first = second = false;
+                }
                 if (first) TEST_TRIANGLE(w6.x, w7.x, v0, v1, v2, a, b, c, bc, ca, ab)
                 if (second) TEST_TRIANGLE(w6.y, w7.x >> 4, v0, v2, v3, a, c, d, cd, da, -ca)
             }

@@ -1,11 +1,12 @@
 //! What the compute tracer walks: a hierarchy per group and one over the placed groups, all in one node array. Here is the fast
-//! kernel's; the readable kernels' are in `reference.rs`.
+//! kernel's and what all share; the readable kernel's is in `reference.rs`, and `brute.rs` has none.
 
 use std::sync::Arc;
 
 use glam::Vec3;
 
-use super::{reference, wide};
+use super::kernel::Kernel;
+use super::{brute, reference, wide};
 use crate::bvh::{Aabb, bvh2};
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, Device, Memory};
@@ -16,17 +17,6 @@ pub const RAYS_PER_LANE_CPU: u32 = 16;
 /// On a GPU enough rays fill the machine; long loops per lane only lengthen the tail.
 pub const RAYS_PER_LANE_GPU: u32 = 2;
 
-/// Which kernel traces.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Kernel {
-    /// Wide nodes with quantised boxes, lanes that refill: `shaders/trace/wide.glsl`.
-    #[default]
-    Wide,
-    /// The readable one: binary nodes, one ray a lane: `shaders/trace/reference.glsl`.
-    Reference,
-}
-
 /// Bytes of a primitive record.
 pub(super) const PRIMITIVE_BYTES: u64 = 40;
 pub(super) const ALPHA_TESTED: u32 = 0x8000_0000;
@@ -34,10 +24,11 @@ pub(super) const SPHERE: u32 = 0x4000_0000;
 /// Bytes of a closest hit between the steps of a launch.
 pub(super) const HIT_BYTES: u64 = 24;
 
-/// Hierarchies on the host, of one kernel or the other.
+/// Hierarchies on the host.
 pub(super) enum Trees {
     Wide(wide::Trees),
-    Reference(reference::Trees),
+    Binary(reference::Trees, Kernel),
+    None,
 }
 
 /// Hierarchies in device memory.
@@ -79,7 +70,7 @@ impl Hierarchy {
     pub fn stack_constant(&self) -> u32 {
         match self.kernel {
             Kernel::Wide => self.stack_entries.saturating_sub(wide::STACK_IN_REGISTERS),
-            Kernel::Reference => self.stack_entries.max(1),
+            _ => self.stack_entries.max(1),
         }
     }
 
@@ -100,14 +91,19 @@ impl Trees {
         }
         Ok(match kernel {
             Kernel::Wide => Trees::Wide(wide::Trees::build(flat)),
-            Kernel::Reference => Trees::Reference(reference::Trees::build(flat)),
+            Kernel::Nearest | Kernel::Direction => Trees::Binary(reference::Trees::build(flat), kernel),
+            Kernel::Brute => {
+                brute::check(flat)?;
+                Trees::None
+            }
         })
     }
 
     pub fn upload(self, device: &Arc<Device>, flat: &FlatScene) -> Result<Hierarchy> {
         match self {
             Trees::Wide(trees) => trees.upload(device, flat),
-            Trees::Reference(trees) => trees.upload(device, flat),
+            Trees::Binary(trees, kernel) => trees.upload(device, flat, kernel),
+            Trees::None => brute::upload(device, flat),
         }
     }
 }

@@ -4,8 +4,9 @@
 use std::sync::Arc;
 
 use super::compute::{
-    Hierarchy, Kernel, PRIMITIVE_BYTES, padding, placement_boxes, primitive_boxes, record, unfinished_counter, write_records,
+    Hierarchy, PRIMITIVE_BYTES, padding, placement_boxes, primitive_boxes, record, unfinished_counter, write_records,
 };
+use super::kernel::Kernel;
 use crate::bvh::build::MAX_DEPTH;
 use crate::bvh::{Aabb, BuildPreset, Bvh2, bvh2};
 use crate::error::Result;
@@ -40,7 +41,7 @@ impl Trees {
         Self { groups, top, bounds: bounds.into_iter().fold(Aabb::EMPTY, Aabb::union) }
     }
 
-    pub fn upload(self, device: &Arc<Device>, flat: &FlatScene) -> Result<Hierarchy> {
+    pub fn upload(self, device: &Arc<Device>, flat: &FlatScene, kernel: Kernel) -> Result<Hierarchy> {
         let group_depth = self.groups.iter().map(|g| g.depth).max().unwrap_or(0);
         // every node visit pushes at most one entry, entering an entry of the top level the way back
         let stack_entries = self.top.as_ref().map_or(0, |top| top.depth + 1) + group_depth;
@@ -74,7 +75,7 @@ impl Trees {
             .flat_map(|(t, group)| t.primitives.iter().map(move |&p| record(flat, group, p)));
         let primitives = write_records(device, "hierarchy primitives", PRIMITIVE_BYTES, primitive as u64, &mut records)?;
         Ok(Hierarchy {
-            kernel: Kernel::Reference,
+            kernel,
             nodes,
             primitives,
             root,

@@ -15,10 +15,10 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::compute::{
-    ALPHA_TESTED, HIT_BYTES, Hierarchy, Kernel, SPHERE, padding, placement_boxes, primitive_boxes, unfinished_counter,
-    write_records,
+    ALPHA_TESTED, HIT_BYTES, Hierarchy, SPHERE, padding, placement_boxes, primitive_boxes, unfinished_counter, write_records,
 };
 use super::gpu_scene::rows;
+use super::kernel::Kernel;
 use super::stream::LAUNCH_RAYS;
 use crate::bvh::build::{self, MAX_DEPTH};
 use crate::bvh::pairs::{self, Fan, Pair};
