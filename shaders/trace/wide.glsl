@@ -36,9 +36,9 @@ const uint ROOT_GROUP = 0x80000000u;
     negative = lessThan(inverse, vec3(0.0));                                                                   \
     octant = (7u - ((negative.x ? 4u : 0u) | (negative.y ? 2u : 0u) | (negative.z ? 1u : 0u))) * 0x01010101u;
 
-Ray take_ray(SceneRoot root, uint k) {
-    vec2 a = uintBitsToFloat(LOAD_PAIR(root.launch_rays, 4u * k)), b = uintBitsToFloat(LOAD_PAIR(root.launch_rays, 4u * k + 1u));
-    vec2 c = uintBitsToFloat(LOAD_PAIR(root.launch_rays, 4u * k + 2u)), d = uintBitsToFloat(LOAD_PAIR(root.launch_rays, 4u * k + 3u));
+Ray take_ray(uint k) {
+    vec2 a = uintBitsToFloat(LOAD_PAIR(push.rays, 4u * k)), b = uintBitsToFloat(LOAD_PAIR(push.rays, 4u * k + 1u));
+    vec2 c = uintBitsToFloat(LOAD_PAIR(push.rays, 4u * k + 2u)), d = uintBitsToFloat(LOAD_PAIR(push.rays, 4u * k + 3u));
     return Ray(vec3(a, b.x), b.y, vec3(c, d.x), d.y);
 }
 
@@ -52,7 +52,7 @@ Ray take_ray(SceneRoot root, uint k) {
 #define NEXT_RAY                              \
     while (true) {                            \
         if (index >= end) return;             \
-        world = take_ray(root, index);        \
+        world = take_ray(index);        \
         if (is_ray(world)) break;             \
         STORE_MISS                            \
         index += LANES;                       \
@@ -77,7 +77,7 @@ bool intersect_record(uint id, vec3 a, vec3 b, vec3 c, Shear shear, vec3 origin,
 
 void main() {
     uint index = gl_WorkGroupID.x * (LANES * RAYS_PER_LANE) + gl_LocalInvocationID.x;
-    uint end = min((gl_WorkGroupID.x + 1u) * (LANES * RAYS_PER_LANE), push.count);
+    uint end = min((gl_WorkGroupID.x + 1u) * (LANES * RAYS_PER_LANE), ray_count());
     if (index >= end) return;
 
     SceneRoot root = SceneRoot(push.scene);

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use glam::Vec3;
 
-use super::stream::LAUNCH_RAYS;
+use super::stream::{LAUNCH_RAYS, LaunchMemory};
 use crate::bvh::build::MAX_DEPTH;
 use crate::bvh::{Aabb, BuildPreset, Bvh2, Cwbvh, bvh2, cwbvh};
 use crate::error::{Error, Result};
@@ -36,7 +36,7 @@ const SPHERE: u32 = 0x4000_0000;
 /// Primitives of a leaf of the binary tree at most: more cost memory accesses, fewer cost nodes.
 const REFERENCE_LEAF: u32 = 4;
 /// Bytes of a closest hit between the steps of a launch.
-const HIT_BYTES: u64 = 24;
+pub(super) const HIT_BYTES: u64 = 24;
 
 /// A tree of one kernel or the other.
 enum Tree {
@@ -65,8 +65,8 @@ pub(super) struct Hierarchy {
     /// A u32: rays whose traversal the driver cut short.
     pub unfinished: Buffer,
     /// Between the steps of a launch (fast kernel only).
-    pub launch_rays: Option<Buffer>,
-    pub launch_hits: Option<Buffer>,
+    pub launch_rays: Option<Arc<Buffer>>,
+    pub launch_hits: Option<Arc<Buffer>>,
 }
 
 impl Hierarchy {
@@ -80,6 +80,14 @@ impl Hierarchy {
                 "the driver cut the traversal of {n} rays short (Mesa before 23 leaves a loop after 65,535 turns; the scene has \
                  very many surfaces in one place): use a newer driver, or --tracer pipeline"
             ))),
+        }
+    }
+
+    /// Between the steps of a launch of the fast kernel.
+    pub fn launch_memory(&self) -> Result<LaunchMemory> {
+        match (&self.launch_rays, &self.launch_hits) {
+            (Some(rays), Some(hits)) => Ok(LaunchMemory { rays: rays.clone(), hits: hits.clone() }),
+            _ => Err(Error::Vulkan("the reference kernel has no steps".into())),
         }
     }
 
@@ -253,7 +261,7 @@ impl Trees {
             &mut top_records.chain(group_records).chain([[0u32; 10]]),
         )?;
         let launch = |name, bytes| match kernel {
-            Kernel::Wide => Buffer::new(device, name, bytes * LAUNCH_RAYS as u64, Memory::Device).map(Some),
+            Kernel::Wide => Buffer::new(device, name, bytes * LAUNCH_RAYS as u64, Memory::Device).map(|b| Some(Arc::new(b))),
             Kernel::Reference => Ok(None),
         };
         let (launch_rays, launch_hits) = (launch("launch rays", size_of::<Ray>() as u64)?, launch("launch hits", HIT_BYTES)?);

@@ -33,7 +33,7 @@ struct SceneRoot {
     nodes: u64,
     primitives: u64,
     top_level: u64,
-    launch_rays: u64,
+    reserved1: u64,
     launch_hits: u64,
     root: u32,
     reserved: u32,
@@ -227,8 +227,7 @@ impl GpuScene {
         self.root.unfinished = h.unfinished.address();
         self.root.bounds_min = h.bounds.min.extend(0.0).to_array();
         self.root.bounds_max = h.bounds.max.extend(0.0).to_array();
-        self.root.launch_rays = h.launch_rays.as_ref().map_or(0, Buffer::address);
-        self.root.launch_hits = h.launch_hits.as_ref().map_or(0, Buffer::address);
+        self.root.launch_hits = h.launch_hits.as_ref().map_or(0, |b| b.address());
         write_all(&mut self.root_buffer, &[self.root])
     }
 

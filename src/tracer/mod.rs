@@ -7,6 +7,7 @@
 mod compute;
 pub mod gpu_scene;
 mod hardware;
+pub mod queue;
 pub mod stream;
 
 use std::sync::{Arc, OnceLock};
@@ -219,7 +220,8 @@ impl Tracer {
                     return Stream::reference(&self.device, shaders, &specialization);
                 }
                 let kernel = self.kernel(shaders.mode(), &specialization)?;
-                Stream::steps(&self.device, shaders, &specialization, kernel, rays_per_lane)
+                let memory = h.launch_memory()?;
+                Stream::steps(&self.device, shaders, &specialization, kernel, rays_per_lane, memory)
             }
             Structure::Hardware { .. } if self.kind == TracerKind::Query => {
                 Stream::query(&self.device, shaders, &specialization)
