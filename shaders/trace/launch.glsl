@@ -2,6 +2,7 @@
 #ifndef TRACE_LAUNCH
 #define TRACE_LAUNCH
 #include "scene/scene.glsl"
+#include "trace/records.glsl"
 
 layout(buffer_reference, std430, buffer_reference_align = 8) buffer LaunchHits { uvec2 v[]; };
 layout(buffer_reference, std430, buffer_reference_align = 4) buffer LaunchFlags { uint v[]; };
@@ -47,11 +48,11 @@ void store_closest(SceneRoot root, uint k, float t, uint instance, uint primitiv
 }
 
 Hit load_closest(SceneRoot root, uint k) {
-    LaunchHits hits = LaunchHits(root.launch_hits);
-    uvec2 a = hits.v[3u * k];
+    uvec2 a = LOAD_PAIR(root.launch_hits, 3u * k);
     if (uintBitsToFloat(a.x) == INFINITY) return miss();
-    uvec2 b = hits.v[3u * k + 1u];
-    return scene_hit(uintBitsToFloat(a.x), a.y, b.x, uintBitsToFloat(uvec2(b.y, hits.v[3u * k + 2u].x)));
+    uvec2 b = LOAD_PAIR(root.launch_hits, 3u * k + 1u);
+    uvec2 c = LOAD_PAIR(root.launch_hits, 3u * k + 2u);
+    return scene_hit(uintBitsToFloat(a.x), a.y, b.x, uintBitsToFloat(uvec2(b.y, c.x)));
 }
 
 #endif

@@ -33,7 +33,8 @@ struct SceneRoot {
     nodes: u64,
     primitives: u64,
     top_level: u64,
-    reserved1: u64,
+    part_count: u32,
+    reserved1: u32,
     launch_hits: u64,
     root: u32,
     reserved: u32,
@@ -194,6 +195,7 @@ impl GpuScene {
             address
         };
         let mut root = SceneRoot { instances: instance_buffer.address(), ..Default::default() };
+        root.part_count = parts.len() as u32;
         root.parts = keep(Buffer::from_slice(device, "part records", &parts)?);
         root.placements = keep(Buffer::from_slice(device, "placements", &placements)?);
         root.materials = keep(Buffer::from_slice(device, "material records", &materials)?);
