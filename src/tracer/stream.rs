@@ -118,10 +118,9 @@ impl Stream {
         rays_per_lane: u32,
         memory: LaunchMemory,
     ) -> Result<Self> {
-        let [generate, deliver] = match device.info.int64 {
-            true => [shaders.generate_64, shaders.deliver_64],
-            false => [shaders.generate, shaders.deliver],
-        };
+        let int64 = device.info.int64;
+        let generate = if int64 { shaders.generate_64 } else { shaders.generate };
+        let deliver = if int64 && device.info.limits.subgroup_ballot { shaders.deliver_64 } else { shaders.deliver };
         let pipeline = Pipeline::Steps {
             generate: match shaders.queue {
                 true => None,
