@@ -19,7 +19,7 @@ use super::compute::{
 };
 use super::gpu_scene::rows;
 use super::kernel::Kernel;
-use super::stream::LAUNCH_RAYS;
+use super::stream::{LAUNCH_RAYS, LaunchMemory};
 use crate::bvh::build::{self, MAX_DEPTH};
 use crate::bvh::pairs::{self, Fan, Pair};
 use crate::bvh::wide::{self, BLOCK_BYTES, Block, Wide};
@@ -86,7 +86,7 @@ impl Trees {
             count as u64,
             &mut trees.flat_map(|(t, by)| t.blocks.iter().map(move |b| wide::rebased(*b, by))),
         )?;
-        let launch = |name, bytes| Buffer::new(device, name, bytes * LAUNCH_RAYS as u64, Memory::Device).map(Some);
+        let launch = |name, bytes| Buffer::new(device, name, bytes * LAUNCH_RAYS as u64, Memory::Device).map(Arc::new);
         Ok(Hierarchy {
             kernel: Kernel::Wide,
             primitives: Buffer::new(device, "no primitives", 16, Memory::Device)?,
@@ -97,9 +97,11 @@ impl Trees {
             stack_entries,
             bounds,
             unfinished: unfinished_counter(device)?,
-            launch_rays: launch("launch rays", size_of::<Ray>() as u64)?,
-            launch_hits: launch("launch hits", HIT_BYTES)?,
-            launch_counters: launch("launch counters", 4)?,
+            launch: Some(LaunchMemory {
+                rays: launch("launch rays", size_of::<Ray>() as u64)?,
+                hits: launch("launch hits", HIT_BYTES)?,
+                counters: launch("launch counters", 4)?,
+            }),
         })
     }
 }
