@@ -38,7 +38,7 @@ fn ray_set(oracle: &Oracle, scene: &Scene, total: usize) -> Vec<Ray> {
 }
 
 /// The compute tracer's kernels that a scene of any size can be sent through.
-const TREES: [Kernel; 3] = [Kernel::Wide, Kernel::Nearest, Kernel::Direction];
+const TREES: [Kernel; 4] = [Kernel::Wide, Kernel::Packet, Kernel::Nearest, Kernel::Direction];
 
 fn gate(device: &Arc<Device>, name: &str, scene: &Scene, total: usize) {
     // each kernel of the compute tracer is judged as a tracer of its own

@@ -50,8 +50,12 @@ impl TracerChoice {
 /// How the compute tracer finds what a ray meets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Traversal {
-    /// Eight-wide nodes, children in the order of the ray's octant: the fast one
+    /// `packet` for coherent rays where the device can, else `wide`
+    Auto,
+    /// Seven-wide nodes, each ray by itself
     Wide,
+    /// Seven-wide nodes, the rays of a subgroup together
+    Packet,
     /// Binary nodes, the nearest child first
     Nearest,
     /// Binary nodes, children in the order of the ray's direction on the split axis
@@ -63,7 +67,9 @@ pub enum Traversal {
 impl From<Traversal> for Kernel {
     fn from(t: Traversal) -> Self {
         match t {
+            Traversal::Auto => Kernel::Auto,
             Traversal::Wide => Kernel::Wide,
+            Traversal::Packet => Kernel::Packet,
             Traversal::Nearest => Kernel::Nearest,
             Traversal::Direction => Kernel::Direction,
             Traversal::Brute => Kernel::Brute,

@@ -6,6 +6,7 @@ mod buffer;
 mod cache;
 mod commands;
 mod device;
+pub mod environment;
 mod info;
 mod instance;
 mod pipeline;

@@ -242,8 +242,13 @@ impl Tracer {
                     .set(4, rays_per_lane)
                     .set(5, u32::from(h.kernel == Kernel::Direction))
                     .set(6, u32::from(self.triangle_test == TriangleTest::Watertight));
+                let packets = shaders.has_packets() && self.device.info.limits.packets && self.device.info.int64;
                 match h.kernel {
-                    Kernel::Wide => {
+                    Kernel::Packet | Kernel::Auto if packets && (h.kernel == Kernel::Packet || shaders.is_coherent()) => {
+                        let lanes = self.device.info.limits.subgroup_size;
+                        Stream::packets(&self.device, shaders, &specialization.set(7, lanes))
+                    }
+                    Kernel::Auto | Kernel::Wide | Kernel::Packet => {
                         let kernel = self.kernel(shaders.mode(), &specialization)?;
                         Stream::steps(&self.device, shaders, &specialization, kernel, rays_per_lane, h.launch_memory()?)
                     }

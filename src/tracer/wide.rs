@@ -57,7 +57,7 @@ impl Trees {
         Self { groups, top }
     }
 
-    pub fn upload(mut self, device: &Arc<Device>, flat: &FlatScene) -> Result<Hierarchy> {
+    pub fn upload(mut self, device: &Arc<Device>, flat: &FlatScene, kernel: Kernel) -> Result<Hierarchy> {
         let bounds = self.top.as_ref().or(self.groups.first()).and_then(|t| t.bounds).unwrap_or(Aabb::EMPTY);
         let group_depth = self.groups.iter().map(|g| g.depth).max().unwrap_or(0);
         // Every node visit pushes at most one entry. Entering an entry of the top level pushes its siblings and the way back.
@@ -88,7 +88,7 @@ impl Trees {
         )?;
         let launch = |name, bytes| Buffer::new(device, name, bytes * LAUNCH_RAYS as u64, Memory::Device).map(Arc::new);
         Ok(Hierarchy {
-            kernel: Kernel::Wide,
+            kernel,
             primitives: Buffer::new(device, "no primitives", 16, Memory::Device)?,
             nodes,
             // an empty scene has no tree, and rays that miss its bounds never begin
