@@ -56,12 +56,13 @@ const HEAD_64: &str = "#extension GL_EXT_shader_explicit_arithmetic_types_int64 
 const HEAD_64_BALLOT: &str = "#extension GL_EXT_shader_explicit_arithmetic_types_int64 : require\n#define LOAD64\n\
      #extension GL_KHR_shader_subgroup_ballot : require\n#define BALLOT\n";
 
-const VARIANTS: [Variant; 7] = [
+const VARIANTS: [Variant; 8] = [
     Variant { field: "generate", template: "trace/generate.glsl", head: "", kind: ShaderKind::Compute },
     Variant { field: "generate_64", template: "trace/generate.glsl", head: HEAD_64, kind: ShaderKind::Compute },
     Variant { field: "deliver", template: "trace/deliver.glsl", head: "", kind: ShaderKind::Compute },
     Variant { field: "deliver_64", template: "trace/deliver.glsl", head: HEAD_64_BALLOT, kind: ShaderKind::Compute },
     Variant { field: "reference", template: "trace/reference.glsl", head: "", kind: ShaderKind::Compute },
+    Variant { field: "brute", template: "trace/brute.glsl", head: "", kind: ShaderKind::Compute },
     Variant {
         field: "query",
         template: "trace/query.glsl",

@@ -41,7 +41,7 @@ pub fn run(args: &RenderArgs, start: Instant) -> Result<()> {
     let camera = choose_camera(args, &scene, aspect)?;
     let flat = FlatScene::new(&scene);
     let record = CameraRecord::new(&camera, flat.origin, aspect);
-    let (kind, why) = args.device.tracer.on(&device.info);
+    let (kind, why, compute) = args.device.choose(&device.info)?;
     let mut options = AoOptions {
         size,
         spp: args.spp.or(scene.hints.spp).unwrap_or(DEFAULT_SPP).max(1),
@@ -55,7 +55,7 @@ pub fn run(args: &RenderArgs, start: Instant) -> Result<()> {
     };
     let needs =
         Needs { normals: options.hemisphere == Hemisphere::Shading || args.wants(Aov::Ns), albedo: args.wants(Aov::Albedo) };
-    let tracer = Tracer::new(&device, kind, &flat, needs)?;
+    let tracer = Tracer::with_options(&device, kind, &flat, needs, compute)?;
 
     // a dump of rays is a set to compare with: all of them
     if args.dump_rays.is_none() {
@@ -82,6 +82,7 @@ pub fn run(args: &RenderArgs, start: Instant) -> Result<()> {
         device: &device.info,
         tracer: kind,
         why,
+        compute: tracer.compute_options(),
         options: &options,
         spp: result.spp,
         stopped_early: result.stopped_early,

@@ -39,6 +39,8 @@ struct SceneRoot {
     root: u32,
     reserved: u32,
     unfinished: u64,
+    launch_counters: u64,
+    reserved2: u64,
     bounds_min: [f32; 4],
     bounds_max: [f32; 4],
 }
@@ -229,7 +231,8 @@ impl GpuScene {
         self.root.unfinished = h.unfinished.address();
         self.root.bounds_min = h.bounds.min.extend(0.0).to_array();
         self.root.bounds_max = h.bounds.max.extend(0.0).to_array();
-        self.root.launch_hits = h.launch_hits.as_ref().map_or(0, |b| b.address());
+        self.root.launch_hits = h.launch.as_ref().map_or(0, |l| l.hits.address());
+        self.root.launch_counters = h.launch.as_ref().map_or(0, |l| l.counters.address());
         write_all(&mut self.root_buffer, &[self.root])
     }
 

@@ -6,7 +6,7 @@ use bytemuck::{Pod, Zeroable};
 
 use super::compute::HIT_BYTES;
 use crate::error::Result;
-use crate::gpu::{Buffer, ComputePipeline, Device, HitShaders, RayTracingPipeline, Recorder, Specialization};
+use crate::gpu::{Buffer, ComputePipeline, Device, HitShaders, Memory, RayTracingPipeline, Recorder, Specialization};
 use crate::ray::Ray;
 use crate::scene::features::SceneFeatures;
 
@@ -35,6 +35,7 @@ pub struct StreamShaders {
     deliver: &'static [u8],
     deliver_64: &'static [u8],
     reference: &'static [u8],
+    brute: &'static [u8],
     query: &'static [u8],
     raygen: &'static [u8],
 }
@@ -81,7 +82,7 @@ enum Pipeline {
         trace: Arc<ComputePipeline>,
         deliver: ComputePipeline,
         rays_per_group: u32,
-        memory: LaunchMemory,
+        memory: Arc<LaunchMemory>,
         // bytes of a result
         record: u64,
     },
@@ -89,10 +90,22 @@ enum Pipeline {
 }
 
 /// Where a launch's rays and results are between its steps.
-#[derive(Clone)]
 pub(super) struct LaunchMemory {
-    pub rays: Arc<Buffer>,
-    pub hits: Arc<Buffer>,
+    pub rays: Buffer,
+    pub hits: Buffer,
+    /// A u32 per work-group: rays that its lanes have taken.
+    pub counters: Buffer,
+}
+
+impl LaunchMemory {
+    pub fn new(device: &Arc<Device>) -> Result<Self> {
+        let buffer = |name, bytes| Buffer::new(device, name, bytes * LAUNCH_RAYS as u64, Memory::Device);
+        Ok(Self {
+            rays: buffer("launch rays", size_of::<Ray>() as u64)?,
+            hits: buffer("launch hits", HIT_BYTES)?,
+            counters: Buffer::new(device, "launch counters", 4 * (LAUNCH_RAYS / LANES) as u64, Memory::Device)?,
+        })
+    }
 }
 
 /// A stream, ready to run.
@@ -116,7 +129,7 @@ impl Stream {
         s: &Specialization,
         trace: Arc<ComputePipeline>,
         rays_per_lane: u32,
-        memory: LaunchMemory,
+        memory: Arc<LaunchMemory>,
     ) -> Result<Self> {
         let int64 = device.info.int64;
         let generate = if int64 { shaders.generate_64 } else { shaders.generate };
@@ -136,8 +149,19 @@ impl Stream {
     }
 
     /// For the compute tracer's readable reference.
-    pub(super) fn reference(device: &Arc<Device>, shaders: &'static StreamShaders, s: &Specialization) -> Result<Self> {
+    pub(super) fn reference(
+        device: &Arc<Device>,
+        shaders: &'static StreamShaders,
+        s: &Specialization,
+        rays_per_lane: u32,
+    ) -> Result<Self> {
         let pipeline = ComputePipeline::new(device, shaders.name, shaders.reference, s)?;
+        Ok(Self { pipeline: Pipeline::Single { pipeline, rays_per_group: LANES * rays_per_lane }, shaders })
+    }
+
+    /// For the compute tracer without a hierarchy.
+    pub(super) fn brute(device: &Arc<Device>, shaders: &'static StreamShaders, s: &Specialization) -> Result<Self> {
+        let pipeline = ComputePipeline::new(device, shaders.name, shaders.brute, s)?;
         Ok(Self { pipeline: Pipeline::Single { pipeline, rays_per_group: LANES }, shaders })
     }
 
@@ -187,7 +211,9 @@ impl Stream {
                         }
                         None => {
                             push.rays += first as u64 * size_of::<Ray>() as u64;
+                            // what the first step does besides
                             recorder.fill(&memory.hits, record * push.count as u64, UNFINISHED);
+                            recorder.fill(&memory.counters, 4 * push.count.div_ceil(LANES) as u64, 0);
                         }
                     }
                     recorder.barrier();
