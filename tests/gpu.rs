@@ -26,7 +26,7 @@ use skylit::sampling::{AO_DIRECTION, CAMERA_FILM, Sampler, to_unit, warp};
 use skylit::scene::builtin::{Placement, analytic, by_name, shapes};
 use skylit::scene::flatten::FlatScene;
 use skylit::scene::{Camera, Filter, Geometry, Instance, Mesh, Projection, Scene, Texture, Wrap};
-use skylit::tracer::{Push, Tracer, stream};
+use skylit::tracer::{Kernel, Needs, Push, Tracer, TracerKind, stream};
 
 fn scene(name: &str) -> Scene {
     by_name(name).unwrap_or_else(|| panic!("no built-in scene {name}"))
@@ -353,6 +353,37 @@ fn gpu_film_does_not_depend_on_batches() {
             assert_eq!(whole.occlusion_rays, other.occlusion_rays, "{kind}");
         }
         assert!(whole.film.mean.iter().any(|m| *m > 0.0) && whole.occlusion_rays > 1000, "{kind}: nothing to see");
+    }
+    assert_validation_clean(&device);
+}
+
+/// Every kernel of the compute tracer stops where the queue of occlusion rays ends: what an earlier launch left there is not traced.
+#[test]
+fn gpu_kernels_heed_the_queues_end() {
+    let device = device();
+    // much background: the queue of one launch is longer than that of the next
+    let scene = scene("cornell-box");
+    let camera = &scene.cameras[0];
+    let far = Camera { camera_to_world: DAffine3::from_translation(DVec3::Z * 4.0) * camera.camera_to_world, ..camera.clone() };
+    let camera =
+        [camera.clone(), far].into_iter().max_by_key(|c| (c.camera_to_world.translation.z.abs() * 1e6) as i64).unwrap();
+    let flat = FlatScene::new(&scene);
+    let options = AoOptions { size: [96, 96], spp: 8, ..Default::default() };
+    let images: Vec<_> = [Kernel::Wide, Kernel::Nearest, Kernel::Direction, Kernel::Brute]
+        .into_iter()
+        .map(|kernel| {
+            let tracer = Tracer::with_options(&device, TracerKind::Compute, &flat, Needs::default(), kernel).unwrap();
+            (kernel, render(&tracer, &scene, &camera, &options))
+        })
+        .collect();
+    let (_, wide) = &images[0];
+    assert!(wide.occlusion_rays > 1000 && wide.skipped_rays > 1000, "{} {}", wide.occlusion_rays, wide.skipped_rays);
+    for (kernel, image) in &images {
+        let (count, greatest, _) = differences(&wide.film.mean, &image.film.mean, 1e-6);
+        println!("{kernel:?}: {} occlusion rays, {count} pixels differ, by {greatest} at most", image.occlusion_rays);
+        assert!(image.occlusion_rays.abs_diff(wide.occlusion_rays) <= 4, "{kernel:?}: {} rays", image.occlusion_rays);
+        // rounding turns a sample here and there
+        assert!(count <= 96 * 96 / 500, "{kernel:?}: {count} pixels differ");
     }
     assert_validation_clean(&device);
 }

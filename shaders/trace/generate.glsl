@@ -20,7 +20,6 @@ void main() {
     r.tmax = near <= far ? r.tmax : -1.0;
     store_ray(push.rays, k, r);
     mark_unfinished(root, k);
-    if (k % LANES == 0u) LaunchFlags(root.launch_counters).v[k / LANES] = 0u;
 }
 
 #endif

@@ -150,7 +150,6 @@ float pick_weight(vec3 w, uint k) {
 void main() {
     uint begin = gl_WorkGroupID.x * (LANES * RAYS_PER_LANE);
     uint end = min(begin + LANES * RAYS_PER_LANE, ray_count());
-    if (begin >= end) return;
     SceneRoot root = SceneRoot(push.scene);
     uint index;
     TAKE

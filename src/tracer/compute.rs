@@ -47,7 +47,7 @@ pub(super) struct Hierarchy {
     /// A u32: rays whose traversal the driver cut short.
     pub unfinished: Buffer,
     /// Between the steps of a launch (fast kernel only).
-    pub launch: Option<Arc<LaunchMemory>>,
+    pub launch: Option<LaunchMemory>,
 }
 
 impl Hierarchy {
@@ -65,8 +65,8 @@ impl Hierarchy {
     }
 
     /// Between the steps of a launch of the fast kernel.
-    pub fn launch_memory(&self) -> Result<Arc<LaunchMemory>> {
-        self.launch.clone().ok_or_else(|| Error::Vulkan("only the fast kernel has steps".into()))
+    pub fn launch_memory(&self) -> Result<LaunchMemory> {
+        self.launch.clone().ok_or_else(|| Error::Vulkan(format!("kernel '{}' has no steps", self.kernel)))
     }
 
     /// What the kernel's array is specialised to: the fast kernel holds the upper end of the stack in registers.

@@ -245,8 +245,7 @@ impl Tracer {
                 match h.kernel {
                     Kernel::Wide => {
                         let kernel = self.kernel(shaders.mode(), &specialization)?;
-                        let memory = h.launch_memory()?;
-                        Stream::steps(&self.device, shaders, &specialization, kernel, rays_per_lane, memory)
+                        Stream::steps(&self.device, shaders, &specialization, kernel, rays_per_lane, h.launch_memory()?)
                     }
                     Kernel::Nearest | Kernel::Direction => {
                         Stream::reference(&self.device, shaders, &specialization, rays_per_lane)

@@ -6,7 +6,7 @@ use bytemuck::{Pod, Zeroable};
 
 use super::compute::HIT_BYTES;
 use crate::error::Result;
-use crate::gpu::{Buffer, ComputePipeline, Device, HitShaders, Memory, RayTracingPipeline, Recorder, Specialization};
+use crate::gpu::{Buffer, ComputePipeline, Device, HitShaders, RayTracingPipeline, Recorder, Specialization};
 use crate::ray::Ray;
 use crate::scene::features::SceneFeatures;
 
@@ -82,7 +82,7 @@ enum Pipeline {
         trace: Arc<ComputePipeline>,
         deliver: ComputePipeline,
         rays_per_group: u32,
-        memory: Arc<LaunchMemory>,
+        memory: LaunchMemory,
         // bytes of a result
         record: u64,
     },
@@ -90,22 +90,12 @@ enum Pipeline {
 }
 
 /// Where a launch's rays and results are between its steps.
+#[derive(Clone)]
 pub(super) struct LaunchMemory {
-    pub rays: Buffer,
-    pub hits: Buffer,
+    pub rays: Arc<Buffer>,
+    pub hits: Arc<Buffer>,
     /// A u32 per work-group: rays that its lanes have taken.
-    pub counters: Buffer,
-}
-
-impl LaunchMemory {
-    pub fn new(device: &Arc<Device>) -> Result<Self> {
-        let buffer = |name, bytes| Buffer::new(device, name, bytes * LAUNCH_RAYS as u64, Memory::Device);
-        Ok(Self {
-            rays: buffer("launch rays", size_of::<Ray>() as u64)?,
-            hits: buffer("launch hits", HIT_BYTES)?,
-            counters: Buffer::new(device, "launch counters", 4 * (LAUNCH_RAYS / LANES) as u64, Memory::Device)?,
-        })
-    }
+    pub counters: Arc<Buffer>,
 }
 
 /// A stream, ready to run.
@@ -129,7 +119,7 @@ impl Stream {
         s: &Specialization,
         trace: Arc<ComputePipeline>,
         rays_per_lane: u32,
-        memory: Arc<LaunchMemory>,
+        memory: LaunchMemory,
     ) -> Result<Self> {
         let int64 = device.info.int64;
         let generate = if int64 { shaders.generate_64 } else { shaders.generate };
@@ -204,6 +194,8 @@ impl Stream {
                     let mut push = Push { first: push.first + first, count: LAUNCH_RAYS.min(push.count - first), ..*push };
                     // the steps hand rays and hits on in memory, and so does one launch to the next
                     recorder.barrier();
+                    let groups = push.count.div_ceil(*rays_per_group);
+                    recorder.fill(&memory.counters, 4 * groups as u64, 0);
                     match generate {
                         Some(generate) => {
                             push.rays = memory.rays.address();
@@ -211,13 +203,11 @@ impl Stream {
                         }
                         None => {
                             push.rays += first as u64 * size_of::<Ray>() as u64;
-                            // what the first step does besides
                             recorder.fill(&memory.hits, record * push.count as u64, UNFINISHED);
-                            recorder.fill(&memory.counters, 4 * push.count.div_ceil(LANES) as u64, 0);
                         }
                     }
                     recorder.barrier();
-                    recorder.timed(tracing, |r| r.dispatch(trace, &push, push.count.div_ceil(*rays_per_group)));
+                    recorder.timed(tracing, |r| r.dispatch(trace, &push, groups));
                     recorder.barrier();
                     recorder.timed(delivering, |r| r.dispatch(deliver, &push, push.count.div_ceil(LANES)));
                 }

@@ -15,17 +15,18 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::compute::{
-    ALPHA_TESTED, Hierarchy, SPHERE, padding, placement_boxes, primitive_boxes, unfinished_counter, write_records,
+    ALPHA_TESTED, HIT_BYTES, Hierarchy, SPHERE, padding, placement_boxes, primitive_boxes, unfinished_counter, write_records,
 };
 use super::gpu_scene::rows;
 use super::kernel::Kernel;
-use super::stream::LaunchMemory;
+use super::stream::{LAUNCH_RAYS, LaunchMemory};
 use crate::bvh::build::{self, MAX_DEPTH};
 use crate::bvh::pairs::{self, Fan, Pair};
 use crate::bvh::wide::{self, BLOCK_BYTES, Block, Wide};
 use crate::bvh::{Aabb, BuildPreset, bvh2};
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, Device, Memory};
+use crate::ray::Ray;
 use crate::scene::Geometry;
 use crate::scene::flatten::{FlatScene, Group};
 
@@ -85,6 +86,7 @@ impl Trees {
             count as u64,
             &mut trees.flat_map(|(t, by)| t.blocks.iter().map(move |b| wide::rebased(*b, by))),
         )?;
+        let launch = |name, bytes| Buffer::new(device, name, bytes * LAUNCH_RAYS as u64, Memory::Device).map(Arc::new);
         Ok(Hierarchy {
             kernel: Kernel::Wide,
             primitives: Buffer::new(device, "no primitives", 16, Memory::Device)?,
@@ -95,7 +97,11 @@ impl Trees {
             stack_entries,
             bounds,
             unfinished: unfinished_counter(device)?,
-            launch: Some(Arc::new(LaunchMemory::new(device)?)),
+            launch: Some(LaunchMemory {
+                rays: launch("launch rays", size_of::<Ray>() as u64)?,
+                hits: launch("launch hits", HIT_BYTES)?,
+                counters: launch("launch counters", 4)?,
+            }),
         })
     }
 }
