@@ -54,7 +54,7 @@ impl Place {
     fn command(&self, args: &[&str]) -> Command {
         let mut command = Command::new(env!("CARGO_BIN_EXE_skylit"));
         command.args(["bench", "rays"]).args(args).stdin(Stdio::null()).env_remove("RUST_BACKTRACE");
-        command.args(["--peers", self.at("peers.toml").to_str().unwrap()]).env("XDG_CACHE_HOME", self.dir.path());
+        command.args(["--peers", self.at("peers.toml").to_str().unwrap()]);
         command
     }
 
@@ -110,7 +110,7 @@ fn wrong_usage() {
 #[test]
 fn a_broken_peers_file_is_named_with_its_line() {
     let place = Place::new(&format!("{}\n[[peer]]\nname = 3\n", Place::entry("a", "", "")));
-    fails(&place.run(&SMALL), 3, &["peers.toml: line 7: "]);
+    fails(&place.run(&SMALL), 3, &["peers.toml: line 8: "]);
     let nowhere = Command::new(env!("CARGO_BIN_EXE_skylit")).args(["bench", "rays", "--peers", "/nonexistent.toml"]).output();
     fails(&nowhere.unwrap(), 3, &["/nonexistent.toml", "no such file"]);
 }
@@ -247,7 +247,8 @@ fn gpu_wrong_answers_fail_the_check() {
         let ours = of("reference", stream);
         assert_eq!(ours["unexplained"], 0, "{ours}");
         assert_eq!(ours["agree"].as_u64().unwrap() + ours["ties"].as_u64().unwrap(), ours["rays"].as_u64().unwrap());
-        assert!(of("a k", stream)["unexplained"].as_u64().unwrap() > 0, "{stream}");
+        // the box has the light outside: that nothing sees it is right by chance
+        assert!(stream == "shadow-any" || of("a k", stream)["unexplained"].as_u64().unwrap() > 0, "{stream}");
     }
     let all = of("a k", "primary");
     assert_eq!(all["unexplained"], all["rays"]);

@@ -55,7 +55,8 @@ fn failed(why: impl std::fmt::Display) -> Error {
     Error::CheckFailed(format!("cannot draw the plot: {why}"))
 }
 
-/// Draws all results. Scenes of a family (`terrain:N`) are joined by lines, others are single marks. The dashed line falls as
+/// Draws all results. Scenes of a family (`terrain:N`) are joined by lines: circles for the first family, triangles for the
+/// second, crosses for others; scenes without a family are hollow circles. The dashed line falls as
 /// 1 / log n from the first point of the first contestant.
 ///
 /// # Errors
@@ -141,6 +142,13 @@ fn panel(benchmark: &RayBenchmark, stream: &str, contestants: &[&str], area: &Ar
         .bold_line_style(RGBColor(205, 205, 205))
         .draw()
         .map_err(failed)?;
+    // families in the order of the scenes: each has its mark
+    let mut families: Vec<&str> = Vec::new();
+    for name in benchmark.scenes.iter().filter_map(|s| family(&s.scene)) {
+        if !families.contains(&name) {
+            families.push(name);
+        }
+    }
     for (k, name) in contestants.iter().enumerate() {
         let mut groups: Vec<(Option<&str>, Vec<Mark>)> = Vec::new();
         for (scene, _, run) in here().filter(|(_, _, r)| r.contestant == *name) {
@@ -154,7 +162,8 @@ fn panel(benchmark: &RayBenchmark, stream: &str, contestants: &[&str], area: &Ar
         }
         for (of, mut points) in groups {
             points.sort_by(|a, b| a.size.total_cmp(&b.size));
-            draw_points(&mut chart, &points, color(k), of.is_some())?;
+            let index = of.and_then(|f| families.iter().position(|g| *g == f));
+            draw_points(&mut chart, &points, color(k), index)?;
             if k == 0 && points.len() > 1 {
                 draw_log_law(&mut chart, points[0], points[points.len() - 1].size)?;
             }
@@ -165,7 +174,7 @@ fn panel(benchmark: &RayBenchmark, stream: &str, contestants: &[&str], area: &Ar
 
 type Chart<'a, 'b> = ChartContext<'a, BitMapBackend<'b>, LogAxes>;
 
-fn draw_points(chart: &mut Chart, points: &[Mark], color: RGBColor, family: bool) -> Result<()> {
+fn draw_points(chart: &mut Chart, points: &[Mark], color: RGBColor, family: Option<usize>) -> Result<()> {
     if points.len() > 1 {
         let line = points.iter().map(|p| (p.size, p.rate));
         chart.draw_series(LineSeries::new(line, color.stroke_width(2))).map_err(failed)?;
@@ -173,8 +182,14 @@ fn draw_points(chart: &mut Chart, points: &[Mark], color: RGBColor, family: bool
     // from the slowest repeat to the fastest
     let spread = |p: &Mark| PathElement::new(vec![(p.size, p.min), (p.size, p.max)], color.stroke_width(1));
     chart.draw_series(points.iter().filter(|p| p.min > 0.0).map(spread)).map_err(failed)?;
-    let style = if family { color.filled() } else { color.stroke_width(2) };
-    chart.draw_series(points.iter().map(|p| Circle::new((p.size, p.rate), 4, style))).map_err(failed)?;
+    let at = |p: &Mark| (p.size, p.rate);
+    match family {
+        None => chart.draw_series(points.iter().map(|p| Circle::new(at(p), 4, color.stroke_width(2)))).map(drop),
+        Some(0) => chart.draw_series(points.iter().map(|p| Circle::new(at(p), 4, color.filled()))).map(drop),
+        Some(1) => chart.draw_series(points.iter().map(|p| TriangleMarker::new(at(p), 6, color.filled()))).map(drop),
+        Some(_) => chart.draw_series(points.iter().map(|p| Cross::new(at(p), 5, color.stroke_width(2)))).map(drop),
+    }
+    .map_err(failed)?;
     Ok(())
 }
 
