@@ -5,7 +5,7 @@
 use divan::Bencher;
 use divan::counter::ItemsCount;
 use glam::Vec3;
-use skylit::bvh::{Aabb, BuildPreset, Bvh2, Cwbvh};
+use skylit::bvh::{Aabb, BuildPreset, Bvh2, Wide, build};
 
 fn main() {
     divan::main();
@@ -30,8 +30,7 @@ fn wide(bencher: Bencher, n: usize) {
     let boxes = surface(n);
     bencher
         .counter(ItemsCount::new(n))
-        .with_inputs(|| boxes.clone())
-        .bench_values(|b| Cwbvh::build(b, 1e-3, BuildPreset::Default));
+        .bench(|| Wide::collapse(&build::tree(&boxes, BuildPreset::Default, None), |item| [item; 16]));
 }
 
 #[divan::bench(args = SIZES, sample_count = 5, sample_size = 1)]

@@ -33,7 +33,7 @@ impl obvhs::Boundable for Aabb {
 
 /// The tree of some boxes (at least one). `collapse`: leaves hold up to so many primitives, where that lowers the cost; else
 /// one each.
-pub(super) fn tree(boxes: &[Aabb], preset: BuildPreset, collapse: Option<u32>) -> Bvh2 {
+pub fn tree(boxes: &[Aabb], preset: BuildPreset, collapse: Option<u32>) -> Bvh2 {
     if !seems_to_repeat(boxes) {
         return limit_depth(distinct_tree(boxes, preset, collapse));
     }
