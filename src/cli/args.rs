@@ -463,7 +463,8 @@ fn parse_fov(text: &str) -> Parsed<f64> {
     parse_where(text, |v| (0.001..=179.0).contains(&v), "must be between 0.001 and 179 degrees")
 }
 
-fn parse_radius(text: &str) -> Parsed<f64> {
+/// A distance above 0, in world units.
+pub fn parse_radius(text: &str) -> Parsed<f64> {
     parse_where(text, |v| v > 0.0, "must be above 0 (`inf` for no limit)")
 }
 
@@ -471,7 +472,8 @@ fn parse_falloff(text: &str) -> Parsed<f64> {
     parse_where(text, |v| v >= 1.0 && v.is_finite(), "must be at least 1 (1 = binary) and finite")
 }
 
-fn parse_seconds(text: &str) -> Parsed<Duration> {
+/// A time above 0.
+pub fn parse_seconds(text: &str) -> Parsed<Duration> {
     parse_where(text, |v| v > 0.0 && v <= 1e9, "must be above 0 seconds").map(Duration::from_secs_f64)
 }
 

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use super::info::DeviceInfo;
 
 /// `$XDG_CACHE_HOME/skylit`, or `~/.cache/skylit`.
-pub(super) fn folder() -> Option<PathBuf> {
+pub fn folder() -> Option<PathBuf> {
     let base = std::env::var_os("XDG_CACHE_HOME").map(PathBuf::from).filter(|p| p.is_absolute());
     base.or_else(|| std::env::var_os("HOME").map(|h| PathBuf::from(h).join(".cache"))).map(|p| p.join("skylit"))
 }

@@ -14,6 +14,7 @@ mod result;
 
 pub use acceleration_structure::{AccelerationStructure, BottomLevelInput, TopLevelEntry};
 pub use buffer::{Buffer, Memory};
+pub use cache::folder as cache_folder;
 pub use commands::{Commands, Recorder, Timing};
 pub use device::{Device, Options};
 pub use info::{DeviceInfo, Limits, TracerNeeds, enumerate};

@@ -90,6 +90,8 @@ pub struct BuildStats {
     pub primitives: u64,
     /// Entries that the compute tracer's stack holds; 0 for the hardware tracers.
     pub stack_entries: u32,
+    /// Cost of the hierarchy by the surface area heuristic, for the tracers that know theirs.
+    pub sah_cost: Option<f64>,
 }
 
 impl BuildStats {
