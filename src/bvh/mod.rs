@@ -2,7 +2,11 @@
 
 pub mod build;
 pub mod bvh2;
+pub mod clip;
 pub mod cwbvh;
+mod reinsert;
+mod sah;
+mod spatial;
 
 pub use build::BuildPreset;
 pub use bvh2::Bvh2;
