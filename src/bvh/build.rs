@@ -124,7 +124,7 @@ pub fn validate(tree: &Bvh2, boxes: &[Aabb], triangles: Option<&dyn Triangles>) 
         }
         let first = node.first_index as usize;
         if !node.is_leaf() {
-            if first % 2 == 0 {
+            if first.is_multiple_of(2) {
                 return Err(format!("the children of node {at} are no pair"));
             }
             work.extend([(first, Some(b), depth + 1), (first + 1, Some(b), depth + 1)]);

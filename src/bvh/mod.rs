@@ -2,6 +2,7 @@
 
 pub mod build;
 pub mod bvh2;
+pub mod cache;
 pub mod clip;
 pub mod cwbvh;
 mod reinsert;

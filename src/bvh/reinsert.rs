@@ -28,7 +28,7 @@ fn union(a: [Vec4; 2], b: [Vec4; 2]) -> [Vec4; 2] {
 /// Siblings lie side by side, the left one at an odd number.
 #[inline(always)]
 fn sibling(node: u32) -> u32 {
-    (node + 1 ^ 1) - 1
+    ((node + 1) ^ 1) - 1
 }
 
 /// A subtree that would be cheaper as the sibling of another.
@@ -95,7 +95,8 @@ pub fn optimise(nodes: &mut [Bvh2Node], effort: Effort) {
             reinsert(nodes, &mut parents, m.from, m.to);
             saved += m.gain as f64;
         }
-        if !(saved > effort.worthwhile * total) {
+        // sums that overflowed are no reason to go on
+        if saved <= effort.worthwhile * total || !saved.is_finite() || !total.is_finite() {
             return;
         }
     }

@@ -255,10 +255,8 @@ pub(super) fn binned(items: &mut [Item], centres: Bounds) -> Option<usize> {
 fn partition(items: &mut [Item], left: impl Fn(&Item) -> bool) -> usize {
     let mut middle = 0;
     for k in 0..items.len() {
-        let item = items[k];
-        items[k] = items[middle];
-        items[middle] = item;
-        middle += left(&item) as usize;
+        items.swap(k, middle);
+        middle += left(&items[middle]) as usize;
     }
     middle
 }
