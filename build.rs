@@ -48,10 +48,11 @@ struct Variant {
     kind: ShaderKind,
 }
 
-const VARIANTS: [Variant; 5] = [
+const VARIANTS: [Variant; 6] = [
     Variant { field: "generate", template: "trace/generate.glsl", head: "", kind: ShaderKind::Compute },
     Variant { field: "deliver", template: "trace/deliver.glsl", head: "", kind: ShaderKind::Compute },
     Variant { field: "reference", template: "trace/reference.glsl", head: "", kind: ShaderKind::Compute },
+    Variant { field: "brute", template: "trace/brute.glsl", head: "", kind: ShaderKind::Compute },
     Variant {
         field: "query",
         template: "trace/query.glsl",

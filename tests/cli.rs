@@ -71,6 +71,8 @@ fn usage_errors() {
     fails(&render(&["--eye", "1,2", "--target", "0,0,0"]), 64, "X,Y,Z");
     fails(&render(&["--eye", "1,2,3", "--target", "1,2,3"]), 64, "same point");
     fails(&render(&["--aov", "depth,smell"]), 64, "smell");
+    fails(&render(&["--traversal", "backwards"]), 64, "wide, nearest, direction, brute");
+    fails(&render(&["--triangle-test", "none"]), 64, "watertight, moller-trumbore");
     fails(&["diff", "a.exr"], 64, "<B>");
     fails(&["export", "builtin:plane", "a.txt"], 64, ".bin, .glb or .gltf");
 }
@@ -199,6 +201,21 @@ fn gpu_render_end_to_end() {
     // each hit of a camera ray started one occlusion ray
     let occlusion = std::fs::metadata(format!("{rays}.ao.bin")).unwrap().len() / 32;
     assert_eq!(traced["hits"].as_u64(), Some(occlusion));
+
+    // every traversal gives the same image, and the record says which it was
+    for traversal in ["wide", "nearest", "direction", "brute"] {
+        let again = at("t.exr");
+        let record = json(&run(&[&base[..], &[&again], &["--traversal", traversal, "--explain", "--json"]].concat()));
+        assert_eq!((record["tracer"].as_str(), record["traversal"].as_str()), (Some("compute"), Some(traversal)));
+        assert_eq!(record["triangle_test"], "watertight");
+        let told = record["explain"].as_array().unwrap().iter().any(|l| l.as_str().unwrap().contains(traversal));
+        assert!(told, "{}", record["explain"]);
+        assert!((record["mean"].as_f64().unwrap() - mean).abs() < 1e-4, "{traversal}: {} is not {mean}", record["mean"]);
+    }
+    let other = ["--tracer", "pipeline", "--traversal", "nearest"];
+    fails(&[&base[..], &[&png], &other].concat(), 64, "--tracer compute");
+    let many = ["render", "builtin:spheres:50000", "--size", "8x8", "--traversal", "brute", "-o", &png];
+    fails(&many, 3, "use another --traversal");
 
     let missing = ["--camera", "nobody"];
     fails(&[&base[..], &[&png], &missing].concat(), 64, "no such camera");

@@ -20,6 +20,7 @@ void main() {
     r.tmax = near <= far ? r.tmax : -1.0;
     store_ray(root, k, r);
     mark_unfinished(root, k);
+    if (k % LANES == 0u) LaunchFlags(root.launch_counters).v[k / LANES] = 0u;
 }
 
 #endif

@@ -1,5 +1,8 @@
 // The compute tracer's readable reference: a two-level binary hierarchy, one ray per lane. It supplies main() around the
 // stream's ray(), closest() or any(). The fast kernel is wide.glsl.
+//
+// Two orders of the children, after Coello's study (2024; docs/traversal.md): the one whose box the ray enters first, or the one
+// that lies first along the sign of the ray's direction on the node's axis. Both prune by the nearest hit so far.
 #ifndef TRACE_REFERENCE
 #define TRACE_REFERENCE
 #include "scene/material.glsl"
@@ -14,14 +17,19 @@ layout(local_size_x = LANES) in;
 // top level + 1 + depth of the deepest group can never be exceeded. See src/bvh/bvh2.rs for the bound on the depth.
 layout(constant_id = 3) const uint STACK_SIZE = 64;
 layout(constant_id = 4) const uint RAYS_PER_LANE = 1;
+layout(constant_id = 5) const bool BY_DIRECTION = false;
 
-// References. A leaf holds count - 1 in bits 27-30 and its first primitive in bits 0-26; a leaf of the top level holds an
+// References. An inner node has its number in bits 0-26 and in bits 27-28 the axis along which its children lie apart, the
+// lower one first. A leaf holds count - 1 in bits 27-30 and its first primitive in bits 0-26; a leaf of the top level holds an
 // InstanceRecord.
 const uint LEAF = 0x80000000u;
 const uint FINISHED = 0x7fffffffu;
 const uint LEAVE_INSTANCE = 0x7ffffffeu;
 const uint NEXT = 0x7ffffffdu;
 const uint LAST_NODE = 0x7ffffff0u;
+const uint NODE_NUMBER = 0x07ffffffu;
+const uint AXIS_SHIFT = 27u;
+layout(buffer_reference, std430, buffer_reference_align = 4) buffer Counter { uint v; };
 #define LOAD_FLOATS(base, i) uintBitsToFloat(LOAD_PAIR(base, i))
 
 // Entry distance of a box, or INFINITY when it is missed.
@@ -45,6 +53,10 @@ void main() {
     uvec2 primitives = root.primitives;
     InstanceRecords instances = InstanceRecords(root.instances);
 
+    // Some CPU drivers leave any loop after 65,535 turns. Rays that are not done when the loop ends are counted, and the host
+    // reports them: their callbacks were not called.
+    uint left = (end - next + LANES - 1u) / LANES;
+
     uint stack[STACK_SIZE];
 #ifndef STREAM_ANY
     float stack_near[STACK_SIZE];
@@ -67,12 +79,21 @@ void main() {
 
     while (true) {
         if (current < LAST_NODE) {
-            vec2 a = LOAD_FLOATS(nodes, 8u * current), b = LOAD_FLOATS(nodes, 8u * current + 1u), c = LOAD_FLOATS(nodes, 8u * current + 2u);
-            vec2 d = LOAD_FLOATS(nodes, 8u * current + 3u), e = LOAD_FLOATS(nodes, 8u * current + 4u), f = LOAD_FLOATS(nodes, 8u * current + 5u);
-            uvec2 children = LOAD_PAIR(nodes, 8u * current + 6u);
+            uint at = 8u * (current & NODE_NUMBER);
+            vec2 a = LOAD_FLOATS(nodes, at), b = LOAD_FLOATS(nodes, at + 1u), c = LOAD_FLOATS(nodes, at + 2u);
+            vec2 d = LOAD_FLOATS(nodes, at + 3u), e = LOAD_FLOATS(nodes, at + 4u), f = LOAD_FLOATS(nodes, at + 5u);
+            uvec2 children = LOAD_PAIR(nodes, at + 6u);
             float near0 = enter_box(vec3(a, b.x), vec3(b.y, c), origin, inverse, world.tmin, best);
             float near1 = enter_box(vec3(d, e.x), vec3(e.y, f), origin, inverse, world.tmin, best);
-            bool swap = near1 < near0;
+            bool swap;
+            if (BY_DIRECTION) {
+                uint axis = current >> AXIS_SHIFT;
+                float along = axis == 0u ? direction.x : axis == 1u ? direction.y : direction.z;
+                // a child that is missed is never first
+                swap = near1 < INFINITY && (along < 0.0 || near0 == INFINITY);
+            } else {
+                swap = near1 < near0;
+            }
             float first = swap ? near1 : near0;
             float second = swap ? near0 : near1;
             current = first < INFINITY ? (swap ? children.y : children.x) : NEXT;
@@ -161,8 +182,9 @@ void main() {
             if (met) closest(index, scene_hit(best, best_instance, best_primitive, best_uv));
             else closest(index, miss());
 #endif
+            left--;
             next += LANES;
-            if (next >= end) return;
+            if (next >= end) break;
             index = push.first + next;
             world = ray(index);
             shear = make_shear(world.direction);
@@ -177,6 +199,7 @@ void main() {
             best_primitive = INVALID;
         }
     }
+    if (left != 0u) atomicAdd(Counter(root.unfinished).v, left);
 }
 
 #endif

@@ -2,6 +2,10 @@
 #ifndef TRACE_TRIANGLE
 #define TRACE_TRIANGLE
 
+// For benchmarks the host can choose the other test, to show what watertightness costs and what it is worth
+// (docs/traversal.md).
+layout(constant_id = 6) const bool WATERTIGHT = true;
+
 // The ray's frame: z is the axis along which the direction is longest, and the shear that makes the ray the z axis.
 struct Shear {
     uint axis;
@@ -18,6 +22,14 @@ Shear make_shear(vec3 d) {
     uint axis = a.x > a.y ? (a.x > a.z ? 0u : 2u) : (a.y > a.z ? 1u : 2u);
     vec3 p = permute(d, axis);
     return Shear(axis, vec3(p.xy / p.z, 1.0 / p.z));
+}
+
+// Likewise, where the inverse of the direction is there already. Any shear will do for watertightness, as long as it is the ray's.
+Shear make_shear(vec3 d, vec3 inverse) {
+    vec3 a = abs(d);
+    uint axis = a.x > a.y ? (a.x > a.z ? 0u : 2u) : (a.y > a.z ? 1u : 2u);
+    float z = permute(inverse, axis).z;
+    return Shear(axis, vec3(permute(d, axis).xy * z, z));
 }
 
 // Numbers of twice the digits, as an unevaluated sum hi + lo: Dekker, "A floating-point technique for extending the available
@@ -89,37 +101,42 @@ float plane_distance(vec3 origin, vec3 direction, vec3 v0, vec3 v1, vec3 v2) {
     return wide_dot(two_difference(v0, origin), normal) / wide_dot(Wide3(direction, vec3(0.0)), normal);
 }
 
-// Why no ray slips between two triangles that share an edge: a corner's sheared position depends on the corner and the ray
-// alone, so both triangles see the same numbers; and the sign of fl(a*b) - fl(c*d) is never wrong, at worst zero, because
-// rounding is monotonic. Zero counts as inside. `precise` keeps the compiler from fusing a product into the difference,
-// which would break the symmetry. (The paper resolves zeros in double precision to hit exactly one of the two triangles;
-// here both are hit, at the same t, which no stream can tell apart.)
-bool intersect_triangle(Shear shear, vec3 origin, vec3 direction, vec3 v0, vec3 v1, vec3 v2, float tmin, float tmax, out float t, out vec2 uv) {
-    precise vec3 a = permute(v0 - origin, shear.axis);
-    precise vec3 b = permute(v1 - origin, shear.axis);
-    precise vec3 c = permute(v2 - origin, shear.axis);
-    precise vec2 pa = a.xy - shear.s.xy * a.z;
-    precise vec2 pb = b.xy - shear.s.xy * b.z;
-    precise vec2 pc = c.xy - shear.s.xy * c.z;
-    precise float u0 = pc.x * pb.y;
-    precise float u1 = pc.y * pb.x;
-    precise float v0_ = pa.x * pc.y;
-    precise float v1_ = pa.y * pc.x;
-    precise float w0 = pb.x * pa.y;
-    precise float w1 = pb.y * pa.x;
-    precise float u = u0 - u1;
-    precise float v = v0_ - v1_;
-    precise float w = w0 - w1;
-    bool outside = (u < 0.0 || v < 0.0 || w < 0.0) && (u > 0.0 || v > 0.0 || w > 0.0);
+// A corner in the ray's frame: where it lies off the ray, and how far along its main axis.
+struct Corner {
+    vec2 p;
+    float z;
+};
+
+Corner make_corner(Shear shear, vec3 origin, vec3 vertex) {
+    precise vec3 a = permute(vertex - origin, shear.axis);
+    precise vec2 p = a.xy - shear.s.xy * a.z;
+    return Corner(p, a.z);
+}
+
+// On which side of the ray the edge from one corner to another passes: positive, negative, or zero. edge(p, q) = -edge(q, p) exactly.
+float edge(Corner p, Corner q) {
+    precise float a = p.p.x * q.p.y;
+    precise float b = p.p.y * q.p.x;
+    precise float e = a - b;
+    return e;
+}
+
+// Does the ray pass between the edges? u, v, w belong to the edges opposite the three corners.
+bool is_inside(float u, float v, float w) {
+    return !((u < 0.0 || v < 0.0 || w < 0.0) && (u > 0.0 || v > 0.0 || w > 0.0));
+}
+
+// For a ray that passes between the edges: where it meets the triangle, if within (tmin, tmax). The barycentric weights are u, v, w
+// times `inverse_det`. To be called under `if`: most rays do not get here, and a denormal number, made by lanes that hold something
+// else, would cost a CPU a hundred times the cycles of a normal one.
+bool meets_between(Shear shear, vec3 origin, vec3 direction, vec3 v0, vec3 v1, vec3 v2, Corner a, Corner b, Corner c, float u, float v,
+        float w, float tmin, float tmax, out float t, out float inverse_det) {
     float det = u + v + w;
-    // Lanes that have no triangle in hand compute too, on whatever they hold; and a denormal number, made from that, costs a CPU
-    // a hundred times the cycles of a normal one. So only plausible determinants are divided by.
-    bool plausible = !outside && abs(det) > 1e-37 && abs(det) < 1e37;
-    float inverse_det = 1.0 / (plausible ? det : 1.0);
+    bool plausible = abs(det) > 1e-37 && abs(det) < 1e37;
+    inverse_det = 1.0 / (plausible ? det : 1.0);
     float scaled = u * a.z + v * b.z + w * c.z;
     t = (plausible ? scaled : 0.0) * shear.s.z * inverse_det;
     bool met = plausible && t > tmin && t < tmax;
-    uv = vec2(met ? v : 0.0, met ? w : 0.0) * inverse_det;
     vec3 z = abs(vec3(a.z, b.z, c.z) * shear.s.z);
     float max_z = max(max(z.x, z.y), z.z);
     // A ray that has just left this surface may find it again at a t that is all rounding, thin triangles above all; and a
@@ -128,7 +145,7 @@ bool intersect_triangle(Shear shear, vec3 origin, vec3 direction, vec3 v0, vec3 
     // triangle's corners, so most hits are spared even the bound.
     if (met && t < 0.05 * max_z) {
         const float GAMMA = 5.9604645e-8;
-        vec3 x = abs(vec3(pa.x, pb.x, pc.x)), y = abs(vec3(pa.y, pb.y, pc.y)), e = abs(vec3(u, v, w));
+        vec3 x = abs(vec3(a.p.x, b.p.x, c.p.x)), y = abs(vec3(a.p.y, b.p.y, c.p.y)), e = abs(vec3(u, v, w));
         float max_x = max(max(x.x, x.y), x.z), max_y = max(max(y.x, y.y), y.z);
         float max_e = max(max(e.x, e.y), e.z);
         float delta_x = 5.0 * GAMMA * (max_x + max_z), delta_y = 5.0 * GAMMA * (max_y + max_z), delta_z = 3.0 * GAMMA * max_z;
@@ -138,6 +155,42 @@ bool intersect_triangle(Shear shear, vec3 origin, vec3 direction, vec3 v0, vec3 
             t = plane_distance(origin, direction, v0, v1, v2);
             met = t > tmin && t < tmax;
         }
+    }
+    return met;
+}
+
+// Moeller, Trumbore, "Fast, Minimum Storage Ray/Triangle Intersection" (JGT 1997), double-sided. Each triangle rounds the shared
+// edge in its own way, so rays slip between neighbours; and t is as rounding leaves it.
+bool intersect_moller_trumbore(vec3 origin, vec3 direction, vec3 v0, vec3 v1, vec3 v2, float tmin, float tmax, out float t, out vec2 uv) {
+    vec3 e1 = v1 - v0, e2 = v2 - v0;
+    vec3 p = cross(direction, e2);
+    float det = dot(e1, p);
+    // as above: no denormals from lanes that hold no triangle
+    bool plausible = abs(det) > 1e-37 && abs(det) < 1e37;
+    float inverse_det = 1.0 / (plausible ? det : 1.0);
+    vec3 s = origin - v0;
+    vec3 q = cross(s, e1);
+    uv = vec2(dot(s, p), dot(direction, q)) * inverse_det;
+    t = dot(e2, q) * inverse_det;
+    return plausible && uv.x >= 0.0 && uv.y >= 0.0 && uv.x + uv.y <= 1.0 && t > tmin && t < tmax;
+}
+
+// Why no ray slips between two triangles that share an edge: a corner's sheared position depends on the corner and the ray
+// alone, so both triangles see the same numbers; and the sign of fl(a*b) - fl(c*d) is never wrong, at worst zero, because
+// rounding is monotonic. Zero counts as inside. `precise` keeps the compiler from fusing a product into the difference,
+// which would break the symmetry. (The paper resolves zeros in double precision to hit exactly one of the two triangles;
+// here both are hit, at the same t, which no stream can tell apart.)
+bool intersect_triangle(Shear shear, vec3 origin, vec3 direction, vec3 v0, vec3 v1, vec3 v2, float tmin, float tmax, out float t, out vec2 uv) {
+    Corner a = make_corner(shear, origin, v0), b = make_corner(shear, origin, v1), c = make_corner(shear, origin, v2);
+    float u = edge(c, b), v = edge(a, c), w = edge(b, a);
+    bool met = false;
+    t = tmax;
+    uv = vec2(0.0);
+    if (!WATERTIGHT) return intersect_moller_trumbore(origin, direction, v0, v1, v2, tmin, tmax, t, uv);
+    if (is_inside(u, v, w)) {
+        float inverse_det;
+        met = meets_between(shear, origin, direction, v0, v1, v2, a, b, c, u, v, w, tmin, tmax, t, inverse_det);
+        if (met) uv = vec2(v, w) * inverse_det;
     }
     return met;
 }

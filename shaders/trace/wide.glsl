@@ -1,14 +1,16 @@
-// The compute tracer's fast kernel: an eight-wide hierarchy of 80-byte nodes with quantised boxes (Ylitie, Karras, Laine,
-// "Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs", HPG 2017), one ray per lane.
+// The compute tracer's fast kernel: one ray per lane through a seven-wide hierarchy of 64-byte blocks (src/bvh/wide.rs), each a node with
+// quantised boxes (after Ylitie, Karras, Laine, "Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs", HPG 2017)
+// or a leaf.
 //
-// Two things make it fast where vectors are wide and gathers dear (CPU drivers): in every turn of the loop a lane either
-// visits a node (80 bytes) or tests two neighbouring primitives (2 x 40 bytes), through the same ten loads; and a lane that is
-// done takes its next ray at once. Rays and results are in memory (generate.glsl, deliver.glsl), so that the stream's own code
-// runs with all lanes busy.
+// What makes it fast where vectors are wide and gathers dear (CPU drivers): in every turn of the loop a lane fetches one block,
+// a cache line, through the same eight loads, whatever it is; a lane that is done takes its next ray at once; and the upper end of
+// the stack is in registers. Rays and results are in memory (generate.glsl, deliver.glsl), so that the stream's own code runs with all
+// lanes busy.
 #ifndef TRACE_WIDE
 #define TRACE_WIDE
 #include "scene/material.glsl"
 #include "scene/sphere.glsl"
+#include "trace/block.glsl"
 #include "trace/records.glsl"
 #include "trace/slab.glsl"
 #include "trace/triangle.glsl"
@@ -16,30 +18,57 @@
 
 layout(local_size_x = LANES) in;
 
-// What the scene's trees need at most: a node visit pushes at most the rest of one group of children; entering an entry of
-// the top level pushes at most that, the rest of its leaf and the way back. The host counts it (src/bvh/cwbvh.rs).
-layout(constant_id = 3) const uint STACK_SIZE = 64;
+// What the scene's trees need at most beyond the entries in registers: a node visit pushes at most the rest of one group of
+// children; entering an entry of the top level pushes that and the way back. The host counts it.
+layout(constant_id = 3) const uint SPILLED = 64;
 layout(constant_id = 4) const uint RAYS_PER_LANE = 1;
 
-// A group of children: the upper 8 bits of its word say which are still to be visited. At or below this, none is.
-const uint NO_CHILD = 0x00ffffffu;
-// "the first child", whatever the octant: where a tree begins
-const uint ROOT_GROUP = 0x80000000u;
-
-#define BYTE(w, k) ((k) == 0 ? (w) & 0xffu : (k) == 3 ? (w) >> 24 : ((w) >> ((k) * 8)) & 0xffu)
+// Entries of the stack in registers. A CPU driver writes to an array element by element, about ninety instructions; moving all of
+// these takes one each.
+const uint TOP = 6u;
 
 #define SET_RAY(o, d)                                                                                          \
     origin = (o);                                                                                              \
     direction = (d);                                                                                           \
-    shear = make_shear(direction);                                                                             \
-    inverse = safe_inverse(direction);                                                                              \
+    inverse = safe_inverse(direction);                                                                         \
+    shear = make_shear(direction, inverse);                                                                    \
     negative = lessThan(inverse, vec3(0.0));                                                                   \
-    octant = (7u - ((negative.x ? 4u : 0u) | (negative.y ? 2u : 0u) | (negative.z ? 1u : 0u))) * 0x01010101u;
+    octant = 7u - ((negative.x ? 4u : 0u) | (negative.y ? 2u : 0u) | (negative.z ? 1u : 0u));
+
+#define PUSH(b, g)                                                          \
+    if (SPILLED > 0u) {                                                     \
+        if (depth >= TOP) {                                                 \
+            spilled_base[depth - TOP] = top_base[TOP - 1u];                 \
+            spilled_group[depth - TOP] = top_group[TOP - 1u];               \
+        }                                                                   \
+    }                                                                       \
+    [[unroll]] for (uint s = TOP - 1u; s > 0u; s--) {                       \
+        top_base[s] = top_base[s - 1u];                                     \
+        top_group[s] = top_group[s - 1u];                                   \
+    }                                                                       \
+    top_base[0] = (b);                                                      \
+    top_group[0] = (g);                                                     \
+    depth++;
+
+#define POP                                                                 \
+    base = top_base[0];                                                     \
+    group = top_group[0];                                                   \
+    [[unroll]] for (uint s = 0u; s < TOP - 1u; s++) {                       \
+        top_base[s] = top_base[s + 1u];                                     \
+        top_group[s] = top_group[s + 1u];                                   \
+    }                                                                       \
+    depth--;                                                                \
+    if (SPILLED > 0u) {                                                     \
+        if (depth >= TOP) {                                                 \
+            top_base[TOP - 1u] = spilled_base[depth - TOP];                 \
+            top_group[TOP - 1u] = spilled_group[depth - TOP];               \
+        }                                                                   \
+    }
 
 Ray take_ray(SceneRoot root, uint k) {
-    vec2 a = uintBitsToFloat(LOAD_PAIR(root.launch_rays, 4u * k)), b = uintBitsToFloat(LOAD_PAIR(root.launch_rays, 4u * k + 1u));
-    vec2 c = uintBitsToFloat(LOAD_PAIR(root.launch_rays, 4u * k + 2u)), d = uintBitsToFloat(LOAD_PAIR(root.launch_rays, 4u * k + 3u));
-    return Ray(vec3(a, b.x), b.y, vec3(c, d.x), d.y);
+    Block4 b = Block4(offset_address(root.launch_rays, 32u * k));
+    vec2 x = uintBitsToFloat(PAIR(b.q0)), y = uintBitsToFloat(PAIR(b.q1)), z = uintBitsToFloat(PAIR(b.q2)), w = uintBitsToFloat(PAIR(b.q3));
+    return Ray(vec3(x, y.x), y.y, vec3(z, w.x), w.y);
 }
 
 #ifdef STREAM_ANY
@@ -48,6 +77,7 @@ Ray take_ray(SceneRoot root, uint k) {
 #define STORE_MISS store_closest(root, index, INFINITY, INVALID, INVALID, vec2(0.0));
 #endif
 
+#define TAKE index = begin + atomicAdd(LaunchFlags(root.launch_counters).v[gl_WorkGroupID.x], 1u);
 // The lane's next ray; what is no ray has missed.
 #define NEXT_RAY                              \
     while (true) {                            \
@@ -55,37 +85,82 @@ Ray take_ray(SceneRoot root, uint k) {
         world = take_ray(root, index);        \
         if (is_ray(world)) break;             \
         STORE_MISS                            \
-        index += LANES;                       \
+        TAKE                                  \
     }
 
-// One primitive record against the ray; the corners are a, b, c.
-bool intersect_record(uint id, vec3 a, vec3 b, vec3 c, Shear shear, vec3 origin, vec3 direction, Ray world,
-        uint instance, float best, out float t, out vec2 uv) {
-    bool met;
-    if (HAS_SPHERES && (id & SPHERE) != 0u) {
-        t = intersect_sphere(origin, direction, world.tmin, best, a, b.x);
-        uv = vec2(0.0);
-        met = t > world.tmin && t < best;
-    } else {
-        met = intersect_triangle(shear, origin, direction, a, b, c, world.tmin, best, t, uv);
+// What the ray met last, with the weights of the second and third corner as the mesh has them.
+#ifdef STREAM_ANY
+#define ACCEPT best_primitive = id & NUMBER;
+#else
+#define ACCEPT                        \
+    best = t;                         \
+    best_uv = uv;                     \
+    best_instance = instance;         \
+    best_primitive = id & NUMBER;
+#endif
+
+// A triangle is met at `t` with barycentric `weights`: unless its alpha says otherwise, take it.
+#define OFFER(turn)                                                                                                  \
+    vec2 uv = vec2(pick_weight(weights, (turn)), pick_weight(weights, (turn) >> 2));                                 \
+    bool met = true;                                                                                                 \
+    if (HAS_ALPHA) {                                                                                                 \
+        if ((id & ALPHA_TESTED) != 0u) met = alpha_passes(instance, id & NUMBER, uv);                                \
+    }                                                                                                                \
+    if (met) {                                                                                                       \
+        ACCEPT                                                                                                       \
     }
-    if (HAS_ALPHA) {
-        if (met && (id & ALPHA_TESTED) != 0u) met = alpha_passes(instance, id & NUMBER, uv);
+
+// One triangle of a pair: its number, the places of its second and third corner, corners as they lie and as the ray sees them, edges.
+#define TEST_TRIANGLE(id_, turn, v0_, v1_, v2_, a, b, c, eu, ev, ew)                                                     \
+    {                                                                                                                    \
+        uint id = (id_);                                                                                                 \
+        float t, inverse_det;                                                                                            \
+        if (meets_between(shear, origin, direction, v0_, v1_, v2_, a, b, c, eu, ev, ew, world.tmin, best, t, inverse_det)) { \
+            vec3 weights = vec3(eu, ev, ew) * inverse_det;                                                               \
+            OFFER(turn)                                                                                                  \
+        }                                                                                                                \
     }
-    return met;
+
+#define TEST_MOLLER_TRUMBORE(id_, turn, v0_, v1_, v2_)                                                      \
+    {                                                                                                       \
+        uint id = (id_);                                                                                    \
+        float t;                                                                                            \
+        vec2 vw;                                                                                            \
+        if (intersect_moller_trumbore(origin, direction, v0_, v1_, v2_, world.tmin, best, t, vw)) {         \
+            vec3 weights = vec3(1.0 - vw.x - vw.y, vw);                                                     \
+            OFFER(turn)                                                                                     \
+        }                                                                                                   \
+    }
+
+#define TEST_SPHERE(id_, center, radius)                                                             \
+    {                                                                                                \
+        uint id = (id_);                                                                             \
+        float t = intersect_sphere(origin, direction, world.tmin, best, center, radius);             \
+        vec2 uv = vec2(0.0);                                                                         \
+        if (id != INVALID && t > world.tmin && t < best) {                                           \
+            ACCEPT                                                                                   \
+        }                                                                                            \
+    }
+
+float pick_weight(vec3 w, uint k) {
+    k &= 3u;
+    return k == 0u ? w.x : k == 1u ? w.y : w.z;
 }
 
 void main() {
-    uint index = gl_WorkGroupID.x * (LANES * RAYS_PER_LANE) + gl_LocalInvocationID.x;
-    uint end = min((gl_WorkGroupID.x + 1u) * (LANES * RAYS_PER_LANE), push.count);
-    if (index >= end) return;
-
+    uint begin = gl_WorkGroupID.x * (LANES * RAYS_PER_LANE);
+    uint end = min(begin + LANES * RAYS_PER_LANE, push.count);
     SceneRoot root = SceneRoot(push.scene);
-    uvec2 nodes = root.nodes;
-    uvec2 primitives = root.primitives;
+    uint index;
+    TAKE
+    uvec2 blocks = root.nodes;
 
-    uint stack_base[STACK_SIZE];
-    uint stack_bits[STACK_SIZE];
+    uint top_base[TOP], top_group[TOP];
+    uint spilled_base[SPILLED + 1u], spilled_group[SPILLED + 1u];
+    [[unroll]] for (uint s = 0u; s < TOP; s++) {
+        top_base[s] = 0u;
+        top_group[s] = 0u;
+    }
     uint depth = 0u;
 
     Ray world;
@@ -97,131 +172,101 @@ void main() {
     SET_RAY(world.origin, world.direction)
     uint instance = 0u;
     bool in_group = SINGLE_LEVEL;
-    // the group of children and the group of primitives in hand
-    uint node_base = root.root, node_bits = ROOT_GROUP;
-    uint primitive_base = 0u, primitive_bits = 0u;
+    uint block = root.root;
+    // siblings yet to be visited (block.glsl)
+    uint base = 0u, group = 0u;
     float best = world.tmax;
     uint best_instance = INVALID, best_primitive = INVALID;
     vec2 best_uv = vec2(0.0);
 
     while (true) {
-        bool visit = primitive_bits == 0u;
-        // the next child: the one that lies first along the ray's octant
-        uint bit = findMSB(node_bits | 1u);
-        uint rest = node_bits & ~(1u << bit);
-        uint slot = (bit - 24u) ^ (octant & 7u);
-        uint node = node_base + bitCount(rest & ((1u << (slot & 31u)) - 1u) & 0xffu);
-        uint first = findLSB(primitive_bits | 0x80000000u);
-        // both strides are multiples of 40 bytes: one address serves either
-        uvec2 base = visit ? nodes : primitives;
-        uint at = 5u * (visit ? node * 2u : primitive_base + first);
-        uvec2 w0 = LOAD_PAIR(base, at), w1 = LOAD_PAIR(base, at + 1u), w2 = LOAD_PAIR(base, at + 2u), w3 = LOAD_PAIR(base, at + 3u);
-        uvec2 w4 = LOAD_PAIR(base, at + 4u), w5 = LOAD_PAIR(base, at + 5u), w6 = LOAD_PAIR(base, at + 6u), w7 = LOAD_PAIR(base, at + 7u);
-        uvec2 w8 = LOAD_PAIR(base, at + 8u), w9 = LOAD_PAIR(base, at + 9u);
-        if (visit) {
-            // w0, w1.x: corner; w1.y: exponents and inner mask; w2: first child, first primitive; w3: meta; then planes
-            if (rest > NO_CHILD) {
-                stack_base[depth] = node_base;
-                stack_bits[depth] = rest;
-                depth++;
-            }
-            vec3 scale = uintBitsToFloat(uvec3(w1.y & 0xffu, (w1.y >> 8) & 0xffu, (w1.y >> 16) & 0xffu) << 23) * inverse;
+        Block8 b = Block8(offset_address(blocks, 64u * block));
+        uvec2 w0 = PAIR(b.q0), w1 = PAIR(b.q1), w2 = PAIR(b.q2), w3 = PAIR(b.q3);
+        uvec2 w4 = PAIR(b.q4), w5 = PAIR(b.q5), w6 = PAIR(b.q6), w7 = PAIR(b.q7);
+        // the child that lies first along the ray, where distance decides and not the octant
+        uint nearest = INVALID;
+        if ((w7.y & LEAF) == 0u) {
+            // w0, w1.x: corner; w1.y: first child; then planes, seven bytes each, and in the eighth: exponents, which children there are
+            vec3 scale = uintBitsToFloat(uvec3(w2.y >> 24, w4.y >> 24, w6.y >> 24) << 23) * inverse;
             vec3 corner = (uintBitsToFloat(uvec3(w0, w1.x)) - origin) * inverse;
-            uint bits = 0u;
-            [[unroll]] for (int half_ = 0; half_ < 2; half_++) {
-                uint near_x = negative.x ? w5[half_] : w4[half_], far_x = negative.x ? w4[half_] : w5[half_];
-                uint near_y = negative.y ? w7[half_] : w6[half_], far_y = negative.y ? w6[half_] : w7[half_];
-                uint near_z = negative.z ? w9[half_] : w8[half_], far_z = negative.z ? w8[half_] : w9[half_];
-                // which bit each child sets: inner children by octant order, leaves by the place of their primitives
-                uint meta = w3[half_];
-                uint inner = ((meta & (meta << 1)) & 0x10101010u) >> 4;
-                uint place = (meta ^ (octant & (inner * 0xffu))) & 0x1f1f1f1fu;
-                uint children = (meta >> 5) & 0x07070707u;
-                [[unroll]] for (int k = 0; k < 4; k++) {
-                    vec3 n = vec3(BYTE(near_x, k), BYTE(near_y, k), BYTE(near_z, k)) * scale + corner;
-                    vec3 f = vec3(BYTE(far_x, k), BYTE(far_y, k), BYTE(far_z, k)) * scale + corner;
-                    float near = MAX(MAX(n.x, n.y), MAX(n.z, world.tmin));
-                    float far = MIN(MIN(MIN(f.x, f.y), f.z) * SLAB_SCALE, best);
-                    bits |= near <= far ? BYTE(children, k) << BYTE(place, k) : 0u;
+            uvec2 near_x = negative.x ? w3 : w2, far_x = negative.x ? w2 : w3;
+            uvec2 near_y = negative.y ? w5 : w4, far_y = negative.y ? w4 : w5;
+            uvec2 near_z = negative.z ? w7 : w6, far_z = negative.z ? w6 : w7;
+            uint hits = 0u;
+            [[unroll]] for (int k = 0; k < 7; k++) {
+                vec3 n = vec3(BYTE(near_x, k), BYTE(near_y, k), BYTE(near_z, k)) * scale + corner;
+                vec3 f = vec3(BYTE(far_x, k), BYTE(far_y, k), BYTE(far_z, k)) * scale + corner;
+                float near = MAX(MAX(n.x, n.y), MAX(n.z, world.tmin));
+                float far = MIN(MIN(MIN(f.x, f.y), f.z) * SLAB_SCALE, best);
+                bool hit = near <= far;
+                hits |= hit ? 1u << k : 0u;
+#ifdef STREAM_CLOSEST
+                // the three lowest bits of a distance matter to no order
+                nearest = min(nearest, hit ? (floatBitsToUint(near) & ~7u) | k : INVALID);
+#endif
+            }
+            uint present = w5.y >> 24;
+            hits &= present;
+            if ((present >> (nearest & 7u) & 1u) == 0u) nearest = INVALID;
+            if (hits != 0u) {
+                if (has_siblings(group)) {
+                    PUSH(base, group)
                 }
+                base = w1.y;
+                group = make_group(hits, present, octant);
             }
-            node_base = w2.x;
-            node_bits = (bits & 0xff000000u) | (w1.y >> 24);
-            primitive_base = w2.y;
-            primitive_bits = bits & NO_CHILD;
         } else if (!SINGLE_LEVEL && !in_group) {
-            // an entry of the top level: go in, and remember what is left outside
-            primitive_bits &= ~(1u << first);
-            if (node_bits > NO_CHILD) {
-                stack_base[depth] = node_base;
-                stack_bits[depth] = node_bits;
-                depth++;
+            // an entry of the top level: the transform to its own space, then its root and number
+            if (has_siblings(group)) {
+                PUSH(base, group)
             }
-            if (primitive_bits != 0u) {
-                stack_base[depth] = primitive_base;
-                stack_bits[depth] = primitive_bits;
-                depth++;
-            }
-            stack_base[depth] = 0u;
-            stack_bits[depth] = 0u;
-            depth++;
-            instance = w4.y;
-            InstanceRecord record = InstanceRecords(root.instances).v[instance];
-            SET_RAY(transform_point(record.world_to_group, world.origin), transform_vector(record.world_to_group, world.direction))
+            // the way back
+            PUSH(0u, 0u)
+            vec4 rows[3] = vec4[3](uintBitsToFloat(uvec4(w0, w1)), uintBitsToFloat(uvec4(w2, w3)), uintBitsToFloat(uvec4(w4, w5)));
+            SET_RAY(transform_point(rows, world.origin), transform_vector(rows, world.direction))
             in_group = true;
-            node_base = record.root;
-            node_bits = ROOT_GROUP;
-            primitive_bits = 0u;
+            instance = w6.y;
+            base = w6.x;
+            group = ROOT_GROUP;
         } else {
-            bool two = ((primitive_bits >> (first + 1u)) & 1u) != 0u;
-            primitive_bits &= ~((two ? 3u : 1u) << first);
-            float t;
-            vec2 uv;
-            if (intersect_record(w4.y, uintBitsToFloat(uvec3(w0, w1.x)), uintBitsToFloat(uvec3(w1.y, w2)), uintBitsToFloat(uvec3(w3, w4.x)),
-                    shear, origin, direction, world, instance, best, t, uv)) {
-                best = t;
-                best_uv = uv;
-                best_instance = instance;
-                best_primitive = w4.y & NUMBER;
-            }
-            // where there is no second, the next record may be of another group: its alpha must not be asked with this instance
-            if (two && intersect_record(w9.y, uintBitsToFloat(uvec3(w5, w6.x)), uintBitsToFloat(uvec3(w6.y, w7)), uintBitsToFloat(uvec3(w8, w9.x)),
-                    shear, origin, direction, world, instance, best, t, uv)) {
-                best = t;
-                best_uv = uv;
-                best_instance = instance;
-                best_primitive = w9.y & NUMBER;
+            if (HAS_SPHERES && (w6.x & SPHERE) != 0u) {
+                TEST_SPHERE(w6.x, uintBitsToFloat(uvec3(w0, w1.x)), uintBitsToFloat(w1.y))
+                TEST_SPHERE(w6.y, uintBitsToFloat(uvec3(w2, w3.x)), uintBitsToFloat(w3.y))
+            } else {
+                vec3 v0 = uintBitsToFloat(uvec3(w0, w1.x)), v1 = uintBitsToFloat(uvec3(w1.y, w2));
+                vec3 v2 = uintBitsToFloat(uvec3(w3, w4.x)), v3 = uintBitsToFloat(uvec3(w4.y, w5));
+                Corner a = make_corner(shear, origin, v0), b = make_corner(shear, origin, v1);
+                Corner c = make_corner(shear, origin, v2), d = make_corner(shear, origin, v3);
+                float ab = edge(b, a), bc = edge(c, b), ca = edge(a, c), cd = edge(d, c), da = edge(a, d);
+                bool first = is_inside(bc, ca, ab), second = is_inside(cd, da, -ca) && w6.y != INVALID;
+                if (!WATERTIGHT) {
+                    TEST_MOLLER_TRUMBORE(w6.x, w7.x, v0, v1, v2)
+                    if (w6.y != INVALID) TEST_MOLLER_TRUMBORE(w6.y, w7.x >> 4, v0, v2, v3)
+                    first = second = false;
+                }
+                if (first) TEST_TRIANGLE(w6.x, w7.x, v0, v1, v2, a, b, c, bc, ca, ab)
+                if (second) TEST_TRIANGLE(w6.y, w7.x >> 4, v0, v2, v3, a, c, d, cd, da, -ca)
             }
 #ifdef STREAM_ANY
             if (best_primitive != INVALID) {
-                primitive_bits = 0u;
-                node_bits = 0u;
+                group = 0u;
                 depth = 0u;
             }
 #endif
         }
-        if (primitive_bits == 0u && node_bits <= NO_CHILD) {
-            bool done = depth == 0u;
+        bool done = false;
+        if (!has_siblings(group)) {
+            done = depth == 0u;
             if (!done) {
-                depth--;
-                uint popped_base = stack_base[depth], popped_bits = stack_bits[depth];
-                if (!SINGLE_LEVEL && popped_bits == 0u) {
+                POP
+                if (!SINGLE_LEVEL && group == 0u) {
                     // back to the top level
                     SET_RAY(world.origin, world.direction)
                     in_group = false;
                     done = depth == 0u;
                     if (!done) {
-                        depth--;
-                        popped_base = stack_base[depth];
-                        popped_bits = stack_bits[depth];
+                        POP
                     }
-                }
-                if (popped_bits > NO_CHILD) {
-                    node_base = popped_base;
-                    node_bits = popped_bits;
-                } else {
-                    primitive_base = popped_base;
-                    primitive_bits = popped_bits;
                 }
             }
             if (done) {
@@ -230,18 +275,29 @@ void main() {
 #else
                 store_closest(root, index, best_primitive != INVALID ? best : INFINITY, best_instance, best_primitive, best_uv);
 #endif
-                index += LANES;
+                TAKE
                 NEXT_RAY
                 SET_RAY(world.origin, world.direction)
                 in_group = SINGLE_LEVEL;
                 instance = 0u;
-                node_base = root.root;
-                node_bits = ROOT_GROUP;
+                base = root.root;
+                group = ROOT_GROUP;
                 best = world.tmax;
                 best_primitive = INVALID;
                 best_instance = INVALID;
             }
         }
+        // the next block
+        uint bit = findMSB(group | 1u);
+        uint slot = (bit - 24u) ^ octant;
+#ifdef STREAM_CLOSEST
+        if (nearest != INVALID) {
+            slot = nearest & 7u;
+            bit = (slot ^ octant) + 24u;
+        }
+#endif
+        group &= ~(1u << bit);
+        block = base + bitCount((group >> 16) & 0xffu & ((1u << (slot & 31u)) - 1u));
     }
 }
 

@@ -3,6 +3,9 @@
 //! Laid out so that a node holds the boxes of both its children: a visit is one load of 64 bytes, and no box is loaded for
 //! nothing. The traversal's stack cannot overflow: every inner node pushes at most one child, so a tree of depth d needs d
 //! entries, and the shader's stack is specialised to the depth that is there.
+//!
+//! A reference to an inner node also says along which axis that node's children lie apart, the lower one first. A traversal that
+//! orders children by the sign of the ray's direction thus knows the order without loading anything more, and nodes do not grow.
 
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
@@ -18,6 +21,11 @@ pub const MAX_PRIMITIVES: usize = 1 << 27;
 pub const EMPTY: u32 = 0x7fff_fffd;
 
 const LEAF: u32 = 0x8000_0000;
+/// Bits 27-28 of a reference to an inner node: 0, 1, 2 for x, y, z. There are fewer nodes than primitives, so the number fits
+/// below.
+const AXIS_SHIFT: u32 = 27;
+/// The number of an inner node, or of the first primitive of a leaf.
+const NUMBER: u32 = (1 << AXIS_SHIFT) - 1;
 
 /// An inner node: boxes of both children, then the references to them.
 #[repr(C)]
@@ -25,7 +33,8 @@ const LEAF: u32 = 0x8000_0000;
 pub struct Node {
     /// Lower and upper corner of both children.
     pub boxes: [[[f32; 3]; 2]; 2],
-    /// Bit 31 set: a leaf with count - 1 in bits 27-30 and the first primitive in bits 0-26; otherwise an inner node.
+    /// Bit 31 set: a leaf with count - 1 in bits 27-30 and the first primitive in bits 0-26; otherwise an inner node with the
+    /// axis of its own children in bits 27-28 and its number in bits 0-26. Along that axis child 0 is the lower one.
     pub children: [u32; 2],
     /// To 64 bytes: one cache line.
     pub reserved: [u32; 2],
@@ -51,7 +60,20 @@ fn leaf_reference(first: u32, count: u32) -> u32 {
 
 /// Splits a leaf reference into its first primitive and their number.
 pub fn leaf_range(reference: u32) -> Option<(u32, u32)> {
-    (reference & LEAF != 0).then_some((reference & 0x07ff_ffff, (reference >> 27 & 0xf) + 1))
+    (reference & LEAF != 0).then_some((reference & NUMBER, (reference >> 27 & 0xf) + 1))
+}
+
+/// Splits a reference to an inner node into its number and the axis (0, 1, 2) along which its children lie apart.
+pub fn inner_node(reference: u32) -> Option<(u32, usize)> {
+    (reference & LEAF == 0 && reference != EMPTY).then_some((reference & NUMBER, (reference >> AXIS_SHIFT) as usize))
+}
+
+/// The axis along which the centres of two boxes lie farthest apart, and whether the first box is the upper one there.
+fn split_axis(a: &Aabb, b: &Aabb) -> (u32, bool) {
+    // twice the centres; halves first, so that huge boxes do not overflow
+    let apart = (b.min * 0.5 + b.max * 0.5) - (a.min * 0.5 + a.max * 0.5);
+    let axis = apart.abs().max_position();
+    (axis as u32, apart[axis] < 0.0)
 }
 
 /// A reference as seen from a buffer in which this tree's nodes begin at `first_node` and its primitives at `first_primitive`.
@@ -88,11 +110,14 @@ impl Bvh2 {
             } else {
                 let (index, first) = (out.nodes.len(), n.first_index as usize);
                 out.depth = out.depth.max(depth + 1);
+                let bounds = |k: usize| Aabb { min: tree.nodes[k].min, max: tree.nodes[k].max };
+                let (axis, swap) = split_axis(&bounds(first), &bounds(first + 1));
+                let (lower, upper) = if swap { (first + 1, first) } else { (first, first + 1) };
                 let corners = |k: usize| [tree.nodes[k].min.to_array(), tree.nodes[k].max.to_array()];
-                out.nodes.push(Node { boxes: [corners(first), corners(first + 1)], children: [0; 2], reserved: [0; 2] });
-                work.push((first + 1, depth + 1, Some((index, 1))));
-                work.push((first, depth + 1, Some((index, 0))));
-                index as u32
+                out.nodes.push(Node { boxes: [corners(lower), corners(upper)], children: [0; 2], reserved: [0; 2] });
+                work.push((upper, depth + 1, Some((index, 1))));
+                work.push((lower, depth + 1, Some((index, 0))));
+                axis << AXIS_SHIFT | index as u32
             };
             match parent {
                 Some((node, side)) => out.nodes[node].children[side] = reference,
@@ -104,7 +129,7 @@ impl Bvh2 {
     }
 
     /// Checks the whole structure against the boxes it was built from: every primitive in exactly one leaf, every box holds
-    /// what is below it, the depth as stated. The error says what is wrong.
+    /// what is below it, children in order along the stated axis, the depth as stated. The error says what is wrong.
     pub fn validate(&self, boxes: &[Aabb]) -> Result<(), String> {
         let mut seen = vec![false; boxes.len()];
         let mut depth = 0;
@@ -128,12 +153,18 @@ impl Bvh2 {
                 continue;
             }
             depth = depth.max(level + 1);
-            let node = self.nodes.get(reference as usize).ok_or(format!("node {reference} is outside"))?;
+            let (number, axis) =
+                inner_node(reference).filter(|r| r.1 < 3).ok_or(format!("reference {reference:#x} is broken"))?;
+            let node = self.nodes.get(number as usize).ok_or(format!("node {number} is outside"))?;
+            let [a, b] = node.boxes.map(|b| bounds_of(&b));
+            if split_axis(&a, &b) != (axis as u32, false) {
+                return Err(format!("children of node {number} are not in order along axis {axis}"));
+            }
             for side in 0..2 {
                 let [lo, hi] = node.boxes[side];
                 let child = Aabb { min: lo.into(), max: hi.into() };
                 if !bounds.contains(&child) {
-                    return Err(format!("child {side} of node {reference} sticks out of its parent"));
+                    return Err(format!("child {side} of node {number} sticks out of its parent"));
                 }
                 work.push((node.children[side], child, level + 1));
             }
@@ -191,6 +222,26 @@ mod tests {
         }
     }
 
+    /// Two clusters apart along one axis only: the root must say so, whichever of them the builder put first.
+    #[test]
+    fn a_reference_names_the_axis_that_separates() {
+        for axis in 0..3 {
+            let place = |i: usize| {
+                let mut p = Vec3::new((i % 3) as f32, (i % 5) as f32, (i % 7) as f32);
+                p[axis] += if i.is_multiple_of(2) { 1000.0 } else { 0.0 };
+                p
+            };
+            let b = boxes(40, place, |_| 0.3);
+            let tree = Bvh2::build(&b, BuildPreset::Default, 2);
+            tree.validate(&b).unwrap();
+            assert_eq!(inner_node(tree.root), Some((0, axis)));
+            assert!(tree.nodes[0].boxes[0][1][axis] < 500.0 && tree.nodes[0].boxes[1][0][axis] > 500.0);
+            // a rebased reference keeps its axis
+            assert_eq!(inner_node(rebase(tree.root, 77, 5)), Some((77, axis)));
+        }
+        assert_eq!(inner_node(EMPTY), None);
+    }
+
     #[test]
     fn coincident_boxes_are_valid() {
         let b = boxes(1000, |_| Vec3::ONE, |_| 0.5);
@@ -207,8 +258,15 @@ mod tests {
         let mut bad = good.clone();
         bad.primitives[3] = bad.primitives[4];
         assert!(bad.validate(&b).is_err());
-        let mut bad = good;
+        let mut bad = good.clone();
         bad.depth += 1;
+        assert!(bad.validate(&b).is_err());
+        let mut bad = good.clone();
+        bad.nodes[0].boxes.reverse();
+        bad.nodes[0].children.reverse();
+        assert!(bad.validate(&b).unwrap_err().contains("order"));
+        let mut bad = good;
+        bad.root += 3 << AXIS_SHIFT;
         assert!(bad.validate(&b).is_err());
     }
 }

@@ -32,7 +32,7 @@ pub struct Key(u128);
 
 impl KeyBuilder {
     /// Adds bytes; their number is added too, so that parts cannot run into each other.
-    pub fn add(mut self, bytes: &[u8]) -> Self {
+    pub fn with(mut self, bytes: &[u8]) -> Self {
         self.0.update(&(bytes.len() as u64).to_le_bytes());
         self.0.update(bytes);
         self
@@ -58,7 +58,7 @@ impl Entries {
         let (_, place) = self.places.iter().find(|(n, _)| n == name)?;
         let bytes = &self.bytes[place.clone()];
         let mut out = vec![T::zeroed(); bytes.len() / size_of::<T>()];
-        (bytes.len() % size_of::<T>() == 0).then(|| {
+        (bytes.len().is_multiple_of(size_of::<T>())).then(|| {
             bytemuck::cast_slice_mut(&mut out).copy_from_slice(bytes);
             out
         })
@@ -178,7 +178,7 @@ mod tests {
     }
 
     fn key(text: &str) -> Key {
-        KeyBuilder::default().add(text.as_bytes()).finish()
+        KeyBuilder::default().with(text.as_bytes()).finish()
     }
 
     #[test]
@@ -198,7 +198,7 @@ mod tests {
 
     #[test]
     fn parts_of_a_key_do_not_run_together() {
-        let of = |parts: &[&str]| parts.iter().fold(KeyBuilder::default(), |k, p| k.add(p.as_bytes())).finish();
+        let of = |parts: &[&str]| parts.iter().fold(KeyBuilder::default(), |k, p| k.with(p.as_bytes())).finish();
         assert_ne!(of(&["ab", "c"]), of(&["a", "bc"]));
         assert_ne!(of(&["ab"]), of(&["ab", ""]));
         assert_eq!(of(&["ab", "c"]), of(&["ab", "c"]));
@@ -230,7 +230,9 @@ mod tests {
     /// A head that fits a body full of nonsense numbers.
     #[test]
     fn a_well_signed_table_is_not_trusted() {
-        for body in [vec![0xff; 8], [1u64.to_le_bytes().to_vec(), vec![1, b'x'], u64::MAX.to_le_bytes().to_vec()].concat(), vec![]] {
+        for body in
+            [vec![0xff; 8], [1u64.to_le_bytes().to_vec(), vec![1, b'x'], u64::MAX.to_le_bytes().to_vec()].concat(), vec![]]
+        {
             let length = (HEAD + body.len()) as u64;
             let sum = xxh3_128(&body).to_le_bytes();
             assert!(parse([&MAGIC[..], &length.to_le_bytes(), &sum, &body].concat()).is_none(), "{body:?}");

@@ -4,14 +4,15 @@ pub mod build;
 pub mod bvh2;
 pub mod cache;
 pub mod clip;
-pub mod cwbvh;
+pub mod pairs;
 mod reinsert;
 mod sah;
 mod spatial;
+pub mod wide;
 
 pub use build::BuildPreset;
 pub use bvh2::Bvh2;
-pub use cwbvh::Cwbvh;
+pub use wide::Wide;
 
 /// An axis-aligned box in f32.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -7,12 +7,14 @@ use clap::{Args, ValueEnum, ValueHint};
 use glam::DVec3;
 
 use super::console::Console;
+use crate::bvh::BuildPreset;
+use crate::bvh::cache::Cache;
 use crate::error::{Error, Result};
 use crate::output::{self, ImageFormat};
 use crate::render::ao::Hemisphere;
 use crate::render::camera::Choice;
 use crate::render::rays::Mode;
-use crate::tracer::TracerKind;
+use crate::tracer::{BuildOptions, ComputeOptions, Kernel, TracerKind, TriangleTest};
 
 /// Samples per pixel when neither the command line nor the scene says.
 pub const DEFAULT_SPP: u32 = 16;
@@ -43,6 +45,48 @@ impl TracerChoice {
             Self::Pipeline => asked(TracerKind::Pipeline),
             Self::Query => asked(TracerKind::Query),
             Self::Compute => asked(TracerKind::Compute),
+        }
+    }
+}
+
+/// How the compute tracer finds what a ray meets.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Traversal {
+    /// Eight-wide nodes, children in the order of the ray's octant: the fast one
+    Wide,
+    /// Binary nodes, the nearest child first
+    Nearest,
+    /// Binary nodes, children in the order of the ray's direction on the split axis
+    Direction,
+    /// Every primitive of every instance: for small scenes and tests
+    Brute,
+}
+
+impl From<Traversal> for Kernel {
+    fn from(t: Traversal) -> Self {
+        match t {
+            Traversal::Wide => Kernel::Wide,
+            Traversal::Nearest => Kernel::Nearest,
+            Traversal::Direction => Kernel::Direction,
+            Traversal::Brute => Kernel::Brute,
+        }
+    }
+}
+
+/// The compute tracer's test of a ray against a triangle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum TriangleTestChoice {
+    /// No ray slips between triangles that share an edge
+    Watertight,
+    /// For benchmarks: rays slip through edges
+    MollerTrumbore,
+}
+
+impl From<TriangleTestChoice> for TriangleTest {
+    fn from(t: TriangleTestChoice) -> Self {
+        match t {
+            TriangleTestChoice::Watertight => TriangleTest::Watertight,
+            TriangleTestChoice::MollerTrumbore => TriangleTest::MollerTrumbore,
         }
     }
 }
@@ -127,12 +171,38 @@ impl Verbosity {
     }
 }
 
+/// How much time to spend on a hierarchy.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum BuildChoice {
+    /// By the number of primitives and of rays
+    Auto,
+    /// Ready soonest
+    Fast,
+    /// Balanced
+    Default,
+    /// Traced fastest: large triangles are split
+    Best,
+}
+
 /// What it runs on.
 #[derive(Clone, Debug, Args)]
 pub struct DeviceArgs {
     /// How rays are traced
     #[arg(long, value_enum, default_value = "auto")]
     pub tracer: TracerChoice,
+    /// How the compute tracer walks its hierarchy [default: wide]
+    #[arg(long, value_enum)]
+    pub traversal: Option<Traversal>,
+    /// The compute tracer's triangle test [default: watertight]
+    #[arg(long, value_enum)]
+    pub triangle_test: Option<TriangleTestChoice>,
+    /// Time to spend on the compute tracer's hierarchy
+    #[arg(long, value_enum, default_value = "auto")]
+    pub build: BuildChoice,
+    /// Keep the compute tracer's hierarchies in this folder, and take them from there when the same geometry comes again
+    /// [env: SKYLIT_BVH_CACHE]
+    #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath)]
+    pub bvh_cache: Option<PathBuf>,
     /// Vulkan device, by index or part of its name (`skylit doctor` lists them)
     #[arg(long, value_name = "INDEX|NAME")]
     pub device: Option<String>,
@@ -145,6 +215,48 @@ impl DeviceArgs {
     /// How to open the device.
     pub fn options(&self) -> crate::gpu::Options {
         crate::gpu::Options { device: self.device.clone(), validation: self.validation, ..Default::default() }
+    }
+
+    /// How the compute tracer's hierarchy is built, when about so many rays will be traced.
+    pub fn build_options(&self, rays: u64) -> BuildOptions {
+        let from_environment = || std::env::var_os("SKYLIT_BVH_CACHE").filter(|v| !v.is_empty()).map(PathBuf::from);
+        let preset = match self.build {
+            BuildChoice::Auto => None,
+            BuildChoice::Fast => Some(BuildPreset::Fast),
+            BuildChoice::Default => Some(BuildPreset::Default),
+            BuildChoice::Best => Some(BuildPreset::Best),
+        };
+        BuildOptions { preset, rays, cache: self.bvh_cache.clone().or_else(from_environment).map(Cache::new) }
+    }
+
+    /// The tracer on a device, why this one, and how the compute tracer works. What concerns the compute tracer alone chooses it
+    /// where `--tracer` leaves the choice.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] when such an option meets another tracer.
+    pub fn choose(&self, info: &crate::gpu::DeviceInfo) -> Result<(TracerKind, String, ComputeOptions)> {
+        let option = match (self.traversal, self.triangle_test) {
+            (Some(_), _) => Some("--traversal"),
+            (None, Some(_)) => Some("--triangle-test"),
+            (None, None) => None,
+        };
+        let (kind, why) = match (self.tracer, option) {
+            (TracerChoice::Auto, Some(option)) => (TracerKind::Compute, format!("{option} is about this tracer alone")),
+            (choice, _) => choice.on(info),
+        };
+        match option {
+            Some(option) if kind != TracerKind::Compute => {
+                Err(Error::Usage(format!("{option} is about the compute tracer: leave it out, or say --tracer compute")))
+            }
+            _ => Ok((
+                kind,
+                why,
+                ComputeOptions {
+                    kernel: self.traversal.map(Kernel::from).unwrap_or_default(),
+                    triangle_test: self.triangle_test.map(TriangleTest::from).unwrap_or_default(),
+                },
+            )),
+        }
     }
 }
 

@@ -31,8 +31,12 @@ pub fn run(args: &RaysArgs) -> Result<()> {
     let flat = FlatScene::new(&scene);
     move_rays(&mut set, -flat.origin);
     let device = Device::open(&args.device.options())?;
-    let (kind, _) = args.device.tracer.on(&device.info);
-    let tracer = Tracer::new(&device, kind, &flat, Needs::default())?;
+    let (kind, _, compute) = args.device.choose(&device.info)?;
+    let tracer = {
+        // and once more to warm up
+        let build = args.device.build_options(set.len() as u64 * (args.repeats as u64 + 1));
+        Tracer::with_build(&device, kind, &flat, Needs::default(), compute, &build)?
+    };
     let stats = tracer.stats();
     let mut control = Keyboard { progress: Progress::new("tracing", &console), keep_partial: false };
     let (hits, times) = rays::trace(&tracer, &set, args.mode.into(), args.repeats, &mut control)?;
@@ -47,9 +51,10 @@ pub fn run(args: &RaysArgs) -> Result<()> {
     let rate = |seconds: f64| if seconds > 0.0 { set.len() as f64 / seconds / 1e6 } else { 0.0 };
     let (on_device, on_wall) = (rate(median(&times.device)), rate(median(&times.wall)));
     console.line(&format!(
-        "{} rays, {hit_count} hit; tracer {kind} on {}: {on_device:.2} Mrays/s on the device, {on_wall:.2} by the clock \
+        "{} rays, {hit_count} hit; tracer {kind}{} on {}: {on_device:.2} Mrays/s on the device, {on_wall:.2} by the clock \
          (median of {}); built in {:.3} s, {:.1} bytes per primitive",
         set.len(),
+        tracer.compute_options().map(|o| format!(" ({})", o.kernel)).unwrap_or_default(),
         device.info.name,
         args.repeats,
         stats.build_seconds,
@@ -57,6 +62,8 @@ pub fn run(args: &RaysArgs) -> Result<()> {
     ))?;
     console.record(&serde_json::json!({
         "tracer": kind.name(),
+        "traversal": tracer.compute_options().map(|o| o.kernel),
+        "triangle_test": tracer.compute_options().map(|o| o.triangle_test),
         "device": device.info.name,
         "driver": device.info.driver,
         "mode": rays::Mode::from(args.mode),

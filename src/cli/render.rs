@@ -39,7 +39,7 @@ pub fn run(args: &RenderArgs, start: Instant) -> Result<()> {
     let camera = choose_camera(args, &scene, aspect)?;
     let flat = FlatScene::new(&scene);
     let record = CameraRecord::new(&camera, flat.origin, aspect);
-    let (kind, why) = args.device.tracer.on(&device.info);
+    let (kind, why, compute) = args.device.choose(&device.info)?;
     let options = AoOptions {
         size,
         spp: args.spp.or(scene.hints.spp).unwrap_or(DEFAULT_SPP).max(1),
@@ -52,7 +52,9 @@ pub fn run(args: &RenderArgs, start: Instant) -> Result<()> {
     };
     let needs =
         Needs { normals: options.hemisphere == Hemisphere::Shading || args.wants(Aov::Ns), albedo: args.wants(Aov::Albedo) };
-    let tracer = Tracer::new(&device, kind, &flat, needs)?;
+    // a camera ray and an occlusion ray each
+    let rays = 2 * options.spp as u64 * size[0] as u64 * size[1] as u64;
+    let tracer = Tracer::with_build(&device, kind, &flat, needs, compute, &args.device.build_options(rays))?;
 
     let mut control = Keyboard { progress: Progress::new("rendering", &console), keep_partial: args.keep_partial };
     let mut result = ao::render(&tracer, &record, &options, &mut control)?;
@@ -74,6 +76,7 @@ pub fn run(args: &RenderArgs, start: Instant) -> Result<()> {
         device: &device.info,
         tracer: kind,
         why,
+        compute: tracer.compute_options(),
         options: &options,
         spp: result.spp,
         stopped_early: result.stopped_early,

@@ -6,7 +6,7 @@ use super::args::RenderArgs;
 use crate::gpu::DeviceInfo;
 use crate::render::ao::{AoOptions, Hemisphere};
 use crate::scene::{Camera, Projection, Scene};
-use crate::tracer::{BuildStats, TracerKind};
+use crate::tracer::{BuildStats, ComputeOptions, TracerKind};
 
 /// Seconds of each part of a run. Loading and starting the device overlap.
 #[derive(Clone, Copy, Debug, Default, serde::Serialize)]
@@ -39,6 +39,8 @@ pub struct Report<'a> {
     pub tracer: TracerKind,
     /// Why this tracer.
     pub why: String,
+    /// How the compute tracer worked, where it was the one.
+    pub compute: Option<ComputeOptions>,
     /// The options of the pass.
     pub options: &'a AoOptions,
     /// Samples that every pixel got.
@@ -147,6 +149,9 @@ impl Report<'_> {
     fn explanations(&self) -> Vec<String> {
         let [_, occlusion, skipped] = self.rays;
         let mut lines = vec![format!("tracer {}: {}", self.tracer, self.why)];
+        if let Some(ComputeOptions { kernel, triangle_test }) = self.compute {
+            lines.push(format!("traversal {kernel}: {}; triangle test {triangle_test}", kernel.describe()));
+        }
         lines.extend(self.features.iter().cloned());
         lines.push(match self.options.binary() {
             true => "binary occlusion: any hit ends a ray, no nearest one is looked for".into(),
@@ -192,6 +197,8 @@ impl Report<'_> {
             },
             "tracer": self.tracer.name(),
             "tracer_reason": self.why,
+            "traversal": self.compute.map(|o| o.kernel),
+            "triangle_test": self.compute.map(|o| o.triangle_test),
             "device": self.device.name,
             "driver": self.device.driver,
             "mean": self.mean,

@@ -1,53 +1,34 @@
-//! What the compute tracer walks: a hierarchy per group and one over the placed groups, all in one node array, for one of two
-//! kernels.
+//! What the compute tracer walks: a hierarchy per group and one over the placed groups, all in one node array. Here is the fast
+//! kernel's and what all share; the readable kernel's is in `reference.rs`, and `brute.rs` has none.
 
 use std::sync::Arc;
 
 use glam::Vec3;
 
-use super::stream::LAUNCH_RAYS;
-use crate::bvh::build::MAX_DEPTH;
-use crate::bvh::{Aabb, BuildPreset, Bvh2, Cwbvh, bvh2, cwbvh};
+use super::kernel::{BuildOptions, Kernel};
+use super::{brute, reference, wide};
+use crate::bvh::{Aabb, bvh2};
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, Device, Memory};
-use crate::ray::Ray;
 use crate::scene::flatten::{FlatScene, Group};
 
 /// Rays that a lane of the fast kernel takes one after the other on a CPU driver, where idle lanes of a vector cost most.
-pub const RAYS_PER_LANE_CPU: u32 = 8;
+pub const RAYS_PER_LANE_CPU: u32 = 16;
 /// On a GPU enough rays fill the machine; long loops per lane only lengthen the tail.
 pub const RAYS_PER_LANE_GPU: u32 = 2;
 
-/// Which kernel traces.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Kernel {
-    /// Eight-wide quantised nodes, lanes that refill: `shaders/trace/wide.glsl`.
-    #[default]
-    Wide,
-    /// The readable one: binary nodes, one ray a lane: `shaders/trace/reference.glsl`.
-    Reference,
-}
-
 /// Bytes of a primitive record.
-const PRIMITIVE_BYTES: u64 = 40;
-const ALPHA_TESTED: u32 = 0x8000_0000;
-const SPHERE: u32 = 0x4000_0000;
-/// Primitives of a leaf of the binary tree at most: more cost memory accesses, fewer cost nodes.
-const REFERENCE_LEAF: u32 = 4;
+pub(super) const PRIMITIVE_BYTES: u64 = 40;
+pub(super) const ALPHA_TESTED: u32 = 0x8000_0000;
+pub(super) const SPHERE: u32 = 0x4000_0000;
 /// Bytes of a closest hit between the steps of a launch.
-const HIT_BYTES: u64 = 24;
-
-/// A tree of one kernel or the other.
-enum Tree {
-    Wide(Cwbvh),
-    Reference(Bvh2),
-}
+pub(super) const HIT_BYTES: u64 = 24;
 
 /// Hierarchies on the host.
-pub(super) struct Trees {
-    groups: Vec<Tree>,
-    top: Option<Tree>,
+pub(super) enum Trees {
+    Wide(wide::Trees),
+    Binary(reference::Trees, Kernel),
+    None,
 }
 
 /// Hierarchies in device memory.
@@ -67,6 +48,8 @@ pub(super) struct Hierarchy {
     /// Between the steps of a launch (fast kernel only).
     pub launch_rays: Option<Buffer>,
     pub launch_hits: Option<Buffer>,
+    /// A u32 per work-group: rays that its lanes have taken.
+    pub launch_counters: Option<Buffer>,
 }
 
 impl Hierarchy {
@@ -83,53 +66,21 @@ impl Hierarchy {
         }
     }
 
+    /// What the kernel's array is specialised to: the fast kernel holds the upper end of the stack in registers.
+    pub fn stack_constant(&self) -> u32 {
+        match self.kernel {
+            Kernel::Wide => self.stack_entries.saturating_sub(wide::STACK_IN_REGISTERS),
+            _ => self.stack_entries.max(1),
+        }
+    }
+
     pub fn bytes(&self) -> u64 {
         self.nodes.size() + self.primitives.size()
     }
 }
 
-impl Tree {
-    fn build(kernel: Kernel, boxes: Vec<Aabb>, max_leaf: u32) -> Self {
-        match kernel {
-            Kernel::Wide => {
-                let pad = padding(boxes.iter());
-                Tree::Wide(Cwbvh::build(boxes, pad, BuildPreset::Default))
-            }
-            Kernel::Reference => Tree::Reference(Bvh2::build(&boxes, BuildPreset::Default, max_leaf)),
-        }
-    }
-
-    fn nodes(&self) -> u32 {
-        match self {
-            Tree::Wide(t) => t.nodes.len() as u32,
-            Tree::Reference(t) => t.nodes.len() as u32,
-        }
-    }
-
-    fn primitives(&self) -> &[u32] {
-        match self {
-            Tree::Wide(t) => &t.primitives,
-            Tree::Reference(t) => &t.primitives,
-        }
-    }
-
-    fn depth(&self) -> u32 {
-        match self {
-            Tree::Wide(t) => t.depth,
-            Tree::Reference(t) => t.depth,
-        }
-    }
-
-    fn bounds(&self, boxes: impl Iterator<Item = Aabb>) -> Aabb {
-        match self {
-            Tree::Wide(t) => t.bounds.unwrap_or(Aabb::EMPTY),
-            Tree::Reference(_) => boxes.fold(Aabb::EMPTY, Aabb::union),
-        }
-    }
-}
-
 impl Trees {
-    pub fn build(flat: &FlatScene, kernel: Kernel) -> Result<Self> {
+    pub fn build(flat: &FlatScene, kernel: Kernel, options: &BuildOptions) -> Result<Self> {
         let total = flat.primitive_count();
         if total > bvh2::MAX_PRIMITIVES || flat.placements.len() > bvh2::MAX_PRIMITIVES {
             return Err(Error::Scene(format!(
@@ -138,151 +89,33 @@ impl Trees {
                 bvh2::MAX_PRIMITIVES
             )));
         }
-        let groups: Vec<_> =
-            flat.groups.iter().map(|g| Tree::build(kernel, primitive_boxes(flat, g).collect(), REFERENCE_LEAF)).collect();
-        let top = (!flat.is_single_level()).then(|| Tree::build(kernel, placement_boxes(flat, &groups), 1));
-        Ok(Self { groups, top })
+        Ok(match kernel {
+            Kernel::Wide => Trees::Wide(wide::Trees::build(flat, options)),
+            Kernel::Nearest | Kernel::Direction => Trees::Binary(reference::Trees::build(flat, options), kernel),
+            Kernel::Brute => {
+                brute::check(flat)?;
+                Trees::None
+            }
+        })
     }
 
     pub fn upload(self, device: &Arc<Device>, flat: &FlatScene) -> Result<Hierarchy> {
-        let bounds = match (&self.top, self.groups.first()) {
-            (Some(top), _) => top.bounds(placement_boxes(flat, &self.groups).into_iter()),
-            (None, Some(group)) => group.bounds(flat.groups.iter().flat_map(|g| primitive_boxes(flat, g))),
-            (None, None) => Aabb::EMPTY,
-        };
-        let group_depth = self.groups.iter().map(Tree::depth).max().unwrap_or(0);
-        let kernel = match self.groups.first().or(self.top.as_ref()) {
-            Some(Tree::Reference(_)) => Kernel::Reference,
-            _ => Kernel::Wide,
-        };
-        // Every node visit pushes at most one entry. Entering an entry of the top level pushes the way back; the wide kernel
-        // also what is left of the node's children and of the leaf's other entries.
-        let stack_entries = match (&self.top, kernel) {
-            (None, _) => group_depth,
-            (Some(top), Kernel::Reference) => top.depth() + 1 + group_depth,
-            (Some(top), Kernel::Wide) => top.depth() + 3 + group_depth,
-        };
-        debug_assert!(stack_entries <= 2 * MAX_DEPTH + 3);
-        // the top level first: it is visited by every ray
-        let top_primitives = match (&self.top, kernel) {
-            // leaves of the wide top level are records, those of the binary one are references
-            (Some(top), Kernel::Wide) => top.primitives().len() as u32,
-            _ => 0,
-        };
-        let mut bases = Vec::new();
-        let (mut node, mut primitive) = (self.top.as_ref().map_or(0, Tree::nodes), top_primitives);
-        for g in &self.groups {
-            bases.push((node, primitive));
-            node += g.nodes();
-            primitive += g.primitives().len() as u32;
+        match self {
+            Trees::Wide(trees) => trees.upload(device, flat),
+            Trees::Binary(trees, kernel) => trees.upload(device, flat, kernel),
+            Trees::None => brute::upload(device, flat),
         }
-        let roots: Vec<_> = self
-            .groups
-            .iter()
-            .zip(&bases)
-            .map(|(g, b)| match g {
-                Tree::Wide(_) => b.0,
-                Tree::Reference(t) => bvh2::rebase(t.root, b.0, b.1),
-            })
-            .collect();
-        let instance_roots: Vec<_> = flat.placements.iter().map(|p| roots[p.group]).collect();
-        let root = match &self.top {
-            Some(Tree::Wide(_)) => 0,
-            Some(Tree::Reference(top)) => top_reference(top, top.root),
-            None => roots.first().copied().unwrap_or(bvh2::EMPTY),
-        };
-
-        let trees: Vec<(&Tree, (u32, u32), bool)> = self
-            .top
-            .iter()
-            .map(|t| (t, (0, 0), true))
-            .chain(self.groups.iter().zip(&bases).map(|(t, &b)| (t, b, false)))
-            .collect();
-        let nodes = match kernel {
-            Kernel::Wide => write_records(
-                device,
-                "hierarchy nodes",
-                cwbvh::NODE_BYTES,
-                node as u64,
-                &mut trees.iter().flat_map(|&(t, b, _)| {
-                    let Tree::Wide(t) = t else { unreachable!("all trees are of one kernel") };
-                    (0..t.nodes.len()).map(move |k| t.rebased(k, b.0, b.1))
-                }),
-            )?,
-            Kernel::Reference => write_records(
-                device,
-                "hierarchy nodes",
-                size_of::<bvh2::Node>() as u64,
-                node as u64,
-                &mut trees.iter().flat_map(|&(t, b, is_top)| {
-                    let Tree::Reference(t) = t else { unreachable!("all trees are of one kernel") };
-                    let pad = padding(
-                        t.nodes
-                            .first()
-                            .into_iter()
-                            .flat_map(|n| n.boxes.map(|b| Aabb { min: b[0].into(), max: b[1].into() }))
-                            .collect::<Vec<_>>()
-                            .iter(),
-                    );
-                    t.nodes.iter().map(move |n| bvh2::Node {
-                        boxes: n.boxes.map(|[lo, hi]| [lo.map(|x| x - pad), hi.map(|x| x + pad)]),
-                        children: n.children.map(|c| if is_top { top_reference(t, c) } else { bvh2::rebase(c, b.0, b.1) }),
-                        ..*n
-                    })
-                }),
-            )?,
-        };
-        let top_records = self.top.iter().filter(|_| kernel == Kernel::Wide).flat_map(|t| {
-            t.primitives().iter().map(|&entry| {
-                let mut r = [0u32; 10];
-                r[9] = entry;
-                r
-            })
-        });
-        let group_records = self
-            .groups
-            .iter()
-            .zip(&flat.groups)
-            .flat_map(|(t, group)| t.primitives().iter().map(move |&p| record(flat, group, p)));
-        // one more: the fast kernel loads records in pairs
-        let primitives = write_records(
-            device,
-            "hierarchy primitives",
-            PRIMITIVE_BYTES,
-            primitive as u64 + 1,
-            &mut top_records.chain(group_records).chain([[0u32; 10]]),
-        )?;
-        let launch = |name, bytes| match kernel {
-            Kernel::Wide => Buffer::new(device, name, bytes * LAUNCH_RAYS as u64, Memory::Device).map(Some),
-            Kernel::Reference => Ok(None),
-        };
-        let (launch_rays, launch_hits) = (launch("launch rays", size_of::<Ray>() as u64)?, launch("launch hits", HIT_BYTES)?);
-        let mut unfinished = Buffer::new(device, "unfinished rays", 4, Memory::Readback)?;
-        unfinished.fill(4, 4, |_, bytes| bytes.fill(0))?;
-        Ok(Hierarchy {
-            unfinished,
-            kernel,
-            nodes,
-            primitives,
-            root,
-            instance_roots,
-            stack_entries,
-            bounds,
-            launch_rays,
-            launch_hits,
-        })
     }
 }
 
-/// A leaf of the binary top level names the entry itself.
-fn top_reference(top: &Bvh2, reference: u32) -> u32 {
-    match bvh2::leaf_range(reference) {
-        Some((slot, _)) => reference - slot + top.primitives[slot as usize],
-        None => reference,
-    }
+/// Counts rays that were cut short: see [`Hierarchy::check_finished`].
+pub(super) fn unfinished_counter(device: &Arc<Device>) -> Result<Buffer> {
+    let mut counter = Buffer::new(device, "unfinished rays", 4, Memory::Readback)?;
+    counter.fill(4, 4, |_, bytes| bytes.fill(0))?;
+    Ok(counter)
 }
 
-fn write_records<T: bytemuck::NoUninit>(
+pub(super) fn write_records<T: bytemuck::NoUninit>(
     device: &Arc<Device>,
     name: &str,
     size: u64,
@@ -300,25 +133,24 @@ fn write_records<T: bytemuck::NoUninit>(
 
 /// How far boxes are widened: eight half-ulps of the largest coordinate. It covers what quantisation rounds away; and a ray that
 /// runs within the plane of flat geometry is then strictly inside the box, so that the traversal needs no special case for it.
-fn padding<'a>(boxes: impl Iterator<Item = &'a Aabb>) -> f32 {
+pub(super) fn padding<'a>(boxes: impl Iterator<Item = &'a Aabb>) -> f32 {
     let reach = boxes.fold(0.0f32, |m, b| m.max(b.min.abs().max(b.max.abs()).max_element()));
     (4.0 * f32::EPSILON * reach).max(1e-30)
 }
 
-fn primitive_boxes(flat: &FlatScene, group: &Group) -> impl Iterator<Item = Aabb> {
+pub(super) fn primitive_boxes(flat: &FlatScene, group: &Group) -> impl Iterator<Item = Aabb> {
     group.parts.iter().flat_map(move |part| {
         let count = flat.scene.meshes[part.mesh].geometry.primitive_count();
         (part.first_primitive..part.first_primitive + count).map(move |p| flat.primitive_bounds(group, part, p))
     })
 }
 
-/// World boxes of the placed groups, widened by what rounding a ray into a group's space may move it.
-fn placement_boxes(flat: &FlatScene, trees: &[Tree]) -> Vec<Aabb> {
+/// World boxes of the placed groups from each group's own, widened by what rounding a ray into a group's space may move it.
+pub(super) fn placement_boxes(flat: &FlatScene, bounds: &[Aabb]) -> Vec<Aabb> {
     let scene = flat.bounds();
     let reach = scene.min.abs().max(scene.max.abs()).max_element().max(0.0);
     // 16 half-ulps of the largest coordinate: two transforms of three products each, and the inverse's own rounding
     let pad = 16.0 * f32::EPSILON * 0.5 * reach;
-    let bounds: Vec<Aabb> = trees.iter().zip(&flat.groups).map(|(t, g)| t.bounds(primitive_boxes(flat, g))).collect();
     flat.placements
         .iter()
         .map(|p| {
@@ -334,7 +166,8 @@ fn placement_boxes(flat: &FlatScene, trees: &[Tree]) -> Vec<Aabb> {
         .collect()
 }
 
-fn record(flat: &FlatScene, group: &Group, primitive: u32) -> [u32; 10] {
+/// A primitive of a group as the shaders read it.
+pub(super) fn record(flat: &FlatScene, group: &Group, primitive: u32) -> [u32; 10] {
     let part = flat.part_of(group, primitive as usize);
     let k = primitive as usize - part.first_primitive;
     let mut out = [0u32; 10];

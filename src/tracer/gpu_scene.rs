@@ -38,6 +38,8 @@ struct SceneRoot {
     root: u32,
     reserved: u32,
     unfinished: u64,
+    launch_counters: u64,
+    reserved2: u64,
     bounds_min: [f32; 4],
     bounds_max: [f32; 4],
 }
@@ -228,6 +230,7 @@ impl GpuScene {
         self.root.bounds_min = h.bounds.min.extend(0.0).to_array();
         self.root.bounds_max = h.bounds.max.extend(0.0).to_array();
         self.root.launch_rays = h.launch_rays.as_ref().map_or(0, Buffer::address);
+        self.root.launch_counters = h.launch_counters.as_ref().map_or(0, Buffer::address);
         self.root.launch_hits = h.launch_hits.as_ref().map_or(0, Buffer::address);
         write_all(&mut self.root_buffer, &[self.root])
     }

@@ -4,16 +4,20 @@
 //! tracer ([`stream`]). A [`Tracer`] holds a scene in device memory ([`gpu_scene`]) together with what it is traced through:
 //! a hierarchy of our own (`compute`) or acceleration structures (`hardware`).
 
+mod brute;
 mod compute;
 pub mod gpu_scene;
 mod hardware;
+mod kernel;
+mod reference;
 pub mod stream;
+mod wide;
 
 use std::sync::{Arc, OnceLock};
 use std::time::Instant;
 
-pub use compute::Kernel;
 pub use gpu_scene::Needs;
+pub use kernel::{BuildOptions, ComputeOptions, Kernel, TriangleTest};
 pub use stream::{Push, Stream, StreamShaders};
 
 use crate::error::{Error, Result};
@@ -108,6 +112,7 @@ pub struct Tracer {
     device: Arc<Device>,
     scene: GpuScene,
     structure: Structure,
+    triangle_test: TriangleTest,
     features: SceneFeatures,
     stats: BuildStats,
     // by mode
@@ -121,11 +126,30 @@ impl Tracer {
     /// [`Error::Device`] when the device lacks what the tracer needs, naming it; [`Error::OutOfMemory`]; [`Error::Scene`] when
     /// the scene has more primitives than the tracer can number.
     pub fn new(device: &Arc<Device>, kind: TracerKind, flat: &FlatScene, needs: Needs) -> Result<Self> {
-        Self::with_kernel(device, kind, flat, needs, Kernel::default())
+        Self::with_options(device, kind, flat, needs, ComputeOptions::default())
     }
 
-    /// As [`Tracer::new`], with a choice of the compute tracer's kernel.
-    pub fn with_kernel(device: &Arc<Device>, kind: TracerKind, flat: &FlatScene, needs: Needs, kernel: Kernel) -> Result<Self> {
+    /// As [`Tracer::new`], with a choice of how the compute tracer works: a [`Kernel`] or [`ComputeOptions`]. The hardware
+    /// tracers have no such choice, and disregard it.
+    pub fn with_options(
+        device: &Arc<Device>,
+        kind: TracerKind,
+        flat: &FlatScene,
+        needs: Needs,
+        options: impl Into<ComputeOptions>,
+    ) -> Result<Self> {
+        Self::with_build(device, kind, flat, needs, options.into(), &BuildOptions::default())
+    }
+
+    /// As [`Tracer::with_options`], with a choice of how the compute tracer's hierarchy is built.
+    pub fn with_build(
+        device: &Arc<Device>,
+        kind: TracerKind,
+        flat: &FlatScene,
+        needs: Needs,
+        options: ComputeOptions,
+        build: &BuildOptions,
+    ) -> Result<Self> {
         if !device.info.supports(kind) {
             let missing =
                 device.info.tracers.iter().find(|t| t.tracer == kind).map(|t| t.missing.join(", ")).unwrap_or_default();
@@ -138,7 +162,8 @@ impl Tracer {
         let mut stats = BuildStats { primitives: flat.primitive_count() as u64, ..Default::default() };
         // the hierarchy first: its build needs the most host memory, the scene's buffers come after that is freed
         let start = Instant::now();
-        let hierarchy = if kind == TracerKind::Compute { Some(compute::Trees::build(flat, kernel)?) } else { None };
+        let hierarchy =
+            if kind == TracerKind::Compute { Some(compute::Trees::build(flat, options.kernel, build)?) } else { None };
         stats.build_seconds = start.elapsed().as_secs_f64();
         let start = Instant::now();
         let mut scene = GpuScene::new(device, flat, needs)?;
@@ -165,12 +190,21 @@ impl Tracer {
             stats.upload_seconds = start.elapsed().as_secs_f64();
         }
         stats.scene_bytes = scene.bytes();
-        Ok(Self { kind, device: device.clone(), scene, structure, features, stats, kernels: Default::default() })
+        let triangle_test = options.triangle_test;
+        Ok(Self { kind, device: device.clone(), scene, structure, triangle_test, features, stats, kernels: Default::default() })
     }
 
     /// Which tracer this is.
     pub fn kind(&self) -> TracerKind {
         self.kind
+    }
+
+    /// How the compute tracer works; `None` for the others.
+    pub fn compute_options(&self) -> Option<ComputeOptions> {
+        match &self.structure {
+            Structure::Compute(h) => Some(ComputeOptions { kernel: h.kernel, triangle_test: self.triangle_test }),
+            Structure::Hardware { .. } => None,
+        }
     }
 
     /// The device it runs on.
@@ -214,12 +248,21 @@ impl Tracer {
             Structure::Compute(h) => {
                 let rays_per_lane =
                     if self.device.info.is_cpu() { compute::RAYS_PER_LANE_CPU } else { compute::RAYS_PER_LANE_GPU };
-                let specialization = specialization.set(3, h.stack_entries.max(1)).set(4, rays_per_lane);
-                if h.kernel == Kernel::Reference {
-                    return Stream::reference(&self.device, shaders, &specialization);
+                let specialization = specialization
+                    .set(3, h.stack_constant())
+                    .set(4, rays_per_lane)
+                    .set(5, u32::from(h.kernel == Kernel::Direction))
+                    .set(6, u32::from(self.triangle_test == TriangleTest::Watertight));
+                match h.kernel {
+                    Kernel::Wide => {
+                        let kernel = self.kernel(shaders.mode(), &specialization)?;
+                        Stream::steps(&self.device, shaders, &specialization, kernel, rays_per_lane)
+                    }
+                    Kernel::Nearest | Kernel::Direction => {
+                        Stream::reference(&self.device, shaders, &specialization, rays_per_lane)
+                    }
+                    Kernel::Brute => Stream::brute(&self.device, shaders, &specialization),
                 }
-                let kernel = self.kernel(shaders.mode(), &specialization)?;
-                Stream::steps(&self.device, shaders, &specialization, kernel, rays_per_lane)
             }
             Structure::Hardware { .. } if self.kind == TracerKind::Query => {
                 Stream::query(&self.device, shaders, &specialization)

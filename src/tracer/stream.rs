@@ -25,6 +25,7 @@ pub struct StreamShaders {
     generate: &'static [u8],
     deliver: &'static [u8],
     reference: &'static [u8],
+    brute: &'static [u8],
     query: &'static [u8],
     raygen: &'static [u8],
 }
@@ -96,8 +97,19 @@ impl Stream {
     }
 
     /// For the compute tracer's readable reference.
-    pub(super) fn reference(device: &Arc<Device>, shaders: &StreamShaders, s: &Specialization) -> Result<Self> {
+    pub(super) fn reference(
+        device: &Arc<Device>,
+        shaders: &StreamShaders,
+        s: &Specialization,
+        rays_per_lane: u32,
+    ) -> Result<Self> {
         let pipeline = ComputePipeline::new(device, shaders.name, shaders.reference, s)?;
+        Ok(Self(Pipeline::Single { pipeline, rays_per_group: LANES * rays_per_lane }))
+    }
+
+    /// For the compute tracer without a hierarchy.
+    pub(super) fn brute(device: &Arc<Device>, shaders: &StreamShaders, s: &Specialization) -> Result<Self> {
+        let pipeline = ComputePipeline::new(device, shaders.name, shaders.brute, s)?;
         Ok(Self(Pipeline::Single { pipeline, rays_per_group: LANES }))
     }
 

@@ -1,0 +1,79 @@
+// The compute tracer without a hierarchy: every ray against every primitive of every instance. For tests, which trust it most
+// because there is least that can be wrong, and to show what a hierarchy saves. It supplies main() around the stream's ray(),
+// closest() or any().
+#ifndef TRACE_BRUTE
+#define TRACE_BRUTE
+#include "scene/material.glsl"
+#include "scene/sphere.glsl"
+#include "trace/records.glsl"
+#include "trace/triangle.glsl"
+
+layout(local_size_x = LANES) in;
+
+#define LOAD_FLOATS(base, i) uintBitsToFloat(LOAD_PAIR(base, i))
+
+// The host lets no scene in whose loops would have more turns than any driver runs (src/tracer/brute.rs).
+void main() {
+    uint k = gl_GlobalInvocationID.x;
+    if (k >= push.count) return;
+    SceneRoot root = SceneRoot(push.scene);
+    uvec2 primitives = root.primitives;
+    Ray world = ray(push.first + k);
+    float best = world.tmax;
+    uint best_instance = INVALID;
+    uint best_primitive = INVALID;
+    vec2 best_uv = vec2(0.0);
+
+    // here the root is the number of instances, and what else are nodes is the range of primitives of each
+    uint instances = is_ray(world) ? root.root : 0u;
+    for (uint instance = 0u; instance < instances; instance++) {
+        uvec2 range = LOAD_PAIR(root.nodes, instance);
+        vec3 origin = world.origin;
+        vec3 direction = world.direction;
+        if (!SINGLE_LEVEL) {
+            InstanceRecord record = InstanceRecords(root.instances).v[instance];
+            direction = transform_vector(record.world_to_group, world.direction);
+            origin = transform_point(record.world_to_group, world.origin);
+        }
+        Shear shear = make_shear(direction);
+        for (uint i = range.x; i < range.y; i++) {
+            vec2 a = LOAD_FLOATS(primitives, 5u * i), b = LOAD_FLOATS(primitives, 5u * i + 1u), c = LOAD_FLOATS(primitives, 5u * i + 2u);
+            vec2 d = LOAD_FLOATS(primitives, 5u * i + 3u), e = LOAD_FLOATS(primitives, 5u * i + 4u);
+            uint id = floatBitsToUint(e.y);
+            float t;
+            vec2 uv;
+            bool met;
+            if (HAS_SPHERES && (id & SPHERE) != 0u) {
+                t = intersect_sphere(origin, direction, world.tmin, best, vec3(a, b.x), b.y);
+                uv = vec2(0.0);
+                met = t > world.tmin && t < best;
+            } else {
+                met = intersect_triangle(shear, origin, direction, vec3(a, b.x), vec3(b.y, c), vec3(d, e.x), world.tmin, best, t, uv);
+            }
+            if (HAS_ALPHA) {
+                if (met && (id & ALPHA_TESTED) != 0u) met = alpha_passes(instance, id & NUMBER, uv);
+            }
+            if (met) {
+                best = t;
+                best_instance = instance;
+                best_primitive = id & NUMBER;
+                best_uv = uv;
+            }
+#ifdef STREAM_ANY
+            if (met) break;
+#endif
+        }
+#ifdef STREAM_ANY
+        if (best_primitive != INVALID) break;
+#endif
+    }
+    bool met = best_primitive != INVALID;
+#ifdef STREAM_ANY
+    any(push.first + k, met);
+#else
+    if (met) closest(push.first + k, scene_hit(best, best_instance, best_primitive, best_uv));
+    else closest(push.first + k, miss());
+#endif
+}
+
+#endif

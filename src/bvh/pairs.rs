@@ -1,0 +1,145 @@
+//! Pairs of triangles that share an edge: what a leaf of the wide hierarchy holds. Two triangles take four corners instead of
+//! six, the shared edge is tested once, and the hierarchy is built over half as many boxes.
+
+use rayon::prelude::*;
+
+use super::Aabb;
+
+/// Stands for "no triangle".
+pub const NONE: u32 = u32::MAX;
+
+/// One triangle, or two with a common edge: (0, 1, 2) and (0, 2, 3) of `corners`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Pair {
+    /// Numbers of the triangles; the second may be [`NONE`].
+    pub triangles: [u32; 2],
+}
+
+/// How two triangles go together: their corners in the order of a pair.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Fan {
+    /// Vertices; the last repeats the third where there is one triangle only.
+    pub corners: [u32; 4],
+    /// Of each triangle, where in (0, 1, 2) and (0, 2, 3) its own second and third corner stand.
+    pub second_third: [[u8; 2]; 2],
+}
+
+impl Fan {
+    /// One triangle alone.
+    pub fn single(t: [u32; 3]) -> Self {
+        Self { corners: [t[0], t[1], t[2], t[2]], second_third: [[1, 2]; 2] }
+    }
+
+    /// Two triangles, if they share two vertices.
+    pub fn of(a: [u32; 3], b: [u32; 3]) -> Option<Self> {
+        // the corner of each that the other lacks
+        let apex = (0..3).find(|&k| !b.contains(&a[k]))?;
+        let other = (0..3).find(|&k| !a.contains(&b[k]))?;
+        let corners = [a[(apex + 2) % 3], a[apex], a[(apex + 1) % 3], b[other]];
+        let second = [corners[0], corners[2], corners[3]];
+        let place = |v: u32| second.iter().position(|&s| s == v).map(|p| p as u8);
+        // a degenerate triangle may repeat a vertex
+        if corners[0] == corners[2] || b.iter().any(|&v| place(v).is_none()) || b[0] == b[1] || b[1] == b[2] || b[2] == b[0] {
+            return None;
+        }
+        let turn = (4 - apex as u8) % 3;
+        let of_a = |k: u8| (k + turn) % 3;
+        Some(Self { corners, second_third: [[of_a(1), of_a(2)], [place(b[1])?, place(b[2])?]] })
+    }
+}
+
+/// Which of three edges, by its ends; and both ends in ascending order.
+fn edge(t: &[u32; 3], k: usize) -> [u32; 2] {
+    let (a, b) = (t[k], t[(k + 1) % 3]);
+    [a.min(b), a.max(b)]
+}
+
+/// For every triangle and edge a triangle on its other side, or [`NONE`].
+fn neighbours(triangles: &[[u32; 3]], vertex_count: usize) -> Vec<[u32; 3]> {
+    // edges in buckets by their lower vertex
+    let mut begin = vec![0u32; vertex_count + 1];
+    for t in triangles {
+        for k in 0..3 {
+            begin[edge(t, k)[0] as usize + 1] += 1;
+        }
+    }
+    for v in 0..vertex_count {
+        begin[v + 1] += begin[v];
+    }
+    let mut fill = begin.clone();
+    let mut entries = vec![[0u32; 2]; triangles.len() * 3];
+    for (i, t) in triangles.iter().enumerate() {
+        for k in 0..3 {
+            let [low, high] = edge(t, k);
+            let at = &mut fill[low as usize];
+            entries[*at as usize] = [high, 3 * i as u32 + k as u32];
+            *at += 1;
+        }
+    }
+    let mut out = vec![[NONE; 3]; triangles.len()];
+    for v in 0..vertex_count {
+        let bucket = &mut entries[begin[v] as usize..begin[v + 1] as usize];
+        for i in 0..bucket.len() {
+            let [high, a] = bucket[i];
+            if a == NONE {
+                continue;
+            }
+            if let Some(j) =
+                (i + 1..bucket.len()).find(|&j| bucket[j][0] == high && bucket[j][1] / 3 != a / 3 && bucket[j][1] != NONE)
+            {
+                let b = bucket[j][1];
+                bucket[j][1] = NONE;
+                out[a as usize / 3][a as usize % 3] = b / 3;
+                out[b as usize / 3][b as usize % 3] = a / 3;
+            }
+        }
+    }
+    out
+}
+
+/// Matches triangles with neighbours so that the boxes of the pairs are small: in each round, whoever are each other's best
+/// choice go together. A box of a pair is never larger than `GROWTH` times the two boxes of its triangles.
+pub fn pair_up(triangles: &[[u32; 3]], boxes: &[Aabb], vertex_count: usize) -> Vec<Pair> {
+    const ROUNDS: usize = 4;
+    const GROWTH: f32 = 1.2;
+    let neighbours = neighbours(triangles, vertex_count);
+    let mut partner = vec![NONE; triangles.len()];
+    let mut wish = vec![NONE; triangles.len()];
+    for _ in 0..ROUNDS {
+        wish.par_iter_mut().with_min_len(4096).enumerate().for_each(|(t, wish)| {
+            *wish = NONE;
+            if partner[t] != NONE {
+                return;
+            }
+            let mut best = (f32::INFINITY, NONE, NONE);
+            for &n in &neighbours[t] {
+                if n == NONE || partner[n as usize] != NONE || Fan::of(triangles[t], triangles[n as usize]).is_none() {
+                    continue;
+                }
+                let (a, b) = (boxes[t], boxes[n as usize]);
+                let (union, sum) = (a.union(b).half_area(), a.half_area() + b.half_area());
+                if union > GROWTH * sum {
+                    continue;
+                }
+                let key = (union - sum, (t as u32).min(n), (t as u32).max(n));
+                if key < best {
+                    best = key;
+                    *wish = n;
+                }
+            }
+        });
+        partner.par_iter_mut().with_min_len(4096).enumerate().for_each(|(t, partner)| {
+            let w = wish[t];
+            if *partner == NONE && w != NONE && wish[w as usize] == t as u32 {
+                *partner = w;
+            }
+        });
+    }
+    let mut pairs = Vec::with_capacity(triangles.len() / 2 + 1);
+    for (t, &p) in partner.iter().enumerate() {
+        if p == NONE || p > t as u32 {
+            pairs.push(Pair { triangles: [t as u32, p] });
+        }
+    }
+    pairs
+}

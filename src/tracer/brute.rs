@@ -1,0 +1,57 @@
+//! What the compute tracer reads when it walks no tree (`shaders/trace/brute.glsl`): primitives group by group, and for each
+//! instance which of them are its own.
+
+use std::sync::Arc;
+
+use super::compute::{Hierarchy, PRIMITIVE_BYTES, record, unfinished_counter, write_records};
+use super::kernel::Kernel;
+use crate::error::{Error, Result};
+use crate::gpu::Device;
+use crate::scene::flatten::{FlatScene, Group};
+
+fn primitives_of(flat: &FlatScene, group: &Group) -> u32 {
+    group.parts.iter().map(|p| flat.scene.meshes[p.mesh].geometry.primitive_count() as u32).sum()
+}
+
+/// Fails for a scene of which every ray would have to test too much.
+pub(super) fn check(flat: &FlatScene) -> Result<()> {
+    let counts: Vec<_> = flat.groups.iter().map(|g| primitives_of(flat, g) as usize).collect();
+    let tests: usize = flat.placements.iter().map(|p| counts[p.group] + 1).sum();
+    if tests <= Kernel::BRUTE_MOST {
+        return Ok(());
+    }
+    Err(Error::Scene(format!(
+        "traversal 'brute' tests every primitive of every instance against every ray, at most {}; this scene has {tests}: use \
+         another --traversal",
+        Kernel::BRUTE_MOST
+    )))
+}
+
+/// Writes the lists. The scene must have passed [`check`].
+pub(super) fn upload(device: &Arc<Device>, flat: &FlatScene) -> Result<Hierarchy> {
+    let mut total = 0;
+    let ranges: Vec<[u32; 2]> = flat
+        .groups
+        .iter()
+        .map(|g| {
+            let first = total;
+            total += primitives_of(flat, g);
+            [first, total]
+        })
+        .collect();
+    let mut records = flat.groups.iter().flat_map(|g| (0..primitives_of(flat, g)).map(move |p| record(flat, g, p)));
+    let mut entries = flat.placements.iter().map(|p| ranges[p.group]);
+    Ok(Hierarchy {
+        kernel: Kernel::Brute,
+        nodes: write_records::<[u32; 2]>(device, "instance ranges", 8, flat.placements.len() as u64, &mut entries)?,
+        primitives: write_records(device, "primitives", PRIMITIVE_BYTES, u64::from(total), &mut records)?,
+        root: flat.placements.len() as u32,
+        instance_roots: flat.placements.iter().map(|p| ranges[p.group][0]).collect(),
+        stack_entries: 0,
+        bounds: flat.bounds(),
+        unfinished: unfinished_counter(device)?,
+        launch_rays: None,
+        launch_hits: None,
+        launch_counters: None,
+    })
+}

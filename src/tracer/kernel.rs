@@ -1,0 +1,121 @@
+//! Which of the compute tracer's kernels runs, and how it tests triangles.
+
+use crate::bvh::BuildPreset;
+use crate::bvh::cache::Cache;
+
+/// How the compute tracer finds what a ray meets. All give the same hits; docs/traversal.md compares their speed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Kernel {
+    /// The fast one: eight-wide quantised nodes whose children are visited in the order of the ray's octant, lanes that refill:
+    /// `shaders/trace/wide.glsl`.
+    #[default]
+    Wide,
+    /// The readable one: binary nodes, the child whose box is entered first comes first: `shaders/trace/reference.glsl`.
+    Nearest,
+    /// As `Nearest`, but the sign of the ray's direction on the node's axis says which child comes first.
+    Direction,
+    /// No tree, every primitive of every instance: `shaders/trace/brute.glsl`. For scenes of at most [`Kernel::BRUTE_MOST`].
+    Brute,
+}
+
+impl Kernel {
+    /// All of them.
+    pub const ALL: [Kernel; 4] = [Kernel::Wide, Kernel::Nearest, Kernel::Direction, Kernel::Brute];
+
+    /// Primitives, each instance's counted, and instances that [`Kernel::Brute`] takes at most together. Mesa before 23 leaves
+    /// a loop after 65,535 turns; and a launch of the fewest rays should not stall a device for long.
+    pub const BRUTE_MOST: usize = 40_000;
+
+    /// As on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Kernel::Wide => "wide",
+            Kernel::Nearest => "nearest",
+            Kernel::Direction => "direction",
+            Kernel::Brute => "brute",
+        }
+    }
+
+    /// What it does, in half a line.
+    pub fn describe(self) -> &'static str {
+        match self {
+            Kernel::Wide => "eight-wide nodes, children in the order of the ray's octant",
+            Kernel::Nearest => "binary nodes, the nearest child first",
+            Kernel::Direction => "binary nodes, children in the order of the ray's direction on the split axis",
+            Kernel::Brute => "every primitive of every instance, no hierarchy",
+        }
+    }
+}
+
+impl std::fmt::Display for Kernel {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+/// The compute tracer's test of a ray against a triangle.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum TriangleTest {
+    /// Woop, Benthin, Wald (JCGT 2013): no ray slips between triangles that share an edge.
+    #[default]
+    Watertight,
+    /// Moeller and Trumbore (JGT 1997): for benchmarks. Rays slip through edges.
+    MollerTrumbore,
+}
+
+impl TriangleTest {
+    /// As on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            TriangleTest::Watertight => "watertight",
+            TriangleTest::MollerTrumbore => "moller-trumbore",
+        }
+    }
+}
+
+impl std::fmt::Display for TriangleTest {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+/// How the compute tracer works; the other tracers have no such choice.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
+pub struct ComputeOptions {
+    /// The kernel.
+    pub kernel: Kernel,
+    /// Its triangle test.
+    pub triangle_test: TriangleTest,
+}
+
+/// How the compute tracer's hierarchy is built; drivers build those of the other tracers.
+#[derive(Clone, Debug)]
+pub struct BuildOptions {
+    /// How much time to spend; `None`: what suits the numbers of primitives and of rays ([`BuildPreset::auto`]).
+    pub preset: Option<BuildPreset>,
+    /// Rays that will be traced, about.
+    pub rays: u64,
+    /// Where built hierarchies are kept, if anywhere. Only those of the wide kernel are.
+    pub cache: Option<Cache>,
+}
+
+impl Default for BuildOptions {
+    fn default() -> Self {
+        Self { preset: Some(BuildPreset::Default), rays: 0, cache: None }
+    }
+}
+
+impl BuildOptions {
+    /// The preset for a number of primitives.
+    pub fn preset(&self, primitives: usize) -> BuildPreset {
+        self.preset.unwrap_or_else(|| BuildPreset::auto(primitives, self.rays))
+    }
+}
+
+impl From<Kernel> for ComputeOptions {
+    fn from(kernel: Kernel) -> Self {
+        Self { kernel, ..Default::default() }
+    }
+}

@@ -1,0 +1,111 @@
+//! What the compute tracer's readable kernel walks (`shaders/trace/reference.glsl`): binary trees, one per group and one over the
+//! placed groups, in one node array.
+
+use std::sync::Arc;
+
+use super::compute::{
+    Hierarchy, PRIMITIVE_BYTES, padding, placement_boxes, primitive_boxes, record, unfinished_counter, write_records,
+};
+use super::kernel::BuildOptions;
+use super::kernel::Kernel;
+use crate::bvh::build::MAX_DEPTH;
+use crate::bvh::{Aabb, Bvh2, bvh2};
+use crate::error::Result;
+use crate::gpu::Device;
+use crate::scene::flatten::FlatScene;
+
+/// Primitives of a leaf at most: more cost memory accesses, fewer cost nodes.
+const MAX_LEAF: u32 = 4;
+
+/// The trees on the host.
+pub(super) struct Trees {
+    groups: Vec<Bvh2>,
+    top: Option<Bvh2>,
+    /// Of everything, not padded.
+    bounds: Aabb,
+}
+
+impl Trees {
+    pub fn build(flat: &FlatScene, options: &BuildOptions) -> Self {
+        let (mut groups, mut bounds) = (Vec::new(), Vec::new());
+        for g in &flat.groups {
+            let boxes: Vec<_> = primitive_boxes(flat, g).collect();
+            bounds.push(boxes.iter().copied().fold(Aabb::EMPTY, Aabb::union));
+            groups.push(Bvh2::build(&boxes, options.preset(boxes.len()), MAX_LEAF));
+        }
+        let mut top = None;
+        if !flat.is_single_level() {
+            bounds = placement_boxes(flat, &bounds);
+            // a leaf of the top level holds one entry: entering it leaves the tree
+            top = Some(Bvh2::build(&bounds, options.preset(bounds.len()), 1));
+        }
+        Self { groups, top, bounds: bounds.into_iter().fold(Aabb::EMPTY, Aabb::union) }
+    }
+
+    pub fn upload(self, device: &Arc<Device>, flat: &FlatScene, kernel: Kernel) -> Result<Hierarchy> {
+        let group_depth = self.groups.iter().map(|g| g.depth).max().unwrap_or(0);
+        // every node visit pushes at most one entry, entering an entry of the top level the way back
+        let stack_entries = self.top.as_ref().map_or(0, |top| top.depth + 1) + group_depth;
+        debug_assert!(stack_entries <= 2 * MAX_DEPTH + 1);
+        // the top level first: it is visited by every ray
+        let mut bases = Vec::new();
+        let (mut node, mut primitive) = (self.top.as_ref().map_or(0, |t| t.nodes.len() as u32), 0);
+        for g in &self.groups {
+            bases.push((node, primitive));
+            node += g.nodes.len() as u32;
+            primitive += g.primitives.len() as u32;
+        }
+        let roots: Vec<_> = self.groups.iter().zip(&bases).map(|(g, b)| bvh2::rebase(g.root, b.0, b.1)).collect();
+        let root = match &self.top {
+            Some(top) => top_reference(top, top.root),
+            None => roots.first().copied().unwrap_or(bvh2::EMPTY),
+        };
+        let top_nodes = self.top.iter().flat_map(|t| padded(t, |c| top_reference(t, c)));
+        let group_nodes = self.groups.iter().zip(bases).flat_map(|(t, b)| padded(t, move |c| bvh2::rebase(c, b.0, b.1)));
+        let nodes = write_records(
+            device,
+            "hierarchy nodes",
+            size_of::<bvh2::Node>() as u64,
+            node as u64,
+            &mut top_nodes.chain(group_nodes),
+        )?;
+        let mut records = self
+            .groups
+            .iter()
+            .zip(&flat.groups)
+            .flat_map(|(t, group)| t.primitives.iter().map(move |&p| record(flat, group, p)));
+        let primitives = write_records(device, "hierarchy primitives", PRIMITIVE_BYTES, primitive as u64, &mut records)?;
+        Ok(Hierarchy {
+            kernel,
+            nodes,
+            primitives,
+            root,
+            instance_roots: flat.placements.iter().map(|p| roots[p.group]).collect(),
+            stack_entries,
+            bounds: self.bounds,
+            unfinished: unfinished_counter(device)?,
+            launch_rays: None,
+            launch_hits: None,
+            launch_counters: None,
+        })
+    }
+}
+
+/// A leaf of the top level names the entry itself.
+fn top_reference(top: &Bvh2, reference: u32) -> u32 {
+    match bvh2::leaf_range(reference) {
+        Some((slot, _)) => reference - slot + top.primitives[slot as usize],
+        None => reference,
+    }
+}
+
+/// A tree's nodes with padded boxes and changed references.
+fn padded<'a>(tree: &'a Bvh2, change: impl Fn(u32) -> u32 + 'a) -> impl Iterator<Item = bvh2::Node> + 'a {
+    let root = tree.nodes.first().map(|n| n.boxes.map(|b| Aabb { min: b[0].into(), max: b[1].into() }));
+    let pad = padding(root.iter().flatten());
+    tree.nodes.iter().map(move |n| bvh2::Node {
+        boxes: n.boxes.map(|[lo, hi]| [lo.map(|x| x - pad), hi.map(|x| x + pad)]),
+        children: n.children.map(&change),
+        ..*n
+    })
+}

@@ -1,0 +1,265 @@
+//! What the compute tracer's fast kernel walks (`shaders/trace/wide.glsl`): a wide hierarchy per group and one over the placed
+//! groups, all in one array of blocks. Here are the leaves.
+//!
+//! | leaf | words 0-11 | 12, 13 | 14 |
+//! |---|---|---|---|
+//! | triangles | four corners: of (0, 1, 2) and (0, 2, 3) | their numbers, the second may be none | places of each one's second and third corner, two bits each |
+//! | sphere | centre, radius | its number, none | |
+//! | entry of the top level | world to group, three rows | root block, number of the entry | |
+//!
+//! A number has flags above it: alpha-tested, sphere.
+
+use std::sync::Arc;
+
+use glam::Vec3;
+use rayon::prelude::*;
+
+use super::compute::{
+    ALPHA_TESTED, HIT_BYTES, Hierarchy, SPHERE, padding, placement_boxes, primitive_boxes, unfinished_counter, write_records,
+};
+use super::gpu_scene::rows;
+use super::kernel::BuildOptions;
+use super::kernel::Kernel;
+use super::stream::LAUNCH_RAYS;
+use crate::bvh::build::{self, MAX_DEPTH};
+use crate::bvh::cache::KeyBuilder;
+use crate::bvh::pairs::{self, Fan, Pair};
+use crate::bvh::wide::{self, BLOCK_BYTES, Block, Wide};
+use crate::bvh::{Aabb, BuildPreset, bvh2};
+use crate::error::{Error, Result};
+use crate::gpu::{Buffer, Device, Memory};
+use crate::ray::Ray;
+use crate::scene::Geometry;
+use crate::scene::flatten::{FlatScene, Group};
+
+/// Entries of the stack that the kernel keeps in registers: `TOP` in the shader.
+pub(super) const STACK_IN_REGISTERS: u32 = 6;
+
+/// The hierarchies on the host.
+pub(super) struct Trees {
+    groups: Vec<Wide>,
+    top: Option<Wide>,
+}
+
+impl Trees {
+    pub fn build(flat: &FlatScene, options: &BuildOptions) -> Self {
+        let groups: Vec<_> = flat
+            .groups
+            .iter()
+            .map(|g| if g.spheres { sphere_tree(flat, g, options) } else { triangle_tree(flat, g, options) })
+            .collect();
+        let top = (!flat.is_single_level()).then(|| {
+            let bounds: Vec<_> = groups.iter().map(|g| g.bounds.unwrap_or(Aabb::EMPTY)).collect();
+            tree(placement_boxes(flat, &bounds), options, |entry| {
+                let placement = &flat.placements[entry as usize];
+                let mut block = [0; 16];
+                block[..12].copy_from_slice(rows(&placement.to_world.inverse()).as_flattened().map_bits());
+                // the root is filled in when the groups have their places
+                block[13] = entry;
+                block
+            })
+        });
+        Self { groups, top }
+    }
+
+    pub fn upload(mut self, device: &Arc<Device>, flat: &FlatScene) -> Result<Hierarchy> {
+        let bounds = self.top.as_ref().or(self.groups.first()).and_then(|t| t.bounds).unwrap_or(Aabb::EMPTY);
+        let group_depth = self.groups.iter().map(|g| g.depth).max().unwrap_or(0);
+        // Every node visit pushes at most one entry. Entering an entry of the top level pushes its siblings and the way back.
+        let stack_entries = self.top.as_ref().map_or(0, |top| top.depth + 2) + group_depth;
+        debug_assert!(stack_entries <= 2 * MAX_DEPTH + 2);
+        // the top level first: it is visited by every ray
+        let mut roots = Vec::new();
+        let mut count = self.top.as_ref().map_or(0, |t| t.blocks.len());
+        for g in &self.groups {
+            roots.push(count as u32);
+            count += g.blocks.len();
+        }
+        if u32::try_from(count).is_err() {
+            return Err(Error::Scene(format!("its hierarchy has {count} blocks; the compute tracer addresses 2^32")));
+        }
+        if let Some(top) = &mut self.top {
+            for block in top.blocks.iter_mut().filter(|b| wide::is_leaf(b)) {
+                block[12] = roots[flat.placements[block[13] as usize].group];
+            }
+        }
+        let trees = self.top.iter().map(|t| (t, 0)).chain(self.groups.iter().zip(roots.iter().copied()));
+        let nodes = write_records(
+            device,
+            "hierarchy",
+            BLOCK_BYTES,
+            count as u64,
+            &mut trees.flat_map(|(t, by)| t.blocks.iter().map(move |b| wide::rebased(*b, by))),
+        )?;
+        let launch = |name, bytes| Buffer::new(device, name, bytes * LAUNCH_RAYS as u64, Memory::Device).map(Some);
+        Ok(Hierarchy {
+            kernel: Kernel::Wide,
+            primitives: Buffer::new(device, "no primitives", 16, Memory::Device)?,
+            nodes,
+            // an empty scene has no tree, and rays that miss its bounds never begin
+            root: if count == 0 { bvh2::EMPTY } else { 0 },
+            instance_roots: vec![0; flat.placements.len()],
+            stack_entries,
+            bounds,
+            unfinished: unfinished_counter(device)?,
+            launch_rays: launch("launch rays", size_of::<Ray>() as u64)?,
+            launch_hits: launch("launch hits", HIT_BYTES)?,
+            launch_counters: launch("launch counters", 4)?,
+        })
+    }
+}
+
+trait Bits {
+    fn map_bits(&self) -> &[u32];
+}
+
+impl Bits for [f32] {
+    fn map_bits(&self) -> &[u32] {
+        bytemuck::cast_slice(self)
+    }
+}
+
+/// A tree over boxes, not yet padded.
+fn tree(mut boxes: Vec<Aabb>, options: &BuildOptions, leaf: impl Fn(u32) -> Block + Sync) -> Wide {
+    if boxes.is_empty() {
+        return Wide::default();
+    }
+    let pad = padding(boxes.iter());
+    boxes.par_iter_mut().for_each(|b| *b = Aabb { min: b.min - pad, max: b.max + pad });
+    let binary = build::tree(&boxes, options.preset(boxes.len()), None);
+    drop(boxes);
+    Wide::collapse(&binary, leaf)
+}
+
+/// Raised whenever the same input gives other blocks: builders, pairs, collapse, the layout of nodes and leaves.
+const LAYOUT_VERSION: u32 = 1;
+
+/// What lies next to the blocks of a kept hierarchy.
+#[repr(C)]
+#[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+struct Kept {
+    bounds: [[f32; 3]; 2],
+    depth: u32,
+    reserved: u32,
+    sah_cost: f64,
+}
+
+/// The hierarchy over what these bytes describe, from the cache if it is there, otherwise built and kept.
+fn kept(options: &BuildOptions, preset: BuildPreset, content: &[&[u8]], build: impl FnOnce() -> Wide) -> Wide {
+    let Some(cache) = &options.cache else { return build() };
+    let head = KeyBuilder::default().with(&LAYOUT_VERSION.to_le_bytes()).with(format!("{preset:?}").as_bytes());
+    let key = content.iter().fold(head, |k, bytes| k.with(bytes)).finish();
+    let loaded = cache.load(key).and_then(|entries| {
+        let kept = *entries.get::<Kept>("tree")?.first()?;
+        let [min, max] = kept.bounds.map(Vec3::from);
+        Some(Wide {
+            blocks: entries.get("blocks")?,
+            depth: kept.depth,
+            bounds: Some(Aabb { min, max }),
+            sah_cost: kept.sah_cost,
+        })
+    });
+    if let Some(wide) = loaded {
+        return wide;
+    }
+    let wide = build();
+    if let Some(b) = wide.bounds {
+        let bounds = [b.min.to_array(), b.max.to_array()];
+        let kept = Kept { bounds, depth: wide.depth, reserved: 0, sah_cost: wide.sah_cost };
+        cache.store(key, &[("tree", bytemuck::bytes_of(&kept)), ("blocks", bytemuck::cast_slice(&wide.blocks))]);
+    }
+    wide
+}
+
+fn sphere_tree(flat: &FlatScene, group: &Group, options: &BuildOptions) -> Wide {
+    tree(primitive_boxes(flat, group).collect(), options, |primitive| {
+        let part = flat.part_of(group, primitive as usize);
+        let s = flat.sphere(part, primitive as usize - part.first_primitive);
+        let mut block = [0; 16];
+        block[..4].copy_from_slice([s.center.x, s.center.y, s.center.z, s.radius].map_bits());
+        block[12..14].copy_from_slice(&[primitive | SPHERE, pairs::NONE]);
+        block
+    })
+}
+
+/// A group's triangles, gathered from its parts.
+struct Triangles {
+    positions: Vec<Vec3>,
+    indices: Vec<[u32; 3]>,
+}
+
+impl Triangles {
+    fn of(flat: &FlatScene, group: &Group) -> Self {
+        let mut out =
+            Self { positions: Vec::with_capacity(group.vertex_count), indices: Vec::with_capacity(group.primitive_count) };
+        for part in &group.parts {
+            let Geometry::Triangles(t) = &flat.scene.meshes[part.mesh].geometry else { continue };
+            out.positions.par_extend((0..t.positions.len()).into_par_iter().map(|v| flat.vertex(part, v)));
+            out.indices.par_extend(t.indices.par_iter().map(|t| t.map(|v| v + part.first_vertex as u32)));
+        }
+        out
+    }
+
+    fn corners(&self, vertices: [u32; 3]) -> [Vec3; 3] {
+        vertices.map(|v| self.positions[v as usize])
+    }
+}
+
+fn triangle_tree(flat: &FlatScene, group: &Group, options: &BuildOptions) -> Wide {
+    let triangles = Triangles::of(flat, group);
+    let preset = options.preset(triangles.indices.len());
+    let opaque = group.opaque_count as u32;
+    let content: [&[u8]; 3] =
+        [&opaque.to_le_bytes(), bytemuck::cast_slice(&triangles.positions), bytemuck::cast_slice(&triangles.indices)];
+    kept(options, preset, &content, || {
+        let boxes: Vec<Aabb> = triangles.indices.par_iter().map(|&t| Aabb::of_points(&triangles.corners(t))).collect();
+        let pairs = pairs::pair_up(&triangles.indices, &boxes, triangles.positions.len());
+        let boxes: Vec<Aabb> = pairs
+            .par_iter()
+            .map(|p| match p.triangles {
+                [a, pairs::NONE] => boxes[a as usize],
+                [a, b] => boxes[a as usize].union(boxes[b as usize]),
+            })
+            .collect();
+        if boxes.is_empty() {
+            return Wide::default();
+        }
+        let pad = padding(boxes.iter());
+        let of_pair = |pair: u32, see: &mut dyn FnMut([Vec3; 3])| {
+            for t in pairs[pair as usize].triangles.into_iter().filter(|&t| t != pairs::NONE) {
+                see(triangles.corners(triangles.indices[t as usize]));
+            }
+        };
+        let binary = build::tree_with_splits(&boxes, &of_pair, preset, pad);
+        drop(boxes);
+        Wide::collapse(&binary, |pair| pair_block(&triangles, pairs[pair as usize], opaque))
+    })
+}
+
+fn pair_block(triangles: &Triangles, pair: Pair, opaque: u32) -> Block {
+    let [a, b] = pair.triangles;
+    let corners = |t: u32| triangles.indices[t as usize];
+    let fan = if b == pairs::NONE {
+        Fan::single(corners(a))
+    } else {
+        Fan::of(corners(a), corners(b)).unwrap_or_else(|| Fan::single(corners(a)))
+    };
+    let mut block = [0; 16];
+    for (k, v) in fan.corners.into_iter().enumerate() {
+        block[3 * k..3 * k + 3].copy_from_slice(&triangles.positions[v as usize].to_array().map(f32::to_bits));
+    }
+    let number = |t: u32| {
+        if t == pairs::NONE {
+            t
+        } else if t >= opaque {
+            t | ALPHA_TESTED
+        } else {
+            t
+        }
+    };
+    block[12] = number(a);
+    block[13] = number(b);
+    let places = fan.second_third.map(|[second, third]| (second | third << 2) as u32);
+    block[14] = places[0] | places[1] << 4;
+    block
+}
