@@ -180,7 +180,7 @@ pub enum BuildChoice {
     Fast,
     /// Balanced
     Default,
-    /// Traced fastest: large triangles are split
+    /// Large triangles are split: nearest hits are found fastest
     Best,
 }
 
