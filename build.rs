@@ -1,7 +1,8 @@
 //! Compiles the shaders: each pass's stream once per tracer and mode, and the shaders that the tracers share.
 //!
-//! A pass is a file `shaders/NAME.glsl` whose head says `// stream: any`, `// stream: closest` or both. The generated
-//! `shaders.rs` holds a constant `NAME_ANY` / `NAME_CLOSEST` for each (see `src/tracer/stream.rs`).
+//! A pass is a file `shaders/NAME.glsl` whose head says `// stream: any`, `// stream: closest` or both; `// rays: queue` besides
+//! when the rays are in memory before it begins. The generated `shaders.rs` holds a constant `NAME_ANY` / `NAME_CLOSEST` for each
+//! (see `src/tracer/stream.rs`). `// compute` instead: a compute shader that traces nothing, as the constant `NAME`.
 
 use std::cell::RefCell;
 use std::collections::BTreeSet;
@@ -48,9 +49,18 @@ struct Variant {
     kind: ShaderKind,
 }
 
-const VARIANTS: [Variant; 6] = [
+/// Loads and stores of 64 bits, where the device has such integers.
+const HEAD_64: &str = "#extension GL_EXT_shader_explicit_arithmetic_types_int64 : require\n#define LOAD64\n";
+
+/// Subgroup ballots besides: one atomic for all lanes that append to a queue.
+const HEAD_64_BALLOT: &str = "#extension GL_EXT_shader_explicit_arithmetic_types_int64 : require\n#define LOAD64\n\
+     #extension GL_KHR_shader_subgroup_ballot : require\n#define BALLOT\n";
+
+const VARIANTS: [Variant; 8] = [
     Variant { field: "generate", template: "trace/generate.glsl", head: "", kind: ShaderKind::Compute },
+    Variant { field: "generate_64", template: "trace/generate.glsl", head: HEAD_64, kind: ShaderKind::Compute },
     Variant { field: "deliver", template: "trace/deliver.glsl", head: "", kind: ShaderKind::Compute },
+    Variant { field: "deliver_64", template: "trace/deliver.glsl", head: HEAD_64_BALLOT, kind: ShaderKind::Compute },
     Variant { field: "reference", template: "trace/reference.glsl", head: "", kind: ShaderKind::Compute },
     Variant { field: "brute", template: "trace/brute.glsl", head: "", kind: ShaderKind::Compute },
     Variant {
@@ -105,18 +115,37 @@ impl Build {
         for file in files {
             let name = file.file_stem().and_then(|s| s.to_str()).expect("shader names are plain").to_owned();
             let text = std::fs::read_to_string(&file).expect("a shader can be read");
+            if text.lines().any(|l| l == "// compute") {
+                let source = format!("#version 460\n{EXTENSIONS}#define LANES {LANES}\n#include \"{name}.glsl\"\n");
+                self.compile(&source, ShaderKind::Compute, &format!("{name}.glsl"), &format!("{name}.spv"));
+                let _ = writeln!(
+                    table,
+                    "/// `shaders/{name}.glsl`, which traces nothing.\npub static {}: &[u8] = include_bytes!(concat!(env!(\"OUT_DIR\"), \"/{name}.spv\"));",
+                    name.to_uppercase()
+                );
+                continue;
+            }
             let Some(modes) = text.lines().find_map(|l| l.strip_prefix("// stream:")) else {
-                self.errors.push(format!("{}: no line '// stream: any' or '// stream: closest' at its head", file.display()));
+                self.errors.push(format!(
+                    "{}: no line '// stream: any', '// stream: closest' or '// compute' at its head",
+                    file.display()
+                ));
                 continue;
             };
+            // what traces rays in memory needs no step that puts them there
+            let queue = text.lines().any(|l| l == "// rays: queue");
             for mode in modes.split_whitespace() {
                 let constant = format!("{}_{}", name.to_uppercase(), mode.to_uppercase());
                 let _ = write!(
                     table,
-                    "/// The stream `shaders/{name}.glsl`, mode `{mode}`.\npub static {constant}: StreamShaders = StreamShaders {{\n    name: \"{name} {mode}\",\n    mode: Mode::{},\n",
+                    "/// The stream `shaders/{name}.glsl`, mode `{mode}`.\npub static {constant}: StreamShaders = StreamShaders {{\n    name: \"{name} {mode}\",\n    pass: \"{name}\",\n    steps: [\"{name} generate\", \"{name} trace\", \"{name} deliver\"],\n    queue: {queue},\n    mode: Mode::{},\n",
                     if mode == "any" { "Any" } else { "Closest" }
                 );
                 for v in &VARIANTS {
+                    if queue && v.template == "trace/generate.glsl" {
+                        let _ = writeln!(table, "    {}: &[],", v.field);
+                        continue;
+                    }
                     let define = if mode == "any" { "#define STREAM_ANY\n" } else { "#define STREAM_CLOSEST\n" };
                     let source = format!(
                         "#version 460\n{EXTENSIONS}{}#define LANES {LANES}\n{define}#include \"{name}.glsl\"\n#include \"{}\"\n",
@@ -137,9 +166,7 @@ impl Build {
     fn kernels(&mut self) -> String {
         let mut table = String::new();
         for mode in ["any", "closest"] {
-            for (bits, head) in
-                [(32, ""), (64, "#extension GL_EXT_shader_explicit_arithmetic_types_int64 : require\n#define LOAD64\n")]
-            {
+            for (bits, head) in [(32, ""), (64, HEAD_64)] {
                 let source = format!(
                     "#version 460\n{EXTENSIONS}#extension GL_EXT_control_flow_attributes : require\n{head}#define LANES {LANES}\n\
                      #define STREAM_{}\n#include \"trace/wide.glsl\"\n",

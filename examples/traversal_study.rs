@@ -39,7 +39,7 @@ const COELLO: [(usize, Option<f64>, f64, f64); 8] = [
 ];
 
 /// Tests of a ray against a primitive that a pass without a hierarchy may take: it gets fewer rays in larger scenes.
-const BRUTE_TESTS: usize = 300_000_000;
+const BRUTE_TESTS: usize = 50_000_000;
 
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Study {
@@ -65,7 +65,7 @@ struct Arguments {
     #[arg(long, default_value_t = 45.0)]
     fov_y: f64,
     /// Camera rays: width and height of the image
-    #[arg(long, num_args = 2, default_values_t = [960, 540])]
+    #[arg(long, num_args = 2, default_values_t = [640, 360])]
     size: Vec<u32>,
     /// How often each variant has its turn
     #[arg(long, default_value_t = 5)]

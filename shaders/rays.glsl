@@ -9,10 +9,7 @@ layout(buffer_reference, std430, buffer_reference_align = 8) readonly buffer Ray
 layout(buffer_reference, std430, buffer_reference_align = 4) writeonly buffer Results { uint v[]; };
 
 Ray ray(uint index) {
-    Quads q = Quads(RaySet(push.pass).rays);
-    vec4 a = uintBitsToFloat(q.v[2u * index]);
-    vec4 b = uintBitsToFloat(q.v[2u * index + 1u]);
-    return Ray(a.xyz, a.w, b.xyz, b.w);
+    return load_ray(RaySet(push.pass).rays, index);
 }
 
 #ifdef STREAM_ANY

@@ -121,10 +121,10 @@ fn gpu_parity_far_from_the_origin() {
 fn gpu_parity_brute_force() {
     let device = device();
     let kernels = Kernel::ALL.map(|kernel| (TracerKind::Compute, kernel));
-    for (name, rays) in [("cornell-box", 100_000), ("cornell-spheres", 100_000), ("spheres:200", 60_000), ("grid:2", 60_000)] {
+    for (name, rays) in [("cornell-box", 60_000), ("cornell-spheres", 60_000), ("spheres:100", 40_000), ("grid:2", 30_000)] {
         gate_of(&device, name, &scene(name), rays, &kernels);
     }
-    gate_of(&device, "leaf-cards", &scene("leaf-cards"), 60_000, &kernels);
+    gate_of(&device, "leaf-cards", &scene("leaf-cards"), 30_000, &kernels);
 }
 
 /// What is too much for brute force is refused, with the number.

@@ -2,6 +2,7 @@
 #ifndef COMMON_CAMERA
 #define COMMON_CAMERA
 #include "common/types.glsl"
+#include "common/queue.glsl"
 #include "common/sampler.glsl"
 
 layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer BlockParams {
@@ -16,16 +17,30 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Bl
     uint hemisphere;          // 0: about the geometric normal, 1: about the shading normal
     float falloff_log2;       // a hit at distance d counts 2^(-d * falloff_log2)
     float radius;             // world units beyond which nothing occludes
-    uvec2 film;               // FilmPixel per ray index of the block
-    uvec2 gbuffer;            // three uvec4 per ray of a launch
+    uvec2 film;               // FilmPixel per pixel of the block
+    uvec2 samples;            // a float per ray of a launch: what the sample adds to its pixel, negative where it met nothing
     uvec2 aov;                // AovPixel per ray of a launch
-    uvec2 ray_dump;           // where to write the rays of this pass, or null
+    uvec2 tiles;              // a uint each: the tiles that are rendered; null: all
+    RayQueue queue;           // occlusion rays
+    uvec2 ray_dump;           // where to write the camera rays, or null
+    uvec2 occlusion_dump;     // where to write the occlusion rays, or null
 };
 
-// Ray index to pixel within the block: 8x8 tiles, Morton order within, so that eight neighbouring lanes are a 4x2 patch.
-uvec2 block_pixel(BlockParams p, uint index) {
-    uint tile = index >> 6;
-    uint k = index & 63u;
+// A ray index counts the samples of a pixel before the pixels of the block, so that neighbouring lanes share a pixel. Pixels are
+// counted in 8x8 tiles, Morton order within: with one sample eight neighbouring lanes are a 4x2 patch.
+uint pixel_index(uint ray_index) {
+    return ray_index >> push.sample_bits;
+}
+
+uint sample_index(uint ray_index) {
+    return push.sample_index + (ray_index & ((1u << push.sample_bits) - 1u));
+}
+
+// Pixel within the block.
+uvec2 block_pixel(BlockParams p, uint pixel) {
+    uint tile = pixel >> 6;
+    if (!is_null(p.tiles)) tile = Words(p.tiles).v[tile];
+    uint k = pixel & 63u;
     uvec2 inside = uvec2((k & 1u) | (k >> 1 & 2u) | (k >> 2 & 4u), (k >> 1 & 1u) | (k >> 2 & 2u) | (k >> 3 & 4u));
     return uvec2(tile % p.tiles_x, tile / p.tiles_x) * 8u + inside;
 }
@@ -54,21 +69,9 @@ vec3 view_direction(BlockParams p, vec3 position) {
     return p.orthographic != 0u ? -vec3(rows[0].z, rows[1].z, rows[2].z) : position - vec3(rows[0].w, rows[1].w, rows[2].w);
 }
 
-layout(buffer_reference, std430, buffer_reference_align = 4) writeonly buffer RayDump { float v[]; };
-
-// For --dump-rays: what the pass is about to trace.
-void dump_ray(BlockParams p, uint index, Ray ray) {
-    if (is_null(p.ray_dump)) return;
-    RayDump dump = RayDump(p.ray_dump);
-    uint at = 8u * (index - push.first);
-    dump.v[at] = ray.origin.x;
-    dump.v[at + 1u] = ray.origin.y;
-    dump.v[at + 2u] = ray.origin.z;
-    dump.v[at + 3u] = ray.tmin;
-    dump.v[at + 4u] = ray.direction.x;
-    dump.v[at + 5u] = ray.direction.y;
-    dump.v[at + 6u] = ray.direction.z;
-    dump.v[at + 7u] = ray.tmax;
+// For --dump-rays: what is about to be traced.
+void dump_ray(uvec2 dump, uint index, Ray ray) {
+    if (!is_null(dump)) store_ray(dump, index - push.first, ray);
 }
 
 #endif

@@ -46,14 +46,45 @@ vec2 load_vec2(uvec2 base, uint index) {
     return uintBitsToFloat(Pairs(base).v[index]);
 }
 
+// Two words at once: one access where 64-bit integers exist. A CPU driver stores lane by lane and word by word.
+#ifdef LOAD64
+layout(buffer_reference, std430, buffer_reference_align = 8) writeonly buffer StoredPairs { uint64_t v[]; };
+#define STORE_PAIR(base, i, pair) StoredPairs(base).v[i] = packUint2x32(pair)
+#else
+layout(buffer_reference, std430, buffer_reference_align = 8) writeonly buffer StoredPairs { uvec2 v[]; };
+#define STORE_PAIR(base, i, pair) StoredPairs(base).v[i] = (pair)
+#endif
+
+// A ray in memory is 32 bytes: origin, tmin, direction, tmax.
+void store_ray(uvec2 rays, uint k, Ray r) {
+    STORE_PAIR(rays, 4u * k, floatBitsToUint(r.origin.xy));
+    STORE_PAIR(rays, 4u * k + 1u, floatBitsToUint(vec2(r.origin.z, r.tmin)));
+    STORE_PAIR(rays, 4u * k + 2u, floatBitsToUint(r.direction.xy));
+    STORE_PAIR(rays, 4u * k + 3u, floatBitsToUint(vec2(r.direction.z, r.tmax)));
+}
+
+Ray load_ray(uvec2 rays, uint k) {
+    vec4 a = uintBitsToFloat(Quads(rays).v[2u * k]), b = uintBitsToFloat(Quads(rays).v[2u * k + 1u]);
+    return Ray(a.xyz, a.w, b.xyz, b.w);
+}
+
 // Every stream has this block; `pass` is the address of the pass's own parameters.
 layout(push_constant) uniform Push {
-    uvec2 scene;  // SceneRoot
+    uvec2 scene;       // SceneRoot
     uvec2 pass;
-    uint first;   // index of the first ray of this launch
-    uint count;   // rays in this launch
-    uint sample_index;
-    uint reserved;
+    uvec2 rays;        // the rays of this launch, where they are in memory: a queue's, or the compute tracer's own
+    uvec2 queued;      // address of a uint: how many rays the queue holds; null when the host knows
+    uint first;        // index of the first ray of this launch
+    uint count;        // rays in this launch; of a queue: at most
+    uint sample_index; // the first sample
+    uint sample_bits;  // a launch takes 2^sample_bits samples of each of its pixels
 } push;
+
+// Rays that this launch has to trace. Everything beyond is to be left alone.
+uint ray_count() {
+    if (is_null(push.queued)) return push.count;
+    uint queued = Words(push.queued).v[0];
+    return min(push.count, queued - min(queued, push.first));
+}
 
 #endif

@@ -17,7 +17,8 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Sc
     uvec2 nodes;       // compute tracer: nodes of its hierarchy
     uvec2 primitives;  // compute tracer: PrimitiveRecord
     uvec2 top_level;   // hardware tracers: address of the top-level acceleration structure
-    uvec2 launch_rays; // compute tracer: rays of a launch between its steps
+    uint part_count;
+    uint root_reserved1;
     uvec2 launch_hits; // compute tracer: what they met
     uint root;         // compute tracer: where traversal begins
     uint root_reserved;
@@ -95,10 +96,14 @@ uint part_index(InstanceRecords instances, uint instance, uint primitive) {
 Hit scene_hit(float t, uint instance, uint primitive, vec2 uv) {
     SceneRoot root = SceneRoot(push.scene);
     InstanceRecords instances = InstanceRecords(root.instances);
+    if (SINGLE_LEVEL) instance = 0u;
     uint scene_instance = instances.v[instance].scene_instance;
-    if (scene_instance == INVALID) {
+    PartRecords parts = PartRecords(root.parts);
+    if (root.part_count == 1u) {
+        // it begins with the group
+        if (scene_instance == INVALID) scene_instance = parts.v[0].scene_instance;
+    } else if (scene_instance == INVALID) {
         uint part = part_index(instances, instance, primitive);
-        PartRecords parts = PartRecords(root.parts);
         scene_instance = parts.v[part].scene_instance;
         primitive -= parts.v[part].first_primitive;
     }

@@ -37,9 +37,24 @@ float spawn_offset(vec4 group_to_world[3], vec4 world_to_group[3], vec3 p, vec3 
 // grows with t.
 Surface surface_at(Ray ray, Hit hit) {
     SceneRoot root = SceneRoot(push.scene);
-    uvec2 placement = Pairs(root.placements).v[hit.instance];
-    InstanceRecord instance = InstanceRecords(root.instances).v[placement.x];
-    PartRecord part = PartRecords(root.parts).v[placement.y];
+    uvec2 placement = uvec2(0u);
+    PartRecord part;
+    // the only part of a scene is the same for all lanes: read once for all, not gathered
+    if (root.part_count == 1u) {
+        part = PartRecords(root.parts).v[0];
+        placement.x = SINGLE_LEVEL ? 0u : Pairs(root.placements).v[hit.instance].x;
+    } else {
+        placement = Pairs(root.placements).v[hit.instance];
+        part = PartRecords(root.parts).v[placement.y];
+    }
+    InstanceRecord instance;
+    if (SINGLE_LEVEL) {
+        // one entry, without a transform
+        instance.group_to_world = vec4[3](vec4(1.0, 0.0, 0.0, 0.0), vec4(0.0, 1.0, 0.0, 0.0), vec4(0.0, 0.0, 1.0, 0.0));
+        instance.world_to_group = instance.group_to_world;
+    } else {
+        instance = InstanceRecords(root.instances).v[placement.x];
+    }
     Surface s;
     s.part = placement.y;
     s.primitive = hit.primitive + part.first_primitive;

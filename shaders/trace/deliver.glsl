@@ -8,7 +8,7 @@ layout(local_size_x = LANES) in;
 
 void main() {
     uint k = gl_GlobalInvocationID.x;
-    if (k >= push.count) return;
+    if (k >= ray_count()) return;
     SceneRoot root = SceneRoot(push.scene);
     if (!is_finished(root, k)) {
         deliver_miss(push.first + k);

@@ -8,7 +8,7 @@ layout(local_size_x = LANES) in;
 
 void main() {
     uint k = gl_GlobalInvocationID.x;
-    if (k >= push.count) return;
+    if (k >= ray_count()) return;
     SceneRoot root = SceneRoot(push.scene);
     Ray r = ray(push.first + k);
     // a ray that misses the bounds of everything is answered here, where all lanes are busy
@@ -18,9 +18,8 @@ void main() {
     float near = MAX(MAX(n.x, n.y), MAX(n.z, r.tmin));
     float far = MIN(MIN(MIN(f.x, f.y), f.z) * SLAB_SCALE, r.tmax);
     r.tmax = near <= far ? r.tmax : -1.0;
-    store_ray(root, k, r);
+    store_ray(push.rays, k, r);
     mark_unfinished(root, k);
-    if (k % LANES == 0u) LaunchFlags(root.launch_counters).v[k / LANES] = 0u;
 }
 
 #endif

@@ -1,20 +1,15 @@
-// Rays and results of one launch of the compute tracer's fast kernel, in memory between its three steps.
+// Results of one launch of the compute tracer's fast kernel, in memory between its steps. The rays are at push.rays.
 #ifndef TRACE_LAUNCH
 #define TRACE_LAUNCH
 #include "scene/scene.glsl"
+#include "trace/records.glsl"
 
-layout(buffer_reference, std430, buffer_reference_align = 16) buffer LaunchRays { uvec4 v[]; };
 layout(buffer_reference, std430, buffer_reference_align = 8) buffer LaunchHits { uvec2 v[]; };
 layout(buffer_reference, std430, buffer_reference_align = 4) buffer LaunchFlags { uint v[]; };
 
-void store_ray(SceneRoot root, uint k, Ray r) {
-    LaunchRays rays = LaunchRays(root.launch_rays);
-    rays.v[2u * k] = floatBitsToUint(vec4(r.origin, r.tmin));
-    rays.v[2u * k + 1u] = floatBitsToUint(vec4(r.direction, r.tmax));
-}
-
 // Stands where a result will be. Some CPU drivers leave any loop after 65,535 turns: a ray that this happens to keeps the mark,
-// and is reported instead of delivering what an earlier launch left there.
+// and is reported instead of delivering what an earlier launch left there. Mirrored in src/tracer/stream.rs: where rays come
+// from a queue, the host puts it.
 const uint UNFINISHED = 0x7fc0dead;
 
 void mark_unfinished(SceneRoot root, uint k) {
@@ -45,18 +40,19 @@ bool load_any(SceneRoot root, uint k) {
 
 // The tracer's own ids; scene ids are found when the hit is delivered.
 void store_closest(SceneRoot root, uint k, float t, uint instance, uint primitive, vec2 uv) {
-    LaunchHits hits = LaunchHits(root.launch_hits);
-    hits.v[3u * k] = uvec2(floatBitsToUint(t), instance);
-    hits.v[3u * k + 1u] = uvec2(primitive, floatBitsToUint(uv.x));
-    hits.v[3u * k + 2u] = uvec2(floatBitsToUint(uv.y), 0u);
+    STORE_PAIR(root.launch_hits, 3u * k, uvec2(floatBitsToUint(t), instance));
+    // of a miss nothing else is read
+    if (t == INFINITY) return;
+    STORE_PAIR(root.launch_hits, 3u * k + 1u, uvec2(primitive, floatBitsToUint(uv.x)));
+    STORE_PAIR(root.launch_hits, 3u * k + 2u, uvec2(floatBitsToUint(uv.y), 0u));
 }
 
 Hit load_closest(SceneRoot root, uint k) {
-    LaunchHits hits = LaunchHits(root.launch_hits);
-    uvec2 a = hits.v[3u * k];
+    uvec2 a = LOAD_PAIR(root.launch_hits, 3u * k);
     if (uintBitsToFloat(a.x) == INFINITY) return miss();
-    uvec2 b = hits.v[3u * k + 1u];
-    return scene_hit(uintBitsToFloat(a.x), a.y, b.x, uintBitsToFloat(uvec2(b.y, hits.v[3u * k + 2u].x)));
+    uvec2 b = LOAD_PAIR(root.launch_hits, 3u * k + 1u);
+    uvec2 c = LOAD_PAIR(root.launch_hits, 3u * k + 2u);
+    return scene_hit(uintBitsToFloat(a.x), a.y, b.x, uintBitsToFloat(uvec2(b.y, c.x)));
 }
 
 #endif

@@ -8,6 +8,7 @@
 layout(location = 0) rayPayloadEXT Payload payload;
 
 void main() {
+    if (gl_LaunchIDEXT.x >= ray_count()) return;
     uint index = push.first + gl_LaunchIDEXT.x;
     Ray world = ray(index);
     if (!is_ray(world)) {

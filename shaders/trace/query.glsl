@@ -8,7 +8,7 @@
 layout(local_size_x = LANES) in;
 
 void main() {
-    if (gl_GlobalInvocationID.x >= push.count) return;
+    if (gl_GlobalInvocationID.x >= ray_count()) return;
     uint index = push.first + gl_GlobalInvocationID.x;
     Ray world = ray(index);
     if (!is_ray(world)) {

@@ -45,7 +45,7 @@ float enter_box(vec3 lo, vec3 hi, vec3 origin, vec3 inverse, float tmin, float t
 
 void main() {
     uint next = gl_WorkGroupID.x * (LANES * RAYS_PER_LANE) + gl_LocalInvocationID.x;
-    uint end = min((gl_WorkGroupID.x + 1u) * (LANES * RAYS_PER_LANE), push.count);
+    uint end = min((gl_WorkGroupID.x + 1u) * (LANES * RAYS_PER_LANE), ray_count());
     if (next >= end) return;
 
     SceneRoot root = SceneRoot(push.scene);

@@ -162,13 +162,15 @@ bool meets_between(Shear shear, vec3 origin, vec3 direction, vec3 v0, vec3 v1, v
 // Moeller, Trumbore, "Fast, Minimum Storage Ray/Triangle Intersection" (JGT 1997), double-sided. Each triangle rounds the shared
 // edge in its own way, so rays slip between neighbours; and t is as rounding leaves it.
 bool intersect_moller_trumbore(vec3 origin, vec3 direction, vec3 v0, vec3 v1, vec3 v2, float tmin, float tmax, out float t, out vec2 uv) {
-    vec3 e1 = v1 - v0, e2 = v2 - v0;
+    // Edges of the corners as seen from the origin: in lanes that hold no triangle, corners are often denormal, and so would
+    // their differences be; less the origin they are none.
+    vec3 a = v0 - origin;
+    vec3 e1 = (v1 - origin) - a, e2 = (v2 - origin) - a;
     vec3 p = cross(direction, e2);
     float det = dot(e1, p);
-    // as above: no denormals from lanes that hold no triangle
     bool plausible = abs(det) > 1e-37 && abs(det) < 1e37;
     float inverse_det = 1.0 / (plausible ? det : 1.0);
-    vec3 s = origin - v0;
+    vec3 s = -a;
     vec3 q = cross(s, e1);
     uv = vec2(dot(s, p), dot(direction, q)) * inverse_det;
     t = dot(e2, q) * inverse_det;

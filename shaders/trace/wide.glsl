@@ -65,8 +65,8 @@ const uint TOP = 6u;
         }                                                                   \
     }
 
-Ray take_ray(SceneRoot root, uint k) {
-    Block4 b = Block4(offset_address(root.launch_rays, 32u * k));
+Ray take_ray(uint k) {
+    Block4 b = Block4(offset_address(push.rays, 32u * k));
     vec2 x = uintBitsToFloat(PAIR(b.q0)), y = uintBitsToFloat(PAIR(b.q1)), z = uintBitsToFloat(PAIR(b.q2)), w = uintBitsToFloat(PAIR(b.q3));
     return Ray(vec3(x, y.x), y.y, vec3(z, w.x), w.y);
 }
@@ -82,7 +82,7 @@ Ray take_ray(SceneRoot root, uint k) {
 #define NEXT_RAY                              \
     while (true) {                            \
         if (index >= end) return;             \
-        world = take_ray(root, index);        \
+        world = take_ray(index);        \
         if (is_ray(world)) break;             \
         STORE_MISS                            \
         TAKE                                  \
@@ -149,7 +149,7 @@ float pick_weight(vec3 w, uint k) {
 
 void main() {
     uint begin = gl_WorkGroupID.x * (LANES * RAYS_PER_LANE);
-    uint end = min(begin + LANES * RAYS_PER_LANE, push.count);
+    uint end = min(begin + LANES * RAYS_PER_LANE, ray_count());
     SceneRoot root = SceneRoot(push.scene);
     uint index;
     TAKE

@@ -9,6 +9,7 @@
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use xxhash_rust::xxh3::{Xxh3, xxh3_128};
 
@@ -69,12 +70,23 @@ impl Entries {
 #[derive(Clone, Debug)]
 pub struct Cache {
     folder: PathBuf,
+    /// What went wrong so far.
+    warnings: Arc<Mutex<Vec<String>>>,
 }
 
 impl Cache {
     /// The cache in a folder, which need not exist yet.
     pub fn new(folder: impl Into<PathBuf>) -> Self {
-        Self { folder: folder.into() }
+        Self { folder: folder.into(), warnings: Default::default() }
+    }
+
+    /// What went wrong since the last time this was asked: one line each.
+    pub fn take_warnings(&self) -> Vec<String> {
+        std::mem::take(&mut self.warnings.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+
+    fn warn(&self, text: String) {
+        self.warnings.lock().unwrap_or_else(PoisonError::into_inner).push(text);
     }
 
     /// The file of a key.
@@ -89,13 +101,13 @@ impl Cache {
             Ok(b) => b,
             Err(e) if e.kind() == std::io::ErrorKind::NotFound => return None,
             Err(e) => {
-                tracing::warn!("{}: cannot read ({e}); the hierarchy is built anew", path.display());
+                self.warn(format!("{}: cannot read ({e}); the hierarchy is built anew", path.display()));
                 return None;
             }
         };
         let entries = parse(bytes);
         if entries.is_none() {
-            tracing::warn!("{}: damaged or of another version; the hierarchy is built anew", path.display());
+            self.warn(format!("{}: damaged or of another version; the hierarchy is built anew", path.display()));
         }
         entries
     }
@@ -104,7 +116,7 @@ impl Cache {
     pub fn store(&self, key: Key, arrays: &[(&str, &[u8])]) {
         let path = self.path(key);
         if let Err(e) = self.try_store(&path, arrays) {
-            tracing::warn!("the hierarchy is not kept: {e}");
+            self.warn(format!("the hierarchy is not kept: {e}"));
         }
     }
 
@@ -263,6 +275,7 @@ mod tests {
         std::fs::write(&file, b"x").unwrap();
         let cache = Cache::new(&file);
         stored(&cache, key("a"));
+        assert!(matches!(&cache.take_warnings()[..], [one] if one.contains("not kept")));
         assert!(cache.load(key("a")).is_none());
         assert_eq!(std::fs::read(&file).unwrap(), b"x");
     }

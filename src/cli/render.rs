@@ -2,6 +2,7 @@
 
 use std::io::Write;
 use std::path::Path;
+use std::sync::Arc;
 use std::time::Instant;
 
 use super::args::{Aov, DEFAULT_SIZE, DEFAULT_SPP, RenderArgs, dump_path};
@@ -9,7 +10,7 @@ use super::console::Console;
 use super::interrupt::{self, Keyboard};
 use super::progress::Progress;
 use super::rays::move_rays;
-use super::report::{Report, Seconds};
+use super::report::{Rays, Report, Seconds};
 use crate::error::{Error, Result};
 use crate::gpu::Device;
 use crate::output::{self, Channel, Image, ImageFormat, Samples, png};
@@ -17,6 +18,7 @@ use crate::ray::Ray;
 use crate::render::ao::{self, AoOptions, Hemisphere};
 use crate::render::aov::{self, AovPixel};
 use crate::render::camera::{self, CameraRecord};
+use crate::render::cover::Cover;
 use crate::scene::flatten::FlatScene;
 use crate::scene::{Projection, Scene, load};
 use crate::tracer::{Needs, Tracer};
@@ -40,7 +42,7 @@ pub fn run(args: &RenderArgs, start: Instant) -> Result<()> {
     let flat = FlatScene::new(&scene);
     let record = CameraRecord::new(&camera, flat.origin, aspect);
     let (kind, why, compute) = args.device.choose(&device.info)?;
-    let options = AoOptions {
+    let mut options = AoOptions {
         size,
         spp: args.spp.or(scene.hints.spp).unwrap_or(DEFAULT_SPP).max(1),
         seed: args.seed,
@@ -49,12 +51,20 @@ pub fn run(args: &RenderArgs, start: Instant) -> Result<()> {
         hemisphere: args.ao_normal.into(),
         time_limit: args.time_limit,
         keep_rays: args.dump_rays.is_some(),
+        cover: None,
     };
     let needs =
         Needs { normals: options.hemisphere == Hemisphere::Shading || args.wants(Aov::Ns), albedo: args.wants(Aov::Albedo) };
     // a camera ray and an occlusion ray each
     let rays = 2 * options.spp as u64 * size[0] as u64 * size[1] as u64;
-    let tracer = Tracer::with_build(&device, kind, &flat, needs, compute, &args.device.build_options(rays))?;
+    let build = args.device.build_options(rays);
+    let tracer = Tracer::with_build(&device, kind, &flat, needs, compute, &build)?;
+    build.take_warnings().iter().for_each(|w| console.warning(w));
+
+    // a dump of rays is a set to compare with: all of them
+    if args.dump_rays.is_none() {
+        options.cover = Cover::new(&flat, &record, size, options.spp).map(Arc::new);
+    }
 
     let mut control = Keyboard { progress: Progress::new("rendering", &console), keep_partial: args.keep_partial };
     let mut result = ao::render(&tracer, &record, &options, &mut control)?;
@@ -83,7 +93,12 @@ pub fn run(args: &RenderArgs, start: Instant) -> Result<()> {
         mean,
         mean_standard_error: error,
         covered_mean: covered_mean(&result.film),
-        rays: [result.primary_rays, result.occlusion_rays, result.skipped_rays],
+        rays: Rays {
+            primary: result.primary_rays,
+            skipped_primary: result.skipped_primary_rays,
+            occlusion: result.occlusion_rays,
+            skipped: result.skipped_rays,
+        },
         device_seconds: std::mem::take(&mut result.device_seconds),
         longest_launch: result.longest_launch,
         stats: tracer.stats(),
@@ -112,7 +127,7 @@ pub fn run(args: &RenderArgs, start: Instant) -> Result<()> {
 }
 
 /// Loads the scene while the driver starts: on small scenes they take equally long.
-fn open(args: &RenderArgs) -> Result<(Scene, std::sync::Arc<Device>, Seconds)> {
+fn open(args: &RenderArgs) -> Result<(Scene, Arc<Device>, Seconds)> {
     let timed = |start: Instant| start.elapsed().as_secs_f64();
     std::thread::scope(|scope| {
         let device = scope.spawn(|| {

@@ -1,5 +1,7 @@
 //! What `skylit render` tells: metadata of the image, lines for people, a record for programs.
 
+use std::collections::BTreeMap;
+
 use serde_json::{Value, json};
 
 use super::args::RenderArgs;
@@ -23,6 +25,19 @@ pub struct Seconds {
     pub write: f64,
     /// From the start of the process' `main`.
     pub total: f64,
+}
+
+/// Rays that were traced, and that were not.
+#[derive(Clone, Copy, Debug, Default, serde::Serialize)]
+pub struct Rays {
+    /// Camera rays.
+    pub primary: u64,
+    /// Camera rays not traced: nothing is in their tile.
+    pub skipped_primary: u64,
+    /// Occlusion rays.
+    pub occlusion: u64,
+    /// Occlusion rays not traced: samples that meet nothing.
+    pub skipped: u64,
 }
 
 /// All there is to say about a render.
@@ -53,9 +68,9 @@ pub struct Report<'a> {
     pub mean_standard_error: f64,
     /// Mean accessibility over what the scene covers.
     pub covered_mean: f64,
-    /// Camera rays, occlusion rays, occlusion rays not traced.
-    pub rays: [u64; 3],
-    /// Device seconds of each pass.
+    /// Rays.
+    pub rays: Rays,
+    /// Device seconds of each step of each pass.
     pub device_seconds: Vec<(&'static str, f64)>,
     /// Longest launch in device seconds.
     pub longest_launch: f64,
@@ -147,7 +162,7 @@ impl Report<'_> {
 
     /// What was skipped, and what that saved.
     fn explanations(&self) -> Vec<String> {
-        let [_, occlusion, skipped] = self.rays;
+        let rays = self.rays;
         let mut lines = vec![format!("tracer {}: {}", self.tracer, self.why)];
         if let Some(ComputeOptions { kernel, triangle_test }) = self.compute {
             lines.push(format!("traversal {kernel}: {}; triangle test {triangle_test}", kernel.describe()));
@@ -163,21 +178,37 @@ impl Report<'_> {
             }
             _ => "occlusion rays have no end: no radius and no falloff was given".into(),
         });
-        let all = (occlusion + skipped).max(1);
-        let share = 100.0 * skipped as f64 / all as f64;
-        lines.push(format!("{skipped} of {all} occlusion rays ({share:.1} %) not traced: their camera ray met nothing"));
+        let share = |part: u64, all: u64| 100.0 * part as f64 / all.max(1) as f64;
+        let all = rays.primary + rays.skipped_primary;
+        lines.push(format!(
+            "{} of {all} camera rays ({:.1} %) not traced: nothing is in their part of the image",
+            rays.skipped_primary,
+            share(rays.skipped_primary, all)
+        ));
+        let all = rays.occlusion + rays.skipped;
+        lines.push(format!(
+            "{} of {all} occlusion rays ({:.1} %) not traced: their sample's camera ray meets nothing",
+            rays.skipped,
+            share(rays.skipped, all)
+        ));
+        let steps: Vec<_> = self.device_seconds.iter().map(|(step, s)| format!("{step} {s:.3}")).collect();
+        lines.push(format!("device seconds: {}", steps.join(", ")));
         lines
     }
 
     /// All rays of the image by the clock.
     fn mrays_s(&self) -> f64 {
-        if self.seconds.trace > 0.0 { (self.rays[0] + self.rays[1]) as f64 / self.seconds.trace / 1e6 } else { 0.0 }
+        if self.seconds.trace > 0.0 { (self.rays.primary + self.rays.occlusion) as f64 / self.seconds.trace / 1e6 } else { 0.0 }
     }
 
     /// A record for programs.
     pub fn record(&self) -> Value {
-        let device_seconds: serde_json::Map<_, _> =
+        let device_steps: serde_json::Map<_, _> =
             self.device_seconds.iter().map(|(label, s)| ((*label).to_owned(), json!(s))).collect();
+        let mut device_seconds = BTreeMap::new();
+        for (label, s) in &self.device_seconds {
+            *device_seconds.entry(label.split(' ').next().unwrap_or(label)).or_insert(0.0) += s;
+        }
         let finite = |v: f64| if v.is_finite() { json!(v) } else { Value::Null };
         let mut record = json!({
             "scene": self.args.scene,
@@ -208,11 +239,12 @@ impl Report<'_> {
             "spheres": self.scene.sphere_count(),
             "degenerate_triangles": self.scene.report.degenerate_triangles,
             "warnings": self.scene.report.warnings,
-            "rays": { "primary": self.rays[0], "occlusion": self.rays[1], "skipped": self.rays[2] },
+            "rays": self.rays,
             "mrays_s_wall": self.mrays_s(),
             "build": self.stats_record(),
             "seconds": self.seconds,
             "device_seconds": device_seconds,
+            "device_steps": device_steps,
             "longest_launch_seconds": self.longest_launch,
         });
         record["seconds"]["build"] = json!(self.stats.build_seconds);

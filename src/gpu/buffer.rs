@@ -112,6 +112,11 @@ impl Buffer {
         Ok(buffer)
     }
 
+    /// Another buffer of the same size on the same device.
+    pub fn sibling(&self, name: &str, memory: Memory) -> Result<Self> {
+        Self::new(&self.device, name, self.size, memory)
+    }
+
     /// Where shaders find it.
     pub fn address(&self) -> u64 {
         self.address

@@ -190,8 +190,14 @@ impl Recorder<'_> {
 
     /// Sets the whole buffer to zero.
     pub fn clear(&mut self, buffer: &Buffer) {
-        // SAFETY: the whole buffer, whose size is a multiple of 4
-        unsafe { self.device.raw.cmd_fill_buffer(self.buffer, buffer.raw, 0, vk::WHOLE_SIZE, 0) };
+        self.fill(buffer, buffer.size(), 0);
+    }
+
+    /// Sets the first `size` bytes, a multiple of 4 and not none, to a repeated word.
+    pub fn fill(&mut self, buffer: &Buffer, size: u64, word: u32) {
+        assert!(size > 0 && size.is_multiple_of(4) && size <= buffer.size());
+        // SAFETY: the range lies within the buffer
+        unsafe { self.device.raw.cmd_fill_buffer(self.buffer, buffer.raw, 0, size, word) };
     }
 
     /// Runs a compute pipeline over `groups` work-groups. The addresses within `push` must lead to living buffers of the

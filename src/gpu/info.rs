@@ -14,6 +14,8 @@ use crate::tracer::TracerKind;
 pub struct Limits {
     /// Invocations that run in lockstep.
     pub subgroup_size: u32,
+    /// Compute shaders can count lanes (subgroup ballots).
+    pub subgroup_ballot: bool,
     /// Work-groups in x of one dispatch.
     pub max_workgroups_x: u32,
     /// Bytes of one allocation.
@@ -234,6 +236,10 @@ fn describe(instance: &Instance, index: usize, physical: vk::PhysicalDevice) -> 
         tracers,
         limits: Limits {
             subgroup_size: v11.subgroup_size,
+            subgroup_ballot: v11.subgroup_supported_stages.contains(vk::ShaderStageFlags::COMPUTE)
+                && v11
+                    .subgroup_supported_operations
+                    .contains(vk::SubgroupFeatureFlags::BASIC | vk::SubgroupFeatureFlags::BALLOT),
             max_workgroups_x: properties.limits.max_compute_work_group_count[0],
             max_allocation: v13_limits.max_buffer_size.min(v11_limits.max_memory_allocation_size),
             device_memory,

@@ -10,7 +10,7 @@ use super::result::Context;
 use crate::error::{Error, Result};
 
 /// Size of the push-constant block that every stream has (`Push` in shaders/common/types.glsl).
-pub(super) const PUSH_BYTES: u32 = 32;
+pub(super) const PUSH_BYTES: u32 = 48;
 
 pub(super) const RAY_STAGES: vk::ShaderStageFlags = vk::ShaderStageFlags::from_raw(
     vk::ShaderStageFlags::RAYGEN_KHR.as_raw()

@@ -60,7 +60,7 @@ pub fn render(tracer: &Tracer, camera: &CameraRecord, size: [u32; 2], control: &
             let push =
                 Push { scene: tracer.scene_address(), pass: params_buffer.address(), first, count, ..Default::default() };
             let start = std::time::Instant::now();
-            let timings = commands.run(|r| r.timed("aov", |r| stream.record(r, &push)))?;
+            let timings = commands.run(|r| stream.record(r, &push))?;
             if count == rays {
                 pace.learn(rays, &timings, start.elapsed().as_secs_f64(), 1);
             }

@@ -4,11 +4,14 @@
 use bytemuck::{Pod, Zeroable};
 
 use super::camera::CameraRecord;
+use crate::tracer::queue::QueueRecord;
 
 /// Pixels of a block at most (1920x1080 fits).
 const MOST_PIXELS: u64 = 1 << 21;
 /// Edge of the tiles in which pixels are numbered; shaders/common/camera.glsl.
-const TILE: u32 = 8;
+pub const TILE: u32 = 8;
+/// Pixels of a tile.
+pub const TILE_PIXELS: u32 = TILE * TILE;
 
 /// `BlockParams` of shaders/common/camera.glsl.
 #[repr(C)]
@@ -38,14 +41,18 @@ pub struct BlockParams {
     pub radius: f32,
     /// Film pixels.
     pub film: u64,
-    /// G-buffer of a launch.
-    pub gbuffer: u64,
+    /// Samples of a launch.
+    pub samples: u64,
     /// Auxiliary outputs of a launch.
     pub aov: u64,
-    /// Where rays are written, or 0.
+    /// Tiles that are rendered, or 0: all.
+    pub tiles: u64,
+    /// Occlusion rays.
+    pub queue: QueueRecord,
+    /// Where camera rays are written, or 0.
     pub ray_dump: u64,
-    /// To a multiple of 16 bytes.
-    pub reserved: u64,
+    /// Where occlusion rays are written, or 0.
+    pub occlusion_dump: u64,
 }
 
 /// A rectangle of the image whose pixels are numbered in 8x8 tiles, Morton order within.
@@ -91,11 +98,19 @@ impl Block {
         [tile % self.tiles_x() * TILE + x, tile / self.tiles_x() * TILE + y]
     }
 
-    /// Place of a ray index in an image of the given width, or `None` for padding.
+    /// Place of a pixel's index in an image of the given width, or `None` for padding.
     pub fn image_index(&self, index: u32, image_width: u32) -> Option<usize> {
         let [x, y] = self.pixel(index);
         (x < self.size[0] && y < self.size[1])
             .then(|| (self.origin[1] + y) as usize * image_width as usize + (self.origin[0] + x) as usize)
+    }
+
+    /// Calls `f` with the place of each of its pixels in an image of the given width.
+    pub fn each_pixel(&self, image_width: u32, mut f: impl FnMut(usize)) {
+        for y in self.origin[1]..self.origin[1] + self.size[1] {
+            let row = y as usize * image_width as usize;
+            (self.origin[0]..self.origin[0] + self.size[0]).for_each(|x| f(row + x as usize));
+        }
     }
 
     /// Parameters of its passes, buffers not yet set.

@@ -4,6 +4,7 @@ pub mod ao;
 pub mod aov;
 pub mod block;
 pub mod camera;
+pub mod cover;
 pub mod film;
 pub mod pace;
 pub mod rays;

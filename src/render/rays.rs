@@ -93,7 +93,7 @@ pub fn trace(
                     let count = rays.min(n - first);
                     let push = Push { scene: tracer.scene_address(), pass: set.address(), first, count, ..Default::default() };
                     // launches do not depend on each other
-                    r.timed("rays", |r| stream.record(r, &push));
+                    stream.record(r, &push);
                     first += count;
                     recorded += 1;
                 }

@@ -50,8 +50,6 @@ pub(super) fn upload(device: &Arc<Device>, flat: &FlatScene) -> Result<Hierarchy
         stack_entries: 0,
         bounds: flat.bounds(),
         unfinished: unfinished_counter(device)?,
-        launch_rays: None,
-        launch_hits: None,
-        launch_counters: None,
+        launch: None,
     })
 }

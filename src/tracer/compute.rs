@@ -6,6 +6,7 @@ use std::sync::Arc;
 use glam::Vec3;
 
 use super::kernel::{BuildOptions, Kernel};
+use super::stream::LaunchMemory;
 use super::{brute, reference, wide};
 use crate::bvh::{Aabb, bvh2};
 use crate::error::{Error, Result};
@@ -46,10 +47,7 @@ pub(super) struct Hierarchy {
     /// A u32: rays whose traversal the driver cut short.
     pub unfinished: Buffer,
     /// Between the steps of a launch (fast kernel only).
-    pub launch_rays: Option<Buffer>,
-    pub launch_hits: Option<Buffer>,
-    /// A u32 per work-group: rays that its lanes have taken.
-    pub launch_counters: Option<Buffer>,
+    pub launch: Option<LaunchMemory>,
 }
 
 impl Hierarchy {
@@ -64,6 +62,11 @@ impl Hierarchy {
                  very many surfaces in one place): use a newer driver, or --tracer pipeline"
             ))),
         }
+    }
+
+    /// Between the steps of a launch of the fast kernel.
+    pub fn launch_memory(&self) -> Result<LaunchMemory> {
+        self.launch.clone().ok_or_else(|| Error::Vulkan(format!("kernel '{}' has no steps", self.kernel)))
     }
 
     /// What the kernel's array is specialised to: the fast kernel holds the upper end of the stack in registers.

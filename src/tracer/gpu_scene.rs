@@ -33,7 +33,8 @@ struct SceneRoot {
     nodes: u64,
     primitives: u64,
     top_level: u64,
-    launch_rays: u64,
+    part_count: u32,
+    reserved1: u32,
     launch_hits: u64,
     root: u32,
     reserved: u32,
@@ -196,6 +197,7 @@ impl GpuScene {
             address
         };
         let mut root = SceneRoot { instances: instance_buffer.address(), ..Default::default() };
+        root.part_count = parts.len() as u32;
         root.parts = keep(Buffer::from_slice(device, "part records", &parts)?);
         root.placements = keep(Buffer::from_slice(device, "placements", &placements)?);
         root.materials = keep(Buffer::from_slice(device, "material records", &materials)?);
@@ -229,9 +231,8 @@ impl GpuScene {
         self.root.unfinished = h.unfinished.address();
         self.root.bounds_min = h.bounds.min.extend(0.0).to_array();
         self.root.bounds_max = h.bounds.max.extend(0.0).to_array();
-        self.root.launch_rays = h.launch_rays.as_ref().map_or(0, Buffer::address);
-        self.root.launch_counters = h.launch_counters.as_ref().map_or(0, Buffer::address);
-        self.root.launch_hits = h.launch_hits.as_ref().map_or(0, Buffer::address);
+        self.root.launch_hits = h.launch.as_ref().map_or(0, |l| l.hits.address());
+        self.root.launch_counters = h.launch.as_ref().map_or(0, |l| l.counters.address());
         write_all(&mut self.root_buffer, &[self.root])
     }
 

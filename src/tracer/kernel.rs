@@ -108,6 +108,11 @@ impl Default for BuildOptions {
 }
 
 impl BuildOptions {
+    /// What went wrong with the cache: one line each.
+    pub fn take_warnings(&self) -> Vec<String> {
+        self.cache.as_ref().map(Cache::take_warnings).unwrap_or_default()
+    }
+
     /// The preset for a number of primitives.
     pub fn preset(&self, primitives: usize) -> BuildPreset {
         self.preset.unwrap_or_else(|| BuildPreset::auto(primitives, self.rays))

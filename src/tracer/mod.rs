@@ -9,6 +9,7 @@ mod compute;
 pub mod gpu_scene;
 mod hardware;
 mod kernel;
+pub mod queue;
 mod reference;
 pub mod stream;
 mod wide;
@@ -256,7 +257,7 @@ impl Tracer {
                 match h.kernel {
                     Kernel::Wide => {
                         let kernel = self.kernel(shaders.mode(), &specialization)?;
-                        Stream::steps(&self.device, shaders, &specialization, kernel, rays_per_lane)
+                        Stream::steps(&self.device, shaders, &specialization, kernel, rays_per_lane, h.launch_memory()?)
                     }
                     Kernel::Nearest | Kernel::Direction => {
                         Stream::reference(&self.device, shaders, &specialization, rays_per_lane)

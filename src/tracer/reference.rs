@@ -84,9 +84,7 @@ impl Trees {
             stack_entries,
             bounds: self.bounds,
             unfinished: unfinished_counter(device)?,
-            launch_rays: None,
-            launch_hits: None,
-            launch_counters: None,
+            launch: None,
         })
     }
 }

@@ -4,8 +4,10 @@ use std::sync::Arc;
 
 use bytemuck::{Pod, Zeroable};
 
+use super::compute::HIT_BYTES;
 use crate::error::Result;
-use crate::gpu::{ComputePipeline, Device, HitShaders, RayTracingPipeline, Recorder, Specialization};
+use crate::gpu::{Buffer, ComputePipeline, Device, HitShaders, RayTracingPipeline, Recorder, Specialization};
+use crate::ray::Ray;
 use crate::scene::features::SceneFeatures;
 
 /// What a stream asks of its rays.
@@ -21,9 +23,17 @@ pub enum Mode {
 pub struct StreamShaders {
     /// Pass and mode.
     pub name: &'static str,
+    /// Pass: what its time is listed under where a stream is one shader.
+    pub pass: &'static str,
+    /// What the time of each step is listed under where a stream is three.
+    pub steps: [&'static str; 3],
+    // its rays are in memory: there is no first step
+    queue: bool,
     mode: Mode,
     generate: &'static [u8],
+    generate_64: &'static [u8],
     deliver: &'static [u8],
+    deliver_64: &'static [u8],
     reference: &'static [u8],
     brute: &'static [u8],
     query: &'static [u8],
@@ -40,18 +50,24 @@ pub struct Push {
     pub scene: u64,
     /// Address of the pass's parameters.
     pub pass: u64,
+    /// Address of ray number `first` of a queue ([`super::queue`]), 32 bytes each; 0 for streams that make their own rays.
+    pub rays: u64,
+    /// Address of a `u32`: how many rays the queue holds; 0 when `count` says it.
+    pub queued: u64,
     /// Index of the first ray.
     pub first: u32,
-    /// Rays to trace.
+    /// Rays to trace; of a queue: at most.
     pub count: u32,
-    /// Which sample of each pixel.
+    /// The first sample of each pixel.
     pub sample_index: u32,
-    /// Zero.
-    pub reserved: u32,
+    /// 2^`sample_bits` samples of each pixel are taken; their rays follow each other.
+    pub sample_bits: u32,
 }
 
 /// Rays that the compute tracer's buffers hold between the steps of a launch.
 pub(super) const LAUNCH_RAYS: u32 = 1 << 19;
+/// Stands where a result will be: `UNFINISHED` of shaders/trace/launch.glsl.
+const UNFINISHED: u32 = 0x7fc0_dead;
 
 enum Pipeline {
     /// One compute shader over all rays.
@@ -61,16 +77,32 @@ enum Pipeline {
     },
     /// Generate, trace, deliver.
     Steps {
-        generate: ComputePipeline,
+        // none: the rays are in memory
+        generate: Option<ComputePipeline>,
         trace: Arc<ComputePipeline>,
         deliver: ComputePipeline,
         rays_per_group: u32,
+        memory: LaunchMemory,
+        // bytes of a result
+        record: u64,
     },
     RayTracing(RayTracingPipeline),
 }
 
+/// Where a launch's rays and results are between its steps.
+#[derive(Clone)]
+pub(super) struct LaunchMemory {
+    pub rays: Arc<Buffer>,
+    pub hits: Arc<Buffer>,
+    /// A u32 per work-group: rays that its lanes have taken.
+    pub counters: Arc<Buffer>,
+}
+
 /// A stream, ready to run.
-pub struct Stream(Pipeline);
+pub struct Stream {
+    pipeline: Pipeline,
+    shaders: &'static StreamShaders,
+}
 
 impl StreamShaders {
     /// What the stream asks of its rays.
@@ -83,44 +115,54 @@ impl Stream {
     /// For the compute tracer's fast kernel, which streams share.
     pub(super) fn steps(
         device: &Arc<Device>,
-        shaders: &StreamShaders,
+        shaders: &'static StreamShaders,
         s: &Specialization,
         trace: Arc<ComputePipeline>,
         rays_per_lane: u32,
+        memory: LaunchMemory,
     ) -> Result<Self> {
-        Ok(Self(Pipeline::Steps {
-            generate: ComputePipeline::new(device, shaders.name, shaders.generate, s)?,
+        let int64 = device.info.int64;
+        let generate = if int64 { shaders.generate_64 } else { shaders.generate };
+        let deliver = if int64 && device.info.limits.subgroup_ballot { shaders.deliver_64 } else { shaders.deliver };
+        let pipeline = Pipeline::Steps {
+            generate: match shaders.queue {
+                true => None,
+                false => Some(ComputePipeline::new(device, shaders.name, generate, s)?),
+            },
             trace,
-            deliver: ComputePipeline::new(device, shaders.name, shaders.deliver, s)?,
+            deliver: ComputePipeline::new(device, shaders.name, deliver, s)?,
             rays_per_group: LANES * rays_per_lane,
-        }))
+            memory,
+            record: if shaders.mode == Mode::Any { 4 } else { HIT_BYTES },
+        };
+        Ok(Self { pipeline, shaders })
     }
 
     /// For the compute tracer's readable reference.
     pub(super) fn reference(
         device: &Arc<Device>,
-        shaders: &StreamShaders,
+        shaders: &'static StreamShaders,
         s: &Specialization,
         rays_per_lane: u32,
     ) -> Result<Self> {
         let pipeline = ComputePipeline::new(device, shaders.name, shaders.reference, s)?;
-        Ok(Self(Pipeline::Single { pipeline, rays_per_group: LANES * rays_per_lane }))
+        Ok(Self { pipeline: Pipeline::Single { pipeline, rays_per_group: LANES * rays_per_lane }, shaders })
     }
 
     /// For the compute tracer without a hierarchy.
-    pub(super) fn brute(device: &Arc<Device>, shaders: &StreamShaders, s: &Specialization) -> Result<Self> {
+    pub(super) fn brute(device: &Arc<Device>, shaders: &'static StreamShaders, s: &Specialization) -> Result<Self> {
         let pipeline = ComputePipeline::new(device, shaders.name, shaders.brute, s)?;
-        Ok(Self(Pipeline::Single { pipeline, rays_per_group: LANES }))
+        Ok(Self { pipeline: Pipeline::Single { pipeline, rays_per_group: LANES }, shaders })
     }
 
-    pub(super) fn query(device: &Arc<Device>, shaders: &StreamShaders, s: &Specialization) -> Result<Self> {
+    pub(super) fn query(device: &Arc<Device>, shaders: &'static StreamShaders, s: &Specialization) -> Result<Self> {
         let pipeline = ComputePipeline::new(device, shaders.name, shaders.query, s)?;
-        Ok(Self(Pipeline::Single { pipeline, rays_per_group: LANES }))
+        Ok(Self { pipeline: Pipeline::Single { pipeline, rays_per_group: LANES }, shaders })
     }
 
     pub(super) fn pipeline(
         device: &Arc<Device>,
-        shaders: &StreamShaders,
+        shaders: &'static StreamShaders,
         s: &Specialization,
         features: SceneFeatures,
     ) -> Result<Self> {
@@ -130,29 +172,47 @@ impl Stream {
             triangle_any: features.alpha.then_some(TRIANGLE_ANY),
             sphere: features.spheres.then_some([SPHERE_CLOSEST, SPHERE_INTERSECTION]),
         };
-        Ok(Self(Pipeline::RayTracing(RayTracingPipeline::new(device, shaders.name, shaders.raygen, &shared, s)?)))
+        let pipeline = Pipeline::RayTracing(RayTracingPipeline::new(device, shaders.name, shaders.raygen, &shared, s)?);
+        Ok(Self { pipeline, shaders })
     }
 
-    /// Records the tracing of rays `push.first .. push.first + push.count`. The addresses in `push` must be those of the
-    /// tracer that made the stream and of parameters of the stream's pass.
+    /// Records the tracing of rays `push.first .. push.first + push.count`, timed under the names of the stream's shaders. The
+    /// addresses in `push` must be those of the tracer that made the stream and of parameters of the stream's pass.
     pub fn record(&self, recorder: &mut Recorder, push: &Push) {
-        match &self.0 {
+        if push.count == 0 {
+            return;
+        }
+        debug_assert_eq!(self.shaders.queue, push.rays != 0, "{}: where are its rays?", self.shaders.name);
+        let pass = self.shaders.pass;
+        match &self.pipeline {
             Pipeline::Single { pipeline, rays_per_group } => {
-                recorder.dispatch(pipeline, push, push.count.div_ceil(*rays_per_group))
+                recorder.timed(pass, |r| r.dispatch(pipeline, push, push.count.div_ceil(*rays_per_group)));
             }
-            Pipeline::Steps { generate, trace, deliver, rays_per_group } => {
+            Pipeline::Steps { generate, trace, deliver, rays_per_group, memory, record } => {
+                let [generating, tracing, delivering] = self.shaders.steps;
                 for first in (0..push.count).step_by(LAUNCH_RAYS as usize) {
-                    let push = Push { first: push.first + first, count: LAUNCH_RAYS.min(push.count - first), ..*push };
+                    let mut push = Push { first: push.first + first, count: LAUNCH_RAYS.min(push.count - first), ..*push };
                     // the steps hand rays and hits on in memory, and so does one launch to the next
                     recorder.barrier();
-                    recorder.dispatch(generate, &push, push.count.div_ceil(LANES));
+                    let groups = push.count.div_ceil(*rays_per_group);
+                    recorder.fill(&memory.counters, 4 * groups as u64, 0);
+                    match generate {
+                        Some(generate) => {
+                            push.rays = memory.rays.address();
+                            recorder.timed(generating, |r| r.dispatch(generate, &push, push.count.div_ceil(LANES)));
+                        }
+                        None => {
+                            push.rays += first as u64 * size_of::<Ray>() as u64;
+                            recorder.fill(&memory.hits, record * push.count as u64, UNFINISHED);
+                        }
+                    }
                     recorder.barrier();
-                    recorder.dispatch(trace, &push, push.count.div_ceil(*rays_per_group));
+                    recorder.timed(tracing, |r| r.dispatch(trace, &push, groups));
                     recorder.barrier();
-                    recorder.dispatch(deliver, &push, push.count.div_ceil(LANES));
+                    recorder.timed(delivering, |r| r.dispatch(deliver, &push, push.count.div_ceil(LANES)));
                 }
             }
-            Pipeline::RayTracing(pipeline) => recorder.trace_rays(pipeline, push, push.count),
+            Pipeline::RayTracing(pipeline) => recorder.timed(pass, |r| r.trace_rays(pipeline, push, push.count)),
         }
     }
 }

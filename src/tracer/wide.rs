@@ -20,7 +20,7 @@ use super::compute::{
 use super::gpu_scene::rows;
 use super::kernel::BuildOptions;
 use super::kernel::Kernel;
-use super::stream::LAUNCH_RAYS;
+use super::stream::{LAUNCH_RAYS, LaunchMemory};
 use crate::bvh::build::{self, MAX_DEPTH};
 use crate::bvh::cache::KeyBuilder;
 use crate::bvh::pairs::{self, Fan, Pair};
@@ -91,7 +91,7 @@ impl Trees {
             count as u64,
             &mut trees.flat_map(|(t, by)| t.blocks.iter().map(move |b| wide::rebased(*b, by))),
         )?;
-        let launch = |name, bytes| Buffer::new(device, name, bytes * LAUNCH_RAYS as u64, Memory::Device).map(Some);
+        let launch = |name, bytes| Buffer::new(device, name, bytes * LAUNCH_RAYS as u64, Memory::Device).map(Arc::new);
         Ok(Hierarchy {
             kernel: Kernel::Wide,
             primitives: Buffer::new(device, "no primitives", 16, Memory::Device)?,
@@ -102,9 +102,11 @@ impl Trees {
             stack_entries,
             bounds,
             unfinished: unfinished_counter(device)?,
-            launch_rays: launch("launch rays", size_of::<Ray>() as u64)?,
-            launch_hits: launch("launch hits", HIT_BYTES)?,
-            launch_counters: launch("launch counters", 4)?,
+            launch: Some(LaunchMemory {
+                rays: launch("launch rays", size_of::<Ray>() as u64)?,
+                hits: launch("launch hits", HIT_BYTES)?,
+                counters: launch("launch counters", 4)?,
+            }),
         })
     }
 }

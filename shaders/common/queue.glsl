@@ -1,0 +1,38 @@
+// A queue of rays in device memory (src/tracer/queue.rs): what one pass appends, a later stream traces without the host ever
+// knowing how many there are (Laine, Karras, Aila, "Megakernels Considered Harmful: Wavefront Path Tracing on GPUs", HPG 2013).
+//
+// The order in which rays arrive differs from run to run. A stream over a queue must therefore write to a place that the ray's
+// tag names, once per tag: then its result does not depend on that order.
+#ifndef COMMON_QUEUE
+#define COMMON_QUEUE
+#include "common/types.glsl"
+
+// Mirrors QueueRecord in src/tracer/queue.rs.
+struct RayQueue {
+    uvec2 rays;   // 32 bytes each
+    uvec2 tags;   // a uint each: for the callback of the stream that traces the queue
+    uvec2 count;  // a uint; the host clears it and sees to it that the queue is large enough
+};
+layout(buffer_reference, std430, buffer_reference_align = 4) buffer QueueCount { uint v[]; };
+layout(buffer_reference, std430, buffer_reference_align = 4) writeonly buffer QueueTags { uint v[]; };
+
+// A place in the queue for each lane that asks.
+uint queue_slot(RayQueue queue) {
+#ifdef BALLOT
+    // one atomic for all lanes: on a CPU driver the bus is locked as often as it counts
+    uvec4 lanes = subgroupBallot(true);
+    uint first = 0u;
+    if (subgroupElect()) first = atomicAdd(QueueCount(queue.count).v[0], subgroupBallotBitCount(lanes));
+    return subgroupBroadcastFirst(first) + subgroupBallotExclusiveBitCount(lanes);
+#else
+    return atomicAdd(QueueCount(queue.count).v[0], 1u);
+#endif
+}
+
+void append_ray(RayQueue queue, Ray ray, uint tag) {
+    uint slot = queue_slot(queue);
+    store_ray(queue.rays, slot, ray);
+    QueueTags(queue.tags).v[slot] = tag;
+}
+
+#endif
