@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use glam::Vec3;
 
-use super::kernel::Kernel;
+use super::kernel::{BuildOptions, Kernel};
 use super::stream::LaunchMemory;
 use super::{brute, reference, wide};
 use crate::bvh::{Aabb, bvh2};
@@ -83,7 +83,7 @@ impl Hierarchy {
 }
 
 impl Trees {
-    pub fn build(flat: &FlatScene, kernel: Kernel) -> Result<Self> {
+    pub fn build(flat: &FlatScene, kernel: Kernel, options: &BuildOptions) -> Result<Self> {
         let total = flat.primitive_count();
         if total > bvh2::MAX_PRIMITIVES || flat.placements.len() > bvh2::MAX_PRIMITIVES {
             return Err(Error::Scene(format!(
@@ -93,8 +93,8 @@ impl Trees {
             )));
         }
         Ok(match kernel {
-            Kernel::Auto | Kernel::Wide | Kernel::Packet => Trees::Wide(wide::Trees::build(flat), kernel),
-            Kernel::Nearest | Kernel::Direction => Trees::Binary(reference::Trees::build(flat), kernel),
+            Kernel::Auto | Kernel::Wide | Kernel::Packet => Trees::Wide(wide::Trees::build(flat, options), kernel),
+            Kernel::Nearest | Kernel::Direction => Trees::Binary(reference::Trees::build(flat, options), kernel),
             Kernel::Brute => {
                 brute::check(flat)?;
                 Trees::None

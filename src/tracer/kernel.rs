@@ -1,5 +1,8 @@
 //! Which of the compute tracer's kernels runs, and how it tests triangles.
 
+use crate::bvh::BuildPreset;
+use crate::bvh::cache::Cache;
+
 /// How the compute tracer finds what a ray meets. All give the same hits; docs/traversal.md compares their speed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
@@ -93,6 +96,35 @@ pub struct ComputeOptions {
     pub kernel: Kernel,
     /// Its triangle test.
     pub triangle_test: TriangleTest,
+}
+
+/// How the compute tracer's hierarchy is built; drivers build those of the other tracers.
+#[derive(Clone, Debug)]
+pub struct BuildOptions {
+    /// How much time to spend; `None`: what suits the numbers of primitives and of rays ([`BuildPreset::auto`]).
+    pub preset: Option<BuildPreset>,
+    /// Rays that will be traced, about.
+    pub rays: u64,
+    /// Where built hierarchies are kept, if anywhere. Only those of the wide kernel are.
+    pub cache: Option<Cache>,
+}
+
+impl Default for BuildOptions {
+    fn default() -> Self {
+        Self { preset: Some(BuildPreset::Default), rays: 0, cache: None }
+    }
+}
+
+impl BuildOptions {
+    /// What went wrong with the cache: one line each.
+    pub fn take_warnings(&self) -> Vec<String> {
+        self.cache.as_ref().map(Cache::take_warnings).unwrap_or_default()
+    }
+
+    /// The preset for a number of primitives.
+    pub fn preset(&self, primitives: usize) -> BuildPreset {
+        self.preset.unwrap_or_else(|| BuildPreset::auto(primitives, self.rays))
+    }
 }
 
 impl From<Kernel> for ComputeOptions {

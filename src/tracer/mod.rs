@@ -18,7 +18,7 @@ use std::sync::{Arc, OnceLock};
 use std::time::Instant;
 
 pub use gpu_scene::Needs;
-pub use kernel::{ComputeOptions, Kernel, TriangleTest};
+pub use kernel::{BuildOptions, ComputeOptions, Kernel, TriangleTest};
 pub use stream::{Push, Stream, StreamShaders};
 
 use crate::error::{Error, Result};
@@ -141,7 +141,18 @@ impl Tracer {
         needs: Needs,
         options: impl Into<ComputeOptions>,
     ) -> Result<Self> {
-        let options = options.into();
+        Self::with_build(device, kind, flat, needs, options.into(), &BuildOptions::default())
+    }
+
+    /// As [`Tracer::with_options`], with a choice of how the compute tracer's hierarchy is built.
+    pub fn with_build(
+        device: &Arc<Device>,
+        kind: TracerKind,
+        flat: &FlatScene,
+        needs: Needs,
+        options: ComputeOptions,
+        build: &BuildOptions,
+    ) -> Result<Self> {
         if !device.info.supports(kind) {
             let missing =
                 device.info.tracers.iter().find(|t| t.tracer == kind).map(|t| t.missing.join(", ")).unwrap_or_default();
@@ -154,7 +165,8 @@ impl Tracer {
         let mut stats = BuildStats { primitives: flat.primitive_count() as u64, ..Default::default() };
         // the hierarchy first: its build needs the most host memory, the scene's buffers come after that is freed
         let start = Instant::now();
-        let hierarchy = if kind == TracerKind::Compute { Some(compute::Trees::build(flat, options.kernel)?) } else { None };
+        let hierarchy =
+            if kind == TracerKind::Compute { Some(compute::Trees::build(flat, options.kernel, build)?) } else { None };
         stats.build_seconds = start.elapsed().as_secs_f64();
         let start = Instant::now();
         let mut scene = GpuScene::new(device, flat, needs)?;
