@@ -27,10 +27,16 @@ pub struct Own {
     pub most_primitives: usize,
 }
 
+const fn compute(kernel: Kernel, name: &'static str, divisor: usize, most_primitives: usize) -> Own {
+    Own { name, tracer: TracerKind::Compute, kernel, divisor, most_primitives }
+}
+
 /// All of them; the first that runs makes the rays, and others are checked against it.
-pub const OWN: [Own; 4] = [
-    Own { name: "wide", tracer: TracerKind::Compute, kernel: Kernel::Wide, divisor: 1, most_primitives: usize::MAX },
-    Own { name: "reference", tracer: TracerKind::Compute, kernel: Kernel::Reference, divisor: 4, most_primitives: 1 << 22 },
+pub const OWN: [Own; 6] = [
+    compute(Kernel::Wide, "wide", 1, usize::MAX),
+    compute(Kernel::Nearest, "nearest", 4, 1 << 22),
+    compute(Kernel::Direction, "direction", 4, 1 << 22),
+    compute(Kernel::Brute, "brute", 64, 2000),
     Own { name: "pipeline", tracer: TracerKind::Pipeline, kernel: Kernel::Wide, divisor: 16, most_primitives: 1 << 21 },
     Own { name: "query", tracer: TracerKind::Query, kernel: Kernel::Wide, divisor: 16, most_primitives: 1 << 21 },
 ];
@@ -41,8 +47,10 @@ impl Own {
         if !info.supports(self.tracer) {
             return Err("the device does not have what it needs (`skylit doctor`)".into());
         }
-        if info.is_cpu() && !named && primitives > self.most_primitives {
-            return Err(format!("slow on a CPU; --kernels {} asks for it", self.name));
+        // without a tree, a GPU is slow too
+        let slow = info.is_cpu() || self.kernel == Kernel::Brute;
+        if slow && !named && primitives > self.most_primitives {
+            return Err(format!("slow on so many primitives; --kernels {} asks for it", self.name));
         }
         Ok(())
     }
@@ -71,7 +79,7 @@ impl<'a> Contestant<'a> {
     /// # Errors
     /// Those of [`Tracer::new`].
     pub fn own(device: &Arc<Device>, flat: &'a FlatScene, own: &Own) -> Result<Self> {
-        let tracer = Tracer::with_kernel(device, own.tracer, flat, Needs::default(), own.kernel)?;
+        let tracer = Tracer::with_options(device, own.tracer, flat, Needs::default(), own.kernel)?;
         let stats = tracer.stats();
         let build = BuildRecord {
             contestant: own.name.to_owned(),
