@@ -27,11 +27,17 @@ pub struct Own {
     pub most_primitives: usize,
 }
 
+const fn compute(kernel: Kernel, name: &'static str, divisor: usize, most_primitives: usize) -> Own {
+    Own { name, tracer: TracerKind::Compute, kernel, divisor, most_primitives }
+}
+
 /// All of them; the first that runs makes the rays, and others are checked against it.
-pub const OWN: [Own; 5] = [
-    Own { name: "wide", tracer: TracerKind::Compute, kernel: Kernel::Wide, divisor: 1, most_primitives: usize::MAX },
-    Own { name: "packet", tracer: TracerKind::Compute, kernel: Kernel::Packet, divisor: 1, most_primitives: usize::MAX },
-    Own { name: "nearest", tracer: TracerKind::Compute, kernel: Kernel::Nearest, divisor: 4, most_primitives: 1 << 22 },
+pub const OWN: [Own; 7] = [
+    compute(Kernel::Wide, "wide", 1, usize::MAX),
+    compute(Kernel::Packet, "packet", 1, usize::MAX),
+    compute(Kernel::Nearest, "nearest", 4, 1 << 22),
+    compute(Kernel::Direction, "direction", 4, 1 << 22),
+    compute(Kernel::Brute, "brute", 64, 2000),
     Own { name: "pipeline", tracer: TracerKind::Pipeline, kernel: Kernel::Wide, divisor: 16, most_primitives: 1 << 21 },
     Own { name: "query", tracer: TracerKind::Query, kernel: Kernel::Wide, divisor: 16, most_primitives: 1 << 21 },
 ];
@@ -42,8 +48,10 @@ impl Own {
         if !info.supports(self.tracer) {
             return Err("the device does not have what it needs (`skylit doctor`)".into());
         }
-        if info.is_cpu() && !named && primitives > self.most_primitives {
-            return Err(format!("slow on a CPU; --kernels {} asks for it", self.name));
+        // without a tree, a GPU is slow too
+        let slow = info.is_cpu() || self.kernel == Kernel::Brute;
+        if slow && !named && primitives > self.most_primitives {
+            return Err(format!("slow on so many primitives; --kernels {} asks for it", self.name));
         }
         Ok(())
     }

@@ -25,12 +25,12 @@ struct Known {
     view: Option<View>,
     /// Length of its ambient occlusion rays, world units.
     ao_radius: f64,
-    /// Towards the light of its shadow rays.
-    light: [f64; 3],
+    /// Where the light of its shadow rays is; `None`: as for any scene.
+    light: Option<[f64; 3]>,
 }
 
-/// Where the light is, unless the scene asks for another place: low enough for long shadows.
-const LIGHT: [f64; 3] = [0.75, 0.45, 0.5];
+/// Towards the light, from the middle of the scene: low enough for long shadows.
+const TOWARDS_LIGHT: DVec3 = DVec3::new(0.75, 0.45, 0.5);
 
 const KNOWN: [Known; 4] = [
     Known {
@@ -38,17 +38,17 @@ const KNOWN: [Known; 4] = [
         // along the nave, from inside
         view: Some(View { eye: [-120.0, 20.0, -5.0], target: [50.0, 35.0, 0.0], fov_y: 70.0 }),
         ao_radius: 60.0,
-        // through the open roof
-        light: [0.15, 1.0, 0.1],
+        // a lamp that hangs in the nave: from outside, nothing of the view is lit
+        light: Some([30.0, 70.0, -5.0]),
     },
     Known {
         path: "dragon/dragon.glb",
         view: Some(View { eye: [0.065, 0.1857, 0.198], target: [-0.0059, 0.125, -0.0046], fov_y: 45.0 }),
         ao_radius: f64::INFINITY,
-        light: LIGHT,
+        light: None,
     },
-    Known { path: "bunny/bunny.glb", view: None, ao_radius: f64::INFINITY, light: LIGHT },
-    Known { path: "flight_helmet/FlightHelmet.gltf", view: None, ao_radius: f64::INFINITY, light: LIGHT },
+    Known { path: "bunny/bunny.glb", view: None, ao_radius: f64::INFINITY, light: None },
+    Known { path: "flight_helmet/FlightHelmet.gltf", view: None, ao_radius: f64::INFINITY, light: None },
 ];
 
 /// Built-in scenes of the default list.
@@ -132,7 +132,7 @@ pub fn load(source: &str, args: &BenchRaysArgs, aspect: f64) -> Result<Subject> 
     let ao_radius = args.ao_radius.or(known.map(|k| k.ao_radius)).unwrap_or(f64::INFINITY);
     let (lo, hi) = scene.bounds().unwrap_or_default();
     // outside of the scene, near enough to make rays of different directions
-    let towards = DVec3::from(known.map_or(LIGHT, |k| k.light)).normalize();
-    let light = (lo + hi) * 0.5 + towards * (hi - lo).length();
+    let outside = || (lo + hi) * 0.5 + TOWARDS_LIGHT.normalize() * (hi - lo).length();
+    let light = known.and_then(|k| k.light).map_or_else(outside, DVec3::from);
     Ok(Subject { scene, camera, ao_radius, light })
 }
