@@ -1,5 +1,7 @@
-//! Building binary trees: from the top down by the surface-area heuristic (`sah.rs`), with spatial splits (`spatial.rs`) where
-//! time is no matter, then improved by reinsertion (`reinsert.rs`).
+//! Building binary trees: from the top down by the surface-area heuristic (`sah.rs`) where time matters most; by obvhs's clustering
+//! and reinsertion (Meister and Bittner, "Parallel Locally-Ordered Clustering for Bounding Volume Hierarchy Construction", TVCG 2018)
+//! by default; with spatial splits (`spatial.rs`) and reinsertion (`reinsert.rs`) where time is no matter. docs/traversal.md has the
+//! table behind the choice.
 //!
 //! The depth of what comes out is bounded, whatever the input: the builders halve where they would go deeper, and a subtree that
 //! reinsertion made too deep is replaced by a balanced one over the same leaves.
@@ -22,7 +24,7 @@ pub const MAX_DEPTH: u32 = 48;
 pub enum BuildPreset {
     /// Least build time: the heuristic alone.
     Fast,
-    /// Reinsertion as far as it pays.
+    /// Clustering and reinsertion.
     #[default]
     Default,
     /// Spatial splits (up to 30 % more references) and thorough reinsertion.
@@ -30,12 +32,12 @@ pub enum BuildPreset {
 }
 
 impl BuildPreset {
-    /// What suits a number of primitives and of rays to be traced through them: reinsertion takes a fifth of a build more, which
-    /// fewer rays than primitives do not earn back, and above ten million primitives the least of everything is used.
+    /// What suits a number of primitives and of rays to be traced through them. On Sponza `Default` traces 8 to 14 % faster than
+    /// `Fast` for a tenth more building, on the dragon hardly at all: fewer rays than primitives do not earn that back, and above
+    /// ten million primitives the least of everything is used.
     ///
-    /// Never `Best`, because what it is worth depends on the rays and not on their number alone. On Sponza closest hits are
-    /// found 1.1 times as fast for 0.3 s more of building, but any hits 0.8 times: a large triangle that is left whole high up
-    /// in the tree is an occluder that is found early. On the dragon both gain 2 to 7 % for 1 s more.
+    /// Never `Best`: three times the build time for 1 to 7 % on the dragon, and on Sponza for closest hits alone; any hits are
+    /// slower, because a large triangle that is left whole high up in the tree is an occluder that is found early.
     pub fn auto(primitives: usize, rays: u64) -> Self {
         if primitives >= 10_000_000 || rays < primitives as u64 { Self::Fast } else { Self::Default }
     }
@@ -43,6 +45,7 @@ impl BuildPreset {
     fn effort(self) -> Effort {
         match self {
             Self::Fast => Effort { share: 0.0, rounds: 0, worthwhile: 1.0 },
+            // where boxes repeat
             Self::Default => Effort { share: 0.003, rounds: 16, worthwhile: 0.001 },
             Self::Best => Effort { share: 0.02, rounds: 16, worthwhile: 0.001 },
         }
@@ -83,10 +86,34 @@ pub fn tree_with_splits(boxes: &[Aabb], triangles: &impl Triangles, preset: Buil
 
 fn whole(boxes: &[Aabb], preset: BuildPreset, pad: f32) -> Bvh2 {
     let grow = |b: &Aabb| Aabb { min: b.min - pad, max: b.max + pad };
+    // clustering pairs one of k equal boxes at a time: k^2 work for a chain of depth k
+    if preset == BuildPreset::Default && boxes.len() > 2 && !seems_to_repeat(boxes) {
+        let boxes: Vec<Aabb> = boxes.par_iter().map(grow).collect();
+        return limit_depth(clustered(&boxes));
+    }
     let mut items: Vec<sah::Item> = boxes.par_iter().enumerate().map(|(i, b)| sah::Item::new(grow(b), i as u32)).collect();
     let nodes = sah::tree(&mut items);
     drop(items);
     finish(nodes, boxes.len(), preset)
+}
+
+fn clustered(boxes: &[Aabb]) -> Bvh2 {
+    let config = obvhs::BvhBuildParams::medium_build();
+    let (distance, precision, threshold) = (config.ploc_search_distance, config.sort_precision, config.search_depth_threshold);
+    let indices = (0..boxes.len() as u32).collect();
+    let mut tree = obvhs::ploc::PlocBuilder::with_capacity(boxes.len()).build(distance, boxes, indices, precision, threshold);
+    obvhs::bvh2::reinsertion::ReinsertionOptimizer::default().run(&mut tree, config.reinsertion_batch_ratio, None);
+    // what it needed and we do not
+    tree.parents = Vec::new();
+    tree
+}
+
+/// Are there equal boxes among some of them, evenly spread? What a sample of this size overlooks is too few to matter.
+fn seems_to_repeat(boxes: &[Aabb]) -> bool {
+    // equal as numbers is equal as bits, once -0 is 0
+    let bits = |v: Vec3| (v + 0.0).to_array().map(f32::to_bits);
+    let mut seen = std::collections::HashSet::new();
+    boxes.iter().step_by(boxes.len().div_ceil(4096).max(1)).any(|b| !seen.insert((bits(b.min), bits(b.max))))
 }
 
 fn finish(mut nodes: Vec<Bvh2Node>, primitives: usize, preset: BuildPreset) -> Bvh2 {

@@ -15,7 +15,10 @@ fn file(info: &DeviceInfo) -> Option<PathBuf> {
     folder().map(|f| {
         // the width of a CPU driver's vectors is no part of what Vulkan calls the same device
         let lanes = info.limits.subgroup_size;
-        f.join(format!("pipelines-{:04x}-{:04x}-{:08x}-{lanes}-{uuid}.bin", info.vendor_id, info.device_id, info.driver_version))
+        f.join(format!(
+            "pipelines-{:04x}-{:04x}-{:08x}-{lanes}-{uuid}.bin",
+            info.vendor_id, info.device_id, info.driver_version
+        ))
     })
 }
 

@@ -25,7 +25,7 @@ pub fn prefer_wide_vectors() {
 
 fn cache_folder() -> Option<PathBuf> {
     let chosen = std::env::var_os(CACHE).map(PathBuf::from);
-    chosen.or_else(|| super::cache::folder()).map(|f| f.join("mesa-512"))
+    chosen.or_else(super::cache::folder).map(|f| f.join("mesa-512"))
 }
 
 #[cfg(target_arch = "x86_64")]

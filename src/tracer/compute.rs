@@ -102,6 +102,14 @@ impl Trees {
         })
     }
 
+    /// See [`super::BuildStats::sah_cost`].
+    pub fn sah_cost(&self) -> Option<f64> {
+        match self {
+            Trees::Wide(trees, _) => trees.sah_cost(),
+            _ => None,
+        }
+    }
+
     pub fn upload(self, device: &Arc<Device>, flat: &FlatScene) -> Result<Hierarchy> {
         match self {
             Trees::Wide(trees, kernel) => trees.upload(device, flat, kernel),

@@ -25,7 +25,8 @@ pub enum Kernel {
 
 impl Kernel {
     /// All of them.
-    pub const ALL: [Kernel; 6] = [Kernel::Auto, Kernel::Wide, Kernel::Packet, Kernel::Nearest, Kernel::Direction, Kernel::Brute];
+    pub const ALL: [Kernel; 6] =
+        [Kernel::Auto, Kernel::Wide, Kernel::Packet, Kernel::Nearest, Kernel::Direction, Kernel::Brute];
 
     /// Primitives, each instance's counted, and instances that [`Kernel::Brute`] takes at most together. Mesa before 23 leaves
     /// a loop after 65,535 turns; and a launch of the fewest rays should not stall a device for long.

@@ -12,6 +12,7 @@ mod kernel;
 pub mod queue;
 mod reference;
 pub mod stream;
+pub mod visits;
 mod wide;
 
 use std::sync::{Arc, OnceLock};
@@ -172,6 +173,7 @@ impl Tracer {
         let mut scene = GpuScene::new(device, flat, needs)?;
         let structure = match hierarchy {
             Some(trees) => {
+                stats.sah_cost = trees.sah_cost();
                 let h = trees.upload(device, flat)?;
                 scene.set_hierarchy(&h)?;
                 stats.stack_entries = h.stack_entries;

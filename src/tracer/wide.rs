@@ -62,6 +62,19 @@ impl Trees {
         Self { groups, top }
     }
 
+    /// The tree of the only group, where there is one and no top level.
+    pub fn into_only_group(mut self) -> Option<Wide> {
+        if self.top.is_none() { self.groups.pop() } else { None }
+    }
+
+    /// Expected blocks that a ray visits, where there is one tree.
+    pub fn sah_cost(&self) -> Option<f64> {
+        match (&self.top, self.groups.as_slice()) {
+            (None, [group]) => Some(group.sah_cost),
+            _ => None,
+        }
+    }
+
     pub fn upload(mut self, device: &Arc<Device>, flat: &FlatScene, kernel: Kernel) -> Result<Hierarchy> {
         let bounds = self.top.as_ref().or(self.groups.first()).and_then(|t| t.bounds).unwrap_or(Aabb::EMPTY);
         let group_depth = self.groups.iter().map(|g| g.depth).max().unwrap_or(0);

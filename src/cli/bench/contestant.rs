@@ -71,6 +71,8 @@ pub struct Contestant<'a> {
     pub build: BuildRecord,
     /// Its answers have to agree with the reference.
     pub strict: bool,
+    /// Which kernel of the compute tracer it is.
+    pub kernel: Option<Kernel>,
     engine: Engine<'a>,
 }
 
@@ -90,7 +92,13 @@ impl<'a> Contestant<'a> {
             sah_cost: stats.sah_cost,
         };
         let divisor = if device.info.is_cpu() { own.divisor } else { 1 };
-        Ok(Self { name: own.name.to_owned(), build, strict: true, engine: Engine::Own { tracer: Box::new(tracer), divisor } })
+        Ok(Self {
+            name: own.name.to_owned(),
+            build,
+            strict: true,
+            kernel: (own.tracer == TracerKind::Compute).then_some(own.kernel),
+            engine: Engine::Own { tracer: Box::new(tracer), divisor },
+        })
     }
 
     /// A kernel of a peer that has the scene.
@@ -109,7 +117,12 @@ impl<'a> Contestant<'a> {
             sah_cost: None,
         };
         let strict = peer.spec.strict.iter().any(|k| k == kernel);
-        Ok(Self { name, build, strict, engine: Engine::Peer { peer: index, kernel: kernel.to_owned(), flat } })
+        Ok(Self { name, build, strict, kernel: None, engine: Engine::Peer { peer: index, kernel: kernel.to_owned(), flat } })
+    }
+
+    /// Is it made for such rays? Packets are for coherent ones alone.
+    pub fn is_for(&self, set: Set) -> bool {
+        self.kernel != Some(Kernel::Packet) || set.is_coherent()
     }
 
     /// The tracer, if it is our own.

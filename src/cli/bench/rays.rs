@@ -25,6 +25,8 @@ use crate::output;
 use crate::ray::Ray;
 use crate::render::rays::Mode;
 use crate::scene::flatten::FlatScene;
+use crate::tracer::Kernel;
+use crate::tracer::visits::VisitCounter;
 
 /// Measures, shows, writes.
 pub fn run(args: &BenchRaysArgs) -> Result<()> {
@@ -158,6 +160,10 @@ struct Bench<'a> {
 
 /// Steps of the progress bar for one scene.
 const STEPS: u64 = 1000;
+/// Rays whose visits are counted, of each stream.
+const VISITS_OF: usize = 20_000;
+/// Larger scenes are not built once more for counting.
+const VISITS_MOST: usize = 2_000_000;
 
 impl Bench<'_> {
     fn note(&mut self, console: &Console, text: String) {
@@ -216,6 +222,8 @@ impl Bench<'_> {
                 self.give_rays(console, &contestants, &mut failed, set, sets.get(set))?;
             }
         }
+        let counted = contestants.iter().any(|c| c.kernel == Some(Kernel::Wide)) && flat.primitive_count() <= VISITS_MOST;
+        let counter = if counted { VisitCounter::new(&flat) } else { None };
         for (k, stream) in asked.iter().enumerate() {
             // one stream at least: a record of nothing says nothing
             if self.is_late() && !(record.streams.is_empty() && self.out.scenes.is_empty()) {
@@ -229,7 +237,7 @@ impl Bench<'_> {
                 continue;
             }
             let share = (k as u64 * STEPS / asked.len() as u64, (k as u64 + 1) * STEPS / asked.len() as u64);
-            record.streams.push(self.stream(console, &contestants, &mut failed, stream, rays, share)?);
+            record.streams.push(self.stream(console, &contestants, &mut failed, stream, (rays, counter.as_ref()), share)?);
         }
         if self.args.check {
             self.check(console, &subject, &contestants, &mut failed, &sets, &mut record)?;
@@ -314,7 +322,7 @@ impl Bench<'_> {
         contestants: &[Contestant],
         failed: &mut [bool],
         stream: &StreamKind,
-        rays: &[Ray],
+        (rays, counter): (&[Ray], Option<&VisitCounter>),
         share: (u64, u64),
     ) -> Result<StreamRecord> {
         let mut runs: Vec<Run> = Vec::new();
@@ -325,7 +333,7 @@ impl Bench<'_> {
         let repeats = self.args.repeats();
         for round in 0..=repeats {
             for (k, run) in runs.iter_mut().enumerate() {
-                if failed[k] {
+                if failed[k] || !contestants[k].is_for(stream.set) {
                     continue;
                 }
                 match run.lap(&mut self.peers, &mut self.keyboard) {
@@ -347,6 +355,9 @@ impl Bench<'_> {
                 break;
             }
         }
+        // a sample says as much as all of them
+        let some: Vec<Ray> = rays.iter().step_by(rays.len().div_ceil(VISITS_OF).max(1)).copied().collect();
+        let visits = counter.map(|c| c.mean(&some, stream.mode == Mode::Any));
         let mut results = Vec::new();
         for (k, contestant) in contestants.iter().enumerate() {
             if failed[k] || laps[k].is_empty() {
@@ -365,8 +376,8 @@ impl Bench<'_> {
                 wall: walls.and_then(|w| rates(&w)),
                 seconds,
                 ratios: Vec::new(),
-                nodes_per_ray: None,
-                primitives_per_ray: None,
+                nodes_per_ray: visits.filter(|_| contestant.kernel == Some(Kernel::Wide)).map(|v| v.nodes),
+                primitives_per_ray: visits.filter(|_| contestant.kernel == Some(Kernel::Wide)).map(|v| v.leaves),
             });
         }
         give_ratios(&mut results, &self.out.baselines);
@@ -390,7 +401,7 @@ impl Bench<'_> {
             let rays = sets.get(stream.set);
             let ours = sure(reference.hits(&mut self.peers, rays, stream.mode, &mut self.keyboard))?;
             for (k, contestant) in contestants.iter().enumerate() {
-                if k == first || failed[k] {
+                if k == first || failed[k] || !contestant.is_for(stream.set) {
                     continue;
                 }
                 let mut compare = || {

@@ -53,6 +53,11 @@ impl Set {
     /// All of them.
     pub const ALL: [Set; 4] = [Set::Primary, Set::Occlusion, Set::Shuffled, Set::Shadow];
 
+    /// Do neighbouring rays take nearly the same way?
+    pub fn is_coherent(self) -> bool {
+        matches!(self, Set::Primary | Set::Shadow)
+    }
+
     /// Name in files.
     pub fn name(self) -> &'static str {
         match self {

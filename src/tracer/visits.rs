@@ -1,0 +1,149 @@
+//! How many blocks of the hierarchy rays visit: the fast kernel's walk on the host, counted. It explains a rate; it traces nothing.
+
+use glam::Vec3;
+use rayon::prelude::*;
+
+use super::compute::SPHERE;
+use super::kernel::BuildOptions;
+use super::wide::Trees;
+use crate::bvh::pairs::NONE;
+use crate::bvh::wide::{self, Block, LEAF};
+use crate::ray::Ray;
+use crate::scene::flatten::FlatScene;
+
+/// The hierarchy of a scene, for counting.
+pub struct VisitCounter {
+    blocks: Vec<Block>,
+}
+
+/// Blocks that a ray visits.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Visits {
+    /// Nodes.
+    pub nodes: f64,
+    /// Leaves, of one or two triangles each.
+    pub leaves: f64,
+}
+
+impl VisitCounter {
+    /// Builds it as the compute tracer does. `None` for scenes of several levels or without triangles, which are not counted.
+    pub fn new(flat: &FlatScene) -> Option<Self> {
+        let countable = flat.is_single_level() && !flat.has_spheres() && !flat.has_alpha();
+        countable
+            .then(|| Trees::build(flat, &BuildOptions::default()))
+            .and_then(Trees::into_only_group)
+            .map(|w| Self { blocks: w.blocks })
+    }
+
+    /// Means over rays: of their walks to the nearest hit, or to any.
+    pub fn mean(&self, rays: &[Ray], any: bool) -> Visits {
+        let sum = rays.par_iter().map(|r| self.walk(r, any)).reduce(|| [0u64; 2], |a, b| [a[0] + b[0], a[1] + b[1]]);
+        let n = rays.len().max(1) as f64;
+        Visits { nodes: sum[0] as f64 / n, leaves: sum[1] as f64 / n }
+    }
+
+    /// Nodes and leaves. The order of children is that of shaders/trace/wide.glsl: for the nearest hit, the child that is entered
+    /// first and then along the ray's octant; for any hit, along the octant.
+    fn walk(&self, ray: &Ray, any: bool) -> [u64; 2] {
+        let mut visits = [0u64; 2];
+        if ray.tmax <= ray.tmin {
+            return visits;
+        }
+        let (origin, direction) = (Vec3::from(ray.origin), Vec3::from(ray.direction));
+        let inverse = direction.to_array().map(|d| 1.0 / if d == 0.0 { 1e-30 } else { d });
+        let octant = (0..3).fold(7u32, |o, a| if inverse[a] < 0.0 { o & !(4 >> a) } else { o });
+        let mut best = ray.tmax;
+        // siblings yet to be visited: node, and slots
+        let mut stack: Vec<(usize, u32)> = Vec::new();
+        let mut next = Some(0usize);
+        while let Some(at) = next.take() {
+            let block = &self.blocks[at];
+            let mut nearest = None;
+            if wide::is_leaf(block) {
+                visits[1] += 1;
+                if let Some(t) = meet(block, origin, direction, ray.tmin, best) {
+                    best = t;
+                    if any {
+                        break;
+                    }
+                }
+            } else {
+                visits[0] += 1;
+                let mut hits = 0;
+                let mut least = f32::INFINITY;
+                for (slot, _) in wide::children(block) {
+                    let planes = wide::child_box(block, slot);
+                    let (mut near, mut far) = (ray.tmin, best);
+                    for a in 0..3 {
+                        let t = planes[a].map(|p| (p as f32 - origin[a]) * inverse[a]);
+                        near = near.max(t[0].min(t[1]));
+                        far = far.min(t[0].max(t[1]));
+                    }
+                    if near <= far {
+                        hits |= 1 << slot;
+                        if near < least {
+                            (least, nearest) = (near, Some(slot as u32));
+                        }
+                    }
+                }
+                if hits != 0 {
+                    stack.push((at, hits));
+                } else {
+                    nearest = None;
+                }
+            }
+            if let Some((node, slots)) = stack.last_mut() {
+                let along = (0..8u32).rev().map(|rank| rank ^ octant).find(|&slot| *slots >> slot & 1 == 1).unwrap_or(0);
+                let slot = nearest.filter(|_| !any).unwrap_or(along);
+                *slots &= !(1 << slot);
+                next = wide::children(&self.blocks[*node]).find(|c| c.0 as u32 == slot).map(|c| c.1 as usize);
+                if *slots == 0 {
+                    stack.pop();
+                }
+            }
+        }
+        visits
+    }
+}
+
+/// Where the ray meets a leaf's triangles nearest, if within (tmin, tmax).
+fn meet(block: &Block, origin: Vec3, direction: Vec3, tmin: f32, tmax: f32) -> Option<f32> {
+    debug_assert!(block[15] & LEAF != 0 && (block[12] == NONE || block[12] & SPHERE == 0));
+    let corner = |k: usize| Vec3::from_array(std::array::from_fn(|a| f32::from_bits(block[3 * k + a])));
+    let corners = [0, 1, 2, 3].map(corner);
+    let mut best = tmax;
+    for [b, c] in [[1, 2], [2, 3]] {
+        // Moeller and Trumbore: what it loses at edges does not show in a mean
+        let (e1, e2) = (corners[b] - corners[0], corners[c] - corners[0]);
+        let p = direction.cross(e2);
+        let inverse = 1.0 / e1.dot(p);
+        let s = origin - corners[0];
+        let q = s.cross(e1);
+        let (u, v, t) = (s.dot(p) * inverse, direction.dot(q) * inverse, e2.dot(q) * inverse);
+        if u >= 0.0 && v >= 0.0 && u + v <= 1.0 && t > tmin && t < best {
+            best = t;
+        }
+    }
+    (best < tmax).then_some(best)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::load;
+
+    #[test]
+    fn rays_that_meet_nothing_visit_the_root_alone() {
+        let scene = load::load("builtin:cornell-box").unwrap();
+        let flat = FlatScene::new(&scene);
+        let counter = VisitCounter::new(&flat).unwrap();
+        let bounds = flat.bounds();
+        let away = Ray { origin: (bounds.max + 1.0).to_array(), tmin: 0.0, direction: [1.0, 1.0, 1.0], tmax: f32::INFINITY };
+        assert_eq!(counter.mean(&[away], false), Visits { nodes: 1.0, leaves: 0.0 });
+        let through = Ray { direction: [-1.0, -1.0, -1.0], ..away };
+        let (closest, any) = (counter.mean(&[through], false), counter.mean(&[through], true));
+        assert!(closest.nodes >= 1.0 && any.nodes <= closest.nodes + 8.0, "{closest:?} {any:?}");
+        let none = Ray { tmax: -1.0, ..through };
+        assert_eq!(counter.mean(&[none], false), Visits::default());
+    }
+}
