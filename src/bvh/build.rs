@@ -35,12 +35,12 @@ impl obvhs::Boundable for Aabb {
 /// one each.
 pub fn tree(boxes: &[Aabb], preset: BuildPreset, collapse: Option<u32>) -> Bvh2 {
     if !seems_to_repeat(boxes) {
-        return limit_depth(distinct_tree(boxes, preset, collapse));
+        return limit_depth(distinct_tree(boxes, preset, collapse), MAX_DEPTH);
     }
     // clustering pairs one of k equal boxes at a time: k^2 work for a chain of depth k. Build over one of each instead.
     let copies = Copies::of(boxes);
     let unique: Vec<Aabb> = copies.groups().map(|g| boxes[g[0] as usize]).collect();
-    limit_depth(copies.expand(&distinct_tree(&unique, preset, None)))
+    limit_depth(copies.expand(&distinct_tree(&unique, preset, None)), MAX_DEPTH)
 }
 
 /// Are there equal boxes among some of them, evenly spread? What a sample of this size overlooks is too few to matter.
@@ -115,13 +115,13 @@ fn distinct_tree(boxes: &[Aabb], preset: BuildPreset, collapse: Option<u32>) -> 
     }
 }
 
-/// The same leaves in a tree that is no deeper than [`MAX_DEPTH`].
-fn limit_depth(tree: Bvh2) -> Bvh2 {
-    if depth_of(&tree) <= MAX_DEPTH {
+/// The same leaves in a tree that is no deeper than `most` (but ceil(log2 leaves) must fit).
+pub fn limit_depth(tree: Bvh2, most: u32) -> Bvh2 {
+    if depth_of(&tree) <= most {
         return tree;
     }
     let counts = leaf_counts(&tree);
-    let nodes = emit(Source::Tree { tree: &tree, node: 0 }, |source, depth| source.limited(depth, &counts));
+    let nodes = emit(Source::Tree { tree: &tree, node: 0 }, |source, depth| source.limited(depth, most, &counts));
     Bvh2 { nodes, primitive_indices: tree.primitive_indices, ..Default::default() }
 }
 
@@ -168,9 +168,9 @@ impl<'a> Source<'a> {
 
     /// Itself while there is room below for anything it may hold, otherwise balanced. With d inner nodes above and n leaves
     /// below, a balanced tree needs d + ceil(log2 n); descending keeps that bound as long as it is below the limit.
-    fn limited(self, depth: u32, counts: &[u32]) -> Self {
+    fn limited(self, depth: u32, most: u32, counts: &[u32]) -> Self {
         match &self {
-            Source::Tree { tree, node } if depth + counts[*node].next_power_of_two().ilog2() >= MAX_DEPTH => {
+            Source::Tree { tree, node } if depth + counts[*node].next_power_of_two().ilog2() >= most => {
                 let (mut found, mut work) = (Vec::new(), vec![*node]);
                 while let Some(n) = work.pop() {
                     let n = &tree.nodes[n];
@@ -269,7 +269,7 @@ mod tests {
         }
         let tree = Bvh2 { nodes, primitive_indices: (0..n as u32).collect(), ..Default::default() };
         assert_eq!(depth_of(&tree), n as u32 - 1);
-        let out = limit_depth(tree);
+        let out = limit_depth(tree, MAX_DEPTH);
         assert!(depth_of(&out) <= MAX_DEPTH);
         let mut leaves: Vec<_> = out.nodes.iter().filter(|n| n.is_leaf()).map(|n| n.first_index).collect();
         leaves.sort_unstable();

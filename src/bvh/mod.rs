@@ -3,10 +3,12 @@
 pub mod build;
 pub mod bvh2;
 pub mod pairs;
+pub mod refit;
 pub mod wide;
 
 pub use build::BuildPreset;
 pub use bvh2::Bvh2;
+pub use refit::{RefitPlan, RefitPolicy, Refitted};
 pub use wide::Wide;
 
 /// An axis-aligned box in f32.

@@ -11,7 +11,7 @@ mod instance;
 mod pipeline;
 mod result;
 
-pub use acceleration_structure::{AccelerationStructure, BottomLevelInput, TopLevelEntry};
+pub use acceleration_structure::{AccelerationStructure, BottomLevelInput, TopLevelEntry, Update};
 pub use buffer::{Buffer, Memory};
 pub use commands::{Commands, Recorder, Timing};
 pub use device::{Device, Options};

@@ -84,6 +84,7 @@ impl Trees {
             bounds: self.bounds,
             unfinished: unfinished_counter(device)?,
             launch: None,
+            dynamic: None,
         })
     }
 }
