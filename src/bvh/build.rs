@@ -89,7 +89,7 @@ fn whole(boxes: &[Aabb], preset: BuildPreset, pad: f32) -> Bvh2 {
     // clustering pairs one of k equal boxes at a time: k^2 work for a chain of depth k
     if preset == BuildPreset::Default && boxes.len() > 2 && !seems_to_repeat(boxes) {
         let boxes: Vec<Aabb> = boxes.par_iter().map(grow).collect();
-        return limit_depth(clustered(&boxes));
+        return limit_depth(clustered(&boxes), MAX_DEPTH);
     }
     let mut items: Vec<sah::Item> = boxes.par_iter().enumerate().map(|(i, b)| sah::Item::new(grow(b), i as u32)).collect();
     let nodes = sah::tree(&mut items);
@@ -118,7 +118,7 @@ fn seems_to_repeat(boxes: &[Aabb]) -> bool {
 
 fn finish(mut nodes: Vec<Bvh2Node>, primitives: usize, preset: BuildPreset) -> Bvh2 {
     reinsert::optimise(&mut nodes, preset.effort());
-    limit_depth(Bvh2 { nodes, primitive_indices: (0..primitives as u32).collect(), ..Default::default() })
+    limit_depth(Bvh2 { nodes, primitive_indices: (0..primitives as u32).collect(), ..Default::default() }, MAX_DEPTH)
 }
 
 /// Expected cost of a ray by the surface-area heuristic: nodes that it visits and primitives that it tests, if it hits the root's
@@ -192,13 +192,13 @@ fn is_covered(t: [Vec3; 3], parts: &[Aabb]) -> bool {
     })
 }
 
-/// The same leaves in a tree that is no deeper than [`MAX_DEPTH`].
-fn limit_depth(tree: Bvh2) -> Bvh2 {
-    if depth_of(&tree) <= MAX_DEPTH {
+/// The same leaves in a tree that is no deeper than `most` (but ceil(log2 leaves) must fit).
+pub fn limit_depth(tree: Bvh2, most: u32) -> Bvh2 {
+    if depth_of(&tree) <= most {
         return tree;
     }
     let counts = leaf_counts(&tree);
-    let nodes = emit(Source::Tree { tree: &tree, node: 0 }, |source, depth| source.limited(depth, &counts));
+    let nodes = emit(Source::Tree { tree: &tree, node: 0 }, |source, depth| source.limited(depth, most, &counts));
     Bvh2 { nodes, primitive_indices: tree.primitive_indices, ..Default::default() }
 }
 
@@ -245,9 +245,9 @@ impl<'a> Source<'a> {
 
     /// Itself while there is room below for anything it may hold, otherwise balanced. With d inner nodes above and n leaves
     /// below, a balanced tree needs d + ceil(log2 n); descending keeps that bound as long as it is below the limit.
-    fn limited(self, depth: u32, counts: &[u32]) -> Self {
+    fn limited(self, depth: u32, most: u32, counts: &[u32]) -> Self {
         match &self {
-            Source::Tree { tree, node } if depth + counts[*node].next_power_of_two().ilog2() >= MAX_DEPTH => {
+            Source::Tree { tree, node } if depth + counts[*node].next_power_of_two().ilog2() >= most => {
                 let (mut found, mut work) = (Vec::new(), vec![*node]);
                 while let Some(n) = work.pop() {
                     let n = &tree.nodes[n];
@@ -485,7 +485,7 @@ mod tests {
         }
         let tree = Bvh2 { nodes, primitive_indices: (0..n as u32).collect(), ..Default::default() };
         assert_eq!(depth_of(&tree), n as u32 - 1);
-        let out = limit_depth(tree);
+        let out = limit_depth(tree, MAX_DEPTH);
         assert!(depth_of(&out) <= MAX_DEPTH);
         let mut leaves: Vec<_> = out.nodes.iter().filter(|n| n.is_leaf()).map(|n| n.first_index).collect();
         leaves.sort_unstable();

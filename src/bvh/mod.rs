@@ -5,6 +5,7 @@ pub mod bvh2;
 pub mod cache;
 pub mod clip;
 pub mod pairs;
+pub mod refit;
 mod reinsert;
 mod sah;
 mod spatial;
@@ -12,6 +13,7 @@ pub mod wide;
 
 pub use build::BuildPreset;
 pub use bvh2::Bvh2;
+pub use refit::{RefitPlan, RefitPolicy, Refitted};
 pub use wide::Wide;
 
 /// An axis-aligned box in f32.

@@ -94,11 +94,13 @@ impl Wide {
         sorted.sort_unstable();
         let top = Piece::collapse(tree, 0, &sorted, &pieces, &leaf);
         let bounds = node_box(tree, 0);
+        // a single leaf has a node above it
+        let blocks = if tree.nodes[0].is_leaf() { 2.0 } else { 1.0 };
         let mut out = Self {
             blocks: top.blocks,
             depth: top.depth,
             bounds: Some(bounds),
-            sah_cost: (top.cost / bounds.half_area()) as f64,
+            sah_cost: (blocks * top.cost / bounds.half_area()) as f64,
         };
         // the pieces' roots have their places; the rest of each follows
         let mut ends = Vec::with_capacity(pieces.len());
@@ -344,7 +346,8 @@ fn assign_slots(children: &mut [(usize, Aabb)], parent: Aabb) {
     }
 }
 
-fn node(bounds: Aabb, children: &[(usize, Aabb)], first: u32) -> Block {
+/// A node over its children's boxes by slot, whose blocks begin at `first`: planes are rounded outwards.
+pub(super) fn node(bounds: Aabb, children: &[(usize, Aabb)], first: u32) -> Block {
     let mut bytes = [0u8; 64];
     bytes[12..16].copy_from_slice(&first.to_le_bytes());
     let mut present = 0u8;

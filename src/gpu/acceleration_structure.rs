@@ -49,6 +49,15 @@ pub struct TopLevelEntry {
     pub bottom_level: u64,
 }
 
+/// How a structure is brought up to date with inputs that have changed in place.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Update {
+    /// Its boxes are made anew, its tree stays.
+    Refit,
+    /// All is made anew.
+    Rebuild,
+}
+
 /// A built acceleration structure.
 pub struct AccelerationStructure {
     raw: vk::AccelerationStructureKHR,
@@ -81,36 +90,36 @@ impl AccelerationStructure {
         let (geometries, ranges) = bottom_level_geometry(input);
         let flags = vk::BuildAccelerationStructureFlagsKHR::PREFER_FAST_TRACE
             | vk::BuildAccelerationStructureFlagsKHR::ALLOW_COMPACTION;
-        let built = build(device, commands, name, vk::AccelerationStructureTypeKHR::BOTTOM_LEVEL, flags, &geometries, &ranges)?;
-        built.compacted(commands, name)
+        let inputs = Inputs { ty: vk::AccelerationStructureTypeKHR::BOTTOM_LEVEL, flags, geometries, ranges };
+        inputs.build(device, commands, name)?.compacted(commands, name)
+    }
+
+    /// As [`AccelerationStructure::bottom_level`], for inputs that will change: not compacted, so that there is room to build it anew.
+    pub fn changing_bottom_level(
+        device: &Arc<Device>,
+        commands: &mut Commands,
+        name: &str,
+        input: &BottomLevelInput,
+    ) -> Result<Self> {
+        Inputs::changing(input).build(device, commands, name)
+    }
+
+    /// Brings a structure made by [`AccelerationStructure::changing_bottom_level`] up to date. The input must be the same but
+    /// for where its vertices are. Its address stays.
+    pub fn update(&self, commands: &mut Commands, input: &BottomLevelInput, update: Update) -> Result<()> {
+        Inputs::changing(input).record(self, commands, update)
     }
 
     /// Builds a top level.
     pub fn top_level(device: &Arc<Device>, commands: &mut Commands, entries: &[TopLevelEntry]) -> Result<Self> {
-        if entries.len() >= 1 << 24 {
-            return Err(Error::Scene(format!(
-                "{} instances: Vulkan's top level numbers at most 2^24; use --tracer compute",
-                entries.len()
-            )));
-        }
-        let mut records = Buffer::new(device, "top-level entries", 64 * entries.len() as u64, Memory::Upload)?;
-        let bytes = records.bytes_mut().ok_or_else(|| Error::Vulkan("the top-level entries are not mapped".into()))?;
-        for (entry, record) in entries.iter().zip(bytes.chunks_exact_mut(64)) {
-            // VkAccelerationStructureInstanceKHR: transform, index | mask, hit group | flags, address
-            record[..48].copy_from_slice(bytemuck::cast_slice(&entry.transform));
-            record[48..52].copy_from_slice(&(entry.index | 0xff << 24).to_le_bytes());
-            let cull_disable = vk::GeometryInstanceFlagsKHR::TRIANGLE_FACING_CULL_DISABLE.as_raw();
-            record[52..56].copy_from_slice(&(entry.hit_group | cull_disable << 24).to_le_bytes());
-            record[56..].copy_from_slice(&entry.bottom_level.to_le_bytes());
-        }
-        let instances = vk::AccelerationStructureGeometryInstancesDataKHR::default()
-            .data(vk::DeviceOrHostAddressConstKHR { device_address: records.address() });
-        let geometry = [vk::AccelerationStructureGeometryKHR::default()
-            .geometry_type(vk::GeometryTypeKHR::INSTANCES)
-            .geometry(vk::AccelerationStructureGeometryDataKHR { instances })];
-        let ranges = [vk::AccelerationStructureBuildRangeInfoKHR::default().primitive_count(entries.len() as u32)];
-        let flags = vk::BuildAccelerationStructureFlagsKHR::PREFER_FAST_TRACE;
-        build(device, commands, "top level", vk::AccelerationStructureTypeKHR::TOP_LEVEL, flags, &geometry, &ranges)
+        let records = entry_records(device, entries)?;
+        Inputs::top_level(&records, entries.len()).build(device, commands, "top level")
+    }
+
+    /// Builds a top level anew, where it lies, for as many entries as before. Its address stays.
+    pub fn rebuild_top_level(&self, commands: &mut Commands, entries: &[TopLevelEntry]) -> Result<()> {
+        let records = entry_records(&self.device, entries)?;
+        Inputs::top_level(&records, entries.len()).record(self, commands, Update::Rebuild)
     }
 
     /// What shaders and top-level entries refer to it by.
@@ -213,46 +222,111 @@ fn bottom_level_geometry<'a>(input: &BottomLevelInput) -> (Vec<Geometry<'a>>, Ve
     }
 }
 
-fn build(
-    device: &Arc<Device>,
-    commands: &mut Commands,
-    name: &str,
+/// The top level's input in memory that the device reads.
+fn entry_records(device: &Arc<Device>, entries: &[TopLevelEntry]) -> Result<Buffer> {
+    if entries.len() >= 1 << 24 {
+        return Err(Error::Scene(format!(
+            "{} instances: Vulkan's top level numbers at most 2^24; use --tracer compute",
+            entries.len()
+        )));
+    }
+    let mut records = Buffer::new(device, "top-level entries", 64 * entries.len() as u64, Memory::Upload)?;
+    let bytes = records.bytes_mut().ok_or_else(|| Error::Vulkan("the top-level entries are not mapped".into()))?;
+    for (entry, record) in entries.iter().zip(bytes.chunks_exact_mut(64)) {
+        // VkAccelerationStructureInstanceKHR: transform, index | mask, hit group | flags, address
+        record[..48].copy_from_slice(bytemuck::cast_slice(&entry.transform));
+        record[48..52].copy_from_slice(&(entry.index | 0xff << 24).to_le_bytes());
+        let cull_disable = vk::GeometryInstanceFlagsKHR::TRIANGLE_FACING_CULL_DISABLE.as_raw();
+        record[52..56].copy_from_slice(&(entry.hit_group | cull_disable << 24).to_le_bytes());
+        record[56..].copy_from_slice(&entry.bottom_level.to_le_bytes());
+    }
+    Ok(records)
+}
+
+/// What a structure is built over, as Vulkan takes it.
+struct Inputs<'a> {
     ty: vk::AccelerationStructureTypeKHR,
     flags: vk::BuildAccelerationStructureFlagsKHR,
-    geometries: &[Geometry],
-    ranges: &[Range],
-) -> Result<AccelerationStructure> {
-    let functions = functions(device)?;
-    let mut info = vk::AccelerationStructureBuildGeometryInfoKHR::default()
-        .ty(ty)
-        .flags(flags)
-        .mode(vk::BuildAccelerationStructureModeKHR::BUILD)
-        .geometries(geometries);
-    let counts: Vec<u32> = ranges.iter().map(|r| r.primitive_count).collect();
-    let mut sizes = vk::AccelerationStructureBuildSizesInfoKHR::default();
-    // SAFETY: geometries and counts match
-    unsafe {
-        functions.get_acceleration_structure_build_sizes(
-            vk::AccelerationStructureBuildTypeKHR::DEVICE,
-            &info,
-            &counts,
-            &mut sizes,
-        )
-    };
-    let structure = AccelerationStructure::allocate(device, name, ty, sizes.acceleration_structure_size)?;
-    // VUID-vkCmdBuildAccelerationStructuresKHR-pInfos-03710: the address itself has to be aligned, so leave room for it
-    let alignment = device.info.limits.scratch_alignment.max(1) as u64;
-    let scratch = Buffer::new(device, "acceleration-structure scratch", sizes.build_scratch_size + alignment, Memory::Device)?;
-    info = info
-        .dst_acceleration_structure(structure.raw)
-        .scratch_data(vk::DeviceOrHostAddressKHR { device_address: scratch.address().next_multiple_of(alignment) });
-    commands.run(|r: &mut Recorder| {
-        r.timed("build", |r| {
-            // SAFETY: inputs, target and scratch live until the submission is waited for
-            unsafe { functions.cmd_build_acceleration_structures(r.buffer, &[info], &[ranges]) };
-        })
-    })?;
-    Ok(structure)
+    geometries: Vec<Geometry<'a>>,
+    ranges: Vec<Range>,
+}
+
+impl<'a> Inputs<'a> {
+    fn changing(input: &BottomLevelInput) -> Self {
+        let (geometries, ranges) = bottom_level_geometry(input);
+        let flags =
+            vk::BuildAccelerationStructureFlagsKHR::PREFER_FAST_TRACE | vk::BuildAccelerationStructureFlagsKHR::ALLOW_UPDATE;
+        Self { ty: vk::AccelerationStructureTypeKHR::BOTTOM_LEVEL, flags, geometries, ranges }
+    }
+
+    fn top_level(records: &Buffer, entries: usize) -> Self {
+        let instances = vk::AccelerationStructureGeometryInstancesDataKHR::default()
+            .data(vk::DeviceOrHostAddressConstKHR { device_address: records.address() });
+        let geometry = vk::AccelerationStructureGeometryKHR::default()
+            .geometry_type(vk::GeometryTypeKHR::INSTANCES)
+            .geometry(vk::AccelerationStructureGeometryDataKHR { instances });
+        Self {
+            ty: vk::AccelerationStructureTypeKHR::TOP_LEVEL,
+            flags: vk::BuildAccelerationStructureFlagsKHR::PREFER_FAST_TRACE,
+            geometries: vec![geometry],
+            ranges: vec![vk::AccelerationStructureBuildRangeInfoKHR::default().primitive_count(entries as u32)],
+        }
+    }
+
+    fn info(&self, mode: vk::BuildAccelerationStructureModeKHR) -> vk::AccelerationStructureBuildGeometryInfoKHR<'_> {
+        vk::AccelerationStructureBuildGeometryInfoKHR::default()
+            .ty(self.ty)
+            .flags(self.flags)
+            .mode(mode)
+            .geometries(&self.geometries)
+    }
+
+    fn sizes(&self, functions: &ash::khr::acceleration_structure::Device) -> vk::AccelerationStructureBuildSizesInfoKHR<'_> {
+        let counts: Vec<u32> = self.ranges.iter().map(|r| r.primitive_count).collect();
+        let mut sizes = vk::AccelerationStructureBuildSizesInfoKHR::default();
+        let info = self.info(vk::BuildAccelerationStructureModeKHR::BUILD);
+        let ty = vk::AccelerationStructureBuildTypeKHR::DEVICE;
+        // SAFETY: geometries and counts match
+        unsafe { functions.get_acceleration_structure_build_sizes(ty, &info, &counts, &mut sizes) };
+        sizes
+    }
+
+    fn build(&self, device: &Arc<Device>, commands: &mut Commands, name: &str) -> Result<AccelerationStructure> {
+        let size = self.sizes(functions(device)?).acceleration_structure_size;
+        let structure = AccelerationStructure::allocate(device, name, self.ty, size)?;
+        self.record(&structure, commands, Update::Rebuild)?;
+        Ok(structure)
+    }
+
+    /// Builds into `target`, which has the size for it, and waits.
+    fn record(&self, target: &AccelerationStructure, commands: &mut Commands, update: Update) -> Result<()> {
+        let device = &target.device;
+        let functions = functions(device)?;
+        let sizes = self.sizes(functions);
+        debug_assert!(sizes.acceleration_structure_size <= target.size());
+        let (mode, size) = match update {
+            Update::Rebuild => (vk::BuildAccelerationStructureModeKHR::BUILD, sizes.build_scratch_size),
+            Update::Refit => (vk::BuildAccelerationStructureModeKHR::UPDATE, sizes.update_scratch_size),
+        };
+        // VUID-vkCmdBuildAccelerationStructuresKHR-pInfos-03710: the address itself has to be aligned, so leave room for it
+        let alignment = device.info.limits.scratch_alignment.max(1) as u64;
+        let scratch = Buffer::new(device, "acceleration-structure scratch", size + alignment, Memory::Device)?;
+        let mut info = self
+            .info(mode)
+            .dst_acceleration_structure(target.raw)
+            .scratch_data(vk::DeviceOrHostAddressKHR { device_address: scratch.address().next_multiple_of(alignment) });
+        if update == Update::Refit {
+            info = info.src_acceleration_structure(target.raw);
+        }
+        commands.run(|r: &mut Recorder| {
+            r.timed("build", |r| {
+                // SAFETY: inputs, target and scratch live until the submission is waited for; a refit's target was built
+                // with ALLOW_UPDATE over as many primitives
+                unsafe { functions.cmd_build_acceleration_structures(r.buffer, &[info], &[&self.ranges]) };
+            })
+        })?;
+        Ok(())
+    }
 }
 
 impl Drop for AccelerationStructure {

@@ -14,7 +14,7 @@ use crate::error::{Error, Result};
 /// Who reads and writes a buffer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Memory {
-    /// The device; the host fills it at most once, through [`Buffer::fill`].
+    /// The device; the host fills it through [`Buffer::fill`] and changes it through [`Buffer::write`].
     Device,
     /// The host writes, the device reads.
     Upload,
@@ -160,6 +160,26 @@ impl Buffer {
             write(at / record, &mut bytes[..n as usize]);
             commands.run(|r| r.copy(&staging, 0, self, at, n))?;
             at += n;
+        }
+        Ok(())
+    }
+
+    /// Overwrites bytes from `offset` on, through a staging buffer where the host cannot see the memory.
+    pub fn write(&mut self, offset: u64, data: &[u8]) -> Result<()> {
+        debug_assert!(offset + data.len() as u64 <= self.size);
+        if data.is_empty() {
+            return Ok(());
+        }
+        if let Some(bytes) = self.bytes_mut() {
+            bytes[offset as usize..][..data.len()].copy_from_slice(data);
+            return Ok(());
+        }
+        let mut staging = Buffer::new(&self.device, "staging", STAGING.min(data.len() as u64), Memory::Upload)?;
+        let mut commands = Commands::new(&self.device)?;
+        for (k, piece) in data.chunks(STAGING as usize).enumerate() {
+            let bytes = staging.bytes_mut().ok_or_else(|| Error::Vulkan("the staging buffer is not mapped".into()))?;
+            bytes[..piece.len()].copy_from_slice(piece);
+            commands.run(|r| r.copy(&staging, 0, self, offset + k as u64 * STAGING, piece.len() as u64))?;
         }
         Ok(())
     }

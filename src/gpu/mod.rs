@@ -12,7 +12,7 @@ mod instance;
 mod pipeline;
 mod result;
 
-pub use acceleration_structure::{AccelerationStructure, BottomLevelInput, TopLevelEntry};
+pub use acceleration_structure::{AccelerationStructure, BottomLevelInput, TopLevelEntry, Update};
 pub use buffer::{Buffer, Memory};
 pub use cache::folder as cache_folder;
 pub use commands::{Commands, Recorder, Timing};

@@ -9,6 +9,40 @@ use glam::{DAffine3, DVec3, Vec3};
 use super::features::{AlphaClass, alpha_classes};
 use super::{Geometry, Scene, Sphere};
 use crate::bvh::Aabb;
+use crate::error::{Error, Result};
+
+/// What of a scene may change while it is traced ([`crate::tracer::Tracer::update`]). Nothing, by default; and then nothing is kept
+/// for it.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Motion {
+    /// Instances that may move, as indices into [`Scene::instances`].
+    pub instances: Vec<usize>,
+    /// Triangle meshes whose vertices may move, as indices into [`Scene::meshes`].
+    pub meshes: Vec<usize>,
+}
+
+impl Motion {
+    /// Nothing moves.
+    pub fn is_none(&self) -> bool {
+        self.instances.is_empty() && self.meshes.is_empty()
+    }
+
+    fn check(&self, scene: &Scene) -> Result<()> {
+        if let Some(i) = self.instances.iter().find(|&&i| i >= scene.instances.len()) {
+            return Err(Error::Usage(format!("instance {i} cannot move: the scene has {}", scene.instances.len())));
+        }
+        for &m in &self.meshes {
+            match scene.meshes.get(m).map(|mesh| &mesh.geometry) {
+                Some(Geometry::Triangles(_)) => (),
+                Some(Geometry::Spheres(_)) => {
+                    return Err(Error::Usage(format!("mesh {m} cannot deform: it holds spheres; move its instances instead")));
+                }
+                None => return Err(Error::Usage(format!("mesh {m} cannot deform: the scene has {}", scene.meshes.len()))),
+            }
+        }
+        Ok(())
+    }
+}
 
 /// A mesh within a group.
 #[derive(Clone, Debug)]
@@ -68,19 +102,38 @@ pub struct FlatScene<'a> {
     pub placements: Vec<Placement>,
     /// Triangles and spheres left out because their material is nowhere opaque enough to be seen.
     pub absent_primitives: usize,
+    /// What may change.
+    pub motion: Motion,
 }
 
 impl<'a> FlatScene<'a> {
-    /// Groups the meshes of a scene.
+    /// Groups the meshes of a scene of which nothing changes.
     pub fn new(scene: &'a Scene) -> Self {
+        Self::group(scene, Motion::default())
+    }
+
+    /// Groups the meshes of a scene; what may change is not baked into anything: its mesh is a group of its own, in object space.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] when `motion` names what is not there, or spheres to deform.
+    pub fn with_motion(scene: &'a Scene, motion: Motion) -> Result<Self> {
+        motion.check(scene)?;
+        Ok(Self::group(scene, motion))
+    }
+
+    fn group(scene: &'a Scene, motion: Motion) -> Self {
         let origin = scene.origin();
         let alpha = alpha_classes(scene);
         let mut uses = vec![0usize; scene.meshes.len()];
         for i in &scene.instances {
             uses[i.mesh] += 1;
         }
+        let mut changes = vec![false; scene.meshes.len()];
+        for mesh in motion.meshes.iter().copied().chain(motion.instances.iter().map(|&i| scene.instances[i].mesh)) {
+            changes[mesh] = true;
+        }
         let relative = |t: DAffine3| DAffine3 { translation: t.translation - origin, ..t };
-        let mut flat = Self { scene, origin, groups: Vec::new(), placements: Vec::new(), absent_primitives: 0 };
+        let mut flat = Self { scene, origin, groups: Vec::new(), placements: Vec::new(), absent_primitives: 0, motion };
         let mut world = [Group::empty(false), Group::empty(true)];
         let mut own: Vec<Option<usize>> = vec![None; scene.meshes.len()];
         // opaque meshes first, so that alpha-tested primitives are the tail of every group
@@ -97,7 +150,7 @@ impl<'a> FlatScene<'a> {
                 }
                 let to_world = relative(instance.object_to_world);
                 let spheres = matches!(geometry, Geometry::Spheres(_));
-                if uses[instance.mesh] == 1 && (!spheres || is_similarity(&to_world)) {
+                if uses[instance.mesh] == 1 && !changes[instance.mesh] && (!spheres || is_similarity(&to_world)) {
                     world[spheres as usize].push(scene, instance.mesh, Some(k), to_world, tested);
                 } else {
                     let group = *own[instance.mesh].get_or_insert_with(|| {
@@ -119,7 +172,7 @@ impl<'a> FlatScene<'a> {
 
     /// One entry that needs no transform: the second level can be skipped.
     pub fn is_single_level(&self) -> bool {
-        matches!(self.placements.as_slice(), [p] if p.to_world == DAffine3::IDENTITY)
+        self.motion.instances.is_empty() && matches!(self.placements.as_slice(), [p] if p.to_world == DAffine3::IDENTITY)
     }
 
     /// Does any primitive need its material asked at every hit?

@@ -51,5 +51,6 @@ pub(super) fn upload(device: &Arc<Device>, flat: &FlatScene) -> Result<Hierarchy
         bounds: flat.bounds(),
         unfinished: unfinished_counter(device)?,
         launch: None,
+        dynamic: None,
     })
 }

@@ -3,15 +3,16 @@
 
 use std::sync::Arc;
 
-use glam::Vec3;
+use glam::{DAffine3, Vec3};
 
+use super::dynamic_trees::DynamicTrees;
 use super::kernel::{BuildOptions, Kernel};
 use super::stream::LaunchMemory;
 use super::{brute, reference, wide};
 use crate::bvh::{Aabb, bvh2};
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, Device, Memory};
-use crate::scene::flatten::{FlatScene, Group};
+use crate::scene::flatten::{FlatScene, Group, Placement};
 
 /// Rays that a lane of the fast kernel takes one after the other on a CPU driver, where idle lanes of a vector cost most.
 pub const RAYS_PER_LANE_CPU: u32 = 16;
@@ -48,6 +49,8 @@ pub(super) struct Hierarchy {
     pub unfinished: Buffer,
     /// Between the steps of a launch (fast kernel only).
     pub launch: Option<LaunchMemory>,
+    /// What keeps it up to date with a scene that changes (fast kernel only).
+    pub dynamic: Option<Box<DynamicTrees>>,
 }
 
 impl Hierarchy {
@@ -80,6 +83,29 @@ impl Hierarchy {
     pub fn bytes(&self) -> u64 {
         self.nodes.size() + self.primitives.size()
     }
+
+    /// See [`DynamicTrees::deform`].
+    pub fn deform(&mut self, device: &Arc<Device>, group: usize, positions: &[Vec3]) -> Result<(bool, f64)> {
+        match &mut self.dynamic {
+            Some(d) => d.deform(device, &mut self.nodes, group, positions),
+            None => Ok((false, 1.0)),
+        }
+    }
+
+    /// See [`DynamicTrees::place`].
+    pub fn place(&mut self, placements: &[Placement]) -> Result<bool> {
+        let Some(dynamic) = &mut self.dynamic else { return Ok(false) };
+        let (rebuilt, bounds) = dynamic.place(&mut self.nodes, placements)?;
+        self.bounds = bounds;
+        Ok(rebuilt)
+    }
+
+    /// See [`DynamicTrees::traced`].
+    pub fn traced(&mut self, seconds: f64, placements: &[Placement]) {
+        if let Some(dynamic) = &mut self.dynamic {
+            dynamic.traced(seconds, placements);
+        }
+    }
 }
 
 impl Trees {
@@ -90,6 +116,12 @@ impl Trees {
                 "{total} primitives and {} instances; the compute tracer numbers at most {} of each",
                 flat.placements.len(),
                 bvh2::MAX_PRIMITIVES
+            )));
+        }
+        if !flat.motion.is_none() && !matches!(kernel, Kernel::Auto | Kernel::Wide | Kernel::Packet) {
+            return Err(Error::Usage(format!(
+                "traversal '{kernel}' is for scenes that do not change; use --traversal {}",
+                Kernel::Wide
             )));
         }
         Ok(match kernel {
@@ -146,6 +178,11 @@ pub(super) fn write_records<T: bytemuck::NoUninit>(
 /// runs within the plane of flat geometry is then strictly inside the box, so that the traversal needs no special case for it.
 pub(super) fn padding<'a>(boxes: impl Iterator<Item = &'a Aabb>) -> f32 {
     let reach = boxes.fold(0.0f32, |m, b| m.max(b.min.abs().max(b.max.abs()).max_element()));
+    reach_padding(reach)
+}
+
+/// [`padding`] of boxes whose largest coordinate is `reach`.
+pub(super) fn reach_padding(reach: f32) -> f32 {
     (4.0 * f32::EPSILON * reach).max(1e-30)
 }
 
@@ -159,22 +196,28 @@ pub(super) fn primitive_boxes(flat: &FlatScene, group: &Group) -> impl Iterator<
 /// World boxes of the placed groups from each group's own, widened by what rounding a ray into a group's space may move it.
 pub(super) fn placement_boxes(flat: &FlatScene, bounds: &[Aabb]) -> Vec<Aabb> {
     let scene = flat.bounds();
-    let reach = scene.min.abs().max(scene.max.abs()).max_element().max(0.0);
-    // 16 half-ulps of the largest coordinate: two transforms of three products each, and the inverse's own rounding
-    let pad = 16.0 * f32::EPSILON * 0.5 * reach;
+    let pad = placement_padding(scene.min.abs().max(scene.max.abs()).max_element().max(0.0));
     flat.placements
         .iter()
         .map(|p| {
-            let b = bounds[p.group];
-            let mut out = Aabb::EMPTY;
-            for k in 0..8u32 {
-                let pick = |axis: usize| if k >> axis & 1 == 0 { b.min[axis] } else { b.max[axis] };
-                let corner = p.to_world.transform_point3(Vec3::new(pick(0), pick(1), pick(2)).as_dvec3()).as_vec3();
-                out = out.union(Aabb { min: corner - pad, max: corner + pad });
-            }
-            out
+            let b = placed(&p.to_world, bounds[p.group]);
+            Aabb { min: b.min - pad, max: b.max + pad }
         })
         .collect()
+}
+
+/// 16 half-ulps of the largest coordinate: two transforms of three products each, and the inverse's own rounding.
+pub(super) fn placement_padding(reach: f32) -> f32 {
+    16.0 * f32::EPSILON * 0.5 * reach
+}
+
+/// Box around a transformed box, rounded but not widened.
+pub(super) fn placed(to_world: &DAffine3, b: Aabb) -> Aabb {
+    (0..8u32).fold(Aabb::EMPTY, |out, k| {
+        let pick = |axis: usize| if k >> axis & 1 == 0 { b.min[axis] } else { b.max[axis] };
+        let corner = to_world.transform_point3(Vec3::new(pick(0), pick(1), pick(2)).as_dvec3()).as_vec3();
+        out.union(Aabb { min: corner, max: corner })
+    })
 }
 
 /// A primitive of a group as the shaders read it.

@@ -121,6 +121,9 @@ pub struct GpuScene {
     instances: Vec<InstanceRecord>,
     instance_buffer: Buffer,
     pub(super) groups: Vec<GroupBuffers>,
+    attributes: Buffer,
+    /// Where in `attributes` the normals of meshes that may deform lie.
+    normals: Vec<(usize, u64)>,
     others: Vec<Buffer>,
 }
 
@@ -203,9 +206,14 @@ impl GpuScene {
         root.materials = keep(Buffer::from_slice(device, "material records", &materials)?);
         root.textures = keep(Buffer::from_slice(device, "texture records", &textures.records)?);
         keep(textures.texels);
-        keep(attributes.buffer);
+        // such a mesh is not baked
+        let normals = |&mesh: &usize| {
+            let address = attributes.addresses.get(&(mesh, None, Attribute::Normals))?;
+            Some((mesh, address - attributes.buffer.address()))
+        };
+        let normals = flat.motion.meshes.iter().filter_map(normals).collect();
         let root_buffer = Buffer::from_slice(device, "scene root", &[root])?;
-        Ok(Self { root, root_buffer, instances, instance_buffer, groups, others })
+        Ok(Self { root, root_buffer, instances, instance_buffer, groups, attributes: attributes.buffer, normals, others })
     }
 
     /// Where shaders begin.
@@ -216,15 +224,47 @@ impl GpuScene {
     /// Bytes of device memory.
     pub fn bytes(&self) -> u64 {
         let groups = self.groups.iter().flat_map(|g| [Some(&g.positions), g.indices.as_ref(), g.part_of.as_ref()]).flatten();
-        groups.chain(&self.others).map(Buffer::size).sum::<u64>() + self.instance_buffer.size()
+        let others = self.others.iter().chain([&self.attributes, &self.instance_buffer]);
+        groups.chain(others).map(Buffer::size).sum::<u64>()
+    }
+
+    /// Vertices of a mesh that is a group of its own have moved.
+    pub(super) fn set_positions(&mut self, group: usize, positions: &[Vec3]) -> Result<()> {
+        self.groups[group].positions.write(0, bytemuck::cast_slice(positions))
+    }
+
+    /// Shading normals of a mesh that may deform; without effect where none were uploaded.
+    pub(super) fn set_normals(&mut self, mesh: usize, normals: &[Vec3]) -> Result<()> {
+        match self.normals.iter().find(|n| n.0 == mesh) {
+            Some(&(_, offset)) => self.attributes.write(offset, bytemuck::cast_slice(normals)),
+            None => Ok(()),
+        }
+    }
+
+    /// Entries of the top level have moved: which, and where to.
+    pub(super) fn set_transforms(&mut self, moved: &[(usize, DAffine3)]) -> Result<()> {
+        for (k, to_world) in moved {
+            let record = &mut self.instances[*k];
+            (record.group_to_world, record.world_to_group) = (rows(to_world), rows(&to_world.inverse()));
+        }
+        // one piece: copying what lies between costs less than a call each
+        let (first, last) = moved.iter().fold((usize::MAX, 0), |(a, b), m| (a.min(m.0), b.max(m.0)));
+        match self.instances.get(first..=last) {
+            Some(records) => {
+                self.instance_buffer.write((first * size_of::<InstanceRecord>()) as u64, bytemuck::cast_slice(records))
+            }
+            None => Ok(()),
+        }
     }
 
     /// Says where the compute tracer's hierarchy lies.
     pub(super) fn set_hierarchy(&mut self, h: &Hierarchy) -> Result<()> {
-        for (record, root) in self.instances.iter_mut().zip(&h.instance_roots) {
-            record.root = *root;
+        if self.instances.iter().zip(&h.instance_roots).any(|(record, root)| record.root != *root) {
+            for (record, root) in self.instances.iter_mut().zip(&h.instance_roots) {
+                record.root = *root;
+            }
+            write_all(&mut self.instance_buffer, &self.instances)?;
         }
-        write_all(&mut self.instance_buffer, &self.instances)?;
         self.root.nodes = h.nodes.address();
         self.root.primitives = h.primitives.address();
         self.root.root = h.root;

@@ -1,10 +1,15 @@
 //! What the hardware tracers traverse: one bottom level per group, one top level.
 
 use std::sync::Arc;
+use std::time::Instant;
 
-use super::gpu_scene::{GpuScene, rows};
-use crate::error::Result;
-use crate::gpu::{AccelerationStructure, BottomLevelInput, Buffer, Commands, Device, Memory, TopLevelEntry};
+use glam::DAffine3;
+
+use super::dynamic::group_of;
+use super::gpu_scene::{GpuScene, GroupBuffers, rows};
+use crate::bvh::RefitPolicy;
+use crate::error::{Error, Result};
+use crate::gpu::{AccelerationStructure, BottomLevelInput, Buffer, Commands, Device, Memory, TopLevelEntry, Update};
 use crate::scene::flatten::{FlatScene, Group};
 
 // hit groups of the pipeline: see gpu::RayTracingPipeline
@@ -16,13 +21,62 @@ const SPHERES: u32 = 2;
 pub(super) struct Structures {
     bottom: Vec<AccelerationStructure>,
     top: AccelerationStructure,
+    /// What a scene that changes needs besides.
+    changing: Option<Changing>,
+}
+
+/// What is built anew when something has moved.
+struct Changing {
+    entries: Vec<TopLevelEntry>,
+    deforming: Vec<Option<Deforming>>,
+}
+
+/// A bottom level whose vertices move.
+struct Deforming {
+    vertex_count: u32,
+    opaque: u32,
+    alpha_tested: u32,
+    policy: RefitPolicy,
+    /// Seconds of the first trace after it was built: nobody sees a driver's tree, so later traces are held against this one.
+    first_trace: Option<f64>,
+}
+
+impl Deforming {
+    fn input<'a>(&self, buffers: &'a GroupBuffers) -> Result<BottomLevelInput<'a>> {
+        let indices = buffers.indices.as_ref().ok_or_else(|| Error::Vulkan("a group that deforms has no indices".into()))?;
+        Ok(BottomLevelInput::Triangles {
+            positions: &buffers.positions,
+            vertex_count: self.vertex_count,
+            indices,
+            opaque: self.opaque,
+            alpha_tested: self.alpha_tested,
+        })
+    }
 }
 
 impl Structures {
     pub fn build(device: &Arc<Device>, flat: &FlatScene, scene: &GpuScene) -> Result<Self> {
         let mut commands = Commands::new(device)?;
         let mut bottom = Vec::with_capacity(flat.groups.len());
-        for (group, buffers) in flat.groups.iter().zip(&scene.groups) {
+        let mut deforming: Vec<Option<Deforming>> = flat.groups.iter().map(|_| None).collect();
+        for k in flat.motion.meshes.iter().filter_map(|&mesh| group_of(flat, mesh)) {
+            let group = &flat.groups[k];
+            deforming[k] = Some(Deforming {
+                vertex_count: group.vertex_count as u32,
+                opaque: group.opaque_count as u32,
+                alpha_tested: (group.primitive_count - group.opaque_count) as u32,
+                policy: RefitPolicy::new(1.0, 0.0),
+                first_trace: None,
+            });
+        }
+        for ((group, buffers), deforming) in flat.groups.iter().zip(&scene.groups).zip(&mut deforming) {
+            if let Some(d) = deforming {
+                let start = Instant::now();
+                let input = d.input(buffers)?;
+                bottom.push(AccelerationStructure::changing_bottom_level(device, &mut commands, "bottom level", &input)?);
+                d.policy = RefitPolicy::new(1.0, start.elapsed().as_secs_f64());
+                continue;
+            }
             let boxes;
             let input = match &buffers.indices {
                 Some(indices) => BottomLevelInput::Triangles {
@@ -56,7 +110,45 @@ impl Structures {
             })
             .collect();
         let top = AccelerationStructure::top_level(device, &mut commands, &entries)?;
-        Ok(Self { bottom, top })
+        let changing = (!flat.motion.is_none()).then_some(Changing { entries, deforming });
+        Ok(Self { bottom, top, changing })
+    }
+
+    /// A group's vertices have moved: has its bottom level refitted, or built anew where the policy says so; whether it was the latter.
+    pub fn deform(&mut self, device: &Arc<Device>, group: usize, scene: &GpuScene) -> Result<bool> {
+        let Some(d) = self.changing.as_mut().and_then(|c| c.deforming[group].as_mut()) else { return Ok(false) };
+        let start = Instant::now();
+        let rebuild = d.policy.should_rebuild();
+        let update = if rebuild { Update::Rebuild } else { Update::Refit };
+        let mut commands = Commands::new(device)?;
+        self.bottom[group].update(&mut commands, &d.input(&scene.groups[group])?, update)?;
+        let seconds = start.elapsed().as_secs_f64();
+        if rebuild {
+            (d.policy, d.first_trace) = (RefitPolicy::new(1.0, seconds), None);
+        } else {
+            d.policy.refitted(d.policy.growth(), seconds);
+        }
+        Ok(rebuild)
+    }
+
+    /// Entries have moved, or groups below them have deformed: has the top level built anew, where it lies.
+    pub fn place(&mut self, device: &Arc<Device>, moved: &[(usize, DAffine3)]) -> Result<()> {
+        let Some(changing) = &mut self.changing else { return Ok(()) };
+        for (entry, to_world) in moved {
+            changing.entries[*entry].transform.copy_from_slice(rows(to_world).as_flattened());
+        }
+        self.top.rebuild_top_level(&mut Commands::new(device)?, &changing.entries)
+    }
+
+    /// Tracing took `seconds` since the last update. That a trace takes longer than the first one did is taken for the trees' age, shared by
+    /// all that deform.
+    pub fn traced(&mut self, seconds: f64) {
+        let Some(changing) = &mut self.changing else { return };
+        for d in changing.deforming.iter_mut().flatten() {
+            let first = *d.first_trace.get_or_insert(seconds);
+            d.policy.costs(seconds / first);
+            d.policy.traced(seconds);
+        }
     }
 
     pub fn address(&self) -> u64 {

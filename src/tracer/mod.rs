@@ -6,6 +6,8 @@
 
 mod brute;
 mod compute;
+mod dynamic;
+mod dynamic_trees;
 pub mod gpu_scene;
 mod hardware;
 mod kernel;
@@ -18,6 +20,7 @@ mod wide;
 use std::sync::{Arc, OnceLock};
 use std::time::Instant;
 
+pub use dynamic::{Changes, MeshChange, UpdateStats};
 pub use gpu_scene::Needs;
 pub use kernel::{BuildOptions, ComputeOptions, Kernel, TriangleTest};
 pub use stream::{Push, Stream, StreamShaders};
@@ -104,9 +107,9 @@ impl BuildStats {
 
 enum Structure {
     Compute(Box<compute::Hierarchy>),
-    /// Held because the top level's address in the scene's root leads here.
+    /// The top level's address in the scene's root leads here.
     Hardware {
-        _levels: hardware::Structures,
+        levels: Box<hardware::Structures>,
     },
 }
 
@@ -119,12 +122,15 @@ pub struct Tracer {
     triangle_test: TriangleTest,
     features: SceneFeatures,
     stats: BuildStats,
+    /// `None`: nothing ever changes.
+    dynamic: Option<Box<dynamic::Dynamic>>,
     // by mode
     kernels: [OnceLock<Arc<ComputePipeline>>; 2],
 }
 
 impl Tracer {
-    /// Uploads a scene and builds what `kind` traces.
+    /// Uploads a scene and builds what `kind` traces. If the scene was flattened with [`crate::scene::flatten::Motion`], the tracer
+    /// can be brought up to date ([`Tracer::update`]).
     ///
     /// # Errors
     /// [`Error::Device`] when the device lacks what the tracer needs, naming it; [`Error::OutOfMemory`]; [`Error::Scene`] when
@@ -188,15 +194,24 @@ impl Tracer {
                 stats.build_seconds = start.elapsed().as_secs_f64();
                 stats.upload_seconds = upload.as_secs_f64();
                 stats.structure_bytes = s.bytes();
-                Structure::Hardware { _levels: s }
+                Structure::Hardware { levels: Box::new(s) }
             }
         };
         if kind == TracerKind::Compute {
             stats.upload_seconds = start.elapsed().as_secs_f64();
         }
         stats.scene_bytes = scene.bytes();
-        let triangle_test = options.triangle_test;
-        Ok(Self { kind, device: device.clone(), scene, structure, triangle_test, features, stats, kernels: Default::default() })
+        Ok(Self {
+            kind,
+            device: device.clone(),
+            scene,
+            structure,
+            triangle_test: options.triangle_test,
+            features,
+            stats,
+            dynamic: dynamic::Dynamic::new(flat).map(Box::new),
+            kernels: Default::default(),
+        })
     }
 
     /// Which tracer this is.

@@ -85,6 +85,7 @@ impl Trees {
             bounds: self.bounds,
             unfinished: unfinished_counter(device)?,
             launch: None,
+            dynamic: None,
         })
     }
 }

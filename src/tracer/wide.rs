@@ -10,13 +10,16 @@
 //! A number has flags above it: alpha-tested, sphere.
 
 use std::sync::Arc;
+use std::time::Instant;
 
 use glam::Vec3;
+use obvhs::bvh2::Bvh2;
 use rayon::prelude::*;
 
 use super::compute::{
     ALPHA_TESTED, HIT_BYTES, Hierarchy, SPHERE, padding, placement_boxes, primitive_boxes, unfinished_counter, write_records,
 };
+use super::dynamic_trees::{DynamicTrees, provide};
 use super::gpu_scene::rows;
 use super::kernel::BuildOptions;
 use super::kernel::Kernel;
@@ -37,20 +40,25 @@ pub(super) const STACK_IN_REGISTERS: u32 = 6;
 
 /// The hierarchies on the host.
 pub(super) struct Trees {
-    groups: Vec<Wide>,
-    top: Option<Wide>,
+    pub groups: Vec<Wide>,
+    pub top: Option<Wide>,
+    /// What each group took to build; what the top level took.
+    pub seconds: Vec<f64>,
+    pub top_seconds: f64,
 }
 
 impl Trees {
     pub fn build(flat: &FlatScene, options: &BuildOptions) -> Self {
-        let groups: Vec<_> = flat
-            .groups
-            .iter()
-            .map(|g| if g.spheres { sphere_tree(flat, g, options) } else { triangle_tree(flat, g, options) })
-            .collect();
+        let timed = |g: &Group| {
+            let start = Instant::now();
+            let tree = if g.spheres { sphere_tree(flat, g, options) } else { triangle_tree(flat, g, options) };
+            (tree, start.elapsed().as_secs_f64())
+        };
+        let (groups, seconds): (Vec<_>, _) = flat.groups.iter().map(timed).unzip();
+        let start = Instant::now();
         let top = (!flat.is_single_level()).then(|| {
             let bounds: Vec<_> = groups.iter().map(|g| g.bounds.unwrap_or(Aabb::EMPTY)).collect();
-            tree(placement_boxes(flat, &bounds), options, |entry| {
+            tree(placement_boxes(flat, &bounds), options.preset(flat.placements.len()), None, |entry| {
                 let placement = &flat.placements[entry as usize];
                 let mut block = [0; 16];
                 block[..12].copy_from_slice(rows(&placement.to_world.inverse()).as_flattened().map_bits());
@@ -59,7 +67,7 @@ impl Trees {
                 block
             })
         });
-        Self { groups, top }
+        Self { groups, top, seconds, top_seconds: start.elapsed().as_secs_f64() }
     }
 
     /// The tree of the only group, where there is one and no top level.
@@ -77,16 +85,18 @@ impl Trees {
 
     pub fn upload(mut self, device: &Arc<Device>, flat: &FlatScene, kernel: Kernel) -> Result<Hierarchy> {
         let bounds = self.top.as_ref().or(self.groups.first()).and_then(|t| t.bounds).unwrap_or(Aabb::EMPTY);
-        let group_depth = self.groups.iter().map(|g| g.depth).max().unwrap_or(0);
+        let (rooms, depths) = provide(&self, flat);
+        let dynamic = (!flat.motion.is_none()).then(|| Box::new(DynamicTrees::new(&self, flat, &rooms, &depths)));
+        let group_depth = depths.groups.iter().copied().max().unwrap_or(0);
         // Every node visit pushes at most one entry. Entering an entry of the top level pushes its siblings and the way back.
-        let stack_entries = self.top.as_ref().map_or(0, |top| top.depth + 2) + group_depth;
+        let stack_entries = self.top.as_ref().map_or(0, |_| depths.top + 2) + group_depth;
         debug_assert!(stack_entries <= 2 * MAX_DEPTH + 2);
         // the top level first: it is visited by every ray
         let mut roots = Vec::new();
-        let mut count = self.top.as_ref().map_or(0, |t| t.blocks.len());
-        for g in &self.groups {
+        let mut count = rooms.top;
+        for room in &rooms.groups {
             roots.push(count as u32);
-            count += g.blocks.len();
+            count += room;
         }
         if u32::try_from(count).is_err() {
             return Err(Error::Scene(format!("its hierarchy has {count} blocks; the compute tracer addresses 2^32")));
@@ -96,25 +106,28 @@ impl Trees {
                 block[12] = roots[flat.placements[block[13] as usize].group];
             }
         }
-        let trees = self.top.iter().map(|t| (t, 0)).chain(self.groups.iter().zip(roots.iter().copied()));
-        let nodes = write_records(
-            device,
-            "hierarchy",
-            BLOCK_BYTES,
-            count as u64,
-            &mut trees.flat_map(|(t, by)| t.blocks.iter().map(move |b| wide::rebased(*b, by))),
-        )?;
+        let trees = self
+            .top
+            .iter()
+            .map(|t| (t, 0, rooms.top))
+            .chain(self.groups.iter().zip(roots.iter().copied()).zip(&rooms.groups).map(|((t, by), &room)| (t, by, room)));
+        let in_room = trees.flat_map(|(t, by, room)| {
+            let free = std::iter::repeat_n([0; 16], room - t.blocks.len());
+            t.blocks.iter().map(move |b| wide::rebased(*b, by)).chain(free)
+        });
+        let nodes = write_records(device, "hierarchy", BLOCK_BYTES, count as u64, &mut { in_room })?;
         let launch = |name, bytes| Buffer::new(device, name, bytes * LAUNCH_RAYS as u64, Memory::Device).map(Arc::new);
         Ok(Hierarchy {
             kernel,
             primitives: Buffer::new(device, "no primitives", 16, Memory::Device)?,
-            nodes,
             // an empty scene has no tree, and rays that miss its bounds never begin
             root: if count == 0 { bvh2::EMPTY } else { 0 },
             instance_roots: vec![0; flat.placements.len()],
             stack_entries,
             bounds,
             unfinished: unfinished_counter(device)?,
+            dynamic: dynamic.map(|mut d| d.mirror(device, &nodes).map(|()| d)).transpose()?,
+            nodes,
             launch: Some(LaunchMemory {
                 rays: launch("launch rays", size_of::<Ray>() as u64)?,
                 hits: launch("launch hits", HIT_BYTES)?,
@@ -134,20 +147,30 @@ impl Bits for [f32] {
     }
 }
 
-/// A tree over boxes, not yet padded.
-fn tree(mut boxes: Vec<Aabb>, options: &BuildOptions, leaf: impl Fn(u32) -> Block + Sync) -> Wide {
+/// A tree over boxes, not yet padded. `depth`: nodes that may lie on a path, where they are bounded.
+pub(super) fn tree(mut boxes: Vec<Aabb>, preset: BuildPreset, depth: Option<u32>, leaf: impl Fn(u32) -> Block + Sync) -> Wide {
     if boxes.is_empty() {
         return Wide::default();
     }
     let pad = padding(boxes.iter());
     boxes.par_iter_mut().for_each(|b| *b = Aabb { min: b.min - pad, max: b.max + pad });
-    let binary = build::tree(&boxes, options.preset(boxes.len()), None);
+    let binary = build::tree(&boxes, preset, None);
     drop(boxes);
-    Wide::collapse(&binary, leaf)
+    collapse(binary, depth, leaf)
+}
+
+/// With at most `depth` nodes on a path, where they are bounded.
+fn collapse(binary: Bvh2, depth: Option<u32>, leaf: impl Fn(u32) -> Block + Sync) -> Wide {
+    let built = Wide::collapse(&binary, &leaf);
+    match depth {
+        // a binary tree is never shallower than the wide one that it becomes
+        Some(most) if built.depth > most => Wide::collapse(&build::limit_depth(binary, most), leaf),
+        _ => built,
+    }
 }
 
 /// Raised whenever the same input gives other blocks: builders, pairs, collapse, the layout of nodes and leaves.
-const LAYOUT_VERSION: u32 = 1;
+const LAYOUT_VERSION: u32 = 2;
 
 /// What lies next to the blocks of a kept hierarchy.
 #[repr(C)]
@@ -187,7 +210,7 @@ fn kept(options: &BuildOptions, preset: BuildPreset, content: &[&[u8]], build: i
 }
 
 fn sphere_tree(flat: &FlatScene, group: &Group, options: &BuildOptions) -> Wide {
-    tree(primitive_boxes(flat, group).collect(), options, |primitive| {
+    tree(primitive_boxes(flat, group).collect(), options.preset(group.primitive_count), None, |primitive| {
         let part = flat.part_of(group, primitive as usize);
         let s = flat.sphere(part, primitive as usize - part.first_primitive);
         let mut block = [0; 16];
@@ -198,9 +221,9 @@ fn sphere_tree(flat: &FlatScene, group: &Group, options: &BuildOptions) -> Wide 
 }
 
 /// A group's triangles, gathered from its parts.
-struct Triangles {
-    positions: Vec<Vec3>,
-    indices: Vec<[u32; 3]>,
+pub(super) struct Triangles {
+    pub positions: Vec<Vec3>,
+    pub indices: Vec<[u32; 3]>,
 }
 
 impl Triangles {
@@ -226,29 +249,32 @@ fn triangle_tree(flat: &FlatScene, group: &Group, options: &BuildOptions) -> Wid
     let opaque = group.opaque_count as u32;
     let content: [&[u8]; 3] =
         [&opaque.to_le_bytes(), bytemuck::cast_slice(&triangles.positions), bytemuck::cast_slice(&triangles.indices)];
-    kept(options, preset, &content, || {
-        let boxes: Vec<Aabb> = triangles.indices.par_iter().map(|&t| Aabb::of_points(&triangles.corners(t))).collect();
-        let pairs = pairs::pair_up(&triangles.indices, &boxes, triangles.positions.len());
-        let boxes: Vec<Aabb> = pairs
-            .par_iter()
-            .map(|p| match p.triangles {
-                [a, pairs::NONE] => boxes[a as usize],
-                [a, b] => boxes[a as usize].union(boxes[b as usize]),
-            })
-            .collect();
-        if boxes.is_empty() {
-            return Wide::default();
+    kept(options, preset, &content, || triangle_tree_of(&triangles, opaque, preset, None))
+}
+
+/// `opaque`: triangles before the first alpha-tested one; `depth` as in [`tree`].
+pub(super) fn triangle_tree_of(triangles: &Triangles, opaque: u32, preset: BuildPreset, depth: Option<u32>) -> Wide {
+    let boxes: Vec<Aabb> = triangles.indices.par_iter().map(|&t| Aabb::of_points(&triangles.corners(t))).collect();
+    let pairs = pairs::pair_up(&triangles.indices, &boxes, triangles.positions.len());
+    let boxes: Vec<Aabb> = pairs
+        .par_iter()
+        .map(|p| match p.triangles {
+            [a, pairs::NONE] => boxes[a as usize],
+            [a, b] => boxes[a as usize].union(boxes[b as usize]),
+        })
+        .collect();
+    if boxes.is_empty() {
+        return Wide::default();
+    }
+    let pad = padding(boxes.iter());
+    let of_pair = |pair: u32, see: &mut dyn FnMut([Vec3; 3])| {
+        for t in pairs[pair as usize].triangles.into_iter().filter(|&t| t != pairs::NONE) {
+            see(triangles.corners(triangles.indices[t as usize]));
         }
-        let pad = padding(boxes.iter());
-        let of_pair = |pair: u32, see: &mut dyn FnMut([Vec3; 3])| {
-            for t in pairs[pair as usize].triangles.into_iter().filter(|&t| t != pairs::NONE) {
-                see(triangles.corners(triangles.indices[t as usize]));
-            }
-        };
-        let binary = build::tree_with_splits(&boxes, &of_pair, preset, pad);
-        drop(boxes);
-        Wide::collapse(&binary, |pair| pair_block(&triangles, pairs[pair as usize], opaque))
-    })
+    };
+    let binary = build::tree_with_splits(&boxes, &of_pair, preset, pad);
+    drop(boxes);
+    collapse(binary, depth, |pair| pair_block(triangles, pairs[pair as usize], opaque))
 }
 
 fn pair_block(triangles: &Triangles, pair: Pair, opaque: u32) -> Block {

@@ -1,0 +1,207 @@
+//! Scenes that change while they are traced: instances move, meshes deform, the rest stays where it is.
+//!
+//! What may change is said when the scene is flattened ([`crate::scene::flatten::Motion`]); [`Tracer::update`] takes what did. The compute tracer refits
+//! its hierarchies on the host or builds them anew (`dynamic_trees.rs`), the hardware tracers have the driver do so (`hardware.rs`). A tracer of
+//! a scene that never changes has nothing of this.
+
+use std::collections::HashMap;
+use std::time::Instant;
+
+use glam::{DAffine3, DVec3, Vec3};
+use rayon::prelude::*;
+
+use super::gpu_scene::rows;
+use super::{Structure, Tracer};
+use crate::error::{Error, Result};
+use crate::scene::Geometry;
+use crate::scene::flatten::{FlatScene, Placement};
+
+/// New vertices of a mesh.
+#[derive(Clone, Copy, Debug)]
+pub struct MeshChange<'a> {
+    /// Index into [`crate::scene::Scene::meshes`].
+    pub mesh: usize,
+    /// Object-space positions, as many as the mesh has vertices. All finite.
+    pub positions: &'a [Vec3],
+    /// Unit shading normals, as many; `None` leaves them as they are. Without effect where the mesh or the tracer has none.
+    pub normals: Option<&'a [Vec3]>,
+}
+
+/// What has changed since the last update.
+#[derive(Clone, Debug, Default)]
+pub struct Changes<'a> {
+    /// Instances (indices into [`crate::scene::Scene::instances`]) and their new object-to-world transforms, in the file's world. Of an instance that
+    /// is named twice the last counts.
+    pub instances: Vec<(usize, DAffine3)>,
+    /// Meshes that have deformed.
+    pub meshes: Vec<MeshChange<'a>>,
+}
+
+/// What an update did.
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
+pub struct UpdateStats {
+    /// Seconds for deformed meshes: to refit them or build them anew, and to write them.
+    pub mesh_seconds: f64,
+    /// Seconds for the top level.
+    pub top_seconds: f64,
+    /// Meshes that were built anew; the others were refitted.
+    pub rebuilt: Vec<usize>,
+    /// The top level was built anew.
+    pub top_rebuilt: bool,
+    /// Greatest SAH cost of a deformed mesh's tree over that at its build (compute tracer).
+    pub growth: f64,
+}
+
+/// A mesh that may deform.
+struct DeformingMesh {
+    /// `None`: it is nowhere to be seen.
+    group: Option<usize>,
+    vertices: usize,
+    normals: usize,
+}
+
+/// What a tracer of a changing scene keeps on the host.
+pub(super) struct Dynamic {
+    origin: DVec3,
+    placements: Vec<Placement>,
+    /// Entry of the top level for each instance that may move, where it has one.
+    entries: HashMap<usize, Option<usize>>,
+    meshes: HashMap<usize, DeformingMesh>,
+}
+
+impl Dynamic {
+    /// `None` for a scene of which nothing changes.
+    pub fn new(flat: &FlatScene) -> Option<Self> {
+        if flat.motion.is_none() {
+            return None;
+        }
+        let placed: HashMap<usize, usize> =
+            flat.placements.iter().enumerate().filter_map(|(k, p)| Some((p.scene_instance?, k))).collect();
+        let meshes = flat.motion.meshes.iter().filter_map(|&mesh| {
+            let Geometry::Triangles(t) = &flat.scene.meshes[mesh].geometry else { return None };
+            let group = group_of(flat, mesh);
+            Some((mesh, DeformingMesh { group, vertices: t.positions.len(), normals: t.normals.len() }))
+        });
+        Some(Self {
+            origin: flat.origin,
+            placements: flat.placements.clone(),
+            entries: flat.motion.instances.iter().map(|i| (*i, placed.get(i).copied())).collect(),
+            meshes: meshes.collect(),
+        })
+    }
+
+    /// Are these changes such as were announced, and sound? Gives the top level's entries that move.
+    fn check(&self, changes: &Changes) -> Result<Vec<(usize, DAffine3)>> {
+        for change in &changes.meshes {
+            let m = change.mesh;
+            let Some(mesh) = self.meshes.get(&m) else {
+                return Err(Error::Usage(format!("mesh {m} was not said to deform: name it in Motion::meshes")));
+            };
+            let count = |what: &str, given: usize, there: usize| {
+                if given == there {
+                    Ok(())
+                } else {
+                    Err(Error::Scene(format!("mesh {m} has {there} {what}, {given} were given")))
+                }
+            };
+            count("vertices", change.positions.len(), mesh.vertices)?;
+            let bad = |v: &[Vec3]| v.par_iter().position_any(|p| !p.is_finite());
+            if let Some(v) = bad(change.positions) {
+                return Err(Error::Scene(format!("vertex {v} of mesh {m} is not finite: {}", change.positions[v])));
+            }
+            if let Some(normals) = change.normals {
+                count("normals", normals.len(), mesh.normals)?;
+                if let Some(v) = bad(normals) {
+                    return Err(Error::Scene(format!("normal {v} of mesh {m} is not finite: {}", normals[v])));
+                }
+            }
+        }
+        let mut moved = Vec::with_capacity(changes.instances.len());
+        for &(i, object_to_world) in &changes.instances {
+            let Some(&entry) = self.entries.get(&i) else {
+                return Err(Error::Usage(format!("instance {i} was not said to move: name it in Motion::instances")));
+            };
+            let to_world = DAffine3 { translation: object_to_world.translation - self.origin, ..object_to_world };
+            let finite = |t: &DAffine3| rows(t).iter().flatten().all(|x| x.is_finite());
+            if !finite(&to_world) || !finite(&to_world.inverse()) {
+                return Err(Error::Scene(format!(
+                    "instance {i} was given a transform that cannot be inverted (a scale of zero?)"
+                )));
+            }
+            moved.extend(entry.map(|e| (e, to_world)));
+        }
+        Ok(moved)
+    }
+}
+
+/// The group of a mesh that was not baked.
+pub(super) fn group_of(flat: &FlatScene, mesh: usize) -> Option<usize> {
+    flat.groups.iter().position(|g| matches!(g.parts.as_slice(), [p] if p.mesh == mesh))
+}
+
+impl Tracer {
+    /// Brings the tracer up to date with a scene that has changed. Ids in hits, streams and [`Tracer::scene_address`] stay as they are;
+    /// nothing may be tracing meanwhile. The origin stays where it was: a scene that wanders far off loses precision.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] when something was not announced in [`crate::scene::flatten::Motion`]; [`Error::Scene`] for numbers that are not finite,
+    /// wrong counts and transforms that cannot be inverted. After these two nothing has changed. [`Error::OutOfMemory`],
+    /// [`Error::Vulkan`], [`Error::DeviceLost`]: the tracer must not be used any more.
+    pub fn update(&mut self, changes: &Changes) -> Result<UpdateStats> {
+        let Some(dynamic) = &mut self.dynamic else {
+            return Err(Error::Usage("this tracer's scene was said never to change: use FlatScene::with_motion".into()));
+        };
+        let moved = dynamic.check(changes)?;
+        let mut stats = UpdateStats { growth: 1.0, ..Default::default() };
+        let start = Instant::now();
+        let mut deformed = false;
+        for change in &changes.meshes {
+            if let Some(normals) = change.normals {
+                self.scene.set_normals(change.mesh, normals)?;
+            }
+            let Some(group) = dynamic.meshes.get(&change.mesh).and_then(|m| m.group) else { continue };
+            self.scene.set_positions(group, change.positions)?;
+            let (rebuilt, growth) = match &mut self.structure {
+                Structure::Compute(h) => h.deform(&self.device, group, change.positions)?,
+                Structure::Hardware { levels } => (levels.deform(&self.device, group, &self.scene)?, 1.0),
+            };
+            if rebuilt {
+                stats.rebuilt.push(change.mesh);
+            }
+            stats.growth = stats.growth.max(growth);
+            deformed = true;
+        }
+        stats.mesh_seconds = start.elapsed().as_secs_f64();
+        if !deformed && moved.is_empty() {
+            return Ok(stats);
+        }
+        let start = Instant::now();
+        for (entry, to_world) in &moved {
+            dynamic.placements[*entry].to_world = *to_world;
+        }
+        let latest: Vec<_> = moved.iter().map(|m| (m.0, dynamic.placements[m.0].to_world)).collect();
+        self.scene.set_transforms(&latest)?;
+        match &mut self.structure {
+            Structure::Compute(h) => {
+                stats.top_rebuilt = h.place(&dynamic.placements)?;
+                self.scene.set_hierarchy(h)?;
+            }
+            Structure::Hardware { levels } => {
+                levels.place(&self.device, &latest)?;
+                stats.top_rebuilt = true;
+            }
+        }
+        stats.top_seconds = start.elapsed().as_secs_f64();
+        Ok(stats)
+    }
+
+    /// Says how many seconds of device time tracing took since the last update, so that the next one can weigh what refitted trees
+    /// cost against building them anew ([`crate::bvh::RefitPolicy`]). Without effect where nothing deforms.
+    pub fn traced(&mut self, seconds: f64) {
+        let Some(dynamic) = &self.dynamic else { return };
+        match &mut self.structure {
+            Structure::Compute(h) => h.traced(seconds, &dynamic.placements),
+            Structure::Hardware { levels } => levels.traced(seconds),
+        }
+    }
+}
