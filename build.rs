@@ -56,11 +56,18 @@ const HEAD_64: &str = "#extension GL_EXT_shader_explicit_arithmetic_types_int64 
 const HEAD_64_BALLOT: &str = "#extension GL_EXT_shader_explicit_arithmetic_types_int64 : require\n#define LOAD64\n\
      #extension GL_KHR_shader_subgroup_ballot : require\n#define BALLOT\n";
 
-const VARIANTS: [Variant; 8] = [
+/// What a packet's lanes share.
+const HEAD_PACKET: &str = "#extension GL_EXT_shader_explicit_arithmetic_types_int64 : require\n#define LOAD64\n\
+     #extension GL_KHR_shader_subgroup_ballot : require\n#define BALLOT\n\
+     #extension GL_KHR_shader_subgroup_arithmetic : require\n#extension GL_EXT_control_flow_attributes : require\n\
+     #define PACKET_RAYS 2\n";
+
+const VARIANTS: [Variant; 9] = [
     Variant { field: "generate", template: "trace/generate.glsl", head: "", kind: ShaderKind::Compute },
     Variant { field: "generate_64", template: "trace/generate.glsl", head: HEAD_64, kind: ShaderKind::Compute },
     Variant { field: "deliver", template: "trace/deliver.glsl", head: "", kind: ShaderKind::Compute },
     Variant { field: "deliver_64", template: "trace/deliver.glsl", head: HEAD_64_BALLOT, kind: ShaderKind::Compute },
+    Variant { field: "packet", template: "trace/packet.glsl", head: HEAD_PACKET, kind: ShaderKind::Compute },
     Variant { field: "reference", template: "trace/reference.glsl", head: "", kind: ShaderKind::Compute },
     Variant { field: "brute", template: "trace/brute.glsl", head: "", kind: ShaderKind::Compute },
     Variant {
@@ -134,15 +141,17 @@ impl Build {
             };
             // what traces rays in memory needs no step that puts them there
             let queue = text.lines().any(|l| l == "// rays: queue");
+            // neighbouring rays take nearly the same way: packets pay
+            let coherent = text.lines().any(|l| l == "// rays: coherent");
             for mode in modes.split_whitespace() {
                 let constant = format!("{}_{}", name.to_uppercase(), mode.to_uppercase());
                 let _ = write!(
                     table,
-                    "/// The stream `shaders/{name}.glsl`, mode `{mode}`.\npub static {constant}: StreamShaders = StreamShaders {{\n    name: \"{name} {mode}\",\n    pass: \"{name}\",\n    steps: [\"{name} generate\", \"{name} trace\", \"{name} deliver\"],\n    queue: {queue},\n    mode: Mode::{},\n",
+                    "/// The stream `shaders/{name}.glsl`, mode `{mode}`.\npub static {constant}: StreamShaders = StreamShaders {{\n    name: \"{name} {mode}\",\n    pass: \"{name}\",\n    steps: [\"{name} generate\", \"{name} trace\", \"{name} deliver\"],\n    queue: {queue},\n    coherent: {coherent},\n    mode: Mode::{},\n",
                     if mode == "any" { "Any" } else { "Closest" }
                 );
                 for v in &VARIANTS {
-                    if queue && v.template == "trace/generate.glsl" {
+                    if queue && ["generate", "generate_64", "packet"].contains(&v.field) {
                         let _ = writeln!(table, "    {}: &[],", v.field);
                         continue;
                     }

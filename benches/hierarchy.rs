@@ -23,7 +23,29 @@ fn surface(n: usize) -> Vec<Aabb> {
         .collect()
 }
 
-const SIZES: [usize; 3] = [10_000, 100_000, 1_000_000];
+/// Up to ten million: time per primitive may grow with the logarithm of their number, no faster.
+const SIZES: [usize; 4] = [10_000, 100_000, 1_000_000, 10_000_000];
+
+#[divan::bench(args = SIZES, sample_count = 5, sample_size = 1)]
+fn fast(bencher: Bencher, n: usize) {
+    let boxes = surface(n);
+    bencher.counter(ItemsCount::new(n)).bench(|| build::tree(&boxes, BuildPreset::Fast, None));
+}
+
+#[divan::bench(args = SIZES, sample_count = 5, sample_size = 1)]
+fn default(bencher: Bencher, n: usize) {
+    let boxes = surface(n);
+    bencher.counter(ItemsCount::new(n)).bench(|| build::tree(&boxes, BuildPreset::Default, None));
+}
+
+/// What there was before, and what others have: PLOC and reinsertion of obvhs.
+#[divan::bench(args = SIZES, sample_count = 5, sample_size = 1)]
+fn obvhs_medium(bencher: Bencher, n: usize) {
+    let boxes = surface(n);
+    let params = obvhs::BvhBuildParams { max_prims_per_leaf: 1, ..obvhs::BvhBuildParams::medium_build() };
+    let mut time = std::time::Duration::default();
+    bencher.counter(ItemsCount::new(n)).bench_local(|| obvhs::bvh2::builder::build_bvh2(&boxes, params, &mut time));
+}
 
 #[divan::bench(args = SIZES, sample_count = 5, sample_size = 1)]
 fn wide(bencher: Bencher, n: usize) {

@@ -2,6 +2,7 @@
 // there is appended to the queue: one over the cosine-weighted hemisphere (pbrt-v4's AOIntegrator). A sample that meets nothing
 // costs nothing from here on.
 // stream: closest
+// rays: coherent
 #include "common/camera.glsl"
 #include "common/warp.glsl"
 #include "scene/surface.glsl"

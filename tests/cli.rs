@@ -139,6 +139,34 @@ fn no_driver_is_exit_code_2() {
     assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 0);
 }
 
+/// A kept hierarchy gives the same image, a damaged one is mended with a warning, and a folder that cannot be is a warning.
+#[test]
+fn gpu_kept_hierarchies() {
+    let dir = tempfile::tempdir().unwrap();
+    let cache = dir.path().join("kept");
+    let render = |name: &str, cache: &Path| {
+        let image = dir.path().join(name);
+        let args = ["render", "builtin:cornell-box", "--tracer", "compute", "--size", "64x48", "--spp", "1", "--build", "best"];
+        let out = skylit(&args).args(["-o", path(&image), "--bvh-cache", path(cache)]).output().unwrap();
+        let said = String::from_utf8_lossy(&out.stderr).into_owned();
+        assert!(out.status.success(), "{said}");
+        (std::fs::read(image).unwrap(), said)
+    };
+    let files = || std::fs::read_dir(&cache).unwrap().map(|f| f.unwrap().path()).collect::<Vec<_>>();
+    let (built, _) = render("a.png", &cache);
+    let [file] = &files()[..] else { panic!("{:?}", files()) };
+    let whole = std::fs::read(file).unwrap();
+    assert_eq!(render("b.png", &cache).0, built);
+    std::fs::write(file, &whole[..whole.len() / 2]).unwrap();
+    let (mended, said) = render("c.png", &cache);
+    assert_eq!(mended, built);
+    assert!(said.contains("damaged"), "{said}");
+    assert_eq!(std::fs::read(file).unwrap(), whole);
+    let (unkept, said) = render("d.png", &file.join("below-a-file"));
+    assert_eq!(unkept, built);
+    assert!(said.contains("not kept"), "{said}");
+}
+
 /// From a scene to files and back to numbers, on whatever device there is.
 #[test]
 fn gpu_render_end_to_end() {

@@ -19,12 +19,14 @@ use skylit::render::ao::{self, AoOptions, AoResult};
 use skylit::render::aov::{self, AovPixel};
 use skylit::render::block::Block;
 use skylit::render::camera::CameraRecord;
+use skylit::render::cover::Cover;
 use skylit::render::{Control, Uncontrolled};
 use skylit::sampling::sobol::hash_combine;
 use skylit::sampling::{AO_DIRECTION, CAMERA_FILM, Sampler, to_unit, warp};
 use skylit::scene::builtin::{Placement, analytic, by_name, shapes};
+use skylit::scene::flatten::FlatScene;
 use skylit::scene::{Camera, Filter, Geometry, Instance, Mesh, Projection, Scene, Texture, Wrap};
-use skylit::tracer::{Push, Tracer, stream};
+use skylit::tracer::{Kernel, Needs, Push, Tracer, TracerKind, stream};
 
 fn scene(name: &str) -> Scene {
     by_name(name).unwrap_or_else(|| panic!("no built-in scene {name}"))
@@ -328,6 +330,118 @@ fn gpu_film_variance_and_seeds() {
     assert_validation_clean(&device);
 }
 
+/// However samples are cut into batches, and in whatever order occlusion rays come back: the same sums, bit for bit.
+#[test]
+fn gpu_film_does_not_depend_on_batches() {
+    let device = device();
+    let scene = scene("leaf-cards");
+    let camera = &scene.cameras[0];
+    let options = AoOptions { size: [70, 45], spp: 23, falloff: 3.0, ..Default::default() };
+    for kind in tracers(&device) {
+        let tracer = tracer(&device, kind, &scene);
+        // 16 + 4 + 2 + 1 samples
+        let whole = render(&tracer, &scene, camera, &options);
+        // 1 + 16 + 4 + 2
+        let kept = render(&tracer, &scene, camera, &AoOptions { keep_rays: true, ..options.clone() });
+        // 1 at a time at first, more later
+        let paced =
+            render(&tracer, &scene, camera, &AoOptions { time_limit: Some(Duration::from_secs(3600)), ..options.clone() });
+        for other in [&kept, &paced] {
+            assert_eq!(whole.film.mean, other.film.mean, "{kind}");
+            assert_eq!(whole.film.variance, other.film.variance, "{kind}");
+            assert_eq!(whole.film.coverage, other.film.coverage, "{kind}");
+            assert_eq!(whole.occlusion_rays, other.occlusion_rays, "{kind}");
+        }
+        assert!(whole.film.mean.iter().any(|m| *m > 0.0) && whole.occlusion_rays > 1000, "{kind}: nothing to see");
+    }
+    assert_validation_clean(&device);
+}
+
+/// Every kernel of the compute tracer stops where the queue of occlusion rays ends: what an earlier launch left there is not traced.
+#[test]
+fn gpu_kernels_heed_the_queues_end() {
+    let device = device();
+    // much background: the queue of one launch is longer than that of the next
+    let scene = scene("cornell-box");
+    let camera = &scene.cameras[0];
+    let far = Camera { camera_to_world: DAffine3::from_translation(DVec3::Z * 4.0) * camera.camera_to_world, ..camera.clone() };
+    let camera =
+        [camera.clone(), far].into_iter().max_by_key(|c| (c.camera_to_world.translation.z.abs() * 1e6) as i64).unwrap();
+    let flat = FlatScene::new(&scene);
+    let options = AoOptions { size: [96, 96], spp: 8, ..Default::default() };
+    let images: Vec<_> = [Kernel::Wide, Kernel::Nearest, Kernel::Direction, Kernel::Brute]
+        .into_iter()
+        .map(|kernel| {
+            let tracer = Tracer::with_options(&device, TracerKind::Compute, &flat, Needs::default(), kernel).unwrap();
+            (kernel, render(&tracer, &scene, &camera, &options))
+        })
+        .collect();
+    let (_, wide) = &images[0];
+    assert!(wide.occlusion_rays > 1000 && wide.skipped_rays > 1000, "{} {}", wide.occlusion_rays, wide.skipped_rays);
+    for (kernel, image) in &images {
+        let (count, greatest, _) = differences(&wide.film.mean, &image.film.mean, 1e-6);
+        println!("{kernel:?}: {} occlusion rays, {count} pixels differ, by {greatest} at most", image.occlusion_rays);
+        assert!(image.occlusion_rays.abs_diff(wide.occlusion_rays) <= 4, "{kernel:?}: {} rays", image.occlusion_rays);
+        // rounding turns a sample here and there
+        assert!(count <= 96 * 96 / 500, "{kernel:?}: {count} pixels differ");
+    }
+    assert_validation_clean(&device);
+}
+
+/// What is left out of an image is empty: with and without, the same image bit for bit; and something is left out.
+#[test]
+fn gpu_cover_leaves_out_nothing_that_is_seen() {
+    let device = device();
+    let cases: Vec<(&str, Scene, Camera)> = [("stairs", 40.0), ("leaf-cards", 30.0), ("cornell-box", 20.0)]
+        .into_iter()
+        .map(|(name, distance)| {
+            let scene = scene(name);
+            let (lo, hi) = scene.bounds().unwrap();
+            let (middle, reach) = ((lo + hi) * 0.5, (hi - lo).length());
+            let eye = middle + DVec3::new(0.5, 0.4, 0.77) * reach * distance / 10.0;
+            // off the middle, so that the image's edge cuts the scene
+            let camera = Camera::look_at(eye, middle + DVec3::X * reach * 0.5, DVec3::Y, 0.6);
+            (name, scene, camera)
+        })
+        .chain([("spheres", analytic::sphere_over_plane(1.0, 1.5, 0.25, Placement::default()))].map(|(name, scene)| {
+            let camera = Camera::look_at(DVec3::new(40.0, 30.0, 50.0), DVec3::ZERO, DVec3::Y, 0.5);
+            (name, scene, camera)
+        }))
+        .collect();
+    for (name, scene, camera) in &cases {
+        let flat = FlatScene::new(scene);
+        for (orthographic, size, spp) in [(false, [203, 149], 4), (true, [160, 96], 4), (false, [64, 64], 1)] {
+            let camera = match orthographic {
+                false => camera.clone(),
+                true => Camera { projection: Projection::Orthographic { half_height: 12.0 }, ..camera.clone() },
+            };
+            let options = AoOptions { size, spp, ..Default::default() };
+            let cover = Cover::new(&flat, &record(scene, &camera, size), size, spp).map(Arc::new);
+            let (live, all) = cover.as_ref().map_or((1, 1), |c| c.count());
+            for kind in tracers(&device) {
+                let tracer = tracer(&device, kind, scene);
+                let whole = render(&tracer, scene, &camera, &options);
+                let image = render(&tracer, scene, &camera, &AoOptions { cover: cover.clone(), ..options.clone() });
+                assert_eq!(whole.film.mean, image.film.mean, "{name} {kind}");
+                assert_eq!(whole.film.coverage, image.film.coverage, "{name} {kind}");
+                assert_eq!(whole.film.samples, image.film.samples, "{name} {kind}");
+                assert_eq!(whole.occlusion_rays, image.occlusion_rays, "{name} {kind}");
+                assert_eq!(whole.skipped_rays, image.skipped_rays, "{name} {kind}");
+                assert_eq!(whole.primary_rays, image.primary_rays + image.skipped_primary_rays, "{name} {kind}");
+                assert_eq!(image.skipped_primary_rays > 0, live < all, "{name} {kind}");
+                assert!(image.occlusion_rays > 0, "{name} {kind}: nothing to see");
+            }
+            println!("{name}, orthographic {orthographic}: {live} of {all} tiles");
+            assert!(live < all, "{name}: nothing was left out");
+        }
+        // from within, anything may be seen anywhere
+        let (lo, hi) = scene.bounds().unwrap();
+        let within = Camera::look_at((lo + hi) * 0.5, hi, DVec3::Y, 0.6);
+        assert!(Cover::new(&flat, &record(scene, &within, [64, 64]), [64, 64], 1).is_none(), "{name}");
+    }
+    assert_validation_clean(&device);
+}
+
 // --- beginning and stopping ---
 
 #[test]
@@ -376,7 +490,7 @@ fn gpu_interruption_and_progress() {
     let device = device();
     let scene = scene("cornell-box");
     let camera = record(&scene, &scene.cameras[0], [64, 64]);
-    let options = AoOptions { size: [64, 64], spp: 50, ..Default::default() };
+    let options = AoOptions { size: [64, 64], spp: 800, ..Default::default() };
     let stopper = |questions, answer| Stopper { questions, answer, progress: Vec::new() };
     for kind in tracers(&device) {
         let tracer = tracer(&device, kind, &scene);
@@ -389,15 +503,20 @@ fn gpu_interruption_and_progress() {
         // stop, but keep what there is
         let image = ao::render(&tracer, &camera, &options, &mut stopper(9, || Ok(true))).unwrap();
         println!("{kind}: stopped after {} samples", image.spp);
-        assert!(image.stopped_early && image.spp >= 1 && image.spp < 50, "{kind}: {}", image.spp);
+        assert!(image.stopped_early && image.spp >= 1 && image.spp < 800, "{kind}: {}", image.spp);
         let same = render(&tracer, &scene, &scene.cameras[0], &AoOptions { spp: image.spp, ..options.clone() });
         assert_eq!(image.film.mean, same.film.mean, "{kind}: not the image of as many samples");
         assert!(!same.stopped_early);
+        // in the midst of the first samples that are taken together: one is finished, or there would be no image
+        let image = ao::render(&tracer, &camera, &options, &mut stopper(1, || Ok(true))).unwrap();
+        assert!(image.stopped_early && image.spp == 1, "{kind}: {}", image.spp);
+        let same = render(&tracer, &scene, &scene.cameras[0], &AoOptions { spp: 1, ..options.clone() });
+        assert_eq!(image.film.mean, same.film.mean, "{kind}: not the image of one sample");
         let mut control = stopper(u32::MAX, || Ok(false));
         let image = ao::render(&tracer, &camera, &options, &mut control).unwrap();
-        assert!(!image.stopped_early && image.spp == 50);
+        assert!(!image.stopped_early && image.spp == 800);
         assert!(control.progress.windows(2).all(|w| w[0].0 <= w[1].0), "{kind}: progress goes back");
-        assert_eq!(control.progress.last(), Some(&(64 * 64 * 50, 64 * 64 * 50)), "{kind}");
+        assert_eq!(control.progress.last(), Some(&(64 * 64 * 800, 64 * 64 * 800)), "{kind}");
     }
     assert_validation_clean(&device);
 }

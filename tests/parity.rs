@@ -3,6 +3,7 @@
 mod common;
 
 use common::{assert_validation_clean, device, tracer, tracers};
+use skylit::bvh::BuildPreset;
 use skylit::gpu::Device;
 use skylit::measure::parity::{judge_any, judge_closest, judge_pair, judge_weights};
 use skylit::measure::ray_sets::{leak_rays, leak_scenes, mixed_rays, random_rays};
@@ -14,7 +15,7 @@ use skylit::render::{Uncontrolled, camera};
 use skylit::scene::Scene;
 use skylit::scene::builtin::by_name;
 use skylit::scene::flatten::FlatScene;
-use skylit::tracer::{ComputeOptions, Kernel, Tracer, TracerKind, TriangleTest};
+use skylit::tracer::{BuildOptions, ComputeOptions, Kernel, Tracer, TracerKind, TriangleTest};
 use std::sync::Arc;
 
 /// Unexplained mismatches that the gate lets pass.
@@ -30,7 +31,7 @@ fn ray_set(oracle: &Oracle, scene: &Scene, total: usize) -> Vec<Ray> {
 }
 
 /// The compute tracer's kernels that a scene of any size can be sent through.
-const TREES: [Kernel; 3] = [Kernel::Wide, Kernel::Nearest, Kernel::Direction];
+const TREES: [Kernel; 4] = [Kernel::Wide, Kernel::Packet, Kernel::Nearest, Kernel::Direction];
 
 fn gate(device: &Arc<Device>, name: &str, scene: &Scene, total: usize) {
     // each kernel of the compute tracer is judged as a tracer of its own
@@ -135,6 +136,32 @@ fn gpu_parity_sponza() {
     let Some(folder) = common::shared_scenes() else { return };
     let path = folder.join("sponza/sponza.glb");
     gate(&device(), "sponza", &skylit::scene::load::load(&path.to_string_lossy()).unwrap(), 1_000_000);
+}
+
+/// Spatial splits leave a triangle in several leaves, cut where it is cut: not one ray may tell. Its nearest hit is at the same
+/// distance to the bit, as both trees hold the same triangles.
+#[test]
+fn gpu_parity_of_builds() {
+    let device = device();
+    for name in ["leaf-cards", "cornell-box"] {
+        let scene = scene(name);
+        let oracle = Oracle::new(&scene, scene.origin());
+        let rays = ray_set(&oracle, &scene, 200_000);
+        let distances = |preset, mode| {
+            let build = BuildOptions { preset: Some(preset), ..Default::default() };
+            let (flat, options) = (FlatScene::new(&scene), ComputeOptions::default());
+            let t = Tracer::with_build(&device, TracerKind::Compute, &flat, common::ALL, options, &build).unwrap();
+            let hits = trace(&t, &rays, mode, 1, &mut Uncontrolled).unwrap().0;
+            hits.iter().map(|h| if mode == Mode::Any { h.is_hit() as u32 } else { h.t.to_bits() }).collect::<Vec<_>>()
+        };
+        for mode in [Mode::Closest, Mode::Any] {
+            let expected = distances(BuildPreset::Fast, mode);
+            for preset in [BuildPreset::Default, BuildPreset::Best] {
+                assert!(distances(preset, mode) == expected, "{name} {preset:?} {mode:?}");
+            }
+        }
+    }
+    assert_validation_clean(&device);
 }
 
 /// The 32-bit loads that devices without shaderInt64 take give the same hits, bit for bit.

@@ -17,7 +17,7 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Sc
     uvec2 nodes;       // compute tracer: nodes of its hierarchy
     uvec2 primitives;  // compute tracer: PrimitiveRecord
     uvec2 top_level;   // hardware tracers: address of the top-level acceleration structure
-    uint part_count;
+    uint part_count;   // records in parts
     uint root_reserved1;
     uvec2 launch_hits; // compute tracer: what they met
     uint root;         // compute tracer: where traversal begins

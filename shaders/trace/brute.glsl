@@ -15,7 +15,7 @@ layout(local_size_x = LANES) in;
 // The host lets no scene in whose loops would have more turns than any driver runs (src/tracer/brute.rs).
 void main() {
     uint k = gl_GlobalInvocationID.x;
-    if (k >= push.count) return;
+    if (k >= ray_count()) return;
     SceneRoot root = SceneRoot(push.scene);
     uvec2 primitives = root.primitives;
     Ray world = ray(push.first + k);

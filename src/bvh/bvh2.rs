@@ -98,7 +98,7 @@ impl Bvh2 {
         Self::lay_out(build::tree(boxes, preset, Some(max_leaf.clamp(1, MAX_LEAF))))
     }
 
-    /// Lays obvhs's tree out depth first.
+    /// Lays a tree out depth first.
     fn lay_out(tree: obvhs::bvh2::Bvh2) -> Self {
         let mut out = Self { nodes: Vec::with_capacity(tree.nodes.len() / 2), primitives: Vec::new(), root: 0, depth: 0 };
         // what to emit, its depth, and the node and side that will refer to it

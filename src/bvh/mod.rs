@@ -2,7 +2,12 @@
 
 pub mod build;
 pub mod bvh2;
+pub mod cache;
+pub mod clip;
 pub mod pairs;
+mod reinsert;
+mod sah;
+mod spatial;
 pub mod wide;
 
 pub use build::BuildPreset;

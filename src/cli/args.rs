@@ -7,12 +7,14 @@ use clap::{Args, ValueEnum, ValueHint};
 use glam::DVec3;
 
 use super::console::Console;
+use crate::bvh::BuildPreset;
+use crate::bvh::cache::Cache;
 use crate::error::{Error, Result};
 use crate::output::{self, ImageFormat};
 use crate::render::ao::Hemisphere;
 use crate::render::camera::Choice;
 use crate::render::rays::Mode;
-use crate::tracer::{ComputeOptions, Kernel, TracerKind, TriangleTest};
+use crate::tracer::{BuildOptions, ComputeOptions, Kernel, TracerKind, TriangleTest};
 
 /// Samples per pixel when neither the command line nor the scene says.
 pub const DEFAULT_SPP: u32 = 16;
@@ -50,8 +52,12 @@ impl TracerChoice {
 /// How the compute tracer finds what a ray meets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Traversal {
-    /// Eight-wide nodes, children in the order of the ray's octant: the fast one
+    /// `packet` for coherent rays where the device can, else `wide`
+    Auto,
+    /// Seven-wide nodes, each ray by itself
     Wide,
+    /// Seven-wide nodes, the rays of a subgroup together
+    Packet,
     /// Binary nodes, the nearest child first
     Nearest,
     /// Binary nodes, children in the order of the ray's direction on the split axis
@@ -63,7 +69,9 @@ pub enum Traversal {
 impl From<Traversal> for Kernel {
     fn from(t: Traversal) -> Self {
         match t {
+            Traversal::Auto => Kernel::Auto,
             Traversal::Wide => Kernel::Wide,
+            Traversal::Packet => Kernel::Packet,
             Traversal::Nearest => Kernel::Nearest,
             Traversal::Direction => Kernel::Direction,
             Traversal::Brute => Kernel::Brute,
@@ -169,6 +177,19 @@ impl Verbosity {
     }
 }
 
+/// How much time to spend on a hierarchy.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum BuildChoice {
+    /// By the number of primitives and of rays
+    Auto,
+    /// Ready soonest
+    Fast,
+    /// Balanced
+    Default,
+    /// Large triangles are split: nearest hits are found fastest
+    Best,
+}
+
 /// What it runs on.
 #[derive(Clone, Debug, Args)]
 pub struct DeviceArgs {
@@ -181,6 +202,13 @@ pub struct DeviceArgs {
     /// The compute tracer's triangle test [default: watertight]
     #[arg(long, value_enum)]
     pub triangle_test: Option<TriangleTestChoice>,
+    /// Time to spend on the compute tracer's hierarchy
+    #[arg(long, value_enum, default_value = "auto")]
+    pub build: BuildChoice,
+    /// Keep the compute tracer's hierarchies in this folder, and take them from there when the same geometry comes again
+    /// [env: SKYLIT_BVH_CACHE]
+    #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath)]
+    pub bvh_cache: Option<PathBuf>,
     /// Vulkan device, by index or part of its name (`skylit doctor` lists them)
     #[arg(long, value_name = "INDEX|NAME")]
     pub device: Option<String>,
@@ -193,6 +221,18 @@ impl DeviceArgs {
     /// How to open the device.
     pub fn options(&self) -> crate::gpu::Options {
         crate::gpu::Options { device: self.device.clone(), validation: self.validation, ..Default::default() }
+    }
+
+    /// How the compute tracer's hierarchy is built, when about so many rays will be traced.
+    pub fn build_options(&self, rays: u64) -> BuildOptions {
+        let from_environment = || std::env::var_os("SKYLIT_BVH_CACHE").filter(|v| !v.is_empty()).map(PathBuf::from);
+        let preset = match self.build {
+            BuildChoice::Auto => None,
+            BuildChoice::Fast => Some(BuildPreset::Fast),
+            BuildChoice::Default => Some(BuildPreset::Default),
+            BuildChoice::Best => Some(BuildPreset::Best),
+        };
+        BuildOptions { preset, rays, cache: self.bvh_cache.clone().or_else(from_environment).map(Cache::new) }
     }
 
     /// The tracer on a device, why this one, and how the compute tracer works. What concerns the compute tracer alone chooses it
@@ -457,7 +497,8 @@ fn parse_fov(text: &str) -> Parsed<f64> {
     parse_where(text, |v| (0.001..=179.0).contains(&v), "must be between 0.001 and 179 degrees")
 }
 
-fn parse_radius(text: &str) -> Parsed<f64> {
+/// A distance above 0, in world units.
+pub fn parse_radius(text: &str) -> Parsed<f64> {
     parse_where(text, |v| v > 0.0, "must be above 0 (`inf` for no limit)")
 }
 
@@ -465,7 +506,8 @@ fn parse_falloff(text: &str) -> Parsed<f64> {
     parse_where(text, |v| v >= 1.0 && v.is_finite(), "must be at least 1 (1 = binary) and finite")
 }
 
-fn parse_seconds(text: &str) -> Parsed<Duration> {
+/// A time above 0.
+pub fn parse_seconds(text: &str) -> Parsed<Duration> {
     parse_where(text, |v| v > 0.0 && v <= 1e9, "must be above 0 seconds").map(Duration::from_secs_f64)
 }
 

@@ -2,6 +2,7 @@
 //! an exit code of [`EXIT_CODES`].
 
 mod args;
+mod bench;
 mod console;
 mod diff;
 mod doctor;
@@ -59,6 +60,8 @@ enum Command {
     Doctor(args::DoctorArgs),
     /// Compare two images in numbers
     Diff(args::DiffArgs),
+    /// Measure how fast rays are traced, beside other tracers
+    Bench(bench::BenchArgs),
 }
 
 /// Runs the command that the process' arguments name.
@@ -96,6 +99,7 @@ fn dispatch(command: Command, start: Instant) -> Result<()> {
         Command::Scenes(args) => scenes::run(&args),
         Command::Doctor(args) => doctor::run(&args),
         Command::Diff(args) => diff::run(&args),
+        Command::Bench(args) => bench::run(&args),
     }
 }
 

@@ -32,7 +32,10 @@ pub fn run(args: &RaysArgs) -> Result<()> {
     move_rays(&mut set, -flat.origin);
     let device = Device::open(&args.device.options())?;
     let (kind, _, compute) = args.device.choose(&device.info)?;
-    let tracer = Tracer::with_options(&device, kind, &flat, Needs::default(), compute)?;
+    // and once more to warm up
+    let build = args.device.build_options(set.len() as u64 * (args.repeats as u64 + 1));
+    let tracer = Tracer::with_build(&device, kind, &flat, Needs::default(), compute, &build)?;
+    build.take_warnings().iter().for_each(|w| console.warning(w));
     let stats = tracer.stats();
     let mut control = Keyboard { progress: Progress::new("tracing", &console), keep_partial: false };
     let (hits, times) = rays::trace(&tracer, &set, args.mode.into(), args.repeats, &mut control)?;

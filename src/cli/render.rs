@@ -55,7 +55,11 @@ pub fn run(args: &RenderArgs, start: Instant) -> Result<()> {
     };
     let needs =
         Needs { normals: options.hemisphere == Hemisphere::Shading || args.wants(Aov::Ns), albedo: args.wants(Aov::Albedo) };
-    let tracer = Tracer::with_options(&device, kind, &flat, needs, compute)?;
+    // a camera ray and an occlusion ray each
+    let rays = 2 * options.spp as u64 * size[0] as u64 * size[1] as u64;
+    let build = args.device.build_options(rays);
+    let tracer = Tracer::with_build(&device, kind, &flat, needs, compute, &build)?;
+    build.take_warnings().iter().for_each(|w| console.warning(w));
 
     // a dump of rays is a set to compare with: all of them
     if args.dump_rays.is_none() {

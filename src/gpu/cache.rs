@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use super::info::DeviceInfo;
 
 /// `$XDG_CACHE_HOME/skylit`, or `~/.cache/skylit`.
-fn folder() -> Option<PathBuf> {
+pub fn folder() -> Option<PathBuf> {
     let base = std::env::var_os("XDG_CACHE_HOME").map(PathBuf::from).filter(|p| p.is_absolute());
     base.or_else(|| std::env::var_os("HOME").map(|h| PathBuf::from(h).join(".cache"))).map(|p| p.join("skylit"))
 }
@@ -13,7 +13,12 @@ fn folder() -> Option<PathBuf> {
 fn file(info: &DeviceInfo) -> Option<PathBuf> {
     let uuid: String = info.pipeline_cache_uuid.iter().map(|b| format!("{b:02x}")).collect();
     folder().map(|f| {
-        f.join(format!("pipelines-{:04x}-{:04x}-{:08x}-{uuid}.bin", info.vendor_id, info.device_id, info.driver_version))
+        // the width of a CPU driver's vectors is no part of what Vulkan calls the same device
+        let lanes = info.limits.subgroup_size;
+        f.join(format!(
+            "pipelines-{:04x}-{:04x}-{:08x}-{lanes}-{uuid}.bin",
+            info.vendor_id, info.device_id, info.driver_version
+        ))
     })
 }
 

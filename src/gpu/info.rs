@@ -16,6 +16,8 @@ pub struct Limits {
     pub subgroup_size: u32,
     /// Compute shaders can count lanes (subgroup ballots).
     pub subgroup_ballot: bool,
+    /// Compute shaders can hand values round and reduce them over lanes, and a subgroup holds at least eight.
+    pub packets: bool,
     /// Work-groups in x of one dispatch.
     pub max_workgroups_x: u32,
     /// Bytes of one allocation.
@@ -240,6 +242,11 @@ fn describe(instance: &Instance, index: usize, physical: vk::PhysicalDevice) -> 
                 && v11
                     .subgroup_supported_operations
                     .contains(vk::SubgroupFeatureFlags::BASIC | vk::SubgroupFeatureFlags::BALLOT),
+            packets: v11.subgroup_supported_stages.contains(vk::ShaderStageFlags::COMPUTE)
+                && v11.subgroup_supported_operations.contains(
+                    vk::SubgroupFeatureFlags::BASIC | vk::SubgroupFeatureFlags::BALLOT | vk::SubgroupFeatureFlags::ARITHMETIC,
+                )
+                && v11.subgroup_size >= 8,
             max_workgroups_x: properties.limits.max_compute_work_group_count[0],
             max_allocation: v13_limits.max_buffer_size.min(v11_limits.max_memory_allocation_size),
             device_memory,

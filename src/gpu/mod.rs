@@ -6,6 +6,7 @@ mod buffer;
 mod cache;
 mod commands;
 mod device;
+pub mod environment;
 mod info;
 mod instance;
 mod pipeline;
@@ -13,6 +14,7 @@ mod result;
 
 pub use acceleration_structure::{AccelerationStructure, BottomLevelInput, TopLevelEntry};
 pub use buffer::{Buffer, Memory};
+pub use cache::folder as cache_folder;
 pub use commands::{Commands, Recorder, Timing};
 pub use device::{Device, Options};
 pub use info::{DeviceInfo, Limits, TracerNeeds, enumerate};

@@ -63,6 +63,15 @@ pub fn write_grey(path: &Path, grey: &[u8], width: u32, height: u32) -> Result<(
     write_bytes(path, grey, width, height, ExtendedColorType::L8)
 }
 
+/// Writes 8-bit sRGB values as they are, three for each of `width * height` pixels.
+pub fn write_rgb(path: &Path, rgb: &[u8], width: u32, height: u32) -> Result<()> {
+    check_size(width, height)?;
+    if rgb.len() as u64 != 3 * u64::from(width) * u64::from(height) {
+        return Err(Error::Usage(format!("{} colour values for {width}x{height} pixels", rgb.len())));
+    }
+    write_bytes(path, rgb, width, height, ExtendedColorType::Rgb8)
+}
+
 fn write_bytes(path: &Path, bytes: &[u8], width: u32, height: u32, color: ExtendedColorType) -> Result<()> {
     write_atomically(path, |file| {
         let mut out = BufWriter::with_capacity(1 << 16, file);

@@ -128,7 +128,7 @@ impl View {
         if matrix.determinant().abs() <= 1e-12 {
             return None;
         }
-        let camera_to_world = DAffine3 { matrix3: matrix.into(), translation: column(3) };
+        let camera_to_world = DAffine3 { matrix3: matrix, translation: column(3) };
         let half = camera.view.map(f64::from);
         let image = size.map(f64::from);
         let mut view = Self {

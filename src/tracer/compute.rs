@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use glam::Vec3;
 
-use super::kernel::Kernel;
+use super::kernel::{BuildOptions, Kernel};
 use super::stream::LaunchMemory;
 use super::{brute, reference, wide};
 use crate::bvh::{Aabb, bvh2};
@@ -27,7 +27,7 @@ pub(super) const HIT_BYTES: u64 = 24;
 
 /// Hierarchies on the host.
 pub(super) enum Trees {
-    Wide(wide::Trees),
+    Wide(wide::Trees, Kernel),
     Binary(reference::Trees, Kernel),
     None,
 }
@@ -72,7 +72,7 @@ impl Hierarchy {
     /// What the kernel's array is specialised to: the fast kernel holds the upper end of the stack in registers.
     pub fn stack_constant(&self) -> u32 {
         match self.kernel {
-            Kernel::Wide => self.stack_entries.saturating_sub(wide::STACK_IN_REGISTERS),
+            Kernel::Auto | Kernel::Wide | Kernel::Packet => self.stack_entries.saturating_sub(wide::STACK_IN_REGISTERS),
             _ => self.stack_entries.max(1),
         }
     }
@@ -83,7 +83,7 @@ impl Hierarchy {
 }
 
 impl Trees {
-    pub fn build(flat: &FlatScene, kernel: Kernel) -> Result<Self> {
+    pub fn build(flat: &FlatScene, kernel: Kernel, options: &BuildOptions) -> Result<Self> {
         let total = flat.primitive_count();
         if total > bvh2::MAX_PRIMITIVES || flat.placements.len() > bvh2::MAX_PRIMITIVES {
             return Err(Error::Scene(format!(
@@ -93,8 +93,8 @@ impl Trees {
             )));
         }
         Ok(match kernel {
-            Kernel::Wide => Trees::Wide(wide::Trees::build(flat)),
-            Kernel::Nearest | Kernel::Direction => Trees::Binary(reference::Trees::build(flat), kernel),
+            Kernel::Auto | Kernel::Wide | Kernel::Packet => Trees::Wide(wide::Trees::build(flat, options), kernel),
+            Kernel::Nearest | Kernel::Direction => Trees::Binary(reference::Trees::build(flat, options), kernel),
             Kernel::Brute => {
                 brute::check(flat)?;
                 Trees::None
@@ -104,7 +104,7 @@ impl Trees {
 
     pub fn upload(self, device: &Arc<Device>, flat: &FlatScene) -> Result<Hierarchy> {
         match self {
-            Trees::Wide(trees) => trees.upload(device, flat),
+            Trees::Wide(trees, kernel) => trees.upload(device, flat, kernel),
             Trees::Binary(trees, kernel) => trees.upload(device, flat, kernel),
             Trees::None => brute::upload(device, flat),
         }

@@ -1,13 +1,20 @@
 //! Which of the compute tracer's kernels runs, and how it tests triangles.
 
+use crate::bvh::BuildPreset;
+use crate::bvh::cache::Cache;
+
 /// How the compute tracer finds what a ray meets. All give the same hits; docs/traversal.md compares their speed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Kernel {
-    /// The fast one: eight-wide quantised nodes whose children are visited in the order of the ray's octant, lanes that refill:
-    /// `shaders/trace/wide.glsl`.
+    /// `Packet` for coherent streams where the device can, else `Wide`.
     #[default]
+    Auto,
+    /// Seven-wide quantised nodes, one ray a lane, lanes that refill: `shaders/trace/wide.glsl`.
     Wide,
+    /// The same nodes, the rays of a subgroup together: `shaders/trace/packet.glsl`. Streams that come from a queue, and devices
+    /// without 64-bit integers or subgroups of eight lanes, are traced by `Wide`.
+    Packet,
     /// The readable one: binary nodes, the child whose box is entered first comes first: `shaders/trace/reference.glsl`.
     Nearest,
     /// As `Nearest`, but the sign of the ray's direction on the node's axis says which child comes first.
@@ -18,7 +25,8 @@ pub enum Kernel {
 
 impl Kernel {
     /// All of them.
-    pub const ALL: [Kernel; 4] = [Kernel::Wide, Kernel::Nearest, Kernel::Direction, Kernel::Brute];
+    pub const ALL: [Kernel; 6] =
+        [Kernel::Auto, Kernel::Wide, Kernel::Packet, Kernel::Nearest, Kernel::Direction, Kernel::Brute];
 
     /// Primitives, each instance's counted, and instances that [`Kernel::Brute`] takes at most together. Mesa before 23 leaves
     /// a loop after 65,535 turns; and a launch of the fewest rays should not stall a device for long.
@@ -27,7 +35,9 @@ impl Kernel {
     /// As on the command line.
     pub fn name(self) -> &'static str {
         match self {
+            Kernel::Auto => "auto",
             Kernel::Wide => "wide",
+            Kernel::Packet => "packet",
             Kernel::Nearest => "nearest",
             Kernel::Direction => "direction",
             Kernel::Brute => "brute",
@@ -37,7 +47,9 @@ impl Kernel {
     /// What it does, in half a line.
     pub fn describe(self) -> &'static str {
         match self {
-            Kernel::Wide => "eight-wide nodes, children in the order of the ray's octant",
+            Kernel::Auto => "seven-wide nodes; packets for coherent rays, else each ray by itself",
+            Kernel::Wide => "seven-wide nodes, each ray by itself",
+            Kernel::Packet => "seven-wide nodes, the rays of a subgroup together",
             Kernel::Nearest => "binary nodes, the nearest child first",
             Kernel::Direction => "binary nodes, children in the order of the ray's direction on the split axis",
             Kernel::Brute => "every primitive of every instance, no hierarchy",
@@ -85,6 +97,35 @@ pub struct ComputeOptions {
     pub kernel: Kernel,
     /// Its triangle test.
     pub triangle_test: TriangleTest,
+}
+
+/// How the compute tracer's hierarchy is built; drivers build those of the other tracers.
+#[derive(Clone, Debug)]
+pub struct BuildOptions {
+    /// How much time to spend; `None`: what suits the numbers of primitives and of rays ([`BuildPreset::auto`]).
+    pub preset: Option<BuildPreset>,
+    /// Rays that will be traced, about.
+    pub rays: u64,
+    /// Where built hierarchies are kept, if anywhere. Only those of the wide kernel are.
+    pub cache: Option<Cache>,
+}
+
+impl Default for BuildOptions {
+    fn default() -> Self {
+        Self { preset: Some(BuildPreset::Default), rays: 0, cache: None }
+    }
+}
+
+impl BuildOptions {
+    /// What went wrong with the cache: one line each.
+    pub fn take_warnings(&self) -> Vec<String> {
+        self.cache.as_ref().map(Cache::take_warnings).unwrap_or_default()
+    }
+
+    /// The preset for a number of primitives.
+    pub fn preset(&self, primitives: usize) -> BuildPreset {
+        self.preset.unwrap_or_else(|| BuildPreset::auto(primitives, self.rays))
+    }
 }
 
 impl From<Kernel> for ComputeOptions {

@@ -18,7 +18,7 @@ use std::sync::{Arc, OnceLock};
 use std::time::Instant;
 
 pub use gpu_scene::Needs;
-pub use kernel::{ComputeOptions, Kernel, TriangleTest};
+pub use kernel::{BuildOptions, ComputeOptions, Kernel, TriangleTest};
 pub use stream::{Push, Stream, StreamShaders};
 
 use crate::error::{Error, Result};
@@ -90,6 +90,8 @@ pub struct BuildStats {
     pub primitives: u64,
     /// Entries that the compute tracer's stack holds; 0 for the hardware tracers.
     pub stack_entries: u32,
+    /// Cost of the hierarchy by the surface area heuristic, for the tracers that know theirs.
+    pub sah_cost: Option<f64>,
 }
 
 impl BuildStats {
@@ -139,7 +141,18 @@ impl Tracer {
         needs: Needs,
         options: impl Into<ComputeOptions>,
     ) -> Result<Self> {
-        let options = options.into();
+        Self::with_build(device, kind, flat, needs, options.into(), &BuildOptions::default())
+    }
+
+    /// As [`Tracer::with_options`], with a choice of how the compute tracer's hierarchy is built.
+    pub fn with_build(
+        device: &Arc<Device>,
+        kind: TracerKind,
+        flat: &FlatScene,
+        needs: Needs,
+        options: ComputeOptions,
+        build: &BuildOptions,
+    ) -> Result<Self> {
         if !device.info.supports(kind) {
             let missing =
                 device.info.tracers.iter().find(|t| t.tracer == kind).map(|t| t.missing.join(", ")).unwrap_or_default();
@@ -152,7 +165,8 @@ impl Tracer {
         let mut stats = BuildStats { primitives: flat.primitive_count() as u64, ..Default::default() };
         // the hierarchy first: its build needs the most host memory, the scene's buffers come after that is freed
         let start = Instant::now();
-        let hierarchy = if kind == TracerKind::Compute { Some(compute::Trees::build(flat, options.kernel)?) } else { None };
+        let hierarchy =
+            if kind == TracerKind::Compute { Some(compute::Trees::build(flat, options.kernel, build)?) } else { None };
         stats.build_seconds = start.elapsed().as_secs_f64();
         let start = Instant::now();
         let mut scene = GpuScene::new(device, flat, needs)?;
@@ -242,8 +256,13 @@ impl Tracer {
                     .set(4, rays_per_lane)
                     .set(5, u32::from(h.kernel == Kernel::Direction))
                     .set(6, u32::from(self.triangle_test == TriangleTest::Watertight));
+                let packets = shaders.has_packets() && self.device.info.limits.packets && self.device.info.int64;
                 match h.kernel {
-                    Kernel::Wide => {
+                    Kernel::Packet | Kernel::Auto if packets && (h.kernel == Kernel::Packet || shaders.is_coherent()) => {
+                        let lanes = self.device.info.limits.subgroup_size;
+                        Stream::packets(&self.device, shaders, &specialization.set(7, lanes))
+                    }
+                    Kernel::Auto | Kernel::Wide | Kernel::Packet => {
                         let kernel = self.kernel(shaders.mode(), &specialization)?;
                         Stream::steps(&self.device, shaders, &specialization, kernel, rays_per_lane, h.launch_memory()?)
                     }

@@ -6,9 +6,10 @@ use std::sync::Arc;
 use super::compute::{
     Hierarchy, PRIMITIVE_BYTES, padding, placement_boxes, primitive_boxes, record, unfinished_counter, write_records,
 };
+use super::kernel::BuildOptions;
 use super::kernel::Kernel;
 use crate::bvh::build::MAX_DEPTH;
-use crate::bvh::{Aabb, BuildPreset, Bvh2, bvh2};
+use crate::bvh::{Aabb, Bvh2, bvh2};
 use crate::error::Result;
 use crate::gpu::Device;
 use crate::scene::flatten::FlatScene;
@@ -25,18 +26,18 @@ pub(super) struct Trees {
 }
 
 impl Trees {
-    pub fn build(flat: &FlatScene) -> Self {
+    pub fn build(flat: &FlatScene, options: &BuildOptions) -> Self {
         let (mut groups, mut bounds) = (Vec::new(), Vec::new());
         for g in &flat.groups {
             let boxes: Vec<_> = primitive_boxes(flat, g).collect();
             bounds.push(boxes.iter().copied().fold(Aabb::EMPTY, Aabb::union));
-            groups.push(Bvh2::build(&boxes, BuildPreset::Default, MAX_LEAF));
+            groups.push(Bvh2::build(&boxes, options.preset(boxes.len()), MAX_LEAF));
         }
         let mut top = None;
         if !flat.is_single_level() {
             bounds = placement_boxes(flat, &bounds);
             // a leaf of the top level holds one entry: entering it leaves the tree
-            top = Some(Bvh2::build(&bounds, BuildPreset::Default, 1));
+            top = Some(Bvh2::build(&bounds, options.preset(bounds.len()), 1));
         }
         Self { groups, top, bounds: bounds.into_iter().fold(Aabb::EMPTY, Aabb::union) }
     }

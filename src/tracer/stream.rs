@@ -29,11 +29,14 @@ pub struct StreamShaders {
     pub steps: [&'static str; 3],
     // its rays are in memory: there is no first step
     queue: bool,
+    // its neighbouring rays take nearly the same way
+    coherent: bool,
     mode: Mode,
     generate: &'static [u8],
     generate_64: &'static [u8],
     deliver: &'static [u8],
     deliver_64: &'static [u8],
+    packet: &'static [u8],
     reference: &'static [u8],
     brute: &'static [u8],
     query: &'static [u8],
@@ -66,6 +69,8 @@ pub struct Push {
 
 /// Rays that the compute tracer's buffers hold between the steps of a launch.
 pub(super) const LAUNCH_RAYS: u32 = 1 << 19;
+/// Rays of each lane of a packet: `PACKET_RAYS` of build.rs.
+const PACKET_RAYS: u32 = 2;
 /// Stands where a result will be: `UNFINISHED` of shaders/trace/launch.glsl.
 const UNFINISHED: u32 = 0x7fc0_dead;
 
@@ -109,6 +114,16 @@ impl StreamShaders {
     pub(super) fn mode(&self) -> Mode {
         self.mode
     }
+
+    /// Do neighbouring rays take nearly the same way through a scene?
+    pub(super) fn is_coherent(&self) -> bool {
+        self.coherent
+    }
+
+    /// Can it be traced in packets? What comes from a queue is in no order.
+    pub(super) fn has_packets(&self) -> bool {
+        !self.packet.is_empty()
+    }
 }
 
 impl Stream {
@@ -136,6 +151,12 @@ impl Stream {
             record: if shaders.mode == Mode::Any { 4 } else { HIT_BYTES },
         };
         Ok(Self { pipeline, shaders })
+    }
+
+    /// For the compute tracer's packets.
+    pub(super) fn packets(device: &Arc<Device>, shaders: &'static StreamShaders, s: &Specialization) -> Result<Self> {
+        let pipeline = ComputePipeline::new(device, shaders.name, shaders.packet, s)?;
+        Ok(Self { pipeline: Pipeline::Single { pipeline, rays_per_group: LANES * PACKET_RAYS }, shaders })
     }
 
     /// For the compute tracer's readable reference.

@@ -18,9 +18,11 @@ use super::compute::{
     ALPHA_TESTED, HIT_BYTES, Hierarchy, SPHERE, padding, placement_boxes, primitive_boxes, unfinished_counter, write_records,
 };
 use super::gpu_scene::rows;
+use super::kernel::BuildOptions;
 use super::kernel::Kernel;
 use super::stream::{LAUNCH_RAYS, LaunchMemory};
 use crate::bvh::build::{self, MAX_DEPTH};
+use crate::bvh::cache::KeyBuilder;
 use crate::bvh::pairs::{self, Fan, Pair};
 use crate::bvh::wide::{self, BLOCK_BYTES, Block, Wide};
 use crate::bvh::{Aabb, BuildPreset, bvh2};
@@ -40,12 +42,15 @@ pub(super) struct Trees {
 }
 
 impl Trees {
-    pub fn build(flat: &FlatScene) -> Self {
-        let groups: Vec<_> =
-            flat.groups.iter().map(|g| if g.spheres { sphere_tree(flat, g) } else { triangle_tree(flat, g) }).collect();
+    pub fn build(flat: &FlatScene, options: &BuildOptions) -> Self {
+        let groups: Vec<_> = flat
+            .groups
+            .iter()
+            .map(|g| if g.spheres { sphere_tree(flat, g, options) } else { triangle_tree(flat, g, options) })
+            .collect();
         let top = (!flat.is_single_level()).then(|| {
             let bounds: Vec<_> = groups.iter().map(|g| g.bounds.unwrap_or(Aabb::EMPTY)).collect();
-            tree(placement_boxes(flat, &bounds), |entry| {
+            tree(placement_boxes(flat, &bounds), options, |entry| {
                 let placement = &flat.placements[entry as usize];
                 let mut block = [0; 16];
                 block[..12].copy_from_slice(rows(&placement.to_world.inverse()).as_flattened().map_bits());
@@ -57,7 +62,7 @@ impl Trees {
         Self { groups, top }
     }
 
-    pub fn upload(mut self, device: &Arc<Device>, flat: &FlatScene) -> Result<Hierarchy> {
+    pub fn upload(mut self, device: &Arc<Device>, flat: &FlatScene, kernel: Kernel) -> Result<Hierarchy> {
         let bounds = self.top.as_ref().or(self.groups.first()).and_then(|t| t.bounds).unwrap_or(Aabb::EMPTY);
         let group_depth = self.groups.iter().map(|g| g.depth).max().unwrap_or(0);
         // Every node visit pushes at most one entry. Entering an entry of the top level pushes its siblings and the way back.
@@ -88,7 +93,7 @@ impl Trees {
         )?;
         let launch = |name, bytes| Buffer::new(device, name, bytes * LAUNCH_RAYS as u64, Memory::Device).map(Arc::new);
         Ok(Hierarchy {
-            kernel: Kernel::Wide,
+            kernel,
             primitives: Buffer::new(device, "no primitives", 16, Memory::Device)?,
             nodes,
             // an empty scene has no tree, and rays that miss its bounds never begin
@@ -117,19 +122,59 @@ impl Bits for [f32] {
 }
 
 /// A tree over boxes, not yet padded.
-fn tree(mut boxes: Vec<Aabb>, leaf: impl Fn(u32) -> Block + Sync) -> Wide {
+fn tree(mut boxes: Vec<Aabb>, options: &BuildOptions, leaf: impl Fn(u32) -> Block + Sync) -> Wide {
     if boxes.is_empty() {
         return Wide::default();
     }
     let pad = padding(boxes.iter());
     boxes.par_iter_mut().for_each(|b| *b = Aabb { min: b.min - pad, max: b.max + pad });
-    let binary = build::tree(&boxes, BuildPreset::Default, None);
+    let binary = build::tree(&boxes, options.preset(boxes.len()), None);
     drop(boxes);
     Wide::collapse(&binary, leaf)
 }
 
-fn sphere_tree(flat: &FlatScene, group: &Group) -> Wide {
-    tree(primitive_boxes(flat, group).collect(), |primitive| {
+/// Raised whenever the same input gives other blocks: builders, pairs, collapse, the layout of nodes and leaves.
+const LAYOUT_VERSION: u32 = 1;
+
+/// What lies next to the blocks of a kept hierarchy.
+#[repr(C)]
+#[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+struct Kept {
+    bounds: [[f32; 3]; 2],
+    depth: u32,
+    reserved: u32,
+    sah_cost: f64,
+}
+
+/// The hierarchy over what these bytes describe, from the cache if it is there, otherwise built and kept.
+fn kept(options: &BuildOptions, preset: BuildPreset, content: &[&[u8]], build: impl FnOnce() -> Wide) -> Wide {
+    let Some(cache) = &options.cache else { return build() };
+    let head = KeyBuilder::default().with(&LAYOUT_VERSION.to_le_bytes()).with(format!("{preset:?}").as_bytes());
+    let key = content.iter().fold(head, |k, bytes| k.with(bytes)).finish();
+    let loaded = cache.load(key).and_then(|entries| {
+        let kept = *entries.get::<Kept>("tree")?.first()?;
+        let [min, max] = kept.bounds.map(Vec3::from);
+        Some(Wide {
+            blocks: entries.get("blocks")?,
+            depth: kept.depth,
+            bounds: Some(Aabb { min, max }),
+            sah_cost: kept.sah_cost,
+        })
+    });
+    if let Some(wide) = loaded {
+        return wide;
+    }
+    let wide = build();
+    if let Some(b) = wide.bounds {
+        let bounds = [b.min.to_array(), b.max.to_array()];
+        let kept = Kept { bounds, depth: wide.depth, reserved: 0, sah_cost: wide.sah_cost };
+        cache.store(key, &[("tree", bytemuck::bytes_of(&kept)), ("blocks", bytemuck::cast_slice(&wide.blocks))]);
+    }
+    wide
+}
+
+fn sphere_tree(flat: &FlatScene, group: &Group, options: &BuildOptions) -> Wide {
+    tree(primitive_boxes(flat, group).collect(), options, |primitive| {
         let part = flat.part_of(group, primitive as usize);
         let s = flat.sphere(part, primitive as usize - part.first_primitive);
         let mut block = [0; 16];
@@ -162,18 +207,35 @@ impl Triangles {
     }
 }
 
-fn triangle_tree(flat: &FlatScene, group: &Group) -> Wide {
+fn triangle_tree(flat: &FlatScene, group: &Group, options: &BuildOptions) -> Wide {
     let triangles = Triangles::of(flat, group);
-    let boxes: Vec<Aabb> = triangles.indices.par_iter().map(|&t| Aabb::of_points(&triangles.corners(t))).collect();
-    let pairs = pairs::pair_up(&triangles.indices, &boxes, triangles.positions.len());
-    let boxes = pairs
-        .par_iter()
-        .map(|p| match p.triangles {
-            [a, pairs::NONE] => boxes[a as usize],
-            [a, b] => boxes[a as usize].union(boxes[b as usize]),
-        })
-        .collect();
-    tree(boxes, |pair| pair_block(&triangles, pairs[pair as usize], group.opaque_count as u32))
+    let preset = options.preset(triangles.indices.len());
+    let opaque = group.opaque_count as u32;
+    let content: [&[u8]; 3] =
+        [&opaque.to_le_bytes(), bytemuck::cast_slice(&triangles.positions), bytemuck::cast_slice(&triangles.indices)];
+    kept(options, preset, &content, || {
+        let boxes: Vec<Aabb> = triangles.indices.par_iter().map(|&t| Aabb::of_points(&triangles.corners(t))).collect();
+        let pairs = pairs::pair_up(&triangles.indices, &boxes, triangles.positions.len());
+        let boxes: Vec<Aabb> = pairs
+            .par_iter()
+            .map(|p| match p.triangles {
+                [a, pairs::NONE] => boxes[a as usize],
+                [a, b] => boxes[a as usize].union(boxes[b as usize]),
+            })
+            .collect();
+        if boxes.is_empty() {
+            return Wide::default();
+        }
+        let pad = padding(boxes.iter());
+        let of_pair = |pair: u32, see: &mut dyn FnMut([Vec3; 3])| {
+            for t in pairs[pair as usize].triangles.into_iter().filter(|&t| t != pairs::NONE) {
+                see(triangles.corners(triangles.indices[t as usize]));
+            }
+        };
+        let binary = build::tree_with_splits(&boxes, &of_pair, preset, pad);
+        drop(boxes);
+        Wide::collapse(&binary, |pair| pair_block(&triangles, pairs[pair as usize], opaque))
+    })
 }
 
 fn pair_block(triangles: &Triangles, pair: Pair, opaque: u32) -> Block {
@@ -214,7 +276,7 @@ mod tests {
     fn check(name: &str) {
         let scene = builtin::by_name(name).unwrap();
         let flat = FlatScene::new(&scene);
-        let trees = Trees::build(&flat);
+        let trees = Trees::build(&flat, &BuildOptions::default());
         for (tree, group) in trees.groups.iter().zip(&flat.groups) {
             let triangles = Triangles::of(&flat, group);
             let boxes: Vec<Aabb> = primitive_boxes(&flat, group).collect();

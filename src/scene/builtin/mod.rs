@@ -7,6 +7,7 @@ pub mod analytic;
 pub mod cornell;
 pub mod many;
 pub mod shapes;
+pub mod terrain;
 
 use super::{Camera, Geometry, Instance, Material, Mesh, Scene};
 use glam::{DAffine3, DVec3, Vec3};
@@ -37,6 +38,8 @@ const NAMES: &[BuiltinInfo] = &[
     info("plane", "a single plane; AO is 1 everywhere"),
     info("grid", "N x N x N turned and stretched instances of a torus over a floor (grid:N, 1 to 128, default 6)"),
     info("spheres", "N random analytic spheres over a floor (spheres:N, 1 to 10000000, default 1000)"),
+    info("terrain", "a fractal landscape of N triangles (terrain:N, 2 to 100000000, default 100000)"),
+    info("instances", "15 landscapes placed 125 times, N triangles in all (instances:N, 250 to 500000000, default 1000000)"),
     info("leaf-cards", "bushes of leaves cut from quads by alpha masks, some of them blended"),
     info("stairs", "stairs, a column and a rail: contact detail"),
     info("far-away", "the stairs, placed more than a million units from the origin"),
@@ -59,14 +62,17 @@ pub fn by_name(name: &str) -> Option<Scene> {
         None => Some(default),
         Some(p) => p.parse::<f64>().ok().filter(|v| (lo..=hi).contains(v)),
     };
-    let count = |default: u32, hi: u32| match parameter {
+    let between = |default: u32, lo: u32, hi: u32| match parameter {
         None => Some(default),
-        Some(p) => p.parse::<u32>().ok().filter(|v| (1..=hi).contains(v)),
+        Some(p) => p.parse::<u32>().ok().filter(|v| (lo..=hi).contains(v)),
     };
+    let count = |default: u32, hi: u32| between(default, 1, hi);
     let mut scene = match base {
         "v-groove" => analytic::v_groove(number(90.0, 1.0, 180.0)?.to_radians(), 4.0, 12.0, Placement::default()),
         "grid" => many::grid(count(6, 128)?),
         "spheres" => many::spheres(count(1000, 10_000_000)?),
+        "terrain" => terrain::terrain(between(100_000, 2, 100_000_000)?),
+        "instances" => terrain::instances(between(1_000_000, 250, 500_000_000)?),
         _ if parameter.is_some() => return None,
         "cornell-box" => cornell::cornell_box(),
         "cornell-empty" => cornell::cornell_empty(),

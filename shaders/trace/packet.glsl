@@ -1,0 +1,393 @@
+// The compute tracer's kernel for coherent streams: the lanes of a subgroup walk the hierarchy together, each with PACKET_RAYS rays of its
+// own (after Wald, Slusallek, Benthin, Wagner, "Interactive Rendering with Coherent Ray Tracing", EG 2001, and `wide.glsl`, whose
+// blocks these are). A block is fetched once for all and decoded once a lane, and control flow is the same in all lanes; so a visit
+// costs a lane a fraction of what it does in `wide.glsl`, and the packet visits what any of its rays would. The result is the same.
+//
+// Rays are generated and delivered here, all lanes in step; nothing goes through memory. The host uses this kernel only for streams
+// that say they are coherent, on devices with subgroup shuffles whose subgroups are known to hold at least eight lanes.
+#ifndef TRACE_PACKET
+#define TRACE_PACKET
+#include "scene/material.glsl"
+#include "scene/sphere.glsl"
+#include "trace/block.glsl"
+#include "trace/callback.glsl"
+#include "trace/records.glsl"
+#include "trace/slab.glsl"
+#include "trace/triangle.glsl"
+
+layout(local_size_x = LANES) in;
+
+// Lanes of a subgroup: a power of two.
+layout(constant_id = 7) const uint SUBGROUP = 8;
+// Stack entries beyond those in registers, as in wide.glsl.
+layout(constant_id = 3) const uint SPILLED = 64;
+const uint TOP = 6u;
+
+layout(buffer_reference, std430, buffer_reference_align = 4) buffer Counter { uint v; };
+layout(buffer_reference, std430, buffer_reference_align = 8) readonly buffer BlockWords { WORD64 v[]; };
+
+// Rays whose directions have the same signs and main axis go together: near and far planes, and the axes of the triangle test,
+// are then the same for all. The rest waits for its turn.
+const uint NO_CLASS = 0xffu;
+
+uint class_of(vec3 inverse, uint axis) {
+    return (inverse.x < 0.0 ? 4u : 0u) | (inverse.y < 0.0 ? 2u : 0u) | (inverse.z < 0.0 ? 1u : 0u) | (axis << 3);
+}
+
+
+// Over all lanes. Constant broadcasts are one instruction on a CPU driver; the built-in reductions, shuffles of more than eight lanes and
+// quad swaps are loops there.
+#define REDUCE_8(op, k)                                                                                                             \
+    r = op(op(op(r, subgroupBroadcast(x, k)), op(subgroupBroadcast(x, k + 1), subgroupBroadcast(x, k + 2))),                        \
+            op(op(subgroupBroadcast(x, k + 3), subgroupBroadcast(x, k + 4)),                                                        \
+                    op(subgroupBroadcast(x, k + 5), op(subgroupBroadcast(x, k + 6), subgroupBroadcast(x, k + 7)))));
+#define REDUCE(op)                          \
+    uint r = x;                             \
+    REDUCE_8(op, 0)                         \
+    if (SUBGROUP > 8u) { REDUCE_8(op, 8) }  \
+    return r;
+
+uint bitwise_or(uint a, uint b) { return a | b; }
+
+uint all_or(uint x) {
+    if (SUBGROUP > 16u) return subgroupOr(x);
+    REDUCE(bitwise_or)
+}
+
+uint all_min(uint x) {
+    if (SUBGROUP > 16u) return subgroupMin(x);
+    REDUCE(min)
+}
+
+float pick_weight(vec3 w, uint k) {
+    k &= 3u;
+    return k == 0u ? w.x : k == 1u ? w.y : w.z;
+}
+
+#define FOR_RAYS [[unroll]] for (int j = 0; j < PACKET_RAYS; j++)
+
+#define PUSH(b, g)                                                          \
+    if (SPILLED > 0u) {                                                     \
+        if (depth >= TOP) {                                                 \
+            spilled_base[depth - TOP] = top_base[TOP - 1u];                 \
+            spilled_group[depth - TOP] = top_group[TOP - 1u];               \
+        }                                                                   \
+    }                                                                       \
+    [[unroll]] for (uint s = TOP - 1u; s > 0u; s--) {                       \
+        top_base[s] = top_base[s - 1u];                                     \
+        top_group[s] = top_group[s - 1u];                                   \
+    }                                                                       \
+    top_base[0] = (b);                                                      \
+    top_group[0] = (g);                                                     \
+    depth++;
+
+#define POP                                                                 \
+    base = top_base[0];                                                     \
+    group = top_group[0];                                                   \
+    [[unroll]] for (uint s = 0u; s < TOP - 1u; s++) {                       \
+        top_base[s] = top_base[s + 1u];                                     \
+        top_group[s] = top_group[s + 1u];                                   \
+    }                                                                       \
+    depth--;                                                                \
+    if (SPILLED > 0u) {                                                     \
+        if (depth >= TOP) {                                                 \
+            top_base[TOP - 1u] = spilled_base[depth - TOP];                 \
+            top_group[TOP - 1u] = spilled_group[depth - TOP];               \
+        }                                                                   \
+    }
+
+#define SET_RAY(j, o, d)                                        \
+    origin[j] = (o);                                            \
+    direction[j] = (d);                                         \
+    inverse[j] = safe_inverse(direction[j]);                    \
+    shear[j] = make_shear(direction[j], inverse[j]);
+
+// The next class of waiting rays: its rays are `active`, the others have an empty interval.
+#define NEXT_CLASS                                                                      \
+    uint least = NO_CLASS;                                                              \
+    FOR_RAYS least = min(least, waiting[j] ? class_of(inverse[j], shear[j].axis) : NO_CLASS);  \
+    class_ = all_min(least);                                                            \
+    FOR_RAYS {                                                                          \
+        bool now = waiting[j] && class_of(inverse[j], shear[j].axis) == class_;         \
+        waiting[j] = waiting[j] && !now;                                                \
+        limit[j] = now ? best[j] : -1.0;                                                \
+    }
+
+#ifdef STREAM_ANY
+#define ACCEPT                        \
+    best[j] = -1.0;                   \
+    limit[j] = -1.0;                  \
+    best_primitive[j] = id & NUMBER;  \
+    found = true;
+#else
+#define ACCEPT                        \
+    best[j] = t;                      \
+    limit[j] = t;                     \
+    best_uv[j] = uv;                  \
+    best_instance[j] = instance;      \
+    best_primitive[j] = id & NUMBER;
+#endif
+
+// A triangle is met at `t` with barycentric `weights`: unless its alpha says otherwise, take it.
+#define OFFER(turn)                                                                                                  \
+    vec2 uv = vec2(pick_weight(weights, (turn)), pick_weight(weights, (turn) >> 2));                                 \
+    bool met = true;                                                                                                 \
+    if (HAS_ALPHA) {                                                                                                 \
+        if ((id & ALPHA_TESTED) != 0u) met = alpha_passes(instance, id & NUMBER, uv);                                \
+    }                                                                                                                \
+    if (met) {                                                                                                       \
+        ACCEPT                                                                                                       \
+    }
+
+#define TEST_TRIANGLE(id_, turn, v0_, v1_, v2_, a, b, c, eu, ev, ew)                                                     \
+    {                                                                                                                    \
+        uint id = (id_);                                                                                                 \
+        float t, inverse_det;                                                                                            \
+        if (meets_between(shear[j], origin[j], direction[j], v0_, v1_, v2_, a, b, c, eu, ev, ew, tmin[j], limit[j], t, inverse_det)) { \
+            vec3 weights = vec3(eu, ev, ew) * inverse_det;                                                               \
+            OFFER(turn)                                                                                                  \
+        }                                                                                                                \
+    }
+
+#define TEST_MOLLER_TRUMBORE(id_, turn, v0_, v1_, v2_)                                                      \
+    {                                                                                                       \
+        uint id = (id_);                                                                                    \
+        float t;                                                                                            \
+        vec2 vw;                                                                                            \
+        if (intersect_moller_trumbore(origin[j], direction[j], v0_, v1_, v2_, tmin[j], limit[j], t, vw)) {  \
+            vec3 weights = vec3(1.0 - vw.x - vw.y, vw);                                                     \
+            OFFER(turn)                                                                                     \
+        }                                                                                                   \
+    }
+
+#define TEST_SPHERE(id_, center, radius)                                                             \
+    {                                                                                                \
+        uint id = (id_);                                                                             \
+        float t = intersect_sphere(origin[j], direction[j], tmin[j], limit[j], center, radius);      \
+        vec2 uv = vec2(0.0);                                                                         \
+        if (id != INVALID && t > tmin[j] && t < limit[j]) {                                          \
+            ACCEPT                                                                                   \
+        }                                                                                            \
+    }
+
+void main() {
+    SceneRoot root = SceneRoot(push.scene);
+    uvec2 blocks = root.nodes;
+    uint lane = gl_SubgroupInvocationID;
+    uint first = (gl_WorkGroupID.x * LANES + gl_SubgroupID * SUBGROUP) * PACKET_RAYS + lane;
+    uint count = ray_count();
+    // the same for all lanes
+    if (first - lane >= count) return;
+
+    vec3 world_origin[PACKET_RAYS], world_direction[PACKET_RAYS], origin[PACKET_RAYS], direction[PACKET_RAYS], inverse[PACKET_RAYS];
+    Shear shear[PACKET_RAYS];
+    // `best`: how far a ray has to look; `limit`: the same for rays of the class in hand, nothing for the others
+    float tmin[PACKET_RAYS], best[PACKET_RAYS], limit[PACKET_RAYS];
+    // not yet traced, at this level; and what the top level will be left with
+    bool waiting[PACKET_RAYS], world_waiting[PACKET_RAYS], world_active[PACKET_RAYS];
+    uint best_instance[PACKET_RAYS], best_primitive[PACKET_RAYS];
+    vec2 best_uv[PACKET_RAYS];
+    FOR_RAYS {
+        uint k = first + uint(j) * SUBGROUP;
+        Ray r = no_ray();
+        if (k < count) r = ray(push.first + k);
+        world_origin[j] = r.origin;
+        world_direction[j] = r.direction;
+        SET_RAY(j, r.origin, r.direction)
+        waiting[j] = is_ray(r);
+        tmin[j] = r.tmin;
+        best[j] = waiting[j] ? r.tmax : -1.0;
+        best_instance[j] = INVALID;
+        best_primitive[j] = INVALID;
+        best_uv[j] = vec2(0.0);
+    }
+
+    uint top_base[TOP], top_group[TOP];
+    uint spilled_base[SPILLED + 1u], spilled_group[SPILLED + 1u];
+    [[unroll]] for (uint s = 0u; s < TOP; s++) {
+        top_base[s] = 0u;
+        top_group[s] = 0u;
+    }
+    uint depth = 0u, instance = 0u, instance_root = 0u;
+    bool in_group = SINGLE_LEVEL;
+    uint class_;
+    { NEXT_CLASS }
+    uint world_class = class_;
+    uint block = root.root, base = 0u, group = 0u;
+    bool finished = class_ == NO_CLASS;
+    // Some CPU drivers leave any loop after 65,535 turns; then `finished` is not set, and the host reports it.
+    while (!finished) {
+        // lane k fetches the k-th pair of words, and hands it round
+        uvec2 own = PAIR(BlockWords(offset_address(blocks, 64u * block)).v[lane & 7u]);
+        uvec2 w0 = uvec2(subgroupBroadcast(own.x, 0), subgroupBroadcast(own.y, 0));
+        uvec2 w1 = uvec2(subgroupBroadcast(own.x, 1), subgroupBroadcast(own.y, 1));
+        uvec2 w2 = uvec2(subgroupBroadcast(own.x, 2), subgroupBroadcast(own.y, 2));
+        uvec2 w3 = uvec2(subgroupBroadcast(own.x, 3), subgroupBroadcast(own.y, 3));
+        uvec2 w4 = uvec2(subgroupBroadcast(own.x, 4), subgroupBroadcast(own.y, 4));
+        uvec2 w5 = uvec2(subgroupBroadcast(own.x, 5), subgroupBroadcast(own.y, 5));
+        uvec2 w6 = uvec2(subgroupBroadcast(own.x, 6), subgroupBroadcast(own.y, 6));
+        uvec2 w7 = uvec2(subgroupBroadcast(own.x, 7), subgroupBroadcast(own.y, 7));
+        uint octant = 7u - (class_ & 7u);
+        uint nearest = INVALID;
+        if ((w7.y & LEAF) == 0u) {
+            vec3 scale[PACKET_RAYS], corner[PACKET_RAYS];
+            FOR_RAYS {
+                scale[j] = uintBitsToFloat(uvec3(w2.y >> 24, w4.y >> 24, w6.y >> 24) << 23) * inverse[j];
+                corner[j] = (uintBitsToFloat(uvec3(w0, w1.x)) - origin[j]) * inverse[j];
+            }
+            uvec2 near_x = (class_ & 4u) != 0u ? w3 : w2, far_x = (class_ & 4u) != 0u ? w2 : w3;
+            uvec2 near_y = (class_ & 2u) != 0u ? w5 : w4, far_y = (class_ & 2u) != 0u ? w4 : w5;
+            uvec2 near_z = (class_ & 1u) != 0u ? w7 : w6, far_z = (class_ & 1u) != 0u ? w6 : w7;
+            uint hits = 0u;
+            [[unroll]] for (int k = 0; k < 7; k++) {
+                vec3 lower = vec3(BYTE(near_x, k), BYTE(near_y, k), BYTE(near_z, k));
+                vec3 upper = vec3(BYTE(far_x, k), BYTE(far_y, k), BYTE(far_z, k));
+                bool any_hit = false;
+                FOR_RAYS {
+                    vec3 n = lower * scale[j] + corner[j];
+                    vec3 f = upper * scale[j] + corner[j];
+                    float near = MAX(MAX(n.x, n.y), MAX(n.z, tmin[j]));
+                    float far = MIN(MIN(MIN(f.x, f.y), f.z) * SLAB_SCALE, limit[j]);
+                    bool hit = near <= far;
+                    any_hit = any_hit || hit;
+#ifdef STREAM_CLOSEST
+                    nearest = min(nearest, hit ? (floatBitsToUint(near) & ~7u) | k : INVALID);
+#endif
+                }
+                hits |= any_hit ? 1u << k : 0u;
+            }
+            uint present = w5.y >> 24;
+            hits = all_or(hits) & present;
+#ifdef STREAM_CLOSEST
+            nearest = all_min(nearest);
+            if ((present >> (nearest & 7u) & 1u) == 0u) nearest = INVALID;
+#endif
+            if (hits != 0u) {
+                if (has_siblings(group)) {
+                    PUSH(base, group)
+                }
+                base = w1.y;
+                group = make_group(hits, present, octant);
+            }
+        } else if (!SINGLE_LEVEL && !in_group) {
+            // an entry of the top level: the transform to its own space, then its root and number
+            if (has_siblings(group)) {
+                PUSH(base, group)
+            }
+            // the way back
+            PUSH(0u, 0u)
+            vec4 rows[3] = vec4[3](uintBitsToFloat(uvec4(w0, w1)), uintBitsToFloat(uvec4(w2, w3)), uintBitsToFloat(uvec4(w4, w5)));
+            FOR_RAYS {
+                world_waiting[j] = waiting[j];
+                world_active[j] = limit[j] > tmin[j];
+                waiting[j] = world_active[j];
+                SET_RAY(j, transform_point(rows, world_origin[j]), transform_vector(rows, world_direction[j]))
+            }
+            in_group = true;
+            instance = w6.y;
+            instance_root = w6.x;
+            NEXT_CLASS
+            octant = 7u - (class_ & 7u);
+            base = instance_root;
+            group = ROOT_GROUP;
+        } else {
+            bool found = false;
+            if (HAS_SPHERES && (w6.x & SPHERE) != 0u) {
+                FOR_RAYS {
+                    TEST_SPHERE(w6.x, uintBitsToFloat(uvec3(w0, w1.x)), uintBitsToFloat(w1.y))
+                    TEST_SPHERE(w6.y, uintBitsToFloat(uvec3(w2, w3.x)), uintBitsToFloat(w3.y))
+                }
+            } else {
+                uint axis = class_ >> 3;
+                vec3 v0 = uintBitsToFloat(uvec3(w0, w1.x)), v1 = uintBitsToFloat(uvec3(w1.y, w2));
+                vec3 v2 = uintBitsToFloat(uvec3(w3, w4.x)), v3 = uintBitsToFloat(uvec3(w4.y, w5));
+                FOR_RAYS {
+                    if (WATERTIGHT) {
+                        Shear s = Shear(axis, shear[j].s);
+                        Corner a = make_corner(s, origin[j], v0), b = make_corner(s, origin[j], v1);
+                        Corner c = make_corner(s, origin[j], v2), d = make_corner(s, origin[j], v3);
+                        float ab = edge(b, a), bc = edge(c, b), ca = edge(a, c), cd = edge(d, c), da = edge(a, d);
+                        // rays of another class see nonsense
+                        bool live = limit[j] > tmin[j];
+                        if (live && is_inside(bc, ca, ab)) TEST_TRIANGLE(w6.x, w7.x, v0, v1, v2, a, b, c, bc, ca, ab)
+                        if (live && w6.y != INVALID && is_inside(cd, da, -ca)) TEST_TRIANGLE(w6.y, w7.x >> 4, v0, v2, v3, a, c, d, cd, da, -ca)
+                    } else {
+                        TEST_MOLLER_TRUMBORE(w6.x, w7.x, v0, v1, v2)
+                        if (w6.y != INVALID) TEST_MOLLER_TRUMBORE(w6.y, w7.x >> 4, v0, v2, v3)
+                    }
+                }
+            }
+#ifdef STREAM_ANY
+            // when no ray of the class looks on, the rest of the tree is left
+            if (all_or(found ? 1u : 0u) != 0u) {
+                bool looking = false;
+                FOR_RAYS looking = looking || limit[j] > tmin[j];
+                if (all_or(looking ? 1u : 0u) == 0u) {
+                    group = 0u;
+                    if (SINGLE_LEVEL) depth = 0u;
+                }
+            }
+#endif
+        }
+        // of a group that is done with: back to the top level, or on with the rays that wait
+        while (!has_siblings(group) && !finished) {
+            if (depth == 0u) {
+                // the tree is done for this class of rays
+                NEXT_CLASS
+                finished = class_ == NO_CLASS;
+                octant = 7u - (class_ & 7u);
+                world_class = class_;
+                base = root.root;
+                group = ROOT_GROUP;
+                nearest = INVALID;
+            } else {
+                POP
+                if (!SINGLE_LEVEL && group == 0u) {
+                    NEXT_CLASS
+                    if (class_ != NO_CLASS) {
+                        // the same instance for other rays
+                        PUSH(0u, 0u)
+                        base = instance_root;
+                        group = ROOT_GROUP;
+                    } else {
+                        FOR_RAYS {
+                            SET_RAY(j, world_origin[j], world_direction[j])
+                            waiting[j] = world_waiting[j];
+                            limit[j] = world_active[j] ? best[j] : -1.0;
+                        }
+                        in_group = false;
+                        class_ = world_class;
+                    }
+                    octant = 7u - (class_ & 7u);
+                }
+                nearest = INVALID;
+            }
+        }
+        uint bit = findMSB(group | 1u);
+        uint slot = (bit - 24u) ^ octant;
+#ifdef STREAM_CLOSEST
+        if (nearest != INVALID) {
+            slot = nearest & 7u;
+            bit = (slot ^ octant) + 24u;
+        }
+#endif
+        group &= ~(1u << bit);
+        block = base + bitCount((group >> 16) & 0xffu & ((1u << (slot & 31u)) - 1u));
+    }
+
+    if (!finished && lane == 0u) atomicAdd(Counter(root.unfinished).v, 1u);
+    FOR_RAYS {
+        uint k = first + uint(j) * SUBGROUP;
+        if (k < count) {
+#ifdef STREAM_ANY
+            any(push.first + k, best_primitive[j] != INVALID);
+#else
+            Hit hit = miss();
+            if (best_primitive[j] != INVALID) hit = scene_hit(best[j], best_instance[j], best_primitive[j], best_uv[j]);
+            closest(push.first + k, hit);
+#endif
+        }
+    }
+}
+
+#endif

@@ -1,0 +1,157 @@
+//! The part of a primitive that lies in a cell, as a box: what a spatial split leaves of it on either side.
+//!
+//! Conservative: rounding only ever makes the box larger, so the boxes of all parts together hold the primitive.
+
+use glam::{DVec3, Vec3};
+
+use super::Aabb;
+
+/// The triangles that a primitive consists of.
+pub trait Triangles: Sync {
+    /// Calls `see` with each triangle of a primitive; with none for a primitive that must not be cut.
+    fn each(&self, primitive: u32, see: &mut dyn FnMut([Vec3; 3]));
+}
+
+impl<F: Fn(u32, &mut dyn FnMut([Vec3; 3])) + Sync> Triangles for F {
+    fn each(&self, primitive: u32, see: &mut dyn FnMut([Vec3; 3])) {
+        self(primitive, see)
+    }
+}
+
+/// A box around the part of a primitive that lies in a cell, itself in the cell. None if there is no such part.
+pub fn clip(primitive: u32, cell: Aabb, triangles: &impl Triangles) -> Option<Aabb> {
+    let (mut min, mut max, mut reach) = (DVec3::INFINITY, DVec3::NEG_INFINITY, 0.0f64);
+    triangles.each(primitive, &mut |t| {
+        let t = t.map(Vec3::as_dvec3);
+        reach = t.iter().fold(reach, |r, p| r.max(p.abs().max_element()));
+        let mut polygon = Polygon::of(t);
+        for axis in 0..3 {
+            polygon.keep(axis, cell.min[axis] as f64, 1.0);
+            polygon.keep(axis, cell.max[axis] as f64, -1.0);
+        }
+        if polygon.overflowed {
+            (min, max) = (min.min(cell.min.as_dvec3()), max.max(cell.max.as_dvec3()));
+        }
+        for &p in polygon.points() {
+            (min, max) = (min.min(p), max.max(p));
+        }
+    });
+    if min.x > max.x {
+        return None;
+    }
+    // points of the clipped polygon are off by some 1e-15 of the triangle's largest coordinate
+    let slack = 1e-13 * reach;
+    let down = |v: DVec3| Vec3::from_array((v - slack).to_array().map(|x| (x as f32).next_down()));
+    let up = |v: DVec3| Vec3::from_array((v + slack).to_array().map(|x| (x as f32).next_up()));
+    let out = Aabb { min: down(min).max(cell.min), max: up(max).min(cell.max) };
+    out.min.cmple(out.max).all().then_some(out)
+}
+
+/// A convex polygon: a triangle clipped by six planes, which is nine corners, or a few more where rounding bends a sliver.
+struct Polygon {
+    points: [DVec3; 12],
+    count: usize,
+    /// There was no room for all corners.
+    overflowed: bool,
+}
+
+impl Polygon {
+    fn of([a, b, c]: [DVec3; 3]) -> Self {
+        let mut points = [DVec3::ZERO; 12];
+        points[..3].copy_from_slice(&[a, b, c]);
+        Self { points, count: 3, overflowed: false }
+    }
+
+    fn points(&self) -> &[DVec3] {
+        &self.points[..self.count]
+    }
+
+    /// Keeps what lies on one side of a plane (Sutherland and Hodgman 1974).
+    fn keep(&mut self, axis: usize, at: f64, sign: f64) {
+        let (old, n) = (self.points, self.count);
+        self.count = 0;
+        for k in 0..n {
+            let (p, q) = (old[k], old[(k + 1) % n]);
+            let (u, v) = ((p[axis] - at) * sign, (q[axis] - at) * sign);
+            if u >= 0.0 {
+                self.push(p);
+            }
+            if (u > 0.0 && v < 0.0) || (u < 0.0 && v > 0.0) {
+                let mut x = p + (q - p) * (u / (u - v));
+                x[axis] = at;
+                self.push(x);
+            }
+        }
+    }
+
+    fn push(&mut self, p: DVec3) {
+        match self.points.get_mut(self.count) {
+            Some(to) => {
+                *to = p;
+                self.count += 1;
+            }
+            None => self.overflowed = true,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A sequence of numbers in [0, 1).
+    fn numbers() -> impl FnMut() -> f32 {
+        let mut state = 1u64;
+        move || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 40) as f32 / (1u32 << 24) as f32
+        }
+    }
+
+    /// Whatever plane a triangle is cut by, at any scale and far from the origin, every point of it is in one of both boxes.
+    #[test]
+    fn parts_hold_the_whole() {
+        let mut next = numbers();
+        for (scale, offset) in [(1.0f32, 0.0f32), (1e-6, 0.0), (1e6, 0.0), (1e-3, 1e3), (1.0, -1e5), (1e-20, 0.0), (1e15, 0.0)]
+        {
+            for _ in 0..2000 {
+                let mut point = || Vec3::new(next(), next(), next() * 0.01) * scale + offset;
+                let t = [point(), point(), point()];
+                let whole = Aabb::of_points(&t);
+                let axis = (next() * 3.0) as usize;
+                let at = whole.min[axis] + (whole.max[axis] - whole.min[axis]) * next();
+                let (mut low, mut high) = (whole, whole);
+                low.max[axis] = at;
+                high.min[axis] = at;
+                let triangles = |_: u32, see: &mut dyn FnMut([Vec3; 3])| see(t);
+                let parts = [low, high].map(|cell| clip(0, cell, &triangles));
+                for (part, cell) in parts.iter().zip([low, high]) {
+                    assert!(part.is_none_or(|p| cell.contains(&p)), "{t:?} {cell:?}");
+                }
+                for _ in 0..20 {
+                    let (mut u, mut v) = (next() as f64, next() as f64);
+                    if u + v > 1.0 {
+                        (u, v) = (1.0 - u, 1.0 - v);
+                    }
+                    let [a, b, c] = t.map(Vec3::as_dvec3);
+                    let p = a + (b - a) * u + (c - a) * v;
+                    let inside = |b: &Aabb| {
+                        b.min.as_dvec3().cmple(p + 1e-14 * p.abs()).all() && b.max.as_dvec3().cmpge(p - 1e-14 * p.abs()).all()
+                    };
+                    assert!(parts.iter().flatten().any(inside), "{p} of {t:?} cut at {at} on axis {axis}: {parts:?}");
+                }
+            }
+        }
+    }
+
+    /// Cutting is worth it: each half of a diagonal is a quarter of the box.
+    #[test]
+    fn parts_are_tight() {
+        let triangles =
+            |_: u32, see: &mut dyn FnMut([Vec3; 3])| see([Vec3::ZERO, Vec3::new(1.0, 1.0, 0.0), Vec3::new(1.0, 1.0, 1e-3)]);
+        let cell = Aabb { min: Vec3::ZERO, max: Vec3::new(0.5, 1.0, 1.0) };
+        let part = clip(0, cell, &triangles).unwrap();
+        assert!((part.max - Vec3::new(0.5, 0.5, 0.0005)).abs().max_element() < 1e-6, "{part:?}");
+        assert_eq!(clip(0, Aabb { min: Vec3::splat(2.0), max: Vec3::splat(3.0) }, &triangles), None);
+    }
+}

@@ -1,0 +1,178 @@
+//! What `skylit bench` takes.
+
+use std::path::PathBuf;
+use std::time::Duration;
+
+use clap::{Args, Subcommand, ValueHint};
+
+use super::contestant::OWN;
+use super::streams::STREAMS;
+use crate::cli::args::{parse_radius, parse_seconds};
+use crate::cli::console::Console;
+use crate::error::{Error, Result};
+
+/// Rays of a set, unless said otherwise: an image of 1280x720.
+const DEFAULT_RAYS: u32 = 1280 * 720;
+/// The same with `--quick`: 320x180.
+const QUICK_RAYS: u32 = 320 * 180;
+/// Timed repeats, unless said otherwise.
+const DEFAULT_REPEATS: u32 = 7;
+const QUICK_REPEATS: u32 = 3;
+
+/// `skylit bench`.
+#[derive(Clone, Debug, Args)]
+pub struct BenchArgs {
+    /// What is measured
+    #[command(subcommand)]
+    pub what: What,
+}
+
+/// What is measured.
+#[derive(Clone, Debug, Subcommand)]
+pub enum What {
+    /// Rays a second of each tracer, kernel and peer, by stream of rays and scene
+    Rays(Box<BenchRaysArgs>),
+}
+
+/// `skylit bench rays`.
+#[derive(Clone, Debug, Args)]
+pub struct BenchRaysArgs {
+    /// Scenes, as `render` takes them [default: the well-known ones that are there, and built-in ones of 10^4 to 2.5*10^7
+    /// triangles]
+    pub scenes: Vec<String>,
+    /// Kernels of our own, separated by commas [default: all that the device runs; slow ones on small scenes only]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = kernel_names())]
+    pub kernels: Vec<String>,
+    /// Streams of rays, separated by commas [default: all]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = stream_names())]
+    pub streams: Vec<String>,
+    /// Timed repeats of each, in turn, after one that warms up [default: 7; 3 with --quick]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
+    pub repeats: Option<u32>,
+    /// About this many rays a set: those of an image of 16:9 [default: 921600; 57600 with --quick]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(64..=1 << 26))]
+    pub rays: Option<u32>,
+    /// Length of ambient occlusion rays, world units [default: what suits the well-known scenes, else no limit]
+    #[arg(long, value_name = "R", value_parser = parse_radius, allow_hyphen_values = true)]
+    pub ao_radius: Option<f64>,
+    /// Stop after this time with what there is
+    #[arg(long, value_name = "SECONDS", value_parser = parse_seconds, allow_hyphen_values = true)]
+    pub time_limit: Option<Duration>,
+    /// Few rays, few repeats, small scenes: a check that everything runs
+    #[arg(long)]
+    pub quick: bool,
+    /// Also compare all answers with those of the first kernel; one that rounding does not explain fails the run
+    #[arg(long)]
+    pub check: bool,
+    /// Keep alpha masks; otherwise they count as opaque, for peers do not know them
+    #[arg(long)]
+    pub alpha: bool,
+    /// Peers to run beside: a file like benches/peers.toml, or `none` [default: benches/peers.toml, where it is there]
+    #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
+    pub peers: Option<String>,
+    /// Vulkan device, by index or part of its name (`skylit doctor` lists them)
+    #[arg(long, value_name = "INDEX|NAME")]
+    pub device: Option<String>,
+    /// Run with the Vulkan validation layer (slower); a message of it fails the run
+    #[arg(long)]
+    pub validation: bool,
+    /// Print one JSON record on stdout instead of text; with =FILE, write it there besides
+    #[arg(long, value_name = "FILE", num_args = 0..=1, require_equals = true, value_hint = ValueHint::FilePath)]
+    pub json: Option<Option<PathBuf>>,
+    /// Also write a table, one row a result
+    #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
+    pub csv: Option<PathBuf>,
+    /// Also draw rates against the number of triangles
+    #[arg(long, value_name = "FILE.png", value_hint = ValueHint::FilePath)]
+    pub plot: Option<PathBuf>,
+    /// Print nothing but errors
+    #[arg(long, short)]
+    pub quiet: bool,
+}
+
+fn kernel_names() -> clap::builder::PossibleValuesParser {
+    OWN.iter().map(|o| o.name).collect::<Vec<_>>().into()
+}
+
+fn stream_names() -> clap::builder::PossibleValuesParser {
+    STREAMS.iter().map(|s| s.name).collect::<Vec<_>>().into()
+}
+
+impl BenchRaysArgs {
+    /// Where to say things.
+    pub fn console(&self) -> Console {
+        Console { json: self.json == Some(None), quiet: self.quiet }
+    }
+
+    /// File for the record.
+    pub fn json_file(&self) -> Option<&PathBuf> {
+        self.json.as_ref()?.as_ref()
+    }
+
+    /// Every file that will be written.
+    pub fn outputs(&self) -> impl Iterator<Item = &PathBuf> {
+        self.json_file().into_iter().chain(&self.csv).chain(&self.plot)
+    }
+
+    /// Checks what clap cannot.
+    pub fn check(&self) -> Result<()> {
+        match &self.plot {
+            Some(p) if p.extension().is_none_or(|e| !e.eq_ignore_ascii_case("png")) => {
+                Err(Error::Usage(format!("--plot {}: the name must end in .png", p.display())))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Timed repeats.
+    pub fn repeats(&self) -> u32 {
+        self.repeats.unwrap_or(if self.quick { QUICK_REPEATS } else { DEFAULT_REPEATS })
+    }
+
+    /// Pixels of the image whose rays are traced: 16:9, multiples of 8.
+    pub fn size(&self) -> [u32; 2] {
+        let rays = f64::from(self.rays.unwrap_or(if self.quick { QUICK_RAYS } else { DEFAULT_RAYS }));
+        let side = |x: f64| ((x / 8.0).round() as u32).max(1) * 8;
+        let width = side((rays * 16.0 / 9.0).sqrt());
+        // exactly as many as asked for where 8 divides them so
+        let height = (rays / f64::from(width)).round() as u32;
+        [width, height.max(1)]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+
+    use super::*;
+
+    #[derive(Parser)]
+    struct Alone {
+        #[command(flatten)]
+        args: BenchRaysArgs,
+    }
+
+    fn parse(extra: &[&str]) -> BenchRaysArgs {
+        Alone::try_parse_from([&["bench"], extra].concat()).unwrap().args
+    }
+
+    #[test]
+    fn sizes_are_those_of_images() {
+        assert_eq!(parse(&[]).size(), [1280, 720]);
+        assert_eq!(parse(&["--quick"]).size(), [320, 180]);
+        assert_eq!((parse(&[]).repeats(), parse(&["--quick"]).repeats()), (7, 3));
+        for n in [64u32, 1000, 10_000, 1_000_000] {
+            let [w, h] = parse(&["--rays", &n.to_string()]).size();
+            assert!((f64::from(w * h) / f64::from(n) - 1.0).abs() < 0.2, "{n}: {w}x{h}");
+        }
+    }
+
+    #[test]
+    fn json_with_and_without_a_file() {
+        assert!(parse(&["--json"]).console().json);
+        let to_file = parse(&["--json=a.json", "scene"]);
+        assert!(!to_file.console().json && to_file.json_file().is_some() && to_file.scenes == ["scene"]);
+        // a scene after --json is a scene
+        assert_eq!(parse(&["--json", "scene"]).scenes, ["scene"]);
+    }
+}

@@ -1,0 +1,21 @@
+//! `skylit bench`: how fast skylit's tracers are, beside each other and beside those of others.
+
+mod args;
+mod contestant;
+mod peer;
+mod peers_file;
+mod rays;
+mod scenes;
+mod streams;
+mod table;
+
+pub use args::BenchArgs;
+
+use crate::error::Result;
+
+/// Runs the benchmark that was asked for.
+pub fn run(args: &BenchArgs) -> Result<()> {
+    match &args.what {
+        args::What::Rays(args) => rays::run(args),
+    }
+}

@@ -1,0 +1,184 @@
+//! The file that describes other tracers, and building them. docs/benchmarks.md describes both.
+
+use std::collections::hash_map::DefaultHasher;
+use std::hash::{Hash, Hasher};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+use serde::Deserialize;
+
+use crate::error::{Error, Result};
+
+/// Where peers are described, unless said otherwise.
+pub const DEFAULT: &str = "benches/peers.toml";
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct PeersFile {
+    #[serde(default)]
+    peer: Vec<toml::Spanned<PeerSpec>>,
+}
+
+/// One tracer of others.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PeerSpec {
+    /// In tables.
+    pub name: String,
+    /// What has to be installed, said where it does not build or start.
+    #[serde(default)]
+    needs: String,
+    /// Files below the folder of the peers file whose change means building again.
+    #[serde(default)]
+    sources: Vec<PathBuf>,
+    /// Command that builds it; nothing to build when empty.
+    #[serde(default)]
+    build: Vec<String>,
+    /// Command that runs it.
+    pub run: Vec<String>,
+    /// What it is asked to trace with.
+    pub kernels: Vec<String>,
+    /// Kernels that ratios are given to.
+    #[serde(default)]
+    pub baselines: Vec<String>,
+    /// Kernels whose answers have to agree with ours under `--check`.
+    #[serde(default)]
+    pub strict: Vec<String>,
+    /// Folder of the peers file.
+    #[serde(skip)]
+    folder: PathBuf,
+}
+
+/// Reads a peers file.
+///
+/// # Errors
+/// [`Error::Input`], naming the file and the line.
+pub fn read(path: &Path) -> Result<Vec<PeerSpec>> {
+    let text = std::fs::read_to_string(path).map_err(|e| Error::read(path, &e))?;
+    let at_line = |offset: usize, message: &str| {
+        let line = 1 + text.as_bytes()[..offset.min(text.len())].iter().filter(|&&b| b == b'\n').count();
+        Error::input(path, format!("line {line}: {message}"))
+    };
+    let file: PeersFile = toml::from_str(&text).map_err(|e| at_line(e.span().map_or(0, |s| s.start), e.message()))?;
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new(".")).to_owned();
+    let mut peers: Vec<PeerSpec> = Vec::new();
+    for entry in file.peer {
+        let start = entry.span().start;
+        let peer = PeerSpec { folder: folder.clone(), ..entry.into_inner() };
+        let word = |s: &String| !s.is_empty() && !s.contains(char::is_whitespace);
+        let unknown = peer.baselines.iter().chain(&peer.strict).find(|b| !peer.kernels.contains(b));
+        let problem = if !word(&peer.name) {
+            Some(format!("`name = {:?}`: a peer's name is one word", peer.name))
+        } else if peers.iter().any(|p| p.name == peer.name) {
+            Some(format!("there are two peers called `{}`", peer.name))
+        } else if peer.run.is_empty() {
+            Some(format!("peer `{}`: `run` names no command", peer.name))
+        } else if peer.kernels.is_empty() || !peer.kernels.iter().all(word) {
+            Some(format!("peer `{}`: `kernels` must list one or more words", peer.name))
+        } else {
+            unknown.map(|b| format!("peer `{}`: `{b}` is not among its kernels", peer.name))
+        };
+        if let Some(problem) = problem {
+            return Err(at_line(start, &problem));
+        }
+        peers.push(peer);
+    }
+    Ok(peers)
+}
+
+impl PeerSpec {
+    /// What it lacks, as the end of a sentence.
+    pub fn missing(&self, why: &str) -> String {
+        let needs = if self.needs.is_empty() { String::new() } else { format!("; it needs {}", self.needs) };
+        format!("peer '{}' is missing: {why}{needs}", self.name)
+    }
+
+    /// Builds it unless an earlier run did, and returns the command that runs it.
+    ///
+    /// # Errors
+    /// A sentence that says why it cannot be built.
+    pub fn prepare(&self) -> Result<Command, String> {
+        let out = self.output()?;
+        if !self.build.is_empty() && !out.exists() {
+            self.build_to(&out)?;
+        }
+        let mut words = self.run.iter().map(|w| self.expand(w, &out));
+        let mut command = Command::new(words.next().unwrap_or_default());
+        command.args(words);
+        Ok(command)
+    }
+
+    /// The file it is built to. Its name changes with all that goes into it.
+    fn output(&self) -> Result<PathBuf, String> {
+        let mut hash = DefaultHasher::new();
+        (&self.build, &self.name).hash(&mut hash);
+        for source in &self.sources {
+            let path = self.folder.join(source);
+            std::fs::read(&path).map_err(|e| format!("{}: {e}", path.display()))?.hash(&mut hash);
+        }
+        let cache = crate::gpu::cache_folder().unwrap_or_else(std::env::temp_dir);
+        Ok(cache.join("peers").join(format!("{}-{:016x}", self.name, hash.finish())))
+    }
+
+    fn expand(&self, word: &str, out: &Path) -> String {
+        word.replace("{dir}", &self.folder.display().to_string()).replace("{out}", &out.display().to_string())
+    }
+
+    /// Beside and renamed, so that a broken-off build leaves no half program.
+    fn build_to(&self, out: &Path) -> Result<(), String> {
+        let folder = out.parent().unwrap_or(Path::new("."));
+        let cannot = |e: std::io::Error| format!("{}: {e}", folder.display());
+        std::fs::create_dir_all(folder).map_err(cannot)?;
+        let place = tempfile::tempdir_in(folder).map_err(cannot)?;
+        let unfinished = place.path().join("built");
+        let words: Vec<_> = self.build.iter().map(|w| self.expand(w, &unfinished)).collect();
+        let done = Command::new(&words[0])
+            .args(&words[1..])
+            .stdin(Stdio::null())
+            .output()
+            .map_err(|e| format!("`{}` does not run ({e})", words[0]))?;
+        if !done.status.success() {
+            let said = String::from_utf8_lossy(&done.stderr);
+            // the line that names the error; compilers say much besides
+            let line = said.lines().find(|l| l.contains("error")).or_else(|| said.lines().next()).unwrap_or("no reason given");
+            return Err(format!("building it failed ({})", line.trim()));
+        }
+        std::fs::rename(&unfinished, out).map_err(cannot)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn error_of(text: &str) -> String {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("peers.toml");
+        std::fs::write(&path, text).unwrap();
+        let e = read(&path).unwrap_err();
+        assert_eq!(e.exit_code(), 3);
+        e.to_string().replace(&path.display().to_string(), "FILE")
+    }
+
+    #[test]
+    fn our_own_file_is_sound() {
+        let peers = read(&Path::new(env!("CARGO_MANIFEST_DIR")).join(DEFAULT)).unwrap();
+        assert!(peers.iter().any(|p| p.name == "embree" && !p.baselines.is_empty()));
+        for source in peers.iter().flat_map(|p| p.sources.iter().map(|s| p.folder.join(s))) {
+            assert!(source.is_file(), "{}", source.display());
+        }
+    }
+
+    #[test]
+    fn errors_name_the_line() {
+        let peer = "[[peer]]\nname = 'a'\nrun = ['a']\nkernels = ['k']\n";
+        assert!(error_of(&format!("{peer}build = 3\n")).starts_with("FILE: line 5: "));
+        assert!(error_of("\n\n[[peer]\n").starts_with("FILE: line 3: "));
+        assert!(error_of(&format!("{peer}\n{peer}")).starts_with("FILE: line 6: there are two peers called `a`"));
+        assert!(error_of(&format!("{peer}baselines = ['x']\n")).contains("`x` is not among its kernels"));
+        assert!(error_of("[[peer]]\nname = 'a b'\nrun = ['a']\nkernels = ['k']\n").contains("one word"));
+        assert!(error_of("[[peer]]\nname = 'a'\nrun = []\nkernels = ['k']\n").contains("no command"));
+        assert!(error_of("[[peer]]\nname = 'a'\nrun = ['a']\n").contains("kernels"));
+        assert!(error_of(&format!("{peer}colour = 'red'\n")).contains("colour"));
+    }
+}

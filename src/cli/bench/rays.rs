@@ -1,0 +1,446 @@
+//! `skylit bench rays`: rates of all contestants, taken in turn, so that a machine that slows down for a while slows all of
+//! them down.
+
+use std::io::Write;
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Instant;
+
+use super::args::BenchRaysArgs;
+use super::contestant::{Contestant, Lap, OWN, Run, peer_kernel};
+use super::peer::{Peer, PeerError};
+use super::scenes::{self, Subject};
+use super::streams::{RaySets, STREAMS, Set, StreamKind};
+use super::{peers_file, table};
+use crate::cli::console::Console;
+use crate::cli::interrupt::{self, Keyboard};
+use crate::cli::progress::Progress;
+use crate::error::{Error, Result};
+use crate::gpu::Device;
+use crate::measure::agreement;
+use crate::measure::benchmark::{CheckRecord, Ratio, RayBenchmark, RunRecord, SceneRecord, StreamRecord};
+use crate::measure::plot;
+use crate::measure::stats::{Summary, paired_ratio};
+use crate::output;
+use crate::ray::Ray;
+use crate::render::rays::Mode;
+use crate::scene::flatten::FlatScene;
+
+/// Measures, shows, writes.
+pub fn run(args: &BenchRaysArgs) -> Result<()> {
+    let start = Instant::now();
+    args.check()?;
+    for path in args.outputs() {
+        output::check_writable(path)?;
+    }
+    interrupt::install();
+    let console = args.console();
+    let (scenes, notes) = scenes::choose(args);
+    // before anything that takes long: a broken peers file, a scene that does not exist
+    let specs = peer_specs(args)?;
+    scenes.iter().try_for_each(|s| scenes::check_there(s))?;
+    let device =
+        Device::open(&crate::gpu::Options { device: args.device.clone(), validation: args.validation, ..Default::default() })?;
+    let mut bench = Bench {
+        args,
+        device: &device,
+        peers: Vec::new(),
+        keyboard: Keyboard { progress: Progress::new("measuring", &console), keep_partial: false },
+        start,
+        out: RayBenchmark {
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            device: device.info.name.clone(),
+            driver: device.info.driver.clone(),
+            threads: std::thread::available_parallelism().map_or(1, usize::from),
+            repeats: args.repeats(),
+            ..Default::default()
+        },
+        laps: (0, 0),
+    };
+    for note in notes {
+        bench.note(&console, note);
+    }
+    match specs {
+        Ok(specs) => bench.start_peers(&console, &specs)?,
+        Err(note) => bench.note(&console, note),
+    }
+    console.line(&format!(
+        "{} ({}), {} threads; medians of {} repeats, in turn{}",
+        bench.out.device,
+        bench.out.driver,
+        bench.out.threads,
+        bench.out.repeats,
+        bench.out.peers.iter().map(|p| format!("; beside {p}")).collect::<String>()
+    ))?;
+    for (k, source) in scenes.iter().enumerate() {
+        if bench.is_late() {
+            bench.out.stopped_early = true;
+            bench.note(&console, format!("time limit: {} scenes left out", scenes.len() - k));
+            break;
+        }
+        // a share of the bar for every scene
+        bench.laps = (k as u64, scenes.len() as u64);
+        let record = bench.scene(&console, source)?;
+        for line in table::scene(&record, &bench.out.baselines) {
+            console.line(&line)?;
+        }
+        bench.out.scenes.push(record);
+    }
+    device.check_validation()?;
+    device.save_pipeline_cache();
+    let mut out = bench.out;
+    out.find_scaling();
+    for line in table::scaling(&out) {
+        console.line(&line)?;
+    }
+    write(args, &out)?;
+    console.record(&out)?;
+    verdict(args, &out)
+}
+
+/// The peers file's entries; or why there are none.
+fn peer_specs(args: &BenchRaysArgs) -> Result<Result<Vec<peers_file::PeerSpec>, String>> {
+    match args.peers.as_deref() {
+        Some("none") => Ok(Ok(Vec::new())),
+        Some(file) => peers_file::read(Path::new(file)).map(Ok),
+        None if Path::new(peers_file::DEFAULT).is_file() => peers_file::read(Path::new(peers_file::DEFAULT)).map(Ok),
+        None => Ok(Err(format!("no peers: {} is not here (--peers FILE names another)", peers_file::DEFAULT))),
+    }
+}
+
+fn write(args: &BenchRaysArgs, out: &RayBenchmark) -> Result<()> {
+    if let Some(path) = args.json_file() {
+        let text = serde_json::to_string_pretty(out)
+            .map_err(|e| Error::CheckFailed(format!("cannot express the result as JSON: {e}")))?;
+        output::write_atomically(path, |f| f.write_all(text.as_bytes()).and_then(|()| f.write_all(b"\n")))?;
+    }
+    if let Some(path) = &args.csv {
+        output::write_atomically(path, |f| out.write_csv(f).map_err(std::io::Error::other))?;
+    }
+    if let Some(path) = &args.plot {
+        let picture = plot::draw(out)?;
+        output::png::write_rgb(path, &picture.rgb, picture.width, picture.height)?;
+    }
+    Ok(())
+}
+
+/// With `--check`: an answer that rounding does not explain is a failure, if it is ours or of a peer that has to agree.
+fn verdict(args: &BenchRaysArgs, out: &RayBenchmark) -> Result<()> {
+    let strict = |c: &&CheckRecord| c.strict && c.unexplained > 0;
+    let checks = || out.scenes.iter().flat_map(|s| s.checks.iter().filter(strict).map(move |c| (s, c)));
+    match checks().next() {
+        Some((scene, c)) if args.check => Err(Error::CheckFailed(format!(
+            "{}, {}: {} of {} answers of '{}' differ from those of '{}' by more than rounding ({}); {} such results in all",
+            scene.scene,
+            c.stream,
+            c.unexplained,
+            c.rays,
+            c.contestant,
+            c.reference,
+            c.examples.first().map_or("no example", String::as_str),
+            checks().count()
+        ))),
+        _ => Ok(()),
+    }
+}
+
+/// A run under way.
+struct Bench<'a> {
+    args: &'a BenchRaysArgs,
+    device: &'a Arc<Device>,
+    peers: Vec<Peer>,
+    keyboard: Keyboard,
+    start: Instant,
+    out: RayBenchmark,
+    /// Scenes that are done, and all of them.
+    laps: (u64, u64),
+}
+
+/// Steps of the progress bar for one scene.
+const STEPS: u64 = 1000;
+
+impl Bench<'_> {
+    fn note(&mut self, console: &Console, text: String) {
+        console.warning(&text);
+        self.out.notes.push(text);
+    }
+
+    fn is_late(&self) -> bool {
+        self.args.time_limit.is_some_and(|limit| self.start.elapsed() >= limit)
+    }
+
+    /// Starts the peers; those that do not are named and left out.
+    fn start_peers(&mut self, console: &Console, specs: &[peers_file::PeerSpec]) -> Result<()> {
+        for spec in specs {
+            match Peer::start(spec) {
+                Ok(peer) => {
+                    self.out.baselines.extend(spec.baselines.iter().map(|k| peer_kernel(&spec.name, k)));
+                    self.out.peers.push(peer.title.clone());
+                    self.peers.push(peer);
+                }
+                Err(PeerError::Ours(e)) => return Err(e),
+                Err(PeerError::Failed(why)) => self.note(console, spec.missing(&why)),
+            }
+        }
+        Ok(())
+    }
+
+    /// Everything about one scene.
+    fn scene(&mut self, console: &Console, source: &str) -> Result<SceneRecord> {
+        let size = self.args.size();
+        let subject = scenes::load(source, self.args, f64::from(size[0]) / f64::from(size[1]))?;
+        crate::cli::warn(console, &subject.scene);
+        interrupt::check()?;
+        let flat = FlatScene::new(&subject.scene);
+        let contestants = self.contestants(console, source, &flat)?;
+        let Some(tracer) = contestants.iter().find_map(Contestant::tracer) else {
+            return Err(Error::Device(format!("{source}: none of the kernels asked for runs here; `skylit doctor` says why")));
+        };
+        let sets = RaySets::make(tracer, &subject, size, &mut self.keyboard)?;
+        let mut record = SceneRecord {
+            scene: source.to_owned(),
+            triangles: subject.scene.triangle_count(),
+            spheres: subject.scene.sphere_count(),
+            instances: subject.scene.instances.len(),
+            stored_primitives: flat.primitive_count() as u64,
+            ao_radius: Some(subject.ao_radius).filter(|r| r.is_finite()),
+            light: subject.light.to_array(),
+            builds: contestants.iter().map(|c| c.build.clone()).collect(),
+            ..Default::default()
+        };
+        // contestants that failed on the way
+        let mut failed = vec![false; contestants.len()];
+        let asked: Vec<&StreamKind> = STREAMS.iter().filter(|s| self.wants(s)).collect();
+        for set in Set::ALL {
+            if asked.iter().any(|s| s.set == set) {
+                self.give_rays(console, &contestants, &mut failed, set, sets.get(set))?;
+            }
+        }
+        for (k, stream) in asked.iter().enumerate() {
+            // one stream at least: a record of nothing says nothing
+            if self.is_late() && !(record.streams.is_empty() && self.out.scenes.is_empty()) {
+                self.out.stopped_early = true;
+                self.note(console, format!("time limit: {source}: {} streams left out", asked.len() - k));
+                break;
+            }
+            let rays = sets.get(stream.set);
+            if rays.is_empty() {
+                self.note(console, format!("{source}: {}: no rays (nothing in view that they start from)", stream.name));
+                continue;
+            }
+            let share = (k as u64 * STEPS / asked.len() as u64, (k as u64 + 1) * STEPS / asked.len() as u64);
+            record.streams.push(self.stream(console, &contestants, &mut failed, stream, rays, share)?);
+        }
+        if self.args.check {
+            self.check(console, &subject, &contestants, &mut failed, &sets, &mut record)?;
+        }
+        Ok(record)
+    }
+
+    fn wants(&self, stream: &StreamKind) -> bool {
+        self.args.streams.is_empty() || self.args.streams.iter().any(|s| s == stream.name)
+    }
+
+    /// All that take part in a scene, built.
+    fn contestants<'f>(&mut self, console: &Console, source: &str, flat: &'f FlatScene<'f>) -> Result<Vec<Contestant<'f>>> {
+        let mut out = Vec::new();
+        for own in &OWN {
+            let named = self.args.kernels.iter().any(|k| k == own.name);
+            if !named && !self.args.kernels.is_empty() {
+                continue;
+            }
+            let made = match own.takes_part(&self.device.info, flat.primitive_count(), named) {
+                Ok(()) => Contestant::own(self.device, flat, own),
+                Err(why) => Err(Error::Device(why)),
+            };
+            match made {
+                Ok(c) => out.push(c),
+                // one that is too large for the device, or not there, does not stop the others
+                Err(e @ (Error::OutOfMemory(_) | Error::Device(_))) => {
+                    self.note(console, format!("{source}: '{}' left out: {e}", own.name));
+                }
+                Err(e) => return Err(e),
+            }
+            interrupt::check()?;
+        }
+        let masked = flat.has_alpha();
+        for index in 0..self.peers.len() {
+            let spec = self.peers[index].spec.clone();
+            let mut build = || -> Result<Vec<Contestant<'f>>, PeerError> {
+                if masked {
+                    return Err(PeerError::Failed("it knows no alpha masks".into()));
+                }
+                self.peers[index].load_scene(flat)?;
+                spec.kernels.iter().map(|k| Contestant::peer(&mut self.peers, index, k, flat)).collect()
+            };
+            match build() {
+                Ok(list) => out.extend(list),
+                Err(PeerError::Ours(e)) => return Err(e),
+                Err(PeerError::Failed(why)) => self.note(console, format!("{source}: peer '{}' left out: {why}", spec.name)),
+            }
+        }
+        Ok(out)
+    }
+
+    /// Gives a set of rays to every peer that takes part.
+    fn give_rays(
+        &mut self,
+        console: &Console,
+        contestants: &[Contestant],
+        failed: &mut [bool],
+        set: Set,
+        rays: &[Ray],
+    ) -> Result<()> {
+        for index in 0..self.peers.len() {
+            if !contestants.iter().zip(&*failed).any(|(c, f)| !f && c.peer_index() == Some(index)) {
+                continue;
+            }
+            match self.peers[index].load_rays(set.name(), rays) {
+                Ok(()) => {}
+                Err(PeerError::Ours(e)) => return Err(e),
+                Err(PeerError::Failed(why)) => {
+                    self.note(console, format!("peer '{}' left out: {why}", self.peers[index].spec.name));
+                    contestants.iter().zip(&mut *failed).for_each(|(c, f)| *f |= c.peer_index() == Some(index));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Rounds over one stream: each contestant once a round.
+    fn stream(
+        &mut self,
+        console: &Console,
+        contestants: &[Contestant],
+        failed: &mut [bool],
+        stream: &StreamKind,
+        rays: &[Ray],
+        share: (u64, u64),
+    ) -> Result<StreamRecord> {
+        let mut runs: Vec<Run> = Vec::new();
+        for c in contestants {
+            runs.push(c.prepare(stream.set, rays, stream.mode)?);
+        }
+        let mut laps: Vec<Vec<Lap>> = contestants.iter().map(|_| Vec::new()).collect();
+        let repeats = self.args.repeats();
+        for round in 0..=repeats {
+            for (k, run) in runs.iter_mut().enumerate() {
+                if failed[k] {
+                    continue;
+                }
+                match run.lap(&mut self.peers, &mut self.keyboard) {
+                    // the first round compiles, finds launch sizes and fills caches
+                    Ok(lap) if round > 0 => laps[k].push(lap),
+                    Ok(_) => {}
+                    Err(PeerError::Ours(e)) => return Err(e),
+                    Err(PeerError::Failed(why)) => {
+                        failed[k] = true;
+                        self.note(console, format!("'{}' left out from here: {why}", contestants[k].name));
+                    }
+                }
+            }
+            interrupt::check()?;
+            let done = share.0 + (share.1 - share.0) * u64::from(round) / u64::from(repeats);
+            self.keyboard.progress.set(self.laps.0 * STEPS + done, self.laps.1 * STEPS);
+            if round > 0 && self.is_late() {
+                self.out.stopped_early |= round < repeats;
+                break;
+            }
+        }
+        let mut results = Vec::new();
+        for (k, contestant) in contestants.iter().enumerate() {
+            if failed[k] || laps[k].is_empty() {
+                continue;
+            }
+            let count = runs[k].rays as f64;
+            let seconds: Vec<f64> = laps[k].iter().map(|l| l.device).collect();
+            let rates = |s: &[f64]| Summary::of(&s.iter().map(|s| count / s / 1e6).collect::<Vec<_>>());
+            let walls: Option<Vec<f64>> = laps[k].iter().map(|l| l.wall).collect();
+            let Some(device) = rates(&seconds) else { continue };
+            results.push(RunRecord {
+                contestant: contestant.name.clone(),
+                rays: runs[k].rays,
+                hit_share: runs[k].hit_count()? as f64 / count,
+                device,
+                wall: walls.and_then(|w| rates(&w)),
+                seconds,
+                ratios: Vec::new(),
+                nodes_per_ray: None,
+                primitives_per_ray: None,
+            });
+        }
+        give_ratios(&mut results, &self.out.baselines);
+        Ok(StreamRecord { stream: stream.name.to_owned(), rays: rays.len(), results })
+    }
+
+    /// All answers against those of the first of our own.
+    fn check(
+        &mut self,
+        console: &Console,
+        subject: &Subject,
+        contestants: &[Contestant],
+        failed: &mut [bool],
+        sets: &RaySets,
+        record: &mut SceneRecord,
+    ) -> Result<()> {
+        let Some((first, reference)) = contestants.iter().enumerate().find(|(_, c)| c.tracer().is_some()) else {
+            return Ok(());
+        };
+        for stream in STREAMS.iter().filter(|s| record.streams.iter().any(|r| r.stream == s.name)) {
+            let rays = sets.get(stream.set);
+            let ours = sure(reference.hits(&mut self.peers, rays, stream.mode, &mut self.keyboard))?;
+            for (k, contestant) in contestants.iter().enumerate() {
+                if k == first || failed[k] {
+                    continue;
+                }
+                let mut compare = || {
+                    let hits = contestant.hits(&mut self.peers, rays, stream.mode, &mut self.keyboard)?;
+                    if stream.mode == Mode::Closest {
+                        return Ok(agreement::compare_closest(&subject.scene, rays, &hits, &ours));
+                    }
+                    agreement::compare_any(&subject.scene, rays, &hits, &ours, |some| {
+                        let mut named = contestant.hits(&mut self.peers, some, Mode::Closest, &mut self.keyboard)?;
+                        named.extend(reference.hits(&mut self.peers, some, Mode::Closest, &mut self.keyboard)?);
+                        Ok(named)
+                    })
+                };
+                match compare() {
+                    Ok(report) => {
+                        let check =
+                            CheckRecord::new(&contestant.name, &reference.name, stream.name, &report, contestant.strict);
+                        record.checks.push(check);
+                    }
+                    Err(PeerError::Ours(e)) => return Err(e),
+                    Err(PeerError::Failed(why)) => {
+                        failed[k] = true;
+                        self.note(console, format!("'{}' left out of the check from here: {why}", contestant.name));
+                    }
+                }
+                interrupt::check()?;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Our own contestants fail with errors of ours only.
+fn sure<T>(result: Result<T, PeerError>) -> Result<T> {
+    result.map_err(|e| match e {
+        PeerError::Ours(e) => e,
+        PeerError::Failed(why) => Error::CheckFailed(why),
+    })
+}
+
+/// Ratios to each baseline that ran, round by round.
+fn give_ratios(results: &mut [RunRecord], baselines: &[String]) {
+    for name in baselines {
+        let Some(base) = results.iter().find(|r| &r.contestant == name).map(|r| (r.seconds.clone(), r.rays as f64)) else {
+            continue;
+        };
+        for run in results.iter_mut() {
+            if let Some(ratio) = paired_ratio(&run.seconds, run.rays as f64, &base.0, base.1) {
+                run.ratios.push(Ratio { to: name.clone(), ratio });
+            }
+        }
+    }
+}

@@ -1,0 +1,241 @@
+//! Two tracers' answers to the same rays, held against each other without an oracle over the whole scene.
+//!
+//! Where the answers differ, a double-precision oracle over only those primitives that either of them names decides: the
+//! difference is a tie when rounding allows both answers ([`super::parity`]), unexplained otherwise. What both miss is not
+//! seen; `tests/parity.rs` has that. It is what fits a benchmark: scenes of 10^7 triangles, differences of a few rays.
+
+use std::collections::{HashMap, HashSet};
+
+use super::parity::{self, ParityReport};
+use crate::oracle::Oracle;
+use crate::oracle::rounding::Rounding;
+use crate::ray::{Hit, Ray};
+use crate::scene::{Geometry, Mesh, Scene, TriangleMesh};
+
+/// Same primitive and a parameter within this many units of the last place: agreement that needs no judge. It is well below
+/// what [`Rounding`] allows.
+const SAME_T_ULPS: f32 = 4.0;
+
+/// Do two closest hits say the same?
+fn same(a: &Hit, b: &Hit) -> bool {
+    match (a.is_hit(), b.is_hit()) {
+        (false, false) => !a.t.is_nan() && !b.t.is_nan(),
+        (true, true) => {
+            a.instance == b.instance
+                && a.primitive == b.primitive
+                && (a.t - b.t).abs() <= SAME_T_ULPS * f32::EPSILON * a.t.abs().max(b.t.abs())
+        }
+        _ => false,
+    }
+}
+
+/// Compares closest hits; `hits` are judged against `reference`. Rays are relative to `scene.origin()`. Surplus entries of
+/// the longer slices are ignored.
+pub fn compare_closest(scene: &Scene, rays: &[Ray], hits: &[Hit], reference: &[Hit]) -> ParityReport {
+    let n = rays.len().min(hits.len()).min(reference.len());
+    let differing: Vec<usize> = (0..n).filter(|&i| !same(&hits[i], &reference[i])).collect();
+    let mut report = agreeing(n, &differing, reference);
+    report.worst_dt = (0..n)
+        .filter(|&i| hits[i].is_hit() && same(&hits[i], &reference[i]) && reference[i].t > 0.0)
+        .map(|i| f64::from((hits[i].t - reference[i].t).abs() / reference[i].t))
+        .fold(0.0, f64::max);
+    if differing.is_empty() {
+        return report;
+    }
+    let pick = |from: &[Hit]| differing.iter().map(|&i| from[i]).collect::<Vec<_>>();
+    let (mut a, mut b) = (pick(hits), pick(reference));
+    let rays: Vec<Ray> = differing.iter().map(|&i| rays[i]).collect();
+    let small = Reduced::new(scene, a.iter().chain(&b));
+    a.iter_mut().chain(&mut b).for_each(|h| small.rename(h));
+    let judged = parity::judge_pair(&small.oracle, &rays, &a, &b, Rounding::default());
+    report = report.merge(restore(judged, &differing, &small));
+    report
+}
+
+/// Compares answers to "is anything in the way?". `named` are closest hits of the rays in question, from either tracer or
+/// both: called with the indices of the rays that differ, it says which primitives could decide.
+///
+/// # Errors
+/// Those of `named`.
+pub fn compare_any<E>(
+    scene: &Scene,
+    rays: &[Ray],
+    hits: &[Hit],
+    reference: &[Hit],
+    named: impl FnOnce(&[Ray]) -> Result<Vec<Hit>, E>,
+) -> Result<ParityReport, E> {
+    let n = rays.len().min(hits.len()).min(reference.len());
+    let differing: Vec<usize> = (0..n).filter(|&i| hits[i].is_hit() != reference[i].is_hit()).collect();
+    let mut report = agreeing(n, &differing, reference);
+    if differing.is_empty() {
+        return Ok(report);
+    }
+    let rays: Vec<Ray> = differing.iter().map(|&i| rays[i]).collect();
+    let small = Reduced::new(scene, named(&rays)?.iter());
+    let pick = |from: &[Hit]| differing.iter().map(|&i| from[i].is_hit()).collect::<Vec<_>>();
+    let (a, b) = (pick(hits), pick(reference));
+    // the answers differ, so one of them is not the oracle's own: a tie needs both to be admissible
+    let truth = small.oracle.trace_any(&rays);
+    let of_a = parity::judge_any(&small.oracle, &rays, &a, &truth, Rounding::default());
+    let of_b = parity::judge_any(&small.oracle, &rays, &b, &truth, Rounding::default());
+    report.unexplained += of_a.unexplained + of_b.unexplained;
+    report.ties += differing.len() as u64 - of_a.unexplained - of_b.unexplained;
+    report.rays += differing.len() as u64;
+    report.hits += b.iter().filter(|&&h| h).count() as u64;
+    report.examples = restore(of_a.merge(of_b), &differing, &small).examples;
+    Ok(report)
+}
+
+/// The report of the rays that do not differ.
+fn agreeing(n: usize, differing: &[usize], reference: &[Hit]) -> ParityReport {
+    let hits =
+        reference[..n].iter().filter(|h| h.is_hit()).count() - differing.iter().filter(|&&i| reference[i].is_hit()).count();
+    let rays = (n - differing.len()) as u64;
+    ParityReport { rays, hits: hits as u64, agree: rays, ..Default::default() }
+}
+
+/// Indices and ids of the examples as they are in the whole set and scene.
+fn restore(mut report: ParityReport, differing: &[usize], small: &Reduced) -> ParityReport {
+    for e in &mut report.examples {
+        e.index = differing.get(e.index).copied().unwrap_or(e.index);
+        e.answer.primitive = small.original(e.answer.instance, e.answer.primitive);
+        e.reference.primitive = small.original(e.reference.instance, e.reference.primitive);
+    }
+    report
+}
+
+/// An oracle over the named primitives only.
+struct Reduced {
+    oracle: Oracle,
+    /// Mesh of each instance.
+    meshes: Vec<usize>,
+    /// Of each mesh: which primitives are left, in order.
+    kept: HashMap<usize, Vec<u32>>,
+}
+
+impl Reduced {
+    fn new<'a>(scene: &Scene, hits: impl Iterator<Item = &'a Hit>) -> Self {
+        let meshes: Vec<usize> = scene.instances.iter().map(|i| i.mesh).collect();
+        let mut sets: HashMap<usize, HashSet<u32>> = HashMap::new();
+        for h in hits {
+            if let Some(&mesh) = meshes.get(h.instance as usize) {
+                sets.entry(mesh).or_default().insert(h.primitive);
+            }
+        }
+        let kept: HashMap<usize, Vec<u32>> = sets
+            .into_iter()
+            .map(|(mesh, set)| {
+                let count = scene.meshes[mesh].geometry.primitive_count();
+                let mut list: Vec<u32> = set.into_iter().filter(|&p| (p as usize) < count).collect();
+                list.sort_unstable();
+                (mesh, list)
+            })
+            .collect();
+        let mut small = Scene {
+            instances: scene.instances.clone(),
+            materials: scene.materials.clone(),
+            textures: scene.textures.clone(),
+            ..Scene::default()
+        };
+        small.meshes = (0..scene.meshes.len())
+            .map(|k| {
+                let mesh = &scene.meshes[k];
+                let list = kept.get(&k).map_or(&[][..], Vec::as_slice);
+                let geometry = match &mesh.geometry {
+                    Geometry::Spheres(s) => Geometry::Spheres(list.iter().map(|&p| s[p as usize]).collect()),
+                    // not even its vertices
+                    Geometry::Triangles(_) if list.is_empty() => Geometry::Triangles(TriangleMesh::default()),
+                    Geometry::Triangles(t) => {
+                        let indices = list.iter().map(|&p| t.indices[p as usize]).collect();
+                        Geometry::Triangles(TriangleMesh { indices, ..t.clone() })
+                    }
+                };
+                Mesh { name: String::new(), geometry, material: mesh.material }
+            })
+            .collect();
+        Self { oracle: Oracle::new(&small, scene.origin()), meshes, kept }
+    }
+
+    /// A hit of the whole scene in the numbering of the reduced one.
+    fn rename(&self, hit: &mut Hit) {
+        let list = self.meshes.get(hit.instance as usize).and_then(|m| self.kept.get(m));
+        if let Some(k) = list.and_then(|l| l.binary_search(&hit.primitive).ok()) {
+            hit.primitive = k as u32;
+        }
+    }
+
+    fn original(&self, instance: u32, primitive: u32) -> u32 {
+        let list = self.meshes.get(instance as usize).and_then(|m| self.kept.get(m));
+        list.and_then(|l| l.get(primitive as usize)).copied().unwrap_or(primitive)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::measure::ray_sets;
+    use crate::scene::builtin::by_name;
+
+    fn set(name: &str) -> (Scene, Vec<Ray>, Vec<Hit>) {
+        let scene = by_name(name).unwrap();
+        let oracle = Oracle::new(&scene, scene.origin());
+        let rays = ray_sets::camera_rays(&oracle, &scene.cameras[0], [64, 48], 3);
+        let hits = oracle.trace_closest(&rays).iter().map(|h| h.to_hit()).collect();
+        (scene, rays, hits)
+    }
+
+    #[test]
+    fn equal_answers_agree() {
+        for name in ["stairs", "spheres:50"] {
+            let (scene, rays, hits) = set(name);
+            let r = compare_closest(&scene, &rays, &hits, &hits);
+            assert_eq!((r.agree, r.ties, r.unexplained, r.rays), (rays.len() as u64, 0, 0, rays.len() as u64));
+            assert!(r.hits > 0);
+        }
+    }
+
+    #[test]
+    fn wrong_answers_are_found_and_named() {
+        let (scene, rays, hits) = set("stairs");
+        let met: Vec<usize> = (0..hits.len()).filter(|&i| hits[i].is_hit()).collect();
+        let mut wrong = hits.clone();
+        // a miss, another place, another primitive
+        wrong[met[10]] = Hit::MISS;
+        wrong[met[200]].t *= 1.01;
+        wrong[met[400]] = hits[met[900]];
+        let r = compare_closest(&scene, &rays, &wrong, &hits);
+        assert_eq!((r.unexplained, r.ties), (3, 0), "{r}");
+        let mut found: Vec<usize> = r.examples.iter().map(|e| e.index).collect();
+        found.sort_unstable();
+        assert_eq!(found, [met[10], met[200], met[400]]);
+        let moved = r.examples.iter().find(|e| e.index == met[200]).unwrap();
+        assert_eq!(moved.answer.primitive, hits[met[200]].primitive);
+    }
+
+    #[test]
+    fn rounding_is_a_tie_or_agreement() {
+        let (scene, rays, hits) = set("stairs");
+        let mut other = hits.clone();
+        other.iter_mut().filter(|h| h.is_hit()).for_each(|h| h.t *= 1.0 + 8.0 * f32::EPSILON);
+        let r = compare_closest(&scene, &rays, &other, &hits);
+        assert_eq!(r.unexplained, 0, "{r}");
+    }
+
+    #[test]
+    fn occlusion_that_differs_is_judged() {
+        let (scene, rays, closest) = set("stairs");
+        let any: Vec<Hit> = closest.iter().map(|h| if h.is_hit() { Hit { t: 0.0, ..Hit::MISS } } else { Hit::MISS }).collect();
+        let k = any.iter().position(Hit::is_hit).unwrap();
+        let mut wrong = any.clone();
+        wrong[k] = Hit::MISS;
+        let asked = |r: &[Ray]| {
+            assert_eq!(r, [rays[k]]);
+            Ok::<_, ()>(vec![closest[k]])
+        };
+        let r = compare_any(&scene, &rays, &wrong, &any, asked).unwrap();
+        assert_eq!((r.unexplained, r.ties, r.agree), (1, 0, rays.len() as u64 - 1));
+        assert_eq!(r.examples[0].index, k);
+        let r = compare_any(&scene, &rays, &any, &any, |_| Err("nothing differs, so nothing is asked")).unwrap();
+        assert_eq!(r.agree, rays.len() as u64);
+    }
+}

@@ -1,0 +1,361 @@
+//! What a benchmark of ray tracing found: records for programs, and the rows of its table.
+//!
+//! Rates are Mrays/s (10^6 rays a second). A *contestant* is a tracer with a kernel of ours, or a kernel of a peer.
+
+use std::io::Write;
+
+use serde::Serialize;
+
+use super::parity::ParityReport;
+use super::stats::{LogScaling, Summary};
+
+/// A whole run.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct RayBenchmark {
+    /// Of skylit.
+    pub version: String,
+    /// Vulkan device.
+    pub device: String,
+    /// Its driver.
+    pub driver: String,
+    /// Logical processors of the host.
+    pub threads: usize,
+    /// Timed repeats that were asked for, after one that warms up.
+    pub repeats: u32,
+    /// Peers that ran, as they introduce themselves.
+    pub peers: Vec<String>,
+    /// Contestants that ratios are given to.
+    pub baselines: Vec<String>,
+    /// What was measured.
+    pub scenes: Vec<SceneRecord>,
+    /// How rates fall with size, over families of scenes.
+    pub scaling: Vec<ScalingRecord>,
+    /// The time limit ended it.
+    pub stopped_early: bool,
+    /// What was left out, and why.
+    pub notes: Vec<String>,
+}
+
+/// One scene.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct SceneRecord {
+    /// As on the command line.
+    pub scene: String,
+    /// Over all instances.
+    pub triangles: u64,
+    /// Over all instances.
+    pub spheres: u64,
+    /// Placed meshes.
+    pub instances: usize,
+    /// Triangles and spheres that are stored; less than what is placed where meshes are placed several times.
+    pub stored_primitives: u64,
+    /// Length of the ambient occlusion rays, world units; `None` for no limit.
+    pub ao_radius: Option<f64>,
+    /// Light of the shadow rays, world coordinates.
+    pub light: [f64; 3],
+    /// What building took.
+    pub builds: Vec<BuildRecord>,
+    /// What tracing took.
+    pub streams: Vec<StreamRecord>,
+    /// Who answered otherwise, where that was asked.
+    pub checks: Vec<CheckRecord>,
+}
+
+impl SceneRecord {
+    /// Triangles and spheres over all instances.
+    pub fn primitives(&self) -> u64 {
+        self.triangles + self.spheres
+    }
+}
+
+/// Building for one contestant.
+#[derive(Clone, Debug, Serialize)]
+pub struct BuildRecord {
+    /// Who.
+    pub contestant: String,
+    /// Seconds to build the hierarchy.
+    pub build_seconds: f64,
+    /// Seconds to write the scene into device memory; `None` for peers.
+    pub upload_seconds: Option<f64>,
+    /// Bytes of nodes and primitives by stored primitive.
+    pub bytes_per_primitive: f64,
+    /// Cost of the hierarchy by the surface area heuristic, where it is known.
+    pub sah_cost: Option<f64>,
+}
+
+/// One stream of rays.
+#[derive(Clone, Debug, Serialize)]
+pub struct StreamRecord {
+    /// Name.
+    pub stream: String,
+    /// Rays in the whole set.
+    pub rays: usize,
+    /// Results, in the order of the contestants.
+    pub results: Vec<RunRecord>,
+}
+
+/// One contestant on one stream.
+#[derive(Clone, Debug, Serialize)]
+pub struct RunRecord {
+    /// Who.
+    pub contestant: String,
+    /// Rays of a repeat; fewer than the set's for slow tracers, which get a sample of it.
+    pub rays: usize,
+    /// Share of these that met something.
+    pub hit_share: f64,
+    /// Mrays/s by the time on the device; a peer has its own clock, which leaves out what lies between it and us.
+    pub device: Summary,
+    /// Mrays/s by the clock, submission included; `None` for peers.
+    pub wall: Option<Summary>,
+    /// Seconds of each repeat on the device, in the order of the rounds.
+    pub seconds: Vec<f64>,
+    /// Rate relative to each baseline, the median of the rounds' quotients, by device time.
+    pub ratios: Vec<Ratio>,
+    /// Nodes visited per ray, where that is counted.
+    pub nodes_per_ray: Option<f64>,
+    /// Primitives tested per ray, where that is counted.
+    pub primitives_per_ray: Option<f64>,
+}
+
+/// How many times as fast as a baseline.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Ratio {
+    /// The baseline.
+    pub to: String,
+    /// Rate over its rate.
+    pub ratio: f64,
+}
+
+/// One contestant's answers against the first one's.
+#[derive(Clone, Debug, Serialize)]
+pub struct CheckRecord {
+    /// Who.
+    pub contestant: String,
+    /// Against whom.
+    pub reference: String,
+    /// Name of the stream.
+    pub stream: String,
+    /// Rays compared.
+    pub rays: u64,
+    /// Same answer.
+    pub agree: u64,
+    /// Another answer that rounding allows.
+    pub ties: u64,
+    /// Any other.
+    pub unexplained: u64,
+    /// Unexplained answers of this contestant are a failure.
+    pub strict: bool,
+    /// The first of the unexplained.
+    pub examples: Vec<String>,
+}
+
+impl CheckRecord {
+    /// From a report.
+    pub fn new(contestant: &str, reference: &str, stream: &str, report: &ParityReport, strict: bool) -> Self {
+        // its text: a summary and a line for each example
+        let examples = report.to_string().lines().skip(1).map(|l| l.trim().to_owned()).collect();
+        Self {
+            contestant: contestant.to_owned(),
+            reference: reference.to_owned(),
+            stream: stream.to_owned(),
+            rays: report.rays,
+            agree: report.agree,
+            ties: report.ties,
+            unexplained: report.unexplained,
+            strict,
+            examples,
+        }
+    }
+}
+
+/// How one contestant's rate on one stream falls over a family of scenes.
+#[derive(Clone, Debug, Serialize)]
+pub struct ScalingRecord {
+    /// What the scenes have in common: the name before the number.
+    pub family: String,
+    /// Name of the stream.
+    pub stream: String,
+    /// Who.
+    pub contestant: String,
+    /// (primitives, median Mrays/s), by size.
+    pub points: Vec<(u64, f64)>,
+    /// The judgement.
+    pub law: LogScaling,
+    /// Falls no faster than log n.
+    pub holds: bool,
+}
+
+/// The family of `builtin:NAME:N`: its name.
+pub fn family(scene: &str) -> Option<&str> {
+    let (family, number) = scene.rsplit_once(':')?;
+    number.parse::<u64>().ok().map(|_| family)
+}
+
+impl RayBenchmark {
+    /// All (family, stream, contestant) with two sizes or more.
+    pub fn find_scaling(&mut self) {
+        let mut found: Vec<ScalingRecord> = Vec::new();
+        let mut keys: Vec<(String, String, String)> = Vec::new();
+        for (scene, stream, run) in self.rows() {
+            let Some(family) = family(&scene.scene) else { continue };
+            let key = (family.to_owned(), stream.stream.clone(), run.contestant.clone());
+            if !keys.contains(&key) {
+                keys.push(key);
+            }
+        }
+        for (name, stream, contestant) in keys {
+            let mut points: Vec<_> = self
+                .rows()
+                .filter(|(s, t, r)| family(&s.scene) == Some(&name) && t.stream == stream && r.contestant == contestant)
+                .map(|(s, _, r)| (s.primitives(), r.device.median))
+                .collect();
+            points.sort_by_key(|p| p.0);
+            if let Some(law) = LogScaling::of(&points) {
+                found.push(ScalingRecord { family: name, stream, contestant, points, law, holds: law.holds() });
+            }
+        }
+        self.scaling = found;
+    }
+
+    /// Every result with where it belongs.
+    pub fn rows(&self) -> impl Iterator<Item = (&SceneRecord, &StreamRecord, &RunRecord)> {
+        self.scenes.iter().flat_map(|s| s.streams.iter().flat_map(move |t| t.results.iter().map(move |r| (s, t, r))))
+    }
+
+    /// Writes one row a result. Numbers that are not known are empty. A ratio column for each baseline.
+    pub fn write_csv(&self, out: impl Write) -> csv::Result<()> {
+        let mut csv = csv::Writer::from_writer(out);
+        let ratios = self.baselines.iter().map(|b| format!("ratio to {b}"));
+        let head = CSV_COLUMNS.iter().map(|c| (*c).to_owned()).chain(ratios);
+        csv.write_record(head)?;
+        let number = |x: f64| format!("{x:.6}");
+        let maybe = |x: Option<f64>| x.map_or_else(String::new, number);
+        for (scene, stream, run) in self.rows() {
+            let build = scene.builds.iter().find(|b| b.contestant == run.contestant);
+            let mut row = vec![
+                scene.scene.clone(),
+                scene.primitives().to_string(),
+                scene.stored_primitives.to_string(),
+                stream.stream.clone(),
+                run.contestant.clone(),
+                run.rays.to_string(),
+                number(run.hit_share),
+                number(run.device.median),
+                number(run.device.min),
+                number(run.device.max),
+                maybe(run.wall.map(|w| w.median)),
+                maybe(run.wall.map(|w| w.min)),
+                maybe(run.wall.map(|w| w.max)),
+                run.seconds.len().to_string(),
+                maybe(build.map(|b| b.build_seconds)),
+                maybe(build.map(|b| b.bytes_per_primitive)),
+                maybe(build.and_then(|b| b.sah_cost)),
+                maybe(run.nodes_per_ray),
+                maybe(run.primitives_per_ray),
+            ];
+            row.extend(self.baselines.iter().map(|b| maybe(run.ratio_to(b))));
+            csv.write_record(row)?;
+        }
+        csv.flush()?;
+        Ok(())
+    }
+}
+
+const CSV_COLUMNS: [&str; 19] = [
+    "scene",
+    "primitives",
+    "stored primitives",
+    "stream",
+    "contestant",
+    "rays",
+    "hit share",
+    "Mrays/s",
+    "Mrays/s min",
+    "Mrays/s max",
+    "Mrays/s wall",
+    "Mrays/s wall min",
+    "Mrays/s wall max",
+    "repeats",
+    "build seconds",
+    "bytes per primitive",
+    "SAH cost",
+    "nodes per ray",
+    "primitives per ray",
+];
+
+impl RunRecord {
+    /// Rate relative to that of a baseline.
+    pub fn ratio_to(&self, baseline: &str) -> Option<f64> {
+        self.ratios.iter().find(|r| r.to == baseline).map(|r| r.ratio)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn run(contestant: &str, rate: f64) -> RunRecord {
+        let flat = Summary { median: rate, min: rate, max: rate };
+        RunRecord {
+            contestant: contestant.into(),
+            rays: 100,
+            hit_share: 0.5,
+            device: flat,
+            wall: None,
+            seconds: vec![1.0],
+            ratios: vec![Ratio { to: "peer, one".into(), ratio: 0.5 }],
+            nodes_per_ray: None,
+            primitives_per_ray: Some(2.0),
+        }
+    }
+
+    fn benchmark() -> RayBenchmark {
+        let scene = |name: &str, triangles, rate| SceneRecord {
+            scene: name.into(),
+            triangles,
+            streams: vec![StreamRecord { stream: "ao-any".into(), rays: 100, results: vec![run("wide", rate), run("b", 1.0)] }],
+            ..Default::default()
+        };
+        RayBenchmark {
+            baselines: vec!["peer, one".into()],
+            scenes: vec![
+                scene("builtin:terrain:1000", 1000, 9.0),
+                scene("a.glb", 50, 3.0),
+                scene("builtin:terrain:10", 10, 10.0),
+            ],
+            ..Default::default()
+        }
+    }
+
+    #[test]
+    fn families_by_name_and_number() {
+        assert_eq!(family("builtin:terrain:1000"), Some("builtin:terrain"));
+        assert_eq!(family("builtin:terrain"), None);
+        assert_eq!(family("scene.glb"), None);
+    }
+
+    #[test]
+    fn scaling_of_each_family_stream_and_contestant() {
+        let mut b = benchmark();
+        b.find_scaling();
+        assert_eq!(b.scaling.len(), 2);
+        let s = &b.scaling[0];
+        assert_eq!((s.contestant.as_str(), s.points.as_slice()), ("wide", &[(10, 10.0), (1000, 9.0)][..]));
+        assert!(s.holds);
+    }
+
+    #[test]
+    fn csv_has_a_row_a_result_and_quotes_what_needs_it() {
+        let mut text = Vec::new();
+        benchmark().write_csv(&mut text).unwrap();
+        let mut reader = csv::Reader::from_reader(text.as_slice());
+        let head = reader.headers().unwrap().clone();
+        assert_eq!(head.iter().next_back(), Some("ratio to peer, one"));
+        let rows: Vec<_> = reader.records().map(|r| r.unwrap()).collect();
+        assert_eq!(rows.len(), 6);
+        let at = |row: &csv::StringRecord, name: &str| row[head.iter().position(|h| h == name).unwrap()].to_owned();
+        assert_eq!(at(&rows[0], "Mrays/s"), "9.000000");
+        assert_eq!(at(&rows[0], "nodes per ray"), "");
+        assert_eq!(at(&rows[0], "ratio to peer, one"), "0.500000");
+    }
+}

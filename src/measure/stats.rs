@@ -1,0 +1,129 @@
+//! Numbers about repeated measurements: what a benchmark says of several timings of one thing.
+
+use serde::Serialize;
+
+/// Median and extremes of some values. The unit is theirs.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Summary {
+    /// Middle value; the mean of the two in the middle of an even number.
+    pub median: f64,
+    /// Least.
+    pub min: f64,
+    /// Greatest.
+    pub max: f64,
+}
+
+impl Summary {
+    /// Of some values; `None` for no values.
+    pub fn of(values: &[f64]) -> Option<Self> {
+        let mut sorted = values.to_vec();
+        sorted.sort_by(f64::total_cmp);
+        let (min, max) = (*sorted.first()?, *sorted.last()?);
+        Some(Self { median: middle(&sorted), min, max })
+    }
+}
+
+/// Median of some values; `None` for no values.
+pub fn median(values: &[f64]) -> Option<f64> {
+    Summary::of(values).map(|s| s.median)
+}
+
+fn middle(sorted: &[f64]) -> f64 {
+    let n = sorted.len();
+    if n % 2 == 1 { sorted[n / 2] } else { 0.5 * (sorted[n / 2 - 1] + sorted[n / 2]) }
+}
+
+/// How much faster `seconds` are than `baseline`, entry `k` of both taken in the same round: the median of the rounds'
+/// quotients. A machine that slows down for a while slows both down, and the quotient stays. `None` when there is no round
+/// that both took part in. `work` and `baseline_work` are what a repeat did, in the same unit.
+pub fn paired_ratio(seconds: &[f64], work: f64, baseline: &[f64], baseline_work: f64) -> Option<f64> {
+    let ratios: Vec<f64> =
+        seconds.iter().zip(baseline).map(|(s, b)| (work / s) / (baseline_work / b)).filter(|r| r.is_finite()).collect();
+    median(&ratios)
+}
+
+/// Does a rate fall faster than the logarithm of the size allows?
+///
+/// A tracer that visits a constant number of nodes a level has rate proportional to 1 / log n. From points (n, rate), in any
+/// order, it takes `rate(n) * ln(n)`, relative to that of the smallest `n`: at least 1 where the rate falls no faster.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct LogScaling {
+    /// The least of these relative products.
+    pub worst: f64,
+    /// The size at which it occurs.
+    pub worst_at: u64,
+    /// Slope of log(rate) against log(n), by least squares: the rate falls as n to this power.
+    pub exponent: f64,
+}
+
+impl LogScaling {
+    /// What counts as falling no faster than log n: rates vary by about this much from run to run.
+    pub const TOLERANCE: f64 = 0.1;
+
+    /// Of at least two points of different size, sizes above 1 and rates above 0; `None` otherwise.
+    pub fn of(points: &[(u64, f64)]) -> Option<Self> {
+        let mut sorted = points.to_vec();
+        sorted.sort_by_key(|p| p.0);
+        let &(n0, r0) = sorted.first()?;
+        if n0 < 2 || sorted.last()?.0 == n0 || sorted.iter().any(|p| !(p.1 > 0.0 && p.1.is_finite())) {
+            return None;
+        }
+        let relative = |&(n, r): &(u64, f64)| (r * (n as f64).ln()) / (r0 * (n0 as f64).ln());
+        let worst = sorted[1..].iter().min_by(|a, b| relative(a).total_cmp(&relative(b)))?;
+        let logs: Vec<_> = sorted.iter().map(|&(n, r)| ((n as f64).ln(), r.ln())).collect();
+        let mean = |f: fn(&(f64, f64)) -> f64| logs.iter().map(f).sum::<f64>() / logs.len() as f64;
+        let (mx, my) = (mean(|p| p.0), mean(|p| p.1));
+        let covariance: f64 = logs.iter().map(|p| (p.0 - mx) * (p.1 - my)).sum();
+        let variance: f64 = logs.iter().map(|p| (p.0 - mx).powi(2)).sum();
+        Some(Self { worst: relative(worst), worst_at: worst.0, exponent: covariance / variance })
+    }
+
+    /// Does it fall no faster than log n, within [`Self::TOLERANCE`]?
+    pub fn holds(&self) -> bool {
+        self.worst >= 1.0 - Self::TOLERANCE
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn medians() {
+        assert_eq!(Summary::of(&[]), None);
+        assert_eq!(Summary::of(&[3.0, 1.0, 2.0]), Some(Summary { median: 2.0, min: 1.0, max: 3.0 }));
+        assert_eq!(median(&[4.0, 1.0, 2.0, 3.0]), Some(2.5));
+        assert_eq!(median(&[7.0]), Some(7.0));
+    }
+
+    #[test]
+    fn ratios_are_taken_round_by_round() {
+        // the machine halves its speed in the second round: both slow down
+        let (ours, theirs) = ([1.0, 2.0, 1.0], [2.0, 4.0, 2.0]);
+        assert_eq!(paired_ratio(&ours, 10.0, &theirs, 10.0), Some(2.0));
+        // half the rays in the same time is half the rate
+        assert_eq!(paired_ratio(&ours, 5.0, &theirs, 10.0), Some(1.0));
+        // one slow round of one of them is not the result
+        assert_eq!(paired_ratio(&[1.0, 9.0, 1.0], 1.0, &[1.0, 1.0, 1.0], 1.0), Some(1.0));
+        // 8, 3 and 1
+        assert_eq!(paired_ratio(&[1.0, 2.0, 4.0], 1.0, &[8.0, 6.0, 4.0], 1.0), Some(3.0));
+        // 1, 8 and 1.5, where the quotient of the medians is 2
+        assert_eq!(paired_ratio(&[4.0, 1.0, 2.0], 1.0, &[4.0, 8.0, 3.0], 1.0), Some(1.5));
+        assert_eq!(paired_ratio(&[], 1.0, &[1.0], 1.0), None);
+    }
+
+    #[test]
+    fn logarithmic_rates_hold_and_steeper_ones_do_not() {
+        let sizes = [10_000u64, 100_000, 1_000_000, 10_000_000];
+        let rates = |f: &dyn Fn(f64) -> f64| sizes.iter().rev().map(|&n| (n, f(n as f64))).collect::<Vec<_>>();
+        let log = LogScaling::of(&rates(&|n| 80.0 / n.ln())).unwrap();
+        assert!(log.holds() && (log.worst - 1.0).abs() < 1e-12);
+        let flat = LogScaling::of(&rates(&|_| 5.0)).unwrap();
+        assert!(flat.holds() && flat.exponent.abs() < 1e-12);
+        let root = LogScaling::of(&rates(&|n| 1e3 / n.sqrt())).unwrap();
+        assert!(!root.holds() && (root.exponent + 0.5).abs() < 1e-9 && root.worst_at == 10_000_000);
+        assert_eq!(LogScaling::of(&[(10, 1.0)]), None);
+        assert_eq!(LogScaling::of(&[(10, 1.0), (10, 2.0)]), None);
+        assert_eq!(LogScaling::of(&[(10, 1.0), (20, 0.0)]), None);
+    }
+}

@@ -1,0 +1,312 @@
+//! `skylit bench rays` from outside, with peers that are shell scripts: what is measured, in which order, and what is said
+//! when something is missing.
+#![cfg(unix)]
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+
+use serde_json::Value;
+
+/// A peer that takes no time and writes down what it is asked. Its clock says a quarter of a second, always. Its hits are
+/// zeros: it claims to meet the first primitive at t = 0.
+const FAKE: &str = r#"
+log=$1; name=$2; dies_at=$3
+echo '{"protocol":1,"peer":"Fake '$name'","threads":1,"kernels":["k","l"]}'
+while read -r command a b c d; do
+  echo "$name $command $a $b $c" >> "$log"
+  if [ "$command" = "$dies_at" ]; then exit 3; fi
+  case $command in
+    quit) exit 0;;
+    scene) echo '{"primitives":1}';;
+    rays) bytes=$(wc -c < "$b"); eval "rays_$a=$((bytes / 32))"; echo '{"rays":1}';;
+    build) echo '{"build_seconds":0.5,"bytes":1000}';;
+    trace) echo '{"seconds":0.25,"hits":3}';;
+    hits) eval "n=\$rays_$c"; head -c $((n * 20)) /dev/zero > "$d"; echo '{"seconds":0.25,"hits":3}';;
+    *) echo '{"error":"what is that?"}';;
+  esac
+done
+"#;
+
+/// A folder with a peers file, the fake, and what they write.
+struct Place {
+    dir: tempfile::TempDir,
+}
+
+impl Place {
+    fn new(peers: &str) -> Self {
+        let dir = tempfile::tempdir().unwrap();
+        std::fs::write(dir.path().join("fake.sh"), FAKE).unwrap();
+        std::fs::write(dir.path().join("peers.toml"), peers).unwrap();
+        Self { dir }
+    }
+
+    /// An entry for the fake under a name.
+    fn entry(name: &str, dies_at: &str, more: &str) -> String {
+        format!(
+            "[[peer]]\nname = '{name}'\nrun = ['sh', '{{dir}}/fake.sh', '{{dir}}/log', '{name}', '{dies_at}']\nkernels = ['k']\n{more}\n"
+        )
+    }
+
+    fn at(&self, name: &str) -> PathBuf {
+        self.dir.path().join(name)
+    }
+
+    fn command(&self, args: &[&str]) -> Command {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_skylit"));
+        command.args(["bench", "rays"]).args(args).stdin(Stdio::null()).env_remove("RUST_BACKTRACE");
+        command.args(["--peers", self.at("peers.toml").to_str().unwrap()]);
+        command
+    }
+
+    fn run(&self, args: &[&str]) -> Output {
+        self.command(args).output().unwrap()
+    }
+
+    fn log(&self) -> Vec<String> {
+        std::fs::read_to_string(self.at("log")).unwrap().lines().map(|l| l.trim().to_owned()).collect()
+    }
+}
+
+const SMALL: [&str; 9] =
+    ["builtin:cornell-box", "--kernels", "wide", "--rays", "2000", "--repeats", "3", "--streams", "primary,shadow-any"];
+
+fn device() -> bool {
+    let there = Command::new(env!("CARGO_BIN_EXE_skylit")).arg("doctor").output().unwrap().status.success();
+    assert!(there || std::env::var_os("SKYLIT_EXPECT_TRACERS").is_none(), "no usable Vulkan device");
+    if !there {
+        println!("skipped: no usable Vulkan device");
+    }
+    there
+}
+
+fn stderr(out: &Output) -> String {
+    String::from_utf8_lossy(&out.stderr).into_owned()
+}
+
+fn json(out: &Output) -> Value {
+    assert!(out.status.success(), "{}", stderr(out));
+    serde_json::from_slice(&out.stdout).unwrap()
+}
+
+fn fails(out: &Output, code: i32, says: &[&str]) {
+    let text = stderr(out);
+    assert_eq!(out.status.code(), Some(code), "{text}");
+    let last = text.lines().last().unwrap();
+    assert!(last.starts_with("skylit: error: ") && says.iter().all(|s| last.contains(s)), "{text}");
+}
+
+#[test]
+fn wrong_usage() {
+    let place = Place::new("");
+    fails(&place.run(&["--kernels", "magic"]), 64, &["magic", "wide, nearest"]);
+    fails(&place.run(&["--streams", "up"]), 64, &["up", "primary"]);
+    fails(&place.run(&["--repeats", "0"]), 64, &["--repeats"]);
+    fails(&place.run(&["--plot", "a.pdf"]), 64, &[".png"]);
+    fails(&place.run(&["--csv", "/nonexistent/a.csv"]), 4, &["folder does not exist"]);
+    fails(&place.run(&["builtin:nothing"]), 64, &["nothing"]);
+    fails(&place.run(&["no-such-scene.glb"]), 3, &["no such file"]);
+}
+
+#[test]
+fn a_broken_peers_file_is_named_with_its_line() {
+    let place = Place::new(&format!("{}\n[[peer]]\nname = 3\n", Place::entry("a", "", "")));
+    fails(&place.run(&SMALL), 3, &["peers.toml: line 8: "]);
+    let nowhere = Command::new(env!("CARGO_BIN_EXE_skylit")).args(["bench", "rays", "--peers", "/nonexistent.toml"]).output();
+    fails(&nowhere.unwrap(), 3, &["/nonexistent.toml", "no such file"]);
+}
+
+/// Repeats are taken in turn, the peer is asked as the protocol says, and its clock and hits are believed.
+#[test]
+fn gpu_rounds_are_interleaved() {
+    if !device() {
+        return;
+    }
+    let place = Place::new(&(Place::entry("a", "", "") + &Place::entry("b", "", "baselines = ['k']")));
+    let record = json(&place.run(&[&SMALL[..], &["--json"]].concat()));
+    let log = place.log();
+    let traced: Vec<_> = log.iter().filter(|l| l.contains(" trace ")).map(String::as_str).collect();
+    // one round to warm up and three that count, of each stream
+    let round = |set: &str, mode: &str| [format!("a trace k {mode} {set}"), format!("b trace k {mode} {set}")].concat();
+    let expected = [round("primary", "closest").repeat(4), round("shadow", "any").repeat(4)].concat();
+    assert_eq!(traced.concat(), expected);
+    // each is given the scene once and each set once, before any timing
+    let first_trace = log.iter().position(|l| l.contains(" trace ")).unwrap();
+    for name in ["a", "b"] {
+        for command in ["scene ", "build k", "rays primary ", "rays shadow "] {
+            let asked: Vec<_> = (0..log.len()).filter(|&k| log[k].starts_with(&format!("{name} {command}"))).collect();
+            assert!(asked.len() == 1 && asked[0] < first_trace, "{name} {command}: {log:?}");
+        }
+    }
+
+    let scene = &record["scenes"][0];
+    let primary = &scene["streams"][0];
+    assert_eq!(primary["stream"], "primary");
+    let results = primary["results"].as_array().unwrap();
+    let names: Vec<_> = results.iter().map(|r| r["contestant"].as_str().unwrap()).collect();
+    assert_eq!(names, ["wide", "a k", "b k"]);
+    let rays = primary["rays"].as_f64().unwrap();
+    for r in &results[1..] {
+        let rate = r["device"]["median"].as_f64().unwrap();
+        assert!((rate - rays / 0.25 / 1e6).abs() < 1e-9 * rate);
+        assert_eq!(r["seconds"].as_array().unwrap().len(), 3);
+        assert!((r["hit_share"].as_f64().unwrap() - 3.0 / rays).abs() < 1e-12);
+        assert_eq!((r["ratios"][0]["to"].as_str(), r["ratios"][0]["ratio"].as_f64()), (Some("b k"), Some(1.0)));
+        assert!(r["wall"].is_null());
+    }
+    // ours: the ratio is what the seconds say
+    let mut ours: Vec<f64> = results[0]["seconds"].as_array().unwrap().iter().map(|s| 0.25 / s.as_f64().unwrap()).collect();
+    ours.sort_by(f64::total_cmp);
+    assert!((results[0]["ratios"][0]["ratio"].as_f64().unwrap() / ours[1] - 1.0).abs() < 1e-9);
+    assert!(results[0]["hit_share"].as_f64().unwrap() > 0.5);
+    let build = &scene["builds"][1];
+    assert_eq!((build["contestant"].as_str(), build["build_seconds"].as_f64()), (Some("a k"), Some(0.5)));
+}
+
+#[test]
+fn gpu_files_of_results() {
+    if !device() {
+        return;
+    }
+    let place = Place::new(&Place::entry("a", "", "baselines = ['k']"));
+    let (csv, plot, record) = (place.at("a.csv"), place.at("a.png"), place.at("a.json"));
+    let args = ["builtin:terrain:200", "builtin:terrain:2000", "--kernels", "wide,nearest", "--rays", "2000", "--repeats", "2"];
+    let files = ["--csv", csv.to_str().unwrap(), "--plot", plot.to_str().unwrap()];
+    let out = place.run(&[&args[..], &files, &[&format!("--json={}", record.display())]].concat());
+    assert!(out.status.success(), "{}", stderr(&out));
+    let text = String::from_utf8(out.stdout).unwrap();
+    for word in ["builtin:terrain:2000: 2,000 triangles", "shuffled-any", "x a k", "no faster than log n", "bytes/primitive"] {
+        assert!(text.contains(word), "{word}: {text}");
+    }
+    let mut rows = csv::Reader::from_path(&csv).unwrap();
+    let head = rows.headers().unwrap().clone();
+    for column in ["scene", "stream", "contestant", "Mrays/s", "ratio to a k"] {
+        assert!(head.iter().any(|h| h == column), "{column}");
+    }
+    // two scenes, five streams, three contestants
+    assert_eq!(rows.records().map(Result::unwrap).count(), 2 * 5 * 3);
+    let image = skylit::output::load(&plot).unwrap();
+    assert!(image.width > 500 && image.height > 500);
+    let record: Value = serde_json::from_slice(&std::fs::read(&record).unwrap()).unwrap();
+    assert_eq!(record["scaling"].as_array().unwrap().len(), 5 * 3);
+    let left: Vec<_> = std::fs::read_dir(place.dir.path()).unwrap().map(|e| e.unwrap().file_name()).collect();
+    assert!(left.iter().all(|n| !n.to_string_lossy().ends_with(".tmp")), "{left:?}");
+
+    let quiet = place.run(&[&SMALL[..], &["--quiet"]].concat());
+    assert!(quiet.status.success() && quiet.stdout.is_empty() && quiet.stderr.is_empty(), "{}", stderr(&quiet));
+}
+
+#[test]
+fn gpu_missing_peers_are_named_and_left_out() {
+    if !device() {
+        return;
+    }
+    let broken = r#"'echo "peer.cpp:1:10: fatal error: embree3/rtcore.h: No such file" >&2; exit 1'"#;
+    let place = Place::new(&format!(
+        "[[peer]]\nname = 'x'\nbuild = ['no-such-compiler', '{{out}}']\nrun = ['{{out}}']\nkernels = ['k']\nneeds = 'a compiler'\n\
+         [[peer]]\nname = 'y'\nbuild = ['sh', '-c', {broken}]\nrun = ['{{out}}']\nkernels = ['k']\nneeds = 'a library'\n\
+         [[peer]]\nname = 'z'\nrun = ['true']\nkernels = ['k']\n\
+         [[peer]]\nname = 'w'\nrun = ['sh', '{{dir}}/fake.sh', '{{dir}}/log', 'w']\nkernels = ['unheard']\n{}",
+        Place::entry("v", "trace", "")
+    ));
+    let record = json(&place.run(&[&SMALL[..], &["--json"]].concat()));
+    let notes: Vec<_> = record["notes"].as_array().unwrap().iter().map(|n| n.as_str().unwrap()).collect();
+    let expect = [
+        ("'x' is missing", "no-such-compiler"),
+        ("'x' is missing", "it needs a compiler"),
+        ("'y' is missing", "fatal error: embree3/rtcore.h"),
+        ("'y' is missing", "it needs a library"),
+        ("'z' is missing", "it ended"),
+        ("'w' is missing", "no kernel 'unheard'"),
+        ("'v k' left out from here", "it ended"),
+    ];
+    for (who, why) in expect {
+        assert!(notes.iter().any(|n| n.contains(who) && n.contains(why)), "{who} {why}: {notes:?}");
+    }
+    // the rest is measured
+    let results = record["scenes"][0]["streams"][0]["results"].as_array().unwrap();
+    assert_eq!(results.len(), 1);
+    // and people are told, too
+    assert!(stderr(&place.run(&SMALL)).contains("skylit: warning: peer 'x' is missing"));
+}
+
+/// The fake's answers are wrong, and found to be.
+#[test]
+fn gpu_wrong_answers_fail_the_check() {
+    if !device() {
+        return;
+    }
+    let lenient = Place::new(&Place::entry("a", "", ""));
+    let args = ["builtin:cornell-box", "--rays", "2000", "--repeats", "1", "--kernels", "wide,nearest", "--check"];
+    let record = json(&lenient.run(&[&args[..], &["--json"]].concat()));
+    let checks = record["scenes"][0]["checks"].as_array().unwrap();
+    let of = |who: &str, stream: &str| {
+        checks.iter().find(|c| c["contestant"] == who && c["stream"] == stream).unwrap_or_else(|| panic!("{who} {stream}"))
+    };
+    for stream in ["primary", "ao-any", "ao-closest", "shuffled-any", "shadow-any"] {
+        let ours = of("nearest", stream);
+        assert_eq!(ours["unexplained"], 0, "{ours}");
+        assert_eq!(ours["agree"].as_u64().unwrap() + ours["ties"].as_u64().unwrap(), ours["rays"].as_u64().unwrap());
+        // the box has the light outside: that nothing sees it is right by chance
+        assert!(stream == "shadow-any" || of("a k", stream)["unexplained"].as_u64().unwrap() > 0, "{stream}");
+    }
+    let all = of("a k", "primary");
+    assert_eq!(all["unexplained"], all["rays"]);
+    assert!(!all["examples"].as_array().unwrap().is_empty());
+
+    let strict = Place::new(&Place::entry("a", "", "strict = ['k']"));
+    fails(&strict.run(&args), 1, &["'a k' differ from those of 'wide'", "primary", "builtin:cornell-box"]);
+}
+
+#[test]
+fn gpu_time_limit_and_interruption() {
+    if !device() {
+        return;
+    }
+    let place = Place::new(&Place::entry("a", "", ""));
+    let args = ["builtin:plane", "builtin:stairs", "--kernels", "wide", "--rays", "400000", "--repeats", "1000"];
+    let record = json(&place.run(&[&args[..], &["--time-limit", "1", "--json"]].concat()));
+    assert_eq!(record["stopped_early"], true);
+    let first = &record["scenes"][0]["streams"][0]["results"][0]["seconds"];
+    assert!((1..1000).contains(&first.as_array().unwrap().len()));
+
+    let csv = place.at("never.csv");
+    let more = ["--repeats", "1000", "--csv", csv.to_str().unwrap()];
+    let args = [&["builtin:stairs", "--kernels", "wide"], &more[..]].concat();
+    let child = place.command(&args).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    std::thread::sleep(std::time::Duration::from_secs(4));
+    assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
+    let out = child.wait_with_output().unwrap();
+    fails(&out, 130, &["interrupted"]);
+    assert!(!csv.exists());
+}
+
+/// The real peer, where it can be built: it loads triangles, instances and spheres, and agrees with us.
+#[test]
+fn gpu_embree_agrees() {
+    if !device() {
+        return;
+    }
+    let peers = Path::new(env!("CARGO_MANIFEST_DIR")).join("benches/peers.toml");
+    let scenes = ["builtin:grid:3", "builtin:spheres:500", "builtin:terrain:5000", "builtin:stairs"];
+    let args = ["--kernels", "wide", "--rays", "20000", "--repeats", "1", "--check", "--json"];
+    let out = Command::new(env!("CARGO_BIN_EXE_skylit"))
+        .args(["bench", "rays", "--peers", peers.to_str().unwrap()])
+        .args(scenes)
+        .args(args)
+        .output()
+        .unwrap();
+    let record = json(&out);
+    if record["peers"].as_array().unwrap().is_empty() {
+        println!("skipped: {}", record["notes"]);
+        return;
+    }
+    for scene in record["scenes"].as_array().unwrap() {
+        let checks = scene["checks"].as_array().unwrap();
+        let robust: Vec<_> = checks.iter().filter(|c| c["contestant"].as_str().unwrap().contains("robust")).collect();
+        assert_eq!(robust.len(), 10, "{}", scene["scene"]);
+        for c in robust {
+            assert_eq!(c["unexplained"], 0, "{}: {c}", scene["scene"]);
+            assert!(c["agree"].as_u64().unwrap() * 100 >= c["rays"].as_u64().unwrap() * 99, "{c}");
+        }
+    }
+}
