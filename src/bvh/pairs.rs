@@ -143,3 +143,110 @@ pub fn pair_up(triangles: &[[u32; 3]], boxes: &[Aabb], vertex_count: usize) -> V
     }
     pairs
 }
+
+#[cfg(test)]
+mod tests {
+    use glam::Vec3;
+
+    use super::*;
+
+    fn boxes(triangles: &[[u32; 3]], positions: &[Vec3]) -> Vec<Aabb> {
+        triangles.iter().map(|t| Aabb::of_points(&t.map(|v| positions[v as usize]))).collect()
+    }
+
+    /// The corners of both triangles by a fan, as each triangle has them: its first is what the other two leave.
+    fn unfolded(fan: &Fan) -> [[u32; 3]; 2] {
+        let [a, b, c, d] = fan.corners;
+        let own = |corners: [u32; 3], [second, third]: [u8; 2]| {
+            let first = 3 - second - third;
+            [first, second, third].map(|k| corners[k as usize])
+        };
+        [own([a, b, c], fan.second_third[0]), own([a, c, d], fan.second_third[1])]
+    }
+
+    fn turned(t: [u32; 3], by: usize) -> [u32; 3] {
+        [0, 1, 2].map(|k| t[(k + by) % 3])
+    }
+
+    #[test]
+    fn a_fan_keeps_both_triangles_corners_in_their_order() {
+        for k in 0..36 {
+            // two vertices in common, every rotation and winding
+            let a = turned(if k / 9 % 2 == 0 { [10, 20, 30] } else { [20, 10, 30] }, k % 3);
+            let b = turned(if k / 18 == 0 { [20, 10, 40] } else { [10, 20, 40] }, k / 3 % 3);
+            let fan = Fan::of(a, b).unwrap_or_else(|| panic!("{a:?} and {b:?} share an edge"));
+            assert_eq!(unfolded(&fan), [a, b], "{fan:?}");
+            let mut ends = [fan.corners[0], fan.corners[2]];
+            ends.sort_unstable();
+            assert_eq!(ends, [10, 20], "{a:?} {b:?}: the diagonal is not the common edge");
+        }
+        let one = Fan::single([7, 8, 9]);
+        assert_eq!(unfolded(&one)[0], [7, 8, 9]);
+    }
+
+    #[test]
+    fn what_is_no_pair_is_refused() {
+        for (a, b) in [
+            // nothing in common; one corner
+            ([0, 1, 2], [3, 4, 5]),
+            ([0, 1, 2], [2, 3, 4]),
+            // the same triangle, turned, and wound the other way
+            ([0, 1, 2], [0, 1, 2]),
+            ([0, 1, 2], [1, 2, 0]),
+            ([0, 1, 2], [2, 1, 0]),
+            // a corner twice
+            ([0, 1, 2], [1, 1, 2]),
+            ([0, 1, 2], [1, 2, 1]),
+            ([0, 1, 2], [1, 3, 3]),
+            ([1, 1, 2], [0, 1, 2]),
+            ([0, 1, 1], [1, 2, 3]),
+            ([1, 0, 1], [1, 0, 2]),
+            ([0, 0, 0], [0, 0, 0]),
+        ] {
+            assert_eq!(Fan::of(a, b), None, "{a:?} {b:?}");
+        }
+    }
+
+    /// Every triangle is in one pair, once; partners share an edge and do not grow their boxes beyond what is allowed.
+    fn check(triangles: &[[u32; 3]], positions: &[Vec3]) -> usize {
+        let boxes = boxes(triangles, positions);
+        let pairs = pair_up(triangles, &boxes, positions.len());
+        let mut seen = vec![0; triangles.len()];
+        for Pair { triangles: [a, b] } in &pairs {
+            seen[*a as usize] += 1;
+            if *b != NONE {
+                seen[*b as usize] += 1;
+                let fan = Fan::of(triangles[*a as usize], triangles[*b as usize]).expect("a pair without a common edge");
+                assert_eq!(unfolded(&fan), [triangles[*a as usize], triangles[*b as usize]]);
+                let (a, b) = (boxes[*a as usize], boxes[*b as usize]);
+                assert!(a.union(b).half_area() <= 1.21 * (a.half_area() + b.half_area()));
+            }
+        }
+        assert!(seen.iter().all(|&n| n == 1), "{seen:?}");
+        pairs.iter().filter(|p| p.triangles[1] != NONE).count()
+    }
+
+    #[test]
+    fn meshes_of_every_kind_are_paired() {
+        // a sheet of quads: nearly all find a partner
+        let n = 20u32;
+        let positions: Vec<Vec3> =
+            (0..n * n).map(|i| Vec3::new((i % n) as f32, (i / n) as f32, (i * 7 % 5) as f32 * 0.1)).collect();
+        let mut sheet = Vec::new();
+        for i in (0..n * (n - 1)).filter(|i| i % n < n - 1) {
+            sheet.extend([[i, i + 1, i + n + 1], [i, i + n + 1, i + n]]);
+        }
+        let pairs = check(&sheet, &positions);
+        assert!(pairs * 2 > sheet.len() * 9 / 10, "{pairs} pairs of {} triangles", sheet.len());
+        // all of it twice, the second time wound the other way: four triangles to an edge
+        let twice: Vec<_> = sheet.iter().copied().chain(sheet.iter().map(|&[a, b, c]| [a, c, b])).collect();
+        assert!(check(&twice, &positions) > sheet.len() / 2);
+        // one edge of all, the same triangle many times, ones without area among them
+        let fan: Vec<_> = (2..50).map(|k| [0, 1, k]).collect();
+        assert!(check(&fan, &positions) > 0);
+        assert_eq!(check(&[[0, 1, 25]; 30], &positions), 0);
+        let broken: Vec<_> = (0..40).flat_map(|k| [[k, k, k], [k, k + 1, k], [k, k + 1, k + 21], [k + 1, k, k]]).collect();
+        check(&broken, &positions);
+        assert_eq!(check(&[], &[]), 0);
+    }
+}

@@ -104,11 +104,14 @@ impl std::fmt::Display for ParityReport {
             let (a, r) = (e.answer, e.reference);
             write!(
                 f,
-                " | answer {} t {:?} | reference {} t {:?}",
+                " | answer {} t {:?} ({:?}, {:?}) | reference {} t {:?} {:?}",
                 id(a.instance, a.primitive),
                 a.t,
+                a.u,
+                a.v,
                 id(r.instance, r.primitive),
-                r.t
+                r.t,
+                r.barycentrics
             )?;
         }
         Ok(())
@@ -215,6 +218,30 @@ pub fn judge_any(oracle: &Oracle, rays: &[Ray], occluded: &[bool], truth: &[bool
         let answer = if occluded[i] { Hit { t: 0.0, ..Hit::MISS } } else { Hit::MISS };
         let reference = if truth[i] { OracleHit { t: 0.0, ..OracleHit::MISS } } else { OracleHit::MISS };
         (verdict, 0.0, Example::of(i, rays, answer, reference))
+    })
+}
+
+/// Judges the barycentric weights of a tracer's closest hits: they are those of the point where the ray meets the triangle that
+/// is named, or off by rounding. Rays that miss, and spheres, agree.
+pub fn judge_weights(oracle: &Oracle, rays: &[Ray], hits: &[Hit], rounding: Rounding) -> ParityReport {
+    report(rays.len().min(hits.len()), |i| {
+        let hit = hits[i];
+        let ray = OracleRay::from(&rays[i]);
+        let mut reference = OracleHit { instance: hit.instance, primitive: hit.primitive, ..OracleHit::MISS };
+        let mut verdict = Verdict::Agree;
+        if hit.is_hit() {
+            reference.t = hit.t as f64;
+            if let Some((weights, errors)) = oracle.weights(&ray, hit.instance, hit.primitive, rounding) {
+                reference.barycentrics = [weights[1], weights[2]];
+                let got = [1.0 - hit.u as f64 - hit.v as f64, hit.u as f64, hit.v as f64];
+                // what is not a number is near nothing
+                let near = (0..3).all(|k| (got[k] - weights[k]).abs() <= errors[k]);
+                if !near {
+                    verdict = Verdict::Unexplained("has the weights of another point");
+                }
+            }
+        }
+        (verdict, 0.0, Example::of(i, rays, hit, reference))
     })
 }
 

@@ -6,7 +6,8 @@ use crate::oracle::{Oracle, OracleHit, OracleRay};
 use crate::ray::Ray;
 use crate::sampling::sobol::hash_combine;
 use crate::sampling::{AO_DIRECTION, CAMERA_FILM, Sampler, to_unit, warp};
-use crate::scene::Camera;
+use crate::scene::builtin::{self, Placement};
+use crate::scene::{Camera, Scene};
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -93,6 +94,38 @@ pub fn ao_rays(oracle: &Oracle, rays: &[Ray], hits: &[OracleHit], per_hit: u32, 
             })
         })
         .collect()
+}
+
+/// At least `total` rays of what renderers send: a third from `camera`, a third ambient occlusion rays of their hits, a third
+/// [`random_rays`].
+pub fn mixed_rays(oracle: &Oracle, camera: &Camera, total: usize, seed: u32) -> Vec<Ray> {
+    let edge = ((total / 3) as f64).sqrt().ceil() as u32;
+    let mut rays = camera_rays(oracle, camera, [edge, edge], seed);
+    let hits = oracle.trace_closest(&rays);
+    let covered = hits.iter().filter(|h| h.is_hit()).count().max(1);
+    let each = (total / 3).div_ceil(covered) as u32;
+    let occlusion = ao_rays(oracle, &rays, &hits, each, f64::INFINITY, seed.wrapping_add(1));
+    rays.extend(occlusion);
+    let missing = total.saturating_sub(rays.len()).max(total / 3);
+    rays.extend(random_rays(oracle, missing, seed.wrapping_add(2)));
+    rays
+}
+
+/// Scenes for [`leak_rays`], with what sets each apart: a box and a round body at scales of 1e-3 to 1e6 and at offsets to 1e6,
+/// in an instance's transform (from which the scene's origin takes it away) and in the vertices.
+pub fn leak_scenes() -> Vec<(String, Scene)> {
+    let mut out = Vec::new();
+    for (scale, offset) in [(1.0, 0.0), (1e-3, 0.0), (1e3, 0.0), (1e6, 0.0), (1.0, 1e6), (1e-3, 1.0), (1e3, -1e6)] {
+        let place = Placement { scale, offset: DVec3::new(offset, offset * 0.37, -offset * 0.71) };
+        let cube = builtin::analytic::closed_box(1.0, place);
+        let mut sphere = cube.clone();
+        sphere.meshes[0].geometry = builtin::shapes::icosphere(1.0, 5);
+        for (what, scene) in [("box", cube), ("round body", sphere)] {
+            out.push((format!("{what}, baked, scale {scale:e}, offset {offset:e}"), builtin::bake(&scene)));
+            out.push((format!("{what}, placed, scale {scale:e}, offset {offset:e}"), scene));
+        }
+    }
+    out
 }
 
 /// Rays that must hit a closed convex mesh (or a union of them), aimed at its shared vertices and edges: even ones from inside,

@@ -20,6 +20,10 @@
 //!   rays, whose triangles appear as slivers;
 //! - the parameter of a hit errs by at most `delta / (|d| cos)`, with `cos` between ray and normal, plus its own rounding, and
 //!   never leaves the primitive's extent along the ray by more than `delta`;
+//! - a triangle's edge functions are differences of products of corners' distances from the ray, which round in proportion to
+//!   those (pbrt-v4, 6.8.7, `delta_e`). That moves a weight by `4 * 2^-23 * |p| |q| / area`, with `p` and `q` the ends of the edge seen
+//!   along the ray: next to nothing, but for slivers, whose weights, and with them the parameter between the corners', are worth
+//!   less than their corners. Signs are never wrong for it, so it makes nothing uncertain;
 //! - where that interval contains `tmin` or `tmax`, the hit may count or not;
 //! - where alpha crosses the cutoff within the error of the texture coordinates (and of a texture unit: 1/256 texel, 1/255 of
 //!   the value), the surface may exist or not.
@@ -118,6 +122,28 @@ impl Oracle {
         found
     }
 
+    /// Barycentric weights of the three corners where the ray meets a triangle (or passes it most closely), and by how much each
+    /// may be off, in a tracer's hit: a displacement of `delta` changes a weight by `delta` over the height that the triangle
+    /// shows along the ray. `None` for a sphere and for what does not exist.
+    pub fn weights(&self, ray: &OracleRay, instance: u32, primitive: u32, rounding: Rounding) -> Option<([f64; 3], [f64; 3])> {
+        let triangle = self.triangles.get(self.index_of(instance, primitive)? as usize)?;
+        let (delta, flat) = self.as_seen(triangle, ray, rounding);
+        let [v, w] = triangle.intersect(ray).map_or_else(|| clamped_barycentrics(&flat), |(_, b)| b);
+        // a weight is divided and stored in single precision besides
+        let own = 8.0 * f32::EPSILON as f64;
+        Some(([1.0 - v - w, v, w], weight_errors(&flat, delta).map(|e| e + own)))
+    }
+
+    /// The model's `delta` for a triangle, and its corners seen along the ray: relative to the ray's line, across it.
+    fn as_seen(&self, triangle: &Triangle, ray: &OracleRay, rounding: Rounding) -> (f64, [DVec3; 3]) {
+        let instance = &self.instances[triangle.instance as usize];
+        let farthest = triangle.v.iter().map(|v| v.length_squared()).fold(0.0, f64::max).sqrt();
+        let reach = ray.origin.length() + farthest + instance.translation;
+        let delta = rounding.ulps * f32::EPSILON as f64 * instance.condition * reach;
+        let d = ray.direction / ray.direction.length();
+        (delta, triangle.v.map(|v| v - ray.origin).map(|c| c - d * c.dot(d)))
+    }
+
     fn candidates_of(&self, index: u32, ray: &OracleRay, rounding: Rounding) -> [Candidate; 2] {
         match self.triangles.get(index as usize) {
             Some(triangle) => [self.triangle_candidate(triangle, ray, rounding).within(ray), Candidate::NEVER],
@@ -130,14 +156,11 @@ impl Oracle {
 
     fn triangle_candidate(&self, triangle: &Triangle, ray: &OracleRay, rounding: Rounding) -> Candidate {
         let instance = &self.instances[triangle.instance as usize];
-        let farthest = triangle.v.iter().map(|v| v.length_squared()).fold(0.0, f64::max).sqrt();
-        let reach = ray.origin.length() + farthest + instance.translation;
-        let delta = rounding.ulps * f32::EPSILON as f64 * instance.condition * reach;
+        let (delta, flat) = self.as_seen(triangle, ray, rounding);
         let length = ray.direction.length();
         let d = ray.direction / length;
         let corners = triangle.v.map(|v| v - ray.origin);
         let along = corners.map(|c| c.dot(d));
-        let flat = [0, 1, 2].map(|k| corners[k] - d * along[k]);
         let to_boundary = (0..3).map(|k| distance_to_segment(flat[k], flat[(k + 1) % 3])).fold(f64::INFINITY, f64::min);
         let inside = triangle.intersect(ray);
         if inside.is_none() && (to_boundary > delta || to_boundary.is_nan()) {
@@ -147,7 +170,9 @@ impl Oracle {
         let normal = triangle.normal();
         let cos = normal.dot(d).abs();
         let t_plane = inside.map_or_else(|| normal.dot(corners[0]) / normal.dot(ray.direction), |(t, _)| t);
-        let slack = 2.0 * delta / (length * cos) + 4.0 * f32::EPSILON as f64 * t_plane.abs();
+        let products = product_errors(&flat);
+        let sliver: f64 = (0..3).map(|k| products[k] * (along[k] / length - t_plane).abs()).sum();
+        let slack = 2.0 * delta / (length * cos) + 4.0 * f32::EPSILON as f64 * t_plane.abs() + sliver;
         let (first, last) =
             (along.iter().copied().fold(f64::INFINITY, f64::min), along.iter().copied().fold(f64::MIN, f64::max));
         let (first, last) = ((first - delta) / length, (last + delta) / length);
@@ -161,12 +186,7 @@ impl Oracle {
         let mut certain = inside.is_some() && to_boundary > delta;
         if let Some(alpha) = &instance.alpha {
             let weights = inside.map_or_else(|| clamped_barycentrics(&flat), |(_, b)| b);
-            // a displacement of delta changes a weight by delta over the height that the triangle shows along the ray
-            let area = (flat[1] - flat[0]).cross(flat[2] - flat[0]).length();
-            let barycentric = [0, 1, 2].map(|k| {
-                let base = (flat[(k + 1) % 3] - flat[(k + 2) % 3]).length();
-                (2.0 * delta * base / area).min(1.0)
-            });
+            let barycentric = weight_errors(&flat, delta);
             let error = AlphaUncertainty { barycentric, texels: 1.0 / 256.0, value: 1.0 / 255.0 };
             let (always, ever) = alpha.presence(triangle.primitive, weights, &error);
             if !ever {
@@ -214,6 +234,23 @@ fn distance_to_segment(a: DVec3, b: DVec3) -> f64 {
     let t = (-a.dot(edge) / edge.length_squared()).clamp(0.0, 1.0);
     // two equal ends divide zero by zero
     if t.is_nan() { a.length() } else { (a + edge * t).length() }
+}
+
+/// By how much a displacement of `delta` changes the weight of each corner: `delta` over the height that the triangle shows;
+/// and the rounding of the edge functions' products besides.
+fn weight_errors(flat: &[DVec3; 3], delta: f64) -> [f64; 3] {
+    let area = (flat[1] - flat[0]).cross(flat[2] - flat[0]).length();
+    let products = product_errors(flat);
+    // one that is not a number says nothing about the weight
+    [0, 1, 2].map(|k| (2.0 * delta * (flat[(k + 1) % 3] - flat[(k + 2) % 3]).length() / area + products[k]).min(1.0))
+}
+
+/// By how much the products of the edge functions move each corner's weight. All weights are divided by the sum of the three,
+/// which errs as they do.
+fn product_errors(flat: &[DVec3; 3]) -> [f64; 3] {
+    let area = (flat[1] - flat[0]).cross(flat[2] - flat[0]).length();
+    let lengths = flat.map(|p| p.length());
+    [0, 1, 2].map(|k| 4.0 * f32::EPSILON as f64 * lengths[(k + 1) % 3] * lengths[(k + 2) % 3] / area)
 }
 
 /// Barycentric weights of the point of the triangle's border that is nearest to the origin.

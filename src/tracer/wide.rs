@@ -304,3 +304,54 @@ fn pair_block(triangles: &Triangles, pair: Pair, opaque: u32) -> Block {
     block[14] = places[0] | places[1] << 4;
     block
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::builtin;
+
+    /// Every leaf lies within the boxes above it and holds what the scene has: each triangle and sphere once, its corners bit for bit
+    /// and in their order, its alpha flag; each entry of the top level its number.
+    fn check(name: &str) {
+        let scene = builtin::by_name(name).unwrap();
+        let flat = FlatScene::new(&scene);
+        let trees = Trees::build(&flat, &BuildOptions::default());
+        for (tree, group) in trees.groups.iter().zip(&flat.groups) {
+            let triangles = Triangles::of(&flat, group);
+            let boxes: Vec<Aabb> = primitive_boxes(&flat, group).collect();
+            let held = |b: &Block| [b[12], b[13]].into_iter().filter(|&id| id != pairs::NONE);
+            let number = |id: u32| (id & !(ALPHA_TESTED | SPHERE)) as usize;
+            tree.validate(|b| held(b).map(|id| boxes[number(id)]).collect()).unwrap_or_else(|e| panic!("{name}: {e}"));
+            let mut seen = vec![0; group.primitive_count];
+            for block in tree.blocks.iter().filter(|b| wide::is_leaf(b)) {
+                for (k, id) in [block[12], block[13]].into_iter().enumerate().filter(|(_, id)| *id != pairs::NONE) {
+                    seen[number(id)] += 1;
+                    assert_eq!(id & SPHERE != 0, group.spheres, "{name}: {id:x}");
+                    if group.spheres {
+                        continue;
+                    }
+                    assert_eq!(id & ALPHA_TESTED != 0, number(id) >= group.opaque_count, "{name}: {id:x}");
+                    let corner = |c: usize| [0, 1, 2].map(|a| block[3 * c + a]);
+                    let corners = if k == 0 { [0, 1, 2] } else { [0, 2, 3] };
+                    let (second, third) = (block[14] >> (4 * k) & 3, block[14] >> (4 * k + 2) & 3);
+                    let order = [3 - second - third, second, third].map(|p| corner(corners[p as usize]));
+                    let own = triangles.corners(triangles.indices[number(id)]).map(|v| v.to_array().map(f32::to_bits));
+                    assert_eq!(order, own, "{name}: triangle {}", number(id));
+                }
+            }
+            assert!(seen.iter().all(|&n| n == 1), "{name}: a primitive is missing or there twice");
+        }
+        if let Some(top) = &trees.top {
+            let bounds: Vec<_> = trees.groups.iter().map(|g| g.bounds.unwrap_or(Aabb::EMPTY)).collect();
+            let boxes = placement_boxes(&flat, &bounds);
+            top.validate(|b| vec![boxes[b[13] as usize]]).unwrap_or_else(|e| panic!("{name}: {e}"));
+        }
+    }
+
+    #[test]
+    fn hierarchies_hold_what_the_scene_has() {
+        for name in ["cornell-box", "cornell-spheres", "leaf-cards", "grid:6", "spheres:300", "stairs", "far-away"] {
+            check(name);
+        }
+    }
+}
