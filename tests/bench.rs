@@ -98,7 +98,7 @@ fn fails(out: &Output, code: i32, says: &[&str]) {
 #[test]
 fn wrong_usage() {
     let place = Place::new("");
-    fails(&place.run(&["--kernels", "magic"]), 64, &["magic", "wide, nearest"]);
+    fails(&place.run(&["--kernels", "magic"]), 64, &["magic", "wide, packet, nearest"]);
     fails(&place.run(&["--streams", "up"]), 64, &["up", "primary"]);
     fails(&place.run(&["--repeats", "0"]), 64, &["--repeats"]);
     fails(&place.run(&["--plot", "a.pdf"]), 64, &[".png"]);

@@ -71,7 +71,7 @@ fn usage_errors() {
     fails(&render(&["--eye", "1,2", "--target", "0,0,0"]), 64, "X,Y,Z");
     fails(&render(&["--eye", "1,2,3", "--target", "1,2,3"]), 64, "same point");
     fails(&render(&["--aov", "depth,smell"]), 64, "smell");
-    fails(&render(&["--traversal", "backwards"]), 64, "wide, nearest, direction, brute");
+    fails(&render(&["--traversal", "backwards"]), 64, "auto, wide, packet, nearest, direction, brute");
     fails(&render(&["--triangle-test", "none"]), 64, "watertight, moller-trumbore");
     fails(&["diff", "a.exr"], 64, "<B>");
     fails(&["export", "builtin:plane", "a.txt"], 64, ".bin, .glb or .gltf");

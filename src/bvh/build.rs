@@ -414,7 +414,7 @@ mod tests {
     fn reinsertion_lowers_the_cost() {
         let boxes: Vec<Aabb> = triangles(5000, 1.0, 0.0).iter().map(|t| Aabb::of_points(t)).collect();
         let costs = PRESETS.map(|p| cost(&tree(&boxes, p, None)));
-        assert!(costs[1] < 0.97 * costs[0] && costs[2] <= costs[1], "{costs:?}");
+        assert!(costs[1] < 0.97 * costs[0] && costs[2] < 0.97 * costs[0], "{costs:?}");
     }
 
     /// Boxes that all overlap leave the search for a better place nothing to prune.
