@@ -24,7 +24,7 @@ pub const MAX_DEPTH: u32 = 48;
 pub enum BuildPreset {
     /// Least build time: the heuristic alone.
     Fast,
-    /// Clustering and reinsertion.
+    /// Clustering and reinsertion where primitives are of uneven size, else the heuristic and reinsertion as far as it pays.
     #[default]
     Default,
     /// Spatial splits (up to 30 % more references) and thorough reinsertion.
@@ -45,7 +45,6 @@ impl BuildPreset {
     fn effort(self) -> Effort {
         match self {
             Self::Fast => Effort { share: 0.0, rounds: 0, worthwhile: 1.0 },
-            // where boxes repeat
             Self::Default => Effort { share: 0.003, rounds: 16, worthwhile: 0.001 },
             Self::Best => Effort { share: 0.02, rounds: 16, worthwhile: 0.001 },
         }
@@ -86,8 +85,9 @@ pub fn tree_with_splits(boxes: &[Aabb], triangles: &impl Triangles, preset: Buil
 
 fn whole(boxes: &[Aabb], preset: BuildPreset, pad: f32) -> Bvh2 {
     let grow = |b: &Aabb| Aabb { min: b.min - pad, max: b.max + pad };
-    // clustering pairs one of k equal boxes at a time: k^2 work for a chain of depth k
-    if preset == BuildPreset::Default && boxes.len() > 2 && !seems_to_repeat(boxes) {
+    // where sizes are alike, clustering gives no better a tree, for more time; and it pairs one of k equal boxes at a time: k^2
+    // work for a chain of depth k
+    if preset == BuildPreset::Default && boxes.len() > 2 && are_uneven(boxes) && !seems_to_repeat(boxes) {
         let boxes: Vec<Aabb> = boxes.par_iter().map(grow).collect();
         return limit_depth(clustered(&boxes), MAX_DEPTH);
     }
@@ -95,6 +95,16 @@ fn whole(boxes: &[Aabb], preset: BuildPreset, pad: f32) -> Bvh2 {
     let nodes = sah::tree(&mut items);
     drop(items);
     finish(nodes, boxes.len(), preset)
+}
+
+/// Is the mean size of some of them, evenly spread, far above the median? So it is in buildings (Sponza: 12), not in scanned surfaces
+/// (dragon: 1.4).
+fn are_uneven(boxes: &[Aabb]) -> bool {
+    let mut areas: Vec<f32> = boxes.iter().step_by(boxes.len().div_ceil(4096).max(1)).map(Aabb::half_area).collect();
+    let mean = areas.iter().map(|&a| f64::from(a)).sum::<f64>() / areas.len() as f64;
+    let middle = areas.len() / 2;
+    let (_, &mut median, _) = areas.select_nth_unstable_by(middle, f32::total_cmp);
+    mean > 4.0 * f64::from(median)
 }
 
 fn clustered(boxes: &[Aabb]) -> Bvh2 {

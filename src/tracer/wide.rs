@@ -170,7 +170,7 @@ fn collapse(binary: Bvh2, depth: Option<u32>, leaf: impl Fn(u32) -> Block + Sync
 }
 
 /// Raised whenever the same input gives other blocks: builders, pairs, collapse, the layout of nodes and leaves.
-const LAYOUT_VERSION: u32 = 2;
+const LAYOUT_VERSION: u32 = 3;
 
 /// What lies next to the blocks of a kept hierarchy.
 #[repr(C)]
