@@ -92,6 +92,12 @@ impl DeviceInfo {
         self.missing_floor.is_empty() && self.tracers.iter().any(|t| t.tracer == tracer && t.missing.is_empty())
     }
 
+    /// Does the driver leave any loop in a shader after 65,535 turns? Mesa's CPU driver did before version 23.
+    pub fn cuts_long_loops(&self) -> bool {
+        let major = self.driver.split("Mesa ").nth(1).and_then(|v| v.split('.').next()).and_then(|v| v.parse::<u32>().ok());
+        self.is_cpu() && major.is_some_and(|m| m < 23)
+    }
+
     /// Does the device run its shaders on the CPU?
     pub fn is_cpu(&self) -> bool {
         self.kind == "cpu"

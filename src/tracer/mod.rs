@@ -172,8 +172,11 @@ impl Tracer {
         let mut stats = BuildStats { primitives: flat.primitive_count() as u64, ..Default::default() };
         // the hierarchy first: its build needs the most host memory, the scene's buffers come after that is freed
         let start = Instant::now();
-        let hierarchy =
-            if kind == TracerKind::Compute { Some(compute::Trees::build(flat, options.kernel, build)?) } else { None };
+        // The fast kernels lose rays in deep trees on drivers that leave long loops: there the readable one traces.
+        let fast = matches!(options.kernel, Kernel::Auto | Kernel::Wide | Kernel::Packet);
+        let kernel =
+            if fast && device.info.cuts_long_loops() && flat.motion.is_none() { Kernel::Nearest } else { options.kernel };
+        let hierarchy = if kind == TracerKind::Compute { Some(compute::Trees::build(flat, kernel, build)?) } else { None };
         stats.build_seconds = start.elapsed().as_secs_f64();
         let start = Instant::now();
         let mut scene = GpuScene::new(device, flat, needs)?;
