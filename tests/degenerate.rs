@@ -21,8 +21,9 @@ use skylit::render::rays::{Mode, trace};
 use skylit::render::{Uncontrolled, aov};
 use skylit::sampling::sobol::hash_combine;
 use skylit::sampling::to_unit;
+use skylit::scene::flatten::FlatScene;
 use skylit::scene::{Camera, Geometry, Instance, Material, Mesh, Scene, Sphere, TriangleMesh};
-use skylit::tracer::{Tracer, TracerKind};
+use skylit::tracer::{Kernel, Tracer, TracerKind};
 
 fn scene(parts: Vec<(Geometry, Vec<DAffine3>)>) -> Scene {
     let mut scene = Scene { materials: vec![Material::default()], ..Scene::default() };
@@ -68,14 +69,25 @@ fn judge(device: &Arc<Device>, what: &str, scene: &Scene, rays: &[Ray]) {
     let oracle = Oracle::new(scene, scene.origin());
     let truth: Vec<OracleHit> = rays.par_iter().map(|r| oracle.brute_force_closest(r)).collect();
     let occluded: Vec<bool> = truth.iter().map(OracleHit::is_hit).collect();
+    let judged = |what: &str, tracer: &Tracer| {
+        let closest = judge_closest(&oracle, rays, &hits(tracer, rays, Mode::Closest), &truth, Rounding::default());
+        println!("{what}: {closest}; stack of {}", tracer.stats().stack_entries);
+        assert_eq!(closest.unexplained, 0, "{what}: {closest}");
+        let any: Vec<bool> = hits(tracer, rays, Mode::Any).iter().map(Hit::is_hit).collect();
+        let any = judge_any(&oracle, rays, &any, &occluded, Rounding::default());
+        assert_eq!(any.unexplained, 0, "{what} any: {any}");
+    };
+    for kernel in [Kernel::Nearest, Kernel::Brute] {
+        let flat = FlatScene::new(scene);
+        // brute force has a bound on the size of scenes
+        match Tracer::with_options(device, TracerKind::Compute, &flat, common::ALL, kernel) {
+            Ok(tracer) => judged(&format!("{what} {kernel:?}"), &tracer),
+            Err(e) => assert!(kernel == Kernel::Brute, "{what} {kernel:?}: {e}"),
+        }
+    }
     for kind in tracers(device) {
         let tracer = tracer(device, kind, scene);
-        let closest = judge_closest(&oracle, rays, &hits(&tracer, rays, Mode::Closest), &truth, Rounding::default());
-        println!("{what} {kind}: {closest}; stack of {}", tracer.stats().stack_entries);
-        assert_eq!(closest.unexplained, 0, "{what} {kind}: {closest}");
-        let any: Vec<bool> = hits(&tracer, rays, Mode::Any).iter().map(Hit::is_hit).collect();
-        let any = judge_any(&oracle, rays, &any, &occluded, Rounding::default());
-        assert_eq!(any.unexplained, 0, "{what} {kind} any: {any}");
+        judged(&format!("{what} {kind}"), &tracer);
         picture(&tracer, scene, &what);
     }
 }

@@ -139,12 +139,12 @@ float pick_weight(vec3 w, uint k) {
         ACCEPT                                                                                                       \
     }
 
-#define TEST_TRIANGLE(id_, turn, v0_, v1_, v2_, a, b, c, eu, ev, ew)                                                     \
+#define TEST_TRIANGLE(id_, turn, v0_, v1_, v2_, a, b, c, e)                                                     \
     {                                                                                                                    \
         uint id = (id_);                                                                                                 \
-        float t, inverse_det;                                                                                            \
-        if (meets_between(shear[j], origin[j], direction[j], v0_, v1_, v2_, a, b, c, eu, ev, ew, tmin[j], limit[j], t, inverse_det)) { \
-            vec3 weights = vec3(eu, ev, ew) * inverse_det;                                                               \
+        float t;                                                                                                         \
+        vec3 weights;                                                                                                    \
+        if (meets_between(shear[j], origin[j], direction[j], v0_, v1_, v2_, a, b, c, e, tmin[j], limit[j], t, weights)) { \
             OFFER(turn)                                                                                                  \
         }                                                                                                                \
     }
@@ -309,8 +309,8 @@ void main() {
                         float ab = edge(b, a), bc = edge(c, b), ca = edge(a, c), cd = edge(d, c), da = edge(a, d);
                         // rays of another class see nonsense
                         bool live = limit[j] > tmin[j];
-                        if (live && is_inside(bc, ca, ab)) TEST_TRIANGLE(w6.x, w7.x, v0, v1, v2, a, b, c, bc, ca, ab)
-                        if (live && w6.y != INVALID && is_inside(cd, da, -ca)) TEST_TRIANGLE(w6.y, w7.x >> 4, v0, v2, v3, a, c, d, cd, da, -ca)
+                        if (live && is_inside(vec3(bc, ca, ab))) TEST_TRIANGLE(w6.x, w7.x, v0, v1, v2, a, b, c, vec3(bc, ca, ab))
+                        if (live && w6.y != INVALID && is_inside(vec3(cd, da, -ca))) TEST_TRIANGLE(w6.y, w7.x >> 4, v0, v2, v3, a, c, d, vec3(cd, da, -ca))
                     } else {
                         TEST_MOLLER_TRUMBORE(w6.x, w7.x, v0, v1, v2)
                         if (w6.y != INVALID) TEST_MOLLER_TRUMBORE(w6.y, w7.x >> 4, v0, v2, v3)

@@ -121,19 +121,32 @@ float edge(Corner p, Corner q) {
     return e;
 }
 
-// Does the ray pass between the edges? u, v, w belong to the edges opposite the three corners.
-bool is_inside(float u, float v, float w) {
-    return !((u < 0.0 || v < 0.0 || w < 0.0) && (u > 0.0 || v > 0.0 || w > 0.0));
+// What rounding has taken from edge(p, q): nearly all of it when that is zero, and then its sign is right.
+float edge_rest(Corner p, Corner q) {
+    precise vec3 a = vec3(p.p.x, p.p.y, 0.0), b = vec3(q.p.y, q.p.x, 0.0);
+    vec3 lost = wide_product(Wide3(a, vec3(0.0)), Wide3(b, vec3(0.0))).lo;
+    precise float e = lost.x - lost.y;
+    return e;
 }
 
-// For a ray that passes between the edges: where it meets the triangle, if within (tmin, tmax). The barycentric weights are u, v, w
-// times `inverse_det`. To be called under `if`: most rays do not get here, and a denormal number, made by lanes that hold something
+// Does the ray pass between the edges? Each is opposite a corner, and zero counts as inside.
+bool is_inside(vec3 e) {
+    return !(any(lessThan(e, vec3(0.0))) && any(greaterThan(e, vec3(0.0))));
+}
+
+// For a ray that passes between the edges of corners a, b, c: where it meets the triangle, if within (tmin, tmax), and the corners'
+// weights. To be called under `if`: most rays do not get here, and a denormal number, made by lanes that hold something
 // else, would cost a CPU a hundred times the cycles of a normal one.
-bool meets_between(Shear shear, vec3 origin, vec3 direction, vec3 v0, vec3 v1, vec3 v2, Corner a, Corner b, Corner c, float u, float v,
-        float w, float tmin, float tmax, out float t, out float inverse_det) {
+bool meets_between(Shear shear, vec3 origin, vec3 direction, vec3 v0, vec3 v1, vec3 v2, Corner a, Corner b, Corner c, vec3 edges,
+        float tmin, float tmax, out float t, out vec3 weights) {
+    // Seen from far beside it a small triangle's edges may all be zero but one, which looks like a hit of a corner.
+    if (any(equal(edges, vec3(0.0)))) edges += vec3(edge_rest(c, b), edge_rest(a, c), edge_rest(b, a));
+    bool inside = is_inside(edges);
+    float u = edges.x, v = edges.y, w = edges.z;
     float det = u + v + w;
-    bool plausible = abs(det) > 1e-37 && abs(det) < 1e37;
-    inverse_det = 1.0 / (plausible ? det : 1.0);
+    bool plausible = inside && abs(det) > 1e-37 && abs(det) < 1e37;
+    float inverse_det = 1.0 / (plausible ? det : 1.0);
+    weights = edges * inverse_det;
     float scaled = u * a.z + v * b.z + w * c.z;
     t = (plausible ? scaled : 0.0) * shear.s.z * inverse_det;
     bool met = plausible && t > tmin && t < tmax;
@@ -179,20 +192,20 @@ bool intersect_moller_trumbore(vec3 origin, vec3 direction, vec3 v0, vec3 v1, ve
 
 // Why no ray slips between two triangles that share an edge: a corner's sheared position depends on the corner and the ray
 // alone, so both triangles see the same numbers; and the sign of fl(a*b) - fl(c*d) is never wrong, at worst zero, because
-// rounding is monotonic. Zero counts as inside. `precise` keeps the compiler from fusing a product into the difference,
-// which would break the symmetry. (The paper resolves zeros in double precision to hit exactly one of the two triangles;
-// here both are hit, at the same t, which no stream can tell apart.)
+// rounding is monotonic. `precise` keeps the compiler from fusing a product into the difference, which would break the symmetry.
+// A zero is resolved with what rounding took from the products (the paper computes in double precision), and if that is zero too,
+// both triangles are hit, at the same t, which no stream can tell apart.
 bool intersect_triangle(Shear shear, vec3 origin, vec3 direction, vec3 v0, vec3 v1, vec3 v2, float tmin, float tmax, out float t, out vec2 uv) {
+    if (!WATERTIGHT) return intersect_moller_trumbore(origin, direction, v0, v1, v2, tmin, tmax, t, uv);
     Corner a = make_corner(shear, origin, v0), b = make_corner(shear, origin, v1), c = make_corner(shear, origin, v2);
-    float u = edge(c, b), v = edge(a, c), w = edge(b, a);
+    vec3 edges = vec3(edge(c, b), edge(a, c), edge(b, a));
     bool met = false;
     t = tmax;
     uv = vec2(0.0);
-    if (!WATERTIGHT) return intersect_moller_trumbore(origin, direction, v0, v1, v2, tmin, tmax, t, uv);
-    if (is_inside(u, v, w)) {
-        float inverse_det;
-        met = meets_between(shear, origin, direction, v0, v1, v2, a, b, c, u, v, w, tmin, tmax, t, inverse_det);
-        if (met) uv = vec2(v, w) * inverse_det;
+    if (is_inside(edges)) {
+        vec3 weights;
+        met = meets_between(shear, origin, direction, v0, v1, v2, a, b, c, edges, tmin, tmax, t, weights);
+        if (met) uv = weights.yz;
     }
     return met;
 }

@@ -22,6 +22,9 @@ layout(local_size_x = LANES) in;
 // children; entering an entry of the top level pushes that and the way back. The host counts it.
 layout(constant_id = 3) const uint SPILLED = 64;
 layout(constant_id = 4) const uint RAYS_PER_LANE = 1;
+// A lane that has taken so many turns takes no further ray; 0: no bound. For drivers that leave any loop after 65,535 turns: with
+// one ray per lane of a work-group each ray is taken nevertheless, because a lane that stops has had one.
+layout(constant_id = 8) const uint MOST_TURNS = 0;
 
 // Entries of the stack in registers. A CPU driver writes to an array element by element, about ninety instructions; moving all of
 // these takes one each.
@@ -71,22 +74,12 @@ Ray take_ray(uint k) {
     return Ray(vec3(x, y.x), y.y, vec3(z, w.x), w.y);
 }
 
-#ifdef STREAM_ANY
-#define STORE_MISS store_any(root, index, false);
-#else
-#define STORE_MISS store_closest(root, index, INFINITY, INVALID, INVALID, vec2(0.0));
-#endif
-
-#define TAKE index = begin + atomicAdd(LaunchFlags(root.launch_counters).v[gl_WorkGroupID.x], 1u);
-// The lane's next ray; what is no ray has missed.
-#define NEXT_RAY                              \
-    while (true) {                            \
-        if (index >= end) return;             \
-        world = take_ray(index);        \
-        if (is_ray(world)) break;             \
-        STORE_MISS                            \
-        TAKE                                  \
-    }
+// The lane's next ray. What is no ray meets nothing: no box and no primitive lies before it.
+#define NEXT_RAY                                                                                        \
+    index = begin + atomicAdd(LaunchFlags(root.launch_counters).v[gl_WorkGroupID.x], 1u);               \
+    if (index >= end) return;                                                                           \
+    world = take_ray(index);                                                                            \
+    if (!is_ray(world)) world = no_ray();
 
 // What the ray met last, with the weights of the second and third corner as the mesh has them.
 #ifdef STREAM_ANY
@@ -111,12 +104,12 @@ Ray take_ray(uint k) {
     }
 
 // One triangle of a pair: its number, the places of its second and third corner, corners as they lie and as the ray sees them, edges.
-#define TEST_TRIANGLE(id_, turn, v0_, v1_, v2_, a, b, c, eu, ev, ew)                                                     \
+#define TEST_TRIANGLE(id_, turn, v0_, v1_, v2_, a, b, c, e)                                                     \
     {                                                                                                                    \
         uint id = (id_);                                                                                                 \
-        float t, inverse_det;                                                                                            \
-        if (meets_between(shear, origin, direction, v0_, v1_, v2_, a, b, c, eu, ev, ew, world.tmin, best, t, inverse_det)) { \
-            vec3 weights = vec3(eu, ev, ew) * inverse_det;                                                               \
+        float t;                                                                                                         \
+        vec3 weights;                                                                                                    \
+        if (meets_between(shear, origin, direction, v0_, v1_, v2_, a, b, c, e, world.tmin, best, t, weights)) { \
             OFFER(turn)                                                                                                  \
         }                                                                                                                \
     }
@@ -152,7 +145,6 @@ void main() {
     uint end = min(begin + LANES * RAYS_PER_LANE, ray_count());
     SceneRoot root = SceneRoot(push.scene);
     uint index;
-    TAKE
     uvec2 blocks = root.nodes;
 
     uint top_base[TOP], top_group[TOP];
@@ -179,7 +171,9 @@ void main() {
     uint best_instance = INVALID, best_primitive = INVALID;
     vec2 best_uv = vec2(0.0);
 
+    uint turns = 0u;
     while (true) {
+        turns++;
         Block8 b = Block8(offset_address(blocks, 64u * block));
         uvec2 w0 = PAIR(b.q0), w1 = PAIR(b.q1), w2 = PAIR(b.q2), w3 = PAIR(b.q3);
         uvec2 w4 = PAIR(b.q4), w5 = PAIR(b.q5), w6 = PAIR(b.q6), w7 = PAIR(b.q7);
@@ -238,14 +232,14 @@ void main() {
                 Corner a = make_corner(shear, origin, v0), b = make_corner(shear, origin, v1);
                 Corner c = make_corner(shear, origin, v2), d = make_corner(shear, origin, v3);
                 float ab = edge(b, a), bc = edge(c, b), ca = edge(a, c), cd = edge(d, c), da = edge(a, d);
-                bool first = is_inside(bc, ca, ab), second = is_inside(cd, da, -ca) && w6.y != INVALID;
+                bool first = is_inside(vec3(bc, ca, ab)), second = is_inside(vec3(cd, da, -ca)) && w6.y != INVALID;
                 if (!WATERTIGHT) {
                     TEST_MOLLER_TRUMBORE(w6.x, w7.x, v0, v1, v2)
                     if (w6.y != INVALID) TEST_MOLLER_TRUMBORE(w6.y, w7.x >> 4, v0, v2, v3)
                     first = second = false;
                 }
-                if (first) TEST_TRIANGLE(w6.x, w7.x, v0, v1, v2, a, b, c, bc, ca, ab)
-                if (second) TEST_TRIANGLE(w6.y, w7.x >> 4, v0, v2, v3, a, c, d, cd, da, -ca)
+                if (first) TEST_TRIANGLE(w6.x, w7.x, v0, v1, v2, a, b, c, vec3(bc, ca, ab))
+                if (second) TEST_TRIANGLE(w6.y, w7.x >> 4, v0, v2, v3, a, c, d, vec3(cd, da, -ca))
             }
 #ifdef STREAM_ANY
             if (best_primitive != INVALID) {
@@ -275,7 +269,7 @@ void main() {
 #else
                 store_closest(root, index, best_primitive != INVALID ? best : INFINITY, best_instance, best_primitive, best_uv);
 #endif
-                TAKE
+                if (MOST_TURNS > 0u && turns > MOST_TURNS) return;
                 NEXT_RAY
                 SET_RAY(world.origin, world.direction)
                 in_group = SINGLE_LEVEL;

@@ -11,13 +11,29 @@ use super::stream::LaunchMemory;
 use super::{brute, reference, wide};
 use crate::bvh::{Aabb, bvh2};
 use crate::error::{Error, Result};
-use crate::gpu::{Buffer, Device, Memory};
+use crate::gpu::{Buffer, Device, DeviceInfo, Memory};
 use crate::scene::flatten::{FlatScene, Group, Placement};
 
 /// Rays that a lane of the fast kernel takes one after the other on a CPU driver, where idle lanes of a vector cost most.
-pub const RAYS_PER_LANE_CPU: u32 = 16;
+const RAYS_PER_LANE_CPU: u32 = 16;
 /// On a GPU enough rays fill the machine; long loops per lane only lengthen the tail.
-pub const RAYS_PER_LANE_GPU: u32 = 2;
+const RAYS_PER_LANE_GPU: u32 = 2;
+
+/// How many rays a lane takes one after the other, and after how many turns of its loop it takes no further one (0: no bound).
+///
+/// Where loops are cut, half of the turns are for the last ray; and with one ray per lane of a work-group all are taken, whatever
+/// they cost: a lane that stops has had one. On a CPU lanes still take eight or so each, because the vectors of a work-group run
+/// one after the other and the first takes them all.
+pub(super) fn lane_budget(device: &DeviceInfo) -> (u32, u32) {
+    match (device.cuts_long_loops(), device.is_cpu()) {
+        (true, _) => (1, CUT_LOOP_TURNS / 2),
+        (false, true) => (RAYS_PER_LANE_CPU, 0),
+        (false, false) => (RAYS_PER_LANE_GPU, 0),
+    }
+}
+
+/// After so many turns some drivers leave any loop: [`DeviceInfo::cuts_long_loops`].
+const CUT_LOOP_TURNS: u32 = 65_535;
 
 /// Bytes of a primitive record.
 pub(super) const PRIMITIVE_BYTES: u64 = 40;

@@ -172,11 +172,8 @@ impl Tracer {
         let mut stats = BuildStats { primitives: flat.primitive_count() as u64, ..Default::default() };
         // the hierarchy first: its build needs the most host memory, the scene's buffers come after that is freed
         let start = Instant::now();
-        // The fast kernels lose rays in deep trees on drivers that leave long loops: there the readable one traces.
-        let fast = matches!(options.kernel, Kernel::Auto | Kernel::Wide | Kernel::Packet);
-        let kernel =
-            if fast && device.info.cuts_long_loops() && flat.motion.is_none() { Kernel::Nearest } else { options.kernel };
-        let hierarchy = if kind == TracerKind::Compute { Some(compute::Trees::build(flat, kernel, build)?) } else { None };
+        let hierarchy =
+            if kind == TracerKind::Compute { Some(compute::Trees::build(flat, options.kernel, build)?) } else { None };
         stats.build_seconds = start.elapsed().as_secs_f64();
         let start = Instant::now();
         let mut scene = GpuScene::new(device, flat, needs)?;
@@ -269,13 +266,13 @@ impl Tracer {
             .set(2, self.features.single_level as u32);
         match &self.structure {
             Structure::Compute(h) => {
-                let rays_per_lane =
-                    if self.device.info.is_cpu() { compute::RAYS_PER_LANE_CPU } else { compute::RAYS_PER_LANE_GPU };
+                let (rays_per_lane, most_turns) = compute::lane_budget(&self.device.info);
                 let specialization = specialization
                     .set(3, h.stack_constant())
                     .set(4, rays_per_lane)
                     .set(5, u32::from(h.kernel == Kernel::Direction))
-                    .set(6, u32::from(self.triangle_test == TriangleTest::Watertight));
+                    .set(6, u32::from(self.triangle_test == TriangleTest::Watertight))
+                    .set(8, most_turns);
                 let packets = shaders.has_packets() && self.device.info.limits.packets && self.device.info.int64;
                 match h.kernel {
                     Kernel::Packet | Kernel::Auto if packets && (h.kernel == Kernel::Packet || shaders.is_coherent()) => {

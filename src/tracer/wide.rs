@@ -28,7 +28,7 @@ use crate::bvh::build::{self, MAX_DEPTH};
 use crate::bvh::cache::KeyBuilder;
 use crate::bvh::pairs::{self, Fan, Pair};
 use crate::bvh::wide::{self, BLOCK_BYTES, Block, Wide};
-use crate::bvh::{Aabb, BuildPreset, bvh2};
+use crate::bvh::{Aabb, BuildPreset};
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, Device, Memory};
 use crate::ray::Ray;
@@ -115,13 +115,14 @@ impl Trees {
             let free = std::iter::repeat_n([0; 16], room - t.blocks.len());
             t.blocks.iter().map(move |b| wide::rebased(*b, by)).chain(free)
         });
-        let nodes = write_records(device, "hierarchy", BLOCK_BYTES, count as u64, &mut { in_room })?;
+        // an empty scene has a node without children
+        let in_room = in_room.chain(std::iter::repeat_n([0; 16], usize::from(count == 0)));
+        let nodes = write_records(device, "hierarchy", BLOCK_BYTES, count.max(1) as u64, &mut { in_room })?;
         let launch = |name, bytes| Buffer::new(device, name, bytes * LAUNCH_RAYS as u64, Memory::Device).map(Arc::new);
         Ok(Hierarchy {
             kernel,
             primitives: Buffer::new(device, "no primitives", 16, Memory::Device)?,
-            // an empty scene has no tree, and rays that miss its bounds never begin
-            root: if count == 0 { bvh2::EMPTY } else { 0 },
+            root: 0,
             instance_roots: vec![0; flat.placements.len()],
             stack_entries,
             bounds,
