@@ -3,14 +3,9 @@
 // closest() or any().
 #ifndef TRACE_BRUTE
 #define TRACE_BRUTE
-#include "scene/material.glsl"
-#include "scene/sphere.glsl"
-#include "trace/records.glsl"
-#include "trace/triangle.glsl"
+#include "trace/primitive.glsl"
 
 layout(local_size_x = LANES) in;
-
-#define LOAD_FLOATS(base, i) uintBitsToFloat(LOAD_PAIR(base, i))
 
 // The host lets no scene in whose loops would have more turns than any driver runs (src/tracer/brute.rs).
 void main() {
@@ -37,26 +32,14 @@ void main() {
         }
         Shear shear = make_shear(direction);
         for (uint i = range.x; i < range.y; i++) {
-            vec2 a = LOAD_FLOATS(primitives, 5u * i), b = LOAD_FLOATS(primitives, 5u * i + 1u), c = LOAD_FLOATS(primitives, 5u * i + 2u);
-            vec2 d = LOAD_FLOATS(primitives, 5u * i + 3u), e = LOAD_FLOATS(primitives, 5u * i + 4u);
-            uint id = floatBitsToUint(e.y);
+            uint primitive;
             float t;
             vec2 uv;
-            bool met;
-            if (HAS_SPHERES && (id & SPHERE) != 0u) {
-                t = intersect_sphere(origin, direction, world.tmin, best, vec3(a, b.x), b.y);
-                uv = vec2(0.0);
-                met = t > world.tmin && t < best;
-            } else {
-                met = intersect_triangle(shear, origin, direction, vec3(a, b.x), vec3(b.y, c), vec3(d, e.x), world.tmin, best, t, uv);
-            }
-            if (HAS_ALPHA) {
-                if (met && (id & ALPHA_TESTED) != 0u) met = alpha_passes(instance, id & NUMBER, uv);
-            }
+            bool met = meets_record(primitives, i, instance, shear, origin, direction, world.tmin, best, primitive, t, uv);
             if (met) {
                 best = t;
                 best_instance = instance;
-                best_primitive = id & NUMBER;
+                best_primitive = primitive;
                 best_uv = uv;
             }
 #ifdef STREAM_ANY

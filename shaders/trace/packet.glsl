@@ -1,27 +1,22 @@
 // The compute tracer's kernel for coherent streams: the lanes of a subgroup walk the hierarchy together, each with PACKET_RAYS rays of its
 // own (after Wald, Slusallek, Benthin, Wagner, "Interactive Rendering with Coherent Ray Tracing", EG 2001, and `wide.glsl`, whose
 // blocks these are). A block is fetched once for all and decoded once a lane, and control flow is the same in all lanes; so a visit
-// costs a lane a fraction of what it does in `wide.glsl`, and the packet visits what any of its rays would. The result is the same.
+// costs a lane a fraction of what it does in `wide.glsl`, and the packet visits what any of its rays would. The nearest hits are the same.
 //
 // Rays are generated and delivered here, all lanes in step; nothing goes through memory. The host uses this kernel only for streams
-// that say they are coherent, on devices with subgroup shuffles whose subgroups are known to hold at least eight lanes.
+// that say they are coherent, on devices whose subgroups are known to hold eight lanes or more and have broadcasts and arithmetic.
 #ifndef TRACE_PACKET
 #define TRACE_PACKET
-#include "scene/material.glsl"
-#include "scene/sphere.glsl"
 #include "trace/block.glsl"
 #include "trace/callback.glsl"
-#include "trace/records.glsl"
+#include "trace/leaf.glsl"
 #include "trace/slab.glsl"
-#include "trace/triangle.glsl"
+#include "trace/stack.glsl"
 
 layout(local_size_x = LANES) in;
 
 // Lanes of a subgroup: a power of two.
 layout(constant_id = 7) const uint SUBGROUP = 8;
-// Stack entries beyond those in registers, as in wide.glsl.
-layout(constant_id = 3) const uint SPILLED = 64;
-const uint TOP = 6u;
 
 layout(buffer_reference, std430, buffer_reference_align = 4) buffer Counter { uint v; };
 layout(buffer_reference, std430, buffer_reference_align = 8) readonly buffer BlockWords { WORD64 v[]; };
@@ -33,7 +28,6 @@ const uint NO_CLASS = 0xffu;
 uint class_of(vec3 inverse, uint axis) {
     return (inverse.x < 0.0 ? 4u : 0u) | (inverse.y < 0.0 ? 2u : 0u) | (inverse.z < 0.0 ? 1u : 0u) | (axis << 3);
 }
-
 
 // Over all lanes. Constant broadcasts are one instruction on a CPU driver; the built-in reductions, shuffles of more than eight lanes and
 // quad swaps are loops there.
@@ -59,42 +53,7 @@ uint all_min(uint x) {
     REDUCE(min)
 }
 
-float pick_weight(vec3 w, uint k) {
-    k &= 3u;
-    return k == 0u ? w.x : k == 1u ? w.y : w.z;
-}
-
 #define FOR_RAYS [[unroll]] for (int j = 0; j < PACKET_RAYS; j++)
-
-#define PUSH(b, g)                                                          \
-    if (SPILLED > 0u) {                                                     \
-        if (depth >= TOP) {                                                 \
-            spilled_base[depth - TOP] = top_base[TOP - 1u];                 \
-            spilled_group[depth - TOP] = top_group[TOP - 1u];               \
-        }                                                                   \
-    }                                                                       \
-    [[unroll]] for (uint s = TOP - 1u; s > 0u; s--) {                       \
-        top_base[s] = top_base[s - 1u];                                     \
-        top_group[s] = top_group[s - 1u];                                   \
-    }                                                                       \
-    top_base[0] = (b);                                                      \
-    top_group[0] = (g);                                                     \
-    depth++;
-
-#define POP                                                                 \
-    base = top_base[0];                                                     \
-    group = top_group[0];                                                   \
-    [[unroll]] for (uint s = 0u; s < TOP - 1u; s++) {                       \
-        top_base[s] = top_base[s + 1u];                                     \
-        top_group[s] = top_group[s + 1u];                                   \
-    }                                                                       \
-    depth--;                                                                \
-    if (SPILLED > 0u) {                                                     \
-        if (depth >= TOP) {                                                 \
-            top_base[TOP - 1u] = spilled_base[depth - TOP];                 \
-            top_group[TOP - 1u] = spilled_group[depth - TOP];               \
-        }                                                                   \
-    }
 
 #define SET_RAY(j, o, d)                                        \
     origin[j] = (o);                                            \
@@ -114,61 +73,19 @@ float pick_weight(vec3 w, uint k) {
     }
 
 #ifdef STREAM_ANY
-#define ACCEPT                        \
+#define ACCEPT(id)                    \
     best[j] = -1.0;                   \
     limit[j] = -1.0;                  \
-    best_primitive[j] = id & NUMBER;  \
+    best_primitive[j] = (id) & NUMBER;  \
     found = true;
 #else
-#define ACCEPT                        \
+#define ACCEPT(id)                    \
     best[j] = t;                      \
     limit[j] = t;                     \
     best_uv[j] = uv;                  \
     best_instance[j] = instance;      \
-    best_primitive[j] = id & NUMBER;
+    best_primitive[j] = (id) & NUMBER;
 #endif
-
-// A triangle is met at `t` with barycentric `weights`: unless its alpha says otherwise, take it.
-#define OFFER(turn)                                                                                                  \
-    vec2 uv = vec2(pick_weight(weights, (turn)), pick_weight(weights, (turn) >> 2));                                 \
-    bool met = true;                                                                                                 \
-    if (HAS_ALPHA) {                                                                                                 \
-        if ((id & ALPHA_TESTED) != 0u) met = alpha_passes(instance, id & NUMBER, uv);                                \
-    }                                                                                                                \
-    if (met) {                                                                                                       \
-        ACCEPT                                                                                                       \
-    }
-
-#define TEST_TRIANGLE(id_, turn, v0_, v1_, v2_, a, b, c, e)                                                     \
-    {                                                                                                                    \
-        uint id = (id_);                                                                                                 \
-        float t;                                                                                                         \
-        vec3 weights;                                                                                                    \
-        if (meets_between(shear[j], origin[j], direction[j], v0_, v1_, v2_, a, b, c, e, tmin[j], limit[j], t, weights)) { \
-            OFFER(turn)                                                                                                  \
-        }                                                                                                                \
-    }
-
-#define TEST_MOLLER_TRUMBORE(id_, turn, v0_, v1_, v2_)                                                      \
-    {                                                                                                       \
-        uint id = (id_);                                                                                    \
-        float t;                                                                                            \
-        vec2 vw;                                                                                            \
-        if (intersect_moller_trumbore(origin[j], direction[j], v0_, v1_, v2_, tmin[j], limit[j], t, vw)) {  \
-            vec3 weights = vec3(1.0 - vw.x - vw.y, vw);                                                     \
-            OFFER(turn)                                                                                     \
-        }                                                                                                   \
-    }
-
-#define TEST_SPHERE(id_, center, radius)                                                             \
-    {                                                                                                \
-        uint id = (id_);                                                                             \
-        float t = intersect_sphere(origin[j], direction[j], tmin[j], limit[j], center, radius);      \
-        vec2 uv = vec2(0.0);                                                                         \
-        if (id != INVALID && t > tmin[j] && t < limit[j]) {                                          \
-            ACCEPT                                                                                   \
-        }                                                                                            \
-    }
 
 void main() {
     SceneRoot root = SceneRoot(push.scene);
@@ -202,13 +119,8 @@ void main() {
         best_uv[j] = vec2(0.0);
     }
 
-    uint top_base[TOP], top_group[TOP];
-    uint spilled_base[SPILLED + 1u], spilled_group[SPILLED + 1u];
-    [[unroll]] for (uint s = 0u; s < TOP; s++) {
-        top_base[s] = 0u;
-        top_group[s] = 0u;
-    }
-    uint depth = 0u, instance = 0u, instance_root = 0u;
+    DECLARE_STACK
+    uint instance = 0u, instance_root = 0u;
     bool in_group = SINGLE_LEVEL;
     uint class_;
     { NEXT_CLASS }
@@ -292,28 +204,36 @@ void main() {
             group = ROOT_GROUP;
         } else {
             bool found = false;
+            float t;
+            vec2 uv;
             if (HAS_SPHERES && (w6.x & SPHERE) != 0u) {
+                vec3 c0 = uintBitsToFloat(uvec3(w0, w1.x)), c1 = uintBitsToFloat(uvec3(w2, w3.x));
                 FOR_RAYS {
-                    TEST_SPHERE(w6.x, uintBitsToFloat(uvec3(w0, w1.x)), uintBitsToFloat(w1.y))
-                    TEST_SPHERE(w6.y, uintBitsToFloat(uvec3(w2, w3.x)), uintBitsToFloat(w3.y))
+                    if (meets_sphere(w6.x, origin[j], direction[j], c0, uintBitsToFloat(w1.y), tmin[j], limit[j], t, uv)) { ACCEPT(w6.x) }
+                    if (meets_sphere(w6.y, origin[j], direction[j], c1, uintBitsToFloat(w3.y), tmin[j], limit[j], t, uv)) { ACCEPT(w6.y) }
                 }
             } else {
                 uint axis = class_ >> 3;
                 vec3 v0 = uintBitsToFloat(uvec3(w0, w1.x)), v1 = uintBitsToFloat(uvec3(w1.y, w2));
                 vec3 v2 = uintBitsToFloat(uvec3(w3, w4.x)), v3 = uintBitsToFloat(uvec3(w4.y, w5));
                 FOR_RAYS {
+                    vec3 o = origin[j], r = direction[j];
                     if (WATERTIGHT) {
                         Shear s = Shear(axis, shear[j].s);
-                        Corner a = make_corner(s, origin[j], v0), b = make_corner(s, origin[j], v1);
-                        Corner c = make_corner(s, origin[j], v2), d = make_corner(s, origin[j], v3);
+                        Corner a = make_corner(s, o, v0), b = make_corner(s, o, v1), c = make_corner(s, o, v2), d = make_corner(s, o, v3);
                         float ab = edge(b, a), bc = edge(c, b), ca = edge(a, c), cd = edge(d, c), da = edge(a, d);
+                        vec3 first = vec3(bc, ca, ab), second = vec3(cd, da, -ca);
                         // rays of another class see nonsense
                         bool live = limit[j] > tmin[j];
-                        if (live && is_inside(vec3(bc, ca, ab))) TEST_TRIANGLE(w6.x, w7.x, v0, v1, v2, a, b, c, vec3(bc, ca, ab))
-                        if (live && w6.y != INVALID && is_inside(vec3(cd, da, -ca))) TEST_TRIANGLE(w6.y, w7.x >> 4, v0, v2, v3, a, c, d, vec3(cd, da, -ca))
+                        if (live && is_inside(first)) {
+                            if (meets_triangle(w6.x, w7.x, instance, s, o, r, v0, v1, v2, a, b, c, first, tmin[j], limit[j], t, uv)) { ACCEPT(w6.x) }
+                        }
+                        if (live && is_inside(second) && w6.y != INVALID) {
+                            if (meets_triangle(w6.y, w7.x >> 4, instance, s, o, r, v0, v2, v3, a, c, d, second, tmin[j], limit[j], t, uv)) { ACCEPT(w6.y) }
+                        }
                     } else {
-                        TEST_MOLLER_TRUMBORE(w6.x, w7.x, v0, v1, v2)
-                        if (w6.y != INVALID) TEST_MOLLER_TRUMBORE(w6.y, w7.x >> 4, v0, v2, v3)
+                        if (meets_moller_trumbore(w6.x, w7.x, instance, o, r, v0, v1, v2, tmin[j], limit[j], t, uv)) { ACCEPT(w6.x) }
+                        if (meets_moller_trumbore(w6.y, w7.x >> 4, instance, o, r, v0, v2, v3, tmin[j], limit[j], t, uv)) { ACCEPT(w6.y) }
                     }
                 }
             }
@@ -341,7 +261,7 @@ void main() {
                 group = ROOT_GROUP;
                 nearest = INVALID;
             } else {
-                POP
+                POP(base, group)
                 if (!SINGLE_LEVEL && group == 0u) {
                     NEXT_CLASS
                     if (class_ != NO_CLASS) {

@@ -5,11 +5,8 @@
 // that lies first along the sign of the ray's direction on the node's axis. Both prune by the nearest hit so far.
 #ifndef TRACE_REFERENCE
 #define TRACE_REFERENCE
-#include "scene/material.glsl"
-#include "scene/sphere.glsl"
-#include "trace/records.glsl"
+#include "trace/primitive.glsl"
 #include "trace/slab.glsl"
-#include "trace/triangle.glsl"
 
 layout(local_size_x = LANES) in;
 
@@ -30,7 +27,6 @@ const uint LAST_NODE = 0x7ffffff0u;
 const uint NODE_NUMBER = 0x07ffffffu;
 const uint AXIS_SHIFT = 27u;
 layout(buffer_reference, std430, buffer_reference_align = 4) buffer Counter { uint v; };
-#define LOAD_FLOATS(base, i) uintBitsToFloat(LOAD_PAIR(base, i))
 
 // Entry distance of a box, or INFINITY when it is missed.
 float enter_box(vec3 lo, vec3 hi, vec3 origin, vec3 inverse, float tmin, float tmax) {
@@ -108,26 +104,14 @@ void main() {
         if ((current & LEAF) != 0u) {
             if (SINGLE_LEVEL || in_group) {
                 uint i = current & 0x07ffffffu;
-                vec2 a = LOAD_FLOATS(primitives, 5u * i), b = LOAD_FLOATS(primitives, 5u * i + 1u), c = LOAD_FLOATS(primitives, 5u * i + 2u);
-                vec2 d = LOAD_FLOATS(primitives, 5u * i + 3u), e = LOAD_FLOATS(primitives, 5u * i + 4u);
-                uint id = floatBitsToUint(e.y);
+                uint primitive;
                 float t;
                 vec2 uv;
-                bool met;
-                if (HAS_SPHERES && (id & SPHERE) != 0u) {
-                    t = intersect_sphere(origin, direction, world.tmin, best, vec3(a, b.x), b.y);
-                    uv = vec2(0.0);
-                    met = t > world.tmin && t < best;
-                } else {
-                    met = intersect_triangle(shear, origin, direction, vec3(a, b.x), vec3(b.y, c), vec3(d, e.x), world.tmin, best, t, uv);
-                }
-                if (HAS_ALPHA) {
-                    if (met && (id & ALPHA_TESTED) != 0u) met = alpha_passes(instance, id & NUMBER, uv);
-                }
+                bool met = meets_record(primitives, i, instance, shear, origin, direction, world.tmin, best, primitive, t, uv);
                 if (met) {
                     best = t;
                     best_instance = instance;
-                    best_primitive = id & NUMBER;
+                    best_primitive = primitive;
                     best_uv = uv;
                 }
                 // the next primitive of the leaf: one more, and one fewer to come

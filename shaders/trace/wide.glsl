@@ -8,27 +8,18 @@
 // lanes busy.
 #ifndef TRACE_WIDE
 #define TRACE_WIDE
-#include "scene/material.glsl"
-#include "scene/sphere.glsl"
 #include "trace/block.glsl"
-#include "trace/records.glsl"
-#include "trace/slab.glsl"
-#include "trace/triangle.glsl"
 #include "trace/launch.glsl"
+#include "trace/leaf.glsl"
+#include "trace/slab.glsl"
+#include "trace/stack.glsl"
 
 layout(local_size_x = LANES) in;
 
-// What the scene's trees need at most beyond the entries in registers: a node visit pushes at most the rest of one group of
-// children; entering an entry of the top level pushes that and the way back. The host counts it.
-layout(constant_id = 3) const uint SPILLED = 64;
 layout(constant_id = 4) const uint RAYS_PER_LANE = 1;
 // A lane that has taken so many turns takes no further ray; 0: no bound. For drivers that leave any loop after 65,535 turns: with
 // one ray per lane of a work-group each ray is taken nevertheless, because a lane that stops has had one.
 layout(constant_id = 8) const uint MOST_TURNS = 0;
-
-// Entries of the stack in registers. A CPU driver writes to an array element by element, about ninety instructions; moving all of
-// these takes one each.
-const uint TOP = 6u;
 
 #define SET_RAY(o, d)                                                                                          \
     origin = (o);                                                                                              \
@@ -37,36 +28,6 @@ const uint TOP = 6u;
     shear = make_shear(direction, inverse);                                                                    \
     negative = lessThan(inverse, vec3(0.0));                                                                   \
     octant = 7u - ((negative.x ? 4u : 0u) | (negative.y ? 2u : 0u) | (negative.z ? 1u : 0u));
-
-#define PUSH(b, g)                                                          \
-    if (SPILLED > 0u) {                                                     \
-        if (depth >= TOP) {                                                 \
-            spilled_base[depth - TOP] = top_base[TOP - 1u];                 \
-            spilled_group[depth - TOP] = top_group[TOP - 1u];               \
-        }                                                                   \
-    }                                                                       \
-    [[unroll]] for (uint s = TOP - 1u; s > 0u; s--) {                       \
-        top_base[s] = top_base[s - 1u];                                     \
-        top_group[s] = top_group[s - 1u];                                   \
-    }                                                                       \
-    top_base[0] = (b);                                                      \
-    top_group[0] = (g);                                                     \
-    depth++;
-
-#define POP                                                                 \
-    base = top_base[0];                                                     \
-    group = top_group[0];                                                   \
-    [[unroll]] for (uint s = 0u; s < TOP - 1u; s++) {                       \
-        top_base[s] = top_base[s + 1u];                                     \
-        top_group[s] = top_group[s + 1u];                                   \
-    }                                                                       \
-    depth--;                                                                \
-    if (SPILLED > 0u) {                                                     \
-        if (depth >= TOP) {                                                 \
-            top_base[TOP - 1u] = spilled_base[depth - TOP];                 \
-            top_group[TOP - 1u] = spilled_group[depth - TOP];               \
-        }                                                                   \
-    }
 
 Ray take_ray(uint k) {
     Block4 b = Block4(offset_address(push.rays, 32u * k));
@@ -81,64 +42,16 @@ Ray take_ray(uint k) {
     world = take_ray(index);                                                                            \
     if (!is_ray(world)) world = no_ray();
 
-// What the ray met last, with the weights of the second and third corner as the mesh has them.
+// What the ray met last: primitive `id` at `t`, with the weights of the second and third corner as the mesh has them.
 #ifdef STREAM_ANY
-#define ACCEPT best_primitive = id & NUMBER;
+#define ACCEPT(id) best_primitive = (id) & NUMBER;
 #else
-#define ACCEPT                        \
+#define ACCEPT(id)                    \
     best = t;                         \
     best_uv = uv;                     \
     best_instance = instance;         \
-    best_primitive = id & NUMBER;
+    best_primitive = (id) & NUMBER;
 #endif
-
-// A triangle is met at `t` with barycentric `weights`: unless its alpha says otherwise, take it.
-#define OFFER(turn)                                                                                                  \
-    vec2 uv = vec2(pick_weight(weights, (turn)), pick_weight(weights, (turn) >> 2));                                 \
-    bool met = true;                                                                                                 \
-    if (HAS_ALPHA) {                                                                                                 \
-        if ((id & ALPHA_TESTED) != 0u) met = alpha_passes(instance, id & NUMBER, uv);                                \
-    }                                                                                                                \
-    if (met) {                                                                                                       \
-        ACCEPT                                                                                                       \
-    }
-
-// One triangle of a pair: its number, the places of its second and third corner, corners as they lie and as the ray sees them, edges.
-#define TEST_TRIANGLE(id_, turn, v0_, v1_, v2_, a, b, c, e)                                                     \
-    {                                                                                                                    \
-        uint id = (id_);                                                                                                 \
-        float t;                                                                                                         \
-        vec3 weights;                                                                                                    \
-        if (meets_between(shear, origin, direction, v0_, v1_, v2_, a, b, c, e, world.tmin, best, t, weights)) { \
-            OFFER(turn)                                                                                                  \
-        }                                                                                                                \
-    }
-
-#define TEST_MOLLER_TRUMBORE(id_, turn, v0_, v1_, v2_)                                                      \
-    {                                                                                                       \
-        uint id = (id_);                                                                                    \
-        float t;                                                                                            \
-        vec2 vw;                                                                                            \
-        if (intersect_moller_trumbore(origin, direction, v0_, v1_, v2_, world.tmin, best, t, vw)) {         \
-            vec3 weights = vec3(1.0 - vw.x - vw.y, vw);                                                     \
-            OFFER(turn)                                                                                     \
-        }                                                                                                   \
-    }
-
-#define TEST_SPHERE(id_, center, radius)                                                             \
-    {                                                                                                \
-        uint id = (id_);                                                                             \
-        float t = intersect_sphere(origin, direction, world.tmin, best, center, radius);             \
-        vec2 uv = vec2(0.0);                                                                         \
-        if (id != INVALID && t > world.tmin && t < best) {                                           \
-            ACCEPT                                                                                   \
-        }                                                                                            \
-    }
-
-float pick_weight(vec3 w, uint k) {
-    k &= 3u;
-    return k == 0u ? w.x : k == 1u ? w.y : w.z;
-}
 
 void main() {
     uint begin = gl_WorkGroupID.x * (LANES * RAYS_PER_LANE);
@@ -147,13 +60,7 @@ void main() {
     uint index;
     uvec2 blocks = root.nodes;
 
-    uint top_base[TOP], top_group[TOP];
-    uint spilled_base[SPILLED + 1u], spilled_group[SPILLED + 1u];
-    [[unroll]] for (uint s = 0u; s < TOP; s++) {
-        top_base[s] = 0u;
-        top_group[s] = 0u;
-    }
-    uint depth = 0u;
+    DECLARE_STACK
 
     Ray world;
     NEXT_RAY
@@ -223,23 +130,30 @@ void main() {
             base = w6.x;
             group = ROOT_GROUP;
         } else {
+            float t;
+            vec2 uv;
             if (HAS_SPHERES && (w6.x & SPHERE) != 0u) {
-                TEST_SPHERE(w6.x, uintBitsToFloat(uvec3(w0, w1.x)), uintBitsToFloat(w1.y))
-                TEST_SPHERE(w6.y, uintBitsToFloat(uvec3(w2, w3.x)), uintBitsToFloat(w3.y))
+                vec3 c0 = uintBitsToFloat(uvec3(w0, w1.x)), c1 = uintBitsToFloat(uvec3(w2, w3.x));
+                if (meets_sphere(w6.x, origin, direction, c0, uintBitsToFloat(w1.y), world.tmin, best, t, uv)) { ACCEPT(w6.x) }
+                if (meets_sphere(w6.y, origin, direction, c1, uintBitsToFloat(w3.y), world.tmin, best, t, uv)) { ACCEPT(w6.y) }
             } else {
                 vec3 v0 = uintBitsToFloat(uvec3(w0, w1.x)), v1 = uintBitsToFloat(uvec3(w1.y, w2));
                 vec3 v2 = uintBitsToFloat(uvec3(w3, w4.x)), v3 = uintBitsToFloat(uvec3(w4.y, w5));
-                Corner a = make_corner(shear, origin, v0), b = make_corner(shear, origin, v1);
-                Corner c = make_corner(shear, origin, v2), d = make_corner(shear, origin, v3);
-                float ab = edge(b, a), bc = edge(c, b), ca = edge(a, c), cd = edge(d, c), da = edge(a, d);
-                bool first = is_inside(vec3(bc, ca, ab)), second = is_inside(vec3(cd, da, -ca)) && w6.y != INVALID;
-                if (!WATERTIGHT) {
-                    TEST_MOLLER_TRUMBORE(w6.x, w7.x, v0, v1, v2)
-                    if (w6.y != INVALID) TEST_MOLLER_TRUMBORE(w6.y, w7.x >> 4, v0, v2, v3)
-                    first = second = false;
+                if (WATERTIGHT) {
+                    Corner a = make_corner(shear, origin, v0), b = make_corner(shear, origin, v1);
+                    Corner c = make_corner(shear, origin, v2), d = make_corner(shear, origin, v3);
+                    float ab = edge(b, a), bc = edge(c, b), ca = edge(a, c), cd = edge(d, c), da = edge(a, d);
+                    vec3 first = vec3(bc, ca, ab), second = vec3(cd, da, -ca);
+                    if (is_inside(first)) {
+                        if (meets_triangle(w6.x, w7.x, instance, shear, origin, direction, v0, v1, v2, a, b, c, first, world.tmin, best, t, uv)) { ACCEPT(w6.x) }
+                    }
+                    if (is_inside(second) && w6.y != INVALID) {
+                        if (meets_triangle(w6.y, w7.x >> 4, instance, shear, origin, direction, v0, v2, v3, a, c, d, second, world.tmin, best, t, uv)) { ACCEPT(w6.y) }
+                    }
+                } else {
+                    if (meets_moller_trumbore(w6.x, w7.x, instance, origin, direction, v0, v1, v2, world.tmin, best, t, uv)) { ACCEPT(w6.x) }
+                    if (meets_moller_trumbore(w6.y, w7.x >> 4, instance, origin, direction, v0, v2, v3, world.tmin, best, t, uv)) { ACCEPT(w6.y) }
                 }
-                if (first) TEST_TRIANGLE(w6.x, w7.x, v0, v1, v2, a, b, c, vec3(bc, ca, ab))
-                if (second) TEST_TRIANGLE(w6.y, w7.x >> 4, v0, v2, v3, a, c, d, vec3(cd, da, -ca))
             }
 #ifdef STREAM_ANY
             if (best_primitive != INVALID) {
@@ -252,14 +166,14 @@ void main() {
         if (!has_siblings(group)) {
             done = depth == 0u;
             if (!done) {
-                POP
+                POP(base, group)
                 if (!SINGLE_LEVEL && group == 0u) {
                     // back to the top level
                     SET_RAY(world.origin, world.direction)
                     in_group = false;
                     done = depth == 0u;
                     if (!done) {
-                        POP
+                        POP(base, group)
                     }
                 }
             }

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 use std::time::Duration;
 
+use clap::builder::PossibleValue;
 use clap::{Args, ValueEnum, ValueHint};
 use glam::DVec3;
 
@@ -49,33 +50,13 @@ impl TracerChoice {
     }
 }
 
-/// How the compute tracer finds what a ray meets.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Traversal {
-    /// `packet` for coherent rays where the device can, else `wide`
-    Auto,
-    /// Seven-wide nodes, each ray by itself
-    Wide,
-    /// Seven-wide nodes, the rays of a subgroup together
-    Packet,
-    /// Binary nodes, the nearest child first
-    Nearest,
-    /// Binary nodes, children in the order of the ray's direction on the split axis
-    Direction,
-    /// Every primitive of every instance: for small scenes and tests
-    Brute,
-}
+impl ValueEnum for Kernel {
+    fn value_variants<'a>() -> &'a [Self] {
+        &Self::ALL
+    }
 
-impl From<Traversal> for Kernel {
-    fn from(t: Traversal) -> Self {
-        match t {
-            Traversal::Auto => Kernel::Auto,
-            Traversal::Wide => Kernel::Wide,
-            Traversal::Packet => Kernel::Packet,
-            Traversal::Nearest => Kernel::Nearest,
-            Traversal::Direction => Kernel::Direction,
-            Traversal::Brute => Kernel::Brute,
-        }
+    fn to_possible_value(&self) -> Option<PossibleValue> {
+        Some(PossibleValue::new(self.name()).help(self.describe()))
     }
 }
 
@@ -198,7 +179,7 @@ pub struct DeviceArgs {
     pub tracer: TracerChoice,
     /// How the compute tracer walks its hierarchy [default: wide]
     #[arg(long, value_enum)]
-    pub traversal: Option<Traversal>,
+    pub traversal: Option<Kernel>,
     /// The compute tracer's triangle test [default: watertight]
     #[arg(long, value_enum)]
     pub triangle_test: Option<TriangleTestChoice>,
@@ -241,11 +222,13 @@ impl DeviceArgs {
     /// # Errors
     /// [`Error::Usage`] when such an option meets another tracer.
     pub fn choose(&self, info: &crate::gpu::DeviceInfo) -> Result<(TracerKind, String, ComputeOptions)> {
-        let option = match (self.traversal, self.triangle_test) {
-            (Some(_), _) => Some("--traversal"),
-            (None, Some(_)) => Some("--triangle-test"),
-            (None, None) => None,
-        };
+        let given = [
+            (self.traversal.is_some(), "--traversal"),
+            (self.triangle_test.is_some(), "--triangle-test"),
+            (self.build != BuildChoice::Auto, "--build"),
+            (self.bvh_cache.is_some(), "--bvh-cache"),
+        ];
+        let option = given.into_iter().find_map(|(given, name)| given.then_some(name));
         let (kind, why) = match (self.tracer, option) {
             (TracerChoice::Auto, Some(option)) => (TracerKind::Compute, format!("{option} is about this tracer alone")),
             (choice, _) => choice.on(info),
@@ -258,7 +241,7 @@ impl DeviceArgs {
                 kind,
                 why,
                 ComputeOptions {
-                    kernel: self.traversal.map(Kernel::from).unwrap_or_default(),
+                    kernel: self.traversal.unwrap_or_default(),
                     triangle_test: self.triangle_test.map(TriangleTest::from).unwrap_or_default(),
                 },
             )),

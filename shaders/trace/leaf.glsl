@@ -1,0 +1,49 @@
+// The fast kernels' leaves: one or two spheres, or a pair of triangles that share an edge (src/bvh/pairs.rs).
+#ifndef TRACE_LEAF
+#define TRACE_LEAF
+#include "scene/material.glsl"
+#include "scene/sphere.glsl"
+#include "trace/records.glsl"
+#include "trace/triangle.glsl"
+
+// The weight of the corner that lies at place `k` of a triangle.
+float pick_weight(vec3 weights, uint k) {
+    k &= 3u;
+    return k == 0u ? weights.x : k == 1u ? weights.y : weights.z;
+}
+
+// A triangle is met with these weights: `id` is its number with flags, `turn` says at which places its second and third corner
+// lie. Their weights, and whether its alpha lets it be met.
+bool is_there(uint id, uint turn, uint instance, vec3 weights, out vec2 uv) {
+    uv = vec2(pick_weight(weights, turn), pick_weight(weights, turn >> 2));
+    bool met = true;
+    if (HAS_ALPHA) {
+        if ((id & ALPHA_TESTED) != 0u) met = alpha_passes(instance, id & NUMBER, uv);
+    }
+    return met;
+}
+
+// One triangle of a pair, whose edges the ray passes between: corners as they lie and as the ray sees them.
+bool meets_triangle(uint id, uint turn, uint instance, Shear shear, vec3 origin, vec3 direction, vec3 v0, vec3 v1, vec3 v2,
+        Corner a, Corner b, Corner c, vec3 edges, float tmin, float tmax, out float t, out vec2 uv) {
+    vec3 weights;
+    bool met = meets_between(shear, origin, direction, v0, v1, v2, a, b, c, edges, tmin, tmax, t, weights);
+    if (met) met = is_there(id, turn, instance, weights, uv);
+    return met;
+}
+
+bool meets_moller_trumbore(uint id, uint turn, uint instance, vec3 origin, vec3 direction, vec3 v0, vec3 v1, vec3 v2, float tmin,
+        float tmax, out float t, out vec2 uv) {
+    vec2 vw;
+    bool met = id != INVALID && intersect_moller_trumbore(origin, direction, v0, v1, v2, tmin, tmax, t, vw);
+    if (met) met = is_there(id, turn, instance, vec3(1.0 - vw.x - vw.y, vw), uv);
+    return met;
+}
+
+bool meets_sphere(uint id, vec3 origin, vec3 direction, vec3 center, float radius, float tmin, float tmax, out float t, out vec2 uv) {
+    t = intersect_sphere(origin, direction, tmin, tmax, center, radius);
+    uv = vec2(0.0);
+    return id != INVALID && t > tmin && t < tmax;
+}
+
+#endif
