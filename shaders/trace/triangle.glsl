@@ -71,16 +71,22 @@ vec3 upper_half(vec3 a) {
     return hi;
 }
 
-Wide3 wide_product(Wide3 a, Wide3 b) {
-    precise vec3 p = a.hi * b.hi;
-    precise vec3 ah = upper_half(a.hi), bh = upper_half(b.hi);
-    precise vec3 al = a.hi - ah, bl = b.hi - bh;
+// What rounding takes from a product.
+vec3 product_rest(vec3 a, vec3 b) {
+    precise vec3 p = a * b;
+    precise vec3 ah = upper_half(a), bh = upper_half(b);
+    precise vec3 al = a - ah, bl = b - bh;
     precise vec3 e0 = ah * bh;
     precise vec3 e1 = e0 - p;
     precise vec3 e2 = e1 + ah * bl;
     precise vec3 e3 = e2 + al * bh;
     precise vec3 e4 = e3 + al * bl;
-    precise vec3 lo = e4 + (a.hi * b.lo + a.lo * b.hi);
+    return e4;
+}
+
+Wide3 wide_product(Wide3 a, Wide3 b) {
+    precise vec3 p = a.hi * b.hi;
+    precise vec3 lo = product_rest(a.hi, b.hi) + (a.hi * b.lo + a.lo * b.hi);
     return Wide3(p, lo);
 }
 
@@ -121,12 +127,11 @@ float edge(Corner p, Corner q) {
     return e;
 }
 
-// What rounding has taken from edge(p, q): nearly all of it when that is zero, and then its sign is right.
-float edge_rest(Corner p, Corner q) {
-    precise vec3 a = vec3(p.p.x, p.p.y, 0.0), b = vec3(q.p.y, q.p.x, 0.0);
-    vec3 lost = wide_product(Wide3(a, vec3(0.0)), Wide3(b, vec3(0.0))).lo;
-    precise float e = lost.x - lost.y;
-    return e;
+// What rounding has taken from edge(c, b), edge(a, c), edge(b, a): nearly all of it where that is zero, and then its sign is right.
+vec3 edge_rests(Corner a, Corner b, Corner c) {
+    precise vec3 rest = product_rest(vec3(c.p.x, a.p.x, b.p.x), vec3(b.p.y, c.p.y, a.p.y))
+        - product_rest(vec3(c.p.y, a.p.y, b.p.y), vec3(b.p.x, c.p.x, a.p.x));
+    return rest;
 }
 
 // Does the ray pass between the edges? Each is opposite a corner, and zero counts as inside.
@@ -140,7 +145,7 @@ bool is_inside(vec3 e) {
 bool meets_between(Shear shear, vec3 origin, vec3 direction, vec3 v0, vec3 v1, vec3 v2, Corner a, Corner b, Corner c, vec3 edges,
         float tmin, float tmax, out float t, out vec3 weights) {
     // Seen from far beside it a small triangle's edges may all be zero but one, which looks like a hit of a corner.
-    if (any(equal(edges, vec3(0.0)))) edges += vec3(edge_rest(c, b), edge_rest(a, c), edge_rest(b, a));
+    if (any(equal(edges, vec3(0.0)))) edges += edge_rests(a, b, c);
     bool inside = is_inside(edges);
     float u = edges.x, v = edges.y, w = edges.z;
     float det = u + v + w;

@@ -213,7 +213,12 @@ impl DeviceArgs {
             BuildChoice::Default => Some(BuildPreset::Default),
             BuildChoice::Best => Some(BuildPreset::Best),
         };
-        BuildOptions { preset, rays, cache: self.bvh_cache.clone().or_else(from_environment).map(Cache::new) }
+        BuildOptions {
+            preset,
+            rays,
+            cache: self.bvh_cache.clone().or_else(from_environment).map(Cache::new),
+            streams: Vec::new(),
+        }
     }
 
     /// The tracer on a device, why this one, and how the compute tracer works. What concerns the compute tracer alone chooses it

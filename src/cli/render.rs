@@ -57,7 +57,8 @@ pub fn run(args: &RenderArgs, start: Instant) -> Result<()> {
         Needs { normals: options.hemisphere == Hemisphere::Shading || args.wants(Aov::Ns), albedo: args.wants(Aov::Albedo) };
     // a camera ray and an occlusion ray each
     let rays = 2 * options.spp as u64 * size[0] as u64 * size[1] as u64;
-    let build = args.device.build_options(rays);
+    let mut build = args.device.build_options(rays);
+    build.streams.extend(ao::streams(&options));
     let tracer = Tracer::with_build(&device, kind, &flat, needs, compute, &build)?;
     build.take_warnings().iter().for_each(|w| console.warning(w));
 

@@ -17,6 +17,7 @@ use crate::error::Result;
 use crate::gpu::{Buffer, Commands, ComputePipeline, Device, Memory, Specialization, Timing};
 use crate::ray::Ray;
 use crate::tracer::queue::RayQueue;
+use crate::tracer::stream::StreamShaders;
 use crate::tracer::{Push, Stream, Tracer, stream};
 
 /// A hit whose falloff is below this is not looked for: half a step of an 8-bit image.
@@ -163,6 +164,11 @@ impl Batch {
     }
 }
 
+/// The streams that [`render`] traces.
+pub fn streams(options: &AoOptions) -> [&'static StreamShaders; 2] {
+    [&stream::PRIMARY_CLOSEST, if options.binary() { &stream::OCCLUSION_ANY } else { &stream::OCCLUSION_CLOSEST }]
+}
+
 /// Renders ambient occlusion.
 ///
 /// When `control` says stop, what is kept are whole samples of all pixels: a film whose pixels have different counts would be a
@@ -177,10 +183,11 @@ pub fn render(tracer: &Tracer, camera: &CameraRecord, options: &AoOptions, contr
     let most_pixels = blocks.iter().map(Block::rays).max().unwrap_or(0) as u64;
     let bits = Batch::next(0, options.spp.max(1), u32::MAX).bits;
     let most = (most_pixels << bits).min(MOST as u64) as u32;
+    let [primary, occlusion] = streams(options);
     let mut launcher = Launcher {
         tracer,
-        primary: tracer.stream(&stream::PRIMARY_CLOSEST)?,
-        occlusion: tracer.stream(if options.binary() { &stream::OCCLUSION_ANY } else { &stream::OCCLUSION_CLOSEST })?,
+        primary: tracer.stream(primary)?,
+        occlusion: tracer.stream(occlusion)?,
         resolve: ComputePipeline::new(device, "resolve", stream::RESOLVE, &Specialization::default())?,
         queue: RayQueue::new(device, most)?,
         samples: Buffer::new(device, "samples", size_of::<f32>() as u64 * most as u64, Memory::Device)?,

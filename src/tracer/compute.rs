@@ -32,6 +32,9 @@ pub(super) fn lane_budget(device: &DeviceInfo) -> (u32, u32) {
     }
 }
 
+/// Entries of the stack beyond those in registers that most scenes come to, rounded up.
+pub(super) const USUAL_STACK: u32 = 16;
+
 /// After so many turns some drivers leave any loop: [`DeviceInfo::cuts_long_loops`].
 const CUT_LOOP_TURNS: u32 = 65_535;
 
@@ -88,10 +91,14 @@ impl Hierarchy {
         self.launch.clone().ok_or_else(|| Error::Vulkan(format!("kernel '{}' has no steps", self.kernel)))
     }
 
-    /// What the kernel's array is specialised to: the fast kernel holds the upper end of the stack in registers.
+    /// What the kernel's array is specialised to: the fast kernels hold the upper end of the stack in registers, and the rest is
+    /// rounded up, so that scenes share compiled shaders.
     pub fn stack_constant(&self) -> u32 {
         match self.kernel {
-            Kernel::Auto | Kernel::Wide | Kernel::Packet => self.stack_entries.saturating_sub(wide::STACK_IN_REGISTERS),
+            Kernel::Auto | Kernel::Wide | Kernel::Packet => match self.stack_entries.saturating_sub(wide::STACK_IN_REGISTERS) {
+                0 => 0,
+                n => n.next_power_of_two().max(USUAL_STACK),
+            },
             _ => self.stack_entries.max(1),
         }
     }

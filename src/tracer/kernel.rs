@@ -1,5 +1,6 @@
 //! Which of the compute tracer's kernels runs, and how it tests triangles.
 
+use super::stream::StreamShaders;
 use crate::bvh::BuildPreset;
 use crate::bvh::cache::Cache;
 
@@ -108,11 +109,13 @@ pub struct BuildOptions {
     pub rays: u64,
     /// Where built hierarchies are kept, if anywhere. Only those of the wide kernel are.
     pub cache: Option<Cache>,
+    /// Streams that [`super::Tracer::stream`] will be asked for: large scenes' are compiled beside the build.
+    pub streams: Vec<&'static StreamShaders>,
 }
 
 impl Default for BuildOptions {
     fn default() -> Self {
-        Self { preset: Some(BuildPreset::Default), rays: 0, cache: None }
+        Self { preset: Some(BuildPreset::Default), rays: 0, cache: None, streams: Vec::new() }
     }
 }
 

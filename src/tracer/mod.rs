@@ -11,6 +11,7 @@ mod dynamic_trees;
 pub mod gpu_scene;
 mod hardware;
 mod kernel;
+mod prepared;
 pub mod queue;
 mod reference;
 pub mod stream;
@@ -26,10 +27,11 @@ pub use kernel::{BuildOptions, ComputeOptions, Kernel, TriangleTest};
 pub use stream::{Push, Stream, StreamShaders};
 
 use crate::error::{Error, Result};
-use crate::gpu::{ComputePipeline, Device, DeviceInfo, Specialization};
+use crate::gpu::{ComputePipeline, Device, DeviceInfo};
 use crate::scene::features::SceneFeatures;
 use crate::scene::flatten::FlatScene;
 use gpu_scene::GpuScene;
+use prepared::{Prepared, Recipe};
 
 /// Which tracer runs the streams.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize)]
@@ -126,6 +128,7 @@ pub struct Tracer {
     dynamic: Option<Box<dynamic::Dynamic>>,
     // by mode
     kernels: [OnceLock<Arc<ComputePipeline>>; 2],
+    prepared: Prepared,
 }
 
 impl Tracer {
@@ -172,8 +175,18 @@ impl Tracer {
         let mut stats = BuildStats { primitives: flat.primitive_count() as u64, ..Default::default() };
         // the hierarchy first: its build needs the most host memory, the scene's buffers come after that is freed
         let start = Instant::now();
-        let hierarchy =
-            if kind == TracerKind::Compute { Some(compute::Trees::build(flat, options.kernel, build)?) } else { None };
+        let (hierarchy, prepared) = match kind {
+            TracerKind::Compute => {
+                let recipes = Prepared::recipes(&device.info, features, options, &build.streams, flat.primitive_count());
+                std::thread::scope(|scope| {
+                    let prepared = (!recipes.is_empty()).then(|| scope.spawn(|| Prepared::compile(device, recipes)));
+                    let trees = compute::Trees::build(flat, options.kernel, build);
+                    let prepared = prepared.map(|p| p.join().unwrap_or_else(|e| std::panic::resume_unwind(e)));
+                    trees.map(|t| (Some(t), prepared.unwrap_or_default()))
+                })?
+            }
+            _ => (None, Prepared::default()),
+        };
         stats.build_seconds = start.elapsed().as_secs_f64();
         let start = Instant::now();
         let mut scene = GpuScene::new(device, flat, needs)?;
@@ -211,6 +224,7 @@ impl Tracer {
             stats,
             dynamic: dynamic::Dynamic::new(flat).map(Box::new),
             kernels: Default::default(),
+            prepared,
         })
     }
 
@@ -260,55 +274,39 @@ impl Tracer {
 
     /// Compiles a stream for this tracer and scene.
     pub fn stream(&self, shaders: &'static StreamShaders) -> Result<Stream> {
-        let specialization = Specialization::default()
-            .set(0, self.features.alpha as u32)
-            .set(1, self.features.spheres as u32)
-            .set(2, self.features.single_level as u32);
         match &self.structure {
             Structure::Compute(h) => {
-                let (rays_per_lane, most_turns) = compute::lane_budget(&self.device.info);
-                let specialization = specialization
-                    .set(3, h.stack_constant())
-                    .set(4, rays_per_lane)
-                    .set(5, u32::from(h.kernel == Kernel::Direction))
-                    .set(6, u32::from(self.triangle_test == TriangleTest::Watertight))
-                    .set(8, most_turns);
-                let packets = shaders.has_packets() && self.device.info.limits.packets && self.device.info.int64;
+                let (info, options) =
+                    (&self.device.info, ComputeOptions { kernel: h.kernel, triangle_test: self.triangle_test });
+                let s = prepared::specialization(info, self.features, options, h.stack_constant());
+                let (rays_per_lane, _) = compute::lane_budget(info);
                 match h.kernel {
-                    Kernel::Packet | Kernel::Auto if packets && (h.kernel == Kernel::Packet || shaders.is_coherent()) => {
-                        let lanes = self.device.info.limits.subgroup_size;
-                        Stream::packets(&self.device, shaders, &specialization.set(7, lanes))
-                    }
+                    Kernel::Nearest | Kernel::Direction => Stream::reference(&self.device, shaders, &s, rays_per_lane),
+                    Kernel::Brute => Stream::brute(&self.device, shaders, &s),
                     Kernel::Auto | Kernel::Wide | Kernel::Packet => {
-                        let kernel = self.kernel(shaders.mode(), &specialization)?;
-                        Stream::steps(&self.device, shaders, &specialization, kernel, rays_per_lane, h.launch_memory()?)
+                        let recipe = prepared::large(info, h.kernel, shaders, &s);
+                        if prepared::in_packets(info, h.kernel, shaders) {
+                            return Ok(Stream::packets(self.prepared.take(&self.device, &recipe)?, shaders));
+                        }
+                        let kernel = self.kernel(shaders.mode(), &recipe)?;
+                        Stream::steps(&self.device, shaders, &s, kernel, rays_per_lane, h.launch_memory()?)
                     }
-                    Kernel::Nearest | Kernel::Direction => {
-                        Stream::reference(&self.device, shaders, &specialization, rays_per_lane)
-                    }
-                    Kernel::Brute => Stream::brute(&self.device, shaders, &specialization),
                 }
             }
             Structure::Hardware { .. } if self.kind == TracerKind::Query => {
-                Stream::query(&self.device, shaders, &specialization)
+                Stream::query(&self.device, shaders, &stream::scene_specialization(self.features))
             }
-            Structure::Hardware { .. } => Stream::pipeline(&self.device, shaders, &specialization, self.features),
+            Structure::Hardware { .. } => Stream::pipeline(&self.device, shaders, self.features),
         }
     }
 
     /// The fast kernel, compiled once for all streams of a mode.
-    fn kernel(&self, mode: stream::Mode, specialization: &Specialization) -> Result<Arc<ComputePipeline>> {
+    fn kernel(&self, mode: stream::Mode, recipe: &Recipe) -> Result<Arc<ComputePipeline>> {
         let slot = &self.kernels[mode as usize];
         if let Some(kernel) = slot.get() {
             return Ok(kernel.clone());
         }
-        let spirv = match (mode, self.device.info.int64) {
-            (stream::Mode::Any, true) => stream::WIDE_ANY_64,
-            (stream::Mode::Any, false) => stream::WIDE_ANY_32,
-            (stream::Mode::Closest, true) => stream::WIDE_CLOSEST_64,
-            (stream::Mode::Closest, false) => stream::WIDE_CLOSEST_32,
-        };
-        let kernel = Arc::new(ComputePipeline::new(&self.device, "wide kernel", spirv, specialization)?);
+        let kernel = Arc::new(self.prepared.take(&self.device, recipe)?);
         Ok(slot.get_or_init(|| kernel).clone())
     }
 }

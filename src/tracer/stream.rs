@@ -109,6 +109,27 @@ pub struct Stream {
     shaders: &'static StreamShaders,
 }
 
+/// What a scene does not need is not compiled.
+pub(super) fn scene_specialization(features: SceneFeatures) -> Specialization {
+    Specialization::default().set(0, features.alpha as u32).set(1, features.spheres as u32).set(2, features.single_level as u32)
+}
+
+/// The fast kernel that traces rays one by one.
+pub(super) fn wide_kernel(mode: Mode, int64: bool) -> &'static [u8] {
+    match (mode, int64) {
+        (Mode::Any, true) => WIDE_ANY_64,
+        (Mode::Any, false) => WIDE_ANY_32,
+        (Mode::Closest, true) => WIDE_CLOSEST_64,
+        (Mode::Closest, false) => WIDE_CLOSEST_32,
+    }
+}
+
+impl std::fmt::Debug for StreamShaders {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        f.write_str(self.name)
+    }
+}
+
 impl StreamShaders {
     /// What the stream asks of its rays.
     pub(super) fn mode(&self) -> Mode {
@@ -118,6 +139,11 @@ impl StreamShaders {
     /// Do neighbouring rays take nearly the same way through a scene?
     pub(super) fn is_coherent(&self) -> bool {
         self.coherent
+    }
+
+    /// What traces it in packets.
+    pub(super) fn packet(&self) -> &'static [u8] {
+        self.packet
     }
 
     /// Can it be traced in packets? What comes from a queue is in no order.
@@ -154,9 +180,8 @@ impl Stream {
     }
 
     /// For the compute tracer's packets.
-    pub(super) fn packets(device: &Arc<Device>, shaders: &'static StreamShaders, s: &Specialization) -> Result<Self> {
-        let pipeline = ComputePipeline::new(device, shaders.name, shaders.packet, s)?;
-        Ok(Self { pipeline: Pipeline::Single { pipeline, rays_per_group: LANES * PACKET_RAYS }, shaders })
+    pub(super) fn packets(pipeline: ComputePipeline, shaders: &'static StreamShaders) -> Self {
+        Self { pipeline: Pipeline::Single { pipeline, rays_per_group: LANES * PACKET_RAYS }, shaders }
     }
 
     /// For the compute tracer's readable reference.
@@ -181,19 +206,20 @@ impl Stream {
         Ok(Self { pipeline: Pipeline::Single { pipeline, rays_per_group: LANES }, shaders })
     }
 
-    pub(super) fn pipeline(
-        device: &Arc<Device>,
-        shaders: &'static StreamShaders,
-        s: &Specialization,
-        features: SceneFeatures,
-    ) -> Result<Self> {
+    pub(super) fn pipeline(device: &Arc<Device>, shaders: &'static StreamShaders, features: SceneFeatures) -> Result<Self> {
         let shared = HitShaders {
             miss: MISS,
             triangle_closest: TRIANGLE_CLOSEST,
             triangle_any: features.alpha.then_some(TRIANGLE_ANY),
             sphere: features.spheres.then_some([SPHERE_CLOSEST, SPHERE_INTERSECTION]),
         };
-        let pipeline = Pipeline::RayTracing(RayTracingPipeline::new(device, shaders.name, shaders.raygen, &shared, s)?);
+        let pipeline = Pipeline::RayTracing(RayTracingPipeline::new(
+            device,
+            shaders.name,
+            shaders.raygen,
+            &shared,
+            &scene_specialization(features),
+        )?);
         Ok(Self { pipeline, shaders })
     }
 

@@ -1,0 +1,104 @@
+//! The compute tracer's large pipelines, compiled while its hierarchy is built: a driver takes a tenth of a second for them, and half
+//! a second where it has not met them before.
+
+use std::sync::{Arc, Mutex, PoisonError};
+
+use super::compute::{self, lane_budget};
+use super::kernel::{ComputeOptions, Kernel, TriangleTest};
+use super::stream::{self, StreamShaders};
+use crate::error::Result;
+use crate::gpu::{ComputePipeline, Device, DeviceInfo, Specialization};
+use crate::scene::features::SceneFeatures;
+
+/// Scenes of fewer primitives are built before a pipeline is compiled.
+const WORTHWHILE: usize = 100_000;
+
+/// A shader and what it is specialised to.
+#[derive(Clone)]
+pub(super) struct Recipe {
+    pub name: &'static str,
+    pub spirv: &'static [u8],
+    pub specialization: Specialization,
+}
+
+/// What was compiled and not yet asked for.
+#[derive(Default)]
+pub(super) struct Prepared {
+    pipelines: Mutex<Vec<(Recipe, ComputePipeline)>>,
+}
+
+impl Prepared {
+    /// What the streams' recipes for a scene are taken to be. A recipe that turns out another is compiled when it is asked for, and an
+    /// error is found again then.
+    pub fn recipes(
+        info: &DeviceInfo,
+        features: SceneFeatures,
+        options: ComputeOptions,
+        streams: &[&'static StreamShaders],
+        primitives: usize,
+    ) -> Vec<Recipe> {
+        let fast = matches!(options.kernel, Kernel::Auto | Kernel::Wide | Kernel::Packet);
+        if !fast || primitives < WORTHWHILE {
+            return Vec::new();
+        }
+        let s = specialization(info, features, options, compute::USUAL_STACK);
+        streams.iter().map(|shaders| large(info, options.kernel, shaders, &s)).collect()
+    }
+
+    /// Compiles them.
+    pub fn compile(device: &Arc<Device>, recipes: Vec<Recipe>) -> Self {
+        let compiled = recipes.into_iter().filter_map(|r| r.compile(device).ok().map(|p| (r, p)));
+        Self { pipelines: Mutex::new(compiled.collect()) }
+    }
+
+    /// The pipeline, compiled now unless it is there.
+    pub fn take(&self, device: &Arc<Device>, recipe: &Recipe) -> Result<ComputePipeline> {
+        let mut there = self.pipelines.lock().unwrap_or_else(PoisonError::into_inner);
+        match there.iter().position(|(r, _)| r.is(recipe)) {
+            Some(k) => Ok(there.swap_remove(k).1),
+            None => recipe.compile(device),
+        }
+    }
+}
+
+impl Recipe {
+    fn compile(&self, device: &Arc<Device>) -> Result<ComputePipeline> {
+        ComputePipeline::new(device, self.name, self.spirv, &self.specialization)
+    }
+
+    fn is(&self, other: &Recipe) -> bool {
+        std::ptr::eq(self.spirv, other.spirv) && self.specialization == other.specialization
+    }
+}
+
+/// What scenes, devices and options make of the compute tracer's shaders.
+pub(super) fn specialization(
+    info: &DeviceInfo,
+    features: SceneFeatures,
+    options: ComputeOptions,
+    stack: u32,
+) -> Specialization {
+    let (rays_per_lane, most_turns) = lane_budget(info);
+    stream::scene_specialization(features)
+        .set(3, stack)
+        .set(4, rays_per_lane)
+        .set(5, u32::from(options.kernel == Kernel::Direction))
+        .set(6, u32::from(options.triangle_test == TriangleTest::Watertight))
+        .set(7, info.limits.subgroup_size)
+        .set(8, most_turns)
+}
+
+/// Is the stream traced in packets?
+pub(super) fn in_packets(info: &DeviceInfo, kernel: Kernel, shaders: &StreamShaders) -> bool {
+    let able = shaders.has_packets() && info.limits.packets && info.int64;
+    able && (kernel == Kernel::Packet || kernel == Kernel::Auto && shaders.is_coherent())
+}
+
+/// The shader of the fast kernels that traces the stream.
+pub(super) fn large(info: &DeviceInfo, kernel: Kernel, shaders: &StreamShaders, s: &Specialization) -> Recipe {
+    let (name, spirv) = match in_packets(info, kernel, shaders) {
+        true => (shaders.name, shaders.packet()),
+        false => ("wide kernel", stream::wide_kernel(shaders.mode(), info.int64)),
+    };
+    Recipe { name, spirv, specialization: s.clone() }
+}
