@@ -1,7 +1,7 @@
 //! Compiles the shaders: each pass's stream once per tracer and mode, and the shaders that the tracers share.
 //!
 //! A pass is a file `shaders/NAME.glsl` whose head says `// stream: any`, `// stream: closest` or both; `// rays: queue` besides
-//! when the rays are in memory before it begins. The generated `shaders.rs` holds a constant `NAME_ANY` / `NAME_CLOSEST` for each
+//! when the rays are in memory before it begins, `// rays: coherent` when neighbours go much the same way (packets pay then). The generated `shaders.rs` holds a constant `NAME_ANY` / `NAME_CLOSEST` for each
 //! (see `src/tracer/stream.rs`). `// compute` instead: a compute shader that traces nothing, as the constant `NAME`.
 
 use std::cell::RefCell;

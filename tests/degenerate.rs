@@ -305,6 +305,28 @@ fn gpu_degenerate_scales_together() {
     assert_validation_clean(&device);
 }
 
+/// As large as the loader lets in, and rays along the axes: nothing overflows.
+#[test]
+fn gpu_degenerate_largest_coordinates() {
+    let device = device();
+    let corners: Vec<[DVec3; 3]> = (0..2000)
+        .map(|i| {
+            let at = random_point(i, 0) * 0.9e12;
+            [at, at + random_point(i, 3) * 1e11, at + random_point(i, 6) * 1e11]
+        })
+        .collect();
+    let scene = scene(vec![(triangles(corners), vec![HERE])]);
+    let oracle = Oracle::new(&scene, scene.origin());
+    let mut rays = random_rays(&oracle, 5000, 3);
+    for (i, t) in oracle.triangles().iter().enumerate() {
+        let middle = (t.v[0] + t.v[1] + t.v[2]) / 3.0;
+        let along = [DVec3::X, DVec3::Y, DVec3::Z][i % 3] * if i % 2 == 0 { 1.0 } else { -1.0 };
+        rays.push(ray(middle - along * 4e12, along));
+    }
+    judge(&device, "the largest coordinates", &scene, &rays);
+    assert_validation_clean(&device);
+}
+
 /// Many times the same triangle: no plane divides them. The tree must stay shallow, and the answer is any of them.
 #[test]
 fn gpu_degenerate_coincident_triangles() {

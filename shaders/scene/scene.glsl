@@ -1,4 +1,4 @@
-// The scene in device memory, reached from one root by device address. Mirrors src/render/gpu_scene.rs field by field.
+// The scene in device memory, reached from one root by device address. Mirrors src/tracer/gpu_scene.rs field by field.
 #ifndef SCENE_SCENE
 #define SCENE_SCENE
 #include "common/types.glsl"
@@ -15,11 +15,11 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Sc
     uvec2 materials;   // MaterialRecord
     uvec2 textures;    // TextureRecord
     uvec2 nodes;       // compute tracer: nodes of its hierarchy
-    uvec2 primitives;  // compute tracer: PrimitiveRecord
+    uvec2 primitives;  // compute tracer, readable kernels: records of shaders/trace/records.glsl
     uvec2 top_level;   // hardware tracers: address of the top-level acceleration structure
     uint part_count;   // records in parts
     uint root_reserved1;
-    uvec2 launch_hits; // compute tracer: what they met
+    uvec2 launch_hits; // compute tracer: what a launch's rays met
     uint root;         // compute tracer: where traversal begins
     uint root_reserved;
     uvec2 unfinished;  // compute tracer: counts rays whose traversal the driver cut short
@@ -36,7 +36,7 @@ struct InstanceRecord {
     uvec2 part_of;        // uint per primitive of the group: its part, counted from first_part; null when there is one part
     uint first_part;
     uint scene_instance;  // INVALID: ask the part
-    uint root;            // compute tracer: node of this group
+    uint root;            // compute tracer, readable kernels: node of this group
     uint opaque_count;    // hardware tracers: primitives from here on are in the second geometry (alpha tested)
     uint reserved0;
     uint reserved1;

@@ -103,9 +103,4 @@ Surface surface_at(Ray ray, Hit hit) {
     return s;
 }
 
-// Origin of a ray that leaves the surface on the side of `direction`.
-vec3 spawn_origin(Surface s, vec3 direction) {
-    return s.position + s.ng * (dot(s.ng, direction) < 0.0 ? -s.offset : s.offset);
-}
-
 #endif

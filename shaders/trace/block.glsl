@@ -21,6 +21,11 @@ uvec2 offset_address(uvec2 address, uint offset) {
     return uvec2(low, address.y + carry);
 }
 
+uvec2 block_address(uvec2 blocks, uint block) {
+    uvec2 address = offset_address(blocks, block << 6);
+    return uvec2(address.x, address.y + (block >> 26));
+}
+
 // Bit of a block's last word: it is a leaf.
 const uint LEAF = 0x80000000u;
 

@@ -1,4 +1,4 @@
-// The fast kernels' leaves: one or two spheres, or a pair of triangles that share an edge (src/bvh/pairs.rs).
+// The fast kernels' leaves: a sphere, or a pair of triangles that share an edge (src/bvh/pairs.rs).
 #ifndef TRACE_LEAF
 #define TRACE_LEAF
 #include "scene/material.glsl"
@@ -40,10 +40,10 @@ bool meets_moller_trumbore(uint id, uint turn, uint instance, vec3 origin, vec3 
     return met;
 }
 
-bool meets_sphere(uint id, vec3 origin, vec3 direction, vec3 center, float radius, float tmin, float tmax, out float t, out vec2 uv) {
+bool meets_sphere(vec3 origin, vec3 direction, vec3 center, float radius, float tmin, float tmax, out float t, out vec2 uv) {
     t = intersect_sphere(origin, direction, tmin, tmax, center, radius);
     uv = vec2(0.0);
-    return id != INVALID && t > tmin && t < tmax;
+    return t > tmin && t < tmax;
 }
 
 #endif

@@ -130,7 +130,7 @@ void main() {
     // Some CPU drivers leave any loop after 65,535 turns; then `finished` is not set, and the host reports it.
     while (!finished) {
         // lane k fetches the k-th pair of words, and hands it round
-        uvec2 own = PAIR(BlockWords(offset_address(blocks, 64u * block)).v[lane & 7u]);
+        uvec2 own = PAIR(BlockWords(block_address(blocks, block)).v[lane & 7u]);
         uvec2 w0 = uvec2(subgroupBroadcast(own.x, 0), subgroupBroadcast(own.y, 0));
         uvec2 w1 = uvec2(subgroupBroadcast(own.x, 1), subgroupBroadcast(own.y, 1));
         uvec2 w2 = uvec2(subgroupBroadcast(own.x, 2), subgroupBroadcast(own.y, 2));
@@ -207,10 +207,9 @@ void main() {
             float t;
             vec2 uv;
             if (HAS_SPHERES && (w6.x & SPHERE) != 0u) {
-                vec3 c0 = uintBitsToFloat(uvec3(w0, w1.x)), c1 = uintBitsToFloat(uvec3(w2, w3.x));
+                vec3 center = uintBitsToFloat(uvec3(w0, w1.x));
                 FOR_RAYS {
-                    if (meets_sphere(w6.x, origin[j], direction[j], c0, uintBitsToFloat(w1.y), tmin[j], limit[j], t, uv)) { ACCEPT(w6.x) }
-                    if (meets_sphere(w6.y, origin[j], direction[j], c1, uintBitsToFloat(w3.y), tmin[j], limit[j], t, uv)) { ACCEPT(w6.y) }
+                    if (meets_sphere(origin[j], direction[j], center, uintBitsToFloat(w1.y), tmin[j], limit[j], t, uv)) { ACCEPT(w6.x) }
                 }
             } else {
                 uint axis = class_ >> 3;

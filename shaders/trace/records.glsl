@@ -1,5 +1,5 @@
-// Primitive records of the compute tracer: 40 bytes, five pairs. A triangle: three corners and a number; a sphere: centre,
-// radius and a number; an entry of the top level: a number alone.
+// Primitive records of the readable kernels: 40 bytes, five pairs. A triangle: three corners and a number; a sphere: centre,
+// radius and a number. The numbers are those of the fast kernels too.
 #ifndef TRACE_RECORDS
 #define TRACE_RECORDS
 

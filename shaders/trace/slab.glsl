@@ -16,7 +16,7 @@ const float SLAB_SCALE = 1.0 + 16.0 * 5.9604645e-8;
 // flat geometry is strictly inside the slab, and lo < 0 < hi times a huge number lets it pass.
 vec3 safe_inverse(vec3 d) {
     vec3 a = abs(d);
-    float least = max(1e-24 * max(max(a.x, a.y), a.z), 1e-37);
+    float least = max(1e-20 * max(max(a.x, a.y), a.z), 1e-37);
     return 1.0 / mix(d, mix(vec3(least), vec3(-least), lessThan(d, vec3(0.0))), lessThan(a, vec3(least)));
 }
 

@@ -81,7 +81,7 @@ void main() {
     uint turns = 0u;
     while (true) {
         turns++;
-        Block8 b = Block8(offset_address(blocks, 64u * block));
+        Block8 b = Block8(block_address(blocks, block));
         uvec2 w0 = PAIR(b.q0), w1 = PAIR(b.q1), w2 = PAIR(b.q2), w3 = PAIR(b.q3);
         uvec2 w4 = PAIR(b.q4), w5 = PAIR(b.q5), w6 = PAIR(b.q6), w7 = PAIR(b.q7);
         // the child that lies first along the ray, where distance decides and not the octant
@@ -133,9 +133,8 @@ void main() {
             float t;
             vec2 uv;
             if (HAS_SPHERES && (w6.x & SPHERE) != 0u) {
-                vec3 c0 = uintBitsToFloat(uvec3(w0, w1.x)), c1 = uintBitsToFloat(uvec3(w2, w3.x));
-                if (meets_sphere(w6.x, origin, direction, c0, uintBitsToFloat(w1.y), world.tmin, best, t, uv)) { ACCEPT(w6.x) }
-                if (meets_sphere(w6.y, origin, direction, c1, uintBitsToFloat(w3.y), world.tmin, best, t, uv)) { ACCEPT(w6.y) }
+                vec3 center = uintBitsToFloat(uvec3(w0, w1.x));
+                if (meets_sphere(origin, direction, center, uintBitsToFloat(w1.y), world.tmin, best, t, uv)) { ACCEPT(w6.x) }
             } else {
                 vec3 v0 = uintBitsToFloat(uvec3(w0, w1.x)), v1 = uintBitsToFloat(uvec3(w1.y, w2));
                 vec3 v2 = uintBitsToFloat(uvec3(w3, w4.x)), v3 = uintBitsToFloat(uvec3(w4.y, w5));

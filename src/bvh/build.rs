@@ -32,11 +32,11 @@ pub enum BuildPreset {
 }
 
 impl BuildPreset {
-    /// What suits a number of primitives and of rays to be traced through them. On Sponza `Default` traces 8 to 14 % faster than
-    /// `Fast` for a tenth more building, on the dragon hardly at all: fewer rays than primitives do not earn that back, and above
+    /// What suits a number of primitives and of rays to be traced through them. On Sponza `Default` traces faster than
+    /// `Fast` for little more building, on the dragon hardly (docs/traversal.md has the table): fewer rays than primitives do not earn that back, and above
     /// ten million primitives the least of everything is used.
     ///
-    /// Never `Best`: three times the build time for 1 to 7 % on the dragon, and on Sponza for closest hits alone; any hits are
+    /// Never `Best`: three times the build time for hardly anything on the dragon, and on Sponza for closest hits alone; any hits are
     /// slower, because a large triangle that is left whole high up in the tree is an occluder that is found early.
     pub fn auto(primitives: usize, rays: u64) -> Self {
         if primitives >= 10_000_000 || rays < primitives as u64 { Self::Fast } else { Self::Default }
@@ -63,7 +63,8 @@ impl obvhs::Boundable for Aabb {
 }
 
 /// The tree of some boxes: at least one, at most 2^27, none empty or NaN. `collapse`: leaves hold up to so many primitives, where
-/// that lowers the cost; else one each. Primitives are never split: `Best` is `Default` with more reinsertion.
+/// that lowers the cost; else one each. Primitives are never split: `Best` is the heuristic from the top down with
+/// thorough reinsertion.
 pub fn tree(boxes: &[Aabb], preset: BuildPreset, collapse: Option<u32>) -> Bvh2 {
     let mut tree = whole(boxes, preset, 0.0);
     if let Some(max_leaf) = collapse {
@@ -133,6 +134,7 @@ fn finish(mut nodes: Vec<Bvh2Node>, primitives: usize, preset: BuildPreset) -> B
 
 /// Expected cost of a ray by the surface-area heuristic: nodes that it visits and primitives that it tests, if it hits the root's
 /// box and nothing else (MacDonald and Booth 1990).
+#[cfg(test)]
 pub fn cost(tree: &Bvh2) -> f64 {
     let area = |n: &Bvh2Node| node_box(n).half_area() as f64 * n.prim_count.max(1) as f64;
     let all: f64 = tree.nodes.par_iter().with_min_len(1 << 14).map(area).sum();

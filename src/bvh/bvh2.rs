@@ -177,22 +177,6 @@ impl Bvh2 {
         }
         Ok(())
     }
-
-    /// Expected cost of a random ray by the surface area heuristic: nodes visited plus primitives tested, each counted 1.
-    pub fn sah_cost(&self) -> f32 {
-        let root = self.nodes.first().map(|n| bounds_of(&n.boxes[0]).union(bounds_of(&n.boxes[1])).half_area()).unwrap_or(0.0);
-        if root <= 0.0 {
-            return self.primitives.len() as f32;
-        }
-        let children = self.nodes.iter().flat_map(|n| (0..2).map(move |k| (n.boxes[k], n.children[k])));
-        let sum: f64 = children
-            .map(|(b, child)| {
-                let cost = leaf_range(child).map_or(1.0, |(_, count)| count as f64);
-                bounds_of(&b).half_area() as f64 * cost
-            })
-            .sum();
-        1.0 + (sum / root as f64) as f32
-    }
 }
 
 fn bounds_of(b: &[[f32; 3]; 2]) -> Aabb {

@@ -77,25 +77,34 @@ fn neighbours(triangles: &[[u32; 3]], vertex_count: usize) -> Vec<[u32; 3]> {
         }
     }
     let mut out = vec![[NONE; 3]; triangles.len()];
+    let mut join = |a: u32, b: u32| {
+        out[a as usize / 3][a as usize % 3] = b / 3;
+        out[b as usize / 3][b as usize % 3] = a / 3;
+    };
     for v in 0..vertex_count {
         let bucket = &mut entries[begin[v] as usize..begin[v + 1] as usize];
+        // of a vertex of very many triangles, those that share an edge are brought together
+        if bucket.len() > CROWDED {
+            bucket.sort_unstable();
+        }
         for i in 0..bucket.len() {
             let [high, a] = bucket[i];
             if a == NONE {
                 continue;
             }
-            if let Some(j) =
-                (i + 1..bucket.len()).find(|&j| bucket[j][0] == high && bucket[j][1] / 3 != a / 3 && bucket[j][1] != NONE)
-            {
-                let b = bucket[j][1];
+            let end = bucket.len().min(if bucket.len() > CROWDED { i + CROWDED } else { usize::MAX });
+            let other = |j: &usize| bucket[*j][0] == high && bucket[*j][1] / 3 != a / 3 && bucket[*j][1] != NONE;
+            if let Some(j) = (i + 1..end).find(other) {
+                join(a, bucket[j][1]);
                 bucket[j][1] = NONE;
-                out[a as usize / 3][a as usize % 3] = b / 3;
-                out[b as usize / 3][b as usize % 3] = a / 3;
             }
         }
     }
     out
 }
+
+/// Edges at a vertex above which not all are held against all.
+const CROWDED: usize = 32;
 
 /// Matches triangles with neighbours so that the boxes of the pairs are small: in each round, whoever are each other's best
 /// choice go together. A box of a pair is never larger than `GROWTH` times the two boxes of its triangles.
@@ -182,6 +191,20 @@ mod tests {
         }
         let one = Fan::single([7, 8, 9]);
         assert_eq!(unfolded(&one)[0], [7, 8, 9]);
+    }
+
+    /// Very many triangles around one vertex: those with a common edge find each other, and in time.
+    #[test]
+    fn a_crowded_vertex() {
+        const PAIRS: u32 = 100_000;
+        let triangles: Vec<[u32; 3]> =
+            (0..PAIRS).flat_map(|i| [[0, 3 * i + 1, 3 * i + 2], [0, 3 * i + 2, 3 * i + 3]]).collect();
+        let found = neighbours(&triangles, 3 * PAIRS as usize + 1);
+        for i in 0..PAIRS {
+            let (a, b) = (2 * i, 2 * i + 1);
+            assert_eq!(found[a as usize], [NONE, NONE, b]);
+            assert_eq!(found[b as usize], [a, NONE, NONE]);
+        }
     }
 
     #[test]

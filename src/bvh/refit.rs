@@ -221,11 +221,6 @@ impl RefitPolicy {
     pub fn growth(&self) -> f64 {
         self.growth
     }
-
-    /// Seconds that tracing has lost to the tree's age, by estimate.
-    pub fn lost_seconds(&self) -> f64 {
-        self.lost_seconds
-    }
 }
 
 #[cfg(test)]
@@ -332,7 +327,7 @@ mod tests {
         // half of each trace is lost: after eight it is the 0.4 seconds that a rebuild takes beyond a refit
         for k in 1..=7 {
             p.traced(0.1);
-            assert!((p.lost_seconds() - 0.05 * k as f64).abs() < 1e-12);
+            assert!((p.lost_seconds - 0.05 * k as f64).abs() < 1e-12);
             assert!(!p.should_rebuild(), "{p:?}");
         }
         p.traced(0.11);
@@ -346,7 +341,7 @@ mod tests {
             p.refitted(cost, 0.0);
             p.traced(100.0);
         }
-        assert!(!p.should_rebuild() && p.lost_seconds() == 0.0);
+        assert!(!p.should_rebuild() && p.lost_seconds == 0.0);
     }
 
     #[test]

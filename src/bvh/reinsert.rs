@@ -194,12 +194,17 @@ fn reinsert(nodes: &mut [Bvh2Node], parents: &mut [u32], from: u32, to: u32) {
 }
 
 /// Boxes of a node and of those above, as far as they change.
-fn refit(nodes: &mut [Bvh2Node], parents: &[u32], mut at: u32) {
+fn refit(nodes: &mut [Bvh2Node], parents: &[u32], from: u32) {
+    let mut at = from;
     loop {
         let node = &nodes[at as usize];
         if !node.is_leaf() {
             let [a, b] = [0, 1].map(|k| &nodes[node.first_index as usize + k]);
             let (min, max) = (a.min.min(b.min), a.max.max(b.max));
+            // the first is in a new place: that it has the box it had says nothing about those above
+            if at != from && (min, max) == (node.min, node.max) {
+                return;
+            }
             nodes[at as usize] = Bvh2Node { min, max, ..nodes[at as usize] };
         }
         if at == 0 {

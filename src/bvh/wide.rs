@@ -96,12 +96,7 @@ impl Wide {
         let bounds = node_box(tree, 0);
         // a single leaf has a node above it
         let blocks = if tree.nodes[0].is_leaf() { 2.0 } else { 1.0 };
-        let mut out = Self {
-            blocks: top.blocks,
-            depth: top.depth,
-            bounds: Some(bounds),
-            sah_cost: (blocks * top.cost / bounds.half_area()) as f64,
-        };
+        let mut out = Self { blocks: top.blocks, depth: top.depth, bounds: Some(bounds), sah_cost: (blocks * top.cost) as f64 };
         // the pieces' roots have their places; the rest of each follows
         let mut ends = Vec::with_capacity(pieces.len());
         let mut end = out.blocks.len();
@@ -126,11 +121,6 @@ impl Wide {
             }
         });
         out
-    }
-
-    /// Blocks that are nodes.
-    pub fn node_count(&self) -> usize {
-        self.blocks.iter().filter(|b| !is_leaf(b)).count()
     }
 
     /// Checks that every leaf is reached once, within the boxes above it, and that the depth is as said. `bounds_of` gives the boxes
@@ -218,9 +208,20 @@ struct Local {
     cost: [f32; WIDTH],
 }
 
-/// Least cost of two subtrees as at most `count` wide ones together, and how many of those on the left.
+/// Least cost of two subtrees as at most `count` wide ones together (two or more), and how many of those on the left.
 fn split(left: &[f32; WIDTH], right: &[f32; WIDTH], count: usize) -> (f32, usize) {
-    (1..count).map(|k| (left[k - 1] + right[count - k - 1], k)).fold((f32::INFINITY, 0), |a, b| if b.0 < a.0 { b } else { a })
+    let cost = |k: usize| (left[k - 1] + right[count - k - 1], k);
+    (2..count).map(cost).fold(cost(1), |a, b| if b.0 < a.0 { b } else { a })
+}
+
+/// Area of a box as a share of a larger one's, whatever the scale: areas alone leave the range of a float at 1e19 and at 1e-20.
+fn share(of: Aabb, whole: Aabb) -> f32 {
+    let area = |b: Aabb| {
+        let d = (b.max.as_dvec3() - b.min.as_dvec3()).max(glam::DVec3::ZERO);
+        d.x * d.y + d.y * d.z + d.z * d.x
+    };
+    let whole = area(whole);
+    if whole > 0.0 { (area(of) / whole) as f32 } else { 0.0 }
 }
 
 impl Piece {
@@ -232,6 +233,7 @@ impl Piece {
         pieces: &[Piece],
         leaf: &(impl Fn(u32) -> Block + Sync),
     ) -> Self {
+        let whole = node_box(tree, 0);
         let cut = |n: u32| cuts.binary_search_by_key(&(n as usize), |c| c.0).ok().map(|k| cuts[k].1);
         let mut locals = vec![Local { node: root as u32, children: [0; 2], cost: [0.0; WIDTH] }];
         // parents before children
@@ -247,7 +249,7 @@ impl Piece {
             work.extend([at + 1, at]);
         }
         for k in (0..locals.len()).rev() {
-            let area = node_box(tree, locals[k].node as usize).half_area();
+            let area = share(node_box(tree, locals[k].node as usize), whole);
             locals[k].cost = match locals[k].children {
                 [0, _] if tree.nodes[locals[k].node as usize].is_leaf() => [area; WIDTH],
                 [0, _] => [cut(locals[k].node).map_or(area, |p| pieces[p].cost); WIDTH],
@@ -276,7 +278,7 @@ impl Piece {
                 let k = split(&locals[l as usize].cost, &locals[r as usize].cost, count).1;
                 for (child, mut count) in [(l as usize, k), (r as usize, count - k)] {
                     let cost = &locals[child].cost;
-                    while count > 1 && cost[count - 1] == cost[count - 2] {
+                    while count > 1 && cost[count - 1] >= cost[count - 2] {
                         count -= 1;
                     }
                     if count == 1 { found.push(child) } else { open.push((locals[child].children, count)) }
@@ -401,6 +403,17 @@ mod tests {
             b[0] = item;
             b
         })
+    }
+
+    /// Areas beyond the range of a float, below it, and none at all.
+    #[test]
+    fn trees_of_any_scale_end() {
+        for (scale, offset) in [(1e18, 0.0), (1e16, -1e18), (1e-30, 0.0), (0.0, 1.0)] {
+            let boxes = boxes(3000, scale, offset);
+            let tree = tree(&boxes);
+            check(&tree, &boxes).unwrap_or_else(|e| panic!("{scale}: {e}"));
+            assert!(tree.sah_cost.is_finite(), "{scale}: {}", tree.sah_cost);
+        }
     }
 
     fn check(tree: &Wide, boxes: &[Aabb]) -> Result<(), String> {

@@ -71,7 +71,7 @@ impl Commands {
         }
         let mut recorder = Recorder { device: &self.device, buffer: self.buffer, queries: self.queries, labels: Vec::new() };
         record(&mut recorder);
-        recorder.barrier_to_host();
+        recorder.final_barrier();
         let labels = recorder.labels;
         unsafe {
             raw.end_command_buffer(self.buffer).context("recording commands")?;
@@ -159,9 +159,15 @@ impl Recorder<'_> {
         );
     }
 
-    fn barrier_to_host(&mut self) {
+    fn final_barrier(&mut self) {
         let all = vk::PipelineStageFlags2::ALL_COMMANDS;
-        self.memory_barrier(all, vk::AccessFlags2::MEMORY_WRITE, vk::PipelineStageFlags2::HOST, vk::AccessFlags2::HOST_READ);
+        // a fence makes writes available; visible they are to whom a barrier names
+        self.memory_barrier(
+            all,
+            vk::AccessFlags2::MEMORY_WRITE,
+            vk::PipelineStageFlags2::HOST | all,
+            vk::AccessFlags2::HOST_READ | vk::AccessFlags2::MEMORY_READ | vk::AccessFlags2::MEMORY_WRITE,
+        );
     }
 
     fn memory_barrier(

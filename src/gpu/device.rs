@@ -59,7 +59,10 @@ impl Device {
         let query = info.supports(TracerKind::Query);
         let mut extensions = Vec::new();
         let mut f12 = vk::PhysicalDeviceVulkan12Features::default().buffer_device_address(true).host_query_reset(true);
-        let mut f13 = vk::PhysicalDeviceVulkan13Features::default().maintenance4(true).synchronization2(true);
+        let mut f13 = vk::PhysicalDeviceVulkan13Features::default()
+            .maintenance4(true)
+            .synchronization2(true)
+            .compute_full_subgroups(info.limits.packets);
         let mut f_structure = vk::PhysicalDeviceAccelerationStructureFeaturesKHR::default().acceleration_structure(true);
         let mut f_pipeline = vk::PhysicalDeviceRayTracingPipelineFeaturesKHR::default().ray_tracing_pipeline(true);
         let mut f_query = vk::PhysicalDeviceRayQueryFeaturesKHR::default().ray_query(true);

@@ -1,6 +1,6 @@
 //! What CPU drivers read from the environment, which has to be right before the first of them is loaded.
 
-use std::ffi::OsString;
+use std::ffi::{OsStr, OsString};
 use std::path::PathBuf;
 
 /// lavapipe's vectors are 256 bits wide unless told otherwise. With 512, where the CPU has them, the compute tracer is a quarter to
@@ -11,21 +11,25 @@ const CACHE: &str = "MESA_SHADER_CACHE_DIR";
 /// Lets lavapipe use the CPU's widest vectors, unless the user has chosen. To be called first in `main`: it does nothing once there
 /// is a second thread, or on other systems than Linux.
 pub fn prefer_wide_vectors() {
-    if std::env::var_os(WIDTH).is_some() || !has_512_bits() || !is_single_threaded() {
+    let chosen = std::env::var_os(WIDTH);
+    if chosen.is_none() && !has_512_bits() || !is_single_threaded() {
         return;
     }
     // Mesa's own cache of compiled shaders does not tell widths apart, and code for one gives wrong results with another:
-    // this width gets a folder of its own.
-    let Some(folder) = cache_folder() else { return };
-    for (name, value) in [(WIDTH, OsString::from("512")), (CACHE, folder.into_os_string())] {
+    // a width that is not the driver's own choice gets a folder of its own.
+    let width = chosen.unwrap_or_else(|| OsString::from("512"));
+    let Some(folder) = cache_folder(&width) else { return };
+    for (name, value) in [(WIDTH, width), (CACHE, folder.into_os_string())] {
         // SAFETY: there is no other thread that could read the environment meanwhile
         unsafe { std::env::set_var(name, value) };
     }
 }
 
-fn cache_folder() -> Option<PathBuf> {
+fn cache_folder(width: &OsStr) -> Option<PathBuf> {
     let chosen = std::env::var_os(CACHE).map(PathBuf::from);
-    chosen.or_else(super::cache::folder).map(|f| f.join("mesa-512"))
+    let mut name = OsString::from("mesa-");
+    name.push(width);
+    chosen.or_else(super::cache::folder).map(|f| f.join(name))
 }
 
 #[cfg(target_arch = "x86_64")]

@@ -252,7 +252,8 @@ fn describe(instance: &Instance, index: usize, physical: vk::PhysicalDevice) -> 
                 && v11.subgroup_supported_operations.contains(
                     vk::SubgroupFeatureFlags::BASIC | vk::SubgroupFeatureFlags::BALLOT | vk::SubgroupFeatureFlags::ARITHMETIC,
                 )
-                && v11.subgroup_size >= 8,
+                && (8..=64).contains(&v11.subgroup_size)
+                && f13.compute_full_subgroups == vk::TRUE,
             max_workgroups_x: properties.limits.max_compute_work_group_count[0],
             max_allocation: v13_limits.max_buffer_size.min(v11_limits.max_memory_allocation_size),
             device_memory,

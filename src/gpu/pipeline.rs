@@ -85,12 +85,29 @@ pub struct ComputePipeline {
 impl ComputePipeline {
     /// Compiles a compute shader with the entry point `main`.
     pub fn new(device: &Arc<Device>, name: &str, spirv: &[u8], specialization: &Specialization) -> Result<Self> {
+        Self::with_flags(device, name, spirv, specialization, vk::PipelineShaderStageCreateFlags::empty())
+    }
+
+    /// As [`ComputePipeline::new`], for a shader that relies on subgroups of the size that the device reports, without idle lanes
+    /// ([`super::Limits::packets`] says that it can).
+    pub fn with_full_subgroups(device: &Arc<Device>, name: &str, spirv: &[u8], s: &Specialization) -> Result<Self> {
+        Self::with_flags(device, name, spirv, s, vk::PipelineShaderStageCreateFlags::REQUIRE_FULL_SUBGROUPS)
+    }
+
+    fn with_flags(
+        device: &Arc<Device>,
+        name: &str,
+        spirv: &[u8],
+        specialization: &Specialization,
+        flags: vk::PipelineShaderStageCreateFlags,
+    ) -> Result<Self> {
         let module = Module::new(device, name, spirv)?;
         let mut pipeline =
             Self { raw: vk::Pipeline::null(), layout: layout(device, vk::ShaderStageFlags::COMPUTE)?, device: device.clone() };
         pipeline.raw = specialization.with(|s| {
             let stage = vk::PipelineShaderStageCreateInfo::default()
                 .stage(vk::ShaderStageFlags::COMPUTE)
+                .flags(flags)
                 .module(module.raw)
                 .name(c"main")
                 .specialization_info(s);

@@ -7,8 +7,8 @@ use crate::gpu::Timing;
 const TARGET: f64 = 0.05;
 /// Rays of the first launch: it also compiles the shaders on drivers that do so late.
 const FIRST: u32 = 1 << 13;
-/// Rays of a launch at most.
-pub const MOST: u32 = 1 << 19;
+/// Rays of a launch at most: passes address their results from a launch's first ray on, so that the tracer must not divide it.
+pub const MOST: u32 = crate::tracer::stream::LAUNCH_RAYS;
 
 /// Finds the size of launches from the time that earlier ones took.
 #[derive(Clone, Debug)]

@@ -44,7 +44,7 @@ pub(super) fn upload(device: &Arc<Device>, flat: &FlatScene) -> Result<Hierarchy
     Ok(Hierarchy {
         kernel: Kernel::Brute,
         nodes: write_records::<[u32; 2]>(device, "instance ranges", 8, flat.placements.len() as u64, &mut entries)?,
-        primitives: write_records(device, "primitives", PRIMITIVE_BYTES, u64::from(total), &mut records)?,
+        primitives: Some(write_records(device, "primitives", PRIMITIVE_BYTES, u64::from(total), &mut records)?),
         root: flat.placements.len() as u32,
         instance_roots: flat.placements.iter().map(|p| ranges[p.group][0]).collect(),
         stack_entries: 0,

@@ -56,7 +56,8 @@ pub(super) enum Trees {
 pub(super) struct Hierarchy {
     pub kernel: Kernel,
     pub nodes: Buffer,
-    pub primitives: Buffer,
+    /// Records of primitives, where they are not in the nodes.
+    pub primitives: Option<Buffer>,
     /// Where a ray begins.
     pub root: u32,
     /// Where it begins within each entry of the top level.
@@ -77,11 +78,14 @@ impl Hierarchy {
     pub fn check_finished(&self) -> Result<()> {
         let mut count = 0u32;
         self.unfinished.read_with(0, 4, 4, |_, bytes| count = bytemuck::pod_read_unaligned(bytes))?;
+        let (what, remedy) = match self.kernel {
+            Kernel::Packet => ("packets of rays", "--traversal wide, or a newer driver"),
+            _ => ("rays", "a newer driver, or fewer surfaces in one place"),
+        };
         match count {
             0 => Ok(()),
             n => Err(Error::Vulkan(format!(
-                "the driver cut the traversal of {n} rays short (Mesa before 23 leaves a loop after 65,535 turns; the scene has \
-                 very many surfaces in one place): use a newer driver, or --tracer pipeline"
+                "the driver cut the traversal of {n} {what} short (Mesa before 23 leaves a loop after 65,535 turns): use {remedy}"
             ))),
         }
     }
@@ -104,7 +108,7 @@ impl Hierarchy {
     }
 
     pub fn bytes(&self) -> u64 {
-        self.nodes.size() + self.primitives.size()
+        self.nodes.size() + self.primitives.as_ref().map_or(0, Buffer::size)
     }
 
     /// See [`DynamicTrees::deform`].

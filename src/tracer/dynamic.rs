@@ -109,7 +109,7 @@ impl Dynamic {
             if let Some(v) = bad(change.positions) {
                 return Err(Error::Scene(format!("vertex {v} of mesh {m} is not finite: {}", change.positions[v])));
             }
-            if let Some(normals) = change.normals {
+            if let Some(normals) = change.normals.filter(|_| mesh.normals > 0) {
                 count("normals", normals.len(), mesh.normals)?;
                 if let Some(v) = bad(normals) {
                     return Err(Error::Scene(format!("normal {v} of mesh {m} is not finite: {}", normals[v])));
@@ -196,7 +196,7 @@ impl Tracer {
     }
 
     /// Says how many seconds of device time tracing took since the last update, so that the next one can weigh what refitted trees
-    /// cost against building them anew ([`crate::bvh::RefitPolicy`]). Without effect where nothing deforms.
+    /// cost against building them anew ([`crate::bvh::RefitPolicy`]). Without effect where nothing moves or deforms.
     pub fn traced(&mut self, seconds: f64) {
         let Some(dynamic) = &self.dynamic else { return };
         match &mut self.structure {

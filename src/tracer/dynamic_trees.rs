@@ -335,7 +335,7 @@ impl Tree {
 }
 
 /// What is said of an entry of the top level.
-fn entry_block(block: &mut Block, entry: u32, placement: &Placement, root: u32) {
+pub(super) fn entry_block(block: &mut Block, entry: u32, placement: &Placement, root: u32) {
     block[..12].copy_from_slice(bytemuck::cast_slice(rows(&placement.to_world.inverse()).as_flattened()));
     block[12] = root;
     block[13] = entry;

@@ -266,7 +266,7 @@ impl GpuScene {
             write_all(&mut self.instance_buffer, &self.instances)?;
         }
         self.root.nodes = h.nodes.address();
-        self.root.primitives = h.primitives.address();
+        self.root.primitives = h.primitives.as_ref().map_or(0, Buffer::address);
         self.root.root = h.root;
         self.root.unfinished = h.unfinished.address();
         self.root.bounds_min = h.bounds.min.extend(0.0).to_array();

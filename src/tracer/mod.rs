@@ -181,13 +181,14 @@ impl Tracer {
                 std::thread::scope(|scope| {
                     let prepared = (!recipes.is_empty()).then(|| scope.spawn(|| Prepared::compile(device, recipes)));
                     let trees = compute::Trees::build(flat, options.kernel, build);
+                    // the driver's work is not the hierarchy's
+                    stats.build_seconds = start.elapsed().as_secs_f64();
                     let prepared = prepared.map(|p| p.join().unwrap_or_else(|e| std::panic::resume_unwind(e)));
                     trees.map(|t| (Some(t), prepared.unwrap_or_default()))
                 })?
             }
             _ => (None, Prepared::default()),
         };
-        stats.build_seconds = start.elapsed().as_secs_f64();
         let start = Instant::now();
         let mut scene = GpuScene::new(device, flat, needs)?;
         let structure = match hierarchy {
@@ -285,7 +286,7 @@ impl Tracer {
                     Kernel::Brute => Stream::brute(&self.device, shaders, &s),
                     Kernel::Auto | Kernel::Wide | Kernel::Packet => {
                         let recipe = prepared::large(info, h.kernel, shaders, &s);
-                        if prepared::in_packets(info, h.kernel, shaders) {
+                        if recipe.packets {
                             return Ok(Stream::packets(self.prepared.take(&self.device, &recipe)?, shaders));
                         }
                         let kernel = self.kernel(shaders.mode(), &recipe)?;

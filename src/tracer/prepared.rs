@@ -19,6 +19,8 @@ pub(super) struct Recipe {
     pub name: &'static str,
     pub spirv: &'static [u8],
     pub specialization: Specialization,
+    /// Its lanes work together.
+    pub packets: bool,
 }
 
 /// What was compiled and not yet asked for.
@@ -42,7 +44,15 @@ impl Prepared {
             return Vec::new();
         }
         let s = specialization(info, features, options, compute::USUAL_STACK);
-        streams.iter().map(|shaders| large(info, options.kernel, shaders, &s)).collect()
+        let mut out: Vec<Recipe> = Vec::new();
+        for shaders in streams {
+            let recipe = large(info, options.kernel, shaders, &s);
+            // streams share the kernel that traces rays one by one
+            if !out.iter().any(|r| r.is(&recipe)) {
+                out.push(recipe);
+            }
+        }
+        out
     }
 
     /// Compiles them.
@@ -53,17 +63,18 @@ impl Prepared {
 
     /// The pipeline, compiled now unless it is there.
     pub fn take(&self, device: &Arc<Device>, recipe: &Recipe) -> Result<ComputePipeline> {
-        let mut there = self.pipelines.lock().unwrap_or_else(PoisonError::into_inner);
-        match there.iter().position(|(r, _)| r.is(recipe)) {
-            Some(k) => Ok(there.swap_remove(k).1),
-            None => recipe.compile(device),
-        }
+        let there = {
+            let mut all = self.pipelines.lock().unwrap_or_else(PoisonError::into_inner);
+            all.iter().position(|(r, _)| r.is(recipe)).map(|k| all.swap_remove(k).1)
+        };
+        there.map_or_else(|| recipe.compile(device), Ok)
     }
 }
 
 impl Recipe {
     fn compile(&self, device: &Arc<Device>) -> Result<ComputePipeline> {
-        ComputePipeline::new(device, self.name, self.spirv, &self.specialization)
+        let make = if self.packets { ComputePipeline::with_full_subgroups } else { ComputePipeline::new };
+        make(device, self.name, self.spirv, &self.specialization)
     }
 
     fn is(&self, other: &Recipe) -> bool {
@@ -88,17 +99,24 @@ pub(super) fn specialization(
         .set(8, most_turns)
 }
 
-/// Is the stream traced in packets?
+/// Is the stream traced in packets? A packet has many more turns than a ray and no bound on them: where drivers cut loops it has to be
+/// asked for.
 pub(super) fn in_packets(info: &DeviceInfo, kernel: Kernel, shaders: &StreamShaders) -> bool {
     let able = shaders.has_packets() && info.limits.packets && info.int64;
-    able && (kernel == Kernel::Packet || kernel == Kernel::Auto && shaders.is_coherent())
+    let wanted = match kernel {
+        Kernel::Packet => true,
+        Kernel::Auto => shaders.is_coherent() && !info.cuts_long_loops(),
+        _ => false,
+    };
+    able && wanted
 }
 
 /// The shader of the fast kernels that traces the stream.
 pub(super) fn large(info: &DeviceInfo, kernel: Kernel, shaders: &StreamShaders, s: &Specialization) -> Recipe {
-    let (name, spirv) = match in_packets(info, kernel, shaders) {
+    let packets = in_packets(info, kernel, shaders);
+    let (name, spirv) = match packets {
         true => (shaders.name, shaders.packet()),
         false => ("wide kernel", stream::wide_kernel(shaders.mode(), info.int64)),
     };
-    Recipe { name, spirv, specialization: s.clone() }
+    Recipe { name, spirv, specialization: s.clone(), packets }
 }

@@ -78,7 +78,7 @@ impl Trees {
         Ok(Hierarchy {
             kernel,
             nodes,
-            primitives,
+            primitives: Some(primitives),
             root,
             instance_roots: flat.placements.iter().map(|p| roots[p.group]).collect(),
             stack_entries,

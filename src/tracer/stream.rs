@@ -68,7 +68,7 @@ pub struct Push {
 }
 
 /// Rays that the compute tracer's buffers hold between the steps of a launch.
-pub(super) const LAUNCH_RAYS: u32 = 1 << 19;
+pub const LAUNCH_RAYS: u32 = 1 << 19;
 /// Rays of each lane of a packet: `PACKET_RAYS` of build.rs.
 const PACKET_RAYS: u32 = 2;
 /// Stands where a result will be: `UNFINISHED` of shaders/trace/launch.glsl.
@@ -230,6 +230,11 @@ impl Stream {
             return;
         }
         debug_assert_eq!(self.shaders.queue, push.rays != 0, "{}: where are its rays?", self.shaders.name);
+        debug_assert!(
+            self.shaders.queue || push.count <= LAUNCH_RAYS,
+            "{}: results would overwrite each other",
+            self.shaders.name
+        );
         let pass = self.shaders.pass;
         match &self.pipeline {
             Pipeline::Single { pipeline, rays_per_group } => {

@@ -19,8 +19,7 @@ use rayon::prelude::*;
 use super::compute::{
     ALPHA_TESTED, HIT_BYTES, Hierarchy, SPHERE, padding, placement_boxes, primitive_boxes, unfinished_counter, write_records,
 };
-use super::dynamic_trees::{DynamicTrees, provide};
-use super::gpu_scene::rows;
+use super::dynamic_trees::{DynamicTrees, entry_block, provide};
 use super::kernel::BuildOptions;
 use super::kernel::Kernel;
 use super::stream::{LAUNCH_RAYS, LaunchMemory};
@@ -59,11 +58,9 @@ impl Trees {
         let top = (!flat.is_single_level()).then(|| {
             let bounds: Vec<_> = groups.iter().map(|g| g.bounds.unwrap_or(Aabb::EMPTY)).collect();
             tree(placement_boxes(flat, &bounds), options.preset(flat.placements.len()), None, |entry| {
-                let placement = &flat.placements[entry as usize];
                 let mut block = [0; 16];
-                block[..12].copy_from_slice(rows(&placement.to_world.inverse()).as_flattened().map_bits());
                 // the root is filled in when the groups have their places
-                block[13] = entry;
+                entry_block(&mut block, entry, &flat.placements[entry as usize], 0);
                 block
             })
         });
@@ -121,9 +118,9 @@ impl Trees {
         let launch = |name, bytes| Buffer::new(device, name, bytes * LAUNCH_RAYS as u64, Memory::Device).map(Arc::new);
         Ok(Hierarchy {
             kernel,
-            primitives: Buffer::new(device, "no primitives", 16, Memory::Device)?,
+            primitives: None,
             root: 0,
-            instance_roots: vec![0; flat.placements.len()],
+            instance_roots: Vec::new(),
             stack_entries,
             bounds,
             unfinished: unfinished_counter(device)?,
@@ -135,16 +132,6 @@ impl Trees {
                 counters: launch("launch counters", 4)?,
             }),
         })
-    }
-}
-
-trait Bits {
-    fn map_bits(&self) -> &[u32];
-}
-
-impl Bits for [f32] {
-    fn map_bits(&self) -> &[u32] {
-        bytemuck::cast_slice(self)
     }
 }
 
@@ -211,13 +198,22 @@ fn kept(options: &BuildOptions, preset: BuildPreset, content: &[&[u8]], build: i
 }
 
 fn sphere_tree(flat: &FlatScene, group: &Group, options: &BuildOptions) -> Wide {
-    tree(primitive_boxes(flat, group).collect(), options.preset(group.primitive_count), None, |primitive| {
-        let part = flat.part_of(group, primitive as usize);
-        let s = flat.sphere(part, primitive as usize - part.first_primitive);
-        let mut block = [0; 16];
-        block[..4].copy_from_slice([s.center.x, s.center.y, s.center.z, s.radius].map_bits());
-        block[12..14].copy_from_slice(&[primitive | SPHERE, pairs::NONE]);
-        block
+    let preset = options.preset(group.primitive_count);
+    let spheres: Vec<[f32; 4]> = (0..group.primitive_count)
+        .into_par_iter()
+        .map(|primitive| {
+            let part = flat.part_of(group, primitive);
+            let s = flat.sphere(part, primitive - part.first_primitive);
+            [s.center.x, s.center.y, s.center.z, s.radius]
+        })
+        .collect();
+    kept(options, preset, &[b"spheres", bytemuck::cast_slice(&spheres)], || {
+        tree(primitive_boxes(flat, group).collect(), preset, None, |primitive| {
+            let mut block = [0; 16];
+            block[..4].copy_from_slice(bytemuck::cast_slice(&spheres[primitive as usize]));
+            block[12] = primitive | SPHERE;
+            block
+        })
     })
 }
 
@@ -255,15 +251,16 @@ fn triangle_tree(flat: &FlatScene, group: &Group, options: &BuildOptions) -> Wid
 
 /// `opaque`: triangles before the first alpha-tested one; `depth` as in [`tree`].
 pub(super) fn triangle_tree_of(triangles: &Triangles, opaque: u32, preset: BuildPreset, depth: Option<u32>) -> Wide {
-    let boxes: Vec<Aabb> = triangles.indices.par_iter().map(|&t| Aabb::of_points(&triangles.corners(t))).collect();
-    let pairs = pairs::pair_up(&triangles.indices, &boxes, triangles.positions.len());
+    let single: Vec<Aabb> = triangles.indices.par_iter().map(|&t| Aabb::of_points(&triangles.corners(t))).collect();
+    let pairs = pairs::pair_up(&triangles.indices, &single, triangles.positions.len());
     let boxes: Vec<Aabb> = pairs
         .par_iter()
         .map(|p| match p.triangles {
-            [a, pairs::NONE] => boxes[a as usize],
-            [a, b] => boxes[a as usize].union(boxes[b as usize]),
+            [a, pairs::NONE] => single[a as usize],
+            [a, b] => single[a as usize].union(single[b as usize]),
         })
         .collect();
+    drop(single);
     if boxes.is_empty() {
         return Wide::default();
     }
@@ -284,7 +281,7 @@ fn pair_block(triangles: &Triangles, pair: Pair, opaque: u32) -> Block {
     let fan = if b == pairs::NONE {
         Fan::single(corners(a))
     } else {
-        Fan::of(corners(a), corners(b)).unwrap_or_else(|| Fan::single(corners(a)))
+        Fan::of(corners(a), corners(b)).expect("a pair shares an edge")
     };
     let mut block = [0; 16];
     for (k, v) in fan.corners.into_iter().enumerate() {

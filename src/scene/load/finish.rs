@@ -9,8 +9,9 @@ use super::{normals, tangents};
 use crate::error::{Error, Result};
 use crate::scene::{Geometry, Material, Mesh, Scene, TriangleMesh};
 
-/// Largest coordinate, in object and world space: beyond it, squared lengths overflow single precision.
-const MAX_COORDINATE: f64 = 1e18;
+/// Largest coordinate, in object and world space: beyond it the triangle test's products of three lengths overflow single precision,
+/// and rays would miss.
+const MAX_COORDINATE: f64 = 1e12;
 
 /// Largest element of an inverse transform, for the same reason.
 const MAX_INVERSE: f64 = 1e30;
