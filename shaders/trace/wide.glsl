@@ -70,7 +70,8 @@ void main() {
     uint octant;
     SET_RAY(world.origin, world.direction)
     uint instance = 0u;
-    bool in_group = SINGLE_LEVEL;
+    // all bits or none: the ray is in the top level
+    uint at_top = SINGLE_LEVEL ? 0u : ~0u;
     uint block = root.root;
     // siblings yet to be visited (block.glsl)
     uint base = 0u, group = 0u;
@@ -116,16 +117,19 @@ void main() {
                 base = w1.y;
                 group = make_group(hits, present, octant);
             }
-        } else if (!SINGLE_LEVEL && !in_group) {
+        } else if (!SINGLE_LEVEL && at_top != 0u) {
             // an entry of the top level: the transform to its own space, then its root and number
             if (has_siblings(group)) {
                 PUSH(base, group)
             }
             // the way back
             PUSH(0u, 0u)
-            vec4 rows[3] = vec4[3](uintBitsToFloat(uvec4(w0, w1)), uintBitsToFloat(uvec4(w2, w3)), uintBitsToFloat(uvec4(w4, w5)));
+            // Lanes that hold something else compute this too, on words that are often denormal as floats, which cost a CPU a
+            // hundred times the cycles: theirs are zeroed, by arithmetic that no compiler takes for this branch's condition.
+            uint mine = uint(int(w7.y) >> 31) & at_top;
+            vec4 rows[3] = vec4[3](uintBitsToFloat(uvec4(w0, w1) & mine), uintBitsToFloat(uvec4(w2, w3) & mine), uintBitsToFloat(uvec4(w4, w5) & mine));
             SET_RAY(transform_point(rows, world.origin), transform_vector(rows, world.direction))
-            in_group = true;
+            at_top = 0u;
             instance = w6.y;
             base = w6.x;
             group = ROOT_GROUP;
@@ -169,7 +173,7 @@ void main() {
                 if (!SINGLE_LEVEL && group == 0u) {
                     // back to the top level
                     SET_RAY(world.origin, world.direction)
-                    in_group = false;
+                    at_top = ~0u;
                     done = depth == 0u;
                     if (!done) {
                         POP(base, group)
@@ -185,7 +189,7 @@ void main() {
                 if (MOST_TURNS > 0u && turns > MOST_TURNS) return;
                 NEXT_RAY
                 SET_RAY(world.origin, world.direction)
-                in_group = SINGLE_LEVEL;
+                at_top = SINGLE_LEVEL ? 0u : ~0u;
                 instance = 0u;
                 base = root.root;
                 group = ROOT_GROUP;
