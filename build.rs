@@ -30,6 +30,9 @@ unsafe extern "C" {}
 /// Threads of a work-group of a stream.
 const LANES: u32 = 64;
 
+/// The fast kernels' work-groups that follow each other take parts of a dispatch that are so far apart (shaders/trace/block.glsl).
+const SPREAD: u32 = 16;
+
 const EXTENSIONS: &str = "#extension GL_EXT_buffer_reference : require\n#extension GL_EXT_buffer_reference_uvec2 : require\n";
 
 struct Build {
@@ -157,7 +160,7 @@ impl Build {
                     }
                     let define = if mode == "any" { "#define STREAM_ANY\n" } else { "#define STREAM_CLOSEST\n" };
                     let source = format!(
-                        "#version 460\n{EXTENSIONS}{}#define LANES {LANES}\n{define}#include \"{name}.glsl\"\n#include \"{}\"\n",
+                        "#version 460\n{EXTENSIONS}{}#define LANES {LANES}\n#define SPREAD {SPREAD}u\n{define}#include \"{name}.glsl\"\n#include \"{}\"\n",
                         v.head, v.template
                     );
                     let output = format!("{name}_{mode}_{}.spv", v.field);
@@ -167,7 +170,10 @@ impl Build {
                 table.push_str("};\n");
             }
         }
-        let _ = writeln!(table, "/// Threads of a work-group of a stream.\npub const LANES: u32 = {LANES};");
+        let _ = writeln!(
+            table,
+            "/// Threads of a work-group of a stream.\npub const LANES: u32 = {LANES};\n/// Work-groups of the fast kernels are dispatched in multiples of this.\nconst SPREAD: u32 = {SPREAD};"
+        );
         table
     }
 
@@ -177,7 +183,7 @@ impl Build {
         for mode in ["any", "closest"] {
             for (bits, head) in [(32, ""), (64, HEAD_64)] {
                 let source = format!(
-                    "#version 460\n{EXTENSIONS}#extension GL_EXT_control_flow_attributes : require\n{head}#define LANES {LANES}\n\
+                    "#version 460\n{EXTENSIONS}#extension GL_EXT_control_flow_attributes : require\n{head}#define LANES {LANES}\n#define SPREAD {SPREAD}u\n\
                      #define STREAM_{}\n#include \"trace/wide.glsl\"\n",
                     mode.to_uppercase()
                 );

@@ -91,7 +91,7 @@ void main() {
     SceneRoot root = SceneRoot(push.scene);
     uvec2 blocks = root.nodes;
     uint lane = gl_SubgroupInvocationID;
-    uint first = (gl_WorkGroupID.x * LANES + gl_SubgroupID * SUBGROUP) * PACKET_RAYS + lane;
+    uint first = (part_of_dispatch() * LANES + gl_SubgroupID * SUBGROUP) * PACKET_RAYS + lane;
     uint count = ray_count();
     // the same for all lanes
     if (first - lane >= count) return;

@@ -54,7 +54,7 @@ Ray take_ray(uint k) {
 #endif
 
 void main() {
-    uint begin = gl_WorkGroupID.x * (LANES * RAYS_PER_LANE);
+    uint begin = part_of_dispatch() * (LANES * RAYS_PER_LANE);
     uint end = min(begin + LANES * RAYS_PER_LANE, ray_count());
     SceneRoot root = SceneRoot(push.scene);
     uint index;
@@ -70,6 +70,8 @@ void main() {
     uint octant;
     SET_RAY(world.origin, world.direction)
     uint instance = 0u;
+    // the stack's depth where the ray entered the instance
+    uint entry_depth = 0u;
     // all bits or none: the ray is in the top level
     uint at_top = SINGLE_LEVEL ? 0u : ~0u;
     uint block = root.root;
@@ -85,6 +87,9 @@ void main() {
         Block8 b = Block8(block_address(blocks, block));
         uvec2 w0 = PAIR(b.q0), w1 = PAIR(b.q1), w2 = PAIR(b.q2), w3 = PAIR(b.q3);
         uvec2 w4 = PAIR(b.q4), w5 = PAIR(b.q5), w6 = PAIR(b.q6), w7 = PAIR(b.q7);
+        // where the ray goes on when it leaves its space
+        bool turns_to = false;
+        vec3 next_origin = world.origin, next_direction = world.direction;
         // the child that lies first along the ray, where distance decides and not the octant
         uint nearest = INVALID;
         if ((w7.y & LEAF) == 0u) {
@@ -122,13 +127,14 @@ void main() {
             if (has_siblings(group)) {
                 PUSH(base, group)
             }
-            // the way back
-            PUSH(0u, 0u)
+            entry_depth = depth;
             // Lanes that hold something else compute this too, on words that are often denormal as floats, which cost a CPU a
             // hundred times the cycles: theirs are zeroed, by arithmetic that no compiler takes for this branch's condition.
             uint mine = uint(int(w7.y) >> 31) & at_top;
             vec4 rows[3] = vec4[3](uintBitsToFloat(uvec4(w0, w1) & mine), uintBitsToFloat(uvec4(w2, w3) & mine), uintBitsToFloat(uvec4(w4, w5) & mine));
-            SET_RAY(transform_point(rows, world.origin), transform_vector(rows, world.direction))
+            next_origin = transform_point(rows, world.origin);
+            next_direction = transform_vector(rows, world.direction);
+            turns_to = true;
             at_top = 0u;
             instance = w6.y;
             base = w6.x;
@@ -162,25 +168,17 @@ void main() {
             if (best_primitive != INVALID) {
                 group = 0u;
                 depth = 0u;
+                entry_depth = 0u;
             }
 #endif
         }
-        bool done = false;
         if (!has_siblings(group)) {
-            done = depth == 0u;
-            if (!done) {
-                POP(base, group)
-                if (!SINGLE_LEVEL && group == 0u) {
-                    // back to the top level
-                    SET_RAY(world.origin, world.direction)
-                    at_top = ~0u;
-                    done = depth == 0u;
-                    if (!done) {
-                        POP(base, group)
-                    }
-                }
+            if (!SINGLE_LEVEL && at_top == 0u && depth == entry_depth) {
+                // back to the top level
+                turns_to = true;
+                at_top = ~0u;
             }
-            if (done) {
+            if (depth == 0u) {
 #ifdef STREAM_ANY
                 store_any(root, index, best_primitive != INVALID);
 #else
@@ -188,16 +186,22 @@ void main() {
 #endif
                 if (MOST_TURNS > 0u && turns > MOST_TURNS) return;
                 NEXT_RAY
-                SET_RAY(world.origin, world.direction)
-                at_top = SINGLE_LEVEL ? 0u : ~0u;
+                if (SINGLE_LEVEL) { SET_RAY(world.origin, world.direction) }
+                next_origin = world.origin;
+                next_direction = world.direction;
+                turns_to = true;
                 instance = 0u;
                 base = root.root;
                 group = ROOT_GROUP;
                 best = world.tmax;
                 best_primitive = INVALID;
                 best_instance = INVALID;
+            } else {
+                POP(base, group)
             }
         }
+        // to an instance's space, to the world's, or another ray: one place for the divisions
+        if (!SINGLE_LEVEL && turns_to) { SET_RAY(next_origin, next_direction) }
         // the next block
         uint bit = findMSB(group | 1u);
         uint slot = (bit - 24u) ^ octant;

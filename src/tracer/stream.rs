@@ -238,7 +238,8 @@ impl Stream {
         let pass = self.shaders.pass;
         match &self.pipeline {
             Pipeline::Single { pipeline, rays_per_group } => {
-                recorder.timed(pass, |r| r.dispatch(pipeline, push, push.count.div_ceil(*rays_per_group)));
+                recorder
+                    .timed(pass, |r| r.dispatch(pipeline, push, push.count.div_ceil(*rays_per_group).next_multiple_of(SPREAD)));
             }
             Pipeline::Steps { generate, trace, deliver, rays_per_group, memory, record } => {
                 let [generating, tracing, delivering] = self.shaders.steps;
@@ -246,7 +247,7 @@ impl Stream {
                     let mut push = Push { first: push.first + first, count: LAUNCH_RAYS.min(push.count - first), ..*push };
                     // the steps hand rays and hits on in memory, and so does one launch to the next
                     recorder.barrier();
-                    let groups = push.count.div_ceil(*rays_per_group);
+                    let groups = push.count.div_ceil(*rays_per_group).next_multiple_of(SPREAD);
                     recorder.fill(&memory.counters, 4 * groups as u64, 0);
                     match generate {
                         Some(generate) => {
