@@ -191,7 +191,7 @@ fn median(mut values: Vec<f64>) -> f64 {
 fn orders(device: &Arc<Device>, flat: &FlatScene, label: &str, streams: &[RayStream; 3], arguments: &Arguments) -> Result<()> {
     let primitives = flat.primitive_count();
     let mut kernels = vec![Kernel::Nearest, Kernel::Direction, Kernel::Wide];
-    if primitives + flat.placements.len() <= Kernel::BRUTE_MOST {
+    if Kernel::brute_tests(flat) <= Kernel::BRUTE_MOST {
         kernels.push(Kernel::Brute);
     }
     let tracers = kernels

@@ -229,6 +229,21 @@ fn gpu_missing_peers_are_named_and_left_out() {
     assert!(stderr(&place.run(&SMALL)).contains("skylit: warning: peer 'x' is missing"));
 }
 
+/// A kernel that refuses a scene is named with its reason, and the others are measured; alone, its reason ends the run.
+#[test]
+fn gpu_refusals_leave_the_rest() {
+    if !device() {
+        return;
+    }
+    let place = Place::new("");
+    let args = ["builtin:grid:8", "--rays", "2000", "--repeats", "1", "--streams", "primary", "--kernels"];
+    let record = json(&place.run(&[&args[..], &["wide,brute", "--json"]].concat()));
+    let notes = record["notes"].to_string();
+    assert!(notes.contains("'brute' left out: traversal 'brute' tests every primitive"), "{notes}");
+    assert_eq!(record["scenes"][0]["streams"][0]["results"].as_array().unwrap().len(), 1);
+    fails(&place.run(&[&args[..], &["brute"]].concat()), 3, &["traversal 'brute' tests every primitive"]);
+}
+
 /// The fake's answers are wrong, and found to be.
 #[test]
 fn gpu_wrong_answers_fail_the_check() {

@@ -249,27 +249,32 @@ impl Bench<'_> {
         self.args.streams.is_empty() || self.args.streams.iter().any(|s| s == stream.name)
     }
 
-    /// All that take part in a scene, built.
+    /// All that take part in a scene, built: one of our own at least, which makes the rays.
     fn contestants<'f>(&mut self, console: &Console, source: &str, flat: &'f FlatScene<'f>) -> Result<Vec<Contestant<'f>>> {
         let mut out = Vec::new();
+        let mut refused = None;
         for own in &OWN {
             let named = self.args.kernels.iter().any(|k| k == own.name);
             if !named && !self.args.kernels.is_empty() {
                 continue;
             }
-            let made = match own.takes_part(&self.device.info, flat.primitive_count(), named) {
+            let made = match own.takes_part(&self.device.info, flat, named) {
                 Ok(()) => Contestant::own(self.device, flat, own),
                 Err(why) => Err(Error::Device(why)),
             };
             match made {
                 Ok(c) => out.push(c),
-                // one that is too large for the device, or not there, does not stop the others
-                Err(e @ (Error::OutOfMemory(_) | Error::Device(_))) => {
+                // one that the scene is too large for, or that the device does not run, does not stop the others
+                Err(e @ (Error::OutOfMemory(_) | Error::Device(_) | Error::Scene(_))) => {
                     self.note(console, format!("{source}: '{}' left out: {e}", own.name));
+                    refused.get_or_insert(e);
                 }
                 Err(e) => return Err(e),
             }
             interrupt::check()?;
+        }
+        if let (true, Some(why)) = (out.is_empty(), refused) {
+            return Err(why);
         }
         let masked = flat.has_alpha();
         for index in 0..self.peers.len() {
