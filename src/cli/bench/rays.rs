@@ -12,7 +12,7 @@ use super::peer::{Peer, PeerError};
 use super::scenes::{self, Subject};
 use super::streams::{RaySets, STREAMS, Set, StreamKind};
 use super::{peers_file, table};
-use crate::cli::console::Console;
+use crate::cli::console::{Console, Failure};
 use crate::cli::interrupt::{self, Keyboard};
 use crate::cli::progress::Progress;
 use crate::error::{Error, Result};
@@ -29,7 +29,7 @@ use crate::tracer::Kernel;
 use crate::tracer::visits::VisitCounter;
 
 /// Measures, shows, writes.
-pub fn run(args: &BenchRaysArgs) -> Result<()> {
+pub fn run(args: &BenchRaysArgs) -> Result<(), Failure> {
     let start = Instant::now();
     args.check()?;
     for path in args.outputs() {
@@ -95,9 +95,9 @@ pub fn run(args: &BenchRaysArgs) -> Result<()> {
     for line in table::scaling(&out) {
         console.line(&line)?;
     }
-    write(args, &out)?;
-    console.record(&out)?;
-    verdict(args, &out)
+    // a file that cannot be written costs neither the other files nor the record
+    let outcome = write(args, &out).and(verdict(args, &out));
+    console.close(&out, outcome)
 }
 
 /// The peers file's entries; or why there are none.
@@ -110,20 +110,22 @@ fn peer_specs(args: &BenchRaysArgs) -> Result<Result<Vec<peers_file::PeerSpec>, 
     }
 }
 
+/// Writes the files that were asked for; one that cannot be written does not stop the others.
 fn write(args: &BenchRaysArgs, out: &RayBenchmark) -> Result<()> {
-    if let Some(path) = args.json_file() {
+    let json = args.json_file().map_or(Ok(()), |path| {
         let text = serde_json::to_string_pretty(out)
             .map_err(|e| Error::CheckFailed(format!("cannot express the result as JSON: {e}")))?;
-        output::write_atomically(path, |f| f.write_all(text.as_bytes()).and_then(|()| f.write_all(b"\n")))?;
-    }
-    if let Some(path) = &args.csv {
-        output::write_atomically(path, |f| out.write_csv(f).map_err(std::io::Error::other))?;
-    }
-    if let Some(path) = &args.plot {
+        output::write_atomically(path, |f| f.write_all(text.as_bytes()).and_then(|()| f.write_all(b"\n")))
+    });
+    let csv = args
+        .csv
+        .as_ref()
+        .map_or(Ok(()), |path| output::write_atomically(path, |f| out.write_csv(f).map_err(std::io::Error::other)));
+    let plot = args.plot.as_ref().map_or(Ok(()), |path| {
         let picture = plot::draw(out)?;
-        output::png::write_rgb(path, &picture.rgb, picture.width, picture.height)?;
-    }
-    Ok(())
+        output::png::write_rgb(path, &picture.rgb, picture.width, picture.height)
+    });
+    json.and(csv).and(plot)
 }
 
 /// With `--check`: an answer that rounding does not explain is a failure, if it is ours or of a peer that has to agree.
@@ -195,7 +197,9 @@ impl Bench<'_> {
     fn scene(&mut self, console: &Console, source: &str) -> Result<SceneRecord> {
         let size = self.args.size();
         let subject = scenes::load(source, self.args, f64::from(size[0]) / f64::from(size[1]))?;
-        crate::cli::warn(console, &subject.scene);
+        for warning in crate::cli::noticed(&subject.scene) {
+            self.note(console, format!("{source}: {}", crate::cli::one_line(&warning)));
+        }
         interrupt::check()?;
         let flat = FlatScene::new(&subject.scene);
         let contestants = self.contestants(console, source, &flat)?;
