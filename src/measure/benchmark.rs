@@ -6,7 +6,7 @@ use std::io::Write;
 
 use serde::Serialize;
 
-use super::parity::ParityReport;
+use super::agreement::Agreement;
 use super::stats::{LogScaling, Summary};
 
 /// A whole run.
@@ -113,8 +113,8 @@ pub struct RunRecord {
     pub ratios: Vec<Ratio>,
     /// Nodes visited per ray, where that is counted.
     pub nodes_per_ray: Option<f64>,
-    /// Primitives tested per ray, where that is counted.
-    pub primitives_per_ray: Option<f64>,
+    /// Leaves visited per ray, of one or two triangles each, where that is counted.
+    pub leaves_per_ray: Option<f64>,
 }
 
 /// How many times as fast as a baseline.
@@ -143,6 +143,8 @@ pub struct CheckRecord {
     pub ties: u64,
     /// Any other.
     pub unexplained: u64,
+    /// Of these, where it is the reference's answer that no rounding explains.
+    pub reference_unexplained: u64,
     /// Unexplained answers of this contestant are a failure.
     pub strict: bool,
     /// The first of the unexplained.
@@ -151,7 +153,8 @@ pub struct CheckRecord {
 
 impl CheckRecord {
     /// From a report.
-    pub fn new(contestant: &str, reference: &str, stream: &str, report: &ParityReport, strict: bool) -> Self {
+    pub fn new(contestant: &str, reference: &str, stream: &str, found: &Agreement, strict: bool) -> Self {
+        let report = &found.report;
         // its text: a summary and a line for each example
         let examples = report.to_string().lines().skip(1).map(|l| l.trim().to_owned()).collect();
         Self {
@@ -162,9 +165,15 @@ impl CheckRecord {
             agree: report.agree,
             ties: report.ties,
             unexplained: report.unexplained,
+            reference_unexplained: found.reference_unexplained,
             strict,
             examples,
         }
+    }
+
+    /// Is it a failure? The reference is one of our own tracers: that its answers are wrong always is.
+    pub fn fails(&self) -> bool {
+        self.strict && self.unexplained > 0 || self.reference_unexplained > 0
     }
 }
 
@@ -251,7 +260,7 @@ impl RayBenchmark {
                 maybe(build.map(|b| b.bytes_per_primitive)),
                 maybe(build.and_then(|b| b.sah_cost)),
                 maybe(run.nodes_per_ray),
-                maybe(run.primitives_per_ray),
+                maybe(run.leaves_per_ray),
             ];
             row.extend(self.baselines.iter().map(|b| maybe(run.ratio_to(b))));
             csv.write_record(row)?;
@@ -280,7 +289,7 @@ const CSV_COLUMNS: [&str; 19] = [
     "bytes per primitive",
     "SAH cost",
     "nodes per ray",
-    "primitives per ray",
+    "leaves per ray",
 ];
 
 impl RunRecord {
@@ -305,7 +314,7 @@ mod tests {
             seconds: vec![1.0],
             ratios: vec![Ratio { to: "peer, one".into(), ratio: 0.5 }],
             nodes_per_ray: None,
-            primitives_per_ray: Some(2.0),
+            leaves_per_ray: Some(2.0),
         }
     }
 

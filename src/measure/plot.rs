@@ -244,7 +244,7 @@ mod tests {
             seconds: Vec::new(),
             ratios: Vec::new(),
             nodes_per_ray: None,
-            primitives_per_ray: None,
+            leaves_per_ray: None,
         };
         let scenes = rates.iter().map(|&(scene, triangles, rate)| SceneRecord {
             scene: scene.into(),

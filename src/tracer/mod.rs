@@ -273,7 +273,7 @@ impl Tracer {
                     .set(5, u32::from(h.kernel == Kernel::Direction))
                     .set(6, u32::from(self.triangle_test == TriangleTest::Watertight))
                     .set(8, most_turns);
-                let packets = shaders.has_packets() && self.device.info.limits.packets && self.device.info.int64;
+                let packets = shaders.has_packets() && self.device.info.packets();
                 match h.kernel {
                     Kernel::Packet | Kernel::Auto if packets && (h.kernel == Kernel::Packet || shaders.is_coherent()) => {
                         let lanes = self.device.info.limits.subgroup_size;

@@ -49,6 +49,10 @@ impl Own {
         if !info.supports(self.tracer) {
             return Err("the device does not have what it needs (`skylit doctor`)".into());
         }
+        if self.kernel == Kernel::Packet && !info.packets() {
+            // it would be `wide` under another name
+            return Err("the device has no subgroups of eight lanes or no 64-bit integers, and traces as 'wide' does".into());
+        }
         // without a tree, a GPU is slow too, and what is placed counts, not what is stored
         let brute = self.kernel == Kernel::Brute;
         let work = if brute { Kernel::brute_tests(flat) } else { flat.primitive_count() };
