@@ -73,6 +73,9 @@ fn usage_errors() {
     fails(&render(&["--aov", "depth,smell"]), 64, "smell");
     fails(&render(&["--traversal", "backwards"]), 64, "auto, wide, packet, nearest, direction, brute");
     fails(&render(&["--triangle-test", "none"]), 64, "watertight, moller-trumbore");
+    fails(&render(&["--tracer", "pipeline", "--build", "best"]), 64, "--tracer compute");
+    fails(&render(&["--traversal", "brute", "--build", "best"]), 64, "has no hierarchy");
+    fails(&["rays", "--mesh", "a.bin", "--rays", "r.bin", "--traversal", "nearest", "--bvh-cache", "d"], 64, "keeps none");
     fails(&["diff", "a.exr"], 64, "<B>");
     fails(&["export", "builtin:plane", "a.txt"], 64, ".bin, .glb or .gltf");
 }

@@ -21,6 +21,7 @@ use crate::tracer::{Needs, Tracer};
 
 /// Loads, traces, reports.
 pub fn run(args: &RaysArgs) -> Result<()> {
+    args.device.check()?;
     interrupt::install();
     let console = args.verbosity.console();
     if let Some(hits) = &args.hits {
