@@ -106,6 +106,8 @@ fn wrong_usage() {
     fails(&place.run(&["--csv", "/nonexistent/a.csv"]), 4, &["folder does not exist"]);
     fails(&place.run(&["builtin:nothing"]), 64, &["nothing"]);
     fails(&place.run(&["no-such-scene.glb"]), 3, &["no such file"]);
+    // before anything is measured
+    fails(&place.run(&["builtin:plane", "builtin:terrain:1"]), 64, &["terrain:1"]);
 }
 
 #[test]

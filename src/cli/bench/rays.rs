@@ -262,6 +262,9 @@ impl Bench<'_> {
         for warning in crate::cli::noticed(&subject.scene) {
             self.note(console, format!("{source}: {}", crate::cli::one_line(&warning)));
         }
+        if let Some(known) = subject.view {
+            self.note(console, format!("{source}: seen and lit as {known} is (docs/benchmarks.md)"));
+        }
         interrupt::check()?;
         let flat = FlatScene::new(&subject.scene);
         let contestants = self.contestants(console, source, &flat)?;
