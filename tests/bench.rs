@@ -239,8 +239,9 @@ fn gpu_refusals_leave_the_rest() {
         return;
     }
     let place = Place::new("");
-    let args = ["builtin:grid:8", "--rays", "2000", "--repeats", "1", "--streams", "primary", "--kernels"];
+    let args = ["builtin:grid:8", "--build", "fast", "--rays", "2000", "--repeats", "1", "--streams", "primary", "--kernels"];
     let record = json(&place.run(&[&args[..], &["wide,brute", "--json"]].concat()));
+    assert_eq!(record["build"], "fast");
     let notes = record["notes"].to_string();
     assert!(notes.contains("'brute' left out: traversal 'brute' tests every primitive"), "{notes}");
     assert_eq!(record["scenes"][0]["streams"][0]["results"].as_array().unwrap().len(), 1);

@@ -171,6 +171,23 @@ pub enum BuildChoice {
     Best,
 }
 
+impl BuildChoice {
+    /// As on the command line.
+    pub fn name(self) -> String {
+        self.to_possible_value().map(|v| v.get_name().to_owned()).unwrap_or_default()
+    }
+
+    /// `None`: what suits the scene and the rays.
+    pub fn preset(self) -> Option<BuildPreset> {
+        match self {
+            BuildChoice::Auto => None,
+            BuildChoice::Fast => Some(BuildPreset::Fast),
+            BuildChoice::Default => Some(BuildPreset::Default),
+            BuildChoice::Best => Some(BuildPreset::Best),
+        }
+    }
+}
+
 /// What it runs on.
 #[derive(Clone, Debug, Args)]
 pub struct DeviceArgs {
@@ -207,13 +224,11 @@ impl DeviceArgs {
     /// How the compute tracer's hierarchy is built, when about so many rays will be traced.
     pub fn build_options(&self, rays: u64) -> BuildOptions {
         let from_environment = || std::env::var_os("SKYLIT_BVH_CACHE").filter(|v| !v.is_empty()).map(PathBuf::from);
-        let preset = match self.build {
-            BuildChoice::Auto => None,
-            BuildChoice::Fast => Some(BuildPreset::Fast),
-            BuildChoice::Default => Some(BuildPreset::Default),
-            BuildChoice::Best => Some(BuildPreset::Best),
-        };
-        BuildOptions { preset, rays, cache: self.bvh_cache.clone().or_else(from_environment).map(Cache::new) }
+        BuildOptions {
+            preset: self.build.preset(),
+            rays,
+            cache: self.bvh_cache.clone().or_else(from_environment).map(Cache::new),
+        }
     }
 
     /// The first option given that is about the compute tracer alone.

@@ -22,6 +22,8 @@ pub struct RayBenchmark {
     pub threads: usize,
     /// Timed repeats that were asked for, after one that warms up.
     pub repeats: u32,
+    /// How long our own hierarchies were built: a preset, or `auto`.
+    pub build: String,
     /// Peers that ran, as they introduce themselves.
     pub peers: Vec<String>,
     /// Contestants that ratios are given to.

@@ -11,7 +11,7 @@ use crate::ray::{Hit, Ray};
 use crate::render::Control;
 use crate::render::rays::{Mode, PreparedRays};
 use crate::scene::flatten::FlatScene;
-use crate::tracer::{Kernel, Needs, Tracer, TracerKind};
+use crate::tracer::{BuildOptions, Kernel, Needs, Tracer, TracerKind};
 
 /// A tracer of our own with its kernel. A new one is a line of [`OWN`].
 pub struct Own {
@@ -87,8 +87,8 @@ impl<'a> Contestant<'a> {
     ///
     /// # Errors
     /// Those of [`Tracer::new`].
-    pub fn own(device: &Arc<Device>, flat: &'a FlatScene, own: &Own) -> Result<Self> {
-        let tracer = Tracer::with_options(device, own.tracer, flat, Needs::default(), own.kernel)?;
+    pub fn own(device: &Arc<Device>, flat: &'a FlatScene, own: &Own, build: &BuildOptions) -> Result<Self> {
+        let tracer = Tracer::with_build(device, own.tracer, flat, Needs::default(), own.kernel.into(), build)?;
         let stats = tracer.stats();
         let build = BuildRecord {
             contestant: own.name.to_owned(),

@@ -12,6 +12,7 @@ use super::peer::{Peer, PeerError};
 use super::scenes::{self, Subject};
 use super::streams::{RaySets, STREAMS, Set, StreamKind};
 use super::{peers_file, table};
+use crate::cli::args::BuildChoice;
 use crate::cli::console::{Console, Failure};
 use crate::cli::interrupt::{self, Keyboard};
 use crate::cli::progress::Progress;
@@ -56,6 +57,7 @@ pub fn run(args: &BenchRaysArgs) -> Result<(), Failure> {
             driver: device.info.driver.clone(),
             threads: std::thread::available_parallelism().map_or(1, usize::from),
             repeats: args.repeats(),
+            build: args.build.name(),
             ..Default::default()
         },
         laps: (0, 0),
@@ -292,7 +294,9 @@ impl Bench<'_> {
                 self.give_rays(console, &contestants, &mut failed, set, sets.get(set))?;
             }
         }
-        let counted = contestants.iter().any(|c| c.kernel == Some(Kernel::Wide)) && flat.primitive_count() <= VISITS_MOST;
+        // the counter's tree is that of the default preset
+        let same = self.args.build == BuildChoice::Default && flat.primitive_count() <= VISITS_MOST;
+        let counted = same && contestants.iter().any(|c| c.kernel == Some(Kernel::Wide));
         let counter = if counted { VisitCounter::new(&flat) } else { None };
         for (k, stream) in asked.iter().enumerate() {
             // one stream at least: a record of nothing says nothing
@@ -337,7 +341,7 @@ impl Bench<'_> {
             }
             self.phase(format!("{source}: building for '{}'", own.name));
             let made = match own.takes_part(&self.device.info, flat, named) {
-                Ok(()) => Contestant::own(self.device, flat, own),
+                Ok(()) => Contestant::own(self.device, flat, own, &self.args.build_options()),
                 Err(why) => Err(Error::Device(why)),
             };
             match made {
