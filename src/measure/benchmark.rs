@@ -304,6 +304,7 @@ impl RunRecord {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::measure::parity::ParityReport;
 
     fn run(contestant: &str, rate: f64) -> RunRecord {
         let flat = Summary { median: rate, min: rate, max: rate };
@@ -353,6 +354,17 @@ mod tests {
         let s = &b.scaling[0];
         assert_eq!((s.contestant.as_str(), s.points.as_slice()), ("wide", &[(10, 10.0), (1000, 9.0)][..]));
         assert!(s.holds);
+    }
+
+    #[test]
+    fn who_fails_a_check() {
+        let check = |strict, unexplained, reference_unexplained| {
+            let report = ParityReport { rays: 10, unexplained, ..Default::default() };
+            CheckRecord::new("b", "wide", "primary", &Agreement { report, reference_unexplained }, strict).fails()
+        };
+        assert!(!check(true, 0, 0) && !check(false, 3, 0));
+        // the reference's own answers count whoever is beside it
+        assert!(check(true, 1, 0) && check(false, 1, 1));
     }
 
     #[test]
