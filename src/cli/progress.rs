@@ -1,10 +1,11 @@
 //! A progress bar on stderr, for work that takes longer than a second.
 
 use std::borrow::Cow;
+use std::fmt::Write;
 use std::io::{IsTerminal, stderr};
 use std::time::{Duration, Instant};
 
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 
 use super::console::Console;
 
@@ -63,8 +64,8 @@ impl Progress {
         let bar = self.bar.get_or_insert_with(|| {
             let bar = ProgressBar::with_draw_target(Some(total), ProgressDrawTarget::stderr_with_hz(10));
             // a template that does not parse would be a slip of ours: the plain style does as well
-            if let Ok(style) = ProgressStyle::with_template("{msg} [{bar:40}] {percent}% {eta} left") {
-                bar.set_style(style.progress_chars("=> "));
+            if let Ok(style) = ProgressStyle::with_template("{msg} [{bar:40}] {percent}%{left}") {
+                bar.set_style(style.with_key("left", left).progress_chars("=> "));
             }
             bar.with_elapsed(self.start.elapsed())
         });
@@ -73,6 +74,14 @@ impl Progress {
         }
         bar.set_length(total);
         bar.set_position(done);
+    }
+}
+
+/// The time that is left, once there is anything to tell it from.
+fn left(state: &ProgressState, out: &mut dyn Write) {
+    if state.pos() > 0 {
+        // into a buffer of the bar's
+        let _ = write!(out, " {:#} left", HumanDuration(state.eta()));
     }
 }
 
