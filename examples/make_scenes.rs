@@ -10,7 +10,7 @@ use skylit::scene::*;
 fn main() -> skylit::Result<()> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");
     export_gltf(&leaves(), &folder.join("leaves.glb"))?;
-    export_gltf(&courtyard(), &folder.join("courtyard.gltf"))
+    export_gltf(&courtyard(), &folder.join("courtyard.gltf")).map(drop)
 }
 
 /// A rectangle in the xz plane, facing +y, centred on the origin.

@@ -9,7 +9,7 @@
 //!
 //! The width of the driver's vectors is set from outside: `LP_NATIVE_VECTOR_WIDTH=256 MESA_SHADER_CACHE_DISABLE=true`.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use clap::Parser;
@@ -44,7 +44,7 @@ struct Arguments {
     #[arg(long, default_value_t = 10_000_000)]
     edge_rays: usize,
     /// Rays in memory at a time
-    #[arg(long, default_value_t = 1_000_000)]
+    #[arg(long, default_value_t = 1_000_000, value_parser = piece)]
     piece: usize,
     /// Which rays: another number makes others
     #[arg(long, default_value_t = 1)]
@@ -55,6 +55,10 @@ struct Arguments {
     /// Kernels, by their names for --traversal
     #[arg(long, value_delimiter = ',', default_value = "wide")]
     kernel: Vec<String>,
+}
+
+fn piece(text: &str) -> std::result::Result<usize, String> {
+    text.parse().ok().filter(|&n| n > 0).ok_or_else(|| "expected a number above 0".to_owned())
 }
 
 /// What is judged: a device and a kernel on it.
@@ -162,7 +166,8 @@ fn scenes(arguments: &Arguments) -> Vec<String> {
     if !arguments.scenes.is_empty() {
         return arguments.scenes.clone();
     }
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/scenes");
+    // as `skylit bench` looks for them
+    let folder = std::env::var_os("SKYLIT_SHARED_SCENES").map_or_else(|| "../shared/scenes".into(), PathBuf::from);
     let shared = SHARED.iter().map(|s| folder.join(s)).filter(|p| p.is_file()).map(|p| p.to_string_lossy().into_owned());
     BUILTIN.iter().map(|s| (*s).to_owned()).chain(shared).collect()
 }

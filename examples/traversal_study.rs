@@ -14,6 +14,7 @@ use glam::DVec3;
 use serde_json::{Value, json};
 use skylit::gpu::{Device, Options};
 use skylit::measure::ray_sets::leak_rays;
+use skylit::measure::stats::median;
 use skylit::oracle::Oracle;
 use skylit::ray::Ray;
 use skylit::render::Uncontrolled;
@@ -79,8 +80,11 @@ struct Arguments {
 }
 
 fn vector(text: &str) -> std::result::Result<DVec3, String> {
-    let parts: Vec<f64> = text.split(',').filter_map(|p| p.trim().parse().ok()).collect();
-    <[f64; 3]>::try_from(parts).map(DVec3::from).map_err(|_| "expected X,Y,Z".to_owned())
+    let parts: Option<Vec<f64>> = text.split(',').map(|p| p.trim().parse().ok().filter(|v: &f64| v.is_finite())).collect();
+    parts
+        .and_then(|p| <[f64; 3]>::try_from(p).ok())
+        .map(DVec3::from)
+        .ok_or_else(|| "expected three finite numbers X,Y,Z".into())
 }
 
 fn main() {
@@ -179,19 +183,13 @@ fn measure(tracers: &[Tracer], streams: &[RayStream], limits: &[usize], rounds: 
             }
         }
     }
-    Ok(seconds.into_iter().map(|v| v.into_iter().map(median).collect()).collect())
-}
-
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    let n = values.len();
-    (values[(n - 1) / 2] + values[n / 2]) * 0.5
+    Ok(seconds.into_iter().map(|v| v.iter().map(|s| median(s).unwrap_or(f64::NAN)).collect()).collect())
 }
 
 fn orders(device: &Arc<Device>, flat: &FlatScene, label: &str, streams: &[RayStream; 3], arguments: &Arguments) -> Result<()> {
     let primitives = flat.primitive_count();
     let mut kernels = vec![Kernel::Nearest, Kernel::Direction, Kernel::Wide];
-    if primitives + flat.placements.len() <= Kernel::BRUTE_MOST {
+    if Kernel::brute_tests(flat) <= Kernel::BRUTE_MOST {
         kernels.push(Kernel::Brute);
     }
     let tracers = kernels

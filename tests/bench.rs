@@ -15,6 +15,7 @@ echo '{"protocol":1,"peer":"Fake '$name'","threads":1,"kernels":["k","l"]}'
 while read -r command a b c d; do
   echo "$name $command $a $b $c" >> "$log"
   if [ "$command" = "$dies_at" ]; then exit 3; fi
+  if [ "hang $b" = "$dies_at" ]; then exec sleep 600; fi
   case $command in
     quit) exit 0;;
     scene) echo '{"primitives":1}';;
@@ -105,6 +106,8 @@ fn wrong_usage() {
     fails(&place.run(&["--csv", "/nonexistent/a.csv"]), 4, &["folder does not exist"]);
     fails(&place.run(&["builtin:nothing"]), 64, &["nothing"]);
     fails(&place.run(&["no-such-scene.glb"]), 3, &["no such file"]);
+    // before anything is measured
+    fails(&place.run(&["builtin:plane", "builtin:terrain:1"]), 64, &["terrain:1"]);
 }
 
 #[test]
@@ -229,6 +232,22 @@ fn gpu_missing_peers_are_named_and_left_out() {
     assert!(stderr(&place.run(&SMALL)).contains("skylit: warning: peer 'x' is missing"));
 }
 
+/// A kernel that refuses a scene is named with its reason, and the others are measured; alone, its reason ends the run.
+#[test]
+fn gpu_refusals_leave_the_rest() {
+    if !device() {
+        return;
+    }
+    let place = Place::new("");
+    let args = ["builtin:grid:8", "--build", "fast", "--rays", "2000", "--repeats", "1", "--streams", "primary", "--kernels"];
+    let record = json(&place.run(&[&args[..], &["wide,brute", "--json"]].concat()));
+    assert_eq!(record["build"], "fast");
+    let notes = record["notes"].to_string();
+    assert!(notes.contains("'brute' left out: traversal 'brute' tests every primitive"), "{notes}");
+    assert_eq!(record["scenes"][0]["streams"][0]["results"].as_array().unwrap().len(), 1);
+    fails(&place.run(&[&args[..], &["brute"]].concat()), 3, &["traversal 'brute' tests every primitive"]);
+}
+
 /// The fake's answers are wrong, and found to be.
 #[test]
 fn gpu_wrong_answers_fail_the_check() {
@@ -263,21 +282,83 @@ fn gpu_time_limit_and_interruption() {
         return;
     }
     let place = Place::new(&Place::entry("a", "", ""));
-    let args = ["builtin:plane", "builtin:stairs", "--kernels", "wide", "--rays", "400000", "--repeats", "1000"];
-    let record = json(&place.run(&[&args[..], &["--time-limit", "1", "--json"]].concat()));
+    // over before anything starts: one round of one stream is measured all the same
+    let args =
+        ["builtin:plane", "builtin:stairs", "--kernels", "wide,nearest", "--rays", "2000", "--repeats", "1000", "--check"];
+    let record = json(&place.run(&[&args[..], &["--time-limit", "0.000001", "--json"]].concat()));
     assert_eq!(record["stopped_early"], true);
-    let first = &record["scenes"][0]["streams"][0]["results"][0]["seconds"];
-    assert!((1..1000).contains(&first.as_array().unwrap().len()));
+    assert_eq!((record["scenes"].as_array().unwrap().len(), record["scenes"][0]["streams"].as_array().unwrap().len()), (1, 1));
+    assert_eq!(record["scenes"][0]["streams"][0]["results"][0]["seconds"].as_array().unwrap().len(), 1);
+    let notes = record["notes"].to_string();
+    for note in ["4 streams left out", "1 streams not checked", "1 scenes left out"] {
+        assert!(notes.contains(note), "{note}: {notes}");
+    }
 
-    let csv = place.at("never.csv");
-    let more = ["--repeats", "1000", "--csv", csv.to_str().unwrap()];
-    let args = [&["builtin:stairs", "--kernels", "wide"], &more[..]].concat();
-    let child = place.command(&args).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
-    std::thread::sleep(std::time::Duration::from_secs(4));
-    assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
-    let out = child.wait_with_output().unwrap();
-    fails(&out, 130, &["interrupted"]);
-    assert!(!csv.exists());
+    // interrupted in the first stream, where there is nothing to write yet, and in the second
+    for (hangs_at, written) in [("hang closest", false), ("hang any", true)] {
+        let place = Place::new(&Place::entry("a", hangs_at, ""));
+        let csv = place.at("a.csv");
+        let more = ["--streams", "primary,shadow-any", "--csv", csv.to_str().unwrap(), "--json"];
+        let args = [&["builtin:stairs", "--kernels", "wide", "--rays", "2000", "--repeats", "1"], &more[..]].concat();
+        let child = place.command(&args).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+        let asked = format!("a trace k {}", &hangs_at[5..]);
+        let start = std::time::Instant::now();
+        while !std::fs::read_to_string(place.at("log")).is_ok_and(|log| log.contains(&asked)) {
+            assert!(start.elapsed().as_secs() < 120, "the peer was never asked to trace");
+            std::thread::sleep(std::time::Duration::from_millis(20));
+        }
+        assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
+        let out = child.wait_with_output().unwrap();
+        fails(&out, 130, &["interrupted"]);
+        assert_eq!(csv.exists(), written);
+        // one record, with what there is and how it ended
+        let record: Value = serde_json::from_slice(&out.stdout).unwrap();
+        assert_eq!(
+            (record["exit_code"].as_u64(), record["scenes"].as_array().unwrap().len()),
+            (Some(130), usize::from(written))
+        );
+    }
+}
+
+/// A scene that fails costs neither the others nor what is written, and the run still fails.
+#[test]
+fn gpu_a_scene_that_fails_leaves_the_rest() {
+    if !device() {
+        return;
+    }
+    let place = Place::new("");
+    let (broken, csv) = (place.at("broken.glb"), place.at("a.csv"));
+    std::fs::write(&broken, "no glTF").unwrap();
+    let args = ["builtin:cornell-box", broken.to_str().unwrap(), "builtin:plane", "--csv", csv.to_str().unwrap()];
+    let more = ["--kernels", "wide", "--rays", "2000", "--repeats", "1", "--streams", "primary", "--json"];
+    let out = place.run(&[&args[..], &more].concat());
+    fails(&out, 3, &["broken.glb"]);
+    let record: Value = serde_json::from_slice(&out.stdout).unwrap();
+    let scenes: Vec<_> = record["scenes"].as_array().unwrap().iter().map(|s| s["scene"].as_str().unwrap()).collect();
+    assert_eq!(scenes, ["builtin:cornell-box", "builtin:plane"]);
+    assert!(record["notes"].to_string().contains("broken.glb: left out"), "{}", record["notes"]);
+    assert_eq!(record["exit_code"], 3);
+    assert_eq!(std::fs::read_to_string(&csv).unwrap().lines().count(), 3);
+}
+
+/// Packets are for coherent rays: asked of others alone, there is nothing to measure, and that is said.
+#[test]
+fn gpu_a_stream_without_contestants_is_named() {
+    if !device() {
+        return;
+    }
+    let place = Place::new("");
+    let args = ["builtin:cornell-box", "--rays", "2000", "--repeats", "1", "--kernels", "packet", "--streams"];
+    let out = place.run(&[&args[..], &["ao-any"]].concat());
+    let said = stderr(&out);
+    if said.contains("traces as 'wide' does") {
+        println!("skipped: no packets here");
+        return;
+    }
+    fails(&out, 64, &["nothing was measured", "ao-any: no contestant takes part"]);
+    let record = json(&place.run(&[&args[..], &["ao-any,primary", "--check", "--json"]].concat()));
+    assert_eq!(record["scenes"][0]["streams"].as_array().unwrap().len(), 1);
+    assert!(record["notes"].to_string().contains("nothing to compare with 'packet'"), "{}", record["notes"]);
 }
 
 /// The real peer, where it can be built: it loads triangles, instances and spheres, and agrees with us.
@@ -289,15 +370,27 @@ fn gpu_embree_agrees() {
     let peers = Path::new(env!("CARGO_MANIFEST_DIR")).join("benches/peers.toml");
     let scenes = ["builtin:grid:3", "builtin:spheres:500", "builtin:terrain:5000", "builtin:stairs"];
     let args = ["--kernels", "wide", "--rays", "20000", "--repeats", "1", "--check", "--json"];
+    // compiled here and now, whatever earlier runs have left
+    let cache = tempfile::tempdir().unwrap();
     let out = Command::new(env!("CARGO_BIN_EXE_skylit"))
         .args(["bench", "rays", "--peers", peers.to_str().unwrap()])
         .args(scenes)
         .args(args)
+        .env("XDG_CACHE_HOME", cache.path())
         .output()
         .unwrap();
     let record = json(&out);
     if record["peers"].as_array().unwrap().is_empty() {
-        println!("skipped: {}", record["notes"]);
+        let notes = record["notes"].to_string();
+        // no compiler, no header, no library; any other reason is a fault of ours
+        let missing = [
+            "` does not run (",
+            "embree3/rtcore.h: No such file",
+            "'embree3/rtcore.h' file not found",
+            "cannot find -lembree3",
+        ];
+        assert!(missing.iter().any(|m| notes.contains(m)), "{notes}");
+        println!("skipped: {notes}");
         return;
     }
     for scene in record["scenes"].as_array().unwrap() {

@@ -73,6 +73,9 @@ fn usage_errors() {
     fails(&render(&["--aov", "depth,smell"]), 64, "smell");
     fails(&render(&["--traversal", "backwards"]), 64, "auto, wide, packet, nearest, direction, brute");
     fails(&render(&["--triangle-test", "none"]), 64, "watertight, moller-trumbore");
+    fails(&render(&["--tracer", "pipeline", "--build", "best"]), 64, "--tracer compute");
+    fails(&render(&["--traversal", "brute", "--build", "best"]), 64, "has no hierarchy");
+    fails(&["rays", "--mesh", "a.bin", "--rays", "r.bin", "--traversal", "nearest", "--bvh-cache", "d"], 64, "keeps none");
     fails(&["diff", "a.exr"], 64, "<B>");
     fails(&["export", "builtin:plane", "a.txt"], 64, ".bin, .glb or .gltf");
 }
@@ -165,6 +168,48 @@ fn gpu_kept_hierarchies() {
     let (unkept, said) = render("d.png", &file.join("below-a-file"));
     assert_eq!(unkept, built);
     assert!(said.contains("not kept"), "{said}");
+    let image = dir.path().join("e.png");
+    let args = ["render", "builtin:cornell-box", "--size", "64x48", "--spp", "1", "--json", "--bvh-cache"];
+    let record = json(&skylit(&args).args([path(&file.join("below-a-file")), "-o", path(&image)]).output().unwrap());
+    assert!(record["warnings"].to_string().contains("not kept"), "{record}");
+}
+
+/// A command that has a result though it fails prints one record, with both.
+#[test]
+fn one_record_for_a_check_that_fails() {
+    let dir = tempfile::tempdir().unwrap();
+    let write = |name: &str, grey: u8| {
+        let file = dir.path().join(name);
+        skylit::output::png::write_grey(&file, &[grey; 16], 4, 4).unwrap();
+        file
+    };
+    let (a, b) = (write("a.png", 10), write("b.png", 200));
+    let args = ["diff", path(&a), path(&b), "--max-rmse", "0.1", "--json"];
+    let out = run(&args);
+    expect_failure(&out, 1, "RMSE", &args);
+    let record: Value = serde_json::from_slice(&out.stdout).unwrap();
+    assert_eq!((record["exit_code"].as_u64(), record["channels"].as_array().map(Vec::len)), (Some(1), Some(1)));
+    assert!(record["error"].as_str().unwrap().contains("RMSE"));
+    assert!(json(&run(&["diff", path(&a), path(&a), "--max-rmse", "0.1", "--json"]))["error"].is_null());
+}
+
+/// What people are warned of is in the record for programs.
+#[test]
+fn warnings_are_in_the_record() {
+    let dir = tempfile::tempdir().unwrap();
+    for (name, format) in [("a.bin", "MESH.bin"), ("a.glb", "glTF")] {
+        let file = dir.path().join(name);
+        let args = ["export", "builtin:spheres:10", path(&file)];
+        let record = json(&run(&[&args[..], &["--json"]].concat()));
+        let warning = record["warnings"][0].as_str().unwrap();
+        assert!(
+            warning.starts_with("10 spheres become ") && warning.ends_with(&format!("{format} has no spheres")),
+            "{warning}"
+        );
+        assert!(record["triangles_written"].as_u64() > record["triangles"].as_u64(), "{record}");
+        let said = String::from_utf8(run(&args).stderr).unwrap();
+        assert_eq!(said, format!("skylit: warning: {warning}\n"));
+    }
 }
 
 /// From a scene to files and back to numbers, on whatever device there is.
@@ -231,7 +276,7 @@ fn gpu_render_end_to_end() {
     assert_eq!(traced["hits"].as_u64(), Some(occlusion));
 
     // every traversal gives the same image, and the record says which it was
-    for traversal in ["wide", "nearest", "direction", "brute"] {
+    for traversal in ["auto", "wide", "packet", "nearest", "direction", "brute"] {
         let again = at("t.exr");
         let record = json(&run(&[&base[..], &[&again], &["--traversal", traversal, "--explain", "--json"]].concat()));
         assert_eq!((record["tracer"].as_str(), record["traversal"].as_str()), (Some("compute"), Some(traversal)));
@@ -267,13 +312,27 @@ fn gpu_stopping_early() {
     assert!(out.exists());
     std::fs::remove_file(&out).unwrap();
     for keep in [false, true] {
-        let args = if keep { [&base[..], &["--keep-partial"]].concat() } else { base.to_vec() };
-        let child = skylit(&args).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
-        std::thread::sleep(std::time::Duration::from_secs(3));
+        let args = if keep { [&base[..], &["--keep-partial", "--json"]].concat() } else { base.to_vec() };
+        // rendering begins as soon as the hierarchy has been kept
+        let cache = tempfile::tempdir().unwrap();
+        let mut command = skylit(&args);
+        command.args(["--build", "best", "--bvh-cache", path(cache.path())]);
+        let child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+        let start = std::time::Instant::now();
+        let kept = || std::fs::read_dir(cache.path()).unwrap().any(|f| f.unwrap().path().extension().is_some());
+        while !kept() {
+            assert!(start.elapsed().as_secs() < 120, "no hierarchy was kept");
+            std::thread::sleep(std::time::Duration::from_millis(20));
+        }
         assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
         let done = child.wait_with_output().unwrap();
         assert_eq!(done.status.code(), Some(130), "{}", String::from_utf8_lossy(&done.stderr));
         assert!(String::from_utf8_lossy(&done.stderr).contains("skylit: error: interrupted"));
         assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), usize::from(keep));
+        if keep {
+            let record: Value = serde_json::from_slice(&done.stdout).unwrap();
+            assert_eq!((record["exit_code"].as_u64(), record["error"].as_str()), (Some(130), Some("interrupted")));
+            assert!(record["spp"].as_u64() > Some(0));
+        }
     }
 }

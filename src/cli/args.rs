@@ -171,13 +171,30 @@ pub enum BuildChoice {
     Best,
 }
 
+impl BuildChoice {
+    /// As on the command line.
+    pub fn name(self) -> String {
+        self.to_possible_value().map(|v| v.get_name().to_owned()).unwrap_or_default()
+    }
+
+    /// `None`: what suits the scene and the rays.
+    pub fn preset(self) -> Option<BuildPreset> {
+        match self {
+            BuildChoice::Auto => None,
+            BuildChoice::Fast => Some(BuildPreset::Fast),
+            BuildChoice::Default => Some(BuildPreset::Default),
+            BuildChoice::Best => Some(BuildPreset::Best),
+        }
+    }
+}
+
 /// What it runs on.
 #[derive(Clone, Debug, Args)]
 pub struct DeviceArgs {
     /// How rays are traced
     #[arg(long, value_enum, default_value = "auto")]
     pub tracer: TracerChoice,
-    /// How the compute tracer walks its hierarchy [default: wide]
+    /// How the compute tracer walks its hierarchy [default: auto]
     #[arg(long, value_enum)]
     pub traversal: Option<Kernel>,
     /// The compute tracer's triangle test [default: watertight]
@@ -207,17 +224,45 @@ impl DeviceArgs {
     /// How the compute tracer's hierarchy is built, when about so many rays will be traced.
     pub fn build_options(&self, rays: u64) -> BuildOptions {
         let from_environment = || std::env::var_os("SKYLIT_BVH_CACHE").filter(|v| !v.is_empty()).map(PathBuf::from);
-        let preset = match self.build {
-            BuildChoice::Auto => None,
-            BuildChoice::Fast => Some(BuildPreset::Fast),
-            BuildChoice::Default => Some(BuildPreset::Default),
-            BuildChoice::Best => Some(BuildPreset::Best),
-        };
         BuildOptions {
-            preset,
+            preset: self.build.preset(),
             rays,
             cache: self.bvh_cache.clone().or_else(from_environment).map(Cache::new),
             streams: Vec::new(),
+        }
+    }
+
+    /// The first option given that is about the compute tracer alone.
+    fn about_compute(&self) -> Option<&'static str> {
+        let given = [
+            (self.traversal.is_some(), "--traversal"),
+            (self.triangle_test.is_some(), "--triangle-test"),
+            (self.build != BuildChoice::Auto, "--build"),
+            (self.bvh_cache.is_some(), "--bvh-cache"),
+        ];
+        given.into_iter().find_map(|(given, name)| given.then_some(name))
+    }
+
+    /// Checks what concerns more than one option: none may be given that would have no effect.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] when an option of the compute tracer meets another tracer, or one of its hierarchy a traversal that has
+    /// none or keeps none.
+    pub fn check(&self) -> Result<()> {
+        if let (TracerChoice::Pipeline | TracerChoice::Query, Some(option)) = (self.tracer, self.about_compute()) {
+            return Err(Error::Usage(format!("{option} is about the compute tracer: leave it out, or say --tracer compute")));
+        }
+        let option = match self.traversal {
+            Some(Kernel::Brute) if self.build != BuildChoice::Auto => Some("--build"),
+            Some(Kernel::Brute | Kernel::Nearest | Kernel::Direction) if self.bvh_cache.is_some() => Some("--bvh-cache"),
+            _ => None,
+        };
+        match (option, self.traversal) {
+            (Some(option), Some(kernel)) => Err(Error::Usage(format!(
+                "{option} has no effect on --traversal {kernel}, which {}: leave it out, or choose another traversal",
+                if kernel == Kernel::Brute { "has no hierarchy" } else { "keeps none" }
+            ))),
+            _ => Ok(()),
         }
     }
 
@@ -225,32 +270,18 @@ impl DeviceArgs {
     /// where `--tracer` leaves the choice.
     ///
     /// # Errors
-    /// [`Error::Usage`] when such an option meets another tracer.
+    /// Those of [`DeviceArgs::check`].
     pub fn choose(&self, info: &crate::gpu::DeviceInfo) -> Result<(TracerKind, String, ComputeOptions)> {
-        let given = [
-            (self.traversal.is_some(), "--traversal"),
-            (self.triangle_test.is_some(), "--triangle-test"),
-            (self.build != BuildChoice::Auto, "--build"),
-            (self.bvh_cache.is_some(), "--bvh-cache"),
-        ];
-        let option = given.into_iter().find_map(|(given, name)| given.then_some(name));
-        let (kind, why) = match (self.tracer, option) {
+        self.check()?;
+        let (kind, why) = match (self.tracer, self.about_compute()) {
             (TracerChoice::Auto, Some(option)) => (TracerKind::Compute, format!("{option} is about this tracer alone")),
             (choice, _) => choice.on(info),
         };
-        match option {
-            Some(option) if kind != TracerKind::Compute => {
-                Err(Error::Usage(format!("{option} is about the compute tracer: leave it out, or say --tracer compute")))
-            }
-            _ => Ok((
-                kind,
-                why,
-                ComputeOptions {
-                    kernel: self.traversal.unwrap_or_default(),
-                    triangle_test: self.triangle_test.map(TriangleTest::from).unwrap_or_default(),
-                },
-            )),
-        }
+        let options = ComputeOptions {
+            kernel: self.traversal.unwrap_or_default(),
+            triangle_test: self.triangle_test.map(TriangleTest::from).unwrap_or_default(),
+        };
+        Ok((kind, why, options))
     }
 }
 
@@ -332,6 +363,7 @@ impl RenderArgs {
 
     /// Checks what concerns more than one option.
     pub fn check(&self) -> Result<()> {
+        self.device.check()?;
         let formats = self.output.iter().map(|p| ImageFormat::of(p)).collect::<Result<Vec<_>>>()?;
         if !self.aov.is_empty() && !formats.contains(&ImageFormat::Exr) {
             return Err(Error::Usage("--aov needs an .exr output: PNG holds colour only".into()));
@@ -526,6 +558,42 @@ mod tests {
         assert!(parse_falloff("0.9").is_err() && parse_falloff("inf").is_err() && parse_falloff("1").is_ok());
         assert!(parse_radius("-1").is_err() && parse_radius("0").is_err() && parse_radius("inf").is_ok());
         assert!(parse_seconds("-1").is_err() && parse_seconds("1e300").is_err() && parse_seconds("0.5").is_ok());
+    }
+
+    #[test]
+    fn options_without_effect_are_refused() {
+        #[derive(clap::Parser)]
+        struct Alone {
+            #[command(flatten)]
+            device: DeviceArgs,
+        }
+        let refused = |line: &str| {
+            let args = ["a"].into_iter().chain(line.split_whitespace());
+            let device = <Alone as clap::Parser>::try_parse_from(args).unwrap().device;
+            device.check().err().map(|e| {
+                assert_eq!(e.exit_code(), 64);
+                e.to_string()
+            })
+        };
+        for (line, about) in [
+            ("--tracer pipeline --build best", "--build is about the compute tracer"),
+            ("--tracer query --bvh-cache d", "--bvh-cache is about the compute tracer"),
+            ("--tracer pipeline --traversal wide", "--traversal is about"),
+            ("--tracer query --triangle-test watertight", "--triangle-test is about"),
+            ("--traversal brute --build fast", "--build has no effect on --traversal brute"),
+            ("--traversal brute --bvh-cache d", "--bvh-cache has no effect on --traversal brute"),
+            ("--traversal nearest --bvh-cache d", "--bvh-cache has no effect on --traversal nearest"),
+            ("--traversal direction --bvh-cache d", "--bvh-cache has no effect on --traversal direction"),
+        ] {
+            assert!(refused(line).is_some_and(|e| e.starts_with(about)), "{line}: {:?}", refused(line));
+        }
+        for line in ["", "--tracer pipeline", "--tracer compute --build best --bvh-cache d", "--traversal nearest --build fast"]
+        {
+            assert_eq!(refused(line), None, "{line}");
+        }
+        for kernel in ["auto", "wide", "packet"] {
+            assert_eq!(refused(&format!("--traversal {kernel} --build best --bvh-cache d")), None);
+        }
     }
 
     #[test]

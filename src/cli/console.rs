@@ -6,6 +6,21 @@ use serde::Serialize;
 
 use crate::error::{Error, Result};
 
+/// How a command ends that did not do what it was asked to.
+#[derive(Debug)]
+pub struct Failure {
+    /// Why.
+    pub error: Error,
+    /// The record on stdout says so already.
+    pub told: bool,
+}
+
+impl From<Error> for Failure {
+    fn from(error: Error) -> Self {
+        Self { error, told: false }
+    }
+}
+
 /// How much a command says.
 #[derive(Clone, Copy, Debug)]
 pub struct Console {
@@ -24,6 +39,27 @@ impl Console {
     /// The result, for programs.
     pub fn record(&self, value: &impl Serialize) -> Result<()> {
         if self.json { json(value) } else { Ok(()) }
+    }
+
+    /// The result of a command that has one also where it fails. In JSON mode the failure is part of the one record, under
+    /// `error` and `exit_code`. `value` is a map.
+    pub fn close(&self, value: &impl Serialize, outcome: Result<()>) -> Result<(), Failure> {
+        #[derive(Serialize)]
+        struct Failed<'a, T> {
+            #[serde(flatten)]
+            value: &'a T,
+            error: String,
+            exit_code: u8,
+        }
+        match outcome {
+            Ok(()) => Ok(self.record(value)?),
+            Err(error) => {
+                let record = Failed { value, error: super::one_line(&error.to_string()), exit_code: error.exit_code() };
+                // what failed first counts: a stdout that fails as well is told of nowhere
+                let _ = self.record(&record);
+                Err(Failure { error, told: self.json })
+            }
+        }
     }
 
     /// Something to know that is no failure. In JSON mode it is part of the record instead.

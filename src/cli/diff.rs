@@ -3,6 +3,7 @@
 use serde_json::json;
 
 use super::args::DiffArgs;
+use super::console::Failure;
 use crate::error::{Error, Result};
 use crate::measure::metrics::ImagePair;
 use crate::output::{self, Channel, Image, Samples};
@@ -33,11 +34,12 @@ struct Numbers {
 }
 
 /// Compares and prints; fails when a limit was given and is passed.
-pub fn run(args: &DiffArgs) -> Result<()> {
+pub fn run(args: &DiffArgs) -> Result<(), Failure> {
     let console = args.verbosity.console();
     let (a, b) = (output::load(&args.a)?, output::load(&args.b)?);
     if (a.width, a.height) != (b.width, b.height) {
-        return Err(Error::Usage(format!("the images differ in size: {}x{} and {}x{}", a.width, a.height, b.width, b.height)));
+        let (a, b) = ([a.width, a.height], [b.width, b.height]);
+        return Err(Error::Usage(format!("the images differ in size: {}x{} and {}x{}", a[0], a[1], b[0], b[1])).into());
     }
     let mask = coverage(&a, &b);
     let mut worst = 0f64;
@@ -56,16 +58,17 @@ pub fn run(args: &DiffArgs) -> Result<()> {
         records.push(record);
     }
     if records.is_empty() {
-        return Err(Error::Usage("the images have no channel in common".into()));
+        return Err(Error::Usage("the images have no channel in common".into()).into());
     }
     let covered = mask.is_some();
-    console.record(&json!({ "a": args.a, "b": args.b, "covered_pixels_only": covered, "channels": records }))?;
-    match args.max_rmse {
+    let verdict = match args.max_rmse {
         Some(limit) if worst > limit => {
             Err(Error::CheckFailed(format!("the images differ by an RMSE of {worst:.3e}, more than {limit:e}")))
         }
         _ => Ok(()),
-    }
+    };
+    let record = json!({ "a": args.a, "b": args.b, "covered_pixels_only": covered, "channels": records });
+    console.close(&record, verdict)
 }
 
 /// Channels of the same name and type; a grey image (`Y`) also goes with one that calls it `R`.

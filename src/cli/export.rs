@@ -2,17 +2,19 @@
 
 use std::path::Path;
 
+use super::Warnings;
 use super::args::ExportArgs;
 use crate::error::{Error, Result};
 use crate::output;
-use crate::scene::{Scene, export, load};
+use crate::scene::export::{self, Written};
+use crate::scene::{Scene, load};
 
 /// Loads and writes.
 pub fn run(args: &ExportArgs) -> Result<()> {
     let console = args.verbosity.console();
     let extension = args.output.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
-    let write: fn(&Scene, &Path) -> Result<()> = match extension.as_str() {
-        "bin" => |scene, path| export::write_mesh_bin(scene, path).map(drop),
+    let write: fn(&Scene, &Path) -> Result<Written> = match extension.as_str() {
+        "bin" => export::write_mesh_bin,
         "glb" | "gltf" => export::export_gltf,
         _ => {
             let path = args.output.display();
@@ -21,17 +23,17 @@ pub fn run(args: &ExportArgs) -> Result<()> {
     };
     output::check_writable(&args.output)?;
     let scene = load::load(&args.scene)?;
-    super::warn(&console, &scene);
-    if scene.sphere_count() > 0 {
-        console.warning(&format!("{} analytic spheres become triangles: .{extension} cannot hold them", scene.sphere_count()));
-    }
-    write(&scene, &args.output)?;
-    console.line(&format!("{}: {} triangles of {}", args.output.display(), scene.triangle_count(), scene.name))?;
+    let mut warnings = Warnings::new(console);
+    super::noticed(&scene).iter().for_each(|w| warnings.add(w));
+    let written = write(&scene, &args.output)?;
+    written.warnings.iter().for_each(|w| warnings.add(w));
+    console.line(&format!("{}: {} triangles of {}", args.output.display(), written.triangles, scene.name))?;
     console.record(&serde_json::json!({
         "scene": scene.name,
         "output": args.output,
         "triangles": scene.triangle_count(),
         "spheres": scene.sphere_count(),
-        "warnings": scene.report.warnings,
+        "triangles_written": written.triangles,
+        "warnings": warnings.list,
     }))
 }

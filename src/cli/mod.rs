@@ -23,7 +23,7 @@ use clap::Parser;
 use clap::error::ErrorKind;
 
 use crate::error::{Error, Result};
-use console::Console;
+use console::{Console, Failure};
 
 /// What the process returns; part of `--help`.
 pub const EXIT_CODES: &str = "\
@@ -76,31 +76,32 @@ fn run_from(arguments: Vec<OsString>) -> ExitCode {
     panic::install();
     let outcome = panic::catch(|| match Cli::try_parse_from(arguments) {
         Ok(cli) => dispatch(cli.command, start),
-        Err(e) => explain(&e),
+        Err(e) => explain(&e).map_err(Failure::from),
     });
-    let (message, code) = match outcome {
+    let (message, code, told) = match outcome {
         Ok(Ok(())) => return ExitCode::SUCCESS,
-        Ok(Err(e)) => (one_line(&e.to_string()), e.exit_code()),
-        Err(bug) => (bug, panic::EXIT_CODE),
+        Ok(Err(Failure { error, told })) => (one_line(&error.to_string()), error.exit_code(), told),
+        Err(bug) => (bug, panic::EXIT_CODE, false),
     };
     console::error(&message);
-    if json {
+    if json && !told {
         // nothing can be done about a stdout that fails now
         let _ = console::json(&serde_json::json!({ "error": message, "exit_code": code }));
     }
     ExitCode::from(code)
 }
 
-fn dispatch(command: Command, start: Instant) -> Result<()> {
+fn dispatch(command: Command, start: Instant) -> Result<(), Failure> {
     match command {
-        Command::Render(args) => render::run(&args, start),
+        Command::Render(args) => return render::run(&args, start),
         Command::Rays(args) => rays::run(&args),
         Command::Export(args) => export::run(&args),
         Command::Scenes(args) => scenes::run(&args),
         Command::Doctor(args) => doctor::run(&args),
-        Command::Diff(args) => diff::run(&args),
-        Command::Bench(args) => bench::run(&args),
+        Command::Diff(args) => return diff::run(&args),
+        Command::Bench(args) => return bench::run(&args),
     }
+    .map_err(Failure::from)
 }
 
 /// Help and version go to stdout; everything else that clap says becomes a usage error of one line.
@@ -123,15 +124,32 @@ fn one_line(text: &str) -> String {
     text.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
-/// Shows what a loader noticed.
-fn warn(console: &Console, scene: &crate::scene::Scene) {
+/// Warnings: shown to people at once, and kept for the record that programs get.
+struct Warnings {
+    console: Console,
+    /// One line each.
+    list: Vec<String>,
+}
+
+impl Warnings {
+    /// None yet.
+    fn new(console: Console) -> Self {
+        Self { console, list: Vec::new() }
+    }
+
+    fn add(&mut self, text: &str) {
+        let line = one_line(text);
+        self.console.warning(&line);
+        self.list.push(line);
+    }
+}
+
+/// What a loader noticed, a sentence each.
+fn noticed(scene: &crate::scene::Scene) -> Vec<String> {
     let report = &scene.report;
-    for warning in &report.warnings {
-        console.warning(&one_line(warning));
-    }
-    if report.degenerate_triangles > 0 {
-        console.warning(&format!("{} triangles without area were dropped", report.degenerate_triangles));
-    }
+    let dropped = (report.degenerate_triangles > 0)
+        .then(|| format!("{} triangles without area were dropped", report.degenerate_triangles));
+    report.warnings.iter().cloned().chain(dropped).collect()
 }
 
 #[cfg(test)]

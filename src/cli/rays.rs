@@ -5,11 +5,13 @@ use std::path::Path;
 
 use glam::DVec3;
 
+use super::Warnings;
 use super::args::RaysArgs;
 use super::interrupt::{self, Keyboard};
 use super::progress::Progress;
 use crate::error::{Error, Result};
 use crate::gpu::Device;
+use crate::measure::stats::median;
 use crate::output;
 use crate::ray::Ray;
 use crate::render::rays;
@@ -19,6 +21,7 @@ use crate::tracer::{Needs, Tracer};
 
 /// Loads, traces, reports.
 pub fn run(args: &RaysArgs) -> Result<()> {
+    args.device.check()?;
     interrupt::install();
     let console = args.verbosity.console();
     if let Some(hits) = &args.hits {
@@ -27,7 +30,8 @@ pub fn run(args: &RaysArgs) -> Result<()> {
     let mut set = read_rays(&args.rays)?;
     rays::check(&set)?;
     let scene = read_mesh(&args.mesh)?;
-    super::warn(&console, &scene);
+    let mut warnings = Warnings::new(console);
+    super::noticed(&scene).iter().for_each(|w| warnings.add(w));
     let flat = FlatScene::new(&scene);
     move_rays(&mut set, -flat.origin);
     let device = Device::open(&args.device.options())?;
@@ -35,7 +39,7 @@ pub fn run(args: &RaysArgs) -> Result<()> {
     // and once more to warm up
     let build = args.device.build_options(set.len() as u64 * (args.repeats as u64 + 1));
     let tracer = Tracer::with_build(&device, kind, &flat, Needs::default(), compute, &build)?;
-    build.take_warnings().iter().for_each(|w| console.warning(w));
+    build.take_warnings().iter().for_each(|w| warnings.add(w));
     let stats = tracer.stats();
     let mut control = Keyboard { progress: Progress::new("tracing", &console), keep_partial: false };
     let (hits, times) = rays::trace(&tracer, &set, args.mode.into(), args.repeats, &mut control)?;
@@ -48,7 +52,8 @@ pub fn run(args: &RaysArgs) -> Result<()> {
 
     let hit_count = hits.iter().filter(|h| h.is_hit()).count();
     let rate = |seconds: f64| if seconds > 0.0 { set.len() as f64 / seconds / 1e6 } else { 0.0 };
-    let (on_device, on_wall) = (rate(median(&times.device)), rate(median(&times.wall)));
+    let middle = |seconds: &[f64]| median(seconds).unwrap_or(0.0);
+    let (on_device, on_wall) = (rate(middle(&times.device)), rate(middle(&times.wall)));
     console.line(&format!(
         "{} rays, {hit_count} hit; tracer {kind}{} on {}: {on_device:.2} Mrays/s on the device, {on_wall:.2} by the clock \
          (median of {}); built in {:.3} s, {:.1} bytes per primitive",
@@ -77,7 +82,7 @@ pub fn run(args: &RaysArgs) -> Result<()> {
         "mrays_s_wall": on_wall,
         "device_seconds": times.device,
         "wall_seconds": times.wall,
-        "warnings": scene.report.warnings,
+        "warnings": warnings.list,
     }))
 }
 
@@ -105,10 +110,4 @@ pub fn move_rays(rays: &mut [Ray], by: DVec3) {
             r.origin = (DVec3::from(r.origin.map(f64::from)) + by).as_vec3().to_array();
         }
     }
-}
-
-fn median(values: &[f64]) -> f64 {
-    let mut sorted = values.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    sorted.get(sorted.len() / 2).copied().unwrap_or(0.0)
 }

@@ -5,8 +5,9 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
+use super::Warnings;
 use super::args::{Aov, DEFAULT_SIZE, DEFAULT_SPP, RenderArgs, dump_path};
-use super::console::Console;
+use super::console::{Console, Failure};
 use super::interrupt::{self, Keyboard};
 use super::progress::Progress;
 use super::rays::move_rays;
@@ -24,7 +25,7 @@ use crate::scene::{Projection, Scene, load};
 use crate::tracer::{Needs, Tracer};
 
 /// Loads, renders, writes, reports.
-pub fn run(args: &RenderArgs, start: Instant) -> Result<()> {
+pub fn run(args: &RenderArgs, start: Instant) -> Result<(), Failure> {
     args.check()?;
     for path in args.outputs() {
         output::check_writable(&path)?;
@@ -32,7 +33,8 @@ pub fn run(args: &RenderArgs, start: Instant) -> Result<()> {
     interrupt::install();
     let console = args.verbosity.console();
     let (scene, device, seconds) = open(args)?;
-    super::warn(&console, &scene);
+    let mut warnings = Warnings::new(console);
+    super::noticed(&scene).iter().for_each(|w| warnings.add(w));
     interrupt::check()?;
 
     let size = args.size.or(scene.hints.size).unwrap_or(DEFAULT_SIZE);
@@ -60,7 +62,7 @@ pub fn run(args: &RenderArgs, start: Instant) -> Result<()> {
     let mut build = args.device.build_options(rays);
     build.streams.extend(ao::streams(&options));
     let tracer = Tracer::with_build(&device, kind, &flat, needs, compute, &build)?;
-    build.take_warnings().iter().for_each(|w| console.warning(w));
+    build.take_warnings().iter().for_each(|w| warnings.add(w));
 
     // a dump of rays is a set to compare with: all of them
     if args.dump_rays.is_none() {
@@ -104,6 +106,7 @@ pub fn run(args: &RenderArgs, start: Instant) -> Result<()> {
         longest_launch: result.longest_launch,
         stats: tracer.stats(),
         features: tracer.features().explain(&flat),
+        warnings: warnings.list,
         seconds,
     };
     let origin = flat.origin;
@@ -123,8 +126,8 @@ pub fn run(args: &RenderArgs, start: Instant) -> Result<()> {
     device.save_pipeline_cache();
     report.seconds.write = write_start.elapsed().as_secs_f64();
     report.seconds.total = start.elapsed().as_secs_f64();
-    report.print(&console)?;
-    if args.keep_partial && interrupt::requested() { Err(Error::Interrupted) } else { Ok(()) }
+    let interrupted = args.keep_partial && interrupt::requested();
+    report.print(&console, if interrupted { Err(Error::Interrupted) } else { Ok(()) })
 }
 
 /// Loads the scene while the driver starts: on small scenes they take equally long.
@@ -230,10 +233,10 @@ fn write_rays(args: &RenderArgs, primary: &mut [Ray], occlusion: &mut [Ray], ori
 }
 
 impl Report<'_> {
-    fn print(&self, console: &Console) -> Result<()> {
+    fn print(&self, console: &Console, outcome: Result<()>) -> Result<(), Failure> {
         for line in self.lines() {
             console.line(&line)?;
         }
-        console.record(&self.record())
+        console.close(&self.record(), outcome)
     }
 }

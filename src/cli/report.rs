@@ -78,6 +78,8 @@ pub struct Report<'a> {
     pub stats: BuildStats,
     /// What the scene made skip.
     pub features: Vec<String>,
+    /// What is no failure, but to be known.
+    pub warnings: Vec<String>,
     /// Times.
     pub seconds: Seconds,
 }
@@ -238,7 +240,7 @@ impl Report<'_> {
             "triangles": self.scene.triangle_count(),
             "spheres": self.scene.sphere_count(),
             "degenerate_triangles": self.scene.report.degenerate_triangles,
-            "warnings": self.scene.report.warnings,
+            "warnings": self.warnings,
             "rays": self.rays,
             "mrays_s_wall": self.mrays_s(),
             "build": self.stats_record(),

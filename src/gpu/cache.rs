@@ -44,11 +44,9 @@ pub fn store(info: &DeviceInfo, data: &[u8]) {
         return;
     }
     let Some(folder) = path.parent() else { return };
-    let written = std::fs::create_dir_all(folder)
+    // not worth a warning: a folder that cannot be written to is as good as no cache
+    let _ = std::fs::create_dir_all(folder)
         .and_then(|()| tempfile::NamedTempFile::new_in(folder))
         .and_then(|mut f| std::io::Write::write_all(&mut f, data).map(|()| f))
         .and_then(|f| f.persist(&path).map_err(|e| e.error));
-    if let Err(e) = written {
-        tracing::debug!("pipeline cache not stored: {e}");
-    }
 }

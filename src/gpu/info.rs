@@ -98,6 +98,11 @@ impl DeviceInfo {
         self.is_cpu() && major.is_some_and(|m| m < 23)
     }
 
+    /// Can the compute tracer trace the rays of a subgroup together?
+    pub fn packets(&self) -> bool {
+        self.limits.packets && self.int64
+    }
+
     /// Does the device run its shaders on the CPU?
     pub fn is_cpu(&self) -> bool {
         self.kind == "cpu"

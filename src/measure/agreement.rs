@@ -7,8 +7,10 @@
 use std::collections::{HashMap, HashSet};
 
 use super::parity::{self, ParityReport};
-use crate::oracle::Oracle;
+use rayon::prelude::*;
+
 use crate::oracle::rounding::Rounding;
+use crate::oracle::{Oracle, OracleRay};
 use crate::ray::{Hit, Ray};
 use crate::scene::{Geometry, Mesh, Scene, TriangleMesh};
 
@@ -29,9 +31,18 @@ fn same(a: &Hit, b: &Hit) -> bool {
     }
 }
 
+/// What a comparison found.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Agreement {
+    /// How many rays agree, and what the others are.
+    pub report: ParityReport,
+    /// Of the unexplained, those where the reference's answer is one that rounding does not allow.
+    pub reference_unexplained: u64,
+}
+
 /// Compares closest hits; `hits` are judged against `reference`. Rays are relative to `scene.origin()`. Surplus entries of
 /// the longer slices are ignored.
-pub fn compare_closest(scene: &Scene, rays: &[Ray], hits: &[Hit], reference: &[Hit]) -> ParityReport {
+pub fn compare_closest(scene: &Scene, rays: &[Ray], hits: &[Hit], reference: &[Hit]) -> Agreement {
     let n = rays.len().min(hits.len()).min(reference.len());
     let differing: Vec<usize> = (0..n).filter(|&i| !same(&hits[i], &reference[i])).collect();
     let mut report = agreeing(n, &differing, reference);
@@ -40,7 +51,7 @@ pub fn compare_closest(scene: &Scene, rays: &[Ray], hits: &[Hit], reference: &[H
         .map(|i| f64::from((hits[i].t - reference[i].t).abs() / reference[i].t))
         .fold(0.0, f64::max);
     if differing.is_empty() {
-        return report;
+        return Agreement { report, reference_unexplained: 0 };
     }
     let pick = |from: &[Hit]| differing.iter().map(|&i| from[i]).collect::<Vec<_>>();
     let (mut a, mut b) = (pick(hits), pick(reference));
@@ -48,8 +59,15 @@ pub fn compare_closest(scene: &Scene, rays: &[Ray], hits: &[Hit], reference: &[H
     let small = Reduced::new(scene, a.iter().chain(&b));
     a.iter_mut().chain(&mut b).for_each(|h| small.rename(h));
     let judged = parity::judge_pair(&small.oracle, &rays, &a, &b, Rounding::default());
-    report = report.merge(restore(judged, &differing, &small));
-    report
+    let wrong = |k: &usize| {
+        let one = *k..*k + 1;
+        // what agrees within rounding is no fault of either
+        parity::judge_pair(&small.oracle, &rays[one.clone()], &a[one.clone()], &b[one], Rounding::default()).unexplained > 0
+            && parity::is_admissible(&small.oracle, &OracleRay::from(&rays[*k]), &b[*k], Rounding::default()).is_err()
+    };
+    let any = judged.unexplained > 0;
+    let reference_unexplained = if any { (0..rays.len()).into_par_iter().filter(wrong).count() as u64 } else { 0 };
+    Agreement { report: report.merge(restore(judged, &differing, &small)), reference_unexplained }
 }
 
 /// Compares answers to "is anything in the way?". `named` are closest hits of the rays in question, from either tracer or
@@ -63,12 +81,12 @@ pub fn compare_any<E>(
     hits: &[Hit],
     reference: &[Hit],
     named: impl FnOnce(&[Ray]) -> Result<Vec<Hit>, E>,
-) -> Result<ParityReport, E> {
+) -> Result<Agreement, E> {
     let n = rays.len().min(hits.len()).min(reference.len());
     let differing: Vec<usize> = (0..n).filter(|&i| hits[i].is_hit() != reference[i].is_hit()).collect();
     let mut report = agreeing(n, &differing, reference);
     if differing.is_empty() {
-        return Ok(report);
+        return Ok(Agreement { report, reference_unexplained: 0 });
     }
     let rays: Vec<Ray> = differing.iter().map(|&i| rays[i]).collect();
     let small = Reduced::new(scene, named(&rays)?.iter());
@@ -82,8 +100,9 @@ pub fn compare_any<E>(
     report.ties += differing.len() as u64 - of_a.unexplained - of_b.unexplained;
     report.rays += differing.len() as u64;
     report.hits += b.iter().filter(|&&h| h).count() as u64;
+    let reference_unexplained = of_b.unexplained;
     report.examples = restore(of_a.merge(of_b), &differing, &small).examples;
-    Ok(report)
+    Ok(Agreement { report, reference_unexplained })
 }
 
 /// The report of the rays that do not differ.
@@ -188,7 +207,7 @@ mod tests {
     fn equal_answers_agree() {
         for name in ["stairs", "spheres:50"] {
             let (scene, rays, hits) = set(name);
-            let r = compare_closest(&scene, &rays, &hits, &hits);
+            let r = compare_closest(&scene, &rays, &hits, &hits).report;
             assert_eq!((r.agree, r.ties, r.unexplained, r.rays), (rays.len() as u64, 0, 0, rays.len() as u64));
             assert!(r.hits > 0);
         }
@@ -203,7 +222,10 @@ mod tests {
         wrong[met[10]] = Hit::MISS;
         wrong[met[200]].t *= 1.01;
         wrong[met[400]] = hits[met[900]];
-        let r = compare_closest(&scene, &rays, &wrong, &hits);
+        let Agreement { report: r, reference_unexplained } = compare_closest(&scene, &rays, &wrong, &hits);
+        assert_eq!(reference_unexplained, 0);
+        // the other way round it is the reference that is wrong
+        assert_eq!(compare_closest(&scene, &rays, &hits, &wrong).reference_unexplained, 3);
         assert_eq!((r.unexplained, r.ties), (3, 0), "{r}");
         let mut found: Vec<usize> = r.examples.iter().map(|e| e.index).collect();
         found.sort_unstable();
@@ -217,7 +239,7 @@ mod tests {
         let (scene, rays, hits) = set("stairs");
         let mut other = hits.clone();
         other.iter_mut().filter(|h| h.is_hit()).for_each(|h| h.t *= 1.0 + 8.0 * f32::EPSILON);
-        let r = compare_closest(&scene, &rays, &other, &hits);
+        let r = compare_closest(&scene, &rays, &other, &hits).report;
         assert_eq!(r.unexplained, 0, "{r}");
     }
 
@@ -232,10 +254,12 @@ mod tests {
             assert_eq!(r, [rays[k]]);
             Ok::<_, ()>(vec![closest[k]])
         };
-        let r = compare_any(&scene, &rays, &wrong, &any, asked).unwrap();
+        let Agreement { report: r, reference_unexplained } = compare_any(&scene, &rays, &wrong, &any, asked).unwrap();
+        assert_eq!(reference_unexplained, 0);
+        assert_eq!(compare_any(&scene, &rays, &any, &wrong, asked).unwrap().reference_unexplained, 1);
         assert_eq!((r.unexplained, r.ties, r.agree), (1, 0, rays.len() as u64 - 1));
         assert_eq!(r.examples[0].index, k);
-        let r = compare_any(&scene, &rays, &any, &any, |_| Err("nothing differs, so nothing is asked")).unwrap();
+        let r = compare_any(&scene, &rays, &any, &any, |_| Err("nothing differs, so nothing is asked")).unwrap().report;
         assert_eq!(r.agree, rays.len() as u64);
     }
 }

@@ -6,7 +6,7 @@ use std::io::Write;
 
 use serde::Serialize;
 
-use super::parity::ParityReport;
+use super::agreement::Agreement;
 use super::stats::{LogScaling, Summary};
 
 /// A whole run.
@@ -22,6 +22,8 @@ pub struct RayBenchmark {
     pub threads: usize,
     /// Timed repeats that were asked for, after one that warms up.
     pub repeats: u32,
+    /// How long our own hierarchies were built: a preset, or `auto`.
+    pub build: String,
     /// Peers that ran, as they introduce themselves.
     pub peers: Vec<String>,
     /// Contestants that ratios are given to.
@@ -113,8 +115,8 @@ pub struct RunRecord {
     pub ratios: Vec<Ratio>,
     /// Nodes visited per ray, where that is counted.
     pub nodes_per_ray: Option<f64>,
-    /// Primitives tested per ray, where that is counted.
-    pub primitives_per_ray: Option<f64>,
+    /// Leaves visited per ray, of one or two triangles each, where that is counted.
+    pub leaves_per_ray: Option<f64>,
 }
 
 /// How many times as fast as a baseline.
@@ -143,6 +145,8 @@ pub struct CheckRecord {
     pub ties: u64,
     /// Any other.
     pub unexplained: u64,
+    /// Of these, where it is the reference's answer that no rounding explains.
+    pub reference_unexplained: u64,
     /// Unexplained answers of this contestant are a failure.
     pub strict: bool,
     /// The first of the unexplained.
@@ -151,7 +155,8 @@ pub struct CheckRecord {
 
 impl CheckRecord {
     /// From a report.
-    pub fn new(contestant: &str, reference: &str, stream: &str, report: &ParityReport, strict: bool) -> Self {
+    pub fn new(contestant: &str, reference: &str, stream: &str, found: &Agreement, strict: bool) -> Self {
+        let report = &found.report;
         // its text: a summary and a line for each example
         let examples = report.to_string().lines().skip(1).map(|l| l.trim().to_owned()).collect();
         Self {
@@ -162,9 +167,15 @@ impl CheckRecord {
             agree: report.agree,
             ties: report.ties,
             unexplained: report.unexplained,
+            reference_unexplained: found.reference_unexplained,
             strict,
             examples,
         }
+    }
+
+    /// Is it a failure? The reference is one of our own tracers: that its answers are wrong always is.
+    pub fn fails(&self) -> bool {
+        self.strict && self.unexplained > 0 || self.reference_unexplained > 0
     }
 }
 
@@ -251,7 +262,7 @@ impl RayBenchmark {
                 maybe(build.map(|b| b.bytes_per_primitive)),
                 maybe(build.and_then(|b| b.sah_cost)),
                 maybe(run.nodes_per_ray),
-                maybe(run.primitives_per_ray),
+                maybe(run.leaves_per_ray),
             ];
             row.extend(self.baselines.iter().map(|b| maybe(run.ratio_to(b))));
             csv.write_record(row)?;
@@ -280,7 +291,7 @@ const CSV_COLUMNS: [&str; 19] = [
     "bytes per primitive",
     "SAH cost",
     "nodes per ray",
-    "primitives per ray",
+    "leaves per ray",
 ];
 
 impl RunRecord {
@@ -293,6 +304,7 @@ impl RunRecord {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::measure::parity::ParityReport;
 
     fn run(contestant: &str, rate: f64) -> RunRecord {
         let flat = Summary { median: rate, min: rate, max: rate };
@@ -305,7 +317,7 @@ mod tests {
             seconds: vec![1.0],
             ratios: vec![Ratio { to: "peer, one".into(), ratio: 0.5 }],
             nodes_per_ray: None,
-            primitives_per_ray: Some(2.0),
+            leaves_per_ray: Some(2.0),
         }
     }
 
@@ -342,6 +354,17 @@ mod tests {
         let s = &b.scaling[0];
         assert_eq!((s.contestant.as_str(), s.points.as_slice()), ("wide", &[(10, 10.0), (1000, 9.0)][..]));
         assert!(s.holds);
+    }
+
+    #[test]
+    fn who_fails_a_check() {
+        let check = |strict, unexplained, reference_unexplained| {
+            let report = ParityReport { rays: 10, unexplained, ..Default::default() };
+            CheckRecord::new("b", "wide", "primary", &Agreement { report, reference_unexplained }, strict).fails()
+        };
+        assert!(!check(true, 0, 0) && !check(false, 3, 0));
+        // the reference's own answers count whoever is beside it
+        assert!(check(true, 1, 0) && check(false, 1, 1));
     }
 
     #[test]

@@ -19,8 +19,9 @@ const HEAD: u32 = 64;
 /// Pixels of a legend's line.
 const LEGEND_LINE: u32 = 26;
 
-/// Colours that the colour-blind can tell apart (Okabe and Ito, "Color Universal Design", 2008), and black.
-const COLORS: [RGBColor; 8] = [
+/// Colours that the colour-blind can tell apart (Okabe and Ito, "Color Universal Design", 2008), and black; then others, for those who
+/// come after.
+const COLORS: [RGBColor; 16] = [
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),
     RGBColor(0, 158, 115),
@@ -29,6 +30,14 @@ const COLORS: [RGBColor; 8] = [
     RGBColor(86, 180, 233),
     RGBColor(120, 120, 40),
     RGBColor(0, 0, 0),
+    RGBColor(110, 60, 160),
+    RGBColor(160, 20, 40),
+    RGBColor(0, 80, 60),
+    RGBColor(150, 150, 150),
+    RGBColor(120, 200, 60),
+    RGBColor(230, 60, 170),
+    RGBColor(90, 45, 20),
+    RGBColor(30, 40, 110),
 ];
 
 /// A picture of 8-bit RGB.
@@ -108,8 +117,11 @@ struct Mark {
     max: f64,
 }
 
+/// Each of a run's contestants has its own; those beyond the list get its colours again, lighter each time.
 fn color(k: usize) -> RGBColor {
-    COLORS[k % COLORS.len()]
+    let RGBColor(r, g, b) = COLORS[k % COLORS.len()];
+    let lighter = |c: u8| (0..k / COLORS.len()).fold(c, |c, _| c + (230 - c.min(230)) / 2);
+    RGBColor(lighter(r), lighter(g), lighter(b))
 }
 
 fn panel(benchmark: &RayBenchmark, stream: &str, contestants: &[&str], area: &Area) -> Result<()> {
@@ -244,7 +256,7 @@ mod tests {
             seconds: Vec::new(),
             ratios: Vec::new(),
             nodes_per_ray: None,
-            primitives_per_ray: None,
+            leaves_per_ray: None,
         };
         let scenes = rates.iter().map(|&(scene, triangles, rate)| SceneRecord {
             scene: scene.into(),
@@ -270,6 +282,17 @@ mod tests {
         assert!(single > 20 && family > single + 300, "{family} {single}");
         // one point is no reason to fail
         assert!(colored(&[("a:10", 10, 5.0)]) > 20);
+    }
+
+    #[test]
+    fn contestants_have_colors_of_their_own() {
+        let apart = |a: RGBColor, b: RGBColor| a.0.abs_diff(b.0) as u32 + a.1.abs_diff(b.1) as u32 + a.2.abs_diff(b.2) as u32;
+        for a in 0..2 * COLORS.len() {
+            for b in 0..a {
+                let least = if a < COLORS.len() { 80 } else { 10 };
+                assert!(apart(color(a), color(b)) >= least, "{a} and {b}: {:?} {:?}", color(a), color(b));
+            }
+        }
     }
 
     #[test]

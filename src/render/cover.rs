@@ -53,7 +53,7 @@ impl Cover {
     /// scene's bounds or beside them, or there is nothing.
     pub fn new(flat: &FlatScene, camera: &CameraRecord, size: [u32; 2], spp: u32) -> Option<Self> {
         let bounds = flat.bounds();
-        let view = View::new(camera, size, bounds)?;
+        let view = View::new(camera, size, bounds, &flat.placements)?;
         let tiles_x = size[0].div_ceil(TILE);
         let tiles = Marks {
             tiles_x,
@@ -121,7 +121,7 @@ fn mark_part(flat: &FlatScene, placement: &Placement, group: &Group, part: &Part
 }
 
 impl View {
-    fn new(camera: &CameraRecord, size: [u32; 2], bounds: Aabb) -> Option<Self> {
+    fn new(camera: &CameraRecord, size: [u32; 2], bounds: Aabb, placements: &[Placement]) -> Option<Self> {
         let rows = camera.camera_to_world.map(|r| r.map(f64::from));
         let column = |k: usize| DVec3::new(rows[0][k], rows[1][k], rows[2][k]);
         let matrix = DMat3::from_cols(column(0), column(1), column(2));
@@ -142,7 +142,12 @@ impl View {
         let corners = corners(bounds).map(|c| view.world_to_camera.transform_point3(c));
         let near = corners.iter().map(|c| -c.z).fold(f64::INFINITY, f64::min);
         let reach = corners.iter().map(|c| c.length()).fold(0.0, f64::max);
-        let coordinates = bounds.min.abs().max(bounds.max.abs()).max_element() as f64 + column(3).length();
+        // as in oracle/rounding.rs: going to a group's space and back errs by the translation too, and the more the worse conditioned
+        let moved = || placements.iter().map(|p| p.to_world).filter(|t| *t != DAffine3::IDENTITY);
+        let translation = moved().map(|t| t.translation.length()).fold(0.0, f64::max);
+        let condition = moved().map(|t| condition(t.matrix3)).fold(1.0, f64::max);
+        let coordinates =
+            condition * (bounds.min.abs().max(bounds.max.abs()).max_element() as f64 + column(3).length() + translation);
         if !(reach.is_finite() && (view.orthographic || near > 1e-3 * reach)) {
             return None;
         }
@@ -169,6 +174,13 @@ impl View {
         (self.orthographic || corners.iter().all(before))
             .then(|| Rectangle::around(corners.into_iter().map(|c| self.project(to_world, c.as_vec3()))))
     }
+}
+
+/// By how much a matrix and its inverse together magnify errors: 1 for rotation and uniform scale.
+fn condition(m: DMat3) -> f64 {
+    let norm = |m: DMat3| m.to_cols_array().iter().map(|x| x * x).sum::<f64>().sqrt();
+    let k = norm(m) * norm(m.inverse()) / 3.0;
+    if k.is_finite() { k.max(1.0) } else { f64::INFINITY }
 }
 
 fn corners(b: Aabb) -> [DVec3; 8] {
@@ -211,5 +223,61 @@ impl Marks {
                 }
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{Camera, Instance, Material, Mesh, Scene, TriangleMesh};
+
+    /// Two instances of a triangle whose vertices are `far` from their mesh's origin, both brought back to the world's, and turned
+    /// and stretched by `matrix`.
+    fn brought_back(far: f64, matrix: DMat3) -> Scene {
+        let positions = [DVec3::ZERO, DVec3::X, DVec3::Y].map(|p| (p + DVec3::splat(far)).as_vec3()).to_vec();
+        let mesh = TriangleMesh { positions, indices: vec![[0, 1, 2]], ..Default::default() };
+        let place = |x: f64| Instance {
+            name: String::new(),
+            mesh: 0,
+            object_to_world: DAffine3 { matrix3: matrix, translation: DVec3::X * x - matrix * DVec3::splat(far) },
+        };
+        Scene {
+            meshes: vec![Mesh { name: String::new(), geometry: Geometry::Triangles(mesh), material: 0 }],
+            instances: vec![place(0.0), place(1.5)],
+            materials: vec![Material::default()],
+            ..Default::default()
+        }
+    }
+
+    fn view(scene: &Scene) -> Option<View> {
+        let flat = FlatScene::new(scene);
+        assert_eq!(flat.placements.len(), 2, "the mesh is not baked");
+        let camera = Camera::look_at(DVec3::new(1.0, 0.5, 20.0), DVec3::new(1.0, 0.5, 0.0), DVec3::Y, 0.7);
+        let camera = CameraRecord::new(&camera, flat.origin, 1.0);
+        View::new(&camera, [256, 256], flat.bounds(), &flat.placements)
+    }
+
+    #[test]
+    fn the_margin_holds_what_instances_transforms_round() {
+        let near = view(&brought_back(0.0, DMat3::IDENTITY)).unwrap();
+        assert!(near.margin < LEAST_MARGIN + 0.01, "{}", near.margin);
+        let scene = brought_back(1.0e6, DMat3::IDENTITY);
+        let far = view(&scene).unwrap();
+        // a ray's origin, rounded where the vertices are, is off by half an ulp of each coordinate; so its hit may be seen so far beside
+        let ulp = (1.0e6f32.next_up() - 1.0e6f32) as f64;
+        let to_world = FlatScene::new(&scene).placements[0].to_world;
+        let at = |p: DVec3| {
+            let p = far.world_to_camera.transform_point3(to_world.transform_point3(p));
+            [far.scale[0] * p.x / -p.z, far.scale[1] * p.y / -p.z]
+        };
+        let corner = DVec3::splat(1.0e6);
+        let (exact, off) = (at(corner), at(corner + DVec3::splat(ulp)));
+        assert!(far.margin > LEAST_MARGIN + (exact[0] - off[0]).abs().max((exact[1] - off[1]).abs()), "{}", far.margin);
+        // stretching makes it worse
+        let stretch = DMat3::from_diagonal(DVec3::new(1.0, 1.0, 0.1));
+        let stretched = view(&brought_back(1.0e5, stretch)).unwrap().margin;
+        assert!(stretched > 2.0 * view(&brought_back(1.0e5, DMat3::IDENTITY)).unwrap().margin, "{stretched}");
+        // and where single precision does not resolve the view, nothing is left out
+        assert!(view(&brought_back(1.0e9, DMat3::IDENTITY)).is_none());
     }
 }

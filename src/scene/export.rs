@@ -14,6 +14,15 @@ pub use mesh_bin::{mesh_bin, read_mesh_bin, write_mesh_bin};
 
 use crate::error::Result;
 
+/// What a scene has become in a file.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Written {
+    /// Triangles placed, those that stand for spheres included.
+    pub triangles: u64,
+    /// What the file does not hold as the scene does, a sentence each.
+    pub warnings: Vec<String>,
+}
+
 /// Lets `fill` write a file that takes its name once it is complete.
 fn write_buffered(path: &Path, fill: impl FnOnce(&mut dyn Write) -> std::io::Result<()>) -> Result<()> {
     crate::output::write_atomically(path, |file| {

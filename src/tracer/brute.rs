@@ -7,16 +7,11 @@ use super::compute::{Hierarchy, PRIMITIVE_BYTES, record, unfinished_counter, wri
 use super::kernel::Kernel;
 use crate::error::{Error, Result};
 use crate::gpu::Device;
-use crate::scene::flatten::{FlatScene, Group};
-
-fn primitives_of(flat: &FlatScene, group: &Group) -> u32 {
-    group.parts.iter().map(|p| flat.scene.meshes[p.mesh].geometry.primitive_count() as u32).sum()
-}
+use crate::scene::flatten::FlatScene;
 
 /// Fails for a scene of which every ray would have to test too much.
 pub(super) fn check(flat: &FlatScene) -> Result<()> {
-    let counts: Vec<_> = flat.groups.iter().map(|g| primitives_of(flat, g) as usize).collect();
-    let tests: usize = flat.placements.iter().map(|p| counts[p.group] + 1).sum();
+    let tests = Kernel::brute_tests(flat);
     if tests <= Kernel::BRUTE_MOST {
         return Ok(());
     }
@@ -35,11 +30,11 @@ pub(super) fn upload(device: &Arc<Device>, flat: &FlatScene) -> Result<Hierarchy
         .iter()
         .map(|g| {
             let first = total;
-            total += primitives_of(flat, g);
+            total += g.primitive_count as u32;
             [first, total]
         })
         .collect();
-    let mut records = flat.groups.iter().flat_map(|g| (0..primitives_of(flat, g)).map(move |p| record(flat, g, p)));
+    let mut records = flat.groups.iter().flat_map(|g| (0..g.primitive_count as u32).map(move |p| record(flat, g, p)));
     let mut entries = flat.placements.iter().map(|p| ranges[p.group]);
     Ok(Hierarchy {
         kernel: Kernel::Brute,

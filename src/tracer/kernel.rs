@@ -3,6 +3,7 @@
 use super::stream::StreamShaders;
 use crate::bvh::BuildPreset;
 use crate::bvh::cache::Cache;
+use crate::scene::flatten::FlatScene;
 
 /// How the compute tracer finds what a ray meets. All give the same hits; docs/traversal.md compares their speed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, serde::Serialize)]
@@ -32,6 +33,11 @@ impl Kernel {
     /// Primitives, each instance's counted, and instances that [`Kernel::Brute`] takes at most together. Mesa before 23 leaves
     /// a loop after 65,535 turns; and a launch of the fewest rays should not stall a device for long.
     pub const BRUTE_MOST: usize = 40_000;
+
+    /// What [`Kernel::Brute`] goes through for each ray of a scene: primitives, each instance's counted, and instances.
+    pub fn brute_tests(flat: &FlatScene) -> usize {
+        flat.placements.iter().map(|p| flat.groups[p.group].primitive_count + 1).sum()
+    }
 
     /// As on the command line.
     pub fn name(self) -> &'static str {

@@ -102,7 +102,7 @@ pub(super) fn specialization(
 /// Is the stream traced in packets? A packet has many more turns than a ray and no bound on them: where drivers cut loops it has to be
 /// asked for.
 pub(super) fn in_packets(info: &DeviceInfo, kernel: Kernel, shaders: &StreamShaders) -> bool {
-    let able = shaders.has_packets() && info.limits.packets && info.int64;
+    let able = shaders.has_packets() && info.packets();
     let wanted = match kernel {
         Kernel::Packet => true,
         Kernel::Auto => shaders.is_coherent() && !info.cuts_long_loops(),

@@ -7,9 +7,10 @@ use clap::{Args, Subcommand, ValueHint};
 
 use super::contestant::OWN;
 use super::streams::STREAMS;
-use crate::cli::args::{parse_radius, parse_seconds};
+use crate::cli::args::{BuildChoice, parse_radius, parse_seconds};
 use crate::cli::console::Console;
 use crate::error::{Error, Result};
+use crate::tracer::BuildOptions;
 
 /// Rays of a set, unless said otherwise: an image of 1280x720.
 const DEFAULT_RAYS: u32 = 1280 * 720;
@@ -52,6 +53,9 @@ pub struct BenchRaysArgs {
     /// About this many rays a set: those of an image of 16:9 [default: 921600; 57600 with --quick]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(64..=1 << 26))]
     pub rays: Option<u32>,
+    /// Time that the compute tracer's kernels spend on their hierarchies
+    #[arg(long, value_enum, default_value = "default")]
+    pub build: BuildChoice,
     /// Length of ambient occlusion rays, world units [default: what suits the well-known scenes, else no limit]
     #[arg(long, value_name = "R", value_parser = parse_radius, allow_hyphen_values = true)]
     pub ao_radius: Option<f64>,
@@ -124,6 +128,14 @@ impl BenchRaysArgs {
         }
     }
 
+    /// How our own hierarchies are built.
+    pub fn build_options(&self) -> BuildOptions {
+        let [width, height] = self.size();
+        // a set of rays is traced once more to warm up
+        let rays = u64::from(width) * u64::from(height) * (u64::from(self.repeats()) + 1);
+        BuildOptions { preset: self.build.preset(), rays, cache: None, streams: Vec::new() }
+    }
+
     /// Timed repeats.
     pub fn repeats(&self) -> u32 {
         self.repeats.unwrap_or(if self.quick { QUICK_REPEATS } else { DEFAULT_REPEATS })
@@ -145,6 +157,7 @@ mod tests {
     use clap::Parser;
 
     use super::*;
+    use crate::bvh::BuildPreset;
 
     #[derive(Parser)]
     struct Alone {
@@ -165,6 +178,15 @@ mod tests {
             let [w, h] = parse(&["--rays", &n.to_string()]).size();
             assert!((f64::from(w * h) / f64::from(n) - 1.0).abs() < 0.2, "{n}: {w}x{h}");
         }
+    }
+
+    #[test]
+    fn hierarchies_are_built_as_asked() {
+        let built = |extra: &[&str]| parse(extra).build_options();
+        assert_eq!(built(&[]).preset, Some(BuildPreset::Default));
+        assert_eq!(built(&["--build", "best"]).preset, Some(BuildPreset::Best));
+        let auto = built(&["--build", "auto", "--repeats", "9"]);
+        assert_eq!((auto.preset, auto.rays), (None, 1280 * 720 * 10));
     }
 
     #[test]

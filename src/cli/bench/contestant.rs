@@ -11,7 +11,7 @@ use crate::ray::{Hit, Ray};
 use crate::render::Control;
 use crate::render::rays::{Mode, PreparedRays};
 use crate::scene::flatten::FlatScene;
-use crate::tracer::{Kernel, Needs, Tracer, TracerKind};
+use crate::tracer::{BuildOptions, Kernel, Needs, Tracer, TracerKind};
 
 /// A tracer of our own with its kernel. A new one is a line of [`OWN`].
 pub struct Own {
@@ -23,7 +23,8 @@ pub struct Own {
     pub kernel: Kernel,
     /// On a CPU device: it gets one in so many rays.
     pub divisor: usize,
-    /// On a CPU device: it is left out of larger scenes, unless asked for by name.
+    /// On a CPU device: it is left out of scenes with more stored primitives, unless asked for by name. Without a tree: with more
+    /// to test for each ray.
     pub most_primitives: usize,
 }
 
@@ -44,13 +45,18 @@ pub const OWN: [Own; 7] = [
 
 impl Own {
     /// Does it take part on this device and scene? `named`: the user asked for it.
-    pub fn takes_part(&self, info: &DeviceInfo, primitives: usize, named: bool) -> Result<(), String> {
+    pub fn takes_part(&self, info: &DeviceInfo, flat: &FlatScene, named: bool) -> Result<(), String> {
         if !info.supports(self.tracer) {
             return Err("the device does not have what it needs (`skylit doctor`)".into());
         }
-        // without a tree, a GPU is slow too
-        let slow = info.is_cpu() || self.kernel == Kernel::Brute;
-        if slow && !named && primitives > self.most_primitives {
+        if self.kernel == Kernel::Packet && !info.packets() {
+            // it would be `wide` under another name
+            return Err("the device has no subgroups of eight lanes or no 64-bit integers, and traces as 'wide' does".into());
+        }
+        // without a tree, a GPU is slow too, and what is placed counts, not what is stored
+        let brute = self.kernel == Kernel::Brute;
+        let work = if brute { Kernel::brute_tests(flat) } else { flat.primitive_count() };
+        if (brute || info.is_cpu()) && !named && work > self.most_primitives {
             return Err(format!("slow on so many primitives; --kernels {} asks for it", self.name));
         }
         Ok(())
@@ -81,8 +87,8 @@ impl<'a> Contestant<'a> {
     ///
     /// # Errors
     /// Those of [`Tracer::new`].
-    pub fn own(device: &Arc<Device>, flat: &'a FlatScene, own: &Own) -> Result<Self> {
-        let tracer = Tracer::with_options(device, own.tracer, flat, Needs::default(), own.kernel)?;
+    pub fn own(device: &Arc<Device>, flat: &'a FlatScene, own: &Own, build: &BuildOptions) -> Result<Self> {
+        let tracer = Tracer::with_build(device, own.tracer, flat, Needs::default(), own.kernel.into(), build)?;
         let stats = tracer.stats();
         let build = BuildRecord {
             contestant: own.name.to_owned(),

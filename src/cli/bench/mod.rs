@@ -11,10 +11,10 @@ mod table;
 
 pub use args::BenchArgs;
 
-use crate::error::Result;
+use super::console::Failure;
 
 /// Runs the benchmark that was asked for.
-pub fn run(args: &BenchArgs) -> Result<()> {
+pub fn run(args: &BenchArgs) -> Result<(), Failure> {
     match &args.what {
         args::What::Rays(args) => rays::run(args),
     }

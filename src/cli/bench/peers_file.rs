@@ -93,6 +93,11 @@ impl PeerSpec {
         format!("peer '{}' is missing: {why}{needs}", self.name)
     }
 
+    /// Is there nothing to build, or did an earlier run build it?
+    pub fn is_built(&self) -> bool {
+        self.build.is_empty() || self.output().is_ok_and(|out| out.exists())
+    }
+
     /// Builds it unless an earlier run did, and returns the command that runs it.
     ///
     /// # Errors
@@ -139,8 +144,9 @@ impl PeerSpec {
             .map_err(|e| format!("`{}` does not run ({e})", words[0]))?;
         if !done.status.success() {
             let said = String::from_utf8_lossy(&done.stderr);
-            // the line that names the error; compilers say much besides
-            let line = said.lines().find(|l| l.contains("error")).or_else(|| said.lines().next()).unwrap_or("no reason given");
+            // the line that names the error; compilers say much besides, and linkers do not call theirs so
+            let names = |l: &&str| l.contains("error") || l.contains("cannot find");
+            let line = said.lines().find(names).or_else(|| said.lines().next()).unwrap_or("no reason given");
             return Err(format!("building it failed ({})", line.trim()));
         }
         std::fs::rename(&unfinished, out).map_err(cannot)

@@ -12,7 +12,8 @@ use super::peer::{Peer, PeerError};
 use super::scenes::{self, Subject};
 use super::streams::{RaySets, STREAMS, Set, StreamKind};
 use super::{peers_file, table};
-use crate::cli::console::Console;
+use crate::cli::args::BuildChoice;
+use crate::cli::console::{Console, Failure};
 use crate::cli::interrupt::{self, Keyboard};
 use crate::cli::progress::Progress;
 use crate::error::{Error, Result};
@@ -23,13 +24,14 @@ use crate::measure::plot;
 use crate::measure::stats::{Summary, paired_ratio};
 use crate::output;
 use crate::ray::Ray;
+use crate::render::Control;
 use crate::render::rays::Mode;
 use crate::scene::flatten::FlatScene;
 use crate::tracer::Kernel;
 use crate::tracer::visits::VisitCounter;
 
 /// Measures, shows, writes.
-pub fn run(args: &BenchRaysArgs) -> Result<()> {
+pub fn run(args: &BenchRaysArgs) -> Result<(), Failure> {
     let start = Instant::now();
     args.check()?;
     for path in args.outputs() {
@@ -55,6 +57,7 @@ pub fn run(args: &BenchRaysArgs) -> Result<()> {
             driver: device.info.driver.clone(),
             threads: std::thread::available_parallelism().map_or(1, usize::from),
             repeats: args.repeats(),
+            build: args.build.name(),
             ..Default::default()
         },
         laps: (0, 0),
@@ -66,38 +69,19 @@ pub fn run(args: &BenchRaysArgs) -> Result<()> {
         Ok(specs) => bench.start_peers(&console, &specs)?,
         Err(note) => bench.note(&console, note),
     }
-    console.line(&format!(
-        "{} ({}), {} threads; medians of {} repeats, in turn{}",
-        bench.out.device,
-        bench.out.driver,
-        bench.out.threads,
-        bench.out.repeats,
-        bench.out.peers.iter().map(|p| format!("; beside {p}")).collect::<String>()
-    ))?;
-    for (k, source) in scenes.iter().enumerate() {
-        if bench.is_late() {
-            bench.out.stopped_early = true;
-            bench.note(&console, format!("time limit: {} scenes left out", scenes.len() - k));
-            break;
-        }
-        // a share of the bar for every scene
-        bench.laps = (k as u64, scenes.len() as u64);
-        let record = bench.scene(&console, source)?;
-        for line in table::scene(&record, &bench.out.baselines) {
-            console.line(&line)?;
-        }
-        bench.out.scenes.push(record);
-    }
-    device.check_validation()?;
-    device.save_pipeline_cache();
+    // whatever goes wrong from here on, what was measured until then is written
+    let measured = bench.scenes(&console, &scenes);
     let mut out = bench.out;
-    out.find_scaling();
-    for line in table::scaling(&out) {
-        console.line(&line)?;
+    drop(bench.keyboard);
+    let valid = device.check_validation();
+    if measured.is_ok() {
+        device.save_pipeline_cache();
     }
-    write(args, &out)?;
-    console.record(&out)?;
-    verdict(args, &out)
+    out.find_scaling();
+    let shown = table::scaling(&out).iter().try_for_each(|line| console.line(line));
+    let written = if out.rows().next().is_some() { write(args, &out) } else { Ok(()) };
+    let verdict = verdict(args, &out);
+    console.close(&out, measured.and(valid).and(shown).and(written).and(verdict))
 }
 
 /// The peers file's entries; or why there are none.
@@ -110,39 +94,56 @@ fn peer_specs(args: &BenchRaysArgs) -> Result<Result<Vec<peers_file::PeerSpec>, 
     }
 }
 
+/// Writes the files that were asked for; one that cannot be written does not stop the others.
 fn write(args: &BenchRaysArgs, out: &RayBenchmark) -> Result<()> {
-    if let Some(path) = args.json_file() {
+    let json = args.json_file().map_or(Ok(()), |path| {
         let text = serde_json::to_string_pretty(out)
             .map_err(|e| Error::CheckFailed(format!("cannot express the result as JSON: {e}")))?;
-        output::write_atomically(path, |f| f.write_all(text.as_bytes()).and_then(|()| f.write_all(b"\n")))?;
-    }
-    if let Some(path) = &args.csv {
-        output::write_atomically(path, |f| out.write_csv(f).map_err(std::io::Error::other))?;
-    }
-    if let Some(path) = &args.plot {
+        output::write_atomically(path, |f| f.write_all(text.as_bytes()).and_then(|()| f.write_all(b"\n")))
+    });
+    let csv = args
+        .csv
+        .as_ref()
+        .map_or(Ok(()), |path| output::write_atomically(path, |f| out.write_csv(f).map_err(std::io::Error::other)));
+    let plot = args.plot.as_ref().map_or(Ok(()), |path| {
         let picture = plot::draw(out)?;
-        output::png::write_rgb(path, &picture.rgb, picture.width, picture.height)?;
-    }
-    Ok(())
+        output::png::write_rgb(path, &picture.rgb, picture.width, picture.height)
+    });
+    json.and(csv).and(plot)
 }
 
-/// With `--check`: an answer that rounding does not explain is a failure, if it is ours or of a peer that has to agree.
+/// With `--check`: an answer that rounding does not explain is a failure, if it is ours or of a peer that has to agree. The
+/// reference is ours, whoever it is held against.
 fn verdict(args: &BenchRaysArgs, out: &RayBenchmark) -> Result<()> {
-    let strict = |c: &&CheckRecord| c.strict && c.unexplained > 0;
-    let checks = || out.scenes.iter().flat_map(|s| s.checks.iter().filter(strict).map(move |c| (s, c)));
+    let checks = || out.scenes.iter().flat_map(|s| s.checks.iter().filter(|c| c.fails()).map(move |c| (s, c)));
     match checks().next() {
         Some((scene, c)) if args.check => Err(Error::CheckFailed(format!(
-            "{}, {}: {} of {} answers of '{}' differ from those of '{}' by more than rounding ({}); {} such results in all",
+            "{}, {}: {} of {} answers of '{}' differ from those of '{}' by more than rounding{} ({}); {} such results in all",
             scene.scene,
             c.stream,
             c.unexplained,
             c.rays,
             c.contestant,
             c.reference,
+            match c.reference_unexplained {
+                0 => String::new(),
+                n => format!(", {n} of these because the latter are wrong"),
+            },
             c.examples.first().map_or("no example", String::as_str),
             checks().count()
         ))),
         _ => Ok(()),
+    }
+}
+
+/// Listens to the keyboard, but leaves the bar alone: for work whose own count is not the run's.
+struct Unshown<'a>(&'a mut Keyboard);
+
+impl Control for Unshown<'_> {
+    fn progress(&mut self, _: u64, _: u64) {}
+
+    fn should_stop(&mut self) -> Result<bool> {
+        self.0.should_stop()
     }
 }
 
@@ -160,6 +161,8 @@ struct Bench<'a> {
 
 /// Steps of the progress bar for one scene.
 const STEPS: u64 = 1000;
+/// Of these, with `--check`, for checking.
+const CHECK_STEPS: u64 = 300;
 /// Rays whose visits are counted, of each stream.
 const VISITS_OF: usize = 20_000;
 /// Larger scenes are not built once more for counting.
@@ -167,8 +170,68 @@ const VISITS_MOST: usize = 2_000_000;
 
 impl Bench<'_> {
     fn note(&mut self, console: &Console, text: String) {
-        console.warning(&text);
+        self.keyboard.progress.suspend(|| console.warning(&text));
         self.out.notes.push(text);
+    }
+
+    /// All scenes. One that fails does not stop the others; it fails the run in the end if it was asked for by name, or if nothing
+    /// was measured.
+    fn scenes(&mut self, console: &Console, scenes: &[String]) -> Result<()> {
+        let title = format!(
+            "{} ({}), {} threads; medians of {} repeats, in turn{}",
+            self.out.device,
+            self.out.driver,
+            self.out.threads,
+            self.out.repeats,
+            self.out.peers.iter().map(|p| format!("; beside {p}")).collect::<String>()
+        );
+        self.keyboard.progress.suspend(|| console.line(&title))?;
+        let mut failed = None;
+        for (k, source) in scenes.iter().enumerate() {
+            // one scene at least: a record of nothing says nothing
+            if k > 0 && self.is_late() {
+                self.out.stopped_early = true;
+                self.note(console, format!("time limit: {} scenes left out", scenes.len() - k));
+                break;
+            }
+            // a share of the bar for every scene
+            self.laps = (k as u64, scenes.len() as u64);
+            self.advance(0);
+            let mut record = SceneRecord { scene: source.clone(), ..Default::default() };
+            let outcome = self.scene(console, source, &mut record);
+            if !record.streams.is_empty() {
+                let table = table::scene(&record, &self.out.baselines);
+                self.keyboard.progress.suspend(|| table.iter().try_for_each(|line| console.line(line)))?;
+                self.out.scenes.push(record);
+            }
+            match outcome {
+                Ok(()) => {}
+                Err(e @ (Error::Interrupted | Error::DeviceLost(_))) => return Err(e),
+                Err(e) => {
+                    self.note(console, format!("{source}: left out from here: {e}"));
+                    failed.get_or_insert(e);
+                }
+            }
+        }
+        let nothing = self.out.rows().next().is_none();
+        match failed {
+            Some(e) if nothing || !self.args.scenes.is_empty() => Err(e),
+            None if nothing => {
+                let why = self.out.notes.last().map_or("no scene", String::as_str);
+                Err(Error::Usage(format!("nothing was measured: {why}")))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Moves the bar: so many of [`STEPS`] of this scene are done.
+    fn advance(&mut self, steps: u64) {
+        self.keyboard.progress.set(self.laps.0 * STEPS + steps, self.laps.1 * STEPS);
+    }
+
+    /// Says what is done from here on.
+    fn phase(&mut self, what: String) {
+        self.keyboard.progress.phase(what);
     }
 
     fn is_late(&self) -> bool {
@@ -178,6 +241,8 @@ impl Bench<'_> {
     /// Starts the peers; those that do not are named and left out.
     fn start_peers(&mut self, console: &Console, specs: &[peers_file::PeerSpec]) -> Result<()> {
         for spec in specs {
+            let how = if spec.is_built() { "starting" } else { "compiling" };
+            self.phase(format!("{how} peer '{}'", spec.name));
             match Peer::start(spec) {
                 Ok(peer) => {
                     self.out.baselines.extend(spec.baselines.iter().map(|k| peer_kernel(&spec.name, k)));
@@ -191,19 +256,26 @@ impl Bench<'_> {
         Ok(())
     }
 
-    /// Everything about one scene.
-    fn scene(&mut self, console: &Console, source: &str) -> Result<SceneRecord> {
+    /// Everything about one scene. `record` has what there is also where it fails.
+    fn scene(&mut self, console: &Console, source: &str, record: &mut SceneRecord) -> Result<()> {
         let size = self.args.size();
+        self.phase(format!("{source}: loading"));
         let subject = scenes::load(source, self.args, f64::from(size[0]) / f64::from(size[1]))?;
-        crate::cli::warn(console, &subject.scene);
+        for warning in crate::cli::noticed(&subject.scene) {
+            self.note(console, format!("{source}: {}", crate::cli::one_line(&warning)));
+        }
+        if let Some(known) = subject.view {
+            self.note(console, format!("{source}: seen and lit as {known} is (docs/benchmarks.md)"));
+        }
         interrupt::check()?;
         let flat = FlatScene::new(&subject.scene);
         let contestants = self.contestants(console, source, &flat)?;
         let Some(tracer) = contestants.iter().find_map(Contestant::tracer) else {
             return Err(Error::Device(format!("{source}: none of the kernels asked for runs here; `skylit doctor` says why")));
         };
-        let sets = RaySets::make(tracer, &subject, size, &mut self.keyboard)?;
-        let mut record = SceneRecord {
+        self.phase(format!("{source}: making rays"));
+        let sets = RaySets::make(tracer, &subject, size, &mut Unshown(&mut self.keyboard))?;
+        *record = SceneRecord {
             scene: source.to_owned(),
             triangles: subject.scene.triangle_count(),
             spheres: subject.scene.sphere_count(),
@@ -222,7 +294,9 @@ impl Bench<'_> {
                 self.give_rays(console, &contestants, &mut failed, set, sets.get(set))?;
             }
         }
-        let counted = contestants.iter().any(|c| c.kernel == Some(Kernel::Wide)) && flat.primitive_count() <= VISITS_MOST;
+        // the counter's tree is that of the default preset
+        let same = self.args.build == BuildChoice::Default && flat.primitive_count() <= VISITS_MOST;
+        let counted = same && contestants.iter().any(|c| c.kernel == Some(Kernel::Wide));
         let counter = if counted { VisitCounter::new(&flat) } else { None };
         for (k, stream) in asked.iter().enumerate() {
             // one stream at least: a record of nothing says nothing
@@ -236,44 +310,58 @@ impl Bench<'_> {
                 self.note(console, format!("{source}: {}: no rays (nothing in view that they start from)", stream.name));
                 continue;
             }
-            let share = (k as u64 * STEPS / asked.len() as u64, (k as u64 + 1) * STEPS / asked.len() as u64);
-            record.streams.push(self.stream(console, &contestants, &mut failed, stream, (rays, counter.as_ref()), share)?);
+            if !contestants.iter().zip(&failed).any(|(c, f)| !f && c.is_for(stream.set)) {
+                self.note(console, format!("{source}: {}: no contestant takes part in it", stream.name));
+                continue;
+            }
+            let steps = if self.args.check { STEPS - CHECK_STEPS } else { STEPS };
+            let share = (k as u64 * steps / asked.len() as u64, (k as u64 + 1) * steps / asked.len() as u64);
+            self.phase(format!("{source}: {}", stream.name));
+            let results = self.stream(console, &contestants, &mut failed, stream, (rays, counter.as_ref()), share)?;
+            record.streams.push(results);
         }
         if self.args.check {
-            self.check(console, &subject, &contestants, &mut failed, &sets, &mut record)?;
+            self.check(console, &subject, &contestants, &mut failed, &sets, record)?;
         }
-        Ok(record)
+        Ok(())
     }
 
     fn wants(&self, stream: &StreamKind) -> bool {
         self.args.streams.is_empty() || self.args.streams.iter().any(|s| s == stream.name)
     }
 
-    /// All that take part in a scene, built.
+    /// All that take part in a scene, built: one of our own at least, which makes the rays.
     fn contestants<'f>(&mut self, console: &Console, source: &str, flat: &'f FlatScene<'f>) -> Result<Vec<Contestant<'f>>> {
         let mut out = Vec::new();
+        let mut refused = None;
         for own in &OWN {
             let named = self.args.kernels.iter().any(|k| k == own.name);
             if !named && !self.args.kernels.is_empty() {
                 continue;
             }
-            let made = match own.takes_part(&self.device.info, flat.primitive_count(), named) {
-                Ok(()) => Contestant::own(self.device, flat, own),
+            self.phase(format!("{source}: building for '{}'", own.name));
+            let made = match own.takes_part(&self.device.info, flat, named) {
+                Ok(()) => Contestant::own(self.device, flat, own, &self.args.build_options()),
                 Err(why) => Err(Error::Device(why)),
             };
             match made {
                 Ok(c) => out.push(c),
-                // one that is too large for the device, or not there, does not stop the others
-                Err(e @ (Error::OutOfMemory(_) | Error::Device(_))) => {
+                // one that the scene is too large for, or that the device does not run, does not stop the others
+                Err(e @ (Error::OutOfMemory(_) | Error::Device(_) | Error::Scene(_))) => {
                     self.note(console, format!("{source}: '{}' left out: {e}", own.name));
+                    refused.get_or_insert(e);
                 }
                 Err(e) => return Err(e),
             }
             interrupt::check()?;
         }
+        if let (true, Some(why)) = (out.is_empty(), refused) {
+            return Err(why);
+        }
         let masked = flat.has_alpha();
         for index in 0..self.peers.len() {
             let spec = self.peers[index].spec.clone();
+            self.phase(format!("{source}: building for '{}'", spec.name));
             let mut build = || -> Result<Vec<Contestant<'f>>, PeerError> {
                 if masked {
                     return Err(PeerError::Failed("it knows no alpha masks".into()));
@@ -349,7 +437,7 @@ impl Bench<'_> {
             }
             interrupt::check()?;
             let done = share.0 + (share.1 - share.0) * u64::from(round) / u64::from(repeats);
-            self.keyboard.progress.set(self.laps.0 * STEPS + done, self.laps.1 * STEPS);
+            self.advance(done);
             if round > 0 && self.is_late() {
                 self.out.stopped_early |= round < repeats;
                 break;
@@ -377,7 +465,7 @@ impl Bench<'_> {
                 seconds,
                 ratios: Vec::new(),
                 nodes_per_ray: visits.filter(|_| contestant.kernel == Some(Kernel::Wide)).map(|v| v.nodes),
-                primitives_per_ray: visits.filter(|_| contestant.kernel == Some(Kernel::Wide)).map(|v| v.leaves),
+                leaves_per_ray: visits.filter(|_| contestant.kernel == Some(Kernel::Wide)).map(|v| v.leaves),
             });
         }
         give_ratios(&mut results, &self.out.baselines);
@@ -397,7 +485,20 @@ impl Bench<'_> {
         let Some((first, reference)) = contestants.iter().enumerate().find(|(_, c)| c.tracer().is_some()) else {
             return Ok(());
         };
-        for stream in STREAMS.iter().filter(|s| record.streams.iter().any(|r| r.stream == s.name)) {
+        let source = record.scene.clone();
+        self.phase(format!("{source}: checking"));
+        let streams: Vec<_> = STREAMS.iter().filter(|s| record.streams.iter().any(|r| r.stream == s.name)).collect();
+        let pairs = (streams.len() * contestants.len()).max(1) as u64;
+        for (done, stream) in streams.iter().enumerate() {
+            if self.is_late() {
+                self.out.stopped_early = true;
+                self.note(console, format!("time limit: {source}: {} streams not checked", streams.len() - done));
+                return Ok(());
+            }
+            if !(0..contestants.len()).any(|k| k != first && !failed[k] && contestants[k].is_for(stream.set)) {
+                self.note(console, format!("{source}: {}: nothing to compare with '{}'", stream.name, reference.name));
+                continue;
+            }
             let rays = sets.get(stream.set);
             let ours = sure(reference.hits(&mut self.peers, rays, stream.mode, &mut self.keyboard))?;
             for (k, contestant) in contestants.iter().enumerate() {
@@ -416,9 +517,8 @@ impl Bench<'_> {
                     })
                 };
                 match compare() {
-                    Ok(report) => {
-                        let check =
-                            CheckRecord::new(&contestant.name, &reference.name, stream.name, &report, contestant.strict);
+                    Ok(found) => {
+                        let check = CheckRecord::new(&contestant.name, &reference.name, stream.name, &found, contestant.strict);
                         record.checks.push(check);
                     }
                     Err(PeerError::Ours(e)) => return Err(e),
@@ -428,6 +528,7 @@ impl Bench<'_> {
                     }
                 }
                 interrupt::check()?;
+                self.advance(STEPS - CHECK_STEPS + (done * contestants.len() + k + 1) as u64 * CHECK_STEPS / pairs);
             }
         }
         Ok(())

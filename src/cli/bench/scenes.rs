@@ -88,11 +88,10 @@ pub fn choose(args: &BenchRaysArgs) -> (Vec<String>, Vec<String>) {
     (scenes.collect(), notes.collect())
 }
 
-/// Fails for a scene that is not there, without loading those that are.
+/// Fails for a scene that is not there, or that no built-in scene becomes with its parameter, without loading those that are.
 pub fn check_there(source: &str) -> Result<()> {
-    let name = source.strip_prefix("builtin:").unwrap_or(source);
-    let base = name.split_once(':').map_or(name, |(base, _)| base);
-    if Path::new(source).exists() || builtin::names().iter().any(|b| b.name == base) {
+    let made = builtin::exists(source.strip_prefix("builtin:").unwrap_or(source));
+    if made || (Path::new(source).exists() && !source.starts_with("builtin:")) {
         return Ok(());
     }
     // says what is wrong with it
@@ -114,6 +113,8 @@ pub struct Subject {
     pub ao_radius: f64,
     /// Point light of the shadow rays, world coordinates.
     pub light: DVec3,
+    /// The well-known scene whose view and light these are, if they are not those of any scene.
+    pub view: Option<&'static str>,
 }
 
 /// Loads a scene and chooses its view.
@@ -122,8 +123,7 @@ pub fn load(source: &str, args: &BenchRaysArgs, aspect: f64) -> Result<Subject> 
     if !args.alpha {
         scene.materials.iter_mut().for_each(|m| m.alpha_mode = AlphaMode::Opaque);
     }
-    let known =
-        Path::new(source).file_name().and_then(|name| KNOWN.iter().find(|k| Path::new(k.path).file_name() == Some(name)));
+    let known = known(source);
     let choice = match known.and_then(|k| k.view.as_ref()) {
         Some(v) => Choice::LookAt { eye: v.eye.into(), target: v.target.into(), up: DVec3::Y, fov_y: v.fov_y.to_radians() },
         None => Choice::Auto,
@@ -134,5 +134,40 @@ pub fn load(source: &str, args: &BenchRaysArgs, aspect: f64) -> Result<Subject> 
     // outside of the scene, near enough to make rays of different directions
     let outside = || (lo + hi) * 0.5 + TOWARDS_LIGHT.normalize() * (hi - lo).length();
     let light = known.and_then(|k| k.light).map_or_else(outside, DVec3::from);
-    Ok(Subject { scene, camera, ao_radius, light })
+    let view = known.filter(|k| k.view.is_some() || k.light.is_some()).map(|k| k.path);
+    Ok(Subject { scene, camera, ao_radius, light, view })
+}
+
+/// The well-known scene that a file is, by its name and that of its folder: there are many a scene.glb.
+fn known(source: &str) -> Option<&'static Known> {
+    let tail = |path: &Path| path.components().rev().take(2).map(|c| c.as_os_str().to_owned()).collect::<Vec<_>>();
+    // a path without a folder has one all the same
+    let path = std::path::absolute(source).unwrap_or_else(|_| PathBuf::from(source));
+    KNOWN.iter().find(|k| tail(Path::new(k.path)) == tail(&path))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn well_known_scenes_by_folder_and_name() {
+        let found = |source: &str| known(source).map(|k| k.path);
+        assert_eq!(found("../shared/scenes/sponza/sponza.glb"), Some("sponza/sponza.glb"));
+        assert_eq!(found("dragon/dragon.glb"), Some("dragon/dragon.glb"));
+        for other in ["sponza.glb", "mine/sponza.glb", "sponza/sponza.gltf", "builtin:plane", "dragon", ""] {
+            assert_eq!(found(other), None, "{other}");
+        }
+    }
+
+    #[test]
+    fn parameters_are_checked_before_anything_is_made() {
+        for there in QUICK.iter().chain(&BUILTIN).chain(&["plane", "builtin:terrain:100000000"]) {
+            assert!(check_there(there).is_ok(), "{there}");
+        }
+        for (absent, code) in [("builtin:terrain:1", 64), ("builtin:grid:1000", 64), ("builtin:plane:3", 64), ("terrain:x", 3)]
+        {
+            assert_eq!(check_there(absent).unwrap_err().exit_code(), code, "{absent}");
+        }
+    }
 }

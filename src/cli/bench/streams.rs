@@ -13,8 +13,11 @@ use crate::sampling::sobol::hash_combine;
 use crate::scene::{Geometry, Scene};
 use crate::tracer::Tracer;
 
-/// Rays that stay together when a slow tracer gets only a part of a set.
-const CHUNK: usize = 1024;
+/// Rays that stay together when a slow tracer gets only a part of a set: at least and at most. Fewer than a work-group of them would
+/// be less coherent than the set.
+const CHUNK: [usize; 2] = [64, 1024];
+/// Chunks that a part of a set has at least, so that it is from all over the image.
+const CHUNKS: usize = 32;
 const SEED: u32 = 1;
 
 /// A stream: a set of rays and what is asked of them.
@@ -151,9 +154,12 @@ fn shuffle(rays: &[Ray]) -> Vec<Ray> {
     out
 }
 
-/// About one ray in `divisor`, in chunks from all over the set, in its order.
+/// About one ray in `divisor`, in chunks from all over the set, in its order. Of a small set more: what is too few to be from all over
+/// it says nothing about it, and takes no time.
 pub fn sample(rays: &[Ray], divisor: usize) -> Vec<Ray> {
-    rays.chunks(CHUNK).step_by(divisor.max(1)).flatten().copied().collect()
+    let chunk = (rays.len() / (divisor.max(1) * CHUNKS)).clamp(CHUNK[0], CHUNK[1]) / CHUNK[0] * CHUNK[0];
+    let step = divisor.min(rays.len() / (chunk * CHUNKS)).max(1);
+    rays.chunks(chunk).step_by(step).flatten().copied().collect()
 }
 
 #[cfg(test)]
@@ -177,12 +183,59 @@ mod tests {
 
     #[test]
     fn samples_are_chunks_of_the_set() {
-        let rays = numbered(10 * CHUNK + 7);
+        let rays = numbered(200_007);
         assert_eq!(sample(&rays, 1), rays);
         let part = sample(&rays, 4);
-        assert_eq!(part.len(), 3 * CHUNK);
-        assert_eq!(part[CHUNK].origin[0] as usize, 4 * CHUNK);
+        assert_eq!(part.len(), 49 * 1024);
+        assert_eq!(part[1024].origin[0] as usize, 4 * 1024);
         assert_eq!(sample(&numbered(5), 16).len(), 5);
         assert!(sample(&[], 16).is_empty());
+    }
+
+    #[test]
+    fn samples_are_from_all_over_the_set() {
+        for n in [1000, 2000, 20_000, 57_600, 300_000, 921_600] {
+            for divisor in [1, 4, 16, 64] {
+                let rays = numbered(n);
+                let part = sample(&rays, divisor);
+                // no gap as long as a sixteenth of the image, nor after the last chunk
+                let gap = |w: &[Ray]| (w[1].origin[0] - w[0].origin[0]) as usize;
+                let longest = part.windows(2).map(gap).max().unwrap().max(n - 1 - part[part.len() - 1].origin[0] as usize);
+                assert!(longest <= n / 16, "{n} rays, one in {divisor}: none of {longest} in a row");
+                let most = (n / divisor).max(2 * CHUNK[0] * CHUNKS) * 5 / 4;
+                assert!(part.len() <= most && part.len() >= (n / divisor).min(n), "{n} rays, one in {divisor}: {}", part.len());
+            }
+        }
+    }
+
+    /// A plane seen from above: light above it reaches its points, light below it does not, whichever way it is wound.
+    #[test]
+    fn shadow_rays_start_where_the_surface_faces_the_light() {
+        for mirrored in [false, true] {
+            let mut scene = crate::scene::builtin::by_name("plane").unwrap();
+            if let (true, Geometry::Triangles(t)) = (mirrored, &mut scene.meshes[0].geometry) {
+                t.indices.iter_mut().for_each(|c| c.swap(1, 2));
+            }
+            let down = Ray { origin: [0.5, 3.0, 0.25], tmin: 0.0, direction: [0.0, -1.0, 0.0], tmax: f32::INFINITY };
+            let away = Ray { direction: [0.0, 1.0, 0.0], ..down };
+            let hit = Hit { t: 3.0, instance: 0, primitive: 0, ..Hit::MISS };
+            let up = Ray { origin: [0.5, 1e-4, 0.25], tmin: 0.0, direction: [0.0, 1.0, 0.0], tmax: 7.0 };
+            let made = |light: DVec3| shadow_rays(&scene, &[away, down], &[Hit::MISS, hit], &[up], light).unwrap();
+            let [ray] = made(DVec3::new(2.5, 4.0, 1.25))[..] else { panic!("one point, one light") };
+            // to the light and no farther
+            assert_eq!((ray.origin, ray.tmax), (up.origin, 1.0));
+            let end = DVec3::from(ray.origin.map(f64::from)) + DVec3::from(ray.direction.map(f64::from));
+            assert!((end - DVec3::new(2.5, 4.0, 1.25)).length() < 1e-6);
+            assert!(made(DVec3::new(2.5, -4.0, 1.25)).is_empty());
+            let n = normal(&scene, &hit, DVec3::from(up.origin.map(f64::from))).unwrap().normalize();
+            assert!((n.y.abs() - 1.0).abs() < 1e-12, "{n}");
+            assert!(shadow_rays(&scene, &[down], &[hit], &[], DVec3::Y).is_err());
+        }
+        let sphere = crate::scene::builtin::by_name("sphere-over-plane").unwrap();
+        let k = sphere.instances.iter().position(|i| matches!(sphere.meshes[i.mesh].geometry, Geometry::Spheres(_))).unwrap();
+        let hit = Hit { t: 1.0, instance: k as u32, primitive: 0, ..Hit::MISS };
+        let top = DVec3::new(0.0, 2.25, 0.0) - sphere.origin();
+        let n = normal(&sphere, &hit, top).unwrap().normalize();
+        assert!((n - DVec3::Y).length() < 1e-6, "{n}");
     }
 }

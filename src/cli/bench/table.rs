@@ -75,15 +75,15 @@ pub fn scene(record: &SceneRecord, baselines: &[String]) -> Vec<String> {
 fn results(record: &SceneRecord, baselines: &[String]) -> Vec<Vec<String>> {
     let runs = || record.streams.iter().flat_map(|t| &t.results);
     // columns that nobody fills stay away
-    let (nodes, primitives) = (runs().any(|r| r.nodes_per_ray.is_some()), runs().any(|r| r.primitives_per_ray.is_some()));
+    let (nodes, leaves) = (runs().any(|r| r.nodes_per_ray.is_some()), runs().any(|r| r.leaves_per_ray.is_some()));
     let mut head: Vec<String> =
         ["stream", "contestant", "rays", "hit", "Mrays/s", "min..max", "wall"].map(str::to_owned).to_vec();
     head.extend(baselines.iter().map(|b| format!("x {b}")));
     if nodes {
         head.push("nodes/ray".into());
     }
-    if primitives {
-        head.push("primitives/ray".into());
+    if leaves {
+        head.push("leaves/ray".into());
     }
     let mut rows = vec![head];
     let maybe = |x: Option<f64>| x.map_or_else(|| "-".to_owned(), number);
@@ -103,8 +103,8 @@ fn results(record: &SceneRecord, baselines: &[String]) -> Vec<Vec<String>> {
             if nodes {
                 row.push(maybe(run.nodes_per_ray));
             }
-            if primitives {
-                row.push(maybe(run.primitives_per_ray));
+            if leaves {
+                row.push(maybe(run.leaves_per_ray));
             }
             rows.push(row);
         }

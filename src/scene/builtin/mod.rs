@@ -53,6 +53,18 @@ pub fn names() -> &'static [BuiltinInfo] {
 /// The built-in scene `name`, which may end in `:PARAMETER` where its description says so. `None` when there is no such scene
 /// or the parameter is out of its range.
 pub fn by_name(name: &str) -> Option<Scene> {
+    let mut scene = recipe(name)?();
+    scene.name = name.to_owned();
+    Some(scene)
+}
+
+/// Would [`by_name`] make a scene of this name? Says so without making it.
+pub fn exists(name: &str) -> bool {
+    recipe(name).is_some()
+}
+
+/// How to make a scene.
+fn recipe(name: &str) -> Option<Box<dyn FnOnce() -> Scene>> {
     let (base, parameter) = match name.split_once(':') {
         Some((base, parameter)) => (base, Some(parameter)),
         None => (name, None),
@@ -66,30 +78,35 @@ pub fn by_name(name: &str) -> Option<Scene> {
         None => Some(default),
         Some(p) => p.parse::<u32>().ok().filter(|v| (lo..=hi).contains(v)),
     };
-    let count = |default: u32, hi: u32| between(default, 1, hi);
-    let mut scene = match base {
-        "v-groove" => analytic::v_groove(number(90.0, 1.0, 180.0)?.to_radians(), 4.0, 12.0, Placement::default()),
-        "grid" => many::grid(count(6, 128)?),
-        "spheres" => many::spheres(count(1000, 10_000_000)?),
-        "terrain" => terrain::terrain(between(100_000, 2, 100_000_000)?),
-        "instances" => terrain::instances(between(1_000_000, 250, 500_000_000)?),
+    let with = |make: fn(u32) -> Scene, n: Option<u32>| n.map(|n| Box::new(move || make(n)) as Box<dyn FnOnce() -> Scene>);
+    match base {
+        "v-groove" => {
+            let angle = number(90.0, 1.0, 180.0)?.to_radians();
+            return Some(Box::new(move || analytic::v_groove(angle, 4.0, 12.0, Placement::default())));
+        }
+        "grid" => return with(many::grid, between(6, 1, 128)),
+        "spheres" => return with(many::spheres, between(1000, 1, 10_000_000)),
+        "terrain" => return with(terrain::terrain, between(100_000, 2, 100_000_000)),
+        "instances" => return with(terrain::instances, between(1_000_000, 250, 500_000_000)),
         _ if parameter.is_some() => return None,
-        "cornell-box" => cornell::cornell_box(),
-        "cornell-empty" => cornell::cornell_empty(),
-        "cornell-mirror" => cornell::cornell_mirror(),
-        "cornell-glass-sphere" => cornell::cornell_glass_sphere(),
-        "cornell-spheres" => cornell::cornell_spheres(),
-        "sphere-over-plane" => analytic::sphere_over_plane(1.0, 1.25, 60.0, Placement::default()),
-        "closed-box" => analytic::closed_box(2.0, Placement::default()),
-        "parallel-planes" => analytic::parallel_planes(8.0, 6.0, 1.0, Placement::default()),
-        "plane" => analytic::plane(20.0, Placement::default()),
-        "leaf-cards" => many::leaf_cards(),
-        "stairs" => many::stairs(DVec3::ZERO),
-        "far-away" => many::stairs(DVec3::new(1.0e6, -5.0e5, 1.5e6)),
+        _ => {}
+    }
+    let make: fn() -> Scene = match base {
+        "cornell-box" => cornell::cornell_box,
+        "cornell-empty" => cornell::cornell_empty,
+        "cornell-mirror" => cornell::cornell_mirror,
+        "cornell-glass-sphere" => cornell::cornell_glass_sphere,
+        "cornell-spheres" => cornell::cornell_spheres,
+        "sphere-over-plane" => || analytic::sphere_over_plane(1.0, 1.25, 60.0, Placement::default()),
+        "closed-box" => || analytic::closed_box(2.0, Placement::default()),
+        "parallel-planes" => || analytic::parallel_planes(8.0, 6.0, 1.0, Placement::default()),
+        "plane" => || analytic::plane(20.0, Placement::default()),
+        "leaf-cards" => many::leaf_cards,
+        "stairs" => || many::stairs(DVec3::ZERO),
+        "far-away" => || many::stairs(DVec3::new(1.0e6, -5.0e5, 1.5e6)),
         _ => return None,
     };
-    scene.name = name.to_owned();
-    Some(scene)
+    Some(Box::new(make))
 }
 
 /// Where a scene for tests lies: scaled about its own origin, then moved. It goes into the instances' transforms.
@@ -199,5 +216,23 @@ impl Rng {
         let (a, b, c) = (self.range(0.0, 1.0), self.range(0.0, std::f64::consts::TAU), self.range(0.0, std::f64::consts::TAU));
         let (p, q) = ((1.0 - a).sqrt(), a.sqrt());
         glam::DQuat::from_xyzw(p * b.sin(), p * b.cos(), q * c.sin(), q * c.cos()).normalize()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_exists_is_known_without_making_it() {
+        assert!(names().iter().all(|b| exists(b.name)));
+        for name in ["terrain:100000000", "spheres:10000000", "instances:250", "v-groove:1", "grid:128"] {
+            assert!(exists(name), "{name}");
+        }
+        for name in ["", "nothing", "plane:1", "terrain:1", "terrain:", "terrain:1e3", "grid:129", "v-groove:nan", "spheres:0"]
+        {
+            assert!(!exists(name), "{name}");
+            assert!(by_name(name).is_none(), "{name}");
+        }
     }
 }

@@ -8,7 +8,7 @@ use std::sync::Arc;
 use glam::{DAffine3, DQuat, DVec3, Vec3};
 use serde_json::{Value, json};
 
-use super::{icosphere, material, write_buffered};
+use super::{Written, icosphere, material, write_buffered};
 use crate::error::{Error, Result};
 use crate::scene::{
     Camera, Filter, Geometry, Light, LightKind, Material, Projection, Scene, Sphere, Texture, TriangleMesh, Wrap,
@@ -18,12 +18,12 @@ use crate::scene::{
 /// name beside it. The extension of `path` decides. Each file appears only when it is complete, the `.gltf` last.
 ///
 /// Triangles, transforms, materials (core and KHR_materials extensions), textures, cameras and punctual lights come back
-/// from the loader as they were. Spheres are tessellated, with a warning in the log; what glTF has no words for (the
+/// from the loader as they were. Spheres are tessellated, and counted in what is returned; what glTF has no words for (the
 /// environment, wishes for rendering, the `.brhan` kind of a material) is left out.
 ///
 /// # Errors
 /// [`Error::Output`], also for another extension or more than 4 GiB.
-pub fn export_gltf(scene: &Scene, path: &Path) -> Result<()> {
+pub fn export_gltf(scene: &Scene, path: &Path) -> Result<Written> {
     let fail = |message: String| Error::Output { path: path.to_owned(), message };
     let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
     let embed = match extension.to_str() {
@@ -33,13 +33,13 @@ pub fn export_gltf(scene: &Scene, path: &Path) -> Result<()> {
     };
     let mut writer = Writer { embed, ..Writer::default() };
     writer.scene(scene, path).map_err(fail)?;
-    let Writer { bin, json, images, .. } = writer;
+    let Writer { bin, json, images, written, .. } = writer;
     let text = json.to_string();
     if u32::try_from(bin.len() + text.len() + 64).is_err() {
         return Err(fail("the scene is larger than 4 GiB, the limit of .glb".to_owned()));
     }
     if embed {
-        return write_buffered(path, |out| {
+        write_buffered(path, |out| {
             let json_size = text.len().next_multiple_of(4);
             let bin_size = bin.len().next_multiple_of(4);
             let words = [2, 12 + 8 + json_size + 8 + bin_size, json_size].map(|n| (n as u32).to_le_bytes());
@@ -52,7 +52,8 @@ pub fn export_gltf(scene: &Scene, path: &Path) -> Result<()> {
             out.write_all(b"BIN\0")?;
             out.write_all(&bin)?;
             out.write_all(&[0; 4][..bin_size - bin.len()])
-        });
+        })?;
+        return Ok(written);
     }
     for (name, png) in &images {
         write_buffered(&path.with_file_name(name), |out| out.write_all(png))?;
@@ -60,7 +61,8 @@ pub fn export_gltf(scene: &Scene, path: &Path) -> Result<()> {
     if !bin.is_empty() {
         write_buffered(&path.with_extension("bin"), |out| out.write_all(&bin))?;
     }
-    write_buffered(path, |out| out.write_all(text.as_bytes()))
+    write_buffered(path, |out| out.write_all(text.as_bytes()))?;
+    Ok(written)
 }
 
 /// JSON arrays.
@@ -80,6 +82,7 @@ struct Writer {
     accessors: Vec<Value>,
     /// File name and bytes of each image that is not embedded.
     images: Vec<(String, Vec<u8>)>,
+    written: Written,
 }
 
 impl Writer {
@@ -94,8 +97,10 @@ impl Writer {
         let lamps = scene.lights.iter().filter(|l| matches!(l.kind, LightKind::Sphere { .. })).count();
         let spheres = spheres.sum::<u64>() + lamps as u64;
         let level = icosphere::level(spheres).min(4);
+        let each = 20u64 << (2 * level);
+        self.written.triangles = scene.triangle_count() + (scene.sphere_count() + lamps as u64) * each;
         if spheres > 0 {
-            tracing::warn!("{spheres} spheres become {} triangles each: glTF has no spheres", 20 << (2 * level));
+            self.written.warnings.push(format!("{spheres} spheres become {each} triangles each: glTF has no spheres"));
         }
         let mut meshes = Vec::new();
         for mesh in &scene.meshes {

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use glam::{DAffine3, Vec3};
 
-use super::{icosphere, write_buffered};
+use super::{Written, icosphere, write_buffered};
 use crate::error::{Error, Result};
 use crate::scene::{Geometry, Instance, Material, Mesh, Scene, TriangleMesh};
 
@@ -12,16 +12,13 @@ use crate::scene::{Geometry, Instance, Material, Mesh, Scene, TriangleMesh};
 ///
 /// Instances are expanded in their order, each with the vertices and the triangle order of its mesh (no corner is moved,
 /// also not under mirroring transforms), so that the n-th triangle over all instances is triangle n here. Spheres are
-/// tessellated, with a warning in the log.
+/// tessellated.
 ///
 /// # Errors
 /// [`Error::Scene`] when there are more vertices than 32-bit indices reach.
 pub fn mesh_bin(scene: &Scene) -> Result<(Vec<Vec3>, Vec<[u32; 3]>)> {
     let spheres = scene.sphere_count();
     let ball = if spheres > 0 { icosphere::icosphere(icosphere::level(spheres)) } else { (Vec::new(), Vec::new()) };
-    if spheres > 0 {
-        tracing::warn!("{spheres} spheres become {} triangles each: MESH.bin has no spheres", ball.1.len());
-    }
     let geometries = || scene.instances.iter().map(|i| (i, &scene.meshes[i.mesh].geometry));
     let vertices: usize = geometries()
         .map(|(_, g)| match g {
@@ -55,11 +52,11 @@ pub fn mesh_bin(scene: &Scene) -> Result<(Vec<Vec3>, Vec<[u32; 3]>)> {
     Ok((positions, indices))
 }
 
-/// Writes [`mesh_bin`] to a file, which appears only when it is complete. Returns the number of triangles.
+/// Writes [`mesh_bin`] to a file, which appears only when it is complete.
 ///
 /// # Errors
 /// As [`mesh_bin`], and [`Error::Output`].
-pub fn write_mesh_bin(scene: &Scene, path: &Path) -> Result<usize> {
+pub fn write_mesh_bin(scene: &Scene, path: &Path) -> Result<Written> {
     let (positions, indices) = mesh_bin(scene)?;
     write_buffered(path, |out| {
         for n in [positions.len(), indices.len()] {
@@ -73,7 +70,13 @@ pub fn write_mesh_bin(scene: &Scene, path: &Path) -> Result<usize> {
         }
         Ok(())
     })?;
-    Ok(indices.len())
+    let mut written = Written { triangles: indices.len() as u64, ..Written::default() };
+    let spheres = scene.sphere_count();
+    if spheres > 0 {
+        let each = 20u64 << (2 * icosphere::level(spheres));
+        written.warnings.push(format!("{spheres} spheres become {each} triangles each: MESH.bin has no spheres"));
+    }
+    Ok(written)
 }
 
 /// Reads a MESH.bin as a scene of one flat-shaded mesh. Number and order of the triangles are those of the file:
