@@ -1,6 +1,6 @@
 //! Time to build hierarchies on the host: `cargo bench --bench hierarchy`. Throughput is primitives a second.
 //!
-//! Tracing is timed on a device, by `skylit rays --repeats N --json` on any mesh and ray set.
+//! Tracing is timed on a device, by `skylit bench rays`.
 
 use divan::Bencher;
 use divan::counter::ItemsCount;

@@ -1,9 +1,12 @@
 //! skylit traces ambient occlusion in real time, path-traces the reference it stands in for, and measures how far apart the
 //! two are. ARCHITECTURE.md draws the whole; each module's first lines say what it is for.
 
+#![deny(unsafe_code)]
+
 pub mod bvh;
 pub mod cli;
 pub mod error;
+#[allow(unsafe_code, reason = "Vulkan is called here, and nowhere else")]
 pub mod gpu;
 pub mod measure;
 pub mod oracle;
