@@ -211,7 +211,7 @@ fn sphere_tree(flat: &FlatScene, group: &Group, options: &BuildOptions) -> Wide 
         tree(primitive_boxes(flat, group).collect(), preset, None, |primitive| {
             let mut block = [0; 16];
             block[..4].copy_from_slice(bytemuck::cast_slice(&spheres[primitive as usize]));
-            block[12] = primitive | SPHERE;
+            block[12..14].copy_from_slice(&[primitive | SPHERE, pairs::NONE]);
             block
         })
     })
