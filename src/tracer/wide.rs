@@ -53,7 +53,7 @@ impl Trees {
             let tree = if g.spheres { sphere_tree(flat, g, options) } else { triangle_tree(flat, g, options) };
             (tree, start.elapsed().as_secs_f64())
         };
-        let (groups, seconds): (Vec<_>, _) = flat.groups.iter().map(timed).unzip();
+        let (groups, seconds): (Vec<_>, _) = flat.groups.par_iter().map(timed).unzip();
         let start = Instant::now();
         let top = (!flat.is_single_level()).then(|| {
             let bounds: Vec<_> = groups.iter().map(|g| g.bounds.unwrap_or(Aabb::EMPTY)).collect();
