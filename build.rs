@@ -30,7 +30,7 @@ unsafe extern "C" {}
 /// Threads of a work-group of a stream.
 const LANES: u32 = 64;
 
-/// The fast kernels' work-groups that follow each other take parts of a dispatch that are so far apart (shaders/trace/block.glsl).
+/// The fast kernels' work-groups that follow each other take parts of a dispatch that are so far apart (shaders/trace/spread.glsl).
 const SPREAD: u32 = 16;
 
 const EXTENSIONS: &str = "#extension GL_EXT_buffer_reference : require\n#extension GL_EXT_buffer_reference_uvec2 : require\n";

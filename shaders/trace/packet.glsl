@@ -11,6 +11,7 @@
 #include "trace/callback.glsl"
 #include "trace/leaf.glsl"
 #include "trace/slab.glsl"
+#include "trace/spread.glsl"
 #include "trace/stack.glsl"
 
 layout(local_size_x = LANES) in;

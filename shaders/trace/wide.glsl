@@ -12,6 +12,7 @@
 #include "trace/launch.glsl"
 #include "trace/leaf.glsl"
 #include "trace/slab.glsl"
+#include "trace/spread.glsl"
 #include "trace/stack.glsl"
 
 layout(local_size_x = LANES) in;
