@@ -167,7 +167,11 @@ impl Report<'_> {
         let rays = self.rays;
         let mut lines = vec![format!("tracer {}: {}", self.tracer, self.why)];
         if let Some(ComputeOptions { kernel, triangle_test }) = self.compute {
-            lines.push(format!("traversal {kernel}: {}; triangle test {triangle_test}", kernel.describe()));
+            let camera = kernel.for_coherent(self.device);
+            lines.push(format!(
+                "traversal {kernel}: {}; camera rays: {camera}; triangle test {triangle_test}",
+                kernel.describe()
+            ));
         }
         lines.extend(self.features.iter().cloned());
         lines.push(match self.options.binary() {

@@ -3,6 +3,7 @@
 use super::stream::StreamShaders;
 use crate::bvh::BuildPreset;
 use crate::bvh::cache::Cache;
+use crate::gpu::DeviceInfo;
 use crate::scene::flatten::FlatScene;
 
 /// How the compute tracer finds what a ray meets. All give the same hits; docs/traversal.md compares their speed.
@@ -48,6 +49,17 @@ impl Kernel {
             Kernel::Nearest => "nearest",
             Kernel::Direction => "direction",
             Kernel::Brute => "brute",
+        }
+    }
+
+    /// What traces coherent streams on a device. A packet has many more turns than a ray and no bound on them: where drivers cut
+    /// loops it has to be asked for.
+    pub fn for_coherent(self, info: &DeviceInfo) -> Kernel {
+        match self {
+            Kernel::Auto if info.packets() && !info.cuts_long_loops() => Kernel::Packet,
+            Kernel::Packet if info.packets() => Kernel::Packet,
+            Kernel::Auto | Kernel::Packet => Kernel::Wide,
+            other => other,
         }
     }
 

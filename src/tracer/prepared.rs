@@ -99,16 +99,10 @@ pub(super) fn specialization(
         .set(8, most_turns)
 }
 
-/// Is the stream traced in packets? A packet has many more turns than a ray and no bound on them: where drivers cut loops it has to be
-/// asked for.
+/// Is the stream traced in packets?
 pub(super) fn in_packets(info: &DeviceInfo, kernel: Kernel, shaders: &StreamShaders) -> bool {
-    let able = shaders.has_packets() && info.packets();
-    let wanted = match kernel {
-        Kernel::Packet => true,
-        Kernel::Auto => shaders.is_coherent() && !info.cuts_long_loops(),
-        _ => false,
-    };
-    able && wanted
+    let wanted = kernel == Kernel::Packet || shaders.is_coherent();
+    shaders.has_packets() && wanted && kernel.for_coherent(info) == Kernel::Packet
 }
 
 /// The shader of the fast kernels that traces the stream.
