@@ -2,7 +2,8 @@
 //!
 //! A pass is a file `shaders/NAME.glsl` whose head says `// stream: any`, `// stream: closest` or both; `// rays: queue` besides
 //! when the rays are in memory before it begins, `// rays: coherent` when neighbours go much the same way (packets pay then). The generated `shaders.rs` holds a constant `NAME_ANY` / `NAME_CLOSEST` for each
-//! (see `src/tracer/stream.rs`). `// compute` instead: a compute shader that traces nothing, as the constant `NAME`.
+//! (see `src/tracer/stream.rs`). `// compute` instead: a compute shader that traces nothing, as the constant `NAME`; `// compute: queue`
+//! when it fills a queue: `NAME_BALLOT` then is for devices that can count lanes.
 
 use std::cell::RefCell;
 use std::collections::BTreeSet;
@@ -125,14 +126,18 @@ impl Build {
         for file in files {
             let name = file.file_stem().and_then(|s| s.to_str()).expect("shader names are plain").to_owned();
             let text = std::fs::read_to_string(&file).expect("a shader can be read");
-            if text.lines().any(|l| l == "// compute") {
-                let source = format!("#version 460\n{EXTENSIONS}#define LANES {LANES}\n#include \"{name}.glsl\"\n");
-                self.compile(&source, ShaderKind::Compute, &format!("{name}.glsl"), &format!("{name}.spv"));
-                let _ = writeln!(
-                    table,
-                    "/// `shaders/{name}.glsl`, which traces nothing.\npub static {}: &[u8] = include_bytes!(concat!(env!(\"OUT_DIR\"), \"/{name}.spv\"));",
-                    name.to_uppercase()
-                );
+            if text.lines().any(|l| l == "// compute" || l == "// compute: queue") {
+                let fills_queue = text.lines().any(|l| l == "// compute: queue");
+                for (suffix, head) in [("", ""), ("_ballot", HEAD_64_BALLOT)].into_iter().take(1 + usize::from(fills_queue)) {
+                    let source = format!("#version 460\n{EXTENSIONS}{head}#define LANES {LANES}\n#include \"{name}.glsl\"\n");
+                    let output = format!("{name}{suffix}.spv");
+                    self.compile(&source, ShaderKind::Compute, &format!("{name}.glsl"), &output);
+                    let constant = format!("{name}{suffix}").to_uppercase();
+                    let _ = writeln!(
+                        table,
+                        "/// `shaders/{name}.glsl`, which traces nothing.\npub static {constant}: &[u8] = include_bytes!(concat!(env!(\"OUT_DIR\"), \"/{output}\"));"
+                    );
+                }
                 continue;
             }
             let Some(modes) = text.lines().find_map(|l| l.strip_prefix("// stream:")) else {

@@ -24,7 +24,7 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Sc
     uint root_reserved;
     uvec2 unfinished;  // compute tracer: counts rays whose traversal the driver cut short
     uvec2 launch_counters; // compute tracer: rays taken by each work-group
-    uvec2 reserved2;
+    uvec2 motion;      // MotionRecord of each entry of the top level; null: nothing moves
     vec4 bounds_min;   // compute tracer: of everything, padded as the hierarchy's boxes are
     vec4 bounds_max;
 };

@@ -184,6 +184,17 @@ impl Buffer {
         Ok(())
     }
 
+    /// Takes the contents of another buffer that is no larger.
+    pub fn copy_from(&mut self, other: &Buffer) -> Result<()> {
+        let size = other.size;
+        if let (Some(from), Some(to)) = (other.bytes(), self.bytes_mut()) {
+            to[..size as usize].copy_from_slice(from);
+            return Ok(());
+        }
+        let device = self.device.clone();
+        Commands::new(&device)?.run(|r| r.copy(other, 0, self, 0, size)).map(drop)
+    }
+
     /// Reads `size` bytes from `offset`, through a staging buffer where the host cannot see the memory.
     pub fn read(&self, offset: u64, size: u64) -> Result<Vec<u8>> {
         let mut out = Vec::with_capacity(size as usize);

@@ -53,6 +53,8 @@ pub struct BlockParams {
     pub ray_dump: u64,
     /// Where occlusion rays are written, or 0.
     pub occlusion_dump: u64,
+    /// Parameters of a frame's passes, or 0.
+    pub frame: u64,
 }
 
 /// A rectangle of the image whose pixels are numbered in 8x8 tiles, Morton order within.

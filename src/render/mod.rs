@@ -1,4 +1,4 @@
-//! The passes. One file a pass, with the same name as its shader; [`ao`] puts them together into an image.
+//! The passes. [`ao`] puts them together into an image, [`realtime`] into frame after frame.
 
 pub mod ao;
 pub mod aov;
@@ -8,6 +8,7 @@ pub mod cover;
 pub mod film;
 pub mod pace;
 pub mod rays;
+pub mod realtime;
 
 use crate::error::Result;
 

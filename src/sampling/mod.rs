@@ -1,9 +1,12 @@
 //! Where random numbers come from, and how they become directions.
 //!
 //! [`sobol`] draws points in integer arithmetic only: the shaders hold the same functions, and both sides give the same bits.
+//! [`sequence`] has what images of few samples and many frames draw.
 //! [`warp`] maps points of the unit square to disks, hemispheres and frames; `f32`, mirrored by the shaders line by line.
 
+pub mod sequence;
 pub mod sobol;
 pub mod warp;
 
+pub use sequence::Sequence;
 pub use sobol::{AO_DIRECTION, CAMERA_FILM, CAMERA_LENS, Sampler, to_unit};

@@ -10,11 +10,13 @@ use std::time::Instant;
 use glam::{DAffine3, DVec3, Vec3};
 use rayon::prelude::*;
 
+use super::compute::placed;
 use super::gpu_scene::rows;
 use super::{Structure, Tracer};
+use crate::bvh::Aabb;
 use crate::error::{Error, Result};
 use crate::scene::Geometry;
-use crate::scene::flatten::{FlatScene, Placement};
+use crate::scene::flatten::{FlatScene, Group, Part, Placement};
 
 /// New vertices of a mesh.
 #[derive(Clone, Copy, Debug)]
@@ -37,6 +39,15 @@ pub struct Changes<'a> {
     pub meshes: Vec<MeshChange<'a>>,
 }
 
+/// Something that moved or changed its shape in an update.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Moved {
+    /// Box around where it was and where it is, relative to the scene's origin.
+    pub bounds: Aabb,
+    /// The longest way that a point of it went, by half its diagonal: 1 and more where nothing of it is where it was.
+    pub share: f32,
+}
+
 /// What an update did.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
 pub struct UpdateStats {
@@ -50,13 +61,17 @@ pub struct UpdateStats {
     pub top_rebuilt: bool,
     /// Greatest SAH cost of a deformed mesh's tree over that at its build (compute tracer).
     pub growth: f64,
+    /// What is no longer where it was.
+    #[serde(skip)]
+    pub moved: Vec<Moved>,
 }
 
 /// A mesh that may deform.
 struct DeformingMesh {
     /// `None`: it is nowhere to be seen.
     group: Option<usize>,
-    vertices: usize,
+    /// Where its vertices are.
+    positions: Vec<Vec3>,
     normals: usize,
 }
 
@@ -64,6 +79,8 @@ struct DeformingMesh {
 pub(super) struct Dynamic {
     origin: DVec3,
     placements: Vec<Placement>,
+    /// Of each group, in its own space.
+    bounds: Vec<Aabb>,
     /// Entry of the top level for each instance that may move, where it has one.
     entries: HashMap<usize, Option<usize>>,
     meshes: HashMap<usize, DeformingMesh>,
@@ -80,11 +97,12 @@ impl Dynamic {
         let meshes = flat.motion.meshes.iter().filter_map(|&mesh| {
             let Geometry::Triangles(t) = &flat.scene.meshes[mesh].geometry else { return None };
             let group = group_of(flat, mesh);
-            Some((mesh, DeformingMesh { group, vertices: t.positions.len(), normals: t.normals.len() }))
+            Some((mesh, DeformingMesh { group, positions: t.positions.clone(), normals: t.normals.len() }))
         });
         Some(Self {
             origin: flat.origin,
             placements: flat.placements.clone(),
+            bounds: flat.groups.iter().map(|g| group_bounds(flat, g)).collect(),
             entries: flat.motion.instances.iter().map(|i| (*i, placed.get(i).copied())).collect(),
             meshes: meshes.collect(),
         })
@@ -104,7 +122,7 @@ impl Dynamic {
                     Err(Error::Scene(format!("mesh {m} has {there} {what}, {given} were given")))
                 }
             };
-            count("vertices", change.positions.len(), mesh.vertices)?;
+            count("vertices", change.positions.len(), mesh.positions.len())?;
             let bad = |v: &[Vec3]| v.par_iter().position_any(|p| !p.is_finite());
             if let Some(v) = bad(change.positions) {
                 return Err(Error::Scene(format!("vertex {v} of mesh {m} is not finite: {}", change.positions[v])));
@@ -134,9 +152,70 @@ impl Dynamic {
     }
 }
 
+/// Box of a group's primitives.
+fn group_bounds(flat: &FlatScene, group: &Group) -> Aabb {
+    let part = |part: &Part| {
+        let count = flat.scene.meshes[part.mesh].geometry.primitive_count();
+        (part.first_primitive..part.first_primitive + count)
+            .into_par_iter()
+            .with_min_len(4096)
+            .map(|k| flat.primitive_bounds(group, part, k))
+            .reduce(|| Aabb::EMPTY, |a, b| a.union(b))
+    };
+    group.parts.iter().map(part).fold(Aabb::EMPTY, |a, b| a.union(b))
+}
+
 /// The group of a mesh that was not baked.
 pub(super) fn group_of(flat: &FlatScene, mesh: usize) -> Option<usize> {
     flat.groups.iter().position(|g| matches!(g.parts.as_slice(), [p] if p.mesh == mesh))
+}
+
+impl Dynamic {
+    /// Takes what has changed, and says where that was and is. Entries whose transform or shape is what it was have not moved.
+    fn advance(&mut self, changes: &Changes, moved: &[(usize, DAffine3)]) -> Vec<Moved> {
+        // of a group's own points, by group
+        let mut ways: HashMap<usize, (Aabb, f32)> = HashMap::new();
+        for change in &changes.meshes {
+            let Some(mesh) = self.meshes.get_mut(&change.mesh) else { continue };
+            let Some(group) = mesh.group else { continue };
+            let (bounds, way) = mesh
+                .positions
+                .par_iter()
+                .zip(change.positions)
+                .with_min_len(4096)
+                .map(|(a, b)| (Aabb { min: *b, max: *b }, a.distance(*b)))
+                .reduce(|| (Aabb::EMPTY, 0.0), |a, b| (a.0.union(b.0), a.1.max(b.1)));
+            mesh.positions.copy_from_slice(change.positions);
+            let before = std::mem::replace(&mut self.bounds[group], bounds);
+            if way > 0.0 {
+                ways.insert(group, (before, way));
+            }
+        }
+        // of an entry that is named twice the last counts
+        let latest: HashMap<usize, DAffine3> = moved.iter().copied().collect();
+        let mut out = Vec::new();
+        for (k, p) in self.placements.iter_mut().enumerate() {
+            let (old, new) = (p.to_world, latest.get(&k).copied().unwrap_or(p.to_world));
+            let deformed = ways.get(&p.group).copied();
+            if old == new && deformed.is_none() {
+                continue;
+            }
+            p.to_world = new;
+            let now = self.bounds[p.group];
+            let (before, way) = deformed.unwrap_or((now, 0.0));
+            let (from, to) = (placed(&old, before), placed(&new, now));
+            let scale = new.matrix3.x_axis.length().max(new.matrix3.y_axis.length()).max(new.matrix3.z_axis.length());
+            let carried = corners(now).map(|c| old.transform_point3(c).distance(new.transform_point3(c))).fold(0.0, f64::max);
+            let half = 0.5 * (to.max - to.min).length().max(f32::MIN_POSITIVE);
+            out.push(Moved { bounds: from.union(to), share: (f64::from(way) * scale + carried) as f32 / half });
+        }
+        out
+    }
+}
+
+fn corners(b: Aabb) -> impl Iterator<Item = DVec3> {
+    let pick = move |k: usize, axis: usize| f64::from(if k >> axis & 1 == 0 { b.min[axis] } else { b.max[axis] });
+    (0..8).map(move |k| DVec3::new(pick(k, 0), pick(k, 1), pick(k, 2)))
 }
 
 impl Tracer {
@@ -154,6 +233,9 @@ impl Tracer {
         let moved = dynamic.check(changes)?;
         let mut stats = UpdateStats { growth: 1.0, ..Default::default() };
         let start = Instant::now();
+        let deforming = changes.meshes.iter().filter_map(|c| dynamic.meshes.get(&c.mesh)?.group).collect();
+        self.scene.begin_update(&dynamic.placements, moved.iter().map(|m| m.0).collect(), deforming)?;
+        stats.moved = dynamic.advance(changes, &moved);
         let mut deformed = false;
         for change in &changes.meshes {
             if let Some(normals) = change.normals {
@@ -176,9 +258,6 @@ impl Tracer {
             return Ok(stats);
         }
         let start = Instant::now();
-        for (entry, to_world) in &moved {
-            dynamic.placements[*entry].to_world = *to_world;
-        }
         let latest: Vec<_> = moved.iter().map(|m| (m.0, dynamic.placements[m.0].to_world)).collect();
         self.scene.set_transforms(&latest)?;
         match &mut self.structure {

@@ -7,10 +7,11 @@ use bytemuck::{Pod, Zeroable};
 use glam::{DAffine3, Vec3};
 
 use super::compute::Hierarchy;
+use super::motion::Motion;
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, Device, Memory};
 use crate::scene::features::alpha_cutoff;
-use crate::scene::flatten::{FlatScene, Group, Part};
+use crate::scene::flatten::{FlatScene, Group, Part, Placement};
 use crate::scene::{Filter, Geometry, Material, TriangleMesh, Wrap};
 
 /// What the passes will ask of the scene; the rest is not uploaded.
@@ -40,7 +41,7 @@ struct SceneRoot {
     reserved: u32,
     unfinished: u64,
     launch_counters: u64,
-    reserved2: u64,
+    motion: u64,
     bounds_min: [f32; 4],
     bounds_max: [f32; 4],
 }
@@ -124,6 +125,8 @@ pub struct GpuScene {
     attributes: Buffer,
     /// Where in `attributes` the normals of meshes that may deform lie.
     normals: Vec<(usize, u64)>,
+    /// Before the last update; `None` where nothing ever changes.
+    motion: Option<Motion>,
     others: Vec<Buffer>,
 }
 
@@ -212,8 +215,11 @@ impl GpuScene {
             Some((mesh, address - attributes.buffer.address()))
         };
         let normals = flat.motion.meshes.iter().filter_map(normals).collect();
+        let motion = Motion::new(device, flat, |group| groups[group].positions.size())?;
+        root.motion = motion.as_ref().map_or(0, Motion::address);
         let root_buffer = Buffer::from_slice(device, "scene root", &[root])?;
-        Ok(Self { root, root_buffer, instances, instance_buffer, groups, attributes: attributes.buffer, normals, others })
+        let attributes = attributes.buffer;
+        Ok(Self { root, root_buffer, instances, instance_buffer, groups, attributes, normals, motion, others })
     }
 
     /// Where shaders begin.
@@ -226,6 +232,15 @@ impl GpuScene {
         let groups = self.groups.iter().flat_map(|g| [Some(&g.positions), g.indices.as_ref(), g.part_of.as_ref()]).flatten();
         let others = self.others.iter().chain([&self.attributes, &self.instance_buffer]);
         groups.chain(others).map(Buffer::size).sum::<u64>()
+    }
+
+    /// Before an update that moves these entries of the top level, now at `placements`, and deforms these groups.
+    pub(super) fn begin_update(&mut self, placements: &[Placement], moving: Vec<usize>, deforming: Vec<usize>) -> Result<()> {
+        let groups = &self.groups;
+        match &mut self.motion {
+            Some(motion) => motion.begin(placements, |g| &groups[g].positions, moving, deforming),
+            None => Ok(()),
+        }
     }
 
     /// Vertices of a mesh that is a group of its own have moved.

@@ -11,6 +11,7 @@ mod dynamic_trees;
 pub mod gpu_scene;
 mod hardware;
 mod kernel;
+mod motion;
 mod prepared;
 pub mod queue;
 mod reference;
@@ -21,7 +22,7 @@ mod wide;
 use std::sync::{Arc, OnceLock};
 use std::time::Instant;
 
-pub use dynamic::{Changes, MeshChange, UpdateStats};
+pub use dynamic::{Changes, MeshChange, Moved, UpdateStats};
 pub use gpu_scene::Needs;
 pub use kernel::{BuildOptions, ComputeOptions, Kernel, TriangleTest};
 pub use stream::{Push, Stream, StreamShaders};
@@ -250,6 +251,11 @@ impl Tracer {
     /// What the scene needs.
     pub fn features(&self) -> SceneFeatures {
         self.features
+    }
+
+    /// May its scene change ([`Tracer::update`])?
+    pub fn is_dynamic(&self) -> bool {
+        self.dynamic.is_some()
     }
 
     /// What making it took.

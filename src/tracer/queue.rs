@@ -55,6 +55,11 @@ impl RayQueue {
         recorder.fill(&self.count, 4, 0);
     }
 
+    /// A `u32`: how many rays it holds.
+    pub fn count(&self) -> &Buffer {
+        &self.count
+    }
+
     /// `push` for a stream that traces what is queued, `most` rays at most. Whoever fills the queue appends no more than
     /// `most`, so that there is room.
     pub fn push(&self, push: Push, most: u32) -> Push {

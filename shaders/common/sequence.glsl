@@ -1,0 +1,51 @@
+// Where the directions of occlusion rays come from, frame after frame: the same functions, bit for bit, as src/sampling/sequence.rs,
+// which cites the papers.
+#ifndef COMMON_SEQUENCE
+#define COMMON_SEQUENCE
+#include "common/sampler.glsl"
+
+const uint SEQUENCE_WHITE = 0u;
+const uint SEQUENCE_STRATIFIED = 1u;
+const uint SEQUENCE_SOBOL = 2u;
+const uint SEQUENCE_BLUE = 3u;
+const uint SEQUENCE_R2 = 4u;
+
+// 2^32 / g and 2^32 / g^2, g = 1.3247... the plastic number
+const uvec2 R2_STEP = uvec2(3242174889u, 2447445414u);
+
+uint spread_bits(uint x) {
+    x &= 0xffffu;
+    x = (x | x << 8) & 0x00ff00ffu;
+    x = (x | x << 4) & 0x0f0f0f0fu;
+    x = (x | x << 2) & 0x33333333u;
+    return (x | x << 1) & 0x55555555u;
+}
+
+uint morton(uvec2 pixel) {
+    return spread_bits(pixel.x) | spread_bits(pixel.y) << 1;
+}
+
+// Sample `index` of `count` that a pixel takes in a frame, as fractions of 2^32.
+uvec2 sequence_bits(uint sequence, uint seed, uvec2 pixel, uint frame, uint index, uint count) {
+    uint n = frame * count + index;
+    if (sequence == SEQUENCE_SOBOL) return sample_2d_bits(seed, pixel, n, AO_DIRECTION);
+    if (sequence == SEQUENCE_BLUE) {
+        seed = hash_combine(seed, AO_DIRECTION);
+        uvec2 p = sobol_2d(owen_scramble(morton(pixel), seed) * count + index);
+        p = uvec2(owen_scramble(p.x, hash_combine(seed, 0u)), owen_scramble(p.y, hash_combine(seed, 1u)));
+        return p + frame * R2_STEP;
+    }
+    seed = hash_combine(hash_combine(hash_combine(seed, pixel.x), pixel.y), AO_DIRECTION);
+    if (sequence == SEQUENCE_R2) return uvec2(hash_combine(seed, 0u), hash_combine(seed, 1u)) + n * R2_STEP;
+    uvec2 random = uvec2(hash_combine(seed, 2u * n), hash_combine(seed, 2u * n + 1u));
+    if (sequence == SEQUENCE_WHITE) return random;
+    // sixteen samples in a row visit each cell of a grid of four by four once
+    uint cell = owen_scramble(n << 28, hash_combine(seed, n >> 4)) >> 28;
+    return uvec2(cell & 3u, cell >> 2) << 30 | random >> 2;
+}
+
+vec2 sequence_2d(uint sequence, uint seed, uvec2 pixel, uint frame, uint index, uint count) {
+    return vec2(sequence_bits(sequence, seed, pixel, frame, index, count) >> 8) * (1.0 / 16777216.0);
+}
+
+#endif

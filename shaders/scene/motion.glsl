@@ -1,0 +1,34 @@
+// Where surfaces were in the previous frame. Mirrors src/tracer/motion.rs.
+#ifndef SCENE_MOTION
+#define SCENE_MOTION
+#include "scene/surface.glsl"
+
+// For each entry of the top level.
+struct MotionRecord {
+    vec4 previous_group_to_world[3];
+    uvec2 previous_positions;  // of the group's vertices; null: as they are
+    uvec2 motion_reserved;
+};
+layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer MotionRecords { MotionRecord v[]; };
+
+// World position, in the previous frame, of the point of the surface that `hit` is.
+vec3 previous_position(Hit hit, Surface s) {
+    SceneRoot root = SceneRoot(push.scene);
+    if (is_null(root.motion)) return s.position;
+    uvec2 placement = Pairs(root.placements).v[hit.instance];
+    InstanceRecord instance = InstanceRecords(root.instances).v[placement.x];
+    MotionRecord motion = MotionRecords(root.motion).v[placement.x];
+    vec3 p;
+    if (is_null(motion.previous_positions)) {
+        p = transform_point(instance.world_to_group, s.position);
+    } else {
+        uvec3 corners = triangle_indices(PartRecords(root.parts).v[placement.y], s.primitive);
+        vec3 v0 = load_vec3(motion.previous_positions, corners.x);
+        vec3 v1 = load_vec3(motion.previous_positions, corners.y);
+        vec3 v2 = load_vec3(motion.previous_positions, corners.z);
+        p = v0 + (s.uv.x * (v1 - v0) + s.uv.y * (v2 - v0));
+    }
+    return transform_point(motion.previous_group_to_world, p);
+}
+
+#endif

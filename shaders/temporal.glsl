@@ -1,0 +1,166 @@
+// temporal: what earlier frames know of a pixel's surface, and this frame's samples added to it.
+//
+// The surface's point is looked up where it was in the previous image; of the four pixels around, those count that show the same
+// surface (distance from its plane, normal, id). A history counts its samples, and a new one weighs by that count, up to a limit
+// (Nehab et al., "Accelerating Real-Time Shading with Reverse Reprojection Caching", 2007). Occlusion is of the world, so a moving
+// camera makes no history wrong; what moves does, near it and by no more than it covers of the hemisphere: so much is taken to be
+// the variance that a frame adds (a Kalman filter's process noise), and where it counts the history is also held to what this frame's
+// samples around say (Karis, "High-Quality Temporal Supersampling", 2014, with the standard error of their mean for a width).
+// compute
+#include "common/frame.glsl"
+
+layout(local_size_x = LANES) in;
+
+// Samples' variance is at least this where it is not known yet: a handful of equal ones say little.
+const float LEAST_VARIANCE = 0.02;
+// Half side of the neighbourhood that a history is held to, pixels.
+const int CLAMP_RADIUS = 3;
+
+// What moved, or changed its shape: box around where it was and where it is.
+struct MovedRecord {
+    vec3 lower;
+    float share;  // of what it covers that may have changed in this frame: the way it went by its size, at most 1
+    vec3 upper;
+    float moved_reserved;
+};
+layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer MovedRecords { MovedRecord v[]; };
+
+// By how much the accessibility of a point may have changed in this frame: the share of the cosine-weighted hemisphere that balls around what
+// moved cover.
+float possible_change(FrameParams f, vec3 position, vec3 normal) {
+    float change = 0.0;
+    MovedRecords moved = MovedRecords(f.moved);
+    for (uint k = 0u; k < f.moved_count; k++) {
+        MovedRecord m = moved.v[k];
+        vec3 nearest = clamp(position, m.lower, m.upper) - position;
+        float gap2 = dot(nearest, nearest);
+        if (gap2 > f.reach * f.reach) continue;
+        vec3 to = 0.5 * (m.lower + m.upper) - position;
+        float radius = 0.5 * length(m.upper - m.lower);
+        float far2 = dot(to, to);
+        // below the horizon altogether
+        if (dot(normal, to) < -radius) continue;
+        float cover = min(radius * radius / max(far2, 1e-30), 1.0);
+        if (gap2 == 0.0) cover = 1.0;
+        change += m.share * cover * exp2(-sqrt(gap2) * f.falloff_log2);
+    }
+    return min(change, 1.0);
+}
+
+// Mean of this frame's samples over the pixels around that show the same surface; variance: of that mean.
+Estimate surroundings(FrameParams f, ivec2 pixel, Plane plane) {
+    float sum = 0.0, squares = 0.0, n = 0.0;
+    bool orthographic = f.orthographic != 0u;
+    for (int y = -CLAMP_RADIUS; y <= CLAMP_RADIUS; y++) {
+        for (int x = -CLAMP_RADIUS; x <= CLAMP_RADIUS; x++) {
+            ivec2 q = pixel + ivec2(x, y);
+            if (any(lessThan(q, ivec2(0))) || any(greaterThanEqual(q, ivec2(f.size)))) continue;
+            uint at = image_index(f, uvec2(q));
+            Estimate e = unpack_estimate(Pairs(f.current).v[at]);
+            if (e.samples == 0.0) continue;
+            if (!same_surface(plane, orthographic, image_plane(f, f.view, vec2(q) + 0.5), Pairs(f.guide).v[at], f.normal_tolerance)) continue;
+            sum += e.mean * e.samples;
+            squares += e.mean * e.mean * e.samples;
+            n += e.samples;
+        }
+    }
+    if (n == 0.0) return Estimate(0.0, 0.0, 0.0);
+    float mean = sum / n;
+    return Estimate(mean, n, (max(squares / n - mean * mean, 0.0) + LEAST_VARIANCE) / n);
+}
+
+Plane plane_at(FrameParams f, vec4 world_to_camera[3], vec2 view, bool orthographic, vec3 position, vec3 normal) {
+    Plane p;
+    vec3 c = affine(world_to_camera, position);
+    p.normal = linear(world_to_camera, normal);
+    p.distance = dot(p.normal, c);
+    p.tolerance = f.depth_tolerance * footprint(f, view, orthographic, -c.z);
+    p.world_normal = normal;
+    return p;
+}
+
+// The history of a surface's point; no samples: there is none.
+Estimate reprojected(FrameParams f, vec3 before, vec3 normal, uint id) {
+    Estimate none = Estimate(0.0, 0.0, 0.0);
+    vec3 c = affine(f.previous_world_to_camera, before);
+    bool orthographic = f.previous_orthographic != 0u;
+    if (!orthographic && !(c.z < 0.0)) return none;
+    vec2 at = image_point(f, f.previous_view, orthographic ? c.xy : c.xy / -c.z) - 0.5;
+    // also what is not a number
+    if (!(all(greaterThan(at, vec2(-1.0))) && all(lessThan(at, vec2(f.size))))) return none;
+    Plane plane = plane_at(f, f.previous_world_to_camera, f.previous_view, orthographic, before, normal);
+    ivec2 base = ivec2(floor(at));
+    vec2 inside = at - vec2(base);
+    // a pixel that was hit in its middle is taken alone: nothing blurs while nothing moves
+    inside = mix(inside, round(inside), lessThan(abs(inside - round(inside)), vec2(1e-3)));
+    float weight = 0.0, mean = 0.0, samples = 0.0, variance = 0.0;
+    for (int k = 0; k < 4; k++) {
+        ivec2 offset = ivec2(k & 1, k >> 1);
+        ivec2 q = base + offset;
+        vec2 w2 = mix(1.0 - inside, inside, vec2(offset));
+        float w = w2.x * w2.y;
+        if (w == 0.0 || any(lessThan(q, ivec2(0))) || any(greaterThanEqual(q, ivec2(f.size)))) continue;
+        uint tap = image_index(f, uvec2(q));
+        uvec2 guide = Pairs(f.previous_guide).v[tap];
+        if (guide.y >> 24 != id) continue;
+        if (!same_surface(plane, orthographic, image_plane(f, f.previous_view, vec2(q) + 0.5), guide, f.normal_tolerance)) continue;
+        Estimate e = unpack_estimate(Pairs(f.previous_history).v[tap]);
+        if (!(e.samples > 0.0)) continue;
+        weight += w;
+        mean += w * e.mean;
+        samples += w * e.samples;
+        variance += w * e.variance;
+    }
+    // less than a hundredth of the footprint was seen
+    if (weight < 0.01) return none;
+    return Estimate(mean / weight, samples / weight, variance / weight);
+}
+
+void main() {
+    uint at = push.first + gl_GlobalInvocationID.x;
+    if (gl_GlobalInvocationID.x >= push.count) return;
+    FrameParams f = FrameParams(push.pass);
+    uvec2 guide = Pairs(f.guide).v[at];
+    if (!is_surface(guide)) {
+        STORE_PAIR(f.history, at, uvec2(0u));
+        return;
+    }
+    Estimate now = unpack_estimate(Pairs(f.current).v[at]);
+    // what is not a number never enters a history
+    if (!(now.mean >= 0.0 && now.mean <= 1.0)) now = Estimate(0.0, 0.0, 0.0);
+    Estimate past = Estimate(0.0, 0.0, 0.0);
+    if (f.has_history != 0u) {
+        if (f.still != 0u) {
+            past = unpack_estimate(Pairs(f.previous_history).v[at]);
+        } else {
+            vec3 position = uintBitsToFloat(Quads(f.surface).v[2u * at].xyz);
+            vec3 normal = uintBitsToFloat(Quads(f.surface).v[2u * at + 1u].xyz);
+            vec3 before = is_null(f.previous_position) ? position : load_vec3(f.previous_position, at);
+            past = reprojected(f, before, normal, guide.y >> 24);
+            float change = f.moved_count > 0u && past.samples > 0.0 ? f.moved_weight * possible_change(f, position, normal) : 0.0;
+            if (change > 0.0) {
+                past.samples /= 1.0 + past.samples * change * change / max(past.variance, LEAST_VARIANCE);
+                if (f.clamp_width > 0.0) {
+                    uvec2 pixel = uvec2(at % f.size.x, at / f.size.x);
+                    Plane plane = plane_at(f, f.world_to_camera, f.view, f.orthographic != 0u, position, normal);
+                    Estimate around = surroundings(f, ivec2(pixel), plane);
+                    if (around.samples > 0.0) {
+                        float width = f.clamp_width * sqrt(around.variance);
+                        past.mean = clamp(past.mean, around.mean - width, around.mean + width);
+                    }
+                }
+            }
+        }
+    }
+    past.samples = min(past.samples, max(f.most_samples - now.samples, 0.0));
+    float total = past.samples + now.samples;
+    Estimate e = Estimate(0.0, total, 0.0);
+    if (total > 0.0) {
+        float share = now.samples / total;
+        float difference = now.mean - past.mean;
+        e.mean = past.mean + share * difference;
+        // of all samples about their common mean
+        e.variance = mix(past.variance, now.variance, share) + share * (1.0 - share) * difference * difference;
+    }
+    STORE_PAIR(f.history, at, pack_estimate(e));
+}

@@ -1,0 +1,207 @@
+//! How the frames of a real-time renderer are made, and the presets that people choose from.
+
+use crate::error::{Error, Result};
+use crate::render::ao::{FALLOFF_CUTOFF, Hemisphere};
+use crate::sampling::Sequence;
+
+/// Which pixels are sampled in a frame.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Resolution {
+    /// All of them.
+    #[default]
+    Full,
+    /// Every second one, like the fields of a chessboard, the others in the next frame.
+    Checkerboard,
+    /// One of four (half the resolution per axis), another in each of four frames.
+    Half,
+}
+
+impl Resolution {
+    /// All of them.
+    pub const ALL: [Resolution; 3] = [Resolution::Full, Resolution::Checkerboard, Resolution::Half];
+
+    /// As on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Resolution::Full => "full",
+            Resolution::Checkerboard => "checkerboard",
+            Resolution::Half => "half",
+        }
+    }
+
+    /// Frames after which every pixel was sampled.
+    pub fn period(self) -> u32 {
+        1 << self as u32
+    }
+}
+
+/// How the pixels of a frame are averaged.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum FilterKind {
+    /// Not at all.
+    None,
+    /// A box, its radius by how many samples there are.
+    #[default]
+    Box,
+}
+
+impl FilterKind {
+    /// All of them.
+    pub const ALL: [FilterKind; 2] = [FilterKind::None, FilterKind::Box];
+
+    /// As on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            FilterKind::None => "none",
+            FilterKind::Box => "box",
+        }
+    }
+}
+
+/// How frames are filtered.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct Filter {
+    /// How.
+    pub kind: FilterKind,
+    /// Pixels; the box grows no further.
+    pub radius: u32,
+    /// Samples that a filtered pixel should rest on: the box grows until it holds so many.
+    pub samples: f32,
+}
+
+/// How frames are made.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct Settings {
+    /// Rays of a pixel that is sampled in a frame; 1 to [`Settings::MOST_RAYS`].
+    pub rays_per_pixel: u32,
+    /// Which pixels are.
+    pub resolution: Resolution,
+    /// Where their directions come from.
+    pub sequence: Sequence,
+    /// Of the sequence.
+    pub seed: u32,
+    /// World units beyond which nothing occludes; infinite for no limit.
+    pub radius: f64,
+    /// c: a hit at distance d counts c^-d; 1 counts every hit alike.
+    pub falloff: f64,
+    /// Axis of the hemisphere.
+    #[serde(skip)]
+    pub hemisphere: Hemisphere,
+    /// Frames that a history counts at most; 1: none is kept.
+    pub history: u32,
+    /// Pixels with a full history get no more rays while nothing moves.
+    pub rest: bool,
+    /// Where things move: standard errors by which a history may differ from its surroundings; 0: by any.
+    pub clamp: f32,
+    /// Where things move: how much that shortens histories; 0: not.
+    pub moved_weight: f32,
+    /// Over pixels.
+    pub filter: Filter,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Preset::Balanced.settings()
+    }
+}
+
+impl Settings {
+    /// Rays of a pixel in a frame at most.
+    pub const MOST_RAYS: u32 = 4096;
+    /// Samples that a history counts at most: as many as half floats count one by one.
+    pub const MOST_SAMPLES: u32 = 2048;
+
+    /// Hits beyond this distance change nothing that can be seen: the radius, or where the falloff has faded.
+    pub fn reach(&self) -> f64 {
+        if self.falloff > 1.0 { self.radius.min(-FALLOFF_CUTOFF.ln() / self.falloff.ln()) } else { self.radius }
+    }
+
+    /// Does any hit do, or has the nearest one to be found?
+    pub fn binary(&self) -> bool {
+        self.falloff <= 1.0
+    }
+
+    /// Samples that a history counts at most.
+    pub fn most_samples(&self) -> u32 {
+        (self.history.saturating_mul(self.rays_per_pixel)).min(Self::MOST_SAMPLES).max(self.rays_per_pixel)
+    }
+
+    /// Are the numbers in their ranges?
+    ///
+    /// # Errors
+    /// [`Error::Usage`], naming the first that is not.
+    pub fn check(&self) -> Result<()> {
+        let wrong = |what: &str| Err(Error::Usage(what.to_owned()));
+        if !(1..=Self::MOST_RAYS).contains(&self.rays_per_pixel) {
+            return wrong(&format!("rays per pixel must be 1 to {}", Self::MOST_RAYS));
+        }
+        if self.history == 0 {
+            return wrong("a history of 0 frames: 1 keeps none");
+        }
+        let good = self.radius > 0.0 && self.falloff >= 1.0 && self.falloff.is_finite();
+        if !good {
+            return wrong("the radius must be above 0, and the falloff at least 1 (1 = binary) and finite");
+        }
+        if !(self.clamp >= 0.0 && self.moved_weight >= 0.0 && self.filter.samples >= 0.0) {
+            return wrong("clamp, weight of motion and samples of the filter must not be negative");
+        }
+        Ok(())
+    }
+}
+
+/// Settings by name.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Preset {
+    /// As fast as it goes.
+    Fast,
+    /// Little error for little time.
+    #[default]
+    Balanced,
+    /// Less error.
+    Quality,
+}
+
+impl Preset {
+    /// All of them.
+    pub const ALL: [Preset; 3] = [Preset::Fast, Preset::Balanced, Preset::Quality];
+
+    /// As on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Preset::Fast => "fast",
+            Preset::Balanced => "balanced",
+            Preset::Quality => "quality",
+        }
+    }
+
+    /// What it stands for.
+    pub fn settings(self) -> Settings {
+        let common = Settings {
+            rays_per_pixel: 1,
+            resolution: Resolution::Full,
+            sequence: Sequence::Blue,
+            seed: 0,
+            radius: f64::INFINITY,
+            falloff: 1.0,
+            hemisphere: Hemisphere::Geometric,
+            history: 32,
+            rest: true,
+            clamp: 2.0,
+            moved_weight: 4.0,
+            filter: Filter { kind: FilterKind::Box, radius: 3, samples: 256.0 },
+        };
+        match self {
+            Preset::Fast => Settings { filter: Filter { radius: 2, ..common.filter }, ..common },
+            Preset::Balanced => Settings { history: 64, ..common },
+            Preset::Quality => Settings {
+                rays_per_pixel: 4,
+                history: 128,
+                filter: Filter { radius: 4, samples: 1024.0, ..common.filter },
+                ..common
+            },
+        }
+    }
+}

@@ -1,0 +1,158 @@
+//! Sequences for images that are made frame after frame, with few samples in each: where the error lies in the image, and how it
+//! changes from frame to frame, decides what a filter over pixels and frames leaves of it.
+//!
+//! Integer arithmetic, mirrored bit for bit by shaders/common/sequence.glsl.
+
+use super::sobol::{AO_DIRECTION, Sampler, hash_combine, owen_scramble, sobol_2d, to_unit};
+
+/// A sequence of points in the unit square, for each pixel and frame.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Sequence {
+    /// Independent random numbers.
+    White,
+    /// Sixteen samples in a row, over pixels' frames, visit each cell of a 4 x 4 grid once.
+    Stratified,
+    /// Each pixel has an Owen-scrambled Sobol sequence of its own, which frames continue (Burley 2020).
+    Sobol,
+    /// One Owen-scrambled Sobol sequence over the image, in the order of a shuffled Morton curve: what an aligned square of pixels
+    /// draws is a net, so that filtering it leaves little error (Ahmed and Wonka, "Screen-Space Blue-Noise Diffusion of Monte Carlo
+    /// Sampling Error via Hierarchical Ordering of Pixels", ACM TOG 39(6), 2020). From frame to frame all points are shifted by
+    /// Roberts' R2 sequence.
+    #[default]
+    Blue,
+    /// Each pixel shifts Roberts' R2 sequence at random: "The Unreasonable Effectiveness of Quasirandom Sequences", 2018.
+    R2,
+}
+
+/// 2^32 / g and 2^32 / g^2, where g^3 = g + 1.
+const R2_STEP: [u32; 2] = [3_242_174_889, 2_447_445_414];
+
+impl Sequence {
+    /// All of them.
+    pub const ALL: [Sequence; 5] = [Sequence::White, Sequence::Stratified, Sequence::Sobol, Sequence::Blue, Sequence::R2];
+
+    /// As on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Sequence::White => "white",
+            Sequence::Stratified => "stratified",
+            Sequence::Sobol => "sobol",
+            Sequence::Blue => "blue",
+            Sequence::R2 => "r2",
+        }
+    }
+
+    /// Sample `index` of the `count` that `pixel` takes in a frame, as fractions of 2^32. What frames draw continues.
+    pub fn get_2d(self, seed: u32, pixel: [u32; 2], frame: u32, index: u32, count: u32) -> [u32; 2] {
+        let n = frame.wrapping_mul(count).wrapping_add(index);
+        let step = |p: [u32; 2], n: u32| std::array::from_fn(|k| p[k].wrapping_add(n.wrapping_mul(R2_STEP[k])));
+        match self {
+            Sequence::Sobol => return Sampler { seed }.get_2d(pixel, n, AO_DIRECTION),
+            Sequence::Blue => {
+                let seed = hash_combine(seed, AO_DIRECTION);
+                let [x, y] = sobol_2d(owen_scramble(morton(pixel), seed).wrapping_mul(count).wrapping_add(index));
+                let p = [owen_scramble(x, hash_combine(seed, 0)), owen_scramble(y, hash_combine(seed, 1))];
+                return step(p, frame);
+            }
+            Sequence::White | Sequence::Stratified | Sequence::R2 => (),
+        }
+        let seed = hash_combine(hash_combine(hash_combine(seed, pixel[0]), pixel[1]), AO_DIRECTION);
+        if self == Sequence::R2 {
+            return step([hash_combine(seed, 0), hash_combine(seed, 1)], n);
+        }
+        let random = [n.wrapping_mul(2), n.wrapping_mul(2).wrapping_add(1)].map(|v| hash_combine(seed, v));
+        if self == Sequence::White {
+            return random;
+        }
+        let cell = owen_scramble(n << 28, hash_combine(seed, n >> 4)) >> 28;
+        [(cell & 3) << 30 | random[0] >> 2, (cell >> 2) << 30 | random[1] >> 2]
+    }
+
+    /// [`Sequence::get_2d`] as fractions in [0, 1).
+    pub fn get_2d_unit(self, seed: u32, pixel: [u32; 2], frame: u32, index: u32, count: u32) -> [f32; 2] {
+        self.get_2d(seed, pixel, frame, index, count).map(to_unit)
+    }
+}
+
+/// Interleaves the lower 16 bits of the coordinates: pixels of aligned squares of 2^k follow each other.
+pub fn morton(pixel: [u32; 2]) -> u32 {
+    let spread = |x: u32| {
+        let x = x & 0xffff;
+        let x = (x | x << 8) & 0x00ff_00ff;
+        let x = (x | x << 4) & 0x0f0f_0f0f;
+        let x = (x | x << 2) & 0x3333_3333;
+        (x | x << 1) & 0x5555_5555
+    };
+    spread(pixel[0]) | spread(pixel[1]) << 1
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Points of a set, by cell of a grid of `n` x `n`.
+    fn counts(points: impl Iterator<Item = [u32; 2]>, n: u64) -> Vec<u32> {
+        let mut out = vec![0; (n * n) as usize];
+        for [x, y] in points {
+            let at = |v: u32| (u64::from(v) * n) >> 32;
+            out[(at(y) * n + at(x)) as usize] += 1;
+        }
+        out
+    }
+
+    #[test]
+    fn each_sequence_stratifies_what_it_says() {
+        let ones = vec![1; 16];
+        for pixel in [[3, 5], [100, 7]] {
+            for first in [0, 2] {
+                let frames = |s: Sequence| (first * 16..first * 16 + 16).map(move |f| s.get_2d(9, pixel, f, 0, 1));
+                assert_eq!(counts(frames(Sequence::Stratified), 4), ones);
+                assert_eq!(counts(frames(Sequence::Sobol), 4), ones);
+                // four samples of four frames, likewise
+                let four = (0..16).map(|k| Sequence::Stratified.get_2d(9, pixel, 4 * first + k / 4, k % 4, 4));
+                assert_eq!(counts(four, 4), ones);
+            }
+        }
+        // an aligned square of four by four pixels, in the first frame; later ones are shifted and stay as even
+        for corner in [[0, 0], [8, 4], [640, 352]] {
+            let square =
+                |frame| (0..16u32).map(move |k| Sequence::Blue.get_2d(1, [corner[0] + k % 4, corner[1] + k / 4], frame, 0, 1));
+            assert_eq!(counts(square(0), 4), ones);
+            let first: Vec<_> = square(0).collect();
+            for (a, b) in first.iter().zip(square(7)) {
+                assert_eq!([0, 1].map(|k| b[k].wrapping_sub(a[k])), [0, 1].map(|k| 7u32.wrapping_mul(R2_STEP[k])));
+            }
+        }
+    }
+
+    #[test]
+    fn the_steps_are_powers_of_the_plastic_number() {
+        let g = 1.324_717_957_244_746_f64;
+        assert!((g * g * g - g - 1.0).abs() < 1e-14);
+        for (k, step) in R2_STEP.into_iter().enumerate() {
+            let exact = 2f64.powi(32) / g.powi(k as i32 + 1);
+            assert!((f64::from(step) - exact).abs() < 1.0, "{step} {exact}");
+        }
+    }
+
+    #[test]
+    fn means_are_right() {
+        for s in Sequence::ALL {
+            let mut sum = [0.0f64; 2];
+            let n = 40 * 40 * 8;
+            for k in 0..n {
+                let p = s.get_2d_unit(5, [k % 40, k / 40 % 40], k / 1600, 0, 1);
+                (0..2).for_each(|i| sum[i] += f64::from(p[i]));
+            }
+            // random numbers would be 0.0026 off
+            assert!(sum.iter().all(|x| (x / f64::from(n) - 0.5).abs() < 0.01), "{s:?} {sum:?}");
+        }
+    }
+
+    #[test]
+    fn morton_keeps_squares_together() {
+        assert_eq!([[0, 0], [1, 0], [0, 1], [1, 1], [2, 0]].map(morton), [0, 1, 2, 3, 4]);
+        assert_eq!(morton([0xffff, 0xffff]), u32::MAX);
+    }
+}

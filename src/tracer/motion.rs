@@ -1,0 +1,90 @@
+//! Where what changes was before the last update, in device memory: surfaces are looked up there in the previous frame. Mirrors
+//! shaders/scene/motion.glsl. Scenes that never change have nothing of it.
+
+use std::sync::Arc;
+
+use bytemuck::{Pod, Zeroable};
+
+use super::dynamic::group_of;
+use super::gpu_scene::rows;
+use crate::error::Result;
+use crate::gpu::{Buffer, Device, Memory};
+use crate::scene::flatten::{FlatScene, Placement};
+
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+struct MotionRecord {
+    previous_group_to_world: [[f32; 4]; 3],
+    previous_positions: u64,
+    reserved: u64,
+}
+
+/// The scene as it was before the last update.
+pub(super) struct Motion {
+    records: Vec<MotionRecord>,
+    buffer: Buffer,
+    /// Of each group that may deform: its vertices.
+    previous: Vec<Option<Buffer>>,
+    /// Entries and groups that the last update changed.
+    moved: Vec<usize>,
+    deformed: Vec<usize>,
+}
+
+impl Motion {
+    /// Nothing has changed yet. `None` for a scene that never does.
+    pub fn new(device: &Arc<Device>, flat: &FlatScene, positions: impl Fn(usize) -> u64) -> Result<Option<Self>> {
+        if flat.motion.is_none() {
+            return Ok(None);
+        }
+        let mut previous: Vec<Option<Buffer>> = flat.groups.iter().map(|_| None).collect();
+        let deforming: Vec<usize> = flat.motion.meshes.iter().filter_map(|&m| group_of(flat, m)).collect();
+        for &group in &deforming {
+            previous[group] = Some(Buffer::new(device, "previous vertices", positions(group), Memory::Device)?);
+        }
+        let records: Vec<_> = flat
+            .placements
+            .iter()
+            .map(|p| MotionRecord {
+                previous_group_to_world: rows(&p.to_world),
+                previous_positions: previous[p.group].as_ref().map_or(0, Buffer::address),
+                reserved: 0,
+            })
+            .collect();
+        let buffer = Buffer::from_slice(device, "motion records", &records)?;
+        // their vertices are not there yet
+        Ok(Some(Self { records, buffer, previous, moved: Vec::new(), deformed: deforming }))
+    }
+
+    /// Where shaders find it.
+    pub fn address(&self) -> u64 {
+        self.buffer.address()
+    }
+
+    /// Before an update that moves these entries and deforms these groups: what is, becomes what was.
+    pub fn begin<'a>(
+        &mut self,
+        placements: &[Placement],
+        positions: impl Fn(usize) -> &'a Buffer,
+        moving: Vec<usize>,
+        deforming: Vec<usize>,
+    ) -> Result<()> {
+        let (moved, deformed) = (std::mem::replace(&mut self.moved, moving), std::mem::replace(&mut self.deformed, deforming));
+        let mut changed = false;
+        for &k in moved.iter().chain(&self.moved) {
+            self.records[k].previous_group_to_world = rows(&placements[k].to_world);
+            changed = true;
+        }
+        if changed {
+            self.buffer.write(0, bytemuck::cast_slice(&self.records))?;
+        }
+        let mut groups: Vec<usize> = deformed.iter().chain(&self.deformed).copied().collect();
+        groups.sort_unstable();
+        groups.dedup();
+        for group in groups {
+            if let Some(previous) = &mut self.previous[group] {
+                previous.copy_from(positions(group))?;
+            }
+        }
+        Ok(())
+    }
+}
