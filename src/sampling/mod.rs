@@ -2,11 +2,14 @@
 //!
 //! [`sobol`] draws points in integer arithmetic only: the shaders hold the same functions, and both sides give the same bits.
 //! [`sequence`] has what images of few samples and many frames draw.
+//! [`best_candidates`] and [`blue_noise`] make the tables of the reference work.
 //! [`warp`] maps points of the unit square to disks, hemispheres and frames; `f32`, mirrored by the shaders line by line.
 
 pub mod sequence;
 pub mod sobol;
+mod tables;
 pub mod warp;
 
 pub use sequence::Sequence;
 pub use sobol::{AO_DIRECTION, CAMERA_FILM, CAMERA_LENS, Sampler, to_unit};
+pub use tables::{best_candidates, blue_noise};

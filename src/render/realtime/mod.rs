@@ -5,6 +5,7 @@
 //! frames know of the same surface; `filter` averages over neighbours. What nothing has changed since the previous frame is not
 //! done again: while neither the camera nor the scene moves there are no camera rays, and pixels with a full history rest.
 
+mod larsen;
 mod params;
 pub mod settings;
 
@@ -19,8 +20,9 @@ use crate::tracer::gpu_scene::rows;
 use crate::tracer::queue::RayQueue;
 use crate::tracer::stream::{LANES, LAUNCH_RAYS, StreamShaders};
 use crate::tracer::{Moved, Push, Stream, Tracer, stream};
+use larsen::Larsen;
 use params::{FrameParams, MOST_MOVED, MovedRecord};
-pub use settings::{Filter, FilterKind, Preset, Resolution, Settings};
+pub use settings::{Filter, FilterKind, Preset, Resolution, Settings, Technique};
 
 /// Rays that a launch holds at most; an image of more is made in several.
 const MOST_QUEUED: u32 = 1 << 22;
@@ -48,6 +50,7 @@ pub struct Realtime {
     settings: Settings,
     passes: Passes,
     images: Images,
+    larsen: Option<Box<Larsen>>,
     commands: Commands,
     /// Pixels of a launch of the occlusion passes.
     chunk: u32,
@@ -59,6 +62,7 @@ struct Passes {
     accessibility: Stream,
     spawn: ComputePipeline,
     gather: ComputePipeline,
+    gtao: ComputePipeline,
     temporal: ComputePipeline,
     filter: ComputePipeline,
 }
@@ -98,11 +102,12 @@ impl Realtime {
         [&stream::GBUFFER_CLOSEST, if settings.binary() { &stream::ACCESSIBILITY_ANY } else { &stream::ACCESSIBILITY_CLOSEST }]
     }
 
-    /// For images of `size` pixels of the tracer's scene.
+    /// For images of `size` pixels of the tracer's scene. `lights` are the positions of its point lights, relative to its origin: the
+    /// reference work's pipeline asks for them.
     ///
     /// # Errors
     /// [`Error::Usage`] for settings out of range, [`Error::OutOfMemory`], and those of compiling shaders.
-    pub fn new(tracer: &Tracer, size: [u32; 2], settings: &Settings) -> Result<Self> {
+    pub fn new(tracer: &Tracer, size: [u32; 2], settings: &Settings, lights: &[[f32; 3]]) -> Result<Self> {
         settings.check()?;
         let device = tracer.device();
         // whole tiles, so that a pixel's samples are in one launch
@@ -113,6 +118,10 @@ impl Realtime {
             settings: *settings,
             passes: Passes::new(tracer, settings)?,
             images: Images::new(tracer, size, settings, chunk)?,
+            larsen: match settings.technique {
+                Technique::Larsen => Some(Box::new(Larsen::new(tracer, size, lights, settings.unit)?)),
+                _ => None,
+            },
             commands: Commands::new(device)?,
             chunk,
             state: State::default(),
@@ -141,7 +150,8 @@ impl Realtime {
     /// Those of the device.
     pub fn frame(&mut self, tracer: &Tracer, camera: &CameraRecord, moved: &[Moved]) -> Result<FrameStats> {
         let moved = MovedRecord::of(moved);
-        let still = moved.is_empty() && self.state.camera == Some(*camera);
+        // the reference work's pipeline makes everything anew
+        let still = moved.is_empty() && self.state.camera == Some(*camera) && self.larsen.is_none();
         if !still {
             self.state.guide ^= 1;
         }
@@ -150,8 +160,9 @@ impl Realtime {
         let pixels = self.pixels();
         let tiles = self.block().rays();
         let push = Push { scene: tracer.scene_address(), pass: self.images.frame_params.address(), ..Default::default() };
-        let launches = tiles.div_ceil(self.chunk);
-        let (passes, images) = (&self.passes, &self.images);
+        let gtao = self.settings.technique == Technique::Gtao;
+        let launches = if gtao { 0 } else { tiles.div_ceil(self.chunk) };
+        let (passes, images, larsen) = (&self.passes, &self.images, self.larsen.as_deref());
         let (guide, rays_per_pixel, chunk) = (&images.guides[self.state.guide], self.settings.rays_per_pixel, self.chunk);
         let timings = self.commands.run(|r| {
             if !still {
@@ -163,7 +174,17 @@ impl Realtime {
                     r.barrier();
                 }
             }
+            if let Some(larsen) = larsen {
+                larsen.record(r, push, &images.result);
+                return;
+            }
             r.clear(&images.current);
+            if gtao {
+                let all = Push { count: pixels as u32, ..push };
+                r.barrier();
+                r.timed("gtao", |r| r.dispatch(&passes.gtao, &all, all.count.div_ceil(LANES)));
+                r.barrier();
+            }
             for launch in 0..launches {
                 let first = launch * chunk;
                 let push = Push { first, count: chunk.min(tiles - first), ..push };
@@ -178,12 +199,17 @@ impl Realtime {
             r.timed("filter", |r| r.dispatch(&passes.filter, &all, groups));
         })?;
         tracer.check_finished()?;
-        let counts = self.images.counts.read(0, 4 * launches as u64)?;
-        let occlusion_rays = counts.chunks_exact(4).map(|c| u64::from(u32::from_ne_bytes([c[0], c[1], c[2], c[3]]))).sum();
+        let occlusion_rays = match &self.larsen {
+            Some(larsen) => larsen.occlusion_rays()?,
+            None => {
+                let counts = self.images.counts.read(0, 4 * u64::from(launches))?;
+                counts.chunks_exact(4).map(|c| u64::from(u32::from_ne_bytes([c[0], c[1], c[2], c[3]]))).sum()
+            }
+        };
         let all = pixels * u64::from(self.settings.rays_per_pixel) / u64::from(self.settings.resolution.period());
         self.state.frame = self.state.frame.wrapping_add(1);
         self.state.camera = Some(*camera);
-        self.state.has_history = self.settings.history > 1;
+        self.state.has_history = self.settings.history > 1 || self.larsen.is_some();
         Ok(FrameStats {
             timings,
             primary_rays: if still { 0 } else { pixels },
@@ -246,6 +272,8 @@ impl Realtime {
             filter_samples: if s.filter.kind == FilterKind::None { 0.0 } else { s.filter.samples },
             filter_radius: if s.filter.kind == FilterKind::None { 0 } else { s.filter.radius },
             rest: s.rest.into(),
+            slices: s.gtao[0],
+            steps: s.gtao[1],
             reserved: 0,
             surface: images.surface.address(),
             axes: images.axes.as_ref().map_or(0, Buffer::address),
@@ -268,6 +296,9 @@ impl Realtime {
         };
         images.block_params.write(0, bytemuck::bytes_of(&params))?;
         images.frame_params.write(0, bytemuck::bytes_of(&frame))?;
+        if let Some(larsen) = &mut self.larsen {
+            larsen.begin(images.frame_params.address(), self.state.frame)?;
+        }
         images.moved.write(0, bytemuck::cast_slice(moved))
     }
 }
@@ -283,6 +314,7 @@ impl Passes {
             accessibility: tracer.stream(accessibility)?,
             spawn: compute("spawn", if ballot { stream::SPAWN_BALLOT } else { stream::SPAWN })?,
             gather: compute("gather", stream::GATHER)?,
+            gtao: compute("gtao", stream::GTAO)?,
             temporal: compute("temporal", stream::TEMPORAL)?,
             filter: compute("filter", stream::FILTER)?,
         })

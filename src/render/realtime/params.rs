@@ -63,6 +63,10 @@ pub struct FrameParams {
     pub filter_radius: u32,
     /// 1: pixels with a full history rest.
     pub rest: u32,
+    /// Of gtao.
+    pub slices: u32,
+    /// Of gtao, on each side.
+    pub steps: u32,
     /// To a multiple of 8 bytes.
     pub reserved: u32,
     /// Surfaces.

@@ -4,6 +4,33 @@ use crate::error::{Error, Result};
 use crate::render::ao::{FALLOFF_CUTOFF, Hemisphere};
 use crate::sampling::Sequence;
 
+/// Where occlusion comes from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Technique {
+    /// Rays through the scene.
+    #[default]
+    Traced,
+    /// The depth image (Jimenez et al. 2016).
+    Gtao,
+    /// The pipeline of the reference work (Larsen 2019) as it was.
+    Larsen,
+}
+
+impl Technique {
+    /// All of them.
+    pub const ALL: [Technique; 3] = [Technique::Traced, Technique::Gtao, Technique::Larsen];
+
+    /// As on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Technique::Traced => "traced",
+            Technique::Gtao => "gtao",
+            Technique::Larsen => "larsen",
+        }
+    }
+}
+
 /// Which pixels are sampled in a frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
@@ -74,6 +101,8 @@ pub struct Filter {
 /// How frames are made.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Settings {
+    /// Where occlusion comes from. What follows is of the traced one, and but for rays of the screen-space one.
+    pub technique: Technique,
     /// Rays of a pixel that is sampled in a frame; 1 to [`Settings::MOST_RAYS`].
     pub rays_per_pixel: u32,
     /// Which pixels are.
@@ -99,6 +128,10 @@ pub struct Settings {
     pub moved_weight: f32,
     /// Over pixels.
     pub filter: Filter,
+    /// Of the screen-space technique: slices through the view ray, and steps on each side of one.
+    pub gtao: [u32; 2],
+    /// Of the reference work's pipeline: world units that one of its own is.
+    pub unit: f64,
 }
 
 impl Default for Settings {
@@ -155,6 +188,10 @@ impl Settings {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Preset {
+    /// The pipeline of the reference work, exactly, its flaws included.
+    Larsen,
+    /// Its budget, 64 rays for each 2x2 pixels, with right sampling, history and filter.
+    LarsenFixed,
     /// As fast as it goes.
     Fast,
     /// Little error for little time.
@@ -162,24 +199,31 @@ pub enum Preset {
     Balanced,
     /// Less error.
     Quality,
+    /// Each frame by itself, 1024 rays a pixel and nothing else: what the others stand in for.
+    Reference,
 }
 
 impl Preset {
     /// All of them.
-    pub const ALL: [Preset; 3] = [Preset::Fast, Preset::Balanced, Preset::Quality];
+    pub const ALL: [Preset; 6] =
+        [Preset::Larsen, Preset::LarsenFixed, Preset::Fast, Preset::Balanced, Preset::Quality, Preset::Reference];
 
     /// As on the command line.
     pub fn name(self) -> &'static str {
         match self {
+            Preset::Larsen => "larsen",
+            Preset::LarsenFixed => "larsen-fixed",
             Preset::Fast => "fast",
             Preset::Balanced => "balanced",
             Preset::Quality => "quality",
+            Preset::Reference => "reference",
         }
     }
 
     /// What it stands for.
     pub fn settings(self) -> Settings {
         let common = Settings {
+            technique: Technique::Traced,
             rays_per_pixel: 1,
             resolution: Resolution::Full,
             sequence: Sequence::Blue,
@@ -192,8 +236,32 @@ impl Preset {
             clamp: 2.0,
             moved_weight: 4.0,
             filter: Filter { kind: FilterKind::Box, radius: 3, samples: 256.0 },
+            gtao: [3, 6],
+            unit: 1.0,
         };
         match self {
+            // it looks for the nearest hit up to 100 units, whatever the falloff leaves of it
+            Preset::Larsen => Settings {
+                technique: Technique::Larsen,
+                rays_per_pixel: 64,
+                resolution: Resolution::Half,
+                falloff: 8.0,
+                ..common
+            },
+            Preset::LarsenFixed => Settings {
+                rays_per_pixel: 64,
+                resolution: Resolution::Half,
+                history: 8,
+                filter: Filter { radius: 1, ..common.filter },
+                ..common
+            },
+            Preset::Reference => Settings {
+                rays_per_pixel: 1024,
+                history: 1,
+                sequence: Sequence::Sobol,
+                filter: Filter { kind: FilterKind::None, ..common.filter },
+                ..common
+            },
             Preset::Fast => Settings { filter: Filter { radius: 2, ..common.filter }, ..common },
             Preset::Balanced => Settings { history: 64, ..common },
             Preset::Quality => Settings {
