@@ -190,6 +190,7 @@ fn one_record_for_a_check_that_fails() {
     let record: Value = serde_json::from_slice(&out.stdout).unwrap();
     assert_eq!((record["exit_code"].as_u64(), record["channels"].as_array().map(Vec::len)), (Some(1), Some(1)));
     assert!(record["error"].as_str().unwrap().contains("RMSE"));
+    assert!(record["flip"]["mean"].as_f64().is_some_and(|v| (0.5..1.0).contains(&v)), "{record}");
     assert!(json(&run(&["diff", path(&a), path(&a), "--max-rmse", "0.1", "--json"]))["error"].is_null());
 }
 

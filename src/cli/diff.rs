@@ -5,6 +5,7 @@ use serde_json::json;
 use super::args::DiffArgs;
 use super::console::Failure;
 use crate::error::{Error, Result};
+use crate::measure::flip::{PIXELS_PER_DEGREE, flip};
 use crate::measure::metrics::ImagePair;
 use crate::output::{self, Channel, Image, Samples};
 
@@ -33,6 +34,19 @@ struct Numbers {
     tanimoto: f64,
 }
 
+/// How different the colours look, over the pixels where all of them are finite and at least one image has something.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+struct Look {
+    /// Channels that make the colour: `R`, `G` and `B`, or a grey one.
+    channels: Vec<String>,
+    /// Pixels counted.
+    pixels: u64,
+    /// Mean FLIP, 0 to 1.
+    mean: f64,
+    /// Of the display that the images are thought to be seen on.
+    pixels_per_degree: f64,
+}
+
 /// Compares and prints; fails when a limit was given and is passed.
 pub fn run(args: &DiffArgs) -> Result<(), Failure> {
     let console = args.verbosity.console();
@@ -44,7 +58,8 @@ pub fn run(args: &DiffArgs) -> Result<(), Failure> {
     let mask = coverage(&a, &b);
     let mut worst = 0f64;
     let mut records = Vec::new();
-    for (x, y) in pairs(&a, &b) {
+    let pairs = pairs(&a, &b);
+    for (x, y) in &pairs {
         let d = compare(&x.samples, &y.samples, mask.as_deref())?;
         let mut line = format!("{:12} ", x.name);
         if let Some(n) = &d.numbers {
@@ -60,6 +75,15 @@ pub fn run(args: &DiffArgs) -> Result<(), Failure> {
     if records.is_empty() {
         return Err(Error::Usage("the images have no channel in common".into()).into());
     }
+    let look = look(&pairs, a.width as usize, mask.as_deref())?;
+    if let Some(l) = &look {
+        console.line(&format!(
+            "{:12} flip {:.4} ({:.0} pixels a degree)",
+            l.channels.join(" "),
+            l.mean,
+            l.pixels_per_degree
+        ))?;
+    }
     let covered = mask.is_some();
     let verdict = match args.max_rmse {
         Some(limit) if worst > limit => {
@@ -67,7 +91,7 @@ pub fn run(args: &DiffArgs) -> Result<(), Failure> {
         }
         _ => Ok(()),
     };
-    let record = json!({ "a": args.a, "b": args.b, "covered_pixels_only": covered, "channels": records });
+    let record = json!({ "a": args.a, "b": args.b, "covered_pixels_only": covered, "channels": records, "flip": look });
     console.close(&record, verdict)
 }
 
@@ -89,6 +113,32 @@ fn pairs<'a>(a: &'a Image, b: &'a Image) -> Vec<(&'a Channel, &'a Channel)> {
 fn coverage(a: &Image, b: &Image) -> Option<Vec<f32>> {
     let (a, b) = (a.f32("A")?, b.f32("A")?);
     Some(a.iter().zip(b).map(|(x, y)| x.max(*y)).collect())
+}
+
+/// FLIP of the colour that the images have in common, if they have any.
+fn look(pairs: &[(&Channel, &Channel)], width: usize, mask: Option<&[f32]>) -> Result<Option<Look>> {
+    let find = |name: &str| {
+        pairs.iter().find(|(x, _)| x.name == name).and_then(|(x, y)| match (&x.samples, &y.samples) {
+            (Samples::F32(a), Samples::F32(b)) => Some((&x.name, [a, b])),
+            _ => None,
+        })
+    };
+    let found: Vec<_> = match ["R", "G", "B"].map(find) {
+        [Some(r), Some(g), Some(b)] => vec![r, g, b],
+        [red, ..] => find("Y").or(red).into_iter().collect(),
+    };
+    let (channels, planes): (Vec<String>, Vec<_>) = found.into_iter().map(|(name, planes)| (name.clone(), planes)).unzip();
+    let Some(count) = planes.first().map(|[a, _]| a.len()) else { return Ok(None) };
+    let counts = |i: usize| mask.is_none_or(|m| m[i] > 0.0) && planes.iter().flatten().all(|p| p[i].is_finite());
+    let counted: Vec<f32> = (0..count).map(|i| f32::from(u8::from(counts(i)))).collect();
+    let pixels = counted.iter().filter(|c| **c > 0.0).count() as u64;
+    if pixels == 0 {
+        return Ok(None);
+    }
+    let [image, reference] = [0, 1].map(|k| (0..count).flat_map(|i| planes.iter().map(move |p| p[k][i])).collect::<Vec<_>>());
+    let pair = ImagePair::new(&image, &reference, channels.len(), Some(&counted))?;
+    let mean = flip(&pair, width, PIXELS_PER_DEGREE)?.mean;
+    Ok(Some(Look { channels, pixels, mean, pixels_per_degree: PIXELS_PER_DEGREE }))
 }
 
 fn compare(a: &Samples, b: &Samples, mask: Option<&[f32]>) -> Result<Difference> {
@@ -148,5 +198,23 @@ mod tests {
         assert_eq!((masked.pixels, masked.differing, masked.broken), (1, 0, 0));
         let ids = compare(&Samples::U32(vec![1, 2]), &Samples::U32(vec![1, 3]), None).unwrap();
         assert_eq!((ids.pixels, ids.differing, ids.numbers), (2, 1, None));
+    }
+
+    #[test]
+    fn looks_are_compared_where_there_is_colour() {
+        let channel = |name: &str, values: &[f32]| Channel { name: name.into(), samples: Samples::F32(values.to_vec()) };
+        let [black, white, broken] = [[0.0; 4], [1.0; 4], [f32::NAN, 1.0, 1.0, 1.0]].map(|v| channel("Y", &v));
+        let of = |x: &Channel, y: &Channel, mask: Option<&[f32]>| look(&[(x, y)], 2, mask).unwrap();
+        let far = of(&black, &white, None).unwrap();
+        assert_eq!((&far.channels[..], far.pixels), (&["Y".to_owned()][..], 4));
+        assert!((far.mean - 0.967).abs() < 1e-3);
+        assert_eq!(of(&broken, &broken, None).unwrap().pixels, 3);
+        assert_eq!(of(&white, &white, Some(&[1.0, 0.0, 0.0, 0.0])).unwrap(), Look { mean: 0.0, pixels: 1, ..far.clone() });
+        assert_eq!(of(&white, &white, Some(&[0.0; 4])), None);
+        assert_eq!(of(&channel("depth.Z", &[0.0; 4]), &channel("depth.Z", &[1.0; 4]), None), None);
+        let planes = |v: f32| ["B", "G", "R"].map(|name| channel(name, &[v; 4]));
+        let (a, b) = (planes(0.2), planes(0.3));
+        let colour = look(&a.iter().zip(&b).collect::<Vec<_>>(), 2, None).unwrap().unwrap();
+        assert!(colour.channels == ["R", "G", "B"] && colour.mean > 0.01, "{colour:?}");
     }
 }

@@ -12,10 +12,10 @@ pub const REL_MSE_EPSILON: f64 = 1e-2;
 /// Two images of the same size, and which of their pixels count.
 #[derive(Clone, Copy, Debug)]
 pub struct ImagePair<'a> {
-    image: &'a [f32],
-    reference: &'a [f32],
-    channels: usize,
-    coverage: Option<&'a [f32]>,
+    pub(super) image: &'a [f32],
+    pub(super) reference: &'a [f32],
+    pub(super) channels: usize,
+    pub(super) coverage: Option<&'a [f32]>,
 }
 
 impl<'a> ImagePair<'a> {

@@ -59,25 +59,73 @@ pub fn check_writable(path: &Path) -> Result<()> {
     check().map_err(|e| Error::write(path, &e))
 }
 
-/// Lets `write` fill a file that takes the place of `path` once it is complete. On failure nothing is left behind, and
-/// what was there before stays. An existing file keeps its permissions, a symbolic link stays a link; a device or FIFO
+/// A file that is written beside its place and takes it once it is complete. What was there before stays until then; dropped
+/// before, it leaves nothing behind. An existing file keeps its permissions, a symbolic link stays a link; a device or FIFO
 /// receives the bytes once they are all there.
-pub fn write_atomically(path: &Path, write: impl FnOnce(&mut File) -> io::Result<()>) -> Result<()> {
-    let run = || match target(path)? {
-        Target::File { path, permissions } => {
-            let mut file = temporary_beside(&path)?;
-            write(file.as_file_mut())?;
-            if let Some(permissions) = permissions {
-                file.as_file().set_permissions(permissions)?;
+#[derive(Debug)]
+pub struct AtomicFile {
+    /// As the user named it.
+    path: PathBuf,
+    place: Place,
+}
+
+#[derive(Debug)]
+enum Place {
+    Beside { file: tempfile::NamedTempFile, path: PathBuf, permissions: Option<Permissions> },
+    Stream(File),
+}
+
+impl AtomicFile {
+    /// An empty one that is to become `path`.
+    pub fn create(path: &Path) -> Result<Self> {
+        let place = || match target(path)? {
+            Target::File { path, permissions } => Ok(Place::Beside { file: temporary_beside(&path)?, path, permissions }),
+            Target::Stream => Ok(Place::Stream(tempfile::tempfile()?)),
+        };
+        let place = place().map_err(|e| Error::write(path, &e))?;
+        Ok(Self { path: path.to_owned(), place })
+    }
+
+    /// Where to write.
+    pub fn file(&mut self) -> &mut File {
+        match &mut self.place {
+            Place::Beside { file, .. } => file.as_file_mut(),
+            Place::Stream(file) => file,
+        }
+    }
+
+    /// Another handle to [`AtomicFile::file`], for writers that own theirs. It has to be flushed before [`AtomicFile::commit`].
+    pub fn handle(&mut self) -> Result<File> {
+        self.file().try_clone().map_err(|e| self.failed(&e))
+    }
+
+    /// Puts what was written in its place.
+    pub fn commit(self) -> Result<()> {
+        let Self { path: named, place } = self;
+        let run = || match place {
+            Place::Beside { file, path, permissions } => {
+                if let Some(permissions) = permissions {
+                    file.as_file().set_permissions(permissions)?;
+                }
+                file.persist(&path).map(drop).map_err(|e| e.error)
             }
-            file.persist(&path).map(drop).map_err(|e| e.error)
-        }
-        Target::Stream => {
-            let mut file = tempfile::tempfile()?;
-            write(&mut file)?;
-            file.rewind()?;
-            io::copy(&mut file, &mut OpenOptions::new().write(true).open(path)?).map(drop)
-        }
-    };
-    run().map_err(|e| Error::write(path, &e))
+            Place::Stream(mut file) => {
+                file.rewind()?;
+                io::copy(&mut file, &mut OpenOptions::new().write(true).open(&named)?).map(drop)
+            }
+        };
+        run().map_err(|e| Error::write(&named, &e))
+    }
+
+    /// What a failed write into it is told as.
+    pub fn failed(&self, error: &io::Error) -> Error {
+        Error::write(&self.path, error)
+    }
+}
+
+/// Lets `write` fill an [`AtomicFile`]: on failure nothing is left behind, and what was there before stays.
+pub fn write_atomically(path: &Path, write: impl FnOnce(&mut File) -> io::Result<()>) -> Result<()> {
+    let mut file = AtomicFile::create(path)?;
+    write(file.file()).map_err(|e| file.failed(&e))?;
+    file.commit()
 }

@@ -30,28 +30,53 @@ pub fn srgb_byte(linear: f32) -> u8 {
     (srgb_encode(linear.clamp(0.0, 1.0)) * 255.0).round() as u8
 }
 
-/// Writes the colour channels of an image, brightened by `exposure` stops (0 = as they are, 1 = twice as bright).
-pub fn write(image: &Image, path: &Path, exposure: f32) -> Result<()> {
+/// What the bytes of a picture mean.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Colour {
+    /// One byte a pixel.
+    Grey,
+    /// Red, green and blue.
+    Rgb,
+}
+
+impl Colour {
+    /// Bytes a pixel.
+    pub fn channels(self) -> usize {
+        match self {
+            Self::Grey => 1,
+            Self::Rgb => 3,
+        }
+    }
+}
+
+/// The colour channels of an image as 8-bit sRGB, brightened by `exposure` stops (0 = as they are, 1 = twice as bright).
+/// `path` is what an error names.
+pub fn bytes_of(image: &Image, exposure: f32, path: &Path) -> Result<(Vec<u8>, Colour)> {
     image.check()?;
     check_size(image.width, image.height)?;
     let gain = exposure.exp2();
-    let (bytes, color) = if let (Some(r), Some(g), Some(b)) = (image.f32("R"), image.f32("G"), image.f32("B")) {
+    if let (Some(r), Some(g), Some(b)) = (image.f32("R"), image.f32("G"), image.f32("B")) {
         let mut bytes = vec![0; image.pixel_count() * 3];
         bytes.par_chunks_mut(3).enumerate().with_min_len(1024).for_each(|(i, p)| {
             p[0] = srgb_byte(r[i] * gain);
             p[1] = srgb_byte(g[i] * gain);
             p[2] = srgb_byte(b[i] * gain);
         });
-        (bytes, ExtendedColorType::Rgb8)
+        Ok((bytes, Colour::Rgb))
     } else if let Some(y) = image.f32("Y").or_else(|| image.f32("R")) {
-        (y.par_iter().with_min_len(1024).map(|v| srgb_byte(v * gain)).collect(), ExtendedColorType::L8)
+        Ok((y.par_iter().with_min_len(1024).map(|v| srgb_byte(v * gain)).collect(), Colour::Grey))
     } else {
-        return Err(Error::Usage(format!(
+        Err(Error::Usage(format!(
             "{}: the image has no colour to show as PNG (channels R, G, B or Y); write it as .exr",
             path.display()
-        )));
-    };
-    write_bytes(path, &bytes, image.width, image.height, color)
+        )))
+    }
+}
+
+/// Writes the colour channels of an image; `exposure` as in [`bytes_of`].
+pub fn write(image: &Image, path: &Path, exposure: f32) -> Result<()> {
+    let (bytes, colour) = bytes_of(image, exposure, path)?;
+    write_bytes(path, &bytes, image.width, image.height, colour)
 }
 
 /// Writes 8-bit grey values as they are, `width * height` of them.
@@ -60,7 +85,7 @@ pub fn write_grey(path: &Path, grey: &[u8], width: u32, height: u32) -> Result<(
     if grey.len() as u64 != u64::from(width) * u64::from(height) {
         return Err(Error::Usage(format!("{} grey values for {width}x{height} pixels", grey.len())));
     }
-    write_bytes(path, grey, width, height, ExtendedColorType::L8)
+    write_bytes(path, grey, width, height, Colour::Grey)
 }
 
 /// Writes 8-bit sRGB values as they are, three for each of `width * height` pixels.
@@ -69,14 +94,18 @@ pub fn write_rgb(path: &Path, rgb: &[u8], width: u32, height: u32) -> Result<()>
     if rgb.len() as u64 != 3 * u64::from(width) * u64::from(height) {
         return Err(Error::Usage(format!("{} colour values for {width}x{height} pixels", rgb.len())));
     }
-    write_bytes(path, rgb, width, height, ExtendedColorType::Rgb8)
+    write_bytes(path, rgb, width, height, Colour::Rgb)
 }
 
-fn write_bytes(path: &Path, bytes: &[u8], width: u32, height: u32, color: ExtendedColorType) -> Result<()> {
+fn write_bytes(path: &Path, bytes: &[u8], width: u32, height: u32, colour: Colour) -> Result<()> {
+    let colour = match colour {
+        Colour::Grey => ExtendedColorType::L8,
+        Colour::Rgb => ExtendedColorType::Rgb8,
+    };
     write_atomically(path, |file| {
         let mut out = BufWriter::with_capacity(1 << 16, file);
         PngEncoder::new_with_quality(&mut out, CompressionType::Fast, FilterType::Adaptive)
-            .write_image(bytes, width, height, color)
+            .write_image(bytes, width, height, colour)
             .map_err(|e| match e {
                 image::ImageError::IoError(e) => e,
                 e => io::Error::other(e.to_string()),

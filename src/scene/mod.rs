@@ -5,6 +5,7 @@
 
 pub mod builtin;
 pub mod camera;
+pub mod camera_path;
 pub mod export;
 pub mod features;
 pub mod flatten;
@@ -12,12 +13,15 @@ pub mod light;
 pub mod load;
 pub mod material;
 pub mod mesh;
+pub mod orbit;
 pub mod texture;
 
 pub use camera::{Camera, Projection};
+pub use camera_path::CameraPath;
 pub use light::{Environment, Light, LightKind};
 pub use material::{AlphaMode, Material, TextureSlot};
 pub use mesh::{Geometry, Mesh, Sphere, TriangleMesh};
+pub use orbit::Orbit;
 pub use texture::{Filter, Texture, Wrap};
 
 use glam::{DAffine3, DVec3};

@@ -1,6 +1,7 @@
 //! Files to [`Scene`]: a reader for each format, then `finish`, which makes the promises that every scene keeps.
 
 mod brhan;
+mod camera_path;
 mod compact;
 mod find;
 mod finish;
@@ -11,6 +12,8 @@ mod picture;
 mod tangents;
 
 use std::path::Path;
+
+pub use camera_path::load_camera_path;
 
 use crate::error::{Error, Result};
 use crate::scene::{Scene, builtin};

@@ -1,0 +1,164 @@
+//! APNG: a PNG that moves, 8-bit sRGB, for looking at. It is written frame by frame, runs for ever, and a program that knows no
+//! animations shows its first frame.
+
+use std::fs::File;
+use std::io::{self, BufWriter};
+use std::path::{Path, PathBuf};
+
+use ::png::{BitDepth, ColorType, Compression, Encoder, EncodingError, SrgbRenderingIntent, Writer};
+
+use super::png::{Colour, bytes_of};
+use super::{AtomicFile, Image, check_size};
+use crate::error::{Error, Result};
+
+/// How long a frame is shown: `numerator` / `denominator` seconds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Delay {
+    /// At least 0; 0 is as fast as the viewer can.
+    pub numerator: u16,
+    /// At least 1.
+    pub denominator: u16,
+}
+
+impl Delay {
+    /// For so many frames a second, in [0.001, 1000]: the simplest fraction within a millionth of it, or the nearest there is.
+    pub fn of_rate(frames_per_second: f64) -> Result<Self> {
+        if !(0.001..=1000.0).contains(&frames_per_second) {
+            return Err(Error::Usage(format!("{frames_per_second} frames a second: must be between 0.001 and 1000")));
+        }
+        let mut best = (f64::INFINITY, Self { numerator: 1, denominator: 1 });
+        for numerator in 1..=u16::MAX {
+            let denominator = (frames_per_second * f64::from(numerator)).round();
+            if denominator > f64::from(u16::MAX) {
+                break;
+            }
+            let error = (denominator / (frames_per_second * f64::from(numerator)) - 1.0).abs();
+            if denominator >= 1.0 && error < best.0 {
+                best = (error, Self { numerator, denominator: denominator as u16 });
+            }
+            if best.0 < 1e-6 {
+                break;
+            }
+        }
+        Ok(best.1)
+    }
+}
+
+/// What is known of an animation before its first frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Animation {
+    /// Pixels in x and y, of every frame.
+    pub size: [u32; 2],
+    /// Of every frame.
+    pub colour: Colour,
+    /// How many frames there will be, at least 1.
+    pub frames: u32,
+    /// How long each is shown.
+    pub delay: Delay,
+}
+
+/// Does the name of `path` end in `.apng`, in either case of letters?
+pub fn is_apng(path: &Path) -> bool {
+    path.extension().is_some_and(|e| e.eq_ignore_ascii_case("apng"))
+}
+
+/// An animation that is being written. It is in its place after [`ApngWriter::finish`]; dropped before, it leaves nothing behind.
+pub struct ApngWriter {
+    // before the file: dropped first, while what it ends in is still there
+    encoder: Writer<BufWriter<File>>,
+    file: AtomicFile,
+    path: PathBuf,
+    animation: Animation,
+    added: u32,
+}
+
+impl ApngWriter {
+    /// Starts an animation that will be `path`.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for an animation of no frames, no pixels, too many pixels, or a delay over 0; [`Error::Output`] where
+    /// `path` cannot be written.
+    pub fn create(path: &Path, animation: Animation) -> Result<Self> {
+        let Animation { size: [width, height], colour, frames, delay } = animation;
+        check_size(width, height)?;
+        if frames == 0 || delay.denominator == 0 {
+            let what = format!("{}: an animation needs a frame, and a frame a delay", path.display());
+            return Err(Error::Usage(what));
+        }
+        let mut file = AtomicFile::create(path)?;
+        let out = BufWriter::with_capacity(1 << 16, file.handle()?);
+        let start = || {
+            let mut encoder = Encoder::new(out, width, height);
+            encoder.set_color(match colour {
+                Colour::Grey => ColorType::Grayscale,
+                Colour::Rgb => ColorType::Rgb,
+            });
+            encoder.set_depth(BitDepth::Eight);
+            encoder.set_source_srgb(SrgbRenderingIntent::Perceptual);
+            encoder.set_compression(Compression::Fast);
+            const FOR_EVER: u32 = 0;
+            encoder.set_animated(frames, FOR_EVER)?;
+            encoder.set_frame_delay(delay.numerator, delay.denominator)?;
+            encoder.write_header()
+        };
+        let encoder = start().map_err(|e| file.failed(&reason(e)))?;
+        Ok(Self { encoder, file, path: path.to_owned(), animation, added: 0 })
+    }
+
+    /// Adds the colour channels of an image as the next frame, brightened by `exposure` stops.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for a frame too many, or one of another size or colour than the animation; [`Error::Output`] where it
+    /// cannot be written.
+    pub fn add(&mut self, image: &Image, exposure: f32) -> Result<()> {
+        let (bytes, colour) = bytes_of(image, exposure, &self.path)?;
+        if ([image.width, image.height], colour) != (self.animation.size, self.animation.colour) {
+            let [width, height] = self.animation.size;
+            return Err(self.wrong(&format!("a frame that is not {width}x{height} {:?}", self.animation.colour)));
+        }
+        self.add_bytes(&bytes)
+    }
+
+    /// Adds 8-bit sRGB values as they are as the next frame: 1 or 3 a pixel, rows from the top. Errors as [`ApngWriter::add`].
+    pub fn add_bytes(&mut self, bytes: &[u8]) -> Result<()> {
+        let Animation { size: [width, height], colour, frames, .. } = self.animation;
+        if bytes.len() as u64 != u64::from(width) * u64::from(height) * colour.channels() as u64 {
+            return Err(self.wrong(&format!("a frame of {} values for {width}x{height} {colour:?} pixels", bytes.len())));
+        }
+        if self.added == frames {
+            return Err(self.wrong(&format!("one frame more than the {frames} it was to have")));
+        }
+        self.encoder.write_image_data(bytes).map_err(|e| self.file.failed(&reason(e)))?;
+        self.added += 1;
+        Ok(())
+    }
+
+    /// Frames so far.
+    pub fn added(&self) -> u32 {
+        self.added
+    }
+
+    /// Puts the animation in its place.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] when frames are missing, [`Error::Output`] where it cannot be written; then there is no file.
+    pub fn finish(self) -> Result<()> {
+        if self.added < self.animation.frames {
+            return Err(self.wrong(&format!("{} of its {} frames are there", self.added, self.animation.frames)));
+        }
+        let Self { encoder, file, .. } = self;
+        encoder.finish().map_err(|e| file.failed(&reason(e)))?;
+        file.commit()
+    }
+
+    fn wrong(&self, what: &str) -> Error {
+        Error::Usage(format!("{}: the animation cannot be written: {what}", self.path.display()))
+    }
+}
+
+fn reason(error: EncodingError) -> io::Error {
+    match error {
+        EncodingError::IoError(e) => e,
+        e => io::Error::other(e.to_string()),
+    }
+}

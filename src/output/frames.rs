@@ -1,0 +1,52 @@
+//! Numbers in names: `out.####.exr` is one file a frame.
+
+use std::path::{Path, PathBuf};
+
+use crate::error::{Error, Result};
+
+/// A path whose file name has a place for the number of the frame: a run of `#`, as many as there are digits at least. In the
+/// names of folders `#` means nothing.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct FramePattern {
+    path: PathBuf,
+    before: String,
+    digits: usize,
+    after: String,
+}
+
+impl FramePattern {
+    /// The pattern that a path is, or `None` for a path without one.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for more than one run of `#`, or one in a name that is no Unicode.
+    pub fn of(path: &Path) -> Result<Option<Self>> {
+        let wrong = |what: &str| Err(Error::Usage(format!("{}: {what}", path.display())));
+        let Some(name) = path.file_name() else { return Ok(None) };
+        let Some(start) = name.as_encoded_bytes().iter().position(|b| *b == b'#') else { return Ok(None) };
+        let Some(name) = name.to_str() else {
+            return wrong("a name with a frame number (#) must be Unicode; rename it");
+        };
+        let (before, rest) = name.split_at(start);
+        let after = rest.trim_start_matches('#');
+        if after.contains('#') {
+            return wrong("more than one place for the frame number; leave one run of #, like out.####.exr");
+        }
+        let digits = rest.len() - after.len();
+        Ok(Some(Self { path: path.to_owned(), before: before.to_owned(), digits, after: after.to_owned() }))
+    }
+
+    /// The path of a frame: its number with leading zeros, and more digits than there are `#` where it needs them.
+    pub fn path(&self, frame: u64) -> PathBuf {
+        self.path.with_file_name(format!("{}{frame:0width$}{}", self.before, self.after, width = self.digits))
+    }
+}
+
+/// Has a path a place for the number of a frame? Errors are those of [`FramePattern::of`].
+pub fn is_pattern(path: &Path) -> Result<bool> {
+    Ok(FramePattern::of(path)?.is_some())
+}
+
+/// The path of a frame; of a path without a pattern, the path itself. Errors are those of [`FramePattern::of`].
+pub fn numbered(path: &Path, frame: u64) -> Result<PathBuf> {
+    Ok(FramePattern::of(path)?.map_or_else(|| path.to_owned(), |p| p.path(frame)))
+}

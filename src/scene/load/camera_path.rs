@@ -1,0 +1,76 @@
+//! Camera paths from JSON:
+//!
+//! ```json
+//! {
+//!   "fps": 30,
+//!   "interpolation": "smooth",
+//!   "keys": [
+//!     { "frame": 0, "eye": [0, 1.6, 4], "target": [0, 1, 0], "up": [0, 1, 0], "fov_y_degrees": 45 },
+//!     { "frame": 60, "eye": [3, 1.6, 2], "target": [0, 1, 0] }
+//!   ]
+//! }
+//! ```
+//!
+//! Lengths are in world units. `interpolation` is `smooth` or `linear`. `keys`, and of a key `frame`, `eye` and `target`, must be
+//! there; the others are as in the first key above when left out. Frames increase and need not be whole.
+
+use std::path::Path;
+
+use glam::DVec3;
+use serde::Deserialize;
+use serde_json::Value;
+
+use crate::error::{Error, Result};
+use crate::scene::camera_path::{CameraPath, Interpolation, Key};
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct PathJson {
+    #[serde(default = "default_fps")]
+    fps: f64,
+    #[serde(default)]
+    interpolation: Interpolation,
+    // read one by one, so that an error can say which it is
+    keys: Vec<Value>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct KeyJson {
+    frame: f64,
+    eye: [f64; 3],
+    target: [f64; 3],
+    #[serde(default = "default_up")]
+    up: [f64; 3],
+    #[serde(default = "default_fov")]
+    fov_y_degrees: f64,
+}
+
+fn default_fps() -> f64 {
+    30.0
+}
+
+fn default_up() -> [f64; 3] {
+    [0.0, 1.0, 0.0]
+}
+
+fn default_fov() -> f64 {
+    45.0
+}
+
+/// Reads a camera path; the head of this file has the format.
+///
+/// # Errors
+/// [`Error::Input`] for a file that is missing or broken, with the number of the key, counted from 1, and what is wrong with it.
+pub fn load_camera_path(path: &Path) -> Result<CameraPath> {
+    let bytes = std::fs::read(path).map_err(|e| Error::read(path, &e))?;
+    let file: PathJson =
+        serde_json::from_slice(&bytes).map_err(|e| Error::input(path, format!("not a readable camera path: {e}")))?;
+    let key = |(k, value): (usize, Value)| {
+        let key: KeyJson = serde_json::from_value(value).map_err(|e| Error::input(path, format!("key {}: {e}", k + 1)))?;
+        let (eye, target, up) = (DVec3::from(key.eye), DVec3::from(key.target), DVec3::from(key.up));
+        Ok(Key { frame: key.frame, eye, target, up, fov_y: key.fov_y_degrees.to_radians() })
+    };
+    let keys = file.keys.into_iter().enumerate().map(key).collect::<Result<Vec<_>>>()?;
+    CameraPath::new(keys, file.interpolation, file.fps).map_err(|e| Error::input(path, e))
+}
