@@ -223,6 +223,27 @@ impl Realtime {
         Ok(bytemuck::pod_collect_to_vec(&self.images.result.read(0, 4 * self.pixels())?))
     }
 
+    /// What the last frame's filter was given, rows from the top; 0 where nothing is and where there is no sample yet. Of the reference
+    /// work's pipeline: the result.
+    pub fn unfiltered(&self) -> Result<Vec<f32>> {
+        match self.larsen {
+            Some(_) => self.result(),
+            None => Ok(self.estimates()?.into_iter().map(|e| e[0]).collect()),
+        }
+    }
+
+    /// Samples behind each pixel of the last frame.
+    pub fn samples(&self) -> Result<Vec<f32>> {
+        Ok(self.estimates()?.into_iter().map(|e| e[1]).collect())
+    }
+
+    /// Mean, number of samples and variance of one sample of each pixel.
+    fn estimates(&self) -> Result<Vec<[f32; 3]>> {
+        let history: Vec<[u32; 2]> =
+            bytemuck::pod_collect_to_vec(&self.images.histories[self.state.history].read(0, 8 * self.pixels())?);
+        Ok(history.iter().map(|h| [f32::from_bits(h[0]), half(h[1] as u16), half((h[1] >> 16) as u16)]).collect())
+    }
+
     /// Where the last frame shows something: 1, elsewhere 0; rows from the top.
     pub fn coverage(&self) -> Result<Vec<f32>> {
         let guide: Vec<[f32; 2]> =
@@ -366,10 +387,33 @@ impl Images {
     }
 }
 
+/// A half float that is not negative, and finite.
+fn half(bits: u16) -> f32 {
+    let (exponent, fraction) = (i32::from(bits >> 10 & 31), f32::from(bits & 1023));
+    match exponent {
+        0 => fraction * (-24f32).exp2(),
+        e => (1024.0 + fraction) * ((e - 25) as f32).exp2(),
+    }
+}
+
 /// World to camera, from the camera's own.
 fn inverse(camera: &CameraRecord) -> [[f32; 4]; 3] {
     let m = camera.camera_to_world.map(|row| row.map(f64::from));
     let column = |k: usize| DVec3::new(m[0][k], m[1][k], m[2][k]);
     let to_world = DAffine3::from_mat3_translation(DMat3::from_cols(column(0), column(1), column(2)), column(3));
     rows(&to_world.inverse())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn half_floats() {
+        for (bits, want) in
+            [(0, 0.0), (0x3c00, 1.0), (0x4000, 2.0), (0x3555, 0.333_251_95), (0x6800, 2048.0), (1, 5.960_464_5e-8)]
+        {
+            assert_eq!(half(bits), want);
+        }
+    }
 }
