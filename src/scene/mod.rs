@@ -3,6 +3,7 @@
 //! Conventions, everywhere: right-handed, lengths in world units (metres in glTF), angles in radians, colours linear with
 //! sRGB primaries, triangles counter-clockwise seen from their front.
 
+pub mod animation;
 pub mod builtin;
 pub mod camera;
 pub mod export;
@@ -14,6 +15,7 @@ pub mod material;
 pub mod mesh;
 pub mod texture;
 
+pub use animation::Rig;
 pub use camera::{Camera, Projection};
 pub use light::{Environment, Light, LightKind};
 pub use material::{AlphaMode, Material, TextureSlot};
@@ -82,6 +84,8 @@ pub struct Scene {
     pub environment: Environment,
     /// Wishes of the file about how to render it.
     pub hints: RenderHints,
+    /// What of it moves over time; `None` where nothing does.
+    pub rig: Option<Rig>,
     /// What the loader noticed.
     pub report: LoadReport,
 }

@@ -14,6 +14,7 @@ use super::gpu_scene::rows;
 use super::{Structure, Tracer};
 use crate::error::{Error, Result};
 use crate::scene::Geometry;
+use crate::scene::animation::{Pose, PosedMesh};
 use crate::scene::flatten::{FlatScene, Placement};
 
 /// New vertices of a mesh.
@@ -35,6 +36,18 @@ pub struct Changes<'a> {
     pub instances: Vec<(usize, DAffine3)>,
     /// Meshes that have deformed.
     pub meshes: Vec<MeshChange<'a>>,
+}
+
+impl Pose {
+    /// What to tell a tracer whose scene was flattened with the animation's [`crate::scene::animation::Rig::motion`].
+    pub fn changes(&self) -> Changes<'_> {
+        fn mesh(posed: &PosedMesh) -> MeshChange<'_> {
+            let shape = &posed.shape;
+            let normals = Some(&shape.normals[..]).filter(|n| !n.is_empty());
+            MeshChange { mesh: posed.mesh, positions: &shape.positions, normals }
+        }
+        Changes { instances: self.instances.clone(), meshes: self.meshes.iter().map(mesh).collect() }
+    }
 }
 
 /// What an update did.

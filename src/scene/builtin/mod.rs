@@ -137,9 +137,10 @@ impl Placement {
 }
 
 /// The same scene with every instance's transform applied to its vertices, rounded to `f32`: what a file without transforms
-/// would hold. Sphere meshes keep their instance's transform (it may make ellipsoids of them).
+/// would hold. Sphere meshes keep their instance's transform (it may make ellipsoids of them). Nothing moves in it.
 pub fn bake(scene: &Scene) -> Scene {
     let mut out = scene.clone();
+    out.rig = None;
     out.meshes.clear();
     for instance in &mut out.instances {
         let mut mesh = scene.meshes[instance.mesh].clone();
