@@ -335,6 +335,47 @@ fn what_is_scaled_to_nothing_may_grow() {
     }
 }
 
+/// Meshes and instances that are left out before others: what moves is still called by its name.
+#[test]
+fn numbers_follow_what_is_left_out() {
+    let mut doc = bound(true);
+    let flat = doc.positions(&[[0.0; 3], [1.0, 0.0, 0.0], [2.0, 0.0, 0.0]]);
+    let good = doc.positions(&TRIANGLE);
+    for position in [flat, good] {
+        doc.push("meshes", json!({ "primitives": [{ "attributes": { "POSITION": position } }] }));
+    }
+    doc.push("nodes", json!({ "name": "hidden", "mesh": 2, "scale": [0, 0, 0] }));
+    doc.push("nodes", json!({ "name": "degenerate", "mesh": 1, "translation": [0, 0, 1] }));
+    doc.push("nodes", json!({ "name": "moving", "mesh": 2, "camera": 0 }));
+    doc.push("cameras", json!({ "type": "perspective", "perspective": { "yfov": 0.7, "znear": 0.1 } }));
+    doc.json["scenes"][0]["nodes"] = json!([3, 4, 0, 1, 5]);
+    animate(&mut doc, 2, "rotation", "LINEAR", &[0.0, 1.0], &[NO_TURN, quarter(0.0, 0.0, 1.0)]);
+    animate(&mut doc, 5, "translation", "LINEAR", &[0.0, 1.0], &[[0.0; 3], [1.0; 3]]);
+    animate(&mut doc, 4, "translation", "LINEAR", &[0.0, 1.0], &[[0.0; 3], [1.0; 3]]);
+    let scene = doc.load();
+    let motion = rig(&scene).motion(0).unwrap();
+    assert_eq!((scene.instances.len(), scene.meshes.len()), (2, 2));
+    assert_eq!(motion.instances.iter().map(|&i| scene.instances[i].name.as_str()).collect::<Vec<_>>(), ["moving"]);
+    assert_eq!(motion.meshes.iter().map(|&m| mesh(&scene, m).positions.len()).collect::<Vec<_>>(), [4]);
+    let pose = pose(&scene, 1.0);
+    near(pose.instances[0].1.translation, DVec3::ONE);
+    near(pose.cameras[0].1.translation, DVec3::ONE);
+    check_positions(&pose.meshes[0].shape.positions, &closed_form(FRAC_PI_2));
+    // a mesh that is a point at rest and grows by its target, on a node that moves, keeps its size
+    let mut doc = Doc::new();
+    let point = doc.positions(&[[0.0; 3]; 3]);
+    let grown = doc.positions(&TRIANGLE);
+    doc.primitive(json!({ "attributes": { "POSITION": point }, "targets": [{ "POSITION": grown }] }));
+    let other = doc.positions(&TRIANGLE);
+    doc.push("meshes", json!({ "primitives": [{ "attributes": { "POSITION": other } }] }));
+    doc.json["nodes"] = json!([{ "mesh": 0 }, { "mesh": 1 }]);
+    doc.json["scenes"][0]["nodes"] = json!([0, 1]);
+    animate(&mut doc, 0, "weights", "LINEAR", &[0.0, 1.0], &[[0.0], [1.0]]);
+    animate(&mut doc, 0, "translation", "LINEAR", &[0.0, 1.0], &[[0.0; 3], [1.0; 3]]);
+    let scene = doc.load();
+    assert_eq!((scene.triangle_count(), scene.instances[0].object_to_world), (2, DAffine3::IDENTITY));
+}
+
 #[test]
 fn triangles_that_open_up_are_kept() {
     let mut doc = Doc::new();

@@ -79,6 +79,20 @@ impl Deformation {
         one(a, b) || one(b, c) || one(c, a) || (self.alike(a, b) && self.alike(b, c))
     }
 
+    /// How large the mesh is as modelled or with one target in full, whichever is most.
+    pub(super) fn extent(&self, base: &Shape) -> f64 {
+        let size = |target: Option<&Target>| {
+            let points = base.positions.iter().enumerate().map(|(v, p)| {
+                let moved = target.and_then(|t| t.positions.get(v)).copied().unwrap_or_default();
+                p.as_dvec3() + moved.as_dvec3()
+            });
+            let bounds =
+                points.fold(None, |b: Option<(DVec3, DVec3)>, p| Some(b.map_or((p, p), |(l, h)| (l.min(p), h.max(p)))));
+            bounds.map_or(0.0, |(lo, hi)| (hi - lo).max_element())
+        };
+        self.targets.iter().map(|t| size(Some(t))).fold(size(None), f64::max)
+    }
+
     /// Follows vertices that were reordered, dropped or copied: vertex `i` was vertex `source[i]`.
     pub(in crate::scene) fn reorder(&mut self, source: &[u32]) {
         fn pick<T: Copy>(values: &mut Vec<T>, source: &[u32]) {

@@ -253,8 +253,13 @@ impl Rig {
         };
         place(&rig, scene);
         let size = scene.bounds().map_or(1.0, |(lo, hi)| (hi - lo).max_element());
-        let extents: Vec<f64> = scene.meshes.iter().map(|m| extent(&m.geometry)).collect();
-        let floor = |mesh: usize| (1e-7 * size / extents[mesh]).clamp(1e-30, 1e30);
+        let mut extents: Vec<f64> = scene.meshes.iter().map(|m| extent(&m.geometry)).collect();
+        for (deformation, base) in rig.parts.deformations.iter().zip(&rig.shapes) {
+            let extent = &mut extents[deformation.mesh];
+            *extent = extent.max(deformation.extent(base));
+        }
+        // a mesh that is a point in every shape may have any scale
+        let floor = |mesh: usize| Some(1e-7 * size / extents[mesh]).filter(|f| *f > 0.0 && f.is_finite()).unwrap_or(1e-7);
         rig.floors = scene.instances.iter().map(|i| floor(i.mesh)).collect();
         place(&rig, scene);
         for (camera, node) in scene.cameras.iter_mut().zip(&rig.parts.cameras) {
@@ -268,5 +273,5 @@ impl Rig {
 
 /// How large a mesh is, in its own units.
 fn extent(geometry: &Geometry) -> f64 {
-    geometry.bounds().map_or(1.0, |(lo, hi)| (hi - lo).max_element()).max(f64::from(f32::MIN_POSITIVE))
+    geometry.bounds().map_or(0.0, |(lo, hi)| (hi - lo).max_element())
 }

@@ -175,7 +175,7 @@ impl Meshes<'_> {
         let meshes = &self.reader.document.meshes;
         let mesh = meshes.get(index).ok_or_else(|| Error::input(self.path, format!("mesh {index} does not exist")))?;
         let name = text(&mesh.name);
-        let again = self.primitives.keys().any(|k| k.mesh == index);
+        let again = self.primitives.range(Wanted::first(index)..).next().is_some_and(|(k, _)| k.mesh == index);
         let mut made = Vec::new();
         for (nth, primitive) in mesh.primitives.iter().enumerate() {
             let place = format!("mesh {index} `{name}`, primitive {nth}");

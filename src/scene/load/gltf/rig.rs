@@ -21,6 +21,13 @@ pub(super) struct Wanted {
     weights: Weights,
 }
 
+impl Wanted {
+    /// What comes before all other wishes for a mesh.
+    pub fn first(mesh: usize) -> Self {
+        Self { mesh, skin: None, weights: Weights::None }
+    }
+}
+
 /// Weights of morph targets.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Weights {
