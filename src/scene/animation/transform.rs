@@ -25,7 +25,9 @@ pub(super) fn at_least(t: &DAffine3, floor: f64) -> DAffine3 {
     let b = longest(&columns, &others, &across).unwrap_or(0);
     let mut side = across(columns[b]);
     if side.length() < floor {
-        let direction = side.try_normalize().unwrap_or_else(|| first.any_orthonormal_vector());
+        // what is left of parallel columns is rounding, which points anywhere
+        let direction = side.try_normalize().map(across).filter(|d| d.length() > 0.1).and_then(DVec3::try_normalize);
+        let direction = direction.unwrap_or_else(|| first.any_orthonormal_vector());
         columns[b] += direction * floor - side;
         side = direction * floor;
     }
