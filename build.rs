@@ -2,8 +2,7 @@
 //!
 //! A pass is a file `shaders/NAME.glsl` whose head says `// stream: any`, `// stream: closest` or both; `// rays: queue` besides
 //! when the rays are in memory before it begins, `// rays: coherent` when neighbours go much the same way (packets pay then). The generated `shaders.rs` holds a constant `NAME_ANY` / `NAME_CLOSEST` for each
-//! (see `src/tracer/stream.rs`). `// compute` instead: a compute shader that traces nothing, as the constant `NAME`; `// compute: queue`
-//! when it fills a queue: `NAME_BALLOT` then is for devices that can count lanes.
+//! (see `src/tracer/stream.rs`). `// compute` instead: a compute shader that traces nothing, as the constant `NAME`.
 
 use std::cell::RefCell;
 use std::collections::BTreeSet;
@@ -68,7 +67,7 @@ const HEAD_PACKET: &str = "#extension GL_EXT_shader_explicit_arithmetic_types_in
 
 const VARIANTS: [Variant; 9] = [
     Variant { field: "generate", template: "trace/generate.glsl", head: "", kind: ShaderKind::Compute },
-    Variant { field: "generate_64", template: "trace/generate.glsl", head: HEAD_64, kind: ShaderKind::Compute },
+    Variant { field: "generate_64", template: "trace/generate.glsl", head: HEAD_64_BALLOT, kind: ShaderKind::Compute },
     Variant { field: "deliver", template: "trace/deliver.glsl", head: "", kind: ShaderKind::Compute },
     Variant { field: "deliver_64", template: "trace/deliver.glsl", head: HEAD_64_BALLOT, kind: ShaderKind::Compute },
     Variant { field: "packet", template: "trace/packet.glsl", head: HEAD_PACKET, kind: ShaderKind::Compute },
@@ -126,18 +125,19 @@ impl Build {
         for file in files {
             let name = file.file_stem().and_then(|s| s.to_str()).expect("shader names are plain").to_owned();
             let text = std::fs::read_to_string(&file).expect("a shader can be read");
-            if text.lines().any(|l| l == "// compute" || l == "// compute: queue") {
-                let fills_queue = text.lines().any(|l| l == "// compute: queue");
-                for (suffix, head) in [("", ""), ("_ballot", HEAD_64_BALLOT)].into_iter().take(1 + usize::from(fills_queue)) {
+            if text.lines().any(|l| l == "// compute") {
+                let constant = name.to_uppercase();
+                let _ = write!(
+                    table,
+                    "/// `shaders/{name}.glsl`, which traces nothing.\npub static {constant}: ComputeShader = ComputeShader {{\n    name: \"{name}\",\n"
+                );
+                for (field, head) in [("plain", ""), ("int64", HEAD_64)] {
                     let source = format!("#version 460\n{EXTENSIONS}{head}#define LANES {LANES}\n#include \"{name}.glsl\"\n");
-                    let output = format!("{name}{suffix}.spv");
+                    let output = format!("{name}_{field}.spv");
                     self.compile(&source, ShaderKind::Compute, &format!("{name}.glsl"), &output);
-                    let constant = format!("{name}{suffix}").to_uppercase();
-                    let _ = writeln!(
-                        table,
-                        "/// `shaders/{name}.glsl`, which traces nothing.\npub static {constant}: &[u8] = include_bytes!(concat!(env!(\"OUT_DIR\"), \"/{output}\"));"
-                    );
+                    let _ = writeln!(table, "    {field}: include_bytes!(concat!(env!(\"OUT_DIR\"), \"/{output}\")),");
                 }
+                table.push_str("};\n");
                 continue;
             }
             let Some(modes) = text.lines().find_map(|l| l.strip_prefix("// stream:")) else {

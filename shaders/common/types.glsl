@@ -35,6 +35,14 @@ layout(buffer_reference, std430, buffer_reference_align = 4) readonly buffer Flo
 layout(buffer_reference, std430, buffer_reference_align = 8) readonly buffer Pairs { uvec2 v[]; };
 layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Quads { uvec4 v[]; };
 
+// On a CPU driver a divergent load is one gather, of 32 or of 64 bits alike: load pairs where 64-bit integers exist.
+#ifdef LOAD64
+layout(buffer_reference, std430, buffer_reference_align = 8) readonly buffer Words64 { uint64_t v[]; };
+#define LOAD_PAIR(base, i) unpackUint2x32(Words64(base).v[i])
+#else
+#define LOAD_PAIR(base, i) Pairs(base).v[i]
+#endif
+
 bool is_null(uvec2 address) { return (address.x | address.y) == 0u; }
 
 vec3 load_vec3(uvec2 base, uint index) {

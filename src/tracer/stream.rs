@@ -43,6 +43,22 @@ pub struct StreamShaders {
     raygen: &'static [u8],
 }
 
+/// A compute shader's SPIR-V.
+pub struct ComputeShader {
+    name: &'static str,
+    plain: &'static [u8],
+    // for devices with 64-bit integers
+    int64: &'static [u8],
+}
+
+impl ComputeShader {
+    /// Compiles it for a device.
+    pub fn pipeline(&self, device: &Arc<Device>) -> Result<ComputePipeline> {
+        let spirv = if device.info.int64 { self.int64 } else { self.plain };
+        ComputePipeline::new(device, self.name, spirv, &Specialization::default())
+    }
+}
+
 include!(concat!(env!("OUT_DIR"), "/shaders.rs"));
 
 /// The push constants of every stream; `Push` in shaders/common/types.glsl.
@@ -163,8 +179,9 @@ impl Stream {
         memory: LaunchMemory,
     ) -> Result<Self> {
         let int64 = device.info.int64;
-        let generate = if int64 { shaders.generate_64 } else { shaders.generate };
-        let deliver = if int64 && device.info.limits.subgroup_ballot { shaders.deliver_64 } else { shaders.deliver };
+        let ballot = int64 && device.info.limits.subgroup_ballot;
+        let generate = if ballot { shaders.generate_64 } else { shaders.generate };
+        let deliver = if ballot { shaders.deliver_64 } else { shaders.deliver };
         let pipeline = Pipeline::Steps {
             generate: match shaders.queue {
                 true => None,
