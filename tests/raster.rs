@@ -50,12 +50,14 @@ struct Difference {
 struct Bounds {
     /// Share of pixels that show another primitive.
     ids: f64,
-    /// Relative depth and position.
-    place: f32,
+    /// Relative.
+    depth: f32,
+    /// Relative; in a thin long triangle corners' weights, and with them the place along it, round the most.
+    position: f32,
     normal: f32,
 }
 
-const BOUNDS: Bounds = Bounds { ids: 0.001, place: 1e-5, normal: 1e-3 };
+const BOUNDS: Bounds = Bounds { ids: 0.001, depth: 1e-5, position: 1e-4, normal: 1e-3 };
 
 /// A scene, a camera, an image.
 struct Shot<'a> {
@@ -119,7 +121,7 @@ impl Shot<'_> {
         let most = (bounds.ids * traced.len() as f64).ceil() as usize;
         assert!(d.ids <= most, "{what}: {} of {} pixels show another primitive", d.ids, traced.len());
         assert!(d.unexplained <= most / 10, "{what}: pixels away from any edge show another primitive: {d:?}");
-        assert!(d.depth <= bounds.place && d.position <= bounds.place, "{what}: {d:?}");
+        assert!(d.depth <= bounds.depth && d.position <= bounds.position, "{what}: {d:?}");
         assert!(d.ng <= bounds.normal && d.ns <= bounds.normal, "{what}: {d:?}");
         d
     }
@@ -181,7 +183,9 @@ fn gpu_orthographic_views() {
     let device = device();
     for (name, half) in [("stairs", 2.0), ("grid:4", 3.0), ("leaf-cards", 2.0), ("cornell-spheres", 1.0), ("far-away", 2.0)] {
         let scene = scene(name);
-        check(&device, &format!("{name}, orthographic"), &scene, &orthographic(&scene.cameras[0], half), SIZE, BOUNDS);
+        // faces seen exactly from their side, and edges along rows of pixels
+        let bounds = Bounds { ids: 0.005, ..BOUNDS };
+        check(&device, &format!("{name}, orthographic"), &scene, &orthographic(&scene.cameras[0], half), SIZE, bounds);
     }
     // from among the geometry: what lies behind is not seen
     let scene = scene("grid:4");
@@ -316,7 +320,7 @@ fn gpu_scales_and_distances() {
             *fov_y = 2.0 * ((0.5 * *fov_y).tan() / back).atan();
         }
         // from afar single precision resolves less than a pixel's 1/64
-        let bounds = if back > 1.0 { Bounds { ids: 0.01, place: 1e-4, normal: 1e-2 } } else { BOUNDS };
+        let bounds = if back > 1.0 { Bounds { ids: 0.01, depth: 1e-4, position: 1e-4, normal: 1e-2 } } else { BOUNDS };
         check(&device, &format!("{name} x {factor:e}, {back} times as far"), &scene, &camera, SIZE, bounds);
     }
     assert_validation_clean(&device);
@@ -428,7 +432,7 @@ fn gpu_what_lies_outside_is_not_drawn() {
     let (_, drawn) = draw(&raster, &tracer, &view, &view);
     println!("{drawn:?}");
     assert_eq!(drawn.placed, FlatScene::new(&scene).primitive_count() as u64);
-    assert!(drawn.primitives < drawn.placed / 2, "{drawn:?}");
+    assert!(drawn.primitives < 6 * drawn.placed / 10, "{drawn:?}");
     assert_validation_clean(&device);
 }
 

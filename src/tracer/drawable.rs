@@ -7,7 +7,7 @@ use crate::bvh::Aabb;
 use crate::scene::flatten::{FlatScene, Group};
 
 /// Primitives that follow each other and are left out or drawn together.
-pub const CHUNK: u32 = 1024;
+pub const CHUNK: u32 = 256;
 
 /// Host-side outline of a group.
 pub struct Shape {
