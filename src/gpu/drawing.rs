@@ -6,8 +6,26 @@ use ash::vk;
 
 use super::buffer::Buffer;
 use super::commands::Recorder;
+use super::device::Device;
 use super::graphics_pipeline::{DRAW_STAGES, GraphicsPipeline};
 use super::image::{Image, Targets, range};
+
+/// A viewport is larger than the image by at most this factor.
+const MOST_WIDE: f32 = 8.0;
+
+impl Device {
+    /// By how much the viewport is larger than an image of `size` pixels, whose centre it shares: its clip space reaches so much farther than
+    /// the image. Drivers that clip at the viewport and not at a guard band, those for CPUs, are slow at it.
+    pub fn viewport_factor(&self, size: [u32; 2]) -> f32 {
+        let limits = &self.info.limits;
+        let most = size.map(|n| {
+            let n = n as f32;
+            let reach = (limits.viewport_range[1] - 0.5 * n).min(0.5 * n - limits.viewport_range[0]);
+            (limits.max_viewport_side / n).min(2.0 * reach / n)
+        });
+        most[0].min(most[1]).min(MOST_WIDE).floor().max(1.0)
+    }
+}
 
 /// Records draws into targets; made by [`Recorder::draw_into`].
 pub struct Drawing<'r, 'd> {
@@ -16,7 +34,8 @@ pub struct Drawing<'r, 'd> {
 }
 
 impl<'d> Recorder<'d> {
-    /// Clears the upper left `size` pixels of the targets to zero and draws there. What the targets held before is lost.
+    /// Clears the upper left `size` pixels of the targets to zero and draws there. Clip space is [`Device::viewport_factor`] times as large
+    /// as the image. What the targets held before is lost.
     pub fn draw_into(&mut self, targets: &Targets, size: [u32; 2], record: impl FnOnce(&mut Drawing<'_, 'd>)) {
         assert!(size[0] <= targets.size()[0] && size[1] <= targets.size()[1]);
         self.transition(
@@ -47,8 +66,10 @@ impl<'d> Recorder<'d> {
             .layer_count(1)
             .color_attachments(&ids)
             .depth_attachment(&depth);
-        let viewport =
-            vk::Viewport { x: 0.0, y: 0.0, width: size[0] as f32, height: size[1] as f32, min_depth: 0.0, max_depth: 1.0 };
+        let factor = self.device.viewport_factor(size);
+        let [width, height] = size.map(|n| factor * n as f32);
+        let [x, y] = size.map(|n| 0.5 * n as f32 * (1.0 - factor));
+        let viewport = vk::Viewport { x, y, width, height, min_depth: 0.0, max_depth: 1.0 };
         let (raw, buffer) = (&self.device.raw, self.buffer);
         // SAFETY: recording state; the targets are in the layouts that are named here
         unsafe {

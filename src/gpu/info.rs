@@ -23,6 +23,10 @@ pub struct Limits {
     pub max_workgroups_x: u32,
     /// Pixels of a side of an image that is drawn into.
     pub max_image_side: u32,
+    /// Pixels of a side of a viewport.
+    pub max_viewport_side: f32,
+    /// Pixel coordinates that a viewport's corners may have.
+    pub viewport_range: [f32; 2],
     /// Bytes of one allocation.
     pub max_allocation: u64,
     /// Bytes of all device-local heaps.
@@ -293,8 +297,6 @@ fn describe(instance: &Instance, index: usize, physical: vk::PhysicalDevice) -> 
                 properties.limits.max_image_dimension2_d,
                 properties.limits.max_framebuffer_width,
                 properties.limits.max_framebuffer_height,
-                properties.limits.max_viewport_dimensions[0],
-                properties.limits.max_viewport_dimensions[1],
             ]
             .into_iter()
             .min()
@@ -302,6 +304,8 @@ fn describe(instance: &Instance, index: usize, physical: vk::PhysicalDevice) -> 
             max_allocation: v13_limits.max_buffer_size.min(v11_limits.max_memory_allocation_size),
             device_memory,
             max_push_constants: properties.limits.max_push_constants_size,
+            max_viewport_side: properties.limits.max_viewport_dimensions.map(|n| n as f32).into_iter().fold(f32::INFINITY, f32::min),
+            viewport_range: properties.limits.viewport_bounds_range,
             timestamp_period: if properties.limits.timestamp_compute_and_graphics == vk::TRUE {
                 properties.limits.timestamp_period
             } else {

@@ -70,8 +70,9 @@ impl Plane {
         Plane { normal: self.normal + other.normal * factor, offset: self.offset + other.offset * factor }
     }
 
-    fn row(self) -> [f32; 4] {
-        self.normal.extend(self.offset).as_vec4().to_array()
+    fn row(self, factor: f64) -> [f32; 4] {
+        let (normal, offset) = (factor * self.normal, factor * self.offset);
+        normal.extend(offset).as_vec4().to_array()
     }
 
     /// Least and greatest value over a box of a group, what may be rounded included.
@@ -152,8 +153,8 @@ impl Frustum {
     }
 
     /// Rows that take a place relative to the eye to clip space. Depth is reversed: it is greatest in front. `depth` is the range of what
-    /// is seen.
-    pub fn clip(&self, depth: [f64; 2]) -> [[f32; 4]; 4] {
+    /// is seen; clip space is `wide` times as large as the image.
+    pub fn clip(&self, depth: [f64; 2], wide: f64) -> [[f32; 4]; 4] {
         let z = if self.orthographic {
             let (near, far) = (depth[0].max(0.0), depth[1].max(0.0));
             let length = (far - near).max(1e-30);
@@ -161,6 +162,6 @@ impl Frustum {
         } else {
             Plane { normal: DVec3::ZERO, offset: (NEAR * depth[1]).max(1e-30) }
         };
-        [self.x.row(), self.y.row(), z.row(), self.w.row()]
+        [self.x.row(1.0 / wide), self.y.row(1.0 / wide), z.row(1.0), self.w.row(1.0)]
     }
 }

@@ -123,9 +123,9 @@ impl Raster {
     pub fn draw(&self, recorder: &mut Recorder, tracer: &Tracer, view: &View) -> Result<Drawn> {
         let size = view.block.size;
         let frustum = Frustum::new(view)?;
-        let (draws, clip, drawn) = self.collect(tracer, &frustum);
+        let (draws, depth, drawn) = self.collect(tracer, &frustum);
         let params = RasterParams {
-            clip,
+            clip: frustum.clip(depth, tracer.device().viewport_factor(size) as f64),
             eye: frustum.eye.to_array(),
             turned: if frustum.turned { -1.0 } else { 1.0 },
             at: view.at,
@@ -175,8 +175,8 @@ impl Raster {
         self.stream.record(recorder, &Push { rays: self.drawn.address(), ..*push });
     }
 
-    /// What has to be drawn, from where, and how much that is.
-    fn collect(&self, tracer: &Tracer, frustum: &Frustum) -> (Draws, [[f32; 4]; 4], Drawn) {
+    /// What has to be drawn, the range of its depth, and how much that is.
+    fn collect(&self, tracer: &Tracer, frustum: &Frustum) -> (Draws, [f64; 2], Drawn) {
         let (mut draws, mut drawn) = (Draws::default(), Drawn::default());
         let mut depth = [f64::INFINITY, 0.0f64];
         for entry in tracer.drawables() {
@@ -193,7 +193,7 @@ impl Raster {
             drawn.draws += 1;
             drawn.primitives += draw.primitives.len() as u64;
         }
-        (draws, frustum.clip(depth), drawn)
+        (draws, depth, drawn)
     }
 
     fn collect_entry(&self, tracer: &Tracer, frustum: &Frustum, entry: &Drawable, sight: Sight, draws: &mut Draws) {
