@@ -1,12 +1,12 @@
-//! What camera rays cost, drawn and traced: time of the auxiliary outputs' pass on each of some scenes, the two by turns, medians. From
-//! submission to the end, because CPU drivers stamp draws when they like.
+//! What camera rays cost, drawn and traced: time of the auxiliary outputs' pass on each of some scenes, the two by turns, medians of
+//! the time from recording to the end of the work.
 //!
 //!     cargo run --release --example primary -- [--repeats N] [SCENE[@EX,EY,EZ,TX,TY,TZ,FOV]...]
 
 use std::time::Instant;
 
 use glam::DVec3;
-use skylit::gpu::{Buffer, Commands, Device, Memory, Options, Recorder};
+use skylit::gpu::{Buffer, Commands, Device, Memory, Options};
 use skylit::render::block::{Block, BlockParams};
 use skylit::render::camera::{CameraRecord, Choice, choose};
 use skylit::render::raster::{Raster, View};
@@ -19,6 +19,8 @@ const SCENES: [&str; 6] = ["cornell-box", "stairs", "grid:6", "leaf-cards", "ter
 const SIZES: [[u32; 2]; 2] = [[640, 360], [1280, 720]];
 
 fn main() -> skylit::Result<()> {
+    // as the program does
+    skylit::gpu::environment::prefer_wide_vectors();
     let (mut repeats, mut scenes) = (9, Vec::new());
     let mut args = std::env::args().skip(1);
     while let Some(arg) = args.next() {
@@ -31,18 +33,18 @@ fn main() -> skylit::Result<()> {
         scenes = SCENES.map(str::to_owned).to_vec();
     }
     let device = Device::open(&Options::default())?;
-    println!("{} ({}), medians of {repeats}, milliseconds from submission to the end", device.info.name, device.info.driver);
-    println!("{:28} {:>10} {:>9} {:>9} {:>9} {:>12} {:>6}", "scene", "image", "traced", "drawn", "its draw", "primitives", "draws");
+    println!("{} ({}), medians of {repeats}, milliseconds from recording to the end", device.info.name, device.info.driver);
+    println!(
+        "{:28} {:>10} {:>9} {:>9} {:>9} {:>9} {:>12} {:>6}",
+        "scene", "image", "traced", "drawn", "its draw", "its hits", "primitives", "draws"
+    );
     for given in &scenes {
         let (name, camera) = given.split_once('@').map_or((given.as_str(), None), |(n, c)| (n, Some(c)));
         let scene = open(name)?;
         let choice = match camera.map(|c| c.split(',').filter_map(|x| x.parse().ok()).collect::<Vec<f64>>()).as_deref() {
-            Some(&[a, b, c, d, e, f, fov]) => Choice::LookAt {
-                eye: DVec3::new(a, b, c),
-                target: DVec3::new(d, e, f),
-                up: DVec3::Y,
-                fov_y: fov.to_radians(),
-            },
+            Some(&[a, b, c, d, e, f, fov]) => {
+                Choice::LookAt { eye: DVec3::new(a, b, c), target: DVec3::new(d, e, f), up: DVec3::Y, fov_y: fov.to_radians() }
+            }
             _ => Choice::Auto,
         };
         let flat = FlatScene::new(&scene);
@@ -75,29 +77,29 @@ fn measure(tracer: &Tracer, scene: &Scene, name: &str, choice: &Choice, size: [u
     let raster = Raster::new(tracer, &stream::AOV_CLOSEST, size)?;
     let view = View { camera, image_size: size, block, at: [0.5; 2] };
     let mut commands = Commands::new(device)?;
-    // traced, drawn, drawing alone
-    let mut times: [Vec<f64>; 3] = Default::default();
+    // traced, drawn, and of the latter the drawing and the hits
+    let mut times: [Vec<f64>; 4] = Default::default();
     let mut drawn = Ok(Default::default());
-    let mut timed = |slot: usize, record: &mut dyn FnMut(&mut Recorder)| {
-        let start = Instant::now();
-        commands.run(|r| record(r))?;
-        times[slot].push(start.elapsed().as_secs_f64());
-        skylit::Result::Ok(())
-    };
     for _ in 0..=repeats {
-        timed(0, &mut |r| {
+        let start = Instant::now();
+        commands.run(|r| {
             for first in (0..count).step_by(LAUNCH_RAYS as usize) {
                 stream.record(r, &Push { first, count: LAUNCH_RAYS.min(count - first), ..push });
             }
         })?;
-        timed(1, &mut |r| drawn = raster.record(r, tracer, &push, &view))?;
-        timed(2, &mut |r| drawn = raster.draw(r, tracer, &view))?;
+        times[0].push(start.elapsed().as_secs_f64());
+        let start = Instant::now();
+        let timings = commands.run(|r| drawn = raster.record(r, tracer, &push, &view))?;
+        times[1].push(start.elapsed().as_secs_f64());
+        for (k, t) in timings.iter().enumerate().take(2) {
+            times[2 + k].push(t.seconds);
+        }
     }
     let drawn = drawn?;
     // the first is to warm up
-    let [traced, both, draw] = times.map(|t| 1e3 * median(&t[1..]));
+    let [traced, both, draw, hits] = times.map(|t| 1e3 * median(&t[1..]));
     println!(
-        "{:28} {:>10} {traced:9.2} {both:9.2} {draw:9.2} {:>12} {:>6}",
+        "{:28} {:>10} {traced:9.2} {both:9.2} {draw:9.2} {hits:9.2} {:>12} {:>6}",
         name.rsplit('/').next().unwrap_or(name),
         format!("{}x{}", size[0], size[1]),
         format!("{:.0}k/{:.0}k", drawn.primitives as f64 / 1e3, drawn.placed as f64 / 1e3),

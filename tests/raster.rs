@@ -23,6 +23,9 @@ use skylit::tracer::{Changes, MeshChange, Push, Tracer, TracerKind, stream};
 
 const NONE: u32 = u32::MAX;
 const SIZE: [u32; 2] = [320, 200];
+/// Pixels: corners are rounded to 1/256 by the drivers here, and Vulkan asks for 1/16.
+const BESIDE: f64 = 1.0 / 64.0;
+const RAYS_BESIDE: usize = 1000;
 
 fn scene(name: &str) -> Scene {
     by_name(name).unwrap_or_else(|| panic!("no built-in scene {name}"))
@@ -34,7 +37,7 @@ struct Difference {
     hits: usize,
     /// Pixels that show another primitive.
     ids: usize,
-    /// Of those, pixels that no ray explains which passes less than 1/64 of a pixel beside the centre.
+    /// Of those, pixels that no ray explains which passes less than [`BESIDE`] the centre.
     unexplained: usize,
     /// Greatest differences where the primitive is the same: depth and position relative to the distances there, normals.
     depth: f32,
@@ -71,16 +74,22 @@ impl Shot<'_> {
         CameraRecord::new(self.camera, self.scene.origin(), self.size[0] as f64 / self.size[1] as f64)
     }
 
-    /// Is what was drawn where the oracle finds it just beside the centre, or where something else is at the same depth?
+    /// Is what was drawn where the oracle finds it just beside the centre, or what was traced at the same depth? Triangles behind a silhouette may
+    /// be drawn a little before those that hide them: then the oracle finds their neighbour at their depth.
     fn explains(&self, oracle: &Oracle, traced: &AovPixel, drawn: &AovPixel, at: usize) -> bool {
         let (x, y) = ((at as u32 % self.size[0]) as f64 + 0.5, (at as u32 / self.size[0]) as f64 + 0.5);
-        (traced.depth - drawn.depth).abs() <= 1e-5 * traced.depth
-            || (0..64).any(|k| {
-                let (radius, turn) = (1.0 / [1024.0, 512.0, 256.0, 64.0][k / 16], k as f64 * std::f64::consts::TAU / 16.0);
+        let both = traced.depth.is_finite() && drawn.depth.is_finite();
+        both && (traced.depth - drawn.depth).abs() <= 3e-5 * traced.depth
+            || (0..RAYS_BESIDE).any(|k| {
+                // a spiral that fills the disc evenly
+                let (radius, turn) = (BESIDE * ((k + 1) as f64 / RAYS_BESIDE as f64).sqrt(), k as f64 * 2.399963);
                 let film = [x + radius * turn.cos(), y + radius * turn.sin()];
                 let hit = oracle.closest(camera_ray(self.camera, oracle.origin(), self.size, film));
                 match hit.is_hit() {
-                    true => (hit.instance, hit.primitive) == (drawn.instance, drawn.primitive),
+                    true => {
+                        let off = (hit.t as f32 - drawn.depth).abs();
+                        hit.instance == drawn.instance && (hit.primitive == drawn.primitive || off <= 1e-3 * drawn.depth)
+                    }
                     false => drawn.instance == NONE,
                 }
             })
@@ -100,7 +109,13 @@ impl Shot<'_> {
             if (a.instance, a.primitive, a.material) != (b.instance, b.primitive, b.material) {
                 d.ids += 1;
                 let oracle = oracle.get_or_insert_with(|| Oracle::new(self.scene, self.scene.origin()));
-                d.unexplained += !self.explains(oracle, a, b, at) as usize;
+                if !self.explains(oracle, a, b, at) {
+                    println!(
+                        "  unexplained: pixel {at}: {} {} at {}, drawn {} {} at {}",
+                        a.instance, a.primitive, a.depth, b.instance, b.primitive, b.depth
+                    );
+                    d.unexplained += 1;
+                }
             } else if a.instance != NONE {
                 let scale = a.position.iter().fold(a.depth, |w, x| w.max(x.abs()));
                 d.depth = d.depth.max((a.depth - b.depth).abs() / scale);
@@ -120,7 +135,7 @@ impl Shot<'_> {
         println!("{what}, {}: {} pixels, {d:?}", tracer.kind(), traced.len());
         let most = (bounds.ids * traced.len() as f64).ceil() as usize;
         assert!(d.ids <= most, "{what}: {} of {} pixels show another primitive", d.ids, traced.len());
-        assert!(d.unexplained <= most / 10, "{what}: pixels away from any edge show another primitive: {d:?}");
+        assert!(d.unexplained == 0, "{what}: pixels away from any edge show another primitive: {d:?}");
         assert!(d.depth <= bounds.depth && d.position <= bounds.position, "{what}: {d:?}");
         assert!(d.ng <= bounds.normal && d.ns <= bounds.normal, "{what}: {d:?}");
         d
@@ -181,11 +196,12 @@ fn gpu_every_tracers_scene_can_be_drawn() {
 #[test]
 fn gpu_orthographic_views() {
     let device = device();
-    for (name, half) in [("stairs", 2.0), ("grid:4", 3.0), ("leaf-cards", 2.0), ("cornell-spheres", 1.0), ("far-away", 2.0)] {
+    for (name, half) in [("stairs", 2.0), ("grid:4", 3.0), ("leaf-cards", 2.0), ("cornell-spheres", 3.0), ("far-away", 2.0)] {
         let scene = scene(name);
         // faces seen exactly from their side, and edges along rows of pixels
         let bounds = Bounds { ids: 0.005, ..BOUNDS };
-        check(&device, &format!("{name}, orthographic"), &scene, &orthographic(&scene.cameras[0], half), SIZE, bounds);
+        let d = check(&device, &format!("{name}, orthographic"), &scene, &orthographic(&scene.cameras[0], half), SIZE, bounds);
+        assert!(d.hits > 10_000, "{name}: hardly anything is seen");
     }
     // from among the geometry: what lies behind is not seen
     let scene = scene("grid:4");
@@ -212,10 +228,7 @@ fn mirrored() -> Scene {
     );
     add(shapes::icosphere(0.3, 2), &[place(DVec3::new(1.0, -1.0, 0.8), 0.3, 0.4, 1.0)]);
     add(shapes::sphere(DVec3::new(0.1, 0.0, 0.0), 0.3), &[place(DVec3::new(-1.5, 0.6, 1.0), 0.9, 1.2, 1.0)]);
-    add(
-        shapes::sphere(DVec3::ZERO, 0.2),
-        &[place(DVec3::splat(1.2), 0.2, 0.0, 1.8), place(DVec3::splat(-0.7), 0.2, 0.7, 1.8)],
-    );
+    add(shapes::sphere(DVec3::ZERO, 0.2), &[place(DVec3::splat(1.2), 0.2, 0.0, 1.8), place(DVec3::splat(-0.7), 0.2, 0.7, 1.8)]);
     scene
 }
 
@@ -315,13 +328,15 @@ fn gpu_scales_and_distances() {
         let mut camera = scene.cameras[0].clone();
         let middle = scene.bounds().map(|(lo, hi)| 0.5 * (lo + hi)).unwrap();
         let eye = camera.camera_to_world.translation * factor;
-        camera.camera_to_world.translation = middle + (eye - middle) * back;
+        let forward = camera.camera_to_world.matrix3 * DVec3::NEG_Z;
+        camera.camera_to_world.translation = eye - forward * ((back - 1.0) * (middle - eye).length());
         if let Projection::Perspective { fov_y } = &mut camera.projection {
             *fov_y = 2.0 * ((0.5 * *fov_y).tan() / back).atan();
         }
         // from afar single precision resolves less than a pixel's 1/64
-        let bounds = if back > 1.0 { Bounds { ids: 0.01, depth: 1e-4, position: 1e-4, normal: 1e-2 } } else { BOUNDS };
-        check(&device, &format!("{name} x {factor:e}, {back} times as far"), &scene, &camera, SIZE, bounds);
+        let bounds = if back > 1.0 { Bounds { ids: 0.01, depth: 1e-4, position: 1e-4, normal: 0.1 } } else { BOUNDS };
+        let d = check(&device, &format!("{name} x {factor:e}, {back} times as far"), &scene, &camera, SIZE, bounds);
+        assert!(d.hits > 10_000, "{name}: hardly anything is seen");
     }
     assert_validation_clean(&device);
 }
@@ -378,8 +393,7 @@ fn draw(raster: &Raster, tracer: &Tracer, view: &View, seen: &View) -> (Vec<AovP
     let params = Buffer::from_slice(device, "block parameters", &[params]).unwrap();
     let push = Push { scene: tracer.scene_address(), pass: params.address(), count, ..Default::default() };
     let mut drawn = None;
-    let timings =
-        Commands::new(device).unwrap().run(|r| drawn = Some(raster.record(r, tracer, &push, view).unwrap())).unwrap();
+    let timings = Commands::new(device).unwrap().run(|r| drawn = Some(raster.record(r, tracer, &push, view).unwrap())).unwrap();
     assert!(timings.is_empty() || timings.iter().map(|t| t.label).eq(["raster draw", "aov"]), "{timings:?}");
     let mut out = vec![AovPixel::zeroed(); count as usize];
     let bytes = target.read(0, 64 * count as u64).unwrap();
@@ -433,6 +447,18 @@ fn gpu_what_lies_outside_is_not_drawn() {
     println!("{drawn:?}");
     assert_eq!(drawn.placed, FlatScene::new(&scene).primitive_count() as u64);
     assert!(drawn.primitives < 6 * drawn.placed / 10, "{drawn:?}");
+    assert_validation_clean(&device);
+}
+
+#[test]
+fn gpu_auto_draws_few_primitives_and_traces_many() {
+    let device = device();
+    let tracer = tracer(&device, TracerKind::Compute, &scene("terrain:20000"));
+    for (pixels, want) in [(1 << 20, Primary::Raster), (1000, Primary::Traced)] {
+        let (primary, why) = Primary::auto(&tracer, pixels);
+        assert_eq!(primary, want, "{why}");
+        assert!(why.contains("primitives a pixel"), "{why}");
+    }
     assert_validation_clean(&device);
 }
 

@@ -69,7 +69,8 @@ impl Commands {
             let begin = vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
             raw.begin_command_buffer(self.buffer, &begin).context("recording commands")?;
         }
-        let mut recorder = Recorder { device: &self.device, buffer: self.buffer, queries: self.queries, labels: Vec::new() };
+        let mut recorder =
+            Recorder { device: &self.device, buffer: self.buffer, queries: self.queries, labels: Vec::new(), drew: false };
         record(&mut recorder);
         recorder.final_barrier();
         let labels = recorder.labels;
@@ -128,6 +129,8 @@ pub struct Recorder<'a> {
     pub(super) buffer: vk::CommandBuffer,
     queries: Option<vk::QueryPool>,
     labels: Vec<&'static str>,
+    // something was drawn
+    pub(super) drew: bool,
 }
 
 impl Recorder<'_> {
@@ -141,6 +144,10 @@ impl Recorder<'_> {
             unsafe { self.device.raw.cmd_write_timestamp2(self.buffer, stage, queries, 2 * region + k) }
         };
         stamp(vk::PipelineStageFlags2::ALL_COMMANDS, 0);
+        if self.drew {
+            // once they have drawn, CPU drivers put a stamp off until something makes them wait
+            self.barrier();
+        }
         record(self);
         let (device, buffer) = (self.device, self.buffer);
         // SAFETY: as above

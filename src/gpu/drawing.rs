@@ -61,11 +61,8 @@ impl<'d> Recorder<'d> {
             .load_op(vk::AttachmentLoadOp::CLEAR)
             .store_op(vk::AttachmentStoreOp::DONT_CARE)
             .clear_value(vk::ClearValue { depth_stencil: vk::ClearDepthStencilValue { depth: 0.0, stencil: 0 } });
-        let info = vk::RenderingInfo::default()
-            .render_area(area)
-            .layer_count(1)
-            .color_attachments(&ids)
-            .depth_attachment(&depth);
+        let info =
+            vk::RenderingInfo::default().render_area(area).layer_count(1).color_attachments(&ids).depth_attachment(&depth);
         let factor = self.device.viewport_factor(size);
         let [width, height] = size.map(|n| factor * n as f32);
         let [x, y] = size.map(|n| 0.5 * n as f32 * (1.0 - factor));
@@ -78,6 +75,7 @@ impl<'d> Recorder<'d> {
             raw.cmd_set_scissor(buffer, 0, &[area]);
         }
         record(&mut Drawing { recorder: self, bound: None });
+        self.drew = true;
         // SAFETY: begun above
         unsafe { self.device.raw.cmd_end_rendering(self.buffer) };
     }
@@ -118,7 +116,9 @@ impl<'d> Recorder<'d> {
             .image(image.raw)
             .subresource_range(range(aspect))];
         // SAFETY: recording state, outside of a rendering
-        unsafe { self.device.raw.cmd_pipeline_barrier2(self.buffer, &vk::DependencyInfo::default().image_memory_barriers(&barrier)) };
+        unsafe {
+            self.device.raw.cmd_pipeline_barrier2(self.buffer, &vk::DependencyInfo::default().image_memory_barriers(&barrier))
+        };
     }
 }
 

@@ -304,7 +304,12 @@ fn describe(instance: &Instance, index: usize, physical: vk::PhysicalDevice) -> 
             max_allocation: v13_limits.max_buffer_size.min(v11_limits.max_memory_allocation_size),
             device_memory,
             max_push_constants: properties.limits.max_push_constants_size,
-            max_viewport_side: properties.limits.max_viewport_dimensions.map(|n| n as f32).into_iter().fold(f32::INFINITY, f32::min),
+            max_viewport_side: properties
+                .limits
+                .max_viewport_dimensions
+                .map(|n| n as f32)
+                .into_iter()
+                .fold(f32::INFINITY, f32::min),
             viewport_range: properties.limits.viewport_bounds_range,
             timestamp_period: if properties.limits.timestamp_compute_and_graphics == vk::TRUE {
                 properties.limits.timestamp_period

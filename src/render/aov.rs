@@ -13,8 +13,8 @@ use crate::tracer::{Push, Stream, Tracer, stream};
 
 /// Where hits come from.
 enum Source {
-    Traced(Stream),
-    Drawn(Raster),
+    Traced(Box<Stream>),
+    Drawn(Box<Raster>),
 }
 
 /// What a pixel's centre shows; `AovPixel` of shaders/aov.glsl.
@@ -59,8 +59,11 @@ pub fn render_with(
     let device = tracer.device();
     let blocks = Block::cut(size);
     let source = match primary {
-        Primary::Traced => Source::Traced(tracer.stream(&stream::AOV_CLOSEST)?),
-        Primary::Raster => Source::Drawn(Raster::new(tracer, &stream::AOV_CLOSEST, blocks.first().map_or([1; 2], |b| b.size))?),
+        Primary::Traced => Source::Traced(Box::new(tracer.stream(&stream::AOV_CLOSEST)?)),
+        Primary::Raster => {
+            let size = blocks.first().map_or([1; 2], |b| b.size);
+            Source::Drawn(Box::new(Raster::new(tracer, &stream::AOV_CLOSEST, size)?))
+        }
     };
     let mut commands = Commands::new(device)?;
     let record = size_of::<AovPixel>() as u64;

@@ -11,8 +11,8 @@ use std::sync::Arc;
 use bytemuck::{Pod, Zeroable};
 
 use super::block::BlockParams;
-use super::frustum::{Frustum, Sight};
 pub use super::frustum::View;
+use super::frustum::{Frustum, Sight};
 use crate::error::Result;
 use crate::gpu::{Buffer, Cull, Device, GraphicsPipeline, Memory, Recorder, Targets};
 use crate::tracer::drawable::CHUNK;
@@ -43,6 +43,32 @@ pub enum Primary {
     Traced,
     /// The scene is drawn.
     Raster,
+}
+
+/// Placed primitives per pixel up to which drawing costs less than tracing. Mesa's CPU driver takes 70 to 90 ns for a triangle of
+/// any size, and a ray costs that much more than looking its hit up. Of GPUs it is not measured.
+const PRIMITIVES_PER_PIXEL: (f64, f64) = (0.5, 8.0);
+
+impl Primary {
+    /// What costs less for images of so many pixels, one sample each, and why.
+    pub fn auto(tracer: &Tracer, pixels: u64) -> (Primary, String) {
+        let info = &tracer.device().info;
+        if !info.can_rasterise() {
+            return (Primary::Traced, format!("the device lacks {}, which rasterising needs", info.missing_raster.join(", ")));
+        }
+        let placed: u64 = tracer.drawables().map(|d| d.shape.primitives as u64).sum();
+        let most = if info.is_cpu() { PRIMITIVES_PER_PIXEL.0 } else { PRIMITIVES_PER_PIXEL.1 };
+        match placed as f64 / pixels.max(1) as f64 {
+            share if share > most => (
+                Primary::Traced,
+                format!("{share:.2} primitives a pixel: this device draws faster than it traces up to {most}"),
+            ),
+            share => (
+                Primary::Raster,
+                format!("{share:.2} primitives a pixel: this device draws faster than it traces up to {most}"),
+            ),
+        }
+    }
 }
 
 /// What was drawn.

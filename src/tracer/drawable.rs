@@ -57,13 +57,7 @@ impl Shape {
         if chunks.len() == 1 {
             chunks.clear();
         }
-        Self {
-            spheres: group.spheres,
-            primitives: primitives as u32,
-            opaque: group.opaque_count as u32,
-            bounds,
-            chunks,
-        }
+        Self { spheres: group.spheres, primitives: primitives as u32, opaque: group.opaque_count as u32, bounds, chunks }
     }
 
     /// Its vertices have moved.

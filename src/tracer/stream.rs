@@ -245,11 +245,7 @@ impl Stream {
         }
         let in_memory = self.shaders.queue || matches!(self.pipeline, Pipeline::Drawn(_));
         debug_assert_eq!(in_memory, push.rays != 0, "{}: where are its rays?", self.shaders.name);
-        debug_assert!(
-            in_memory || push.count <= LAUNCH_RAYS,
-            "{}: results would overwrite each other",
-            self.shaders.name
-        );
+        debug_assert!(in_memory || push.count <= LAUNCH_RAYS, "{}: results would overwrite each other", self.shaders.name);
         let pass = self.shaders.pass;
         match &self.pipeline {
             Pipeline::Single { pipeline, rays_per_group } => {
