@@ -1,6 +1,9 @@
 //! What camera rays cost, drawn and traced: time of the auxiliary outputs' pass on each of some scenes, the two by turns, medians of
 //! the time from recording to the end of the work.
 //!
+//! Where the device cannot draw, traced alone. A CPU driver of Mesa draws with vectors of 256 bits at most; what traced rays cost with
+//! wider ones is shown with `LP_NATIVE_VECTOR_WIDTH=512` and a `MESA_SHADER_CACHE_DIR` of its own.
+//!
 //!     cargo run --release --example primary -- [--repeats N] [SCENE[@EX,EY,EZ,TX,TY,TZ,FOV]...]
 
 use std::time::Instant;
@@ -19,8 +22,6 @@ const SCENES: [&str; 6] = ["cornell-box", "stairs", "grid:6", "leaf-cards", "ter
 const SIZES: [[u32; 2]; 2] = [[640, 360], [1280, 720]];
 
 fn main() -> skylit::Result<()> {
-    // as the program does
-    skylit::gpu::environment::prefer_wide_vectors();
     let (mut repeats, mut scenes) = (9, Vec::new());
     let mut args = std::env::args().skip(1);
     while let Some(arg) = args.next() {
@@ -74,7 +75,7 @@ fn measure(tracer: &Tracer, scene: &Scene, name: &str, choice: &Choice, size: [u
     let params = Buffer::from_slice(device, "block parameters", &[params])?;
     let push = Push { scene: tracer.scene_address(), pass: params.address(), count, ..Default::default() };
     let stream = tracer.stream(&stream::AOV_CLOSEST)?;
-    let raster = Raster::new(tracer, &stream::AOV_CLOSEST, size)?;
+    let raster = device.info.can_rasterise().then(|| Raster::new(tracer, &stream::AOV_CLOSEST, size)).transpose()?;
     let view = View { camera, image_size: size, block, at: [0.5; 2] };
     let mut commands = Commands::new(device)?;
     // traced, drawn, and of the latter the drawing and the hits
@@ -88,6 +89,7 @@ fn measure(tracer: &Tracer, scene: &Scene, name: &str, choice: &Choice, size: [u
             }
         })?;
         times[0].push(start.elapsed().as_secs_f64());
+        let Some(raster) = &raster else { continue };
         let start = Instant::now();
         let timings = commands.run(|r| drawn = raster.record(r, tracer, &push, &view))?;
         times[1].push(start.elapsed().as_secs_f64());
@@ -97,7 +99,7 @@ fn measure(tracer: &Tracer, scene: &Scene, name: &str, choice: &Choice, size: [u
     }
     let drawn = drawn?;
     // the first is to warm up
-    let [traced, both, draw, hits] = times.map(|t| 1e3 * median(&t[1..]));
+    let [traced, both, draw, hits] = times.map(|t| 1e3 * median(t.get(1..).unwrap_or_default()));
     println!(
         "{:28} {:>10} {traced:9.2} {both:9.2} {draw:9.2} {hits:9.2} {:>12} {:>6}",
         name.rsplit('/').next().unwrap_or(name),

@@ -6,7 +6,7 @@ mod common;
 use std::sync::Arc;
 
 use bytemuck::Zeroable;
-use common::{ALL, assert_validation_clean, device, tracer, tracers};
+use common::{ALL, assert_validation_clean, tracer, tracers};
 use glam::{DAffine3, DMat3, DQuat, DVec3, Vec3};
 use skylit::gpu::{Buffer, Commands, Device, Memory};
 use skylit::oracle::Oracle;
@@ -26,6 +26,25 @@ const SIZE: [u32; 2] = [320, 200];
 /// Pixels: corners are rounded to 1/256 by the drivers here, and Vulkan asks for 1/16.
 const BESIDE: f64 = 1.0 / 64.0;
 const RAYS_BESIDE: usize = 1000;
+
+/// `None`, said on stdout and checked, where the driver's vectors are too wide to draw with.
+fn device() -> Option<Arc<Device>> {
+    let device = common::device();
+    if device.info.can_rasterise() {
+        return Some(device);
+    }
+    println!("skipped: the device lacks {:?}", device.info.missing_raster);
+    assert!(
+        device.info.missing_raster.iter().all(|m| m.contains("LP_NATIVE_VECTOR_WIDTH")),
+        "{:?}",
+        device.info.missing_raster
+    );
+    let tracer = tracer(&device, TracerKind::Compute, &scene("cornell-box"));
+    let Err(error) = Raster::new(&tracer, &stream::AOV_CLOSEST, SIZE) else { panic!("it can draw") };
+    assert!(error.to_string().contains("LP_NATIVE_VECTOR_WIDTH") && error.to_string().contains("--primary traced"), "{error}");
+    assert_eq!(Primary::auto(&tracer, 1 << 20).0, Primary::Traced);
+    None
+}
 
 fn scene(name: &str) -> Scene {
     by_name(name).unwrap_or_else(|| panic!("no built-in scene {name}"))
@@ -153,7 +172,7 @@ fn orthographic(camera: &Camera, half_height: f64) -> Camera {
 
 #[test]
 fn gpu_scenes_drawn_and_traced() {
-    let device = device();
+    let Some(device) = device() else { return };
     for name in [
         "cornell-box",
         "stairs",
@@ -177,7 +196,7 @@ fn gpu_scenes_drawn_and_traced() {
 
 #[test]
 fn gpu_every_tracers_scene_can_be_drawn() {
-    let device = device();
+    let Some(device) = device() else { return };
     for name in ["grid:4", "leaf-cards", "spheres:300"] {
         let scene = scene(name);
         let shot = Shot { scene: &scene, camera: &scene.cameras[0], size: SIZE };
@@ -195,7 +214,7 @@ fn gpu_every_tracers_scene_can_be_drawn() {
 
 #[test]
 fn gpu_orthographic_views() {
-    let device = device();
+    let Some(device) = device() else { return };
     for (name, half) in [("stairs", 2.0), ("grid:4", 3.0), ("leaf-cards", 2.0), ("cornell-spheres", 3.0), ("far-away", 2.0)] {
         let scene = scene(name);
         // faces seen exactly from their side, and edges along rows of pixels
@@ -234,7 +253,7 @@ fn mirrored() -> Scene {
 
 #[test]
 fn gpu_mirrored_instances_and_cameras() {
-    let device = device();
+    let Some(device) = device() else { return };
     let scene = mirrored();
     let camera = &scene.cameras[0];
     check(&device, "mirrored instances", &scene, camera, SIZE, BOUNDS);
@@ -247,7 +266,7 @@ fn gpu_mirrored_instances_and_cameras() {
 
 #[test]
 fn gpu_image_sizes() {
-    let device = device();
+    let Some(device) = device() else { return };
     let scene = scene("cornell-spheres");
     // a pixel or a few may all lie on an edge
     let few = |size: [u32; 2]| Bounds { ids: BOUNDS.ids.max(2.0 / (size[0] * size[1]) as f64), ..BOUNDS };
@@ -266,7 +285,7 @@ fn gpu_image_sizes() {
 
 #[test]
 fn gpu_cameras_within_and_before_geometry() {
-    let device = device();
+    let Some(device) = device() else { return };
     // within a sphere, within a torus of many placed ones, on a landscape that goes on behind
     let spheres = scene("cornell-spheres");
     let sphere = spheres
@@ -311,7 +330,7 @@ fn gpu_cameras_within_and_before_geometry() {
 
 #[test]
 fn gpu_scales_and_distances() {
-    let device = device();
+    let Some(device) = device() else { return };
     for (name, factor, back) in [
         ("stairs", 1e-3, 1.0),
         ("stairs", 1e6, 1.0),
@@ -343,7 +362,7 @@ fn gpu_scales_and_distances() {
 
 #[test]
 fn gpu_drawn_scenes_follow_updates() {
-    let device = device();
+    let Some(device) = device() else { return };
     for kind in tracers(&device) {
         let mut scene = scene("grid:3");
         let motion = Motion { instances: (0..scene.instances.len()).collect(), meshes: vec![scene.instances[0].mesh] };
@@ -404,7 +423,7 @@ fn draw(raster: &Raster, tracer: &Tracer, view: &View, seen: &View) -> (Vec<AovP
 /// A place in the pixel moves what is drawn as far as the pixels' own numbers do.
 #[test]
 fn gpu_a_pixels_sample_may_lie_anywhere() {
-    let device = device();
+    let Some(device) = device() else { return };
     for scene in [scene("grid:4"), mirrored()] {
         let tracer = tracer(&device, TracerKind::Compute, &scene);
         let size = [128, 96];
@@ -432,7 +451,7 @@ fn gpu_a_pixels_sample_may_lie_anywhere() {
 
 #[test]
 fn gpu_what_lies_outside_is_not_drawn() {
-    let device = device();
+    let Some(device) = device() else { return };
     let scene = scene("terrain:200000");
     let (lo, hi) = scene.bounds().unwrap();
     let eye = DVec3::new(0.5 * (lo.x + hi.x), hi.y + 0.1, 0.5 * (lo.z + hi.z));
@@ -452,7 +471,7 @@ fn gpu_what_lies_outside_is_not_drawn() {
 
 #[test]
 fn gpu_auto_draws_few_primitives_and_traces_many() {
-    let device = device();
+    let Some(device) = device() else { return };
     let tracer = tracer(&device, TracerKind::Compute, &scene("terrain:20000"));
     for (pixels, want) in [(1 << 20, Primary::Raster), (1000, Primary::Traced)] {
         let (primary, why) = Primary::auto(&tracer, pixels);
@@ -464,7 +483,7 @@ fn gpu_auto_draws_few_primitives_and_traces_many() {
 
 #[test]
 fn gpu_what_cannot_be_drawn_is_said() {
-    let device = device();
+    let Some(device) = device() else { return };
     let scene = scene("cornell-box");
     let tracer = tracer(&device, TracerKind::Compute, &scene);
     let Err(error) = Raster::new(&tracer, &stream::RAYS_CLOSEST, SIZE) else { panic!("any rays can be drawn") };

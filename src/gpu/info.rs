@@ -139,6 +139,14 @@ fn text(s: &[std::ffi::c_char]) -> String {
     String::from_utf8_lossy(&bytes).into_owned()
 }
 
+/// With wider vectors Mesa's CPU driver crashes when it compiles a vertex shader (seen with 22.3.6 and 25.0.7).
+const MOST_DRAWING_BITS: u32 = 256;
+
+/// Bits of the vectors of Mesa's CPU driver, which are in its name: "llvmpipe (LLVM 15.0.6, 256 bits)".
+fn vector_bits(name: &str) -> Option<u32> {
+    name.strip_prefix("llvmpipe")?.strip_suffix(" bits)")?.rsplit(' ').next()?.parse().ok()
+}
+
 /// Can images of this format be drawn into?
 fn is_target(raw: &ash::Instance, physical: vk::PhysicalDevice, format: vk::Format, target: vk::FormatFeatureFlags) -> bool {
     // SAFETY: the physical device belongs to the living instance
@@ -220,9 +228,11 @@ fn describe(instance: &Instance, index: usize, physical: vk::PhysicalDevice) -> 
         missing_floor.push("a compute queue".to_owned());
     }
 
+    let narrow = vector_bits(&text(&properties.device_name)).is_none_or(|bits| bits <= MOST_DRAWING_BITS);
     let missing_raster = [
         (graphics_family.is_some(), "a queue for graphics and compute"),
         (f13.dynamic_rendering == vk::TRUE, "dynamicRendering"),
+        (narrow, "vectors of at most 256 bits (LP_NATIVE_VECTOR_WIDTH=256)"),
         (is_target(raw, physical, IDS, vk::FormatFeatureFlags::COLOR_ATTACHMENT), "images of two 32-bit integers to draw into"),
         (is_target(raw, physical, DEPTH, vk::FormatFeatureFlags::DEPTH_STENCIL_ATTACHMENT), "32-bit depth"),
     ];
@@ -323,4 +333,18 @@ fn describe(instance: &Instance, index: usize, physical: vk::PhysicalDevice) -> 
         },
         queue_family,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_cpu_drivers_name_says_how_wide_its_vectors_are() {
+        assert_eq!(vector_bits("llvmpipe (LLVM 15.0.6, 256 bits)"), Some(256));
+        assert_eq!(vector_bits("llvmpipe (LLVM 19.1.7, 512 bits)"), Some(512));
+        for other in ["llvmpipe", "NVIDIA H100 80GB HBM3", "a GPU with 512 bits)", ""] {
+            assert_eq!(vector_bits(other), None, "{other}");
+        }
+    }
 }
