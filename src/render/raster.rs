@@ -45,8 +45,8 @@ pub enum Primary {
     Raster,
 }
 
-/// Placed primitives per pixel up to which drawing costs less than tracing: of CPUs, and of other devices. Mesa's CPU driver takes 80 to
-/// 180 ns for a triangle of any size; with 0.43 of them a pixel both cost the same, with 0.28 drawing saves a third
+/// Placed primitives per pixel up to which drawing costs less than tracing: of CPUs, and of other devices. Mesa's CPU driver takes 90 to
+/// 240 ns for a triangle, however small; with 0.43 of them a pixel both cost the same, with 0.28 drawing saves a third
 /// (`examples/primary.rs`). Of GPUs it is not measured.
 const PRIMITIVES_PER_PIXEL: (f64, f64) = (0.4, 8.0);
 
