@@ -1,7 +1,8 @@
 //! Compiles the shaders: each pass's stream once per tracer and mode, and the shaders that the tracers share.
 //!
 //! A pass is a file `shaders/NAME.glsl` whose head says `// stream: any`, `// stream: closest` or both; `// rays: queue` besides
-//! when the rays are in memory before it begins, `// rays: coherent` when neighbours go much the same way (packets pay then). The generated `shaders.rs` holds a constant `NAME_ANY` / `NAME_CLOSEST` for each
+//! when the rays are in memory before it begins, `// rays: coherent` when they are the camera's: neighbours go much the
+//! same way (packets pay), and what they meet can be drawn instead of traced, where there is one a pixel. The generated `shaders.rs` holds a constant `NAME_ANY` / `NAME_CLOSEST` for each
 //! (see `src/tracer/stream.rs`). `// compute` instead: a compute shader that traces nothing, as the constant `NAME`.
 
 use std::cell::RefCell;
@@ -65,7 +66,7 @@ const HEAD_PACKET: &str = "#extension GL_EXT_shader_explicit_arithmetic_types_in
      #extension GL_KHR_shader_subgroup_arithmetic : require\n#extension GL_EXT_control_flow_attributes : require\n\
      #define PACKET_RAYS 2\n";
 
-const VARIANTS: [Variant; 9] = [
+const VARIANTS: [Variant; 10] = [
     Variant { field: "generate", template: "trace/generate.glsl", head: "", kind: ShaderKind::Compute },
     Variant { field: "generate_64", template: "trace/generate.glsl", head: HEAD_64_BALLOT, kind: ShaderKind::Compute },
     Variant { field: "deliver", template: "trace/deliver.glsl", head: "", kind: ShaderKind::Compute },
@@ -85,6 +86,7 @@ const VARIANTS: [Variant; 9] = [
         head: "#extension GL_EXT_ray_tracing : require\n",
         kind: ShaderKind::RayGeneration,
     },
+    Variant { field: "visibility", template: "trace/visibility.glsl", head: "", kind: ShaderKind::Compute },
 ];
 
 fn main() {
@@ -159,7 +161,9 @@ impl Build {
                     if mode == "any" { "Any" } else { "Closest" }
                 );
                 for v in &VARIANTS {
-                    if queue && ["generate", "generate_64", "packet"].contains(&v.field) {
+                    // only what camera rays meet can be drawn
+                    let drawn = v.field != "visibility" || coherent && mode == "closest";
+                    if !drawn || queue && ["generate", "generate_64", "packet"].contains(&v.field) {
                         let _ = writeln!(table, "    {}: &[],", v.field);
                         continue;
                     }
@@ -203,7 +207,7 @@ impl Build {
         table
     }
 
-    /// The shaders that every stream of the pipeline tracer shares.
+    /// The shaders that every stream of the pipeline tracer shares, and those that draw.
     fn shared(&mut self) -> String {
         let mut table = String::new();
         for (constant, file, kind) in [
@@ -212,6 +216,11 @@ impl Build {
             ("TRIANGLE_ANY", "trace/triangle.rahit", ShaderKind::AnyHit),
             ("SPHERE_CLOSEST", "trace/sphere.rchit", ShaderKind::ClosestHit),
             ("SPHERE_INTERSECTION", "trace/sphere.rint", ShaderKind::Intersection),
+            ("DRAW_TRIANGLES", "raster/triangle.vert", ShaderKind::Vertex),
+            ("DRAW_OPAQUE", "raster/opaque.frag", ShaderKind::Fragment),
+            ("DRAW_ALPHA", "raster/alpha.frag", ShaderKind::Fragment),
+            ("DRAW_SPHERES", "raster/sphere.vert", ShaderKind::Vertex),
+            ("DRAW_SPHERE", "raster/sphere.frag", ShaderKind::Fragment),
         ] {
             let path = self.shaders.join(file);
             let source = std::fs::read_to_string(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));

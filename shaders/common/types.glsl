@@ -80,7 +80,7 @@ Ray load_ray(uvec2 rays, uint k) {
 layout(push_constant) uniform Push {
     uvec2 scene;       // SceneRoot
     uvec2 pass;
-    uvec2 rays;        // the rays of this launch, where they are in memory: a queue's, or the compute tracer's own
+    uvec2 rays;        // the rays of this launch, where they are in memory: a queue's, or the compute tracer's own; or what was drawn (trace/visibility.glsl)
     uvec2 queued;      // address of a uint: how many rays the queue holds; null when the host knows
     uint first;        // index of the first ray of this launch
     uint count;        // rays in this launch; of a queue: at most

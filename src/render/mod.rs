@@ -6,7 +6,9 @@ pub mod block;
 pub mod camera;
 pub mod cover;
 pub mod film;
+mod frustum;
 pub mod pace;
+pub mod raster;
 pub mod rays;
 pub mod realtime;
 
