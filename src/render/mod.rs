@@ -11,6 +11,7 @@ pub mod pace;
 pub mod raster;
 pub mod rays;
 pub mod realtime;
+pub mod sequence;
 
 use crate::error::Result;
 

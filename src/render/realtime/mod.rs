@@ -14,6 +14,7 @@ use glam::{DAffine3, DMat3, DVec3};
 use super::ao::Hemisphere;
 use super::block::{Block, BlockParams};
 use super::camera::CameraRecord;
+use super::raster::{Primary, Raster, View};
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, Commands, ComputePipeline, Memory, Recorder, Timing};
 use crate::tracer::gpu_scene::rows;
@@ -43,6 +44,13 @@ pub struct FrameStats {
     pub skipped_rays: u64,
 }
 
+impl FrameStats {
+    /// Device seconds of what traces rays, which hierarchies that change are judged by ([`Tracer::traced`]).
+    pub fn tracing_seconds(&self) -> f64 {
+        self.timings.iter().filter(|t| t.label.contains("trace") || t.label == "gbuffer").map(|t| t.seconds).sum()
+    }
+}
+
 /// The frames of one image size.
 pub struct Realtime {
     size: [u32; 2],
@@ -51,16 +59,23 @@ pub struct Realtime {
     images: Images,
     larsen: Option<Box<Larsen>>,
     commands: Commands,
+    primary_reason: String,
     state: State,
 }
 
 struct Passes {
-    gbuffer: Stream,
+    gbuffer: CameraRays,
     accessibility: Stream,
     gather: ComputePipeline,
     gtao: ComputePipeline,
     temporal: ComputePipeline,
     filter: ComputePipeline,
+}
+
+/// What finds what pixels show.
+enum CameraRays {
+    Traced(Box<Stream>),
+    Drawn(Box<Raster>),
 }
 
 /// Device memory: parameters, and a record a pixel.
@@ -111,10 +126,15 @@ impl Realtime {
                 settings.rays_per_pixel, size[0], size[1]
             )));
         }
+        let (primary, primary_reason) = match settings.primary {
+            Some(primary) => (primary, "asked for".to_owned()),
+            None => Primary::auto(tracer, u64::from(size[0]) * u64::from(size[1])),
+        };
         Ok(Self {
             size,
-            settings: *settings,
-            passes: Passes::new(tracer, settings)?,
+            settings: Settings { primary: Some(primary), ..*settings },
+            passes: Passes::new(tracer, size, settings, primary)?,
+            primary_reason,
             images: Images::new(tracer, size, settings)?,
             larsen: match settings.technique {
                 Technique::Larsen => Some(Box::new(Larsen::new(tracer, size, lights, settings.unit)?)),
@@ -130,9 +150,14 @@ impl Realtime {
         self.size
     }
 
-    /// How frames are made.
+    /// How frames are made; [`Settings::primary`] is what it turned out to be.
     pub fn settings(&self) -> &Settings {
         &self.settings
+    }
+
+    /// Why camera rays are traced, or the scene drawn.
+    pub fn primary_reason(&self) -> &str {
+        &self.primary_reason
     }
 
     /// Forgets what earlier frames know.
@@ -158,7 +183,8 @@ impl Realtime {
         let push = Push { scene: tracer.scene_address(), pass: self.images.frame_params.address(), ..Default::default() };
         let launches = self.launches(push);
         let mut batches = launches.chunks(MOST_LAUNCHES).peekable();
-        let (mut timings, mut first) = (Vec::new(), true);
+        let (mut timings, mut first, mut drawn) = (Vec::new(), true, Ok(()));
+        let view = View { camera: *camera, image_size: self.size, block: self.block(), at: [0.5; 2] };
         loop {
             // a frame without launches still has its other passes
             let (batch, begins) = (batches.next().unwrap_or_default(), std::mem::take(&mut first));
@@ -166,7 +192,8 @@ impl Realtime {
             timings.extend(self.commands.run(|r| {
                 let (passes, images) = (&self.passes, &self.images);
                 if begins && !still {
-                    passes.record_gbuffer(r, images, &images.guides[self.state.guide], push, self.size);
+                    let guide = &images.guides[self.state.guide];
+                    drawn = passes.record_gbuffer(r, tracer, images, guide, push, &view);
                 }
                 if let Some(larsen) = &self.larsen {
                     larsen.record(r, push, &images.result);
@@ -186,6 +213,7 @@ impl Realtime {
                 break;
             }
         }
+        drawn?;
         tracer.check_finished()?;
         let occlusion_rays = match &self.larsen {
             Some(larsen) => larsen.occlusion_rays()?,
@@ -200,7 +228,7 @@ impl Realtime {
         self.state.has_history = self.settings.history > 1 || self.larsen.is_some();
         Ok(FrameStats {
             timings,
-            primary_rays: if still { 0 } else { pixels },
+            primary_rays: if still || self.settings.primary == Some(Primary::Raster) { 0 } else { pixels },
             occlusion_rays,
             skipped_rays: all.saturating_sub(occlusion_rays),
         })
@@ -328,11 +356,14 @@ impl Realtime {
 }
 
 impl Passes {
-    fn new(tracer: &Tracer, settings: &Settings) -> Result<Self> {
+    fn new(tracer: &Tracer, size: [u32; 2], settings: &Settings, primary: Primary) -> Result<Self> {
         let device = tracer.device();
         let [gbuffer, accessibility] = Realtime::streams(settings);
         Ok(Self {
-            gbuffer: tracer.stream(gbuffer)?,
+            gbuffer: match primary {
+                Primary::Traced => CameraRays::Traced(Box::new(tracer.stream(gbuffer)?)),
+                Primary::Raster => CameraRays::Drawn(Box::new(Raster::new(tracer, gbuffer, size)?)),
+            },
             accessibility: tracer.stream(accessibility)?,
             gather: stream::GATHER.pipeline(device)?,
             gtao: stream::GTAO.pipeline(device)?,
@@ -341,15 +372,30 @@ impl Passes {
         })
     }
 
-    fn record_gbuffer(&self, r: &mut Recorder, images: &Images, guide: &Buffer, push: Push, size: [u32; 2]) {
+    fn record_gbuffer(
+        &self,
+        r: &mut Recorder,
+        tracer: &Tracer,
+        images: &Images,
+        guide: &Buffer,
+        push: Push,
+        view: &View,
+    ) -> Result<()> {
         r.fill(guide, guide.size(), f32::INFINITY.to_bits());
         r.barrier();
-        let rays = Block { origin: [0, 0], size }.rays();
+        if let CameraRays::Drawn(raster) = &self.gbuffer {
+            raster.draw(r, tracer, view)?;
+        }
+        let rays = view.block.rays();
         for first in (0..rays).step_by(LAUNCH_RAYS as usize) {
-            let count = LAUNCH_RAYS.min(rays - first);
-            self.gbuffer.record(r, &Push { first, count, pass: images.block_params.address(), ..push });
+            let push = Push { first, count: LAUNCH_RAYS.min(rays - first), pass: images.block_params.address(), ..push };
+            match &self.gbuffer {
+                CameraRays::Traced(stream) => stream.record(r, &push),
+                CameraRays::Drawn(raster) => raster.trace(r, &push),
+            }
             r.barrier();
         }
+        Ok(())
     }
 
     fn record_begin(&self, r: &mut Recorder, images: &Images, push: Push, pixels: u32, technique: Technique) {
