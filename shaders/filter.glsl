@@ -9,9 +9,9 @@
 
 layout(local_size_x = LANES) in;
 
-// Variance of a sample that too few have told of.
-const float PRIOR_VARIANCE = 0.1;
-const float PRIOR_SAMPLES = 2.0;
+// Where few samples have told of their variance, it is taken for that of samples that are 0 or 1: the most it can be. So many samples
+// count as few.
+const float PRIOR_SAMPLES = 4.0;
 
 void main() {
     uint at = push.first + gl_GlobalInvocationID.x;
@@ -54,7 +54,8 @@ void main() {
     }
     float mean = sum / n;
     float spread = max(squares / n - mean * mean, 0.0);
-    float variance = (variances + PRIOR_VARIANCE * PRIOR_SAMPLES) / (n + PRIOR_SAMPLES);
+    // about their own pixels' means, so that each pixel has one less to tell
+    float variance = (variances + mean * (1.0 - mean) * PRIOR_SAMPLES) / (max(n - count, 0.0) + PRIOR_SAMPLES);
     // what noise alone makes of the spread: each mean has the variance of a sample by its samples
     float detail = max(spread - variance * count / n, 0.0);
     float keep = own.samples > 0.0 ? detail / (detail + variance / own.samples) : 0.0;
