@@ -39,7 +39,8 @@ void add_sample(uint index, float accessibility) {
     uvec2 pixel = tile_pixel(f, index);
     if (any(greaterThanEqual(pixel, f.size))) return;
     uint at = image_index(f, pixel);
-    if (has_rays(f, pixel, at)) STORE_PAIR(f.current, at, pack_estimate(Estimate(accessibility, 1.0, 0.0)));
+    // what is written where nothing is, nobody reads
+    if (is_sampled(f, pixel) && !is_resting(f, at)) STORE_PAIR(f.current, at, pack_estimate(Estimate(accessibility, 1.0, 0.0)));
 }
 
 #ifdef STREAM_ANY

@@ -202,10 +202,14 @@ bool is_sampled(FrameParams f, uvec2 pixel) {
     return true;
 }
 
+// Has a pixel of a surface all its samples?
+bool is_resting(FrameParams f, uint at) {
+    return f.rest != 0u && unpack_estimate(LOAD_PAIR(f.previous_history, at)).samples >= f.most_samples;
+}
+
 // Has a pixel rays in this frame?
 bool has_rays(FrameParams f, uvec2 pixel, uint at) {
-    if (!is_sampled(f, pixel) || !is_surface(LOAD_PAIR(f.guide, at))) return false;
-    return f.rest == 0u || unpack_estimate(LOAD_PAIR(f.previous_history, at)).samples < f.most_samples;
+    return is_sampled(f, pixel) && is_surface(LOAD_PAIR(f.guide, at)) && !is_resting(f, at);
 }
 
 #endif

@@ -46,6 +46,11 @@ Surface surface_at(Ray ray, Hit hit) {
     } else {
         placement = Pairs(root.placements).v[hit.instance];
         part = PartRecords(root.parts).v[placement.y];
+        if (SINGLE_LEVEL && !HAS_SPHERES) {
+            // parts of one group share its arrays: the same for all lanes, too
+            part.indices = PartRecords(root.parts).v[0].indices;
+            part.positions = PartRecords(root.parts).v[0].positions;
+        }
     }
     InstanceRecord instance;
     if (SINGLE_LEVEL) {

@@ -266,7 +266,7 @@ impl Preset {
                 filter: Filter { kind: FilterKind::None, ..common.filter },
                 ..common
             },
-            Preset::Fast => Settings { filter: Filter { radius: 2, ..common.filter }, ..common },
+            Preset::Fast => Settings { filter: Filter { radius: 2, samples: 64.0, ..common.filter }, ..common },
             Preset::Balanced => Settings { history: 64, ..common },
             Preset::Quality => Settings {
                 rays_per_pixel: 4,
