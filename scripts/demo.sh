@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Sets up, builds, and renders the ambient occlusion of built-in scenes with each of the three tracers; prints how far apart
-# the tracers' images are, and where the images lie.
+# the tracers' images are, and where the images lie; then a short animation in real time.
 #
 #   ./scripts/demo.sh [SPP]         samples per pixel, 64 unless given
 set -euo pipefail
@@ -28,6 +28,9 @@ for scene in "${scenes[@]}"; do
   done
 done
 
+say "a scene in motion, frame after frame"
+"$skylit" render scenes/parade.glb --preset balanced --animate --frames 0..30 --size 480x270 -o "$out/parade.apng"
+
 report=$out/report.md
 {
   echo "# skylit: ambient occlusion by three tracers"
@@ -46,6 +49,7 @@ report=$out/report.md
       printf -- '- %s and %s: %s\n' "$a" "$b" "$numbers"
     done
   done
+  printf '\n## In real time: `parade`, preset `balanced`\n\n![parade](parade.apng)\n'
 } > "$report.new"
 mv "$report.new" "$report"
 

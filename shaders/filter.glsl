@@ -1,5 +1,8 @@
-// filter: the mean over a pixel's neighbours on the same surface, each counting by its samples; a box whose radius is just large
-// enough that the mean rests on `filter_samples` samples.
+// filter: the mean over a pixel's neighbours on the same surface, each counting by its samples: so what has no sample yet gets its value
+// from what has (joint bilateral upsampling; Kopf, Cohen, Lischinski, Uyttendaele 2007). A box whose radius is just large enough that
+// the mean rests on `filter_samples` samples; or its two sides one after the other; or a small box again and again with holes that
+// double (a trous; Dammertz, Sewtz, Hanika, Lensch, "Edge-Avoiding A-Trous Wavelet Transform for fast Global Illumination Filtering",
+// HPG 2010).
 //
 // How far the histories in the box differ by more than their noise says how much of the difference between pixel and box is detail;
 // the pixel keeps that share of its own value (Lee, "Digital Image Enhancement and Noise Filtering by Use of Local Statistics", PAMI
@@ -13,33 +16,57 @@ layout(local_size_x = LANES) in;
 // count as few.
 const float PRIOR_SAMPLES = 4.0;
 
+// A step of the filter, in the push constants: estimates from `rays` to `queued`, or accessibility to the result where that is null.
+// Sides of the box on which it reaches to the radius, and the distance of its taps.
+const uint STEP_HORIZONTAL = 1u;
+const uint STEP_VERTICAL = 2u;
+
+// Pixels to each side.
+int box_radius(FrameParams f, float samples) {
+    float side = sqrt(f.filter_samples / max(samples, 0.25));
+    return int(clamp(ceil(0.5 * (side - 1.0)), 0.0, float(push.sample_bits)));
+}
+
+void finish(FrameParams f, uint at, Estimate e) {
+    if (!is_null(push.queued)) {
+        STORE_PAIR(push.queued, at, pack_estimate(e));
+        return;
+    }
+    // where nobody knows: as if nothing were in the way
+    FloatImage(f.result).v[at] = e.samples > 0.0 ? e.mean : 1.0;
+}
+
 void main() {
-    uint at = push.first + gl_GlobalInvocationID.x;
-    if (gl_GlobalInvocationID.x >= push.count) return;
+    uint at = gl_GlobalInvocationID.x;
+    if (at >= push.count) return;
     FrameParams f = FrameParams(push.pass);
-    FloatImage result = FloatImage(f.result);
     if (!is_surface(LOAD_PAIR(f.guide, at))) {
-        result.v[at] = 0.0;
+        if (is_null(push.queued)) FloatImage(f.result).v[at] = 0.0;
+        else STORE_PAIR(push.queued, at, uvec2(0u));
         return;
     }
-    Estimate own = unpack_estimate(LOAD_PAIR(f.history, at));
-    float side = sqrt(f.filter_samples / max(own.samples, 0.25));
-    int radius = int(clamp(ceil(0.5 * (side - 1.0)), 0.0, float(f.filter_radius)));
-    if (radius == 0 && own.samples > 0.0) {
-        result.v[at] = own.mean;
+    uvec2 guides = f.guide, estimates = push.rays;
+    Estimate own = unpack_estimate(LOAD_PAIR(estimates, at));
+    int stride = int(push.sample_index >> 2);
+    // a step with holes is of one size; it is left out where there are samples enough
+    int radius = stride > 1 ? (own.samples < f.filter_samples ? int(push.sample_bits) : 0) : box_radius(f, own.samples);
+    if (radius == 0) {
+        finish(f, at, own);
         return;
     }
-    uvec2 guides = f.guide, histories = f.history;
     uint width = f.size.x;
     ivec2 pixel = ivec2(at % width, at / width);
     EdgeTest edge = edge_test(f, f.world_to_camera, f.view, f.orthographic != 0u, surface_position(f, at), surface_normal(f, at), vec2(pixel) + 0.5);
-    ivec2 lower = max(pixel - radius, ivec2(0)), upper = min(pixel + radius, ivec2(f.size) - 1);
+    ivec2 reach = radius * ivec2(push.sample_index & STEP_HORIZONTAL, (push.sample_index & STEP_VERTICAL) >> 1);
+    // taps within the image
+    ivec2 lower = max(-reach, -(pixel / stride)), upper = min(reach, (ivec2(f.size) - 1 - pixel) / stride);
     float sum = 0.0, squares = 0.0, n = 0.0, variances = 0.0, count = 0.0;
     for (int y = lower.y; y <= upper.y; y++) {
         for (int x = lower.x; x <= upper.x; x++) {
-            uint tap = uint(y) * width + uint(x);
-            if (!same_surface(edge, vec2(ivec2(x, y) - pixel), LOAD_PAIR(guides, tap))) continue;
-            Estimate e = unpack_estimate(LOAD_PAIR(histories, tap));
+            ivec2 offset = stride * ivec2(x, y);
+            uint tap = uint(int(at) + offset.y * int(width) + offset.x);
+            if (!same_surface(edge, vec2(offset), LOAD_PAIR(guides, tap))) continue;
+            Estimate e = unpack_estimate(LOAD_PAIR(estimates, tap));
             sum += e.mean * e.samples;
             squares += e.mean * e.mean * e.samples;
             variances += e.variance * e.samples;
@@ -48,8 +75,7 @@ void main() {
         }
     }
     if (n == 0.0) {
-        // nobody knows: as if nothing were in the way
-        result.v[at] = 1.0;
+        finish(f, at, own);
         return;
     }
     float mean = sum / n;
@@ -59,5 +85,5 @@ void main() {
     // what noise alone makes of the spread: each mean has the variance of a sample by its samples
     float detail = max(spread - variance * count / n, 0.0);
     float keep = own.samples > 0.0 && detail > 0.0 ? detail / (detail + variance / own.samples) : 0.0;
-    result.v[at] = mix(mean, own.mean, keep);
+    finish(f, at, Estimate(mix(mean, own.mean, keep), mix(n, own.samples, keep), variance));
 }

@@ -36,11 +36,9 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Fr
     float clamp_width;                 // standard errors by which a history may differ from its surroundings where things move; 0: any
     float moved_weight;                // how much what moves shortens histories
     float filter_samples;              // samples that a filtered value should rest on
-    uint filter_radius;                // pixels, at most
     uint rest;                         // 1: nothing moves, and pixels with all their samples get no more
     uint slices;                       // of gtao
     uint steps;                        // of gtao, on each side of a slice
-    uint frame_reserved;
     uvec2 surface;
     uvec2 axes;                        // 3 floats a pixel: the hemisphere's axis where it is not the geometric normal; or null
     uvec2 guide;

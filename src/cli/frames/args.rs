@@ -55,6 +55,8 @@ choices!(Sequence, |s| match s {
 choices!(FilterKind, |f| match f {
     FilterKind::None => "What histories say",
     FilterKind::Box => "A box that stops at edges, as wide as samples are few",
+    FilterKind::Separable => "The box's two sides one after the other",
+    FilterKind::Atrous => "A small box again and again, its taps twice as far apart each time",
 });
 
 /// How it is found what pixels show.

@@ -88,6 +88,8 @@ struct Images {
     guides: [Buffer; 2],
     histories: [Buffer; 2],
     current: Buffer,
+    /// Between the steps of a filter of several.
+    between: Option<[Buffer; 2]>,
     samples: Option<Buffer>,
     previous_position: Option<Buffer>,
     result: Buffer,
@@ -206,7 +208,8 @@ impl Realtime {
                     passes.record_occlusion(r, push, self.settings.rays_per_pixel);
                 }
                 if ends {
-                    passes.record_end(r, push, pixels as u32);
+                    let history = &images.histories[self.state.history];
+                    passes.record_end(r, images, push, pixels as u32, history, &self.settings.filter);
                 }
             })?);
             if ends {
@@ -322,12 +325,10 @@ impl Realtime {
             moved_count: moved.len() as u32,
             clamp_width: s.clamp,
             moved_weight: s.moved_weight,
-            filter_samples: if s.filter.kind == FilterKind::None { 0.0 } else { s.filter.samples },
-            filter_radius: if s.filter.kind == FilterKind::None { 0 } else { s.filter.radius },
+            filter_samples: s.filter.samples,
             rest: (s.rest && still && self.state.has_history).into(),
             slices: s.gtao[0],
             steps: s.gtao[1],
-            reserved: 0,
             surface: images.surface.address(),
             axes: images.axes.as_ref().map_or(0, Buffer::address),
             guide,
@@ -417,11 +418,24 @@ impl Passes {
         }
     }
 
-    fn record_end(&self, r: &mut Recorder, push: Push, pixels: u32) {
+    /// `history`: the frame's.
+    fn record_end(&self, r: &mut Recorder, images: &Images, push: Push, pixels: u32, history: &Buffer, filter: &Filter) {
         let (push, groups) = (Push { count: pixels, ..push }, pixels.div_ceil(LANES));
         r.timed("temporal", |r| r.dispatch(&self.temporal, &push, groups));
-        r.barrier();
-        r.timed("filter", |r| r.dispatch(&self.filter, &push, groups));
+        let steps = filter.steps();
+        let mut from = history.address();
+        for (k, step) in steps.iter().enumerate() {
+            let to = match &images.between {
+                Some(between) if k + 1 < steps.len() => between[k % 2].address(),
+                _ => 0,
+            };
+            let sides = u32::from(step.sides[0]) | u32::from(step.sides[1]) << 1;
+            let push =
+                Push { rays: from, queued: to, sample_index: sides | step.stride << 2, sample_bits: step.radius, ..push };
+            r.barrier();
+            r.timed("filter", |r| r.dispatch(&self.filter, &push, groups));
+            from = to;
+        }
     }
 }
 
@@ -441,6 +455,10 @@ impl Images {
             guides: [image("guide", 8)?, image("guide", 8)?],
             histories: [image("history", 8)?, image("history", 8)?],
             current: image("samples of the frame", 8)?,
+            between: match settings.filter.steps().len() {
+                0 | 1 => None,
+                _ => Some([image("filtered estimates", 8)?, image("filtered estimates", 8)?]),
+            },
             samples: match settings.rays_per_pixel > 1 {
                 true => Some(Buffer::new(device, "samples", 4 * u64::from(LAUNCH_RAYS), Memory::Device)?),
                 false => None,

@@ -58,16 +58,12 @@ pub struct FrameParams {
     pub moved_weight: f32,
     /// Of a filtered pixel.
     pub filter_samples: f32,
-    /// Pixels.
-    pub filter_radius: u32,
     /// 1: nothing moves, and pixels with a full history rest.
     pub rest: u32,
     /// Of gtao.
     pub slices: u32,
     /// Of gtao, on each side.
     pub steps: u32,
-    /// To a multiple of 8 bytes.
-    pub reserved: u32,
     /// Surfaces.
     pub surface: u64,
     /// Axes of the hemispheres, or 0.

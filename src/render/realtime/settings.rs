@@ -73,19 +73,36 @@ pub enum FilterKind {
     /// A box, its radius by how many samples there are.
     #[default]
     Box,
+    /// Its sides one after the other: fewer taps for large radii. Exact on plane surfaces.
+    Separable,
+    /// A box of 3x3 again and again, its taps twice as far apart each time, up to the radius.
+    Atrous,
 }
 
 impl FilterKind {
     /// All of them.
-    pub const ALL: [FilterKind; 2] = [FilterKind::None, FilterKind::Box];
+    pub const ALL: [FilterKind; 4] = [FilterKind::None, FilterKind::Box, FilterKind::Separable, FilterKind::Atrous];
 
     /// As on the command line.
     pub fn name(self) -> &'static str {
         match self {
             FilterKind::None => "none",
             FilterKind::Box => "box",
+            FilterKind::Separable => "separable",
+            FilterKind::Atrous => "atrous",
         }
     }
+}
+
+/// A step of a filter: half sides of its box in taps, and their distance in pixels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct FilterStep {
+    /// Along rows, along columns.
+    pub sides: [bool; 2],
+    /// Taps to each side at most.
+    pub radius: u32,
+    /// Pixels from tap to tap.
+    pub stride: u32,
 }
 
 /// How frames are filtered.
@@ -97,6 +114,23 @@ pub struct Filter {
     pub radius: u32,
     /// Samples that a filtered pixel should rest on: the box grows until it holds so many.
     pub samples: f32,
+}
+
+impl Filter {
+    /// What is done one after the other. There is one step at least: it turns estimates into what is shown.
+    pub fn steps(&self) -> Vec<FilterStep> {
+        let step = |sides, radius, stride| FilterStep { sides, radius, stride };
+        match self.kind {
+            FilterKind::None => vec![step([true, true], 0, 1)],
+            FilterKind::Box => vec![step([true, true], self.radius, 1)],
+            FilterKind::Separable => vec![step([true, false], self.radius, 1), step([false, true], self.radius, 1)],
+            FilterKind::Atrous => {
+                // 1, 1 + 2, 1 + 2 + 4, ... pixels
+                let levels = (self.radius + 1).max(2).ilog2();
+                (0..levels).map(|k| step([true, true], self.radius.min(1), 1 << k)).collect()
+            }
+        }
+    }
 }
 
 /// How frames are made.
@@ -266,7 +300,7 @@ impl Preset {
                 filter: Filter { kind: FilterKind::None, ..common.filter },
                 ..common
             },
-            Preset::Fast => Settings { filter: Filter { radius: 2, samples: 64.0, ..common.filter }, ..common },
+            Preset::Fast => Settings { filter: Filter { radius: 2, samples: 128.0, ..common.filter }, ..common },
             Preset::Balanced => Settings { history: 64, ..common },
             Preset::Quality => Settings {
                 rays_per_pixel: 4,
@@ -275,5 +309,31 @@ impl Preset {
                 ..common
             },
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn steps_reach_to_the_radius() {
+        for kind in FilterKind::ALL {
+            for radius in [0, 1, 3, 7, 15] {
+                let steps = Filter { kind, radius, samples: 64.0 }.steps();
+                let reach = |axis: usize| steps.iter().filter(|s| s.sides[axis]).map(|s| s.radius * s.stride).sum::<u32>();
+                let wanted = if kind == FilterKind::None { 0 } else { radius };
+                assert_eq!([reach(0), reach(1)], [wanted; 2], "{kind:?} {radius}");
+            }
+        }
+    }
+
+    #[test]
+    fn presets_are_sound() {
+        for preset in Preset::ALL {
+            preset.settings().check().unwrap();
+        }
+        let wrong = Settings { rays_per_pixel: 0, ..Settings::default() };
+        assert_eq!(wrong.check().unwrap_err().exit_code(), 64);
     }
 }
