@@ -2,18 +2,7 @@
 // cosine-weighted hemisphere (pbrt-v4's AOIntegrator). Pixels that show nothing have none, and neither have those that know enough
 // while nothing moves. Built twice: with a falloff the nearest hit counts by its distance, without one any hit will do.
 // stream: any closest
-#include "common/frame.glsl"
-#include "common/sequence.glsl"
-#include "common/warp.glsl"
-
-vec2 direction_sample(FrameParams f, uvec2 pixel, uint k) {
-    // what is ordered over the image counts the pixels that are sampled, what is ordered over time the frames in which they are
-    if (f.sequence == SEQUENCE_BLUE) {
-        uvec2 cell = f.pattern == PATTERN_QUARTER ? pixel >> 1 : f.pattern == PATTERN_CHECKER ? uvec2(pixel.x >> 1, pixel.y) : pixel;
-        return sequence_2d(f.sequence, f.seed, cell, f.frame, k, f.rays_per_pixel);
-    }
-    return sequence_2d(f.sequence, f.seed, pixel, f.frame >> f.pattern, k, f.rays_per_pixel);
-}
+#include "common/occlusion.glsl"
 
 Ray ray(uint index) {
     FrameParams f = FrameParams(push.pass);
@@ -23,8 +12,7 @@ Ray ray(uint index) {
     if (!has_rays(f, pixel, at)) return no_ray();
     claim(f.ray_count);
     vec3 ng = surface_normal(f, at);
-    vec3 axis = is_null(f.axes) ? ng : load_vec3(f.axes, at);
-    vec3 w = to_world(axis, cosine_hemisphere(direction_sample(f, pixel, index % f.rays_per_pixel)));
+    vec3 w = occlusion_direction(f, pixel, at, ng, index % f.rays_per_pixel);
     // about a shading normal some directions are below the surface: they start there, and meet its inside
     float side = dot(ng, w) < 0.0 ? -1.0 : 1.0;
     return Ray(surface_position(f, at) + ng * (side * spawn_offset_at(f, at)), 0.0, w, f.reach);
@@ -40,7 +28,11 @@ void add_sample(uint index, float accessibility) {
     if (any(greaterThanEqual(pixel, f.size))) return;
     uint at = image_index(f, pixel);
     // what is written where nothing is, nobody reads
-    if (is_sampled(f, pixel) && !is_resting(f, at)) STORE_PAIR(f.current, at, pack_estimate(Estimate(accessibility, 1.0, 0.0)));
+    if (!is_sampled(f, pixel) || is_resting(f, at)) return;
+    STORE_PAIR(f.current, at, pack_estimate(Estimate(accessibility, 1.0, 0.0)));
+    if (!is_null(f.current_bent)) {
+        store_vec3(f.current_bent, at, accessibility * occlusion_direction(f, pixel, at, surface_normal(f, at), 0u));
+    }
 }
 
 #ifdef STREAM_ANY

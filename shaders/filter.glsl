@@ -27,7 +27,16 @@ int box_radius(FrameParams f, float samples) {
     return int(clamp(ceil(0.5 * (side - 1.0)), 0.0, float(push.sample_bits)));
 }
 
-void finish(FrameParams f, uint at, Estimate e) {
+// Bent normals beside them are at `bent` of the frame's parameters; from where to where is in `first`.
+vec3 load_bent(FrameParams f, uint at) {
+    return load_vec3(f.bent[push.first & 3u], at);
+}
+
+void finish(FrameParams f, uint at, Estimate e, vec3 bent) {
+    if (BENT) {
+        bool open = is_null(push.queued) && e.samples == 0.0;
+        store_vec3(f.bent[push.first >> 2], at, open ? (2.0 / 3.0) * surface_normal(f, at) : bent);
+    }
     if (!is_null(push.queued)) {
         STORE_PAIR(push.queued, at, pack_estimate(e));
         return;
@@ -43,15 +52,17 @@ void main() {
     if (!is_surface(LOAD_PAIR(f.guide, at))) {
         if (is_null(push.queued)) FloatImage(f.result).v[at] = 0.0;
         else STORE_PAIR(push.queued, at, uvec2(0u));
+        if (BENT) store_vec3(f.bent[push.first >> 2], at, vec3(0.0));
         return;
     }
     uvec2 guides = f.guide, estimates = push.rays;
     Estimate own = unpack_estimate(LOAD_PAIR(estimates, at));
+    vec3 own_bent = BENT ? load_bent(f, at) : vec3(0.0);
     int stride = int(push.sample_index >> 2);
     // a step with holes is of one size; it is left out where there are samples enough
     int radius = stride > 1 ? (own.samples < f.filter_samples ? int(push.sample_bits) : 0) : box_radius(f, own.samples);
     if (radius == 0) {
-        finish(f, at, own);
+        finish(f, at, own, own_bent);
         return;
     }
     uint width = f.size.x;
@@ -61,6 +72,7 @@ void main() {
     // taps within the image
     ivec2 lower = max(-reach, -(pixel / stride)), upper = min(reach, (ivec2(f.size) - 1 - pixel) / stride);
     float sum = 0.0, squares = 0.0, n = 0.0, variances = 0.0, count = 0.0;
+    vec3 bent = vec3(0.0);
     for (int y = lower.y; y <= upper.y; y++) {
         for (int x = lower.x; x <= upper.x; x++) {
             ivec2 offset = stride * ivec2(x, y);
@@ -70,12 +82,13 @@ void main() {
             sum += e.mean * e.samples;
             squares += e.mean * e.mean * e.samples;
             variances += e.variance * e.samples;
+            if (BENT) bent += load_bent(f, tap) * e.samples;
             n += e.samples;
             count += e.samples > 0.0 ? 1.0 : 0.0;
         }
     }
     if (n == 0.0) {
-        finish(f, at, own);
+        finish(f, at, own, own_bent);
         return;
     }
     float mean = sum / n;
@@ -85,5 +98,5 @@ void main() {
     // what noise alone makes of the spread: each mean has the variance of a sample by its samples
     float detail = max(spread - variance * count / n, 0.0);
     float keep = own.samples > 0.0 && detail > 0.0 ? detail / (detail + variance / own.samples) : 0.0;
-    finish(f, at, Estimate(mix(mean, own.mean, keep), mix(n, own.samples, keep), variance));
+    finish(f, at, Estimate(mix(mean, own.mean, keep), mix(n, own.samples, keep), variance), mix(bent / n, own_bent, keep));
 }

@@ -1,7 +1,7 @@
-// gather: where a pixel has several samples in a frame, their mean and variance; in the order of the samples, so that it depends
-// on nothing else.
+// gather: where a pixel has several samples in a frame, their mean and variance, and with bent normals their mean direction; in the
+// order of the samples, so that it depends on nothing else.
 // compute
-#include "common/frame.glsl"
+#include "common/occlusion.glsl"
 
 layout(local_size_x = LANES) in;
 
@@ -24,4 +24,9 @@ void main() {
     float mean = sum / float(n);
     float variance = n > 1u ? max(squares - sum * mean, 0.0) / float(n - 1u) : 0.0;
     STORE_PAIR(f.current, at, pack_estimate(Estimate(mean, float(n), variance)));
+    if (BENT) {
+        vec3 ng = surface_normal(f, at), bent = vec3(0.0);
+        for (uint s = 0u; s < n; s++) bent += samples.v[k * n + s] * occlusion_direction(f, pixel, at, ng, s);
+        store_vec3(f.current_bent, at, bent / float(n));
+    }
 }

@@ -68,8 +68,8 @@ Estimate surroundings(FrameParams f, ivec2 pixel, EdgeTest edge) {
     return Estimate(mean, n, (max(squares / n - mean * mean, 0.0) + LEAST_VARIANCE) / n);
 }
 
-// The history of a surface's point; no samples: there is none.
-Estimate reprojected(FrameParams f, vec3 before, vec3 normal, uint id) {
+// The history of a surface's point; no samples: there is none. `bent`: that of its bent normal.
+Estimate reprojected(FrameParams f, vec3 before, vec3 normal, uint id, inout vec3 bent) {
     Estimate none = Estimate(0.0, 0.0, 0.0);
     vec3 c = affine(f.previous_world_to_camera, before);
     bool orthographic = f.previous_orthographic != 0u;
@@ -83,6 +83,7 @@ Estimate reprojected(FrameParams f, vec3 before, vec3 normal, uint id) {
     inside = mix(inside, round(inside), lessThan(abs(inside - round(inside)), vec2(1e-3)));
     EdgeTest edge = edge_test(f, f.previous_world_to_camera, f.previous_view, orthographic, before, normal, at + 0.5);
     float weight = 0.0, mean = 0.0, samples = 0.0, variance = 0.0;
+    vec3 bents = vec3(0.0);
     for (int k = 0; k < 4; k++) {
         ivec2 corner = ivec2(k & 1, k >> 1);
         ivec2 q = base + corner;
@@ -98,9 +99,11 @@ Estimate reprojected(FrameParams f, vec3 before, vec3 normal, uint id) {
         mean += w * e.mean;
         samples += w * e.samples;
         variance += w * e.variance;
+        if (BENT) bents += w * load_vec3(f.previous_bent_history, tap);
     }
     // less than a hundredth of the footprint was seen
     if (weight < 0.01) return none;
+    if (BENT) bent = bents / weight;
     return Estimate(mean / weight, samples / weight, variance / weight);
 }
 
@@ -117,13 +120,15 @@ void main() {
     // what is not a number never enters a history
     if (!(now.mean >= 0.0 && now.mean <= 1.0)) now = Estimate(0.0, 0.0, 0.0);
     Estimate past = Estimate(0.0, 0.0, 0.0);
+    vec3 bent = vec3(0.0);
     if (f.has_history != 0u) {
         if (f.still != 0u) {
             past = unpack_estimate(LOAD_PAIR(f.previous_history, at));
+            if (BENT) bent = load_vec3(f.previous_bent_history, at);
         } else {
             vec3 position = surface_position(f, at), normal = surface_normal(f, at);
             vec3 before = is_null(f.previous_position) ? position : load_vec3(f.previous_position, at);
-            past = reprojected(f, before, normal, guide.y >> 24);
+            past = reprojected(f, before, normal, guide.y >> 24, bent);
             float change = f.moved_count > 0u && past.samples > 0.0 ? f.moved_weight * possible_change(f, position, normal) : 0.0;
             if (change > 0.0) {
                 past.samples /= 1.0 + past.samples * change * change / max(past.variance, LEAST_VARIANCE);
@@ -148,6 +153,9 @@ void main() {
         e.mean = past.mean + share * difference;
         // of all samples about their common mean
         e.variance = mix(past.variance, now.variance, share) + share * (1.0 - share) * difference * difference;
+        // without samples there is nothing at its place
+        if (BENT && now.samples > 0.0) bent = mix(bent, load_vec3(f.current_bent, at), share);
     }
     STORE_PAIR(f.history, at, pack_estimate(e));
+    if (BENT) store_vec3(f.bent[0], at, bent);
 }

@@ -58,6 +58,10 @@ fn usage_errors() {
     fails(&["render", "builtin:plane"], 64, "--output");
     fails(&["render", "builtin:plane", "-o", "a.jpg"], 64, ".exr or .png");
     fails(&["render", "builtin:plane", "-o", "a.png", "--aov", "depth"], 64, "--aov needs an .exr");
+    fails(&render(&["--aov", "bent"]), 64, "--aov bent is of frames in real time");
+    fails(&render(&["--preset", "fast", "--show", "normal"]), 64, "--show is of .png and .apng");
+    fails(&["render", "builtin:plane", "-o", "a.png", "--preset", "larsen", "--show", "samples"], 64, "counts no samples");
+    fails(&["render", "builtin:plane", "-o", "a.png", "--technique", "gtao", "--show", "bent"], 64, "technique traced");
     fails(&render(&["--tracer", "magic"]), 64, "pipeline, query, compute");
     fails(&render(&["--size", "0x5"]), 64, "at least 1");
     fails(&render(&["--size", "20000x20000"]), 64, "16384x16384 is the most");
@@ -211,6 +215,38 @@ fn warnings_are_in_the_record() {
         let said = String::from_utf8(run(&args).stderr).unwrap();
         assert_eq!(said, format!("skylit: warning: {warning}\n"));
     }
+}
+
+/// What pictures of frames show, and what is beside it in .exr files.
+#[test]
+fn gpu_frames_as_pictures() {
+    if !run(&["doctor"]).status.success() {
+        assert!(std::env::var_os("SKYLIT_EXPECT_TRACERS").is_none(), "no usable Vulkan device");
+        println!("skipped: no usable Vulkan device");
+        return;
+    }
+    let dir = tempfile::tempdir().unwrap();
+    let at = |name: &str| path(&dir.path().join(name)).to_owned();
+    let base =
+        ["render", "builtin:stairs", "--size", "64x48", "--preset", "fast", "--frames", "2..4", "--validation", "--json"];
+    let (exr, png, apng) = (at("a.##.exr"), at("a.##.png"), at("a.apng"));
+    let record = json(&run(&[&base[..], &["--aov", "bent", "-o", &exr, "-o", &png, "-o", &apng]].concat()));
+    assert!(record["passes"]["display"].is_object() && record["mean"].as_f64().unwrap() > 0.1);
+    for frame in ["02", "03"] {
+        let numbers = skylit::output::load(at(&format!("a.{frame}.exr")).as_ref()).unwrap();
+        assert!(["Y", "A", "samples", "bent.X", "bent.Y", "bent.Z"].iter().all(|name| numbers.f32(name).is_some()));
+        assert!(numbers.f32("depth.Z").is_none());
+        // the same picture as from the numbers
+        let again = at("again.png");
+        skylit::output::save(&numbers, again.as_ref()).unwrap();
+        assert_eq!(std::fs::read(again).unwrap(), std::fs::read(at(&format!("a.{frame}.png"))).unwrap());
+    }
+    json(&run(&[&base[..], &["--show", "normal", "-o", &png, "-o", &apng]].concat()));
+    let picture = skylit::output::load(at("a.03.png").as_ref()).unwrap();
+    assert!(["R", "G", "B"].iter().all(|name| picture.f32(name).is_some()));
+    // numbers alone: nothing is shown
+    let record = json(&run(&[&base[..], &["-o", &exr]].concat()));
+    assert!(record["passes"]["display"].is_null());
 }
 
 /// From a scene to files and back to numbers, on whatever device there is.

@@ -5,6 +5,8 @@
 //   guide     8 bytes: view depth (infinite: nothing is there), normal and id packed: what edge tests of neighbours read
 //   history   8 bytes: mean accessibility; number of samples behind it, variance of one of them
 //   current   8 bytes: the same of this frame's samples alone; no samples: 0 of them
+//   bent      12 bytes, where asked for: mean of accessibility times direction (bent normal), world space; one for each of
+//             this frame's samples, history and the filtered result. Its samples are those of the accessibility beside it.
 #ifndef COMMON_FRAME
 #define COMMON_FRAME
 #include "common/types.glsl"
@@ -51,11 +53,22 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Fr
     uvec2 result;                      // a float a pixel: accessibility
     uvec2 moved;                       // MovedRecord: what has moved since the previous frame
     uvec2 ray_count;                   // a uint: occlusion rays of the frame
+    uvec2 current_bent;                // 3 floats a pixel, of each bent image: of this frame's samples; null, as the others: not asked for
+    uvec2 previous_bent_history;
+    uvec2 bent[4];                     // history; two between the steps of the filter; filtered
 };
+
+// Are bent normals asked for? In what traces nothing the answer is compiled in.
+layout(constant_id = 9) const bool BENT = false;
 
 layout(buffer_reference, std430, buffer_reference_align = 4) buffer FloatImage { float v[]; };
 layout(buffer_reference, std430, buffer_reference_align = 8) buffer PairImage { uvec2 v[]; };
 layout(buffer_reference, std430, buffer_reference_align = 16) buffer QuadImage { uvec4 v[]; };
+
+void store_vec3(uvec2 image, uint at, vec3 value) {
+    FloatImage target = FloatImage(image);
+    for (uint k = 0u; k < 3u; k++) target.v[3u * at + k] = value[k];
+}
 
 // Pixel of a place in the tile order of src/render/block.rs.
 uvec2 tile_pixel(FrameParams f, uint k) {

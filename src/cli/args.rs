@@ -119,7 +119,9 @@ pub enum Aov {
     Ids,
     /// Base colour: albedo.R, .G, .B
     Albedo,
-    /// All of these
+    /// Bent normal, of frames in real time: bent.X, .Y, .Z
+    Bent,
+    /// All of these but the bent normal
     All,
 }
 
@@ -365,9 +367,17 @@ impl RenderArgs {
         self.output.iter().any(|p| ImageFormat::of(p).is_ok_and(|f| f == ImageFormat::Exr))
     }
 
+    /// Will a picture be written, a still or an animation, rather than numbers?
+    pub fn writes_picture(&self) -> bool {
+        self.output.iter().any(|p| apng::is_apng(p) || ImageFormat::of(p).is_ok_and(|f| f == ImageFormat::Png))
+    }
+
     /// Checks what concerns more than one option.
     pub fn check(&self) -> Result<()> {
         self.device.check()?;
+        if self.frames.show.is_some() && !self.writes_picture() {
+            return Err(Error::Usage("--show is of .png and .apng outputs: an .exr has its channels, see --aov".into()));
+        }
         let in_time = self.frames.wanted();
         let images = self.output.iter().filter(|p| in_time.is_none() || !apng::is_apng(p));
         let formats = images.map(|p| ImageFormat::of(p)).collect::<Result<Vec<_>>>()?;
@@ -383,6 +393,9 @@ impl RenderArgs {
         }
         if !self.aov.is_empty() && !formats.contains(&ImageFormat::Exr) {
             return Err(Error::Usage("--aov needs an .exr output: PNG holds colour only".into()));
+        }
+        if in_time.is_none() && self.wants(Aov::Bent) {
+            return Err(Error::Usage("--aov bent is of frames in real time: add --preset".into()));
         }
         if let Some(path) = &self.depth_image {
             ImageFormat::of(path)?;
@@ -412,7 +425,7 @@ impl RenderArgs {
 
     /// Was this auxiliary output asked for?
     pub fn wants(&self, aov: Aov) -> bool {
-        self.aov.contains(&aov) || self.aov.contains(&Aov::All)
+        self.aov.contains(&aov) || aov != Aov::Bent && self.aov.contains(&Aov::All)
     }
 
     /// Every file that will be written.

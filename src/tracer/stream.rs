@@ -56,8 +56,13 @@ pub struct ComputeShader {
 impl ComputeShader {
     /// Compiles it for a device.
     pub fn pipeline(&self, device: &Arc<Device>) -> Result<ComputePipeline> {
+        self.specialized(device, &Specialization::default())
+    }
+
+    /// Compiles it for a device, with constants that differ from what the shader says.
+    pub fn specialized(&self, device: &Arc<Device>, constants: &Specialization) -> Result<ComputePipeline> {
         let spirv = if device.info.int64 { self.int64 } else { self.plain };
-        ComputePipeline::new(device, self.name, spirv, &Specialization::default())
+        ComputePipeline::new(device, self.name, spirv, constants)
     }
 }
 

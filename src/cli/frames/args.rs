@@ -8,6 +8,7 @@ use clap::{Args, ValueEnum, ValueHint};
 use crate::error::{Error, Result};
 use crate::output::{apng, frames};
 use crate::render::raster::Primary;
+use crate::render::realtime::display::Shown;
 use crate::render::realtime::{FilterKind, Preset, Resolution, Settings, Technique};
 use crate::sampling::Sequence;
 
@@ -57,6 +58,16 @@ choices!(FilterKind, |f| match f {
     FilterKind::Box => "A box that stops at edges, as wide as samples are few",
     FilterKind::Separable => "The box's two sides one after the other",
     FilterKind::Atrous => "A small box again and again, its taps twice as far apart each time",
+});
+choices!(Shown, |s| match s {
+    Shown::Accessibility => "The result",
+    Shown::Unfiltered => "What the filter is given",
+    Shown::Samples => "Samples behind a pixel; white: as many as a history counts",
+    Shown::Variance => "Of one sample; white: a quarter",
+    Shown::Depth => "Along the view, near is white",
+    Shown::Normal => "Geometric normal, -1 to 1 as 0 to 1",
+    Shown::Position => "World position, in bands of a quarter of the scene",
+    Shown::Bent => "Bent normal, -1 to 1 as 0 to 1",
 });
 
 /// How it is found what pixels show.
@@ -147,6 +158,9 @@ pub struct FrameArgs {
     /// Pixels to which the filter reaches at most [default: the preset's]
     #[arg(long, value_name = "PIXELS", value_parser = clap::value_parser!(u32).range(0..=16))]
     pub filter_radius: Option<u32>,
+    /// What .png and .apng outputs show [default: accessibility]
+    #[arg(long, value_name = "NAME", value_enum)]
+    pub show: Option<Shown>,
 }
 
 impl FrameArgs {
@@ -168,6 +182,7 @@ impl FrameArgs {
             (self.history.is_some(), "--history"),
             (self.filter.is_some(), "--filter"),
             (self.filter_radius.is_some(), "--filter-radius"),
+            (self.show.is_some(), "--show"),
         ];
         given.into_iter().find_map(|(given, name)| given.then_some(name))
     }

@@ -7,7 +7,7 @@ mod write;
 use std::time::Instant;
 
 use super::Warnings;
-use super::args::{DEFAULT_SIZE, RenderArgs};
+use super::args::{Aov, DEFAULT_SIZE, RenderArgs};
 use super::console::Failure;
 use super::interrupt;
 use super::progress::Progress;
@@ -16,6 +16,7 @@ use crate::error::{Error, Result};
 use crate::output;
 use crate::render::ao::Hemisphere;
 use crate::render::camera::CameraRecord;
+use crate::render::realtime::display::{Display, Shown};
 use crate::render::realtime::{Realtime, Settings, Technique};
 use crate::render::sequence::{self, CameraMotion, Sequence};
 use crate::render::{Control, aov};
@@ -28,6 +29,10 @@ use write::Writer;
 
 /// Frames a second, unless said otherwise.
 const DEFAULT_FPS: f64 = 30.0;
+/// Exposure of pictures, stops.
+const EXPOSURE: f32 = 0.0;
+/// Of the scene's diagonal: what shown depths and positions are measured in.
+const UNIT_OF_SCENE: f32 = 0.25;
 
 /// Loads, makes frames, writes them, reports.
 pub fn run(args: &RenderArgs, start: Instant) -> Result<(), Failure> {
@@ -37,7 +42,10 @@ pub fn run(args: &RenderArgs, start: Instant) -> Result<(), Failure> {
     settings.falloff = args.ao_falloff.unwrap_or(settings.falloff);
     settings.hemisphere = args.ao_normal.into();
     settings.seed = args.seed;
+    let shown = args.frames.show.unwrap_or_default();
+    settings.bent = args.wants(Aov::Bent) || shown == Shown::Bent;
     settings.check()?;
+    shown.check(&settings)?;
     let range = args.frames.range();
     for path in &args.output {
         output::check_writable(&output::frames::numbered(path, u64::from(range.first))?)?;
@@ -68,10 +76,8 @@ pub fn run(args: &RenderArgs, start: Instant) -> Result<(), Failure> {
     let mut sequence = Sequence::new(&scene, camera.clone(), file_camera, motion, animation, fps)?;
     let flat = FlatScene::with_motion(&scene, sequence.motion()?)?;
     let (kind, why, compute) = args.device.choose(&device.info)?;
-    let needs = Needs {
-        normals: settings.hemisphere == Hemisphere::Shading || args.wants(super::args::Aov::Ns),
-        albedo: args.wants(super::args::Aov::Albedo),
-    };
+    let needs =
+        Needs { normals: settings.hemisphere == Hemisphere::Shading || args.wants(Aov::Ns), albedo: args.wants(Aov::Albedo) };
     let warm_up = warm_up(args, &settings);
     let frames = u64::from(range.end - range.first) + u64::from(warm_up);
     let rays = frames * u64::from(size[0]) * u64::from(size[1]) * (1 + u64::from(settings.rays_per_pixel));
@@ -81,8 +87,14 @@ pub fn run(args: &RenderArgs, start: Instant) -> Result<(), Failure> {
     build.take_warnings().iter().for_each(|w| warnings.add(w));
     let mut realtime = Realtime::new(&tracer, size, &settings, &point_lights(&scene, &flat))?;
 
+    if args.writes_picture() {
+        let display = Display { shown, exposure: EXPOSURE, unit: UNIT_OF_SCENE * scene_size(&scene) as f32 };
+        realtime.display(&tracer, Some(display))?;
+    }
+    let needs_aov = args.aov.iter().any(|a| *a != Aov::Bent);
+
     let mut progress = Progress::new("rendering", &console);
-    let mut writer = Writer::create(&args.output, size, range.end - range.first, fps)?;
+    let mut writer = Writer::create(&args.output, size, range.end - range.first, fps, shown.colour())?;
     let mut report = Report::new(args, &settings, realtime.settings().primary.unwrap_or_default(), realtime.primary_reason());
     report.describe(&device.info, kind, why, tracer.stats(), tracer.features().explain(&flat), &scene, &camera);
     for (done, number) in (0..warm_up).map(|_| range.first).chain(range.first..range.end).enumerate() {
@@ -95,10 +107,15 @@ pub fn run(args: &RenderArgs, start: Instant) -> Result<(), Failure> {
         let kept = done as u64 >= u64::from(warm_up);
         if kept {
             let write_start = Instant::now();
-            let pixels = if args.aov.is_empty() { Vec::new() } else { aov::render(&tracer, &record, size, &mut Silent)? };
-            let image = write::image(args, &realtime, size, &pixels, flat.origin, report.metadata(number))?;
-            writer.add(number, &image)?;
-            report.mean = mean(&image);
+            let pixels = if needs_aov { aov::render(&tracer, &record, size, &mut Silent)? } else { Vec::new() };
+            let image = match args.writes_exr() {
+                true => Some(write::image(args, &realtime, size, &pixels, flat.origin, report.metadata(number))?),
+                false => None,
+            };
+            writer.add(number, size, image.as_ref(), realtime.displayed())?;
+            if number + 1 == range.end {
+                report.mean = mean(&realtime.result()?, &realtime.coverage()?);
+            }
             report.seconds.write += write_start.elapsed().as_secs_f64();
         }
         report.add(FrameReport::new(number, kept, seconds, update.mesh_seconds + update.top_seconds, stats));
@@ -120,10 +137,15 @@ pub fn run(args: &RenderArgs, start: Instant) -> Result<(), Failure> {
 }
 
 /// Mean accessibility over what is covered.
-fn mean(image: &output::Image) -> f64 {
-    let sum = |name: &str| image.f32(name).map_or(0.0, |v| v.iter().map(|&x| f64::from(x)).sum::<f64>());
-    let covered = sum("A");
-    if covered > 0.0 { sum("Y") / covered } else { 0.0 }
+fn mean(accessibility: &[f32], coverage: &[f32]) -> f64 {
+    let sum = |v: &[f32]| v.iter().map(|&x| f64::from(x)).sum::<f64>();
+    let covered = sum(coverage);
+    if covered > 0.0 { sum(accessibility) / covered } else { 0.0 }
+}
+
+/// Diagonal, world units; 1 where there is nothing.
+fn scene_size(scene: &Scene) -> f64 {
+    scene.bounds().map(|(lo, hi)| (hi - lo).length()).filter(|d| *d > 0.0).unwrap_or(1.0)
 }
 
 /// Frames before the first: a single one is to be settled.

@@ -1,42 +1,60 @@
 //! Where frames go: files by number, or one animation.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use glam::DVec3;
 
-use crate::cli::args::RenderArgs;
+use crate::cli::args::{Aov, RenderArgs};
 use crate::cli::render::aov_channels;
 use crate::error::Result;
+use crate::gpu::Buffer;
 use crate::output::apng::{self, Animation, ApngWriter, Delay};
-use crate::output::{self, Channel, Image, Samples, frames, png};
+use crate::output::png::{self, Colour};
+use crate::output::{self, Channel, Image, ImageFormat, Samples, frames};
 use crate::render::aov::AovPixel;
 use crate::render::realtime::Realtime;
 
-/// Exposure of pictures, stops.
-const EXPOSURE: f32 = 0.0;
-
 /// Everything that frames are written to.
 pub struct Writer {
-    files: Vec<PathBuf>,
+    images: Vec<PathBuf>,
+    pictures: Vec<PathBuf>,
     animations: Vec<ApngWriter>,
+    colour: Colour,
 }
 
 impl Writer {
-    /// Starts the animations. They appear when [`Writer::finish`] is called.
-    pub fn create(outputs: &[PathBuf], size: [u32; 2], frames: u32, fps: f64) -> Result<Self> {
+    /// Starts the animations. They appear when [`Writer::finish`] is called. `colour`: of pictures.
+    pub fn create(outputs: &[PathBuf], size: [u32; 2], frames: u32, fps: f64, colour: Colour) -> Result<Self> {
         let (animations, files): (Vec<_>, Vec<_>) = outputs.iter().cloned().partition(|p| apng::is_apng(p));
+        let (mut images, mut pictures) = (Vec::new(), Vec::new());
+        for path in files {
+            if ImageFormat::of(&path)? == ImageFormat::Png { pictures.push(path) } else { images.push(path) }
+        }
         let delay = Delay::of_rate(fps)?;
-        let start = |p: &PathBuf| ApngWriter::create(p, Animation { size, colour: png::Colour::Grey, frames, delay });
-        Ok(Self { files, animations: animations.iter().map(start).collect::<Result<_>>()? })
+        let start = |p: &PathBuf| ApngWriter::create(p, Animation { size, colour, frames, delay });
+        Ok(Self { images, pictures, animations: animations.iter().map(start).collect::<Result<_>>()?, colour })
     }
 
-    /// Writes a frame.
-    pub fn add(&mut self, number: u32, image: &Image) -> Result<()> {
-        for path in &self.files {
-            output::save(image, &frames::numbered(path, u64::from(number))?)?;
+    /// Writes a frame: its channels, and what is shown of it ([`Realtime::displayed`]), each where there are files for it.
+    pub fn add(&mut self, number: u32, [width, height]: [u32; 2], image: Option<&Image>, shown: Option<&Buffer>) -> Result<()> {
+        if let Some(image) = image {
+            for path in &self.images {
+                output::save(image, &frames::numbered(path, u64::from(number))?)?;
+            }
         }
-        if !self.animations.is_empty() {
-            let (bytes, _) = png::bytes_of(image, EXPOSURE, Path::new("frame"))?;
+        if let Some(shown) = shown {
+            let mut bytes = Vec::new();
+            let channels = self.colour.channels();
+            shown.read_with(0, 4 * u64::from(width) * u64::from(height), 4, |_, words| {
+                bytes.extend(words.chunks_exact(4).flat_map(|word| &word[..channels]));
+            })?;
+            for path in &self.pictures {
+                let path = frames::numbered(path, u64::from(number))?;
+                match self.colour {
+                    Colour::Grey => png::write_grey(&path, &bytes, width, height)?,
+                    Colour::Rgb => png::write_rgb(&path, &bytes, width, height)?,
+                }
+            }
             for animation in &mut self.animations {
                 animation.add_bytes(&bytes)?;
             }
@@ -60,10 +78,13 @@ pub fn image(
     metadata: Vec<(String, String)>,
 ) -> Result<Image> {
     let f32s = |name: &str, samples| Channel { name: name.into(), samples: Samples::F32(samples) };
-    let mut channels = vec![f32s("Y", realtime.result()?), f32s("A", realtime.coverage()?)];
-    if args.writes_exr() {
-        channels.push(f32s("samples", realtime.samples()?));
-        channels.extend(aov_channels(args, pixels, origin));
+    let mut channels =
+        vec![f32s("Y", realtime.result()?), f32s("A", realtime.coverage()?), f32s("samples", realtime.samples()?)];
+    channels.extend(aov_channels(args, pixels, origin));
+    if args.wants(Aov::Bent) {
+        let bent = realtime.bent()?;
+        let axis = |k: usize| bent.iter().map(|b| b[k]).collect();
+        channels.extend(["bent.X", "bent.Y", "bent.Z"].iter().enumerate().map(|(k, name)| f32s(name, axis(k))));
     }
     Ok(Image { width: size[0], height: size[1], channels, metadata })
 }

@@ -5,6 +5,8 @@
 //! frames know of the same surface; `filter` averages over neighbours. What nothing has changed since the previous frame is not
 //! done again: while neither the camera nor the scene moves there are no camera rays, and pixels with a full history rest.
 
+mod bent;
+pub mod display;
 mod larsen;
 mod params;
 pub mod settings;
@@ -16,10 +18,12 @@ use super::block::{Block, BlockParams};
 use super::camera::CameraRecord;
 use super::raster::{Primary, Raster, View};
 use crate::error::{Error, Result};
-use crate::gpu::{Buffer, Commands, ComputePipeline, Memory, Recorder, Timing};
+use crate::gpu::{Buffer, Commands, ComputePipeline, Memory, Recorder, Specialization, Timing};
 use crate::tracer::gpu_scene::rows;
 use crate::tracer::stream::{LANES, LAUNCH_RAYS, StreamShaders};
 use crate::tracer::{Moved, Push, Stream, Tracer, stream};
+use bent::Bent;
+use display::{Display, DisplayPass};
 use larsen::Larsen;
 use params::{FrameParams, MOST_MOVED, MovedRecord};
 pub use settings::{Filter, FilterKind, Preset, Resolution, Settings, Technique};
@@ -30,6 +34,8 @@ const MOST_LAUNCHES: usize = 8;
 const DEPTH_TOLERANCE: f32 = 1.5;
 /// Cosine between normals, likewise.
 const NORMAL_TOLERANCE: f32 = 0.9;
+/// Id of a constant of shaders/common/frame.glsl.
+const BENT: u32 = 9;
 
 /// What making a frame took.
 #[derive(Clone, Debug, Default)]
@@ -58,6 +64,9 @@ pub struct Realtime {
     passes: Passes,
     images: Images,
     larsen: Option<Box<Larsen>>,
+    display: Option<DisplayPass>,
+    /// Is it recorded?
+    displays: bool,
     commands: Commands,
     primary_reason: String,
     state: State,
@@ -92,6 +101,7 @@ struct Images {
     between: Option<[Buffer; 2]>,
     samples: Option<Buffer>,
     previous_position: Option<Buffer>,
+    bent: Option<Bent>,
     result: Buffer,
     /// Number of occlusion rays.
     ray_count: Buffer,
@@ -142,6 +152,8 @@ impl Realtime {
                 Technique::Larsen => Some(Box::new(Larsen::new(tracer, size, lights, settings.unit)?)),
                 _ => None,
             },
+            display: None,
+            displays: false,
             commands: Commands::new(tracer.device())?,
             state: State::default(),
         })
@@ -199,17 +211,20 @@ impl Realtime {
                 }
                 if let Some(larsen) = &self.larsen {
                     larsen.record(r, push, &images.result);
-                    return;
+                } else {
+                    if begins {
+                        passes.record_begin(r, images, push, pixels as u32, self.settings.technique);
+                    }
+                    for push in batch {
+                        passes.record_occlusion(r, push, self.settings.rays_per_pixel);
+                    }
+                    if ends {
+                        let history = &images.histories[self.state.history];
+                        passes.record_end(r, images, push, pixels as u32, history, &self.settings.filter);
+                    }
                 }
-                if begins {
-                    passes.record_begin(r, images, push, pixels as u32, self.settings.technique);
-                }
-                for push in batch {
-                    passes.record_occlusion(r, push, self.settings.rays_per_pixel);
-                }
-                if ends {
-                    let history = &images.histories[self.state.history];
-                    passes.record_end(r, images, push, pixels as u32, history, &self.settings.filter);
+                if let Some(display) = self.display.as_ref().filter(|_| ends && self.displays) {
+                    display.record(r, pixels as u32);
                 }
             })?);
             if ends {
@@ -237,6 +252,30 @@ impl Realtime {
         })
     }
 
+    /// What frames from the next on leave in [`Realtime::displayed`], beside everything else and in the same submission; `None`: nothing,
+    /// at no cost. May change before every frame: the first time compiles the pass, later ones write its parameters.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for what these settings do not make, and those of compiling the shader.
+    pub fn display(&mut self, tracer: &Tracer, display: Option<Display>) -> Result<()> {
+        self.displays = false;
+        let Some(display) = display else { return Ok(()) };
+        display.shown.check(&self.settings)?;
+        let mut pass = match self.display.take() {
+            Some(pass) => pass,
+            None => DisplayPass::new(tracer, self.pixels())?,
+        };
+        pass.set(&display, &self.settings, self.images.frame_params.address())?;
+        (self.display, self.displays) = (Some(pass), true);
+        Ok(())
+    }
+
+    /// The last frame as [`Realtime::display`] asked for it, in device memory: a word a pixel, rows from the top, the bytes red, green,
+    /// blue and 255. `None` before the first time.
+    pub fn displayed(&self) -> Option<&Buffer> {
+        self.display.as_ref().map(|d| &d.words)
+    }
+
     /// Accessibility of each pixel of the last frame, rows from the top; 0 where nothing is.
     pub fn result(&self) -> Result<Vec<f32>> {
         Ok(bytemuck::pod_collect_to_vec(&self.images.result.read(0, 4 * self.pixels())?))
@@ -254,6 +293,17 @@ impl Realtime {
     /// Samples behind each pixel of the last frame.
     pub fn samples(&self) -> Result<Vec<f32>> {
         Ok(self.estimates()?.into_iter().map(|e| e[1]).collect())
+    }
+
+    /// Bent normal of each pixel of the last frame, rows from the top: the mean over the cosine-weighted hemisphere of accessibility times
+    /// direction, world space. Its length tells how much is open, and how much to one side: on an open plane two thirds, where nothing
+    /// is open 0. Divided by [`Realtime::result`] it is the mean of the open directions. 0 where nothing is.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] without [`Settings::bent`], and those of the device.
+    pub fn bent(&self) -> Result<Vec<[f32; 3]>> {
+        let bent = self.images.bent.as_ref().ok_or_else(bent::not_asked_for)?;
+        Ok(bytemuck::pod_collect_to_vec(&bent.result.read(0, 12 * self.pixels())?))
     }
 
     /// Mean, number of samples and variance of one sample of each pixel.
@@ -341,6 +391,7 @@ impl Realtime {
             result: images.result.address(),
             moved: images.moved.address(),
             ray_count: images.ray_count.address(),
+            ..images.bent.as_ref().map_or_else(FrameParams::default, |b| b.params(self.state.history))
         };
         let params = BlockParams {
             hemisphere: (s.hemisphere == Hemisphere::Shading).into(),
@@ -360,16 +411,17 @@ impl Passes {
     fn new(tracer: &Tracer, size: [u32; 2], settings: &Settings, primary: Primary) -> Result<Self> {
         let device = tracer.device();
         let [gbuffer, accessibility] = Realtime::streams(settings);
+        let constants = Specialization::default().set(BENT, settings.bent.into());
         Ok(Self {
             gbuffer: match primary {
                 Primary::Traced => CameraRays::Traced(Box::new(tracer.stream(gbuffer)?)),
                 Primary::Raster => CameraRays::Drawn(Box::new(Raster::new(tracer, gbuffer, size)?)),
             },
             accessibility: tracer.stream(accessibility)?,
-            gather: stream::GATHER.pipeline(device)?,
+            gather: stream::GATHER.specialized(device, &constants)?,
             gtao: stream::GTAO.pipeline(device)?,
-            temporal: stream::TEMPORAL.pipeline(device)?,
-            filter: stream::FILTER.pipeline(device)?,
+            temporal: stream::TEMPORAL.specialized(device, &constants)?,
+            filter: stream::FILTER.specialized(device, &constants)?,
         })
     }
 
@@ -423,18 +475,25 @@ impl Passes {
         let (push, groups) = (Push { count: pixels, ..push }, pixels.div_ceil(LANES));
         r.timed("temporal", |r| r.dispatch(&self.temporal, &push, groups));
         let steps = filter.steps();
-        let mut from = history.address();
+        let (mut from, mut bent_from) = (history.address(), 0);
         for (k, step) in steps.iter().enumerate() {
-            let to = match &images.between {
-                Some(between) if k + 1 < steps.len() => between[k % 2].address(),
-                _ => 0,
+            // bent normals are named by their place in the parameters
+            let (to, bent_to) = match &images.between {
+                Some(between) if k + 1 < steps.len() => (between[k % 2].address(), 1 + k as u32 % 2),
+                _ => (0, 3),
             };
             let sides = u32::from(step.sides[0]) | u32::from(step.sides[1]) << 1;
-            let push =
-                Push { rays: from, queued: to, sample_index: sides | step.stride << 2, sample_bits: step.radius, ..push };
+            let push = Push {
+                rays: from,
+                queued: to,
+                sample_index: sides | step.stride << 2,
+                sample_bits: step.radius,
+                first: bent_from | bent_to << 2,
+                ..push
+            };
             r.barrier();
             r.timed("filter", |r| r.dispatch(&self.filter, &push, groups));
-            from = to;
+            (from, bent_from) = (to, bent_to);
         }
     }
 }
@@ -464,6 +523,7 @@ impl Images {
                 false => None,
             },
             previous_position: maybe(tracer.is_dynamic(), "previous positions", 12)?,
+            bent: settings.bent.then(|| Bent::new(device, pixels, settings.filter.steps().len())).transpose()?,
             result: Buffer::new(device, "accessibility", 4 * pixels, Memory::Readback)?,
             ray_count: Buffer::new(device, "number of rays", 4, Memory::Readback)?,
         })

@@ -88,6 +88,12 @@ pub struct FrameParams {
     pub moved: u64,
     /// Number of occlusion rays.
     pub ray_count: u64,
+    /// Mean direction of this frame's samples, or 0.
+    pub current_bent: u64,
+    /// Bent normals of the previous frame, or 0.
+    pub previous_bent_history: u64,
+    /// Of this one: history, two between the steps of the filter, filtered; or 0.
+    pub bent: [u64; 4],
 }
 
 /// `MovedRecord` of shaders/temporal.glsl.

@@ -169,6 +169,8 @@ pub struct Settings {
     pub gtao: [u32; 2],
     /// Of the reference work's pipeline: world units that one of its own is.
     pub unit: f64,
+    /// Bent normals besides: the mean direction in which a point is open.
+    pub bent: bool,
 }
 
 impl Default for Settings {
@@ -216,6 +218,9 @@ impl Settings {
         }
         if !(self.clamp >= 0.0 && self.moved_weight >= 0.0 && self.filter.samples >= 0.0) {
             return wrong("clamp, weight of motion and samples of the filter must not be negative");
+        }
+        if self.bent && self.technique != Technique::Traced {
+            return wrong("bent normals are made of traced directions: choose the technique traced");
         }
         Ok(())
     }
@@ -276,6 +281,7 @@ impl Preset {
             filter: Filter { kind: FilterKind::Box, radius: 3, samples: 256.0 },
             gtao: [3, 6],
             unit: 1.0,
+            bent: false,
         };
         match self {
             // it looks for the nearest hit up to 100 units, whatever the falloff leaves of it

@@ -1,0 +1,74 @@
+// display: a buffer of the frame as it is shown: a word a pixel, red in the lowest byte, 8-bit sRGB, opaque.
+//
+// Every buffer becomes a linear colour first, is brightened by the exposure, and is then encoded. The bytes are those of
+// src/output/png.rs on any device: a driver's own power function only guesses a byte, and the smallest values that the host encodes as
+// this byte and the next decide.
+// compute
+#include "common/frame.glsl"
+
+layout(local_size_x = LANES) in;
+
+// Mirrors DisplayParams in src/render/realtime/display.rs.
+layout(buffer_reference, std430, buffer_reference_align = 8) readonly buffer DisplayParams {
+    uvec2 frame;       // FrameParams
+    uvec2 thresholds;  // a float a byte: the smallest value that is encoded so
+    uvec2 words;       // a uint a pixel
+    uint shown;        // see below
+    float gain;        // 2^exposure
+    float unit;        // world units
+    uint has_history;  // 0: there is nothing but the result
+};
+layout(buffer_reference, std430, buffer_reference_align = 4) writeonly buffer DisplayWords { uint v[]; };
+
+// As src/render/realtime/display.rs has them.
+const uint SHOWN_ACCESSIBILITY = 0u;
+const uint SHOWN_UNFILTERED = 1u;
+const uint SHOWN_SAMPLES = 2u;
+const uint SHOWN_VARIANCE = 3u;
+const uint SHOWN_DEPTH = 4u;
+const uint SHOWN_NORMAL = 5u;
+const uint SHOWN_POSITION = 6u;
+const uint SHOWN_BENT = 7u;
+
+// Variance of samples that are 0 or 1 at most.
+const float WHITE_VARIANCE = 0.25;
+
+uint srgb_byte(uvec2 thresholds, float linear) {
+    // also what is not a number
+    if (!(linear > 0.0)) return 0u;
+    if (linear >= 1.0) return 255u;
+    float coded = linear <= 0.0031308 ? 12.92 * linear : 1.055 * pow(linear, 1.0 / 2.4) - 0.055;
+    uint byte = min(uint(255.0 * max(coded, 0.0) + 0.5), 255u);
+    Floats smallest = Floats(thresholds);
+    if (linear < smallest.v[byte]) return byte - 1u;
+    return byte < 255u && linear >= smallest.v[byte + 1u] ? byte + 1u : byte;
+}
+
+// In a space that repeats every two units, without a jump.
+vec3 fold(vec3 v) {
+    return abs(2.0 * fract(0.5 * v) - 1.0);
+}
+
+vec3 colour(DisplayParams d, FrameParams f, uint at) {
+    if (d.shown == SHOWN_ACCESSIBILITY || d.shown == SHOWN_UNFILTERED && d.has_history == 0u) return vec3(FloatImage(f.result).v[at]);
+    uvec2 guide = LOAD_PAIR(f.guide, at);
+    if (!is_surface(guide)) return vec3(0.0);
+    if (d.shown == SHOWN_DEPTH) return vec3(d.unit / (d.unit + uintBitsToFloat(guide.x)));
+    if (d.shown == SHOWN_NORMAL) return 0.5 + 0.5 * surface_normal(f, at);
+    if (d.shown == SHOWN_POSITION) return fold(surface_position(f, at) / d.unit);
+    if (d.shown == SHOWN_BENT) return 0.5 + 0.5 * load_vec3(f.bent[3], at);
+    Estimate e = unpack_estimate(LOAD_PAIR(f.history, at));
+    if (d.shown == SHOWN_SAMPLES) return vec3(e.samples / f.most_samples);
+    return vec3(d.shown == SHOWN_VARIANCE ? e.variance / WHITE_VARIANCE : e.mean);
+}
+
+void main() {
+    uint at = push.first + gl_GlobalInvocationID.x;
+    if (gl_GlobalInvocationID.x >= push.count) return;
+    DisplayParams d = DisplayParams(push.pass);
+    vec3 linear = colour(d, FrameParams(d.frame), at) * d.gain;
+    uint red = srgb_byte(d.thresholds, linear.r);
+    uint word = 0xff000000u | red * 0x010101u;
+    if (d.shown >= SHOWN_NORMAL) word = 0xff000000u | red | srgb_byte(d.thresholds, linear.g) << 8 | srgb_byte(d.thresholds, linear.b) << 16;
+    DisplayWords(d.words).v[at] = word;
+}
