@@ -6,13 +6,23 @@
 
 Ray ray(uint index) {
     FrameParams f = FrameParams(push.pass);
-    uvec2 pixel = tile_pixel(f, index / f.rays_per_pixel);
-    if (any(greaterThanEqual(pixel, f.size))) return no_ray();
-    uint at = image_index(f, pixel);
-    if (!has_rays(f, pixel, at)) return no_ray();
+    uvec2 pixel;
+    uint at, k;
+    if (is_null(f.list)) {
+        pixel = tile_pixel(f, index / f.rays_per_pixel);
+        k = index % f.rays_per_pixel;
+        if (any(greaterThanEqual(pixel, f.size))) return no_ray();
+        at = image_index(f, pixel);
+        if (!has_rays(f, pixel, at)) return no_ray();
+    } else {
+        uint entry = Words(f.list).v[index];
+        at = entry >> 4;
+        k = entry & 15u;
+        pixel = uvec2(at % f.size.x, at / f.size.x);
+    }
     claim(f.ray_count);
     vec3 ng = surface_normal(f, at);
-    vec3 w = occlusion_direction(f, pixel, at, ng, index % f.rays_per_pixel);
+    vec3 w = occlusion_direction(f, pixel, at, ng, k);
     // about a shading normal some directions are below the surface: they start there, and meet its inside
     float side = dot(ng, w) < 0.0 ? -1.0 : 1.0;
     return Ray(surface_position(f, at) + ng * (side * spawn_offset_at(f, at)), 0.0, w, f.reach);
@@ -20,6 +30,11 @@ Ray ray(uint index) {
 
 void add_sample(uint index, float accessibility) {
     FrameParams f = FrameParams(push.pass);
+    if (!is_null(f.list)) {
+        uint entry = Words(f.list).v[index];
+        FloatImage(f.samples).v[(entry >> 4) * f.most_rays + (entry & 15u)] = accessibility;
+        return;
+    }
     if (f.rays_per_pixel > 1u) {
         FloatImage(f.samples).v[index - push.first] = accessibility;
         return;

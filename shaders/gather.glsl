@@ -7,17 +7,23 @@ layout(local_size_x = LANES) in;
 
 void main() {
     FrameParams f = FrameParams(push.pass);
-    uint n = f.rays_per_pixel;
+    // with a budget all of a frame at once, a place for each pixel's samples
+    bool planned = !is_null(f.plan);
+    uint n = planned ? 1u : f.rays_per_pixel;
     uint k = gl_GlobalInvocationID.x;
     if (k >= push.count / n) return;
     uvec2 pixel = tile_pixel(f, push.first / n + k);
     if (any(greaterThanEqual(pixel, f.size))) return;
-    uint at = image_index(f, pixel);
-    if (!has_rays(f, pixel, at)) return;
+    uint at = image_index(f, pixel), begin = k * n;
+    if (planned) {
+        n = LOAD_PAIR(f.plan, at).x & 0xffu;
+        begin = at * f.most_rays;
+        if (n == 0u) return;
+    } else if (!has_rays(f, pixel, at)) return;
     Floats samples = Floats(f.samples);
     float sum = 0.0, squares = 0.0;
     for (uint s = 0u; s < n; s++) {
-        float x = samples.v[k * n + s];
+        float x = samples.v[begin + s];
         sum += x;
         squares += x * x;
     }
@@ -26,7 +32,7 @@ void main() {
     STORE_PAIR(f.current, at, pack_estimate(Estimate(mean, float(n), variance)));
     if (BENT) {
         vec3 ng = surface_normal(f, at), bent = vec3(0.0);
-        for (uint s = 0u; s < n; s++) bent += samples.v[k * n + s] * occlusion_direction(f, pixel, at, ng, s);
+        for (uint s = 0u; s < n; s++) bent += samples.v[begin + s] * occlusion_direction(f, pixel, at, ng, s);
         store_vec3(f.current_bent, at, bent / float(n));
     }
 }

@@ -144,7 +144,8 @@ void main() {
             }
         }
     }
-    past.samples = min(past.samples, max(f.most_samples - now.samples, 0.0));
+    float most = is_null(f.plan) ? f.most_samples : uintBitsToFloat(LOAD_PAIR(f.plan, at).y);
+    past.samples = min(past.samples, max(most - now.samples, 0.0));
     float total = past.samples + now.samples;
     Estimate e = Estimate(0.0, total, 0.0);
     if (total > 0.0) {

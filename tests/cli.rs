@@ -62,6 +62,8 @@ fn usage_errors() {
     fails(&render(&["--preset", "fast", "--show", "normal"]), 64, "--show is of .png and .apng");
     fails(&["render", "builtin:plane", "-o", "a.png", "--preset", "larsen", "--show", "samples"], 64, "counts no samples");
     fails(&["render", "builtin:plane", "-o", "a.png", "--technique", "gtao", "--show", "bent"], 64, "technique traced");
+    fails(&render(&["--preset", "larsen-fixed", "--budget", "variance"]), 64, "1 to 4 rays per pixel");
+    fails(&render(&["--preset", "larsen", "--budget", "variance"]), 64, "--budget has no effect on --preset larsen");
     fails(&render(&["--tracer", "magic"]), 64, "pipeline, query, compute");
     fails(&render(&["--size", "0x5"]), 64, "at least 1");
     fails(&render(&["--size", "20000x20000"]), 64, "16384x16384 is the most");

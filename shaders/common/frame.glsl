@@ -41,6 +41,8 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Fr
     uint rest;                         // 1: nothing moves, and pixels with all their samples get no more
     uint slices;                       // of gtao
     uint steps;                        // of gtao, on each side of a slice
+    uint most_rays;                    // of a pixel in a frame with a budget
+    uint frame_reserved;
     uvec2 surface;
     uvec2 axes;                        // 3 floats a pixel: the hemisphere's axis where it is not the geometric normal; or null
     uvec2 guide;
@@ -56,6 +58,12 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Fr
     uvec2 current_bent;                // 3 floats a pixel, of each bent image: of this frame's samples; null, as the others: not asked for
     uvec2 previous_bent_history;
     uvec2 bent[4];                     // history; two between the steps of the filter; filtered
+    uvec2 plan;                        // 8 bytes a pixel: number of its first ray in its sequence (24 bits), rays; samples that its
+                                       // history counts at most; null, as what follows: every pixel has as many
+    uvec2 list;                        // a uint a ray: pixel (28 bits), which of its rays
+    uvec2 taken;                       // a uint a pixel: rays that it has had
+    uvec2 wishes;                      // 8 bytes a pixel, in tiles: deviation of one sample, samples
+    uvec2 budget_sums;                 // see common/budget.glsl
 };
 
 // Are bent normals asked for? In what traces nothing the answer is compiled in.

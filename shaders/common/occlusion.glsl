@@ -6,6 +6,8 @@
 #include "common/warp.glsl"
 
 vec2 direction_sample(FrameParams f, uvec2 pixel, uint k) {
+    // with a budget a pixel's sequence goes on where it stopped
+    if (!is_null(f.plan)) return sequence_2d(f.sequence, f.seed, pixel, (LOAD_PAIR(f.plan, image_index(f, pixel)).x >> 8) + k, 0u, 1u);
     // what is ordered over the image counts the pixels that are sampled, what is ordered over time the frames in which they are
     if (f.sequence == SEQUENCE_BLUE) {
         uvec2 cell = f.pattern == PATTERN_QUARTER ? pixel >> 1 : f.pattern == PATTERN_CHECKER ? uvec2(pixel.x >> 1, pixel.y) : pixel;

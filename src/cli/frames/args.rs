@@ -9,7 +9,7 @@ use crate::error::{Error, Result};
 use crate::output::{apng, frames};
 use crate::render::raster::Primary;
 use crate::render::realtime::display::Shown;
-use crate::render::realtime::{FilterKind, Preset, Resolution, Settings, Technique};
+use crate::render::realtime::{Budget, FilterKind, Preset, Resolution, Settings, Technique};
 use crate::sampling::Sequence;
 
 /// Implements clap's enumeration by what a type has already: all values, names and a line of help for each.
@@ -52,6 +52,10 @@ choices!(Sequence, |s| match s {
     Sequence::Sobol => "Owen-scrambled Sobol, a sequence for each pixel",
     Sequence::Blue => "One Owen-scrambled Sobol sequence over the image: error is blue noise",
     Sequence::R2 => "Roberts' R2, shifted at random for each pixel",
+});
+choices!(Budget, |b| match b {
+    Budget::Uniform => "All pixels have as many",
+    Budget::Variance => "As many in all, most where a pixel's mean is known least",
 });
 choices!(FilterKind, |f| match f {
     FilterKind::None => "What histories say",
@@ -143,6 +147,9 @@ pub struct FrameArgs {
     /// Occlusion rays of a pixel in a frame [default: the preset's]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(Settings::MOST_RAYS)))]
     pub rays_per_pixel: Option<u32>,
+    /// Whose rays they are; docs/realtime.md has what that gains
+    #[arg(long, value_enum, default_value = "uniform")]
+    pub budget: Budget,
     /// Which pixels have rays in a frame [default: the preset's]
     #[arg(long, value_enum)]
     pub resolution: Option<Resolution>,
@@ -177,6 +184,7 @@ impl FrameArgs {
             (self.technique.is_some(), "--technique"),
             (self.primary != PrimaryChoice::Auto, "--primary"),
             (self.rays_per_pixel.is_some(), "--rays-per-pixel"),
+            (self.budget != Budget::Uniform, "--budget"),
             (self.resolution.is_some(), "--resolution"),
             (self.sequence.is_some(), "--sequence"),
             (self.history.is_some(), "--history"),
@@ -206,6 +214,7 @@ impl FrameArgs {
             let own = [
                 (technique != Technique::Larsen, "--technique"),
                 (self.rays_per_pixel.is_some(), "--rays-per-pixel"),
+                (self.budget != Budget::Uniform, "--budget"),
                 (self.resolution.is_some(), "--resolution"),
                 (self.sequence.is_some(), "--sequence"),
                 (self.history.is_some(), "--history"),
@@ -225,6 +234,7 @@ impl FrameArgs {
             PrimaryChoice::Raster => Some(Primary::Raster),
         };
         s.rays_per_pixel = self.rays_per_pixel.unwrap_or(s.rays_per_pixel);
+        s.budget = self.budget;
         s.resolution = self.resolution.unwrap_or(s.resolution);
         s.sequence = self.sequence.unwrap_or(s.sequence);
         s.history = self.history.unwrap_or(s.history);

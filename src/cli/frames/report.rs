@@ -102,6 +102,7 @@ impl<'a> Report<'a> {
         [
             ("ao.falloff", s.falloff.to_string()),
             ("ao.radius", s.radius.to_string()),
+            ("budget", s.budget.name().into()),
             ("camera", self.camera.clone()),
             ("device", format!("{} ({})", self.device, self.driver)),
             ("frame", frame.to_string()),

@@ -6,6 +6,7 @@
 //! done again: while neither the camera nor the scene moves there are no camera rays, and pixels with a full history rest.
 
 mod bent;
+mod budget;
 pub mod display;
 mod larsen;
 mod params;
@@ -23,10 +24,11 @@ use crate::tracer::gpu_scene::rows;
 use crate::tracer::stream::{LANES, LAUNCH_RAYS, StreamShaders};
 use crate::tracer::{Moved, Push, Stream, Tracer, stream};
 use bent::Bent;
+use budget::BudgetPass;
 use display::{Display, DisplayPass};
 use larsen::Larsen;
 use params::{FrameParams, MOST_MOVED, MovedRecord};
-pub use settings::{Filter, FilterKind, Preset, Resolution, Settings, Technique};
+pub use settings::{Budget, Filter, FilterKind, Preset, Resolution, Settings, Technique};
 
 /// Launches of a submission: between them others get their turn on the device.
 const MOST_LAUNCHES: usize = 8;
@@ -64,6 +66,7 @@ pub struct Realtime {
     passes: Passes,
     images: Images,
     larsen: Option<Box<Larsen>>,
+    budget: Option<Box<BudgetPass>>,
     display: Option<DisplayPass>,
     /// Is it recorded?
     displays: bool,
@@ -131,7 +134,8 @@ impl Realtime {
     /// [`Error::Usage`] for settings out of range, [`Error::OutOfMemory`], and those of compiling shaders.
     pub fn new(tracer: &Tracer, size: [u32; 2], settings: &Settings, lights: &[[f32; 3]]) -> Result<Self> {
         settings.check()?;
-        let rays = u64::from(Block { origin: [0, 0], size }.rays()) * u64::from(settings.rays_per_pixel);
+        let most = if settings.budget == Budget::Variance { Settings::MOST_SHARE } else { 1 } * settings.rays_per_pixel;
+        let rays = u64::from(Block { origin: [0, 0], size }.rays()) * u64::from(most);
         if rays > u64::from(u32::MAX) {
             return Err(Error::Usage(format!(
                 "{} rays per pixel of {}x{}: a frame has 2^32 rays at most; use fewer, or a smaller image",
@@ -151,6 +155,10 @@ impl Realtime {
             larsen: match settings.technique {
                 Technique::Larsen => Some(Box::new(Larsen::new(tracer, size, lights, settings.unit)?)),
                 _ => None,
+            },
+            budget: match settings.budget {
+                Budget::Variance => Some(Box::new(BudgetPass::new(tracer, size, settings)?)),
+                Budget::Uniform => None,
             },
             display: None,
             displays: false,
@@ -214,11 +222,14 @@ impl Realtime {
                 } else {
                     if begins {
                         passes.record_begin(r, images, push, pixels as u32, self.settings.technique);
+                        self.budget.iter().for_each(|b| b.record(r, push));
                     }
+                    let several = self.settings.rays_per_pixel > 1 && self.budget.is_none();
                     for push in batch {
-                        passes.record_occlusion(r, push, self.settings.rays_per_pixel);
+                        passes.record_occlusion(r, push, self.settings.rays_per_pixel, several);
                     }
                     if ends {
+                        self.budget.iter().for_each(|b| b.record_gather(r, &passes.gather, push));
                         let history = &images.histories[self.state.history];
                         passes.record_end(r, images, push, pixels as u32, history, &self.settings.filter);
                     }
@@ -328,6 +339,9 @@ impl Realtime {
     fn launches(&self, push: Push) -> Vec<Push> {
         let n = self.settings.rays_per_pixel;
         let (all, most) = (self.block().rays() * n, LAUNCH_RAYS / n * n);
+        if let Some(budget) = &self.budget {
+            return budget.launches(self.pixels(), push);
+        }
         match self.settings.technique {
             Technique::Traced => {
                 (0..all).step_by(most as usize).map(|first| Push { first, count: most.min(all - first), ..push }).collect()
@@ -393,6 +407,7 @@ impl Realtime {
             ray_count: images.ray_count.address(),
             ..images.bent.as_ref().map_or_else(FrameParams::default, |b| b.params(self.state.history))
         };
+        let frame = self.budget.as_ref().map_or(frame, |b| b.params(frame));
         let params = BlockParams {
             hemisphere: (s.hemisphere == Hemisphere::Shading).into(),
             frame: images.frame_params.address(),
@@ -461,10 +476,10 @@ impl Passes {
         }
     }
 
-    fn record_occlusion(&self, r: &mut Recorder, push: &Push, rays_per_pixel: u32) {
+    fn record_occlusion(&self, r: &mut Recorder, push: &Push, rays_per_pixel: u32, several: bool) {
         self.accessibility.record(r, push);
         r.barrier();
-        if rays_per_pixel > 1 {
+        if several {
             r.timed("gather", |r| r.dispatch(&self.gather, push, (push.count / rays_per_pixel).div_ceil(LANES)));
             r.barrier();
         }

@@ -64,6 +64,10 @@ pub struct FrameParams {
     pub slices: u32,
     /// Of gtao, on each side.
     pub steps: u32,
+    /// Of a pixel in a frame with a budget.
+    pub most_rays: u32,
+    /// To a multiple of 8 bytes.
+    pub reserved: u32,
     /// Surfaces.
     pub surface: u64,
     /// Axes of the hemispheres, or 0.
@@ -94,6 +98,16 @@ pub struct FrameParams {
     pub previous_bent_history: u64,
     /// Of this one: history, two between the steps of the filter, filtered; or 0.
     pub bent: [u64; 4],
+    /// Rays of each pixel, or 0: all have as many.
+    pub plan: u64,
+    /// Those rays, or 0.
+    pub list: u64,
+    /// Rays that pixels have had, or 0.
+    pub taken: u64,
+    /// Deviations and samples, or 0.
+    pub wishes: u64,
+    /// Sums of wishes, or 0.
+    pub budget_sums: u64,
 }
 
 /// `MovedRecord` of shaders/temporal.glsl.

@@ -64,6 +64,30 @@ impl Resolution {
     }
 }
 
+/// Who has how many of a frame's rays.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Budget {
+    /// All pixels that are sampled have as many.
+    #[default]
+    Uniform,
+    /// As many in all, most where a pixel's mean is known least.
+    Variance,
+}
+
+impl Budget {
+    /// All of them.
+    pub const ALL: [Budget; 2] = [Budget::Uniform, Budget::Variance];
+
+    /// As on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Budget::Uniform => "uniform",
+            Budget::Variance => "variance",
+        }
+    }
+}
+
 /// How the pixels of a frame are averaged.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
@@ -142,6 +166,8 @@ pub struct Settings {
     pub primary: Option<Primary>,
     /// Rays of a pixel that is sampled in a frame; 1 to [`Settings::MOST_RAYS`].
     pub rays_per_pixel: u32,
+    /// Whose they are: so many on average, or each pixel's own.
+    pub budget: Budget,
     /// Which pixels are.
     pub resolution: Resolution,
     /// Where their directions come from.
@@ -182,6 +208,10 @@ impl Default for Settings {
 impl Settings {
     /// Rays of a pixel in a frame at most.
     pub const MOST_RAYS: u32 = 4096;
+    /// With a budget: rays of a pixel in a frame at most, times those that it has on average.
+    pub const MOST_SHARE: u32 = 4;
+    /// With a budget: rays of a pixel in a frame on average at most. Four bits count them.
+    const MOST_BUDGET: u32 = 4;
     /// Samples that a history counts at most: as many as half floats count one by one.
     pub const MOST_SAMPLES: u32 = 2048;
 
@@ -208,6 +238,14 @@ impl Settings {
         let wrong = |what: &str| Err(Error::Usage(what.to_owned()));
         if !(1..=Self::MOST_RAYS).contains(&self.rays_per_pixel) {
             return wrong(&format!("rays per pixel must be 1 to {}", Self::MOST_RAYS));
+        }
+        if self.budget == Budget::Variance
+            && (self.rays_per_pixel > Self::MOST_BUDGET || self.history < 2 || self.technique != Technique::Traced)
+        {
+            return wrong(&format!(
+                "a budget by variance needs traced rays, a history, and 1 to {} rays per pixel",
+                Self::MOST_BUDGET
+            ));
         }
         if self.history == 0 {
             return wrong("a history of 0 frames: 1 keeps none");
@@ -268,6 +306,7 @@ impl Preset {
             technique: Technique::Traced,
             primary: None,
             rays_per_pixel: 1,
+            budget: Budget::Uniform,
             resolution: Resolution::Full,
             sequence: Sequence::Blue,
             seed: 0,
