@@ -1,0 +1,124 @@
+//! Scenes that change while they are seen: something appears, something slides, the camera steps aside.
+
+mod appear;
+mod masks;
+mod room;
+mod script;
+mod sequence;
+mod sidestep;
+
+use super::Bench;
+use super::candidates::Candidate;
+use super::reference::{Referee, Truth};
+use super::shot::Shot;
+use super::table;
+use crate::error::Result;
+use crate::measure::ao_benchmark::verdict::THEIRS;
+use crate::measure::ao_benchmark::{ChangeRecord, ChangeResult};
+use crate::measure::temporal::{Ghosting, LagCurve, Residual, recovery};
+use crate::render::camera::CameraRecord;
+use crate::render::realtime::Technique;
+use crate::scene::flatten::FlatScene;
+use crate::tracer::Tracer;
+use script::Script;
+
+/// How much more than the settled error still counts as recovered.
+const RECOVERED: f64 = 1.1;
+
+/// All changes.
+pub fn measure(bench: &mut Bench) -> Result<()> {
+    let room = room::Room::new();
+    let aspect = bench.aspect();
+    type Play = fn(&mut Bench, &mut Script, &mut Stage, &mut ChangeRecord) -> Result<()>;
+    let plays: [(&str, Script, Play); 3] = [
+        ("appear", room.appearing(), appear::play),
+        ("slide", room.sliding(aspect), sequence::play),
+        ("sidestep", room.standing(), sidestep::play),
+    ];
+    let all = plays.len() as f64;
+    for (k, (change, mut script, play)) in plays.into_iter().enumerate() {
+        let name = format!("{}, {change}", script.name);
+        if bench.is_late() && !bench.out.is_empty() {
+            bench.leave_out(&name);
+            continue;
+        }
+        bench.advance(k as f64 / all);
+        let flat = FlatScene::with_motion(script.scene, script.motion.clone())?;
+        let mut tracer = bench.tracer(&name, &flat)?;
+        let occlusion = bench.args.occlusion(script.reach)?;
+        let size = bench.args.size();
+        let referee = Referee::new(&tracer, size, &occlusion, bench.args.reference_rays())?;
+        let camera = CameraRecord::new(&script.camera, flat.origin, aspect);
+        let mut stage = Stage { tracer: &mut tracer, referee, size, camera, occlusion, name };
+        let mut record = ChangeRecord { scene: script.name.clone(), change: change.to_owned(), ..Default::default() };
+        let outcome = play(bench, &mut script, &mut stage, &mut record);
+        compare(&mut record);
+        if !record.results.is_empty() {
+            bench.lines(&table::change(&record))?;
+            bench.out.changes.push(record);
+        }
+        outcome?;
+    }
+    Ok(())
+}
+
+/// Where a script is played.
+struct Stage<'a> {
+    tracer: &'a mut Tracer,
+    referee: Referee,
+    size: [u32; 2],
+    camera: CameraRecord,
+    occlusion: super::candidates::Occlusion,
+    name: String,
+}
+
+impl Stage<'_> {
+    /// What is right now.
+    fn truth(&mut self) -> Result<Truth> {
+        self.referee.truth(self.tracer, &self.camera)
+    }
+
+    /// What the camera sees now.
+    fn shot(&self) -> Shot<'_> {
+        Shot { tracer: self.tracer, size: self.size, camera: self.camera, occlusion: self.occlusion }
+    }
+}
+
+/// Presets that know a past.
+fn candidates(bench: &Bench) -> Vec<&'static Candidate> {
+    bench.args.candidates().into_iter().filter(|c| c.name != "reference").collect()
+}
+
+/// A result with the name of its preset.
+fn result_of(candidate: &Candidate, stage: &Stage) -> ChangeResult {
+    let technique: Technique = candidate.settings(&stage.occlusion).technique;
+    ChangeResult { preset: candidate.name.to_owned(), technique: technique.name().to_owned(), ..Default::default() }
+}
+
+/// How much of `wrong` an image shows, added to `ghosting`. Error and difference are taken from halves of the references that know nothing
+/// of each other, so that their noise does not pass for a ghost.
+fn ghost(ghosting: &mut Ghosting, image: &[f32], truth: &Truth, wrong: &Truth, mask: &[f32]) -> Option<Residual> {
+    let [a, b] = &truth.halves;
+    let shifted: Vec<f32> = image.iter().zip(a).zip(b).map(|((v, a), b)| v - a + b).collect();
+    ghosting.add(&shifted, b, &wrong.halves[1], Some(mask))
+}
+
+/// What says something only beside the pipeline of the reference work.
+fn compare(record: &mut ChangeRecord) {
+    let theirs = record.results.iter().find(|r| r.preset == THEIRS);
+    let their_half_life = theirs.and_then(|r| r.fitted_half_life);
+    let their_end = theirs.filter(|r| r.recovery.is_some()).and_then(|r| r.rmse.last().copied());
+    for r in &mut record.results {
+        r.times_as_quick = their_half_life.zip(r.fitted_half_life).map(|(theirs, ours)| theirs / ours).filter(|x| !x.is_nan());
+        r.recovery_to_larsen = their_end.and_then(|end| recovery(&r.rmse, end, RECOVERED));
+    }
+}
+
+/// What the residuals of frames after a sudden change say.
+fn lag(result: &mut ChangeResult, residuals: Vec<f64>) {
+    let curve = LagCurve::new(residuals);
+    result.half_life = Some(curve.half_life());
+    result.fitted_half_life = Some(curve.fitted_half_life());
+    result.gone = curve.gone();
+    result.residuals = curve.residuals().to_vec();
+}
