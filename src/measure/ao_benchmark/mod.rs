@@ -256,8 +256,13 @@ pub struct ChangeResult {
     pub preset: String,
     /// Where its occlusion comes from.
     pub technique: String,
-    /// Share of the old image in each frame from the change on.
+    /// Share of the old image in each frame from the change on; of `slide` and `animated`, of the truth of the frame before, in frames
+    /// that have a reference. What the preset itself ends at counts as 0.
     pub residuals: Vec<f64>,
+    /// The same beside frames of the same age without a past, which are as blurred and as noisy: what is remembered, and no more.
+    pub memory: Vec<f64>,
+    /// Frames in which half of that is forgotten.
+    pub memory_half_life: Option<f64>,
     /// Frames in which half of the old is forgotten, by the first frame.
     pub half_life: Option<f64>,
     /// The same, by all frames that still show some.
@@ -266,7 +271,7 @@ pub struct ChangeResult {
     pub gone: Option<usize>,
     /// What the old adds to the mean squared error.
     pub ghosting: Option<f64>,
-    /// The larsen preset's fitted half-life over this one's.
+    /// The larsen preset's half-life of memory over this one's.
     pub times_as_quick: Option<f64>,
     /// Error of each frame over the pixels that are looked at.
     pub rmse: Vec<f64>,

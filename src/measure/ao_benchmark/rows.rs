@@ -5,7 +5,7 @@ use std::io::Write;
 use super::{AoBenchmark, ChangeResult, Cost, Errors, SeriesPoint, Still};
 use crate::measure::stats::Spread;
 
-const COLUMNS: [&str; 39] = [
+const COLUMNS: [&str; 40] = [
     "part",
     "scene",
     "view",
@@ -35,6 +35,7 @@ const COLUMNS: [&str; 39] = [
     "equal-time rmse",
     "half-life",
     "fitted half-life",
+    "memory half-life",
     "gone",
     "ghosting",
     "times as quick",
@@ -183,6 +184,7 @@ fn change_row(head: Row, r: &ChangeResult) -> Row {
     let frames = |n: Option<usize>| n.map(|n| n as f64);
     let row = head.text("preset", &r.preset).text("technique", &r.technique);
     let row = row.number("half-life", r.half_life).number("fitted half-life", r.fitted_half_life);
+    let row = row.number("memory half-life", r.memory_half_life);
     let row = row.number("gone", frames(r.gone)).number("ghosting", r.ghosting).number("times as quick", r.times_as_quick);
     let row = row.number("recovery", frames(r.recovery)).number("recovery to larsen", frames(r.recovery_to_larsen));
     let row = row.number("stale pixels", count(r.stale_pixels)).number("stale by chance", count(r.stale_pixels_by_chance));

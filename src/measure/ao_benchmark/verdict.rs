@@ -30,7 +30,7 @@ pub struct Verdict {
     pub rays_to_reach_ratio: Option<f64>,
     /// With as many rays as take their time.
     pub equal_time: Option<EqualTime>,
-    /// Presets whose filter does not lower the settled error.
+    /// Presets whose filter raises the settled error.
     pub filter_raises: Vec<String>,
 }
 
@@ -87,10 +87,10 @@ impl Verdict {
     }
 }
 
-/// Does its filter fail to lower the settled error?
+/// Does its filter raise the settled error?
 fn raises(r: &TechniqueRecord) -> bool {
     let settled = r.still.as_ref().and_then(Still::settled);
-    settled.and_then(|p| Some(p.errors.rmse >= p.unfiltered?.rmse)).unwrap_or(false)
+    settled.and_then(|p| Some(p.errors.rmse > p.unfiltered?.rmse)).unwrap_or(false)
 }
 
 #[cfg(test)]

@@ -20,8 +20,6 @@ const SEEDS: [u32; 2] = [0x5eed_000a, 0x5eed_000b];
 pub struct Truth {
     /// The mean of both halves.
     pub image: Vec<f32>,
-    /// Each by itself.
-    pub halves: [Vec<f32>; 2],
     /// 1 where something is.
     pub coverage: Vec<f32>,
     /// Standard error of `image`.
@@ -74,7 +72,7 @@ impl Referee {
         let (coverage, surfaces) = (a.coverage()?, a.surfaces()?);
         let image = halves[0].iter().zip(&halves[1]).map(|(a, b)| 0.5 * (a + b)).collect();
         let rmse = 0.5 * ImagePair::new(&halves[0], &halves[1], 1, Some(&coverage))?.rmse();
-        Ok(Truth { image, halves, coverage, rmse, surfaces, width: self.width })
+        Ok(Truth { image, coverage, rmse, surfaces, width: self.width })
     }
 }
 

@@ -28,7 +28,7 @@ fn error(x: f64) -> String {
 }
 
 fn ratio(x: f64) -> String {
-    if x.is_infinite() { "never".to_owned() } else { format!("{x:.3}") }
+    if x.is_infinite() { "inf".to_owned() } else { format!("{x:.3}") }
 }
 
 fn ms(s: Spread) -> String {
@@ -167,7 +167,7 @@ fn verdict(v: &Verdict) -> Vec<String> {
         ));
     }
     if !v.filter_raises.is_empty() {
-        lines.push(format!("  the filter does not lower the error of: {}", v.filter_raises.join(", ")));
+        lines.push(format!("  the filter raises the settled error of: {}", v.filter_raises.join(", ")));
     }
     lines
 }
@@ -186,12 +186,13 @@ pub fn change(record: &ChangeRecord) -> Vec<String> {
         ),
     ];
     type Column = (&'static str, fn(&ChangeResult) -> Option<String>);
-    let columns: [Column; 13] = [
+    let columns: [Column; 14] = [
         ("left 1", |r| r.residuals.first().map(|g| format!("{g:.3}"))),
         ("left 4", |r| r.residuals.get(3).map(|g| format!("{g:.3}"))),
-        ("half-life", |r| r.half_life.map(ratio)),
-        ("fitted", |r| r.fitted_half_life.map(ratio)),
-        ("x as quick", |r| r.times_as_quick.map(number)),
+        ("half-life", |r| r.fitted_half_life.map(ratio)),
+        ("memory 1", |r| r.memory.first().map(|g| format!("{g:.3}"))),
+        ("half-life", |r| r.memory_half_life.map(ratio)),
+        ("x as quick", |r| r.times_as_quick.map(ratio)),
         ("gone in", |r| r.gone.map(|n| n.to_string())),
         ("ghosting", |r| r.ghosting.map(|g| format!("{g:.2e}"))),
         ("stale", |r| r.stale_pixels.map(thousands)),

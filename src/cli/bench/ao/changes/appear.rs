@@ -1,7 +1,7 @@
 //! Something appears under a camera that stands still: how long the image without it stays.
 
 use super::script::Script;
-use super::{Stage, candidates, ghost, lag, masks, result_of};
+use super::{Stage, afresh, candidates, ghost, lag, masks, result_of, settled};
 use crate::cli::bench::ao::Bench;
 use crate::cli::bench::ao::laps::Laps;
 use crate::cli::bench::ao::reference::Truth;
@@ -51,20 +51,30 @@ pub fn play(bench: &mut Bench, script: &mut Script, stage: &mut Stage, record: &
         let mut result = result_of(candidate, stage);
         let update = script.to(stage.tracer, 1)?;
         result.update_ms = Spread::of(&[1e3 * (update.mesh_seconds + update.top_seconds)]);
-        let (mut residuals, mut ghosting, mut after) = (Vec::new(), Ghosting::default(), Vec::new());
-        for frame in 0..frames as usize {
+        let old = realtime.result()?;
+        let mut images = Vec::new();
+        for frame in 0..frames {
             let moved = if frame == 0 { update.moved.as_slice() } else { &[] };
             laps.frame(&mut realtime, stage.tracer, &stage.camera, moved)?;
             let image = realtime.result()?;
-            residuals.push(ghost(&mut ghosting, &image, &truth, &wrong, &mask).map_or(f64::NAN, |r| r.share));
             result.rmse.push(truth.rmse_over(&image, &mask)?);
-            if frame + 1 == STALE_AFTER {
-                after = image;
-            }
+            images.push(image);
         }
+        let fresh = afresh(&mut realtime, stage, bench.args.frames().max(frames))?;
+        let Some(new) = fresh.last() else { continue };
+        // what it showed before is all of it, also where that is not what was right
+        let share = |image: &[f32], beside: &[f32], ghosting: &mut Ghosting| {
+            ghost(ghosting, (image, beside), (&truth, &wrong), &mask).map_or(f64::NAN, |r| r.share)
+        };
+        let all = share(&old, new, &mut Ghosting::default());
+        let mut ghosting = Ghosting::default();
+        let residuals = images.iter().map(|image| share(image, new, &mut ghosting) / all).collect();
+        let of_that_age = |(image, fresh): (&Vec<f32>, &Vec<f32>)| share(image, fresh, &mut Ghosting::default()) / all;
+        let memory = images.iter().zip(&fresh).map(of_that_age).collect();
         result.ghosting = Some(ghosting.energy());
-        lag(&mut result, residuals);
-        stale(&mut result, &mut realtime, stage, (&after, &mask), (&truth, &wrong))?;
+        lag(&mut result, residuals, memory);
+        let after = &images[STALE_AFTER - 1];
+        stale(&mut result, &mut realtime, stage, (after, &mask), (&truth, &wrong))?;
         record.results.push(result);
     }
     Ok(())
@@ -78,29 +88,27 @@ fn stale(
     (image, mask): (&[f32], &[f32]),
     (truth, wrong): (&Truth, &Truth),
 ) -> Result<()> {
-    let mut laps = Laps::default();
-    let mut fresh = || -> Result<Vec<f32>> {
-        // what it draws goes on: each run is another
-        realtime.reset();
-        for _ in 0..STALE_AFTER {
-            laps.frame(realtime, stage.tracer, &stage.camera, &[])?;
-        }
-        realtime.result()
-    };
-    let mut squares = vec![0f64; image.len()];
+    // what it draws goes on: each run is another
+    let mut fresh = || settled(realtime, stage, STALE_AFTER as u32);
+    let (mut sums, mut squares) = (vec![0f64; image.len()], vec![0f64; image.len()]);
     for _ in 0..FRESH_RUNS {
-        let errors = fresh()?;
-        squares.iter_mut().zip(errors.iter().zip(&truth.image)).for_each(|(s, (v, t))| *s += f64::from(v - t).powi(2));
+        for ((sum, square), v) in sums.iter_mut().zip(&mut squares).zip(fresh()?) {
+            *sum += f64::from(v);
+            *square += f64::from(v).powi(2);
+        }
     }
     let chance = fresh()?;
-    let noise = truth.rmse.powi(2) + HALF_STEP.powi(2);
-    let variances = pooled(&squares, mask, stage.size, FRESH_RUNS as f64);
+    let runs = FRESH_RUNS as f64;
+    let scatter: Vec<f64> = sums.iter().zip(&squares).map(|(s, q)| ((q - s * s / runs) / (runs - 1.0)).max(0.0)).collect();
+    let variances = pooled(&scatter, mask, stage.size);
     let count = |image: &[f32]| {
         let is_stale = |k: &usize| {
             let k = *k;
             let old = f64::from(wrong.image[k] - truth.image[k]);
-            let off = f64::from(image[k] - truth.image[k]) * old.signum();
-            mask[k] > 0.0 && old != 0.0 && off > SIGMAS * (variances[k] + noise).sqrt()
+            let off = (f64::from(image[k]) - sums[k] / runs) * old.signum();
+            // of one image and of a mean of some
+            let variance = variances[k] * (1.0 + 1.0 / runs) + HALF_STEP.powi(2);
+            mask[k] > 0.0 && old != 0.0 && off > SIGMAS * variance.sqrt()
         };
         (0..image.len()).filter(is_stale).count() as u64
     };
@@ -109,8 +117,8 @@ fn stale(
     Ok(())
 }
 
-/// Mean square of each pixel, over squares of pixels around it that count.
-fn pooled(squares: &[f64], mask: &[f32], size: [u32; 2], runs: f64) -> Vec<f64> {
+/// Mean variance of each pixel, over squares of pixels around it that count.
+fn pooled(variances: &[f64], mask: &[f32], size: [u32; 2]) -> Vec<f64> {
     let [width, height] = size.map(i64::from);
     let around = |k: usize| {
         let (x, y) = (k as i64 % width, k as i64 / width);
@@ -119,14 +127,14 @@ fn pooled(squares: &[f64], mask: &[f32], size: [u32; 2], runs: f64) -> Vec<f64> 
             for u in (x - POOL).max(0)..=(x + POOL).min(width - 1) {
                 let at = (v * width + u) as usize;
                 if mask[at] > 0.0 {
-                    sum += squares[at];
-                    n += runs;
+                    sum += variances[at];
+                    n += 1.0;
                 }
             }
         }
         if n > 0.0 { sum / n } else { 0.0 }
     };
-    (0..squares.len()).map(around).collect()
+    (0..variances.len()).map(around).collect()
 }
 
 #[cfg(test)]
@@ -136,7 +144,8 @@ mod tests {
     #[test]
     fn deviations_are_pooled_over_what_counts() {
         let mask = [1.0, 1.0, 0.0, 1.0, 1.0, 1.0];
-        let squares = [2.0, 4.0, 100.0, 6.0, 0.0, 0.0];
-        assert_eq!(pooled(&squares, &mask, [6, 1], 2.0)[0], 1.5);
+        let variances = [2.0, 4.0, 100.0, 6.0, 0.0, 0.0];
+        assert_eq!(pooled(&variances, &mask, [6, 1])[0], 3.0);
+        assert_eq!(pooled(&variances, &mask, [1, 6])[5], 2.0);
     }
 }

@@ -9,6 +9,7 @@ mod sidestep;
 
 use super::Bench;
 use super::candidates::Candidate;
+use super::laps::Laps;
 use super::reference::{Referee, Truth};
 use super::shot::Shot;
 use super::table;
@@ -17,7 +18,7 @@ use crate::measure::ao_benchmark::verdict::THEIRS;
 use crate::measure::ao_benchmark::{ChangeRecord, ChangeResult};
 use crate::measure::temporal::{Ghosting, LagCurve, Residual, recovery};
 use crate::render::camera::CameraRecord;
-use crate::render::realtime::Technique;
+use crate::render::realtime::{Realtime, Technique};
 use crate::scene::flatten::FlatScene;
 use crate::tracer::Tracer;
 use script::Script;
@@ -95,27 +96,52 @@ fn result_of(candidate: &Candidate, stage: &Stage) -> ChangeResult {
     ChangeResult { preset: candidate.name.to_owned(), technique: technique.name().to_owned(), ..Default::default() }
 }
 
-/// How much of `wrong` an image shows, added to `ghosting`. Error and difference are taken from halves of the references that know nothing
-/// of each other, so that their noise does not pass for a ghost.
-fn ghost(ghosting: &mut Ghosting, image: &[f32], truth: &Truth, wrong: &Truth, mask: &[f32]) -> Option<Residual> {
-    let [a, b] = &truth.halves;
-    let shifted: Vec<f32> = image.iter().zip(a).zip(b).map(|((v, a), b)| v - a + b).collect();
-    ghosting.add(&shifted, b, &wrong.halves[1], Some(mask))
+/// How much of `wrong` an image shows, added to `ghosting`. `settled` is what the preset itself ends at when nothing changes any more: what
+/// it always gets wrong is no ghost. `None` where nothing differs.
+fn ghost(
+    ghosting: &mut Ghosting,
+    (image, settled): (&[f32], &[f32]),
+    (truth, wrong): (&Truth, &Truth),
+    mask: &[f32],
+) -> Option<Residual> {
+    // as if it settled at what is right
+    let shifted: Vec<f32> = image.iter().zip(settled).zip(&truth.image).map(|((v, s), t)| v - s + t).collect();
+    ghosting.add(&shifted, &truth.image, &wrong.image, Some(mask))
+}
+
+/// What a preset shows of a scene that does not change, in each of `frames` frames from now on, without any past.
+fn afresh(realtime: &mut Realtime, stage: &Stage, frames: u32) -> Result<Vec<Vec<f32>>> {
+    realtime.reset();
+    let mut laps = Laps::default();
+    let one = |_| {
+        laps.frame(realtime, stage.tracer, &stage.camera, &[])?;
+        realtime.result()
+    };
+    (0..frames).map(one).collect()
+}
+
+/// The last of them: what it ends at.
+fn settled(realtime: &mut Realtime, stage: &Stage, frames: u32) -> Result<Vec<f32>> {
+    Ok(afresh(realtime, stage, frames)?.pop().unwrap_or_default())
 }
 
 /// What says something only beside the pipeline of the reference work.
 fn compare(record: &mut ChangeRecord) {
     let theirs = record.results.iter().find(|r| r.preset == THEIRS);
-    let their_half_life = theirs.and_then(|r| r.fitted_half_life);
+    let their_half_life = theirs.and_then(|r| r.memory_half_life);
     let their_end = theirs.filter(|r| r.recovery.is_some()).and_then(|r| r.rmse.last().copied());
     for r in &mut record.results {
-        r.times_as_quick = their_half_life.zip(r.fitted_half_life).map(|(theirs, ours)| theirs / ours).filter(|x| !x.is_nan());
+        r.times_as_quick = their_half_life.zip(r.memory_half_life).map(|(theirs, ours)| theirs / ours).filter(|x| !x.is_nan());
         r.recovery_to_larsen = their_end.and_then(|end| recovery(&r.rmse, end, RECOVERED));
     }
 }
 
-/// What the residuals of frames after a sudden change say.
-fn lag(result: &mut ChangeResult, residuals: Vec<f64>) {
+/// What the residuals of frames after a sudden change say, beside what the preset ends at and beside frames of the same age without a
+/// past.
+fn lag(result: &mut ChangeResult, residuals: Vec<f64>, memory: Vec<f64>) {
+    let remembered = LagCurve::new(memory);
+    result.memory_half_life = Some(remembered.fitted_half_life());
+    result.memory = remembered.residuals().to_vec();
     let curve = LagCurve::new(residuals);
     result.half_life = Some(curve.half_life());
     result.fitted_half_life = Some(curve.fitted_half_life());

@@ -1,7 +1,7 @@
 //! Something moves in every frame: errors, ghosts, and what keeping up costs.
 
 use super::script::Script;
-use super::{Stage, candidates, ghost, masks, result_of};
+use super::{Stage, candidates, ghost, masks, result_of, settled};
 use crate::cli::bench::ao::Bench;
 use crate::cli::bench::ao::laps::Laps;
 use crate::cli::bench::ao::moving::measured;
@@ -47,7 +47,7 @@ pub fn play(bench: &mut Bench, script: &mut Script, stage: &mut Stage, record: &
         let mut realtime = stage.shot().realtime(&candidate.settings(&stage.occlusion))?;
         let mut result = result_of(candidate, stage);
         let (mut laps, mut updates) = (Laps::default(), Vec::new());
-        let (mut ghosting, mut errors): (_, Vec<Errors>) = (Ghosting::default(), Vec::new());
+        let (mut images, mut errors): (Vec<Vec<f32>>, Vec<Errors>) = (Vec::new(), Vec::new());
         for frame in 0..frames {
             let moved = if frame == 0 {
                 Vec::new()
@@ -65,7 +65,13 @@ pub fn play(bench: &mut Bench, script: &mut Script, stage: &mut Stage, record: &
             let Some(m) = moments.iter().find(|m| m.frame == frame) else { continue };
             let image = realtime.result()?;
             errors.push(m.truth.errors_of(&image)?);
-            let left = ghost(&mut ghosting, &image, &m.truth, &m.before, &m.mask);
+            images.push(image);
+        }
+        let mut ghosting = Ghosting::default();
+        for (m, image) in moments.iter().zip(&images) {
+            script.to(stage.tracer, m.frame)?;
+            let settled = settled(&mut realtime, stage, frames)?;
+            let left = ghost(&mut ghosting, (image, &settled), (&m.truth, &m.before), &m.mask);
             result.residuals.push(left.map_or(f64::NAN, |r| r.share));
         }
         result.ghosting = Some(ghosting.energy());
