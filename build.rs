@@ -1,9 +1,9 @@
 //! Compiles the shaders: each pass's stream once per tracer and mode, and the shaders that the tracers share.
 //!
 //! A pass is a file `shaders/NAME.glsl` whose head says `// stream: any`, `// stream: closest` or both; `// rays: queue` besides
-//! when the rays are in memory before it begins, `// rays: coherent` when neighbours go much the same way (packets pay then). The generated `shaders.rs` holds a constant `NAME_ANY` / `NAME_CLOSEST` for each
-//! (see `src/tracer/stream.rs`). `// compute` instead: a compute shader that traces nothing, as the constant `NAME`; `// compute: queue`
-//! when it fills a queue: `NAME_BALLOT` then is for devices that can count lanes.
+//! when the rays are in memory before it begins, `// rays: coherent` when they are the camera's: neighbours go much the
+//! same way (packets pay), and what they meet can be drawn instead of traced, where there is one a pixel. The generated `shaders.rs` holds a constant `NAME_ANY` / `NAME_CLOSEST` for each
+//! (see `src/tracer/stream.rs`). `// compute` instead: a compute shader that traces nothing, as the constant `NAME`.
 
 use std::cell::RefCell;
 use std::collections::BTreeSet;
@@ -66,9 +66,9 @@ const HEAD_PACKET: &str = "#extension GL_EXT_shader_explicit_arithmetic_types_in
      #extension GL_KHR_shader_subgroup_arithmetic : require\n#extension GL_EXT_control_flow_attributes : require\n\
      #define PACKET_RAYS 2\n";
 
-const VARIANTS: [Variant; 9] = [
+const VARIANTS: [Variant; 10] = [
     Variant { field: "generate", template: "trace/generate.glsl", head: "", kind: ShaderKind::Compute },
-    Variant { field: "generate_64", template: "trace/generate.glsl", head: HEAD_64, kind: ShaderKind::Compute },
+    Variant { field: "generate_64", template: "trace/generate.glsl", head: HEAD_64_BALLOT, kind: ShaderKind::Compute },
     Variant { field: "deliver", template: "trace/deliver.glsl", head: "", kind: ShaderKind::Compute },
     Variant { field: "deliver_64", template: "trace/deliver.glsl", head: HEAD_64_BALLOT, kind: ShaderKind::Compute },
     Variant { field: "packet", template: "trace/packet.glsl", head: HEAD_PACKET, kind: ShaderKind::Compute },
@@ -86,6 +86,7 @@ const VARIANTS: [Variant; 9] = [
         head: "#extension GL_EXT_ray_tracing : require\n",
         kind: ShaderKind::RayGeneration,
     },
+    Variant { field: "visibility", template: "trace/visibility.glsl", head: "", kind: ShaderKind::Compute },
 ];
 
 fn main() {
@@ -126,18 +127,19 @@ impl Build {
         for file in files {
             let name = file.file_stem().and_then(|s| s.to_str()).expect("shader names are plain").to_owned();
             let text = std::fs::read_to_string(&file).expect("a shader can be read");
-            if text.lines().any(|l| l == "// compute" || l == "// compute: queue") {
-                let fills_queue = text.lines().any(|l| l == "// compute: queue");
-                for (suffix, head) in [("", ""), ("_ballot", HEAD_64_BALLOT)].into_iter().take(1 + usize::from(fills_queue)) {
+            if text.lines().any(|l| l == "// compute") {
+                let constant = name.to_uppercase();
+                let _ = write!(
+                    table,
+                    "/// `shaders/{name}.glsl`, which traces nothing.\npub static {constant}: ComputeShader = ComputeShader {{\n    name: \"{name}\",\n"
+                );
+                for (field, head) in [("plain", ""), ("int64", HEAD_64)] {
                     let source = format!("#version 460\n{EXTENSIONS}{head}#define LANES {LANES}\n#include \"{name}.glsl\"\n");
-                    let output = format!("{name}{suffix}.spv");
+                    let output = format!("{name}_{field}.spv");
                     self.compile(&source, ShaderKind::Compute, &format!("{name}.glsl"), &output);
-                    let constant = format!("{name}{suffix}").to_uppercase();
-                    let _ = writeln!(
-                        table,
-                        "/// `shaders/{name}.glsl`, which traces nothing.\npub static {constant}: &[u8] = include_bytes!(concat!(env!(\"OUT_DIR\"), \"/{output}\"));"
-                    );
+                    let _ = writeln!(table, "    {field}: include_bytes!(concat!(env!(\"OUT_DIR\"), \"/{output}\")),");
                 }
+                table.push_str("};\n");
                 continue;
             }
             let Some(modes) = text.lines().find_map(|l| l.strip_prefix("// stream:")) else {
@@ -159,7 +161,9 @@ impl Build {
                     if mode == "any" { "Any" } else { "Closest" }
                 );
                 for v in &VARIANTS {
-                    if queue && ["generate", "generate_64", "packet"].contains(&v.field) {
+                    // only what camera rays meet can be drawn
+                    let drawn = v.field != "visibility" || coherent && mode == "closest";
+                    if !drawn || queue && ["generate", "generate_64", "packet"].contains(&v.field) {
                         let _ = writeln!(table, "    {}: &[],", v.field);
                         continue;
                     }
@@ -203,7 +207,7 @@ impl Build {
         table
     }
 
-    /// The shaders that every stream of the pipeline tracer shares.
+    /// The shaders that every stream of the pipeline tracer shares, and those that draw.
     fn shared(&mut self) -> String {
         let mut table = String::new();
         for (constant, file, kind) in [
@@ -212,6 +216,11 @@ impl Build {
             ("TRIANGLE_ANY", "trace/triangle.rahit", ShaderKind::AnyHit),
             ("SPHERE_CLOSEST", "trace/sphere.rchit", ShaderKind::ClosestHit),
             ("SPHERE_INTERSECTION", "trace/sphere.rint", ShaderKind::Intersection),
+            ("DRAW_TRIANGLES", "raster/triangle.vert", ShaderKind::Vertex),
+            ("DRAW_OPAQUE", "raster/opaque.frag", ShaderKind::Fragment),
+            ("DRAW_ALPHA", "raster/alpha.frag", ShaderKind::Fragment),
+            ("DRAW_SPHERES", "raster/sphere.vert", ShaderKind::Vertex),
+            ("DRAW_SPHERE", "raster/sphere.frag", ShaderKind::Fragment),
         ] {
             let path = self.shaders.join(file);
             let source = std::fs::read_to_string(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));

@@ -10,6 +10,7 @@ use skylit::scene::*;
 fn main() -> skylit::Result<()> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");
     export_gltf(&leaves(), &folder.join("leaves.glb"))?;
+    export_gltf(&builtin::parade::parade(), &folder.join("parade.glb"))?;
     export_gltf(&courtyard(), &folder.join("courtyard.gltf")).map(drop)
 }
 

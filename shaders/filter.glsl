@@ -9,61 +9,55 @@
 
 layout(local_size_x = LANES) in;
 
-// Variance of a sample that too few have told of.
-const float PRIOR_VARIANCE = 0.1;
-const float PRIOR_SAMPLES = 2.0;
+// Where few samples have told of their variance, it is taken for that of samples that are 0 or 1: the most it can be. So many samples
+// count as few.
+const float PRIOR_SAMPLES = 4.0;
 
 void main() {
     uint at = push.first + gl_GlobalInvocationID.x;
     if (gl_GlobalInvocationID.x >= push.count) return;
     FrameParams f = FrameParams(push.pass);
     FloatImage result = FloatImage(f.result);
-    uvec2 guide = Pairs(f.guide).v[at];
-    if (!is_surface(guide)) {
+    if (!is_surface(LOAD_PAIR(f.guide, at))) {
         result.v[at] = 0.0;
         return;
     }
-    Estimate own = unpack_estimate(Pairs(f.history).v[at]);
+    Estimate own = unpack_estimate(LOAD_PAIR(f.history, at));
     float side = sqrt(f.filter_samples / max(own.samples, 0.25));
     int radius = int(clamp(ceil(0.5 * (side - 1.0)), 0.0, float(f.filter_radius)));
     if (radius == 0 && own.samples > 0.0) {
         result.v[at] = own.mean;
         return;
     }
-    bool orthographic = f.orthographic != 0u;
-    ivec2 pixel = ivec2(at % f.size.x, at / f.size.x);
-    float depth = uintBitsToFloat(guide.x);
-    Plane plane;
-    plane.world_normal = unpack_normal(guide.y);
-    plane.normal = linear(f.world_to_camera, plane.world_normal);
-    plane.distance = dot(plane.normal, unproject(orthographic, image_plane(f, f.view, vec2(pixel) + 0.5), depth));
-    plane.tolerance = f.depth_tolerance * footprint(f, f.view, orthographic, depth);
-    float sum = 0.0, squares = 0.0, n = 0.0, noise = 0.0, count = 0.0;
+    uvec2 guides = f.guide, histories = f.history;
+    uint width = f.size.x;
+    ivec2 pixel = ivec2(at % width, at / width);
+    EdgeTest edge = edge_test(f, f.world_to_camera, f.view, f.orthographic != 0u, surface_position(f, at), surface_normal(f, at), vec2(pixel) + 0.5);
     ivec2 lower = max(pixel - radius, ivec2(0)), upper = min(pixel + radius, ivec2(f.size) - 1);
+    float sum = 0.0, squares = 0.0, n = 0.0, variances = 0.0, count = 0.0;
     for (int y = lower.y; y <= upper.y; y++) {
         for (int x = lower.x; x <= upper.x; x++) {
-            uint tap = uint(y) * f.size.x + uint(x);
-            uvec2 g = Pairs(f.guide).v[tap];
-            if (!same_surface(plane, orthographic, image_plane(f, f.view, vec2(x, y) + 0.5), g, f.normal_tolerance)) continue;
-            Estimate e = unpack_estimate(Pairs(f.history).v[tap]);
-            if (!(e.samples > 0.0)) continue;
-            float variance = (e.variance * e.samples + PRIOR_VARIANCE * PRIOR_SAMPLES) / (e.samples + PRIOR_SAMPLES);
+            uint tap = uint(y) * width + uint(x);
+            if (!same_surface(edge, vec2(ivec2(x, y) - pixel), LOAD_PAIR(guides, tap))) continue;
+            Estimate e = unpack_estimate(LOAD_PAIR(histories, tap));
             sum += e.mean * e.samples;
             squares += e.mean * e.mean * e.samples;
+            variances += e.variance * e.samples;
             n += e.samples;
-            // the variance of a mean, weighted by its samples
-            noise += variance;
-            count += 1.0;
+            count += e.samples > 0.0 ? 1.0 : 0.0;
         }
     }
     if (n == 0.0) {
-        result.v[at] = own.samples > 0.0 ? own.mean : 1.0;
+        // nobody knows: as if nothing were in the way
+        result.v[at] = 1.0;
         return;
     }
     float mean = sum / n;
     float spread = max(squares / n - mean * mean, 0.0);
-    float detail = max(spread - noise / n, 0.0);
-    float variance = (own.variance * own.samples + PRIOR_VARIANCE * PRIOR_SAMPLES) / (own.samples + PRIOR_SAMPLES);
+    // about their own pixels' means, so that each pixel has one less to tell
+    float variance = (variances + mean * (1.0 - mean) * PRIOR_SAMPLES) / (max(n - count, 0.0) + PRIOR_SAMPLES);
+    // what noise alone makes of the spread: each mean has the variance of a sample by its samples
+    float detail = max(spread - variance * count / n, 0.0);
     float keep = own.samples > 0.0 ? detail / (detail + variance / own.samples) : 0.0;
     result.v[at] = mix(mean, own.mean, keep);
 }

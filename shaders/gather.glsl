@@ -6,18 +6,18 @@
 layout(local_size_x = LANES) in;
 
 void main() {
-    if (gl_GlobalInvocationID.x >= push.count) return;
     FrameParams f = FrameParams(push.pass);
-    uvec2 pixel = tile_pixel(f, push.first + gl_GlobalInvocationID.x);
+    uint n = f.rays_per_pixel;
+    uint k = gl_GlobalInvocationID.x;
+    if (k >= push.count / n) return;
+    uvec2 pixel = tile_pixel(f, push.first / n + k);
     if (any(greaterThanEqual(pixel, f.size))) return;
     uint at = image_index(f, pixel);
-    uint n = uint(unpack_estimate(Pairs(f.current).v[at]).samples);
-    if (n == 0u) return;
+    if (!has_rays(f, pixel, at)) return;
     Floats samples = Floats(f.samples);
-    uint first = gl_GlobalInvocationID.x * f.rays_per_pixel;
     float sum = 0.0, squares = 0.0;
-    for (uint k = 0u; k < n; k++) {
-        float x = samples.v[first + k];
+    for (uint s = 0u; s < n; s++) {
+        float x = samples.v[k * n + s];
         sum += x;
         squares += x * x;
     }

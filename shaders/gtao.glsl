@@ -29,7 +29,7 @@ void main() {
     uint at = push.first + gl_GlobalInvocationID.x;
     if (gl_GlobalInvocationID.x >= push.count) return;
     FrameParams f = FrameParams(push.pass);
-    uvec2 guide = Pairs(f.guide).v[at];
+    uvec2 guide = LOAD_PAIR(f.guide, at);
     if (!is_surface(guide)) return;
     bool orthographic = f.orthographic != 0u;
     uvec2 pixel = uvec2(at % f.size.x, at / f.size.x);

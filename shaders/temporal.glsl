@@ -48,17 +48,16 @@ float possible_change(FrameParams f, vec3 position, vec3 normal) {
 }
 
 // Mean of this frame's samples over the pixels around that show the same surface; variance: of that mean.
-Estimate surroundings(FrameParams f, ivec2 pixel, Plane plane) {
+Estimate surroundings(FrameParams f, ivec2 pixel, EdgeTest edge) {
     float sum = 0.0, squares = 0.0, n = 0.0;
-    bool orthographic = f.orthographic != 0u;
-    for (int y = -CLAMP_RADIUS; y <= CLAMP_RADIUS; y++) {
-        for (int x = -CLAMP_RADIUS; x <= CLAMP_RADIUS; x++) {
-            ivec2 q = pixel + ivec2(x, y);
-            if (any(lessThan(q, ivec2(0))) || any(greaterThanEqual(q, ivec2(f.size)))) continue;
-            uint at = image_index(f, uvec2(q));
-            Estimate e = unpack_estimate(Pairs(f.current).v[at]);
-            if (e.samples == 0.0) continue;
-            if (!same_surface(plane, orthographic, image_plane(f, f.view, vec2(q) + 0.5), Pairs(f.guide).v[at], f.normal_tolerance)) continue;
+    uvec2 current = f.current, guide = f.guide;
+    uint width = f.size.x;
+    ivec2 lower = max(pixel - CLAMP_RADIUS, ivec2(0)), upper = min(pixel + CLAMP_RADIUS, ivec2(f.size) - 1);
+    for (int y = lower.y; y <= upper.y; y++) {
+        for (int x = lower.x; x <= upper.x; x++) {
+            uint at = uint(y) * width + uint(x);
+            Estimate e = unpack_estimate(LOAD_PAIR(current, at));
+            if (e.samples == 0.0 || !same_surface(edge, vec2(ivec2(x, y) - pixel), LOAD_PAIR(guide, at))) continue;
             sum += e.mean * e.samples;
             squares += e.mean * e.mean * e.samples;
             n += e.samples;
@@ -67,16 +66,6 @@ Estimate surroundings(FrameParams f, ivec2 pixel, Plane plane) {
     if (n == 0.0) return Estimate(0.0, 0.0, 0.0);
     float mean = sum / n;
     return Estimate(mean, n, (max(squares / n - mean * mean, 0.0) + LEAST_VARIANCE) / n);
-}
-
-Plane plane_at(FrameParams f, vec4 world_to_camera[3], vec2 view, bool orthographic, vec3 position, vec3 normal) {
-    Plane p;
-    vec3 c = affine(world_to_camera, position);
-    p.normal = linear(world_to_camera, normal);
-    p.distance = dot(p.normal, c);
-    p.tolerance = f.depth_tolerance * footprint(f, view, orthographic, -c.z);
-    p.world_normal = normal;
-    return p;
 }
 
 // The history of a surface's point; no samples: there is none.
@@ -88,23 +77,22 @@ Estimate reprojected(FrameParams f, vec3 before, vec3 normal, uint id) {
     vec2 at = image_point(f, f.previous_view, orthographic ? c.xy : c.xy / -c.z) - 0.5;
     // also what is not a number
     if (!(all(greaterThan(at, vec2(-1.0))) && all(lessThan(at, vec2(f.size))))) return none;
-    Plane plane = plane_at(f, f.previous_world_to_camera, f.previous_view, orthographic, before, normal);
     ivec2 base = ivec2(floor(at));
     vec2 inside = at - vec2(base);
     // a pixel that was hit in its middle is taken alone: nothing blurs while nothing moves
     inside = mix(inside, round(inside), lessThan(abs(inside - round(inside)), vec2(1e-3)));
+    EdgeTest edge = edge_test(f, f.previous_world_to_camera, f.previous_view, orthographic, before, normal, at + 0.5);
     float weight = 0.0, mean = 0.0, samples = 0.0, variance = 0.0;
     for (int k = 0; k < 4; k++) {
-        ivec2 offset = ivec2(k & 1, k >> 1);
-        ivec2 q = base + offset;
-        vec2 w2 = mix(1.0 - inside, inside, vec2(offset));
+        ivec2 corner = ivec2(k & 1, k >> 1);
+        ivec2 q = base + corner;
+        vec2 w2 = mix(1.0 - inside, inside, vec2(corner));
         float w = w2.x * w2.y;
         if (w == 0.0 || any(lessThan(q, ivec2(0))) || any(greaterThanEqual(q, ivec2(f.size)))) continue;
         uint tap = image_index(f, uvec2(q));
-        uvec2 guide = Pairs(f.previous_guide).v[tap];
-        if (guide.y >> 24 != id) continue;
-        if (!same_surface(plane, orthographic, image_plane(f, f.previous_view, vec2(q) + 0.5), guide, f.normal_tolerance)) continue;
-        Estimate e = unpack_estimate(Pairs(f.previous_history).v[tap]);
+        uvec2 guide = LOAD_PAIR(f.previous_guide, tap);
+        if (guide.y >> 24 != id || !same_surface(edge, vec2(q) - at, guide)) continue;
+        Estimate e = unpack_estimate(LOAD_PAIR(f.previous_history, tap));
         if (!(e.samples > 0.0)) continue;
         weight += w;
         mean += w * e.mean;
@@ -120,21 +108,20 @@ void main() {
     uint at = push.first + gl_GlobalInvocationID.x;
     if (gl_GlobalInvocationID.x >= push.count) return;
     FrameParams f = FrameParams(push.pass);
-    uvec2 guide = Pairs(f.guide).v[at];
+    uvec2 guide = LOAD_PAIR(f.guide, at);
     if (!is_surface(guide)) {
         STORE_PAIR(f.history, at, uvec2(0u));
         return;
     }
-    Estimate now = unpack_estimate(Pairs(f.current).v[at]);
+    Estimate now = unpack_estimate(LOAD_PAIR(f.current, at));
     // what is not a number never enters a history
     if (!(now.mean >= 0.0 && now.mean <= 1.0)) now = Estimate(0.0, 0.0, 0.0);
     Estimate past = Estimate(0.0, 0.0, 0.0);
     if (f.has_history != 0u) {
         if (f.still != 0u) {
-            past = unpack_estimate(Pairs(f.previous_history).v[at]);
+            past = unpack_estimate(LOAD_PAIR(f.previous_history, at));
         } else {
-            vec3 position = uintBitsToFloat(Quads(f.surface).v[2u * at].xyz);
-            vec3 normal = uintBitsToFloat(Quads(f.surface).v[2u * at + 1u].xyz);
+            vec3 position = surface_position(f, at), normal = surface_normal(f, at);
             vec3 before = is_null(f.previous_position) ? position : load_vec3(f.previous_position, at);
             past = reprojected(f, before, normal, guide.y >> 24);
             float change = f.moved_count > 0u && past.samples > 0.0 ? f.moved_weight * possible_change(f, position, normal) : 0.0;
@@ -142,8 +129,8 @@ void main() {
                 past.samples /= 1.0 + past.samples * change * change / max(past.variance, LEAST_VARIANCE);
                 if (f.clamp_width > 0.0) {
                     uvec2 pixel = uvec2(at % f.size.x, at / f.size.x);
-                    Plane plane = plane_at(f, f.world_to_camera, f.view, f.orthographic != 0u, position, normal);
-                    Estimate around = surroundings(f, ivec2(pixel), plane);
+                    EdgeTest edge = edge_test(f, f.world_to_camera, f.view, f.orthographic != 0u, position, normal, vec2(pixel) + 0.5);
+                    Estimate around = surroundings(f, ivec2(pixel), edge);
                     if (around.samples > 0.0) {
                         float width = f.clamp_width * sqrt(around.variance);
                         past.mean = clamp(past.mean, around.mean - width, around.mean + width);

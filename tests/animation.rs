@@ -1,180 +1,144 @@
-//! Animations and numbered frames: what is written comes back, and what is broken off leaves nothing.
+//! Tracers that follow an animation: at every time the answers of the oracle, and of a tracer built anew.
 
-use std::fs::File;
-use std::io::BufReader;
-use std::path::Path;
+mod common;
 
-use skylit::Error;
-use skylit::output::apng::{Animation, ApngWriter, Delay, is_apng};
-use skylit::output::frames::{FramePattern, is_pattern, numbered};
-use skylit::output::png::Colour;
-use skylit::output::{self, Channel, Image, Samples};
+use std::sync::Arc;
 
-const DELAY: Delay = Delay { numerator: 1, denominator: 25 };
+use common::{ALL, assert_validation_clean, device, tracers};
+use glam::{DAffine3, DQuat, DVec3};
+use skylit::gpu::Device;
+use skylit::measure::parity::{judge_closest, judge_pair};
+use skylit::measure::ray_sets::random_rays;
+use skylit::oracle::Oracle;
+use skylit::oracle::rounding::Rounding;
+use skylit::ray::{Hit, Ray};
+use skylit::render::Uncontrolled;
+use skylit::render::rays::{Mode, trace};
+use skylit::scene::animation::{Animation, Channel, Interpolation, Local, Node, Parts, Playback, Pose, Property, Sampler};
+use skylit::scene::builtin::by_name;
+use skylit::scene::flatten::FlatScene;
+use skylit::scene::{Geometry, Rig, Scene};
+use skylit::tracer::{Tracer, TracerKind};
 
-fn bytes(count: usize, frame: usize) -> Vec<u8> {
-    (0..count).map(|i| ((i * (frame + 3)) % 251 + frame) as u8).collect()
+const RAYS: usize = 30_000;
+
+fn closest(tracer: &Tracer, rays: &[Ray]) -> Vec<Hit> {
+    trace(tracer, rays, Mode::Closest, 1, &mut Uncontrolled).unwrap().0
 }
 
-fn files_in(folder: &Path) -> usize {
-    std::fs::read_dir(folder).unwrap().count()
-}
-
-#[test]
-fn every_frame_comes_back() {
-    let dir = tempfile::tempdir().unwrap();
-    let path = dir.path().join("a.apng");
-    for (colour, size, frames) in [(Colour::Grey, [31, 17], 5), (Colour::Rgb, [64, 48], 3), (Colour::Rgb, [1, 1], 1)] {
-        let count = (size[0] * size[1]) as usize * colour.channels();
-        let mut writer = ApngWriter::create(&path, Animation { size, colour, frames, delay: DELAY }).unwrap();
-        for frame in 0..frames as usize {
-            writer.add_bytes(&bytes(count, frame)).unwrap();
-        }
-        assert_eq!(writer.added(), frames);
-        writer.finish().unwrap();
-
-        let mut reader = png::Decoder::new(BufReader::new(File::open(&path).unwrap())).read_info().unwrap();
-        let info = reader.info();
-        let control = info.animation_control.unwrap();
-        assert_eq!((control.num_frames, control.num_plays), (frames, 0));
-        assert_eq!(([info.width, info.height], info.bit_depth), (size, png::BitDepth::Eight));
-        assert_eq!(info.srgb, Some(png::SrgbRenderingIntent::Perceptual));
-        assert_eq!(info.color_type.samples(), colour.channels());
-        for frame in 0..frames as usize {
-            let mut decoded = vec![0; reader.output_buffer_size().unwrap()];
-            reader.next_frame(&mut decoded).unwrap();
-            assert_eq!(decoded, bytes(count, frame), "{colour:?}, frame {frame}");
-            let shown = reader.info().frame_control.unwrap();
-            assert_eq!((shown.delay_num, shown.delay_den), (1, 25));
-        }
-        assert!(reader.next_frame(&mut vec![0; count]).is_err(), "there are no more");
+/// Plays `animation` at these times. Returns for each the share of rays that the pose before would have answered otherwise.
+fn follow(device: &Arc<Device>, kind: TracerKind, scene: &Scene, animation: usize, times: &[f64]) -> Vec<f64> {
+    let rig = scene.rig.as_ref().unwrap();
+    let flat = FlatScene::with_motion(scene, rig.motion(animation).unwrap()).unwrap();
+    let mut tracer = Tracer::new(device, kind, &flat, ALL).unwrap();
+    let mut pose = Pose::default();
+    let mut stale = Vec::new();
+    for &seconds in times {
+        rig.pose(animation, seconds, Playback::Loop, &mut pose).unwrap();
+        let mut posed = scene.clone();
+        pose.apply(&mut posed);
+        let oracle = Oracle::new(&posed, flat.origin);
+        let rays = random_rays(&oracle, RAYS, 5);
+        let truth = oracle.trace_closest(&rays);
+        let before = judge_closest(&oracle, &rays, &closest(&tracer, &rays), &truth, Rounding::default());
+        tracer.update(&pose.changes()).unwrap();
+        let hits = closest(&tracer, &rays);
+        let report = judge_closest(&oracle, &rays, &hits, &truth, Rounding::default());
+        println!("{} {kind} {seconds} s: {report}", scene.name);
+        assert!(report.unexplained_fraction() <= 1e-5, "{kind} {seconds} s: {report}");
+        assert!(report.hits > RAYS as u64 / 20, "the rays hardly meet the scene");
+        let fresh = FlatScene { origin: flat.origin, ..FlatScene::new(&posed) };
+        let fresh = Tracer::new(device, kind, &fresh, ALL).unwrap();
+        let report = judge_pair(&oracle, &rays, &hits, &closest(&fresh, &rays), Rounding::default());
+        assert!(report.unexplained_fraction() <= 1e-5, "{kind} {seconds} s against a new tracer: {report}");
+        stale.push(before.unexplained_fraction());
     }
-    assert_eq!(files_in(dir.path()), 1);
-    // a program that knows no animations reads the first frame
-    let still = dir.path().join("a.png");
-    std::fs::rename(&path, &still).unwrap();
-    assert_eq!(output::load(&still).unwrap().pixel_count(), 1);
+    stale
 }
 
 #[test]
-fn images_become_frames() {
-    let dir = tempfile::tempdir().unwrap();
-    let path = dir.path().join("a.apng");
-    let image = |name: &str, value: f32| Image {
-        width: 2,
-        height: 1,
-        channels: vec![Channel { name: name.into(), samples: Samples::F32(vec![value, 1.0]) }],
-        metadata: vec![],
+fn gpu_an_animation_is_followed() {
+    let device = device();
+    let scene = by_name("parade").unwrap();
+    for kind in tracers(&device) {
+        for animation in 0..2 {
+            let stale = follow(&device, kind, &scene, animation, &[0.0, 0.3, 0.95, 1.4, 2.0 + 0.3]);
+            // each step moves something, and the judge would see it
+            assert!(stale[1..].iter().all(|s| *s > 1e-3), "{kind}: {stale:?}");
+        }
+    }
+    assert_validation_clean(&device);
+}
+
+/// A block that shrinks to nothing, another that is nothing at first.
+fn growing() -> Scene {
+    let mut scene = by_name("stairs").unwrap();
+    let mesh = scene.meshes.len();
+    let size = scene.bounds().map_or(1.0, |(lo, hi)| (hi - lo).max_element());
+    let cube = skylit::scene::builtin::shapes::cuboid(DVec3::splat(-0.1 * size), DVec3::splat(0.1 * size));
+    assert!(matches!(cube, Geometry::Triangles(_)));
+    scene.meshes.push(skylit::scene::Mesh { name: "cube".into(), geometry: cube, material: 0 });
+    let mut parts = Parts { instances: vec![None; scene.instances.len()], ..Parts::default() };
+    parts.cameras = vec![None; scene.cameras.len()];
+    let mut channels = Vec::new();
+    for (node, ends) in [[1.0, 0.0], [0.0, 1.0]].into_iter().enumerate() {
+        let local = Local::Parts {
+            translation: DVec3::new(0.3 * size * (node as f64 - 0.5), 0.4 * size, 0.1 * size),
+            rotation: DQuat::from_rotation_x(0.4),
+            scale: DVec3::splat(ends[0]),
+        };
+        parts.nodes.push(Node { local, ..Node::default() });
+        let instance = skylit::scene::Instance { name: "cube".into(), mesh, object_to_world: DAffine3::IDENTITY };
+        scene.instances.push(instance);
+        parts.instances.push(Some(node));
+        let values = ends.map(|s| [s as f32; 3]).as_flattened().to_vec();
+        let sampler = Sampler { interpolation: Interpolation::Linear, times: [0.0, 1.0].into(), values };
+        channels.push(Channel { node, property: Property::Scale, sampler });
+    }
+    parts.animations = vec![Animation { name: "grow".into(), duration: 1.0, channels }];
+    Rig::attach(&mut scene, parts).unwrap();
+    scene
+}
+
+#[test]
+fn gpu_what_shrinks_to_nothing_comes_back() {
+    let device = device();
+    let scene = growing();
+    for kind in tracers(&device) {
+        let stale = follow(&device, kind, &scene, 0, &[0.5, 0.0, 1e-8, 0.999_999, 0.25]);
+        assert!(stale[0] > 1e-3 && stale[4] > 1e-3, "{kind}: {stale:?}");
+    }
+    assert_validation_clean(&device);
+}
+
+#[test]
+fn a_rig_must_fit_its_scene() {
+    let mut scene = by_name("parade").unwrap();
+    let good = scene.rig.take().unwrap().parts().clone();
+    let refused = |change: &dyn Fn(&mut Parts), says: &str| {
+        let mut parts = good.clone();
+        change(&mut parts);
+        let error = Rig::attach(&mut scene.clone(), parts).unwrap_err();
+        let text = error.to_string();
+        assert!(text.contains(says) && !text.contains('\n') && error.exit_code() == 3, "{says}: {text}");
     };
-    let animation = Animation { size: [2, 1], colour: Colour::Grey, frames: 2, delay: DELAY };
-    let mut writer = ApngWriter::create(&path, animation).unwrap();
-    writer.add(&image("Y", 0.5), 0.0).unwrap();
-    assert!(matches!(writer.add(&image("depth.Z", 0.5), 0.0), Err(Error::Usage(_))));
-    assert!(matches!(writer.add(&Image { width: 1, height: 2, ..image("Y", 0.5) }, 0.0), Err(Error::Usage(_))));
-    writer.add(&image("R", 0.25), 1.0).unwrap();
-    writer.finish().unwrap();
-    let mut reader = png::Decoder::new(BufReader::new(File::open(&path).unwrap())).read_info().unwrap();
-    for _ in 0..2 {
-        let mut decoded = [0; 2];
-        reader.next_frame(&mut decoded).unwrap();
-        assert_eq!(decoded, [188, 255]);
-    }
-}
-
-#[test]
-fn what_is_broken_off_leaves_nothing() {
-    let dir = tempfile::tempdir().unwrap();
-    let path = dir.path().join("a.apng");
-    let animation = Animation { size: [4, 4], colour: Colour::Grey, frames: 2, delay: DELAY };
-    std::fs::write(&path, "old").unwrap();
-    let mut dropped = ApngWriter::create(&path, animation).unwrap();
-    dropped.add_bytes(&[1; 16]).unwrap();
-    assert_eq!(files_in(dir.path()), 2);
-    drop(dropped);
-    let mut short = ApngWriter::create(&path, animation).unwrap();
-    short.add_bytes(&[1; 16]).unwrap();
-    assert!(short.finish().unwrap_err().to_string().contains("1 of its 2 frames"));
-    assert_eq!((files_in(dir.path()), std::fs::read(&path).unwrap()), (1, b"old".to_vec()));
-
-    let mut long = ApngWriter::create(&path, animation).unwrap();
-    assert!(matches!(long.add_bytes(&[1; 15]), Err(Error::Usage(_))));
-    long.add_bytes(&[1; 16]).unwrap();
-    long.add_bytes(&[2; 16]).unwrap();
-    assert!(matches!(long.add_bytes(&[3; 16]), Err(Error::Usage(_))));
-    long.finish().unwrap();
-    assert!(std::fs::read(&path).unwrap().starts_with(b"\x89PNG"));
-
-    for bad in [
-        Animation { frames: 0, ..animation },
-        Animation { size: [0, 4], ..animation },
-        Animation { delay: Delay { numerator: 1, denominator: 0 }, ..animation },
-    ] {
-        assert!(matches!(ApngWriter::create(&path, bad), Err(Error::Usage(_))), "{bad:?}");
-    }
-    let nowhere = dir.path().join("none/a.apng");
-    assert!(matches!(ApngWriter::create(&nowhere, animation), Err(Error::Output { .. })));
-    assert_eq!(files_in(dir.path()), 1);
-}
-
-#[cfg(target_os = "linux")]
-#[test]
-fn a_device_that_is_full() {
-    let full = Path::new("/dev/full");
-    if full.exists() {
-        let animation = Animation { size: [4, 4], colour: Colour::Grey, frames: 1, delay: DELAY };
-        let mut writer = ApngWriter::create(full, animation).unwrap();
-        writer.add_bytes(&[1; 16]).unwrap();
-        assert!(writer.finish().unwrap_err().to_string().contains("the disk is full"));
-    }
-}
-
-#[test]
-fn delays_are_simple_fractions() {
-    for (rate, want) in [(30.0, (1, 30)), (29.97, (100, 2997)), (23.976, (125, 2997)), (0.5, (2, 1)), (1000.0, (1, 1000))] {
-        let delay = Delay::of_rate(rate).unwrap();
-        assert_eq!((delay.numerator, delay.denominator), want, "{rate}");
-    }
-    for rate in [0.001, 0.001_37, std::f64::consts::PI, 59.940_059, 997.123] {
-        let delay = Delay::of_rate(rate).unwrap();
-        let made = f64::from(delay.denominator) / f64::from(delay.numerator);
-        assert!((made / rate - 1.0).abs() < 2e-5, "{rate}: {delay:?}");
-    }
-    for bad in [0.0, -1.0, f64::NAN, f64::INFINITY, 1001.0] {
-        assert!(Delay::of_rate(bad).is_err(), "{bad}");
-    }
-}
-
-#[test]
-fn names_of_animations() {
-    assert!(is_apng(Path::new("a.apng")) && is_apng(Path::new("x/a.b.APNG")));
-    assert!(!is_apng(Path::new("a.png")) && !is_apng(Path::new("apng")));
-}
-
-#[test]
-fn frame_numbers() {
-    let of = |path: &str, frame: u64| numbered(Path::new(path), frame).unwrap().to_str().unwrap().to_owned();
-    assert_eq!(of("out.####.exr", 7), "out.0007.exr");
-    assert_eq!(of("out.####.exr", 123_456), "out.123456.exr");
-    assert_eq!(of("a/b#/c#.png", 0), "a/b#/c0.png");
-    assert_eq!(of("##", 3), "03");
-    assert_eq!(of("Zürich-###-塔.png", 12), "Zürich-012-塔.png");
-    assert_eq!(of("plain.exr", 5), "plain.exr");
-    assert_eq!(of("a#/plain.exr", 5), "a#/plain.exr");
-    let has = |path: &str| is_pattern(Path::new(path));
-    assert!(has("out.#.exr").unwrap() && !has("out.exr").unwrap() && !has("#/out.exr").unwrap() && !has("..").unwrap());
-    let error = has("a.##.b.#.exr").unwrap_err();
-    assert!(matches!(&error, Error::Usage(m) if m.contains("a.##.b.#.exr") && m.contains("one run of #")), "{error}");
-    assert_eq!(error.exit_code(), 64);
-    let pattern = FramePattern::of(Path::new("x.###.png")).unwrap().unwrap();
-    assert_eq!([8, 9, 10].map(|k| pattern.path(k)), ["x.008.png", "x.009.png", "x.010.png"].map(std::path::PathBuf::from));
-}
-
-#[cfg(unix)]
-#[test]
-fn frame_numbers_in_names_that_are_no_text() {
-    use std::os::unix::ffi::OsStrExt;
-    let path = |bytes: &'static [u8]| Path::new(std::ffi::OsStr::from_bytes(bytes));
-    assert!(is_pattern(path(b"a\xff##.png")).is_err());
-    assert_eq!(numbered(path(b"a\xff.png"), 3).unwrap(), path(b"a\xff.png"));
-    assert_eq!(numbered(path(b"\xff/a#.png"), 3).unwrap(), path(b"\xff/a3.png"));
+    refused(&|p| p.nodes[0].parent = Some(0), "comes before its parent");
+    refused(&|p| p.nodes[0].local = Local::Matrix(DAffine3::from_scale(DVec3::NAN)), "not finite");
+    refused(&|p| p.instances.truncate(1), "instances are on nodes");
+    refused(&|p| p.cameras[0] = Some(999), "of only");
+    refused(&|p| p.skins[0].joints[1] = 999, "joint node 999 does not exist");
+    refused(&|p| p.skins[0].inverse_bind.truncate(2), "3 joints and 2 inverse bind matrices");
+    refused(&|p| p.deformations[0].mesh = 0, "vertices");
+    refused(&|p| p.deformations[0].mesh = 99, "mesh 99 does not exist");
+    refused(&|p| p.deformations[1].mesh = p.deformations[0].mesh, "deforms in two ways");
+    refused(&|p| p.deformations[0].influences[0].joints[5] = [7; 4], "vertex 5 is bound to joint 7 of only 3");
+    refused(&|p| p.deformations[0].influences[0].weights[5][1] = f32::NAN, "vertex 5");
+    refused(&|p| p.deformations[1].targets.truncate(1), "1 morph targets");
+    refused(&|p| p.deformations[1].targets[1].positions[3].y = f32::NAN, "morph target 1 is not finite at vertex 3");
+    refused(&|p| p.animations[0].channels[2].node = 999, "animation 0 `parade`, channel 2: node 999");
+    refused(&|p| p.animations[0].channels[0].sampler.times = [1.0, 0.0].into(), "channel 0: the time of key 1");
+    refused(
+        &|p| p.animations[1].channels[0].sampler.values[4] = f32::INFINITY,
+        "animation 1 `bend`, channel 0: a value of key 1",
+    );
 }

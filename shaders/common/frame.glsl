@@ -37,7 +37,7 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Fr
     float moved_weight;                // how much what moves shortens histories
     float filter_samples;              // samples that a filtered value should rest on
     uint filter_radius;                // pixels, at most
-    uint rest;                         // 1: pixels with all their samples get no more while nothing moves
+    uint rest;                         // 1: nothing moves, and pixels with all their samples get no more
     uint slices;                       // of gtao
     uint steps;                        // of gtao, on each side of a slice
     uint frame_reserved;
@@ -52,8 +52,7 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Fr
     uvec2 previous_position;           // 3 floats a pixel: where its surface was in the previous frame; null: nothing moves
     uvec2 result;                      // a float a pixel: accessibility
     uvec2 moved;                       // MovedRecord: what has moved since the previous frame
-    uvec2 tiles;                       // a uint each: the tiles that show anything; null: all
-    RayQueue queue;
+    uvec2 ray_count;                   // a uint: occlusion rays of the frame
 };
 
 layout(buffer_reference, std430, buffer_reference_align = 4) buffer FloatImage { float v[]; };
@@ -63,7 +62,6 @@ layout(buffer_reference, std430, buffer_reference_align = 16) buffer QuadImage {
 // Pixel of a place in the tile order of src/render/block.rs.
 uvec2 tile_pixel(FrameParams f, uint k) {
     uint tile = k >> 6;
-    if (!is_null(f.tiles)) tile = Words(f.tiles).v[tile];
     uint j = k & 63u;
     uvec2 inside = uvec2((j & 1u) | (j >> 1 & 2u) | (j >> 2 & 4u), (j >> 1 & 1u) | (j >> 2 & 2u) | (j >> 3 & 4u));
     return uvec2(tile % f.tiles_x, tile / f.tiles_x) * 8u + inside;
@@ -73,21 +71,9 @@ uint image_index(FrameParams f, uvec2 pixel) {
     return pixel.y * f.size.x + pixel.x;
 }
 
-// A direction in 24 bits, 12 for each side of an octahedron: Cigolle et al., "A Survey of Efficient Representations for Independent
-// Unit Vectors", JCGT 3(2), 2014. For edge tests only.
+// A direction in 24 bits, for edge tests only: within 0.004 of each coordinate.
 uint pack_normal(vec3 n) {
-    vec2 p = n.xy / (abs(n.x) + abs(n.y) + abs(n.z));
-    if (n.z < 0.0) p = (1.0 - abs(p.yx)) * vec2(p.x >= 0.0 ? 1.0 : -1.0, p.y >= 0.0 ? 1.0 : -1.0);
-    uvec2 q = uvec2(clamp((p * 0.5 + 0.5) * 4095.0 + 0.5, 0.0, 4095.0));
-    return q.x | q.y << 12;
-}
-
-vec3 unpack_normal(uint bits) {
-    vec2 p = vec2(bits & 0xfffu, bits >> 12 & 0xfffu) * (2.0 / 4095.0) - 1.0;
-    vec3 n = vec3(p, 1.0 - abs(p.x) - abs(p.y));
-    float t = max(-n.z, 0.0);
-    n.xy += vec2(n.x >= 0.0 ? -t : t, n.y >= 0.0 ? -t : t);
-    return normalize(n);
+    return packSnorm4x8(vec4(n, 0.0)) & 0xffffffu;
 }
 
 // Eight bits that tell most ids apart.
@@ -101,6 +87,18 @@ uvec2 make_guide(float depth, vec3 normal, uint id) {
 
 bool is_surface(uvec2 guide) {
     return uintBitsToFloat(guide.x) < INFINITY;
+}
+
+vec3 surface_position(FrameParams f, uint at) {
+    return uintBitsToFloat(uvec3(LOAD_PAIR(f.surface, 4u * at), LOAD_PAIR(f.surface, 4u * at + 1u).x));
+}
+
+vec3 surface_normal(FrameParams f, uint at) {
+    return uintBitsToFloat(uvec3(LOAD_PAIR(f.surface, 4u * at + 2u), LOAD_PAIR(f.surface, 4u * at + 3u).x));
+}
+
+float spawn_offset_at(FrameParams f, uint at) {
+    return uintBitsToFloat(LOAD_PAIR(f.surface, 4u * at + 1u).y);
 }
 
 // Where on the plane at unit distance (or, with parallel rays, on the plane of the camera) a point of the image is; pixels from the
@@ -127,28 +125,51 @@ float footprint(FrameParams f, vec2 view, bool orthographic, float depth) {
     return orthographic ? side : side * depth;
 }
 
-// The plane of a surface in camera space: dot(normal, x) = distance.
-struct Plane {
-    vec3 normal;
-    float distance;
-    float tolerance;  // distance from the plane at which an edge begins
-    vec3 world_normal;
-};
-
-// Do a neighbour's records belong to the same surface? `plane_at`: its place on the image plane.
-bool same_surface(Plane p, bool orthographic, vec2 plane_at, uvec2 guide, float cosine) {
-    float depth = uintBitsToFloat(guide.x);
-    if (!(depth < INFINITY)) return false;
-    float off = abs(dot(p.normal, unproject(orthographic, plane_at, depth)) - p.distance);
-    return off <= p.tolerance && dot(p.world_normal, unpack_normal(guide.y)) >= cosine;
-}
-
 vec3 affine(vec4 rows[3], vec3 p) {
     return vec3(dot(rows[0].xyz, p), dot(rows[1].xyz, p), dot(rows[2].xyz, p)) + vec3(rows[0].w, rows[1].w, rows[2].w);
 }
 
 vec3 linear(vec4 rows[3], vec3 v) {
     return vec3(dot(rows[0].xyz, v), dot(rows[1].xyz, v), dot(rows[2].xyz, v));
+}
+
+// Tells whether neighbours of a point of the image show the same surface: they lie on its plane, by so much, and their normals are
+// like its own. The distance from the plane of what a pixel shows follows from its depth and an expression that is linear in the
+// pixel's place.
+struct EdgeTest {
+    vec3 normal;        // world
+    float cosine;
+    float distance;     // of the plane from the camera
+    float tolerance;    // of the distance from the plane
+    float at, right, down;  // the linear expression, at the point and by pixel
+    float by_depth;
+    bool orthographic;
+};
+
+// `centre`: the point's place in the image, pixels; position and normal in world space.
+EdgeTest edge_test(FrameParams f, vec4 world_to_camera[3], vec2 view, bool orthographic, vec3 position, vec3 normal, vec2 centre) {
+    EdgeTest e;
+    vec3 c = affine(world_to_camera, position), n = linear(world_to_camera, normal);
+    vec2 plane = image_plane(f, view, centre), step = 2.0 * view / vec2(f.size);
+    e.normal = normal;
+    e.cosine = f.normal_tolerance;
+    e.distance = dot(n, c);
+    e.tolerance = f.depth_tolerance * footprint(f, view, orthographic, -c.z);
+    e.at = dot(n.xy, plane) - (orthographic ? 0.0 : n.z);
+    e.right = n.x * step.x;
+    e.down = -n.y * step.y;
+    e.by_depth = -n.z;
+    e.orthographic = orthographic;
+    return e;
+}
+
+// `offset`: from the point to the neighbour, pixels.
+bool same_surface(EdgeTest e, vec2 offset, uvec2 guide) {
+    float depth = uintBitsToFloat(guide.x);
+    float s = e.at + offset.x * e.right + offset.y * e.down;
+    float off = (e.orthographic ? s + depth * e.by_depth : s * depth) - e.distance;
+    // not so where the depth is infinite
+    return abs(off) <= e.tolerance && dot(e.normal, unpackSnorm4x8(guide.y).xyz) >= e.cosine;
 }
 
 // A mean over samples: how many there are, and the variance of one.
@@ -158,14 +179,33 @@ struct Estimate {
     float variance;
 };
 
+const float MOST_VARIANCE = 0.5;  // of values from 0 to 1: a quarter, and half of it more for an unbiased estimate from two
+
 uvec2 pack_estimate(Estimate e) {
-    // half floats count exactly up to 2048
-    return uvec2(floatBitsToUint(e.mean), packHalf2x16(vec2(e.samples, e.variance)));
+    // sixteenths of a sample: interpolated histories have parts of them
+    uint samples = uint(clamp(e.samples, 0.0, 4095.0) * 16.0 + 0.5);
+    uint variance = uint(clamp(e.variance * (65535.0 / MOST_VARIANCE), 0.0, 65535.0) + 0.5);
+    return uvec2(floatBitsToUint(e.mean), samples << 16 | variance);
 }
 
 Estimate unpack_estimate(uvec2 bits) {
-    vec2 s = unpackHalf2x16(bits.y);
-    return Estimate(uintBitsToFloat(bits.x), s.x, s.y);
+    return Estimate(uintBitsToFloat(bits.x), float(bits.y >> 16) * 0.0625, float(bits.y & 0xffffu) * (MOST_VARIANCE / 65535.0));
+}
+
+const uint PATTERN_CHECKER = 1u;
+const uint PATTERN_QUARTER = 2u;
+
+bool is_sampled(FrameParams f, uvec2 pixel) {
+    if (f.pattern == PATTERN_CHECKER) return ((pixel.x + pixel.y + f.frame) & 1u) == 0u;
+    // one of each 2x2, opposite corners in turn
+    if (f.pattern == PATTERN_QUARTER) return (0x9cu >> (2u * (f.frame & 3u)) & 3u) == ((pixel.x & 1u) | (pixel.y & 1u) << 1);
+    return true;
+}
+
+// Has a pixel rays in this frame?
+bool has_rays(FrameParams f, uvec2 pixel, uint at) {
+    if (!is_sampled(f, pixel) || !is_surface(LOAD_PAIR(f.guide, at))) return false;
+    return f.rest == 0u || unpack_estimate(LOAD_PAIR(f.previous_history, at)).samples < f.most_samples;
 }
 
 #endif

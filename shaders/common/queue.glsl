@@ -16,21 +16,21 @@ struct RayQueue {
 layout(buffer_reference, std430, buffer_reference_align = 4) buffer QueueCount { uint v[]; };
 layout(buffer_reference, std430, buffer_reference_align = 4) writeonly buffer QueueTags { uint v[]; };
 
-// A place in the queue for each lane that asks.
-uint queue_slot(RayQueue queue) {
+// A number for each lane that asks, counting up at an address.
+uint claim(uvec2 counter) {
 #ifdef BALLOT
     // one atomic for all lanes: on a CPU driver the bus is locked as often as it counts
     uvec4 lanes = subgroupBallot(true);
     uint first = 0u;
-    if (subgroupElect()) first = atomicAdd(QueueCount(queue.count).v[0], subgroupBallotBitCount(lanes));
+    if (subgroupElect()) first = atomicAdd(QueueCount(counter).v[0], subgroupBallotBitCount(lanes));
     return subgroupBroadcastFirst(first) + subgroupBallotExclusiveBitCount(lanes);
 #else
-    return atomicAdd(QueueCount(queue.count).v[0], 1u);
+    return atomicAdd(QueueCount(counter).v[0], 1u);
 #endif
 }
 
 void append_ray(RayQueue queue, Ray ray, uint tag) {
-    uint slot = queue_slot(queue);
+    uint slot = claim(queue.count);
     store_ray(queue.rays, slot, ray);
     QueueTags(queue.tags).v[slot] = tag;
 }

@@ -35,6 +35,14 @@ layout(buffer_reference, std430, buffer_reference_align = 4) readonly buffer Flo
 layout(buffer_reference, std430, buffer_reference_align = 8) readonly buffer Pairs { uvec2 v[]; };
 layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Quads { uvec4 v[]; };
 
+// On a CPU driver a divergent load is one gather, of 32 or of 64 bits alike: load pairs where 64-bit integers exist.
+#ifdef LOAD64
+layout(buffer_reference, std430, buffer_reference_align = 8) readonly buffer Words64 { uint64_t v[]; };
+#define LOAD_PAIR(base, i) unpackUint2x32(Words64(base).v[i])
+#else
+#define LOAD_PAIR(base, i) Pairs(base).v[i]
+#endif
+
 bool is_null(uvec2 address) { return (address.x | address.y) == 0u; }
 
 vec3 load_vec3(uvec2 base, uint index) {
@@ -72,7 +80,7 @@ Ray load_ray(uvec2 rays, uint k) {
 layout(push_constant) uniform Push {
     uvec2 scene;       // SceneRoot
     uvec2 pass;
-    uvec2 rays;        // the rays of this launch, where they are in memory: a queue's, or the compute tracer's own
+    uvec2 rays;        // the rays of this launch, where they are in memory: a queue's, or the compute tracer's own; or what was drawn (trace/visibility.glsl)
     uvec2 queued;      // address of a uint: how many rays the queue holds; null when the host knows
     uint first;        // index of the first ray of this launch
     uint count;        // rays in this launch; of a queue: at most

@@ -8,10 +8,11 @@ use clap::{Args, ValueEnum, ValueHint};
 use glam::DVec3;
 
 use super::console::Console;
+use super::frames::args::FrameArgs;
 use crate::bvh::BuildPreset;
 use crate::bvh::cache::Cache;
 use crate::error::{Error, Result};
-use crate::output::{self, ImageFormat};
+use crate::output::{self, ImageFormat, apng};
 use crate::render::ao::Hemisphere;
 use crate::render::camera::Choice;
 use crate::render::rays::Mode;
@@ -320,9 +321,9 @@ pub struct RenderArgs {
     /// Distance, in world units, beyond which nothing occludes
     #[arg(long, value_name = "R", default_value = "inf", value_parser = parse_radius, allow_hyphen_values = true)]
     pub ao_radius: f64,
-    /// A hit at distance d occludes by C^-d; 1 is binary
-    #[arg(long, value_name = "C", default_value = "1", value_parser = parse_falloff, allow_hyphen_values = true)]
-    pub ao_falloff: f64,
+    /// A hit at distance d occludes by C^-d; 1 is binary [default: 1; 8 with --preset larsen]
+    #[arg(long, value_name = "C", value_parser = parse_falloff, allow_hyphen_values = true)]
+    pub ao_falloff: Option<f64>,
     /// Axis of the hemisphere of occlusion rays
     #[arg(long, value_enum, default_value = "geometric")]
     pub ao_normal: AoNormal,
@@ -350,6 +351,9 @@ pub struct RenderArgs {
     /// Print what the scene and the options made it skip, and what that saved
     #[arg(long)]
     pub explain: bool,
+    /// Frames in real time
+    #[command(flatten)]
+    pub frames: FrameArgs,
     /// How results are shown
     #[command(flatten)]
     pub verbosity: Verbosity,
@@ -364,7 +368,19 @@ impl RenderArgs {
     /// Checks what concerns more than one option.
     pub fn check(&self) -> Result<()> {
         self.device.check()?;
-        let formats = self.output.iter().map(|p| ImageFormat::of(p)).collect::<Result<Vec<_>>>()?;
+        let in_time = self.frames.wanted();
+        let images = self.output.iter().filter(|p| in_time.is_none() || !apng::is_apng(p));
+        let formats = images.map(|p| ImageFormat::of(p)).collect::<Result<Vec<_>>>()?;
+        let only_film = [
+            (self.spp.is_some(), "--spp", "use --rays-per-pixel"),
+            (self.time_limit.is_some(), "--time-limit", "leave it out"),
+            (self.keep_partial, "--keep-partial", "leave it out"),
+            (self.depth_image.is_some(), "--depth-image", "use --aov depth"),
+            (self.dump_rays.is_some(), "--dump-rays", "leave it out"),
+        ];
+        if let (Some(frames), Some((_, option, remedy))) = (in_time, only_film.iter().find(|o| o.0)) {
+            return Err(Error::Usage(format!("{option} is not for frames in real time, which {frames} asks for: {remedy}")));
+        }
         if !self.aov.is_empty() && !formats.contains(&ImageFormat::Exr) {
             return Err(Error::Usage("--aov needs an .exr output: PNG holds colour only".into()));
         }

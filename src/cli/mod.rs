@@ -7,6 +7,7 @@ mod console;
 mod diff;
 mod doctor;
 mod export;
+mod frames;
 mod interrupt;
 mod panic;
 mod progress;
@@ -48,7 +49,7 @@ struct Cli {
 
 #[derive(Debug, clap::Subcommand)]
 enum Command {
-    /// Render the ambient occlusion of a scene to an image file
+    /// Render the ambient occlusion of a scene: an image, or frames in real time
     Render(Box<args::RenderArgs>),
     /// Trace a raw set of rays against a mesh and report how fast that was
     Rays(args::RaysArgs),

@@ -27,6 +27,9 @@ use crate::tracer::{Needs, Tracer};
 /// Loads, renders, writes, reports.
 pub fn run(args: &RenderArgs, start: Instant) -> Result<(), Failure> {
     args.check()?;
+    if args.frames.wanted().is_some() {
+        return super::frames::run(args, start);
+    }
     for path in args.outputs() {
         output::check_writable(&path)?;
     }
@@ -49,7 +52,7 @@ pub fn run(args: &RenderArgs, start: Instant) -> Result<(), Failure> {
         spp: args.spp.or(scene.hints.spp).unwrap_or(DEFAULT_SPP).max(1),
         seed: args.seed,
         radius: args.ao_radius,
-        falloff: args.ao_falloff,
+        falloff: args.ao_falloff.unwrap_or(1.0),
         hemisphere: args.ao_normal.into(),
         time_limit: args.time_limit,
         keep_rays: args.dump_rays.is_some(),
@@ -131,7 +134,7 @@ pub fn run(args: &RenderArgs, start: Instant) -> Result<(), Failure> {
 }
 
 /// Loads the scene while the driver starts: on small scenes they take equally long.
-fn open(args: &RenderArgs) -> Result<(Scene, Arc<Device>, Seconds)> {
+pub(super) fn open(args: &RenderArgs) -> Result<(Scene, Arc<Device>, Seconds)> {
     let timed = |start: Instant| start.elapsed().as_secs_f64();
     std::thread::scope(|scope| {
         let device = scope.spawn(|| {
@@ -149,7 +152,7 @@ fn open(args: &RenderArgs) -> Result<(Scene, Arc<Device>, Seconds)> {
     })
 }
 
-fn choose_camera(args: &RenderArgs, scene: &Scene, aspect: f64) -> Result<crate::scene::Camera> {
+pub(super) fn choose_camera(args: &RenderArgs, scene: &Scene, aspect: f64) -> Result<crate::scene::Camera> {
     let mut camera = camera::choose(scene, &args.camera_choice(), aspect)?;
     if let Some(degrees) = args.fov_y {
         match &mut camera.projection {
@@ -179,6 +182,14 @@ fn channels(film: crate::render::film::Film, args: &RenderArgs, pixels: &[AovPix
     out.push(f32s("A", film.coverage));
     out.push(f32s("variance", film.variance));
     out.push(Channel { name: "samples".into(), samples: Samples::U32(film.samples) });
+    out.extend(aov_channels(args, pixels, origin));
+    out
+}
+
+/// The auxiliary outputs that were asked for.
+pub(super) fn aov_channels(args: &RenderArgs, pixels: &[AovPixel], origin: glam::DVec3) -> Vec<Channel> {
+    let f32s = |name: &str, samples| Channel { name: name.into(), samples: Samples::F32(samples) };
+    let mut out = Vec::new();
     let plane = |name: &str, f: &dyn Fn(&AovPixel) -> f32| f32s(name, pixels.iter().map(f).collect());
     let ids = |name: &str, f: &dyn Fn(&AovPixel) -> u32| Channel {
         name: name.into(),

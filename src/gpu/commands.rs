@@ -69,7 +69,8 @@ impl Commands {
             let begin = vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
             raw.begin_command_buffer(self.buffer, &begin).context("recording commands")?;
         }
-        let mut recorder = Recorder { device: &self.device, buffer: self.buffer, queries: self.queries, labels: Vec::new() };
+        let mut recorder =
+            Recorder { device: &self.device, buffer: self.buffer, queries: self.queries, labels: Vec::new(), drew: false };
         record(&mut recorder);
         recorder.final_barrier();
         let labels = recorder.labels;
@@ -128,6 +129,8 @@ pub struct Recorder<'a> {
     pub(super) buffer: vk::CommandBuffer,
     queries: Option<vk::QueryPool>,
     labels: Vec<&'static str>,
+    // something was drawn
+    pub(super) drew: bool,
 }
 
 impl Recorder<'_> {
@@ -141,6 +144,10 @@ impl Recorder<'_> {
             unsafe { self.device.raw.cmd_write_timestamp2(self.buffer, stage, queries, 2 * region + k) }
         };
         stamp(vk::PipelineStageFlags2::ALL_COMMANDS, 0);
+        if self.drew {
+            // once they have drawn, CPU drivers put a stamp off until something makes them wait
+            self.barrier();
+        }
         record(self);
         let (device, buffer) = (self.device, self.buffer);
         // SAFETY: as above
@@ -194,6 +201,15 @@ impl Recorder<'_> {
         unsafe { self.device.raw.cmd_copy_buffer(self.buffer, from.raw, to.raw, &region) };
     }
 
+    /// Writes a few bytes at the beginning of a buffer when the device gets here: what is recorded later does not change them. Sizes are
+    /// multiples of 4, up to 64 KiB.
+    pub fn update<T: bytemuck::NoUninit>(&mut self, buffer: &Buffer, value: &T) {
+        let bytes = bytemuck::bytes_of(value);
+        assert!(bytes.len().is_multiple_of(4) && bytes.len() <= 1 << 16 && bytes.len() as u64 <= buffer.size());
+        // SAFETY: the range lies within the buffer and has a size that may be recorded
+        unsafe { self.device.raw.cmd_update_buffer(self.buffer, buffer.raw, 0, bytes) };
+    }
+
     /// Sets the whole buffer to zero.
     pub fn clear(&mut self, buffer: &Buffer) {
         self.fill(buffer, buffer.size(), 0);
@@ -230,7 +246,7 @@ impl Recorder<'_> {
         }
     }
 
-    fn push<P: bytemuck::NoUninit>(&self, layout: vk::PipelineLayout, stages: vk::ShaderStageFlags, push: &P) {
+    pub(super) fn push<P: bytemuck::NoUninit>(&self, layout: vk::PipelineLayout, stages: vk::ShaderStageFlags, push: &P) {
         let bytes = bytemuck::bytes_of(push);
         assert_eq!(bytes.len() as u32, super::pipeline::PUSH_BYTES);
         // SAFETY: the layout has one range of this size for these stages

@@ -62,6 +62,7 @@ impl Device {
         let mut f13 = vk::PhysicalDeviceVulkan13Features::default()
             .maintenance4(true)
             .synchronization2(true)
+            .dynamic_rendering(info.can_rasterise())
             .compute_full_subgroups(info.limits.packets);
         let mut f_structure = vk::PhysicalDeviceAccelerationStructureFeaturesKHR::default().acceleration_structure(true);
         let mut f_pipeline = vk::PhysicalDeviceRayTracingPipelineFeaturesKHR::default().ray_tracing_pipeline(true);

@@ -4,6 +4,7 @@ use std::ffi::CStr;
 
 use ash::{khr, vk};
 
+use super::image::{DEPTH, IDS};
 use super::instance::Instance;
 use super::result::Context;
 use crate::error::Result;
@@ -20,6 +21,12 @@ pub struct Limits {
     pub packets: bool,
     /// Work-groups in x of one dispatch.
     pub max_workgroups_x: u32,
+    /// Pixels of a side of an image that is drawn into.
+    pub max_image_side: u32,
+    /// Pixels of a side of a viewport.
+    pub max_viewport_side: f32,
+    /// Pixel coordinates that a viewport's corners may have.
+    pub viewport_range: [f32; 2],
     /// Bytes of one allocation.
     pub max_allocation: u64,
     /// Bytes of all device-local heaps.
@@ -69,6 +76,8 @@ pub struct DeviceInfo {
     pub unified_memory: bool,
     /// What each tracer needs and does not find here; empty: it runs.
     pub tracers: Vec<TracerNeeds>,
+    /// What rasterising needs and does not find here; empty: it runs.
+    pub missing_raster: Vec<String>,
     /// Limits that matter.
     pub limits: Limits,
     #[serde(skip)]
@@ -90,6 +99,11 @@ impl DeviceInfo {
     /// Can this tracer run here?
     pub fn supports(&self, tracer: TracerKind) -> bool {
         self.missing_floor.is_empty() && self.tracers.iter().any(|t| t.tracer == tracer && t.missing.is_empty())
+    }
+
+    /// Can it rasterise? Devices for computing alone cannot.
+    pub fn can_rasterise(&self) -> bool {
+        self.missing_floor.is_empty() && self.missing_raster.is_empty()
     }
 
     /// Does the driver leave any loop in a shader after 65,535 turns? Mesa's CPU driver did before version 23.
@@ -123,6 +137,21 @@ impl DeviceInfo {
 fn text(s: &[std::ffi::c_char]) -> String {
     let bytes: Vec<u8> = s.iter().map(|&c| c as u8).take_while(|&c| c != 0).collect();
     String::from_utf8_lossy(&bytes).into_owned()
+}
+
+/// With wider vectors Mesa's CPU driver crashes when it compiles a vertex shader (seen with 22.3.6 and 25.0.7).
+const MOST_DRAWING_BITS: u32 = 256;
+
+/// Bits of the vectors of Mesa's CPU driver, which are in its name: "llvmpipe (LLVM 15.0.6, 256 bits)".
+fn vector_bits(name: &str) -> Option<u32> {
+    name.strip_prefix("llvmpipe")?.strip_suffix(" bits)")?.rsplit(' ').next()?.parse().ok()
+}
+
+/// Can images of this format be drawn into?
+fn is_target(raw: &ash::Instance, physical: vk::PhysicalDevice, format: vk::Format, target: vk::FormatFeatureFlags) -> bool {
+    // SAFETY: the physical device belongs to the living instance
+    let features = unsafe { raw.get_physical_device_format_properties(physical, format) }.optimal_tiling_features;
+    features.contains(target)
 }
 
 /// All devices of the machine, usable or not.
@@ -175,7 +204,10 @@ fn describe(instance: &Instance, index: usize, physical: vk::PhysicalDevice) -> 
     let int64 = features2.features.shader_int64 == vk::TRUE;
 
     let families = unsafe { raw.get_physical_device_queue_family_properties(physical) };
-    let queue_family = families.iter().position(|f| f.queue_flags.contains(vk::QueueFlags::COMPUTE)).map(|k| k as u32);
+    let family = |flags| families.iter().position(|f| f.queue_flags.contains(flags)).map(|k| k as u32);
+    // one queue for everything, where there is one
+    let graphics_family = family(vk::QueueFlags::COMPUTE | vk::QueueFlags::GRAPHICS);
+    let queue_family = graphics_family.or_else(|| family(vk::QueueFlags::COMPUTE));
 
     let mut missing_floor = Vec::new();
     if !vulkan13 {
@@ -195,6 +227,16 @@ fn describe(instance: &Instance, index: usize, physical: vk::PhysicalDevice) -> 
     if queue_family.is_none() {
         missing_floor.push("a compute queue".to_owned());
     }
+
+    let narrow = vector_bits(&text(&properties.device_name)).is_none_or(|bits| bits <= MOST_DRAWING_BITS);
+    let missing_raster = [
+        (graphics_family.is_some(), "a queue for graphics and compute"),
+        (f13.dynamic_rendering == vk::TRUE, "dynamicRendering"),
+        (narrow, "vectors of at most 256 bits (LP_NATIVE_VECTOR_WIDTH=256)"),
+        (is_target(raw, physical, IDS, vk::FormatFeatureFlags::COLOR_ATTACHMENT), "images of two 32-bit integers to draw into"),
+        (is_target(raw, physical, DEPTH, vk::FormatFeatureFlags::DEPTH_STENCIL_ATTACHMENT), "32-bit depth"),
+    ];
+    let missing_raster = missing_raster.iter().filter(|n| !n.0).map(|n| n.1.to_owned()).collect();
 
     let structure_needs = [
         ("VK_KHR_acceleration_structure", f_structure.acceleration_structure == vk::TRUE),
@@ -247,6 +289,7 @@ fn describe(instance: &Instance, index: usize, physical: vk::PhysicalDevice) -> 
         int64,
         unified_memory: matches!(kind, "cpu" | "integrated"),
         tracers,
+        missing_raster,
         limits: Limits {
             subgroup_size: v11.subgroup_size,
             subgroup_ballot: v11.subgroup_supported_stages.contains(vk::ShaderStageFlags::COMPUTE)
@@ -260,9 +303,24 @@ fn describe(instance: &Instance, index: usize, physical: vk::PhysicalDevice) -> 
                 && (8..=64).contains(&v11.subgroup_size)
                 && f13.compute_full_subgroups == vk::TRUE,
             max_workgroups_x: properties.limits.max_compute_work_group_count[0],
+            max_image_side: [
+                properties.limits.max_image_dimension2_d,
+                properties.limits.max_framebuffer_width,
+                properties.limits.max_framebuffer_height,
+            ]
+            .into_iter()
+            .min()
+            .unwrap_or(0),
             max_allocation: v13_limits.max_buffer_size.min(v11_limits.max_memory_allocation_size),
             device_memory,
             max_push_constants: properties.limits.max_push_constants_size,
+            max_viewport_side: properties
+                .limits
+                .max_viewport_dimensions
+                .map(|n| n as f32)
+                .into_iter()
+                .fold(f32::INFINITY, f32::min),
+            viewport_range: properties.limits.viewport_bounds_range,
             timestamp_period: if properties.limits.timestamp_compute_and_graphics == vk::TRUE {
                 properties.limits.timestamp_period
             } else {
@@ -275,4 +333,18 @@ fn describe(instance: &Instance, index: usize, physical: vk::PhysicalDevice) -> 
         },
         queue_family,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_cpu_drivers_name_says_how_wide_its_vectors_are() {
+        assert_eq!(vector_bits("llvmpipe (LLVM 15.0.6, 256 bits)"), Some(256));
+        assert_eq!(vector_bits("llvmpipe (LLVM 19.1.7, 512 bits)"), Some(512));
+        for other in ["llvmpipe", "NVIDIA H100 80GB HBM3", "a GPU with 512 bits)", ""] {
+            assert_eq!(vector_bits(other), None, "{other}");
+        }
+    }
 }

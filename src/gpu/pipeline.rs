@@ -33,7 +33,7 @@ impl Specialization {
         self
     }
 
-    fn with<R>(&self, f: impl FnOnce(&vk::SpecializationInfo) -> R) -> R {
+    pub(super) fn with<R>(&self, f: impl FnOnce(&vk::SpecializationInfo) -> R) -> R {
         let map: Vec<_> = (0..)
             .zip(&self.entries)
             .map(|(k, (id, _))| vk::SpecializationMapEntry { constant_id: *id, offset: 4 * k, size: 4 })
@@ -44,13 +44,13 @@ impl Specialization {
 }
 
 /// A shader module that lives while pipelines are made from it.
-struct Module<'a> {
-    raw: vk::ShaderModule,
+pub(super) struct Module<'a> {
+    pub(super) raw: vk::ShaderModule,
     device: &'a Device,
 }
 
 impl<'a> Module<'a> {
-    fn new(device: &'a Device, name: &str, spirv: &[u8]) -> Result<Self> {
+    pub(super) fn new(device: &'a Device, name: &str, spirv: &[u8]) -> Result<Self> {
         let words = ash::util::read_spv(&mut std::io::Cursor::new(spirv))
             .map_err(|e| Error::Vulkan(format!("shader {name} is no SPIR-V: {e}")))?;
         // SAFETY: valid SPIR-V from the build script's compiler
@@ -68,7 +68,7 @@ impl Drop for Module<'_> {
     }
 }
 
-fn layout(device: &Device, stages: vk::ShaderStageFlags) -> Result<vk::PipelineLayout> {
+pub(super) fn layout(device: &Device, stages: vk::ShaderStageFlags) -> Result<vk::PipelineLayout> {
     let ranges = [vk::PushConstantRange { stage_flags: stages, offset: 0, size: PUSH_BYTES }];
     // SAFETY: a plain layout
     unsafe { device.raw.create_pipeline_layout(&vk::PipelineLayoutCreateInfo::default().push_constant_ranges(&ranges), None) }

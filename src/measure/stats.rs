@@ -47,6 +47,15 @@ pub fn median(values: &[f64]) -> Option<f64> {
     Summary::of(values).map(|s| s.median)
 }
 
+/// The value below which a share of the values lies, by linear interpolation between ranks; `None` for no values. `share` from 0 to 1.
+pub fn percentile(values: &[f64], share: f64) -> Option<f64> {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let at = share.clamp(0.0, 1.0) * sorted.len().checked_sub(1)? as f64;
+    let (low, high) = (sorted[at.floor() as usize], sorted[at.ceil() as usize]);
+    Some(low + (high - low) * at.fract())
+}
+
 fn middle(sorted: &[f64]) -> f64 {
     let n = sorted.len();
     if n % 2 == 1 { sorted[n / 2] } else { 0.5 * (sorted[n / 2 - 1] + sorted[n / 2]) }
@@ -117,6 +126,9 @@ mod tests {
         assert_eq!(Spread::of(&hundred), Some(Spread { median: 50.5, p95: 95.0 }));
         assert_eq!(Spread::of(&[2.0, 1.0]), Some(Spread { median: 1.5, p95: 2.0 }));
         assert_eq!(Spread::of(&[]), None);
+        assert_eq!(percentile(&[], 0.95), None);
+        assert_eq!(percentile(&[3.0, 1.0, 2.0, 4.0, 5.0], 0.5), Some(3.0));
+        assert_eq!(percentile(&[3.0, 1.0, 2.0, 4.0, 5.0], 0.95), Some(4.8));
     }
 
     #[test]

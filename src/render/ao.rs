@@ -14,7 +14,7 @@ use super::cover::Cover;
 use super::film::{Film, FilmPixel};
 use super::pace::{MOST, Pace};
 use crate::error::Result;
-use crate::gpu::{Buffer, Commands, ComputePipeline, Device, Memory, Specialization, Timing};
+use crate::gpu::{Buffer, Commands, ComputePipeline, Device, Memory, Timing};
 use crate::ray::Ray;
 use crate::tracer::queue::RayQueue;
 use crate::tracer::stream::StreamShaders;
@@ -188,7 +188,7 @@ pub fn render(tracer: &Tracer, camera: &CameraRecord, options: &AoOptions, contr
         tracer,
         primary: tracer.stream(primary)?,
         occlusion: tracer.stream(occlusion)?,
-        resolve: ComputePipeline::new(device, "resolve", stream::RESOLVE, &Specialization::default())?,
+        resolve: stream::RESOLVE.pipeline(device)?,
         queue: RayQueue::new(device, most)?,
         samples: Buffer::new(device, "samples", size_of::<f32>() as u64 * most as u64, Memory::Device)?,
         params: Buffer::new(device, "block parameters", size_of::<BlockParams>() as u64, Memory::Upload)?,

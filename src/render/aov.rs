@@ -6,9 +6,16 @@ use super::Control;
 use super::block::{Block, BlockParams};
 use super::camera::CameraRecord;
 use super::pace::{MOST, Pace};
+use super::raster::{Primary, Raster, View};
 use crate::error::Result;
 use crate::gpu::{Buffer, Commands, Memory};
-use crate::tracer::{Push, Tracer, stream};
+use crate::tracer::{Push, Stream, Tracer, stream};
+
+/// Where hits come from.
+enum Source {
+    Traced(Box<Stream>),
+    Drawn(Box<Raster>),
+}
 
 /// What a pixel's centre shows; `AovPixel` of shaders/aov.glsl.
 #[repr(C)]
@@ -38,10 +45,27 @@ pub struct AovPixel {
 
 /// Renders the outputs of an image, rows from the top. The tracer's [`crate::tracer::Needs`] must cover what is looked at.
 pub fn render(tracer: &Tracer, camera: &CameraRecord, size: [u32; 2], control: &mut dyn Control) -> Result<Vec<AovPixel>> {
+    render_with(tracer, camera, size, Primary::Traced, control)
+}
+
+/// As [`render`], with a choice of how it is found what the rays meet.
+pub fn render_with(
+    tracer: &Tracer,
+    camera: &CameraRecord,
+    size: [u32; 2],
+    primary: Primary,
+    control: &mut dyn Control,
+) -> Result<Vec<AovPixel>> {
     let device = tracer.device();
-    let stream = tracer.stream(&stream::AOV_CLOSEST)?;
-    let mut commands = Commands::new(device)?;
     let blocks = Block::cut(size);
+    let source = match primary {
+        Primary::Traced => Source::Traced(Box::new(tracer.stream(&stream::AOV_CLOSEST)?)),
+        Primary::Raster => {
+            let size = blocks.first().map_or([1; 2], |b| b.size);
+            Source::Drawn(Box::new(Raster::new(tracer, &stream::AOV_CLOSEST, size)?))
+        }
+    };
+    let mut commands = Commands::new(device)?;
     let record = size_of::<AovPixel>() as u64;
     let most = blocks.iter().map(Block::rays).max().unwrap_or(0).min(MOST);
     let target = Buffer::new(device, "auxiliary outputs", record * most as u64, Memory::Readback)?;
@@ -53,6 +77,12 @@ pub fn render(tracer: &Tracer, camera: &CameraRecord, size: [u32; 2], control: &
         if let Some(bytes) = params_buffer.bytes_mut() {
             bytes[..size_of::<BlockParams>()].copy_from_slice(bytemuck::bytes_of(&params));
         }
+        if let Source::Drawn(raster) = &source {
+            let view = View { camera: *camera, image_size: size, block: *block, at: [0.5; 2] };
+            let mut drawn = Ok(Default::default());
+            commands.run(|r| drawn = raster.draw(r, tracer, &view))?;
+            drawn?;
+        }
         let mut first = 0;
         while first < block.rays() {
             let rays = pace.rays();
@@ -60,7 +90,10 @@ pub fn render(tracer: &Tracer, camera: &CameraRecord, size: [u32; 2], control: &
             let push =
                 Push { scene: tracer.scene_address(), pass: params_buffer.address(), first, count, ..Default::default() };
             let start = std::time::Instant::now();
-            let timings = commands.run(|r| stream.record(r, &push))?;
+            let timings = commands.run(|r| match &source {
+                Source::Traced(stream) => stream.record(r, &push),
+                Source::Drawn(raster) => raster.trace(r, &push),
+            })?;
             if count == rays {
                 pace.learn(rays, &timings, start.elapsed().as_secs_f64(), 1);
             }

@@ -6,9 +6,12 @@ pub mod block;
 pub mod camera;
 pub mod cover;
 pub mod film;
+mod frustum;
 pub mod pace;
+pub mod raster;
 pub mod rays;
 pub mod realtime;
+pub mod sequence;
 
 use crate::error::Result;
 

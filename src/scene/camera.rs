@@ -67,6 +67,13 @@ impl Camera {
     }
 }
 
+/// Position and orientation of `to_world` without its scale, shear and mirroring. Keeps -z and as much of +y as it can.
+pub(in crate::scene) fn rigid(to_world: &DAffine3) -> DAffine3 {
+    let back = to_world.matrix3.z_axis.try_normalize().unwrap_or(DVec3::Z);
+    let right = to_world.matrix3.y_axis.cross(back).try_normalize().unwrap_or_else(|| back.any_orthonormal_vector());
+    DAffine3::from_mat3_translation(DMat3::from_cols(right, back.cross(right), back), to_world.translation)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -63,6 +63,13 @@ pub struct Part {
     pub alpha_tested: bool,
 }
 
+impl Part {
+    /// The primitive of the group that follows its last.
+    pub fn end(&self, flat: &FlatScene) -> usize {
+        self.first_primitive + flat.scene.meshes[self.mesh].geometry.primitive_count()
+    }
+}
+
 /// What one bottom-level structure is built over: triangles or spheres, never both.
 #[derive(Clone, Debug)]
 pub struct Group {

@@ -3,6 +3,7 @@
 //! Conventions, everywhere: right-handed, lengths in world units (metres in glTF), angles in radians, colours linear with
 //! sRGB primaries, triangles counter-clockwise seen from their front.
 
+pub mod animation;
 pub mod builtin;
 pub mod camera;
 pub mod camera_path;
@@ -16,6 +17,7 @@ pub mod mesh;
 pub mod orbit;
 pub mod texture;
 
+pub use animation::Rig;
 pub use camera::{Camera, Projection};
 pub use camera_path::CameraPath;
 pub use light::{Environment, Light, LightKind};
@@ -86,6 +88,8 @@ pub struct Scene {
     pub environment: Environment,
     /// Wishes of the file about how to render it.
     pub hints: RenderHints,
+    /// What of it moves over time; `None` where nothing does.
+    pub rig: Option<Rig>,
     /// What the loader noticed.
     pub report: LoadReport,
 }

@@ -16,6 +16,7 @@ use super::{Structure, Tracer};
 use crate::bvh::Aabb;
 use crate::error::{Error, Result};
 use crate::scene::Geometry;
+use crate::scene::animation::{Pose, PosedMesh};
 use crate::scene::flatten::{FlatScene, Group, Part, Placement};
 
 /// New vertices of a mesh.
@@ -46,6 +47,18 @@ pub struct Moved {
     pub bounds: Aabb,
     /// The longest way that a point of it went, by half its diagonal: 1 and more where nothing of it is where it was.
     pub share: f32,
+}
+
+impl Pose {
+    /// What to tell a tracer whose scene was flattened with the animation's [`crate::scene::animation::Rig::motion`].
+    pub fn changes(&self) -> Changes<'_> {
+        fn mesh(posed: &PosedMesh) -> MeshChange<'_> {
+            let shape = &posed.shape;
+            let normals = Some(&shape.normals[..]).filter(|n| !n.is_empty());
+            MeshChange { mesh: posed.mesh, positions: &shape.positions, normals }
+        }
+        Changes { instances: self.instances.clone(), meshes: self.meshes.iter().map(mesh).collect() }
+    }
 }
 
 /// What an update did.

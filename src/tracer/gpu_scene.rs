@@ -7,6 +7,7 @@ use bytemuck::{Pod, Zeroable};
 use glam::{DAffine3, Vec3};
 
 use super::compute::Hierarchy;
+use super::drawable::{Drawable, Shape};
 use super::motion::Motion;
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, Device, Memory};
@@ -122,6 +123,9 @@ pub struct GpuScene {
     instances: Vec<InstanceRecord>,
     instance_buffer: Buffer,
     pub(super) groups: Vec<GroupBuffers>,
+    shapes: Vec<Shape>,
+    /// The group of each entry of the top level.
+    group_of: Vec<u32>,
     attributes: Buffer,
     /// Where in `attributes` the normals of meshes that may deform lie.
     normals: Vec<(usize, u64)>,
@@ -218,8 +222,36 @@ impl GpuScene {
         let motion = Motion::new(device, flat, |group| groups[group].positions.size())?;
         root.motion = motion.as_ref().map_or(0, Motion::address);
         let root_buffer = Buffer::from_slice(device, "scene root", &[root])?;
+        let shapes = flat.groups.iter().map(|g| Shape::new(flat, g)).collect();
+        let group_of = flat.placements.iter().map(|p| p.group as u32).collect();
         let attributes = attributes.buffer;
-        Ok(Self { root, root_buffer, instances, instance_buffer, groups, attributes, normals, motion, others })
+        Ok(Self {
+            root,
+            root_buffer,
+            instances,
+            instance_buffer,
+            groups,
+            shapes,
+            group_of,
+            attributes,
+            normals,
+            motion,
+            others,
+        })
+    }
+
+    /// What there is to draw, entry by entry of the top level, as it is now.
+    pub(super) fn drawables(&self) -> impl Iterator<Item = Drawable<'_>> {
+        (0..).zip(self.instances.iter().zip(&self.group_of)).map(|(entry, (instance, &group))| {
+            let buffers = &self.groups[group as usize];
+            Drawable {
+                entry,
+                to_world: instance.group_to_world,
+                shape: &self.shapes[group as usize],
+                positions: buffers.positions.address(),
+                indices: buffers.indices.as_ref().map_or(0, Buffer::address),
+            }
+        })
     }
 
     /// Where shaders begin.
@@ -245,6 +277,7 @@ impl GpuScene {
 
     /// Vertices of a mesh that is a group of its own have moved.
     pub(super) fn set_positions(&mut self, group: usize, positions: &[Vec3]) -> Result<()> {
+        self.shapes[group].deform(positions);
         self.groups[group].positions.write(0, bytemuck::cast_slice(positions))
     }
 

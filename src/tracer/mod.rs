@@ -6,6 +6,7 @@
 
 mod brute;
 mod compute;
+pub mod drawable;
 mod dynamic;
 mod dynamic_trees;
 pub mod gpu_scene;
@@ -22,6 +23,7 @@ mod wide;
 use std::sync::{Arc, OnceLock};
 use std::time::Instant;
 
+pub use drawable::Drawable;
 pub use dynamic::{Changes, MeshChange, Moved, UpdateStats};
 pub use gpu_scene::Needs;
 pub use kernel::{BuildOptions, ComputeOptions, Kernel, TriangleTest};
@@ -305,6 +307,16 @@ impl Tracer {
             }
             Structure::Hardware { .. } => Stream::pipeline(&self.device, shaders, self.features),
         }
+    }
+
+    /// Compiles a stream of camera rays for pixels that were drawn ([`crate::render::raster`]): nothing is traced.
+    pub fn drawn_stream(&self, shaders: &'static StreamShaders) -> Result<Stream> {
+        Stream::drawn(&self.device, shaders, &stream::scene_specialization(self.features))
+    }
+
+    /// What there is to draw, entry by entry of the top level, as it is since the last [`Tracer::update`].
+    pub fn drawables(&self) -> impl Iterator<Item = Drawable<'_>> {
+        self.scene.drawables()
     }
 
     /// The fast kernel, compiled once for all streams of a mode.

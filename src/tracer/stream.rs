@@ -5,7 +5,7 @@ use std::sync::Arc;
 use bytemuck::{Pod, Zeroable};
 
 use super::compute::HIT_BYTES;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::gpu::{Buffer, ComputePipeline, Device, HitShaders, RayTracingPipeline, Recorder, Specialization};
 use crate::ray::Ray;
 use crate::scene::features::SceneFeatures;
@@ -41,6 +41,24 @@ pub struct StreamShaders {
     brute: &'static [u8],
     query: &'static [u8],
     raygen: &'static [u8],
+    // empty: its rays are not the camera's
+    visibility: &'static [u8],
+}
+
+/// A compute shader's SPIR-V.
+pub struct ComputeShader {
+    name: &'static str,
+    plain: &'static [u8],
+    // for devices with 64-bit integers
+    int64: &'static [u8],
+}
+
+impl ComputeShader {
+    /// Compiles it for a device.
+    pub fn pipeline(&self, device: &Arc<Device>) -> Result<ComputePipeline> {
+        let spirv = if device.info.int64 { self.int64 } else { self.plain };
+        ComputePipeline::new(device, self.name, spirv, &Specialization::default())
+    }
 }
 
 include!(concat!(env!("OUT_DIR"), "/shaders.rs"));
@@ -53,7 +71,8 @@ pub struct Push {
     pub scene: u64,
     /// Address of the pass's parameters.
     pub pass: u64,
-    /// Address of ray number `first` of a queue ([`super::queue`]), 32 bytes each; 0 for streams that make their own rays.
+    /// Address of ray number `first` of a queue ([`super::queue`]), 32 bytes each; 0 for streams that make their own rays. Where those
+    /// were drawn: of what was drawn ([`crate::render::raster`]).
     pub rays: u64,
     /// Address of a `u32`: how many rays the queue holds; 0 when `count` says it.
     pub queued: u64,
@@ -92,6 +111,8 @@ enum Pipeline {
         record: u64,
     },
     RayTracing(RayTracingPipeline),
+    /// One compute shader over all rays, whose hits are known but for where.
+    Drawn(ComputePipeline),
 }
 
 /// Where a launch's rays and results are between its steps.
@@ -110,7 +131,7 @@ pub struct Stream {
 }
 
 /// What a scene does not need is not compiled.
-pub(super) fn scene_specialization(features: SceneFeatures) -> Specialization {
+pub(crate) fn scene_specialization(features: SceneFeatures) -> Specialization {
     Specialization::default().set(0, features.alpha as u32).set(1, features.spheres as u32).set(2, features.single_level as u32)
 }
 
@@ -163,8 +184,9 @@ impl Stream {
         memory: LaunchMemory,
     ) -> Result<Self> {
         let int64 = device.info.int64;
-        let generate = if int64 { shaders.generate_64 } else { shaders.generate };
-        let deliver = if int64 && device.info.limits.subgroup_ballot { shaders.deliver_64 } else { shaders.deliver };
+        let ballot = int64 && device.info.limits.subgroup_ballot;
+        let generate = if ballot { shaders.generate_64 } else { shaders.generate };
+        let deliver = if ballot { shaders.deliver_64 } else { shaders.deliver };
         let pipeline = Pipeline::Steps {
             generate: match shaders.queue {
                 true => None,
@@ -223,18 +245,24 @@ impl Stream {
         Ok(Self { pipeline, shaders })
     }
 
+    /// For rays whose pixels have been drawn. [`Push::rays`] is then the address of what was drawn ([`crate::render::raster`]).
+    pub(super) fn drawn(device: &Arc<Device>, shaders: &'static StreamShaders, s: &Specialization) -> Result<Self> {
+        if shaders.visibility.is_empty() {
+            return Err(Error::Usage(format!("the rays of '{}' are not the camera's: they cannot be drawn", shaders.name)));
+        }
+        let pipeline = ComputePipeline::new(device, shaders.name, shaders.visibility, s)?;
+        Ok(Self { pipeline: Pipeline::Drawn(pipeline), shaders })
+    }
+
     /// Records the tracing of rays `push.first .. push.first + push.count`, timed under the names of the stream's shaders. The
     /// addresses in `push` must be those of the tracer that made the stream and of parameters of the stream's pass.
     pub fn record(&self, recorder: &mut Recorder, push: &Push) {
         if push.count == 0 {
             return;
         }
-        debug_assert_eq!(self.shaders.queue, push.rays != 0, "{}: where are its rays?", self.shaders.name);
-        debug_assert!(
-            self.shaders.queue || push.count <= LAUNCH_RAYS,
-            "{}: results would overwrite each other",
-            self.shaders.name
-        );
+        let in_memory = self.shaders.queue || matches!(self.pipeline, Pipeline::Drawn(_));
+        debug_assert_eq!(in_memory, push.rays != 0, "{}: where are its rays?", self.shaders.name);
+        debug_assert!(in_memory || push.count <= LAUNCH_RAYS, "{}: results would overwrite each other", self.shaders.name);
         let pass = self.shaders.pass;
         match &self.pipeline {
             Pipeline::Single { pipeline, rays_per_group } => {
@@ -265,6 +293,7 @@ impl Stream {
                     recorder.timed(delivering, |r| r.dispatch(deliver, &push, push.count.div_ceil(LANES)));
                 }
             }
+            Pipeline::Drawn(pipeline) => recorder.timed(pass, |r| r.dispatch(pipeline, push, push.count.div_ceil(LANES))),
             Pipeline::RayTracing(pipeline) => recorder.timed(pass, |r| r.trace_rays(pipeline, push, push.count)),
         }
     }

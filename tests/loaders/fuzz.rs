@@ -1,6 +1,8 @@
 //! Broken files: an error or a scene, never a panic, never absurd memory.
 
 use serde_json::json;
+use skylit::scene::Scene;
+use skylit::scene::animation::{Playback, Pose};
 
 use crate::build::*;
 
@@ -40,7 +42,34 @@ fn rich() -> Doc {
     *doc.first() = json!({ "attributes": { "POSITION": position, "NORMAL": normal, "TEXCOORD_0": texcoord, "COLOR_0": color },
         "indices": indices, "material": 0 });
     doc.push("cameras", json!({ "type": "perspective", "perspective": { "yfov": 0.7, "znear": 0.1 } }));
-    doc.json["nodes"] = json!([{ "mesh": 0, "children": [1], "scale": [1, 2, 3] }, { "camera": 0, "rotation": [0, 0, 0, 1] }]);
+    let joints = doc.accessor(&[0, 1, 0, 0].repeat(3), U8, "VEC4", 3);
+    let weights = doc.accessor(&[128, 127, 0, 0].repeat(3), U8, "VEC4", 3);
+    doc.json["accessors"][weights]["normalized"] = json!(true);
+    doc.first()["attributes"]["JOINTS_0"] = json!(joints);
+    doc.first()["attributes"]["WEIGHTS_0"] = json!(weights);
+    doc.first()["targets"] = json!([{ "POSITION": position, "NORMAL": normal }]);
+    let bind = doc.accessor(&bytes(&[glam::Mat4::IDENTITY.to_cols_array(); 2]), F32, "MAT4", 2);
+    doc.push("skins", json!({ "joints": [1, 2], "inverseBindMatrices": bind }));
+    let times = doc.accessor(&bytes(&[[0.0f32], [1.0]]), F32, "SCALAR", 2);
+    let moves = doc.accessor(&bytes(&[[0.0f32; 3], [1.0; 3]]), F32, "VEC3", 2);
+    let morphs = doc.accessor(&bytes(&[[0.0f32], [0.5], [0.0], [0.0], [1.0], [0.0]]), F32, "SCALAR", 6);
+    doc.push(
+        "animations",
+        json!({ "samplers": [
+            { "input": times, "output": moves },
+            { "input": times, "output": morphs, "interpolation": "CUBICSPLINE" },
+        ], "channels": [
+            { "sampler": 0, "target": { "node": 1, "path": "scale" } },
+            { "sampler": 1, "target": { "node": 0, "path": "weights" } },
+            { "sampler": 0, "target": { "node": 3, "path": "translation" } },
+        ] }),
+    );
+    doc.json["nodes"] = json!([
+        { "mesh": 0, "skin": 0, "children": [1], "scale": [1, 2, 3], "weights": [0.5] },
+        { "camera": 0, "rotation": [0, 0, 0, 1], "children": [2, 3] },
+        { "translation": [0, 1, 0] },
+        { "mesh": 0 },
+    ]);
     doc
 }
 
@@ -70,13 +99,29 @@ fn mutate(original: &[u8], random: &mut Random) -> Vec<u8> {
     data
 }
 
+/// Whatever was loaded can be played.
+fn play(scene: &Scene) {
+    let Some(rig) = &scene.rig else { return };
+    let mut pose = Pose::default();
+    for animation in 0..rig.animations().len() {
+        let motion = rig.motion(animation).unwrap();
+        for seconds in [0.0, 0.4, 1e9] {
+            rig.pose(animation, seconds, Playback::Once, &mut pose).unwrap();
+            assert_eq!((pose.instances.len(), pose.meshes.len()), (motion.instances.len(), motion.meshes.len()));
+        }
+    }
+}
+
 fn survive(name: &str, data: &[u8], cases: u32) {
     let folder = Folder::new();
     let mut random = Random(0x5eed);
     let (mut good, mut bad) = (0, 0);
     for _ in 0..cases {
         match folder.load(name, mutate(data, &mut random)) {
-            Ok(_) => good += 1,
+            Ok(scene) => {
+                good += 1;
+                play(&scene);
+            }
             Err(e) => {
                 bad += 1;
                 assert!(!e.to_string().contains('\n'), "{e}");
@@ -89,7 +134,7 @@ fn survive(name: &str, data: &[u8], cases: u32) {
 
 #[test]
 fn glb() {
-    assert!(rich().try_load().is_ok());
+    assert!(rich().try_load().is_ok_and(|s| s.rig.is_some_and(|r| !r.motion(0).unwrap().meshes.is_empty())));
     survive("a.glb", &rich().glb(), 6000);
 }
 

@@ -175,13 +175,7 @@ fn punctual_lights() {
 #[test]
 fn what_is_not_shown_is_said() {
     let mut doc = Doc::triangle();
-    let position = doc.first()["attributes"]["POSITION"].clone();
-    doc.first()["targets"] = json!([{ "POSITION": position }]);
-    doc.json["nodes"][0]["skin"] = json!(0);
-    doc.json["animations"] = json!([{ "channels": [], "samplers": [] }]);
     doc.json["extensionsUsed"] = json!(["EXT_mesh_gpu_instancing"]);
     let warnings = doc.load().report.warnings.join("; ");
-    for word in ["morph", "skin", "animation", "EXT_mesh_gpu_instancing"] {
-        assert!(warnings.contains(word), "{word}: {warnings}");
-    }
+    assert!(warnings.contains("EXT_mesh_gpu_instancing"), "{warnings}");
 }

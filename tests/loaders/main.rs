@@ -1,5 +1,6 @@
 //! Loaders and exporter: every glTF feature, OBJ, `.brhan`, bad input, round trips, and the scenes of others where present.
 
+mod animation;
 mod brhan;
 mod build;
 mod errors;

@@ -8,7 +8,7 @@ use std::sync::Arc;
 use bytemuck::{Pod, Zeroable};
 
 use crate::error::Result;
-use crate::gpu::{Buffer, ComputePipeline, Device, Memory, Recorder, Specialization};
+use crate::gpu::{Buffer, ComputePipeline, Device, Memory, Recorder};
 use crate::render::block::Block;
 use crate::sampling::{best_candidates, blue_noise};
 use crate::tracer::stream::{LANES, LAUNCH_RAYS};
@@ -64,7 +64,6 @@ impl Larsen {
         let half = size.map(|n| n.div_ceil(2));
         let pixels = |s: [u32; 2]| u64::from(s[0]) * u64::from(s[1]);
         let image = |name: &str, n: u64| Buffer::new(device, name, 4 * n, Memory::Device);
-        let compute = |name: &str, spirv: &[u8]| ComputePipeline::new(device, name, spirv, &Specialization::default());
         let light_records: Vec<[f32; 4]> = lights.iter().map(|p| [p[0], p[1], p[2], 0.0]).collect();
         let others = [
             Buffer::from_slice(device, "lights", &light_records)?,
@@ -95,9 +94,9 @@ impl Larsen {
         Ok(Self {
             light: tracer.stream(&stream::LARSEN_LIGHT_ANY)?,
             occlusion: tracer.stream(&stream::LARSEN_OCCLUSION_CLOSEST)?,
-            sum: compute("larsen sum", stream::LARSEN_SUM)?,
-            blur: compute("larsen blur", stream::LARSEN_BLUR)?,
-            temporal: compute("larsen temporal", stream::LARSEN_TEMPORAL)?,
+            sum: stream::LARSEN_SUM.pipeline(device)?,
+            blur: stream::LARSEN_BLUR.pipeline(device)?,
+            temporal: stream::LARSEN_TEMPORAL.pipeline(device)?,
             params,
             params_buffer: upload(device)?,
             size,

@@ -1,7 +1,7 @@
-//! Ambient occlusion frame after frame: the passes `gbuffer`, `spawn`, `accessibility`, `gather`, `temporal` and `filter`.
+//! Ambient occlusion frame after frame: the passes `gbuffer`, `accessibility`, `gather`, `temporal` and `filter`.
 //!
-//! `gbuffer` finds what each pixel's centre shows; `spawn` makes occlusion rays of the pixels that are sampled in this frame and
-//! `accessibility` traces them; `gather` adds up those of a pixel where there are several; `temporal` adds them to what earlier
+//! `gbuffer` finds what each pixel's centre shows; `accessibility` traces occlusion rays of the pixels that are sampled in this
+//! frame; `gather` adds up those of a pixel where there are several; `temporal` adds them to what earlier
 //! frames know of the same surface; `filter` averages over neighbours. What nothing has changed since the previous frame is not
 //! done again: while neither the camera nor the scene moves there are no camera rays, and pixels with a full history rest.
 
@@ -12,20 +12,20 @@ pub mod settings;
 use glam::{DAffine3, DMat3, DVec3};
 
 use super::ao::Hemisphere;
-use super::block::{Block, BlockParams, TILE_PIXELS};
+use super::block::{Block, BlockParams};
 use super::camera::CameraRecord;
-use crate::error::Result;
-use crate::gpu::{Buffer, Commands, ComputePipeline, Memory, Recorder, Specialization, Timing};
+use super::raster::{Primary, Raster, View};
+use crate::error::{Error, Result};
+use crate::gpu::{Buffer, Commands, ComputePipeline, Memory, Recorder, Timing};
 use crate::tracer::gpu_scene::rows;
-use crate::tracer::queue::RayQueue;
 use crate::tracer::stream::{LANES, LAUNCH_RAYS, StreamShaders};
 use crate::tracer::{Moved, Push, Stream, Tracer, stream};
 use larsen::Larsen;
 use params::{FrameParams, MOST_MOVED, MovedRecord};
 pub use settings::{Filter, FilterKind, Preset, Resolution, Settings, Technique};
 
-/// Rays that a launch holds at most; an image of more is made in several.
-const MOST_QUEUED: u32 = 1 << 22;
+/// Launches of a submission: between them others get their turn on the device.
+const MOST_LAUNCHES: usize = 8;
 /// Distance from a pixel's plane, in footprints of the pixel, at which its neighbours belong to another surface.
 const DEPTH_TOLERANCE: f32 = 1.5;
 /// Cosine between normals, likewise.
@@ -58,6 +58,13 @@ pub struct Surface {
     pub before: [f32; 3],
 }
 
+impl FrameStats {
+    /// Device seconds of what traces rays, which hierarchies that change are judged by ([`Tracer::traced`]).
+    pub fn tracing_seconds(&self) -> f64 {
+        self.timings.iter().filter(|t| t.label.contains("trace") || t.label == "gbuffer").map(|t| t.seconds).sum()
+    }
+}
+
 /// The frames of one image size.
 pub struct Realtime {
     size: [u32; 2],
@@ -66,19 +73,23 @@ pub struct Realtime {
     images: Images,
     larsen: Option<Box<Larsen>>,
     commands: Commands,
-    /// Pixels of a launch of the occlusion passes.
-    chunk: u32,
+    primary_reason: String,
     state: State,
 }
 
 struct Passes {
-    gbuffer: Stream,
+    gbuffer: CameraRays,
     accessibility: Stream,
-    spawn: ComputePipeline,
     gather: ComputePipeline,
     gtao: ComputePipeline,
     temporal: ComputePipeline,
     filter: ComputePipeline,
+}
+
+/// What finds what pixels show.
+enum CameraRays {
+    Traced(Box<Stream>),
+    Drawn(Box<Raster>),
 }
 
 /// Device memory: parameters, and a record a pixel.
@@ -94,9 +105,8 @@ struct Images {
     samples: Option<Buffer>,
     previous_position: Option<Buffer>,
     result: Buffer,
-    queue: RayQueue,
-    /// Rays of each launch of a frame.
-    counts: Buffer,
+    /// Number of occlusion rays.
+    ray_count: Buffer,
 }
 
 /// What is known from the frames before.
@@ -123,21 +133,28 @@ impl Realtime {
     /// [`Error::Usage`] for settings out of range, [`Error::OutOfMemory`], and those of compiling shaders.
     pub fn new(tracer: &Tracer, size: [u32; 2], settings: &Settings, lights: &[[f32; 3]]) -> Result<Self> {
         settings.check()?;
-        let device = tracer.device();
-        // whole tiles, so that a pixel's samples are in one launch
-        let tiles = Block { origin: [0, 0], size }.rays();
-        let chunk = (MOST_QUEUED / settings.rays_per_pixel / TILE_PIXELS * TILE_PIXELS).clamp(TILE_PIXELS, tiles);
+        let rays = u64::from(Block { origin: [0, 0], size }.rays()) * u64::from(settings.rays_per_pixel);
+        if rays > u64::from(u32::MAX) {
+            return Err(Error::Usage(format!(
+                "{} rays per pixel of {}x{}: a frame has 2^32 rays at most; use fewer, or a smaller image",
+                settings.rays_per_pixel, size[0], size[1]
+            )));
+        }
+        let (primary, primary_reason) = match settings.primary {
+            Some(primary) => (primary, "asked for".to_owned()),
+            None => Primary::auto(tracer, u64::from(size[0]) * u64::from(size[1])),
+        };
         Ok(Self {
             size,
-            settings: *settings,
-            passes: Passes::new(tracer, settings)?,
-            images: Images::new(tracer, size, settings, chunk)?,
+            settings: Settings { primary: Some(primary), ..*settings },
+            passes: Passes::new(tracer, size, settings, primary)?,
+            primary_reason,
+            images: Images::new(tracer, size, settings)?,
             larsen: match settings.technique {
                 Technique::Larsen => Some(Box::new(Larsen::new(tracer, size, lights, settings.unit)?)),
                 _ => None,
             },
-            commands: Commands::new(device)?,
-            chunk,
+            commands: Commands::new(tracer.device())?,
             state: State::default(),
         })
     }
@@ -147,9 +164,14 @@ impl Realtime {
         self.size
     }
 
-    /// How frames are made.
+    /// How frames are made; [`Settings::primary`] is what it turned out to be.
     pub fn settings(&self) -> &Settings {
         &self.settings
+    }
+
+    /// Why camera rays are traced, or the scene drawn.
+    pub fn primary_reason(&self) -> &str {
+        &self.primary_reason
     }
 
     /// Forgets what earlier frames know.
@@ -178,52 +200,46 @@ impl Realtime {
         self.state.history ^= 1;
         self.write_params(camera, &moved, still)?;
         let pixels = self.pixels();
-        let tiles = self.block().rays();
         let push = Push { scene: tracer.scene_address(), pass: self.images.frame_params.address(), ..Default::default() };
-        let gtao = self.settings.technique == Technique::Gtao;
-        let launches = if gtao { 0 } else { tiles.div_ceil(self.chunk) };
-        let (passes, images, larsen) = (&self.passes, &self.images, self.larsen.as_deref());
-        let (guide, rays_per_pixel, chunk) = (&images.guides[self.state.guide], self.settings.rays_per_pixel, self.chunk);
-        let timings = self.commands.run(|r| {
-            if !still {
-                r.fill(guide, guide.size(), f32::INFINITY.to_bits());
-                r.barrier();
-                let push = Push { pass: images.block_params.address(), ..push };
-                for first in (0..tiles).step_by(LAUNCH_RAYS as usize) {
-                    passes.gbuffer.record(r, &Push { first, count: LAUNCH_RAYS.min(tiles - first), ..push });
-                    r.barrier();
+        let launches = self.launches(push);
+        let mut batches = launches.chunks(MOST_LAUNCHES).peekable();
+        let (mut timings, mut first, mut drawn) = (Vec::new(), true, Ok(()));
+        let view = View { camera: *camera, image_size: self.size, block: self.block(), at: [0.5; 2] };
+        loop {
+            // a frame without launches still has its other passes
+            let (batch, begins) = (batches.next().unwrap_or_default(), std::mem::take(&mut first));
+            let ends = batches.peek().is_none();
+            timings.extend(self.commands.run(|r| {
+                let (passes, images) = (&self.passes, &self.images);
+                if begins && !still {
+                    let guide = &images.guides[self.state.guide];
+                    drawn = passes.record_gbuffer(r, tracer, images, guide, push, &view);
                 }
+                if let Some(larsen) = &self.larsen {
+                    larsen.record(r, push, &images.result);
+                    return;
+                }
+                if begins {
+                    passes.record_begin(r, images, push, pixels as u32, self.settings.technique);
+                }
+                for push in batch {
+                    passes.record_occlusion(r, push, self.settings.rays_per_pixel);
+                }
+                if ends {
+                    passes.record_end(r, push, pixels as u32);
+                }
+            })?);
+            if ends {
+                break;
             }
-            if let Some(larsen) = larsen {
-                larsen.record(r, push, &images.result);
-                return;
-            }
-            r.clear(&images.current);
-            if gtao {
-                let all = Push { count: pixels as u32, ..push };
-                r.barrier();
-                r.timed("gtao", |r| r.dispatch(&passes.gtao, &all, all.count.div_ceil(LANES)));
-                r.barrier();
-            }
-            for launch in 0..launches {
-                let first = launch * chunk;
-                let push = Push { first, count: chunk.min(tiles - first), ..push };
-                passes.record_occlusion(r, images, push, rays_per_pixel);
-                r.copy(images.queue.count(), 0, &images.counts, 4 * u64::from(launch), 4);
-                r.barrier();
-            }
-            let all = Push { count: pixels as u32, ..push };
-            let groups = all.count.div_ceil(LANES);
-            r.timed("temporal", |r| r.dispatch(&passes.temporal, &all, groups));
-            r.barrier();
-            r.timed("filter", |r| r.dispatch(&passes.filter, &all, groups));
-        })?;
+        }
+        drawn?;
         tracer.check_finished()?;
         let occlusion_rays = match &self.larsen {
             Some(larsen) => larsen.occlusion_rays()?,
             None => {
-                let counts = self.images.counts.read(0, 4 * u64::from(launches))?;
-                counts.chunks_exact(4).map(|c| u64::from(u32::from_ne_bytes([c[0], c[1], c[2], c[3]]))).sum()
+                let bytes = self.images.ray_count.read(0, 4)?;
+                u64::from(u32::from_ne_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]))
             }
         };
         let all = pixels * u64::from(self.settings.rays_per_pixel) / u64::from(self.settings.resolution.period());
@@ -232,7 +248,7 @@ impl Realtime {
         self.state.has_history = self.settings.history > 1 || self.larsen.is_some();
         Ok(FrameStats {
             timings,
-            primary_rays: if still { 0 } else { pixels },
+            primary_rays: if still || self.settings.primary == Some(Primary::Raster) { 0 } else { pixels },
             occlusion_rays,
             skipped_rays: all.saturating_sub(occlusion_rays),
         })
@@ -261,7 +277,11 @@ impl Realtime {
     fn estimates(&self) -> Result<Vec<[f32; 3]>> {
         let history: Vec<[u32; 2]> =
             bytemuck::pod_collect_to_vec(&self.images.histories[self.state.history].read(0, 8 * self.pixels())?);
-        Ok(history.iter().map(|h| [f32::from_bits(h[0]), half(h[1] as u16), half((h[1] >> 16) as u16)]).collect())
+        // `pack_estimate` of shaders/common/frame.glsl
+        Ok(history
+            .iter()
+            .map(|h| [f32::from_bits(h[0]), (h[1] >> 16) as f32 / 16.0, (h[1] & 0xffff) as f32 * (0.5 / 65535.0)])
+            .collect())
     }
 
     /// Where the last frame shows something: 1, elsewhere 0; rows from the top.
@@ -286,6 +306,18 @@ impl Realtime {
             (*covered > 0.0).then_some(Surface { position, before })
         };
         Ok(covered.iter().enumerate().map(surface).collect())
+    }
+
+    /// The launches of occlusion rays, each of whole pixels.
+    fn launches(&self, push: Push) -> Vec<Push> {
+        let n = self.settings.rays_per_pixel;
+        let (all, most) = (self.block().rays() * n, LAUNCH_RAYS / n * n);
+        match self.settings.technique {
+            Technique::Traced => {
+                (0..all).step_by(most as usize).map(|first| Push { first, count: most.min(all - first), ..push }).collect()
+            }
+            Technique::Gtao | Technique::Larsen => Vec::new(),
+        }
     }
 
     fn pixels(&self) -> u64 {
@@ -329,7 +361,7 @@ impl Realtime {
             moved_weight: s.moved_weight,
             filter_samples: if s.filter.kind == FilterKind::None { 0.0 } else { s.filter.samples },
             filter_radius: if s.filter.kind == FilterKind::None { 0 } else { s.filter.radius },
-            rest: s.rest.into(),
+            rest: (s.rest && still && self.state.has_history).into(),
             slices: s.gtao[0],
             steps: s.gtao[1],
             reserved: 0,
@@ -344,8 +376,7 @@ impl Realtime {
             previous_position: images.previous_position.as_ref().map_or(0, Buffer::address),
             result: images.result.address(),
             moved: images.moved.address(),
-            tiles: 0,
-            queue: images.queue.record(),
+            ray_count: images.ray_count.address(),
         };
         let params = BlockParams {
             hemisphere: (s.hemisphere == Hemisphere::Shading).into(),
@@ -362,47 +393,82 @@ impl Realtime {
 }
 
 impl Passes {
-    fn new(tracer: &Tracer, settings: &Settings) -> Result<Self> {
+    fn new(tracer: &Tracer, size: [u32; 2], settings: &Settings, primary: Primary) -> Result<Self> {
         let device = tracer.device();
-        let compute = |name: &str, spirv: &[u8]| ComputePipeline::new(device, name, spirv, &Specialization::default());
-        let ballot = device.info.int64 && device.info.limits.subgroup_ballot;
         let [gbuffer, accessibility] = Realtime::streams(settings);
         Ok(Self {
-            gbuffer: tracer.stream(gbuffer)?,
+            gbuffer: match primary {
+                Primary::Traced => CameraRays::Traced(Box::new(tracer.stream(gbuffer)?)),
+                Primary::Raster => CameraRays::Drawn(Box::new(Raster::new(tracer, gbuffer, size)?)),
+            },
             accessibility: tracer.stream(accessibility)?,
-            spawn: compute("spawn", if ballot { stream::SPAWN_BALLOT } else { stream::SPAWN })?,
-            gather: compute("gather", stream::GATHER)?,
-            gtao: compute("gtao", stream::GTAO)?,
-            temporal: compute("temporal", stream::TEMPORAL)?,
-            filter: compute("filter", stream::FILTER)?,
+            gather: stream::GATHER.pipeline(device)?,
+            gtao: stream::GTAO.pipeline(device)?,
+            temporal: stream::TEMPORAL.pipeline(device)?,
+            filter: stream::FILTER.pipeline(device)?,
         })
     }
 
-    /// The pixels of a launch.
-    fn record_occlusion(&self, r: &mut Recorder, images: &Images, push: Push, rays_per_pixel: u32) {
-        let groups = push.count.div_ceil(LANES);
-        images.queue.clear(r);
+    fn record_gbuffer(
+        &self,
+        r: &mut Recorder,
+        tracer: &Tracer,
+        images: &Images,
+        guide: &Buffer,
+        push: Push,
+        view: &View,
+    ) -> Result<()> {
+        r.fill(guide, guide.size(), f32::INFINITY.to_bits());
         r.barrier();
-        r.timed("spawn", |r| r.dispatch(&self.spawn, &push, groups));
-        r.barrier();
-        self.accessibility.record(r, &images.queue.push(push, push.count * rays_per_pixel));
-        r.barrier();
-        if rays_per_pixel > 1 {
-            r.timed("gather", |r| r.dispatch(&self.gather, &push, groups));
+        if let CameraRays::Drawn(raster) = &self.gbuffer {
+            raster.draw(r, tracer, view)?;
+        }
+        let rays = view.block.rays();
+        for first in (0..rays).step_by(LAUNCH_RAYS as usize) {
+            let push = Push { first, count: LAUNCH_RAYS.min(rays - first), pass: images.block_params.address(), ..push };
+            match &self.gbuffer {
+                CameraRays::Traced(stream) => stream.record(r, &push),
+                CameraRays::Drawn(raster) => raster.trace(r, &push),
+            }
             r.barrier();
         }
+        Ok(())
+    }
+
+    fn record_begin(&self, r: &mut Recorder, images: &Images, push: Push, pixels: u32, technique: Technique) {
+        r.clear(&images.current);
+        r.clear(&images.ray_count);
+        r.barrier();
+        if technique == Technique::Gtao {
+            r.timed("gtao", |r| r.dispatch(&self.gtao, &Push { count: pixels, ..push }, pixels.div_ceil(LANES)));
+            r.barrier();
+        }
+    }
+
+    fn record_occlusion(&self, r: &mut Recorder, push: &Push, rays_per_pixel: u32) {
+        self.accessibility.record(r, push);
+        r.barrier();
+        if rays_per_pixel > 1 {
+            r.timed("gather", |r| r.dispatch(&self.gather, push, (push.count / rays_per_pixel).div_ceil(LANES)));
+            r.barrier();
+        }
+    }
+
+    fn record_end(&self, r: &mut Recorder, push: Push, pixels: u32) {
+        let (push, groups) = (Push { count: pixels, ..push }, pixels.div_ceil(LANES));
+        r.timed("temporal", |r| r.dispatch(&self.temporal, &push, groups));
+        r.barrier();
+        r.timed("filter", |r| r.dispatch(&self.filter, &push, groups));
     }
 }
 
 impl Images {
-    fn new(tracer: &Tracer, size: [u32; 2], settings: &Settings, chunk: u32) -> Result<Self> {
+    fn new(tracer: &Tracer, size: [u32; 2], settings: &Settings) -> Result<Self> {
         let device = tracer.device();
         let pixels = u64::from(size[0]) * u64::from(size[1]);
-        let launches = Block { origin: [0, 0], size }.rays().div_ceil(chunk);
         let image = |name: &str, bytes: u64| Buffer::new(device, name, bytes * pixels, Memory::Device);
         let maybe = |wanted: bool, name: &str, bytes: u64| if wanted { image(name, bytes).map(Some) } else { Ok(None) };
         let upload = |name: &str, bytes: usize| Buffer::new(device, name, bytes as u64, Memory::Upload);
-        let rays = chunk * settings.rays_per_pixel;
         Ok(Self {
             block_params: upload("block parameters", size_of::<BlockParams>())?,
             frame_params: upload("frame parameters", size_of::<FrameParams>())?,
@@ -413,23 +479,13 @@ impl Images {
             histories: [image("history", 8)?, image("history", 8)?],
             current: image("samples of the frame", 8)?,
             samples: match settings.rays_per_pixel > 1 {
-                true => Some(Buffer::new(device, "samples", 4 * u64::from(rays), Memory::Device)?),
+                true => Some(Buffer::new(device, "samples", 4 * u64::from(LAUNCH_RAYS), Memory::Device)?),
                 false => None,
             },
             previous_position: maybe(tracer.is_dynamic(), "previous positions", POSITION_BYTES)?,
             result: Buffer::new(device, "accessibility", 4 * pixels, Memory::Readback)?,
-            queue: RayQueue::new(device, rays)?,
-            counts: Buffer::new(device, "numbers of rays", 4 * u64::from(launches), Memory::Readback)?,
+            ray_count: Buffer::new(device, "number of rays", 4, Memory::Readback)?,
         })
-    }
-}
-
-/// A half float that is not negative, and finite.
-fn half(bits: u16) -> f32 {
-    let (exponent, fraction) = (i32::from(bits >> 10 & 31), f32::from(bits & 1023));
-    match exponent {
-        0 => fraction * (-24f32).exp2(),
-        e => (1024.0 + fraction) * ((e - 25) as f32).exp2(),
     }
 }
 
@@ -439,18 +495,4 @@ fn inverse(camera: &CameraRecord) -> [[f32; 4]; 3] {
     let column = |k: usize| DVec3::new(m[0][k], m[1][k], m[2][k]);
     let to_world = DAffine3::from_mat3_translation(DMat3::from_cols(column(0), column(1), column(2)), column(3));
     rows(&to_world.inverse())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn half_floats() {
-        for (bits, want) in
-            [(0, 0.0), (0x3c00, 1.0), (0x4000, 2.0), (0x3555, 0.333_251_95), (0x6800, 2048.0), (1, 5.960_464_5e-8)]
-        {
-            assert_eq!(half(bits), want);
-        }
-    }
 }

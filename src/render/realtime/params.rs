@@ -3,7 +3,6 @@
 use bytemuck::{Pod, Zeroable};
 
 use crate::tracer::Moved;
-use crate::tracer::queue::QueueRecord;
 
 /// `FrameParams` of shaders/common/frame.glsl.
 #[repr(C)]
@@ -61,7 +60,7 @@ pub struct FrameParams {
     pub filter_samples: f32,
     /// Pixels.
     pub filter_radius: u32,
-    /// 1: pixels with a full history rest.
+    /// 1: nothing moves, and pixels with a full history rest.
     pub rest: u32,
     /// Of gtao.
     pub slices: u32,
@@ -91,10 +90,8 @@ pub struct FrameParams {
     pub result: u64,
     /// What has moved.
     pub moved: u64,
-    /// Tiles that are rendered, or 0: all.
-    pub tiles: u64,
-    /// Occlusion rays.
-    pub queue: QueueRecord,
+    /// Number of occlusion rays.
+    pub ray_count: u64,
 }
 
 /// `MovedRecord` of shaders/temporal.glsl.

@@ -2,6 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::render::ao::{FALLOFF_CUTOFF, Hemisphere};
+use crate::render::raster::Primary;
 use crate::sampling::Sequence;
 
 /// Where occlusion comes from.
@@ -103,6 +104,8 @@ pub struct Filter {
 pub struct Settings {
     /// Where occlusion comes from. What follows is of the traced one, and but for rays of the screen-space one.
     pub technique: Technique,
+    /// How it is found what pixels show; `None`: what costs less ([`Primary::auto`]).
+    pub primary: Option<Primary>,
     /// Rays of a pixel that is sampled in a frame; 1 to [`Settings::MOST_RAYS`].
     pub rays_per_pixel: u32,
     /// Which pixels are.
@@ -224,6 +227,7 @@ impl Preset {
     pub fn settings(self) -> Settings {
         let common = Settings {
             technique: Technique::Traced,
+            primary: None,
             rays_per_pixel: 1,
             resolution: Resolution::Full,
             sequence: Sequence::Blue,

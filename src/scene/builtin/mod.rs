@@ -6,6 +6,7 @@
 pub mod analytic;
 pub mod cornell;
 pub mod many;
+pub mod parade;
 pub mod shapes;
 pub mod terrain;
 
@@ -42,6 +43,7 @@ const NAMES: &[BuiltinInfo] = &[
     info("instances", "15 landscapes placed 125 times, N triangles in all (instances:N, 250 to 500000000, default 1000000)"),
     info("leaf-cards", "bushes of leaves cut from quads by alpha masks, some of them blended"),
     info("stairs", "stairs, a column and a rail: contact detail"),
+    info("parade", "an animation of two seconds: moving blocks, a rotor, a column that bends, a ball that changes its shape"),
     info("far-away", "the stairs, placed more than a million units from the origin"),
 ];
 
@@ -102,6 +104,7 @@ fn recipe(name: &str) -> Option<Box<dyn FnOnce() -> Scene>> {
         "parallel-planes" => || analytic::parallel_planes(8.0, 6.0, 1.0, Placement::default()),
         "plane" => || analytic::plane(20.0, Placement::default()),
         "leaf-cards" => many::leaf_cards,
+        "parade" => parade::parade,
         "stairs" => || many::stairs(DVec3::ZERO),
         "far-away" => || many::stairs(DVec3::new(1.0e6, -5.0e5, 1.5e6)),
         _ => return None,
@@ -137,9 +140,10 @@ impl Placement {
 }
 
 /// The same scene with every instance's transform applied to its vertices, rounded to `f32`: what a file without transforms
-/// would hold. Sphere meshes keep their instance's transform (it may make ellipsoids of them).
+/// would hold. Sphere meshes keep their instance's transform (it may make ellipsoids of them). Nothing moves in it.
 pub fn bake(scene: &Scene) -> Scene {
     let mut out = scene.clone();
+    out.rig = None;
     out.meshes.clear();
     for instance in &mut out.instances {
         let mut mesh = scene.meshes[instance.mesh].clone();

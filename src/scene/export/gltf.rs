@@ -1,5 +1,7 @@
 //! glTF 2.0 writer.
 
+mod rig;
+
 use std::collections::BTreeSet;
 use std::io::Cursor;
 use std::path::Path;
@@ -10,6 +12,7 @@ use serde_json::{Value, json};
 
 use super::{Written, icosphere, material, write_buffered};
 use crate::error::{Error, Result};
+use crate::scene::animation::Shape;
 use crate::scene::{
     Camera, Filter, Geometry, Light, LightKind, Material, Projection, Scene, Sphere, Texture, TriangleMesh, Wrap,
 };
@@ -17,8 +20,8 @@ use crate::scene::{
 /// Writes `scene` as glTF 2.0: one `.glb` file with everything in it, or a `.gltf` with a `.bin` and PNG files of the same
 /// name beside it. The extension of `path` decides. Each file appears only when it is complete, the `.gltf` last.
 ///
-/// Triangles, transforms, materials (core and KHR_materials extensions), textures, cameras and punctual lights come back
-/// from the loader as they were. Spheres are tessellated, and counted in what is returned; what glTF has no words for (the
+/// Triangles, transforms, materials (core and KHR_materials extensions), textures, cameras, punctual lights and animations with skins
+/// and morph targets come back from the loader as they were (what has a rig is written at its rest). Spheres are tessellated, and counted in what is returned; what glTF has no words for (the
 /// environment, wishes for rendering, the `.brhan` kind of a material) is left out.
 ///
 /// # Errors
@@ -102,19 +105,35 @@ impl Writer {
         if spheres > 0 {
             self.written.warnings.push(format!("{spheres} spheres become {each} triangles each: glTF has no spheres"));
         }
+        let rig = scene.rig.as_ref();
         let mut meshes = Vec::new();
-        for mesh in &scene.meshes {
-            let tessellated;
+        for (m, mesh) in scene.meshes.iter().enumerate() {
+            let made;
+            let deformations = rig.map_or(&[][..], |r| &r.parts().deformations);
+            let deformation = deformations.iter().position(|d| d.mesh == m);
             let triangles = match &mesh.geometry {
-                Geometry::Triangles(t) => t,
+                Geometry::Triangles(t) => match deformation.and_then(|d| rig?.modelled(d)) {
+                    Some(shape) => {
+                        made = modelled(t, shape);
+                        &made
+                    }
+                    None => t,
+                },
                 Geometry::Spheres(s) => {
-                    tessellated = tessellate(s, level);
-                    &tessellated
+                    made = tessellate(s, level);
+                    &made
                 }
             };
-            meshes.push(self.mesh(&mesh.name, triangles, mesh.material));
+            let mut out = self.mesh(&mesh.name, triangles, mesh.material);
+            if let Some(d) = deformation {
+                self.deformation(&deformations[d], triangles.positions.len(), &mut out["primitives"][0]);
+            }
+            meshes.push(out);
         }
-        let mut nodes: Vec<Value> = scene.instances.iter().map(|i| with_mesh(&i.name, i.mesh, &i.object_to_world)).collect();
+        let mut tree = rig::tree(scene, rig);
+        let mut nodes = std::mem::take(&mut tree.nodes);
+        let mut roots = std::mem::take(&mut tree.roots);
+        let free = nodes.len();
         let mut lights = Vec::new();
         for light in &scene.lights {
             match light.kind {
@@ -134,13 +153,21 @@ impl Writer {
             }
         }
         let cameras: Vec<Value> = scene.cameras.iter().map(camera).collect();
-        nodes.extend(scene.cameras.iter().enumerate().map(|(i, c)| {
+        nodes.extend(scene.cameras.iter().enumerate().filter_map(|(i, c)| {
+            if rig.is_some_and(|r| rig::carries_camera(r, i).is_some()) {
+                return None;
+            }
             let mut node = node(&c.name, &c.camera_to_world);
             node["camera"] = json!(i);
-            node
+            Some(node)
         }));
+        roots.extend(free..nodes.len());
+        let (mut skins, mut animations) = (Vec::new(), Vec::new());
+        if let Some(rig) = rig {
+            skins.extend(rig.parts().skins.iter().map(|s| self.skin(s)));
+            animations.extend(rig.animations().iter().map(|a| self.animation(a, rig, &tree)));
+        }
 
-        let roots: Vec<usize> = (0..nodes.len()).collect();
         let mut json = json!({
             "asset": { "version": "2.0", "generator": concat!("skylit ", env!("CARGO_PKG_VERSION")) },
             "scene": 0,
@@ -168,6 +195,8 @@ impl Writer {
         put("meshes", meshes);
         put("cameras", cameras);
         put("nodes", nodes);
+        put("skins", skins);
+        put("animations", animations);
         json["scenes"] = if roots.is_empty() { json!([{}]) } else { json!([{ "nodes": roots }]) };
         if !lights.is_empty() {
             used.insert("KHR_lights_punctual");
@@ -192,8 +221,13 @@ impl Writer {
         self.views.len() - 1
     }
 
-    /// Appends an accessor of `N` floats an element.
+    /// Appends an accessor of `N` floats a vertex.
     fn floats<const N: usize>(&mut self, values: impl Iterator<Item = [f32; N]>, bounds: bool) -> usize {
+        self.numbers(values, bounds, Some(34962))
+    }
+
+    /// Appends an accessor of `N` floats an element; `target`: what its buffer view is for, if it is for vertices.
+    fn numbers<const N: usize>(&mut self, values: impl Iterator<Item = [f32; N]>, bounds: bool, target: Option<u32>) -> usize {
         let (mut bytes, mut count) = (Vec::new(), 0);
         let (mut min, mut max) = ([f32::INFINITY; N], [f32::NEG_INFINITY; N]);
         for value in values {
@@ -203,8 +237,8 @@ impl Writer {
                 bytes.extend_from_slice(&x.to_le_bytes());
             }
         }
-        let view = self.view(&bytes, Some(34962));
-        let shape = ["SCALAR", "VEC2", "VEC3", "VEC4"][N - 1];
+        let view = self.view(&bytes, target);
+        let shape = ["SCALAR", "VEC2", "VEC3", "VEC4"].get(N - 1).unwrap_or(&"MAT4");
         let mut accessor = json!({ "bufferView": view, "componentType": 5126, "count": count, "type": shape });
         if bounds {
             (accessor["min"], accessor["max"]) = (json!(min.as_slice()), json!(max.as_slice()));
@@ -320,6 +354,12 @@ fn sampler(texture: &Texture) -> Value {
         Filter::Linear => (9729, 9987),
     };
     json!({ "magFilter": mag, "minFilter": min, "wrapS": wrap(texture.wrap[0]), "wrapT": wrap(texture.wrap[1]) })
+}
+
+/// A mesh with its vertices as modelled, where those that it has are posed.
+fn modelled(posed: &TriangleMesh, shape: &Shape) -> TriangleMesh {
+    let Shape { positions, normals, tangents } = shape.clone();
+    TriangleMesh { positions, normals, tangents, ..posed.clone() }
 }
 
 /// Spheres as one smooth mesh.

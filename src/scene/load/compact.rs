@@ -7,7 +7,9 @@ use crate::scene::TriangleMesh;
 ///
 /// A mesh that is broken (indices out of range, positions that are not finite) stays as it is, so that the error can name
 /// the file's own indices.
-pub(super) fn compact(mesh: &mut TriangleMesh) {
+///
+/// Returns which vertices are left, in their order, if some were dropped.
+pub(super) fn compact(mesh: &mut TriangleMesh) -> Option<Vec<u32>> {
     const UNUSED: u32 = u32::MAX;
     let count = mesh.positions.len();
     let mut index = vec![UNUSED; count];
@@ -19,11 +21,11 @@ pub(super) fn compact(mesh: &mut TriangleMesh) {
                 used += 1;
             }
             Some(_) => {}
-            None => return,
+            None => return None,
         }
     }
     if used * 2 > count || !mesh.positions.iter().all(|p| p.is_finite()) {
-        return;
+        return None;
     }
     // vertices keep their order
     for (next, slot) in index.iter_mut().filter(|slot| **slot != UNUSED).enumerate() {
@@ -44,4 +46,5 @@ pub(super) fn compact(mesh: &mut TriangleMesh) {
     for set in &mut mesh.texcoords {
         keep(set, &index);
     }
+    Some((0..).zip(&index).filter(|(_, slot)| **slot != UNUSED).map(|(i, _)| i).collect())
 }

@@ -7,7 +7,8 @@ use rayon::prelude::*;
 
 use super::{normals, tangents};
 use crate::error::{Error, Result};
-use crate::scene::{Geometry, Material, Mesh, Scene, TriangleMesh};
+use crate::scene::animation::Deformation;
+use crate::scene::{Geometry, Instance, Material, Mesh, Rig, Scene, TriangleMesh};
 
 /// Largest coordinate, in object and world space: beyond it the triangle test's products of three lengths overflow single precision,
 /// and rays would miss.
@@ -27,14 +28,26 @@ pub(super) fn finish(scene: &mut Scene, path: &Path) -> Result<()> {
     drop_unplaced(scene);
 
     let materials = &scene.materials;
-    let notes: Vec<Notes> = scene.meshes.par_iter_mut().map(|mesh| repair(mesh, &materials[mesh.material])).collect();
+    let deforming = match &mut scene.rig {
+        Some(rig) => rig.deformations_mut(scene.meshes.len()),
+        None => (0..scene.meshes.len()).map(|_| None).collect(),
+    };
+    let meshes = scene.meshes.par_iter_mut().zip(deforming);
+    let notes: Vec<Notes> = meshes.map(|(mesh, deformation)| repair(mesh, &materials[mesh.material], deformation)).collect();
     for note in notes {
         scene.report.warnings.extend(note.warnings);
         scene.report.degenerate_triangles += note.degenerate;
         scene.report.normals_computed += usize::from(note.flat);
         scene.report.tangents_computed += usize::from(note.tangents);
     }
+    if scene.rig.is_some() {
+        Rig::settle(scene);
+        check(scene, path)?;
+    }
     drop_empty(scene);
+    if scene.rig.as_ref().is_some_and(Rig::is_idle) {
+        scene.rig = None;
+    }
     extent(scene, path)
 }
 
@@ -100,19 +113,30 @@ fn materials(scene: &mut Scene) {
 }
 
 /// Tracers invert transforms. A mesh that its transform squashes flat gets it applied to its vertices instead; one that is
-/// squashed to a line or a point, which is a way of hiding it, has nothing to show and is not placed.
+/// squashed to a line or a point, which is a way of hiding it, has nothing to show and is not placed. An animated one may grow
+/// again, and a mesh that deforms cannot be baked: both get the least of a thickness instead ([`Rig::settle`]).
 fn bake_singular(scene: &mut Scene) {
     let before = scene.instances.len();
-    scene.instances.retain(|i| {
-        let m = &i.object_to_world.matrix3;
+    let moving = scene.rig.as_ref().map(|rig| rig.moving(scene));
+    let moves = |i: usize| moving.as_ref().is_some_and(|m| m[i]);
+    let shows = |(i, instance): (usize, &Instance)| {
+        let m = &instance.object_to_world.matrix3;
         let [x, y, z] = [m.x_axis, m.y_axis, m.z_axis];
-        [x.cross(y), y.cross(z), z.cross(x)].iter().any(|n| *n != DVec3::ZERO)
-    });
+        moves(i) || [x.cross(y), y.cross(z), z.cross(x)].iter().any(|n| *n != DVec3::ZERO)
+    };
+    let keep: Vec<bool> = scene.instances.iter().enumerate().map(shows).collect();
+    let moving: Option<Vec<bool>> =
+        moving.as_ref().map(|m| m.iter().zip(&keep).filter(|(_, k)| **k).map(|(m, _)| *m).collect());
+    retain_instances(scene, &keep);
     let hidden = before - scene.instances.len();
     if hidden > 0 {
         scene.report.warnings.push(format!("{hidden} meshes are scaled to nothing: left out"));
     }
-    for instance in &mut scene.instances {
+    let deforming = scene.rig.as_ref().map(|rig| rig.deforming(scene));
+    for (i, instance) in scene.instances.iter_mut().enumerate() {
+        if moving.as_ref().is_some_and(|m| m[i]) || deforming.as_ref().is_some_and(|d| d[instance.mesh]) {
+            continue;
+        }
         let inverse = instance.object_to_world.inverse().to_cols_array();
         if inverse.iter().all(|x| x.abs() <= MAX_INVERSE) {
             continue;
@@ -131,6 +155,9 @@ fn bake_singular(scene: &mut Scene) {
         instance.mesh = scene.meshes.len();
         instance.object_to_world = DAffine3::IDENTITY;
         scene.meshes.push(mesh);
+        if let Some(rig) = &mut scene.rig {
+            rig.release(i);
+        }
     }
 }
 
@@ -142,12 +169,14 @@ struct Notes {
     tangents: bool,
 }
 
-fn repair(mesh: &mut Mesh, material: &Material) -> Notes {
+/// `deformation`: how the mesh deforms, if it does; the mesh is as modelled then.
+fn repair(mesh: &mut Mesh, material: &Material, deformation: Option<&mut Deformation>) -> Notes {
     let mut notes = Notes::default();
     let Geometry::Triangles(triangles) = &mut mesh.geometry else { return notes };
     let before = triangles.indices.len();
     let positions = &triangles.positions;
-    triangles.indices.retain(|&t| !is_degenerate(t, positions));
+    let opens = |t| deformation.as_ref().is_some_and(|d| !d.stays_flat(t, positions));
+    triangles.indices.retain(|&t| !is_degenerate(t, positions) || opens(t));
     notes.degenerate = before - triangles.indices.len();
     if triangles.indices.is_empty() {
         return notes;
@@ -179,7 +208,10 @@ fn repair(mesh: &mut Mesh, material: &Material) -> Notes {
         triangles.tangents = Vec::new();
     } else if !tangents::normalize(triangles) {
         let slot = material.normal_texture.or(material.clearcoat.normal_texture).or(material.anisotropy.texture);
-        tangents::compute(triangles, slot.map_or(0, |s| s.texcoord));
+        let source = tangents::compute(triangles, slot.map_or(0, |s| s.texcoord));
+        if let Some(deformation) = deformation {
+            deformation.reorder(&source);
+        }
         notes.tangents = true;
     }
     notes
@@ -209,8 +241,20 @@ fn drop_empty(scene: &mut Scene) {
     for mesh in scene.meshes.iter().zip(&keep).filter(|(_, keep)| !**keep).map(|(m, _)| m) {
         scene.report.warnings.push(format!("mesh `{}` has nothing to show: left out", mesh.name));
     }
-    scene.instances.retain(|i| keep[i.mesh]);
+    let placed: Vec<bool> = scene.instances.iter().map(|i| keep[i.mesh]).collect();
+    retain_instances(scene, &placed);
     retain_meshes(scene, &keep);
+}
+
+fn retain_instances(scene: &mut Scene, keep: &[bool]) {
+    if keep.iter().all(|&k| k) {
+        return;
+    }
+    let mut each = keep.iter();
+    scene.instances.retain(|_| each.next().copied().unwrap_or(true));
+    if let Some(rig) = &mut scene.rig {
+        rig.keep_instances(keep);
+    }
 }
 
 fn retain_meshes(scene: &mut Scene, keep: &[bool]) {
@@ -225,6 +269,9 @@ fn retain_meshes(scene: &mut Scene, keep: &[bool]) {
     }
     for instance in &mut scene.instances {
         instance.mesh = index[instance.mesh];
+    }
+    if let Some(rig) = &mut scene.rig {
+        rig.keep_meshes(keep, &index);
     }
     let mut keep = keep.iter();
     scene.meshes.retain(|_| keep.next().copied().unwrap_or(true));

@@ -26,7 +26,7 @@ const FORMATS: [&str; 4] = ["gltf", "glb", "obj", "brhan"];
 ///
 /// What is loaded keeps these promises: at least one triangle or sphere is placed; at least one material exists; all
 /// indices are in range; positions, normals, texture coordinates and transforms are finite; transforms can be inverted;
-/// no triangle is degenerate; normals have unit length; tangents exist where a material needs them. What had to be done
+/// no triangle is degenerate, but for those of meshes that deform which have an area in another pose; normals have unit length; tangents exist where a material needs them. What had to be done
 /// for that, short of an error, is in [`Scene::report`].
 ///
 /// # Errors

@@ -19,8 +19,12 @@ pub(super) fn normalize(mesh: &mut TriangleMesh) -> bool {
 }
 
 /// Computes tangents from set `set` of the texture coordinates, which must exist. Vertices whose triangles disagree are
-/// split; a mesh without normals becomes explicitly flat.
-pub(super) fn compute(mesh: &mut TriangleMesh, set: usize) {
+/// split; a mesh without normals becomes explicitly flat. Returns which vertex each vertex was before.
+pub(super) fn compute(mesh: &mut TriangleMesh, set: usize) -> Vec<u32> {
+    let mut source: Vec<u32> = match mesh.normals.is_empty() {
+        true => mesh.indices.iter().flatten().copied().collect(),
+        false => (0..mesh.positions.len() as u32).collect(),
+    };
     if mesh.normals.is_empty() {
         normals::make_flat(mesh);
     }
@@ -35,7 +39,10 @@ pub(super) fn compute(mesh: &mut TriangleMesh, set: usize) {
             *tangent = normal.try_normalize().unwrap_or(Vec3::Z).any_orthonormal_vector().extend(1.0);
         }
     }
-    weld(mesh, &tangents);
+    for original in weld(mesh, &tangents) {
+        source.push(source[original as usize]);
+    }
+    source
 }
 
 struct Corners<'a> {
@@ -81,7 +88,8 @@ impl Geometry for Corners<'_> {
 }
 
 /// Gives each vertex the tangent of its corners (three per triangle), with a copy of the vertex for each other tangent.
-fn weld(mesh: &mut TriangleMesh, corners: &[Vec4]) {
+/// Returns what each copy is one of.
+fn weld(mesh: &mut TriangleMesh, corners: &[Vec4]) -> Vec<u32> {
     const NONE: u32 = u32::MAX;
     let mut tangents = vec![Vec4::ZERO; mesh.positions.len()];
     let mut taken = vec![false; mesh.positions.len()];
@@ -124,4 +132,5 @@ fn weld(mesh: &mut TriangleMesh, corners: &[Vec4]) {
         *tangent = normal.try_normalize().unwrap_or(Vec3::Z).any_orthonormal_vector().extend(1.0);
     }
     mesh.tangents = tangents;
+    copies
 }

@@ -16,7 +16,7 @@ use parse::Statement;
 use super::{find, finish};
 use crate::error::{Error, Result};
 use crate::scene::material::{Material, MaterialKind, Transmission};
-use crate::scene::{Camera, Geometry, Instance, Mesh, Scene, Sphere};
+use crate::scene::{Camera, Geometry, Instance, Mesh, Rig, Scene, Sphere};
 
 /// Reads a `.brhan` file and the models that it names.
 pub(super) fn read(path: &Path) -> Result<Scene> {
@@ -135,6 +135,12 @@ impl Loader<'_> {
         let key = (found, material.as_ref().map(|m| format!("{m:?}")));
         if !self.models.contains_key(&key) {
             let mut model = super::read_model(&key.0)?;
+            if model.rig.is_some() {
+                // its nodes are not this scene's
+                Rig::settle(&mut model);
+                model.rig = None;
+                self.scene.report.warnings.push(format!("{file}: animations of models are not played"));
+            }
             finish::check(&model, &key.0)?;
             if let Some(material) = material {
                 for mesh in &mut model.meshes {

@@ -8,10 +8,13 @@
 //! <https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html>
 
 mod accessor;
+mod animation;
 mod container;
 mod material;
 mod mesh;
 mod node;
+mod rig;
+mod skin;
 mod texture;
 mod uri;
 
@@ -23,6 +26,8 @@ use ::gltf::json::validation::Checked;
 use ::gltf::json::{Index, Root};
 
 use accessor::Reader;
+use glam::{DAffine3, DVec3};
+use rig::{Stage, Wanted};
 
 use super::compact;
 use crate::error::{Error, Result};
@@ -69,41 +74,51 @@ pub(super) fn read(path: &Path) -> Result<Scene> {
 
     let mut scene = Scene::default();
     extensions(&document, path, &mut scene)?;
-    if !document.animations.is_empty() {
-        scene.report.warnings.push("animations are not played: the rest pose is shown".to_owned());
-    }
-    let placed = node::place(&document, &doubles).map_err(|e| Error::input(path, e))?;
+    let placed = node::place(&document, &doubles, !doubles.skins.is_empty()).map_err(|e| Error::input(path, e))?;
 
     let mut warnings = Vec::new();
     let material = |(i, m)| material::convert(m).map_err(|e| Error::input(path, format!("material {i}: {e}")));
     scene.materials = document.materials.iter().enumerate().map(material).collect::<Result<_>>()?;
     scene.textures = texture::resolve(&reader, path, &mut scene.materials, &mut |w| warnings.push(w));
 
+    let input = |e| Error::input(path, e);
+    let mut stage = Stage::new(&reader, &doubles, &placed, &mut |w| warnings.push(w));
     let mut meshes = Meshes { reader: &reader, path, primitives: BTreeMap::new(), default_material: None };
-    for placed in &placed {
+    for (at, placed) in placed.iter().enumerate().filter(|(_, p)| p.shown) {
         let node = &document.nodes[placed.node];
         let name = text(&node.name);
         if let Some(index) = node.mesh {
-            if node.skin.is_some() {
-                warnings.push(format!("node {} `{name}` has a skin: its rest shape is shown", placed.node));
-            }
-            for mesh in meshes.of(index.value(), &mut scene, &mut warnings)? {
-                scene.instances.push(Instance { name: name.to_owned(), mesh, object_to_world: placed.to_world });
+            let wanted = stage.wanted(at, index.value()).map_err(input)?;
+            for made in meshes.of(&wanted, at, &mut stage, &mut scene, &mut warnings)? {
+                // a skinned mesh stands where its joints are, wherever its node is
+                let object_to_world = made.anchor.map_or(placed.to_world, DAffine3::from_translation);
+                scene.instances.push(Instance { name: name.to_owned(), mesh: made.mesh, object_to_world });
+                stage.instances.push(made.anchor.is_none().then_some(at));
             }
         }
         if let Some(index) = node.camera {
             match node::camera(&document, &doubles, placed, index.value()) {
-                Ok(camera) => scene.cameras.push(camera),
+                Ok(camera) => {
+                    scene.cameras.push(camera);
+                    stage.cameras.push(Some(at));
+                }
                 Err(e) => warnings.push(format!("{e}: ignored")),
             }
         }
         if let Some(light) = node.extensions.as_ref().and_then(|e| e.khr_lights_punctual.as_ref()) {
             match node::light(&document, placed, light.light.value()) {
-                Ok(light) => scene.lights.push(light),
+                Ok(light) => {
+                    if stage.moves(at) {
+                        warnings
+                            .push(format!("node {} `{name}` carries a light and is animated: the light stays", placed.node));
+                    }
+                    scene.lights.push(light);
+                }
                 Err(e) => warnings.push(format!("{e}: ignored")),
             }
         }
     }
+    stage.finish(&mut scene).map_err(input)?;
     scene.report.warnings.append(&mut warnings);
     Ok(scene)
 }
@@ -125,48 +140,73 @@ fn extensions(document: &Root, path: &Path, scene: &mut Scene) -> Result<()> {
     Ok(())
 }
 
-/// Reads each mesh that is placed, once.
+/// Reads each mesh that is placed, once for each way in which it deforms.
 struct Meshes<'a> {
     reader: &'a Reader<'a>,
     path: &'a Path,
     /// The scene's meshes of each glTF mesh.
-    primitives: BTreeMap<usize, Vec<usize>>,
+    primitives: BTreeMap<Wanted, Vec<Made>>,
     /// The scene's material for primitives without one.
     default_material: Option<usize>,
 }
 
+/// A mesh of the scene.
+#[derive(Clone, Copy)]
+struct Made {
+    mesh: usize,
+    /// Where it is placed if it has a skin.
+    anchor: Option<DVec3>,
+}
+
 impl Meshes<'_> {
-    fn of(&mut self, index: usize, scene: &mut Scene, warnings: &mut Vec<String>) -> Result<Vec<usize>> {
-        if let Some(known) = self.primitives.get(&index) {
+    /// `at`: the placed node that carries it.
+    fn of(
+        &mut self,
+        wanted: &Wanted,
+        at: usize,
+        stage: &mut Stage,
+        scene: &mut Scene,
+        warnings: &mut Vec<String>,
+    ) -> Result<Vec<Made>> {
+        if let Some(known) = self.primitives.get(wanted) {
             return Ok(known.clone());
         }
+        let index = wanted.mesh;
         let meshes = &self.reader.document.meshes;
         let mesh = meshes.get(index).ok_or_else(|| Error::input(self.path, format!("mesh {index} does not exist")))?;
         let name = text(&mesh.name);
+        let again = self.primitives.range(Wanted::first(index)..).next().is_some_and(|(k, _)| k.mesh == index);
         let mut made = Vec::new();
         for (nth, primitive) in mesh.primitives.iter().enumerate() {
             let place = format!("mesh {index} `{name}`, primitive {nth}");
+            // once is enough
+            let mut warn = |w: String| {
+                if !again {
+                    warnings.push(format!("{place} {w}"));
+                }
+            };
+            let input = |e: String| Error::input(self.path, format!("{place}: {e}"));
             let material = match primitive.material.map(|m| m.value()) {
                 Some(m) if m < scene.materials.len() && m < self.reader.document.materials.len() => m,
-                Some(m) => return Err(Error::input(self.path, format!("{place}: material {m} does not exist"))),
+                Some(m) => return Err(input(format!("material {m} does not exist"))),
                 None => *self.default_material.get_or_insert_with(|| {
                     scene.materials.push(material::default_material());
                     scene.materials.len() - 1
                 }),
             };
-            if primitive.targets.as_ref().is_some_and(|t| !t.is_empty()) {
-                warnings.push(format!("{place} has morph targets: its rest shape is shown"));
-            }
             let tangents = scene.materials[material].needs_tangents();
-            let read = mesh::read(self.reader, primitive, tangents, &mut |w| warnings.push(format!("{place} {w}")));
-            if let Some(mut triangles) = read.map_err(|e| Error::input(self.path, format!("{place}: {e}")))? {
-                let name = if mesh.primitives.len() == 1 { name.to_owned() } else { format!("{name}#{nth}") };
-                compact::compact(&mut triangles);
-                made.push(scene.meshes.len());
-                scene.meshes.push(Mesh { name, geometry: Geometry::Triangles(triangles), material });
+            let Some(mut triangles) = mesh::read(self.reader, primitive, tangents, &mut warn).map_err(input)? else { continue };
+            let mut deformation = stage.deformation(wanted, primitive, &triangles, at, &mut warn).map_err(input)?;
+            let kept = compact::compact(&mut triangles);
+            if let (Some(deformation), Some(kept)) = (&mut deformation, kept) {
+                deformation.reorder(&kept);
             }
+            let anchor = deformation.and_then(|d| stage.deform(d, wanted, scene.meshes.len(), &mut triangles));
+            let name = if mesh.primitives.len() == 1 { name.to_owned() } else { format!("{name}#{nth}") };
+            made.push(Made { mesh: scene.meshes.len(), anchor });
+            scene.meshes.push(Mesh { name, geometry: Geometry::Triangles(triangles), material });
         }
-        self.primitives.insert(index, made.clone());
+        self.primitives.insert(wanted.clone(), made.clone());
         Ok(made)
     }
 }

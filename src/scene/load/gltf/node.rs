@@ -4,10 +4,12 @@ use std::f32::consts::{FRAC_PI_2, FRAC_PI_4};
 
 use ::gltf::json::extensions::scene::khr_lights_punctual::Type as LightType;
 use ::gltf::json::{Index, Node, Root};
-use glam::{DAffine3, DMat3, DMat4, DQuat, DVec3};
+use glam::{DAffine3, DMat4, DQuat, DVec3};
 use serde::Deserialize;
 
 use super::{text, valid};
+use crate::scene::animation::Local;
+use crate::scene::camera::rigid;
 use crate::scene::{Camera, Light, LightKind, Projection};
 
 /// The numbers that place things, in double precision: the crate rounds them to single, in which far-away scenes fall apart
@@ -17,6 +19,10 @@ use crate::scene::{Camera, Light, LightKind, Projection};
 pub(super) struct Doubles {
     nodes: Vec<Transform>,
     cameras: Vec<Lens>,
+    /// Read by us because the crate refuses channels without a node (KHR_animation_pointer).
+    pub animations: Vec<super::animation::Animation>,
+    /// For the same reason: what the crate refuses is read again without them.
+    pub skins: Vec<super::skin::Skin>,
 }
 
 #[derive(Deserialize)]
@@ -46,17 +52,23 @@ struct Orthographic {
     ymag: f64,
 }
 
-/// A node of the scene that is shown.
+/// A node of a tree.
 pub(super) struct Placed {
     pub node: usize,
+    /// Index into the list of them.
+    pub parent: Option<usize>,
+    pub local: Local,
     pub to_world: DAffine3,
+    /// In the scene that is shown.
+    pub shown: bool,
 }
 
-/// Every node of the scene with its world transform, parents before children, in the order of the file.
+/// Every node of the scene with its world transform, parents before children, in the order of the file. With `all` the nodes outside
+/// of the scene follow, whose transforms the joints of skins may want.
 ///
 /// # Errors
 /// What is wrong, in words: indices out of range, nodes reached twice.
-pub(super) fn place(document: &Root, doubles: &Doubles) -> Result<Vec<Placed>, String> {
+pub(super) fn place(document: &Root, doubles: &Doubles, all: bool) -> Result<Vec<Placed>, String> {
     let nodes = &document.nodes;
     let mut parents = vec![0u32; nodes.len()];
     for (i, node) in nodes.iter().enumerate() {
@@ -76,19 +88,32 @@ pub(super) fn place(document: &Root, doubles: &Doubles) -> Result<Vec<Placed>, S
     };
     let mut placed = Vec::new();
     let mut seen = vec![false; nodes.len()];
-    // a stack and no recursion: files may nest deeper than the call stack
-    let mut stack: Vec<(usize, DAffine3)> = roots.iter().rev().map(|&r| (r, DAffine3::IDENTITY)).collect();
-    while let Some((i, parent)) = stack.pop() {
-        let node = nodes.get(i).ok_or_else(|| format!("the scene names node {i}, which does not exist"))?;
-        if std::mem::replace(&mut seen[i], true) {
-            return Err(format!("node {i} is its own ancestor, or the scene lists it twice"));
+    let outside = (0..nodes.len()).filter(|&i| all && parents[i] == 0);
+    let trees = roots.into_iter().map(|r| (r, true)).chain(outside.map(|r| (r, false)));
+    for (root, shown) in trees {
+        if !shown && seen[root] {
+            continue;
         }
-        let to_world = parent * doubles.nodes.get(i).map_or(Ok(DAffine3::IDENTITY), |t| local(t, i))?;
-        if !to_world.is_finite() {
-            return Err(format!("node {i} has a transform that is not finite"));
+        // a stack and no recursion: files may nest deeper than the call stack
+        let mut stack: Vec<(usize, Option<usize>)> = vec![(root, None)];
+        while let Some((i, parent)) = stack.pop() {
+            let node = nodes.get(i).ok_or_else(|| format!("the scene names node {i}, which does not exist"))?;
+            if std::mem::replace(&mut seen[i], true) {
+                if !shown {
+                    continue;
+                }
+                return Err(format!("node {i} is its own ancestor, or the scene lists it twice"));
+            }
+            let local = doubles.nodes.get(i).map_or(Ok(Local::default()), |t| local(t, i))?;
+            let above: Option<&Placed> = parent.and_then(|p| placed.get(p));
+            let to_world = above.map_or(local.affine(), |p| p.to_world * local.affine());
+            if !to_world.is_finite() {
+                return Err(format!("node {i} has a transform that is not finite"));
+            }
+            let index = placed.len();
+            placed.push(Placed { node: i, parent, local, to_world, shown });
+            stack.extend(children(node).rev().map(|c| (c, Some(index))));
         }
-        placed.push(Placed { node: i, to_world });
-        stack.extend(children(node).rev().map(|c| (c, to_world)));
     }
     if no_scene && let Some(i) = seen.iter().position(|s| !s) {
         return Err(format!("node {i} is its own ancestor"));
@@ -100,30 +125,28 @@ fn children(node: &Node) -> impl DoubleEndedIterator<Item = usize> {
     node.children.iter().flatten().map(Index::value)
 }
 
-fn local(node: &Transform, index: usize) -> Result<DAffine3, String> {
+fn local(node: &Transform, index: usize) -> Result<Local, String> {
     if let Some(m) = node.matrix {
         let m = DMat4::from_cols_array(&m);
         // affine by the specification; a perspective matrix would silently lose its last row
         if (m.row(3) - glam::DVec4::W).abs().max_element() > 1e-6 {
             return Err(format!("node {index} has a matrix that is not affine"));
         }
-        return Ok(DAffine3::from_mat4(m));
+        return Ok(Local::Matrix(DAffine3::from_mat4(m)));
     }
     let rotation = node.rotation.map_or(DQuat::IDENTITY, DQuat::from_array);
-    // exporters round; and a zero quaternion stands for no rotation
-    let rotation = if rotation.length_squared() > 1e-30 { rotation.normalize() } else { DQuat::IDENTITY };
-    Ok(DAffine3::from_scale_rotation_translation(
-        node.scale.map_or(DVec3::ONE, DVec3::from_array),
-        rotation,
-        node.translation.map_or(DVec3::ZERO, DVec3::from_array),
-    ))
-}
-
-/// Position and orientation of `to_world` without its scale, shear and mirroring. Keeps -z and as much of +y as it can.
-fn rigid(to_world: &DAffine3) -> DAffine3 {
-    let back = to_world.matrix3.z_axis.try_normalize().unwrap_or(DVec3::Z);
-    let right = to_world.matrix3.y_axis.cross(back).try_normalize().unwrap_or_else(|| back.any_orthonormal_vector());
-    DAffine3::from_mat3_translation(DMat3::from_cols(right, back.cross(right), back), to_world.translation)
+    let squared = rotation.length_squared();
+    Ok(Local::Parts {
+        translation: node.translation.map_or(DVec3::ZERO, DVec3::from_array),
+        rotation: match squared {
+            // what we wrote comes back bit by bit
+            _ if (squared - 1.0).abs() < 1e-14 => rotation,
+            // exporters round; and a zero quaternion stands for no rotation
+            _ if squared > 1e-30 => rotation.normalize(),
+            _ => DQuat::IDENTITY,
+        },
+        scale: node.scale.map_or(DVec3::ONE, DVec3::from_array),
+    })
 }
 
 /// The camera of a node.

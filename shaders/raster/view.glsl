@@ -1,0 +1,39 @@
+// What is drawn, and from where. In a draw `push.pass` is a RasterParams, `push.rays` and `push.queued` are the group's vertices (or
+// spheres) and corners, `push.first` the entry of the top level.
+#ifndef RASTER_VIEW
+#define RASTER_VIEW
+#include "common/camera.glsl"
+#include "scene/scene.glsl"
+
+// Mirrors RasterParams in src/render/raster.rs.
+layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer RasterParams {
+    vec4 clip[4];   // rows: from a place relative to the eye to clip space
+    vec3 eye;
+    float turned;   // -1 where the camera's transform turns the winding, else 1
+    vec2 at;        // where in a pixel its ray passes
+    uvec2 block;    // BlockParams
+};
+
+// Clip space of a place relative to the eye.
+vec4 to_clip(vec3 d) {
+    vec4 rows[4] = RasterParams(push.pass).clip;
+    return vec4(dot(rows[0].xyz, d) + rows[0].w, dot(rows[1].xyz, d) + rows[1].w, dot(rows[2].xyz, d) + rows[2].w,
+        dot(rows[3].xyz, d) + rows[3].w);
+}
+
+// A point of the group, relative to the eye: the difference first, so that what is near is not rounded as what is far.
+vec3 seen_from_eye(vec3 p) {
+    vec3 eye = RasterParams(push.pass).eye;
+    if (SINGLE_LEVEL) return p - eye;
+    vec4 rows[3] = InstanceRecords(SceneRoot(push.scene).instances).v[push.first].group_to_world;
+    return transform_vector(rows, p) + (vec3(rows[0].w, rows[1].w, rows[2].w) - eye);
+}
+
+// The exact ray of a fragment's pixel.
+Ray pixel_ray(vec2 fragment) {
+    RasterParams params = RasterParams(push.pass);
+    BlockParams p = BlockParams(params.block);
+    return camera_ray(p, vec2(uvec2(fragment) + p.block_origin) + params.at);
+}
+
+#endif

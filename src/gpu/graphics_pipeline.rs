@@ -1,0 +1,107 @@
+//! Pipelines that draw triangles into [`super::Targets`]. Vertices are fetched by address: there are no vertex buffers.
+
+use std::sync::Arc;
+
+use ash::vk;
+
+use super::device::Device;
+use super::image::{DEPTH, IDS};
+use super::pipeline::{Module, Specialization, layout};
+use super::result::Context;
+use crate::error::Result;
+
+/// Stages that see the push constants.
+pub(super) const DRAW_STAGES: vk::ShaderStageFlags =
+    vk::ShaderStageFlags::from_raw(vk::ShaderStageFlags::VERTEX.as_raw() | vk::ShaderStageFlags::FRAGMENT.as_raw());
+
+/// Which triangles are not drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Cull {
+    /// None: both sides are seen.
+    Nothing,
+    /// Those whose corners go round counter-clockwise in the image.
+    Front,
+}
+
+/// A vertex and a fragment shader.
+pub struct GraphicsPipeline {
+    pub(super) raw: vk::Pipeline,
+    pub(super) layout: vk::PipelineLayout,
+    device: Arc<Device>,
+}
+
+impl GraphicsPipeline {
+    /// Compiles two shaders with the entry points `main` and the same specialisation constants. Triangles are drawn where their
+    /// depth is greater than what is there.
+    pub fn new(
+        device: &Arc<Device>,
+        name: &str,
+        vertex: &[u8],
+        fragment: &[u8],
+        specialization: &Specialization,
+        cull: Cull,
+    ) -> Result<Self> {
+        let modules = [Module::new(device, name, vertex)?, Module::new(device, name, fragment)?];
+        let mut pipeline = Self { raw: vk::Pipeline::null(), layout: layout(device, DRAW_STAGES)?, device: device.clone() };
+        let vertex_input = vk::PipelineVertexInputStateCreateInfo::default();
+        let assembly = vk::PipelineInputAssemblyStateCreateInfo::default().topology(vk::PrimitiveTopology::TRIANGLE_LIST);
+        let viewport = vk::PipelineViewportStateCreateInfo::default().viewport_count(1).scissor_count(1);
+        let rasterization = vk::PipelineRasterizationStateCreateInfo::default()
+            .polygon_mode(vk::PolygonMode::FILL)
+            .cull_mode(match cull {
+                Cull::Nothing => vk::CullModeFlags::NONE,
+                Cull::Front => vk::CullModeFlags::FRONT,
+            })
+            .front_face(vk::FrontFace::COUNTER_CLOCKWISE)
+            .line_width(1.0);
+        let multisample = vk::PipelineMultisampleStateCreateInfo::default().rasterization_samples(vk::SampleCountFlags::TYPE_1);
+        let depth = vk::PipelineDepthStencilStateCreateInfo::default()
+            .depth_test_enable(true)
+            .depth_write_enable(true)
+            .depth_compare_op(vk::CompareOp::GREATER);
+        let both = vk::ColorComponentFlags::R | vk::ColorComponentFlags::G;
+        let attachments = [vk::PipelineColorBlendAttachmentState::default().color_write_mask(both)];
+        let blend = vk::PipelineColorBlendStateCreateInfo::default().attachments(&attachments);
+        let states = [vk::DynamicState::VIEWPORT, vk::DynamicState::SCISSOR];
+        let dynamic = vk::PipelineDynamicStateCreateInfo::default().dynamic_states(&states);
+        let formats = [IDS];
+        let mut rendering =
+            vk::PipelineRenderingCreateInfo::default().color_attachment_formats(&formats).depth_attachment_format(DEPTH);
+        pipeline.raw = specialization.with(|s| {
+            let stage = |k: usize, stage| {
+                vk::PipelineShaderStageCreateInfo::default()
+                    .stage(stage)
+                    .module(modules[k].raw)
+                    .name(c"main")
+                    .specialization_info(s)
+            };
+            let stages = [stage(0, vk::ShaderStageFlags::VERTEX), stage(1, vk::ShaderStageFlags::FRAGMENT)];
+            let info = [vk::GraphicsPipelineCreateInfo::default()
+                .stages(&stages)
+                .vertex_input_state(&vertex_input)
+                .input_assembly_state(&assembly)
+                .viewport_state(&viewport)
+                .rasterization_state(&rasterization)
+                .multisample_state(&multisample)
+                .depth_stencil_state(&depth)
+                .color_blend_state(&blend)
+                .dynamic_state(&dynamic)
+                .layout(pipeline.layout)
+                .push_next(&mut rendering)];
+            // SAFETY: modules and layout are of this device; all states that a draw needs are there
+            unsafe { device.raw.create_graphics_pipelines(device.pipeline_cache, &info, None) }.map_err(|e| e.1).context(name)
+        })?[0];
+        device.name(pipeline.raw, name);
+        Ok(pipeline)
+    }
+}
+
+impl Drop for GraphicsPipeline {
+    fn drop(&mut self) {
+        // SAFETY: submissions are waited for
+        unsafe {
+            self.device.raw.destroy_pipeline(self.raw, None);
+            self.device.raw.destroy_pipeline_layout(self.layout, None);
+        }
+    }
+}

@@ -1,0 +1,129 @@
+//! Is a description of what moves sound, and does it fit its scene?
+
+use super::{Animation, Channel, Deformation, Local, Parts, Property, Skin};
+use crate::scene::{Geometry, Scene};
+
+/// What is wrong, in words, naming the thing.
+pub(super) fn check(scene: &Scene, parts: &Parts) -> Result<(), String> {
+    let nodes = parts.nodes.len();
+    for (i, node) in parts.nodes.iter().enumerate() {
+        let name = &node.name;
+        if node.parent.is_some_and(|p| p >= i) {
+            return Err(format!("node {i} `{name}` comes before its parent"));
+        }
+        if !node.local.affine().is_finite() {
+            return Err(format!("node {i} `{name}` has a transform that is not finite"));
+        }
+        if node.weights.iter().any(|w| !w.is_finite()) {
+            return Err(format!("node {i} `{name}` has a morph weight that is not finite"));
+        }
+    }
+    for (i, skin) in parts.skins.iter().enumerate() {
+        check_skin(skin, nodes).map_err(|e| format!("skin {i} `{}`: {e}", skin.name))?;
+    }
+    let mut seen = vec![false; scene.meshes.len()];
+    for (i, deformation) in parts.deformations.iter().enumerate() {
+        let mesh = deformation.mesh;
+        match seen.get_mut(mesh) {
+            None => return Err(format!("deformation {i}: mesh {mesh} does not exist (the scene has {})", scene.meshes.len())),
+            Some(true) => return Err(format!("mesh {mesh} deforms in two ways")),
+            Some(seen) => *seen = true,
+        }
+        check_deformation(deformation, scene, parts).map_err(|e| format!("mesh {mesh} `{}`: {e}", scene.meshes[mesh].name))?;
+    }
+    for (i, animation) in parts.animations.iter().enumerate() {
+        check_animation(animation, parts).map_err(|e| format!("animation {i} `{}`, {e}", animation.name))?;
+    }
+    let on = |what: &str, carried: &[Option<usize>], there: usize| {
+        if carried.len() != there {
+            return Err(format!("{} {what} are on nodes, the scene has {there}", carried.len()));
+        }
+        match carried.iter().flatten().find(|&&n| n >= nodes) {
+            Some(n) => Err(format!("{what} are on node {n}, of only {nodes}")),
+            None => Ok(()),
+        }
+    };
+    on("instances", &parts.instances, scene.instances.len())?;
+    on("cameras", &parts.cameras, scene.cameras.len())
+}
+
+fn check_skin(skin: &Skin, nodes: usize) -> Result<(), String> {
+    if skin.joints.is_empty() || skin.joints.len() != skin.inverse_bind.len() {
+        return Err(format!("has {} joints and {} inverse bind matrices", skin.joints.len(), skin.inverse_bind.len()));
+    }
+    if let Some(j) = skin.joints.iter().find(|&&j| j >= nodes) {
+        return Err(format!("joint node {j} does not exist (there are {nodes})"));
+    }
+    match skin.inverse_bind.iter().position(|m| !m.is_finite()) {
+        Some(i) => Err(format!("inverse bind matrix {i} is not finite")),
+        None => Ok(()),
+    }
+}
+
+fn check_deformation(deformation: &Deformation, scene: &Scene, parts: &Parts) -> Result<(), String> {
+    let Geometry::Triangles(triangles) = &scene.meshes[deformation.mesh].geometry else {
+        return Err("holds spheres, which cannot deform".to_owned());
+    };
+    let vertices = triangles.positions.len();
+    let node = parts.nodes.get(deformation.node).ok_or_else(|| format!("node {} does not exist", deformation.node))?;
+    let joints = match deformation.skin {
+        None if deformation.influences.is_empty() => 0,
+        None => return Err("has joints and weights, but no skin".to_owned()),
+        Some(s) if !(1..=2).contains(&deformation.influences.len()) => {
+            return Err(format!("has skin {s} and {} sets of joints; one or two are read", deformation.influences.len()));
+        }
+        Some(s) => parts.skins.get(s).ok_or_else(|| format!("skin {s} does not exist"))?.joints.len(),
+    };
+    for set in &deformation.influences {
+        if (set.joints.len(), set.weights.len()) != (vertices, vertices) {
+            return Err(format!(
+                "has joints or weights for {} of {vertices} vertices",
+                set.joints.len().min(set.weights.len())
+            ));
+        }
+        for (v, (joint, weight)) in set.joints.iter().zip(&set.weights).enumerate() {
+            if weight.iter().any(|w| !(w.is_finite() && *w >= 0.0)) {
+                return Err(format!("a joint weight of vertex {v} is not finite, or below zero"));
+            }
+            if let Some((j, _)) = joint.iter().zip(weight).find(|&(&j, &w)| w > 0.0 && usize::from(j) >= joints) {
+                return Err(format!("vertex {v} is bound to joint {j} of only {joints}"));
+            }
+        }
+    }
+    if !deformation.targets.is_empty() && node.weights.len() != deformation.targets.len() {
+        let (targets, weights) = (deformation.targets.len(), node.weights.len());
+        return Err(format!("has {targets} morph targets, its node {} {weights} weights", deformation.node));
+    }
+    for (t, target) in deformation.targets.iter().enumerate() {
+        for (what, deltas) in [("positions", &target.positions), ("normals", &target.normals)] {
+            if !deltas.is_empty() && deltas.len() != vertices {
+                return Err(format!("morph target {t} has {} {what} for {vertices} vertices", deltas.len()));
+            }
+            if let Some(v) = deltas.iter().position(|d| !d.is_finite()) {
+                return Err(format!("morph target {t} is not finite at vertex {v} ({what})"));
+            }
+        }
+    }
+    Ok(())
+}
+
+fn check_animation(animation: &Animation, parts: &Parts) -> Result<(), String> {
+    if !(animation.duration.is_finite() && animation.duration >= 0.0) {
+        return Err(format!("a duration of {} s", animation.duration));
+    }
+    for (i, channel) in animation.channels.iter().enumerate() {
+        check_channel(channel, parts).map_err(|e| format!("channel {i}: {e}"))?;
+    }
+    Ok(())
+}
+
+fn check_channel(channel: &Channel, parts: &Parts) -> Result<(), String> {
+    let n = channel.node;
+    let node = parts.nodes.get(n).ok_or_else(|| format!("node {n} does not exist"))?;
+    match (channel.property, node.local) {
+        (Property::Weights, _) if node.weights.is_empty() => return Err(format!("node {n} has no morph targets")),
+        (Property::Weights, _) | (_, Local::Parts { .. }) => {}
+        (_, Local::Matrix(_)) => return Err(format!("node {n} has a matrix, which cannot be animated")),
+    }
+    channel.sampler.check(channel.width(node))
+}

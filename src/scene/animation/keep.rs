@@ -1,0 +1,68 @@
+//! A rig follows its scene while loaders mend it: meshes and instances are dropped, vertices reordered.
+
+use super::{Deformation, Rig};
+use crate::scene::Scene;
+
+impl Rig {
+    /// What each mesh of a scene of `meshes` does, if it deforms.
+    pub(in crate::scene) fn deformations_mut(&mut self, meshes: usize) -> Vec<Option<&mut Deformation>> {
+        let mut all: Vec<Option<&mut Deformation>> = (0..meshes).map(|_| None).collect();
+        for deformation in &mut self.parts.deformations {
+            let mesh = deformation.mesh;
+            all[mesh] = Some(deformation);
+        }
+        all
+    }
+
+    /// For each instance of `scene`: does some animation move it?
+    pub(in crate::scene) fn moving(&self, scene: &Scene) -> Vec<bool> {
+        let mut moving = vec![false; scene.instances.len()];
+        for animation in 0..self.parts.animations.len() {
+            for i in self.motion(animation).unwrap_or_default().instances {
+                moving[i] = true;
+            }
+        }
+        moving
+    }
+
+    /// For each mesh of `scene`: does some animation deform it?
+    pub(in crate::scene) fn deforming(&self, scene: &Scene) -> Vec<bool> {
+        let mut deforming = vec![false; scene.meshes.len()];
+        for deformation in &self.parts.deformations {
+            deforming[deformation.mesh] = true;
+        }
+        deforming
+    }
+
+    /// This instance has got a transform of its own.
+    pub(in crate::scene) fn release(&mut self, instance: usize) {
+        self.parts.instances[instance] = None;
+    }
+
+    /// Only these instances are kept.
+    pub(in crate::scene) fn keep_instances(&mut self, keep: &[bool]) {
+        let mut each = keep.iter();
+        self.parts.instances.retain(|_| each.next().copied().unwrap_or(true));
+        let mut each = keep.iter();
+        self.floors.retain(|_| each.next().copied().unwrap_or(true));
+    }
+
+    /// Only these meshes are kept; `index` says what each is called now.
+    pub(in crate::scene) fn keep_meshes(&mut self, keep: &[bool], index: &[usize]) {
+        let mut each = self.parts.deformations.iter().map(|d| keep[d.mesh]).collect::<Vec<_>>().into_iter();
+        if !self.shapes.is_empty() {
+            let mut each = each.clone();
+            self.shapes.retain(|_| each.next().unwrap_or(true));
+        }
+        self.parts.deformations.retain(|_| each.next().unwrap_or(true));
+        for deformation in &mut self.parts.deformations {
+            deformation.mesh = index[deformation.mesh];
+        }
+    }
+
+    /// Does no animation change anything?
+    pub(in crate::scene) fn is_idle(&self) -> bool {
+        (0..self.parts.animations.len())
+            .all(|a| self.motion(a).is_ok_and(|m| m.is_none()) && self.moving_cameras(a).is_ok_and(|c| c.is_empty()))
+    }
+}

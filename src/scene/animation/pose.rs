@@ -1,0 +1,277 @@
+//! Playing: what an animation changes, and how things stand at a time.
+
+use glam::{DAffine3, DVec3};
+
+use super::transform::{anchor, at_least};
+use super::{Animation, Deformation, Local, Property, Rig, Shape};
+use crate::error::{Error, Result};
+use crate::scene::camera::rigid;
+use crate::scene::flatten::Motion;
+use crate::scene::{Geometry, Scene};
+
+/// What happens beyond an animation's end.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Playback {
+    /// It starts again.
+    #[default]
+    Loop,
+    /// It stands still, as it does before its beginning.
+    Once,
+}
+
+impl Playback {
+    /// Seconds since the beginning of an animation, from seconds since it was started. A time that is not finite is its beginning.
+    pub fn time(self, seconds: f64, duration: f64) -> f64 {
+        match self {
+            _ if !seconds.is_finite() || duration <= 0.0 => 0.0,
+            Self::Loop => seconds.rem_euclid(duration),
+            Self::Once => seconds.clamp(0.0, duration),
+        }
+    }
+}
+
+/// A mesh in its pose.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct PosedMesh {
+    /// Index into [`Scene::meshes`].
+    pub mesh: usize,
+    /// Its vertices. Normals are empty where the mesh has none; tangents always.
+    pub shape: Shape,
+}
+
+/// How what an animation changes stands at some time. Its buffers are used again when it is filled again.
+#[derive(Clone, Debug, Default)]
+pub struct Pose {
+    /// Instances (indices into [`Scene::instances`]) and their object-to-world transforms, all of which can be inverted.
+    pub instances: Vec<(usize, DAffine3)>,
+    /// Meshes that deform.
+    pub meshes: Vec<PosedMesh>,
+    /// Cameras (indices into [`Scene::cameras`]) and their camera-to-world transforms, without scale.
+    pub cameras: Vec<(usize, DAffine3)>,
+    scratch: Scratch,
+}
+
+#[derive(Clone, Debug, Default)]
+struct Scratch {
+    live: Vec<bool>,
+    locals: Vec<Local>,
+    world: Vec<DAffine3>,
+    joints: Vec<DAffine3>,
+    weights: Vec<f64>,
+}
+
+impl Pose {
+    /// Puts the scene that the pose was made for into it.
+    pub fn apply(&self, scene: &mut Scene) {
+        for &(i, to_world) in &self.instances {
+            if let Some(instance) = scene.instances.get_mut(i) {
+                instance.object_to_world = to_world;
+            }
+        }
+        for posed in &self.meshes {
+            if let Some(Geometry::Triangles(t)) = scene.meshes.get_mut(posed.mesh).map(|m| &mut m.geometry) {
+                t.positions.clone_from(&posed.shape.positions);
+                t.normals.clone_from(&posed.shape.normals);
+            }
+        }
+        for &(i, to_world) in &self.cameras {
+            if let Some(camera) = scene.cameras.get_mut(i) {
+                camera.camera_to_world = to_world;
+            }
+        }
+    }
+}
+
+impl Rig {
+    /// The instances that an animation moves and the meshes that it deforms, and nothing else: keys that leave a node as it is at rest
+    /// move nothing. What it does to cameras concerns no tracer.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] when there is no such animation.
+    pub fn motion(&self, animation: usize) -> Result<Motion> {
+        let mut live = Vec::new();
+        self.live(animation, &mut live)?;
+        let deformations = &self.parts.deformations;
+        let deform = |d: &&Deformation| self.deforms(animation, d, &live);
+        Ok(Motion {
+            instances: self.moved(&self.parts.instances, &live).map(|(i, _)| i).collect(),
+            meshes: deformations.iter().filter(deform).map(|d| d.mesh).collect(),
+        })
+    }
+
+    /// The cameras that an animation moves, as indices into [`Scene::cameras`].
+    ///
+    /// # Errors
+    /// [`Error::Usage`] when there is no such animation.
+    pub fn moving_cameras(&self, animation: usize) -> Result<Vec<usize>> {
+        let mut live = Vec::new();
+        self.live(animation, &mut live)?;
+        Ok(self.moved(&self.parts.cameras, &live).map(|(i, _)| i).collect())
+    }
+
+    /// How everything that an animation changes ([`Rig::motion`]) stands `seconds` after it was started. `pose` may come from any rig
+    /// and time.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] when there is no such animation.
+    pub fn pose(&self, animation: usize, seconds: f64, playback: Playback, pose: &mut Pose) -> Result<()> {
+        let Scratch { live, locals, world, joints, weights } = &mut pose.scratch;
+        let playing = self.live(animation, live)?;
+        let seconds = playback.time(seconds, playing.duration);
+        locals.clear();
+        locals.extend(self.parts.nodes.iter().map(|n| n.local));
+        for (channel, _) in playing.channels.iter().zip(&self.still[animation]).filter(|(_, still)| !**still) {
+            let Local::Parts { translation, rotation, scale } = &mut locals[channel.node] else { continue };
+            match channel.property {
+                Property::Translation => *translation = channel.sampler.vector(seconds),
+                Property::Rotation => *rotation = channel.sampler.rotation(seconds),
+                Property::Scale => *scale = channel.sampler.vector(seconds),
+                Property::Weights => {}
+            }
+        }
+        world.clone_from(&self.rest);
+        for (i, node) in self.parts.nodes.iter().enumerate().filter(|(i, _)| live[*i]) {
+            let local = locals[i].affine();
+            world[i] = node.parent.map_or(local, |p| world[p] * local);
+        }
+
+        pose.instances.clear();
+        let placed = self.moved(&self.parts.instances, live);
+        pose.instances.extend(placed.map(|(i, node)| (i, at_least(&world[node], self.floor(i)))));
+        pose.cameras.clear();
+        pose.cameras.extend(self.moved(&self.parts.cameras, live).map(|(i, node)| (i, rigid(&world[node]))));
+
+        let mut count = 0;
+        for (d, deformation) in self.parts.deformations.iter().enumerate() {
+            if !self.deforms(animation, deformation, live) {
+                continue;
+            }
+            let Some(base) = self.shapes.get(d) else { continue };
+            if pose.meshes.len() == count {
+                pose.meshes.push(PosedMesh::default());
+            }
+            self.weights(deformation, Some((playing, seconds)), weights);
+            self.joints(deformation, world, joints);
+            pose.meshes[count].mesh = deformation.mesh;
+            deformation.pose(base, weights, joints, false, &mut pose.meshes[count].shape);
+            count += 1;
+        }
+        pose.meshes.truncate(count);
+        Ok(())
+    }
+
+    /// Which nodes an animation moves, itself or with a parent.
+    fn live(&self, animation: usize, live: &mut Vec<bool>) -> Result<&Animation> {
+        let Some(playing) = self.parts.animations.get(animation) else {
+            let count = self.parts.animations.len();
+            return Err(Error::Usage(format!("animation {animation} does not exist: the scene has {count}, counted from 0")));
+        };
+        live.clear();
+        live.resize(self.parts.nodes.len(), false);
+        for (channel, still) in playing.channels.iter().zip(&self.still[animation]) {
+            live[channel.node] |= !still && channel.property != Property::Weights;
+        }
+        for (i, node) in self.parts.nodes.iter().enumerate() {
+            live[i] |= node.parent.is_some_and(|p| live[p]);
+        }
+        Ok(playing)
+    }
+
+    /// Of what nodes carry, that which moves, and the node of each.
+    fn moved<'a>(&self, carried: &'a [Option<usize>], live: &'a [bool]) -> impl Iterator<Item = (usize, usize)> + use<'a> {
+        carried.iter().enumerate().filter_map(|(i, node)| Some((i, (*node)?))).filter(|(_, node)| live[*node])
+    }
+
+    fn deforms(&self, animation: usize, deformation: &Deformation, live: &[bool]) -> bool {
+        let skinned = deformation.skin.is_some_and(|s| self.parts.skins[s].joints.iter().any(|&j| live[j]));
+        let mut channels = self.parts.animations[animation].channels.iter().zip(&self.still[animation]);
+        let morphs = |c: &super::Channel| c.property == Property::Weights && c.node == deformation.node;
+        skinned || (!deformation.targets.is_empty() && channels.any(|(c, still)| !still && morphs(c)))
+    }
+
+    /// Weights of a mesh's targets: as animated, or at rest.
+    fn weights(&self, deformation: &Deformation, playing: Option<(&Animation, f64)>, out: &mut Vec<f64>) {
+        out.clear();
+        out.extend(self.parts.nodes[deformation.node].weights.iter().map(|&w| f64::from(w)));
+        let Some((animation, seconds)) = playing.filter(|_| !deformation.targets.is_empty()) else { return };
+        let of = |c: &&super::Channel| c.property == Property::Weights && c.node == deformation.node;
+        if let Some(channel) = animation.channels.iter().rfind(of) {
+            channel.sampler.weights(seconds, out);
+        }
+    }
+
+    /// What each joint of a mesh's skin does to its vertices, given the nodes' world transforms.
+    fn joints(&self, deformation: &Deformation, world: &[DAffine3], out: &mut Vec<DAffine3>) {
+        out.clear();
+        let Some(skin) = deformation.skin else { return };
+        let (skin, anchor) = (&self.parts.skins[skin], self.anchor(skin));
+        out.extend(skin.joints.iter().zip(&skin.inverse_bind).map(|(&j, bind)| {
+            let near = DAffine3 { translation: world[j].translation - anchor, ..world[j] };
+            near * *bind
+        }));
+    }
+
+    /// Where instances of meshes with this skin stand.
+    fn anchor(&self, skin: usize) -> DVec3 {
+        self.parts.skins[skin].joints.first().map_or(DVec3::ZERO, |&j| anchor(&self.rest[j]))
+    }
+
+    fn floor(&self, instance: usize) -> f64 {
+        self.floors.get(instance).copied().unwrap_or(1e-7)
+    }
+
+    /// Puts a scene whose meshes are as modelled into its rest pose, and keeps what it takes to pose it otherwise.
+    pub(in crate::scene) fn settle(scene: &mut Scene) {
+        let Some(mut rig) = scene.rig.take() else { return };
+        rig.shapes.clear();
+        let (mut weights, mut joints) = (Vec::new(), Vec::new());
+        for deformation in &rig.parts.deformations {
+            // other geometry was refused when the rig was made
+            let Geometry::Triangles(t) = &mut scene.meshes[deformation.mesh].geometry else { continue };
+            let base = Shape::take(t);
+            rig.weights(deformation, None, &mut weights);
+            rig.joints(deformation, &rig.rest, &mut joints);
+            let mut shape = Shape::default();
+            deformation.pose(&base, &weights, &joints, true, &mut shape);
+            shape.give(t);
+            rig.shapes.push(base);
+        }
+        for deformation in &rig.parts.deformations {
+            let Some(skin) = deformation.skin else { continue };
+            let at = DAffine3::from_translation(rig.anchor(skin));
+            scene.instances.iter_mut().filter(|i| i.mesh == deformation.mesh).for_each(|i| i.object_to_world = at);
+        }
+        let (moving, deforming) = (rig.moving(scene), rig.deforming(scene));
+        let place = |rig: &Self, scene: &mut Scene| {
+            for (i, node) in rig.parts.instances.iter().enumerate().filter_map(|(i, n)| Some((i, (*n)?))) {
+                let instance = &mut scene.instances[i];
+                let rest = rig.rest[node];
+                // what stays was seen to by loaders, or is as its author wants it
+                let changes = moving[i] || deforming[instance.mesh];
+                instance.object_to_world = if changes { at_least(&rest, rig.floor(i)) } else { rest };
+            }
+        };
+        place(&rig, scene);
+        let size = scene.bounds().map_or(1.0, |(lo, hi)| (hi - lo).max_element());
+        let mut extents: Vec<f64> = scene.meshes.iter().map(|m| extent(&m.geometry)).collect();
+        for (deformation, base) in rig.parts.deformations.iter().zip(&rig.shapes) {
+            let extent = &mut extents[deformation.mesh];
+            *extent = extent.max(deformation.extent(base));
+        }
+        // a mesh that is a point in every shape may have any scale
+        let floor = |mesh: usize| Some(1e-7 * size / extents[mesh]).filter(|f| *f > 0.0 && f.is_finite()).unwrap_or(1e-7);
+        rig.floors = scene.instances.iter().map(|i| floor(i.mesh)).collect();
+        place(&rig, scene);
+        for (camera, node) in scene.cameras.iter_mut().zip(&rig.parts.cameras) {
+            if let Some(node) = *node {
+                camera.camera_to_world = rigid(&rig.rest[node]);
+            }
+        }
+        scene.rig = Some(rig);
+    }
+}
+
+/// How large a mesh is, in its own units.
+fn extent(geometry: &Geometry) -> f64 {
+    geometry.bounds().map_or(0.0, |(lo, hi)| (hi - lo).max_element())
+}

@@ -1,0 +1,236 @@
+//! Values between keys, as appendix C of the glTF 2.0 specification has them.
+
+use std::sync::Arc;
+
+use glam::{DQuat, DVec3, DVec4};
+
+/// How values between two keys come about.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Interpolation {
+    /// The value of the key before.
+    Step,
+    /// In a straight line; rotations turn evenly, the shorter way (slerp).
+    #[default]
+    Linear,
+    /// Cubic Hermite splines, whose tangents lie beside the values; rotations are brought to unit length afterwards.
+    CubicSpline,
+}
+
+/// Keys of one animated property.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Sampler {
+    /// How values between keys come about.
+    pub interpolation: Interpolation,
+    /// Seconds, increasing. Channels of a file often share them.
+    pub times: Arc<[f32]>,
+    /// The numbers of each key, one key after the other; for splines those of the incoming tangent, the value and the outgoing
+    /// tangent (per second).
+    pub values: Vec<f32>,
+}
+
+/// Where a time lies: key `key`, `share` of the way (0 to 1) to the next one, which is `seconds` later; 0 when there is none.
+struct Between {
+    key: usize,
+    share: f64,
+    seconds: f64,
+}
+
+impl Sampler {
+    /// Values of `width` numbers: are there any keys, as many values as keys, times that increase, all finite?
+    ///
+    /// # Errors
+    /// What is wrong, in words.
+    pub fn check(&self, width: usize) -> Result<(), String> {
+        let keys = self.times.len();
+        if keys == 0 {
+            return Err("has no keys".to_owned());
+        }
+        if let Some(k) = self.times.iter().position(|t| !t.is_finite()) {
+            return Err(format!("the time of key {k} is not finite"));
+        }
+        if let Some(k) = self.times.windows(2).position(|t| t[0] >= t[1]) {
+            return Err(format!("the time of key {} ({} s) is not after the one before", k + 1, self.times[k + 1]));
+        }
+        let wanted = keys.checked_mul(width * self.stride());
+        if wanted != Some(self.values.len()) {
+            return Err(format!("has {} numbers for {keys} keys of {}", self.values.len(), width * self.stride()));
+        }
+        match self.values.iter().position(|v| !v.is_finite()) {
+            Some(i) => Err(format!("a value of key {} is not finite", i / (width * self.stride()).max(1))),
+            None => Ok(()),
+        }
+    }
+
+    /// Values a key has: splines have tangents.
+    fn stride(&self) -> usize {
+        if self.interpolation == Interpolation::CubicSpline { 3 } else { 1 }
+    }
+
+    /// Time of the last key in seconds.
+    pub fn end(&self) -> f64 {
+        self.times.last().map_or(0.0, |&t| f64::from(t))
+    }
+
+    /// The numbers of key `key`, `width` of them. `part`: 0 for the value, -1 and 1 for the tangents before and after it.
+    fn numbers(&self, key: usize, width: usize, part: isize) -> &[f32] {
+        let at = match self.interpolation {
+            Interpolation::CubicSpline => (3 * key).saturating_add_signed(1 + part),
+            _ => key,
+        };
+        self.values.get(at * width..(at + 1) * width).unwrap_or_default()
+    }
+
+    /// Before the first key and after the last one time stands still.
+    fn locate(&self, seconds: f64) -> Between {
+        let next = self.times.partition_point(|&t| f64::from(t) <= seconds);
+        if next == 0 || next == self.times.len() {
+            return Between { key: next.saturating_sub(1), share: 0.0, seconds: 0.0 };
+        }
+        let (from, to) = (f64::from(self.times[next - 1]), f64::from(self.times[next]));
+        Between { key: next - 1, share: (seconds - from) / (to - from), seconds: to - from }
+    }
+
+    /// Number `i` of a value of `width` numbers; straight lines for [`Interpolation::Linear`].
+    fn number(&self, b: &Between, width: usize, i: usize) -> f64 {
+        let at = |key, part| self.numbers(key, width, part).get(i).map_or(0.0, |&v| f64::from(v));
+        let (here, u) = (at(b.key, 0), b.share);
+        if b.seconds == 0.0 {
+            return here;
+        }
+        match self.interpolation {
+            Interpolation::Step => here,
+            Interpolation::Linear => here + (at(b.key + 1, 0) - here) * u,
+            Interpolation::CubicSpline => {
+                let (u2, u3) = (u * u, u * u * u);
+                (2.0 * u3 - 3.0 * u2 + 1.0) * here
+                    + b.seconds * (u3 - 2.0 * u2 + u) * at(b.key, 1)
+                    + (3.0 * u2 - 2.0 * u3) * at(b.key + 1, 0)
+                    + b.seconds * (u3 - u2) * at(b.key + 1, -1)
+            }
+        }
+    }
+
+    /// A translation or scale.
+    pub fn vector(&self, seconds: f64) -> DVec3 {
+        let b = self.locate(seconds);
+        DVec3::from_array([0, 1, 2].map(|i| self.number(&b, 3, i)))
+    }
+
+    /// A rotation, of unit length.
+    pub fn rotation(&self, seconds: f64) -> DQuat {
+        let b = self.locate(seconds);
+        if self.interpolation == Interpolation::Linear && b.seconds > 0.0 {
+            let [from, to] = [b.key, b.key + 1].map(|key| {
+                let numbers = self.numbers(key, 4, 0);
+                unit(DVec4::from_array([0, 1, 2, 3].map(|i| numbers.get(i).map_or(0.0, |&v| f64::from(v)))))
+            });
+            // the shorter way round: glam turns the end where their product is below zero
+            return from.slerp(to, b.share).normalize();
+        }
+        unit(DVec4::from_array([0, 1, 2, 3].map(|i| self.number(&b, 4, i))))
+    }
+
+    /// Weights of morph targets, as many as `out` holds.
+    pub fn weights(&self, seconds: f64, out: &mut [f64]) {
+        let b = self.locate(seconds);
+        let width = out.len();
+        for (i, w) in out.iter_mut().enumerate() {
+            *w = self.number(&b, width, i);
+        }
+    }
+
+    /// All keys have one value, and it is the one that `same` recognises: nothing is animated.
+    pub(super) fn is_still(&self, width: usize, same: impl Fn(&[f32]) -> bool) -> bool {
+        let spline = self.interpolation == Interpolation::CubicSpline;
+        let first = self.numbers(0, width, 0);
+        same(first)
+            && (0..self.times.len()).all(|k| {
+                let flat = |part| self.numbers(k, width, part).iter().all(|&t| t == 0.0);
+                self.numbers(k, width, 0) == first && (!spline || (flat(-1) && flat(1)))
+            })
+    }
+}
+
+/// Unit length; a zero quaternion stands for no rotation, as it does in nodes.
+pub(super) fn unit(q: DVec4) -> DQuat {
+    q.try_normalize().map_or(DQuat::IDENTITY, DQuat::from_vec4)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::FRAC_PI_2;
+
+    fn sampler(interpolation: Interpolation, times: &[f32], values: &[f32]) -> Sampler {
+        Sampler { interpolation, times: times.into(), values: values.to_vec() }
+    }
+
+    #[test]
+    fn steps_and_lines_hold_their_ends() {
+        let step = sampler(Interpolation::Step, &[1.0, 2.0, 4.0], &[1.0, 0.0, 0.0, 2.0, 0.0, 0.0, 3.0, 6.0, 0.0]);
+        let line = Sampler { interpolation: Interpolation::Linear, ..step.clone() };
+        for (t, s, l) in [
+            (-1.0, 1.0, 1.0),
+            (1.0, 1.0, 1.0),
+            (1.5, 1.0, 1.5),
+            (2.0, 2.0, 2.0),
+            (3.0, 2.0, 2.5),
+            (4.0, 3.0, 3.0),
+            (9.0, 3.0, 3.0),
+        ] {
+            assert_eq!((step.vector(t).x, line.vector(t).x), (s, l), "{t}");
+        }
+        assert_eq!(line.vector(2.5), DVec3::new(2.25, 1.5, 0.0));
+        assert_eq!((line.end(), line.check(3), step.check(3)), (4.0, Ok(()), Ok(())));
+    }
+
+    /// By hand: keys at 1 and 3 s, values 2 and 5, tangents 1 (out) and -2 (in) a second; at 1.5 s, u = 1/4:
+    /// (2/64 - 3/16 + 1) 2 + 2 (1/64 - 2/16 + 1/4) 1 + (-2/64 + 3/16) 5 + 2 (1/64 - 1/16) (-2) = 1.6875 + 0.28125 + 0.78125 + 0.1875
+    #[test]
+    fn cubic_by_hand() {
+        let s = sampler(Interpolation::CubicSpline, &[1.0, 3.0], &[9.0, 2.0, 1.0, -2.0, 5.0, 9.0]);
+        assert_eq!(s.check(1), Ok(()));
+        let at = |t| {
+            let mut out = [0.0];
+            s.weights(t, &mut out);
+            out[0]
+        };
+        assert_eq!((at(0.0), at(1.0), at(3.0), at(4.0)), (2.0, 2.0, 5.0, 5.0));
+        assert!((at(1.5) - 2.9375).abs() < 1e-15, "{}", at(1.5));
+        // its slope at the keys is that of their tangents
+        assert!(((at(1.0 + 1e-6) - 2.0) / 1e-6 - 1.0).abs() < 1e-4);
+        assert!(((5.0 - at(3.0 - 1e-6)) / 1e-6 + 2.0).abs() < 1e-4);
+    }
+
+    #[test]
+    fn rotations_turn_evenly_and_the_shorter_way() {
+        let h = std::f32::consts::FRAC_1_SQRT_2;
+        // a quarter turn about y, its end once written with the other sign
+        for sign in [1.0, -1.0] {
+            let s = sampler(Interpolation::Linear, &[0.0, 1.0], &[0.0, 0.0, 0.0, 1.0, 0.0, sign * h, 0.0, sign * h]);
+            for share in [0.0, 0.25, 1.0 / 3.0, 0.9, 1.0] {
+                let truth = DQuat::from_rotation_y(FRAC_PI_2 * share);
+                assert!(s.rotation(share).dot(truth).abs() > 1.0 - 1e-13, "{sign} {share}");
+                assert!((s.rotation(share).length() - 1.0).abs() < 1e-14);
+            }
+        }
+        // a spline without tangents: halfway it is the mean, brought to unit length
+        let z = [0.0f32; 4];
+        let spline = [z, [0.0, 0.0, 0.0, 1.0], z, z, [0.0, h, 0.0, h], z].concat();
+        let s = sampler(Interpolation::CubicSpline, &[0.0, 2.0], &spline);
+        assert!(s.rotation(1.0).dot(DQuat::from_rotation_y(FRAC_PI_2 * 0.5)) > 1.0 - 1e-13);
+        let s = sampler(Interpolation::Step, &[0.0, 2.0], &[0.0, 3.0, 0.0, 3.0, 0.0, 0.0, 0.0, 0.0]);
+        assert!(s.rotation(1.0).dot(DQuat::from_rotation_y(FRAC_PI_2)) > 1.0 - 1e-13);
+        assert_eq!(s.rotation(2.0), DQuat::IDENTITY);
+    }
+
+    #[test]
+    fn what_is_wrong_is_said() {
+        let check = |times: &[f32], values: &[f32]| sampler(Interpolation::Linear, times, values).check(1).unwrap_err();
+        assert!(check(&[], &[]).contains("no keys"));
+        assert!(check(&[0.0, f32::NAN], &[0.0, 0.0]).contains("time of key 1"));
+        assert!(check(&[0.0, 1.0, 1.0], &[0.0; 3]).contains("key 2 (1 s) is not after"));
+        assert!(check(&[0.0, 1.0], &[0.0; 3]).contains("3 numbers for 2 keys of 1"));
+        assert!(check(&[0.0, 1.0], &[0.0, f32::INFINITY]).contains("value of key 1"));
+    }
+}

@@ -1,0 +1,262 @@
+//! What moves in a file, put together: which meshes deform over time and get a rig, and which have one shape only and are posed here.
+
+use std::collections::BTreeMap;
+
+use ::gltf::json::mesh::Primitive;
+use glam::{DAffine3, DVec3};
+
+use super::accessor::Reader;
+use super::node::{Doubles, Placed};
+use super::{animation, skin, text};
+use crate::scene::animation::{Animation, Deformation, Node, Parts, Property, Shape, Skin, anchor};
+use crate::scene::{Rig, Scene, TriangleMesh};
+
+/// A mesh as a node wants it. Nodes that want the same share it.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct Wanted {
+    /// Number in the file.
+    pub mesh: usize,
+    /// Number in the file.
+    skin: Option<usize>,
+    weights: Weights,
+}
+
+impl Wanted {
+    /// What comes before all other wishes for a mesh.
+    pub fn first(mesh: usize) -> Self {
+        Self { mesh, skin: None, weights: Weights::None }
+    }
+}
+
+/// Weights of morph targets.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum Weights {
+    /// All zero, or no targets.
+    None,
+    /// The same at all times; the bits of floats, so that they have an order.
+    Fixed(Vec<u32>),
+    /// Those of a placed node, which an animation changes.
+    Animated(usize),
+}
+
+/// The tree and its animations while the scene is read. Nodes are numbered as they are placed, skins as in the file.
+pub(super) struct Stage<'a> {
+    reader: &'a Reader<'a>,
+    doubles: &'a Doubles,
+    placed: &'a [Placed],
+    /// Place of each node of the file.
+    index: Vec<Option<usize>>,
+    nodes: Vec<Node>,
+    animations: Vec<Animation>,
+    /// Nodes that some animation moves, and nodes whose weights one changes.
+    moves: Vec<bool>,
+    morphs: Vec<bool>,
+    skins: BTreeMap<usize, Skin>,
+    deformations: Vec<Deformation>,
+    /// Of each instance of the scene the placed node, unless it has a skin.
+    pub instances: Vec<Option<usize>>,
+    /// Of each camera the placed node.
+    pub cameras: Vec<Option<usize>>,
+}
+
+impl<'a> Stage<'a> {
+    pub fn new(reader: &'a Reader, doubles: &'a Doubles, placed: &'a [Placed], warn: &mut dyn FnMut(String)) -> Self {
+        let document = reader.document;
+        let mut index = vec![None; document.nodes.len()];
+        for (at, p) in placed.iter().enumerate() {
+            index[p.node] = Some(at);
+        }
+        let node = |p: &Placed| {
+            let node = &document.nodes[p.node];
+            let mesh = node.mesh.and_then(|m| document.meshes.get(m.value()));
+            let targets = |m: &::gltf::json::Mesh| m.primitives.iter().filter_map(|p| Some(p.targets.as_ref()?.len())).max();
+            let mut weights = node.weights.clone().or_else(|| mesh?.weights.clone()).unwrap_or_default();
+            weights.resize(mesh.and_then(targets).unwrap_or(0), 0.0);
+            weights.iter_mut().filter(|w| !w.is_finite()).for_each(|w| *w = 0.0);
+            Node { name: text(&node.name).to_owned(), parent: p.parent, local: p.local, weights }
+        };
+        // without animations only the weights are asked for, and of few nodes
+        let nodes: Vec<Node> = placed.iter().map(node).collect();
+        let animations = animation::read(reader, &doubles.animations, &nodes, &index, warn);
+        let (mut moves, mut morphs) = (vec![false; nodes.len()], vec![false; nodes.len()]);
+        for channel in animations.iter().flat_map(|a| &a.channels).filter(|c| !c.is_still(&nodes[c.node])) {
+            let which = if channel.property == Property::Weights { &mut morphs } else { &mut moves };
+            which[channel.node] = true;
+        }
+        for (at, node) in nodes.iter().enumerate() {
+            moves[at] |= node.parent.is_some_and(|p| moves[p]);
+        }
+        Self {
+            reader,
+            doubles,
+            placed,
+            index,
+            nodes,
+            animations,
+            moves,
+            morphs,
+            skins: BTreeMap::new(),
+            deformations: Vec::new(),
+            instances: Vec::new(),
+            cameras: Vec::new(),
+        }
+    }
+
+    /// Does some animation move this placed node?
+    pub fn moves(&self, at: usize) -> bool {
+        self.moves[at]
+    }
+
+    /// How placed node `at` wants mesh `mesh`.
+    ///
+    /// # Errors
+    /// What is wrong with its skin, in words.
+    pub fn wanted(&mut self, at: usize, mesh: usize) -> Result<Wanted, String> {
+        let skin = self.reader.document.nodes[self.placed[at].node].skin.map(|s| s.value());
+        if let Some(s) = skin.filter(|s| !self.skins.contains_key(s)) {
+            let all = &self.doubles.skins;
+            let found = all.get(s).ok_or_else(|| format!("skin {s} does not exist (the file has {})", all.len()))?;
+            let read = skin::read(self.reader, found, &self.index).map_err(|e| format!("skin {s}: {e}"))?;
+            self.skins.insert(s, read);
+        }
+        let weights = match &self.nodes[at].weights {
+            _ if self.morphs[at] => Weights::Animated(at),
+            weights if weights.iter().all(|w| *w == 0.0) => Weights::None,
+            weights => Weights::Fixed(weights.iter().map(|w| w.to_bits()).collect()),
+        };
+        Ok(Wanted { mesh, skin, weights })
+    }
+
+    /// How a primitive deforms on placed node `at`, if it does. `triangles`: its vertices, in the file's order.
+    ///
+    /// # Errors
+    /// What is wrong, in words.
+    pub fn deformation(
+        &self,
+        wanted: &Wanted,
+        primitive: &Primitive,
+        triangles: &TriangleMesh,
+        at: usize,
+        warn: &mut dyn FnMut(String),
+    ) -> Result<Option<Deformation>, String> {
+        let vertices = triangles.positions.len();
+        let mut made = Deformation { node: at, ..Deformation::default() };
+        if let Some(s) = wanted.skin {
+            made.influences = skin::influences(self.reader, primitive, vertices, self.skins[&s].joints.len(), warn)?;
+            made.skin = Some(s).filter(|_| !made.influences.is_empty());
+            if made.skin.is_none() {
+                warn("has no joints and weights, which its node's skin asks for: shown as it is modelled".to_owned());
+            }
+        }
+        if wanted.weights != Weights::None {
+            let (normals, count) = (!triangles.normals.is_empty(), self.nodes[at].weights.len());
+            made.targets = skin::targets(self.reader, primitive, vertices, normals, count)?;
+            if made.targets.iter().all(|t| t.positions.is_empty() && t.normals.is_empty()) {
+                made.targets.clear();
+            }
+        }
+        Ok((made.skin.is_some() || !made.targets.is_empty()).then_some(made))
+    }
+
+    /// Notes that mesh `mesh` of the scene deforms over time, or poses it here and now if it does not. Returns where it is to be placed
+    /// if it has a skin.
+    pub fn deform(
+        &mut self,
+        mut made: Deformation,
+        wanted: &Wanted,
+        mesh: usize,
+        triangles: &mut TriangleMesh,
+    ) -> Option<DVec3> {
+        let skin = made.skin.map(|s| &self.skins[&s]);
+        let place = skin.and_then(|s| Some(anchor(&self.placed[*s.joints.first()?].to_world)));
+        let weights: Vec<f64> = self.nodes[made.node].weights.iter().map(|w| f64::from(*w)).collect();
+        let animated = matches!(wanted.weights, Weights::Animated(_)) && !made.targets.is_empty();
+        if !animated && !made.targets.is_empty() {
+            let targets = std::mem::take(&mut made.targets);
+            repose(&Deformation { targets, ..Deformation::default() }, &weights, &[], triangles);
+        }
+        if animated || skin.is_some_and(|s| s.joints.iter().any(|&j| self.moves[j])) {
+            made.mesh = mesh;
+            self.deformations.push(made);
+        } else if let (Some(skin), Some(place)) = (skin, place) {
+            let joint = |(&j, bind): (&usize, &DAffine3)| {
+                let to_world = self.placed[j].to_world;
+                DAffine3 { translation: to_world.translation - place, ..to_world } * *bind
+            };
+            let joints: Vec<DAffine3> = skin.joints.iter().zip(&skin.inverse_bind).map(joint).collect();
+            repose(&made, &weights, &joints, triangles);
+        }
+        place
+    }
+
+    /// Gives the scene its rig, if it has animations.
+    ///
+    /// # Errors
+    /// What is wrong, in words.
+    pub fn finish(mut self, scene: &mut Scene) -> Result<(), String> {
+        if self.animations.is_empty() {
+            return Ok(());
+        }
+        // only what carries something, with all above it
+        let mut keep = vec![false; self.nodes.len()];
+        let joints = self.deformations.iter().filter_map(|d| d.skin).flat_map(|s| &self.skins[&s].joints).copied();
+        let carried = self.instances.iter().chain(&self.cameras).flatten().copied();
+        for at in carried.chain(joints).chain(self.deformations.iter().map(|d| d.node)) {
+            keep[at] = true;
+        }
+        for at in (0..keep.len()).rev() {
+            if keep[at]
+                && let Some(parent) = self.nodes[at].parent
+            {
+                keep[parent] = true;
+            }
+        }
+        let mut next = 0;
+        let count = |&keep: &bool| {
+            next += usize::from(keep);
+            next - usize::from(keep)
+        };
+        let number: Vec<usize> = keep.iter().map(count).collect();
+        for node in &mut self.nodes {
+            node.parent = node.parent.map(|p| number[p]);
+        }
+        let mut each = keep.iter();
+        self.nodes.retain(|_| each.next().copied().unwrap_or(true));
+        for animation in &mut self.animations {
+            animation.channels.retain(|c| keep[c.node]);
+            animation.channels.iter_mut().for_each(|c| c.node = number[c.node]);
+        }
+        let mut skins = Vec::new();
+        let mut names = BTreeMap::new();
+        for deformation in &mut self.deformations {
+            deformation.node = number[deformation.node];
+            deformation.skin = deformation.skin.map(|s| {
+                *names.entry(s).or_insert_with(|| {
+                    let mut skin = self.skins[&s].clone();
+                    skin.joints.iter_mut().for_each(|j| *j = number[*j]);
+                    skins.push(skin);
+                    skins.len() - 1
+                })
+            });
+        }
+        let renumber = |carried: Vec<Option<usize>>| carried.into_iter().map(|at| at.map(|at| number[at])).collect();
+        let parts = Parts {
+            nodes: self.nodes,
+            skins,
+            deformations: self.deformations,
+            animations: self.animations,
+            instances: renumber(self.instances),
+            cameras: renumber(self.cameras),
+        };
+        scene.rig = Some(Rig::new(scene, parts)?);
+        Ok(())
+    }
+}
+
+/// Poses a mesh for good.
+fn repose(deformation: &Deformation, weights: &[f64], joints: &[DAffine3], mesh: &mut TriangleMesh) {
+    let base = Shape::take(mesh);
+    let mut shape = Shape::default();
+    deformation.pose(&base, weights, joints, true, &mut shape);
+    shape.give(mesh);
+}
