@@ -85,6 +85,8 @@ pub struct TechniqueRecord {
     pub preset: String,
     /// Where its occlusion comes from.
     pub technique: String,
+    /// What finds what the camera sees: `traced` camera rays, or `raster`.
+    pub primary: String,
     /// Rays of a pixel that is sampled in a frame.
     pub rays_per_pixel: u32,
     /// Under a camera that stands still, all work done in every frame.

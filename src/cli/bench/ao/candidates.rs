@@ -1,6 +1,7 @@
 //! What is compared: presets, all with one and the same occlusion.
 
 use crate::error::{Error, Result};
+use crate::render::raster::Primary;
 use crate::render::realtime::{Preset, Settings, Technique};
 
 /// Share that a hit at the reach still counts, exponentially: what an 8-bit image just shows.
@@ -39,7 +40,10 @@ impl Candidate {
     /// How its frames are made, with a scene's occlusion.
     pub fn settings(&self, occlusion: &Occlusion) -> Settings {
         let settings = self.preset.settings();
-        occlusion.of(Settings { technique: self.technique.unwrap_or(settings.technique), ..settings })
+        let technique = self.technique.unwrap_or(settings.technique);
+        // the reference work traces its camera rays
+        let primary = if technique == Technique::Larsen { Some(Primary::Traced) } else { settings.primary };
+        occlusion.of(Settings { technique, primary, ..settings })
     }
 }
 

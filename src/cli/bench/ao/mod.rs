@@ -151,7 +151,7 @@ impl<'a> Bench<'a> {
             self.job(source, |bench| views::measure(bench, source))?;
         }
         if changes {
-            self.job("changes", changes::measure)?;
+            self.job("changes", |bench| changes::measure(bench, scenes))?;
         }
         if structures {
             self.job("structures", structures::measure)?;

@@ -8,6 +8,7 @@ use crate::measure::ao_benchmark::Errors;
 use crate::measure::flip::{PIXELS_PER_DEGREE, flip};
 use crate::measure::metrics::ImagePair;
 use crate::render::camera::CameraRecord;
+use crate::render::raster::Primary;
 use crate::render::realtime::{Preset, Realtime, Settings, Surface};
 use crate::tracer::Tracer;
 
@@ -44,7 +45,10 @@ impl Referee {
     pub fn new(tracer: &Tracer, size: [u32; 2], occlusion: &Occlusion, rays: u32) -> Result<Self> {
         let half = rays.div_ceil(2);
         let at_once = half.min(AT_ONCE);
-        let settings = |seed| occlusion.of(Settings { seed, rays_per_pixel: at_once, ..Preset::Reference.settings() });
+        let settings = |seed| {
+            let primary = Some(Primary::Traced);
+            occlusion.of(Settings { seed, rays_per_pixel: at_once, primary, ..Preset::Reference.settings() })
+        };
         let [a, b] = SEEDS.map(|seed| Realtime::new(tracer, size, &settings(seed), &[]));
         Ok(Self { halves: [a?, b?], frames: half.div_ceil(at_once), width: size[0] as usize })
     }
@@ -98,11 +102,29 @@ impl Truth {
         let rmse = pair.rmse();
         Ok(Errors {
             rmse,
-            rmse_corrected: (rmse * rmse - self.rmse * self.rmse).max(0.0).sqrt(),
+            rmse_corrected: corrected(rmse, self.rmse),
             bias: pair.bias(),
             flip: flip(&pair, self.width, PIXELS_PER_DEGREE)?.mean,
             tanimoto: pair.tanimoto(),
             minimum_ratio: pair.minimum_ratio(),
         })
+    }
+}
+
+/// An error without that of what it was measured against; NaN stays what it is.
+fn corrected(rmse: f64, reference: f64) -> f64 {
+    let squares = rmse * rmse - reference * reference;
+    if squares < 0.0 { 0.0 } else { squares.sqrt() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_references_own_error_is_taken_off() {
+        assert!((corrected(0.5, 0.3) - 0.4).abs() < 1e-12);
+        assert_eq!(corrected(0.1, 0.2), 0.0);
+        assert!(corrected(f64::NAN, 0.1).is_nan());
     }
 }

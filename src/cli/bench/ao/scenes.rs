@@ -67,7 +67,7 @@ const BUILTIN: [&str; 2] = ["builtin:terrain:2450000", "builtin:instances:250000
 /// With `--quick`.
 const QUICK: [&str; 3] = ["builtin:stairs", "builtin:terrain:10000", "builtin:instances:25000"];
 /// Reach of any other scene, diagonals of its bounds.
-const REACH: f64 = 0.25;
+pub const REACH: f64 = 0.25;
 /// How much nearer than the scene's own camera, or than one that sees all of it, the near view is.
 const NEARER: f64 = 0.5;
 /// Side of the plane, in the greatest side of what stands on it.

@@ -59,7 +59,7 @@ pub fn view(record: &ViewRecord) -> Vec<String> {
     lines.push(String::new());
     for r in &record.results {
         if let Some(s) = &r.still {
-            lines.push(format!("  {}: {} ms", r.preset, passes(&s.moving_cost)));
+            lines.push(format!("  {}, camera rays {}: {} ms", r.preset, r.primary, passes(&s.moving_cost)));
         }
     }
     lines.extend(verdict(&record.verdict));

@@ -12,6 +12,7 @@ use super::table;
 use crate::error::Result;
 use crate::measure::ao_benchmark::{TechniqueRecord, Verdict, ViewRecord};
 use crate::render::camera::CameraRecord;
+use crate::render::raster::Primary;
 use crate::scene::flatten::FlatScene;
 
 /// Both views of a scene.
@@ -117,11 +118,14 @@ fn from_there(
 
 fn one(bench: &Bench, shot: &Shot, candidate: &Candidate, truth: &Truth, way: Option<&Way>) -> Result<TechniqueRecord> {
     let settings = candidate.settings(&shot.occlusion);
+    let pixels = u64::from(shot.size[0]) * u64::from(shot.size[1]);
+    let primary = settings.primary.unwrap_or_else(|| Primary::auto(shot.tracer, pixels).0);
     // equal time is judged by what a still camera shows
     let still = bench.args.wants(Part::Still) || bench.args.wants(Part::EqualTime);
     Ok(TechniqueRecord {
         preset: candidate.name.to_owned(),
         technique: settings.technique.name().to_owned(),
+        primary: if primary == Primary::Traced { "traced" } else { "raster" }.to_owned(),
         rays_per_pixel: settings.rays_per_pixel,
         still: if still { Some(shot.still(candidate, truth, bench.args.frames())?) } else { None },
         rest: if bench.args.wants(Part::Rest) { shot.rest(candidate, truth)? } else { None },

@@ -20,47 +20,64 @@ use crate::measure::temporal::{Ghosting, LagCurve, Residual, recovery};
 use crate::render::camera::CameraRecord;
 use crate::render::realtime::{Realtime, Technique};
 use crate::scene::flatten::FlatScene;
+use crate::scene::load;
 use crate::tracer::Tracer;
 use script::Script;
 
 /// How much more than the settled error still counts as recovered.
 const RECOVERED: f64 = 1.1;
 
-/// All changes.
-pub fn measure(bench: &mut Bench) -> Result<()> {
+/// What is animated, unless scenes are named.
+const ANIMATED: &str = "builtin:parade";
+
+/// All changes: those of a room of our own, and the first animation of each scene that has one.
+pub fn measure(bench: &mut Bench, scenes: &[String]) -> Result<()> {
     let room = room::Room::new();
     let aspect = bench.aspect();
-    type Play = fn(&mut Bench, &mut Script, &mut Stage, &mut ChangeRecord) -> Result<()>;
+    let animated = if bench.args.scenes.is_empty() { vec![ANIMATED.to_owned()] } else { scenes.to_vec() };
+    let jobs = animated.len() as f64 + 3.0;
     let plays: [(&str, Script, Play); 3] = [
         ("appear", room.appearing(), appear::play),
         ("slide", room.sliding(aspect), sequence::play),
         ("sidestep", room.standing(), sidestep::play),
     ];
-    let all = plays.len() as f64;
-    for (k, (change, mut script, play)) in plays.into_iter().enumerate() {
-        let name = format!("{}, {change}", script.name);
-        if bench.is_late() && !bench.out.is_empty() {
-            bench.leave_out(&name);
-            continue;
+    for (k, (change, script, play)) in plays.into_iter().enumerate() {
+        bench.advance(k as f64 / jobs);
+        one(bench, change, script, play)?;
+    }
+    for (k, source) in animated.iter().enumerate() {
+        bench.advance((k as f64 + 3.0) / jobs);
+        let scene = load::load(source)?;
+        if let Some(script) = Script::animated(source, &scene, aspect)? {
+            one(bench, "animated", script, sequence::play)?;
         }
-        bench.advance(k as f64 / all);
-        let flat = FlatScene::with_motion(script.scene, script.motion.clone())?;
-        let mut tracer = bench.tracer(&name, &flat)?;
-        let occlusion = bench.args.occlusion(script.reach)?;
-        let size = bench.args.size();
-        let referee = Referee::new(&tracer, size, &occlusion, bench.args.reference_rays())?;
-        let camera = CameraRecord::new(&script.camera, flat.origin, aspect);
-        let mut stage = Stage { tracer: &mut tracer, referee, size, camera, occlusion, name };
-        let mut record = ChangeRecord { scene: script.name.clone(), change: change.to_owned(), ..Default::default() };
-        let outcome = play(bench, &mut script, &mut stage, &mut record);
-        compare(&mut record);
-        if !record.results.is_empty() {
-            bench.lines(&table::change(&record))?;
-            bench.out.changes.push(record);
-        }
-        outcome?;
     }
     Ok(())
+}
+
+type Play = fn(&mut Bench, &mut Script, &mut Stage, &mut ChangeRecord) -> Result<()>;
+
+fn one(bench: &mut Bench, change: &str, mut script: Script, play: Play) -> Result<()> {
+    let name = format!("{}, {change}", script.name);
+    if bench.is_late() && !bench.out.is_empty() {
+        bench.leave_out(&name);
+        return Ok(());
+    }
+    let flat = FlatScene::with_motion(script.scene, script.motion.clone())?;
+    let mut tracer = bench.tracer(&name, &flat)?;
+    let occlusion = bench.args.occlusion(script.reach)?;
+    let size = bench.args.size();
+    let referee = Referee::new(&tracer, size, &occlusion, bench.args.reference_rays())?;
+    let camera = CameraRecord::new(&script.camera, flat.origin, bench.aspect());
+    let mut stage = Stage { tracer: &mut tracer, referee, size, camera, occlusion, name };
+    let mut record = ChangeRecord { scene: script.name.clone(), change: change.to_owned(), ..Default::default() };
+    let outcome = play(bench, &mut script, &mut stage, &mut record);
+    compare(&mut record);
+    if !record.results.is_empty() {
+        bench.lines(&table::change(&record))?;
+        bench.out.changes.push(record);
+    }
+    outcome
 }
 
 /// Where a script is played.
