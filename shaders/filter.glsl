@@ -58,6 +58,6 @@ void main() {
     float variance = (variances + mean * (1.0 - mean) * PRIOR_SAMPLES) / (max(n - count, 0.0) + PRIOR_SAMPLES);
     // what noise alone makes of the spread: each mean has the variance of a sample by its samples
     float detail = max(spread - variance * count / n, 0.0);
-    float keep = own.samples > 0.0 ? detail / (detail + variance / own.samples) : 0.0;
+    float keep = own.samples > 0.0 && detail > 0.0 ? detail / (detail + variance / own.samples) : 0.0;
     result.v[at] = mix(mean, own.mean, keep);
 }
