@@ -366,6 +366,8 @@ impl Realtime {
             rest: (s.rest && still && self.state.has_history).into(),
             slices: s.gtao[0],
             steps: s.gtao[1],
+            even_sequence: (s.sequence.is_even() && !s.binary()).into(),
+            reserved: 0,
             surface: images.surface.address(),
             axes: images.axes.as_ref().map_or(0, Buffer::address),
             guide,
