@@ -16,6 +16,17 @@ layout(local_size_x = LANES) in;
 // count as few.
 const float PRIOR_SAMPLES = 4.0;
 
+// A pixel whose box holds fewer samples of its surface also takes those of surfaces that are turned and offset a little more.
+const float LONELY = 6.0;
+const float LONELY_COSINE = 0.5;
+const float LONELY_TOLERANCE = 2.0;
+
+// Variance of the mean of n samples, by that of one: 1/n of random ones, and less where a sequence fills the square evenly and what is
+// sampled is smooth, as it is with a falloff.
+float mean_variance(FrameParams f, float n) {
+    return (f.even_sequence != 0u ? inversesqrt(max(n, 1.0)) : 1.0) / n;
+}
+
 // A step of the filter, in the push constants: estimates from `rays` to `queued`, or accessibility to the result where that is null.
 // Sides of the box on which it reaches to the radius, and the distance of its taps.
 const uint STEP_HORIZONTAL = 1u;
@@ -60,19 +71,29 @@ void main() {
     ivec2 reach = radius * ivec2(push.sample_index & STEP_HORIZONTAL, (push.sample_index & STEP_VERTICAL) >> 1);
     // taps within the image
     ivec2 lower = max(-reach, -(pixel / stride)), upper = min(reach, (ivec2(f.size) - 1 - pixel) / stride);
-    float sum = 0.0, squares = 0.0, n = 0.0, variances = 0.0, count = 0.0;
-    for (int y = lower.y; y <= upper.y; y++) {
-        for (int x = lower.x; x <= upper.x; x++) {
-            ivec2 offset = stride * ivec2(x, y);
-            uint tap = uint(int(at) + offset.y * int(width) + offset.x);
-            if (!same_surface(edge, vec2(offset), LOAD_PAIR(guides, tap))) continue;
-            Estimate e = unpack_estimate(LOAD_PAIR(estimates, tap));
-            sum += e.mean * e.samples;
-            squares += e.mean * e.mean * e.samples;
-            variances += e.variance * e.samples;
-            n += e.samples;
-            count += e.samples > 0.0 ? 1.0 : 0.0;
+    float sum, squares, n, variances, count, noise;
+    bool even = f.even_sequence != 0u;
+    for (int attempt = 0; attempt < 2; attempt++) {
+        sum = squares = n = variances = count = noise = 0.0;
+        for (int y = lower.y; y <= upper.y; y++) {
+            for (int x = lower.x; x <= upper.x; x++) {
+                ivec2 offset = stride * ivec2(x, y);
+                uint tap = uint(int(at) + offset.y * int(width) + offset.x);
+                if (!same_surface(edge, vec2(offset), LOAD_PAIR(guides, tap))) continue;
+                Estimate e = unpack_estimate(LOAD_PAIR(estimates, tap));
+                sum += e.mean * e.samples;
+                squares += e.mean * e.mean * e.samples;
+                variances += e.variance * e.samples;
+                n += e.samples;
+                count += e.samples > 0.0 ? 1.0 : 0.0;
+                // its samples times the variance of their mean
+                noise += e.samples > 0.0 ? (even ? inversesqrt(max(e.samples, 1.0)) : 1.0) : 0.0;
+            }
         }
+        if (n >= LONELY) break;
+        // geometry as fine as pixels: neighbours that are nearly so, rather than next to nothing
+        edge.cosine = LONELY_COSINE;
+        edge.tolerance *= LONELY_TOLERANCE;
     }
     if (n == 0.0) {
         finish(f, at, own);
@@ -82,8 +103,8 @@ void main() {
     float spread = max(squares / n - mean * mean, 0.0);
     // about their own pixels' means, so that each pixel has one less to tell
     float variance = (variances + mean * (1.0 - mean) * PRIOR_SAMPLES) / (max(n - count, 0.0) + PRIOR_SAMPLES);
-    // what noise alone makes of the spread: each mean has the variance of a sample by its samples
-    float detail = max(spread - variance * count / n, 0.0);
-    float keep = own.samples > 0.0 && detail > 0.0 ? detail / (detail + variance / own.samples) : 0.0;
+    // what noise alone makes of the spread
+    float detail = max(spread - variance * noise / n, 0.0);
+    float keep = own.samples > 0.0 && detail > 0.0 ? detail / (detail + variance * mean_variance(f, own.samples)) : 0.0;
     finish(f, at, Estimate(mix(mean, own.mean, keep), mix(n, own.samples, keep), variance));
 }

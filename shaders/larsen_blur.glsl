@@ -28,7 +28,8 @@ void main() {
     vec2 uv = (vec2(at % f.size.x, at / f.size.x) + 0.5) / vec2(f.size);
     vec2 middle = uv * vec2(l.half_size) - 0.5;
     float occlusion = bilinear(l, middle);
-    if (occlusion != 0.0) {
+    // without a filter: to see what it does
+    if (occlusion != 0.0 && push.sample_bits > 0u) {
         occlusion = 0.0;
         for (int k = 0; k < 9; k++) occlusion += bilinear(l, middle + vec2(k % 3 - 1, k / 3 - 1)) / 9.0;
     }

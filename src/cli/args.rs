@@ -504,7 +504,7 @@ pub struct DiffArgs {
 
 type Parsed<T> = std::result::Result<T, String>;
 
-fn parse_size(text: &str) -> Parsed<[u32; 2]> {
+pub fn parse_size(text: &str) -> Parsed<[u32; 2]> {
     let side = |s: &str| s.trim().parse::<u32>().map_err(|_| "expected WIDTHxHEIGHT in pixels, like 1280x720".to_owned());
     let (w, h) = text.split_once(['x', 'X']).ok_or("expected WIDTHxHEIGHT in pixels, like 1280x720")?;
     let size = [side(w)?, side(h)?];

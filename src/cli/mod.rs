@@ -61,7 +61,7 @@ enum Command {
     Doctor(args::DoctorArgs),
     /// Compare two images in numbers
     Diff(args::DiffArgs),
-    /// Measure how fast rays are traced, beside other tracers
+    /// Measure how fast rays are traced, beside other tracers, and what real-time ambient occlusion costs and is worth
     Bench(bench::BenchArgs),
 }
 

@@ -1,9 +1,13 @@
 //! Numbers that say how good something is: [`metrics`] of two images, [`flip`] for how different they look, [`temporal`] for
 //! what of the past is left in a sequence of them, [`parity`] of two tracers, over [`ray_sets`]; and how fast: [`benchmark`]
-//! holds what a benchmark found, [`stats`] what repeats say, [`plot`] the picture of it.
+//! holds what a benchmark found, [`ao_benchmark`] what one of ambient occlusion did, [`stats`] what repeats say, [`plot`]
+//! and [`ao_plot`] the pictures of them, with what [`chart`] has for both.
 
 pub mod agreement;
+pub mod ao_benchmark;
+pub mod ao_plot;
 pub mod benchmark;
+pub mod chart;
 pub mod flip;
 pub mod metrics;
 pub mod parity;

@@ -23,6 +23,25 @@ impl Summary {
     }
 }
 
+/// Median of some values, and what all but the slowest twentieth stay within. The unit is theirs.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Spread {
+    /// Middle value.
+    pub median: f64,
+    /// The 95th percentile, by nearest rank: a value that occurred.
+    pub p95: f64,
+}
+
+impl Spread {
+    /// Of some values; `None` for no values.
+    pub fn of(values: &[f64]) -> Option<Self> {
+        let mut sorted = values.to_vec();
+        sorted.sort_by(f64::total_cmp);
+        let rank = (sorted.len() * 19).div_ceil(20).checked_sub(1)?;
+        Some(Self { median: middle(&sorted), p95: sorted[rank] })
+    }
+}
+
 /// Median of some values; `None` for no values.
 pub fn median(values: &[f64]) -> Option<f64> {
     Summary::of(values).map(|s| s.median)
@@ -103,6 +122,10 @@ mod tests {
         assert_eq!(Summary::of(&[3.0, 1.0, 2.0]), Some(Summary { median: 2.0, min: 1.0, max: 3.0 }));
         assert_eq!(median(&[4.0, 1.0, 2.0, 3.0]), Some(2.5));
         assert_eq!(median(&[7.0]), Some(7.0));
+        let hundred: Vec<f64> = (1..=100).rev().map(f64::from).collect();
+        assert_eq!(Spread::of(&hundred), Some(Spread { median: 50.5, p95: 95.0 }));
+        assert_eq!(Spread::of(&[2.0, 1.0]), Some(Spread { median: 1.5, p95: 2.0 }));
+        assert_eq!(Spread::of(&[]), None);
         assert_eq!(percentile(&[], 0.95), None);
         assert_eq!(percentile(&[3.0, 1.0, 2.0, 4.0, 5.0], 0.5), Some(3.0));
         assert_eq!(percentile(&[3.0, 1.0, 2.0, 4.0, 5.0], 0.95), Some(4.8));

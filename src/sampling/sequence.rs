@@ -43,6 +43,11 @@ impl Sequence {
         }
     }
 
+    /// Do the samples that a pixel takes one after the other fill the square evenly?
+    pub fn is_even(self) -> bool {
+        matches!(self, Sequence::Sobol | Sequence::Blue | Sequence::R2)
+    }
+
     /// Sample `index` of the `count` that `pixel` takes in a frame, as fractions of 2^32. What frames draw continues.
     pub fn get_2d(self, seed: u32, pixel: [u32; 2], frame: u32, index: u32, count: u32) -> [u32; 2] {
         let n = frame.wrapping_mul(count).wrapping_add(index);

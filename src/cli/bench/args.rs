@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use clap::{Args, Subcommand, ValueHint};
 
+use super::ao::BenchAoArgs;
 use super::contestant::OWN;
 use super::streams::STREAMS;
 use crate::cli::args::{BuildChoice, parse_radius, parse_seconds};
@@ -33,6 +34,8 @@ pub struct BenchArgs {
 pub enum What {
     /// Rays a second of each tracer, kernel and peer, by stream of rays and scene
     Rays(Box<BenchRaysArgs>),
+    /// Real-time ambient occlusion: time, rays and error of each preset, by scene, view and kind of motion
+    Ao(Box<BenchAoArgs>),
 }
 
 /// `skylit bench rays`.

@@ -1,5 +1,7 @@
-//! `skylit bench`: how fast skylit's tracers are, beside each other and beside those of others.
+//! `skylit bench`: how fast skylit's tracers are, beside each other and beside those of others; and how fast and how good its
+//! real-time ambient occlusion is.
 
+mod ao;
 mod args;
 mod contestant;
 mod peer;
@@ -17,5 +19,6 @@ use super::console::Failure;
 pub fn run(args: &BenchArgs) -> Result<(), Failure> {
     match &args.what {
         args::What::Rays(args) => rays::run(args),
+        args::What::Ao(args) => ao::run(args),
     }
 }

@@ -99,7 +99,7 @@ pub fn check_there(source: &str) -> Result<()> {
 }
 
 /// Where the well-known scenes are.
-fn folder() -> PathBuf {
+pub(super) fn folder() -> PathBuf {
     std::env::var_os("SKYLIT_SHARED_SCENES").map_or_else(|| Path::new("../shared/scenes").to_owned(), PathBuf::from)
 }
 
@@ -140,10 +140,15 @@ pub fn load(source: &str, args: &BenchRaysArgs, aspect: f64) -> Result<Subject> 
 
 /// The well-known scene that a file is, by its name and that of its folder: there are many a scene.glb.
 fn known(source: &str) -> Option<&'static Known> {
+    KNOWN.iter().find(|k| is_file(source, k.path))
+}
+
+/// Do a file and its folder have the names of `path`'s?
+pub(super) fn is_file(source: &str, path: &str) -> bool {
     let tail = |path: &Path| path.components().rev().take(2).map(|c| c.as_os_str().to_owned()).collect::<Vec<_>>();
     // a path without a folder has one all the same
-    let path = std::path::absolute(source).unwrap_or_else(|_| PathBuf::from(source));
-    KNOWN.iter().find(|k| tail(Path::new(k.path)) == tail(&path))
+    let source = std::path::absolute(source).unwrap_or_else(|_| PathBuf::from(source));
+    tail(Path::new(path)) == tail(&source)
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 use crate::measure::benchmark::{RayBenchmark, SceneRecord};
 
 /// A table in plain text: the first `left` columns to the left, the others to the right.
-fn align(rows: &[Vec<String>], left: usize) -> Vec<String> {
+pub(super) fn align(rows: &[Vec<String>], left: usize) -> Vec<String> {
     let columns = rows.iter().map(Vec::len).max().unwrap_or(0);
     let width: Vec<usize> =
         (0..columns).map(|c| rows.iter().filter_map(|r| r.get(c)).map(|t| t.chars().count()).max().unwrap_or(0)).collect();
@@ -14,7 +14,7 @@ fn align(rows: &[Vec<String>], left: usize) -> Vec<String> {
     rows.iter().map(|r| r.iter().enumerate().map(cell).collect::<Vec<_>>().join("  ").trim_end().to_owned()).collect()
 }
 
-fn number(x: f64) -> String {
+pub(super) fn number(x: f64) -> String {
     match x {
         x if x >= 100.0 => format!("{x:.0}"),
         x if x >= 10.0 => format!("{x:.1}"),
@@ -23,7 +23,7 @@ fn number(x: f64) -> String {
 }
 
 /// With separators between thousands.
-fn thousands(n: u64) -> String {
+pub(super) fn thousands(n: u64) -> String {
     let digits = n.to_string();
     let mut out = String::new();
     for (k, c) in digits.chars().enumerate() {

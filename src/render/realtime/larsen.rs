@@ -7,6 +7,7 @@ use std::sync::Arc;
 
 use bytemuck::{Pod, Zeroable};
 
+use super::settings::{FilterKind, Settings};
 use crate::error::Result;
 use crate::gpu::{Buffer, ComputePipeline, Device, Memory, Recorder};
 use crate::render::block::Block;
@@ -50,6 +51,7 @@ pub(super) struct Larsen {
     params: LarsenParams,
     params_buffer: Buffer,
     size: [u32; 2],
+    blurred: bool,
     lit: Buffer,
     previous: Buffer,
     rays: Buffer,
@@ -58,8 +60,8 @@ pub(super) struct Larsen {
 }
 
 impl Larsen {
-    /// `lights`: positions of point lights relative to the scene's origin. `unit`: world units that one of theirs is.
-    pub fn new(tracer: &Tracer, size: [u32; 2], lights: &[[f32; 3]], unit: f64) -> Result<Self> {
+    /// `lights`: positions of point lights relative to the scene's origin.
+    pub fn new(tracer: &Tracer, size: [u32; 2], lights: &[[f32; 3]], settings: &Settings) -> Result<Self> {
         let device = tracer.device();
         let half = size.map(|n| n.div_ceil(2));
         let pixels = |s: [u32; 2]| u64::from(s[0]) * u64::from(s[1]);
@@ -80,7 +82,7 @@ impl Larsen {
             lights: lights_at,
             light_count: lights.len() as u32,
             half_size: half,
-            unit: unit as f32,
+            unit: settings.unit as f32,
             points,
             noise,
             lit: lit.address(),
@@ -100,6 +102,7 @@ impl Larsen {
             params,
             params_buffer: upload(device)?,
             size,
+            blurred: settings.filter.kind != FilterKind::None,
             lit,
             previous,
             rays,
@@ -135,7 +138,7 @@ impl Larsen {
             r.timed("sum", |r| r.dispatch(&self.sum, &push, (count / RAYS).div_ceil(LANES)));
             r.barrier();
         }
-        let all = Push { count: self.size[0] * self.size[1], ..push };
+        let all = Push { count: self.size[0] * self.size[1], sample_bits: self.blurred.into(), ..push };
         let groups = all.count.div_ceil(LANES);
         r.timed("blur", |r| r.dispatch(&self.blur, &all, groups));
         r.barrier();

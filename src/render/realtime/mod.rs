@@ -31,6 +31,11 @@ const DEPTH_TOLERANCE: f32 = 1.5;
 /// Cosine between normals, likewise.
 const NORMAL_TOLERANCE: f32 = 0.9;
 
+/// Bytes of a pixel's surface (`surface` in shaders/common/frame.glsl).
+const SURFACE_BYTES: u64 = 32;
+/// Bytes of where it was.
+const POSITION_BYTES: u64 = 12;
+
 /// What making a frame took.
 #[derive(Clone, Debug, Default)]
 pub struct FrameStats {
@@ -42,6 +47,15 @@ pub struct FrameStats {
     pub occlusion_rays: u64,
     /// Occlusion rays that this many pixels would have taken, and that were left out: nothing is there, or all is known.
     pub skipped_rays: u64,
+}
+
+/// A pixel's surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Surface {
+    /// Its point, relative to the scene's origin.
+    pub position: [f32; 3],
+    /// Where that point was before the scene's last update.
+    pub before: [f32; 3],
 }
 
 impl FrameStats {
@@ -139,7 +153,7 @@ impl Realtime {
             primary_reason,
             images: Images::new(tracer, size, settings)?,
             larsen: match settings.technique {
-                Technique::Larsen => Some(Box::new(Larsen::new(tracer, size, lights, settings.unit)?)),
+                Technique::Larsen => Some(Box::new(Larsen::new(tracer, size, lights, settings)?)),
                 _ => None,
             },
             commands: Commands::new(tracer.device())?,
@@ -166,6 +180,12 @@ impl Realtime {
     pub fn reset(&mut self) {
         self.state.has_history = false;
         self.state.camera = None;
+    }
+
+    /// As [`Realtime::reset`], and draws the same samples again, from the first frame on.
+    pub fn rewind(&mut self) {
+        self.reset();
+        self.state.frame = 0;
     }
 
     /// Makes the next frame. `moved` is what has moved in the scene since the one before ([`crate::tracer::UpdateStats::moved`]).
@@ -274,6 +294,23 @@ impl Realtime {
         Ok(guide.iter().map(|g| if g[0] < f32::INFINITY { 1.0 } else { 0.0 }).collect())
     }
 
+    /// What each pixel of the last frame shows, rows from the top; `None` where nothing is.
+    pub fn surfaces(&self) -> Result<Vec<Option<Surface>>> {
+        let floats = |buffer: &Buffer, bytes: u64| -> Result<Vec<f32>> {
+            Ok(bytemuck::pod_collect_to_vec(&buffer.read(0, bytes * self.pixels())?))
+        };
+        let now = floats(&self.images.surface, SURFACE_BYTES)?;
+        let before = self.images.previous_position.as_ref().map(|b| floats(b, POSITION_BYTES)).transpose()?;
+        let point = |values: &[f32], k: usize| [values[k], values[k + 1], values[k + 2]];
+        let covered = self.coverage()?;
+        let surface = |(k, covered): (usize, &f32)| {
+            let position = point(&now, k * SURFACE_BYTES as usize / 4);
+            let before = before.as_ref().map_or(position, |b| point(b, 3 * k));
+            (*covered > 0.0).then_some(Surface { position, before })
+        };
+        Ok(covered.iter().enumerate().map(surface).collect())
+    }
+
     /// The launches of occlusion rays, each of whole pixels.
     fn launches(&self, push: Push) -> Vec<Push> {
         let n = self.settings.rays_per_pixel;
@@ -329,6 +366,8 @@ impl Realtime {
             rest: (s.rest && still && self.state.has_history).into(),
             slices: s.gtao[0],
             steps: s.gtao[1],
+            even_sequence: (s.sequence.is_even() && !s.binary()).into(),
+            reserved: 0,
             surface: images.surface.address(),
             axes: images.axes.as_ref().map_or(0, Buffer::address),
             guide,
@@ -450,7 +489,7 @@ impl Images {
             block_params: upload("block parameters", size_of::<BlockParams>())?,
             frame_params: upload("frame parameters", size_of::<FrameParams>())?,
             moved: upload("what moved", MOST_MOVED * size_of::<MovedRecord>())?,
-            surface: image("surfaces", 32)?,
+            surface: image("surfaces", SURFACE_BYTES)?,
             axes: maybe(settings.hemisphere == Hemisphere::Shading, "axes of hemispheres", 12)?,
             guides: [image("guide", 8)?, image("guide", 8)?],
             histories: [image("history", 8)?, image("history", 8)?],
@@ -463,7 +502,7 @@ impl Images {
                 true => Some(Buffer::new(device, "samples", 4 * u64::from(LAUNCH_RAYS), Memory::Device)?),
                 false => None,
             },
-            previous_position: maybe(tracer.is_dynamic(), "previous positions", 12)?,
+            previous_position: maybe(tracer.is_dynamic(), "previous positions", POSITION_BYTES)?,
             result: Buffer::new(device, "accessibility", 4 * pixels, Memory::Readback)?,
             ray_count: Buffer::new(device, "number of rays", 4, Memory::Readback)?,
         })

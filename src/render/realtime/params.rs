@@ -64,6 +64,10 @@ pub struct FrameParams {
     pub slices: u32,
     /// Of gtao, on each side.
     pub steps: u32,
+    /// 1: the samples of a pixel fill the square evenly.
+    pub even_sequence: u32,
+    /// To a multiple of 8 bytes.
+    pub reserved: u32,
     /// Surfaces.
     pub surface: u64,
     /// Axes of the hemispheres, or 0.
