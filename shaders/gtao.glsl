@@ -11,8 +11,8 @@ layout(local_size_x = LANES) in;
 const float PI = 3.14159265359;
 // The first step leaves the pixel itself, pixels.
 const float LEAST_STEP = 1.3;
-// Radius of the search at most, in heights of the image.
-const float MOST_SEARCH = 0.5;
+// Sine of the angle above a surface's plane from which on something stands on it.
+const float LEAST_RISE = 1e-3;
 
 float arc(float cos_n, float n, float h) {
     return 0.25 * (cos_n + 2.0 * h * sin(n) - cos(2.0 * h - n));
@@ -25,6 +25,12 @@ float weight(FrameParams f, float d) {
     return edge * exp2(-d * f.falloff_log2);
 }
 
+// How far it is from a point of the image to its border, pixels.
+float to_border(FrameParams f, vec2 from, vec2 direction) {
+    vec2 room = mix(from, vec2(f.size) - from, greaterThan(direction, vec2(0.0))) / max(abs(direction), vec2(1e-6));
+    return min(room.x, room.y);
+}
+
 void main() {
     uint at = push.first + gl_GlobalInvocationID.x;
     if (gl_GlobalInvocationID.x >= push.count) return;
@@ -35,23 +41,25 @@ void main() {
     uvec2 pixel = uvec2(at % f.size.x, at / f.size.x);
     float depth = uintBitsToFloat(guide.x);
     vec2 centre = vec2(pixel) + 0.5;
-    vec3 p = unproject(orthographic, image_plane(f, f.view, centre), depth);
+    vec2 plane = image_plane(f, f.view, centre);
+    vec3 p = unproject(orthographic, plane, depth);
     vec3 v = orthographic ? vec3(0.0, 0.0, 1.0) : normalize(-p);
     vec3 normal = linear(f.world_to_camera, uintBitsToFloat(Quads(f.surface).v[2u * at + 1u].xyz));
-    float most = MOST_SEARCH * float(f.size.y);
-    float radius = min(f.reach / footprint(f, f.view, orthographic, depth), most);
+    // perpendicular to the view ray
+    vec3 right = normalize(vec3(v.z, 0.0, -v.x)), up = cross(v, right);
+    float radius = f.reach / footprint(f, f.view, orthographic, depth);
     vec2 u = sequence_2d(f.sequence, f.seed, pixel, f.frame, 0u, 1u);
-    float accessibility = 0.0;
+    float accessibility = 0.0, open = 0.0;
     for (uint slice = 0u; slice < f.slices; slice++) {
         float phi = PI * (float(slice) + u.x) / float(f.slices);
+        // slices are even about the view ray, which those that are even in the image are not beside its middle
+        vec3 tangent = cos(phi) * right + sin(phi) * up;
         // image rows go down, the camera's y goes up
-        vec2 along = vec2(cos(phi), -sin(phi));
-        vec3 direction = vec3(cos(phi), sin(phi), 0.0);
-        vec3 axis = normalize(cross(direction, v));
+        vec2 along = vec2(1.0, -1.0) * normalize(orthographic ? tangent.xy : tangent.xy + plane * tangent.z);
+        vec3 axis = cross(tangent, v);
         vec3 projected = normal - axis * dot(normal, axis);
         float size = length(projected);
         if (size < 1e-5) continue;
-        vec3 tangent = direction - v * dot(direction, v);
         float cos_n = clamp(dot(projected, v) / size, 0.0, 1.0);
         float n = (dot(tangent, projected) < 0.0 ? -1.0 : 1.0) * acos(cos_n);
         float arcs = 0.0;
@@ -60,16 +68,19 @@ void main() {
             // the surface itself is the lowest horizon
             float low = cos(clamp(n + sgn * 0.5 * PI, -PI, PI));
             float horizon = low;
+            // what lies beyond the border is not known: all steps are spent within
+            float search = min(radius, to_border(f, centre, sgn * along));
             for (uint k = 0u; k < f.steps; k++) {
                 float s = (float(k) + u.y) / float(f.steps);
-                vec2 q = centre + sgn * along * max(s * s * radius, LEAST_STEP + float(k));
+                vec2 q = centre + sgn * along * max(s * s * search, LEAST_STEP + float(k));
                 if (any(lessThan(q, vec2(0.0))) || any(greaterThanEqual(q, vec2(f.size)))) break;
                 uvec2 tap = uvec2(q);
                 float there = uintBitsToFloat(Pairs(f.guide).v[image_index(f, tap)].x);
                 if (!(there < INFINITY)) continue;
                 vec3 delta = unproject(orthographic, image_plane(f, f.view, vec2(tap) + 0.5), there) - p;
                 float d = length(delta);
-                if (d == 0.0) continue;
+                // what lies in the surface's own plane is no horizon: a pixel's middle is beside the slice, where a slanting plane is higher
+                if (dot(delta, normal) <= LEAST_RISE * d) continue;
                 horizon = max(horizon, mix(low, dot(delta, v) / d, weight(f, d)));
             }
             float h = sgn * acos(clamp(horizon, -1.0, 1.0));
@@ -78,7 +89,9 @@ void main() {
             arcs += arc(cos_n, n, h);
         }
         accessibility += size * arcs;
+        open += size * (cos_n + n * sin(n));
     }
-    accessibility = clamp(accessibility / float(f.slices), 0.0, 1.0);
+    // of what these slices would be without anything in them, which a few are not evenly
+    accessibility = open > 0.0 ? clamp(accessibility / open, 0.0, 1.0) : 1.0;
     STORE_PAIR(f.current, at, pack_estimate(Estimate(accessibility, 1.0, 0.0)));
 }
