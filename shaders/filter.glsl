@@ -56,6 +56,22 @@ void finish(FrameParams f, uint at, Estimate e, vec3 bent) {
     FloatImage(f.result).v[at] = e.samples > 0.0 ? e.mean : 1.0;
 }
 
+// Of the pixels around, whatever they show: for one that is the only one of its surface, before it has had its turn. A guess, but a
+// better one than that nothing is in the way.
+Estimate around(FrameParams f, uvec2 estimates, ivec2 pixel) {
+    ivec2 lower = max(pixel - 1, ivec2(0)), upper = min(pixel + 1, ivec2(f.size) - 1);
+    float sum = 0.0, n = 0.0;
+    for (int y = lower.y; y <= upper.y; y++) {
+        for (int x = lower.x; x <= upper.x; x++) {
+            // background has no samples
+            Estimate e = unpack_estimate(LOAD_PAIR(estimates, uint(y) * f.size.x + uint(x)));
+            sum += e.mean * e.samples;
+            n += e.samples;
+        }
+    }
+    return n > 0.0 ? Estimate(sum / n, n, 0.0) : Estimate(0.0, 0.0, 0.0);
+}
+
 void main() {
     uint at = gl_GlobalInvocationID.x;
     if (at >= push.count) return;
@@ -110,7 +126,7 @@ void main() {
         edge.tolerance *= LONELY_TOLERANCE;
     }
     if (n == 0.0) {
-        finish(f, at, own, own_bent);
+        finish(f, at, is_null(push.queued) ? around(f, estimates, pixel) : own, own_bent);
         return;
     }
     float mean = sum / n;

@@ -1,0 +1,133 @@
+//! Ambient occlusion frame after frame: what its images must show, what it leaves out, and how it ends. Images are small; every claim is
+//! held on each tracer that the device runs, unless it says which.
+
+#[path = "../common/mod.rs"]
+mod common;
+
+mod bias;
+mod cli;
+mod constants;
+mod degenerate;
+mod edges;
+mod gtao;
+mod larsen;
+mod long_run;
+mod motion;
+mod sequence;
+mod settings;
+mod skips;
+mod tracers;
+
+use std::sync::Arc;
+
+use glam::{DAffine3, DVec3};
+use skylit::gpu::Device;
+use skylit::render::camera::CameraRecord;
+use skylit::render::raster::Primary;
+use skylit::render::realtime::{Filter, FilterKind, FrameStats, Preset, Realtime, Settings};
+use skylit::scene::builtin::by_name;
+use skylit::scene::{Camera, Geometry, Instance, Material, Mesh, Scene, TriangleMesh};
+use skylit::tracer::{Tracer, TracerKind};
+
+/// The floor's: for what comes after tracing, which no tracer changes.
+fn one_tracer(device: &Device) -> Vec<TracerKind> {
+    let kinds = common::tracers(device);
+    kinds.into_iter().filter(|k| *k == TracerKind::Compute).collect()
+}
+
+/// Of most images here.
+const SIZE: [u32; 2] = [96, 54];
+
+fn scene(name: &str) -> Scene {
+    by_name(name).unwrap_or_else(|| panic!("no built-in scene {name}"))
+}
+
+fn record(scene: &Scene, camera: &Camera, size: [u32; 2]) -> CameraRecord {
+    CameraRecord::new(camera, scene.origin(), f64::from(size[0]) / f64::from(size[1]))
+}
+
+/// The scene's own camera, moved along its own axes.
+fn stepped(scene: &Scene, size: [u32; 2], step: DVec3) -> CameraRecord {
+    let mut camera = scene.cameras[0].clone();
+    camera.camera_to_world = camera.camera_to_world * DAffine3::from_translation(step);
+    record(scene, &camera, size)
+}
+
+/// Camera rays are traced: what is drawn has a test of its own.
+fn traced(preset: Preset) -> Settings {
+    Settings { primary: Some(Primary::Traced), ..preset.settings() }
+}
+
+const NO_FILTER: Filter = Filter { kind: FilterKind::None, radius: 0, samples: 0.0 };
+
+fn realtime(tracer: &Tracer, size: [u32; 2], settings: &Settings) -> Realtime {
+    Realtime::new(tracer, size, settings, &[]).unwrap_or_else(|e| panic!("{}: {e}", tracer.kind()))
+}
+
+/// Frames of a scene in which nothing moves.
+fn frames(realtime: &mut Realtime, tracer: &Tracer, camera: &CameraRecord, count: u32) -> Vec<FrameStats> {
+    (0..count).map(|_| realtime.frame(tracer, camera, &[]).unwrap()).collect()
+}
+
+/// What an image with many rays says, without history and filter: a quarter of the preset's, which leaves an error of 0.01.
+fn reference(tracer: &Tracer, size: [u32; 2], like: &Settings, camera: &CameraRecord) -> Vec<f32> {
+    let settings = Settings {
+        radius: like.radius,
+        falloff: like.falloff,
+        hemisphere: like.hemisphere,
+        // of none of the seeds under test
+        seed: 77,
+        rays_per_pixel: 256,
+        ..traced(Preset::Reference)
+    };
+    let mut realtime = realtime(tracer, size, &settings);
+    frames(&mut realtime, tracer, camera, 1);
+    realtime.result().unwrap()
+}
+
+fn mean(values: impl IntoIterator<Item = f64>) -> f64 {
+    let (sum, count) = values.into_iter().fold((0.0, 0u64), |(s, n), v| (s + v, n + 1));
+    assert!(count > 0, "the mean of nothing");
+    sum / count as f64
+}
+
+/// Root of the mean square difference where `mask` is above 0.
+fn rmse(a: &[f32], b: &[f32], mask: &[f32]) -> f64 {
+    assert!(a.len() == b.len() && a.len() == mask.len());
+    let squares = (0..a.len()).filter(|&i| mask[i] > 0.0).map(|i| f64::from(a[i] - b[i]).powi(2));
+    mean(squares).sqrt()
+}
+
+/// Finite, from 0 to 1.
+fn assert_sound(what: &str, realtime: &Realtime) {
+    for (name, image) in [("result", realtime.result().unwrap()), ("history", realtime.unfiltered().unwrap())] {
+        let bad = image.iter().filter(|v| !(0.0..=1.0).contains(*v)).count();
+        assert_eq!(bad, 0, "{what}: {bad} pixels of {} in the {name} are no accessibility", image.len());
+    }
+    assert!(realtime.samples().unwrap().iter().all(|n| (0.0..=4096.0).contains(n)), "{what}");
+}
+
+/// Meshes where they are, each once.
+fn scene_of(meshes: Vec<TriangleMesh>, camera: Camera) -> Scene {
+    let mut scene = Scene { materials: vec![Material::default()], cameras: vec![camera], ..Scene::default() };
+    for (mesh, geometry) in meshes.into_iter().enumerate() {
+        scene.meshes.push(Mesh { name: format!("mesh {mesh}"), geometry: Geometry::Triangles(geometry), material: 0 });
+        scene.instances.push(Instance { name: format!("mesh {mesh}"), mesh, object_to_world: DAffine3::IDENTITY });
+    }
+    scene
+}
+
+fn triangles(geometry: Geometry) -> TriangleMesh {
+    match geometry {
+        Geometry::Triangles(t) => t,
+        Geometry::Spheres(_) => panic!("spheres"),
+    }
+}
+
+fn bits(values: &[f32]) -> Vec<u32> {
+    values.iter().map(|v| v.to_bits()).collect()
+}
+
+fn tracer_of(device: &Arc<Device>, kind: TracerKind, scene: &Scene) -> Tracer {
+    common::tracer(device, kind, scene)
+}
