@@ -92,7 +92,7 @@ fn gpu_any_scale_and_place() {
         let scene = analytic::sphere_over_plane(1.0, 1.25, 60.0, place);
         let good = record(&scene, &scene.cameras[0], SMALL);
         let mut nearer = scene.cameras[0].clone();
-        nearer.camera_to_world = nearer.camera_to_world * DAffine3::from_translation(DVec3::NEG_Z * 0.5 * scale);
+        nearer.camera_to_world *= DAffine3::from_translation(DVec3::NEG_Z * 0.5 * scale);
         check(&format!("scale {scale}, offset {offset}"), &scene, &good, &[record(&scene, &nearer, SMALL)]);
     }
 }

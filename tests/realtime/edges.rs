@@ -84,8 +84,8 @@ fn gpu_nothing_crosses_an_edge_in_depth() {
             }
             let what = format!("{kind}, gap {gap}, {:?}", settings.filter.kind);
             let (mut changed, mut partial) = ([0; 2], 0);
-            for frame in 0..images[0].len() {
-                let [plain, near_tilted, far_tilted] = [0, 1, 2].map(|k| &images[k][frame]);
+            let [plain, near_tilted, far_tilted] = [0, 1, 2].map(|k: usize| images[k].iter());
+            for (frame, ((plain, near_tilted), far_tilted)) in plain.zip(near_tilted).zip(far_tilted).enumerate() {
                 for i in 0..plain.0.len() {
                     let Shown { near, face } = plain.0[i];
                     // as narrow as the other sides are seen, a pixel may be the only one of one, and guesses until it has had its turn

@@ -153,7 +153,7 @@ fn gpu_screen_space_is_off_by_what_the_image_does_not_show() {
                 few_got.push(f64::from(few[i]));
                 traced.push(f64::from(want[i]));
             }
-            let [hidden, got, few_got, traced] = [hidden, got, few_got, traced].map(|v| mean(v));
+            let [hidden, got, few_got, traced] = [hidden, got, few_got, traced].map(mean);
             println!(
                 "{what}: {got:.3} ({few_got:.3} with few steps), traced {traced:.3}, rays to what is not shown {hidden:.3}"
             );

@@ -49,7 +49,7 @@ fn record(scene: &Scene, camera: &Camera, size: [u32; 2]) -> CameraRecord {
 /// The scene's own camera, moved along its own axes.
 fn stepped(scene: &Scene, size: [u32; 2], step: DVec3) -> CameraRecord {
     let mut camera = scene.cameras[0].clone();
-    camera.camera_to_world = camera.camera_to_world * DAffine3::from_translation(step);
+    camera.camera_to_world *= DAffine3::from_translation(step);
     record(scene, &camera, size)
 }
 

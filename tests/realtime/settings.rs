@@ -110,7 +110,7 @@ fn gpu_orthographic_cameras_keep_their_histories() {
         let at = |frame: u32| {
             let mut camera = Camera { projection: Projection::Orthographic { half_height: 1.7 }, ..scene.cameras[0].clone() };
             let step = DVec3::new(0.012, 0.02, -0.05) * f64::from(frame);
-            camera.camera_to_world = camera.camera_to_world * glam::DAffine3::from_translation(step);
+            camera.camera_to_world *= glam::DAffine3::from_translation(step);
             record(&scene, &camera, SIZE)
         };
         for frame in 0..32 {
