@@ -6,7 +6,8 @@
 //
 // How far the histories in the box differ by more than their noise says how much of the difference between pixel and box is detail;
 // the pixel keeps that share of its own value (Lee, "Digital Image Enhancement and Noise Filtering by Use of Local Statistics", PAMI
-// 1980). Weights are 0 or a number of samples: nothing crosses an edge, and a constant stays what it is.
+// 1980), and a little more: a few pixels tell their spread badly (James, Stein, "Estimation with Quadratic Loss", 1961). Weights are 0
+// or a number of samples: nothing crosses an edge, and a constant stays what it is.
 // compute
 #include "common/frame.glsl"
 
@@ -21,10 +22,10 @@ const float LONELY = 6.0;
 const float LONELY_COSINE = 0.5;
 const float LONELY_TOLERANCE = 2.0;
 
-// Variance of the mean of n samples, by that of one: 1/n of random ones, and less where a sequence fills the square evenly and what is
-// sampled is smooth, as it is with a falloff.
-float mean_variance(FrameParams f, float n) {
-    return (f.even_sequence != 0u ? inversesqrt(max(n, 1.0)) : 1.0) / n;
+// n times the variance of the mean of n samples, by that of one: 1 of random ones, and less where a sequence fills the square evenly
+// and what is sampled is smooth, as it is with a falloff. n^-1/4 is the middle of what scenes show (docs/realtime.md).
+float evenness(FrameParams f, float n) {
+    return f.even_sequence != 0u ? inversesqrt(sqrt(max(n, 1.0))) : 1.0;
 }
 
 // A step of the filter, in the push constants: estimates from `rays` to `queued`, or accessibility to the result where that is null.
@@ -100,7 +101,6 @@ void main() {
     ivec2 lower = max(-reach, -(pixel / stride)), upper = min(reach, (ivec2(f.size) - 1 - pixel) / stride);
     float sum, squares, n, variances, count, noise;
     vec3 bent;
-    bool even = f.even_sequence != 0u;
     for (int attempt = 0; attempt < 2; attempt++) {
         sum = squares = n = variances = count = noise = 0.0;
         bent = vec3(0.0);
@@ -117,7 +117,7 @@ void main() {
                 n += e.samples;
                 count += e.samples > 0.0 ? 1.0 : 0.0;
                 // its samples times the variance of their mean
-                noise += e.samples > 0.0 ? (even ? inversesqrt(max(e.samples, 1.0)) : 1.0) : 0.0;
+                noise += e.samples > 0.0 ? evenness(f, e.samples) : 0.0;
             }
         }
         if (n >= LONELY) break;
@@ -133,8 +133,15 @@ void main() {
     float spread = max(squares / n - mean * mean, 0.0);
     // about their own pixels' means, so that each pixel has one less to tell
     float variance = (variances + mean * (1.0 - mean) * PRIOR_SAMPLES) / (max(n - count, 0.0) + PRIOR_SAMPLES);
-    // what noise alone makes of the spread
-    float detail = max(spread - variance * noise / n, 0.0);
-    float keep = own.samples > 0.0 && detail > 0.0 ? detail / (detail + variance * mean_variance(f, own.samples)) : 0.0;
+    float keep = 0.0;
+    if (own.samples > 0.0) {
+        float own_noise = variance * evenness(f, own.samples) / own.samples;
+        // of the pixel about the box: detail, which is what noise does not explain of the spread, and its own noise
+        float unlike = spread * count / max(count - 1.0, 1.0) - variance * noise / n + own_noise;
+        // with 3 of `count` pixels taken off, the sum of squared errors of what is kept is never above that of the pixels as they are;
+        // so it is for histories that are as long as they get. For short ones it is too careful, and 1 does better.
+        float careful = 1.0 + 2.0 * min(own.samples / f.most_samples, 1.0);
+        keep = unlike > 0.0 ? clamp(1.0 - max(count - careful, 0.0) / count * own_noise / unlike, 0.0, 1.0) : 0.0;
+    }
     finish(f, at, Estimate(mix(mean, own.mean, keep), mix(n, own.samples, keep), variance), mix(bent / n, own_bent, keep));
 }
