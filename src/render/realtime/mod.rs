@@ -8,8 +8,10 @@
 mod bent;
 mod budget;
 pub mod display;
+mod images;
 mod larsen;
 mod params;
+mod passes;
 pub mod settings;
 
 use glam::{DAffine3, DMat3, DVec3};
@@ -17,17 +19,18 @@ use glam::{DAffine3, DMat3, DVec3};
 use super::ao::Hemisphere;
 use super::block::{Block, BlockParams};
 use super::camera::CameraRecord;
-use super::raster::{Primary, Raster, View};
+use super::raster::{Primary, View};
 use crate::error::{Error, Result};
-use crate::gpu::{Buffer, Commands, ComputePipeline, Memory, Recorder, Specialization, Timing};
+use crate::gpu::{Buffer, Commands, Timing};
 use crate::tracer::gpu_scene::rows;
-use crate::tracer::stream::{LANES, LAUNCH_RAYS, StreamShaders};
-use crate::tracer::{Moved, Push, Stream, Tracer, stream};
-use bent::Bent;
+use crate::tracer::stream::{LAUNCH_RAYS, StreamShaders};
+use crate::tracer::{Moved, Push, Tracer, stream};
 use budget::BudgetPass;
 use display::{Display, DisplayPass};
+use images::{Images, POSITION_BYTES, SURFACE_BYTES};
 use larsen::Larsen;
-use params::{FrameParams, MOST_MOVED, MovedRecord};
+use params::{FrameParams, MovedRecord};
+use passes::Passes;
 pub use settings::{Budget, Filter, FilterKind, Preset, Resolution, Settings, Technique};
 
 /// Launches of a submission: between them others get their turn on the device.
@@ -36,14 +39,6 @@ const MOST_LAUNCHES: usize = 8;
 const DEPTH_TOLERANCE: f32 = 1.5;
 /// Cosine between normals, likewise.
 const NORMAL_TOLERANCE: f32 = 0.9;
-/// Id of a constant of shaders/common/frame.glsl.
-const BENT: u32 = 9;
-
-/// Bytes of a pixel's surface (`surface` in shaders/common/frame.glsl).
-const SURFACE_BYTES: u64 = 32;
-/// Bytes of where it was.
-const POSITION_BYTES: u64 = 12;
-
 /// What making a frame took.
 #[derive(Clone, Debug, Default)]
 pub struct FrameStats {
@@ -87,41 +82,6 @@ pub struct Realtime {
     commands: Commands,
     primary_reason: String,
     state: State,
-}
-
-struct Passes {
-    gbuffer: CameraRays,
-    accessibility: Stream,
-    gather: ComputePipeline,
-    gtao: ComputePipeline,
-    temporal: ComputePipeline,
-    filter: ComputePipeline,
-}
-
-/// What finds what pixels show.
-enum CameraRays {
-    Traced(Box<Stream>),
-    Drawn(Box<Raster>),
-}
-
-/// Device memory: parameters, and a record a pixel.
-struct Images {
-    block_params: Buffer,
-    frame_params: Buffer,
-    moved: Buffer,
-    surface: Buffer,
-    axes: Option<Buffer>,
-    guides: [Buffer; 2],
-    histories: [Buffer; 2],
-    current: Buffer,
-    /// Between the steps of a filter of several.
-    between: Option<[Buffer; 2]>,
-    samples: Option<Buffer>,
-    previous_position: Option<Buffer>,
-    bent: Option<Bent>,
-    result: Buffer,
-    /// Number of occlusion rays.
-    ray_count: Buffer,
 }
 
 /// What is known from the frames before.
@@ -457,129 +417,6 @@ impl Realtime {
             larsen.begin(images.frame_params.address(), self.state.frame)?;
         }
         images.moved.write(0, bytemuck::cast_slice(moved))
-    }
-}
-
-impl Passes {
-    fn new(tracer: &Tracer, size: [u32; 2], settings: &Settings, primary: Primary) -> Result<Self> {
-        let device = tracer.device();
-        let [gbuffer, accessibility] = Realtime::streams(settings);
-        let constants = Specialization::default().set(BENT, settings.bent.into());
-        Ok(Self {
-            gbuffer: match primary {
-                Primary::Traced => CameraRays::Traced(Box::new(tracer.stream(gbuffer)?)),
-                Primary::Raster => CameraRays::Drawn(Box::new(Raster::new(tracer, gbuffer, size)?)),
-            },
-            accessibility: tracer.stream(accessibility)?,
-            gather: stream::GATHER.specialized(device, &constants)?,
-            gtao: stream::GTAO.pipeline(device)?,
-            temporal: stream::TEMPORAL.specialized(device, &constants)?,
-            filter: stream::FILTER.specialized(device, &constants)?,
-        })
-    }
-
-    fn record_gbuffer(
-        &self,
-        r: &mut Recorder,
-        tracer: &Tracer,
-        images: &Images,
-        guide: &Buffer,
-        push: Push,
-        view: &View,
-    ) -> Result<()> {
-        r.fill(guide, guide.size(), f32::INFINITY.to_bits());
-        r.barrier();
-        if let CameraRays::Drawn(raster) = &self.gbuffer {
-            raster.draw(r, tracer, view)?;
-        }
-        let rays = view.block.rays();
-        for first in (0..rays).step_by(LAUNCH_RAYS as usize) {
-            let push = Push { first, count: LAUNCH_RAYS.min(rays - first), pass: images.block_params.address(), ..push };
-            match &self.gbuffer {
-                CameraRays::Traced(stream) => stream.record(r, &push),
-                CameraRays::Drawn(raster) => raster.trace(r, &push),
-            }
-            r.barrier();
-        }
-        Ok(())
-    }
-
-    fn record_begin(&self, r: &mut Recorder, images: &Images, push: Push, pixels: u32, technique: Technique) {
-        r.clear(&images.current);
-        r.clear(&images.ray_count);
-        r.barrier();
-        if technique == Technique::Gtao {
-            r.timed("gtao", |r| r.dispatch(&self.gtao, &Push { count: pixels, ..push }, pixels.div_ceil(LANES)));
-            r.barrier();
-        }
-    }
-
-    fn record_occlusion(&self, r: &mut Recorder, push: &Push, rays_per_pixel: u32, several: bool) {
-        self.accessibility.record(r, push);
-        r.barrier();
-        if several {
-            r.timed("gather", |r| r.dispatch(&self.gather, push, (push.count / rays_per_pixel).div_ceil(LANES)));
-            r.barrier();
-        }
-    }
-
-    /// `history`: the frame's.
-    fn record_end(&self, r: &mut Recorder, images: &Images, push: Push, pixels: u32, history: &Buffer, filter: &Filter) {
-        let (push, groups) = (Push { count: pixels, ..push }, pixels.div_ceil(LANES));
-        r.timed("temporal", |r| r.dispatch(&self.temporal, &push, groups));
-        let steps = filter.steps();
-        let (mut from, mut bent_from) = (history.address(), 0);
-        for (k, step) in steps.iter().enumerate() {
-            // bent normals are named by their place in the parameters
-            let (to, bent_to) = match &images.between {
-                Some(between) if k + 1 < steps.len() => (between[k % 2].address(), 1 + k as u32 % 2),
-                _ => (0, 3),
-            };
-            let sides = u32::from(step.sides[0]) | u32::from(step.sides[1]) << 1;
-            let push = Push {
-                rays: from,
-                queued: to,
-                sample_index: sides | step.stride << 2,
-                sample_bits: step.radius,
-                first: bent_from | bent_to << 2,
-                ..push
-            };
-            r.barrier();
-            r.timed("filter", |r| r.dispatch(&self.filter, &push, groups));
-            (from, bent_from) = (to, bent_to);
-        }
-    }
-}
-
-impl Images {
-    fn new(tracer: &Tracer, size: [u32; 2], settings: &Settings) -> Result<Self> {
-        let device = tracer.device();
-        let pixels = u64::from(size[0]) * u64::from(size[1]);
-        let image = |name: &str, bytes: u64| Buffer::new(device, name, bytes * pixels, Memory::Device);
-        let maybe = |wanted: bool, name: &str, bytes: u64| if wanted { image(name, bytes).map(Some) } else { Ok(None) };
-        let upload = |name: &str, bytes: usize| Buffer::new(device, name, bytes as u64, Memory::Upload);
-        Ok(Self {
-            block_params: upload("block parameters", size_of::<BlockParams>())?,
-            frame_params: upload("frame parameters", size_of::<FrameParams>())?,
-            moved: upload("what moved", MOST_MOVED * size_of::<MovedRecord>())?,
-            surface: image("surfaces", SURFACE_BYTES)?,
-            axes: maybe(settings.hemisphere == Hemisphere::Shading, "axes of hemispheres", 12)?,
-            guides: [image("guide", 8)?, image("guide", 8)?],
-            histories: [image("history", 8)?, image("history", 8)?],
-            current: image("samples of the frame", 8)?,
-            between: match settings.filter.steps().len() {
-                0 | 1 => None,
-                _ => Some([image("filtered estimates", 8)?, image("filtered estimates", 8)?]),
-            },
-            samples: match settings.rays_per_pixel > 1 {
-                true => Some(Buffer::new(device, "samples", 4 * u64::from(LAUNCH_RAYS), Memory::Device)?),
-                false => None,
-            },
-            previous_position: maybe(tracer.is_dynamic(), "previous positions", POSITION_BYTES)?,
-            bent: settings.bent.then(|| Bent::new(device, pixels, settings.filter.steps().len())).transpose()?,
-            result: Buffer::new(device, "accessibility", 4 * pixels, Memory::Readback)?,
-            ray_count: Buffer::new(device, "number of rays", 4, Memory::Readback)?,
-        })
     }
 }
 
