@@ -201,7 +201,7 @@ fn judge(name: &str, arguments: &Arguments, subjects: &[Subject], scenes: usize)
 }
 
 fn tracer(subject: &Subject, flat: &FlatScene) -> Result<Tracer> {
-    let needs = Needs { normals: false, albedo: false };
+    let needs = Needs::default();
     Tracer::with_options(&subject.device, TracerKind::Compute, flat, needs, subject.kernel)
 }
 

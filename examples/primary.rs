@@ -49,7 +49,7 @@ fn main() -> skylit::Result<()> {
             _ => Choice::Auto,
         };
         let flat = FlatScene::new(&scene);
-        let tracer = Tracer::new(&device, TracerKind::Compute, &flat, Needs { normals: true, albedo: false })?;
+        let tracer = Tracer::new(&device, TracerKind::Compute, &flat, Needs { normals: true, ..Needs::default() })?;
         for size in SIZES {
             measure(&tracer, &scene, name, &choice, size, repeats)?;
         }

@@ -2,10 +2,10 @@
 // samples were cut into launches, nor on which of them was traced first.
 // compute
 #include "common/camera.glsl"
+#include "common/film.glsl"
 
 layout(local_size_x = LANES) in;
 
-// Sums are compensated (Kahan 1965): a million samples keep their digits.
 struct FilmPixel {
     vec2 sum;          // of accessibility, and its compensation
     vec2 sum_squares;  // likewise
@@ -13,14 +13,6 @@ struct FilmPixel {
     uint reserved;
 };
 layout(buffer_reference, std430, buffer_reference_align = 8) buffer Film { FilmPixel v[]; };
-
-vec2 kahan_add(vec2 sum, float x) {
-    precise float y = x - sum.y;
-    precise float t = sum.x + y;
-    precise float c = t - sum.x;
-    precise float compensation = c - y;
-    return vec2(t, compensation);
-}
 
 void main() {
     uint k = gl_GlobalInvocationID.x;

@@ -25,6 +25,7 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Bl
     uvec2 ray_dump;           // where to write the camera rays, or null
     uvec2 occlusion_dump;     // where to write the occlusion rays, or null
     uvec2 frame;              // FrameParams, or null
+    uvec2 path;               // PathParams, or null
 };
 
 // A ray index counts the samples of a pixel before the pixels of the block, so that neighbouring lanes share a pixel. Pixels are

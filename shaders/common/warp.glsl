@@ -32,6 +32,40 @@ vec3 cosine_hemisphere(vec2 u) {
     return vec3(d.xy, sqrt((1.0 - d.z) * (1.0 + d.z)));
 }
 
+// Cosine and sine of turns in [0, 1].
+vec2 on_circle(float turns) {
+    // eighths of a turn, nearest quarter first: exact
+    float quarter = floor(4.0 * turns + 0.5);
+    float x = (4.0 * turns - quarter) * 1.57079632679;
+    float c = cos_quarter(x), s = sin_quarter(x);
+    uint q = uint(quarter) & 3u;
+    vec2 v = (q & 1u) == 0u ? vec2(c, s) : vec2(-s, c);
+    return q < 2u ? v : -v;
+}
+
+// Angle of (x, y) in turns, -1/2 to 1/2: Cephes' atanf, a few 1e-8 of a turn off. Vulkan lets a driver's own be off by 4096 ulp.
+float turns_of(float y, float x) {
+    float ax = abs(x), ay = abs(y);
+    float greater = max(ax, ay);
+    if (greater == 0.0) return 0.0;
+    float t = min(ax, ay) / greater;
+    // from [0, 1] to [-tan(pi/8), tan(pi/8)]
+    bool upper = t > 0.4142135624;
+    float z = upper ? (t - 1.0) / (t + 1.0) : t;
+    float zz = z * z;
+    float a = (((8.05374449538e-2 * zz - 1.38776856032e-1) * zz + 1.99777106478e-1) * zz - 3.33329491539e-1) * zz * z + z;
+    float turns = a * 0.159154943092 + (upper ? 0.125 : 0.0);
+    turns = ay > ax ? 0.25 - turns : turns;
+    turns = x < 0.0 ? 0.5 - turns : turns;
+    return y < 0.0 ? -turns : turns;
+}
+
+// even over the sphere
+vec3 uniform_sphere(vec2 u) {
+    float z = 1.0 - 2.0 * u.x, r = sqrt(max(1.0 - z * z, 0.0));
+    return vec3(r * on_circle(u.y), z);
+}
+
 // Duff et al. 2017, branchless
 vec3 to_world(vec3 n, vec3 v) {
     float s = n.z >= 0.0 ? 1.0 : -1.0;

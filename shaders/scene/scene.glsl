@@ -25,6 +25,8 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Sc
     uvec2 unfinished;  // compute tracer: counts rays whose traversal the driver cut short
     uvec2 launch_counters; // compute tracer: rays taken by each work-group
     uvec2 motion;      // MotionRecord of each entry of the top level; null: nothing moves
+    uvec2 shading;     // ShadingRecord of each material (shaders/path/shading.glsl); null: nobody asks
+    uvec2 root_reserved2;
     vec4 bounds_min;   // compute tracer: of everything, padded as the hierarchy's boxes are
     vec4 bounds_max;
 };
@@ -73,6 +75,14 @@ struct MaterialRecord {
     uint material_reserved2;
 };
 layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer MaterialRecords { MaterialRecord v[]; };
+
+// A texture and where on it a surface is.
+struct TextureUse {
+    vec4 transform;  // 2x2, column by column
+    vec2 offset;
+    uint texture;    // INVALID: none
+    uint set;        // of texture coordinates
+};
 
 struct TextureRecord {
     uvec2 texels;  // RGBA8, a uint each, rows from the top

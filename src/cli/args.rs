@@ -9,6 +9,7 @@ use glam::DVec3;
 
 use super::console::Console;
 use super::frames::args::FrameArgs;
+use super::paths::args::PathArgs;
 use crate::bvh::BuildPreset;
 use crate::bvh::cache::Cache;
 use crate::error::{Error, Result};
@@ -84,6 +85,19 @@ impl From<TriangleTestChoice> for TriangleTest {
 pub enum Integrator {
     /// Ambient occlusion
     Ao,
+    /// Path tracing: all light there is
+    Path,
+    /// Emitted and direct light: paths of one bounce
+    Direct,
+    /// Grey diffuse surfaces under a white sky: what ambient occlusion stands in for, divided by their albedo
+    AoSky,
+}
+
+impl Integrator {
+    /// As on the command line.
+    pub fn name(self) -> String {
+        self.to_possible_value().map(|v| v.get_name().to_owned()).unwrap_or_default()
+    }
 }
 
 /// Axis of the hemisphere that occlusion rays fill.
@@ -356,6 +370,9 @@ pub struct RenderArgs {
     /// Frames in real time
     #[command(flatten)]
     pub frames: FrameArgs,
+    /// Paths
+    #[command(flatten)]
+    pub paths: PathArgs,
     /// How results are shown
     #[command(flatten)]
     pub verbosity: Verbosity,
@@ -375,6 +392,7 @@ impl RenderArgs {
     /// Checks what concerns more than one option.
     pub fn check(&self) -> Result<()> {
         self.device.check()?;
+        self.paths.check(self)?;
         if self.frames.show.is_some() && !self.writes_picture() {
             return Err(Error::Usage("--show is of .png and .apng outputs: an .exr has its channels, see --aov".into()));
         }
@@ -525,11 +543,11 @@ pub fn parse_size(text: &str) -> Parsed<[u32; 2]> {
     Ok(size)
 }
 
-fn parse_number(text: &str) -> Parsed<f64> {
+pub fn parse_number(text: &str) -> Parsed<f64> {
     text.trim().parse::<f64>().ok().filter(|v| !v.is_nan()).ok_or_else(|| "expected a number".to_owned())
 }
 
-fn parse_vector(text: &str) -> Parsed<DVec3> {
+pub fn parse_vector(text: &str) -> Parsed<DVec3> {
     let parts = text.split(',').map(parse_number).collect::<Parsed<Vec<_>>>().map_err(|_| "expected X,Y,Z".to_owned())?;
     match parts[..] {
         [x, y, z] if parts.iter().all(|v| v.is_finite()) => Ok(DVec3::new(x, y, z)),
@@ -537,7 +555,7 @@ fn parse_vector(text: &str) -> Parsed<DVec3> {
     }
 }
 
-fn parse_where(text: &str, holds: impl Fn(f64) -> bool, rule: &str) -> Parsed<f64> {
+pub fn parse_where(text: &str, holds: impl Fn(f64) -> bool, rule: &str) -> Parsed<f64> {
     parse_number(text).and_then(|v| if holds(v) { Ok(v) } else { Err(rule.to_owned()) })
 }
 

@@ -10,6 +10,7 @@ mod export;
 mod frames;
 mod interrupt;
 mod panic;
+mod paths;
 mod progress;
 mod rays;
 mod render;

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use super::Warnings;
-use super::args::{Aov, DEFAULT_SIZE, DEFAULT_SPP, RenderArgs, dump_path};
+use super::args::{Aov, DEFAULT_SIZE, DEFAULT_SPP, Integrator, RenderArgs, dump_path};
 use super::console::{Console, Failure};
 use super::interrupt::{self, Keyboard};
 use super::progress::Progress;
@@ -29,6 +29,9 @@ pub fn run(args: &RenderArgs, start: Instant) -> Result<(), Failure> {
     args.check()?;
     if args.frames.wanted().is_some() {
         return super::frames::run(args, start);
+    }
+    if args.integrator != Integrator::Ao {
+        return super::paths::run(args, start);
     }
     for path in args.outputs() {
         output::check_writable(&path)?;
@@ -58,8 +61,11 @@ pub fn run(args: &RenderArgs, start: Instant) -> Result<(), Failure> {
         keep_rays: args.dump_rays.is_some(),
         cover: None,
     };
-    let needs =
-        Needs { normals: options.hemisphere == Hemisphere::Shading || args.wants(Aov::Ns), albedo: args.wants(Aov::Albedo) };
+    let needs = Needs {
+        normals: options.hemisphere == Hemisphere::Shading || args.wants(Aov::Ns),
+        albedo: args.wants(Aov::Albedo),
+        shading: false,
+    };
     // a camera ray and an occlusion ray each
     let rays = 2 * options.spp as u64 * size[0] as u64 * size[1] as u64;
     let mut build = args.device.build_options(rays);
@@ -222,7 +228,7 @@ pub(super) fn aov_channels(args: &RenderArgs, pixels: &[AovPixel], origin: glam:
     out
 }
 
-fn write_depth(path: &Path, pixels: &[AovPixel], size: [u32; 2]) -> Result<()> {
+pub(super) fn write_depth(path: &Path, pixels: &[AovPixel], size: [u32; 2]) -> Result<()> {
     let depth: Vec<f32> = pixels.iter().map(|p| p.depth).collect();
     match ImageFormat::of(path)? {
         ImageFormat::Png => png::write_grey(path, &png::depth_to_grey(&depth), size[0], size[1]),

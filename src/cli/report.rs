@@ -40,6 +40,16 @@ pub struct Rays {
     pub skipped: u64,
 }
 
+/// A camera in words.
+pub fn camera_text(camera: &Camera) -> String {
+    let m = &camera.camera_to_world;
+    let lens = match camera.projection {
+        Projection::Perspective { fov_y } => format!("perspective, fov_y {} degrees", fov_y.to_degrees()),
+        Projection::Orthographic { half_height } => format!("orthographic, half height {half_height}"),
+    };
+    format!("{:?} eye {}, forward {}, up {}; {lens}", camera.name, m.translation, -m.matrix3.z_axis, m.matrix3.y_axis)
+}
+
 /// All there is to say about a render.
 pub struct Report<'a> {
     /// What was asked for.
@@ -89,7 +99,7 @@ impl Report<'_> {
     pub fn metadata(&self) -> Vec<(String, String)> {
         let hemisphere = self.hemisphere();
         [
-            ("camera", self.camera_text()),
+            ("camera", camera_text(self.camera)),
             ("device", format!("{} ({})", self.device.name, self.device.driver)),
             ("integrator", "ao".into()),
             ("ao.radius", self.options.radius.to_string()),
@@ -110,15 +120,6 @@ impl Report<'_> {
             Hemisphere::Geometric => "geometric",
             Hemisphere::Shading => "shading",
         }
-    }
-
-    fn camera_text(&self) -> String {
-        let m = &self.camera.camera_to_world;
-        let lens = match self.camera.projection {
-            Projection::Perspective { fov_y } => format!("perspective, fov_y {} degrees", fov_y.to_degrees()),
-            Projection::Orthographic { half_height } => format!("orthographic, half height {half_height}"),
-        };
-        format!("{:?} eye {}, forward {}, up {}; {lens}", self.camera.name, m.translation, -m.matrix3.z_axis, m.matrix3.y_axis)
     }
 
     /// Lines for people.
@@ -225,7 +226,7 @@ impl Report<'_> {
             "spp_asked": self.options.spp,
             "stopped_early": self.stopped_early,
             "seed": self.options.seed,
-            "camera": self.camera_text(),
+            "camera": camera_text(self.camera),
             "ao": {
                 "radius": finite(self.options.radius),
                 "falloff": self.options.falloff,

@@ -55,6 +55,25 @@ pub struct BlockParams {
     pub occlusion_dump: u64,
     /// Parameters of a frame's passes, or 0.
     pub frame: u64,
+    /// Parameters of the path tracer, or 0.
+    pub path: u64,
+}
+
+impl BlockParams {
+    /// The same for a block of an image.
+    pub fn at(&self, block: &Block, image_size: [u32; 2], camera: &CameraRecord, seed: u32) -> Self {
+        Self {
+            camera_to_world: camera.camera_to_world,
+            view: camera.view,
+            orthographic: camera.orthographic as u32,
+            seed,
+            image_size,
+            block_origin: block.origin,
+            block_size: block.size,
+            tiles_x: block.tiles_x(),
+            ..*self
+        }
+    }
 }
 
 /// A rectangle of the image whose pixels are numbered in 8x8 tiles, Morton order within.
@@ -117,17 +136,7 @@ impl Block {
 
     /// Parameters of its passes, buffers not yet set.
     pub fn params(&self, image_size: [u32; 2], camera: &CameraRecord, seed: u32) -> BlockParams {
-        BlockParams {
-            camera_to_world: camera.camera_to_world,
-            view: camera.view,
-            orthographic: camera.orthographic as u32,
-            seed,
-            image_size,
-            block_origin: self.origin,
-            block_size: self.size,
-            tiles_x: self.tiles_x(),
-            ..Default::default()
-        }
+        BlockParams::default().at(self, image_size, camera, seed)
     }
 }
 

@@ -1,45 +1,58 @@
 //! The film: sums per pixel on the device, means and variances on the host.
 
-use bytemuck::{Pod, Zeroable};
+/// Bytes of a pixel's record on the device: of each channel a sum and its compensation, of each a sum of squares and its compensation, then two
+/// counts. `FilmPixel` of shaders/resolve.glsl and shaders/path_resolve.glsl.
+pub const fn record_bytes(channels: usize) -> u64 {
+    16 * channels as u64 + 8
+}
 
-/// `FilmPixel` of shaders/occlusion.glsl: compensated sums.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+/// A pixel's record as the device left it.
+#[derive(Clone, Debug)]
 pub struct FilmPixel {
-    /// Sum and its compensation.
-    pub sum: [f32; 2],
-    /// Sum of squares and its compensation.
-    pub sum_squares: [f32; 2],
-    /// Samples that met the scene. The others count 0 and are not written; how many were taken the host knows.
+    /// Sum and sum of squares of each channel.
+    sums: Vec<[f64; 2]>,
+    /// Samples that met the scene.
     pub covered: u32,
-    /// To a multiple of 8 bytes.
-    pub reserved: u32,
+    /// Samples that were left out because they were not finite.
+    pub not_finite: u32,
 }
 
 impl FilmPixel {
+    /// Nothing was added.
+    pub fn empty(channels: usize) -> Self {
+        Self { sums: vec![[0.0; 2]; channels], covered: 0, not_finite: 0 }
+    }
+
+    /// From [`record_bytes`] bytes.
+    pub fn read(bytes: &[u8]) -> Self {
+        let words: Vec<u32> = bytemuck::pod_collect_to_vec(bytes);
+        let channels = (words.len() - 2) / 4;
+        // the compensation is what the sum has too much
+        let total = |k: usize| f64::from(f32::from_bits(words[k])) - f64::from(f32::from_bits(words[k + 1]));
+        Self {
+            sums: (0..channels).map(|c| [total(2 * c), total(2 * (channels + c))]).collect(),
+            covered: words[4 * channels],
+            not_finite: words[4 * channels + 1],
+        }
+    }
+
     /// Mean over all samples; those that missed count 0.
-    pub fn mean(&self, samples: u32) -> f64 {
-        self.total() / samples.max(1) as f64
+    pub fn mean(&self, channel: usize, samples: u32) -> f64 {
+        self.sums[channel][0] / f64::from(samples.max(1))
     }
 
     /// Unbiased variance of one sample (not of the mean); 0 with fewer than two samples.
-    pub fn variance(&self, samples: u32) -> f64 {
+    pub fn variance(&self, channel: usize, samples: u32) -> f64 {
         if samples < 2 {
             return 0.0;
         }
-        let n = samples as f64;
-        let squares = self.sum_squares[0] as f64 - self.sum_squares[1] as f64;
-        ((squares - self.total() * self.total() / n) / (n - 1.0)).max(0.0)
+        let ([sum, squares], n) = (self.sums[channel], f64::from(samples));
+        ((squares - sum * sum / n) / (n - 1.0)).max(0.0)
     }
 
     /// Share of samples that met the scene.
     pub fn coverage(&self, samples: u32) -> f64 {
-        self.covered as f64 / samples.max(1) as f64
-    }
-
-    fn total(&self) -> f64 {
-        // the compensation is what the sum has too much
-        self.sum[0] as f64 - self.sum[1] as f64
+        f64::from(self.covered) / f64::from(samples.max(1))
     }
 }
 
@@ -50,37 +63,66 @@ pub struct Film {
     pub width: u32,
     /// Pixels in y.
     pub height: u32,
-    /// Mean over all samples of a pixel.
+    /// Values of a pixel: 1 (accessibility) or 3 (linear RGB radiance).
+    pub channels: usize,
+    /// Mean over all samples of a pixel, channels interleaved.
     pub mean: Vec<f32>,
     /// Share of samples that met the scene.
     pub coverage: Vec<f32>,
-    /// Variance of one sample.
+    /// Variance of one sample, channels interleaved.
     pub variance: Vec<f32>,
     /// Samples taken.
     pub samples: Vec<u32>,
+    /// Samples of all pixels that were left out because they were not finite.
+    pub not_finite: u64,
 }
 
 impl Film {
     /// An empty film.
-    pub fn new(width: u32, height: u32) -> Self {
+    pub fn new(width: u32, height: u32, channels: usize) -> Self {
         let n = width as usize * height as usize;
-        Self { width, height, mean: vec![0.0; n], coverage: vec![0.0; n], variance: vec![0.0; n], samples: vec![0; n] }
+        Self {
+            width,
+            height,
+            channels,
+            mean: vec![0.0; channels * n],
+            coverage: vec![0.0; n],
+            variance: vec![0.0; channels * n],
+            samples: vec![0; n],
+            not_finite: 0,
+        }
     }
 
     /// Puts a pixel of which `samples` were taken in its place.
     pub fn set(&mut self, index: usize, pixel: &FilmPixel, samples: u32) {
-        self.mean[index] = pixel.mean(samples) as f32;
-        self.coverage[index] = pixel.coverage(samples) as f32;
-        self.variance[index] = pixel.variance(samples) as f32;
-        self.samples[index] = samples;
+        // those that were left out were not taken
+        let counted = samples - pixel.not_finite.min(samples);
+        for c in 0..self.channels {
+            self.mean[self.channels * index + c] = pixel.mean(c, counted) as f32;
+            self.variance[self.channels * index + c] = pixel.variance(c, counted) as f32;
+        }
+        self.coverage[index] = pixel.coverage(counted) as f32;
+        self.samples[index] = counted;
+        self.not_finite += u64::from(pixel.not_finite);
     }
 
-    /// Mean of all pixels and its standard error, from the pixels' own variances. Stratified sampling makes the true error
-    /// smaller than that.
+    /// One channel of the means.
+    pub fn plane(&self, channel: usize) -> Vec<f32> {
+        self.mean.iter().skip(channel).step_by(self.channels).copied().collect()
+    }
+
+    /// One channel of the variances.
+    pub fn variance_plane(&self, channel: usize) -> Vec<f32> {
+        self.variance.iter().skip(channel).step_by(self.channels).copied().collect()
+    }
+
+    /// Mean over all pixels and channels and its standard error, from the pixels' own variances. Stratified sampling makes the true error
+    /// smaller than that; that channels vary together, larger.
     pub fn mean_and_error(&self) -> (f64, f64) {
         let n = self.mean.len().max(1) as f64;
-        let mean = self.mean.iter().map(|&x| x as f64).sum::<f64>() / n;
-        let variance: f64 = self.variance.iter().zip(&self.samples).map(|(&v, &s)| v as f64 / s.max(1) as f64).sum();
+        let mean = self.mean.iter().map(|&x| f64::from(x)).sum::<f64>() / n;
+        let of = |k: usize| f64::from(self.samples[k / self.channels].max(1));
+        let variance: f64 = self.variance.iter().enumerate().map(|(k, &v)| f64::from(v) / of(k)).sum();
         (mean, variance.sqrt() / n)
     }
 }

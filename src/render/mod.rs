@@ -1,5 +1,6 @@
-//! The passes. [`ao`] puts them together into an image, [`realtime`] into frame after frame.
+//! The passes. [`ao`] and [`path`] put them together into an image, [`realtime`] into frame after frame.
 
+pub mod accumulate;
 pub mod ao;
 pub mod aov;
 pub mod block;
@@ -8,6 +9,7 @@ pub mod cover;
 pub mod film;
 mod frustum;
 pub mod pace;
+pub mod path;
 pub mod raster;
 pub mod rays;
 pub mod realtime;

@@ -1,6 +1,8 @@
 //! Lights that are no surfaces of a mesh, and what surrounds the scene.
 
-use glam::{DVec3, Vec3};
+use std::sync::Arc;
+
+use glam::{DMat3, DVec3, Vec3};
 
 /// Shape and falloff of a light (KHR_lights_punctual, `.brhan` SphericalLight).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -48,4 +50,23 @@ pub enum Environment {
     Black,
     /// The same radiance from everywhere.
     Uniform(Vec3),
+    /// An image of it.
+    Map(EnvironmentMap),
+}
+
+/// Radiance from every direction, in equirectangular projection.
+#[derive(Clone, Debug, PartialEq)]
+pub struct EnvironmentMap {
+    /// File name.
+    pub name: String,
+    /// Pixels in x: once around. -z of the map is in the middle, +x to the right of it.
+    pub width: u32,
+    /// Pixels in y, from +y at the top to -y.
+    pub height: u32,
+    /// Linear radiance, rows from the top, finite and not negative.
+    pub radiance: Arc<[Vec3]>,
+    /// Multiplies it.
+    pub factor: Vec3,
+    /// Rotation from world directions to the map's.
+    pub to_map: DMat3,
 }

@@ -20,7 +20,7 @@ pub mod texture;
 pub use animation::Rig;
 pub use camera::{Camera, Projection};
 pub use camera_path::CameraPath;
-pub use light::{Environment, Light, LightKind};
+pub use light::{Environment, EnvironmentMap, Light, LightKind};
 pub use material::{AlphaMode, Material, TextureSlot};
 pub use mesh::{Geometry, Mesh, Sphere, TriangleMesh};
 pub use orbit::Orbit;

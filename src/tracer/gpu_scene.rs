@@ -9,11 +9,12 @@ use glam::{DAffine3, Vec3};
 use super::compute::Hierarchy;
 use super::drawable::{Drawable, Shape};
 use super::motion::Motion;
+use super::shading::{self, ShadingRecord, TextureUse};
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, Device, Memory};
 use crate::scene::features::alpha_cutoff;
 use crate::scene::flatten::{FlatScene, Group, Part, Placement};
-use crate::scene::{Filter, Geometry, Material, TriangleMesh, Wrap};
+use crate::scene::{Filter, Geometry, Material, TextureSlot, TriangleMesh, Wrap};
 
 /// What the passes will ask of the scene; the rest is not uploaded.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -22,6 +23,8 @@ pub struct Needs {
     pub normals: bool,
     /// Base colour of every surface, not only of alpha-tested ones.
     pub albedo: bool,
+    /// Everything that light does to surfaces, and they to it: what paths ask for. Normals and base colours with it.
+    pub shading: bool,
 }
 
 #[repr(C)]
@@ -43,6 +46,8 @@ struct SceneRoot {
     unfinished: u64,
     launch_counters: u64,
     motion: u64,
+    shading: u64,
+    reserved2: u64,
     bounds_min: [f32; 4],
     bounds_max: [f32; 4],
 }
@@ -137,6 +142,7 @@ pub struct GpuScene {
 impl GpuScene {
     /// Writes what `needs` and the scene itself call for.
     pub fn new(device: &Arc<Device>, flat: &FlatScene, needs: Needs) -> Result<Self> {
+        let needs = Needs { normals: needs.normals || needs.shading, albedo: needs.albedo || needs.shading, ..needs };
         let groups = flat.groups.iter().map(|g| group_buffers(device, flat, g)).collect::<Result<Vec<_>>>()?;
         let (mut parts, mut first_part) = (Vec::new(), Vec::new());
         let mut others = Vec::new();
@@ -200,6 +206,10 @@ impl GpuScene {
         }
         let textures = Textures::upload(device, flat, needs)?;
         let materials: Vec<_> = flat.scene.materials.iter().map(|m| textures.material(m)).collect();
+        let shading: Vec<_> = match needs.shading {
+            true => flat.scene.materials.iter().map(|m| ShadingRecord::new(m, |slot| textures.slot(slot))).collect(),
+            false => Vec::new(),
+        };
         let instance_buffer = Buffer::from_slice(device, "instance records", &instances)?;
         let mut keep = |buffer: Buffer| {
             let address = buffer.address();
@@ -213,6 +223,9 @@ impl GpuScene {
         root.materials = keep(Buffer::from_slice(device, "material records", &materials)?);
         root.textures = keep(Buffer::from_slice(device, "texture records", &textures.records)?);
         keep(textures.texels);
+        if needs.shading {
+            root.shading = keep(Buffer::from_slice(device, "shading records", &shading)?);
+        }
         // such a mesh is not baked
         let normals = |&mesh: &usize| {
             let address = attributes.addresses.get(&(mesh, None, Attribute::Normals))?;
@@ -468,7 +481,9 @@ impl Attributes {
             let mesh = &flat.scene.meshes[part.mesh];
             let Geometry::Triangles(t) = &mesh.geometry else { continue };
             let color = needs.albedo || part.alpha_tested;
-            let textured = color && flat.scene.materials[mesh.material].base_color_texture.is_some();
+            let material = &flat.scene.materials[mesh.material];
+            let textured = color && material.base_color_texture.is_some()
+                || needs.shading && shading::slots(material).into_iter().any(|slot| slot.is_some());
             for (attribute, wanted) in [
                 (Attribute::Normals, needs.normals),
                 (Attribute::Texcoords(0), textured),
@@ -519,11 +534,13 @@ impl Textures {
         let mut used = Vec::new();
         for part in flat.groups.iter().flat_map(|g| &g.parts) {
             let material = &flat.scene.materials[flat.scene.meshes[part.mesh].material];
-            if let Some(slot) = material.base_color_texture.filter(|_| needs.albedo || part.alpha_tested)
-                && record_of[slot.texture] == INVALID
-            {
-                record_of[slot.texture] = used.len() as u32;
-                used.push(slot.texture);
+            let base = material.base_color_texture.filter(|_| needs.albedo || part.alpha_tested);
+            let others = if needs.shading { shading::slots(material) } else { [None; shading::SLOTS] };
+            for slot in others.into_iter().chain([base]).flatten() {
+                if record_of[slot.texture] == INVALID {
+                    record_of[slot.texture] = used.len() as u32;
+                    used.push(slot.texture);
+                }
             }
         }
         // two textures may share an image: it is stored once
@@ -559,6 +576,19 @@ impl Textures {
             })
             .collect();
         Ok(Self { texels, records, record_of })
+    }
+
+    /// Of a texture that was uploaded; none: 1 everywhere.
+    fn slot(&self, slot: Option<TextureSlot>) -> TextureUse {
+        match slot {
+            Some(s) => TextureUse {
+                transform: s.transform.matrix2.to_cols_array(),
+                offset: s.transform.translation.to_array(),
+                texture: self.record_of[s.texture],
+                set: s.texcoord as u32,
+            },
+            None => TextureUse { transform: [1.0, 0.0, 0.0, 1.0], offset: [0.0; 2], texture: INVALID, set: 0 },
+        }
     }
 
     fn material(&self, m: &Material) -> MaterialRecord {

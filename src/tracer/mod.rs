@@ -16,6 +16,7 @@ mod motion;
 mod prepared;
 pub mod queue;
 mod reference;
+mod shading;
 pub mod stream;
 pub mod visits;
 mod wide;

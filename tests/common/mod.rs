@@ -43,7 +43,7 @@ pub fn tracers(device: &Device) -> Vec<TracerKind> {
 }
 
 /// Everything that a pass may ask for.
-pub const ALL: Needs = Needs { normals: true, albedo: true };
+pub const ALL: Needs = Needs { normals: true, albedo: true, shading: false };
 
 pub fn tracer(device: &Arc<Device>, kind: TracerKind, scene: &Scene) -> Tracer {
     let flat = FlatScene::new(scene);

@@ -76,8 +76,11 @@ pub fn run(args: &RenderArgs, start: Instant) -> Result<(), Failure> {
     let mut sequence = Sequence::new(&scene, camera.clone(), file_camera, motion, animation, fps)?;
     let flat = FlatScene::with_motion(&scene, sequence.motion()?)?;
     let (kind, why, compute) = args.device.choose(&device.info)?;
-    let needs =
-        Needs { normals: settings.hemisphere == Hemisphere::Shading || args.wants(Aov::Ns), albedo: args.wants(Aov::Albedo) };
+    let needs = Needs {
+        normals: settings.hemisphere == Hemisphere::Shading || args.wants(Aov::Ns),
+        albedo: args.wants(Aov::Albedo),
+        shading: false,
+    };
     let warm_up = warm_up(args, &settings);
     let frames = u64::from(range.end - range.first) + u64::from(warm_up);
     let rays = frames * u64::from(size[0]) * u64::from(size[1]) * (1 + u64::from(settings.rays_per_pixel));

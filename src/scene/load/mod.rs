@@ -3,6 +3,7 @@
 mod brhan;
 mod camera_path;
 mod compact;
+mod environment;
 mod find;
 mod finish;
 mod gltf;
@@ -14,6 +15,7 @@ mod tangents;
 use std::path::Path;
 
 pub use camera_path::load_camera_path;
+pub use environment::load_environment;
 
 use crate::error::{Error, Result};
 use crate::scene::{Scene, builtin};

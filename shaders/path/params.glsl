@@ -1,0 +1,77 @@
+// Parameters of the path tracer's passes, and what it keeps of each path. Mirrors src/render/path/params.rs.
+#ifndef PATH_PARAMS
+#define PATH_PARAMS
+#include "common/camera.glsl"
+
+// An environment in equirectangular projection.
+struct EnvironmentMap {
+    uvec2 texels;    // a quad each: linear radiance, and how likely the texel is drawn; null: the environment is one colour
+    uvec2 table;     // a pair each: threshold and alias
+    uint width;
+    uint height;
+    uint map_reserved0;
+    uint map_reserved1;
+    vec4 to_map[3];  // rows: world directions to the map's own, in which +y is up and -z in the middle
+};
+
+layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer PathParams {
+    EnvironmentMap map;
+    vec3 environment;     // radiance; factor of the map's
+    uint light_count;
+    uvec2 lights;         // LightRecord
+    uvec2 light_of;       // a uint for each instance of the scene: its first light, INVALID where it has none; null: none has any
+    uvec2 states;         // PathState of each path of a launch
+    uvec2 radiance;       // a quad a path: radiance, and 1 where its camera ray met something
+    uvec2 contributions;  // a quad a path: what its shadow ray brings if nothing is in the way
+    uvec2 tags;           // of the queue that is traced: which path a ray belongs to
+    RayQueue next;        // rays of the next bounce
+    RayQueue shadow;      // rays to lights
+    uint max_depth;       // bounces
+    uint rr_depth;        // bounces before Russian roulette
+    float clamp_to;       // no path vertex adds more than this in any channel; infinite: none is held
+    uint white_sky;       // 1: every surface is diffuse and grey
+    float albedo;         // that grey
+    uint strategy;        // how directions are drawn: STRATEGY_*
+    uint environment_light;  // its place among the lights, or INVALID
+    uint path_reserved;
+};
+
+// Everything below but MIS shows what it is good for.
+const uint STRATEGY_MIS = 0u;
+const uint STRATEGY_BSDF = 1u;     // no light samples
+const uint STRATEGY_LIGHT = 2u;    // what light samples could find, nothing else finds
+const uint STRATEGY_COSINE = 3u;   // no light samples, cosine-distributed directions
+const uint STRATEGY_UNIFORM = 4u;  // no light samples, directions distributed evenly
+
+// A path between two bounces: 32 bytes.
+struct PathState {
+    vec3 throughput;
+    float pdf;       // with which the BSDF proposed its ray; negative: nothing else could have
+    uint index;      // of its camera ray
+    uint depth;      // bounces so far
+    float eta_scale; // refraction changed radiance by 1 / this
+    uint state_reserved;
+};
+
+PathState load_state(uvec2 states, uint k) {
+    uvec4 a = Quads(states).v[2u * k], b = Quads(states).v[2u * k + 1u];
+    return PathState(uintBitsToFloat(a.xyz), uintBitsToFloat(a.w), b.x, b.y, uintBitsToFloat(b.z), 0u);
+}
+
+void store_state(uvec2 states, uint k, PathState s) {
+    STORE_PAIR(states, 4u * k, floatBitsToUint(s.throughput.xy));
+    STORE_PAIR(states, 4u * k + 1u, floatBitsToUint(vec2(s.throughput.z, s.pdf)));
+    STORE_PAIR(states, 4u * k + 2u, uvec2(s.index, s.depth));
+    STORE_PAIR(states, 4u * k + 3u, uvec2(floatBitsToUint(s.eta_scale), 0u));
+}
+
+vec4 load_quad(uvec2 base, uint k) {
+    return uintBitsToFloat(Quads(base).v[k]);
+}
+
+void store_quad(uvec2 base, uint k, vec4 q) {
+    STORE_PAIR(base, 2u * k, floatBitsToUint(q.xy));
+    STORE_PAIR(base, 2u * k + 1u, floatBitsToUint(q.zw));
+}
+
+#endif

@@ -1,0 +1,15 @@
+// path_shadow: rays from path vertices to lights; where nothing is in the way, the path has what the light brings.
+// stream: any
+// rays: queue
+#include "path/params.glsl"
+
+Ray ray(uint index) {
+    return load_ray(push.rays, index - push.first);
+}
+
+void any(uint index, bool occluded) {
+    if (occluded) return;
+    PathParams p = PathParams(BlockParams(push.pass).path);
+    uint k = Words(p.shadow.tags).v[index];
+    store_quad(p.radiance, k, load_quad(p.radiance, k) + load_quad(p.contributions, k));
+}

@@ -1,0 +1,146 @@
+//! Options of `skylit render` that are about paths.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum, ValueHint};
+use glam::{DMat3, Vec3};
+
+use crate::cli::args::{Aov, Integrator, RenderArgs, parse_number, parse_vector, parse_where};
+use crate::error::{Error, Result};
+use crate::render::path::Strategy;
+use crate::scene::{Environment, load};
+
+/// How directions are drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Sampling {
+    /// BSDF and light samples, weighed by the power heuristic
+    Mis,
+    /// BSDF samples alone
+    Bsdf,
+    /// Light samples for what they can find
+    Light,
+    /// Cosine-distributed directions
+    Cosine,
+    /// Directions distributed evenly over the hemisphere
+    Uniform,
+}
+
+impl From<Sampling> for Strategy {
+    fn from(s: Sampling) -> Self {
+        match s {
+            Sampling::Mis => Strategy::Mis,
+            Sampling::Bsdf => Strategy::Bsdf,
+            Sampling::Light => Strategy::Light,
+            Sampling::Cosine => Strategy::Cosine,
+            Sampling::Uniform => Strategy::Uniform,
+        }
+    }
+}
+
+/// Paths.
+#[derive(Clone, Debug, Args)]
+#[command(next_help_heading = "Paths (--integrator path, direct, ao-sky)")]
+pub struct PathArgs {
+    /// Bounces at most: 0 shows what emits, 1 adds direct light [default: the scene's, or no limit; direct: 1]
+    #[arg(long, value_name = "N")]
+    pub max_depth: Option<u32>,
+    /// Bounces before Russian roulette ends paths [default: 5]
+    #[arg(long, value_name = "N")]
+    pub rr_depth: Option<u32>,
+    /// Hold what a bounce adds to this radiance: less noise, too dark [default: off]
+    #[arg(long, value_name = "X", value_parser = parse_clamp, allow_hyphen_values = true)]
+    pub firefly_clamp: Option<f64>,
+    /// How directions are drawn; all but the default are for comparison [default: mis]
+    #[arg(long, value_enum)]
+    pub sampling: Option<Sampling>,
+    /// What surrounds the scene: an equirectangular .hdr or .exr, or a radiance R,G,B [default: the scene's]
+    #[arg(long, value_name = "FILE|R,G,B", value_hint = ValueHint::FilePath)]
+    pub environment: Option<String>,
+    /// Turn the environment about the vertical axis by this angle, counter-clockwise from above
+    #[arg(long, value_name = "DEG", value_parser = parse_number, requires = "environment", allow_hyphen_values = true)]
+    pub environment_turn: Option<f64>,
+    /// Multiply the environment by this
+    #[arg(long, value_name = "X", value_parser = parse_scale, requires = "environment", allow_hyphen_values = true)]
+    pub environment_scale: Option<f64>,
+    /// Albedo of all surfaces with --integrator ao-sky [default: 0.5]
+    #[arg(long, value_name = "X", value_parser = parse_albedo, allow_hyphen_values = true)]
+    pub sky_albedo: Option<f64>,
+    /// Brighten .png outputs by this many stops [default: 0]
+    #[arg(long, value_name = "EV", value_parser = parse_number, allow_hyphen_values = true)]
+    pub exposure: Option<f64>,
+}
+
+fn parse_clamp(text: &str) -> std::result::Result<f64, String> {
+    parse_where(text, |v| v > 0.0, "must be above 0")
+}
+
+fn parse_scale(text: &str) -> std::result::Result<f64, String> {
+    parse_where(text, |v| v >= 0.0 && v.is_finite(), "must be finite and not negative")
+}
+
+fn parse_albedo(text: &str) -> std::result::Result<f64, String> {
+    parse_where(text, |v| v > 0.0 && v <= 1.0, "must be above 0 and at most 1")
+}
+
+impl PathArgs {
+    /// Checks what concerns more than one option: none may be given that would have no effect.
+    pub fn check(&self, args: &RenderArgs) -> Result<()> {
+        let paths = [
+            (self.max_depth.is_some(), "--max-depth"),
+            (self.rr_depth.is_some(), "--rr-depth"),
+            (self.firefly_clamp.is_some(), "--firefly-clamp"),
+            (self.sampling.is_some(), "--sampling"),
+            (self.environment.is_some(), "--environment"),
+            (self.exposure.is_some(), "--exposure"),
+        ];
+        let wrong = |what: String| Err(Error::Usage(what));
+        match args.integrator {
+            Integrator::Ao => {
+                if let Some((_, option)) = paths.iter().find(|o| o.0) {
+                    return wrong(format!("{option} is about paths: add --integrator path"));
+                }
+            }
+            integrator => {
+                let name = integrator.name();
+                if args.frames.wanted().is_some() {
+                    return wrong(format!("--integrator {name} makes stills: leave --preset and --frames out"));
+                }
+                if args.wants(Aov::Bent) || args.dump_rays.is_some() || args.ao_falloff.is_some() || args.ao_radius.is_finite()
+                {
+                    return wrong(format!(
+                        "--integrator {name} has no occlusion rays: leave --ao-radius, --ao-falloff, --aov bent and --dump-rays out"
+                    ));
+                }
+                if integrator == Integrator::Direct && self.max_depth.is_some() {
+                    return wrong("--max-depth: --integrator direct has one bounce; use --integrator path".into());
+                }
+                if integrator == Integrator::AoSky && self.environment.is_some() {
+                    return wrong("--environment: the sky of --integrator ao-sky is white".into());
+                }
+            }
+        }
+        if self.sky_albedo.is_some() && args.integrator != Integrator::AoSky {
+            return wrong("--sky-albedo is of --integrator ao-sky".into());
+        }
+        Ok(())
+    }
+
+    /// The environment that is asked for, instead of the scene's.
+    ///
+    /// # Errors
+    /// [`Error::Input`] for a file that cannot be read, [`Error::Usage`] for a negative radiance.
+    pub fn environment(&self) -> Result<Option<Environment>> {
+        let Some(text) = &self.environment else { return Ok(None) };
+        let scale = self.environment_scale.unwrap_or(1.0) as f32;
+        if let Ok(colour) = parse_vector(text) {
+            if colour.min_element() < 0.0 {
+                return Err(Error::Usage(format!("--environment {text}: radiance is not negative")));
+            }
+            return Ok(Some(Environment::Uniform(colour.as_vec3() * scale)));
+        }
+        let mut map = load::load_environment(&PathBuf::from(text))?;
+        map.factor = Vec3::splat(scale);
+        map.to_map = DMat3::from_rotation_y(-self.environment_turn.unwrap_or(0.0).to_radians());
+        Ok(Some(Environment::Map(map)))
+    }
+}

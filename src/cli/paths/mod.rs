@@ -1,0 +1,158 @@
+//! `skylit render --integrator path`, `direct` and `ao-sky`.
+
+pub mod args;
+mod report;
+
+use std::sync::Arc;
+use std::time::Instant;
+
+use super::Warnings;
+use super::args::{DEFAULT_SIZE, DEFAULT_SPP, Integrator, RenderArgs};
+use super::console::Failure;
+use super::interrupt::{self, Keyboard};
+use super::progress::Progress;
+use super::render::{aov_channels, choose_camera, open, write_depth};
+use super::report::Seconds;
+use crate::error::{Error, Result};
+use crate::output::{self, Channel, Image, ImageFormat, Samples, png};
+use crate::render::aov;
+use crate::render::camera::CameraRecord;
+use crate::render::cover::Cover;
+use crate::render::film::Film;
+use crate::render::path::{self, MOST_DEPTH, PathOptions};
+use crate::scene::Environment;
+use crate::scene::flatten::FlatScene;
+use crate::tracer::{Needs, Tracer};
+use report::Report;
+
+/// Rays of a path that the hierarchy's build is planned for.
+const RAYS_OF_A_PATH: u64 = 6;
+/// Grey of `ao-sky`.
+const SKY_ALBEDO: f64 = 0.5;
+
+/// Loads, renders, writes, reports.
+pub fn run(args: &RenderArgs, start: Instant) -> Result<(), Failure> {
+    for path in args.outputs() {
+        output::check_writable(&path)?;
+    }
+    interrupt::install();
+    let console = args.verbosity.console();
+    let (mut scene, device, seconds) = open(args)?;
+    let mut warnings = Warnings::new(console);
+    super::noticed(&scene).iter().for_each(|w| warnings.add(w));
+    if let Some(environment) = args.paths.environment()? {
+        scene.environment = environment;
+    }
+    interrupt::check()?;
+
+    let size = args.size.or(scene.hints.size).unwrap_or(DEFAULT_SIZE);
+    output::check_size(size[0], size[1])?;
+    let aspect = f64::from(size[0]) / f64::from(size[1]);
+    let camera = choose_camera(args, &scene, aspect)?;
+    let flat = FlatScene::new(&scene);
+    let record = CameraRecord::new(&camera, flat.origin, aspect);
+    let (kind, why, compute) = args.device.choose(&device.info)?;
+    let mut options = options(args, &flat, size);
+    let mut build = args.device.build_options(RAYS_OF_A_PATH * options.spp as u64 * size[0] as u64 * size[1] as u64);
+    build.streams.extend(path::streams());
+    let needs = Needs { shading: true, ..Default::default() };
+    let tracer = Tracer::with_build(&device, kind, &flat, needs, compute, &build)?;
+    build.take_warnings().iter().for_each(|w| warnings.add(w));
+    // what surrounds the scene shines where nothing is
+    if options.white_sky.is_none() && scene.environment == Environment::Black {
+        options.cover = Cover::new(&flat, &record, size, options.spp).map(Arc::new);
+    }
+
+    let mut control = Keyboard { progress: Progress::new("rendering", &console), keep_partial: args.keep_partial };
+    let result = path::render(&tracer, &flat, &record, &options, &mut control)?;
+    let aov_start = Instant::now();
+    let pixels = match args.aov.is_empty() && args.depth_image.is_none() {
+        true => Vec::new(),
+        false => aov::render(&tracer, &record, size, &mut control)?,
+    };
+    let seconds = Seconds { trace: result.image.trace_seconds, aov: aov_start.elapsed().as_secs_f64(), ..seconds };
+    drop(control);
+    device.check_validation()?;
+    if result.image.film.not_finite > 0 {
+        warnings.add(&format!(
+            "{} of {} samples were not finite and were left out: please report this scene",
+            result.image.film.not_finite,
+            u64::from(result.image.spp) * u64::from(size[0]) * u64::from(size[1])
+        ));
+    }
+    if options.white_sky.is_none() && scene.environment == Environment::Black && scene.lights.is_empty() && !emits(&flat) {
+        warnings.add("the scene has no light, and the image is black: give --environment FILE or R,G,B");
+    }
+
+    let write_start = Instant::now();
+    let mut report = Report {
+        args,
+        scene: &scene,
+        camera: &camera,
+        device: &device.info,
+        tracer: kind,
+        why,
+        options: &options,
+        result: &result,
+        stats: tracer.stats(),
+        features: tracer.features().explain(&flat),
+        warnings: warnings.list,
+        seconds,
+    };
+    if let Some(path) = &args.depth_image {
+        write_depth(path, &pixels, size)?;
+    }
+    let mut channels = channels(&result.image.film, args);
+    channels.extend(aov_channels(args, &pixels, flat.origin));
+    let image = Image { width: size[0], height: size[1], channels, metadata: report.metadata() };
+    for path in &args.output {
+        match ImageFormat::of(path)? {
+            ImageFormat::Png => png::write(&image, path, args.paths.exposure.unwrap_or(0.0) as f32)?,
+            ImageFormat::Exr => output::save(&image, path)?,
+        }
+    }
+    device.save_pipeline_cache();
+    report.seconds.write = write_start.elapsed().as_secs_f64();
+    report.seconds.total = start.elapsed().as_secs_f64();
+    for line in report.lines() {
+        console.line(&line)?;
+    }
+    let interrupted = args.keep_partial && interrupt::requested();
+    console.close(&report.record(), if interrupted { Err(Error::Interrupted) } else { Ok(()) })
+}
+
+/// Does any surface emit?
+fn emits(flat: &FlatScene) -> bool {
+    flat.scene.meshes.iter().any(|m| flat.scene.materials[m.material].emissive != glam::Vec3::ZERO)
+}
+
+fn options(args: &RenderArgs, flat: &FlatScene, size: [u32; 2]) -> PathOptions {
+    let hints = &flat.scene.hints;
+    let asked = args.paths.max_depth.or(hints.max_depth).unwrap_or(MOST_DEPTH);
+    PathOptions {
+        size,
+        spp: args.spp.or(hints.spp).unwrap_or(DEFAULT_SPP).max(1),
+        seed: args.seed,
+        max_depth: if args.integrator == Integrator::Direct { 1 } else { asked },
+        rr_depth: args.paths.rr_depth.unwrap_or(PathOptions::default().rr_depth),
+        firefly_clamp: args.paths.firefly_clamp.map_or(f32::INFINITY, |c| c as f32),
+        strategy: args.paths.sampling.map(Into::into).unwrap_or_default(),
+        white_sky: (args.integrator == Integrator::AoSky).then(|| args.paths.sky_albedo.unwrap_or(SKY_ALBEDO) as f32),
+        time_limit: args.time_limit,
+        cover: None,
+    }
+}
+
+/// The film as named channels: linear RGB, coverage, and of each channel the variance of one sample.
+fn channels(film: &Film, args: &RenderArgs) -> Vec<Channel> {
+    let f32s = |name: String, samples| Channel { name, samples: Samples::F32(samples) };
+    let mut out: Vec<_> = ["R", "G", "B"].iter().enumerate().map(|(c, n)| f32s((*n).into(), film.plane(c))).collect();
+    if args.writes_exr() {
+        out.push(f32s("A".into(), film.coverage.clone()));
+        for (c, name) in ["R", "G", "B"].iter().enumerate() {
+            out.push(f32s(format!("variance.{name}"), film.variance_plane(c)));
+        }
+        out.push(Channel { name: "samples".into(), samples: Samples::U32(film.samples.clone()) });
+    }
+    out
+}

@@ -1,0 +1,334 @@
+//! Path tracing: the truth that ambient occlusion stands in for. The streams `path_camera`, `path_bounce` and `path_shadow` and the pass
+//! `path_resolve`, several samples of each pixel at a time.
+//!
+//! A wavefront (Laine, Karras, Aila 2013): `path_camera` traces camera rays and shades what they meet, which leaves rays to lights in one
+//! queue and rays of the next bounce in another; `path_shadow` traces the first, `path_bounce` the second, and so on until a queue is
+//! empty. Every path writes to places of its own only, so images do not depend on the order in which rays arrive.
+
+mod environment;
+mod lights;
+mod params;
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use super::Control;
+use super::accumulate::{Accumulated, Estimator, Plan, accumulate, most_rays};
+use super::block::BlockParams;
+use super::camera::CameraRecord;
+use super::cover::Cover;
+use crate::error::Result;
+use crate::gpu::{Buffer, Commands, ComputePipeline, Memory, Timing};
+use crate::scene::Environment;
+use crate::scene::flatten::FlatScene;
+use crate::tracer::queue::RayQueue;
+use crate::tracer::stream::StreamShaders;
+use crate::tracer::{Push, Stream, Tracer, stream};
+use environment::DeviceEnvironment;
+use lights::Lights;
+use params::{INVALID, PathParams, QUAD_BYTES, STATE_BYTES};
+
+/// Bounces of a submission; then the host asks how many paths are left.
+const BOUNCES: u32 = 4;
+/// Longest path: with Russian roulette, which lets no more than 0.95 of paths go on, none gets here.
+pub const MOST_DEPTH: u32 = 4096;
+
+/// How directions are drawn. All of them estimate the same image; all but `Mis` are for comparison.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Strategy {
+    /// BSDF samples and light samples, weighed by the power heuristic (Veach 1997).
+    #[default]
+    Mis,
+    /// BSDF samples alone.
+    Bsdf,
+    /// Light samples for what they can find; BSDF samples for the rest.
+    Light,
+    /// Cosine-distributed directions, whatever the BSDF; no light samples.
+    Cosine,
+    /// Directions distributed evenly over the hemisphere; no light samples.
+    Uniform,
+}
+
+impl Strategy {
+    /// As shaders/path/params.glsl numbers them.
+    fn number(self) -> u32 {
+        match self {
+            Strategy::Mis => 0,
+            Strategy::Bsdf => 1,
+            Strategy::Light => 2,
+            Strategy::Cosine => 3,
+            Strategy::Uniform => 4,
+        }
+    }
+
+    fn draws_lights(self) -> bool {
+        matches!(self, Strategy::Mis | Strategy::Light)
+    }
+}
+
+/// What to render.
+#[derive(Clone, Debug)]
+pub struct PathOptions {
+    /// Image size in pixels.
+    pub size: [u32; 2],
+    /// Paths per pixel.
+    pub spp: u32,
+    /// Of the sampler.
+    pub seed: u32,
+    /// Bounces at most: 0 shows what emits, 1 adds direct light. [`MOST_DEPTH`] is the limit, which nobody reaches.
+    pub max_depth: u32,
+    /// Bounces before Russian roulette.
+    pub rr_depth: u32,
+    /// No path vertex but the first adds more than this radiance in any channel; infinite: unbiased.
+    pub firefly_clamp: f32,
+    /// How directions are drawn.
+    pub strategy: Strategy,
+    /// Every surface is diffuse and of this grey, and nothing shines but a white sky: the rendering equation that ambient occlusion
+    /// approximates.
+    pub white_sky: Option<f32>,
+    /// Stop after this time with what there is.
+    pub time_limit: Option<Duration>,
+    /// Which tiles of the image show anything; only where the environment is black.
+    pub cover: Option<Arc<Cover>>,
+}
+
+impl Default for PathOptions {
+    fn default() -> Self {
+        Self {
+            size: [1280, 720],
+            spp: 16,
+            seed: 0,
+            max_depth: MOST_DEPTH,
+            rr_depth: 5,
+            firefly_clamp: f32::INFINITY,
+            strategy: Strategy::Mis,
+            white_sky: None,
+            time_limit: None,
+            cover: None,
+        }
+    }
+}
+
+/// An image and how it came about.
+#[derive(Clone, Debug, Default)]
+pub struct PathResult {
+    /// The image, linear RGB radiance, and the work of its camera rays.
+    pub image: Accumulated,
+    /// Rays of all bounces but the first.
+    pub bounce_rays: u64,
+    /// Rays to lights.
+    pub shadow_rays: u64,
+    /// Bounces of the longest path.
+    pub longest_path: u32,
+    /// Lights that light samples are drawn from.
+    pub lights: u32,
+}
+
+/// The streams that [`render`] traces.
+pub fn streams() -> [&'static StreamShaders; 3] {
+    [&stream::PATH_CAMERA_CLOSEST, &stream::PATH_BOUNCE_CLOSEST, &stream::PATH_SHADOW_ANY]
+}
+
+/// Renders. The tracer must have been made of `flat` with [`crate::tracer::Needs::shading`].
+///
+/// # Errors
+/// Those of the device, and [`crate::Error::Interrupted`] when `control` says so.
+pub fn render(
+    tracer: &Tracer,
+    flat: &FlatScene,
+    camera: &CameraRecord,
+    options: &PathOptions,
+    control: &mut dyn Control,
+) -> Result<PathResult> {
+    let mut estimator = Paths::new(tracer, flat, options)?;
+    let plan = Plan {
+        size: options.size,
+        spp: options.spp,
+        seed: options.seed,
+        time_limit: options.time_limit,
+        cover: options.cover.as_deref(),
+    };
+    let image = accumulate(tracer, camera, &plan, &BlockParams::default(), &mut estimator, control)?;
+    let Paths { bounce_rays, shadow_rays, longest_path, lights, .. } = estimator;
+    Ok(PathResult { image, bounce_rays, shadow_rays, longest_path, lights })
+}
+
+struct Paths {
+    camera: Stream,
+    bounce: Stream,
+    shadow: Stream,
+    resolve: ComputePipeline,
+    /// Of bounces: what one is traced from, the other is filled with.
+    queues: [RayQueue; 2],
+    shadow_queue: RayQueue,
+    /// Parameters that fill either queue.
+    block_params: [Buffer; 2],
+    path_params: [u64; 2],
+    /// How many rays each bounce and its light samples traced.
+    counts: Buffer,
+    max_depth: u32,
+    draws_lights: bool,
+    bounce_rays: u64,
+    shadow_rays: u64,
+    longest_path: u32,
+    lights: u32,
+    _buffers: Vec<Buffer>,
+    _environment: DeviceEnvironment,
+}
+
+impl Paths {
+    fn new(tracer: &Tracer, flat: &FlatScene, options: &PathOptions) -> Result<Self> {
+        let device = tracer.device();
+        let most = most_rays(options.size, options.spp);
+        let white = Environment::Uniform(glam::Vec3::ONE);
+        let around = if options.white_sky.is_some() { &white } else { &flat.scene.environment };
+        let environment = DeviceEnvironment::new(device, around)?;
+        let lights = match options.white_sky {
+            Some(_) => Lights::sky_only(),
+            None => Lights::new(flat, environment.mean),
+        };
+        let quads = |name: &str| Buffer::new(device, name, QUAD_BYTES * most as u64, Memory::Device);
+        let queues = [RayQueue::new(device, most)?, RayQueue::new(device, most)?];
+        let shadow_queue = RayQueue::new(device, most)?;
+        let (radiance, contributions) = (quads("radiance of paths")?, quads("what lights bring")?);
+        let states = Buffer::new(device, "paths", STATE_BYTES * most as u64, Memory::Device)?;
+        let mut buffers = Vec::new();
+        let mut keep = |buffer: Buffer| {
+            let address = buffer.address();
+            buffers.push(buffer);
+            address
+        };
+        let base = PathParams {
+            map: environment.map,
+            environment: environment.factor.to_array(),
+            light_count: lights.records.len() as u32,
+            lights: if lights.records.is_empty() { 0 } else { keep(Buffer::from_slice(device, "lights", &lights.records)?) },
+            light_of: match lights.light_of.is_empty() {
+                true => 0,
+                false => keep(Buffer::from_slice(device, "lights of instances", &lights.light_of)?),
+            },
+            states: keep(states),
+            radiance: keep(radiance),
+            contributions: keep(contributions),
+            shadow: shadow_queue.record(),
+            max_depth: options.max_depth.min(MOST_DEPTH),
+            rr_depth: options.rr_depth,
+            clamp_to: options.firefly_clamp,
+            white_sky: options.white_sky.is_some().into(),
+            albedo: options.white_sky.unwrap_or(0.0),
+            strategy: options.strategy.number(),
+            environment_light: lights.environment.unwrap_or(INVALID),
+            ..Default::default()
+        };
+        // those with number k fill queue k, and read the tags of the other
+        let mut params = |k: usize| -> Result<u64> {
+            let record = PathParams { next: queues[k].record(), tags: queues[k ^ 1].record().tags, ..base };
+            Ok(keep(Buffer::from_slice(device, "parameters of paths", &[record])?))
+        };
+        let addresses = [params(0)?, params(1)?];
+        let block = || Buffer::new(device, "block parameters", size_of::<BlockParams>() as u64, Memory::Upload);
+        let block_params = [block()?, block()?];
+        Ok(Self {
+            camera: tracer.stream(&stream::PATH_CAMERA_CLOSEST)?,
+            bounce: tracer.stream(&stream::PATH_BOUNCE_CLOSEST)?,
+            shadow: tracer.stream(&stream::PATH_SHADOW_ANY)?,
+            resolve: stream::PATH_RESOLVE.pipeline(device)?,
+            queues,
+            shadow_queue,
+            block_params,
+            path_params: addresses,
+            counts: Buffer::new(device, "numbers of rays", 4 * 2 * u64::from(BOUNCES + 1), Memory::Readback)?,
+            max_depth: options.max_depth.min(MOST_DEPTH),
+            draws_lights: options.strategy.draws_lights() && !lights.records.is_empty(),
+            bounce_rays: 0,
+            shadow_rays: 0,
+            longest_path: 0,
+            lights: if options.strategy.draws_lights() { lights.records.len() as u32 } else { 0 },
+            _buffers: buffers,
+            _environment: environment,
+        })
+    }
+
+    /// Traces the rays to lights that a vertex left; notes how many in place `slot`.
+    fn record_shadow(&self, r: &mut crate::gpu::Recorder, push: Push, most: u32, slot: u32) {
+        if !self.draws_lights {
+            return;
+        }
+        r.barrier();
+        self.shadow.record(r, &self.shadow_queue.push(push, most));
+        r.barrier();
+        r.copy(self.shadow_queue.count(), 0, &self.counts, 8 * u64::from(slot) + 4, 4);
+    }
+
+    /// All bounces of a launch, `BOUNCES` to a submission.
+    fn launch_one(&mut self, commands: &mut Commands, push: Push) -> Result<Vec<Timing>> {
+        let passes = self.block_params.each_ref().map(Buffer::address);
+        let push = |fills: usize| Push { pass: passes[fills], ..push };
+        let (mut timings, mut depth, mut left) = (Vec::new(), 0, push(0).count);
+        // vertex `depth` fills queue `depth % 2`
+        loop {
+            let last = depth + BOUNCES;
+            let begin = depth;
+            timings.extend(commands.run(|r| {
+                r.fill(&self.counts, self.counts.size(), 0);
+                if begin == 0 {
+                    self.queues[0].clear(r);
+                    self.shadow_queue.clear(r);
+                    r.barrier();
+                    self.camera.record(r, &push(0));
+                    self.record_shadow(r, push(0), left, BOUNCES);
+                }
+                while depth < last.min(self.max_depth) {
+                    depth += 1;
+                    let (fills, traced) = (depth as usize % 2, (depth as usize + 1) % 2);
+                    r.barrier();
+                    self.queues[fills].clear(r);
+                    self.shadow_queue.clear(r);
+                    r.barrier();
+                    self.bounce.record(r, &self.queues[traced].push(push(fills), left));
+                    r.copy(self.queues[traced].count(), 0, &self.counts, 8 * u64::from((depth - 1) % BOUNCES), 4);
+                    self.record_shadow(r, push(fills), left, (depth - 1) % BOUNCES);
+                }
+                r.barrier();
+                // what is left for the next submission
+                r.copy(self.queues[depth as usize % 2].count(), 0, &self.counts, 8 * u64::from(BOUNCES), 4);
+            })?);
+            let counts: Vec<u32> = bytemuck::pod_collect_to_vec(&self.counts.read(0, self.counts.size())?);
+            for k in begin..depth {
+                let rays = counts[2 * ((k % BOUNCES) as usize)];
+                self.bounce_rays += u64::from(rays);
+                if rays > 0 {
+                    self.longest_path = self.longest_path.max(k + 1);
+                }
+            }
+            self.shadow_rays += counts.iter().skip(1).step_by(2).map(|&n| u64::from(n)).sum::<u64>();
+            left = counts[2 * BOUNCES as usize];
+            if left == 0 || depth >= self.max_depth {
+                break;
+            }
+        }
+        let groups = (push(0).count >> push(0).sample_bits).div_ceil(stream::LANES);
+        timings.extend(commands.run(|r| r.timed("path_resolve", |r| r.dispatch(&self.resolve, &push(0), groups)))?);
+        Ok(timings)
+    }
+}
+
+impl Estimator for Paths {
+    const CHANNELS: usize = 3;
+
+    fn begin(&mut self, params: BlockParams, _: bool) -> Result<u64> {
+        for (buffer, path) in self.block_params.iter_mut().zip(self.path_params) {
+            buffer.write(0, bytemuck::bytes_of(&BlockParams { path, ..params }))?;
+        }
+        Ok(self.block_params[0].address())
+    }
+
+    fn launch(&mut self, commands: &mut Commands, launches: &[Push], _: bool) -> Result<Vec<Timing>> {
+        let mut timings = Vec::new();
+        for push in launches {
+            timings.extend(self.launch_one(commands, *push)?);
+        }
+        Ok(timings)
+    }
+}

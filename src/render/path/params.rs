@@ -1,0 +1,47 @@
+//! What the path tracer's shaders get; mirrors shaders/path/params.glsl.
+
+use bytemuck::{Pod, Zeroable};
+
+use crate::tracer::queue::QueueRecord;
+
+/// Bytes of a path between two bounces.
+pub(super) const STATE_BYTES: u64 = 32;
+/// Bytes of four numbers.
+pub(super) const QUAD_BYTES: u64 = 16;
+/// Names no light.
+pub(super) const INVALID: u32 = u32::MAX;
+
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+pub(super) struct MapRecord {
+    pub texels: u64,
+    pub table: u64,
+    pub width: u32,
+    pub height: u32,
+    pub reserved: [u32; 2],
+    pub to_map: [[f32; 4]; 3],
+}
+
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+pub(super) struct PathParams {
+    pub map: MapRecord,
+    pub environment: [f32; 3],
+    pub light_count: u32,
+    pub lights: u64,
+    pub light_of: u64,
+    pub states: u64,
+    pub radiance: u64,
+    pub contributions: u64,
+    pub tags: u64,
+    pub next: QueueRecord,
+    pub shadow: QueueRecord,
+    pub max_depth: u32,
+    pub rr_depth: u32,
+    pub clamp_to: f32,
+    pub white_sky: u32,
+    pub albedo: f32,
+    pub strategy: u32,
+    pub environment_light: u32,
+    pub reserved: u32,
+}

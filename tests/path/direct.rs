@@ -1,0 +1,160 @@
+//! Light that arrives at a plane directly. The camera looks straight down at a patch so small that the closed form hardly varies over it.
+
+use super::*;
+use skylit::scene::builtin::shapes;
+
+const ALBEDO: f32 = 0.6;
+const RHO: f64 = 0.6;
+
+/// A floor at height 0, its middle seen from above through a view of 2e-3 units.
+fn floor_and(mut parts: Vec<(Geometry, Material)>) -> Scene {
+    // what shines is not in the way: the camera is near
+    let camera = Camera::look_at(DVec3::new(0.0, 0.1, 0.0), DVec3::ZERO, DVec3::Z, 0.02);
+    parts.insert(0, (shapes::floor(DVec3::ZERO, 10.0), matte(ALBEDO)));
+    scene_of(parts, camera)
+}
+
+fn options(strategy: Strategy, spp: u32) -> PathOptions {
+    PathOptions { size: [16, 16], spp, seed: 5, strategy, ..Default::default() }
+}
+
+fn light(kind: LightKind, position: DVec3, direction: DVec3, intensity: f32) -> Light {
+    Light {
+        name: String::new(),
+        kind,
+        intensity: Vec3::splat(intensity),
+        position,
+        direction: direction.normalize(),
+        range: f64::INFINITY,
+    }
+}
+
+#[test]
+fn gpu_points_spots_and_directions() {
+    let device = device();
+    let at = DVec3::new(0.6, 0.8, 0.0);
+    let lit = |light: Light| {
+        let mut scene = floor_and(Vec::new());
+        scene.lights.push(light);
+        scene
+    };
+    let reflected = RHO / std::f64::consts::PI;
+    // one unit away, cosine 0.8
+    let point = lit(light(LightKind::Point, at, -at, 3.0));
+    holds(&device, "point", &point, &options(Strategy::Mis, 16), reflected * 3.0 * 0.8, 1e-3);
+    let spot = LightKind::Spot { inner_angle: 0.2, outer_angle: 0.4 };
+    let middle = lit(light(spot, at, -at, 3.0));
+    holds(&device, "spot, on its axis", &middle, &options(Strategy::Mis, 16), reflected * 3.0 * 0.8, 1e-3);
+    // turned by 0.3 radians: between the two
+    let turned = DVec3::new(-(0.6f64.asin() + 0.3).sin(), -(0.6f64.asin() + 0.3).cos(), 0.0);
+    let share = ((0.3f64.cos() - 0.4f64.cos()) / (0.2f64.cos() - 0.4f64.cos())).powi(2);
+    let beside = lit(light(spot, at, turned, 3.0));
+    holds(&device, "spot, beside its axis", &beside, &options(Strategy::Mis, 16), reflected * 3.0 * 0.8 * share, 1e-3);
+    let away = lit(light(spot, at, at, 3.0));
+    let flat = FlatScene::new(&away);
+    for kind in tracers(&device) {
+        let film = render(&tracer(&device, kind, &flat), &flat, &options(Strategy::Mis, 1)).image.film;
+        assert!(film.mean.iter().all(|&m| m == 0.0), "{kind}: a spot that shines away");
+    }
+    let sun = lit(light(LightKind::Directional, DVec3::ZERO, DVec3::new(-0.6, -0.8, 0.0), 3.0));
+    holds(&device, "directional", &sun, &options(Strategy::Mis, 16), reflected * 3.0 * 0.8, 1e-3);
+    // three lights at once: each is drawn as often as it is strong
+    let mut all = lit(light(LightKind::Point, at, -at, 3.0));
+    all.lights.push(light(LightKind::Directional, DVec3::ZERO, DVec3::new(-0.6, -0.8, 0.0), 3.0));
+    all.lights.push(light(spot, DVec3::Y, DVec3::NEG_Y, 5.0));
+    holds(&device, "three lights", &all, &options(Strategy::Mis, 1024), reflected * (3.0 * 0.8 * 2.0 + 5.0), 1e-2);
+}
+
+/// A sphere seen under a half angle a from a point, its centre at angle t from the normal and all of it above the horizon: pi L sin^2 a cos t.
+#[test]
+fn gpu_a_sphere() {
+    let device = device();
+    let centre = DVec3::new(0.9, 1.2, 0.0);
+    for radius in [0.03, 0.7] {
+        let scene = floor_and(vec![(shapes::sphere(centre, radius), emitter(4.0))]);
+        let expected = RHO * 4.0 * (radius / 1.5f64).powi(2) * 0.8;
+        holds(&device, "sphere", &scene, &options(Strategy::Mis, 128), expected, 2e-3);
+        holds(&device, "sphere", &scene, &options(Strategy::Light, 128), expected, 2e-3);
+        if radius > 0.1 {
+            holds(&device, "sphere", &scene, &options(Strategy::Bsdf, 512), expected, 5e-3);
+            holds(&device, "sphere", &scene, &options(Strategy::Uniform, 512), expected, 5e-3);
+        }
+    }
+}
+
+/// A square lamp over the floor, its form factor from its corners (Lambert 1760).
+#[test]
+fn gpu_a_square() {
+    let device = device();
+    let lamp = |up: bool| {
+        let (u, v) = (DVec3::X * 0.8, DVec3::Z * 0.5);
+        let middle = DVec3::new(0.5, 0.9, 0.2);
+        // counter-clockwise seen from the front
+        if up { shapes::rectangle(middle, v, u) } else { shapes::rectangle(middle, u, v) }
+    };
+    let Geometry::Triangles(corners) = lamp(false) else { unreachable!() };
+    let polygon: Vec<DVec3> = corners.positions.iter().map(|p| p.as_dvec3()).collect();
+    let factor = skylit::oracle::closed_form::polygon_form_factor(DVec3::ZERO, DVec3::Y, &polygon).abs();
+    assert!(factor > 0.05);
+    let expected = RHO * 4.0 * factor;
+    let scene = floor_and(vec![(lamp(false), emitter(4.0))]);
+    holds(&device, "square", &scene, &options(Strategy::Mis, 128), expected, 2e-3);
+    holds(&device, "square", &scene, &options(Strategy::Light, 128), expected, 2e-3);
+    holds(&device, "square", &scene, &options(Strategy::Cosine, 512), expected, 5e-3);
+    // its back is dark, unless it has two sides
+    let away = floor_and(vec![(lamp(true), emitter(4.0))]);
+    let flat = FlatScene::new(&away);
+    for kind in tracers(&device) {
+        let film = render(&tracer(&device, kind, &flat), &flat, &options(Strategy::Mis, 16)).image.film;
+        assert!(film.mean.iter().all(|&m| m == 0.0), "{kind}: light from the back of a lamp");
+    }
+    let both = floor_and(vec![(lamp(true), Material { double_sided: true, ..emitter(4.0) })]);
+    holds(&device, "square, both sides", &both, &options(Strategy::Mis, 128), expected, 2e-3);
+}
+
+/// Under a sky that is the same everywhere a plane is as bright as its albedo; so it is under a map of one colour, however it is cut into
+/// texels, and under a map of one bright texel as much as that brings.
+#[test]
+fn gpu_skies() {
+    let device = device();
+    let under = |environment: Environment| Scene { environment, ..floor_and(Vec::new()) };
+    let uniform = under(Environment::Uniform(Vec3::splat(2.0)));
+    for strategy in [Strategy::Mis, Strategy::Bsdf, Strategy::Light, Strategy::Uniform] {
+        let precision = if strategy == Strategy::Uniform { 3e-3 } else { 2e-3 };
+        holds(&device, "uniform sky", &uniform, &options(strategy, 128), RHO * 2.0, precision);
+    }
+    let map = |width: u32, height: u32, radiance: &dyn Fn(u32, u32) -> f32| {
+        let texels = (0..width * height).map(|k| Vec3::splat(radiance(k % width, k / width))).collect();
+        under(Environment::Map(skylit::scene::EnvironmentMap {
+            name: "map".into(),
+            width,
+            height,
+            radiance: texels,
+            factor: Vec3::ONE,
+            to_map: glam::DMat3::IDENTITY,
+        }))
+    };
+    for strategy in [Strategy::Mis, Strategy::Bsdf, Strategy::Light] {
+        holds(&device, "map of one colour", &map(7, 5, &|_, _| 2.0), &options(strategy, 128), RHO * 2.0, 5e-3);
+    }
+    // a texel and what is interpolated around it, integrated on a fine grid
+    let (width, height, bright) = (64u32, 32u32, [20u32, 9u32]);
+    let sun = map(width, height, &|x, y| if [x, y] == bright { 5e3 } else { 0.0 });
+    let fine = 64;
+    let tent = |i: u32, at: u32, size: u32| {
+        let x = (f64::from(i) + 0.5) / f64::from(fine * size) * f64::from(size) - 0.5;
+        (1.0 - (x - f64::from(at)).abs()).max(0.0)
+    };
+    let mut irradiance = 0.0;
+    for y in 0..height * fine {
+        let theta = (f64::from(y) + 0.5) / f64::from(height * fine) * std::f64::consts::PI;
+        for x in 0..width * fine {
+            irradiance += tent(x, bright[0], width) * tent(y, bright[1], height) * theta.cos().max(0.0) * theta.sin();
+        }
+    }
+    let cell = 2.0 * std::f64::consts::PI.powi(2) / f64::from(width * fine) / f64::from(height * fine);
+    let expected = RHO / std::f64::consts::PI * 5e3 * irradiance * cell;
+    holds(&device, "map with a sun", &sun, &options(Strategy::Mis, 256), expected, 1e-2);
+    holds(&device, "map with a sun", &sun, &options(Strategy::Light, 256), expected, 1e-2);
+    holds(&device, "map with a sun", &sun, &options(Strategy::Bsdf, 1 << 12), expected, 3e-3);
+}

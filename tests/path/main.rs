@@ -1,0 +1,85 @@
+//! Path-traced images by every tracer against what is known in closed form: light that arrives directly, furnaces in which nothing may be
+//! lost or gained, enclosures with light everywhere. Images are small.
+
+#[path = "../common/mod.rs"]
+mod common;
+
+mod direct;
+mod furnace;
+mod transport;
+
+use std::sync::Arc;
+
+use common::{assert_validation_clean, device, tracers};
+use glam::{DAffine3, DVec3, Vec3};
+use skylit::gpu::Device;
+use skylit::render::Uncontrolled;
+use skylit::render::camera::CameraRecord;
+use skylit::render::film::Film;
+use skylit::render::path::{self, PathOptions, PathResult, Strategy};
+use skylit::scene::flatten::FlatScene;
+use skylit::scene::material::MaterialKind;
+use skylit::scene::{Camera, Environment, Geometry, Instance, Light, LightKind, Material, Mesh, Scene};
+use skylit::tracer::{Needs, Tracer, TracerKind};
+
+/// A scene of shapes with a material each.
+fn scene_of(parts: Vec<(Geometry, Material)>, camera: Camera) -> Scene {
+    let mut scene = Scene { cameras: vec![camera], ..Scene::default() };
+    for (k, (geometry, material)) in parts.into_iter().enumerate() {
+        scene.materials.push(material);
+        scene.meshes.push(Mesh { name: format!("mesh {k}"), geometry, material: k });
+        scene.instances.push(Instance { name: format!("mesh {k}"), mesh: k, object_to_world: DAffine3::IDENTITY });
+    }
+    scene
+}
+
+fn matte(albedo: f32) -> Material {
+    Material { kind: MaterialKind::Matte, base_color: Vec3::splat(albedo).extend(1.0), ..Material::default() }
+}
+
+/// Emits, and reflects nothing.
+fn emitter(radiance: f32) -> Material {
+    Material { emissive: Vec3::splat(radiance), ..matte(0.0) }
+}
+
+fn tracer(device: &Arc<Device>, kind: TracerKind, flat: &FlatScene) -> Tracer {
+    let needs = Needs { shading: true, ..Default::default() };
+    Tracer::new(device, kind, flat, needs).unwrap_or_else(|e| panic!("{kind}: {e}"))
+}
+
+fn render(tracer: &Tracer, flat: &FlatScene, options: &PathOptions) -> PathResult {
+    let aspect = f64::from(options.size[0]) / f64::from(options.size[1]);
+    let record = CameraRecord::new(&flat.scene.cameras[0], flat.origin, aspect);
+    let result =
+        path::render(tracer, flat, &record, options, &mut Uncontrolled).unwrap_or_else(|e| panic!("{}: {e}", tracer.kind()));
+    assert_eq!(result.image.film.not_finite, 0, "{}: samples that are no numbers", tracer.kind());
+    result
+}
+
+/// Mean over all pixels and channels, and its true standard error: pixels draw their samples independently of each other.
+fn mean_of(film: &Film) -> (f64, f64) {
+    let means: Vec<f64> = film.mean.chunks(3).map(|p| p.iter().map(|&c| f64::from(c)).sum::<f64>() / 3.0).collect();
+    let n = means.len() as f64;
+    let mean = means.iter().sum::<f64>() / n;
+    let variance = means.iter().map(|m| (m - mean).powi(2)).sum::<f64>() / (n - 1.0);
+    (mean, (variance / n).sqrt())
+}
+
+/// Holds the mean of an image that should be `expected` all over against it, on every tracer; strategies that are for comparison on one:
+/// they are the same code on all. `precision`: the standard error, relative, that the image must reach to say anything.
+fn holds(device: &Arc<Device>, what: &str, scene: &Scene, options: &PathOptions, expected: f64, precision: f64) {
+    let flat = FlatScene::new(scene);
+    let all = tracers(device).into_iter();
+    for kind in all.filter(|&k| options.strategy == Strategy::Mis || k == TracerKind::Compute) {
+        let result = render(&tracer(device, kind, &flat), &flat, options);
+        let (mean, error) = mean_of(&result.image.film);
+        println!("{what}, {kind}, {:?}: {mean:.6} +- {error:.6}, expected {expected:.6}", options.strategy);
+        assert!(error <= precision * expected, "{what}, {kind}: {mean} +- {error} says nothing about {expected}");
+        // rounding beside noise
+        assert!(
+            (mean - expected).abs() <= 4.5 * error + 2e-6 * expected,
+            "{what}, {kind}: {mean} +- {error} is not {expected}"
+        );
+    }
+    assert_validation_clean(device);
+}
