@@ -23,9 +23,9 @@ const float LONELY_COSINE = 0.5;
 const float LONELY_TOLERANCE = 2.0;
 
 // n times the variance of the mean of n samples, by that of one: 1 of random ones, and less where a sequence fills the square evenly
-// and what is sampled is smooth, as it is with a falloff. n^-1/4 is the middle of what scenes show (docs/realtime.md).
-float evenness(FrameParams f, float n) {
-    return f.even_sequence != 0u ? inversesqrt(sqrt(max(n, 1.0))) : 1.0;
+// and what is sampled is smooth, as it is with a falloff (Sequence::evenness in src/sampling/sequence.rs).
+float mean_variance(FrameParams f, float n) {
+    return f.evenness > 0.0 ? pow(max(n, 1.0), -f.evenness) : 1.0;
 }
 
 // A step of the filter, in the push constants: estimates from `rays` to `queued`, or accessibility to the result where that is null.
@@ -117,7 +117,7 @@ void main() {
                 n += e.samples;
                 count += e.samples > 0.0 ? 1.0 : 0.0;
                 // its samples times the variance of their mean
-                noise += e.samples > 0.0 ? evenness(f, e.samples) : 0.0;
+                noise += e.samples > 0.0 ? mean_variance(f, e.samples) : 0.0;
             }
         }
         if (n >= LONELY) break;
@@ -135,7 +135,7 @@ void main() {
     float variance = (variances + mean * (1.0 - mean) * PRIOR_SAMPLES) / (max(n - count, 0.0) + PRIOR_SAMPLES);
     float keep = 0.0;
     if (own.samples > 0.0) {
-        float own_noise = variance * evenness(f, own.samples) / own.samples;
+        float own_noise = variance * mean_variance(f, own.samples) / own.samples;
         // of the pixel about the box: detail, which is what noise does not explain of the spread, and its own noise
         float unlike = spread * count / max(count - 1.0, 1.0) - variance * noise / n + own_noise;
         // with 3 of `count` pixels taken off, the sum of squared errors of what is kept is never above that of the pixels as they are;

@@ -41,7 +41,7 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Fr
     uint rest;                         // 1: nothing moves, and pixels with all their samples get no more
     uint slices;                       // of gtao
     uint steps;                        // of gtao, on each side of a slice
-    uint even_sequence;                // 1: the samples of a pixel fill the square evenly, frame after frame
+    float evenness;                    // the variance of the mean of n samples falls as n^-(1 + evenness)
     uint most_rays;                    // of a pixel in a frame with a budget
     uvec2 surface;
     uvec2 axes;                        // 3 floats a pixel: the hemisphere's axis where it is not the geometric normal; or null

@@ -104,7 +104,7 @@ fn gpu_frames_by_number_tell_what_they_are() {
             ("history", "64"),
             ("rays_per_pixel", "1"),
             ("resolution", "full"),
-            ("sequence", "blue"),
+            ("sequence", "sobol"),
             ("scene", "builtin:parade"),
             ("integrator", "ao"),
         ] {

@@ -390,7 +390,7 @@ impl Realtime {
             rest: (s.rest && still && self.state.has_history).into(),
             slices: s.gtao[0],
             steps: s.gtao[1],
-            even_sequence: (s.sequence.is_even() && !s.binary()).into(),
+            evenness: if s.binary() { 0.0 } else { s.sequence.evenness() },
             surface: images.surface.address(),
             axes: images.axes.as_ref().map_or(0, Buffer::address),
             guide,

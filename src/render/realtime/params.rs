@@ -64,8 +64,8 @@ pub struct FrameParams {
     pub slices: u32,
     /// Of gtao, on each side.
     pub steps: u32,
-    /// 1: the samples of a pixel fill the square evenly.
-    pub even_sequence: u32,
+    /// The variance of the mean of n samples falls as n to the power of minus 1 and this.
+    pub evenness: f32,
     /// Of a pixel in a frame with a budget.
     pub most_rays: u32,
     /// Surfaces.

@@ -308,7 +308,7 @@ impl Preset {
             rays_per_pixel: 1,
             budget: Budget::Uniform,
             resolution: Resolution::Full,
-            sequence: Sequence::Blue,
+            sequence: Sequence::Sobol,
             seed: 0,
             radius: f64::INFINITY,
             falloff: 1.0,
