@@ -3,11 +3,55 @@
 // rays: coherent
 #include "path/path.glsl"
 
+// Mirrors PixelFilter in src/render/path/mod.rs.
+const uint FILTER_BOX = 0u;
+const uint FILTER_TENT = 1u;
+const uint FILTER_BLACKMAN_HARRIS = 2u;
+const float BLACKMAN_HARRIS_RADIUS = 1.5;
+
+// Share of Blackman and Harris' window (four terms) below x, which goes over it from 0 to 1.
+float blackman_harris_share(float x) {
+    const float TURN = 6.28318530718;
+    float s1 = on_circle(x).y, s2 = on_circle(fract(2.0 * x)).y, s3 = on_circle(fract(3.0 * x)).y;
+    return x + (-0.48829 * s1 + 0.5 * 0.14128 * s2 - 0.01168 / 3.0 * s3) / (0.35875 * TURN);
+}
+
+// From the middle of a pixel, as often as the filter weighs it.
+float filter_offset(uint pixel_filter, float u) {
+    if (pixel_filter == FILTER_TENT) return u < 0.5 ? sqrt(2.0 * u) - 1.0 : 1.0 - sqrt(2.0 - 2.0 * u);
+    if (pixel_filter == FILTER_BLACKMAN_HARRIS) {
+        // the share grows with x: halve to the last bit that matters
+        float low = 0.0, high = 1.0;
+        for (int k = 0; k < 20; k++) {
+            float middle = 0.5 * (low + high);
+            if (blackman_harris_share(middle) < u) low = middle;
+            else high = middle;
+        }
+        return (low + high - 1.0) * BLACKMAN_HARRIS_RADIUS;
+    }
+    return u - 0.5;
+}
+
+// Where a ray through a lens starts, and where it goes: to the point that the ray through the lens' middle meets in the plane of focus.
+Ray lens_ray(BlockParams p, Ray r, vec2 u) {
+    PathParams path = PathParams(p.path);
+    vec4 rows[3] = p.camera_to_world;
+    vec3 right = vec3(rows[0].x, rows[1].x, rows[2].x), up = vec3(rows[0].y, rows[1].y, rows[2].y), back = vec3(rows[0].z, rows[1].z, rows[2].z);
+    vec2 lens = path.lens_radius * concentric_disk(u).xy;
+    vec3 sharp = r.origin + r.direction * (path.focus / -dot(r.direction, back));
+    r.origin += right * lens.x + up * lens.y;
+    r.direction = normalize(sharp - r.origin);
+    return r;
+}
+
 Ray camera_sample(BlockParams p, uint index) {
     uvec2 pixel = block_pixel(p, pixel_index(index));
     if (!in_block(p, pixel)) return no_ray();
     pixel += p.block_origin;
-    return camera_ray(p, vec2(pixel) + sample_2d(p.seed, pixel, sample_index(index), CAMERA_FILM));
+    PathParams path = PathParams(p.path);
+    vec2 u = sample_2d(p.seed, pixel, sample_index(index), CAMERA_FILM);
+    Ray r = camera_ray(p, vec2(pixel) + 0.5 + vec2(filter_offset(path.pixel_filter, u.x), filter_offset(path.pixel_filter, u.y)));
+    return path.lens_radius > 0.0 ? lens_ray(p, r, sample_2d(p.seed, pixel, sample_index(index), CAMERA_LENS)) : r;
 }
 
 Ray ray(uint index) {

@@ -4,6 +4,7 @@
 #define COMMON_SAMPLER
 
 const uint CAMERA_FILM = 0u;
+const uint CAMERA_LENS = 1u;
 const uint AO_DIRECTION = 2u;
 
 uint hash(uint x) {

@@ -33,7 +33,11 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Pa
     float albedo;         // that grey
     uint strategy;        // how directions are drawn: STRATEGY_*
     uint environment_light;  // its place among the lights, or INVALID
-    uint path_reserved;
+    uint pixel_filter;    // FILTER_*
+    float lens_radius;    // world units; 0: a pinhole
+    float focus;          // distance along the view at which the image is sharp
+    uint path_reserved0;
+    uint path_reserved1;
 };
 
 // Everything below but MIS shows what it is good for.

@@ -6,6 +6,7 @@ mod atomic;
 pub mod exr;
 pub mod frames;
 pub mod png;
+pub mod tone_map;
 
 use std::path::Path;
 

@@ -4,6 +4,7 @@
 #[path = "../common/mod.rs"]
 mod common;
 
+mod camera;
 mod direct;
 mod furnace;
 mod transport;

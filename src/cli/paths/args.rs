@@ -7,7 +7,8 @@ use glam::{DMat3, Vec3};
 
 use crate::cli::args::{Aov, Integrator, RenderArgs, parse_number, parse_vector, parse_where};
 use crate::error::{Error, Result};
-use crate::render::path::Strategy;
+use crate::output::tone_map::ToneMap;
+use crate::render::path::{PixelFilter, Strategy};
 use crate::scene::{Environment, load};
 
 /// How directions are drawn.
@@ -33,6 +34,54 @@ impl From<Sampling> for Strategy {
             Sampling::Light => Strategy::Light,
             Sampling::Cosine => Strategy::Cosine,
             Sampling::Uniform => Strategy::Uniform,
+        }
+    }
+}
+
+/// Reconstruction filter of pixels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum PixelFilterChoice {
+    /// The pixel's own square
+    Box,
+    /// A tent of radius 1
+    Tent,
+    /// Blackman and Harris' window of radius 1.5
+    BlackmanHarris,
+}
+
+impl From<PixelFilterChoice> for PixelFilter {
+    fn from(f: PixelFilterChoice) -> Self {
+        match f {
+            PixelFilterChoice::Box => PixelFilter::Box,
+            PixelFilterChoice::Tent => PixelFilter::Tent,
+            PixelFilterChoice::BlackmanHarris => PixelFilter::BlackmanHarris,
+        }
+    }
+}
+
+/// How radiance is brought below 1.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum ToneMapChoice {
+    /// Cut off at 1
+    Linear,
+    /// 1 - e^-x
+    Exp,
+    /// Luminance over 1 + luminance
+    Reinhard,
+    /// Khronos PBR Neutral
+    Neutral,
+    /// AgX
+    Agx,
+}
+
+impl From<ToneMapChoice> for ToneMap {
+    fn from(t: ToneMapChoice) -> Self {
+        match t {
+            ToneMapChoice::Linear => ToneMap::Linear,
+            ToneMapChoice::Exp => ToneMap::Exponential,
+            ToneMapChoice::Reinhard => ToneMap::Reinhard,
+            ToneMapChoice::Neutral => ToneMap::Neutral,
+            ToneMapChoice::Agx => ToneMap::Agx,
         }
     }
 }
@@ -65,6 +114,18 @@ pub struct PathArgs {
     /// Albedo of all surfaces with --integrator ao-sky [default: 0.5]
     #[arg(long, value_name = "X", value_parser = parse_albedo, allow_hyphen_values = true)]
     pub sky_albedo: Option<f64>,
+    /// Reconstruction filter of pixels, by importance sampling [default: box]
+    #[arg(long, value_enum)]
+    pub pixel_filter: Option<PixelFilterChoice>,
+    /// Aperture of a 36x24 mm camera: the focal length over this is the lens; world units are metres [default: a pinhole]
+    #[arg(long, value_name = "N", value_parser = parse_clamp, requires = "focus_distance", allow_hyphen_values = true)]
+    pub f_number: Option<f64>,
+    /// Distance along the view at which the image is sharp, world units
+    #[arg(long, value_name = "D", value_parser = parse_clamp, requires = "f_number", allow_hyphen_values = true)]
+    pub focus_distance: Option<f64>,
+    /// How .png outputs bring radiance below 1 [default: linear]
+    #[arg(long, value_enum)]
+    pub tone_map: Option<ToneMapChoice>,
     /// Brighten .png outputs by this many stops [default: 0]
     #[arg(long, value_name = "EV", value_parser = parse_number, allow_hyphen_values = true)]
     pub exposure: Option<f64>,
@@ -92,6 +153,9 @@ impl PathArgs {
             (self.sampling.is_some(), "--sampling"),
             (self.environment.is_some(), "--environment"),
             (self.exposure.is_some(), "--exposure"),
+            (self.tone_map.is_some(), "--tone-map"),
+            (self.pixel_filter.is_some(), "--pixel-filter"),
+            (self.f_number.is_some(), "--f-number"),
         ];
         let wrong = |what: String| Err(Error::Usage(what));
         match args.integrator {

@@ -14,14 +14,15 @@ use super::progress::Progress;
 use super::render::{aov_channels, choose_camera, open, write_depth};
 use super::report::Seconds;
 use crate::error::{Error, Result};
+use crate::output::tone_map::ToneMap;
 use crate::output::{self, Channel, Image, ImageFormat, Samples, png};
 use crate::render::aov;
 use crate::render::camera::CameraRecord;
 use crate::render::cover::Cover;
 use crate::render::film::Film;
-use crate::render::path::{self, MOST_DEPTH, PathOptions};
-use crate::scene::Environment;
+use crate::render::path::{self, Lens, MOST_DEPTH, PathOptions};
 use crate::scene::flatten::FlatScene;
+use crate::scene::{Camera, Environment, Projection};
 use crate::tracer::{Needs, Tracer};
 use report::Report;
 
@@ -52,14 +53,14 @@ pub fn run(args: &RenderArgs, start: Instant) -> Result<(), Failure> {
     let flat = FlatScene::new(&scene);
     let record = CameraRecord::new(&camera, flat.origin, aspect);
     let (kind, why, compute) = args.device.choose(&device.info)?;
-    let mut options = options(args, &flat, size);
+    let mut options = options(args, &flat, &camera, size)?;
     let mut build = args.device.build_options(RAYS_OF_A_PATH * options.spp as u64 * size[0] as u64 * size[1] as u64);
     build.streams.extend(path::streams());
     let needs = Needs { shading: true, ..Default::default() };
     let tracer = Tracer::with_build(&device, kind, &flat, needs, compute, &build)?;
     build.take_warnings().iter().for_each(|w| warnings.add(w));
-    // what surrounds the scene shines where nothing is
-    if options.white_sky.is_none() && scene.environment == Environment::Black {
+    // what surrounds the scene shines where nothing is; lenses and wide filters look beside the pixel
+    if options.white_sky.is_none() && scene.environment == Environment::Black && options.is_sharp() {
         options.cover = Cover::new(&flat, &record, size, options.spp).map(Arc::new);
     }
 
@@ -107,7 +108,7 @@ pub fn run(args: &RenderArgs, start: Instant) -> Result<(), Failure> {
     let image = Image { width: size[0], height: size[1], channels, metadata: report.metadata() };
     for path in &args.output {
         match ImageFormat::of(path)? {
-            ImageFormat::Png => png::write(&image, path, args.paths.exposure.unwrap_or(0.0) as f32)?,
+            ImageFormat::Png => png::write(&picture(&image, args), path, 0.0)?,
             ImageFormat::Exr => output::save(&image, path)?,
         }
     }
@@ -126,11 +127,28 @@ fn emits(flat: &FlatScene) -> bool {
     flat.scene.meshes.iter().any(|m| flat.scene.materials[m.material].emissive != glam::Vec3::ZERO)
 }
 
-fn options(args: &RenderArgs, flat: &FlatScene, size: [u32; 2]) -> PathOptions {
+/// Height of the sensor that `--f-number` is about, metres.
+const SENSOR_HEIGHT: f64 = 0.024;
+
+/// The lens that is asked for.
+fn lens(args: &RenderArgs, camera: &Camera) -> Result<Option<Lens>> {
+    let (Some(f_number), Some(focus)) = (args.paths.f_number, args.paths.focus_distance) else { return Ok(None) };
+    match camera.projection {
+        Projection::Perspective { fov_y } => {
+            let focal_length = 0.5 * SENSOR_HEIGHT / (0.5 * fov_y).tan();
+            Ok(Some(Lens { radius: (0.5 * focal_length / f_number) as f32, focus: focus as f32 }))
+        }
+        Projection::Orthographic { .. } => Err(Error::Usage("--f-number: the camera is orthographic and has no lens".into())),
+    }
+}
+
+fn options(args: &RenderArgs, flat: &FlatScene, camera: &Camera, size: [u32; 2]) -> Result<PathOptions> {
     let hints = &flat.scene.hints;
     let asked = args.paths.max_depth.or(hints.max_depth).unwrap_or(MOST_DEPTH);
-    PathOptions {
+    Ok(PathOptions {
         size,
+        pixel_filter: args.paths.pixel_filter.map(Into::into).unwrap_or_default(),
+        lens: lens(args, camera)?,
         spp: args.spp.or(hints.spp).unwrap_or(DEFAULT_SPP).max(1),
         seed: args.seed,
         max_depth: if args.integrator == Integrator::Direct { 1 } else { asked },
@@ -140,7 +158,13 @@ fn options(args: &RenderArgs, flat: &FlatScene, size: [u32; 2]) -> PathOptions {
         white_sky: (args.integrator == Integrator::AoSky).then(|| args.paths.sky_albedo.unwrap_or(SKY_ALBEDO) as f32),
         time_limit: args.time_limit,
         cover: None,
-    }
+    })
+}
+
+/// What a picture of 8 bits shows.
+fn picture(image: &Image, args: &RenderArgs) -> Image {
+    let map = args.paths.tone_map.map(ToneMap::from).unwrap_or_default();
+    map.apply(image, args.paths.exposure.unwrap_or(0.0) as f32)
 }
 
 /// The film as named channels: linear RGB, coverage, and of each channel the variance of one sample.

@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 use crate::cli::args::RenderArgs;
 use crate::cli::report::{Seconds, camera_text};
 use crate::gpu::DeviceInfo;
-use crate::render::path::{MOST_DEPTH, PathOptions, PathResult};
+use crate::render::path::{MOST_DEPTH, PathOptions, PathResult, PixelFilter};
 use crate::scene::{Camera, Environment, Scene};
 use crate::tracer::{BuildStats, TracerKind};
 
@@ -63,6 +63,12 @@ impl Report<'_> {
         ];
         if o.firefly_clamp.is_finite() {
             out.push(("firefly_clamp", o.firefly_clamp.to_string()));
+        }
+        if o.pixel_filter != PixelFilter::Box {
+            out.push(("pixel_filter", format!("{:?}", o.pixel_filter)));
+        }
+        if let Some(lens) = o.lens {
+            out.push(("lens", format!("radius {}, focus {}", lens.radius, lens.focus)));
         }
         if let Some(albedo) = o.white_sky {
             out.push(("sky_albedo", albedo.to_string()));

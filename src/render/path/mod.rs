@@ -67,6 +67,29 @@ impl Strategy {
     }
 }
 
+/// What a pixel is the mean of: positions in the image are drawn as often as the filter weighs them, and count alike (Ernst, Stamminger,
+/// Greiner, "Filter Importance Sampling", 2006).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum PixelFilter {
+    /// The pixel's own square.
+    #[default]
+    Box,
+    /// Falls linearly to 0 at one pixel's distance.
+    Tent,
+    /// Blackman and Harris' window (1978), 0 at 1.5 pixels' distance.
+    BlackmanHarris,
+}
+
+/// A thin lens.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct Lens {
+    /// World units.
+    pub radius: f32,
+    /// Distance along the view at which the image is sharp, world units.
+    pub focus: f32,
+}
+
 /// What to render.
 #[derive(Clone, Debug)]
 pub struct PathOptions {
@@ -87,9 +110,13 @@ pub struct PathOptions {
     /// Every surface is diffuse and of this grey, and nothing shines but a white sky: the rendering equation that ambient occlusion
     /// approximates.
     pub white_sky: Option<f32>,
+    /// What a pixel is the mean of.
+    pub pixel_filter: PixelFilter,
+    /// A perspective camera's; without it a pinhole.
+    pub lens: Option<Lens>,
     /// Stop after this time with what there is.
     pub time_limit: Option<Duration>,
-    /// Which tiles of the image show anything; only where the environment is black.
+    /// Which tiles of the image show anything; only where the environment is black and [`PathOptions::is_sharp`].
     pub cover: Option<Arc<Cover>>,
 }
 
@@ -104,9 +131,18 @@ impl Default for PathOptions {
             firefly_clamp: f32::INFINITY,
             strategy: Strategy::Mis,
             white_sky: None,
+            pixel_filter: PixelFilter::Box,
+            lens: None,
             time_limit: None,
             cover: None,
         }
+    }
+}
+
+impl PathOptions {
+    /// Does every pixel see nothing but what projects into it?
+    pub fn is_sharp(&self) -> bool {
+        self.pixel_filter == PixelFilter::Box && self.lens.is_none()
     }
 }
 
@@ -219,6 +255,9 @@ impl Paths {
             albedo: options.white_sky.unwrap_or(0.0),
             strategy: options.strategy.number(),
             environment_light: lights.environment.unwrap_or(INVALID),
+            lens_radius: options.lens.map_or(0.0, |l| l.radius),
+            focus: options.lens.map_or(1.0, |l| l.focus),
+            pixel_filter: options.pixel_filter as u32,
             ..Default::default()
         };
         // those with number k fill queue k, and read the tags of the other

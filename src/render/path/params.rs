@@ -43,5 +43,8 @@ pub(super) struct PathParams {
     pub albedo: f32,
     pub strategy: u32,
     pub environment_light: u32,
-    pub reserved: u32,
+    pub pixel_filter: u32,
+    pub lens_radius: f32,
+    pub focus: f32,
+    pub reserved: [u32; 2],
 }
