@@ -49,15 +49,14 @@ fn gpu_budgets_are_met() {
             assert!(known > 8.0 * f64::from(rays), "{kind}, {rays} rays: histories of {known} samples");
             assert!((sum / wanted - 1.0f64).abs() < 0.04, "{kind}, {rays} rays: {sum} of {wanted}");
         }
-        // while nothing moves, until histories are full: as many as a uniform budget takes
-        let mut realtime = Realtime::new(&tracer, SIZE, &Settings { history: 16, ..settings() }, &[]).unwrap();
+        // while nothing moves, until histories are full: as many as a uniform budget takes. With `sobol` some go on: docs/realtime.md
+        let blue = Settings { sequence: Sequence::Blue, history: 16, ..settings() };
+        let mut realtime = Realtime::new(&tracer, SIZE, &blue, &[]).unwrap();
         let camera = record(&scene.cameras[0], &scene);
         let counts: Vec<u64> = (0..60).map(|_| realtime.frame(&tracer, &camera, &[]).unwrap().occlusion_rays).collect();
         let share = counts.iter().sum::<u64>() as f64 / (16.0 * covered(&realtime));
         assert!((share - 1.0).abs() < 0.25, "{kind}: {share} of the budget at rest");
-        // some go on: variances are estimates, and what pixels may have moves with them
-        let rest = counts[40..].iter().sum::<u64>() as f64 / 20.0;
-        assert!(rest < 0.15 * covered(&realtime), "{kind}: {rest} rays at rest");
+        assert!((counts[59] as f64) < 0.05 * covered(&realtime), "{kind}: {} rays at rest", counts[59]);
     }
     assert_validation_clean(&device);
 }

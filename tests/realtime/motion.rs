@@ -10,6 +10,7 @@ use skylit::render::Uncontrolled;
 use skylit::render::aov;
 use skylit::render::camera::CameraRecord;
 use skylit::render::realtime::{Preset, Realtime, Settings};
+use skylit::sampling::Sequence;
 use skylit::scene::animation::{Playback, Pose};
 use skylit::scene::builtin::shapes;
 use skylit::scene::flatten::{FlatScene, Motion};
@@ -29,7 +30,9 @@ fn gpu_a_moving_camera_is_hardly_worse_than_a_still_one() {
     let end = stepped(&scene, SIZE, DVec3::ZERO);
     for kind in one_tracer(&device) {
         let tracer = tracer_of(&device, kind, &scene);
-        for settings in [traced(Preset::Fast), Settings { filter: NO_FILTER, ..traced(Preset::Fast) }] {
+        // about places, not about evenness, which a still pixel's own Sobol sequence has more of than what is interpolated from several
+        let blue = Settings { sequence: Sequence::Blue, ..traced(Preset::Fast) };
+        for settings in [blue, Settings { filter: NO_FILTER, ..blue }] {
             let want = reference(&tracer, SIZE, &settings, &end);
             let error = |realtime: &Realtime| rmse(&realtime.result().unwrap(), &want, &realtime.coverage().unwrap());
             let mut still = realtime(&tracer, SIZE, &settings);
@@ -43,9 +46,9 @@ fn gpu_a_moving_camera_is_hardly_worse_than_a_still_one() {
             let (a, b) = (error(&still), error(&moving));
             let kept = mean(moving.samples().unwrap().into_iter().filter(|n| *n > 0.0).map(f64::from));
             println!("{kind}, {:?}: still {a:.4}, moving {b:.4}; {kept:.1} samples", settings.filter.kind);
-            // what is interpolated in each of 32 frames is blurred, and sums of other pixels' samples fill the square less evenly than
-            // a pixel's own: 2.6 times as much. A place that is half a pixel off makes it more than four times as much
-            assert!(b <= 3.2 * a, "{kind}: {b} after {a}");
+            // what is interpolated in each of 32 frames is blurred, which in an image of so few pixels is as much again; a place that is half a
+            // pixel off makes it more than four times as much
+            assert!(b <= 2.5 * a, "{kind}: {b} after {a}");
             assert!(kept > 20.0, "{kind}: {kept} samples of 32 are left");
         }
     }
