@@ -38,29 +38,17 @@ impl ToneMap {
         }
     }
 
-    /// The channels `R`, `G`, `B` (or `Y`) of an image, brightened by `exposure` stops and mapped; the others are left out.
+    /// The channels `R`, `G`, `B` of an image, brightened by `exposure` stops and mapped; the others are left out, as are all where one of these is missing.
     pub fn apply(self, image: &Image, exposure: f32) -> Image {
         let gain = exposure.exp2();
-        let planes: Vec<_> = ["R", "G", "B"].iter().filter_map(|n| image.f32(n)).collect();
-        let (names, planes) = match (&planes[..], image.f32("Y")) {
-            ([_, _, _], _) => (vec!["R", "G", "B"], planes),
-            (_, Some(y)) => (vec!["Y"], vec![y, y, y]),
-            _ => (Vec::new(), Vec::new()),
-        };
-        let mapped: Vec<Rgb> = match planes[..] {
-            [r, g, b] => (0..image.pixel_count())
-                .into_par_iter()
-                .with_min_len(1024)
-                .map(|k| self.map([r[k] * gain, g[k] * gain, b[k] * gain]))
-                .collect(),
-            _ => Vec::new(),
-        };
-        let channel = |(c, name): (usize, &&str)| Channel {
-            name: (*name).to_owned(),
-            samples: Samples::F32(mapped.iter().map(|p| p[c]).collect()),
-        };
-        let channels = names.iter().enumerate().map(channel).collect();
-        Image { width: image.width, height: image.height, channels, metadata: Vec::new() }
+        let mut out = Image { width: image.width, height: image.height, ..Default::default() };
+        if let (Some(r), Some(g), Some(b)) = (image.f32("R"), image.f32("G"), image.f32("B")) {
+            let pixels = (0..image.pixel_count()).into_par_iter().with_min_len(1024);
+            let mapped: Vec<Rgb> = pixels.map(|k| self.map([r[k] * gain, g[k] * gain, b[k] * gain])).collect();
+            let plane = |c: usize| Samples::F32(mapped.iter().map(|p| p[c]).collect());
+            out.channels = (0..3).map(|c| Channel { name: ["R", "G", "B"][c].to_owned(), samples: plane(c) }).collect();
+        }
+        out
     }
 }
 
