@@ -4,7 +4,6 @@ use super::*;
 use skylit::render::Control;
 use skylit::render::accumulate::Accumulated;
 use skylit::render::ao::{self, AoOptions};
-use skylit::render::convergence::TileErrors;
 use skylit::render::cover::Cover;
 use skylit::render::film_state::FilmState;
 use skylit::render::schedule::FilmOptions;
@@ -44,11 +43,12 @@ fn gpu_a_film_goes_on_as_if_it_had_never_stopped() {
     for (name, options) in [("cornell-box", box_), ("stairs", sky)] {
         let scene = by_name(name).unwrap();
         let flat = FlatScene::new(&scene);
-        for kind in tracers(&device) {
+        // the second on one tracer: every run compiles its shaders
+        for kind in tracers(&device).into_iter().filter(|&k| name == "cornell-box" || k == TracerKind::Compute) {
             let tracer = tracer(&device, kind, &flat);
             let whole = render(&tracer, &flat, &up_to(&options, 16, None)).image;
             assert_eq!((whole.spp, whole.most_spp, whole.stopped_early), (16, 16, false));
-            // one tracer for what is the host's alone: every run compiles its shaders
+            // and on that one what is the host's alone
             let alone = kind == TracerKind::Compute;
             let cuts = if alone { &[&[3, 7, 16][..], &[15, 16], &[16, 16]][..] } else { &[&[3, 7, 16][..]] };
             for cuts in cuts {
@@ -206,18 +206,28 @@ fn rmse(film: &Film, reference: &Film, of: impl Fn(usize) -> bool) -> f64 {
     (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt()
 }
 
+/// A floor seen from above, a lamp over one of its corners and out of sight: found by chance, which is noisy near it and quiet far away.
+fn lamp_over_a_corner() -> Scene {
+    let mut camera = Camera::look_at(DVec3::new(0.0, 0.5, 0.0), DVec3::ZERO, DVec3::Z, 1.0);
+    camera.projection = skylit::scene::Projection::Orthographic { half_height: 3.0 };
+    let lamp = shapes::sphere(DVec3::new(2.5, 1.2, 1.5), 0.5);
+    scene_of(vec![(shapes::floor(DVec3::ZERO, 20.0), matte(0.6)), (lamp, emitter(4.0))], camera)
+}
+
 /// Tiles are left alone once they are good enough: the image is as good as was asked for, and quiet tiles cost less.
 #[test]
 fn gpu_a_target_is_reached_where_it_is_dear_and_where_it_is_cheap() {
     let device = device();
-    let scene = by_name("cornell-box").unwrap();
+    let scene = lamp_over_a_corner();
     let flat = FlatScene::new(&scene);
-    let base = PathOptions { size: [64, 48], seed: 11, max_depth: 4, ..Default::default() };
+    let base = PathOptions { size: [64, 48], seed: 11, max_depth: 1, ..Default::default() };
     let compute = tracer(&device, TracerKind::Compute, &flat);
-    let reference = render(&compute, &flat, &PathOptions { spp: 4096, seed: 12, ..base.clone() }).image.film;
-    let (target, most) = (0.05, 4096);
+    // light samples find the lamp at once
+    let reference = render(&compute, &flat, &PathOptions { spp: 1024, seed: 12, ..base.clone() }).image.film;
+    assert!(reference.estimated_rmse() < 1e-3, "the reference is too noisy");
+    let (target, most) = (0.03, 8192);
     let film = FilmOptions { target_rmse: Some(target), ..Default::default() };
-    let options = PathOptions { film, ..base };
+    let options = PathOptions { film, strategy: Strategy::Uniform, ..base };
     for kind in tracers(&device) {
         let tracer = tracer(&device, kind, &flat);
         let image = render(&tracer, &flat, &up_to(&options, most, None)).image;
@@ -233,14 +243,19 @@ fn gpu_a_target_is_reached_where_it_is_dear_and_where_it_is_cheap() {
         // all are done before the samples are spent, and not all at once
         assert!(tiles.done == tiles.all && tiles.all == 48 && !image.stopped_early, "{kind}: {tiles:?}");
         assert_eq!((least, least.is_power_of_two(), highest.is_power_of_two()), (64, true, true), "{kind}");
-        assert!(highest >= 256 && mean < 0.6 * f64::from(highest), "{kind}: {mean} of {highest}");
+        assert!(highest >= 512 && mean < 0.6 * f64::from(highest), "{kind}: {mean} of {highest}");
         assert_eq!((image.spp, image.most_spp), (least, highest), "{kind}");
-        // also where a tile got least
-        println!("{kind}: {samples:?}", samples = image.state.as_ref().map(FilmState::tile_samples));
-        let quiet = rmse(&image.film, &reference, |pixel| image.film.samples[pixel] == least);
-        assert!(quiet <= 1.5 * target, "{kind}: {quiet} where there are {least} samples");
-        // no tile was left alone too early: none with fewer samples than its neighbour's error asks for
-        assert!(TileErrors::of(&image.film).open(target).iter().all(|open| !open), "{kind}");
+        // tile by tile, too: those that got least, and those in the middle
+        let samples = image.state.as_ref().unwrap().tile_samples().to_vec();
+        println!("{kind}: {samples:?}");
+        let of_tile = |tile: usize| rmse(&image.film, &reference, |k| k / 64 / 8 * 8 + k % 64 / 8 == tile);
+        let worst = (0..48).map(of_tile).fold(0.0, f64::max);
+        println!("{kind}: worst tile {worst:.5}");
+        assert!(worst <= 1.5 * target, "{kind}: a tile with an error of {worst}");
+        let mut counts = samples.clone();
+        counts.sort_unstable();
+        counts.dedup();
+        assert!(counts.len() >= 3, "{kind}: {counts:?}");
         if kind != TracerKind::Compute {
             continue;
         }
@@ -258,8 +273,8 @@ fn gpu_a_target_is_reached_where_it_is_dear_and_where_it_is_cheap() {
         assert!(better.film.estimated_rmse() <= 0.7 * target && better.converged.unwrap().done == 48, "{kind}");
         assert!(rmse(&better.film, &reference, |_| true) <= 1.05 * target, "{kind}");
         // and without a target, all do
-        let even =
-            render(&tracer, &flat, &up_to(&PathOptions { film: FilmOptions::default(), ..options.clone() }, 300, image.state));
+        let untargeted = PathOptions { film: FilmOptions::default(), ..options.clone() };
+        let even = render(&tracer, &flat, &up_to(&untargeted, 300, image.state.clone()));
         assert!(even.image.film.samples.iter().zip(&image.film.samples).all(|(now, then)| *now == 300.max(*then)), "{kind}");
     }
     assert_validation_clean(&device);
