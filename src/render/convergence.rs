@@ -43,16 +43,16 @@ impl TileErrors {
         Self { size, errors: sums.into_iter().map(|(sum, n)| (sum / f64::from(n.max(1))).sqrt()).collect() }
     }
 
-    /// The tiles that do not know enough: those whose error, or that of one of their neighbours, is above `target`.
+    /// The tiles that do not know enough: those whose error, or that of one of their neighbours, is not at most `target`.
     pub fn open(&self, target: f64) -> Vec<bool> {
         let [width, height] = self.size;
-        // not a number is above every target
-        let above = |x: usize, y: usize| !(self.errors[y * width + x] <= target);
+        // what is no number is not
+        let enough = |x: usize, y: usize| self.errors[y * width + x] <= target;
         let around = |at: usize, n: usize| at.saturating_sub(1)..(at + 2).min(n);
         (0..width * height)
             .map(|tile| {
                 let (x, y) = (tile % width, tile / width);
-                around(y, height).any(|y| around(x, width).any(|x| above(x, y)))
+                !around(y, height).all(|y| around(x, width).all(|x| enough(x, y)))
             })
             .collect()
     }
