@@ -179,7 +179,7 @@ fn courtyard() -> Scene {
             filter: Filter::Linear,
         }],
         lights: vec![
-            light("sun", LightKind::Directional, Vec3::new(3.0, 2.8, 2.5), DVec3::ZERO),
+            light("sun", LightKind::Directional { angle: 0.0 }, Vec3::new(3.0, 2.8, 2.5), DVec3::ZERO),
             light("lamp", LightKind::Point, Vec3::new(20.0, 14.0, 8.0), DVec3::new(0.0, 2.0, 1.0)),
         ],
         cameras: vec![camera, plan],

@@ -81,6 +81,11 @@ fn usage_errors() {
     fails(&render(&["--triangle-test", "none"]), 64, "watertight, moller-trumbore");
     fails(&render(&["--tracer", "pipeline", "--build", "best"]), 64, "--tracer compute");
     fails(&render(&["--traversal", "brute", "--build", "best"]), 64, "has no hierarchy");
+    fails(&render(&["--resumable", "--preset", "fast"]), 64, "--resumable is of stills");
+    fails(&render(&["--resume", "a.exr", "--dump-rays", "r"]), 64, "leave --dump-rays out");
+    fails(&render(&["--integrator", "path", "--target-rmse", "0"]), 64, "above 0");
+    fails(&render(&["--integrator", "path", "--resume", "a.png"]), 64, "--resume a.png: only an .exr");
+    fails(&["render", "builtin:plane", "-o", "a.png", "--integrator", "path", "--resumable"], 64, "--resumable needs an .exr");
     fails(&["rays", "--mesh", "a.bin", "--rays", "r.bin", "--traversal", "nearest", "--bvh-cache", "d"], 64, "keeps none");
     fails(&["diff", "a.exr"], 64, "<B>");
     fails(&["export", "builtin:plane", "a.txt"], 64, ".bin, .glb or .gltf");

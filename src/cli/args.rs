@@ -8,6 +8,7 @@ use clap::{Args, ValueEnum, ValueHint};
 use glam::DVec3;
 
 use super::console::Console;
+use super::film::args::FilmArgs;
 use super::frames::args::FrameArgs;
 use super::paths::args::PathArgs;
 use crate::bvh::BuildPreset;
@@ -381,6 +382,9 @@ pub struct RenderArgs {
     /// Paths
     #[command(flatten)]
     pub paths: PathArgs,
+    /// The film
+    #[command(flatten)]
+    pub film: FilmArgs,
     /// How results are shown
     #[command(flatten)]
     pub verbosity: Verbosity,
@@ -401,6 +405,7 @@ impl RenderArgs {
     pub fn check(&self) -> Result<()> {
         self.device.check()?;
         self.paths.check(self)?;
+        self.film.check(self)?;
         if self.frames.show.is_some() && !self.writes_picture() {
             return Err(Error::Usage("--show is of .png and .apng outputs: an .exr has its channels, see --aov".into()));
         }

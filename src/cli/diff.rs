@@ -95,12 +95,16 @@ pub fn run(args: &DiffArgs) -> Result<(), Failure> {
     console.close(&record, verdict)
 }
 
-/// Channels of the same name and type; a grey image (`Y`) also goes with one that calls it `R`.
+/// Channels of the same name and type; a grey image (`Y`) also goes with one that calls it `R`. The sums of a film (`state`) are no image.
 fn pairs<'a>(a: &'a Image, b: &'a Image) -> Vec<(&'a Channel, &'a Channel)> {
     let same_type = |x: &Channel, y: &Channel| std::mem::discriminant(&x.samples) == std::mem::discriminant(&y.samples);
     let find = |image: &'a Image, name: &str| image.channels.iter().find(|c| c.name == name);
-    let mut found: Vec<_> =
-        a.channels.iter().filter_map(|x| find(b, &x.name).filter(|y| same_type(x, y)).map(|y| (x, y))).collect();
+    let mut found: Vec<_> = a
+        .channels
+        .iter()
+        .filter(|x| !x.name.starts_with("state."))
+        .filter_map(|x| find(b, &x.name).filter(|y| same_type(x, y)).map(|y| (x, y)))
+        .collect();
     if found.is_empty() {
         for (p, q) in [("Y", "R"), ("R", "Y")] {
             found.extend(find(a, p).zip(find(b, q)));

@@ -7,6 +7,7 @@ mod console;
 mod diff;
 mod doctor;
 mod export;
+mod film;
 mod frames;
 mod interrupt;
 mod panic;

@@ -8,21 +8,29 @@ use std::time::Instant;
 use super::Warnings;
 use super::args::{Aov, DEFAULT_SIZE, DEFAULT_SPP, Integrator, RenderArgs, dump_path};
 use super::console::{Console, Failure};
+use super::film::{self, Saver};
 use super::interrupt::{self, Keyboard};
 use super::progress::Progress;
 use super::rays::move_rays;
-use super::report::{Rays, Report, Seconds};
+use super::report::{self, Rays, Report, Seconds};
 use crate::error::{Error, Result};
 use crate::gpu::Device;
 use crate::output::{self, Channel, Image, ImageFormat, Samples, png};
 use crate::ray::Ray;
+use crate::render::accumulate::Accumulated;
 use crate::render::ao::{self, AoOptions, Hemisphere};
 use crate::render::aov::{self, AovPixel};
 use crate::render::camera::{self, CameraRecord};
 use crate::render::cover::Cover;
+use crate::render::film::Film;
+use crate::render::film_state::FilmState;
+use crate::render::schedule::FilmOptions;
 use crate::scene::flatten::FlatScene;
-use crate::scene::{Projection, Scene, load};
+use crate::scene::{Projection, Scene, fingerprint, load};
 use crate::tracer::{Needs, Tracer};
+
+/// Values of a pixel.
+const CHANNELS: [&str; 1] = ["Y"];
 
 /// Loads, renders, writes, reports.
 pub fn run(args: &RenderArgs, start: Instant) -> Result<(), Failure> {
@@ -60,7 +68,16 @@ pub fn run(args: &RenderArgs, start: Instant) -> Result<(), Failure> {
         time_limit: args.time_limit,
         keep_rays: args.dump_rays.is_some(),
         cover: None,
+        film: FilmOptions::default(),
     };
+    let print = args.film.keeps_state().then(|| fingerprint::of_scene(&scene));
+    let identity = report::identity(&camera, &options, print);
+    let maker = [("tracer", kind.name().into()), ("device", format!("{} ({})", device.info.name, device.info.driver))];
+    let resumed = film::resume(args, &CHANNELS, size, options.spp, &identity, &maker)?;
+    let before = resumed.as_ref().map(|r| r.state.most_samples());
+    resumed.iter().flat_map(|r| &r.warning).for_each(|w| warnings.add(w));
+    options.film = film::options(args, &scene.hints, options.spp, resumed.map(|r| r.state));
+    film::check_writable(args, &options.film)?;
     let needs = Needs {
         normals: options.hemisphere == Hemisphere::Shading || args.wants(Aov::Ns),
         albedo: args.wants(Aov::Albedo),
@@ -78,14 +95,28 @@ pub fn run(args: &RenderArgs, start: Instant) -> Result<(), Failure> {
         options.cover = Cover::new(&flat, &record, size, options.spp).map(Arc::new);
     }
 
-    let mut control = Keyboard { progress: Progress::new("rendering", &console), keep_partial: args.keep_partial };
-    let mut result = ao::render(&tracer, &record, &options, &mut control)?;
+    let mut keyboard = Keyboard { progress: Progress::new("rendering", &console), keep_partial: args.keep_partial };
+    // first, because what is saved on the way has them, too
     let aov_start = Instant::now();
     let pixels = match args.aov.is_empty() && args.depth_image.is_none() {
         true => Vec::new(),
-        false => aov::render(&tracer, &record, size, &mut control)?,
+        false => aov::render(&tracer, &record, size, &mut keyboard)?,
     };
-    let seconds = Seconds { trace: result.trace_seconds, aov: aov_start.elapsed().as_secs_f64(), ..seconds };
+    let aov_seconds = aov_start.elapsed().as_secs_f64();
+    let origin = flat.origin;
+    let image = |film: Film, state: Option<&FilmState>, spp: String| Image {
+        width: size[0],
+        height: size[1],
+        channels: channels(film, state.filter(|_| options.film.keep_state), args, &pixels, origin),
+        metadata: film::metadata(args, spp, &maker, &identity),
+    };
+    let mut save = |on_way: &Accumulated| {
+        let image = image(on_way.film.clone(), on_way.state.as_ref(), film::spp_text(on_way.spp, on_way.most_spp));
+        args.output.iter().try_for_each(|path| output::save(&image, &film::interval_path(path, on_way.most_spp)))
+    };
+    let mut control = Saver { keyboard, save: &mut save };
+    let mut result = ao::render(&tracer, &record, &options, &mut control)?;
+    let seconds = Seconds { trace: result.trace_seconds, aov: aov_seconds, ..seconds };
     drop(control);
     device.check_validation()?;
 
@@ -101,6 +132,8 @@ pub fn run(args: &RenderArgs, start: Instant) -> Result<(), Failure> {
         compute: tracer.compute_options(),
         options: &options,
         spp: result.spp,
+        most_spp: result.most_spp,
+        film: film::tell(args, &scene.hints, &result.film, result.converged, before, options.spp),
         stopped_early: result.stopped_early,
         mean,
         mean_standard_error: error,
@@ -118,17 +151,11 @@ pub fn run(args: &RenderArgs, start: Instant) -> Result<(), Failure> {
         warnings: warnings.list,
         seconds,
     };
-    let origin = flat.origin;
     write_rays(args, &mut result.kept_primary, &mut result.kept_occlusion, origin)?;
     if let Some(path) = &args.depth_image {
         write_depth(path, &pixels, size)?;
     }
-    let image = Image {
-        width: size[0],
-        height: size[1],
-        channels: channels(result.film, args, &pixels, origin),
-        metadata: report.metadata(),
-    };
+    let image = image(result.film, result.state.as_ref(), film::spp_text(result.spp, result.most_spp));
     for path in &args.output {
         output::save(&image, path)?;
     }
@@ -172,22 +199,29 @@ pub(super) fn choose_camera(args: &RenderArgs, scene: &Scene, aspect: f64) -> Re
 }
 
 /// Mean over what the scene covers.
-fn covered_mean(film: &crate::render::film::Film) -> f64 {
+fn covered_mean(film: &Film) -> f64 {
     let sum = |v: &[f32]| v.iter().map(|&x| f64::from(x)).sum::<f64>();
     let covered = sum(&film.coverage);
     if covered > 0.0 { sum(&film.mean) / covered } else { 0.0 }
 }
 
-/// The film and the auxiliary outputs that were asked for, as named channels.
-fn channels(film: crate::render::film::Film, args: &RenderArgs, pixels: &[AovPixel], origin: glam::DVec3) -> Vec<Channel> {
+/// The film, its sums if it is to go on, and the auxiliary outputs that were asked for, as named channels.
+fn channels(
+    film: Film,
+    state: Option<&FilmState>,
+    args: &RenderArgs,
+    pixels: &[AovPixel],
+    origin: glam::DVec3,
+) -> Vec<Channel> {
     let f32s = |name: &str, samples| Channel { name: name.into(), samples: Samples::F32(samples) };
-    let mut out = vec![f32s("Y", film.mean)];
+    let mut out = vec![f32s(CHANNELS[0], film.mean)];
     if !args.writes_exr() {
         return out;
     }
     out.push(f32s("A", film.coverage));
     out.push(f32s("variance", film.variance));
     out.push(Channel { name: "samples".into(), samples: Samples::U32(film.samples) });
+    out.extend(state.iter().flat_map(|s| film::state_channels(s, &CHANNELS)));
     out.extend(aov_channels(args, pixels, origin));
     out
 }

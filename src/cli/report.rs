@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use serde_json::{Value, json};
 
 use super::args::RenderArgs;
+use super::film::{Identity, Told, spp_text};
 use crate::gpu::DeviceInfo;
 use crate::render::ao::{AoOptions, Hemisphere};
 use crate::scene::{Camera, Projection, Scene};
@@ -50,6 +51,31 @@ pub fn camera_text(camera: &Camera) -> String {
     format!("{:?} eye {}, forward {}, up {}; {lens}", camera.name, m.translation, -m.matrix3.z_axis, m.matrix3.y_axis)
 }
 
+/// What has to agree when an image of ambient occlusion is gone on with: all that its samples depend on, but for its size. `print`: the
+/// scene's fingerprint, where the film is kept.
+pub fn identity(camera: &Camera, options: &AoOptions, print: Option<String>) -> Identity {
+    // no `..`: a new option has to be put where it belongs
+    let AoOptions { size: _, spp: _, time_limit: _, keep_rays: _, cover: _, film: _, seed, radius, falloff, hemisphere: _ } =
+        options;
+    vec![
+        ("version", Some(env!("CARGO_PKG_VERSION").into())),
+        ("integrator", Some("ao".into())),
+        ("scene.hash", print),
+        ("camera", Some(camera_text(camera))),
+        ("seed", Some(seed.to_string())),
+        ("ao.radius", Some(radius.to_string())),
+        ("ao.falloff", Some(falloff.to_string())),
+        ("ao.normal", Some(hemisphere(options).into())),
+    ]
+}
+
+fn hemisphere(options: &AoOptions) -> &'static str {
+    match options.hemisphere {
+        Hemisphere::Geometric => "geometric",
+        Hemisphere::Shading => "shading",
+    }
+}
+
 /// All there is to say about a render.
 pub struct Report<'a> {
     /// What was asked for.
@@ -70,6 +96,10 @@ pub struct Report<'a> {
     pub options: &'a AoOptions,
     /// Samples that every pixel got.
     pub spp: u32,
+    /// Samples that any pixel got at most.
+    pub most_spp: u32,
+    /// Of the film.
+    pub film: Told,
     /// Fewer than asked for.
     pub stopped_early: bool,
     /// Mean accessibility over all pixels; background counts 0.
@@ -95,33 +125,6 @@ pub struct Report<'a> {
 }
 
 impl Report<'_> {
-    /// Text attributes of the image. Nothing in it differs between two runs of the same command.
-    pub fn metadata(&self) -> Vec<(String, String)> {
-        let hemisphere = self.hemisphere();
-        [
-            ("camera", camera_text(self.camera)),
-            ("device", format!("{} ({})", self.device.name, self.device.driver)),
-            ("integrator", "ao".into()),
-            ("ao.radius", self.options.radius.to_string()),
-            ("ao.falloff", self.options.falloff.to_string()),
-            ("ao.normal", hemisphere.into()),
-            ("scene", self.args.scene.clone()),
-            ("seed", self.options.seed.to_string()),
-            ("spp", self.spp.to_string()),
-            ("tracer", self.tracer.name().into()),
-            ("version", env!("CARGO_PKG_VERSION").into()),
-        ]
-        .map(|(k, v)| (k.to_owned(), v))
-        .to_vec()
-    }
-
-    fn hemisphere(&self) -> &'static str {
-        match self.options.hemisphere {
-            Hemisphere::Geometric => "geometric",
-            Hemisphere::Shading => "shading",
-        }
-    }
-
     /// Lines for people.
     pub fn lines(&self) -> Vec<String> {
         let [width, height] = self.options.size;
@@ -130,7 +133,7 @@ impl Report<'_> {
             format!(
                 "{}: {width}x{height}, {} spp, tracer {} on {}; mean accessibility {:.5} +- {:.5} ({:.5} where the scene is)",
                 self.args.output.iter().map(|p| p.display().to_string()).collect::<Vec<_>>().join(", "),
-                self.spp,
+                spp_text(self.spp, self.most_spp),
                 self.tracer,
                 self.device.name,
                 self.mean,
@@ -151,6 +154,7 @@ impl Report<'_> {
                 self.mrays_s(),
             ),
         ];
+        lines.extend(self.film.lines.iter().cloned());
         if self.stopped_early {
             lines.push(format!("stopped early: {} of {} samples per pixel", self.spp, self.options.spp));
         }
@@ -230,7 +234,7 @@ impl Report<'_> {
             "ao": {
                 "radius": finite(self.options.radius),
                 "falloff": self.options.falloff,
-                "normal": self.hemisphere(),
+                "normal": hemisphere(self.options),
                 "reach": finite(self.options.reach()),
             },
             "tracer": self.tracer.name(),
@@ -242,6 +246,7 @@ impl Report<'_> {
             "mean": self.mean,
             "mean_standard_error": self.mean_standard_error,
             "covered_mean": self.covered_mean,
+            "film": self.film.record,
             "triangles": self.scene.triangle_count(),
             "spheres": self.scene.sphere_count(),
             "degenerate_triangles": self.scene.report.degenerate_triangles,

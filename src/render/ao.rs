@@ -11,8 +11,11 @@ use super::Control;
 use super::accumulate::{Estimator, Plan, accumulate, most_rays};
 use super::block::BlockParams;
 use super::camera::CameraRecord;
+use super::convergence::TileCount;
 use super::cover::Cover;
 use super::film::Film;
+use super::film_state::FilmState;
+use super::schedule::FilmOptions;
 use crate::error::Result;
 use crate::gpu::{Buffer, Commands, ComputePipeline, Device, Memory, Timing};
 use crate::ray::Ray;
@@ -58,6 +61,8 @@ pub struct AoOptions {
     pub keep_rays: bool,
     /// Which tiles of the image show anything; without it all are traced.
     pub cover: Option<Arc<Cover>>,
+    /// What the film starts from, and where it stops on its way. Rays are kept only of a film that starts empty.
+    pub film: FilmOptions,
 }
 
 impl Default for AoOptions {
@@ -72,6 +77,7 @@ impl Default for AoOptions {
             time_limit: None,
             keep_rays: false,
             cover: None,
+            film: FilmOptions::default(),
         }
     }
 }
@@ -93,8 +99,14 @@ impl AoOptions {
 pub struct AoResult {
     /// The image.
     pub film: Film,
+    /// Its sums, where they are to be kept.
+    pub state: Option<FilmState>,
+    /// Tiles that know enough, where there is a target.
+    pub converged: Option<TileCount>,
     /// Samples that every pixel got.
     pub spp: u32,
+    /// Samples that any pixel got at most.
+    pub most_spp: u32,
     /// Stopped before all samples were taken.
     pub stopped_early: bool,
     /// Camera rays traced.
@@ -161,6 +173,7 @@ pub fn render(tracer: &Tracer, camera: &CameraRecord, options: &AoOptions, contr
         seed: options.seed,
         time_limit: options.time_limit,
         cover: options.cover.as_deref(),
+        film: &options.film,
     };
     let params = BlockParams {
         hemisphere: (options.hemisphere == Hemisphere::Shading) as u32,
@@ -176,7 +189,10 @@ pub fn render(tracer: &Tracer, camera: &CameraRecord, options: &AoOptions, contr
     let skipped_rays = image.primary_rays + image.skipped_primary_rays - occlusion_rays;
     Ok(AoResult {
         film: image.film,
+        state: image.state,
+        converged: image.converged,
         spp: image.spp,
+        most_spp: image.most_spp,
         stopped_early: image.stopped_early,
         primary_rays: image.primary_rays,
         skipped_primary_rays: image.skipped_primary_rays,

@@ -106,9 +106,20 @@ impl Block {
         self.size[0].div_ceil(TILE)
     }
 
+    /// Tiles of it.
+    pub fn tiles(&self) -> u32 {
+        self.tiles_x() * self.size[1].div_ceil(TILE)
+    }
+
+    /// Place of a tile among those of an image of the given width, rows from the top.
+    pub fn image_tile(&self, tile: u32, image_width: u32) -> usize {
+        let [x, y] = self.origin.map(|o| o / TILE);
+        ((y + tile / self.tiles_x()) * image_width.div_ceil(TILE) + x + tile % self.tiles_x()) as usize
+    }
+
     /// Ray indices: those of whole tiles, so some lie outside.
     pub fn rays(&self) -> u32 {
-        self.tiles_x() * self.size[1].div_ceil(TILE) * TILE * TILE
+        self.tiles() * TILE_PIXELS
     }
 
     /// Pixel within the block of a ray index; outside of `size` for padding. The shaders' `block_pixel`.

@@ -80,12 +80,9 @@ impl Cover {
 
     /// The tiles of a block, as the block counts them; `None` when all are live.
     pub fn tiles(&self, block: &Block) -> Option<Vec<u32>> {
-        let [x0, y0] = block.origin.map(|o| o / TILE);
-        let rows = block.size[1].div_ceil(TILE);
-        let all = block.tiles_x() * rows;
-        let at = |t: u32| ((y0 + t / block.tiles_x()) * self.tiles_x + x0 + t % block.tiles_x()) as usize;
-        let live: Vec<u32> = (0..all).filter(|&t| self.live[at(t)]).collect();
-        (live.len() < all as usize).then_some(live)
+        let width = self.tiles_x * TILE;
+        let live: Vec<u32> = (0..block.tiles()).filter(|&t| self.live[block.image_tile(t, width)]).collect();
+        (live.len() < block.tiles() as usize).then_some(live)
     }
 
     /// Tiles in which something may be seen, and all tiles.

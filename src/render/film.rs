@@ -1,16 +1,25 @@
-//! The film: sums per pixel on the device, means and variances on the host.
+//! The film: sums per pixel on the device, means and variances on the host. What of it is put down and taken up again is in
+//! [`super::film_state`].
 
-/// Bytes of a pixel's record on the device: of each channel a sum and its compensation, of each a sum of squares and its compensation, then two
-/// counts. `FilmPixel` of shaders/resolve.glsl and shaders/path_resolve.glsl.
+/// Values of a pixel at most.
+pub const MOST_CHANNELS: usize = 3;
+
+/// 32-bit words of a pixel's record on the device: of each channel a sum and what it has too much, of each a sum of squares and what it has too
+/// much, then two counts. `FilmPixel` of shaders/resolve.glsl and shaders/path_resolve.glsl.
+pub const fn record_words(channels: usize) -> usize {
+    4 * channels + 2
+}
+
+/// Bytes of a pixel's record on the device.
 pub const fn record_bytes(channels: usize) -> u64 {
-    16 * channels as u64 + 8
+    4 * record_words(channels) as u64
 }
 
 /// A pixel's record as the device left it.
-#[derive(Clone, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct FilmPixel {
     /// Sum and sum of squares of each channel.
-    sums: Vec<[f64; 2]>,
+    sums: [[f64; 2]; MOST_CHANNELS],
     /// Samples that met the scene.
     pub covered: u32,
     /// Samples that were left out because they were not finite.
@@ -18,22 +27,16 @@ pub struct FilmPixel {
 }
 
 impl FilmPixel {
-    /// Nothing was added.
-    pub fn empty(channels: usize) -> Self {
-        Self { sums: vec![[0.0; 2]; channels], covered: 0, not_finite: 0 }
-    }
-
-    /// From [`record_bytes`] bytes.
-    pub fn read(bytes: &[u8]) -> Self {
-        let words: Vec<u32> = bytemuck::pod_collect_to_vec(bytes);
+    /// From [`record_words`] words.
+    pub fn of(words: &[u32]) -> Self {
         let channels = (words.len() - 2) / 4;
         // the compensation is what the sum has too much
         let total = |k: usize| f64::from(f32::from_bits(words[k])) - f64::from(f32::from_bits(words[k + 1]));
-        Self {
-            sums: (0..channels).map(|c| [total(2 * c), total(2 * (channels + c))]).collect(),
-            covered: words[4 * channels],
-            not_finite: words[4 * channels + 1],
+        let mut sums = [[0.0; 2]; MOST_CHANNELS];
+        for (c, s) in sums.iter_mut().enumerate().take(channels) {
+            *s = [total(2 * c), total(2 * (channels + c))];
         }
+        Self { sums, covered: words[4 * channels], not_finite: words[4 * channels + 1] }
     }
 
     /// Mean over all samples; those that missed count 0.
@@ -116,13 +119,29 @@ impl Film {
         self.variance.iter().skip(channel).step_by(self.channels).copied().collect()
     }
 
+    /// Fewest and most samples of a pixel, and their mean.
+    pub fn samples_range(&self) -> (u32, f64, u32) {
+        let sum: u64 = self.samples.iter().map(|&n| u64::from(n)).sum();
+        let least = self.samples.iter().copied().min().unwrap_or(0);
+        (least, sum as f64 / self.samples.len().max(1) as f64, self.samples.iter().copied().max().unwrap_or(0))
+    }
+
+    /// What the pixels' own variances say of the image's error: the root mean square, over pixels and channels, of the standard error of the
+    /// mean. Stratified sampling makes the true error smaller.
+    pub fn estimated_rmse(&self) -> f64 {
+        (self.summed_square_errors() / self.mean.len().max(1) as f64).sqrt()
+    }
+
     /// Mean over all pixels and channels and its standard error, from the pixels' own variances. Stratified sampling makes the true error
     /// smaller than that; that channels vary together, larger.
     pub fn mean_and_error(&self) -> (f64, f64) {
         let n = self.mean.len().max(1) as f64;
         let mean = self.mean.iter().map(|&x| f64::from(x)).sum::<f64>() / n;
+        (mean, self.summed_square_errors().sqrt() / n)
+    }
+
+    fn summed_square_errors(&self) -> f64 {
         let of = |k: usize| f64::from(self.samples[k / self.channels].max(1));
-        let variance: f64 = self.variance.iter().enumerate().map(|(k, &v)| f64::from(v) / of(k)).sum();
-        (mean, variance.sqrt() / n)
+        self.variance.iter().enumerate().map(|(k, &v)| f64::from(v) / of(k)).sum()
     }
 }

@@ -5,14 +5,17 @@ pub mod ao;
 pub mod aov;
 pub mod block;
 pub mod camera;
+pub mod convergence;
 pub mod cover;
 pub mod film;
+pub mod film_state;
 mod frustum;
 pub mod pace;
 pub mod path;
 pub mod raster;
 pub mod rays;
 pub mod realtime;
+pub mod schedule;
 pub mod sequence;
 
 use crate::error::Result;
@@ -22,6 +25,15 @@ pub trait Control {
     /// `done` of `total` units are finished. Called a few times a second.
     fn progress(&mut self, done: u64, total: u64) {
         let _ = (done, total);
+    }
+
+    /// An image has reached a number of samples that was asked for ([`schedule::FilmOptions::intervals`]), and is not finished.
+    ///
+    /// # Errors
+    /// What goes wrong with it ends the work.
+    fn interval(&mut self, image: &accumulate::Accumulated) -> Result<()> {
+        let _ = image;
+        Ok(())
     }
 
     /// Asked between submissions. `Ok(true)`: stop here and keep what there is; an error (usually

@@ -10,6 +10,7 @@ pub mod camera;
 pub mod camera_path;
 pub mod export;
 pub mod features;
+pub mod fingerprint;
 pub mod flatten;
 pub mod light;
 pub mod load;

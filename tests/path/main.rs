@@ -1,12 +1,14 @@
 //! Path-traced images by every tracer against what is known in closed form: light that arrives directly, furnaces in which nothing may be
-//! lost or gained, enclosures with light everywhere. Images are small.
+//! lost or gained, enclosures with light everywhere; and what becomes of their films. Images are small.
 
 #[path = "../common/mod.rs"]
 mod common;
 
 mod bsdf;
 mod camera;
+mod cli;
 mod direct;
+mod film;
 mod furnace;
 mod materials;
 mod transport;

@@ -196,10 +196,10 @@ impl PathArgs {
             }
         }
         // views know nothing of light
-        if super::view(args.integrator).is_some() {
-            if let Some((_, option)) = of_light.iter().find(|o| o.0) {
-                return wrong(format!("{option}: --integrator {} shows surfaces, not light", args.integrator.name()));
-            }
+        if super::view(args.integrator).is_some()
+            && let Some((_, option)) = of_light.iter().find(|o| o.0)
+        {
+            return wrong(format!("{option}: --integrator {} shows surfaces, not light", args.integrator.name()));
         }
         if self.sky_albedo.is_some() && args.integrator != Integrator::AoSky {
             return wrong("--sky-albedo is of --integrator ao-sky".into());

@@ -4,12 +4,14 @@ pub mod args;
 mod lights;
 mod report;
 
+use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
 use super::Warnings;
 use super::args::{DEFAULT_SIZE, DEFAULT_SPP, Integrator, RenderArgs};
 use super::console::Failure;
+use super::film::{self, Saver};
 use super::interrupt::{self, Keyboard};
 use super::progress::Progress;
 use super::render::{aov_channels, choose_camera, open, write_depth};
@@ -17,18 +19,20 @@ use super::report::Seconds;
 use crate::error::{Error, Result};
 use crate::output::tone_map::ToneMap;
 use crate::output::{self, Channel, Image, ImageFormat, Samples, png};
+use crate::render::accumulate::Accumulated;
 use crate::render::aov;
 use crate::render::camera::CameraRecord;
 use crate::render::cover::Cover;
-use crate::render::film::Film;
 use crate::render::path::{self, Lens, MOST_DEPTH, PathOptions, View};
 use crate::scene::flatten::FlatScene;
-use crate::scene::{Camera, Environment, Projection};
+use crate::scene::{Camera, Environment, Projection, fingerprint};
 use crate::tracer::{Needs, Tracer};
-use report::Report;
+use report::{About, Report};
 
 /// Rays of a path that the hierarchy's build is planned for.
 const RAYS_OF_A_PATH: u64 = 6;
+/// Values of a pixel.
+const CHANNELS: [&str; 3] = ["R", "G", "B"];
 /// Grey of `ao-sky`.
 const SKY_ALBEDO: f64 = 0.5;
 
@@ -55,32 +59,60 @@ pub fn run(args: &RenderArgs, start: Instant) -> Result<(), Failure> {
     let flat = FlatScene::for_paths(&scene);
     let record = CameraRecord::new(&camera, flat.origin, aspect);
     let (kind, why, compute) = args.device.choose(&device.info)?;
-    let mut options = options(args, &flat, &camera, size)?;
-    let mut build = args.device.build_options(RAYS_OF_A_PATH * options.spp as u64 * size[0] as u64 * size[1] as u64);
+    let prints = || [fingerprint::of_scene(&scene), fingerprint::of_environment(&scene.environment)];
+    let mut about = About {
+        args,
+        scene: &scene,
+        camera: &camera,
+        device: &device.info,
+        tracer: kind,
+        options: options(args, &flat, &camera, size)?,
+        prints: args.film.keeps_state().then(prints),
+    };
+    let spp = about.options.spp;
+    let resumed = film::resume(args, &CHANNELS, size, spp, &about.identity(), &about.maker())?;
+    let before = resumed.as_ref().map(|r| r.state.most_samples());
+    resumed.iter().flat_map(|r| &r.warning).for_each(|w| warnings.add(w));
+    about.options.film = film::options(args, &scene.hints, spp, resumed.map(|r| r.state));
+    film::check_writable(args, &about.options.film)?;
+    let mut build = args.device.build_options(RAYS_OF_A_PATH * spp as u64 * size[0] as u64 * size[1] as u64);
     build.streams.extend(path::streams());
     let needs = Needs {
         shading: true,
-        white: options.white_sky.is_some(),
+        white: about.options.white_sky.is_some(),
         compensation: args.paths.energy_compensation,
-        baked_occlusion: options.view == Some(View::BakedOcclusion),
+        baked_occlusion: about.options.view == Some(View::BakedOcclusion),
         ..Default::default()
     };
     let tracer = Tracer::with_build(&device, kind, &flat, needs, compute, &build)?;
     build.take_warnings().iter().for_each(|w| warnings.add(w));
     // what surrounds the scene shines where nothing is; lenses and wide filters look beside the pixel
-    let black = options.view.is_some() || options.white_sky.is_none() && scene.environment == Environment::Black;
-    if black && options.is_sharp() {
-        options.cover = Cover::new(&flat, &record, size, options.spp).map(Arc::new);
+    let black = about.options.view.is_some() || about.options.white_sky.is_none() && scene.environment == Environment::Black;
+    if black && about.options.is_sharp() {
+        about.options.cover = Cover::new(&flat, &record, size, spp).map(Arc::new);
     }
+    let (about, options) = (&about, &about.options);
 
-    let mut control = Keyboard { progress: Progress::new("rendering", &console), keep_partial: args.keep_partial };
-    let result = path::render(&tracer, &flat, &record, &options, &mut control)?;
+    let mut keyboard = Keyboard { progress: Progress::new("rendering", &console), keep_partial: args.keep_partial };
+    // first, because what is saved on the way has them, too
     let aov_start = Instant::now();
     let pixels = match args.aov.is_empty() && args.depth_image.is_none() {
         true => Vec::new(),
-        false => aov::render(&tracer, &record, size, &mut control)?,
+        false => aov::render(&tracer, &record, size, &mut keyboard)?,
     };
-    let seconds = Seconds { trace: result.image.trace_seconds, aov: aov_start.elapsed().as_secs_f64(), ..seconds };
+    let aov_seconds = aov_start.elapsed().as_secs_f64();
+    let image = |accumulated: &Accumulated| {
+        let mut channels = channels(accumulated, args, options.film.keep_state);
+        channels.extend(aov_channels(args, &pixels, flat.origin));
+        Image { width: size[0], height: size[1], channels, metadata: about.metadata(accumulated) }
+    };
+    let mut save = |accumulated: &Accumulated| {
+        let image = image(accumulated);
+        args.output.iter().try_for_each(|path| write(&image, &film::interval_path(path, accumulated.most_spp), args))
+    };
+    let mut control = Saver { keyboard, save: &mut save };
+    let result = path::render(&tracer, &flat, &record, options, &mut control)?;
+    let seconds = Seconds { trace: result.image.trace_seconds, aov: aov_seconds, ..seconds };
     drop(control);
     device.check_validation()?;
     if result.image.film.not_finite > 0 {
@@ -90,20 +122,21 @@ pub fn run(args: &RenderArgs, start: Instant) -> Result<(), Failure> {
             u64::from(result.image.spp) * u64::from(size[0]) * u64::from(size[1])
         ));
     }
-    if options.view.is_none() && options.white_sky.is_none() && scene.environment == Environment::Black && scene.lights.is_empty() && !emits(&flat) {
+    if options.view.is_none()
+        && options.white_sky.is_none()
+        && scene.environment == Environment::Black
+        && scene.lights.is_empty()
+        && !emits(&flat)
+    {
         warnings.add("the scene has no light, and the image is black: give --environment FILE or R,G,B");
     }
 
     let write_start = Instant::now();
     let mut report = Report {
-        args,
-        scene: &scene,
-        camera: &camera,
-        device: &device.info,
-        tracer: kind,
+        about,
         why,
-        options: &options,
         result: &result,
+        film: film::tell(args, &scene.hints, &result.image.film, result.image.converged, before, spp),
         stats: tracer.stats(),
         features: tracer.features().explain(&flat),
         tracer_features: tracer.features(),
@@ -113,15 +146,8 @@ pub fn run(args: &RenderArgs, start: Instant) -> Result<(), Failure> {
     if let Some(path) = &args.depth_image {
         write_depth(path, &pixels, size)?;
     }
-    let mut channels = channels(&result.image.film, args);
-    channels.extend(aov_channels(args, &pixels, flat.origin));
-    let image = Image { width: size[0], height: size[1], channels, metadata: report.metadata() };
-    for path in &args.output {
-        match ImageFormat::of(path)? {
-            ImageFormat::Png => png::write(&picture(&image, args), path, 0.0)?,
-            ImageFormat::Exr => output::save(&image, path)?,
-        }
-    }
+    let image = image(&result.image);
+    args.output.iter().try_for_each(|path| write(&image, path, args))?;
     device.save_pipeline_cache();
     report.seconds.write = write_start.elapsed().as_secs_f64();
     report.seconds.total = start.elapsed().as_secs_f64();
@@ -169,6 +195,7 @@ fn options(args: &RenderArgs, flat: &FlatScene, camera: &Camera, size: [u32; 2])
         white_sky: (args.integrator == Integrator::AoSky).then(|| args.paths.sky_albedo.unwrap_or(SKY_ALBEDO) as f32),
         time_limit: args.time_limit,
         cover: None,
+        film: Default::default(),
     })
 }
 
@@ -180,6 +207,14 @@ fn view(integrator: Integrator) -> Option<View> {
         Integrator::Depth => Some(View::Depth),
         Integrator::BakedOcclusion => Some(View::BakedOcclusion),
         Integrator::Ao | Integrator::Path | Integrator::Direct | Integrator::AoSky => None,
+    }
+}
+
+/// Writes an output, of the kind that its name says.
+fn write(image: &Image, path: &Path, args: &RenderArgs) -> Result<()> {
+    match ImageFormat::of(path)? {
+        ImageFormat::Png => png::write(&picture(image, args), path, 0.0),
+        ImageFormat::Exr => output::save(image, path),
     }
 }
 
@@ -208,16 +243,20 @@ fn picture(image: &Image, args: &RenderArgs) -> Image {
     map.apply(image, args.paths.exposure.unwrap_or(0.0) as f32)
 }
 
-/// The film as named channels: linear RGB, coverage, and of each channel the variance of one sample.
-fn channels(film: &Film, args: &RenderArgs) -> Vec<Channel> {
+/// The film as named channels: linear RGB, coverage, and of each channel the variance of one sample; its sums, so that it can be gone on with.
+fn channels(image: &Accumulated, args: &RenderArgs, keep_state: bool) -> Vec<Channel> {
+    let film = &image.film;
     let f32s = |name: String, samples| Channel { name, samples: Samples::F32(samples) };
-    let mut out: Vec<_> = ["R", "G", "B"].iter().enumerate().map(|(c, n)| f32s((*n).into(), film.plane(c))).collect();
+    let mut out: Vec<_> = CHANNELS.iter().enumerate().map(|(c, n)| f32s((*n).into(), film.plane(c))).collect();
     if args.writes_exr() {
         out.push(f32s("A".into(), film.coverage.clone()));
-        for (c, name) in ["R", "G", "B"].iter().enumerate() {
+        for (c, name) in CHANNELS.iter().enumerate() {
             out.push(f32s(format!("variance.{name}"), film.variance_plane(c)));
         }
         out.push(Channel { name: "samples".into(), samples: Samples::U32(film.samples.clone()) });
+    }
+    if let Some(state) = image.state.as_ref().filter(|_| keep_state) {
+        out.extend(film::state_channels(state, &CHANNELS));
     }
     out
 }

@@ -3,25 +3,36 @@
 use serde_json::{Value, json};
 
 use crate::cli::args::RenderArgs;
+use crate::cli::film::{Identity, Maker, Told, metadata, spp_text};
 use crate::cli::report::{Seconds, camera_text};
 use crate::gpu::DeviceInfo;
+use crate::render::accumulate::Accumulated;
 use crate::render::path::{MOST_DEPTH, PathOptions, PathResult, PixelFilter};
 use crate::scene::features::SceneFeatures;
 use crate::scene::{Camera, Environment, Scene};
 use crate::tracer::shading::feature;
 use crate::tracer::{BuildStats, TracerKind};
 
-/// All there is to say about it.
-pub struct Report<'a> {
+/// What the image is of.
+pub struct About<'a> {
     pub args: &'a RenderArgs,
     pub scene: &'a Scene,
     pub camera: &'a Camera,
     pub device: &'a DeviceInfo,
     pub tracer: TracerKind,
+    pub options: PathOptions,
+    /// Fingerprints of the scene and of its environment, where the film is kept.
+    pub prints: Option<[String; 2]>,
+}
+
+/// All there is to say about it.
+pub struct Report<'a> {
+    pub about: &'a About<'a>,
     /// Why this tracer.
     pub why: String,
-    pub options: &'a PathOptions,
     pub result: &'a PathResult,
+    /// Of the film.
+    pub film: Told,
     pub stats: BuildStats,
     /// What the scene made skip.
     pub features: Vec<String>,
@@ -30,7 +41,7 @@ pub struct Report<'a> {
     pub seconds: Seconds,
 }
 
-impl Report<'_> {
+impl About<'_> {
     fn depth(&self) -> String {
         match self.options.max_depth {
             n if n >= MOST_DEPTH => "unlimited".into(),
@@ -48,41 +59,60 @@ impl Report<'_> {
         }
     }
 
-    /// Text attributes of the image. Nothing in it differs between two runs of the same command.
-    pub fn metadata(&self) -> Vec<(String, String)> {
-        let o = self.options;
-        let mut out = vec![
-            ("camera", camera_text(self.camera)),
-            ("device", format!("{} ({})", self.device.name, self.device.driver)),
-            ("environment", self.environment()),
-            ("integrator", self.args.integrator.name()),
-            ("max_depth", self.depth()),
-            ("rr_depth", o.rr_depth.to_string()),
-            ("sampling", format!("{:?}", o.strategy).to_lowercase()),
-            ("scene", self.args.scene.clone()),
-            ("seed", o.seed.to_string()),
-            ("spp", self.result.image.spp.to_string()),
-            ("tracer", self.tracer.name().into()),
-            ("version", env!("CARGO_PKG_VERSION").into()),
-        ];
-        if o.firefly_clamp.is_finite() {
-            out.push(("firefly_clamp", o.firefly_clamp.to_string()));
-        }
-        if o.pixel_filter != PixelFilter::Box {
-            out.push(("pixel_filter", format!("{:?}", o.pixel_filter)));
-        }
-        if let Some(lens) = o.lens {
-            out.push(("lens", format!("radius {}, focus {}", lens.radius, lens.focus)));
-        }
-        if self.args.paths.energy_compensation {
-            out.push(("energy_compensation", "on".into()));
-        }
-        if let Some(albedo) = o.white_sky {
-            out.push(("sky_albedo", albedo.to_string()));
-        }
-        out.into_iter().map(|(k, v)| (k.to_owned(), v)).collect()
+    /// What has to agree when the image is gone on with: all that its samples depend on, but for its size.
+    pub fn identity(&self) -> Identity {
+        // no `..`: a new option has to be put where it belongs
+        let PathOptions {
+            size: _,
+            spp: _,
+            time_limit: _,
+            cover: _,
+            film: _,
+            seed,
+            max_depth: _,
+            rr_depth,
+            firefly_clamp,
+            strategy,
+            white_sky,
+            view: _,
+            pixel_filter,
+            lens,
+        } = &self.options;
+        let [scene, environment] = match &self.prints {
+            Some(prints) => prints.each_ref().map(|p| Some(p.clone())),
+            None => [None, None],
+        };
+        vec![
+            ("version", Some(env!("CARGO_PKG_VERSION").into())),
+            ("integrator", Some(self.args.integrator.name())),
+            ("scene.hash", scene),
+            ("environment", Some(self.environment())),
+            ("environment.hash", environment.filter(|_| white_sky.is_none())),
+            ("camera", Some(camera_text(self.camera))),
+            ("seed", Some(seed.to_string())),
+            ("max_depth", Some(self.depth())),
+            ("rr_depth", Some(rr_depth.to_string())),
+            ("sampling", Some(format!("{strategy:?}").to_lowercase())),
+            ("firefly_clamp", firefly_clamp.is_finite().then(|| firefly_clamp.to_string())),
+            ("pixel_filter", (*pixel_filter != PixelFilter::Box).then(|| format!("{pixel_filter:?}"))),
+            ("lens", lens.map(|lens| format!("radius {}, focus {}", lens.radius, lens.focus))),
+            ("energy_compensation", self.args.paths.energy_compensation.then(|| "on".into())),
+            ("sky_albedo", white_sky.map(|albedo| albedo.to_string())),
+        ]
     }
 
+    /// What made it.
+    pub fn maker(&self) -> Maker {
+        [("tracer", self.tracer.name().into()), ("device", format!("{} ({})", self.device.name, self.device.driver))]
+    }
+
+    /// Text attributes of the image.
+    pub fn metadata(&self, image: &Accumulated) -> Vec<(String, String)> {
+        metadata(self.args, spp_text(image.spp, image.most_spp), &self.maker(), &self.identity())
+    }
+}
+
+impl Report<'_> {
     fn rays(&self) -> u64 {
         self.result.image.primary_rays + self.result.bounce_rays + self.result.shadow_rays
     }
@@ -93,18 +123,18 @@ impl Report<'_> {
 
     /// Lines for people.
     pub fn lines(&self) -> Vec<String> {
-        let ([width, height], s, image) = (self.options.size, &self.seconds, &self.result.image);
+        let ([width, height], s, image) = (self.about.options.size, &self.seconds, &self.result.image);
         let (mean, error) = image.film.mean_and_error();
         let per_second = |n: u64| n as f64 / s.trace.max(1e-9) / 1e6;
         let mut lines = vec![
             format!(
                 "{}: {width}x{height}, {} spp, {}, tracer {} on {}; mean {}{mean:.5} +- {error:.5}",
-                self.args.output.iter().map(|p| p.display().to_string()).collect::<Vec<_>>().join(", "),
-                image.spp,
-                self.args.integrator.name(),
-                self.tracer,
-                self.device.name,
-                if self.options.view.is_some() { "" } else { "radiance " },
+                self.about.args.output.iter().map(|p| p.display().to_string()).collect::<Vec<_>>().join(", "),
+                spp_text(image.spp, image.most_spp),
+                self.about.args.integrator.name(),
+                self.about.tracer,
+                self.about.device.name,
+                if self.about.options.view.is_some() { "" } else { "radiance " },
             ),
             format!(
                 "{:.2} Mpaths/s, {:.2} Mrays/s; a path has {:.2} rays, {:.2} of them to lights; the longest {} bounces (limit {})",
@@ -113,7 +143,7 @@ impl Report<'_> {
                 self.rays() as f64 / self.paths().max(1) as f64,
                 self.result.shadow_rays as f64 / self.paths().max(1) as f64,
                 self.result.longest_path,
-                self.depth(),
+                self.about.depth(),
             ),
             format!(
                 "seconds: load {:.3}, device {:.3} (at the same time), build {:.3}, upload {:.3}, trace {:.3}, aov {:.3}, write {:.3}, \
@@ -121,13 +151,17 @@ impl Report<'_> {
                 s.load, s.device, self.stats.build_seconds, self.stats.upload_seconds, s.trace, s.aov, s.write, s.total
             ),
         ];
-        if self.options.firefly_clamp.is_finite() {
-            lines.push(format!("held to radiance {} after the first hit: the image is too dark", self.options.firefly_clamp));
+        if self.about.options.firefly_clamp.is_finite() {
+            lines.push(format!(
+                "held to radiance {} after the first hit: the image is too dark",
+                self.about.options.firefly_clamp
+            ));
         }
+        lines.extend(self.film.lines.iter().cloned());
         if image.stopped_early {
-            lines.push(format!("stopped early: {} of {} samples per pixel", image.spp, self.options.spp));
+            lines.push(format!("stopped early: {} of {} samples per pixel", image.spp, self.about.options.spp));
         }
-        if self.args.explain {
+        if self.about.args.explain {
             lines.extend(self.explanations().into_iter().map(|l| format!("explain: {l}")));
         }
         lines
@@ -145,7 +179,7 @@ impl Report<'_> {
 
     fn explanations(&self) -> Vec<String> {
         let image = &self.result.image;
-        let mut lines = vec![format!("tracer {}: {}", self.tracer, self.why)];
+        let mut lines = vec![format!("tracer {}: {}", self.about.tracer, self.why)];
         lines.extend(self.features.iter().cloned());
         lines.extend(self.shading());
         lines.push(match self.result.lights {
@@ -166,37 +200,38 @@ impl Report<'_> {
 
     /// A record for programs.
     pub fn record(&self) -> Value {
-        let (image, o) = (&self.result.image, self.options);
+        let (image, o) = (&self.result.image, &self.about.options);
         let (mean, error) = image.film.mean_and_error();
         let steps: serde_json::Map<_, _> = image.device_seconds.iter().map(|(l, s)| ((*l).to_owned(), json!(s))).collect();
         let mut record = json!({
-            "scene": self.args.scene,
-            "output": self.args.output,
-            "integrator": self.args.integrator.name(),
+            "scene": self.about.args.scene,
+            "output": self.about.args.output,
+            "integrator": self.about.args.integrator.name(),
             "width": o.size[0],
             "height": o.size[1],
             "spp": image.spp,
             "spp_asked": o.spp,
             "stopped_early": image.stopped_early,
             "seed": o.seed,
-            "camera": camera_text(self.camera),
-            "environment": self.environment(),
+            "camera": camera_text(self.about.camera),
+            "environment": self.about.environment(),
             "max_depth": if o.max_depth >= MOST_DEPTH { Value::Null } else { json!(o.max_depth) },
             "rr_depth": o.rr_depth,
             "firefly_clamp": if o.firefly_clamp.is_finite() { json!(o.firefly_clamp) } else { Value::Null },
             "sampling": o.strategy,
             "sky_albedo": o.white_sky,
-            "energy_compensation": self.args.paths.energy_compensation,
-            "tracer": self.tracer.name(),
+            "energy_compensation": self.about.args.paths.energy_compensation,
+            "tracer": self.about.tracer.name(),
             "tracer_reason": self.why,
-            "device": self.device.name,
-            "driver": self.device.driver,
+            "device": self.about.device.name,
+            "driver": self.about.device.driver,
             "mean": mean,
             "mean_standard_error": error,
             "not_finite": image.film.not_finite,
+            "film": self.film.record,
             "lights": self.result.lights,
-            "triangles": self.scene.triangle_count(),
-            "spheres": self.scene.sphere_count(),
+            "triangles": self.about.scene.triangle_count(),
+            "spheres": self.about.scene.sphere_count(),
             "warnings": self.warnings,
             "rays": {
                 "primary": image.primary_rays,
@@ -211,7 +246,7 @@ impl Report<'_> {
         });
         record["seconds"]["build"] = json!(self.stats.build_seconds);
         record["seconds"]["upload"] = json!(self.stats.upload_seconds);
-        if self.args.explain {
+        if self.about.args.explain {
             record["explain"] = json!(self.explanations());
         }
         record

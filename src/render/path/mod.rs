@@ -18,6 +18,7 @@ use super::accumulate::{Accumulated, Estimator, Plan, accumulate, most_rays};
 use super::block::BlockParams;
 use super::camera::CameraRecord;
 use super::cover::Cover;
+use super::schedule::FilmOptions;
 use crate::error::Result;
 use crate::gpu::{Buffer, Commands, ComputePipeline, Memory, Timing};
 use crate::scene::Environment;
@@ -148,6 +149,8 @@ pub struct PathOptions {
     pub time_limit: Option<Duration>,
     /// Which tiles of the image show anything; only where the environment is black and [`PathOptions::is_sharp`].
     pub cover: Option<Arc<Cover>>,
+    /// What the film starts from, and where it stops on its way.
+    pub film: FilmOptions,
 }
 
 impl Default for PathOptions {
@@ -166,6 +169,7 @@ impl Default for PathOptions {
             lens: None,
             time_limit: None,
             cover: None,
+            film: FilmOptions::default(),
         }
     }
 }
@@ -217,6 +221,7 @@ pub fn render(
         seed: options.seed,
         time_limit: options.time_limit,
         cover: options.cover.as_deref(),
+        film: &options.film,
     };
     let image = accumulate(tracer, camera, &plan, &BlockParams::default(), &mut estimator, control)?;
     let Paths { bounce_rays, shadow_rays, longest_path, lights, light_tree, .. } = estimator;

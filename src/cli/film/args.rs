@@ -1,0 +1,70 @@
+//! Options of `skylit render` that are about the film: what it starts from, when it is saved, when it is good enough.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueHint};
+
+use crate::cli::args::{RenderArgs, parse_where};
+use crate::error::{Error, Result};
+use crate::output::ImageFormat;
+
+/// The film.
+#[derive(Clone, Debug, Args)]
+#[command(next_help_heading = "Film of stills")]
+pub struct FilmArgs {
+    /// Go on with an image that was rendered with --resumable, up to --spp samples in all: the same bits as in one go. All else must be as it was
+    #[arg(long, value_name = "FILE.exr", value_hint = ValueHint::FilePath)]
+    pub resume: Option<PathBuf>,
+    /// Put the film's exact sums into .exr outputs (layer `state`), for --resume; --resume and --intervals do so anyway
+    #[arg(long)]
+    pub resumable: bool,
+    /// Also write the outputs, as NAME.0016.exr, whenever the number of samples reaches a power of two, or one that the scene names
+    #[arg(long)]
+    pub intervals: bool,
+    /// Take no more samples of an 8x8 tile once its standard error and its neighbours' are estimated to be at most E, in units of the image; judged at powers
+    /// of two from 64 samples on. --spp is then the most
+    #[arg(long, value_name = "E", value_parser = parse_target, allow_hyphen_values = true)]
+    pub target_rmse: Option<f64>,
+}
+
+fn parse_target(text: &str) -> std::result::Result<f64, String> {
+    parse_where(text, |v| v > 0.0 && v.is_finite(), "must be finite and above 0")
+}
+
+impl FilmArgs {
+    /// Will .exr outputs have the film's sums?
+    pub fn keeps_state(&self) -> bool {
+        self.resumable || self.intervals || self.resume.is_some()
+    }
+
+    /// Checks what concerns more than one option: none may be given that would have no effect.
+    ///
+    /// # Errors
+    /// [`Error::Usage`], naming the option and what to do about it.
+    pub fn check(&self, args: &RenderArgs) -> Result<()> {
+        let given = [
+            (self.resume.is_some(), "--resume"),
+            (self.resumable, "--resumable"),
+            (self.intervals, "--intervals"),
+            (self.target_rmse.is_some(), "--target-rmse"),
+        ];
+        let wrong = |what: String| Err(Error::Usage(what));
+        let Some((_, option)) = given.into_iter().find(|g| g.0) else { return Ok(()) };
+        if let Some(frames) = args.frames.wanted() {
+            return wrong(format!("{option} is of stills: leave it out, or {frames}"));
+        }
+        if self.resume.is_some() && args.dump_rays.is_some() {
+            return wrong("--resume: the rays of the first sample are not traced again; leave --dump-rays out".into());
+        }
+        if self.resumable && !args.writes_exr() {
+            return wrong("--resumable needs an .exr output: PNG holds colour only".into());
+        }
+        match &self.resume {
+            Some(path) if ImageFormat::of(path).ok() != Some(ImageFormat::Exr) => wrong(format!(
+                "--resume {}: only an .exr that was rendered with --resumable can be gone on with",
+                path.display()
+            )),
+            _ => Ok(()),
+        }
+    }
+}
