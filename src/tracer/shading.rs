@@ -82,10 +82,12 @@ pub(crate) mod feature {
     pub const EMISSION: u32 = 16384;
     pub const COMPENSATION: u32 = 32768;
     pub const BENT_NORMALS: u32 = 65536;
+    /// Every surface counts as white: nothing but Lambert is compiled ([`super::Needs::white`]).
+    pub const WHITE: u32 = 131072;
 
     /// All of them, in words.
     pub const NAMES: [(u32, &str); 17] = [
-        (DIFFUSE, "matte materials"),
+        (DIFFUSE, "Lambert"),
         (GLTF, "metallic-roughness"),
         (CONDUCTOR, "measured metals"),
         (GLASS, "glass"),
@@ -176,14 +178,14 @@ fn refracts(m: &Material) -> bool {
 /// What the materials of a scene ask for: bits of [`feature`].
 pub(super) fn features(flat: &FlatScene, needs: Needs) -> u32 {
     let with = |on: bool, bit: u32| if on { bit } else { 0 };
-    let mut bits = with(needs.compensation, feature::COMPENSATION);
+    // under a white sky surfaces are diffuse, whatever they are made of
+    let mut bits = feature::DIFFUSE | with(needs.compensation, feature::COMPENSATION) | with(needs.white, feature::WHITE);
     for part in flat.groups.iter().flat_map(|g| &g.parts) {
         let mesh = &flat.scene.meshes[part.mesh];
         let m = &flat.scene.materials[mesh.material];
         let bent = |t: &Geometry| matches!(t, Geometry::Triangles(t) if !t.normals.is_empty());
         bits |= with(bent(&mesh.geometry), feature::BENT_NORMALS);
         if needs.white {
-            bits |= feature::DIFFUSE;
             continue;
         }
         let gltf = m.kind == MaterialKind::MetallicRoughness && !m.unlit;

@@ -208,3 +208,19 @@ fn gpu_views_show_surfaces() {
     }
     assert_validation_clean(&device);
 }
+
+/// A tracer that was made for less is refused: its image would be wrong.
+#[test]
+fn gpu_tracers_without_materials_are_refused() {
+    let device = device();
+    let scene = scene_of(vec![(sheet(0.0), matte(0.5))], ahead());
+    let flat = FlatScene::for_paths(&scene);
+    let record = CameraRecord::new(&scene.cameras[0], flat.origin, 1.0);
+    for (needs, says) in
+        [(Needs::default(), "Needs::shading"), (Needs { shading: true, white: true, ..Default::default() }, "Needs::white")]
+    {
+        let tracer = Tracer::new(&device, TracerKind::Compute, &flat, needs).unwrap();
+        let error = path::render(&tracer, &flat, &record, &options(1), &mut Uncontrolled).unwrap_err();
+        assert!(error.to_string().contains(says), "{error}");
+    }
+}

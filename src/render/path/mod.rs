@@ -19,11 +19,12 @@ use super::block::BlockParams;
 use super::camera::CameraRecord;
 use super::cover::Cover;
 use super::schedule::FilmOptions;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::gpu::{Buffer, Commands, ComputePipeline, Memory, Timing};
 use crate::scene::Environment;
 use crate::scene::flatten::FlatScene;
 use crate::tracer::queue::RayQueue;
+use crate::tracer::shading::feature;
 use crate::tracer::stream::StreamShaders;
 use crate::tracer::{Push, Stream, Tracer, stream};
 use environment::DeviceEnvironment;
@@ -260,6 +261,15 @@ struct Paths {
 impl Paths {
     fn new(tracer: &Tracer, flat: &FlatScene, options: &PathOptions) -> Result<Self> {
         let device = tracer.device();
+        // a tracer that was made for less would make a wrong image, and say nothing
+        let Some(shading) = tracer.features().shading else {
+            return Err(Error::Usage("paths need a tracer that was made with Needs::shading".into()));
+        };
+        if shading & feature::WHITE != 0 && options.white_sky.is_none() {
+            return Err(Error::Usage(
+                "a tracer that was made with Needs::white knows no materials: paths under other skies need them".into(),
+            ));
+        }
         let most = most_rays(options.size, options.spp);
         let white = Environment::Uniform(glam::Vec3::ONE);
         let around = if options.white_sky.is_some() { &white } else { &flat.scene.environment };
