@@ -163,7 +163,8 @@ impl Entry {
             let options = PathOptions {
                 size: self.size,
                 spp: self.spp / blocks,
-                seed: 100 + block,
+                // scenes that look alike must not have the same noise
+                seed: self.name.bytes().fold(block, |h, b| h.wrapping_mul(31).wrapping_add(b.into())),
                 max_depth: self.max_depth.unwrap_or(MOST_DEPTH),
                 lens: self.lens.as_ref().map(|l| Lens { radius: l.radius, focus: l.focus }),
                 ..Default::default()

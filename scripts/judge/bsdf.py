@@ -361,14 +361,14 @@ class Gltf(mi.BSDF):
     def chances(self, p: Point) -> "Chances":
         """How often each lobe is drawn."""
         c = dr.maximum(dr.dot(p.frame.n, p.o), LEAST_COSINE)
-        f = dr.max(self.fresnel(p, c))
+        # facets refract and reflect where the whole would not
+        f = dr.clip(dr.max(self.fresnel(p, c)), 0.1, 0.9)
         inner = (1 - p.metallic) * dr.max(p.base)
         diffuse = inner * (1 - self.transmission) * (1 - 0.9 * f) + self.sheen_most
         transmission = inner * self.transmission * (1 - f)
-        specular = dr.maximum(f, 0.05) if not self.volume else f
         coat = dr.maximum(self.coat_fresnel(dr.dot(p.coat_frame.n, p.o)), 0.1 * self.coat)
-        total = diffuse + transmission + specular + coat
-        return Chances(diffuse / total, specular / total, transmission / total, coat / total)
+        total = diffuse + transmission + f + coat
+        return Chances(diffuse / total, f / total, transmission / total, coat / total)
 
     def absorbed(self, si: Any, p: Point) -> Any:
         """What is left of the light after its way through the body, which ends here."""

@@ -369,7 +369,7 @@ def _(s: Judged) -> None:
     s.camera((1.6, 2.4, 3.4), (0, 0.5, 0), xmag=1.5)
 
 
-@scene("camera-lens", "a thin lens, in focus on one of three boxes", "stock", lens={"radius": 0.15, "focus": 4.6})
+@scene("camera-lens", "a thin lens, in focus on one of three boxes", "stock", lens={"radius": 0.3, "focus": 4.6})
 def _(s: Judged) -> None:
     s.floor()
     for k, (x, z) in enumerate([(-1.0, 1.3), (0.0, 0.0), (1.0, -1.6)]):
@@ -529,7 +529,12 @@ def stage(s: Judged) -> None:
 
 def rough_pair(roughness: float) -> Callable[[Judged], None]:
     def build(s: Judged) -> None:
-        stage(s)
+        if roughness < 0.1:
+            # what mirrors the sun on so few facets is noise
+            stage(s)
+        else:
+            s.floor(matte((0.5, 0.45, 0.4)))
+            s.more["environment"] = ENVIRONMENT
         ball(s, surface((0.2, 0.5, 0.3), 0.0, roughness), middle=(-0.65, 0.62, 0), radius=0.55)
         ball(s, surface((0.95, 0.7, 0.4), 1.0, roughness), middle=(0.65, 0.62, 0), radius=0.55)
 
