@@ -8,7 +8,8 @@
 use std::cell::RefCell;
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
 
 use shaderc::{
     CompileOptions, Compiler, EnvVersion, IncludeType, OptimizationLevel, ResolvedInclude, ShaderKind, SpirvVersion, TargetEnv,
@@ -34,15 +35,22 @@ const LANES: u32 = 64;
 /// The fast kernels' work-groups that follow each other take parts of a dispatch that are so far apart (shaders/trace/spread.glsl).
 const SPREAD: u32 = 16;
 
-const EXTENSIONS: &str = "#extension GL_EXT_buffer_reference : require\n#extension GL_EXT_buffer_reference_uvec2 : require\n";
+const EXTENSIONS: &str = "#extension GL_EXT_buffer_reference : require\n#extension GL_EXT_buffer_reference_uvec2 : require\n\
+                          #extension GL_EXT_control_flow_attributes : require\n";
 
 struct Build {
-    compiler: Compiler,
     shaders: PathBuf,
-    out: PathBuf,
-    // every file that was included by any shader
-    seen: RefCell<BTreeSet<PathBuf>>,
+    jobs: Vec<Job>,
     errors: Vec<String>,
+}
+
+/// A shader to be compiled.
+struct Job {
+    source: String,
+    kind: ShaderKind,
+    name: String,
+    // file name
+    output: String,
 }
 
 /// How a tracer turns a stream into a shader.
@@ -92,17 +100,12 @@ const VARIANTS: [Variant; 10] = [
 fn main() {
     println!("cargo:rerun-if-changed=build.rs");
     let manifest = PathBuf::from(std::env::var_os("CARGO_MANIFEST_DIR").expect("cargo sets it"));
-    let mut build = Build {
-        compiler: Compiler::new().unwrap_or_else(|e| panic!("shaderc does not start: {e}")),
-        shaders: manifest.join("shaders"),
-        out: PathBuf::from(std::env::var_os("OUT_DIR").expect("cargo sets it")),
-        seen: RefCell::new(BTreeSet::new()),
-        errors: Vec::new(),
-    };
+    let mut build = Build { shaders: manifest.join("shaders"), jobs: Vec::new(), errors: Vec::new() };
+    let out = PathBuf::from(std::env::var_os("OUT_DIR").expect("cargo sets it"));
     let table = build.streams() + &build.kernels() + &build.shared();
-    std::fs::write(build.out.join("shaders.rs"), table).expect("OUT_DIR can be written");
+    std::fs::write(out.join("shaders.rs"), table).expect("OUT_DIR can be written");
     println!("cargo:rerun-if-changed={}", build.shaders.display());
-    for file in build.seen.borrow().iter() {
+    for file in build.compile(&out) {
         println!("cargo:rerun-if-changed={}", file.display());
     }
     if !build.errors.is_empty() {
@@ -136,7 +139,7 @@ impl Build {
                 for (field, head) in [("plain", ""), ("int64", HEAD_64)] {
                     let source = format!("#version 460\n{EXTENSIONS}{head}#define LANES {LANES}\n#include \"{name}.glsl\"\n");
                     let output = format!("{name}_{field}.spv");
-                    self.compile(&source, ShaderKind::Compute, &format!("{name}.glsl"), &output);
+                    self.add(source, ShaderKind::Compute, &format!("{name}.glsl"), &output);
                     let _ = writeln!(table, "    {field}: include_bytes!(concat!(env!(\"OUT_DIR\"), \"/{output}\")),");
                 }
                 table.push_str("};\n");
@@ -173,7 +176,7 @@ impl Build {
                         v.head, v.template
                     );
                     let output = format!("{name}_{mode}_{}.spv", v.field);
-                    self.compile(&source, v.kind, &format!("{name}.glsl as {} ({mode})", v.template), &output);
+                    self.add(source, v.kind, &format!("{name}.glsl as {} ({mode})", v.template), &output);
                     let _ = writeln!(table, "    {}: include_bytes!(concat!(env!(\"OUT_DIR\"), \"/{output}\")),", v.field);
                 }
                 table.push_str("};\n");
@@ -192,12 +195,12 @@ impl Build {
         for mode in ["any", "closest"] {
             for (bits, head) in [(32, ""), (64, HEAD_64)] {
                 let source = format!(
-                    "#version 460\n{EXTENSIONS}#extension GL_EXT_control_flow_attributes : require\n{head}#define LANES {LANES}\n#define SPREAD {SPREAD}u\n\
+                    "#version 460\n{EXTENSIONS}{head}#define LANES {LANES}\n#define SPREAD {SPREAD}u\n\
                      #define STREAM_{}\n#include \"trace/wide.glsl\"\n",
                     mode.to_uppercase()
                 );
                 let (constant, output) = (format!("WIDE_{}_{bits}", mode.to_uppercase()), format!("wide_{mode}_{bits}.spv"));
-                self.compile(&source, ShaderKind::Compute, &format!("trace/wide.glsl ({mode}, {bits}-bit loads)"), &output);
+                self.add(source, ShaderKind::Compute, &format!("trace/wide.glsl ({mode}, {bits}-bit loads)"), &output);
                 let _ = writeln!(
                     table,
                     "/// `shaders/trace/wide.glsl`, mode `{mode}`, {bits}-bit loads.\npub static {constant}: &[u8] = include_bytes!(concat!(env!(\"OUT_DIR\"), \"/{output}\"));"
@@ -225,7 +228,7 @@ impl Build {
             let path = self.shaders.join(file);
             let source = std::fs::read_to_string(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
             let output = format!("{}.spv", constant.to_lowercase());
-            self.compile(&source, kind, file, &output);
+            self.add(source, kind, file, &output);
             let _ = writeln!(
                 table,
                 "/// `shaders/{file}`.\npub static {constant}: &[u8] = include_bytes!(concat!(env!(\"OUT_DIR\"), \"/{output}\"));"
@@ -234,15 +237,47 @@ impl Build {
         table
     }
 
-    fn compile(&mut self, source: &str, kind: ShaderKind, name: &str, output: &str) {
+    fn add(&mut self, source: String, kind: ShaderKind, name: &str, output: &str) {
+        self.jobs.push(Job { source, kind, name: name.to_owned(), output: output.to_owned() });
+    }
+
+    /// Compiles all shaders, on all cores, and says which files they included.
+    fn compile(&mut self, out: &Path) -> BTreeSet<PathBuf> {
+        let threads = std::thread::available_parallelism().map_or(1, usize::from);
+        let (jobs, shaders) = (Mutex::new(self.jobs.iter()), &self.shaders);
+        let results = Mutex::new((BTreeSet::new(), Vec::new()));
+        std::thread::scope(|scope| {
+            for _ in 0..threads {
+                scope.spawn(|| {
+                    let compiler = Compiler::new().unwrap_or_else(|e| panic!("shaderc does not start: {e}"));
+                    loop {
+                        let Some(job) = jobs.lock().expect("no compiler panics").next() else { break };
+                        let (seen, error) = job.compile(&compiler, shaders, out);
+                        let mut results = results.lock().expect("no compiler panics");
+                        results.0.extend(seen);
+                        results.1.extend(error);
+                    }
+                });
+            }
+        });
+        let (seen, mut errors) = results.into_inner().expect("no compiler panics");
+        errors.sort();
+        self.errors.extend(errors);
+        seen
+    }
+}
+
+impl Job {
+    /// Returns the files that were included, and what is wrong, in words.
+    fn compile(&self, compiler: &Compiler, shaders: &Path, out: &Path) -> (BTreeSet<PathBuf>, Option<String>) {
         // who included what, to name the chain when a file does not compile
         let chain: RefCell<Vec<(String, String)>> = RefCell::new(Vec::new());
+        let seen = RefCell::new(BTreeSet::new());
         let mut options = CompileOptions::new().expect("options can be made");
         options.set_target_env(TargetEnv::Vulkan, EnvVersion::Vulkan1_3 as u32);
         options.set_target_spirv(SpirvVersion::V1_5);
         options.set_optimization_level(OptimizationLevel::Performance);
         options.set_warnings_as_errors();
-        let (shaders, seen) = (&self.shaders, &self.seen);
         options.set_include_callback(|requested, _: IncludeType, from, _| {
             let path = shaders.join(requested);
             let content = std::fs::read_to_string(&path).map_err(|e| format!("{}: {e}", path.display()))?;
@@ -251,25 +286,33 @@ impl Build {
             // glslang numbers lines per file and names the file through this
             Ok(ResolvedInclude { resolved_name: requested.to_owned(), content })
         });
-        match self.compiler.compile_into_spirv(source, kind, name, "main", Some(&options)) {
-            Ok(artifact) => std::fs::write(self.out.join(output), artifact.as_binary_u8()).expect("OUT_DIR can be written"),
+        let result = compiler.compile_into_spirv(&self.source, self.kind, &self.name, "main", Some(&options));
+        drop(options);
+        let error = match result {
+            Ok(artifact) => {
+                std::fs::write(out.join(&self.output), artifact.as_binary_u8()).expect("OUT_DIR can be written");
+                None
+            }
             Err(error) => {
-                let text = error.to_string();
-                let mut message = format!("shader {name} does not compile:\n{text}");
-                let chain = chain.borrow();
-                // the file that the first message names, and how it came in
-                if let Some(mut file) =
-                    text.lines().find_map(|l| chain.iter().find(|c| l.starts_with(&format!("{}:", c.0))).map(|c| c.0.clone()))
-                {
-                    while let Some((_, from)) = chain.iter().find(|c| c.0 == file) {
-                        let _ = write!(message, "\n  {file} was included from {from}");
-                        file = from.clone();
-                    }
-                }
-                self.errors.push(message);
                 // so that the table's include_bytes! does not add a second, misleading error
-                let _ = std::fs::write(self.out.join(output), []);
+                let _ = std::fs::write(out.join(&self.output), []);
+                Some(self.explain(&error.to_string(), &chain.borrow()))
+            }
+        };
+        (seen.into_inner(), error)
+    }
+
+    /// The compiler's words, and how the file that the first of them names came in.
+    fn explain(&self, text: &str, chain: &[(String, String)]) -> String {
+        let mut message = format!("shader {} does not compile:\n{text}", self.name);
+        if let Some(mut file) =
+            text.lines().find_map(|l| chain.iter().find(|c| l.starts_with(&format!("{}:", c.0))).map(|c| c.0.clone()))
+        {
+            while let Some((_, from)) = chain.iter().find(|c| c.0 == file) {
+                let _ = write!(message, "\n  {file} was included from {from}");
+                file = from.clone();
             }
         }
+        message
     }
 }

@@ -69,6 +69,6 @@ void closest(uint index, Hit hit) {
     PathParams path = PathParams(p.path);
     // divided by the albedo, so that what one bounce brings is the accessibility; survival goes by what paths carry without that
     float scale = path.white_sky != 0u ? path.albedo : 1.0;
-    PathState state = PathState(vec3(1.0 / scale), -1.0, index, 0u, scale, 0u);
+    PathState state = PathState(vec3(1.0 / scale), -1.0, index, 0u, scale, NO_MEDIUM);
     path_vertex(p, k, state, vec4(0.0, 0.0, 0.0, is_hit(hit) ? 1.0 : 0.0), r, hit);
 }

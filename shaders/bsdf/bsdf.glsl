@@ -1,23 +1,46 @@
 // Reflection models behind one interface: how much of the light from wi leaves towards wo, and where to look for it.
 //
-//     vec3 bsdf_eval(Bsdf, wo, wi)            value times |cos wi|, without the delta lobes
-//     float bsdf_pdf(Bsdf, wo, wi)            density with which bsdf_sample proposes wi, per solid angle, without the delta lobes
-//     BsdfSample bsdf_sample(Bsdf, wo, u, v)  a direction; weight is value times |cos| over density
+//     BsdfValue bsdf_at(Bsdf, wo, wi)         value times |cos wi|, and the density with which bsdf_sample proposes wi, per solid angle; both
+//                                             without the delta lobes
+//     BsdfSample bsdf_sample(Bsdf, wo, u, v)  a direction, and of a delta lobe weight and probability; of the others bsdf_at knows them
 //
 // Directions are unit vectors in the frame of the shading normal, z on the side from which the surface is seen: wo.z > 0. The integrator knows
-// no more than this: a model is a file in this folder and a line in each of the functions below.
+// no more than this: a model is a file in this folder and a line in each of the functions below. docs/materials.md has the formulas.
 #ifndef BSDF_BSDF
 #define BSDF_BSDF
 #include "common/warp.glsl"
+#include "bsdf/features.glsl"
 #include "bsdf/microfacet.glsl"
+#include "bsdf/albedo.glsl"
 
-// Mirrors BsdfKind in src/render/path/material.rs.
-const uint BSDF_NONE = 0u;                // absorbs everything
-const uint BSDF_DIFFUSE = 1u;             // Lambert: `diffuse`
-const uint BSDF_METALLIC_ROUGHNESS = 2u;  // `diffuse` under microfacets with Schlick's `f0`, `f90` (glTF 2.0, appendix B)
-const uint BSDF_CONDUCTOR = 3u;           // microfacets of `f0` + i `k`, tinted by `tint`
-const uint BSDF_DIELECTRIC = 4u;          // microfacets that reflect and refract, `eta`
-const uint BSDF_MIRROR = 5u;              // reflects `tint` of all light
+const uint BSDF_NONE = 0u;        // absorbs everything
+const uint BSDF_DIFFUSE = 1u;     // Lambert: `diffuse`
+const uint BSDF_GLTF = 2u;        // glTF 2.0, appendix B, with extensions
+const uint BSDF_CONDUCTOR = 3u;   // microfacets of `f0` + i `k`, tinted by `tint`
+const uint BSDF_DIELECTRIC = 4u;  // microfacets that reflect and refract, `eta`
+const uint BSDF_MIRROR = 5u;      // reflects `tint` of all light
+
+// A layer over another: clearcoat.
+struct Coat {
+    float weight;
+    vec3 normal;  // in the frame
+    Microfacets facets;
+};
+
+// Fibres over another layer.
+struct Sheen {
+    vec3 color;
+    float alpha;
+    float kept;  // of what is below, on wo's side
+};
+
+// How often each lobe of a glTF material is sampled, in all 1.
+struct Shares {
+    float interface_;  // specular reflection and transmission
+    float diffuse;
+    float coat;
+    float sheen;
+};
 
 struct Bsdf {
     uint kind;
@@ -25,64 +48,95 @@ struct Bsdf {
     vec3 f0;
     float f90;
     vec3 k;
-    vec3 tint;          // of what is reflected
-    vec3 transmitted;   // of what is refracted
-    float eta;          // index of refraction beyond the surface over that on wo's side
+    vec3 tint;         // of what is reflected
+    vec3 transmitted;  // of what is refracted
+    float eta;         // index of refraction beyond the surface over that on wo's side
+    float metallic;
+    bool volume;       // what is transmitted is refracted; else it goes straight on, through thin walls
     Microfacets facets;
-    float specular_share;  // probability with which the specular lobe is sampled, by estimated albedo
+    vec3 gain;         // energy compensation of specular terms, else 1
+    float under;       // share of light that reaches what is under the interface; negative: what the Fresnel term leaves
+    Coat coat;
+    Sheen sheen;
+    Shares shares;
+};
+
+struct BsdfValue {
+    vec3 f;     // value times |cos wi|
+    float pdf;
 };
 
 struct BsdfSample {
     vec3 wi;
-    vec3 weight;
+    vec3 weight;  // value times |cos| over density
     float pdf;    // 0: nothing was sampled
     bool delta;
     float eta;    // refracted: `eta` of the surface; else 1
 };
 
+// A direction whose weight and density bsdf_at tells.
+BsdfSample proposed(vec3 wi, float eta) { return BsdfSample(wi, vec3(0.0), 1.0, false, eta); }
+
+const BsdfValue NO_VALUE = BsdfValue(vec3(0.0), 0.0);
 const BsdfSample NO_SAMPLE = BsdfSample(vec3(0.0, 0.0, 1.0), vec3(0.0), 0.0, false, 1.0);
 
+// Absorbs everything.
+Bsdf black_bsdf() {
+    Bsdf b;
+    b.kind = BSDF_NONE;
+    b.diffuse = b.f0 = b.k = b.transmitted = vec3(0.0);
+    b.tint = b.gain = vec3(1.0);
+    b.f90 = b.eta = 1.0;
+    b.metallic = 0.0;
+    b.volume = false;
+    b.facets = Microfacets(vec2(1.0), false);
+    b.under = -1.0;
+    b.coat = Coat(0.0, vec3(0.0, 0.0, 1.0), b.facets);
+    b.sheen = Sheen(vec3(0.0), 1.0, 1.0);
+    b.shares = Shares(0.0, 0.0, 0.0, 0.0);
+    return b;
+}
+
+float highest(vec3 c) { return max(c.r, max(c.g, c.b)); }
+
+#include "bsdf/gltf.glsl"
+#include "bsdf/conductor.glsl"
+#include "bsdf/dielectric.glsl"
+
+bool is_kind(Bsdf b, uint kind, uint feature) { return has(feature) && b.kind == kind; }
+
+// Is there anything that samples of the BSDF alone can find?
 bool has_smooth_part(Bsdf b) {
-    return b.kind == BSDF_MIRROR || b.kind >= BSDF_METALLIC_ROUGHNESS && b.kind <= BSDF_DIELECTRIC && is_smooth(b.facets);
+    if (is_kind(b, BSDF_MIRROR, HAS_MIRROR)) return true;
+    if (is_kind(b, BSDF_GLTF, HAS_GLTF)) return is_smooth(b.facets) || has(HAS_COAT) && b.coat.weight > 0.0 && is_smooth(b.coat.facets);
+    return (is_kind(b, BSDF_CONDUCTOR, HAS_CONDUCTOR) || is_kind(b, BSDF_DIELECTRIC, HAS_GLASS)) && is_smooth(b.facets);
 }
 
 // Is there anything that light samples could find?
 bool has_rough_part(Bsdf b) {
-    if (b.kind == BSDF_DIFFUSE) return true;
-    if (b.kind == BSDF_METALLIC_ROUGHNESS) return !is_smooth(b.facets) || b.specular_share < 1.0;
-    return (b.kind == BSDF_CONDUCTOR || b.kind == BSDF_DIELECTRIC) && !is_smooth(b.facets);
+    if (is_kind(b, BSDF_DIFFUSE, HAS_DIFFUSE)) return true;
+    if (is_kind(b, BSDF_GLTF, HAS_GLTF)) return gltf_has_rough_part(b);
+    return (is_kind(b, BSDF_CONDUCTOR, HAS_CONDUCTOR) || is_kind(b, BSDF_DIELECTRIC, HAS_GLASS)) && !is_smooth(b.facets);
 }
 
-#include "bsdf/metallic_roughness.glsl"
-#include "bsdf/conductor.glsl"
-#include "bsdf/dielectric.glsl"
-
-vec3 bsdf_eval(Bsdf b, vec3 wo, vec3 wi) {
-    if (b.kind == BSDF_DIFFUSE) return wi.z > 0.0 ? b.diffuse * (wi.z / PI) : vec3(0.0);
-    if (b.kind == BSDF_METALLIC_ROUGHNESS) return metallic_roughness_eval(b, wo, wi);
-    if (b.kind == BSDF_CONDUCTOR) return conductor_eval(b, wo, wi);
-    if (b.kind == BSDF_DIELECTRIC) return dielectric_eval(b, wo, wi);
-    return vec3(0.0);
-}
-
-float bsdf_pdf(Bsdf b, vec3 wo, vec3 wi) {
-    if (b.kind == BSDF_DIFFUSE) return max(wi.z, 0.0) / PI;
-    if (b.kind == BSDF_METALLIC_ROUGHNESS) return metallic_roughness_pdf(b, wo, wi);
-    if (b.kind == BSDF_CONDUCTOR) return conductor_pdf(b, wo, wi);
-    if (b.kind == BSDF_DIELECTRIC) return dielectric_pdf(b, wo, wi);
-    return 0.0;
+BsdfValue bsdf_at(Bsdf b, vec3 wo, vec3 wi) {
+    if (is_kind(b, BSDF_DIFFUSE, HAS_DIFFUSE)) {
+        float pdf = max(wi.z, 0.0) / PI;
+        return BsdfValue(b.diffuse * pdf, pdf);
+    }
+    if (is_kind(b, BSDF_GLTF, HAS_GLTF)) return gltf_at(b, wo, wi);
+    if (is_kind(b, BSDF_CONDUCTOR, HAS_CONDUCTOR)) return conductor_at(b, wo, wi);
+    if (is_kind(b, BSDF_DIELECTRIC, HAS_GLASS)) return dielectric_at(b, wo, wi);
+    return NO_VALUE;
 }
 
 // u: where; v: which lobe.
 BsdfSample bsdf_sample(Bsdf b, vec3 wo, vec2 u, float v) {
-    if (b.kind == BSDF_DIFFUSE) {
-        vec3 wi = cosine_hemisphere(u);
-        return BsdfSample(wi, b.diffuse, wi.z / PI, false, 1.0);
-    }
-    if (b.kind == BSDF_METALLIC_ROUGHNESS) return metallic_roughness_sample(b, wo, u, v);
-    if (b.kind == BSDF_CONDUCTOR) return conductor_sample(b, wo, u);
-    if (b.kind == BSDF_DIELECTRIC) return dielectric_sample(b, wo, u, v);
-    if (b.kind == BSDF_MIRROR) return BsdfSample(vec3(-wo.xy, wo.z), b.tint, 1.0, true, 1.0);
+    if (is_kind(b, BSDF_DIFFUSE, HAS_DIFFUSE)) return proposed(cosine_hemisphere(u), 1.0);
+    if (is_kind(b, BSDF_GLTF, HAS_GLTF)) return gltf_sample(b, wo, u, v);
+    if (is_kind(b, BSDF_CONDUCTOR, HAS_CONDUCTOR)) return conductor_sample(b, wo, u);
+    if (is_kind(b, BSDF_DIELECTRIC, HAS_GLASS)) return dielectric_sample(b, wo, u, v);
+    if (is_kind(b, BSDF_MIRROR, HAS_MIRROR)) return BsdfSample(vec3(-wo.xy, wo.z), b.tint, 1.0, true, 1.0);
     return NO_SAMPLE;
 }
 

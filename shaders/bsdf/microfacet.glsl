@@ -11,6 +11,9 @@ const float PI = 3.14159265358979;
 // Below this the lobe is narrower than single precision can hold: it counts as a perfect mirror.
 const float LEAST_ALPHA = 1e-3;
 
+// Directions nearer to the surface count as this near.
+const float LEAST_COSINE = 1e-4;
+
 struct Microfacets {
     vec2 alpha;     // along x and y of the frame
     bool beckmann;  // or GGX
@@ -68,6 +71,36 @@ vec3 sample_microfacet(Microfacets d, vec3 wo, vec2 u) {
 float microfacet_pdf(Microfacets d, vec3 wo, vec3 m) {
     if (d.beckmann) return distribution(d, m) * m.z;
     return masking(d, wo) * max(dot(wo, m), 0.0) * distribution(d, m) / max(wo.z, 1e-30);
+}
+
+// Density of what microfacets with normal m reflect, with respect to the solid angle of the reflected direction.
+float reflected_pdf(Microfacets d, vec3 wo, vec3 m) {
+    return microfacet_pdf(d, wo, m) / (4.0 * max(dot(wo, m), 1e-30));
+}
+
+// The microfacet normal that takes wi to wo, on the side of wo; zero where there is none. eta: index beyond the surface over that on wo's side.
+vec3 generalized_half(float eta, vec3 wo, vec3 wi) {
+    vec3 m = wi.z > 0.0 ? wo + wi : wo + eta * wi;
+    float m2 = dot(m, m);
+    if (m2 == 0.0) return vec3(0.0);
+    m *= inversesqrt(m2) * (m.z < 0.0 ? -1.0 : 1.0);
+    // back-facing microfacets
+    return dot(wo, m) > 0.0 && dot(wi, m) * wi.z > 0.0 ? m : vec3(0.0);
+}
+
+// Direction refracted by a microfacet: om its cosine with wo, cos_t the cosine on the other side.
+vec3 refracted(float eta, vec3 wo, vec3 m, float om, float cos_t) {
+    return (om / eta - cos_t) * m - wo / eta;
+}
+
+// Walter et al. 2007, equation 21 without D, G and Fresnel term, times |cos wi|, of radiance; im: cosine of microfacet and wi.
+float refracted_value(float eta, float cos_o, float om, float im) {
+    return abs(im * om) / (cos_o * sqr(om + eta * im));
+}
+
+// Density of what microfacets with normal m refract, with respect to the solid angle of the refracted direction.
+float refracted_pdf(Microfacets d, float eta, vec3 wo, vec3 m, float im) {
+    return microfacet_pdf(d, wo, m) * eta * eta * abs(im) / sqr(dot(wo, m) + eta * im);
 }
 
 // Share of light that a dielectric reflects; eta: index of refraction on the side of -n over that on the side of n, cos_i > 0 on the side

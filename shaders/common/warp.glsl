@@ -66,6 +66,11 @@ vec3 uniform_sphere(vec2 u) {
     return vec3(r * on_circle(u.y), z);
 }
 
+// even over the hemisphere about z
+vec3 uniform_hemisphere(vec2 u) {
+    return vec3(sqrt(max(1.0 - u.x * u.x, 0.0)) * on_circle(u.y), u.x);
+}
+
 // Duff et al. 2017, branchless
 vec3 to_world(vec3 n, vec3 v) {
     float s = n.z >= 0.0 ? 1.0 : -1.0;
@@ -73,5 +78,28 @@ vec3 to_world(vec3 n, vec3 v) {
     float b = n.x * n.y * a;
     return vec3(1.0 + s * n.x * n.x * a, s * b, -s * n.x) * v.x + vec3(b, s + n.y * n.y * a, -n.y) * v.y + n * v.z;
 }
+
+// Orthonormal axes; n is the third.
+struct Frame {
+    vec3 s;
+    vec3 t;
+    vec3 n;
+};
+
+Frame frame_about(vec3 n) {
+    return Frame(to_world(n, vec3(1.0, 0.0, 0.0)), to_world(n, vec3(0.0, 1.0, 0.0)), n);
+}
+
+// Its first axis as near to `along` as may be.
+Frame frame_along(vec3 n, vec3 along) {
+    vec3 s = along - n * dot(n, along);
+    float s2 = dot(s, s);
+    if (!(s2 > 1e-12)) return frame_about(n);
+    s *= inversesqrt(s2);
+    return Frame(s, cross(n, s), n);
+}
+
+vec3 to_frame(Frame f, vec3 w) { return vec3(dot(f.s, w), dot(f.t, w), dot(f.n, w)); }
+vec3 from_frame(Frame f, vec3 w) { return f.s * w.x + f.t * w.y + f.n * w.z; }
 
 #endif

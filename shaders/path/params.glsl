@@ -36,8 +36,10 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Pa
     uint pixel_filter;    // FILTER_*
     float lens_radius;    // world units; 0: a pinhole
     float focus;          // distance along the view at which the image is sharp
-    uint path_reserved0;
-    uint path_reserved1;
+    uint view;            // VIEW_*: no light, but what camera rays see
+    uint light_first;     // of the lights that are drawn by power
+    uvec2 light_tree;     // LightNode of those before, or null
+    uvec2 path_reserved;
 };
 
 // Everything below but MIS shows what it is good for.
@@ -47,6 +49,8 @@ const uint STRATEGY_LIGHT = 2u;    // what light samples could find, nothing els
 const uint STRATEGY_COSINE = 3u;   // no light samples, cosine-distributed directions
 const uint STRATEGY_UNIFORM = 4u;  // no light samples, directions distributed evenly
 
+const uint NO_MEDIUM = 0xffffffffu;
+
 // A path between two bounces: 32 bytes.
 struct PathState {
     vec3 throughput;
@@ -54,19 +58,19 @@ struct PathState {
     uint index;      // of its camera ray
     uint depth;      // bounces so far
     float eta_scale; // refraction changed radiance by 1 / this
-    uint state_reserved;
+    uint medium;     // material of the volume that it is in, or NO_MEDIUM
 };
 
 PathState load_state(uvec2 states, uint k) {
     uvec4 a = Quads(states).v[2u * k], b = Quads(states).v[2u * k + 1u];
-    return PathState(uintBitsToFloat(a.xyz), uintBitsToFloat(a.w), b.x, b.y, uintBitsToFloat(b.z), 0u);
+    return PathState(uintBitsToFloat(a.xyz), uintBitsToFloat(a.w), b.x, b.y, uintBitsToFloat(b.z), b.w);
 }
 
 void store_state(uvec2 states, uint k, PathState s) {
     STORE_PAIR(states, 4u * k, floatBitsToUint(s.throughput.xy));
     STORE_PAIR(states, 4u * k + 1u, floatBitsToUint(vec2(s.throughput.z, s.pdf)));
     STORE_PAIR(states, 4u * k + 2u, uvec2(s.index, s.depth));
-    STORE_PAIR(states, 4u * k + 3u, uvec2(floatBitsToUint(s.eta_scale), 0u));
+    STORE_PAIR(states, 4u * k + 3u, uvec2(floatBitsToUint(s.eta_scale), s.medium));
 }
 
 vec4 load_quad(uvec2 base, uint k) {

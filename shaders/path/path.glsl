@@ -5,6 +5,7 @@
 #ifndef PATH_PATH
 #define PATH_PATH
 #include "path/lights.glsl"
+#include "path/view.glsl"
 
 // Dimensions of the sampler (src/sampling/sobol.rs), in pairs: vertex n begins at PATH_FIRST + n * PATH_STRIDE.
 const uint PATH_FIRST = 8u;
@@ -16,8 +17,6 @@ const uint LIGHT_PLACE = 3u;
 
 // A path survives a bounce at most this often, however bright: closed white rooms end, too.
 const float MOST_SURVIVAL = 0.95;
-// A shading normal that turns away from the viewer is bent back to this cosine.
-const float LEAST_COSINE = 1e-4;
 // How much of its length a shadow ray stays short of a light, beside what the light's own rounding asks.
 const float SHADOW_EPSILON = 2e-6;
 
@@ -42,41 +41,108 @@ bool draws_lights(PathParams p) {
     return p.strategy == STRATEGY_MIS || p.strategy == STRATEGY_LIGHT;
 }
 
-// A frame about the shading normal.
-struct Frame {
-    vec3 s;
-    vec3 t;
-    vec3 n;
-};
-
-Frame frame_about(vec3 n) {
-    return Frame(to_world(n, vec3(1.0, 0.0, 0.0)), to_world(n, vec3(0.0, 1.0, 0.0)), n);
+// A direction, or its mirror image at the true surface, in the frame of the shading normal. A BSDF about that normal reaches directions which the
+// surface hides: those are mirrored at it, so that nothing that it reflects (or transmits) is lost, and two of the BSDF's directions may be one of the
+// world's. found: the BSDF's direction and the world's are on the same side.
+vec3 unbent(Shading m, vec3 w, bool mirrored, out bool found) {
+    float side = dot(m.ng, w);
+    vec3 wi = to_frame(m.frame, mirrored ? w - 2.0 * side * m.ng : w);
+    found = wi.z * side > 0.0;
+    return wi;
 }
 
-vec3 to_frame(Frame f, vec3 w) { return vec3(dot(f.s, w), dot(f.t, w), dot(f.n, w)); }
-vec3 from_frame(Frame f, vec3 w) { return f.s * w.x + f.t * w.y + f.n * w.z; }
-
-// A direction by the strategy that is asked for.
-BsdfSample draw_direction(PathParams p, Bsdf b, vec3 wo, vec2 u, float v) {
-    bool plain = p.strategy == STRATEGY_COSINE || p.strategy == STRATEGY_UNIFORM;
-    // a delta lobe can be sampled in one way only
-    if (!plain || !has_rough_part(b) || has_smooth_part(b)) return bsdf_sample(b, wo, u, v);
-    vec3 wi = p.strategy == STRATEGY_COSINE ? cosine_hemisphere(u) : vec3(0.0, 0.0, 1.0);
-    if (p.strategy == STRATEGY_UNIFORM) {
-        float r = sqrt(max(1.0 - u.x * u.x, 0.0));
-        wi = vec3(r * on_circle(u.y), u.x);
+// Value and density at a vertex, of a direction in the world.
+BsdfValue vertex_at(Shading m, vec3 wo, vec3 w) {
+    BsdfValue value = NO_VALUE;
+    // one copy of the code for both
+    [[dont_unroll]] for (int k = 0; k < (has(HAS_BENT_NORMALS) ? 2 : 1); k++) {
+        bool found;
+        vec3 wi = unbent(m, w, k > 0, found);
+        if (!found) continue;
+        BsdfValue one = bsdf_at(m.bsdf, wo, wi);
+        value = BsdfValue(value.f + one.f, value.pdf + one.pdf);
     }
-    float pdf = p.strategy == STRATEGY_COSINE ? wi.z / PI : 1.0 / (2.0 * PI);
-    if (!(wi.z > 0.0)) return NO_SAMPLE;
-    return BsdfSample(wi, bsdf_eval(b, wo, wi) / pdf, pdf, false, 1.0);
+    return value;
+}
+
+// Density of cosine-distributed directions, or of even ones, about the shading normal, of a direction in the world.
+float plain_pdf(PathParams p, Shading m, vec3 w) {
+    float pdf = 0.0;
+    for (int k = 0; k < 2; k++) {
+        bool found;
+        float c = unbent(m, w, k > 0, found).z;
+        if (found && c > 0.0) pdf += p.strategy == STRATEGY_COSINE ? c / PI : 1.0 / (2.0 * PI);
+    }
+    return pdf;
+}
+
+// A direction by the strategy that is asked for; in the world.
+BsdfSample draw_direction(PathParams p, Shading m, vec3 wo, vec2 u, float v) {
+    Bsdf b = m.bsdf;
+    bool plain = p.strategy == STRATEGY_COSINE || p.strategy == STRATEGY_UNIFORM;
+    // a delta lobe can be sampled in one way only, and these know reflection only
+    plain = plain && has_rough_part(b) && !has_smooth_part(b) && b.transmitted == vec3(0.0);
+    BsdfSample s;
+    if (plain) s = proposed(p.strategy == STRATEGY_COSINE ? cosine_hemisphere(u) : uniform_hemisphere(u), 1.0);
+    else s = bsdf_sample(b, wo, u, v);
+    if (!(s.pdf > 0.0)) return NO_SAMPLE;
+    vec3 w = from_frame(m.frame, s.wi);
+    float side = dot(m.ng, w);
+    if (has(HAS_BENT_NORMALS) && side * s.wi.z < 0.0) w -= 2.0 * side * m.ng;
+    s.wi = w;
+    if (s.delta) return s;
+    BsdfValue value = vertex_at(m, wo, w);
+    s.pdf = plain ? plain_pdf(p, m, w) : value.pdf;
+    s.weight = value.f / s.pdf;
+    if (!(s.pdf > 0.0)) return NO_SAMPLE;
+    return s;
+}
+
+// What a medium leaves of light over a length.
+vec3 transmittance(uint medium, float length_) {
+    if (!has(HAS_ABSORPTION) || medium == NO_MEDIUM) return vec3(1.0);
+    vec3 depth = ShadingRecords(SceneRoot(push.scene).shading).v[medium].absorption;
+    // nothing absorbs nothing, over any length
+    return mix(exp(-depth * length_), vec3(1.0), equal(depth, vec3(0.0)));
+}
+
+// The medium on the other side of a surface.
+uint medium_beyond(Shading m, bool front, uint medium) {
+    if (!has(HAS_ABSORPTION) || !m.bsdf.volume) return medium;
+    return front ? m.material : NO_MEDIUM;
+}
+
+// Next-event estimation: a ray to a light, and what that brings.
+void draw_light(BlockParams block, PathParams p, uint k, PathState state, Surface s, Shading m, vec3 wo, uint beyond, uvec2 pixel, uint n, uint dimension) {
+    vec2 choice = sample_2d(block.seed, pixel, n, dimension + LIGHT_CHOICE);
+    vec2 place = sample_2d(block.seed, pixel, n, dimension + LIGHT_PLACE);
+    LightSample l = sample_light(p, s.position, choice.x, place);
+    if (!(l.pdf > 0.0)) return;
+    BsdfValue value = vertex_at(m, wo, l.wi);
+    vec3 c = state.throughput * value.f * l.radiance / l.pdf;
+    if (p.strategy == STRATEGY_MIS && !l.delta) c *= power_heuristic(l.pdf, value.pdf);
+    if (!(highest(c) > 0.0)) return;
+    float side = dot(m.ng, l.wi);
+    vec3 origin = s.position + m.ng * (sign(side) * s.offset);
+    Ray shadow = Ray(origin, 0.0, l.wi, INFINITY);
+    if (l.distance < INFINITY) {
+        vec3 to = l.to - origin;
+        float d = length(to);
+        shadow.direction = to / d;
+        shadow.tmax = d * (1.0 - SHADOW_EPSILON);
+    }
+    c *= transmittance(side > 0.0 ? state.medium : beyond, l.distance);
+    store_quad(p.contributions, k, vec4(held(p, c, state.depth + 1u), 0.0));
+    append_ray(p.shadow, shadow, k);
 }
 
 // k: the path; sum: its radiance so far and its coverage.
 void path_vertex(BlockParams block, uint k, PathState state, vec4 sum, Ray ray, Hit hit) {
     PathParams p = PathParams(block.path);
+    state.throughput *= transmittance(state.medium, hit.t);
     if (!is_hit(hit)) {
         // as with ambient occlusion, what shows nothing counts nothing
-        if (p.white_sky != 0u && state.depth == 0u) {
+        if ((p.white_sky != 0u || p.view != VIEW_NONE) && state.depth == 0u) {
             store_quad(p.radiance, k, sum);
             return;
         }
@@ -89,15 +155,15 @@ void path_vertex(BlockParams block, uint k, PathState state, vec4 sum, Ray ray, 
         return;
     }
     Surface s = surface_at(ray, hit);
-    vec3 wo = -ray.direction;
-    bool front = dot(s.ng, wo) > 0.0;
-    vec3 ng = front ? s.ng : -s.ng, ns = front ? s.ns : -s.ns;
-    float cos_o = dot(ns, wo);
-    if (cos_o < LEAST_COSINE) {
-        ns = normalize(ns + (LEAST_COSINE - cos_o) * wo);
-        cos_o = max(dot(ns, wo), LEAST_COSINE);
+    vec3 towards_viewer = -ray.direction;
+    bool front = dot(s.ng, towards_viewer) > 0.0;
+    Shading m;
+    if (p.white_sky != 0u) m = grey_shading(s, towards_viewer, p.albedo);
+    else m = shade(s, towards_viewer);
+    if (p.view != VIEW_NONE) {
+        store_quad(p.radiance, k, vec4(view_value(p.view, s, m, hit.t), sum.a));
+        return;
     }
-    Shading m = shade(p, s, front, cos_o);
     if (m.emission != vec3(0.0)) {
         float light = m.unlit ? 0.0 : light_pdf(p, hit, ray.origin, ray.direction);
         sum.rgb += held(p, state.throughput * m.emission * emission_weight(p, state, light), state.depth);
@@ -105,49 +171,26 @@ void path_vertex(BlockParams block, uint k, PathState state, vec4 sum, Ray ray, 
     store_quad(p.radiance, k, sum);
     if (m.bsdf.kind == BSDF_NONE || state.depth >= p.max_depth) return;
 
-    Frame f = frame_about(ns);
-    vec3 local = to_frame(f, wo);
-    local.z = max(local.z, LEAST_COSINE);
+    vec3 wo = to_frame(m.frame, towards_viewer);
+    wo.z = max(wo.z, LEAST_COSINE);
     uvec2 pixel = block_pixel(block, pixel_index(state.index)) + block.block_origin;
     uint n = sample_index(state.index), dimension = PATH_FIRST + state.depth * PATH_STRIDE;
-
+    uint beyond = medium_beyond(m, front, state.medium);
     if (draws_lights(p) && p.light_count > 0u && has_rough_part(m.bsdf)) {
-        vec2 choice = sample_2d(block.seed, pixel, n, dimension + LIGHT_CHOICE);
-        vec2 place = sample_2d(block.seed, pixel, n, dimension + LIGHT_PLACE);
-        LightSample l = sample_light(p, s.position, choice.x, place);
-        vec3 wi = to_frame(f, l.wi);
-        float side = dot(ng, l.wi);
-        if (l.pdf > 0.0 && side * wi.z > 0.0) {
-            vec3 c = state.throughput * bsdf_eval(m.bsdf, local, wi) * l.radiance / l.pdf;
-            if (p.strategy == STRATEGY_MIS && !l.delta) c *= power_heuristic(l.pdf, bsdf_pdf(m.bsdf, local, wi));
-            if (max(c.r, max(c.g, c.b)) > 0.0) {
-                vec3 origin = s.position + ng * (sign(side) * s.offset);
-                Ray shadow = Ray(origin, 0.0, l.wi, INFINITY);
-                if (l.distance < INFINITY) {
-                    vec3 to = l.to - origin;
-                    float d = length(to);
-                    shadow.direction = to / d;
-                    shadow.tmax = d * (1.0 - SHADOW_EPSILON);
-                }
-                store_quad(p.contributions, k, vec4(held(p, c, state.depth + 1u), 0.0));
-                append_ray(p.shadow, shadow, k);
-            }
-        }
+        draw_light(block, p, k, state, s, m, wo, beyond, pixel, n, dimension);
     }
 
     // after the last bounce only what is met shines
     vec2 lobe = sample_2d(block.seed, pixel, n, dimension + BSDF_LOBE);
-    BsdfSample b = draw_direction(p, m.bsdf, local, sample_2d(block.seed, pixel, n, dimension + BSDF_DIRECTION), lobe.x);
-    if (!(b.pdf > 0.0)) return;
-    vec3 w = from_frame(f, b.wi);
-    float side = dot(ng, w);
-    // a shading normal may send light through the surface: there is no such light
-    if (!(side * b.wi.z > 0.0)) return;
+    BsdfSample b = draw_direction(p, m, wo, sample_2d(block.seed, pixel, n, dimension + BSDF_DIRECTION), lobe.x);
+    float side = dot(m.ng, b.wi);
+    if (!(b.pdf > 0.0) || side == 0.0) return;
     state.throughput *= b.weight;
     state.pdf = b.delta ? -1.0 : b.pdf;
     state.eta_scale *= b.eta * b.eta;
+    if (side < 0.0) state.medium = beyond;
     state.depth++;
-    float brightest = max(state.throughput.r, max(state.throughput.g, state.throughput.b));
+    float brightest = highest(state.throughput);
     if (!(brightest > 0.0)) return;
     if (state.depth >= p.rr_depth) {
         float survival = min(brightest * state.eta_scale, MOST_SURVIVAL);
@@ -155,7 +198,7 @@ void path_vertex(BlockParams block, uint k, PathState state, vec4 sum, Ray ray, 
         state.throughput /= survival;
     }
     store_state(p.states, k, state);
-    append_ray(p.next, Ray(s.position + ng * (sign(side) * s.offset), 0.0, normalize(w), INFINITY), k);
+    append_ray(p.next, Ray(s.position + m.ng * (sign(side) * s.offset), 0.0, normalize(b.wi), INFINITY), k);
 }
 
 #endif

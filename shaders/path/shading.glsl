@@ -5,30 +5,60 @@
 #include "path/params.glsl"
 #include "bsdf/bsdf.glsl"
 
-const uint MODEL_METALLIC_ROUGHNESS = 0u;
+const uint MODEL_GLTF = 0u;
 const uint MODEL_MATTE = 1u;
 const uint MODEL_MIRROR = 2u;
 const uint MODEL_GLASS = 3u;
 const uint MODEL_CONDUCTOR = 4u;
 const uint MODEL_UNLIT = 5u;
 
+// Walls of a glTF material that transmits.
+const uint WALLS_NONE = 0u;
+const uint WALLS_THIN = 1u;
+const uint WALLS_VOLUME = 2u;
+
+const uint USE_METALLIC_ROUGHNESS = 0u;
+const uint USE_EMISSION = 1u;
+const uint USE_NORMAL = 2u;
+const uint USE_COAT = 3u;
+const uint USE_COAT_ROUGHNESS = 4u;
+const uint USE_COAT_NORMAL = 5u;
+const uint USE_SHEEN = 6u;
+const uint USE_SHEEN_ROUGHNESS = 7u;
+const uint USE_TRANSMISSION = 8u;
+const uint USE_SPECULAR = 9u;
+const uint USE_SPECULAR_COLOR = 10u;
+const uint USE_ANISOTROPY = 11u;
+const uint USE_OCCLUSION = 12u;
+const uint USES = 13u;
+
 struct ShadingRecord {
-    vec3 emission;       // radiance
+    vec3 emission;         // radiance
     uint model;
     float metallic;
     float roughness;
     float ior;
-    float specular;      // KHR_materials_specular
-    vec3 specular_color; // of mirror, glass, conductor: factor of what is reflected
-    uint emits_back;     // from both sides
-    vec3 eta;            // conductor
-    float shading_reserved0;
+    float specular;        // KHR_materials_specular
+    vec3 specular_color;   // of mirror, glass, conductor: factor of what is reflected
+    uint emits_back;       // from both sides
+    vec3 eta;              // conductor
+    float transmission;
     vec3 k;
-    float shading_reserved1;
-    vec3 transmitted;    // glass: factor of what is refracted
-    float shading_reserved2;
-    TextureUse metallic_roughness_texture;
-    TextureUse emission_texture;
+    float coat;
+    vec3 transmitted;      // glass: factor of what is refracted
+    float coat_roughness;
+    vec3 sheen_color;
+    float sheen_roughness;
+    vec3 absorption;       // per unit of length in the volume
+    uint walls;            // WALLS_*
+    vec2 anisotropy;       // strength times cosine and sine of its angle from the tangent
+    float normal_scale;
+    float coat_normal_scale;
+    uint glass_layer;      // of the albedo tables: among the indices of refraction
+    uint shading_reserved0;
+    uint shading_reserved1;
+    uint shading_reserved2;
+    TextureUse uses[USES];
 };
 layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer ShadingRecords { ShadingRecord v[]; };
 
@@ -42,71 +72,201 @@ vec4 sample_use(TextureUse use, PartRecord part, uint primitive, vec2 uv, bool s
 
 // Factor of a light's radiance at a point of a primitive of an instance of the scene.
 vec3 emission_texture(uint instance, uint primitive, vec2 uv) {
+    if (!has(HAS_TEXTURES)) return vec3(1.0);
     SceneRoot root = SceneRoot(push.scene);
     PartRecord part = PartRecords(root.parts).v[Pairs(root.placements).v[instance].y];
-    TextureUse use = ShadingRecords(root.shading).v[part.material].emission_texture;
+    TextureUse use = ShadingRecords(root.shading).v[part.material].uses[USE_EMISSION];
     return sample_use(use, part, primitive + part.first_primitive, uv, true).rgb;
 }
 
+// What a path meets.
 struct Shading {
     Bsdf bsdf;
+    Frame frame;    // about the shading normal, which is on the viewer's side
+    vec3 ng;        // geometric normal, on the viewer's side
     vec3 emission;  // towards the viewer
     bool unlit;
+    uint material;
 };
 
-// `front`: is the surface seen from its front? cos_o: cosine between view and shading normal.
-Shading shade(PathParams params, Surface s, bool front, float cos_o) {
+// What the material's textures say at a surface, 1 where it has none.
+struct Looked {
+    vec4 at[USES];
+};
+
+Looked look_up(Surface s, PartRecord part) {
+    Looked found;
+    const uint SRGB = 1u << USE_EMISSION | 1u << USE_SHEEN | 1u << USE_SPECULAR_COLOR;
+    ShadingRecords records = ShadingRecords(SceneRoot(push.scene).shading);
+    // one copy of the code for all
+    [[dont_unroll]] for (uint use = 0u; use < USES; use++) {
+        found.at[use] = vec4(1.0);
+        if (has(HAS_TEXTURES)) {
+            found.at[use] = sample_use(records.v[part.material].uses[use], part, s.primitive, s.uv, (SRGB >> use & 1u) != 0u);
+        }
+    }
+    return found;
+}
+
+bool has_map(ShadingRecord m, uint use) { return has(HAS_NORMAL_MAPS) && m.uses[use].texture != INVALID; }
+
+// Normal from a tangent-space map; tangents about n, which is on the front.
+vec3 mapped_normal(vec4 texel_, float scale, vec3 n, vec4 tangent) {
+    vec3 t = texel_.xyz * 2.0 - 1.0;
+    t.xy *= scale;
+    vec3 mapped = tangent.xyz * t.x + cross(n, tangent.xyz) * (tangent.w * t.y) + n * t.z;
+    float m2 = dot(mapped, mapped);
+    return m2 > 1e-12 ? mapped * inversesqrt(m2) : n;
+}
+
+// Bent towards the viewer as far as it turns away.
+vec3 towards(vec3 n, vec3 wo) {
+    float c = dot(n, wo);
+    return c < LEAST_COSINE ? normalize(n + (LEAST_COSINE - c) * wo) : n;
+}
+
+// Turns and stretches microfacets along KHR_materials_anisotropy's direction. Returns it, in the plane of tangent and bitangent.
+vec2 anisotropic(Looked looked, ShadingRecord m, inout vec2 alpha) {
+    vec3 t = looked.at[USE_ANISOTROPY].xyz;
+    vec2 d = m.uses[USE_ANISOTROPY].texture != INVALID ? t.xy * 2.0 - 1.0 : vec2(1.0, 0.0);
+    float strength = length(m.anisotropy) * t.z;
+    alpha.x = mix(alpha.x, 1.0, strength * strength);
+    vec2 turn = strength > 0.0 ? normalize(m.anisotropy) : vec2(1.0, 0.0);
+    return vec2(turn.x * d.x - turn.y * d.y, turn.y * d.x + turn.x * d.y);
+}
+
+// Factors that give back what microfacets of one bounce lose (docs/materials.md, Energy).
+void compensate(inout Bsdf b, ShadingRecord m, float cos_o, float roughness, bool front) {
+    if (!has(HAS_COMPENSATION) || is_smooth(b.facets)) return;
+    if (b.kind == BSDF_CONDUCTOR) {
+        float e = albedo(ALBEDO_BECKMANN, cos_o, roughness);
+        b.gain = 1.0 + fresnel_conductor(1.0, b.f0, b.k) * ((1.0 - e) / e);
+    } else if (b.kind == BSDF_DIELECTRIC || b.volume) {
+        b.gain = vec3(1.0 / albedo(ALBEDO_GLASS + 2u * m.glass_layer + (front ? 0u : 1u), cos_o, roughness));
+        b.transmitted *= b.kind == BSDF_DIELECTRIC ? 1.0 : b.gain.x;
+    } else {
+        float a0 = albedo(ALBEDO_GGX_F0, cos_o, roughness), a90 = albedo(ALBEDO_GGX_F90, cos_o, roughness), e = a0 + a90;
+        b.gain = 1.0 + b.f0 * ((1.0 - e) / e);
+        b.under = clamp(1.0 - highest(b.gain * (b.f0 * a0 + b.f90 * a90)), 0.0, 1.0);
+    }
+}
+
+// The BSDF of a glTF material but for the frame; returns the direction of anisotropy.
+vec2 gltf_bsdf(inout Bsdf b, Looked looked, ShadingRecord m, vec3 base, bool front, float cos_o) {
+    vec4 mr = looked.at[USE_METALLIC_ROUGHNESS];
+    float metallic = m.metallic * mr.b, roughness = m.roughness * mr.g;
+    float specular = m.specular * looked.at[USE_SPECULAR].a;
+    vec3 specular_color = m.specular_color * looked.at[USE_SPECULAR_COLOR].rgb;
+    float r0 = (m.ior - 1.0) / (m.ior + 1.0);
+    b.kind = BSDF_GLTF;
+    b.diffuse = base * (1.0 - metallic);
+    b.f0 = mix(min(r0 * r0 * specular_color, vec3(1.0)) * specular, base, metallic);
+    b.f90 = mix(specular, 1.0, metallic);
+    b.facets = Microfacets(vec2(roughness * roughness), false);
+    vec2 along = vec2(1.0, 0.0);
+    if (has(HAS_ANISOTROPY) && m.anisotropy != vec2(0.0)) along = anisotropic(looked, m, b.facets.alpha);
+    if (has_transmission() && m.walls != WALLS_NONE) {
+        float transmission = m.transmission * looked.at[USE_TRANSMISSION].r;
+        b.transmitted = b.diffuse * transmission;
+        b.diffuse *= 1.0 - transmission;
+        b.volume = has(HAS_VOLUMES) && m.walls == WALLS_VOLUME;
+        if (b.volume) {
+            b.eta = front ? m.ior : 1.0 / m.ior;
+            b.tint = min(specular_color, vec3(1.0)) * specular;
+            b.metallic = metallic;
+            b.f0 = base;
+        }
+    }
+    if (has(HAS_SHEEN) && highest(m.sheen_color) > 0.0) {
+        float r = m.sheen_roughness * looked.at[USE_SHEEN_ROUGHNESS].a;
+        b.sheen = Sheen(m.sheen_color * looked.at[USE_SHEEN].rgb, max(r * r, LEAST_SHEEN_ALPHA), 1.0);
+        b.sheen.kept = sheen_kept(b.sheen, cos_o);
+    }
+    if (has(HAS_COAT) && m.coat > 0.0) {
+        float r = m.coat_roughness * looked.at[USE_COAT_ROUGHNESS].g;
+        b.coat.weight = m.coat * looked.at[USE_COAT].r;
+        b.coat.facets = Microfacets(vec2(r * r), false);
+    }
+    compensate(b, m, cos_o, roughness, front);
+    set_shares(b, cos_o);
+    return along;
+}
+
+// A surface that absorbs everything.
+Shading black_shading(Surface s, vec3 wo) {
+    float side = dot(s.ng, wo) > 0.0 ? 1.0 : -1.0;
+    return Shading(black_bsdf(), frame_about(towards(s.ns * side, wo)), s.ng * side, vec3(0.0), false, INVALID);
+}
+
+// A diffuse one, whatever the material.
+Shading grey_shading(Surface s, vec3 wo, float grey) {
+    Shading out_ = black_shading(s, wo);
+    out_.bsdf.kind = BSDF_DIFFUSE;
+    out_.bsdf.diffuse = vec3(grey);
+    return out_;
+}
+
+// What a ray that comes along -wo meets.
+Shading shade(Surface s, vec3 wo) {
     SceneRoot root = SceneRoot(push.scene);
     PartRecord part = PartRecords(root.parts).v[s.part];
     ShadingRecord m = ShadingRecords(root.shading).v[part.material];
-    Shading out_;
-    out_.unlit = false;
-    out_.emission = vec3(0.0);
-    out_.bsdf = Bsdf(BSDF_NONE, vec3(0.0), vec3(0.0), 1.0, vec3(0.0), vec3(1.0), vec3(1.0), 1.0, Microfacets(vec2(1.0), false), 0.0);
-    if (params.white_sky != 0u) {
-        out_.bsdf.kind = BSDF_DIFFUSE;
-        out_.bsdf.diffuse = vec3(params.albedo);
-        return out_;
-    }
-    if (m.emission != vec3(0.0) && (front || m.emits_back != 0u)) {
-        out_.emission = m.emission * sample_use(m.emission_texture, part, s.primitive, s.uv, true).rgb;
+    bool front = dot(s.ng, wo) > 0.0;
+    float side = front ? 1.0 : -1.0;
+    Shading out_ = black_shading(s, wo);
+    out_.material = part.material;
+    vec3 n = out_.frame.n;
+    Looked looked = look_up(s, part);
+    if (has(HAS_EMISSION) && m.emission != vec3(0.0) && (front || m.emits_back != 0u)) {
+        out_.emission = m.emission * looked.at[USE_EMISSION].rgb;
     }
     vec3 base = base_color(part, MaterialRecords(root.materials).v[part.material], s.primitive, s.uv).rgb;
-    if (m.model == MODEL_UNLIT) {
+    if (has(HAS_UNLIT) && m.model == MODEL_UNLIT) {
         out_.unlit = true;
         out_.emission += base;
         return out_;
     }
-    if (m.model == MODEL_MATTE) {
+    vec4 tangent = vec4(0.0);
+    bool mapped = has_map(m, USE_NORMAL), coat_mapped = has(HAS_COAT) && has_map(m, USE_COAT_NORMAL);
+    if ((mapped || coat_mapped || has(HAS_ANISOTROPY)) && !is_null(part.tangents)) tangent = tangent_at(s, part);
+    if (mapped && tangent.w != 0.0) {
+        n = towards(mapped_normal(looked.at[USE_NORMAL], m.normal_scale, s.ns, tangent) * side, wo);
+        out_.frame = frame_about(n);
+    }
+    float cos_o = max(dot(n, wo), LEAST_COSINE);
+    if (has(HAS_DIFFUSE) && m.model == MODEL_MATTE) {
         out_.bsdf.kind = BSDF_DIFFUSE;
         out_.bsdf.diffuse = base;
-    } else if (m.model == MODEL_MIRROR) {
+    } else if (has(HAS_MIRROR) && m.model == MODEL_MIRROR) {
         out_.bsdf.kind = BSDF_MIRROR;
         out_.bsdf.tint = m.specular_color;
-    } else if (m.model == MODEL_GLASS) {
+    } else if (has(HAS_GLASS) && m.model == MODEL_GLASS) {
         out_.bsdf.kind = BSDF_DIELECTRIC;
         out_.bsdf.tint = m.specular_color;
         out_.bsdf.transmitted = m.transmitted;
         out_.bsdf.eta = front ? m.ior : 1.0 / m.ior;
         out_.bsdf.facets = Microfacets(vec2(m.roughness * m.roughness), false);
-    } else if (m.model == MODEL_CONDUCTOR) {
+        compensate(out_.bsdf, m, cos_o, m.roughness, front);
+    } else if (has(HAS_CONDUCTOR) && m.model == MODEL_CONDUCTOR) {
         out_.bsdf.kind = BSDF_CONDUCTOR;
         out_.bsdf.tint = m.specular_color;
         out_.bsdf.f0 = m.eta;
         out_.bsdf.k = m.k;
         out_.bsdf.facets = Microfacets(vec2(m.roughness * m.roughness), true);
-    } else {
-        vec4 mr = sample_use(m.metallic_roughness_texture, part, s.primitive, s.uv, false);
-        float metallic = m.metallic * mr.b, roughness = m.roughness * mr.g;
-        // KHR_materials_ior and _specular
-        float r0 = (m.ior - 1.0) / (m.ior + 1.0);
-        vec3 dielectric = min(r0 * r0 * m.specular_color, vec3(1.0)) * m.specular;
-        out_.bsdf.kind = BSDF_METALLIC_ROUGHNESS;
-        out_.bsdf.diffuse = base * (1.0 - metallic);
-        out_.bsdf.f0 = mix(dielectric, base, metallic);
-        out_.bsdf.f90 = mix(m.specular, 1.0, metallic);
-        out_.bsdf.facets = Microfacets(vec2(roughness * roughness), false);
-        out_.bsdf.specular_share = specular_share(out_.bsdf.diffuse, out_.bsdf.f0, out_.bsdf.f90, cos_o);
+        compensate(out_.bsdf, m, cos_o, m.roughness, front);
+    } else if (has(HAS_GLTF)) {
+        vec2 along = gltf_bsdf(out_.bsdf, looked, m, base, front, cos_o);
+        if (has(HAS_ANISOTROPY) && m.anisotropy != vec2(0.0) && tangent.w != 0.0) {
+            vec3 d = tangent.xyz * along.x + cross(s.ns, tangent.xyz) * (tangent.w * along.y);
+            out_.frame = frame_along(n, d);
+        }
+        if (coat_mapped && tangent.w != 0.0) {
+            vec3 nc = mapped_normal(looked.at[USE_COAT_NORMAL], m.coat_normal_scale, s.ns, tangent) * side;
+            out_.bsdf.coat.normal = to_frame(out_.frame, nc);
+        } else if (has(HAS_COAT) && mapped) {
+            // the coat has its own normals, or none
+            out_.bsdf.coat.normal = to_frame(out_.frame, towards(s.ns * side, wo));
+        }
     }
     return out_;
 }

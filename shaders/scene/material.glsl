@@ -2,6 +2,7 @@
 #ifndef SCENE_MATERIAL
 #define SCENE_MATERIAL
 #include "scene/texture.glsl"
+#include "common/sampler.glsl"
 
 // Vertex numbers of a triangle, within the group. `primitive` counts in the group.
 uvec3 triangle_indices(PartRecord part, uint primitive) {
@@ -39,13 +40,21 @@ vec4 base_color(PartRecord part, MaterialRecord material, uint primitive, vec2 u
     return color;
 }
 
+// In [0, 1), a number for each of all arguments.
+float evenly(uvec2 a, uvec2 b) {
+    return float(hash_combine(hash_combine(hash_combine(hash(a.x), a.y), b.x), b.y) >> 8) * (1.0 / 16777216.0);
+}
+
 // Is there a surface at this point of an alpha-tested primitive?
 bool alpha_passes(uint instance, uint primitive, vec2 uv) {
     SceneRoot root = SceneRoot(push.scene);
     InstanceRecords instances = InstanceRecords(root.instances);
     PartRecord part = PartRecords(root.parts).v[part_index(instances, instance, primitive)];
     MaterialRecord material = MaterialRecords(root.materials).v[part.material];
-    return base_color(part, material, primitive, uv).a >= material.alpha_cutoff;
+    float alpha = base_color(part, material, primitive, uv).a;
+    // rays differ in where they meet it, if by bits only: that is as good as a number of their own, and the same however often it is asked
+    if (material.coverage != 0u) return alpha > evenly(floatBitsToUint(uv), uvec2(instance, primitive));
+    return alpha >= material.alpha_cutoff;
 }
 
 #endif

@@ -26,7 +26,7 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Sc
     uvec2 launch_counters; // compute tracer: rays taken by each work-group
     uvec2 motion;      // MotionRecord of each entry of the top level; null: nothing moves
     uvec2 shading;     // ShadingRecord of each material (shaders/path/shading.glsl); null: nobody asks
-    uvec2 root_reserved2;
+    uvec2 albedo;      // tables of shaders/bsdf/albedo.glsl; null: no material asks
     vec4 bounds_min;   // compute tracer: of everything, padded as the hierarchy's boxes are
     vec4 bounds_max;
 };
@@ -57,9 +57,8 @@ struct PartRecord {
     uint material;
     uint scene_instance;
     uint mirrored;     // 1: the vertices were baked through a transform that turned their winding
-    uint part_reserved0;
-    uint part_reserved1;
-    uint part_reserved2;
+    uint part_reserved;
+    uvec2 tangents;    // 4 floats per vertex of the part; null: no material asks
 };
 layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer PartRecords { PartRecord v[]; };
 
@@ -70,7 +69,7 @@ struct MaterialRecord {
     uint base_color_texture;  // INVALID: none
     uint texcoord_set;
     float alpha_cutoff;       // present where alpha >= cutoff; negative: always
-    uint material_reserved0;
+    uint coverage;            // 1: present with a probability of alpha, whatever the cutoff
     uint material_reserved1;
     uint material_reserved2;
 };

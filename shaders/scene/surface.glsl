@@ -9,6 +9,7 @@ struct Surface {
     vec3 ns;         // unit shading normal, on the side of ng
     float offset;    // distance along +-ng at which a new ray cannot meet this surface again
     uint part;       // PartRecord
+    uint entry;      // InstanceRecord
     uint primitive;  // in the group
     vec2 uv;
 };
@@ -62,6 +63,7 @@ Surface surface_at(Ray ray, Hit hit) {
     }
     Surface s;
     s.part = placement.y;
+    s.entry = SINGLE_LEVEL ? 0u : placement.x;
     s.primitive = hit.primitive + part.first_primitive;
     s.uv = vec2(hit.u, hit.v);
 
@@ -106,6 +108,24 @@ Surface surface_at(Ray ray, Hit hit) {
     s.ns = ns2 > 0.0 ? ns * inversesqrt(ns2) : s.ng;
     s.ns *= dot(s.ns, s.ng) < 0.0 ? -1.0 : 1.0;
     return s;
+}
+
+// Unit tangent (world, not yet orthogonal to the normal) with handedness in w: the bitangent is w cross(normal, tangent) about the normal on the
+// front. w = 0: there is none.
+vec4 tangent_at(Surface s, PartRecord part) {
+    uvec3 corners = triangle_indices(part, s.primitive) - part.first_vertex;
+    Quads q = Quads(part.tangents);
+    vec4 a = uintBitsToFloat(q.v[corners.x]);
+    vec3 t = a.xyz * (1.0 - s.uv.x - s.uv.y) + uintBitsToFloat(q.v[corners.y]).xyz * s.uv.x + uintBitsToFloat(q.v[corners.z]).xyz * s.uv.y;
+    float w = a.w;
+    if (!SINGLE_LEVEL) {
+        vec4 rows[3] = InstanceRecords(SceneRoot(push.scene).instances).v[s.entry].group_to_world;
+        t = transform_vector(rows, t);
+        // a mirroring transform turns the bitangent against the cross product
+        if (dot(rows[0].xyz, cross(rows[1].xyz, rows[2].xyz)) < 0.0) w = -w;
+    }
+    float t2 = dot(t, t);
+    return t2 > 0.0 ? vec4(t * inversesqrt(t2), w) : vec4(0.0);
 }
 
 #endif

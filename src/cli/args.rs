@@ -91,6 +91,14 @@ pub enum Integrator {
     Direct,
     /// Grey diffuse surfaces under a white sky: what ambient occlusion stands in for, divided by their albedo
     AoSky,
+    /// Shading normals, in world space
+    Normals,
+    /// Base colours
+    Albedo,
+    /// Distances along camera rays
+    Depth,
+    /// Occlusion that materials have baked into textures
+    BakedOcclusion,
 }
 
 impl Integrator {

@@ -64,7 +64,7 @@ pub fn run(args: &RenderArgs, start: Instant) -> Result<(), Failure> {
     let needs = Needs {
         normals: options.hemisphere == Hemisphere::Shading || args.wants(Aov::Ns),
         albedo: args.wants(Aov::Albedo),
-        shading: false,
+        ..Default::default()
     };
     // a camera ray and an occlusion ray each
     let rays = 2 * options.spp as u64 * size[0] as u64 * size[1] as u64;

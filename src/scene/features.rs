@@ -23,8 +23,18 @@ pub fn alpha_cutoff(material: &Material) -> Option<f32> {
     }
 }
 
+/// What [`AlphaMode::Blend`] means for rays.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Blend {
+    /// There from an alpha of one half on: what streams ask that only know there or not.
+    #[default]
+    Masked,
+    /// There with a probability of alpha, drawn anew for each ray: what paths ask. Spheres, which have no coordinates to draw by, are masked.
+    Covered,
+}
+
 /// Class of each mesh of the scene, from the range of alpha that its material and vertices can reach.
-pub fn alpha_classes(scene: &Scene) -> Vec<AlphaClass> {
+pub fn alpha_classes(scene: &Scene, blend: Blend) -> Vec<AlphaClass> {
     // range of alpha of each texture, looked at once and only where an alpha mode asks
     let mut ranges: Vec<Option<(f32, f32)>> = vec![None; scene.textures.len()];
     scene
@@ -46,6 +56,14 @@ pub fn alpha_classes(scene: &Scene) -> Vec<AlphaClass> {
             }
             // interpolation rounds: a range that just reaches the cutoff is tested
             let margin = 1e-5;
+            let covered = blend == Blend::Covered && material.alpha_mode == AlphaMode::Blend;
+            if covered && matches!(mesh.geometry, Geometry::Triangles(_)) {
+                return match (lo >= 1.0 - margin, hi <= 0.0) {
+                    (true, _) => AlphaClass::Opaque,
+                    (_, true) => AlphaClass::Absent,
+                    _ => AlphaClass::Tested,
+                };
+            }
             if lo >= cutoff + margin || cutoff <= 0.0 {
                 AlphaClass::Opaque
             } else if hi < cutoff - margin {
@@ -76,12 +94,14 @@ pub struct SceneFeatures {
     pub spheres: bool,
     /// One top-level entry with an identity transform.
     pub single_level: bool,
+    /// What materials ask of paths, as the bits of shaders/bsdf/features.glsl; `None` where nobody shades.
+    pub shading: Option<u32>,
 }
 
 impl SceneFeatures {
     /// Of a flattened scene.
     pub fn of(flat: &FlatScene) -> Self {
-        Self { alpha: flat.has_alpha(), spheres: flat.has_spheres(), single_level: flat.is_single_level() }
+        Self { alpha: flat.has_alpha(), spheres: flat.has_spheres(), single_level: flat.is_single_level(), shading: None }
     }
 
     /// One line for each thing that is skipped, and what that saves.

@@ -6,7 +6,7 @@
 
 use glam::{DAffine3, DVec3, Vec3};
 
-use super::features::{AlphaClass, alpha_classes};
+use super::features::{AlphaClass, Blend, alpha_classes};
 use super::{Geometry, Scene, Sphere};
 use crate::bvh::Aabb;
 use crate::error::{Error, Result};
@@ -111,12 +111,19 @@ pub struct FlatScene<'a> {
     pub absent_primitives: usize,
     /// What may change.
     pub motion: Motion,
+    /// What partial coverage means.
+    pub blend: Blend,
 }
 
 impl<'a> FlatScene<'a> {
     /// Groups the meshes of a scene of which nothing changes.
     pub fn new(scene: &'a Scene) -> Self {
-        Self::group(scene, Motion::default())
+        Self::group(scene, Motion::default(), Blend::Masked)
+    }
+
+    /// As [`FlatScene::new`], for paths: what covers a surface in part is there for a part of the rays.
+    pub fn for_paths(scene: &'a Scene) -> Self {
+        Self::group(scene, Motion::default(), Blend::Covered)
     }
 
     /// Groups the meshes of a scene; what may change is not baked into anything: its mesh is a group of its own, in object space.
@@ -125,12 +132,12 @@ impl<'a> FlatScene<'a> {
     /// [`Error::Usage`] when `motion` names what is not there, or spheres to deform.
     pub fn with_motion(scene: &'a Scene, motion: Motion) -> Result<Self> {
         motion.check(scene)?;
-        Ok(Self::group(scene, motion))
+        Ok(Self::group(scene, motion, Blend::Masked))
     }
 
-    fn group(scene: &'a Scene, motion: Motion) -> Self {
+    fn group(scene: &'a Scene, motion: Motion, blend: Blend) -> Self {
         let origin = scene.origin();
-        let alpha = alpha_classes(scene);
+        let alpha = alpha_classes(scene, blend);
         let mut uses = vec![0usize; scene.meshes.len()];
         for i in &scene.instances {
             uses[i.mesh] += 1;
@@ -140,7 +147,7 @@ impl<'a> FlatScene<'a> {
             changes[mesh] = true;
         }
         let relative = |t: DAffine3| DAffine3 { translation: t.translation - origin, ..t };
-        let mut flat = Self { scene, origin, groups: Vec::new(), placements: Vec::new(), absent_primitives: 0, motion };
+        let mut flat = Self { scene, origin, groups: Vec::new(), placements: Vec::new(), absent_primitives: 0, motion, blend };
         let mut world = [Group::empty(false), Group::empty(true)];
         let mut own: Vec<Option<usize>> = vec![None; scene.meshes.len()];
         // opaque meshes first, so that alpha-tested primitives are the tail of every group

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use glam::{DMat3, DVec3, Vec3};
 
-/// Shape and falloff of a light (KHR_lights_punctual, `.brhan` SphericalLight).
+/// Shape and falloff of a light (KHR_lights_punctual). What has an extent is a surface that emits ([`super::Material::emissive`]).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum LightKind {
     /// `intensity` in candela.
@@ -16,12 +16,10 @@ pub enum LightKind {
         /// Radians from the axis where it ends.
         outer_angle: f32,
     },
-    /// `intensity` in lux.
-    Directional,
-    /// `intensity` is emitted radiance; the sphere itself is visible.
-    Sphere {
-        /// World units.
-        radius: f64,
+    /// `intensity` in lux, of a surface that faces it.
+    Directional {
+        /// Radians that it fills in the sky, from edge to edge; 0: shadows are sharp. The sun: 0.0093.
+        angle: f32,
     },
 }
 

@@ -24,7 +24,7 @@ pub enum AlphaMode {
         /// Usually 0.5.
         cutoff: f32,
     },
-    /// Coverage. Occlusion streams treat it as a mask at 0.5.
+    /// Coverage: paths draw it, occlusion streams treat it as a mask at 0.5.
     Blend,
 }
 
@@ -47,7 +47,7 @@ pub enum MaterialKind {
 }
 
 /// KHR_materials_clearcoat.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Clearcoat {
     /// Strength, 0 to 1.
     pub factor: f32,
@@ -59,6 +59,14 @@ pub struct Clearcoat {
     pub roughness_texture: Option<TextureSlot>,
     /// Normal map of the coat.
     pub normal_texture: Option<TextureSlot>,
+    /// Scale of that map's x and y.
+    pub normal_scale: f32,
+}
+
+impl Default for Clearcoat {
+    fn default() -> Self {
+        Self { factor: 0.0, texture: None, roughness: 0.0, roughness_texture: None, normal_texture: None, normal_scale: 1.0 }
+    }
 }
 
 /// KHR_materials_sheen.

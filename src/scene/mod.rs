@@ -4,6 +4,7 @@
 //! sRGB primaries, triangles counter-clockwise seen from their front.
 
 pub mod animation;
+pub mod blackbody;
 pub mod builtin;
 pub mod camera;
 pub mod camera_path;

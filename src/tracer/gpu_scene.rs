@@ -4,17 +4,18 @@ use std::borrow::Cow;
 use std::sync::Arc;
 
 use bytemuck::{Pod, Zeroable};
-use glam::{DAffine3, Vec3};
+use glam::{DAffine3, Vec3, Vec4};
 
+use super::albedo;
 use super::compute::Hierarchy;
 use super::drawable::{Drawable, Shape};
 use super::motion::Motion;
 use super::shading::{self, ShadingRecord, TextureUse};
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, Device, Memory};
-use crate::scene::features::alpha_cutoff;
+use crate::scene::features::{Blend, alpha_cutoff};
 use crate::scene::flatten::{FlatScene, Group, Part, Placement};
-use crate::scene::{Filter, Geometry, Material, TextureSlot, TriangleMesh, Wrap};
+use crate::scene::{AlphaMode, Filter, Geometry, Material, TextureSlot, TriangleMesh, Wrap};
 
 /// What the passes will ask of the scene; the rest is not uploaded.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -25,6 +26,12 @@ pub struct Needs {
     pub albedo: bool,
     /// Everything that light does to surfaces, and they to it: what paths ask for. Normals and base colours with it.
     pub shading: bool,
+    /// With `shading`: every surface is white and nothing else is asked of it.
+    pub white: bool,
+    /// With `shading`: what microfacets of one bounce lose is given back.
+    pub compensation: bool,
+    /// With `shading`: occlusion that is baked into textures, to be shown.
+    pub baked_occlusion: bool,
 }
 
 #[repr(C)]
@@ -47,7 +54,7 @@ struct SceneRoot {
     launch_counters: u64,
     motion: u64,
     shading: u64,
-    reserved2: u64,
+    albedo: u64,
     bounds_min: [f32; 4],
     bounds_max: [f32; 4],
 }
@@ -78,7 +85,8 @@ struct PartRecord {
     material: u32,
     scene_instance: u32,
     mirrored: u32,
-    reserved: [u32; 3],
+    reserved: u32,
+    tangents: u64,
 }
 
 #[repr(C)]
@@ -90,7 +98,8 @@ struct MaterialRecord {
     base_color_texture: u32,
     texcoord_set: u32,
     alpha_cutoff: f32,
-    reserved: [u32; 3],
+    coverage: u32,
+    reserved: [u32; 2],
 }
 
 #[repr(C)]
@@ -142,7 +151,11 @@ pub struct GpuScene {
 impl GpuScene {
     /// Writes what `needs` and the scene itself call for.
     pub fn new(device: &Arc<Device>, flat: &FlatScene, needs: Needs) -> Result<Self> {
-        let needs = Needs { normals: needs.normals || needs.shading, albedo: needs.albedo || needs.shading, ..needs };
+        let needs = Needs {
+            normals: needs.normals || needs.shading,
+            albedo: needs.albedo || needs.shading && !needs.white,
+            ..needs
+        };
         let groups = flat.groups.iter().map(|g| group_buffers(device, flat, g)).collect::<Result<Vec<_>>>()?;
         let (mut parts, mut first_part) = (Vec::new(), Vec::new());
         let mut others = Vec::new();
@@ -164,7 +177,8 @@ impl GpuScene {
                     material: flat.scene.meshes[part.mesh].material as u32,
                     scene_instance: part.scene_instance.map_or(INVALID, |i| i as u32),
                     mirrored: part.mirrored as u32,
-                    reserved: [0; 3],
+                    reserved: 0,
+                    tangents: attributes.address(part, k, Attribute::Tangents),
                 });
             }
         }
@@ -205,9 +219,13 @@ impl GpuScene {
             }
         }
         let textures = Textures::upload(device, flat, needs)?;
-        let materials: Vec<_> = flat.scene.materials.iter().map(|m| textures.material(m)).collect();
+        let materials: Vec<_> = flat.scene.materials.iter().map(|m| textures.material(m, flat.blend)).collect();
+        let indices = shading::indices_of_refraction(&flat.scene.materials);
         let shading: Vec<_> = match needs.shading {
-            true => flat.scene.materials.iter().map(|m| ShadingRecord::new(m, |slot| textures.slot(slot))).collect(),
+            true => {
+                let record = |m| ShadingRecord::new(m, needs, &indices, |slot| textures.slot(slot));
+                flat.scene.materials.iter().map(record).collect()
+            }
             false => Vec::new(),
         };
         let instance_buffer = Buffer::from_slice(device, "instance records", &instances)?;
@@ -225,6 +243,9 @@ impl GpuScene {
         keep(textures.texels);
         if needs.shading {
             root.shading = keep(Buffer::from_slice(device, "shading records", &shading)?);
+            if let Some(tables) = albedo_tables(flat, needs, &indices) {
+                root.albedo = keep(Buffer::from_slice(device, "albedo tables", &tables)?);
+            }
         }
         // such a mesh is not baked
         let normals = |&mesh: &usize| {
@@ -344,6 +365,20 @@ impl GpuScene {
     }
 }
 
+/// What materials ask about albedos, if any does.
+fn albedo_tables(flat: &FlatScene, needs: Needs, indices: &[f32]) -> Option<Vec<f32>> {
+    let features = shading::features(flat, needs);
+    let has = |feature: u32| features & feature != 0;
+    let wanted = albedo::Wanted {
+        ggx: needs.compensation && has(shading::feature::GLTF),
+        sheen: has(shading::feature::SHEEN),
+        beckmann: needs.compensation && has(shading::feature::CONDUCTOR),
+    };
+    let glass = if needs.compensation && !needs.white { indices } else { &[] };
+    let any = wanted.ggx || wanted.sheen || wanted.beckmann || !glass.is_empty();
+    any.then(|| albedo::tables(wanted, glass))
+}
+
 fn write_all<T: Pod>(buffer: &mut Buffer, data: &[T]) -> Result<()> {
     let bytes: &[u8] = bytemuck::cast_slice(data);
     buffer.fill(bytes.len() as u64, 1, |first, chunk| chunk.copy_from_slice(&bytes[first as usize..][..chunk.len()]))
@@ -456,6 +491,7 @@ fn concatenate(device: &Arc<Device>, name: &str, arrays: &[Cow<[u8]>]) -> Result
 #[derive(Clone, Copy, PartialEq, Eq, Hash)]
 enum Attribute {
     Normals,
+    Tangents,
     Texcoords(usize),
     Colors,
 }
@@ -468,9 +504,9 @@ struct Attributes {
 }
 
 impl Attributes {
-    /// Baked normals differ from part to part; everything else is the mesh's own.
+    /// Baked normals and tangents differ from part to part; everything else is the mesh's own.
     fn key(part: &Part, index: usize, attribute: Attribute) -> (usize, Option<usize>, Attribute) {
-        let baked = attribute == Attribute::Normals && part.to_group.matrix3 != glam::DMat3::IDENTITY;
+        let baked = matches!(attribute, Attribute::Normals | Attribute::Tangents) && part.to_group.matrix3 != glam::DMat3::IDENTITY;
         (part.mesh, baked.then_some(index), attribute)
     }
 
@@ -483,9 +519,10 @@ impl Attributes {
             let color = needs.albedo || part.alpha_tested;
             let material = &flat.scene.materials[mesh.material];
             let textured = color && material.base_color_texture.is_some()
-                || needs.shading && shading::slots(material).into_iter().any(|slot| slot.is_some());
+                || shading::slots(material, needs).into_iter().any(|slot| slot.is_some());
             for (attribute, wanted) in [
                 (Attribute::Normals, needs.normals),
+                (Attribute::Tangents, needs.shading && !needs.white),
                 (Attribute::Texcoords(0), textured),
                 (Attribute::Texcoords(1), textured),
                 (Attribute::Colors, color),
@@ -515,6 +552,16 @@ fn attribute_bytes<'a>(t: &'a TriangleMesh, part: &Part, attribute: Attribute) -
             let baked: Vec<Vec3> = t.normals.iter().map(|n| (m * n.as_dvec3()).as_vec3()).collect();
             Cow::Owned(bytemuck::cast_slice(&baked).to_vec())
         }
+        Attribute::Tangents if part.to_group.matrix3 == glam::DMat3::IDENTITY => {
+            Cow::Borrowed(bytemuck::cast_slice(&t.tangents))
+        }
+        Attribute::Tangents => {
+            let m = part.to_group.matrix3;
+            // a mirroring transform turns the bitangent against the cross product
+            let side = if part.mirrored { -1.0 } else { 1.0 };
+            let bake = |t: &Vec4| (m * t.truncate().as_dvec3()).normalize_or_zero().as_vec3().extend(side * t.w);
+            Cow::Owned(bytemuck::cast_slice(&t.tangents.iter().map(bake).collect::<Vec<_>>()).to_vec())
+        }
         Attribute::Texcoords(set) => Cow::Borrowed(bytemuck::cast_slice(&t.texcoords[set])),
         Attribute::Colors => Cow::Borrowed(bytemuck::cast_slice(&t.colors)),
     }
@@ -535,8 +582,7 @@ impl Textures {
         for part in flat.groups.iter().flat_map(|g| &g.parts) {
             let material = &flat.scene.materials[flat.scene.meshes[part.mesh].material];
             let base = material.base_color_texture.filter(|_| needs.albedo || part.alpha_tested);
-            let others = if needs.shading { shading::slots(material) } else { [None; shading::SLOTS] };
-            for slot in others.into_iter().chain([base]).flatten() {
+            for slot in shading::slots(material, needs).into_iter().chain([base]).flatten() {
                 if record_of[slot.texture] == INVALID {
                     record_of[slot.texture] = used.len() as u32;
                     used.push(slot.texture);
@@ -591,7 +637,7 @@ impl Textures {
         }
     }
 
-    fn material(&self, m: &Material) -> MaterialRecord {
+    fn material(&self, m: &Material, blend: Blend) -> MaterialRecord {
         let slot = m.base_color_texture.filter(|s| self.record_of[s.texture] != INVALID);
         let transform = slot.map_or(glam::Affine2::IDENTITY, |s| s.transform);
         MaterialRecord {
@@ -601,7 +647,8 @@ impl Textures {
             base_color_texture: slot.map_or(INVALID, |s| self.record_of[s.texture]),
             texcoord_set: slot.map_or(0, |s| s.texcoord as u32),
             alpha_cutoff: alpha_cutoff(m).unwrap_or(-1.0),
-            reserved: [0; 3],
+            coverage: (blend == Blend::Covered && m.alpha_mode == AlphaMode::Blend).into(),
+            reserved: [0; 2],
         }
     }
 }

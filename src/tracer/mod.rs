@@ -4,6 +4,7 @@
 //! tracer ([`stream`]). A [`Tracer`] holds a scene in device memory ([`gpu_scene`]) together with what it is traced through:
 //! a hierarchy of our own (`compute`) or acceleration structures (`hardware`).
 
+mod albedo;
 mod brute;
 mod compute;
 pub mod drawable;
@@ -16,7 +17,7 @@ mod motion;
 mod prepared;
 pub mod queue;
 mod reference;
-mod shading;
+pub(crate) mod shading;
 pub mod stream;
 pub mod visits;
 mod wide;
@@ -175,7 +176,8 @@ impl Tracer {
                 device.info.name, device.info.driver
             )));
         }
-        let features = SceneFeatures::of(flat);
+        let shading = needs.shading.then(|| shading::features(flat, needs));
+        let features = SceneFeatures { shading, ..SceneFeatures::of(flat) };
         let mut stats = BuildStats { primitives: flat.primitive_count() as u64, ..Default::default() };
         // the hierarchy first: its build needs the most host memory, the scene's buffers come after that is freed
         let start = Instant::now();

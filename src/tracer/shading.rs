@@ -1,12 +1,14 @@
-//! What of materials the path tracer gets: `ShadingRecord` of shaders/path/shading.glsl.
+//! What of materials the path tracer gets: `ShadingRecord` of shaders/path/shading.glsl, and which of it the scene asks for at all.
 
 use bytemuck::{Pod, Zeroable};
 
+use super::gpu_scene::Needs;
+use crate::scene::flatten::FlatScene;
 use crate::scene::material::MaterialKind;
-use crate::scene::{Material, TextureSlot};
+use crate::scene::{Geometry, Material, TextureSlot};
 
-/// Textures of a material beside its base colour's.
-pub(super) const SLOTS: usize = 2;
+/// Textures of a material beside its base colour's: `USE_*` of shaders/path/shading.glsl.
+pub(super) const SLOTS: usize = 13;
 
 /// `TextureUse` of shaders/scene/scene.glsl.
 #[repr(C)]
@@ -33,21 +35,75 @@ pub(super) struct ShadingRecord {
     specular_color: [f32; 3],
     emits_back: u32,
     eta: [f32; 3],
-    reserved0: f32,
+    transmission: f32,
     k: [f32; 3],
-    reserved1: f32,
+    coat: f32,
     transmitted: [f32; 3],
-    reserved2: f32,
-    metallic_roughness_texture: TextureUse,
-    emission_texture: TextureUse,
+    coat_roughness: f32,
+    sheen_color: [f32; 3],
+    sheen_roughness: f32,
+    absorption: [f32; 3],
+    walls: u32,
+    anisotropy: [f32; 2],
+    normal_scale: f32,
+    coat_normal_scale: f32,
+    glass_layer: u32,
+    reserved: [u32; 3],
+    uses: [TextureUse; SLOTS],
 }
 
-const METALLIC_ROUGHNESS: u32 = 0;
+const GLTF: u32 = 0;
 const MATTE: u32 = 1;
 const MIRROR: u32 = 2;
 const GLASS: u32 = 3;
 const CONDUCTOR: u32 = 4;
 const UNLIT: u32 = 5;
+
+const NO_WALLS: u32 = 0;
+const THIN_WALLS: u32 = 1;
+const VOLUME: u32 = 2;
+
+/// Bits of shaders/bsdf/features.glsl, and what is not compiled where one is absent.
+pub(crate) mod feature {
+    pub const DIFFUSE: u32 = 1;
+    pub const GLTF: u32 = 2;
+    pub const CONDUCTOR: u32 = 4;
+    pub const GLASS: u32 = 8;
+    pub const MIRROR: u32 = 16;
+    pub const UNLIT: u32 = 32;
+    pub const COAT: u32 = 64;
+    pub const SHEEN: u32 = 128;
+    pub const THIN_WALLS: u32 = 256;
+    pub const VOLUMES: u32 = 512;
+    pub const ABSORPTION: u32 = 1024;
+    pub const ANISOTROPY: u32 = 2048;
+    pub const NORMAL_MAPS: u32 = 4096;
+    pub const TEXTURES: u32 = 8192;
+    pub const EMISSION: u32 = 16384;
+    pub const COMPENSATION: u32 = 32768;
+    pub const BENT_NORMALS: u32 = 65536;
+
+    /// All of them, in words.
+    pub const NAMES: [(u32, &str); 17] = [
+        (DIFFUSE, "matte materials"),
+        (GLTF, "metallic-roughness"),
+        (CONDUCTOR, "measured metals"),
+        (GLASS, "glass"),
+        (MIRROR, "mirrors"),
+        (UNLIT, "unlit surfaces"),
+        (COAT, "clearcoat"),
+        (SHEEN, "sheen"),
+        (THIN_WALLS, "thin walls that transmit"),
+        (VOLUMES, "volumes"),
+        (ABSORPTION, "absorption"),
+        (ANISOTROPY, "anisotropy"),
+        (NORMAL_MAPS, "normal maps"),
+        (TEXTURES, "textures of more than base colour"),
+        (EMISSION, "emissive surfaces"),
+        (COMPENSATION, "energy compensation"),
+        (BENT_NORMALS, "interpolated normals"),
+    ];
+}
 
 /// Complex index of refraction of a metal at the wavelengths of sRGB's primaries: eta and k of the measurements of Palik's handbook (1985) as
 /// Mitsuba and pbrt carry them, integrated to linear sRGB.
@@ -60,22 +116,109 @@ fn metal(kind: MaterialKind) -> Option<[[f32; 3]; 2]> {
 }
 
 /// The textures that paths ask for.
-pub(super) fn slots(m: &Material) -> [Option<TextureSlot>; SLOTS] {
-    [m.metallic_roughness_texture, m.emissive_texture]
+pub(super) fn slots(m: &Material, needs: Needs) -> [Option<TextureSlot>; SLOTS] {
+    if !needs.shading || needs.white {
+        return [None; SLOTS];
+    }
+    [
+        m.metallic_roughness_texture,
+        m.emissive_texture,
+        m.normal_texture,
+        m.clearcoat.texture,
+        m.clearcoat.roughness_texture,
+        m.clearcoat.normal_texture,
+        m.sheen.color_texture,
+        m.sheen.roughness_texture,
+        m.transmission.texture,
+        m.specular.texture,
+        m.specular.color_texture,
+        m.anisotropy.texture,
+        m.occlusion_texture.filter(|_| needs.baked_occlusion),
+    ]
+}
+
+/// Does light pass through it, and how?
+fn walls(m: &Material) -> u32 {
+    match m.kind {
+        MaterialKind::MetallicRoughness if !m.unlit && m.transmission.factor > 0.0 => {
+            if m.transmission.thickness > 0.0 { VOLUME } else { THIN_WALLS }
+        }
+        _ => NO_WALLS,
+    }
+}
+
+/// Attenuation per world unit.
+fn absorption(m: &Material) -> [f32; 3] {
+    if walls(m) != VOLUME {
+        return [0.0; 3];
+    }
+    // what absorbs everything at once has no number: the least that single precision holds is left after its distance
+    let per_unit = |c: f32| -c.clamp(f32::MIN_POSITIVE, 1.0).ln() / m.transmission.attenuation_distance;
+    m.transmission.attenuation_color.to_array().map(per_unit)
+}
+
+/// Indices of refraction of all materials that refract, each once: rough ones have tables of albedo ([`super::albedo`]).
+pub(super) fn indices_of_refraction(materials: &[Material]) -> Vec<f32> {
+    let mut all: Vec<f32> = materials.iter().filter(|m| refracts(m)).map(|m| m.ior).collect();
+    all.sort_by(f32::total_cmp);
+    all.dedup();
+    all
+}
+
+fn refracts(m: &Material) -> bool {
+    m.kind == MaterialKind::Glass && !m.unlit || walls(m) == VOLUME
+}
+
+/// What the materials of a scene ask for: bits of [`feature`].
+pub(super) fn features(flat: &FlatScene, needs: Needs) -> u32 {
+    let with = |on: bool, bit: u32| if on { bit } else { 0 };
+    let mut bits = with(needs.compensation, feature::COMPENSATION);
+    for part in flat.groups.iter().flat_map(|g| &g.parts) {
+        let mesh = &flat.scene.meshes[part.mesh];
+        let m = &flat.scene.materials[mesh.material];
+        let bent = |t: &Geometry| matches!(t, Geometry::Triangles(t) if !t.normals.is_empty());
+        bits |= with(bent(&mesh.geometry), feature::BENT_NORMALS);
+        if needs.white {
+            bits |= feature::DIFFUSE;
+            continue;
+        }
+        let gltf = m.kind == MaterialKind::MetallicRoughness && !m.unlit;
+        bits |= match m.kind {
+            _ if m.unlit => feature::UNLIT,
+            MaterialKind::MetallicRoughness => feature::GLTF,
+            MaterialKind::Matte => feature::DIFFUSE,
+            MaterialKind::Mirror => feature::MIRROR,
+            MaterialKind::Glass => feature::GLASS,
+            MaterialKind::Copper | MaterialKind::Gold => feature::CONDUCTOR,
+        };
+        let normal_maps = m.normal_texture.is_some() || m.clearcoat.factor > 0.0 && m.clearcoat.normal_texture.is_some();
+        let textures = slots(m, needs).iter().any(Option::is_some);
+        bits |= with(gltf && m.clearcoat.factor > 0.0, feature::COAT)
+            | with(gltf && m.sheen.color.max_element() > 0.0, feature::SHEEN)
+            | with(walls(m) == THIN_WALLS, feature::THIN_WALLS)
+            | with(walls(m) == VOLUME, feature::VOLUMES)
+            | with(absorption(m).iter().any(|&a| a > 0.0), feature::ABSORPTION)
+            | with(gltf && m.anisotropy.strength > 0.0, feature::ANISOTROPY)
+            | with(normal_maps, feature::NORMAL_MAPS | feature::BENT_NORMALS)
+            | with(textures, feature::TEXTURES)
+            | with(m.emissive.max_element() > 0.0, feature::EMISSION);
+    }
+    bits
 }
 
 impl ShadingRecord {
-    pub fn new(m: &Material, texture: impl Fn(Option<TextureSlot>) -> TextureUse) -> Self {
+    /// `indices`: those of [`indices_of_refraction`].
+    pub fn new(m: &Material, needs: Needs, indices: &[f32], texture: impl Fn(Option<TextureSlot>) -> TextureUse) -> Self {
         let metal = metal(m.kind);
-        let [metallic_roughness_texture, emission_texture] = slots(m).map(texture);
         // the colour of a metal is in its index of refraction already
         let tint = if metal.is_some() { [1.0; 3] } else { m.specular_color.to_array() };
         let specular_color = if m.kind == MaterialKind::MetallicRoughness { m.specular.color.to_array() } else { tint };
+        let (sin, cos) = m.anisotropy.rotation.sin_cos();
         Self {
             emission: m.emissive.to_array(),
             model: match m.kind {
                 _ if m.unlit => UNLIT,
-                MaterialKind::MetallicRoughness => METALLIC_ROUGHNESS,
+                MaterialKind::MetallicRoughness => GLTF,
                 MaterialKind::Matte => MATTE,
                 MaterialKind::Mirror => MIRROR,
                 MaterialKind::Glass => GLASS,
@@ -90,9 +233,19 @@ impl ShadingRecord {
             eta: metal.map_or([0.0; 3], |m| m[0]),
             k: metal.map_or([0.0; 3], |m| m[1]),
             transmitted: m.transmittance.to_array(),
-            metallic_roughness_texture,
-            emission_texture,
-            ..Self::default()
+            transmission: m.transmission.factor,
+            coat: m.clearcoat.factor,
+            coat_roughness: m.clearcoat.roughness,
+            sheen_color: m.sheen.color.to_array(),
+            sheen_roughness: m.sheen.roughness,
+            absorption: absorption(m),
+            walls: walls(m),
+            anisotropy: [m.anisotropy.strength * cos, m.anisotropy.strength * sin],
+            normal_scale: m.normal_scale,
+            coat_normal_scale: m.clearcoat.normal_scale,
+            glass_layer: indices.iter().position(|&ior| ior == m.ior).unwrap_or(0) as u32,
+            reserved: [0; 3],
+            uses: slots(m, needs).map(texture),
         }
     }
 }

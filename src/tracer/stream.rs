@@ -137,7 +137,14 @@ pub struct Stream {
 
 /// What a scene does not need is not compiled.
 pub(crate) fn scene_specialization(features: SceneFeatures) -> Specialization {
-    Specialization::default().set(0, features.alpha as u32).set(1, features.spheres as u32).set(2, features.single_level as u32)
+    let s = Specialization::default()
+        .set(0, features.alpha as u32)
+        .set(1, features.spheres as u32)
+        .set(2, features.single_level as u32);
+    match features.shading {
+        Some(bits) => s.set(9, bits),
+        None => s,
+    }
 }
 
 /// The fast kernel that traces rays one by one.

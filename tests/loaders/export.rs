@@ -61,6 +61,7 @@ fn scene() -> Scene {
             roughness: 0.2,
             roughness_texture: slot(1),
             normal_texture: slot(0),
+            normal_scale: 0.7,
         },
         sheen: Sheen { color: Vec3::new(0.1, 0.2, 0.3), color_texture: slot(0), roughness: 0.4, roughness_texture: slot(1) },
         transmission: Transmission {
@@ -107,7 +108,7 @@ fn scene() -> Scene {
         lights: vec![
             light("lamp", LightKind::Point),
             light("spot", LightKind::Spot { inner_angle: 0.1, outer_angle: 0.4 }),
-            light("sun", LightKind::Directional),
+            light("sun", LightKind::Directional { angle: 0.0 }),
         ],
         cameras: vec![
             Camera::look_at(DVec3::new(3.0, 2.0, 1.0), DVec3::ZERO, DVec3::Y, 0.7),
@@ -184,18 +185,17 @@ fn gltf_round_trips() {
 fn spheres_are_tessellated() {
     let folder = Folder::new();
     let sphere = Sphere { center: Vec3::new(1.0, 0.0, 0.0), radius: 2.0 };
+    let bulb = Sphere { center: Vec3::ZERO, radius: 0.5 };
     let scene = Scene {
-        meshes: vec![Mesh { name: "ball".into(), geometry: Geometry::Spheres(vec![sphere]), material: 0 }],
-        instances: vec![Instance { name: "ball".into(), mesh: 0, object_to_world: DAffine3::from_scale(DVec3::splat(2.0)) }],
-        materials: vec![Material::default()],
-        lights: vec![Light {
-            name: "bulb".into(),
-            kind: LightKind::Sphere { radius: 0.5 },
-            intensity: Vec3::new(10.0, 5.0, 1.0),
-            position: DVec3::new(0.0, 9.0, 0.0),
-            direction: DVec3::NEG_Z,
-            range: f64::INFINITY,
-        }],
+        meshes: vec![
+            Mesh { name: "ball".into(), geometry: Geometry::Spheres(vec![sphere]), material: 0 },
+            Mesh { name: "bulb".into(), geometry: Geometry::Spheres(vec![bulb]), material: 1 },
+        ],
+        instances: vec![
+            Instance { name: "ball".into(), mesh: 0, object_to_world: DAffine3::from_scale(DVec3::splat(2.0)) },
+            Instance { name: "bulb".into(), mesh: 1, object_to_world: DAffine3::from_translation(DVec3::new(0.0, 9.0, 0.0)) },
+        ],
+        materials: vec![Material::default(), Material { emissive: Vec3::new(10.0, 5.0, 1.0), ..Material::default() }],
         ..Scene::default()
     };
     let path = folder.path("a.glb");
@@ -204,8 +204,10 @@ fn spheres_are_tessellated() {
     assert_eq!((loaded.instances.len(), loaded.lights.len(), loaded.triangle_count()), (2, 0, 2 * 5120));
     assert_eq!(loaded.materials[loaded.meshes[1].material].emissive, Vec3::new(10.0, 5.0, 1.0));
     let (positions, indices) = mesh_bin(&scene).unwrap();
-    assert_eq!(indices.len(), 20480);
-    assert!(positions.iter().all(|p| (p.distance(Vec3::new(2.0, 0.0, 0.0)) - 4.0).abs() < 1e-5));
+    assert_eq!(indices.len(), 2 * 20480);
+    let ball = |p: &Vec3| (p.distance(Vec3::new(2.0, 0.0, 0.0)) - 4.0).abs() < 1e-5;
+    let bulb = |p: &Vec3| (p.distance(Vec3::new(0.0, 9.0, 0.0)) - 0.5).abs() < 1e-5;
+    assert!(positions.iter().all(|p| ball(p) || bulb(p)) && positions.iter().filter(|p| bulb(p)).count() * 2 == positions.len());
 }
 
 #[test]

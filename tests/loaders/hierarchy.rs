@@ -168,7 +168,7 @@ fn punctual_lights() {
     assert_eq!(spot.kind, LightKind::Spot { inner_angle: 0.1, outer_angle: 0.3 });
     // turned by -90 degrees about x: shines down
     assert!((spot.direction - DVec3::NEG_Y).length() < 1e-12, "{}", spot.direction);
-    assert_eq!((sun.kind, sun.direction, sun.range), (LightKind::Directional, DVec3::NEG_Z, f64::INFINITY));
+    assert_eq!((sun.kind, sun.direction, sun.range), (LightKind::Directional { angle: 0.0 }, DVec3::NEG_Z, f64::INFINITY));
     assert_eq!(sun.name, "sun");
 }
 

@@ -28,7 +28,7 @@ fn courtyard() {
     let scene = own("courtyard.gltf");
     assert_eq!((scene.triangle_count(), scene.instances.len()), (2 + 15 * 12, 16));
     assert_eq!((scene.cameras.len(), scene.lights.len(), scene.textures.len()), (2, 2, 1));
-    assert_eq!(scene.lights[0].kind, LightKind::Directional);
+    assert_eq!(scene.lights[0].kind, LightKind::Directional { angle: 0.0 });
 }
 
 #[test]

@@ -56,11 +56,11 @@ fn gpu_points_spots_and_directions() {
         let film = render(&tracer(&device, kind, &flat), &flat, &options(Strategy::Mis, 1)).image.film;
         assert!(film.mean.iter().all(|&m| m == 0.0), "{kind}: a spot that shines away");
     }
-    let sun = lit(light(LightKind::Directional, DVec3::ZERO, DVec3::new(-0.6, -0.8, 0.0), 3.0));
+    let sun = lit(light(LightKind::Directional { angle: 0.0 }, DVec3::ZERO, DVec3::new(-0.6, -0.8, 0.0), 3.0));
     holds(&device, "directional", &sun, &options(Strategy::Mis, 16), reflected * 3.0 * 0.8, 1e-3);
     // three lights at once: each is drawn as often as it is strong
     let mut all = lit(light(LightKind::Point, at, -at, 3.0));
-    all.lights.push(light(LightKind::Directional, DVec3::ZERO, DVec3::new(-0.6, -0.8, 0.0), 3.0));
+    all.lights.push(light(LightKind::Directional { angle: 0.0 }, DVec3::ZERO, DVec3::new(-0.6, -0.8, 0.0), 3.0));
     all.lights.push(light(spot, DVec3::Y, DVec3::NEG_Y, 5.0));
     holds(&device, "three lights", &all, &options(Strategy::Mis, 1024), reflected * (3.0 * 0.8 * 2.0 + 5.0), 1e-2);
 }
@@ -157,4 +157,55 @@ fn gpu_skies() {
     holds(&device, "map with a sun", &sun, &options(Strategy::Mis, 256), expected, 1e-2);
     holds(&device, "map with a sun", &sun, &options(Strategy::Light, 256), expected, 1e-2);
     holds(&device, "map with a sun", &sun, &options(Strategy::Bsdf, 1 << 12), expected, 3e-3);
+}
+
+/// More lights than a table chooses among: squares that tile a ceiling, in their closed form one rectangle; and with a sun besides.
+#[test]
+fn gpu_many_lights() {
+    let device = device();
+    let (n, side, height) = (24, 3.0, 1.0);
+    let step = side / f64::from(n);
+    let corner = |k: i32| -0.5 * side + step * f64::from(k);
+    let tiles = (0..n * n).map(|k| {
+        let at = DVec3::new(corner(k % n) + 0.5 * step, height, corner(k / n) + 0.5 * step);
+        shapes::rectangle(at, DVec3::X * step, DVec3::Z * step)
+    });
+    let ceiling = |strength: f32| {
+        let mut scene = floor_and(Vec::new());
+        for (k, tile) in tiles.clone().enumerate() {
+            scene.materials.push(emitter(strength));
+            scene.meshes.push(Mesh { name: format!("tile {k}"), geometry: tile, material: 1 + k });
+            scene.instances.push(Instance { name: format!("tile {k}"), mesh: 1 + k, object_to_world: DAffine3::IDENTITY });
+        }
+        scene
+    };
+    let (e, y) = (0.5 * side, height);
+    let whole = [(-e, -e), (e, -e), (e, e), (-e, e)].map(|(x, z)| DVec3::new(x, y, z));
+    let form = skylit::oracle::closed_form::polygon_form_factor(DVec3::ZERO, DVec3::Y, &whole).abs();
+    let scene = ceiling(4.0);
+    let flat = FlatScene::for_paths(&scene);
+    let options = options(Strategy::Mis, 256);
+    let result = render(&tracer(&device, TracerKind::Compute, &flat), &flat, &options);
+    assert!(result.light_tree && result.lights == 2 * (n * n) as u32, "{} lights", result.lights);
+    for strategy in [Strategy::Mis, Strategy::Light] {
+        holds(&device, "many lights", &scene, &PathOptions { strategy, max_depth: 1, ..options.clone() }, RHO * 4.0 * form, 2e-2);
+    }
+    let mut sunny = ceiling(4.0);
+    // below the ceiling's edge
+    let from = DVec3::new(0.95, -0.3122499, 0.0);
+    sunny.lights.push(light(LightKind::Directional { angle: 0.01 }, DVec3::ZERO, from, 3.0));
+    let sun = RHO / std::f64::consts::PI * 3.0 * 0.3122499;
+    holds(&device, "with a sun", &sunny, &PathOptions { max_depth: 1, ..options }, RHO * 4.0 * form + sun, 2e-2);
+}
+
+/// A sun with an extent lights what faces it as one without: by the cosine of its middle, as long as all of it is above the horizon.
+#[test]
+fn gpu_a_wide_sun() {
+    let device = device();
+    for angle in [0.0093, 0.5, 1.0] {
+        let mut scene = floor_and(Vec::new());
+        scene.lights.push(light(LightKind::Directional { angle }, DVec3::ZERO, DVec3::new(-0.6, -0.8, 0.0), 3.0));
+        let expected = RHO / std::f64::consts::PI * 3.0 * 0.8;
+        holds(&device, &format!("sun of {angle}"), &scene, &options(Strategy::Mis, 128), expected, 3e-3);
+    }
 }

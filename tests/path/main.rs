@@ -4,9 +4,11 @@
 #[path = "../common/mod.rs"]
 mod common;
 
+mod bsdf;
 mod camera;
 mod direct;
 mod furnace;
+mod materials;
 mod transport;
 
 use std::sync::Arc;
@@ -69,7 +71,20 @@ fn mean_of(film: &Film) -> (f64, f64) {
 /// Holds the mean of an image that should be `expected` all over against it, on every tracer; strategies that are for comparison on one:
 /// they are the same code on all. `precision`: the standard error, relative, that the image must reach to say anything.
 fn holds(device: &Arc<Device>, what: &str, scene: &Scene, options: &PathOptions, expected: f64, precision: f64) {
-    let flat = FlatScene::new(scene);
+    holds_but_for(2e-6, device, what, scene, options, expected, precision);
+}
+
+/// The same, with rounding of a size that is known.
+fn holds_but_for(
+    rounding: f64,
+    device: &Arc<Device>,
+    what: &str,
+    scene: &Scene,
+    options: &PathOptions,
+    expected: f64,
+    precision: f64,
+) {
+    let flat = FlatScene::for_paths(scene);
     let all = tracers(device).into_iter();
     for kind in all.filter(|&k| options.strategy == Strategy::Mis || k == TracerKind::Compute) {
         let result = render(&tracer(device, kind, &flat), &flat, options);
@@ -78,7 +93,7 @@ fn holds(device: &Arc<Device>, what: &str, scene: &Scene, options: &PathOptions,
         assert!(error <= precision * expected, "{what}, {kind}: {mean} +- {error} says nothing about {expected}");
         // rounding beside noise
         assert!(
-            (mean - expected).abs() <= 4.5 * error + 2e-6 * expected,
+            (mean - expected).abs() <= 4.5 * error + rounding * expected,
             "{what}, {kind}: {mean} +- {error} is not {expected}"
         );
     }

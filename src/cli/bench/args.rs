@@ -1,16 +1,12 @@
 //! What `skylit bench` takes.
 
-use std::path::PathBuf;
-use std::time::Duration;
-
 use clap::{Args, Subcommand, ValueHint};
 
 use super::ao::BenchAoArgs;
+use super::common::CommonArgs;
 use super::contestant::OWN;
 use super::streams::STREAMS;
-use crate::cli::args::{BuildChoice, parse_radius, parse_seconds};
-use crate::cli::console::Console;
-use crate::error::{Error, Result};
+use crate::cli::args::{BuildChoice, parse_radius};
 use crate::tracer::BuildOptions;
 
 /// Rays of a set, unless said otherwise: an image of 1280x720.
@@ -62,12 +58,6 @@ pub struct BenchRaysArgs {
     /// Length of ambient occlusion rays, world units [default: what suits the well-known scenes, else no limit]
     #[arg(long, value_name = "R", value_parser = parse_radius, allow_hyphen_values = true)]
     pub ao_radius: Option<f64>,
-    /// Stop after this time with what there is
-    #[arg(long, value_name = "SECONDS", value_parser = parse_seconds, allow_hyphen_values = true)]
-    pub time_limit: Option<Duration>,
-    /// Few rays, few repeats, small scenes: a check that everything runs
-    #[arg(long)]
-    pub quick: bool,
     /// Also compare all answers with those of the first kernel; one that rounding does not explain fails the run
     #[arg(long)]
     pub check: bool,
@@ -77,24 +67,9 @@ pub struct BenchRaysArgs {
     /// Peers to run beside: a file like benches/peers.toml, or `none` [default: benches/peers.toml, where it is there]
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub peers: Option<String>,
-    /// Vulkan device, by index or part of its name (`skylit doctor` lists them)
-    #[arg(long, value_name = "INDEX|NAME")]
-    pub device: Option<String>,
-    /// Run with the Vulkan validation layer (slower); a message of it fails the run
-    #[arg(long)]
-    pub validation: bool,
-    /// Print one JSON record on stdout instead of text; with =FILE, write it there besides
-    #[arg(long, value_name = "FILE", num_args = 0..=1, require_equals = true, value_hint = ValueHint::FilePath)]
-    pub json: Option<Option<PathBuf>>,
-    /// Also write a table, one row a result
-    #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
-    pub csv: Option<PathBuf>,
-    /// Also draw rates against the number of triangles
-    #[arg(long, value_name = "FILE.png", value_hint = ValueHint::FilePath)]
-    pub plot: Option<PathBuf>,
-    /// Print nothing but errors
-    #[arg(long, short)]
-    pub quiet: bool,
+    /// What every benchmark takes
+    #[command(flatten)]
+    pub common: CommonArgs,
 }
 
 fn kernel_names() -> clap::builder::PossibleValuesParser {
@@ -106,31 +81,6 @@ fn stream_names() -> clap::builder::PossibleValuesParser {
 }
 
 impl BenchRaysArgs {
-    /// Where to say things.
-    pub fn console(&self) -> Console {
-        Console { json: self.json == Some(None), quiet: self.quiet }
-    }
-
-    /// File for the record.
-    pub fn json_file(&self) -> Option<&PathBuf> {
-        self.json.as_ref()?.as_ref()
-    }
-
-    /// Every file that will be written.
-    pub fn outputs(&self) -> impl Iterator<Item = &PathBuf> {
-        self.json_file().into_iter().chain(&self.csv).chain(&self.plot)
-    }
-
-    /// Checks what clap cannot.
-    pub fn check(&self) -> Result<()> {
-        match &self.plot {
-            Some(p) if p.extension().is_none_or(|e| !e.eq_ignore_ascii_case("png")) => {
-                Err(Error::Usage(format!("--plot {}: the name must end in .png", p.display())))
-            }
-            _ => Ok(()),
-        }
-    }
-
     /// How our own hierarchies are built.
     pub fn build_options(&self) -> BuildOptions {
         let [width, height] = self.size();
@@ -141,12 +91,12 @@ impl BenchRaysArgs {
 
     /// Timed repeats.
     pub fn repeats(&self) -> u32 {
-        self.repeats.unwrap_or(if self.quick { QUICK_REPEATS } else { DEFAULT_REPEATS })
+        self.common.number(self.repeats, DEFAULT_REPEATS, QUICK_REPEATS)
     }
 
     /// Pixels of the image whose rays are traced: 16:9, multiples of 8.
     pub fn size(&self) -> [u32; 2] {
-        let rays = f64::from(self.rays.unwrap_or(if self.quick { QUICK_RAYS } else { DEFAULT_RAYS }));
+        let rays = f64::from(self.common.number(self.rays, DEFAULT_RAYS, QUICK_RAYS));
         let side = |x: f64| ((x / 8.0).round() as u32).max(1) * 8;
         let width = side((rays * 16.0 / 9.0).sqrt());
         // exactly as many as asked for where 8 divides them so
@@ -194,9 +144,9 @@ mod tests {
 
     #[test]
     fn json_with_and_without_a_file() {
-        assert!(parse(&["--json"]).console().json);
+        assert!(parse(&["--json"]).common.console().json);
         let to_file = parse(&["--json=a.json", "scene"]);
-        assert!(!to_file.console().json && to_file.json_file().is_some() && to_file.scenes == ["scene"]);
+        assert!(!to_file.common.console().json && to_file.common.json_file().is_some() && to_file.scenes == ["scene"]);
         // a scene after --json is a scene
         assert_eq!(parse(&["--json", "scene"]).scenes, ["scene"]);
     }

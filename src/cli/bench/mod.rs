@@ -3,6 +3,7 @@
 
 mod ao;
 mod args;
+mod common;
 mod contestant;
 mod peer;
 mod peers_file;

@@ -33,18 +33,18 @@ use crate::tracer::visits::VisitCounter;
 /// Measures, shows, writes.
 pub fn run(args: &BenchRaysArgs) -> Result<(), Failure> {
     let start = Instant::now();
-    args.check()?;
-    for path in args.outputs() {
+    args.common.check()?;
+    for path in args.common.outputs() {
         output::check_writable(path)?;
     }
     interrupt::install();
-    let console = args.console();
+    let console = args.common.console();
     let (scenes, notes) = scenes::choose(args);
     // before anything that takes long: a broken peers file, a scene that does not exist
     let specs = peer_specs(args)?;
     scenes.iter().try_for_each(|s| scenes::check_there(s))?;
     let device =
-        Device::open(&crate::gpu::Options { device: args.device.clone(), validation: args.validation, ..Default::default() })?;
+        Device::open(&crate::gpu::Options { device: args.common.device.clone(), validation: args.common.validation, ..Default::default() })?;
     let mut bench = Bench {
         args,
         device: &device,
@@ -96,16 +96,16 @@ fn peer_specs(args: &BenchRaysArgs) -> Result<Result<Vec<peers_file::PeerSpec>, 
 
 /// Writes the files that were asked for; one that cannot be written does not stop the others.
 fn write(args: &BenchRaysArgs, out: &RayBenchmark) -> Result<()> {
-    let json = args.json_file().map_or(Ok(()), |path| {
+    let json = args.common.json_file().map_or(Ok(()), |path| {
         let text = serde_json::to_string_pretty(out)
             .map_err(|e| Error::CheckFailed(format!("cannot express the result as JSON: {e}")))?;
         output::write_atomically(path, |f| f.write_all(text.as_bytes()).and_then(|()| f.write_all(b"\n")))
     });
-    let csv = args
+    let csv = args.common
         .csv
         .as_ref()
         .map_or(Ok(()), |path| output::write_atomically(path, |f| out.write_csv(f).map_err(std::io::Error::other)));
-    let plot = args.plot.as_ref().map_or(Ok(()), |path| {
+    let plot = args.common.plot.as_ref().map_or(Ok(()), |path| {
         let picture = plot::draw(out)?;
         output::png::write_rgb(path, &picture.rgb, picture.width, picture.height)
     });
@@ -235,7 +235,7 @@ impl Bench<'_> {
     }
 
     fn is_late(&self) -> bool {
-        self.args.time_limit.is_some_and(|limit| self.start.elapsed() >= limit)
+        self.args.common.time_limit.is_some_and(|limit| self.start.elapsed() >= limit)
     }
 
     /// Starts the peers; those that do not are named and left out.

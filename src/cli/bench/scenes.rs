@@ -78,7 +78,7 @@ pub fn choose(args: &BenchRaysArgs) -> (Vec<String>, Vec<String>) {
     if !args.scenes.is_empty() {
         return (args.scenes.clone(), Vec::new());
     }
-    if args.quick {
+    if args.common.quick {
         return (QUICK.map(str::to_owned).to_vec(), Vec::new());
     }
     let folder = folder();

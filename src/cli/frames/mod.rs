@@ -79,7 +79,7 @@ pub fn run(args: &RenderArgs, start: Instant) -> Result<(), Failure> {
     let needs = Needs {
         normals: settings.hemisphere == Hemisphere::Shading || args.wants(Aov::Ns),
         albedo: args.wants(Aov::Albedo),
-        shading: false,
+        ..Default::default()
     };
     let warm_up = warm_up(args, &settings);
     let frames = u64::from(range.end - range.first) + u64::from(warm_up);

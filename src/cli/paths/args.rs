@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum, ValueHint};
 use glam::{DMat3, Vec3};
 
+use super::lights::LightSpec;
 use crate::cli::args::{Aov, Integrator, RenderArgs, parse_number, parse_vector, parse_where};
 use crate::error::{Error, Result};
 use crate::output::tone_map::ToneMap;
@@ -88,7 +89,7 @@ impl From<ToneMapChoice> for ToneMap {
 
 /// Paths.
 #[derive(Clone, Debug, Args)]
-#[command(next_help_heading = "Paths (--integrator path, direct, ao-sky)")]
+#[command(next_help_heading = "Paths (--integrator path, direct, ao-sky; views)")]
 pub struct PathArgs {
     /// Bounces at most: 0 shows what emits, 1 adds direct light [default: the scene's, or no limit; direct: 1]
     #[arg(long, value_name = "N")]
@@ -111,6 +112,13 @@ pub struct PathArgs {
     /// Multiply the environment by this
     #[arg(long, value_name = "X", value_parser = parse_scale, requires = "environment", allow_hyphen_values = true)]
     pub environment_scale: Option<f64>,
+    /// Give back what microfacets lose that reflect light only once
+    #[arg(long)]
+    pub energy_compensation: bool,
+    /// Add a light: point, spot, sun, sphere, rectangle or disk, then key=value: position, direction (where it shines), radius, size=W,H,
+    /// intensity (cd), irradiance (lux) or radiance, color=R,G,B or temperature=K, and outer, inner, angle in degrees. May be repeated
+    #[arg(long, value_name = "SPEC", value_parser = super::lights::parse)]
+    pub light: Vec<LightSpec>,
     /// Albedo of all surfaces with --integrator ao-sky [default: 0.5]
     #[arg(long, value_name = "X", value_parser = parse_albedo, allow_hyphen_values = true)]
     pub sky_albedo: Option<f64>,
@@ -146,12 +154,16 @@ fn parse_albedo(text: &str) -> std::result::Result<f64, String> {
 impl PathArgs {
     /// Checks what concerns more than one option: none may be given that would have no effect.
     pub fn check(&self, args: &RenderArgs) -> Result<()> {
-        let paths = [
+        let of_light = [
             (self.max_depth.is_some(), "--max-depth"),
             (self.rr_depth.is_some(), "--rr-depth"),
             (self.firefly_clamp.is_some(), "--firefly-clamp"),
             (self.sampling.is_some(), "--sampling"),
+            (self.energy_compensation, "--energy-compensation"),
             (self.environment.is_some(), "--environment"),
+            (!self.light.is_empty(), "--light"),
+        ];
+        let of_images = [
             (self.exposure.is_some(), "--exposure"),
             (self.tone_map.is_some(), "--tone-map"),
             (self.pixel_filter.is_some(), "--pixel-filter"),
@@ -160,7 +172,7 @@ impl PathArgs {
         let wrong = |what: String| Err(Error::Usage(what));
         match args.integrator {
             Integrator::Ao => {
-                if let Some((_, option)) = paths.iter().find(|o| o.0) {
+                if let Some((_, option)) = of_light.iter().chain(&of_images).find(|o| o.0) {
                     return wrong(format!("{option} is about paths: add --integrator path"));
                 }
             }
@@ -178,9 +190,15 @@ impl PathArgs {
                 if integrator == Integrator::Direct && self.max_depth.is_some() {
                     return wrong("--max-depth: --integrator direct has one bounce; use --integrator path".into());
                 }
-                if integrator == Integrator::AoSky && self.environment.is_some() {
-                    return wrong("--environment: the sky of --integrator ao-sky is white".into());
+                if integrator == Integrator::AoSky && (self.environment.is_some() || !self.light.is_empty()) {
+                    return wrong("--environment, --light: nothing but a white sky shines in --integrator ao-sky".into());
                 }
+            }
+        }
+        // views know nothing of light
+        if super::view(args.integrator).is_some() {
+            if let Some((_, option)) = of_light.iter().find(|o| o.0) {
+                return wrong(format!("{option}: --integrator {} shows surfaces, not light", args.integrator.name()));
             }
         }
         if self.sky_albedo.is_some() && args.integrator != Integrator::AoSky {

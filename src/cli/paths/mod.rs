@@ -1,6 +1,7 @@
-//! `skylit render --integrator path`, `direct` and `ao-sky`.
+//! `skylit render --integrator path`, `direct`, `ao-sky`, and views of surfaces.
 
 pub mod args;
+mod lights;
 mod report;
 
 use std::sync::Arc;
@@ -20,7 +21,7 @@ use crate::render::aov;
 use crate::render::camera::CameraRecord;
 use crate::render::cover::Cover;
 use crate::render::film::Film;
-use crate::render::path::{self, Lens, MOST_DEPTH, PathOptions};
+use crate::render::path::{self, Lens, MOST_DEPTH, PathOptions, View};
 use crate::scene::flatten::FlatScene;
 use crate::scene::{Camera, Environment, Projection};
 use crate::tracer::{Needs, Tracer};
@@ -44,23 +45,31 @@ pub fn run(args: &RenderArgs, start: Instant) -> Result<(), Failure> {
     if let Some(environment) = args.paths.environment()? {
         scene.environment = environment;
     }
+    args.paths.light.iter().for_each(|l| l.add(&mut scene));
     interrupt::check()?;
 
     let size = args.size.or(scene.hints.size).unwrap_or(DEFAULT_SIZE);
     output::check_size(size[0], size[1])?;
     let aspect = f64::from(size[0]) / f64::from(size[1]);
     let camera = choose_camera(args, &scene, aspect)?;
-    let flat = FlatScene::new(&scene);
+    let flat = FlatScene::for_paths(&scene);
     let record = CameraRecord::new(&camera, flat.origin, aspect);
     let (kind, why, compute) = args.device.choose(&device.info)?;
     let mut options = options(args, &flat, &camera, size)?;
     let mut build = args.device.build_options(RAYS_OF_A_PATH * options.spp as u64 * size[0] as u64 * size[1] as u64);
     build.streams.extend(path::streams());
-    let needs = Needs { shading: true, ..Default::default() };
+    let needs = Needs {
+        shading: true,
+        white: options.white_sky.is_some(),
+        compensation: args.paths.energy_compensation,
+        baked_occlusion: options.view == Some(View::BakedOcclusion),
+        ..Default::default()
+    };
     let tracer = Tracer::with_build(&device, kind, &flat, needs, compute, &build)?;
     build.take_warnings().iter().for_each(|w| warnings.add(w));
     // what surrounds the scene shines where nothing is; lenses and wide filters look beside the pixel
-    if options.white_sky.is_none() && scene.environment == Environment::Black && options.is_sharp() {
+    let black = options.view.is_some() || options.white_sky.is_none() && scene.environment == Environment::Black;
+    if black && options.is_sharp() {
         options.cover = Cover::new(&flat, &record, size, options.spp).map(Arc::new);
     }
 
@@ -81,7 +90,7 @@ pub fn run(args: &RenderArgs, start: Instant) -> Result<(), Failure> {
             u64::from(result.image.spp) * u64::from(size[0]) * u64::from(size[1])
         ));
     }
-    if options.white_sky.is_none() && scene.environment == Environment::Black && scene.lights.is_empty() && !emits(&flat) {
+    if options.view.is_none() && options.white_sky.is_none() && scene.environment == Environment::Black && scene.lights.is_empty() && !emits(&flat) {
         warnings.add("the scene has no light, and the image is black: give --environment FILE or R,G,B");
     }
 
@@ -97,6 +106,7 @@ pub fn run(args: &RenderArgs, start: Instant) -> Result<(), Failure> {
         result: &result,
         stats: tracer.stats(),
         features: tracer.features().explain(&flat),
+        tracer_features: tracer.features(),
         warnings: warnings.list,
         seconds,
     };
@@ -155,14 +165,45 @@ fn options(args: &RenderArgs, flat: &FlatScene, camera: &Camera, size: [u32; 2])
         rr_depth: args.paths.rr_depth.unwrap_or(PathOptions::default().rr_depth),
         firefly_clamp: args.paths.firefly_clamp.map_or(f32::INFINITY, |c| c as f32),
         strategy: args.paths.sampling.map(Into::into).unwrap_or_default(),
+        view: view(args.integrator),
         white_sky: (args.integrator == Integrator::AoSky).then(|| args.paths.sky_albedo.unwrap_or(SKY_ALBEDO) as f32),
         time_limit: args.time_limit,
         cover: None,
     })
 }
 
-/// What a picture of 8 bits shows.
+/// What is seen instead of light.
+fn view(integrator: Integrator) -> Option<View> {
+    match integrator {
+        Integrator::Normals => Some(View::Normals),
+        Integrator::Albedo => Some(View::Albedo),
+        Integrator::Depth => Some(View::Depth),
+        Integrator::BakedOcclusion => Some(View::BakedOcclusion),
+        Integrator::Ao | Integrator::Path | Integrator::Direct | Integrator::AoSky => None,
+    }
+}
+
+/// What a picture of 8 bits shows: light; of views, normals about the middle of the range, and depths over the greatest.
 fn picture(image: &Image, args: &RenderArgs) -> Image {
+    let shown = |f: &dyn Fn(f32) -> f32| {
+        let mut out = image.clone();
+        out.channels.retain(|c| ["R", "G", "B"].contains(&c.name.as_str()));
+        for channel in &mut out.channels {
+            if let Samples::F32(values) = &mut channel.samples {
+                values.iter_mut().for_each(|v| *v = png::srgb_decode(f(*v)));
+            }
+        }
+        out
+    };
+    match view(args.integrator) {
+        Some(View::Normals) => return shown(&|n| 0.5 * n + 0.5),
+        Some(View::Depth) => {
+            let greatest = image.f32("R").map_or(0.0, |d| d.iter().copied().fold(0.0, f32::max)).max(f32::MIN_POSITIVE);
+            return shown(&|d| d / greatest);
+        }
+        Some(View::BakedOcclusion) => return shown(&|o| o),
+        Some(View::Albedo) | None => (),
+    }
     let map = args.paths.tone_map.map(ToneMap::from).unwrap_or_default();
     map.apply(image, args.paths.exposure.unwrap_or(0.0) as f32)
 }

@@ -6,7 +6,9 @@ use crate::cli::args::RenderArgs;
 use crate::cli::report::{Seconds, camera_text};
 use crate::gpu::DeviceInfo;
 use crate::render::path::{MOST_DEPTH, PathOptions, PathResult, PixelFilter};
+use crate::scene::features::SceneFeatures;
 use crate::scene::{Camera, Environment, Scene};
+use crate::tracer::shading::feature;
 use crate::tracer::{BuildStats, TracerKind};
 
 /// All there is to say about it.
@@ -23,6 +25,7 @@ pub struct Report<'a> {
     pub stats: BuildStats,
     /// What the scene made skip.
     pub features: Vec<String>,
+    pub tracer_features: SceneFeatures,
     pub warnings: Vec<String>,
     pub seconds: Seconds,
 }
@@ -37,6 +40,7 @@ impl Report<'_> {
 
     fn environment(&self) -> String {
         match &self.scene.environment {
+            _ if self.options.view.is_some() => "none".into(),
             _ if self.options.white_sky.is_some() => "white".into(),
             Environment::Black => "black".into(),
             Environment::Uniform(c) => format!("{}, {}, {}", c.x, c.y, c.z),
@@ -70,6 +74,9 @@ impl Report<'_> {
         if let Some(lens) = o.lens {
             out.push(("lens", format!("radius {}, focus {}", lens.radius, lens.focus)));
         }
+        if self.args.paths.energy_compensation {
+            out.push(("energy_compensation", "on".into()));
+        }
         if let Some(albedo) = o.white_sky {
             out.push(("sky_albedo", albedo.to_string()));
         }
@@ -91,12 +98,13 @@ impl Report<'_> {
         let per_second = |n: u64| n as f64 / s.trace.max(1e-9) / 1e6;
         let mut lines = vec![
             format!(
-                "{}: {width}x{height}, {} spp, {}, tracer {} on {}; mean radiance {mean:.5} +- {error:.5}",
+                "{}: {width}x{height}, {} spp, {}, tracer {} on {}; mean {}{mean:.5} +- {error:.5}",
                 self.args.output.iter().map(|p| p.display().to_string()).collect::<Vec<_>>().join(", "),
                 image.spp,
                 self.args.integrator.name(),
                 self.tracer,
                 self.device.name,
+                if self.options.view.is_some() { "" } else { "radiance " },
             ),
             format!(
                 "{:.2} Mpaths/s, {:.2} Mrays/s; a path has {:.2} rays, {:.2} of them to lights; the longest {} bounces (limit {})",
@@ -125,12 +133,24 @@ impl Report<'_> {
         lines
     }
 
+    /// What of materials is compiled, and what is not.
+    fn shading(&self) -> Option<String> {
+        let asked = self.tracer_features.shading?;
+        let list = |on: bool| {
+            let names = feature::NAMES.iter().filter(|(bit, _)| (asked & bit != 0) == on).map(|f| f.1);
+            names.collect::<Vec<_>>().join(", ")
+        };
+        Some(format!("materials ask for {}; not compiled: {}", list(true), list(false)))
+    }
+
     fn explanations(&self) -> Vec<String> {
         let image = &self.result.image;
         let mut lines = vec![format!("tracer {}: {}", self.tracer, self.why)];
         lines.extend(self.features.iter().cloned());
+        lines.extend(self.shading());
         lines.push(match self.result.lights {
             0 => "no light samples: there is nothing to draw them from, or --sampling asks for none".into(),
+            n if self.result.light_tree => format!("{n} lights, drawn by what they may do at a point, from a tree"),
             n => format!("{n} lights, drawn by their power"),
         });
         let all = image.primary_rays + image.skipped_primary_rays;
@@ -166,6 +186,7 @@ impl Report<'_> {
             "firefly_clamp": if o.firefly_clamp.is_finite() { json!(o.firefly_clamp) } else { Value::Null },
             "sampling": o.strategy,
             "sky_albedo": o.white_sky,
+            "energy_compensation": self.args.paths.energy_compensation,
             "tracer": self.tracer.name(),
             "tracer_reason": self.why,
             "device": self.device.name,

@@ -6,6 +6,7 @@
 //! empty. Every path writes to places of its own only, so images do not depend on the order in which rays arrive.
 
 mod environment;
+mod light_tree;
 mod lights;
 mod params;
 
@@ -81,6 +82,33 @@ pub enum PixelFilter {
     BlackmanHarris,
 }
 
+/// What a camera ray sees of a surface, instead of light.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum View {
+    /// Unit shading normals, world, on the viewer's side; normal maps included.
+    Normals,
+    /// Base colours, linear; of mirrors, glass and measured metals what they reflect at normal incidence.
+    Albedo,
+    /// Distance along the ray, world units.
+    Depth,
+    /// Occlusion that is baked into the material's texture; 1 where there is none.
+    BakedOcclusion,
+}
+
+impl View {
+    /// As shaders/path/view.glsl numbers them.
+    fn number(view: Option<Self>) -> u32 {
+        match view {
+            None => 0,
+            Some(View::Normals) => 1,
+            Some(View::Albedo) => 2,
+            Some(View::Depth) => 3,
+            Some(View::BakedOcclusion) => 4,
+        }
+    }
+}
+
 /// A thin lens.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Lens {
@@ -110,6 +138,8 @@ pub struct PathOptions {
     /// Every surface is diffuse and of this grey, and nothing shines but a white sky: the rendering equation that ambient occlusion
     /// approximates.
     pub white_sky: Option<f32>,
+    /// No light, but what camera rays see. Misses count 0.
+    pub view: Option<View>,
     /// What a pixel is the mean of.
     pub pixel_filter: PixelFilter,
     /// A perspective camera's; without it a pinhole.
@@ -131,6 +161,7 @@ impl Default for PathOptions {
             firefly_clamp: f32::INFINITY,
             strategy: Strategy::Mis,
             white_sky: None,
+            view: None,
             pixel_filter: PixelFilter::Box,
             lens: None,
             time_limit: None,
@@ -159,6 +190,8 @@ pub struct PathResult {
     pub longest_path: u32,
     /// Lights that light samples are drawn from.
     pub lights: u32,
+    /// They are so many that a tree chooses among them.
+    pub light_tree: bool,
 }
 
 /// The streams that [`render`] traces.
@@ -186,8 +219,13 @@ pub fn render(
         cover: options.cover.as_deref(),
     };
     let image = accumulate(tracer, camera, &plan, &BlockParams::default(), &mut estimator, control)?;
-    let Paths { bounce_rays, shadow_rays, longest_path, lights, .. } = estimator;
-    Ok(PathResult { image, bounce_rays, shadow_rays, longest_path, lights })
+    let Paths { bounce_rays, shadow_rays, longest_path, lights, light_tree, .. } = estimator;
+    Ok(PathResult { image, bounce_rays, shadow_rays, longest_path, lights, light_tree })
+}
+
+/// Bounces at most.
+fn most_depth(options: &PathOptions) -> u32 {
+    if options.view.is_some() { 0 } else { options.max_depth.min(MOST_DEPTH) }
 }
 
 struct Paths {
@@ -209,6 +247,7 @@ struct Paths {
     shadow_rays: u64,
     longest_path: u32,
     lights: u32,
+    light_tree: bool,
     _buffers: Vec<Buffer>,
     _environment: DeviceEnvironment,
 }
@@ -238,7 +277,12 @@ impl Paths {
         let base = PathParams {
             map: environment.map,
             environment: environment.factor.to_array(),
-            light_count: lights.records.len() as u32,
+            light_count: lights.records.len() as u32 - lights.first,
+            light_first: lights.first,
+            light_tree: match lights.tree.is_empty() {
+                true => 0,
+                false => keep(Buffer::from_slice(device, "tree of lights", &lights.tree)?),
+            },
             lights: if lights.records.is_empty() { 0 } else { keep(Buffer::from_slice(device, "lights", &lights.records)?) },
             light_of: match lights.light_of.is_empty() {
                 true => 0,
@@ -248,7 +292,8 @@ impl Paths {
             radiance: keep(radiance),
             contributions: keep(contributions),
             shadow: shadow_queue.record(),
-            max_depth: options.max_depth.min(MOST_DEPTH),
+            max_depth: most_depth(options),
+            view: View::number(options.view),
             rr_depth: options.rr_depth,
             clamp_to: options.firefly_clamp,
             white_sky: options.white_sky.is_some().into(),
@@ -278,12 +323,13 @@ impl Paths {
             block_params,
             path_params: addresses,
             counts: Buffer::new(device, "numbers of rays", 4 * 2 * u64::from(BOUNCES + 1), Memory::Readback)?,
-            max_depth: options.max_depth.min(MOST_DEPTH),
-            draws_lights: options.strategy.draws_lights() && !lights.records.is_empty(),
+            max_depth: most_depth(options),
+            draws_lights: options.strategy.draws_lights() && !lights.records.is_empty() && options.view.is_none(),
             bounce_rays: 0,
             shadow_rays: 0,
             longest_path: 0,
-            lights: if options.strategy.draws_lights() { lights.records.len() as u32 } else { 0 },
+            lights: if options.strategy.draws_lights() { lights.count() } else { 0 },
+            light_tree: !lights.tree.is_empty(),
             _buffers: buffers,
             _environment: environment,
         })

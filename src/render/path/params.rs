@@ -46,5 +46,8 @@ pub(super) struct PathParams {
     pub pixel_filter: u32,
     pub lens_radius: f32,
     pub focus: f32,
-    pub reserved: [u32; 2],
+    pub view: u32,
+    pub light_first: u32,
+    pub light_tree: u64,
+    pub reserved: u64,
 }

@@ -7,14 +7,14 @@ use std::io::Cursor;
 use std::path::Path;
 use std::sync::Arc;
 
-use glam::{DAffine3, DQuat, DVec3, Vec3};
+use glam::{DAffine3, DQuat, DVec3};
 use serde_json::{Value, json};
 
 use super::{Written, icosphere, material, write_buffered};
 use crate::error::{Error, Result};
 use crate::scene::animation::Shape;
 use crate::scene::{
-    Camera, Filter, Geometry, Light, LightKind, Material, Projection, Scene, Sphere, Texture, TriangleMesh, Wrap,
+    Camera, Filter, Geometry, Light, LightKind, Projection, Scene, Sphere, Texture, TriangleMesh, Wrap,
 };
 
 /// Writes `scene` as glTF 2.0: one `.glb` file with everything in it, or a `.gltf` with a `.bin` and PNG files of the same
@@ -91,17 +91,16 @@ struct Writer {
 impl Writer {
     fn scene(&mut self, scene: &Scene, path: &Path) -> Result<(), String> {
         let mut used = BTreeSet::new();
-        let mut materials: Vec<Value> = scene.materials.iter().map(|m| material::material(m, &mut used)).collect();
+        let materials: Vec<Value> = scene.materials.iter().map(|m| material::material(m, &mut used)).collect();
         let Textures { textures, images, samplers } = self.textures(&scene.textures, path)?;
         let spheres = scene.meshes.iter().map(|m| match &m.geometry {
             Geometry::Triangles(_) => 0,
             Geometry::Spheres(s) => s.len() as u64,
         });
-        let lamps = scene.lights.iter().filter(|l| matches!(l.kind, LightKind::Sphere { .. })).count();
-        let spheres = spheres.sum::<u64>() + lamps as u64;
+        let spheres = spheres.sum::<u64>();
         let level = icosphere::level(spheres).min(4);
         let each = 20u64 << (2 * level);
-        self.written.triangles = scene.triangle_count() + (scene.sphere_count() + lamps as u64) * each;
+        self.written.triangles = scene.triangle_count() + scene.sphere_count() * each;
         if spheres > 0 {
             self.written.warnings.push(format!("{spheres} spheres become {each} triangles each: glTF has no spheres"));
         }
@@ -136,21 +135,12 @@ impl Writer {
         let free = nodes.len();
         let mut lights = Vec::new();
         for light in &scene.lights {
-            match light.kind {
-                LightKind::Sphere { radius } => {
-                    let black =
-                        Material { base_color: Vec3::ZERO.extend(1.0), emissive: light.intensity, ..Default::default() };
-                    materials.push(material::material(&black, &mut used));
-                    let unit = tessellate(&[Sphere { center: Vec3::ZERO, radius: 1.0 }], level);
-                    meshes.push(self.mesh(&light.name, &unit, materials.len() - 1));
-                    let to_world = DAffine3::from_translation(light.position) * DAffine3::from_scale(DVec3::splat(radius));
-                    nodes.push(with_mesh(&light.name, meshes.len() - 1, &to_world));
-                }
-                _ => {
-                    nodes.push(light_node(light, lights.len()));
-                    lights.push(punctual(light));
-                }
+            if matches!(light.kind, LightKind::Directional { angle } if angle > 0.0) {
+                let name = &light.name;
+                self.written.warnings.push(format!("light '{name}' becomes a direction: glTF's have no extent"));
             }
+            nodes.push(light_node(light, lights.len()));
+            lights.push(punctual(light));
         }
         let cameras: Vec<Value> = scene.cameras.iter().map(camera).collect();
         nodes.extend(scene.cameras.iter().enumerate().filter_map(|(i, c)| {
@@ -421,12 +411,12 @@ fn punctual(light: &Light) -> Value {
         out["range"] = json!(light.range);
     }
     match light.kind {
-        LightKind::Directional => out["type"] = json!("directional"),
+        LightKind::Directional { .. } => out["type"] = json!("directional"),
         LightKind::Spot { inner_angle, outer_angle } => {
             out["type"] = json!("spot");
             out["spot"] = json!({ "innerConeAngle": inner_angle, "outerConeAngle": outer_angle });
         }
-        LightKind::Point | LightKind::Sphere { .. } => out["type"] = json!("point"),
+        LightKind::Point => out["type"] = json!("point"),
     }
     out
 }

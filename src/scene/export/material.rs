@@ -96,6 +96,9 @@ impl Writer<'_> {
             self.texture(&mut e, "clearcoatTexture", &coat.texture);
             self.texture(&mut e, "clearcoatRoughnessTexture", &coat.roughness_texture);
             self.texture(&mut e, "clearcoatNormalTexture", &coat.normal_texture);
+            if coat.normal_texture.is_some() && coat.normal_scale != 1.0 {
+                e["clearcoatNormalTexture"]["scale"] = json!(coat.normal_scale);
+            }
             self.extension("KHR_materials_clearcoat", e);
         }
         let sheen = &m.sheen;

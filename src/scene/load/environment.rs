@@ -1,4 +1,6 @@
-//! Environments from images: Radiance HDR and OpenEXR, in equirectangular projection.
+//! Environments from images: Radiance HDR and OpenEXR in equirectangular projection, or the six faces of a cube.
+
+mod cube;
 
 use std::path::Path;
 
@@ -12,29 +14,43 @@ use crate::scene::EnvironmentMap;
 /// Largest width and height.
 const MAX_SIDE: u32 = 16384;
 
-/// Reads an environment. Colours are linear with sRGB primaries; values that are negative count as 0.
+/// Rows from the top, linear.
+struct Pixels {
+    width: u32,
+    height: u32,
+    radiance: Vec<Vec3>,
+}
+
+/// Reads an environment: an equirectangular image, or a folder that holds the faces of a cube as `px`, `nx`, `py`, `ny`, `pz`, `nz` (.hdr, .exr, .png, .jpg). Colours
+/// are linear with sRGB primaries (those of .png and .jpg are decoded); values that are negative count as 0.
 ///
 /// # Errors
 /// [`Error::Input`] naming the file when it cannot be read or decoded, or holds values that are not finite.
 pub fn load_environment(path: &Path) -> Result<EnvironmentMap> {
-    let bad = |what: String| Error::input(path, what);
-    let exr = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("exr"));
-    let (width, height, radiance) = if exr { read_exr(path)? } else { read_hdr(path)? };
-    if let Some(k) = radiance.iter().position(|c| !c.is_finite()) {
-        let (x, y) = (k as u32 % width, k as u32 / width);
-        return Err(bad(format!("pixel {x}, {y} is not finite: an environment must be")));
-    }
+    let Pixels { width, height, radiance } = if path.is_dir() { cube::read(path)? } else { read(path)? };
     Ok(EnvironmentMap {
         name: path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default(),
         width,
         height,
-        radiance: radiance.into_iter().map(|c| c.max(Vec3::ZERO)).collect(),
+        radiance: radiance.into(),
         factor: Vec3::ONE,
         to_map: DMat3::IDENTITY,
     })
 }
 
-fn read_hdr(path: &Path) -> Result<(u32, u32, Vec<Vec3>)> {
+/// One image.
+fn read(path: &Path) -> Result<Pixels> {
+    let is = |extension: &str| path.extension().is_some_and(|e| e.eq_ignore_ascii_case(extension));
+    let mut pixels = if is("exr") { read_exr(path)? } else { read_hdr(path)? };
+    if let Some(k) = pixels.radiance.iter().position(|c| !c.is_finite()) {
+        let (x, y) = (k as u32 % pixels.width, k as u32 / pixels.width);
+        return Err(Error::input(path, format!("pixel {x}, {y} is not finite: an environment must be")));
+    }
+    pixels.radiance.iter_mut().for_each(|c| *c = c.max(Vec3::ZERO));
+    Ok(pixels)
+}
+
+fn read_hdr(path: &Path) -> Result<Pixels> {
     let bytes = std::fs::read(path).map_err(|e| Error::read(path, &e))?;
     let bad =
         |e: image::ImageError| Error::input(path, format!("cannot be decoded as Radiance HDR (.exr and .hdr are read): {e}"));
@@ -44,10 +60,11 @@ fn read_hdr(path: &Path) -> Result<(u32, u32, Vec<Vec3>)> {
     limits.max_alloc = Some(4 << 30);
     reader.limits(limits);
     let image = reader.decode().map_err(bad)?.into_rgb32f();
-    Ok((image.width(), image.height(), image.pixels().map(|p| Vec3::from_array(p.0)).collect()))
+    let radiance = image.pixels().map(|p| Vec3::from_array(p.0)).collect();
+    Ok(Pixels { width: image.width(), height: image.height(), radiance })
 }
 
-fn read_exr(path: &Path) -> Result<(u32, u32, Vec<Vec3>)> {
+fn read_exr(path: &Path) -> Result<Pixels> {
     let image = exr::read(path)?;
     if image.width > MAX_SIDE || image.height > MAX_SIDE {
         return Err(Error::input(path, format!("is larger than {MAX_SIDE} pixels")));
@@ -56,5 +73,6 @@ fn read_exr(path: &Path) -> Result<(u32, u32, Vec<Vec3>)> {
         image.f32(name).ok_or_else(|| Error::input(path, format!("has no channel {name} of floats: R, G and B are needed")))
     };
     let [r, g, b] = [plane("R")?, plane("G")?, plane("B")?];
-    Ok((image.width, image.height, (0..r.len()).map(|k| Vec3::new(r[k], g[k], b[k])).collect()))
+    let radiance = (0..r.len()).map(|k| Vec3::new(r[k], g[k], b[k])).collect();
+    Ok(Pixels { width: image.width, height: image.height, radiance })
 }

@@ -1,14 +1,11 @@
 //! What `skylit bench ao` takes.
 
-use std::path::PathBuf;
-use std::time::Duration;
-
-use clap::{Args, ValueEnum, ValueHint};
+use clap::{Args, ValueEnum};
 
 use super::candidates::{CANDIDATES, Candidate, Occlusion};
-use crate::cli::args::{BuildChoice, TracerChoice, parse_seconds, parse_size};
-use crate::cli::console::Console;
-use crate::error::{Error, Result};
+use crate::cli::args::{BuildChoice, TracerChoice, parse_size};
+use crate::cli::bench::common::CommonArgs;
+use crate::error::Result;
 use crate::tracer::BuildOptions;
 
 /// Pixels, unless said otherwise.
@@ -107,30 +104,9 @@ pub struct BenchAoArgs {
     /// Time that the compute tracer spends on its hierarchy
     #[arg(long, value_enum, default_value = "default")]
     pub build: BuildChoice,
-    /// Stop after this time with what there is
-    #[arg(long, value_name = "SECONDS", value_parser = parse_seconds, allow_hyphen_values = true)]
-    pub time_limit: Option<Duration>,
-    /// Small images, few frames, small scenes: a check that everything runs
-    #[arg(long)]
-    pub quick: bool,
-    /// Vulkan device, by index or part of its name (`skylit doctor` lists them)
-    #[arg(long, value_name = "INDEX|NAME")]
-    pub device: Option<String>,
-    /// Run with the Vulkan validation layer (slower); a message of it fails the run
-    #[arg(long)]
-    pub validation: bool,
-    /// Print one JSON record on stdout instead of text; with =FILE, write it there besides
-    #[arg(long, value_name = "FILE", num_args = 0..=1, require_equals = true, value_hint = ValueHint::FilePath)]
-    pub json: Option<Option<PathBuf>>,
-    /// Also write a table, one row a result
-    #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
-    pub csv: Option<PathBuf>,
-    /// Also draw errors against rays, and the series
-    #[arg(long, value_name = "FILE.png", value_hint = ValueHint::FilePath)]
-    pub plot: Option<PathBuf>,
-    /// Print nothing but errors
-    #[arg(long, short)]
-    pub quiet: bool,
+    /// What every benchmark takes
+    #[command(flatten)]
+    pub common: CommonArgs,
 }
 
 fn preset_names() -> clap::builder::PossibleValuesParser {
@@ -138,34 +114,6 @@ fn preset_names() -> clap::builder::PossibleValuesParser {
 }
 
 impl BenchAoArgs {
-    /// Where to say things.
-    pub fn console(&self) -> Console {
-        Console { json: self.json == Some(None), quiet: self.quiet }
-    }
-
-    /// File for the record.
-    pub fn json_file(&self) -> Option<&PathBuf> {
-        self.json.as_ref()?.as_ref()
-    }
-
-    /// Every file that will be written.
-    pub fn outputs(&self) -> impl Iterator<Item = &PathBuf> {
-        self.json_file().into_iter().chain(&self.csv).chain(&self.plot)
-    }
-
-    /// Checks what clap cannot.
-    ///
-    /// # Errors
-    /// [`Error::Usage`].
-    pub fn check(&self) -> Result<()> {
-        match &self.plot {
-            Some(p) if p.extension().is_none_or(|e| !e.eq_ignore_ascii_case("png")) => {
-                Err(Error::Usage(format!("--plot {}: the name must end in .png", p.display())))
-            }
-            _ => Ok(()),
-        }
-    }
-
     /// Is a part asked for?
     pub fn wants(&self, part: Part) -> bool {
         if !self.series.is_empty() {
@@ -204,22 +152,22 @@ impl BenchAoArgs {
 
     /// Pixels.
     pub fn size(&self) -> [u32; 2] {
-        self.size.unwrap_or(if self.quick { QUICK_SIZE } else { DEFAULT_SIZE })
+        self.size.unwrap_or(if self.common.quick { QUICK_SIZE } else { DEFAULT_SIZE })
     }
 
     /// Frames of a run.
     pub fn frames(&self) -> u32 {
-        self.frames.unwrap_or(if self.quick { QUICK_FRAMES } else { DEFAULT_FRAMES })
+        self.common.number(self.frames, DEFAULT_FRAMES, QUICK_FRAMES)
     }
 
     /// Rays a pixel of a reference.
     pub fn reference_rays(&self) -> u32 {
-        self.reference_rays.unwrap_or(if self.quick { QUICK_REFERENCE_RAYS } else { DEFAULT_REFERENCE_RAYS })
+        self.common.number(self.reference_rays, DEFAULT_REFERENCE_RAYS, QUICK_REFERENCE_RAYS)
     }
 
     /// Timed updates.
     pub fn repeats(&self) -> u32 {
-        self.repeats.unwrap_or(if self.quick { QUICK_REPEATS } else { DEFAULT_REPEATS })
+        self.common.number(self.repeats, DEFAULT_REPEATS, QUICK_REPEATS)
     }
 
     /// How the compute tracer's hierarchies are built.

@@ -40,17 +40,17 @@ const STEPS: u64 = 1000;
 /// Measures, shows, writes.
 pub fn run(args: &BenchAoArgs) -> Result<(), Failure> {
     let start = Instant::now();
-    args.check()?;
-    for path in args.outputs() {
+    args.common.check()?;
+    for path in args.common.outputs() {
         output::check_writable(path)?;
     }
     interrupt::install();
-    let console = args.console();
+    let console = args.common.console();
     let (scenes, notes) = scenes::choose(args);
     // before anything that takes long
     scenes.iter().try_for_each(|s| check_there(s))?;
     let device =
-        Device::open(&gpu::Options { device: args.device.clone(), validation: args.validation, ..Default::default() })?;
+        Device::open(&gpu::Options { device: args.common.device.clone(), validation: args.common.validation, ..Default::default() })?;
     let kind = args.tracer.on(&device.info).0;
     let mut bench = Bench {
         args,
@@ -97,16 +97,16 @@ pub fn run(args: &BenchAoArgs) -> Result<(), Failure> {
 
 /// Writes the files that were asked for; one that cannot be written does not stop the others.
 fn write(args: &BenchAoArgs, out: &AoBenchmark) -> Result<()> {
-    let json = args.json_file().map_or(Ok(()), |path| {
+    let json = args.common.json_file().map_or(Ok(()), |path| {
         let text = serde_json::to_string_pretty(out)
             .map_err(|e| Error::CheckFailed(format!("cannot express the result as JSON: {e}")))?;
         output::write_atomically(path, |f| f.write_all(text.as_bytes()).and_then(|()| f.write_all(b"\n")))
     });
-    let csv = args
+    let csv = args.common
         .csv
         .as_ref()
         .map_or(Ok(()), |path| output::write_atomically(path, |f| out.write_csv(f).map_err(std::io::Error::other)));
-    let plot = args.plot.as_ref().map_or(Ok(()), |path| {
+    let plot = args.common.plot.as_ref().map_or(Ok(()), |path| {
         let picture = ao_plot::draw(out)?;
         output::png::write_rgb(path, &picture.rgb, picture.width, picture.height)
     });
@@ -218,7 +218,7 @@ impl<'a> Bench<'a> {
     }
 
     fn is_late(&self) -> bool {
-        self.args.time_limit.is_some_and(|limit| self.start.elapsed() >= limit)
+        self.args.common.time_limit.is_some_and(|limit| self.start.elapsed() >= limit)
     }
 
     /// Builds what traces a scene.

@@ -83,7 +83,7 @@ fn truth(bench: &mut Bench, shot: &Shot) -> Result<Truth> {
 /// Time by the number of triangles.
 fn triangles(bench: &mut Bench, scenes: &[String]) -> Result<SeriesRecord> {
     let default: Vec<String> =
-        if bench.args.quick { QUICK_TRIANGLES.map(str::to_owned).to_vec() } else { TRIANGLES.map(str::to_owned).to_vec() };
+        if bench.args.common.quick { QUICK_TRIANGLES.map(str::to_owned).to_vec() } else { TRIANGLES.map(str::to_owned).to_vec() };
     let sources = if bench.args.scenes.is_empty() { default } else { scenes.to_vec() };
     let mut lines: Vec<SeriesLine> = [OURS, THEIRS].map(|name| SeriesLine { name: name.to_owned(), points: Vec::new() }).into();
     for (k, source) in sources.iter().enumerate() {
@@ -115,7 +115,7 @@ fn triangles(bench: &mut Bench, scenes: &[String]) -> Result<SeriesRecord> {
 
 /// Time and error by the number of rays.
 fn rays(bench: &mut Bench, source: &str) -> Result<SeriesRecord> {
-    let numbers: &[u32] = if bench.args.quick { &QUICK_RAYS } else { &RAYS };
+    let numbers: &[u32] = if bench.args.common.quick { &QUICK_RAYS } else { &RAYS };
     let frames = bench.args.frames();
     let points = near(bench, source, |bench, _, shot| {
         bench.phase(format!("{source}: reference"));
@@ -149,7 +149,7 @@ fn rays(bench: &mut Bench, source: &str) -> Result<SeriesRecord> {
 
 /// Time by the number of pixels.
 fn resolution(bench: &mut Bench, source: &str) -> Result<SeriesRecord> {
-    let sizes: &[[u32; 2]] = if bench.args.quick { &QUICK_SIZES } else { &SIZES };
+    let sizes: &[[u32; 2]] = if bench.args.common.quick { &QUICK_SIZES } else { &SIZES };
     let frames = bench.args.frames();
     let points = near(bench, source, |bench, _, shot| {
         let mut points = Vec::new();

@@ -26,7 +26,7 @@ const MESH: usize = 0;
 /// All scenes.
 pub fn measure(bench: &mut Bench) -> Result<()> {
     let first = bench.out.structures.len();
-    let sources = if bench.args.quick { QUICK } else { SCENES };
+    let sources = if bench.args.common.quick { QUICK } else { SCENES };
     for (k, source) in sources.into_iter().enumerate() {
         if bench.is_late() && !bench.out.is_empty() {
             bench.leave_out(&format!("structures of {source}"));

@@ -183,6 +183,7 @@ impl ClearcoatJson {
             roughness: self.clearcoat_roughness_factor,
             roughness_texture: slot(&self.clearcoat_roughness_texture),
             normal_texture: normal_slot(&self.clearcoat_normal_texture)?,
+            normal_scale: self.clearcoat_normal_texture.as_ref().map_or(1.0, |t| t.scale),
         })
     }
 }

@@ -184,7 +184,7 @@ pub(super) fn light(document: &Root, placed: &Placed, index: usize) -> Result<Li
     let light = lights.get(index).ok_or_else(|| format!("light {index} does not exist"))?;
     let kind = match valid(light.type_) {
         Some(LightType::Point) => LightKind::Point,
-        Some(LightType::Directional) => LightKind::Directional,
+        Some(LightType::Directional) => LightKind::Directional { angle: 0.0 },
         Some(LightType::Spot) => {
             // not the crate's default for lights without `spot`, whose outer angle is zero
             let (inner, outer) = light.spot.as_ref().map_or((0.0, FRAC_PI_4), |s| (s.inner_cone_angle, s.outer_cone_angle));

@@ -1,0 +1,38 @@
+// bsdf_probe: traces nothing; writes what the BSDF of a part's material makes of given directions, so that a test can hold density, samples and
+// values to each other on every tracer and driver.
+// stream: any
+#include "path/path.glsl"
+
+layout(buffer_reference, std430, buffer_reference_align = 8) readonly buffer BsdfProbe {
+    uvec2 inputs;   // three quads each: towards the viewer, and the part; wi, or where to sample and which lobe; shading normal, and 1 to sample
+    uvec2 params;   // PathParams: how directions are drawn
+    uvec2 outputs;  // three quads each: value times |cos|, density; wi, 1 for a delta lobe; weight, eta
+};
+
+Ray ray(uint index) { return no_ray(); }
+
+// About a geometric normal of z. Directions are the world's.
+void any(uint index, bool occluded) {
+    BsdfProbe probe = BsdfProbe(push.pass);
+    uvec4 a = Quads(probe.inputs).v[3u * index], b = Quads(probe.inputs).v[3u * index + 1u], c = Quads(probe.inputs).v[3u * index + 2u];
+    vec3 viewer = uintBitsToFloat(a.xyz), given = uintBitsToFloat(b.xyz);
+    Surface s;
+    s.position = vec3(0.0);
+    s.ng = vec3(0.0, 0.0, 1.0);
+    s.ns = uintBitsToFloat(c.xyz);
+    s.offset = 0.0;
+    s.part = a.w;
+    s.entry = 0u;
+    s.primitive = PartRecords(SceneRoot(push.scene).parts).v[a.w].first_primitive;
+    s.uv = vec2(1.0 / 3.0);
+    Shading m = shade(s, viewer);
+    vec3 wo = to_frame(m.frame, viewer);
+    wo.z = max(wo.z, LEAST_COSINE);
+    BsdfSample drawn = BsdfSample(given, vec3(0.0), 0.0, false, 1.0);
+    PathParams p = PathParams(probe.params);
+    if (c.w != 0u) drawn = draw_direction(p, m, wo, given.xy, given.z);
+    BsdfValue value = vertex_at(m, wo, drawn.wi);
+    store_quad(probe.outputs, 3u * index, vec4(value.f, c.w != 0u ? drawn.pdf : value.pdf));
+    store_quad(probe.outputs, 3u * index + 1u, vec4(drawn.wi, drawn.delta ? 1.0 : 0.0));
+    store_quad(probe.outputs, 3u * index + 2u, vec4(drawn.weight, drawn.eta));
+}

@@ -1,0 +1,89 @@
+// A light for a point out of many: a tree over them, descended towards what may be bright there (Conty Estevez and Kulla, "Importance
+// Sampling of Many Lights with Adaptive Tree Splitting", HPG 2018; the bounds are those of pbrt-v4, 12.6.3). Mirrors src/render/path/light_tree.rs.
+#ifndef PATH_LIGHT_TREE
+#define PATH_LIGHT_TREE
+#include "common/types.glsl"
+#include "common/sampler.glsl"
+
+// What a subtree's lights may do at most. Where and how large: a ball. Where they shine: within an angle o + e of an axis, fading beyond o.
+struct LightNode {
+    vec3 center;
+    float radius;
+    vec3 axis;
+    float intensity;  // luminance per solid angle, in its best direction
+    float cos_o;
+    float sin_o;
+    float cos_e;
+    uint link;        // of an inner node: its first child, the second follows; of a leaf: its light
+};
+layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer LightNodes { LightNode v[]; };
+
+const uint LIGHT_LEAF = 0x80000000u;
+const uint LIGHT_BOTH_WAYS = 0x40000000u;  // it shines along its axis and against it
+const uint LIGHT_LINK = 0x3fffffffu;
+// A sample's number is stretched at each choice; so many choices leave enough of its bits.
+const uint STRETCHES = 8u;
+
+// Cosine and sine of an angle less another, not below 0.
+vec2 angle_less(vec2 a, vec2 b) {
+    return a.x > b.x ? vec2(1.0, 0.0) : vec2(a.x * b.x + a.y * b.y, a.y * b.x - a.x * b.y);
+}
+
+// Estimate of what a subtree does at a point; 0 only where it does nothing.
+float light_importance(LightNode node, vec3 from) {
+    vec3 d = from - node.center;
+    float d2 = dot(d, d), r2 = node.radius * node.radius;
+    // in the ball anything may be
+    if (d2 <= r2) return node.intensity / max(r2, 1e-30);
+    float cos_w = dot(node.axis, d) * inversesqrt(d2);
+    if ((node.link & LIGHT_BOTH_WAYS) != 0u) cos_w = abs(cos_w);
+    vec2 w = vec2(cos_w, sqrt(max(1.0 - cos_w * cos_w, 0.0)));
+    float sin2_b = r2 / d2;
+    vec2 left = angle_less(angle_less(w, vec2(node.cos_o, node.sin_o)), vec2(sqrt(1.0 - sin2_b), sqrt(sin2_b)));
+    return left.x > node.cos_e ? node.intensity * max(left.x, 1e-4) / d2 : 0.0;
+}
+
+// A light, and the probability with which it is drawn; 0: no light reaches the point.
+float draw_leaf(uvec2 tree, vec3 from, float u, out uint light) {
+    LightNodes nodes = LightNodes(tree);
+    LightNode node = nodes.v[0];
+    float probability = 1.0;
+    uint seed = floatBitsToUint(u);
+    light = 0u;
+    for (uint level = 0u; (node.link & LIGHT_LEAF) == 0u; level++) {
+        uint child = node.link & LIGHT_LINK;
+        LightNode first = nodes.v[child], second = nodes.v[child + 1u];
+        float a = light_importance(first, from), b = light_importance(second, from);
+        if (!(a + b > 0.0)) return 0.0;
+        float p = a / (a + b);
+        if (level >= STRETCHES) u = float(hash_combine(seed, level) >> 8) * (1.0 / 16777216.0);
+        bool takes_first = u < p;
+        u = min(takes_first ? u / p : (u - p) / (1.0 - p), 0.99999994);
+        probability *= takes_first ? p : 1.0 - p;
+        if (takes_first) node = first;
+        else node = second;
+    }
+    light = node.link & LIGHT_LINK;
+    return probability;
+}
+
+// With which probability draw_leaf draws a light; trail: at each level from the root, is it in the second child?
+float leaf_probability(uvec2 tree, vec3 from, uint trail) {
+    LightNodes nodes = LightNodes(tree);
+    LightNode node = nodes.v[0];
+    float probability = 1.0;
+    while ((node.link & LIGHT_LEAF) == 0u) {
+        uint child = node.link & LIGHT_LINK;
+        LightNode first = nodes.v[child], second = nodes.v[child + 1u];
+        float a = light_importance(first, from), b = light_importance(second, from);
+        if (!(a + b > 0.0)) return 0.0;
+        bool takes_second = (trail & 1u) != 0u;
+        probability *= takes_second ? b / (a + b) : a / (a + b);
+        if (takes_second) node = second;
+        else node = first;
+        trail >>= 1;
+    }
+    return probability;
+}
+
+#endif

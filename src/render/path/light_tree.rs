@@ -1,0 +1,293 @@
+//! A tree over lights, from which one is drawn by what it may do at a point: `LightNode` of shaders/path/light_tree.glsl.
+//!
+//! Conty Estevez, Kulla, "Importance Sampling of Many Lights with Adaptive Tree Splitting", HPG 2018, without the splitting; its measure of a split
+//! (surface area, orientation, power), with bounding balls in place of boxes at the nodes.
+
+use std::f64::consts::PI;
+
+use bytemuck::{Pod, Zeroable};
+use glam::DVec3;
+
+/// Levels after which lights are halved whatever that costs: a light's way from the root is 32 bits.
+const MEASURED_LEVELS: u32 = 12;
+/// Most lights of a tree: with the levels above, no way is longer than 32.
+pub(super) const MOST_LIGHTS: usize = 1 << 19;
+/// Bins along an axis where splits are looked for.
+const BINS: usize = 12;
+
+const LEAF: u32 = 0x8000_0000;
+const BOTH_WAYS: u32 = 0x4000_0000;
+
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+pub(super) struct LightNode {
+    center: [f32; 3],
+    radius: f32,
+    axis: [f32; 3],
+    intensity: f32,
+    cos_o: f32,
+    sin_o: f32,
+    cos_e: f32,
+    link: u32,
+}
+
+/// What a light, or several, may do at most.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Bounds {
+    /// Box that holds it.
+    pub lo: DVec3,
+    /// The other corner.
+    pub hi: DVec3,
+    /// Axis of the cone of its normals.
+    pub axis: DVec3,
+    /// Half angle of that cone, radians.
+    pub spread: f64,
+    /// How far from a normal it shines, radians.
+    pub falloff: f64,
+    /// Along its axis and against it.
+    pub both_ways: bool,
+    /// Luminance per solid angle in its best direction.
+    pub intensity: f64,
+}
+
+impl Bounds {
+    fn union(&self, o: &Self) -> Self {
+        let both_ways = self.both_ways || o.both_ways;
+        // where one of them shines both ways the other's axis may be turned
+        let other = if both_ways && self.axis.dot(o.axis) < 0.0 { -o.axis } else { o.axis };
+        let (axis, spread) = cone_union((self.axis, self.spread), (other, o.spread));
+        Self {
+            lo: self.lo.min(o.lo),
+            hi: self.hi.max(o.hi),
+            axis,
+            spread,
+            falloff: self.falloff.max(o.falloff),
+            both_ways,
+            intensity: self.intensity + o.intensity,
+        }
+    }
+
+    fn middle(&self) -> DVec3 {
+        0.5 * (self.lo + self.hi)
+    }
+
+    /// Conty Estevez and Kulla's measure: what it costs to be drawn in vain.
+    fn cost(&self) -> f64 {
+        let (o, w) = (self.spread, (self.spread + self.falloff).min(PI));
+        let solid = 2.0 * PI * (1.0 - o.cos())
+            + 0.5 * PI * (2.0 * w * o.sin() - (o - 2.0 * w).cos() - 2.0 * o * o.sin() + o.cos());
+        let d = self.hi - self.lo;
+        self.intensity * solid.max(1e-9) * (d.x * d.y + d.y * d.z + d.z * d.x).max(1e-30)
+    }
+
+    fn node(&self, link: u32) -> LightNode {
+        let middle = self.middle().as_vec3();
+        // the middle's own rounding, and the radius's, may leave nothing outside
+        let radius = (self.hi - middle.as_dvec3()).length().max((self.lo - middle.as_dvec3()).length()) * (1.0 + 1e-6);
+        // a little wider than the cone is: single precision
+        let spread = (self.spread + 1e-4).min(PI);
+        LightNode {
+            center: middle.to_array(),
+            radius: radius as f32,
+            axis: self.axis.as_vec3().to_array(),
+            intensity: self.intensity as f32,
+            cos_o: spread.cos() as f32,
+            sin_o: spread.sin() as f32,
+            cos_e: (self.falloff + 1e-4).min(PI).cos() as f32,
+            link: link | if self.both_ways { BOTH_WAYS } else { 0 },
+        }
+    }
+}
+
+/// Smallest cone that holds two, each an axis and a half angle.
+fn cone_union(a: (DVec3, f64), b: (DVec3, f64)) -> (DVec3, f64) {
+    let (a, b) = if a.1 >= b.1 { (a, b) } else { (b, a) };
+    let between = a.0.angle_between(b.0);
+    if (between + b.1).min(PI) <= a.1 {
+        return a;
+    }
+    let spread = 0.5 * (a.1 + between + b.1);
+    let turn = a.0.cross(b.0);
+    if spread >= PI || turn.length_squared() < 1e-24 {
+        return (a.0, if spread >= PI || between > 1.0 { PI } else { spread });
+    }
+    let axis = glam::DQuat::from_axis_angle(turn.normalize(), spread - a.1) * a.0;
+    (axis.normalize(), spread)
+}
+
+/// The nodes, root first, and each light's way from the root: bit k is set where it is in the second child at level k.
+pub(super) fn build(lights: &[Bounds]) -> (Vec<LightNode>, Vec<u32>) {
+    assert!(!lights.is_empty() && lights.len() <= MOST_LIGHTS, "{} lights", lights.len());
+    let mut tree = Tree { lights, nodes: vec![LightNode::default()], trails: vec![0; lights.len()] };
+    let mut all: Vec<u32> = (0..lights.len() as u32).collect();
+    tree.fill(0, &mut all, 0, 0);
+    (tree.nodes, tree.trails)
+}
+
+struct Tree<'a> {
+    lights: &'a [Bounds],
+    nodes: Vec<LightNode>,
+    trails: Vec<u32>,
+}
+
+impl Tree<'_> {
+    /// Makes node `at` of some lights.
+    fn fill(&mut self, at: usize, of: &mut [u32], trail: u32, level: u32) -> Bounds {
+        if let [light] = *of {
+            self.trails[light as usize] = trail;
+            let bounds = self.lights[light as usize];
+            self.nodes[at] = bounds.node(LEAF | light);
+            return bounds;
+        }
+        let middle = self.split(of, level);
+        let child = self.nodes.len();
+        self.nodes.extend([LightNode::default(); 2]);
+        let (first, second) = of.split_at_mut(middle);
+        let a = self.fill(child, first, trail, level + 1);
+        let b = self.fill(child + 1, second, trail | 1 << level, level + 1);
+        let bounds = a.union(&b);
+        self.nodes[at] = bounds.node(child as u32);
+        bounds
+    }
+
+    /// Sorts lights into two parts, neither empty; returns how many are in the first.
+    fn split(&self, of: &mut [u32], level: u32) -> usize {
+        let middle = |k: u32| self.lights[k as usize].middle();
+        let (lo, hi) = of.iter().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(lo, hi), &k| (lo.min(middle(k)), hi.max(middle(k))));
+        let extent = hi - lo;
+        let mut best: Option<(f64, usize, f64)> = None;
+        let axes = if level < MEASURED_LEVELS { 0..3 } else { 0..0 };
+        for axis in axes.filter(|&a| extent[a] > 0.0) {
+            let bin = |k: u32| (((middle(k)[axis] - lo[axis]) / extent[axis] * BINS as f64) as usize).min(BINS - 1);
+            let mut bins: [Option<Bounds>; BINS] = [None; BINS];
+            for &k in of.iter() {
+                let b = &self.lights[k as usize];
+                let slot = &mut bins[bin(k)];
+                *slot = Some(slot.map_or(*b, |s| s.union(b)));
+            }
+            let join = |a: Option<Bounds>, b: &Option<Bounds>| match (a, b) {
+                (Some(a), Some(b)) => Some(a.union(b)),
+                (a, b) => a.or(*b),
+            };
+            for cut in 1..BINS {
+                let (left, right) = (bins[..cut].iter().fold(None, join), bins[cut..].iter().fold(None, join));
+                let (Some(left), Some(right)) = (left, right) else { continue };
+                // long boxes are cut across
+                let cost = extent.max_element() / extent[axis] * (left.cost() + right.cost());
+                if best.is_none_or(|b| cost < b.0) {
+                    best = Some((cost, axis, lo[axis] + extent[axis] * cut as f64 / BINS as f64));
+                }
+            }
+        }
+        if let Some((_, axis, cut)) = best {
+            let of_first = partition(of, |&k| middle(k)[axis] < cut);
+            if of_first > 0 && of_first < of.len() {
+                return of_first;
+            }
+        }
+        let axis = if extent.x >= extent.y && extent.x >= extent.z { 0 } else if extent.y >= extent.z { 1 } else { 2 };
+        let half = of.len() / 2;
+        of.select_nth_unstable_by(half, |&a, &b| middle(a)[axis].total_cmp(&middle(b)[axis]).then(a.cmp(&b)));
+        half
+    }
+}
+
+/// Those that hold first; returns how many.
+fn partition<T: Copy>(items: &mut [T], holds: impl Fn(&T) -> bool) -> usize {
+    let mut first = 0;
+    for k in 0..items.len() {
+        if holds(&items[k]) {
+            items.swap(first, k);
+            first += 1;
+        }
+    }
+    first
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sampling::sobol::{hash_combine, to_unit};
+
+    fn random(seed: u32, k: u32) -> f64 {
+        f64::from(to_unit(hash_combine(seed, k)))
+    }
+
+    fn lights(n: u32) -> Vec<Bounds> {
+        (0..n)
+            .map(|i| {
+                let at = DVec3::new(random(i, 0), 0.2 * random(i, 1), random(i, 2).powi(3)) * 10.0;
+                let axis = (DVec3::new(random(i, 3), random(i, 4), random(i, 5)) - 0.5).normalize();
+                let size = DVec3::splat(0.05 * random(i, 6));
+                let (spread, falloff) = if i % 5 == 0 { (PI, 0.5 * PI) } else { (0.0, 0.5 * PI) };
+                Bounds { lo: at - size, hi: at + size, axis, spread, falloff, both_ways: i % 3 == 0, intensity: random(i, 7) }
+            })
+            .collect()
+    }
+
+    /// shaders/path/light_tree.glsl, in double precision.
+    fn importance(n: &LightNode, from: DVec3) -> f64 {
+        let less = |a: (f64, f64), b: (f64, f64)| if a.0 > b.0 { (1.0, 0.0) } else { (a.0 * b.0 + a.1 * b.1, a.1 * b.0 - a.0 * b.1) };
+        let d = from - glam::Vec3::from_array(n.center).as_dvec3();
+        let (d2, r2) = (d.length_squared(), f64::from(n.radius).powi(2));
+        if d2 <= r2 {
+            return f64::from(n.intensity) / r2.max(1e-30);
+        }
+        let mut c = glam::Vec3::from_array(n.axis).as_dvec3().dot(d) / d2.sqrt();
+        if n.link & BOTH_WAYS != 0 {
+            c = c.abs();
+        }
+        let w = (c, (1.0 - c * c).max(0.0).sqrt());
+        let b = ((1.0 - r2 / d2).sqrt(), (r2 / d2).sqrt());
+        let left = less(less(w, (n.cos_o.into(), n.sin_o.into())), b);
+        if left.0 > f64::from(n.cos_e) { f64::from(n.intensity) * left.0.max(1e-4) / d2 } else { 0.0 }
+    }
+
+    /// Every light is where its way leads, once, and a parent's bounds hold its children's: what shines at a point has all its ancestors
+    /// important there.
+    #[test]
+    fn bounds_hold_what_is_below() {
+        for n in [1, 2, 3, 100, 3000] {
+            let all = lights(n);
+            let (nodes, trails) = build(&all);
+            assert_eq!(nodes.len(), 2 * n as usize - 1);
+            for (light, trail) in trails.iter().enumerate() {
+                for sample in 0..20 {
+                    let k = light as u32 * 20 + sample;
+                    let from = DVec3::new(random(k, 20), random(k, 21), random(k, 22)) * 14.0 - 2.0;
+                    let (mut node, mut way, mut above) = (&nodes[0], *trail, vec![]);
+                    while node.link & LEAF == 0 {
+                        above.push(importance(node, from));
+                        node = &nodes[(node.link & 0x3fff_ffff) as usize + (way & 1) as usize];
+                        way >>= 1;
+                    }
+                    assert_eq!(node.link & 0x3fff_ffff, light as u32);
+                    if importance(node, from) > 0.0 {
+                        assert!(above.iter().all(|&i| i > 0.0), "light {light} of {n} is lost at {from}: {above:?}");
+                    }
+                }
+            }
+        }
+    }
+
+    /// Lights in one place can only be halved.
+    #[test]
+    fn coincident_lights_end() {
+        let one = lights(1)[0];
+        let (nodes, trails) = build(&vec![one; 1 << 12]);
+        assert_eq!(nodes.len(), (2 << 12) - 1);
+        assert!(trails.iter().all(|&t| t < 1 << 12));
+    }
+
+    #[test]
+    fn cones_hold_both() {
+        for k in 0..500 {
+            let axis = |s: u32| (DVec3::new(random(k, s), random(k, s + 1), random(k, s + 2)) - 0.5).normalize();
+            let (a, b) = ((axis(0), PI * random(k, 9)), (axis(3), PI * random(k, 10)));
+            let (axis, spread) = cone_union(a, b);
+            for c in [a, b] {
+                assert!(spread >= PI - 1e-9 || axis.angle_between(c.0) + c.1 <= spread + 1e-6, "{a:?} {b:?}: {axis} {spread}");
+            }
+        }
+    }
+}

@@ -1,0 +1,390 @@
+//! Every reflection model against itself: densities add up, samples follow them (Pearson's chi-square), weights are value over density, directions
+//! may be exchanged, no more light leaves than came; and on all tracers the same.
+
+use super::*;
+use skylit::gpu::{Buffer, Commands, Memory};
+use skylit::scene::material::{Anisotropy, Clearcoat, Sheen, Transmission};
+use skylit::scene::TriangleMesh;
+use skylit::tracer::{Push, Stream, stream};
+use std::f64::consts::PI;
+
+/// Cells of the sphere: by cosine, by angle.
+const GRID: [usize; 2] = [256, 512];
+/// So many cells of the grid, along both axes, are a cell of the histogram.
+const COARSE: usize = 16;
+/// Samples of a histogram.
+const SAMPLES: usize = 1 << 17;
+
+/// What the probe wrote about a direction.
+#[derive(Clone, Copy, Debug)]
+struct Answer {
+    f: DVec3,
+    pdf: f64,
+    wi: DVec3,
+    delta: bool,
+    weight: DVec3,
+}
+
+/// What to ask: a direction, or a sample at a point of the unit cube.
+#[derive(Clone, Copy)]
+enum Ask {
+    At(DVec3),
+    Sample([f64; 3]),
+}
+
+struct Probe<'a> {
+    device: &'a Arc<Device>,
+    tracer: Tracer,
+    stream: Stream,
+}
+
+impl Probe<'_> {
+    fn new(device: &Arc<Device>, tracer: Tracer) -> Probe<'_> {
+        let stream = tracer.stream(&stream::BSDF_PROBE_ANY).unwrap();
+        Probe { device, tracer, stream }
+    }
+
+    /// `part`: number of the material. `normal`: the shading normal; the surface's own is z.
+    fn ask(&self, part: u32, viewer: DVec3, normal: DVec3, asks: &[Ask]) -> Vec<Answer> {
+        self.ask_all(part, normal, asks.iter().map(|&ask| (viewer, ask)))
+    }
+
+    /// The same, each as seen from a direction of its own.
+    fn ask_all(&self, part: u32, normal: DVec3, asks: impl Iterator<Item = (DVec3, Ask)>) -> Vec<Answer> {
+        let bits = |v: DVec3| v.as_vec3().to_array().map(f32::to_bits);
+        let n = bits(normal);
+        let inputs: Vec<[u32; 12]> = asks
+            .map(|(viewer, ask)| {
+                let v = bits(viewer);
+                let (given, sample) = match ask {
+                    Ask::At(w) => (bits(w), 0),
+                    Ask::Sample(u) => (u.map(|x| (x as f32).min(0.999_999_94).to_bits()), 1),
+                };
+                [v[0], v[1], v[2], part, given[0], given[1], given[2], 0, n[0], n[1], n[2], sample]
+            })
+            .collect();
+        let source = Buffer::from_slice(self.device, "probe inputs", &inputs).unwrap();
+        let bytes = 48 * inputs.len() as u64;
+        let results = Buffer::new(self.device, "probe outputs", bytes, Memory::Readback).unwrap();
+        // all zero: directions are drawn as the default strategy draws them
+        let params = Buffer::from_slice(self.device, "parameters", &[[0u32; 128]]).unwrap();
+        let probe = [[source.address(), params.address(), results.address()]];
+        let probe = Buffer::from_slice(self.device, "probe", &probe).unwrap();
+        let count = inputs.len() as u32;
+        let push = Push { scene: self.tracer.scene_address(), pass: probe.address(), count, ..Default::default() };
+        Commands::new(self.device).unwrap().run(|r| self.stream.record(r, &push)).unwrap();
+        let results = results.read(0, bytes).unwrap();
+        let vector = |v: &[f32]| DVec3::new(v[0].into(), v[1].into(), v[2].into());
+        results
+            .chunks_exact(48)
+            .map(|bytes| {
+                let v: [f32; 12] = bytemuck::pod_read_unaligned(bytes);
+                Answer { f: vector(&v[..3]), pdf: v[3].into(), wi: vector(&v[4..7]), delta: v[7] != 0.0, weight: vector(&v[8..11]) }
+            })
+            .collect()
+    }
+}
+
+/// A material, its name, and what is to be known of it.
+struct Case {
+    name: &'static str,
+    material: Material,
+    /// Directions may be exchanged.
+    reciprocal: bool,
+    /// Reflects everything that comes, or all but so much.
+    conserves: Option<f64>,
+    /// Index of refraction of what is beyond, for what refracts.
+    eta: Option<f64>,
+}
+
+fn gltf(metallic: f32, roughness: f32) -> Material {
+    Material { metallic, roughness, ..Material::default() }
+}
+
+fn cases() -> Vec<Case> {
+    let case = |name, material| Case { name, material, reciprocal: true, conserves: None, eta: None };
+    let coat = |factor, roughness| Clearcoat { factor, roughness, ..Default::default() };
+    let sheen = |roughness| Sheen { color: Vec3::new(0.9, 0.5, 0.3), roughness, ..Default::default() };
+    let through = |factor, thickness| Transmission { factor, thickness, ..Default::default() };
+    let turned = Anisotropy { strength: 0.7, rotation: 0.6, ..Default::default() };
+    let brhan = |kind, roughness| Material {
+        kind,
+        roughness,
+        specular_color: Vec3::ONE,
+        transmittance: Vec3::ONE,
+        ior: 1.5,
+        ..Material::default()
+    };
+    let ior = |eta: f64, c: Case| Case { eta: Some(eta), ..c };
+    vec![
+        Case { conserves: Some(0.0), ..case("matte", matte(1.0)) },
+        case("metallic-roughness 0.3", gltf(0.0, 0.3)),
+        case("metallic-roughness 0.7", gltf(0.0, 0.7)),
+        case("metallic-roughness 1", gltf(0.0, 1.0)),
+        case("metal 0.3", gltf(1.0, 0.3)),
+        case("metal 0.8", gltf(1.0, 0.8)),
+        case("half metal 0.5", gltf(0.5, 0.5)),
+        case("anisotropic metal", Material { anisotropy: turned, ..gltf(1.0, 0.4) }),
+        case("coat 0.3 over plastic", Material { clearcoat: coat(1.0, 0.3), ..gltf(0.0, 0.6) }),
+        case("smooth half coat over metal", Material { clearcoat: coat(0.5, 0.0), ..gltf(1.0, 0.5) }),
+        case("sheen 0.3", Material { sheen: sheen(0.3), ..gltf(0.0, 0.8) }),
+        case("sheen 0.8", Material { sheen: sheen(0.8), ..gltf(0.0, 0.8) }),
+        case("coat over sheen", Material { sheen: sheen(0.6), clearcoat: coat(1.0, 0.4), ..gltf(0.0, 0.8) }),
+        case("thin walls 0.4", Material { transmission: through(0.8, 0.0), ..gltf(0.0, 0.4) }),
+        case("smooth thin walls, half metal", Material { transmission: through(0.7, 0.0), ..gltf(0.5, 0.0) }),
+        ior(1.5, case("volume 0.5", Material { transmission: through(1.0, 1.0), ..gltf(0.0, 0.5) })),
+        ior(1.33, case("half volume 0.6", Material { transmission: through(0.5, 1.0), ior: 1.33, ..gltf(0.0, 0.6) })),
+        ior(1.5, Case { conserves: Some(1e-3), ..case("smooth volume", Material { transmission: through(1.0, 1.0), ..gltf(0.0, 0.0) }) }),
+        ior(1.5, case("rough glass", brhan(MaterialKind::Glass, 0.6))),
+        ior(1.5, Case { conserves: Some(1e-3), ..case("smooth glass", brhan(MaterialKind::Glass, 0.0)) }),
+        case("copper", brhan(MaterialKind::Copper, 0.4)),
+        case("gold", brhan(MaterialKind::Gold, 0.7)),
+        Case { conserves: Some(0.0), ..case("mirror", brhan(MaterialKind::Mirror, 0.0)) },
+    ]
+}
+
+/// A triangle of each material, with a tangent along x.
+fn scene(cases: &[Case]) -> Scene {
+    let triangle = || {
+        Geometry::Triangles(TriangleMesh {
+            positions: vec![Vec3::ZERO, Vec3::X, Vec3::Y],
+            indices: vec![[0, 1, 2]],
+            normals: vec![Vec3::Z; 3],
+            tangents: vec![glam::Vec4::new(1.0, 0.0, 0.0, 1.0); 3],
+            texcoords: [vec![glam::Vec2::ZERO, glam::Vec2::X, glam::Vec2::Y], Vec::new()],
+            ..TriangleMesh::default()
+        })
+    };
+    let camera = Camera::look_at(DVec3::Z, DVec3::ZERO, DVec3::Y, 0.5);
+    scene_of(cases.iter().map(|c| (triangle(), c.material.clone())).collect(), camera)
+}
+
+fn from_above(cosine: f64, turn: f64) -> DVec3 {
+    let s = (1.0 - cosine * cosine).sqrt();
+    DVec3::new(s * turn.cos(), s * turn.sin(), cosine)
+}
+
+/// Middles of the grid's cells.
+fn grid() -> Vec<Ask> {
+    let [across, around] = GRID;
+    let at = |k: usize, n: usize| (k as f64 + 0.5) / n as f64;
+    (0..across * around)
+        .map(|k| Ask::At(from_above(1.0 - 2.0 * at(k / around, across), 2.0 * PI * at(k % around, around))))
+        .collect()
+}
+
+/// Solid angle of a cell.
+const CELL: f64 = 4.0 * PI / (GRID[0] * GRID[1]) as f64;
+
+/// Independent points of the unit cube.
+fn random(n: usize, seed: u32) -> Vec<[f64; 3]> {
+    use skylit::sampling::sobol::{hash_combine, to_unit};
+    let x = |i: usize, k: u32| f64::from(to_unit(hash_combine(hash_combine(seed, i as u32), k)));
+    (0..n).map(|i| [x(i, 0), x(i, 1), x(i, 2)]).collect()
+}
+
+/// Where a direction's cell of the histogram is.
+fn coarse(w: DVec3) -> usize {
+    let [across, around] = GRID.map(|n| n / COARSE);
+    let row = ((0.5 - 0.5 * w.z) * across as f64).clamp(0.0, across as f64 - 1.0) as usize;
+    let turn = (w.y.atan2(w.x) / (2.0 * PI)).rem_euclid(1.0);
+    row * around + ((turn * around as f64) as usize).min(around - 1)
+}
+
+/// How far a chi-square statistic is from what it should be, in standard deviations (Wilson and Hilferty 1931).
+fn deviations(statistic: f64, freedom: f64) -> f64 {
+    let v = 2.0 / (9.0 * freedom);
+    ((statistic / freedom).cbrt() - (1.0 - v)) / v.sqrt()
+}
+
+/// Pearson's statistic of counts against what is expected; cells of which little is expected are taken together.
+fn chi_square(expected: &[f64], counts: &[f64]) -> f64 {
+    let (mut statistic, mut cells, mut rest) = (0.0, 0.0f64, (0.0, 0.0));
+    for (&e, &c) in expected.iter().zip(counts) {
+        if e < 8.0 {
+            rest = (rest.0 + e, rest.1 + c);
+        } else {
+            statistic += (c - e).powi(2) / e;
+            cells += 1.0;
+        }
+    }
+    if rest.0 >= 8.0 {
+        statistic += (rest.1 - rest.0).powi(2) / rest.0;
+        cells += 1.0;
+    } else {
+        // where next to nothing is expected, next to nothing may be
+        assert!(rest.1 <= rest.0 + 6.0 * (rest.0 + 1.0).sqrt(), "{} samples where {} are expected", rest.1, rest.0);
+    }
+    deviations(statistic, (cells - 1.0).max(1.0))
+}
+
+/// Views of a surface: cosines, from behind too where it refracts.
+fn views(case: &Case) -> Vec<DVec3> {
+    let above = [0.95, 0.5, 0.12].map(|c| from_above(c, 0.4));
+    above.into_iter().chain(case.eta.map(|_| from_above(-0.8, 0.4))).collect()
+}
+
+#[test]
+fn gpu_samples_follow_their_density() {
+    let device = device();
+    let cases = cases();
+    let scene = scene(&cases);
+    let flat = FlatScene::for_paths(&scene);
+    let probe = Probe::new(&device, tracer(&device, TracerKind::Compute, &flat));
+    let (grid, samples) = (grid(), random(SAMPLES, 5));
+    let asks: Vec<Ask> = samples.iter().map(|&u| Ask::Sample(u)).collect();
+    println!("{:32} {:>6} {:>9} {:>9} {:>7} {:>9} {:>9}", "material", "cos", "density", "samples", "delta", "chi2, sd", "albedo");
+    let (mut worst, mut most) = (0.0f64, 0.0f64);
+    for (part, case) in (0u32..).zip(&cases) {
+        // bent shading normals mirror what the surface hides: the same must hold
+        for (view, normal) in views(case).into_iter().map(|v| (v, DVec3::Z)).chain([(from_above(0.6, 0.4), from_above(0.9, 2.9))]) {
+            let what = format!("{}, {:.2}, normal {normal:.2}", case.name, view.z);
+            let at = probe.ask(part, view, normal, &grid);
+            let drawn = probe.ask(part, view, normal, &asks);
+            let finite = |a: &Answer| a.f.is_finite() && a.pdf.is_finite() && a.pdf >= 0.0 && a.f.min_element() >= 0.0;
+            assert!(at.iter().all(finite), "{what}: {:?}", at.iter().find(|a| !finite(a)));
+            assert!(drawn.iter().all(|a| finite(a) && a.weight.is_finite()), "{what}");
+
+            let (mut expected, mut counts) = (vec![0.0; grid.len() / (COARSE * COARSE)], vec![0.0; grid.len() / (COARSE * COARSE)]);
+            for (ask, a) in grid.iter().zip(&at) {
+                let Ask::At(w) = ask else { unreachable!() };
+                expected[coarse(*w)] += a.pdf * CELL * SAMPLES as f64;
+            }
+            let (mut rough, mut delta) = (0.0, 0.0);
+            // radiance is compressed beyond the surface: as energy it is more, by the square of the index
+            let index = case.eta.map_or(1.0, |eta| if view.z > 0.0 { eta * eta } else { 1.0 / (eta * eta) });
+            let (mut reflected, mut energy) = (DVec3::ZERO, DVec3::ZERO);
+            for a in drawn.iter().filter(|a| a.pdf > 0.0) {
+                reflected += a.weight;
+                energy += a.weight * if a.wi.z * view.z < 0.0 { index } else { 1.0 };
+                assert!((a.wi.length() - 1.0).abs() < 1e-4, "{what}: {a:?}");
+                if a.delta {
+                    delta += 1.0;
+                } else {
+                    rough += 1.0;
+                    counts[coarse(a.wi)] += 1.0;
+                    let again = (a.weight * a.pdf - a.f).abs().max_element();
+                    assert!(again <= 2e-4 * a.f.max_element() + 1e-6, "{what}: weight {:?} is not value over density: {a:?}", a.weight);
+                }
+            }
+            let n = SAMPLES as f64;
+            let density = expected.iter().sum::<f64>() / n;
+            let (share, sd) = (rough / n, (density * (1.0 - density).max(1e-4) / n).sqrt());
+            let chi = if rough > 0.0 { chi_square(&expected, &counts) } else { 0.0 };
+            let (albedo, energy) = (reflected / n, energy / n);
+            println!("{:32} {:6.2} {density:9.5} {share:9.5} {:7.3} {chi:9.2} {:9.5}", case.name, view.z, delta / n, energy.x);
+            worst = worst.max(chi);
+            assert!((density - share).abs() <= 5.0 * sd + 3e-3, "{what}: density {density}, samples {share}");
+            assert!(chi < 5.0, "{what}: samples do not follow their density: {chi} standard deviations");
+            // what of the light comes back; a sample's weight varies little
+            most = most.max(energy.max_element());
+            // glTF takes what is diffuse for what the Fresnel term leaves at the half vector, which is another for each direction: at grazing
+            // angles that is more than the specular term, whose half vectors are near the normal, takes away
+            let mixes = case.material.kind == MaterialKind::MetallicRoughness && case.material.metallic < 1.0;
+            let limit = if mixes { 1.0 + 0.4 * (1.0 - view.dot(normal).abs()).powi(2) } else { 1.0 };
+            assert!(energy.max_element() <= limit + 5e-3, "{what}: {energy} of the light goes on");
+            if let Some(loss) = case.conserves {
+                assert!((1.0 - energy.x).abs() <= loss + 1e-5, "{what}: {energy} of the light goes on");
+            }
+            // the same by quadrature, of what is not a delta lobe
+            if delta == 0.0 {
+                let sum = at.iter().map(|a| a.f * CELL).sum::<DVec3>();
+                assert!((sum - albedo).abs().max_element() < 8e-3, "{what}: {sum} by quadrature, {albedo} by samples");
+            }
+        }
+    }
+    println!("greatest: {worst:.2}; most light that goes on: {most:.4}");
+    assert_validation_clean(&device);
+}
+
+#[test]
+fn gpu_directions_may_be_exchanged() {
+    let device = device();
+    let cases = cases();
+    let scene = scene(&cases);
+    let flat = FlatScene::for_paths(&scene);
+    let probe = Probe::new(&device, tracer(&device, TracerKind::Compute, &flat));
+    let mut checked = 0;
+    for (part, case) in (0u32..).zip(&cases).filter(|(_, c)| c.reciprocal) {
+        let side = if case.eta.is_some() || case.material.transmission.factor > 0.0 { 2.0 } else { 1.0 };
+        let two = |u: &[f64; 3]| (from_above(0.05 + 0.95 * u[0], 1.0), from_above(1.0 - (side - 0.05) * u[1], 2.0 * PI * u[2]));
+        let all: Vec<_> = random(256, 9).iter().map(two).filter(|(_, b)| b.z.abs() > 0.05).collect();
+        let there = probe.ask_all(part, DVec3::Z, all.iter().map(|&(a, b)| (a, Ask::At(b))));
+        let back = probe.ask_all(part, DVec3::Z, all.iter().map(|&(a, b)| (b, Ask::At(a))));
+        let mut pairs = 0;
+        for ((&(a, b), there), back) in all.iter().zip(&there).zip(&back) {
+            let (there, back) = (there.f / b.z.abs(), back.f / a.z.abs());
+            // through a surface radiance changes with the square of the index (Veach 1997, 5.2)
+            let eta = if b.z < 0.0 { case.eta.unwrap_or(1.0) } else { 1.0 };
+            let difference = (there * eta * eta - back).abs().max_element();
+            let scale = there.max_element().max(back.max_element());
+            assert!(difference <= 2e-3 * scale + 1e-6, "{}: {a} {b}: {there} and {back}", case.name);
+            pairs += usize::from(scale > 1e-6);
+        }
+        checked += usize::from(pairs > 10);
+    }
+    assert!(checked >= 17, "of {} materials only {checked} had anything to exchange", cases.len());
+}
+
+/// Microfacets of one bounce lose light; what `--energy-compensation` gives back is all of it.
+#[test]
+fn gpu_compensation_gives_back_what_is_lost() {
+    let device = device();
+    let white = |roughness| Material { base_color: glam::Vec4::ONE, ..gltf(1.0, roughness) };
+    let glass = |roughness| Material { kind: MaterialKind::Glass, specular_color: Vec3::ONE, transmittance: Vec3::ONE, roughness, ..Material::default() };
+    let case = |name, material| Case { name, material, reciprocal: false, conserves: None, eta: None };
+    let cases = [
+        case("metal 0.5", white(0.5)),
+        case("metal 1", white(1.0)),
+        case("plastic 1", gltf(0.0, 1.0)),
+        case("plastic 0.5", gltf(0.0, 0.5)),
+        case("glass 0.5", glass(0.5)),
+        case("glass 1", glass(1.0)),
+        case("volume 1", Material { transmission: Transmission { factor: 1.0, thickness: 1.0, ..Default::default() }, ..gltf(0.0, 1.0) }),
+    ];
+    let scene = scene(&cases);
+    let flat = FlatScene::for_paths(&scene);
+    println!("{:12} {:>5} {:>9} {:>9}", "material", "cos", "as it is", "given back");
+    let asks: Vec<Ask> = random(SAMPLES, 3).into_iter().map(Ask::Sample).collect();
+    let probes = [false, true].map(|compensation| {
+        let needs = Needs { shading: true, compensation, ..Default::default() };
+        Probe::new(&device, Tracer::new(&device, TracerKind::Compute, &flat, needs).unwrap())
+    });
+    for (part, case) in (0u32..).zip(&cases) {
+        for cosine in [1.0, 0.6, 0.2] {
+            let energy = |probe: &Probe| {
+                let drawn = probe.ask(part, from_above(cosine, 0.3), DVec3::Z, &asks);
+                // radiance is compressed beyond the surface: as energy it is its square more
+                let index = f64::from(case.material.ior).powi(2);
+                let sum: f64 = drawn.iter().filter(|a| a.pdf > 0.0).map(|a| a.weight.x * if a.wi.z < 0.0 { index } else { 1.0 }).sum();
+                sum / asks.len() as f64
+            };
+            let [plain, full] = probes.each_ref().map(energy);
+            println!("{:12} {cosine:5.2} {plain:9.4} {full:9.4}", case.name);
+            assert!((full - 1.0).abs() <= 1e-2, "{}: {full} of the light at cosine {cosine}, {plain} without", case.name);
+        }
+    }
+}
+
+#[test]
+fn gpu_tracers_agree_on_materials() {
+    let device = device();
+    let cases = cases();
+    let scene = scene(&cases);
+    let flat = FlatScene::for_paths(&scene);
+    let asks: Vec<Ask> = random(64, 1).iter().map(|&u| Ask::Sample(u)).collect();
+    let answers = |kind: TracerKind| -> Vec<Answer> {
+        let probe = Probe::new(&device, tracer(&device, kind, &flat));
+        (0..cases.len() as u32).flat_map(|part| probe.ask(part, from_above(0.6, 0.2), DVec3::Z, &asks)).collect()
+    };
+    let kinds = tracers(&device);
+    let first = answers(kinds[0]);
+    for &kind in &kinds[1..] {
+        for (k, (a, b)) in first.iter().zip(answers(kind)).enumerate() {
+            let near = |x: DVec3, y: DVec3| (x - y).abs().max_element() <= 1e-4 * x.abs().max_element() + 1e-6;
+            let name = cases[k / asks.len()].name;
+            assert!(near(a.wi, b.wi) && near(a.weight, b.weight) && a.delta == b.delta, "{name}: {a:?} by {}, {b:?} by {kind}", kinds[0]);
+        }
+    }
+    assert_validation_clean(&device);
+}

@@ -1,0 +1,192 @@
+//! What materials do along a path: coverage, absorption, normal maps, textures; and views of them.
+
+use super::*;
+use skylit::render::path::View;
+use skylit::scene::builtin::shapes;
+use skylit::scene::material::{AlphaMode, Transmission};
+use skylit::scene::{Filter, Texture, TextureSlot, TriangleMesh, Wrap};
+use glam::{Affine2, Vec2, Vec4};
+
+/// A camera at z = 2 that looks at the origin through a narrow view.
+fn ahead() -> Camera {
+    Camera::look_at(DVec3::new(0.0, 0.0, 2.0), DVec3::ZERO, DVec3::Y, 0.2)
+}
+
+/// A square across the view, which faces the camera.
+fn sheet(z: f64) -> Geometry {
+    shapes::rectangle(DVec3::new(0.0, 0.0, z), DVec3::X * 8.0, DVec3::Y * 8.0)
+}
+
+fn options(spp: u32) -> PathOptions {
+    PathOptions { size: [16, 16], spp, seed: 7, ..Default::default() }
+}
+
+fn covered(alpha: f32, material: Material) -> Material {
+    Material { alpha_mode: AlphaMode::Blend, base_color: material.base_color.truncate().extend(alpha), ..material }
+}
+
+/// A sheet that covers a share of what is behind it: for camera rays, for bounces and for rays to lights.
+#[test]
+fn gpu_coverage() {
+    let device = device();
+    let many = options(2048);
+    let seen = scene_of(vec![(sheet(0.5), covered(0.3, emitter(2.0))), (sheet(0.0), emitter(5.0))], ahead());
+    holds(&device, "camera rays", &seen, &many, 0.3 * 2.0 + 0.7 * 5.0, 3e-3);
+    let twice = scene_of(
+        vec![(sheet(0.5), covered(0.5, emitter(0.0))), (sheet(0.4), covered(0.25, emitter(0.0))), (sheet(0.0), emitter(5.0))],
+        ahead(),
+    );
+    holds(&device, "two sheets", &twice, &many, 0.5 * 0.75 * 5.0, 4e-3);
+    // a lamp behind the camera shines through a sheet that the camera does not look through
+    let mut lit = scene_of(vec![(sheet(0.0), matte(0.5)), (sheet(3.0), covered(0.6, matte(0.0)))], ahead());
+    lit.lights.push(Light {
+        name: String::new(),
+        kind: LightKind::Directional { angle: 0.0 },
+        intensity: Vec3::splat(4.0),
+        position: DVec3::ZERO,
+        direction: DVec3::NEG_Z,
+        range: f64::INFINITY,
+    });
+    holds(&device, "rays to lights", &lit, &PathOptions { max_depth: 1, ..many.clone() }, 0.4 * 4.0 * 0.5 / std::f64::consts::PI, 4e-3);
+    let sky = Scene {
+        environment: Environment::Uniform(Vec3::ONE),
+        ..scene_of(vec![(sheet(0.0), matte(0.5)), (sheet(3.0), covered(1.0, matte(0.0)))], ahead())
+    };
+    let all = {
+        let flat = FlatScene::for_paths(&sky);
+        assert!(!flat.has_alpha(), "an alpha of 1 is opaque");
+        flat.primitive_count()
+    };
+    assert_eq!(all, 4);
+}
+
+/// A box of index 1 that absorbs: light goes straight through it and loses e^(-a d).
+#[test]
+fn gpu_absorption() {
+    let device = device();
+    let glass = |ior| Material {
+        metallic: 0.0,
+        roughness: 0.0,
+        ior,
+        transmission: Transmission {
+            factor: 1.0,
+            thickness: 1.0,
+            attenuation_color: Vec3::splat(0.3),
+            attenuation_distance: 0.5,
+            ..Default::default()
+        },
+        ..Material::default()
+    };
+    let body = shapes::cuboid(DVec3::new(-3.0, -3.0, 0.1), DVec3::new(3.0, 3.0, 0.9));
+    // so narrow that all rays are as long
+    let narrow = Camera::look_at(DVec3::new(0.0, 0.0, 2.0), DVec3::ZERO, DVec3::Y, 1e-3);
+    let seen = scene_of(vec![(body.clone(), glass(1.0)), (sheet(0.0), emitter(5.0))], narrow);
+    let expected = 5.0 * 0.3f64.powf(0.8 / 0.5);
+    // rays start above surfaces, by what rounding asks of so large a box: a millionth of it
+    holds_but_for(2e-5, &device, "absorption", &seen, &options(16), expected, 5e-3);
+    // the sky through a box that absorbs nothing has what Fresnel leaves of two surfaces: with all bounces, everything
+    let clear = Material { transmission: Transmission { attenuation_distance: f32::INFINITY, ..glass(1.5).transmission }, ..glass(1.5) };
+    let furnace = Scene { environment: Environment::Uniform(Vec3::ONE), ..scene_of(vec![(body, clear)], ahead()) };
+    holds(&device, "clear box", &furnace, &options(256), 1.0, 3e-3);
+}
+
+/// Shading normals, interpolated or from a map, lose no light and make none: a white body in white light disappears.
+#[test]
+fn gpu_shading_normals_keep_energy() {
+    let device = device();
+    let furnace = |geometry: Geometry, material: Material, texture: Option<Texture>| {
+        let mut scene = scene_of(vec![(geometry, material)], ahead());
+        scene.environment = Environment::Uniform(Vec3::ONE);
+        scene.textures.extend(texture);
+        scene
+    };
+    // very coarse: the normals are far from the triangles'
+    let Geometry::Triangles(mut ball) = shapes::icosphere(1.0, 1) else { panic!("no triangles") };
+    ball.normals = ball.positions.iter().map(|p| p.normalize()).collect();
+    holds(&device, "coarse ball", &furnace(Geometry::Triangles(ball), matte(1.0), None), &options(64), 1.0, 2e-3);
+    let bumps: Vec<u8> = (0..64u32).flat_map(|k| [(k * 37 % 256) as u8, (k * 101 % 256) as u8, 160, 255]).collect();
+    let map = Texture { name: String::new(), width: 8, height: 8, rgba8: bumps.into(), wrap: [Wrap::Repeat; 2], filter: Filter::Linear };
+    let slot = TextureSlot { texture: 0, texcoord: 0, transform: Affine2::from_scale(Vec2::splat(3.0)) };
+    let mapped = Material { normal_texture: Some(slot), ..matte(1.0) };
+    holds(&device, "normal map", &furnace(textured_sheet(false), mapped, Some(map)), &options(64), 1.0, 2e-3);
+}
+
+/// A square with texture coordinates and tangents along them; `mirrored`: its handedness is the other.
+fn textured_sheet(mirrored: bool) -> Geometry {
+    let Geometry::Triangles(t) = sheet(0.0) else { panic!("no triangles") };
+    let w = if mirrored { -1.0 } else { 1.0 };
+    Geometry::Triangles(TriangleMesh {
+        normals: vec![Vec3::Z; 4],
+        tangents: vec![Vec4::new(1.0, 0.0, 0.0, w); 4],
+        texcoords: [vec![Vec2::ZERO, Vec2::X, Vec2::ONE, Vec2::Y], Vec::new()],
+        ..t
+    })
+}
+
+/// A map of one colour bends all normals alike: the same normal as a view, also where transforms mirror and stretch.
+#[test]
+fn gpu_normal_maps_follow_tangents() {
+    let device = device();
+    let texel = [204u8, 153, 229, 255];
+    let t = Vec3::new(204.0, 153.0, 229.0) / 255.0 * 2.0 - 1.0;
+    let map = |x: [u8; 4]| Texture {
+        name: String::new(),
+        width: 1,
+        height: 1,
+        rgba8: x.to_vec().into(),
+        wrap: [Wrap::Repeat; 2],
+        filter: Filter::Nearest,
+    };
+    let slot = TextureSlot { texture: 0, texcoord: 0, transform: Affine2::IDENTITY };
+    let material = Material { normal_texture: Some(slot), normal_scale: 0.5, ..matte(1.0) };
+    let n = Vec3::new(0.5 * t.x, 0.5 * t.y, t.z).normalize();
+    let turn = DAffine3::from_rotation_z(0.5);
+    let cases = [
+        ("as it is", DAffine3::IDENTITY, false, n),
+        ("other handedness", DAffine3::IDENTITY, true, Vec3::new(n.x, -n.y, n.z)),
+        ("turned", turn, false, turn.matrix3.as_mat3() * n),
+        // x points the other way, and so does the tangent; the bitangent stays
+        ("mirrored", DAffine3::from_scale(DVec3::new(-1.0, 1.0, 1.0)), false, Vec3::new(-n.x, n.y, n.z)),
+    ];
+    for (name, transform, handed, expected) in cases {
+        for twice in [false, true] {
+            let mut scene = scene_of(vec![(textured_sheet(handed), material.clone())], ahead());
+            scene.textures.push(map(texel));
+            scene.instances[0].object_to_world = transform;
+            if twice {
+                // placed twice it is not baked: the shader transforms
+                let far = DAffine3::from_translation(DVec3::new(0.0, 0.0, -50.0));
+                scene.instances.push(Instance { name: String::new(), mesh: 0, object_to_world: far });
+            }
+            let flat = FlatScene::for_paths(&scene);
+            for kind in tracers(&device) {
+                let options = PathOptions { view: Some(View::Normals), size: [4, 4], spp: 2, ..options(1) };
+                let film = render(&tracer(&device, kind, &flat), &flat, &options).image.film;
+                for pixel in film.mean.chunks(3) {
+                    let off = (Vec3::from_slice(pixel) - expected).length();
+                    assert!(off < 1e-4, "{name}, twice {twice}, {kind}: {pixel:?}, not {expected}");
+                }
+            }
+        }
+    }
+}
+
+/// Views are what the auxiliary outputs are, where a sample goes through the pixel's middle: at pixels that see one flat surface.
+#[test]
+fn gpu_views_show_surfaces() {
+    let device = device();
+    let colour = Material { base_color: Vec4::new(0.2, 0.5, 0.8, 1.0), ..Material::default() };
+    let scene = scene_of(vec![(sheet(0.0), colour)], ahead());
+    let flat = FlatScene::for_paths(&scene);
+    for kind in tracers(&device) {
+        let tracer = tracer(&device, kind, &flat);
+        let of = |view| render(&tracer, &flat, &PathOptions { view: Some(view), size: [8, 8], spp: 4, ..options(1) }).image.film;
+        assert!(of(View::Albedo).mean.chunks(3).all(|p| (Vec3::from_slice(p) - Vec3::new(0.2, 0.5, 0.8)).length() < 1e-6));
+        assert!(of(View::Normals).mean.chunks(3).all(|p| (Vec3::from_slice(p) - Vec3::Z).length() < 1e-6));
+        let depth = of(View::Depth);
+        // two units ahead, a little more towards the corners
+        assert!(depth.mean.iter().all(|&d| (2.0..2.03).contains(&d)), "{kind}: {:?}", depth.mean);
+        assert!(of(View::BakedOcclusion).mean.iter().all(|&o| o == 1.0));
+    }
+    assert_validation_clean(&device);
+}
