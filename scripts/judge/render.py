@@ -89,6 +89,8 @@ class Builder:
         pbr, extensions = m["pbrMetallicRoughness"], m.get("extensions", {})
         names = {n.removeprefix("KHR_materials_") for n in extensions} - {"emissive_strength"}
         metallic, roughness = pbr.get("metallicFactor", 1.0), pbr.get("roughnessFactor", 1.0)
+        if "normalTexture" in m:
+            return None
         if "unlit" in names:
             return {"type": "diffuse", "reflectance": rgb([0, 0, 0])}
         if names == {"specular"} and extensions["KHR_materials_specular"] == {"specularFactor": 0.0} and metallic == 0:

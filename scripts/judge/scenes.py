@@ -427,7 +427,7 @@ def _(s: Judged) -> None:
     s.light("point", 6.0, (-1.5, 2.4, -1.2))
 
 
-@scene("alpha-blend", "a sheet that is there in part", "stock", integrator="volpath", awaits="blend")
+@scene("alpha-blend", "a sheet that is there in part", "stock", integrator="volpath")
 def _(s: Judged) -> None:
     s.floor()
     random = np.random.default_rng(9)
@@ -566,14 +566,14 @@ def _(s: Judged) -> None:
     ball(s, surface((0.1, 0.1, 0.1), 0.0, 0.4, extensions=khr(ior={"ior": 2.4})), middle=(0.65, 0.62, 0), radius=0.55)
 
 
-@scene("smooth-normals", "a coarse ball with the sphere's normals", "python", awaits="what shading normals send through a surface")
+@scene("smooth-normals", "a coarse ball with the sphere's normals", "python")
 def _(s: Judged) -> None:
     stage(s)
     s.add(icosphere((-0.65, 0.62, 0), 0.55, 1, smooth=True), matte((0.7, 0.6, 0.3)))
     s.add(icosphere((0.65, 0.62, 0), 0.55, 1, smooth=True), surface((0.8, 0.6, 0.5), 1.0, 0.3))
 
 
-@scene("normal-map", "a normal map on a matte and on a shiny sheet", "python", awaits="normal maps")
+@scene("normal-map", "a normal map on a matte and on a shiny sheet", "python")
 def _(s: Judged) -> None:
     stage(s)
     texture = s.writer.texture(bumps(5, 12, 0.5))
@@ -585,23 +585,22 @@ def _(s: Judged) -> None:
 @scene("glass", "a glass ball", "stock")
 def _(s: Judged) -> None:
     stage(s)
-    s.more["awaits"] = "transmission"
     ball(s, glass())
 
 
-@scene("glass-absorbing", "glass in which light is absorbed", "stock", integrator="volpath", awaits="volumes")
+@scene("glass-absorbing", "glass in which light is absorbed", "stock", integrator="volpath")
 def _(s: Judged) -> None:
     stage(s)
     ball(s, glass(ior=1.4, attenuationColor=[0.3, 0.7, 0.9], attenuationDistance=0.6))
 
 
-@scene("glass-rough", "rough glass, tinted, absorbing", "python", awaits="transmission")
+@scene("glass-rough", "rough glass, tinted, absorbing", "python")
 def _(s: Judged) -> None:
     stage(s)
     ball(s, glass(0.4, (0.9, 0.95, 1.0), 1.5, attenuationColor=[0.8, 0.5, 0.3], attenuationDistance=1.0))
 
 
-@scene("thin", "thin walls that transmit, clear and frosted", "python", awaits="transmission")
+@scene("thin", "thin walls that transmit, clear and frosted", "python")
 def _(s: Judged) -> None:
     stage(s)
     clear = surface((0.9, 0.6, 0.5), 0.0, 0.0, extensions=khr(transmission={"transmissionFactor": 1.0}), doubleSided=True)
@@ -611,7 +610,7 @@ def _(s: Judged) -> None:
     ball(s, matte((0.2, 0.3, 0.8)), middle=(0, 0.5, -0.9), radius=0.45)
 
 
-@scene("clearcoat-smooth", "a smooth coat on a matte and a rough body", "python", awaits="clearcoat")
+@scene("clearcoat-smooth", "a smooth coat on a matte and a rough body", "python")
 def _(s: Judged) -> None:
     stage(s)
     coat = khr(clearcoat={"clearcoatFactor": 1.0, "clearcoatRoughnessFactor": 0.0})
@@ -619,7 +618,7 @@ def _(s: Judged) -> None:
     ball(s, surface((0.2, 0.3, 0.7), 0.0, 0.5, extensions=coat), middle=(0.65, 0.62, 0), radius=0.55)
 
 
-@scene("clearcoat-rough", "a rough coat, whole and in part, on a metal", "python", awaits="clearcoat")
+@scene("clearcoat-rough", "a rough coat, whole and in part, on a metal", "python")
 def _(s: Judged) -> None:
     stage(s)
     for x, factor, roughness in [(-0.65, 1.0, 0.3), (0.65, 0.6, 0.5)]:
@@ -627,7 +626,7 @@ def _(s: Judged) -> None:
         ball(s, surface((0.9, 0.6, 0.3), 1.0, 0.6, extensions=coat), middle=(x, 0.62, 0), radius=0.55)
 
 
-@scene("sheen", "sheen of two roughnesses over a colour", "python", awaits="sheen")
+@scene("sheen", "sheen of two roughnesses over a colour", "python")
 def _(s: Judged) -> None:
     stage(s)
     for x, color, roughness in [(-0.65, [0.9, 0.7, 0.8], 0.3), (0.65, [0.4, 0.6, 0.9], 0.8)]:
@@ -635,7 +634,7 @@ def _(s: Judged) -> None:
         ball(s, surface((0.4, 0.1, 0.15), 0.0, 0.8, extensions=sheen), middle=(x, 0.62, 0), radius=0.55)
 
 
-@scene("anisotropy", "brushed sheets, the direction turned on one of them", "python", awaits="anisotropy")
+@scene("anisotropy", "brushed sheets, the direction turned on one of them", "python")
 def _(s: Judged) -> None:
     stage(s)
     for x, strength, turn in [(-0.75, 0.8, 0.0), (0.75, 0.6, 0.7)]:
@@ -643,7 +642,7 @@ def _(s: Judged) -> None:
         s.add(quad((x, 0.8, 0), (1.3, 0, 0), (0, 1.2, -0.5)), surface((0.9, 0.8, 0.7), 1.0, 0.3, extensions=brushed))
 
 
-@scene("anisotropy-tube", "a brushed tube with smooth normals", "python", awaits="anisotropy")
+@scene("anisotropy-tube", "a brushed tube with smooth normals", "python")
 def _(s: Judged) -> None:
     stage(s)
     brushed = khr(anisotropy={"anisotropyStrength": 0.7, "anisotropyRotation": 0.4})
@@ -651,7 +650,7 @@ def _(s: Judged) -> None:
     s.add(cylinder((0, 0.75, 0), 0.6, 1.3), tube)
 
 
-@scene("layers", "coat, sheen, anisotropy and a metal in part", "python", awaits="everything")
+@scene("layers", "coat, sheen, anisotropy and a metal in part", "python")
 def _(s: Judged) -> None:
     stage(s)
     extensions = khr(

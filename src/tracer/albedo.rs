@@ -58,7 +58,9 @@ fn lambda(alpha: f64, cosine: f64) -> f64 {
 
 /// Midpoints of a grid over the unit square.
 fn grid() -> impl Iterator<Item = (f64, f64)> {
-    (0..POINTS * POINTS).map(|k| ((k % POINTS) as f64 + 0.5, (k / POINTS) as f64 + 0.5)).map(|(x, y)| (x / POINTS as f64, y / POINTS as f64))
+    (0..POINTS * POINTS)
+        .map(|k| ((k % POINTS) as f64 + 0.5, (k / POINTS) as f64 + 0.5))
+        .map(|(x, y)| (x / POINTS as f64, y / POINTS as f64))
 }
 
 fn direction(cosine: f64) -> [f64; 3] {
@@ -93,7 +95,11 @@ fn ggx(cos_o: f64, roughness: f64, fresnel: impl Fn(f64) -> f64) -> f64 {
             let om = dot(wo, m);
             let cos_i = 2.0 * om * m[2] - wo[2];
             // G2 over G1
-            if cos_i > 0.0 { fresnel(om) * (1.0 + lambda(alpha, cos_o)) / (1.0 + lambda(alpha, cos_o) + lambda(alpha, cos_i)) } else { 0.0 }
+            if cos_i > 0.0 {
+                fresnel(om) * (1.0 + lambda(alpha, cos_o)) / (1.0 + lambda(alpha, cos_o) + lambda(alpha, cos_i))
+            } else {
+                0.0
+            }
         })
         .sum();
     sum / (POINTS * POINTS) as f64

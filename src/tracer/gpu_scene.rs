@@ -151,11 +151,8 @@ pub struct GpuScene {
 impl GpuScene {
     /// Writes what `needs` and the scene itself call for.
     pub fn new(device: &Arc<Device>, flat: &FlatScene, needs: Needs) -> Result<Self> {
-        let needs = Needs {
-            normals: needs.normals || needs.shading,
-            albedo: needs.albedo || needs.shading && !needs.white,
-            ..needs
-        };
+        let needs =
+            Needs { normals: needs.normals || needs.shading, albedo: needs.albedo || needs.shading && !needs.white, ..needs };
         let groups = flat.groups.iter().map(|g| group_buffers(device, flat, g)).collect::<Result<Vec<_>>>()?;
         let (mut parts, mut first_part) = (Vec::new(), Vec::new());
         let mut others = Vec::new();
@@ -506,7 +503,8 @@ struct Attributes {
 impl Attributes {
     /// Baked normals and tangents differ from part to part; everything else is the mesh's own.
     fn key(part: &Part, index: usize, attribute: Attribute) -> (usize, Option<usize>, Attribute) {
-        let baked = matches!(attribute, Attribute::Normals | Attribute::Tangents) && part.to_group.matrix3 != glam::DMat3::IDENTITY;
+        let baked =
+            matches!(attribute, Attribute::Normals | Attribute::Tangents) && part.to_group.matrix3 != glam::DMat3::IDENTITY;
         (part.mesh, baked.then_some(index), attribute)
     }
 

@@ -141,7 +141,11 @@ pub(super) fn slots(m: &Material, needs: Needs) -> [Option<TextureSlot>; SLOTS] 
 fn walls(m: &Material) -> u32 {
     match m.kind {
         MaterialKind::MetallicRoughness if !m.unlit && m.transmission.factor > 0.0 => {
-            if m.transmission.thickness > 0.0 { VOLUME } else { THIN_WALLS }
+            if m.transmission.thickness > 0.0 {
+                VOLUME
+            } else {
+                THIN_WALLS
+            }
         }
         _ => NO_WALLS,
     }

@@ -207,7 +207,9 @@ fn spheres_are_tessellated() {
     assert_eq!(indices.len(), 2 * 20480);
     let ball = |p: &Vec3| (p.distance(Vec3::new(2.0, 0.0, 0.0)) - 4.0).abs() < 1e-5;
     let bulb = |p: &Vec3| (p.distance(Vec3::new(0.0, 9.0, 0.0)) - 0.5).abs() < 1e-5;
-    assert!(positions.iter().all(|p| ball(p) || bulb(p)) && positions.iter().filter(|p| bulb(p)).count() * 2 == positions.len());
+    assert!(
+        positions.iter().all(|p| ball(p) || bulb(p)) && positions.iter().filter(|p| bulb(p)).count() * 2 == positions.len()
+    );
 }
 
 #[test]

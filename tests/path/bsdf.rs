@@ -3,8 +3,8 @@
 
 use super::*;
 use skylit::gpu::{Buffer, Commands, Memory};
-use skylit::scene::material::{Anisotropy, Clearcoat, Sheen, Transmission};
 use skylit::scene::TriangleMesh;
+use skylit::scene::material::{Anisotropy, Clearcoat, Sheen, Transmission};
 use skylit::tracer::{Push, Stream, stream};
 use std::f64::consts::PI;
 
@@ -79,7 +79,13 @@ impl Probe<'_> {
             .chunks_exact(48)
             .map(|bytes| {
                 let v: [f32; 12] = bytemuck::pod_read_unaligned(bytes);
-                Answer { f: vector(&v[..3]), pdf: v[3].into(), wi: vector(&v[4..7]), delta: v[7] != 0.0, weight: vector(&v[8..11]) }
+                Answer {
+                    f: vector(&v[..3]),
+                    pdf: v[3].into(),
+                    wi: vector(&v[4..7]),
+                    delta: v[7] != 0.0,
+                    weight: vector(&v[8..11]),
+                }
             })
             .collect()
     }
@@ -134,7 +140,13 @@ fn cases() -> Vec<Case> {
         case("smooth thin walls, half metal", Material { transmission: through(0.7, 0.0), ..gltf(0.5, 0.0) }),
         ior(1.5, case("volume 0.5", Material { transmission: through(1.0, 1.0), ..gltf(0.0, 0.5) })),
         ior(1.33, case("half volume 0.6", Material { transmission: through(0.5, 1.0), ior: 1.33, ..gltf(0.0, 0.6) })),
-        ior(1.5, Case { conserves: Some(1e-3), ..case("smooth volume", Material { transmission: through(1.0, 1.0), ..gltf(0.0, 0.0) }) }),
+        ior(
+            1.5,
+            Case {
+                conserves: Some(1e-3),
+                ..case("smooth volume", Material { transmission: through(1.0, 1.0), ..gltf(0.0, 0.0) })
+            },
+        ),
         ior(1.5, case("rough glass", brhan(MaterialKind::Glass, 0.6))),
         ior(1.5, Case { conserves: Some(1e-3), ..case("smooth glass", brhan(MaterialKind::Glass, 0.0)) }),
         case("copper", brhan(MaterialKind::Copper, 0.4)),
@@ -233,11 +245,16 @@ fn gpu_samples_follow_their_density() {
     let probe = Probe::new(&device, tracer(&device, TracerKind::Compute, &flat));
     let (grid, samples) = (grid(), random(SAMPLES, 5));
     let asks: Vec<Ask> = samples.iter().map(|&u| Ask::Sample(u)).collect();
-    println!("{:32} {:>6} {:>9} {:>9} {:>7} {:>9} {:>9}", "material", "cos", "density", "samples", "delta", "chi2, sd", "albedo");
+    println!(
+        "{:32} {:>6} {:>9} {:>9} {:>7} {:>9} {:>9}",
+        "material", "cos", "density", "samples", "delta", "chi2, sd", "albedo"
+    );
     let (mut worst, mut most) = (0.0f64, 0.0f64);
     for (part, case) in (0u32..).zip(&cases) {
         // bent shading normals mirror what the surface hides: the same must hold
-        for (view, normal) in views(case).into_iter().map(|v| (v, DVec3::Z)).chain([(from_above(0.6, 0.4), from_above(0.9, 2.9))]) {
+        for (view, normal) in
+            views(case).into_iter().map(|v| (v, DVec3::Z)).chain([(from_above(0.6, 0.4), from_above(0.9, 2.9))])
+        {
             let what = format!("{}, {:.2}, normal {normal:.2}", case.name, view.z);
             let at = probe.ask(part, view, normal, &grid);
             let drawn = probe.ask(part, view, normal, &asks);
@@ -245,7 +262,8 @@ fn gpu_samples_follow_their_density() {
             assert!(at.iter().all(finite), "{what}: {:?}", at.iter().find(|a| !finite(a)));
             assert!(drawn.iter().all(|a| finite(a) && a.weight.is_finite()), "{what}");
 
-            let (mut expected, mut counts) = (vec![0.0; grid.len() / (COARSE * COARSE)], vec![0.0; grid.len() / (COARSE * COARSE)]);
+            let (mut expected, mut counts) =
+                (vec![0.0; grid.len() / (COARSE * COARSE)], vec![0.0; grid.len() / (COARSE * COARSE)]);
             for (ask, a) in grid.iter().zip(&at) {
                 let Ask::At(w) = ask else { unreachable!() };
                 expected[coarse(*w)] += a.pdf * CELL * SAMPLES as f64;
@@ -264,7 +282,11 @@ fn gpu_samples_follow_their_density() {
                     rough += 1.0;
                     counts[coarse(a.wi)] += 1.0;
                     let again = (a.weight * a.pdf - a.f).abs().max_element();
-                    assert!(again <= 2e-4 * a.f.max_element() + 1e-6, "{what}: weight {:?} is not value over density: {a:?}", a.weight);
+                    assert!(
+                        again <= 2e-4 * a.f.max_element() + 1e-6,
+                        "{what}: weight {:?} is not value over density: {a:?}",
+                        a.weight
+                    );
                 }
             }
             let n = SAMPLES as f64;
@@ -331,7 +353,13 @@ fn gpu_directions_may_be_exchanged() {
 fn gpu_compensation_gives_back_what_is_lost() {
     let device = device();
     let white = |roughness| Material { base_color: glam::Vec4::ONE, ..gltf(1.0, roughness) };
-    let glass = |roughness| Material { kind: MaterialKind::Glass, specular_color: Vec3::ONE, transmittance: Vec3::ONE, roughness, ..Material::default() };
+    let glass = |roughness| Material {
+        kind: MaterialKind::Glass,
+        specular_color: Vec3::ONE,
+        transmittance: Vec3::ONE,
+        roughness,
+        ..Material::default()
+    };
     let case = |name, material| Case { name, material, reciprocal: false, conserves: None, eta: None };
     let cases = [
         case("metal 0.5", white(0.5)),
@@ -340,7 +368,10 @@ fn gpu_compensation_gives_back_what_is_lost() {
         case("plastic 0.5", gltf(0.0, 0.5)),
         case("glass 0.5", glass(0.5)),
         case("glass 1", glass(1.0)),
-        case("volume 1", Material { transmission: Transmission { factor: 1.0, thickness: 1.0, ..Default::default() }, ..gltf(0.0, 1.0) }),
+        case(
+            "volume 1",
+            Material { transmission: Transmission { factor: 1.0, thickness: 1.0, ..Default::default() }, ..gltf(0.0, 1.0) },
+        ),
     ];
     let scene = scene(&cases);
     let flat = FlatScene::for_paths(&scene);
@@ -356,7 +387,8 @@ fn gpu_compensation_gives_back_what_is_lost() {
                 let drawn = probe.ask(part, from_above(cosine, 0.3), DVec3::Z, &asks);
                 // radiance is compressed beyond the surface: as energy it is its square more
                 let index = f64::from(case.material.ior).powi(2);
-                let sum: f64 = drawn.iter().filter(|a| a.pdf > 0.0).map(|a| a.weight.x * if a.wi.z < 0.0 { index } else { 1.0 }).sum();
+                let sum: f64 =
+                    drawn.iter().filter(|a| a.pdf > 0.0).map(|a| a.weight.x * if a.wi.z < 0.0 { index } else { 1.0 }).sum();
                 sum / asks.len() as f64
             };
             let [plain, full] = probes.each_ref().map(energy);
@@ -383,7 +415,11 @@ fn gpu_tracers_agree_on_materials() {
         for (k, (a, b)) in first.iter().zip(answers(kind)).enumerate() {
             let near = |x: DVec3, y: DVec3| (x - y).abs().max_element() <= 1e-4 * x.abs().max_element() + 1e-6;
             let name = cases[k / asks.len()].name;
-            assert!(near(a.wi, b.wi) && near(a.weight, b.weight) && a.delta == b.delta, "{name}: {a:?} by {}, {b:?} by {kind}", kinds[0]);
+            assert!(
+                near(a.wi, b.wi) && near(a.weight, b.weight) && a.delta == b.delta,
+                "{name}: {a:?} by {}, {b:?} by {kind}",
+                kinds[0]
+            );
         }
     }
     assert_validation_clean(&device);

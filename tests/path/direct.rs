@@ -188,7 +188,14 @@ fn gpu_many_lights() {
     let result = render(&tracer(&device, TracerKind::Compute, &flat), &flat, &options);
     assert!(result.light_tree && result.lights == 2 * (n * n) as u32, "{} lights", result.lights);
     for strategy in [Strategy::Mis, Strategy::Light] {
-        holds(&device, "many lights", &scene, &PathOptions { strategy, max_depth: 1, ..options.clone() }, RHO * 4.0 * form, 2e-2);
+        holds(
+            &device,
+            "many lights",
+            &scene,
+            &PathOptions { strategy, max_depth: 1, ..options.clone() },
+            RHO * 4.0 * form,
+            2e-2,
+        );
     }
     let mut sunny = ceiling(4.0);
     // below the ceiling's edge

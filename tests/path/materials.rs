@@ -1,11 +1,11 @@
 //! What materials do along a path: coverage, absorption, normal maps, textures; and views of them.
 
 use super::*;
+use glam::{Affine2, Vec2, Vec4};
 use skylit::render::path::View;
 use skylit::scene::builtin::shapes;
 use skylit::scene::material::{AlphaMode, Transmission};
 use skylit::scene::{Filter, Texture, TextureSlot, TriangleMesh, Wrap};
-use glam::{Affine2, Vec2, Vec4};
 
 /// A camera at z = 2 that looks at the origin through a narrow view.
 fn ahead() -> Camera {
@@ -47,7 +47,14 @@ fn gpu_coverage() {
         direction: DVec3::NEG_Z,
         range: f64::INFINITY,
     });
-    holds(&device, "rays to lights", &lit, &PathOptions { max_depth: 1, ..many.clone() }, 0.4 * 4.0 * 0.5 / std::f64::consts::PI, 4e-3);
+    holds(
+        &device,
+        "rays to lights",
+        &lit,
+        &PathOptions { max_depth: 1, ..many.clone() },
+        0.4 * 4.0 * 0.5 / std::f64::consts::PI,
+        4e-3,
+    );
     let sky = Scene {
         environment: Environment::Uniform(Vec3::ONE),
         ..scene_of(vec![(sheet(0.0), matte(0.5)), (sheet(3.0), covered(1.0, matte(0.0)))], ahead())
@@ -85,7 +92,10 @@ fn gpu_absorption() {
     // rays start above surfaces, by what rounding asks of so large a box: a millionth of it
     holds_but_for(2e-5, &device, "absorption", &seen, &options(16), expected, 5e-3);
     // the sky through a box that absorbs nothing has what Fresnel leaves of two surfaces: with all bounces, everything
-    let clear = Material { transmission: Transmission { attenuation_distance: f32::INFINITY, ..glass(1.5).transmission }, ..glass(1.5) };
+    let clear = Material {
+        transmission: Transmission { attenuation_distance: f32::INFINITY, ..glass(1.5).transmission },
+        ..glass(1.5)
+    };
     let furnace = Scene { environment: Environment::Uniform(Vec3::ONE), ..scene_of(vec![(body, clear)], ahead()) };
     holds(&device, "clear box", &furnace, &options(256), 1.0, 3e-3);
 }
@@ -105,7 +115,14 @@ fn gpu_shading_normals_keep_energy() {
     ball.normals = ball.positions.iter().map(|p| p.normalize()).collect();
     holds(&device, "coarse ball", &furnace(Geometry::Triangles(ball), matte(1.0), None), &options(64), 1.0, 2e-3);
     let bumps: Vec<u8> = (0..64u32).flat_map(|k| [(k * 37 % 256) as u8, (k * 101 % 256) as u8, 160, 255]).collect();
-    let map = Texture { name: String::new(), width: 8, height: 8, rgba8: bumps.into(), wrap: [Wrap::Repeat; 2], filter: Filter::Linear };
+    let map = Texture {
+        name: String::new(),
+        width: 8,
+        height: 8,
+        rgba8: bumps.into(),
+        wrap: [Wrap::Repeat; 2],
+        filter: Filter::Linear,
+    };
     let slot = TextureSlot { texture: 0, texcoord: 0, transform: Affine2::from_scale(Vec2::splat(3.0)) };
     let mapped = Material { normal_texture: Some(slot), ..matte(1.0) };
     holds(&device, "normal map", &furnace(textured_sheet(false), mapped, Some(map)), &options(64), 1.0, 2e-3);
@@ -180,7 +197,8 @@ fn gpu_views_show_surfaces() {
     let flat = FlatScene::for_paths(&scene);
     for kind in tracers(&device) {
         let tracer = tracer(&device, kind, &flat);
-        let of = |view| render(&tracer, &flat, &PathOptions { view: Some(view), size: [8, 8], spp: 4, ..options(1) }).image.film;
+        let of =
+            |view| render(&tracer, &flat, &PathOptions { view: Some(view), size: [8, 8], spp: 4, ..options(1) }).image.film;
         assert!(of(View::Albedo).mean.chunks(3).all(|p| (Vec3::from_slice(p) - Vec3::new(0.2, 0.5, 0.8)).length() < 1e-6));
         assert!(of(View::Normals).mean.chunks(3).all(|p| (Vec3::from_slice(p) - Vec3::Z).length() < 1e-6));
         let depth = of(View::Depth);

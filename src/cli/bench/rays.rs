@@ -43,8 +43,11 @@ pub fn run(args: &BenchRaysArgs) -> Result<(), Failure> {
     // before anything that takes long: a broken peers file, a scene that does not exist
     let specs = peer_specs(args)?;
     scenes.iter().try_for_each(|s| scenes::check_there(s))?;
-    let device =
-        Device::open(&crate::gpu::Options { device: args.common.device.clone(), validation: args.common.validation, ..Default::default() })?;
+    let device = Device::open(&crate::gpu::Options {
+        device: args.common.device.clone(),
+        validation: args.common.validation,
+        ..Default::default()
+    })?;
     let mut bench = Bench {
         args,
         device: &device,
@@ -101,7 +104,8 @@ fn write(args: &BenchRaysArgs, out: &RayBenchmark) -> Result<()> {
             .map_err(|e| Error::CheckFailed(format!("cannot express the result as JSON: {e}")))?;
         output::write_atomically(path, |f| f.write_all(text.as_bytes()).and_then(|()| f.write_all(b"\n")))
     });
-    let csv = args.common
+    let csv = args
+        .common
         .csv
         .as_ref()
         .map_or(Ok(()), |path| output::write_atomically(path, |f| out.write_csv(f).map_err(std::io::Error::other)));

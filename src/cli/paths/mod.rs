@@ -90,7 +90,12 @@ pub fn run(args: &RenderArgs, start: Instant) -> Result<(), Failure> {
             u64::from(result.image.spp) * u64::from(size[0]) * u64::from(size[1])
         ));
     }
-    if options.view.is_none() && options.white_sky.is_none() && scene.environment == Environment::Black && scene.lights.is_empty() && !emits(&flat) {
+    if options.view.is_none()
+        && options.white_sky.is_none()
+        && scene.environment == Environment::Black
+        && scene.lights.is_empty()
+        && !emits(&flat)
+    {
         warnings.add("the scene has no light, and the image is black: give --environment FILE or R,G,B");
     }
 

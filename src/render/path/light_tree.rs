@@ -74,8 +74,8 @@ impl Bounds {
     /// Conty Estevez and Kulla's measure: what it costs to be drawn in vain.
     fn cost(&self) -> f64 {
         let (o, w) = (self.spread, (self.spread + self.falloff).min(PI));
-        let solid = 2.0 * PI * (1.0 - o.cos())
-            + 0.5 * PI * (2.0 * w * o.sin() - (o - 2.0 * w).cos() - 2.0 * o * o.sin() + o.cos());
+        let solid =
+            2.0 * PI * (1.0 - o.cos()) + 0.5 * PI * (2.0 * w * o.sin() - (o - 2.0 * w).cos() - 2.0 * o * o.sin() + o.cos());
         let d = self.hi - self.lo;
         self.intensity * solid.max(1e-9) * (d.x * d.y + d.y * d.z + d.z * d.x).max(1e-30)
     }
@@ -153,7 +153,8 @@ impl Tree<'_> {
     /// Sorts lights into two parts, neither empty; returns how many are in the first.
     fn split(&self, of: &mut [u32], level: u32) -> usize {
         let middle = |k: u32| self.lights[k as usize].middle();
-        let (lo, hi) = of.iter().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(lo, hi), &k| (lo.min(middle(k)), hi.max(middle(k))));
+        let (lo, hi) =
+            of.iter().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(lo, hi), &k| (lo.min(middle(k)), hi.max(middle(k))));
         let extent = hi - lo;
         let mut best: Option<(f64, usize, f64)> = None;
         let axes = if level < MEASURED_LEVELS { 0..3 } else { 0..0 };
@@ -185,7 +186,13 @@ impl Tree<'_> {
                 return of_first;
             }
         }
-        let axis = if extent.x >= extent.y && extent.x >= extent.z { 0 } else if extent.y >= extent.z { 1 } else { 2 };
+        let axis = if extent.x >= extent.y && extent.x >= extent.z {
+            0
+        } else if extent.y >= extent.z {
+            1
+        } else {
+            2
+        };
         let half = of.len() / 2;
         of.select_nth_unstable_by(half, |&a, &b| middle(a)[axis].total_cmp(&middle(b)[axis]).then(a.cmp(&b)));
         half
@@ -227,7 +234,8 @@ mod tests {
 
     /// shaders/path/light_tree.glsl, in double precision.
     fn importance(n: &LightNode, from: DVec3) -> f64 {
-        let less = |a: (f64, f64), b: (f64, f64)| if a.0 > b.0 { (1.0, 0.0) } else { (a.0 * b.0 + a.1 * b.1, a.1 * b.0 - a.0 * b.1) };
+        let less =
+            |a: (f64, f64), b: (f64, f64)| if a.0 > b.0 { (1.0, 0.0) } else { (a.0 * b.0 + a.1 * b.1, a.1 * b.0 - a.0 * b.1) };
         let d = from - glam::Vec3::from_array(n.center).as_dvec3();
         let (d2, r2) = (d.length_squared(), f64::from(n.radius).powi(2));
         if d2 <= r2 {

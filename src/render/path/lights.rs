@@ -163,7 +163,11 @@ fn add_punctual(all: &mut Gathered, flat: &FlatScene, light: &Light) {
             let solid = 2.0 * PI * (1.0 - 0.5 * f64::from(inner + outer));
             let record = LightRecord { kind: SPOT, cos_inner: inner, cos_outer: outer, ..base };
             let (spread, reach) = (f64::from(inner_angle), f64::from(outer_angle));
-            all.push(record, solid * brightness, Some(place(light.direction.normalize_or(DVec3::NEG_Z), spread, reach - spread)));
+            all.push(
+                record,
+                solid * brightness,
+                Some(place(light.direction.normalize_or(DVec3::NEG_Z), spread, reach - spread)),
+            );
         }
         LightKind::Directional { angle } => {
             // 1 - cos, without cancellation

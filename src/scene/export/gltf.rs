@@ -13,9 +13,7 @@ use serde_json::{Value, json};
 use super::{Written, icosphere, material, write_buffered};
 use crate::error::{Error, Result};
 use crate::scene::animation::Shape;
-use crate::scene::{
-    Camera, Filter, Geometry, Light, LightKind, Projection, Scene, Sphere, Texture, TriangleMesh, Wrap,
-};
+use crate::scene::{Camera, Filter, Geometry, Light, LightKind, Projection, Scene, Sphere, Texture, TriangleMesh, Wrap};
 
 /// Writes `scene` as glTF 2.0: one `.glb` file with everything in it, or a `.gltf` with a `.bin` and PNG files of the same
 /// name beside it. The extension of `path` decides. Each file appears only when it is complete, the `.gltf` last.

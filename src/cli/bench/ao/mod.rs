@@ -49,8 +49,11 @@ pub fn run(args: &BenchAoArgs) -> Result<(), Failure> {
     let (scenes, notes) = scenes::choose(args);
     // before anything that takes long
     scenes.iter().try_for_each(|s| check_there(s))?;
-    let device =
-        Device::open(&gpu::Options { device: args.common.device.clone(), validation: args.common.validation, ..Default::default() })?;
+    let device = Device::open(&gpu::Options {
+        device: args.common.device.clone(),
+        validation: args.common.validation,
+        ..Default::default()
+    })?;
     let kind = args.tracer.on(&device.info).0;
     let mut bench = Bench {
         args,
@@ -102,7 +105,8 @@ fn write(args: &BenchAoArgs, out: &AoBenchmark) -> Result<()> {
             .map_err(|e| Error::CheckFailed(format!("cannot express the result as JSON: {e}")))?;
         output::write_atomically(path, |f| f.write_all(text.as_bytes()).and_then(|()| f.write_all(b"\n")))
     });
-    let csv = args.common
+    let csv = args
+        .common
         .csv
         .as_ref()
         .map_or(Ok(()), |path| output::write_atomically(path, |f| out.write_csv(f).map_err(std::io::Error::other)));

@@ -82,8 +82,11 @@ fn truth(bench: &mut Bench, shot: &Shot) -> Result<Truth> {
 
 /// Time by the number of triangles.
 fn triangles(bench: &mut Bench, scenes: &[String]) -> Result<SeriesRecord> {
-    let default: Vec<String> =
-        if bench.args.common.quick { QUICK_TRIANGLES.map(str::to_owned).to_vec() } else { TRIANGLES.map(str::to_owned).to_vec() };
+    let default: Vec<String> = if bench.args.common.quick {
+        QUICK_TRIANGLES.map(str::to_owned).to_vec()
+    } else {
+        TRIANGLES.map(str::to_owned).to_vec()
+    };
     let sources = if bench.args.scenes.is_empty() { default } else { scenes.to_vec() };
     let mut lines: Vec<SeriesLine> = [OURS, THEIRS].map(|name| SeriesLine { name: name.to_owned(), points: Vec::new() }).into();
     for (k, source) in sources.iter().enumerate() {

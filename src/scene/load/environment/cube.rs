@@ -24,7 +24,10 @@ pub(super) fn read(folder: &Path) -> Result<Pixels> {
     let side = faces[0].width;
     if let Some(k) = faces.iter().position(|f| f.width != side || f.height != side) {
         let (w, h) = (faces[k].width, faces[k].height);
-        return Err(Error::input(folder, format!("face {} is {w}x{h}, not {side}x{side}: all must be square and alike", FACES[k])));
+        return Err(Error::input(
+            folder,
+            format!("face {} is {w}x{h}, not {side}x{side}: all must be square and alike", FACES[k]),
+        ));
     }
     let (width, height) = ((4 * side).min(MAX_SIDE), (2 * side).min(MAX_SIDE / 2));
     let radiance = (0..width * height).into_par_iter().with_min_len(4096).map(|k| texel(&faces, [width, height], k)).collect();
@@ -53,7 +56,8 @@ fn texel(faces: &[Pixels], [width, height]: [u32; 2], k: u32) -> Vec3 {
     let (x, y) = (k % width, k / width);
     let mut sum = Vec3::ZERO;
     for p in 0..POINTS * POINTS {
-        let at = |pixel: u32, point: u32, n: u32| (f64::from(pixel) + (f64::from(point) + 0.5) / f64::from(POINTS)) / f64::from(n);
+        let at =
+            |pixel: u32, point: u32, n: u32| (f64::from(pixel) + (f64::from(point) + 0.5) / f64::from(POINTS)) / f64::from(n);
         // from the upper left corner; -z is in the middle, +x to the right of it (shaders/path/map.glsl)
         let (phi, theta) = (2.0 * PI * (at(x, p % POINTS, width) - 0.5), PI * at(y, p / POINTS, height));
         sum += look_up(faces, DVec3::new(theta.sin() * phi.sin(), theta.cos(), -theta.sin() * phi.cos()));
@@ -92,9 +96,8 @@ mod tests {
     /// Faces of one colour each: every direction sees the face that it points at.
     #[test]
     fn directions_find_their_faces() {
-        let faces: Vec<Pixels> = (0..6)
-            .map(|k| Pixels { width: 4, height: 4, radiance: vec![Vec3::splat(k as f32); 16] })
-            .collect();
+        let faces: Vec<Pixels> =
+            (0..6).map(|k| Pixels { width: 4, height: 4, radiance: vec![Vec3::splat(k as f32); 16] }).collect();
         let axes = [DVec3::X, DVec3::NEG_X, DVec3::Y, DVec3::NEG_Y, DVec3::Z, DVec3::NEG_Z];
         for (k, axis) in axes.into_iter().enumerate() {
             assert_eq!(look_up(&faces, (axis + DVec3::new(0.1, 0.2, -0.15)).normalize()).x, k as f32);
