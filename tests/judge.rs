@@ -287,13 +287,13 @@ fn compare(ours: &Estimate, judge: &Estimate) -> Verdict {
     let mut squares = 0.0;
     for t in 0..across[0] * across[1] {
         let tile = [t % across[0], t / across[0]];
-        for c in 0..3 {
+        for (c, average) in averages.iter().enumerate() {
             let (difference, error) = over(&|p| [p % width / TILE, p / width / TILE] == tile, c);
             let z = difference / error.max(1e-12);
             v.tile_z = v.tile_z.max(z.abs());
             squares += z * z;
             if z.abs() > threshold {
-                let percent = 100.0 * difference / averages[c].max(1e-12);
+                let percent = 100.0 * difference / average.max(1e-12);
                 v.failures.push(format!("tile {tile:?}, channel {c}: {z:.1} sigmas, {percent:.2} % of the image's mean"));
             }
         }
