@@ -53,7 +53,7 @@ bool alpha_passes(uint instance, uint primitive, vec2 uv) {
     MaterialRecord material = MaterialRecords(root.materials).v[part.material];
     float alpha = base_color(part, material, primitive, uv).a;
     // rays differ in where they meet it, if by bits only: that is as good as a number of their own, and the same however often it is asked
-    if (material.coverage != 0u) return alpha > evenly(floatBitsToUint(uv), uvec2(instance, primitive));
+    if (HAS_COVERAGE && material.coverage != 0u) return alpha > evenly(floatBitsToUint(uv), uvec2(instance, primitive));
     return alpha >= material.alpha_cutoff;
 }
 

@@ -7,6 +7,7 @@
 layout(constant_id = 0) const bool HAS_ALPHA = true;
 layout(constant_id = 1) const bool HAS_SPHERES = true;
 layout(constant_id = 2) const bool SINGLE_LEVEL = false;
+layout(constant_id = 10) const bool HAS_COVERAGE = true;
 
 layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer SceneRoot {
     uvec2 instances;   // InstanceRecord: an entry of the top level

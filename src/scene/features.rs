@@ -90,6 +90,8 @@ fn alpha_range(rgba8: &[u8]) -> (f32, f32) {
 pub struct SceneFeatures {
     /// Some triangles are alpha tested.
     pub alpha: bool,
+    /// Some of them are there for a part of the rays ([`Blend::Covered`]).
+    pub coverage: bool,
     /// There are analytic spheres.
     pub spheres: bool,
     /// One top-level entry with an identity transform.
@@ -101,7 +103,13 @@ pub struct SceneFeatures {
 impl SceneFeatures {
     /// Of a flattened scene.
     pub fn of(flat: &FlatScene) -> Self {
-        Self { alpha: flat.has_alpha(), spheres: flat.has_spheres(), single_level: flat.is_single_level(), shading: None }
+        Self {
+            alpha: flat.has_alpha(),
+            coverage: flat.has_coverage(),
+            spheres: flat.has_spheres(),
+            single_level: flat.is_single_level(),
+            shading: None,
+        }
     }
 
     /// One line for each thing that is skipped, and what that saves.

@@ -7,7 +7,7 @@
 use glam::{DAffine3, DVec3, Vec3};
 
 use super::features::{AlphaClass, Blend, alpha_classes};
-use super::{Geometry, Scene, Sphere};
+use super::{AlphaMode, Geometry, Scene, Sphere};
 use crate::bvh::Aabb;
 use crate::error::{Error, Result};
 
@@ -192,6 +192,12 @@ impl<'a> FlatScene<'a> {
     /// Does any primitive need its material asked at every hit?
     pub fn has_alpha(&self) -> bool {
         self.groups.iter().any(|g| g.opaque_count < g.primitive_count)
+    }
+
+    /// Is any of them there for a part of the rays only?
+    pub fn has_coverage(&self) -> bool {
+        let covers = |p: &Part| self.scene.materials[self.scene.meshes[p.mesh].material].alpha_mode == AlphaMode::Blend;
+        self.blend == Blend::Covered && self.groups.iter().flat_map(|g| &g.parts).any(|p| p.alpha_tested && covers(p))
     }
 
     /// Is there a sphere?

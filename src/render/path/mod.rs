@@ -272,9 +272,15 @@ impl Paths {
         }
         let most = most_rays(options.size, options.spp);
         let white = Environment::Uniform(glam::Vec3::ONE);
-        let around = if options.white_sky.is_some() { &white } else { &flat.scene.environment };
+        let around = match options.view {
+            // it shows surfaces, whatever shines on them
+            Some(_) => &Environment::Black,
+            None if options.white_sky.is_some() => &white,
+            None => &flat.scene.environment,
+        };
         let environment = DeviceEnvironment::new(device, around)?;
         let lights = match options.white_sky {
+            _ if options.view.is_some() => Lights::default(),
             Some(_) => Lights::sky_only(),
             None => Lights::new(flat, environment.mean),
         };
