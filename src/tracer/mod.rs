@@ -22,7 +22,7 @@ pub mod stream;
 pub mod visits;
 mod wide;
 
-use std::sync::{Arc, OnceLock};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::time::Instant;
 
 pub use drawable::Drawable;
@@ -134,6 +134,8 @@ pub struct Tracer {
     // by mode
     kernels: [OnceLock<Arc<ComputePipeline>>; 2],
     prepared: Prepared,
+    // those that were asked for: who renders twice compiles once
+    streams: Mutex<Vec<Stream>>,
 }
 
 impl Tracer {
@@ -231,6 +233,7 @@ impl Tracer {
             stats,
             dynamic: dynamic::Dynamic::new(flat).map(Box::new),
             kernels: Default::default(),
+            streams: Default::default(),
             prepared,
         })
     }
@@ -284,8 +287,21 @@ impl Tracer {
         }
     }
 
-    /// Compiles a stream for this tracer and scene.
+    /// A stream for this tracer and scene, compiled when it is first asked for.
+    ///
+    /// # Errors
+    /// Those of the device.
     pub fn stream(&self, shaders: &'static StreamShaders) -> Result<Stream> {
+        let all = || self.streams.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(stream) = all().iter().find(|s| std::ptr::eq(s.shaders(), shaders)) {
+            return Ok(stream.clone());
+        }
+        let stream = self.compile(shaders)?;
+        all().push(stream.clone());
+        Ok(stream)
+    }
+
+    fn compile(&self, shaders: &'static StreamShaders) -> Result<Stream> {
         match &self.structure {
             Structure::Compute(h) => {
                 let (info, options) =

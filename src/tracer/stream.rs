@@ -98,26 +98,27 @@ const PACKET_RAYS: u32 = 2;
 /// Stands where a result will be: `UNFINISHED` of shaders/trace/launch.glsl.
 const UNFINISHED: u32 = 0x7fc0_dead;
 
+#[derive(Clone)]
 enum Pipeline {
     /// One compute shader over all rays.
     Single {
-        pipeline: ComputePipeline,
+        pipeline: Arc<ComputePipeline>,
         rays_per_group: u32,
     },
     /// Generate, trace, deliver.
     Steps {
         // none: the rays are in memory
-        generate: Option<ComputePipeline>,
+        generate: Option<Arc<ComputePipeline>>,
         trace: Arc<ComputePipeline>,
-        deliver: ComputePipeline,
+        deliver: Arc<ComputePipeline>,
         rays_per_group: u32,
         memory: LaunchMemory,
         // bytes of a result
         record: u64,
     },
-    RayTracing(RayTracingPipeline),
+    RayTracing(Arc<RayTracingPipeline>),
     /// One compute shader over all rays, whose hits are known but for where.
-    Drawn(ComputePipeline),
+    Drawn(Arc<ComputePipeline>),
 }
 
 /// Where a launch's rays and results are between its steps.
@@ -129,7 +130,8 @@ pub(super) struct LaunchMemory {
     pub counters: Arc<Buffer>,
 }
 
-/// A stream, ready to run.
+/// A stream, ready to run. Clones share what was compiled.
+#[derive(Clone)]
 pub struct Stream {
     pipeline: Pipeline,
     shaders: &'static StreamShaders,
@@ -186,7 +188,22 @@ impl StreamShaders {
     }
 }
 
+/// One of a stream's shaders.
+fn compile(
+    device: &Arc<Device>,
+    shaders: &StreamShaders,
+    spirv: &'static [u8],
+    s: &Specialization,
+) -> Result<Arc<ComputePipeline>> {
+    ComputePipeline::new(device, shaders.name, spirv, s).map(Arc::new)
+}
+
 impl Stream {
+    /// What it was compiled from.
+    pub(super) fn shaders(&self) -> &'static StreamShaders {
+        self.shaders
+    }
+
     /// For the compute tracer's fast kernel, which streams share.
     pub(super) fn steps(
         device: &Arc<Device>,
@@ -203,10 +220,10 @@ impl Stream {
         let pipeline = Pipeline::Steps {
             generate: match shaders.queue {
                 true => None,
-                false => Some(ComputePipeline::new(device, shaders.name, generate, s)?),
+                false => Some(compile(device, shaders, generate, s)?),
             },
             trace,
-            deliver: ComputePipeline::new(device, shaders.name, deliver, s)?,
+            deliver: compile(device, shaders, deliver, s)?,
             rays_per_group: LANES * rays_per_lane,
             memory,
             record: if shaders.mode == Mode::Any { 4 } else { HIT_BYTES },
@@ -216,7 +233,7 @@ impl Stream {
 
     /// For the compute tracer's packets.
     pub(super) fn packets(pipeline: ComputePipeline, shaders: &'static StreamShaders) -> Self {
-        Self { pipeline: Pipeline::Single { pipeline, rays_per_group: LANES * PACKET_RAYS }, shaders }
+        Self { pipeline: Pipeline::Single { pipeline: Arc::new(pipeline), rays_per_group: LANES * PACKET_RAYS }, shaders }
     }
 
     /// For the compute tracer's readable reference.
@@ -226,18 +243,18 @@ impl Stream {
         s: &Specialization,
         rays_per_lane: u32,
     ) -> Result<Self> {
-        let pipeline = ComputePipeline::new(device, shaders.name, shaders.reference, s)?;
+        let pipeline = compile(device, shaders, shaders.reference, s)?;
         Ok(Self { pipeline: Pipeline::Single { pipeline, rays_per_group: LANES * rays_per_lane }, shaders })
     }
 
     /// For the compute tracer without a hierarchy.
     pub(super) fn brute(device: &Arc<Device>, shaders: &'static StreamShaders, s: &Specialization) -> Result<Self> {
-        let pipeline = ComputePipeline::new(device, shaders.name, shaders.brute, s)?;
+        let pipeline = compile(device, shaders, shaders.brute, s)?;
         Ok(Self { pipeline: Pipeline::Single { pipeline, rays_per_group: LANES }, shaders })
     }
 
     pub(super) fn query(device: &Arc<Device>, shaders: &'static StreamShaders, s: &Specialization) -> Result<Self> {
-        let pipeline = ComputePipeline::new(device, shaders.name, shaders.query, s)?;
+        let pipeline = compile(device, shaders, shaders.query, s)?;
         Ok(Self { pipeline: Pipeline::Single { pipeline, rays_per_group: LANES }, shaders })
     }
 
@@ -248,14 +265,9 @@ impl Stream {
             triangle_any: features.alpha.then_some(TRIANGLE_ANY),
             sphere: features.spheres.then_some([SPHERE_CLOSEST, SPHERE_INTERSECTION]),
         };
-        let pipeline = Pipeline::RayTracing(RayTracingPipeline::new(
-            device,
-            shaders.name,
-            shaders.raygen,
-            &shared,
-            &scene_specialization(features),
-        )?);
-        Ok(Self { pipeline, shaders })
+        let s = scene_specialization(features);
+        let pipeline = RayTracingPipeline::new(device, shaders.name, shaders.raygen, &shared, &s)?;
+        Ok(Self { pipeline: Pipeline::RayTracing(Arc::new(pipeline)), shaders })
     }
 
     /// For rays whose pixels have been drawn. [`Push::rays`] is then the address of what was drawn ([`crate::render::raster`]).
@@ -263,7 +275,7 @@ impl Stream {
         if shaders.visibility.is_empty() {
             return Err(Error::Usage(format!("the rays of '{}' are not the camera's: they cannot be drawn", shaders.name)));
         }
-        let pipeline = ComputePipeline::new(device, shaders.name, shaders.visibility, s)?;
+        let pipeline = compile(device, shaders, shaders.visibility, s)?;
         Ok(Self { pipeline: Pipeline::Drawn(pipeline), shaders })
     }
 

@@ -319,3 +319,29 @@ fn gpu_many_samples_keep_their_digits() {
 fn gpu_a_million_samples_keep_their_digits() {
     holds_after(1_000_000, 333_333);
 }
+
+#[test]
+fn gpu_an_integrator_renders_again() {
+    let device = device();
+    let scene = skylit::scene::builtin::by_name("cornell-box").unwrap();
+    let flat = FlatScene::for_paths(&scene);
+    let options = PathOptions { size: [16, 16], spp: 8, ..PathOptions::default() };
+    for kind in tracers(&device) {
+        let tracer = tracer(&device, kind, &flat);
+        let record = CameraRecord::new(&scene.cameras[0], flat.origin, 1.0);
+        let mut integrator = path::PathIntegrator::new(&tracer, &flat, &options).unwrap();
+        let mut again = |spp, seed| integrator.render(&tracer, &record, spp, seed, &mut Uncontrolled).unwrap();
+        let [first, other, fewer, second] = [again(8, 3), again(8, 4), again(2, 3), again(8, 3)];
+        // nothing of an image is left in the next
+        assert_eq!(first.image.film.mean, second.image.film.mean, "{kind}");
+        assert_eq!((first.bounce_rays, first.shadow_rays), (second.bounce_rays, second.shadow_rays), "{kind}");
+        assert_ne!(first.image.film.mean, other.image.film.mean, "{kind}");
+        let alone =
+            path::render(&tracer, &flat, &record, &PathOptions { spp: 2, seed: 3, ..options.clone() }, &mut Uncontrolled)
+                .unwrap();
+        assert_eq!(fewer.image.film.mean, alone.image.film.mean, "{kind}");
+        let error = integrator.render(&tracer, &record, 9, 0, &mut Uncontrolled).unwrap_err();
+        assert_eq!(error.exit_code(), 64, "{error}");
+    }
+    assert_validation_clean(&device);
+}

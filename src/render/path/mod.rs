@@ -215,18 +215,62 @@ pub fn render(
     options: &PathOptions,
     control: &mut dyn Control,
 ) -> Result<PathResult> {
-    let mut estimator = Paths::new(tracer, flat, options)?;
-    let plan = Plan {
-        size: options.size,
-        spp: options.spp,
-        seed: options.seed,
-        time_limit: options.time_limit,
-        cover: options.cover.as_deref(),
-        film: &options.film,
-    };
-    let image = accumulate(tracer, camera, &plan, &BlockParams::default(), &mut estimator, control)?;
-    let Paths { bounce_rays, shadow_rays, longest_path, lights, light_tree, .. } = estimator;
-    Ok(PathResult { image, bounce_rays, shadow_rays, longest_path, lights, light_tree })
+    PathIntegrator::new(tracer, flat, options)?.render(tracer, camera, options.spp, options.seed, control)
+}
+
+/// Renders one scene again and again: lights, environment, queues and pipelines are made once.
+pub struct PathIntegrator {
+    paths: Paths,
+    options: PathOptions,
+}
+
+impl PathIntegrator {
+    /// For images of `options.spp` paths a pixel at most. The tracer must have been made of `flat` with
+    /// [`crate::tracer::Needs::shading`].
+    ///
+    /// # Errors
+    /// Those of the device; [`Error::Usage`] for a tracer that was made for less.
+    pub fn new(tracer: &Tracer, flat: &FlatScene, options: &PathOptions) -> Result<Self> {
+        Ok(Self { paths: Paths::new(tracer, flat, options)?, options: options.clone() })
+    }
+
+    /// Renders `spp` paths a pixel. `tracer` must be the one that it was made with.
+    ///
+    /// # Errors
+    /// Those of the device; [`Error::Usage`] for more paths than it was made for; [`crate::Error::Interrupted`] when `control` says so.
+    pub fn render(
+        &mut self,
+        tracer: &Tracer,
+        camera: &CameraRecord,
+        spp: u32,
+        seed: u32,
+        control: &mut dyn Control,
+    ) -> Result<PathResult> {
+        let Self { paths, options } = self;
+        if spp > options.spp {
+            return Err(Error::Usage(format!("{spp} paths a pixel: the integrator was made for {}", options.spp)));
+        }
+        let plan = Plan {
+            size: options.size,
+            spp,
+            seed,
+            time_limit: options.time_limit,
+            cover: options.cover.as_deref(),
+            film: &options.film,
+        };
+        paths.traced = Traced::default();
+        let image = accumulate(tracer, camera, &plan, &BlockParams::default(), paths, control)?;
+        let Traced { bounce_rays, shadow_rays, longest_path } = paths.traced;
+        Ok(PathResult { image, bounce_rays, shadow_rays, longest_path, lights: paths.lights, light_tree: paths.light_tree })
+    }
+}
+
+/// What an image took.
+#[derive(Clone, Copy, Default)]
+struct Traced {
+    bounce_rays: u64,
+    shadow_rays: u64,
+    longest_path: u32,
 }
 
 /// Bounces at most.
@@ -249,9 +293,7 @@ struct Paths {
     counts: Buffer,
     max_depth: u32,
     draws_lights: bool,
-    bounce_rays: u64,
-    shadow_rays: u64,
-    longest_path: u32,
+    traced: Traced,
     lights: u32,
     light_tree: bool,
     _buffers: Vec<Buffer>,
@@ -346,9 +388,7 @@ impl Paths {
             counts: Buffer::new(device, "numbers of rays", 4 * 2 * u64::from(BOUNCES + 1), Memory::Readback)?,
             max_depth: most_depth(options),
             draws_lights: options.strategy.draws_lights() && !lights.records.is_empty() && options.view.is_none(),
-            bounce_rays: 0,
-            shadow_rays: 0,
-            longest_path: 0,
+            traced: Traced::default(),
             lights: if options.strategy.draws_lights() { lights.count() } else { 0 },
             light_tree: !lights.tree.is_empty(),
             _buffers: buffers,
@@ -403,12 +443,12 @@ impl Paths {
             let counts: Vec<u32> = bytemuck::pod_collect_to_vec(&self.counts.read(0, self.counts.size())?);
             for k in begin..depth {
                 let rays = counts[2 * ((k % BOUNCES) as usize)];
-                self.bounce_rays += u64::from(rays);
+                self.traced.bounce_rays += u64::from(rays);
                 if rays > 0 {
-                    self.longest_path = self.longest_path.max(k + 1);
+                    self.traced.longest_path = self.traced.longest_path.max(k + 1);
                 }
             }
-            self.shadow_rays += counts.iter().skip(1).step_by(2).map(|&n| u64::from(n)).sum::<u64>();
+            self.traced.shadow_rays += counts.iter().skip(1).step_by(2).map(|&n| u64::from(n)).sum::<u64>();
             left = counts[2 * BOUNCES as usize];
             if left == 0 || depth >= self.max_depth {
                 break;
