@@ -50,3 +50,12 @@ impl Control for Keyboard {
         if self.keep_partial { Ok(requested()) } else { check().map(|()| false) }
     }
 }
+
+/// Listens to the keyboard, and shows nothing: for work whose own count is not that of the bar.
+pub struct Unshown;
+
+impl Control for Unshown {
+    fn should_stop(&mut self) -> Result<bool> {
+        check().map(|()| false)
+    }
+}

@@ -4,6 +4,7 @@
 #[path = "../common/mod.rs"]
 mod common;
 
+mod appearance;
 mod bsdf;
 mod camera;
 mod cli;

@@ -5,6 +5,7 @@ use clap::{Args, Subcommand, ValueHint};
 use super::ao::BenchAoArgs;
 use super::common::CommonArgs;
 use super::contestant::OWN;
+use super::path::BenchPathArgs;
 use super::streams::STREAMS;
 use crate::cli::args::{BuildChoice, parse_radius};
 use crate::tracer::BuildOptions;
@@ -32,6 +33,8 @@ pub enum What {
     Rays(Box<BenchRaysArgs>),
     /// Real-time ambient occlusion: time, rays and error of each preset, by scene, view and kind of motion
     Ao(Box<BenchAoArgs>),
+    /// Path tracing: error against time of each sampling strategy and peer, by scene
+    Path(Box<BenchPathArgs>),
 }
 
 /// `skylit bench rays`.

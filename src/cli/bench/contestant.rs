@@ -2,7 +2,8 @@
 
 use std::sync::Arc;
 
-use super::peer::{Peer, PeerError};
+use super::peer::Peer;
+use super::process::PeerError;
 use super::streams::{Set, sample};
 use crate::error::{Error, Result};
 use crate::gpu::{Device, DeviceInfo};
@@ -113,7 +114,7 @@ impl<'a> Contestant<'a> {
     /// When the peer fails to build.
     pub fn peer(peers: &mut [Peer], index: usize, kernel: &str, flat: &'a FlatScene<'a>) -> Result<Self, PeerError> {
         let peer = &mut peers[index];
-        let name = peer_kernel(&peer.spec.name, kernel);
+        let name = peer_kernel(&peer.process.spec.name, kernel);
         let (build_seconds, bytes) = peer.build(kernel)?;
         let build = BuildRecord {
             contestant: name.clone(),
@@ -122,7 +123,7 @@ impl<'a> Contestant<'a> {
             bytes_per_primitive: bytes / flat.primitive_count().max(1) as f64,
             sah_cost: None,
         };
-        let strict = peer.spec.strict.iter().any(|k| k == kernel);
+        let strict = peer.process.spec.strict.iter().any(|k| k == kernel);
         Ok(Self { name, build, strict, kernel: None, engine: Engine::Peer { peer: index, kernel: kernel.to_owned(), flat } })
     }
 

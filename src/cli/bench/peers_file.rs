@@ -19,12 +19,26 @@ struct PeersFile {
     peer: Vec<toml::Spanned<PeerSpec>>,
 }
 
+/// Which benchmark a peer is for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Measures {
+    /// `skylit bench rays`
+    #[default]
+    Rays,
+    /// `skylit bench path`
+    Paths,
+}
+
 /// One tracer of others.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PeerSpec {
     /// In tables.
     pub name: String,
+    /// What it takes part in.
+    #[serde(default)]
+    measures: Measures,
     /// What has to be installed, said where it does not build or start.
     #[serde(default)]
     needs: String,
@@ -47,6 +61,21 @@ pub struct PeerSpec {
     /// Folder of the peers file.
     #[serde(skip)]
     folder: PathBuf,
+}
+
+/// The peers of a benchmark: of the file that was asked for (`none`: nobody), or of [`DEFAULT`]; or why there are none.
+///
+/// # Errors
+/// Those of [`read`].
+pub fn choose(asked: Option<&str>, measures: Measures) -> Result<Result<Vec<PeerSpec>, String>> {
+    let file = match asked {
+        Some("none") => return Ok(Ok(Vec::new())),
+        None if !Path::new(DEFAULT).is_file() => {
+            return Ok(Err(format!("no peers: {DEFAULT} is not here (--peers FILE names another)")));
+        }
+        file => file.unwrap_or(DEFAULT),
+    };
+    Ok(Ok(read(Path::new(file))?.into_iter().filter(|p| p.measures == measures).collect()))
 }
 
 /// Reads a peers file.

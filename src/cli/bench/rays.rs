@@ -2,16 +2,17 @@
 //! them down.
 
 use std::io::Write;
-use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
 use super::args::BenchRaysArgs;
 use super::contestant::{Contestant, Lap, OWN, Run, peer_kernel};
-use super::peer::{Peer, PeerError};
+use super::peer::Peer;
+use super::peers_file::{self, Measures};
+use super::process::PeerError;
 use super::scenes::{self, Subject};
 use super::streams::{RaySets, STREAMS, Set, StreamKind};
-use super::{peers_file, table};
+use super::table;
 use crate::cli::args::BuildChoice;
 use crate::cli::console::{Console, Failure};
 use crate::cli::interrupt::{self, Keyboard};
@@ -24,7 +25,6 @@ use crate::measure::plot;
 use crate::measure::stats::{Summary, paired_ratio};
 use crate::output;
 use crate::ray::Ray;
-use crate::render::Control;
 use crate::render::rays::Mode;
 use crate::scene::flatten::FlatScene;
 use crate::tracer::Kernel;
@@ -41,7 +41,7 @@ pub fn run(args: &BenchRaysArgs) -> Result<(), Failure> {
     let console = args.common.console();
     let (scenes, notes) = scenes::choose(args);
     // before anything that takes long: a broken peers file, a scene that does not exist
-    let specs = peer_specs(args)?;
+    let specs = peers_file::choose(args.peers.as_deref(), Measures::Rays)?;
     scenes.iter().try_for_each(|s| scenes::check_there(s))?;
     let device = Device::open(&crate::gpu::Options {
         device: args.common.device.clone(),
@@ -87,16 +87,6 @@ pub fn run(args: &BenchRaysArgs) -> Result<(), Failure> {
     console.close(&out, measured.and(valid).and(shown).and(written).and(verdict))
 }
 
-/// The peers file's entries; or why there are none.
-fn peer_specs(args: &BenchRaysArgs) -> Result<Result<Vec<peers_file::PeerSpec>, String>> {
-    match args.peers.as_deref() {
-        Some("none") => Ok(Ok(Vec::new())),
-        Some(file) => peers_file::read(Path::new(file)).map(Ok),
-        None if Path::new(peers_file::DEFAULT).is_file() => peers_file::read(Path::new(peers_file::DEFAULT)).map(Ok),
-        None => Ok(Err(format!("no peers: {} is not here (--peers FILE names another)", peers_file::DEFAULT))),
-    }
-}
-
 /// Writes the files that were asked for; one that cannot be written does not stop the others.
 fn write(args: &BenchRaysArgs, out: &RayBenchmark) -> Result<()> {
     let json = args.common.json_file().map_or(Ok(()), |path| {
@@ -137,17 +127,6 @@ fn verdict(args: &BenchRaysArgs, out: &RayBenchmark) -> Result<()> {
             checks().count()
         ))),
         _ => Ok(()),
-    }
-}
-
-/// Listens to the keyboard, but leaves the bar alone: for work whose own count is not the run's.
-struct Unshown<'a>(&'a mut Keyboard);
-
-impl Control for Unshown<'_> {
-    fn progress(&mut self, _: u64, _: u64) {}
-
-    fn should_stop(&mut self) -> Result<bool> {
-        self.0.should_stop()
     }
 }
 
@@ -250,7 +229,7 @@ impl Bench<'_> {
             match Peer::start(spec) {
                 Ok(peer) => {
                     self.out.baselines.extend(spec.baselines.iter().map(|k| peer_kernel(&spec.name, k)));
-                    self.out.peers.push(peer.title.clone());
+                    self.out.peers.push(peer.process.title.clone());
                     self.peers.push(peer);
                 }
                 Err(PeerError::Ours(e)) => return Err(e),
@@ -278,7 +257,7 @@ impl Bench<'_> {
             return Err(Error::Device(format!("{source}: none of the kernels asked for runs here; `skylit doctor` says why")));
         };
         self.phase(format!("{source}: making rays"));
-        let sets = RaySets::make(tracer, &subject, size, &mut Unshown(&mut self.keyboard))?;
+        let sets = RaySets::make(tracer, &subject, size, &mut interrupt::Unshown)?;
         *record = SceneRecord {
             scene: source.to_owned(),
             triangles: subject.scene.triangle_count(),
@@ -364,7 +343,7 @@ impl Bench<'_> {
         }
         let masked = flat.has_alpha();
         for index in 0..self.peers.len() {
-            let spec = self.peers[index].spec.clone();
+            let spec = self.peers[index].process.spec.clone();
             self.phase(format!("{source}: building for '{}'", spec.name));
             let mut build = || -> Result<Vec<Contestant<'f>>, PeerError> {
                 if masked {
@@ -399,7 +378,7 @@ impl Bench<'_> {
                 Ok(()) => {}
                 Err(PeerError::Ours(e)) => return Err(e),
                 Err(PeerError::Failed(why)) => {
-                    self.note(console, format!("peer '{}' left out: {why}", self.peers[index].spec.name));
+                    self.note(console, format!("peer '{}' left out: {why}", self.peers[index].process.spec.name));
                     contestants.iter().zip(&mut *failed).for_each(|(c, f)| *f |= c.peer_index() == Some(index));
                 }
             }

@@ -15,11 +15,11 @@ use super::render::{choose_camera, open};
 use crate::error::{Error, Result};
 use crate::output;
 use crate::render::ao::Hemisphere;
+use crate::render::aov;
 use crate::render::camera::CameraRecord;
 use crate::render::realtime::display::{Display, Shown};
 use crate::render::realtime::{Realtime, Settings, Technique};
 use crate::render::sequence::{self, CameraMotion, Sequence};
-use crate::render::{Control, aov};
 use crate::scene::flatten::FlatScene;
 use crate::scene::load::load_camera_path;
 use crate::scene::{Camera, LightKind, Orbit, Scene};
@@ -110,7 +110,7 @@ pub fn run(args: &RenderArgs, start: Instant) -> Result<(), Failure> {
         let kept = done as u64 >= u64::from(warm_up);
         if kept {
             let write_start = Instant::now();
-            let pixels = if needs_aov { aov::render(&tracer, &record, size, &mut Silent)? } else { Vec::new() };
+            let pixels = if needs_aov { aov::render(&tracer, &record, size, &mut interrupt::Unshown)? } else { Vec::new() };
             let image = match args.writes_exr() {
                 true => Some(write::image(args, &realtime, size, &pixels, flat.origin, report.metadata(number))?),
                 false => None,
@@ -169,15 +169,6 @@ fn orbit(scene: &Scene, frames: f64) -> Result<Orbit> {
 fn point_lights(scene: &Scene, flat: &FlatScene) -> Vec<[f32; 3]> {
     let point = scene.lights.iter().filter(|l| matches!(l.kind, LightKind::Point));
     point.map(|l| (l.position - flat.origin).as_vec3().to_array()).collect()
-}
-
-/// The camera of a frame is the same for its other channels.
-struct Silent;
-
-impl Control for Silent {
-    fn should_stop(&mut self) -> Result<bool> {
-        interrupt::check().map(|()| false)
-    }
 }
 
 /// What the camera's image is called in reports.

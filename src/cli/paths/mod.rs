@@ -1,7 +1,7 @@
 //! `skylit render --integrator path`, `direct`, `ao-sky`, and views of surfaces.
 
 pub mod args;
-mod lights;
+pub mod lights;
 mod report;
 
 use std::path::Path;
