@@ -253,9 +253,12 @@ impl GpuScene {
         root.materials = keep(Buffer::from_slice(device, "material records", &materials)?);
         root.textures = keep(Buffer::from_slice(device, "texture records", &textures.records)?);
         keep(textures.texels);
-        let mips = textures.mips.as_ref().map_or(MipStats::default(), Mips::stats);
+        let mut mip_stats = MipStats::default();
         if let Some(mips) = textures.mips {
-            root.mips = keep(Buffer::from_slice(device, "mip records", &mips.records)?);
+            let records = Buffer::from_slice(device, "mip records", &mips.records)?;
+            let levels = mips.records.iter().map(|r| r.last + 1).max().unwrap_or(0);
+            mip_stats = MipStats { levels, bytes: records.size() + mips.texels.size() };
+            root.mips = keep(records);
             keep(mips.texels);
         }
         if needs.shading {
@@ -288,7 +291,7 @@ impl GpuScene {
             normals,
             motion,
             others,
-            mips,
+            mips: mip_stats,
         })
     }
 
@@ -629,11 +632,6 @@ impl Mips {
             records[k].texels[texels as usize] = addresses[pyramid];
         }
         Ok(Self { texels, records })
-    }
-
-    fn stats(&self) -> MipStats {
-        let levels = self.records.iter().map(|r| r.last + 1).max().unwrap_or(0);
-        MipStats { levels, bytes: self.texels.size() + (self.records.len() * size_of::<MipRecord>()) as u64 }
     }
 }
 
