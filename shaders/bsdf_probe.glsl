@@ -25,7 +25,7 @@ void any(uint index, bool occluded) {
     s.entry = 0u;
     s.primitive = PartRecords(SceneRoot(push.scene).parts).v[a.w].first_primitive;
     s.uv = vec2(1.0 / 3.0);
-    Shading m = shade(s, viewer);
+    Shading m = shade(s, viewer, SHARP);
     vec3 wo = to_frame(m.frame, viewer);
     wo.z = max(wo.z, LEAST_COSINE);
     BsdfSample drawn = BsdfSample(given, vec3(0.0), 0.0, false, 1.0);

@@ -23,6 +23,7 @@ const uint HAS_EMISSION = 16384u;
 const uint HAS_COMPENSATION = 32768u;  // of energy that microfacets lose
 const uint HAS_BENT_NORMALS = 65536u;  // shading normals that are not those of the surface
 // 131072: every surface is white, and nothing but HAS_DIFFUSE is set; shaders do not ask
+const uint HAS_RAY_CONES = 262144u;    // textures have levels, if any path asks for them
 
 bool has(uint what) { return (SHADING & what) != 0u; }
 

@@ -39,7 +39,7 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Pa
     uint view;            // VIEW_*: no light, but what camera rays see
     uint light_first;     // of the lights that are drawn by power
     uvec2 light_tree;     // LightNode of those before, or null
-    uvec2 path_reserved;
+    uvec2 cones;          // a pair a path: width and spread of its cone (path/cone.glsl); null: textures are read without levels
 };
 
 // Everything below but MIS shows what it is good for.

@@ -157,11 +157,19 @@ void path_vertex(BlockParams block, uint k, PathState state, vec4 sum, Ray ray, 
     Surface s = surface_at(ray, hit);
     vec3 towards_viewer = -ray.direction;
     bool front = dot(s.ng, towards_viewer) > 0.0;
+    Cone cone = Cone(0.0, 0.0);
+    float log_side = SHARP;
+    if (has_cones(p)) {
+        if (state.depth == 0u) cone = camera_cone(block, ray.direction);
+        else cone = load_cone(p, k);
+        cone = cone_after(cone, hit.t);
+        log_side = footprint(cone, s, ray.direction);
+    }
     Shading m;
     if (p.white_sky != 0u) m = grey_shading(s, towards_viewer, p.albedo);
-    else m = shade(s, towards_viewer);
+    else m = shade(s, towards_viewer, log_side);
     if (p.view != VIEW_NONE) {
-        store_quad(p.radiance, k, vec4(view_value(p.view, s, m, hit.t), sum.a));
+        store_quad(p.radiance, k, vec4(view_value(p.view, s, m, hit.t, log_side), sum.a));
         return;
     }
     if (m.emission != vec3(0.0)) {
@@ -198,6 +206,7 @@ void path_vertex(BlockParams block, uint k, PathState state, vec4 sum, Ray ray, 
         state.throughput /= survival;
     }
     store_state(p.states, k, state);
+    if (has_cones(p)) store_cone(p, k, scattered_cone(cone, s, front, b, side < 0.0));
     append_ray(p.next, Ray(s.position + m.ng * (sign(side) * s.offset), 0.0, normalize(b.wi), INFINITY), k);
 }
 

@@ -2,7 +2,9 @@
 #ifndef PATH_SHADING
 #define PATH_SHADING
 #include "scene/surface.glsl"
+#include "scene/mipmap.glsl"
 #include "path/params.glsl"
+#include "path/cone.glsl"
 #include "bsdf/bsdf.glsl"
 
 const uint MODEL_GLTF = 0u;
@@ -62,12 +64,41 @@ struct ShadingRecord {
 };
 layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer ShadingRecords { ShadingRecord v[]; };
 
-// Value of a texture at a point of a primitive (counted in the group), 1 where there is none.
-vec4 sample_use(TextureUse use, PartRecord part, uint primitive, vec2 uv, bool srgb) {
+// Twice the area of a triangle on a texture of one by one, before the use's own transform.
+float texcoord_area(PartRecord part, uvec3 corners, uint set) {
+    uvec2 base = set == 1u ? part.texcoords1 : part.texcoords0;
+    if (is_null(base)) return 0.0;
+    corners -= part.first_vertex;
+    vec2 a = load_vec2(base, corners.x);
+    vec2 edge1 = load_vec2(base, corners.y) - a, edge2 = load_vec2(base, corners.z) - a;
+    return abs(edge1.x * edge2.y - edge1.y * edge2.x);
+}
+
+// Value of a texture of a kind (TEXELS_*) at a point of a primitive (counted in the group), 1 where there is none. log_side: footprint().
+vec4 sample_use(TextureUse use, PartRecord part, uint primitive, vec2 uv, uint kind, float log_side) {
     if (use.texture == INVALID || is_null(part.indices)) return vec4(1.0);
-    vec2 st = texcoord_at(part, triangle_indices(part, primitive), uv, use.set);
+    uvec3 corners = triangle_indices(part, primitive);
+    vec2 st = texcoord_at(part, corners, uv, use.set);
     st = vec2(use.transform.x * st.x + use.transform.z * st.y, use.transform.y * st.x + use.transform.w * st.y) + use.offset;
-    return sample_texture(use.texture, st, srgb);
+    if (has(HAS_RAY_CONES) && log_side > SHARP) {
+        TextureRecords records = TextureRecords(SceneRoot(push.scene).textures);
+        float area = texcoord_area(part, corners, use.set) * abs(use.transform.x * use.transform.w - use.transform.y * use.transform.z);
+        area *= float(records.v[use.texture].width) * float(records.v[use.texture].height);
+        // coordinates that do not change show one point of the texture
+        if (area > 0.0) return sample_mipmap(use.texture, st, kind, log_side + 0.5 * log2(area));
+    }
+    return sample_texture(use.texture, st, kind != TEXELS_LINEAR);
+}
+
+// Linear base colour of what is seen at a surface.
+vec3 shown_color(Surface s, PartRecord part, MaterialRecord m, float log_side) {
+    if (!has(HAS_RAY_CONES)) return base_color(part, m, s.primitive, s.uv).rgb;
+    vec3 color = m.base_color.rgb;
+    if (is_null(part.indices)) return color;
+    color *= vertex_color(part, triangle_indices(part, s.primitive), s.uv).rgb;
+    TextureUse use = TextureUse(m.texcoord_transform, m.texcoord_offset, m.base_color_texture, m.texcoord_set);
+    // where alpha says what there is, colours of what there is not count nothing
+    return color * sample_use(use, part, s.primitive, s.uv, m.alpha_cutoff < 0.0 ? TEXELS_SRGB : TEXELS_COVERED, log_side).rgb;
 }
 
 // Factor of a light's radiance at a point of a primitive of an instance of the scene.
@@ -76,7 +107,8 @@ vec3 emission_texture(uint instance, uint primitive, vec2 uv) {
     SceneRoot root = SceneRoot(push.scene);
     PartRecord part = PartRecords(root.parts).v[Pairs(root.placements).v[instance].y];
     TextureUse use = ShadingRecords(root.shading).v[part.material].uses[USE_EMISSION];
-    return sample_use(use, part, primitive + part.first_primitive, uv, true).rgb;
+    // the light is as it is: only what a path sees is filtered
+    return sample_use(use, part, primitive + part.first_primitive, uv, TEXELS_SRGB, SHARP).rgb;
 }
 
 // What a path meets.
@@ -94,7 +126,7 @@ struct Looked {
     vec4 at[USES];
 };
 
-Looked look_up(Surface s, PartRecord part) {
+Looked look_up(Surface s, PartRecord part, float log_side) {
     Looked found;
     const uint SRGB = 1u << USE_EMISSION | 1u << USE_SHEEN | 1u << USE_SPECULAR_COLOR;
     ShadingRecords records = ShadingRecords(SceneRoot(push.scene).shading);
@@ -102,7 +134,8 @@ Looked look_up(Surface s, PartRecord part) {
     [[dont_unroll]] for (uint use = 0u; use < USES; use++) {
         found.at[use] = vec4(1.0);
         if (has(HAS_TEXTURES)) {
-            found.at[use] = sample_use(records.v[part.material].uses[use], part, s.primitive, s.uv, (SRGB >> use & 1u) != 0u);
+            uint kind = (SRGB >> use & 1u) != 0u ? TEXELS_SRGB : TEXELS_LINEAR;
+            found.at[use] = sample_use(records.v[part.material].uses[use], part, s.primitive, s.uv, kind, log_side);
         }
     }
     return found;
@@ -206,8 +239,8 @@ Shading grey_shading(Surface s, vec3 wo, float grey) {
     return out_;
 }
 
-// What a ray that comes along -wo meets.
-Shading shade(Surface s, vec3 wo) {
+// What a ray that comes along -wo meets, with textures over a footprint().
+Shading shade(Surface s, vec3 wo, float log_side) {
     SceneRoot root = SceneRoot(push.scene);
     PartRecord part = PartRecords(root.parts).v[s.part];
     ShadingRecord m = ShadingRecords(root.shading).v[part.material];
@@ -216,11 +249,11 @@ Shading shade(Surface s, vec3 wo) {
     Shading out_ = black_shading(s, wo);
     out_.material = part.material;
     vec3 n = out_.frame.n;
-    Looked looked = look_up(s, part);
+    Looked looked = look_up(s, part, log_side);
     if (has(HAS_EMISSION) && m.emission != vec3(0.0) && (front || m.emits_back != 0u)) {
         out_.emission = m.emission * looked.at[USE_EMISSION].rgb;
     }
-    vec3 base = base_color(part, MaterialRecords(root.materials).v[part.material], s.primitive, s.uv).rgb;
+    vec3 base = shown_color(s, part, MaterialRecords(root.materials).v[part.material], log_side);
     if (has(HAS_UNLIT) && m.model == MODEL_UNLIT) {
         out_.unlit = true;
         out_.emission += base;

@@ -9,14 +9,14 @@ const uint VIEW_ALBEDO = 2u;
 const uint VIEW_DEPTH = 3u;
 const uint VIEW_BAKED_OCCLUSION = 4u;
 
-vec3 view_value(uint view, Surface s, Shading shown, float distance_) {
+vec3 view_value(uint view, Surface s, Shading shown, float distance_, float log_side) {
     if (view == VIEW_DEPTH) return vec3(distance_);
     if (view == VIEW_NORMALS) return shown.frame.n;
     PartRecord part = PartRecords(SceneRoot(push.scene).parts).v[s.part];
     ShadingRecord m = ShadingRecords(SceneRoot(push.scene).shading).v[part.material];
-    if (view == VIEW_BAKED_OCCLUSION) return vec3(look_up(s, part).at[USE_OCCLUSION].r);
+    if (view == VIEW_BAKED_OCCLUSION) return vec3(look_up(s, part, log_side).at[USE_OCCLUSION].r);
     bool coloured = m.model == MODEL_MIRROR || m.model == MODEL_GLASS || m.model == MODEL_CONDUCTOR;
-    vec3 base = base_color(part, MaterialRecords(SceneRoot(push.scene).materials).v[part.material], s.primitive, s.uv).rgb;
+    vec3 base = shown_color(s, part, MaterialRecords(SceneRoot(push.scene).materials).v[part.material], log_side);
     if (!coloured) return base;
     return m.model == MODEL_CONDUCTOR ? m.specular_color * fresnel_conductor(1.0, m.eta, m.k) : m.specular_color;
 }

@@ -30,6 +30,8 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Sc
     uvec2 albedo;      // tables of shaders/bsdf/albedo.glsl; null: no material asks
     vec4 bounds_min;   // compute tracer: of everything, padded as the hierarchy's boxes are
     vec4 bounds_max;
+    uvec2 mips;        // MipRecord of each texture (shaders/scene/mipmap.glsl); null: nobody asks
+    uvec2 root_reserved2;
 };
 
 // Matrices are three rows of an affine map. Group space is the space of the bottom level's vertices.

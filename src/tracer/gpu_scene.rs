@@ -9,6 +9,7 @@ use glam::{DAffine3, Vec3, Vec4};
 use super::albedo;
 use super::compute::Hierarchy;
 use super::drawable::{Drawable, Shape};
+use super::mipmap::{self, MipRecord, Texels};
 use super::motion::Motion;
 use super::shading::{self, ShadingRecord, TextureUse};
 use crate::error::{Error, Result};
@@ -32,6 +33,8 @@ pub struct Needs {
     pub compensation: bool,
     /// With `shading`: occlusion that is baked into textures, to be shown.
     pub baked_occlusion: bool,
+    /// With `shading`: levels of textures, for paths that know how wide they are ([`crate::render::path::TextureFilter::RayCone`]).
+    pub mip_levels: bool,
 }
 
 #[repr(C)]
@@ -57,6 +60,8 @@ struct SceneRoot {
     albedo: u64,
     bounds_min: [f32; 4],
     bounds_max: [f32; 4],
+    mips: u64,
+    reserved2: u64,
 }
 
 #[repr(C)]
@@ -146,6 +151,16 @@ pub struct GpuScene {
     /// Before the last update; `None` where nothing ever changes.
     motion: Option<Motion>,
     others: Vec<Buffer>,
+    mips: MipStats,
+}
+
+/// What the levels of textures are.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct MipStats {
+    /// Of the texture that has most, level 0 counted; 0: there are none.
+    pub levels: u32,
+    /// Bytes beside level 0.
+    pub bytes: u64,
 }
 
 impl GpuScene {
@@ -238,6 +253,14 @@ impl GpuScene {
         root.materials = keep(Buffer::from_slice(device, "material records", &materials)?);
         root.textures = keep(Buffer::from_slice(device, "texture records", &textures.records)?);
         keep(textures.texels);
+        let mut mip_stats = MipStats::default();
+        if let Some(mips) = textures.mips {
+            let records = Buffer::from_slice(device, "mip records", &mips.records)?;
+            let levels = mips.records.iter().map(|r| r.last + 1).max().unwrap_or(0);
+            mip_stats = MipStats { levels, bytes: records.size() + mips.texels.size() };
+            root.mips = keep(records);
+            keep(mips.texels);
+        }
         if needs.shading {
             root.shading = keep(Buffer::from_slice(device, "shading records", &shading)?);
             if let Some(tables) = albedo_tables(flat, needs, &indices) {
@@ -268,6 +291,7 @@ impl GpuScene {
             normals,
             motion,
             others,
+            mips: mip_stats,
         })
     }
 
@@ -295,6 +319,11 @@ impl GpuScene {
         let groups = self.groups.iter().flat_map(|g| [Some(&g.positions), g.indices.as_ref(), g.part_of.as_ref()]).flatten();
         let others = self.others.iter().chain([&self.attributes, &self.instance_buffer]);
         groups.chain(others).map(Buffer::size).sum::<u64>()
+    }
+
+    /// Levels of textures.
+    pub(super) fn mips(&self) -> MipStats {
+        self.mips
     }
 
     /// Before an update that moves these entries of the top level, now at `placements`, and deforms these groups.
@@ -571,20 +600,58 @@ struct Textures {
     records: Vec<TextureRecord>,
     // record of each texture of the scene
     record_of: Vec<u32>,
+    mips: Option<Mips>,
+}
+
+/// Levels of textures, in one buffer.
+struct Mips {
+    texels: Buffer,
+    records: Vec<MipRecord>,
+}
+
+impl Mips {
+    /// Of the scene's textures that are used, as each is used (by [`Texels`]).
+    fn upload(device: &Arc<Device>, flat: &FlatScene, used: &[usize], uses: &[[bool; 3]]) -> Result<Self> {
+        let texture = |t: usize| &flat.scene.textures[t];
+        let mut records: Vec<_> = used.iter().map(|&t| MipRecord::new([texture(t).width, texture(t).height])).collect();
+        // textures that share an image share its levels, too
+        let mut pyramids: Vec<Cow<[u8]>> = Vec::new();
+        let mut pyramid_of = std::collections::HashMap::new();
+        let mut places = Vec::new();
+        for (k, (&t, uses)) in used.iter().zip(uses).enumerate() {
+            for texels in Texels::ALL.into_iter().filter(|&texels| uses[texels as usize]) {
+                let pyramid = *pyramid_of.entry((Arc::as_ptr(&texture(t).rgba8), texels)).or_insert_with(|| {
+                    pyramids.push(Cow::Owned(bytemuck::pod_collect_to_vec(&mipmap::pyramid(texture(t), texels))));
+                    pyramids.len() - 1
+                });
+                places.push((k, texels, pyramid));
+            }
+        }
+        let (texels, addresses) = concatenate(device, "mip levels", &pyramids)?;
+        for (k, texels, pyramid) in places {
+            records[k].texels[texels as usize] = addresses[pyramid];
+        }
+        Ok(Self { texels, records })
+    }
 }
 
 impl Textures {
     fn upload(device: &Arc<Device>, flat: &FlatScene, needs: Needs) -> Result<Self> {
         let mut record_of = vec![INVALID; flat.scene.textures.len()];
-        let mut used = Vec::new();
+        let (mut used, mut uses) = (Vec::new(), Vec::new());
         for part in flat.groups.iter().flat_map(|g| &g.parts) {
             let material = &flat.scene.materials[flat.scene.meshes[part.mesh].material];
             let base = material.base_color_texture.filter(|_| needs.albedo || part.alpha_tested);
-            for slot in shading::slots(material, needs).into_iter().chain([base]).flatten() {
+            let base_texels = if alpha_cutoff(material).is_some() { Texels::Covered } else { Texels::Srgb };
+            let slots = shading::slots(material, needs).into_iter().enumerate().map(|(k, slot)| (slot, shading::texels(k)));
+            for (slot, texels) in slots.chain([(base, base_texels)]) {
+                let Some(slot) = slot else { continue };
                 if record_of[slot.texture] == INVALID {
                     record_of[slot.texture] = used.len() as u32;
                     used.push(slot.texture);
+                    uses.push([false; 3]);
                 }
+                uses[record_of[slot.texture] as usize][texels as usize] = true;
             }
         }
         // two textures may share an image: it is stored once
@@ -619,7 +686,11 @@ impl Textures {
                 }
             })
             .collect();
-        Ok(Self { texels, records, record_of })
+        let mips = match needs.mip_levels && needs.shading && !needs.white && !used.is_empty() {
+            true => Some(Mips::upload(device, flat, &used, &uses)?),
+            false => None,
+        };
+        Ok(Self { texels, records, record_of, mips })
     }
 
     /// Of a texture that was uploaded; none: 1 everywhere.

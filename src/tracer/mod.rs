@@ -13,6 +13,7 @@ mod dynamic_trees;
 pub mod gpu_scene;
 mod hardware;
 mod kernel;
+mod mipmap;
 mod motion;
 mod prepared;
 pub mod queue;
@@ -97,6 +98,10 @@ pub struct BuildStats {
     pub structure_bytes: u64,
     /// Bytes of the scene besides: vertices, indices, attributes, textures, records.
     pub scene_bytes: u64,
+    /// Of these, what levels of textures take beside level 0; 0 where nobody asks for them ([`Needs::mip_levels`]).
+    pub mip_bytes: u64,
+    /// Levels of the texture that has most, level 0 counted; 0 where nobody asks.
+    pub mip_levels: u32,
     /// Triangles and spheres in the structures (each group once).
     pub primitives: u64,
     /// Entries that the compute tracer's stack holds; 0 for the hardware tracers.
@@ -223,6 +228,7 @@ impl Tracer {
             stats.upload_seconds = start.elapsed().as_secs_f64();
         }
         stats.scene_bytes = scene.bytes();
+        (stats.mip_levels, stats.mip_bytes) = (scene.mips().levels, scene.mips().bytes);
         Ok(Self {
             kind,
             device: device.clone(),

@@ -3,6 +3,7 @@
 use bytemuck::{Pod, Zeroable};
 
 use super::gpu_scene::Needs;
+use super::mipmap::Texels;
 use crate::scene::flatten::FlatScene;
 use crate::scene::material::MaterialKind;
 use crate::scene::{Geometry, Material, TextureSlot};
@@ -84,6 +85,8 @@ pub(crate) mod feature {
     pub const BENT_NORMALS: u32 = 65536;
     /// Every surface counts as white: nothing but Lambert is compiled ([`super::Needs::white`]).
     pub const WHITE: u32 = 131072;
+    /// Textures have levels ([`super::Needs::mip_levels`]).
+    pub const RAY_CONES: u32 = 262144;
 
     /// All of them, in words.
     pub const NAMES: [(u32, &str); 17] = [
@@ -139,6 +142,12 @@ pub(super) fn slots(m: &Material, needs: Needs) -> [Option<TextureSlot>; SLOTS] 
     ]
 }
 
+/// What the texture in a slot holds, as shaders/path/shading.glsl reads it.
+pub(super) fn texels(slot: usize) -> Texels {
+    // emission, colours of sheen and of specular reflection
+    if [1, 6, 10].contains(&slot) { Texels::Srgb } else { Texels::Linear }
+}
+
 /// Does light pass through it, and how?
 fn walls(m: &Material) -> u32 {
     match m.kind {
@@ -179,7 +188,10 @@ fn refracts(m: &Material) -> bool {
 pub(super) fn features(flat: &FlatScene, needs: Needs) -> u32 {
     let with = |on: bool, bit: u32| if on { bit } else { 0 };
     // under a white sky surfaces are diffuse, whatever they are made of
-    let mut bits = feature::DIFFUSE | with(needs.compensation, feature::COMPENSATION) | with(needs.white, feature::WHITE);
+    let mut bits = feature::DIFFUSE
+        | with(needs.compensation, feature::COMPENSATION)
+        | with(needs.white, feature::WHITE)
+        | with(needs.mip_levels && !needs.white, feature::RAY_CONES);
     for part in flat.groups.iter().flat_map(|g| &g.parts) {
         let mesh = &flat.scene.meshes[part.mesh];
         let m = &flat.scene.materials[mesh.material];

@@ -43,8 +43,15 @@ pub fn tracers(device: &Device) -> Vec<TracerKind> {
 }
 
 /// Everything that a pass may ask for.
-pub const ALL: Needs =
-    Needs { normals: true, albedo: true, shading: false, white: false, compensation: false, baked_occlusion: false };
+pub const ALL: Needs = Needs {
+    normals: true,
+    albedo: true,
+    shading: false,
+    white: false,
+    compensation: false,
+    baked_occlusion: false,
+    mip_levels: false,
+};
 
 pub fn tracer(device: &Arc<Device>, kind: TracerKind, scene: &Scene) -> Tracer {
     let flat = FlatScene::new(scene);

@@ -282,3 +282,22 @@ fn gpu_a_run_that_is_broken_off_leaves_whole_files() {
     fails(&[&BASE[..], &["--spp", "16", "--intervals", "-o", &place(&dir, "x.exr")]].concat(), 4, "x.0008.exr");
     assert_eq!(names(dir.path()), ["x.0008.exr"]);
 }
+
+/// It changes the image: it has to be as it was, and it is said.
+#[test]
+fn gpu_texture_filters_are_told_and_kept() {
+    let dir = tempfile::tempdir().unwrap();
+    let film = place(&dir, "a.exr");
+    let told = render(&["-o", &film, "--spp", "2", "--texture-filter", "ray-cone", "--resumable", "--explain"]);
+    assert_eq!((&told["texture_filter"], &told["mip_bytes"]), (&"ray-cone".into(), &0.into()), "{told}");
+    assert!(told["explain"].to_string().contains("mip levels: none, no surface has a texture"), "{told}");
+    let plain = render(&["-o", &place(&dir, "b.exr"), "--spp", "1", "--explain"]);
+    assert_eq!(plain["texture_filter"], "bilinear");
+    assert!(plain["explain"].to_string().contains("mip levels: left out, nobody asked"), "{plain}");
+    let go_on = [&BASE[..], &["-o", &place(&dir, "c.exr"), "--spp", "4", "--resume", &film]].concat();
+    fails(&go_on, 64, "texture filter");
+    for (integrator, says) in [("ao", "is about paths"), ("depth", "reads no textures"), ("ao-sky", "reads no textures")] {
+        let args = ["render", BASE[1], "-o", &place(&dir, "d.exr"), "--integrator", integrator, "--texture-filter", "ray-cone"];
+        fails(&args, 64, says);
+    }
+}

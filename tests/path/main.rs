@@ -12,6 +12,7 @@ mod direct;
 mod film;
 mod furnace;
 mod materials;
+mod texture_filter;
 mod transport;
 
 use std::sync::Arc;

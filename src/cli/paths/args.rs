@@ -9,7 +9,7 @@ use super::lights::LightSpec;
 use crate::cli::args::{Aov, Integrator, RenderArgs, parse_number, parse_vector, parse_where};
 use crate::error::{Error, Result};
 use crate::output::tone_map::ToneMap;
-use crate::render::path::{PixelFilter, Strategy};
+use crate::render::path::{PixelFilter, Strategy, TextureFilter};
 use crate::scene::{Environment, load};
 
 /// How directions are drawn.
@@ -56,6 +56,24 @@ impl From<PixelFilterChoice> for PixelFilter {
             PixelFilterChoice::Box => PixelFilter::Box,
             PixelFilterChoice::Tent => PixelFilter::Tent,
             PixelFilterChoice::BlackmanHarris => PixelFilter::BlackmanHarris,
+        }
+    }
+}
+
+/// What is read of textures.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum TextureFilterChoice {
+    /// A point: the samples of a pixel average
+    Bilinear,
+    /// The mean over the cone of the path, from mip levels: less noise from few samples, biased
+    RayCone,
+}
+
+impl From<TextureFilterChoice> for TextureFilter {
+    fn from(f: TextureFilterChoice) -> Self {
+        match f {
+            TextureFilterChoice::Bilinear => TextureFilter::Bilinear,
+            TextureFilterChoice::RayCone => TextureFilter::RayCone,
         }
     }
 }
@@ -125,6 +143,9 @@ pub struct PathArgs {
     /// Reconstruction filter of pixels, by importance sampling [default: box]
     #[arg(long, value_enum)]
     pub pixel_filter: Option<PixelFilterChoice>,
+    /// What paths read of textures where they meet them [default: bilinear]
+    #[arg(long, value_enum)]
+    pub texture_filter: Option<TextureFilterChoice>,
     /// Aperture of a 36x24 mm camera: the focal length over this is the lens; world units are metres [default: a pinhole]
     #[arg(long, value_name = "N", value_parser = parse_clamp, requires = "focus_distance", allow_hyphen_values = true)]
     pub f_number: Option<f64>,
@@ -167,6 +188,7 @@ impl PathArgs {
             (self.exposure.is_some(), "--exposure"),
             (self.tone_map.is_some(), "--tone-map"),
             (self.pixel_filter.is_some(), "--pixel-filter"),
+            (self.texture_filter.is_some(), "--texture-filter"),
             (self.f_number.is_some(), "--f-number"),
         ];
         let wrong = |what: String| Err(Error::Usage(what));
@@ -200,6 +222,9 @@ impl PathArgs {
             && let Some((_, option)) = of_light.iter().find(|o| o.0)
         {
             return wrong(format!("{option}: --integrator {} shows surfaces, not light", args.integrator.name()));
+        }
+        if self.texture_filter.is_some() && matches!(args.integrator, Integrator::AoSky | Integrator::Depth) {
+            return wrong(format!("--texture-filter: --integrator {} reads no textures", args.integrator.name()));
         }
         if self.sky_albedo.is_some() && args.integrator != Integrator::AoSky {
             return wrong("--sky-albedo is of --integrator ao-sky".into());

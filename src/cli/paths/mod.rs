@@ -23,7 +23,7 @@ use crate::render::accumulate::Accumulated;
 use crate::render::aov;
 use crate::render::camera::CameraRecord;
 use crate::render::cover::Cover;
-use crate::render::path::{self, Lens, MOST_DEPTH, PathOptions, View};
+use crate::render::path::{self, Lens, MOST_DEPTH, PathOptions, TextureFilter, View};
 use crate::scene::flatten::FlatScene;
 use crate::scene::{Camera, Environment, Projection, fingerprint};
 use crate::tracer::{Needs, Tracer};
@@ -82,6 +82,7 @@ pub fn run(args: &RenderArgs, start: Instant) -> Result<(), Failure> {
         white: about.options.white_sky.is_some(),
         compensation: args.paths.energy_compensation,
         baked_occlusion: about.options.view == Some(View::BakedOcclusion),
+        mip_levels: about.options.texture_filter == TextureFilter::RayCone,
         ..Default::default()
     };
     let tracer = Tracer::with_build(&device, kind, &flat, needs, compute, &build)?;
@@ -184,6 +185,7 @@ fn options(args: &RenderArgs, flat: &FlatScene, camera: &Camera, size: [u32; 2])
     Ok(PathOptions {
         size,
         pixel_filter: args.paths.pixel_filter.map(Into::into).unwrap_or_default(),
+        texture_filter: args.paths.texture_filter.map(Into::into).unwrap_or_default(),
         lens: lens(args, camera)?,
         spp: args.spp.or(hints.spp).unwrap_or(DEFAULT_SPP).max(1),
         seed: args.seed,

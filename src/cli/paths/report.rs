@@ -7,7 +7,7 @@ use crate::cli::film::{Identity, Maker, Told, metadata, spp_text};
 use crate::cli::report::{Seconds, camera_text};
 use crate::gpu::DeviceInfo;
 use crate::render::accumulate::Accumulated;
-use crate::render::path::{MOST_DEPTH, PathOptions, PathResult, PixelFilter};
+use crate::render::path::{MOST_DEPTH, PathOptions, PathResult, PixelFilter, TextureFilter};
 use crate::scene::features::SceneFeatures;
 use crate::scene::{Camera, Environment, Scene};
 use crate::tracer::shading::feature;
@@ -76,6 +76,7 @@ impl About<'_> {
             white_sky,
             view: _,
             pixel_filter,
+            texture_filter,
             lens,
         } = &self.options;
         let [scene, environment] = match &self.prints {
@@ -95,6 +96,7 @@ impl About<'_> {
             ("sampling", Some(format!("{strategy:?}").to_lowercase())),
             ("firefly_clamp", firefly_clamp.is_finite().then(|| firefly_clamp.to_string())),
             ("pixel_filter", (*pixel_filter != PixelFilter::Box).then(|| format!("{pixel_filter:?}"))),
+            ("texture_filter", (*texture_filter != TextureFilter::Bilinear).then(|| "ray-cone".into())),
             ("lens", lens.map(|lens| format!("radius {}, focus {}", lens.radius, lens.focus))),
             ("energy_compensation", self.args.paths.energy_compensation.then(|| "on".into())),
             ("sky_albedo", white_sky.map(|albedo| albedo.to_string())),
@@ -157,6 +159,9 @@ impl Report<'_> {
                 self.about.options.firefly_clamp
             ));
         }
+        if self.about.options.texture_filter == TextureFilter::RayCone {
+            lines.push("textures averaged over ray cones: what they show is blurred, however many samples".into());
+        }
         lines.extend(self.film.lines.iter().cloned());
         if image.stopped_early {
             lines.push(format!("stopped early: {} of {} samples per pixel", image.spp, self.about.options.spp));
@@ -177,11 +182,22 @@ impl Report<'_> {
         Some(format!("materials ask for {}; not compiled: {}", list(true), list(false)))
     }
 
+    fn mip_levels(&self) -> String {
+        match self.about.options.texture_filter {
+            TextureFilter::Bilinear => "mip levels: left out, nobody asked (--texture-filter ray-cone)".into(),
+            TextureFilter::RayCone if self.stats.mip_levels == 0 => "mip levels: none, no surface has a texture".into(),
+            TextureFilter::RayCone => {
+                format!("mip levels: up to {}, {} bytes beside the first", self.stats.mip_levels, self.stats.mip_bytes)
+            }
+        }
+    }
+
     fn explanations(&self) -> Vec<String> {
         let image = &self.result.image;
         let mut lines = vec![format!("tracer {}: {}", self.about.tracer, self.why)];
         lines.extend(self.features.iter().cloned());
         lines.extend(self.shading());
+        lines.push(self.mip_levels());
         lines.push(match self.result.lights {
             0 => "no light samples: there is nothing to draw them from, or --sampling asks for none".into(),
             n if self.result.light_tree => format!("{n} lights, drawn by what they may do at a point, from a tree"),
@@ -220,6 +236,9 @@ impl Report<'_> {
             "firefly_clamp": if o.firefly_clamp.is_finite() { json!(o.firefly_clamp) } else { Value::Null },
             "sampling": o.strategy,
             "view": o.view,
+            "texture_filter": o.texture_filter,
+            "mip_levels": self.stats.mip_levels,
+            "mip_bytes": self.stats.mip_bytes,
             "sky_albedo": o.white_sky,
             "energy_compensation": self.about.args.paths.energy_compensation,
             "tracer": self.about.tracer.name(),

@@ -29,7 +29,7 @@ use crate::tracer::stream::StreamShaders;
 use crate::tracer::{Push, Stream, Tracer, stream};
 use environment::DeviceEnvironment;
 use lights::Lights;
-use params::{INVALID, PathParams, QUAD_BYTES, STATE_BYTES};
+use params::{CONE_BYTES, INVALID, PathParams, QUAD_BYTES, STATE_BYTES};
 
 /// Bounces of a submission; then the host asks how many paths are left.
 const BOUNCES: u32 = 4;
@@ -111,6 +111,17 @@ impl View {
     }
 }
 
+/// What a path reads of a texture where it meets one.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum TextureFilter {
+    /// A point of it, between its texels: the samples of a pixel do the averaging.
+    #[default]
+    Bilinear,
+    /// Its mean over what the path's cone covers, from levels: less noise from few samples, and a bias that no number of samples removes.
+    RayCone,
+}
+
 /// A thin lens.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Lens {
@@ -144,6 +155,8 @@ pub struct PathOptions {
     pub view: Option<View>,
     /// What a pixel is the mean of.
     pub pixel_filter: PixelFilter,
+    /// How textures are read; [`TextureFilter::RayCone`] asks for [`crate::tracer::Needs::mip_levels`].
+    pub texture_filter: TextureFilter,
     /// A perspective camera's; without it a pinhole.
     pub lens: Option<Lens>,
     /// Stop after this time with what there is.
@@ -167,6 +180,7 @@ impl Default for PathOptions {
             white_sky: None,
             view: None,
             pixel_filter: PixelFilter::Box,
+            texture_filter: TextureFilter::Bilinear,
             lens: None,
             time_limit: None,
             cover: None,
@@ -312,6 +326,10 @@ impl Paths {
                 "a tracer that was made with Needs::white knows no materials: paths under other skies need them".into(),
             ));
         }
+        let cones = options.texture_filter == TextureFilter::RayCone && options.white_sky.is_none();
+        if cones && shading & feature::RAY_CONES == 0 {
+            return Err(Error::Usage("ray cones need a tracer that was made with Needs::mip_levels".into()));
+        }
         let most = most_rays(options.size, options.spp);
         let white = Environment::Uniform(glam::Vec3::ONE);
         let around = match options.view {
@@ -366,6 +384,10 @@ impl Paths {
             lens_radius: options.lens.map_or(0.0, |l| l.radius),
             focus: options.lens.map_or(1.0, |l| l.focus),
             pixel_filter: options.pixel_filter as u32,
+            cones: match cones {
+                true => keep(Buffer::new(device, "cones of paths", CONE_BYTES * most as u64, Memory::Device)?),
+                false => 0,
+            },
             ..Default::default()
         };
         // those with number k fill queue k, and read the tags of the other

@@ -6,6 +6,8 @@ use crate::tracer::queue::QueueRecord;
 
 /// Bytes of a path between two bounces.
 pub(super) const STATE_BYTES: u64 = 32;
+/// Bytes of a path's cone, where it has one.
+pub(super) const CONE_BYTES: u64 = 8;
 /// Bytes of four numbers.
 pub(super) const QUAD_BYTES: u64 = 16;
 /// Names no light.
@@ -49,5 +51,5 @@ pub(super) struct PathParams {
     pub view: u32,
     pub light_first: u32,
     pub light_tree: u64,
-    pub reserved: u64,
+    pub cones: u64,
 }

@@ -1,0 +1,62 @@
+// Levels of textures: each half as wide and high as the one before, rounded down, every texel the mean of what it covers. Level 0 is the texture
+// itself (scene/texture.glsl); the others are linear, 16 bits a channel. Mirrors src/tracer/mipmap.rs.
+#ifndef SCENE_MIPMAP
+#define SCENE_MIPMAP
+#include "scene/texture.glsl"
+
+// What a texture's colours are, and so how they were averaged.
+const uint TEXELS_LINEAR = 0u;
+const uint TEXELS_SRGB = 1u;
+const uint TEXELS_COVERED = 2u;  // sRGB of what alpha lets through: weighted by it, and stored so
+
+const uint MOST_LEVELS = 15u;    // beside level 0
+
+struct MipRecord {
+    uvec2 texels[3];          // of level 1, for each TEXELS_*: a pair each; null: nobody asks
+    uint last;                // the smallest level
+    uint first[MOST_LEVELS];  // texels before each level, from level 1 on
+};
+layout(buffer_reference, std430, buffer_reference_align = 8) readonly buffer MipRecords { MipRecord v[]; };
+
+// Linear value of a level at uv, filtered as the texture is; of TEXELS_COVERED times alpha.
+vec4 sample_level(uint index, TextureRecord texture, vec2 uv, uint kind, uint level) {
+    if (level == 0u) {
+        vec4 c = sample_texture(index, uv, kind != TEXELS_LINEAR);
+        return kind == TEXELS_COVERED ? vec4(c.rgb * c.a, c.a) : c;
+    }
+    MipRecords mips = MipRecords(SceneRoot(push.scene).mips);
+    Pairs texels = Pairs(mips.v[index].texels[kind]);
+    uint first = mips.v[index].first[level - 1u];
+    uvec2 size = max(uvec2(texture.width, texture.height) >> level, uvec2(1u));
+    vec2 p = fold(uv, texture) * vec2(size);
+    if (texture.nearest == 0u) p -= 0.5;
+    ivec2 i = ivec2(floor(p));
+    vec2 f = texture.nearest == 0u ? p - vec2(i) : vec2(0.0);
+    uvec2 x = uvec2(wrap_texel(i.x, size.x, texture.wrap_u), wrap_texel(i.x + 1, size.x, texture.wrap_u));
+    uvec2 y = first + size.x * uvec2(wrap_texel(i.y, size.y, texture.wrap_v), wrap_texel(i.y + 1, size.y, texture.wrap_v));
+    uvec2 a = texels.v[y.x + x.x], b = texels.v[y.x + x.y], c = texels.v[y.y + x.x], d = texels.v[y.y + x.y];
+    return mix(mix(vec4(unpackUnorm2x16(a.x), unpackUnorm2x16(a.y)), vec4(unpackUnorm2x16(b.x), unpackUnorm2x16(b.y)), f.x),
+               mix(vec4(unpackUnorm2x16(c.x), unpackUnorm2x16(c.y)), vec4(unpackUnorm2x16(d.x), unpackUnorm2x16(d.y)), f.x), f.y);
+}
+
+// Value at uv over a square of 2^lod texels, linear between levels; at lod 0 and below what sample_texture says, bit for bit.
+vec4 sample_mipmap(uint index, vec2 uv, uint kind, float lod) {
+    MipRecords mips = MipRecords(SceneRoot(push.scene).mips);
+    // also where it is no number
+    if (!(lod > 0.0) || mips.v[index].last == 0u) return sample_texture(index, uv, kind != TEXELS_LINEAR);
+    TextureRecord texture = TextureRecords(SceneRoot(push.scene).textures).v[index];
+    float whole = min(lod, float(mips.v[index].last));
+    uint level = uint(whole);
+    float above = whole - float(level);
+    vec4 c = vec4(0.0);
+    // one copy of the code for both
+    [[dont_unroll]] for (uint k = 0u; k < 2u; k++) {
+        float weight = k == 0u ? 1.0 - above : above;
+        if (weight > 0.0) c += weight * sample_level(index, texture, uv, kind, level + k);
+    }
+    if (kind != TEXELS_COVERED) return c;
+    // what is seen here, but not there on average, has a colour of its own
+    return c.a > 0.0 ? vec4(c.rgb / c.a, c.a) : sample_texture(index, uv, true);
+}
+
+#endif
