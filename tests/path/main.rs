@@ -7,6 +7,7 @@ mod common;
 mod bsdf;
 mod camera;
 mod cli;
+mod denoise;
 mod direct;
 mod film;
 mod furnace;
