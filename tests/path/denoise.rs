@@ -53,6 +53,7 @@ fn left(name: &str, spp: u32, check: impl Fn(&Film, &[f32], &Features)) -> f64 {
 #[test]
 fn gpu_the_filter_takes_noise_away() {
     let left = left("cornell-box", 8, |_, _, _| ());
+    // 0.62: at this size much of the image is edges; of 192x192 a quarter to a half is left, relative to the radiance
     assert!(left < 0.7, "{left} of the error is left");
 }
 
