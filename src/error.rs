@@ -13,7 +13,7 @@ pub enum Error {
     #[error("{0}")]
     Usage(String),
 
-    /// No Vulkan loader, no device, or a device below the floor. The text names the missing feature.
+    /// No Vulkan loader, no device, or a device below the floor; no library that was asked for. The text names what is missing.
     #[error("{0}")]
     Device(String),
 

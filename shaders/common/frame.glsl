@@ -183,12 +183,16 @@ EdgeTest edge_test(FrameParams f, vec4 world_to_camera[3], vec2 view, bool ortho
 }
 
 // `offset`: from the point to the neighbour, pixels.
-bool same_surface(EdgeTest e, vec2 offset, uvec2 guide) {
+bool on_plane(EdgeTest e, vec2 offset, uvec2 guide) {
     float depth = uintBitsToFloat(guide.x);
     float s = e.at + offset.x * e.right + offset.y * e.down;
     float off = (e.orthographic ? s + depth * e.by_depth : s * depth) - e.distance;
     // not so where the depth is infinite
-    return abs(off) <= e.tolerance && dot(e.normal, unpackSnorm4x8(guide.y).xyz) >= e.cosine;
+    return abs(off) <= e.tolerance;
+}
+
+bool same_surface(EdgeTest e, vec2 offset, uvec2 guide) {
+    return on_plane(e, offset, guide) && dot(e.normal, unpackSnorm4x8(guide.y).xyz) >= e.cosine;
 }
 
 // A mean over samples: how many there are, and the variance of one.

@@ -33,7 +33,7 @@ pub const EXIT_CODES: &str = "\
 Exit codes:
   0    done
   1    a check did not hold (images differ, validation messages), or a Vulkan call failed
-  2    no Vulkan loader, no device, or a device below what is needed; see `skylit doctor`
+  2    no Vulkan loader, no device, or a device below what is needed (see `skylit doctor`); no Open Image Denoise
   3    an input file is missing or broken, or the scene cannot be rendered
   4    an output file cannot be written; nothing half-written is left
   5    out of memory

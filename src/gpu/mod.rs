@@ -12,6 +12,8 @@ mod graphics_pipeline;
 mod image;
 mod info;
 mod instance;
+#[cfg_attr(not(feature = "oidn"), path = "no_oidn.rs")]
+pub mod oidn;
 mod pipeline;
 mod result;
 

@@ -56,6 +56,21 @@ pub fn render_with(
     primary: Primary,
     control: &mut dyn Control,
 ) -> Result<Vec<AovPixel>> {
+    let mut out = vec![AovPixel::zeroed(); size[0] as usize * size[1] as usize];
+    visit(tracer, camera, size, primary, control, &mut |at, pixel| out[at] = *pixel)?;
+    Ok(out)
+}
+
+/// As [`render_with`], for images of which less is kept: `take` gets every pixel once, with its place (rows from the top), in an order that is the same for
+/// the same size.
+pub fn visit(
+    tracer: &Tracer,
+    camera: &CameraRecord,
+    size: [u32; 2],
+    primary: Primary,
+    control: &mut dyn Control,
+    take: &mut dyn FnMut(usize, &AovPixel),
+) -> Result<()> {
     let device = tracer.device();
     let blocks = Block::cut(size);
     let source = match primary {
@@ -70,7 +85,6 @@ pub fn render_with(
     let most = blocks.iter().map(Block::rays).max().unwrap_or(0).min(MOST);
     let target = Buffer::new(device, "auxiliary outputs", record * most as u64, Memory::Readback)?;
     let mut params_buffer = Buffer::new(device, "block parameters", size_of::<BlockParams>() as u64, Memory::Upload)?;
-    let mut out = vec![AovPixel::zeroed(); size[0] as usize * size[1] as usize];
     let mut pace = Pace::default();
     for block in &blocks {
         let params = BlockParams { aov: target.address(), ..block.params(size, camera, 0) };
@@ -100,7 +114,7 @@ pub fn render_with(
             target.read_with(0, record * count as u64, record, |begin, bytes| {
                 for (k, pixel) in bytes.chunks_exact(record as usize).enumerate() {
                     if let Some(at) = block.image_index(first + begin as u32 + k as u32, size[0]) {
-                        out[at] = bytemuck::pod_read_unaligned(pixel);
+                        take(at, &bytemuck::pod_read_unaligned(pixel));
                     }
                 }
             })?;
@@ -108,6 +122,5 @@ pub fn render_with(
             first += count;
         }
     }
-    tracer.check_finished()?;
-    Ok(out)
+    tracer.check_finished()
 }

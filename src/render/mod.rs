@@ -7,6 +7,7 @@ pub mod block;
 pub mod camera;
 pub mod convergence;
 pub mod cover;
+pub mod denoise;
 pub mod film;
 pub mod film_state;
 mod frustum;

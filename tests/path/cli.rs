@@ -15,12 +15,12 @@ fn skylit(args: &[&str]) -> Command {
     command
 }
 
-fn run(args: &[&str]) -> Output {
+pub fn run(args: &[&str]) -> Output {
     skylit(args).output().unwrap()
 }
 
 /// Runs `render` of the scene that all tests share, with more options; returns its record.
-fn render(more: &[&str]) -> Value {
+pub fn render(more: &[&str]) -> Value {
     let args = [&BASE[..], more, &["--json", "--validation"]].concat();
     let out = run(&args);
     assert!(out.status.success(), "{args:?}: {}", String::from_utf8_lossy(&out.stderr));
@@ -28,7 +28,7 @@ fn render(more: &[&str]) -> Value {
 }
 
 /// Ends with this code, one line that contains `says`, and nothing else.
-fn fails(args: &[&str], code: i32, says: &str) {
+pub fn fails(args: &[&str], code: i32, says: &str) {
     let out = run(args);
     let stderr = String::from_utf8_lossy(&out.stderr);
     assert_eq!(out.status.code(), Some(code), "{args:?}: {stderr}");
@@ -38,18 +38,18 @@ fn fails(args: &[&str], code: i32, says: &str) {
     assert!(out.stdout.is_empty(), "{args:?}");
 }
 
-fn names(folder: &Path) -> Vec<String> {
+pub fn names(folder: &Path) -> Vec<String> {
     let mut names: Vec<_> =
         std::fs::read_dir(folder).unwrap().map(|f| f.unwrap().file_name().to_str().unwrap().to_owned()).collect();
     names.sort();
     names
 }
 
-fn place(dir: &tempfile::TempDir, name: &str) -> String {
+pub fn place(dir: &tempfile::TempDir, name: &str) -> String {
     dir.path().join(name).to_str().unwrap().to_owned()
 }
 
-fn bytes(path: &str) -> Vec<u8> {
+pub fn bytes(path: &str) -> Vec<u8> {
     std::fs::read(path).unwrap()
 }
 

@@ -8,6 +8,7 @@ mod appearance;
 mod bsdf;
 mod camera;
 mod cli;
+mod denoise;
 mod direct;
 mod film;
 mod furnace;

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum, ValueHint};
 use glam::{DMat3, Vec3};
 
+use super::denoise::DenoiseChoice;
 use super::lights::LightSpec;
 use crate::cli::args::{Aov, Integrator, RenderArgs, parse_number, parse_vector, parse_where};
 use crate::error::{Error, Result};
@@ -140,6 +141,10 @@ pub struct PathArgs {
     /// Albedo of all surfaces with --integrator ao-sky [default: 0.5]
     #[arg(long, value_name = "X", value_parser = parse_albedo, allow_hyphen_values = true)]
     pub sky_albedo: Option<f64>,
+    /// Take noise out of the image once it is done, and put a bias in its place: oidn, filter, or auto for oidn where it is there. An .exr keeps the mean
+    /// as noisy.R, noisy.G, noisy.B [default: off; without METHOD: auto]
+    #[arg(long, value_name = "METHOD", value_enum, num_args = 0..=1, require_equals = false, default_missing_value = "auto")]
+    pub denoise: Option<DenoiseChoice>,
     /// Reconstruction filter of pixels, by importance sampling [default: box]
     #[arg(long, value_enum)]
     pub pixel_filter: Option<PixelFilterChoice>,
@@ -183,6 +188,7 @@ impl PathArgs {
             (self.energy_compensation, "--energy-compensation"),
             (self.environment.is_some(), "--environment"),
             (!self.light.is_empty(), "--light"),
+            (self.denoise.is_some(), "--denoise"),
         ];
         let of_images = [
             (self.exposure.is_some(), "--exposure"),

@@ -1,6 +1,7 @@
 //! `skylit render --integrator path`, `direct`, `ao-sky`, and views of surfaces.
 
 pub mod args;
+pub mod denoise;
 pub mod lights;
 mod report;
 
@@ -23,10 +24,12 @@ use crate::render::accumulate::Accumulated;
 use crate::render::aov;
 use crate::render::camera::CameraRecord;
 use crate::render::cover::Cover;
+use crate::render::denoise::Shot;
 use crate::render::path::{self, Lens, MOST_DEPTH, PathOptions, TextureFilter, View};
 use crate::scene::flatten::FlatScene;
 use crate::scene::{Camera, Environment, Projection, fingerprint};
 use crate::tracer::{Needs, Tracer};
+use denoise::Denoising;
 use report::{About, Report};
 
 /// Rays of a path that the hierarchy's build is planned for.
@@ -41,6 +44,7 @@ pub fn run(args: &RenderArgs, start: Instant) -> Result<(), Failure> {
     for path in args.outputs() {
         output::check_writable(&path)?;
     }
+    let denoiser = denoise::choose(args.paths.denoise)?;
     interrupt::install();
     let console = args.verbosity.console();
     let (mut scene, device, seconds) = open(args)?;
@@ -102,13 +106,22 @@ pub fn run(args: &RenderArgs, start: Instant) -> Result<(), Failure> {
         false => aov::render(&tracer, &record, size, &mut keyboard)?,
     };
     let aov_seconds = aov_start.elapsed().as_secs_f64();
-    let image = |accumulated: &Accumulated| {
+    let denoising = denoiser.as_ref().map(|chosen| {
+        let shot = Shot { tracer: &tracer, scene: &scene, camera: &record, options };
+        Denoising::new(chosen, shot, args)
+    });
+    let image = |accumulated: &Accumulated| -> Result<Image> {
         let mut channels = channels(accumulated, args, options.film.keep_state);
+        let mut metadata = about.metadata(accumulated);
+        if let Some(denoising) = &denoising {
+            channels = denoising.channels(accumulated, channels, args.writes_exr())?;
+            metadata.push(("denoise".into(), denoising.name().into()));
+        }
         channels.extend(aov_channels(args, &pixels, flat.origin));
-        Image { width: size[0], height: size[1], channels, metadata: about.metadata(accumulated) }
+        Ok(Image { width: size[0], height: size[1], channels, metadata })
     };
     let mut save = |accumulated: &Accumulated| {
-        let image = image(accumulated);
+        let image = image(accumulated)?;
         args.output.iter().try_for_each(|path| write(&image, &film::interval_path(path, accumulated.most_spp), args))
     };
     let mut control = Saver { keyboard, save: &mut save };
@@ -132,6 +145,8 @@ pub fn run(args: &RenderArgs, start: Instant) -> Result<(), Failure> {
         warnings.add("the scene has no light, and the image is black: give --environment FILE or R,G,B");
     }
 
+    let image = image(&result.image)?;
+    device.check_validation()?;
     let write_start = Instant::now();
     let mut report = Report {
         about,
@@ -143,11 +158,11 @@ pub fn run(args: &RenderArgs, start: Instant) -> Result<(), Failure> {
         tracer_features: tracer.features(),
         warnings: warnings.list,
         seconds,
+        denoised: denoising.as_ref().map(|d| d.tell(args.writes_exr())),
     };
     if let Some(path) = &args.depth_image {
         write_depth(path, &pixels, size)?;
     }
-    let image = image(&result.image);
     args.output.iter().try_for_each(|path| write(&image, path, args))?;
     device.save_pipeline_cache();
     report.seconds.write = write_start.elapsed().as_secs_f64();

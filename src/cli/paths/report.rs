@@ -2,6 +2,7 @@
 
 use serde_json::{Value, json};
 
+use super::denoise::Told as Denoised;
 use crate::cli::args::RenderArgs;
 use crate::cli::film::{Identity, Maker, Told, metadata, spp_text};
 use crate::cli::report::{Seconds, camera_text};
@@ -39,6 +40,8 @@ pub struct Report<'a> {
     pub tracer_features: SceneFeatures,
     pub warnings: Vec<String>,
     pub seconds: Seconds,
+    /// Of the denoiser, if there was one.
+    pub denoised: Option<Denoised>,
 }
 
 impl About<'_> {
@@ -162,6 +165,7 @@ impl Report<'_> {
         if self.about.options.texture_filter == TextureFilter::RayCone {
             lines.push("textures averaged over ray cones: what they show is blurred, however many samples".into());
         }
+        lines.extend(self.denoised.iter().map(|d| d.line.clone()));
         lines.extend(self.film.lines.iter().cloned());
         if image.stopped_early {
             lines.push(format!("stopped early: {} of {} samples per pixel", image.spp, self.about.options.spp));
@@ -209,6 +213,7 @@ impl Report<'_> {
             image.skipped_primary_rays,
             100.0 * image.skipped_primary_rays as f64 / all.max(1) as f64
         ));
+        lines.extend(self.denoised.iter().map(|d| d.explanation.clone()));
         let steps: Vec<_> = image.device_seconds.iter().map(|(step, s)| format!("{step} {s:.3}")).collect();
         lines.push(format!("device seconds: {}", steps.join(", ")));
         lines
@@ -267,6 +272,9 @@ impl Report<'_> {
         });
         record["seconds"]["build"] = json!(self.stats.build_seconds);
         record["seconds"]["upload"] = json!(self.stats.upload_seconds);
+        if let Some(denoised) = &self.denoised {
+            record["denoise"] = denoised.record.clone();
+        }
         if self.about.args.explain {
             record["explain"] = json!(self.explanations());
         }

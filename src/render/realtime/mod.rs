@@ -10,7 +10,7 @@ mod budget;
 pub mod display;
 mod images;
 mod larsen;
-mod params;
+pub(super) mod params;
 mod passes;
 pub mod settings;
 
@@ -36,7 +36,7 @@ pub use settings::{Budget, Filter, FilterKind, Preset, Resolution, Settings, Tec
 /// Launches of a submission: between them others get their turn on the device.
 const MOST_LAUNCHES: usize = 8;
 /// Distance from a pixel's plane, in footprints of the pixel, at which its neighbours belong to another surface.
-const DEPTH_TOLERANCE: f32 = 1.5;
+pub(super) const DEPTH_TOLERANCE: f32 = 1.5;
 /// Cosine between normals, likewise.
 const NORMAL_TOLERANCE: f32 = 0.9;
 /// What making a frame took.
@@ -421,7 +421,7 @@ impl Realtime {
 }
 
 /// World to camera, from the camera's own.
-fn inverse(camera: &CameraRecord) -> [[f32; 4]; 3] {
+pub(super) fn inverse(camera: &CameraRecord) -> [[f32; 4]; 3] {
     let m = camera.camera_to_world.map(|row| row.map(f64::from));
     let column = |k: usize| DVec3::new(m[0][k], m[1][k], m[2][k]);
     let to_world = DAffine3::from_mat3_translation(DMat3::from_cols(column(0), column(1), column(2)), column(3));

@@ -1,0 +1,128 @@
+// The mean over a pixel's neighbours on the same surface, each counting by its samples: so what has no sample yet gets its value
+// from what has (joint bilateral upsampling; Kopf, Cohen, Lischinski, Uyttendaele 2007). A box whose radius is just large enough that
+// the mean rests on `filter_samples` samples; or its two sides one after the other; or a small box again and again with holes that
+// double (a trous; Dammertz, Sewtz, Hanika, Lensch, "Edge-Avoiding A-Trous Wavelet Transform for fast Global Illumination Filtering",
+// HPG 2010).
+//
+// How far the pixels in the box differ by more than their noise says how much of the difference between pixel and box is detail;
+// the pixel keeps that share of its own value (Lee, "Digital Image Enhancement and Noise Filtering by Use of Local Statistics", PAMI
+// 1980), and a little more: a few pixels tell their spread badly (James, Stein, "Estimation with Quadratic Loss", 1961). Weights are 0
+// or a number of samples: nothing crosses an edge, and a constant stays what it is.
+//
+// Who includes this says what is filtered, a VALUE of one channel or of several, and what is known of it: an ESTIMATE, with a mean, the
+// number of samples behind it and the variance of one. Besides:
+//   uint filtered_pixel()                          the pixel of this thread
+//   ESTIMATE load_estimate(image, at)
+//   bool is_neighbour(edge, offset, own, guide)    do two pixels show the same surface?
+//   VALUE prior_variance(mean, spread, samples)    what to take for the variance where samples have not told of it: by the mean of a box,
+//                                                  the variance of its pixels and the samples that a pixel has
+//   float total(value)                             a sum over channels
+//   ESTIMATE guess(f, image, pixel, own)           of a pixel without samples in its box
+//   void finish(f, at, estimate, bent)             writes the result; finish_nothing(f, at): of a pixel that is not filtered
+//   PRIOR_SAMPLES                                  so many samples count as few
+//   LONELY                                         a pixel whose box holds fewer samples of its surface also takes those of surfaces that are
+//                                                  turned and offset a little more
+#ifndef COMMON_FILTER
+#define COMMON_FILTER
+#include "common/frame.glsl"
+
+const float LONELY_COSINE = 0.5;
+const float LONELY_TOLERANCE = 2.0;
+
+// n times the variance of the mean of n samples, by that of one: 1 of random ones, and less where a sequence fills the square evenly
+// and what is sampled is smooth, as it is with a falloff (Sequence::evenness in src/sampling/sequence.rs).
+float mean_variance(FrameParams f, float n) {
+    return f.evenness > 0.0 ? pow(max(n, 1.0), -f.evenness) : 1.0;
+}
+
+// A step of the filter, in the push constants: estimates from `rays` to `queued`, or accessibility to the result where that is null.
+// Sides of the box on which it reaches to the radius, and the distance of its taps.
+const uint STEP_HORIZONTAL = 1u;
+const uint STEP_VERTICAL = 2u;
+
+// Pixels to each side.
+int box_radius(FrameParams f, float samples) {
+    float side = sqrt(f.filter_samples / max(samples, 0.25));
+    return int(clamp(ceil(0.5 * (side - 1.0)), 0.0, float(push.sample_bits)));
+}
+
+// Bent normals beside them are at `bent` of the frame's parameters; from where to where is in `first`.
+vec3 load_bent(FrameParams f, uint at) {
+    return load_vec3(f.bent[push.first & 3u], at);
+}
+
+void main() {
+    uint at = filtered_pixel();
+    if (at >= push.count) return;
+    FrameParams f = FrameParams(push.pass);
+    uvec2 own_guide = LOAD_PAIR(f.guide, at);
+    if (!is_surface(own_guide)) {
+        finish_nothing(f, at);
+        return;
+    }
+    uvec2 guides = f.guide, estimates = push.rays;
+    ESTIMATE own = load_estimate(estimates, at);
+    vec3 own_bent = BENT ? load_bent(f, at) : vec3(0.0);
+    int stride = int(push.sample_index >> 2);
+    // a step with holes is of one size; it is left out where there are samples enough
+    int radius = stride > 1 ? (own.samples < f.filter_samples ? int(push.sample_bits) : 0) : box_radius(f, own.samples);
+    if (radius == 0) {
+        finish(f, at, own, own_bent);
+        return;
+    }
+    uint width = f.size.x;
+    ivec2 pixel = ivec2(at % width, at / width);
+    EdgeTest edge = edge_test(f, f.world_to_camera, f.view, f.orthographic != 0u, surface_position(f, at), surface_normal(f, at), vec2(pixel) + 0.5);
+    ivec2 reach = radius * ivec2(push.sample_index & STEP_HORIZONTAL, (push.sample_index & STEP_VERTICAL) >> 1);
+    // taps within the image
+    ivec2 lower = max(-reach, -(pixel / stride)), upper = min(reach, (ivec2(f.size) - 1 - pixel) / stride);
+    VALUE sum, squares, variances;
+    float n, count, noise;
+    vec3 bent;
+    for (int attempt = 0; attempt < 2; attempt++) {
+        sum = squares = variances = VALUE(0.0);
+        n = count = noise = 0.0;
+        bent = vec3(0.0);
+        for (int y = lower.y; y <= upper.y; y++) {
+            for (int x = lower.x; x <= upper.x; x++) {
+                ivec2 offset = stride * ivec2(x, y);
+                uint tap = uint(int(at) + offset.y * int(width) + offset.x);
+                if (!is_neighbour(edge, vec2(offset), own_guide, LOAD_PAIR(guides, tap))) continue;
+                ESTIMATE e = load_estimate(estimates, tap);
+                sum += e.mean * e.samples;
+                squares += e.mean * e.mean * e.samples;
+                variances += e.variance * e.samples;
+                if (BENT) bent += load_bent(f, tap) * e.samples;
+                n += e.samples;
+                count += e.samples > 0.0 ? 1.0 : 0.0;
+                // its samples times the variance of their mean
+                noise += e.samples > 0.0 ? mean_variance(f, e.samples) : 0.0;
+            }
+        }
+        if (n >= LONELY) break;
+        // geometry as fine as pixels: neighbours that are nearly so, rather than next to nothing
+        edge.cosine = LONELY_COSINE;
+        edge.tolerance *= LONELY_TOLERANCE;
+    }
+    if (n == 0.0) {
+        finish(f, at, guess(f, estimates, pixel, own), own_bent);
+        return;
+    }
+    VALUE mean = sum / n;
+    VALUE spread = max(squares / n - mean * mean, VALUE(0.0));
+    // about their own pixels' means, so that each pixel has one less to tell
+    VALUE variance = (variances + prior_variance(mean, spread, n / max(count, 1.0)) * PRIOR_SAMPLES) / (max(n - count, 0.0) + PRIOR_SAMPLES);
+    float keep = 0.0;
+    if (own.samples > 0.0) {
+        float own_noise = total(variance) * mean_variance(f, own.samples) / own.samples;
+        // of the pixel about the box: detail, which is what noise does not explain of the spread, and its own noise
+        float unlike = total(spread) * count / max(count - 1.0, 1.0) - total(variance) * noise / n + own_noise;
+        // with 3 of `count` pixels taken off, the sum of squared errors of what is kept is never above that of the pixels as they are;
+        // so it is for histories that are as long as they get. For short ones it is too careful, and 1 does better.
+        float careful = 1.0 + 2.0 * min(own.samples / f.most_samples, 1.0);
+        keep = unlike > 0.0 ? clamp(1.0 - max(count - careful, 0.0) / count * own_noise / unlike, 0.0, 1.0) : 0.0;
+    }
+    finish(f, at, ESTIMATE(mix(mean, own.mean, keep), mix(n, own.samples, keep), variance), mix(bent / n, own_bent, keep));
+}
+
+#endif

@@ -1,0 +1,51 @@
+// denoise: the mean of radiance over a pixel's neighbours on the same surface (common/filter.glsl), all channels with the same weights. Mirrors
+// src/render/denoise/filter.rs.
+// compute
+#include "common/frame.glsl"
+
+layout(local_size_x = LANES) in;
+
+// 32 bytes: mean and number of samples, variance of one sample.
+struct RadianceEstimate {
+    vec3 mean;
+    float samples;
+    vec3 variance;
+};
+
+#define VALUE vec3
+#define ESTIMATE RadianceEstimate
+
+// One sample says nothing of its variance: then all of what the box differs by is noise.
+const float PRIOR_SAMPLES = 4.0;
+// a pixel that is alone on its surface has samples of its own
+const float LONELY = 0.0;
+
+uint filtered_pixel() { return push.first + gl_GlobalInvocationID.x; }
+
+RadianceEstimate load_estimate(uvec2 estimates, uint at) {
+    vec4 a = uintBitsToFloat(Quads(estimates).v[2u * at]), b = uintBitsToFloat(Quads(estimates).v[2u * at + 1u]);
+    return RadianceEstimate(a.xyz, a.w, b.xyz);
+}
+
+// The normals in guides are those of shading here: light on a surface changes with them. The eight bits beside them are the same for
+// what may be averaged.
+bool is_neighbour(EdgeTest edge, vec2 offset, uvec2 own_guide, uvec2 guide) {
+    vec3 own = unpackSnorm4x8(own_guide.y).xyz;
+    return (own_guide.y ^ guide.y) >> 24 == 0u && on_plane(edge, offset, guide) && dot(own, unpackSnorm4x8(guide.y).xyz) >= edge.cosine;
+}
+
+vec3 prior_variance(vec3 mean, vec3 spread, float samples) { return spread * samples; }
+
+float total(vec3 value) { return value.r + value.g + value.b; }
+
+void finish(FrameParams f, uint at, RadianceEstimate e, vec3 bent) {
+    QuadImage to = QuadImage(push.queued);
+    to.v[2u * at] = floatBitsToUint(vec4(e.mean, e.samples));
+    to.v[2u * at + 1u] = floatBitsToUint(vec4(e.variance, 0.0));
+}
+
+void finish_nothing(FrameParams f, uint at) { finish(f, at, RadianceEstimate(vec3(0.0), 0.0, vec3(0.0)), vec3(0.0)); }
+
+RadianceEstimate guess(FrameParams f, uvec2 estimates, ivec2 pixel, RadianceEstimate own) { return own; }
+
+#include "common/filter.glsl"
