@@ -1,6 +1,7 @@
-// Environments from images: radiance from a direction, and directions by how much light comes from there. Texels are looked up bilinearly;
-// directions are drawn texel by texel, each as often as the mean of its bilinear patch is bright, by its solid angle, from an alias table
-// (src/sampling/alias.rs), so that wherever there is light a direction can be drawn.
+// Environments from images: radiance from a direction, and directions by how much light comes from there. Texels are looked up bilinearly.
+// Directions are drawn by the luminance of what is looked up: a row of patches between the middles of texels, a patch of it, and a place in the patch
+// (src/sampling/patches.rs has the formulas). The two numbers that a direction is drawn with stay in order, so that those which are
+// spread evenly are directions that are; of an emitter that nothing hides little is left to chance.
 #ifndef PATH_MAP
 #define PATH_MAP
 #include "common/warp.glsl"
@@ -36,16 +37,46 @@ vec3 map_radiance(EnvironmentMap map, vec3 w) {
     return map_lookup(map, map_coordinates(map_direction(map, w)));
 }
 
-// `likely`: of the texel.
-float map_density(EnvironmentMap map, float likely, float sin_theta) {
-    return sin_theta > 0.0 ? likely * float(map.width * map.height) / (2.0 * PI * PI * sin_theta) : 0.0;
+// The four texels of a patch, and where in it.
+struct Patch {
+    vec4 a, b, c, d;  // upper left, upper right, lower left, lower right: radiance, luminance
+    vec2 at;          // 0 to 1
+};
+
+vec4 patch_value(Patch q) { return mix(mix(q.a, q.b, q.at.x), mix(q.c, q.d, q.at.x), q.at.y); }
+
+// x: column; y: row, of which those at the poles are halves. at: in the patch.
+Patch map_patch(EnvironmentMap map, ivec2 i, vec2 at) {
+    return Patch(map_texel(map, i.x, i.y - 1), map_texel(map, i.x + 1, i.y - 1), map_texel(map, i.x, i.y), map_texel(map, i.x + 1, i.y), at);
+}
+
+// Where a patch begins among numbers from 0 to 1, and where it ends; those of rows come first.
+vec2 map_interval(EnvironmentMap map, uint at) {
+    Floats table = Floats(map.table);
+    return vec2(table.v[at], table.v[at + 1u]);
+}
+
+uint map_columns(EnvironmentMap map, uint row) { return map.height + 2u + row * (map.width + 1u); }
+
+// Density per solid angle of a direction in a patch whose row and column have these intervals.
+float map_density(EnvironmentMap map, Patch q, uint row, vec2 rows, vec2 columns, float sin_theta) {
+    float mean = 0.25 * (q.a.w + q.b.w + q.c.w + q.d.w);
+    if (!(mean > 0.0 && sin_theta > 0.0)) return 0.0;
+    float halves = row == 0u || row == map.height ? 2.0 : 1.0;
+    float density = (rows.y - rows.x) * (columns.y - columns.x) * halves * (patch_value(q).w / mean);
+    return density * (float(map.width) * float(map.height) / (2.0 * PI * PI * sin_theta));
 }
 
 float map_pdf(EnvironmentMap map, vec3 w) {
     vec3 d = map_direction(map, w);
-    uvec2 texel = min(uvec2(map_coordinates(d) * vec2(map.width, map.height)), uvec2(map.width, map.height) - 1u);
-    float likely = load_quad(map.texels, texel.y * map.width + texel.x).w;
-    return map_density(map, likely, sqrt(max(1.0 - d.y * d.y, 0.0)));
+    vec2 p = map_coordinates(d) * vec2(map.width, map.height) - 0.5;
+    ivec2 i = ivec2(floor(p));
+    // a patch is named by its right lower texel's row, and by its left column
+    i.y = clamp(i.y + 1, 0, int(map.height));
+    Patch q = map_patch(map, i, p - floor(p));
+    uint column = uint(i.x < 0 ? i.x + int(map.width) : i.x), row = uint(i.y);
+    vec2 columns = map_interval(map, map_columns(map, row) + min(column, map.width - 1u));
+    return map_density(map, q, row, map_interval(map, row), columns, sqrt(max(1.0 - d.y * d.y, 0.0)));
 }
 
 // Direction (world), radiance and density.
@@ -55,29 +86,47 @@ struct MapSample {
     float pdf;
 };
 
-MapSample sample_map(EnvironmentMap map, vec2 u) {
-    uint n = map.width * map.height;
-    float x = u.x * float(n);
-    uint k = min(uint(x), n - 1u);
-    // what is left of the number after each choice is as even as it was
-    float rest = x - float(k);
-    uvec2 entry = Pairs(map.table).v[k];
-    float threshold = uintBitsToFloat(entry.x);
-    if (rest < threshold) {
-        rest /= threshold;
-    } else {
-        rest = (rest - threshold) / (1.0 - threshold);
-        k = entry.y;
+// The interval among `count` that holds u, which begin at the table's place `first`; what is left of u is as even as it was.
+uint find_interval(EnvironmentMap map, uint first, uint count, inout float u, out vec2 interval) {
+    Floats table = Floats(map.table);
+    uint low = 0u;
+    while (count > 1u) {
+        uint half_ = count >> 1;
+        if (table.v[first + low + half_] <= u) low += half_;
+        count -= half_;
     }
-    vec2 uv = (vec2(k % map.width, k / map.width) + vec2(min(rest, 0.9999999), u.y)) / vec2(map.width, map.height);
-    vec2 down = on_circle(0.5 * uv.y), around = on_circle(uv.x);
+    interval = map_interval(map, first + low);
+    u = clamp((u - interval.x) / (interval.y - interval.x), 0.0, 0.99999994);
+    return low;
+}
+
+// By a density that goes linearly from a to b over [0, 1] (pbrt-v4, A.4.2).
+float sample_linear(float u, float a, float b) {
+    float sum = a + b;
+    if (!(sum > 0.0)) return u;
+    a /= sum;
+    b /= sum;
+    float root = sqrt(mix(a * a, b * b, u));
+    return a + root > 0.0 ? min(u / (a + root), 0.99999994) : 0.0;
+}
+
+MapSample sample_map(EnvironmentMap map, vec2 u) {
+    vec2 rows, columns;
+    uint row = find_interval(map, 0u, map.height + 1u, u.y, rows);
+    uint column = find_interval(map, map_columns(map, row), map.width, u.x, columns);
+    Patch q = map_patch(map, ivec2(column, row), vec2(0.0));
+    float y = sample_linear(u.y, q.a.w + q.b.w, q.c.w + q.d.w);
+    q.at = vec2(sample_linear(u.x, mix(q.a.w, q.c.w, y), mix(q.b.w, q.d.w, y)), y);
+    // poles are in the middle of their patches
+    float half_row = row == 0u ? 0.5 + 0.5 * y : row == map.height ? 0.5 * y : y;
+    vec2 uv = (vec2(column, row) + vec2(0.5 + q.at.x, half_row - 0.5)) / vec2(map.width, map.height);
+    vec2 down = on_circle(0.5 * clamp(uv.y, 0.0, 1.0)), around = on_circle(fract(uv.x));
     float s = down.y;
     // half a turn from where the map begins
     vec3 d = vec3(-s * around.y, down.x, s * around.x);
-    float likely = load_quad(map.texels, k).w;
     // the map's directions are world's, turned: back by the transpose
     vec3 wi = map.to_map[0].xyz * d.x + map.to_map[1].xyz * d.y + map.to_map[2].xyz * d.z;
-    return MapSample(wi, map_lookup(map, uv), map_density(map, likely, s));
+    return MapSample(wi, patch_value(q).rgb, map_density(map, q, row, rows, columns, s));
 }
 
 #endif

@@ -5,8 +5,8 @@
 
 // An environment in equirectangular projection.
 struct EnvironmentMap {
-    uvec2 texels;    // a quad each: linear radiance, and how likely the texel is drawn; null: the environment is one colour
-    uvec2 table;     // a pair each: threshold and alias
+    uvec2 texels;    // a quad each: linear radiance, and its luminance; null: the environment is one colour
+    uvec2 table;     // floats: what directions are drawn with (path/map.glsl)
     uint width;
     uint height;
     uint map_reserved0;

@@ -16,7 +16,9 @@ pub const OWN: &str = "skylit";
 /// Seeds of references: no timed image has them.
 const REFERENCE_SEED: u32 = 0x7e0_0000;
 /// Seconds that one image of a reference should take.
-const CHUNK_SECONDS: f64 = 1.0;
+const CHUNK_SECONDS: f64 = 2.0;
+/// Sample counts go up by this: powers of four are what stratifying samplers do best with.
+pub const STEP: u32 = 4;
 /// Images of a reference at least: two for each half.
 const LEAST_CHUNKS: u32 = 4;
 
@@ -114,10 +116,10 @@ pub fn truth(
     let mut spp = 4;
     loop {
         let shot = engine.render(peers, spp, REFERENCE_SEED)?;
-        if shot.seconds * 2.0 > CHUNK_SECONDS.min(limit / f64::from(LEAST_CHUNKS)) || spp * 2 > most_spp {
+        if shot.seconds * f64::from(STEP) > CHUNK_SECONDS.min(limit / f64::from(LEAST_CHUNKS)) || spp * STEP > most_spp {
             break;
         }
-        spp *= 2;
+        spp *= STEP;
     }
     let (mut halves, mut seconds, mut chunks) = ([Vec::new(), Vec::new()], 0.0, 0u32);
     // as many in one half as in the other

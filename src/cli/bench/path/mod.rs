@@ -12,7 +12,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 pub use args::BenchPathArgs;
-use engine::{Engine, OWN, Truth, truth};
+use engine::{Engine, OWN, STEP, Truth, truth};
 use peer::Peer;
 
 use super::contestant::peer_kernel;
@@ -33,8 +33,6 @@ use crate::render::path::{self, PathOptions};
 use crate::scene::flatten::FlatScene;
 use crate::tracer::{BuildOptions, ComputeOptions, Needs, Tracer, TracerKind};
 
-/// Sample counts go up by this.
-const STEP: u32 = 4;
 /// Paths of a pixel in one image at most.
 const MOST_SPP: u32 = 1 << 16;
 /// Steps of the progress bar for one scene.

@@ -1,0 +1,96 @@
+//! Choosing a place in an image of the sphere by how bright it is there: what is interpolated bilinearly between texels, as the shader
+//! does it (shaders/path/map.glsl), after the sampling of piecewise bilinear functions in Mitsuba 3 and pbrt-v4 (A.5).
+//!
+//! Patches lie between the middles of texels: `width` columns (the last one wraps round) and `height + 1` rows, of which those at the poles
+//! are halves. A row is drawn by its weight, then a patch of the row by its own, both by inversion: what is left of each number
+//! after that places the sample in the patch, by the bilinear function there. Numbers that are spread evenly stay so.
+
+/// Intervals of numbers from 0 to 1 that rows and patches are drawn with.
+#[derive(Clone, Debug, Default)]
+pub struct Patches {
+    /// Where each row begins, `height + 1` of them, and 1; then of each row where its patches begin, `width` of them, and 1. What single precision
+    /// rounds to nothing is never drawn: its density is 0.
+    pub table: Vec<f32>,
+}
+
+impl Patches {
+    /// From values at texels, not negative and finite, rows from the pole at +y.
+    pub fn new(width: usize, height: usize, values: &[f64]) -> Self {
+        let at = |x: usize, y: isize| values[y.clamp(0, height as isize - 1) as usize * width + x % width];
+        let mut rows = Vec::with_capacity(height + 1);
+        let mut columns = Vec::with_capacity((height + 1) * (width + 1));
+        for row in 0..=height {
+            let weights: Vec<f64> = (0..width)
+                .map(|x| {
+                    let [above, below] = [row as isize - 1, row as isize];
+                    0.25 * (at(x, above) + at(x + 1, above) + at(x, below) + at(x + 1, below))
+                })
+                .collect();
+            // of the solid angle between the middles of two rows of texels
+            let cos = |y: f64| (y.clamp(0.0, height as f64) / height as f64 * std::f64::consts::PI).cos();
+            rows.push(weights.iter().sum::<f64>() * (cos(row as f64 - 0.5) - cos(row as f64 + 0.5)));
+            push_intervals(&mut columns, &weights);
+        }
+        let mut table = Vec::with_capacity(height + 2 + columns.len());
+        push_intervals(&mut table, &rows);
+        table.extend(columns);
+        Self { table }
+    }
+}
+
+/// Where each interval begins, and 1. Without any weight all are alike.
+fn push_intervals(table: &mut Vec<f32>, weights: &[f64]) {
+    let total: f64 = weights.iter().sum();
+    let mut sum = 0.0;
+    for (k, weight) in weights.iter().enumerate() {
+        let begins = if total > 0.0 { sum / total } else { k as f64 / weights.len() as f64 };
+        table.push((begins as f32).min(1.0));
+        sum += weight;
+    }
+    table.push(1.0);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn widths(table: &[f32]) -> Vec<f32> {
+        table.windows(2).map(|w| w[1] - w[0]).collect()
+    }
+
+    #[test]
+    fn an_even_image_is_even_over_the_sphere() {
+        let (w, h) = (8, 4);
+        let patches = Patches::new(w, h, &vec![3.0; w * h]);
+        assert_eq!(patches.table.len(), h + 2 + (h + 1) * (w + 1));
+        let rows = widths(&patches.table[..h + 2]);
+        for (row, width) in rows.iter().enumerate() {
+            let cos = |y: f64| (y.clamp(0.0, 4.0) / 4.0 * std::f64::consts::PI).cos();
+            let share = 0.5 * (cos(row as f64 - 0.5) - cos(row as f64 + 0.5));
+            assert!((f64::from(*width) - share).abs() < 1e-6, "{row}: {width}, not {share}");
+        }
+        for row in 0..=h {
+            let first = h + 2 + row * (w + 1);
+            assert!(widths(&patches.table[first..first + w + 1]).iter().all(|c| (c - 0.125).abs() < 1e-6));
+        }
+    }
+
+    #[test]
+    fn one_texel_lights_the_patches_around_it() {
+        let (w, h) = (4, 3);
+        let mut values = vec![0.0; w * h];
+        values[w + 3] = 1.0;
+        let patches = Patches::new(w, h, &values);
+        let rows = widths(&patches.table[..h + 2]);
+        // rows of patches above and below the middle one of three rows of texels, and none at the poles
+        assert_eq!((rows[0], rows[3]), (0.0, 0.0));
+        assert!((rows[1] - 0.5).abs() < 1e-6 && (rows[2] - 0.5).abs() < 1e-6);
+        for row in [1, 2] {
+            let first = h + 2 + row * (w + 1);
+            // the last column wraps
+            assert_eq!(widths(&patches.table[first..first + w + 1]), [0.0, 0.0, 0.5, 0.5]);
+        }
+        // nothing at all: no interval is broken
+        assert!(Patches::new(2, 1, &[0.0; 2]).table.iter().all(|v| (0.0..=1.0).contains(v)));
+    }
+}
