@@ -123,8 +123,8 @@ fn gpu_error_against_time() {
         assert!(rmse(points.len() - 1) < rmse(0), "{points:?}");
         assert!(ours["mrays"].as_f64().unwrap() > ours["mpaths"].as_f64().unwrap());
     }
-    // half a second an image is more than it may take: it stops at once
-    assert_eq!(results[2]["points"].as_array().unwrap().len(), 1);
+    // half a second an image is more than it may take: it stops as soon as it may
+    assert_eq!(results[2]["points"].as_array().unwrap().len(), 2);
     assert_eq!(results[2]["points"][0]["seconds"]["median"], 0.5);
     // it is told all that is there
     let told: Value = serde_json::from_slice(&std::fs::read(place.at("kept/scene.json")).unwrap()).unwrap();

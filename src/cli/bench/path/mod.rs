@@ -331,8 +331,11 @@ impl<'a> Bench<'a> {
                 going = false;
                 for entry in entries.iter_mut() {
                     let wanted = match round {
-                        // those whose last image was short go on
-                        0 => entry.laps.last().is_none_or(|l| l.spp * STEP == spp && 2.0 * l.seconds[0] < self.args.seconds()),
+                        // those whose last image was short go on; a curve has two points
+                        0 => entry
+                            .laps
+                            .last()
+                            .is_none_or(|l| l.spp * STEP == spp && (l.spp == 1 || 2.0 * l.seconds[0] < self.args.seconds())),
                         _ => entry.laps.iter().any(|l| l.spp == spp),
                     };
                     if !wanted {
