@@ -2,9 +2,13 @@
 //! when something is missing.
 #![cfg(unix)]
 
+#[path = "common/command.rs"]
+mod command;
+
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 
+use command::{device, fails, stderr};
 use serde_json::Value;
 
 /// A peer that takes no time and writes down what it is asked. Its clock says a quarter of a second, always. Its hits are
@@ -71,29 +75,9 @@ impl Place {
 const SMALL: [&str; 9] =
     ["builtin:cornell-box", "--kernels", "wide", "--rays", "2000", "--repeats", "3", "--streams", "primary,shadow-any"];
 
-fn device() -> bool {
-    let there = Command::new(env!("CARGO_BIN_EXE_skylit")).arg("doctor").output().unwrap().status.success();
-    assert!(there || std::env::var_os("SKYLIT_EXPECT_TRACERS").is_none(), "no usable Vulkan device");
-    if !there {
-        println!("skipped: no usable Vulkan device");
-    }
-    there
-}
-
-fn stderr(out: &Output) -> String {
-    String::from_utf8_lossy(&out.stderr).into_owned()
-}
-
 fn json(out: &Output) -> Value {
     assert!(out.status.success(), "{}", stderr(out));
     serde_json::from_slice(&out.stdout).unwrap()
-}
-
-fn fails(out: &Output, code: i32, says: &[&str]) {
-    let text = stderr(out);
-    assert_eq!(out.status.code(), Some(code), "{text}");
-    let last = text.lines().last().unwrap();
-    assert!(last.starts_with("skylit: error: ") && says.iter().all(|s| last.contains(s)), "{text}");
 }
 
 #[test]

@@ -1,8 +1,12 @@
 //! `skylit bench ao` from outside: what it measures and writes of tiny scenes, and what it refuses.
 #![cfg(unix)]
 
+#[path = "common/command.rs"]
+mod command;
+
 use std::process::{Command, Output, Stdio};
 
+use command::{device, fails, stderr};
 use serde_json::Value;
 
 const TINY: [&str; 8] = ["--quick", "--size", "48x27", "--frames", "8", "--reference-rays", "16", "--quiet"];
@@ -15,26 +19,6 @@ fn command(args: &[&str]) -> Command {
 
 fn run(args: &[&str]) -> Output {
     command(args).output().unwrap()
-}
-
-fn device() -> bool {
-    let there = Command::new(env!("CARGO_BIN_EXE_skylit")).arg("doctor").output().unwrap().status.success();
-    assert!(there || std::env::var_os("SKYLIT_EXPECT_TRACERS").is_none(), "no usable Vulkan device");
-    if !there {
-        println!("skipped: no usable Vulkan device");
-    }
-    there
-}
-
-fn stderr(out: &Output) -> String {
-    String::from_utf8_lossy(&out.stderr).into_owned()
-}
-
-fn fails(out: &Output, code: i32, says: &[&str]) {
-    let text = stderr(out);
-    assert_eq!(out.status.code(), Some(code), "{text}");
-    let last = text.lines().last().unwrap();
-    assert!(last.starts_with("skylit: error: ") && says.iter().all(|s| last.contains(s)), "{text}");
 }
 
 fn record(args: &[&str]) -> Value {

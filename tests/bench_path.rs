@@ -2,9 +2,13 @@
 //! refused.
 #![cfg(unix)]
 
+#[path = "common/command.rs"]
+mod command;
+
 use std::path::PathBuf;
 use std::process::{Command, Output, Stdio};
 
+use command::{device, fails, stderr};
 use serde_json::Value;
 
 /// A peer that takes half a second, always, and whose images are black but for the first pixel. It keeps the scene that it gets.
@@ -61,26 +65,6 @@ impl Place {
 fn command(args: &[&str]) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_skylit"));
     command.args(["bench", "path"]).args(args).stdin(Stdio::null()).env_remove("RUST_BACKTRACE").output().unwrap()
-}
-
-fn device() -> bool {
-    let there = Command::new(env!("CARGO_BIN_EXE_skylit")).arg("doctor").output().unwrap().status.success();
-    assert!(there || std::env::var_os("SKYLIT_EXPECT_TRACERS").is_none(), "no usable Vulkan device");
-    if !there {
-        println!("skipped: no usable Vulkan device");
-    }
-    there
-}
-
-fn stderr(out: &Output) -> String {
-    String::from_utf8_lossy(&out.stderr).into_owned()
-}
-
-fn fails(out: &Output, code: i32, says: &[&str]) {
-    let text = stderr(out);
-    assert_eq!(out.status.code(), Some(code), "{text}");
-    let last = text.lines().last().unwrap();
-    assert!(last.starts_with("skylit: error: ") && says.iter().all(|s| last.contains(s)), "{text}");
 }
 
 #[test]

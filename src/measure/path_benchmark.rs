@@ -198,7 +198,7 @@ impl PathBenchmark {
     ///
     /// # Errors
     /// Those of the writer.
-    pub fn write_csv(&self, out: &mut dyn Write) -> Result<(), csv::Error> {
+    pub fn write_csv(&self, out: impl Write) -> csv::Result<()> {
         let mut csv = csv::Writer::from_writer(out);
         csv.write_record([
             "scene",

@@ -1,7 +1,6 @@
 //! `skylit bench rays`: rates of all contestants, taken in turn, so that a machine that slows down for a while slows all of
 //! them down.
 
-use std::io::Write;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -23,7 +22,6 @@ use crate::measure::agreement;
 use crate::measure::benchmark::{CheckRecord, Ratio, RayBenchmark, RunRecord, SceneRecord, StreamRecord};
 use crate::measure::plot;
 use crate::measure::stats::{Summary, paired_ratio};
-use crate::output;
 use crate::ray::Ray;
 use crate::render::rays::Mode;
 use crate::scene::flatten::FlatScene;
@@ -34,20 +32,13 @@ use crate::tracer::visits::VisitCounter;
 pub fn run(args: &BenchRaysArgs) -> Result<(), Failure> {
     let start = Instant::now();
     args.common.check()?;
-    for path in args.common.outputs() {
-        output::check_writable(path)?;
-    }
     interrupt::install();
     let console = args.common.console();
     let (scenes, notes) = scenes::choose(args);
     // before anything that takes long: a broken peers file, a scene that does not exist
     let specs = peers_file::choose(args.peers.as_deref(), Measures::Rays)?;
     scenes.iter().try_for_each(|s| scenes::check_there(s))?;
-    let device = Device::open(&crate::gpu::Options {
-        device: args.common.device.clone(),
-        validation: args.common.validation,
-        ..Default::default()
-    })?;
+    let device = args.common.open_device()?;
     let mut bench = Bench {
         args,
         device: &device,
@@ -82,28 +73,10 @@ pub fn run(args: &BenchRaysArgs) -> Result<(), Failure> {
     }
     out.find_scaling();
     let shown = table::scaling(&out).iter().try_for_each(|line| console.line(line));
-    let written = if out.rows().next().is_some() { write(args, &out) } else { Ok(()) };
+    let written =
+        if out.rows().next().is_some() { args.common.write(&out, |f| out.write_csv(f), || plot::draw(&out)) } else { Ok(()) };
     let verdict = verdict(args, &out);
     console.close(&out, measured.and(valid).and(shown).and(written).and(verdict))
-}
-
-/// Writes the files that were asked for; one that cannot be written does not stop the others.
-fn write(args: &BenchRaysArgs, out: &RayBenchmark) -> Result<()> {
-    let json = args.common.json_file().map_or(Ok(()), |path| {
-        let text = serde_json::to_string_pretty(out)
-            .map_err(|e| Error::CheckFailed(format!("cannot express the result as JSON: {e}")))?;
-        output::write_atomically(path, |f| f.write_all(text.as_bytes()).and_then(|()| f.write_all(b"\n")))
-    });
-    let csv = args
-        .common
-        .csv
-        .as_ref()
-        .map_or(Ok(()), |path| output::write_atomically(path, |f| out.write_csv(f).map_err(std::io::Error::other)));
-    let plot = args.common.plot.as_ref().map_or(Ok(()), |path| {
-        let picture = plot::draw(out)?;
-        output::png::write_rgb(path, &picture.rgb, picture.width, picture.height)
-    });
-    json.and(csv).and(plot)
 }
 
 /// With `--check`: an answer that rounding does not explain is a failure, if it is ours or of a peer that has to agree. The

@@ -248,6 +248,11 @@ impl PathIntegrator {
         Ok(Self { paths: Paths::new(tracer, flat, options)?, options: options.clone() })
     }
 
+    /// Lights that light samples are drawn from.
+    pub fn lights(&self) -> u32 {
+        self.paths.lights
+    }
+
     /// Renders `spp` paths a pixel. `tracer` must be the one that it was made with.
     ///
     /// # Errors

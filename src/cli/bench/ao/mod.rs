@@ -15,7 +15,6 @@ mod structures;
 mod table;
 mod views;
 
-use std::io::Write;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -27,10 +26,9 @@ use crate::cli::console::{Console, Failure};
 use crate::cli::interrupt::{self, Keyboard};
 use crate::cli::progress::Progress;
 use crate::error::{Error, Result};
-use crate::gpu::{self, Device};
+use crate::gpu::Device;
 use crate::measure::ao_benchmark::AoBenchmark;
 use crate::measure::ao_plot;
-use crate::output;
 use crate::scene::flatten::FlatScene;
 use crate::tracer::{ComputeOptions, Needs, Tracer, TracerKind};
 
@@ -41,19 +39,12 @@ const STEPS: u64 = 1000;
 pub fn run(args: &BenchAoArgs) -> Result<(), Failure> {
     let start = Instant::now();
     args.common.check()?;
-    for path in args.common.outputs() {
-        output::check_writable(path)?;
-    }
     interrupt::install();
     let console = args.common.console();
     let (scenes, notes) = scenes::choose(args);
     // before anything that takes long
     scenes.iter().try_for_each(|s| check_there(s))?;
-    let device = Device::open(&gpu::Options {
-        device: args.common.device.clone(),
-        validation: args.common.validation,
-        ..Default::default()
-    })?;
+    let device = args.common.open_device()?;
     let kind = args.tracer.on(&device.info).0;
     let mut bench = Bench {
         args,
@@ -88,7 +79,7 @@ pub fn run(args: &BenchAoArgs) -> Result<(), Failure> {
     if measured.is_ok() {
         device.save_pipeline_cache();
     }
-    let written = if out.is_empty() { Ok(()) } else { write(args, &out) };
+    let written = if out.is_empty() { Ok(()) } else { args.common.write(&out, |f| out.write_csv(f), || ao_plot::draw(&out)) };
     let nothing = || Error::Usage(format!("nothing was measured: {}", out.notes.last().map_or("no scene", String::as_str)));
     let verdict = match failed {
         Some(e) if out.is_empty() || !args.scenes.is_empty() => Err(e),
@@ -96,25 +87,6 @@ pub fn run(args: &BenchAoArgs) -> Result<(), Failure> {
         _ => Ok(()),
     };
     console.close(&out, measured.and(valid).and(written).and(verdict))
-}
-
-/// Writes the files that were asked for; one that cannot be written does not stop the others.
-fn write(args: &BenchAoArgs, out: &AoBenchmark) -> Result<()> {
-    let json = args.common.json_file().map_or(Ok(()), |path| {
-        let text = serde_json::to_string_pretty(out)
-            .map_err(|e| Error::CheckFailed(format!("cannot express the result as JSON: {e}")))?;
-        output::write_atomically(path, |f| f.write_all(text.as_bytes()).and_then(|()| f.write_all(b"\n")))
-    });
-    let csv = args
-        .common
-        .csv
-        .as_ref()
-        .map_or(Ok(()), |path| output::write_atomically(path, |f| out.write_csv(f).map_err(std::io::Error::other)));
-    let plot = args.common.plot.as_ref().map_or(Ok(()), |path| {
-        let picture = ao_plot::draw(out)?;
-        output::png::write_rgb(path, &picture.rgb, picture.width, picture.height)
-    });
-    json.and(csv).and(plot)
 }
 
 /// A run under way.
