@@ -32,8 +32,11 @@ unsafe extern "C" {}
 /// Threads of a work-group of a stream.
 const LANES: u32 = 64;
 
-/// The fast kernels' work-groups that follow each other take parts of a dispatch that are so far apart (shaders/trace/spread.glsl).
+/// Runs of work-groups of streams that follow each other take runs of parts of a dispatch that are so far apart (shaders/trace/spread.glsl).
 const SPREAD: u32 = 16;
+
+/// Work-groups that take neighbouring parts, where a part is a ray for each lane: memory is fetched ahead.
+const RUN: u32 = 4;
 
 const EXTENSIONS: &str = "#extension GL_EXT_buffer_reference : require\n#extension GL_EXT_buffer_reference_uvec2 : require\n\
                           #extension GL_EXT_control_flow_attributes : require\n";
@@ -172,7 +175,7 @@ impl Build {
                     }
                     let define = if mode == "any" { "#define STREAM_ANY\n" } else { "#define STREAM_CLOSEST\n" };
                     let source = format!(
-                        "#version 460\n{EXTENSIONS}{}#define LANES {LANES}\n#define SPREAD {SPREAD}u\n{define}#include \"{name}.glsl\"\n#include \"{}\"\n",
+                        "#version 460\n{EXTENSIONS}{}#define LANES {LANES}\n#define SPREAD {SPREAD}u\n#define RUN {RUN}u\n{define}#include \"{name}.glsl\"\n#include \"{}\"\n",
                         v.head, v.template
                     );
                     let output = format!("{name}_{mode}_{}.spv", v.field);
@@ -184,7 +187,7 @@ impl Build {
         }
         let _ = writeln!(
             table,
-            "/// Threads of a work-group of a stream.\npub const LANES: u32 = {LANES};\n/// Work-groups of the fast kernels are dispatched in multiples of this.\nconst SPREAD: u32 = {SPREAD};"
+            "/// Threads of a work-group of a stream.\npub const LANES: u32 = {LANES};\n/// Runs of work-groups are so far apart in a dispatch.\nconst SPREAD: u32 = {SPREAD};\n/// Work-groups of such a run.\nconst RUN: u32 = {RUN};"
         );
         table
     }
@@ -195,7 +198,7 @@ impl Build {
         for mode in ["any", "closest"] {
             for (bits, head) in [(32, ""), (64, HEAD_64)] {
                 let source = format!(
-                    "#version 460\n{EXTENSIONS}{head}#define LANES {LANES}\n#define SPREAD {SPREAD}u\n\
+                    "#version 460\n{EXTENSIONS}{head}#define LANES {LANES}\n#define SPREAD {SPREAD}u\n#define RUN {RUN}u\n\
                      #define STREAM_{}\n#include \"trace/wide.glsl\"\n",
                     mode.to_uppercase()
                 );

@@ -5,7 +5,6 @@
 
 layout(buffer_reference, std430, buffer_reference_align = 8) readonly buffer BsdfProbe {
     uvec2 inputs;   // three quads each: towards the viewer, and the part; wi, or where to sample and which lobe; shading normal, and 1 to sample
-    uvec2 params;   // PathParams: how directions are drawn
     uvec2 outputs;  // three quads each: value times |cos|, density; wi, 1 for a delta lobe; weight, eta
 };
 
@@ -29,8 +28,7 @@ void any(uint index, bool occluded) {
     vec3 wo = to_frame(m.frame, viewer);
     wo.z = max(wo.z, LEAST_COSINE);
     BsdfSample drawn = BsdfSample(given, vec3(0.0), 0.0, false, 1.0);
-    PathParams p = PathParams(probe.params);
-    if (c.w != 0u) drawn = draw_direction(p, m, wo, given.xy, given.z);
+    if (c.w != 0u) drawn = draw_direction(m, wo, given.xy, given.z);
     BsdfValue value = vertex_at(m, wo, drawn.wi);
     store_quad(probe.outputs, 3u * index, vec4(value.f, c.w != 0u ? drawn.pdf : value.pdf));
     store_quad(probe.outputs, 3u * index + 1u, vec4(drawn.wi, drawn.delta ? 1.0 : 0.0));

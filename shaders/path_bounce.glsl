@@ -11,5 +11,7 @@ void closest(uint index, Hit hit) {
     BlockParams block = BlockParams(push.pass);
     PathParams p = PathParams(block.path);
     uint k = Words(p.tags).v[index];
-    path_vertex(block, k, load_state(p.states, k), load_quad(p.radiance, k), load_ray(push.rays, index - push.first), hit);
+    vec3 added = path_vertex(block, k, load_state(p.states, index), load_ray(push.rays, index - push.first), hit);
+    // most vertices add nothing
+    if (added != vec3(0.0)) store_quad(p.radiance, k, load_quad(p.radiance, k) + vec4(added, 0.0));
 }

@@ -18,6 +18,7 @@ float blackman_harris_share(float x) {
 
 // From the middle of a pixel, as often as the filter weighs it.
 float filter_offset(uint pixel_filter, float u) {
+    if (!asks(ASKS_FILTER)) return u - 0.5;
     if (pixel_filter == FILTER_TENT) return u < 0.5 ? sqrt(2.0 * u) - 1.0 : 1.0 - sqrt(2.0 - 2.0 * u);
     if (pixel_filter == FILTER_BLACKMAN_HARRIS) {
         // the share grows with x: halve to the last bit that matters
@@ -51,7 +52,8 @@ Ray camera_sample(BlockParams p, uint index) {
     PathParams path = PathParams(p.path);
     vec2 u = sample_2d(p.seed, pixel, sample_index(index), CAMERA_FILM);
     Ray r = camera_ray(p, vec2(pixel) + 0.5 + vec2(filter_offset(path.pixel_filter, u.x), filter_offset(path.pixel_filter, u.y)));
-    return path.lens_radius > 0.0 ? lens_ray(p, r, sample_2d(p.seed, pixel, sample_index(index), CAMERA_LENS)) : r;
+    if (asks(ASKS_LENS)) return lens_ray(p, r, sample_2d(p.seed, pixel, sample_index(index), CAMERA_LENS));
+    return r;
 }
 
 Ray ray(uint index) {
@@ -68,7 +70,7 @@ void closest(uint index, Hit hit) {
     }
     PathParams path = PathParams(p.path);
     // divided by the albedo, so that what one bounce brings is the accessibility; survival goes by what paths carry without that
-    float scale = path.white_sky != 0u ? path.albedo : 1.0;
+    float scale = asks(ASKS_GREY) ? path.albedo : 1.0;
     PathState state = PathState(vec3(1.0 / scale), -1.0, index, 0u, scale, NO_MEDIUM);
-    path_vertex(p, k, state, vec4(0.0, 0.0, 0.0, is_hit(hit) ? 1.0 : 0.0), r, hit);
+    store_quad(path.radiance, k, vec4(path_vertex(p, k, state, r, hit), is_hit(hit) ? 1.0 : 0.0));
 }

@@ -11,5 +11,5 @@ void any(uint index, bool occluded) {
     if (occluded) return;
     PathParams p = PathParams(BlockParams(push.pass).path);
     uint k = Words(p.shadow.tags).v[index];
-    store_quad(p.radiance, k, load_quad(p.radiance, k) + load_quad(p.contributions, k));
+    store_quad(p.radiance, k, load_quad(p.radiance, k) + load_quad(p.contributions, index));
 }

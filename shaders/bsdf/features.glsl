@@ -18,13 +18,16 @@ const uint HAS_VOLUMES = 512u;         // and into bodies
 const uint HAS_ABSORPTION = 1024u;     // in them
 const uint HAS_ANISOTROPY = 2048u;
 const uint HAS_NORMAL_MAPS = 4096u;
-const uint HAS_TEXTURES = 8192u;       // beside base colours
+const uint HAS_BASE_COLORS = 8192u;    // that vary over a surface, by texture or by vertex
 const uint HAS_EMISSION = 16384u;
 const uint HAS_COMPENSATION = 32768u;  // of energy that microfacets lose
 const uint HAS_BENT_NORMALS = 65536u;  // shading normals that are not those of the surface
 // 131072: every surface is white, and nothing but HAS_DIFFUSE is set; shaders do not ask
 const uint HAS_RAY_CONES = 262144u;    // textures have levels, if any path asks for them
+const uint FIRST_USE = 19u;            // this and the twelve bits above: textures for each USE_* of path/shading.glsl
 
 bool has(uint what) { return (SHADING & what) != 0u; }
+
+bool has_use(uint use) { return has(1u << (FIRST_USE + use)); }
 
 #endif

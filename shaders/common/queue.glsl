@@ -29,10 +29,12 @@ uint claim(uvec2 counter) {
 #endif
 }
 
-void append_ray(RayQueue queue, Ray ray, uint tag) {
+// Returns the ray's place in the queue: the index with which a stream over the queue will be called.
+uint append_ray(RayQueue queue, Ray ray, uint tag) {
     uint slot = claim(queue.count);
     store_ray(queue.rays, slot, ray);
     QueueTags(queue.tags).v[slot] = tag;
+    return slot;
 }
 
 #endif

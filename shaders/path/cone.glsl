@@ -24,8 +24,6 @@ const float SHARE_OF_LOBE = 0.25;
 // No cone widens or narrows faster.
 const float MOST_SPREAD = 1.0;
 
-bool has_cones(PathParams p) { return has(HAS_RAY_CONES) && !is_null(p.cones); }
-
 // A pixel's. Lenses do not widen it: their samples do what they are there for.
 Cone camera_cone(BlockParams p, vec3 direction) {
     vec2 pixel = 2.0 * p.view / vec2(p.image_size);

@@ -51,12 +51,12 @@ const LightSample NO_LIGHT_SAMPLE = LightSample(vec3(0.0, 0.0, 1.0), 0.0, vec3(0
 
 // Radiance of an environment from direction w; and the density with which it is drawn, per solid angle.
 vec3 environment_radiance(PathParams p, vec3 w) {
-    if (is_null(p.map.texels)) return p.environment;
+    if (!asks(ASKS_MAP)) return p.environment;
     return p.environment * map_radiance(p.map, w);
 }
 
 float environment_pdf(PathParams p, vec3 w) {
-    return is_null(p.map.texels) ? 1.0 / (4.0 * PI) : map_pdf(p.map, w);
+    return asks(ASKS_MAP) ? map_pdf(p.map, w) : 1.0 / (4.0 * PI);
 }
 
 // Smooth end of a light's range (KHR_lights_punctual).
@@ -71,7 +71,7 @@ LightSample sample_point(LightRecord light, vec3 from) {
     if (!(d2 > 0.0)) return NO_LIGHT_SAMPLE;
     vec3 wi = to / d;
     float falloff = range_window(d, light.range);
-    if (light.kind == LIGHT_SPOT) {
+    if (asks(ASKS_SPOTS) && light.kind == LIGHT_SPOT) {
         // KHR_lights_punctual
         float x = clamp((dot(-wi, light.axis) - light.cos_outer) / max(light.cos_inner - light.cos_outer, 1e-4), 0.0, 1.0);
         falloff *= x * x;
@@ -175,59 +175,68 @@ LightSample sample_triangle(LightRecord light, vec3 from, vec2 u) {
     return LightSample(wi, d, point, radiance, triangle_pdf(light, s, d, wi), false);
 }
 
-// A light for a point that is lit, and a point on it. u: which; v: where.
-LightSample sample_light(PathParams p, vec3 from, float u, vec2 v) {
-    if (p.light_count == 0u) return NO_LIGHT_SAMPLE;
+// By power, from the alias table. What is left of u is as even as it was.
+uint choose_light(PathParams p, inout float u) {
     LightRecords lights = LightRecords(p.lights);
     float x = u * float(p.light_count);
     uint bin = min(uint(x), p.light_count - 1u), k = p.light_first + bin;
-    // what is left of the number is as even as it was
-    float rest = x - float(bin), threshold = lights.v[k].threshold;
-    if (rest < threshold) {
-        rest /= threshold;
-    } else {
-        rest = (rest - threshold) / (1.0 - threshold);
-        k = lights.v[k].alias;
+    float threshold = lights.v[k].threshold;
+    u = x - float(bin);
+    if (u < threshold) {
+        u /= threshold;
+        return k;
     }
+    u = (u - threshold) / (1.0 - threshold);
+    return lights.v[k].alias;
+}
+
+// Is it of this kind? What the scene has not is not compiled; and where all are of one kind, nobody has to look.
+bool is_kind(LightRecord light, uint kind, uint asked) { return asks(asked) && ((ASKED & ASKS_KINDS) == asked || light.kind == kind); }
+
+// A light for a point that is lit, and a point on it. u: which; v: where.
+LightSample sample_light(PathParams p, vec3 from, float u, vec2 v) {
+    LightRecords lights = LightRecords(p.lights);
+    uint k = asks(ASKS_CHOICE) ? choose_light(p, u) : p.light_first;
     LightRecord light = lights.v[k];
-    if (light.kind == LIGHT_TREE) {
+    if (is_kind(light, LIGHT_TREE, ASKS_LIGHT_TREE)) {
         float of_tree = light.probability;
-        float of_leaf = draw_leaf(p.light_tree, from, min(rest, 0.99999994), k);
+        float of_leaf = draw_leaf(p.light_tree, from, min(u, 0.99999994), k);
         if (!(of_leaf > 0.0)) return NO_LIGHT_SAMPLE;
         light = lights.v[k];
         light.probability = of_tree * of_leaf;
     }
-    if (light.kind == LIGHT_TRIANGLE) return sample_triangle(light, from, v);
-    if (light.kind == LIGHT_SPHERE) return sample_sphere(light, from, v);
-    if (light.kind == LIGHT_ENVIRONMENT) {
+    if (is_kind(light, LIGHT_TRIANGLE, ASKS_TRIANGLES)) return sample_triangle(light, from, v);
+    if (is_kind(light, LIGHT_SPHERE, ASKS_SPHERES)) return sample_sphere(light, from, v);
+    if (is_kind(light, LIGHT_ENVIRONMENT, ASKS_SKY)) {
         LightSample s = LightSample(uniform_sphere(v), INFINITY, vec3(0.0), p.environment, 1.0 / (4.0 * PI), false);
-        if (!is_null(p.map.texels)) {
+        if (asks(ASKS_MAP)) {
             MapSample m = sample_map(p.map, v);
             s = LightSample(m.wi, INFINITY, vec3(0.0), p.environment * m.radiance, m.pdf, false);
         }
         s.pdf *= light.probability;
         return s;
     }
-    if (light.kind == LIGHT_DIRECTIONAL) {
+    if (is_kind(light, LIGHT_DIRECTIONAL, ASKS_SUNS)) {
         // of one radiance over its cone; the intensity is what a surface that faces it gets
         vec3 wi = sample_cone(-light.axis, light.radius, v);
         return LightSample(wi, INFINITY, vec3(0.0), light.intensity / (1.0 - 0.5 * light.radius), light.probability, true);
     }
-    return sample_point(light, from);
+    if (asks(ASKS_POINTS) || asks(ASKS_SPOTS)) return sample_point(light, from);
+    return NO_LIGHT_SAMPLE;
 }
 
 // Density with which sample_light draws, from a point, what a ray from there met; 0: it never does.
 float light_pdf(PathParams p, Hit hit, vec3 from, vec3 wi) {
-    if (is_null(p.light_of)) return 0.0;
+    if (!asks(ASKS_TRIANGLES) && !asks(ASKS_SPHERES)) return 0.0;
     uint first = Words(p.light_of).v[hit.instance];
     if (first == INVALID) return 0.0;
     LightRecord light = LightRecords(p.lights).v[first + hit.primitive];
-    if (!is_null(p.light_tree)) {
+    if (asks(ASKS_LIGHT_TREE)) {
         // the last of all is the tree
         float of_tree = LightRecords(p.lights).v[p.light_first + p.light_count - 1u].probability;
         light.probability = of_tree * leaf_probability(p.light_tree, from, light.alias);
     }
-    if (light.kind == LIGHT_TRIANGLE) return triangle_pdf(light, spherical_triangle(light, from), hit.t, wi);
+    if (is_kind(light, LIGHT_TRIANGLE, ASKS_TRIANGLES)) return triangle_pdf(light, spherical_triangle(light, from), hit.t, wi);
     vec3 to = light.position - from;
     float d2 = dot(to, to);
     if (d2 <= light.radius * light.radius * (1.0 + 1e-5)) return 0.0;

@@ -2,6 +2,7 @@
 #ifndef PATH_PARAMS
 #define PATH_PARAMS
 #include "common/camera.glsl"
+#include "path/asked.glsl"
 
 // An environment in equirectangular projection.
 struct EnvironmentMap {
@@ -19,35 +20,27 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Pa
     vec3 environment;     // radiance; factor of the map's
     uint light_count;
     uvec2 lights;         // LightRecord
-    uvec2 light_of;       // a uint for each instance of the scene: its first light, INVALID where it has none; null: none has any
-    uvec2 states;         // PathState of each path of a launch
+    uvec2 light_of;       // a uint for each instance of the scene: its first light, INVALID where it has none
+    uvec2 states;         // PathState of each ray of the queue that is traced
+    uvec2 next_states;    // of the next bounce's
     uvec2 radiance;       // a quad a path: radiance, and 1 where its camera ray met something
-    uvec2 contributions;  // a quad a path: what its shadow ray brings if nothing is in the way
+    uvec2 contributions;  // a quad for each ray of the shadow queue: what it brings if nothing is in the way
     uvec2 tags;           // of the queue that is traced: which path a ray belongs to
     RayQueue next;        // rays of the next bounce
     RayQueue shadow;      // rays to lights
     uint max_depth;       // bounces
     uint rr_depth;        // bounces before Russian roulette
     float clamp_to;       // no path vertex adds more than this in any channel; infinite: none is held
-    uint white_sky;       // 1: every surface is diffuse and grey
-    float albedo;         // that grey
-    uint strategy;        // how directions are drawn: STRATEGY_*
+    float albedo;         // of grey surfaces
     uint environment_light;  // its place among the lights, or INVALID
     uint pixel_filter;    // FILTER_*
     float lens_radius;    // world units; 0: a pinhole
     float focus;          // distance along the view at which the image is sharp
     uint view;            // VIEW_*: no light, but what camera rays see
     uint light_first;     // of the lights that are drawn by power
-    uvec2 light_tree;     // LightNode of those before, or null
-    uvec2 cones;          // a pair a path: width and spread of its cone (path/cone.glsl); null: textures are read without levels
+    uvec2 light_tree;     // LightNode of those before
+    uvec2 cones;          // a pair a path: width and spread of its cone (path/cone.glsl)
 };
-
-// Everything below but MIS shows what it is good for.
-const uint STRATEGY_MIS = 0u;
-const uint STRATEGY_BSDF = 1u;     // no light samples
-const uint STRATEGY_LIGHT = 2u;    // what light samples could find, nothing else finds
-const uint STRATEGY_COSINE = 3u;   // no light samples, cosine-distributed directions
-const uint STRATEGY_UNIFORM = 4u;  // no light samples, directions distributed evenly
 
 const uint NO_MEDIUM = 0xffffffffu;
 
@@ -61,6 +54,7 @@ struct PathState {
     uint medium;     // material of the volume that it is in, or NO_MEDIUM
 };
 
+// What a bounce reads and writes lies in the order of its queue, one vector of paths after the other: fetched ahead, where by path each would be a wait.
 PathState load_state(uvec2 states, uint k) {
     uvec4 a = Quads(states).v[2u * k], b = Quads(states).v[2u * k + 1u];
     return PathState(uintBitsToFloat(a.xyz), uintBitsToFloat(a.w), b.x, b.y, uintBitsToFloat(b.z), b.w);

@@ -27,18 +27,14 @@ float power_heuristic(float a, float b) {
 }
 
 vec3 held(PathParams p, vec3 c, uint depth) {
-    return depth > 0u ? min(c, vec3(p.clamp_to)) : c;
+    return asks(ASKS_CLAMP) && depth > 0u ? min(c, vec3(p.clamp_to)) : c;
 }
 
 // Weight of an emitter that a ray met, which light samples draw with density `light`.
 float emission_weight(PathParams p, PathState state, float light) {
     if (state.pdf < 0.0 || !(light > 0.0)) return 1.0;
-    if (p.strategy == STRATEGY_MIS) return power_heuristic(state.pdf, light);
-    return p.strategy == STRATEGY_LIGHT ? 0.0 : 1.0;
-}
-
-bool draws_lights(PathParams p) {
-    return p.strategy == STRATEGY_MIS || p.strategy == STRATEGY_LIGHT;
+    if (asks(ASKS_MIS)) return power_heuristic(state.pdf, light);
+    return asks(ASKS_LIGHT_SAMPLES) ? 0.0 : 1.0;
 }
 
 // A direction, or its mirror image at the true surface, in the frame of the shading normal. A BSDF about that normal reaches directions which the
@@ -66,24 +62,23 @@ BsdfValue vertex_at(Shading m, vec3 wo, vec3 w) {
 }
 
 // Density of cosine-distributed directions, or of even ones, about the shading normal, of a direction in the world.
-float plain_pdf(PathParams p, Shading m, vec3 w) {
+float plain_pdf(Shading m, vec3 w) {
     float pdf = 0.0;
     for (int k = 0; k < 2; k++) {
         bool found;
         float c = unbent(m, w, k > 0, found).z;
-        if (found && c > 0.0) pdf += p.strategy == STRATEGY_COSINE ? c / PI : 1.0 / (2.0 * PI);
+        if (found && c > 0.0) pdf += asks(ASKS_COSINE) ? c / PI : 1.0 / (2.0 * PI);
     }
     return pdf;
 }
 
 // A direction by the strategy that is asked for; in the world.
-BsdfSample draw_direction(PathParams p, Shading m, vec3 wo, vec2 u, float v) {
+BsdfSample draw_direction(Shading m, vec3 wo, vec2 u, float v) {
     Bsdf b = m.bsdf;
-    bool plain = p.strategy == STRATEGY_COSINE || p.strategy == STRATEGY_UNIFORM;
     // a delta lobe can be sampled in one way only, and these know reflection only
-    plain = plain && has_rough_part(b) && !has_smooth_part(b) && b.transmitted == vec3(0.0);
+    bool plain = (asks(ASKS_COSINE) || asks(ASKS_UNIFORM)) && has_rough_part(b) && !has_smooth_part(b) && b.transmitted == vec3(0.0);
     BsdfSample s;
-    if (plain) s = proposed(p.strategy == STRATEGY_COSINE ? cosine_hemisphere(u) : uniform_hemisphere(u), 1.0);
+    if (plain) s = proposed(asks(ASKS_COSINE) ? cosine_hemisphere(u) : uniform_hemisphere(u), 1.0);
     else s = bsdf_sample(b, wo, u, v);
     if (!(s.pdf > 0.0)) return NO_SAMPLE;
     vec3 w = from_frame(m.frame, s.wi);
@@ -92,7 +87,7 @@ BsdfSample draw_direction(PathParams p, Shading m, vec3 wo, vec2 u, float v) {
     s.wi = w;
     if (s.delta) return s;
     BsdfValue value = vertex_at(m, wo, w);
-    s.pdf = plain ? plain_pdf(p, m, w) : value.pdf;
+    s.pdf = plain ? plain_pdf(m, w) : value.pdf;
     s.weight = value.f / s.pdf;
     if (!(s.pdf > 0.0)) return NO_SAMPLE;
     return s;
@@ -101,7 +96,7 @@ BsdfSample draw_direction(PathParams p, Shading m, vec3 wo, vec2 u, float v) {
 // What a medium leaves of light over a length.
 vec3 transmittance(uint medium, float length_) {
     if (!has(HAS_ABSORPTION) || medium == NO_MEDIUM) return vec3(1.0);
-    vec3 depth = ShadingRecords(SceneRoot(push.scene).shading).v[medium].absorption;
+    vec3 depth = SHADING_OF(medium).absorption;
     // nothing absorbs nothing, over any length
     return mix(exp(-depth * length_), vec3(1.0), equal(depth, vec3(0.0)));
 }
@@ -120,7 +115,7 @@ void draw_light(BlockParams block, PathParams p, uint k, PathState state, Surfac
     if (!(l.pdf > 0.0)) return;
     BsdfValue value = vertex_at(m, wo, l.wi);
     vec3 c = state.throughput * value.f * l.radiance / l.pdf;
-    if (p.strategy == STRATEGY_MIS && !l.delta) c *= power_heuristic(l.pdf, value.pdf);
+    if (asks(ASKS_MIS) && !l.delta) c *= power_heuristic(l.pdf, value.pdf);
     if (!(highest(c) > 0.0)) return;
     float side = dot(m.ng, l.wi);
     vec3 origin = s.position + m.ng * (sign(side) * s.offset);
@@ -132,82 +127,77 @@ void draw_light(BlockParams block, PathParams p, uint k, PathState state, Surfac
         shadow.tmax = d * (1.0 - SHADOW_EPSILON);
     }
     c *= transmittance(side > 0.0 ? state.medium : beyond, l.distance);
-    store_quad(p.contributions, k, vec4(held(p, c, state.depth + 1u), 0.0));
-    append_ray(p.shadow, shadow, k);
+    uint slot = append_ray(p.shadow, shadow, k);
+    store_quad(p.contributions, slot, vec4(held(p, c, state.depth + 1u), 0.0));
 }
 
-// k: the path; sum: its radiance so far and its coverage.
-void path_vertex(BlockParams block, uint k, PathState state, vec4 sum, Ray ray, Hit hit) {
+// k: the path. Returns what the vertex itself adds to its radiance; what light samples add comes with their rays.
+vec3 path_vertex(BlockParams block, uint k, PathState state, Ray ray, Hit hit) {
     PathParams p = PathParams(block.path);
     state.throughput *= transmittance(state.medium, hit.t);
     if (!is_hit(hit)) {
         // as with ambient occlusion, what shows nothing counts nothing
-        if ((p.white_sky != 0u || p.view != VIEW_NONE) && state.depth == 0u) {
-            store_quad(p.radiance, k, sum);
-            return;
-        }
+        if ((asks(ASKS_GREY) || asks(ASKS_VIEW)) && state.depth == 0u) return vec3(0.0);
         float light = 0.0;
-        if (p.environment_light != INVALID) {
+        if (asks(ASKS_LIGHT_SAMPLES) && asks(ASKS_SKY)) {
             light = LightRecords(p.lights).v[p.environment_light].probability * environment_pdf(p, ray.direction);
         }
         vec3 c = state.throughput * environment_radiance(p, ray.direction) * emission_weight(p, state, light);
-        store_quad(p.radiance, k, vec4(sum.rgb + held(p, c, state.depth), sum.a));
-        return;
+        return held(p, c, state.depth);
     }
     Surface s = surface_at(ray, hit);
     vec3 towards_viewer = -ray.direction;
     bool front = dot(s.ng, towards_viewer) > 0.0;
     Cone cone = Cone(0.0, 0.0);
     float log_side = SHARP;
-    if (has_cones(p)) {
+    if (asks(ASKS_CONES)) {
         if (state.depth == 0u) cone = camera_cone(block, ray.direction);
         else cone = load_cone(p, k);
         cone = cone_after(cone, hit.t);
         log_side = footprint(cone, s, ray.direction);
     }
     Shading m;
-    if (p.white_sky != 0u) m = grey_shading(s, towards_viewer, p.albedo);
+    if (asks(ASKS_GREY)) m = grey_shading(s, towards_viewer, p.albedo);
     else m = shade(s, towards_viewer, log_side);
-    if (p.view != VIEW_NONE) {
-        store_quad(p.radiance, k, vec4(view_value(p.view, s, m, hit.t, log_side), sum.a));
-        return;
-    }
+    if (asks(ASKS_VIEW)) return view_value(p.view, s, m, hit.t, log_side);
+    vec3 added = vec3(0.0);
     if (m.emission != vec3(0.0)) {
-        float light = m.unlit ? 0.0 : light_pdf(p, hit, ray.origin, ray.direction);
-        sum.rgb += held(p, state.throughput * m.emission * emission_weight(p, state, light), state.depth);
+        float light = 0.0;
+        if (asks(ASKS_LIGHT_SAMPLES) && !m.unlit) light = light_pdf(p, hit, ray.origin, ray.direction);
+        added = held(p, state.throughput * m.emission * emission_weight(p, state, light), state.depth);
     }
-    store_quad(p.radiance, k, sum);
-    if (m.bsdf.kind == BSDF_NONE || state.depth >= p.max_depth) return;
+    if (m.bsdf.kind == BSDF_NONE || state.depth >= p.max_depth) return added;
 
     vec3 wo = to_frame(m.frame, towards_viewer);
     wo.z = max(wo.z, LEAST_COSINE);
     uvec2 pixel = block_pixel(block, pixel_index(state.index)) + block.block_origin;
     uint n = sample_index(state.index), dimension = PATH_FIRST + state.depth * PATH_STRIDE;
     uint beyond = medium_beyond(m, front, state.medium);
-    if (draws_lights(p) && p.light_count > 0u && has_rough_part(m.bsdf)) {
+    if (asks(ASKS_LIGHT_SAMPLES) && has_rough_part(m.bsdf)) {
         draw_light(block, p, k, state, s, m, wo, beyond, pixel, n, dimension);
     }
 
     // after the last bounce only what is met shines
     vec2 lobe = sample_2d(block.seed, pixel, n, dimension + BSDF_LOBE);
-    BsdfSample b = draw_direction(p, m, wo, sample_2d(block.seed, pixel, n, dimension + BSDF_DIRECTION), lobe.x);
+    BsdfSample b = draw_direction(m, wo, sample_2d(block.seed, pixel, n, dimension + BSDF_DIRECTION), lobe.x);
     float side = dot(m.ng, b.wi);
-    if (!(b.pdf > 0.0) || side == 0.0) return;
+    if (!(b.pdf > 0.0) || side == 0.0) return added;
     state.throughput *= b.weight;
     state.pdf = b.delta ? -1.0 : b.pdf;
     state.eta_scale *= b.eta * b.eta;
     if (side < 0.0) state.medium = beyond;
     state.depth++;
     float brightest = highest(state.throughput);
-    if (!(brightest > 0.0)) return;
+    if (!(brightest > 0.0)) return added;
     if (state.depth >= p.rr_depth) {
         float survival = min(brightest * state.eta_scale, MOST_SURVIVAL);
-        if (lobe.y >= survival) return;
+        if (lobe.y >= survival) return added;
         state.throughput /= survival;
     }
-    store_state(p.states, k, state);
-    if (has_cones(p)) store_cone(p, k, scattered_cone(cone, s, front, b, side < 0.0));
-    append_ray(p.next, Ray(s.position + m.ng * (sign(side) * s.offset), 0.0, normalize(b.wi), INFINITY), k);
+    if (asks(ASKS_CONES)) store_cone(p, k, scattered_cone(cone, s, front, b, side < 0.0));
+    uint slot = append_ray(p.next, Ray(s.position + m.ng * (sign(side) * s.offset), 0.0, normalize(b.wi), INFINITY), k);
+    store_state(p.next_states, slot, state);
+    return added;
 }
 
 #endif

@@ -64,6 +64,9 @@ struct ShadingRecord {
 };
 layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer ShadingRecords { ShadingRecord v[]; };
 
+// The record of a material, read where it is asked: what a branch asks for that nobody takes is not fetched.
+#define SHADING_OF(material) ShadingRecords(SceneRoot(push.scene).shading).v[material]
+
 // Twice the area of a triangle on a texture of one by one, before the use's own transform.
 float texcoord_area(PartRecord part, uvec3 corners, uint set) {
     uvec2 base = set == 1u ? part.texcoords1 : part.texcoords0;
@@ -92,6 +95,7 @@ vec4 sample_use(TextureUse use, PartRecord part, uint primitive, vec2 uv, uint k
 
 // Linear base colour of what is seen at a surface.
 vec3 shown_color(Surface s, PartRecord part, MaterialRecord m, float log_side) {
+    if (!has(HAS_BASE_COLORS)) return m.base_color.rgb;
     if (!has(HAS_RAY_CONES)) return base_color(part, m, s.primitive, s.uv).rgb;
     vec3 color = m.base_color.rgb;
     if (is_null(part.indices)) return color;
@@ -103,10 +107,10 @@ vec3 shown_color(Surface s, PartRecord part, MaterialRecord m, float log_side) {
 
 // Factor of a light's radiance at a point of a primitive of an instance of the scene.
 vec3 emission_texture(uint instance, uint primitive, vec2 uv) {
-    if (!has(HAS_TEXTURES)) return vec3(1.0);
+    if (!has_use(USE_EMISSION)) return vec3(1.0);
     SceneRoot root = SceneRoot(push.scene);
     PartRecord part = PartRecords(root.parts).v[Pairs(root.placements).v[instance].y];
-    TextureUse use = ShadingRecords(root.shading).v[part.material].uses[USE_EMISSION];
+    TextureUse use = SHADING_OF(part.material).uses[USE_EMISSION];
     // the light is as it is: only what a path sees is filtered
     return sample_use(use, part, primitive + part.first_primitive, uv, TEXELS_SRGB, SHARP).rgb;
 }
@@ -129,19 +133,17 @@ struct Looked {
 Looked look_up(Surface s, PartRecord part, float log_side) {
     Looked found;
     const uint SRGB = 1u << USE_EMISSION | 1u << USE_SHEEN | 1u << USE_SPECULAR_COLOR;
-    ShadingRecords records = ShadingRecords(SceneRoot(push.scene).shading);
-    // one copy of the code for all
-    [[dont_unroll]] for (uint use = 0u; use < USES; use++) {
+    uint m = part.material;
+    // all places are constants once it is unrolled: CPU drivers write to others lane by lane
+    [[unroll]] for (uint use = 0u; use < USES; use++) {
         found.at[use] = vec4(1.0);
-        if (has(HAS_TEXTURES)) {
-            uint kind = (SRGB >> use & 1u) != 0u ? TEXELS_SRGB : TEXELS_LINEAR;
-            found.at[use] = sample_use(records.v[part.material].uses[use], part, s.primitive, s.uv, kind, log_side);
-        }
+        uint kind = (SRGB >> use & 1u) != 0u ? TEXELS_SRGB : TEXELS_LINEAR;
+        if (has_use(use)) found.at[use] = sample_use(SHADING_OF(m).uses[use], part, s.primitive, s.uv, kind, log_side);
     }
     return found;
 }
 
-bool has_map(ShadingRecord m, uint use) { return has(HAS_NORMAL_MAPS) && m.uses[use].texture != INVALID; }
+bool has_map(uint m, uint use) { return has_use(use) && SHADING_OF(m).uses[use].texture != INVALID; }
 
 // Normal from a tangent-space map; tangents about n, which is on the front.
 vec3 mapped_normal(vec4 texel_, float scale, vec3 n, vec4 tangent) {
@@ -159,23 +161,23 @@ vec3 towards(vec3 n, vec3 wo) {
 }
 
 // Turns and stretches microfacets along KHR_materials_anisotropy's direction. Returns it, in the plane of tangent and bitangent.
-vec2 anisotropic(Looked looked, ShadingRecord m, inout vec2 alpha) {
+vec2 anisotropic(Looked looked, uint m, inout vec2 alpha) {
     vec3 t = looked.at[USE_ANISOTROPY].xyz;
-    vec2 d = m.uses[USE_ANISOTROPY].texture != INVALID ? t.xy * 2.0 - 1.0 : vec2(1.0, 0.0);
-    float strength = length(m.anisotropy) * t.z;
+    vec2 d = SHADING_OF(m).uses[USE_ANISOTROPY].texture != INVALID ? t.xy * 2.0 - 1.0 : vec2(1.0, 0.0);
+    float strength = length(SHADING_OF(m).anisotropy) * t.z;
     alpha.x = mix(alpha.x, 1.0, strength * strength);
-    vec2 turn = strength > 0.0 ? normalize(m.anisotropy) : vec2(1.0, 0.0);
+    vec2 turn = strength > 0.0 ? normalize(SHADING_OF(m).anisotropy) : vec2(1.0, 0.0);
     return vec2(turn.x * d.x - turn.y * d.y, turn.y * d.x + turn.x * d.y);
 }
 
 // Factors that give back what microfacets of one bounce lose (docs/materials.md, Energy).
-void compensate(inout Bsdf b, ShadingRecord m, float cos_o, float roughness, bool front) {
+void compensate(inout Bsdf b, uint m, float cos_o, float roughness, bool front) {
     if (!has(HAS_COMPENSATION) || is_smooth(b.facets)) return;
     if (b.kind == BSDF_CONDUCTOR) {
         float e = albedo(ALBEDO_BECKMANN, cos_o, roughness);
         b.gain = 1.0 + fresnel_conductor(1.0, b.f0, b.k) * ((1.0 - e) / e);
     } else if (b.kind == BSDF_DIELECTRIC || b.volume) {
-        b.gain = vec3(1.0 / albedo(ALBEDO_GLASS + 2u * m.glass_layer + (front ? 0u : 1u), cos_o, roughness));
+        b.gain = vec3(1.0 / albedo(ALBEDO_GLASS + 2u * SHADING_OF(m).glass_layer + (front ? 0u : 1u), cos_o, roughness));
         b.transmitted *= b.kind == BSDF_DIELECTRIC ? 1.0 : b.gain.x;
     } else {
         float a0 = albedo(ALBEDO_GGX_F0, cos_o, roughness), a90 = albedo(ALBEDO_GGX_F90, cos_o, roughness), e = a0 + a90;
@@ -185,39 +187,39 @@ void compensate(inout Bsdf b, ShadingRecord m, float cos_o, float roughness, boo
 }
 
 // The BSDF of a glTF material but for the frame; returns the direction of anisotropy.
-vec2 gltf_bsdf(inout Bsdf b, Looked looked, ShadingRecord m, vec3 base, bool front, float cos_o) {
+vec2 gltf_bsdf(inout Bsdf b, Looked looked, uint m, vec3 base, bool front, float cos_o) {
     vec4 mr = looked.at[USE_METALLIC_ROUGHNESS];
-    float metallic = m.metallic * mr.b, roughness = m.roughness * mr.g;
-    float specular = m.specular * looked.at[USE_SPECULAR].a;
-    vec3 specular_color = m.specular_color * looked.at[USE_SPECULAR_COLOR].rgb;
-    float r0 = (m.ior - 1.0) / (m.ior + 1.0);
+    float metallic = SHADING_OF(m).metallic * mr.b, roughness = SHADING_OF(m).roughness * mr.g;
+    float specular = SHADING_OF(m).specular * looked.at[USE_SPECULAR].a;
+    vec3 specular_color = SHADING_OF(m).specular_color * looked.at[USE_SPECULAR_COLOR].rgb;
+    float r0 = (SHADING_OF(m).ior - 1.0) / (SHADING_OF(m).ior + 1.0);
     b.kind = BSDF_GLTF;
     b.diffuse = base * (1.0 - metallic);
     b.f0 = mix(min(r0 * r0 * specular_color, vec3(1.0)) * specular, base, metallic);
     b.f90 = mix(specular, 1.0, metallic);
     b.facets = Microfacets(vec2(roughness * roughness), false);
     vec2 along = vec2(1.0, 0.0);
-    if (has(HAS_ANISOTROPY) && m.anisotropy != vec2(0.0)) along = anisotropic(looked, m, b.facets.alpha);
-    if (has_transmission() && m.walls != WALLS_NONE) {
-        float transmission = m.transmission * looked.at[USE_TRANSMISSION].r;
+    if (has(HAS_ANISOTROPY) && SHADING_OF(m).anisotropy != vec2(0.0)) along = anisotropic(looked, m, b.facets.alpha);
+    if (has_transmission() && SHADING_OF(m).walls != WALLS_NONE) {
+        float transmission = SHADING_OF(m).transmission * looked.at[USE_TRANSMISSION].r;
         b.transmitted = b.diffuse * transmission;
         b.diffuse *= 1.0 - transmission;
-        b.volume = has(HAS_VOLUMES) && m.walls == WALLS_VOLUME;
+        b.volume = has(HAS_VOLUMES) && SHADING_OF(m).walls == WALLS_VOLUME;
         if (b.volume) {
-            b.eta = front ? m.ior : 1.0 / m.ior;
+            b.eta = front ? SHADING_OF(m).ior : 1.0 / SHADING_OF(m).ior;
             b.tint = min(specular_color, vec3(1.0)) * specular;
             b.metallic = metallic;
             b.f0 = base;
         }
     }
-    if (has(HAS_SHEEN) && highest(m.sheen_color) > 0.0) {
-        float r = m.sheen_roughness * looked.at[USE_SHEEN_ROUGHNESS].a;
-        b.sheen = Sheen(m.sheen_color * looked.at[USE_SHEEN].rgb, max(r * r, LEAST_SHEEN_ALPHA), 1.0);
+    if (has(HAS_SHEEN) && highest(SHADING_OF(m).sheen_color) > 0.0) {
+        float r = SHADING_OF(m).sheen_roughness * looked.at[USE_SHEEN_ROUGHNESS].a;
+        b.sheen = Sheen(SHADING_OF(m).sheen_color * looked.at[USE_SHEEN].rgb, max(r * r, LEAST_SHEEN_ALPHA), 1.0);
         b.sheen.kept = sheen_kept(b.sheen, cos_o);
     }
-    if (has(HAS_COAT) && m.coat > 0.0) {
-        float r = m.coat_roughness * looked.at[USE_COAT_ROUGHNESS].g;
-        b.coat.weight = m.coat * looked.at[USE_COAT].r;
+    if (has(HAS_COAT) && SHADING_OF(m).coat > 0.0) {
+        float r = SHADING_OF(m).coat_roughness * looked.at[USE_COAT_ROUGHNESS].g;
+        b.coat.weight = SHADING_OF(m).coat * looked.at[USE_COAT].r;
         b.coat.facets = Microfacets(vec2(r * r), false);
     }
     compensate(b, m, cos_o, roughness, front);
@@ -243,18 +245,18 @@ Shading grey_shading(Surface s, vec3 wo, float grey) {
 Shading shade(Surface s, vec3 wo, float log_side) {
     SceneRoot root = SceneRoot(push.scene);
     PartRecord part = PartRecords(root.parts).v[s.part];
-    ShadingRecord m = ShadingRecords(root.shading).v[part.material];
+    uint m = part.material;
     bool front = dot(s.ng, wo) > 0.0;
     float side = front ? 1.0 : -1.0;
     Shading out_ = black_shading(s, wo);
     out_.material = part.material;
     vec3 n = out_.frame.n;
     Looked looked = look_up(s, part, log_side);
-    if (has(HAS_EMISSION) && m.emission != vec3(0.0) && (front || m.emits_back != 0u)) {
-        out_.emission = m.emission * looked.at[USE_EMISSION].rgb;
+    if (has(HAS_EMISSION) && SHADING_OF(m).emission != vec3(0.0) && (front || SHADING_OF(m).emits_back != 0u)) {
+        out_.emission = SHADING_OF(m).emission * looked.at[USE_EMISSION].rgb;
     }
     vec3 base = shown_color(s, part, MaterialRecords(root.materials).v[part.material], log_side);
-    if (has(HAS_UNLIT) && m.model == MODEL_UNLIT) {
+    if (has(HAS_UNLIT) && SHADING_OF(m).model == MODEL_UNLIT) {
         out_.unlit = true;
         out_.emission += base;
         return out_;
@@ -263,38 +265,38 @@ Shading shade(Surface s, vec3 wo, float log_side) {
     bool mapped = has_map(m, USE_NORMAL), coat_mapped = has(HAS_COAT) && has_map(m, USE_COAT_NORMAL);
     if ((mapped || coat_mapped || has(HAS_ANISOTROPY)) && !is_null(part.tangents)) tangent = tangent_at(s, part);
     if (mapped && tangent.w != 0.0) {
-        n = towards(mapped_normal(looked.at[USE_NORMAL], m.normal_scale, s.ns, tangent) * side, wo);
+        n = towards(mapped_normal(looked.at[USE_NORMAL], SHADING_OF(m).normal_scale, s.ns, tangent) * side, wo);
         out_.frame = frame_about(n);
     }
     float cos_o = max(dot(n, wo), LEAST_COSINE);
-    if (has(HAS_DIFFUSE) && m.model == MODEL_MATTE) {
+    if (has(HAS_DIFFUSE) && SHADING_OF(m).model == MODEL_MATTE) {
         out_.bsdf.kind = BSDF_DIFFUSE;
         out_.bsdf.diffuse = base;
-    } else if (has(HAS_MIRROR) && m.model == MODEL_MIRROR) {
+    } else if (has(HAS_MIRROR) && SHADING_OF(m).model == MODEL_MIRROR) {
         out_.bsdf.kind = BSDF_MIRROR;
-        out_.bsdf.tint = m.specular_color;
-    } else if (has(HAS_GLASS) && m.model == MODEL_GLASS) {
+        out_.bsdf.tint = SHADING_OF(m).specular_color;
+    } else if (has(HAS_GLASS) && SHADING_OF(m).model == MODEL_GLASS) {
         out_.bsdf.kind = BSDF_DIELECTRIC;
-        out_.bsdf.tint = m.specular_color;
-        out_.bsdf.transmitted = m.transmitted;
-        out_.bsdf.eta = front ? m.ior : 1.0 / m.ior;
-        out_.bsdf.facets = Microfacets(vec2(m.roughness * m.roughness), false);
-        compensate(out_.bsdf, m, cos_o, m.roughness, front);
-    } else if (has(HAS_CONDUCTOR) && m.model == MODEL_CONDUCTOR) {
+        out_.bsdf.tint = SHADING_OF(m).specular_color;
+        out_.bsdf.transmitted = SHADING_OF(m).transmitted;
+        out_.bsdf.eta = front ? SHADING_OF(m).ior : 1.0 / SHADING_OF(m).ior;
+        out_.bsdf.facets = Microfacets(vec2(SHADING_OF(m).roughness * SHADING_OF(m).roughness), false);
+        compensate(out_.bsdf, m, cos_o, SHADING_OF(m).roughness, front);
+    } else if (has(HAS_CONDUCTOR) && SHADING_OF(m).model == MODEL_CONDUCTOR) {
         out_.bsdf.kind = BSDF_CONDUCTOR;
-        out_.bsdf.tint = m.specular_color;
-        out_.bsdf.f0 = m.eta;
-        out_.bsdf.k = m.k;
-        out_.bsdf.facets = Microfacets(vec2(m.roughness * m.roughness), true);
-        compensate(out_.bsdf, m, cos_o, m.roughness, front);
+        out_.bsdf.tint = SHADING_OF(m).specular_color;
+        out_.bsdf.f0 = SHADING_OF(m).eta;
+        out_.bsdf.k = SHADING_OF(m).k;
+        out_.bsdf.facets = Microfacets(vec2(SHADING_OF(m).roughness * SHADING_OF(m).roughness), true);
+        compensate(out_.bsdf, m, cos_o, SHADING_OF(m).roughness, front);
     } else if (has(HAS_GLTF)) {
         vec2 along = gltf_bsdf(out_.bsdf, looked, m, base, front, cos_o);
-        if (has(HAS_ANISOTROPY) && m.anisotropy != vec2(0.0) && tangent.w != 0.0) {
+        if (has(HAS_ANISOTROPY) && SHADING_OF(m).anisotropy != vec2(0.0) && tangent.w != 0.0) {
             vec3 d = tangent.xyz * along.x + cross(s.ns, tangent.xyz) * (tangent.w * along.y);
             out_.frame = frame_along(n, d);
         }
         if (coat_mapped && tangent.w != 0.0) {
-            vec3 nc = mapped_normal(looked.at[USE_COAT_NORMAL], m.coat_normal_scale, s.ns, tangent) * side;
+            vec3 nc = mapped_normal(looked.at[USE_COAT_NORMAL], SHADING_OF(m).coat_normal_scale, s.ns, tangent) * side;
             out_.bsdf.coat.normal = to_frame(out_.frame, nc);
         } else if (has(HAS_COAT) && mapped) {
             // the coat has its own normals, or none

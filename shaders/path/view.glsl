@@ -13,7 +13,7 @@ vec3 view_value(uint view, Surface s, Shading shown, float distance_, float log_
     if (view == VIEW_DEPTH) return vec3(distance_);
     if (view == VIEW_NORMALS) return shown.frame.n;
     PartRecord part = PartRecords(SceneRoot(push.scene).parts).v[s.part];
-    ShadingRecord m = ShadingRecords(SceneRoot(push.scene).shading).v[part.material];
+    ShadingRecord m = SHADING_OF(part.material);
     if (view == VIEW_BAKED_OCCLUSION) return vec3(look_up(s, part, log_side).at[USE_OCCLUSION].r);
     bool coloured = m.model == MODEL_MIRROR || m.model == MODEL_GLASS || m.model == MODEL_CONDUCTOR;
     vec3 base = shown_color(s, part, MaterialRecords(SceneRoot(push.scene).materials).v[part.material], log_side);

@@ -4,12 +4,13 @@
 #ifndef TRACE_BRUTE
 #define TRACE_BRUTE
 #include "trace/primitive.glsl"
+#include "trace/spread.glsl"
 
 layout(local_size_x = LANES) in;
 
 // The host lets no scene in whose loops would have more turns than any driver runs (src/tracer/brute.rs).
 void main() {
-    uint k = gl_GlobalInvocationID.x;
+    uint k = ray_of_dispatch();
     if (k >= ray_count()) return;
     SceneRoot root = SceneRoot(push.scene);
     uvec2 primitives = root.primitives;

@@ -3,11 +3,12 @@
 #define TRACE_DELIVER
 #include "trace/callback.glsl"
 #include "trace/launch.glsl"
+#include "trace/spread.glsl"
 
 layout(local_size_x = LANES) in;
 
 void main() {
-    uint k = gl_GlobalInvocationID.x;
+    uint k = ray_of_dispatch();
     if (k >= ray_count()) return;
     SceneRoot root = SceneRoot(push.scene);
     if (!is_finished(root, k)) {

@@ -8,8 +8,11 @@
 layout(location = 0) rayPayloadEXT Payload payload;
 
 void main() {
-    if (gl_LaunchIDEXT.x >= ray_count()) return;
-    uint index = push.first + gl_LaunchIDEXT.x;
+    // as work-groups take them (trace/spread.glsl): a row has every SPREADth run of rays
+    const uint RUN_RAYS = LANES * RUN;
+    uint k = ((gl_LaunchIDEXT.x & ~(RUN_RAYS - 1u)) * SPREAD) + gl_LaunchIDEXT.y * RUN_RAYS + (gl_LaunchIDEXT.x & (RUN_RAYS - 1u));
+    if (k >= ray_count()) return;
+    uint index = push.first + k;
     Ray world = ray(index);
     if (!is_ray(world)) {
         deliver_miss(index);

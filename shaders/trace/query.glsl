@@ -4,12 +4,14 @@
 #include "scene/material.glsl"
 #include "scene/sphere.glsl"
 #include "trace/callback.glsl"
+#include "trace/spread.glsl"
 
 layout(local_size_x = LANES) in;
 
 void main() {
-    if (gl_GlobalInvocationID.x >= ray_count()) return;
-    uint index = push.first + gl_GlobalInvocationID.x;
+    uint k = ray_of_dispatch();
+    if (k >= ray_count()) return;
+    uint index = push.first + k;
     Ray world = ray(index);
     if (!is_ray(world)) {
         deliver_miss(index);

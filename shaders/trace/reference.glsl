@@ -7,6 +7,7 @@
 #define TRACE_REFERENCE
 #include "trace/primitive.glsl"
 #include "trace/slab.glsl"
+#include "trace/spread.glsl"
 
 layout(local_size_x = LANES) in;
 
@@ -40,8 +41,9 @@ float enter_box(vec3 lo, vec3 hi, vec3 origin, vec3 inverse, float tmin, float t
 }
 
 void main() {
-    uint next = gl_WorkGroupID.x * (LANES * RAYS_PER_LANE) + gl_LocalInvocationID.x;
-    uint end = min((gl_WorkGroupID.x + 1u) * (LANES * RAYS_PER_LANE), ray_count());
+    uint part = part_of_dispatch();
+    uint next = part * (LANES * RAYS_PER_LANE) + gl_LocalInvocationID.x;
+    uint end = min((part + 1u) * (LANES * RAYS_PER_LANE), ray_count());
     if (next >= end) return;
 
     SceneRoot root = SceneRoot(push.scene);

@@ -38,7 +38,7 @@ Ray take_ray(uint k) {
 
 // The lane's next ray. What is no ray meets nothing: no box and no primitive lies before it.
 #define NEXT_RAY                                                                                        \
-    index = begin + atomicAdd(LaunchFlags(root.launch_counters).v[gl_WorkGroupID.x], 1u);               \
+    index = begin + atomicAdd(LaunchFlags(root.launch_counters).v[part], 1u);               \
     if (index >= end) return;                                                                           \
     world = take_ray(index);                                                                            \
     if (!is_ray(world)) world = no_ray();
@@ -55,7 +55,7 @@ Ray take_ray(uint k) {
 #endif
 
 void main() {
-    uint begin = part_of_dispatch() * (LANES * RAYS_PER_LANE);
+    uint part = part_of_dispatch(), begin = part * (LANES * RAYS_PER_LANE);
     uint end = min(begin + LANES * RAYS_PER_LANE, ray_count());
     SceneRoot root = SceneRoot(push.scene);
     uint index;

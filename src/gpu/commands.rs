@@ -10,6 +10,9 @@ use super::pipeline::{ComputePipeline, RayTracingPipeline};
 use super::result::Context;
 use crate::error::Result;
 
+/// Work-groups along y and z that every device takes (Vulkan 1.3, Required Limits).
+const MOST_WORKGROUPS: u32 = 65_535;
+
 /// Timed regions that one submission can hold.
 const MAX_REGIONS: u32 = 512;
 
@@ -225,24 +228,29 @@ impl Recorder<'_> {
     /// Runs a compute pipeline over `groups` work-groups. The addresses within `push` must lead to living buffers of the
     /// layout that the shader expects.
     pub fn dispatch<P: bytemuck::NoUninit>(&mut self, pipeline: &ComputePipeline, push: &P, groups: u32) {
-        assert!(groups <= self.device.info.limits.max_workgroups_x);
+        self.dispatch_3d(pipeline, push, [groups, 1, 1]);
+    }
+
+    /// The same over so many work-groups along x, y and z.
+    pub fn dispatch_3d<P: bytemuck::NoUninit>(&mut self, pipeline: &ComputePipeline, push: &P, [x, y, z]: [u32; 3]) {
+        assert!(x <= self.device.info.limits.max_workgroups_x && y.max(z) <= MOST_WORKGROUPS);
         // SAFETY: recording state; the push constants have the size that the layout was made with (asserted there)
         unsafe {
             self.device.raw.cmd_bind_pipeline(self.buffer, vk::PipelineBindPoint::COMPUTE, pipeline.raw);
             self.push(pipeline.layout, vk::ShaderStageFlags::COMPUTE, push);
-            self.device.raw.cmd_dispatch(self.buffer, groups, 1, 1);
+            self.device.raw.cmd_dispatch(self.buffer, x, y, z);
         }
     }
 
-    /// Runs a ray-tracing pipeline over `rays` invocations; see [`Recorder::dispatch`] for `push`.
-    pub fn trace_rays<P: bytemuck::NoUninit>(&mut self, pipeline: &RayTracingPipeline, push: &P, rays: u32) {
+    /// Runs a ray-tracing pipeline over `rows` rows of `rays` invocations each; see [`Recorder::dispatch`] for `push`.
+    pub fn trace_rays<P: bytemuck::NoUninit>(&mut self, pipeline: &RayTracingPipeline, push: &P, rays: u32, rows: u32) {
         let Some(functions) = &self.device.pipelines else { return };
         // SAFETY: as above; the tables were made for this pipeline
         unsafe {
             self.device.raw.cmd_bind_pipeline(self.buffer, vk::PipelineBindPoint::RAY_TRACING_KHR, pipeline.raw);
             self.push(pipeline.layout, super::pipeline::RAY_STAGES, push);
             let none = vk::StridedDeviceAddressRegionKHR::default();
-            functions.cmd_trace_rays(self.buffer, &pipeline.raygen, &pipeline.miss, &pipeline.hit, &none, rays, 1, 1);
+            functions.cmd_trace_rays(self.buffer, &pipeline.raygen, &pipeline.miss, &pipeline.hit, &none, rays, rows, 1);
         }
     }
 

@@ -33,6 +33,12 @@ impl Specialization {
         self
     }
 
+    /// These, and those of `other`.
+    pub fn and(mut self, other: &Specialization) -> Self {
+        self.entries.extend(&other.entries);
+        self
+    }
+
     pub(super) fn with<R>(&self, f: impl FnOnce(&vk::SpecializationInfo) -> R) -> R {
         let map: Vec<_> = (0..)
             .zip(&self.entries)

@@ -33,7 +33,7 @@ pub use kernel::{BuildOptions, ComputeOptions, Kernel, TriangleTest};
 pub use stream::{Push, Stream, StreamShaders};
 
 use crate::error::{Error, Result};
-use crate::gpu::{ComputePipeline, Device, DeviceInfo};
+use crate::gpu::{ComputePipeline, Device, DeviceInfo, Specialization};
 use crate::scene::features::SceneFeatures;
 use crate::scene::flatten::FlatScene;
 use gpu_scene::GpuScene;
@@ -140,7 +140,7 @@ pub struct Tracer {
     kernels: [OnceLock<Arc<ComputePipeline>>; 2],
     prepared: Prepared,
     // those that were asked for: who renders twice compiles once
-    streams: Mutex<Vec<Stream>>,
+    streams: Mutex<Vec<(Specialization, Stream)>>,
 }
 
 impl Tracer {
@@ -298,39 +298,49 @@ impl Tracer {
     /// # Errors
     /// Those of the device.
     pub fn stream(&self, shaders: &'static StreamShaders) -> Result<Stream> {
+        self.specialized(shaders, &Specialization::default())
+    }
+
+    /// A stream, as [`Tracer::stream`] gives it, with constants of its pass.
+    ///
+    /// # Errors
+    /// Those of the device.
+    pub fn specialized(&self, shaders: &'static StreamShaders, constants: &Specialization) -> Result<Stream> {
         let all = || self.streams.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(stream) = all().iter().find(|s| std::ptr::eq(s.shaders(), shaders)) {
+        let is = |(of, stream): &&(Specialization, Stream)| of == constants && std::ptr::eq(stream.shaders(), shaders);
+        if let Some((_, stream)) = all().iter().find(is) {
             return Ok(stream.clone());
         }
-        let stream = self.compile(shaders)?;
-        all().push(stream.clone());
+        let stream = self.compile(shaders, constants)?;
+        all().push((constants.clone(), stream.clone()));
         Ok(stream)
     }
 
-    fn compile(&self, shaders: &'static StreamShaders) -> Result<Stream> {
+    fn compile(&self, shaders: &'static StreamShaders, constants: &Specialization) -> Result<Stream> {
+        let scene = || stream::scene_specialization(self.features).and(constants);
         match &self.structure {
             Structure::Compute(h) => {
                 let (info, options) =
                     (&self.device.info, ComputeOptions { kernel: h.kernel, triangle_test: self.triangle_test });
                 let s = prepared::specialization(info, self.features, options, h.stack_constant());
+                let all = s.clone().and(constants);
                 let (rays_per_lane, _) = compute::lane_budget(info);
                 match h.kernel {
-                    Kernel::Nearest | Kernel::Direction => Stream::reference(&self.device, shaders, &s, rays_per_lane),
-                    Kernel::Brute => Stream::brute(&self.device, shaders, &s),
+                    Kernel::Nearest | Kernel::Direction => Stream::reference(&self.device, shaders, &all, rays_per_lane),
+                    Kernel::Brute => Stream::brute(&self.device, shaders, &all),
                     Kernel::Auto | Kernel::Wide | Kernel::Packet => {
-                        let recipe = prepared::large(info, h.kernel, shaders, &s);
-                        if recipe.packets {
+                        if prepared::in_packets(info, h.kernel, shaders) {
+                            let recipe = prepared::large(info, h.kernel, shaders, &all);
                             return Ok(Stream::packets(self.prepared.take(&self.device, &recipe)?, shaders));
                         }
-                        let kernel = self.kernel(shaders.mode(), &recipe)?;
-                        Stream::steps(&self.device, shaders, &s, kernel, rays_per_lane, h.launch_memory()?)
+                        // of the pass it knows nothing: streams share it
+                        let kernel = self.kernel(shaders.mode(), &prepared::large(info, h.kernel, shaders, &s))?;
+                        Stream::steps(&self.device, shaders, &all, kernel, rays_per_lane, h.launch_memory()?)
                     }
                 }
             }
-            Structure::Hardware { .. } if self.kind == TracerKind::Query => {
-                Stream::query(&self.device, shaders, &stream::scene_specialization(self.features))
-            }
-            Structure::Hardware { .. } => Stream::pipeline(&self.device, shaders, self.features),
+            Structure::Hardware { .. } if self.kind == TracerKind::Query => Stream::query(&self.device, shaders, &scene()),
+            Structure::Hardware { .. } => Stream::pipeline(&self.device, shaders, self.features, &scene()),
         }
     }
 

@@ -79,7 +79,7 @@ pub(crate) mod feature {
     pub const ABSORPTION: u32 = 1024;
     pub const ANISOTROPY: u32 = 2048;
     pub const NORMAL_MAPS: u32 = 4096;
-    pub const TEXTURES: u32 = 8192;
+    pub const BASE_COLORS: u32 = 8192;
     pub const EMISSION: u32 = 16384;
     pub const COMPENSATION: u32 = 32768;
     pub const BENT_NORMALS: u32 = 65536;
@@ -88,7 +88,12 @@ pub(crate) mod feature {
     /// Textures have levels ([`super::Needs::mip_levels`]).
     pub const RAY_CONES: u32 = 262144;
 
-    /// All of them, in words.
+    /// Textures in a slot of [`super::slots`].
+    pub const fn texture(slot: usize) -> u32 {
+        1 << (19 + slot)
+    }
+
+    /// All but textures, in words.
     pub const NAMES: [(u32, &str); 17] = [
         (DIFFUSE, "Lambert"),
         (GLTF, "metallic-roughness"),
@@ -103,10 +108,27 @@ pub(crate) mod feature {
         (ABSORPTION, "absorption"),
         (ANISOTROPY, "anisotropy"),
         (NORMAL_MAPS, "normal maps"),
-        (TEXTURES, "textures of more than base colour"),
+        (BASE_COLORS, "base colours that vary over a surface"),
         (EMISSION, "emissive surfaces"),
         (COMPENSATION, "energy compensation"),
         (BENT_NORMALS, "interpolated normals"),
+    ];
+
+    /// Textures beside base colours', in words.
+    pub const TEXTURES: [(u32, &str); super::SLOTS] = [
+        (texture(0), "metallic-roughness"),
+        (texture(1), "emissive"),
+        (texture(2), "normal"),
+        (texture(3), "clearcoat"),
+        (texture(4), "clearcoat roughness"),
+        (texture(5), "clearcoat normal"),
+        (texture(6), "sheen colour"),
+        (texture(7), "sheen roughness"),
+        (texture(8), "transmission"),
+        (texture(9), "specular"),
+        (texture(10), "specular colour"),
+        (texture(11), "anisotropy"),
+        (texture(12), "occlusion"),
     ];
 }
 
@@ -210,7 +232,10 @@ pub(super) fn features(flat: &FlatScene, needs: Needs) -> u32 {
             MaterialKind::Copper | MaterialKind::Gold => feature::CONDUCTOR,
         };
         let normal_maps = m.normal_texture.is_some() || m.clearcoat.factor > 0.0 && m.clearcoat.normal_texture.is_some();
-        let textures = slots(m, needs).iter().any(Option::is_some);
+        let varies =
+            |g: &Geometry| matches!(g, Geometry::Triangles(t) if !t.colors.is_empty() || m.base_color_texture.is_some());
+        let textures = slots(m, needs).map(|t| t.is_some());
+        bits |= textures.iter().enumerate().fold(0, |bits, (slot, &there)| bits | with(there, feature::texture(slot)));
         bits |= with(gltf && m.clearcoat.factor > 0.0, feature::COAT)
             | with(gltf && m.sheen.color.max_element() > 0.0, feature::SHEEN)
             | with(walls(m) == THIN_WALLS, feature::THIN_WALLS)
@@ -218,7 +243,7 @@ pub(super) fn features(flat: &FlatScene, needs: Needs) -> u32 {
             | with(absorption(m).iter().any(|&a| a > 0.0), feature::ABSORPTION)
             | with(gltf && m.anisotropy.strength > 0.0, feature::ANISOTROPY)
             | with(normal_maps, feature::NORMAL_MAPS | feature::BENT_NORMALS)
-            | with(textures, feature::TEXTURES)
+            | with(varies(&mesh.geometry), feature::BASE_COLORS)
             | with(m.emissive.max_element() > 0.0, feature::EMISSION);
     }
     bits

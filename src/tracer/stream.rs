@@ -188,6 +188,11 @@ impl StreamShaders {
     }
 }
 
+/// Work-groups along x, y and z that take at least `parts` parts, in runs of `run` (shaders/trace/spread.glsl).
+fn spread(parts: u32, run: u32) -> [u32; 3] {
+    [run, parts.div_ceil(run * SPREAD), SPREAD]
+}
+
 /// One of a stream's shaders.
 fn compile(
     device: &Arc<Device>,
@@ -258,15 +263,19 @@ impl Stream {
         Ok(Self { pipeline: Pipeline::Single { pipeline, rays_per_group: LANES }, shaders })
     }
 
-    pub(super) fn pipeline(device: &Arc<Device>, shaders: &'static StreamShaders, features: SceneFeatures) -> Result<Self> {
+    pub(super) fn pipeline(
+        device: &Arc<Device>,
+        shaders: &'static StreamShaders,
+        features: SceneFeatures,
+        s: &Specialization,
+    ) -> Result<Self> {
         let shared = HitShaders {
             miss: MISS,
             triangle_closest: TRIANGLE_CLOSEST,
             triangle_any: features.alpha.then_some(TRIANGLE_ANY),
             sphere: features.spheres.then_some([SPHERE_CLOSEST, SPHERE_INTERSECTION]),
         };
-        let s = scene_specialization(features);
-        let pipeline = RayTracingPipeline::new(device, shaders.name, shaders.raygen, &shared, &s)?;
+        let pipeline = RayTracingPipeline::new(device, shaders.name, shaders.raygen, &shared, s)?;
         Ok(Self { pipeline: Pipeline::RayTracing(Arc::new(pipeline)), shaders })
     }
 
@@ -291,8 +300,8 @@ impl Stream {
         let pass = self.shaders.pass;
         match &self.pipeline {
             Pipeline::Single { pipeline, rays_per_group } => {
-                recorder
-                    .timed(pass, |r| r.dispatch(pipeline, push, push.count.div_ceil(*rays_per_group).next_multiple_of(SPREAD)));
+                let run = if *rays_per_group == LANES { RUN } else { 1 };
+                recorder.timed(pass, |r| r.dispatch_3d(pipeline, push, spread(push.count.div_ceil(*rays_per_group), run)));
             }
             Pipeline::Steps { generate, trace, deliver, rays_per_group, memory, record } => {
                 let [generating, tracing, delivering] = self.shaders.steps;
@@ -300,8 +309,8 @@ impl Stream {
                     let mut push = Push { first: push.first + first, count: LAUNCH_RAYS.min(push.count - first), ..*push };
                     // the steps hand rays and hits on in memory, and so does one launch to the next
                     recorder.barrier();
-                    let groups = push.count.div_ceil(*rays_per_group).next_multiple_of(SPREAD);
-                    recorder.fill(&memory.counters, 4 * groups as u64, 0);
+                    let groups = spread(push.count.div_ceil(*rays_per_group), 1);
+                    recorder.fill(&memory.counters, 4 * groups.iter().map(|&n| u64::from(n)).product::<u64>(), 0);
                     match generate {
                         Some(generate) => {
                             push.rays = memory.rays.address();
@@ -313,13 +322,15 @@ impl Stream {
                         }
                     }
                     recorder.barrier();
-                    recorder.timed(tracing, |r| r.dispatch(trace, &push, groups));
+                    recorder.timed(tracing, |r| r.dispatch_3d(trace, &push, groups));
                     recorder.barrier();
-                    recorder.timed(delivering, |r| r.dispatch(deliver, &push, push.count.div_ceil(LANES)));
+                    recorder.timed(delivering, |r| r.dispatch_3d(deliver, &push, spread(push.count.div_ceil(LANES), RUN)));
                 }
             }
             Pipeline::Drawn(pipeline) => recorder.timed(pass, |r| r.dispatch(pipeline, push, push.count.div_ceil(LANES))),
-            Pipeline::RayTracing(pipeline) => recorder.timed(pass, |r| r.trace_rays(pipeline, push, push.count)),
+            Pipeline::RayTracing(pipeline) => recorder.timed(pass, |r| {
+                r.trace_rays(pipeline, push, push.count.div_ceil(SPREAD).next_multiple_of(LANES * RUN), SPREAD)
+            }),
         }
     }
 }

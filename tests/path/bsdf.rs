@@ -66,9 +66,7 @@ impl Probe<'_> {
         let source = Buffer::from_slice(self.device, "probe inputs", &inputs).unwrap();
         let bytes = 48 * inputs.len() as u64;
         let results = Buffer::new(self.device, "probe outputs", bytes, Memory::Readback).unwrap();
-        // all zero: directions are drawn as the default strategy draws them
-        let params = Buffer::from_slice(self.device, "parameters", &[[0u32; 128]]).unwrap();
-        let probe = [[source.address(), params.address(), results.address()]];
+        let probe = [[source.address(), results.address()]];
         let probe = Buffer::from_slice(self.device, "probe", &probe).unwrap();
         let count = inputs.len() as u32;
         let push = Push { scene: self.tracer.scene_address(), pass: probe.address(), count, ..Default::default() };

@@ -283,6 +283,48 @@ fn gpu_a_run_that_is_broken_off_leaves_whole_files() {
     assert_eq!(names(dir.path()), ["x.0008.exr"]);
 }
 
+/// What nobody asks for is not in the shaders, and it is said.
+#[test]
+fn gpu_what_is_compiled_is_told() {
+    let dir = tempfile::tempdir().unwrap();
+    let told = |args: &[&str]| {
+        render(&[&["-o", &place(&dir, "a.exr"), "--spp", "1", "--explain"], args].concat())["explain"].to_string()
+    };
+    let plain = told(&[]);
+    let lights = "ask for triangles that shine, a choice among lights, light samples, MIS weights; not compiled: lights at points, spots";
+    assert!(plain.contains(lights), "{plain}");
+    assert!(plain.contains("textures beside base colours: nothing; not compiled: metallic-roughness"), "{plain}");
+    let bsdf = told(&[
+        "--sampling",
+        "bsdf",
+        "--light",
+        "spot position=0.1,1,0.1 direction=0,-1,0 outer=40 intensity=3",
+        "--firefly-clamp",
+        "9",
+    ]);
+    assert!(
+        bsdf.contains("ask for a clamp of fireflies; not compiled: lights at points, spots, directional lights, triangles"),
+        "{bsdf}"
+    );
+    let image = place(&dir, "b.exr");
+    let out = run(&[
+        "render",
+        BASE[1],
+        "-o",
+        &image,
+        "--integrator",
+        "normals",
+        "--size",
+        "40x24",
+        "--spp",
+        "1",
+        "--explain",
+        "--json",
+    ]);
+    let view = String::from_utf8(out.stdout).unwrap();
+    assert!(view.contains("lights and options ask for a view without light; not compiled"), "{view}");
+}
+
 /// It changes the image: it has to be as it was, and it is said.
 #[test]
 fn gpu_texture_filters_are_told_and_kept() {

@@ -176,14 +176,14 @@ impl Report<'_> {
         lines
     }
 
-    /// What of materials is compiled, and what is not.
-    fn shading(&self) -> Option<String> {
-        let asked = self.tracer_features.shading?;
-        let list = |on: bool| {
-            let names = feature::NAMES.iter().filter(|(bit, _)| (asked & bit != 0) == on).map(|f| f.1);
-            names.collect::<Vec<_>>().join(", ")
-        };
-        Some(format!("materials ask for {}; not compiled: {}", list(true), list(false)))
+    /// What of materials, textures and transport is compiled, and what is not.
+    fn compiled(&self) -> Vec<String> {
+        let asked = self.tracer_features.shading.unwrap_or(0);
+        vec![
+            compiled("materials ask for", asked, &feature::NAMES),
+            compiled("textures beside base colours:", asked, &feature::TEXTURES),
+            compiled("lights and options ask for", self.result.asked, &crate::render::path::ASKED),
+        ]
     }
 
     fn mip_levels(&self) -> String {
@@ -200,7 +200,7 @@ impl Report<'_> {
         let image = &self.result.image;
         let mut lines = vec![format!("tracer {}: {}", self.about.tracer, self.why)];
         lines.extend(self.features.iter().cloned());
-        lines.extend(self.shading());
+        lines.extend(self.compiled());
         lines.push(self.mip_levels());
         lines.push(match self.result.lights {
             0 => "no light samples: there is nothing to draw them from, or --sampling asks for none".into(),
@@ -280,4 +280,13 @@ impl Report<'_> {
         }
         record
     }
+}
+
+/// Which of the code that `names` stand for is compiled.
+fn compiled(what: &str, asked: u32, names: &[(u32, &str)]) -> String {
+    let list = |on: bool| {
+        let names: Vec<_> = names.iter().filter(|(bit, _)| (asked & bit != 0) == on).map(|f| f.1).collect();
+        if names.is_empty() { "nothing".into() } else { names.join(", ") }
+    };
+    format!("{what} {}; not compiled: {}", list(true), list(false))
 }

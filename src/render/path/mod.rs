@@ -5,6 +5,7 @@
 //! queue and rays of the next bounce in another; `path_shadow` traces the first, `path_bounce` the second, and so on until a queue is
 //! empty. Every path writes to places of its own only, so images do not depend on the order in which rays arrive.
 
+mod asked;
 mod environment;
 mod light_tree;
 mod lights;
@@ -27,6 +28,7 @@ use crate::tracer::queue::RayQueue;
 use crate::tracer::shading::feature;
 use crate::tracer::stream::StreamShaders;
 use crate::tracer::{Push, Stream, Tracer, stream};
+pub use asked::ASKED;
 use environment::DeviceEnvironment;
 use lights::Lights;
 use params::{CONE_BYTES, INVALID, PathParams, QUAD_BYTES, STATE_BYTES};
@@ -54,17 +56,6 @@ pub enum Strategy {
 }
 
 impl Strategy {
-    /// As shaders/path/params.glsl numbers them.
-    fn number(self) -> u32 {
-        match self {
-            Strategy::Mis => 0,
-            Strategy::Bsdf => 1,
-            Strategy::Light => 2,
-            Strategy::Cosine => 3,
-            Strategy::Uniform => 4,
-        }
-    }
-
     fn draws_lights(self) -> bool {
         matches!(self, Strategy::Mis | Strategy::Light)
     }
@@ -211,11 +202,13 @@ pub struct PathResult {
     pub lights: u32,
     /// They are so many that a tree chooses among them.
     pub light_tree: bool,
+    /// What of the shaders was compiled: bits of [`ASKED`].
+    pub asked: u32,
 }
 
-/// The streams that [`render`] traces.
-pub fn streams() -> [&'static StreamShaders; 3] {
-    [&stream::PATH_CAMERA_CLOSEST, &stream::PATH_BOUNCE_CLOSEST, &stream::PATH_SHADOW_ANY]
+/// The streams that [`render`] traces and that nothing but the scene's geometry is needed for.
+pub fn streams() -> [&'static StreamShaders; 2] {
+    [&stream::PATH_BOUNCE_CLOSEST, &stream::PATH_SHADOW_ANY]
 }
 
 /// Renders. The tracer must have been made of `flat` with [`crate::tracer::Needs::shading`].
@@ -280,7 +273,15 @@ impl PathIntegrator {
         paths.traced = Traced::default();
         let image = accumulate(tracer, camera, &plan, &BlockParams::default(), paths, control)?;
         let Traced { bounce_rays, shadow_rays, longest_path } = paths.traced;
-        Ok(PathResult { image, bounce_rays, shadow_rays, longest_path, lights: paths.lights, light_tree: paths.light_tree })
+        Ok(PathResult {
+            image,
+            bounce_rays,
+            shadow_rays,
+            longest_path,
+            lights: paths.lights,
+            light_tree: paths.light_tree,
+            asked: paths.asked,
+        })
     }
 }
 
@@ -315,6 +316,7 @@ struct Paths {
     traced: Traced,
     lights: u32,
     light_tree: bool,
+    asked: u32,
     _buffers: Vec<Buffer>,
     _environment: DeviceEnvironment,
 }
@@ -349,11 +351,13 @@ impl Paths {
             Some(_) => Lights::sky_only(),
             None => Lights::new(flat, environment.mean),
         };
+        let asked = asked::asked(options, &lights, environment.map.texels != 0, cones);
+        let constants = asked::constants(asked);
         let quads = |name: &str| Buffer::new(device, name, QUAD_BYTES * most as u64, Memory::Device);
         let queues = [RayQueue::new(device, most)?, RayQueue::new(device, most)?];
         let shadow_queue = RayQueue::new(device, most)?;
         let (radiance, contributions) = (quads("radiance of paths")?, quads("what lights bring")?);
-        let states = Buffer::new(device, "paths", STATE_BYTES * most as u64, Memory::Device)?;
+        let states = || Buffer::new(device, "paths", STATE_BYTES * most as u64, Memory::Device);
         let mut buffers = Vec::new();
         let mut keep = |buffer: Buffer| {
             let address = buffer.address();
@@ -363,7 +367,7 @@ impl Paths {
         let base = PathParams {
             map: environment.map,
             environment: environment.factor.to_array(),
-            light_count: lights.records.len() as u32 - lights.first,
+            light_count: lights.choices(),
             light_first: lights.first,
             light_tree: match lights.tree.is_empty() {
                 true => 0,
@@ -374,7 +378,6 @@ impl Paths {
                 true => 0,
                 false => keep(Buffer::from_slice(device, "lights of instances", &lights.light_of)?),
             },
-            states: keep(states),
             radiance: keep(radiance),
             contributions: keep(contributions),
             shadow: shadow_queue.record(),
@@ -382,9 +385,7 @@ impl Paths {
             view: View::number(options.view),
             rr_depth: options.rr_depth,
             clamp_to: options.firefly_clamp,
-            white_sky: options.white_sky.is_some().into(),
             albedo: options.white_sky.unwrap_or(0.0),
-            strategy: options.strategy.number(),
             environment_light: lights.environment.unwrap_or(INVALID),
             lens_radius: options.lens.map_or(0.0, |l| l.radius),
             focus: options.lens.map_or(1.0, |l| l.focus),
@@ -395,17 +396,19 @@ impl Paths {
             },
             ..Default::default()
         };
-        // those with number k fill queue k, and read the tags of the other
+        let states = [keep(states()?), keep(states()?)];
+        // those with number k fill queue k, and read what belongs to the other
         let mut params = |k: usize| -> Result<u64> {
-            let record = PathParams { next: queues[k].record(), tags: queues[k ^ 1].record().tags, ..base };
+            let (next, tags) = (queues[k].record(), queues[k ^ 1].record().tags);
+            let record = PathParams { next, tags, states: states[k ^ 1], next_states: states[k], ..base };
             Ok(keep(Buffer::from_slice(device, "parameters of paths", &[record])?))
         };
         let addresses = [params(0)?, params(1)?];
         let block = || Buffer::new(device, "block parameters", size_of::<BlockParams>() as u64, Memory::Upload);
         let block_params = [block()?, block()?];
         Ok(Self {
-            camera: tracer.stream(&stream::PATH_CAMERA_CLOSEST)?,
-            bounce: tracer.stream(&stream::PATH_BOUNCE_CLOSEST)?,
+            camera: tracer.specialized(&stream::PATH_CAMERA_CLOSEST, &constants)?,
+            bounce: tracer.specialized(&stream::PATH_BOUNCE_CLOSEST, &constants)?,
             shadow: tracer.stream(&stream::PATH_SHADOW_ANY)?,
             resolve: stream::PATH_RESOLVE.pipeline(device)?,
             queues,
@@ -418,6 +421,7 @@ impl Paths {
             traced: Traced::default(),
             lights: if options.strategy.draws_lights() { lights.count() } else { 0 },
             light_tree: !lights.tree.is_empty(),
+            asked,
             _buffers: buffers,
             _environment: environment,
         })
