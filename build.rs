@@ -8,7 +8,9 @@
 use std::cell::RefCell;
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
+use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::{Path, PathBuf};
+use std::process::Command;
 use std::sync::Mutex;
 
 use shaderc::{
@@ -40,6 +42,78 @@ const RUN: u32 = 4;
 
 const EXTENSIONS: &str = "#extension GL_EXT_buffer_reference : require\n#extension GL_EXT_buffer_reference_uvec2 : require\n\
                           #extension GL_EXT_control_flow_attributes : require\n";
+
+/// What was compiled before, by what it was compiled from: the other profiles' builds find theirs here, and a change compiles anew only what includes it.
+/// A file `KEY.spv` each, in the folder `spirv` beside the profiles'.
+struct Cache {
+    folder: PathBuf,
+    // whose words they are
+    compiler: String,
+}
+
+/// More shaders than this are not kept; the oldest go first.
+const MOST_KEPT: usize = 1500;
+
+impl Cache {
+    /// `None`: nobody says which compiler this is, or the folder cannot be made. Then all is compiled, every time.
+    fn open(out: &Path) -> Option<Self> {
+        let bundled = std::env::var_os("CARGO_FEATURE_BUILD_SHADERC").is_some();
+        let compiler = match bundled {
+            true => "bundled".to_owned(),
+            false => {
+                let said = Command::new("pkg-config").args(["--modversion", "shaderc", "SPIRV-Tools"]).output().ok()?;
+                said.status.success().then(|| String::from_utf8_lossy(&said.stdout).into_owned())?
+            }
+        };
+        // target/PROFILE/build/PACKAGE/out
+        let folder = out.ancestors().nth(4)?.join("spirv");
+        std::fs::create_dir_all(&folder).ok()?;
+        Some(Self { folder, compiler })
+    }
+
+    /// Where a job's SPIR-V is or will be, and the files that it includes. `None` where one of them cannot be read: the compiler says it better.
+    fn find(&self, job: &Job, shaders: &Path) -> Option<(PathBuf, BTreeSet<PathBuf>)> {
+        // two numbers of 64 bits
+        let mut hashes = [DefaultHasher::new(), DefaultHasher::new()];
+        hashes[1].write_u8(1);
+        let mut tell = |text: &str| hashes.iter_mut().for_each(|h| text.hash(h));
+        tell(&self.compiler);
+        tell(include_str!("Cargo.lock"));
+        tell(include_str!("build.rs"));
+        tell(&format!("{:?}", job.kind));
+        let (mut seen, mut texts) = (BTreeSet::new(), vec![job.source.clone()]);
+        while let Some(text) = texts.pop() {
+            tell(&text);
+            for name in text.lines().filter_map(|l| l.trim_start().strip_prefix("#include \"")?.split('"').next()) {
+                let path = shaders.join(name);
+                if !seen.contains(&path) {
+                    texts.push(std::fs::read_to_string(&path).ok()?);
+                    seen.insert(path);
+                }
+            }
+        }
+        let key: String = hashes.iter().map(|h| format!("{:016x}", h.finish())).collect();
+        Some((self.folder.join(key + ".spv"), seen))
+    }
+
+    /// Beside, then renamed: builds of two profiles may run at once. What fails is compiled again next time.
+    fn keep(place: &Path, spirv: &[u8]) {
+        let beside = place.with_extension(std::process::id().to_string());
+        if std::fs::write(&beside, spirv).is_err() || std::fs::rename(&beside, place).is_err() {
+            let _ = std::fs::remove_file(&beside);
+        }
+    }
+
+    fn prune(&self) {
+        let Ok(entries) = std::fs::read_dir(&self.folder) else { return };
+        let mut all: Vec<_> =
+            entries.filter_map(|e| e.ok()).filter_map(|e| Some((e.metadata().ok()?.modified().ok()?, e.path()))).collect();
+        all.sort();
+        for (_, path) in all.iter().take(all.len().saturating_sub(MOST_KEPT)) {
+            let _ = std::fs::remove_file(path);
+        }
+    }
+}
 
 struct Build {
     shaders: PathBuf,
@@ -249,13 +323,14 @@ impl Build {
         let threads = std::thread::available_parallelism().map_or(1, usize::from);
         let (jobs, shaders) = (Mutex::new(self.jobs.iter()), &self.shaders);
         let results = Mutex::new((BTreeSet::new(), Vec::new()));
+        let cache = Cache::open(out);
         std::thread::scope(|scope| {
             for _ in 0..threads {
                 scope.spawn(|| {
                     let compiler = Compiler::new().unwrap_or_else(|e| panic!("shaderc does not start: {e}"));
                     loop {
                         let Some(job) = jobs.lock().expect("no compiler panics").next() else { break };
-                        let (seen, error) = job.compile(&compiler, shaders, out);
+                        let (seen, error) = job.make(&compiler, shaders, out, cache.as_ref());
                         let mut results = results.lock().expect("no compiler panics");
                         results.0.extend(seen);
                         results.1.extend(error);
@@ -263,6 +338,9 @@ impl Build {
                 });
             }
         });
+        if let Some(cache) = &cache {
+            cache.prune();
+        }
         let (seen, mut errors) = results.into_inner().expect("no compiler panics");
         errors.sort();
         self.errors.extend(errors);
@@ -271,6 +349,29 @@ impl Build {
 }
 
 impl Job {
+    /// Takes it from the cache, or compiles it. Returns the files that were included, and what is wrong, in words.
+    fn make(
+        &self,
+        compiler: &Compiler,
+        shaders: &Path,
+        out: &Path,
+        cache: Option<&Cache>,
+    ) -> (BTreeSet<PathBuf>, Option<String>) {
+        let found = cache.and_then(|c| c.find(self, shaders));
+        let output = out.join(&self.output);
+        if let Some((place, seen)) = &found
+            && let Ok(spirv) = std::fs::read(place)
+        {
+            std::fs::write(&output, spirv).expect("OUT_DIR can be written");
+            return (seen.clone(), None);
+        }
+        let (seen, error) = self.compile(compiler, shaders, out);
+        if let (Some((place, _)), None) = (&found, &error) {
+            Cache::keep(place, &std::fs::read(&output).expect("it was written"));
+        }
+        (seen, error)
+    }
+
     /// Returns the files that were included, and what is wrong, in words.
     fn compile(&self, compiler: &Compiler, shaders: &Path, out: &Path) -> (BTreeSet<PathBuf>, Option<String>) {
         // who included what, to name the chain when a file does not compile

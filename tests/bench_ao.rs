@@ -160,8 +160,12 @@ fn gpu_structures_and_series() {
     assert_eq!(names, ["triangles", "rays", "resolution", "sampling"]);
     assert_eq!(series[0]["lines"].as_array().unwrap().len(), 2);
     assert_eq!(series[3]["lines"].as_array().unwrap().len(), 5);
-    let last = series[3]["lines"][0]["points"].as_array().unwrap().last().unwrap();
-    assert!(last["equal_time_rmse"].as_f64().unwrap() > 0.0 && last["unfiltered_rmse"].as_f64().unwrap() > 0.0);
+    let last = |line: &Value| line["points"].as_array().unwrap().last().unwrap().clone();
+    let last: Vec<_> = series[3]["lines"].as_array().unwrap().iter().map(last).collect();
+    assert!(last.iter().all(|p| p["unfiltered_rmse"].as_f64().unwrap() > 0.0));
+    // the fastest has all its frames when it is done; of another the first may take longer than that, on a machine that stumbles
+    let at_equal_time: Vec<_> = last.iter().filter_map(|p| p["equal_time_rmse"].as_f64()).collect();
+    assert!(!at_equal_time.is_empty() && at_equal_time.iter().all(|&rmse| rmse > 0.0));
     assert!(all["views"].as_array().unwrap().is_empty());
 }
 
