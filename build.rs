@@ -57,14 +57,11 @@ const MOST_KEPT: usize = 1500;
 impl Cache {
     /// `None`: nobody says which compiler this is, or the folder cannot be made. Then all is compiled, every time.
     fn open(out: &Path) -> Option<Self> {
-        let bundled = std::env::var_os("CARGO_FEATURE_BUILD_SHADERC").is_some();
-        let compiler = match bundled {
-            true => "bundled".to_owned(),
-            false => {
-                let said = Command::new("pkg-config").args(["--modversion", "shaderc", "SPIRV-Tools"]).output().ok()?;
-                said.status.success().then(|| String::from_utf8_lossy(&said.stdout).into_owned())?
-            }
-        };
+        if std::env::var_os("CARGO_FEATURE_BUILD_SHADERC").is_some() {
+            return None;
+        }
+        let said = Command::new("pkg-config").args(["--modversion", "shaderc", "SPIRV-Tools"]).output().ok()?;
+        let compiler = said.status.success().then(|| String::from_utf8_lossy(&said.stdout).into_owned())?;
         // target/PROFILE/build/PACKAGE/out
         let folder = out.ancestors().nth(4)?.join("spirv");
         std::fs::create_dir_all(&folder).ok()?;
@@ -78,7 +75,6 @@ impl Cache {
         hashes[1].write_u8(1);
         let mut tell = |text: &str| hashes.iter_mut().for_each(|h| text.hash(h));
         tell(&self.compiler);
-        tell(include_str!("Cargo.lock"));
         tell(include_str!("build.rs"));
         tell(&format!("{:?}", job.kind));
         let (mut seen, mut texts) = (BTreeSet::new(), vec![job.source.clone()]);

@@ -17,7 +17,6 @@ const uint HAS_THIN_WALLS = 256u;      // transmission through surfaces without 
 const uint HAS_VOLUMES = 512u;         // and into bodies
 const uint HAS_ABSORPTION = 1024u;     // in them
 const uint HAS_ANISOTROPY = 2048u;
-const uint HAS_NORMAL_MAPS = 4096u;
 const uint HAS_BASE_COLORS = 8192u;    // that vary over a surface, by texture or by vertex
 const uint HAS_EMISSION = 16384u;
 const uint HAS_COMPENSATION = 32768u;  // of energy that microfacets lose

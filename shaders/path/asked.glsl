@@ -5,7 +5,7 @@
 
 layout(constant_id = 11) const uint ASKED = 0u;
 
-// kinds of lights that are drawn
+// kinds of lights that are drawn: 1 << LIGHT_* of path/lights.glsl
 const uint ASKS_POINTS = 1u;
 const uint ASKS_SPOTS = 2u;
 const uint ASKS_SUNS = 4u;              // directional

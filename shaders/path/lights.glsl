@@ -59,6 +59,9 @@ float environment_pdf(PathParams p, vec3 w) {
     return asks(ASKS_MAP) ? map_pdf(p.map, w) : 1.0 / (4.0 * PI);
 }
 
+// Is it of this kind? What the scene has not is not compiled; and where all are of one kind, nobody has to look.
+bool is_kind(LightRecord light, uint kind) { return asks(1u << kind) && ((ASKED & ASKS_KINDS) == 1u << kind || light.kind == kind); }
+
 // Smooth end of a light's range (KHR_lights_punctual).
 float range_window(float distance, float range) {
     float x = distance / range;
@@ -71,7 +74,7 @@ LightSample sample_point(LightRecord light, vec3 from) {
     if (!(d2 > 0.0)) return NO_LIGHT_SAMPLE;
     vec3 wi = to / d;
     float falloff = range_window(d, light.range);
-    if (asks(ASKS_SPOTS) && light.kind == LIGHT_SPOT) {
+    if (is_kind(light, LIGHT_SPOT)) {
         // KHR_lights_punctual
         float x = clamp((dot(-wi, light.axis) - light.cos_outer) / max(light.cos_inner - light.cos_outer, 1e-4), 0.0, 1.0);
         falloff *= x * x;
@@ -190,24 +193,21 @@ uint choose_light(PathParams p, inout float u) {
     return lights.v[k].alias;
 }
 
-// Is it of this kind? What the scene has not is not compiled; and where all are of one kind, nobody has to look.
-bool is_kind(LightRecord light, uint kind, uint asked) { return asks(asked) && ((ASKED & ASKS_KINDS) == asked || light.kind == kind); }
-
 // A light for a point that is lit, and a point on it. u: which; v: where.
 LightSample sample_light(PathParams p, vec3 from, float u, vec2 v) {
     LightRecords lights = LightRecords(p.lights);
     uint k = asks(ASKS_CHOICE) ? choose_light(p, u) : p.light_first;
     LightRecord light = lights.v[k];
-    if (is_kind(light, LIGHT_TREE, ASKS_LIGHT_TREE)) {
+    if (is_kind(light, LIGHT_TREE)) {
         float of_tree = light.probability;
         float of_leaf = draw_leaf(p.light_tree, from, min(u, 0.99999994), k);
         if (!(of_leaf > 0.0)) return NO_LIGHT_SAMPLE;
         light = lights.v[k];
         light.probability = of_tree * of_leaf;
     }
-    if (is_kind(light, LIGHT_TRIANGLE, ASKS_TRIANGLES)) return sample_triangle(light, from, v);
-    if (is_kind(light, LIGHT_SPHERE, ASKS_SPHERES)) return sample_sphere(light, from, v);
-    if (is_kind(light, LIGHT_ENVIRONMENT, ASKS_SKY)) {
+    if (is_kind(light, LIGHT_TRIANGLE)) return sample_triangle(light, from, v);
+    if (is_kind(light, LIGHT_SPHERE)) return sample_sphere(light, from, v);
+    if (is_kind(light, LIGHT_ENVIRONMENT)) {
         LightSample s = LightSample(uniform_sphere(v), INFINITY, vec3(0.0), p.environment, 1.0 / (4.0 * PI), false);
         if (asks(ASKS_MAP)) {
             MapSample m = sample_map(p.map, v);
@@ -216,7 +216,7 @@ LightSample sample_light(PathParams p, vec3 from, float u, vec2 v) {
         s.pdf *= light.probability;
         return s;
     }
-    if (is_kind(light, LIGHT_DIRECTIONAL, ASKS_SUNS)) {
+    if (is_kind(light, LIGHT_DIRECTIONAL)) {
         // of one radiance over its cone; the intensity is what a surface that faces it gets
         vec3 wi = sample_cone(-light.axis, light.radius, v);
         return LightSample(wi, INFINITY, vec3(0.0), light.intensity / (1.0 - 0.5 * light.radius), light.probability, true);
@@ -236,7 +236,7 @@ float light_pdf(PathParams p, Hit hit, vec3 from, vec3 wi) {
         float of_tree = LightRecords(p.lights).v[p.light_first + p.light_count - 1u].probability;
         light.probability = of_tree * leaf_probability(p.light_tree, from, light.alias);
     }
-    if (is_kind(light, LIGHT_TRIANGLE, ASKS_TRIANGLES)) return triangle_pdf(light, spherical_triangle(light, from), hit.t, wi);
+    if (is_kind(light, LIGHT_TRIANGLE)) return triangle_pdf(light, spherical_triangle(light, from), hit.t, wi);
     vec3 to = light.position - from;
     float d2 = dot(to, to);
     if (d2 <= light.radius * light.radius * (1.0 + 1e-5)) return 0.0;

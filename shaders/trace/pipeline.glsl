@@ -8,9 +8,10 @@
 layout(location = 0) rayPayloadEXT Payload payload;
 
 void main() {
-    // as work-groups take them (trace/spread.glsl): a row has every SPREADth run of rays
+    // as work-groups take them (trace/spread.glsl), but in one row: of several, GPUs put small tiles together, and the rays of a tile would lie far apart
     const uint RUN_RAYS = LANES * RUN;
-    uint k = ((gl_LaunchIDEXT.x & ~(RUN_RAYS - 1u)) * SPREAD) + gl_LaunchIDEXT.y * RUN_RAYS + (gl_LaunchIDEXT.x & (RUN_RAYS - 1u));
+    uint run = gl_LaunchIDEXT.x / RUN_RAYS, rows = gl_LaunchSizeEXT.x / (RUN_RAYS * SPREAD);
+    uint k = (run % rows * SPREAD + run / rows) * RUN_RAYS + gl_LaunchIDEXT.x % RUN_RAYS;
     if (k >= ray_count()) return;
     uint index = push.first + k;
     Ray world = ray(index);

@@ -38,7 +38,7 @@ Ray take_ray(uint k) {
 
 // The lane's next ray. What is no ray meets nothing: no box and no primitive lies before it.
 #define NEXT_RAY                                                                                        \
-    index = begin + atomicAdd(LaunchFlags(root.launch_counters).v[part], 1u);               \
+    index = begin + atomicAdd(LaunchFlags(root.launch_counters).v[part], 1u);                           \
     if (index >= end) return;                                                                           \
     world = take_ray(index);                                                                            \
     if (!is_ray(world)) world = no_ray();

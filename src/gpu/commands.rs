@@ -242,15 +242,15 @@ impl Recorder<'_> {
         }
     }
 
-    /// Runs a ray-tracing pipeline over `rows` rows of `rays` invocations each; see [`Recorder::dispatch`] for `push`.
-    pub fn trace_rays<P: bytemuck::NoUninit>(&mut self, pipeline: &RayTracingPipeline, push: &P, rays: u32, rows: u32) {
+    /// Runs a ray-tracing pipeline over `rays` invocations; see [`Recorder::dispatch`] for `push`.
+    pub fn trace_rays<P: bytemuck::NoUninit>(&mut self, pipeline: &RayTracingPipeline, push: &P, rays: u32) {
         let Some(functions) = &self.device.pipelines else { return };
         // SAFETY: as above; the tables were made for this pipeline
         unsafe {
             self.device.raw.cmd_bind_pipeline(self.buffer, vk::PipelineBindPoint::RAY_TRACING_KHR, pipeline.raw);
             self.push(pipeline.layout, super::pipeline::RAY_STAGES, push);
             let none = vk::StridedDeviceAddressRegionKHR::default();
-            functions.cmd_trace_rays(self.buffer, &pipeline.raygen, &pipeline.miss, &pipeline.hit, &none, rays, rows, 1);
+            functions.cmd_trace_rays(self.buffer, &pipeline.raygen, &pipeline.miss, &pipeline.hit, &none, rays, 1, 1);
         }
     }
 

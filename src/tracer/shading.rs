@@ -78,7 +78,6 @@ pub(crate) mod feature {
     pub const VOLUMES: u32 = 512;
     pub const ABSORPTION: u32 = 1024;
     pub const ANISOTROPY: u32 = 2048;
-    pub const NORMAL_MAPS: u32 = 4096;
     pub const BASE_COLORS: u32 = 8192;
     pub const EMISSION: u32 = 16384;
     pub const COMPENSATION: u32 = 32768;
@@ -94,7 +93,7 @@ pub(crate) mod feature {
     }
 
     /// All but textures, in words.
-    pub const NAMES: [(u32, &str); 17] = [
+    pub const NAMES: [(u32, &str); 16] = [
         (DIFFUSE, "Lambert"),
         (GLTF, "metallic-roughness"),
         (CONDUCTOR, "measured metals"),
@@ -107,28 +106,27 @@ pub(crate) mod feature {
         (VOLUMES, "volumes"),
         (ABSORPTION, "absorption"),
         (ANISOTROPY, "anisotropy"),
-        (NORMAL_MAPS, "normal maps"),
         (BASE_COLORS, "base colours that vary over a surface"),
         (EMISSION, "emissive surfaces"),
         (COMPENSATION, "energy compensation"),
         (BENT_NORMALS, "interpolated normals"),
     ];
 
-    /// Textures beside base colours', in words.
-    pub const TEXTURES: [(u32, &str); super::SLOTS] = [
-        (texture(0), "metallic-roughness"),
-        (texture(1), "emissive"),
-        (texture(2), "normal"),
-        (texture(3), "clearcoat"),
-        (texture(4), "clearcoat roughness"),
-        (texture(5), "clearcoat normal"),
-        (texture(6), "sheen colour"),
-        (texture(7), "sheen roughness"),
-        (texture(8), "transmission"),
-        (texture(9), "specular"),
-        (texture(10), "specular colour"),
-        (texture(11), "anisotropy"),
-        (texture(12), "occlusion"),
+    /// Textures beside base colours', in words, slot by slot.
+    pub const TEXTURES: [&str; super::SLOTS] = [
+        "metallic-roughness",
+        "emissive",
+        "normal",
+        "clearcoat",
+        "clearcoat roughness",
+        "clearcoat normal",
+        "sheen colour",
+        "sheen roughness",
+        "transmission",
+        "specular",
+        "specular colour",
+        "anisotropy",
+        "occlusion",
     ];
 }
 
@@ -242,7 +240,7 @@ pub(super) fn features(flat: &FlatScene, needs: Needs) -> u32 {
             | with(walls(m) == VOLUME, feature::VOLUMES)
             | with(absorption(m).iter().any(|&a| a > 0.0), feature::ABSORPTION)
             | with(gltf && m.anisotropy.strength > 0.0, feature::ANISOTROPY)
-            | with(normal_maps, feature::NORMAL_MAPS | feature::BENT_NORMALS)
+            | with(normal_maps, feature::BENT_NORMALS)
             | with(varies(&mesh.geometry), feature::BASE_COLORS)
             | with(m.emissive.max_element() > 0.0, feature::EMISSION);
     }

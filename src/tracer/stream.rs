@@ -328,9 +328,10 @@ impl Stream {
                 }
             }
             Pipeline::Drawn(pipeline) => recorder.timed(pass, |r| r.dispatch(pipeline, push, push.count.div_ceil(LANES))),
-            Pipeline::RayTracing(pipeline) => recorder.timed(pass, |r| {
-                r.trace_rays(pipeline, push, push.count.div_ceil(SPREAD).next_multiple_of(LANES * RUN), SPREAD)
-            }),
+            Pipeline::RayTracing(pipeline) => {
+                let rays = push.count.next_multiple_of(LANES * RUN * SPREAD);
+                recorder.timed(pass, |r| r.trace_rays(pipeline, push, rays));
+            }
         }
     }
 }

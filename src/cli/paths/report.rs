@@ -8,7 +8,7 @@ use crate::cli::film::{Identity, Maker, Told, metadata, spp_text};
 use crate::cli::report::{Seconds, camera_text};
 use crate::gpu::DeviceInfo;
 use crate::render::accumulate::Accumulated;
-use crate::render::path::{MOST_DEPTH, PathOptions, PathResult, PixelFilter, TextureFilter};
+use crate::render::path::{self, MOST_DEPTH, PathOptions, PathResult, PixelFilter, TextureFilter};
 use crate::scene::features::SceneFeatures;
 use crate::scene::{Camera, Environment, Scene};
 use crate::tracer::shading::feature;
@@ -179,10 +179,11 @@ impl Report<'_> {
     /// What of materials, textures and transport is compiled, and what is not.
     fn compiled(&self) -> Vec<String> {
         let asked = self.tracer_features.shading.unwrap_or(0);
+        let textures: Vec<_> = (0..).map(feature::texture).zip(feature::TEXTURES).collect();
         vec![
             compiled("materials ask for", asked, &feature::NAMES),
-            compiled("textures beside base colours:", asked, &feature::TEXTURES),
-            compiled("lights and options ask for", self.result.asked, &crate::render::path::ASKED),
+            compiled("textures beside base colours:", asked, &textures),
+            compiled("lights and options ask for", self.result.asked, &path::ASKED),
         ]
     }
 

@@ -1,6 +1,6 @@
 //! What a scene's lights and a render's options ask of paths: what nobody asks for is not compiled. `ASKED` of shaders/path/asked.glsl.
 
-use super::lights::{Kinds, Lights};
+use super::lights::Lights;
 use super::{PathOptions, PixelFilter, Strategy};
 use crate::gpu::Specialization;
 
@@ -17,13 +17,7 @@ const LENS: u32 = 65536;
 const FILTER: u32 = 131_072;
 const CONES: u32 = 262_144;
 
-/// As shaders/path/asked.glsl numbers them.
-fn kinds(kinds: Kinds) -> u32 {
-    let Kinds { points, spots, suns, triangles, spheres, sky, tree } = kinds;
-    [points, spots, suns, triangles, spheres, sky, tree].iter().enumerate().map(|(k, &there)| u32::from(there) << k).sum()
-}
-
-/// All of them, in words.
+/// All of them, in words; first the kinds of lights, in the order of [`Lights::kinds`].
 pub const ASKED: [(u32, &str); 19] = [
     (1, "lights at points"),
     (2, "spots"),
@@ -63,7 +57,7 @@ pub(super) fn asked(options: &PathOptions, lights: &Lights, map: bool, cones: bo
         (FILTER, options.pixel_filter != PixelFilter::Box),
         (CONES, cones),
     ];
-    bits.iter().filter(|(_, asked)| *asked).map(|(bit, _)| bit).sum::<u32>() | if drawn { kinds(lights.kinds()) } else { 0 }
+    bits.iter().filter(|(_, asked)| *asked).map(|(bit, _)| bit).sum::<u32>() | if drawn { lights.kinds() } else { 0 }
 }
 
 /// What shaders get of it.

@@ -63,18 +63,6 @@ pub(super) struct Lights {
     pub environment: Option<u32>,
 }
 
-/// Which kinds of lights there are.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Kinds {
-    pub points: bool,
-    pub spots: bool,
-    pub suns: bool,
-    pub triangles: bool,
-    pub spheres: bool,
-    pub sky: bool,
-    pub tree: bool,
-}
-
 /// Luminance of linear sRGB (IEC 61966-2-1).
 pub(super) fn luminance(c: Vec3) -> f64 {
     c.as_dvec3().dot(DVec3::new(0.2126, 0.7152, 0.0722))
@@ -105,18 +93,9 @@ impl Lights {
         Self { records: vec![record], environment: Some(0), ..Default::default() }
     }
 
-    /// What [`super::asked`] says of them.
-    pub fn kinds(&self) -> Kinds {
-        let has = |kind: u32| self.records.iter().any(|r| r.kind == kind);
-        Kinds {
-            points: has(POINT),
-            spots: has(SPOT),
-            suns: has(DIRECTIONAL),
-            triangles: has(TRIANGLE),
-            spheres: has(SPHERE),
-            sky: has(ENVIRONMENT),
-            tree: has(TREE),
-        }
+    /// A bit for each kind that there is, the first for [`POINT`].
+    pub fn kinds(&self) -> u32 {
+        self.records.iter().fold(0, |bits, r| bits | 1 << r.kind)
     }
 
     /// Among how many the alias table chooses.
