@@ -71,6 +71,7 @@ void closest(uint index, Hit hit) {
     PathParams path = PathParams(p.path);
     // divided by the albedo, so that what one bounce brings is the accessibility; survival goes by what paths carry without that
     float scale = asks(ASKS_GREY) ? path.albedo : 1.0;
-    PathState state = PathState(vec3(1.0 / scale), -1.0, index, 0u, scale, NO_MEDIUM);
+    PathState state = PathState(vec3(1.0 / scale), -1.0, index, 0u, 0u, scale, NO_MEDIUM);
+    if (asks(ASKS_MEDIA)) state.medium = current_medium(path.camera_media);
     store_quad(path.radiance, k, vec4(path_vertex(p, k, state, r, hit), is_hit(hit) ? 1.0 : 0.0));
 }

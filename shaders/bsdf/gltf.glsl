@@ -169,4 +169,10 @@ BsdfSample gltf_sample(Bsdf b, vec3 wo, vec2 u, float v) {
     return NO_SAMPLE;
 }
 
+// What goes straight through a thin wall without roughness.
+vec3 gltf_straight(Bsdf b, vec3 wo) {
+    if (b.volume || !is_smooth(b.facets)) return vec3(0.0);
+    return b.transmitted * (let_through(b, interface_fresnel(b, wo.z)) * layers_transmit(b, wo, -wo));
+}
+
 #endif

@@ -13,21 +13,25 @@ const uint ASKS_TRIANGLES = 8u;
 const uint ASKS_SPHERES = 16u;
 const uint ASKS_SKY = 32u;
 const uint ASKS_LIGHT_TREE = 64u;
-const uint ASKS_KINDS = 127u;           // all of these
-const uint ASKS_CHOICE = 128u;          // there is more than one to choose among
-const uint ASKS_MAP = 256u;             // the environment is an image
+const uint ASKS_RECTANGLES = 128u;
+const uint ASKS_KINDS = 255u;           // all of these
+const uint ASKS_CHOICE = 256u;          // there is more than one to choose among
+const uint ASKS_MAP = 512u;             // the environment is an image
 // strategies; neither: BSDF samples alone
-const uint ASKS_LIGHT_SAMPLES = 512u;   // there are lights, and they are drawn
-const uint ASKS_MIS = 1024u;            // and what BSDF samples find counts, too
-const uint ASKS_COSINE = 2048u;         // directions by the cosine
-const uint ASKS_UNIFORM = 4096u;        // directions evenly
+const uint ASKS_LIGHT_SAMPLES = 1024u;  // there are lights, and they are sampled
+const uint ASKS_MIS = 2048u;            // and what BSDF samples find counts, too
+const uint ASKS_COSINE = 4096u;         // directions by the cosine
+const uint ASKS_UNIFORM = 8192u;        // uniform hemisphere sampling
 // options
-const uint ASKS_GREY = 8192u;           // every surface is diffuse and grey
-const uint ASKS_VIEW = 16384u;          // no light, but what camera rays see
-const uint ASKS_CLAMP = 32768u;         // of fireflies
-const uint ASKS_LENS = 65536u;
-const uint ASKS_FILTER = 131072u;       // pixels are more than a box
-const uint ASKS_CONES = 262144u;        // textures are read over cones
+const uint ASKS_GREY = 16384u;          // every surface is diffuse and grey
+const uint ASKS_VIEW = 32768u;          // no light, but what camera rays see
+const uint ASKS_CLAMP = 65536u;         // of fireflies
+const uint ASKS_LENS = 131072u;
+const uint ASKS_FILTER = 262144u;       // pixels are more than a box
+const uint ASKS_CONES = 524288u;        // textures are read over cones
+const uint ASKS_DISKS = 1048576u;       // directional lights have an extent: paths meet them
+const uint ASKS_MEDIA = 2097152u;       // volumes absorb, or may lie in each other
+const uint ASKS_CLEAR_WALLS = 4194304u; // thin walls let light through in straight lines
 
 bool asks(uint what) { return (ASKED & what) != 0u; }
 

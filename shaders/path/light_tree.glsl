@@ -21,8 +21,8 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Li
 const uint LIGHT_LEAF = 0x80000000u;
 const uint LIGHT_BOTH_WAYS = 0x40000000u;  // it shines along its axis and against it
 const uint LIGHT_LINK = 0x3fffffffu;
-// A sample's number is stretched at each choice; so many choices leave enough of its bits.
-const uint STRETCHES = 8u;
+// A sample's number is stretched at each choice; below this share of it, too few of its bits are left, and another takes its place.
+const float LEAST_STRETCH = 1.0 / 4096.0;
 
 // Cosine and sine of an angle less another, not below 0.
 vec2 angle_less(vec2 a, vec2 b) {
@@ -43,11 +43,11 @@ float light_importance(LightNode node, vec3 from) {
     return left.x > node.cos_e ? node.intensity * max(left.x, 1e-4) / d2 : 0.0;
 }
 
-// A light, and the probability with which it is drawn; 0: no light reaches the point.
-float draw_leaf(uvec2 tree, vec3 from, float u, out uint light) {
+// A light, and the probability with which it is chosen; 0: no light reaches the point. u: in [0, 1), and what is left of it.
+float draw_leaf(uvec2 tree, vec3 from, inout float u, out uint light) {
     LightNodes nodes = LightNodes(tree);
     LightNode node = nodes.v[0];
-    float probability = 1.0;
+    float probability = 1.0, share = 1.0;
     uint seed = floatBitsToUint(u);
     light = 0u;
     for (uint level = 0u; (node.link & LIGHT_LEAF) == 0u; level++) {
@@ -56,10 +56,15 @@ float draw_leaf(uvec2 tree, vec3 from, float u, out uint light) {
         float a = light_importance(first, from), b = light_importance(second, from);
         if (!(a + b > 0.0)) return 0.0;
         float p = a / (a + b);
-        if (level >= STRETCHES) u = float(hash_combine(seed, level) >> 8) * (1.0 / 16777216.0);
         bool takes_first = u < p;
         u = min(takes_first ? u / p : (u - p) / (1.0 - p), 0.99999994);
-        probability *= takes_first ? p : 1.0 - p;
+        p = takes_first ? p : 1.0 - p;
+        probability *= p;
+        share *= p;
+        if (share < LEAST_STRETCH) {
+            u = float(hash_combine(seed, level) >> 8) * (1.0 / 16777216.0);
+            share = 1.0;
+        }
         if (takes_first) node = first;
         else node = second;
     }

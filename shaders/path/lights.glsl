@@ -1,5 +1,8 @@
-// Lights: what emits, how it is chosen (by power, from an alias table, or from a tree), how a point on it is drawn and with which density. Mirrors
+// Lights: what emits, how one is chosen (by power, or from a tree), how a point on it is sampled and with which density. Mirrors
 // src/render/path/lights.rs.
+//
+// One two-dimensional sample does it all: its first number chooses the light, and what is left of it places the point. Every light then gets points
+// that are as evenly distributed as the samples are, where a choice by a number of its own would give each light a random subset of them.
 #ifndef PATH_LIGHTS
 #define PATH_LIGHTS
 #include "common/warp.glsl"
@@ -13,28 +16,30 @@ const uint LIGHT_DIRECTIONAL = 2u;
 const uint LIGHT_TRIANGLE = 3u;
 const uint LIGHT_SPHERE = 4u;
 const uint LIGHT_ENVIRONMENT = 5u;
-const uint LIGHT_TREE = 6u;  // all that have a place: one of them is drawn from the tree
+const uint LIGHT_TREE = 6u;       // all that have a position: the tree chooses one of them
+const uint LIGHT_RECTANGLE = 7u;  // two triangles
 
-const uint LIGHT_TWO_SIDED = 1u;  // triangle: it emits from its back, too
-const uint LIGHT_MIRRORED = 2u;   // triangle: a mirroring transform has turned its winding
+const uint LIGHT_TWO_SIDED = 1u;  // triangle, rectangle: it emits from its back, too
+const uint LIGHT_MIRRORED = 2u;   // triangle, rectangle: a mirroring transform has turned its winding
+const uint LIGHT_ALPHA = 4u;      // triangle: its material's alpha says how much of it is there
 
 struct LightRecord {
-    vec3 position;      // point, spot: where; triangle: first corner; sphere: centre
+    vec3 position;      // point, spot: where; triangle, rectangle: a corner; sphere: centre
     float radius;       // sphere; directional: 1 - cosine of half the angle that it fills
-    vec3 axis;          // spot, directional: where it shines; triangle: first edge
+    vec3 axis;          // spot, directional: where it shines; triangle, rectangle: first edge
     float cos_inner;    // spot
-    vec3 edge;          // triangle: second edge
+    vec3 edge;          // triangle, rectangle: second edge
     float cos_outer;    // spot
     vec3 intensity;     // point, spot: per solid angle; directional: irradiance; else: radiance, before any texture
     float range;        // point, spot: without effect beyond
     float probability;  // of being chosen
-    float threshold;    // alias table: this one is chosen below it, `alias` above
-    uint alias;         // of a light in the tree: its way from the root
+    uint trail;         // of a light in the tree: its way from the root
+    uint light_reserved;
     uint kind;
-    uint instance;      // triangle, sphere: what is seen of it
+    uint instance;      // triangle, rectangle, sphere: what is seen of it
     uint primitive;
-    uint flags;         // LIGHT_TWO_SIDED, LIGHT_MIRRORED
-    float lift;         // triangle, sphere: how far above itself rounding may have put it
+    uint flags;         // LIGHT_TWO_SIDED, LIGHT_MIRRORED, LIGHT_ALPHA
+    float lift;         // triangle, rectangle, sphere: how far above itself rounding may have put it
 };
 layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer LightRecords { LightRecord v[]; };
 
@@ -110,7 +115,14 @@ LightSample sample_sphere(LightRecord light, vec3 from, vec2 u) {
     return LightSample(wi, distance, point, light.intensity, light.probability / (2.0 * PI * cone), false);
 }
 
-// A triangle as it is seen from a point: directions of its corners, and the solid angle that it fills (Van Oosterom and Strackee 1983).
+// Solid angle of a triangle whose corners lie at a, b, c, as an angle in turns and as its half's tangent is known: numerator and denominator (Van
+// Oosterom and Strackee 1983). volume: a . (b x c), the same for all triangles of one area in one plane, and exact where that of unit vectors cancels.
+float triangle_solid_angle(float volume, vec3 a, vec3 b, vec3 c, vec3 lengths) {
+    float below = lengths.x * lengths.y * lengths.z + dot(a, b) * lengths.z + dot(b, c) * lengths.x + dot(c, a) * lengths.y;
+    return 4.0 * PI * turns_of(volume, below);
+}
+
+// A triangle as it is seen from a point: directions of its corners, and the solid angle that it fills.
 struct SphericalTriangle {
     vec3 a;
     vec3 b;
@@ -119,11 +131,10 @@ struct SphericalTriangle {
 };
 
 SphericalTriangle spherical_triangle(LightRecord light, vec3 from) {
-    vec3 a = light.position - from;
-    SphericalTriangle s = SphericalTriangle(normalize(a), normalize(a + light.axis), normalize(a + light.edge), 0.0);
-    float volume = abs(dot(s.a, cross(s.b, s.c))), sum = 1.0 + dot(s.a, s.b) + dot(s.b, s.c) + dot(s.c, s.a);
-    s.solid_angle = 4.0 * PI * turns_of(volume, sum);
-    return s;
+    vec3 a = light.position - from, b = a + light.axis, c = a + light.edge;
+    vec3 lengths = vec3(length(a), length(b), length(c));
+    float volume = abs(dot(a, cross(light.axis, light.edge)));
+    return SphericalTriangle(a / lengths.x, b / lengths.y, c / lengths.z, triangle_solid_angle(volume, a, b, c, lengths));
 }
 
 // Is it sampled by its solid angle? Small ones are by their area: that is the same, and does not cancel (bounds as in pbrt-v4, 6.5).
@@ -160,51 +171,138 @@ vec2 sample_spherical_triangle(SphericalTriangle s, LightRecord light, vec3 from
     return b.x + b.y > 1.0 ? b / (b.x + b.y) : b;
 }
 
+// A rectangle as it is seen from a point (Urena, Fajardo, King, "An Area-Preserving Parametrization for Spherical Rectangles", EGSR 2013): its corners
+// along its edges, from the foot of the perpendicular, and the distance of its plane.
+struct SphericalRectangle {
+    float x0;
+    float x1;
+    float y0;
+    float y1;
+    float z;
+    float solid_angle;
+};
+
+SphericalRectangle spherical_rectangle(LightRecord light, vec3 from) {
+    vec3 a = light.position - from, b = a + light.axis, c = a + light.edge, d = b + light.edge;
+    float width = length(light.axis), height = length(light.edge);
+    vec3 x = light.axis / width, y = light.edge / height, n = cross(light.axis, light.edge);
+    float volume = abs(dot(a, n)), x0 = dot(a, x), y0 = dot(a, y);
+    vec4 lengths = vec4(length(a), length(b), length(c), length(d));
+    float solid = triangle_solid_angle(volume, a, b, c, lengths.xyz) + triangle_solid_angle(volume, d, b, c, lengths.wyz);
+    return SphericalRectangle(x0, x0 + width, y0, y0 + height, volume / (width * height), solid);
+}
+
+// Is it sampled by its solid angle? The angles whose differences say where a point of a small one is are not known well enough.
+bool is_wide(SphericalRectangle s) { return s.solid_angle > 2e-3 && s.solid_angle < 6.22; }
+
+// acos in turns.
+float turns_of_cosine(float c) { return turns_of(sqrt(max((1.0 - c) * (1.0 + c), 0.0)), c); }
+
+// A point of a rectangle in shares of its edges, uniformly distributed over the solid angle that it fills. Names are the paper's.
+vec2 sample_spherical_rectangle(SphericalRectangle s, vec2 u) {
+    float z2 = s.z * s.z;
+    float n0 = -s.y0 * inversesqrt(z2 + s.y0 * s.y0), n1 = s.x1 * inversesqrt(z2 + s.x1 * s.x1);
+    float n2 = s.y1 * inversesqrt(z2 + s.y1 * s.y1), n3 = -s.x0 * inversesqrt(z2 + s.x0 * s.x0);
+    float g2 = turns_of_cosine(-n2 * n3), g3 = turns_of_cosine(-n3 * n0);
+    float all_ = turns_of_cosine(-n0 * n1) + turns_of_cosine(-n1 * n2) + g2 + g3 - 1.0;
+    vec2 au = on_circle(fract(u.x * all_ + 1.0 - g2 - g3));
+    float fu = (au.x * n0 - n2) / au.y;
+    float cu = clamp(inversesqrt(fu * fu + n0 * n0) * (fu > 0.0 ? 1.0 : -1.0), -0.99999994, 0.99999994);
+    float xu = clamp(cu * s.z * inversesqrt((1.0 - cu) * (1.0 + cu)), s.x0, s.x1);
+    float d2 = xu * xu + z2;
+    float h0 = s.y0 * inversesqrt(d2 + s.y0 * s.y0), h1 = s.y1 * inversesqrt(d2 + s.y1 * s.y1);
+    float hv = mix(h0, h1, u.y), rest = (1.0 - hv) * (1.0 + hv);
+    float yv = rest > 1e-6 ? clamp(hv * sqrt(d2 / rest), s.y0, s.y1) : s.y1;
+    return vec2((xu - s.x0) / (s.x1 - s.x0), (yv - s.y0) / (s.y1 - s.y0));
+}
+
+// Density of a point of a rectangle, per solid angle.
+float rectangle_pdf(LightRecord light, SphericalRectangle s, float distance, vec3 wi) {
+    if (is_wide(s)) return light.probability / s.solid_angle;
+    float facing = abs(dot(cross(light.axis, light.edge), wi));
+    return facing > 0.0 ? light.probability * distance * distance / facing : 0.0;
+}
+
+// What is left to say of a point on a triangle or rectangle but for its radiance and density: direction, distance, and a point above it. 0: nothing
+// is emitted this way.
+bool flat_light_point(LightRecord light, vec3 from, vec2 b, out LightSample l) {
+    l = NO_LIGHT_SAMPLE;
+    vec3 point = light.position + (b.x * light.axis + b.y * light.edge);
+    vec3 to = point - from;
+    float d2 = dot(to, to);
+    if (!(d2 > 0.0)) return false;
+    l.distance = sqrt(d2);
+    l.wi = to / l.distance;
+    vec3 n = cross(light.axis, light.edge) * ((light.flags & LIGHT_MIRRORED) != 0u ? -1.0 : 1.0);
+    float front = -dot(n, l.wi);
+    if ((light.flags & LIGHT_TWO_SIDED) == 0u && front <= 0.0) return false;
+    l.to = point + normalize(n) * (front > 0.0 ? light.lift : -light.lift);
+    l.radiance = light.intensity;
+    return true;
+}
+
+LightSample sample_rectangle(LightRecord light, vec3 from, vec2 u) {
+    SphericalRectangle s = spherical_rectangle(light, from);
+    if (is_wide(s)) u = sample_spherical_rectangle(s, u);
+    LightSample l;
+    if (flat_light_point(light, from, u, l)) l.pdf = rectangle_pdf(light, s, l.distance, l.wi);
+    return l;
+}
+
 LightSample sample_triangle(LightRecord light, vec3 from, vec2 u) {
     SphericalTriangle s = spherical_triangle(light, from);
     // Heitz, "A Low-Distortion Map Between Triangle and Square", 2019
     vec2 b = u.x < u.y ? vec2(0.5 * u.x, u.y - 0.5 * u.x) : vec2(u.x - 0.5 * u.y, 0.5 * u.y);
     if (is_wide(s)) b = sample_spherical_triangle(s, light, from, u);
-    vec3 point = light.position + (b.x * light.axis + b.y * light.edge);
-    vec3 to = point - from;
-    float d2 = dot(to, to), d = sqrt(d2);
-    if (!(d2 > 0.0)) return NO_LIGHT_SAMPLE;
-    vec3 wi = to / d;
-    vec3 n = cross(light.axis, light.edge) * ((light.flags & LIGHT_MIRRORED) != 0u ? -1.0 : 1.0);
-    float front = -dot(n, wi);
-    if ((light.flags & LIGHT_TWO_SIDED) == 0u && front <= 0.0) return NO_LIGHT_SAMPLE;
-    point += normalize(n) * (front > 0.0 ? light.lift : -light.lift);
-    vec3 radiance = light.intensity * emission_texture(light.instance, light.primitive, b);
-    return LightSample(wi, d, point, radiance, triangle_pdf(light, s, d, wi), false);
+    LightSample l;
+    if (!flat_light_point(light, from, b, l)) return l;
+    l.radiance *= emission_texture(light.instance, light.primitive, b);
+    if (HAS_ALPHA && (light.flags & LIGHT_ALPHA) != 0u) l.radiance *= emitter_alpha(light.instance, light.primitive, b);
+    l.pdf = triangle_pdf(light, s, l.distance, l.wi);
+    return l;
 }
 
-// By power, from the alias table. What is left of u is as even as it was.
-uint choose_light(PathParams p, inout float u) {
-    LightRecords lights = LightRecords(p.lights);
-    float x = u * float(p.light_count);
-    uint bin = min(uint(x), p.light_count - 1u), k = p.light_first + bin;
-    float threshold = lights.v[k].threshold;
-    u = x - float(bin);
-    if (u < threshold) {
-        u /= threshold;
-        return k;
+// Chooses a light by its power. bits: uniformly distributed; u: what is left of them, in [0, 1).
+uint choose_light(PathParams p, uint bits, out float u) {
+    Words starts = Words(p.light_starts);
+    uint low = 0u, count = p.light_count;
+    while (count > 1u) {
+        uint half_ = count >> 1;
+        if (starts.v[low + half_] <= bits) low += half_;
+        count -= half_;
     }
-    u = (u - threshold) / (1.0 - threshold);
-    return lights.v[k].alias;
+    uint start = starts.v[low];
+    // the last ends at 2^32, which is 0
+    u = min(float(bits - start) / float(starts.v[low + 1u] - start), 0.99999994);
+    return p.light_first + low;
 }
 
-// A light for a point that is lit, and a point on it. u: which; v: where.
-LightSample sample_light(PathParams p, vec3 from, float u, vec2 v) {
+// Radiance of a directional light with an extent: the same over its disk in the sky. Its intensity is what a surface that faces it gets.
+vec3 disk_radiance(LightRecord light) { return light.intensity / (2.0 * PI * light.radius * (1.0 - 0.5 * light.radius)); }
+
+// Density with which its directions are sampled, per solid angle.
+float disk_pdf(LightRecord light) { return light.probability / (2.0 * PI * light.radius); }
+
+// Does a ray that leaves the scene this way meet the disk? By the chord between two unit vectors, which does not cancel as their cosine does.
+bool meets_disk(LightRecord light, vec3 w) {
+    vec3 chord = w + light.axis;
+    return dot(chord, chord) < 2.0 * light.radius;
+}
+
+// A light for a point that is lit, and a point on it. bits: a point of a two-dimensional sequence.
+LightSample sample_light(PathParams p, vec3 from, uvec2 bits) {
     LightRecords lights = LightRecords(p.lights);
-    uint k = asks(ASKS_CHOICE) ? choose_light(p, u) : p.light_first;
+    vec2 v = vec2(bits >> 8) * (1.0 / 16777216.0);
+    uint k = asks(ASKS_CHOICE) ? choose_light(p, bits.x, v.x) : p.light_first;
     LightRecord light = lights.v[k];
     if (is_kind(light, LIGHT_TREE)) {
         float of_tree = light.probability;
-        float of_leaf = draw_leaf(p.light_tree, from, min(u, 0.99999994), k);
+        float of_leaf = draw_leaf(p.light_tree, from, v.x, k);
         if (!(of_leaf > 0.0)) return NO_LIGHT_SAMPLE;
         light = lights.v[k];
         light.probability = of_tree * of_leaf;
     }
+    if (is_kind(light, LIGHT_RECTANGLE)) return sample_rectangle(light, from, v);
     if (is_kind(light, LIGHT_TRIANGLE)) return sample_triangle(light, from, v);
     if (is_kind(light, LIGHT_SPHERE)) return sample_sphere(light, from, v);
     if (is_kind(light, LIGHT_ENVIRONMENT)) {
@@ -217,9 +315,9 @@ LightSample sample_light(PathParams p, vec3 from, float u, vec2 v) {
         return s;
     }
     if (is_kind(light, LIGHT_DIRECTIONAL)) {
-        // of one radiance over its cone; the intensity is what a surface that faces it gets
+        if (light.radius == 0.0) return LightSample(-light.axis, INFINITY, vec3(0.0), light.intensity, light.probability, true);
         vec3 wi = sample_cone(-light.axis, light.radius, v);
-        return LightSample(wi, INFINITY, vec3(0.0), light.intensity / (1.0 - 0.5 * light.radius), light.probability, true);
+        return LightSample(wi, INFINITY, vec3(0.0), disk_radiance(light), disk_pdf(light), false);
     }
     if (asks(ASKS_POINTS) || asks(ASKS_SPOTS)) return sample_point(light, from);
     return NO_LIGHT_SAMPLE;
@@ -227,15 +325,18 @@ LightSample sample_light(PathParams p, vec3 from, float u, vec2 v) {
 
 // Density with which sample_light draws, from a point, what a ray from there met; 0: it never does.
 float light_pdf(PathParams p, Hit hit, vec3 from, vec3 wi) {
-    if (!asks(ASKS_TRIANGLES) && !asks(ASKS_SPHERES)) return 0.0;
+    if (!asks(ASKS_TRIANGLES) && !asks(ASKS_RECTANGLES) && !asks(ASKS_SPHERES)) return 0.0;
     uint first = Words(p.light_of).v[hit.instance];
     if (first == INVALID) return 0.0;
-    LightRecord light = LightRecords(p.lights).v[first + hit.primitive];
+    uint k = Words(p.light_of).v[first + hit.primitive];
+    if (k == INVALID) return 0.0;
+    LightRecord light = LightRecords(p.lights).v[k];
     if (asks(ASKS_LIGHT_TREE)) {
         // the last of all is the tree
         float of_tree = LightRecords(p.lights).v[p.light_first + p.light_count - 1u].probability;
-        light.probability = of_tree * leaf_probability(p.light_tree, from, light.alias);
+        light.probability = of_tree * leaf_probability(p.light_tree, from, light.trail);
     }
+    if (is_kind(light, LIGHT_RECTANGLE)) return rectangle_pdf(light, spherical_rectangle(light, from), hit.t, wi);
     if (is_kind(light, LIGHT_TRIANGLE)) return triangle_pdf(light, spherical_triangle(light, from), hit.t, wi);
     vec3 to = light.position - from;
     float d2 = dot(to, to);

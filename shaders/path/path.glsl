@@ -5,6 +5,7 @@
 #ifndef PATH_PATH
 #define PATH_PATH
 #include "path/lights.glsl"
+#include "path/media.glsl"
 #include "path/view.glsl"
 
 // Dimensions of the sampler (src/sampling/sobol.rs), in pairs: vertex n begins at PATH_FIRST + n * PATH_STRIDE.
@@ -12,11 +13,12 @@ const uint PATH_FIRST = 8u;
 const uint PATH_STRIDE = 8u;
 const uint BSDF_DIRECTION = 0u;
 const uint BSDF_LOBE = 1u;     // and Russian roulette
-const uint LIGHT_CHOICE = 2u;
-const uint LIGHT_PLACE = 3u;
+const uint LIGHT_POINT_ON = 2u;  // which light, and where on it
 
 // A path survives a bounce at most this often, however bright: closed white rooms end, too.
 const float MOST_SURVIVAL = 0.95;
+// Two media whose indices of refraction differ by a smaller share do not refract.
+const float LEAST_REFRACTION = 1e-3;
 // How much of its length a shadow ray stays short of a light, beside what the light's own rounding asks.
 const float SHADOW_EPSILON = 2e-6;
 
@@ -37,39 +39,22 @@ float emission_weight(PathParams p, PathState state, float light) {
     return asks(ASKS_LIGHT_SAMPLES) ? 0.0 : 1.0;
 }
 
-// A direction, or its mirror image at the true surface, in the frame of the shading normal. A BSDF about that normal reaches directions which the
-// surface hides: those are mirrored at it, so that nothing that it reflects (or transmits) is lost, and two of the BSDF's directions may be one of the
-// world's. found: the BSDF's direction and the world's are on the same side.
-vec3 unbent(Shading m, vec3 w, bool mirrored, out bool found) {
-    float side = dot(m.ng, w);
-    vec3 wi = to_frame(m.frame, mirrored ? w - 2.0 * side * m.ng : w);
-    found = wi.z * side > 0.0;
-    return wi;
+// Radiance, weighted, of the directional lights whose disks a ray that leaves the scene meets.
+vec3 disks_met(PathParams p, PathState state, vec3 w) {
+    vec3 c = vec3(0.0);
+    for (uint k = 0u; k < p.disk_count; k++) {
+        LightRecord light = LightRecords(p.lights).v[p.first_disk + k];
+        if (light.radius == 0.0 || !meets_disk(light, w)) continue;
+        c += disk_radiance(light) * emission_weight(p, state, asks(ASKS_LIGHT_SAMPLES) ? disk_pdf(light) : 0.0);
+    }
+    return c;
 }
 
-// Value and density at a vertex, of a direction in the world.
+// Value and density at a vertex, of a direction in the world. What a BSDF about a shading normal sends through the true surface is lost.
 BsdfValue vertex_at(Shading m, vec3 wo, vec3 w) {
-    BsdfValue value = NO_VALUE;
-    // one copy of the code for both
-    [[dont_unroll]] for (int k = 0; k < (has(HAS_BENT_NORMALS) ? 2 : 1); k++) {
-        bool found;
-        vec3 wi = unbent(m, w, k > 0, found);
-        if (!found) continue;
-        BsdfValue one = bsdf_at(m.bsdf, wo, wi);
-        value = BsdfValue(value.f + one.f, value.pdf + one.pdf);
-    }
-    return value;
-}
-
-// Density of cosine-distributed directions, or of even ones, about the shading normal, of a direction in the world.
-float plain_pdf(Shading m, vec3 w) {
-    float pdf = 0.0;
-    for (int k = 0; k < 2; k++) {
-        bool found;
-        float c = unbent(m, w, k > 0, found).z;
-        if (found && c > 0.0) pdf += asks(ASKS_COSINE) ? c / PI : 1.0 / (2.0 * PI);
-    }
-    return pdf;
+    vec3 wi = to_frame(m.frame, w);
+    if (has(HAS_BENT_NORMALS) && !(wi.z * dot(m.ng, w) > 0.0)) return NO_VALUE;
+    return bsdf_at(m.bsdf, wo, wi);
 }
 
 // A direction by the strategy that is asked for; in the world.
@@ -81,13 +66,18 @@ BsdfSample draw_direction(Shading m, vec3 wo, vec2 u, float v) {
     if (plain) s = proposed(asks(ASKS_COSINE) ? cosine_hemisphere(u) : uniform_hemisphere(u), 1.0);
     else s = bsdf_sample(b, wo, u, v);
     if (!(s.pdf > 0.0)) return NO_SAMPLE;
-    vec3 w = from_frame(m.frame, s.wi);
-    float side = dot(m.ng, w);
-    if (has(HAS_BENT_NORMALS) && side * s.wi.z < 0.0) w -= 2.0 * side * m.ng;
-    s.wi = w;
-    if (s.delta) return s;
-    BsdfValue value = vertex_at(m, wo, w);
-    s.pdf = plain ? plain_pdf(m, w) : value.pdf;
+    vec3 wi = s.wi;
+    s.wi = from_frame(m.frame, wi);
+    float side = dot(m.ng, s.wi);
+    bool hidden = has(HAS_BENT_NORMALS) && !(side * wi.z > 0.0);
+    if (s.delta) {
+        // one direction for each view: mirrored at the true surface nothing of it is lost, and none counts twice
+        if (hidden) s.wi -= 2.0 * side * m.ng;
+        return s;
+    }
+    if (hidden) return NO_SAMPLE;
+    BsdfValue value = bsdf_at(b, wo, wi);
+    s.pdf = !plain ? value.pdf : asks(ASKS_COSINE) ? wi.z / PI : 1.0 / (2.0 * PI);
     s.weight = value.f / s.pdf;
     if (!(s.pdf > 0.0)) return NO_SAMPLE;
     return s;
@@ -101,17 +91,9 @@ vec3 transmittance(uint medium, float length_) {
     return mix(exp(-depth * length_), vec3(1.0), equal(depth, vec3(0.0)));
 }
 
-// The medium on the other side of a surface.
-uint medium_beyond(Shading m, bool front, uint medium) {
-    if (!has(HAS_ABSORPTION) || !m.bsdf.volume) return medium;
-    return front ? m.material : NO_MEDIUM;
-}
-
 // Next-event estimation: a ray to a light, and what that brings.
 void draw_light(BlockParams block, PathParams p, uint k, PathState state, Surface s, Shading m, vec3 wo, uint beyond, uvec2 pixel, uint n, uint dimension) {
-    vec2 choice = sample_2d(block.seed, pixel, n, dimension + LIGHT_CHOICE);
-    vec2 place = sample_2d(block.seed, pixel, n, dimension + LIGHT_PLACE);
-    LightSample l = sample_light(p, s.position, choice.x, place);
+    LightSample l = sample_light(p, s.position, sample_2d_bits(block.seed, pixel, n, dimension + LIGHT_POINT_ON));
     if (!(l.pdf > 0.0)) return;
     BsdfValue value = vertex_at(m, wo, l.wi);
     vec3 c = state.throughput * value.f * l.radiance / l.pdf;
@@ -131,6 +113,36 @@ void draw_light(BlockParams block, PathParams p, uint k, PathState state, Surfac
     store_quad(p.contributions, slot, vec4(held(p, c, state.depth + 1u), 0.0));
 }
 
+// Goes on behind a surface as if it were not there.
+void pass_straight(PathParams p, uint k, PathState state, Surface s, vec3 ng, Ray ray, Cone cone) {
+    state.passes++;
+    if (asks(ASKS_CONES)) store_cone(p, k, cone);
+    uint slot = append_ray(p.next, Ray(s.position - ng * s.offset, 0.0, ray.direction, INFINITY), k);
+    store_state(p.next_states, slot, state);
+}
+
+// How far a path has come straight since its last bounce.
+float straight_length(PathParams p, uint k, PathState state) {
+    return asks(ASKS_CLEAR_WALLS) && state.passes > 0u ? Floats(p.straight).v[k] : 0.0;
+}
+
+void add_straight(PathParams p, uint k, PathState state, float length_) {
+    StoredFloats(p.straight).v[k] = straight_length(p, k, state) + length_;
+}
+
+// Share of light that goes straight through a surface.
+vec3 straight_transmittance(Shading m, vec3 towards_viewer) {
+    if (m.bsdf.kind != BSDF_GLTF) return vec3(0.0);
+    vec3 wo = to_frame(m.frame, towards_viewer);
+    wo.z = max(wo.z, LEAST_COSINE);
+    return gltf_straight(m.bsdf, wo);
+}
+
+// Has a sample gone straight through a thin wall?
+bool is_straight(Bsdf b, BsdfSample s, float side) {
+    return s.delta && side < 0.0 && b.kind == BSDF_GLTF && !b.volume;
+}
+
 // k: the path. Returns what the vertex itself adds to its radiance; what light samples add comes with their rays.
 vec3 path_vertex(BlockParams block, uint k, PathState state, Ray ray, Hit hit) {
     PathParams p = PathParams(block.path);
@@ -142,8 +154,9 @@ vec3 path_vertex(BlockParams block, uint k, PathState state, Ray ray, Hit hit) {
         if (asks(ASKS_LIGHT_SAMPLES) && asks(ASKS_SKY)) {
             light = LightRecords(p.lights).v[p.environment_light].probability * environment_pdf(p, ray.direction);
         }
-        vec3 c = state.throughput * environment_radiance(p, ray.direction) * emission_weight(p, state, light);
-        return held(p, c, state.depth);
+        vec3 c = environment_radiance(p, ray.direction) * emission_weight(p, state, light);
+        if (asks(ASKS_DISKS)) c += disks_met(p, state, ray.direction);
+        return held(p, state.throughput * c, state.depth);
     }
     Surface s = surface_at(ray, hit);
     vec3 towards_viewer = -ray.direction;
@@ -151,7 +164,7 @@ vec3 path_vertex(BlockParams block, uint k, PathState state, Ray ray, Hit hit) {
     Cone cone = Cone(0.0, 0.0);
     float log_side = SHARP;
     if (asks(ASKS_CONES)) {
-        if (state.depth == 0u) cone = camera_cone(block, ray.direction);
+        if (state.depth + state.passes == 0u) cone = camera_cone(block, ray.direction);
         else cone = load_cone(p, k);
         cone = cone_after(cone, hit.t);
         log_side = footprint(cone, s, ray.direction);
@@ -163,18 +176,57 @@ vec3 path_vertex(BlockParams block, uint k, PathState state, Ray ray, Hit hit) {
     vec3 added = vec3(0.0);
     if (m.emission != vec3(0.0)) {
         float light = 0.0;
-        if (asks(ASKS_LIGHT_SAMPLES) && !m.unlit) light = light_pdf(p, hit, ray.origin, ray.direction);
+        if (asks(ASKS_LIGHT_SAMPLES) && !m.unlit) {
+            // as seen from the vertex where light was sampled, which may lie behind thin walls
+            float before = straight_length(p, k, state);
+            Hit seen = hit;
+            seen.t += before;
+            light = light_pdf(p, seen, ray.origin - before * ray.direction, ray.direction);
+        }
         added = held(p, state.throughput * m.emission * emission_weight(p, state, light), state.depth);
     }
-    if (m.bsdf.kind == BSDF_NONE || state.depth >= p.max_depth) return added;
+    Boundary boundary;
+    boundary.medium = state.medium;
+    bool is_boundary = asks(ASKS_MEDIA) && is_medium(m.material);
+    if (is_boundary) {
+        MediaStack stack = p.camera_media;
+        if (state.depth + state.passes > 0u) stack = load_media(p, k);
+        boundary = boundary_at(m.material, front, state.medium, stack);
+        if (!boundary.is_there) {
+            // no light sample crosses it: what the path meets from here on counts in full
+            state.pdf = -1.0;
+            store_media(p, k, boundary.stack);
+            pass_straight(p, k, state, s, m.ng, ray, cone);
+            return vec3(0.0);
+        }
+        // an index of 0 stands for what reflects everything
+        if (SHADING_OF(m.material).ior > 0.0) {
+            m.bsdf.eta = boundary.eta;
+            // what does not refract is not blurred, either
+            if (abs(boundary.eta - 1.0) < LEAST_REFRACTION) m.bsdf.facets.alpha = vec2(0.0);
+        }
+    } else if (asks(ASKS_MEDIA) && state.depth + state.passes == 0u) {
+        store_media(p, k, p.camera_media);
+    }
+    if (m.bsdf.kind == BSDF_NONE) return added;
+    if (state.depth >= p.max_depth) {
+        // walls that light goes straight through are no bounces
+        if (asks(ASKS_CLEAR_WALLS)) {
+            state.throughput *= straight_transmittance(m, towards_viewer);
+            if (highest(state.throughput) > 0.0) {
+                add_straight(p, k, state, hit.t);
+                pass_straight(p, k, state, s, m.ng, ray, cone);
+            }
+        }
+        return added;
+    }
 
     vec3 wo = to_frame(m.frame, towards_viewer);
     wo.z = max(wo.z, LEAST_COSINE);
     uvec2 pixel = block_pixel(block, pixel_index(state.index)) + block.block_origin;
-    uint n = sample_index(state.index), dimension = PATH_FIRST + state.depth * PATH_STRIDE;
-    uint beyond = medium_beyond(m, front, state.medium);
+    uint n = sample_index(state.index), dimension = PATH_FIRST + (state.depth + state.passes) * PATH_STRIDE;
     if (asks(ASKS_LIGHT_SAMPLES) && has_rough_part(m.bsdf)) {
-        draw_light(block, p, k, state, s, m, wo, beyond, pixel, n, dimension);
+        draw_light(block, p, k, state, s, m, wo, boundary.medium, pixel, n, dimension);
     }
 
     // after the last bounce only what is met shines
@@ -183,16 +235,26 @@ vec3 path_vertex(BlockParams block, uint k, PathState state, Ray ray, Hit hit) {
     float side = dot(m.ng, b.wi);
     if (!(b.pdf > 0.0) || side == 0.0) return added;
     state.throughput *= b.weight;
-    state.pdf = b.delta ? -1.0 : b.pdf;
-    state.eta_scale *= b.eta * b.eta;
-    if (side < 0.0) state.medium = beyond;
-    state.depth++;
     float brightest = highest(state.throughput);
     if (!(brightest > 0.0)) return added;
-    if (state.depth >= p.rr_depth) {
-        float survival = min(brightest * state.eta_scale, MOST_SURVIVAL);
-        if (lobe.y >= survival) return added;
-        state.throughput /= survival;
+    if (asks(ASKS_CLEAR_WALLS) && is_straight(m.bsdf, b, side)) {
+        // light samples pass here, too: the density with which they compete is still that of the last bounce
+        add_straight(p, k, state, hit.t);
+        state.passes++;
+    } else {
+        state.pdf = b.delta ? -1.0 : b.pdf;
+        state.eta_scale *= b.eta * b.eta;
+        state.depth++;
+        if (asks(ASKS_CLEAR_WALLS)) StoredFloats(p.straight).v[k] = 0.0;
+        if (state.depth >= p.rr_depth) {
+            float survival = min(brightest * state.eta_scale, MOST_SURVIVAL);
+            if (lobe.y >= survival) return added;
+            state.throughput /= survival;
+        }
+        if (is_boundary && side < 0.0) {
+            state.medium = boundary.medium;
+            store_media(p, k, boundary.stack);
+        }
     }
     if (asks(ASKS_CONES)) store_cone(p, k, scattered_cone(cone, s, front, b, side < 0.0));
     uint slot = append_ray(p.next, Ray(s.position + m.ng * (sign(side) * s.offset), 0.0, normalize(b.wi), INFINITY), k);

@@ -57,9 +57,9 @@ struct ShadingRecord {
     float normal_scale;
     float coat_normal_scale;
     uint glass_layer;      // of the albedo tables: among the indices of refraction
+    int priority;          // of a volume among those that overlap (path/media.glsl)
     uint shading_reserved0;
     uint shading_reserved1;
-    uint shading_reserved2;
     TextureUse uses[USES];
 };
 layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer ShadingRecords { ShadingRecord v[]; };
@@ -113,6 +113,16 @@ vec3 emission_texture(uint instance, uint primitive, vec2 uv) {
     TextureUse use = SHADING_OF(part.material).uses[USE_EMISSION];
     // the light is as it is: only what a path sees is filtered
     return sample_use(use, part, primitive + part.first_primitive, uv, TEXELS_SRGB, SHARP).rgb;
+}
+
+// How much of an emitter is there at a point of a primitive of an instance of the scene: what rays that arrive there meet on average.
+float emitter_alpha(uint instance, uint primitive, vec2 uv) {
+    SceneRoot root = SceneRoot(push.scene);
+    PartRecord part = PartRecords(root.parts).v[Pairs(root.placements).v[instance].y];
+    MaterialRecord m = MaterialRecords(root.materials).v[part.material];
+    float alpha = base_color(part, m, primitive + part.first_primitive, uv).a;
+    if (HAS_COVERAGE && m.coverage != 0u) return clamp(alpha, 0.0, 1.0);
+    return alpha >= m.alpha_cutoff ? 1.0 : 0.0;
 }
 
 // What a path meets.

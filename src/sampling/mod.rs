@@ -1,18 +1,18 @@
 //! Where random numbers come from, and how they become directions.
 //!
 //! [`sobol`] draws points in integer arithmetic only: the shaders hold the same functions, and both sides give the same bits.
-//! [`alias`] chooses among many, [`patches`] places in an image of the sphere; [`sequence`] has what images of few samples and many frames draw.
+//! [`cumulative`] chooses among many, [`patches`] places in an image of the sphere; [`sequence`] has what images of few samples and many frames draw.
 //! [`best_candidates`] and [`blue_noise`] make the tables of the reference work.
 //! [`warp`] maps points of the unit square to disks, hemispheres and frames; `f32`, mirrored by the shaders line by line.
 
-pub mod alias;
+pub mod cumulative;
 pub mod patches;
 pub mod sequence;
 pub mod sobol;
 mod tables;
 pub mod warp;
 
-pub use alias::{AliasBin, AliasTable};
+pub use cumulative::CumulativeTable;
 pub use patches::Patches;
 pub use sequence::Sequence;
 pub use sobol::{AO_DIRECTION, CAMERA_FILM, CAMERA_LENS, Sampler, to_unit};

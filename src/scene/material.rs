@@ -187,6 +187,9 @@ pub struct Material {
     pub sheen: Sheen,
     /// KHR_materials_transmission and KHR_materials_volume.
     pub transmission: Transmission,
+    /// Of volumes that overlap, the one with the highest priority is there; of equal ones, the one that a path entered last (Schmidt, Budge 2002). glTF:
+    /// `extras.dielectricPriority` of the material.
+    pub dielectric_priority: i32,
     /// KHR_materials_specular.
     pub specular: Specular,
     /// KHR_materials_anisotropy.
@@ -218,6 +221,7 @@ impl Default for Material {
             clearcoat: Clearcoat::default(),
             sheen: Sheen::default(),
             transmission: Transmission::default(),
+            dielectric_priority: 0,
             specular: Specular::default(),
             anisotropy: Anisotropy::default(),
         }

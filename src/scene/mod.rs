@@ -133,6 +133,12 @@ impl Scene {
         world
     }
 
+    /// Whether a ray that leaves the scene may meet light: an environment, or a directional light that has an extent.
+    pub fn has_visible_sky(&self) -> bool {
+        let is_disk = |l: &Light| matches!(l.kind, LightKind::Directional { angle } if angle > 0.0);
+        self.environment != Environment::Black || self.lights.iter().any(is_disk)
+    }
+
     /// The point that tracers use as their origin, in the file's world space: zero for a scene around the origin, the
     /// centre of the bounds for one that lies far away from it compared with its size, so that single precision is spent
     /// on the scene and not on its distance. Rounded to f32, so that subtracting it is exact where it can be.

@@ -49,7 +49,8 @@ pub(super) struct ShadingRecord {
     normal_scale: f32,
     coat_normal_scale: f32,
     glass_layer: u32,
-    reserved: [u32; 3],
+    priority: i32,
+    reserved: [u32; 2],
     uses: [TextureUse; SLOTS],
 }
 
@@ -182,6 +183,21 @@ fn walls(m: &Material) -> u32 {
     }
 }
 
+/// Is it what bodies are made of that light goes through?
+pub(crate) fn is_medium(m: &Material) -> bool {
+    refracts(m)
+}
+
+/// Does light absorbed in it count?
+pub(crate) fn absorbs(m: &Material) -> bool {
+    absorption(m).iter().any(|&a| a > 0.0)
+}
+
+/// May light go straight through it: walls without thickness that are smooth, or may be where a texture says so?
+pub(crate) fn has_clear_walls(m: &Material) -> bool {
+    walls(m) == THIN_WALLS && (m.roughness < 0.1 || m.metallic_roughness_texture.is_some())
+}
+
 /// Attenuation per world unit.
 fn absorption(m: &Material) -> [f32; 3] {
     if walls(m) != VOLUME {
@@ -285,7 +301,8 @@ impl ShadingRecord {
             normal_scale: m.normal_scale,
             coat_normal_scale: m.clearcoat.normal_scale,
             glass_layer: indices.iter().position(|&ior| ior == m.ior).unwrap_or(0) as u32,
-            reserved: [0; 3],
+            priority: m.dielectric_priority,
+            reserved: [0; 2],
             uses: slots(m, needs).map(texture),
         }
     }

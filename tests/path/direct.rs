@@ -195,7 +195,7 @@ fn gpu_many_lights() {
     let flat = FlatScene::for_paths(&scene);
     let options = options(Strategy::Mis, 256);
     let result = render(&tracer(&device, TracerKind::Compute, &flat), &flat, &options);
-    assert!(result.light_tree && result.lights == 2 * (n * n) as u32, "{} lights", result.lights);
+    assert!(result.light_tree && result.lights == (n * n) as u32, "{} lights", result.lights);
     for strategy in [Strategy::Mis, Strategy::Light] {
         holds(
             &device,

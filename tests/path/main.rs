@@ -10,9 +10,12 @@ mod camera;
 mod cli;
 mod denoise;
 mod direct;
+mod emitters;
 mod film;
 mod furnace;
 mod materials;
+mod media;
+mod shading_normals;
 mod texture_filter;
 mod transport;
 
@@ -89,9 +92,37 @@ fn holds_but_for(
     expected: f64,
     precision: f64,
 ) {
-    let flat = FlatScene::for_paths(scene);
     let all = tracers(device).into_iter();
-    for kind in all.filter(|&k| options.strategy == Strategy::Mis || k == TracerKind::Compute) {
+    let kinds: Vec<_> = all.filter(|&k| options.strategy == Strategy::Mis || k == TracerKind::Compute).collect();
+    holds_with(&kinds, rounding, device, what, scene, options, expected, precision);
+}
+
+/// The same on the compute tracer alone: for variations of what another case asks of all of them.
+fn holds_on_compute(
+    rounding: f64,
+    device: &Arc<Device>,
+    what: &str,
+    scene: &Scene,
+    options: &PathOptions,
+    expected: f64,
+    precision: f64,
+) {
+    holds_with(&[TracerKind::Compute], rounding, device, what, scene, options, expected, precision);
+}
+
+#[expect(clippy::too_many_arguments, reason = "the two above name what they share")]
+fn holds_with(
+    kinds: &[TracerKind],
+    rounding: f64,
+    device: &Arc<Device>,
+    what: &str,
+    scene: &Scene,
+    options: &PathOptions,
+    expected: f64,
+    precision: f64,
+) {
+    let flat = FlatScene::for_paths(scene);
+    for &kind in kinds {
         let result = render(&tracer(device, kind, &flat), &flat, options);
         let (mean, error) = mean_of(&result.image.film);
         println!("{what}, {kind}, {:?}: {mean:.6} +- {error:.6}, expected {expected:.6}", options.strategy);

@@ -91,8 +91,8 @@ pub fn run(args: &RenderArgs, start: Instant) -> Result<(), Failure> {
     };
     let tracer = Tracer::with_build(&device, kind, &flat, needs, compute, &build)?;
     build.take_warnings().iter().for_each(|w| warnings.add(w));
-    // what surrounds the scene shines where nothing is; lenses and wide filters look beside the pixel
-    let black = about.options.view.is_some() || about.options.white_sky.is_none() && scene.environment == Environment::Black;
+    // what surrounds the scene is seen where nothing is; lenses and wide filters look beside the pixel
+    let black = about.options.view.is_some() || about.options.white_sky.is_none() && !scene.has_visible_sky();
     if black && about.options.is_sharp() {
         about.options.cover = Cover::new(&flat, &record, size, spp).map(Arc::new);
     }

@@ -1,18 +1,20 @@
-//! The lights of a scene as the path tracer draws them: `LightRecord` of shaders/path/lights.glsl. Few are drawn by their power, from an alias table;
-//! of many, a tree chooses by what they may do at a point ([`super::light_tree`]).
+//! The lights of a scene as the path tracer samples them: `LightRecord` of shaders/path/lights.glsl. Few are chosen by their power; of many, a tree
+//! chooses by what they may do at a point ([`super::light_tree`]).
 
 use std::collections::HashMap;
 use std::f64::consts::PI;
+use std::ops::Range;
 
 use bytemuck::{Pod, Zeroable};
-use glam::{DVec3, Vec3};
+use glam::{DVec3, DVec4, Vec3, Vec4};
 
 use super::light_tree::{self, Bounds, LightNode};
 use super::params::INVALID;
 use crate::output::png::srgb_decode;
-use crate::sampling::AliasTable;
+use crate::sampling::CumulativeTable;
+use crate::scene::features::{AlphaClass, alpha_classes};
 use crate::scene::flatten::FlatScene;
-use crate::scene::{Geometry, Light, LightKind};
+use crate::scene::{AlphaMode, Geometry, Light, LightKind, Material, TriangleMesh};
 
 const POINT: u32 = 0;
 const SPOT: u32 = 1;
@@ -21,12 +23,14 @@ const TRIANGLE: u32 = 3;
 const SPHERE: u32 = 4;
 const ENVIRONMENT: u32 = 5;
 const TREE: u32 = 6;
+const RECTANGLE: u32 = 7;
 
-/// More lights with a place than these are drawn from a tree.
+/// More lights with a position than these are chosen from a tree.
 const MOST_BY_POWER: usize = 256;
 
 const TWO_SIDED: u32 = 1;
 const MIRRORED: u32 = 2;
+const ALPHA: u32 = 4;
 
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
@@ -40,8 +44,8 @@ pub(super) struct LightRecord {
     intensity: [f32; 3],
     range: f32,
     probability: f32,
-    threshold: f32,
-    alias: u32,
+    trail: u32,
+    reserved: u32,
     kind: u32,
     instance: u32,
     primitive: u32,
@@ -53,14 +57,21 @@ pub(super) struct LightRecord {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Lights {
     pub records: Vec<LightRecord>,
-    /// The first of the records that the alias table chooses among; it chooses among all from there on.
+    /// The first of the records that are chosen by power, which are all from there on.
     pub first: u32,
-    /// Over the lights that have a place, where they are many: one of the table's choices then is the tree.
+    /// [`CumulativeTable::starts`] of the power of those.
+    pub starts: Vec<u32>,
+    /// Over the lights that have a position, where they are many: the tree then is the last that is chosen by power.
     pub tree: Vec<LightNode>,
-    /// First light of each instance of the scene; empty where no surface is a light.
+    /// For each instance of the scene, the place further on in this table where the lights of its primitives begin, or [`INVALID`]; then those
+    /// lights, one for each primitive, or [`INVALID`]. Empty where no surface is a light.
     pub light_of: Vec<u32>,
-    /// Place of the environment.
+    /// Index of the environment.
     pub environment: Option<u32>,
+    /// Directional lights.
+    pub directional: Range<u32>,
+    /// Some of them have an extent: paths meet them.
+    pub has_disks: bool,
 }
 
 /// Luminance of linear sRGB (IEC 61966-2-1).
@@ -68,7 +79,7 @@ pub(super) fn luminance(c: Vec3) -> f64 {
     c.as_dvec3().dot(DVec3::new(0.2126, 0.7152, 0.0722))
 }
 
-/// Lights that are being gathered: each with its power, and with bounds where it has a place.
+/// Lights that are being gathered: each with its power, and with bounds where it has a position.
 #[derive(Default)]
 struct Gathered {
     records: Vec<LightRecord>,
@@ -77,20 +88,24 @@ struct Gathered {
 }
 
 impl Gathered {
-    fn push(&mut self, record: LightRecord, power: f64, bounds: Option<Bounds>) {
-        debug_assert!(bounds.is_none() || self.bounds.len() == self.records.len(), "lights with a place come first");
+    /// Returns its index. What has no power is not sampled: [`INVALID`].
+    fn push(&mut self, record: LightRecord, power: f64, bounds: Option<Bounds>) -> u32 {
+        debug_assert!(bounds.is_none() || self.bounds.len() == self.records.len(), "lights with a position come first");
+        if power.is_nan() || power <= 0.0 {
+            return INVALID;
+        }
         self.records.push(record);
         self.powers.push(power);
         self.bounds.extend(bounds);
+        self.records.len() as u32 - 1
     }
 }
 
 impl Lights {
     /// Nothing but an environment.
     pub fn sky_only() -> Self {
-        let record =
-            LightRecord { kind: ENVIRONMENT, instance: INVALID, probability: 1.0, threshold: 1.0, ..Default::default() };
-        Self { records: vec![record], environment: Some(0), ..Default::default() }
+        let record = LightRecord { kind: ENVIRONMENT, instance: INVALID, probability: 1.0, ..Default::default() };
+        Self { records: vec![record], starts: vec![0; 2], environment: Some(0), ..Default::default() }
     }
 
     /// A bit for each kind that there is, the first for [`POINT`].
@@ -98,7 +113,7 @@ impl Lights {
         self.records.iter().fold(0, |bits, r| bits | 1 << r.kind)
     }
 
-    /// Among how many the alias table chooses.
+    /// How many are chosen by power.
     pub fn choices(&self) -> u32 {
         self.records.len() as u32 - self.first
     }
@@ -115,19 +130,22 @@ impl Lights {
         let is_far = |light: &&Light| matches!(light.kind, LightKind::Directional { .. });
         scene.lights.iter().filter(|l| !is_far(l)).for_each(|l| add_punctual(&mut all, flat, l));
         let light_of = add_surfaces(&mut all, flat);
+        let first_far = all.records.len() as u32;
         scene.lights.iter().filter(is_far).for_each(|l| add_punctual(&mut all, flat, l));
-        let mut lights = Self { light_of, ..Default::default() };
+        let directional = first_far..all.records.len() as u32;
+        let has_disks = all.records[first_far as usize..].iter().any(|r| r.radius > 0.0);
+        let mut lights = Self { light_of, directional, has_disks, ..Default::default() };
         if environment != Vec3::ZERO {
-            lights.environment = Some(all.records.len() as u32);
             // what crosses the disk that the scene fills, from everywhere
             let power = 4.0 * PI.powi(2) * radius(flat).powi(2) * luminance(environment);
-            all.push(LightRecord { kind: ENVIRONMENT, instance: INVALID, ..Default::default() }, power, None);
+            let index = all.push(LightRecord { kind: ENVIRONMENT, instance: INVALID, ..Default::default() }, power, None);
+            lights.environment = Some(index).filter(|&k| k != INVALID);
         }
         let placed = all.bounds.len();
         if placed > MOST_BY_POWER && placed <= light_tree::MOST_LIGHTS {
             let (nodes, trails) = light_tree::build(&all.bounds);
             for (record, trail) in all.records.iter_mut().zip(trails) {
-                record.alias = trail;
+                record.trail = trail;
             }
             let power = all.powers[..placed].iter().sum();
             all.push(LightRecord { kind: TREE, instance: INVALID, ..Default::default() }, power, None);
@@ -135,10 +153,11 @@ impl Lights {
         }
         lights.records = all.records;
         let first = lights.first as usize;
-        let table = AliasTable::new(&all.powers[first..]);
-        for ((record, bin), &probability) in lights.records[first..].iter_mut().zip(&table.bins).zip(&table.probabilities) {
-            (record.threshold, record.alias, record.probability) = (bin.threshold, bin.alias + lights.first, probability);
+        let table = CumulativeTable::new(&all.powers[first..]);
+        for (record, &probability) in lights.records[first..].iter_mut().zip(&table.probabilities) {
+            record.probability = probability;
         }
+        lights.starts = table.starts;
         lights
     }
 }
@@ -188,65 +207,41 @@ fn add_punctual(all: &mut Gathered, flat: &FlatScene, light: &Light) {
     }
 }
 
-/// Every primitive whose material emits; returns the first light of each instance, nothing where there is none. A sphere that its instance
-/// stretches has no closed form: BSDF samples find it.
+/// Every primitive whose material emits; returns [`Lights::light_of`]. A sphere that its instance stretches has no closed form: BSDF samples find it.
 fn add_surfaces(all: &mut Gathered, flat: &FlatScene) -> Vec<u32> {
     let scene = flat.scene;
-    let mut light_of = vec![INVALID; scene.instances.len()];
+    let (mut light_of, mut of_primitives) = (vec![INVALID; scene.instances.len()], Vec::new());
+    let alpha = alpha_classes(scene, flat.blend);
     let mut means = HashMap::new();
     for (i, instance) in scene.instances.iter().enumerate() {
         let mesh = &scene.meshes[instance.mesh];
         let material = &scene.materials[mesh.material];
-        // an unlit surface lights nothing: it only shows
-        if material.emissive == Vec3::ZERO || material.unlit {
+        // an unlit surface lights nothing: it only shows; what no ray meets does neither
+        if material.emissive == Vec3::ZERO || material.unlit || alpha[instance.mesh] == AlphaClass::Absent {
             continue;
         }
         let to_world = instance.object_to_world;
-        let first = all.records.len() as u32;
         let base = LightRecord {
             intensity: material.emissive.to_array(),
             instance: i as u32,
             flags: if material.double_sided { TWO_SIDED } else { 0 },
             ..Default::default()
         };
-        let texture = material.emissive_texture.map(|slot| slot.texture);
-        let mean = *means.entry(texture).or_insert_with(|| mean_texture(flat, texture));
-        let brightness = luminance(material.emissive * mean);
+        let mut mean = |texture: Option<usize>| *means.entry(texture).or_insert_with(|| mean_texture(flat, texture));
+        let mut brightness = luminance(material.emissive * mean(material.emissive_texture.map(|slot| slot.texture)).truncate());
+        let is_tested = alpha[instance.mesh] == AlphaClass::Tested;
+        if is_tested {
+            brightness *= mean_alpha(material, &mesh.geometry, mean(material.base_color_texture.map(|slot| slot.texture)).w);
+        }
+        let first = of_primitives.len();
         match &mesh.geometry {
             Geometry::Triangles(t) => {
+                let flags = base.flags
+                    | if to_world.matrix3.determinant() < 0.0 { MIRRORED } else { 0 }
+                    | if is_tested { ALPHA } else { 0 };
+                let plain = material.emissive_texture.is_none() && !is_tested;
                 let point = |k: u32| to_world.transform_point3(t.positions[k as usize].as_dvec3()) - flat.origin;
-                // a transform that mirrors turns the winding
-                let mirrored = to_world.matrix3.determinant() < 0.0;
-                for (primitive, corners) in t.indices.iter().enumerate() {
-                    let [a, b, c] = corners.map(point);
-                    let (e1, e2) = (b - a, c - a);
-                    let normal = e1.cross(e2) * if mirrored { -1.0 } else { 1.0 };
-                    let area = 0.5 * normal.length();
-                    let extent = a.abs().max(b.abs()).max(c.abs()).max_element() + e1.abs().max(e2.abs()).max_element();
-                    // barycentrics follow the corners; a turned winding is a turned normal
-                    let edge = |e: DVec3| e.as_vec3().to_array();
-                    let record = LightRecord {
-                        kind: TRIANGLE,
-                        position: a.as_vec3().to_array(),
-                        axis: edge(e1),
-                        edge: edge(e2),
-                        flags: base.flags | if mirrored { MIRRORED } else { 0 },
-                        primitive: primitive as u32,
-                        lift: (extent * LIFT) as f32,
-                        ..base
-                    };
-                    let sides = if material.double_sided { 2.0 } else { 1.0 };
-                    let bounds = Bounds {
-                        lo: a.min(b).min(c),
-                        hi: a.max(b).max(c),
-                        axis: normal.normalize_or(DVec3::Z),
-                        spread: 0.0,
-                        falloff: 0.5 * PI,
-                        both_ways: material.double_sided,
-                        intensity: area * brightness,
-                    };
-                    all.push(record, sides * PI * area * brightness, Some(bounds));
-                }
+                add_triangles(all, t, point, plain, brightness, LightRecord { flags, ..base }, &mut of_primitives);
             }
             Geometry::Spheres(spheres) => {
                 let m = to_world.matrix3;
@@ -274,13 +269,111 @@ fn add_surfaces(all: &mut Gathered, flat: &FlatScene) -> Vec<u32> {
                         both_ways: false,
                         intensity: PI * radius * radius * brightness,
                     };
-                    all.push(record, 4.0 * PI.powi(2) * radius * radius * brightness, Some(bounds));
+                    of_primitives.push(all.push(record, 4.0 * PI.powi(2) * radius * radius * brightness, Some(bounds)));
                 }
             }
         }
-        light_of[i] = first;
+        light_of[i] = (scene.instances.len() + first) as u32;
     }
-    if light_of.iter().all(|&first| first == INVALID) { Vec::new() } else { light_of }
+    if light_of.iter().all(|&first| first == INVALID) {
+        return Vec::new();
+    }
+    light_of.extend(of_primitives);
+    light_of
+}
+
+/// The triangles of a mesh: two neighbours that make a rectangle of one radiance (`plain`) are one light.
+fn add_triangles(
+    all: &mut Gathered,
+    mesh: &TriangleMesh,
+    point: impl Fn(u32) -> DVec3,
+    plain: bool,
+    brightness: f64,
+    base: LightRecord,
+    of_primitives: &mut Vec<u32>,
+) {
+    let both_ways = base.flags & TWO_SIDED != 0;
+    // a transform that mirrors turns the winding
+    let turn = if base.flags & MIRRORED != 0 { -1.0 } else { 1.0 };
+    let mut push = |kind: u32, [a, e1, e2]: [DVec3; 3], primitive: usize, slack: f64| {
+        let normal = turn * e1.cross(e2);
+        let area = if kind == RECTANGLE { 1.0 } else { 0.5 } * normal.length();
+        let (b, c) = (a + e1, a + e2);
+        let far = if kind == RECTANGLE { a + e1 + e2 } else { a };
+        let extent = a.abs().max(b.abs()).max(c.abs()).max_element() + e1.abs().max(e2.abs()).max_element();
+        // barycentrics follow the corners; a turned winding is a turned normal
+        let record = LightRecord {
+            kind,
+            position: a.as_vec3().to_array(),
+            axis: e1.as_vec3().to_array(),
+            edge: e2.as_vec3().to_array(),
+            primitive: primitive as u32,
+            lift: (extent * LIFT + slack) as f32,
+            ..base
+        };
+        let bounds = Bounds {
+            lo: a.min(b).min(c).min(far),
+            hi: a.max(b).max(c).max(far),
+            axis: normal.normalize_or(DVec3::Z),
+            spread: 0.0,
+            falloff: 0.5 * PI,
+            both_ways,
+            intensity: area * brightness,
+        };
+        all.push(record, if both_ways { 2.0 } else { 1.0 } * PI * area * brightness, Some(bounds))
+    };
+    let mut k = 0;
+    while k < mesh.indices.len() {
+        let corners = mesh.indices[k].map(&point);
+        let next = mesh.indices.get(k + 1).filter(|_| plain).map(|n| n.map(&point));
+        if let Some((rectangle, slack)) = next.and_then(|next| rectangle(corners, next)) {
+            let index = push(RECTANGLE, rectangle, k, slack);
+            of_primitives.extend([index; 2]);
+            k += 2;
+            continue;
+        }
+        let [a, b, c] = corners;
+        of_primitives.push(push(TRIANGLE, [a, b - a, c - a], k, 0.0));
+        k += 1;
+    }
+}
+
+/// The rectangle that two triangles make, as a corner and two edges, and how far a corner is from where it should be; `None` where they make none.
+fn rectangle(first: [DVec3; 3], second: [DVec3; 3]) -> Option<([DVec3; 3], f64)> {
+    let extent = first.iter().chain(&second).fold(0.0f64, |e, p| e.max(p.abs().max_element()));
+    // positions are rounded to single precision, of their own coordinates and of the instance's
+    let slack = 2.0 * extent / 16_777_216.0;
+    for k in 0..3 {
+        let [a, b, c] = [first[k], first[(k + 1) % 3], first[(k + 2) % 3]];
+        let (e1, e2) = (b - a, c - a);
+        let shorter = e1.length().min(e2.length());
+        if shorter.is_nan() || shorter <= 1e4 * slack || e1.dot(e2).abs() > 1e-5 * e1.length() * e2.length() {
+            continue;
+        }
+        // the other has the diagonal, the other way round, and the fourth corner
+        let d = a + e1 + e2;
+        for j in 0..3 {
+            let other = [second[j], second[(j + 1) % 3], second[(j + 2) % 3]];
+            if other[0] == c && other[1] == b && (other[2] - d).length() <= slack {
+                return Some(([a, e1, e2], slack));
+            }
+        }
+    }
+    None
+}
+
+/// Mean of the alpha of an emitter that is not everywhere: only its order of magnitude matters, for how often it is chosen.
+fn mean_alpha(material: &Material, geometry: &Geometry, of_texture: f32) -> f64 {
+    let of_vertices = match geometry {
+        Geometry::Triangles(t) if !t.colors.is_empty() => t.colors.iter().map(|c| c.w).sum::<f32>() / t.colors.len() as f32,
+        _ => 1.0,
+    };
+    let mean = material.base_color.w * of_texture * of_vertices;
+    match material.alpha_mode {
+        // of a mask it says too little: present texels may have any alpha above the cutoff
+        AlphaMode::Mask { .. } => f64::from(mean.clamp(0.25, 1.0)),
+        _ => f64::from(mean.clamp(1e-3, 1.0)),
+    }
 }
 
 /// Share of its coordinates by which rounding may have moved a point of a light.
@@ -291,13 +384,14 @@ fn radius(flat: &FlatScene) -> f64 {
     flat.scene.bounds().map_or(1.0, |(lo, hi)| 0.5 * (hi - lo).length()).max(1e-30)
 }
 
-/// Mean of the texture that multiplies a material's emission.
-fn mean_texture(flat: &FlatScene, texture: Option<usize>) -> Vec3 {
-    let Some(texture) = texture else { return Vec3::ONE };
+/// Mean of a texture of sRGB colours, linear, and of its alpha.
+fn mean_texture(flat: &FlatScene, texture: Option<usize>) -> Vec4 {
+    let Some(texture) = texture else { return Vec4::ONE };
     let texels = &flat.scene.textures[texture].rgba8;
-    let mut sum = DVec3::ZERO;
+    let mut sum = DVec4::ZERO;
     for p in texels.chunks_exact(4) {
-        sum += DVec3::from_array([0, 1, 2].map(|c| f64::from(srgb_decode(f32::from(p[c]) / 255.0))));
+        let colour = [0, 1, 2].map(|c| f64::from(srgb_decode(f32::from(p[c]) / 255.0)));
+        sum += DVec3::from_array(colour).extend(f64::from(p[3]) / 255.0);
     }
-    (sum / (texels.len() / 4).max(1) as f64).as_vec3()
+    (sum / (texels.len() / 4).max(1) as f64).as_vec4()
 }

@@ -9,6 +9,7 @@ mod asked;
 mod environment;
 mod light_tree;
 mod lights;
+mod media;
 mod params;
 
 use std::sync::Arc;
@@ -31,10 +32,13 @@ use crate::tracer::{Push, Stream, Tracer, stream};
 pub use asked::ASKED;
 use environment::DeviceEnvironment;
 use lights::Lights;
-use params::{CONE_BYTES, INVALID, PathParams, QUAD_BYTES, STATE_BYTES};
+use media::Bodies;
+use params::{CONE_BYTES, INVALID, MEDIA_BYTES, PathParams, QUAD_BYTES, STATE_BYTES, STRAIGHT_BYTES};
 
 /// Bounces of a submission; then the host asks how many paths are left.
 const BOUNCES: u32 = 4;
+/// Surfaces that a path goes straight through at most: more of them end it.
+const MAX_STRAIGHT: u32 = 4096;
 /// Longest path: with Russian roulette, which lets no more than 0.95 of paths go on, none gets here.
 pub const MOST_DEPTH: u32 = 4096;
 
@@ -259,6 +263,7 @@ impl PathIntegrator {
         control: &mut dyn Control,
     ) -> Result<PathResult> {
         let Self { paths, options } = self;
+        paths.place_camera(camera)?;
         if spp > options.spp {
             return Err(Error::Usage(format!("{spp} paths a pixel: the integrator was made for {}", options.spp)));
         }
@@ -298,6 +303,15 @@ fn most_depth(options: &PathOptions) -> u32 {
     if options.view.is_some() { 0 } else { options.max_depth.min(MOST_DEPTH) }
 }
 
+/// What rays to lights need where thin walls let them through.
+struct Walls {
+    stream: Stream,
+    /// Rays that have come through one wall more; they go back and forth between this queue and that of rays to lights.
+    later: RayQueue,
+    contributions: Buffer,
+    count: Buffer,
+}
+
 struct Paths {
     camera: Stream,
     bounce: Stream,
@@ -306,9 +320,13 @@ struct Paths {
     /// Of bounces: what one is traced from, the other is filled with.
     queues: [RayQueue; 2],
     shadow_queue: RayQueue,
-    /// Parameters that fill either queue.
-    block_params: [Buffer; 2],
-    path_params: [u64; 2],
+    /// Parameters that fill either queue; then those of rays that come through walls, out of either queue of rays to lights.
+    block_params: Vec<Buffer>,
+    path_params: Vec<Buffer>,
+    records: Vec<PathParams>,
+    walls: Option<Walls>,
+    /// What paths may be inside of, where it matters.
+    bodies: Option<Bodies>,
     /// How many rays each bounce and its light samples traced.
     counts: Buffer,
     max_depth: u32,
@@ -351,7 +369,8 @@ impl Paths {
             Some(_) => Lights::sky_only(),
             None => Lights::new(flat, environment.mean),
         };
-        let asked = asked::asked(options, &lights, environment.map.texels != 0, cones);
+        let asked = asked::asked(options, flat, &lights, environment.map.texels != 0, cones);
+        let [has_media, has_clear_walls] = [asked::MEDIA, asked::CLEAR_WALLS].map(|bit| asked & bit != 0);
         let constants = asked::constants(asked);
         let quads = |name: &str| Buffer::new(device, name, QUAD_BYTES * most as u64, Memory::Device);
         let queues = [RayQueue::new(device, most)?, RayQueue::new(device, most)?];
@@ -378,6 +397,12 @@ impl Paths {
                 true => 0,
                 false => keep(Buffer::from_slice(device, "lights of instances", &lights.light_of)?),
             },
+            light_starts: match lights.starts.is_empty() {
+                true => 0,
+                false => keep(Buffer::from_slice(device, "distribution of lights", &lights.starts)?),
+            },
+            first_disk: lights.directional.start,
+            disk_count: lights.directional.end - lights.directional.start,
             radiance: keep(radiance),
             contributions: keep(contributions),
             shadow: shadow_queue.record(),
@@ -394,18 +419,50 @@ impl Paths {
                 true => keep(Buffer::new(device, "cones of paths", CONE_BYTES * most as u64, Memory::Device)?),
                 false => 0,
             },
+            media: match has_media {
+                true => keep(Buffer::new(device, "volumes around paths", MEDIA_BYTES * most as u64, Memory::Device)?),
+                false => 0,
+            },
+            straight: match has_clear_walls {
+                true => keep(Buffer::new(device, "straight lengths of paths", STRAIGHT_BYTES * most as u64, Memory::Device)?),
+                false => 0,
+            },
+            camera_media: [INVALID; 4],
             ..Default::default()
         };
         let states = [keep(states()?), keep(states()?)];
-        // those with number k fill queue k, and read what belongs to the other
-        let mut params = |k: usize| -> Result<u64> {
-            let (next, tags) = (queues[k].record(), queues[k ^ 1].record().tags);
-            let record = PathParams { next, tags, states: states[k ^ 1], next_states: states[k], ..base };
-            Ok(keep(Buffer::from_slice(device, "parameters of paths", &[record])?))
+        let draws_lights = options.strategy.draws_lights() && !lights.records.is_empty() && options.view.is_none();
+        let walls = match has_clear_walls && draws_lights {
+            true => Some(Walls {
+                stream: tracer.specialized(&stream::PATH_SHADOW_WALLS_CLOSEST, &constants)?,
+                later: RayQueue::new(device, most)?,
+                contributions: quads("what lights bring through walls")?,
+                count: Buffer::new(device, "number of rays behind walls", 4, Memory::Readback)?,
+            }),
+            false => None,
         };
-        let addresses = [params(0)?, params(1)?];
-        let block = || Buffer::new(device, "block parameters", size_of::<BlockParams>() as u64, Memory::Upload);
-        let block_params = [block()?, block()?];
+        // those with number k fill queue k, and read what belongs to the other
+        let of_bounces = |k: usize| {
+            let (next, tags) = (queues[k].record(), queues[k ^ 1].record().tags);
+            PathParams { next, tags, states: states[k ^ 1], next_states: states[k], ..base }
+        };
+        let mut records = vec![of_bounces(0), of_bounces(1)];
+        // rays to lights go from one queue to the other at each wall
+        if let Some(w) = &walls {
+            let (later, later_contributions) = (w.later.record(), w.contributions.address());
+            records.push(PathParams { later, later_contributions, ..base });
+            let (shadow, contributions) = (later, later_contributions);
+            let (later, later_contributions) = (base.shadow, base.contributions);
+            records.push(PathParams { shadow, contributions, later, later_contributions, ..base });
+        }
+        let path_params = records
+            .iter()
+            .map(|record| Buffer::from_slice(device, "parameters of paths", &[*record]))
+            .collect::<Result<Vec<_>>>()?;
+        let block_params = records
+            .iter()
+            .map(|_| Buffer::new(device, "block parameters", size_of::<BlockParams>() as u64, Memory::Upload))
+            .collect::<Result<Vec<_>>>()?;
         Ok(Self {
             camera: tracer.specialized(&stream::PATH_CAMERA_CLOSEST, &constants)?,
             bounce: tracer.specialized(&stream::PATH_BOUNCE_CLOSEST, &constants)?,
@@ -414,10 +471,13 @@ impl Paths {
             queues,
             shadow_queue,
             block_params,
-            path_params: addresses,
+            path_params,
+            records,
+            walls,
+            bodies: has_media.then(|| Bodies::new(flat)),
             counts: Buffer::new(device, "numbers of rays", 4 * 2 * u64::from(BOUNCES + 1), Memory::Readback)?,
             max_depth: most_depth(options),
-            draws_lights: options.strategy.draws_lights() && !lights.records.is_empty() && options.view.is_none(),
+            draws_lights,
             traced: Traced::default(),
             lights: if options.strategy.draws_lights() { lights.count() } else { 0 },
             light_tree: !lights.tree.is_empty(),
@@ -427,25 +487,76 @@ impl Paths {
         })
     }
 
+    /// Says which volumes the camera is in. Parallel rays and those through a lens count as starting where the camera is.
+    fn place_camera(&mut self, camera: &CameraRecord) -> Result<()> {
+        let Some(bodies) = &self.bodies else { return Ok(()) };
+        let eye = glam::DVec3::from_array([0, 1, 2].map(|row| f64::from(camera.camera_to_world[row][3])));
+        let camera_media = bodies.around(eye);
+        for (record, buffer) in self.records.iter_mut().zip(&mut self.path_params) {
+            record.camera_media = camera_media;
+            buffer.write(0, bytemuck::bytes_of(record))?;
+        }
+        Ok(())
+    }
+
     /// Traces the rays to lights that a vertex left; notes how many in place `slot`.
     fn record_shadow(&self, r: &mut crate::gpu::Recorder, push: Push, most: u32, slot: u32) {
         if !self.draws_lights {
             return;
         }
         r.barrier();
-        self.shadow.record(r, &self.shadow_queue.push(push, most));
+        match &self.walls {
+            None => self.shadow.record(r, &self.shadow_queue.push(push, most)),
+            Some(walls) => {
+                walls.later.clear(r);
+                r.barrier();
+                let push = Push { pass: self.block_params[2].address(), ..push };
+                walls.stream.record(r, &self.shadow_queue.push(push, most));
+                r.barrier();
+                r.copy(walls.later.count(), 0, &walls.count, 0, 4);
+            }
+        }
         r.barrier();
         r.copy(self.shadow_queue.count(), 0, &self.counts, 8 * u64::from(slot) + 4, 4);
     }
 
-    /// All bounces of a launch, `BOUNCES` to a submission.
+    /// Traces rays to lights that have come through a wall, wall after wall, until none is left.
+    fn trace_behind_walls(&mut self, commands: &mut Commands, push: Push) -> Result<Vec<Timing>> {
+        let mut timings = Vec::new();
+        let Some(walls) = self.walls.as_ref().filter(|_| self.draws_lights) else { return Ok(timings) };
+        let queues = [&self.shadow_queue, &walls.later];
+        // those that vertices left went from the first queue to the second
+        let mut from = 1;
+        loop {
+            let left: u32 = bytemuck::pod_read_unaligned(&walls.count.read(0, 4)?);
+            if left == 0 {
+                return Ok(timings);
+            }
+            self.traced.shadow_rays += u64::from(left);
+            let push = Push { pass: self.block_params[2 + from].address(), ..push };
+            timings.extend(commands.run(|r| {
+                queues[from ^ 1].clear(r);
+                r.barrier();
+                walls.stream.record(r, &queues[from].push(push, left));
+                r.barrier();
+                r.copy(queues[from ^ 1].count(), 0, &walls.count, 0, 4);
+            })?);
+            from ^= 1;
+        }
+    }
+
+    /// All bounces of a launch, `BOUNCES` to a submission; behind walls that let light through, one.
     fn launch_one(&mut self, commands: &mut Commands, push: Push) -> Result<Vec<Timing>> {
-        let passes = self.block_params.each_ref().map(Buffer::address);
+        let passes = [0, 1].map(|k| self.block_params[k].address());
         let push = |fills: usize| Push { pass: passes[fills], ..push };
+        // what a path goes straight through is no bounce, but it takes a launch
+        let straight = self.bodies.is_some() || self.asked & asked::CLEAR_WALLS != 0;
+        let max_launches = if straight { self.max_depth.saturating_add(MAX_STRAIGHT) } else { self.max_depth };
+        let bounces = if self.walls.is_some() { 1 } else { BOUNCES };
         let (mut timings, mut depth, mut left) = (Vec::new(), 0, push(0).count);
         // vertex `depth` fills queue `depth % 2`
         loop {
-            let last = depth + BOUNCES;
+            let last = depth + bounces;
             let begin = depth;
             timings.extend(commands.run(|r| {
                 r.fill(&self.counts, self.counts.size(), 0);
@@ -456,7 +567,7 @@ impl Paths {
                     self.camera.record(r, &push(0));
                     self.record_shadow(r, push(0), left, BOUNCES);
                 }
-                while depth < last.min(self.max_depth) {
+                while depth < last.min(max_launches) {
                     depth += 1;
                     let (fills, traced) = (depth as usize % 2, (depth as usize + 1) % 2);
                     r.barrier();
@@ -471,6 +582,7 @@ impl Paths {
                 // what is left for the next submission
                 r.copy(self.queues[depth as usize % 2].count(), 0, &self.counts, 8 * u64::from(BOUNCES), 4);
             })?);
+            timings.extend(self.trace_behind_walls(commands, push(0))?);
             let counts: Vec<u32> = bytemuck::pod_collect_to_vec(&self.counts.read(0, self.counts.size())?);
             for k in begin..depth {
                 let rays = counts[2 * ((k % BOUNCES) as usize)];
@@ -481,7 +593,7 @@ impl Paths {
             }
             self.traced.shadow_rays += counts.iter().skip(1).step_by(2).map(|&n| u64::from(n)).sum::<u64>();
             left = counts[2 * BOUNCES as usize];
-            if left == 0 || depth >= self.max_depth {
+            if left == 0 || depth >= max_launches {
                 break;
             }
         }
@@ -495,8 +607,8 @@ impl Estimator for Paths {
     const CHANNELS: usize = 3;
 
     fn begin(&mut self, params: BlockParams, _: bool) -> Result<u64> {
-        for (buffer, path) in self.block_params.iter_mut().zip(self.path_params) {
-            buffer.write(0, bytemuck::bytes_of(&BlockParams { path, ..params }))?;
+        for (buffer, path) in self.block_params.iter_mut().zip(&self.path_params) {
+            buffer.write(0, bytemuck::bytes_of(&BlockParams { path: path.address(), ..params }))?;
         }
         Ok(self.block_params[0].address())
     }

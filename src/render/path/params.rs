@@ -10,7 +10,11 @@ pub(super) const STATE_BYTES: u64 = 32;
 pub(super) const CONE_BYTES: u64 = 8;
 /// Bytes of four numbers.
 pub(super) const QUAD_BYTES: u64 = 16;
-/// Names no light.
+/// Bytes of the volumes that a path is in, where volumes matter.
+pub(super) const MEDIA_BYTES: u64 = 16;
+/// Bytes of how far a path has come straight, where there are walls that let it.
+pub(super) const STRAIGHT_BYTES: u64 = 4;
+/// Names no light, and no volume.
 pub(super) const INVALID: u32 = u32::MAX;
 
 #[repr(C)]
@@ -51,4 +55,12 @@ pub(super) struct PathParams {
     pub light_first: u32,
     pub light_tree: u64,
     pub cones: u64,
+    pub light_starts: u64,
+    pub first_disk: u32,
+    pub disk_count: u32,
+    pub media: u64,
+    pub straight: u64,
+    pub camera_media: [u32; 4],
+    pub later: QueueRecord,
+    pub later_contributions: u64,
 }

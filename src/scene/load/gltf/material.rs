@@ -139,6 +139,7 @@ pub(super) fn convert(material: &json::Material) -> Result<Material, String> {
         clearcoat: ClearcoatJson::of(others)?.to_scene()?,
         sheen: SheenJson::of(others)?.to_scene(),
         transmission: transmission(material),
+        dielectric_priority: dielectric_priority(material)?,
         specular: specular.map_or_else(Specular::default, |s| Specular {
             factor: s.specular_factor.0,
             texture: slot(&s.specular_texture),
@@ -148,6 +149,19 @@ pub(super) fn convert(material: &json::Material) -> Result<Material, String> {
         anisotropy: AnisotropyJson::of(others)?.to_scene(),
         ..Material::default()
     })
+}
+
+/// `extras.dielectricPriority`; other extras are somebody else's.
+fn dielectric_priority(material: &json::Material) -> Result<i32, String> {
+    #[derive(Deserialize)]
+    struct Extras {
+        #[serde(rename = "dielectricPriority")]
+        priority: Option<Value>,
+    }
+    let extras = material.extras.as_ref().and_then(|e| serde_json::from_str::<Extras>(e.get()).ok());
+    let Some(priority) = extras.and_then(|e| e.priority) else { return Ok(0) };
+    let whole = priority.as_i64().and_then(|p| i32::try_from(p).ok());
+    whole.ok_or_else(|| format!("extras.dielectricPriority: {priority} is no whole number of 32 bits"))
 }
 
 fn alpha_mode(material: &json::Material) -> AlphaMode {

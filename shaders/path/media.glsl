@@ -1,0 +1,71 @@
+// Volumes within volumes: which of them a path is in, and which two meet at a surface (Schmidt and Budge, "Simple Nested Dielectrics in Ray Traced
+// Images", JGT 2002). A path keeps the volumes whose surfaces it has entered and not left. Of those it is in the one of highest priority, and among
+// equal ones in the one that it entered last. A surface at which that does not change is not there.
+#ifndef PATH_MEDIA
+#define PATH_MEDIA
+#include "path/shading.glsl"
+
+// Materials of volumes, the last entered first; NO_MEDIUM at the end. Beyond four, the first that was entered is forgotten.
+#define MediaStack uvec4
+
+bool is_medium(uint material) {
+    return has(HAS_VOLUMES) && SHADING_OF(material).walls == WALLS_VOLUME || has(HAS_GLASS) && SHADING_OF(material).model == MODEL_GLASS;
+}
+
+// The volume that a path with this stack is in.
+uint current_medium(MediaStack stack) {
+    uint found = NO_MEDIUM;
+    int highest_ = 0;
+    [[unroll]] for (uint k = 0u; k < 4u; k++) {
+        if (stack[k] == NO_MEDIUM) break;
+        int priority = SHADING_OF(stack[k]).priority;
+        if (found == NO_MEDIUM || priority > highest_) {
+            found = stack[k];
+            highest_ = priority;
+        }
+    }
+    return found;
+}
+
+MediaStack entered(MediaStack stack, uint m) { return MediaStack(m, stack.xyz); }
+
+// Without the volume, which is as it was where the volume is not in it.
+MediaStack left(MediaStack stack, uint m) {
+    if (stack.x == m) return MediaStack(stack.yzw, NO_MEDIUM);
+    if (stack.y == m) return MediaStack(stack.xzw, NO_MEDIUM);
+    if (stack.z == m) return MediaStack(stack.xyw, NO_MEDIUM);
+    return stack.w == m ? MediaStack(stack.xyz, NO_MEDIUM) : stack;
+}
+
+// Index of refraction; around everything it is 1.
+float medium_ior(uint m) { return m == NO_MEDIUM ? 1.0 : SHADING_OF(m).ior; }
+
+// What lies beyond a surface of a volume.
+struct Boundary {
+    bool is_there;
+    uint medium;       // beyond
+    MediaStack stack;  // beyond
+    float eta;         // index of refraction beyond the surface over that before it
+};
+
+Boundary boundary_at(uint material, bool front, uint here, MediaStack stack) {
+    Boundary b;
+    b.stack = front ? entered(stack, material) : left(stack, material);
+    if (!front && b.stack == stack) {
+        // a path that is inside without having entered: the body is open, or it began there
+        b.is_there = true;
+        b.medium = here;
+        b.eta = medium_ior(here) / medium_ior(material);
+        return b;
+    }
+    b.medium = current_medium(b.stack);
+    b.is_there = b.medium != here;
+    b.eta = medium_ior(b.medium) / medium_ior(here);
+    return b;
+}
+
+MediaStack load_media(PathParams p, uint k) { return Quads(p.media).v[k]; }
+
+void store_media(PathParams p, uint k, MediaStack stack) { store_quad(p.media, k, uintBitsToFloat(stack)); }
+
+#endif

@@ -1,0 +1,75 @@
+//! Choosing one of many with given probabilities, by inversion of their cumulative distribution. Unlike an alias table it keeps the order of the
+//! outcomes: neighbouring numbers choose neighbouring outcomes, and what is left of a number once it has chosen is as evenly distributed as
+//! the number was. So one stratified sample can choose an outcome and then a point of it (pbrt-v4, A.1, `SampleDiscrete`).
+
+/// A distribution over outcomes `0..n`, in units of 2^-32: what is drawn is exactly what the probabilities say.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct CumulativeTable {
+    /// `n + 1` numbers: outcome `k` is chosen from `starts[k]` up to `starts[k + 1]`. The last is 2^32, which wraps to 0.
+    pub starts: Vec<u32>,
+    /// Probability of each outcome.
+    pub probabilities: Vec<f32>,
+}
+
+impl CumulativeTable {
+    /// From weights that are finite and above 0; at most 2^31 of them.
+    pub fn new(weights: &[f64]) -> Self {
+        let n = weights.len() as u64;
+        debug_assert!(weights.iter().all(|&w| w > 0.0 && w.is_finite()), "weights must be above 0");
+        if n == 0 {
+            return Self::default();
+        }
+        let total: f64 = weights.iter().sum();
+        let all = 1u64 << 32;
+        // every outcome gets one unit, and its share of the others
+        let spare = (all - n) as f64;
+        let (mut sum, mut starts) = (0.0, Vec::with_capacity(weights.len() + 1));
+        for (k, weight) in weights.iter().enumerate() {
+            starts.push(k as u64 + (spare * (sum / total)) as u64);
+            sum += weight;
+        }
+        starts.push(all);
+        let probabilities = starts.windows(2).map(|w| ((w[1] - w[0]) as f64 / all as f64) as f32).collect();
+        Self { starts: starts.into_iter().map(|s| s as u32).collect(), probabilities }
+    }
+
+    /// The outcome of 32 random bits, and what is left of them, in [0, 1].
+    pub fn sample(&self, bits: u32) -> (usize, f32) {
+        let n = self.probabilities.len();
+        let k = self.starts[..n].partition_point(|&s| s <= bits) - 1;
+        let width = self.starts[k + 1].wrapping_sub(self.starts[k]);
+        // a single outcome fills all 2^32
+        let width = if width == 0 { 4_294_967_296.0 } else { width as f32 };
+        (k, (bits - self.starts[k]) as f32 / width)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn draws_as_often_as_asked_and_in_order() {
+        let many: Vec<f64> = (0..1000).map(|k| 1.0 + f64::from(k % 7)).collect();
+        for weights in [vec![1.0], vec![1.0, 2.0, 3.0, 4.0], vec![1e-9, 1.0, 1e-30, 5.0, 1e9], many] {
+            let table = CumulativeTable::new(&weights);
+            let (n, total) = (weights.len(), weights.iter().sum::<f64>());
+            let (mut counts, mut last, draws) = (vec![0u32; n], (0, 0.0), 1u32 << 18);
+            for k in 0..draws {
+                let (chosen, rest) = table.sample((k << 14) + (1 << 13));
+                assert!((0.0..=1.0).contains(&rest), "{weights:?}: {rest}");
+                assert!((chosen, rest) >= last, "{weights:?}: not in order");
+                last = (chosen, rest);
+                counts[chosen] += 1;
+            }
+            for k in 0..n {
+                let wanted = weights[k] / total;
+                assert!((f64::from(table.probabilities[k]) - wanted).abs() < 1e-6, "{weights:?}: {k}");
+                assert!((f64::from(counts[k]) / f64::from(draws) - wanted).abs() < 1e-5, "{weights:?}: {k}");
+                assert!(table.probabilities[k] > 0.0, "{weights:?}: {k} is impossible");
+            }
+            assert_eq!(table.sample(0).0, 0);
+            assert_eq!(table.sample(u32::MAX).0, n - 1);
+        }
+    }
+}
