@@ -34,8 +34,8 @@ struct Sheen {
     float kept;  // of what is below, on wo's side
 };
 
-// How often each lobe of a glTF material is sampled, in all 1.
-struct Shares {
+// How often each lobe of a glTF material is sampled; the sum is 1.
+struct LobeProbabilities {
     float interface_;  // specular reflection and transmission
     float diffuse;
     float coat;
@@ -45,20 +45,21 @@ struct Shares {
 struct Bsdf {
     uint kind;
     vec3 diffuse;
-    vec3 f0;
-    float f90;
+    vec3 f0;           // glTF: Schlick's term of dielectric and metal, mixed; of volumes the metal's part alone. Conductor: index of refraction
+    vec3 f90;
+    float dielectric_f0;   // Schlick's term of a glTF material's dielectric part, in its brightest channel
+    float dielectric_f90;
     vec3 k;
     vec3 tint;         // of what is reflected
     vec3 transmitted;  // of what is refracted
     float eta;         // index of refraction beyond the surface over that on wo's side
-    float metallic;
+    float dielectric_weight;   // of the exact Fresnel term of a volume: 1 - metallic, times its energy compensation
     bool volume;       // what is transmitted is refracted; else it goes straight on, through thin walls
     Microfacets facets;
-    vec3 gain;         // energy compensation of specular terms, else 1
-    float under;       // share of light that reaches what is under the interface; negative: what the Fresnel term leaves
+    float base_transmittance;  // with energy compensation: share of light that reaches what is under the interface
     Coat coat;
     Sheen sheen;
-    Shares shares;
+    LobeProbabilities probabilities;
 };
 
 struct BsdfValue {
@@ -85,15 +86,14 @@ Bsdf black_bsdf() {
     Bsdf b;
     b.kind = BSDF_NONE;
     b.diffuse = b.f0 = b.k = b.transmitted = vec3(0.0);
-    b.tint = b.gain = vec3(1.0);
-    b.f90 = b.eta = 1.0;
-    b.metallic = 0.0;
+    b.tint = b.f90 = vec3(1.0);
+    b.dielectric_f0 = 0.0;
+    b.dielectric_f90 = b.dielectric_weight = b.eta = b.base_transmittance = 1.0;
     b.volume = false;
     b.facets = Microfacets(vec2(1.0), false);
-    b.under = -1.0;
     b.coat = Coat(0.0, vec3(0.0, 0.0, 1.0), b.facets);
     b.sheen = Sheen(vec3(0.0), 1.0, 1.0);
-    b.shares = Shares(0.0, 0.0, 0.0, 0.0);
+    b.probabilities = LobeProbabilities(0.0, 0.0, 0.0, 0.0);
     return b;
 }
 

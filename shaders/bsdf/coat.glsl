@@ -2,7 +2,7 @@
 #ifndef BSDF_COAT
 #define BSDF_COAT
 
-float coat_fresnel(float c) { return fresnel_schlick(c, vec3(0.04), 1.0).r; }
+float coat_fresnel(float c) { return mix(0.04, 1.0, schlick_weight(c)); }
 
 // What the coat lets through on the way from or to a direction: both ways count, so that they may be exchanged.
 float coat_transmits(Coat coat, vec3 w) {

@@ -6,7 +6,7 @@ BsdfValue conductor_at(Bsdf b, vec3 wo, vec3 wi) {
     if (is_smooth(b.facets) || !(wi.z > 0.0)) return NO_VALUE;
     vec3 m = normalize(wo + wi);
     vec3 f = fresnel_conductor(dot(wo, m), b.f0, b.k);
-    f *= b.tint * b.gain * (distribution(b.facets, m) * masking_shadowing(b.facets, wo, wi) / (4.0 * wo.z));
+    f *= b.tint * (distribution(b.facets, m) * masking_shadowing(b.facets, wo, wi) / (4.0 * wo.z));
     return BsdfValue(f, reflected_pdf(b.facets, wo, m));
 }
 

@@ -11,10 +11,10 @@ BsdfValue dielectric_at(Bsdf b, vec3 wo, vec3 wi) {
     float f = fresnel_dielectric(om, b.eta, cos_t);
     if (wi.z > 0.0) {
         float d = distribution(b.facets, m) * masking_shadowing(b.facets, wo, wi);
-        return BsdfValue(b.tint * b.gain * (f * d / (4.0 * wo.z)), f * reflected_pdf(b.facets, wo, m));
+        return BsdfValue(b.tint * (f * d / (4.0 * wo.z)), f * reflected_pdf(b.facets, wo, m));
     }
     float d = distribution(b.facets, m) * masking_shadowing(b.facets, wo, vec3(wi.xy, -wi.z));
-    return BsdfValue(b.transmitted * b.gain * ((1.0 - f) * d * refracted_value(b.eta, wo.z, om, im)),
+    return BsdfValue(b.transmitted * ((1.0 - f) * d * refracted_value(b.eta, wo.z, om, im)),
                      (1.0 - f) * refracted_pdf(b.facets, b.eta, wo, m, im));
 }
 

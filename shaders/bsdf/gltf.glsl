@@ -7,33 +7,85 @@
 
 bool has_transmission() { return has(HAS_THIN_WALLS) || has(HAS_VOLUMES); }
 
-// Share of light that the interface reflects, by the cosine between microfacet and view.
-vec3 interface_fresnel(Bsdf b, float c) {
-    if (!has(HAS_VOLUMES) || !b.volume) return fresnel_schlick(c, b.f0, b.f90);
-    float cos_t;
-    vec3 f = vec3(fresnel_dielectric(c, b.eta, cos_t));
-    // beyond the critical angle there is nowhere else to go
-    if (cos_t > 0.0) f *= b.tint;
-    return mix(f, fresnel_schlick(c, b.f0, 1.0), b.metallic);
+// What microfacets do with light.
+struct InterfaceFresnel {
+    vec3 reflected;     // share that they reflect: mix(dielectric, metal, metallic)
+    float transmitted;  // share that the dielectric part lets through to the other side
+    float diffuse;      // and to what is diffuse below it
+};
+
+// By the cosine between microfacet and view.
+InterfaceFresnel interface_fresnel(Bsdf b, float c) {
+    float weight = schlick_weight(c);
+    vec3 reflected = mix(b.f0, b.f90, weight);
+    float dielectric = mix(b.dielectric_f0, b.dielectric_f90, weight);
+    if (has(HAS_VOLUMES) && b.volume) {
+        float cos_t;
+        float f = fresnel_dielectric(c, b.eta, cos_t);
+        // beyond the critical angle there is nowhere else to go
+        vec3 tint = cos_t > 0.0 ? b.tint : vec3(1.0);
+        dielectric = f * highest(tint);
+        reflected += b.dielectric_weight * f * tint;
+    }
+    InterfaceFresnel all_ = InterfaceFresnel(reflected, 1.0 - dielectric, 1.0 - dielectric);
+    if (has(HAS_COMPENSATION)) {
+        all_.diffuse = b.base_transmittance;
+        // how much is refracted depends on the microfacet; what goes straight on has one factor for all
+        if (!has(HAS_VOLUMES) || !b.volume) all_.transmitted = b.base_transmittance;
+    }
+    return all_;
 }
 
-// What the interface lets through.
-float let_through(Bsdf b, vec3 fresnel) {
-    return b.under >= 0.0 ? b.under : 1.0 - highest(fresnel);
+// Sets the Fresnel terms of a glTF material, f0 and f90 those of its dielectric part: the specification's mix(dielectric, metal, metallic), each
+// part with its own energy compensation. albedo_layer: the first of the volume's tables, on the viewer's side.
+void set_interface(inout Bsdf b, vec3 f0, float f90, vec3 base, float metallic, float cos_o, float roughness, uint albedo_layer) {
+    vec3 dielectric_gain = vec3(1.0), metal_gain = vec3(1.0);
+    bool volume = has(HAS_VOLUMES) && b.volume;
+    if (has(HAS_COMPENSATION)) {
+        bool smooth_surface = is_smooth(b.facets);
+        float e = smooth_surface ? 1.0 : ggx_albedo(cos_o, roughness);
+        metal_gain += base * ((1.0 - e) / e);
+        if (volume) {
+            DielectricAlbedo a;
+            if (smooth_surface) {
+                float cos_t;
+                float f = fresnel_dielectric(cos_o, b.eta, cos_t) * (cos_t > 0.0 ? highest(b.tint) : 1.0);
+                a = DielectricAlbedo(f, 1.0 - f);
+            } else {
+                a = dielectric_albedo(albedo_layer, cos_o, roughness, e, highest(b.tint));
+            }
+            float gain = 1.0 / (a.reflected + a.transmitted);
+            dielectric_gain = vec3(gain);
+            b.transmitted *= gain;
+            b.base_transmittance = clamp(1.0 - gain * a.reflected, 0.0, 1.0);
+        } else {
+            float weight = smooth_surface ? schlick_weight(cos_o) : ggx_schlick_weight(cos_o, roughness);
+            dielectric_gain += f0 * ((1.0 - e) / e);
+            b.base_transmittance = clamp(1.0 - e * highest(dielectric_gain * mix(f0, vec3(f90), weight)), 0.0, 1.0);
+            // thin walls transmit by the lobe by which they reflect, and lose as much
+            b.transmitted /= e;
+        }
+    }
+    b.dielectric_f0 = highest(f0);
+    b.dielectric_f90 = f90;
+    b.dielectric_weight = (1.0 - metallic) * dielectric_gain.x;
+    // volumes have the exact term in place of Schlick's
+    vec3 dielectric = volume ? vec3(0.0) : (1.0 - metallic) * dielectric_gain, metal = metallic * metal_gain;
+    b.f0 = dielectric * f0 + metal * base;
+    b.f90 = dielectric * f90 + metal;
 }
 
 // How often what meets a microfacet is sampled as reflected, and not as transmitted.
-float reflected_share(Bsdf b, vec3 fresnel) {
+float reflected_probability(Bsdf b, InterfaceFresnel f) {
     if (!has_transmission()) return 1.0;
-    float r = highest(fresnel), t = highest(b.transmitted) * (1.0 - r);
+    float r = highest(f.reflected), t = highest(b.transmitted) * f.transmitted;
     return r + t > 0.0 ? r / (r + t) : 1.0;
 }
 
 // Each lobe is sampled by how much it reflects in all, or nearly.
-void set_shares(inout Bsdf b, float cos_o) {
-    vec3 f = interface_fresnel(b, cos_o);
-    float r = highest(f), through = let_through(b, f);
-    vec4 w = vec4(highest(b.gain * f) + highest(b.transmitted) * through, highest(b.diffuse) * through, 0.0, 0.0);
+void set_probabilities(inout Bsdf b, float cos_o) {
+    InterfaceFresnel f = interface_fresnel(b, cos_o);
+    vec4 w = vec4(highest(f.reflected) + highest(b.transmitted) * f.transmitted, highest(b.diffuse) * f.diffuse, 0.0, 0.0);
     if (has(HAS_SHEEN)) {
         w.xy *= b.sheen.kept;
         w.w = 1.0 - b.sheen.kept;
@@ -44,13 +96,13 @@ void set_shares(inout Bsdf b, float cos_o) {
     }
     float sum = w.x + w.y + w.z + w.w;
     if (sum > 0.0) w /= sum;
-    b.shares = Shares(w.x, w.y, w.z, w.w);
+    b.probabilities = LobeProbabilities(w.x, w.y, w.z, w.w);
 }
 
 bool gltf_has_rough_part(Bsdf b) {
-    if (b.shares.diffuse > 0.0 || has(HAS_SHEEN) && b.shares.sheen > 0.0) return true;
-    if (has(HAS_COAT) && b.shares.coat > 0.0 && !is_smooth(b.coat.facets)) return true;
-    return !is_smooth(b.facets) && b.shares.interface_ > 0.0;
+    if (b.probabilities.diffuse > 0.0 || has(HAS_SHEEN) && b.probabilities.sheen > 0.0) return true;
+    if (has(HAS_COAT) && b.probabilities.coat > 0.0 && !is_smooth(b.coat.facets)) return true;
+    return !is_smooth(b.facets) && b.probabilities.interface_ > 0.0;
 }
 
 // The interface's own reflection and transmission, and what is diffuse below it.
@@ -63,23 +115,22 @@ BsdfValue base_at(Bsdf b, vec3 wo, vec3 wi) {
     vec3 m = up || straight ? normalize(wo + w) : generalized_half(b.eta, wo, wi);
     if (m == vec3(0.0)) return value;
     float om = dot(wo, m);
-    vec3 f = interface_fresnel(b, om);
-    float through = let_through(b, f);
+    InterfaceFresnel f = interface_fresnel(b, om);
     if (up) {
         float cosine = wi.z / PI;
-        value = BsdfValue(b.diffuse * (through * cosine), b.shares.diffuse * cosine);
+        value = BsdfValue(b.diffuse * (f.diffuse * cosine), b.probabilities.diffuse * cosine);
     }
     if (is_smooth(b.facets)) return value;
     float d = distribution(b.facets, m) * masking_shadowing(b.facets, wo, vec3(wi.xy, abs(wi.z)));
-    float reflects = b.shares.interface_ * reflected_share(b, f), transmits = b.shares.interface_ - reflects;
+    float reflects = b.probabilities.interface_ * reflected_probability(b, f), transmits = b.probabilities.interface_ - reflects;
     if (up) {
-        value.f += f * b.gain * (d / (4.0 * wo.z));
+        value.f += f.reflected * (d / (4.0 * wo.z));
         value.pdf += reflects * reflected_pdf(b.facets, wo, m);
     } else if (straight) {
-        value = BsdfValue(b.transmitted * (through * d / (4.0 * wo.z)), transmits * reflected_pdf(b.facets, wo, m));
+        value = BsdfValue(b.transmitted * (f.transmitted * d / (4.0 * wo.z)), transmits * reflected_pdf(b.facets, wo, m));
     } else {
         float im = dot(wi, m);
-        value = BsdfValue(b.transmitted * (through * d * refracted_value(b.eta, wo.z, om, im)),
+        value = BsdfValue(b.transmitted * (f.transmitted * d * refracted_value(b.eta, wo.z, om, im)),
                           transmits * refracted_pdf(b.facets, b.eta, wo, m, im));
     }
     return value;
@@ -93,7 +144,7 @@ BsdfValue gltf_at(Bsdf b, vec3 wo, vec3 wi) {
         value.f *= min(b.sheen.kept, sheen_kept(b.sheen, abs(wi.z)));
         if (up) {
             value.f += sheen_value(b.sheen, wo, wi);
-            value.pdf += b.shares.sheen / (2.0 * PI);
+            value.pdf += b.probabilities.sheen / (2.0 * PI);
         }
     }
     if (has(HAS_COAT) && b.coat.weight > 0.0) {
@@ -101,7 +152,7 @@ BsdfValue gltf_at(Bsdf b, vec3 wo, vec3 wi) {
         if (up && !is_smooth(b.coat.facets)) {
             BsdfValue coat = coat_at(b.coat, wo, wi);
             value.f += coat.f;
-            value.pdf += b.shares.coat * coat.pdf;
+            value.pdf += b.probabilities.coat * coat.pdf;
         }
     }
     return value;
@@ -120,15 +171,15 @@ BsdfSample interface_sample(Bsdf b, vec3 wo, vec2 u, float v, out bool found) {
     bool smooth_surface = is_smooth(b.facets);
     vec3 m = smooth_surface ? vec3(0.0, 0.0, 1.0) : sample_microfacet(b.facets, wo, u);
     float om = dot(wo, m);
-    vec3 f = interface_fresnel(b, om);
-    float share = reflected_share(b, f);
+    InterfaceFresnel f = interface_fresnel(b, om);
+    float probability = reflected_probability(b, f);
     BsdfSample s = BsdfSample(2.0 * om * m - wo, vec3(0.0), 1.0, smooth_surface, 1.0);
     found = om > 0.0;
-    if (v < share) {
+    if (v < probability) {
         found = found && s.wi.z > 0.0;
         if (smooth_surface) {
-            s.pdf = b.shares.interface_ * share;
-            s.weight = f * layers_transmit(b, wo, s.wi) / s.pdf;
+            s.pdf = b.probabilities.interface_ * probability;
+            s.weight = f.reflected * layers_transmit(b, wo, s.wi) / s.pdf;
         }
         return s;
     }
@@ -143,29 +194,29 @@ BsdfSample interface_sample(Bsdf b, vec3 wo, vec2 u, float v, out bool found) {
     }
     found = found && s.wi.z < 0.0;
     if (smooth_surface) {
-        s.pdf = b.shares.interface_ * (1.0 - share);
-        s.weight = b.transmitted * (let_through(b, f) * layers_transmit(b, wo, s.wi) / (s.pdf * s.eta * s.eta));
+        s.pdf = b.probabilities.interface_ * (1.0 - probability);
+        s.weight = b.transmitted * (f.transmitted * layers_transmit(b, wo, s.wi) / (s.pdf * s.eta * s.eta));
     }
     return s;
 }
 
 BsdfSample gltf_sample(Bsdf b, vec3 wo, vec2 u, float v) {
-    if (v < b.shares.interface_) {
+    if (v < b.probabilities.interface_) {
         bool found;
-        BsdfSample s = interface_sample(b, wo, u, v / b.shares.interface_, found);
+        BsdfSample s = interface_sample(b, wo, u, v / b.probabilities.interface_, found);
         if (found) return s;
         return NO_SAMPLE;
     }
-    if (v < b.shares.interface_ + b.shares.diffuse) return proposed(cosine_hemisphere(u), 1.0);
-    if (has(HAS_COAT) && v < b.shares.interface_ + b.shares.diffuse + b.shares.coat) {
+    if (v < b.probabilities.interface_ + b.probabilities.diffuse) return proposed(cosine_hemisphere(u), 1.0);
+    if (has(HAS_COAT) && v < b.probabilities.interface_ + b.probabilities.diffuse + b.probabilities.coat) {
         vec3 m = coat_microfacet(b.coat, wo, u);
         vec3 wi = 2.0 * dot(wo, m) * m - wo;
         if (!(wi.z > 0.0)) return NO_SAMPLE;
         if (!is_smooth(b.coat.facets)) return proposed(wi, 1.0);
-        float weight = b.coat.weight * coat_fresnel(dot(wo, m)) / b.shares.coat;
-        return BsdfSample(wi, vec3(weight), b.shares.coat, true, 1.0);
+        float weight = b.coat.weight * coat_fresnel(dot(wo, m)) / b.probabilities.coat;
+        return BsdfSample(wi, vec3(weight), b.probabilities.coat, true, 1.0);
     }
-    if (has(HAS_SHEEN) && b.shares.sheen > 0.0) return proposed(uniform_hemisphere(u), 1.0);
+    if (has(HAS_SHEEN) && b.probabilities.sheen > 0.0) return proposed(uniform_hemisphere(u), 1.0);
     return NO_SAMPLE;
 }
 

@@ -8,8 +8,9 @@
 #include "common/warp.glsl"
 
 const float PI = 3.14159265358979;
-// Below this the lobe is narrower than single precision can hold: it counts as a perfect mirror.
-const float LEAST_ALPHA = 1e-3;
+// Below this the lobe is narrower than single precision can hold: it counts as a perfect mirror. A roughness of 1 / 255, the least of an 8-bit
+// texture, has an alpha of 1.5e-5.
+const float LEAST_ALPHA = 1e-5;
 
 // Directions nearer to the surface count as this near.
 const float LEAST_COSINE = 1e-4;
@@ -128,10 +129,10 @@ vec3 fresnel_conductor(float cos_i, vec3 eta, vec3 k) {
     return 0.5 * (parallel + perpendicular);
 }
 
-// Schlick 1994.
-vec3 fresnel_schlick(float cos_i, vec3 f0, float f90) {
+// How far Schlick's Fresnel term (1994) is on its way from f0 to f90.
+float schlick_weight(float cos_i) {
     float x = 1.0 - clamp(cos_i, 0.0, 1.0);
-    return mix(f0, vec3(f90), x * x * x * x * x);
+    return x * x * x * x * x;
 }
 
 #endif

@@ -32,7 +32,7 @@ vec3 sheen_value(Sheen sheen, vec3 wo, vec3 wi) {
 
 // What fibres leave to what is below them, by the cosine of the light's or the viewer's direction.
 float sheen_kept(Sheen sheen, float cosine) {
-    return 1.0 - highest(sheen.color) * min(albedo(ALBEDO_SHEEN, cosine, sqrt(sheen.alpha)), 1.0);
+    return 1.0 - highest(sheen.color) * min(albedo(ALBEDO_SHEEN, sqrt(max(cosine, 0.0)), sqrt(sheen.alpha)), 1.0);
 }
 
 #endif

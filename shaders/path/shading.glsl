@@ -176,23 +176,27 @@ vec2 anisotropic(Looked looked, uint m, inout vec2 alpha) {
     vec2 d = SHADING_OF(m).uses[USE_ANISOTROPY].texture != INVALID ? t.xy * 2.0 - 1.0 : vec2(1.0, 0.0);
     float strength = length(SHADING_OF(m).anisotropy) * t.z;
     alpha.x = mix(alpha.x, 1.0, strength * strength);
+    if (alpha.x >= LEAST_ALPHA) alpha = max(alpha, vec2(LEAST_ALPHA));
     vec2 turn = strength > 0.0 ? normalize(SHADING_OF(m).anisotropy) : vec2(1.0, 0.0);
     return vec2(turn.x * d.x - turn.y * d.y, turn.y * d.x + turn.x * d.y);
 }
 
-// Factors that give back what microfacets of one bounce lose (docs/materials.md, Energy).
+// First layer of the albedo tables of a material that refracts, as seen from a side.
+uint dielectric_layer(uint m, bool front) {
+    return ALBEDO_DIELECTRIC + DIELECTRIC_LAYERS * (2u * SHADING_OF(m).glass_layer + (front ? 0u : 1u));
+}
+
+// Factors that give back what microfacets of one bounce lose (docs/materials.md, Energy). glTF's are in set_interface().
 void compensate(inout Bsdf b, uint m, float cos_o, float roughness, bool front) {
     if (!has(HAS_COMPENSATION) || is_smooth(b.facets)) return;
     if (b.kind == BSDF_CONDUCTOR) {
-        float e = albedo(ALBEDO_BECKMANN, cos_o, roughness);
-        b.gain = 1.0 + fresnel_conductor(1.0, b.f0, b.k) * ((1.0 - e) / e);
-    } else if (b.kind == BSDF_DIELECTRIC || b.volume) {
-        b.gain = vec3(1.0 / albedo(ALBEDO_GLASS + 2u * SHADING_OF(m).glass_layer + (front ? 0u : 1u), cos_o, roughness));
-        b.transmitted *= b.kind == BSDF_DIELECTRIC ? 1.0 : b.gain.x;
+        float e = beckmann_albedo(cos_o, roughness);
+        b.tint *= 1.0 + fresnel_conductor(1.0, b.f0, b.k) * ((1.0 - e) / e);
     } else {
-        float a0 = albedo(ALBEDO_GGX_F0, cos_o, roughness), a90 = albedo(ALBEDO_GGX_F90, cos_o, roughness), e = a0 + a90;
-        b.gain = 1.0 + b.f0 * ((1.0 - e) / e);
-        b.under = clamp(1.0 - highest(b.gain * (b.f0 * a0 + b.f90 * a90)), 0.0, 1.0);
+        DielectricAlbedo a = dielectric_albedo(dielectric_layer(m, front), cos_o, roughness, ggx_albedo(cos_o, roughness), 1.0);
+        float gain = 1.0 / (a.reflected + a.transmitted);
+        b.tint *= gain;
+        b.transmitted *= gain;
     }
 }
 
@@ -205,8 +209,7 @@ vec2 gltf_bsdf(inout Bsdf b, Looked looked, uint m, vec3 base, bool front, float
     float r0 = (SHADING_OF(m).ior - 1.0) / (SHADING_OF(m).ior + 1.0);
     b.kind = BSDF_GLTF;
     b.diffuse = base * (1.0 - metallic);
-    b.f0 = mix(min(r0 * r0 * specular_color, vec3(1.0)) * specular, base, metallic);
-    b.f90 = mix(specular, 1.0, metallic);
+    vec3 f0 = min(r0 * r0 * specular_color, vec3(1.0)) * specular;
     b.facets = Microfacets(vec2(roughness * roughness), false);
     vec2 along = vec2(1.0, 0.0);
     if (has(HAS_ANISOTROPY) && SHADING_OF(m).anisotropy != vec2(0.0)) along = anisotropic(looked, m, b.facets.alpha);
@@ -218,8 +221,6 @@ vec2 gltf_bsdf(inout Bsdf b, Looked looked, uint m, vec3 base, bool front, float
         if (b.volume) {
             b.eta = front ? SHADING_OF(m).ior : 1.0 / SHADING_OF(m).ior;
             b.tint = min(specular_color, vec3(1.0)) * specular;
-            b.metallic = metallic;
-            b.f0 = base;
         }
     }
     if (has(HAS_SHEEN) && highest(SHADING_OF(m).sheen_color) > 0.0) {
@@ -232,8 +233,8 @@ vec2 gltf_bsdf(inout Bsdf b, Looked looked, uint m, vec3 base, bool front, float
         b.coat.weight = SHADING_OF(m).coat * looked.at[USE_COAT].r;
         b.coat.facets = Microfacets(vec2(r * r), false);
     }
-    compensate(b, m, cos_o, roughness, front);
-    set_shares(b, cos_o);
+    set_interface(b, f0, specular, base, metallic, cos_o, roughness, dielectric_layer(m, front));
+    set_probabilities(b, cos_o);
     return along;
 }
 
@@ -267,8 +268,9 @@ Shading shade(Surface s, vec3 wo, float log_side) {
     }
     vec3 base = shown_color(s, part, MaterialRecords(root.materials).v[part.material], log_side);
     if (has(HAS_UNLIT) && SHADING_OF(m).model == MODEL_UNLIT) {
+        // such a material shows its base colour; what it emits is ignored
         out_.unlit = true;
-        out_.emission += base;
+        out_.emission = base;
         return out_;
     }
     vec4 tangent = vec4(0.0);

@@ -173,7 +173,8 @@ pub struct Material {
     pub alpha_mode: AlphaMode,
     /// Both faces are shaded. Visibility never depends on it: rays meet both faces.
     pub double_sided: bool,
-    /// Index of refraction (KHR_materials_ior, `Ni`).
+    /// Index of refraction (KHR_materials_ior, `Ni`): at least 1. In glTF also 0, for a Fresnel term of 1 that leaves reflection to the specular
+    /// colour; such a material does not refract.
     pub ior: f32,
     /// Specular colour of MTL/.brhan (`Ks`, `specular[]`, `reflectance[]`).
     pub specular_color: Vec3,

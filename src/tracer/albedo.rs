@@ -3,15 +3,25 @@
 //!
 //! The integrals are over the visible normals of GGX (Heitz, "Sampling the GGX Distribution of Visible Normals", JCGT 2018), by stratified
 //! points: what is left to sum is a Smith term and Fresnel's, both smooth. Beckmann's and Charlie's are by the midpoint rule.
+//!
+//! Microfacets of any roughness hide and shadow alike once the surface is stretched until its roughness is 1: their albedo has its least, 0.89,
+//! where the cosine is alpha, and the stretched cosine as an axis holds it in place. What follows the cosine itself, as Fresnel's term does, is
+//! divided by that and has a table of its own. Both axes are square roots, for the sake of grazing angles.
 
 use std::f64::consts::PI;
 
+use rayon::prelude::*;
+
 /// Entries along cosine and along roughness, both from 0 to 1: `ALBEDO_SIZE` of shaders/bsdf/albedo.glsl.
-const SIZE: usize = 32;
+const SIZE: usize = 64;
 /// Points along each axis of an integral.
-const POINTS: usize = 24;
-/// Smallest cosine and roughness: at 0 the integrals are limits.
-const LEAST: f64 = 1e-3;
+const POINTS: usize = 32;
+/// Points in all of one with a critical angle.
+const LATTICE: usize = 4096;
+/// Smallest roughness: at 0 the integrals are limits.
+const MIN_ROUGHNESS: f64 = 1e-3;
+/// Smallest cosine, of a direction and stretched.
+const MIN_COSINE: f64 = 1e-7;
 
 /// Which tables are asked for; the others stay 0.
 #[derive(Clone, Copy, Debug, Default)]
@@ -26,23 +36,47 @@ pub(super) struct Wanted {
 
 /// Layers of `SIZE` squared in the order of shaders/bsdf/albedo.glsl, rows by roughness; `glass`: indices of refraction.
 pub(super) fn tables(wanted: Wanted, glass: &[f32]) -> Vec<f32> {
-    let layer = |wanted: bool, f: &(dyn Fn(f64, f64) -> f64 + Sync)| -> Vec<f32> {
-        if !wanted {
-            return vec![0.0; SIZE * SIZE];
-        }
-        let at = |k: usize| (k as f64 / (SIZE - 1) as f64).max(LEAST);
-        (0..SIZE * SIZE).map(|k| f(at(k % SIZE), at(k / SIZE)) as f32).collect()
-    };
-    let mut all = layer(wanted.ggx, &|c, r| ggx(c, r, |om| 1.0 - weight(om)));
-    all.extend(layer(wanted.ggx, &|c, r| ggx(c, r, weight)));
-    all.extend(layer(wanted.sheen, &charlie));
-    all.extend(layer(wanted.beckmann, &beckmann));
+    let ggx_wanted = wanted.ggx || !glass.is_empty();
+    let mut all = table(ggx_wanted, |x, r| [ggx(unstretched(x, r), r)[0]]);
+    all.extend(table(ggx_wanted, |x, r| {
+        let [whole, weighted] = ggx(cosine(x), r);
+        [weighted / whole]
+    }));
+    all.extend(table(wanted.sheen, |x, r| [charlie(cosine(x), r)]));
+    all.extend(table(wanted.beckmann, |x, r| [beckmann(unstretched(x, r), r)]));
     for &ior in glass {
-        let ior = f64::from(ior);
-        all.extend(layer(true, &|c, r| rough_glass(c, r, ior)));
-        all.extend(layer(true, &|c, r| rough_glass(c, r, 1.0 / ior)));
+        for eta in [f64::from(ior), 1.0 / f64::from(ior)] {
+            all.extend(table(true, |x, r| {
+                let [total, reflected, open, closed] = dielectric(cosine(x), r, eta);
+                let whole = ggx(cosine(x), r)[0];
+                [total / whole, reflected / whole, open, closed]
+            }));
+        }
     }
     all
+}
+
+/// Layers of a function of both axes; zeros where nobody wants it.
+fn table<const N: usize>(wanted: bool, f: impl Fn(f64, f64) -> [f64; N] + Sync) -> Vec<f32> {
+    let entry = |k: usize| {
+        let [x, y] = [k % SIZE, k / SIZE].map(|i| i as f64 / (SIZE - 1) as f64);
+        f(x, y.max(MIN_ROUGHNESS))
+    };
+    let entries: Vec<[f64; N]> = if wanted { (0..SIZE * SIZE).into_par_iter().map(entry).collect() } else { Vec::new() };
+    let layer = |k: usize| entries.iter().map(move |values| values[k] as f32);
+    if wanted { (0..N).flat_map(layer).collect() } else { vec![0.0; N * SIZE * SIZE] }
+}
+
+/// The cosine at a place of the axis.
+fn cosine(x: f64) -> f64 {
+    (x * x).max(MIN_COSINE)
+}
+
+/// The cosine whose stretched one is at a place of the axis: `stretched()` of shaders/bsdf/albedo.glsl, the other way.
+fn unstretched(x: f64, roughness: f64) -> f64 {
+    let v2 = cosine(x).powi(2);
+    let scaled = v2 * roughness.powi(4);
+    (scaled / (1.0 - v2 + scaled)).sqrt().min(1.0)
 }
 
 /// Schlick's weight of f90.
@@ -56,11 +90,21 @@ fn lambda(alpha: f64, cosine: f64) -> f64 {
     0.5 * ((1.0 + alpha * alpha * tan2).sqrt() - 1.0)
 }
 
-/// Midpoints of a grid over the unit square.
-fn grid() -> impl Iterator<Item = (f64, f64)> {
+/// Midpoints of a grid over the unit square, and the weight of each.
+fn grid() -> impl Iterator<Item = ((f64, f64), f64)> {
     (0..POINTS * POINTS)
         .map(|k| ((k % POINTS) as f64 + 0.5, (k / POINTS) as f64 + 0.5))
-        .map(|(x, y)| (x / POINTS as f64, y / POINTS as f64))
+        .map(|(x, y)| spaced(x / POINTS as f64, y / POINTS as f64, POINTS * POINTS))
+}
+
+/// The same of a lattice by the golden ratio, for integrands with an edge: no row of it lies along one.
+fn lattice() -> impl Iterator<Item = ((f64, f64), f64)> {
+    (0..LATTICE).map(|k| k as f64 + 0.5).map(|k| spaced(k / LATTICE as f64, (k * 0.618_033_988_749_894_9).fract(), LATTICE))
+}
+
+/// The second coordinate is spaced by its root from 1: where it is that near, normals are nearly flat, and what they reflect leaves the upper side.
+fn spaced(x: f64, y: f64, points: usize) -> ((f64, f64), f64) {
+    ((x, 1.0 - y * y), 2.0 * y / points as f64)
 }
 
 fn direction(cosine: f64) -> [f64; 3] {
@@ -76,52 +120,57 @@ fn normalize(v: [f64; 3]) -> [f64; 3] {
     v.map(|x| x / length)
 }
 
-/// A normal of GGX that is visible from wo.
+/// A normal of GGX that is visible from wo, on one side of the plane of wo: the other side is its mirror image.
 fn visible_normal(alpha: f64, wo: [f64; 3], u: (f64, f64)) -> [f64; 3] {
     let v = normalize([alpha * wo[0], alpha * wo[1], wo[2]]);
-    let phi = 2.0 * PI * u.0;
+    let phi = PI * u.0;
     let z = (1.0 - u.1) * (1.0 + v[2]) - v[2];
     let s = (1.0 - z * z).max(0.0).sqrt();
     let h = [s * phi.cos() + v[0], s * phi.sin() + v[1], z + v[2]];
     normalize([alpha * h[0], alpha * h[1], h[2].max(1e-12)])
 }
 
-/// Of GGX that reflects `fresnel` of the cosine between microfacet and view.
-fn ggx(cos_o: f64, roughness: f64, fresnel: impl Fn(f64) -> f64) -> f64 {
+/// Of GGX that reflects everything, and what of that is weighted by Schlick's term.
+fn ggx(cos_o: f64, roughness: f64) -> [f64; 2] {
     let (alpha, wo) = (roughness * roughness, direction(cos_o));
-    let sum: f64 = grid()
-        .map(|u| {
-            let m = visible_normal(alpha, wo, u);
-            let om = dot(wo, m);
-            let cos_i = 2.0 * om * m[2] - wo[2];
+    let hidden = 1.0 + lambda(alpha, cos_o);
+    let mut sum = [0.0; 2];
+    for (u, share) in grid() {
+        let m = visible_normal(alpha, wo, u);
+        let om = dot(wo, m);
+        let cos_i = 2.0 * om * m[2] - wo[2];
+        if cos_i > 0.0 {
             // G2 over G1
-            if cos_i > 0.0 {
-                fresnel(om) * (1.0 + lambda(alpha, cos_o)) / (1.0 + lambda(alpha, cos_o) + lambda(alpha, cos_i))
-            } else {
-                0.0
-            }
-        })
-        .sum();
-    sum / (POINTS * POINTS) as f64
+            let g = share * hidden / (hidden + lambda(alpha, cos_i));
+            sum[0] += g;
+            sum[1] += g * weight(om);
+        }
+    }
+    sum
 }
 
-/// All that GGX microfacets of glass reflect and refract; eta: index beyond over index on wo's side.
-fn rough_glass(cos_o: f64, roughness: f64, eta: f64) -> f64 {
+/// Of GGX with a dielectric's Fresnel term F, `DIELECTRIC_*` of shaders/bsdf/albedo.glsl: reflected beyond the critical angle; reflected where there
+/// is refraction; refracted as if F were 0 there; what F takes from that. eta: index beyond over index on wo's side.
+fn dielectric(cos_o: f64, roughness: f64, eta: f64) -> [f64; 4] {
     let (alpha, wo) = (roughness * roughness, direction(cos_o));
-    let g = |cos_i: f64| (1.0 + lambda(alpha, cos_o)) / (1.0 + lambda(alpha, cos_o) + lambda(alpha, cos_i));
-    let sum: f64 = grid()
-        .map(|u| {
-            let m = visible_normal(alpha, wo, u);
-            let om = dot(wo, m);
-            let (f, cos_t) = fresnel(om, eta);
-            let reflected = 2.0 * om * m[2] - wo[2];
-            let refracted = (om / eta - cos_t) * m[2] - wo[2] / eta;
-            let up = if reflected > 0.0 { f * g(reflected) } else { 0.0 };
-            let down = if cos_t > 0.0 && refracted < 0.0 { (1.0 - f) * g(-refracted) } else { 0.0 };
-            up + down
-        })
-        .sum();
-    sum / (POINTS * POINTS) as f64
+    let hidden = 1.0 + lambda(alpha, cos_o);
+    let mut sum = [0.0; 4];
+    for (u, share) in lattice() {
+        let m = visible_normal(alpha, wo, u);
+        let om = dot(wo, m);
+        let (f, cos_t) = fresnel(om, eta);
+        let g = |cos_i: f64| if cos_i > 0.0 { share * hidden / (hidden + lambda(alpha, cos_i)) } else { 0.0 };
+        let reflected = g(2.0 * om * m[2] - wo[2]);
+        if cos_t > 0.0 {
+            let refracted = g(wo[2] / eta - (om / eta - cos_t) * m[2]);
+            sum[1] += f * reflected;
+            sum[2] += refracted;
+            sum[3] += f * refracted;
+        } else {
+            sum[0] += reflected;
+        }
+    }
+    sum
 }
 
 /// Exact Fresnel term of a dielectric, and the cosine beyond; 0 where all is reflected.
@@ -144,9 +193,9 @@ fn beckmann(cos_o: f64, roughness: f64) -> f64 {
         let a = 1.0 / (alpha * tan).max(1e-15);
         if a < 1.6 { (1.0 + a * (-1.259 + 0.396 * a)) / (a * (3.535 + 2.181 * a)) } else { 0.0 }
     };
-    let sum: f64 = grid()
-        .map(|u| {
-            let (tan2, phi) = (-alpha * alpha * (1.0 - u.1).ln(), 2.0 * PI * u.0);
+    grid()
+        .map(|(u, share)| {
+            let (tan2, phi) = (-alpha * alpha * (1.0 - u.1).ln(), PI * u.0);
             let cos_m = 1.0 / (1.0 + tan2).sqrt();
             let s = (1.0 - cos_m * cos_m).max(0.0).sqrt();
             let m = [s * phi.cos(), s * phi.sin(), cos_m];
@@ -155,13 +204,12 @@ fn beckmann(cos_o: f64, roughness: f64) -> f64 {
             if om <= 0.0 || cos_i <= 0.0 {
                 return 0.0;
             }
-            om / (cos_o * cos_m * (1.0 + lambda(cos_o) + lambda(cos_i)))
+            share * om / (cos_o * cos_m * (1.0 + lambda(cos_o) + lambda(cos_i)))
         })
-        .sum();
-    sum / (POINTS * POINTS) as f64
+        .sum()
 }
 
-/// Of Charlie's fibres (shaders/bsdf/sheen.glsl).
+/// Of Charlie's fibres (shaders/bsdf/sheen.glsl): more than 1 for smooth ones at grazing angles, which is cut off where it is looked up.
 fn charlie(cos_o: f64, roughness: f64) -> f64 {
     let (alpha, wo) = ((roughness * roughness).max(1e-3), direction(cos_o));
     let mix = |a: f64, b: f64| a + (b - a) * (1.0 - alpha).powi(2);
@@ -170,7 +218,7 @@ fn charlie(cos_o: f64, roughness: f64) -> f64 {
     let curve = |x: f64| a / (1.0 + b * x.max(1e-9).powf(c)) + d * x + e;
     let lambda = |x: f64| if x < 0.5 { curve(x).exp() } else { (2.0 * curve(0.5) - curve(1.0 - x)).exp() };
     // fibres shine along the surface: most of the light is where half vectors are near to it, so cosines are spaced by their squares
-    let n = 4 * POINTS;
+    let n = POINTS;
     let mut sum = 0.0;
     for i in 0..n {
         let x = (i as f64 + 0.5) / n as f64;
@@ -186,7 +234,7 @@ fn charlie(cos_o: f64, roughness: f64) -> f64 {
             sum += distribution * g / (4.0 * cos_o) * width * 2.0 * PI / n as f64;
         }
     }
-    sum.min(1.0)
+    sum
 }
 
 #[cfg(test)]
@@ -196,22 +244,76 @@ mod tests {
     /// Microfacets that are a mirror lose nothing; rough ones what the same integral over 400 x 400 points says.
     #[test]
     fn mirrors_lose_nothing_and_rough_ones_what_is_known() {
-        for (c, rough) in [(0.1, 0.7602), (0.5, 0.4507), (1.0, 0.3069)] {
-            assert!((ggx(c, 0.01, |_| 1.0) - 1.0).abs() < 1e-3, "{c}");
-            assert!((rough_glass(c, 0.01, 1.5) - 1.0).abs() < 1e-3, "{c}");
+        let glass = |c, r, eta| {
+            let [total, reflected, open, closed] = dielectric(c, r, eta);
+            total + reflected + open - closed
+        };
+        for (c, rough) in [(0.01, 0.9539), (0.1, 0.7602), (0.5, 0.4507), (1.0, 0.3069)] {
+            assert!((ggx(c, 0.001,)[0] - 1.0).abs() < 1e-3, "{c}");
+            assert!((glass(c, 0.001, 1.5) - 1.0).abs() < 1e-3, "{c}");
             assert!((beckmann(c, 0.03) - 1.0).abs() < 2e-2, "{c}");
-            assert!((ggx(c, 1.0, |_| 1.0) - rough).abs() < 2e-3, "{c}");
+            assert!((ggx(c, 1.0)[0] - rough).abs() < 1e-3, "{c}");
+        }
+        // the least of any roughness, where the cosine is alpha
+        for r in [0.01, 0.03, 0.1] {
+            assert!((ggx(r * r, r)[0] - 0.892).abs() < 1e-3, "{r}");
         }
     }
 
-    /// What f0 and f90 weigh is the whole, and nothing reflects more than there is.
+    /// What is weighted is less than the whole, and nothing reflects more than there is.
     #[test]
-    fn parts_add_up() {
+    fn parts_are_no_more_than_the_whole() {
         for (c, r) in [(0.2, 0.3), (0.6, 0.8), (1.0, 0.5)] {
-            let whole = ggx(c, r, |_| 1.0);
-            let parts = ggx(c, r, |om| 1.0 - weight(om)) + ggx(c, r, weight);
-            assert!((whole - parts).abs() < 1e-12, "{c} {r}");
-            assert!(whole <= 1.0 && charlie(c, r) <= 1.0 && rough_glass(c, r, 1.0 / 1.5) <= 1.0);
+            let [whole, weighted] = ggx(c, r);
+            assert!(weighted >= 0.0 && weighted <= whole && whole <= 1.0, "{c} {r}");
+            for eta in [1.5, 1.0 / 1.5] {
+                let [total, reflected, open, closed] = dielectric(c, r, eta);
+                assert!(total + reflected + open - closed <= 1.0 && closed <= open, "{c} {r} {eta}");
+                assert!(total == 0.0 || eta < 1.0, "{c} {r} {eta}");
+            }
         }
+    }
+
+    /// Axes and back.
+    #[test]
+    fn places_are_those_of_the_shader() {
+        let stretched = |c: f64, r: f64| (c / (c * c + r.powi(4) * (1.0 - c * c)).sqrt()).sqrt();
+        for r in [0.01, 0.1, 0.5, 1.0] {
+            for x in [0.1, 0.4, 0.9, 1.0] {
+                assert!((stretched(unstretched(x, r), r) - x).abs() < 1e-9, "{x} {r}");
+            }
+        }
+    }
+
+    /// Tables as the shader reads them, between their entries, against integrals of many points: what compensation is off by.
+    #[test]
+    fn tables_hold_between_their_entries() {
+        let tables = tables(Wanted { ggx: true, sheen: true, beckmann: true }, &[]);
+        let at = |layer: usize, x: f64, y: f64| {
+            let (x, y) = (x * (SIZE - 1) as f64, y * (SIZE - 1) as f64);
+            let (i, j) = ((x as usize).min(SIZE - 2), (y as usize).min(SIZE - 2));
+            let (f, g) = (x - i as f64, y - j as f64);
+            let entry = |i: usize, j: usize| f64::from(tables[(layer * SIZE + j) * SIZE + i]);
+            let row = |j: usize| entry(i, j) * (1.0 - f) + entry(i + 1, j) * f;
+            row(j) * (1.0 - g) + row(j + 1) * g
+        };
+        let mut worst = [0.0f64; 4];
+        for r in [0.05, 0.1, 0.23, 0.41, 0.5, 0.77, 0.99f64] {
+            for c in [0.003, 0.01, 0.03, 0.08, 0.2, 0.5, 0.8, 1.0f64] {
+                let stretched = (c / (c * c + r.powi(4) * (1.0 - c * c)).sqrt()).sqrt();
+                let [whole, weighted] = ggx(c, r);
+                let errors = [
+                    at(0, stretched, r) / whole - 1.0,
+                    at(1, c.sqrt(), r) - weighted / whole,
+                    if r >= 0.1 { at(2, c.sqrt(), r).min(1.0) - charlie(c, r).min(1.0) } else { 0.0 },
+                    at(3, stretched, r) / beckmann(c, r) - 1.0,
+                ];
+                for (w, e) in worst.iter_mut().zip(errors) {
+                    *w = w.max(e.abs());
+                }
+            }
+        }
+        println!("GGX {:.4}, Schlick {:.4}, sheen {:.4}, Beckmann {:.4}", worst[0], worst[1], worst[2], worst[3]);
+        assert!(worst.iter().zip([3e-3, 3e-3, 5e-3, 1e-2]).all(|(w, limit)| *w < limit), "{worst:?}");
     }
 }

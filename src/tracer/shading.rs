@@ -173,11 +173,8 @@ pub(super) fn texels(slot: usize) -> Texels {
 fn walls(m: &Material) -> u32 {
     match m.kind {
         MaterialKind::MetallicRoughness if !m.unlit && m.transmission.factor > 0.0 => {
-            if m.transmission.thickness > 0.0 {
-                VOLUME
-            } else {
-                THIN_WALLS
-            }
+            // an index of 0 has no refraction, and no inside: what it transmits goes straight on
+            if m.transmission.thickness > 0.0 && m.ior != 0.0 { VOLUME } else { THIN_WALLS }
         }
         _ => NO_WALLS,
     }
@@ -258,7 +255,7 @@ pub(super) fn features(flat: &FlatScene, needs: Needs) -> u32 {
             | with(gltf && m.anisotropy.strength > 0.0, feature::ANISOTROPY)
             | with(normal_maps, feature::BENT_NORMALS)
             | with(varies(&mesh.geometry), feature::BASE_COLORS)
-            | with(m.emissive.max_element() > 0.0, feature::EMISSION);
+            | with(m.emissive.max_element() > 0.0 && !m.unlit, feature::EMISSION);
     }
     bits
 }
@@ -272,7 +269,7 @@ impl ShadingRecord {
         let specular_color = if m.kind == MaterialKind::MetallicRoughness { m.specular.color.to_array() } else { tint };
         let (sin, cos) = m.anisotropy.rotation.sin_cos();
         Self {
-            emission: m.emissive.to_array(),
+            emission: if m.unlit { [0.0; 3] } else { m.emissive.to_array() },
             model: match m.kind {
                 _ if m.unlit => UNLIT,
                 MaterialKind::MetallicRoughness => GLTF,

@@ -8,6 +8,7 @@ use rayon::prelude::*;
 use super::{normals, tangents};
 use crate::error::{Error, Result};
 use crate::scene::animation::Deformation;
+use crate::scene::material::MaterialKind;
 use crate::scene::{Geometry, Instance, Material, Mesh, Rig, Scene, TriangleMesh};
 
 /// Largest coordinate, in object and world space: beyond it the triangle test's products of three lengths overflow single precision,
@@ -97,6 +98,15 @@ fn materials(scene: &mut Scene) {
             scene.report.warnings.push(format!("material `{name}` has a colour that is not finite: replaced"));
             material.base_color = glam::Vec4::ONE;
             material.emissive = glam::Vec3::ZERO;
+        }
+        // 0 is glTF's word for a Fresnel term of 1
+        if !(material.ior >= 1.0 || material.ior == 0.0 && material.kind == MaterialKind::MetallicRoughness) {
+            let (name, ior) = (&material.name, material.ior);
+            scene
+                .report
+                .warnings
+                .push(format!("material `{name}` has an index of refraction of {ior}, which is below 1: 1 instead"));
+            material.ior = 1.0;
         }
         for share in [&mut material.metallic, &mut material.roughness] {
             *share = share.clamp(0.0, 1.0);

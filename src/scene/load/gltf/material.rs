@@ -133,8 +133,7 @@ pub(super) fn convert(material: &json::Material) -> Result<Material, String> {
         emissive_texture: slot(&material.emissive_texture),
         alpha_mode: alpha_mode(material),
         double_sided: material.double_sided,
-        // 0 stands for "perfect mirror, no refraction" in the extension; as an index of refraction it means nothing
-        ior: extensions.and_then(|e| e.ior.as_ref()).map(|i| i.ior.0).filter(|&i| i >= 1.0).unwrap_or(1.5),
+        ior: extensions.and_then(|e| e.ior.as_ref()).map_or(1.5, |i| i.ior.0),
         unlit: extensions.is_some_and(|e| e.unlit.is_some()),
         clearcoat: ClearcoatJson::of(others)?.to_scene()?,
         sheen: SheenJson::of(others)?.to_scene(),
