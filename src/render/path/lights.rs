@@ -9,7 +9,6 @@ use glam::{DVec3, Vec3};
 
 use super::light_tree::{self, Bounds, LightNode};
 use super::params::INVALID;
-use crate::output::png::srgb_decode;
 use crate::sampling::AliasTable;
 use crate::scene::flatten::FlatScene;
 use crate::scene::{Geometry, Light, LightKind};
@@ -294,10 +293,11 @@ fn radius(flat: &FlatScene) -> f64 {
 /// Mean of the texture that multiplies a material's emission.
 fn mean_texture(flat: &FlatScene, texture: Option<usize>) -> Vec3 {
     let Some(texture) = texture else { return Vec3::ONE };
-    let texels = &flat.scene.textures[texture].rgba8;
+    let texels = &flat.scene.textures[texture].texels;
     let mut sum = DVec3::ZERO;
-    for p in texels.chunks_exact(4) {
-        sum += DVec3::from_array([0, 1, 2].map(|c| f64::from(srgb_decode(f32::from(p[c]) / 255.0))));
+    for i in 0..texels.len() {
+        let [r, g, b, _] = texels.decode_srgb(i);
+        sum += Vec3::new(r, g, b).as_dvec3();
     }
-    (sum / (texels.len() / 4).max(1) as f64).as_vec3()
+    (sum / texels.len().max(1) as f64).as_vec3()
 }
