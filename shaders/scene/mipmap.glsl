@@ -1,5 +1,5 @@
 // Levels of textures: each half as wide and high as the one before, rounded down, every texel the mean of what it covers. Level 0 is the texture
-// itself (scene/texture.glsl); the others are linear, 16 bits a channel, or floats where the texture has floats. Mirrors src/tracer/mipmap.rs.
+// itself (scene/texture.glsl); the others are linear, 16 bits a channel, or floats where the texture has more than 8 bits itself. Mirrors src/tracer/mipmap.rs.
 #ifndef SCENE_MIPMAP
 #define SCENE_MIPMAP
 #include "scene/texture.glsl"
@@ -20,7 +20,7 @@ layout(buffer_reference, std430, buffer_reference_align = 8) readonly buffer Mip
 
 // A texel of the levels from 1 on.
 vec4 mean_texel(TextureRecord texture, uvec2 texels, uint i) {
-    if (HAS_DEEP_TEXELS && texture.format == FORMAT_FLOAT) return uintBitsToFloat(Quads(texels).v[i]);
+    if (HAS_DEEP_TEXELS && texture.format != FORMAT_UNORM8) return uintBitsToFloat(Quads(texels).v[i]);
     return unorm16(Pairs(texels).v[i]);
 }
 

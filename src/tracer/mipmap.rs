@@ -6,7 +6,7 @@ use bytemuck::{Pod, Zeroable};
 use glam::Vec4;
 use rayon::prelude::*;
 
-use crate::scene::Texture;
+use crate::scene::{TexelData, Texture};
 
 /// Beside level 0: `MOST_LEVELS` of shaders/scene/mipmap.glsl. Enough for 65535 texels.
 const MOST_LEVELS: usize = 15;
@@ -60,12 +60,12 @@ fn levels(size: [u32; 2]) -> impl Iterator<Item = [u32; 2]> {
 }
 
 /// All levels from 1 on as they lie in device memory, one after the other, rows from the top: four numbers of 16 bits a texel, to 2^-17, or four floats
-/// where the texture has floats.
+/// where the texture has more than 8 bits itself.
 pub(super) fn pyramid(texture: &Texture, texels: Texels) -> Vec<u8> {
     let levels = means(texture, texels);
-    match texture.texels.is_float() {
-        true => bytemuck::pod_collect_to_vec(&levels),
-        false => bytemuck::pod_collect_to_vec(&levels.iter().map(unorm16).collect::<Vec<_>>()),
+    match texture.texels {
+        TexelData::Unorm8(_) => bytemuck::pod_collect_to_vec(&levels.iter().map(unorm16).collect::<Vec<_>>()),
+        _ => bytemuck::pod_collect_to_vec(&levels),
     }
 }
 
