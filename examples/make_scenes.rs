@@ -1,7 +1,6 @@
 //! Writes the files in `scenes/`, all of our own making: `cargo run --example make_scenes`
 
 use std::path::Path;
-use std::sync::Arc;
 
 use glam::{Affine2, DAffine3, DQuat, DVec3, Vec2, Vec3, Vec4};
 use skylit::scene::export::export_gltf;
@@ -51,7 +50,7 @@ fn leaves() -> Scene {
         // colour runs on beyond the edge, so that filtering draws no dark seam
         [r, g, b, if inside { 255 } else { 0 }]
     };
-    let rgba8: Arc<[u8]> = (0..size).flat_map(|y| (0..size).flat_map(move |x| leaf(x, y))).collect();
+    let rgba8: Vec<u8> = (0..size).flat_map(|y| (0..size).flat_map(move |x| leaf(x, y))).collect();
     let mut instances = vec![Instance { name: "ground".into(), mesh: 0, object_to_world: DAffine3::IDENTITY }];
     for i in 0..24 {
         // the golden angle spreads them evenly
@@ -84,7 +83,7 @@ fn leaves() -> Scene {
             name: "leaf".into(),
             width: size,
             height: size,
-            rgba8,
+            texels: rgba8.into(),
             wrap: [Wrap::Clamp; 2],
             filter: Filter::Linear,
         }],
@@ -126,7 +125,7 @@ fn courtyard() -> Scene {
         };
         [value as u8, (value - value / 12) as u8, (value - value / 6) as u8, 255]
     };
-    let rgba8: Arc<[u8]> = (0..size).flat_map(|y| (0..size).flat_map(move |x| tile(x, y))).collect();
+    let rgba8: Vec<u8> = (0..size).flat_map(|y| (0..size).flat_map(move |x| tile(x, y))).collect();
     let mut instances = vec![Instance { name: "floor".into(), mesh: 0, object_to_world: DAffine3::IDENTITY }];
     let mut block = |name: String, size: DVec3, at: DVec3| {
         let object_to_world = DAffine3::from_scale_rotation_translation(size, DQuat::IDENTITY, at + DVec3::Y * size.y * 0.5);
@@ -174,7 +173,7 @@ fn courtyard() -> Scene {
             name: "tiles".into(),
             width: size,
             height: size,
-            rgba8,
+            texels: rgba8.into(),
             wrap: [Wrap::Repeat; 2],
             filter: Filter::Linear,
         }],

@@ -11,7 +11,12 @@ void closest(uint index, Hit hit) {
     BlockParams block = BlockParams(push.pass);
     PathParams p = PathParams(block.path);
     uint k = Words(p.tags).v[index];
-    vec3 added = path_vertex(block, k, load_state(p.states, index), load_ray(push.rays, index - push.first), hit);
+    PathState state = load_state(p.states, index);
+    if (HAS_COVERAGE) {
+        uvec2 pixel = block_pixel(block, pixel_index(state.index)) + block.block_origin;
+        next_ray_seed = ray_seed(block.seed, pixel, sample_index(state.index), state.depth + state.passes + 1u);
+    }
+    vec3 added = path_vertex(block, k, state, load_ray(push.rays, index - push.first), hit);
     // most vertices add nothing
     if (added != vec3(0.0)) store_quad(p.radiance, k, load_quad(p.radiance, k) + vec4(added, 0.0));
 }

@@ -52,6 +52,7 @@ Ray camera_sample(BlockParams p, uint index) {
     PathParams path = PathParams(p.path);
     vec2 u = sample_2d(p.seed, pixel, sample_index(index), CAMERA_FILM);
     Ray r = camera_ray(p, vec2(pixel) + 0.5 + vec2(filter_offset(path.pixel_filter, u.x), filter_offset(path.pixel_filter, u.y)));
+    if (HAS_COVERAGE) r.tmin = tmin_of_seed(ray_seed(p.seed, pixel, sample_index(index), 0u));
     if (asks(ASKS_LENS)) return lens_ray(p, r, sample_2d(p.seed, pixel, sample_index(index), CAMERA_LENS));
     return r;
 }
@@ -73,5 +74,6 @@ void closest(uint index, Hit hit) {
     float scale = asks(ASKS_GREY) ? path.albedo : 1.0;
     PathState state = PathState(vec3(1.0 / scale), -1.0, index, 0u, 0u, scale, NO_MEDIUM);
     if (asks(ASKS_MEDIA)) state.medium = current_medium(path.camera_media);
+    if (HAS_COVERAGE) next_ray_seed = ray_seed(p.seed, block_pixel(p, pixel_index(index)) + p.block_origin, sample_index(index), 1u);
     store_quad(path.radiance, k, vec4(path_vertex(p, k, state, r, hit), is_hit(hit) ? 1.0 : 0.0));
 }

@@ -21,6 +21,7 @@ void closest(uint index, Hit hit) {
     Shading m = shade(s, -r.direction, SHARP);
     c.rgb *= straight_transmittance(m, -r.direction);
     if (!(highest(c.rgb) > 0.0)) return;
+    if (HAS_COVERAGE) next_ray_seed = hash(floatBitsToUint(r.tmin));
     uint slot = append_ray(p.later, Ray(s.position - m.ng * s.offset, 0.0, r.direction, (r.tmax - hit.t) * (1.0 - SHADOW_EPSILON)), k);
     store_quad(p.later_contributions, slot, c);
 }

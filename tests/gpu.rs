@@ -543,6 +543,7 @@ fn gpu_validation_layer_listens() {
 
 /// A texture's linear colour at coordinates `uv`, by the book: sRGB decoded before filtering.
 fn texture_color(texture: &Texture, uv: DVec2) -> DVec3 {
+    let rgba8 = texture.texels.as_bytes();
     let decode = |c: u8| {
         let c = c as f64 / 255.0;
         if c <= 0.04045 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) }
@@ -558,7 +559,7 @@ fn texture_color(texture: &Texture, uv: DVec2) -> DVec3 {
     let fetch = |x: f64, y: f64| {
         let (x, y) = (wrap(x, texture.width, texture.wrap[0]), wrap(y, texture.height, texture.wrap[1]));
         let at = 4 * (y * texture.width as i64 + x) as usize;
-        DVec3::from_array([0, 1, 2].map(|k| decode(texture.rgba8[at + k])))
+        DVec3::from_array([0, 1, 2].map(|k| decode(rgba8[at + k])))
     };
     let p = uv * DVec2::new(texture.width as f64, texture.height as f64);
     match texture.filter {

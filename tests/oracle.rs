@@ -150,7 +150,7 @@ fn alpha_masks_cut_holes() {
         name: String::new(),
         width: 2,
         height: 1,
-        rgba8: vec![0, 0, 0, 0, 0, 0, 0, 255].into(),
+        texels: vec![0u8, 0, 0, 0, 0, 0, 0, 255].into(),
         wrap: [Wrap::Clamp; 2],
         filter: Filter::Nearest,
     });
@@ -160,6 +160,11 @@ fn alpha_masks_cut_holes() {
     s.materials[0].alpha_mode = AlphaMode::Mask { cutoff: 0.5 };
     let present = |s: &Scene, x: f64| Oracle::new(s, DVec3::ZERO).any(ray([x, 1.0, 0.1], [0.0, -1.0, 0.0]));
     assert!(!present(&s, -0.01) && present(&s, 0.01));
+    // of 16 bits: two values that are one in 8
+    s.textures[0].texels = vec![0u16, 0, 0, 32770, 0, 0, 0, 32800].into();
+    s.materials[0].alpha_mode = AlphaMode::Mask { cutoff: 0.5002 };
+    assert!(!present(&s, -0.01) && present(&s, 0.01));
+    s.textures[0].texels = vec![0u8, 0, 0, 0, 0, 0, 0, 255].into();
     // bilinear: alpha is 0 at x = -0.5, 1 at 0.5, 1/4 at -0.25
     s.textures[0].filter = Filter::Linear;
     s.materials[0].alpha_mode = AlphaMode::Mask { cutoff: 0.25 };

@@ -60,6 +60,7 @@ struct Bsdf {
     Coat coat;
     Sheen sheen;
     LobeProbabilities probabilities;
+    vec3 ng;           // geometric normal in the frame, on the viewer's side
 };
 
 struct BsdfValue {
@@ -94,10 +95,23 @@ Bsdf black_bsdf() {
     b.coat = Coat(0.0, vec3(0.0, 0.0, 1.0), b.facets);
     b.sheen = Sheen(vec3(0.0), 1.0, 1.0);
     b.probabilities = LobeProbabilities(0.0, 0.0, 0.0, 0.0);
+    b.ng = vec3(0.0, 0.0, 1.0);
     return b;
 }
 
 float highest(vec3 c) { return max(c.r, max(c.g, c.b)); }
+
+// What is left of light from (or to) a direction where the normal n of a rough lobe leans away from the geometric normal: the lobe alone would gain light
+// from directions near the surface, and end it abruptly at the horizon (Chiang, Li, Burley, "Taming the Shadow Terminator", SIGGRAPH 2019 talks). At most
+// 1: no lobe is brighter than n alone makes it. All in the frame; wi may be on either side of both normals.
+float shadowing(vec3 ng, vec3 n, vec3 wi) {
+    if (!has(HAS_BENT_NORMALS)) return 1.0;
+    float g = dot(ng, wi) / (dot(n, wi) * dot(ng, n));
+    if (g >= 1.0) return 1.0;
+    return g > 0.0 ? g * (1.0 + g * (1.0 - g)) : 0.0;
+}
+
+const vec3 FRAME_NORMAL = vec3(0.0, 0.0, 1.0);
 
 #include "bsdf/gltf.glsl"
 #include "bsdf/conductor.glsl"
@@ -120,14 +134,16 @@ bool has_rough_part(Bsdf b) {
 }
 
 BsdfValue bsdf_at(Bsdf b, vec3 wo, vec3 wi) {
+    BsdfValue value = NO_VALUE;
+    if (is_kind(b, BSDF_GLTF, HAS_GLTF)) return gltf_at(b, wo, wi);
     if (is_kind(b, BSDF_DIFFUSE, HAS_DIFFUSE)) {
         float pdf = max(wi.z, 0.0) / PI;
-        return BsdfValue(b.diffuse * pdf, pdf);
+        value = BsdfValue(b.diffuse * pdf, pdf);
     }
-    if (is_kind(b, BSDF_GLTF, HAS_GLTF)) return gltf_at(b, wo, wi);
-    if (is_kind(b, BSDF_CONDUCTOR, HAS_CONDUCTOR)) return conductor_at(b, wo, wi);
-    if (is_kind(b, BSDF_DIELECTRIC, HAS_GLASS)) return dielectric_at(b, wo, wi);
-    return NO_VALUE;
+    if (is_kind(b, BSDF_CONDUCTOR, HAS_CONDUCTOR)) value = conductor_at(b, wo, wi);
+    if (is_kind(b, BSDF_DIELECTRIC, HAS_GLASS)) value = dielectric_at(b, wo, wi);
+    value.f *= shadowing(b.ng, FRAME_NORMAL, wi);
+    return value;
 }
 
 // u: where; v: which lobe.

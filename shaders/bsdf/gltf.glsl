@@ -147,11 +147,12 @@ BsdfValue gltf_at(Bsdf b, vec3 wo, vec3 wi) {
             value.pdf += b.probabilities.sheen / (2.0 * PI);
         }
     }
+    value.f *= shadowing(b.ng, FRAME_NORMAL, wi);
     if (has(HAS_COAT) && b.coat.weight > 0.0) {
         value.f *= coat_transmits(b.coat, wo) * coat_transmits(b.coat, wi);
         if (up && !is_smooth(b.coat.facets)) {
             BsdfValue coat = coat_at(b.coat, wo, wi);
-            value.f += coat.f;
+            value.f += coat.f * shadowing(b.ng, coat_normal(b.coat, wo), wi);
             value.pdf += b.probabilities.coat * coat.pdf;
         }
     }
@@ -223,7 +224,7 @@ BsdfSample gltf_sample(Bsdf b, vec3 wo, vec2 u, float v) {
 // What goes straight through a thin wall without roughness.
 vec3 gltf_straight(Bsdf b, vec3 wo) {
     if (b.volume || !is_smooth(b.facets)) return vec3(0.0);
-    return b.transmitted * (let_through(b, interface_fresnel(b, wo.z)) * layers_transmit(b, wo, -wo));
+    return b.transmitted * (interface_fresnel(b, wo.z).transmitted * layers_transmit(b, wo, -wo));
 }
 
 #endif

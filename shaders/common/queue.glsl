@@ -5,6 +5,7 @@
 // tag names, once per tag: then its result does not depend on that order.
 #ifndef COMMON_QUEUE
 #define COMMON_QUEUE
+#include "common/ray_seed.glsl"
 #include "common/types.glsl"
 
 // Mirrors QueueRecord in src/tracer/queue.rs.
@@ -29,9 +30,16 @@ uint claim(uvec2 counter) {
 #endif
 }
 
+// Seed of the next ray that is appended (common/ray_seed.glsl); 0: rays have none.
+uint next_ray_seed = 0u;
+
 // Returns the ray's place in the queue: the index with which a stream over the queue will be called.
 uint append_ray(RayQueue queue, Ray ray, uint tag) {
     uint slot = claim(queue.count);
+    if (next_ray_seed != 0u) {
+        ray.tmin = tmin_of_seed(next_ray_seed);
+        next_ray_seed = hash(next_ray_seed);
+    }
     store_ray(queue.rays, slot, ray);
     QueueTags(queue.tags).v[slot] = tag;
     return slot;

@@ -6,6 +6,7 @@
 const uint CAMERA_FILM = 0u;
 const uint CAMERA_LENS = 1u;
 const uint AO_DIRECTION = 2u;
+const uint RAY_SEED = 3u;
 
 uint hash(uint x) {
     x ^= x >> 16;

@@ -199,12 +199,9 @@ vec3 path_vertex(BlockParams block, uint k, PathState state, Ray ray, Hit hit) {
             pass_straight(p, k, state, s, m.ng, ray, cone);
             return vec3(0.0);
         }
-        // an index of 0 stands for what reflects everything
-        if (SHADING_OF(m.material).ior > 0.0) {
-            m.bsdf.eta = boundary.eta;
-            // what does not refract is not blurred, either
-            if (abs(boundary.eta - 1.0) < LEAST_REFRACTION) m.bsdf.facets.alpha = vec2(0.0);
-        }
+        m.bsdf.eta = boundary.eta;
+        // what does not refract is not blurred, either
+        if (abs(boundary.eta - 1.0) < LEAST_REFRACTION) m.bsdf.facets.alpha = vec2(0.0);
     } else if (asks(ASKS_MEDIA) && state.depth + state.passes == 0u) {
         store_media(p, k, p.camera_media);
     }

@@ -249,6 +249,7 @@ Shading grey_shading(Surface s, vec3 wo, float grey) {
     Shading out_ = black_shading(s, wo);
     out_.bsdf.kind = BSDF_DIFFUSE;
     out_.bsdf.diffuse = vec3(grey);
+    if (has(HAS_BENT_NORMALS)) out_.bsdf.ng = to_frame(out_.frame, out_.ng);
     return out_;
 }
 
@@ -315,6 +316,7 @@ Shading shade(Surface s, vec3 wo, float log_side) {
             out_.bsdf.coat.normal = to_frame(out_.frame, towards(s.ns * side, wo));
         }
     }
+    if (has(HAS_BENT_NORMALS)) out_.bsdf.ng = to_frame(out_.frame, out_.ng);
     return out_;
 }
 

@@ -11,6 +11,6 @@ void main() {
     float t;
     vec2 uv;
     meet_drawn(pixel_ray(gl_FragCoord.xy), push.first, primitive, t, uv);
-    if (!alpha_passes(push.first, primitive, uv)) discard;
+    if (!alpha_passes(push.first, primitive, uv, 0.0)) discard;
     visible = uvec2(push.first + 1u, primitive);
 }

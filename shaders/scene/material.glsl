@@ -2,7 +2,7 @@
 #ifndef SCENE_MATERIAL
 #define SCENE_MATERIAL
 #include "scene/texture.glsl"
-#include "common/sampler.glsl"
+#include "common/ray_seed.glsl"
 
 // Vertex numbers of a triangle, within the group. `primitive` counts in the group.
 uvec3 triangle_indices(PartRecord part, uint primitive) {
@@ -40,20 +40,21 @@ vec4 base_color(PartRecord part, MaterialRecord material, uint primitive, vec2 u
     return color;
 }
 
-// In [0, 1), a number for each of all arguments.
-float evenly(uvec2 a, uvec2 b) {
-    return float(hash_combine(hash_combine(hash_combine(hash(a.x), a.y), b.x), b.y) >> 8) * (1.0 / 16777216.0);
+// A uniform random number in [0, 1) for a ray and a primitive, however often it is asked for. Rays without a seed are told apart by the bits of where
+// they meet the primitive.
+float coverage_threshold(uint instance, uint primitive, vec2 uv, float tmin) {
+    uvec2 ray = has_seed(tmin) ? uvec2(floatBitsToUint(tmin), 0u) : floatBitsToUint(uv);
+    return float(hash_combine(hash_combine(hash_combine(hash(ray.x), ray.y), instance), primitive) >> 8) * (1.0 / 16777216.0);
 }
 
-// Is there a surface at this point of an alpha-tested primitive?
-bool alpha_passes(uint instance, uint primitive, vec2 uv) {
+// Is there a surface at this point of an alpha-tested primitive, for a ray that begins at tmin?
+bool alpha_passes(uint instance, uint primitive, vec2 uv, float tmin) {
     SceneRoot root = SceneRoot(push.scene);
     InstanceRecords instances = InstanceRecords(root.instances);
     PartRecord part = PartRecords(root.parts).v[part_index(instances, instance, primitive)];
     MaterialRecord material = MaterialRecords(root.materials).v[part.material];
     float alpha = base_color(part, material, primitive, uv).a;
-    // rays differ in where they meet it, if by bits only: that is as good as a number of their own, and the same however often it is asked
-    if (HAS_COVERAGE && material.coverage != 0u) return alpha > evenly(floatBitsToUint(uv), uvec2(instance, primitive));
+    if (HAS_COVERAGE && material.coverage != 0u) return alpha > coverage_threshold(instance, primitive, uv, tmin);
     return alpha >= material.alpha_cutoff;
 }
 

@@ -1,5 +1,5 @@
 // Levels of textures: each half as wide and high as the one before, rounded down, every texel the mean of what it covers. Level 0 is the texture
-// itself (scene/texture.glsl); the others are linear, 16 bits a channel. Mirrors src/tracer/mipmap.rs.
+// itself (scene/texture.glsl); the others are linear, 16 bits a channel, or floats where the texture has more than 8 bits itself. Mirrors src/tracer/mipmap.rs.
 #ifndef SCENE_MIPMAP
 #define SCENE_MIPMAP
 #include "scene/texture.glsl"
@@ -12,11 +12,17 @@ const uint TEXELS_COVERED = 2u;  // sRGB of what alpha lets through: weighted by
 const uint MOST_LEVELS = 15u;    // beside level 0
 
 struct MipRecord {
-    uvec2 texels[3];          // of level 1, for each TEXELS_*: a pair each; null: nobody asks
+    uvec2 texels[3];          // of level 1, for each TEXELS_*: a uvec2 each, or a vec4; null: unused
     uint last;                // the smallest level
     uint first[MOST_LEVELS];  // texels before each level, from level 1 on
 };
 layout(buffer_reference, std430, buffer_reference_align = 8) readonly buffer MipRecords { MipRecord v[]; };
+
+// A texel of the levels from 1 on.
+vec4 mean_texel(TextureRecord texture, uvec2 texels, uint i) {
+    if (HAS_DEEP_TEXELS && texture.format != FORMAT_UNORM8) return uintBitsToFloat(Quads(texels).v[i]);
+    return unorm16(Pairs(texels).v[i]);
+}
 
 // Linear value of a level at uv, filtered as the texture is; of TEXELS_COVERED times alpha.
 vec4 sample_level(uint index, TextureRecord texture, vec2 uv, uint kind, uint level) {
@@ -25,7 +31,7 @@ vec4 sample_level(uint index, TextureRecord texture, vec2 uv, uint kind, uint le
         return kind == TEXELS_COVERED ? vec4(c.rgb * c.a, c.a) : c;
     }
     MipRecords mips = MipRecords(SceneRoot(push.scene).mips);
-    Pairs texels = Pairs(mips.v[index].texels[kind]);
+    uvec2 texels = mips.v[index].texels[kind];
     uint first = mips.v[index].first[level - 1u];
     uvec2 size = max(uvec2(texture.width, texture.height) >> level, uvec2(1u));
     vec2 p = fold(uv, texture) * vec2(size);
@@ -34,9 +40,8 @@ vec4 sample_level(uint index, TextureRecord texture, vec2 uv, uint kind, uint le
     vec2 f = texture.nearest == 0u ? p - vec2(i) : vec2(0.0);
     uvec2 x = uvec2(wrap_texel(i.x, size.x, texture.wrap_u), wrap_texel(i.x + 1, size.x, texture.wrap_u));
     uvec2 y = first + size.x * uvec2(wrap_texel(i.y, size.y, texture.wrap_v), wrap_texel(i.y + 1, size.y, texture.wrap_v));
-    uvec2 a = texels.v[y.x + x.x], b = texels.v[y.x + x.y], c = texels.v[y.y + x.x], d = texels.v[y.y + x.y];
-    return mix(mix(vec4(unpackUnorm2x16(a.x), unpackUnorm2x16(a.y)), vec4(unpackUnorm2x16(b.x), unpackUnorm2x16(b.y)), f.x),
-               mix(vec4(unpackUnorm2x16(c.x), unpackUnorm2x16(c.y)), vec4(unpackUnorm2x16(d.x), unpackUnorm2x16(d.y)), f.x), f.y);
+    return mix(mix(mean_texel(texture, texels, y.x + x.x), mean_texel(texture, texels, y.x + x.y), f.x),
+               mix(mean_texel(texture, texels, y.y + x.x), mean_texel(texture, texels, y.y + x.y), f.x), f.y);
 }
 
 // Value at uv over a square of 2^lod texels, linear between levels; at lod 0 and below what sample_texture says, bit for bit.

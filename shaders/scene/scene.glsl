@@ -8,6 +8,7 @@ layout(constant_id = 0) const bool HAS_ALPHA = true;
 layout(constant_id = 1) const bool HAS_SPHERES = true;
 layout(constant_id = 2) const bool SINGLE_LEVEL = false;
 layout(constant_id = 10) const bool HAS_COVERAGE = true;
+layout(constant_id = 12) const bool HAS_DEEP_TEXELS = true;  // of more than 8 bits a channel
 
 layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer SceneRoot {
     uvec2 instances;   // InstanceRecord: an entry of the top level
@@ -86,14 +87,18 @@ struct TextureUse {
     uint set;        // of texture coordinates
 };
 
+const uint FORMAT_UNORM8 = 0u;   // a uint each
+const uint FORMAT_UNORM16 = 1u;  // a uvec2 each
+const uint FORMAT_FLOAT = 2u;    // a vec4 each: linear, whatever the use
+
 struct TextureRecord {
-    uvec2 texels;  // RGBA8, a uint each, rows from the top
+    uvec2 texels;  // RGBA, rows from the top
     uint width;
     uint height;
     uint wrap_u;   // 0 repeat, 1 mirror, 2 clamp
     uint wrap_v;
     uint nearest;  // 1: nearest, 0: bilinear
-    uint reserved;
+    uint format;   // one of FORMAT_*
 };
 layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer TextureRecords { TextureRecord v[]; };
 

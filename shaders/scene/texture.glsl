@@ -16,9 +16,15 @@ uint wrap_texel(int i, uint size, uint mode) {
     return uint(m < 0 ? m + n : m);
 }
 
+vec4 unorm16(uvec2 rgba) { return vec4(unpackUnorm2x16(rgba.x), unpackUnorm2x16(rgba.y)); }
+
 // One texel as stored: sRGB is not decoded.
 vec4 texel(TextureRecord texture, int x, int y) {
     uint i = wrap_texel(y, texture.height, texture.wrap_v) * texture.width + wrap_texel(x, texture.width, texture.wrap_u);
+    if (HAS_DEEP_TEXELS) {
+        if (texture.format == FORMAT_UNORM16) return unorm16(Pairs(texture.texels).v[i]);
+        if (texture.format == FORMAT_FLOAT) return uintBitsToFloat(Quads(texture.texels).v[i]);
+    }
     return unpackUnorm4x8(Words(texture.texels).v[i]);
 }
 
@@ -29,7 +35,8 @@ vec3 srgb_to_linear(vec3 c) {
 
 vec4 decoded_texel(TextureRecord texture, int x, int y, bool srgb) {
     vec4 c = texel(texture, x, y);
-    return srgb ? vec4(srgb_to_linear(c.rgb), c.a) : c;
+    bool encoded = srgb && !(HAS_DEEP_TEXELS && texture.format == FORMAT_FLOAT);
+    return encoded ? vec4(srgb_to_linear(c.rgb), c.a) : c;
 }
 
 // Coordinates far outside [0, 1] would overflow the integer texel index: fold them first. Repeating with period 2 holds for

@@ -14,11 +14,11 @@ float pick_weight(vec3 weights, uint k) {
 
 // A triangle is met with these weights: `id` is its number with flags, `turn` says at which places its second and third corner
 // lie. Their weights, and whether its alpha lets it be met.
-bool is_there(uint id, uint turn, uint instance, vec3 weights, out vec2 uv) {
+bool is_there(uint id, uint turn, uint instance, vec3 weights, float tmin, out vec2 uv) {
     uv = vec2(pick_weight(weights, turn), pick_weight(weights, turn >> 2));
     bool met = true;
     if (HAS_ALPHA) {
-        if ((id & ALPHA_TESTED) != 0u) met = alpha_passes(instance, id & NUMBER, uv);
+        if ((id & ALPHA_TESTED) != 0u) met = alpha_passes(instance, id & NUMBER, uv, tmin);
     }
     return met;
 }
@@ -28,7 +28,7 @@ bool meets_triangle(uint id, uint turn, uint instance, Shear shear, vec3 origin,
         Corner a, Corner b, Corner c, vec3 edges, float tmin, float tmax, out float t, out vec2 uv) {
     vec3 weights;
     bool met = meets_between(shear, origin, direction, v0, v1, v2, a, b, c, edges, tmin, tmax, t, weights);
-    if (met) met = is_there(id, turn, instance, weights, uv);
+    if (met) met = is_there(id, turn, instance, weights, tmin, uv);
     return met;
 }
 
@@ -36,7 +36,7 @@ bool meets_moller_trumbore(uint id, uint turn, uint instance, vec3 origin, vec3 
         float tmax, out float t, out vec2 uv) {
     vec2 vw;
     bool met = id != INVALID && intersect_moller_trumbore(origin, direction, v0, v1, v2, tmin, tmax, t, vw);
-    if (met) met = is_there(id, turn, instance, vec3(1.0 - vw.x - vw.y, vw), uv);
+    if (met) met = is_there(id, turn, instance, vec3(1.0 - vw.x - vw.y, vw), tmin, uv);
     return met;
 }
 

@@ -25,7 +25,7 @@ bool meets_record(uvec2 primitives, uint i, uint instance, Shear shear, vec3 ori
         met = intersect_triangle(shear, origin, direction, vec3(a, b.x), vec3(b.y, c), vec3(d, e.x), tmin, tmax, t, uv);
     }
     if (HAS_ALPHA) {
-        if (met && (id & ALPHA_TESTED) != 0u) met = alpha_passes(instance, primitive, uv);
+        if (met && (id & ALPHA_TESTED) != 0u) met = alpha_passes(instance, primitive, uv, tmin);
     }
     return met;
 }

@@ -32,7 +32,8 @@ void main() {
         uint primitive = uint(rayQueryGetIntersectionPrimitiveIndexEXT(query, false));
         if (type == gl_RayQueryCandidateIntersectionTriangleEXT) {
             // only alpha-tested triangles are not opaque, and they are the second geometry
-            if (HAS_ALPHA && alpha_passes(instance, instances.v[instance].opaque_count + primitive, rayQueryGetIntersectionBarycentricsEXT(query, false)))
+            vec2 uv = rayQueryGetIntersectionBarycentricsEXT(query, false);
+            if (HAS_ALPHA && alpha_passes(instance, instances.v[instance].opaque_count + primitive, uv, world.tmin))
                 rayQueryConfirmIntersectionEXT(query);
         } else if (HAS_SPHERES) {
             PartRecords parts = PartRecords(root.parts);

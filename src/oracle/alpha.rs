@@ -1,6 +1,6 @@
 //! Alpha of a surface, as the shaders compute it: base colour alpha x texture alpha x vertex colour alpha, against a cutoff.
 
-use crate::scene::{AlphaMode, Filter, Geometry, Mesh, Scene, Texture, Wrap};
+use crate::scene::{AlphaMode, Filter, Geometry, Mesh, Scene, TexelData, Texture, Wrap};
 use glam::{Affine2, DVec2, Vec2};
 
 /// Cutoff of blended materials in occlusion and visibility.
@@ -129,7 +129,12 @@ pub fn texture_alpha(texture: &Texture, at: DVec2) -> f64 {
     let fetch = |x: f64, y: f64| {
         let (x, y) = (wrap(x, texture.width, texture.wrap[0]), wrap(y, texture.height, texture.wrap[1]));
         let index = 4 * (y as usize * texture.width as usize + x as usize) + 3;
-        texture.rgba8.get(index).map_or(1.0, |a| *a as f64 / 255.0)
+        let alpha = match &texture.texels {
+            TexelData::Unorm8(rgba) => rgba.get(index).map(|a| f64::from(*a) / 255.0),
+            TexelData::Unorm16(rgba) => rgba.get(index).map(|a| f64::from(*a) / 65535.0),
+            TexelData::Float(rgba) => rgba.get(index).map(|a| f64::from(*a)),
+        };
+        alpha.unwrap_or(1.0)
     };
     match texture.filter {
         Filter::Nearest => fetch(at.x.floor(), at.y.floor()),

@@ -14,6 +14,8 @@ pub const CAMERA_FILM: u32 = 0;
 pub const CAMERA_LENS: u32 = 1;
 /// Dimension pair of the direction of an ambient occlusion ray.
 pub const AO_DIRECTION: u32 = 2;
+/// In place of a dimension pair, for the random number of each ray by which partial coverage is decided (`shaders/common/ray_seed.glsl`).
+pub const RAY_SEED: u32 = 3;
 /// First dimension pair of path vertices; vertex `n` uses [`PATH_STRIDE`] pairs from `PATH_FIRST + n * PATH_STRIDE`.
 pub const PATH_FIRST: u32 = 8;
 /// Dimension pairs that one path vertex may use.

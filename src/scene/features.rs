@@ -1,7 +1,7 @@
 //! What a scene needs, found once at load: the rest is not compiled into shaders, not recorded and not traced.
 
 use super::flatten::FlatScene;
-use super::{AlphaMode, Geometry, Material, Scene};
+use super::{AlphaMode, Geometry, Material, Scene, TexelData};
 
 /// What alpha means for the visibility of a mesh.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -46,7 +46,7 @@ pub fn alpha_classes(scene: &Scene, blend: Blend) -> Vec<AlphaClass> {
             let (mut lo, mut hi) = (material.base_color.w, material.base_color.w);
             if let Geometry::Triangles(t) = &mesh.geometry {
                 if let Some(slot) = &material.base_color_texture {
-                    let (a, b) = *ranges[slot.texture].get_or_insert_with(|| alpha_range(&scene.textures[slot.texture].rgba8));
+                    let (a, b) = *ranges[slot.texture].get_or_insert_with(|| alpha_range(&scene.textures[slot.texture].texels));
                     (lo, hi) = (lo * a, hi * b);
                 }
                 if !t.colors.is_empty() {
@@ -80,9 +80,8 @@ pub fn alpha_classes(scene: &Scene, blend: Blend) -> Vec<AlphaClass> {
         .collect()
 }
 
-fn alpha_range(rgba8: &[u8]) -> (f32, f32) {
-    let (lo, hi) = rgba8.chunks_exact(4).fold((255u8, 0u8), |(lo, hi), p| (lo.min(p[3]), hi.max(p[3])));
-    (lo as f32 / 255.0, hi as f32 / 255.0)
+fn alpha_range(texels: &TexelData) -> (f32, f32) {
+    texels.iter().fold((f32::INFINITY, 0.0), |(lo, hi), [_, _, _, alpha]| (alpha.min(lo), alpha.max(hi)))
 }
 
 /// What the scene needs, as the specialisation of shaders.
@@ -92,6 +91,8 @@ pub struct SceneFeatures {
     pub alpha: bool,
     /// Some of them are there for a part of the rays ([`Blend::Covered`]).
     pub coverage: bool,
+    /// Some textures have more than 8 bits a channel.
+    pub deep_texels: bool,
     /// There are analytic spheres.
     pub spheres: bool,
     /// One top-level entry with an identity transform.
@@ -106,6 +107,7 @@ impl SceneFeatures {
         Self {
             alpha: flat.has_alpha(),
             coverage: flat.has_coverage(),
+            deep_texels: flat.scene.textures.iter().any(|t| !matches!(t.texels, TexelData::Unorm8(_))),
             spheres: flat.has_spheres(),
             single_level: flat.is_single_level(),
             shading: None,

@@ -5,7 +5,7 @@ use std::fmt::{Debug, Write};
 
 use xxhash_rust::xxh3::Xxh3;
 
-use super::{Environment, EnvironmentMap, Geometry, Instance, Mesh, Scene, Texture, TriangleMesh};
+use super::{Environment, EnvironmentMap, Geometry, Instance, Mesh, Scene, TexelData, Texture, TriangleMesh};
 
 /// Of geometry, materials, textures and lights, without what surrounds them: 32 hexadecimal digits.
 pub fn of_scene(scene: &Scene) -> String {
@@ -32,9 +32,13 @@ pub fn of_scene(scene: &Scene) -> String {
         hash.count(*mesh);
         hash.slice(&object_to_world.to_cols_array());
     }
-    for Texture { name: _, width, height, rgba8, wrap, filter } in &scene.textures {
+    for Texture { name: _, width, height, texels, wrap, filter } in &scene.textures {
         hash.text(&(width, height, wrap, filter));
-        hash.slice(rgba8);
+        match texels {
+            TexelData::Unorm8(rgba) => hash.slice(rgba),
+            TexelData::Unorm16(rgba) => hash.slice(rgba),
+            TexelData::Float(rgba) => hash.slice(rgba),
+        }
     }
     // few, and with many fields: their debug text has all of them, numbers to the last digit
     hash.text(&scene.materials);

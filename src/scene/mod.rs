@@ -26,7 +26,7 @@ pub use light::{Environment, EnvironmentMap, Light, LightKind};
 pub use material::{AlphaMode, Material, TextureSlot};
 pub use mesh::{Geometry, Mesh, Sphere, TriangleMesh};
 pub use orbit::Orbit;
-pub use texture::{Filter, Texture, Wrap};
+pub use texture::{Filter, TexelData, Texture, Wrap};
 
 use glam::{DAffine3, DVec3};
 

@@ -1,6 +1,8 @@
 //! Decoded images with their samplers.
 
-use std::sync::Arc;
+use std::sync::{Arc, LazyLock};
+
+use crate::output::png::srgb_decode;
 
 /// What happens outside [0, 1].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -24,7 +26,108 @@ pub enum Filter {
     Linear,
 }
 
-/// An 8-bit RGBA image and how to sample it. Whether RGB is sRGB or linear is said by the use: base colour, emissive and the
+/// RGBA of all texels of an image, rows from the top. Shared: two textures may sample one image differently.
+#[derive(Clone, Debug, PartialEq)]
+pub enum TexelData {
+    /// 8 bits a channel, which stand for 0 to 1.
+    Unorm8(Arc<[u8]>),
+    /// 16 bits a channel, which stand for 0 to 1.
+    Unorm16(Arc<[u16]>),
+    /// Floats, 0 or more: always linear, also where 8 or 16 bits would be sRGB.
+    Float(Arc<[f32]>),
+}
+
+impl TexelData {
+    /// Number of texels.
+    pub fn len(&self) -> usize {
+        match self {
+            Self::Unorm8(v) => v.len() / 4,
+            Self::Unorm16(v) => v.len() / 4,
+            Self::Float(v) => v.len() / 4,
+        }
+    }
+
+    /// There are no texels.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Whether colours are never sRGB.
+    pub fn is_float(&self) -> bool {
+        matches!(self, Self::Float(_))
+    }
+
+    /// Texel `i` as it is stored: sRGB is not decoded. `texel` of shaders/scene/texture.glsl.
+    ///
+    /// # Panics
+    /// When there is no such texel.
+    pub fn get(&self, i: usize) -> [f32; 4] {
+        let channels = 4 * i..4 * i + 4;
+        let mut texel = [0.0; 4];
+        match self {
+            Self::Unorm8(v) => texel.iter_mut().zip(&v[channels]).for_each(|(t, &c)| *t = f32::from(c) / 255.0),
+            Self::Unorm16(v) => texel.iter_mut().zip(&v[channels]).for_each(|(t, &c)| *t = f32::from(c) / 65535.0),
+            Self::Float(v) => texel.copy_from_slice(&v[channels]),
+        }
+        texel
+    }
+
+    /// Texel `i` with linear colours, of a texture that is used as sRGB: `decoded_texel` of shaders/scene/texture.glsl.
+    ///
+    /// # Panics
+    /// When there is no such texel.
+    pub fn decode_srgb(&self, i: usize) -> [f32; 4] {
+        static EIGHT_BITS: LazyLock<[f32; 256]> = LazyLock::new(|| std::array::from_fn(|v| srgb_decode(v as f32 / 255.0)));
+        let [r, g, b, a] = self.get(i);
+        match self {
+            Self::Unorm8(v) => {
+                let [r, g, b] = [0, 1, 2].map(|c| EIGHT_BITS[usize::from(v[4 * i + c])]);
+                [r, g, b, a]
+            }
+            Self::Unorm16(_) => [srgb_decode(r), srgb_decode(g), srgb_decode(b), a],
+            Self::Float(_) => [r, g, b, a],
+        }
+    }
+
+    /// All texels, one after the other, as they are stored.
+    pub fn iter(&self) -> impl Iterator<Item = [f32; 4]> {
+        (0..self.len()).map(|i| self.get(i))
+    }
+
+    /// What is in memory.
+    pub fn as_bytes(&self) -> &[u8] {
+        match self {
+            Self::Unorm8(v) => v,
+            Self::Unorm16(v) => bytemuck::cast_slice(v),
+            Self::Float(v) => bytemuck::cast_slice(v),
+        }
+    }
+
+    /// Whether both are the same memory.
+    pub fn is_shared_with(&self, other: &Self) -> bool {
+        std::ptr::eq(self.as_bytes(), other.as_bytes())
+    }
+}
+
+impl From<Vec<u8>> for TexelData {
+    fn from(rgba: Vec<u8>) -> Self {
+        Self::Unorm8(rgba.into())
+    }
+}
+
+impl From<Vec<u16>> for TexelData {
+    fn from(rgba: Vec<u16>) -> Self {
+        Self::Unorm16(rgba.into())
+    }
+}
+
+impl From<Vec<f32>> for TexelData {
+    fn from(rgba: Vec<f32>) -> Self {
+        Self::Float(rgba.into())
+    }
+}
+
+/// An RGBA image and how to sample it. Whether the RGB of integers is sRGB or linear is said by the use: base colour, emissive and the
 /// like are sRGB, everything else linear; alpha is always linear.
 #[derive(Clone, Debug)]
 pub struct Texture {
@@ -34,8 +137,8 @@ pub struct Texture {
     pub width: u32,
     /// Pixels in y.
     pub height: u32,
-    /// Rows from the top, RGBA, `4 * width * height` bytes. Shared: two textures may sample one image differently.
-    pub rgba8: Arc<[u8]>,
+    /// `width * height` texels.
+    pub texels: TexelData,
     /// Wrapping in u and v.
     pub wrap: [Wrap; 2],
     /// Interpolation.

@@ -16,7 +16,7 @@ use crate::error::{Error, Result};
 use crate::gpu::{Buffer, Device, Memory};
 use crate::scene::features::{Blend, alpha_cutoff};
 use crate::scene::flatten::{FlatScene, Group, Part, Placement};
-use crate::scene::{AlphaMode, Filter, Geometry, Material, TextureSlot, TriangleMesh, Wrap};
+use crate::scene::{AlphaMode, Filter, Geometry, Material, TexelData, TextureSlot, TriangleMesh, Wrap};
 
 /// What the passes will ask of the scene; the rest is not uploaded.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -115,7 +115,7 @@ struct TextureRecord {
     height: u32,
     wrap: [u32; 2],
     nearest: u32,
-    reserved: u32,
+    format: u32,
 }
 
 const INVALID: u32 = u32::MAX;
@@ -620,8 +620,8 @@ impl Mips {
         let mut places = Vec::new();
         for (k, (&t, uses)) in used.iter().zip(uses).enumerate() {
             for texels in Texels::ALL.into_iter().filter(|&texels| uses[texels as usize]) {
-                let pyramid = *pyramid_of.entry((Arc::as_ptr(&texture(t).rgba8), texels)).or_insert_with(|| {
-                    pyramids.push(Cow::Owned(bytemuck::pod_collect_to_vec(&mipmap::pyramid(texture(t), texels))));
+                let pyramid = *pyramid_of.entry((texture(t).texels.as_bytes().as_ptr(), texels)).or_insert_with(|| {
+                    pyramids.push(Cow::Owned(mipmap::pyramid(texture(t), texels)));
                     pyramids.len() - 1
                 });
                 places.push((k, texels, pyramid));
@@ -660,8 +660,8 @@ impl Textures {
         let mut image = Vec::new();
         for &t in &used {
             let texture = &flat.scene.textures[t];
-            image.push(*image_of.entry(Arc::as_ptr(&texture.rgba8)).or_insert_with(|| {
-                images.push(Cow::Borrowed(&texture.rgba8[..]));
+            image.push(*image_of.entry(texture.texels.as_bytes().as_ptr()).or_insert_with(|| {
+                images.push(Cow::Borrowed(texture.texels.as_bytes()));
                 images.len() - 1
             }));
         }
@@ -682,7 +682,11 @@ impl Textures {
                     height: texture.height,
                     wrap: texture.wrap.map(wrap),
                     nearest: (texture.filter == Filter::Nearest) as u32,
-                    reserved: 0,
+                    format: match texture.texels {
+                        TexelData::Unorm8(_) => 0,
+                        TexelData::Unorm16(_) => 1,
+                        TexelData::Float(_) => 2,
+                    },
                 }
             })
             .collect();

@@ -6,8 +6,7 @@ use bytemuck::{Pod, Zeroable};
 use glam::Vec4;
 use rayon::prelude::*;
 
-use crate::output::png::srgb_decode;
-use crate::scene::Texture;
+use crate::scene::{TexelData, Texture};
 
 /// Beside level 0: `MOST_LEVELS` of shaders/scene/mipmap.glsl. Enough for 65535 texels.
 const MOST_LEVELS: usize = 15;
@@ -60,18 +59,25 @@ fn levels(size: [u32; 2]) -> impl Iterator<Item = [u32; 2]> {
     halves.skip(1).take(MOST_LEVELS)
 }
 
-/// All levels from 1 on, one after the other, rows from the top, four numbers of 16 bits a texel: the means of what each texel covers of the level before,
-/// to 2^-17.
-pub(super) fn pyramid(texture: &Texture, texels: Texels) -> Vec<[u16; 4]> {
-    let decoded: Vec<f32> =
-        (0..=255u8).map(|v| f32::from(v) / 255.0).map(|v| if texels == Texels::Linear { v } else { srgb_decode(v) }).collect();
-    let stored: &[[u8; 4]] = bytemuck::cast_slice(&texture.rgba8);
+/// All levels from 1 on as they lie in device memory, one after the other, rows from the top: four numbers of 16 bits a texel, to 2^-17, or four floats
+/// where the texture has more than 8 bits itself.
+pub(super) fn pyramid(texture: &Texture, texels: Texels) -> Vec<u8> {
+    let levels = means(texture, texels);
+    match texture.texels {
+        TexelData::Unorm8(_) => bytemuck::pod_collect_to_vec(&levels.iter().map(unorm16).collect::<Vec<_>>()),
+        _ => bytemuck::pod_collect_to_vec(&levels),
+    }
+}
+
+fn unorm16(texel: &Vec4) -> [u16; 4] {
+    texel.to_array().map(|c| (c.clamp(0.0, 1.0) * 65535.0).round() as u16)
+}
+
+/// The means of what each texel covers of the level before, of all levels from 1 on.
+fn means(texture: &Texture, texels: Texels) -> Vec<Vec4> {
     let texel = |i: usize| {
-        let [r, g, b, a] = stored[i];
-        let alpha = f32::from(a) / 255.0;
-        let covers = if texels == Texels::Covered { alpha } else { 1.0 };
-        let [r, g, b] = [r, g, b].map(|c| covers * decoded[usize::from(c)]);
-        Vec4::new(r, g, b, alpha)
+        let c = Vec4::from_array(if texels == Texels::Linear { texture.texels.get(i) } else { texture.texels.decode_srgb(i) });
+        if texels == Texels::Covered { (c.truncate() * c.w).extend(c.w) } else { c }
     };
     let mut out = Vec::new();
     let mut before = [texture.width, texture.height];
@@ -81,7 +87,7 @@ pub(super) fn pyramid(texture: &Texture, texels: Texels) -> Vec<[u16; 4]> {
             true => reduced(before, size, texel),
             false => reduced(before, size, |i| means[i]),
         };
-        out.extend(means.iter().map(|m| m.to_array().map(|c| (c.clamp(0.0, 1.0) * 65535.0).round() as u16)));
+        out.extend_from_slice(&means);
         before = size;
     }
     out
@@ -126,11 +132,16 @@ impl Taps {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::output::png::srgb_decode;
     use crate::scene::{Filter, Wrap};
+
+    fn pyramid(texture: &Texture, texels: Texels) -> Vec<[u16; 4]> {
+        bytemuck::pod_collect_to_vec(&super::pyramid(texture, texels))
+    }
 
     fn texture(width: u32, height: u32, rgba8: Vec<u8>) -> Texture {
         let (wrap, filter) = ([Wrap::Repeat; 2], Filter::Linear);
-        Texture { name: String::new(), width, height, rgba8: rgba8.into(), wrap, filter }
+        Texture { name: String::new(), width, height, texels: rgba8.into(), wrap, filter }
     }
 
     fn channel(texels: &[[u16; 4]], c: usize) -> Vec<f64> {
@@ -165,12 +176,12 @@ mod tests {
             for texels in Texels::ALL {
                 let levels = pyramid(&t, texels);
                 let value = |c: usize| {
-                    let texel = |p: &[u8]| {
-                        let v = f64::from(p[c]) / 255.0;
+                    let texel = |p: [f32; 4]| {
+                        let v = f64::from(p[c]);
                         let linear = if c == 3 || texels == Texels::Linear { v } else { f64::from(srgb_decode(v as f32)) };
-                        if texels == Texels::Covered && c < 3 { linear * f64::from(p[3]) / 255.0 } else { linear }
+                        if texels == Texels::Covered && c < 3 { linear * f64::from(p[3]) } else { linear }
                     };
-                    mean(&t.rgba8.chunks(4).map(texel).collect::<Vec<_>>())
+                    mean(&t.texels.iter().map(texel).collect::<Vec<_>>())
                 };
                 let ends = record.first[..record.last as usize].iter().skip(1).map(|&n| n as usize).chain([levels.len()]);
                 for (&first, end) in record.first[..record.last as usize].iter().zip(ends) {

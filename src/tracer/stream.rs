@@ -143,7 +143,8 @@ pub(crate) fn scene_specialization(features: SceneFeatures) -> Specialization {
         .set(0, features.alpha as u32)
         .set(1, features.spheres as u32)
         .set(2, features.single_level as u32)
-        .set(10, features.coverage as u32);
+        .set(10, features.coverage as u32)
+        .set(12, features.deep_texels as u32);
     match features.shading {
         Some(bits) => s.set(9, bits),
         None => s,

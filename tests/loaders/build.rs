@@ -183,6 +183,14 @@ pub fn corners(mesh: &TriangleMesh) -> Vec<[[f32; 3]; 3]> {
 }
 
 /// A PNG of one colour.
+/// One texel of 16 bits a channel.
+pub fn png16(color: [u16; 4]) -> Vec<u8> {
+    let mut out = std::io::Cursor::new(Vec::new());
+    let pixels = image::ImageBuffer::<image::Rgba<u16>, _>::from_pixel(1, 1, image::Rgba(color));
+    pixels.write_to(&mut out, image::ImageFormat::Png).unwrap();
+    out.into_inner()
+}
+
 pub fn png(width: u32, height: u32, color: [u8; 4]) -> Vec<u8> {
     let mut out = std::io::Cursor::new(Vec::new());
     let pixels = image::RgbaImage::from_pixel(width, height, image::Rgba(color));

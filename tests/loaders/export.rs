@@ -1,7 +1,5 @@
 //! The exporter: what it writes comes back.
 
-use std::sync::Arc;
-
 use glam::{Affine2, DAffine3, DQuat, DVec3, Vec2, Vec3, Vec4};
 use skylit::Error;
 use skylit::scene::export::{Written, export_gltf, mesh_bin, read_mesh_bin, write_mesh_bin};
@@ -28,9 +26,9 @@ fn two_triangles() -> TriangleMesh {
 
 /// A scene with everything that glTF has words for.
 fn scene() -> Scene {
-    let rgba8: Arc<[u8]> = (0..4 * 8 * 4).map(|i| (i * 7) as u8).collect();
+    let rgba8: TexelData = (0..4 * 8 * 4).map(|i| (i * 7) as u8).collect::<Vec<u8>>().into();
     let texture =
-        |name: &str, wrap, filter| Texture { name: name.into(), width: 8, height: 4, rgba8: rgba8.clone(), wrap, filter };
+        |name: &str, wrap, filter| Texture { name: name.into(), width: 8, height: 4, texels: rgba8.clone(), wrap, filter };
     let turned = TextureSlot {
         texture: 1,
         texcoord: 1,
@@ -136,7 +134,7 @@ fn same(a: &Scene, b: &Scene) {
         assert_eq!((&x.name, x.mesh, x.object_to_world), (&y.name, y.mesh, y.object_to_world));
     }
     for (x, y) in a.textures.iter().zip(&b.textures) {
-        assert_eq!((&x.name, x.width, x.height, &x.rgba8), (&y.name, y.width, y.height, &y.rgba8));
+        assert_eq!((&x.name, x.width, x.height, &x.texels), (&y.name, y.width, y.height, &y.texels));
         assert_eq!((x.wrap, x.filter), (y.wrap, y.filter));
     }
     for (x, y) in a.materials.iter().zip(&b.materials) {
@@ -158,6 +156,23 @@ fn same(a: &Scene, b: &Scene) {
         assert_eq!((&x.name, x.projection, x.aspect), (&y.name, y.projection, y.aspect));
         assert!(x.camera_to_world.abs_diff_eq(y.camera_to_world, 1e-12));
     }
+}
+
+/// 16 bits a channel stay; floats have no image format in glTF.
+#[test]
+fn gltf_keeps_textures_of_16_bits() {
+    let folder = Folder::new();
+    let mut original = scene();
+    for (name, alpha) in [("opaque.glb", 65535), ("alpha.gltf", 1000)] {
+        let texels: Vec<u16> = (0..8 * 4u16).flat_map(|i| [i * 517, 600, i, alpha]).collect();
+        original.textures[0].texels = texels.into();
+        let path = folder.path(name);
+        export_gltf(&original, &path).unwrap();
+        same(&original, &load(&path).unwrap());
+    }
+    original.textures[0].texels = vec![1.5f32; 4 * 8 * 4].into();
+    let error = export_gltf(&original, &folder.path("float.glb")).unwrap_err().to_string();
+    assert!(error.contains("holds floats"), "{error}");
 }
 
 #[test]

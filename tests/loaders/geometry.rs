@@ -290,6 +290,57 @@ fn tangents_only_where_a_normal_map_needs_them() {
     assert_eq!(mesh(&scene, 0).normals, [Vec3::Z; 3]);
 }
 
+/// Without tangents, and without texture coordinates to compute them from: around the y axis.
+#[test]
+fn tangents_without_texture_coordinates() {
+    const POINTS: [[f32; 3]; 3] = [[0.0, 0.0, 0.0], [0.0, 0.0, -2.0], [0.0, 2.0, 0.0]];
+    let anisotropy = json!({ "KHR_materials_anisotropy": { "anisotropyStrength": 0.5 } });
+    let coat = json!({ "KHR_materials_clearcoat": { "clearcoatFactor": 1, "clearcoatNormalTexture": { "index": 0 } } });
+    let cases = [
+        ("anisotropy", json!({ "extensions": anisotropy }), true),
+        (
+            "anisotropy from a texture",
+            json!({ "extensions": {
+            "KHR_materials_anisotropy": { "anisotropyStrength": 0.5, "anisotropyTexture": { "index": 0 } } } }),
+            true,
+        ),
+        ("normal map", json!({ "normalTexture": { "index": 0 } }), false),
+        ("normal map of set 1", json!({ "normalTexture": { "index": 0, "texCoord": 1 } }), false),
+        ("coat's normal map", json!({ "extensions": coat }), false),
+    ];
+    for (name, material, warned) in cases {
+        for (normals, set) in [(false, None), (true, None), (false, Some(0)), (true, Some(1))] {
+            let mut doc = Doc::new();
+            let position = doc.positions(&POINTS);
+            doc.primitive(json!({ "attributes": { "POSITION": position }, "material": 0 }));
+            doc.push("materials", material.clone());
+            let uri = format!("data:image/png;base64,{}", base64(&png(2, 2, [128, 128, 255, 255])));
+            doc.push("images", json!({ "uri": uri }));
+            doc.push("textures", json!({ "source": 0 }));
+            if normals {
+                let normal = doc.accessor(&bytes(&[[1.0, 0.0, 0.0f32]; 3]), F32, "VEC3", 3);
+                doc.first()["attributes"]["NORMAL"] = json!(normal);
+            }
+            if let Some(set) = set {
+                // u upwards
+                let texcoord = doc.accessor(&bytes(&[[0.0, 0.0], [0.0, 1.0], [1.0, 0.0f32]]), F32, "VEC2", 3);
+                doc.first()["attributes"][format!("TEXCOORD_{set}")] = json!(texcoord);
+            }
+            let scene = doc.load();
+            let m = mesh(&scene, 0);
+            // the normal is +x or -x
+            assert_eq!(m.normals.len(), 3, "{name}");
+            let expected = if set.is_some() { Vec3::Y } else { Vec3::new(0.0, 0.0, -m.normals[0].x) };
+            for t in &m.tangents {
+                assert!((t.truncate() - expected).length() < 1e-6 && t.w.abs() == 1.0, "{name}, {set:?}: {t}");
+            }
+            assert_eq!((m.tangents.len(), scene.report.tangents_computed), (3, 1), "{name}");
+            let about = scene.report.warnings.iter().any(|w| w.contains("neither tangents nor texture coordinates"));
+            assert_eq!(about, warned && set.is_none(), "{name}, {set:?}: {:?}", scene.report.warnings);
+        }
+    }
+}
+
 #[test]
 fn tangents_split_vertices_where_texcoords_mirror() {
     // two triangles share the edge 1-2; u runs one way in the first and back in the second

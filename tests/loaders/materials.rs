@@ -3,7 +3,7 @@
 use glam::{Vec2, Vec3, Vec4};
 use serde_json::{Value, json};
 use skylit::scene::material::{AlphaMode, Material};
-use skylit::scene::{Filter, Scene, Wrap};
+use skylit::scene::{Filter, Scene, TexelData, Wrap};
 
 use crate::build::*;
 
@@ -47,7 +47,7 @@ fn core() {
     assert_eq!(scene.textures.len(), 3);
     let texture = &scene.textures[m.base_color_texture.unwrap().texture];
     assert_eq!((texture.name.as_str(), texture.width, texture.height), ("image 2", 3, 2));
-    assert_eq!(texture.rgba8[..4], [2, 2, 3, 4]);
+    assert_eq!(texture.texels.as_bytes()[..4], [2, 2, 3, 4]);
     assert_eq!(m.metallic_roughness_texture.unwrap().texcoord, 1);
     assert_eq!(m.occlusion_texture.unwrap().texture, m.metallic_roughness_texture.unwrap().texture);
 }
@@ -173,7 +173,34 @@ fn samplers() {
     assert_eq!((a.wrap, a.filter), ([Wrap::Clamp, Wrap::Mirror], Filter::Nearest));
     assert_eq!((b.wrap, b.filter), ([Wrap::Repeat; 2], Filter::Linear));
     // one image, decoded once
-    assert!(std::sync::Arc::ptr_eq(&a.rgba8, &b.rgba8));
+    assert!(a.texels.is_shared_with(&b.texels));
+}
+
+/// Images keep the bits that they have: 16 a channel, and floats, which may be above 1. Eight bits that were widened to 16 need no more than eight.
+#[test]
+fn images_keep_their_bits() {
+    let mut hdr = std::io::Cursor::new(Vec::new());
+    image::Rgb32FImage::from_pixel(4, 4, image::Rgb([0.25, 8.0, 0.0])).write_to(&mut hdr, image::ImageFormat::Hdr).unwrap();
+    let mut grey = std::io::Cursor::new(Vec::new());
+    image::ImageBuffer::<image::Luma<u16>, _>::from_pixel(1, 1, image::Luma([600u16]))
+        .write_to(&mut grey, image::ImageFormat::Png)
+        .unwrap();
+    let texels: [(&[u8], TexelData); 4] = [
+        (&png16([600, 2, 3, 65000]), vec![600u16, 2, 3, 65000].into()),
+        (&png16([257 * 9, 0, 257, 65535]), vec![9u8, 0, 1, 255].into()),
+        (grey.get_ref(), vec![600u16, 600, 600, 65535].into()),
+        (hdr.get_ref(), vec![0.25f32, 8.0, 0.0, 1.0].into()),
+    ];
+    for (file, expected) in texels {
+        let folder = Folder::new();
+        folder.write("image", file);
+        let mut doc = with_material(json!({ "emissiveTexture": { "index": 0 } }));
+        doc.json["images"][0] = json!({ "uri": "image" });
+        let scene = folder.load("scene.gltf", doc.gltf()).unwrap();
+        assert!(scene.report.warnings.is_empty(), "{:?}", scene.report.warnings);
+        let found = &scene.textures[0].texels;
+        assert_eq!((std::mem::discriminant(found), found.get(0)), (std::mem::discriminant(&expected), expected.get(0)));
+    }
 }
 
 #[test]
@@ -192,8 +219,9 @@ fn images_from_everywhere() {
     let m = material(&scene);
     let texture = |slot: &Option<skylit::scene::TextureSlot>| &scene.textures[slot.unwrap().texture];
     let jpeg = texture(&m.emissive_texture);
-    assert!(jpeg.rgba8[0].abs_diff(200) < 4 && jpeg.rgba8[1].abs_diff(100) < 4 && jpeg.rgba8[3] == 255);
-    assert_eq!(texture(&m.occlusion_texture).rgba8[..4], [9, 8, 7, 6]);
+    let rgba8 = jpeg.texels.as_bytes();
+    assert!(rgba8[0].abs_diff(200) < 4 && rgba8[1].abs_diff(100) < 4 && rgba8[3] == 255);
+    assert_eq!(texture(&m.occlusion_texture).texels.as_bytes()[..4], [9, 8, 7, 6]);
     assert_eq!(texture(&m.base_color_texture).width, 3);
 }
 

@@ -220,10 +220,10 @@ fn opacity_maps_become_masks() {
     assert_eq!((m.alpha_mode, m.kind), (AlphaMode::Mask { cutoff: 0.5 }, MaterialKind::MetallicRoughness));
     let texture = &scene.textures[m.base_color_texture.unwrap().texture];
     assert_eq!((texture.width, texture.height), (4, 8));
-    assert!(texture.rgba8.chunks(4).all(|p| p == [10, 20, 30, 200]));
+    assert!(texture.texels.as_bytes().chunks(4).all(|p| p == [10, 20, 30, 200]));
     let scene = with_mtl(&folder, "newmtl m\nmap_d alpha.png\n");
     let texture = &scene.textures[scene.materials[0].base_color_texture.unwrap().texture];
-    assert!(texture.rgba8.chunks(4).all(|p| p == [255, 255, 255, 200]));
+    assert!(texture.texels.as_bytes().chunks(4).all(|p| p == [255, 255, 255, 200]));
 }
 
 #[test]

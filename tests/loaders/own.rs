@@ -19,7 +19,7 @@ fn leaves() {
     let scene = own("leaves.glb");
     assert_eq!((scene.triangle_count(), scene.instances.len(), scene.meshes.len()), (2 + 24 * 6, 25, 2));
     assert_eq!(scene.materials[1].alpha_mode, AlphaMode::Mask { cutoff: 0.5 });
-    let alpha = |f: fn(u8) -> bool| scene.textures[0].rgba8.chunks(4).filter(|p| f(p[3])).count();
+    let alpha = |f: fn(u8) -> bool| scene.textures[0].texels.as_bytes().chunks(4).filter(|p| f(p[3])).count();
     assert!(alpha(|a| a == 0) > 1000 && alpha(|a| a == 255) > 1000);
 }
 

@@ -41,7 +41,7 @@ fn check(scene: &Scene) {
     }
     for slot in scene.materials.iter().flat_map(|m| m.textures()) {
         let t = &scene.textures[slot.texture];
-        assert_eq!(t.rgba8.len(), 4 * t.width as usize * t.height as usize);
+        assert_eq!(t.texels.len(), t.width as usize * t.height as usize);
     }
 }
 

@@ -283,6 +283,23 @@ fn gpu_a_run_that_is_broken_off_leaves_whole_files() {
     assert_eq!(names(dir.path()), ["x.0008.exr"]);
 }
 
+/// Options that an integrator has no use for are refused by their own names, and no other option is named.
+#[test]
+fn options_of_frames_are_refused_by_name() {
+    let dir = tempfile::tempdir().unwrap();
+    let image = place(&dir, "a.exr");
+    for (option, value) in [("--animate", "0"), ("--fps", "25"), ("--frames", "0..2"), ("--preset", "fast"), ("--orbit", "9")] {
+        let says = format!("{option} is about frames in real time, and --integrator path renders stills: leave it out, or use");
+        fails(&[&BASE[..], &["-o", &image, option, value]].concat(), 64, &says);
+    }
+    for (option, value) in [("--ao-radius", "1"), ("--ao-falloff", "2"), ("--dump-rays", "x")] {
+        let says = format!("{option} is about occlusion rays, and --integrator path traces none");
+        fails(&[&BASE[..], &["-o", &image, option, value]].concat(), 64, &says);
+    }
+    let sky = ["render", BASE[1], "-o", &image, "--integrator", "ao-sky", "--light", "point position=0,1,0 intensity=1"];
+    fails(&sky, 64, "error: --light: nothing but a white sky");
+}
+
 /// What nobody asks for is not in the shaders, and it is said.
 #[test]
 fn gpu_what_is_compiled_is_told() {

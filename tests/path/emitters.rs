@@ -50,7 +50,7 @@ fn gpu_emitters_are_there_as_their_alpha_says() {
             name: String::new(),
             width: 2,
             height: 1,
-            rgba8: rgba8.to_vec().into(),
+            texels: rgba8.to_vec().into(),
             wrap: [Wrap::Clamp; 2],
             filter: Filter::Nearest,
         }));

@@ -5,7 +5,7 @@ use glam::{Affine2, Vec2, Vec4};
 use skylit::render::path::View;
 use skylit::scene::builtin::shapes;
 use skylit::scene::material::{AlphaMode, Transmission};
-use skylit::scene::{Filter, Texture, TextureSlot, TriangleMesh, Wrap};
+use skylit::scene::{Filter, Sphere, TexelData, Texture, TextureSlot, TriangleMesh, Wrap};
 
 /// A camera at z = 2 that looks at the origin through a narrow view.
 fn ahead() -> Camera {
@@ -67,6 +67,42 @@ fn gpu_coverage() {
     assert_eq!(all, 4);
 }
 
+/// Coverage is right at pixels so small that few coordinates of the sheet are told apart in single precision, for camera rays, for bounces and for
+/// rays to lights.
+#[test]
+fn gpu_coverage_of_tiny_pixels() {
+    let device = device();
+    let (eye, target) = (DVec3::new(0.9, 0.5, 2.0), DVec3::new(0.3, 0.2, 0.0));
+    // of the sheet's width, which is 8
+    for pixel in [6e-7, 6e-9] {
+        let narrow = Camera::look_at(eye, target, DVec3::Y, 16.0 * pixel * 8.0 / 1.6);
+        let seen = scene_of(vec![(sheet(0.5), covered(0.3, emitter(2.0))), (sheet(0.0), emitter(5.0))], narrow.clone());
+        holds(&device, &format!("camera rays, {pixel:e}"), &seen, &options(1024), 0.3 * 2.0 + 0.7 * 5.0, 3e-3);
+        // behind the camera, in a mirror
+        let mirror = Material { kind: MaterialKind::Mirror, specular_color: Vec3::ONE, ..matte(1.0) };
+        let both_sides = |m: Material| Material { double_sided: true, ..m };
+        let behind = vec![
+            (sheet(0.0), mirror),
+            (sheet(3.0), both_sides(covered(0.3, emitter(2.0)))),
+            (sheet(4.0), both_sides(emitter(5.0))),
+        ];
+        let reflected = scene_of(behind, narrow.clone());
+        holds(&device, &format!("bounces, {pixel:e}"), &reflected, &options(1024), 0.3 * 2.0 + 0.7 * 5.0, 3e-3);
+        let mut lit = scene_of(vec![(sheet(0.0), matte(0.5)), (sheet(3.0), covered(0.6, matte(0.0)))], narrow);
+        lit.lights.push(Light {
+            name: String::new(),
+            kind: LightKind::Directional { angle: 0.0 },
+            intensity: Vec3::splat(4.0),
+            position: DVec3::ZERO,
+            direction: DVec3::NEG_Z,
+            range: f64::INFINITY,
+        });
+        let direct = PathOptions { max_depth: 1, ..options(1024) };
+        let expected = 0.4 * 4.0 * 0.5 / std::f64::consts::PI;
+        holds(&device, &format!("rays to lights, {pixel:e}"), &lit, &direct, expected, 4e-3);
+    }
+}
+
 /// A box of index 1 that absorbs: light goes straight through it and loses e^(-a d).
 #[test]
 fn gpu_absorption() {
@@ -125,6 +161,47 @@ fn gpu_shading_normals_make_no_light() {
     assert_validation_clean(&device);
 }
 
+/// Texels of 16 bits and floats are what they are, with and without filtering; integers are sRGB where textures are, floats never.
+#[test]
+fn gpu_deep_texels() {
+    let device = device();
+    let slot = Some(TextureSlot { texture: 0, texcoord: 0, transform: Affine2::IDENTITY });
+    let with = |texels: TexelData, filter: Filter, material: Material| {
+        let width = texels.len() as u32;
+        let texture = Texture { name: String::new(), width, height: 1, texels, wrap: [Wrap::Repeat; 2], filter };
+        let behind = (sheet(-0.5), emitter(5.0));
+        Scene { textures: vec![texture], ..scene_of(vec![(textured_sheet(false), material), behind], ahead()) }
+    };
+    for filter in [Filter::Nearest, Filter::Linear] {
+        let lamp = Material { emissive_texture: slot, ..emitter(2.0) };
+        let dark = with(vec![600u16, 600, 600, 65535].into(), filter, lamp.clone());
+        holds(&device, "16 bits", &dark, &options(4), 2.0 * 600.0 / 65535.0 / 12.92, 1e-3);
+        let coded: f64 = 30001.0 / 65535.0;
+        let bright = with(vec![30001u16, 30001, 30001, 65535].into(), filter, lamp.clone());
+        let expected = 2.0 * ((coded + 0.055) / 1.055).powf(2.4);
+        holds_but_for(2e-5, &device, "16 bits, above the linear part", &bright, &options(4), expected, 1e-3);
+        let float = with(vec![7.25f32, 7.25, 7.25, 1.0].into(), filter, lamp);
+        holds(&device, "floats", &float, &options(4), 2.0 * 7.25, 1e-3);
+        // two values of alpha that are the same in 8 bits, and a cutoff between them
+        let mask = Material { base_color_texture: slot, alpha_mode: AlphaMode::Mask { cutoff: 0.5002 }, ..emitter(2.0) };
+        for (alpha, seen) in [(32800u16, 2.0), (32770, 5.0)] {
+            let mask = with(vec![65535u16, 65535, 65535, alpha].into(), filter, mask.clone());
+            holds(&device, "alpha of 16 bits", &mask, &options(4), seen, 1e-3);
+        }
+    }
+    // numbers, and not colours
+    let mapped = Material { normal_texture: slot, ..Material::default() };
+    let straight = with(vec![32768u16, 32768, 65535, 65535].into(), Filter::Linear, mapped);
+    let flat = FlatScene::for_paths(&straight);
+    for kind in tracers(&device) {
+        let view = PathOptions { view: Some(View::Normals), ..options(2) };
+        let film = render(&tracer(&device, kind, &flat), &flat, &view).image.film;
+        let off = film.mean.chunks(3).map(|p| (Vec3::from_slice(p) - Vec3::Z).length()).fold(0.0, f32::max);
+        // in 8 bits the nearest to straight is off by 0.005
+        assert!(off < 5e-5, "{kind}: off by {off}");
+    }
+}
+
 /// A square with texture coordinates and tangents along them; `mirrored`: its handedness is the other.
 fn textured_sheet(mirrored: bool) -> Geometry {
     let Geometry::Triangles(t) = sheet(0.0) else { panic!("no triangles") };
@@ -147,7 +224,7 @@ fn gpu_normal_maps_follow_tangents() {
         name: String::new(),
         width: 1,
         height: 1,
-        rgba8: x.to_vec().into(),
+        texels: x.to_vec().into(),
         wrap: [Wrap::Repeat; 2],
         filter: Filter::Nearest,
     };
@@ -183,6 +260,60 @@ fn gpu_normal_maps_follow_tangents() {
             }
         }
     }
+}
+
+/// An anisotropic mesh of a file without tangents and texture coordinates is rendered as one with tangents around the y axis; spheres, whose direction
+/// is arbitrary, are rendered, too.
+#[test]
+fn gpu_anisotropy_without_texture_coordinates() {
+    let device = device();
+    let folder = tempfile::tempdir().unwrap();
+    let Geometry::Triangles(square) = sheet(0.0) else { panic!("no triangles") };
+    let floats: Vec<f32> = square.indices.iter().flatten().flat_map(|&i| square.positions[i as usize].to_array()).collect();
+    std::fs::write(folder.path().join("a.bin"), bytemuck::cast_slice::<f32, u8>(&floats)).unwrap();
+    let count = floats.len() / 3;
+    let document = serde_json::json!({
+        "asset": { "version": "2.0" }, "scene": 0, "scenes": [{ "nodes": [0] }], "nodes": [{ "mesh": 0 }],
+        "meshes": [{ "primitives": [{ "attributes": { "POSITION": 0 }, "material": 0 }] }],
+        "accessors": [{ "bufferView": 0, "componentType": 5126, "count": count, "type": "VEC3", "min": [-4, -4, 0], "max": [4, 4, 0] }],
+        "bufferViews": [{ "buffer": 0, "byteLength": 12 * count }],
+        "buffers": [{ "uri": "a.bin", "byteLength": 12 * count }],
+        "materials": [{
+            "pbrMetallicRoughness": { "roughnessFactor": 0.3 },
+            "extensions": { "KHR_materials_anisotropy": { "anisotropyStrength": 0.9, "anisotropyRotation": 0.4 } },
+        }],
+        "extensionsUsed": ["KHR_materials_anisotropy"],
+    });
+    let path = folder.path().join("a.gltf");
+    std::fs::write(&path, document.to_string()).unwrap();
+    let light = Light {
+        name: String::new(),
+        kind: LightKind::Directional { angle: 0.1 },
+        intensity: Vec3::splat(4.0),
+        position: DVec3::ZERO,
+        direction: DVec3::new(-0.3, -0.2, -1.0).normalize(),
+        range: f64::INFINITY,
+    };
+    let mut file = skylit::scene::load::load(path.to_str().unwrap()).unwrap();
+    (file.cameras, file.lights) = (vec![ahead()], vec![light.clone()]);
+    let mut ours = scene_of(vec![(textured_sheet(false), file.materials[0].clone())], ahead());
+    ours.lights.push(light.clone());
+    let ball = Geometry::Spheres(vec![Sphere { center: Vec3::ZERO, radius: 1.0 }]);
+    let mut spheres = scene_of(vec![(ball, file.materials[0].clone())], ahead());
+    spheres.lights.push(light);
+    for kind in tracers(&device) {
+        let film = |scene: &Scene| {
+            let flat = FlatScene::for_paths(scene);
+            render(&tracer(&device, kind, &flat), &flat, &options(4)).image.film
+        };
+        let (a, b) = (film(&file), film(&ours));
+        assert!(mean_of(&b).0 > 1e-3, "{kind}: nothing is lit");
+        let off = a.mean.iter().zip(&b.mean).map(|(a, b)| (a - b).abs() / (a + b + 1e-3)).fold(0.0, f32::max);
+        println!("{kind}: off by {off:e}");
+        assert!(off < 1e-4, "{kind}: off by {off}");
+        assert!(mean_of(&film(&spheres)).0 > 1e-3, "{kind}: no sphere is lit");
+    }
+    assert_validation_clean(&device);
 }
 
 /// Views are what the auxiliary outputs are, where a sample goes through the pixel's middle: at pixels that see one flat surface.

@@ -42,7 +42,7 @@ fn sheet(normal: DVec3, mapped: bool, material: Material) -> Scene {
         name: String::new(),
         width: 1,
         height: 1,
-        rgba8: vec![texel[0], texel[1], texel[2], 255].into(),
+        texels: vec![texel[0], texel[1], texel[2], 255].into(),
         wrap: [Wrap::Repeat; 2],
         filter: Filter::Nearest,
     });

@@ -5,13 +5,13 @@ use glam::{Affine2, Vec2};
 use skylit::render::path::{TextureFilter, View};
 use skylit::scene::builtin::shapes;
 use skylit::scene::material::AlphaMode;
-use skylit::scene::{Filter, Projection, Texture, TextureSlot, TriangleMesh, Wrap};
+use skylit::scene::{Filter, Projection, TexelData, Texture, TextureSlot, TriangleMesh, Wrap};
 
 const SLOT: Option<TextureSlot> = Some(TextureSlot { texture: 0, texcoord: 0, transform: Affine2::IDENTITY });
 
 fn texture(width: u32, height: u32, texel: impl Fn(u32, u32) -> [u8; 4]) -> Texture {
     let rgba8: Vec<u8> = (0..width * height).flat_map(|i| texel(i % width, i / width)).collect();
-    Texture { name: String::new(), width, height, rgba8: rgba8.into(), wrap: [Wrap::Repeat; 2], filter: Filter::Linear }
+    Texture { name: String::new(), width, height, texels: rgba8.into(), wrap: [Wrap::Repeat; 2], filter: Filter::Linear }
 }
 
 fn grey(v: u8) -> [u8; 4] {
@@ -65,6 +65,30 @@ fn options(spp: u32, texture_filter: TextureFilter) -> PathOptions {
 
 fn albedo(spp: u32, texture_filter: TextureFilter) -> PathOptions {
     PathOptions { view: Some(View::Albedo), ..options(spp, texture_filter) }
+}
+
+/// Levels of textures of 16 bits and of floats have the mean of the texture: four texels to a pixel's side.
+#[test]
+fn gpu_levels_of_deep_textures() {
+    let device = device();
+    let float: Vec<f32> = (0..64).flat_map(|i| if i % 2 == 0 { [9.0, 3.0, 0.0, 1.0] } else { [1.0; 4] }).collect();
+    let unorm: Vec<u16> = (0..64).flat_map(|i| if i % 2 == 0 { [1200u16, 600, 0, 65535] } else { [0, 0, 0, 65535] }).collect();
+    let mean = |v: [f64; 3]| v.map(|v| v / 65535.0 / 12.92);
+    for (texels, expected) in [(TexelData::from(float), [5.0, 2.0, 0.5]), (unorm.into(), mean([600.0, 300.0, 0.0]))] {
+        let image = Texture { texels, ..texture(8, 8, |_, _| grey(0)) };
+        let scene = wall(image, 4.0);
+        let flat = FlatScene::for_paths(&scene);
+        for kind in tracers(&device) {
+            let film = render(&with_levels(&device, kind, &flat), &flat, &albedo(4, TextureFilter::RayCone)).image.film;
+            for pixel in film.mean.chunks(3) {
+                for (found, expected) in pixel.iter().zip(expected) {
+                    let off = (f64::from(*found) - expected).abs();
+                    assert!(off < 1e-4 * expected + 1e-6, "{kind}: {pixel:?}, not {expected}");
+                }
+            }
+        }
+    }
+    assert_validation_clean(&device);
 }
 
 fn mean_square(a: &Film, b: &Film) -> f64 {

@@ -206,20 +206,30 @@ impl PathArgs {
             }
             integrator => {
                 let name = integrator.name();
-                if args.frames.wanted().is_some() {
-                    return wrong(format!("--integrator {name} makes stills: leave --preset and --frames out"));
-                }
-                if args.wants(Aov::Bent) || args.dump_rays.is_some() || args.ao_falloff.is_some() || args.ao_radius.is_finite()
-                {
+                if let Some(option) = args.frames.wanted() {
                     return wrong(format!(
-                        "--integrator {name} has no occlusion rays: leave --ao-radius, --ao-falloff, --aov bent and --dump-rays out"
+                        "{option} is about frames in real time, and --integrator {name} renders stills: leave it out, or use --integrator ao"
+                    ));
+                }
+                let of_occlusion = [
+                    (args.ao_radius.is_finite(), "--ao-radius"),
+                    (args.ao_falloff.is_some(), "--ao-falloff"),
+                    (args.wants(Aov::Bent), "--aov bent"),
+                    (args.dump_rays.is_some(), "--dump-rays"),
+                ];
+                if let Some((_, option)) = of_occlusion.iter().find(|o| o.0) {
+                    return wrong(format!(
+                        "{option} is about occlusion rays, and --integrator {name} traces none: leave it out, or use --integrator ao"
                     ));
                 }
                 if integrator == Integrator::Direct && self.max_depth.is_some() {
                     return wrong("--max-depth: --integrator direct has one bounce; use --integrator path".into());
                 }
                 if integrator == Integrator::AoSky && (self.environment.is_some() || !self.light.is_empty()) {
-                    return wrong("--environment, --light: nothing but a white sky shines in --integrator ao-sky".into());
+                    let option = if self.environment.is_some() { "--environment" } else { "--light" };
+                    return wrong(format!(
+                        "{option}: nothing but a white sky emits light in --integrator ao-sky; leave it out"
+                    ));
                 }
             }
         }

@@ -10,7 +10,6 @@ use glam::{DVec3, DVec4, Vec3, Vec4};
 
 use super::light_tree::{self, Bounds, LightNode};
 use super::params::INVALID;
-use crate::output::png::srgb_decode;
 use crate::sampling::CumulativeTable;
 use crate::scene::features::{AlphaClass, alpha_classes};
 use crate::scene::flatten::FlatScene;
@@ -387,11 +386,10 @@ fn radius(flat: &FlatScene) -> f64 {
 /// Mean of a texture of sRGB colours, linear, and of its alpha.
 fn mean_texture(flat: &FlatScene, texture: Option<usize>) -> Vec4 {
     let Some(texture) = texture else { return Vec4::ONE };
-    let texels = &flat.scene.textures[texture].rgba8;
+    let texels = &flat.scene.textures[texture].texels;
     let mut sum = DVec4::ZERO;
-    for p in texels.chunks_exact(4) {
-        let colour = [0, 1, 2].map(|c| f64::from(srgb_decode(f32::from(p[c]) / 255.0)));
-        sum += DVec3::from_array(colour).extend(f64::from(p[3]) / 255.0);
+    for i in 0..texels.len() {
+        sum += Vec4::from_array(texels.decode_srgb(i)).as_dvec4();
     }
-    (sum / (texels.len() / 4).max(1) as f64).as_vec4()
+    (sum / texels.len().max(1) as f64).as_vec4()
 }

@@ -62,7 +62,7 @@ fn leaf_texture(size: u32, wrap: Wrap, filter: Filter) -> Texture {
             rgba8.extend([shade(70.0), shade(130.0), shade(45.0), (alpha.clamp(0.0, 1.0) * 255.0).round() as u8]);
         }
     }
-    Texture { name: "leaf".to_owned(), width: size, height: size, rgba8: rgba8.into(), wrap: [wrap; 2], filter }
+    Texture { name: "leaf".to_owned(), width: size, height: size, texels: rgba8.into(), wrap: [wrap; 2], filter }
 }
 
 /// A tuft of `count` leaf cards around the origin. Its texture coordinates span `span` of the texture; with `alpha`, its

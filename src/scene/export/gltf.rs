@@ -5,7 +5,6 @@ mod rig;
 use std::collections::BTreeSet;
 use std::io::Cursor;
 use std::path::Path;
-use std::sync::Arc;
 
 use glam::{DAffine3, DQuat, DVec3};
 use serde_json::{Value, json};
@@ -13,7 +12,9 @@ use serde_json::{Value, json};
 use super::{Written, icosphere, material, write_buffered};
 use crate::error::{Error, Result};
 use crate::scene::animation::Shape;
-use crate::scene::{Camera, Filter, Geometry, Light, LightKind, Projection, Scene, Sphere, Texture, TriangleMesh, Wrap};
+use crate::scene::{
+    Camera, Filter, Geometry, Light, LightKind, Projection, Scene, Sphere, TexelData, Texture, TriangleMesh, Wrap,
+};
 
 /// Writes `scene` as glTF 2.0: one `.glb` file with everything in it, or a `.gltf` with a `.bin` and PNG files of the same
 /// name beside it. The extension of `path` decides. Each file appears only when it is complete, the `.gltf` last.
@@ -272,9 +273,9 @@ impl Writer {
     /// JSON of textures, images and samplers. Textures that share pixels share the image.
     fn textures(&mut self, all: &[Texture], path: &Path) -> Result<Textures, String> {
         let Textures { mut textures, mut images, mut samplers } = Textures::default();
-        let mut pixels: Vec<&Arc<[u8]>> = Vec::new();
+        let mut pixels: Vec<&TexelData> = Vec::new();
         for texture in all {
-            let source = match pixels.iter().position(|p| Arc::ptr_eq(p, &texture.rgba8)) {
+            let source = match pixels.iter().position(|p| p.is_shared_with(&texture.texels)) {
                 Some(known) => known,
                 None => {
                     let png = png(texture)?;
@@ -288,7 +289,7 @@ impl Writer {
                         self.images.push((name, png));
                     }
                     images.push(image);
-                    pixels.push(&texture.rgba8);
+                    pixels.push(&texture.texels);
                     images.len() - 1
                 }
             };
@@ -304,30 +305,27 @@ impl Writer {
 }
 
 fn png(texture: &Texture) -> Result<Vec<u8>, String> {
-    let mut png = Vec::new();
-    let (width, height) = (texture.width, texture.height);
-    let opaque = texture.rgba8.chunks_exact(4).all(|p| p[3] == 255);
-    let encoded = if opaque {
-        let rgb: Vec<u8> = texture.rgba8.chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]]).collect();
-        image::write_buffer_with_format(
-            &mut Cursor::new(&mut png),
-            &rgb,
-            width,
-            height,
-            image::ExtendedColorType::Rgb8,
-            image::ImageFormat::Png,
-        )
-    } else {
-        image::write_buffer_with_format(
-            &mut Cursor::new(&mut png),
-            &texture.rgba8,
-            width,
-            height,
-            image::ExtendedColorType::Rgba8,
-            image::ImageFormat::Png,
-        )
+    use image::ExtendedColorType::{Rgb8, Rgb16, Rgba8, Rgba16};
+    fn opaque<T: Copy>(rgba: &[T]) -> Vec<T> {
+        rgba.chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]]).collect()
+    }
+    let has_alpha = texture.texels.iter().any(|[_, _, _, alpha]| alpha < 1.0);
+    let (bytes, color) = match &texture.texels {
+        TexelData::Unorm8(rgba) if has_alpha => (rgba.to_vec(), Rgba8),
+        TexelData::Unorm8(rgba) => (opaque(rgba), Rgb8),
+        TexelData::Unorm16(rgba) if has_alpha => (bytemuck::cast_slice(rgba).to_vec(), Rgba16),
+        TexelData::Unorm16(rgba) => (bytemuck::cast_slice(&opaque(rgba)).to_vec(), Rgb16),
+        TexelData::Float(_) => {
+            return Err(format!(
+                "the texture `{}` holds floats, which no image of a glTF file does: make it a PNG",
+                texture.name
+            ));
+        }
     };
-    encoded.map_err(|e| format!("the texture `{}` cannot be encoded: {e}", texture.name))?;
+    let mut png = Vec::new();
+    let format = image::ImageFormat::Png;
+    image::write_buffer_with_format(&mut Cursor::new(&mut png), &bytes, texture.width, texture.height, color, format)
+        .map_err(|e| format!("the texture `{}` cannot be encoded: {e}", texture.name))?;
     Ok(png)
 }
 

@@ -217,6 +217,10 @@ fn repair(mesh: &mut Mesh, material: &Material, deformation: Option<&mut Deforma
     if !material.needs_tangents() {
         triangles.tangents = Vec::new();
     } else if !tangents::normalize(triangles) {
+        if material.anisotropy.strength > 0.0 && !triangles.texcoords.iter().any(|set| tangents::varies(set)) {
+            let text = "is anisotropic and has neither tangents nor texture coordinates: stretched around its y axis";
+            notes.warnings.push(format!("mesh `{}`: {text}", mesh.name));
+        }
         let slot = material.normal_texture.or(material.clearcoat.normal_texture).or(material.anisotropy.texture);
         let source = tangents::compute(triangles, slot.map_or(0, |s| s.texcoord));
         if let Some(deformation) = deformation {

@@ -1,9 +1,10 @@
-//! Image files to RGBA8.
+//! Image files to texels.
 
 use std::io::Cursor;
-use std::sync::Arc;
 
-use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits};
+use image::{ColorType, DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits};
+
+use crate::scene::TexelData;
 
 /// Largest width and height.
 const MAX_SIDE: u32 = 16384;
@@ -13,7 +14,7 @@ const MAX_SIDE: u32 = 16384;
 pub(super) struct Picture {
     pub width: u32,
     pub height: u32,
-    pub rgba8: Arc<[u8]>,
+    pub texels: TexelData,
 }
 
 /// Decodes an image of the format that its first bytes show or, for formats without a signature (TGA), that `name` ends in.
@@ -36,6 +37,23 @@ pub(super) fn decode(bytes: &[u8], name: &str) -> Result<Picture, String> {
     if u64::from(width) * u64::from(height) > 10_000 * bytes.len() as u64 || width == 0 || height == 0 {
         return Err(format!("cannot be decoded: {width}x{height} pixels from {} bytes", bytes.len()));
     }
-    let pixels = DynamicImage::from_decoder(decoder).map_err(|e| format!("cannot be decoded: {e}"))?.into_rgba8();
-    Ok(Picture { width, height, rgba8: pixels.into_raw().into() })
+    let pixels = DynamicImage::from_decoder(decoder).map_err(|e| format!("cannot be decoded: {e}"))?;
+    let texels = match pixels.color() {
+        ColorType::Rgb32F | ColorType::Rgba32F => {
+            let mut rgba = pixels.into_rgba32f().into_raw();
+            // what is not finite, or negative, would spoil every texel filtered with it
+            rgba.iter_mut().filter(|v| !(v.is_finite() && **v >= 0.0)).for_each(|v| *v = 0.0);
+            rgba.into()
+        }
+        ColorType::L16 | ColorType::La16 | ColorType::Rgb16 | ColorType::Rgba16 => {
+            let rgba = pixels.into_rgba16().into_raw();
+            // eight bits that somebody widened lose nothing by being narrowed again
+            match rgba.iter().all(|v| v % 257 == 0) {
+                true => rgba.iter().map(|v| (v / 257) as u8).collect::<Vec<u8>>().into(),
+                false => rgba.into(),
+            }
+        }
+        _ => pixels.into_rgba8().into_raw().into(),
+    };
+    Ok(Picture { width, height, texels })
 }

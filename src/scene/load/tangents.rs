@@ -1,7 +1,7 @@
 //! Tangents by MikkTSpace, the space that normal maps are baked in. <http://www.mikktspace.com>
 
 use bevy_mikktspace::{Geometry, TangentSpace, generate_tangents};
-use glam::{Vec3, Vec4};
+use glam::{Vec2, Vec3, Vec4};
 
 use super::normals;
 use crate::scene::TriangleMesh;
@@ -18,8 +18,9 @@ pub(super) fn normalize(mesh: &mut TriangleMesh) -> bool {
     !mesh.tangents.is_empty() && !mesh.normals.is_empty()
 }
 
-/// Computes tangents from set `set` of the texture coordinates, which must exist. Vertices whose triangles disagree are
-/// split; a mesh without normals becomes explicitly flat. Returns which vertex each vertex was before.
+/// Computes tangents from set `set` of the texture coordinates, or from the other set where that one is empty or the same everywhere. Where neither
+/// has a gradient, tangents are [`horizontal`]. Vertices whose triangles disagree are split; a mesh without normals becomes explicitly flat. Returns which vertex each vertex
+/// was before.
 pub(super) fn compute(mesh: &mut TriangleMesh, set: usize) -> Vec<u32> {
     let mut source: Vec<u32> = match mesh.normals.is_empty() {
         true => mesh.indices.iter().flatten().copied().collect(),
@@ -28,21 +29,37 @@ pub(super) fn compute(mesh: &mut TriangleMesh, set: usize) -> Vec<u32> {
     if mesh.normals.is_empty() {
         normals::make_flat(mesh);
     }
-    let mut corners = Corners { mesh, set, tangents: vec![Vec4::ZERO; mesh.indices.len() * 3] };
+    let set = [set, 1 - set].into_iter().find(|&s| varies(&mesh.texcoords[s]));
+    let mut corners = Corners { mesh, set: set.unwrap_or(0), tangents: vec![Vec4::ZERO; mesh.indices.len() * 3] };
     // its error type has no values
-    let made = generate_tangents(&mut corners).is_ok();
+    let made = set.is_some() && generate_tangents(&mut corners).is_ok();
     let mut tangents = corners.tangents;
     for (corner, tangent) in tangents.iter_mut().enumerate() {
-        // no texture gradient here: any direction in the surface will do
-        if !made || !tangent.is_finite() || tangent.truncate().length_squared() < 0.5 {
-            let normal = mesh.normals[mesh.indices[corner / 3][corner % 3] as usize];
-            *tangent = normal.try_normalize().unwrap_or(Vec3::Z).any_orthonormal_vector().extend(1.0);
+        let normal = mesh.normals[mesh.indices[corner / 3][corner % 3] as usize];
+        // without a gradient MikkTSpace gives the x axis, whatever the normal
+        let has_gradient = made
+            && tangent.is_finite()
+            && tangent.truncate().length_squared() > 0.5
+            && tangent.truncate().dot(normal).abs() < 0.01;
+        if !has_gradient {
+            *tangent = horizontal(normal);
         }
     }
     for original in weld(mesh, &tangents) {
         source.push(source[original as usize]);
     }
     source
+}
+
+/// Texture coordinates that are not all the same.
+pub(super) fn varies(texcoords: &[Vec2]) -> bool {
+    texcoords.windows(2).any(|w| w[0] != w[1])
+}
+
+/// The tangent of a surface without texture coordinates: around the y axis of the mesh, as the lines of latitude of a globe run; along x at the poles.
+fn horizontal(normal: Vec3) -> Vec4 {
+    let t = Vec3::new(normal.z, 0.0, -normal.x);
+    if t.length_squared() > 1e-6 { t.normalize().extend(1.0) } else { Vec4::new(1.0, 0.0, 0.0, 1.0) }
 }
 
 struct Corners<'a> {
@@ -129,7 +146,7 @@ fn weld(mesh: &mut TriangleMesh, corners: &[Vec4]) -> Vec<u32> {
     }
     // vertices that no triangle uses
     for (tangent, normal) in tangents.iter_mut().zip(&mesh.normals).filter(|(t, _)| t.w == 0.0) {
-        *tangent = normal.try_normalize().unwrap_or(Vec3::Z).any_orthonormal_vector().extend(1.0);
+        *tangent = horizontal(*normal);
     }
     mesh.tangents = tangents;
     copies

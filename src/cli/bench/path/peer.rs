@@ -118,7 +118,8 @@ fn write_scene(scene: &Scene, camera: &Camera, size: [u32; 2], folder: &PathBuf)
     }
     let textures = scene.textures.iter().map(|t| {
         Ok(json!({
-            "texels": files.add(&t.rgba8)?,
+            // the peers' own format of 8 bits
+            "texels": files.add(&t.texels.iter().flatten().map(|v| (v.min(1.0) * 255.0).round() as u8).collect::<Vec<_>>())?,
             "width": t.width,
             "height": t.height,
             "wrap": t.wrap.map(|w| match w { Wrap::Repeat => "repeat", Wrap::Mirror => "mirror", Wrap::Clamp => "clamp" }),

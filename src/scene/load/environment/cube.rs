@@ -8,7 +8,6 @@ use rayon::prelude::*;
 
 use super::{MAX_SIDE, Pixels};
 use crate::error::{Error, Result};
-use crate::output::png::srgb_decode;
 use crate::scene::load::picture;
 
 /// Names of the faces, without extension: the directions that their middles look at.
@@ -43,12 +42,15 @@ fn face(folder: &Path, name: &str) -> Result<Pixels> {
     if path.extension().is_some_and(|e| e == "hdr" || e == "exr") { super::read(path) } else { picture(path) }
 }
 
-/// Eight bits a channel, sRGB.
+/// sRGB.
 fn picture(path: &PathBuf) -> Result<Pixels> {
     let bytes = std::fs::read(path).map_err(|e| Error::read(path, &e))?;
     let p = picture::decode(&bytes, &path.to_string_lossy()).map_err(|e| Error::input(path, e))?;
-    let linear: Vec<f32> = (0..=255u8).map(|b| srgb_decode(f32::from(b) / 255.0)).collect();
-    let radiance = p.rgba8.chunks_exact(4).map(|c| Vec3::from_array([0, 1, 2].map(|i| linear[c[i] as usize]))).collect();
+    let linear = |i| {
+        let [r, g, b, _] = p.texels.decode_srgb(i);
+        Vec3::new(r, g, b)
+    };
+    let radiance = (0..p.texels.len()).into_par_iter().map(linear).collect();
     Ok(Pixels { width: p.width, height: p.height, radiance })
 }
 

@@ -56,7 +56,7 @@ pub(super) fn resolve(reader: &Reader, path: &Path, materials: &mut [Material], 
             name: name.to_owned(),
             width: picture.width,
             height: picture.height,
-            rgba8: picture.rgba8.clone(),
+            texels: picture.texels.clone(),
             wrap,
             filter,
         });

@@ -2,7 +2,6 @@
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
 use glam::{Vec3, Vec4};
 
@@ -11,7 +10,7 @@ use crate::error::{Error, Result};
 use crate::scene::load::find;
 use crate::scene::load::picture::{self, Picture};
 use crate::scene::material::{AlphaMode, Material, MaterialKind, TextureSlot, Transmission};
-use crate::scene::{Filter, Scene, Texture, Wrap};
+use crate::scene::{Filter, Scene, TexelData, Texture, Wrap};
 
 /// What faces without a (known) material look like: matte, a little darker than white.
 pub(super) fn grey(name: String) -> Material {
@@ -97,9 +96,9 @@ impl Library {
         };
         let wrap = [if options.clamp { Wrap::Clamp } else { Wrap::Repeat }; 2];
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        let Picture { width, height, rgba8 } = picture;
+        let Picture { width, height, texels } = picture;
         let texture = scene.textures.len();
-        scene.textures.push(Texture { name, width, height, rgba8, wrap, filter: Filter::Linear });
+        scene.textures.push(Texture { name, width, height, texels, wrap, filter: Filter::Linear });
         self.textures.insert(key, texture);
         Some(TextureSlot { texture, texcoord: 0, transform: options.transform })
     }
@@ -150,24 +149,27 @@ fn roughness(shininess: Option<f32>, specular: Vec3) -> f32 {
 }
 
 fn has_alpha(picture: &Picture) -> bool {
-    picture.rgba8.chunks_exact(4).any(|p| p[3] < 255)
+    picture.texels.iter().any(|[_, _, _, alpha]| alpha < 1.0)
 }
 
 /// `color` (or white) with the alpha of `alpha`, or its red where it is opaque; the size is that of the larger one.
 fn with_alpha(color: Option<Picture>, alpha: &Picture) -> Picture {
     let channel = if has_alpha(alpha) { 3 } else { 0 };
-    let color = color.unwrap_or_else(|| Picture { width: 1, height: 1, rgba8: Arc::from([255u8; 4]) });
+    let color = color.unwrap_or_else(|| Picture { width: 1, height: 1, texels: vec![255u8; 4].into() });
     let (width, height) = (color.width.max(alpha.width), color.height.max(alpha.height));
     let texel = |p: &Picture, x: u32, y: u32| {
         let x = u64::from(x) * u64::from(p.width) / u64::from(width);
         let y = u64::from(y) * u64::from(p.height) / u64::from(height);
-        ((y * u64::from(p.width) + x) * 4) as usize
+        p.texels.get((y * u64::from(p.width) + x) as usize)
     };
-    let mut rgba8 = Vec::with_capacity(4 * width as usize * height as usize);
-    for (y, x) in (0..height).flat_map(|y| (0..width).map(move |x| (y, x))) {
-        let c = texel(&color, x, y);
-        rgba8.extend_from_slice(&color.rgba8[c..c + 3]);
-        rgba8.push(alpha.rgba8[texel(alpha, x, y) + channel]);
-    }
-    Picture { width, height, rgba8: rgba8.into() }
+    let all = (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).flat_map(|(x, y)| {
+        let [r, g, b, _] = texel(&color, x, y);
+        [r, g, b, texel(alpha, x, y)[channel]]
+    });
+    let texels = match (&color.texels, &alpha.texels) {
+        (TexelData::Float(_), _) => all.collect::<Vec<f32>>().into(),
+        (TexelData::Unorm8(_), TexelData::Unorm8(_)) => all.map(|v| (v * 255.0).round() as u8).collect::<Vec<u8>>().into(),
+        _ => all.map(|v| (v * 65535.0).round() as u16).collect::<Vec<u16>>().into(),
+    };
+    Picture { width, height, texels }
 }
