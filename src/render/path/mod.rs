@@ -552,15 +552,15 @@ impl Paths {
         // what a path goes straight through is no bounce, but it takes a launch
         let straight = self.bodies.is_some() || self.asked & asked::CLEAR_WALLS != 0;
         let max_launches = if straight { self.max_depth.saturating_add(MAX_STRAIGHT) } else { self.max_depth };
-        let bounces = if self.walls.is_some() { 1 } else { BOUNCES };
-        let (mut timings, mut depth, mut left) = (Vec::new(), 0, push(0).count);
+        let (mut timings, mut depth, mut left, mut started) = (Vec::new(), 0, push(0).count, false);
         // vertex `depth` fills queue `depth % 2`
         loop {
-            let last = depth + bounces;
-            let begin = depth;
+            // rays behind walls are traced before the next vertices leave others
+            let bounces = if self.walls.is_some() { u32::from(started) } else { BOUNCES };
+            let (begin, last) = (depth, depth + bounces);
             timings.extend(commands.run(|r| {
                 r.fill(&self.counts, self.counts.size(), 0);
-                if begin == 0 {
+                if !started {
                     self.queues[0].clear(r);
                     self.shadow_queue.clear(r);
                     r.barrier();
@@ -582,6 +582,7 @@ impl Paths {
                 // what is left for the next submission
                 r.copy(self.queues[depth as usize % 2].count(), 0, &self.counts, 8 * u64::from(BOUNCES), 4);
             })?);
+            started = true;
             timings.extend(self.trace_behind_walls(commands, push(0))?);
             let counts: Vec<u32> = bytemuck::pod_collect_to_vec(&self.counts.read(0, self.counts.size())?);
             for k in begin..depth {
