@@ -5,6 +5,7 @@ to the viewer, `i` to the light. Values hold the cosine, as Mitsuba wants them."
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -160,6 +161,78 @@ def dielectric(c: Any, eta: Any) -> Any:
     return dr.select(sin2 >= 1, 1, 0.5 * (s * s + p * p))
 
 
+# energy compensation (Turquin 2019)
+
+
+def visible_normals(cosine: float, alpha: float, points: int) -> tuple[np.ndarray, np.ndarray]:
+    """A direction, and normals of GGX that are visible from it (Heitz 2018), at the middles of points x points cells."""
+    u = (np.arange(points) + 0.5) / points
+    phi, z = np.meshgrid(2 * np.pi * u, u)
+    o = np.array([np.sqrt(1 - cosine * cosine), 0, cosine])
+    v = o * [alpha, alpha, 1]
+    v /= np.linalg.norm(v)
+    # Dupuy and Benyoub (2023): a cap of the sphere, and the vector in the middle between it and the view
+    z = (1 - z) * (1 + v[2]) - v[2]
+    s = np.sqrt(np.maximum(1 - z * z, 0))
+    h = np.stack([s * np.cos(phi), s * np.sin(phi), z], -1) + v
+    h[..., :2] *= alpha
+    return o, h / np.linalg.norm(h, axis=-1, keepdims=True)
+
+
+def masked(o: float, i: np.ndarray, alpha: float) -> np.ndarray:
+    """Smith's height-correlated term for both directions over that of the view alone."""
+
+    def lambda_(c: Any) -> Any:
+        return 0.5 * (np.sqrt(1 + alpha * alpha * (1 - c * c) / (c * c)) - 1)
+
+    return (1 + lambda_(o)) / (1 + lambda_(o) + lambda_(np.maximum(np.abs(i), 1e-6)))
+
+
+def ggx_albedo(cosine: float, roughness: float, points: int = 64) -> tuple[float, float]:
+    """Of microfacets with Schlick's term: the albedo is f0 times the first and f90 times the second."""
+    alpha = max(roughness, 1e-2) ** 2
+    o, h = visible_normals(max(cosine, 1e-3), alpha, points)
+    oh = h @ o
+    i = 2 * oh * h[..., 2] - o[2]
+    share = np.where(i > 0, masked(o[2], i, alpha), 0)
+    weight = np.maximum(1 - oh, 0) ** 5
+    return float(np.mean(share * (1 - weight))), float(np.mean(share * weight))
+
+
+def glass_albedo(cosine: float, roughness: float, eta: float, points: int = 64) -> float:
+    """Of all that microfacets of glass reflect and refract."""
+    alpha = max(roughness, 1e-2) ** 2
+    o, h = visible_normals(max(cosine, 1e-3), alpha, points)
+    oh = h @ o
+    sin2 = (1 - oh * oh) / (eta * eta)
+    t = np.sqrt(np.maximum(1 - sin2, 0))
+    s, p = (oh - eta * t) / (oh + eta * t), (eta * oh - t) / (eta * oh + t)
+    f = np.where(sin2 >= 1, 1, 0.5 * (s * s + p * p))
+    up, down = 2 * oh * h[..., 2] - o[2], (oh / eta - t) * h[..., 2] - o[2] / eta
+    up = np.where(up > 0, f * masked(o[2], up, alpha), 0)
+    down = np.where((sin2 < 1) & (down < 0), (1 - f) * masked(o[2], down, alpha), 0)
+    return float(np.mean(up + down))
+
+
+class Table:
+    """A function of cosine and roughness, bilinear between its values at k / (SIZE - 1)."""
+
+    SIZE = 48
+
+    def __init__(self, function: Callable[[float, float], float]) -> None:
+        at = np.arange(self.SIZE) / (self.SIZE - 1)
+        self.values = mi.Float(np.array([function(c, r) for r in at for c in at], np.float32))
+
+    def __call__(self, cosine: Any, roughness: Any) -> Any:
+        x, y = (dr.clip(v, 0, 1) * (self.SIZE - 1) for v in (cosine, roughness))
+        i, j = (dr.minimum(mi.UInt32(v), self.SIZE - 2) for v in (x, y))
+
+        def value(di: int, dj: int) -> Any:
+            return dr.gather(mi.Float, self.values, (j + dj) * self.SIZE + i + di)
+
+        return mix(mix(value(0, 0), value(1, 0), x - i), mix(value(0, 1), value(1, 1), x - i), y - j)
+
+
 # sheen
 
 
@@ -289,6 +362,12 @@ class Gltf(mi.BSDF):
             table = np.array([charlie_albedo(max(r * r, 1e-3), m=128 if varies else 512) for r in rows])
             self.sheen_table, self.sheen_rows, self.sheen_columns = mi.Float(table.ravel()), *table.shape
 
+        self.compensation = d.compensation
+        if self.compensation and self.volume:
+            self.outside, self.inside = (Table(lambda c, r, eta=eta: glass_albedo(c, r, eta)) for eta in (self.ior, 1 / self.ior))
+        elif self.compensation:
+            self.albedo = [Table(lambda c, r, k=k: ggx_albedo(c, r)[k]) for k in (0, 1)]
+
         # a lobe is rough or smooth as a whole
         self.smooth = self.roughness**2 < SMOOTH and self.rough_texture is None
         self.clearcoat_smooth = self.clearcoat_roughness**2 < SMOOTH and self.clearcoat_roughness_texture is None
@@ -373,22 +452,47 @@ class Gltf(mi.BSDF):
         """Index beyond the surface over that on the viewer's side."""
         return dr.select(p.front, self.ior, 1 / self.ior) if self.volume else mi.Float(1)
 
-    def fresnel(self, p: Point, c: Any) -> tuple[Any, Any]:
-        """The dielectric's term, and the mixture with the metal's."""
-        c = dr.maximum(c, 1e-6)
-        if self.volume:
-            f = dielectric(c, self.eta(p))
-            tinted = f * dr.minimum(p.specular_color, 1) * p.specular
-            # beyond the critical angle everything is reflected
-            dielectric_term = dr.select(f >= 1, mi.Color3f(1), tinted)
-        else:
-            f0 = dr.minimum(((self.ior - 1) / (self.ior + 1)) ** 2 * p.specular_color, 1) * p.specular
-            dielectric_term = schlick(f0, p.specular, c)
-        return dielectric_term, mix(dielectric_term, schlick(p.base, 1, c), p.metallic)
+    def dielectric_ends(self, p: Point) -> tuple[Any, Any]:
+        """Schlick's f0 and f90 of the dielectric."""
+        return dr.minimum(((self.ior - 1) / (self.ior + 1)) ** 2 * p.specular_color, 1) * p.specular, p.specular
 
-    def below(self, p: Point, dielectric_term: Any) -> Any:
+    def dielectric_fresnel(self, p: Point, c: Any) -> Any:
+        if not self.volume:
+            return schlick(*self.dielectric_ends(p), c)
+        f = dielectric(c, self.eta(p))
+        # beyond the critical angle everything is reflected
+        return dr.select(f >= 1, mi.Color3f(1), f * dr.minimum(p.specular_color, 1) * p.specular)
+
+    def gains(self, p: Point) -> tuple[Any, Any, Any]:
+        """What compensation multiplies the reflection of the dielectric and of the metal by, and the dielectric's albedo then."""
+        c = dr.dot(p.frame.n, p.o)
+        a0, a90 = (table(c, p.roughness) for table in self.albedo)
+        f0, f90 = self.dielectric_ends(p)
+        lost = (1 - a0 - a90) / (a0 + a90)
+        gain = 1 + f0 * lost
+        return gain, 1 + p.base * lost, gain * (f0 * a0 + f90 * a90)
+
+    def glass_gain(self, p: Point) -> Any:
+        if not (self.volume and self.compensation) or self.smooth:
+            return mi.Float(1)
+        c = dr.dot(p.frame.n, p.o)
+        return 1 / dr.select(p.front, self.outside(c, p.roughness), self.inside(c, p.roughness))
+
+    def specular_fresnel(self, p: Point, c: Any) -> Any:
+        """Of the dielectric and the metal as metallic mixes them, with compensation."""
+        c = dr.maximum(c, 1e-6)
+        f, metal = self.dielectric_fresnel(p, c), schlick(p.base, 1, c)
+        if self.compensation and not self.volume and not self.smooth:
+            gain, metal_gain, _ = self.gains(p)
+            f, metal = f * gain, metal * metal_gain
+        return mix(f, metal, p.metallic) * self.glass_gain(p)
+
+    def below(self, p: Point, c: Any) -> Any:
         """Share of light that the dielectric lets through, to what is diffuse below it or to the other side; metals absorb it."""
-        return p.base * ((1 - p.metallic) * (1 - dr.max(dielectric_term)))
+        reflected = self.dielectric_fresnel(p, dr.maximum(c, 1e-6))
+        if self.compensation and not self.volume and not self.smooth:
+            reflected = self.gains(p)[2]
+        return p.base * ((1 - p.metallic) * dr.clip(1 - dr.max(reflected), 0, 1))
 
     def clearcoat_fresnel(self, p: Point, c: Any) -> Any:
         return p.clearcoat * schlick(0.04, 1.0, dr.abs(c))
@@ -426,9 +530,9 @@ class Gltf(mi.BSDF):
         o, i = p.frame.to_local(p.o), p.frame.to_local(i_world)
         up = i.z > 0
         h = dr.normalize(o + i)
-        dielectric_term, f = self.fresnel(p, dr.dot(o, h))
+        f = self.specular_fresnel(p, dr.dot(o, h))
         lobes = self.probabilities(p)
-        value = self.below(p, dielectric_term) * ((1 - p.transmission) * i.z / dr.pi)
+        value = self.below(p, dr.dot(o, h)) * ((1 - p.transmission) * i.z / dr.pi)
         pdf = lobes.diffuse * i.z / dr.pi
         if not self.smooth:
             d, g = ggx_d(h, p.ax, p.ay), ggx_g2(o, i, p.ax, p.ay)
@@ -473,7 +577,7 @@ class Gltf(mi.BSDF):
             value = ggx_d(h, p.ax, p.ay) * ggx_g2(o, i, p.ax, p.ay) / (4 * o.z)
             density = ggx_visible_pdf(o, h, p.ax, p.ay) / (4 * dr.maximum(oh, 1e-9))
             possible = i.z > 0
-        value = self.below(p, self.fresnel(p, oh)[0]) * (p.transmission * value * shadowing(p.frame.n, p.ng, i_world))
+        value = self.below(p, oh) * self.glass_gain(p) * (p.transmission * value * shadowing(p.frame.n, p.ng, i_world))
         value *= self.through_clearcoat(p, i_world) * self.through_sheen(p, i_world)
         return dr.select(possible, value, 0), dr.select(possible, lobes.transmission * density, 0)
 
@@ -483,7 +587,7 @@ class Gltf(mi.BSDF):
         """How often each lobe is sampled."""
         c = dr.maximum(dr.dot(p.frame.n, p.o), LEAST_COSINE)
         # facets refract and reflect where the whole would not
-        f = dr.clip(dr.max(self.fresnel(p, c)[1]), 0.1, 0.9)
+        f = dr.clip(dr.max(self.specular_fresnel(p, c)), 0.1, 0.9)
         inner = (1 - p.metallic) * dr.max(p.base)
         diffuse = inner * (1 - p.transmission) * (1 - 0.9 * f) + p.sheen_max
         transmission = inner * p.transmission * (1 - f)
@@ -507,7 +611,7 @@ class Gltf(mi.BSDF):
         """Transmittance of a smooth thin wall."""
         o = p.frame.to_local(p.o)
         layers = self.through_clearcoat(p, -p.o) * self.through_sheen(p, -p.o)
-        return self.below(p, self.fresnel(p, o.z)[0]) * (p.transmission * layers)
+        return self.below(p, o.z) * (p.transmission * layers)
 
     def eval_null_transmission(self, si: Any, active: Any = True) -> Any:
         return self.straight(self.point(si, active)) if self.null else mi.Color3f(0)
@@ -551,9 +655,9 @@ class Gltf(mi.BSDF):
         # delta lobes, which are mirrored at the true surface
         delta, wi = mi.Bool(False), i
         if self.smooth:
-            dielectric_term, f = self.fresnel(p, o.z)
+            f = self.specular_fresnel(p, o.z)
             layers = self.through_clearcoat(p, i) * self.through_sheen(p, i) * self.absorbed(si, p)
-            body = self.below(p, dielectric_term) * (p.transmission / (eta * eta))
+            body = self.below(p, o.z) * (p.transmission / (eta * eta))
             one = dr.select(through, body / dr.maximum(lobes.transmission, 1e-9), f / dr.maximum(lobes.specular, 1e-9))
             delta = specular | through
             sure = active & dr.select(through, possible, True)

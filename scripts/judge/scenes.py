@@ -731,6 +731,14 @@ def _(s: Judged) -> None:
     s.sky(0.1, 0.12, 0.15)
 
 
+@scene("compensation", "energy compensation: rough metal, plastic and glass", "python", size=SMALL, compensation=True)
+def _(s: Judged) -> None:
+    stage(s)
+    ball(s, surface((0.9, 0.6, 0.3), 1.0, 0.8), middle=(-0.85, 0.5, 0.2), radius=0.42)
+    ball(s, surface((0.7, 0.7, 0.7), 0.0, 0.6, extensions=khr(ior={"ior": 2.0})), middle=(0.05, 0.5, 0.4), radius=0.42)
+    ball(s, glass(0.6, (0.9, 0.95, 1.0), 1.5), middle=(0.95, 0.5, 0.2), radius=0.42)
+
+
 @scene("glass", "a glass ball", "stock")
 def _(s: Judged) -> None:
     stage(s)
