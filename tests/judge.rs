@@ -34,6 +34,8 @@ use skylit::tracer::{Needs, Tracer, TracerKind};
 
 /// Renderings with seeds of their own that an image is the mean of. Shaders are compiled once for all of them.
 const BLOCKS: u32 = 2;
+/// Failures of a scene that are printed.
+const MAX_FAILURES: usize = 6;
 /// Level of the test of all pixels of an image.
 const ALPHA: f64 = 0.01;
 /// Pixels that must pass.
@@ -367,7 +369,12 @@ fn agrees(kind: TracerKind) {
             100.0 * v.precision,
             begin.elapsed().as_secs_f64()
         );
-        failures.extend(v.failures.into_iter().map(|f| format!("{} ({}): {f}", entry.name, entry.about)));
+        let more = v.failures.len().saturating_sub(MAX_FAILURES);
+        // means and tiles come after pixels, and say more
+        failures.extend(v.failures.into_iter().rev().take(MAX_FAILURES).map(|f| format!("{} ({}): {f}", entry.name, entry.about)));
+        if more > 0 {
+            failures.push(format!("{}: and {more} more", entry.name));
+        }
     }
     assert!(failures.is_empty(), "Mitsuba and {kind} do not agree:\n{}", failures.join("\n"));
     assert_validation_clean(&device);
