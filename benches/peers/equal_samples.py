@@ -244,7 +244,7 @@ def main() -> None:
     parser.add_argument("names", nargs="*", help=f"scenes of {', '.join(SCENES)}; all without")
     parser.add_argument("--size", type=int, default=48, help="side of the images, pixels (48)")
     parser.add_argument("--seeds", type=int, default=8, help="half of them for %d samples, twice as many for %d (8)" % (SPP[1], SPP[0]))
-    parser.add_argument("--reference-spp", type=int, default=4096, help="samples of each part of a reference (4096)")
+    parser.add_argument("--reference-spp", type=int, default=2048, help="samples of each part of a reference (2048)")
     parser.add_argument("--reference-parts", type=int, default=4, help="parts of a reference, with seeds of their own (4)")
     parser.add_argument("--mitsuba", type=Path, help="folder that keeps Mitsuba's images for the next run")
     parser.add_argument("--json", type=Path, help="the rows, for other programs")

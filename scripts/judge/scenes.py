@@ -348,10 +348,10 @@ def _(s: Judged) -> None:
         s.add(quad((x, y, z), (0.12, 0, 0), (0, 0, 0.12)), lamp(40 * random.random(3) ** 2 + 1))
 
 
-@scene("light-mesh", "a body of many triangles that shines", "stock")
+@scene("light-mesh", "a mesh of 320 triangles that emits", "stock")
 def _(s: Judged) -> None:
     s.floor()
-    s.add(icosphere((0.8, 0.9, 0.3), 0.35, 1), lamp((8, 6, 3)))
+    s.add(icosphere((0.8, 0.9, 0.3), 0.35, 2), lamp((8, 6, 3)))
     s.add(box((-1.3, 0.02, -0.8), (-0.3, 1.1, 0.2)), matte((0.4, 0.5, 0.7)))
 
 
