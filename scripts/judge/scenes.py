@@ -529,7 +529,7 @@ def _(s: Judged) -> None:
     s.sky(0.5, 0.6, 0.7)
 
 
-@scene("texture-coat", "textures of clearcoat (factor, roughness, normal) and of sheen (colour, roughness)", "python", size=SMALL)
+@scene("texture-coat", "textures of clearcoat (factor, roughness, normal) and of sheen (colour, roughness)", "python", size=SMALL, spp=1024)
 def _(s: Judged) -> None:
     stage(s)
     coat = patches(4, 27)
@@ -545,7 +545,7 @@ def _(s: Judged) -> None:
     s.add(quad((0.75, 0.75, 0), (1.3, 0, -0.2), (0, 1.1, -0.9)), surface((0.3, 0.1, 0.2), 0.0, 0.8, extensions=cloth))
 
 
-@scene("texture-specular", "textures of transmission, specular (factor, colour) and anisotropy", "python", size=SMALL)
+@scene("texture-specular", "textures of transmission, specular (factor, colour) and anisotropy", "python", size=SMALL, spp=1024)
 def _(s: Judged) -> None:
     stage(s)
 
