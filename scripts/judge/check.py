@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
-"""Holds the BSDFs of bsdf.py to themselves: what `sample` draws against integrals of `eval` and `pdf` over the sphere, and reciprocity.
+"""Holds the BSDFs of bsdf.py to themselves: what `sample` gives against integrals of `eval` and `pdf` over the sphere, and reciprocity.
 
-    venv/bin/python scripts/judge/check.py"""
+    venv/bin/python scripts/judge/check.py [SCENE ...]"""
 
 from __future__ import annotations
 
@@ -21,14 +21,15 @@ from scenes import SCENES, TESTS  # noqa: E402
 N = 1 << 21
 
 
-def at(cosine: float, phi: float = 0.4) -> Any:
-    """A point of a plane seen under this cosine; negative: from behind."""
+def at(cosine: float, phi: float = 0.4, tilt: float = 0.0) -> Any:
+    """A point of a plane seen under this cosine (negative: from behind), whose shading normal has this angle to the plane's."""
     si = dr.zeros(mi.SurfaceInteraction3f, N)
     si.n = mi.Normal3f(0, 0, 1)
-    si.sh_frame = mi.Frame3f(mi.Normal3f(0, 0, 1))
+    si.sh_frame = mi.Frame3f(mi.Normal3f(float(np.sin(tilt)), 0, float(np.cos(tilt))))
     si.t = dr.full(mi.Float, 0.3, N)
     sine = np.sqrt(1 - cosine * cosine)
-    si.wi = mi.Vector3f(*(dr.full(mi.Float, float(x), N) for x in (sine * np.cos(phi), sine * np.sin(phi), cosine)))
+    o = mi.Vector3f(*(dr.full(mi.Float, float(x), N) for x in (sine * np.cos(phi), sine * np.sin(phi), cosine)))
+    si.wi = si.to_local(o)
     return si
 
 
@@ -46,22 +47,30 @@ def check(name: str, model: Any) -> bool:
     def uniform() -> Any:
         return mi.Point2f(rng.next_float32(), rng.next_float32())
 
-    for cosine in (0.9, 0.4, -0.7):
-        si = at(cosine)
+    for cosine, tilt in ((0.9, 0.0), (0.4, 0.0), (-0.7, 0.0), (0.5, 0.6), (-0.3, 1.0)):
+        si = at(cosine, tilt=tilt)
         bs, weight = model.sample(ctx, si, rng.next_float32(), uniform())
         delta = mi.has_flag(bs.sampled_type, mi.BSDFFlags.Delta)
-        drawn, drawn_error = summed(dr.select(delta, 0, weight))
+        sampled, sampled_error = summed(dr.select(delta, 0, weight))
         rough, _ = summed(dr.select(~delta & (bs.pdf > 0), mi.Float(1), 0))
-        # uniform over the sphere, and, where lobes are narrow, by the model's own density
+        # uniform over the sphere
         wo = mi.warp.square_to_uniform_sphere(uniform())
         value, pdf = model.eval_pdf(ctx, si, wo)
+        # directions that are lost have a density of their own: it is of what is sampled in vain
         whole, whole_error = summed(value * (4 * dr.pi))
-        density, density_error = summed(pdf * (4 * dr.pi))
-        for what, a, b, error in [("value", drawn, whole, np.hypot(drawn_error, whole_error)), ("density", rough, density, density_error)]:
+        density, density_error = summed(dr.select(dr.max(value) > 0, pdf, 0) * (4 * dr.pi))
+        quantities = [("value", sampled, whole, np.hypot(sampled_error, whole_error)), ("density", rough, density, density_error)]
+        if model.null:
+            null = mi.has_flag(bs.sampled_type, mi.BSDFFlags.Null)
+            passed, passed_error = summed(dr.select(null, weight, 0))
+            quantities.append(("transmittance", passed, summed(model.eval_null_transmission(si))[0], passed_error))
+        for what, a, b, error in quantities:
             off = np.abs(a - b) / np.maximum(error, 1e-5)
             if (off > 5).any():
                 fine = False
-                print(f"{name}, cosine {cosine}: {what} drawn {a}, integrated {b}, {off.max():.1f} sigmas")
+                print(f"{name}, cosine {cosine}, tilt {tilt}: {what} sampled {a}, integrated {b}, {off.max():.1f} sigmas")
+        if tilt != 0 or model.compensation:
+            continue
         # f(o, i) = f(i, o), but that refraction scales radiance by the square of the index
         wo = mi.warp.square_to_uniform_sphere(uniform())
         there = model.eval(ctx, si, wo) / dr.abs(mi.Frame3f.cos_theta(wo))
@@ -82,18 +91,23 @@ def check(name: str, model: Any) -> bool:
     return fine
 
 
+def without_textures(value: Any) -> Any:
+    if not isinstance(value, dict):
+        return value
+    return {key: without_textures(v) for key, v in value.items() if not key.endswith("Texture")}
+
+
 def main() -> None:
     bsdf.register()
     fine = True
-    for name in SCENES:
+    for name in sys.argv[1:] or SCENES:
         scene = gltf.read(TESTS / "scenes" / f"{name}.gltf")
+        compensation = SCENES[name]().more.get("compensation", False)
         for k, material in enumerate(scene.document["materials"]):
             # tangents and textures are of meshes
             if "extensions" in material and "KHR_materials_unlit" in material["extensions"] or "emissiveFactor" in material:
                 continue
-            plain = {key: v for key, v in material.items() if not key.endswith("Texture")}
-            plain["pbrMetallicRoughness"] = {key: v for key, v in material["pbrMetallicRoughness"].items() if not key.endswith("Texture")}
-            bsdf.DESCRIPTIONS.append(bsdf.Description(plain, scene, False, False))
+            bsdf.DESCRIPTIONS.append(bsdf.Description(without_textures(material), scene, False, False, compensation))
             model = mi.load_dict({"type": "gltf", "description": len(bsdf.DESCRIPTIONS) - 1})
             fine &= check(f"{name}, material {k}", model)
     print("fine" if fine else "not fine")

@@ -15,6 +15,7 @@ import numpy as np
 Array = np.ndarray
 
 FLOAT, UINT = 5126, 5125
+WRAPS = {"repeat": 10497, "mirror": 33648, "clamp": 33071}
 KINDS = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4"}
 
 
@@ -28,6 +29,7 @@ class Mesh:
     uv: Array | None = None
     colors: Array | None = None
     tangents: Array | None = None
+    uv1: Array | None = None
 
 
 def png(rgba: Array) -> bytes:
@@ -90,31 +92,32 @@ class Writer:
             accessor |= {"min": packed.min(0).tolist(), "max": packed.max(0).tolist()}
         return self.add("accessors", accessor)
 
-    def texture(self, rgba: Array, wrap: str = "repeat", nearest: bool = False) -> int:
-        mode = {"repeat": 10497, "mirror": 33648, "clamp": 33071}[wrap]
+    def texture(self, rgba: Array, wrap: str | tuple[str, str] = "repeat", nearest: bool = False) -> int:
+        """`wrap` is one mode for both axes, or one of each."""
+        s, t = (WRAPS[mode] for mode in ((wrap, wrap) if isinstance(wrap, str) else wrap))
         f = 9728 if nearest else 9729
         uri = "data:image/png;base64," + base64.b64encode(png(rgba)).decode()
-        sampler = self.add("samplers", {"magFilter": f, "minFilter": f, "wrapS": mode, "wrapT": mode})
+        sampler = self.add("samplers", {"magFilter": f, "minFilter": f, "wrapS": s, "wrapT": t})
         return self.add("textures", {"sampler": sampler, "source": self.add("images", {"uri": uri})})
 
     def material(self, **m: Any) -> int:
         self.used |= set(m.get("extensions", {}))
         return self.add("materials", m)
 
-    def mesh(self, mesh: Mesh, material: int) -> int:
-        attributes = {"POSITION": mesh.positions, "NORMAL": mesh.normals, "TEXCOORD_0": mesh.uv}
+    def mesh(self, mesh: Mesh, material: int, name: str = "") -> int:
+        attributes = {"POSITION": mesh.positions, "NORMAL": mesh.normals, "TEXCOORD_0": mesh.uv, "TEXCOORD_1": mesh.uv1}
         attributes |= {"COLOR_0": mesh.colors, "TANGENT": mesh.tangents}
         primitive = {"attributes": {k: self.accessor(v) for k, v in attributes.items() if v is not None}}
         primitive |= {"indices": self.accessor(mesh.indices.astype(np.uint32).ravel()), "material": material}
-        return self.add("meshes", {"primitives": [primitive]})
+        return self.add("meshes", {"primitives": [primitive]} | ({"name": name} if name else {}))
 
     def node(self, **n: Any) -> int:
         node = self.add("nodes", n)
         self.json["scenes"][0]["nodes"].append(node)
         return node
 
-    def place(self, mesh: Mesh, material: int, **transform: Any) -> int:
-        return self.node(mesh=self.mesh(mesh, material), **transform)
+    def place(self, mesh: Mesh, material: int, name: str = "", **transform: Any) -> int:
+        return self.node(mesh=self.mesh(mesh, material, name), **transform)
 
     def light(self, **light: Any) -> dict[str, Any]:
         """The extension that a node with this light carries."""
@@ -134,12 +137,13 @@ class Writer:
 
 @dataclass
 class Texture:
-    """An image and how it is looked up; `linear` decodes sRGB."""
+    """An image, the set of texture coordinates that it is looked up with, and how; `linear` decodes sRGB."""
 
     pixels: Array
-    wrap: str
+    wrap: tuple[str, str]
     nearest: bool
     transform: Array
+    set: int
 
     def raw(self) -> Array:
         return self.pixels.astype(np.float64) / 255
@@ -156,6 +160,8 @@ class Part:
 
     mesh: Mesh
     material: dict[str, Any]
+    name: str
+    to_world: Array
 
 
 @dataclass
@@ -171,10 +177,8 @@ class Scene:
     def texture(self, info: dict[str, Any] | None) -> Texture | None:
         if info is None:
             return None
-        assert info.get("texCoord", 0) == 0
         texture = self.document["textures"][info["index"]]
         sampler = self.document["samplers"][texture["sampler"]]
-        assert sampler["wrapS"] == sampler["wrapT"]
         uri = self.document["images"][texture["source"]]["uri"]
         t = info.get("extensions", {}).get("KHR_texture_transform", {})
         (x, y), (sx, sy), r = t.get("offset", [0, 0]), t.get("scale", [1, 1]), t.get("rotation", 0.0)
@@ -182,8 +186,10 @@ class Scene:
         c, s = np.cos(r), np.sin(r)
         move = np.array([[1, 0, x], [0, 1, y], [0, 0, 1]])
         matrix = move @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]]) @ np.diag([sx, sy, 1])
-        wrap = {10497: "repeat", 33648: "mirror", 33071: "clamp"}[sampler["wrapS"]]
-        return Texture(png_pixels(base64.b64decode(uri.split(",")[1])), wrap, sampler["magFilter"] == 9728, matrix)
+        modes = {number: mode for mode, number in WRAPS.items()}
+        wrap = (modes[sampler["wrapS"]], modes[sampler["wrapT"]])
+        pixels = png_pixels(base64.b64decode(uri.split(",")[1]))
+        return Texture(pixels, wrap, sampler["magFilter"] == 9728, matrix, info.get("texCoord", 0))
 
 
 def matrix_of(node: dict[str, Any]) -> Array:
@@ -221,7 +227,7 @@ def read(path: Path) -> Scene:
         values = values.astype(np.int64 if kind == "<u4" else np.float64)
         return values if width == 1 else values.reshape(-1, width)
 
-    def place(part: dict[str, Any], m: Array) -> Part:
+    def place(part: dict[str, Any], name: str, m: Array) -> Part:
         a = {k: accessor(v) for k, v in part["attributes"].items()}
         linear, indices = m[:3, :3], accessor(part["indices"]).reshape(-1, 3)
         if np.linalg.det(linear) < 0:
@@ -237,16 +243,18 @@ def read(path: Path) -> Scene:
             normals=unit(a["NORMAL"] @ np.linalg.inv(linear)),
             indices=indices,
             uv=a.get("TEXCOORD_0"),
+            uv1=a.get("TEXCOORD_1"),
             colors=a.get("COLOR_0"),
             tangents=tangents,
         )
-        return Part(mesh, document["materials"][part["material"]])
+        return Part(mesh, document["materials"][part["material"]], name, m)
 
     def visit(index: int, above: Array) -> None:
         node = document["nodes"][index]
         m = above @ matrix_of(node)
         if "mesh" in node:
-            scene.parts.extend(place(p, m) for p in document["meshes"][node["mesh"]]["primitives"])
+            mesh = document["meshes"][node["mesh"]]
+            scene.parts.extend(place(p, mesh.get("name", ""), m) for p in mesh["primitives"])
         if "camera" in node:
             scene.camera, scene.camera_to_world = document["cameras"][node["camera"]], m
         light = node.get("extensions", {}).get("KHR_lights_punctual")

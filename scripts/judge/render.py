@@ -30,19 +30,21 @@ import emitters  # noqa: E402
 import gltf  # noqa: E402
 from scenes import TESTS  # noqa: E402
 
-# between the two sides of a lamp that shines both ways: Mitsuba's shine one way
+# between the two sides of an emitter that emits both ways: Mitsuba's emit one way
 GAP = 2e-4
+# at this distance a disk is a directional light with an angle; what its rays differ by over a scene is below 1e-4
+FAR = 1e5
 # how much finer than the file Mitsuba's environment is, whose rows lie elsewhere
 FINER = 24
 
 
-def write_ply(path: Path, mesh: gltf.Mesh, smooth: bool) -> None:
-    """Binary PLY with what of the mesh Mitsuba is to know."""
+def write_ply(path: Path, mesh: gltf.Mesh, smooth: bool, uv: np.ndarray | None) -> None:
+    """Binary PLY: positions, normals where they are not those of the faces, and one set of texture coordinates."""
     columns = [("x y z", mesh.positions)]
     if smooth:
         columns.append(("nx ny nz", mesh.normals))
-    if mesh.uv is not None:
-        columns.append(("u v", mesh.uv))
+    if uv is not None:
+        columns.append(("u v", uv))
     names = " ".join(n for n, _ in columns).split()
     header = ["ply", "format binary_little_endian 1.0", f"element vertex {len(mesh.positions)}"]
     header += [f"property float {n}" for n in names]
@@ -64,12 +66,62 @@ def rgb(color: Any) -> dict[str, Any]:
     return {"type": "rgb", "value": [float(c) for c in color[:3]]}
 
 
+def light_spec(text: str) -> tuple[str, dict[str, Any]]:
+    """The kind of a light of `--light`, and its values; `power` is the colour times intensity, irradiance or radiance."""
+    kind, *words = text.split()
+    numbers = {k: np.array([float(x) for x in v.split(",")]) for k, v in (w.split("=") for w in words)}
+    strength = next(numbers[k] for k in ("intensity", "irradiance", "radiance") if k in numbers)
+    return kind, numbers | {"power": strength * numbers.get("color", np.ones(3))}
+
+
+def facing(position: Any, direction: Any, half: Any) -> Any:
+    """The transform of a unit square or disk at a position, which faces a direction, its first axis horizontal; docs/path.md."""
+    front = gltf.unit(np.array(direction, float))
+    u = np.cross([0, 1, 0], front)
+    u = gltf.unit(u) if np.linalg.norm(u) > 1e-6 else np.array([1.0, 0, 0])
+    m = np.eye(4)
+    m[:3] = np.stack([u * half[0], np.cross(front, u) * half[1], front, position], 1)
+    return mi.ScalarTransform4f(m)
+
+
+def is_inside(point: np.ndarray, mesh: gltf.Mesh) -> bool:
+    """Does a closed mesh hold a point? By the solid angle that its triangles fill (van Oosterom and Strackee 1983)."""
+    a, b, c = (mesh.positions[mesh.indices[:, k]] - point for k in range(3))
+    la, lb, lc = (np.linalg.norm(x, axis=-1) for x in (a, b, c))
+    dot = lambda x, y: np.sum(x * y, -1)  # noqa: E731
+    angle = 2 * np.arctan2(dot(a, np.cross(b, c)), la * lb * lc + dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb)
+    return bool(abs(angle.sum()) > 2 * np.pi)
+
+
 class Builder:
     """From glTF to what Mitsuba's load_dict takes."""
 
     def __init__(self, scene: gltf.Scene, entry: dict[str, Any], folder: Path) -> None:
         self.scene, self.entry, self.folder = scene, entry, folder
         self.count = 0
+        self.volumes = [part for part in scene.parts if "KHR_materials_volume" in part.material.get("extensions", {})]
+        self.media: dict[int, Any] = {}
+
+    def volume_at(self, point: np.ndarray, but: gltf.Part | None = None) -> gltf.Part | None:
+        """The innermost volume that holds a point."""
+        holding = [v for v in self.volumes if v is not but and is_inside(point, v.mesh)]
+        return min(holding, key=lambda v: np.prod(np.ptp(v.mesh.positions, axis=0)), default=None)
+
+    def medium(self, part: gltf.Part | None) -> Any:
+        """What fills a volume, if that absorbs; one object, which all surfaces of the volume refer to."""
+        volume = {} if part is None else part.material["extensions"]["KHR_materials_volume"]
+        if "attenuationDistance" not in volume:
+            return None
+        if id(part) not in self.media:
+            sigma = -np.log(volume["attenuationColor"]) / volume["attenuationDistance"]
+            # Mitsuba scales the coefficient: the largest one stays outside
+            medium = {"type": "homogeneous", "albedo": 0.0, "sigma_t": rgb(sigma / sigma.max()), "scale": float(sigma.max())}
+            self.media[id(part)] = mi.load_dict(medium)
+        return self.media[id(part)]
+
+    def surroundings(self, part: gltf.Part) -> gltf.Part | None:
+        """The volume that a volume is in."""
+        return self.volume_at(part.mesh.positions[0], part)
 
     def base(self, part: gltf.Part) -> dict[str, Any]:
         """Base colour as a texture of Mitsuba's: a factor and one of texture and colours at vertices."""
@@ -99,20 +151,27 @@ class Builder:
             return {"type": "twosided", "bsdf": {"type": "conductor", "material": "none"}}
         if names == {"transmission", "volume", "ior"} and roughness == 0 and extensions["KHR_materials_transmission"] == {"transmissionFactor": 1.0}:
             assert pbr["baseColorFactor"] == [1, 1, 1, 1]
-            return {"type": "dielectric", "int_ior": extensions["KHR_materials_ior"]["ior"], "ext_ior": 1.0}
+            around = self.surroundings(part)
+            outer = 1.0 if around is None else around.material["extensions"]["KHR_materials_ior"]["ior"]
+            return {"type": "dielectric", "int_ior": extensions["KHR_materials_ior"]["ior"], "ext_ior": outer}
         return None
 
-    def alpha(self, material: dict[str, Any], inner: dict[str, Any]) -> dict[str, Any]:
-        """What is there in part."""
+    def opacity(self, material: dict[str, Any]) -> tuple[gltf.Texture, np.ndarray] | None:
+        """Alpha per texel, of what is not opaque."""
         mode, pbr = material.get("alphaMode", "OPAQUE"), material["pbrMetallicRoughness"]
         if mode == "OPAQUE":
-            return inner
+            return None
         texture = self.scene.texture(pbr["baseColorTexture"])
         opacity = texture.raw()[..., 3:] * pbr.get("baseColorFactor", [1, 1, 1, 1])[3]
         if mode == "MASK":
             assert texture.nearest, "a cutoff of what is interpolated"
             opacity = (opacity >= material.get("alphaCutoff", 0.5)).astype(float)
-        return {"type": "mask", "opacity": bsdf.bitmap(texture, opacity), "bsdf": inner}
+        return texture, opacity
+
+    def alpha(self, material: dict[str, Any], inner: dict[str, Any]) -> dict[str, Any]:
+        """A material with its alpha."""
+        opacity = self.opacity(material)
+        return inner if opacity is None else {"type": "mask", "opacity": bsdf.bitmap(*opacity), "bsdf": inner}
 
     def material(self, part: gltf.Part) -> dict[str, Any]:
         # stock BSDFs know nothing of shading normals that send light through the surface
@@ -120,7 +179,13 @@ class Builder:
         if inner is None:
             assert self.entry["judge"] == "python", f"{self.entry['name']} is not for Mitsuba's own BSDFs: {part.material}"
             bsdf.DESCRIPTIONS.append(
-                bsdf.Description(part.material, self.scene, part.mesh.colors is not None, part.mesh.tangents is not None)
+                bsdf.Description(
+                    part.material,
+                    self.scene,
+                    part.mesh.colors is not None,
+                    part.mesh.tangents is not None,
+                    self.entry.get("compensation", False),
+                )
             )
             inner = {"type": "gltf", "description": len(bsdf.DESCRIPTIONS) - 1}
         return self.alpha(part.material, inner)
@@ -134,7 +199,16 @@ class Builder:
         if not factor.any():
             return None
         texture = self.scene.texture(material.get("emissiveTexture"))
-        radiance = rgb(factor) if texture is None else bsdf.bitmap(texture, texture.linear()[..., :3] * factor)
+        values = None if texture is None else texture.linear()[..., :3] * factor
+        opacity = self.opacity(material)
+        if opacity is not None:
+            # Mitsuba's emitters do not know the alpha of their surfaces
+            if texture is None:
+                texture, values = opacity[0], opacity[1] * factor
+            else:
+                assert texture.nearest and opacity[0].nearest and texture.pixels.shape == opacity[0].pixels.shape
+                values = values * opacity[1]
+        radiance = rgb(factor) if texture is None else bsdf.bitmap(texture, values)
         return {"type": "area", "radiance": radiance}
 
     def shapes(self, part: gltf.Part) -> dict[str, Any]:
@@ -148,24 +222,52 @@ class Builder:
             down = 0.5 * GAP * mesh.normals
             back = gltf.Mesh(mesh.positions - down, -mesh.normals, mesh.indices[:, ::-1], mesh.uv)
             sides = [gltf.Mesh(mesh.positions + down, mesh.normals, mesh.indices, mesh.uv), back]
+        # Mitsuba's own BSDFs know one set of texture coordinates; ours find the second as an attribute
+        slot = part.material["pbrMetallicRoughness"].get("baseColorTexture", {}) | part.material.get("emissiveTexture", {})
+        second = material["type"] != "gltf" and slot.get("texCoord", 0) == 1
         for side in sides:
-            path = self.folder / f"{self.count}.ply"
-            write_ply(path, side, smooth)
-            shape = {"type": "ply", "filename": str(path), "face_normals": not smooth, "bsdf": material}
+            shape: dict[str, Any] = {"bsdf": material}
+            if part.name == "sphere":
+                # the analytic sphere that the mesh stands for
+                radius = np.linalg.norm(part.to_world[:3, 0])
+                shape |= {"type": "sphere", "center": part.to_world[:3, 3].tolist(), "radius": float(radius)}
+            else:
+                path = self.folder / f"{self.count}.ply"
+                write_ply(path, side, smooth, side.uv1 if second else side.uv)
+                shape |= {"type": "ply", "filename": str(path), "face_normals": not smooth}
             if emission:
                 shape["emitter"] = emission
-            volume = part.material.get("extensions", {}).get("KHR_materials_volume", {})
-            if material["type"] == "dielectric" and "attenuationDistance" in volume:
-                sigma = -np.log(volume["attenuationColor"]) / volume["attenuationDistance"]
-                # Mitsuba scales the coefficient: the largest one stays outside
-                shape["interior"] = {"type": "homogeneous", "albedo": 0.0, "sigma_t": rgb(sigma / sigma.max()), "scale": float(sigma.max())}
+            if material["type"] == "dielectric":
+                media = {"interior": self.medium(part), "exterior": self.medium(self.surroundings(part))}
+                shape |= {k: m for k, m in media.items() if m is not None}
             loaded = mi.load_dict(shape)
-            for name, values in [("vertex_color", side.colors), ("vertex_tangent", side.tangents)]:
-                if values is not None:
+            uv1 = None if side.uv1 is None else np.pad(side.uv1, ((0, 0), (0, 1)))
+            for name, values in [("vertex_color", side.colors), ("vertex_tangent", side.tangents), ("vertex_uv1", uv1)]:
+                if values is not None and part.name != "sphere":
                     loaded.add_attribute(name, 3, mi.Float(values[:, :3].astype(np.float32).ravel()))
             out[f"shape_{self.count}"] = loaded
             self.count += 1
         return out
+
+    def option_light(self, text: str) -> dict[str, Any]:
+        """A light of `--light`."""
+        kind, v = light_spec(text)
+        if kind == "point":
+            return {"type": "point", "position": v["position"].tolist(), "intensity": rgb(v["power"])}
+        if kind == "sun" and "angle" not in v:
+            return {"type": "directional", "direction": v["direction"].tolist(), "irradiance": rgb(v["power"])}
+        shape: dict[str, Any] = {"bsdf": {"type": "diffuse", "reflectance": rgb([0, 0, 0])}}
+        shape["emitter"] = {"type": "area", "radiance": rgb(v["power"])}
+        if kind == "sun":
+            half = np.radians(0.5 * v["angle"][0])
+            middle = -FAR * gltf.unit(v["direction"])
+            shape["emitter"]["radiance"] = rgb(v["power"] / (np.pi * np.sin(half) ** 2))
+            radius = FAR * np.tan(half)
+            return shape | {"type": "disk", "to_world": facing(middle, v["direction"], [radius, radius])}
+        if kind == "sphere":
+            return shape | {"type": "sphere", "center": v["position"].tolist(), "radius": float(v["radius"][0])}
+        half = 0.5 * v["size"] if kind == "rectangle" else np.repeat(v["radius"], 2)
+        return shape | {"type": kind, "to_world": facing(v["position"], v["direction"], half)}
 
     def light(self, light: dict[str, Any]) -> dict[str, Any]:
         intensity = np.array(light.get("color", [1, 1, 1])) * light.get("intensity", 1.0)
@@ -206,7 +308,10 @@ class Builder:
         width, height = self.entry.get("size", [32, 32])
         film = {"type": "hdrfilm", "width": width, "height": height, "pixel_format": "rgb", "component_format": "float32"}
         film["rfilter"] = {"type": "box"}
-        common = {"film": film, "sampler": {"type": "independent"}, "near_clip": 1e-3, "far_clip": 1e4}
+        common = {"film": film, "sampler": {"type": "independent"}, "near_clip": 1e-3, "far_clip": 10 * FAR}
+        medium = self.medium(self.volume_at(m[:3, 3]))
+        if medium is not None:
+            common["medium"] = medium
         if camera["type"] == "orthographic":
             half = camera["orthographic"]["ymag"]
             to_world = to_world @ np.diag([half * width / height, half, 1.0, 1.0])
@@ -225,6 +330,7 @@ class Builder:
         for part in self.scene.parts:
             d |= self.shapes(part)
         d |= {f"light_{k}": self.light(light) for k, light in enumerate(self.scene.lights)}
+        d |= {f"option_light_{k}": self.option_light(text) for k, text in enumerate(self.entry.get("lights", []))}
         environment = self.environment()
         if environment:
             d["environment"] = environment

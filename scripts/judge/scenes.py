@@ -44,7 +44,8 @@ def merged(meshes: list[Mesh]) -> Mesh:
         return None if any(v is None for v in values) else np.concatenate(values)
 
     indices = np.concatenate([m.indices + k for m, k in zip(meshes, first)])
-    return Mesh(all_of("positions"), all_of("normals"), indices, all_of("uv"), all_of("colors"), all_of("tangents"))
+    names = ("uv", "colors", "tangents", "uv1")
+    return Mesh(all_of("positions"), all_of("normals"), indices, *map(all_of, names))
 
 
 def box(lo: Any, hi: Any, inside: bool = False) -> Mesh:
@@ -162,6 +163,14 @@ def bumps(n: int, seed: int, tilt: float) -> Array:
     return np.concatenate([rgb, np.full((n, n, 1), 255)], -1).astype(np.uint8)
 
 
+def brush(n: int, seed: int) -> Array:
+    """Directions of anisotropy at random, and strengths."""
+    random = np.random.default_rng(seed)
+    angle = random.uniform(0, 2 * np.pi, (n, n))
+    rgb = np.stack([0.5 + 0.5 * np.cos(angle), 0.5 + 0.5 * np.sin(angle), random.uniform(0.3, 1, (n, n)), np.ones((n, n))], -1)
+    return np.round(255 * rgb).astype(np.uint8)
+
+
 # scenes
 
 @dataclass
@@ -174,8 +183,12 @@ class Judged:
     writer: Writer = field(default_factory=Writer)
     more: dict[str, Any] = field(default_factory=dict)
 
-    def add(self, mesh: Mesh, material: dict[str, Any], **transform: Any) -> None:
-        self.writer.place(mesh, self.writer.material(**material), **transform)
+    def add(self, mesh: Mesh, material: dict[str, Any], name: str = "", **transform: Any) -> None:
+        self.writer.place(mesh, self.writer.material(**material), name, **transform)
+
+    def sphere(self, middle: Any, radius: float, material: dict[str, Any]) -> None:
+        """An analytic sphere. glTF has none: a mesh of this name stands for it, and both renderers put the sphere in its place."""
+        self.add(icosphere((0, 0, 0), 1.0, 0), material, "sphere", translation=list(middle), scale=[radius] * 3)
 
     def floor(self, material: dict[str, Any] | None = None, tiles: float = 1.0, size: float = 6.0) -> None:
         self.add(quad((0, 0, 0), (size, 0, 0), (0, 0, -size), tiles), material or matte())
@@ -198,6 +211,10 @@ class Judged:
     def sky(self, *rgb: float) -> None:
         self.more["environment"] = list(rgb)
 
+    def option_light(self, text: str) -> None:
+        """A light as `--light` takes it."""
+        self.more.setdefault("lights", []).append(text)
+
 
 def look_at(eye: Any, target: Any) -> list[float]:
     """A node's matrix that looks along -z at the target."""
@@ -211,6 +228,27 @@ def look_at(eye: Any, target: Any) -> list[float]:
 
 
 SCENES: dict[str, Callable[[], Judged]] = {}
+
+# what scenes wait for: the test leaves them out until it is there
+HALF_METALS = "half metals that mix a dielectric and a metal"
+SHADING_NORMALS = "shading normals whose light to the wrong side is lost, and their shadowing factor"
+AWAITS = {
+    "unlit": "unlit materials that ignore emissiveFactor",
+    "emitter-alpha": "light samples that respect the alpha of emitters",
+    "sun-wide": "directional lights with an angle that are visible",
+    "thin-straight": "lights that shine through smooth thin walls",
+    "nested": "nested volumes",
+    "camera-inside": "cameras that start inside of a volume",
+    "metal-half": HALF_METALS,
+    "metal-ramp": HALF_METALS,
+    "texture-rough": HALF_METALS,
+    "texture-sets": HALF_METALS,
+    "layers": HALF_METALS,
+    "smooth-normals": SHADING_NORMALS,
+    "normal-map": SHADING_NORMALS,
+    "normal-map-grazing": SHADING_NORMALS,
+    "anisotropy-tube": SHADING_NORMALS,
+}
 
 
 def scene(name: str, about: str, judge: str = "python", **more: Any) -> Callable[[Callable[[Judged], None]], Callable[[Judged], None]]:
@@ -310,10 +348,10 @@ def _(s: Judged) -> None:
         s.add(quad((x, y, z), (0.12, 0, 0), (0, 0, 0.12)), lamp(40 * random.random(3) ** 2 + 1))
 
 
-@scene("light-mesh", "a body of many triangles that shines", "stock")
+@scene("light-mesh", "a mesh of 320 triangles that emits", "stock")
 def _(s: Judged) -> None:
     s.floor()
-    s.add(icosphere((0.8, 0.9, 0.3), 0.35, 1), lamp((8, 6, 3)))
+    s.add(icosphere((0.8, 0.9, 0.3), 0.35, 2), lamp((8, 6, 3)))
     s.add(box((-1.3, 0.02, -0.8), (-0.3, 1.1, 0.2)), matte((0.4, 0.5, 0.7)))
 
 
@@ -344,8 +382,63 @@ def _(s: Judged) -> None:
 @scene("unlit", "a body that only shows its colour", "stock")
 def _(s: Judged) -> None:
     s.floor()
-    ball(s, surface((0.9, 0.3, 0.1), 0.0, 1.0, extensions=khr(unlit={})))
+    ball(s, surface((0.9, 0.3, 0.1), 0.0, 1.0, extensions=khr(unlit={}), emissiveFactor=[0.3, 0.9, 0.6]))
     s.sky(0.5, 0.5, 0.5)
+
+
+SMALL = [24, 24]
+
+
+@scene("light-rectangle", "a rectangle of --light close to a wall, and what stands before it", "stock", size=SMALL)
+def _(s: Judged) -> None:
+    s.floor()
+    s.add(quad((0, 1.5, -1.2), (6, 0, 0), (0, 3, 0)), matte((0.7, 0.6, 0.5)))
+    s.add(box((-0.5, 0.02, -0.2), (0.3, 0.6, 0.2)), matte((0.3, 0.5, 0.8)))
+    s.add(quad((0.8, 0.8, -0.3), (0.4, 0, 0.3), (0, 0.5, 0)), matte((0.8, 0.4, 0.3), doubleSided=True))
+    s.option_light("rectangle position=0.4,1.5,-0.85 direction=0.1,-0.8,-0.3 size=1.6,0.3 radiance=14 color=1,0.8,0.6")
+
+
+@scene("light-disk", "a disk of --light, and what stands before it", "stock", size=SMALL)
+def _(s: Judged) -> None:
+    s.floor()
+    s.add(box((-0.9, 0.02, -0.7), (-0.5, 1.0, -0.3)), matte((0.3, 0.7, 0.4)))
+    s.add(quad((0.3, 0.6, 0.2), (0.9, 0, 0), (0, 0, -0.5)), matte((0.7, 0.4, 0.7), doubleSided=True))
+    s.option_light("disk position=0.8,1.5,0.2 direction=-0.5,-1,-0.1 radius=0.45 radiance=11 color=0.8,1,0.9")
+
+
+@scene("spheres", "analytic spheres: matte, rough metal and glass, lit by one", "python", size=SMALL)
+def _(s: Judged) -> None:
+    s.floor()
+    s.sphere((-0.9, 0.5, 0.2), 0.45, matte((0.3, 0.5, 0.8)))
+    s.sphere((0.3, 0.42, 0.7), 0.4, glass())
+    s.sphere((0.5, 0.6, -0.7), 0.55, surface((0.95, 0.7, 0.4), 1.0, 0.4))
+    s.sphere((-0.3, 0.2, 1.1), 0.15, lamp((3, 1, 0.5)))
+    s.option_light("sphere position=-0.5,1.7,-0.6 radius=0.3 radiance=14 color=1,0.9,0.7")
+    s.sky(0.2, 0.25, 0.3)
+
+
+@scene("sun-wide", "a sun of eight degrees: in view, in a mirror, on rough metal, and the penumbra that it makes", "python", size=[30, 24])
+def _(s: Judged) -> None:
+    s.floor(matte((0.5, 0.45, 0.4)), size=8.0)
+    s.add(quad((-0.3, 0.02, 0.4), (1.0, 0, 0), (0, 0, -1.6)), surface((1, 1, 1), 1.0, 0.0))
+    s.add(quad((1.2, 0.02, 0.4), (1.2, 0, 0), (0, 0, -2.6)), surface((0.9, 0.7, 0.5), 1.0, 0.35))
+    s.add(box((-1.6, 0.02, -1.2), (-1.1, 1.1, -0.9)), matte((0.3, 0.5, 0.8)))
+    s.option_light("sun direction=0.15,-0.36,1 irradiance=3 color=1,0.9,0.7 angle=8")
+    s.camera((0, 1.5, 4.4), (0, 1.2, 0), 0.9)
+
+
+@scene("emitter-alpha", "emitters with a picture, holes cut by alpha, and there in part", "stock", integrator="volpath", size=SMALL)
+def _(s: Judged) -> None:
+    s.floor()
+    texture = s.writer.texture(patches(4, 21, lambda x, y: 255 if (x + y) % 2 else 40), "clamp", nearest=True)
+    slots = {"pbr": {"baseColorTexture": {"index": texture}}, "emissiveTexture": {"index": texture}}
+    holes = lamp((9, 9, 9)) | matte((0, 0, 0), alphaMode="MASK", **slots)
+    s.add(quad((-0.75, 0.7, -0.5), (1.1, 0, 0.3), (0, 1.1, 0)), holes | {"extensions": lamp((9, 9, 9))["extensions"]})
+    random = np.random.default_rng(22)
+    veil = s.writer.texture(patches(3, 22, lambda x, y: int(random.integers(0, 256))))
+    part = lamp((5, 6, 8)) | matte((0, 0, 0, 0.9), alphaMode="BLEND", pbr={"baseColorTexture": {"index": veil}})
+    s.add(quad((0.75, 0.7, -0.3), (1.1, 0, -0.3), (0, 1.1, 0)), part | {"extensions": lamp((5, 6, 8))["extensions"]})
+    s.add(box((0.2, 0.02, -1.4), (1.2, 0.8, -1.0)), matte((0.8, 0.5, 0.3)))
 
 
 # cameras
@@ -414,6 +507,59 @@ def _(s: Judged) -> None:
     s.floor(surface((0.8, 0.7, 0.5), 1.0, 1.0, pbr=pbr), tiles=1.5, size=4.0)
     s.lamp(middle=(0, 1.6, -1.2), side=1.4)
     s.sky(0.3, 0.4, 0.5)
+
+
+@scene("texture-sets", "axes that wrap differently; both sets of texture coordinates", "python", size=SMALL)
+def _(s: Judged) -> None:
+    def sheet(x: float, **uv: float) -> Mesh:
+        mesh = quad((x, 0, 0), (1.25, 0, 0), (0, 0, -3.2), 1.0)
+        first = mesh.uv
+        assert first is not None
+        mesh.uv, mesh.uv1 = 2.6 * first - 0.8, first @ np.array([[1.1, 0.9], [-0.9, 1.7]]) - 0.3
+        return mesh
+
+    def slot(wrap: tuple[str, str], number: int, seed: int, nearest: bool = False) -> dict[str, Any]:
+        return {"index": s.writer.texture(patches(4, seed), wrap, nearest), "texCoord": number}
+
+    s.add(sheet(-1.3), matte((1, 1, 1), pbr={"baseColorTexture": slot(("repeat", "clamp"), 0, 23, True)}))
+    s.add(sheet(0.0), matte((1, 0.9, 0.8), pbr={"baseColorTexture": slot(("clamp", "mirror"), 1, 24)}))
+    both = {"baseColorTexture": slot(("mirror", "repeat"), 0, 25), "metallicRoughnessTexture": slot(("repeat", "mirror"), 1, 26)}
+    s.add(sheet(1.3), surface((1, 1, 1), 1.0, 1.0, pbr=both))
+    s.lamp((6, 6, 6), (0.5, 1.7, -1.6), 1.4)
+    s.sky(0.5, 0.6, 0.7)
+
+
+@scene("texture-coat", "textures of clearcoat (factor, roughness, normal) and of sheen (colour, roughness)", "python", size=SMALL, spp=1024)
+def _(s: Judged) -> None:
+    stage(s)
+    coat = patches(4, 27)
+    # so rough that nothing is a mirror
+    coat[..., 1] = np.random.default_rng(28).integers(110, 256, (4, 4))
+    slots = {f"clearcoat{name}Texture": {"index": s.writer.texture(coat)} for name in ("", "Roughness")}
+    slots["clearcoatNormalTexture"] = {"index": s.writer.texture(bumps(5, 29, 0.35)), "scale": 0.9}
+    coated = khr(clearcoat={"clearcoatFactor": 1.0, "clearcoatRoughnessFactor": 0.8} | slots)
+    s.add(quad((-0.75, 0.75, 0), (1.3, 0, 0.2), (0, 1.1, -0.9)), surface((0.6, 0.2, 0.1), 0.0, 0.7, extensions=coated))
+    fibres = patches(4, 30, lambda x, y: 90 + 41 * ((x + 2 * y) % 5))
+    slots = {f"sheen{name}Texture": {"index": s.writer.texture(fibres)} for name in ("Color", "Roughness")}
+    cloth = khr(sheen={"sheenColorFactor": [0.9, 0.9, 0.8], "sheenRoughnessFactor": 0.9} | slots)
+    s.add(quad((0.75, 0.75, 0), (1.3, 0, -0.2), (0, 1.1, -0.9)), surface((0.3, 0.1, 0.2), 0.0, 0.8, extensions=cloth))
+
+
+@scene("texture-specular", "textures of transmission, specular (factor, colour) and anisotropy", "python", size=SMALL, spp=1024)
+def _(s: Judged) -> None:
+    stage(s)
+
+    def sheet(x: float) -> Mesh:
+        return quad((x, 0.7, 0.2), (0.95, 0, 0), (0, 1.1, -0.6))
+
+    window = khr(transmission={"transmissionFactor": 0.9, "transmissionTexture": {"index": s.writer.texture(patches(4, 31))}})
+    s.add(sheet(-1.05), surface((0.7, 0.9, 0.6), 0.0, 0.4, extensions=window, doubleSided=True))
+    texture = {"index": s.writer.texture(patches(4, 32, lambda x, y: 60 + 48 * ((3 * x + y) % 5)))}
+    tint = {"specularFactor": 0.9, "specularColorFactor": [1.0, 1.0, 0.8], "specularTexture": texture, "specularColorTexture": texture}
+    s.add(sheet(0.0), surface((0.1, 0.1, 0.1), 0.0, 0.35, extensions=khr(specular=tint, ior={"ior": 2.2})))
+    brushed = {"anisotropyStrength": 0.9, "anisotropyRotation": 0.4, "anisotropyTexture": {"index": s.writer.texture(brush(3, 33), nearest=True)}}
+    s.add(sheet(1.05), surface((0.9, 0.8, 0.7), 1.0, 0.35, extensions=khr(anisotropy=brushed)))
+    s.add(box((-1.4, 0.02, -1.4), (-0.8, 0.6, -0.9)), matte((0.8, 0.3, 0.2)))
 
 
 @scene("alpha-mask", "holes cut by alpha", "stock", integrator="volpath")
@@ -551,6 +697,17 @@ def _(s: Judged) -> None:
     ball(s, surface((0.9, 0.3, 0.2), 0.5, 0.35))
 
 
+@scene("metal-ramp", "metallic from 0 to 1 in steps, on a rough and on a smooth sheet", "python", size=SMALL)
+def _(s: Judged) -> None:
+    stage(s)
+    steps = np.zeros((6, 6, 4), np.uint8)
+    steps[..., 1], steps[..., 2] = 255, np.arange(0, 256, 51)
+    slot = {"metallicRoughnessTexture": {"index": s.writer.texture(steps, "clamp", nearest=True)}}
+    s.add(quad((-0.75, 0.8, 0), (1.4, 0, 0), (0, 1.3, -0.7)), surface((0.9, 0.5, 0.2), 1.0, 0.35, pbr=slot))
+    for k in range(3):
+        s.add(quad((0.31 + 0.48 * k, 0.8, 0), (0.44, 0, 0), (0, 1.3, -0.7)), surface((0.3, 0.6, 0.9), 0.25 + 0.25 * k, 0.0))
+
+
 @scene("metal-smooth", "metal and dielectric of roughness 0", "python")
 def _(s: Judged) -> None:
     stage(s)
@@ -582,6 +739,27 @@ def _(s: Judged) -> None:
     s.add(quad((0.75, 0.8, 0), (1.3, 0, 0), (0, 1.2, -0.4)), surface((0.8, 0.7, 0.5), 1.0, 0.35) | slot)
 
 
+@scene("normal-map-grazing", "normal maps under a sun that grazes them: matte, metal, and a clearcoat's own", "python", size=SMALL)
+def _(s: Judged) -> None:
+    s.floor(matte((0.5, 0.45, 0.4)))
+    texture = s.writer.texture(bumps(6, 34, 0.7))
+    slot = {"normalTexture": {"index": texture}}
+    s.add(quad((-1.15, 0.3, 0.2), (1.05, 0, 0), (0, 0, -2.6)), matte((0.8, 0.7, 0.6)) | slot)
+    s.add(quad((0.0, 0.3, 0.2), (1.05, 0, 0), (0, 0, -2.6)), surface((0.8, 0.7, 0.5), 1.0, 0.5) | slot)
+    coat = khr(clearcoat={"clearcoatFactor": 1.0, "clearcoatRoughnessFactor": 0.45, "clearcoatNormalTexture": {"index": texture}})
+    s.add(quad((1.15, 0.3, 0.2), (1.05, 0, 0), (0, 0, -2.6)), surface((0.2, 0.4, 0.7), 0.0, 0.7, extensions=coat))
+    s.light("directional", 8.0, (2.0, 0.5, -2.0), color=[1.0, 0.9, 0.8])
+    s.sky(0.1, 0.12, 0.15)
+
+
+@scene("compensation", "energy compensation: rough metal, plastic and glass", "python", size=SMALL, compensation=True)
+def _(s: Judged) -> None:
+    stage(s)
+    ball(s, surface((0.9, 0.6, 0.3), 1.0, 0.8), middle=(-0.85, 0.5, 0.2), radius=0.42)
+    ball(s, surface((0.7, 0.7, 0.7), 0.0, 0.6, extensions=khr(ior={"ior": 2.0})), middle=(0.05, 0.5, 0.4), radius=0.42)
+    ball(s, glass(0.6, (0.9, 0.95, 1.0), 1.5), middle=(0.95, 0.5, 0.2), radius=0.42)
+
+
 @scene("glass", "a glass ball", "stock")
 def _(s: Judged) -> None:
     stage(s)
@@ -608,6 +786,37 @@ def _(s: Judged) -> None:
     s.add(quad((-0.75, 0.8, 0.3), (1.3, 0, 0.3), (0, 1.2, 0.2)), clear)
     s.add(quad((0.75, 0.8, 0.3), (1.3, 0, -0.3), (0, 1.2, 0.2)), frosted)
     ball(s, matte((0.2, 0.3, 0.8)), middle=(0, 0.5, -0.9), radius=0.45)
+
+
+@scene("thin-straight", "a sun and a point light through smooth thin walls, which are no bounces", "python", integrator="volpath", max_depth=2, size=SMALL)
+def _(s: Judged) -> None:
+    s.floor()
+    ball(s, matte((0.7, 0.5, 0.3)), middle=(-0.2, 0.5, 0.0), radius=0.45)
+    for color, factor, x in [((0.9, 0.6, 0.5), 0.9, 0.75), ((0.6, 0.9, 0.95), 1.0, 0.95)]:
+        wall = surface(color, 0.0, 0.0, extensions=khr(transmission={"transmissionFactor": factor}), doubleSided=True)
+        s.add(quad((x, 0.8, 0), (0, 0, 2.4), (0.1, 1.5, 0)), wall)
+    wall = surface((0.8, 0.9, 0.7), 0.0, 0.0, extensions=khr(transmission={"transmissionFactor": 1.0}, ior={"ior": 1.8}))
+    s.add(quad((-0.9, 0.7, 1.1), (0.9, 0, 0.2), (0, 1.3, -0.1)), wall)
+    s.light("directional", 3.0, (2.0, 1.6, 0.3), color=[1.0, 0.9, 0.8])
+    s.light("point", 6.0, (1.8, 1.4, 1.0), color=[0.4, 0.6, 1.0])
+    s.sky(0.1, 0.12, 0.15)
+
+
+@scene("nested", "glass that holds water, and an absorbing body around another", "stock", integrator="volpath", size=SMALL)
+def _(s: Judged) -> None:
+    stage(s)
+    ball(s, glass(ior=1.5), middle=(-0.65, 0.62, 0), radius=0.55)
+    ball(s, glass(ior=1.33, attenuationColor=[0.4, 0.6, 0.9], attenuationDistance=0.7), middle=(-0.65, 0.62, 0), radius=0.42)
+    ball(s, glass(ior=1.4, attenuationColor=[0.9, 0.5, 0.3], attenuationDistance=0.5), middle=(0.65, 0.62, 0), radius=0.55)
+    s.add(box((0.45, 0.4, -0.2), (0.85, 0.75, 0.2)), glass(ior=1.8, attenuationColor=[0.3, 0.9, 0.5], attenuationDistance=0.4))
+
+
+@scene("camera-inside", "a camera in a body that absorbs", "stock", integrator="volpath", size=SMALL)
+def _(s: Judged) -> None:
+    stage(s)
+    ball(s, matte((0.8, 0.5, 0.3)))
+    s.add(turned_box((0.5, 1.9, 3.8), (2.0, 1.5, 2.2), 0.2), glass(ior=1.25, attenuationColor=[0.5, 0.7, 0.9], attenuationDistance=1.5))
+    s.add(box((-0.1, 1.5, 3.2), (0.25, 1.75, 3.5)), matte((0.3, 0.6, 0.4)))
 
 
 @scene("clearcoat-smooth", "a smooth coat on a matte and a rough body", "python")
@@ -690,7 +899,8 @@ def main() -> None:
     for name, make in SCENES.items():
         s = make()
         s.writer.write(folder / f"{name}.gltf")
-        entries.append({"name": name, "judge": s.judge, "about": s.about} | s.more)
+        awaits = {"awaits": AWAITS[name]} if name in AWAITS else {}
+        entries.append({"name": name, "judge": s.judge, "about": s.about} | s.more | awaits)
     lines = ",\n".join("  " + json.dumps(e) for e in entries)
     (TESTS / "scenes.json").write_text(f"[\n{lines}\n]\n")
     print(f"{len(entries)} scenes, {sum(f.stat().st_size for f in folder.iterdir()) / 1e6:.2f} MB")

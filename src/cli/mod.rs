@@ -27,6 +27,7 @@ use clap::error::ErrorKind;
 
 use crate::error::{Error, Result};
 use console::{Console, Failure};
+pub use paths::lights;
 
 /// What the process returns; part of `--help`.
 pub const EXIT_CODES: &str = "\
