@@ -21,7 +21,17 @@ void closest(uint index, Hit hit) {
     Shading m = shade(s, -r.direction, SHARP);
     c.rgb *= straight_transmittance(m, -r.direction);
     if (!(highest(c.rgb) > 0.0)) return;
+    Ray behind = Ray(s.position - m.ng * s.offset, 0.0, r.direction, INFINITY);
+    if (r.tmax < INFINITY) {
+        // to the same point: a ray that starts a little beside would end a little elsewhere, and perhaps meet the light itself
+        vec3 to = r.origin + r.tmax * r.direction - behind.origin;
+        float d = length(to);
+        behind.direction = to / d;
+        behind.tmax = d * (1.0 - SHADOW_EPSILON);
+        // the wall hides nothing that is nearer than rounding
+        if (dot(behind.direction, r.direction) <= 0.0) behind = no_ray();
+    }
     if (HAS_COVERAGE) next_ray_seed = hash(floatBitsToUint(r.tmin));
-    uint slot = append_ray(p.later, Ray(s.position - m.ng * s.offset, 0.0, r.direction, (r.tmax - hit.t) * (1.0 - SHADOW_EPSILON)), k);
+    uint slot = append_ray(p.later, behind, k);
     store_quad(p.later_contributions, slot, c);
 }

@@ -230,25 +230,7 @@ def look_at(eye: Any, target: Any) -> list[float]:
 SCENES: dict[str, Callable[[], Judged]] = {}
 
 # what scenes wait for: the test leaves them out until it is there
-HALF_METALS = "half metals that mix a dielectric and a metal"
-SHADING_NORMALS = "shading normals whose light to the wrong side is lost, and their shadowing factor"
-AWAITS = {
-    "unlit": "unlit materials that ignore emissiveFactor",
-    "emitter-alpha": "light samples that respect the alpha of emitters",
-    "sun-wide": "directional lights with an angle that are visible",
-    "thin-straight": "lights that shine through smooth thin walls",
-    "nested": "nested volumes",
-    "camera-inside": "cameras that start inside of a volume",
-    "metal-half": HALF_METALS,
-    "metal-ramp": HALF_METALS,
-    "texture-rough": HALF_METALS,
-    "texture-sets": HALF_METALS,
-    "layers": HALF_METALS,
-    "smooth-normals": SHADING_NORMALS,
-    "normal-map": SHADING_NORMALS,
-    "normal-map-grazing": SHADING_NORMALS,
-    "anisotropy-tube": SHADING_NORMALS,
-}
+AWAITS: dict[str, str] = {}
 
 
 def scene(name: str, about: str, judge: str = "python", **more: Any) -> Callable[[Callable[[Judged], None]], Callable[[Judged], None]]:
