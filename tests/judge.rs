@@ -34,10 +34,6 @@ use skylit::tracer::{Needs, Tracer, TracerKind};
 
 /// Renderings with seeds of their own that an image is the mean of. Shaders are compiled once for all of them.
 const BLOCKS: u32 = 2;
-/// Samples per pixel of a scene's with this tracer. All run one integrator, so half of them do where another has already been held to all.
-fn samples(kind: TracerKind, spp: u32) -> u32 {
-    if kind == TracerKind::Compute { spp } else { spp / 2 }
-}
 /// Failures of a scene that are printed.
 const MAX_FAILURES: usize = 6;
 /// Level of the test of all pixels of an image.
@@ -178,10 +174,9 @@ impl Entry {
         let camera = CameraRecord::new(&flat.scene.cameras[0], flat.origin, aspect);
         let n = 3 * (self.size[0] * self.size[1]) as usize;
         let (mut sums, mut squares, mut variances) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
-        let spp = samples(kind, self.spp);
         let options = PathOptions {
             size: self.size,
-            spp: spp / BLOCKS,
+            spp: self.spp / BLOCKS,
             max_depth: self.max_depth.unwrap_or(MOST_DEPTH),
             lens: self.lens.as_ref().map(|l| Lens { radius: l.radius, focus: l.focus }),
             ..Default::default()
@@ -204,7 +199,7 @@ impl Entry {
         }
         let b = f64::from(BLOCKS);
         let mean: Vec<f64> = sums.iter().map(|s| s / b).collect();
-        let variance: Vec<f64> = variances.iter().map(|v| v / b / f64::from(spp)).collect();
+        let variance: Vec<f64> = variances.iter().map(|v| v / b / f64::from(self.spp)).collect();
         let by_blocks = |k: usize| (squares[k] / b - mean[k] * mean[k]).max(0.0) / (b - 1.0);
         Estimate {
             size: self.size.map(|n| n as usize),
@@ -212,7 +207,7 @@ impl Entry {
             freedom: b - 1.0,
             variance,
             mean,
-            spp: f64::from(spp),
+            spp: f64::from(self.spp),
         }
     }
 }
@@ -364,7 +359,7 @@ fn agrees(kind: TracerKind) {
             "{} | {} | {kind} | {} | {:.2} | {:.1} | {:.1} ({:.2}) | {:+.1} | {:+.2} | {:.2} | {:.1}",
             entry.name,
             entry.judge,
-            samples(kind, entry.spp),
+            entry.spp,
             100.0 * v.share,
             v.pixel_z,
             v.tile_z,
@@ -421,7 +416,7 @@ fn judge_is_complete() {
     assert_eq!(listed(folder(), "exr"), names);
     for entry in &entries {
         assert!(["stock", "python"].contains(&entry.judge.as_str()), "{}: who is {}?", entry.name, entry.judge);
-        assert!(entry.spp % 4 == 0 && entry.spp >= 64, "{}: {} samples", entry.name, entry.spp);
+        assert!(entry.spp % 2 == 0 && entry.spp >= 64, "{}: {} samples", entry.name, entry.spp);
         entry.judged();
     }
 }
