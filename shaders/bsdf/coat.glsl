@@ -9,9 +9,9 @@ float coat_transmits(Coat coat, vec3 w) {
     return 1.0 - coat.weight * coat_fresnel(abs(dot(coat.normal, w)));
 }
 
-// The coat's normal, or the frame's where that turns away from the viewer.
+// The coat's normal, which faces the viewer but for rounding; then it is the frame's.
 vec3 coat_normal(Coat coat, vec3 wo) {
-    return dot(coat.normal, wo) > LEAST_COSINE ? coat.normal : vec3(0.0, 0.0, 1.0);
+    return dot(coat.normal, wo) > 0.0 ? coat.normal : vec3(0.0, 0.0, 1.0);
 }
 
 vec3 about(vec3 n, vec3 w) {
@@ -21,6 +21,7 @@ vec3 about(vec3 n, vec3 w) {
 BsdfValue coat_at(Coat coat, vec3 wo, vec3 wi) {
     vec3 n = coat_normal(coat, wo);
     vec3 o = about(n, wo), i = about(n, wi);
+    o.z = max(o.z, LEAST_COSINE);
     if (!(i.z > 0.0)) return NO_VALUE;
     vec3 m = normalize(o + i);
     float f = coat.weight * coat_fresnel(dot(o, m));

@@ -188,6 +188,7 @@ vec3 path_vertex(BlockParams block, uint k, PathState state, Ray ray, Hit hit) {
     Boundary boundary;
     boundary.medium = state.medium;
     bool is_boundary = asks(ASKS_MEDIA) && is_medium(m.material);
+    if (asks(ASKS_MEDIA) && state.depth + state.passes == 0u) store_media(p, k, p.camera_media);
     if (is_boundary) {
         MediaStack stack = p.camera_media;
         if (state.depth + state.passes > 0u) stack = load_media(p, k);
@@ -202,8 +203,6 @@ vec3 path_vertex(BlockParams block, uint k, PathState state, Ray ray, Hit hit) {
         m.bsdf.eta = boundary.eta;
         // what does not refract is not blurred, either
         if (abs(boundary.eta - 1.0) < LEAST_REFRACTION) m.bsdf.facets.alpha = vec2(0.0);
-    } else if (asks(ASKS_MEDIA) && state.depth + state.passes == 0u) {
-        store_media(p, k, p.camera_media);
     }
     if (m.bsdf.kind == BSDF_NONE) return added;
     if (state.depth >= p.max_depth) {

@@ -310,7 +310,7 @@ Shading shade(Surface s, vec3 wo, float log_side) {
         }
         if (coat_mapped && tangent.w != 0.0) {
             vec3 nc = mapped_normal(looked.at[USE_COAT_NORMAL], SHADING_OF(m).coat_normal_scale, s.ns, tangent) * side;
-            out_.bsdf.coat.normal = to_frame(out_.frame, nc);
+            out_.bsdf.coat.normal = to_frame(out_.frame, towards(nc, wo));
         } else if (has(HAS_COAT) && mapped) {
             // the coat has its own normals, or none
             out_.bsdf.coat.normal = to_frame(out_.frame, towards(s.ns * side, wo));
