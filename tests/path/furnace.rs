@@ -174,11 +174,7 @@ fn gpu_compensated_white_disappears() {
         ("thin walls 1", through(1.0, 0.0, 1.0)),
         ("half thin walls 0.5", through(0.5, 0.0, 0.5)),
     ];
-    let bodies = [
-        ("volume 0.2", through(1.0, 1.0, 0.2)),
-        ("volume 1", through(1.0, 1.0, 1.0)),
-        ("half volume 0.5", through(0.5, 1.0, 0.5)),
-    ];
+    let bodies = [("volume 0.2", through(1.0, 1.0, 0.2)), ("volume 1", through(1.0, 1.0, 1.0))];
     // 87 degrees
     let scenes = planes
         .into_iter()
