@@ -308,12 +308,12 @@ fn gpu_what_is_compiled_is_told() {
         render(&[&["-o", &place(&dir, "a.exr"), "--spp", "1", "--explain"], args].concat())["explain"].to_string()
     };
     let plain = told(&[]);
-    let lights = "ask for triangles that shine, a choice among lights, light samples, MIS weights; not compiled: lights at points, spots";
+    let lights = "ask for rectangles that shine, light samples, MIS weights; not compiled: lights at points, spots";
     assert!(plain.contains(lights), "{plain}");
     assert!(plain.contains("textures beside base colours: nothing; not compiled: metallic-roughness"), "{plain}");
     let light = "spot position=0.1,1,0.1 direction=0,-1,0 outer=40 intensity=3";
     let spot = told(&["--sampling", "light", "--light", light]);
-    assert!(spot.contains("ask for spots, triangles that shine, a choice among lights, light samples; not compiled"), "{spot}");
+    assert!(spot.contains("ask for spots, rectangles that shine, a choice among lights, light samples; not compiled"), "{spot}");
     let bsdf = told(&["--sampling", "bsdf", "--light", light, "--firefly-clamp", "9"]);
     assert!(bsdf.contains("ask for a clamp of fireflies; not compiled: lights at points, spots"), "{bsdf}");
     let image = place(&dir, "b.exr");
