@@ -313,7 +313,10 @@ fn gpu_what_is_compiled_is_told() {
     assert!(plain.contains("textures beside base colours: nothing; not compiled: metallic-roughness"), "{plain}");
     let light = "spot position=0.1,1,0.1 direction=0,-1,0 outer=40 intensity=3";
     let spot = told(&["--sampling", "light", "--light", light]);
-    assert!(spot.contains("ask for spots, rectangles that shine, a choice among lights, light samples; not compiled"), "{spot}");
+    assert!(
+        spot.contains("ask for spots, rectangles that shine, a choice among lights, light samples; not compiled"),
+        "{spot}"
+    );
     let bsdf = told(&["--sampling", "bsdf", "--light", light, "--firefly-clamp", "9"]);
     assert!(bsdf.contains("ask for a clamp of fireflies; not compiled: lights at points, spots"), "{bsdf}");
     let image = place(&dir, "b.exr");
