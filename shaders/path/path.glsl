@@ -76,7 +76,8 @@ BsdfSample draw_direction(Shading m, vec3 wo, vec2 u, float v) {
         return s;
     }
     if (hidden) return NO_SAMPLE;
-    BsdfValue value = bsdf_at(b, wo, wi);
+    // as light samples see the direction: near the surface a rounded cosine is not the same
+    BsdfValue value = vertex_at(m, wo, s.wi);
     s.pdf = !plain ? value.pdf : asks(ASKS_COSINE) ? wi.z / PI : 1.0 / (2.0 * PI);
     s.weight = value.f / s.pdf;
     if (!(s.pdf > 0.0)) return NO_SAMPLE;
