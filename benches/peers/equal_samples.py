@@ -3,7 +3,7 @@
 
     pip install mitsuba==3.9.1 numpy      # and LLVM's shared library: DRJIT_LIBLLVM_PATH names it where it is not found
     python3 benches/peers/equal_samples.py target/release/skylit
-    python3 benches/peers/equal_samples.py target/release/skylit disk sky-sun --mitsuba /tmp/mitsuba     # these; Mitsuba's part is kept there
+    python3 benches/peers/equal_samples.py target/release/skylit disk sky-sun --mitsuba images/mitsuba   # these; Mitsuba's part is kept there
 
 Each scene is rendered with 64 and 256 samples a pixel and several seeds by both, and held against a reference of the same engine: what its
 own samples converge to. The references' means must agree. RMSE is over pixels and channels, averaged over seeds as mean squares; the noise of
