@@ -115,8 +115,8 @@ LightSample sample_sphere(LightRecord light, vec3 from, vec2 u) {
     return LightSample(wi, distance, point, light.intensity, light.probability / (2.0 * PI * cone), false);
 }
 
-// Solid angle of a triangle whose corners lie at a, b, c, as an angle in turns and as its half's tangent is known: numerator and denominator (Van
-// Oosterom and Strackee 1983). volume: a . (b x c), the same for all triangles of one area in one plane, and exact where that of unit vectors cancels.
+// Solid angle of a triangle with corners a, b, c as seen from the origin (Van Oosterom and Strackee 1983). lengths: those of a, b, c. volume: |a . (b x c)|,
+// computed from the triangle's edges, because that of unit vectors cancels.
 float triangle_solid_angle(float volume, vec3 a, vec3 b, vec3 c, vec3 lengths) {
     float below = lengths.x * lengths.y * lengths.z + dot(a, b) * lengths.z + dot(b, c) * lengths.x + dot(c, a) * lengths.y;
     return 4.0 * PI * turns_of(volume, below);
@@ -212,7 +212,7 @@ vec2 sample_spherical_rectangle(SphericalRectangle s, vec2 u) {
     float d2 = xu * xu + z2;
     float h0 = s.y0 * inversesqrt(d2 + s.y0 * s.y0), h1 = s.y1 * inversesqrt(d2 + s.y1 * s.y1);
     float hv = mix(h0, h1, u.y), rest = (1.0 - hv) * (1.0 + hv);
-    float yv = rest > 1e-6 ? clamp(hv * sqrt(d2 / rest), s.y0, s.y1) : s.y1;
+    float yv = rest > 1e-6 ? clamp(hv * sqrt(d2 / rest), s.y0, s.y1) : hv > 0.0 ? s.y1 : s.y0;
     return vec2((xu - s.x0) / (s.x1 - s.x0), (yv - s.y0) / (s.y1 - s.y0));
 }
 
@@ -223,8 +223,7 @@ float rectangle_pdf(LightRecord light, SphericalRectangle s, float distance, vec
     return facing > 0.0 ? light.probability * distance * distance / facing : 0.0;
 }
 
-// What is left to say of a point on a triangle or rectangle but for its radiance and density: direction, distance, and a point above it. 0: nothing
-// is emitted this way.
+// A light sample at a point of a triangle or rectangle, without the density and what textures say. False where the light emits nothing that way.
 bool flat_light_point(LightRecord light, vec3 from, vec2 b, out LightSample l) {
     l = NO_LIGHT_SAMPLE;
     vec3 point = light.position + (b.x * light.axis + b.y * light.edge);
