@@ -24,5 +24,5 @@ void any(uint index, bool occluded) {
     ProbeOutputs outputs = ProbeOutputs(probe.outputs);
     outputs.v[3u * index] = uvec4(sample_2d_bits(a.x, a.yz, a.w, b.x), floatBitsToUint(u));
     outputs.v[3u * index + 1u] = uvec4(floatBitsToUint(local), occluded ? 1u : 0u);
-    outputs.v[3u * index + 2u] = uvec4(floatBitsToUint(world), 0u);
+    outputs.v[3u * index + 2u] = uvec4(floatBitsToUint(world), sample_choice_bits(a.x, a.yz, a.w, b.x).x);
 }

@@ -88,6 +88,8 @@ fn gpu_sampler_gives_the_hosts_bits() {
             let sampler = Sampler { seed };
             let bits = sampler.get_2d([x, y], sample, dimension);
             assert_eq!([got[0], got[1]], bits, "{kind}: probe {i}, {input:?}");
+            let choice = sampler.get_choice_2d([x, y], sample, dimension);
+            assert_eq!([got[11], bits[1]], choice, "{kind}: choice of probe {i}, {input:?}");
             let u = sampler.get_2d_unit([x, y], sample, dimension);
             assert_eq!([got[2], got[3]], u.map(f32::to_bits), "{kind}: probe {i}");
             assert_eq!(got[7], 0, "{kind}: a ray that is none was occluded");

@@ -54,6 +54,25 @@ fn scrambled_points_are_nets_in_every_pixel_and_dimension() {
     assert!(!is_net(&[[0, 0], [1, 1]]), "the judge can say no");
 }
 
+/// They are nets like the others, and the first numbers of the first 2^k are 2^-k apart, all of them.
+#[test]
+fn choices_are_nets_and_evenly_spaced() {
+    for k in 0..=10 {
+        for (pixel, dimension) in [([0, 0], 0), ([640, 359], 2), ([16383, 16383], 5)] {
+            let sampler = Sampler { seed: 9 };
+            let points: Vec<_> = (0..1u32 << k).map(|i| sampler.get_choice_2d(pixel, i, dimension)).collect();
+            assert!(is_net(&points), "first 2^{k} choices of {pixel:?}, {dimension}");
+            let mut first: Vec<u32> = points.iter().map(|p| p[0]).collect();
+            first.sort_unstable();
+            assert!(first.windows(2).all(|w| u64::from(w[1] - w[0]) == 1u64 << (32 - k)), "{pixel:?}, {dimension}: {first:?}");
+        }
+    }
+    // those of pixels are shifted against each other, uniformly
+    let (n, sampler) = (4096, Sampler { seed: 1 });
+    let mean: f64 = (0..n).map(|x| f64::from(to_unit(sampler.get_choice_2d([x, 3], 0, 2)[0]))).sum::<f64>() / f64::from(n);
+    assert!((mean - 0.5).abs() < 4.0 * (1.0 / 12.0 / f64::from(n)).sqrt(), "{mean}");
+}
+
 #[test]
 fn first_points_are_uniform_and_independent_between_pixels_and_dimensions() {
     // Over many pixels the first sample must be uniform, and uncorrelated with its neighbour, with the other coordinate, with

@@ -48,6 +48,13 @@ uvec2 sample_2d_bits(uint seed, uvec2 pixel, uint sample_index, uint dimension) 
     return uvec2(owen_scramble(p.x, hash_combine(seed, 0u)), owen_scramble(p.y, hash_combine(seed, 1u)));
 }
 
+// The same, but the first number, which chooses among many outcomes, is scrambled by a digital shift alone.
+uvec2 sample_choice_bits(uint seed, uvec2 pixel, uint sample_index, uint dimension) {
+    seed = hash_combine(hash_combine(hash_combine(seed, pixel.x), pixel.y), dimension);
+    uvec2 p = sobol_2d(owen_scramble(sample_index, seed));
+    return uvec2(p.x ^ hash_combine(seed, 0u), owen_scramble(p.y, hash_combine(seed, 1u)));
+}
+
 // In [0, 1): the upper 24 bits, exactly
 vec2 sample_2d(uint seed, uvec2 pixel, uint sample_index, uint dimension) {
     return vec2(sample_2d_bits(seed, pixel, sample_index, dimension) >> 8) * (1.0 / 16777216.0);

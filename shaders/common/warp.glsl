@@ -60,12 +60,6 @@ float turns_of(float y, float x) {
     return y < 0.0 ? -turns : turns;
 }
 
-// even over the sphere
-vec3 uniform_sphere(vec2 u) {
-    float z = 1.0 - 2.0 * u.x, r = sqrt(max(1.0 - z * z, 0.0));
-    return vec3(r * on_circle(u.y), z);
-}
-
 // even over the hemisphere about z
 vec3 uniform_hemisphere(vec2 u) {
     return vec3(sqrt(max(1.0 - u.x * u.x, 0.0)) * on_circle(u.y), u.x);

@@ -10,7 +10,7 @@ struct LightNode {
     vec3 center;
     float radius;
     vec3 axis;
-    float intensity;  // luminance per solid angle, in its best direction
+    float intensity;  // brightness per solid angle, in its best direction
     float cos_o;
     float sin_o;
     float cos_e;

@@ -54,14 +54,27 @@ struct LightSample {
 
 const LightSample NO_LIGHT_SAMPLE = LightSample(vec3(0.0, 0.0, 1.0), 0.0, vec3(0.0), vec3(0.0), 0.0, false);
 
-// Radiance of an environment from direction w; and the density with which it is drawn, per solid angle.
+// Radiance of the environment from direction w.
 vec3 environment_radiance(PathParams p, vec3 w) {
     if (!asks(ASKS_MAP)) return p.environment;
     return p.environment * map_radiance(p.map, w);
 }
 
-float environment_pdf(PathParams p, vec3 w) {
-    return asks(ASKS_MAP) ? map_pdf(p.map, w) : 1.0 / (4.0 * PI);
+// An environment of one colour is best sampled as a diffuse surface reflects it: by the cosine to the shading normal, on each side that light may come from.
+bool is_lit_from_behind(Shading m) { return (has_transmission() || has(HAS_GLASS)) && m.bsdf.transmitted != vec3(0.0); }
+
+float uniform_sky_pdf(Shading m, vec3 w) {
+    float c = dot(m.frame.n, w) / PI;
+    return is_lit_from_behind(m) ? 0.5 * abs(c) : max(c, 0.0);
+}
+
+// Direction and density.
+vec4 sample_uniform_sky(Shading m, vec2 u) {
+    bool behind = is_lit_from_behind(m) && u.x >= 0.5;
+    if (is_lit_from_behind(m)) u.x = behind ? 2.0 * u.x - 1.0 : 2.0 * u.x;
+    vec3 w = cosine_hemisphere(u);
+    w = from_frame(m.frame, behind ? vec3(w.xy, -w.z) : w);
+    return vec4(w, uniform_sky_pdf(m, w));
 }
 
 // Is it of this kind? What the scene has not is not compiled; and where all are of one kind, nobody has to look.
@@ -289,7 +302,7 @@ bool meets_disk(LightRecord light, vec3 w) {
 }
 
 // A light for a point that is lit, and a point on it. bits: a point of a two-dimensional sequence.
-LightSample sample_light(PathParams p, vec3 from, uvec2 bits) {
+LightSample sample_light(PathParams p, vec3 from, Shading m, uvec2 bits) {
     LightRecords lights = LightRecords(p.lights);
     vec2 v = vec2(bits >> 8) * (1.0 / 16777216.0);
     uint k = asks(ASKS_CHOICE) ? choose_light(p, bits.x, v.x) : p.light_first;
@@ -305,13 +318,12 @@ LightSample sample_light(PathParams p, vec3 from, uvec2 bits) {
     if (is_kind(light, LIGHT_TRIANGLE)) return sample_triangle(light, from, v);
     if (is_kind(light, LIGHT_SPHERE)) return sample_sphere(light, from, v);
     if (is_kind(light, LIGHT_ENVIRONMENT)) {
-        LightSample s = LightSample(uniform_sphere(v), INFINITY, vec3(0.0), p.environment, 1.0 / (4.0 * PI), false);
         if (asks(ASKS_MAP)) {
-            MapSample m = sample_map(p.map, v);
-            s = LightSample(m.wi, INFINITY, vec3(0.0), p.environment * m.radiance, m.pdf, false);
+            MapSample s = sample_map(p.map, v);
+            return LightSample(s.wi, INFINITY, vec3(0.0), p.environment * s.radiance, light.probability * s.pdf, false);
         }
-        s.pdf *= light.probability;
-        return s;
+        vec4 s = sample_uniform_sky(m, v);
+        return LightSample(s.xyz, INFINITY, vec3(0.0), p.environment, light.probability * s.w, false);
     }
     if (is_kind(light, LIGHT_DIRECTIONAL)) {
         if (light.radius == 0.0) return LightSample(-light.axis, INFINITY, vec3(0.0), light.intensity, light.probability, true);

@@ -1,6 +1,6 @@
 // Environments from images: radiance from a direction, and directions by how much light comes from there. Texels are looked up bilinearly.
-// Directions are drawn by the luminance of what is looked up: a row of patches between the middles of texels, a patch of it, and a place in the patch
-// (src/sampling/patches.rs has the formulas). The two numbers that a direction is drawn with stay in order, so that those which are
+// Directions are drawn by weights of texels (src/render/path/environment.rs), interpolated likewise: a row of patches between the middles of texels, a
+// patch of it, and a place in the patch (src/sampling/patches.rs has the formulas). The two numbers that a direction is drawn with stay in order, so that those which are
 // spread evenly are directions that are; of an emitter that nothing hides little is left to chance.
 #ifndef PATH_MAP
 #define PATH_MAP
@@ -39,7 +39,7 @@ vec3 map_radiance(EnvironmentMap map, vec3 w) {
 
 // The four texels of a patch, and where in it.
 struct Patch {
-    vec4 a, b, c, d;  // upper left, upper right, lower left, lower right: radiance, luminance
+    vec4 a, b, c, d;  // upper left, upper right, lower left, lower right: radiance, weight
     vec2 at;          // 0 to 1
 };
 

@@ -6,7 +6,7 @@
 
 // An environment in equirectangular projection.
 struct EnvironmentMap {
-    uvec2 texels;    // a quad each: linear radiance, and its luminance; null: the environment is one colour
+    uvec2 texels;    // a quad each: linear radiance, and the weight with which directions there are drawn; null: the environment is one colour
     uvec2 table;     // floats: what directions are drawn with (path/map.glsl)
     uint width;
     uint height;
@@ -48,6 +48,7 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Pa
     uvec4 camera_media;   // volumes that the camera is in
     RayQueue later;       // rays to lights that have come through thin walls
     uvec2 later_contributions;
+    uvec2 sky_densities;  // a float a path: density with which light samples at its last bounce draw its direction from an environment of one colour
 };
 
 const uint NO_MEDIUM = 0xffffffffu;

@@ -94,7 +94,9 @@ vec3 transmittance(uint medium, float length_) {
 
 // Next-event estimation: a ray to a light, and what that brings.
 void draw_light(BlockParams block, PathParams p, uint k, PathState state, Surface s, Shading m, vec3 wo, uint beyond, uvec2 pixel, uint n, uint dimension) {
-    LightSample l = sample_light(p, s.position, sample_2d_bits(block.seed, pixel, n, dimension + LIGHT_POINT_ON));
+    dimension += LIGHT_POINT_ON;
+    uvec2 bits = asks(ASKS_LIGHT_TREE) ? sample_choice_bits(block.seed, pixel, n, dimension) : sample_2d_bits(block.seed, pixel, n, dimension);
+    LightSample l = sample_light(p, s.position, m, bits);
     if (!(l.pdf > 0.0)) return;
     BsdfValue value = vertex_at(m, wo, l.wi);
     vec3 c = state.throughput * value.f * l.radiance / l.pdf;
@@ -152,8 +154,9 @@ vec3 path_vertex(BlockParams block, uint k, PathState state, Ray ray, Hit hit) {
         // as with ambient occlusion, what shows nothing counts nothing
         if ((asks(ASKS_GREY) || asks(ASKS_VIEW)) && state.depth == 0u) return vec3(0.0);
         float light = 0.0;
-        if (asks(ASKS_LIGHT_SAMPLES) && asks(ASKS_SKY)) {
-            light = LightRecords(p.lights).v[p.environment_light].probability * environment_pdf(p, ray.direction);
+        if (asks(ASKS_LIGHT_SAMPLES) && asks(ASKS_SKY) && state.depth > 0u) {
+            float of_sky = LightRecords(p.lights).v[p.environment_light].probability;
+            light = of_sky * (asks(ASKS_MAP) ? map_pdf(p.map, ray.direction) : Floats(p.sky_densities).v[k]);
         }
         vec3 c = environment_radiance(p, ray.direction) * emission_weight(p, state, light);
         if (asks(ASKS_DISKS)) c += disks_met(p, state, ray.direction);
@@ -243,6 +246,7 @@ vec3 path_vertex(BlockParams block, uint k, PathState state, Ray ray, Hit hit) {
         state.eta_scale *= b.eta * b.eta;
         state.depth++;
         if (asks(ASKS_CLEAR_WALLS)) StoredFloats(p.straight).v[k] = 0.0;
+        if (asks(ASKS_LIGHT_SAMPLES) && asks(ASKS_SKY) && !asks(ASKS_MAP)) StoredFloats(p.sky_densities).v[k] = uniform_sky_pdf(m, b.wi);
         if (state.depth >= p.rr_depth) {
             float survival = min(brightest * state.eta_scale, MOST_SURVIVAL);
             if (lobe.y >= survival) return added;

@@ -89,6 +89,15 @@ impl Sampler {
         [owen_scramble(x, hash_combine(seed, 0)), owen_scramble(y, hash_combine(seed, 1))]
     }
 
+    /// The same point set, for a first number that chooses among many outcomes: it is scrambled by a digital shift alone, so that the first `2^k` points of
+    /// any pixel and dimension have evenly spaced first numbers. An Owen scramble places each of them at random in its interval of `2^-k`: better for
+    /// smooth functions, but where an interval holds several outcomes their choice is noise.
+    pub const fn get_choice_2d(&self, pixel: [u32; 2], sample_index: u32, dimension: u32) -> [u32; 2] {
+        let seed = hash_combine(hash_combine(hash_combine(self.seed, pixel[0]), pixel[1]), dimension);
+        let [x, y] = sobol_2d(owen_scramble(sample_index, seed));
+        [x ^ hash_combine(seed, 0), owen_scramble(y, hash_combine(seed, 1))]
+    }
+
     /// [`Sampler::get_2d`] as fractions in [0, 1).
     pub fn get_2d_unit(&self, pixel: [u32; 2], sample_index: u32, dimension: u32) -> [f32; 2] {
         self.get_2d(pixel, sample_index, dimension).map(to_unit)

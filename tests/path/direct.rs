@@ -152,6 +152,37 @@ fn gpu_skies() {
     holds(&device, "large map with a sun", &sun, &options(Strategy::Light, 256), expected, 2e-3);
 }
 
+/// Nothing is left to chance where a sky of one colour lights a diffuse plane and nothing is in the way: light samples are drawn as the plane reflects
+/// them. Rough thin walls are lit from both sides, and the strategies agree on how much.
+#[test]
+fn gpu_uniform_skies_are_sampled_as_surfaces_reflect() {
+    let device = device();
+    let scene = Scene { environment: Environment::Uniform(Vec3::splat(2.0)), ..floor_and(Vec::new()) };
+    let flat = FlatScene::new(&scene);
+    for kind in tracers(&device) {
+        for strategy in [Strategy::Mis, Strategy::Light] {
+            let film = render(&tracer(&device, kind, &flat), &flat, &options(strategy, 1)).image.film;
+            let worst = film.mean.iter().map(|&m| (f64::from(m) - RHO * 2.0).abs()).fold(0.0, f64::max);
+            assert!(worst < 1e-5, "{kind}, {strategy:?}: a pixel is {worst} off");
+        }
+    }
+    let transmission = skylit::scene::material::Transmission { factor: 0.5, ..Default::default() };
+    let wall = Material { transmission, roughness: 0.6, metallic: 0.0, ..Material::default() };
+    let camera = Camera::look_at(DVec3::new(0.0, 0.1, 0.0), DVec3::ZERO, DVec3::Z, 0.02);
+    let scene = Scene {
+        environment: Environment::Uniform(Vec3::splat(2.0)),
+        ..scene_of(vec![(skylit::scene::builtin::shapes::floor(DVec3::ZERO, 10.0), wall)], camera)
+    };
+    let flat = FlatScene::for_paths(&scene);
+    let tracer = tracer(&device, TracerKind::Compute, &flat);
+    let means = [Strategy::Mis, Strategy::Bsdf, Strategy::Light]
+        .map(|s| mean_of(&render(&tracer, &flat, &options(s, 1024)).image.film));
+    for (mean, error) in &means[1..] {
+        let noise = error.hypot(means[0].1);
+        assert!(noise < 4e-3 * mean && (mean - means[0].0).abs() < 4.0 * noise, "{means:?}");
+    }
+}
+
 /// What a texel of radiance 1 and what is interpolated around it bring to a plane that faces up, by integration on a fine grid.
 fn irradiance_of_texel(at: [u32; 2], size: [u32; 2]) -> f64 {
     let fine = 128;

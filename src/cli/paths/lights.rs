@@ -187,7 +187,8 @@ fn disk(direction: DVec3, radius: f64) -> Geometry {
     let mut mesh = crate::scene::TriangleMesh::default();
     mesh.positions.push(Vec3::ZERO);
     mesh.positions.extend((0..DISK_CORNERS).map(|k| corner(k).as_vec3()));
-    mesh.indices.extend((0..DISK_CORNERS).map(|k| [0, 1 + k, 1 + (k + 1) % DISK_CORNERS]));
+    // the centre second: solid angles are sampled from there outwards, so a fan's samples are as even as those of one disk
+    mesh.indices.extend((0..DISK_CORNERS).map(|k| [1 + (k + 1) % DISK_CORNERS, 0, 1 + k]));
     Geometry::Triangles(mesh)
 }
 

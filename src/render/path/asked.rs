@@ -8,7 +8,7 @@ use crate::tracer::shading;
 
 const CHOICE: u32 = 256;
 const MAP: u32 = 512;
-const LIGHT_SAMPLES: u32 = 1024;
+pub(super) const LIGHT_SAMPLES: u32 = 1024;
 const MIS: u32 = 2048;
 const COSINE: u32 = 4096;
 const UNIFORM: u32 = 8192;

@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use glam::{DVec3, Vec3};
+use glam::Vec3;
 
-use super::lights::luminance;
+use super::lights::brightness;
 use super::params::MapRecord;
 use crate::error::Result;
 use crate::gpu::{Buffer, Device};
@@ -22,8 +22,8 @@ pub(super) struct DeviceEnvironment {
 }
 
 impl DeviceEnvironment {
-    /// Uploads what there is to upload.
-    pub fn new(device: &Arc<Device>, environment: &Environment) -> Result<Self> {
+    /// Uploads what there is to upload. `compensated`: light samples are weighed against BSDF samples, and can leave to them what is no brighter than the mean.
+    pub fn new(device: &Arc<Device>, environment: &Environment, compensated: bool) -> Result<Self> {
         let plain = |c: Vec3| Self { map: MapRecord::default(), factor: c, mean: c, _buffers: Vec::new() };
         let map = match environment {
             Environment::Black => return Ok(plain(Vec3::ZERO)),
@@ -31,9 +31,13 @@ impl DeviceEnvironment {
             Environment::Map(map) => map,
         };
         let (width, height) = (map.width as usize, map.height as usize);
-        let luminances: Vec<f64> = map.radiance.iter().map(|c| luminance(*c)).collect();
-        let patches = Patches::new(width, height, &luminances);
-        let texels: Vec<[f32; 4]> = map.radiance.iter().zip(&luminances).map(|(c, &l)| c.extend(l as f32).to_array()).collect();
+        let mut weights: Vec<f64> = map.radiance.iter().map(|c| brightness(*c)).collect();
+        if compensated {
+            let mean = mean(map, &weights);
+            compensate(&mut weights, mean);
+        }
+        let patches = Patches::new(width, height, &weights);
+        let texels: Vec<[f32; 4]> = map.radiance.iter().zip(&weights).map(|(c, &l)| c.extend(l as f32).to_array()).collect();
         let texels = Buffer::from_slice(device, "environment", &texels)?;
         let table = Buffer::from_slice(device, "environment's patches", &patches.table)?;
         let m = map.to_map;
@@ -46,18 +50,77 @@ impl DeviceEnvironment {
             reserved: [0; 2],
             to_map: [row(0), row(1), row(2)],
         };
-        Ok(Self { map: record, factor: map.factor, mean: mean(map) * map.factor, _buffers: vec![texels, table] })
+        Ok(Self { map: record, factor: map.factor, mean: mean_radiance(map) * map.factor, _buffers: vec![texels, table] })
+    }
+}
+
+/// Leaves of weights what they have above their mean over the sphere: "MIS compensation" (Karlik, Sik, Vevoda, Skrivan, Krivanek, SIGGRAPH Asia 2019,
+/// section 5). Directions of the rest are drawn by BSDF samples anyway, and these draw them better: the map knows nothing of the surface. An even map is
+/// left as it is.
+fn compensate(weights: &mut [f64], mean: f64) {
+    if weights.iter().any(|&w| w > mean * 1.0001) {
+        weights.iter_mut().for_each(|w| *w = (*w - mean).max(0.0));
     }
 }
 
 /// Radiance averaged over the sphere.
-fn mean(map: &EnvironmentMap) -> Vec3 {
-    let (mut sum, mut total) = (DVec3::ZERO, 0.0);
-    for (k, radiance) in map.radiance.iter().enumerate() {
-        let y = k / map.width as usize;
+fn mean_radiance(map: &EnvironmentMap) -> Vec3 {
+    let channel = |k: usize| mean(map, &map.radiance.iter().map(|c| f64::from(c[k])).collect::<Vec<_>>()) as f32;
+    Vec3::new(channel(0), channel(1), channel(2))
+}
+
+/// Mean over the sphere of what a map's texels have.
+fn mean(map: &EnvironmentMap, values: &[f64]) -> f64 {
+    let (mut sum, mut total) = (0.0, 0.0);
+    for (y, row) in values.chunks_exact(map.width as usize).enumerate() {
         let sin = ((y as f64 + 0.5) / f64::from(map.height) * std::f64::consts::PI).sin();
-        sum += radiance.as_dvec3() * sin;
-        total += sin;
+        sum += row.iter().sum::<f64>() * sin;
+        total += row.len() as f64 * sin;
     }
-    (sum / total.max(1e-300)).as_vec3()
+    sum / total.max(1e-300)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_above_the_mean_is_left_to_light_samples() {
+        let mut weights = vec![1.0, 1.0, 1.0, 9.0];
+        compensate(&mut weights, 3.0);
+        assert_eq!(weights, [0.0, 0.0, 0.0, 6.0]);
+        // an even map has nothing above it, and rounding makes nothing of it
+        for even in [vec![2.0; 4], vec![2.0, 2.0, 2.0, 2.0 + 1e-6]] {
+            let mut weights = even.clone();
+            compensate(&mut weights, 2.0);
+            assert_eq!(weights, even);
+        }
+        let mut black = vec![0.0; 4];
+        compensate(&mut black, 0.0);
+        assert_eq!(black, [0.0; 4]);
+    }
+
+    #[test]
+    fn means_are_those_of_the_sphere() {
+        // rows at the poles are small
+        let radiance: Vec<Vec3> =
+            (0..8).map(|k| if (2..6).contains(&k) { Vec3::ONE } else { Vec3::new(0.0, 2.0, 1.0) }).collect();
+        let map = EnvironmentMap {
+            name: String::new(),
+            width: 2,
+            height: 4,
+            radiance: radiance.into(),
+            factor: Vec3::ONE,
+            to_map: glam::DMat3::IDENTITY,
+        };
+        let share = (0.375f64 * std::f64::consts::PI).sin()
+            / ((0.125f64 * std::f64::consts::PI).sin() + (0.375f64 * std::f64::consts::PI).sin());
+        let mean = mean_radiance(&map);
+        assert!(
+            (f64::from(mean.x) - share).abs() < 1e-6
+                && (f64::from(mean.y) - (2.0 - share)).abs() < 1e-6
+                && (mean.z - 1.0).abs() < 1e-6,
+            "{mean}"
+        );
+    }
 }

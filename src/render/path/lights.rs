@@ -73,9 +73,10 @@ pub(super) struct Lights {
     pub has_disks: bool,
 }
 
-/// Luminance of linear sRGB (IEC 61966-2-1).
-pub(super) fn luminance(c: Vec3) -> f64 {
-    c.as_dvec3().dot(DVec3::new(0.2126, 0.7152, 0.0722))
+/// How much a light of this radiance (or intensity, or irradiance; linear RGB) counts: the root mean square of its channels. Sampled in proportion to it, the
+/// squared error summed over channels is least. In proportion to luminance, blue lights would be sampled too seldom, and be noise.
+pub(super) fn brightness(c: Vec3) -> f64 {
+    (c.as_dvec3().length_squared() / 3.0).sqrt()
 }
 
 /// Lights that are being gathered: each with its power, and with bounds where it has a position.
@@ -136,7 +137,7 @@ impl Lights {
         let mut lights = Self { light_of, directional, has_disks, ..Default::default() };
         if environment != Vec3::ZERO {
             // what crosses the disk that the scene fills, from everywhere
-            let power = 4.0 * PI.powi(2) * radius(flat).powi(2) * luminance(environment);
+            let power = 4.0 * PI.powi(2) * radius(flat).powi(2) * brightness(environment);
             let index = all.push(LightRecord { kind: ENVIRONMENT, instance: INVALID, ..Default::default() }, power, None);
             lights.environment = Some(index).filter(|&k| k != INVALID);
         }
@@ -163,7 +164,7 @@ impl Lights {
 
 fn add_punctual(all: &mut Gathered, flat: &FlatScene, light: &Light) {
     let position = light.position - flat.origin;
-    let brightness = luminance(light.intensity);
+    let brightness = brightness(light.intensity);
     let base = LightRecord {
         position: position.as_vec3().to_array(),
         axis: light.direction.as_vec3().to_array(),
@@ -227,7 +228,8 @@ fn add_surfaces(all: &mut Gathered, flat: &FlatScene) -> Vec<u32> {
             ..Default::default()
         };
         let mut mean = |texture: Option<usize>| *means.entry(texture).or_insert_with(|| mean_texture(flat, texture));
-        let mut brightness = luminance(material.emissive * mean(material.emissive_texture.map(|slot| slot.texture)).truncate());
+        let mut brightness =
+            brightness(material.emissive * mean(material.emissive_texture.map(|slot| slot.texture)).truncate());
         let is_tested = alpha[instance.mesh] == AlphaClass::Tested;
         if is_tested {
             brightness *= mean_alpha(material, &mesh.geometry, mean(material.base_color_texture.map(|slot| slot.texture)).w);
@@ -392,4 +394,18 @@ fn mean_texture(flat: &FlatScene, texture: Option<usize>) -> Vec4 {
         sum += Vec4::from_array(texels.decode_srgb(i)).as_dvec4();
     }
     (sum / texels.len().max(1) as f64).as_vec4()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What matters of a light is how much it brings, in whichever channel.
+    #[test]
+    fn colours_count_alike() {
+        let colours = [Vec3::X, Vec3::Y, Vec3::Z, Vec3::ONE];
+        let counts = colours.map(brightness);
+        assert!(counts[0] == counts[1] && counts[1] == counts[2] && (counts[3] - 1.0).abs() < 1e-12, "{counts:?}");
+        assert_eq!(brightness(3.0 * Vec3::Z), 3.0 * counts[2]);
+    }
 }

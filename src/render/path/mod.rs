@@ -33,7 +33,7 @@ pub use asked::ASKED;
 use environment::DeviceEnvironment;
 use lights::Lights;
 use media::Bodies;
-use params::{CONE_BYTES, INVALID, MEDIA_BYTES, PathParams, QUAD_BYTES, STATE_BYTES, STRAIGHT_BYTES};
+use params::{CONE_BYTES, INVALID, MEDIA_BYTES, PathParams, QUAD_BYTES, SKY_DENSITY_BYTES, STATE_BYTES, STRAIGHT_BYTES};
 
 /// Bounces of a submission; then the host asks how many paths are left.
 const BOUNCES: u32 = 4;
@@ -363,7 +363,7 @@ impl Paths {
             None if options.white_sky.is_some() => &white,
             None => &flat.scene.environment,
         };
-        let environment = DeviceEnvironment::new(device, around)?;
+        let environment = DeviceEnvironment::new(device, around, options.strategy == Strategy::Mis)?;
         let lights = match options.white_sky {
             _ if options.view.is_some() => Lights::default(),
             Some(_) => Lights::sky_only(),
@@ -371,6 +371,7 @@ impl Paths {
         };
         let asked = asked::asked(options, flat, &lights, environment.map.texels != 0, cones);
         let [has_media, has_clear_walls] = [asked::MEDIA, asked::CLEAR_WALLS].map(|bit| asked & bit != 0);
+        let asks_even_sky = asked & asked::LIGHT_SAMPLES != 0 && lights.environment.is_some() && environment.map.texels == 0;
         let constants = asked::constants(asked);
         let quads = |name: &str| Buffer::new(device, name, QUAD_BYTES * most as u64, Memory::Device);
         let queues = [RayQueue::new(device, most)?, RayQueue::new(device, most)?];
@@ -425,6 +426,10 @@ impl Paths {
             },
             straight: match has_clear_walls {
                 true => keep(Buffer::new(device, "straight lengths of paths", STRAIGHT_BYTES * most as u64, Memory::Device)?),
+                false => 0,
+            },
+            sky_densities: match asks_even_sky {
+                true => keep(Buffer::new(device, "densities of the sky", SKY_DENSITY_BYTES * most as u64, Memory::Device)?),
                 false => 0,
             },
             camera_media: [INVALID; 4],
