@@ -6,6 +6,7 @@
 //!
 //!     cargo run --release --example primary -- [--repeats N] [SCENE[@EX,EY,EZ,TX,TY,TZ,FOV]...]
 
+use skylit::shaders;
 use std::time::Instant;
 
 use glam::DVec3;
@@ -74,8 +75,8 @@ fn measure(tracer: &Tracer, scene: &Scene, name: &str, choice: &Choice, size: [u
     let params = BlockParams { aov: target.address(), ..block.params(size, &camera, 0) };
     let params = Buffer::from_slice(device, "block parameters", &[params])?;
     let push = Push { scene: tracer.scene_address(), pass: params.address(), count, ..Default::default() };
-    let stream = tracer.stream(&stream::AOV_CLOSEST)?;
-    let raster = device.info.can_rasterise().then(|| Raster::new(tracer, &stream::AOV_CLOSEST, size)).transpose()?;
+    let stream = tracer.stream(&shaders::AOV_CLOSEST)?;
+    let raster = device.info.can_rasterise().then(|| Raster::new(tracer, &shaders::AOV_CLOSEST, size)).transpose()?;
     let view = View { camera, image_size: size, block, at: [0.5; 2] };
     let mut commands = Commands::new(device)?;
     // traced, drawn, and of the latter the drawing and the hits

@@ -1,7 +1,6 @@
 // accessibility: the occlusion rays of a frame. From the surface of each pixel that is sampled in this frame they go over the
 // cosine-weighted hemisphere (pbrt-v4's AOIntegrator). Pixels that show nothing have none, and neither have those that know enough
 // while nothing moves. Built twice: with a falloff the nearest hit counts by its distance, without one any hit will do.
-// stream: any closest
 #include "common/occlusion.glsl"
 
 Ray ray(uint index) {

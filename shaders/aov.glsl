@@ -1,6 +1,4 @@
 // aov: one ray through each pixel's centre; writes what it met.
-// stream: closest
-// rays: coherent
 #include "common/camera.glsl"
 #include "scene/surface.glsl"
 

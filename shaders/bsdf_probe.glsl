@@ -1,6 +1,5 @@
 // bsdf_probe: traces nothing; writes what the BSDF of a part's material makes of given directions, so that a test can hold density, samples and
 // values to each other on every tracer and driver.
-// stream: any
 #include "path/path.glsl"
 
 layout(buffer_reference, std430, buffer_reference_align = 8) readonly buffer BsdfProbe {

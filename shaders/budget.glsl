@@ -11,7 +11,6 @@
 // end a pixel's share. And a pixel takes the points of its sequence in their order, none left out: where points belonged to frames,
 // those that a frame without rays leaves out would not be any points, since what comes next in a sequence of low discrepancy is unlike
 // what came before, and what came before decides.
-// compute
 #include "common/occlusion.glsl"
 #include "common/budget.glsl"
 

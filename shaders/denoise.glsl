@@ -1,6 +1,5 @@
 // denoise: the mean of radiance over a pixel's neighbours on the same surface (common/filter.glsl), all channels with the same weights. Mirrors
 // src/render/denoise/filter.rs.
-// compute
 #include "common/frame.glsl"
 
 layout(local_size_x = LANES) in;

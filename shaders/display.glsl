@@ -3,7 +3,6 @@
 // Every buffer becomes a linear colour first, is brightened by the exposure, and is then encoded. The bytes are those of
 // src/output/png.rs on any device: a driver's own power function only guesses a byte, and the smallest values that the host encodes as
 // this byte and the next decide.
-// compute
 #include "common/frame.glsl"
 
 layout(local_size_x = LANES) in;

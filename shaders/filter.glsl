@@ -1,6 +1,5 @@
 // filter: the mean of the accessibility over a pixel's neighbours on the same surface, and of bent normals with the same weights
 // (common/filter.glsl).
-// compute
 #include "common/frame.glsl"
 
 layout(local_size_x = LANES) in;

@@ -1,6 +1,5 @@
 // gather: where a pixel has several samples in a frame, their mean and variance, and with bent normals their mean direction; in the
 // order of the samples, so that it depends on nothing else.
-// compute
 #include "common/occlusion.glsl"
 
 layout(local_size_x = LANES) in;

@@ -1,6 +1,4 @@
 // gbuffer: one camera ray through each pixel's centre; what it meets is kept for the passes of the frame that follow.
-// stream: closest
-// rays: coherent
 #include "common/camera.glsl"
 #include "common/frame.glsl"
 #include "scene/motion.glsl"

@@ -2,7 +2,6 @@
 // Real-Time Strategies for Accurate Indirect Occlusion", SIGGRAPH 2016 courses. In each of a few slices through the view ray the
 // horizons on both sides are searched, and the cosine-weighted arc between them is integrated in closed form. What the image does not
 // show does not occlude.
-// compute
 #include "common/frame.glsl"
 #include "common/sequence.glsl"
 

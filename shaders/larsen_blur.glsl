@@ -1,6 +1,5 @@
 // larsen_blur: a box of 3x3 over the occlusion image, read with bilinear filtering at the full size, without any test for edges; not
 // where it is 0. The colour of everything is white here.
-// compute
 #include "common/larsen.glsl"
 
 layout(local_size_x = LANES) in;

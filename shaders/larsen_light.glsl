@@ -1,5 +1,4 @@
 // larsen_light: how many of the point lights each pixel sees, a shadow ray each.
-// stream: any
 #include "common/larsen.glsl"
 
 Ray ray(uint index) {

@@ -1,6 +1,5 @@
 // larsen_occlusion: 64 rays per pixel of an image of half the size per axis, where no light is visible; nearest hits, whatever the
 // falloff.
-// stream: closest
 #include "common/larsen.glsl"
 #include "common/warp.glsl"
 

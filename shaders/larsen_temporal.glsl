@@ -1,6 +1,5 @@
 // larsen_temporal: half of the frame before, looked up where the surface's point was in it, and half of this one. Nothing is ever
 // rejected, but for what has no position.
-// compute
 #include "common/larsen.glsl"
 
 layout(local_size_x = LANES) in;

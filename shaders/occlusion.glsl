@@ -1,7 +1,5 @@
 // occlusion: the rays that `primary` left in the queue; says what each sample adds to its pixel. Built twice: with a falloff the
 // nearest hit counts by its distance, without one any hit will do.
-// stream: any closest
-// rays: queue
 #include "common/camera.glsl"
 
 layout(buffer_reference, std430, buffer_reference_align = 4) writeonly buffer Samples { float v[]; };

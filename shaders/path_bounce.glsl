@@ -1,6 +1,4 @@
 // path_bounce: the rays that `path_camera` or the bounce before left in a queue, and the vertices that they meet (shaders/path/path.glsl).
-// stream: closest
-// rays: queue
 #include "path/path.glsl"
 
 Ray ray(uint index) {

@@ -1,6 +1,4 @@
 // path_camera: one camera ray per sample, and the first vertex of each path (shaders/path/path.glsl).
-// stream: closest
-// rays: coherent
 #include "path/path.glsl"
 
 // Mirrors PixelFilter in src/render/path/mod.rs.

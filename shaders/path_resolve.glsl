@@ -1,6 +1,5 @@
 // path_resolve: adds the paths of a launch to the film, a thread a pixel, in the order of the samples: sums do not depend on how the samples
 // were cut into launches, nor on which was traced first.
-// compute
 #include "common/film.glsl"
 #include "path/params.glsl"
 

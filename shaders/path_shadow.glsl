@@ -1,6 +1,4 @@
 // path_shadow: rays from path vertices to lights; where nothing is in the way, the path has what the light brings.
-// stream: any
-// rays: queue
 #include "path/params.glsl"
 
 Ray ray(uint index) {

@@ -1,7 +1,5 @@
 // path_shadow_walls: path_shadow where there are thin walls without roughness, which light goes straight through: what is left of the light goes on
 // behind the wall, in a queue of its own.
-// stream: closest
-// rays: queue
 #include "path/path.glsl"
 
 Ray ray(uint index) {

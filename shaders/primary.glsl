@@ -1,8 +1,6 @@
 // primary: one camera ray per sample, jittered within its pixel; where it meets the scene, the occlusion ray that leaves from
 // there is appended to the queue: one over the cosine-weighted hemisphere (pbrt-v4's AOIntegrator). A sample that meets nothing
 // costs nothing from here on.
-// stream: closest
-// rays: coherent
 #include "common/camera.glsl"
 #include "common/warp.glsl"
 #include "scene/surface.glsl"

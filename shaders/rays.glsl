@@ -1,5 +1,4 @@
 // rays: traces a set of rays from memory; writes a hit record each, or whether the way is blocked.
-// stream: any closest
 #include "common/types.glsl"
 
 layout(buffer_reference, std430, buffer_reference_align = 8) readonly buffer RaySet {

@@ -1,6 +1,5 @@
 // resolve: adds the samples of a launch to the film, a thread a pixel, in the order of the samples: sums do not depend on how the
 // samples were cut into launches, nor on which of them was traced first.
-// compute
 #include "common/camera.glsl"
 #include "common/film.glsl"
 

@@ -1,6 +1,5 @@
 // sampler_probe: traces nothing; writes what the sampler and the warps make of given inputs, so that a test can hold them to
 // src/sampling on every tracer and driver.
-// stream: any
 #include "common/types.glsl"
 #include "common/sampler.glsl"
 #include "common/warp.glsl"

@@ -1,5 +1,4 @@
 // sequence_probe: writes what the sequences make of given inputs, so that a test can hold them to src/sampling/sequence.rs.
-// compute
 #include "common/types.glsl"
 #include "common/sequence.glsl"
 

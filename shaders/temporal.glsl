@@ -6,7 +6,6 @@
 // camera makes no history wrong; what moves does, near it and by no more than it covers of the hemisphere: so much is taken to be
 // the variance that a frame adds (a Kalman filter's process noise), and where it counts the history is also held to what this frame's
 // samples around say (Karis, "High-Quality Temporal Supersampling", 2014, with the standard error of their mean for a width).
-// compute
 #include "common/frame.glsl"
 
 layout(local_size_x = LANES) in;

@@ -15,6 +15,7 @@ pub mod ray;
 pub mod render;
 pub mod sampling;
 pub mod scene;
+pub mod shaders;
 pub mod tracer;
 
 pub use error::{Error, Result};

@@ -3,6 +3,7 @@
 
 mod common;
 
+use skylit::shaders;
 use std::sync::Arc;
 
 use bytemuck::Zeroable;
@@ -40,7 +41,7 @@ fn device() -> Option<Arc<Device>> {
         device.info.missing_raster
     );
     let tracer = tracer(&device, TracerKind::Compute, &scene("cornell-box"));
-    let Err(error) = Raster::new(&tracer, &stream::AOV_CLOSEST, SIZE) else { panic!("it can draw") };
+    let Err(error) = Raster::new(&tracer, &shaders::AOV_CLOSEST, SIZE) else { panic!("it can draw") };
     assert!(error.to_string().contains("LP_NATIVE_VECTOR_WIDTH") && error.to_string().contains("--primary traced"), "{error}");
     assert_eq!(Primary::auto(&tracer, 1 << 20).0, Primary::Traced);
     None
@@ -277,7 +278,7 @@ fn gpu_image_sizes() {
     let side = device.info.limits.max_image_side;
     let tracer = tracer(&device, TracerKind::Compute, &scene);
     for size in [[side + 1, 1], [1, side + 1]] {
-        let Err(error) = Raster::new(&tracer, &stream::AOV_CLOSEST, size) else { panic!("{size:?} can be drawn") };
+        let Err(error) = Raster::new(&tracer, &shaders::AOV_CLOSEST, size) else { panic!("{size:?} can be drawn") };
         assert!(error.to_string().contains("--primary traced"), "{error}");
     }
     assert_validation_clean(&device);
@@ -427,7 +428,7 @@ fn gpu_a_pixels_sample_may_lie_anywhere() {
     for scene in [scene("grid:4"), mirrored()] {
         let tracer = tracer(&device, TracerKind::Compute, &scene);
         let size = [128, 96];
-        let raster = Raster::new(&tracer, &stream::AOV_CLOSEST, size).unwrap();
+        let raster = Raster::new(&tracer, &shaders::AOV_CLOSEST, size).unwrap();
         for camera in [scene.cameras[0].clone(), orthographic(&scene.cameras[0], 2.0)] {
             let camera = Shot { scene: &scene, camera: &camera, size: [320, 200] }.record();
             let block = |origin: [u32; 2]| Block { origin, size };
@@ -460,7 +461,7 @@ fn gpu_what_lies_outside_is_not_drawn() {
     let shot = Shot { scene: &scene, camera: &camera, size: SIZE };
     // triangles of a pixel and less
     shot.check("a quarter of a terrain", &tracer, Bounds { ids: 0.01, normal: 1e-2, ..BOUNDS });
-    let raster = Raster::new(&tracer, &stream::AOV_CLOSEST, SIZE).unwrap();
+    let raster = Raster::new(&tracer, &shaders::AOV_CLOSEST, SIZE).unwrap();
     let view = View { camera: shot.record(), image_size: SIZE, block: Block { origin: [0, 0], size: SIZE }, at: [0.5; 2] };
     let (_, drawn) = draw(&raster, &tracer, &view, &view);
     println!("{drawn:?}");
@@ -486,7 +487,7 @@ fn gpu_what_cannot_be_drawn_is_said() {
     let Some(device) = device() else { return };
     let scene = scene("cornell-box");
     let tracer = tracer(&device, TracerKind::Compute, &scene);
-    let Err(error) = Raster::new(&tracer, &stream::RAYS_CLOSEST, SIZE) else { panic!("any rays can be drawn") };
+    let Err(error) = Raster::new(&tracer, &shaders::RAYS_CLOSEST, SIZE) else { panic!("any rays can be drawn") };
     assert!(error.to_string().contains("rays closest"), "{error}");
     let mut flat = scene.cameras[0].clone();
     flat.camera_to_world.matrix3.x_axis = flat.camera_to_world.matrix3.y_axis;

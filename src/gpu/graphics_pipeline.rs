@@ -9,6 +9,7 @@ use super::image::{DEPTH, IDS};
 use super::pipeline::{Module, Specialization, layout};
 use super::result::Context;
 use crate::error::Result;
+use crate::shaders::Shader;
 
 /// Stages that see the push constants.
 pub(super) const DRAW_STAGES: vk::ShaderStageFlags =
@@ -36,8 +37,8 @@ impl GraphicsPipeline {
     pub fn new(
         device: &Arc<Device>,
         name: &str,
-        vertex: &[u8],
-        fragment: &[u8],
+        vertex: &Shader,
+        fragment: &Shader,
         specialization: &Specialization,
         cull: Cull,
     ) -> Result<Self> {

@@ -8,6 +8,7 @@ use super::buffer::{Buffer, Memory};
 use super::device::Device;
 use super::result::Context;
 use crate::error::{Error, Result};
+use crate::shaders::{ComputeShader, Shader};
 
 /// Size of the push-constant block that every stream has (`Push` in shaders/common/types.glsl).
 pub(super) const PUSH_BYTES: u32 = 48;
@@ -56,8 +57,8 @@ pub(super) struct Module<'a> {
 }
 
 impl<'a> Module<'a> {
-    pub(super) fn new(device: &'a Device, name: &str, spirv: &[u8]) -> Result<Self> {
-        let words = ash::util::read_spv(&mut std::io::Cursor::new(spirv))
+    pub(super) fn new(device: &'a Device, name: &str, shader: &Shader) -> Result<Self> {
+        let words = ash::util::read_spv(&mut std::io::Cursor::new(shader.spirv()?))
             .map_err(|e| Error::Vulkan(format!("shader {name} is no SPIR-V: {e}")))?;
         // SAFETY: valid SPIR-V from the build script's compiler
         let raw = unsafe { device.raw.create_shader_module(&vk::ShaderModuleCreateInfo::default().code(&words), None) }
@@ -90,24 +91,24 @@ pub struct ComputePipeline {
 
 impl ComputePipeline {
     /// Compiles a compute shader with the entry point `main`.
-    pub fn new(device: &Arc<Device>, name: &str, spirv: &[u8], specialization: &Specialization) -> Result<Self> {
-        Self::with_flags(device, name, spirv, specialization, vk::PipelineShaderStageCreateFlags::empty())
+    pub fn new(device: &Arc<Device>, name: &str, shader: &Shader, specialization: &Specialization) -> Result<Self> {
+        Self::with_flags(device, name, shader, specialization, vk::PipelineShaderStageCreateFlags::empty())
     }
 
     /// As [`ComputePipeline::new`], for a shader that relies on subgroups of the size that the device reports, without idle lanes
     /// ([`super::Limits::packets`] says that it can).
-    pub fn with_full_subgroups(device: &Arc<Device>, name: &str, spirv: &[u8], s: &Specialization) -> Result<Self> {
-        Self::with_flags(device, name, spirv, s, vk::PipelineShaderStageCreateFlags::REQUIRE_FULL_SUBGROUPS)
+    pub fn with_full_subgroups(device: &Arc<Device>, name: &str, shader: &Shader, s: &Specialization) -> Result<Self> {
+        Self::with_flags(device, name, shader, s, vk::PipelineShaderStageCreateFlags::REQUIRE_FULL_SUBGROUPS)
     }
 
     fn with_flags(
         device: &Arc<Device>,
         name: &str,
-        spirv: &[u8],
+        shader: &Shader,
         specialization: &Specialization,
         flags: vk::PipelineShaderStageCreateFlags,
     ) -> Result<Self> {
-        let module = Module::new(device, name, spirv)?;
+        let module = Module::new(device, name, shader)?;
         let mut pipeline =
             Self { raw: vk::Pipeline::null(), layout: layout(device, vk::ShaderStageFlags::COMPUTE)?, device: device.clone() };
         pipeline.raw = specialization.with(|s| {
@@ -126,6 +127,24 @@ impl ComputePipeline {
     }
 }
 
+impl ComputeShader {
+    /// Compiles it for a device.
+    ///
+    /// # Errors
+    /// Those of the device.
+    pub fn pipeline(&self, device: &Arc<Device>) -> Result<ComputePipeline> {
+        self.specialized(device, &Specialization::default())
+    }
+
+    /// Compiles it for a device, with constants that differ from what the shader says.
+    ///
+    /// # Errors
+    /// Those of the device.
+    pub fn specialized(&self, device: &Arc<Device>, constants: &Specialization) -> Result<ComputePipeline> {
+        ComputePipeline::new(device, self.name, self.variant(device.info.int64), constants)
+    }
+}
+
 impl Drop for ComputePipeline {
     fn drop(&mut self) {
         // SAFETY: submissions are waited for
@@ -136,16 +155,16 @@ impl Drop for ComputePipeline {
     }
 }
 
-/// The shaders that all streams of the pipeline tracer share, as SPIR-V.
+/// The shaders that all streams of the pipeline tracer share.
 pub struct HitShaders<'a> {
     /// Miss.
-    pub miss: &'a [u8],
+    pub miss: &'a Shader,
     /// Closest hit on a triangle.
-    pub triangle_closest: &'a [u8],
+    pub triangle_closest: &'a Shader,
     /// Any hit on an alpha-tested triangle; `None` where the scene has none.
-    pub triangle_any: Option<&'a [u8]>,
+    pub triangle_any: Option<&'a Shader>,
     /// Closest hit on a sphere and its intersection shader; `None` where the scene has none.
-    pub sphere: Option<[&'a [u8]; 2]>,
+    pub sphere: Option<[&'a Shader; 2]>,
 }
 
 /// A ray-tracing pipeline with its shader binding table. Hit groups: 0 opaque triangles, 1 alpha-tested triangles, 2 spheres
@@ -165,7 +184,7 @@ impl RayTracingPipeline {
     pub fn new(
         device: &Arc<Device>,
         name: &str,
-        raygen: &[u8],
+        raygen: &Shader,
         shared: &HitShaders,
         specialization: &Specialization,
     ) -> Result<Self> {

@@ -4,6 +4,7 @@
 //! what each sample adds; `resolve` adds the samples to the film, pixel by pixel and in their order. So an occlusion ray that does
 //! not exist costs nothing, neighbouring rays belong to one pixel, and sums do not depend on launch sizes.
 
+use crate::shaders::{self, StreamShaders};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -20,8 +21,8 @@ use crate::error::Result;
 use crate::gpu::{Buffer, Commands, ComputePipeline, Device, Memory, Timing};
 use crate::ray::Ray;
 use crate::tracer::queue::RayQueue;
-use crate::tracer::stream::StreamShaders;
-use crate::tracer::{Push, Stream, Tracer, stream};
+
+use crate::tracer::{Push, Stream, Tracer};
 
 /// A hit whose falloff is below this is not looked for: half a step of an 8-bit image.
 pub const FALLOFF_CUTOFF: f64 = 1.0 / 510.0;
@@ -143,7 +144,7 @@ struct Occlusion {
 
 /// The streams that [`render`] traces.
 pub fn streams(options: &AoOptions) -> [&'static StreamShaders; 2] {
-    [&stream::PRIMARY_CLOSEST, if options.binary() { &stream::OCCLUSION_ANY } else { &stream::OCCLUSION_CLOSEST }]
+    [&shaders::PRIMARY_CLOSEST, if options.binary() { &shaders::OCCLUSION_ANY } else { &shaders::OCCLUSION_CLOSEST }]
 }
 
 /// Renders ambient occlusion; how it stops, [`accumulate`](super::accumulate) says.
@@ -157,7 +158,7 @@ pub fn render(tracer: &Tracer, camera: &CameraRecord, options: &AoOptions, contr
     let mut estimator = Occlusion {
         primary: tracer.stream(primary)?,
         occlusion: tracer.stream(occlusion)?,
-        resolve: stream::RESOLVE.pipeline(device)?,
+        resolve: shaders::RESOLVE.pipeline(device)?,
         queue: RayQueue::new(device, most)?,
         samples: Buffer::new(device, "samples", size_of::<f32>() as u64 * most as u64, Memory::Device)?,
         params: Buffer::new(device, "block parameters", size_of::<BlockParams>() as u64, Memory::Upload)?,
@@ -236,7 +237,7 @@ impl Estimator for Occlusion {
                 r.barrier();
                 self.occlusion.record(r, &queue.push(*push, push.count));
                 r.barrier();
-                let groups = (push.count >> push.sample_bits).div_ceil(stream::LANES);
+                let groups = (push.count >> push.sample_bits).div_ceil(shaders::LANES);
                 r.timed("resolve", |r| r.dispatch(&self.resolve, push, groups));
                 // the next launch reuses the queue and the samples
                 r.barrier();

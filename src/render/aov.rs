@@ -1,5 +1,6 @@
 //! Auxiliary outputs: what a ray through each pixel's centre meets.
 
+use crate::shaders;
 use bytemuck::{Pod, Zeroable};
 
 use super::Control;
@@ -9,7 +10,7 @@ use super::pace::{MOST, Pace};
 use super::raster::{Primary, Raster, View};
 use crate::error::Result;
 use crate::gpu::{Buffer, Commands, Memory};
-use crate::tracer::{Push, Stream, Tracer, stream};
+use crate::tracer::{Push, Stream, Tracer};
 
 /// Where hits come from.
 enum Source {
@@ -74,10 +75,10 @@ pub fn visit(
     let device = tracer.device();
     let blocks = Block::cut(size);
     let source = match primary {
-        Primary::Traced => Source::Traced(Box::new(tracer.stream(&stream::AOV_CLOSEST)?)),
+        Primary::Traced => Source::Traced(Box::new(tracer.stream(&shaders::AOV_CLOSEST)?)),
         Primary::Raster => {
             let size = blocks.first().map_or([1; 2], |b| b.size);
-            Source::Drawn(Box::new(Raster::new(tracer, &stream::AOV_CLOSEST, size)?))
+            Source::Drawn(Box::new(Raster::new(tracer, &shaders::AOV_CLOSEST, size)?))
         }
     };
     let mut commands = Commands::new(device)?;

@@ -137,14 +137,6 @@ impl Block {
             .then(|| (self.origin[1] + y) as usize * image_width as usize + (self.origin[0] + x) as usize)
     }
 
-    /// Calls `f` with the place of each of its pixels in an image of the given width.
-    pub fn each_pixel(&self, image_width: u32, mut f: impl FnMut(usize)) {
-        for y in self.origin[1]..self.origin[1] + self.size[1] {
-            let row = y as usize * image_width as usize;
-            (self.origin[0]..self.origin[0] + self.size[0]).for_each(|x| f(row + x as usize));
-        }
-    }
-
     /// Parameters of its passes, buffers not yet set.
     pub fn params(&self, image_size: [u32; 2], camera: &CameraRecord, seed: u32) -> BlockParams {
         BlockParams::default().at(self, image_size, camera, seed)

@@ -15,8 +15,9 @@ pub use super::frustum::View;
 use super::frustum::{Frustum, Sight};
 use crate::error::Result;
 use crate::gpu::{Buffer, Cull, Device, GraphicsPipeline, Memory, Recorder, Targets};
+use crate::shaders::{self, StreamShaders};
 use crate::tracer::drawable::CHUNK;
-use crate::tracer::stream::{self, StreamShaders};
+use crate::tracer::stream;
 use crate::tracer::{Drawable, Push, Stream, Tracer};
 
 /// Vertices of the box around a sphere; shaders/raster/sphere.vert.
@@ -113,10 +114,10 @@ impl Raster {
         let targets = Targets::new(device, size)?;
         let s = stream::scene_specialization(features);
         let pipeline = |name, vertex, fragment, cull| GraphicsPipeline::new(device, name, vertex, fragment, &s, cull);
-        let alpha = || pipeline("draw alpha-tested", stream::DRAW_TRIANGLES, stream::DRAW_ALPHA, Cull::Nothing);
-        let spheres = || pipeline("draw spheres", stream::DRAW_SPHERES, stream::DRAW_SPHERE, Cull::Front);
+        let alpha = || pipeline("draw alpha-tested", &shaders::DRAW_TRIANGLES, &shaders::DRAW_ALPHA, Cull::Nothing);
+        let spheres = || pipeline("draw spheres", &shaders::DRAW_SPHERES, &shaders::DRAW_SPHERE, Cull::Front);
         Ok(Self {
-            triangles: pipeline("draw opaque", stream::DRAW_TRIANGLES, stream::DRAW_OPAQUE, Cull::Nothing)?,
+            triangles: pipeline("draw opaque", &shaders::DRAW_TRIANGLES, &shaders::DRAW_OPAQUE, Cull::Nothing)?,
             alpha_tested: features.alpha.then(alpha).transpose()?,
             spheres: features.spheres.then(spheres).transpose()?,
             targets,

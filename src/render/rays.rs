@@ -1,5 +1,6 @@
 //! Traces a set of rays: what joins skylit's tracers to any other.
 
+use crate::shaders;
 use bytemuck::{Pod, Zeroable};
 
 use super::Control;
@@ -7,7 +8,7 @@ use super::pace::{MOST, Pace};
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, Commands, Memory};
 use crate::ray::{Hit, Ray};
-use crate::tracer::{Push, Stream, Tracer, stream};
+use crate::tracer::{Push, Stream, Tracer};
 
 /// What to find.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
@@ -100,8 +101,8 @@ impl<'t> PreparedRays<'t> {
     pub fn new(tracer: &'t Tracer, rays: &[Ray], mode: Mode) -> Result<Self> {
         let device = tracer.device();
         let stream = tracer.stream(match mode {
-            Mode::Any => &stream::RAYS_ANY,
-            Mode::Closest => &stream::RAYS_CLOSEST,
+            Mode::Any => &shaders::RAYS_ANY,
+            Mode::Closest => &shaders::RAYS_CLOSEST,
         })?;
         let count = u32::try_from(rays.len())
             .ok()

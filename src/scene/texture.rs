@@ -52,11 +52,6 @@ impl TexelData {
         self.len() == 0
     }
 
-    /// Whether colours are never sRGB.
-    pub fn is_float(&self) -> bool {
-        matches!(self, Self::Float(_))
-    }
-
     /// Texel `i` as it is stored: sRGB is not decoded. `texel` of shaders/scene/texture.glsl.
     ///
     /// # Panics

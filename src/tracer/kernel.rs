@@ -1,10 +1,10 @@
 //! Which of the compute tracer's kernels runs, and how it tests triangles.
 
-use super::stream::StreamShaders;
 use crate::bvh::BuildPreset;
 use crate::bvh::cache::Cache;
 use crate::gpu::DeviceInfo;
 use crate::scene::flatten::FlatScene;
+use crate::shaders::StreamShaders;
 
 /// How the compute tracer finds what a ray meets. All give the same hits; docs/traversal.md compares their speed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, serde::Serialize)]

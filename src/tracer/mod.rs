@@ -30,12 +30,13 @@ pub use drawable::Drawable;
 pub use dynamic::{Changes, MeshChange, Moved, UpdateStats};
 pub use gpu_scene::Needs;
 pub use kernel::{BuildOptions, ComputeOptions, Kernel, TriangleTest};
-pub use stream::{Push, Stream, StreamShaders};
+pub use stream::{Push, Stream};
 
 use crate::error::{Error, Result};
 use crate::gpu::{ComputePipeline, Device, DeviceInfo, Specialization};
 use crate::scene::features::SceneFeatures;
 use crate::scene::flatten::FlatScene;
+use crate::shaders::{Mode, StreamShaders};
 use gpu_scene::GpuScene;
 use prepared::{Prepared, Recipe};
 
@@ -334,7 +335,7 @@ impl Tracer {
                             return Ok(Stream::packets(self.prepared.take(&self.device, &recipe)?, shaders));
                         }
                         // of the pass it knows nothing: streams share it
-                        let kernel = self.kernel(shaders.mode(), &prepared::large(info, h.kernel, shaders, &s))?;
+                        let kernel = self.kernel(shaders.mode, &prepared::large(info, h.kernel, shaders, &s))?;
                         Stream::steps(&self.device, shaders, &all, kernel, rays_per_lane, h.launch_memory()?)
                     }
                 }
@@ -355,7 +356,7 @@ impl Tracer {
     }
 
     /// The fast kernel, compiled once for all streams of a mode.
-    fn kernel(&self, mode: stream::Mode, recipe: &Recipe) -> Result<Arc<ComputePipeline>> {
+    fn kernel(&self, mode: Mode, recipe: &Recipe) -> Result<Arc<ComputePipeline>> {
         let slot = &self.kernels[mode as usize];
         if let Some(kernel) = slot.get() {
             return Ok(kernel.clone());

@@ -5,10 +5,11 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use super::compute::{self, lane_budget};
 use super::kernel::{ComputeOptions, Kernel, TriangleTest};
-use super::stream::{self, StreamShaders};
+use super::stream;
 use crate::error::Result;
 use crate::gpu::{ComputePipeline, Device, DeviceInfo, Specialization};
 use crate::scene::features::SceneFeatures;
+use crate::shaders::{Rays, Shader, StreamShaders, Variant, wide_kernel};
 
 /// Scenes of fewer primitives are built before a pipeline is compiled.
 const WORTHWHILE: usize = 100_000;
@@ -17,7 +18,7 @@ const WORTHWHILE: usize = 100_000;
 #[derive(Clone)]
 pub(super) struct Recipe {
     pub name: &'static str,
-    pub spirv: &'static [u8],
+    pub shader: &'static Shader,
     pub specialization: Specialization,
     /// Its lanes work together.
     pub packets: bool,
@@ -74,11 +75,11 @@ impl Prepared {
 impl Recipe {
     fn compile(&self, device: &Arc<Device>) -> Result<ComputePipeline> {
         let make = if self.packets { ComputePipeline::with_full_subgroups } else { ComputePipeline::new };
-        make(device, self.name, self.spirv, &self.specialization)
+        make(device, self.name, self.shader, &self.specialization)
     }
 
     fn is(&self, other: &Recipe) -> bool {
-        std::ptr::eq(self.spirv, other.spirv) && self.specialization == other.specialization
+        std::ptr::eq(self.shader, other.shader) && self.specialization == other.specialization
     }
 }
 
@@ -101,16 +102,16 @@ pub(super) fn specialization(
 
 /// Is the stream traced in packets?
 pub(super) fn in_packets(info: &DeviceInfo, kernel: Kernel, shaders: &StreamShaders) -> bool {
-    let wanted = kernel == Kernel::Packet || shaders.is_coherent();
-    shaders.has_packets() && wanted && kernel.for_coherent(info) == Kernel::Packet
+    let wanted = kernel == Kernel::Packet || shaders.rays == Rays::Camera;
+    shaders.variant(Variant::Packet).is_some() && wanted && kernel.for_coherent(info) == Kernel::Packet
 }
 
 /// The shader of the fast kernels that traces the stream.
-pub(super) fn large(info: &DeviceInfo, kernel: Kernel, shaders: &StreamShaders, s: &Specialization) -> Recipe {
-    let packets = in_packets(info, kernel, shaders);
-    let (name, spirv) = match packets {
-        true => (shaders.name, shaders.packet()),
-        false => ("wide kernel", stream::wide_kernel(shaders.mode(), info.int64)),
+pub(super) fn large(info: &DeviceInfo, kernel: Kernel, shaders: &'static StreamShaders, s: &Specialization) -> Recipe {
+    let packet = shaders.variant(Variant::Packet).filter(|_| in_packets(info, kernel, shaders));
+    let (name, shader) = match packet {
+        Some(shader) => (shaders.name, shader),
+        None => ("wide kernel", wide_kernel(shaders.mode, info.int64)),
     };
-    Recipe { name, spirv, specialization: s.clone(), packets }
+    Recipe { name, shader, specialization: s.clone(), packets: packet.is_some() }
 }

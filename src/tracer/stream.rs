@@ -9,64 +9,7 @@ use crate::error::{Error, Result};
 use crate::gpu::{Buffer, ComputePipeline, Device, HitShaders, RayTracingPipeline, Recorder, Specialization};
 use crate::ray::Ray;
 use crate::scene::features::SceneFeatures;
-
-/// What a stream asks of its rays.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Mode {
-    /// Whether something is in the way.
-    Any,
-    /// The nearest hit.
-    Closest,
-}
-
-/// A stream's SPIR-V for each tracer.
-pub struct StreamShaders {
-    /// Pass and mode.
-    pub name: &'static str,
-    /// Pass: what its time is listed under where a stream is one shader.
-    pub pass: &'static str,
-    /// What the time of each step is listed under where a stream is three.
-    pub steps: [&'static str; 3],
-    // its rays are in memory: there is no first step
-    queue: bool,
-    // its neighbouring rays take nearly the same way
-    coherent: bool,
-    mode: Mode,
-    generate: &'static [u8],
-    generate_64: &'static [u8],
-    deliver: &'static [u8],
-    deliver_64: &'static [u8],
-    packet: &'static [u8],
-    reference: &'static [u8],
-    brute: &'static [u8],
-    query: &'static [u8],
-    raygen: &'static [u8],
-    // empty: its rays are not the camera's
-    visibility: &'static [u8],
-}
-
-/// A compute shader's SPIR-V.
-pub struct ComputeShader {
-    name: &'static str,
-    plain: &'static [u8],
-    // for devices with 64-bit integers
-    int64: &'static [u8],
-}
-
-impl ComputeShader {
-    /// Compiles it for a device.
-    pub fn pipeline(&self, device: &Arc<Device>) -> Result<ComputePipeline> {
-        self.specialized(device, &Specialization::default())
-    }
-
-    /// Compiles it for a device, with constants that differ from what the shader says.
-    pub fn specialized(&self, device: &Arc<Device>, constants: &Specialization) -> Result<ComputePipeline> {
-        let spirv = if device.info.int64 { self.int64 } else { self.plain };
-        ComputePipeline::new(device, self.name, spirv, constants)
-    }
-}
-
-include!(concat!(env!("OUT_DIR"), "/shaders.rs"));
+use crate::shaders::{self, LANES, Mode, PACKET_RAYS, RUN, Rays, SPREAD, StreamShaders, Variant};
 
 /// The push constants of every stream; `Push` in shaders/common/types.glsl.
 #[repr(C)]
@@ -93,8 +36,6 @@ pub struct Push {
 
 /// Rays that the compute tracer's buffers hold between the steps of a launch.
 pub const LAUNCH_RAYS: u32 = 1 << 19;
-/// Rays of each lane of a packet: `PACKET_RAYS` of build.rs.
-const PACKET_RAYS: u32 = 2;
 /// Stands where a result will be: `UNFINISHED` of shaders/trace/launch.glsl.
 const UNFINISHED: u32 = 0x7fc0_dead;
 
@@ -151,44 +92,6 @@ pub(crate) fn scene_specialization(features: SceneFeatures) -> Specialization {
     }
 }
 
-/// The fast kernel that traces rays one by one.
-pub(super) fn wide_kernel(mode: Mode, int64: bool) -> &'static [u8] {
-    match (mode, int64) {
-        (Mode::Any, true) => WIDE_ANY_64,
-        (Mode::Any, false) => WIDE_ANY_32,
-        (Mode::Closest, true) => WIDE_CLOSEST_64,
-        (Mode::Closest, false) => WIDE_CLOSEST_32,
-    }
-}
-
-impl std::fmt::Debug for StreamShaders {
-    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
-        f.write_str(self.name)
-    }
-}
-
-impl StreamShaders {
-    /// What the stream asks of its rays.
-    pub(super) fn mode(&self) -> Mode {
-        self.mode
-    }
-
-    /// Do neighbouring rays take nearly the same way through a scene?
-    pub(super) fn is_coherent(&self) -> bool {
-        self.coherent
-    }
-
-    /// What traces it in packets.
-    pub(super) fn packet(&self) -> &'static [u8] {
-        self.packet
-    }
-
-    /// Can it be traced in packets? What comes from a queue is in no order.
-    pub(super) fn has_packets(&self) -> bool {
-        !self.packet.is_empty()
-    }
-}
-
 /// Work-groups along x, y and z that take at least `parts` parts, in runs of `run` (shaders/trace/spread.glsl).
 fn spread(parts: u32, run: u32) -> [u32; 3] {
     [run, parts.div_ceil(run * SPREAD), SPREAD]
@@ -197,11 +100,13 @@ fn spread(parts: u32, run: u32) -> [u32; 3] {
 /// One of a stream's shaders.
 fn compile(
     device: &Arc<Device>,
-    shaders: &StreamShaders,
-    spirv: &'static [u8],
+    shaders: &'static StreamShaders,
+    variant: Variant,
     s: &Specialization,
 ) -> Result<Arc<ComputePipeline>> {
-    ComputePipeline::new(device, shaders.name, spirv, s).map(Arc::new)
+    let shader =
+        shaders.variant(variant).ok_or_else(|| Error::Usage(format!("'{}' is not made for {variant:?}", shaders.name)))?;
+    ComputePipeline::new(device, shaders.name, shader, s).map(Arc::new)
 }
 
 impl Stream {
@@ -221,12 +126,14 @@ impl Stream {
     ) -> Result<Self> {
         let int64 = device.info.int64;
         let ballot = int64 && device.info.limits.subgroup_ballot;
-        let generate = if ballot { shaders.generate_64 } else { shaders.generate };
-        let deliver = if ballot { shaders.deliver_64 } else { shaders.deliver };
+        let (generate, deliver) = match ballot {
+            true => (Variant::Generate64, Variant::Deliver64),
+            false => (Variant::Generate, Variant::Deliver),
+        };
         let pipeline = Pipeline::Steps {
-            generate: match shaders.queue {
-                true => None,
-                false => Some(compile(device, shaders, generate, s)?),
+            generate: match shaders.rays {
+                Rays::Queue => None,
+                Rays::Generated | Rays::Camera => Some(compile(device, shaders, generate, s)?),
             },
             trace,
             deliver: compile(device, shaders, deliver, s)?,
@@ -249,43 +156,45 @@ impl Stream {
         s: &Specialization,
         rays_per_lane: u32,
     ) -> Result<Self> {
-        let pipeline = compile(device, shaders, shaders.reference, s)?;
+        let pipeline = compile(device, shaders, Variant::Reference, s)?;
         Ok(Self { pipeline: Pipeline::Single { pipeline, rays_per_group: LANES * rays_per_lane }, shaders })
     }
 
     /// For the compute tracer without a hierarchy.
     pub(super) fn brute(device: &Arc<Device>, shaders: &'static StreamShaders, s: &Specialization) -> Result<Self> {
-        let pipeline = compile(device, shaders, shaders.brute, s)?;
+        let pipeline = compile(device, shaders, Variant::Brute, s)?;
         Ok(Self { pipeline: Pipeline::Single { pipeline, rays_per_group: LANES }, shaders })
     }
 
     pub(super) fn query(device: &Arc<Device>, shaders: &'static StreamShaders, s: &Specialization) -> Result<Self> {
-        let pipeline = compile(device, shaders, shaders.query, s)?;
+        let pipeline = compile(device, shaders, Variant::Query, s)?;
         Ok(Self { pipeline: Pipeline::Single { pipeline, rays_per_group: LANES }, shaders })
     }
 
     pub(super) fn pipeline(
         device: &Arc<Device>,
-        shaders: &'static StreamShaders,
+        stream: &'static StreamShaders,
         features: SceneFeatures,
         s: &Specialization,
     ) -> Result<Self> {
         let shared = HitShaders {
-            miss: MISS,
-            triangle_closest: TRIANGLE_CLOSEST,
-            triangle_any: features.alpha.then_some(TRIANGLE_ANY),
-            sphere: features.spheres.then_some([SPHERE_CLOSEST, SPHERE_INTERSECTION]),
+            miss: &shaders::MISS,
+            triangle_closest: &shaders::TRIANGLE_CLOSEST,
+            triangle_any: features.alpha.then_some(&shaders::TRIANGLE_ANY),
+            sphere: features.spheres.then_some([&shaders::SPHERE_CLOSEST, &shaders::SPHERE_INTERSECTION]),
         };
-        let pipeline = RayTracingPipeline::new(device, shaders.name, shaders.raygen, &shared, s)?;
-        Ok(Self { pipeline: Pipeline::RayTracing(Arc::new(pipeline)), shaders })
+        let raygen =
+            stream.variant(Variant::Raygen).ok_or_else(|| Error::Usage(format!("'{}' has no raygen shader", stream.name)))?;
+        let pipeline = RayTracingPipeline::new(device, stream.name, raygen, &shared, s)?;
+        Ok(Self { pipeline: Pipeline::RayTracing(Arc::new(pipeline)), shaders: stream })
     }
 
     /// For rays whose pixels have been drawn. [`Push::rays`] is then the address of what was drawn ([`crate::render::raster`]).
     pub(super) fn drawn(device: &Arc<Device>, shaders: &'static StreamShaders, s: &Specialization) -> Result<Self> {
-        if shaders.visibility.is_empty() {
+        if shaders.variant(Variant::Visibility).is_none() {
             return Err(Error::Usage(format!("the rays of '{}' are not the camera's: they cannot be drawn", shaders.name)));
         }
-        let pipeline = compile(device, shaders, shaders.visibility, s)?;
+        let pipeline = compile(device, shaders, Variant::Visibility, s)?;
         Ok(Self { pipeline: Pipeline::Drawn(pipeline), shaders })
     }
 
@@ -295,7 +204,7 @@ impl Stream {
         if push.count == 0 {
             return;
         }
-        let in_memory = self.shaders.queue || matches!(self.pipeline, Pipeline::Drawn(_));
+        let in_memory = self.shaders.rays == Rays::Queue || matches!(self.pipeline, Pipeline::Drawn(_));
         debug_assert_eq!(in_memory, push.rays != 0, "{}: where are its rays?", self.shaders.name);
         debug_assert!(in_memory || push.count <= LAUNCH_RAYS, "{}: results would overwrite each other", self.shaders.name);
         let pass = self.shaders.pass;

@@ -5,6 +5,7 @@ use super::*;
 use skylit::gpu::{Buffer, Commands, Memory};
 use skylit::scene::TriangleMesh;
 use skylit::scene::material::{Anisotropy, Clearcoat, Sheen, Specular, Transmission};
+use skylit::shaders;
 use skylit::tracer::{Push, Stream, stream};
 use std::f64::consts::PI;
 
@@ -40,7 +41,7 @@ struct Probe<'a> {
 
 impl Probe<'_> {
     fn new(device: &Arc<Device>, tracer: Tracer) -> Probe<'_> {
-        let stream = tracer.stream(&stream::BSDF_PROBE_ANY).unwrap();
+        let stream = tracer.stream(&shaders::BSDF_PROBE_ANY).unwrap();
         Probe { device, tracer, stream }
     }
 

@@ -54,8 +54,6 @@ impl Verdict {
     pub const RAYS_AIM: f64 = 0.1;
     /// Greatest share of their error at equal time.
     pub const EQUAL_TIME_AIM: f64 = 1.0 / 3.0;
-    /// How many times as quick as theirs a change is to be forgotten.
-    pub const LAG_AIM: f64 = 5.0;
 
     /// Of what was measured in a view; what needs measurements of its own (`equal_time`) is given.
     pub fn of(view: &ViewRecord, equal_time: Option<EqualTime>) -> Self {

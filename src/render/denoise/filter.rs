@@ -5,6 +5,7 @@
 //! background; and pixels in which some of the latter two shows. Pixels that show several surfaces are averaged among themselves, so that none of
 //! their light gets onto the surfaces beside them.
 
+use crate::shaders::{self, LANES};
 use std::time::Instant;
 
 use bytemuck::{Pod, Zeroable};
@@ -21,8 +22,8 @@ use crate::render::realtime::params::FrameParams;
 use crate::render::realtime::settings::FilterStep;
 use crate::render::realtime::{DEPTH_TOLERANCE, Filter, FilterKind, inverse};
 use crate::scene::material::{Material, MaterialKind};
-use crate::tracer::stream::LANES;
-use crate::tracer::{Push, stream};
+
+use crate::tracer::Push;
 
 /// How it filters.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
@@ -189,7 +190,7 @@ fn run(shot: &Shot, size: [u32; 2], guided: &Guided, settings: &Settings, contro
         ..Default::default()
     };
     let params = Buffer::from_slice(device, "filter parameters", &[params])?;
-    let pipeline = stream::DENOISE.pipeline(device)?;
+    let pipeline = shaders::DENOISE.pipeline(device)?;
     let (mut commands, mut pace) = (Commands::new(device)?, Pace::default());
     let mut from = &given;
     for (k, step) in steps.iter().enumerate() {

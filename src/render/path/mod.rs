@@ -12,6 +12,7 @@ mod lights;
 mod media;
 mod params;
 
+use crate::shaders::{self, StreamShaders};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -27,8 +28,8 @@ use crate::scene::Environment;
 use crate::scene::flatten::FlatScene;
 use crate::tracer::queue::RayQueue;
 use crate::tracer::shading::feature;
-use crate::tracer::stream::StreamShaders;
-use crate::tracer::{Push, Stream, Tracer, stream};
+
+use crate::tracer::{Push, Stream, Tracer};
 pub use asked::ASKED;
 use environment::DeviceEnvironment;
 use lights::Lights;
@@ -212,7 +213,7 @@ pub struct PathResult {
 
 /// The streams that [`render`] traces and that nothing but the scene's geometry is needed for.
 pub fn streams() -> [&'static StreamShaders; 2] {
-    [&stream::PATH_BOUNCE_CLOSEST, &stream::PATH_SHADOW_ANY]
+    [&shaders::PATH_BOUNCE_CLOSEST, &shaders::PATH_SHADOW_ANY]
 }
 
 /// Renders. The tracer must have been made of `flat` with [`crate::tracer::Needs::shading`].
@@ -439,7 +440,7 @@ impl Paths {
         let draws_lights = options.strategy.draws_lights() && !lights.records.is_empty() && options.view.is_none();
         let walls = match has_clear_walls && draws_lights {
             true => Some(Walls {
-                stream: tracer.specialized(&stream::PATH_SHADOW_WALLS_CLOSEST, &constants)?,
+                stream: tracer.specialized(&shaders::PATH_SHADOW_WALLS_CLOSEST, &constants)?,
                 later: RayQueue::new(device, most)?,
                 contributions: quads("what lights bring through walls")?,
                 count: Buffer::new(device, "number of rays behind walls", 4, Memory::Readback)?,
@@ -469,10 +470,10 @@ impl Paths {
             .map(|_| Buffer::new(device, "block parameters", size_of::<BlockParams>() as u64, Memory::Upload))
             .collect::<Result<Vec<_>>>()?;
         Ok(Self {
-            camera: tracer.specialized(&stream::PATH_CAMERA_CLOSEST, &constants)?,
-            bounce: tracer.specialized(&stream::PATH_BOUNCE_CLOSEST, &constants)?,
-            shadow: tracer.stream(&stream::PATH_SHADOW_ANY)?,
-            resolve: stream::PATH_RESOLVE.pipeline(device)?,
+            camera: tracer.specialized(&shaders::PATH_CAMERA_CLOSEST, &constants)?,
+            bounce: tracer.specialized(&shaders::PATH_BOUNCE_CLOSEST, &constants)?,
+            shadow: tracer.stream(&shaders::PATH_SHADOW_ANY)?,
+            resolve: shaders::PATH_RESOLVE.pipeline(device)?,
             queues,
             shadow_queue,
             block_params,
@@ -603,7 +604,7 @@ impl Paths {
                 break;
             }
         }
-        let groups = (push(0).count >> push(0).sample_bits).div_ceil(stream::LANES);
+        let groups = (push(0).count >> push(0).sample_bits).div_ceil(shaders::LANES);
         timings.extend(commands.run(|r| r.timed("path_resolve", |r| r.dispatch(&self.resolve, &push(0), groups)))?);
         Ok(timings)
     }

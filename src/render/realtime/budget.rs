@@ -5,8 +5,9 @@ use super::settings::Settings;
 use crate::error::Result;
 use crate::gpu::{Buffer, ComputePipeline, Memory, Recorder};
 use crate::render::block::Block;
-use crate::tracer::stream::{LANES, LAUNCH_RAYS};
-use crate::tracer::{Push, Tracer, stream};
+use crate::shaders::{self, LANES};
+use crate::tracer::stream::LAUNCH_RAYS;
+use crate::tracer::{Push, Tracer};
 
 /// Words of the sums, and which of them counts the rays that are listed: shaders/common/budget.glsl.
 const SUMS: u64 = 131;
@@ -38,7 +39,7 @@ impl BudgetPass {
         let most_rays = Settings::MOST_SHARE * settings.rays_per_pixel;
         let image = |name: &str, bytes: u64| Buffer::new(device, name, bytes * pixels, Memory::Device);
         Ok(Self {
-            pipeline: stream::BUDGET.pipeline(device)?,
+            pipeline: shaders::BUDGET.pipeline(device)?,
             places,
             most_rays,
             plan: image("plan of rays", 8)?,

@@ -1,13 +1,14 @@
 //! A buffer of the frame as it is shown: RGBA words in device memory, which a window takes as they are and files without alpha.
 
+use crate::shaders::{self, LANES};
 use bytemuck::{Pod, Zeroable};
 
 use super::settings::{Settings, Technique};
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, ComputePipeline, Memory, Recorder};
 use crate::output::png::{Colour, srgb_byte};
-use crate::tracer::stream::LANES;
-use crate::tracer::{Push, Tracer, stream};
+
+use crate::tracer::{Push, Tracer};
 
 /// What can be shown of a frame. As shaders/display.glsl numbers them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
@@ -120,7 +121,7 @@ impl DisplayPass {
     pub fn new(tracer: &Tracer, pixels: u64) -> Result<Self> {
         let device = tracer.device();
         Ok(Self {
-            pipeline: stream::DISPLAY.pipeline(device)?,
+            pipeline: shaders::DISPLAY.pipeline(device)?,
             params: Buffer::new(device, "parameters of the display", size_of::<DisplayParams>() as u64, Memory::Upload)?,
             thresholds: Buffer::from_slice(device, "thresholds of sRGB", &thresholds())?,
             words: Buffer::new(device, "display", 4 * pixels, Memory::Device)?,

@@ -3,6 +3,7 @@
 //! before. What its text leaves open is taken as favourable to it: the geometric normal, a bias and a reach that fit the scene's scale
 //! ([`super::Settings::unit`]), white surfaces.
 
+use crate::shaders::{self, LANES};
 use std::sync::Arc;
 
 use bytemuck::{Pod, Zeroable};
@@ -12,8 +13,8 @@ use crate::error::Result;
 use crate::gpu::{Buffer, ComputePipeline, Device, Memory, Recorder};
 use crate::render::block::Block;
 use crate::sampling::{best_candidates, blue_noise};
-use crate::tracer::stream::{LANES, LAUNCH_RAYS};
-use crate::tracer::{Push, Stream, Tracer, stream};
+use crate::tracer::stream::LAUNCH_RAYS;
+use crate::tracer::{Push, Stream, Tracer};
 
 /// Occlusion rays of a pixel of the occlusion image.
 const RAYS: u32 = 64;
@@ -94,11 +95,11 @@ impl Larsen {
             ..Default::default()
         };
         Ok(Self {
-            light: tracer.stream(&stream::LARSEN_LIGHT_ANY)?,
-            occlusion: tracer.stream(&stream::LARSEN_OCCLUSION_CLOSEST)?,
-            sum: stream::LARSEN_SUM.pipeline(device)?,
-            blur: stream::LARSEN_BLUR.pipeline(device)?,
-            temporal: stream::LARSEN_TEMPORAL.pipeline(device)?,
+            light: tracer.stream(&shaders::LARSEN_LIGHT_ANY)?,
+            occlusion: tracer.stream(&shaders::LARSEN_OCCLUSION_CLOSEST)?,
+            sum: shaders::LARSEN_SUM.pipeline(device)?,
+            blur: shaders::LARSEN_BLUR.pipeline(device)?,
+            temporal: shaders::LARSEN_TEMPORAL.pipeline(device)?,
             params,
             params_buffer: upload(device)?,
             size,

@@ -14,6 +14,7 @@ pub(super) mod params;
 mod passes;
 pub mod settings;
 
+use crate::shaders::{self, StreamShaders};
 use glam::{DAffine3, DMat3, DVec3};
 
 use super::ao::Hemisphere;
@@ -23,8 +24,8 @@ use super::raster::{Primary, View};
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, Commands, Timing};
 use crate::tracer::gpu_scene::rows;
-use crate::tracer::stream::{LAUNCH_RAYS, StreamShaders};
-use crate::tracer::{Moved, Push, Tracer, stream};
+use crate::tracer::stream::LAUNCH_RAYS;
+use crate::tracer::{Moved, Push, Tracer};
 use budget::BudgetPass;
 use display::{Display, DisplayPass};
 use images::{Images, POSITION_BYTES, SURFACE_BYTES};
@@ -98,7 +99,10 @@ struct State {
 impl Realtime {
     /// The streams that it traces.
     pub fn streams(settings: &Settings) -> [&'static StreamShaders; 2] {
-        [&stream::GBUFFER_CLOSEST, if settings.binary() { &stream::ACCESSIBILITY_ANY } else { &stream::ACCESSIBILITY_CLOSEST }]
+        [
+            &shaders::GBUFFER_CLOSEST,
+            if settings.binary() { &shaders::ACCESSIBILITY_ANY } else { &shaders::ACCESSIBILITY_CLOSEST },
+        ]
     }
 
     /// For images of `size` pixels of the tracer's scene. `lights` are the positions of its point lights, relative to its origin: the

@@ -6,7 +6,8 @@ use super::settings::{Filter, Settings, Technique};
 use crate::error::Result;
 use crate::gpu::{Buffer, ComputePipeline, Recorder, Specialization};
 use crate::render::raster::{Primary, Raster, View};
-use crate::tracer::stream::{self, LANES, LAUNCH_RAYS};
+use crate::shaders::{self, LANES};
+use crate::tracer::stream::LAUNCH_RAYS;
 use crate::tracer::{Push, Stream, Tracer};
 
 /// Id of a constant of shaders/common/frame.glsl.
@@ -39,10 +40,10 @@ impl Passes {
                 Primary::Raster => CameraRays::Drawn(Box::new(Raster::new(tracer, gbuffer, size)?)),
             },
             accessibility: tracer.stream(accessibility)?,
-            gather: stream::GATHER.specialized(device, &constants)?,
-            gtao: stream::GTAO.pipeline(device)?,
-            temporal: stream::TEMPORAL.specialized(device, &constants)?,
-            filter: stream::FILTER.specialized(device, &constants)?,
+            gather: shaders::GATHER.specialized(device, &constants)?,
+            gtao: shaders::GTAO.pipeline(device)?,
+            temporal: shaders::TEMPORAL.specialized(device, &constants)?,
+            filter: shaders::FILTER.specialized(device, &constants)?,
         })
     }
 

@@ -1,0 +1,187 @@
+//! From GLSL to SPIR-V, with a cache on disk. Used by build.rs, which compiles every shader, and by programs that were built with the feature
+//! `live-shaders`, which compile the ones that they need.
+
+use std::cell::RefCell;
+use std::collections::BTreeSet;
+use std::fmt::Write as _;
+use std::hash::{DefaultHasher, Hash, Hasher};
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use shaderc::{
+    CompileOptions, EnvVersion, IncludeType, OptimizationLevel, ResolvedInclude, ShaderKind, SpirvVersion, TargetEnv,
+};
+
+use super::source::{Source, Stage};
+
+/// What was compiled before, by what it was compiled from: builds of other profiles and later runs find theirs here, and a change compiles anew only what
+/// includes it. A file `KEY.spv` each, in the folder `spirv` beside the profiles'.
+struct Cache {
+    folder: PathBuf,
+    // version of the compiler
+    compiler: String,
+}
+
+/// More shaders than this are not kept; the oldest go first.
+const MAX_KEPT: usize = 1500;
+
+/// Three quarters of the time go into optimisation. Whoever edits a shader wants to see it: the driver optimises, too.
+const OPTIMIZATION: OptimizationLevel =
+    if cfg!(feature = "live-shaders") { OptimizationLevel::Zero } else { OptimizationLevel::Performance };
+
+/// Compiles shaders of one folder.
+pub struct Compiler {
+    shaders: PathBuf,
+    cache: Option<Cache>,
+}
+
+/// A shader that was compiled.
+pub struct Compiled {
+    /// Its SPIR-V.
+    pub spirv: Vec<u8>,
+    /// The files that it includes.
+    #[cfg_attr(feature = "live-shaders", allow(dead_code, reason = "build.rs alone tells cargo"))]
+    pub included: BTreeSet<PathBuf>,
+}
+
+impl Compiler {
+    /// shaders: the folder. out: OUT_DIR; the cache lies beside the profiles'. Without pkg-config, which says which compiler this is, there is no cache.
+    pub fn new(shaders: &Path, out: &Path) -> Self {
+        Self { shaders: shaders.to_owned(), cache: Cache::open(out) }
+    }
+
+    /// Compiles, or takes what was compiled before.
+    ///
+    /// # Errors
+    /// The compiler's words, and how the file that the first of them names was included.
+    pub fn compile(&self, source: &Source) -> Result<Compiled, String> {
+        let text = source.text(&self.shaders)?;
+        // `None` where an included file cannot be read: the compiler says it better
+        let (key, included) = key(&text, source.stage(), &self.shaders).unzip();
+        let place = self.cache.as_ref().zip(key).map(|(cache, key)| cache.place(&key));
+        if let (Some(place), Some(included)) = (&place, included)
+            && let Ok(spirv) = std::fs::read(place)
+            && !spirv.is_empty()
+        {
+            return Ok(Compiled { spirv, included });
+        }
+        let compiled = self.run(source, &text)?;
+        if let Some(place) = place {
+            Cache::keep(&place, &compiled.spirv);
+        }
+        Ok(compiled)
+    }
+
+    fn run(&self, source: &Source, text: &str) -> Result<Compiled, String> {
+        // who included what, to name the chain when a file does not compile
+        let chain: RefCell<Vec<(String, String)>> = RefCell::new(Vec::new());
+        let included = RefCell::new(BTreeSet::new());
+        let compiler = shaderc::Compiler::new().map_err(|e| format!("shaderc does not start: {e}"))?;
+        let mut options = CompileOptions::new().map_err(|e| format!("shaderc does not start: {e}"))?;
+        options.set_target_env(TargetEnv::Vulkan, EnvVersion::Vulkan1_3 as u32);
+        options.set_target_spirv(SpirvVersion::V1_5);
+        options.set_optimization_level(OPTIMIZATION);
+        options.set_warnings_as_errors();
+        options.set_include_callback(|requested, _: IncludeType, from, _| {
+            let path = self.shaders.join(requested);
+            let content = std::fs::read_to_string(&path).map_err(|e| format!("{}: {e}", path.display()))?;
+            included.borrow_mut().insert(path);
+            chain.borrow_mut().push((requested.to_owned(), from.to_owned()));
+            // glslang numbers lines per file and names the file through this
+            Ok(ResolvedInclude { resolved_name: requested.to_owned(), content })
+        });
+        let kind = match source.stage() {
+            Stage::Compute => ShaderKind::Compute,
+            Stage::RayGeneration => ShaderKind::RayGeneration,
+            Stage::Miss => ShaderKind::Miss,
+            Stage::ClosestHit => ShaderKind::ClosestHit,
+            Stage::AnyHit => ShaderKind::AnyHit,
+            Stage::Intersection => ShaderKind::Intersection,
+            Stage::Vertex => ShaderKind::Vertex,
+            Stage::Fragment => ShaderKind::Fragment,
+        };
+        let result = compiler.compile_into_spirv(text, kind, &source.to_string(), "main", Some(&options));
+        drop(options);
+        match result {
+            Ok(artifact) => Ok(Compiled { spirv: artifact.as_binary_u8().to_vec(), included: included.into_inner() }),
+            Err(error) => Err(explain(source, &error.to_string(), &chain.borrow())),
+        }
+    }
+}
+
+impl Cache {
+    fn open(out: &Path) -> Option<Self> {
+        if cfg!(feature = "build-shaderc") {
+            return None;
+        }
+        let said = Command::new("pkg-config").args(["--modversion", "shaderc", "SPIRV-Tools"]).output().ok()?;
+        let compiler = said.status.success().then(|| String::from_utf8_lossy(&said.stdout).into_owned())?;
+        // target/PROFILE/build/PACKAGE/out
+        let folder = out.ancestors().nth(4)?.join("spirv");
+        std::fs::create_dir_all(&folder).ok()?;
+        let cache = Self { folder, compiler };
+        cache.prune();
+        Some(cache)
+    }
+
+    /// Removes what is oldest beyond what it may hold.
+    fn prune(&self) {
+        let Ok(entries) = std::fs::read_dir(&self.folder) else { return };
+        let mut all: Vec<_> =
+            entries.filter_map(|e| e.ok()).filter_map(|e| Some((e.metadata().ok()?.modified().ok()?, e.path()))).collect();
+        all.sort();
+        for (_, path) in all.iter().take(all.len().saturating_sub(MAX_KEPT)) {
+            let _ = std::fs::remove_file(path);
+        }
+    }
+
+    fn place(&self, key: &str) -> PathBuf {
+        let mut hash = DefaultHasher::new();
+        self.compiler.hash(&mut hash);
+        include_str!("compiler.rs").hash(&mut hash);
+        self.folder.join(format!("{key}{:016x}.spv", hash.finish()))
+    }
+
+    /// Beside, then renamed: builds of two profiles and other programs may run at once. What fails is compiled again next time.
+    fn keep(place: &Path, spirv: &[u8]) {
+        let beside = place.with_extension(std::process::id().to_string());
+        if std::fs::write(&beside, spirv).is_err() || std::fs::rename(&beside, place).is_err() {
+            let _ = std::fs::remove_file(&beside);
+        }
+    }
+}
+
+/// A key of a text, of all that it includes and of the kind of shader; and the files that it includes.
+fn key(text: &str, stage: Stage, shaders: &Path) -> Option<(String, BTreeSet<PathBuf>)> {
+    // two numbers of 64 bits
+    let mut hashes = [DefaultHasher::new(), DefaultHasher::new()];
+    hashes[1].write_u8(1);
+    let mut add = |text: &str| hashes.iter_mut().for_each(|h| text.hash(h));
+    add(&format!("{stage:?} {OPTIMIZATION:?}"));
+    let (mut seen, mut texts) = (BTreeSet::new(), vec![text.to_owned()]);
+    while let Some(text) = texts.pop() {
+        add(&text);
+        for name in text.lines().filter_map(|l| l.trim_start().strip_prefix("#include \"")?.split('"').next()) {
+            let path = shaders.join(name);
+            if !seen.contains(&path) {
+                texts.push(std::fs::read_to_string(&path).ok()?);
+                seen.insert(path);
+            }
+        }
+    }
+    Some((hashes.iter().map(|h| format!("{:016x}", h.finish())).collect(), seen))
+}
+
+/// The compiler's words, and how the file that the first of them names came in.
+fn explain(source: &Source, text: &str, chain: &[(String, String)]) -> String {
+    let mut message = format!("shader {source} does not compile:\n{text}");
+    if let Some(mut file) =
+        text.lines().find_map(|l| chain.iter().find(|c| l.starts_with(&format!("{}:", c.0))).map(|c| c.0.clone()))
+    {
+        while let Some((_, from)) = chain.iter().find(|c| c.0 == file) {
+            let _ = write!(message, "\n  {file} was included from {from}");
+            file = from.clone();
+        }
+    }
+    message
+}

@@ -1,0 +1,259 @@
+//! The shaders, as SPIR-V: each one stands in `registry.rs`, and build.rs compiles all of them into the program.
+//!
+//! A program that was built with the cargo feature `live-shaders` has none of it: it reads shaders/ in the source tree when it runs, and compiles what it
+//! needs when it first needs it, into a cache that all builds share. An edit of a shader then takes effect with the next run, or with the next pipeline that
+//! is made, and nothing of Rust is compiled for it.
+
+#[cfg(feature = "live-shaders")]
+mod compiler;
+mod source;
+
+use std::borrow::Cow;
+
+pub use source::{LANES, Mode, PACKET_RAYS, RUN, Rays, SPREAD, Source, Stage, Variant};
+
+use crate::error::Result;
+
+/// A shader, ready for the driver.
+#[derive(Debug)]
+pub struct Shader {
+    source: Source,
+    #[cfg(not(feature = "live-shaders"))]
+    spirv: &'static [u8],
+}
+
+impl Shader {
+    /// What it is compiled from.
+    pub fn source(&self) -> &Source {
+        &self.source
+    }
+
+    /// Its SPIR-V.
+    ///
+    /// # Errors
+    /// None, but with the feature `live-shaders`: then [`crate::Error::Usage`] has the compiler's words.
+    #[cfg(not(feature = "live-shaders"))]
+    pub fn spirv(&self) -> Result<Cow<'static, [u8]>> {
+        Ok(Cow::Borrowed(self.spirv))
+    }
+
+    /// Its SPIR-V, compiled from the files as they are now.
+    ///
+    /// # Errors
+    /// [`crate::Error::Usage`] with the compiler's words.
+    #[cfg(feature = "live-shaders")]
+    pub fn spirv(&self) -> Result<Cow<'static, [u8]>> {
+        use std::path::Path;
+        use std::sync::OnceLock;
+
+        static COMPILER: OnceLock<compiler::Compiler> = OnceLock::new();
+        let compiler = COMPILER.get_or_init(|| compiler::Compiler::new(&folder(), Path::new(env!("OUT_DIR"))));
+        compiler.compile(&self.source).map(|c| Cow::Owned(c.spirv)).map_err(crate::Error::Usage)
+    }
+}
+
+/// Where the shaders' sources are read from, with the feature `live-shaders`.
+#[cfg(feature = "live-shaders")]
+fn folder() -> std::path::PathBuf {
+    std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("shaders")
+}
+
+/// When a shader's source was last changed: pipelines that were made before then are of another text. `None` without the feature `live-shaders`, where
+/// shaders never change, and where the folder cannot be read.
+pub fn last_change() -> Option<std::time::SystemTime> {
+    #[cfg(feature = "live-shaders")]
+    {
+        let (mut last, mut folders) = (None, vec![folder()]);
+        while let Some(folder) = folders.pop() {
+            for entry in std::fs::read_dir(folder).ok()?.filter_map(|e| e.ok()) {
+                let data = entry.metadata().ok()?;
+                if data.is_dir() {
+                    folders.push(entry.path());
+                }
+                last = last.max(data.modified().ok());
+            }
+        }
+        last
+    }
+    #[cfg(not(feature = "live-shaders"))]
+    None
+}
+
+/// A stream's shaders, one for each tracer and step.
+pub struct StreamShaders {
+    /// Pass and mode.
+    pub name: &'static str,
+    /// Pass: what its time is listed under where a stream is one shader.
+    pub pass: &'static str,
+    /// What the time of each step is listed under where a stream is three.
+    pub steps: [&'static str; 3],
+    /// What it asks of its rays.
+    pub mode: Mode,
+    /// Where they come from.
+    pub rays: Rays,
+    // in the order of Variant::ALL; those that do not apply are empty
+    variants: [Shader; 10],
+}
+
+impl StreamShaders {
+    /// Its shader for a tracer and step; `None` where [`Variant::applies_to`] says so.
+    pub fn variant(&self, variant: Variant) -> Option<&Shader> {
+        variant.applies_to(self.rays).then(|| &self.variants[variant as usize])
+    }
+}
+
+impl std::fmt::Debug for StreamShaders {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        f.write_str(self.name)
+    }
+}
+
+/// The shaders of a pass that traces nothing.
+#[derive(Debug)]
+pub struct ComputeShader {
+    /// The pass.
+    pub name: &'static str,
+    plain: Shader,
+    int64: Shader,
+}
+
+impl ComputeShader {
+    /// The one for devices that have 64-bit integers, or have not.
+    pub fn variant(&self, int64: bool) -> &Shader {
+        if int64 { &self.int64 } else { &self.plain }
+    }
+}
+
+/// The compute tracer's fast kernel, which all streams of a mode share.
+pub fn wide_kernel(mode: Mode, int64: bool) -> &'static Shader {
+    match (mode, int64) {
+        (Mode::Any, true) => &WIDE_ANY_64,
+        (Mode::Any, false) => &WIDE_ANY_32,
+        (Mode::Closest, true) => &WIDE_CLOSEST_64,
+        (Mode::Closest, false) => &WIDE_CLOSEST_32,
+    }
+}
+
+#[cfg(not(feature = "live-shaders"))]
+macro_rules! shader {
+    ($source:expr, $($file:expr),*) => {
+        Shader { source: $source, spirv: include_bytes!(concat!(env!("OUT_DIR"), "/", $($file,)* ".spv")) }
+    };
+}
+
+#[cfg(feature = "live-shaders")]
+macro_rules! shader {
+    ($source:expr, $($file:expr),*) => {
+        Shader { source: $source }
+    };
+}
+
+macro_rules! mode {
+    (any) => {
+        Mode::Any
+    };
+    (closest) => {
+        Mode::Closest
+    };
+}
+
+macro_rules! rays {
+    (generated) => {
+        Rays::Generated
+    };
+    (camera) => {
+        Rays::Camera
+    };
+    (queue) => {
+        Rays::Queue
+    };
+}
+
+macro_rules! variant {
+    ($pass:literal, $mode:ident, $variant:ident) => {
+        shader!(
+            Source::Stream { pass: $pass, mode: mode!($mode), variant: Variant::$variant },
+            $pass,
+            "_",
+            stringify!($mode),
+            "_",
+            stringify!($variant)
+        )
+    };
+}
+
+macro_rules! registry {
+    (
+        streams { $($stream:ident = $pass:literal, $mode:ident, $rays:ident;)* }
+        compute { $($compute:ident = $name:literal;)* }
+        stages { $($stage:ident = $path:literal, $kind:ident;)* }
+    ) => {
+        $(
+            #[doc = concat!("The stream `shaders/", $pass, ".glsl`, mode `", stringify!($mode), "`.")]
+            pub static $stream: StreamShaders = StreamShaders {
+                name: concat!($pass, " ", stringify!($mode)),
+                pass: $pass,
+                steps: [concat!($pass, " generate"), concat!($pass, " trace"), concat!($pass, " deliver")],
+                mode: mode!($mode),
+                rays: rays!($rays),
+                variants: [
+                    variant!($pass, $mode, Generate),
+                    variant!($pass, $mode, Generate64),
+                    variant!($pass, $mode, Deliver),
+                    variant!($pass, $mode, Deliver64),
+                    variant!($pass, $mode, Packet),
+                    variant!($pass, $mode, Reference),
+                    variant!($pass, $mode, Brute),
+                    variant!($pass, $mode, Query),
+                    variant!($pass, $mode, Raygen),
+                    variant!($pass, $mode, Visibility),
+                ],
+            };
+        )*
+        $(
+            #[doc = concat!("`shaders/", $name, ".glsl`, which traces nothing.")]
+            pub static $compute: ComputeShader = ComputeShader {
+                name: $name,
+                plain: shader!(Source::Compute { pass: $name, int64: false }, $name, "_32"),
+                int64: shader!(Source::Compute { pass: $name, int64: true }, $name, "_64"),
+            };
+        )*
+        $(
+            #[doc = concat!("`shaders/", $path, "`.")]
+            pub static $stage: Shader = shader!(Source::File { path: $path, stage: Stage::$kind }, stringify!($stage));
+        )*
+    };
+}
+
+static WIDE_ANY_32: Shader = shader!(Source::Kernel { mode: Mode::Any, int64: false }, "wide_any_32");
+static WIDE_ANY_64: Shader = shader!(Source::Kernel { mode: Mode::Any, int64: true }, "wide_any_64");
+static WIDE_CLOSEST_32: Shader = shader!(Source::Kernel { mode: Mode::Closest, int64: false }, "wide_closest_32");
+static WIDE_CLOSEST_64: Shader = shader!(Source::Kernel { mode: Mode::Closest, int64: true }, "wide_closest_64");
+
+include!("registry.rs");
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn variants_are_numbered_in_order() {
+        for (k, variant) in Variant::ALL.into_iter().enumerate() {
+            assert_eq!(variant as usize, k);
+            let Some(shader) = PRIMARY_CLOSEST.variant(variant) else { panic!("{variant:?}") };
+            assert_eq!(*shader.source(), Source::Stream { pass: "primary", mode: Mode::Closest, variant });
+        }
+        assert!(OCCLUSION_ANY.variant(Variant::Packet).is_none() && OCCLUSION_ANY.variant(Variant::Generate64).is_none());
+        assert!(RAYS_ANY.variant(Variant::Visibility).is_none() && RAYS_ANY.variant(Variant::Packet).is_some());
+    }
+
+    #[test]
+    fn every_shader_is_spirv() {
+        let spirv = |shader: &Shader| shader.spirv().unwrap()[..4] == 0x0723_0203u32.to_le_bytes();
+        assert!(spirv(&MISS) && spirv(&DRAW_SPHERE) && spirv(RESOLVE.variant(true)) && spirv(RESOLVE.variant(false)));
+        for (mode, int64) in [(Mode::Any, true), (Mode::Any, false), (Mode::Closest, true), (Mode::Closest, false)] {
+            let shader = wide_kernel(mode, int64);
+            assert!(spirv(shader) && *shader.source() == Source::Kernel { mode, int64 });
+        }
+    }
+}

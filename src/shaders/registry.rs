@@ -1,0 +1,57 @@
+// Every shader, once: a line here and a file in shaders/ make a pass. build.rs includes this file and compiles what it lists; src/shaders/mod.rs includes it
+// and makes constants of it.
+//
+// streams: passes that trace rays. CONSTANT = file, what each ray asks for (any, closest), and where the rays come from:
+//     generated   the pass makes them
+//     camera      the pass makes them, and neighbours take much the same way: packets of rays pay, and what they meet can be rasterized instead of traced
+//     queue       they are in memory before the pass begins
+// compute: passes that trace nothing.
+// stages: what streams of the pipeline tracer share, and what rasterizes.
+registry! {
+    streams {
+        ACCESSIBILITY_ANY = "accessibility", any, generated;
+        ACCESSIBILITY_CLOSEST = "accessibility", closest, generated;
+        AOV_CLOSEST = "aov", closest, camera;
+        BSDF_PROBE_ANY = "bsdf_probe", any, generated;
+        GBUFFER_CLOSEST = "gbuffer", closest, camera;
+        LARSEN_LIGHT_ANY = "larsen_light", any, generated;
+        LARSEN_OCCLUSION_CLOSEST = "larsen_occlusion", closest, generated;
+        OCCLUSION_ANY = "occlusion", any, queue;
+        OCCLUSION_CLOSEST = "occlusion", closest, queue;
+        PATH_BOUNCE_CLOSEST = "path_bounce", closest, queue;
+        PATH_CAMERA_CLOSEST = "path_camera", closest, camera;
+        PATH_SHADOW_ANY = "path_shadow", any, queue;
+        PATH_SHADOW_WALLS_CLOSEST = "path_shadow_walls", closest, queue;
+        PRIMARY_CLOSEST = "primary", closest, camera;
+        RAYS_ANY = "rays", any, generated;
+        RAYS_CLOSEST = "rays", closest, generated;
+        SAMPLER_PROBE_ANY = "sampler_probe", any, generated;
+    }
+    compute {
+        BUDGET = "budget";
+        DENOISE = "denoise";
+        DISPLAY = "display";
+        FILTER = "filter";
+        GATHER = "gather";
+        GTAO = "gtao";
+        LARSEN_BLUR = "larsen_blur";
+        LARSEN_SUM = "larsen_sum";
+        LARSEN_TEMPORAL = "larsen_temporal";
+        PATH_RESOLVE = "path_resolve";
+        RESOLVE = "resolve";
+        SEQUENCE_PROBE = "sequence_probe";
+        TEMPORAL = "temporal";
+    }
+    stages {
+        MISS = "trace/miss.rmiss", Miss;
+        TRIANGLE_CLOSEST = "trace/triangle.rchit", ClosestHit;
+        TRIANGLE_ANY = "trace/triangle.rahit", AnyHit;
+        SPHERE_CLOSEST = "trace/sphere.rchit", ClosestHit;
+        SPHERE_INTERSECTION = "trace/sphere.rint", Intersection;
+        DRAW_TRIANGLES = "raster/triangle.vert", Vertex;
+        DRAW_OPAQUE = "raster/opaque.frag", Fragment;
+        DRAW_ALPHA = "raster/alpha.frag", Fragment;
+        DRAW_SPHERES = "raster/sphere.vert", Vertex;
+        DRAW_SPHERE = "raster/sphere.frag", Fragment;
+    }
+}

@@ -1,0 +1,238 @@
+//! What a shader is compiled from: how a tracer's template and a pass make one source text. Used by build.rs and by the program.
+
+use std::fmt;
+use std::path::Path;
+
+/// Threads of a work-group of a stream.
+pub const LANES: u32 = 64;
+
+/// Runs of work-groups of streams that follow each other take runs of parts of a dispatch that are so far apart (shaders/trace/spread.glsl).
+pub const SPREAD: u32 = 16;
+
+/// Work-groups that take neighbouring parts, where a part is a ray for each lane: memory is fetched ahead.
+pub const RUN: u32 = 4;
+
+/// Rays of each lane of a packet.
+pub const PACKET_RAYS: u32 = 2;
+
+const EXTENSIONS: &str = "#extension GL_EXT_buffer_reference : require\n#extension GL_EXT_buffer_reference_uvec2 : require\n\
+                          #extension GL_EXT_control_flow_attributes : require\n";
+
+/// Loads and stores of 64 bits, where the device has such integers.
+const HEAD_64: &str = "#extension GL_EXT_shader_explicit_arithmetic_types_int64 : require\n#define LOAD64\n";
+
+/// Subgroup ballots besides: one atomic for all lanes that append to a queue.
+const HEAD_BALLOT: &str = "#extension GL_KHR_shader_subgroup_ballot : require\n#define BALLOT\n";
+
+/// What a stream asks of its rays.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Mode {
+    /// Whether something is in the way.
+    Any,
+    /// The nearest hit.
+    Closest,
+}
+
+impl Mode {
+    fn define(self) -> &'static str {
+        match self {
+            Mode::Any => "#define STREAM_ANY\n",
+            Mode::Closest => "#define STREAM_CLOSEST\n",
+        }
+    }
+
+    fn name(self) -> &'static str {
+        match self {
+            Mode::Any => "any",
+            Mode::Closest => "closest",
+        }
+    }
+}
+
+/// Where a stream's rays come from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Rays {
+    /// The pass makes them.
+    Generated,
+    /// The pass makes them, and neighbours take much the same way; what they meet can be rasterized instead of traced.
+    Camera,
+    /// They are in memory before the pass begins.
+    Queue,
+}
+
+/// Kind of a shader.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[allow(missing_docs, reason = "Vulkan's own names")]
+pub enum Stage {
+    Compute,
+    RayGeneration,
+    Miss,
+    ClosestHit,
+    AnyHit,
+    Intersection,
+    Vertex,
+    Fragment,
+}
+
+/// How a tracer turns a stream into a shader.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Variant {
+    /// Compute tracer: rays to memory.
+    Generate,
+    /// The same for devices with 64-bit integers and subgroup ballots.
+    Generate64,
+    /// Compute tracer: hits to the pass.
+    Deliver,
+    /// The same for devices with 64-bit integers and subgroup ballots.
+    Deliver64,
+    /// Compute tracer: the rays of a subgroup together.
+    Packet,
+    /// Compute tracer: the readable kernel over a binary tree.
+    Reference,
+    /// Compute tracer: every primitive of every instance.
+    Brute,
+    /// Query tracer.
+    Query,
+    /// Pipeline tracer.
+    Raygen,
+    /// No tracer: what is at each pixel was rasterized.
+    Visibility,
+}
+
+impl Variant {
+    /// All of them, in the order of their numbers.
+    pub const ALL: [Self; 10] = [
+        Self::Generate,
+        Self::Generate64,
+        Self::Deliver,
+        Self::Deliver64,
+        Self::Packet,
+        Self::Reference,
+        Self::Brute,
+        Self::Query,
+        Self::Raygen,
+        Self::Visibility,
+    ];
+
+    /// Is there such a shader of streams whose rays come from there?
+    pub fn applies_to(self, rays: Rays) -> bool {
+        match self {
+            Self::Generate | Self::Generate64 | Self::Packet => rays != Rays::Queue,
+            Self::Visibility => rays == Rays::Camera,
+            _ => true,
+        }
+    }
+
+    fn template(self) -> &'static str {
+        match self {
+            Self::Generate | Self::Generate64 => "trace/generate.glsl",
+            Self::Deliver | Self::Deliver64 => "trace/deliver.glsl",
+            Self::Packet => "trace/packet.glsl",
+            Self::Reference => "trace/reference.glsl",
+            Self::Brute => "trace/brute.glsl",
+            Self::Query => "trace/query.glsl",
+            Self::Raygen => "trace/pipeline.glsl",
+            Self::Visibility => "trace/visibility.glsl",
+        }
+    }
+
+    fn head(self) -> String {
+        match self {
+            Self::Generate64 | Self::Deliver64 => format!("{HEAD_64}{HEAD_BALLOT}"),
+            Self::Packet => format!(
+                "{HEAD_64}{HEAD_BALLOT}#extension GL_KHR_shader_subgroup_arithmetic : require\n#define PACKET_RAYS {PACKET_RAYS}\n"
+            ),
+            Self::Query => "#extension GL_EXT_ray_query : require\n".into(),
+            Self::Raygen => "#extension GL_EXT_ray_tracing : require\n".into(),
+            _ => String::new(),
+        }
+    }
+}
+
+/// What one shader is compiled from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Source {
+    /// A stream in a tracer's template.
+    Stream {
+        /// File in shaders/, without its ending.
+        pass: &'static str,
+        /// What its rays ask for.
+        mode: Mode,
+        /// The template.
+        variant: Variant,
+    },
+    /// A pass that traces nothing.
+    Compute {
+        /// File in shaders/, without its ending.
+        pass: &'static str,
+        /// For devices with 64-bit integers.
+        int64: bool,
+    },
+    /// The compute tracer's fast kernel: no stream's code is in it.
+    Kernel {
+        /// What rays ask for.
+        mode: Mode,
+        /// For devices with 64-bit integers.
+        int64: bool,
+    },
+    /// A whole file.
+    File {
+        /// In shaders/.
+        path: &'static str,
+        /// What it is.
+        stage: Stage,
+    },
+}
+
+impl Source {
+    /// Kind of the shader.
+    pub fn stage(&self) -> Stage {
+        match self {
+            Self::Stream { variant: Variant::Raygen, .. } => Stage::RayGeneration,
+            Self::File { stage, .. } => *stage,
+            _ => Stage::Compute,
+        }
+    }
+
+    /// The text, with its includes as they stand. `shaders`: the folder.
+    ///
+    /// # Errors
+    /// A file that cannot be read, in words.
+    pub fn text(&self, shaders: &Path) -> Result<String, String> {
+        let lanes = format!("#define LANES {LANES}\n");
+        let spread = format!("#define SPREAD {SPREAD}u\n#define RUN {RUN}u\n");
+        let head_64 = |int64: bool| if int64 { HEAD_64 } else { "" };
+        Ok(match self {
+            Self::Stream { pass, mode, variant } => format!(
+                "#version 460\n{EXTENSIONS}{}{lanes}{spread}{}#include \"{pass}.glsl\"\n#include \"{}\"\n",
+                variant.head(),
+                mode.define(),
+                variant.template()
+            ),
+            Self::Compute { pass, int64 } => {
+                format!("#version 460\n{EXTENSIONS}{}{lanes}#include \"{pass}.glsl\"\n", head_64(*int64))
+            }
+            Self::Kernel { mode, int64 } => format!(
+                "#version 460\n{EXTENSIONS}{}{lanes}{spread}{}#include \"trace/wide.glsl\"\n",
+                head_64(*int64),
+                mode.define()
+            ),
+            Self::File { path, .. } => {
+                let path = shaders.join(path);
+                std::fs::read_to_string(&path).map_err(|e| format!("{}: {e}", path.display()))?
+            }
+        })
+    }
+}
+
+impl fmt::Display for Source {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let bits = |int64: &bool| if *int64 { "64" } else { "32" };
+        match self {
+            Self::Stream { pass, mode, variant } => write!(f, "{pass}.glsl as {} ({})", variant.template(), mode.name()),
+            Self::Compute { pass, int64 } => write!(f, "{pass}.glsl ({}-bit loads)", bits(int64)),
+            Self::Kernel { mode, int64 } => write!(f, "trace/wide.glsl ({}, {}-bit loads)", mode.name(), bits(int64)),
+            Self::File { path, .. } => f.write_str(path),
+        }
+    }
+}
