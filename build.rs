@@ -3,6 +3,9 @@
 
 #[path = "src/shaders/compiler.rs"]
 mod compiler;
+#[path = "src/interface/mod.rs"]
+#[allow(dead_code, unused_imports, reason = "the program uses the rest")]
+mod interface;
 #[path = "src/shaders/source.rs"]
 #[allow(dead_code, reason = "the program uses the rest")]
 mod source;
@@ -83,7 +86,7 @@ macro_rules! registry {
 include!("src/shaders/registry.rs");
 
 fn main() {
-    for file in ["build.rs", "src/shaders/compiler.rs", "src/shaders/source.rs", "src/shaders/registry.rs"] {
+    for file in ["build.rs", "src/interface", "src/shaders/compiler.rs", "src/shaders/source.rs", "src/shaders/registry.rs"] {
         println!("cargo:rerun-if-changed={file}");
     }
     if cfg!(feature = "live-shaders") {
@@ -113,7 +116,7 @@ fn main() {
 /// Compiles on all cores. Returns the files that were included, and what is wrong, in words.
 fn compile(jobs: &[Job], shaders: &Path, out: &Path) -> (BTreeSet<PathBuf>, Vec<String>) {
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
-    let compiler = Compiler::new(shaders, out);
+    let compiler = Compiler::new(shaders, interface::glsl::files(), out);
     let next = Mutex::new(jobs.iter());
     let results = Mutex::new((BTreeSet::new(), Vec::new()));
     std::thread::scope(|scope| {

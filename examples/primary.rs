@@ -17,7 +17,7 @@ use skylit::render::raster::{Raster, View};
 use skylit::scene::flatten::FlatScene;
 use skylit::scene::{Scene, builtin, load};
 use skylit::tracer::stream::LAUNCH_RAYS;
-use skylit::tracer::{Needs, Push, Tracer, TracerKind, stream};
+use skylit::tracer::{Needs, Push, Tracer, TracerKind};
 
 const SCENES: [&str; 6] = ["cornell-box", "stairs", "grid:6", "leaf-cards", "terrain:100000", "terrain:1000000"];
 const SIZES: [[u32; 2]; 2] = [[640, 360], [1280, 720]];

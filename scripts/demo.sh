@@ -3,6 +3,8 @@
 # the tracers' images are, and where the images lie; then a short animation in real time.
 #
 #   ./scripts/demo.sh [SPP]         samples per pixel, 64 unless given
+#
+# SKYLIT_PROFILE  profile to build with, release unless given
 set -euo pipefail
 cd "$(dirname "$0")/.."
 spp=${1:-${SKYLIT_DEMO_SPP:-64}}
@@ -15,8 +17,10 @@ say() { printf 'demo: %s\n' "$*"; }
 
 ./scripts/setup.sh
 say "building"
-cargo build --release --locked
-skylit=${CARGO_TARGET_DIR:-target}/release/skylit
+profile=${SKYLIT_PROFILE:-release}
+cargo build --profile "$profile" --locked
+# cargo's folder of the profile dev
+skylit=${CARGO_TARGET_DIR:-target}/${profile/#dev/debug}/skylit
 mkdir -p "$out"
 "$skylit" doctor
 

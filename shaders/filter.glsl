@@ -22,7 +22,7 @@ float prior_variance(float mean, float spread, float samples) { return mean * (1
 float total(float value) { return value; }
 
 void finish(FrameParams f, uint at, Estimate e, vec3 bent) {
-    if (BENT) {
+    if (BENT_NORMALS) {
         bool open = is_null(push.queued) && e.samples == 0.0;
         store_vec3(f.bent[push.first >> 2], at, open ? (2.0 / 3.0) * surface_normal(f, at) : bent);
     }
@@ -37,7 +37,7 @@ void finish(FrameParams f, uint at, Estimate e, vec3 bent) {
 void finish_nothing(FrameParams f, uint at) {
     if (is_null(push.queued)) FloatImage(f.result).v[at] = 0.0;
     else STORE_PAIR(push.queued, at, uvec2(0u));
-    if (BENT) store_vec3(f.bent[push.first >> 2], at, vec3(0.0));
+    if (BENT_NORMALS) store_vec3(f.bent[push.first >> 2], at, vec3(0.0));
 }
 
 // By the pixels around, whatever they show: for one that is the only one of its surface, before it has had its turn. A guess, but a

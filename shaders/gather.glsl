@@ -29,7 +29,7 @@ void main() {
     float mean = sum / float(n);
     float variance = n > 1u ? max(squares - sum * mean, 0.0) / float(n - 1u) : 0.0;
     STORE_PAIR(f.current, at, pack_estimate(Estimate(mean, float(n), variance)));
-    if (BENT) {
+    if (BENT_NORMALS) {
         vec3 ng = surface_normal(f, at), bent = vec3(0.0);
         for (uint s = 0u; s < n; s++) bent += samples.v[begin + s] * occlusion_direction(f, pixel, at, ng, s);
         store_vec3(f.current_bent, at, bent / float(n));

@@ -16,7 +16,7 @@ float blackman_harris_share(float x) {
 
 // From the middle of a pixel, as often as the filter weighs it.
 float filter_offset(uint pixel_filter, float u) {
-    if (!asks(ASKS_FILTER)) return u - 0.5;
+    if (!WITH_PIXEL_FILTER) return u - 0.5;
     if (pixel_filter == FILTER_TENT) return u < 0.5 ? sqrt(2.0 * u) - 1.0 : 1.0 - sqrt(2.0 - 2.0 * u);
     if (pixel_filter == FILTER_BLACKMAN_HARRIS) {
         // the share grows with x: halve to the last bit that matters
@@ -51,7 +51,7 @@ Ray camera_sample(BlockParams p, uint index) {
     vec2 u = sample_2d(p.seed, pixel, sample_index(index), CAMERA_FILM);
     Ray r = camera_ray(p, vec2(pixel) + 0.5 + vec2(filter_offset(path.pixel_filter, u.x), filter_offset(path.pixel_filter, u.y)));
     if (HAS_COVERAGE) r.tmin = tmin_of_seed(ray_seed(p.seed, pixel, sample_index(index), 0u));
-    if (asks(ASKS_LENS)) return lens_ray(p, r, sample_2d(p.seed, pixel, sample_index(index), CAMERA_LENS));
+    if (WITH_LENS) return lens_ray(p, r, sample_2d(p.seed, pixel, sample_index(index), CAMERA_LENS));
     return r;
 }
 
@@ -69,9 +69,9 @@ void closest(uint index, Hit hit) {
     }
     PathParams path = PathParams(p.path);
     // divided by the albedo, so that what one bounce brings is the accessibility; survival goes by what paths carry without that
-    float scale = asks(ASKS_GREY) ? path.albedo : 1.0;
+    float scale = WITH_CONSTANT_ALBEDO ? path.albedo : 1.0;
     PathState state = PathState(vec3(1.0 / scale), -1.0, index, 0u, 0u, scale, NO_MEDIUM);
-    if (asks(ASKS_MEDIA)) state.medium = current_medium(path.camera_media);
+    if (WITH_MEDIA) state.medium = current_medium(path.camera_media);
     if (HAS_COVERAGE) next_ray_seed = ray_seed(p.seed, block_pixel(p, pixel_index(index)) + p.block_origin, sample_index(index), 1u);
     store_quad(path.radiance, k, vec4(path_vertex(p, k, state, r, hit), is_hit(hit) ? 1.0 : 0.0));
 }

@@ -98,11 +98,11 @@ Estimate reprojected(FrameParams f, vec3 before, vec3 normal, uint id, inout vec
         mean += w * e.mean;
         samples += w * e.samples;
         variance += w * e.variance;
-        if (BENT) bents += w * load_vec3(f.previous_bent_history, tap);
+        if (BENT_NORMALS) bents += w * load_vec3(f.previous_bent_history, tap);
     }
     // less than a hundredth of the footprint was seen
     if (weight < 0.01) return none;
-    if (BENT) bent = bents / weight;
+    if (BENT_NORMALS) bent = bents / weight;
     return Estimate(mean / weight, samples / weight, variance / weight);
 }
 
@@ -123,7 +123,7 @@ void main() {
     if (f.has_history != 0u) {
         if (f.still != 0u) {
             past = unpack_estimate(LOAD_PAIR(f.previous_history, at));
-            if (BENT) bent = load_vec3(f.previous_bent_history, at);
+            if (BENT_NORMALS) bent = load_vec3(f.previous_bent_history, at);
         } else {
             vec3 position = surface_position(f, at), normal = surface_normal(f, at);
             vec3 before = is_null(f.previous_position) ? position : load_vec3(f.previous_position, at);
@@ -154,8 +154,8 @@ void main() {
         // of all samples about their common mean
         e.variance = mix(past.variance, now.variance, share) + share * (1.0 - share) * difference * difference;
         // without samples there is nothing at its place
-        if (BENT && now.samples > 0.0) bent = mix(bent, load_vec3(f.current_bent, at), share);
+        if (BENT_NORMALS && now.samples > 0.0) bent = mix(bent, load_vec3(f.current_bent, at), share);
     }
     STORE_PAIR(f.history, at, pack_estimate(e));
-    if (BENT) store_vec3(f.bent[0], at, bent);
+    if (BENT_NORMALS) store_vec3(f.bent[0], at, bent);
 }

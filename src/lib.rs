@@ -8,6 +8,7 @@ pub mod cli;
 pub mod error;
 #[allow(unsafe_code, reason = "Vulkan is called here, and nowhere else")]
 pub mod gpu;
+pub mod interface;
 pub mod measure;
 pub mod oracle;
 pub mod output;

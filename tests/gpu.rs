@@ -27,7 +27,7 @@ use skylit::sampling::{AO_DIRECTION, CAMERA_FILM, Sampler, to_unit, warp};
 use skylit::scene::builtin::{Placement, analytic, by_name, shapes};
 use skylit::scene::flatten::FlatScene;
 use skylit::scene::{Camera, Filter, Geometry, Instance, Mesh, Projection, Scene, Texture, Wrap};
-use skylit::tracer::{Kernel, Needs, Push, Tracer, TracerKind, stream};
+use skylit::tracer::{Kernel, Needs, Push, Tracer, TracerKind};
 
 fn scene(name: &str) -> Scene {
     by_name(name).unwrap_or_else(|| panic!("no built-in scene {name}"))

@@ -20,7 +20,7 @@ use skylit::render::raster::{Drawn, Primary, Raster, View};
 use skylit::scene::builtin::{by_name, shapes};
 use skylit::scene::flatten::{FlatScene, Motion};
 use skylit::scene::{Camera, Geometry, Instance, Mesh, Projection, Scene};
-use skylit::tracer::{Changes, MeshChange, Push, Tracer, TracerKind, stream};
+use skylit::tracer::{Changes, MeshChange, Push, Tracer, TracerKind};
 
 const NONE: u32 = u32::MAX;
 const SIZE: [u32; 2] = [320, 200];

@@ -105,7 +105,7 @@ float highest(vec3 c) { return max(c.r, max(c.g, c.b)); }
 // from directions near the surface, and end it abruptly at the horizon (Chiang, Li, Burley, "Taming the Shadow Terminator", SIGGRAPH 2019 talks). At most
 // 1: no lobe is brighter than n alone makes it. All in the frame; wi may be on either side of both normals.
 float shadowing(vec3 ng, vec3 n, vec3 wi) {
-    if (!has(HAS_BENT_NORMALS)) return 1.0;
+    if (!HAS_SHADING_NORMALS) return 1.0;
     float g = dot(ng, wi) / (dot(n, wi) * dot(ng, n));
     if (g >= 1.0) return 1.0;
     return g > 0.0 ? g * (1.0 + g * (1.0 - g)) : 0.0;
@@ -117,12 +117,12 @@ const vec3 FRAME_NORMAL = vec3(0.0, 0.0, 1.0);
 #include "bsdf/conductor.glsl"
 #include "bsdf/dielectric.glsl"
 
-bool is_kind(Bsdf b, uint kind, uint feature) { return has(feature) && b.kind == kind; }
+bool is_kind(Bsdf b, uint kind, bool feature) { return feature && b.kind == kind; }
 
 // Is there anything that samples of the BSDF alone can find?
 bool has_smooth_part(Bsdf b) {
     if (is_kind(b, BSDF_MIRROR, HAS_MIRROR)) return true;
-    if (is_kind(b, BSDF_GLTF, HAS_GLTF)) return is_smooth(b.facets) || has(HAS_COAT) && b.coat.weight > 0.0 && is_smooth(b.coat.facets);
+    if (is_kind(b, BSDF_GLTF, HAS_GLTF)) return is_smooth(b.facets) || HAS_CLEARCOAT && b.coat.weight > 0.0 && is_smooth(b.coat.facets);
     return (is_kind(b, BSDF_CONDUCTOR, HAS_CONDUCTOR) || is_kind(b, BSDF_DIELECTRIC, HAS_GLASS)) && is_smooth(b.facets);
 }
 

@@ -5,7 +5,7 @@
 #include "bsdf/coat.glsl"
 #include "bsdf/sheen.glsl"
 
-bool has_transmission() { return has(HAS_THIN_WALLS) || has(HAS_VOLUMES); }
+bool has_transmission() { return HAS_THIN_WALLS || HAS_VOLUMES; }
 
 // What microfacets do with light.
 struct InterfaceFresnel {
@@ -19,7 +19,7 @@ InterfaceFresnel interface_fresnel(Bsdf b, float c) {
     float weight = schlick_weight(c);
     vec3 reflected = mix(b.f0, b.f90, weight);
     float dielectric = mix(b.dielectric_f0, b.dielectric_f90, weight);
-    if (has(HAS_VOLUMES) && b.volume) {
+    if (HAS_VOLUMES && b.volume) {
         float cos_t;
         float f = fresnel_dielectric(c, b.eta, cos_t);
         // beyond the critical angle there is nowhere else to go
@@ -28,10 +28,10 @@ InterfaceFresnel interface_fresnel(Bsdf b, float c) {
         reflected += b.dielectric_weight * f * tint;
     }
     InterfaceFresnel all_ = InterfaceFresnel(reflected, 1.0 - dielectric, 1.0 - dielectric);
-    if (has(HAS_COMPENSATION)) {
+    if (HAS_COMPENSATION) {
         all_.diffuse = b.base_transmittance;
         // how much is refracted depends on the microfacet; what goes straight on has one factor for all
-        if (!has(HAS_VOLUMES) || !b.volume) all_.transmitted = b.base_transmittance;
+        if (!HAS_VOLUMES || !b.volume) all_.transmitted = b.base_transmittance;
     }
     return all_;
 }
@@ -40,8 +40,8 @@ InterfaceFresnel interface_fresnel(Bsdf b, float c) {
 // part with its own energy compensation. albedo_layer: the first of the volume's tables, on the viewer's side.
 void set_interface(inout Bsdf b, vec3 f0, float f90, vec3 base, float metallic, float cos_o, float roughness, uint albedo_layer) {
     vec3 dielectric_gain = vec3(1.0), metal_gain = vec3(1.0);
-    bool volume = has(HAS_VOLUMES) && b.volume;
-    if (has(HAS_COMPENSATION)) {
+    bool volume = HAS_VOLUMES && b.volume;
+    if (HAS_COMPENSATION) {
         bool smooth_surface = is_smooth(b.facets);
         float e = smooth_surface ? 1.0 : ggx_albedo(cos_o, roughness);
         metal_gain += base * ((1.0 - e) / e);
@@ -86,11 +86,11 @@ float reflected_probability(Bsdf b, InterfaceFresnel f) {
 void set_probabilities(inout Bsdf b, float cos_o) {
     InterfaceFresnel f = interface_fresnel(b, cos_o);
     vec4 w = vec4(highest(f.reflected) + highest(b.transmitted) * f.transmitted, highest(b.diffuse) * f.diffuse, 0.0, 0.0);
-    if (has(HAS_SHEEN)) {
+    if (HAS_SHEEN) {
         w.xy *= b.sheen.kept;
         w.w = 1.0 - b.sheen.kept;
     }
-    if (has(HAS_COAT) && b.coat.weight > 0.0) {
+    if (HAS_CLEARCOAT && b.coat.weight > 0.0) {
         w.z = b.coat.weight * coat_fresnel(cos_o);
         w.xyw *= 1.0 - w.z;
     }
@@ -100,15 +100,15 @@ void set_probabilities(inout Bsdf b, float cos_o) {
 }
 
 bool gltf_has_rough_part(Bsdf b) {
-    if (b.probabilities.diffuse > 0.0 || has(HAS_SHEEN) && b.probabilities.sheen > 0.0) return true;
-    if (has(HAS_COAT) && b.probabilities.coat > 0.0 && !is_smooth(b.coat.facets)) return true;
+    if (b.probabilities.diffuse > 0.0 || HAS_SHEEN && b.probabilities.sheen > 0.0) return true;
+    if (HAS_CLEARCOAT && b.probabilities.coat > 0.0 && !is_smooth(b.coat.facets)) return true;
     return !is_smooth(b.facets) && b.probabilities.interface_ > 0.0;
 }
 
 // The interface's own reflection and transmission, and what is diffuse below it.
 BsdfValue base_at(Bsdf b, vec3 wo, vec3 wi) {
     BsdfValue value = NO_VALUE;
-    bool up = wi.z > 0.0, straight = !up && !(has(HAS_VOLUMES) && b.volume);
+    bool up = wi.z > 0.0, straight = !up && !(HAS_VOLUMES && b.volume);
     if (!up && (!has_transmission() || b.transmitted == vec3(0.0) || wi.z == 0.0)) return value;
     // thin walls: what goes straight on is what would be reflected, on the other side
     vec3 w = straight ? vec3(wi.xy, -wi.z) : wi;
@@ -140,7 +140,7 @@ BsdfValue base_at(Bsdf b, vec3 wo, vec3 wi) {
 BsdfValue gltf_at(Bsdf b, vec3 wo, vec3 wi) {
     BsdfValue value = base_at(b, wo, wi);
     bool up = wi.z > 0.0;
-    if (has(HAS_SHEEN) && b.sheen.kept < 1.0) {
+    if (HAS_SHEEN && b.sheen.kept < 1.0) {
         value.f *= min(b.sheen.kept, sheen_kept(b.sheen, abs(wi.z)));
         if (up) {
             value.f += sheen_value(b.sheen, wo, wi);
@@ -148,7 +148,7 @@ BsdfValue gltf_at(Bsdf b, vec3 wo, vec3 wi) {
         }
     }
     value.f *= shadowing(b.ng, FRAME_NORMAL, wi);
-    if (has(HAS_COAT) && b.coat.weight > 0.0) {
+    if (HAS_CLEARCOAT && b.coat.weight > 0.0) {
         value.f *= coat_transmits(b.coat, wo) * coat_transmits(b.coat, wi);
         if (up && !is_smooth(b.coat.facets)) {
             BsdfValue coat = coat_at(b.coat, wo, wi);
@@ -162,8 +162,8 @@ BsdfValue gltf_at(Bsdf b, vec3 wo, vec3 wi) {
 // What layers over a delta lobe of the base leave of it.
 float layers_transmit(Bsdf b, vec3 wo, vec3 wi) {
     float left = 1.0;
-    if (has(HAS_SHEEN) && b.sheen.kept < 1.0) left *= min(b.sheen.kept, sheen_kept(b.sheen, abs(wi.z)));
-    if (has(HAS_COAT) && b.coat.weight > 0.0) left *= coat_transmits(b.coat, wo) * coat_transmits(b.coat, wi);
+    if (HAS_SHEEN && b.sheen.kept < 1.0) left *= min(b.sheen.kept, sheen_kept(b.sheen, abs(wi.z)));
+    if (HAS_CLEARCOAT && b.coat.weight > 0.0) left *= coat_transmits(b.coat, wo) * coat_transmits(b.coat, wi);
     return left;
 }
 
@@ -184,7 +184,7 @@ BsdfSample interface_sample(Bsdf b, vec3 wo, vec2 u, float v, out bool found) {
         }
         return s;
     }
-    if (has(HAS_VOLUMES) && b.volume) {
+    if (HAS_VOLUMES && b.volume) {
         float cos_t;
         float all_ = fresnel_dielectric(om, b.eta, cos_t);
         found = found && cos_t > 0.0;
@@ -209,7 +209,7 @@ BsdfSample gltf_sample(Bsdf b, vec3 wo, vec2 u, float v) {
         return NO_SAMPLE;
     }
     if (v < b.probabilities.interface_ + b.probabilities.diffuse) return proposed(cosine_hemisphere(u), 1.0);
-    if (has(HAS_COAT) && v < b.probabilities.interface_ + b.probabilities.diffuse + b.probabilities.coat) {
+    if (HAS_CLEARCOAT && v < b.probabilities.interface_ + b.probabilities.diffuse + b.probabilities.coat) {
         vec3 m = coat_microfacet(b.coat, wo, u);
         vec3 wi = 2.0 * dot(wo, m) * m - wo;
         if (!(wi.z > 0.0)) return NO_SAMPLE;
@@ -217,7 +217,7 @@ BsdfSample gltf_sample(Bsdf b, vec3 wo, vec2 u, float v) {
         float weight = b.coat.weight * coat_fresnel(dot(wo, m)) / b.probabilities.coat;
         return BsdfSample(wi, vec3(weight), b.probabilities.coat, true, 1.0);
     }
-    if (has(HAS_SHEEN) && b.probabilities.sheen > 0.0) return proposed(uniform_hemisphere(u), 1.0);
+    if (HAS_SHEEN && b.probabilities.sheen > 0.0) return proposed(uniform_hemisphere(u), 1.0);
     return NO_SAMPLE;
 }
 

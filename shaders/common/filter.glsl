@@ -62,7 +62,7 @@ void main() {
     }
     uvec2 guides = f.guide, estimates = push.rays;
     ESTIMATE own = load_estimate(estimates, at);
-    vec3 own_bent = BENT ? load_bent(f, at) : vec3(0.0);
+    vec3 own_bent = BENT_NORMALS ? load_bent(f, at) : vec3(0.0);
     int stride = int(push.sample_index >> 2);
     // a step with holes is of one size; it is left out where there are samples enough
     int radius = stride > 1 ? (own.samples < f.filter_samples ? int(push.sample_bits) : 0) : box_radius(f, own.samples);
@@ -92,7 +92,7 @@ void main() {
                 sum += e.mean * e.samples;
                 squares += e.mean * e.mean * e.samples;
                 variances += e.variance * e.samples;
-                if (BENT) bent += load_bent(f, tap) * e.samples;
+                if (BENT_NORMALS) bent += load_bent(f, tap) * e.samples;
                 n += e.samples;
                 count += e.samples > 0.0 ? 1.0 : 0.0;
                 // its samples times the variance of their mean

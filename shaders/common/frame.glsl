@@ -66,9 +66,6 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Fr
     uvec2 budget_sums;                 // see common/budget.glsl
 };
 
-// Are bent normals asked for? In what traces nothing the answer is compiled in.
-layout(constant_id = 9) const bool BENT = false;
-
 layout(buffer_reference, std430, buffer_reference_align = 4) buffer FloatImage { float v[]; };
 layout(buffer_reference, std430, buffer_reference_align = 8) buffer PairImage { uvec2 v[]; };
 layout(buffer_reference, std430, buffer_reference_align = 16) buffer QuadImage { uvec4 v[]; };

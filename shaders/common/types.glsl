@@ -1,6 +1,7 @@
 // Rays, hits and raw memory: what every stream and every tracer speaks.
 #ifndef COMMON_TYPES
 #define COMMON_TYPES
+#include "interface/constants.glsl"
 
 // The points origin + t * direction with tmin < t < tmax. A ray with tmax <= tmin is no ray: it is not traced, and its
 // callback reports a miss.

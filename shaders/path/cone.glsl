@@ -103,7 +103,7 @@ float curvature(Surface s) {
 // After a bounce. By the paraxial equations, with the mean of what a curved mirror or lens does along the plane of incidence and across it; a lobe
 // adds its own width.
 Cone scattered_cone(Cone c, Surface s, bool front, BsdfSample b, bool passes) {
-    float turn = has(HAS_BENT_NORMALS) || HAS_SPHERES ? (front ? 1.0 : -1.0) * curvature(s) * c.width : 0.0;
+    float turn = HAS_SHADING_NORMALS || HAS_SPHERES ? (front ? 1.0 : -1.0) * curvature(s) * c.width : 0.0;
     if (!passes) c.spread += 2.0 * turn;
     else if (b.eta != 1.0) c.spread = (c.spread + turn) / b.eta - turn;
     if (!b.delta) c.spread = sqrt(c.spread * c.spread + SHARE_OF_LOBE / b.pdf);

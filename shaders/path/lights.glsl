@@ -6,18 +6,11 @@
 #ifndef PATH_LIGHTS
 #define PATH_LIGHTS
 #include "common/warp.glsl"
+#include "interface/light_kind.glsl"
 #include "path/map.glsl"
 #include "path/light_tree.glsl"
 #include "path/shading.glsl"
 
-const uint LIGHT_POINT = 0u;
-const uint LIGHT_SPOT = 1u;
-const uint LIGHT_DIRECTIONAL = 2u;
-const uint LIGHT_TRIANGLE = 3u;
-const uint LIGHT_SPHERE = 4u;
-const uint LIGHT_ENVIRONMENT = 5u;
-const uint LIGHT_TREE = 6u;       // all that have a position: the tree chooses one of them
-const uint LIGHT_RECTANGLE = 7u;  // two triangles
 
 const uint LIGHT_TWO_SIDED = 1u;  // triangle, rectangle: it emits from its back, too
 const uint LIGHT_MIRRORED = 2u;   // triangle, rectangle: a mirroring transform has turned its winding
@@ -56,12 +49,12 @@ const LightSample NO_LIGHT_SAMPLE = LightSample(vec3(0.0, 0.0, 1.0), 0.0, vec3(0
 
 // Radiance of the environment from direction w.
 vec3 environment_radiance(PathParams p, vec3 w) {
-    if (!asks(ASKS_MAP)) return p.environment;
+    if (!WITH_ENVIRONMENT_MAP) return p.environment;
     return p.environment * map_radiance(p.map, w);
 }
 
 // An environment of one colour is best sampled as a diffuse surface reflects it: by the cosine to the shading normal, on each side that light may come from.
-bool is_lit_from_behind(Shading m) { return (has_transmission() || has(HAS_GLASS)) && m.bsdf.transmitted != vec3(0.0); }
+bool is_lit_from_behind(Shading m) { return (has_transmission() || HAS_GLASS) && m.bsdf.transmitted != vec3(0.0); }
 
 float uniform_sky_pdf(Shading m, vec3 w) {
     float c = dot(m.frame.n, w) / PI;
@@ -78,7 +71,11 @@ vec4 sample_uniform_sky(Shading m, vec2 u) {
 }
 
 // Is it of this kind? What the scene has not is not compiled; and where all are of one kind, nobody has to look.
-bool is_kind(LightRecord light, uint kind) { return asks(1u << kind) && ((ASKED & ASKS_KINDS) == 1u << kind || light.kind == kind); }
+bool is_kind(LightRecord light, uint kind) {
+    // kinds are the first features
+    uint kinds = PATH_FEATURES_0 & (1u << LIGHT_KIND_COUNT) - 1u;
+    return (kinds >> kind & 1u) != 0u && (kinds == 1u << kind || light.kind == kind);
+}
 
 // Smooth end of a light's range (KHR_lights_punctual).
 float range_window(float distance, float range) {
@@ -305,7 +302,7 @@ bool meets_disk(LightRecord light, vec3 w) {
 LightSample sample_light(PathParams p, vec3 from, Shading m, uvec2 bits) {
     LightRecords lights = LightRecords(p.lights);
     vec2 v = vec2(bits >> 8) * (1.0 / 16777216.0);
-    uint k = asks(ASKS_CHOICE) ? choose_light(p, bits.x, v.x) : p.light_first;
+    uint k = WITH_LIGHT_CHOICE ? choose_light(p, bits.x, v.x) : p.light_first;
     LightRecord light = lights.v[k];
     if (is_kind(light, LIGHT_TREE)) {
         float of_tree = light.probability;
@@ -318,7 +315,7 @@ LightSample sample_light(PathParams p, vec3 from, Shading m, uvec2 bits) {
     if (is_kind(light, LIGHT_TRIANGLE)) return sample_triangle(light, from, v);
     if (is_kind(light, LIGHT_SPHERE)) return sample_sphere(light, from, v);
     if (is_kind(light, LIGHT_ENVIRONMENT)) {
-        if (asks(ASKS_MAP)) {
+        if (WITH_ENVIRONMENT_MAP) {
             MapSample s = sample_map(p.map, v);
             return LightSample(s.wi, INFINITY, vec3(0.0), p.environment * s.radiance, light.probability * s.pdf, false);
         }
@@ -330,19 +327,19 @@ LightSample sample_light(PathParams p, vec3 from, Shading m, uvec2 bits) {
         vec3 wi = sample_cone(-light.axis, light.radius, v);
         return LightSample(wi, INFINITY, vec3(0.0), disk_radiance(light), disk_pdf(light), false);
     }
-    if (asks(ASKS_POINTS) || asks(ASKS_SPOTS)) return sample_point(light, from);
+    if (WITH_POINT_LIGHTS || WITH_SPOT_LIGHTS) return sample_point(light, from);
     return NO_LIGHT_SAMPLE;
 }
 
 // Density with which sample_light draws, from a point, what a ray from there met; 0: it never does.
 float light_pdf(PathParams p, Hit hit, vec3 from, vec3 wi) {
-    if (!asks(ASKS_TRIANGLES) && !asks(ASKS_RECTANGLES) && !asks(ASKS_SPHERES)) return 0.0;
+    if (!WITH_TRIANGLE_LIGHTS && !WITH_RECTANGLE_LIGHTS && !WITH_SPHERE_LIGHTS) return 0.0;
     uint first = Words(p.light_of).v[hit.instance];
     if (first == INVALID) return 0.0;
     uint k = Words(p.light_of).v[first + hit.primitive];
     if (k == INVALID) return 0.0;
     LightRecord light = LightRecords(p.lights).v[k];
-    if (asks(ASKS_LIGHT_TREE)) {
+    if (WITH_LIGHT_TREE) {
         // the last of all is the tree
         float of_tree = LightRecords(p.lights).v[p.light_first + p.light_count - 1u].probability;
         light.probability = of_tree * leaf_probability(p.light_tree, from, light.trail);

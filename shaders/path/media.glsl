@@ -9,7 +9,7 @@
 #define MediaStack uvec4
 
 bool is_medium(uint material) {
-    return has(HAS_VOLUMES) && SHADING_OF(material).walls == WALLS_VOLUME || has(HAS_GLASS) && SHADING_OF(material).model == MODEL_GLASS;
+    return HAS_VOLUMES && SHADING_OF(material).walls == WALLS_VOLUME || HAS_GLASS && SHADING_OF(material).model == MODEL_GLASS;
 }
 
 // The volume that a path with this stack is in.

@@ -2,7 +2,7 @@
 #ifndef PATH_PARAMS
 #define PATH_PARAMS
 #include "common/camera.glsl"
-#include "path/asked.glsl"
+#include "interface/path_features.glsl"
 
 // An environment in equirectangular projection.
 struct EnvironmentMap {

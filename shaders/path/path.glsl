@@ -29,14 +29,14 @@ float power_heuristic(float a, float b) {
 }
 
 vec3 held(PathParams p, vec3 c, uint depth) {
-    return asks(ASKS_CLAMP) && depth > 0u ? min(c, vec3(p.clamp_to)) : c;
+    return WITH_CLAMP && depth > 0u ? min(c, vec3(p.clamp_to)) : c;
 }
 
 // Weight of an emitter that a ray met, which light samples draw with density `light`.
 float emission_weight(PathParams p, PathState state, float light) {
     if (state.pdf < 0.0 || !(light > 0.0)) return 1.0;
-    if (asks(ASKS_MIS)) return power_heuristic(state.pdf, light);
-    return asks(ASKS_LIGHT_SAMPLES) ? 0.0 : 1.0;
+    if (WITH_MIS) return power_heuristic(state.pdf, light);
+    return WITH_LIGHT_SAMPLES ? 0.0 : 1.0;
 }
 
 // Radiance, weighted, of the directional lights whose disks a ray that leaves the scene meets.
@@ -45,7 +45,7 @@ vec3 disks_met(PathParams p, PathState state, vec3 w) {
     for (uint k = 0u; k < p.disk_count; k++) {
         LightRecord light = LightRecords(p.lights).v[p.first_disk + k];
         if (light.radius == 0.0 || !meets_disk(light, w)) continue;
-        c += disk_radiance(light) * emission_weight(p, state, asks(ASKS_LIGHT_SAMPLES) ? disk_pdf(light) : 0.0);
+        c += disk_radiance(light) * emission_weight(p, state, WITH_LIGHT_SAMPLES ? disk_pdf(light) : 0.0);
     }
     return c;
 }
@@ -53,7 +53,7 @@ vec3 disks_met(PathParams p, PathState state, vec3 w) {
 // Value and density at a vertex, of a direction in the world. What a BSDF about a shading normal sends through the true surface is lost.
 BsdfValue vertex_at(Shading m, vec3 wo, vec3 w) {
     vec3 wi = to_frame(m.frame, w);
-    if (has(HAS_BENT_NORMALS) && !(wi.z * dot(m.ng, w) > 0.0)) return NO_VALUE;
+    if (HAS_SHADING_NORMALS && !(wi.z * dot(m.ng, w) > 0.0)) return NO_VALUE;
     return bsdf_at(m.bsdf, wo, wi);
 }
 
@@ -61,15 +61,15 @@ BsdfValue vertex_at(Shading m, vec3 wo, vec3 w) {
 BsdfSample draw_direction(Shading m, vec3 wo, vec2 u, float v) {
     Bsdf b = m.bsdf;
     // a delta lobe can be sampled in one way only, and these know reflection only
-    bool plain = (asks(ASKS_COSINE) || asks(ASKS_UNIFORM)) && has_rough_part(b) && !has_smooth_part(b) && b.transmitted == vec3(0.0);
+    bool plain = (WITH_COSINE_SAMPLING || WITH_UNIFORM_SAMPLING) && has_rough_part(b) && !has_smooth_part(b) && b.transmitted == vec3(0.0);
     BsdfSample s;
-    if (plain) s = proposed(asks(ASKS_COSINE) ? cosine_hemisphere(u) : uniform_hemisphere(u), 1.0);
+    if (plain) s = proposed(WITH_COSINE_SAMPLING ? cosine_hemisphere(u) : uniform_hemisphere(u), 1.0);
     else s = bsdf_sample(b, wo, u, v);
     if (!(s.pdf > 0.0)) return NO_SAMPLE;
     vec3 wi = s.wi;
     s.wi = from_frame(m.frame, wi);
     float side = dot(m.ng, s.wi);
-    bool hidden = has(HAS_BENT_NORMALS) && !(side * wi.z > 0.0);
+    bool hidden = HAS_SHADING_NORMALS && !(side * wi.z > 0.0);
     if (s.delta) {
         // one direction for each view: mirrored at the true surface nothing of it is lost, and none counts twice
         if (hidden) s.wi -= 2.0 * side * m.ng;
@@ -78,7 +78,7 @@ BsdfSample draw_direction(Shading m, vec3 wo, vec2 u, float v) {
     if (hidden) return NO_SAMPLE;
     // as light samples see the direction: near the surface a rounded cosine is not the same
     BsdfValue value = vertex_at(m, wo, s.wi);
-    s.pdf = !plain ? value.pdf : asks(ASKS_COSINE) ? wi.z / PI : 1.0 / (2.0 * PI);
+    s.pdf = !plain ? value.pdf : WITH_COSINE_SAMPLING ? wi.z / PI : 1.0 / (2.0 * PI);
     s.weight = value.f / s.pdf;
     if (!(s.pdf > 0.0)) return NO_SAMPLE;
     return s;
@@ -86,7 +86,7 @@ BsdfSample draw_direction(Shading m, vec3 wo, vec2 u, float v) {
 
 // What a medium leaves of light over a length.
 vec3 transmittance(uint medium, float length_) {
-    if (!has(HAS_ABSORPTION) || medium == NO_MEDIUM) return vec3(1.0);
+    if (!HAS_ABSORPTION || medium == NO_MEDIUM) return vec3(1.0);
     vec3 depth = SHADING_OF(medium).absorption;
     // nothing absorbs nothing, over any length
     return mix(exp(-depth * length_), vec3(1.0), equal(depth, vec3(0.0)));
@@ -95,12 +95,12 @@ vec3 transmittance(uint medium, float length_) {
 // Next-event estimation: a ray to a light, and what that brings.
 void draw_light(BlockParams block, PathParams p, uint k, PathState state, Surface s, Shading m, vec3 wo, uint beyond, uvec2 pixel, uint n, uint dimension) {
     dimension += LIGHT_POINT_ON;
-    uvec2 bits = asks(ASKS_LIGHT_TREE) ? sample_choice_bits(block.seed, pixel, n, dimension) : sample_2d_bits(block.seed, pixel, n, dimension);
+    uvec2 bits = WITH_LIGHT_TREE ? sample_choice_bits(block.seed, pixel, n, dimension) : sample_2d_bits(block.seed, pixel, n, dimension);
     LightSample l = sample_light(p, s.position, m, bits);
     if (!(l.pdf > 0.0)) return;
     BsdfValue value = vertex_at(m, wo, l.wi);
     vec3 c = state.throughput * value.f * l.radiance / l.pdf;
-    if (asks(ASKS_MIS) && !l.delta) c *= power_heuristic(l.pdf, value.pdf);
+    if (WITH_MIS && !l.delta) c *= power_heuristic(l.pdf, value.pdf);
     if (!(highest(c) > 0.0)) return;
     float side = dot(m.ng, l.wi);
     vec3 origin = s.position + m.ng * (sign(side) * s.offset);
@@ -119,14 +119,14 @@ void draw_light(BlockParams block, PathParams p, uint k, PathState state, Surfac
 // Goes on behind a surface as if it were not there.
 void pass_straight(PathParams p, uint k, PathState state, Surface s, vec3 ng, Ray ray, Cone cone) {
     state.passes++;
-    if (asks(ASKS_CONES)) store_cone(p, k, cone);
+    if (WITH_RAY_CONES) store_cone(p, k, cone);
     uint slot = append_ray(p.next, Ray(s.position - ng * s.offset, 0.0, ray.direction, INFINITY), k);
     store_state(p.next_states, slot, state);
 }
 
 // How far a path has come straight since its last bounce.
 float straight_length(PathParams p, uint k, PathState state) {
-    return asks(ASKS_CLEAR_WALLS) && state.passes > 0u ? Floats(p.straight).v[k] : 0.0;
+    return WITH_CLEAR_WALLS && state.passes > 0u ? Floats(p.straight).v[k] : 0.0;
 }
 
 void add_straight(PathParams p, uint k, PathState state, float length_) {
@@ -152,14 +152,14 @@ vec3 path_vertex(BlockParams block, uint k, PathState state, Ray ray, Hit hit) {
     state.throughput *= transmittance(state.medium, hit.t);
     if (!is_hit(hit)) {
         // as with ambient occlusion, what shows nothing counts nothing
-        if ((asks(ASKS_GREY) || asks(ASKS_VIEW)) && state.depth == 0u) return vec3(0.0);
+        if ((WITH_CONSTANT_ALBEDO || WITH_VIEW) && state.depth == 0u) return vec3(0.0);
         float light = 0.0;
-        if (asks(ASKS_LIGHT_SAMPLES) && asks(ASKS_SKY) && state.depth > 0u) {
+        if (WITH_LIGHT_SAMPLES && WITH_ENVIRONMENT && state.depth > 0u) {
             float of_sky = LightRecords(p.lights).v[p.environment_light].probability;
-            light = of_sky * (asks(ASKS_MAP) ? map_pdf(p.map, ray.direction) : Floats(p.sky_densities).v[k]);
+            light = of_sky * (WITH_ENVIRONMENT_MAP ? map_pdf(p.map, ray.direction) : Floats(p.sky_densities).v[k]);
         }
         vec3 c = environment_radiance(p, ray.direction) * emission_weight(p, state, light);
-        if (asks(ASKS_DISKS)) c += disks_met(p, state, ray.direction);
+        if (WITH_DISTANT_DISKS) c += disks_met(p, state, ray.direction);
         return held(p, state.throughput * c, state.depth);
     }
     Surface s = surface_at(ray, hit);
@@ -167,20 +167,20 @@ vec3 path_vertex(BlockParams block, uint k, PathState state, Ray ray, Hit hit) {
     bool front = dot(s.ng, towards_viewer) > 0.0;
     Cone cone = Cone(0.0, 0.0);
     float log_side = SHARP;
-    if (asks(ASKS_CONES)) {
+    if (WITH_RAY_CONES) {
         if (state.depth + state.passes == 0u) cone = camera_cone(block, ray.direction);
         else cone = load_cone(p, k);
         cone = cone_after(cone, hit.t);
         log_side = footprint(cone, s, ray.direction);
     }
     Shading m;
-    if (asks(ASKS_GREY)) m = grey_shading(s, towards_viewer, p.albedo);
+    if (WITH_CONSTANT_ALBEDO) m = grey_shading(s, towards_viewer, p.albedo);
     else m = shade(s, towards_viewer, log_side);
-    if (asks(ASKS_VIEW)) return view_value(p.view, s, m, hit.t, log_side);
+    if (WITH_VIEW) return view_value(p.view, s, m, hit.t, log_side);
     vec3 added = vec3(0.0);
     if (m.emission != vec3(0.0)) {
         float light = 0.0;
-        if (asks(ASKS_LIGHT_SAMPLES) && !m.unlit) {
+        if (WITH_LIGHT_SAMPLES && !m.unlit) {
             // as seen from the vertex where light was sampled, which may lie behind thin walls
             float before = straight_length(p, k, state);
             Hit seen = hit;
@@ -191,8 +191,8 @@ vec3 path_vertex(BlockParams block, uint k, PathState state, Ray ray, Hit hit) {
     }
     Boundary boundary;
     boundary.medium = state.medium;
-    bool is_boundary = asks(ASKS_MEDIA) && is_medium(m.material);
-    if (asks(ASKS_MEDIA) && state.depth + state.passes == 0u) store_media(p, k, p.camera_media);
+    bool is_boundary = WITH_MEDIA && is_medium(m.material);
+    if (WITH_MEDIA && state.depth + state.passes == 0u) store_media(p, k, p.camera_media);
     if (is_boundary) {
         MediaStack stack = p.camera_media;
         if (state.depth + state.passes > 0u) stack = load_media(p, k);
@@ -211,7 +211,7 @@ vec3 path_vertex(BlockParams block, uint k, PathState state, Ray ray, Hit hit) {
     if (m.bsdf.kind == BSDF_NONE) return added;
     if (state.depth >= p.max_depth) {
         // walls that light goes straight through are no bounces
-        if (asks(ASKS_CLEAR_WALLS)) {
+        if (WITH_CLEAR_WALLS) {
             state.throughput *= straight_transmittance(m, towards_viewer);
             if (highest(state.throughput) > 0.0) {
                 add_straight(p, k, state, hit.t);
@@ -225,7 +225,7 @@ vec3 path_vertex(BlockParams block, uint k, PathState state, Ray ray, Hit hit) {
     wo.z = max(wo.z, LEAST_COSINE);
     uvec2 pixel = block_pixel(block, pixel_index(state.index)) + block.block_origin;
     uint n = sample_index(state.index), dimension = PATH_FIRST + (state.depth + state.passes) * PATH_STRIDE;
-    if (asks(ASKS_LIGHT_SAMPLES) && has_rough_part(m.bsdf)) {
+    if (WITH_LIGHT_SAMPLES && has_rough_part(m.bsdf)) {
         draw_light(block, p, k, state, s, m, wo, boundary.medium, pixel, n, dimension);
     }
 
@@ -237,7 +237,7 @@ vec3 path_vertex(BlockParams block, uint k, PathState state, Ray ray, Hit hit) {
     state.throughput *= b.weight;
     float brightest = highest(state.throughput);
     if (!(brightest > 0.0)) return added;
-    if (asks(ASKS_CLEAR_WALLS) && is_straight(m.bsdf, b, side)) {
+    if (WITH_CLEAR_WALLS && is_straight(m.bsdf, b, side)) {
         // light samples pass here, too: the density with which they compete is still that of the last bounce
         add_straight(p, k, state, hit.t);
         state.passes++;
@@ -245,8 +245,8 @@ vec3 path_vertex(BlockParams block, uint k, PathState state, Ray ray, Hit hit) {
         state.pdf = b.delta ? -1.0 : b.pdf;
         state.eta_scale *= b.eta * b.eta;
         state.depth++;
-        if (asks(ASKS_CLEAR_WALLS)) StoredFloats(p.straight).v[k] = 0.0;
-        if (asks(ASKS_LIGHT_SAMPLES) && asks(ASKS_SKY) && !asks(ASKS_MAP)) StoredFloats(p.sky_densities).v[k] = uniform_sky_pdf(m, b.wi);
+        if (WITH_CLEAR_WALLS) StoredFloats(p.straight).v[k] = 0.0;
+        if (WITH_LIGHT_SAMPLES && WITH_ENVIRONMENT && !WITH_ENVIRONMENT_MAP) StoredFloats(p.sky_densities).v[k] = uniform_sky_pdf(m, b.wi);
         if (state.depth >= p.rr_depth) {
             float survival = min(brightest * state.eta_scale, MOST_SURVIVAL);
             if (lobe.y >= survival) return added;
@@ -257,7 +257,7 @@ vec3 path_vertex(BlockParams block, uint k, PathState state, Ray ray, Hit hit) {
             store_media(p, k, boundary.stack);
         }
     }
-    if (asks(ASKS_CONES)) store_cone(p, k, scattered_cone(cone, s, front, b, side < 0.0));
+    if (WITH_RAY_CONES) store_cone(p, k, scattered_cone(cone, s, front, b, side < 0.0));
     uint slot = append_ray(p.next, Ray(s.position + m.ng * (sign(side) * s.offset), 0.0, normalize(b.wi), INFINITY), k);
     store_state(p.next_states, slot, state);
     return added;

@@ -6,33 +6,8 @@
 #include "path/params.glsl"
 #include "path/cone.glsl"
 #include "bsdf/bsdf.glsl"
-
-const uint MODEL_GLTF = 0u;
-const uint MODEL_MATTE = 1u;
-const uint MODEL_MIRROR = 2u;
-const uint MODEL_GLASS = 3u;
-const uint MODEL_CONDUCTOR = 4u;
-const uint MODEL_UNLIT = 5u;
-
-// Walls of a glTF material that transmits.
-const uint WALLS_NONE = 0u;
-const uint WALLS_THIN = 1u;
-const uint WALLS_VOLUME = 2u;
-
-const uint USE_METALLIC_ROUGHNESS = 0u;
-const uint USE_EMISSION = 1u;
-const uint USE_NORMAL = 2u;
-const uint USE_COAT = 3u;
-const uint USE_COAT_ROUGHNESS = 4u;
-const uint USE_COAT_NORMAL = 5u;
-const uint USE_SHEEN = 6u;
-const uint USE_SHEEN_ROUGHNESS = 7u;
-const uint USE_TRANSMISSION = 8u;
-const uint USE_SPECULAR = 9u;
-const uint USE_SPECULAR_COLOR = 10u;
-const uint USE_ANISOTROPY = 11u;
-const uint USE_OCCLUSION = 12u;
-const uint USES = 13u;
+#include "interface/material_model.glsl"
+#include "interface/walls.glsl"
 
 struct ShadingRecord {
     vec3 emission;         // radiance
@@ -60,7 +35,7 @@ struct ShadingRecord {
     int priority;          // of a volume among those that overlap (path/media.glsl)
     uint shading_reserved0;
     uint shading_reserved1;
-    TextureUse uses[USES];
+    TextureUse uses[TEXTURE_FEATURES_COUNT];
 };
 layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer ShadingRecords { ShadingRecord v[]; };
 
@@ -83,7 +58,7 @@ vec4 sample_use(TextureUse use, PartRecord part, uint primitive, vec2 uv, uint k
     uvec3 corners = triangle_indices(part, primitive);
     vec2 st = texcoord_at(part, corners, uv, use.set);
     st = vec2(use.transform.x * st.x + use.transform.z * st.y, use.transform.y * st.x + use.transform.w * st.y) + use.offset;
-    if (has(HAS_RAY_CONES) && log_side > SHARP) {
+    if (HAS_RAY_CONES && log_side > SHARP) {
         TextureRecords records = TextureRecords(SceneRoot(push.scene).textures);
         float area = texcoord_area(part, corners, use.set) * abs(use.transform.x * use.transform.w - use.transform.y * use.transform.z);
         area *= float(records.v[use.texture].width) * float(records.v[use.texture].height);
@@ -95,8 +70,8 @@ vec4 sample_use(TextureUse use, PartRecord part, uint primitive, vec2 uv, uint k
 
 // Linear base colour of what is seen at a surface.
 vec3 shown_color(Surface s, PartRecord part, MaterialRecord m, float log_side) {
-    if (!has(HAS_BASE_COLORS)) return m.base_color.rgb;
-    if (!has(HAS_RAY_CONES)) return base_color(part, m, s.primitive, s.uv).rgb;
+    if (!HAS_BASE_COLORS) return m.base_color.rgb;
+    if (!HAS_RAY_CONES) return base_color(part, m, s.primitive, s.uv).rgb;
     vec3 color = m.base_color.rgb;
     if (is_null(part.indices)) return color;
     color *= vertex_color(part, triangle_indices(part, s.primitive), s.uv).rgb;
@@ -137,7 +112,7 @@ struct Shading {
 
 // What the material's textures say at a surface, 1 where it has none.
 struct Looked {
-    vec4 at[USES];
+    vec4 at[TEXTURE_FEATURES_COUNT];
 };
 
 Looked look_up(Surface s, PartRecord part, float log_side) {
@@ -145,7 +120,7 @@ Looked look_up(Surface s, PartRecord part, float log_side) {
     const uint SRGB = 1u << USE_EMISSION | 1u << USE_SHEEN | 1u << USE_SPECULAR_COLOR;
     uint m = part.material;
     // all places are constants once it is unrolled: CPU drivers write to others lane by lane
-    [[unroll]] for (uint use = 0u; use < USES; use++) {
+    [[unroll]] for (uint use = 0u; use < TEXTURE_FEATURES_COUNT; use++) {
         found.at[use] = vec4(1.0);
         uint kind = (SRGB >> use & 1u) != 0u ? TEXELS_SRGB : TEXELS_LINEAR;
         if (has_use(use)) found.at[use] = sample_use(SHADING_OF(m).uses[use], part, s.primitive, s.uv, kind, log_side);
@@ -188,7 +163,7 @@ uint dielectric_layer(uint m, bool front) {
 
 // Factors that give back what microfacets of one bounce lose (docs/materials.md, Energy). glTF's are in set_interface().
 void compensate(inout Bsdf b, uint m, float cos_o, float roughness, bool front) {
-    if (!has(HAS_COMPENSATION) || is_smooth(b.facets)) return;
+    if (!HAS_COMPENSATION || is_smooth(b.facets)) return;
     if (b.kind == BSDF_CONDUCTOR) {
         float e = beckmann_albedo(cos_o, roughness);
         b.tint *= 1.0 + fresnel_conductor(1.0, b.f0, b.k) * ((1.0 - e) / e);
@@ -212,25 +187,25 @@ vec2 gltf_bsdf(inout Bsdf b, Looked looked, uint m, vec3 base, bool front, float
     vec3 f0 = min(r0 * r0 * specular_color, vec3(1.0)) * specular;
     b.facets = Microfacets(vec2(roughness * roughness), false);
     vec2 along = vec2(1.0, 0.0);
-    if (has(HAS_ANISOTROPY) && SHADING_OF(m).anisotropy != vec2(0.0)) along = anisotropic(looked, m, b.facets.alpha);
+    if (HAS_ANISOTROPY && SHADING_OF(m).anisotropy != vec2(0.0)) along = anisotropic(looked, m, b.facets.alpha);
     if (has_transmission() && SHADING_OF(m).walls != WALLS_NONE) {
         float transmission = SHADING_OF(m).transmission * looked.at[USE_TRANSMISSION].r;
         b.transmitted = b.diffuse * transmission;
         b.diffuse *= 1.0 - transmission;
-        b.volume = has(HAS_VOLUMES) && SHADING_OF(m).walls == WALLS_VOLUME;
+        b.volume = HAS_VOLUMES && SHADING_OF(m).walls == WALLS_VOLUME;
         if (b.volume) {
             b.eta = front ? SHADING_OF(m).ior : 1.0 / SHADING_OF(m).ior;
             b.tint = min(specular_color, vec3(1.0)) * specular;
         }
     }
-    if (has(HAS_SHEEN) && highest(SHADING_OF(m).sheen_color) > 0.0) {
+    if (HAS_SHEEN && highest(SHADING_OF(m).sheen_color) > 0.0) {
         float r = SHADING_OF(m).sheen_roughness * looked.at[USE_SHEEN_ROUGHNESS].a;
         b.sheen = Sheen(SHADING_OF(m).sheen_color * looked.at[USE_SHEEN].rgb, max(r * r, LEAST_SHEEN_ALPHA), 1.0);
         b.sheen.kept = sheen_kept(b.sheen, cos_o);
     }
-    if (has(HAS_COAT) && SHADING_OF(m).coat > 0.0) {
-        float r = SHADING_OF(m).coat_roughness * looked.at[USE_COAT_ROUGHNESS].g;
-        b.coat.weight = SHADING_OF(m).coat * looked.at[USE_COAT].r;
+    if (HAS_CLEARCOAT && SHADING_OF(m).coat > 0.0) {
+        float r = SHADING_OF(m).coat_roughness * looked.at[USE_CLEARCOAT_ROUGHNESS].g;
+        b.coat.weight = SHADING_OF(m).coat * looked.at[USE_CLEARCOAT].r;
         b.coat.facets = Microfacets(vec2(r * r), false);
     }
     set_interface(b, f0, specular, base, metallic, cos_o, roughness, dielectric_layer(m, front));
@@ -249,7 +224,7 @@ Shading grey_shading(Surface s, vec3 wo, float grey) {
     Shading out_ = black_shading(s, wo);
     out_.bsdf.kind = BSDF_DIFFUSE;
     out_.bsdf.diffuse = vec3(grey);
-    if (has(HAS_BENT_NORMALS)) out_.bsdf.ng = to_frame(out_.frame, out_.ng);
+    if (HAS_SHADING_NORMALS) out_.bsdf.ng = to_frame(out_.frame, out_.ng);
     return out_;
 }
 
@@ -264,59 +239,59 @@ Shading shade(Surface s, vec3 wo, float log_side) {
     out_.material = part.material;
     vec3 n = out_.frame.n;
     Looked looked = look_up(s, part, log_side);
-    if (has(HAS_EMISSION) && SHADING_OF(m).emission != vec3(0.0) && (front || SHADING_OF(m).emits_back != 0u)) {
+    if (HAS_EMISSION && SHADING_OF(m).emission != vec3(0.0) && (front || SHADING_OF(m).emits_back != 0u)) {
         out_.emission = SHADING_OF(m).emission * looked.at[USE_EMISSION].rgb;
     }
     vec3 base = shown_color(s, part, MaterialRecords(root.materials).v[part.material], log_side);
-    if (has(HAS_UNLIT) && SHADING_OF(m).model == MODEL_UNLIT) {
+    if (HAS_UNLIT && SHADING_OF(m).model == MODEL_UNLIT) {
         // such a material shows its base colour; what it emits is ignored
         out_.unlit = true;
         out_.emission = base;
         return out_;
     }
     vec4 tangent = vec4(0.0);
-    bool mapped = has_map(m, USE_NORMAL), coat_mapped = has(HAS_COAT) && has_map(m, USE_COAT_NORMAL);
-    if ((mapped || coat_mapped || has(HAS_ANISOTROPY)) && !is_null(part.tangents)) tangent = tangent_at(s, part);
+    bool mapped = has_map(m, USE_NORMAL), coat_mapped = HAS_CLEARCOAT && has_map(m, USE_CLEARCOAT_NORMAL);
+    if ((mapped || coat_mapped || HAS_ANISOTROPY) && !is_null(part.tangents)) tangent = tangent_at(s, part);
     if (mapped && tangent.w != 0.0) {
         n = towards(mapped_normal(looked.at[USE_NORMAL], SHADING_OF(m).normal_scale, s.ns, tangent) * side, wo);
         out_.frame = frame_about(n);
     }
     float cos_o = max(dot(n, wo), LEAST_COSINE);
-    if (has(HAS_DIFFUSE) && SHADING_OF(m).model == MODEL_MATTE) {
+    if (HAS_DIFFUSE && SHADING_OF(m).model == MODEL_MATTE) {
         out_.bsdf.kind = BSDF_DIFFUSE;
         out_.bsdf.diffuse = base;
-    } else if (has(HAS_MIRROR) && SHADING_OF(m).model == MODEL_MIRROR) {
+    } else if (HAS_MIRROR && SHADING_OF(m).model == MODEL_MIRROR) {
         out_.bsdf.kind = BSDF_MIRROR;
         out_.bsdf.tint = SHADING_OF(m).specular_color;
-    } else if (has(HAS_GLASS) && SHADING_OF(m).model == MODEL_GLASS) {
+    } else if (HAS_GLASS && SHADING_OF(m).model == MODEL_GLASS) {
         out_.bsdf.kind = BSDF_DIELECTRIC;
         out_.bsdf.tint = SHADING_OF(m).specular_color;
         out_.bsdf.transmitted = SHADING_OF(m).transmitted;
         out_.bsdf.eta = front ? SHADING_OF(m).ior : 1.0 / SHADING_OF(m).ior;
         out_.bsdf.facets = Microfacets(vec2(SHADING_OF(m).roughness * SHADING_OF(m).roughness), false);
         compensate(out_.bsdf, m, cos_o, SHADING_OF(m).roughness, front);
-    } else if (has(HAS_CONDUCTOR) && SHADING_OF(m).model == MODEL_CONDUCTOR) {
+    } else if (HAS_CONDUCTOR && SHADING_OF(m).model == MODEL_CONDUCTOR) {
         out_.bsdf.kind = BSDF_CONDUCTOR;
         out_.bsdf.tint = SHADING_OF(m).specular_color;
         out_.bsdf.f0 = SHADING_OF(m).eta;
         out_.bsdf.k = SHADING_OF(m).k;
         out_.bsdf.facets = Microfacets(vec2(SHADING_OF(m).roughness * SHADING_OF(m).roughness), true);
         compensate(out_.bsdf, m, cos_o, SHADING_OF(m).roughness, front);
-    } else if (has(HAS_GLTF)) {
+    } else if (HAS_GLTF) {
         vec2 along = gltf_bsdf(out_.bsdf, looked, m, base, front, cos_o);
-        if (has(HAS_ANISOTROPY) && SHADING_OF(m).anisotropy != vec2(0.0) && tangent.w != 0.0) {
+        if (HAS_ANISOTROPY && SHADING_OF(m).anisotropy != vec2(0.0) && tangent.w != 0.0) {
             vec3 d = tangent.xyz * along.x + cross(s.ns, tangent.xyz) * (tangent.w * along.y);
             out_.frame = frame_along(n, d);
         }
         if (coat_mapped && tangent.w != 0.0) {
-            vec3 nc = mapped_normal(looked.at[USE_COAT_NORMAL], SHADING_OF(m).coat_normal_scale, s.ns, tangent) * side;
+            vec3 nc = mapped_normal(looked.at[USE_CLEARCOAT_NORMAL], SHADING_OF(m).coat_normal_scale, s.ns, tangent) * side;
             out_.bsdf.coat.normal = to_frame(out_.frame, towards(nc, wo));
-        } else if (has(HAS_COAT) && mapped) {
+        } else if (HAS_CLEARCOAT && mapped) {
             // the coat has its own normals, or none
             out_.bsdf.coat.normal = to_frame(out_.frame, towards(s.ns * side, wo));
         }
     }
-    if (has(HAS_BENT_NORMALS)) out_.bsdf.ng = to_frame(out_.frame, out_.ng);
+    if (HAS_SHADING_NORMALS) out_.bsdf.ng = to_frame(out_.frame, out_.ng);
     return out_;
 }
 

@@ -3,13 +3,6 @@
 #define SCENE_SCENE
 #include "common/types.glsl"
 
-// What the scene needs; the host sets them from SceneFeatures, and the code of what is absent is compiled away.
-layout(constant_id = 0) const bool HAS_ALPHA = true;
-layout(constant_id = 1) const bool HAS_SPHERES = true;
-layout(constant_id = 2) const bool SINGLE_LEVEL = false;
-layout(constant_id = 10) const bool HAS_COVERAGE = true;
-layout(constant_id = 12) const bool HAS_DEEP_TEXELS = true;  // of more than 8 bits a channel
-
 layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer SceneRoot {
     uvec2 instances;   // InstanceRecord: an entry of the top level
     uvec2 parts;       // PartRecord: a mesh within a group

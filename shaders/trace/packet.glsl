@@ -16,9 +16,6 @@
 
 layout(local_size_x = LANES) in;
 
-// Lanes of a subgroup: a power of two.
-layout(constant_id = 7) const uint SUBGROUP = 8;
-
 layout(buffer_reference, std430, buffer_reference_align = 4) buffer Counter { uint v; };
 layout(buffer_reference, std430, buffer_reference_align = 8) readonly buffer BlockWords { WORD64 v[]; };
 
@@ -39,18 +36,18 @@ uint class_of(vec3 inverse, uint axis) {
 #define REDUCE(op)                          \
     uint r = x;                             \
     REDUCE_8(op, 0)                         \
-    if (SUBGROUP > 8u) { REDUCE_8(op, 8) }  \
+    if (SUBGROUP_SIZE > 8u) { REDUCE_8(op, 8) }  \
     return r;
 
 uint bitwise_or(uint a, uint b) { return a | b; }
 
 uint all_or(uint x) {
-    if (SUBGROUP > 16u) return subgroupOr(x);
+    if (SUBGROUP_SIZE > 16u) return subgroupOr(x);
     REDUCE(bitwise_or)
 }
 
 uint all_min(uint x) {
-    if (SUBGROUP > 16u) return subgroupMin(x);
+    if (SUBGROUP_SIZE > 16u) return subgroupMin(x);
     REDUCE(min)
 }
 
@@ -92,7 +89,7 @@ void main() {
     SceneRoot root = SceneRoot(push.scene);
     uvec2 blocks = root.nodes;
     uint lane = gl_SubgroupInvocationID;
-    uint first = (part_of_dispatch() * LANES + gl_SubgroupID * SUBGROUP) * PACKET_RAYS + lane;
+    uint first = (part_of_dispatch() * LANES + gl_SubgroupID * SUBGROUP_SIZE) * PACKET_RAYS + lane;
     uint count = ray_count();
     // the same for all lanes
     if (first - lane >= count) return;
@@ -106,7 +103,7 @@ void main() {
     uint best_instance[PACKET_RAYS], best_primitive[PACKET_RAYS];
     vec2 best_uv[PACKET_RAYS];
     FOR_RAYS {
-        uint k = first + uint(j) * SUBGROUP;
+        uint k = first + uint(j) * SUBGROUP_SIZE;
         Ray r = no_ray();
         if (k < count) r = ray(push.first + k);
         world_origin[j] = r.origin;
@@ -297,7 +294,7 @@ void main() {
 
     if (!finished && lane == 0u) atomicAdd(Counter(root.unfinished).v, 1u);
     FOR_RAYS {
-        uint k = first + uint(j) * SUBGROUP;
+        uint k = first + uint(j) * SUBGROUP_SIZE;
         if (k < count) {
 #ifdef STREAM_ANY
             any(push.first + k, best_primitive[j] != INVALID);

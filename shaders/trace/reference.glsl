@@ -11,11 +11,8 @@
 
 layout(local_size_x = LANES) in;
 
-// The host sets this to what the scene's trees need at most: every inner node pushes at most one child, so depth of the
+// STACK_SIZE is what the scene's trees need at most: every inner node pushes at most one child, so depth of the
 // top level + 1 + depth of the deepest group can never be exceeded. See src/bvh/bvh2.rs for the bound on the depth.
-layout(constant_id = 3) const uint STACK_SIZE = 64;
-layout(constant_id = 4) const uint RAYS_PER_LANE = 1;
-layout(constant_id = 5) const bool BY_DIRECTION = false;
 
 // References. An inner node has its number in bits 0-26 and in bits 27-28 the axis along which its children lie apart, the
 // lower one first. A leaf holds count - 1 in bits 27-30 and its first primitive in bits 0-26; a leaf of the top level holds an

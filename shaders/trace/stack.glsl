@@ -6,13 +6,12 @@
 // Entries in registers; `STACK_IN_REGISTERS` of src/tracer/wide.rs.
 const uint TOP = 6u;
 
-// What the scene's trees need at most beyond those: a node visit pushes at most the rest of one group of
+// STACK_SIZE is what the scene's trees need at most beyond those: a node visit pushes at most the rest of one group of
 // children; entering an entry of the top level pushes that and the way back. The host counts it.
-layout(constant_id = 3) const uint SPILLED = 64;
 
 #define DECLARE_STACK                                                       \
     uint top_base[TOP], top_group[TOP];                                     \
-    uint spilled_base[SPILLED + 1u], spilled_group[SPILLED + 1u];           \
+    uint spilled_base[STACK_SIZE + 1u], spilled_group[STACK_SIZE + 1u];           \
     [[unroll]] for (uint s = 0u; s < TOP; s++) {                            \
         top_base[s] = 0u;                                                   \
         top_group[s] = 0u;                                                  \
@@ -20,7 +19,7 @@ layout(constant_id = 3) const uint SPILLED = 64;
     uint depth = 0u;
 
 #define PUSH(b, g)                                                          \
-    if (SPILLED > 0u) {                                                     \
+    if (STACK_SIZE > 0u) {                                                     \
         if (depth >= TOP) {                                                 \
             spilled_base[depth - TOP] = top_base[TOP - 1u];                 \
             spilled_group[depth - TOP] = top_group[TOP - 1u];               \
@@ -42,7 +41,7 @@ layout(constant_id = 3) const uint SPILLED = 64;
         top_group[s] = top_group[s + 1u];                                   \
     }                                                                       \
     depth--;                                                                \
-    if (SPILLED > 0u) {                                                     \
+    if (STACK_SIZE > 0u) {                                                     \
         if (depth >= TOP) {                                                 \
             top_base[TOP - 1u] = spilled_base[depth - TOP];                 \
             top_group[TOP - 1u] = spilled_group[depth - TOP];               \

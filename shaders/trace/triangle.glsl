@@ -2,9 +2,7 @@
 #ifndef TRACE_TRIANGLE
 #define TRACE_TRIANGLE
 
-// For benchmarks the host can choose the other test, to show what watertightness costs and what it is worth
-// (docs/traversal.md).
-layout(constant_id = 6) const bool WATERTIGHT = true;
+// Where WATERTIGHT is not set it is the test of Möller and Trumbore, for benchmarks: what watertightness costs and what it is worth (docs/traversal.md).
 
 // The ray's frame: z is the axis along which the direction is longest, and the shear that makes the ray the z axis.
 struct Shear {

@@ -17,10 +17,8 @@
 
 layout(local_size_x = LANES) in;
 
-layout(constant_id = 4) const uint RAYS_PER_LANE = 1;
-// A lane that has taken so many turns takes no further ray; 0: no bound. For drivers that leave any loop after 65,535 turns: with
-// one ray per lane of a work-group each ray is taken nevertheless, because a lane that stops has had one.
-layout(constant_id = 8) const uint MOST_TURNS = 0;
+// MAX_ITERATIONS is for drivers that leave any loop after 65,535 iterations: with one ray per lane of a work-group each ray is taken nevertheless, because a
+// lane that stops has had one.
 
 #define SET_RAY(o, d)                                                                                          \
     origin = (o);                                                                                              \
@@ -185,7 +183,7 @@ void main() {
 #else
                 store_closest(root, index, best_primitive != INVALID ? best : INFINITY, best_instance, best_primitive, best_uv);
 #endif
-                if (MOST_TURNS > 0u && turns > MOST_TURNS) return;
+                if (MAX_ITERATIONS > 0u && turns > MAX_ITERATIONS) return;
                 NEXT_RAY
                 if (SINGLE_LEVEL) { SET_RAY(world.origin, world.direction) }
                 next_origin = world.origin;

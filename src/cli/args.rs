@@ -36,7 +36,7 @@ pub enum TracerChoice {
     Pipeline,
     /// VK_KHR_ray_query
     Query,
-    /// Compute shaders over our own hierarchy: any device
+    /// Compute shaders over a software BVH: any device
     Compute,
 }
 
@@ -68,7 +68,7 @@ impl ValueEnum for Kernel {
 pub enum TriangleTestChoice {
     /// No ray slips between triangles that share an edge
     Watertight,
-    /// For benchmarks: rays slip through edges
+    /// Moeller-Trumbore, for benchmarks: not watertight
     MollerTrumbore,
 }
 
@@ -86,19 +86,19 @@ impl From<TriangleTestChoice> for TriangleTest {
 pub enum Integrator {
     /// Ambient occlusion
     Ao,
-    /// Path tracing: all light there is
+    /// Path tracing: global illumination
     Path,
-    /// Emitted and direct light: paths of one bounce
+    /// Direct lighting: paths of one bounce
     Direct,
-    /// Grey diffuse surfaces under a white sky: what ambient occlusion stands in for, divided by their albedo
+    /// Path traced grey diffuse surfaces under a white sky, divided by albedo: the ground truth that AO approximates
     AoSky,
     /// Shading normals, in world space
     Normals,
     /// Base colours
     Albedo,
-    /// Distances along camera rays
+    /// Distance along camera rays
     Depth,
-    /// Occlusion that materials have baked into textures
+    /// Baked occlusion textures
     BakedOcclusion,
 }
 
@@ -112,9 +112,9 @@ impl Integrator {
 /// Axis of the hemisphere that occlusion rays fill.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum AoNormal {
-    /// The triangle's own, on the viewer's side
+    /// Geometric normal, on the viewer's side
     Geometric,
-    /// The interpolated one
+    /// Shading normal (interpolated)
     Shading,
 }
 
@@ -151,9 +151,9 @@ pub enum Aov {
 /// What to find of each ray.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum RayMode {
-    /// Whether something is in the way
+    /// Any hit
     Any,
-    /// The nearest hit
+    /// Closest hit
     Closest,
 }
 
@@ -187,13 +187,13 @@ impl Verbosity {
 /// How much time to spend on a hierarchy.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum BuildChoice {
-    /// By the number of primitives and of rays
+    /// Chosen by the number of primitives and rays
     Auto,
-    /// Ready soonest
+    /// Fastest build
     Fast,
     /// Balanced
     Default,
-    /// Large triangles are split: nearest hits are found fastest
+    /// Spatial splits: fastest traversal
     Best,
 }
 
@@ -220,23 +220,23 @@ pub struct DeviceArgs {
     /// How rays are traced
     #[arg(long, value_enum, default_value = "auto")]
     pub tracer: TracerChoice,
-    /// How the compute tracer walks its hierarchy [default: auto]
+    /// Traversal kernel of the compute tracer [default: auto]
     #[arg(long, value_enum)]
     pub traversal: Option<Kernel>,
-    /// The compute tracer's triangle test [default: watertight]
+    /// Ray-triangle intersection test of the compute tracer [default: watertight]
     #[arg(long, value_enum)]
     pub triangle_test: Option<TriangleTestChoice>,
-    /// Time to spend on the compute tracer's hierarchy
+    /// BVH build quality of the compute tracer
     #[arg(long, value_enum, default_value = "auto")]
     pub build: BuildChoice,
-    /// Keep the compute tracer's hierarchies in this folder, and take them from there when the same geometry comes again
+    /// Cache the compute tracer's BVHs in this folder, and reuse them for the same geometry
     /// [env: SKYLIT_BVH_CACHE]
     #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath)]
     pub bvh_cache: Option<PathBuf>,
     /// Vulkan device, by index or part of its name (`skylit doctor` lists them)
     #[arg(long, value_name = "INDEX|NAME")]
     pub device: Option<String>,
-    /// Run with the Vulkan validation layer; a message of it fails the run
+    /// Enable the Vulkan validation layer; any message fails the run
     #[arg(long)]
     pub validation: bool,
 }
@@ -334,22 +334,22 @@ pub struct RenderArgs {
     /// Camera position
     #[arg(long, value_name = "X,Y,Z", value_parser = parse_vector, requires = "target", allow_hyphen_values = true)]
     pub eye: Option<DVec3>,
-    /// Point in the middle of the image
+    /// Point that the camera looks at
     #[arg(long, value_name = "X,Y,Z", value_parser = parse_vector, requires = "eye", allow_hyphen_values = true)]
     pub target: Option<DVec3>,
-    /// Up in the image [default: 0,1,0]
+    /// Up vector [default: 0,1,0]
     #[arg(long, value_name = "X,Y,Z", value_parser = parse_vector, requires = "eye", allow_hyphen_values = true)]
     pub up: Option<DVec3>,
     /// Vertical field of view in degrees [default: the camera's, or 45]
     #[arg(long, value_name = "DEG", value_parser = parse_fov, allow_hyphen_values = true)]
     pub fov_y: Option<f64>,
-    /// Distance, in world units, beyond which nothing occludes
+    /// AO radius in scene units: hits beyond do not occlude
     #[arg(long, value_name = "R", default_value = "inf", value_parser = parse_radius, allow_hyphen_values = true)]
     pub ao_radius: f64,
-    /// A hit at distance d occludes by C^-d; 1 is binary [default: 1; 8 with --preset larsen]
+    /// AO falloff: a hit at distance d occludes by C^-d; 1 is binary [default: 1; 8 with --preset larsen]
     #[arg(long, value_name = "C", value_parser = parse_falloff, allow_hyphen_values = true)]
     pub ao_falloff: Option<f64>,
-    /// Axis of the hemisphere of occlusion rays
+    /// Normal of the hemisphere that AO samples
     #[arg(long, value_enum, default_value = "geometric")]
     pub ao_normal: AoNormal,
     /// What it runs on
@@ -358,22 +358,22 @@ pub struct RenderArgs {
     /// Seed of the sampler
     #[arg(long, default_value_t = 0)]
     pub seed: u32,
-    /// Stop after this time and write the samples taken so far (one per pixel at least)
+    /// Stop after this time and write the image so far (at least one sample per pixel)
     #[arg(long, value_name = "SECONDS", value_parser = parse_seconds, allow_hyphen_values = true)]
     pub time_limit: Option<Duration>,
-    /// On Ctrl-C, too, write the samples taken so far (and still exit with 130)
+    /// Write the image so far on Ctrl-C, too (the exit code is still 130)
     #[arg(long)]
     pub keep_partial: bool,
     /// Auxiliary outputs to add to the .exr, separated by commas
     #[arg(long, value_name = "LIST", value_enum, value_delimiter = ',')]
     pub aov: Vec<Aov>,
-    /// Also write the 1-ray depth image: .png (near white, far and background black) or .exr (depth.Z)
+    /// Also write a depth image of one ray per pixel: .png (near is white, far and background black) or .exr (depth.Z)
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub depth_image: Option<PathBuf>,
     /// Also write the rays of the first sample to PREFIX.primary.bin and PREFIX.ao.bin
     #[arg(long, value_name = "PREFIX")]
     pub dump_rays: Option<PathBuf>,
-    /// Print what the scene and the options made it skip, and what that saved
+    /// Print what was skipped because the scene or the options do not need it, and what that saved
     #[arg(long)]
     pub explain: bool,
     /// Frames in real time
@@ -491,7 +491,7 @@ pub struct RaysArgs {
     /// Where to write the hits: f32 t (inf = miss), u32 instance, u32 primitive, f32 u, f32 v each
     #[arg(long, value_name = "HITS.bin", value_hint = ValueHint::FilePath)]
     pub hits: Option<PathBuf>,
-    /// How often to trace the set, after a first pass that warms up
+    /// Repetitions, after one warm-up
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     pub repeats: u32,
     /// How results are shown
@@ -523,7 +523,7 @@ pub struct ScenesArgs {
 /// `skylit doctor`.
 #[derive(Clone, Debug, Args)]
 pub struct DoctorArgs {
-    /// The device to judge, by index or part of its name [default: the most capable]
+    /// Device to examine, by index or part of its name [default: the most capable]
     #[arg(long, value_name = "INDEX|NAME")]
     pub device: Option<String>,
     /// Print one JSON record on stdout instead of text
@@ -536,7 +536,7 @@ pub struct DoctorArgs {
 pub struct DiffArgs {
     /// First image, .exr or .png
     pub a: PathBuf,
-    /// Second image: the reference where it matters
+    /// Second image: the reference, for metrics that are not symmetric
     pub b: PathBuf,
     /// Fail (exit code 1) when the RMSE of a channel is above this
     #[arg(long, value_name = "X", value_parser = parse_limit, allow_hyphen_values = true)]

@@ -79,7 +79,7 @@ fn describe(text: &mut String, d: &DeviceInfo, chosen: Option<(usize, TracerKind
         } else if t.tracer == auto.0 {
             format!("yes, picked by `auto`: {}", auto.1)
         } else {
-            "yes, passed over by `auto`".into()
+            "available, not chosen by `auto`".into()
         };
         line(format!("  {:8} {state} (needs {})", t.tracer.name(), t.needs.join(", ")));
     }

@@ -151,8 +151,8 @@ impl Warnings {
 /// What a loader noticed, a sentence each.
 fn noticed(scene: &crate::scene::Scene) -> Vec<String> {
     let report = &scene.report;
-    let dropped = (report.degenerate_triangles > 0)
-        .then(|| format!("{} triangles without area were dropped", report.degenerate_triangles));
+    let dropped =
+        (report.degenerate_triangles > 0).then(|| format!("dropped {} degenerate triangles", report.degenerate_triangles));
     report.warnings.iter().cloned().chain(dropped).collect()
 }
 

@@ -8,6 +8,7 @@ use super::buffer::{Buffer, Memory};
 use super::device::Device;
 use super::result::Context;
 use crate::error::{Error, Result};
+use crate::interface::constants::Constant;
 use crate::shaders::{ComputeShader, Shader};
 
 /// Size of the push-constant block that every stream has (`Push` in shaders/common/types.glsl).
@@ -28,9 +29,15 @@ pub struct Specialization {
 }
 
 impl Specialization {
-    /// Sets the 32-bit constant (a bool is 0 or 1) with this id.
-    pub fn set(mut self, id: u32, value: u32) -> Self {
-        self.entries.push((id, value));
+    /// Sets a constant (a bool is 0 or 1).
+    pub fn set(mut self, constant: Constant, value: impl Into<u32>) -> Self {
+        self.entries.push((constant.id, value.into()));
+        self
+    }
+
+    /// Sets constants with their values.
+    pub fn set_all(mut self, constants: impl IntoIterator<Item = (Constant, u32)>) -> Self {
+        self.entries.extend(constants.into_iter().map(|(constant, value)| (constant.id, value)));
         self
     }
 

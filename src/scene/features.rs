@@ -2,6 +2,7 @@
 
 use super::flatten::FlatScene;
 use super::{AlphaMode, Geometry, Material, Scene, TexelData};
+use crate::interface::ShadingFeatures;
 
 /// What alpha means for the visibility of a mesh.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -97,8 +98,8 @@ pub struct SceneFeatures {
     pub spheres: bool,
     /// One top-level entry with an identity transform.
     pub single_level: bool,
-    /// What materials ask of paths, as the bits of shaders/bsdf/features.glsl; `None` where nobody shades.
-    pub shading: Option<u32>,
+    /// What materials require of the path tracer; `None` where nothing is shaded.
+    pub shading: Option<ShadingFeatures>,
 }
 
 impl SceneFeatures {

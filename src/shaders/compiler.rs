@@ -2,7 +2,7 @@
 //! `live-shaders`, which compile the ones that they need.
 
 use std::cell::RefCell;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::{Path, PathBuf};
@@ -32,6 +32,8 @@ const OPTIMIZATION: OptimizationLevel =
 /// Compiles shaders of one folder.
 pub struct Compiler {
     shaders: PathBuf,
+    // files that are made, by name
+    interface: BTreeMap<String, String>,
     cache: Option<Cache>,
 }
 
@@ -45,9 +47,19 @@ pub struct Compiled {
 }
 
 impl Compiler {
-    /// shaders: the folder. out: OUT_DIR; the cache lies beside the profiles'. Without pkg-config, which says which compiler this is, there is no cache.
-    pub fn new(shaders: &Path, out: &Path) -> Self {
-        Self { shaders: shaders.to_owned(), cache: Cache::open(out) }
+    /// shaders: the folder. interface: further files, by name. out: OUT_DIR; the cache lies beside the profiles'. Without pkg-config, which says which compiler this is, there is no cache.
+    pub fn new(shaders: &Path, interface: Vec<(String, String)>, out: &Path) -> Self {
+        Self { shaders: shaders.to_owned(), interface: interface.into_iter().collect(), cache: Cache::open(out) }
+    }
+
+    /// The text of a file that is included, and its path where it has one.
+    fn read(&self, name: &str) -> Result<(String, Option<PathBuf>), String> {
+        if let Some(text) = self.interface.get(name) {
+            return Ok((text.clone(), None));
+        }
+        let path = self.shaders.join(name);
+        let text = std::fs::read_to_string(&path).map_err(|e| format!("{}: {e}", path.display()))?;
+        Ok((text, Some(path)))
     }
 
     /// Compiles, or takes what was compiled before.
@@ -57,7 +69,7 @@ impl Compiler {
     pub fn compile(&self, source: &Source) -> Result<Compiled, String> {
         let text = source.text(&self.shaders)?;
         // `None` where an included file cannot be read: the compiler says it better
-        let (key, included) = key(&text, source.stage(), &self.shaders).unzip();
+        let (key, included) = self.key(&text, source.stage()).unzip();
         let place = self.cache.as_ref().zip(key).map(|(cache, key)| cache.place(&key));
         if let (Some(place), Some(included)) = (&place, included)
             && let Ok(spirv) = std::fs::read(place)
@@ -72,6 +84,27 @@ impl Compiler {
         Ok(compiled)
     }
 
+    /// A key of a text, of all that it includes and of the kind of shader; and the files that it includes.
+    fn key(&self, text: &str, stage: Stage) -> Option<(String, BTreeSet<PathBuf>)> {
+        // two numbers of 64 bits
+        let mut hashes = [DefaultHasher::new(), DefaultHasher::new()];
+        hashes[1].write_u8(1);
+        let mut add = |text: &str| hashes.iter_mut().for_each(|h| text.hash(h));
+        add(&format!("{stage:?} {OPTIMIZATION:?}"));
+        let (mut names, mut paths, mut texts) = (BTreeSet::new(), BTreeSet::new(), vec![text.to_owned()]);
+        while let Some(text) = texts.pop() {
+            add(&text);
+            for name in text.lines().filter_map(|l| l.trim_start().strip_prefix("#include \"")?.split('"').next()) {
+                if names.insert(name.to_owned()) {
+                    let (text, path) = self.read(name).ok()?;
+                    texts.push(text);
+                    paths.extend(path);
+                }
+            }
+        }
+        Some((hashes.iter().map(|h| format!("{:016x}", h.finish())).collect(), paths))
+    }
+
     fn run(&self, source: &Source, text: &str) -> Result<Compiled, String> {
         // who included what, to name the chain when a file does not compile
         let chain: RefCell<Vec<(String, String)>> = RefCell::new(Vec::new());
@@ -83,9 +116,8 @@ impl Compiler {
         options.set_optimization_level(OPTIMIZATION);
         options.set_warnings_as_errors();
         options.set_include_callback(|requested, _: IncludeType, from, _| {
-            let path = self.shaders.join(requested);
-            let content = std::fs::read_to_string(&path).map_err(|e| format!("{}: {e}", path.display()))?;
-            included.borrow_mut().insert(path);
+            let (content, path) = self.read(requested)?;
+            included.borrow_mut().extend(path);
             chain.borrow_mut().push((requested.to_owned(), from.to_owned()));
             // glslang numbers lines per file and names the file through this
             Ok(ResolvedInclude { resolved_name: requested.to_owned(), content })
@@ -149,27 +181,6 @@ impl Cache {
             let _ = std::fs::remove_file(&beside);
         }
     }
-}
-
-/// A key of a text, of all that it includes and of the kind of shader; and the files that it includes.
-fn key(text: &str, stage: Stage, shaders: &Path) -> Option<(String, BTreeSet<PathBuf>)> {
-    // two numbers of 64 bits
-    let mut hashes = [DefaultHasher::new(), DefaultHasher::new()];
-    hashes[1].write_u8(1);
-    let mut add = |text: &str| hashes.iter_mut().for_each(|h| text.hash(h));
-    add(&format!("{stage:?} {OPTIMIZATION:?}"));
-    let (mut seen, mut texts) = (BTreeSet::new(), vec![text.to_owned()]);
-    while let Some(text) = texts.pop() {
-        add(&text);
-        for name in text.lines().filter_map(|l| l.trim_start().strip_prefix("#include \"")?.split('"').next()) {
-            let path = shaders.join(name);
-            if !seen.contains(&path) {
-                texts.push(std::fs::read_to_string(&path).ok()?);
-                seen.insert(path);
-            }
-        }
-    }
-    Some((hashes.iter().map(|h| format!("{:016x}", h.finish())).collect(), seen))
 }
 
 /// The compiler's words, and how the file that the first of them names came in.

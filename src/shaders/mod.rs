@@ -47,7 +47,8 @@ impl Shader {
         use std::sync::OnceLock;
 
         static COMPILER: OnceLock<compiler::Compiler> = OnceLock::new();
-        let compiler = COMPILER.get_or_init(|| compiler::Compiler::new(&folder(), Path::new(env!("OUT_DIR"))));
+        let compiler = COMPILER
+            .get_or_init(|| compiler::Compiler::new(&folder(), crate::interface::glsl::files(), Path::new(env!("OUT_DIR"))));
         compiler.compile(&self.source).map(|c| Cow::Owned(c.spirv)).map_err(crate::Error::Usage)
     }
 }

@@ -14,6 +14,7 @@ use super::motion::Motion;
 use super::shading::{self, ShadingRecord, TextureUse};
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, Device, Memory};
+use crate::interface::MaterialFeature;
 use crate::scene::features::{Blend, alpha_cutoff};
 use crate::scene::flatten::{FlatScene, Group, Part, Placement};
 use crate::scene::{AlphaMode, Filter, Geometry, Material, TexelData, TextureSlot, TriangleMesh, Wrap};
@@ -393,12 +394,11 @@ impl GpuScene {
 
 /// What materials ask about albedos, if any does.
 fn albedo_tables(flat: &FlatScene, needs: Needs, indices: &[f32]) -> Option<Vec<f32>> {
-    let features = shading::features(flat, needs);
-    let has = |feature: u32| features & feature != 0;
+    let materials = shading::features(flat, needs).materials;
     let wanted = albedo::Wanted {
-        ggx: needs.compensation && has(shading::feature::GLTF),
-        sheen: has(shading::feature::SHEEN),
-        beckmann: needs.compensation && has(shading::feature::CONDUCTOR),
+        ggx: needs.compensation && materials.contains(MaterialFeature::Gltf),
+        sheen: materials.contains(MaterialFeature::Sheen),
+        beckmann: needs.compensation && materials.contains(MaterialFeature::Conductor),
     };
     let glass = if needs.compensation && !needs.white { indices } else { &[] };
     let any = wanted.ggx || wanted.sheen || wanted.beckmann || !glass.is_empty();

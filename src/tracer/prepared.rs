@@ -8,6 +8,7 @@ use super::kernel::{ComputeOptions, Kernel, TriangleTest};
 use super::stream;
 use crate::error::Result;
 use crate::gpu::{ComputePipeline, Device, DeviceInfo, Specialization};
+use crate::interface::constants;
 use crate::scene::features::SceneFeatures;
 use crate::shaders::{Rays, Shader, StreamShaders, Variant, wide_kernel};
 
@@ -90,14 +91,14 @@ pub(super) fn specialization(
     options: ComputeOptions,
     stack: u32,
 ) -> Specialization {
-    let (rays_per_lane, most_turns) = lane_budget(info);
+    let (rays_per_lane, max_iterations) = lane_budget(info);
     stream::scene_specialization(features)
-        .set(3, stack)
-        .set(4, rays_per_lane)
-        .set(5, u32::from(options.kernel == Kernel::Direction))
-        .set(6, u32::from(options.triangle_test == TriangleTest::Watertight))
-        .set(7, info.limits.subgroup_size)
-        .set(8, most_turns)
+        .set(constants::STACK_SIZE, stack)
+        .set(constants::RAYS_PER_LANE, rays_per_lane)
+        .set(constants::BY_DIRECTION, options.kernel == Kernel::Direction)
+        .set(constants::WATERTIGHT, options.triangle_test == TriangleTest::Watertight)
+        .set(constants::SUBGROUP_SIZE, info.limits.subgroup_size)
+        .set(constants::MAX_ITERATIONS, max_iterations)
 }
 
 /// Is the stream traced in packets?

@@ -4,12 +4,15 @@ use bytemuck::{Pod, Zeroable};
 
 use super::gpu_scene::Needs;
 use super::mipmap::Texels;
+use crate::interface::{
+    MaterialFeature, MaterialFeatures, MaterialModel, ShadingFeatures, TextureFeature, TextureFeatures, Walls,
+};
 use crate::scene::flatten::FlatScene;
 use crate::scene::material::MaterialKind;
 use crate::scene::{Geometry, Material, TextureSlot};
 
-/// Textures of a material beside its base colour's: `USE_*` of shaders/path/shading.glsl.
-pub(super) const SLOTS: usize = 13;
+/// Textures of a material beside its base colour's, numbered as [`TextureFeature`].
+pub(super) const SLOTS: usize = TextureFeature::ALL.len();
 
 /// `TextureUse` of shaders/scene/scene.glsl.
 #[repr(C)]
@@ -54,83 +57,6 @@ pub(super) struct ShadingRecord {
     uses: [TextureUse; SLOTS],
 }
 
-const GLTF: u32 = 0;
-const MATTE: u32 = 1;
-const MIRROR: u32 = 2;
-const GLASS: u32 = 3;
-const CONDUCTOR: u32 = 4;
-const UNLIT: u32 = 5;
-
-const NO_WALLS: u32 = 0;
-const THIN_WALLS: u32 = 1;
-const VOLUME: u32 = 2;
-
-/// Bits of shaders/bsdf/features.glsl, and what is not compiled where one is absent.
-pub(crate) mod feature {
-    pub const DIFFUSE: u32 = 1;
-    pub const GLTF: u32 = 2;
-    pub const CONDUCTOR: u32 = 4;
-    pub const GLASS: u32 = 8;
-    pub const MIRROR: u32 = 16;
-    pub const UNLIT: u32 = 32;
-    pub const COAT: u32 = 64;
-    pub const SHEEN: u32 = 128;
-    pub const THIN_WALLS: u32 = 256;
-    pub const VOLUMES: u32 = 512;
-    pub const ABSORPTION: u32 = 1024;
-    pub const ANISOTROPY: u32 = 2048;
-    pub const BASE_COLORS: u32 = 8192;
-    pub const EMISSION: u32 = 16384;
-    pub const COMPENSATION: u32 = 32768;
-    pub const BENT_NORMALS: u32 = 65536;
-    /// Every surface counts as white: nothing but Lambert is compiled ([`super::Needs::white`]).
-    pub const WHITE: u32 = 131072;
-    /// Textures have levels ([`super::Needs::mip_levels`]).
-    pub const RAY_CONES: u32 = 262144;
-
-    /// Textures in a slot of [`super::slots`].
-    pub const fn texture(slot: usize) -> u32 {
-        1 << (19 + slot)
-    }
-
-    /// All but textures, in words.
-    pub const NAMES: [(u32, &str); 16] = [
-        (DIFFUSE, "Lambert"),
-        (GLTF, "metallic-roughness"),
-        (CONDUCTOR, "measured metals"),
-        (GLASS, "glass"),
-        (MIRROR, "mirrors"),
-        (UNLIT, "unlit surfaces"),
-        (COAT, "clearcoat"),
-        (SHEEN, "sheen"),
-        (THIN_WALLS, "thin walls that transmit"),
-        (VOLUMES, "volumes"),
-        (ABSORPTION, "absorption"),
-        (ANISOTROPY, "anisotropy"),
-        (BASE_COLORS, "base colours that vary over a surface"),
-        (EMISSION, "emissive surfaces"),
-        (COMPENSATION, "energy compensation"),
-        (BENT_NORMALS, "interpolated normals"),
-    ];
-
-    /// Textures beside base colours', in words, slot by slot.
-    pub const TEXTURES: [&str; super::SLOTS] = [
-        "metallic-roughness",
-        "emissive",
-        "normal",
-        "clearcoat",
-        "clearcoat roughness",
-        "clearcoat normal",
-        "sheen colour",
-        "sheen roughness",
-        "transmission",
-        "specular",
-        "specular colour",
-        "anisotropy",
-        "occlusion",
-    ];
-}
-
 /// Complex index of refraction of a metal at the wavelengths of sRGB's primaries: eta and k of the measurements of Palik's handbook (1985) as
 /// Mitsuba and pbrt carry them, integrated to linear sRGB.
 fn metal(kind: MaterialKind) -> Option<[[f32; 3]; 2]> {
@@ -170,13 +96,13 @@ pub(super) fn texels(slot: usize) -> Texels {
 }
 
 /// Does light pass through it, and how?
-fn walls(m: &Material) -> u32 {
+fn walls(m: &Material) -> Walls {
     match m.kind {
         MaterialKind::MetallicRoughness if !m.unlit && m.transmission.factor > 0.0 => {
             // an index of 0 has no refraction, and no inside: what it transmits goes straight on
-            if m.transmission.thickness > 0.0 && m.ior != 0.0 { VOLUME } else { THIN_WALLS }
+            if m.transmission.thickness > 0.0 && m.ior != 0.0 { Walls::Volume } else { Walls::Thin }
         }
-        _ => NO_WALLS,
+        _ => Walls::Opaque,
     }
 }
 
@@ -192,12 +118,12 @@ pub(crate) fn absorbs(m: &Material) -> bool {
 
 /// May light go straight through it: walls without thickness that are smooth, or may be where a texture says so?
 pub(crate) fn has_clear_walls(m: &Material) -> bool {
-    walls(m) == THIN_WALLS && (m.roughness < 0.1 || m.metallic_roughness_texture.is_some())
+    walls(m) == Walls::Thin && (m.roughness < 0.1 || m.metallic_roughness_texture.is_some())
 }
 
 /// Attenuation per world unit.
 fn absorption(m: &Material) -> [f32; 3] {
-    if walls(m) != VOLUME {
+    if walls(m) != Walls::Volume {
         return [0.0; 3];
     }
     // what absorbs everything at once has no number: the least that single precision holds is left after its distance
@@ -214,50 +140,54 @@ pub(super) fn indices_of_refraction(materials: &[Material]) -> Vec<f32> {
 }
 
 fn refracts(m: &Material) -> bool {
-    m.kind == MaterialKind::Glass && !m.unlit || walls(m) == VOLUME
+    m.kind == MaterialKind::Glass && !m.unlit || walls(m) == Walls::Volume
 }
 
-/// What the materials of a scene ask for: bits of [`feature`].
-pub(super) fn features(flat: &FlatScene, needs: Needs) -> u32 {
-    let with = |on: bool, bit: u32| if on { bit } else { 0 };
+/// What the materials of a scene require of paths.
+pub(super) fn features(flat: &FlatScene, needs: Needs) -> ShadingFeatures {
     // under a white sky surfaces are diffuse, whatever they are made of
-    let mut bits = feature::DIFFUSE
-        | with(needs.compensation, feature::COMPENSATION)
-        | with(needs.white, feature::WHITE)
-        | with(needs.mip_levels && !needs.white, feature::RAY_CONES);
+    let mut materials: MaterialFeatures = [MaterialFeature::Diffuse].into_iter().collect();
+    let mut textures = TextureFeatures::default();
+    materials.insert_if(needs.compensation, MaterialFeature::Compensation);
+    materials.insert_if(needs.white, MaterialFeature::White);
+    materials.insert_if(needs.mip_levels && !needs.white, MaterialFeature::RayCones);
     for part in flat.groups.iter().flat_map(|g| &g.parts) {
         let mesh = &flat.scene.meshes[part.mesh];
         let m = &flat.scene.materials[mesh.material];
-        let bent = |t: &Geometry| matches!(t, Geometry::Triangles(t) if !t.normals.is_empty());
-        bits |= with(bent(&mesh.geometry), feature::BENT_NORMALS);
+        let has_normals = matches!(&mesh.geometry, Geometry::Triangles(t) if !t.normals.is_empty());
+        materials.insert_if(has_normals, MaterialFeature::ShadingNormals);
         if needs.white {
             continue;
         }
         let gltf = m.kind == MaterialKind::MetallicRoughness && !m.unlit;
-        bits |= match m.kind {
-            _ if m.unlit => feature::UNLIT,
-            MaterialKind::MetallicRoughness => feature::GLTF,
-            MaterialKind::Matte => feature::DIFFUSE,
-            MaterialKind::Mirror => feature::MIRROR,
-            MaterialKind::Glass => feature::GLASS,
-            MaterialKind::Copper | MaterialKind::Gold => feature::CONDUCTOR,
-        };
+        materials.insert(match m.kind {
+            _ if m.unlit => MaterialFeature::Unlit,
+            MaterialKind::MetallicRoughness => MaterialFeature::Gltf,
+            MaterialKind::Matte => MaterialFeature::Diffuse,
+            MaterialKind::Mirror => MaterialFeature::Mirror,
+            MaterialKind::Glass => MaterialFeature::Glass,
+            MaterialKind::Copper | MaterialKind::Gold => MaterialFeature::Conductor,
+        });
         let normal_maps = m.normal_texture.is_some() || m.clearcoat.factor > 0.0 && m.clearcoat.normal_texture.is_some();
-        let varies =
-            |g: &Geometry| matches!(g, Geometry::Triangles(t) if !t.colors.is_empty() || m.base_color_texture.is_some());
-        let textures = slots(m, needs).map(|t| t.is_some());
-        bits |= textures.iter().enumerate().fold(0, |bits, (slot, &there)| bits | with(there, feature::texture(slot)));
-        bits |= with(gltf && m.clearcoat.factor > 0.0, feature::COAT)
-            | with(gltf && m.sheen.color.max_element() > 0.0, feature::SHEEN)
-            | with(walls(m) == THIN_WALLS, feature::THIN_WALLS)
-            | with(walls(m) == VOLUME, feature::VOLUMES)
-            | with(absorption(m).iter().any(|&a| a > 0.0), feature::ABSORPTION)
-            | with(gltf && m.anisotropy.strength > 0.0, feature::ANISOTROPY)
-            | with(normal_maps, feature::BENT_NORMALS)
-            | with(varies(&mesh.geometry), feature::BASE_COLORS)
-            | with(m.emissive.max_element() > 0.0 && !m.unlit, feature::EMISSION);
+        let varies = matches!(&mesh.geometry, Geometry::Triangles(t) if !t.colors.is_empty() || m.base_color_texture.is_some());
+        for (slot, &feature) in slots(m, needs).iter().zip(TextureFeature::ALL) {
+            textures.insert_if(slot.is_some(), feature);
+        }
+        for (required, feature) in [
+            (gltf && m.clearcoat.factor > 0.0, MaterialFeature::Clearcoat),
+            (gltf && m.sheen.color.max_element() > 0.0, MaterialFeature::Sheen),
+            (walls(m) == Walls::Thin, MaterialFeature::ThinWalls),
+            (walls(m) == Walls::Volume, MaterialFeature::Volumes),
+            (absorbs(m), MaterialFeature::Absorption),
+            (gltf && m.anisotropy.strength > 0.0, MaterialFeature::Anisotropy),
+            (normal_maps, MaterialFeature::ShadingNormals),
+            (varies, MaterialFeature::BaseColors),
+            (m.emissive.max_element() > 0.0 && !m.unlit, MaterialFeature::Emission),
+        ] {
+            materials.insert_if(required, feature);
+        }
     }
-    bits
+    ShadingFeatures { materials, textures }
 }
 
 impl ShadingRecord {
@@ -271,12 +201,12 @@ impl ShadingRecord {
         Self {
             emission: if m.unlit { [0.0; 3] } else { m.emissive.to_array() },
             model: match m.kind {
-                _ if m.unlit => UNLIT,
-                MaterialKind::MetallicRoughness => GLTF,
-                MaterialKind::Matte => MATTE,
-                MaterialKind::Mirror => MIRROR,
-                MaterialKind::Glass => GLASS,
-                MaterialKind::Copper | MaterialKind::Gold => CONDUCTOR,
+                _ if m.unlit => MaterialModel::Unlit as u32,
+                MaterialKind::MetallicRoughness => MaterialModel::Gltf as u32,
+                MaterialKind::Matte => MaterialModel::Matte as u32,
+                MaterialKind::Mirror => MaterialModel::Mirror as u32,
+                MaterialKind::Glass => MaterialModel::Glass as u32,
+                MaterialKind::Copper | MaterialKind::Gold => MaterialModel::Conductor as u32,
             },
             metallic: m.metallic,
             roughness: m.roughness,
@@ -293,7 +223,7 @@ impl ShadingRecord {
             sheen_color: m.sheen.color.to_array(),
             sheen_roughness: m.sheen.roughness,
             absorption: absorption(m),
-            walls: walls(m),
+            walls: walls(m) as u32,
             anisotropy: [m.anisotropy.strength * cos, m.anisotropy.strength * sin],
             normal_scale: m.normal_scale,
             coat_normal_scale: m.clearcoat.normal_scale,

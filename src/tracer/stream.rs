@@ -7,6 +7,7 @@ use bytemuck::{Pod, Zeroable};
 use super::compute::HIT_BYTES;
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, ComputePipeline, Device, HitShaders, RayTracingPipeline, Recorder, Specialization};
+use crate::interface::constants;
 use crate::ray::Ray;
 use crate::scene::features::SceneFeatures;
 use crate::shaders::{self, LANES, Mode, PACKET_RAYS, RUN, Rays, SPREAD, StreamShaders, Variant};
@@ -81,13 +82,13 @@ pub struct Stream {
 /// What a scene does not need is not compiled.
 pub(crate) fn scene_specialization(features: SceneFeatures) -> Specialization {
     let s = Specialization::default()
-        .set(0, features.alpha as u32)
-        .set(1, features.spheres as u32)
-        .set(2, features.single_level as u32)
-        .set(10, features.coverage as u32)
-        .set(12, features.deep_texels as u32);
+        .set(constants::HAS_ALPHA, features.alpha)
+        .set(constants::HAS_SPHERES, features.spheres)
+        .set(constants::SINGLE_LEVEL, features.single_level)
+        .set(constants::HAS_COVERAGE, features.coverage)
+        .set(constants::HAS_DEEP_TEXELS, features.deep_texels);
     match features.shading {
-        Some(bits) => s.set(9, bits),
+        Some(shading) => s.set_all(shading.materials.constants()).set_all(shading.textures.constants()),
         None => s,
     }
 }

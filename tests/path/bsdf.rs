@@ -6,7 +6,7 @@ use skylit::gpu::{Buffer, Commands, Memory};
 use skylit::scene::TriangleMesh;
 use skylit::scene::material::{Anisotropy, Clearcoat, Sheen, Specular, Transmission};
 use skylit::shaders;
-use skylit::tracer::{Push, Stream, stream};
+use skylit::tracer::{Push, Stream};
 use std::f64::consts::PI;
 
 /// Cells of the sphere: by cosine, by angle.

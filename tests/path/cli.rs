@@ -308,17 +308,18 @@ fn gpu_what_is_compiled_is_told() {
         render(&[&["-o", &place(&dir, "a.exr"), "--spp", "1", "--explain"], args].concat())["explain"].to_string()
     };
     let plain = told(&[]);
-    let lights = "ask for rectangles that shine, light samples, MIS weights; not compiled: lights at points, spots";
+    let lights =
+        "require emissive rectangles, light samples, multiple importance sampling; specialized out: point lights, spot lights";
     assert!(plain.contains(lights), "{plain}");
-    assert!(plain.contains("textures beside base colours: nothing; not compiled: metallic-roughness"), "{plain}");
+    assert!(plain.contains("textures beside base colours: nothing; specialized out: metallic-roughness"), "{plain}");
     let light = "spot position=0.1,1,0.1 direction=0,-1,0 outer=40 intensity=3";
     let spot = told(&["--sampling", "light", "--light", light]);
     assert!(
-        spot.contains("ask for spots, rectangles that shine, a choice among lights, light samples; not compiled"),
+        spot.contains("require spot lights, emissive rectangles, a choice among lights, light samples; specialized out"),
         "{spot}"
     );
     let bsdf = told(&["--sampling", "bsdf", "--light", light, "--firefly-clamp", "9"]);
-    assert!(bsdf.contains("ask for a clamp of fireflies; not compiled: lights at points, spots"), "{bsdf}");
+    assert!(bsdf.contains("require radiance clamp; specialized out: point lights, spot lights"), "{bsdf}");
     let image = place(&dir, "b.exr");
     let out = run(&[
         "render",
@@ -335,7 +336,7 @@ fn gpu_what_is_compiled_is_told() {
         "--json",
     ]);
     let view = String::from_utf8(out.stdout).unwrap();
-    assert!(view.contains("lights and options ask for a view without light; not compiled"), "{view}");
+    assert!(view.contains("lights and options require auxiliary view; specialized out"), "{view}");
 }
 
 /// It changes the image: it has to be as it was, and it is said.
@@ -348,7 +349,7 @@ fn gpu_texture_filters_are_told_and_kept() {
     assert!(told["explain"].to_string().contains("mip levels: none, no surface has a texture"), "{told}");
     let plain = render(&["-o", &place(&dir, "b.exr"), "--spp", "1", "--explain"]);
     assert_eq!(plain["texture_filter"], "bilinear");
-    assert!(plain["explain"].to_string().contains("mip levels: left out, nobody asked"), "{plain}");
+    assert!(plain["explain"].to_string().contains("mip levels: unused"), "{plain}");
     let [on, never] = ["c.exr", "d.exr"].map(|name| place(&dir, name));
     fails(&[&BASE[..], &["-o", &on, "--spp", "4", "--resume", &film]].concat(), 64, "texture filter");
     for (integrator, says) in [("ao", "is about paths"), ("depth", "reads no textures"), ("ao-sky", "reads no textures")] {

@@ -4,7 +4,7 @@ use skylit::gpu::{Buffer, Commands, Memory};
 use skylit::sampling::Sequence;
 use skylit::sampling::sobol::hash_combine;
 use skylit::shaders;
-use skylit::tracer::{Push, stream};
+use skylit::tracer::Push;
 
 use crate::common::{assert_validation_clean, device};
 

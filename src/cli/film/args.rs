@@ -12,17 +12,18 @@ use crate::output::ImageFormat;
 #[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Film of stills")]
 pub struct FilmArgs {
-    /// Go on with an image that was rendered with --resumable, up to --spp samples in all: the same bits as in one go. All else must be as it was
+    /// Resume a render that was saved with --resumable, up to --spp samples in all; the result is bit-identical to an uninterrupted render. All other settings
+    /// must be the same
     #[arg(long, value_name = "FILE.exr", value_hint = ValueHint::FilePath)]
     pub resume: Option<PathBuf>,
-    /// Put the film's exact sums into .exr outputs (layer `state`), for --resume; --resume and --intervals do so anyway
+    /// Save the state of the film in .exr outputs (layer `state`), for --resume; implied by --resume and --intervals
     #[arg(long)]
     pub resumable: bool,
-    /// Also write the outputs, as NAME.0016.exr, whenever the number of samples reaches a power of two, or one that the scene names
+    /// Also save intermediate images, as NAME.0016.exr, at every power of two of samples and at those that the scene names
     #[arg(long)]
     pub intervals: bool,
-    /// Take no more samples of an 8x8 tile once its standard error and its neighbours' are estimated to be at most E, in units of the image; judged at powers
-    /// of two from 64 samples on. --spp is then the most
+    /// Adaptive sampling: stop sampling an 8x8 tile once its estimated standard error and its neighbours' are at most E (radiance), tested at powers of two
+    /// from 64 samples on. --spp is then the maximum
     #[arg(long, value_name = "E", value_parser = parse_target, allow_hyphen_values = true)]
     pub target_rmse: Option<f64>,
 }
@@ -60,10 +61,9 @@ impl FilmArgs {
             return wrong("--resumable needs an .exr output: PNG holds colour only".into());
         }
         match &self.resume {
-            Some(path) if ImageFormat::of(path).ok() != Some(ImageFormat::Exr) => wrong(format!(
-                "--resume {}: only an .exr that was rendered with --resumable can be gone on with",
-                path.display()
-            )),
+            Some(path) if ImageFormat::of(path).ok() != Some(ImageFormat::Exr) => {
+                wrong(format!("--resume {}: only an .exr that was rendered with --resumable can be resumed", path.display()))
+            }
             _ => Ok(()),
         }
     }

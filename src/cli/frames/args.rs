@@ -29,60 +29,60 @@ macro_rules! choices {
 }
 
 choices!(Preset, |p| match p {
-    Preset::Larsen => "The pipeline of Larsen (2019), exactly: half resolution, 64 rays, a box, half of the frame before",
-    Preset::LarsenFixed => "Its budget, with right sampling, history and filter",
-    Preset::Fast => "A ray a pixel, short histories, a small filter",
-    Preset::Balanced => "A ray a pixel, long histories",
-    Preset::Quality => "Four rays a pixel, longer histories, a wider filter",
-    Preset::Reference => "1024 rays a pixel, each frame by itself",
+    Preset::Larsen => "The pipeline of Larsen (2019): half resolution, 64 rays, box filter, history weight 0.5",
+    Preset::LarsenFixed => "The same ray budget, with correct sampling, reprojection and filter",
+    Preset::Fast => "1 ray per pixel, short history, small filter",
+    Preset::Balanced => "1 ray per pixel, long history",
+    Preset::Quality => "4 rays per pixel, longer history, wider filter",
+    Preset::Reference => "1024 rays per pixel, no history",
 });
 choices!(Technique, |t| match t {
-    Technique::Traced => "Rays through the scene",
-    Technique::Gtao => "From the depth image alone (Jimenez et al. 2016)",
+    Technique::Traced => "Ray-traced ambient occlusion",
+    Technique::Gtao => "Screen-space ground-truth AO (Jimenez et al. 2016)",
     Technique::Larsen => "The pipeline of Larsen (2019)",
 });
 choices!(Resolution, |r| match r {
     Resolution::Full => "Every pixel in every frame",
-    Resolution::Checkerboard => "Every second pixel in turn",
-    Resolution::Half => "One of four pixels in turn: half the resolution per axis",
+    Resolution::Checkerboard => "Half of the pixels per frame, alternating",
+    Resolution::Half => "A quarter of the pixels per frame: half the resolution per axis",
 });
 choices!(Sequence, |s| match s {
-    Sequence::White => "Random numbers",
-    Sequence::Stratified => "Random in the cells of a grid, over 16 samples",
-    Sequence::Sobol => "Owen-scrambled Sobol, a sequence for each pixel",
-    Sequence::Blue => "One Owen-scrambled Sobol sequence over the image: error is blue noise",
-    Sequence::R2 => "Roberts' R2, shifted at random for each pixel",
+    Sequence::White => "Independent random numbers",
+    Sequence::Stratified => "Jittered on a 4x4 grid",
+    Sequence::Sobol => "Owen-scrambled Sobol, one sequence per pixel",
+    Sequence::Blue => "Owen-scrambled Sobol over the image: blue-noise error",
+    Sequence::R2 => "R2 sequence (Roberts), Cranley-Patterson rotation per pixel",
 });
 choices!(Budget, |b| match b {
-    Budget::Uniform => "All pixels have as many",
-    Budget::Variance => "As many in all, most where a pixel's mean is known least",
+    Budget::Uniform => "The same number for every pixel",
+    Budget::Variance => "The same total, in proportion to the standard error of pixels",
 });
 choices!(FilterKind, |f| match f {
-    FilterKind::None => "What histories say",
-    FilterKind::Box => "A box that stops at edges, as wide as samples are few",
-    FilterKind::Separable => "The box's two sides one after the other",
-    FilterKind::Atrous => "A small box again and again, its taps twice as far apart each time",
+    FilterKind::None => "No spatial filter",
+    FilterKind::Box => "Edge-aware box filter; fewer samples, larger radius",
+    FilterKind::Separable => "Edge-aware box filter, separable",
+    FilterKind::Atrous => "Edge-aware a-trous filter",
 });
 choices!(Shown, |s| match s {
-    Shown::Accessibility => "The result",
-    Shown::Unfiltered => "What the filter is given",
-    Shown::Samples => "Samples behind a pixel; white: as many as a history counts",
-    Shown::Variance => "Of one sample; white: a quarter",
-    Shown::Depth => "Along the view, near is white",
-    Shown::Normal => "Geometric normal, -1 to 1 as 0 to 1",
-    Shown::Position => "World position, in bands of a quarter of the scene",
-    Shown::Bent => "Bent normal, -1 to 1 as 0 to 1",
+    Shown::Accessibility => "The filtered result",
+    Shown::Unfiltered => "The input of the spatial filter",
+    Shown::Samples => "Accumulated samples; white: maximum history length",
+    Shown::Variance => "Variance of one sample; white: 0.25",
+    Shown::Depth => "Depth along the view; white is near",
+    Shown::Normal => "Geometric normal, -1 to 1 mapped to 0 to 1",
+    Shown::Position => "World position, repeating every quarter of the scene",
+    Shown::Bent => "Bent normal, -1 to 1 mapped to 0 to 1",
 });
 
-/// How it is found what pixels show.
+/// Primary visibility.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub enum PrimaryChoice {
-    /// What costs less on the device
+    /// Whichever is faster on the device
     #[default]
     Auto,
-    /// Camera rays are traced
+    /// Ray traced
     Traced,
-    /// The scene is drawn
+    /// Rasterized
     Raster,
 }
 
@@ -117,52 +117,52 @@ fn parse_rate(text: &str) -> std::result::Result<f64, String> {
 #[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Frames in real time")]
 pub struct FrameArgs {
-    /// Make frames with the real-time pipeline
+    /// Render with the real-time pipeline and these settings
     #[arg(long, value_enum)]
     pub preset: Option<Preset>,
-    /// Render frames A to B - 1 [default: one, after as many of the same as its history counts]
+    /// Render frames A to B - 1 [default: one frame, after warm-up]
     #[arg(long, value_name = "A..B", value_parser = parse_frames)]
     pub frames: Option<FrameRange>,
-    /// Frames a second [default: the camera path's, or 30]
+    /// Frames per second [default: the camera path's, or 30]
     #[arg(long, value_name = "N", value_parser = parse_rate)]
     pub fps: Option<f64>,
     /// Play an animation of the scene, by index or name [default: the first]
     #[arg(long, value_name = "INDEX|NAME", num_args = 0..=1, default_missing_value = "0")]
     pub animate: Option<String>,
-    /// Move the camera as a file of keys says (docs/sequences.md)
+    /// Animate the camera along the key frames of a file (docs/sequences.md)
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath, conflicts_with_all = ["orbit", "eye", "camera", "fov_y"])]
     pub camera_path: Option<PathBuf>,
-    /// Turn the camera about the middle of the scene, once in so many frames
+    /// Orbit the camera around the centre of the scene, one turn in this many frames
     #[arg(long, value_name = "FRAMES", num_args = 0..=1, default_missing_value = "240", value_parser = clap::value_parser!(u32).range(1..))]
     pub orbit: Option<u32>,
-    /// Frames before the first that are made and not kept, all of them like the first [default: 0; for one frame, the history's length]
+    /// Warm-up frames, identical to the first, that are rendered and discarded [default: 0; for a single frame, the history length]
     #[arg(long, value_name = "N")]
     pub warm_up: Option<u32>,
-    /// Where occlusion comes from [default: the preset's]
+    /// AO technique [default: the preset's]
     #[arg(long, value_enum)]
     pub technique: Option<Technique>,
-    /// How it is found what pixels show
+    /// Primary visibility: rasterized or ray traced
     #[arg(long, value_enum, default_value = "auto")]
     pub primary: PrimaryChoice,
-    /// Occlusion rays of a pixel in a frame [default: the preset's]
+    /// Occlusion rays per pixel and frame [default: the preset's]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(Settings::MOST_RAYS)))]
     pub rays_per_pixel: Option<u32>,
-    /// Whose rays they are; docs/realtime.md has what that gains
+    /// How rays are distributed over pixels (docs/realtime.md)
     #[arg(long, value_enum, default_value = "uniform")]
     pub budget: Budget,
-    /// Which pixels have rays in a frame [default: the preset's]
+    /// Resolution of ray tracing per frame [default: the preset's]
     #[arg(long, value_enum)]
     pub resolution: Option<Resolution>,
-    /// Where directions come from [default: the preset's]
+    /// Sampler of ray directions [default: the preset's]
     #[arg(long, value_enum)]
     pub sequence: Option<Sequence>,
-    /// Frames that a history counts at most; 1 keeps none [default: the preset's]
+    /// Maximum history length in frames; 1 disables temporal accumulation [default: the preset's]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub history: Option<u32>,
-    /// How pixels are averaged [default: the preset's]
+    /// Spatial filter [default: the preset's]
     #[arg(long, value_enum)]
     pub filter: Option<FilterKind>,
-    /// Pixels to which the filter reaches at most [default: the preset's]
+    /// Maximum filter radius in pixels [default: the preset's]
     #[arg(long, value_name = "PIXELS", value_parser = clap::value_parser!(u32).range(0..=16))]
     pub filter_radius: Option<u32>,
     /// What .png and .apng outputs show [default: accessibility]

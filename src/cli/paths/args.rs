@@ -16,15 +16,15 @@ use crate::scene::{Environment, load};
 /// How directions are drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Sampling {
-    /// BSDF and light samples, weighed by the power heuristic
+    /// Multiple importance sampling of BSDF and lights, power heuristic
     Mis,
-    /// BSDF samples alone
+    /// BSDF sampling only
     Bsdf,
-    /// Light samples for what they can find
+    /// Light sampling for emitters that it can sample, BSDF sampling for the rest
     Light,
-    /// Cosine-distributed directions
+    /// Cosine-weighted hemisphere sampling
     Cosine,
-    /// Directions distributed evenly over the hemisphere
+    /// Uniform hemisphere sampling
     Uniform,
 }
 
@@ -43,11 +43,11 @@ impl From<Sampling> for Strategy {
 /// Reconstruction filter of pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum PixelFilterChoice {
-    /// The pixel's own square
+    /// Box filter of one pixel
     Box,
-    /// A tent of radius 1
+    /// Tent filter of radius 1
     Tent,
-    /// Blackman and Harris' window of radius 1.5
+    /// Blackman-Harris filter of radius 1.5
     BlackmanHarris,
 }
 
@@ -64,9 +64,9 @@ impl From<PixelFilterChoice> for PixelFilter {
 /// What is read of textures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum TextureFilterChoice {
-    /// A point: the samples of a pixel average
+    /// Bilinear lookups: the samples of a pixel average them
     Bilinear,
-    /// The mean over the cone of the path, from mip levels: less noise from few samples, biased
+    /// Ray cones choose a mip level: less noise at low sample counts, biased
     RayCone,
 }
 
@@ -82,11 +82,11 @@ impl From<TextureFilterChoice> for TextureFilter {
 /// How radiance is brought below 1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum ToneMapChoice {
-    /// Cut off at 1
+    /// Clamp at 1
     Linear,
-    /// 1 - e^-x
+    /// Exponential, 1 - e^-x
     Exp,
-    /// Luminance over 1 + luminance
+    /// Reinhard, by luminance
     Reinhard,
     /// Khronos PBR Neutral
     Neutral,
@@ -110,57 +110,57 @@ impl From<ToneMapChoice> for ToneMap {
 #[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Paths (--integrator path, direct, ao-sky; views)")]
 pub struct PathArgs {
-    /// Bounces at most: 0 shows what emits, 1 adds direct light [default: the scene's, or no limit; direct: 1]
+    /// Maximum path length in bounces: 0 is emitted light, 1 adds direct light [default: the scene's, or no limit; direct: 1]
     #[arg(long, value_name = "N")]
     pub max_depth: Option<u32>,
-    /// Bounces before Russian roulette ends paths [default: 5]
+    /// Bounces before Russian roulette may end a path [default: 5]
     #[arg(long, value_name = "N")]
     pub rr_depth: Option<u32>,
-    /// Hold what a bounce adds to this radiance: less noise, too dark [default: off]
+    /// Clamp indirect radiance to X (reduces fireflies; biased) [default: off]
     #[arg(long, value_name = "X", value_parser = parse_clamp, allow_hyphen_values = true)]
     pub firefly_clamp: Option<f64>,
-    /// How directions are drawn; all but the default are for comparison [default: mis]
+    /// Sampling strategy; all but the default are for comparison [default: mis]
     #[arg(long, value_enum)]
     pub sampling: Option<Sampling>,
-    /// What surrounds the scene: an equirectangular .hdr or .exr, or a radiance R,G,B [default: the scene's]
+    /// Environment light: an equirectangular map (.hdr, .exr), or a constant radiance R,G,B [default: the scene's]
     #[arg(long, value_name = "FILE|R,G,B", value_hint = ValueHint::FilePath)]
     pub environment: Option<String>,
-    /// Turn the environment about the vertical axis by this angle, counter-clockwise from above
+    /// Rotate the environment map about the vertical axis by this angle, counter-clockwise from above
     #[arg(long, value_name = "DEG", value_parser = parse_number, requires = "environment", allow_hyphen_values = true)]
     pub environment_turn: Option<f64>,
-    /// Multiply the environment by this
+    /// Factor of the environment's radiance
     #[arg(long, value_name = "X", value_parser = parse_scale, requires = "environment", allow_hyphen_values = true)]
     pub environment_scale: Option<f64>,
-    /// Give back what microfacets lose that reflect light only once
+    /// Compensate for energy lost to multiple scattering between microfacets (Turquin 2019)
     #[arg(long)]
     pub energy_compensation: bool,
-    /// Add a light: point, spot, sun, sphere, rectangle or disk, then key=value: position, direction (where it shines), radius, size=W,H,
+    /// Add a light: point, spot, sun, sphere, rectangle or disk, then key=value: position, direction (in which it emits), radius, size=W,H,
     /// intensity (cd), irradiance (lux) or radiance, color=R,G,B or temperature=K, and outer, inner, angle in degrees. May be repeated
     #[arg(long, value_name = "SPEC", value_parser = super::lights::parse)]
     pub light: Vec<LightSpec>,
     /// Albedo of all surfaces with --integrator ao-sky [default: 0.5]
     #[arg(long, value_name = "X", value_parser = parse_albedo, allow_hyphen_values = true)]
     pub sky_albedo: Option<f64>,
-    /// Take noise out of the image once it is done, and put a bias in its place: oidn, filter, or auto for oidn where it is there. An .exr keeps the mean
-    /// as noisy.R, noisy.G, noisy.B [default: off; without METHOD: auto]
+    /// Denoise the final image (biased): oidn, filter, or auto (oidn if it is installed). An .exr keeps the noisy image as noisy.R, noisy.G, noisy.B
+    /// [default: off; without METHOD: auto]
     #[arg(long, value_name = "METHOD", value_enum, num_args = 0..=1, require_equals = false, default_missing_value = "auto")]
     pub denoise: Option<DenoiseChoice>,
-    /// Reconstruction filter of pixels, by importance sampling [default: box]
+    /// Pixel reconstruction filter, by importance sampling [default: box]
     #[arg(long, value_enum)]
     pub pixel_filter: Option<PixelFilterChoice>,
-    /// What paths read of textures where they meet them [default: bilinear]
+    /// Texture filter of paths [default: bilinear]
     #[arg(long, value_enum)]
     pub texture_filter: Option<TextureFilterChoice>,
-    /// Aperture of a 36x24 mm camera: the focal length over this is the lens; world units are metres [default: a pinhole]
+    /// f-number of a thin lens with a 36x24 mm sensor; scene units are taken as metres [default: a pinhole]
     #[arg(long, value_name = "N", value_parser = parse_clamp, requires = "focus_distance", allow_hyphen_values = true)]
     pub f_number: Option<f64>,
-    /// Distance along the view at which the image is sharp, world units
+    /// Focus distance along the view, in scene units
     #[arg(long, value_name = "D", value_parser = parse_clamp, requires = "f_number", allow_hyphen_values = true)]
     pub focus_distance: Option<f64>,
-    /// How .png outputs bring radiance below 1 [default: linear]
+    /// Tone mapping operator of .png outputs [default: linear]
     #[arg(long, value_enum)]
     pub tone_map: Option<ToneMapChoice>,
-    /// Brighten .png outputs by this many stops [default: 0]
+    /// Exposure of .png outputs, in stops [default: 0]
     #[arg(long, value_name = "EV", value_parser = parse_number, allow_hyphen_values = true)]
     pub exposure: Option<f64>,
 }

@@ -8,10 +8,9 @@ use crate::cli::film::{Identity, Maker, Told, metadata, spp_text};
 use crate::cli::report::{Seconds, camera_text};
 use crate::gpu::DeviceInfo;
 use crate::render::accumulate::Accumulated;
-use crate::render::path::{self, MOST_DEPTH, PathOptions, PathResult, PixelFilter, TextureFilter};
+use crate::render::path::{MOST_DEPTH, PathOptions, PathResult, PixelFilter, TextureFilter};
 use crate::scene::features::SceneFeatures;
 use crate::scene::{Camera, Environment, Scene};
-use crate::tracer::shading::feature;
 use crate::tracer::{BuildStats, TracerKind};
 
 /// What the image is of.
@@ -157,13 +156,10 @@ impl Report<'_> {
             ),
         ];
         if self.about.options.firefly_clamp.is_finite() {
-            lines.push(format!(
-                "held to radiance {} after the first hit: the image is too dark",
-                self.about.options.firefly_clamp
-            ));
+            lines.push(format!("indirect radiance clamped to {}: biased, too dark", self.about.options.firefly_clamp));
         }
         if self.about.options.texture_filter == TextureFilter::RayCone {
-            lines.push("textures averaged over ray cones: what they show is blurred, however many samples".into());
+            lines.push("textures filtered by ray cones: blurred, however many samples (biased)".into());
         }
         lines.extend(self.denoised.iter().map(|d| d.line.clone()));
         lines.extend(self.film.lines.iter().cloned());
@@ -178,18 +174,17 @@ impl Report<'_> {
 
     /// What of materials, textures and transport is compiled, and what is not.
     fn compiled(&self) -> Vec<String> {
-        let asked = self.tracer_features.shading.unwrap_or(0);
-        let textures: Vec<_> = (0..).map(feature::texture).zip(feature::TEXTURES).collect();
+        let shading = self.tracer_features.shading.unwrap_or_default();
         vec![
-            compiled("materials ask for", asked, &feature::NAMES),
-            compiled("textures beside base colours:", asked, &textures),
-            compiled("lights and options ask for", self.result.asked, &path::ASKED),
+            compiled("materials require", shading.materials.labels()),
+            compiled("textures beside base colours:", shading.textures.labels()),
+            compiled("lights and options require", self.result.features.labels()),
         ]
     }
 
     fn mip_levels(&self) -> String {
         match self.about.options.texture_filter {
-            TextureFilter::Bilinear => "mip levels: left out, nobody asked (--texture-filter ray-cone)".into(),
+            TextureFilter::Bilinear => "mip levels: unused (--texture-filter ray-cone uses them)".into(),
             TextureFilter::RayCone if self.stats.mip_levels == 0 => "mip levels: none, no surface has a texture".into(),
             TextureFilter::RayCone => {
                 format!("mip levels: up to {}, {} bytes beside the first", self.stats.mip_levels, self.stats.mip_bytes)
@@ -204,9 +199,9 @@ impl Report<'_> {
         lines.extend(self.compiled());
         lines.push(self.mip_levels());
         lines.push(match self.result.lights {
-            0 => "no light samples: there is nothing to draw them from, or --sampling asks for none".into(),
-            n if self.result.light_tree => format!("{n} lights, drawn by what they may do at a point, from a tree"),
-            n => format!("{n} lights, drawn by their power"),
+            0 => "no light sampling: there are no lights, or --sampling does not use it".into(),
+            n if self.result.light_tree => format!("{n} lights, sampled by a light tree"),
+            n => format!("{n} lights, sampled by power"),
         });
         let all = image.primary_rays + image.skipped_primary_rays;
         lines.push(format!(
@@ -284,10 +279,7 @@ impl Report<'_> {
 }
 
 /// Which of the code that `names` stand for is compiled.
-fn compiled(what: &str, asked: u32, names: &[(u32, &str)]) -> String {
-    let list = |on: bool| {
-        let names: Vec<_> = names.iter().filter(|(bit, _)| (asked & bit != 0) == on).map(|f| f.1).collect();
-        if names.is_empty() { "nothing".into() } else { names.join(", ") }
-    };
-    format!("{what} {}; not compiled: {}", list(true), list(false))
+fn compiled(what: &str, labels: [Vec<&'static str>; 2]) -> String {
+    let [required, other] = labels.map(|labels| if labels.is_empty() { "nothing".into() } else { labels.join(", ") });
+    format!("{what} {required}; specialized out: {other}")
 }

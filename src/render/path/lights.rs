@@ -10,19 +10,11 @@ use glam::{DVec3, DVec4, Vec3, Vec4};
 
 use super::light_tree::{self, Bounds, LightNode};
 use super::params::INVALID;
+use crate::interface::{LightKind as Kind, PathFeature};
 use crate::sampling::CumulativeTable;
 use crate::scene::features::{AlphaClass, alpha_classes};
 use crate::scene::flatten::FlatScene;
 use crate::scene::{AlphaMode, Geometry, Light, LightKind, Material, TriangleMesh};
-
-const POINT: u32 = 0;
-const SPOT: u32 = 1;
-const DIRECTIONAL: u32 = 2;
-const TRIANGLE: u32 = 3;
-const SPHERE: u32 = 4;
-const ENVIRONMENT: u32 = 5;
-const TREE: u32 = 6;
-const RECTANGLE: u32 = 7;
 
 /// More lights with a position than these are chosen from a tree.
 const MOST_BY_POWER: usize = 256;
@@ -104,13 +96,13 @@ impl Gathered {
 impl Lights {
     /// Nothing but an environment.
     pub fn sky_only() -> Self {
-        let record = LightRecord { kind: ENVIRONMENT, instance: INVALID, probability: 1.0, ..Default::default() };
+        let record = LightRecord { kind: Kind::Environment as u32, instance: INVALID, probability: 1.0, ..Default::default() };
         Self { records: vec![record], starts: vec![0; 2], environment: Some(0), ..Default::default() }
     }
 
-    /// A bit for each kind that there is, the first for [`POINT`].
-    pub fn kinds(&self) -> u32 {
-        self.records.iter().fold(0, |bits, r| bits | 1 << r.kind)
+    /// The kinds that there are: the first features are [`Kind::ALL`].
+    pub fn kinds(&self) -> impl Iterator<Item = PathFeature> {
+        self.records.iter().map(|r| PathFeature::ALL[r.kind as usize])
     }
 
     /// How many are chosen by power.
@@ -138,7 +130,8 @@ impl Lights {
         if environment != Vec3::ZERO {
             // what crosses the disk that the scene fills, from everywhere
             let power = 4.0 * PI.powi(2) * radius(flat).powi(2) * brightness(environment);
-            let index = all.push(LightRecord { kind: ENVIRONMENT, instance: INVALID, ..Default::default() }, power, None);
+            let index =
+                all.push(LightRecord { kind: Kind::Environment as u32, instance: INVALID, ..Default::default() }, power, None);
             lights.environment = Some(index).filter(|&k| k != INVALID);
         }
         let placed = all.bounds.len();
@@ -148,7 +141,7 @@ impl Lights {
                 record.trail = trail;
             }
             let power = all.powers[..placed].iter().sum();
-            all.push(LightRecord { kind: TREE, instance: INVALID, ..Default::default() }, power, None);
+            all.push(LightRecord { kind: Kind::Tree as u32, instance: INVALID, ..Default::default() }, power, None);
             (lights.tree, lights.first) = (nodes, placed as u32);
         }
         lights.records = all.records;
@@ -184,13 +177,17 @@ fn add_punctual(all: &mut Gathered, flat: &FlatScene, light: &Light) {
     };
     match light.kind {
         LightKind::Point => {
-            all.push(LightRecord { kind: POINT, ..base }, 4.0 * PI * brightness, Some(place(DVec3::Z, PI, 0.5 * PI)));
+            all.push(
+                LightRecord { kind: Kind::Point as u32, ..base },
+                4.0 * PI * brightness,
+                Some(place(DVec3::Z, PI, 0.5 * PI)),
+            );
         }
         LightKind::Spot { inner_angle, outer_angle } => {
             let (inner, outer) = (inner_angle.cos(), outer_angle.cos());
             // as if it fell off half-way between the two
             let solid = 2.0 * PI * (1.0 - 0.5 * f64::from(inner + outer));
-            let record = LightRecord { kind: SPOT, cos_inner: inner, cos_outer: outer, ..base };
+            let record = LightRecord { kind: Kind::Spot as u32, cos_inner: inner, cos_outer: outer, ..base };
             let (spread, reach) = (f64::from(inner_angle), f64::from(outer_angle));
             all.push(
                 record,
@@ -201,7 +198,7 @@ fn add_punctual(all: &mut Gathered, flat: &FlatScene, light: &Light) {
         LightKind::Directional { angle } => {
             // 1 - cos, without cancellation
             let one_minus_cos = 2.0 * (0.25 * f64::from(angle)).sin().powi(2);
-            let record = LightRecord { kind: DIRECTIONAL, radius: one_minus_cos as f32, ..base };
+            let record = LightRecord { kind: Kind::Directional as u32, radius: one_minus_cos as f32, ..base };
             all.push(record, PI * radius(flat).powi(2) * brightness, None);
         }
     }
@@ -254,7 +251,7 @@ fn add_surfaces(all: &mut Gathered, flat: &FlatScene) -> Vec<u32> {
                     let centre = to_world.transform_point3(s.center.as_dvec3()) - flat.origin;
                     let radius = f64::from(s.radius) * scale[0];
                     let record = LightRecord {
-                        kind: SPHERE,
+                        kind: Kind::Sphere as u32,
                         position: centre.as_vec3().to_array(),
                         radius: radius as f32,
                         primitive: primitive as u32,
@@ -296,15 +293,15 @@ fn add_triangles(
     let both_ways = base.flags & TWO_SIDED != 0;
     // a transform that mirrors turns the winding
     let turn = if base.flags & MIRRORED != 0 { -1.0 } else { 1.0 };
-    let mut push = |kind: u32, [a, e1, e2]: [DVec3; 3], primitive: usize, slack: f64| {
+    let mut push = |kind: Kind, [a, e1, e2]: [DVec3; 3], primitive: usize, slack: f64| {
         let normal = turn * e1.cross(e2);
-        let area = if kind == RECTANGLE { 1.0 } else { 0.5 } * normal.length();
+        let area = if kind == Kind::Rectangle { 1.0 } else { 0.5 } * normal.length();
         let (b, c) = (a + e1, a + e2);
-        let far = if kind == RECTANGLE { a + e1 + e2 } else { a };
+        let far = if kind == Kind::Rectangle { a + e1 + e2 } else { a };
         let extent = a.abs().max(b.abs()).max(c.abs()).max_element() + e1.abs().max(e2.abs()).max_element();
         // barycentrics follow the corners; a turned winding is a turned normal
         let record = LightRecord {
-            kind,
+            kind: kind as u32,
             position: a.as_vec3().to_array(),
             axis: e1.as_vec3().to_array(),
             edge: e2.as_vec3().to_array(),
@@ -328,13 +325,13 @@ fn add_triangles(
         let corners = mesh.indices[k].map(&point);
         let next = mesh.indices.get(k + 1).filter(|_| plain).map(|n| n.map(&point));
         if let Some((rectangle, slack)) = next.and_then(|next| rectangle(corners, next)) {
-            let index = push(RECTANGLE, rectangle, k, slack);
+            let index = push(Kind::Rectangle, rectangle, k, slack);
             of_primitives.extend([index; 2]);
             k += 2;
             continue;
         }
         let [a, b, c] = corners;
-        of_primitives.push(push(TRIANGLE, [a, b - a, c - a], k, 0.0));
+        of_primitives.push(push(Kind::Triangle, [a, b - a, c - a], k, 0.0));
         k += 1;
     }
 }

@@ -5,8 +5,8 @@
 //! queue and rays of the next bounce in another; `path_shadow` traces the first, `path_bounce` the second, and so on until a queue is
 //! empty. Every path writes to places of its own only, so images do not depend on the order in which rays arrive.
 
-mod asked;
 mod environment;
+mod features;
 mod light_tree;
 mod lights;
 mod media;
@@ -23,14 +23,13 @@ use super::camera::CameraRecord;
 use super::cover::Cover;
 use super::schedule::FilmOptions;
 use crate::error::{Error, Result};
-use crate::gpu::{Buffer, Commands, ComputePipeline, Memory, Timing};
+use crate::gpu::{Buffer, Commands, ComputePipeline, Memory, Specialization, Timing};
+use crate::interface::{MaterialFeature, PathFeature, PathFeatures};
 use crate::scene::Environment;
 use crate::scene::flatten::FlatScene;
 use crate::tracer::queue::RayQueue;
-use crate::tracer::shading::feature;
 
 use crate::tracer::{Push, Stream, Tracer};
-pub use asked::ASKED;
 use environment::DeviceEnvironment;
 use lights::Lights;
 use media::Bodies;
@@ -207,8 +206,8 @@ pub struct PathResult {
     pub lights: u32,
     /// They are so many that a tree chooses among them.
     pub light_tree: bool,
-    /// What of the shaders was compiled: bits of [`ASKED`].
-    pub asked: u32,
+    /// What of the shaders was compiled.
+    pub features: PathFeatures,
 }
 
 /// The streams that [`render`] traces and that nothing but the scene's geometry is needed for.
@@ -286,7 +285,7 @@ impl PathIntegrator {
             longest_path,
             lights: paths.lights,
             light_tree: paths.light_tree,
-            asked: paths.asked,
+            features: paths.features,
         })
     }
 }
@@ -335,7 +334,7 @@ struct Paths {
     traced: Traced,
     lights: u32,
     light_tree: bool,
-    asked: u32,
+    features: PathFeatures,
     _buffers: Vec<Buffer>,
     _environment: DeviceEnvironment,
 }
@@ -347,13 +346,13 @@ impl Paths {
         let Some(shading) = tracer.features().shading else {
             return Err(Error::Usage("paths need a tracer that was made with Needs::shading".into()));
         };
-        if shading & feature::WHITE != 0 && options.white_sky.is_none() {
+        if shading.materials.contains(MaterialFeature::White) && options.white_sky.is_none() {
             return Err(Error::Usage(
                 "a tracer that was made with Needs::white knows no materials: paths under other skies need them".into(),
             ));
         }
         let cones = options.texture_filter == TextureFilter::RayCone && options.white_sky.is_none();
-        if cones && shading & feature::RAY_CONES == 0 {
+        if cones && !shading.materials.contains(MaterialFeature::RayCones) {
             return Err(Error::Usage("ray cones need a tracer that was made with Needs::mip_levels".into()));
         }
         let most = most_rays(options.size, options.spp);
@@ -370,10 +369,11 @@ impl Paths {
             Some(_) => Lights::sky_only(),
             None => Lights::new(flat, environment.mean),
         };
-        let asked = asked::asked(options, flat, &lights, environment.map.texels != 0, cones);
-        let [has_media, has_clear_walls] = [asked::MEDIA, asked::CLEAR_WALLS].map(|bit| asked & bit != 0);
-        let asks_even_sky = asked & asked::LIGHT_SAMPLES != 0 && lights.environment.is_some() && environment.map.texels == 0;
-        let constants = asked::constants(asked);
+        let features = features::features(options, flat, &lights, environment.map.texels != 0, cones);
+        let [has_media, has_clear_walls] = [PathFeature::Media, PathFeature::ClearWalls].map(|f| features.contains(f));
+        let samples_constant_sky =
+            features.contains(PathFeature::LightSamples) && lights.environment.is_some() && environment.map.texels == 0;
+        let constants = Specialization::default().set_all(features.constants());
         let quads = |name: &str| Buffer::new(device, name, QUAD_BYTES * most as u64, Memory::Device);
         let queues = [RayQueue::new(device, most)?, RayQueue::new(device, most)?];
         let shadow_queue = RayQueue::new(device, most)?;
@@ -429,7 +429,7 @@ impl Paths {
                 true => keep(Buffer::new(device, "straight lengths of paths", STRAIGHT_BYTES * most as u64, Memory::Device)?),
                 false => 0,
             },
-            sky_densities: match asks_even_sky {
+            sky_densities: match samples_constant_sky {
                 true => keep(Buffer::new(device, "densities of the sky", SKY_DENSITY_BYTES * most as u64, Memory::Device)?),
                 false => 0,
             },
@@ -487,7 +487,7 @@ impl Paths {
             traced: Traced::default(),
             lights: if options.strategy.draws_lights() { lights.count() } else { 0 },
             light_tree: !lights.tree.is_empty(),
-            asked,
+            features,
             _buffers: buffers,
             _environment: environment,
         })
@@ -556,7 +556,7 @@ impl Paths {
         let passes = [0, 1].map(|k| self.block_params[k].address());
         let push = |fills: usize| Push { pass: passes[fills], ..push };
         // what a path goes straight through is no bounce, but it takes a launch
-        let straight = self.bodies.is_some() || self.asked & asked::CLEAR_WALLS != 0;
+        let straight = self.bodies.is_some() || self.features.contains(PathFeature::ClearWalls);
         let max_launches = if straight { self.max_depth.saturating_add(MAX_STRAIGHT) } else { self.max_depth };
         let (mut timings, mut depth, mut left, mut started) = (Vec::new(), 0, push(0).count, false);
         // vertex `depth` fills queue `depth % 2`

@@ -5,13 +5,11 @@ use super::images::Images;
 use super::settings::{Filter, Settings, Technique};
 use crate::error::Result;
 use crate::gpu::{Buffer, ComputePipeline, Recorder, Specialization};
+use crate::interface::constants;
 use crate::render::raster::{Primary, Raster, View};
 use crate::shaders::{self, LANES};
 use crate::tracer::stream::LAUNCH_RAYS;
 use crate::tracer::{Push, Stream, Tracer};
-
-/// Id of a constant of shaders/common/frame.glsl.
-const BENT: u32 = 9;
 
 /// Those of one image size and of settings.
 pub struct Passes {
@@ -33,17 +31,17 @@ impl Passes {
     pub fn new(tracer: &Tracer, size: [u32; 2], settings: &Settings, primary: Primary) -> Result<Self> {
         let device = tracer.device();
         let [gbuffer, accessibility] = Realtime::streams(settings);
-        let constants = Specialization::default().set(BENT, settings.bent.into());
+        let specialization = Specialization::default().set(constants::BENT_NORMALS, settings.bent);
         Ok(Self {
             gbuffer: match primary {
                 Primary::Traced => CameraRays::Traced(Box::new(tracer.stream(gbuffer)?)),
                 Primary::Raster => CameraRays::Drawn(Box::new(Raster::new(tracer, gbuffer, size)?)),
             },
             accessibility: tracer.stream(accessibility)?,
-            gather: shaders::GATHER.specialized(device, &constants)?,
+            gather: shaders::GATHER.specialized(device, &specialization)?,
             gtao: shaders::GTAO.pipeline(device)?,
-            temporal: shaders::TEMPORAL.specialized(device, &constants)?,
-            filter: shaders::FILTER.specialized(device, &constants)?,
+            temporal: shaders::TEMPORAL.specialized(device, &specialization)?,
+            filter: shaders::FILTER.specialized(device, &specialization)?,
         })
     }
 

@@ -1,0 +1,233 @@
+//! Sets of features: what scenes and options require of the path tracer's shaders. A feature that is not in its set is not compiled. Each set is as many
+//! words as it needs, a specialization constant each, and a feature is a `bool` in the shaders.
+
+use super::constants::{self, Constant};
+
+/// What the shaders' side is made of.
+pub(super) struct Declaration {
+    /// Its file in interface/, and its words' names in upper case.
+    pub name: &'static str,
+    /// Of the first word.
+    pub first_id: u32,
+    /// Features are in the set where nobody says what is.
+    pub is_full: bool,
+    /// In the shaders a feature is its number, to be looked up, and no `bool`.
+    pub is_indexed: bool,
+    /// Names in the shaders, and what they mean.
+    pub features: &'static [(&'static str, &'static str)],
+}
+
+macro_rules! feature_set {
+    (
+        $(#[doc = $set_about:literal])*
+        $set:ident of $(#[doc = $feature_about:literal])* $feature:ident: $file:literal, from $first:expr, full $is_full:literal, indexed $is_indexed:literal, $declaration:ident;
+        $($variant:ident = $name:literal, $label:literal;)*
+    ) => {
+        $(#[doc = $feature_about])*
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+        #[allow(missing_docs, reason = "label() says what each is")]
+        pub enum $feature {
+            $($variant,)*
+        }
+
+        impl $feature {
+            /// All of them, in order.
+            pub const ALL: &'static [Self] = &[$(Self::$variant,)*];
+
+            /// What it is, in words.
+            pub fn label(self) -> &'static str {
+                match self {
+                    $(Self::$variant => $label,)*
+                }
+            }
+        }
+
+        $(#[doc = $set_about])*
+        #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+        pub struct $set {
+            words: [u32; Self::WORDS],
+        }
+
+        impl $set {
+            const WORDS: usize = $feature::ALL.len().div_ceil(32);
+
+            /// Is it in the set?
+            pub fn contains(self, feature: $feature) -> bool {
+                self.words[feature as usize / 32] >> (feature as u32 % 32) & 1 == 1
+            }
+
+            /// Adds it.
+            pub fn insert(&mut self, feature: $feature) {
+                self.words[feature as usize / 32] |= 1 << (feature as u32 % 32);
+            }
+
+            /// Adds it if `required`.
+            pub fn insert_if(&mut self, required: bool, feature: $feature) {
+                if required {
+                    self.insert(feature);
+                }
+            }
+
+            /// The specialization constants that say it to shaders, with their values.
+            pub fn constants(self) -> impl Iterator<Item = (Constant, u32)> {
+                self.words.into_iter().zip($first..).map(|(word, id)| (Constant { id }, word))
+            }
+
+            /// Words of what is in the set, and of what is not.
+            pub fn labels(self) -> [Vec<&'static str>; 2] {
+                [true, false].map(|there| {
+                    $feature::ALL.iter().filter(|&&f| self.contains(f) == there).map(|f| f.label()).collect()
+                })
+            }
+        }
+
+        impl FromIterator<$feature> for $set {
+            fn from_iter<I: IntoIterator<Item = $feature>>(features: I) -> Self {
+                let mut set = Self::default();
+                features.into_iter().for_each(|f| set.insert(f));
+                set
+            }
+        }
+
+        pub(super) const $declaration: Declaration =
+            Declaration { name: $file, first_id: $first, is_full: $is_full, is_indexed: $is_indexed, features: &[$(($name, $label),)*] };
+    };
+}
+
+const MATERIAL_FIRST: u32 = constants::ALL.len() as u32;
+const TEXTURE_FIRST: u32 = MATERIAL_FIRST + MaterialFeatures::WORDS as u32;
+const PATH_FIRST: u32 = TEXTURE_FIRST + TextureFeatures::WORDS as u32;
+
+feature_set! {
+    /// What the materials of a scene require.
+    MaterialFeatures of /// What a material may require of shaders.
+    MaterialFeature: "material_features", from MATERIAL_FIRST, full true, indexed false, MATERIAL;
+    Diffuse = "HAS_DIFFUSE", "Lambert";
+    Gltf = "HAS_GLTF", "metallic-roughness";
+    Conductor = "HAS_CONDUCTOR", "conductors";
+    Glass = "HAS_GLASS", "glass";
+    Mirror = "HAS_MIRROR", "mirrors";
+    Unlit = "HAS_UNLIT", "unlit surfaces";
+    Clearcoat = "HAS_CLEARCOAT", "clearcoat";
+    Sheen = "HAS_SHEEN", "sheen";
+    ThinWalls = "HAS_THIN_WALLS", "thin walls that transmit";
+    Volumes = "HAS_VOLUMES", "volumes";
+    Absorption = "HAS_ABSORPTION", "absorption";
+    Anisotropy = "HAS_ANISOTROPY", "anisotropy";
+    BaseColors = "HAS_BASE_COLORS", "base colours that vary over a surface";
+    Emission = "HAS_EMISSION", "emissive surfaces";
+    Compensation = "HAS_COMPENSATION", "energy compensation";
+    ShadingNormals = "HAS_SHADING_NORMALS", "shading normals";
+    White = "IS_WHITE", "white surfaces";
+    RayCones = "HAS_RAY_CONES", "ray cones";
+}
+
+feature_set! {
+    /// Which textures the materials of a scene have.
+    TextureFeatures of /// Textures of a material beside its base colour's; numbered as the slots of a material.
+    TextureFeature: "texture_features", from TEXTURE_FIRST, full true, indexed true, TEXTURE;
+    MetallicRoughness = "USE_METALLIC_ROUGHNESS", "metallic-roughness";
+    Emission = "USE_EMISSION", "emissive";
+    Normal = "USE_NORMAL", "normal";
+    Clearcoat = "USE_CLEARCOAT", "clearcoat";
+    ClearcoatRoughness = "USE_CLEARCOAT_ROUGHNESS", "clearcoat roughness";
+    ClearcoatNormal = "USE_CLEARCOAT_NORMAL", "clearcoat normal";
+    SheenColor = "USE_SHEEN", "sheen colour";
+    SheenRoughness = "USE_SHEEN_ROUGHNESS", "sheen roughness";
+    Transmission = "USE_TRANSMISSION", "transmission";
+    Specular = "USE_SPECULAR", "specular";
+    SpecularColor = "USE_SPECULAR_COLOR", "specular colour";
+    Anisotropy = "USE_ANISOTROPY", "anisotropy";
+    Occlusion = "USE_OCCLUSION", "occlusion";
+}
+
+feature_set! {
+    /// What the lights of a scene and the options of a render require of paths.
+    PathFeatures of /// What lights and options may require of paths. The first are the kinds of lights that are sampled, numbered as [`super::LightKind`].
+    PathFeature: "path_features", from PATH_FIRST, full false, indexed false, PATH;
+    PointLights = "WITH_POINT_LIGHTS", "point lights";
+    SpotLights = "WITH_SPOT_LIGHTS", "spot lights";
+    DirectionalLights = "WITH_DIRECTIONAL_LIGHTS", "directional lights";
+    TriangleLights = "WITH_TRIANGLE_LIGHTS", "emissive triangles";
+    SphereLights = "WITH_SPHERE_LIGHTS", "emissive spheres";
+    Environment = "WITH_ENVIRONMENT", "environment light";
+    LightTree = "WITH_LIGHT_TREE", "light tree";
+    RectangleLights = "WITH_RECTANGLE_LIGHTS", "emissive rectangles";
+    LightChoice = "WITH_LIGHT_CHOICE", "a choice among lights";
+    EnvironmentMap = "WITH_ENVIRONMENT_MAP", "environment map";
+    LightSamples = "WITH_LIGHT_SAMPLES", "light samples";
+    Mis = "WITH_MIS", "multiple importance sampling";
+    CosineSampling = "WITH_COSINE_SAMPLING", "cosine hemisphere sampling";
+    UniformSampling = "WITH_UNIFORM_SAMPLING", "uniform hemisphere sampling";
+    ConstantAlbedo = "WITH_CONSTANT_ALBEDO", "constant albedo";
+    View = "WITH_VIEW", "auxiliary view";
+    Clamp = "WITH_CLAMP", "radiance clamp";
+    Lens = "WITH_LENS", "thin lens";
+    PixelFilter = "WITH_PIXEL_FILTER", "pixel filter";
+    RayCones = "WITH_RAY_CONES", "ray cones";
+    DistantDisks = "WITH_DISTANT_DISKS", "directional lights of angular diameter above 0";
+    Media = "WITH_MEDIA", "volumes that absorb or nest";
+    ClearWalls = "WITH_CLEAR_WALLS", "thin walls that light passes straight";
+}
+
+/// What of the path tracer's shaders a scene requires.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub struct ShadingFeatures {
+    /// Of its materials.
+    pub materials: MaterialFeatures,
+    /// Of their textures.
+    pub textures: TextureFeatures,
+}
+
+/// All sets.
+pub(super) const SETS: [&Declaration; 3] = [&MATERIAL, &TEXTURE, &PATH];
+
+#[cfg(test)]
+mod tests {
+    use super::super::LightKind;
+    use super::*;
+
+    #[test]
+    fn sets_hold_what_was_put_in() {
+        let set: PathFeatures = [PathFeature::PointLights, PathFeature::ClearWalls].into_iter().collect();
+        for &feature in PathFeature::ALL {
+            assert_eq!(
+                set.contains(feature),
+                matches!(feature, PathFeature::PointLights | PathFeature::ClearWalls),
+                "{feature:?}"
+            );
+        }
+        assert_eq!(set.labels()[0], ["point lights", "thin walls that light passes straight"]);
+        assert_eq!(set.constants().map(|c| c.1).collect::<Vec<_>>(), [1 | 1 << 22]);
+    }
+
+    /// No two constants have one number: those by name, then the words of each set.
+    #[test]
+    fn numbers_are_given_out_once() {
+        let mut ids: Vec<u32> = (0..constants::ALL.len() as u32).collect();
+        ids.extend(MaterialFeatures::default().constants().map(|c| c.0.id));
+        ids.extend(TextureFeatures::default().constants().map(|c| c.0.id));
+        ids.extend(PathFeatures::default().constants().map(|c| c.0.id));
+        assert!(ids.iter().copied().eq(0..ids.len() as u32), "{ids:?}");
+    }
+
+    #[test]
+    fn kinds_of_lights_are_the_first_features_of_paths() {
+        let kinds = [
+            (LightKind::Point, PathFeature::PointLights),
+            (LightKind::Spot, PathFeature::SpotLights),
+            (LightKind::Directional, PathFeature::DirectionalLights),
+            (LightKind::Triangle, PathFeature::TriangleLights),
+            (LightKind::Sphere, PathFeature::SphereLights),
+            (LightKind::Environment, PathFeature::Environment),
+            (LightKind::Tree, PathFeature::LightTree),
+            (LightKind::Rectangle, PathFeature::RectangleLights),
+        ];
+        assert_eq!(kinds.len(), LightKind::ALL.len());
+        assert!(
+            kinds
+                .iter()
+                .all(|&(kind, feature)| kind as usize == feature as usize && PathFeature::ALL[kind as usize] == feature)
+        );
+    }
+}
