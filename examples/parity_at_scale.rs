@@ -19,7 +19,7 @@ use skylit::measure::ray_sets::{leak_rays, leak_scenes, mixed_rays};
 use skylit::oracle::Oracle;
 use skylit::oracle::rounding::Rounding;
 use skylit::ray::{Hit, Ray};
-use skylit::render::Uncontrolled;
+use skylit::render::NoControl;
 use skylit::render::camera::{self, Choice};
 use skylit::render::rays::{Mode, trace};
 use skylit::scene::flatten::FlatScene;
@@ -206,7 +206,7 @@ fn tracer(subject: &Subject, flat: &FlatScene) -> Result<Tracer> {
 }
 
 fn answers(tracer: &Tracer, rays: &[Ray], mode: Mode) -> Result<Vec<Hit>> {
-    Ok(trace(tracer, rays, mode, 1, &mut Uncontrolled)?.0)
+    Ok(trace(tracer, rays, mode, 1, &mut NoControl)?.0)
 }
 
 fn row(scene: &str, subject: &Subject, tally: &Tally) {

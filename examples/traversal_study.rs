@@ -17,7 +17,7 @@ use skylit::measure::ray_sets::leak_rays;
 use skylit::measure::stats::median;
 use skylit::oracle::Oracle;
 use skylit::ray::Ray;
-use skylit::render::Uncontrolled;
+use skylit::render::NoControl;
 use skylit::render::ao::{self, AoOptions};
 use skylit::render::camera::{self, CameraRecord, Choice};
 use skylit::render::rays::{Mode, trace};
@@ -150,7 +150,7 @@ fn streams(device: &Arc<Device>, flat: &FlatScene, arguments: &Arguments) -> Res
     let camera = CameraRecord::new(&camera::choose(flat.scene, &choice, aspect)?, flat.origin, aspect);
     let tracer = Tracer::new(device, TracerKind::Compute, flat, Needs::default())?;
     let options = AoOptions { size, spp: 1, keep_rays: true, ..Default::default() };
-    let kept = ao::render(&tracer, &camera, &options, &mut Uncontrolled)?;
+    let kept = ao::render(&tracer, &camera, &options, &mut NoControl)?;
     let bounce: Vec<_> = kept.kept_occlusion.into_iter().filter(|r| r.tmax > r.tmin).collect();
     Ok([
         RayStream { name: "camera", mode: Mode::Closest, rays: kept.kept_primary },
@@ -178,7 +178,7 @@ fn measure(tracers: &[Tracer], streams: &[RayStream], limits: &[usize], rounds: 
                 if rays.is_empty() {
                     return Err(Error::Scene("the camera sees nothing: give --eye and --target".into()));
                 }
-                let (_, times) = trace(tracer, rays, stream.mode, 1, &mut Uncontrolled)?;
+                let (_, times) = trace(tracer, rays, stream.mode, 1, &mut NoControl)?;
                 seconds[k][s].extend(times.device.iter().map(|t| t / rays.len() as f64));
             }
         }
@@ -294,7 +294,7 @@ fn leaks(device: &Arc<Device>) -> Result<()> {
             for (count, triangle_test) in counts.iter_mut().zip(TESTS) {
                 let options = ComputeOptions { kernel, triangle_test };
                 let tracer = Tracer::with_options(device, TracerKind::Compute, &flat, Needs::default(), options)?;
-                let (hits, _) = trace(&tracer, &rays, Mode::Closest, 1, &mut Uncontrolled)?;
+                let (hits, _) = trace(&tracer, &rays, Mode::Closest, 1, &mut NoControl)?;
                 *count = hits.iter().filter(|h| !h.is_hit()).count();
             }
             println!("| {name} | {} | {kernel} | {} | {} |", rays.len(), counts[0], counts[1]);

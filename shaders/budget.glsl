@@ -2,8 +2,8 @@
 //
 // The variance of a pixel's mean is v / n: of one sample, by the samples that its history has. Its sum over the image is least when n is
 // in proportion to sqrt(v) (Neyman, "On the Two Different Aspects of the Representative Method", 1934), so a pixel with n samples wants
-// level * sqrt(v) - n more, between none and the most that a frame gives it; the level is where these wishes meet the budget. It is found
-// in two rounds, each of which adds up the wishes of one of sixteen pixels at 64 levels; integers, so that the sum does not depend on the
+// level * sqrt(v) - n more, between none and the most that a frame gives it; the level is where these desired_samples meet the budget. It is found
+// in two rounds, each of which adds up the desired_samples of one of sixteen pixels at 64 levels; integers, so that the sum does not depend on the
 // order.
 //
 // Samples that decide how many follow them bias a mean (Kirk and Arvo, "Unbiased Sampling Techniques for Image Synthesis", SIGGRAPH
@@ -92,13 +92,13 @@ void main() {
     BudgetSums sums = BudgetSums(f.budget_sums);
     uint k = gl_GlobalInvocationID.x, lane = gl_LocalInvocationID.x, stage = push.sample_index;
     if (stage == STAGE_WISHES) {
-        STORE_PAIR(f.wishes, k, floatBitsToUint(wish_of(f, tile_pixel(f, k))));
+        STORE_PAIR(f.desired_samples, k, floatBitsToUint(wish_of(f, tile_pixel(f, k))));
         return;
     }
     if (stage == STAGE_COARSE || stage == STAGE_FINE) {
         // one of sixteen in a row, another in each frame, speaks for all
         uint place = 16u * k + (hash_combine(k, f.frame) & 15u);
-        tile[lane] = place < push.count ? uintBitsToFloat(LOAD_PAIR(f.wishes, place)) : vec2(0.0);
+        tile[lane] = place < push.count ? uintBitsToFloat(LOAD_PAIR(f.desired_samples, place)) : vec2(0.0);
         barrier();
     }
     if (stage == STAGE_COARSE) {
@@ -124,7 +124,7 @@ void main() {
         return;
     }
     uvec2 pixel = tile_pixel(f, k);
-    vec2 wish = uintBitsToFloat(LOAD_PAIR(f.wishes, k));
+    vec2 wish = uintBitsToFloat(LOAD_PAIR(f.desired_samples, k));
     uint fine = crossing(sums, SUMS_FINE, target, lane);
     float level = high;
     if (fine < 64u) {
@@ -154,7 +154,7 @@ void main() {
     FrameWords taken = FrameWords(f.taken);
     uint first = f.has_history != 0u ? taken.v[at] : 0u;
     taken.v[at] = first + count;
-    float most = min(full * abs(wish.x), MOST_CAP);
+    float most = min(full * abs(wish.x), MAX_CAP);
     STORE_PAIR(f.plan, at, uvec2(first << 8 | count, floatBitsToUint(most)));
     FrameWords list = FrameWords(f.list);
     for (uint j = 0u; j < count; j++) list.v[list_begin + before + j] = at << 4 | j;

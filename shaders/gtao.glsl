@@ -9,9 +9,9 @@ layout(local_size_x = LANES) in;
 
 const float PI = 3.14159265359;
 // The first step leaves the pixel itself, pixels.
-const float LEAST_STEP = 1.3;
+const float MIN_STEP = 1.3;
 // Sine of the angle above a surface's plane from which on something stands on it.
-const float LEAST_RISE = 1e-3;
+const float MIN_RISE = 1e-3;
 
 float arc(float cos_n, float n, float h) {
     return 0.25 * (cos_n + 2.0 * h * sin(n) - cos(2.0 * h - n));
@@ -71,7 +71,7 @@ void main() {
             float search = min(radius, to_border(f, centre, sgn * along));
             for (uint k = 0u; k < f.steps; k++) {
                 float s = (float(k) + u.y) / float(f.steps);
-                vec2 q = centre + sgn * along * max(s * s * search, LEAST_STEP + float(k));
+                vec2 q = centre + sgn * along * max(s * s * search, MIN_STEP + float(k));
                 if (any(lessThan(q, vec2(0.0))) || any(greaterThanEqual(q, vec2(f.size)))) break;
                 uvec2 tap = uvec2(q);
                 float there = uintBitsToFloat(Pairs(f.guide).v[image_index(f, tap)].x);
@@ -79,7 +79,7 @@ void main() {
                 vec3 delta = unproject(orthographic, image_plane(f, f.view, vec2(tap) + 0.5), there) - p;
                 float d = length(delta);
                 // what lies in the surface's own plane is no horizon: a pixel's middle is beside the slice, where a slanting plane is higher
-                if (dot(delta, normal) <= LEAST_RISE * d) continue;
+                if (dot(delta, normal) <= MIN_RISE * d) continue;
                 horizon = max(horizon, mix(low, dot(delta, v) / d, weight(f, d)));
             }
             float h = sgn * acos(clamp(horizon, -1.0, 1.0));

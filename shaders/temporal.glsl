@@ -11,7 +11,7 @@
 layout(local_size_x = LANES) in;
 
 // Samples' variance is at least this where it is not known yet: a handful of equal ones say little.
-const float LEAST_VARIANCE = 0.02;
+const float MIN_VARIANCE = 0.02;
 // Half side of the neighbourhood that a history is held to, pixels.
 const int CLAMP_RADIUS = 3;
 
@@ -64,7 +64,7 @@ Estimate surroundings(FrameParams f, ivec2 pixel, EdgeTest edge) {
     }
     if (n == 0.0) return Estimate(0.0, 0.0, 0.0);
     float mean = sum / n;
-    return Estimate(mean, n, (max(squares / n - mean * mean, 0.0) + LEAST_VARIANCE) / n);
+    return Estimate(mean, n, (max(squares / n - mean * mean, 0.0) + MIN_VARIANCE) / n);
 }
 
 // The history of a surface's point; no samples: there is none. `bent`: that of its bent normal.
@@ -130,7 +130,7 @@ void main() {
             past = reprojected(f, before, normal, guide.y >> 24, bent);
             float change = f.moved_count > 0u && past.samples > 0.0 ? f.moved_weight * possible_change(f, position, normal) : 0.0;
             if (change > 0.0) {
-                past.samples /= 1.0 + past.samples * change * change / max(past.variance, LEAST_VARIANCE);
+                past.samples /= 1.0 + past.samples * change * change / max(past.variance, MIN_VARIANCE);
                 if (f.clamp_width > 0.0) {
                     uvec2 pixel = uvec2(at % f.size.x, at / f.size.x);
                     EdgeTest edge = edge_test(f, f.world_to_camera, f.view, f.orthographic != 0u, position, normal, vec2(pixel) + 0.5);

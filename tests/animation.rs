@@ -12,7 +12,7 @@ use skylit::measure::ray_sets::random_rays;
 use skylit::oracle::Oracle;
 use skylit::oracle::rounding::Rounding;
 use skylit::ray::{Hit, Ray};
-use skylit::render::Uncontrolled;
+use skylit::render::NoControl;
 use skylit::render::rays::{Mode, trace};
 use skylit::scene::animation::{Animation, Channel, Interpolation, Local, Node, Parts, Playback, Pose, Property, Sampler};
 use skylit::scene::builtin::by_name;
@@ -23,7 +23,7 @@ use skylit::tracer::{Tracer, TracerKind};
 const RAYS: usize = 30_000;
 
 fn closest(tracer: &Tracer, rays: &[Ray]) -> Vec<Hit> {
-    trace(tracer, rays, Mode::Closest, 1, &mut Uncontrolled).unwrap().0
+    trace(tracer, rays, Mode::Closest, 1, &mut NoControl).unwrap().0
 }
 
 /// Plays `animation` at these times. Returns for each the share of rays that the pose before would have answered otherwise.

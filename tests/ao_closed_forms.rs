@@ -17,7 +17,7 @@ use skylit::gpu::Device;
 use skylit::oracle::camera::camera_ray;
 use skylit::oracle::closed_form as exact;
 use skylit::oracle::{Oracle, OracleRay};
-use skylit::render::Uncontrolled;
+use skylit::render::NoControl;
 use skylit::render::ao::{self, AoOptions, AoResult};
 use skylit::render::camera::CameraRecord;
 use skylit::scene::builtin::{self, Placement, analytic, shapes};
@@ -26,7 +26,7 @@ use skylit::tracer::{Tracer, TracerKind};
 
 fn render(tracer: &Tracer, scene: &Scene, camera: &Camera, options: &AoOptions) -> AoResult {
     let record = CameraRecord::new(camera, scene.origin(), options.size[0] as f64 / options.size[1] as f64);
-    ao::render(tracer, &record, options, &mut Uncontrolled).unwrap_or_else(|e| panic!("{}: {e}", tracer.kind()))
+    ao::render(tracer, &record, options, &mut NoControl).unwrap_or_else(|e| panic!("{}: {e}", tracer.kind()))
 }
 
 /// What an image should show.

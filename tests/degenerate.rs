@@ -18,7 +18,7 @@ use skylit::ray::{Hit, Ray};
 use skylit::render::ao::{self, AoOptions};
 use skylit::render::camera::CameraRecord;
 use skylit::render::rays::{Mode, trace};
-use skylit::render::{Uncontrolled, aov};
+use skylit::render::{NoControl, aov};
 use skylit::sampling::sobol::hash_combine;
 use skylit::sampling::to_unit;
 use skylit::scene::flatten::FlatScene;
@@ -61,7 +61,7 @@ fn random_point(i: u32, k: u32) -> DVec3 {
 }
 
 fn hits(tracer: &Tracer, rays: &[Ray], mode: Mode) -> Vec<Hit> {
-    trace(tracer, rays, mode, 1, &mut Uncontrolled).unwrap_or_else(|e| panic!("{}: {e}", tracer.kind())).0
+    trace(tracer, rays, mode, 1, &mut NoControl).unwrap_or_else(|e| panic!("{}: {e}", tracer.kind())).0
 }
 
 /// Every tracer against the oracle without its tree; also makes a small image and its outputs, which must be numbers.
@@ -97,11 +97,11 @@ fn picture(tracer: &Tracer, scene: &Scene, what: &dyn std::fmt::Display) {
     let camera = CameraRecord::new(&Camera::framing(lo, hi, 1.0), scene.origin(), 1.0);
     for falloff in [1.0, 4.0] {
         let options = AoOptions { size: [16, 16], spp: 2, falloff, ..Default::default() };
-        let image = ao::render(tracer, &camera, &options, &mut Uncontrolled).unwrap();
+        let image = ao::render(tracer, &camera, &options, &mut NoControl).unwrap();
         let all = image.film.mean.iter().chain(&image.film.variance);
         assert!(all.clone().all(|x| (0.0..=1.0).contains(x)), "{what} {}: {all:?}", tracer.kind());
     }
-    for pixel in aov::render(tracer, &camera, [16, 16], &mut Uncontrolled).unwrap() {
+    for pixel in aov::render(tracer, &camera, [16, 16], &mut NoControl).unwrap() {
         let numbers = [pixel.position, pixel.ng, pixel.ns, [pixel.red, pixel.green, pixel.blue]];
         assert!(numbers.as_flattened().iter().all(|x| x.is_finite()) && !pixel.depth.is_nan(), "{what}: {pixel:?}");
     }
@@ -353,7 +353,7 @@ fn coincident(count: u32) {
         let start = std::time::Instant::now();
         let tracer = tracer(&device, kind, &scene);
         let built = start.elapsed();
-        let traced = trace(&tracer, &rays, Mode::Closest, 1, &mut Uncontrolled);
+        let traced = trace(&tracer, &rays, Mode::Closest, 1, &mut NoControl);
         // Mesa 22.3 leaves loops after 65,535 turns: then the right answer is to say so
         if let Err(Error::Vulkan(message)) = &traced
             && message.contains("cut the traversal")
@@ -457,7 +457,7 @@ fn gpu_degenerate_slivers_do_not_meet_themselves() {
                 let tracer = tracer(&device, kind, &scene);
                 let options = AoOptions { size: [128, 128], spp: 32, ..Default::default() };
                 let image =
-                    ao::render(&tracer, &CameraRecord::new(&camera, scene.origin(), 1.0), &options, &mut Uncontrolled).unwrap();
+                    ao::render(&tracer, &CameraRecord::new(&camera, scene.origin(), 1.0), &options, &mut NoControl).unwrap();
                 // a convex body does not occlude itself
                 let covered: f64 = image.film.coverage.iter().map(|&c| c as f64 * 32.0).sum();
                 let off: f64 =

@@ -13,7 +13,7 @@ use skylit::measure::ray_sets::{leak_rays, random_rays};
 use skylit::oracle::Oracle;
 use skylit::oracle::rounding::Rounding;
 use skylit::ray::{Hit, Ray};
-use skylit::render::Uncontrolled;
+use skylit::render::NoControl;
 use skylit::render::rays::{Mode, trace};
 use skylit::scene::builtin::{by_name, shapes};
 use skylit::scene::flatten::{FlatScene, Motion};
@@ -41,7 +41,7 @@ fn positions_mut(scene: &mut Scene, mesh: usize) -> &mut [Vec3] {
 }
 
 fn closest(tracer: &Tracer, rays: &[Ray]) -> Vec<Hit> {
-    trace(tracer, rays, Mode::Closest, 1, &mut Uncontrolled).unwrap().0
+    trace(tracer, rays, Mode::Closest, 1, &mut NoControl).unwrap().0
 }
 
 /// A scene, what of it moves, and a tracer that follows.
@@ -91,7 +91,7 @@ impl Follower {
         // without the update the judge would have seen it
         let report = judge_closest(&oracle, &rays, &stale, &truth, rounding);
         assert!(report.unexplained_fraction() > 1e-3, "{kind} step {}: hardly anything moved", self.steps);
-        let (any, _) = trace(&self.tracer, &rays, Mode::Any, 1, &mut Uncontrolled).unwrap();
+        let (any, _) = trace(&self.tracer, &rays, Mode::Any, 1, &mut NoControl).unwrap();
         let differ = any.iter().zip(&hits).filter(|(a, h)| a.is_hit() != h.is_hit()).count();
         assert!(differ <= RAYS / 10_000, "{differ} rays to any hit differ");
         self.steps += 1;

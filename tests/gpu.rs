@@ -21,7 +21,7 @@ use skylit::render::aov::{self, AovPixel};
 use skylit::render::block::Block;
 use skylit::render::camera::CameraRecord;
 use skylit::render::cover::Cover;
-use skylit::render::{Control, Uncontrolled};
+use skylit::render::{Control, NoControl};
 use skylit::sampling::sobol::hash_combine;
 use skylit::sampling::{AO_DIRECTION, CAMERA_FILM, Sampler, to_unit, warp};
 use skylit::scene::builtin::{Placement, analytic, by_name, shapes};
@@ -38,7 +38,7 @@ fn record(scene: &Scene, camera: &Camera, size: [u32; 2]) -> CameraRecord {
 }
 
 fn render(tracer: &Tracer, scene: &Scene, camera: &Camera, options: &AoOptions) -> AoResult {
-    ao::render(tracer, &record(scene, camera, options.size), options, &mut Uncontrolled)
+    ao::render(tracer, &record(scene, camera, options.size), options, &mut NoControl)
         .unwrap_or_else(|e| panic!("{}: {e}", tracer.kind()))
 }
 
@@ -691,7 +691,7 @@ fn gpu_auxiliary_outputs_equal_the_oracles() {
             for kind in tracers(&device) {
                 let what = format!("{name}{view} {kind}");
                 let tracer = tracer(&device, kind, scene);
-                let got = aov::render(&tracer, &record(scene, camera, size), size, &mut Uncontrolled).unwrap();
+                let got = aov::render(&tracer, &record(scene, camera, size), size, &mut NoControl).unwrap();
                 let far = |a: [f32; 3], b: [f32; 3]| {
                     let d = [0, 1, 2].map(|k| (a[k] - b[k]).abs());
                     // NaN counts as far

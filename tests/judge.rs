@@ -25,7 +25,7 @@ use serde::Deserialize;
 use skylit::cli::lights;
 use skylit::gpu::Device;
 use skylit::output::exr;
-use skylit::render::Uncontrolled;
+use skylit::render::NoControl;
 use skylit::render::camera::CameraRecord;
 use skylit::render::path::{Lens, MOST_DEPTH, PathIntegrator, PathOptions};
 use skylit::scene::builtin::shapes;
@@ -206,7 +206,7 @@ impl Entry {
             // scenes that look alike must not have the same noise
             let seed = self.name.bytes().fold(block, |h, b| h.wrapping_mul(31).wrapping_add(b.into()));
             let film = integrator
-                .render(&tracer, &camera, options.spp, seed, &mut Uncontrolled)
+                .render(&tracer, &camera, options.spp, seed, &mut NoControl)
                 .unwrap_or_else(|e| panic!("{}, {kind}: {e}", self.name));
             let film = film.image.film;
             assert_eq!(film.not_finite, 0, "{}, {kind}: samples that are no numbers", self.name);

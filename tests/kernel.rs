@@ -13,7 +13,7 @@ use skylit::measure::ray_sets::{mixed_rays, narrow, random_rays};
 use skylit::oracle::rounding::Rounding;
 use skylit::oracle::{Oracle, OracleRay};
 use skylit::ray::{Hit, Ray};
-use skylit::render::Uncontrolled;
+use skylit::render::NoControl;
 use skylit::render::ao::{self, AoOptions};
 use skylit::render::camera::CameraRecord;
 use skylit::render::rays::{Mode, trace};
@@ -53,7 +53,7 @@ fn ray(origin: DVec3, direction: DVec3) -> Ray {
 }
 
 fn hits(tracer: &Tracer, rays: &[Ray], mode: Mode) -> Vec<Hit> {
-    trace(tracer, rays, mode, 1, &mut Uncontrolled).unwrap_or_else(|e| panic!("{}: {e}", tracer.kind())).0
+    trace(tracer, rays, mode, 1, &mut NoControl).unwrap_or_else(|e| panic!("{}: {e}", tracer.kind())).0
 }
 
 /// No tracer's answer to any ray is unexplained: nearest, its weights, any.
@@ -333,7 +333,7 @@ fn gpu_kernel_empty_queues() {
             for (towards, seen) in [(target, true), (eye * 2.0 - target, false)] {
                 let camera = CameraRecord::new(&Camera::look_at(eye, towards, DVec3::Y, 0.3), scene.origin(), 1.0);
                 let options = AoOptions { size: [70, 33], spp: 3, falloff, ..Default::default() };
-                let image = ao::render(&tracer, &camera, &options, &mut Uncontrolled).unwrap();
+                let image = ao::render(&tracer, &camera, &options, &mut NoControl).unwrap();
                 let covered = image.film.coverage.iter().filter(|&&c| c > 0.0).count();
                 assert_eq!(covered > 0, seen, "{kind}: {covered} pixels covered");
                 assert_eq!(image.occlusion_rays > 0, seen, "{kind}: {} occlusion rays", image.occlusion_rays);

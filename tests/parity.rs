@@ -11,7 +11,7 @@ use skylit::oracle::Oracle;
 use skylit::oracle::rounding::Rounding;
 use skylit::ray::Ray;
 use skylit::render::rays::{Mode, trace};
-use skylit::render::{Uncontrolled, camera};
+use skylit::render::{NoControl, camera};
 use skylit::scene::Scene;
 use skylit::scene::builtin::by_name;
 use skylit::scene::flatten::FlatScene;
@@ -55,7 +55,7 @@ fn gate_of(device: &Arc<Device>, name: &str, scene: &Scene, total: usize, all: &
             Some(o) => format!("{kind} ({})", o.kernel),
             None => kind.to_string(),
         };
-        let (hits, _) = trace(&tracer, &rays, Mode::Closest, 1, &mut Uncontrolled).unwrap();
+        let (hits, _) = trace(&tracer, &rays, Mode::Closest, 1, &mut NoControl).unwrap();
         let report = judge_closest(&oracle, &rays, &hits, &truth, rounding);
         println!("{name} {kind} closest against the oracle: {report}");
         assert!(report.unexplained_fraction() <= BOUND, "{name} {kind}: {report}");
@@ -64,7 +64,7 @@ fn gate_of(device: &Arc<Device>, name: &str, scene: &Scene, total: usize, all: &
         assert!(report.ties < report.rays / 50, "{name} {kind}: {report}");
         let report = judge_weights(&oracle, &rays, &hits, rounding);
         assert!(report.unexplained_fraction() <= BOUND, "{name} {kind} weights: {report}");
-        let (any, _) = trace(&tracer, &rays, Mode::Any, 1, &mut Uncontrolled).unwrap();
+        let (any, _) = trace(&tracer, &rays, Mode::Any, 1, &mut NoControl).unwrap();
         let any: Vec<bool> = any.iter().map(|h| h.is_hit()).collect();
         let report = judge_any(&oracle, &rays, &any, &occluded, rounding);
         println!("{name} {kind} any     against the oracle: {report}");
@@ -151,7 +151,7 @@ fn gpu_parity_of_builds() {
             let build = BuildOptions { preset: Some(preset), ..Default::default() };
             let (flat, options) = (FlatScene::new(&scene), ComputeOptions::default());
             let t = Tracer::with_build(&device, TracerKind::Compute, &flat, common::ALL, options, &build).unwrap();
-            let hits = trace(&t, &rays, mode, 1, &mut Uncontrolled).unwrap().0;
+            let hits = trace(&t, &rays, mode, 1, &mut NoControl).unwrap().0;
             hits.iter().map(|h| if mode == Mode::Any { h.is_hit() as u32 } else { h.t.to_bits() }).collect::<Vec<_>>()
         };
         for mode in [Mode::Closest, Mode::Any] {
@@ -175,7 +175,7 @@ fn gpu_parity_without_int64() {
     let rays = ray_set(&oracle, &scene, 100_000);
     let hits = |d: &Arc<Device>| {
         let t = tracer(d, TracerKind::Compute, &scene);
-        trace(&t, &rays, Mode::Closest, 1, &mut Uncontrolled).unwrap().0
+        trace(&t, &rays, Mode::Closest, 1, &mut NoControl).unwrap().0
     };
     assert_eq!(hits(&narrow), hits(&wide));
     assert_validation_clean(&narrow);
@@ -194,8 +194,8 @@ fn gpu_nothing_leaks() {
         for (kind, kernel) in tracers(&device).into_iter().flat_map(|kind| kernels(kind).into_iter().map(move |k| (kind, k))) {
             let flat = FlatScene::new(&scene);
             let tracer = Tracer::with_options(&device, kind, &flat, common::ALL, kernel).unwrap();
-            let (any, _) = trace(&tracer, &rays, Mode::Any, 1, &mut Uncontrolled).unwrap();
-            let (closest, _) = trace(&tracer, &rays, Mode::Closest, 1, &mut Uncontrolled).unwrap();
+            let (any, _) = trace(&tracer, &rays, Mode::Any, 1, &mut NoControl).unwrap();
+            let (closest, _) = trace(&tracer, &rays, Mode::Closest, 1, &mut NoControl).unwrap();
             let leaks = |hits: &[skylit::ray::Hit]| hits.iter().filter(|h| !h.is_hit()).count();
             let (a, c) = (leaks(&any), leaks(&closest));
             println!("{what}, {kind} ({kernel}): {a} leaks of {} any, {c} closest", rays.len());
@@ -222,7 +222,7 @@ fn gpu_the_other_triangle_test_leaks() {
         let tracer =
             Tracer::with_options(&device, TracerKind::Compute, &FlatScene::new(&sphere), common::ALL, options).unwrap();
         assert_eq!(tracer.compute_options(), Some(options));
-        let hits = |rays: &[Ray]| trace(&tracer, rays, Mode::Closest, 1, &mut Uncontrolled).unwrap().0;
+        let hits = |rays: &[Ray]| trace(&tracer, rays, Mode::Closest, 1, &mut NoControl).unwrap().0;
         let leaks = hits(&edges).iter().filter(|h| !h.is_hit()).count();
         let differ = hits(&anywhere).iter().zip(&truth).filter(|(h, t)| h.is_hit() != t.is_hit()).count();
         println!("{kernel}: {leaks} of {} rays leak, {differ} of {} others differ", edges.len(), anywhere.len());

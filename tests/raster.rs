@@ -12,7 +12,7 @@ use glam::{DAffine3, DMat3, DQuat, DVec3, Vec3};
 use skylit::gpu::{Buffer, Commands, Device, Memory};
 use skylit::oracle::Oracle;
 use skylit::oracle::camera::camera_ray;
-use skylit::render::Uncontrolled;
+use skylit::render::NoControl;
 use skylit::render::aov::{self, AovPixel};
 use skylit::render::block::{Block, BlockParams};
 use skylit::render::camera::CameraRecord;
@@ -149,7 +149,7 @@ impl Shot<'_> {
 
     fn check(&self, what: &str, tracer: &Tracer, bounds: Bounds) -> Difference {
         let [traced, drawn] = [Primary::Traced, Primary::Raster].map(|p| {
-            aov::render_with(tracer, &self.record(), self.size, p, &mut Uncontrolled).unwrap_or_else(|e| panic!("{p:?}: {e}"))
+            aov::render_with(tracer, &self.record(), self.size, p, &mut NoControl).unwrap_or_else(|e| panic!("{p:?}: {e}"))
         });
         let d = self.compare(&traced, &drawn);
         println!("{what}, {}: {} pixels, {d:?}", tracer.kind(), traced.len());
@@ -205,7 +205,7 @@ fn gpu_every_tracers_scene_can_be_drawn() {
         for kind in tracers(&device) {
             let tracer = tracer(&device, kind, &scene);
             shot.check(name, &tracer, BOUNDS);
-            let drawn = aov::render_with(&tracer, &shot.record(), SIZE, Primary::Raster, &mut Uncontrolled).unwrap();
+            let drawn = aov::render_with(&tracer, &shot.record(), SIZE, Primary::Raster, &mut NoControl).unwrap();
             // whatever traces, the same is drawn
             assert!(*first.get_or_insert(drawn.clone()) == drawn, "{name} {kind}");
         }
@@ -373,7 +373,7 @@ fn gpu_drawn_scenes_follow_updates() {
         let before = {
             let shot = Shot { scene: &scene, camera: &camera, size: SIZE };
             shot.check("before an update", &tracer, BOUNDS);
-            aov::render_with(&tracer, &shot.record(), SIZE, Primary::Raster, &mut Uncontrolled).unwrap()
+            aov::render_with(&tracer, &shot.record(), SIZE, Primary::Raster, &mut NoControl).unwrap()
         };
         let origin = scene.origin();
         let (meshes, instances) = (&mut scene.meshes, &mut scene.instances);
@@ -397,7 +397,7 @@ fn gpu_drawn_scenes_follow_updates() {
         tracer.update(&changes).unwrap();
         let shot = Shot { scene: &scene, camera: &camera, size: SIZE };
         shot.check("after an update", &tracer, BOUNDS);
-        let after = aov::render_with(&tracer, &shot.record(), SIZE, Primary::Raster, &mut Uncontrolled).unwrap();
+        let after = aov::render_with(&tracer, &shot.record(), SIZE, Primary::Raster, &mut NoControl).unwrap();
         let moved = before.iter().zip(&after).filter(|(a, b)| a.depth != b.depth).count();
         assert!(moved > 1000, "{kind}: hardly anything moved");
     }
@@ -492,7 +492,7 @@ fn gpu_what_cannot_be_drawn_is_said() {
     let mut flat = scene.cameras[0].clone();
     flat.camera_to_world.matrix3.x_axis = flat.camera_to_world.matrix3.y_axis;
     let record = Shot { scene: &scene, camera: &flat, size: SIZE }.record();
-    let Err(error) = aov::render_with(&tracer, &record, SIZE, Primary::Raster, &mut Uncontrolled) else {
+    let Err(error) = aov::render_with(&tracer, &record, SIZE, Primary::Raster, &mut NoControl) else {
         panic!("a flat camera sees something")
     };
     assert!(error.to_string().contains("camera"), "{error}");

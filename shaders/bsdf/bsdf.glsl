@@ -1,8 +1,8 @@
 // Reflection models behind one interface: how much of the light from wi leaves towards wo, and where to look for it.
 //
-//     BsdfValue bsdf_at(Bsdf, wo, wi)         value times |cos wi|, and the density with which bsdf_sample proposes wi, per solid angle; both
+//     BsdfValue bsdf_eval(Bsdf, wo, wi)         value times |cos wi|, and the density with which bsdf_sample proposes wi, per solid angle; both
 //                                             without the delta lobes
-//     BsdfSample bsdf_sample(Bsdf, wo, u, v)  a direction, and of a delta lobe weight and probability; of the others bsdf_at knows them
+//     BsdfSample bsdf_sample(Bsdf, wo, u, v)  a direction, and of a delta lobe weight and probability; of the others bsdf_eval knows them
 //
 // Directions are unit vectors in the frame of the shading normal, z on the side from which the surface is seen: wo.z > 0. The integrator knows
 // no more than this: a model is a file in this folder and a line in each of the functions below. docs/materials.md has the formulas.
@@ -76,7 +76,7 @@ struct BsdfSample {
     float eta;    // refracted: `eta` of the surface; else 1
 };
 
-// A direction whose weight and density bsdf_at tells.
+// A direction whose weight and density bsdf_eval tells.
 BsdfSample proposed(vec3 wi, float eta) { return BsdfSample(wi, vec3(0.0), 1.0, false, eta); }
 
 const BsdfValue NO_VALUE = BsdfValue(vec3(0.0), 0.0);
@@ -133,15 +133,15 @@ bool has_rough_part(Bsdf b) {
     return (is_kind(b, BSDF_CONDUCTOR, HAS_CONDUCTOR) || is_kind(b, BSDF_DIELECTRIC, HAS_GLASS)) && !is_smooth(b.facets);
 }
 
-BsdfValue bsdf_at(Bsdf b, vec3 wo, vec3 wi) {
+BsdfValue bsdf_eval(Bsdf b, vec3 wo, vec3 wi) {
     BsdfValue value = NO_VALUE;
-    if (is_kind(b, BSDF_GLTF, HAS_GLTF)) return gltf_at(b, wo, wi);
+    if (is_kind(b, BSDF_GLTF, HAS_GLTF)) return gltf_eval(b, wo, wi);
     if (is_kind(b, BSDF_DIFFUSE, HAS_DIFFUSE)) {
         float pdf = max(wi.z, 0.0) / PI;
         value = BsdfValue(b.diffuse * pdf, pdf);
     }
-    if (is_kind(b, BSDF_CONDUCTOR, HAS_CONDUCTOR)) value = conductor_at(b, wo, wi);
-    if (is_kind(b, BSDF_DIELECTRIC, HAS_GLASS)) value = dielectric_at(b, wo, wi);
+    if (is_kind(b, BSDF_CONDUCTOR, HAS_CONDUCTOR)) value = conductor_eval(b, wo, wi);
+    if (is_kind(b, BSDF_DIELECTRIC, HAS_GLASS)) value = dielectric_eval(b, wo, wi);
     value.f *= shadowing(b.ng, FRAME_NORMAL, wi);
     return value;
 }

@@ -2,7 +2,7 @@
 #ifndef BSDF_CONDUCTOR_
 #define BSDF_CONDUCTOR_
 
-BsdfValue conductor_at(Bsdf b, vec3 wo, vec3 wi) {
+BsdfValue conductor_eval(Bsdf b, vec3 wo, vec3 wi) {
     if (is_smooth(b.facets) || !(wi.z > 0.0)) return NO_VALUE;
     vec3 m = normalize(wo + wi);
     vec3 f = fresnel_conductor(dot(wo, m), b.f0, b.k);

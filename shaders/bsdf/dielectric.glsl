@@ -3,7 +3,7 @@
 #ifndef BSDF_DIELECTRIC_
 #define BSDF_DIELECTRIC_
 
-BsdfValue dielectric_at(Bsdf b, vec3 wo, vec3 wi) {
+BsdfValue dielectric_eval(Bsdf b, vec3 wo, vec3 wi) {
     if (is_smooth(b.facets) || wi.z == 0.0) return NO_VALUE;
     vec3 m = generalized_half(b.eta, wo, wi);
     if (m == vec3(0.0)) return NO_VALUE;

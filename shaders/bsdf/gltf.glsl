@@ -137,7 +137,7 @@ BsdfValue base_at(Bsdf b, vec3 wo, vec3 wi) {
 }
 
 // Of all layers; without the delta lobes.
-BsdfValue gltf_at(Bsdf b, vec3 wo, vec3 wi) {
+BsdfValue gltf_eval(Bsdf b, vec3 wo, vec3 wi) {
     BsdfValue value = base_at(b, wo, wi);
     bool up = wi.z > 0.0;
     if (HAS_SHEEN && b.sheen.kept < 1.0) {

@@ -10,7 +10,7 @@
 const float PI = 3.14159265358979;
 // Below this the lobe is narrower than single precision can hold: it counts as a perfect mirror. A roughness of 1 / 255, the least of an 8-bit
 // texture, has an alpha of 1.5e-5.
-const float LEAST_ALPHA = 1e-5;
+const float MIN_ALPHA = 1e-5;
 
 // Directions nearer to the surface count as this near.
 const float LEAST_COSINE = 1e-4;
@@ -21,7 +21,7 @@ struct Microfacets {
 };
 
 bool is_smooth(Microfacets d) {
-    return max(d.alpha.x, d.alpha.y) < LEAST_ALPHA;
+    return max(d.alpha.x, d.alpha.y) < MIN_ALPHA;
 }
 
 float sqr(float x) { return x * x; }

@@ -3,7 +3,7 @@
 #ifndef BSDF_SHEEN
 #define BSDF_SHEEN
 
-const float LEAST_SHEEN_ALPHA = 1e-3;
+const float MIN_SHEEN_ALPHA = 1e-3;
 
 // Charlie's distribution by the sine of the microfacet's normal.
 float charlie(float alpha, float cos_m) {

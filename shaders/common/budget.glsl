@@ -15,6 +15,6 @@ const uint SUMS_LISTED = 130u;
 const float SUM_UNITS = 16.0;
 const float DEVIATION_UNITS = 256.0;
 // Samples of a history that half floats and sixteenths can count.
-const float MOST_CAP = 4000.0;
+const float MAX_CAP = 4000.0;
 
 #endif

@@ -62,7 +62,7 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Fr
                                        // history counts at most; null, as what follows: every pixel has as many
     uvec2 list;                        // a uint a ray: pixel (28 bits), which of its rays
     uvec2 taken;                       // a uint a pixel: rays that it has had
-    uvec2 wishes;                      // 8 bytes a pixel, in tiles: deviation of one sample, samples
+    uvec2 desired_samples;                      // 8 bytes a pixel, in tiles: deviation of one sample, samples
     uvec2 budget_sums;                 // see common/budget.glsl
 };
 
@@ -199,17 +199,17 @@ struct Estimate {
     float variance;
 };
 
-const float MOST_VARIANCE = 0.5;  // of values from 0 to 1: a quarter, and half of it more for an unbiased estimate from two
+const float MAX_VARIANCE = 0.5;  // of values from 0 to 1: a quarter, and half of it more for an unbiased estimate from two
 
 uvec2 pack_estimate(Estimate e) {
     // sixteenths of a sample: interpolated histories have parts of them
     uint samples = uint(clamp(e.samples, 0.0, 4095.0) * 16.0 + 0.5);
-    uint variance = uint(clamp(e.variance * (65535.0 / MOST_VARIANCE), 0.0, 65535.0) + 0.5);
+    uint variance = uint(clamp(e.variance * (65535.0 / MAX_VARIANCE), 0.0, 65535.0) + 0.5);
     return uvec2(floatBitsToUint(e.mean), samples << 16 | variance);
 }
 
 Estimate unpack_estimate(uvec2 bits) {
-    return Estimate(uintBitsToFloat(bits.x), float(bits.y >> 16) * 0.0625, float(bits.y & 0xffffu) * (MOST_VARIANCE / 65535.0));
+    return Estimate(uintBitsToFloat(bits.x), float(bits.y >> 16) * 0.0625, float(bits.y & 0xffffu) * (MAX_VARIANCE / 65535.0));
 }
 
 const uint PATTERN_CHECKER = 1u;

@@ -22,7 +22,7 @@ const float SHARPER = -0.5;
 // over what the directions of other samples see.
 const float SHARE_OF_LOBE = 0.25;
 // No cone widens or narrows faster.
-const float MOST_SPREAD = 1.0;
+const float MAX_SPREAD = 1.0;
 
 // A pixel's. Lenses do not widen it: their samples do what they are there for.
 Cone camera_cone(BlockParams p, vec3 direction) {
@@ -107,7 +107,7 @@ Cone scattered_cone(Cone c, Surface s, bool front, BsdfSample b, bool passes) {
     if (!passes) c.spread += 2.0 * turn;
     else if (b.eta != 1.0) c.spread = (c.spread + turn) / b.eta - turn;
     if (!b.delta) c.spread = sqrt(c.spread * c.spread + SHARE_OF_LOBE / b.pdf);
-    c.spread = clamp(c.spread, -MOST_SPREAD, MOST_SPREAD);
+    c.spread = clamp(c.spread, -MAX_SPREAD, MAX_SPREAD);
     return c;
 }
 

@@ -22,7 +22,7 @@ const uint LIGHT_LEAF = 0x80000000u;
 const uint LIGHT_BOTH_WAYS = 0x40000000u;  // it shines along its axis and against it
 const uint LIGHT_LINK = 0x3fffffffu;
 // A sample's number is stretched at each choice; below this share of it, too few of its bits are left, and another takes its place.
-const float LEAST_STRETCH = 1.0 / 4096.0;
+const float MIN_STRETCH = 1.0 / 4096.0;
 
 // Cosine and sine of an angle less another, not below 0.
 vec2 angle_less(vec2 a, vec2 b) {
@@ -61,7 +61,7 @@ float draw_leaf(uvec2 tree, vec3 from, inout float u, out uint light) {
         p = takes_first ? p : 1.0 - p;
         probability *= p;
         share *= p;
-        if (share < LEAST_STRETCH) {
+        if (share < MIN_STRETCH) {
             u = float(hash_combine(seed, level) >> 8) * (1.0 / 16777216.0);
             share = 1.0;
         }

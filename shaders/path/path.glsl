@@ -16,9 +16,9 @@ const uint BSDF_LOBE = 1u;     // and Russian roulette
 const uint LIGHT_POINT_ON = 2u;  // which light, and where on it
 
 // A path survives a bounce at most this often, however bright: closed white rooms end, too.
-const float MOST_SURVIVAL = 0.95;
+const float MAX_SURVIVAL = 0.95;
 // Two media whose indices of refraction differ by a smaller share do not refract.
-const float LEAST_REFRACTION = 1e-3;
+const float MIN_REFRACTION = 1e-3;
 // How much of its length a shadow ray stays short of a light, beside what the light's own rounding asks.
 const float SHADOW_EPSILON = 2e-6;
 
@@ -28,7 +28,7 @@ float power_heuristic(float a, float b) {
     return 1.0 / (1.0 + r * r);
 }
 
-vec3 held(PathParams p, vec3 c, uint depth) {
+vec3 clamp_radiance(PathParams p, vec3 c, uint depth) {
     return WITH_CLAMP && depth > 0u ? min(c, vec3(p.clamp_to)) : c;
 }
 
@@ -54,7 +54,7 @@ vec3 disks_met(PathParams p, PathState state, vec3 w) {
 BsdfValue vertex_at(Shading m, vec3 wo, vec3 w) {
     vec3 wi = to_frame(m.frame, w);
     if (HAS_SHADING_NORMALS && !(wi.z * dot(m.ng, w) > 0.0)) return NO_VALUE;
-    return bsdf_at(m.bsdf, wo, wi);
+    return bsdf_eval(m.bsdf, wo, wi);
 }
 
 // A direction by the strategy that is asked for; in the world.
@@ -113,7 +113,7 @@ void draw_light(BlockParams block, PathParams p, uint k, PathState state, Surfac
     }
     c *= transmittance(side > 0.0 ? state.medium : beyond, l.distance);
     uint slot = append_ray(p.shadow, shadow, k);
-    store_quad(p.contributions, slot, vec4(held(p, c, state.depth + 1u), 0.0));
+    store_quad(p.contributions, slot, vec4(clamp_radiance(p, c, state.depth + 1u), 0.0));
 }
 
 // Goes on behind a surface as if it were not there.
@@ -160,7 +160,7 @@ vec3 path_vertex(BlockParams block, uint k, PathState state, Ray ray, Hit hit) {
         }
         vec3 c = environment_radiance(p, ray.direction) * emission_weight(p, state, light);
         if (WITH_DISTANT_DISKS) c += disks_met(p, state, ray.direction);
-        return held(p, state.throughput * c, state.depth);
+        return clamp_radiance(p, state.throughput * c, state.depth);
     }
     Surface s = surface_at(ray, hit);
     vec3 towards_viewer = -ray.direction;
@@ -187,7 +187,7 @@ vec3 path_vertex(BlockParams block, uint k, PathState state, Ray ray, Hit hit) {
             seen.t += before;
             light = light_pdf(p, seen, ray.origin - before * ray.direction, ray.direction);
         }
-        added = held(p, state.throughput * m.emission * emission_weight(p, state, light), state.depth);
+        added = clamp_radiance(p, state.throughput * m.emission * emission_weight(p, state, light), state.depth);
     }
     Boundary boundary;
     boundary.medium = state.medium;
@@ -206,7 +206,7 @@ vec3 path_vertex(BlockParams block, uint k, PathState state, Ray ray, Hit hit) {
         }
         m.bsdf.eta = boundary.eta;
         // what does not refract is not blurred, either
-        if (abs(boundary.eta - 1.0) < LEAST_REFRACTION) m.bsdf.facets.alpha = vec2(0.0);
+        if (abs(boundary.eta - 1.0) < MIN_REFRACTION) m.bsdf.facets.alpha = vec2(0.0);
     }
     if (m.bsdf.kind == BSDF_NONE) return added;
     if (state.depth >= p.max_depth) {
@@ -248,7 +248,7 @@ vec3 path_vertex(BlockParams block, uint k, PathState state, Ray ray, Hit hit) {
         if (WITH_CLEAR_WALLS) StoredFloats(p.straight).v[k] = 0.0;
         if (WITH_LIGHT_SAMPLES && WITH_ENVIRONMENT && !WITH_ENVIRONMENT_MAP) StoredFloats(p.sky_densities).v[k] = uniform_sky_pdf(m, b.wi);
         if (state.depth >= p.rr_depth) {
-            float survival = min(brightest * state.eta_scale, MOST_SURVIVAL);
+            float survival = min(brightest * state.eta_scale, MAX_SURVIVAL);
             if (lobe.y >= survival) return added;
             state.throughput /= survival;
         }

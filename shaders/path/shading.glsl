@@ -151,7 +151,7 @@ vec2 anisotropic(Looked looked, uint m, inout vec2 alpha) {
     vec2 d = SHADING_OF(m).uses[USE_ANISOTROPY].texture != INVALID ? t.xy * 2.0 - 1.0 : vec2(1.0, 0.0);
     float strength = length(SHADING_OF(m).anisotropy) * t.z;
     alpha.x = mix(alpha.x, 1.0, strength * strength);
-    if (alpha.x >= LEAST_ALPHA) alpha = max(alpha, vec2(LEAST_ALPHA));
+    if (alpha.x >= MIN_ALPHA) alpha = max(alpha, vec2(MIN_ALPHA));
     vec2 turn = strength > 0.0 ? normalize(SHADING_OF(m).anisotropy) : vec2(1.0, 0.0);
     return vec2(turn.x * d.x - turn.y * d.y, turn.y * d.x + turn.x * d.y);
 }
@@ -200,7 +200,7 @@ vec2 gltf_bsdf(inout Bsdf b, Looked looked, uint m, vec3 base, bool front, float
     }
     if (HAS_SHEEN && highest(SHADING_OF(m).sheen_color) > 0.0) {
         float r = SHADING_OF(m).sheen_roughness * looked.at[USE_SHEEN_ROUGHNESS].a;
-        b.sheen = Sheen(SHADING_OF(m).sheen_color * looked.at[USE_SHEEN].rgb, max(r * r, LEAST_SHEEN_ALPHA), 1.0);
+        b.sheen = Sheen(SHADING_OF(m).sheen_color * looked.at[USE_SHEEN].rgb, max(r * r, MIN_SHEEN_ALPHA), 1.0);
         b.sheen.kept = sheen_kept(b.sheen, cos_o);
     }
     if (HAS_CLEARCOAT && SHADING_OF(m).coat > 0.0) {

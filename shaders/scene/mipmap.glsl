@@ -9,12 +9,12 @@ const uint TEXELS_LINEAR = 0u;
 const uint TEXELS_SRGB = 1u;
 const uint TEXELS_COVERED = 2u;  // sRGB of what alpha lets through: weighted by it, and stored so
 
-const uint MOST_LEVELS = 15u;    // beside level 0
+const uint MAX_LEVELS = 15u;    // beside level 0
 
 struct MipRecord {
     uvec2 texels[3];          // of level 1, for each TEXELS_*: a uvec2 each, or a vec4; null: unused
     uint last;                // the smallest level
-    uint first[MOST_LEVELS];  // texels before each level, from level 1 on
+    uint first[MAX_LEVELS];  // texels before each level, from level 1 on
 };
 layout(buffer_reference, std430, buffer_reference_align = 8) readonly buffer MipRecords { MipRecord v[]; };
 

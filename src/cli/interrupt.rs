@@ -34,14 +34,14 @@ pub fn check() -> Result<()> {
 }
 
 /// Connects long work to the keyboard and to the progress bar.
-pub struct Keyboard {
+pub struct ProgressControl {
     /// Where progress is shown.
     pub progress: Progress,
     /// Ctrl-C keeps what there is instead of failing.
     pub keep_partial: bool,
 }
 
-impl Control for Keyboard {
+impl Control for ProgressControl {
     fn progress(&mut self, done: u64, total: u64) {
         self.progress.set(done, total);
     }
@@ -52,9 +52,9 @@ impl Control for Keyboard {
 }
 
 /// Listens to the keyboard, and shows nothing: for work whose own count is not that of the bar.
-pub struct Unshown;
+pub struct SilentControl;
 
-impl Control for Unshown {
+impl Control for SilentControl {
     fn should_stop(&mut self) -> Result<bool> {
         check().map(|()| false)
     }

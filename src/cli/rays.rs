@@ -7,7 +7,7 @@ use glam::DVec3;
 
 use super::Warnings;
 use super::args::RaysArgs;
-use super::interrupt::{self, Keyboard};
+use super::interrupt::{self, ProgressControl};
 use super::progress::Progress;
 use crate::error::{Error, Result};
 use crate::gpu::Device;
@@ -41,7 +41,7 @@ pub fn run(args: &RaysArgs) -> Result<()> {
     let tracer = Tracer::with_build(&device, kind, &flat, Needs::default(), compute, &build)?;
     build.take_warnings().iter().for_each(|w| warnings.add(w));
     let stats = tracer.stats();
-    let mut control = Keyboard { progress: Progress::new("tracing", &console), keep_partial: false };
+    let mut control = ProgressControl { progress: Progress::new("tracing", &console), keep_partial: false };
     let (hits, times) = rays::trace(&tracer, &set, args.mode.into(), args.repeats, &mut control)?;
     drop(control);
     if let Some(path) = &args.hits {

@@ -9,7 +9,7 @@ use super::Warnings;
 use super::args::{Aov, DEFAULT_SIZE, DEFAULT_SPP, Integrator, RenderArgs, dump_path};
 use super::console::{Console, Failure};
 use super::film::{self, Saver};
-use super::interrupt::{self, Keyboard};
+use super::interrupt::{self, ProgressControl};
 use super::progress::Progress;
 use super::rays::move_rays;
 use super::report::{self, Rays, Report, Seconds};
@@ -95,7 +95,7 @@ pub fn run(args: &RenderArgs, start: Instant) -> Result<(), Failure> {
         options.cover = Cover::new(&flat, &record, size, options.spp).map(Arc::new);
     }
 
-    let mut keyboard = Keyboard { progress: Progress::new("rendering", &console), keep_partial: args.keep_partial };
+    let mut keyboard = ProgressControl { progress: Progress::new("rendering", &console), keep_partial: args.keep_partial };
     // first, because what is saved on the way has them, too
     let aov_start = Instant::now();
     let pixels = match args.aov.is_empty() && args.depth_image.is_none() {

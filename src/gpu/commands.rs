@@ -11,7 +11,7 @@ use super::result::Context;
 use crate::error::Result;
 
 /// Work-groups along y and z that every device takes (Vulkan 1.3, Required Limits).
-const MOST_WORKGROUPS: u32 = 65_535;
+const MAX_WORKGROUPS: u32 = 65_535;
 
 /// Timed regions that one submission can hold.
 const MAX_REGIONS: u32 = 512;
@@ -233,7 +233,7 @@ impl Recorder<'_> {
 
     /// The same over so many work-groups along x, y and z.
     pub fn dispatch_3d<P: bytemuck::NoUninit>(&mut self, pipeline: &ComputePipeline, push: &P, [x, y, z]: [u32; 3]) {
-        assert!(x <= self.device.info.limits.max_workgroups_x && y.max(z) <= MOST_WORKGROUPS);
+        assert!(x <= self.device.info.limits.max_workgroups_x && y.max(z) <= MAX_WORKGROUPS);
         // SAFETY: recording state; the push constants have the size that the layout was made with (asserted there)
         unsafe {
             self.device.raw.cmd_bind_pipeline(self.buffer, vk::PipelineBindPoint::COMPUTE, pipeline.raw);

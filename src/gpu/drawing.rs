@@ -11,7 +11,7 @@ use super::graphics_pipeline::{DRAW_STAGES, GraphicsPipeline};
 use super::image::{Image, Targets, range};
 
 /// A viewport is larger than the image by at most this factor.
-const MOST_WIDE: f32 = 8.0;
+const MAX_WIDE: f32 = 8.0;
 
 impl Device {
     /// By how much the viewport is larger than an image of `size` pixels, whose centre it shares: its clip space reaches so much farther than
@@ -23,7 +23,7 @@ impl Device {
             let reach = (limits.viewport_range[1] - 0.5 * n).min(0.5 * n - limits.viewport_range[0]);
             (limits.max_viewport_side / n).min(2.0 * reach / n)
         });
-        most[0].min(most[1]).min(MOST_WIDE).floor().max(1.0)
+        most[0].min(most[1]).min(MAX_WIDE).floor().max(1.0)
     }
 }
 

@@ -140,7 +140,7 @@ fn text(s: &[std::ffi::c_char]) -> String {
 }
 
 /// With wider vectors Mesa's CPU driver crashes when it compiles a vertex shader (seen with 22.3.6 and 25.0.7).
-const MOST_DRAWING_BITS: u32 = 256;
+const MAX_DRAWING_BITS: u32 = 256;
 
 /// Bits of the vectors of Mesa's CPU driver, which are in its name: "llvmpipe (LLVM 15.0.6, 256 bits)".
 fn vector_bits(name: &str) -> Option<u32> {
@@ -228,7 +228,7 @@ fn describe(instance: &Instance, index: usize, physical: vk::PhysicalDevice) -> 
         missing_floor.push("a compute queue".to_owned());
     }
 
-    let narrow = vector_bits(&text(&properties.device_name)).is_none_or(|bits| bits <= MOST_DRAWING_BITS);
+    let narrow = vector_bits(&text(&properties.device_name)).is_none_or(|bits| bits <= MAX_DRAWING_BITS);
     let missing_raster = [
         (graphics_family.is_some(), "a queue for graphics and compute"),
         (f13.dynamic_rendering == vk::TRUE, "dynamicRendering"),

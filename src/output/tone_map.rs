@@ -86,10 +86,10 @@ fn transform(m: &Matrix, c: Rgb) -> Rgb {
 }
 
 fn agx(c: Rgb) -> Rgb {
-    const LEAST_STOPS: f32 = -12.473_93;
-    const MOST_STOPS: f32 = 4.026_069;
+    const MIN_STOPS: f32 = -12.473_93;
+    const MAX_STOPS: f32 = 4.026_069;
     let curve = |x: f32| {
-        let x = ((x.max(1e-10).log2() - LEAST_STOPS) / (MOST_STOPS - LEAST_STOPS)).clamp(0.0, 1.0);
+        let x = ((x.max(1e-10).log2() - MIN_STOPS) / (MAX_STOPS - MIN_STOPS)).clamp(0.0, 1.0);
         let polynomial = [15.5, -40.14, 31.96, -6.868, 0.4298, 0.1191, -0.00232];
         polynomial.iter().fold(0.0f32, |sum, k| sum * x + k)
     };

@@ -10,7 +10,7 @@ use super::block::{Block, BlockParams, TILE_PIXELS};
 use super::camera::CameraRecord;
 use super::convergence::{TileCount, TileErrors};
 use super::cover::Cover;
-use super::film::{Film, FilmPixel, MOST_CHANNELS, record_bytes, record_words};
+use super::film::{Film, FilmPixel, MAX_CHANNELS, record_bytes, record_words};
 use super::film_state::{FilmState, tiles};
 use super::pace::{MOST, Pace};
 use super::schedule::{FilmOptions, Step};
@@ -19,7 +19,7 @@ use crate::gpu::{Buffer, Commands, Device, Memory, Timing};
 use crate::tracer::{Push, Tracer};
 
 /// Samples of a pixel in a launch at most, as a power of two: neighbouring rays, which then start and end close together.
-const MOST_SAMPLE_BITS: u32 = 4;
+const MAX_SAMPLE_BITS: u32 = 4;
 
 /// What estimates pixels.
 pub(super) trait Estimator {
@@ -126,7 +126,7 @@ impl Batch {
     /// As many samples as a launch takes and as are left of `wanted`, but no more than `most` (at least one).
     fn next(first: u32, wanted: u32, most: u32) -> Self {
         let samples = (wanted - first).min(most.max(1));
-        Self { first, bits: samples.ilog2().min(MOST_SAMPLE_BITS) }
+        Self { first, bits: samples.ilog2().min(MAX_SAMPLE_BITS) }
     }
 
     fn samples(&self) -> u32 {
@@ -364,7 +364,7 @@ impl<E: Estimator> Run<'_, E> {
         plot.film.read_with(0, record * plot.pixels as u64, record, |first, bytes| {
             for (k, bytes) in bytes.chunks_exact(record as usize).enumerate() {
                 let Some(at) = group.place(plot.tiles.as_deref(), first as u32 + k as u32, width) else { continue };
-                let mut words = [0u32; record_words(MOST_CHANNELS)];
+                let mut words = [0u32; record_words(MAX_CHANNELS)];
                 let words = &mut words[..record_words(E::CHANNELS)];
                 bytemuck::cast_slice_mut::<u32, u8>(words).copy_from_slice(bytes);
                 let pixel = FilmPixel::of(words);

@@ -20,9 +20,9 @@ const PRIMITIVES_PER_RAY: f64 = 0.5;
 /// Relative rounding of ray origins, directions and transformed vertices: 16 half-ulps.
 const ROUNDING: f64 = 16.0 * f32::EPSILON as f64 * 0.5;
 /// Margin where nothing is rounded, pixels.
-const LEAST_MARGIN: f64 = 0.5;
+const MIN_MARGIN: f64 = 0.5;
 /// With a larger margin in pixels (a view so narrow that single precision does not resolve it) nothing is left out.
-const MOST_MARGIN: f64 = 64.0;
+const MAX_MARGIN: f64 = 64.0;
 
 /// The tiles of an image in which something may be seen.
 #[derive(Debug)]
@@ -153,8 +153,8 @@ impl View {
             true => ROUNDING * (coordinates + half[0] + half[1] + reach),
             false => ROUNDING * (coordinates / near + 1.0) * (1.0 + half[0] * half[0] + half[1] * half[1]),
         };
-        view.margin = LEAST_MARGIN + error * view.scale[0].max(view.scale[1]);
-        (view.margin <= MOST_MARGIN).then_some(view)
+        view.margin = MIN_MARGIN + error * view.scale[0].max(view.scale[1]);
+        (view.margin <= MAX_MARGIN).then_some(view)
     }
 
     /// Where a point is in the image, pixels from the upper left corner.
@@ -257,7 +257,7 @@ mod tests {
     #[test]
     fn the_margin_holds_what_instances_transforms_round() {
         let near = view(&brought_back(0.0, DMat3::IDENTITY)).unwrap();
-        assert!(near.margin < LEAST_MARGIN + 0.01, "{}", near.margin);
+        assert!(near.margin < MIN_MARGIN + 0.01, "{}", near.margin);
         let scene = brought_back(1.0e6, DMat3::IDENTITY);
         let far = view(&scene).unwrap();
         // a ray's origin, rounded where the vertices are, is off by half an ulp of each coordinate; so its hit may be seen so far beside
@@ -269,7 +269,7 @@ mod tests {
         };
         let corner = DVec3::splat(1.0e6);
         let (exact, off) = (at(corner), at(corner + DVec3::splat(ulp)));
-        assert!(far.margin > LEAST_MARGIN + (exact[0] - off[0]).abs().max((exact[1] - off[1]).abs()), "{}", far.margin);
+        assert!(far.margin > MIN_MARGIN + (exact[0] - off[0]).abs().max((exact[1] - off[1]).abs()), "{}", far.margin);
         // stretching makes it worse
         let stretch = DMat3::from_diagonal(DVec3::new(1.0, 1.0, 0.1));
         let stretched = view(&brought_back(1.0e5, stretch)).unwrap().margin;

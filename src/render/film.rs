@@ -2,7 +2,7 @@
 //! [`super::film_state`].
 
 /// Values of a pixel at most.
-pub const MOST_CHANNELS: usize = 3;
+pub const MAX_CHANNELS: usize = 3;
 
 /// 32-bit words of a pixel's record on the device: of each channel a sum and what it has too much, of each a sum of squares and what it has too
 /// much, then two counts. `FilmPixel` of shaders/resolve.glsl and shaders/path_resolve.glsl.
@@ -19,7 +19,7 @@ pub const fn record_bytes(channels: usize) -> u64 {
 #[derive(Clone, Copy, Debug, Default)]
 pub struct FilmPixel {
     /// Sum and sum of squares of each channel.
-    sums: [[f64; 2]; MOST_CHANNELS],
+    sums: [[f64; 2]; MAX_CHANNELS],
     /// Samples that met the scene.
     pub covered: u32,
     /// Samples that were left out because they were not finite.
@@ -32,7 +32,7 @@ impl FilmPixel {
         let channels = (words.len() - 2) / 4;
         // the compensation is what the sum has too much
         let total = |k: usize| f64::from(f32::from_bits(words[k])) - f64::from(f32::from_bits(words[k + 1]));
-        let mut sums = [[0.0; 2]; MOST_CHANNELS];
+        let mut sums = [[0.0; 2]; MAX_CHANNELS];
         for (c, s) in sums.iter_mut().enumerate().take(channels) {
             *s = [total(2 * c), total(2 * (channels + c))];
         }

@@ -45,6 +45,6 @@ pub trait Control {
 }
 
 /// Never stops, shows nothing.
-pub struct Uncontrolled;
+pub struct NoControl;
 
-impl Control for Uncontrolled {}
+impl Control for NoControl {}

@@ -8,8 +8,8 @@ use rayon::prelude::*;
 
 use crate::scene::{TexelData, Texture};
 
-/// Beside level 0: `MOST_LEVELS` of shaders/scene/mipmap.glsl. Enough for 65535 texels.
-const MOST_LEVELS: usize = 15;
+/// Beside level 0: `MAX_LEVELS` of shaders/scene/mipmap.glsl. Enough for 65535 texels.
+const MAX_LEVELS: usize = 15;
 
 /// What a texture's colours are, and so how they are averaged: `TEXELS_*` of shaders/scene/mipmap.glsl. All levels hold linear values: a texture that
 /// is used in two ways has two sets of them.
@@ -36,7 +36,7 @@ pub(super) struct MipRecord {
     /// The smallest level.
     pub last: u32,
     /// Texels before each level, from level 1 on.
-    pub first: [u32; MOST_LEVELS],
+    pub first: [u32; MAX_LEVELS],
 }
 
 impl MipRecord {
@@ -56,7 +56,7 @@ impl MipRecord {
 /// Sizes of the levels from level 1 on: each half of the one before, rounded down, to one texel.
 fn levels(size: [u32; 2]) -> impl Iterator<Item = [u32; 2]> {
     let halves = std::iter::successors(Some(size), |s| (*s != [1, 1]).then(|| s.map(|n| (n / 2).max(1))));
-    halves.skip(1).take(MOST_LEVELS)
+    halves.skip(1).take(MAX_LEVELS)
 }
 
 /// All levels from 1 on as they lie in device memory, one after the other, rows from the top: four numbers of 16 bits a texel, to 2^-17, or four floats

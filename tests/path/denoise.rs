@@ -17,10 +17,10 @@ fn filter(tracer: &Tracer, flat: &FlatScene, options: &PathOptions, film: &Film)
     let aspect = f64::from(options.size[0]) / f64::from(options.size[1]);
     let record = CameraRecord::new(&flat.scene.cameras[0], flat.origin, aspect);
     let shot = Shot { tracer, scene: flat.scene, camera: &record, options };
-    let features = Features::render(&shot, &mut Uncontrolled).unwrap();
+    let features = Features::render(&shot, &mut NoControl).unwrap();
     let denoiser = Denoiser::Filter(Default::default());
     assert_eq!(denoiser.name(), "filter");
-    (denoiser.denoise(&shot, film, &features, &mut Uncontrolled).unwrap(), features)
+    (denoiser.denoise(&shot, film, &features, &mut NoControl).unwrap(), features)
 }
 
 /// Of what a screen shows: edges of lights are as far from the reference after as before, and would hide all else.

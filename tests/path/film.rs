@@ -89,7 +89,7 @@ fn gpu_films_of_ambient_occlusion_go_on_too() {
         let tracer = tracer(&device, kind, &flat);
         let image = |spp: u32, start: Option<FilmState>| {
             let film = FilmOptions { start: start.map(Arc::new), keep_state: true, ..Default::default() };
-            ao::render(&tracer, &record, &AoOptions { size, spp, film, ..Default::default() }, &mut Uncontrolled).unwrap()
+            ao::render(&tracer, &record, &AoOptions { size, spp, film, ..Default::default() }, &mut NoControl).unwrap()
         };
         let whole = image(16, None);
         let [first, second] = [image(3, None), image(7, image(3, None).state)];
@@ -193,7 +193,7 @@ fn gpu_a_film_of_another_size_is_refused() {
     let record = CameraRecord::new(&scene.cameras[0], flat.origin, 1.0);
     for other in [FilmState::new([8, 9], 3), FilmState::new([8, 8], 1)] {
         let options = up_to(&PathOptions { size: [8, 8], ..Default::default() }, 4, Some(other));
-        let error = path::render(&tracer, &flat, &record, &options, &mut Uncontrolled).unwrap_err();
+        let error = path::render(&tracer, &flat, &record, &options, &mut NoControl).unwrap_err();
         assert_eq!(error.exit_code(), 64);
         assert!(error.to_string().contains("does not go on as one of 8x8 with 3"), "{error}");
     }
@@ -330,17 +330,17 @@ fn gpu_an_integrator_renders_again() {
         let tracer = tracer(&device, kind, &flat);
         let record = CameraRecord::new(&scene.cameras[0], flat.origin, 1.0);
         let mut integrator = path::PathIntegrator::new(&tracer, &flat, &options).unwrap();
-        let mut again = |spp, seed| integrator.render(&tracer, &record, spp, seed, &mut Uncontrolled).unwrap();
+        let mut again = |spp, seed| integrator.render(&tracer, &record, spp, seed, &mut NoControl).unwrap();
         let [first, other, fewer, second] = [again(8, 3), again(8, 4), again(2, 3), again(8, 3)];
         // nothing of an image is left in the next
         assert_eq!(first.image.film.mean, second.image.film.mean, "{kind}");
         assert_eq!((first.bounce_rays, first.shadow_rays), (second.bounce_rays, second.shadow_rays), "{kind}");
         assert_ne!(first.image.film.mean, other.image.film.mean, "{kind}");
         let alone =
-            path::render(&tracer, &flat, &record, &PathOptions { spp: 2, seed: 3, ..options.clone() }, &mut Uncontrolled)
+            path::render(&tracer, &flat, &record, &PathOptions { spp: 2, seed: 3, ..options.clone() }, &mut NoControl)
                 .unwrap();
         assert_eq!(fewer.image.film.mean, alone.image.film.mean, "{kind}");
-        let error = integrator.render(&tracer, &record, 9, 0, &mut Uncontrolled).unwrap_err();
+        let error = integrator.render(&tracer, &record, 9, 0, &mut NoControl).unwrap_err();
         assert_eq!(error.exit_code(), 64, "{error}");
     }
     assert_validation_clean(&device);

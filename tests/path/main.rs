@@ -24,7 +24,7 @@ use std::sync::Arc;
 use common::{assert_validation_clean, device, tracers};
 use glam::{DAffine3, DVec3, Vec3};
 use skylit::gpu::Device;
-use skylit::render::Uncontrolled;
+use skylit::render::NoControl;
 use skylit::render::camera::CameraRecord;
 use skylit::render::film::Film;
 use skylit::render::path::{self, PathOptions, PathResult, Strategy};
@@ -62,7 +62,7 @@ fn render(tracer: &Tracer, flat: &FlatScene, options: &PathOptions) -> PathResul
     let aspect = f64::from(options.size[0]) / f64::from(options.size[1]);
     let record = CameraRecord::new(&flat.scene.cameras[0], flat.origin, aspect);
     let result =
-        path::render(tracer, flat, &record, options, &mut Uncontrolled).unwrap_or_else(|e| panic!("{}: {e}", tracer.kind()));
+        path::render(tracer, flat, &record, options, &mut NoControl).unwrap_or_else(|e| panic!("{}: {e}", tracer.kind()));
     assert_eq!(result.image.film.not_finite, 0, "{}: samples that are no numbers", tracer.kind());
     result
 }

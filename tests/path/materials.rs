@@ -348,7 +348,7 @@ fn gpu_tracers_without_materials_are_refused() {
         [(Needs::default(), "Needs::shading"), (Needs { shading: true, white: true, ..Default::default() }, "Needs::white")]
     {
         let tracer = Tracer::new(&device, TracerKind::Compute, &flat, needs).unwrap();
-        let error = path::render(&tracer, &flat, &record, &options(1), &mut Uncontrolled).unwrap_err();
+        let error = path::render(&tracer, &flat, &record, &options(1), &mut NoControl).unwrap_err();
         assert!(error.to_string().contains(says), "{error}");
     }
 }

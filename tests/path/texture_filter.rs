@@ -297,7 +297,7 @@ fn gpu_levels_are_there_when_somebody_asks() {
         let film = |tracer: &Tracer| render(tracer, &flat, &albedo(4, TextureFilter::Bilinear)).image.film;
         assert_eq!(film(&without).mean, film(&with).mean, "{kind}: levels that nobody reads");
         let record = CameraRecord::new(&scene.cameras[0], flat.origin, 1.0);
-        let refused = path::render(&without, &flat, &record, &albedo(1, TextureFilter::RayCone), &mut Uncontrolled);
+        let refused = path::render(&without, &flat, &record, &albedo(1, TextureFilter::RayCone), &mut NoControl);
         assert!(refused.is_err_and(|e| e.to_string().contains("Needs::mip_levels")), "{kind}");
     }
     assert_validation_clean(&device);

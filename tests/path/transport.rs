@@ -92,7 +92,7 @@ fn gpu_one_bounce_under_a_white_sky_is_ambient_occlusion() {
         let tracer = tracer(&device, kind, &flat);
         let record = CameraRecord::new(&scene.cameras[0], flat.origin, 1.5);
         let occlusion =
-            ao::render(&tracer, &record, &AoOptions { size, spp: 256, ..Default::default() }, &mut Uncontrolled).unwrap();
+            ao::render(&tracer, &record, &AoOptions { size, spp: 256, ..Default::default() }, &mut NoControl).unwrap();
         let options = PathOptions { size, spp: 256, seed: 8, max_depth: 1, white_sky: Some(0.5), ..Default::default() };
         let sky = render(&tracer, &flat, &options).image.film;
         let error: f64 =

@@ -4,7 +4,7 @@ use glam::{DAffine3, DVec3};
 use skylit::oracle::{Oracle, OracleRay};
 use skylit::render::camera::CameraRecord;
 use skylit::render::realtime::{Preset, Realtime, Settings};
-use skylit::render::{Uncontrolled, aov};
+use skylit::render::{NoControl, aov};
 use skylit::scene::builtin::shapes;
 use skylit::scene::flatten::{FlatScene, Motion};
 use skylit::scene::{Camera, Scene};
@@ -100,7 +100,7 @@ fn gpu_larsen_traces_a_quarter_of_the_pixels_and_none_that_is_lit() {
                 assert!(result.iter().all(|v| *v == 1.0), "{kind}: occlusion where light is");
             }
             let (rays, result) = run(&[lamp.as_vec3().to_array()]);
-            let seen = aov::render(&tracer, &view(&scene, size), size, &mut Uncontrolled).unwrap();
+            let seen = aov::render(&tracer, &view(&scene, size), size, &mut NoControl).unwrap();
             let dark = |i: usize| {
                 let p = DVec3::from_array(seen[i].position.map(f64::from)) + DVec3::Y * 1e-3;
                 oracle.closest(OracleRay { origin: p, direction: (lamp - p).normalize(), tmin: 0.0, tmax: f64::INFINITY }).t

@@ -6,7 +6,7 @@ use glam::{DAffine3, DQuat, DVec3};
 use skylit::gpu::Device;
 use skylit::measure::temporal::{Residual, recovery};
 use skylit::oracle::{Oracle, OracleRay};
-use skylit::render::Uncontrolled;
+use skylit::render::NoControl;
 use skylit::render::aov;
 use skylit::render::camera::CameraRecord;
 use skylit::render::realtime::{Preset, Realtime, Settings};
@@ -149,7 +149,7 @@ fn at(place: DAffine3) -> Changes<'static> {
 }
 
 fn instances(tracer: &Tracer, camera: &CameraRecord) -> Vec<u32> {
-    aov::render(tracer, camera, SIZE, &mut Uncontrolled).unwrap().iter().map(|p| p.instance).collect()
+    aov::render(tracer, camera, SIZE, &mut NoControl).unwrap().iter().map(|p| p.instance).collect()
 }
 
 #[test]

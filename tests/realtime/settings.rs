@@ -24,7 +24,7 @@ fn settings_out_of_range_are_named() {
     let filter = |samples| Filter { samples, ..good.filter };
     for (settings, says) in [
         (Settings { rays_per_pixel: 0, ..good }, "rays per pixel"),
-        (Settings { rays_per_pixel: Settings::MOST_RAYS + 1, ..good }, "rays per pixel"),
+        (Settings { rays_per_pixel: Settings::MAX_RAYS + 1, ..good }, "rays per pixel"),
         (Settings { history: 0, ..good }, "history"),
         (Settings { radius: 0.0, ..good }, "radius"),
         (Settings { radius: f64::NAN, ..good }, "radius"),
@@ -42,7 +42,7 @@ fn settings_out_of_range_are_named() {
         assert!(matches!(error, Error::Usage(_)) && error.exit_code() == 64, "{error}");
         assert!(error.to_string().contains(says) && !error.to_string().contains('\n'), "{says}: {error}");
     }
-    for (history, rays, most) in [(1, 1, 1), (32, 4, 128), (1, 4096, 4096), (u32::MAX, 2, Settings::MOST_SAMPLES)] {
+    for (history, rays, most) in [(1, 1, 1), (32, 4, 128), (1, 4096, 4096), (u32::MAX, 2, Settings::MAX_SAMPLES)] {
         assert_eq!(Settings { history, rays_per_pixel: rays, ..good }.most_samples(), most);
     }
 }

@@ -14,7 +14,7 @@ use super::streams::{RaySets, STREAMS, Set, StreamKind};
 use super::table;
 use crate::cli::args::BuildChoice;
 use crate::cli::console::{Console, Failure};
-use crate::cli::interrupt::{self, Keyboard};
+use crate::cli::interrupt::{self, ProgressControl};
 use crate::cli::progress::Progress;
 use crate::error::{Error, Result};
 use crate::gpu::Device;
@@ -43,7 +43,7 @@ pub fn run(args: &BenchRaysArgs) -> Result<(), Failure> {
         args,
         device: &device,
         peers: Vec::new(),
-        keyboard: Keyboard { progress: Progress::new("measuring", &console), keep_partial: false },
+        keyboard: ProgressControl { progress: Progress::new("measuring", &console), keep_partial: false },
         start,
         out: RayBenchmark {
             version: env!("CARGO_PKG_VERSION").to_owned(),
@@ -108,7 +108,7 @@ struct Bench<'a> {
     args: &'a BenchRaysArgs,
     device: &'a Arc<Device>,
     peers: Vec<Peer>,
-    keyboard: Keyboard,
+    keyboard: ProgressControl,
     start: Instant,
     out: RayBenchmark,
     /// Scenes that are done, and all of them.
@@ -230,7 +230,7 @@ impl Bench<'_> {
             return Err(Error::Device(format!("{source}: none of the kernels asked for runs here; `skylit doctor` says why")));
         };
         self.phase(format!("{source}: making rays"));
-        let sets = RaySets::make(tracer, &subject, size, &mut interrupt::Unshown)?;
+        let sets = RaySets::make(tracer, &subject, size, &mut interrupt::SilentControl)?;
         *record = SceneRecord {
             scene: source.to_owned(),
             triangles: subject.scene.triangle_count(),

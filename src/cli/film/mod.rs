@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 pub use report::{Told, tell};
 
 use super::args::RenderArgs;
-use super::interrupt::Keyboard;
+use super::interrupt::ProgressControl;
 use crate::error::{Error, Result};
 use crate::output::{self, Channel, Image, Samples};
 use crate::render::Control;
@@ -214,7 +214,7 @@ fn read_state(image: &Image, names: &[&str]) -> Read {
 /// Connects long work to the keyboard, and saves it on its way.
 pub struct Saver<'a> {
     /// Where progress is shown, and who may stop it.
-    pub keyboard: Keyboard,
+    pub keyboard: ProgressControl,
     /// Writes an image that is not finished.
     pub save: &'a mut dyn FnMut(&Accumulated) -> Result<()>,
 }

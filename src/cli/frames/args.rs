@@ -145,7 +145,7 @@ pub struct FrameArgs {
     #[arg(long, value_enum, default_value = "auto")]
     pub primary: PrimaryChoice,
     /// Occlusion rays per pixel and frame [default: the preset's]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(Settings::MOST_RAYS)))]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(Settings::MAX_RAYS)))]
     pub rays_per_pixel: Option<u32>,
     /// How rays are distributed over pixels (docs/realtime.md)
     #[arg(long, value_enum, default_value = "uniform")]

@@ -110,7 +110,7 @@ pub fn run(args: &RenderArgs, start: Instant) -> Result<(), Failure> {
         let kept = done as u64 >= u64::from(warm_up);
         if kept {
             let write_start = Instant::now();
-            let pixels = if needs_aov { aov::render(&tracer, &record, size, &mut interrupt::Unshown)? } else { Vec::new() };
+            let pixels = if needs_aov { aov::render(&tracer, &record, size, &mut interrupt::SilentControl)? } else { Vec::new() };
             let image = match args.writes_exr() {
                 true => Some(write::image(args, &realtime, size, &pixels, flat.origin, report.metadata(number))?),
                 false => None,
@@ -155,7 +155,7 @@ fn scene_size(scene: &Scene) -> f64 {
 fn warm_up(args: &RenderArgs, settings: &Settings) -> u32 {
     let settles = || match settings.technique {
         Technique::Larsen => 4,
-        _ => settings.history.min(Settings::MOST_SAMPLES) * settings.resolution.period() - 1,
+        _ => settings.history.min(Settings::MAX_SAMPLES) * settings.resolution.period() - 1,
     };
     args.frames.warm_up.unwrap_or_else(|| if args.frames.frames.is_some() { 0 } else { settles() })
 }

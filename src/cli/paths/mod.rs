@@ -13,7 +13,7 @@ use super::Warnings;
 use super::args::{DEFAULT_SIZE, DEFAULT_SPP, Integrator, RenderArgs};
 use super::console::Failure;
 use super::film::{self, Saver};
-use super::interrupt::{self, Keyboard};
+use super::interrupt::{self, ProgressControl};
 use super::progress::Progress;
 use super::render::{aov_channels, choose_camera, open, write_depth};
 use super::report::Seconds;
@@ -98,7 +98,7 @@ pub fn run(args: &RenderArgs, start: Instant) -> Result<(), Failure> {
     }
     let (about, options) = (&about, &about.options);
 
-    let mut keyboard = Keyboard { progress: Progress::new("rendering", &console), keep_partial: args.keep_partial };
+    let mut keyboard = ProgressControl { progress: Progress::new("rendering", &console), keep_partial: args.keep_partial };
     // first, because what is saved on the way has them, too
     let aov_start = Instant::now();
     let pixels = match args.aov.is_empty() && args.depth_image.is_none() {

@@ -43,7 +43,7 @@ impl Default for Settings {
 }
 
 /// Radiance is divided by this much at least: what reflects less tells nothing of the light on it.
-const LEAST_ALBEDO: f32 = 0.01;
+const MIN_ALBEDO: f32 = 0.01;
 /// Below this roughness metals count as mirrors.
 const POLISHED: f32 = 0.25;
 /// `RadianceEstimate` of shaders/denoise.glsl.
@@ -134,12 +134,12 @@ fn guide(shot: &Shot, film: &Film, features: &Features) -> Guided {
         };
         let albedo = rgb(&features.albedo, k) / features.coverage[k].max(f32::MIN_POSITIVE);
         let reflects = if white { albedo } else { albedo + uncoloured(material) };
-        let left = !white && (shows_others(material) || is_source(material) || reflects.max_element() <= LEAST_ALBEDO);
+        let left = !white && (shows_others(material) || is_source(material) || reflects.max_element() <= MIN_ALBEDO);
         if samples == 0 || mix == Mix::Source || left {
             continue;
         }
         // a lens blurs what is divided, but not what it is divided by
-        let divisor = if options.lens.is_some() { Vec3::ONE } else { reflects.max(Vec3::splat(LEAST_ALBEDO)) };
+        let divisor = if options.lens.is_some() { Vec3::ONE } else { reflects.max(Vec3::splat(MIN_ALBEDO)) };
         // the shader wants the mean square about the pixel's own mean
         let variance = rgb(&film.variance, k) * (1.0 - 1.0 / samples as f32) / (divisor * divisor);
         out.estimates[k] = Estimate {

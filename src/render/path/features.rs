@@ -9,7 +9,7 @@ use crate::tracer::shading;
 /// What is required. `map`: the environment is an image; `cones`: textures are read over ray cones.
 pub(super) fn features(options: &PathOptions, flat: &FlatScene, lights: &Lights, map: bool, cones: bool) -> PathFeatures {
     let plain = options.white_sky.is_some() || options.view.is_some();
-    let drawn = options.strategy.draws_lights() && !lights.records.is_empty();
+    let drawn = options.strategy.samples_lights() && !lights.records.is_empty();
     let features = [
         (PathFeature::LightChoice, drawn && lights.choices() > 1),
         (PathFeature::EnvironmentMap, map),

@@ -11,7 +11,7 @@ use glam::DVec3;
 /// Levels after which lights are halved whatever that costs: a light's way from the root is 32 bits.
 const MEASURED_LEVELS: u32 = 12;
 /// Most lights of a tree: with the levels above, no way is longer than 32.
-pub(super) const MOST_LIGHTS: usize = 1 << 19;
+pub(super) const MAX_LIGHTS: usize = 1 << 19;
 /// Bins along an axis where splits are looked for.
 const BINS: usize = 12;
 
@@ -117,7 +117,7 @@ fn cone_union(a: (DVec3, f64), b: (DVec3, f64)) -> (DVec3, f64) {
 
 /// The nodes, root first, and each light's way from the root: bit k is set where it is in the second child at level k.
 pub(super) fn build(lights: &[Bounds]) -> (Vec<LightNode>, Vec<u32>) {
-    assert!(!lights.is_empty() && lights.len() <= MOST_LIGHTS, "{} lights", lights.len());
+    assert!(!lights.is_empty() && lights.len() <= MAX_LIGHTS, "{} lights", lights.len());
     let mut tree = Tree { lights, nodes: vec![LightNode::default()], trails: vec![0; lights.len()] };
     let mut all: Vec<u32> = (0..lights.len() as u32).collect();
     tree.fill(0, &mut all, 0, 0);

@@ -17,7 +17,7 @@ use crate::scene::flatten::FlatScene;
 use crate::scene::{AlphaMode, Geometry, Light, LightKind, Material, TriangleMesh};
 
 /// More lights with a position than these are chosen from a tree.
-const MOST_BY_POWER: usize = 256;
+const MAX_BY_POWER: usize = 256;
 
 const TWO_SIDED: u32 = 1;
 const MIRRORED: u32 = 2;
@@ -135,7 +135,7 @@ impl Lights {
             lights.environment = Some(index).filter(|&k| k != INVALID);
         }
         let placed = all.bounds.len();
-        if placed > MOST_BY_POWER && placed <= light_tree::MOST_LIGHTS {
+        if placed > MAX_BY_POWER && placed <= light_tree::MAX_LIGHTS {
             let (nodes, trails) = light_tree::build(&all.bounds);
             for (record, trail) in all.records.iter_mut().zip(trails) {
                 record.trail = trail;

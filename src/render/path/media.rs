@@ -8,7 +8,7 @@ use crate::scene::{Geometry, Instance, Material};
 use crate::tracer::shading::{absorbs, is_medium};
 
 /// Volumes that a path can be in at once.
-const MOST_NESTED: usize = 4;
+const MAX_NESTED: usize = 4;
 
 /// Directions along which it is asked whether a point is inside; of no scene's symmetry. The majority decides, should one pass through an edge.
 const DIRECTIONS: [DVec3; 3] = [
@@ -65,11 +65,11 @@ impl Bodies {
 
     /// The volumes around a point (relative to the scene's origin), the innermost first: those out of whose surfaces a ray from there comes more often
     /// than it goes in, in the order in which it leaves them. [`INVALID`] at the end.
-    pub fn around(&self, point: DVec3) -> [u32; MOST_NESTED] {
+    pub fn around(&self, point: DVec3) -> [u32; MAX_NESTED] {
         let by_direction = DIRECTIONS.map(|d| self.along(point, d));
         // what two of the three say; where all differ, the first
         let most = by_direction.iter().find(|a| by_direction.iter().filter(|b| b == a).count() > 1).unwrap_or(&by_direction[0]);
-        let mut stack = [INVALID; MOST_NESTED];
+        let mut stack = [INVALID; MAX_NESTED];
         stack.iter_mut().zip(most).for_each(|(slot, &material)| *slot = material);
         stack
     }

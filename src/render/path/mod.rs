@@ -60,7 +60,7 @@ pub enum Strategy {
 }
 
 impl Strategy {
-    fn draws_lights(self) -> bool {
+    fn samples_lights(self) -> bool {
         matches!(self, Strategy::Mis | Strategy::Light)
     }
 }
@@ -330,7 +330,7 @@ struct Paths {
     /// How many rays each bounce and its light samples traced.
     counts: Buffer,
     max_depth: u32,
-    draws_lights: bool,
+    samples_lights: bool,
     traced: Traced,
     lights: u32,
     light_tree: bool,
@@ -437,8 +437,8 @@ impl Paths {
             ..Default::default()
         };
         let states = [keep(states()?), keep(states()?)];
-        let draws_lights = options.strategy.draws_lights() && !lights.records.is_empty() && options.view.is_none();
-        let walls = match has_clear_walls && draws_lights {
+        let samples_lights = options.strategy.samples_lights() && !lights.records.is_empty() && options.view.is_none();
+        let walls = match has_clear_walls && samples_lights {
             true => Some(Walls {
                 stream: tracer.specialized(&shaders::PATH_SHADOW_WALLS_CLOSEST, &constants)?,
                 later: RayQueue::new(device, most)?,
@@ -483,9 +483,9 @@ impl Paths {
             bodies: has_media.then(|| Bodies::new(flat)),
             counts: Buffer::new(device, "numbers of rays", 4 * 2 * u64::from(BOUNCES + 1), Memory::Readback)?,
             max_depth: most_depth(options),
-            draws_lights,
+            samples_lights,
             traced: Traced::default(),
-            lights: if options.strategy.draws_lights() { lights.count() } else { 0 },
+            lights: if options.strategy.samples_lights() { lights.count() } else { 0 },
             light_tree: !lights.tree.is_empty(),
             features,
             _buffers: buffers,
@@ -507,7 +507,7 @@ impl Paths {
 
     /// Traces the rays to lights that a vertex left; notes how many in place `slot`.
     fn record_shadow(&self, r: &mut crate::gpu::Recorder, push: Push, most: u32, slot: u32) {
-        if !self.draws_lights {
+        if !self.samples_lights {
             return;
         }
         r.barrier();
@@ -529,7 +529,7 @@ impl Paths {
     /// Traces rays to lights that have come through a wall, wall after wall, until none is left.
     fn trace_behind_walls(&mut self, commands: &mut Commands, push: Push) -> Result<Vec<Timing>> {
         let mut timings = Vec::new();
-        let Some(walls) = self.walls.as_ref().filter(|_| self.draws_lights) else { return Ok(timings) };
+        let Some(walls) = self.walls.as_ref().filter(|_| self.samples_lights) else { return Ok(timings) };
         let queues = [&self.shadow_queue, &walls.later];
         // those that vertices left went from the first queue to the second
         let mut from = 1;

@@ -12,9 +12,9 @@ use crate::tracer::{Push, Tracer};
 /// Words of the sums, and which of them counts the rays that are listed: shaders/common/budget.glsl.
 const SUMS: u64 = 131;
 const LISTED: u64 = 130;
-/// Rounds of the pass: wishes at levels far apart, at levels between two of them, and the rays.
-const STAGES: [(&str, u32); 4] = [("budget wishes", 1), ("budget sums", SHARE), ("budget sums", SHARE), ("budget rays", 1)];
-/// One of so many pixels speaks for all where wishes are added up.
+/// Rounds of the pass: desired_samples at levels far apart, at levels between two of them, and the rays.
+const STAGES: [(&str, u32); 4] = [("budget desired_samples", 1), ("budget sums", SHARE), ("budget sums", SHARE), ("budget rays", 1)];
+/// One of so many pixels speaks for all where desired_samples are added up.
 const SHARE: u32 = 16;
 
 /// The pass and its memory.
@@ -26,7 +26,7 @@ pub(super) struct BudgetPass {
     plan: Buffer,
     list: Buffer,
     taken: Buffer,
-    wishes: Buffer,
+    desired_samples: Buffer,
     sums: Buffer,
     samples: Buffer,
 }
@@ -36,7 +36,7 @@ impl BudgetPass {
         let device = tracer.device();
         let pixels = u64::from(size[0]) * u64::from(size[1]);
         let places = Block { origin: [0, 0], size }.rays();
-        let most_rays = Settings::MOST_SHARE * settings.rays_per_pixel;
+        let most_rays = Settings::MAX_SHARE * settings.rays_per_pixel;
         let image = |name: &str, bytes: u64| Buffer::new(device, name, bytes * pixels, Memory::Device);
         Ok(Self {
             pipeline: shaders::BUDGET.pipeline(device)?,
@@ -46,8 +46,8 @@ impl BudgetPass {
             list: image("list of rays", 4 * u64::from(most_rays))?,
             // sequences may begin anywhere
             taken: image("rays taken", 4)?,
-            wishes: Buffer::new(device, "wishes", 8 * u64::from(places), Memory::Device)?,
-            sums: Buffer::new(device, "sums of wishes", 4 * SUMS, Memory::Device)?,
+            desired_samples: Buffer::new(device, "desired_samples", 8 * u64::from(places), Memory::Device)?,
+            sums: Buffer::new(device, "sums of desired_samples", 4 * SUMS, Memory::Device)?,
             samples: image("samples", 4 * u64::from(most_rays))?,
         })
     }
@@ -60,7 +60,7 @@ impl BudgetPass {
             plan: self.plan.address(),
             list: self.list.address(),
             taken: self.taken.address(),
-            wishes: self.wishes.address(),
+            desired_samples: self.desired_samples.address(),
             budget_sums: self.sums.address(),
             ..others
         }

@@ -1,7 +1,7 @@
 //! Device memory of a frame's passes: a record a pixel each, and parameters.
 
 use super::bent::Bent;
-use super::params::{FrameParams, MOST_MOVED, MovedRecord};
+use super::params::{FrameParams, MAX_MOVED, MovedRecord};
 use super::settings::Settings;
 use crate::error::Result;
 use crate::gpu::{Buffer, Memory};
@@ -45,7 +45,7 @@ impl Images {
         Ok(Self {
             block_params: upload("block parameters", size_of::<BlockParams>())?,
             frame_params: upload("frame parameters", size_of::<FrameParams>())?,
-            moved: upload("what moved", MOST_MOVED * size_of::<MovedRecord>())?,
+            moved: upload("what moved", MAX_MOVED * size_of::<MovedRecord>())?,
             surface: image("surfaces", SURFACE_BYTES)?,
             axes: maybe(settings.hemisphere == Hemisphere::Shading, "axes of hemispheres", 12)?,
             guides: [image("guide", 8)?, image("guide", 8)?],

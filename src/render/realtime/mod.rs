@@ -35,7 +35,7 @@ use passes::Passes;
 pub use settings::{Budget, Filter, FilterKind, Preset, Resolution, Settings, Technique};
 
 /// Launches of a submission: between them others get their turn on the device.
-const MOST_LAUNCHES: usize = 8;
+const MAX_LAUNCHES: usize = 8;
 /// Distance from a pixel's plane, in footprints of the pixel, at which its neighbours belong to another surface.
 pub(super) const DEPTH_TOLERANCE: f32 = 1.5;
 /// Cosine between normals, likewise.
@@ -112,7 +112,7 @@ impl Realtime {
     /// [`Error::Usage`] for settings out of range, [`Error::OutOfMemory`], and those of compiling shaders.
     pub fn new(tracer: &Tracer, size: [u32; 2], settings: &Settings, lights: &[[f32; 3]]) -> Result<Self> {
         settings.check()?;
-        let most = if settings.budget == Budget::Variance { Settings::MOST_SHARE } else { 1 } * settings.rays_per_pixel;
+        let most = if settings.budget == Budget::Variance { Settings::MAX_SHARE } else { 1 } * settings.rays_per_pixel;
         let rays = u64::from(Block { origin: [0, 0], size }.rays()) * u64::from(most);
         if rays > u64::from(u32::MAX) {
             return Err(Error::Usage(format!(
@@ -188,7 +188,7 @@ impl Realtime {
         let pixels = self.pixels();
         let push = Push { scene: tracer.scene_address(), pass: self.images.frame_params.address(), ..Default::default() };
         let launches = self.launches(push);
-        let mut batches = launches.chunks(MOST_LAUNCHES).peekable();
+        let mut batches = launches.chunks(MAX_LAUNCHES).peekable();
         let (mut timings, mut first, mut drawn) = (Vec::new(), true, Ok(()));
         let view = View { camera: *camera, image_size: self.size, block: self.block(), at: [0.5; 2] };
         loop {

@@ -105,8 +105,8 @@ pub struct FrameParams {
     /// Rays that pixels have had, or 0.
     pub taken: u64,
     /// Deviations and samples, or 0.
-    pub wishes: u64,
-    /// Sums of wishes, or 0.
+    pub desired_samples: u64,
+    /// Sums of desired_samples, or 0.
     pub budget_sums: u64,
 }
 
@@ -121,7 +121,7 @@ pub struct MovedRecord {
 }
 
 /// Boxes that a frame's passes look at, each for every pixel.
-pub const MOST_MOVED: usize = 16;
+pub const MAX_MOVED: usize = 16;
 
 impl MovedRecord {
     /// Of what an update moved: the largest each by itself, the others in one box.
@@ -129,7 +129,7 @@ impl MovedRecord {
         let mut all: Vec<&Moved> = moved.iter().filter(|m| m.share > 0.0).collect();
         let size = |m: &Moved| m.share * m.bounds.half_area();
         all.sort_by(|a, b| size(b).total_cmp(&size(a)));
-        let single = if all.len() > MOST_MOVED { MOST_MOVED - 1 } else { all.len() };
+        let single = if all.len() > MAX_MOVED { MAX_MOVED - 1 } else { all.len() };
         let record = |m: &Moved| Self {
             lower: m.bounds.min.to_array(),
             share: m.share.min(1.0),
@@ -161,7 +161,7 @@ mod tests {
             })
             .collect();
         let records = MovedRecord::of(&moved);
-        assert_eq!(records.len(), MOST_MOVED);
+        assert_eq!(records.len(), MAX_MOVED);
         for m in &moved {
             let inside = |r: &MovedRecord| {
                 (0..3).all(|k| r.lower[k] <= m.bounds.min[k] && m.bounds.max[k] <= r.upper[k]) && r.share >= m.share

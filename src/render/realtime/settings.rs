@@ -164,7 +164,7 @@ pub struct Settings {
     pub technique: Technique,
     /// How it is found what pixels show; `None`: what costs less ([`Primary::auto`]).
     pub primary: Option<Primary>,
-    /// Rays of a pixel that is sampled in a frame; 1 to [`Settings::MOST_RAYS`].
+    /// Rays of a pixel that is sampled in a frame; 1 to [`Settings::MAX_RAYS`].
     pub rays_per_pixel: u32,
     /// Whose they are: so many on average, or each pixel's own.
     pub budget: Budget,
@@ -207,13 +207,13 @@ impl Default for Settings {
 
 impl Settings {
     /// Rays of a pixel in a frame at most.
-    pub const MOST_RAYS: u32 = 4096;
+    pub const MAX_RAYS: u32 = 4096;
     /// With a budget: rays of a pixel in a frame at most, times those that it has on average.
-    pub const MOST_SHARE: u32 = 4;
+    pub const MAX_SHARE: u32 = 4;
     /// With a budget: rays of a pixel in a frame on average at most. Four bits count them.
-    const MOST_BUDGET: u32 = 4;
+    const MAX_BUDGET: u32 = 4;
     /// Samples that a history counts at most: as many as half floats count one by one.
-    pub const MOST_SAMPLES: u32 = 2048;
+    pub const MAX_SAMPLES: u32 = 2048;
 
     /// Hits beyond this distance change nothing that can be seen: the radius, or where the falloff has faded.
     pub fn reach(&self) -> f64 {
@@ -227,7 +227,7 @@ impl Settings {
 
     /// Samples that a history counts at most.
     pub fn most_samples(&self) -> u32 {
-        (self.history.saturating_mul(self.rays_per_pixel)).min(Self::MOST_SAMPLES).max(self.rays_per_pixel)
+        (self.history.saturating_mul(self.rays_per_pixel)).min(Self::MAX_SAMPLES).max(self.rays_per_pixel)
     }
 
     /// Are the numbers in their ranges?
@@ -236,15 +236,15 @@ impl Settings {
     /// [`Error::Usage`], naming the first that is not.
     pub fn check(&self) -> Result<()> {
         let wrong = |what: &str| Err(Error::Usage(what.to_owned()));
-        if !(1..=Self::MOST_RAYS).contains(&self.rays_per_pixel) {
-            return wrong(&format!("rays per pixel must be 1 to {}", Self::MOST_RAYS));
+        if !(1..=Self::MAX_RAYS).contains(&self.rays_per_pixel) {
+            return wrong(&format!("rays per pixel must be 1 to {}", Self::MAX_RAYS));
         }
         if self.budget == Budget::Variance
-            && (self.rays_per_pixel > Self::MOST_BUDGET || self.history < 2 || self.technique != Technique::Traced)
+            && (self.rays_per_pixel > Self::MAX_BUDGET || self.history < 2 || self.technique != Technique::Traced)
         {
             return wrong(&format!(
                 "a budget by variance needs traced rays, a history, and 1 to {} rays per pixel",
-                Self::MOST_BUDGET
+                Self::MAX_BUDGET
             ));
         }
         if self.history == 0 {

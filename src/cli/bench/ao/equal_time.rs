@@ -12,7 +12,7 @@ use crate::render::realtime::Settings;
 /// Frames that are timed while the number of rays is looked for.
 const PROBE_FRAMES: u32 = 8;
 /// Rays a pixel at most.
-const MOST_RAYS: u32 = 256;
+const MAX_RAYS: u32 = 256;
 /// Times that the number is corrected by what the whole run took.
 const CORRECTIONS: u32 = 3;
 
@@ -35,10 +35,10 @@ pub fn find(shot: &Shot, view: &ViewRecord, truth: &Truth, frames: u32) -> Resul
     let fits =
         |rays: u32| -> Result<bool> { Ok(ms(&shot.tremble(&settings(rays), PROBE_FRAMES)?.1, PROBE_FRAMES) <= their_ms) };
     let (mut fit, mut beyond) = (1, 2);
-    while beyond <= MOST_RAYS && fits(beyond)? {
+    while beyond <= MAX_RAYS && fits(beyond)? {
         (fit, beyond) = (beyond, 2 * beyond);
     }
-    while beyond - fit > 1 && fit < MOST_RAYS {
+    while beyond - fit > 1 && fit < MAX_RAYS {
         let middle = fit + (beyond - fit) / 2;
         if fits(middle)? {
             fit = middle;

@@ -23,7 +23,7 @@ use args::{FalloffChoice, Part};
 
 use super::scenes::check_there;
 use crate::cli::console::{Console, Failure};
-use crate::cli::interrupt::{self, Keyboard};
+use crate::cli::interrupt::{self, ProgressControl};
 use crate::cli::progress::Progress;
 use crate::error::{Error, Result};
 use crate::gpu::Device;
@@ -51,7 +51,7 @@ pub fn run(args: &BenchAoArgs) -> Result<(), Failure> {
         console,
         device: &device,
         kind,
-        keyboard: Keyboard { progress: Progress::new("measuring", &console), keep_partial: false },
+        keyboard: ProgressControl { progress: Progress::new("measuring", &console), keep_partial: false },
         start,
         out: AoBenchmark {
             version: env!("CARGO_PKG_VERSION").to_owned(),
@@ -95,7 +95,7 @@ struct Bench<'a> {
     console: Console,
     device: &'a Arc<Device>,
     kind: TracerKind,
-    keyboard: Keyboard,
+    keyboard: ProgressControl,
     start: Instant,
     out: AoBenchmark,
     /// Those that are done, and all of them.

@@ -129,7 +129,7 @@ impl Shot<'_> {
             return Ok(None);
         }
         let mut realtime = self.realtime(&settings)?;
-        let most = settings.history.min(Settings::MOST_SAMPLES).saturating_mul(settings.resolution.period()) + PATIENCE;
+        let most = settings.history.min(Settings::MAX_SAMPLES).saturating_mul(settings.resolution.period()) + PATIENCE;
         let mut laps = Laps::default();
         let mut frames = None;
         for frame in 0..most {

@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use super::peer::Peer;
 use crate::cli::bench::process::PeerError;
-use crate::cli::interrupt::Unshown;
+use crate::cli::interrupt::SilentControl;
 use crate::error::Result;
 use crate::render::camera::CameraRecord;
 use crate::render::path::{PathIntegrator, PathOptions};
@@ -20,7 +20,7 @@ const CHUNK_SECONDS: f64 = 2.0;
 /// Sample counts go up by this: powers of four are what stratifying samplers do best with.
 pub const STEP: u32 = 4;
 /// Images of a reference at least: two for each half.
-const LEAST_CHUNKS: u32 = 4;
+const MIN_CHUNKS: u32 = 4;
 
 /// An image and what it took.
 pub struct Shot {
@@ -74,7 +74,7 @@ impl<'a> Engine<'a> {
         match self {
             Self::Own { tracer, camera, integrator } => {
                 let start = Instant::now();
-                let result = integrator.render(tracer, camera, spp, seed, &mut Unshown)?;
+                let result = integrator.render(tracer, camera, spp, seed, &mut SilentControl)?;
                 let seconds = start.elapsed().as_secs_f64();
                 let rays = result.image.primary_rays + result.bounce_rays + result.shadow_rays;
                 let longest = result.image.longest_launch;
@@ -116,14 +116,14 @@ pub fn truth(
     let mut spp = 4;
     loop {
         let shot = engine.render(peers, spp, REFERENCE_SEED)?;
-        if shot.seconds * f64::from(STEP) > CHUNK_SECONDS.min(limit / f64::from(LEAST_CHUNKS)) || spp * STEP > most_spp {
+        if shot.seconds * f64::from(STEP) > CHUNK_SECONDS.min(limit / f64::from(MIN_CHUNKS)) || spp * STEP > most_spp {
             break;
         }
         spp *= STEP;
     }
     let (mut halves, mut seconds, mut chunks) = ([Vec::new(), Vec::new()], 0.0, 0u32);
     // as many in one half as in the other
-    while chunks < LEAST_CHUNKS || seconds < limit || chunks % 2 == 1 {
+    while chunks < MIN_CHUNKS || seconds < limit || chunks % 2 == 1 {
         let shot = engine.render(peers, spp, REFERENCE_SEED + 1 + chunks)?;
         let half: &mut Vec<f64> = &mut halves[chunks as usize % 2];
         half.resize(shot.image.len(), 0.0);

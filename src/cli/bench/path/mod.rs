@@ -18,7 +18,7 @@ use super::contestant::peer_kernel;
 use super::peers_file::{self, Measures, PeerSpec};
 use super::process::PeerError;
 use crate::cli::console::{Console, Failure};
-use crate::cli::interrupt::{self, Keyboard};
+use crate::cli::interrupt::{self, ProgressControl};
 use crate::cli::progress::Progress;
 use crate::error::{Error, Result};
 use crate::gpu::Device;
@@ -32,7 +32,7 @@ use crate::scene::flatten::FlatScene;
 use crate::tracer::{BuildOptions, ComputeOptions, Needs, Tracer, TracerKind};
 
 /// Paths of a pixel in one image at most.
-const MOST_SPP: u32 = 1 << 16;
+const MAX_SPP: u32 = 1 << 16;
 /// Steps of the progress bar for one scene.
 const STEPS: u64 = 1000;
 /// Share of a scene's bar that its references get.
@@ -56,7 +56,7 @@ pub fn run(args: &BenchPathArgs) -> Result<(), Failure> {
         device: &device,
         kind,
         peers: Vec::new(),
-        keyboard: Keyboard { progress: Progress::new("measuring", &console), keep_partial: false },
+        keyboard: ProgressControl { progress: Progress::new("measuring", &console), keep_partial: false },
         start,
         out: PathBenchmark {
             version: env!("CARGO_PKG_VERSION").to_owned(),
@@ -96,7 +96,7 @@ struct Bench<'a> {
     device: &'a Arc<Device>,
     kind: TracerKind,
     peers: Vec<Peer>,
-    keyboard: Keyboard,
+    keyboard: ProgressControl,
     start: Instant,
     out: PathBenchmark,
     /// Scenes that are done, and all of them.
@@ -195,7 +195,7 @@ impl<'a> Bench<'a> {
         };
         let mut truths = Vec::new();
         let own = |strategy| -> Result<Engine> {
-            let options = PathOptions { size, spp: MOST_SPP, strategy, ..PathOptions::default() };
+            let options = PathOptions { size, spp: MAX_SPP, strategy, ..PathOptions::default() };
             Engine::own(&tracer, &flat, camera, &options)
         };
         let mut referee = own(path::Strategy::Mis)?;
@@ -277,7 +277,7 @@ impl<'a> Bench<'a> {
         let Self { keyboard, peers, args, jobs, .. } = self;
         let (jobs, before) = (*jobs, record.references.len() as f64);
         let limit = args.reference_seconds();
-        let truth = truth(engine, peers, limit, MOST_SPP, &mut |share| {
+        let truth = truth(engine, peers, limit, MAX_SPP, &mut |share| {
             advance(keyboard, jobs, REFERENCES * (before + share) / of as f64);
         })?;
         let mean = truth.image.iter().map(|v| f64::from(*v)).sum::<f64>() / truth.image.len() as f64;
@@ -295,7 +295,7 @@ impl<'a> Bench<'a> {
                 _ => format!("{scene}: round {round} of {}", rounds - 1),
             });
             let (mut spp, mut going) = (1u32, true);
-            while going && spp <= MOST_SPP {
+            while going && spp <= MAX_SPP {
                 going = false;
                 for entry in entries.iter_mut() {
                     let wanted = match round {
@@ -343,7 +343,7 @@ impl<'a> Bench<'a> {
 }
 
 /// Moves the bar: this share of the scene is done.
-fn advance(keyboard: &mut Keyboard, jobs: (u64, u64), share: f64) {
+fn advance(keyboard: &mut ProgressControl, jobs: (u64, u64), share: f64) {
     let steps = (share.clamp(0.0, 1.0) * STEPS as f64) as u64;
     keyboard.progress.set(jobs.0 * STEPS + steps, jobs.1 * STEPS);
 }
