@@ -21,7 +21,7 @@ const uint BSDF_DIELECTRIC = 4u;  // microfacets that reflect and refract, `eta`
 const uint BSDF_MIRROR = 5u;      // reflects `tint` of all light
 
 // A layer over another: clearcoat.
-struct Coat {
+struct Clearcoat {
     float weight;
     vec3 normal;  // in the frame
     Microfacets facets;
@@ -38,7 +38,7 @@ struct Sheen {
 struct LobeProbabilities {
     float interface_;  // specular reflection and transmission
     float diffuse;
-    float coat;
+    float clearcoat;
     float sheen;
 };
 
@@ -57,7 +57,7 @@ struct Bsdf {
     bool volume;       // what is transmitted is refracted; else it goes straight on, through thin walls
     Microfacets facets;
     float base_transmittance;  // with energy compensation: share of light that reaches what is under the interface
-    Coat coat;
+    Clearcoat clearcoat;
     Sheen sheen;
     LobeProbabilities probabilities;
     vec3 ng;           // geometric normal in the frame, on the viewer's side
@@ -92,7 +92,7 @@ Bsdf black_bsdf() {
     b.dielectric_f90 = b.dielectric_weight = b.eta = b.base_transmittance = 1.0;
     b.volume = false;
     b.facets = Microfacets(vec2(1.0), false);
-    b.coat = Coat(0.0, vec3(0.0, 0.0, 1.0), b.facets);
+    b.clearcoat = Clearcoat(0.0, vec3(0.0, 0.0, 1.0), b.facets);
     b.sheen = Sheen(vec3(0.0), 1.0, 1.0);
     b.probabilities = LobeProbabilities(0.0, 0.0, 0.0, 0.0);
     b.ng = vec3(0.0, 0.0, 1.0);
@@ -122,7 +122,7 @@ bool is_kind(Bsdf b, uint kind, bool feature) { return feature && b.kind == kind
 // Is there anything that samples of the BSDF alone can find?
 bool has_smooth_part(Bsdf b) {
     if (is_kind(b, BSDF_MIRROR, HAS_MIRROR)) return true;
-    if (is_kind(b, BSDF_GLTF, HAS_GLTF)) return is_smooth(b.facets) || HAS_CLEARCOAT && b.coat.weight > 0.0 && is_smooth(b.coat.facets);
+    if (is_kind(b, BSDF_GLTF, HAS_GLTF)) return is_smooth(b.facets) || HAS_CLEARCOAT && b.clearcoat.weight > 0.0 && is_smooth(b.clearcoat.facets);
     return (is_kind(b, BSDF_CONDUCTOR, HAS_CONDUCTOR) || is_kind(b, BSDF_DIELECTRIC, HAS_GLASS)) && is_smooth(b.facets);
 }
 

@@ -1,8 +1,8 @@
-// glTF 2.0's material (appendix B) with its extensions: a coat over fibres over an interface, which reflects and lets light through to what
+// glTF 2.0's material (appendix B) with its extensions: a clearcoat over fibres over an interface, which reflects and lets light through to what
 // scatters below it, or to the other side. docs/materials.md has the formulas. Part of bsdf/bsdf.glsl.
 #ifndef BSDF_GLTF_
 #define BSDF_GLTF_
-#include "bsdf/coat.glsl"
+#include "bsdf/clearcoat.glsl"
 #include "bsdf/sheen.glsl"
 
 bool has_transmission() { return HAS_THIN_WALLS || HAS_VOLUMES; }
@@ -90,8 +90,8 @@ void set_probabilities(inout Bsdf b, float cos_o) {
         w.xy *= b.sheen.kept;
         w.w = 1.0 - b.sheen.kept;
     }
-    if (HAS_CLEARCOAT && b.coat.weight > 0.0) {
-        w.z = b.coat.weight * coat_fresnel(cos_o);
+    if (HAS_CLEARCOAT && b.clearcoat.weight > 0.0) {
+        w.z = b.clearcoat.weight * clearcoat_fresnel(cos_o);
         w.xyw *= 1.0 - w.z;
     }
     float sum = w.x + w.y + w.z + w.w;
@@ -101,7 +101,7 @@ void set_probabilities(inout Bsdf b, float cos_o) {
 
 bool gltf_has_rough_part(Bsdf b) {
     if (b.probabilities.diffuse > 0.0 || HAS_SHEEN && b.probabilities.sheen > 0.0) return true;
-    if (HAS_CLEARCOAT && b.probabilities.coat > 0.0 && !is_smooth(b.coat.facets)) return true;
+    if (HAS_CLEARCOAT && b.probabilities.clearcoat > 0.0 && !is_smooth(b.clearcoat.facets)) return true;
     return !is_smooth(b.facets) && b.probabilities.interface_ > 0.0;
 }
 
@@ -148,12 +148,12 @@ BsdfValue gltf_eval(Bsdf b, vec3 wo, vec3 wi) {
         }
     }
     value.f *= shadowing(b.ng, FRAME_NORMAL, wi);
-    if (HAS_CLEARCOAT && b.coat.weight > 0.0) {
-        value.f *= coat_transmits(b.coat, wo) * coat_transmits(b.coat, wi);
-        if (up && !is_smooth(b.coat.facets)) {
-            BsdfValue coat = coat_at(b.coat, wo, wi);
-            value.f += coat.f * shadowing(b.ng, coat_normal(b.coat, wo), wi);
-            value.pdf += b.probabilities.coat * coat.pdf;
+    if (HAS_CLEARCOAT && b.clearcoat.weight > 0.0) {
+        value.f *= clearcoat_transmits(b.clearcoat, wo) * clearcoat_transmits(b.clearcoat, wi);
+        if (up && !is_smooth(b.clearcoat.facets)) {
+            BsdfValue clearcoat = clearcoat_at(b.clearcoat, wo, wi);
+            value.f += clearcoat.f * shadowing(b.ng, clearcoat_normal(b.clearcoat, wo), wi);
+            value.pdf += b.probabilities.clearcoat * clearcoat.pdf;
         }
     }
     return value;
@@ -163,7 +163,7 @@ BsdfValue gltf_eval(Bsdf b, vec3 wo, vec3 wi) {
 float layers_transmit(Bsdf b, vec3 wo, vec3 wi) {
     float left = 1.0;
     if (HAS_SHEEN && b.sheen.kept < 1.0) left *= min(b.sheen.kept, sheen_kept(b.sheen, abs(wi.z)));
-    if (HAS_CLEARCOAT && b.coat.weight > 0.0) left *= coat_transmits(b.coat, wo) * coat_transmits(b.coat, wi);
+    if (HAS_CLEARCOAT && b.clearcoat.weight > 0.0) left *= clearcoat_transmits(b.clearcoat, wo) * clearcoat_transmits(b.clearcoat, wi);
     return left;
 }
 
@@ -209,13 +209,13 @@ BsdfSample gltf_sample(Bsdf b, vec3 wo, vec2 u, float v) {
         return NO_SAMPLE;
     }
     if (v < b.probabilities.interface_ + b.probabilities.diffuse) return proposed(cosine_hemisphere(u), 1.0);
-    if (HAS_CLEARCOAT && v < b.probabilities.interface_ + b.probabilities.diffuse + b.probabilities.coat) {
-        vec3 m = coat_microfacet(b.coat, wo, u);
+    if (HAS_CLEARCOAT && v < b.probabilities.interface_ + b.probabilities.diffuse + b.probabilities.clearcoat) {
+        vec3 m = clearcoat_microfacet(b.clearcoat, wo, u);
         vec3 wi = 2.0 * dot(wo, m) * m - wo;
         if (!(wi.z > 0.0)) return NO_SAMPLE;
-        if (!is_smooth(b.coat.facets)) return proposed(wi, 1.0);
-        float weight = b.coat.weight * coat_fresnel(dot(wo, m)) / b.probabilities.coat;
-        return BsdfSample(wi, vec3(weight), b.probabilities.coat, true, 1.0);
+        if (!is_smooth(b.clearcoat.facets)) return proposed(wi, 1.0);
+        float weight = b.clearcoat.weight * clearcoat_fresnel(dot(wo, m)) / b.probabilities.clearcoat;
+        return BsdfSample(wi, vec3(weight), b.probabilities.clearcoat, true, 1.0);
     }
     if (HAS_SHEEN && b.probabilities.sheen > 0.0) return proposed(uniform_hemisphere(u), 1.0);
     return NO_SAMPLE;

@@ -21,16 +21,16 @@ struct ShadingRecord {
     vec3 eta;              // conductor
     float transmission;
     vec3 k;
-    float coat;
+    float clearcoat;
     vec3 transmitted;      // glass: factor of what is refracted
-    float coat_roughness;
+    float clearcoat_roughness;
     vec3 sheen_color;
     float sheen_roughness;
     vec3 absorption;       // per unit of length in the volume
     uint walls;            // WALLS_*
     vec2 anisotropy;       // strength times cosine and sine of its angle from the tangent
     float normal_scale;
-    float coat_normal_scale;
+    float clearcoat_normal_scale;
     uint glass_layer;      // of the albedo tables: among the indices of refraction
     int priority;          // of a volume among those that overlap (path/media.glsl)
     uint shading_reserved0;
@@ -203,10 +203,10 @@ vec2 gltf_bsdf(inout Bsdf b, Looked looked, uint m, vec3 base, bool front, float
         b.sheen = Sheen(SHADING_OF(m).sheen_color * looked.at[USE_SHEEN].rgb, max(r * r, MIN_SHEEN_ALPHA), 1.0);
         b.sheen.kept = sheen_kept(b.sheen, cos_o);
     }
-    if (HAS_CLEARCOAT && SHADING_OF(m).coat > 0.0) {
-        float r = SHADING_OF(m).coat_roughness * looked.at[USE_CLEARCOAT_ROUGHNESS].g;
-        b.coat.weight = SHADING_OF(m).coat * looked.at[USE_CLEARCOAT].r;
-        b.coat.facets = Microfacets(vec2(r * r), false);
+    if (HAS_CLEARCOAT && SHADING_OF(m).clearcoat > 0.0) {
+        float r = SHADING_OF(m).clearcoat_roughness * looked.at[USE_CLEARCOAT_ROUGHNESS].g;
+        b.clearcoat.weight = SHADING_OF(m).clearcoat * looked.at[USE_CLEARCOAT].r;
+        b.clearcoat.facets = Microfacets(vec2(r * r), false);
     }
     set_interface(b, f0, specular, base, metallic, cos_o, roughness, dielectric_layer(m, front));
     set_probabilities(b, cos_o);
@@ -250,8 +250,8 @@ Shading shade(Surface s, vec3 wo, float log_side) {
         return out_;
     }
     vec4 tangent = vec4(0.0);
-    bool mapped = has_map(m, USE_NORMAL), coat_mapped = HAS_CLEARCOAT && has_map(m, USE_CLEARCOAT_NORMAL);
-    if ((mapped || coat_mapped || HAS_ANISOTROPY) && !is_null(part.tangents)) tangent = tangent_at(s, part);
+    bool mapped = has_map(m, USE_NORMAL), clearcoat_mapped = HAS_CLEARCOAT && has_map(m, USE_CLEARCOAT_NORMAL);
+    if ((mapped || clearcoat_mapped || HAS_ANISOTROPY) && !is_null(part.tangents)) tangent = tangent_at(s, part);
     if (mapped && tangent.w != 0.0) {
         n = towards(mapped_normal(looked.at[USE_NORMAL], SHADING_OF(m).normal_scale, s.ns, tangent) * side, wo);
         out_.frame = frame_about(n);
@@ -283,12 +283,12 @@ Shading shade(Surface s, vec3 wo, float log_side) {
             vec3 d = tangent.xyz * along.x + cross(s.ns, tangent.xyz) * (tangent.w * along.y);
             out_.frame = frame_along(n, d);
         }
-        if (coat_mapped && tangent.w != 0.0) {
-            vec3 nc = mapped_normal(looked.at[USE_CLEARCOAT_NORMAL], SHADING_OF(m).coat_normal_scale, s.ns, tangent) * side;
-            out_.bsdf.coat.normal = to_frame(out_.frame, towards(nc, wo));
+        if (clearcoat_mapped && tangent.w != 0.0) {
+            vec3 nc = mapped_normal(looked.at[USE_CLEARCOAT_NORMAL], SHADING_OF(m).clearcoat_normal_scale, s.ns, tangent) * side;
+            out_.bsdf.clearcoat.normal = to_frame(out_.frame, towards(nc, wo));
         } else if (HAS_CLEARCOAT && mapped) {
-            // the coat has its own normals, or none
-            out_.bsdf.coat.normal = to_frame(out_.frame, towards(s.ns * side, wo));
+            // the clearcoat has its own normals, or none
+            out_.bsdf.clearcoat.normal = to_frame(out_.frame, towards(s.ns * side, wo));
         }
     }
     if (HAS_SHADING_NORMALS) out_.bsdf.ng = to_frame(out_.frame, out_.ng);
