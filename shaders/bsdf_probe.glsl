@@ -26,10 +26,10 @@ void any(uint index, bool occluded) {
     Shading m = shade(s, viewer, SHARP);
     vec3 wo = to_frame(m.frame, viewer);
     wo.z = max(wo.z, LEAST_COSINE);
-    BsdfSample drawn = BsdfSample(given, vec3(0.0), 0.0, false, 1.0);
-    if (c.w != 0u) drawn = draw_direction(m, wo, given.xy, given.z);
-    BsdfValue value = vertex_at(m, wo, drawn.wi);
-    store_quad(probe.outputs, 3u * index, vec4(value.f, c.w != 0u ? drawn.pdf : value.pdf));
-    store_quad(probe.outputs, 3u * index + 1u, vec4(drawn.wi, drawn.delta ? 1.0 : 0.0));
-    store_quad(probe.outputs, 3u * index + 2u, vec4(drawn.weight, drawn.eta));
+    BsdfSample sampled = BsdfSample(given, vec3(0.0), 0.0, false, 1.0);
+    if (c.w != 0u) sampled = sample_direction(m, wo, given.xy, given.z);
+    BsdfValue value = vertex_at(m, wo, sampled.wi);
+    store_quad(probe.outputs, 3u * index, vec4(value.f, c.w != 0u ? sampled.pdf : value.pdf));
+    store_quad(probe.outputs, 3u * index + 1u, vec4(sampled.wi, sampled.delta ? 1.0 : 0.0));
+    store_quad(probe.outputs, 3u * index + 2u, vec4(sampled.weight, sampled.eta));
 }

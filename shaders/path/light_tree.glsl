@@ -44,7 +44,7 @@ float light_importance(LightNode node, vec3 from) {
 }
 
 // A light, and the probability with which it is chosen; 0: no light reaches the point. u: in [0, 1), and what is left of it.
-float draw_leaf(uvec2 tree, vec3 from, inout float u, out uint light) {
+float sample_leaf(uvec2 tree, vec3 from, inout float u, out uint light) {
     LightNodes nodes = LightNodes(tree);
     LightNode node = nodes.v[0];
     float probability = 1.0, share = 1.0;
@@ -72,7 +72,7 @@ float draw_leaf(uvec2 tree, vec3 from, inout float u, out uint light) {
     return probability;
 }
 
-// With which probability draw_leaf draws a light; trail: at each level from the root, is it in the second child?
+// With which probability sample_leaf draws a light; trail: at each level from the root, is it in the second child?
 float leaf_probability(uvec2 tree, vec3 from, uint trail) {
     LightNodes nodes = LightNodes(tree);
     LightNode node = nodes.v[0];

@@ -306,7 +306,7 @@ LightSample sample_light(PathParams p, vec3 from, Shading m, uvec2 bits) {
     LightRecord light = lights.v[k];
     if (is_kind(light, LIGHT_TREE)) {
         float of_tree = light.probability;
-        float of_leaf = draw_leaf(p.light_tree, from, v.x, k);
+        float of_leaf = sample_leaf(p.light_tree, from, v.x, k);
         if (!(of_leaf > 0.0)) return NO_LIGHT_SAMPLE;
         light = lights.v[k];
         light.probability = of_tree * of_leaf;

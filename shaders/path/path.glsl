@@ -58,7 +58,7 @@ BsdfValue vertex_at(Shading m, vec3 wo, vec3 w) {
 }
 
 // A direction by the strategy that is asked for; in the world.
-BsdfSample draw_direction(Shading m, vec3 wo, vec2 u, float v) {
+BsdfSample sample_direction(Shading m, vec3 wo, vec2 u, float v) {
     Bsdf b = m.bsdf;
     // a delta lobe can be sampled in one way only, and these know reflection only
     bool plain = (WITH_COSINE_SAMPLING || WITH_UNIFORM_SAMPLING) && has_rough_part(b) && !has_smooth_part(b) && b.transmitted == vec3(0.0);
@@ -93,7 +93,7 @@ vec3 transmittance(uint medium, float length_) {
 }
 
 // Next-event estimation: a ray to a light, and what that brings.
-void draw_light(BlockParams block, PathParams p, uint k, PathState state, Surface s, Shading m, vec3 wo, uint beyond, uvec2 pixel, uint n, uint dimension) {
+void sample_direct_light(BlockParams block, PathParams p, uint k, PathState state, Surface s, Shading m, vec3 wo, uint beyond, uvec2 pixel, uint n, uint dimension) {
     dimension += LIGHT_POINT_ON;
     uvec2 bits = WITH_LIGHT_TREE ? sample_choice_bits(block.seed, pixel, n, dimension) : sample_2d_bits(block.seed, pixel, n, dimension);
     LightSample l = sample_light(p, s.position, m, bits);
@@ -226,12 +226,12 @@ vec3 path_vertex(BlockParams block, uint k, PathState state, Ray ray, Hit hit) {
     uvec2 pixel = block_pixel(block, pixel_index(state.index)) + block.block_origin;
     uint n = sample_index(state.index), dimension = PATH_FIRST + (state.depth + state.passes) * PATH_STRIDE;
     if (WITH_LIGHT_SAMPLES && has_rough_part(m.bsdf)) {
-        draw_light(block, p, k, state, s, m, wo, boundary.medium, pixel, n, dimension);
+        sample_direct_light(block, p, k, state, s, m, wo, boundary.medium, pixel, n, dimension);
     }
 
     // after the last bounce only what is met shines
     vec2 lobe = sample_2d(block.seed, pixel, n, dimension + BSDF_LOBE);
-    BsdfSample b = draw_direction(m, wo, sample_2d(block.seed, pixel, n, dimension + BSDF_DIRECTION), lobe.x);
+    BsdfSample b = sample_direction(m, wo, sample_2d(block.seed, pixel, n, dimension + BSDF_DIRECTION), lobe.x);
     float side = dot(m.ng, b.wi);
     if (!(b.pdf > 0.0) || side == 0.0) return added;
     state.throughput *= b.weight;

@@ -2,7 +2,7 @@
 #include "common/extensions.glsl"
 #include "raster/view.glsl"
 #include "scene/material.glsl"
-#include "trace/drawn.glsl"
+#include "trace/rasterized.glsl"
 
 layout(location = 0) flat in uint primitive;
 layout(location = 0) out uvec2 visible;
@@ -10,7 +10,7 @@ layout(location = 0) out uvec2 visible;
 void main() {
     float t;
     vec2 uv;
-    meet_drawn(pixel_ray(gl_FragCoord.xy), push.first, primitive, t, uv);
+    intersect_rasterized(pixel_ray(gl_FragCoord.xy), push.first, primitive, t, uv);
     if (!alpha_passes(push.first, primitive, uv, 0.0)) discard;
     visible = uvec2(push.first + 1u, primitive);
 }

@@ -2,7 +2,7 @@
 #include "common/extensions.glsl"
 #include "raster/view.glsl"
 #include "scene/material.glsl"
-#include "trace/drawn.glsl"
+#include "trace/rasterized.glsl"
 
 layout(location = 0) flat in uint primitive;
 layout(location = 0) out uvec2 visible;

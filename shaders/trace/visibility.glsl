@@ -5,7 +5,7 @@
 #define TRACE_VISIBILITY
 #include "common/camera.glsl"
 #include "trace/callback.glsl"
-#include "trace/drawn.glsl"
+#include "trace/rasterized.glsl"
 
 layout(local_size_x = LANES) in;
 
@@ -27,7 +27,7 @@ void main() {
     uint entry = drawn.x - 1u;
     float t;
     vec2 uv;
-    meet_drawn(world, entry, drawn.y, t, uv);
+    intersect_rasterized(world, entry, drawn.y, t, uv);
     closest(index, scene_hit(t, entry, drawn.y, uv));
 }
 

@@ -123,7 +123,7 @@ impl Raster {
             targets,
             drawn: buffer(device, "drawn primitives", 8 * size[0] as u64 * size[1] as u64)?,
             params: buffer(device, "raster parameters", size_of::<RasterParams>() as u64)?,
-            stream: tracer.drawn_stream(shaders)?,
+            stream: tracer.rasterized_stream(shaders)?,
         })
     }
 

@@ -346,8 +346,8 @@ impl Tracer {
     }
 
     /// Compiles a stream of camera rays for pixels that were drawn ([`crate::render::raster`]): nothing is traced.
-    pub fn drawn_stream(&self, shaders: &'static StreamShaders) -> Result<Stream> {
-        Stream::drawn(&self.device, shaders, &stream::scene_specialization(self.features))
+    pub fn rasterized_stream(&self, shaders: &'static StreamShaders) -> Result<Stream> {
+        Stream::rasterized(&self.device, shaders, &stream::scene_specialization(self.features))
     }
 
     /// What there is to draw, entry by entry of the top level, as it is since the last [`Tracer::update`].

@@ -60,7 +60,7 @@ enum Pipeline {
     },
     RayTracing(Arc<RayTracingPipeline>),
     /// One compute shader over all rays, whose hits are known but for where.
-    Drawn(Arc<ComputePipeline>),
+    Rasterized(Arc<ComputePipeline>),
 }
 
 /// Where a launch's rays and results are between its steps.
@@ -191,12 +191,12 @@ impl Stream {
     }
 
     /// For rays whose pixels have been drawn. [`Push::rays`] is then the address of what was drawn ([`crate::render::raster`]).
-    pub(super) fn drawn(device: &Arc<Device>, shaders: &'static StreamShaders, s: &Specialization) -> Result<Self> {
+    pub(super) fn rasterized(device: &Arc<Device>, shaders: &'static StreamShaders, s: &Specialization) -> Result<Self> {
         if shaders.variant(Variant::Visibility).is_none() {
             return Err(Error::Usage(format!("the rays of '{}' are not the camera's: they cannot be drawn", shaders.name)));
         }
         let pipeline = compile(device, shaders, Variant::Visibility, s)?;
-        Ok(Self { pipeline: Pipeline::Drawn(pipeline), shaders })
+        Ok(Self { pipeline: Pipeline::Rasterized(pipeline), shaders })
     }
 
     /// Records the tracing of rays `push.first .. push.first + push.count`, timed under the names of the stream's shaders. The
@@ -205,7 +205,7 @@ impl Stream {
         if push.count == 0 {
             return;
         }
-        let in_memory = self.shaders.rays == Rays::Queue || matches!(self.pipeline, Pipeline::Drawn(_));
+        let in_memory = self.shaders.rays == Rays::Queue || matches!(self.pipeline, Pipeline::Rasterized(_));
         debug_assert_eq!(in_memory, push.rays != 0, "{}: where are its rays?", self.shaders.name);
         debug_assert!(in_memory || push.count <= LAUNCH_RAYS, "{}: results would overwrite each other", self.shaders.name);
         let pass = self.shaders.pass;
@@ -238,7 +238,7 @@ impl Stream {
                     recorder.timed(delivering, |r| r.dispatch_3d(deliver, &push, spread(push.count.div_ceil(LANES), RUN)));
                 }
             }
-            Pipeline::Drawn(pipeline) => recorder.timed(pass, |r| r.dispatch(pipeline, push, push.count.div_ceil(LANES))),
+            Pipeline::Rasterized(pipeline) => recorder.timed(pass, |r| r.dispatch(pipeline, push, push.count.div_ceil(LANES))),
             Pipeline::RayTracing(pipeline) => {
                 let rays = push.count.next_multiple_of(LANES * RUN * SPREAD);
                 recorder.timed(pass, |r| r.trace_rays(pipeline, push, rays));

@@ -14,7 +14,7 @@ Ray to_group(Ray world, uint entry) {
 
 // A rasteriser rounds corners to a fraction of a pixel, so the ray may pass the triangle by so much. Then it meets the nearest
 // point of its edge.
-void meet_drawn_triangle(Ray r, vec3 v0, vec3 v1, vec3 v2, out float t, out vec2 uv) {
+void intersect_rasterized_triangle(Ray r, vec3 v0, vec3 v1, vec3 v2, out float t, out vec2 uv) {
     Shear shear = make_shear(r.direction);
     Corner a = make_corner(shear, r.origin, v0), b = make_corner(shear, r.origin, v1), c = make_corner(shear, r.origin, v2);
     vec3 edges = vec3(edge(c, b), edge(a, c), edge(b, a));
@@ -32,7 +32,7 @@ void meet_drawn_triangle(Ray r, vec3 v0, vec3 v1, vec3 v2, out float t, out vec2
     uv = weights.yz;
 }
 
-void meet_drawn_sphere(Ray r, vec4 sphere, out float t, out vec2 uv) {
+void intersect_rasterized_sphere(Ray r, vec4 sphere, out float t, out vec2 uv) {
     uv = vec2(0.0);
     t = intersect_sphere(r.origin, r.direction, r.tmin, r.tmax, sphere.xyz, sphere.w);
     // it was met when it was drawn; a compiler that rounds otherwise may see it passed by
@@ -40,16 +40,16 @@ void meet_drawn_sphere(Ray r, vec4 sphere, out float t, out vec2 uv) {
 }
 
 // `primitive` counts in the group. Distance along the ray, and the weights of a triangle's second and third corner.
-void meet_drawn(Ray world, uint entry, uint primitive, out float t, out vec2 uv) {
+void intersect_rasterized(Ray world, uint entry, uint primitive, out float t, out vec2 uv) {
     SceneRoot root = SceneRoot(push.scene);
     Ray r = to_group(world, entry);
     // a group's parts share its vertices
     PartRecord part = PartRecords(root.parts).v[root.part_count == 1u ? 0u : InstanceRecords(root.instances).v[entry].first_part];
     if (HAS_SPHERES && is_null(part.indices)) {
-        meet_drawn_sphere(r, uintBitsToFloat(Quads(part.positions).v[primitive]), t, uv);
+        intersect_rasterized_sphere(r, uintBitsToFloat(Quads(part.positions).v[primitive]), t, uv);
     } else {
         uvec3 corners = triangle_indices(part, primitive);
-        meet_drawn_triangle(r, load_vec3(part.positions, corners.x), load_vec3(part.positions, corners.y),
+        intersect_rasterized_triangle(r, load_vec3(part.positions, corners.x), load_vec3(part.positions, corners.y),
             load_vec3(part.positions, corners.z), t, uv);
     }
 }
