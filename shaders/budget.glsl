@@ -2,8 +2,8 @@
 //
 // The variance of a pixel's mean is v / n: of one sample, by the samples that its history has. Its sum over the image is least when n is
 // in proportion to sqrt(v) (Neyman, "On the Two Different Aspects of the Representative Method", 1934), so a pixel with n samples wants
-// level * sqrt(v) - n more, between none and the most that a frame gives it; the level is where these desired_samples meet the budget. It is found
-// in two rounds, each of which adds up the desired_samples of one of sixteen pixels at 64 levels; integers, so that the sum does not depend on the
+// level * sqrt(v) - n more, between none and the most that a frame gives it; the level is where these numbers of desired samples meet the budget. It is found
+// in two rounds, each of which adds up the desired samples of one of sixteen pixels at 64 levels; integers, so that the sum does not depend on the
 // order.
 //
 // Samples that decide how many follow them bias a mean (Kirk and Arvo, "Unbiased Sampling Techniques for Image Synthesis", SIGGRAPH

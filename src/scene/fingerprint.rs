@@ -1,5 +1,5 @@
 //! Numbers that tell one scene from another by what an image of it can depend on, for images that are gone on with later. Names of files,
-//! cameras and desired_samples about rendering are no part of it.
+//! cameras and render settings are no part of it.
 
 use std::fmt::{Debug, Write};
 

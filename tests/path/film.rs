@@ -337,8 +337,7 @@ fn gpu_an_integrator_renders_again() {
         assert_eq!((first.bounce_rays, first.shadow_rays), (second.bounce_rays, second.shadow_rays), "{kind}");
         assert_ne!(first.image.film.mean, other.image.film.mean, "{kind}");
         let alone =
-            path::render(&tracer, &flat, &record, &PathOptions { spp: 2, seed: 3, ..options.clone() }, &mut NoControl)
-                .unwrap();
+            path::render(&tracer, &flat, &record, &PathOptions { spp: 2, seed: 3, ..options.clone() }, &mut NoControl).unwrap();
         assert_eq!(fewer.image.film.mean, alone.image.film.mean, "{kind}");
         let error = integrator.render(&tracer, &record, 9, 0, &mut NoControl).unwrap_err();
         assert_eq!(error.exit_code(), 64, "{error}");

@@ -110,7 +110,8 @@ pub fn run(args: &RenderArgs, start: Instant) -> Result<(), Failure> {
         let kept = done as u64 >= u64::from(warm_up);
         if kept {
             let write_start = Instant::now();
-            let pixels = if needs_aov { aov::render(&tracer, &record, size, &mut interrupt::SilentControl)? } else { Vec::new() };
+            let pixels =
+                if needs_aov { aov::render(&tracer, &record, size, &mut interrupt::SilentControl)? } else { Vec::new() };
             let image = match args.writes_exr() {
                 true => Some(write::image(args, &realtime, size, &pixels, flat.origin, report.metadata(number))?),
                 false => None,

@@ -12,9 +12,10 @@ use crate::tracer::{Push, Tracer};
 /// Words of the sums, and which of them counts the rays that are listed: shaders/common/budget.glsl.
 const SUMS: u64 = 131;
 const LISTED: u64 = 130;
-/// Rounds of the pass: desired_samples at levels far apart, at levels between two of them, and the rays.
-const STAGES: [(&str, u32); 4] = [("budget desired_samples", 1), ("budget sums", SHARE), ("budget sums", SHARE), ("budget rays", 1)];
-/// One of so many pixels speaks for all where desired_samples are added up.
+/// Rounds of the pass: desired samples at levels far apart, at levels between two of them, and the rays.
+const STAGES: [(&str, u32); 4] =
+    [("budget desired samples", 1), ("budget sums", SHARE), ("budget sums", SHARE), ("budget rays", 1)];
+/// One of so many pixels speaks for all where desired samples are added up.
 const SHARE: u32 = 16;
 
 /// The pass and its memory.
@@ -46,8 +47,8 @@ impl BudgetPass {
             list: image("list of rays", 4 * u64::from(most_rays))?,
             // sequences may begin anywhere
             taken: image("rays taken", 4)?,
-            desired_samples: Buffer::new(device, "desired_samples", 8 * u64::from(places), Memory::Device)?,
-            sums: Buffer::new(device, "sums of desired_samples", 4 * SUMS, Memory::Device)?,
+            desired_samples: Buffer::new(device, "desired samples", 8 * u64::from(places), Memory::Device)?,
+            sums: Buffer::new(device, "sums of desired samples", 4 * SUMS, Memory::Device)?,
             samples: image("samples", 4 * u64::from(most_rays))?,
         })
     }

@@ -106,7 +106,7 @@ pub struct FrameParams {
     pub taken: u64,
     /// Deviations and samples, or 0.
     pub desired_samples: u64,
-    /// Sums of desired_samples, or 0.
+    /// Sums of desired samples, or 0.
     pub budget_sums: u64,
 }
 

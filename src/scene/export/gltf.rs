@@ -21,7 +21,7 @@ use crate::scene::{
 ///
 /// Triangles, transforms, materials (core and KHR_materials extensions), textures, cameras, punctual lights and animations with skins
 /// and morph targets come back from the loader as they were (what has a rig is written at its rest). Spheres are tessellated, and counted in what is returned; what glTF has no words for (the
-/// environment, desired_samples for rendering, the `.brhan` kind of a material) is left out.
+/// environment, render settings, the `.brhan` kind of a material) is left out.
 ///
 /// # Errors
 /// [`Error::Output`], also for another extension or more than 4 GiB.

@@ -1,4 +1,4 @@
-//! `.brhan`: the text scenes of Larsen's reference path tracer. A camera, desired_samples for rendering, OBJ (or glTF) models with
+//! `.brhan`: the text scenes of Larsen's reference path tracer. A camera, render settings, OBJ (or glTF) models with
 //! transforms and materials, spheres.
 //!
 //! Spheres stay analytic. A `SphericalLight` is a sphere with an emissive material and nothing else: it is seen by camera

@@ -22,7 +22,7 @@ pub(super) struct Wanted {
 }
 
 impl Wanted {
-    /// What comes before all other desired_samples for a mesh.
+    /// What comes before all other requests for a mesh.
     pub fn first(mesh: usize) -> Self {
         Self { mesh, skin: None, weights: Weights::None }
     }
