@@ -13,8 +13,7 @@ use crate::tracer::{Push, Tracer};
 const SUMS: u64 = 131;
 const LISTED: u64 = 130;
 /// Rounds of the pass: desired samples at levels far apart, at levels between two of them, and the rays.
-const STAGES: [(&str, u32); 4] =
-    [("budget desired samples", 1), ("budget sums", SHARE), ("budget sums", SHARE), ("budget rays", 1)];
+const STAGES: [(&str, u32); 4] = [("budget wishes", 1), ("budget sums", SHARE), ("budget sums", SHARE), ("budget rays", 1)];
 /// One of so many pixels speaks for all where desired samples are added up.
 const SHARE: u32 = 16;
 
