@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
 use compiler::Compiler;
-use source::{Mode, Rays, Source, Stage, Variant};
+use source::{Mode, Rays, Source, Stage, Variant, mode, rays};
 
 // Debian's libshaderc_combined.a leaves glslang and SPIRV-Tools out; their order is that of their dependencies.
 macro_rules! libraries {
@@ -34,27 +34,6 @@ libraries!("glslang" "SPIRV" "MachineIndependent" "GenericCodeGen" "OSDependent"
 
 /// A shader that is to be compiled: its file's name in OUT_DIR, and what it is compiled from; nothing where no such shader applies.
 type Job = (String, Option<Source>);
-
-macro_rules! mode {
-    (any) => {
-        Mode::Any
-    };
-    (closest) => {
-        Mode::Closest
-    };
-}
-
-macro_rules! rays {
-    (generated) => {
-        Rays::Generated
-    };
-    (camera) => {
-        Rays::Camera
-    };
-    (queue) => {
-        Rays::Queue
-    };
-}
 
 macro_rules! registry {
     (

@@ -11,6 +11,7 @@ mod source;
 use std::borrow::Cow;
 
 pub use source::{LANES, Mode, PACKET_RAYS, RUN, Rays, SPREAD, Source, Stage, Variant};
+use source::{mode, rays};
 
 use crate::error::Result;
 
@@ -146,27 +147,6 @@ macro_rules! shader {
 macro_rules! shader {
     ($source:expr, $($file:expr),*) => {
         Shader { source: $source }
-    };
-}
-
-macro_rules! mode {
-    (any) => {
-        Mode::Any
-    };
-    (closest) => {
-        Mode::Closest
-    };
-}
-
-macro_rules! rays {
-    (generated) => {
-        Rays::Generated
-    };
-    (camera) => {
-        Rays::Camera
-    };
-    (queue) => {
-        Rays::Queue
     };
 }
 

@@ -236,3 +236,27 @@ impl fmt::Display for Source {
         }
     }
 }
+
+// the words of registry.rs
+macro_rules! mode {
+    (any) => {
+        Mode::Any
+    };
+    (closest) => {
+        Mode::Closest
+    };
+}
+
+macro_rules! rays {
+    (generated) => {
+        Rays::Generated
+    };
+    (camera) => {
+        Rays::Camera
+    };
+    (queue) => {
+        Rays::Queue
+    };
+}
+
+pub(crate) use {mode, rays};
