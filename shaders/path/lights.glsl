@@ -53,21 +53,23 @@ vec3 environment_radiance(PathParams p, vec3 w) {
     return p.environment * map_radiance(p.map, w);
 }
 
-// An environment of one colour is best sampled as a diffuse surface reflects it: by the cosine to the shading normal, on each side that light may come from.
-bool is_lit_from_behind(Shading m) { return (has_transmission() || HAS_GLASS) && m.bsdf.transmitted != vec3(0.0); }
+// Can light from behind the surface be scattered to the viewer?
+bool transmits_light(Shading m) { return (has_transmission() || HAS_GLASS) && m.bsdf.transmitted != vec3(0.0); }
 
-float uniform_sky_pdf(Shading m, vec3 w) {
+// A constant environment is sampled by the cosine to the shading normal, as a diffuse surface scatters it, on each side that light may come from. Per solid
+// angle.
+float constant_environment_pdf(Shading m, vec3 w) {
     float c = dot(m.frame.n, w) / PI;
-    return is_lit_from_behind(m) ? 0.5 * abs(c) : max(c, 0.0);
+    return transmits_light(m) ? 0.5 * abs(c) : max(c, 0.0);
 }
 
-// Direction and density.
-vec4 sample_uniform_sky(Shading m, vec2 u) {
-    bool behind = is_lit_from_behind(m) && u.x >= 0.5;
-    if (is_lit_from_behind(m)) u.x = behind ? 2.0 * u.x - 1.0 : 2.0 * u.x;
+// Direction (world), and its pdf.
+vec4 sample_constant_environment(Shading m, vec2 u) {
+    bool behind = transmits_light(m) && u.x >= 0.5;
+    if (transmits_light(m)) u.x = behind ? 2.0 * u.x - 1.0 : 2.0 * u.x;
     vec3 w = cosine_hemisphere(u);
     w = from_frame(m.frame, behind ? vec3(w.xy, -w.z) : w);
-    return vec4(w, uniform_sky_pdf(m, w));
+    return vec4(w, constant_environment_pdf(m, w));
 }
 
 // Is it of this kind? What the scene has not is not compiled; and where all are of one kind, nobody has to look.
@@ -319,7 +321,7 @@ LightSample sample_light(PathParams p, vec3 from, Shading m, uvec2 bits) {
             MapSample s = sample_map(p.map, v);
             return LightSample(s.wi, INFINITY, vec3(0.0), p.environment * s.radiance, light.probability * s.pdf, false);
         }
-        vec4 s = sample_uniform_sky(m, v);
+        vec4 s = sample_constant_environment(m, v);
         return LightSample(s.xyz, INFINITY, vec3(0.0), p.environment, light.probability * s.w, false);
     }
     if (is_kind(light, LIGHT_DIRECTIONAL)) {

@@ -48,7 +48,7 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Pa
     uvec4 camera_media;   // volumes that the camera is in
     RayQueue later;       // rays to lights that have come through thin walls
     uvec2 later_contributions;
-    uvec2 sky_densities;  // a float a path: density with which light samples at its last bounce draw its direction from an environment of one colour
+    uvec2 environment_pdfs;  // a float a path: density with which light samples at its last bounce draw its direction from an environment of one colour
 };
 
 const uint NO_MEDIUM = 0xffffffffu;

@@ -156,7 +156,7 @@ vec3 path_vertex(BlockParams block, uint k, PathState state, Ray ray, Hit hit) {
         float light = 0.0;
         if (WITH_LIGHT_SAMPLES && WITH_ENVIRONMENT && state.depth > 0u) {
             float of_sky = LightRecords(p.lights).v[p.environment_light].probability;
-            light = of_sky * (WITH_ENVIRONMENT_MAP ? map_pdf(p.map, ray.direction) : Floats(p.sky_densities).v[k]);
+            light = of_sky * (WITH_ENVIRONMENT_MAP ? map_pdf(p.map, ray.direction) : Floats(p.environment_pdfs).v[k]);
         }
         vec3 c = environment_radiance(p, ray.direction) * emission_weight(p, state, light);
         if (WITH_DISTANT_DISKS) c += disks_met(p, state, ray.direction);
@@ -246,7 +246,7 @@ vec3 path_vertex(BlockParams block, uint k, PathState state, Ray ray, Hit hit) {
         state.eta_scale *= b.eta * b.eta;
         state.depth++;
         if (WITH_CLEAR_WALLS) StoredFloats(p.straight).v[k] = 0.0;
-        if (WITH_LIGHT_SAMPLES && WITH_ENVIRONMENT && !WITH_ENVIRONMENT_MAP) StoredFloats(p.sky_densities).v[k] = uniform_sky_pdf(m, b.wi);
+        if (WITH_LIGHT_SAMPLES && WITH_ENVIRONMENT && !WITH_ENVIRONMENT_MAP) StoredFloats(p.environment_pdfs).v[k] = constant_environment_pdf(m, b.wi);
         if (state.depth >= p.rr_depth) {
             float survival = min(brightest * state.eta_scale, MAX_SURVIVAL);
             if (lobe.y >= survival) return added;

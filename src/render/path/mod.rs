@@ -33,7 +33,7 @@ use crate::tracer::{Push, Stream, Tracer};
 use environment::DeviceEnvironment;
 use lights::Lights;
 use media::Bodies;
-use params::{CONE_BYTES, INVALID, MEDIA_BYTES, PathParams, QUAD_BYTES, SKY_DENSITY_BYTES, STATE_BYTES, STRAIGHT_BYTES};
+use params::{CONE_BYTES, ENVIRONMENT_PDF_BYTES, INVALID, MEDIA_BYTES, PathParams, QUAD_BYTES, STATE_BYTES, STRAIGHT_BYTES};
 
 /// Bounces of a submission; then the host asks how many paths are left.
 const BOUNCES: u32 = 4;
@@ -371,7 +371,7 @@ impl Paths {
         };
         let features = features::features(options, flat, &lights, environment.map.texels != 0, cones);
         let [has_media, has_clear_walls] = [PathFeature::Media, PathFeature::ClearWalls].map(|f| features.contains(f));
-        let samples_constant_sky =
+        let samples_constant_environment =
             features.contains(PathFeature::LightSamples) && lights.environment.is_some() && environment.map.texels == 0;
         let constants = Specialization::default().set_all(features.constants());
         let quads = |name: &str| Buffer::new(device, name, QUAD_BYTES * most as u64, Memory::Device);
@@ -429,8 +429,10 @@ impl Paths {
                 true => keep(Buffer::new(device, "straight lengths of paths", STRAIGHT_BYTES * most as u64, Memory::Device)?),
                 false => 0,
             },
-            sky_densities: match samples_constant_sky {
-                true => keep(Buffer::new(device, "densities of the sky", SKY_DENSITY_BYTES * most as u64, Memory::Device)?),
+            environment_pdfs: match samples_constant_environment {
+                true => {
+                    keep(Buffer::new(device, "environment pdfs of paths", ENVIRONMENT_PDF_BYTES * most as u64, Memory::Device)?)
+                }
                 false => 0,
             },
             camera_media: [INVALID; 4],

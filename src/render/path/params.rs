@@ -15,7 +15,7 @@ pub(super) const MEDIA_BYTES: u64 = 16;
 /// Bytes of how far a path has come straight, where there are walls that let it.
 pub(super) const STRAIGHT_BYTES: u64 = 4;
 /// Bytes of the density with which light samples draw a path's direction, where they draw from an environment of one colour.
-pub(super) const SKY_DENSITY_BYTES: u64 = 4;
+pub(super) const ENVIRONMENT_PDF_BYTES: u64 = 4;
 /// Names no light, and no volume.
 pub(super) const INVALID: u32 = u32::MAX;
 
@@ -65,5 +65,5 @@ pub(super) struct PathParams {
     pub camera_media: [u32; 4],
     pub later: QueueRecord,
     pub later_contributions: u64,
-    pub sky_densities: u64,
+    pub environment_pdfs: u64,
 }
