@@ -4,9 +4,9 @@
 use divan::Bencher;
 use divan::counter::ItemsCount;
 use glam::{DAffine3, DVec3, Vec3};
-use skylit::bvh::{Aabb, BuildPreset, RefitPlan, Wide, build};
+use skylit::accel::flatten::{FlatScene, Motion};
+use skylit::accel::{Aabb, BuildPreset, RefitPlan, Wide, build};
 use skylit::gpu::{Device, Options};
-use skylit::scene::flatten::{FlatScene, Motion};
 use skylit::scene::{Geometry, Instance, Mesh, Scene, TriangleMesh};
 use skylit::tracer::{Changes, MeshChange, Needs, Tracer, TracerKind};
 

@@ -5,7 +5,7 @@
 use divan::Bencher;
 use divan::counter::ItemsCount;
 use glam::Vec3;
-use skylit::bvh::{Aabb, BuildPreset, Bvh2, Wide, build};
+use skylit::accel::{Aabb, BuildPreset, Bvh2, Wide, build};
 
 fn main() {
     divan::main();

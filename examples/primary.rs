@@ -10,11 +10,11 @@ use skylit::shaders;
 use std::time::Instant;
 
 use glam::DVec3;
+use skylit::accel::flatten::FlatScene;
+use skylit::film::block::{Block, BlockParams};
+use skylit::film::camera::{CameraRecord, Choice, choose};
 use skylit::gpu::{Buffer, Commands, Device, Memory, Options};
-use skylit::render::block::{Block, BlockParams};
-use skylit::render::camera::{CameraRecord, Choice, choose};
-use skylit::render::raster::{Raster, View};
-use skylit::scene::flatten::FlatScene;
+use skylit::raster::{Raster, View};
 use skylit::scene::{Scene, builtin, load};
 use skylit::tracer::stream::LAUNCH_RAYS;
 use skylit::tracer::{Needs, Push, Tracer, TracerKind};

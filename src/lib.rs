@@ -3,20 +3,26 @@
 
 #![deny(unsafe_code)]
 
-pub mod bvh;
+pub mod accel;
+pub mod bench;
 pub mod cli;
+pub mod denoise;
 pub mod error;
+pub mod film;
 #[allow(unsafe_code, reason = "Vulkan is called here, and nowhere else")]
 pub mod gpu;
+pub mod integrators;
 pub mod interface;
 pub mod measure;
 pub mod oracle;
 pub mod output;
+pub mod raster;
 pub mod ray;
-pub mod render;
+pub mod realtime;
 pub mod sampling;
 pub mod scene;
 pub mod shaders;
+pub mod terminal;
 pub mod tracer;
 
 pub use error::{Error, Result};

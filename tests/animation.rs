@@ -6,17 +6,17 @@ use std::sync::Arc;
 
 use common::{ALL, assert_validation_clean, device, tracers};
 use glam::{DAffine3, DQuat, DVec3};
+use skylit::accel::flatten::FlatScene;
+use skylit::film::NoControl;
 use skylit::gpu::Device;
+use skylit::integrators::rays::{Mode, trace};
 use skylit::measure::parity::{judge_closest, judge_pair};
 use skylit::measure::ray_sets::random_rays;
 use skylit::oracle::Oracle;
 use skylit::oracle::rounding::Rounding;
 use skylit::ray::{Hit, Ray};
-use skylit::render::NoControl;
-use skylit::render::rays::{Mode, trace};
 use skylit::scene::animation::{Animation, Channel, Interpolation, Local, Node, Parts, Playback, Pose, Property, Sampler};
 use skylit::scene::builtin::by_name;
-use skylit::scene::flatten::FlatScene;
 use skylit::scene::{Geometry, Rig, Scene};
 use skylit::tracer::{Tracer, TracerKind};
 

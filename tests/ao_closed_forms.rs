@@ -13,13 +13,13 @@ use std::sync::Arc;
 
 use common::{assert_validation_clean, device, tracer, tracers};
 use glam::{DAffine3, DQuat, DVec3, Vec3};
+use skylit::film::NoControl;
+use skylit::film::camera::CameraRecord;
 use skylit::gpu::Device;
+use skylit::integrators::ao::{self, AoOptions, AoResult};
 use skylit::oracle::camera::camera_ray;
 use skylit::oracle::closed_form as exact;
 use skylit::oracle::{Oracle, OracleRay};
-use skylit::render::NoControl;
-use skylit::render::ao::{self, AoOptions, AoResult};
-use skylit::render::camera::CameraRecord;
 use skylit::scene::builtin::{self, Placement, analytic, shapes};
 use skylit::scene::{Camera, Geometry, Instance, Material, Mesh, Scene, TriangleMesh};
 use skylit::tracer::{Tracer, TracerKind};
@@ -518,7 +518,7 @@ fn gpu_ao_closed_box_is_zero() {
 /// them, meet the inside of a closed body; the others leave it.
 #[test]
 fn gpu_ao_about_shading_normals() {
-    use skylit::render::ao::Hemisphere;
+    use skylit::integrators::ao::Hemisphere;
     let device = device();
     let lean = 40f64.to_radians();
     let mut scene = analytic::closed_box(2.0, Placement::default());

@@ -3,18 +3,18 @@
 mod common;
 
 use common::{assert_validation_clean, device, tracer, tracers};
-use skylit::bvh::BuildPreset;
+use skylit::accel::BuildPreset;
+use skylit::accel::flatten::FlatScene;
+use skylit::film::{NoControl, camera};
 use skylit::gpu::Device;
+use skylit::integrators::rays::{Mode, trace};
 use skylit::measure::parity::{judge_any, judge_closest, judge_pair, judge_weights};
 use skylit::measure::ray_sets::{leak_rays, leak_scenes, mixed_rays, random_rays};
 use skylit::oracle::Oracle;
 use skylit::oracle::rounding::Rounding;
 use skylit::ray::Ray;
-use skylit::render::rays::{Mode, trace};
-use skylit::render::{NoControl, camera};
 use skylit::scene::Scene;
 use skylit::scene::builtin::by_name;
-use skylit::scene::flatten::FlatScene;
 use skylit::tracer::{BuildOptions, ComputeOptions, Kernel, Tracer, TracerKind, TriangleTest};
 use std::sync::Arc;
 

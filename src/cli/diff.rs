@@ -3,11 +3,11 @@
 use serde_json::json;
 
 use super::args::DiffArgs;
-use super::console::Failure;
 use crate::error::{Error, Result};
 use crate::measure::flip::{PIXELS_PER_DEGREE, flip};
 use crate::measure::metrics::ImagePair;
 use crate::output::{self, Channel, Image, Samples};
+use crate::terminal::console::Failure;
 
 /// How far apart two channels are, over the pixels where both are finite and at least one image has something.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]

@@ -1,9 +1,9 @@
 //! `skylit doctor`: what this machine offers, and what skylit makes of it.
 
 use super::args::DoctorArgs;
-use super::console;
 use crate::error::{Error, Result};
 use crate::gpu::{Device, DeviceInfo, Instance, Options, enumerate};
+use crate::terminal::console;
 use crate::tracer::TracerKind;
 
 /// Prints the table and the verdict; fails when nothing can be rendered here.

@@ -2,12 +2,12 @@
 
 use std::path::Path;
 
-use super::Warnings;
 use super::args::ExportArgs;
 use crate::error::{Error, Result};
 use crate::output;
 use crate::scene::export::{self, Written};
 use crate::scene::{Scene, load};
+use crate::terminal::warnings::{Warnings, warnings_of};
 
 /// Loads and writes.
 pub fn run(args: &ExportArgs) -> Result<()> {
@@ -24,7 +24,7 @@ pub fn run(args: &ExportArgs) -> Result<()> {
     output::check_writable(&args.output)?;
     let scene = load::load(&args.scene)?;
     let mut warnings = Warnings::new(console);
-    super::noticed(&scene).iter().for_each(|w| warnings.add(w));
+    warnings_of(&scene).iter().for_each(|w| warnings.add(w));
     let written = write(&scene, &args.output)?;
     written.warnings.iter().for_each(|w| warnings.add(w));
     console.line(&format!("{}: {} triangles of {}", args.output.display(), written.triangles, scene.name))?;

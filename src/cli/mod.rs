@@ -2,17 +2,12 @@
 //! an exit code of [`EXIT_CODES`].
 
 mod args;
-mod bench;
-mod console;
 mod diff;
 mod doctor;
 mod export;
 mod film;
 mod frames;
-mod interrupt;
-mod panic;
-mod paths;
-mod progress;
+pub(crate) mod paths;
 mod rays;
 mod render;
 mod report;
@@ -26,7 +21,9 @@ use clap::Parser;
 use clap::error::ErrorKind;
 
 use crate::error::{Error, Result};
-use console::{Console, Failure};
+use crate::terminal::console::Failure;
+use crate::terminal::warnings::one_line;
+use crate::terminal::{console, panic};
 pub use paths::lights;
 
 /// What the process returns; part of `--help`.
@@ -65,7 +62,7 @@ enum Command {
     /// Compare two images in numbers
     Diff(args::DiffArgs),
     /// Measure how fast rays are traced, beside other tracers, and what real-time ambient occlusion costs and is worth
-    Bench(bench::BenchArgs),
+    Bench(crate::bench::BenchArgs),
 }
 
 /// Runs the command that the process' arguments name.
@@ -103,7 +100,7 @@ fn dispatch(command: Command, start: Instant) -> Result<(), Failure> {
         Command::Scenes(args) => scenes::run(&args),
         Command::Doctor(args) => doctor::run(&args),
         Command::Diff(args) => return diff::run(&args),
-        Command::Bench(args) => return bench::run(&args),
+        Command::Bench(args) => return crate::bench::run(&args),
     }
     .map_err(Failure::from)
 }
@@ -122,38 +119,6 @@ fn explain(error: &clap::Error) -> Result<()> {
             Err(Error::Usage(words.trim_start_matches("error: ").to_owned()))
         }
     }
-}
-
-fn one_line(text: &str) -> String {
-    text.split_whitespace().collect::<Vec<_>>().join(" ")
-}
-
-/// Warnings: shown to people at once, and kept for the record that programs get.
-struct Warnings {
-    console: Console,
-    /// One line each.
-    list: Vec<String>,
-}
-
-impl Warnings {
-    /// None yet.
-    fn new(console: Console) -> Self {
-        Self { console, list: Vec::new() }
-    }
-
-    fn add(&mut self, text: &str) {
-        let line = one_line(text);
-        self.console.warning(&line);
-        self.list.push(line);
-    }
-}
-
-/// What a loader noticed, a sentence each.
-fn noticed(scene: &crate::scene::Scene) -> Vec<String> {
-    let report = &scene.report;
-    let dropped =
-        (report.degenerate_triangles > 0).then(|| format!("dropped {} degenerate triangles", report.degenerate_triangles));
-    report.warnings.iter().cloned().chain(dropped).collect()
 }
 
 #[cfg(test)]

@@ -5,18 +5,18 @@ use std::path::Path;
 
 use glam::DVec3;
 
-use super::Warnings;
 use super::args::RaysArgs;
-use super::interrupt::{self, ProgressControl};
-use super::progress::Progress;
+use crate::accel::flatten::FlatScene;
 use crate::error::{Error, Result};
 use crate::gpu::Device;
+use crate::integrators::rays;
 use crate::measure::stats::median;
 use crate::output;
 use crate::ray::Ray;
-use crate::render::rays;
-use crate::scene::flatten::FlatScene;
 use crate::scene::{Scene, export, load};
+use crate::terminal::interrupt::{self, ProgressControl};
+use crate::terminal::progress::Progress;
+use crate::terminal::warnings::{Warnings, warnings_of};
 use crate::tracer::{Needs, Tracer};
 
 /// Loads, traces, reports.
@@ -31,7 +31,7 @@ pub fn run(args: &RaysArgs) -> Result<()> {
     rays::check(&set)?;
     let scene = read_mesh(&args.mesh)?;
     let mut warnings = Warnings::new(console);
-    super::noticed(&scene).iter().for_each(|w| warnings.add(w));
+    warnings_of(&scene).iter().for_each(|w| warnings.add(w));
     let flat = FlatScene::new(&scene);
     move_rays(&mut set, -flat.origin);
     let device = Device::open(&args.device.options())?;

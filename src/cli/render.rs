@@ -5,28 +5,28 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
-use super::Warnings;
 use super::args::{Aov, DEFAULT_SIZE, DEFAULT_SPP, Integrator, RenderArgs, dump_path};
-use super::console::{Console, Failure};
 use super::film::{self, Saver};
-use super::interrupt::{self, ProgressControl};
-use super::progress::Progress;
 use super::rays::move_rays;
 use super::report::{self, Rays, Report, Seconds};
+use crate::accel::flatten::FlatScene;
 use crate::error::{Error, Result};
+use crate::film::Film;
+use crate::film::accumulate::Accumulated;
+use crate::film::camera::{self, CameraRecord};
+use crate::film::cover::Cover;
+use crate::film::schedule::FilmOptions;
+use crate::film::state::FilmState;
 use crate::gpu::Device;
+use crate::integrators::ao::{self, AoOptions, Hemisphere};
+use crate::integrators::aov::{self, AovPixel};
 use crate::output::{self, Channel, Image, ImageFormat, Samples, png};
 use crate::ray::Ray;
-use crate::render::accumulate::Accumulated;
-use crate::render::ao::{self, AoOptions, Hemisphere};
-use crate::render::aov::{self, AovPixel};
-use crate::render::camera::{self, CameraRecord};
-use crate::render::cover::Cover;
-use crate::render::film::Film;
-use crate::render::film_state::FilmState;
-use crate::render::schedule::FilmOptions;
-use crate::scene::flatten::FlatScene;
 use crate::scene::{Projection, Scene, fingerprint, load};
+use crate::terminal::console::{Console, Failure};
+use crate::terminal::interrupt::{self, ProgressControl};
+use crate::terminal::progress::Progress;
+use crate::terminal::warnings::{Warnings, warnings_of};
 use crate::tracer::{Needs, Tracer};
 
 /// Values of a pixel.
@@ -48,7 +48,7 @@ pub fn run(args: &RenderArgs, start: Instant) -> Result<(), Failure> {
     let console = args.verbosity.console();
     let (scene, device, seconds) = open(args)?;
     let mut warnings = Warnings::new(console);
-    super::noticed(&scene).iter().for_each(|w| warnings.add(w));
+    warnings_of(&scene).iter().for_each(|w| warnings.add(w));
     interrupt::check()?;
 
     let size = args.size.or(scene.hints.size).unwrap_or(DEFAULT_SIZE);

@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use super::args::RenderArgs;
 use super::film::{Identity, Told, spp_text};
 use crate::gpu::DeviceInfo;
-use crate::render::ao::{AoOptions, Hemisphere};
+use crate::integrators::ao::{AoOptions, Hemisphere};
 use crate::scene::{Camera, Projection, Scene};
 use crate::tracer::{BuildStats, ComputeOptions, TracerKind};
 

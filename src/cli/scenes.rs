@@ -1,9 +1,9 @@
 //! `skylit scenes`: the scenes written in code.
 
 use super::args::ScenesArgs;
-use super::console;
 use crate::error::Result;
 use crate::scene::builtin;
+use crate::terminal::console;
 
 /// Lists them.
 pub fn run(args: &ScenesArgs) -> Result<()> {

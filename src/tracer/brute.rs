@@ -5,9 +5,9 @@ use std::sync::Arc;
 
 use super::compute::{Hierarchy, PRIMITIVE_BYTES, record, unfinished_counter, write_records};
 use super::kernel::Kernel;
+use crate::accel::flatten::FlatScene;
 use crate::error::{Error, Result};
 use crate::gpu::Device;
-use crate::scene::flatten::FlatScene;
 
 /// Fails for a scene of which every ray would have to test too much.
 pub(super) fn check(flat: &FlatScene) -> Result<()> {

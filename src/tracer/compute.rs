@@ -9,10 +9,10 @@ use super::dynamic_trees::DynamicTrees;
 use super::kernel::{BuildOptions, Kernel};
 use super::stream::LaunchMemory;
 use super::{brute, reference, wide};
-use crate::bvh::{Aabb, bvh2};
+use crate::accel::flatten::{FlatScene, Group, Placement};
+use crate::accel::{Aabb, bvh2};
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, Device, DeviceInfo, Memory};
-use crate::scene::flatten::{FlatScene, Group, Placement};
 
 /// Rays that a lane of the fast kernel takes one after the other on a CPU driver, where idle lanes of a vector cost most.
 const RAYS_PER_LANE_CPU: u32 = 16;

@@ -3,8 +3,8 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
-use crate::bvh::Aabb;
-use crate::scene::flatten::{FlatScene, Group};
+use crate::accel::Aabb;
+use crate::accel::flatten::{FlatScene, Group};
 
 /// Primitives that follow each other and are left out or drawn together.
 pub const CHUNK: u32 = 256;

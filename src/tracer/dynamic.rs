@@ -1,6 +1,6 @@
 //! Scenes that change while they are traced: instances move, meshes deform, the rest stays where it is.
 //!
-//! What may change is said when the scene is flattened ([`crate::scene::flatten::Motion`]); [`Tracer::update`] takes what did. The compute tracer refits
+//! What may change is said when the scene is flattened ([`crate::accel::flatten::Motion`]); [`Tracer::update`] takes what did. The compute tracer refits
 //! its hierarchies on the host or builds them anew (`dynamic_trees.rs`), the hardware tracers have the driver do so (`hardware.rs`). A tracer of
 //! a scene that never changes has nothing of this.
 
@@ -13,11 +13,11 @@ use rayon::prelude::*;
 use super::compute::placed;
 use super::gpu_scene::rows;
 use super::{Structure, Tracer};
-use crate::bvh::Aabb;
+use crate::accel::Aabb;
+use crate::accel::flatten::{FlatScene, Group, Part, Placement};
 use crate::error::{Error, Result};
 use crate::scene::Geometry;
 use crate::scene::animation::{Pose, PosedMesh};
-use crate::scene::flatten::{FlatScene, Group, Part, Placement};
 
 /// New vertices of a mesh.
 #[derive(Clone, Copy, Debug)]
@@ -236,7 +236,7 @@ impl Tracer {
     /// nothing may be tracing meanwhile. The origin stays where it was: a scene that wanders far off loses precision.
     ///
     /// # Errors
-    /// [`Error::Usage`] when something was not announced in [`crate::scene::flatten::Motion`]; [`Error::Scene`] for numbers that are not finite,
+    /// [`Error::Usage`] when something was not announced in [`crate::accel::flatten::Motion`]; [`Error::Scene`] for numbers that are not finite,
     /// wrong counts and transforms that cannot be inverted. After these two nothing has changed. [`Error::OutOfMemory`],
     /// [`Error::Vulkan`], [`Error::DeviceLost`]: the tracer must not be used any more.
     pub fn update(&mut self, changes: &Changes) -> Result<UpdateStats> {
@@ -288,7 +288,7 @@ impl Tracer {
     }
 
     /// Says how many seconds of device time tracing took since the last update, so that the next one can weigh what refitted trees
-    /// cost against building them anew ([`crate::bvh::RefitPolicy`]). Without effect where nothing moves or deforms.
+    /// cost against building them anew ([`crate::accel::RefitPolicy`]). Without effect where nothing moves or deforms.
     pub fn traced(&mut self, seconds: f64) {
         let Some(dynamic) = &self.dynamic else { return };
         match &mut self.structure {

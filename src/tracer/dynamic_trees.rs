@@ -15,14 +15,14 @@ use super::compute::{ALPHA_TESTED, padding, placed, placement_padding, reach_pad
 use super::dynamic::group_of;
 use super::gpu_scene::rows;
 use super::wide::{Trees, Triangles, tree, triangle_tree_of};
-use crate::bvh::build::MAX_DEPTH;
-use crate::bvh::refit::{RefitPlan, RefitPolicy, refit};
-use crate::bvh::wide::{self, BLOCK_BYTES, Block, Wide};
-use crate::bvh::{Aabb, BuildPreset, pairs};
+use crate::accel::build::MAX_DEPTH;
+use crate::accel::flatten::{FlatScene, Placement};
+use crate::accel::refit::{RefitPlan, RefitPolicy, refit};
+use crate::accel::wide::{self, BLOCK_BYTES, Block, Wide};
+use crate::accel::{Aabb, BuildPreset, pairs};
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, Device, Memory};
 use crate::scene::Geometry;
-use crate::scene::flatten::{FlatScene, Placement};
 
 /// A top level of so many entries is always built anew: docs/traversal.md has the measurement.
 const TOP_BUILD_MOST: usize = 256;

@@ -12,11 +12,11 @@ use super::drawable::{Drawable, Shape};
 use super::mipmap::{self, MipRecord, Texels};
 use super::motion::Motion;
 use super::shading::{self, ShadingRecord, TextureUse};
+use crate::accel::features::{Blend, alpha_cutoff};
+use crate::accel::flatten::{FlatScene, Group, Part, Placement};
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, Device, Memory};
 use crate::interface::MaterialFeature;
-use crate::scene::features::{Blend, alpha_cutoff};
-use crate::scene::flatten::{FlatScene, Group, Part, Placement};
 use crate::scene::{AlphaMode, Filter, Geometry, Material, TexelData, TextureSlot, TriangleMesh, Wrap};
 
 /// What the passes will ask of the scene; the rest is not uploaded.
@@ -34,7 +34,7 @@ pub struct Needs {
     pub compensation: bool,
     /// With `shading`: occlusion that is baked into textures, to be shown.
     pub baked_occlusion: bool,
-    /// With `shading`: levels of textures, for paths that know how wide they are ([`crate::render::path::TextureFilter::RayCone`]).
+    /// With `shading`: levels of textures, for paths that know how wide they are ([`crate::integrators::path::TextureFilter::RayCone`]).
     pub mip_levels: bool,
 }
 

@@ -7,10 +7,10 @@ use glam::DAffine3;
 
 use super::dynamic::group_of;
 use super::gpu_scene::{GpuScene, GroupBuffers, rows};
-use crate::bvh::RefitPolicy;
+use crate::accel::RefitPolicy;
+use crate::accel::flatten::{FlatScene, Group};
 use crate::error::{Error, Result};
 use crate::gpu::{AccelerationStructure, BottomLevelInput, Buffer, Commands, Device, Memory, TopLevelEntry, Update};
-use crate::scene::flatten::{FlatScene, Group};
 
 // hit groups of the pipeline: see gpu::RayTracingPipeline
 const OPAQUE_TRIANGLES: u32 = 0;

@@ -1,9 +1,9 @@
 //! Which of the compute tracer's kernels runs, and how it tests triangles.
 
-use crate::bvh::BuildPreset;
-use crate::bvh::cache::Cache;
+use crate::accel::BuildPreset;
+use crate::accel::cache::Cache;
+use crate::accel::flatten::FlatScene;
 use crate::gpu::DeviceInfo;
-use crate::scene::flatten::FlatScene;
 use crate::shaders::StreamShaders;
 
 /// How the compute tracer finds what a ray meets. All give the same hits; docs/traversal.md compares their speed.

@@ -32,10 +32,10 @@ pub use gpu_scene::Needs;
 pub use kernel::{BuildOptions, ComputeOptions, Kernel, TriangleTest};
 pub use stream::{Push, Stream};
 
+use crate::accel::features::SceneFeatures;
+use crate::accel::flatten::FlatScene;
 use crate::error::{Error, Result};
 use crate::gpu::{ComputePipeline, Device, DeviceInfo, Specialization};
-use crate::scene::features::SceneFeatures;
-use crate::scene::flatten::FlatScene;
 use crate::shaders::{Mode, StreamShaders};
 use gpu_scene::GpuScene;
 use prepared::{Prepared, Recipe};
@@ -145,7 +145,7 @@ pub struct Tracer {
 }
 
 impl Tracer {
-    /// Uploads a scene and builds what `kind` traces. If the scene was flattened with [`crate::scene::flatten::Motion`], the tracer
+    /// Uploads a scene and builds what `kind` traces. If the scene was flattened with [`crate::accel::flatten::Motion`], the tracer
     /// can be brought up to date ([`Tracer::update`]).
     ///
     /// # Errors
@@ -345,7 +345,7 @@ impl Tracer {
         }
     }
 
-    /// Compiles a stream of camera rays for pixels that were drawn ([`crate::render::raster`]): nothing is traced.
+    /// Compiles a stream of camera rays for pixels that were drawn ([`crate::raster`]): nothing is traced.
     pub fn rasterized_stream(&self, shaders: &'static StreamShaders) -> Result<Stream> {
         Stream::rasterized(&self.device, shaders, &stream::scene_specialization(self.features))
     }

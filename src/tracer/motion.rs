@@ -7,9 +7,9 @@ use bytemuck::{Pod, Zeroable};
 
 use super::dynamic::group_of;
 use super::gpu_scene::rows;
+use crate::accel::flatten::{FlatScene, Placement};
 use crate::error::Result;
 use crate::gpu::{Buffer, Device, Memory};
-use crate::scene::flatten::{FlatScene, Placement};
 
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]

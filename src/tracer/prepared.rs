@@ -6,10 +6,10 @@ use std::sync::{Arc, Mutex, PoisonError};
 use super::compute::{self, lane_budget};
 use super::kernel::{ComputeOptions, Kernel, TriangleTest};
 use super::stream;
+use crate::accel::features::SceneFeatures;
 use crate::error::Result;
 use crate::gpu::{ComputePipeline, Device, DeviceInfo, Specialization};
 use crate::interface::constants;
-use crate::scene::features::SceneFeatures;
 use crate::shaders::{Rays, Shader, StreamShaders, Variant, wide_kernel};
 
 /// Scenes of fewer primitives are built before a pipeline is compiled.

@@ -8,11 +8,11 @@ use super::compute::{
 };
 use super::kernel::BuildOptions;
 use super::kernel::Kernel;
-use crate::bvh::build::MAX_DEPTH;
-use crate::bvh::{Aabb, Bvh2, bvh2};
+use crate::accel::build::MAX_DEPTH;
+use crate::accel::flatten::FlatScene;
+use crate::accel::{Aabb, Bvh2, bvh2};
 use crate::error::Result;
 use crate::gpu::Device;
-use crate::scene::flatten::FlatScene;
 
 /// Primitives of a leaf at most: more cost memory accesses, fewer cost nodes.
 const MAX_LEAF: u32 = 4;

@@ -4,10 +4,10 @@ use bytemuck::{Pod, Zeroable};
 
 use super::gpu_scene::Needs;
 use super::mipmap::Texels;
+use crate::accel::flatten::FlatScene;
 use crate::interface::{
     MaterialFeature, MaterialFeatures, MaterialModel, ShadingFeatures, TextureFeature, TextureFeatures, Walls,
 };
-use crate::scene::flatten::FlatScene;
 use crate::scene::material::MaterialKind;
 use crate::scene::{Geometry, Material, TextureSlot};
 

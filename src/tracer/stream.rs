@@ -5,11 +5,11 @@ use std::sync::Arc;
 use bytemuck::{Pod, Zeroable};
 
 use super::compute::HIT_BYTES;
+use crate::accel::features::SceneFeatures;
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, ComputePipeline, Device, HitShaders, RayTracingPipeline, Recorder, Specialization};
 use crate::interface::constants;
 use crate::ray::Ray;
-use crate::scene::features::SceneFeatures;
 use crate::shaders::{self, LANES, Mode, PACKET_RAYS, RUN, Rays, SPREAD, StreamShaders, Variant};
 
 /// The push constants of every stream; `Push` in shaders/common/types.glsl.
@@ -21,7 +21,7 @@ pub struct Push {
     /// Address of the pass's parameters.
     pub pass: u64,
     /// Address of ray number `first` of a queue ([`super::queue`]), 32 bytes each; 0 for streams that make their own rays. Where those
-    /// were drawn: of what was drawn ([`crate::render::raster`]).
+    /// were drawn: of what was drawn ([`crate::raster`]).
     pub rays: u64,
     /// Address of a `u32`: how many rays the queue holds; 0 when `count` says it.
     pub queued: u64,
@@ -190,7 +190,7 @@ impl Stream {
         Ok(Self { pipeline: Pipeline::RayTracing(Arc::new(pipeline)), shaders: stream })
     }
 
-    /// For rays whose pixels have been drawn. [`Push::rays`] is then the address of what was drawn ([`crate::render::raster`]).
+    /// For rays whose pixels have been drawn. [`Push::rays`] is then the address of what was drawn ([`crate::raster`]).
     pub(super) fn rasterized(device: &Arc<Device>, shaders: &'static StreamShaders, s: &Specialization) -> Result<Self> {
         if shaders.variant(Variant::Visibility).is_none() {
             return Err(Error::Usage(format!("the rays of '{}' are not the camera's: they cannot be drawn", shaders.name)));

@@ -6,10 +6,10 @@ use rayon::prelude::*;
 use super::compute::SPHERE;
 use super::kernel::BuildOptions;
 use super::wide::Trees;
-use crate::bvh::pairs::NONE;
-use crate::bvh::wide::{self, Block, LEAF};
+use crate::accel::flatten::FlatScene;
+use crate::accel::pairs::NONE;
+use crate::accel::wide::{self, Block, LEAF};
 use crate::ray::Ray;
-use crate::scene::flatten::FlatScene;
 
 /// The hierarchy of a scene, for counting.
 pub struct VisitCounter {

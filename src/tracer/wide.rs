@@ -23,16 +23,16 @@ use super::dynamic_trees::{DynamicTrees, entry_block, provide};
 use super::kernel::BuildOptions;
 use super::kernel::Kernel;
 use super::stream::{LAUNCH_RAYS, LaunchMemory};
-use crate::bvh::build::{self, MAX_DEPTH};
-use crate::bvh::cache::KeyBuilder;
-use crate::bvh::pairs::{self, Fan, Pair};
-use crate::bvh::wide::{self, BLOCK_BYTES, Block, Wide};
-use crate::bvh::{Aabb, BuildPreset};
+use crate::accel::build::{self, MAX_DEPTH};
+use crate::accel::cache::KeyBuilder;
+use crate::accel::flatten::{FlatScene, Group};
+use crate::accel::pairs::{self, Fan, Pair};
+use crate::accel::wide::{self, BLOCK_BYTES, Block, Wide};
+use crate::accel::{Aabb, BuildPreset};
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, Device, Memory};
 use crate::ray::Ray;
 use crate::scene::Geometry;
-use crate::scene::flatten::{FlatScene, Group};
 
 /// Entries of the stack that the kernel keeps in registers: `TOP` in the shader.
 pub(super) const STACK_IN_REGISTERS: u32 = 6;

@@ -4,9 +4,9 @@
 use std::sync::Arc;
 
 use skylit::Error;
+use skylit::accel::flatten::FlatScene;
 use skylit::gpu::{Device, Options};
 use skylit::scene::Scene;
-use skylit::scene::flatten::FlatScene;
 use skylit::tracer::{Needs, Tracer, TracerKind};
 
 /// Opens the default device with the validation layer. A machine without Vulkan fails the tests: software drivers exist.

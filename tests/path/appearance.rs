@@ -2,7 +2,7 @@
 //! another metal box with the third, glass lets light through with the third (Coello 2024, figures of one to four bounces).
 
 use super::*;
-use skylit::render::path::View;
+use skylit::integrators::path::View;
 use skylit::scene::builtin::by_name;
 
 const SIZE: [u32; 2] = [48, 48];

@@ -1,7 +1,7 @@
 //! What a pixel is the mean of: filters by an edge that runs between pixels, lenses by a lamp that is out of focus.
 
 use super::*;
-use skylit::render::path::{Lens, PixelFilter};
+use skylit::integrators::path::{Lens, PixelFilter};
 use skylit::scene::Projection;
 use skylit::scene::builtin::shapes;
 

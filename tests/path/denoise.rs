@@ -2,8 +2,8 @@
 
 use super::cli::{bytes, fails, names, place, render as command, run};
 use super::*;
+use skylit::denoise::{Denoiser, Features, Mix, Shot};
 use skylit::output::{self, Samples};
-use skylit::render::denoise::{Denoiser, Features, Mix, Shot};
 use skylit::scene::builtin::{by_name, shapes};
 
 const SIZE: [u32; 2] = [48, 48];

@@ -1,12 +1,12 @@
 //! Films that are put down and taken up again, saved on their way, stopped where they are good enough, and added to a million times.
 
 use super::*;
-use skylit::render::Control;
-use skylit::render::accumulate::Accumulated;
-use skylit::render::ao::{self, AoOptions};
-use skylit::render::cover::Cover;
-use skylit::render::film_state::FilmState;
-use skylit::render::schedule::FilmOptions;
+use skylit::film::Control;
+use skylit::film::accumulate::Accumulated;
+use skylit::film::cover::Cover;
+use skylit::film::schedule::FilmOptions;
+use skylit::film::state::FilmState;
+use skylit::integrators::ao::{self, AoOptions};
 use skylit::scene::builtin::{by_name, shapes};
 
 /// Keeps what a film has on its way.
@@ -159,7 +159,7 @@ fn gpu_films_of_many_blocks_and_few_tiles() {
     let flat = FlatScene::new(&scene);
     let tracer_of = |flat: &FlatScene| tracer(&device, TracerKind::Compute, flat);
     let tall = PathOptions { size: [3, 262_200], seed: 2, max_depth: 0, ..Default::default() };
-    assert_eq!(skylit::render::block::Block::cut(tall.size).len(), 2);
+    assert_eq!(skylit::film::block::Block::cut(tall.size).len(), 2);
     let compute = tracer_of(&flat);
     let whole = render(&compute, &flat, &up_to(&tall, 3, None)).image;
     let film = FilmOptions { intervals: vec![1], ..Default::default() };

@@ -23,12 +23,12 @@ use std::sync::Arc;
 
 use common::{assert_validation_clean, device, tracers};
 use glam::{DAffine3, DVec3, Vec3};
+use skylit::accel::flatten::FlatScene;
+use skylit::film::Film;
+use skylit::film::NoControl;
+use skylit::film::camera::CameraRecord;
 use skylit::gpu::Device;
-use skylit::render::NoControl;
-use skylit::render::camera::CameraRecord;
-use skylit::render::film::Film;
-use skylit::render::path::{self, PathOptions, PathResult, Strategy};
-use skylit::scene::flatten::FlatScene;
+use skylit::integrators::path::{self, PathOptions, PathResult, Strategy};
 use skylit::scene::material::MaterialKind;
 use skylit::scene::{Camera, Environment, Geometry, Instance, Light, LightKind, Material, Mesh, Scene};
 use skylit::tracer::{Needs, Tracer, TracerKind};

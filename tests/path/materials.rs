@@ -2,7 +2,7 @@
 
 use super::*;
 use glam::{Affine2, Vec2, Vec4};
-use skylit::render::path::View;
+use skylit::integrators::path::View;
 use skylit::scene::builtin::shapes;
 use skylit::scene::material::{AlphaMode, Transmission};
 use skylit::scene::{Filter, Sphere, TexelData, Texture, TextureSlot, TriangleMesh, Wrap};

@@ -2,7 +2,7 @@
 
 use super::*;
 use glam::{Affine2, Vec2};
-use skylit::render::path::{TextureFilter, View};
+use skylit::integrators::path::{TextureFilter, View};
 use skylit::scene::builtin::shapes;
 use skylit::scene::material::AlphaMode;
 use skylit::scene::{Filter, Projection, TexelData, Texture, TextureSlot, TriangleMesh, Wrap};

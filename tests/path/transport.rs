@@ -83,7 +83,7 @@ fn gpu_three_tracers_one_image_of_paths() {
 /// Grey surfaces under a white sky, one bounce: ambient occlusion itself.
 #[test]
 fn gpu_one_bounce_under_a_white_sky_is_ambient_occlusion() {
-    use skylit::render::ao::{self, AoOptions};
+    use skylit::integrators::ao::{self, AoOptions};
     let device = device();
     let scene = by_name("stairs").unwrap();
     let flat = FlatScene::new(&scene);

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 use skylit::oracle::closed_form as exact;
-use skylit::render::realtime::{Filter, FilterKind, Preset, Resolution, Settings};
+use skylit::realtime::{Filter, FilterKind, Preset, Resolution, Settings};
 use skylit::sampling::Sequence;
 use skylit::scene::Camera;
 use skylit::scene::builtin::{Placement, analytic};
@@ -15,7 +15,7 @@ use crate::{NO_FILTER, SIZE, frames, mean, one_tracer, realtime, record, referen
 fn error(
     tracer: &Tracer,
     settings: &Settings,
-    camera: &skylit::render::camera::CameraRecord,
+    camera: &skylit::film::camera::CameraRecord,
     want: &[f32],
     seeds: u32,
 ) -> (f64, f64) {

@@ -1,7 +1,7 @@
 //! Where the answer is the same everywhere it comes out exactly, in every frame.
 
 use glam::DVec3;
-use skylit::render::realtime::{Filter, FilterKind, Preset, Settings};
+use skylit::realtime::{Filter, FilterKind, Preset, Settings};
 use skylit::scene::Scene;
 use skylit::scene::builtin::{Placement, analytic};
 use skylit::tracer::TracerKind;

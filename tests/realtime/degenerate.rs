@@ -1,9 +1,9 @@
 //! Whatever is rendered, what comes out is an accessibility, and the frames after know nothing of what was wrong.
 
 use glam::{DAffine3, DVec3};
-use skylit::render::ao::Hemisphere;
-use skylit::render::camera::CameraRecord;
-use skylit::render::realtime::{Preset, Settings, Technique};
+use skylit::film::camera::CameraRecord;
+use skylit::integrators::ao::Hemisphere;
+use skylit::realtime::{Preset, Settings, Technique};
 use skylit::scene::builtin::{Placement, analytic};
 use skylit::scene::{Camera, Geometry, Projection, Scene};
 use skylit::tracer::TracerKind;

@@ -5,10 +5,10 @@
 //! on the other side has crept over the edge; the bits must be the same.
 
 use glam::{DVec3, Vec3};
+use skylit::integrators::ao::Hemisphere;
 use skylit::oracle::Oracle;
 use skylit::oracle::camera::camera_ray;
-use skylit::render::ao::Hemisphere;
-use skylit::render::realtime::{Filter, FilterKind, Preset, Resolution, Settings};
+use skylit::realtime::{Filter, FilterKind, Preset, Resolution, Settings};
 use skylit::scene::builtin::shapes;
 use skylit::scene::{Camera, Scene, TriangleMesh};
 

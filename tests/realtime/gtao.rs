@@ -1,10 +1,10 @@
 //! The screen-space technique: what its formula must give, what it cannot know, and what it leaves alone.
 
 use glam::{DAffine3, DVec3};
+use skylit::film::camera::CameraRecord;
 use skylit::oracle::camera::camera_ray;
 use skylit::oracle::{Oracle, OracleRay, ao as oracle_ao, closed_form as exact};
-use skylit::render::camera::CameraRecord;
-use skylit::render::realtime::{Preset, Settings, Technique};
+use skylit::realtime::{Preset, Settings, Technique};
 use skylit::sampling::Sampler;
 use skylit::scene::builtin::{Placement, analytic};
 use skylit::scene::{Camera, Projection, Scene};

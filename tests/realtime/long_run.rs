@@ -4,7 +4,7 @@ use std::process::Command;
 
 use glam::DVec3;
 use skylit::measure::temporal::Drift;
-use skylit::render::realtime::Preset;
+use skylit::realtime::Preset;
 
 use crate::common::{assert_validation_clean, device, tracers};
 use crate::{assert_sound, mean, realtime, scene, stepped, traced, tracer_of};

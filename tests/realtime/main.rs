@@ -21,10 +21,10 @@ mod tracers;
 use std::sync::Arc;
 
 use glam::{DAffine3, DVec3};
+use skylit::film::camera::CameraRecord;
 use skylit::gpu::Device;
-use skylit::render::camera::CameraRecord;
-use skylit::render::raster::Primary;
-use skylit::render::realtime::{Filter, FilterKind, FrameStats, Preset, Realtime, Settings};
+use skylit::raster::Primary;
+use skylit::realtime::{Filter, FilterKind, FrameStats, Preset, Realtime, Settings};
 use skylit::scene::builtin::by_name;
 use skylit::scene::{Camera, Geometry, Instance, Material, Mesh, Scene, TriangleMesh};
 use skylit::tracer::{Tracer, TracerKind};

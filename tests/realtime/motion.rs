@@ -3,17 +3,17 @@
 use std::sync::Arc;
 
 use glam::{DAffine3, DQuat, DVec3};
+use skylit::accel::flatten::{FlatScene, Motion};
+use skylit::film::NoControl;
+use skylit::film::camera::CameraRecord;
 use skylit::gpu::Device;
+use skylit::integrators::aov;
 use skylit::measure::temporal::{Residual, recovery};
 use skylit::oracle::{Oracle, OracleRay};
-use skylit::render::NoControl;
-use skylit::render::aov;
-use skylit::render::camera::CameraRecord;
-use skylit::render::realtime::{Preset, Realtime, Settings};
+use skylit::realtime::{Preset, Realtime, Settings};
 use skylit::sampling::Sequence;
 use skylit::scene::animation::{Playback, Pose};
 use skylit::scene::builtin::shapes;
-use skylit::scene::flatten::{FlatScene, Motion};
 use skylit::scene::{Camera, Scene};
 use skylit::tracer::{Changes, Tracer, TracerKind};
 

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 use skylit::Error;
-use skylit::render::realtime::{Filter, Preset, Realtime, Resolution, Settings, Technique};
+use skylit::realtime::{Filter, Preset, Realtime, Resolution, Settings, Technique};
 use skylit::sampling::Sequence;
 use skylit::scene::builtin::{Placement, analytic};
 use skylit::scene::{Camera, Projection};

@@ -1,12 +1,12 @@
 //! What is left out is counted, and changes nothing.
 
 use glam::DVec3;
-use skylit::render::realtime::{Preset, Resolution, Settings, Technique};
+use skylit::realtime::{Preset, Resolution, Settings, Technique};
 
 use crate::common::{assert_validation_clean, device, tracers};
 use crate::{SIZE, bits, frames, realtime, scene, stepped, traced, tracer_of};
 
-fn covered(realtime: &skylit::render::realtime::Realtime) -> u64 {
+fn covered(realtime: &skylit::realtime::Realtime) -> u64 {
     realtime.coverage().unwrap().iter().filter(|c| **c > 0.0).count() as u64
 }
 

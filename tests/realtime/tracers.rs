@@ -1,8 +1,8 @@
 //! Three tracers, one image; drawn or traced, one image; the same run, the same bits.
 
 use glam::DVec3;
-use skylit::render::raster::Primary;
-use skylit::render::realtime::{Preset, Realtime, Settings};
+use skylit::raster::Primary;
+use skylit::realtime::{Preset, Realtime, Settings};
 use skylit::scene::Scene;
 use skylit::tracer::Tracer;
 

@@ -4,9 +4,10 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueHint};
 
-use crate::cli::args::{RenderArgs, parse_where};
+use crate::cli::args::RenderArgs;
 use crate::error::{Error, Result};
 use crate::output::ImageFormat;
+use crate::terminal::parse::parse_where;
 
 /// The film.
 #[derive(Clone, Debug, Args)]

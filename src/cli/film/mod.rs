@@ -9,15 +9,15 @@ use std::path::{Path, PathBuf};
 pub use report::{Told, tell};
 
 use super::args::RenderArgs;
-use super::interrupt::ProgressControl;
 use crate::error::{Error, Result};
+use crate::film::Control;
+use crate::film::accumulate::Accumulated;
+use crate::film::record_words;
+use crate::film::schedule::FilmOptions;
+use crate::film::state::{FilmState, words};
 use crate::output::{self, Channel, Image, Samples};
-use crate::render::Control;
-use crate::render::accumulate::Accumulated;
-use crate::render::film::record_words;
-use crate::render::film_state::{FilmState, words};
-use crate::render::schedule::FilmOptions;
 use crate::scene::RenderHints;
+use crate::terminal::interrupt::ProgressControl;
 
 /// The layer that holds a film's sums.
 const LAYER: &str = "state";

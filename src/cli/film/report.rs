@@ -3,8 +3,8 @@
 use serde_json::{Value, json};
 
 use crate::cli::args::RenderArgs;
-use crate::render::convergence::TileCount;
-use crate::render::film::Film;
+use crate::film::Film;
+use crate::film::convergence::TileCount;
 use crate::scene::RenderHints;
 
 /// The same for people and for programs.

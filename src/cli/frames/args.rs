@@ -7,9 +7,9 @@ use clap::{Args, ValueEnum, ValueHint};
 
 use crate::error::{Error, Result};
 use crate::output::{apng, frames};
-use crate::render::raster::Primary;
-use crate::render::realtime::display::Shown;
-use crate::render::realtime::{Budget, FilterKind, Preset, Resolution, Settings, Technique};
+use crate::raster::Primary;
+use crate::realtime::display::Shown;
+use crate::realtime::{Budget, FilterKind, Preset, Resolution, Settings, Technique};
 use crate::sampling::Sequence;
 
 /// Implements clap's enumeration by what a type has already: all values, names and a line of help for each.

@@ -6,23 +6,23 @@ mod write;
 
 use std::time::Instant;
 
-use super::Warnings;
 use super::args::{Aov, DEFAULT_SIZE, RenderArgs};
-use super::console::Failure;
-use super::interrupt;
-use super::progress::Progress;
 use super::render::{choose_camera, open};
+use crate::accel::flatten::FlatScene;
 use crate::error::{Error, Result};
+use crate::film::camera::CameraRecord;
+use crate::integrators::ao::Hemisphere;
+use crate::integrators::aov;
 use crate::output;
-use crate::render::ao::Hemisphere;
-use crate::render::aov;
-use crate::render::camera::CameraRecord;
-use crate::render::realtime::display::{Display, Shown};
-use crate::render::realtime::{Realtime, Settings, Technique};
-use crate::render::sequence::{self, CameraMotion, Sequence};
-use crate::scene::flatten::FlatScene;
+use crate::realtime::display::{Display, Shown};
+use crate::realtime::sequence::{self, CameraMotion, Sequence};
+use crate::realtime::{Realtime, Settings, Technique};
 use crate::scene::load::load_camera_path;
 use crate::scene::{Camera, LightKind, Orbit, Scene};
+use crate::terminal::console::Failure;
+use crate::terminal::interrupt;
+use crate::terminal::progress::Progress;
+use crate::terminal::warnings::{Warnings, warnings_of};
 use crate::tracer::{Needs, Tracer};
 use report::{FrameReport, Report};
 use write::Writer;
@@ -54,7 +54,7 @@ pub fn run(args: &RenderArgs, start: Instant) -> Result<(), Failure> {
     let console = args.verbosity.console();
     let (scene, device, seconds) = open(args)?;
     let mut warnings = Warnings::new(console);
-    super::noticed(&scene).iter().for_each(|w| warnings.add(w));
+    warnings_of(&scene).iter().for_each(|w| warnings.add(w));
     interrupt::check()?;
 
     let size = args.size.or(scene.hints.size).unwrap_or(DEFAULT_SIZE);

@@ -7,8 +7,8 @@ use crate::cli::args::RenderArgs;
 use crate::cli::report::Seconds;
 use crate::gpu::{DeviceInfo, Timing};
 use crate::measure::stats::{Summary, percentile};
-use crate::render::raster::Primary;
-use crate::render::realtime::{FrameStats, Settings};
+use crate::raster::Primary;
+use crate::realtime::{FrameStats, Settings};
 use crate::scene::{Camera, Scene};
 use crate::tracer::{BuildStats, TracerKind};
 

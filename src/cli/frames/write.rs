@@ -8,11 +8,11 @@ use crate::cli::args::{Aov, RenderArgs};
 use crate::cli::render::aov_channels;
 use crate::error::Result;
 use crate::gpu::Buffer;
+use crate::integrators::aov::AovPixel;
 use crate::output::apng::{self, Animation, ApngWriter, Delay};
 use crate::output::png::{self, Colour};
 use crate::output::{self, Channel, Image, ImageFormat, Samples, frames};
-use crate::render::aov::AovPixel;
-use crate::render::realtime::Realtime;
+use crate::realtime::Realtime;
 
 /// Everything that frames are written to.
 pub struct Writer {

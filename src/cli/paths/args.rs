@@ -7,11 +7,12 @@ use glam::{DMat3, Vec3};
 
 use super::denoise::DenoiseChoice;
 use super::lights::LightSpec;
-use crate::cli::args::{Aov, Integrator, RenderArgs, parse_number, parse_vector, parse_where};
+use crate::cli::args::{Aov, Integrator, RenderArgs};
 use crate::error::{Error, Result};
+use crate::integrators::path::{PixelFilter, Strategy, TextureFilter};
 use crate::output::tone_map::ToneMap;
-use crate::render::path::{PixelFilter, Strategy, TextureFilter};
 use crate::scene::{Environment, load};
+use crate::terminal::parse::{parse_number, parse_vector, parse_where};
 
 /// How directions are drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]

@@ -7,12 +7,12 @@ use clap::ValueEnum;
 use serde_json::{Value, json};
 
 use crate::cli::args::RenderArgs;
-use crate::cli::interrupt;
+use crate::denoise::{Denoiser, Features, GRID, Oidn, Shot};
 use crate::error::Result;
+use crate::film::Control;
+use crate::film::accumulate::Accumulated;
 use crate::output::{Channel, Samples};
-use crate::render::Control;
-use crate::render::accumulate::Accumulated;
-use crate::render::denoise::{Denoiser, Features, GRID, Oidn, Shot};
+use crate::terminal::interrupt;
 
 /// What takes the noise away.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]

@@ -2,11 +2,11 @@
 
 use glam::{DAffine3, DVec3, Vec3};
 
-use crate::cli::args::{parse_number, parse_vector};
 use crate::scene::blackbody::blackbody;
 use crate::scene::builtin::shapes;
 use crate::scene::material::MaterialKind;
 use crate::scene::{Geometry, Instance, Light, LightKind, Material, Mesh, Scene};
+use crate::terminal::parse::{parse_number, parse_vector};
 
 /// A light as it is asked for: `KIND key=value ...`.
 #[derive(Clone, Debug)]

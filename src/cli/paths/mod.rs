@@ -9,25 +9,25 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
-use super::Warnings;
 use super::args::{DEFAULT_SIZE, DEFAULT_SPP, Integrator, RenderArgs};
-use super::console::Failure;
 use super::film::{self, Saver};
-use super::interrupt::{self, ProgressControl};
-use super::progress::Progress;
 use super::render::{aov_channels, choose_camera, open, write_depth};
 use super::report::Seconds;
+use crate::accel::flatten::FlatScene;
+use crate::denoise::Shot;
 use crate::error::{Error, Result};
+use crate::film::accumulate::Accumulated;
+use crate::film::camera::CameraRecord;
+use crate::film::cover::Cover;
+use crate::integrators::aov;
+use crate::integrators::path::{self, Lens, MOST_DEPTH, PathOptions, TextureFilter, View};
 use crate::output::tone_map::ToneMap;
 use crate::output::{self, Channel, Image, ImageFormat, Samples, png};
-use crate::render::accumulate::Accumulated;
-use crate::render::aov;
-use crate::render::camera::CameraRecord;
-use crate::render::cover::Cover;
-use crate::render::denoise::Shot;
-use crate::render::path::{self, Lens, MOST_DEPTH, PathOptions, TextureFilter, View};
-use crate::scene::flatten::FlatScene;
 use crate::scene::{Camera, Environment, Projection, fingerprint};
+use crate::terminal::console::Failure;
+use crate::terminal::interrupt::{self, ProgressControl};
+use crate::terminal::progress::Progress;
+use crate::terminal::warnings::{Warnings, warnings_of};
 use crate::tracer::{Needs, Tracer};
 use denoise::Denoising;
 use report::{About, Report};
@@ -49,7 +49,7 @@ pub fn run(args: &RenderArgs, start: Instant) -> Result<(), Failure> {
     let console = args.verbosity.console();
     let (mut scene, device, seconds) = open(args)?;
     let mut warnings = Warnings::new(console);
-    super::noticed(&scene).iter().for_each(|w| warnings.add(w));
+    warnings_of(&scene).iter().for_each(|w| warnings.add(w));
     if let Some(environment) = args.paths.environment()? {
         scene.environment = environment;
     }

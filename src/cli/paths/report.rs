@@ -3,13 +3,13 @@
 use serde_json::{Value, json};
 
 use super::denoise::Told as Denoised;
+use crate::accel::features::SceneFeatures;
 use crate::cli::args::RenderArgs;
 use crate::cli::film::{Identity, Maker, Told, metadata, spp_text};
 use crate::cli::report::{Seconds, camera_text};
+use crate::film::accumulate::Accumulated;
 use crate::gpu::DeviceInfo;
-use crate::render::accumulate::Accumulated;
-use crate::render::path::{MOST_DEPTH, PathOptions, PathResult, PixelFilter, TextureFilter};
-use crate::scene::features::SceneFeatures;
+use crate::integrators::path::{MOST_DEPTH, PathOptions, PathResult, PixelFilter, TextureFilter};
 use crate::scene::{Camera, Environment, Scene};
 use crate::tracer::{BuildStats, TracerKind};
 

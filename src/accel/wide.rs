@@ -1,0 +1,452 @@
+//! The hierarchy that `shaders/trace/wide.glsl` walks: up to seven children a node, boxes quantised to eight bits a plane (after
+//! Ylitie, Karras, Laine, "Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs", HPG 2017).
+//!
+//! Nodes and leaves are blocks of 64 bytes, a cache line, in one array; the children of a node lie side by side. So a group of
+//! siblings is one number and a few bits, and one fetch serves whatever is next. Which nodes of the binary tree become wide ones is chosen
+//! by dynamic programming for the least expected number of blocks that a ray visits (the paper's section 3.1 with one kind of leaf).
+//!
+//! A node, in words of 32 bits:
+//! | words | what |
+//! |---|---|
+//! | 0-2 | lower corner, f32 |
+//! | 3 | block of the first child |
+//! | 4-7 | lower planes along x of children 0-6, a byte each, then the exponent of the x scale; the same for upper planes, with a zero |
+//! | 8-11 | along y; the second eighth byte is the mask of slots that hold children |
+//! | 12-15 | along z; the second eighth byte is 0: the last word's top bit says "leaf" |
+//!
+//! A leaf is the caller's, but for the top bit of its last word.
+//!
+//! The traversal's stack cannot overflow: a node visit pushes at most one entry (the rest of a group of siblings), so a
+//! tree needs as many entries as its longest path has nodes.
+
+use glam::Vec3;
+use obvhs::bvh2::Bvh2;
+use rayon::prelude::*;
+
+use super::Aabb;
+
+/// Children of a node at most.
+pub const WIDTH: usize = 7;
+/// Bit of a block's last word.
+pub const LEAF: u32 = 0x8000_0000;
+/// Bytes of a block.
+pub const BLOCK_BYTES: u64 = size_of::<Block>() as u64;
+/// Subtrees that are collapsed side by side.
+const TASKS: usize = 256;
+
+/// A node or a leaf.
+pub type Block = [u32; 16];
+
+/// A wide hierarchy.
+#[derive(Clone, Debug)]
+pub struct Wide {
+    /// Nodes and leaves; the root node is the first. There is one even over nothing.
+    pub blocks: Vec<Block>,
+    /// Nodes on the longest path from the root.
+    pub depth: u32,
+    /// Bounds of everything; `None` over nothing.
+    pub bounds: Option<Aabb>,
+    /// Expected number of blocks that a ray through the bounds visits, by the surface area heuristic.
+    pub sah_cost: f64,
+}
+
+/// Part of a tree, collapsed: its root node is the first block, addresses count from there.
+struct Piece {
+    blocks: Vec<Block>,
+    depth: u32,
+    cost: f32,
+    /// Blocks that other pieces begin with: where, and which.
+    inserts: Vec<(u32, usize, u32)>,
+}
+
+impl Default for Wide {
+    fn default() -> Self {
+        Self { blocks: vec![[0; 16]], depth: 1, bounds: None, sah_cost: 0.0 }
+    }
+}
+
+impl Wide {
+    /// Collapses a binary tree whose leaves hold one item each, and whose boxes are padded by what quantisation and traversal round
+    /// away. `leaf` makes an item's block.
+    pub fn collapse(tree: &Bvh2, leaf: impl Fn(u32) -> Block + Sync) -> Self {
+        if tree.nodes.is_empty() {
+            return Self::default();
+        }
+        // subtrees that are collapsed on their own, and the rest above them
+        let mut frontier = vec![0usize];
+        while frontier.len() < TASKS && tree.nodes.len() > 16 * TASKS {
+            let inner = |n: &&usize| !tree.nodes[**n].is_leaf();
+            if !frontier.iter().any(|n| inner(&n)) {
+                break;
+            }
+            frontier = frontier
+                .iter()
+                .flat_map(|&n| {
+                    let node = &tree.nodes[n];
+                    let first = node.first_index as usize;
+                    if node.is_leaf() { vec![n] } else { vec![first, first + 1] }
+                })
+                .collect();
+        }
+        frontier.retain(|&n| n != 0 && !tree.nodes[n].is_leaf());
+        let pieces: Vec<Piece> = frontier.par_iter().map(|&n| Piece::collapse(tree, n, &[], &[], &leaf)).collect();
+        let mut sorted: Vec<(usize, usize)> = frontier.iter().copied().zip(0..).collect();
+        sorted.sort_unstable();
+        let top = Piece::collapse(tree, 0, &sorted, &pieces, &leaf);
+        let bounds = node_box(tree, 0);
+        // a single leaf has a node above it
+        let blocks = if tree.nodes[0].is_leaf() { 2.0 } else { 1.0 };
+        let mut out = Self { blocks: top.blocks, depth: top.depth, bounds: Some(bounds), sah_cost: (blocks * top.cost) as f64 };
+        // the pieces' roots have their places; the rest of each follows
+        let mut ends = Vec::with_capacity(pieces.len());
+        let mut end = out.blocks.len();
+        for &(at, piece, level) in &top.inserts {
+            let p = &pieces[piece];
+            out.depth = out.depth.max(level + p.depth - 1);
+            out.blocks[at as usize] = rebased(p.blocks[0], end as u32 - 1);
+            ends.push((piece, end));
+            end += p.blocks.len() - 1;
+        }
+        out.blocks.resize(end, [0; 16]);
+        let mut rest = &mut out.blocks[ends.first().map_or(end, |e| e.1)..];
+        let mut targets = Vec::new();
+        for &(piece, begin) in &ends {
+            let (mine, others) = rest.split_at_mut(pieces[piece].blocks.len() - 1);
+            targets.push((piece, begin, mine));
+            rest = others;
+        }
+        targets.into_par_iter().for_each(|(piece, begin, target)| {
+            for (to, from) in target.iter_mut().zip(&pieces[piece].blocks[1..]) {
+                *to = rebased(*from, begin as u32 - 1);
+            }
+        });
+        out
+    }
+
+    /// Checks that every leaf is reached once, within the boxes above it, and that the depth is as said. `bounds_of` gives the boxes
+    /// of what a leaf holds.
+    ///
+    /// # Errors
+    /// What is wrong first.
+    pub fn validate(&self, bounds_of: impl Fn(&Block) -> Vec<Aabb>) -> Result<(), String> {
+        let mut seen = vec![0u32; self.blocks.len()];
+        let mut work = vec![(0usize, 1u32, Vec::<[[f64; 2]; 3]>::new())];
+        let mut deepest = 0;
+        while let Some((at, level, chain)) = work.pop() {
+            let block = self.blocks.get(at).ok_or_else(|| format!("block {at} is outside"))?;
+            seen[at] += 1;
+            if seen[at] > 1 {
+                return Err(format!("block {at} is reached twice"));
+            }
+            if is_leaf(block) {
+                for b in bounds_of(block) {
+                    let inside = |c: &[[f64; 2]; 3]| (0..3).all(|a| c[a][0] <= b.min[a] as f64 && c[a][1] >= b.max[a] as f64);
+                    if !chain.iter().all(inside) {
+                        return Err(format!("what leaf {at} holds sticks out of a box above it"));
+                    }
+                }
+                continue;
+            }
+            deepest = deepest.max(level);
+            for (slot, child) in children(block) {
+                let mut chain = chain.clone();
+                chain.push(child_box(block, slot));
+                work.push((child as usize, level + 1, chain));
+            }
+        }
+        if let Some(at) = seen.iter().position(|&s| s == 0) {
+            return Err(format!("block {at} is never reached"));
+        }
+        if deepest != self.depth {
+            return Err(format!("depth is {deepest}, said to be {}", self.depth));
+        }
+        Ok(())
+    }
+}
+
+/// Is it a leaf?
+pub fn is_leaf(block: &Block) -> bool {
+    block[15] & LEAF != 0
+}
+
+/// A block of a tree whose blocks begin `by` further on.
+pub fn rebased(mut block: Block, by: u32) -> Block {
+    if !is_leaf(&block) {
+        block[3] = block[3].wrapping_add(by);
+    }
+    block
+}
+
+/// Slots and blocks of a node's children.
+pub fn children(node: &Block) -> impl Iterator<Item = (usize, u32)> {
+    let (first, present) = (node[3], node[11] >> 24);
+    (0..WIDTH).filter(move |s| present >> s & 1 == 1).zip(first..)
+}
+
+fn byte(node: &Block, k: usize) -> u8 {
+    (node[k / 4] >> (k % 4 * 8)) as u8
+}
+
+/// Box of a slot's child: lower and upper plane per axis.
+pub fn child_box(node: &Block, slot: usize) -> [[f64; 2]; 3] {
+    std::array::from_fn(|a| {
+        let scale = f32::from_bits((byte(node, 23 + 16 * a) as u32) << 23) as f64;
+        let plane = |k: usize| f32::from_bits(node[a]) as f64 + byte(node, 16 + 16 * a + k) as f64 * scale;
+        [plane(slot), plane(8 + slot)]
+    })
+}
+
+fn node_box(tree: &Bvh2, n: usize) -> Aabb {
+    Aabb { min: tree.nodes[n].min, max: tree.nodes[n].max }
+}
+
+/// A node of the binary tree with what its subtree costs as at most 1, 2, ... wide subtrees.
+struct Local {
+    node: u32,
+    /// Index of the left child, 0 for leaves and for roots of other pieces; the right one's.
+    children: [u32; 2],
+    cost: [f32; WIDTH],
+}
+
+/// Least cost of two subtrees as at most `count` wide ones together (two or more), and how many of those on the left.
+fn split(left: &[f32; WIDTH], right: &[f32; WIDTH], count: usize) -> (f32, usize) {
+    let cost = |k: usize| (left[k - 1] + right[count - k - 1], k);
+    (2..count).map(cost).fold(cost(1), |a, b| if b.0 < a.0 { b } else { a })
+}
+
+/// Area of a box as a share of a larger one's, whatever the scale: areas alone leave the range of a float at 1e19 and at 1e-20.
+fn share(of: Aabb, whole: Aabb) -> f32 {
+    let area = |b: Aabb| {
+        let d = (b.max.as_dvec3() - b.min.as_dvec3()).max(glam::DVec3::ZERO);
+        d.x * d.y + d.y * d.z + d.z * d.x
+    };
+    let whole = area(whole);
+    if whole > 0.0 { (area(of) / whole) as f32 } else { 0.0 }
+}
+
+impl Piece {
+    /// `cuts`: roots of other pieces (sorted), which are not descended into.
+    fn collapse(
+        tree: &Bvh2,
+        root: usize,
+        cuts: &[(usize, usize)],
+        pieces: &[Piece],
+        leaf: &(impl Fn(u32) -> Block + Sync),
+    ) -> Self {
+        let whole = node_box(tree, 0);
+        let cut = |n: u32| cuts.binary_search_by_key(&(n as usize), |c| c.0).ok().map(|k| cuts[k].1);
+        let mut locals = vec![Local { node: root as u32, children: [0; 2], cost: [0.0; WIDTH] }];
+        // parents before children
+        let mut work = vec![0usize];
+        while let Some(k) = work.pop() {
+            let node = &tree.nodes[locals[k].node as usize];
+            if node.is_leaf() || (!cuts.is_empty() && cut(locals[k].node).is_some()) {
+                continue;
+            }
+            let at = locals.len();
+            locals[k].children = [at as u32, at as u32 + 1];
+            locals.extend([0, 1].map(|c| Local { node: node.first_index + c, children: [0; 2], cost: [0.0; WIDTH] }));
+            work.extend([at + 1, at]);
+        }
+        for k in (0..locals.len()).rev() {
+            let area = share(node_box(tree, locals[k].node as usize), whole);
+            locals[k].cost = match locals[k].children {
+                [0, _] if tree.nodes[locals[k].node as usize].is_leaf() => [area; WIDTH],
+                [0, _] => [cut(locals[k].node).map_or(area, |p| pieces[p].cost); WIDTH],
+                [l, r] => {
+                    let (left, right) = (locals[l as usize].cost, locals[r as usize].cost);
+                    let mut cost = [area + split(&left, &right, WIDTH).0; WIDTH];
+                    for count in 2..=WIDTH {
+                        cost[count - 1] = cost[count - 2].min(split(&left, &right, count).0);
+                    }
+                    cost
+                }
+            };
+        }
+        let mut out = Self { blocks: vec![[0; 16]], depth: 1, cost: locals[0].cost[0], inserts: Vec::new() };
+        let mut work = vec![(0usize, 0usize, 1u32)];
+        let (mut found, mut open) = (Vec::new(), Vec::new());
+        while let Some((k, at, level)) = work.pop() {
+            out.depth = out.depth.max(level);
+            found.clear();
+            match locals[k].children {
+                // a tree of a single leaf: its node has that as its only child
+                [0, _] => found.push(k),
+                children => open.push((children, WIDTH)),
+            }
+            while let Some(([l, r], count)) = open.pop() {
+                let k = split(&locals[l as usize].cost, &locals[r as usize].cost, count).1;
+                for (child, mut count) in [(l as usize, k), (r as usize, count - k)] {
+                    let cost = &locals[child].cost;
+                    while count > 1 && cost[count - 1] >= cost[count - 2] {
+                        count -= 1;
+                    }
+                    if count == 1 { found.push(child) } else { open.push((locals[child].children, count)) }
+                }
+            }
+            let mut boxes = [(0usize, Aabb::EMPTY); WIDTH];
+            let boxes = &mut boxes[..found.len()];
+            for (b, &child) in boxes.iter_mut().zip(&found) {
+                b.1 = node_box(tree, locals[child].node as usize);
+            }
+            let bounds = node_box(tree, locals[k].node as usize);
+            assign_slots(boxes, bounds);
+            let mut order: [usize; WIDTH] = std::array::from_fn(|k| k);
+            let order = &mut order[..found.len()];
+            order.sort_unstable_by_key(|&k| boxes[k].0);
+            let first = out.blocks.len();
+            out.blocks[at] = node(bounds, boxes, first as u32);
+            for (place, &j) in (first..).zip(&*order) {
+                let child = found[j];
+                let number = locals[child].node;
+                let binary = &tree.nodes[number as usize];
+                if binary.is_leaf() {
+                    let mut block = leaf(tree.primitive_indices[binary.first_index as usize]);
+                    block[15] |= LEAF;
+                    out.blocks.push(block);
+                    continue;
+                }
+                out.blocks.push([0; 16]);
+                match cut(number) {
+                    Some(piece) => out.inserts.push((place as u32, piece, level + 1)),
+                    None => work.push((child, place, level + 1)),
+                }
+            }
+        }
+        out
+    }
+}
+
+/// Gives each child the slot whose direction from the node's middle is most its own, so that going through the slots in the order of
+/// a ray's octant meets near children first (Ylitie et al., section 3.2; greedily).
+fn assign_slots(children: &mut [(usize, Aabb)], parent: Aabb) {
+    let middle = parent.min + parent.max;
+    let mut free = (1u32 << WIDTH) - 1;
+    let mut left: u32 = (1 << children.len()) - 1;
+    let mut offsets = [Vec3::ZERO; WIDTH];
+    for (o, c) in offsets.iter_mut().zip(&*children) {
+        *o = c.1.min + c.1.max - middle;
+    }
+    while left != 0 {
+        let mut best = (f32::NEG_INFINITY, 0, 0);
+        for c in (0..children.len()).filter(|c| left >> c & 1 == 1) {
+            for s in (0..WIDTH).filter(|s| free >> s & 1 == 1) {
+                let sign = |bit: usize| if s & bit != 0 { 1.0 } else { -1.0 };
+                let value = offsets[c].dot(Vec3::new(sign(4), sign(2), sign(1)));
+                if value > best.0 {
+                    best = (value, c, s);
+                }
+            }
+        }
+        // a value that is not a number loses to all: then the first free slot will do
+        if best.0 == f32::NEG_INFINITY {
+            best = (0.0, left.trailing_zeros() as usize, free.trailing_zeros() as usize);
+        }
+        children[best.1].0 = best.2;
+        left &= !(1 << best.1);
+        free &= !(1 << best.2);
+    }
+}
+
+/// A node over its children's boxes by slot, whose blocks begin at `first`: planes are rounded outwards.
+pub(super) fn node(bounds: Aabb, children: &[(usize, Aabb)], first: u32) -> Block {
+    let mut bytes = [0u8; 64];
+    bytes[12..16].copy_from_slice(&first.to_le_bytes());
+    let mut present = 0u8;
+    for axis in 0..3 {
+        let low = bounds.min[axis] as f64;
+        let extent = bounds.max[axis] as f64 - low;
+        // the least power of two of which 255 reach across
+        let mut exponent = ((extent / 255.0) as f32).to_bits() >> 23;
+        while f32::from_bits(exponent << 23) as f64 * 255.0 < extent && exponent < 254 {
+            exponent += 1;
+        }
+        let exponent = exponent.max(1);
+        let scale = 1.0 / f32::from_bits(exponent << 23) as f64;
+        let at = 16 + 16 * axis;
+        bytes[at..at + WIDTH].fill(255);
+        for &(slot, b) in children {
+            bytes[at + slot] = ((b.min[axis] as f64 - low) * scale).floor().clamp(0.0, 255.0) as u8;
+            bytes[at + 8 + slot] = ((b.max[axis] as f64 - low) * scale).ceil().clamp(0.0, 255.0) as u8;
+            present |= 1 << slot;
+        }
+        bytes[at + 7] = exponent as u8;
+    }
+    bytes[47] = present;
+    let mut block: Block = std::array::from_fn(|k| u32::from_le_bytes([0, 1, 2, 3].map(|j| bytes[4 * k + j])));
+    block[..3].copy_from_slice(&bounds.min.to_array().map(f32::to_bits));
+    block
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::accel::{BuildPreset, build};
+
+    fn boxes(n: usize, scale: f32, offset: f32) -> Vec<Aabb> {
+        (0..n)
+            .map(|i| {
+                let c = Vec3::new((i * 37 % 101) as f32, (i * 61 % 89) as f32, (i * 17 % 97) as f32) * scale + offset;
+                let r = Vec3::new(0.0, 0.1 + (i % 7) as f32, 3.0) * scale;
+                Aabb { min: c - r, max: c + r }
+            })
+            .collect()
+    }
+
+    fn tree(boxes: &[Aabb]) -> Wide {
+        if boxes.is_empty() {
+            return Wide::default();
+        }
+        let binary = build::tree(boxes, BuildPreset::Default, None);
+        Wide::collapse(&binary, |item| {
+            let mut b = [0; 16];
+            b[0] = item;
+            b
+        })
+    }
+
+    /// Areas beyond the range of a float, below it, and none at all.
+    #[test]
+    fn trees_of_any_scale_end() {
+        for (scale, offset) in [(1e18, 0.0), (1e16, -1e18), (1e-30, 0.0), (0.0, 1.0)] {
+            let boxes = boxes(3000, scale, offset);
+            let tree = tree(&boxes);
+            check(&tree, &boxes).unwrap_or_else(|e| panic!("{scale}: {e}"));
+            assert!(tree.sah_cost.is_finite(), "{scale}: {}", tree.sah_cost);
+        }
+    }
+
+    fn check(tree: &Wide, boxes: &[Aabb]) -> Result<(), String> {
+        let mut items: Vec<u32> = tree.blocks.iter().filter(|b| is_leaf(b)).map(|b| b[0]).collect();
+        items.sort_unstable();
+        if items != (0..boxes.len() as u32).collect::<Vec<_>>() {
+            return Err("not every item has one leaf".into());
+        }
+        tree.validate(|b| vec![boxes[b[0] as usize]])
+    }
+
+    #[test]
+    fn trees_of_every_size_and_scale_are_valid() {
+        for n in (0..40).chain([100, 1000, 20_000]) {
+            for (scale, offset) in [(1.0, 0.0), (1e-3, 10.0), (1e5, -1e6)] {
+                let b = boxes(n, scale, offset);
+                check(&tree(&b), &b).unwrap_or_else(|e| panic!("{n} boxes at scale {scale}, offset {offset}: {e}"));
+            }
+        }
+    }
+
+    #[test]
+    fn validate_sees_damage() {
+        let b = boxes(500, 1.0, 0.0);
+        let good = tree(&b);
+        let mut bad = good.clone();
+        bad.blocks[0][0] = (f32::from_bits(bad.blocks[0][0]) + 20.0).to_bits();
+        assert!(check(&bad, &b).is_err());
+        let mut bad = good.clone();
+        bad.blocks[0][3] += 1;
+        assert!(check(&bad, &b).is_err());
+        let mut bad = good;
+        bad.depth += 1;
+        assert!(check(&bad, &b).is_err());
+    }
+}

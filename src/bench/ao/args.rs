@@ -1,0 +1,217 @@
+//! What `skylit bench ao` takes.
+
+use clap::{Args, ValueEnum};
+
+use super::candidates::{CANDIDATES, Candidate, Occlusion};
+use crate::bench::common::CommonArgs;
+use crate::error::Result;
+use crate::terminal::device_args::{BuildChoice, TracerChoice};
+use crate::terminal::parse::parse_size;
+use crate::tracer::BuildOptions;
+
+/// Pixels, unless said otherwise.
+const DEFAULT_SIZE: [u32; 2] = [640, 360];
+/// The same with `--quick`.
+const QUICK_SIZE: [u32; 2] = [160, 90];
+/// Frames of a run, unless said otherwise.
+const DEFAULT_FRAMES: u32 = 64;
+/// The same with `--quick`.
+const QUICK_FRAMES: u32 = 16;
+/// Rays a pixel of a reference, unless said otherwise.
+const DEFAULT_REFERENCE_RAYS: u32 = 512;
+/// The same with `--quick`.
+const QUICK_REFERENCE_RAYS: u32 = 64;
+/// Timed updates of each structure, unless said otherwise.
+const DEFAULT_REPEATS: u32 = 9;
+/// The same with `--quick`.
+const QUICK_REPEATS: u32 = 3;
+/// Presets that are not measured unless they are named: they stand for the truth.
+const LEFT_OUT: &str = "reference";
+
+/// How occlusion fades with distance.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum FalloffChoice {
+    /// A hit at the scene's reach counts 1/255 of one that is near
+    Exponential,
+    /// Hits count alike up to the scene's reach, and not at all beyond
+    Binary,
+}
+
+/// A part of the benchmark.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Part {
+    /// A camera that stands still: time, and error after 1, 2, 4, ... frames
+    Still,
+    /// The same, with what is known already left out
+    Rest,
+    /// A camera that goes round
+    Moving,
+    /// `balanced` with as many rays as take the time of `larsen`
+    EqualTime,
+    /// A scene of our own that changes: lag, ghosts, recovery
+    Changes,
+    /// Keeping acceleration structures up to date
+    Structures,
+}
+
+/// A number that is varied.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Series {
+    /// The same landscape of 10^4 to 10^7 triangles, and 2.5*10^7 by instancing
+    Triangles,
+    /// 1 to 64 rays a pixel
+    Rays,
+    /// 320x180 to 1920x1080
+    Resolution,
+    /// Every sequence of samples
+    Sampling,
+}
+
+/// `skylit bench ao`.
+#[derive(Clone, Debug, Args)]
+pub struct BenchAoArgs {
+    /// Scenes, as `render` takes them [default: the well-known ones that are there, and two large built-in ones]
+    pub scenes: Vec<String>,
+    /// Presets, separated by commas; gtao is balanced from the depth image [default: all but reference]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = preset_names())]
+    pub presets: Vec<String>,
+    /// Parts, separated by commas [default: all; of scenes that are named, those about a view]
+    #[arg(long, value_enum, value_name = "LIST", value_delimiter = ',')]
+    pub parts: Vec<Part>,
+    /// Vary one number instead, the others as they are; several separated by commas
+    #[arg(long, value_enum, value_name = "LIST", value_delimiter = ',', conflicts_with_all = ["parts", "structures"])]
+    pub series: Vec<Series>,
+    /// Also measure how long structures take to update, where scenes are named
+    #[arg(long)]
+    pub structures: bool,
+    /// Image size in pixels [default: 640x360; 160x90 with --quick]
+    #[arg(long, value_name = "WxH", value_parser = parse_size)]
+    pub size: Option<[u32; 2]>,
+    /// Frames of a run [default: 64; 16 with --quick]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(4..=10_000))]
+    pub frames: Option<u32>,
+    /// Rays a pixel of each reference [default: 512; 64 with --quick]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=1 << 20))]
+    pub reference_rays: Option<u32>,
+    /// Timed updates of each structure [default: 9; 3 with --quick]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
+    pub repeats: Option<u32>,
+    /// How occlusion fades with distance
+    #[arg(long, value_enum, default_value = "exponential")]
+    pub ao_falloff: FalloffChoice,
+    /// How rays are traced
+    #[arg(long, value_enum, default_value = "auto")]
+    pub tracer: TracerChoice,
+    /// Time that the compute tracer spends on its hierarchy
+    #[arg(long, value_enum, default_value = "default")]
+    pub build: BuildChoice,
+    /// What every benchmark takes
+    #[command(flatten)]
+    pub common: CommonArgs,
+}
+
+fn preset_names() -> clap::builder::PossibleValuesParser {
+    CANDIDATES.iter().map(|c| c.name).collect::<Vec<_>>().into()
+}
+
+impl BenchAoArgs {
+    /// Is a part asked for?
+    pub fn wants(&self, part: Part) -> bool {
+        if !self.series.is_empty() {
+            return false;
+        }
+        match part {
+            Part::Structures if self.structures => true,
+            _ if !self.parts.is_empty() => self.parts.contains(&part),
+            // about no scene that is named
+            Part::Changes | Part::Structures => self.scenes.is_empty(),
+            Part::Still | Part::Rest | Part::Moving | Part::EqualTime => true,
+        }
+    }
+
+    /// Is anything asked for that is about views of scenes?
+    pub fn wants_views(&self) -> bool {
+        [Part::Still, Part::Rest, Part::Moving, Part::EqualTime].into_iter().any(|p| self.wants(p))
+    }
+
+    /// What is compared, in the order in which presets are listed.
+    pub fn candidates(&self) -> Vec<&'static Candidate> {
+        let wanted = |c: &&Candidate| match self.presets.as_slice() {
+            [] => c.name != LEFT_OUT,
+            names => names.iter().any(|n| n == c.name),
+        };
+        CANDIDATES.iter().filter(wanted).collect()
+    }
+
+    /// How occlusion fades in a scene of such a reach.
+    ///
+    /// # Errors
+    /// Those of [`Occlusion::new`].
+    pub fn occlusion(&self, reach: f64) -> Result<Occlusion> {
+        Occlusion::new(reach, self.ao_falloff == FalloffChoice::Binary)
+    }
+
+    /// Pixels.
+    pub fn size(&self) -> [u32; 2] {
+        self.size.unwrap_or(if self.common.quick { QUICK_SIZE } else { DEFAULT_SIZE })
+    }
+
+    /// Frames of a run.
+    pub fn frames(&self) -> u32 {
+        self.common.number(self.frames, DEFAULT_FRAMES, QUICK_FRAMES)
+    }
+
+    /// Rays a pixel of a reference.
+    pub fn reference_rays(&self) -> u32 {
+        self.common.number(self.reference_rays, DEFAULT_REFERENCE_RAYS, QUICK_REFERENCE_RAYS)
+    }
+
+    /// Timed updates.
+    pub fn repeats(&self) -> u32 {
+        self.common.number(self.repeats, DEFAULT_REPEATS, QUICK_REPEATS)
+    }
+
+    /// How the compute tracer's hierarchies are built.
+    pub fn build_options(&self) -> BuildOptions {
+        let [width, height] = self.size();
+        let rays = u64::from(width) * u64::from(height) * u64::from(self.reference_rays());
+        BuildOptions { preset: self.build.preset(), rays, cache: None, streams: Vec::new() }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+
+    use super::*;
+
+    #[derive(Parser)]
+    struct Alone {
+        #[command(flatten)]
+        args: BenchAoArgs,
+    }
+
+    fn parse(extra: &[&str]) -> BenchAoArgs {
+        Alone::try_parse_from([&["bench"], extra].concat()).unwrap().args
+    }
+
+    #[test]
+    fn parts_by_what_is_named() {
+        let all = parse(&[]);
+        assert!(all.wants(Part::Still) && all.wants(Part::Changes) && all.wants(Part::Structures));
+        let scene = parse(&["a.glb"]);
+        assert!(scene.wants(Part::EqualTime) && !scene.wants(Part::Changes) && !scene.wants(Part::Structures));
+        assert!(parse(&["a.glb", "--structures"]).wants(Part::Structures));
+        let some = parse(&["a.glb", "--parts", "changes,rest"]);
+        assert!(some.wants(Part::Changes) && some.wants(Part::Rest) && !some.wants(Part::Still) && some.wants_views());
+        assert!(!parse(&["--series", "rays"]).wants_views());
+        assert!(Alone::try_parse_from(["bench", "--series", "rays", "--structures"]).is_err());
+    }
+
+    #[test]
+    fn the_reference_has_to_be_named() {
+        let names = |extra: &[&str]| parse(extra).candidates().iter().map(|c| c.name).collect::<Vec<_>>();
+        assert_eq!(names(&[]), ["larsen", "larsen-fixed", "fast", "balanced", "quality", "gtao"]);
+        assert_eq!(names(&["--presets", "reference,fast"]), ["fast", "reference"]);
+    }
+}

@@ -1,0 +1,130 @@
+//! Frames made one after another, and what they cost.
+
+use std::time::Instant;
+
+use crate::error::Result;
+use crate::film::camera::CameraRecord;
+use crate::measure::ao_benchmark::{Cost, PassTime};
+use crate::measure::stats::Spread;
+use crate::realtime::{FrameStats, Realtime, Technique};
+use crate::terminal::interrupt;
+use crate::tracer::{Moved, Tracer};
+
+/// Frames that were made.
+#[derive(Default)]
+pub struct Laps {
+    frames: Vec<Lap>,
+}
+
+struct Lap {
+    wall: f64,
+    stats: FrameStats,
+}
+
+impl Laps {
+    /// Makes the next frame and takes its time. Fails when the user asked to stop.
+    pub fn frame(
+        &mut self,
+        realtime: &mut Realtime,
+        tracer: &Tracer,
+        camera: &CameraRecord,
+        moved: &[Moved],
+    ) -> Result<&FrameStats> {
+        interrupt::check()?;
+        let start = Instant::now();
+        let mut stats = realtime.frame(tracer, camera, moved)?;
+        let wall = start.elapsed().as_secs_f64();
+        if realtime.settings().technique == Technique::Gtao {
+            // it would have traced none
+            stats.skipped_rays = 0;
+        }
+        self.frames.push(Lap { wall, stats });
+        // just pushed
+        Ok(&self.frames[self.frames.len() - 1].stats)
+    }
+
+    /// Frames so far.
+    pub fn len(&self) -> usize {
+        self.frames.len()
+    }
+
+    /// Occlusion rays of all frames so far.
+    pub fn rays(&self) -> u64 {
+        self.frames.iter().map(|l| l.stats.occlusion_rays).sum()
+    }
+
+    /// Camera rays of all frames so far.
+    pub fn camera_rays(&self) -> u64 {
+        self.frames.iter().map(|l| l.stats.primary_rays).sum()
+    }
+
+    /// Device seconds of each frame, or by the clock where the device has none.
+    pub fn seconds(&self) -> Vec<f64> {
+        let seconds =
+            |l: &Lap| if l.stats.timings.is_empty() { l.wall } else { l.stats.timings.iter().map(|t| t.seconds).sum() };
+        self.frames.iter().map(seconds).collect()
+    }
+
+    /// What a frame costs, of those from `first` on: the first ones compile and find their memory.
+    pub fn cost(&self, first: usize) -> Cost {
+        let frames = &self.frames[first.min(self.frames.len())..];
+        let ms = |values: &mut dyn Iterator<Item = f64>| {
+            Spread::of(&values.map(|s| s * 1e3).collect::<Vec<_>>()).unwrap_or_default()
+        };
+        let mean =
+            |of: fn(&FrameStats) -> u64| frames.iter().map(|l| of(&l.stats)).sum::<u64>() as f64 / frames.len().max(1) as f64;
+        // steps and launches of a pass belong together: "PASS STEP"
+        let mut passes: Vec<&str> = Vec::new();
+        for label in frames.iter().flat_map(|l| &l.stats.timings).map(|t| pass(t.label)) {
+            if !passes.contains(&label) {
+                passes.push(label);
+            }
+        }
+        let of_pass = |name: &str| {
+            let of_frame = |l: &Lap| {
+                let here = l.stats.timings.iter().filter(|t| pass(t.label) == name).map(|t| t.seconds);
+                // a frame that has no need of it says nothing about it
+                here.reduce(|a, b| a + b)
+            };
+            PassTime { pass: name.to_owned(), ms: ms(&mut frames.iter().filter_map(of_frame)) }
+        };
+        Cost {
+            passes: passes.iter().map(|name| of_pass(name)).collect(),
+            device_ms: ms(&mut frames.iter().map(|l| l.stats.timings.iter().map(|t| t.seconds).sum())),
+            wall_ms: ms(&mut frames.iter().map(|l| l.wall)),
+            camera_rays: mean(|s| s.primary_rays),
+            rays: mean(|s| s.occlusion_rays),
+            skipped_rays: mean(|s| s.skipped_rays),
+        }
+    }
+}
+
+fn pass(label: &str) -> &str {
+    label.split_once(' ').map_or(label, |(pass, _)| pass)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gpu::Timing;
+
+    #[test]
+    fn steps_of_a_pass_are_added() {
+        let lap = |k: f64| Lap {
+            wall: k,
+            stats: FrameStats {
+                timings: [("gbuffer trace", 1.0), ("gbuffer deliver", 0.5), ("filter", 0.25)]
+                    .map(|(label, seconds)| Timing { label, seconds: seconds * k * 1e-3 })
+                    .to_vec(),
+                occlusion_rays: 10,
+                ..Default::default()
+            },
+        };
+        let laps = Laps { frames: vec![lap(100.0), lap(1.0), lap(1.0), lap(2.0)] };
+        let cost = laps.cost(1);
+        let names: Vec<_> = cost.passes.iter().map(|p| (p.pass.as_str(), p.ms.median)).collect();
+        assert_eq!(names, [("gbuffer", 1.5), ("filter", 0.25)]);
+        assert!((cost.device_ms.median - 1.75).abs() < 1e-12 && (cost.device_ms.p95 - 3.5).abs() < 1e-12);
+        assert_eq!((laps.rays(), cost.rays), (40, 10.0));
+    }
+}

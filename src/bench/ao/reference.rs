@@ -1,0 +1,130 @@
+//! What images are held against: many rays a pixel, through the middles of the pixels, in two independent halves, so that the error
+//! of the reference itself is known.
+
+use super::candidates::Occlusion;
+use crate::error::Result;
+use crate::film::camera::CameraRecord;
+use crate::measure::ao_benchmark::Errors;
+use crate::measure::flip::{PIXELS_PER_DEGREE, flip};
+use crate::measure::metrics::ImagePair;
+use crate::raster::Primary;
+use crate::realtime::{Preset, Realtime, Settings, Surface};
+use crate::terminal::interrupt;
+use crate::tracer::Tracer;
+
+/// Rays of a pixel in one frame of a half: few enough that the user can interrupt it.
+const AT_ONCE: u32 = 16;
+/// Seeds of the two halves: no preset has them.
+const SEEDS: [u32; 2] = [0x5eed_000a, 0x5eed_000b];
+
+/// What is right.
+pub struct Truth {
+    /// The mean of both halves.
+    pub image: Vec<f32>,
+    /// 1 where something is.
+    pub coverage: Vec<f32>,
+    /// Standard error of `image`.
+    pub rmse: f64,
+    /// What each pixel shows.
+    pub surfaces: Vec<Option<Surface>>,
+    width: usize,
+}
+
+/// Makes references of one size.
+pub struct Referee {
+    halves: [Realtime; 2],
+    frames: u32,
+    width: usize,
+}
+
+impl Referee {
+    /// Of `rays` a pixel in all, rounded up to what divides evenly.
+    ///
+    /// # Errors
+    /// Those of the device.
+    pub fn new(tracer: &Tracer, size: [u32; 2], occlusion: &Occlusion, rays: u32) -> Result<Self> {
+        let half = rays.div_ceil(2);
+        let at_once = half.min(AT_ONCE);
+        let settings = |seed| {
+            let primary = Some(Primary::Traced);
+            occlusion.of(Settings { seed, rays_per_pixel: at_once, primary, ..Preset::Reference.settings() })
+        };
+        let [a, b] = SEEDS.map(|seed| Realtime::new(tracer, size, &settings(seed), &[]));
+        Ok(Self { halves: [a?, b?], frames: half.div_ceil(at_once), width: size[0] as usize })
+    }
+
+    /// What is right now. Two references draw the same samples: what did not change between them is the same to the bit.
+    ///
+    /// # Errors
+    /// Those of the device; [`crate::Error::Interrupted`].
+    pub fn truth(&mut self, tracer: &Tracer, camera: &CameraRecord) -> Result<Truth> {
+        let frames = self.frames;
+        let half = |realtime: &mut Realtime| -> Result<Vec<f32>> {
+            realtime.rewind();
+            let mut sums: Vec<f64> = Vec::new();
+            for _ in 0..frames {
+                interrupt::check()?;
+                realtime.frame(tracer, camera, &[])?;
+                let image = realtime.result()?;
+                sums.resize(image.len(), 0.0);
+                sums.iter_mut().zip(&image).for_each(|(s, v)| *s += f64::from(*v));
+            }
+            Ok(sums.into_iter().map(|s| (s / f64::from(frames)) as f32).collect())
+        };
+        let [a, b] = &mut self.halves;
+        let halves = [half(a)?, half(b)?];
+        let (coverage, surfaces) = (a.coverage()?, a.surfaces()?);
+        let image = halves[0].iter().zip(&halves[1]).map(|(a, b)| 0.5 * (a + b)).collect();
+        let rmse = 0.5 * ImagePair::new(&halves[0], &halves[1], 1, Some(&coverage))?.rmse();
+        Ok(Truth { image, coverage, rmse, surfaces, width: self.width })
+    }
+}
+
+impl Truth {
+    /// Pixels that show something.
+    pub fn covered(&self) -> u64 {
+        self.coverage.iter().filter(|c| **c > 0.0).count() as u64
+    }
+
+    /// RMSE of an image over the covered pixels, as measured.
+    pub fn rmse_of(&self, image: &[f32]) -> Result<f64> {
+        Ok(ImagePair::new(image, &self.image, 1, Some(&self.coverage))?.rmse())
+    }
+
+    /// RMSE of an image over some pixels.
+    pub fn rmse_over(&self, image: &[f32], mask: &[f32]) -> Result<f64> {
+        Ok(ImagePair::new(image, &self.image, 1, Some(mask))?.rmse())
+    }
+
+    /// Every error of an image, over the covered pixels.
+    pub fn errors_of(&self, image: &[f32]) -> Result<Errors> {
+        let pair = ImagePair::new(image, &self.image, 1, Some(&self.coverage))?;
+        let rmse = pair.rmse();
+        Ok(Errors {
+            rmse,
+            rmse_corrected: corrected(rmse, self.rmse),
+            bias: pair.bias(),
+            flip: flip(&pair, self.width, PIXELS_PER_DEGREE)?.mean,
+            tanimoto: pair.tanimoto(),
+            minimum_ratio: pair.minimum_ratio(),
+        })
+    }
+}
+
+/// An error without that of what it was measured against; NaN stays what it is.
+fn corrected(rmse: f64, reference: f64) -> f64 {
+    let squares = rmse * rmse - reference * reference;
+    if squares < 0.0 { 0.0 } else { squares.sqrt() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_references_own_error_is_taken_off() {
+        assert!((corrected(0.5, 0.3) - 0.4).abs() < 1e-12);
+        assert_eq!(corrected(0.1, 0.2), 0.0);
+        assert!(corrected(f64::NAN, 0.1).is_nan());
+    }
+}

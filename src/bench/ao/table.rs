@@ -1,0 +1,256 @@
+//! What people read.
+
+use crate::bench::table::{align, number, thousands};
+use crate::measure::ao_benchmark::{
+    ChangeRecord, ChangeResult, Cost, Errors, SeriesRecord, StructureRecord, TechniqueRecord, Verdict, ViewRecord,
+};
+use crate::measure::stats::Spread;
+
+/// Top levels of the reference work, by million triangles and meshes: milliseconds on a GPU that it does not name.
+const THEIR_TOPS: &str = "4.9 M in 4 meshes 0.157, 6.7 M in 5 0.160, 8.6 M in 6 0.160, 25.2 M in 15 0.180";
+/// And the rest of what it says about structures.
+const THEIR_BUILDS: &str = "first build of 25.2 M 230 ms; updating a mesh was guessed at 100 to 200 ms, not measured";
+
+fn head(names: &[&str]) -> Vec<String> {
+    names.iter().map(|n| (*n).to_owned()).collect()
+}
+
+fn indented(rows: &[Vec<String>]) -> impl Iterator<Item = String> {
+    align(rows, 1).into_iter().map(|l| format!("  {l}"))
+}
+
+fn maybe<T>(x: Option<T>, show: impl Fn(T) -> String) -> String {
+    x.map_or_else(|| "-".to_owned(), show)
+}
+
+fn error(x: f64) -> String {
+    format!("{x:.4}")
+}
+
+fn ratio(x: f64) -> String {
+    if x.is_infinite() { "inf".to_owned() } else { format!("{x:.3}") }
+}
+
+fn ms(s: Spread) -> String {
+    format!("{}..{}", number(s.median), number(s.p95))
+}
+
+fn passes(cost: &Cost) -> String {
+    cost.passes.iter().map(|p| format!("{} {}", p.pass, number(p.ms.median))).collect::<Vec<_>>().join(", ")
+}
+
+/// One view's results.
+pub fn view(record: &ViewRecord) -> Vec<String> {
+    let mut lines = vec![
+        String::new(),
+        format!(
+            "{}, {}: {} primitives, reach {:.4}; {} pixels show something; reference good to {:.5}",
+            record.scene,
+            record.view,
+            thousands(record.primitives),
+            record.reach,
+            thousands(record.covered),
+            record.reference_rmse
+        ),
+    ];
+    lines.extend(indented(&times(&record.results)));
+    lines.push(String::new());
+    lines.extend(indented(&errors(&record.results)));
+    lines.push(String::new());
+    for r in &record.results {
+        if let Some(s) = &r.still {
+            lines.push(format!("  {}, camera rays {}: {} ms", r.preset, r.primary, passes(&s.moving_cost)));
+        }
+    }
+    lines.extend(verdict(&record.verdict));
+    lines
+}
+
+fn times(results: &[TechniqueRecord]) -> Vec<Vec<String>> {
+    let columns =
+        ["ms a frame", "still..p95", "+camera rays..p95", "wall", "orbit", "at rest", "after", "rays", "skipped", "camera"];
+    let mut rows = vec![head(&columns)];
+    rows[0][0] = "preset".into();
+    for r in results {
+        let still = r.still.as_ref();
+        rows.push(vec![
+            r.preset.clone(),
+            maybe(still, |s| ms(s.cost.device_ms)),
+            maybe(still, |s| ms(s.moving_cost.device_ms)),
+            maybe(still, |s| number(s.moving_cost.wall_ms.median)),
+            maybe(r.moving.as_ref(), |m| number(m.cost.ms())),
+            maybe(r.rest.as_ref(), |s| number(s.cost.ms())),
+            maybe(r.rest.as_ref().and_then(|s| s.frames), |f| format!("{f} frames")),
+            maybe(still, |s| thousands(s.cost.rays as u64)),
+            maybe(still, |s| thousands(s.cost.skipped_rays as u64)),
+            maybe(still, |s| thousands(s.moving_cost.camera_rays as u64)),
+        ]);
+    }
+    rows
+}
+
+fn errors(results: &[TechniqueRecord]) -> Vec<Vec<String>> {
+    let columns = [
+        "error",
+        "RMSE",
+        "corrected",
+        "unfiltered",
+        "bias",
+        "FLIP",
+        "Tanimoto",
+        "min ratio",
+        "frame 1",
+        "frame 4",
+        "orbit RMSE",
+        "unfiltered",
+        "FLIP",
+    ];
+    let mut rows = vec![head(&columns)];
+    for r in results {
+        let still = r.still.as_ref();
+        let settled = still.and_then(|s| s.settled());
+        let of = |show: &dyn Fn(&Errors) -> String| maybe(settled, |p| show(&p.errors));
+        let after = |frame: u32| maybe(still.and_then(|s| s.curve.iter().find(|p| p.frame == frame)), |p| error(p.errors.rmse));
+        let moving = r.moving.as_ref();
+        rows.push(vec![
+            r.preset.clone(),
+            of(&|e| error(e.rmse)),
+            of(&|e| error(e.rmse_corrected)),
+            maybe(settled.and_then(|p| p.unfiltered), |e| error(e.rmse)),
+            of(&|e| format!("{:+.4}", e.bias)),
+            of(&|e| error(e.flip)),
+            of(&|e| format!("{:.6}", e.tanimoto)),
+            of(&|e| error(e.minimum_ratio)),
+            after(1),
+            after(4),
+            maybe(moving, |m| error(m.errors.rmse)),
+            maybe(moving.and_then(|m| m.unfiltered), |e| error(e.rmse)),
+            maybe(moving, |m| error(m.errors.flip)),
+        ]);
+    }
+    rows
+}
+
+/// Yes or no.
+fn met(holds: bool) -> &'static str {
+    if holds { "yes" } else { "NO" }
+}
+
+fn verdict(v: &Verdict) -> Vec<String> {
+    let mut lines = Vec::new();
+    if let (Some(rays), Some(rmse)) = (v.rays_ratio, v.rmse_ratio) {
+        let holds = rays <= Verdict::RAYS_AIM && rmse <= 1.0;
+        lines.push(format!(
+            "  balanced over larsen: {rays:.3} of the rays ({} with camera rays, {} while moving), {rmse:.3} of the settled RMSE \
+             ({} on the orbit); a tenth of the rays, no more error: {}",
+            maybe(v.rays_ratio_with_camera, ratio),
+            maybe(v.rays_ratio_moving, ratio),
+            maybe(v.moving_rmse_ratio, ratio),
+            met(holds)
+        ));
+        lines.push(match (v.frames_to_reach, v.rays_to_reach, v.rays_to_reach_ratio) {
+            (Some(frames), Some(rays), Some(ratio)) => format!(
+                "  balanced reaches larsen's settled RMSE in frame {frames}, after {} rays: {ratio:.3} of what one frame of larsen's traces",
+                thousands(rays)
+            ),
+            _ => "  balanced does not reach larsen's settled RMSE".to_owned(),
+        });
+    }
+    if let Some(e) = v.equal_time {
+        lines.push(format!(
+            "  equal time: balanced with {} rays a pixel takes {} ms to larsen's {}, and {:.3} of its settled RMSE; a third or less: {}",
+            e.rays_per_pixel,
+            number(e.ms),
+            number(e.their_ms),
+            e.rmse_ratio,
+            met(e.rmse_ratio <= Verdict::EQUAL_TIME_AIM)
+        ));
+    }
+    if !v.filter_raises.is_empty() {
+        lines.push(format!("  the filter raises the settled error of: {}", v.filter_raises.join(", ")));
+    }
+    lines
+}
+
+/// What a change left behind.
+pub fn change(record: &ChangeRecord) -> Vec<String> {
+    let mut lines = vec![
+        String::new(),
+        format!(
+            "{}, {}: {} pixels looked at, {} frames; reference good to {:.5}",
+            record.scene,
+            record.change,
+            thousands(record.pixels),
+            record.frames,
+            record.reference_rmse
+        ),
+    ];
+    type Column = (&'static str, fn(&ChangeResult) -> Option<String>);
+    let columns: [Column; 14] = [
+        ("left 1", |r| r.residuals.first().map(|g| format!("{g:.3}"))),
+        ("left 4", |r| r.residuals.get(3).map(|g| format!("{g:.3}"))),
+        ("half-life", |r| r.fitted_half_life.map(ratio)),
+        ("memory 1", |r| r.memory.first().map(|g| format!("{g:.3}"))),
+        ("half-life", |r| r.memory_half_life.map(ratio)),
+        ("x as quick", |r| r.times_as_quick.map(ratio)),
+        ("gone in", |r| r.gone.map(|n| n.to_string())),
+        ("ghosting", |r| r.ghosting.map(|g| format!("{g:.2e}"))),
+        ("stale", |r| r.stale_pixels.map(thousands)),
+        ("by chance", |r| r.stale_pixels_by_chance.map(thousands)),
+        ("recovered in", |r| r.recovery.map(|n| n.to_string())),
+        ("as larsen in", |r| r.recovery_to_larsen.map(|n| n.to_string())),
+        ("RMSE", |r| r.errors.map(|e| error(e.rmse))),
+        ("update ms", |r| r.update_ms.map(ms)),
+    ];
+    // columns that nobody fills stay away
+    let used: Vec<&Column> = columns.iter().filter(|(_, of)| record.results.iter().any(|r| of(r).is_some())).collect();
+    let mut rows = vec![std::iter::once("preset").chain(used.iter().map(|c| c.0)).map(str::to_owned).collect::<Vec<_>>()];
+    rows.extend(record.results.iter().map(|r| {
+        let cells = used.iter().map(|(_, of)| of(r).unwrap_or_else(|| "-".to_owned()));
+        std::iter::once(r.preset.clone()).chain(cells).collect()
+    }));
+    lines.extend(indented(&rows));
+    lines
+}
+
+/// What keeping structures up to date took.
+pub fn structures(records: &[StructureRecord]) -> Vec<String> {
+    let columns = ["structures, ms", "stored", "placed", "first build", "top level..p95", "mesh", "refit..p95", "rebuild..p95"];
+    let mut rows = vec![head(&columns)];
+    for r in records {
+        rows.push(vec![
+            r.scene.clone(),
+            format!("{} in {}", thousands(r.stored), r.meshes),
+            format!("{} in {}", thousands(r.primitives), r.instances),
+            number(r.build_ms),
+            maybe(r.top, |s| format!("{} {}", ms(s), if r.top_rebuilt { "built" } else { "refitted" })),
+            thousands(r.mesh_triangles),
+            maybe(r.refit, ms),
+            maybe(r.rebuild, ms),
+        ]);
+    }
+    let theirs = [format!("  Larsen, top level, ms: {THEIR_TOPS}"), format!("  Larsen: {THEIR_BUILDS}")];
+    std::iter::once(String::new()).chain(indented(&rows)).chain(theirs).collect()
+}
+
+/// One number varied.
+pub fn series(record: &SeriesRecord) -> Vec<String> {
+    let columns = ["", "x", "ms..p95", "frames/s", "RMSE", "unfiltered", "at equal time", "passes, ms"];
+    let mut rows = vec![head(&columns)];
+    rows[0][0].clone_from(&record.series);
+    for line in &record.lines {
+        for p in &line.points {
+            rows.push(vec![
+                format!("{} {}", line.name, p.scene),
+                thousands(p.x as u64),
+                maybe(p.cost.as_ref(), |c| ms(c.device_ms)),
+                maybe(p.cost.as_ref().map(Cost::ms).filter(|ms| *ms > 0.0), |ms| number(1e3 / ms)),
+                maybe(p.rmse, error),
+                maybe(p.unfiltered_rmse, error),
+                maybe(p.equal_time_rmse, error),
+                maybe(p.cost.as_ref(), passes),
+            ]);
+        }
+    }
+    std::iter::once(String::new()).chain(indented(&rows)).collect()
+}

@@ -1,0 +1,114 @@
+//! What every benchmark takes: how long, how thoroughly, on what, and where to say it.
+
+use std::io::Write;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::Duration;
+
+use clap::{Args, ValueHint};
+use serde::Serialize;
+
+use crate::error::{Error, Result};
+use crate::gpu::{self, Device};
+use crate::measure::chart::Picture;
+use crate::output;
+use crate::terminal::console::Console;
+use crate::terminal::parse::parse_seconds;
+
+/// Options of `skylit bench` that do not depend on what is measured.
+#[derive(Clone, Debug, Args)]
+pub struct CommonArgs {
+    /// Stop after this time with what there is
+    #[arg(long, value_name = "SECONDS", value_parser = parse_seconds, allow_hyphen_values = true)]
+    pub time_limit: Option<Duration>,
+    /// Little of everything, on small scenes: a check that everything runs
+    #[arg(long)]
+    pub quick: bool,
+    /// Vulkan device, by index or part of its name (`skylit doctor` lists them)
+    #[arg(long, value_name = "INDEX|NAME")]
+    pub device: Option<String>,
+    /// Run with the Vulkan validation layer (slower); a message of it fails the run
+    #[arg(long)]
+    pub validation: bool,
+    /// Print one JSON record on stdout instead of text; with =FILE, write it there besides
+    #[arg(long, value_name = "FILE", num_args = 0..=1, require_equals = true, value_hint = ValueHint::FilePath)]
+    pub json: Option<Option<PathBuf>>,
+    /// Also write a table, one row a result
+    #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
+    pub csv: Option<PathBuf>,
+    /// Also draw what was measured
+    #[arg(long, value_name = "FILE.png", value_hint = ValueHint::FilePath)]
+    pub plot: Option<PathBuf>,
+    /// Print nothing but errors
+    #[arg(long, short)]
+    pub quiet: bool,
+}
+
+impl CommonArgs {
+    /// Where to say things.
+    pub fn console(&self) -> Console {
+        Console { json: self.json == Some(None), quiet: self.quiet }
+    }
+
+    /// File for the record.
+    pub fn json_file(&self) -> Option<&PathBuf> {
+        self.json.as_ref()?.as_ref()
+    }
+
+    /// Every file that will be written.
+    pub fn outputs(&self) -> impl Iterator<Item = &PathBuf> {
+        self.json_file().into_iter().chain(&self.csv).chain(&self.plot)
+    }
+
+    /// Checks what clap cannot, and that every file can be written.
+    ///
+    /// # Errors
+    /// [`Error::Usage`]; those of [`output::check_writable`].
+    pub fn check(&self) -> Result<()> {
+        match &self.plot {
+            Some(p) if p.extension().is_none_or(|e| !e.eq_ignore_ascii_case("png")) => {
+                Err(Error::Usage(format!("--plot {}: the name must end in .png", p.display())))
+            }
+            _ => self.outputs().try_for_each(|path| output::check_writable(path)),
+        }
+    }
+
+    /// Opens the device.
+    ///
+    /// # Errors
+    /// Those of [`Device::open`].
+    pub fn open_device(&self) -> Result<Arc<Device>> {
+        Device::open(&gpu::Options { device: self.device.clone(), validation: self.validation, ..Default::default() })
+    }
+
+    /// Writes the files that were asked for; one that cannot be written does not stop the others.
+    ///
+    /// # Errors
+    /// The first that went wrong.
+    pub fn write(
+        &self,
+        record: &impl Serialize,
+        table: impl Fn(&mut dyn Write) -> std::result::Result<(), csv::Error>,
+        picture: impl Fn() -> Result<Picture>,
+    ) -> Result<()> {
+        let json = self.json_file().map_or(Ok(()), |path| {
+            let text = serde_json::to_string_pretty(record)
+                .map_err(|e| Error::CheckFailed(format!("cannot express the result as JSON: {e}")))?;
+            output::write_atomically(path, |f| f.write_all(text.as_bytes()).and_then(|()| f.write_all(b"\n")))
+        });
+        let csv = self
+            .csv
+            .as_ref()
+            .map_or(Ok(()), |path| output::write_atomically(path, |f| table(f).map_err(std::io::Error::other)));
+        let plot = self.plot.as_ref().map_or(Ok(()), |path| {
+            let picture = picture()?;
+            output::png::write_rgb(path, &picture.rgb, picture.width, picture.height)
+        });
+        json.and(csv).and(plot)
+    }
+
+    /// One of two numbers, unless another was asked for: the second with `--quick`.
+    pub fn number(&self, asked: Option<u32>, usual: u32, quick: u32) -> u32 {
+        asked.unwrap_or(if self.quick { quick } else { usual })
+    }
+}

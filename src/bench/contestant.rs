@@ -1,0 +1,239 @@
+//! Who is measured: our own tracers and kernels, and those of peers, behind one interface.
+
+use std::sync::Arc;
+
+use super::peer::Peer;
+use super::process::PeerError;
+use super::streams::{Set, sample};
+use crate::accel::flatten::FlatScene;
+use crate::error::{Error, Result};
+use crate::film::Control;
+use crate::gpu::{Device, DeviceInfo};
+use crate::integrators::rays::{Mode, PreparedRays};
+use crate::measure::benchmark::BuildRecord;
+use crate::ray::{Hit, Ray};
+use crate::tracer::{BuildOptions, Kernel, Needs, Tracer, TracerKind};
+
+/// A tracer of our own with its kernel. A new one is a line of [`OWN`].
+pub struct Own {
+    /// On the command line and in tables.
+    pub name: &'static str,
+    /// Which tracer.
+    pub tracer: TracerKind,
+    /// Which kernel of the compute tracer.
+    pub kernel: Kernel,
+    /// On a CPU device: it gets one in so many rays.
+    pub divisor: usize,
+    /// On a CPU device: it is left out of scenes with more stored primitives, unless asked for by name. Without a tree: with more
+    /// to test for each ray.
+    pub most_primitives: usize,
+}
+
+const fn compute(kernel: Kernel, name: &'static str, divisor: usize, most_primitives: usize) -> Own {
+    Own { name, tracer: TracerKind::Compute, kernel, divisor, most_primitives }
+}
+
+/// All of them; the first that runs makes the rays, and others are checked against it.
+pub const OWN: [Own; 7] = [
+    compute(Kernel::Wide, "wide", 1, usize::MAX),
+    compute(Kernel::Packet, "packet", 1, usize::MAX),
+    compute(Kernel::Nearest, "nearest", 4, 1 << 22),
+    compute(Kernel::Direction, "direction", 4, 1 << 22),
+    compute(Kernel::Brute, "brute", 64, 2000),
+    Own { name: "pipeline", tracer: TracerKind::Pipeline, kernel: Kernel::Wide, divisor: 16, most_primitives: 1 << 21 },
+    Own { name: "query", tracer: TracerKind::Query, kernel: Kernel::Wide, divisor: 16, most_primitives: 1 << 21 },
+];
+
+impl Own {
+    /// Does it take part on this device and scene? `named`: the user asked for it.
+    pub fn takes_part(&self, info: &DeviceInfo, flat: &FlatScene, named: bool) -> Result<(), String> {
+        if !info.supports(self.tracer) {
+            return Err("the device does not have what it needs (`skylit doctor`)".into());
+        }
+        if self.kernel == Kernel::Packet && !info.packets() {
+            // it would be `wide` under another name
+            return Err("the device has no subgroups of eight lanes or no 64-bit integers, and traces as 'wide' does".into());
+        }
+        // without a tree, a GPU is slow too, and what is placed counts, not what is stored
+        let brute = self.kernel == Kernel::Brute;
+        let work = if brute { Kernel::brute_tests(flat) } else { flat.primitive_count() };
+        if (brute || info.is_cpu()) && !named && work > self.most_primitives {
+            return Err(format!("slow on so many primitives; --kernels {} asks for it", self.name));
+        }
+        Ok(())
+    }
+}
+
+/// Where a contestant's rays are traced.
+enum Engine<'a> {
+    Own { tracer: Box<Tracer>, divisor: usize },
+    Peer { peer: usize, kernel: String, flat: &'a FlatScene<'a> },
+}
+
+/// One of those who are measured, with a scene.
+pub struct Contestant<'a> {
+    /// In tables.
+    pub name: String,
+    /// What building took.
+    pub build: BuildRecord,
+    /// Its answers have to agree with the reference.
+    pub strict: bool,
+    /// Which kernel of the compute tracer it is.
+    pub kernel: Option<Kernel>,
+    engine: Engine<'a>,
+}
+
+impl<'a> Contestant<'a> {
+    /// One of our own.
+    ///
+    /// # Errors
+    /// Those of [`Tracer::new`].
+    pub fn own(device: &Arc<Device>, flat: &'a FlatScene, own: &Own, build: &BuildOptions) -> Result<Self> {
+        let tracer = Tracer::with_build(device, own.tracer, flat, Needs::default(), own.kernel.into(), build)?;
+        let stats = tracer.stats();
+        let build = BuildRecord {
+            contestant: own.name.to_owned(),
+            build_seconds: stats.build_seconds,
+            upload_seconds: Some(stats.upload_seconds),
+            bytes_per_primitive: stats.bytes_per_primitive(),
+            sah_cost: stats.sah_cost,
+        };
+        let divisor = if device.info.is_cpu() { own.divisor } else { 1 };
+        Ok(Self {
+            name: own.name.to_owned(),
+            build,
+            strict: true,
+            kernel: (own.tracer == TracerKind::Compute).then_some(own.kernel),
+            engine: Engine::Own { tracer: Box::new(tracer), divisor },
+        })
+    }
+
+    /// A kernel of a peer that has the scene.
+    ///
+    /// # Errors
+    /// When the peer fails to build.
+    pub fn peer(peers: &mut [Peer], index: usize, kernel: &str, flat: &'a FlatScene<'a>) -> Result<Self, PeerError> {
+        let peer = &mut peers[index];
+        let name = peer_kernel(&peer.process.spec.name, kernel);
+        let (build_seconds, bytes) = peer.build(kernel)?;
+        let build = BuildRecord {
+            contestant: name.clone(),
+            build_seconds,
+            upload_seconds: None,
+            bytes_per_primitive: bytes / flat.primitive_count().max(1) as f64,
+            sah_cost: None,
+        };
+        let strict = peer.process.spec.strict.iter().any(|k| k == kernel);
+        Ok(Self { name, build, strict, kernel: None, engine: Engine::Peer { peer: index, kernel: kernel.to_owned(), flat } })
+    }
+
+    /// Is it made for such rays? Packets are for coherent ones alone.
+    pub fn is_for(&self, set: Set) -> bool {
+        self.kernel != Some(Kernel::Packet) || set.is_coherent()
+    }
+
+    /// The tracer, if it is our own.
+    pub fn tracer(&self) -> Option<&Tracer> {
+        match &self.engine {
+            Engine::Own { tracer, .. } => Some(tracer),
+            Engine::Peer { .. } => None,
+        }
+    }
+
+    /// The peer it belongs to.
+    pub fn peer_index(&self) -> Option<usize> {
+        match self.engine {
+            Engine::Own { .. } => None,
+            Engine::Peer { peer, .. } => Some(peer),
+        }
+    }
+
+    /// Makes ready for one stream.
+    pub fn prepare<'c>(&'c self, set: Set, rays: &[Ray], mode: Mode) -> Result<Run<'c>> {
+        match &self.engine {
+            Engine::Own { tracer, divisor } => {
+                let rays = sample(rays, *divisor);
+                let prepared = PreparedRays::new(tracer, &rays, mode)?;
+                Ok(Run { rays: rays.len(), how: How::Own(Box::new(prepared)) })
+            }
+            Engine::Peer { peer, kernel, .. } => {
+                Ok(Run { rays: rays.len(), how: How::Peer { peer: *peer, kernel, set: set.name(), mode, hits: 0 } })
+            }
+        }
+    }
+
+    /// What rays meet, outside of any timing.
+    ///
+    /// # Errors
+    /// Those of the device or the peer.
+    pub fn hits(&self, peers: &mut [Peer], rays: &[Ray], mode: Mode, control: &mut dyn Control) -> Result<Vec<Hit>, PeerError> {
+        match &self.engine {
+            Engine::Own { tracer, .. } => {
+                let mut prepared = PreparedRays::new(tracer, rays, mode)?;
+                prepared.pass(control)?;
+                Ok(prepared.hits()?)
+            }
+            Engine::Peer { peer, kernel, flat } => {
+                let peer = &mut peers[*peer];
+                peer.load_rays("check", rays)?;
+                peer.hits(flat, kernel, mode, "check", rays.len())
+            }
+        }
+    }
+}
+
+/// A peer's kernel in tables.
+pub fn peer_kernel(peer: &str, kernel: &str) -> String {
+    format!("{peer} {kernel}")
+}
+
+/// A contestant about to trace one stream again and again.
+pub struct Run<'c> {
+    /// Rays of a repeat.
+    pub rays: usize,
+    how: How<'c>,
+}
+
+enum How<'c> {
+    Own(Box<PreparedRays<'c>>),
+    Peer { peer: usize, kernel: &'c str, set: &'static str, mode: Mode, hits: u64 },
+}
+
+/// Seconds of one repeat.
+pub struct Lap {
+    /// On the device, or by the peer's own clock.
+    pub device: f64,
+    /// By our clock; `None` for peers.
+    pub wall: Option<f64>,
+}
+
+impl Run<'_> {
+    /// One repeat.
+    ///
+    /// # Errors
+    /// Those of the device or the peer.
+    pub fn lap(&mut self, peers: &mut [Peer], control: &mut dyn Control) -> Result<Lap, PeerError> {
+        match &mut self.how {
+            How::Own(prepared) => {
+                let (device, wall) = prepared.pass(control)?;
+                Ok(Lap { device, wall: Some(wall) })
+            }
+            How::Peer { peer, kernel, set, mode, hits } => {
+                let (seconds, found) = peers[*peer].trace(kernel, *mode, set)?;
+                *hits = found;
+                Ok(Lap { device: seconds, wall: None })
+            }
+        }
+    }
+
+    /// Rays of the last repeat that met something.
+    ///
+    /// # Errors
+    /// Those of the device; [`Error::CheckFailed`] when the driver cut a traversal short.
+    pub fn hit_count(&self) -> Result<u64, Error> {
+        match &self.how {
+            How::Own(prepared) => Ok(prepared.hits()?.iter().filter(|h| h.is_hit()).count() as u64),
+            How::Peer { hits, .. } => Ok(*hits),
+        }
+    }
+}

@@ -1,0 +1,93 @@
+//! What `skylit bench path` takes.
+
+use std::path::PathBuf;
+use std::time::Duration;
+
+use clap::{Args, ValueHint};
+
+use crate::bench::common::CommonArgs;
+use crate::cli::paths::args::Sampling;
+use crate::terminal::device_args::{BuildChoice, TracerChoice};
+use crate::terminal::parse::{parse_seconds, parse_size};
+
+/// Pixels, unless said otherwise.
+const DEFAULT_SIZE: [u32; 2] = [256, 256];
+/// The same with `--quick`.
+const QUICK_SIZE: [u32; 2] = [64, 64];
+/// Timed images of each kind, unless said otherwise.
+const DEFAULT_REPEATS: u32 = 5;
+/// The same with `--quick`.
+const QUICK_REPEATS: u32 = 2;
+/// Seconds that one image may take, unless said otherwise.
+const DEFAULT_SECONDS: f64 = 4.0;
+/// The same with `--quick`.
+const QUICK_SECONDS: f64 = 0.3;
+/// References get so many times the longest image.
+const REFERENCE_SHARE: f64 = 15.0;
+
+/// `skylit bench path`.
+#[derive(Clone, Debug, Args)]
+pub struct BenchPathArgs {
+    /// Scenes: as `render` takes them, or cornell (the box, its walls Lambert's), sphere-diffuse, sphere-metal, sphere-mirror, sphere-glass
+    /// [default: cornell, those of FlightHelmet and Sponza that are there, and the first three spheres]
+    pub scenes: Vec<String>,
+    /// Sampling strategies of our own, separated by commas [default: all]
+    #[arg(long, value_enum, value_name = "LIST", value_delimiter = ',')]
+    pub strategies: Vec<Sampling>,
+    /// Image size in pixels [default: 256x256; 64x64 with --quick]
+    #[arg(long, value_name = "WxH", value_parser = parse_size)]
+    pub size: Option<[u32; 2]>,
+    /// Timed images of each sample count, in turn, after one that warms up [default: 5; 2 with --quick]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
+    pub repeats: Option<u32>,
+    /// Sample counts go up by fours until an image takes about so long [default: 4; 0.3 with --quick]
+    #[arg(long, value_name = "SECONDS", value_parser = parse_seconds, allow_hyphen_values = true)]
+    pub seconds: Option<Duration>,
+    /// Spend so long on the reference of each engine and scene [default: 15 times --seconds]
+    #[arg(long, value_name = "SECONDS", value_parser = parse_seconds, allow_hyphen_values = true)]
+    pub reference_seconds: Option<Duration>,
+    /// What surrounds scenes that have no light: an equirectangular .hdr or .exr [default: the shared sun map, or one of our own]
+    #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
+    pub environment: Option<PathBuf>,
+    /// How rays are traced
+    #[arg(long, value_enum, default_value = "auto")]
+    pub tracer: TracerChoice,
+    /// Time that the compute tracer spends on its hierarchy
+    #[arg(long, value_enum, default_value = "default")]
+    pub build: BuildChoice,
+    /// Peers to run beside: a file like benches/peers.toml, or `none` [default: benches/peers.toml, where it is there]
+    #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
+    pub peers: Option<String>,
+    /// What every benchmark takes
+    #[command(flatten)]
+    pub common: CommonArgs,
+}
+
+impl BenchPathArgs {
+    /// Pixels.
+    pub fn size(&self) -> [u32; 2] {
+        self.size.unwrap_or(if self.common.quick { QUICK_SIZE } else { DEFAULT_SIZE })
+    }
+
+    /// Timed images of each kind.
+    pub fn repeats(&self) -> u32 {
+        self.common.number(self.repeats, DEFAULT_REPEATS, QUICK_REPEATS)
+    }
+
+    /// Seconds that one image may take.
+    pub fn seconds(&self) -> f64 {
+        let usual = if self.common.quick { QUICK_SECONDS } else { DEFAULT_SECONDS };
+        self.seconds.map_or(usual, |d| d.as_secs_f64())
+    }
+
+    /// Seconds for each reference.
+    pub fn reference_seconds(&self) -> f64 {
+        self.reference_seconds.map_or(REFERENCE_SHARE * self.seconds(), |d| d.as_secs_f64())
+    }
+
+    /// Strategies of our own, in the order in which they are listed.
+    pub fn strategies(&self) -> Vec<Sampling> {
+        let all = [Sampling::Mis, Sampling::Light, Sampling::Bsdf, Sampling::Cosine, Sampling::Uniform];
+        all.into_iter().filter(|s| self.strategies.is_empty() || self.strategies.contains(s)).collect()
+    }
+}

@@ -1,0 +1,140 @@
+//! Who renders: a strategy of our own, or a kernel of a peer.
+
+use std::time::Instant;
+
+use super::peer::Peer;
+use crate::accel::flatten::FlatScene;
+use crate::bench::process::PeerError;
+use crate::error::Result;
+use crate::film::camera::CameraRecord;
+use crate::integrators::path::{PathIntegrator, PathOptions};
+use crate::terminal::interrupt::SilentControl;
+use crate::tracer::Tracer;
+
+/// Name of our own engine in records.
+pub const OWN: &str = "skylit";
+/// Seeds of references: no timed image has them.
+const REFERENCE_SEED: u32 = 0x7e0_0000;
+/// Seconds that one image of a reference should take.
+const CHUNK_SECONDS: f64 = 2.0;
+/// Sample counts go up by this: powers of four are what stratifying samplers do best with.
+pub const STEP: u32 = 4;
+/// Images of a reference at least: two for each half.
+const MIN_CHUNKS: u32 = 4;
+
+/// An image and what it took.
+pub struct Shot {
+    /// Wall seconds; of a peer, by its own clock.
+    pub seconds: f64,
+    /// Linear RGB, rows from the top.
+    pub image: Vec<f32>,
+    /// Rays, where they are counted.
+    pub rays: Option<u64>,
+    /// Longest launch, device seconds, where it is known.
+    pub longest_launch: Option<f64>,
+}
+
+/// Who renders.
+pub enum Engine<'a> {
+    /// One of our strategies.
+    Own {
+        /// What traces.
+        tracer: &'a Tracer,
+        /// From where.
+        camera: CameraRecord,
+        /// What renders.
+        integrator: Box<PathIntegrator>,
+    },
+    /// A kernel of a peer that has the scene.
+    Peer {
+        /// Its place among the peers.
+        peer: usize,
+        /// As it calls it.
+        kernel: String,
+        /// Pixels.
+        size: [u32; 2],
+    },
+}
+
+impl<'a> Engine<'a> {
+    /// One of our own.
+    ///
+    /// # Errors
+    /// Those of the device.
+    pub fn own(tracer: &'a Tracer, flat: &FlatScene, camera: CameraRecord, options: &PathOptions) -> Result<Self> {
+        let integrator = Box::new(PathIntegrator::new(tracer, flat, options)?);
+        Ok(Self::Own { tracer, camera, integrator })
+    }
+
+    /// An image.
+    ///
+    /// # Errors
+    /// Those of the device or the peer; Ctrl-C.
+    pub fn render(&mut self, peers: &mut [Peer], spp: u32, seed: u32) -> Result<Shot, PeerError> {
+        match self {
+            Self::Own { tracer, camera, integrator } => {
+                let start = Instant::now();
+                let result = integrator.render(tracer, camera, spp, seed, &mut SilentControl)?;
+                let seconds = start.elapsed().as_secs_f64();
+                let rays = result.image.primary_rays + result.bounce_rays + result.shadow_rays;
+                let longest = result.image.longest_launch;
+                let longest_launch = (longest > 0.0).then_some(longest);
+                Ok(Shot { seconds, image: result.image.film.mean, rays: Some(rays), longest_launch })
+            }
+            Self::Peer { peer, kernel, size } => {
+                let (seconds, image) = peers[*peer].render(kernel, spp, seed, *size)?;
+                Ok(Shot { seconds, image, rays: None, longest_launch: None })
+            }
+        }
+    }
+}
+
+/// What is right, in two independent halves.
+pub struct Truth {
+    /// Mean of both.
+    pub image: Vec<f32>,
+    /// Standard error of `image`, root mean square over pixels and channels.
+    pub rmse: f64,
+    /// Paths a pixel.
+    pub spp: u64,
+    /// Spent on it.
+    pub seconds: f64,
+}
+
+/// Renders a reference for so long. `advance` hears the share that is done.
+///
+/// # Errors
+/// Those of [`Engine::render`].
+pub fn truth(
+    engine: &mut Engine,
+    peers: &mut [Peer],
+    limit: f64,
+    most_spp: u32,
+    advance: &mut dyn FnMut(f64),
+) -> Result<Truth, PeerError> {
+    // how many paths take about a chunk's time
+    let mut spp = 4;
+    loop {
+        let shot = engine.render(peers, spp, REFERENCE_SEED)?;
+        if shot.seconds * f64::from(STEP) > CHUNK_SECONDS.min(limit / f64::from(MIN_CHUNKS)) || spp * STEP > most_spp {
+            break;
+        }
+        spp *= STEP;
+    }
+    let (mut halves, mut seconds, mut chunks) = ([Vec::new(), Vec::new()], 0.0, 0u32);
+    // as many in one half as in the other
+    while chunks < MIN_CHUNKS || seconds < limit || chunks % 2 == 1 {
+        let shot = engine.render(peers, spp, REFERENCE_SEED + 1 + chunks)?;
+        let half: &mut Vec<f64> = &mut halves[chunks as usize % 2];
+        half.resize(shot.image.len(), 0.0);
+        half.iter_mut().zip(&shot.image).for_each(|(sum, v)| *sum += f64::from(*v));
+        seconds += shot.seconds;
+        chunks += 1;
+        advance((seconds / limit).min(1.0));
+    }
+    let n = f64::from(chunks / 2);
+    let [a, b] = &halves;
+    let image = a.iter().zip(b).map(|(a, b)| (0.5 * (a + b) / n) as f32).collect();
+    let squares: f64 = a.iter().zip(b).map(|(a, b)| (0.5 * (a - b) / n).powi(2)).sum();
+    Ok(Truth { image, rmse: (squares / a.len() as f64).sqrt(), spp: u64::from(spp) * u64::from(chunks), seconds })
+}

@@ -1,0 +1,67 @@
+//! What people read.
+
+use crate::bench::table::{align, number, thousands};
+use crate::measure::path_benchmark::{Contestant, How, PathScene};
+
+/// One scene's results.
+pub fn scene(record: &PathScene) -> Vec<String> {
+    let mut what = vec![format!("{}x{}", record.size[0], record.size[1]), format!("{} triangles", thousands(record.triangles))];
+    if record.spheres > 0 {
+        what.push(format!("{} spheres", thousands(record.spheres)));
+    }
+    what.push(format!("{} lights", record.lights));
+    what.push(format!("around it {}", record.environment));
+    let mut lines = vec![String::new(), format!("{}: {}", record.scene, what.join(", "))];
+    for r in &record.references {
+        lines.push(format!(
+            "  reference of {}: {} paths a pixel in {:.0} s, known to {:.2e}, mean {:.4}",
+            r.engine,
+            thousands(r.spp),
+            r.seconds,
+            r.rmse,
+            r.mean
+        ));
+    }
+    for d in &record.differences {
+        lines.push(format!(
+            "  {} beside ours: mean {:.4} times, RMSE {:.2e}, of which {:.2e} is noise",
+            d.engine, d.mean_ratio, d.rmse, d.explained
+        ));
+    }
+    let target = record.target.as_ref().map(|t| t.rmse);
+    let mut rows = vec![
+        ["contestant", "spp", "seconds", "RMSE", "bad pixels", "Mpaths/s", "Mrays/s", "1/(MSE s)"].map(str::to_owned).to_vec(),
+    ];
+    if let Some(rmse) = target {
+        rows[0].extend([format!("s to {rmse:.2e}"), "times as long".into()]);
+    }
+    let base = record.target.as_ref().and_then(|t| record.results.iter().find(|r| r.name == t.set_by)).and_then(seconds);
+    rows.extend(record.results.iter().map(|r| row(r, base)));
+    lines.push(String::new());
+    lines.extend(align(&rows, 1).into_iter().map(|l| format!("  {l}")));
+    lines
+}
+
+fn seconds(r: &Contestant) -> Option<f64> {
+    r.seconds_to_target.map(|t| t.seconds)
+}
+
+fn row(r: &Contestant, base: Option<f64>) -> Vec<String> {
+    let mut out = vec![r.name.clone()];
+    let Some(last) = r.points.last() else { return out };
+    let median = last.seconds.map_or_else(String::new, |s| format!("{:.2}", s.median));
+    let unsure = if last.unsure { "?" } else { "" };
+    out.extend([last.spp.to_string(), median, format!("{:.2e}{unsure}", last.rmse)]);
+    out.extend([format!("{:.3} %", 100.0 * last.bad_pixels), number(r.mpaths), r.mrays.map_or_else(String::new, number)]);
+    out.push(format!("{:.2e}", r.efficiency));
+    if let Some(t) = r.seconds_to_target {
+        let mark = match t.how {
+            How::Between => "",
+            How::Less => "<",
+            How::Extrapolated => "~",
+        };
+        out.push(format!("{mark}{}", number(t.seconds)));
+        out.extend(base.map(|b| format!("{mark}{}", number(t.seconds / b))));
+    }
+    out
+}

@@ -1,0 +1,149 @@
+//! A peer that traces rays: scenes and rays in files, seconds and hits back. docs/benchmarks.md has the protocol.
+
+use std::io::{BufWriter, Write};
+use std::path::Path;
+
+use super::peers_file::PeerSpec;
+use super::process::{PeerError, Process};
+use crate::accel::flatten::FlatScene;
+use crate::error::{Error, Result};
+use crate::integrators::rays::Mode;
+use crate::ray::{Hit, Ray};
+use crate::scene::Geometry;
+
+/// Of peer scenes: "SKYP".
+const SCENE_MAGIC: u32 = 0x5059_4b53;
+
+/// A running peer.
+pub struct Peer {
+    /// How to talk to it.
+    pub process: Process,
+}
+
+impl Peer {
+    /// Builds, starts and greets it.
+    ///
+    /// # Errors
+    /// Those of [`Process::start`].
+    pub fn start(spec: &PeerSpec) -> Result<Self, PeerError> {
+        Ok(Self { process: Process::start(spec)? })
+    }
+
+    /// Gives it a scene; the one before is forgotten, and all rays.
+    pub fn load_scene(&mut self, flat: &FlatScene) -> Result<(), PeerError> {
+        let path = self.process.file("scene.bin");
+        write_scene(flat, &path).map_err(|e| Error::write(&path, &e))?;
+        self.process.ask(&format!("scene {}", path.display()))?;
+        // it has read it: the space is worth more than the file
+        let _ = std::fs::remove_file(&path);
+        Ok(())
+    }
+
+    /// Builds what a kernel traces: seconds and bytes, the same for kernels that share a structure.
+    pub fn build(&mut self, kernel: &str) -> Result<(f64, f64), PeerError> {
+        let answer = self.process.ask(&format!("build {kernel}"))?;
+        Ok((Process::number(&answer, "build_seconds")?, Process::number(&answer, "bytes")?))
+    }
+
+    /// Gives it a set of rays under a name.
+    pub fn load_rays(&mut self, name: &str, rays: &[Ray]) -> Result<(), PeerError> {
+        let path = self.process.file(&format!("{name}.rays"));
+        std::fs::write(&path, bytemuck::cast_slice(rays)).map_err(|e| Error::write(&path, &e))?;
+        self.process.ask(&format!("rays {name} {}", path.display()))?;
+        let _ = std::fs::remove_file(&path);
+        Ok(())
+    }
+
+    /// Traces a set once: seconds by its own clock, and how many rays met something.
+    pub fn trace(&mut self, kernel: &str, mode: Mode, name: &str) -> Result<(f64, u64), PeerError> {
+        let answer = self.process.ask(&format!("trace {kernel} {} {name}", mode_name(mode)))?;
+        let (seconds, hits) = (Process::number(&answer, "seconds")?, Process::number(&answer, "hits")?);
+        if !(seconds > 0.0 && seconds.is_finite()) {
+            return Err(PeerError::Failed(format!("it traced in {seconds} seconds")));
+        }
+        Ok((seconds, hits as u64))
+    }
+
+    /// What a set of `count` rays meets, with the scene's ids.
+    pub fn hits(
+        &mut self,
+        flat: &FlatScene,
+        kernel: &str,
+        mode: Mode,
+        name: &str,
+        count: usize,
+    ) -> Result<Vec<Hit>, PeerError> {
+        let path = self.process.file("hits.bin");
+        self.process.ask(&format!("hits {kernel} {} {name} {}", mode_name(mode), path.display()))?;
+        let bytes = std::fs::read(&path).map_err(|e| Error::read(&path, &e))?;
+        let _ = std::fs::remove_file(&path);
+        if bytes.len() != count * size_of::<Hit>() {
+            return Err(PeerError::Failed(format!("it wrote {} bytes of hits for {count} rays", bytes.len())));
+        }
+        let mut hits: Vec<Hit> = bytemuck::pod_collect_to_vec(&bytes);
+        if mode == Mode::Closest {
+            hits.iter_mut().filter(|h| h.is_hit()).for_each(|h| rename(flat, h));
+        }
+        Ok(hits)
+    }
+}
+
+fn mode_name(mode: Mode) -> &'static str {
+    match mode {
+        Mode::Any => "any",
+        Mode::Closest => "closest",
+    }
+}
+
+/// From placement and primitive of its group to instance and primitive of its mesh. Ids that do not exist stay: nothing is
+/// there under them, and a check will say so.
+fn rename(flat: &FlatScene, hit: &mut Hit) {
+    let Some(placement) = flat.placements.get(hit.instance as usize) else { return };
+    let group = &flat.groups[placement.group];
+    if hit.primitive as usize >= group.primitive_count {
+        return;
+    }
+    let part = flat.part_of(group, hit.primitive as usize);
+    hit.primitive -= part.first_primitive as u32;
+    if let Some(instance) = placement.scene_instance.or(part.scene_instance) {
+        hit.instance = instance as u32;
+    }
+}
+
+/// Writes the groups and placements that our tracers build over, vertices as they lie in device memory.
+fn write_scene(flat: &FlatScene, path: &Path) -> std::io::Result<()> {
+    let mut out = BufWriter::with_capacity(1 << 20, std::fs::File::create(path)?);
+    let mut words = |w: &[u32]| w.iter().try_for_each(|x| out.write_all(&x.to_le_bytes()));
+    words(&[SCENE_MAGIC, 1, flat.groups.len() as u32, flat.placements.len() as u32])?;
+    for group in &flat.groups {
+        let vertices = if group.spheres { group.primitive_count } else { group.vertex_count };
+        words(&[u32::from(group.spheres), vertices as u32, group.primitive_count as u32])?;
+        for part in &group.parts {
+            match &flat.scene.meshes[part.mesh].geometry {
+                Geometry::Spheres(s) => {
+                    for k in 0..s.len() {
+                        let s = flat.sphere(part, k);
+                        words(&[s.center.x, s.center.y, s.center.z, s.radius].map(f32::to_bits))?;
+                    }
+                }
+                Geometry::Triangles(t) => {
+                    for k in 0..t.positions.len() {
+                        words(&flat.vertex(part, k).to_array().map(f32::to_bits))?;
+                    }
+                }
+            }
+        }
+        for part in &group.parts {
+            if let Geometry::Triangles(t) = &flat.scene.meshes[part.mesh].geometry {
+                t.indices.iter().try_for_each(|i| words(&i.map(|k| k + part.first_vertex as u32)))?;
+            }
+        }
+    }
+    for placement in &flat.placements {
+        words(&[placement.group as u32])?;
+        for row in crate::tracer::gpu_scene::rows(&placement.to_world) {
+            words(&row.map(f32::to_bits))?;
+        }
+    }
+    out.flush()
+}

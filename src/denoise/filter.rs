@@ -1,0 +1,241 @@
+//! The filter of frames in real time (shaders/common/filter.glsl) over radiance: what surfaces reflect is divided by their albedo, averaged over
+//! neighbours on the same surface as far as noise explains how they differ, and multiplied again.
+//!
+//! Left as they are: mirrors, glass and polished metal, since what is seen in them has edges that nobody knows of; what emits; the
+//! background; and pixels in which some of the latter two shows. Pixels that show several surfaces are averaged among themselves, so that none of
+//! their light gets onto the surfaces beside them.
+
+use crate::shaders::{self, LANES};
+use std::time::Instant;
+
+use bytemuck::{Pod, Zeroable};
+use glam::Vec3;
+
+use super::Shot;
+use super::features::{Features, Look, Mix, is_source};
+use crate::error::Result;
+use crate::film::Control;
+use crate::film::Film;
+use crate::film::pace::Pace;
+use crate::gpu::{Buffer, Commands, Memory};
+use crate::realtime::params::FrameParams;
+use crate::realtime::settings::FilterStep;
+use crate::realtime::{DEPTH_TOLERANCE, Filter, FilterKind, inverse};
+use crate::scene::material::{Material, MaterialKind};
+
+use crate::tracer::Push;
+
+/// How it filters.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct Settings {
+    /// Shape of the neighbourhood.
+    pub kind: FilterKind,
+    /// Pixels to each side.
+    pub radius: u32,
+    /// Cosine between shading normals at which an edge begins.
+    pub cosine: f32,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self { kind: FilterKind::Box, radius: 5, cosine: 0.95 }
+    }
+}
+
+/// Radiance is divided by this much at least: what reflects less tells nothing of the light on it.
+const MIN_ALBEDO: f32 = 0.01;
+/// Below this roughness metals count as mirrors.
+const POLISHED: f32 = 0.25;
+/// `RadianceEstimate` of shaders/denoise.glsl.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+struct Estimate {
+    mean: [f32; 3],
+    samples: f32,
+    variance: [f32; 3],
+    reserved: f32,
+}
+
+/// `surface` of shaders/common/frame.glsl.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+struct SurfaceRecord {
+    position: [f32; 3],
+    spawn_offset: f32,
+    normal: [f32; 3],
+    reserved: f32,
+}
+
+/// Which pixels are averaged, and how they look to the shader.
+struct Guided {
+    surfaces: Vec<SurfaceRecord>,
+    guides: Vec<[u32; 2]>,
+    estimates: Vec<Estimate>,
+    /// Of each pixel; zero where it is left as it is.
+    divisors: Vec<Vec3>,
+}
+
+/// See [`super::Denoiser::denoise`].
+pub fn filter(
+    shot: &Shot,
+    film: &Film,
+    features: &Features,
+    settings: &Settings,
+    control: &mut dyn Control,
+) -> Result<Vec<f32>> {
+    let guided = guide(shot, film, features);
+    let filtered = run(shot, [film.width, film.height], &guided, settings, control)?;
+    let mut out = film.mean.clone();
+    for (k, divisor) in guided.divisors.iter().enumerate().filter(|(_, d)| **d != Vec3::ZERO) {
+        let radiance = Vec3::from(filtered[k].mean) * *divisor;
+        out[3 * k..][..3].copy_from_slice(&radiance.to_array());
+    }
+    Ok(out)
+}
+
+fn rgb(image: &[f32], pixel: usize) -> Vec3 {
+    Vec3::from_slice(&image[3 * pixel..][..3])
+}
+
+/// Does it show things that have edges of their own?
+fn shows_others(material: &Material) -> bool {
+    let polished = material.roughness < POLISHED;
+    match material.kind {
+        MaterialKind::Mirror | MaterialKind::Glass => true,
+        MaterialKind::Matte => false,
+        MaterialKind::Copper | MaterialKind::Gold => polished,
+        MaterialKind::MetallicRoughness => material.transmission.factor > 0.0 || polished && material.metallic > 0.5,
+    }
+}
+
+/// What a material reflects at normal incidence whatever its colour.
+fn uncoloured(material: &Material) -> f32 {
+    match material.kind {
+        MaterialKind::MetallicRoughness => ((material.ior - 1.0) / (material.ior + 1.0)).powi(2) * material.specular.factor,
+        _ => 0.0,
+    }
+}
+
+fn guide(shot: &Shot, film: &Film, features: &Features) -> Guided {
+    let Shot { scene, camera, options, .. } = *shot;
+    let pixels = film.samples.len();
+    let mut out = Guided {
+        surfaces: vec![SurfaceRecord::default(); pixels],
+        guides: vec![[f32::INFINITY.to_bits(), 0]; pixels],
+        estimates: vec![Estimate::default(); pixels],
+        divisors: vec![Vec3::ZERO; pixels],
+    };
+    let look = Look::new(camera, film.height);
+    let white = options.white_sky.is_some();
+    for k in 0..pixels {
+        let (centre, samples, mix) = (&features.centres[k], film.samples[k], features.mix[k]);
+        let Some(material) = scene.materials.get(centre.material as usize).filter(|_| centre.depth < f32::INFINITY) else {
+            continue;
+        };
+        let albedo = rgb(&features.albedo, k) / features.coverage[k].max(f32::MIN_POSITIVE);
+        let reflects = if white { albedo } else { albedo + uncoloured(material) };
+        let left = !white && (shows_others(material) || is_source(material) || reflects.max_element() <= MIN_ALBEDO);
+        if samples == 0 || mix == Mix::Source || left {
+            continue;
+        }
+        // a lens blurs what is divided, but not what it is divided by
+        let divisor = if options.lens.is_some() { Vec3::ONE } else { reflects.max(Vec3::splat(MIN_ALBEDO)) };
+        // the shader wants the mean square about the pixel's own mean
+        let variance = rgb(&film.variance, k) * (1.0 - 1.0 / samples as f32) / (divisor * divisor);
+        out.estimates[k] = Estimate {
+            mean: (rgb(&film.mean, k) / divisor).to_array(),
+            samples: samples as f32,
+            variance: variance.to_array(),
+            reserved: 0.0,
+        };
+        out.surfaces[k] = SurfaceRecord { position: centre.position, normal: centre.ng, ..Default::default() };
+        // eight bits: seven of the material, and whether it is the only surface of the pixel
+        let class = (centre.material.wrapping_mul(0x9e37_79b1) >> 25) << 1 | u32::from(mix == Mix::Several);
+        out.guides[k] = [look.depth(centre.position).to_bits(), pack_normal(Vec3::from(centre.ns)) | class << 24];
+        out.divisors[k] = divisor;
+    }
+    out
+}
+
+/// `pack_normal` of shaders/common/frame.glsl.
+fn pack_normal(n: Vec3) -> u32 {
+    let byte = |x: f32| u32::from((x.clamp(-1.0, 1.0) * 127.0).round() as i8 as u8);
+    byte(n.x) | byte(n.y) << 8 | byte(n.z) << 16
+}
+
+/// Filters on the device, in launches that are short.
+fn run(shot: &Shot, size: [u32; 2], guided: &Guided, settings: &Settings, control: &mut dyn Control) -> Result<Vec<Estimate>> {
+    let (device, camera) = (shot.tracer.device(), shot.camera);
+    let pixels = guided.estimates.len() as u32;
+    let surface = Buffer::from_slice(device, "surfaces", &guided.surfaces)?;
+    let guide = Buffer::from_slice(device, "guide", &guided.guides)?;
+    let given = Buffer::from_slice(device, "radiance", &guided.estimates)?;
+    let image = || Buffer::new(device, "filtered radiance", given.size(), Memory::Device);
+    let filter = Filter { kind: settings.kind, radius: settings.radius, samples: f32::MAX };
+    let steps: Vec<FilterStep> = filter.steps();
+    let between = if steps.len() > 1 { vec![image()?, image()?] } else { vec![image()?] };
+    let params = FrameParams {
+        camera_to_world: camera.camera_to_world,
+        world_to_camera: inverse(camera),
+        view: camera.view,
+        orthographic: camera.orthographic.into(),
+        size,
+        depth_tolerance: DEPTH_TOLERANCE,
+        normal_tolerance: settings.cosine,
+        filter_samples: filter.samples,
+        // every estimate is final: none gets better by itself
+        most_samples: 1.0,
+        surface: surface.address(),
+        guide: guide.address(),
+        ..Default::default()
+    };
+    let params = Buffer::from_slice(device, "filter parameters", &[params])?;
+    let pipeline = shaders::DENOISE.pipeline(device)?;
+    let (mut commands, mut pace) = (Commands::new(device)?, Pace::default());
+    let mut from = &given;
+    for (k, step) in steps.iter().enumerate() {
+        let to = &between[k % between.len()];
+        let mut first = 0;
+        while first < pixels {
+            let n = pace.rays().min(pixels - first);
+            let push = Push {
+                pass: params.address(),
+                rays: from.address(),
+                queued: to.address(),
+                sample_index: u32::from(step.sides[0]) | u32::from(step.sides[1]) << 1 | step.stride << 2,
+                sample_bits: step.radius,
+                first,
+                count: first + n,
+                ..Default::default()
+            };
+            let start = Instant::now();
+            let timings = commands.run(|r| r.timed("denoise", |r| r.dispatch(&pipeline, &push, n.div_ceil(LANES))))?;
+            if n == pace.rays() {
+                pace.learn(n, &timings, start.elapsed().as_secs_f64(), 1);
+            }
+            control.should_stop()?;
+            first += n;
+        }
+        from = to;
+    }
+    Ok(bytemuck::pod_collect_to_vec(&from.read(0, from.size())?))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn normals_are_packed_as_the_shader_does() {
+        assert_eq!(pack_normal(Vec3::new(1.0, -1.0, 0.0)), 0x00_81_7f);
+        assert_eq!(pack_normal(Vec3::new(0.5, 2.0, -0.004)), 0xff_7f_40);
+    }
+
+    #[test]
+    fn what_shows_others_is_left_alone() {
+        let of = |kind, roughness, metallic| shows_others(&Material { kind, roughness, metallic, ..Material::default() });
+        assert!(of(MaterialKind::Mirror, 1.0, 0.0) && of(MaterialKind::Glass, 1.0, 0.0));
+        assert!(of(MaterialKind::Gold, 0.1, 0.0) && !of(MaterialKind::Gold, 0.5, 0.0) && !of(MaterialKind::Matte, 0.0, 1.0));
+        assert!(of(MaterialKind::MetallicRoughness, 0.1, 1.0) && !of(MaterialKind::MetallicRoughness, 0.1, 0.0));
+    }
+}

@@ -1,0 +1,159 @@
+//! The film: sums per pixel on the device, means and variances on the host. What of it is put down and taken up again is in
+//! [`state`].
+
+pub mod accumulate;
+pub mod block;
+pub mod camera;
+mod control;
+pub mod convergence;
+pub mod cover;
+pub mod pace;
+pub mod schedule;
+pub mod state;
+
+pub use control::{Control, NoControl};
+
+/// Values of a pixel at most.
+pub const MAX_CHANNELS: usize = 3;
+
+/// 32-bit words of a pixel's record on the device: of each channel a sum and what it has too much, of each a sum of squares and what it has too
+/// much, then two counts. `FilmPixel` of shaders/resolve.glsl and shaders/path_resolve.glsl.
+pub const fn record_words(channels: usize) -> usize {
+    4 * channels + 2
+}
+
+/// Bytes of a pixel's record on the device.
+pub const fn record_bytes(channels: usize) -> u64 {
+    4 * record_words(channels) as u64
+}
+
+/// A pixel's record as the device left it.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct FilmPixel {
+    /// Sum and sum of squares of each channel.
+    sums: [[f64; 2]; MAX_CHANNELS],
+    /// Samples that met the scene.
+    pub covered: u32,
+    /// Samples that were left out because they were not finite.
+    pub not_finite: u32,
+}
+
+impl FilmPixel {
+    /// From [`record_words`] words.
+    pub fn of(words: &[u32]) -> Self {
+        let channels = (words.len() - 2) / 4;
+        // the compensation is what the sum has too much
+        let total = |k: usize| f64::from(f32::from_bits(words[k])) - f64::from(f32::from_bits(words[k + 1]));
+        let mut sums = [[0.0; 2]; MAX_CHANNELS];
+        for (c, s) in sums.iter_mut().enumerate().take(channels) {
+            *s = [total(2 * c), total(2 * (channels + c))];
+        }
+        Self { sums, covered: words[4 * channels], not_finite: words[4 * channels + 1] }
+    }
+
+    /// Mean over all samples; those that missed count 0.
+    pub fn mean(&self, channel: usize, samples: u32) -> f64 {
+        self.sums[channel][0] / f64::from(samples.max(1))
+    }
+
+    /// Unbiased variance of one sample (not of the mean); 0 with fewer than two samples.
+    pub fn variance(&self, channel: usize, samples: u32) -> f64 {
+        if samples < 2 {
+            return 0.0;
+        }
+        let ([sum, squares], n) = (self.sums[channel], f64::from(samples));
+        ((squares - sum * sum / n) / (n - 1.0)).max(0.0)
+    }
+
+    /// Share of samples that met the scene.
+    pub fn coverage(&self, samples: u32) -> f64 {
+        f64::from(self.covered) / f64::from(samples.max(1))
+    }
+}
+
+/// A finished film, rows from the top.
+#[derive(Clone, Debug, Default)]
+pub struct Film {
+    /// Pixels in x.
+    pub width: u32,
+    /// Pixels in y.
+    pub height: u32,
+    /// Values of a pixel: 1 (accessibility) or 3 (linear RGB radiance).
+    pub channels: usize,
+    /// Mean over all samples of a pixel, channels interleaved.
+    pub mean: Vec<f32>,
+    /// Share of samples that met the scene.
+    pub coverage: Vec<f32>,
+    /// Variance of one sample, channels interleaved.
+    pub variance: Vec<f32>,
+    /// Samples taken.
+    pub samples: Vec<u32>,
+    /// Samples of all pixels that were left out because they were not finite.
+    pub not_finite: u64,
+}
+
+impl Film {
+    /// An empty film.
+    pub fn new(width: u32, height: u32, channels: usize) -> Self {
+        let n = width as usize * height as usize;
+        Self {
+            width,
+            height,
+            channels,
+            mean: vec![0.0; channels * n],
+            coverage: vec![0.0; n],
+            variance: vec![0.0; channels * n],
+            samples: vec![0; n],
+            not_finite: 0,
+        }
+    }
+
+    /// Puts a pixel of which `samples` were taken in its place.
+    pub fn set(&mut self, index: usize, pixel: &FilmPixel, samples: u32) {
+        // those that were left out were not taken
+        let counted = samples - pixel.not_finite.min(samples);
+        for c in 0..self.channels {
+            self.mean[self.channels * index + c] = pixel.mean(c, counted) as f32;
+            self.variance[self.channels * index + c] = pixel.variance(c, counted) as f32;
+        }
+        self.coverage[index] = pixel.coverage(counted) as f32;
+        self.samples[index] = counted;
+        self.not_finite += u64::from(pixel.not_finite);
+    }
+
+    /// One channel of the means.
+    pub fn plane(&self, channel: usize) -> Vec<f32> {
+        self.mean.iter().skip(channel).step_by(self.channels).copied().collect()
+    }
+
+    /// One channel of the variances.
+    pub fn variance_plane(&self, channel: usize) -> Vec<f32> {
+        self.variance.iter().skip(channel).step_by(self.channels).copied().collect()
+    }
+
+    /// Fewest and most samples of a pixel, and their mean.
+    pub fn samples_range(&self) -> (u32, f64, u32) {
+        let sum: u64 = self.samples.iter().map(|&n| u64::from(n)).sum();
+        let least = self.samples.iter().copied().min().unwrap_or(0);
+        (least, sum as f64 / self.samples.len().max(1) as f64, self.samples.iter().copied().max().unwrap_or(0))
+    }
+
+    /// What the pixels' own variances say of the image's error: the root mean square, over pixels and channels, of the standard error of the
+    /// mean. Stratified sampling makes the true error smaller.
+    pub fn estimated_rmse(&self) -> f64 {
+        (self.summed_square_errors() / self.mean.len().max(1) as f64).sqrt()
+    }
+
+    /// Mean over all pixels and channels and its standard error, from the pixels' own variances. Stratified sampling makes the true error
+    /// smaller than that; that channels vary together, larger.
+    pub fn mean_and_error(&self) -> (f64, f64) {
+        let n = self.mean.len().max(1) as f64;
+        let mean = self.mean.iter().map(|&x| f64::from(x)).sum::<f64>() / n;
+        (mean, self.summed_square_errors().sqrt() / n)
+    }
+
+    fn summed_square_errors(&self) -> f64 {
+        let of = |k: usize| f64::from(self.samples[k / self.channels].max(1));
+        self.variance.iter().enumerate().map(|(k, &v)| f64::from(v) / of(k)).sum()
+    }
+}

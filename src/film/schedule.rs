@@ -1,0 +1,148 @@
+//! In which steps a film gets its samples: all at once, or with stops at which it is saved or judged. A step follows from the film alone,
+//! so a film that was put down between two steps goes on as it would have.
+
+use std::sync::Arc;
+
+use super::Film;
+use super::convergence::{FIRST_CHECK, TileErrors};
+use super::state::FilmState;
+
+/// What a film starts from, where it stops on its way, and what is kept of it.
+#[derive(Clone, Debug, Default)]
+pub struct FilmOptions {
+    /// Go on from here, with the samples that come next. Size and channels must be those of the image.
+    pub start: Option<Arc<FilmState>>,
+    /// Keep the film's sums.
+    pub keep_state: bool,
+    /// Numbers of samples per pixel at which [`crate::film::Control::interval`] gets the image, ascending.
+    pub intervals: Vec<u32>,
+    /// Take no more samples of tiles whose standard error is at most this (in the image's own units), judged at powers of two of samples from
+    /// [`FIRST_CHECK`] on. The plan's samples are then the most.
+    pub target_rmse: Option<f64>,
+}
+
+/// What is done next.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Step {
+    /// Samples that the tiles have afterwards.
+    pub goal: u32,
+    /// The tiles that get samples.
+    pub tiles: Vec<bool>,
+    /// Samples to go at most, over all tiles, this step's included.
+    pub left: u64,
+}
+
+impl FilmOptions {
+    /// Must the sums come to the host between steps, or at the end?
+    pub(crate) fn needs_state(&self) -> bool {
+        self.start.is_some() || self.keep_state || !self.intervals.is_empty() || self.target_rmse.is_some()
+    }
+
+    /// The next step, of a film whose tiles have so many samples, up to `spp`. `None`: it is finished.
+    pub(crate) fn next(&self, spp: u32, tile_samples: &[u32], film: &Film) -> Option<Step> {
+        let below = |n: u32| n < spp;
+        let mut tiles: Vec<bool> = tile_samples.iter().map(|&n| below(n)).collect();
+        if let Some(target) = self.target_rmse {
+            // tiles between two checks are on their way: nothing is judged before they get to the next one, and if there are no samples
+            // left for that, nothing at all. So it does not matter where a film was put down meanwhile.
+            if tile_samples.iter().any(|&n| !is_check(n)) {
+                tiles.iter_mut().zip(tile_samples).for_each(|(tile, &n)| *tile &= !is_check(n));
+            } else if tiles.contains(&true) {
+                let open = TileErrors::of(film).open(target);
+                tiles.iter_mut().zip(open).for_each(|(tile, open)| *tile &= open);
+            }
+        }
+        let chosen = || tile_samples.iter().zip(&tiles).filter(|(_, chosen)| **chosen).map(|(n, _)| *n);
+        let least = chosen().min()?;
+        let left = chosen().map(|n| u64::from(spp - n)).sum();
+        let interval = self.intervals.iter().copied().find(|&n| n > least).unwrap_or(spp);
+        let check = if self.target_rmse.is_some() { next_check(least) } else { spp };
+        let goal = spp.min(interval).min(check);
+        // those that are further wait
+        tiles.iter_mut().zip(tile_samples).for_each(|(tile, &n)| *tile &= n < goal);
+        Some(Step { goal, tiles, left })
+    }
+}
+
+/// Is a tile with `n` samples judged?
+fn is_check(n: u32) -> bool {
+    n >= FIRST_CHECK && n.is_power_of_two()
+}
+
+/// The first check beyond `n` samples.
+fn next_check(n: u32) -> u32 {
+    n.checked_add(1).and_then(u32::checked_next_power_of_two).map_or(u32::MAX, |n| n.max(FIRST_CHECK))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The goals of a film whose tiles all stay open, from `first` samples on.
+    fn goals(options: &FilmOptions, first: u32, spp: u32) -> Vec<u32> {
+        let mut film = Film::new(16, 8, 1);
+        film.variance.fill(1e9);
+        let (mut samples, mut goals) = ([first; 2], Vec::new());
+        film.samples.fill(first);
+        while let Some(step) = options.next(spp, &samples, &film) {
+            assert_eq!((step.tiles, step.left), (vec![true; 2], 2 * u64::from(spp - samples[0])));
+            goals.push(step.goal);
+            samples = [step.goal; 2];
+            film.samples.fill(step.goal);
+        }
+        goals
+    }
+
+    #[test]
+    fn steps_end_where_the_film_is_looked_at() {
+        let plain = FilmOptions::default();
+        assert!(!plain.needs_state());
+        assert_eq!(goals(&plain, 0, 100), [100]);
+        assert_eq!(goals(&plain, 16, 100), [100]);
+        assert!(goals(&plain, 100, 100).is_empty());
+        let intervals = FilmOptions { intervals: vec![1, 2, 4, 8, 16], ..Default::default() };
+        assert_eq!(goals(&intervals, 0, 23), [1, 2, 4, 8, 16, 23]);
+        assert_eq!(goals(&intervals, 5, 23), [8, 16, 23]);
+        let target = FilmOptions { target_rmse: Some(0.1), ..Default::default() };
+        assert_eq!(goals(&target, 0, 300), [64, 128, 256, 300]);
+        assert_eq!(goals(&target, 100, 512), [128, 256, 512]);
+        assert_eq!(goals(&target, 0, 10), [10]);
+        let both = FilmOptions { intervals: vec![16, 100], ..target };
+        assert_eq!(goals(&both, 0, 128), [16, 64, 100, 128]);
+        assert_eq!(next_check(u32::MAX), u32::MAX);
+    }
+
+    #[test]
+    fn quiet_tiles_wait_and_are_taken_up_again() {
+        let options = FilmOptions { target_rmse: Some(0.1), ..Default::default() };
+        // four tiles in a row
+        let mut film = Film::new(32, 8, 1);
+        let mut set = |samples: [u32; 4], variance: [f32; 4]| {
+            for x in 0..32 * 8 {
+                film.samples[x] = samples[x % 32 / 8];
+                film.variance[x] = variance[x % 32 / 8];
+            }
+            options.next(1024, &samples, &film)
+        };
+        // errors 0.05, 0.05, 0.05, 1
+        let step = set([64; 4], [0.16, 0.16, 0.16, 64.0]).unwrap();
+        assert_eq!((step.goal, step.tiles), (128, vec![false, false, true, true]));
+        // cut short: nothing is judged before they are all there
+        let step = set([64, 64, 100, 100], [64.0; 4]).unwrap();
+        assert_eq!((step.goal, step.tiles), (128, vec![false, false, true, true]));
+        // at the end of a run of 100 samples, too
+        assert_eq!(
+            FilmOptions { target_rmse: Some(0.1), ..Default::default() }.next(100, &[64, 64, 100, 100], &Film::new(32, 8, 1)),
+            None
+        );
+        // the third has turned out to be noisy: the second, which has fewer samples, goes on first
+        let step = set([64, 64, 128, 128], [0.16, 0.16, 64.0, 64.0]).unwrap();
+        assert_eq!((step.goal, step.tiles, step.left), (128, vec![false, true, false, false], 960 + 2 * 896));
+        let step = set([64, 128, 128, 128], [0.16, 0.16, 64.0, 64.0]).unwrap();
+        assert_eq!((step.goal, step.tiles), (256, vec![false, true, true, true]));
+        // all know enough; and those that do not have all there are
+        assert_eq!(set([64, 128, 256, 256], [0.16; 4]), None);
+        assert_eq!(set([64, 512, 1024, 1024], [0.16, 0.16, 1e9, 1e9]).map(|s| s.tiles), Some(vec![false, true, false, false]));
+        assert_eq!(set([64, 1024, 1024, 1024], [0.16, 0.16, 1e9, 1e9]), None);
+    }
+}

@@ -1,0 +1,127 @@
+//! Auxiliary outputs: what a ray through each pixel's centre meets.
+
+use crate::shaders;
+use bytemuck::{Pod, Zeroable};
+
+use crate::error::Result;
+use crate::film::Control;
+use crate::film::block::{Block, BlockParams};
+use crate::film::camera::CameraRecord;
+use crate::film::pace::{MOST, Pace};
+use crate::gpu::{Buffer, Commands, Memory};
+use crate::raster::{Primary, Raster, View};
+use crate::tracer::{Push, Stream, Tracer};
+
+/// Where hits come from.
+enum Source {
+    Traced(Box<Stream>),
+    Drawn(Box<Raster>),
+}
+
+/// What a pixel's centre shows; `AovPixel` of shaders/aov.glsl.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+pub struct AovPixel {
+    /// Distance along the ray (world units); infinite where nothing is met.
+    pub depth: f32,
+    /// Index into the scene's instances; `u32::MAX` where nothing is met.
+    pub instance: u32,
+    /// Triangle or sphere of the instance's mesh.
+    pub primitive: u32,
+    /// Index into the scene's materials.
+    pub material: u32,
+    /// World position relative to the scene's origin.
+    pub position: [f32; 3],
+    /// Linear base colour: red.
+    pub red: f32,
+    /// Unit geometric normal, world, front side.
+    pub ng: [f32; 3],
+    /// Linear base colour: green.
+    pub green: f32,
+    /// Unit shading normal, on the side of `ng`.
+    pub ns: [f32; 3],
+    /// Linear base colour: blue.
+    pub blue: f32,
+}
+
+/// Renders the outputs of an image, rows from the top. The tracer's [`crate::tracer::Needs`] must cover what is looked at.
+pub fn render(tracer: &Tracer, camera: &CameraRecord, size: [u32; 2], control: &mut dyn Control) -> Result<Vec<AovPixel>> {
+    render_with(tracer, camera, size, Primary::Traced, control)
+}
+
+/// As [`render`], with a choice of how it is found what the rays meet.
+pub fn render_with(
+    tracer: &Tracer,
+    camera: &CameraRecord,
+    size: [u32; 2],
+    primary: Primary,
+    control: &mut dyn Control,
+) -> Result<Vec<AovPixel>> {
+    let mut out = vec![AovPixel::zeroed(); size[0] as usize * size[1] as usize];
+    visit(tracer, camera, size, primary, control, &mut |at, pixel| out[at] = *pixel)?;
+    Ok(out)
+}
+
+/// As [`render_with`], for images of which less is kept: `take` gets every pixel once, with its place (rows from the top), in an order that is the same for
+/// the same size.
+pub fn visit(
+    tracer: &Tracer,
+    camera: &CameraRecord,
+    size: [u32; 2],
+    primary: Primary,
+    control: &mut dyn Control,
+    take: &mut dyn FnMut(usize, &AovPixel),
+) -> Result<()> {
+    let device = tracer.device();
+    let blocks = Block::cut(size);
+    let source = match primary {
+        Primary::Traced => Source::Traced(Box::new(tracer.stream(&shaders::AOV_CLOSEST)?)),
+        Primary::Raster => {
+            let size = blocks.first().map_or([1; 2], |b| b.size);
+            Source::Drawn(Box::new(Raster::new(tracer, &shaders::AOV_CLOSEST, size)?))
+        }
+    };
+    let mut commands = Commands::new(device)?;
+    let record = size_of::<AovPixel>() as u64;
+    let most = blocks.iter().map(Block::rays).max().unwrap_or(0).min(MOST);
+    let target = Buffer::new(device, "auxiliary outputs", record * most as u64, Memory::Readback)?;
+    let mut params_buffer = Buffer::new(device, "block parameters", size_of::<BlockParams>() as u64, Memory::Upload)?;
+    let mut pace = Pace::default();
+    for block in &blocks {
+        let params = BlockParams { aov: target.address(), ..block.params(size, camera, 0) };
+        if let Some(bytes) = params_buffer.bytes_mut() {
+            bytes[..size_of::<BlockParams>()].copy_from_slice(bytemuck::bytes_of(&params));
+        }
+        if let Source::Drawn(raster) = &source {
+            let view = View { camera: *camera, image_size: size, block: *block, at: [0.5; 2] };
+            let mut drawn = Ok(Default::default());
+            commands.run(|r| drawn = raster.draw(r, tracer, &view))?;
+            drawn?;
+        }
+        let mut first = 0;
+        while first < block.rays() {
+            let rays = pace.rays();
+            let count = rays.min(block.rays() - first);
+            let push =
+                Push { scene: tracer.scene_address(), pass: params_buffer.address(), first, count, ..Default::default() };
+            let start = std::time::Instant::now();
+            let timings = commands.run(|r| match &source {
+                Source::Traced(stream) => stream.record(r, &push),
+                Source::Drawn(raster) => raster.trace(r, &push),
+            })?;
+            if count == rays {
+                pace.learn(rays, &timings, start.elapsed().as_secs_f64(), 1);
+            }
+            target.read_with(0, record * count as u64, record, |begin, bytes| {
+                for (k, pixel) in bytes.chunks_exact(record as usize).enumerate() {
+                    if let Some(at) = block.image_index(first + begin as u32 + k as u32, size[0]) {
+                        take(at, &bytemuck::pod_read_unaligned(pixel));
+                    }
+                }
+            })?;
+            control.should_stop()?;
+            first += count;
+        }
+    }
+    tracer.check_finished()
+}

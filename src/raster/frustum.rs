@@ -1,0 +1,168 @@
+//! From the world to the image as a rasteriser takes it, and what of the scene lies outside of the image.
+
+use glam::{DMat3, DVec3, Vec3};
+
+use crate::accel::Aabb;
+use crate::error::{Error, Result};
+use crate::film::block::Block;
+use crate::film::camera::CameraRecord;
+
+/// Pixels around the image that are kept: a rasteriser rounds corners to a fraction of one.
+const MARGIN: f64 = 1.0;
+/// Relative rounding of clip coordinates: 32 half-ulps.
+const ROUNDING: f64 = 16.0 * f32::EPSILON as f64;
+/// By so much of its size is a box widened: spheres are drawn in boxes that are a little larger than they (shaders/raster/sphere.vert).
+const WIDENED: f64 = 2e-3;
+/// The near plane of a perspective view, as a part of the depth of the farthest that is in it. Depth is reversed and floating, so it
+/// costs no precision; what is nearer, single precision does not tell from the eye.
+const NEAR: f64 = 1e-9;
+
+/// An image, or a block of one, seen through a camera.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct View {
+    /// The camera.
+    pub camera: CameraRecord,
+    /// Of the whole image, pixels.
+    pub image_size: [u32; 2],
+    /// The part of it.
+    pub block: Block,
+    /// Where in its pixel each ray passes, pixels from the upper left corner; the centre is `[0.5, 0.5]`. The rays of the stream that
+    /// uses what is drawn must pass there.
+    pub at: [f32; 2],
+}
+
+/// How much of a box is in the view.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Sight {
+    /// Nothing, for certain.
+    Nothing,
+    /// Some of it, perhaps.
+    Part,
+    /// All.
+    All,
+}
+
+/// Where something is: positive inside. In terms of the place relative to the eye.
+#[derive(Clone, Copy)]
+struct Plane {
+    normal: DVec3,
+    offset: f64,
+}
+
+/// A view's volume.
+pub(super) struct Frustum {
+    /// Where the camera is, relative to the scene's origin.
+    pub eye: Vec3,
+    /// The camera's transform turns the winding.
+    pub turned: bool,
+    orthographic: bool,
+    // clip coordinates x, y, w
+    x: Plane,
+    y: Plane,
+    w: Plane,
+    depth: Plane,
+    // four sides and the front
+    planes: [Plane; 5],
+}
+
+impl Plane {
+    fn plus(self, other: Plane, factor: f64) -> Plane {
+        Plane { normal: self.normal + other.normal * factor, offset: self.offset + other.offset * factor }
+    }
+
+    fn row(self, factor: f64) -> [f32; 4] {
+        let (normal, offset) = (factor * self.normal, factor * self.offset);
+        normal.extend(offset).as_vec4().to_array()
+    }
+
+    /// Least and greatest value over a box of a group, what may be rounded included.
+    fn range(&self, bounds: &Aabb, to_world: &[[f32; 4]; 3], eye: DVec3) -> [f64; 2] {
+        let row = |k: usize| DVec3::from_array([0, 1, 2].map(|j| to_world[k][j] as f64));
+        let normal = row(0) * self.normal.x + row(1) * self.normal.y + row(2) * self.normal.z;
+        let translation = DVec3::from_array([0, 1, 2].map(|k| to_world[k][3] as f64)) - eye;
+        let (lo, hi) = (bounds.min.as_dvec3(), bounds.max.as_dvec3());
+        let (center, half) = (0.5 * (lo + hi), 0.5 * (hi - lo));
+        let middle = normal.dot(center) + self.normal.dot(translation) + self.offset;
+        let terms =
+            row(0).abs() * self.normal.x.abs() + row(1).abs() * self.normal.y.abs() + row(2).abs() * self.normal.z.abs();
+        let rounding =
+            terms.dot(lo.abs().max(hi.abs())) + self.normal.abs().dot(translation.abs() + eye.abs()) + self.offset.abs();
+        let reach = (1.0 + WIDENED) * normal.abs().dot(half) + ROUNDING * rounding;
+        [middle - reach, middle + reach]
+    }
+}
+
+impl Frustum {
+    /// # Errors
+    /// [`Error::Scene`] when the camera's transform is flat.
+    pub fn new(view: &View) -> Result<Self> {
+        let rows = view.camera.camera_to_world;
+        let column = |k: usize| DVec3::from_array(rows.map(|r| r[k] as f64));
+        let matrix = DMat3::from_cols(column(0), column(1), column(2));
+        let determinant = matrix.determinant();
+        let inverse = matrix.inverse().transpose();
+        if determinant == 0.0 || !determinant.is_finite() || !inverse.is_finite() {
+            return Err(Error::Scene("the camera's transform cannot be inverted (a scale of zero?)".into()));
+        }
+        // camera space, row by row
+        let [right, up, back] = [inverse.x_axis, inverse.y_axis, inverse.z_axis];
+        let depth = Plane { normal: -back, offset: 0.0 };
+        let orthographic = view.camera.orthographic;
+        let w = if orthographic { Plane { normal: DVec3::ZERO, offset: 1.0 } } else { depth };
+        let side = |axis: DVec3, k: usize, sign: f64| {
+            let (image, block) = (view.image_size[k] as f64, view.block.size[k] as f64);
+            let scale = sign * image / (view.camera.view[k] as f64 * block);
+            // pixels are sampled at their centre: the image is moved so that it is `at` that lies there
+            let moved = (image - 2.0 * view.block.origin[k] as f64 + 1.0 - 2.0 * view.at[k] as f64) / block - 1.0;
+            Plane { normal: axis * scale, offset: 0.0 }.plus(w, moved)
+        };
+        let (x, y) = (side(right, 0, 1.0), side(up, 1, -1.0));
+        let wide = view.block.size.map(|n| 1.0 + 2.0 * MARGIN / n as f64);
+        let kept =
+            |p: Plane, k: usize, sign: f64| Plane { normal: w.normal * wide[k], offset: w.offset * wide[k] }.plus(p, sign);
+        Ok(Self {
+            eye: column(3).as_vec3(),
+            turned: determinant < 0.0,
+            orthographic,
+            x,
+            y,
+            w,
+            depth,
+            planes: [kept(x, 0, 1.0), kept(x, 0, -1.0), kept(y, 1, 1.0), kept(y, 1, -1.0), depth],
+        })
+    }
+
+    /// How much of a group's box is seen.
+    pub fn sight(&self, bounds: &Aabb, to_world: &[[f32; 4]; 3]) -> Sight {
+        let mut sight = Sight::All;
+        for plane in &self.planes {
+            let [least, most] = plane.range(bounds, to_world, self.eye.as_dvec3());
+            if most < 0.0 {
+                return Sight::Nothing;
+            }
+            // NaN is no reason to leave anything out, nor to take all for seen
+            if least.is_nan() || least < 0.0 {
+                sight = Sight::Part;
+            }
+        }
+        sight
+    }
+
+    /// Least and greatest depth of a group's box.
+    pub fn depth(&self, bounds: &Aabb, to_world: &[[f32; 4]; 3]) -> [f64; 2] {
+        self.depth.range(bounds, to_world, self.eye.as_dvec3())
+    }
+
+    /// Rows that take a place relative to the eye to clip space. Depth is reversed: it is greatest in front. `depth` is the range of what
+    /// is seen; clip space is `wide` times as large as the image.
+    pub fn clip(&self, depth: [f64; 2], wide: f64) -> [[f32; 4]; 4] {
+        let z = if self.orthographic {
+            let (near, far) = (depth[0].max(0.0), depth[1].max(0.0));
+            let length = (far - near).max(1e-30);
+            Plane { normal: -self.depth.normal / length, offset: far / length }
+        } else {
+            Plane { normal: DVec3::ZERO, offset: (NEAR * depth[1]).max(1e-30) }
+        };
+        [self.x.row(1.0 / wide), self.y.row(1.0 / wide), z.row(1.0), self.w.row(1.0)]
+    }
+}

@@ -1,0 +1,260 @@
+//! What camera rays meet, drawn instead of traced: one ray a pixel.
+//!
+//! Triangles are drawn into an image that says which primitive each pixel shows, and a compute shader meets each ray with that one
+//! primitive and calls the stream back (`shaders/trace/visibility.glsl`). So a pass's shader is the same, and gets the same hits, as
+//! when its rays are traced; only where a ray passes an edge within a fraction of a pixel that hardware rounds corners to may the
+//! neighbour be met.
+
+mod frustum;
+
+use std::ops::Range;
+use std::sync::Arc;
+
+use bytemuck::{Pod, Zeroable};
+
+use crate::error::Result;
+use crate::film::block::BlockParams;
+use crate::gpu::{Buffer, Cull, Device, GraphicsPipeline, Memory, Recorder, Targets};
+use crate::shaders::{self, StreamShaders};
+use crate::tracer::drawable::CHUNK;
+use crate::tracer::stream;
+use crate::tracer::{Drawable, Push, Stream, Tracer};
+pub use frustum::View;
+use frustum::{Frustum, Sight};
+
+/// Vertices of the box around a sphere; shaders/raster/sphere.vert.
+const BOX_VERTICES: u32 = 36;
+
+/// `RasterParams` of shaders/raster/view.glsl, and the block's behind it.
+#[repr(C)]
+#[derive(Clone, Copy, Zeroable, Pod)]
+struct RasterParams {
+    clip: [[f32; 4]; 4],
+    eye: [f32; 3],
+    turned: f32,
+    at: [f32; 2],
+    block: u64,
+    params: BlockParams,
+}
+
+/// How it is found what camera rays meet.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Primary {
+    /// The tracer traces them.
+    #[default]
+    Traced,
+    /// The scene is drawn.
+    Raster,
+}
+
+/// Placed primitives per pixel up to which drawing costs less than tracing: of CPUs, and of other devices. Mesa's CPU driver takes 90 to
+/// 240 ns for a triangle, however small; with 0.43 of them a pixel both cost the same, with 0.28 drawing saves a third
+/// (`examples/primary.rs`). Of GPUs it is not measured.
+const PRIMITIVES_PER_PIXEL: (f64, f64) = (0.4, 8.0);
+
+impl Primary {
+    /// What costs less for images of so many pixels, one sample each, and why.
+    pub fn auto(tracer: &Tracer, pixels: u64) -> (Primary, String) {
+        let info = &tracer.device().info;
+        if !info.can_rasterise() {
+            return (Primary::Traced, format!("the device lacks {}, which rasterising needs", info.missing_raster.join(", ")));
+        }
+        let placed: u64 = tracer.drawables().map(|d| d.shape.primitives as u64).sum();
+        let most = if info.is_cpu() { PRIMITIVES_PER_PIXEL.0 } else { PRIMITIVES_PER_PIXEL.1 };
+        let share = placed as f64 / pixels.max(1) as f64;
+        let primary = if share > most { Primary::Traced } else { Primary::Raster };
+        (primary, format!("{share:.2} primitives a pixel: up to {most} this device draws faster than it traces"))
+    }
+}
+
+/// What was drawn.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Drawn {
+    /// Draw calls.
+    pub draws: usize,
+    /// Primitives in them.
+    pub primitives: u64,
+    /// Placed primitives of the scene.
+    pub placed: u64,
+}
+
+/// Draws a tracer's scene, and finds the hits of a stream of camera rays from it.
+pub struct Raster {
+    triangles: GraphicsPipeline,
+    // only where the scene has any
+    alpha_tested: Option<GraphicsPipeline>,
+    spheres: Option<GraphicsPipeline>,
+    targets: Targets,
+    drawn: Buffer,
+    params: Buffer,
+    stream: Stream,
+}
+
+/// Consecutive primitives of an entry.
+struct Draw {
+    push: Push,
+    primitives: Range<u32>,
+}
+
+/// By pipeline.
+#[derive(Default)]
+struct Draws {
+    triangles: Vec<Draw>,
+    alpha_tested: Vec<Draw>,
+    spheres: Vec<Draw>,
+}
+
+impl Raster {
+    /// Compiles the shaders for a scene and a stream of camera rays, and allocates for blocks of up to `size` pixels.
+    ///
+    /// # Errors
+    /// [`crate::Error::Device`] when the device does not draw, or not so large; [`crate::Error::Usage`] for a stream whose rays are
+    /// not the camera's; [`crate::Error::OutOfMemory`].
+    pub fn new(tracer: &Tracer, shaders: &'static StreamShaders, size: [u32; 2]) -> Result<Self> {
+        let (device, features) = (tracer.device(), tracer.features());
+        let targets = Targets::new(device, size)?;
+        let s = stream::scene_specialization(features);
+        let pipeline = |name, vertex, fragment, cull| GraphicsPipeline::new(device, name, vertex, fragment, &s, cull);
+        let alpha = || pipeline("draw alpha-tested", &shaders::DRAW_TRIANGLES, &shaders::DRAW_ALPHA, Cull::Nothing);
+        let spheres = || pipeline("draw spheres", &shaders::DRAW_SPHERES, &shaders::DRAW_SPHERE, Cull::Front);
+        Ok(Self {
+            triangles: pipeline("draw opaque", &shaders::DRAW_TRIANGLES, &shaders::DRAW_OPAQUE, Cull::Nothing)?,
+            alpha_tested: features.alpha.then(alpha).transpose()?,
+            spheres: features.spheres.then(spheres).transpose()?,
+            targets,
+            drawn: buffer(device, "drawn primitives", 8 * size[0] as u64 * size[1] as u64)?,
+            params: buffer(device, "raster parameters", size_of::<RasterParams>() as u64)?,
+            stream: tracer.rasterized_stream(shaders)?,
+        })
+    }
+
+    /// Records both [`Raster::draw`] and [`Raster::trace`].
+    ///
+    /// # Errors
+    /// Those of [`Raster::draw`].
+    pub fn record(&self, recorder: &mut Recorder, tracer: &Tracer, push: &Push, view: &View) -> Result<Drawn> {
+        let drawn = self.draw(recorder, tracer, view)?;
+        self.trace(recorder, push);
+        Ok(drawn)
+    }
+
+    /// Records the drawing of a view of the scene as it is now, timed as "raster draw". What was drawn before is replaced.
+    ///
+    /// # Errors
+    /// [`crate::Error::Scene`] when the camera's transform is flat.
+    pub fn draw(&self, recorder: &mut Recorder, tracer: &Tracer, view: &View) -> Result<Drawn> {
+        let size = view.block.size;
+        let frustum = Frustum::new(view)?;
+        let (draws, depth, drawn) = self.collect(tracer, &frustum);
+        let params = RasterParams {
+            clip: frustum.clip(depth, tracer.device().viewport_factor(size) as f64),
+            eye: frustum.eye.to_array(),
+            turned: if frustum.turned { -1.0 } else { 1.0 },
+            at: view.at,
+            block: self.params.address() + std::mem::offset_of!(RasterParams, params) as u64,
+            params: view.block.params(view.image_size, &view.camera, 0),
+        };
+        recorder.barrier();
+        recorder.update(&self.params, &params);
+        recorder.barrier();
+        recorder.timed("raster draw", |r| {
+            r.draw_into(&self.targets, size, |d| {
+                let triangles = |n: Range<u32>| 3 * n.start..3 * n.end;
+                let boxes = |n: Range<u32>| BOX_VERTICES * n.start..BOX_VERTICES * n.end;
+                let mut all = |pipeline: &GraphicsPipeline, draws: &[Draw], vertices: &dyn Fn(Range<u32>) -> Range<u32>| {
+                    if !draws.is_empty() {
+                        d.bind(pipeline);
+                    }
+                    let mut entry = None;
+                    for draw in draws {
+                        if entry.replace(draw.push.first) != Some(draw.push.first) {
+                            d.push(&draw.push);
+                        }
+                        d.draw(vertices(draw.primitives.clone()), 0..1);
+                    }
+                };
+                all(&self.triangles, &draws.triangles, &triangles);
+                // the most is hidden by then
+                for (pipeline, draws, vertices) in [
+                    (&self.spheres, &draws.spheres, &boxes as &dyn Fn(Range<u32>) -> Range<u32>),
+                    (&self.alpha_tested, &draws.alpha_tested, &triangles),
+                ] {
+                    if let Some(pipeline) = pipeline {
+                        all(pipeline, draws, vertices);
+                    }
+                }
+            });
+            r.copy_ids(&self.targets, size, &self.drawn);
+        });
+        recorder.barrier();
+        Ok(drawn)
+    }
+
+    /// Records the stream's rays `push.first .. push.first + push.count` through the pixels of the block that was drawn last, timed under
+    /// the name of their pass. The stream's parameters must be [`BlockParams`] of the same block and camera, and `push.sample_bits` 0.
+    pub fn trace(&self, recorder: &mut Recorder, push: &Push) {
+        debug_assert!(push.sample_bits == 0, "one ray a pixel");
+        self.stream.record(recorder, &Push { rays: self.drawn.address(), ..*push });
+    }
+
+    /// What has to be drawn, the range of its depth, and how much that is.
+    fn collect(&self, tracer: &Tracer, frustum: &Frustum) -> (Draws, [f64; 2], Drawn) {
+        let (mut draws, mut drawn) = (Draws::default(), Drawn::default());
+        let mut depth = [f64::INFINITY, 0.0f64];
+        for entry in tracer.drawables() {
+            drawn.placed += entry.shape.primitives as u64;
+            let sight = frustum.sight(&entry.shape.bounds, &entry.to_world);
+            if sight == Sight::Nothing {
+                continue;
+            }
+            let [least, most] = frustum.depth(&entry.shape.bounds, &entry.to_world);
+            depth = [depth[0].min(least), depth[1].max(most)];
+            self.collect_entry(tracer, frustum, &entry, sight, &mut draws);
+        }
+        for draw in [&draws.triangles, &draws.alpha_tested, &draws.spheres].into_iter().flatten() {
+            drawn.draws += 1;
+            drawn.primitives += draw.primitives.len() as u64;
+        }
+        (draws, depth, drawn)
+    }
+
+    fn collect_entry(&self, tracer: &Tracer, frustum: &Frustum, entry: &Drawable, sight: Sight, draws: &mut Draws) {
+        let push = Push {
+            scene: tracer.scene_address(),
+            pass: self.params.address(),
+            rays: entry.positions,
+            queued: entry.indices,
+            first: entry.entry,
+            ..Default::default()
+        };
+        let shape = entry.shape;
+        let mut add = |range: Range<u32>| {
+            let push_range = |to: &mut Vec<Draw>, range: Range<u32>| match to.last_mut() {
+                _ if range.is_empty() => (),
+                Some(last) if last.push.first == push.first && last.primitives.end == range.start => {
+                    last.primitives.end = range.end
+                }
+                _ => to.push(Draw { push, primitives: range }),
+            };
+            if shape.spheres {
+                push_range(&mut draws.spheres, range);
+            } else {
+                push_range(&mut draws.triangles, range.start..range.end.min(shape.opaque));
+                push_range(&mut draws.alpha_tested, range.start.max(shape.opaque)..range.end);
+            }
+        };
+        if sight == Sight::All || shape.chunks.is_empty() {
+            return add(0..shape.primitives);
+        }
+        for (k, bounds) in (0..).zip(&shape.chunks) {
+            if frustum.sight(bounds, &entry.to_world) != Sight::Nothing {
+                add(CHUNK * k..(CHUNK * (k + 1)).min(shape.primitives));
+            }
+        }
+    }
+}
+
+fn buffer(device: &Arc<Device>, name: &str, size: u64) -> Result<Buffer> {
+    Buffer::new(device, name, size, Memory::Device)
+}

@@ -1,0 +1,384 @@
+//! How the frames of a real-time renderer are made, and the presets that people choose from.
+
+use crate::error::{Error, Result};
+use crate::integrators::ao::{FALLOFF_CUTOFF, Hemisphere};
+use crate::raster::Primary;
+use crate::sampling::Sequence;
+
+/// Where occlusion comes from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Technique {
+    /// Rays through the scene.
+    #[default]
+    Traced,
+    /// The depth image (Jimenez et al. 2016).
+    Gtao,
+    /// The pipeline of the reference work (Larsen 2019) as it was.
+    Larsen,
+}
+
+impl Technique {
+    /// All of them.
+    pub const ALL: [Technique; 3] = [Technique::Traced, Technique::Gtao, Technique::Larsen];
+
+    /// As on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Technique::Traced => "traced",
+            Technique::Gtao => "gtao",
+            Technique::Larsen => "larsen",
+        }
+    }
+}
+
+/// Which pixels are sampled in a frame.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Resolution {
+    /// All of them.
+    #[default]
+    Full,
+    /// Every second one, like the fields of a chessboard, the others in the next frame.
+    Checkerboard,
+    /// One of four (half the resolution per axis), another in each of four frames.
+    Half,
+}
+
+impl Resolution {
+    /// All of them.
+    pub const ALL: [Resolution; 3] = [Resolution::Full, Resolution::Checkerboard, Resolution::Half];
+
+    /// As on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Resolution::Full => "full",
+            Resolution::Checkerboard => "checkerboard",
+            Resolution::Half => "half",
+        }
+    }
+
+    /// Frames after which every pixel was sampled.
+    pub fn period(self) -> u32 {
+        1 << self as u32
+    }
+}
+
+/// Who has how many of a frame's rays.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Budget {
+    /// All pixels that are sampled have as many.
+    #[default]
+    Uniform,
+    /// As many in all, most where a pixel's mean is known least.
+    Variance,
+}
+
+impl Budget {
+    /// All of them.
+    pub const ALL: [Budget; 2] = [Budget::Uniform, Budget::Variance];
+
+    /// As on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Budget::Uniform => "uniform",
+            Budget::Variance => "variance",
+        }
+    }
+}
+
+/// How the pixels of a frame are averaged.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum FilterKind {
+    /// Not at all.
+    None,
+    /// A box, its radius by how many samples there are.
+    #[default]
+    Box,
+    /// Its sides one after the other: fewer taps for large radii. Exact on plane surfaces.
+    Separable,
+    /// A box of 3x3 again and again, its taps twice as far apart each time, up to the radius.
+    Atrous,
+}
+
+impl FilterKind {
+    /// All of them.
+    pub const ALL: [FilterKind; 4] = [FilterKind::None, FilterKind::Box, FilterKind::Separable, FilterKind::Atrous];
+
+    /// As on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            FilterKind::None => "none",
+            FilterKind::Box => "box",
+            FilterKind::Separable => "separable",
+            FilterKind::Atrous => "atrous",
+        }
+    }
+}
+
+/// A step of a filter: half sides of its box in taps, and their distance in pixels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct FilterStep {
+    /// Along rows, along columns.
+    pub sides: [bool; 2],
+    /// Taps to each side at most.
+    pub radius: u32,
+    /// Pixels from tap to tap.
+    pub stride: u32,
+}
+
+/// How frames are filtered.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct Filter {
+    /// How.
+    pub kind: FilterKind,
+    /// Pixels; the box grows no further.
+    pub radius: u32,
+    /// Samples that a filtered pixel should rest on: the box grows until it holds so many.
+    pub samples: f32,
+}
+
+impl Filter {
+    /// What is done one after the other. There is one step at least: it turns estimates into what is shown.
+    pub fn steps(&self) -> Vec<FilterStep> {
+        let step = |sides, radius, stride| FilterStep { sides, radius, stride };
+        match self.kind {
+            FilterKind::None => vec![step([true, true], 0, 1)],
+            FilterKind::Box => vec![step([true, true], self.radius, 1)],
+            FilterKind::Separable => vec![step([true, false], self.radius, 1), step([false, true], self.radius, 1)],
+            FilterKind::Atrous => {
+                // 1, 1 + 2, 1 + 2 + 4, ... pixels
+                let levels = (self.radius + 1).max(2).ilog2();
+                (0..levels).map(|k| step([true, true], self.radius.min(1), 1 << k)).collect()
+            }
+        }
+    }
+}
+
+/// How frames are made.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct Settings {
+    /// Where occlusion comes from. What follows is of the traced one, and but for rays of the screen-space one.
+    pub technique: Technique,
+    /// How it is found what pixels show; `None`: what costs less ([`Primary::auto`]).
+    pub primary: Option<Primary>,
+    /// Rays of a pixel that is sampled in a frame; 1 to [`Settings::MAX_RAYS`].
+    pub rays_per_pixel: u32,
+    /// Whose they are: so many on average, or each pixel's own.
+    pub budget: Budget,
+    /// Which pixels are.
+    pub resolution: Resolution,
+    /// Where their directions come from.
+    pub sequence: Sequence,
+    /// Of the sequence.
+    pub seed: u32,
+    /// World units beyond which nothing occludes; infinite for no limit.
+    pub radius: f64,
+    /// c: a hit at distance d counts c^-d; 1 counts every hit alike.
+    pub falloff: f64,
+    /// Axis of the hemisphere.
+    #[serde(skip)]
+    pub hemisphere: Hemisphere,
+    /// Frames that a history counts at most; 1: none is kept.
+    pub history: u32,
+    /// Pixels with a full history get no more rays while nothing moves.
+    pub rest: bool,
+    /// Where things move: standard errors by which a history may differ from its surroundings; 0: by any.
+    pub clamp: f32,
+    /// Where things move: how much that shortens histories; 0: not.
+    pub moved_weight: f32,
+    /// Over pixels.
+    pub filter: Filter,
+    /// Of the screen-space technique: slices through the view ray, and steps on each side of one.
+    pub gtao: [u32; 2],
+    /// Of the reference work's pipeline: world units that one of its own is.
+    pub unit: f64,
+    /// Bent normals besides: the mean direction in which a point is open.
+    pub bent: bool,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Preset::Balanced.settings()
+    }
+}
+
+impl Settings {
+    /// Rays of a pixel in a frame at most.
+    pub const MAX_RAYS: u32 = 4096;
+    /// With a budget: rays of a pixel in a frame at most, times those that it has on average.
+    pub const MAX_SHARE: u32 = 4;
+    /// With a budget: rays of a pixel in a frame on average at most. Four bits count them.
+    const MAX_BUDGET: u32 = 4;
+    /// Samples that a history counts at most: as many as half floats count one by one.
+    pub const MAX_SAMPLES: u32 = 2048;
+
+    /// Hits beyond this distance change nothing that can be seen: the radius, or where the falloff has faded.
+    pub fn reach(&self) -> f64 {
+        if self.falloff > 1.0 { self.radius.min(-FALLOFF_CUTOFF.ln() / self.falloff.ln()) } else { self.radius }
+    }
+
+    /// Does any hit do, or has the nearest one to be found?
+    pub fn binary(&self) -> bool {
+        self.falloff <= 1.0
+    }
+
+    /// Samples that a history counts at most.
+    pub fn most_samples(&self) -> u32 {
+        (self.history.saturating_mul(self.rays_per_pixel)).min(Self::MAX_SAMPLES).max(self.rays_per_pixel)
+    }
+
+    /// Are the numbers in their ranges?
+    ///
+    /// # Errors
+    /// [`Error::Usage`], naming the first that is not.
+    pub fn check(&self) -> Result<()> {
+        let wrong = |what: &str| Err(Error::Usage(what.to_owned()));
+        if !(1..=Self::MAX_RAYS).contains(&self.rays_per_pixel) {
+            return wrong(&format!("rays per pixel must be 1 to {}", Self::MAX_RAYS));
+        }
+        if self.budget == Budget::Variance
+            && (self.rays_per_pixel > Self::MAX_BUDGET || self.history < 2 || self.technique != Technique::Traced)
+        {
+            return wrong(&format!(
+                "a budget by variance needs traced rays, a history, and 1 to {} rays per pixel",
+                Self::MAX_BUDGET
+            ));
+        }
+        if self.history == 0 {
+            return wrong("a history of 0 frames: 1 keeps none");
+        }
+        let good = self.radius > 0.0 && self.falloff >= 1.0 && self.falloff.is_finite();
+        if !good {
+            return wrong("the radius must be above 0, and the falloff at least 1 (1 = binary) and finite");
+        }
+        if !(self.clamp >= 0.0 && self.moved_weight >= 0.0 && self.filter.samples >= 0.0) {
+            return wrong("clamp, weight of motion and samples of the filter must not be negative");
+        }
+        if self.bent && self.technique != Technique::Traced {
+            return wrong("bent normals are made of traced directions: choose the technique traced");
+        }
+        Ok(())
+    }
+}
+
+/// Settings by name.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Preset {
+    /// The pipeline of the reference work, exactly, its flaws included.
+    Larsen,
+    /// Its budget, 64 rays for each 2x2 pixels, with right sampling, history and filter.
+    LarsenFixed,
+    /// As fast as it goes.
+    Fast,
+    /// Little error for little time.
+    #[default]
+    Balanced,
+    /// Less error.
+    Quality,
+    /// Each frame by itself, 1024 rays a pixel and nothing else: what the others stand in for.
+    Reference,
+}
+
+impl Preset {
+    /// All of them.
+    pub const ALL: [Preset; 6] =
+        [Preset::Larsen, Preset::LarsenFixed, Preset::Fast, Preset::Balanced, Preset::Quality, Preset::Reference];
+
+    /// As on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Preset::Larsen => "larsen",
+            Preset::LarsenFixed => "larsen-fixed",
+            Preset::Fast => "fast",
+            Preset::Balanced => "balanced",
+            Preset::Quality => "quality",
+            Preset::Reference => "reference",
+        }
+    }
+
+    /// What it stands for.
+    pub fn settings(self) -> Settings {
+        let common = Settings {
+            technique: Technique::Traced,
+            primary: None,
+            rays_per_pixel: 1,
+            budget: Budget::Uniform,
+            resolution: Resolution::Full,
+            sequence: Sequence::Sobol,
+            seed: 0,
+            radius: f64::INFINITY,
+            falloff: 1.0,
+            hemisphere: Hemisphere::Geometric,
+            history: 32,
+            rest: true,
+            clamp: 2.0,
+            moved_weight: 4.0,
+            filter: Filter { kind: FilterKind::Box, radius: 3, samples: 256.0 },
+            gtao: [3, 6],
+            unit: 1.0,
+            bent: false,
+        };
+        match self {
+            // it looks for the nearest hit up to 100 units, whatever the falloff leaves of it
+            Preset::Larsen => Settings {
+                technique: Technique::Larsen,
+                rays_per_pixel: 64,
+                resolution: Resolution::Half,
+                falloff: 8.0,
+                ..common
+            },
+            Preset::LarsenFixed => Settings {
+                rays_per_pixel: 64,
+                resolution: Resolution::Half,
+                history: 8,
+                filter: Filter { radius: 1, ..common.filter },
+                ..common
+            },
+            Preset::Reference => Settings {
+                rays_per_pixel: 1024,
+                history: 1,
+                sequence: Sequence::Sobol,
+                filter: Filter { kind: FilterKind::None, ..common.filter },
+                ..common
+            },
+            Preset::Fast => Settings { filter: Filter { radius: 2, samples: 128.0, ..common.filter }, ..common },
+            Preset::Balanced => Settings { history: 64, ..common },
+            Preset::Quality => Settings {
+                rays_per_pixel: 4,
+                history: 128,
+                filter: Filter { radius: 4, samples: 1024.0, ..common.filter },
+                ..common
+            },
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn steps_reach_to_the_radius() {
+        for kind in FilterKind::ALL {
+            for radius in [0, 1, 3, 7, 15] {
+                let steps = Filter { kind, radius, samples: 64.0 }.steps();
+                let reach = |axis: usize| steps.iter().filter(|s| s.sides[axis]).map(|s| s.radius * s.stride).sum::<u32>();
+                let wanted = if kind == FilterKind::None { 0 } else { radius };
+                assert_eq!([reach(0), reach(1)], [wanted; 2], "{kind:?} {radius}");
+            }
+        }
+    }
+
+    #[test]
+    fn presets_are_sound() {
+        for preset in Preset::ALL {
+            preset.settings().check().unwrap();
+        }
+        let wrong = Settings { rays_per_pixel: 0, ..Settings::default() };
+        assert_eq!(wrong.check().unwrap_err().exit_code(), 64);
+    }
+}

@@ -1,0 +1,36 @@
+//! A bug is reported in one line and with an exit code of its own, never as a stack trace out of nowhere.
+
+use std::panic::{AssertUnwindSafe, catch_unwind, set_hook};
+use std::sync::Mutex;
+
+/// Exit code of a process that met a bug in skylit.
+pub const EXIT_CODE: u8 = 70;
+
+/// What the first panic said; later ones (of other threads) usually follow from it.
+static FIRST: Mutex<Option<String>> = Mutex::new(None);
+
+/// Makes panics quiet: [`catch`] tells what happened.
+pub fn install() {
+    set_hook(Box::new(|info| {
+        let payload = info.payload();
+        let what = payload.downcast_ref::<&str>().copied().or_else(|| payload.downcast_ref::<String>().map(String::as_str));
+        let what = what.unwrap_or("unknown reason");
+        let place = info.location().map(|l| format!(" at {}:{}", l.file(), l.line())).unwrap_or_default();
+        let message = format!("internal error: {what}{place}; this is a bug in skylit, please report it");
+        if std::env::var_os("RUST_BACKTRACE").is_some_and(|v| v != "0") {
+            eprintln!("{}", std::backtrace::Backtrace::force_capture());
+        }
+        if let Ok(mut first) = FIRST.lock() {
+            first.get_or_insert(message);
+        }
+    }));
+}
+
+/// Runs `f`; `Err` is the line to report.
+pub fn catch<T>(f: impl FnOnce() -> T) -> Result<T, String> {
+    // nothing is used after a panic but the message
+    catch_unwind(AssertUnwindSafe(f)).map_err(|_| {
+        let first = FIRST.lock().ok().and_then(|mut m| m.take());
+        super::warnings::one_line(&first.unwrap_or_else(|| "internal error; this is a bug in skylit, please report it".into()))
+    })
+}

@@ -1,0 +1,64 @@
+//! Values of options: from text to numbers in their ranges.
+
+use std::time::Duration;
+
+use glam::DVec3;
+
+use crate::output;
+
+/// A value, or what was expected.
+pub type Parsed<T> = std::result::Result<T, String>;
+
+/// `WxH`, pixels.
+pub fn parse_size(text: &str) -> Parsed<[u32; 2]> {
+    let side = |s: &str| s.trim().parse::<u32>().map_err(|_| "expected WIDTHxHEIGHT in pixels, like 1280x720".to_owned());
+    let (w, h) = text.split_once(['x', 'X']).ok_or("expected WIDTHxHEIGHT in pixels, like 1280x720")?;
+    let size = [side(w)?, side(h)?];
+    output::check_size(size[0], size[1]).map_err(|e| e.to_string())?;
+    Ok(size)
+}
+
+/// Any number that is not NaN.
+pub fn parse_number(text: &str) -> Parsed<f64> {
+    text.trim().parse::<f64>().ok().filter(|v| !v.is_nan()).ok_or_else(|| "expected a number".to_owned())
+}
+
+/// `X,Y,Z`, finite.
+pub fn parse_vector(text: &str) -> Parsed<DVec3> {
+    let parts = text.split(',').map(parse_number).collect::<Parsed<Vec<_>>>().map_err(|_| "expected X,Y,Z".to_owned())?;
+    match parts[..] {
+        [x, y, z] if parts.iter().all(|v| v.is_finite()) => Ok(DVec3::new(x, y, z)),
+        _ => Err("expected three finite numbers X,Y,Z".into()),
+    }
+}
+
+/// A number for which something holds; `rule` says what.
+pub fn parse_where(text: &str, holds: impl Fn(f64) -> bool, rule: &str) -> Parsed<f64> {
+    parse_number(text).and_then(|v| if holds(v) { Ok(v) } else { Err(rule.to_owned()) })
+}
+
+/// A field of view, degrees.
+pub fn parse_fov(text: &str) -> Parsed<f64> {
+    // beyond this the tangent of single precision loses the image
+    parse_where(text, |v| (0.001..=179.0).contains(&v), "must be between 0.001 and 179 degrees")
+}
+
+/// A distance above 0, in world units.
+pub fn parse_radius(text: &str) -> Parsed<f64> {
+    parse_where(text, |v| v > 0.0, "must be above 0 (`inf` for no limit)")
+}
+
+/// A base of the falloff: 1 or above.
+pub fn parse_falloff(text: &str) -> Parsed<f64> {
+    parse_where(text, |v| v >= 1.0 && v.is_finite(), "must be at least 1 (1 = binary) and finite")
+}
+
+/// A time above 0.
+pub fn parse_seconds(text: &str) -> Parsed<Duration> {
+    parse_where(text, |v| v > 0.0 && v <= 1e9, "must be above 0 seconds").map(Duration::from_secs_f64)
+}
+
+/// A bound: 0 or above.
+pub fn parse_limit(text: &str) -> Parsed<f64> {
+    parse_where(text, |v| v >= 0.0, "must not be negative")
+}
