@@ -236,21 +236,21 @@ impl Recorder<'_> {
         assert!(x <= self.device.info.limits.max_workgroups_x && y.max(z) <= MAX_WORKGROUPS);
         // SAFETY: recording state; the push constants have the size that the layout was made with (asserted there)
         unsafe {
-            self.device.raw.cmd_bind_pipeline(self.buffer, vk::PipelineBindPoint::COMPUTE, pipeline.raw);
-            self.push(pipeline.layout, vk::ShaderStageFlags::COMPUTE, push);
+            self.device.raw.cmd_bind_pipeline(self.buffer, vk::PipelineBindPoint::COMPUTE, pipeline.raw());
+            self.push(pipeline.layout(), vk::ShaderStageFlags::COMPUTE, push);
             self.device.raw.cmd_dispatch(self.buffer, x, y, z);
         }
     }
 
     /// Runs a ray-tracing pipeline over `rays` invocations; see [`Recorder::dispatch`] for `push`.
     pub fn trace_rays<P: bytemuck::NoUninit>(&mut self, pipeline: &RayTracingPipeline, push: &P, rays: u32) {
-        let Some(functions) = &self.device.pipelines else { return };
+        let (Some(functions), Some(table)) = (&self.device.pipelines, pipeline.table()) else { return };
         // SAFETY: as above; the tables were made for this pipeline
         unsafe {
-            self.device.raw.cmd_bind_pipeline(self.buffer, vk::PipelineBindPoint::RAY_TRACING_KHR, pipeline.raw);
-            self.push(pipeline.layout, super::pipeline::RAY_STAGES, push);
+            self.device.raw.cmd_bind_pipeline(self.buffer, vk::PipelineBindPoint::RAY_TRACING_KHR, pipeline.raw());
+            self.push(pipeline.layout(), super::pipeline::RAY_STAGES, push);
             let none = vk::StridedDeviceAddressRegionKHR::default();
-            functions.cmd_trace_rays(self.buffer, &pipeline.raygen, &pipeline.miss, &pipeline.hit, &none, rays, 1, 1);
+            functions.cmd_trace_rays(self.buffer, &table.raygen, &table.miss, &table.hit, &none, rays, 1, 1);
         }
     }
 

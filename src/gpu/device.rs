@@ -10,6 +10,7 @@ use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
 use super::cache;
 use super::info::{DeviceInfo, enumerate};
 use super::instance::{Instance, ValidationLog, no_driver};
+use super::pipeline::LivePipelines;
 use super::result::Context;
 use crate::error::{Error, Result};
 use crate::tracer::TracerKind;
@@ -37,6 +38,7 @@ pub struct Device {
     pub(super) queue: Mutex<vk::Queue>,
     pub(super) queue_family: u32,
     pub(super) pipeline_cache: vk::PipelineCache,
+    pub(super) live: LivePipelines,
     /// What the device is and can do. `int64` says what is used, not only what is there.
     pub info: DeviceInfo,
     validation: Option<Arc<ValidationLog>>,
@@ -114,6 +116,7 @@ impl Device {
             queue: Mutex::new(queue),
             queue_family,
             pipeline_cache,
+            live: LivePipelines::default(),
             info,
             validation: instance.validation.clone(),
             raw,

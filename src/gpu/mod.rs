@@ -27,4 +27,4 @@ pub use graphics_pipeline::{Cull, GraphicsPipeline};
 pub use image::{Image, Targets};
 pub use info::{DeviceInfo, Limits, TracerNeeds, enumerate};
 pub use instance::Instance;
-pub use pipeline::{ComputePipeline, HitShaders, RayTracingPipeline, Specialization};
+pub use pipeline::{ComputePipeline, HitShaders, KeptPipelines, RayTracingPipeline, Specialization};

@@ -1,6 +1,10 @@
 //! Compute and ray-tracing pipelines. There are no descriptor sets: everything is reached by address from push constants.
+//!
+//! A pipeline is a handle: the device knows those that are alive, and gives the same one to whoever asks for the same SPIR-V and the same
+//! constants. Whoever wants pipelines to outlive the work that they were compiled for keeps [`Device::live_pipelines`].
 
-use std::sync::Arc;
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex, PoisonError, Weak};
 
 use ash::vk;
 
@@ -23,7 +27,7 @@ pub(super) const RAY_STAGES: vk::ShaderStageFlags = vk::ShaderStageFlags::from_r
 );
 
 /// Specialisation constants by id.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Specialization {
     entries: Vec<(u32, u32)>,
 }
@@ -89,12 +93,79 @@ pub(super) fn layout(device: &Device, stages: vk::ShaderStageFlags) -> Result<vk
         .context("the pipeline layout")
 }
 
-/// A compute pipeline.
-pub struct ComputePipeline {
-    pub(super) raw: vk::Pipeline,
-    pub(super) layout: vk::PipelineLayout,
+/// What a pipeline is made of: hashes of its shaders' SPIR-V (content, so that shaders which are compiled while the program runs count), their constants, and how it is made.
+#[derive(Clone, PartialEq, Eq, Hash)]
+struct Key {
+    shaders: Vec<u128>,
+    specialization: Specialization,
+    flags: u32,
+}
+
+impl Key {
+    fn new<'a>(shaders: impl IntoIterator<Item = &'a Shader>, specialization: &Specialization, flags: u32) -> Result<Self> {
+        let hash = |shader: &Shader| Ok(xxhash_rust::xxh3::xxh3_128(&shader.spirv()?));
+        let shaders = shaders.into_iter().map(hash).collect::<Result<_>>()?;
+        Ok(Self { shaders, specialization: specialization.clone(), flags })
+    }
+}
+
+/// A pipeline and its layout, destroyed when nobody has it any more.
+struct Compiled {
+    raw: vk::Pipeline,
+    layout: vk::PipelineLayout,
+    /// Of a ray-tracing pipeline.
+    table: Option<Table>,
     device: Arc<Device>,
 }
+
+impl Drop for Compiled {
+    fn drop(&mut self) {
+        // SAFETY: submissions are waited for
+        unsafe {
+            self.device.raw.destroy_pipeline(self.raw, None);
+            self.device.raw.destroy_pipeline_layout(self.layout, None);
+        }
+    }
+}
+
+/// The pipelines of a device that are alive.
+#[derive(Default)]
+pub(super) struct LivePipelines(Mutex<HashMap<Key, Weak<Compiled>>>);
+
+impl LivePipelines {
+    /// The pipeline that was made of this, or what `make` gives.
+    fn get(&self, key: Key, make: impl FnOnce() -> Result<Compiled>) -> Result<Arc<Compiled>> {
+        let all = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(pipeline) = all().get(&key).and_then(Weak::upgrade) {
+            return Ok(pipeline);
+        }
+        // not under the lock: compiling takes seconds, and several threads do
+        let made = Arc::new(make()?);
+        let mut all = all();
+        all.retain(|_, pipeline| pipeline.strong_count() > 0);
+        all.insert(key, Arc::downgrade(&made));
+        Ok(made)
+    }
+}
+
+/// Keeps pipelines alive ([`Device::live_pipelines`]).
+#[derive(Default)]
+pub struct KeptPipelines {
+    #[expect(dead_code, reason = "held, not looked at")]
+    pipelines: Vec<Arc<Compiled>>,
+}
+
+impl Device {
+    /// All pipelines that are alive. While this is kept, who asks for one of them again gets it without compiling.
+    pub fn live_pipelines(&self) -> KeptPipelines {
+        let all = self.live.0.lock().unwrap_or_else(PoisonError::into_inner);
+        KeptPipelines { pipelines: all.values().filter_map(Weak::upgrade).collect() }
+    }
+}
+
+/// A compute pipeline.
+#[derive(Clone)]
+pub struct ComputePipeline(Arc<Compiled>);
 
 impl ComputePipeline {
     /// Compiles a compute shader with the entry point `main`.
@@ -115,22 +186,34 @@ impl ComputePipeline {
         specialization: &Specialization,
         flags: vk::PipelineShaderStageCreateFlags,
     ) -> Result<Self> {
-        let module = Module::new(device, name, shader)?;
-        let mut pipeline =
-            Self { raw: vk::Pipeline::null(), layout: layout(device, vk::ShaderStageFlags::COMPUTE)?, device: device.clone() };
-        pipeline.raw = specialization.with(|s| {
-            let stage = vk::PipelineShaderStageCreateInfo::default()
-                .stage(vk::ShaderStageFlags::COMPUTE)
-                .flags(flags)
-                .module(module.raw)
-                .name(c"main")
-                .specialization_info(s);
-            let info = [vk::ComputePipelineCreateInfo::default().stage(stage).layout(pipeline.layout)];
-            // SAFETY: module and layout are of this device
-            unsafe { device.raw.create_compute_pipelines(device.pipeline_cache, &info, None) }.map_err(|e| e.1).context(name)
-        })?[0];
-        device.name(pipeline.raw, name);
-        Ok(pipeline)
+        let key = Key::new([shader], specialization, flags.as_raw())?;
+        let make = || {
+            let module = Module::new(device, name, shader)?;
+            let layout = layout(device, vk::ShaderStageFlags::COMPUTE)?;
+            let mut pipeline = Compiled { raw: vk::Pipeline::null(), layout, table: None, device: device.clone() };
+            pipeline.raw = specialization.with(|s| {
+                let stage = vk::PipelineShaderStageCreateInfo::default()
+                    .stage(vk::ShaderStageFlags::COMPUTE)
+                    .flags(flags)
+                    .module(module.raw)
+                    .name(c"main")
+                    .specialization_info(s);
+                let info = [vk::ComputePipelineCreateInfo::default().stage(stage).layout(layout)];
+                // SAFETY: module and layout are of this device
+                unsafe { device.raw.create_compute_pipelines(device.pipeline_cache, &info, None) }.map_err(|e| e.1).context(name)
+            })?[0];
+            device.name(pipeline.raw, name);
+            Ok(pipeline)
+        };
+        device.live.get(key, make).map(Self)
+    }
+
+    pub(super) fn raw(&self) -> vk::Pipeline {
+        self.0.raw
+    }
+
+    pub(super) fn layout(&self) -> vk::PipelineLayout {
+        self.0.layout
     }
 }
 
@@ -152,16 +235,6 @@ impl ComputeShader {
     }
 }
 
-impl Drop for ComputePipeline {
-    fn drop(&mut self) {
-        // SAFETY: submissions are waited for
-        unsafe {
-            self.device.raw.destroy_pipeline(self.raw, None);
-            self.device.raw.destroy_pipeline_layout(self.layout, None);
-        }
-    }
-}
-
 /// The shaders that all streams of the pipeline tracer share.
 pub struct HitShaders<'a> {
     /// Miss.
@@ -176,14 +249,15 @@ pub struct HitShaders<'a> {
 
 /// A ray-tracing pipeline with its shader binding table. Hit groups: 0 opaque triangles, 1 alpha-tested triangles, 2 spheres
 /// (groups that the scene does not need repeat group 0, so that the numbers hold).
-pub struct RayTracingPipeline {
-    pub(super) raw: vk::Pipeline,
-    pub(super) layout: vk::PipelineLayout,
+#[derive(Clone)]
+pub struct RayTracingPipeline(Arc<Compiled>);
+
+/// A shader binding table.
+pub(super) struct Table {
     pub(super) raygen: vk::StridedDeviceAddressRegionKHR,
     pub(super) miss: vk::StridedDeviceAddressRegionKHR,
     pub(super) hit: vk::StridedDeviceAddressRegionKHR,
-    _table: Option<Buffer>,
-    device: Arc<Device>,
+    _buffer: Buffer,
 }
 
 impl RayTracingPipeline {
@@ -197,6 +271,19 @@ impl RayTracingPipeline {
     ) -> Result<Self> {
         let functions =
             device.pipelines.as_ref().ok_or_else(|| Error::Device("the device has no VK_KHR_ray_tracing_pipeline".into()))?;
+        let optional = shared.triangle_any.into_iter().chain(shared.sphere.into_iter().flatten());
+        let key = Key::new([raygen, shared.miss, shared.triangle_closest].into_iter().chain(optional), specialization, u32::MAX)?;
+        device.live.get(key, || Self::compile(device, functions, name, raygen, shared, specialization)).map(Self)
+    }
+
+    fn compile(
+        device: &Arc<Device>,
+        functions: &ash::khr::ray_tracing_pipeline::Device,
+        name: &str,
+        raygen: &Shader,
+        shared: &HitShaders,
+        specialization: &Specialization,
+    ) -> Result<Compiled> {
         let mut modules = vec![
             (Module::new(device, name, raygen)?, vk::ShaderStageFlags::RAYGEN_KHR),
             (Module::new(device, "miss", shared.miss)?, vk::ShaderStageFlags::MISS_KHR),
@@ -235,16 +322,8 @@ impl RayTracingPipeline {
             modules.push((Module::new(device, "sphere closest hit", closest)?, vk::ShaderStageFlags::CLOSEST_HIT_KHR));
             modules.push((Module::new(device, "sphere intersection", intersection)?, vk::ShaderStageFlags::INTERSECTION_KHR));
         }
-        let none = vk::StridedDeviceAddressRegionKHR::default();
-        let mut pipeline = Self {
-            raw: vk::Pipeline::null(),
-            layout: layout(device, RAY_STAGES)?,
-            raygen: none,
-            miss: none,
-            hit: none,
-            _table: None,
-            device: device.clone(),
-        };
+        let layout = layout(device, RAY_STAGES)?;
+        let mut pipeline = Compiled { raw: vk::Pipeline::null(), layout, table: None, device: device.clone() };
         pipeline.raw = specialization.with(|s| {
             let stages: Vec<_> = modules
                 .iter()
@@ -269,30 +348,43 @@ impl RayTracingPipeline {
             .context(name)
         })?[0];
         device.name(pipeline.raw, name);
-        pipeline.make_table(functions, groups.len() as u32)?;
+        pipeline.table = Some(Table::new(functions, &pipeline, groups.len() as u32)?);
         Ok(pipeline)
     }
 
+    pub(super) fn raw(&self) -> vk::Pipeline {
+        self.0.raw
+    }
+
+    pub(super) fn layout(&self) -> vk::PipelineLayout {
+        self.0.layout
+    }
+
+    pub(super) fn table(&self) -> Option<&Table> {
+        self.0.table.as_ref()
+    }
+}
+
+impl Table {
     /// Lays the group handles out as the device's own sizes ask: raygen, miss, then the hit groups.
-    fn make_table(&mut self, functions: &ash::khr::ray_tracing_pipeline::Device, groups: u32) -> Result<()> {
-        let limits = &self.device.info.limits;
+    fn new(functions: &ash::khr::ray_tracing_pipeline::Device, pipeline: &Compiled, groups: u32) -> Result<Self> {
+        let limits = &pipeline.device.info.limits;
         let size = limits.shader_group_handle_size as usize;
         // SAFETY: the pipeline has this many groups
-        let handles = unsafe { functions.get_ray_tracing_shader_group_handles(self.raw, 0, groups, size * groups as usize) }
+        let handles = unsafe { functions.get_ray_tracing_shader_group_handles(pipeline.raw, 0, groups, size * groups as usize) }
             .context("the shader group handles")?;
         let base = limits.shader_group_base_alignment as u64;
         let stride = (size as u64).next_multiple_of(limits.shader_group_handle_alignment as u64);
         let regions = [1u64, 1, groups as u64 - 2];
         let sizes = regions.map(|n| (n * stride).next_multiple_of(base));
-        let table = Buffer::with_usage(
-            &self.device,
+        let mut table = Buffer::with_usage(
+            &pipeline.device,
             "shader binding table",
             // room to align its beginning
             sizes.iter().sum::<u64>() + base,
             Memory::Upload,
             vk::BufferUsageFlags::SHADER_BINDING_TABLE_KHR,
         )?;
-        let mut table = table;
         let start = table.address().next_multiple_of(base);
         let mut offset = start - table.address();
         let mut addresses = [0; 3];
@@ -311,20 +403,7 @@ impl RayTracingPipeline {
         let region =
             |k: usize, stride: u64| vk::StridedDeviceAddressRegionKHR { device_address: addresses[k], stride, size: sizes[k] };
         // the ray generation table's size must be its stride
-        self.raygen = region(0, sizes[0]);
-        self.miss = region(1, stride);
-        self.hit = region(2, stride);
-        self._table = Some(table);
-        Ok(())
+        Ok(Self { raygen: region(0, sizes[0]), miss: region(1, stride), hit: region(2, stride), _buffer: table })
     }
 }
 
-impl Drop for RayTracingPipeline {
-    fn drop(&mut self) {
-        // SAFETY: submissions are waited for
-        unsafe {
-            self.device.raw.destroy_pipeline(self.raw, None);
-            self.device.raw.destroy_pipeline_layout(self.layout, None);
-        }
-    }
-}
