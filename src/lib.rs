@@ -21,6 +21,7 @@ pub mod ray;
 pub mod realtime;
 pub mod sampling;
 pub mod scene;
+pub mod settings;
 pub mod shaders;
 pub mod terminal;
 pub mod tracer;

@@ -1,5 +1,6 @@
 //! Traces a set of rays: what joins skylit's tracers to any other.
 
+use crate::settings::choices;
 use crate::shaders;
 use bytemuck::{Pod, Zeroable};
 
@@ -10,14 +11,14 @@ use crate::gpu::{Buffer, Commands, Memory};
 use crate::ray::{Hit, Ray};
 use crate::tracer::{Push, Stream, Tracer};
 
-/// What to find.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Mode {
-    /// Whether something is in the way.
-    Any,
-    /// The nearest hit.
-    Closest,
+choices! {
+    /// What to find of a ray.
+    pub enum Mode {
+        /// Any hit
+        Any = "any",
+        /// Closest hit
+        Closest = "closest",
+    }
 }
 
 #[repr(C)]

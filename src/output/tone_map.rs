@@ -1,23 +1,24 @@
 //! From radiance to what a display can show. Applied when an 8-bit picture is written, and never before: images are kept linear.
 
+use crate::settings::choices;
 use rayon::prelude::*;
 
 use super::{Channel, Image, Samples};
 
-/// How bright values are brought below 1. Values are linear with sRGB primaries, before and after.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum ToneMap {
-    /// Cut off at 1.
-    #[default]
-    Linear,
-    /// 1 - e^-x, each channel by itself.
-    Exponential,
-    /// L / (1 + L) of the luminance: Reinhard, Stark, Shirley, Ferwerda, "Photographic Tone Reproduction for Digital Images", 2002.
-    Reinhard,
-    /// Khronos PBR Neutral (2024): base colours come out as they went in, highlights lose their colour.
-    Neutral,
-    /// AgX (Sobotka 2022) with Wrensch's polynomial for its curve (2023).
-    Agx,
+choices! {
+    /// Tone mapping operator. Values are linear with sRGB primaries, before and after.
+    pub enum ToneMap {
+        /// Clamp at 1
+        Linear = "linear",
+        /// Exponential, 1 - e^-x per channel
+        Exponential = "exp",
+        /// Reinhard et al. (2002), by luminance
+        Reinhard = "reinhard",
+        /// Khronos PBR Neutral (2024)
+        Neutral = "neutral",
+        /// AgX (Sobotka 2022, curve by Wrensch 2023)
+        Agx = "agx",
+    }
 }
 
 type Rgb = [f32; 3];
@@ -101,11 +102,10 @@ fn agx(c: Rgb) -> Rgb {
 mod tests {
     use super::*;
 
-    const ALL: [ToneMap; 5] = [ToneMap::Linear, ToneMap::Exponential, ToneMap::Reinhard, ToneMap::Neutral, ToneMap::Agx];
 
     #[test]
     fn grey_stays_grey_and_brighter_stays_brighter() {
-        for map in ALL {
+        for map in ToneMap::ALL {
             let mut last = -1.0;
             for k in 0..400 {
                 let x = 1e-3 * 1.04f32.powi(k);

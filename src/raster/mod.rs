@@ -7,6 +7,7 @@
 
 mod frustum;
 
+use crate::settings::choices;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -37,15 +38,14 @@ struct RasterParams {
     params: BlockParams,
 }
 
-/// How it is found what camera rays meet.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Primary {
-    /// The tracer traces them.
-    #[default]
-    Traced,
-    /// The scene is drawn.
-    Raster,
+choices! {
+    /// Primary visibility: how it is found what camera rays meet.
+    pub enum Primary {
+        /// Ray traced
+        Traced = "traced",
+        /// Rasterized
+        Raster = "raster",
+    }
 }
 
 /// Placed primitives per pixel up to which drawing costs less than tracing: of CPUs, and of other devices. Mesa's CPU driver takes 90 to

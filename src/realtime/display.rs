@@ -1,5 +1,6 @@
 //! A buffer of the frame as it is shown: RGBA words in device memory, which a window takes as they are and files without alpha.
 
+use crate::settings::choices;
 use crate::shaders::{self, LANES};
 use bytemuck::{Pod, Zeroable};
 
@@ -10,56 +11,29 @@ use crate::output::png::{Colour, srgb_byte};
 
 use crate::tracer::{Push, Tracer};
 
-/// What can be shown of a frame. As shaders/display.glsl numbers them.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Shown {
-    /// The result, white where nothing occludes.
-    #[default]
-    Accessibility,
-    /// What the filter was given.
-    Unfiltered,
-    /// Samples behind a pixel; white: as many as a history counts.
-    Samples,
-    /// Of one sample; white: a quarter, the most that samples of 0 and 1 have.
-    Variance,
-    /// Along the view; white: none, a half: [`Display::unit`].
-    Depth,
-    /// The geometric normal on the viewer's side, world space, -1 to 1 as 0 to 1.
-    Normal,
-    /// World position relative to the scene's origin: from white to black in one [`Display::unit`], and back in the next.
-    Position,
-    /// [`super::Realtime::bent`], -1 to 1 as 0 to 1.
-    Bent,
+choices! {
+    /// What is shown of a frame. shaders/display.glsl numbers them in this order.
+    pub enum Shown {
+        /// The filtered result
+        Accessibility = "accessibility",
+        /// The input of the spatial filter
+        Unfiltered = "unfiltered",
+        /// Accumulated samples; white: maximum history length
+        Samples = "samples",
+        /// Variance of one sample; white: 0.25
+        Variance = "variance",
+        /// Depth along the view; white is near
+        Depth = "depth",
+        /// Geometric normal, -1 to 1 mapped to 0 to 1
+        Normal = "normal",
+        /// World position, repeating every quarter of the scene
+        Position = "position",
+        /// Bent normal, -1 to 1 mapped to 0 to 1
+        Bent = "bent",
+    }
 }
 
 impl Shown {
-    /// All of them.
-    pub const ALL: [Shown; 8] = [
-        Shown::Accessibility,
-        Shown::Unfiltered,
-        Shown::Samples,
-        Shown::Variance,
-        Shown::Depth,
-        Shown::Normal,
-        Shown::Position,
-        Shown::Bent,
-    ];
-
-    /// As on the command line.
-    pub fn name(self) -> &'static str {
-        match self {
-            Shown::Accessibility => "accessibility",
-            Shown::Unfiltered => "unfiltered",
-            Shown::Samples => "samples",
-            Shown::Variance => "variance",
-            Shown::Depth => "depth",
-            Shown::Normal => "normal",
-            Shown::Position => "position",
-            Shown::Bent => "bent",
-        }
-    }
-
     /// What a file without alpha needs for it.
     pub fn colour(self) -> Colour {
         match self {

@@ -1,120 +1,63 @@
 //! How the frames of a real-time renderer are made, and the presets that people choose from.
 
+use crate::settings::choices;
 use crate::error::{Error, Result};
 use crate::integrators::ao::{FALLOFF_CUTOFF, Hemisphere};
 use crate::raster::Primary;
 use crate::sampling::Sequence;
 
-/// Where occlusion comes from.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Technique {
-    /// Rays through the scene.
-    #[default]
-    Traced,
-    /// The depth image (Jimenez et al. 2016).
-    Gtao,
-    /// The pipeline of the reference work (Larsen 2019) as it was.
-    Larsen,
-}
-
-impl Technique {
-    /// All of them.
-    pub const ALL: [Technique; 3] = [Technique::Traced, Technique::Gtao, Technique::Larsen];
-
-    /// As on the command line.
-    pub fn name(self) -> &'static str {
-        match self {
-            Technique::Traced => "traced",
-            Technique::Gtao => "gtao",
-            Technique::Larsen => "larsen",
-        }
+choices! {
+    /// How a pixel's ambient visibility is estimated.
+    pub enum Technique {
+        /// Ray-traced ambient occlusion
+        Traced = "traced",
+        /// Screen-space ground-truth AO (Jimenez et al. 2016)
+        Gtao = "gtao",
+        /// The pipeline of Larsen (2019)
+        Larsen = "larsen",
     }
 }
 
-/// Which pixels are sampled in a frame.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Resolution {
-    /// All of them.
-    #[default]
-    Full,
-    /// Every second one, like the fields of a chessboard, the others in the next frame.
-    Checkerboard,
-    /// One of four (half the resolution per axis), another in each of four frames.
-    Half,
+choices! {
+    /// Which pixels are sampled in a frame.
+    pub enum Resolution {
+        /// Every pixel in every frame
+        Full = "full",
+        /// Half of the pixels per frame, alternating
+        Checkerboard = "checkerboard",
+        /// A quarter of the pixels per frame: half the resolution per axis
+        Half = "half",
+    }
 }
 
 impl Resolution {
-    /// All of them.
-    pub const ALL: [Resolution; 3] = [Resolution::Full, Resolution::Checkerboard, Resolution::Half];
-
-    /// As on the command line.
-    pub fn name(self) -> &'static str {
-        match self {
-            Resolution::Full => "full",
-            Resolution::Checkerboard => "checkerboard",
-            Resolution::Half => "half",
-        }
-    }
-
     /// Frames after which every pixel was sampled.
     pub fn period(self) -> u32 {
         1 << self as u32
     }
 }
 
-/// Who has how many of a frame's rays.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Budget {
-    /// All pixels that are sampled have as many.
-    #[default]
-    Uniform,
-    /// As many in all, most where a pixel's mean is known least.
-    Variance,
-}
-
-impl Budget {
-    /// All of them.
-    pub const ALL: [Budget; 2] = [Budget::Uniform, Budget::Variance];
-
-    /// As on the command line.
-    pub fn name(self) -> &'static str {
-        match self {
-            Budget::Uniform => "uniform",
-            Budget::Variance => "variance",
-        }
+choices! {
+    /// How the rays of a frame are distributed over its pixels.
+    pub enum Budget {
+        /// The same number for every pixel
+        Uniform = "uniform",
+        /// The same total, in proportion to the standard error of pixels
+        Variance = "variance",
     }
 }
 
-/// How the pixels of a frame are averaged.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum FilterKind {
-    /// Not at all.
-    None,
-    /// A box, its radius by how many samples there are.
-    #[default]
-    Box,
-    /// Its sides one after the other: fewer taps for large radii. Exact on plane surfaces.
-    Separable,
-    /// A box of 3x3 again and again, its taps twice as far apart each time, up to the radius.
-    Atrous,
-}
-
-impl FilterKind {
-    /// All of them.
-    pub const ALL: [FilterKind; 4] = [FilterKind::None, FilterKind::Box, FilterKind::Separable, FilterKind::Atrous];
-
-    /// As on the command line.
-    pub fn name(self) -> &'static str {
-        match self {
-            FilterKind::None => "none",
-            FilterKind::Box => "box",
-            FilterKind::Separable => "separable",
-            FilterKind::Atrous => "atrous",
-        }
+choices! {
+    /// Spatial filter of a frame. Its radius follows from how many samples a pixel has.
+    pub enum FilterKind {
+        /// Edge-aware box filter; fewer samples, larger radius
+        Box = "box",
+        /// No spatial filter
+        None = "none",
+        /// Edge-aware box filter, separable
+        Separable = "separable",
+        /// Edge-aware a-trous filter
+        Atrous = "atrous",
     }
 }
 
@@ -264,42 +207,25 @@ impl Settings {
     }
 }
 
-/// Settings by name.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Preset {
-    /// The pipeline of the reference work, exactly, its flaws included.
-    Larsen,
-    /// Its budget, 64 rays for each 2x2 pixels, with right sampling, history and filter.
-    LarsenFixed,
-    /// As fast as it goes.
-    Fast,
-    /// Little error for little time.
-    #[default]
-    Balanced,
-    /// Less error.
-    Quality,
-    /// Each frame by itself, 1024 rays a pixel and nothing else: what the others stand in for.
-    Reference,
+choices! {
+    /// Settings by name.
+    pub enum Preset {
+        /// 1 ray per pixel, long history
+        Balanced = "balanced",
+        /// The pipeline of Larsen (2019): half resolution, 64 rays, box filter, history weight 0.5
+        Larsen = "larsen",
+        /// The same ray budget, with correct sampling, reprojection and filter
+        LarsenFixed = "larsen-fixed",
+        /// 1 ray per pixel, short history, small filter
+        Fast = "fast",
+        /// 4 rays per pixel, longer history, wider filter
+        Quality = "quality",
+        /// 1024 rays per pixel, no history
+        Reference = "reference",
+    }
 }
 
 impl Preset {
-    /// All of them.
-    pub const ALL: [Preset; 6] =
-        [Preset::Larsen, Preset::LarsenFixed, Preset::Fast, Preset::Balanced, Preset::Quality, Preset::Reference];
-
-    /// As on the command line.
-    pub fn name(self) -> &'static str {
-        match self {
-            Preset::Larsen => "larsen",
-            Preset::LarsenFixed => "larsen-fixed",
-            Preset::Fast => "fast",
-            Preset::Balanced => "balanced",
-            Preset::Quality => "quality",
-            Preset::Reference => "reference",
-        }
-    }
-
     /// What it stands for.
     pub fn settings(self) -> Settings {
         let common = Settings {

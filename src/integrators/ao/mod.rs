@@ -4,6 +4,7 @@
 //! what each sample adds; `resolve` adds the samples to the film, pixel by pixel and in their order. So an occlusion ray that does
 //! not exist costs nothing, neighbouring rays belong to one pixel, and sums do not depend on launch sizes.
 
+use crate::settings::choices;
 use crate::shaders::{self, StreamShaders};
 use std::sync::Arc;
 use std::time::Duration;
@@ -30,15 +31,14 @@ pub const FALLOFF_CUTOFF: f64 = 1.0 / 510.0;
 /// What a sample that met nothing leaves; no accessibility is negative.
 const MET_NOTHING: f32 = -1.0;
 
-/// The axis of the hemisphere.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Hemisphere {
-    /// The geometric normal, on the viewer's side (pbrt-v4's AOIntegrator).
-    #[default]
-    Geometric,
-    /// The interpolated shading normal.
-    Shading,
+choices! {
+    /// The axis of the hemisphere that occlusion rays fill.
+    pub enum Hemisphere {
+        /// Geometric normal, on the viewer's side (as pbrt-v4's AOIntegrator)
+        Geometric = "geometric",
+        /// Shading normal (interpolated)
+        Shading = "shading",
+    }
 }
 
 /// What to render.

@@ -12,6 +12,7 @@ mod lights;
 mod media;
 mod params;
 
+use crate::settings::choices;
 use crate::shaders::{self, StreamShaders};
 use std::sync::Arc;
 use std::time::Duration;
@@ -42,21 +43,20 @@ const MAX_STRAIGHT: u32 = 4096;
 /// Longest path: with Russian roulette, which lets no more than 0.95 of paths go on, none gets here.
 pub const MOST_DEPTH: u32 = 4096;
 
-/// How directions are drawn. All of them estimate the same image; all but `Mis` are for comparison.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Strategy {
-    /// BSDF samples and light samples, weighed by the power heuristic (Veach 1997).
-    #[default]
-    Mis,
-    /// BSDF samples alone.
-    Bsdf,
-    /// Light samples for what they can find; BSDF samples for the rest.
-    Light,
-    /// Cosine-distributed directions, whatever the BSDF; no light samples.
-    Cosine,
-    /// Directions distributed evenly over the hemisphere; no light samples.
-    Uniform,
+choices! {
+    /// How directions are sampled. All strategies estimate the same image; all but the first are for comparison.
+    pub enum Strategy {
+        /// Multiple importance sampling of BSDF and lights, power heuristic (Veach 1997)
+        Mis = "mis",
+        /// BSDF sampling only
+        Bsdf = "bsdf",
+        /// Light sampling for emitters that it can sample, BSDF sampling for the rest
+        Light = "light",
+        /// Cosine-weighted hemisphere sampling
+        Cosine = "cosine",
+        /// Uniform hemisphere sampling
+        Uniform = "uniform",
+    }
 }
 
 impl Strategy {
@@ -65,18 +65,17 @@ impl Strategy {
     }
 }
 
-/// What a pixel is the mean of: positions in the image are drawn as often as the filter weighs them, and count alike (Ernst, Stamminger,
-/// Greiner, "Filter Importance Sampling", 2006).
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum PixelFilter {
-    /// The pixel's own square.
-    #[default]
-    Box,
-    /// Falls linearly to 0 at one pixel's distance.
-    Tent,
-    /// Blackman and Harris' window (1978), 0 at 1.5 pixels' distance.
-    BlackmanHarris,
+choices! {
+    /// Reconstruction filter of pixels, by importance sampling: positions are sampled in proportion to the filter, and count alike (Ernst, Stamminger, Greiner,
+    /// "Filter Importance Sampling", 2006).
+    pub enum PixelFilter {
+        /// Box filter of one pixel
+        Box = "box",
+        /// Tent filter of radius 1
+        Tent = "tent",
+        /// Blackman-Harris filter of radius 1.5
+        BlackmanHarris = "blackman-harris",
+    }
 }
 
 /// What a camera ray sees of a surface, instead of light.
@@ -106,15 +105,14 @@ impl View {
     }
 }
 
-/// What a path reads of a texture where it meets one.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum TextureFilter {
-    /// A point of it, between its texels: the samples of a pixel do the averaging.
-    #[default]
-    Bilinear,
-    /// Its mean over what the path's cone covers, from levels: less noise from few samples, and a bias that no number of samples removes.
-    RayCone,
+choices! {
+    /// How a path reads textures.
+    pub enum TextureFilter {
+        /// Bilinear lookups: the samples of a pixel average them
+        Bilinear = "bilinear",
+        /// Ray cones choose a mip level: less noise at low sample counts, biased
+        RayCone = "ray-cone",
+    }
 }
 
 /// A thin lens.

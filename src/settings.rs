@@ -1,0 +1,235 @@
+//! How settings are declared: once, as a struct that is a command line (with the feature `cli`), a JSON record and the metadata of an image alike.
+//!
+//! Each setting knows which integrators it is for, and whether it is of stills, of frames in real time, or of both: [`check`] finds the one that would have no effect.
+
+use crate::error::{Error, Result};
+
+/// What a setting has an effect on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct AppliesTo {
+    /// Names of integrators; none: all of them.
+    pub integrators: &'static [&'static str],
+    /// Stills.
+    pub stills: bool,
+    /// Frames in real time.
+    pub frames: bool,
+}
+
+impl AppliesTo {
+    /// Everything.
+    pub const ALL: Self = Self { integrators: &[], stills: true, frames: true };
+    /// Stills of any integrator.
+    pub const STILLS: Self = Self { integrators: &[], stills: true, frames: false };
+    /// Frames in real time.
+    pub const FRAMES: Self = Self { integrators: &[], stills: false, frames: true };
+
+    /// Stills of some integrators.
+    pub const fn stills_of(integrators: &'static [&'static str]) -> Self {
+        Self { integrators, ..Self::STILLS }
+    }
+
+    /// Stills and frames of some integrators.
+    pub const fn of(integrators: &'static [&'static str]) -> Self {
+        Self { integrators, ..Self::ALL }
+    }
+
+    fn includes(&self, integrator: &str) -> bool {
+        self.integrators.is_empty() || self.integrators.contains(&integrator)
+    }
+}
+
+/// A setting that differs from its default.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Given {
+    /// As in files: `max_depth`.
+    pub name: &'static str,
+    /// What it has an effect on.
+    pub applies: AppliesTo,
+}
+
+impl Given {
+    /// As on the command line: `--max-depth`.
+    pub fn option(&self) -> String {
+        format!("--{}", self.name.replace('_', "-"))
+    }
+}
+
+/// Is a value that of a setting which was not given?
+pub fn is_default<T: Default + PartialEq>(value: &T) -> bool {
+    *value == T::default()
+}
+
+/// Names in a sentence: `a`, `a and b`, `a, b and c`.
+fn list(names: &[&str]) -> String {
+    match names {
+        [] => "none".into(),
+        [one] => (*one).to_owned(),
+        [most @ .., last] => format!("{} and {last}", most.join(", ")),
+    }
+}
+
+/// Has each of these settings an effect on what `integrator` renders: frames in real time because `frames`, if there is one, was given; else a still?
+///
+/// # Errors
+/// [`Error::Usage`] for the first that has none.
+pub fn check(given: &[Given], integrator: &str, frames: Option<&Given>) -> Result<()> {
+    let wrong = |text: String| Err(Error::Usage(text));
+    for setting in given {
+        let (option, applies) = (setting.option(), setting.applies);
+        if let (Some(frames), false) = (frames, applies.frames) {
+            return wrong(format!("{option} is for stills, and {} asks for frames in real time: leave one of them out", frames.option()));
+        }
+        if !applies.includes(integrator) {
+            let others = list(applies.integrators);
+            return wrong(format!("{option} has no effect on --integrator {integrator}: leave it out, or use --integrator {others}"));
+        }
+    }
+    Ok(())
+}
+
+/// Declares settings: `name: type, option(what clap is told), applies(to what);`, each with its doc, which is its help.
+///
+/// A setting is an `Option`, a `bool` or a `Vec`; its default means that it was not given.
+macro_rules! settings {
+    (
+        $(#[$meta:meta])*
+        $heading:literal
+        $vis:vis struct $name:ident {
+            $(
+                $(#[doc = $doc:literal])+
+                $field:ident: $type:ty, option($($option:tt)*), applies($applies:expr);
+            )*
+        }
+    ) => {
+        $(#[$meta])*
+        #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
+        #[serde(default, deny_unknown_fields)]
+        #[cfg_attr(feature = "cli", derive(clap::Args))]
+        #[cfg_attr(feature = "cli", command(next_help_heading = $heading))]
+        $vis struct $name {
+            $(
+                $(#[doc = $doc])+
+                #[serde(skip_serializing_if = "crate::settings::is_default")]
+                #[cfg_attr(feature = "cli", arg(long, $($option)*))]
+                pub $field: $type,
+            )*
+        }
+
+        impl $name {
+            /// The settings that were given.
+            pub fn given(&self) -> Vec<$crate::settings::Given> {
+                let mut out = Vec::new();
+                $(
+                    if !$crate::settings::is_default(&self.$field) {
+                        out.push($crate::settings::Given { name: stringify!($field), applies: $applies });
+                    }
+                )*
+                out
+            }
+        }
+    };
+}
+pub(crate) use settings;
+
+/// Declares a choice among named alternatives: `/// help` and `Variant = "name",` each; the first is the default. The doc of an alternative is the help of the command line.
+macro_rules! choices {
+    (
+        $(#[$meta:meta])*
+        $vis:vis enum $type:ident {
+            $(
+                $(#[doc = $doc:literal])+
+                $variant:ident = $name:literal,
+            )+
+        }
+    ) => {
+        $(#[$meta])*
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
+        $vis enum $type {
+            $(
+                $(#[doc = $doc])+
+                #[serde(rename = $name)]
+                $variant,
+            )+
+        }
+
+        impl $type {
+            /// All of them.
+            pub const ALL: [Self; [$($name),+].len()] = [$(Self::$variant),+];
+
+            /// As on the command line and in files.
+            pub const fn name(self) -> &'static str {
+                match self {
+                    $(Self::$variant => $name,)+
+                }
+            }
+
+            /// What it is, in a line.
+            pub fn help(self) -> &'static str {
+                match self {
+                    $(Self::$variant => concat!($($doc),+).trim(),)+
+                }
+            }
+        }
+
+        impl Default for $type {
+            fn default() -> Self {
+                Self::ALL[0]
+            }
+        }
+
+        impl std::fmt::Display for $type {
+            fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+                f.pad(self.name())
+            }
+        }
+
+        #[cfg(feature = "cli")]
+        impl clap::ValueEnum for $type {
+            fn value_variants<'a>() -> &'a [Self] {
+                &Self::ALL
+            }
+
+            fn to_possible_value(&self) -> Option<clap::builder::PossibleValue> {
+                Some(clap::builder::PossibleValue::new(self.name()).help(self.help()))
+            }
+        }
+    };
+}
+pub(crate) use choices;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    settings! {
+        /// For this test.
+        "Test"
+        struct Some {
+            /// First.
+            max_depth: Option<u32>, option(value_name = "N"), applies(AppliesTo::stills_of(&["path", "direct"]));
+            /// Second.
+            fps: Option<f64>, option(value_name = "N"), applies(AppliesTo::FRAMES);
+        }
+    }
+
+    #[test]
+    fn settings_know_what_they_are_for() {
+        let some = Some { max_depth: Option::Some(3), fps: None };
+        let [depth] = some.given()[..] else { panic!("one was given") };
+        assert_eq!(depth.option(), "--max-depth");
+        assert!(check(&[depth], "path", None).is_ok());
+        let text = |r: Result<()>| r.unwrap_err().to_string();
+        assert!(text(check(&[depth], "ao", None)).contains("use --integrator path and direct"));
+        let fps = Some { fps: Option::Some(24.0), ..Default::default() }.given()[0];
+        assert!(text(check(&[depth], "path", Option::Some(&fps))).contains("--fps asks for frames"));
+    }
+
+    #[test]
+    fn settings_are_files() {
+        let some = Some { max_depth: Option::Some(3), fps: None };
+        let text = serde_json::to_string(&some).unwrap();
+        assert_eq!(text, r#"{"max_depth":3}"#);
+        assert_eq!(serde_json::from_str::<Some>(&text).unwrap(), some);
+        assert!(serde_json::from_str::<Some>(r#"{"max_deptth":3}"#).is_err());
+    }
+}
