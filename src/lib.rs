@@ -19,6 +19,7 @@ pub mod output;
 pub mod raster;
 pub mod ray;
 pub mod realtime;
+pub mod renderer;
 pub mod sampling;
 pub mod scene;
 pub mod settings;
@@ -27,3 +28,4 @@ pub mod terminal;
 pub mod tracer;
 
 pub use error::{Error, Result};
+pub use renderer::Renderer;

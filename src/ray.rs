@@ -45,3 +45,12 @@ impl Hit {
         self.t < f32::INFINITY
     }
 }
+
+/// Moves rays: between the world of files and the tracers' coordinates, which differ for a scene far from the origin.
+pub fn translate(rays: &mut [Ray], by: glam::DVec3) {
+    if by != glam::DVec3::ZERO {
+        for r in rays {
+            r.origin = (glam::DVec3::from(r.origin.map(f64::from)) + by).as_vec3().to_array();
+        }
+    }
+}

@@ -82,7 +82,7 @@ fn check(device: &Arc<Device>, case: &Case) {
         let tracer = tracer(device, kind, case.scene);
         let start = std::time::Instant::now();
         let image = render(&tracer, case.scene, &case.camera, &case.options);
-        let film = &image.film;
+        let film = &image.image.film;
         let n = used as f64;
         let (mut bias, mut squares, mut variance, mut mean) = (0.0, 0.0, 0.0, 0.0);
         for (i, want) in expected.iter().enumerate() {
@@ -91,14 +91,14 @@ fn check(device: &Arc<Device>, case: &Case) {
             let residual = film.mean[i] as f64 - want;
             bias += residual / n;
             squares += residual * residual / n;
-            variance += film.variance[i] as f64 / image.spp as f64;
+            variance += film.variance[i] as f64 / image.image.spp as f64;
             mean += want / n;
         }
         let independent = variance.sqrt() / n;
         let true_error = ((squares - bias * bias).max(0.0) / n).sqrt();
         println!(
             "{what}: want {mean:.6}, bias {bias:+.1e}, standard error {true_error:.1e} ({independent:.1e} if independent), {used} pixels x {} in {:.2} s",
-            image.spp,
+            image.image.spp,
             start.elapsed().as_secs_f64()
         );
         assert!(true_error <= PRECISION, "{what}: standard error {true_error}");
@@ -372,11 +372,17 @@ fn check_exact(device: &Arc<Device>, what: &str, scene: &Scene, camera: &Camera,
     for kind in tracers(device) {
         let tracer = tracer(device, kind, scene);
         let image = render(&tracer, scene, camera, &options);
-        let spp = image.spp as f64;
-        let covered: f64 = image.film.coverage.iter().map(|&c| c as f64 * spp).sum();
+        let spp = image.image.spp as f64;
+        let covered: f64 = image.image.film.coverage.iter().map(|&c| c as f64 * spp).sum();
         // misses of the camera count 0 in the mean
-        let off: f64 =
-            image.film.mean.iter().zip(&image.film.coverage).map(|(m, c)| ((m - c * want).abs() as f64 * spp).round()).sum();
+        let off: f64 = image
+            .image
+            .film
+            .mean
+            .iter()
+            .zip(&image.image.film.coverage)
+            .map(|(m, c)| ((m - c * want).abs() as f64 * spp).round())
+            .sum();
         println!("{what} {kind}: {off} of {covered} samples are not {want}");
         assert!(covered >= 0.25 * options.size[0] as f64 * options.size[1] as f64 * spp, "{what} {kind}: {covered} covered");
         assert!(off <= spare(kind) * 1e-6 * covered, "{what} {kind}: {off} of {covered} samples are not {want}");

@@ -99,7 +99,7 @@ fn picture(tracer: &Tracer, scene: &Scene, what: &dyn std::fmt::Display) {
     for falloff in [1.0, 4.0] {
         let options = AoOptions { size: [16, 16], spp: 2, falloff, ..Default::default() };
         let image = ao::render(tracer, &camera, &options, &mut NoControl).unwrap();
-        let all = image.film.mean.iter().chain(&image.film.variance);
+        let all = image.image.film.mean.iter().chain(&image.image.film.variance);
         assert!(all.clone().all(|x| (0.0..=1.0).contains(x)), "{what} {}: {all:?}", tracer.kind());
     }
     for pixel in aov::render(tracer, &camera, [16, 16], &mut NoControl).unwrap() {
@@ -460,9 +460,15 @@ fn gpu_degenerate_slivers_do_not_meet_themselves() {
                 let image =
                     ao::render(&tracer, &CameraRecord::new(&camera, scene.origin(), 1.0), &options, &mut NoControl).unwrap();
                 // a convex body does not occlude itself
-                let covered: f64 = image.film.coverage.iter().map(|&c| c as f64 * 32.0).sum();
-                let off: f64 =
-                    image.film.mean.iter().zip(&image.film.coverage).map(|(m, c)| ((c - m) as f64 * 32.0).round()).sum();
+                let covered: f64 = image.image.film.coverage.iter().map(|&c| c as f64 * 32.0).sum();
+                let off: f64 = image
+                    .image
+                    .film
+                    .mean
+                    .iter()
+                    .zip(&image.image.film.coverage)
+                    .map(|(m, c)| ((c - m) as f64 * 32.0).round())
+                    .sum();
                 println!("{what}, turned {turn}, {kind}: {off} of {covered} rays meet the body they leave");
                 assert!(covered > 1000.0, "{what} {kind}: {covered} covered");
                 assert!(off == 0.0, "{what}, turned {turn}, {kind}: {off} of {covered} rays meet the body they leave");

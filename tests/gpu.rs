@@ -149,16 +149,16 @@ fn compare_with_oracle(device: &Arc<Device>, what: &str, scene: &Scene, camera: 
     for kind in tracers(device) {
         let tracer = tracer(device, kind, scene);
         let image = render(&tracer, scene, camera, options);
-        assert!(image.film.samples.iter().all(|&s| s == options.spp), "{what} {kind}: samples are missing");
-        let (count, greatest, mean) = differences(&image.film.mean, &want.accessibility, threshold);
-        let (covers, ..) = differences(&image.film.coverage, &want.coverage, 1e-6);
+        assert!(image.image.film.samples.iter().all(|&s| s == options.spp), "{what} {kind}: samples are missing");
+        let (count, greatest, mean) = differences(&image.image.film.mean, &want.accessibility, threshold);
+        let (covers, ..) = differences(&image.image.film.coverage, &want.coverage, 1e-6);
         println!(
             "{what} {kind} and the oracle: {count} of {pixels} pixels differ (at most {greatest:.1e}), {covers} in coverage; means by {mean:+.1e}"
         );
         assert!(count <= allowed && covers <= allowed, "{what} {kind}: {count} pixels differ, {covers} in coverage");
         assert!(mean.abs() <= 1e-4, "{what} {kind}: means differ by {mean}");
         for (other, pixels_of_other) in &images {
-            let (count, greatest, mean) = differences(&image.film.mean, pixels_of_other, threshold);
+            let (count, greatest, mean) = differences(&image.image.film.mean, pixels_of_other, threshold);
             println!(
                 "{what} {kind} and {other}: {count} of {pixels} pixels differ (at most {greatest:.1e}); means by {mean:+.1e}"
             );
@@ -167,7 +167,7 @@ fn compare_with_oracle(device: &Arc<Device>, what: &str, scene: &Scene, camera: 
                 "{what} {kind} and {other}: {count} pixels differ, means by {mean}"
             );
         }
-        images.push((kind, image.film.mean));
+        images.push((kind, image.image.film.mean));
     }
 }
 
@@ -247,25 +247,28 @@ fn gpu_images_of_several_blocks() {
     for kind in tracers(&device) {
         let tracer = tracer(&device, kind, &scene);
         let image = render(&tracer, &scene, camera, &options);
-        assert!(image.film.samples.iter().all(|&s| s == 1), "{kind}: pixels without their sample");
-        let got: Vec<f32> = pixels.iter().map(|&[x, y]| image.film.mean[(y * options.size[0] + x) as usize]).collect();
+        assert!(image.image.film.samples.iter().all(|&s| s == 1), "{kind}: pixels without their sample");
+        let got: Vec<f32> = pixels.iter().map(|&[x, y]| image.image.film.mean[(y * options.size[0] + x) as usize]).collect();
         let (count, ..) = differences(&got, &want, 1e-4);
         println!(
             "{kind}: {count} of {} pixels differ; {} + {} rays, {} skipped, in {:.2} s; the longest launch took {:.3} s",
             pixels.len(),
-            image.primary_rays,
+            image.image.primary_rays,
             image.occlusion_rays,
             image.skipped_rays,
-            image.trace_seconds,
-            image.longest_launch
+            image.image.trace_seconds,
+            image.image.longest_launch
         );
         assert!(count <= pixels.len() / 1000, "{kind}: {count} of {} pixels differ", pixels.len());
-        assert_eq!(image.primary_rays, 3_000_000);
+        assert_eq!(image.image.primary_rays, 3_000_000);
         assert_eq!(image.occlusion_rays + image.skipped_rays, 3_000_000);
         // no time at all: every block still gets one sample, or there would be no image
         let hurried = AoOptions { spp: 4, time_limit: Some(Duration::ZERO), ..options.clone() };
         let image = render(&tracer, &scene, camera, &hurried);
-        assert!(image.stopped_early && image.spp == 1 && image.film.samples.iter().all(|&s| s == 1), "{kind}");
+        assert!(
+            image.image.stopped_early && image.image.spp == 1 && image.image.film.samples.iter().all(|&s| s == 1),
+            "{kind}"
+        );
     }
     assert_validation_clean(&device);
 }
@@ -286,12 +289,12 @@ fn gpu_film_keeps_its_digits() {
     for kind in tracers(&device) {
         let tracer = tracer(&device, kind, &scene);
         let image = render(&tracer, &scene, &camera, &options);
-        let (_, greatest, mean) = differences(&image.film.mean, &want.accessibility, 0.0);
+        let (_, greatest, mean) = differences(&image.image.film.mean, &want.accessibility, 0.0);
         let relative: Vec<f64> =
-            image.film.variance.iter().zip(&want.variance).map(|(a, b)| (*a as f64 / *b as f64 - 1.0).abs()).collect();
+            image.image.film.variance.iter().zip(&want.variance).map(|(a, b)| (*a as f64 / *b as f64 - 1.0).abs()).collect();
         let worst = relative.iter().fold(0.0f64, |a, b| a.max(*b));
         println!("{kind}: means differ by at most {greatest:.1e}, on average {mean:+.1e}; variances by a share of {worst:.1e}");
-        assert!(image.film.samples.iter().all(|&s| s == 20_000));
+        assert!(image.image.film.samples.iter().all(|&s| s == 20_000));
         assert!(want.variance.iter().all(|v| *v > 1e-3));
         assert!(greatest <= 4e-7, "{kind}: means differ by {greatest}");
         assert!(worst <= 1e-4, "{kind}: variances differ by a share of {worst}");
@@ -310,25 +313,25 @@ fn gpu_film_variance_and_seeds() {
         let tracer = tracer(&device, kind, &scene);
         let first = render(&tracer, &scene, camera, &options);
         let (mut mixed, n) = (0, options.spp as f64);
-        for (&m, &v) in first.film.mean.iter().zip(&first.film.variance) {
+        for (&m, &v) in first.image.film.mean.iter().zip(&first.image.film.variance) {
             let m = m as f64;
             assert!((v as f64 - n / (n - 1.0) * m * (1.0 - m)).abs() < 1e-6, "{kind}: mean {m}, variance {v}");
             mixed += (v > 0.0) as u32;
         }
         assert!(mixed > 500, "{kind}: {mixed} pixels with a variance");
         let again = render(&tracer, &scene, camera, &options);
-        assert_eq!(first.film.mean, again.film.mean, "{kind}: the same seed, other bits");
-        assert_eq!(first.film.variance, again.film.variance, "{kind}: the same seed, other bits");
+        assert_eq!(first.image.film.mean, again.image.film.mean, "{kind}: the same seed, other bits");
+        assert_eq!(first.image.film.variance, again.image.film.variance, "{kind}: the same seed, other bits");
         let other = render(&tracer, &scene, camera, &AoOptions { seed: 1, ..options.clone() });
-        let (count, _, mean) = differences(&first.film.mean, &other.film.mean, 1e-3);
-        let (_, error) = first.film.mean_and_error();
+        let (count, _, mean) = differences(&first.image.film.mean, &other.image.film.mean, 1e-3);
+        let (_, error) = first.image.film.mean_and_error();
         println!("{kind}: another seed changes {count} pixels and the mean by {mean:+.1e}, standard error {error:.1e}");
         assert!(count > 500, "{kind}: another seed changes {count} pixels only");
         assert!(mean.abs() < 4.0 * 2f64.sqrt() * error, "{kind}: another seed changes the mean by {mean}");
         // a single sample has no variance, and is 0 or 1
         let single = render(&tracer, &scene, camera, &AoOptions { spp: 1, ..options.clone() });
-        assert!(single.film.variance.iter().all(|&v| v == 0.0));
-        assert!(single.film.mean.iter().all(|&m| m == 0.0 || m == 1.0));
+        assert!(single.image.film.variance.iter().all(|&v| v == 0.0));
+        assert!(single.image.film.mean.iter().all(|&m| m == 0.0 || m == 1.0));
     }
     assert_validation_clean(&device);
 }
@@ -350,12 +353,12 @@ fn gpu_film_does_not_depend_on_batches() {
         let paced =
             render(&tracer, &scene, camera, &AoOptions { time_limit: Some(Duration::from_secs(3600)), ..options.clone() });
         for other in [&kept, &paced] {
-            assert_eq!(whole.film.mean, other.film.mean, "{kind}");
-            assert_eq!(whole.film.variance, other.film.variance, "{kind}");
-            assert_eq!(whole.film.coverage, other.film.coverage, "{kind}");
+            assert_eq!(whole.image.film.mean, other.image.film.mean, "{kind}");
+            assert_eq!(whole.image.film.variance, other.image.film.variance, "{kind}");
+            assert_eq!(whole.image.film.coverage, other.image.film.coverage, "{kind}");
             assert_eq!(whole.occlusion_rays, other.occlusion_rays, "{kind}");
         }
-        assert!(whole.film.mean.iter().any(|m| *m > 0.0) && whole.occlusion_rays > 1000, "{kind}: nothing to see");
+        assert!(whole.image.film.mean.iter().any(|m| *m > 0.0) && whole.occlusion_rays > 1000, "{kind}: nothing to see");
     }
     assert_validation_clean(&device);
 }
@@ -382,7 +385,7 @@ fn gpu_kernels_heed_the_queues_end() {
     let (_, wide) = &images[0];
     assert!(wide.occlusion_rays > 1000 && wide.skipped_rays > 1000, "{} {}", wide.occlusion_rays, wide.skipped_rays);
     for (kernel, image) in &images {
-        let (count, greatest, _) = differences(&wide.film.mean, &image.film.mean, 1e-6);
+        let (count, greatest, _) = differences(&wide.image.film.mean, &image.image.film.mean, 1e-6);
         println!("{kernel:?}: {} occlusion rays, {count} pixels differ, by {greatest} at most", image.occlusion_rays);
         assert!(image.occlusion_rays.abs_diff(wide.occlusion_rays) <= 4, "{kernel:?}: {} rays", image.occlusion_rays);
         // rounding turns a sample here and there
@@ -425,13 +428,17 @@ fn gpu_cover_leaves_out_nothing_that_is_seen() {
                 let tracer = tracer(&device, kind, scene);
                 let whole = render(&tracer, scene, &camera, &options);
                 let image = render(&tracer, scene, &camera, &AoOptions { cover: cover.clone(), ..options.clone() });
-                assert_eq!(whole.film.mean, image.film.mean, "{name} {kind}");
-                assert_eq!(whole.film.coverage, image.film.coverage, "{name} {kind}");
-                assert_eq!(whole.film.samples, image.film.samples, "{name} {kind}");
+                assert_eq!(whole.image.film.mean, image.image.film.mean, "{name} {kind}");
+                assert_eq!(whole.image.film.coverage, image.image.film.coverage, "{name} {kind}");
+                assert_eq!(whole.image.film.samples, image.image.film.samples, "{name} {kind}");
                 assert_eq!(whole.occlusion_rays, image.occlusion_rays, "{name} {kind}");
                 assert_eq!(whole.skipped_rays, image.skipped_rays, "{name} {kind}");
-                assert_eq!(whole.primary_rays, image.primary_rays + image.skipped_primary_rays, "{name} {kind}");
-                assert_eq!(image.skipped_primary_rays > 0, live < all, "{name} {kind}");
+                assert_eq!(
+                    whole.image.primary_rays,
+                    image.image.primary_rays + image.image.skipped_primary_rays,
+                    "{name} {kind}"
+                );
+                assert_eq!(image.image.skipped_primary_rays > 0, live < all, "{name} {kind}");
                 assert!(image.occlusion_rays > 0, "{name} {kind}: nothing to see");
             }
             println!("{name}, orthographic {orthographic}: {live} of {all} tiles");
@@ -458,13 +465,20 @@ fn gpu_time_limit() {
         let start = Instant::now();
         let image = render(&tracer, &scene, &scene.cameras[0], &options);
         let took = start.elapsed();
-        println!("{kind}: {} samples in {took:?}, the longest launch took {:.4} s", image.spp, image.longest_launch);
-        assert!(image.stopped_early && image.spp >= 1 && image.spp < options.spp, "{kind}: {}", image.spp);
-        assert!(image.film.samples.iter().all(|&s| s == image.spp), "{kind}: pixels with other counts");
-        assert_eq!(image.primary_rays, 64 * 64 * image.spp as u64);
+        println!(
+            "{kind}: {} samples in {took:?}, the longest launch took {:.4} s",
+            image.image.spp, image.image.longest_launch
+        );
+        assert!(
+            image.image.stopped_early && image.image.spp >= 1 && image.image.spp < options.spp,
+            "{kind}: {}",
+            image.image.spp
+        );
+        assert!(image.image.film.samples.iter().all(|&s| s == image.image.spp), "{kind}: pixels with other counts");
+        assert_eq!(image.image.primary_rays, 64 * 64 * image.image.spp as u64);
         // generous: the machine may be busy. Compiling counts too
         assert!(took >= limit && took < limit + Duration::from_secs(20), "{kind}: {took:?}");
-        let mean = image.film.mean_and_error().0;
+        let mean = image.image.film.mean_and_error().0;
         assert!((0.2..0.7).contains(&mean), "{kind}: mean {mean}");
     }
     assert_validation_clean(&device);
@@ -499,25 +513,25 @@ fn gpu_interruption_and_progress() {
         let tracer = tracer(&device, kind, &scene);
         let mut control = stopper(9, || Err(Error::Interrupted));
         let result = ao::render(&tracer, &camera, &options, &mut control);
-        assert!(matches!(result, Err(Error::Interrupted)), "{kind}: {:?}", result.map(|r| r.spp));
+        assert!(matches!(result, Err(Error::Interrupted)), "{kind}: {:?}", result.map(|r| r.image.spp));
         // the same through the auxiliary outputs
         let result = aov::render(&tracer, &camera, [64, 64], &mut stopper(1, || Err(Error::Interrupted)));
         assert!(matches!(result, Err(Error::Interrupted)), "{kind}");
         // stop, but keep what there is
         let image = ao::render(&tracer, &camera, &options, &mut stopper(9, || Ok(true))).unwrap();
-        println!("{kind}: stopped after {} samples", image.spp);
-        assert!(image.stopped_early && image.spp >= 1 && image.spp < 800, "{kind}: {}", image.spp);
-        let same = render(&tracer, &scene, &scene.cameras[0], &AoOptions { spp: image.spp, ..options.clone() });
-        assert_eq!(image.film.mean, same.film.mean, "{kind}: not the image of as many samples");
-        assert!(!same.stopped_early);
+        println!("{kind}: stopped after {} samples", image.image.spp);
+        assert!(image.image.stopped_early && image.image.spp >= 1 && image.image.spp < 800, "{kind}: {}", image.image.spp);
+        let same = render(&tracer, &scene, &scene.cameras[0], &AoOptions { spp: image.image.spp, ..options.clone() });
+        assert_eq!(image.image.film.mean, same.image.film.mean, "{kind}: not the image of as many samples");
+        assert!(!same.image.stopped_early);
         // in the midst of the first samples that are taken together: one is finished, or there would be no image
         let image = ao::render(&tracer, &camera, &options, &mut stopper(1, || Ok(true))).unwrap();
-        assert!(image.stopped_early && image.spp == 1, "{kind}: {}", image.spp);
+        assert!(image.image.stopped_early && image.image.spp == 1, "{kind}: {}", image.image.spp);
         let same = render(&tracer, &scene, &scene.cameras[0], &AoOptions { spp: 1, ..options.clone() });
-        assert_eq!(image.film.mean, same.film.mean, "{kind}: not the image of one sample");
+        assert_eq!(image.image.film.mean, same.image.film.mean, "{kind}: not the image of one sample");
         let mut control = stopper(u32::MAX, || Ok(false));
         let image = ao::render(&tracer, &camera, &options, &mut control).unwrap();
-        assert!(!image.stopped_early && image.spp == 800);
+        assert!(!image.image.stopped_early && image.image.spp == 800);
         assert!(control.progress.windows(2).all(|w| w[0].0 <= w[1].0), "{kind}: progress goes back");
         assert_eq!(control.progress.last(), Some(&(64 * 64 * 800, 64 * 64 * 800)), "{kind}");
     }
@@ -765,7 +779,7 @@ fn gpu_kept_rays_are_the_images() {
         let image = render(&tracer, &scene, camera, &options);
         let (primary, occlusion) = (&image.kept_primary, &image.kept_occlusion);
         assert_eq!(primary.len(), pixels.len(), "{kind}");
-        let covered = image.film.coverage.len();
+        let covered = image.image.film.coverage.len();
         println!("{kind}: {} camera rays, {} occlusion rays of {covered} pixels", primary.len(), occlusion.len());
         let wide = |a: [f32; 3]| DVec3::from_array(a.map(f64::from));
         let mut next = 0;

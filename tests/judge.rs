@@ -29,9 +29,9 @@ use skylit::gpu::Device;
 use skylit::integrators::path::{Lens, MOST_DEPTH, PathIntegrator, PathOptions};
 use skylit::output::exr;
 use skylit::scene::builtin::shapes;
+use skylit::scene::light_spec;
 use skylit::scene::load::{load_environment, load_file};
 use skylit::scene::{Environment, Scene};
-use skylit::terminal::lights;
 use skylit::tracer::{Needs, Tracer, TracerKind};
 
 /// Scenes for tracers and drivers of which the shading code is known to be right from another's images: alpha, spheres, instances, walls and volumes that rays go through,
@@ -158,7 +158,7 @@ impl Entry {
             mesh.geometry = shapes::sphere(DVec3::ZERO, 1.0);
         }
         for light in &self.lights {
-            lights::parse(light).unwrap_or_else(|e| panic!("{}: {e}", self.name)).add(&mut scene);
+            light_spec::parse(light).unwrap_or_else(|e| panic!("{}: {e}", self.name)).add(&mut scene);
         }
         scene.environment = match &self.environment {
             None => Environment::Black,

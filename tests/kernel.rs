@@ -334,10 +334,10 @@ fn gpu_kernel_empty_queues() {
                 let camera = CameraRecord::new(&Camera::look_at(eye, towards, DVec3::Y, 0.3), scene.origin(), 1.0);
                 let options = AoOptions { size: [70, 33], spp: 3, falloff, ..Default::default() };
                 let image = ao::render(&tracer, &camera, &options, &mut NoControl).unwrap();
-                let covered = image.film.coverage.iter().filter(|&&c| c > 0.0).count();
+                let covered = image.image.film.coverage.iter().filter(|&&c| c > 0.0).count();
                 assert_eq!(covered > 0, seen, "{kind}: {covered} pixels covered");
                 assert_eq!(image.occlusion_rays > 0, seen, "{kind}: {} occlusion rays", image.occlusion_rays);
-                assert!(seen || image.film.mean.iter().all(|&m| m == 0.0), "{kind}: light where nothing is");
+                assert!(seen || image.image.film.mean.iter().all(|&m| m == 0.0), "{kind}: light where nothing is");
             }
         }
     }

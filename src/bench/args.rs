@@ -7,9 +7,9 @@ use super::common::CommonArgs;
 use super::contestant::OWN;
 use super::path::BenchPathArgs;
 use super::streams::STREAMS;
-use crate::terminal::device_args::BuildChoice;
-use crate::terminal::parse::parse_radius;
+use crate::settings::parse::parse_radius;
 use crate::tracer::BuildOptions;
+use crate::tracer::settings::BuildChoice;
 
 /// Rays of a set, unless said otherwise: an image of 1280x720.
 const DEFAULT_RAYS: u32 = 1280 * 720;

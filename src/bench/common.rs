@@ -12,8 +12,8 @@ use crate::error::{Error, Result};
 use crate::gpu::{self, Device};
 use crate::measure::chart::Picture;
 use crate::output;
+use crate::settings::parse::parse_seconds;
 use crate::terminal::console::Console;
-use crate::terminal::parse::parse_seconds;
 
 /// Options of `skylit bench` that do not depend on what is measured.
 #[derive(Clone, Debug, Args)]

@@ -22,10 +22,10 @@ use crate::measure::plot;
 use crate::measure::stats::{Summary, paired_ratio};
 use crate::ray::Ray;
 use crate::terminal::console::{Console, Failure};
-use crate::terminal::device_args::BuildChoice;
 use crate::terminal::interrupt::{self, ProgressControl};
 use crate::terminal::progress::Progress;
 use crate::tracer::Kernel;
+use crate::tracer::settings::BuildChoice;
 use crate::tracer::visits::VisitCounter;
 
 /// Measures, shows, writes.
@@ -51,7 +51,7 @@ pub fn run(args: &BenchRaysArgs) -> Result<(), Failure> {
             driver: device.info.driver.clone(),
             threads: std::thread::available_parallelism().map_or(1, usize::from),
             repeats: args.repeats(),
-            build: args.build.name(),
+            build: args.build.name().to_owned(),
             ..Default::default()
         },
         laps: (0, 0),

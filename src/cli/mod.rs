@@ -5,12 +5,8 @@ mod args;
 mod diff;
 mod doctor;
 mod export;
-mod film;
-mod frames;
-mod paths;
 mod rays;
 mod render;
-mod report;
 mod scenes;
 
 use std::ffi::OsString;
@@ -49,7 +45,7 @@ struct Cli {
 #[derive(Debug, clap::Subcommand)]
 enum Command {
     /// Render the ambient occlusion of a scene: an image, or frames in real time
-    Render(Box<args::RenderArgs>),
+    Render(Box<render::RenderArgs>),
     /// Trace a raw set of rays against a mesh and report how fast that was
     Rays(args::RaysArgs),
     /// Write a scene as glTF (.glb, .gltf) or as a world-space triangle soup (.bin)

@@ -3,8 +3,6 @@
 use std::io::Write;
 use std::path::Path;
 
-use glam::DVec3;
-
 use super::args::RaysArgs;
 use crate::accel::flatten::FlatScene;
 use crate::error::{Error, Result};
@@ -12,7 +10,7 @@ use crate::gpu::Device;
 use crate::integrators::rays;
 use crate::measure::stats::median;
 use crate::output;
-use crate::ray::Ray;
+use crate::ray::{Ray, translate};
 use crate::scene::{Scene, export, load};
 use crate::terminal::interrupt::{self, ProgressControl};
 use crate::terminal::progress::Progress;
@@ -33,7 +31,7 @@ pub fn run(args: &RaysArgs) -> Result<()> {
     let mut warnings = Warnings::new(console);
     warnings_of(&scene).iter().for_each(|w| warnings.add(w));
     let flat = FlatScene::new(&scene);
-    move_rays(&mut set, -flat.origin);
+    translate(&mut set, -flat.origin);
     let device = Device::open(&args.device.options())?;
     let (kind, _, compute) = args.device.choose(&device.info)?;
     // and once more to warm up
@@ -42,7 +40,7 @@ pub fn run(args: &RaysArgs) -> Result<()> {
     build.take_warnings().iter().for_each(|w| warnings.add(w));
     let stats = tracer.stats();
     let mut control = ProgressControl { progress: Progress::new("tracing", &console), keep_partial: false };
-    let (hits, times) = rays::trace(&tracer, &set, args.mode.into(), args.repeats, &mut control)?;
+    let (hits, times) = rays::trace(&tracer, &set, args.mode, args.repeats, &mut control)?;
     drop(control);
     if let Some(path) = &args.hits {
         output::write_atomically(path, |file| file.write_all(bytemuck::cast_slice(&hits)))?;
@@ -70,7 +68,7 @@ pub fn run(args: &RaysArgs) -> Result<()> {
         "triangle_test": tracer.compute_options().map(|o| o.triangle_test),
         "device": device.info.name,
         "driver": device.info.driver,
-        "mode": rays::Mode::from(args.mode),
+        "mode": args.mode,
         "triangles": scene.triangle_count(),
         "spheres": scene.sphere_count(),
         "rays": set.len(),
@@ -101,13 +99,4 @@ fn read_rays(path: &Path) -> Result<Vec<Ray>> {
         return Err(Error::input(path, message));
     }
     Ok(bytemuck::pod_collect_to_vec(&bytes))
-}
-
-/// Between the world of files and the tracers' coordinates, which differ for a scene far from the origin.
-pub fn move_rays(rays: &mut [Ray], by: DVec3) {
-    if by != DVec3::ZERO {
-        for r in rays {
-            r.origin = (DVec3::from(r.origin.map(f64::from)) + by).as_vec3().to_array();
-        }
-    }
 }

@@ -19,6 +19,11 @@ pub trait Control {
         Ok(())
     }
 
+    /// Something that the user should know and that is no failure, in a line.
+    fn warning(&mut self, text: &str) {
+        let _ = text;
+    }
+
     /// Asked between submissions. `Ok(true)`: stop here and keep what there is; an error (usually
     /// [`crate::Error::Interrupted`]): stop and keep nothing.
     fn should_stop(&mut self) -> Result<bool> {

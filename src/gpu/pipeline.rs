@@ -200,7 +200,9 @@ impl ComputePipeline {
                     .specialization_info(s);
                 let info = [vk::ComputePipelineCreateInfo::default().stage(stage).layout(layout)];
                 // SAFETY: module and layout are of this device
-                unsafe { device.raw.create_compute_pipelines(device.pipeline_cache, &info, None) }.map_err(|e| e.1).context(name)
+                unsafe { device.raw.create_compute_pipelines(device.pipeline_cache, &info, None) }
+                    .map_err(|e| e.1)
+                    .context(name)
             })?[0];
             device.name(pipeline.raw, name);
             Ok(pipeline)
@@ -272,7 +274,8 @@ impl RayTracingPipeline {
         let functions =
             device.pipelines.as_ref().ok_or_else(|| Error::Device("the device has no VK_KHR_ray_tracing_pipeline".into()))?;
         let optional = shared.triangle_any.into_iter().chain(shared.sphere.into_iter().flatten());
-        let key = Key::new([raygen, shared.miss, shared.triangle_closest].into_iter().chain(optional), specialization, u32::MAX)?;
+        let key =
+            Key::new([raygen, shared.miss, shared.triangle_closest].into_iter().chain(optional), specialization, u32::MAX)?;
         device.live.get(key, || Self::compile(device, functions, name, raygen, shared, specialization)).map(Self)
     }
 
@@ -371,8 +374,9 @@ impl Table {
         let limits = &pipeline.device.info.limits;
         let size = limits.shader_group_handle_size as usize;
         // SAFETY: the pipeline has this many groups
-        let handles = unsafe { functions.get_ray_tracing_shader_group_handles(pipeline.raw, 0, groups, size * groups as usize) }
-            .context("the shader group handles")?;
+        let handles =
+            unsafe { functions.get_ray_tracing_shader_group_handles(pipeline.raw, 0, groups, size * groups as usize) }
+                .context("the shader group handles")?;
         let base = limits.shader_group_base_alignment as u64;
         let stride = (size as u64).next_multiple_of(limits.shader_group_handle_alignment as u64);
         let regions = [1u64, 1, groups as u64 - 2];
@@ -406,4 +410,3 @@ impl Table {
         Ok(Self { raygen: region(0, sizes[0]), miss: region(1, stride), hit: region(2, stride), _buffer: table })
     }
 }
-

@@ -2,6 +2,7 @@
 
 use crate::shaders;
 use bytemuck::{Pod, Zeroable};
+use glam::DVec3;
 
 use crate::error::Result;
 use crate::film::Control;
@@ -9,8 +10,39 @@ use crate::film::block::{Block, BlockParams};
 use crate::film::camera::CameraRecord;
 use crate::film::pace::{MOST, Pace};
 use crate::gpu::{Buffer, Commands, Memory};
+use crate::output::{Channel, Samples};
 use crate::raster::{Primary, Raster, View};
+use crate::settings::choices;
 use crate::tracer::{Push, Stream, Tracer};
+
+choices! {
+    /// An auxiliary output.
+    pub enum Aov {
+        /// Distance along the ray: depth.Z
+        Depth = "depth",
+        /// World position: position.X, .Y, .Z
+        Position = "position",
+        /// Geometric normal: Ng.X, .Y, .Z
+        Ng = "ng",
+        /// Shading normal: Ns.X, .Y, .Z
+        Ns = "ns",
+        /// Indices: id.instance, id.primitive, id.material
+        Ids = "ids",
+        /// Base colour: albedo.R, .G, .B
+        Albedo = "albedo",
+        /// Bent normal, of frames in real time: bent.X, .Y, .Z
+        Bent = "bent",
+        /// All of these but the bent normal
+        All = "all",
+    }
+}
+
+impl Aov {
+    /// Is this one among those that are wanted?
+    pub fn among(self, wanted: &[Aov]) -> bool {
+        wanted.contains(&self) || self != Aov::Bent && wanted.contains(&Aov::All)
+    }
+}
 
 /// Where hits come from.
 enum Source {
@@ -124,4 +156,43 @@ pub fn visit(
         }
     }
     tracer.check_finished()
+}
+
+/// Auxiliary outputs as channels of an image. `origin`: of the tracers' scene, in the file's world.
+pub fn channels(wanted: &[Aov], pixels: &[AovPixel], origin: DVec3) -> Vec<Channel> {
+    let wants = |aov: Aov| aov.among(wanted);
+    let mut out = Vec::new();
+    let plane = |name: &str, f: &dyn Fn(&AovPixel) -> f32| Channel {
+        name: name.into(),
+        samples: Samples::F32(pixels.iter().map(f).collect()),
+    };
+    let ids = |name: &str, f: &dyn Fn(&AovPixel) -> u32| Channel {
+        name: name.into(),
+        samples: Samples::U32(pixels.iter().map(f).collect()),
+    };
+    if wants(Aov::Depth) {
+        out.push(plane("depth.Z", &|p| p.depth));
+    }
+    for (k, axis) in ["X", "Y", "Z"].into_iter().enumerate() {
+        if wants(Aov::Position) {
+            out.push(plane(&format!("position.{axis}"), &|p| (f64::from(p.position[k]) + origin[k]) as f32));
+        }
+        if wants(Aov::Ng) {
+            out.push(plane(&format!("Ng.{axis}"), &|p| p.ng[k]));
+        }
+        if wants(Aov::Ns) {
+            out.push(plane(&format!("Ns.{axis}"), &|p| p.ns[k]));
+        }
+    }
+    if wants(Aov::Ids) {
+        out.push(ids("id.instance", &|p| p.instance));
+        out.push(ids("id.primitive", &|p| p.primitive));
+        out.push(ids("id.material", &|p| p.material));
+    }
+    if wants(Aov::Albedo) {
+        out.push(plane("albedo.R", &|p| p.red));
+        out.push(plane("albedo.G", &|p| p.green));
+        out.push(plane("albedo.B", &|p| p.blue));
+    }
+    out
 }

@@ -102,7 +102,6 @@ fn agx(c: Rgb) -> Rgb {
 mod tests {
     use super::*;
 
-
     #[test]
     fn grey_stays_grey_and_brighter_stays_brighter() {
         for map in ToneMap::ALL {

@@ -8,6 +8,7 @@
 mod bent;
 mod budget;
 pub mod display;
+pub mod frame_settings;
 mod images;
 mod larsen;
 pub(super) mod params;

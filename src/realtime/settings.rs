@@ -1,10 +1,10 @@
 //! How the frames of a real-time renderer are made, and the presets that people choose from.
 
-use crate::settings::choices;
 use crate::error::{Error, Result};
 use crate::integrators::ao::{FALLOFF_CUTOFF, Hemisphere};
 use crate::raster::Primary;
 use crate::sampling::Sequence;
+use crate::settings::choices;
 
 choices! {
     /// How a pixel's ambient visibility is estimated.
@@ -49,11 +49,11 @@ choices! {
 
 choices! {
     /// Spatial filter of a frame. Its radius follows from how many samples a pixel has.
-    pub enum FilterKind {
-        /// Edge-aware box filter; fewer samples, larger radius
-        Box = "box",
+    pub enum FilterKind (default Box) {
         /// No spatial filter
         None = "none",
+        /// Edge-aware box filter; fewer samples, larger radius
+        Box = "box",
         /// Edge-aware box filter, separable
         Separable = "separable",
         /// Edge-aware a-trous filter
@@ -209,15 +209,15 @@ impl Settings {
 
 choices! {
     /// Settings by name.
-    pub enum Preset {
-        /// 1 ray per pixel, long history
-        Balanced = "balanced",
+    pub enum Preset (default Balanced) {
         /// The pipeline of Larsen (2019): half resolution, 64 rays, box filter, history weight 0.5
         Larsen = "larsen",
         /// The same ray budget, with correct sampling, reprojection and filter
         LarsenFixed = "larsen-fixed",
         /// 1 ray per pixel, short history, small filter
         Fast = "fast",
+        /// 1 ray per pixel, long history
+        Balanced = "balanced",
         /// 4 rays per pixel, longer history, wider filter
         Quality = "quality",
         /// 1024 rays per pixel, no history

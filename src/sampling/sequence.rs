@@ -4,45 +4,34 @@
 //! Integer arithmetic, mirrored bit for bit by shaders/common/sequence.glsl.
 
 use super::sobol::{AO_DIRECTION, Sampler, hash_combine, owen_scramble, sobol_2d, to_unit};
+use crate::settings::choices;
 
-/// A sequence of points in the unit square, for each pixel and frame.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, serde::Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Sequence {
-    /// Independent random numbers.
-    White,
-    /// Sixteen samples in a row, over pixels' frames, visit each cell of a 4 x 4 grid once.
-    Stratified,
-    /// Each pixel has an Owen-scrambled Sobol sequence of its own, which frames continue (Burley 2020).
-    Sobol,
-    /// One Owen-scrambled Sobol sequence over the image, in the order of a shuffled Morton curve: what an aligned square of pixels
-    /// draws is a net, so that filtering it leaves little error (Ahmed and Wonka, "Screen-Space Blue-Noise Diffusion of Monte Carlo
-    /// Sampling Error via Hierarchical Ordering of Pixels", ACM TOG 39(6), 2020). From frame to frame all points are shifted by
-    /// Roberts' R2 sequence.
-    #[default]
-    Blue,
-    /// Each pixel shifts Roberts' R2 sequence at random: "The Unreasonable Effectiveness of Quasirandom Sequences", 2018.
-    R2,
+choices! {
+    /// A sequence of points in the unit square, for each pixel and frame.
+    ///
+    /// `Stratified`: sixteen samples in a row, over a pixel's frames, visit each cell of the grid once. `Sobol`: each pixel has a sequence of its own, which
+    /// frames continue (Burley 2020). `Blue`: one sequence over the image, in the order of a shuffled Morton curve: the samples of an aligned
+    /// square of pixels are a net, so that filtering it leaves little error (Ahmed and Wonka, "Screen-Space Blue-Noise Diffusion of Monte Carlo
+    /// Sampling Error via Hierarchical Ordering of Pixels", ACM TOG 39(6), 2020); from frame to frame all points are shifted by Roberts' R2 sequence ("The
+    /// Unreasonable Effectiveness of Quasirandom Sequences", 2018).
+    pub enum Sequence (default Blue) {
+        /// Independent random numbers
+        White = "white",
+        /// Jittered on a 4x4 grid
+        Stratified = "stratified",
+        /// Owen-scrambled Sobol, one sequence per pixel
+        Sobol = "sobol",
+        /// Owen-scrambled Sobol over the image: blue-noise error
+        Blue = "blue",
+        /// R2 sequence (Roberts), Cranley-Patterson rotation per pixel
+        R2 = "r2",
+    }
 }
 
 /// 2^32 / g and 2^32 / g^2, where g^3 = g + 1.
 const R2_STEP: [u32; 2] = [3_242_174_889, 2_447_445_414];
 
 impl Sequence {
-    /// All of them.
-    pub const ALL: [Sequence; 5] = [Sequence::White, Sequence::Stratified, Sequence::Sobol, Sequence::Blue, Sequence::R2];
-
-    /// As on the command line.
-    pub fn name(self) -> &'static str {
-        match self {
-            Sequence::White => "white",
-            Sequence::Stratified => "stratified",
-            Sequence::Sobol => "sobol",
-            Sequence::Blue => "blue",
-            Sequence::R2 => "r2",
-        }
-    }
-
     /// How evenly the samples that a pixel takes one after the other fill the square: the mean of n of them, of something smooth, has a
     /// variance that falls as n to the power of minus 1 and this. Measured (docs/realtime.md).
     pub fn evenness(self) -> f32 {

@@ -11,6 +11,7 @@ pub mod camera_path;
 pub mod export;
 pub mod fingerprint;
 pub mod light;
+pub mod light_spec;
 pub mod load;
 pub mod material;
 pub mod mesh;

@@ -21,6 +21,24 @@ impl From<Error> for Failure {
     }
 }
 
+/// How results are shown.
+#[derive(Clone, Copy, Debug, clap::Args)]
+pub struct Verbosity {
+    /// Print one JSON record on stdout instead of text
+    #[arg(long)]
+    pub json: bool,
+    /// Print nothing but errors
+    #[arg(long, short)]
+    pub quiet: bool,
+}
+
+impl Verbosity {
+    /// Where to say things.
+    pub fn console(&self) -> Console {
+        Console { json: self.json, quiet: self.quiet }
+    }
+}
+
 /// How much a command says.
 #[derive(Clone, Copy, Debug)]
 pub struct Console {

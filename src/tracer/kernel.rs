@@ -4,33 +4,28 @@ use crate::accel::BuildPreset;
 use crate::accel::cache::Cache;
 use crate::accel::flatten::FlatScene;
 use crate::gpu::DeviceInfo;
+use crate::settings::choices;
 use crate::shaders::StreamShaders;
 
-/// How the compute tracer finds what a ray meets. All give the same hits; docs/traversal.md compares their speed.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, serde::Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Kernel {
-    /// `Packet` for coherent streams where the device can, else `Wide`.
-    #[default]
-    Auto,
-    /// Seven-wide quantised nodes, one ray a lane, lanes that refill: `shaders/trace/wide.glsl`.
-    Wide,
-    /// The same nodes, the rays of a subgroup together: `shaders/trace/packet.glsl`. Streams that come from a queue, and devices
-    /// without 64-bit integers or subgroups of eight lanes, are traced by `Wide`.
-    Packet,
-    /// The readable one: binary nodes, the child whose box is entered first comes first: `shaders/trace/reference.glsl`.
-    Nearest,
-    /// As `Nearest`, but the sign of the ray's direction on the node's axis says which child comes first.
-    Direction,
-    /// No tree, every primitive of every instance: `shaders/trace/brute.glsl`. For scenes of at most [`Kernel::BRUTE_MOST`].
-    Brute,
+choices! {
+    /// How the compute tracer finds what a ray meets. All give the same hits; docs/traversal.md compares their speed.
+    pub enum Kernel {
+        /// seven-wide nodes; packets for coherent rays, else each ray by itself
+        Auto = "auto",
+        /// seven-wide nodes, each ray by itself
+        Wide = "wide",
+        /// seven-wide nodes, the rays of a subgroup together
+        Packet = "packet",
+        /// binary nodes, the nearest child first
+        Nearest = "nearest",
+        /// binary nodes, children in the order of the ray's direction on the split axis
+        Direction = "direction",
+        /// every primitive of every instance, no hierarchy
+        Brute = "brute",
+    }
 }
 
 impl Kernel {
-    /// All of them.
-    pub const ALL: [Kernel; 6] =
-        [Kernel::Auto, Kernel::Wide, Kernel::Packet, Kernel::Nearest, Kernel::Direction, Kernel::Brute];
-
     /// Primitives, each instance's counted, and instances that [`Kernel::Brute`] takes at most together. Mesa before 23 leaves
     /// a loop after 65,535 turns; and a launch of the fewest rays should not stall a device for long.
     pub const BRUTE_MOST: usize = 40_000;
@@ -38,18 +33,6 @@ impl Kernel {
     /// What [`Kernel::Brute`] goes through for each ray of a scene: primitives, each instance's counted, and instances.
     pub fn brute_tests(flat: &FlatScene) -> usize {
         flat.placements.iter().map(|p| flat.groups[p.group].primitive_count + 1).sum()
-    }
-
-    /// As on the command line.
-    pub fn name(self) -> &'static str {
-        match self {
-            Kernel::Auto => "auto",
-            Kernel::Wide => "wide",
-            Kernel::Packet => "packet",
-            Kernel::Nearest => "nearest",
-            Kernel::Direction => "direction",
-            Kernel::Brute => "brute",
-        }
     }
 
     /// What traces coherent streams on a device. A packet has many more turns than a ray and no bound on them: where drivers cut
@@ -62,50 +45,15 @@ impl Kernel {
             other => other,
         }
     }
-
-    /// What it does, in half a line.
-    pub fn describe(self) -> &'static str {
-        match self {
-            Kernel::Auto => "seven-wide nodes; packets for coherent rays, else each ray by itself",
-            Kernel::Wide => "seven-wide nodes, each ray by itself",
-            Kernel::Packet => "seven-wide nodes, the rays of a subgroup together",
-            Kernel::Nearest => "binary nodes, the nearest child first",
-            Kernel::Direction => "binary nodes, children in the order of the ray's direction on the split axis",
-            Kernel::Brute => "every primitive of every instance, no hierarchy",
-        }
-    }
 }
 
-impl std::fmt::Display for Kernel {
-    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
-        f.write_str(self.name())
-    }
-}
-
-/// The compute tracer's test of a ray against a triangle.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, serde::Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum TriangleTest {
-    /// Woop, Benthin, Wald (JCGT 2013): no ray slips between triangles that share an edge.
-    #[default]
-    Watertight,
-    /// Moeller and Trumbore (JGT 1997): for benchmarks. Rays slip through edges.
-    MollerTrumbore,
-}
-
-impl TriangleTest {
-    /// As on the command line.
-    pub fn name(self) -> &'static str {
-        match self {
-            TriangleTest::Watertight => "watertight",
-            TriangleTest::MollerTrumbore => "moller-trumbore",
-        }
-    }
-}
-
-impl std::fmt::Display for TriangleTest {
-    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
-        f.write_str(self.name())
+choices! {
+    /// The compute tracer's test of a ray against a triangle.
+    pub enum TriangleTest {
+        /// Watertight (Woop, Benthin, Wald 2013): no ray slips between triangles that share an edge
+        Watertight = "watertight",
+        /// Moeller-Trumbore (1997), for benchmarks: not watertight
+        MollerTrumbore = "moller-trumbore",
     }
 }
 

@@ -18,6 +18,7 @@ mod motion;
 mod prepared;
 pub mod queue;
 mod reference;
+pub mod settings;
 pub(crate) mod shading;
 pub mod stream;
 pub mod visits;
@@ -30,6 +31,7 @@ pub use drawable::Drawable;
 pub use dynamic::{Changes, MeshChange, Moved, UpdateStats};
 pub use gpu_scene::Needs;
 pub use kernel::{BuildOptions, ComputeOptions, Kernel, TriangleTest};
+pub use settings::{BuildChoice, DeviceSettings, TracerChoice};
 pub use stream::{Push, Stream};
 
 use crate::accel::features::SceneFeatures;

@@ -92,9 +92,14 @@ fn gpu_films_of_ambient_occlusion_go_on_too() {
             ao::render(&tracer, &record, &AoOptions { size, spp, film, ..Default::default() }, &mut NoControl).unwrap()
         };
         let whole = image(16, None);
-        let [first, second] = [image(3, None), image(7, image(3, None).state)];
-        let last = image(16, second.state.clone());
-        assert!(last.state.is_some() && last.state == whole.state && last.film.mean == whole.film.mean, "{kind}");
+        let [first, second] = [image(3, None), image(7, image(3, None).image.state)];
+        let last = image(16, second.image.state.clone());
+        assert!(
+            last.image.state.is_some()
+                && last.image.state == whole.image.state
+                && last.image.film.mean == whole.image.film.mean,
+            "{kind}"
+        );
         let rays = first.occlusion_rays + second.occlusion_rays + last.occlusion_rays;
         assert_eq!(rays, whole.occlusion_rays, "{kind}");
     }

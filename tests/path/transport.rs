@@ -95,12 +95,13 @@ fn gpu_one_bounce_under_a_white_sky_is_ambient_occlusion() {
             ao::render(&tracer, &record, &AoOptions { size, spp: 256, ..Default::default() }, &mut NoControl).unwrap();
         let options = PathOptions { size, spp: 256, seed: 8, max_depth: 1, white_sky: Some(0.5), ..Default::default() };
         let sky = render(&tracer, &flat, &options).image.film;
-        let error: f64 =
-            (0..occlusion.film.mean.len()).map(|k| f64::from(occlusion.film.mean[k] - sky.mean[3 * k]).powi(2)).sum::<f64>();
-        let rmse = (error / occlusion.film.mean.len() as f64).sqrt();
+        let error: f64 = (0..occlusion.image.film.mean.len())
+            .map(|k| f64::from(occlusion.image.film.mean[k] - sky.mean[3 * k]).powi(2))
+            .sum::<f64>();
+        let rmse = (error / occlusion.image.film.mean.len() as f64).sqrt();
         println!("{kind}: rmse {rmse}");
         assert!(rmse < 0.03, "{kind}: {rmse}");
-        let (a, b) = (occlusion.film.mean_and_error(), sky.mean_and_error());
+        let (a, b) = (occlusion.image.film.mean_and_error(), sky.mean_and_error());
         assert!((a.0 - b.0).abs() < 4.5 * (a.1 * a.1 + 3.0 * b.1 * b.1).sqrt(), "{kind}: {a:?} and {b:?}");
         // more bounces, more light
         let more = render(&tracer, &flat, &PathOptions { max_depth: 20, ..options }).image.film.mean_and_error().0;

@@ -5,9 +5,9 @@ use clap::{Args, ValueEnum};
 use super::candidates::{CANDIDATES, Candidate, Occlusion};
 use crate::bench::common::CommonArgs;
 use crate::error::Result;
-use crate::terminal::device_args::{BuildChoice, TracerChoice};
-use crate::terminal::parse::parse_size;
+use crate::settings::parse::parse_size;
 use crate::tracer::BuildOptions;
+use crate::tracer::settings::{BuildChoice, TracerChoice};
 
 /// Pixels, unless said otherwise.
 const DEFAULT_SIZE: [u32; 2] = [640, 360];

@@ -6,9 +6,9 @@ use std::time::Duration;
 use clap::{Args, ValueHint};
 
 use crate::bench::common::CommonArgs;
-use crate::terminal::device_args::{BuildChoice, TracerChoice};
-use crate::terminal::parse::{parse_seconds, parse_size};
-use crate::terminal::sampling::Sampling;
+use crate::integrators::path::Strategy;
+use crate::settings::parse::{parse_seconds, parse_size};
+use crate::tracer::settings::{BuildChoice, TracerChoice};
 
 /// Pixels, unless said otherwise.
 const DEFAULT_SIZE: [u32; 2] = [256, 256];
@@ -33,7 +33,7 @@ pub struct BenchPathArgs {
     pub scenes: Vec<String>,
     /// Sampling strategies of our own, separated by commas [default: all]
     #[arg(long, value_enum, value_name = "LIST", value_delimiter = ',')]
-    pub strategies: Vec<Sampling>,
+    pub strategies: Vec<Strategy>,
     /// Image size in pixels [default: 256x256; 64x64 with --quick]
     #[arg(long, value_name = "WxH", value_parser = parse_size)]
     pub size: Option<[u32; 2]>,
@@ -86,8 +86,8 @@ impl BenchPathArgs {
     }
 
     /// Strategies of our own, in the order in which they are listed.
-    pub fn strategies(&self) -> Vec<Sampling> {
-        let all = [Sampling::Mis, Sampling::Light, Sampling::Bsdf, Sampling::Cosine, Sampling::Uniform];
+    pub fn strategies(&self) -> Vec<Strategy> {
+        let all = [Strategy::Mis, Strategy::Light, Strategy::Bsdf, Strategy::Cosine, Strategy::Uniform];
         all.into_iter().filter(|s| self.strategies.is_empty() || self.strategies.contains(s)).collect()
     }
 }

@@ -207,8 +207,8 @@ impl<'a> Bench<'a> {
         drop(referee);
         let mut entries: Vec<Entry> = Vec::new();
         for strategy in args.strategies() {
-            let engine = own(strategy.into())?;
-            let name = format!("{strategy:?}").to_lowercase();
+            let engine = own(strategy)?;
+            let name = strategy.name().to_owned();
             entries.push(Entry { name, truth: 0, engine, laps: Vec::new(), biases: Vec::new(), longest_launch: None });
         }
         let mut baseline = entries.first().map(|e| e.name.clone());

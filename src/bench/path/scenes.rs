@@ -10,9 +10,9 @@ use crate::bench::scenes::{check_there, folder, is_file};
 use crate::error::Result;
 use crate::film::camera::{self, Choice};
 use crate::scene::builtin::shapes;
+use crate::scene::light_spec;
 use crate::scene::material::MaterialKind;
 use crate::scene::{Camera, Environment, EnvironmentMap, Instance, Material, Mesh, Scene, load};
-use crate::terminal::lights;
 
 /// The map with a sun in it, below the folder of shared scenes.
 const SUN_MAP: &str = "env/spruit_sunrise_1k.hdr";
@@ -114,7 +114,7 @@ pub fn load(source: &str, args: &BenchPathArgs, aspect: f64) -> Result<Subject> 
     if dark || args.environment.is_some() {
         scene.environment = Environment::Map(map(args)?);
     }
-    if let Some(Ok(light)) = known.and_then(|k| k.light).map(lights::parse) {
+    if let Some(Ok(light)) = known.and_then(|k| k.light).map(light_spec::parse) {
         light.add(&mut scene);
     }
     let choice = match known.and_then(|k| k.view) {
@@ -202,7 +202,7 @@ mod tests {
     #[test]
     fn lights_of_known_scenes_are_lights() {
         for light in KNOWN.iter().filter_map(|k| k.light) {
-            assert!(lights::parse(light).is_ok(), "{light}");
+            assert!(light_spec::parse(light).is_ok(), "{light}");
         }
     }
 

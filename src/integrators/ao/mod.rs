@@ -5,25 +5,29 @@
 //! not exist costs nothing, neighbouring rays belong to one pixel, and sums do not depend on launch sizes.
 
 use crate::settings::choices;
+mod report;
+pub mod settings;
+
 use crate::shaders::{self, StreamShaders};
 use std::sync::Arc;
 use std::time::Duration;
 
+use super::{Integrator, IntegratorSettings, PictureOptions, Rendered, Shot};
+use crate::accel::flatten::FlatScene;
 use crate::error::Result;
 use crate::film::Control;
-use crate::film::Film;
-use crate::film::accumulate::{Estimator, Plan, accumulate, most_rays};
+use crate::film::accumulate::{Accumulated, Estimator, Plan, accumulate, most_rays};
 use crate::film::block::BlockParams;
 use crate::film::camera::CameraRecord;
-use crate::film::convergence::TileCount;
 use crate::film::cover::Cover;
 use crate::film::schedule::FilmOptions;
-use crate::film::state::FilmState;
 use crate::gpu::{Buffer, Commands, ComputePipeline, Device, Memory, Timing};
+use crate::output::Image;
 use crate::ray::Ray;
+use crate::scene::Scene;
 use crate::tracer::queue::RayQueue;
 
-use crate::tracer::{Push, Stream, Tracer};
+use crate::tracer::{Needs, Push, Stream, Tracer};
 
 /// A hit whose falloff is below this is not looked for: half a step of an 8-bit image.
 pub const FALLOFF_CUTOFF: f64 = 1.0 / 510.0;
@@ -95,35 +99,110 @@ impl AoOptions {
     }
 }
 
+/// Ambient occlusion: the fraction of the cosine-weighted hemisphere over a point that is open.
+pub struct AmbientOcclusion;
+
+impl AmbientOcclusion {
+    fn options(shot: &Shot) -> AoOptions {
+        let ao = &shot.settings.ao;
+        AoOptions {
+            size: shot.size,
+            spp: shot.spp,
+            seed: shot.seed,
+            radius: ao.radius(),
+            falloff: ao.ao_falloff.unwrap_or(1.0),
+            hemisphere: ao.hemisphere(),
+            time_limit: shot.time_limit,
+            keep_rays: shot.keep_rays,
+            cover: None,
+            film: shot.film.clone(),
+        }
+    }
+}
+
+impl Integrator for AmbientOcclusion {
+    fn name(&self) -> &'static str {
+        "ao"
+    }
+
+    fn help(&self) -> &'static str {
+        "Ambient occlusion"
+    }
+
+    fn channels(&self) -> &'static [&'static str] {
+        &["Y"]
+    }
+
+    fn quantity(&self) -> &'static str {
+        "ambient visibility"
+    }
+
+    fn flatten<'s>(&self, scene: &'s Scene) -> Result<FlatScene<'s>> {
+        Ok(FlatScene::new(scene))
+    }
+
+    fn needs(&self, settings: &IntegratorSettings) -> Needs {
+        Needs { normals: settings.ao.hemisphere() == Hemisphere::Shading, ..Default::default() }
+    }
+
+    fn streams(&self, settings: &IntegratorSettings) -> Vec<&'static StreamShaders> {
+        let falloff = settings.ao.ao_falloff.unwrap_or(1.0);
+        streams(&AoOptions { falloff, ..Default::default() }).to_vec()
+    }
+
+    /// A camera ray and an occlusion ray.
+    fn rays_per_sample(&self) -> u64 {
+        2
+    }
+
+    /// A dump of rays is a set to compare with: all of them.
+    fn skips_empty_tiles(&self, shot: &Shot) -> bool {
+        !shot.keep_rays
+    }
+
+    fn sees_environment(&self) -> bool {
+        false
+    }
+
+    fn identity(&self, shot: &Shot) -> Vec<(&'static str, Option<String>)> {
+        // no `..`: a new option has to be put where it belongs
+        let AoOptions { size: _, spp: _, time_limit: _, keep_rays: _, cover: _, film: _, seed: _, radius, falloff, hemisphere } =
+            Self::options(shot);
+        vec![
+            ("ao.radius", Some(radius.to_string())),
+            ("ao.falloff", Some(falloff.to_string())),
+            ("ao.normal", Some(hemisphere.to_string())),
+        ]
+    }
+
+    fn render(
+        &self,
+        tracer: &Tracer,
+        flat: &FlatScene,
+        shot: &Shot,
+        cover: Option<Arc<Cover>>,
+        control: &mut dyn Control,
+    ) -> Result<Rendered> {
+        let options = AoOptions { cover, ..Self::options(shot) };
+        let result = render(tracer, &shot.camera_record(flat), &options, control)?;
+        let report = report::report(&options, &result);
+        Ok(Rendered { image: result.image, report, kept_rays: [result.kept_primary, result.kept_occlusion] })
+    }
+
+    fn picture(&self, image: &Image, _: &PictureOptions) -> Image {
+        image.clone()
+    }
+}
+
 /// An image and how it came about.
 #[derive(Clone, Debug, Default)]
 pub struct AoResult {
-    /// The image.
-    pub film: Film,
-    /// Its sums, where they are to be kept.
-    pub state: Option<FilmState>,
-    /// Tiles that know enough, where there is a target.
-    pub converged: Option<TileCount>,
-    /// Samples that every pixel got.
-    pub spp: u32,
-    /// Samples that any pixel got at most.
-    pub most_spp: u32,
-    /// Stopped before all samples were taken.
-    pub stopped_early: bool,
-    /// Camera rays traced.
-    pub primary_rays: u64,
-    /// Camera rays not traced because nothing is in their tile of the image.
-    pub skipped_primary_rays: u64,
+    /// The image and the work of its camera rays.
+    pub image: Accumulated,
     /// Occlusion rays traced.
     pub occlusion_rays: u64,
     /// Occlusion rays not traced because there is no surface that they could start from.
     pub skipped_rays: u64,
-    /// Device seconds of each step of each pass, `"PASS STEP"`; of a pass that is one shader, `"PASS"`.
-    pub device_seconds: Vec<(&'static str, f64)>,
-    /// Longest launch, device seconds.
-    pub longest_launch: f64,
-    /// Seconds of the trace loop, compiling included.
-    pub trace_seconds: f64,
     /// Camera rays of the first sample, when asked for.
     pub kept_primary: Vec<Ray>,
     /// Occlusion rays of the first sample, when asked for.
@@ -188,23 +267,7 @@ pub fn render(tracer: &Tracer, camera: &CameraRecord, options: &AoOptions, contr
     let [kept_primary, kept_occlusion] = estimator.kept;
     let occlusion_rays = image.covered;
     let skipped_rays = image.primary_rays + image.skipped_primary_rays - occlusion_rays;
-    Ok(AoResult {
-        film: image.film,
-        state: image.state,
-        converged: image.converged,
-        spp: image.spp,
-        most_spp: image.most_spp,
-        stopped_early: image.stopped_early,
-        primary_rays: image.primary_rays,
-        skipped_primary_rays: image.skipped_primary_rays,
-        occlusion_rays,
-        skipped_rays,
-        device_seconds: image.device_seconds,
-        longest_launch: image.longest_launch,
-        trace_seconds: image.trace_seconds,
-        kept_primary,
-        kept_occlusion,
-    })
+    Ok(AoResult { image, occlusion_rays, skipped_rays, kept_primary, kept_occlusion })
 }
 
 fn ray_buffer(device: &Arc<Device>, rays: u32) -> Result<Buffer> {

@@ -7,10 +7,13 @@
 
 mod environment;
 mod features;
+pub mod kinds;
 mod light_tree;
 mod lights;
 mod media;
 mod params;
+mod report;
+pub mod settings;
 
 use crate::settings::choices;
 use crate::shaders::{self, StreamShaders};

@@ -1,23 +1,11 @@
-//! Films that are put down and taken up again, saved on their way, and stopped where they are good enough.
+//! Films that are put down in an image file and taken up again: their sums, and what has to agree.
 
-pub mod args;
-mod report;
+use std::path::Path;
 
-use std::ffi::OsString;
-use std::path::{Path, PathBuf};
-
-pub use report::{Told, tell};
-
-use super::args::RenderArgs;
 use crate::error::{Error, Result};
-use crate::film::Control;
-use crate::film::accumulate::Accumulated;
 use crate::film::record_words;
-use crate::film::schedule::FilmOptions;
 use crate::film::state::{FilmState, words};
 use crate::output::{self, Channel, Image, Samples};
-use crate::scene::RenderHints;
-use crate::terminal::interrupt::ProgressControl;
 
 /// The layer that holds a film's sums.
 const LAYER: &str = "state";
@@ -29,59 +17,6 @@ pub type Identity = Vec<(&'static str, Option<String>)>;
 
 /// What made an image: its tracer and its device.
 pub type Maker = [(&'static str, String); 2];
-
-/// Text attributes of an image. Nothing in it differs between two runs of the same command.
-pub fn metadata(args: &RenderArgs, spp: String, maker: &Maker, identity: &Identity) -> Vec<(String, String)> {
-    let mut out = vec![("scene", args.scene.clone()), ("spp", spp)];
-    out.extend(maker.iter().cloned());
-    out.extend(identity.iter().filter_map(|(key, value)| Some((*key, value.clone()?))));
-    if let Some(target) = args.film.target_rmse {
-        out.push(("target_rmse", target.to_string()));
-    }
-    out.into_iter().map(|(k, v)| (k.to_owned(), v)).collect()
-}
-
-/// Samples per pixel: the fewest and the most.
-pub fn spp_text(least: u32, most: u32) -> String {
-    if least == most { most.to_string() } else { format!("{least} to {most}") }
-}
-
-/// What a film is to do, as the options say, with a film that it starts from. A scene names samples of its own at which it wants to be saved.
-pub fn options(args: &RenderArgs, hints: &RenderHints, spp: u32, start: Option<FilmState>) -> FilmOptions {
-    let mut intervals: Vec<u32> = match args.film.intervals {
-        true => (0..u32::BITS).map(|k| 1 << k).chain(hints.save_intervals.iter().copied()).collect(),
-        false => Vec::new(),
-    };
-    intervals.retain(|&n| n > 0 && n < spp);
-    intervals.sort_unstable();
-    intervals.dedup();
-    FilmOptions {
-        start: start.map(Into::into),
-        keep_state: args.film.keeps_state() && args.writes_exr(),
-        intervals,
-        target_rmse: args.film.target_rmse,
-    }
-}
-
-/// Can all that is saved on the way be written? Asked before long work starts.
-///
-/// # Errors
-/// [`Error::Output`], naming the file.
-pub fn check_writable(args: &RenderArgs, options: &FilmOptions) -> Result<()> {
-    let check = |path: &Path| options.intervals.iter().try_for_each(|&n| output::check_writable(&interval_path(path, n)));
-    args.output.iter().try_for_each(|path| check(path))
-}
-
-/// NAME.0016.exr: the name of an output once it has `samples` samples.
-pub fn interval_path(path: &Path, samples: u32) -> PathBuf {
-    let mut name = OsString::from(path.file_stem().unwrap_or_default());
-    name.push(format!(".{samples:04}"));
-    if let Some(extension) = path.extension() {
-        name.push(".");
-        name.push(extension);
-    }
-    path.with_file_name(name)
-}
 
 /// A film's sums as channels of an image; `names` are those of its values.
 pub fn state_channels(state: &FilmState, names: &[&str]) -> Vec<Channel> {
@@ -112,21 +47,21 @@ pub struct Resumed {
     pub warning: Option<String>,
 }
 
-/// Reads the film that `--resume` names, if it does, for an image of `size` pixels, whose values are called `names`, with `spp` samples in all.
-/// `identity` is that of this run, `maker` its tracer and its device.
+/// Reads the film that an image file holds, for an image of `size` pixels, whose values are called `names`, with `spp` samples in all.
+/// `scene` is its name, `identity` is that of this run, `maker` its tracer and its device.
 ///
 /// # Errors
 /// [`Error::Input`] for a file that cannot be read or has no film; [`Error::Usage`], naming what differs, for one that another run
 /// has begun, and for one that has more samples already.
 pub fn resume(
-    args: &RenderArgs,
+    path: &Path,
+    scene: &str,
     names: &[&str],
     size: [u32; 2],
     spp: u32,
     identity: &Identity,
     maker: &Maker,
-) -> Result<Option<Resumed>> {
-    let Some(path) = &args.film.resume else { return Ok(None) };
+) -> Result<Resumed> {
     let image = output::exr::read(path)?;
     let state = read_state(&image, names);
     if matches!(state, Read::Nothing) {
@@ -138,7 +73,7 @@ pub fn resume(
             path.display()
         ))
     };
-    if let Some((key, its, ours)) = difference(&image, identity, &args.scene) {
+    if let Some((key, its, ours)) = difference(&image, identity, scene) {
         return Err(differs(&key, &its, &ours));
     }
     if [image.width, image.height] != size {
@@ -163,7 +98,7 @@ pub fn resume(
             image.metadata(key).unwrap_or("unknown")
         )
     });
-    Ok(Some(Resumed { state, warning }))
+    Ok(Resumed { state, warning })
 }
 
 /// The first key that differs, and both values.
@@ -211,38 +146,9 @@ fn read_state(image: &Image, names: &[&str]) -> Read {
     state.map_or(Read::Damaged, Read::State)
 }
 
-/// Connects long work to the keyboard, and saves it on its way.
-pub struct Saver<'a> {
-    /// Where progress is shown, and who may stop it.
-    pub keyboard: ProgressControl,
-    /// Writes an image that is not finished.
-    pub save: &'a mut dyn FnMut(&Accumulated) -> Result<()>,
-}
-
-impl Control for Saver<'_> {
-    fn progress(&mut self, done: u64, total: u64) {
-        self.keyboard.progress(done, total);
-    }
-
-    fn interval(&mut self, image: &Accumulated) -> Result<()> {
-        (self.save)(image)
-    }
-
-    fn should_stop(&mut self) -> Result<bool> {
-        self.keyboard.should_stop()
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn names_of_intervals() {
-        let of = |path: &str, n: u32| interval_path(path.as_ref(), n).to_string_lossy().into_owned();
-        assert_eq!(of("out/a.exr", 16), "out/a.0016.exr");
-        assert_eq!(of("a.b.png", 65536), "a.b.65536.png");
-    }
 
     #[test]
     fn what_differs_is_named() {

@@ -53,12 +53,68 @@ pub fn parse_falloff(text: &str) -> Parsed<f64> {
     parse_where(text, |v| v >= 1.0 && v.is_finite(), "must be at least 1 (1 = binary) and finite")
 }
 
-/// A time above 0.
+/// Seconds above 0.
+pub fn parse_time(text: &str) -> Parsed<f64> {
+    parse_where(text, |v| v > 0.0 && v <= 1e9, "must be above 0 seconds")
+}
+
+/// A time above 0, given in seconds.
 pub fn parse_seconds(text: &str) -> Parsed<Duration> {
-    parse_where(text, |v| v > 0.0 && v <= 1e9, "must be above 0 seconds").map(Duration::from_secs_f64)
+    parse_time(text).map(Duration::from_secs_f64)
 }
 
 /// A bound: 0 or above.
 pub fn parse_limit(text: &str) -> Parsed<f64> {
     parse_where(text, |v| v >= 0.0, "must not be negative")
+}
+
+/// A number above 0.
+pub fn parse_positive(text: &str) -> Parsed<f64> {
+    parse_where(text, |v| v > 0.0, "must be above 0")
+}
+
+/// A factor: finite, 0 or above.
+pub fn parse_factor(text: &str) -> Parsed<f64> {
+    parse_where(text, |v| v >= 0.0 && v.is_finite(), "must be finite and not negative")
+}
+
+/// An albedo above 0, at most 1.
+pub fn parse_albedo(text: &str) -> Parsed<f64> {
+    parse_where(text, |v| v > 0.0 && v <= 1.0, "must be above 0 and at most 1")
+}
+
+/// A bound on an error: finite, above 0.
+pub fn parse_target(text: &str) -> Parsed<f64> {
+    parse_where(text, |v| v > 0.0 && v.is_finite(), "must be finite and above 0")
+}
+
+/// Frames a second: 0.01 to 1000.
+pub fn parse_rate(text: &str) -> Parsed<f64> {
+    parse_where(text, |v| (0.01..=1000.0).contains(&v), "must be between 0.01 and 1000 frames a second")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sizes() {
+        assert_eq!(parse_size("1x1"), Ok([1, 1]));
+        assert_eq!(parse_size("16384x16384"), Ok([16384, 16384]));
+        for bad in ["0x5", "5x0", "16385x16384", "5", "x", "-1x5", "1x2x3", "4294967296x1", ""] {
+            assert!(parse_size(bad).is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn numbers() {
+        assert_eq!(parse_vector("1,-2.5,3e2"), Ok(DVec3::new(1.0, -2.5, 300.0)));
+        for bad in ["1,2", "1,2,3,4", "a,b,c", "nan,0,0", "inf,0,0", ""] {
+            assert!(parse_vector(bad).is_err(), "{bad}");
+        }
+        assert!(parse_fov("nan").is_err() && parse_fov("0").is_err() && parse_fov("180").is_err() && parse_fov("45").is_ok());
+        assert!(parse_falloff("0.9").is_err() && parse_falloff("inf").is_err() && parse_falloff("1").is_ok());
+        assert!(parse_radius("-1").is_err() && parse_radius("0").is_err() && parse_radius("inf").is_ok());
+        assert!(parse_seconds("-1").is_err() && parse_seconds("1e300").is_err() && parse_seconds("0.5").is_ok());
+    }
 }

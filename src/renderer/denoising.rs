@@ -1,28 +1,27 @@
-//! `--denoise`: which denoiser runs, what it is told, and what is said of it.
+//! Denoising of stills: which denoiser runs, what it is told, and what is said of it.
 
 use std::cell::{Cell, RefCell};
 use std::time::Instant;
 
-use clap::ValueEnum;
 use serde_json::{Value, json};
 
-use crate::cli::args::RenderArgs;
 use crate::denoise::{Denoiser, Features, GRID, Oidn, Shot};
 use crate::error::Result;
 use crate::film::Control;
 use crate::film::accumulate::Accumulated;
+use crate::integrators::path::settings::DenoiseChoice;
 use crate::output::{Channel, Samples};
-use crate::terminal::interrupt;
 
-/// What takes the noise away.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum DenoiseChoice {
-    /// Open Image Denoise where it is there, else the filter
-    Auto,
-    /// Intel Open Image Denoise: a neural network, on the CPU
-    Oidn,
-    /// The filter of ambient occlusion in real time, over radiance
-    Filter,
+/// The channels that are denoised.
+const CHANNELS: [&str; 3] = ["R", "G", "B"];
+
+/// Interruptions are errors where work is to be given up, and nothing where what there is is kept: it is denoised to its end.
+struct Unstoppable<'a>(&'a mut dyn Control);
+
+impl Control for Unstoppable<'_> {
+    fn should_stop(&mut self) -> Result<bool> {
+        self.0.should_stop().map(|_| false)
+    }
 }
 
 /// A denoiser, and why it is that one.
@@ -52,33 +51,18 @@ pub fn choose(choice: Option<DenoiseChoice>) -> Result<Option<Chosen>> {
     }))
 }
 
-/// Stops what is not worth finishing. With --keep-partial what there is is denoised, too.
-struct Stop {
-    keep_partial: bool,
-}
-
-impl Control for Stop {
-    fn should_stop(&mut self) -> Result<bool> {
-        if !self.keep_partial {
-            interrupt::check()?;
-        }
-        Ok(false)
-    }
-}
-
 /// Denoises films of one scene and camera.
 pub struct Denoising<'a> {
     chosen: &'a Chosen,
     shot: Shot<'a>,
-    keep_partial: bool,
     // those of the first film serve the next
     features: RefCell<Option<Features>>,
     seconds: Cell<f64>,
 }
 
 impl<'a> Denoising<'a> {
-    pub fn new(chosen: &'a Chosen, shot: Shot<'a>, args: &RenderArgs) -> Self {
-        Self { chosen, shot, keep_partial: args.keep_partial, features: RefCell::new(None), seconds: Cell::new(0.0) }
+    pub fn new(chosen: &'a Chosen, shot: Shot<'a>) -> Self {
+        Self { chosen, shot, features: RefCell::new(None), seconds: Cell::new(0.0) }
     }
 
     /// What the image is called by in its metadata.
@@ -86,10 +70,16 @@ impl<'a> Denoising<'a> {
         self.chosen.denoiser.name()
     }
 
-    /// The channels of a denoised film in place of its means, which follow as `noisy.R`, `noisy.G`, `noisy.B` if `keep_noisy`.
-    pub fn channels(&self, accumulated: &Accumulated, mut channels: Vec<Channel>, keep_noisy: bool) -> Result<Vec<Channel>> {
+    /// The channels of a denoised film in place of its means, which follow as `noisy.R`, `noisy.G`, `noisy.B`. An interruption ends it, unless `control`
+    /// wants what there is: then that is denoised, too.
+    pub fn channels(
+        &self,
+        accumulated: &Accumulated,
+        mut channels: Vec<Channel>,
+        control: &mut dyn Control,
+    ) -> Result<Vec<Channel>> {
         let start = Instant::now();
-        let mut stop = Stop { keep_partial: self.keep_partial };
+        let mut stop = Unstoppable(control);
         let features = match self.features.take() {
             Some(features) => features,
             None => Features::render(&self.shot, &mut stop)?,
@@ -97,25 +87,24 @@ impl<'a> Denoising<'a> {
         let denoised = self.chosen.denoiser.denoise(&self.shot, &accumulated.film, &features, &mut stop)?;
         self.features.replace(Some(features));
         let mut noisy = Vec::new();
-        for (c, name) in super::CHANNELS.iter().enumerate() {
+        for (c, name) in CHANNELS.iter().enumerate() {
             let Some(channel) = channels.iter_mut().find(|channel| channel.name == *name) else { continue };
-            let plane = denoised.iter().skip(c).step_by(super::CHANNELS.len()).copied().collect();
+            let plane = denoised.iter().skip(c).step_by(CHANNELS.len()).copied().collect();
             let mean = std::mem::replace(&mut channel.samples, Samples::F32(plane));
             noisy.push(Channel { name: format!("noisy.{name}"), samples: mean });
         }
-        if keep_noisy {
-            channels.extend(noisy);
-        }
+        channels.extend(noisy);
         self.seconds.set(self.seconds.get() + start.elapsed().as_secs_f64());
         Ok(channels)
     }
 
     /// What there is to say of it.
-    pub fn tell(&self, writes_exr: bool) -> Told {
+    pub fn report(&self) -> DenoiseReport {
         let (name, why, seconds) = (self.name(), &self.chosen.why, self.seconds.get());
-        let mean = if writes_exr { "; noisy.R, noisy.G and noisy.B are the mean without" } else { "" };
-        Told {
-            line: format!("denoised by {name} ({why}) in {seconds:.3} s: the image is biased{mean}"),
+        DenoiseReport {
+            line: format!(
+                "denoised by {name} ({why}) in {seconds:.3} s: the image is biased; noisy.R, noisy.G and noisy.B of an .exr are the mean without"
+            ),
             explanation: format!(
                 "denoiser {name}: {why}; it knows surfaces by {} camera rays a pixel{}",
                 GRID * GRID + 1,
@@ -130,7 +119,8 @@ impl<'a> Denoising<'a> {
 }
 
 /// The same for people and for programs.
-pub struct Told {
+#[derive(Clone, Debug)]
+pub struct DenoiseReport {
     /// A sentence.
     pub line: String,
     /// For `--explain`.

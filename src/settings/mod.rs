@@ -2,6 +2,8 @@
 //!
 //! Each setting knows which integrators it is for, and whether it is of stills, of frames in real time, or of both: [`check`] finds the one that would have no effect.
 
+pub mod parse;
+
 use crate::error::{Error, Result};
 
 /// What a setting has an effect on.
@@ -77,11 +79,16 @@ pub fn check(given: &[Given], integrator: &str, frames: Option<&Given>) -> Resul
     for setting in given {
         let (option, applies) = (setting.option(), setting.applies);
         if let (Some(frames), false) = (frames, applies.frames) {
-            return wrong(format!("{option} is for stills, and {} asks for frames in real time: leave one of them out", frames.option()));
+            return wrong(format!(
+                "{option} is for stills, and {} asks for frames in real time: leave one of them out",
+                frames.option()
+            ));
         }
         if !applies.includes(integrator) {
             let others = list(applies.integrators);
-            return wrong(format!("{option} has no effect on --integrator {integrator}: leave it out, or use --integrator {others}"));
+            return wrong(format!(
+                "{option} has no effect on --integrator {integrator}: leave it out, or use --integrator {others}"
+            ));
         }
     }
     Ok(())
@@ -131,11 +138,11 @@ macro_rules! settings {
 }
 pub(crate) use settings;
 
-/// Declares a choice among named alternatives: `/// help` and `Variant = "name",` each; the first is the default. The doc of an alternative is the help of the command line.
+/// Declares a choice among named alternatives: `/// help` and `Variant = "name",` each; the first is the default unless another is named. The doc of an alternative is the help of the command line.
 macro_rules! choices {
     (
         $(#[$meta:meta])*
-        $vis:vis enum $type:ident {
+        $vis:vis enum $type:ident $((default $default:ident))? {
             $(
                 $(#[doc = $doc:literal])+
                 $variant:ident = $name:literal,
@@ -173,7 +180,7 @@ macro_rules! choices {
 
         impl Default for $type {
             fn default() -> Self {
-                Self::ALL[0]
+                [$(Self::$default,)? Self::ALL[0]][0]
             }
         }
 

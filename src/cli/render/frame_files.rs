@@ -2,28 +2,22 @@
 
 use std::path::PathBuf;
 
-use glam::DVec3;
-
-use crate::cli::args::{Aov, RenderArgs};
-use crate::cli::render::aov_channels;
 use crate::error::Result;
 use crate::gpu::Buffer;
-use crate::integrators::aov::AovPixel;
 use crate::output::apng::{self, Animation, ApngWriter, Delay};
 use crate::output::png::{self, Colour};
-use crate::output::{self, Channel, Image, ImageFormat, Samples, frames};
-use crate::realtime::Realtime;
+use crate::output::{self, Image, ImageFormat, frames};
 
 /// Everything that frames are written to.
-pub struct Writer {
+pub struct FrameFiles {
     images: Vec<PathBuf>,
     pictures: Vec<PathBuf>,
     animations: Vec<ApngWriter>,
     colour: Colour,
 }
 
-impl Writer {
-    /// Starts the animations. They appear when [`Writer::finish`] is called. `colour`: of pictures.
+impl FrameFiles {
+    /// Starts the animations. They appear when [`FrameFiles::finish`] is called. `colour`: of pictures.
     pub fn create(outputs: &[PathBuf], size: [u32; 2], frames: u32, fps: f64, colour: Colour) -> Result<Self> {
         let (animations, files): (Vec<_>, Vec<_>) = outputs.iter().cloned().partition(|p| apng::is_apng(p));
         let (mut images, mut pictures) = (Vec::new(), Vec::new());
@@ -35,7 +29,7 @@ impl Writer {
         Ok(Self { images, pictures, animations: animations.iter().map(start).collect::<Result<_>>()?, colour })
     }
 
-    /// Writes a frame: its channels, and what is shown of it ([`Realtime::displayed`]), each where there are files for it.
+    /// Writes a frame: its channels, and what is shown of it ([`crate::renderer::Frames::displayed`]), each where there are files for it.
     pub fn add(&mut self, number: u32, [width, height]: [u32; 2], image: Option<&Image>, shown: Option<&Buffer>) -> Result<()> {
         if let Some(image) = image {
             for path in &self.images {
@@ -66,25 +60,4 @@ impl Writer {
     pub fn finish(self) -> Result<()> {
         self.animations.into_iter().try_for_each(ApngWriter::finish)
     }
-}
-
-/// The last frame as an image: `Y` accessibility, `A` 1 where something is, `samples` behind each pixel, and what `--aov` adds.
-pub fn image(
-    args: &RenderArgs,
-    realtime: &Realtime,
-    size: [u32; 2],
-    pixels: &[AovPixel],
-    origin: DVec3,
-    metadata: Vec<(String, String)>,
-) -> Result<Image> {
-    let f32s = |name: &str, samples| Channel { name: name.into(), samples: Samples::F32(samples) };
-    let mut channels =
-        vec![f32s("Y", realtime.result()?), f32s("A", realtime.coverage()?), f32s("samples", realtime.samples()?)];
-    channels.extend(aov_channels(args, pixels, origin));
-    if args.wants(Aov::Bent) {
-        let bent = realtime.bent()?;
-        let axis = |k: usize| bent.iter().map(|b| b[k]).collect();
-        channels.extend(["bent.X", "bent.Y", "bent.Z"].iter().enumerate().map(|(k, name)| f32s(name, axis(k))));
-    }
-    Ok(Image { width: size[0], height: size[1], channels, metadata })
 }

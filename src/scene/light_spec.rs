@@ -1,4 +1,4 @@
-//! `--light`: lights that are not in the file.
+//! Lights that are not in a scene's file, described in a line of text: `point position=0,2,0 intensity=100`.
 
 use glam::{DAffine3, DVec3, Vec3};
 
@@ -6,11 +6,12 @@ use crate::scene::blackbody::blackbody;
 use crate::scene::builtin::shapes;
 use crate::scene::material::MaterialKind;
 use crate::scene::{Geometry, Instance, Light, LightKind, Material, Mesh, Scene};
-use crate::terminal::parse::{parse_number, parse_vector};
+use crate::settings::parse::{parse_number, parse_vector};
 
-/// A light as it is asked for: `KIND key=value ...`.
+/// A light as it is asked for: `KIND key=value ...`. Files hold the text.
 #[derive(Clone, Debug)]
 pub struct LightSpec {
+    text: String,
     shape: Shape,
     /// Colour times intensity, irradiance or radiance.
     power: Vec3,
@@ -79,7 +80,10 @@ fn colour(text: &str) -> Result<Vec3, String> {
     if c.min_element() < 0.0 { Err("light is not negative".into()) } else { Ok(c.as_vec3()) }
 }
 
-/// For the command line.
+/// Reads a light's description.
+///
+/// # Errors
+/// What is wrong with it, in a line.
 pub fn parse(text: &str) -> Result<LightSpec, String> {
     let mut words = text.split_whitespace();
     let kind = words.next().ok_or("empty: point, spot, sun, sphere, rectangle or disk, then key=value")?;
@@ -126,7 +130,26 @@ pub fn parse(text: &str) -> Result<LightSpec, String> {
     };
     match keys.given.first() {
         Some((key, _)) => Err(format!("{kind} has no {key}")),
-        None => Ok(LightSpec { shape, power: tint * strength as f32 }),
+        None => Ok(LightSpec { text: text.to_owned(), shape, power: tint * strength as f32 }),
+    }
+}
+
+impl PartialEq for LightSpec {
+    fn eq(&self, other: &Self) -> bool {
+        self.text == other.text
+    }
+}
+
+impl serde::Serialize for LightSpec {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(&self.text)
+    }
+}
+
+impl<'de> serde::Deserialize<'de> for LightSpec {
+    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let text = String::deserialize(deserializer)?;
+        parse(&text).map_err(serde::de::Error::custom)
     }
 }
 

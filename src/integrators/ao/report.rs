@@ -1,0 +1,61 @@
+//! What there is to say of an image of ambient occlusion.
+
+use serde_json::{Value, json};
+
+use super::{AoOptions, AoResult};
+use crate::film::Film;
+use crate::integrators::IntegratorReport;
+
+/// Says it.
+pub(super) fn report(options: &AoOptions, result: &AoResult) -> IntegratorReport {
+    let image = &result.image;
+    let covered_mean = covered_mean(&image.film);
+    let traced = image.primary_rays + result.occlusion_rays;
+    let mrays_s = if image.trace_seconds > 0.0 { traced as f64 / image.trace_seconds / 1e6 } else { 0.0 };
+    let finite = |v: f64| if v.is_finite() { json!(v) } else { Value::Null };
+    let record = json!({
+        "ao": {
+            "radius": finite(options.radius),
+            "falloff": options.falloff,
+            "normal": options.hemisphere,
+            "reach": finite(options.reach()),
+        },
+        "covered_mean": covered_mean,
+        "rays": {
+            "primary": image.primary_rays,
+            "skipped_primary": image.skipped_primary_rays,
+            "occlusion": result.occlusion_rays,
+            "skipped": result.skipped_rays,
+        },
+        "mrays_s_wall": mrays_s,
+    });
+    let mut explanations = vec![match options.binary() {
+        true => "binary occlusion: any hit ends a ray, no nearest one is looked for".into(),
+        false => "occlusion falls off with distance: the nearest hit is looked for".into(),
+    }];
+    explanations.push(match options.reach() {
+        r if r.is_finite() => {
+            format!("occlusion rays end at distance {r:.6}: what is beyond changes nothing that can be seen")
+        }
+        _ => "occlusion rays have no end: no radius and no falloff was given".into(),
+    });
+    let all = result.occlusion_rays + result.skipped_rays;
+    explanations.push(format!(
+        "{} of {all} occlusion rays ({:.1} %) not traced: their sample's camera ray meets nothing",
+        result.skipped_rays,
+        100.0 * result.skipped_rays as f64 / all.max(1) as f64
+    ));
+    IntegratorReport {
+        lines: vec![format!("mean over the scene's pixels {covered_mean:.5}; {mrays_s:.1} Mrays/s")],
+        explanations,
+        record: record.as_object().cloned().unwrap_or_default(),
+        warnings: Vec::new(),
+    }
+}
+
+/// Mean over what the scene covers.
+fn covered_mean(film: &Film) -> f64 {
+    let sum = |v: &[f32]| v.iter().map(|&x| f64::from(x)).sum::<f64>();
+    let covered = sum(&film.coverage);
+    if covered > 0.0 { sum(&film.mean) / covered } else { 0.0 }
+}

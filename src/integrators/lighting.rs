@@ -1,0 +1,61 @@
+//! Light that is not in a scene's file.
+
+use std::path::PathBuf;
+
+use glam::{DMat3, Vec3};
+
+use crate::error::{Error, Result};
+use crate::scene::light_spec::{self, LightSpec};
+use crate::scene::{Environment, Scene, load};
+use crate::settings::parse::{parse_factor, parse_number, parse_vector};
+use crate::settings::{AppliesTo, settings};
+
+/// What is lit by lights.
+const LIT: AppliesTo = AppliesTo::stills_of(&["path", "direct"]);
+
+settings! {
+    /// Light besides the scene's.
+    "Light (--integrator path, direct)"
+    pub struct LightingSettings {
+        /// Environment light: an equirectangular map (.hdr, .exr), or a constant radiance R,G,B [default: the scene's]
+        environment: Option<String>, option(value_name = "FILE|R,G,B"), applies(LIT);
+        /// Rotate the environment map about the vertical axis by this angle, counter-clockwise from above
+        environment_turn: Option<f64>,
+            option(value_name = "DEG", value_parser = parse_number, requires = "environment", allow_hyphen_values = true), applies(LIT);
+        /// Factor of the environment's radiance
+        environment_scale: Option<f64>,
+            option(value_name = "X", value_parser = parse_factor, requires = "environment", allow_hyphen_values = true), applies(LIT);
+        /// Add a light: point, spot, sun, sphere, rectangle or disk, then key=value: position, direction (in which it emits), radius, size=W,H,
+        /// intensity (cd), irradiance (lux) or radiance, color=R,G,B or temperature=K, and outer, inner, angle in degrees. May be repeated
+        light: Vec<LightSpec>, option(value_name = "SPEC", value_parser = light_spec::parse), applies(LIT);
+    }
+}
+
+impl LightingSettings {
+    /// Puts the lights into a scene, and replaces its environment if another is asked for.
+    ///
+    /// # Errors
+    /// [`Error::Input`] for a map that cannot be read, [`Error::Usage`] for a negative radiance.
+    pub fn apply(&self, scene: &mut Scene) -> Result<()> {
+        if let Some(environment) = self.environment()? {
+            scene.environment = environment;
+        }
+        self.light.iter().for_each(|l| l.add(scene));
+        Ok(())
+    }
+
+    fn environment(&self) -> Result<Option<Environment>> {
+        let Some(text) = &self.environment else { return Ok(None) };
+        let scale = self.environment_scale.unwrap_or(1.0) as f32;
+        if let Ok(colour) = parse_vector(text) {
+            if colour.min_element() < 0.0 {
+                return Err(Error::Usage(format!("--environment {text}: radiance is not negative")));
+            }
+            return Ok(Some(Environment::Uniform(colour.as_vec3() * scale)));
+        }
+        let mut map = load::load_environment(&PathBuf::from(text))?;
+        map.factor = Vec3::splat(scale);
+        map.to_map = DMat3::from_rotation_y(-self.environment_turn.unwrap_or(0.0).to_radians());
+        Ok(Some(Environment::Map(map)))
+    }
+}

@@ -1,0 +1,235 @@
+//! The integrators that are made of paths: global illumination, direct light, the ground truth of ambient occlusion, and views of surfaces.
+
+use std::sync::Arc;
+
+use super::report::{self, environment_text};
+use super::{Lens, MOST_DEPTH, PathOptions, PixelFilter, TextureFilter, View, render, streams};
+use crate::accel::flatten::FlatScene;
+use crate::error::{Error, Result};
+use crate::film::Control;
+use crate::film::cover::Cover;
+use crate::integrators::{Integrator, IntegratorSettings, PictureOptions, Rendered, Shot};
+use crate::output::{Image, Samples, png};
+use crate::scene::{Camera, Projection, Scene};
+use crate::shaders::StreamShaders;
+use crate::tracer::{Needs, Tracer};
+
+/// Path tracing.
+pub static PATH: Paths =
+    Paths { name: "path", help: "Path tracing: global illumination", kind: Kind::Light { max_depth: None } };
+/// Paths of one bounce.
+pub static DIRECT: Paths =
+    Paths { name: "direct", help: "Direct lighting: paths of one bounce", kind: Kind::Light { max_depth: Some(1) } };
+/// What ambient occlusion approximates.
+pub static AO_SKY: Paths = Paths {
+    name: "ao-sky",
+    help: "Path traced grey diffuse surfaces under a white sky, divided by albedo: the ground truth that AO approximates",
+    kind: Kind::WhiteSky,
+};
+/// Shading normals.
+pub static NORMALS: Paths = Paths { name: "normals", help: "Shading normals, in world space", kind: Kind::View(View::Normals) };
+/// Base colours.
+pub static ALBEDO: Paths = Paths { name: "albedo", help: "Base colours", kind: Kind::View(View::Albedo) };
+/// Distances.
+pub static DEPTH: Paths = Paths { name: "depth", help: "Distance along camera rays", kind: Kind::View(View::Depth) };
+/// Occlusion from textures.
+pub static BAKED_OCCLUSION: Paths =
+    Paths { name: "baked-occlusion", help: "Baked occlusion textures", kind: Kind::View(View::BakedOcclusion) };
+
+/// Grey of `ao-sky`.
+const SKY_ALBEDO: f64 = 0.5;
+/// Height of the sensor that an f-number is about, metres.
+const SENSOR_HEIGHT: f64 = 0.024;
+
+/// What paths gather.
+enum Kind {
+    /// Light, up to so many bounces; `None`: as many as settings say.
+    Light { max_depth: Option<u32> },
+    /// A white sky's light from grey surfaces.
+    WhiteSky,
+    /// No light, but what camera rays see.
+    View(View),
+}
+
+/// An integrator that traces paths.
+pub struct Paths {
+    name: &'static str,
+    help: &'static str,
+    kind: Kind,
+}
+
+impl Paths {
+    fn view(&self) -> Option<View> {
+        if let Kind::View(view) = self.kind { Some(view) } else { None }
+    }
+
+    fn options(&self, shot: &Shot) -> Result<PathOptions> {
+        let settings = &shot.settings.path;
+        let wanted = settings.max_depth.or(shot.scene.hints.max_depth).unwrap_or(MOST_DEPTH);
+        Ok(PathOptions {
+            size: shot.size,
+            pixel_filter: settings.pixel_filter.unwrap_or_default(),
+            texture_filter: settings.texture_filter.unwrap_or_default(),
+            lens: lens(shot.settings, shot.camera)?,
+            spp: shot.spp,
+            seed: shot.seed,
+            max_depth: if let Kind::Light { max_depth: Some(depth) } = self.kind { depth } else { wanted },
+            rr_depth: settings.rr_depth.unwrap_or(PathOptions::default().rr_depth),
+            firefly_clamp: settings.firefly_clamp.map_or(f32::INFINITY, |c| c as f32),
+            strategy: settings.sampling.unwrap_or_default(),
+            view: self.view(),
+            white_sky: matches!(self.kind, Kind::WhiteSky).then(|| settings.sky_albedo.unwrap_or(SKY_ALBEDO) as f32),
+            time_limit: shot.time_limit,
+            cover: None,
+            film: shot.film.clone(),
+        })
+    }
+}
+
+/// The lens that is asked for.
+fn lens(settings: &IntegratorSettings, camera: &Camera) -> Result<Option<Lens>> {
+    let (Some(f_number), Some(focus)) = (settings.path.f_number, settings.path.focus_distance) else { return Ok(None) };
+    match camera.projection {
+        Projection::Perspective { fov_y } => {
+            let focal_length = 0.5 * SENSOR_HEIGHT / (0.5 * fov_y).tan();
+            Ok(Some(Lens { radius: (0.5 * focal_length / f_number) as f32, focus: focus as f32 }))
+        }
+        Projection::Orthographic { .. } => Err(Error::Usage("--f-number: the camera is orthographic and has no lens".into())),
+    }
+}
+
+impl Integrator for Paths {
+    fn name(&self) -> &'static str {
+        self.name
+    }
+
+    fn help(&self) -> &'static str {
+        self.help
+    }
+
+    fn channels(&self) -> &'static [&'static str] {
+        &["R", "G", "B"]
+    }
+
+    fn quantity(&self) -> &'static str {
+        match self.kind {
+            Kind::View(_) => "value",
+            Kind::Light { .. } | Kind::WhiteSky => "radiance",
+        }
+    }
+
+    fn flatten<'s>(&self, scene: &'s Scene) -> Result<FlatScene<'s>> {
+        Ok(FlatScene::for_paths(scene))
+    }
+
+    fn needs(&self, settings: &IntegratorSettings) -> Needs {
+        Needs {
+            shading: true,
+            white: matches!(self.kind, Kind::WhiteSky),
+            compensation: settings.path.energy_compensation,
+            baked_occlusion: self.view() == Some(View::BakedOcclusion),
+            mip_levels: settings.path.texture_filter.unwrap_or_default() == TextureFilter::RayCone,
+            ..Default::default()
+        }
+    }
+
+    fn streams(&self, _: &IntegratorSettings) -> Vec<&'static StreamShaders> {
+        streams().to_vec()
+    }
+
+    fn rays_per_sample(&self) -> u64 {
+        6
+    }
+
+    /// What surrounds the scene is seen where nothing is; lenses and wide filters look beside the pixel.
+    fn skips_empty_tiles(&self, shot: &Shot) -> bool {
+        let black = match self.kind {
+            Kind::View(_) => true,
+            Kind::WhiteSky => false,
+            Kind::Light { .. } => !shot.scene.has_visible_sky(),
+        };
+        let settings = &shot.settings.path;
+        let is_pinhole = settings.f_number.is_none() || settings.focus_distance.is_none();
+        black && is_pinhole && settings.pixel_filter.unwrap_or_default() == PixelFilter::Box
+    }
+
+    fn sees_environment(&self) -> bool {
+        !matches!(self.kind, Kind::WhiteSky)
+    }
+
+    fn identity(&self, shot: &Shot) -> Vec<(&'static str, Option<String>)> {
+        // without its lens a camera is refused when the image is rendered
+        let Ok(options) = self.options(shot) else { return Vec::new() };
+        // no `..`: a new option has to be put where it belongs
+        let PathOptions {
+            size: _,
+            spp: _,
+            time_limit: _,
+            cover: _,
+            film: _,
+            seed: _,
+            max_depth,
+            rr_depth,
+            firefly_clamp,
+            strategy,
+            white_sky,
+            view: _,
+            pixel_filter,
+            texture_filter,
+            lens,
+        } = options;
+        vec![
+            ("environment", Some(environment_text(shot.scene, &options))),
+            ("max_depth", Some(report::depth_text(max_depth))),
+            ("rr_depth", Some(rr_depth.to_string())),
+            ("sampling", Some(strategy.to_string())),
+            ("firefly_clamp", firefly_clamp.is_finite().then(|| firefly_clamp.to_string())),
+            ("pixel_filter", (pixel_filter != PixelFilter::Box).then(|| pixel_filter.to_string())),
+            ("texture_filter", (texture_filter != TextureFilter::Bilinear).then(|| texture_filter.to_string())),
+            ("lens", lens.map(|lens| format!("radius {}, focus {}", lens.radius, lens.focus))),
+            ("energy_compensation", shot.settings.path.energy_compensation.then(|| "on".into())),
+            ("sky_albedo", white_sky.map(|albedo| albedo.to_string())),
+        ]
+    }
+
+    fn render(
+        &self,
+        tracer: &Tracer,
+        flat: &FlatScene,
+        shot: &Shot,
+        cover: Option<Arc<Cover>>,
+        control: &mut dyn Control,
+    ) -> Result<Rendered> {
+        let options = PathOptions { cover, ..self.options(shot)? };
+        let result = render(tracer, flat, &shot.camera_record(flat), &options, control)?;
+        let report = report::report(tracer, flat, shot, &options, &result);
+        Ok(Rendered { image: result.image, report, ..Default::default() })
+    }
+
+    /// Light; of views, normals about the middle of the range, and depths over the greatest.
+    fn picture(&self, image: &Image, options: &PictureOptions) -> Image {
+        let shown = |f: &dyn Fn(f32) -> f32| {
+            let mut out = image.clone();
+            out.channels.retain(|c| self.channels().contains(&c.name.as_str()));
+            for channel in &mut out.channels {
+                if let Samples::F32(values) = &mut channel.samples {
+                    values.iter_mut().for_each(|v| *v = png::srgb_decode(f(*v)));
+                }
+            }
+            out
+        };
+        match self.view() {
+            Some(View::Normals) => shown(&|n| 0.5 * n + 0.5),
+            Some(View::Depth) => {
+                let greatest = image.f32("R").map_or(0.0, |d| d.iter().copied().fold(0.0, f32::max)).max(f32::MIN_POSITIVE);
+                shown(&|d| d / greatest)
+            }
+            Some(View::BakedOcclusion) => shown(&|o| o),
+            Some(View::Albedo) | None => options.tone_map.apply(image, options.exposure),
+        }
+    }
+
+    fn path_options(&self, shot: &Shot) -> Result<Option<PathOptions>> {
+        self.options(shot).map(Some)
+    }
+}

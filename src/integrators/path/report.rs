@@ -1,0 +1,123 @@
+//! What there is to say of a path-traced image.
+
+use serde_json::{Value, json};
+
+use super::{MOST_DEPTH, PathOptions, PathResult, TextureFilter};
+use crate::accel::flatten::FlatScene;
+use crate::integrators::{IntegratorReport, Shot};
+use crate::scene::{Environment, Scene};
+use crate::tracer::{BuildStats, Tracer};
+
+/// A limit of bounces in words.
+pub(super) fn depth_text(max_depth: u32) -> String {
+    if max_depth >= MOST_DEPTH { "unlimited".into() } else { max_depth.to_string() }
+}
+
+/// What light comes from all around, in words.
+pub(super) fn environment_text(scene: &Scene, options: &PathOptions) -> String {
+    match &scene.environment {
+        _ if options.view.is_some() => "none".into(),
+        _ if options.white_sky.is_some() => "white".into(),
+        Environment::Black => "black".into(),
+        Environment::Uniform(c) => format!("{}, {}, {}", c.x, c.y, c.z),
+        Environment::Map(map) => map.name.clone(),
+    }
+}
+
+/// Does any surface emit?
+fn emits(flat: &FlatScene) -> bool {
+    flat.scene.meshes.iter().any(|m| flat.scene.materials[m.material].emissive != glam::Vec3::ZERO)
+}
+
+/// Says it.
+pub(super) fn report(tracer: &Tracer, flat: &FlatScene, shot: &Shot, o: &PathOptions, result: &PathResult) -> IntegratorReport {
+    let (image, stats) = (&result.image, tracer.stats());
+    let (paths, rays) = (image.primary_rays, image.primary_rays + result.bounce_rays + result.shadow_rays);
+    let per_second = |n: u64| n as f64 / image.trace_seconds.max(1e-9) / 1e6;
+    let mut lines = vec![format!(
+        "{:.2} Mpaths/s, {:.2} Mrays/s; a path has {:.2} rays, {:.2} of them to lights; the longest {} bounces (limit {})",
+        per_second(paths),
+        per_second(rays),
+        rays as f64 / paths.max(1) as f64,
+        result.shadow_rays as f64 / paths.max(1) as f64,
+        result.longest_path,
+        depth_text(o.max_depth),
+    )];
+    if o.firefly_clamp.is_finite() {
+        lines.push(format!("indirect radiance clamped to {}: biased, too dark", o.firefly_clamp));
+    }
+    if o.texture_filter == TextureFilter::RayCone {
+        lines.push("textures filtered by ray cones: blurred, however many samples (biased)".into());
+    }
+    let shading = tracer.features().shading.unwrap_or_default();
+    let mut explanations = vec![
+        compiled("materials require", shading.materials.labels()),
+        compiled("textures beside base colours:", shading.textures.labels()),
+        compiled("lights and options require", result.features.labels()),
+        mip_levels(o, &stats),
+    ];
+    explanations.push(match result.lights {
+        0 => "no light sampling: there are no lights, or --sampling does not use it".into(),
+        n if result.light_tree => format!("{n} lights, sampled by a light tree"),
+        n => format!("{n} lights, sampled by power"),
+    });
+    let record = json!({
+        "environment": environment_text(shot.scene, o),
+        "max_depth": if o.max_depth >= MOST_DEPTH { Value::Null } else { json!(o.max_depth) },
+        "rr_depth": o.rr_depth,
+        "firefly_clamp": if o.firefly_clamp.is_finite() { json!(o.firefly_clamp) } else { Value::Null },
+        "sampling": o.strategy,
+        "view": o.view,
+        "texture_filter": o.texture_filter,
+        "mip_levels": stats.mip_levels,
+        "mip_bytes": stats.mip_bytes,
+        "sky_albedo": o.white_sky,
+        "energy_compensation": shot.settings.path.energy_compensation,
+        "not_finite": image.film.not_finite,
+        "lights": result.lights,
+        "light_tree": result.light_tree,
+        "rays": {
+            "primary": image.primary_rays,
+            "skipped_primary": image.skipped_primary_rays,
+            "bounce": result.bounce_rays,
+            "shadow": result.shadow_rays,
+        },
+        "longest_path": result.longest_path,
+    });
+    IntegratorReport {
+        lines,
+        explanations,
+        record: record.as_object().cloned().unwrap_or_default(),
+        warnings: warnings(flat, o, image.film.not_finite, image.spp),
+    }
+}
+
+fn warnings(flat: &FlatScene, o: &PathOptions, not_finite: u64, spp: u32) -> Vec<String> {
+    let mut warnings = Vec::new();
+    if not_finite > 0 {
+        warnings.push(format!(
+            "{not_finite} of {} samples were not finite and were left out: please report this scene",
+            u64::from(spp) * u64::from(o.size[0]) * u64::from(o.size[1])
+        ));
+    }
+    let scene = flat.scene;
+    let dark = scene.environment == Environment::Black && scene.lights.is_empty() && !emits(flat);
+    if o.view.is_none() && o.white_sky.is_none() && dark {
+        warnings.push("the scene has no light, and the image is black: give --environment FILE or R,G,B".into());
+    }
+    warnings
+}
+
+fn mip_levels(o: &PathOptions, stats: &BuildStats) -> String {
+    match o.texture_filter {
+        TextureFilter::Bilinear => "mip levels: unused (--texture-filter ray-cone uses them)".into(),
+        TextureFilter::RayCone if stats.mip_levels == 0 => "mip levels: none, no surface has a texture".into(),
+        TextureFilter::RayCone => format!("mip levels: up to {}, {} bytes beside the first", stats.mip_levels, stats.mip_bytes),
+    }
+}
+
+/// Which of the code that `labels` stand for is compiled.
+fn compiled(what: &str, labels: [Vec<&'static str>; 2]) -> String {
+    let [required, other] = labels.map(|labels| if labels.is_empty() { "nothing".into() } else { labels.join(", ") });
+    format!("{what} {required}; specialized out: {other}")
+}

@@ -1,0 +1,199 @@
+//! Settings of frames in real time: which frames, and how they are made.
+
+use std::path::PathBuf;
+
+use crate::error::{Error, Result};
+use crate::integrators::ao::settings::AoSettings;
+use crate::output::{apng, frames};
+use crate::raster::Primary;
+use crate::realtime::display::Shown;
+use crate::realtime::{Budget, FilterKind, Preset, Resolution, Settings, Technique};
+use crate::sampling::Sequence;
+use crate::settings::parse::parse_rate;
+use crate::settings::{AppliesTo, choices, settings};
+
+/// What frames in real time are made of.
+const FRAMES: AppliesTo = AppliesTo { integrators: &["ao"], ..AppliesTo::FRAMES };
+
+choices! {
+    /// Primary visibility, as it is asked for.
+    pub enum PrimaryChoice {
+        /// Whichever is faster on the device
+        Auto = "auto",
+        /// Ray traced
+        Traced = "traced",
+        /// Rasterized
+        Raster = "raster",
+    }
+}
+
+/// Frames from the first to the one before the last: `A..B`; a number is one frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct FrameRange {
+    /// The first.
+    pub first: u32,
+    /// One more than the last.
+    pub end: u32,
+}
+
+impl serde::Serialize for FrameRange {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> std::result::Result<S::Ok, S::Error> {
+        serializer.collect_str(&format_args!("{}..{}", self.first, self.end))
+    }
+}
+
+impl<'de> serde::Deserialize<'de> for FrameRange {
+    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> std::result::Result<Self, D::Error> {
+        parse_frames(&String::deserialize(deserializer)?).map_err(serde::de::Error::custom)
+    }
+}
+
+fn parse_frames(text: &str) -> std::result::Result<FrameRange, String> {
+    const EXPECTED: &str = "expected A..B, frames A to B - 1, like 0..60";
+    let number = |s: &str| s.trim().parse::<u32>().map_err(|_| EXPECTED.to_owned());
+    let range = match text.split_once("..") {
+        Some((a, b)) => FrameRange { first: number(a)?, end: number(b)? },
+        None => {
+            let first = number(text)?;
+            FrameRange { first, end: first.checked_add(1).ok_or(EXPECTED)? }
+        }
+    };
+    if range.end <= range.first { Err(format!("{text} has no frames: {EXPECTED}")) } else { Ok(range) }
+}
+
+settings! {
+    /// Frames in real time.
+    "Frames in real time"
+    pub struct FrameSettings {
+        /// Render with the real-time pipeline and these settings
+        preset: Option<Preset>, option(value_enum), applies(FRAMES);
+        /// Render frames A to B - 1 [default: one frame, after warm-up]
+        frames: Option<FrameRange>, option(value_name = "A..B", value_parser = parse_frames), applies(FRAMES);
+        /// Frames per second [default: the camera path's, or 30]
+        fps: Option<f64>, option(value_name = "N", value_parser = parse_rate), applies(FRAMES);
+        /// Play an animation of the scene, by index or name [default: the first]
+        animate: Option<String>, option(value_name = "INDEX|NAME", num_args = 0..=1, default_missing_value = "0"), applies(FRAMES);
+        /// Animate the camera along the key frames of a file (docs/sequences.md)
+        camera_path: Option<PathBuf>,
+            option(value_name = "FILE", value_hint = clap::ValueHint::FilePath, conflicts_with_all = ["orbit", "eye", "camera", "fov_y"]),
+            applies(FRAMES);
+        /// Orbit the camera around the centre of the scene, one turn in this many frames
+        orbit: Option<u32>,
+            option(value_name = "FRAMES", num_args = 0..=1, default_missing_value = "240", value_parser = clap::value_parser!(u32).range(1..)),
+            applies(FRAMES);
+        /// Warm-up frames, identical to the first, that are rendered and discarded [default: 0; for a single frame, the history length]
+        warm_up: Option<u32>, option(value_name = "N"), applies(FRAMES);
+        /// AO technique [default: the preset's]
+        technique: Option<Technique>, option(value_enum), applies(FRAMES);
+        /// Primary visibility: rasterized or ray traced [default: auto]
+        primary: Option<PrimaryChoice>, option(value_enum), applies(FRAMES);
+        /// Occlusion rays per pixel and frame [default: the preset's]
+        rays_per_pixel: Option<u32>,
+            option(value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(Settings::MAX_RAYS))), applies(FRAMES);
+        /// How rays are distributed over pixels (docs/realtime.md) [default: uniform]
+        budget: Option<Budget>, option(value_enum), applies(FRAMES);
+        /// Resolution of ray tracing per frame [default: the preset's]
+        resolution: Option<Resolution>, option(value_enum), applies(FRAMES);
+        /// Sampler of ray directions [default: the preset's]
+        sequence: Option<Sequence>, option(value_enum), applies(FRAMES);
+        /// Maximum history length in frames; 1 disables temporal accumulation [default: the preset's]
+        history: Option<u32>, option(value_name = "N", value_parser = clap::value_parser!(u32).range(1..)), applies(FRAMES);
+        /// Spatial filter [default: the preset's]
+        filter: Option<FilterKind>, option(value_enum), applies(FRAMES);
+        /// Maximum filter radius in pixels [default: the preset's]
+        filter_radius: Option<u32>, option(value_name = "PIXELS", value_parser = clap::value_parser!(u32).range(0..=16)), applies(FRAMES);
+        /// What .png and .apng outputs show [default: accessibility]
+        show: Option<Shown>, option(value_name = "NAME", value_enum), applies(FRAMES);
+    }
+}
+
+impl FrameSettings {
+    /// The frames that are kept.
+    pub fn range(&self) -> FrameRange {
+        self.frames.unwrap_or(FrameRange { first: 0, end: 1 })
+    }
+
+    /// The preset with what was said otherwise, for ambient occlusion with these settings.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for what has no effect together.
+    pub fn settings(&self, ao: &AoSettings, seed: u32) -> Result<Settings> {
+        let mut s = self.preset.unwrap_or_default().settings();
+        let technique = self.technique.unwrap_or(s.technique);
+        if technique == Technique::Larsen && s.technique != Technique::Larsen {
+            return Err(Error::Usage("--technique larsen is --preset larsen: its settings are its own".into()));
+        }
+        if s.technique == Technique::Larsen {
+            let own = [
+                (technique != Technique::Larsen, "--technique"),
+                (self.rays_per_pixel.is_some(), "--rays-per-pixel"),
+                (self.budget.is_some(), "--budget"),
+                (self.resolution.is_some(), "--resolution"),
+                (self.sequence.is_some(), "--sequence"),
+                (self.history.is_some(), "--history"),
+                (self.filter.is_some(), "--filter"),
+                (self.filter_radius.is_some(), "--filter-radius"),
+            ];
+            if let Some((_, name)) = own.iter().find(|o| o.0) {
+                return Err(Error::Usage(format!(
+                    "{name} has no effect on --preset larsen: leave it out, or choose another preset"
+                )));
+            }
+        }
+        s.technique = technique;
+        s.primary = match self.primary.unwrap_or_default() {
+            PrimaryChoice::Auto => None,
+            PrimaryChoice::Traced => Some(Primary::Traced),
+            PrimaryChoice::Raster => Some(Primary::Raster),
+        };
+        s.rays_per_pixel = self.rays_per_pixel.unwrap_or(s.rays_per_pixel);
+        s.budget = self.budget.unwrap_or_default();
+        s.resolution = self.resolution.unwrap_or(s.resolution);
+        s.sequence = self.sequence.unwrap_or(s.sequence);
+        s.history = self.history.unwrap_or(s.history);
+        s.filter.kind = self.filter.unwrap_or(s.filter.kind);
+        s.filter.radius = self.filter_radius.unwrap_or(s.filter.radius);
+        s.radius = ao.radius();
+        s.falloff = ao.ao_falloff.unwrap_or(s.falloff);
+        s.hemisphere = ao.hemisphere();
+        s.seed = seed;
+        Ok(s)
+    }
+
+    /// Can each output hold what there is to write?
+    ///
+    /// # Errors
+    /// [`Error::Usage`].
+    pub fn check_outputs(&self, outputs: &[PathBuf]) -> Result<()> {
+        let range = self.range();
+        for path in outputs {
+            let numbered = frames::is_pattern(path)?;
+            if apng::is_apng(path) {
+                if numbered {
+                    return Err(Error::Usage(format!("{}: an animation holds all frames; leave the # out", path.display())));
+                }
+            } else if range.end - range.first > 1 && !numbered {
+                return Err(Error::Usage(format!(
+                    "{}: {} frames need a name with a place for their number, like out.####.exr, or an animation, like out.apng",
+                    path.display(),
+                    range.end - range.first
+                )));
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ranges_of_frames() {
+        assert_eq!(parse_frames("3..7"), Ok(FrameRange { first: 3, end: 7 }));
+        assert_eq!(parse_frames("5"), Ok(FrameRange { first: 5, end: 6 }));
+        for bad in ["", "..", "7..3", "3..3", "-1..2", "a..b", "4294967295"] {
+            assert!(parse_frames(bad).is_err(), "{bad}");
+        }
+    }
+}

@@ -1,0 +1,272 @@
+//! Frames in real time: one image after another, with what is known from those before.
+
+use std::time::Instant;
+
+use super::report::{FrameReport, FramesReport, Seconds, Setup};
+use super::still::{aov_needs, camera_text, scene_warnings};
+use super::{RenderSettings, Renderer, TracerRequest};
+use crate::accel::flatten::FlatScene;
+use crate::error::{Error, Result};
+use crate::film::Control;
+use crate::film::camera::CameraRecord;
+use crate::gpu::{Buffer, Device};
+use crate::integrators::ao::Hemisphere;
+use crate::integrators::aov::{self, Aov};
+use crate::output::{self, Channel, Image, Samples};
+use crate::realtime::display::{Display, Shown};
+use crate::realtime::frame_settings::FrameRange;
+use crate::realtime::sequence::{self, CameraMotion, Sequence};
+use crate::realtime::{Realtime, Settings, Technique};
+use crate::scene::load::load_camera_path;
+use crate::scene::{LightKind, Orbit, Scene};
+use crate::tracer::{Needs, Tracer};
+
+/// Frames a second, unless said otherwise.
+const DEFAULT_FPS: f64 = 30.0;
+/// Exposure of pictures, stops.
+const EXPOSURE: f32 = 0.0;
+/// Of the scene's diagonal: what shown depths and positions are measured in.
+const UNIT_OF_SCENE: f32 = 0.25;
+
+/// Frames of a scene, rendered one after the other ([`Renderer::frames`]).
+pub struct Frames<'r> {
+    device: &'r Device,
+    sequence: Sequence<'r>,
+    tracer: Tracer,
+    realtime: Realtime,
+    size: [u32; 2],
+    origin: glam::DVec3,
+    aov: Vec<Aov>,
+    fps: f64,
+    range: FrameRange,
+    warm_up: u32,
+    done: u32,
+    last_camera: CameraRecord,
+    report: FramesReport,
+    metadata: Vec<(&'static str, String)>,
+}
+
+/// A frame that was rendered.
+#[derive(Clone, Copy, Debug)]
+pub struct FrameOutput {
+    /// Its number.
+    pub number: u32,
+    /// It is no frame of the warm-up.
+    pub kept: bool,
+}
+
+impl Renderer {
+    /// Prepares frames in real time: those that `settings.frames` names, after the warm-up. `displays`: pictures of them are wanted ([`Frames::displayed`]).
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for settings that have no effect together or do not fit the scene; those of the device.
+    pub fn frames(&mut self, settings: &RenderSettings, displays: bool, control: &mut dyn Control) -> Result<Frames<'_>> {
+        settings.check()?;
+        let timeline = &settings.frames;
+        let mut how = timeline.settings(&settings.integrators.ao, settings.seed())?;
+        let shown = timeline.show.unwrap_or_default();
+        how.bent = Aov::Bent.among(&settings.image.aov) || shown == Shown::Bent;
+        how.check()?;
+        shown.check(&how)?;
+        self.light(&settings.lighting)?;
+        let scene = &self.scene;
+        let mut warnings = scene_warnings(scene);
+        warnings.iter().for_each(|w| control.warning(w));
+
+        let range = timeline.range();
+        let size = settings.size(scene);
+        output::check_size(size[0], size[1])?;
+        let aspect = f64::from(size[0]) / f64::from(size[1]);
+        let path = timeline.camera_path.as_deref().map(load_camera_path).transpose()?;
+        let camera = match &path {
+            Some(path) => path.camera_at(f64::from(range.first)),
+            None => settings.camera.choose(scene, aspect)?,
+        };
+        let fps = timeline.fps.or(path.as_ref().map(|p| p.fps())).unwrap_or(DEFAULT_FPS);
+        let motion = match (path, timeline.orbit) {
+            (Some(path), _) => CameraMotion::Path(path),
+            (None, Some(frames)) => CameraMotion::Orbit(orbit(scene, f64::from(frames))?),
+            (None, None) => CameraMotion::Still,
+        };
+        let animation = timeline.animate.as_deref().map(|a| sequence::find_animation(scene, a)).transpose()?;
+        let file_camera = scene.cameras.iter().position(|c| *c == camera);
+        let sequence = Sequence::new(scene, camera.clone(), file_camera, motion, animation, fps)?;
+        let flat = FlatScene::with_motion(scene, sequence.motion()?)?;
+        let needs = Needs { normals: how.hemisphere == Hemisphere::Shading, ..Default::default() };
+        let warm_up = timeline.warm_up.unwrap_or_else(|| if timeline.frames.is_some() { 0 } else { settling_frames(&how) });
+        let frames = u64::from(range.end - range.first) + u64::from(warm_up);
+        let request = TracerRequest {
+            needs: aov_needs(needs, &settings.image.aov),
+            streams: Realtime::streams(&how).to_vec(),
+            rays: frames * u64::from(size[0]) * u64::from(size[1]) * (1 + u64::from(how.rays_per_pixel)),
+            control: &mut *control,
+            warnings: &mut warnings,
+        };
+        let tracer = request.build(&self.device, self.kind, &flat, self.compute, &self.settings)?;
+        let mut realtime = Realtime::new(&tracer, size, &how, &point_lights(scene, &flat))?;
+        if displays {
+            let display = Display { shown, exposure: EXPOSURE, unit: UNIT_OF_SCENE * scene_size(scene) as f32 };
+            realtime.display(&tracer, Some(display))?;
+        }
+        let setup = Setup::new(self, &tracer, &flat, camera_text(&camera), warnings);
+        let primary = realtime.settings().primary.unwrap_or_default();
+        let preset = timeline.preset.unwrap_or_default();
+        let metadata = vec![
+            ("ao.falloff", how.falloff.to_string()),
+            ("ao.radius", how.radius.to_string()),
+            ("ao.normal", how.hemisphere.to_string()),
+            ("budget", how.budget.to_string()),
+            ("camera", setup.camera.clone()),
+            ("device", format!("{} ({})", setup.device, setup.driver)),
+            ("history", how.history.to_string()),
+            ("integrator", "ao".into()),
+            ("preset", preset.to_string()),
+            ("primary", primary.to_string()),
+            ("rays_per_pixel", how.rays_per_pixel.to_string()),
+            ("resolution", how.resolution.to_string()),
+            ("scene", setup.scene.clone()),
+            ("seed", how.seed.to_string()),
+            ("sequence", how.sequence.to_string()),
+            ("technique", how.technique.to_string()),
+            ("tracer", setup.tracer.to_string()),
+            ("version", env!("CARGO_PKG_VERSION").into()),
+        ];
+        let report = FramesReport {
+            setup,
+            preset,
+            settings: how,
+            primary,
+            primary_reason: realtime.primary_reason().to_owned(),
+            frames: Vec::new(),
+            mean: 0.0,
+            seconds: Seconds::default(),
+        };
+        // what a later call asks for again
+        self.pipelines = self.device.live_pipelines();
+        Ok(Frames {
+            device: &self.device,
+            last_camera: CameraRecord::new(&camera, flat.origin, aspect),
+            origin: flat.origin,
+            sequence,
+            tracer,
+            realtime,
+            size,
+            aov: settings.image.aov.clone(),
+            fps,
+            range,
+            warm_up,
+            done: 0,
+            report,
+            metadata,
+        })
+    }
+}
+
+impl Frames<'_> {
+    /// Frames in all, those of the warm-up included.
+    pub fn count(&self) -> u32 {
+        self.warm_up + self.range.end - self.range.first
+    }
+
+    /// Frames a second.
+    pub fn fps(&self) -> f64 {
+        self.fps
+    }
+
+    /// Pixels.
+    pub fn size(&self) -> [u32; 2] {
+        self.size
+    }
+
+    /// Renders the next frame; `None` after the last.
+    ///
+    /// # Errors
+    /// Those of the device.
+    pub fn advance(&mut self) -> Result<Option<FrameOutput>> {
+        if self.done >= self.count() {
+            return Ok(None);
+        }
+        let number = self.range.first + self.done.saturating_sub(self.warm_up);
+        let kept = self.done >= self.warm_up;
+        let start = Instant::now();
+        let (camera, update) = self.sequence.frame(f64::from(number), &mut self.tracer)?;
+        self.last_camera = CameraRecord::new(&camera, self.origin, f64::from(self.size[0]) / f64::from(self.size[1]));
+        let stats = self.realtime.frame(&self.tracer, &self.last_camera, &update.moved)?;
+        self.tracer.traced(stats.tracing_seconds());
+        let (seconds, update_seconds) = (start.elapsed().as_secs_f64(), update.mesh_seconds + update.top_seconds);
+        self.report.frames.push(FrameReport { number, kept, seconds, update_seconds, stats });
+        self.done += 1;
+        if self.done == self.count() {
+            self.report.mean = covered_mean(&self.realtime.result()?, &self.realtime.coverage()?);
+            self.device.check_validation()?;
+            self.device.save_pipeline_cache();
+        }
+        Ok(Some(FrameOutput { number, kept }))
+    }
+
+    /// The last frame as an image: `Y` ambient visibility, `A` 1 where the scene is, `samples` behind each pixel, and auxiliary outputs.
+    ///
+    /// # Errors
+    /// Those of the device.
+    pub fn image(&self, control: &mut dyn Control) -> Result<Image> {
+        let f32s = |name: &str, samples| Channel { name: name.into(), samples: Samples::F32(samples) };
+        let realtime = &self.realtime;
+        let mut channels =
+            vec![f32s("Y", realtime.result()?), f32s("A", realtime.coverage()?), f32s("samples", realtime.samples()?)];
+        if self.aov.iter().any(|a| *a != Aov::Bent) {
+            let pixels = aov::render(&self.tracer, &self.last_camera, self.size, control)?;
+            channels.extend(aov::channels(&self.aov, &pixels, self.origin));
+        }
+        if Aov::Bent.among(&self.aov) {
+            let bent = realtime.bent()?;
+            let axis = |k: usize| bent.iter().map(|b| b[k]).collect();
+            channels.extend(["bent.X", "bent.Y", "bent.Z"].iter().enumerate().map(|(k, name)| f32s(name, axis(k))));
+        }
+        let number = self.report.frames.last().map_or(self.range.first, |f| f.number);
+        let mut metadata: Vec<_> = self.metadata.iter().map(|(k, v)| ((*k).to_owned(), v.clone())).collect();
+        metadata.push(("frame".into(), number.to_string()));
+        metadata.sort();
+        Ok(Image { width: self.size[0], height: self.size[1], channels, metadata })
+    }
+
+    /// The last frame as it is shown, in device memory: a word a pixel, rows from the top.
+    pub fn displayed(&self) -> Option<&Buffer> {
+        self.realtime.displayed()
+    }
+
+    /// How the frames came about.
+    pub fn report(self) -> FramesReport {
+        self.report
+    }
+}
+
+/// Frames of a camera at rest after which nothing changes any more.
+fn settling_frames(settings: &Settings) -> u32 {
+    match settings.technique {
+        Technique::Larsen => 4,
+        _ => settings.history.min(Settings::MAX_SAMPLES) * settings.resolution.period() - 1,
+    }
+}
+
+/// Mean over what is covered.
+fn covered_mean(values: &[f32], coverage: &[f32]) -> f64 {
+    let sum = |v: &[f32]| v.iter().map(|&x| f64::from(x)).sum::<f64>();
+    let covered = sum(coverage);
+    if covered > 0.0 { sum(values) / covered } else { 0.0 }
+}
+
+/// Diagonal, scene units; 1 where there is nothing.
+fn scene_size(scene: &Scene) -> f64 {
+    scene.bounds().map(|(lo, hi)| (hi - lo).length()).filter(|d| *d > 0.0).unwrap_or(1.0)
+}
+
+fn orbit(scene: &Scene, frames: f64) -> Result<Orbit> {
+    let (lo, hi) = scene.bounds().ok_or_else(|| Error::Scene("nothing to turn about: the scene has no geometry".into()))?;
+    Orbit::vertical((lo + hi) * 0.5, frames)
+}
+
+/// Positions relative to the tracers' origin.
+fn point_lights(scene: &Scene, flat: &FlatScene) -> Vec<[f32; 3]> {
+    let point = scene.lights.iter().filter(|l| matches!(l.kind, LightKind::Point));
+    point.map(|l| (l.position - flat.origin).as_vec3().to_array()).collect()
+}

@@ -1,0 +1,209 @@
+//! The renderer: a device, a scene, the tracer that was built for it and the pipelines that were compiled, behind two verbs: [`Renderer::still`] and
+//! [`Renderer::frames`].
+//!
+//! What one call has built, the next one uses: the tracer, where settings need the same of the scene, and every pipeline.
+//!
+//! ```
+//! use skylit::film::NoControl;
+//! use skylit::renderer::{RenderSettings, Renderer};
+//! use skylit::tracer::DeviceSettings;
+//!
+//! let mut renderer = Renderer::open("builtin:cornell-box", &DeviceSettings::default())?;
+//! let mut settings = RenderSettings::default();
+//! settings.image.size = Some([16, 16]);
+//! settings.image.spp = Some(4);
+//! let ao = renderer.still(&settings, &mut NoControl)?;
+//! settings.integrator = "path".parse().ok();
+//! let path = renderer.still(&settings, &mut NoControl)?;
+//! println!("{:.3} of the hemisphere is open; radiance {:.3}", ao.report.mean, path.report.mean);
+//! # Ok::<(), skylit::Error>(())
+//! ```
+
+mod denoising;
+mod film_file;
+pub mod frames;
+pub mod report;
+pub mod settings;
+pub mod still;
+
+use std::sync::Arc;
+use std::time::Instant;
+
+use crate::accel::features::Blend;
+use crate::accel::flatten::FlatScene;
+use crate::error::Result;
+use crate::film::Control;
+use crate::gpu::{Device, KeptPipelines};
+use crate::integrators::lighting::LightingSettings;
+use crate::scene::{Environment, Scene, load};
+use crate::shaders::StreamShaders;
+use crate::tracer::{ComputeOptions, DeviceSettings, Needs, Tracer, TracerKind};
+
+pub use frames::{FrameOutput, Frames};
+pub use report::{FramesReport, StillReport};
+pub use settings::RenderSettings;
+pub use still::Still;
+
+/// Device, scene, tracer and pipelines.
+pub struct Renderer {
+    device: Arc<Device>,
+    name: String,
+    scene: Scene,
+    lighting: Lighting,
+    settings: DeviceSettings,
+    kind: TracerKind,
+    kind_reason: String,
+    compute: ComputeOptions,
+    tracer: Option<ReadyTracer>,
+    /// Pipelines of all that was rendered: they are not compiled again.
+    pipelines: KeptPipelines,
+    open_seconds: OpenSeconds,
+}
+
+/// What opening took. Loading and starting the device overlap.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct OpenSeconds {
+    /// Reading the scene.
+    pub load: f64,
+    /// Starting the device.
+    pub device: f64,
+}
+
+/// A tracer, and what it was made for.
+struct ReadyTracer {
+    tracer: Tracer,
+    blend: Blend,
+    needs: Needs,
+}
+
+/// What was added to a scene, so that it can be taken away again.
+#[derive(Default)]
+struct Lighting {
+    settings: LightingSettings,
+    /// Lengths of the scene's own lists: lights, materials, meshes and instances.
+    own: [usize; 4],
+    environment: Option<Environment>,
+}
+
+impl Renderer {
+    /// Loads a scene (a file, or `builtin:NAME`) while the driver starts: on small scenes they take equally long.
+    ///
+    /// # Errors
+    /// Those of [`load::load`] and [`Device::open`].
+    pub fn open(scene: &str, settings: &DeviceSettings) -> Result<Self> {
+        let timed = |start: Instant| start.elapsed().as_secs_f64();
+        let (loaded, opened, seconds) = std::thread::scope(|scope| {
+            let device = scope.spawn(|| {
+                let start = Instant::now();
+                (Device::open(&settings.options()), timed(start))
+            });
+            let start = Instant::now();
+            let loaded = load::load(scene);
+            let load = timed(start);
+            let (opened, device) = match device.join() {
+                Ok(done) => done,
+                Err(panic) => std::panic::resume_unwind(panic),
+            };
+            (loaded, opened, OpenSeconds { load, device })
+        });
+        let mut renderer = Self::new(opened?, loaded?, settings)?;
+        (renderer.name, renderer.open_seconds) = (scene.to_owned(), seconds);
+        Ok(renderer)
+    }
+
+    /// For a scene that is there, on a device that is open.
+    ///
+    /// # Errors
+    /// [`crate::Error::Usage`] for settings that contradict each other.
+    pub fn new(device: Arc<Device>, scene: Scene, settings: &DeviceSettings) -> Result<Self> {
+        let (kind, kind_reason, compute) = settings.choose(&device.info)?;
+        Ok(Self {
+            device,
+            name: scene.name.clone(),
+            lighting: Lighting::default(),
+            scene,
+            settings: settings.clone(),
+            kind,
+            kind_reason,
+            compute,
+            tracer: None,
+            pipelines: KeptPipelines::default(),
+            open_seconds: OpenSeconds::default(),
+        })
+    }
+
+    /// The scene, with the lights of the last settings.
+    pub fn scene(&self) -> &Scene {
+        &self.scene
+    }
+
+    /// The device.
+    pub fn device(&self) -> &Arc<Device> {
+        &self.device
+    }
+
+    /// The tracer that is used, and why this one.
+    pub fn tracer_kind(&self) -> (TracerKind, &str) {
+        (self.kind, &self.kind_reason)
+    }
+
+    /// Keeps every pipeline that is alive, and what the driver can keep on disk.
+    fn keep_pipelines(&mut self) {
+        self.pipelines = self.device.live_pipelines();
+        self.device.save_pipeline_cache();
+    }
+
+    /// Lights the scene as settings say. Lights of the settings before are taken away.
+    fn light(&mut self, settings: &LightingSettings) -> Result<()> {
+        if self.lighting.settings == *settings {
+            return Ok(());
+        }
+        let s = &mut self.scene;
+        let before = std::mem::take(&mut self.lighting);
+        if before.settings != LightingSettings::default() {
+            let [lights, materials, meshes, instances] = before.own;
+            s.lights.truncate(lights);
+            s.materials.truncate(materials);
+            s.meshes.truncate(meshes);
+            s.instances.truncate(instances);
+            s.environment = before.environment.unwrap_or_default();
+        }
+        // what is traced changes
+        self.tracer = None;
+        let own = [s.lights.len(), s.materials.len(), s.meshes.len(), s.instances.len()];
+        let environment = Some(s.environment.clone());
+        settings.apply(s)?;
+        self.lighting = Lighting { settings: settings.clone(), own, environment };
+        Ok(())
+    }
+}
+
+/// A tracer for a scene: the one that is there, if it was made for at least this; else a new one.
+struct TracerRequest<'a> {
+    needs: Needs,
+    streams: Vec<&'static StreamShaders>,
+    /// Rays that will be traced, about.
+    rays: u64,
+    control: &'a mut dyn Control,
+    warnings: &'a mut Vec<String>,
+}
+
+impl TracerRequest<'_> {
+    fn build(
+        self,
+        device: &Arc<Device>,
+        kind: TracerKind,
+        flat: &FlatScene,
+        compute: ComputeOptions,
+        settings: &DeviceSettings,
+    ) -> Result<Tracer> {
+        let mut build = settings.build_options(self.rays);
+        build.streams.extend(self.streams);
+        let tracer = Tracer::with_build(device, kind, flat, self.needs, compute, &build)?;
+        for warning in build.take_warnings() {
+            self.control.warning(&warning);
+            self.warnings.push(warning);
+        }
+        Ok(tracer)
+    }
+}
