@@ -8,9 +8,9 @@ use std::time::Duration;
 use clap::{Args, ValueHint};
 use serde::Serialize;
 
+use crate::bench::plot::chart::Picture;
 use crate::error::{Error, Result};
 use crate::gpu::{self, Device};
-use crate::measure::chart::Picture;
 use crate::output;
 use crate::terminal::console::Console;
 use crate::terminal::parse::parse_seconds;

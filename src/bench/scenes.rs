@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use glam::DVec3;
 
-use super::args::BenchRaysArgs;
+use super::rays::BenchRaysArgs;
 use crate::error::Result;
 use crate::film::camera::{self, Choice};
 use crate::scene::{AlphaMode, Camera, Scene, builtin, load};

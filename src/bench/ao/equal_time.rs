@@ -4,9 +4,9 @@ use super::candidates::CANDIDATES;
 use super::laps::Laps;
 use super::reference::Truth;
 use super::shot::{Shot, first_timed};
+use crate::bench::record::ao::{EqualTime, ViewRecord};
+use crate::bench::record::ao_verdict::{OURS, THEIRS};
 use crate::error::Result;
-use crate::measure::ao_benchmark::verdict::{OURS, THEIRS};
-use crate::measure::ao_benchmark::{EqualTime, ViewRecord};
 use crate::realtime::Settings;
 
 /// Frames that are timed while the number of rays is looked for.

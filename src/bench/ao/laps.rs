@@ -2,9 +2,9 @@
 
 use std::time::Instant;
 
+use crate::bench::record::ao::{Cost, PassTime};
 use crate::error::Result;
 use crate::film::camera::CameraRecord;
-use crate::measure::ao_benchmark::{Cost, PassTime};
 use crate::measure::stats::Spread;
 use crate::realtime::{FrameStats, Realtime, Technique};
 use crate::terminal::interrupt;

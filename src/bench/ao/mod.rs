@@ -23,10 +23,10 @@ use args::{FalloffChoice, Part};
 
 use super::scenes::check_there;
 use crate::accel::flatten::FlatScene;
+use crate::bench::plot;
+use crate::bench::record::ao::AoBenchmark;
 use crate::error::{Error, Result};
 use crate::gpu::Device;
-use crate::measure::ao_benchmark::AoBenchmark;
-use crate::measure::ao_plot;
 use crate::terminal::console::{Console, Failure};
 use crate::terminal::interrupt::{self, ProgressControl};
 use crate::terminal::progress::Progress;
@@ -79,7 +79,7 @@ pub fn run(args: &BenchAoArgs) -> Result<(), Failure> {
     if measured.is_ok() {
         device.save_pipeline_cache();
     }
-    let written = if out.is_empty() { Ok(()) } else { args.common.write(&out, |f| out.write_csv(f), || ao_plot::draw(&out)) };
+    let written = if out.is_empty() { Ok(()) } else { args.common.write(&out, |f| out.write_csv(f), || plot::ao::draw(&out)) };
     let nothing = || Error::Usage(format!("nothing was measured: {}", out.notes.last().map_or("no scene", String::as_str)));
     let verdict = match failed {
         Some(e) if out.is_empty() || !args.scenes.is_empty() => Err(e),

@@ -4,9 +4,9 @@ use super::candidates::Candidate;
 use super::laps::Laps;
 use super::reference::{Referee, Truth};
 use super::shot::{Shot, first_timed};
+use crate::bench::record::ao::{Errors, Moving};
 use crate::error::Result;
 use crate::film::camera::CameraRecord;
-use crate::measure::ao_benchmark::{Errors, Moving};
 use crate::realtime::Technique;
 use crate::scene::{Camera, Orbit};
 

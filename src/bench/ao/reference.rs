@@ -2,9 +2,9 @@
 //! of the reference itself is known.
 
 use super::candidates::Occlusion;
+use crate::bench::record::ao::Errors;
 use crate::error::Result;
 use crate::film::camera::CameraRecord;
-use crate::measure::ao_benchmark::Errors;
 use crate::measure::flip::{PIXELS_PER_DEGREE, flip};
 use crate::measure::metrics::ImagePair;
 use crate::raster::Primary;

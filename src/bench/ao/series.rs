@@ -7,10 +7,10 @@ use super::scenes::{self, Subject};
 use super::shot::{Shot, first_timed};
 use super::{Bench, table};
 use crate::accel::flatten::FlatScene;
+use crate::bench::record::ao::{SeriesLine, SeriesPoint, SeriesRecord};
+use crate::bench::record::ao_verdict::{OURS, THEIRS};
 use crate::error::Result;
 use crate::film::camera::CameraRecord;
-use crate::measure::ao_benchmark::verdict::{OURS, THEIRS};
-use crate::measure::ao_benchmark::{SeriesLine, SeriesPoint, SeriesRecord};
 use crate::realtime::Settings;
 use crate::sampling::Sequence;
 

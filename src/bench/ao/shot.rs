@@ -3,9 +3,9 @@
 use super::candidates::{Candidate, Occlusion};
 use super::laps::Laps;
 use super::reference::Truth;
+use crate::bench::record::ao::{Errors, Point, Rest, Still};
 use crate::error::Result;
 use crate::film::camera::CameraRecord;
-use crate::measure::ao_benchmark::{Errors, Point, Rest, Still};
 use crate::realtime::{Filter, FilterKind, Realtime, Settings, Technique};
 use crate::tracer::Tracer;
 

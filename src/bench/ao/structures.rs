@@ -5,8 +5,8 @@ use glam::{DAffine3, Vec3};
 
 use super::{Bench, table};
 use crate::accel::flatten::{FlatScene, Motion};
+use crate::bench::record::ao::StructureRecord;
 use crate::error::{Error, Result};
-use crate::measure::ao_benchmark::StructureRecord;
 use crate::measure::stats::Spread;
 use crate::scene::{Geometry, load};
 use crate::terminal::interrupt;

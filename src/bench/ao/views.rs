@@ -10,9 +10,9 @@ use super::scenes::{self, Subject, View};
 use super::shot::Shot;
 use super::table;
 use crate::accel::flatten::FlatScene;
+use crate::bench::record::ao::{TechniqueRecord, Verdict, ViewRecord};
 use crate::error::Result;
 use crate::film::camera::CameraRecord;
-use crate::measure::ao_benchmark::{TechniqueRecord, Verdict, ViewRecord};
 use crate::raster::Primary;
 
 /// Both views of a scene.

@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use super::peer::Peer;
 use crate::accel::flatten::FlatScene;
-use crate::bench::process::PeerError;
+use crate::bench::peers::process::PeerError;
 use crate::error::Result;
 use crate::film::camera::CameraRecord;
 use crate::integrators::path::{PathIntegrator, PathOptions};

@@ -14,17 +14,17 @@ pub use args::BenchPathArgs;
 use engine::{Engine, OWN, STEP, Truth, truth};
 use peer::Peer;
 
-use super::contestant::peer_kernel;
-use super::peers_file::{self, Measures, PeerSpec};
-use super::process::PeerError;
+use super::peers::file as peers_file;
+use super::peers::file::{Measures, PeerSpec};
+use super::peers::process::PeerError;
 use crate::accel::flatten::FlatScene;
+use crate::bench::plot;
+use crate::bench::record::path::{Contestant, Difference, PathBenchmark, PathScene, Point, Reference};
 use crate::error::{Error, Result};
 use crate::film::camera::CameraRecord;
 use crate::gpu::Device;
 use crate::integrators::path::{self, PathOptions};
-use crate::measure::metrics::ImagePair;
-use crate::measure::path_benchmark::{Contestant, Difference, PathBenchmark, PathScene, Point, Reference, bad_pixels};
-use crate::measure::path_plot;
+use crate::measure::metrics::{ImagePair, bad_pixels};
 use crate::measure::stats::Summary;
 use crate::terminal::console::{Console, Failure};
 use crate::terminal::interrupt::{self, ProgressControl};
@@ -79,7 +79,8 @@ pub fn run(args: &BenchPathArgs) -> Result<(), Failure> {
     if measured.is_ok() {
         device.save_pipeline_cache();
     }
-    let written = if out.is_empty() { Ok(()) } else { args.common.write(&out, |f| out.write_csv(f), || path_plot::draw(&out)) };
+    let written =
+        if out.is_empty() { Ok(()) } else { args.common.write(&out, |f| out.write_csv(f), || plot::path::draw(&out)) };
     let nothing = || Error::Usage(format!("nothing was measured: {}", out.notes.last().map_or("no scene", String::as_str)));
     let verdict = match failed {
         Some(e) if out.is_empty() || !args.scenes.is_empty() => Err(e),
@@ -262,7 +263,7 @@ impl<'a> Bench<'a> {
         truths.push(theirs);
         let truth = truths.len() - 1;
         let entry = |kernel: &String| Entry {
-            name: peer_kernel(&spec.name, kernel),
+            name: spec.title_of(kernel),
             truth,
             engine: engine(kernel),
             laps: Vec::new(),

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use glam::{Affine2, Vec3};
 use serde_json::{Value, json};
 
-use crate::bench::peers_file::PeerSpec;
-use crate::bench::process::{PeerError, Process};
+use crate::bench::peers::file::PeerSpec;
+use crate::bench::peers::process::{PeerError, Process};
 use crate::error::{Error, Result};
 use crate::scene::{
     AlphaMode, Camera, Environment, Filter, Geometry, LightKind, Material, Projection, Scene, TextureSlot, Wrap,

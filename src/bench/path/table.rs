@@ -1,7 +1,7 @@
 //! What people read.
 
+use crate::bench::record::path::{Contestant, How, PathScene};
 use crate::bench::table::{align, number, thousands};
-use crate::measure::path_benchmark::{Contestant, How, PathScene};
 
 /// One scene's results.
 pub fn scene(record: &PathScene) -> Vec<String> {

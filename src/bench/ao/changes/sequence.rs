@@ -7,8 +7,8 @@ use crate::bench::ao::laps::Laps;
 use crate::bench::ao::moving::measured;
 use crate::bench::ao::reference::Truth;
 use crate::bench::ao::shot::first_timed;
+use crate::bench::record::ao::{ChangeRecord, Errors};
 use crate::error::Result;
-use crate::measure::ao_benchmark::{ChangeRecord, Errors};
 use crate::measure::stats::Spread;
 use crate::measure::temporal::Ghosting;
 

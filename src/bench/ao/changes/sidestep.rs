@@ -6,9 +6,9 @@ use super::script::Script;
 use super::{RECOVERED, Stage, candidates, masks, result_of};
 use crate::bench::ao::Bench;
 use crate::bench::ao::laps::Laps;
+use crate::bench::record::ao::ChangeRecord;
 use crate::error::Result;
 use crate::film::camera::CameraRecord;
-use crate::measure::ao_benchmark::ChangeRecord;
 use crate::measure::temporal::recovery;
 use crate::scene::Camera;
 

@@ -6,8 +6,8 @@ use std::io::Write;
 
 use serde::Serialize;
 
-use super::agreement::Agreement;
-use super::stats::{LogScaling, Summary};
+use crate::measure::agreement::Agreement;
+use crate::measure::stats::{LogScaling, Summary};
 
 /// A whole run.
 #[derive(Clone, Debug, Default, Serialize)]

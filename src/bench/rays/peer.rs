@@ -3,9 +3,9 @@
 use std::io::{BufWriter, Write};
 use std::path::Path;
 
-use super::peers_file::PeerSpec;
-use super::process::{PeerError, Process};
 use crate::accel::flatten::FlatScene;
+use crate::bench::peers::file::PeerSpec;
+use crate::bench::peers::process::{PeerError, Process};
 use crate::error::{Error, Result};
 use crate::integrators::rays::Mode;
 use crate::ray::{Hit, Ray};

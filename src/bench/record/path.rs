@@ -8,7 +8,7 @@ use std::io::Write;
 
 use serde::Serialize;
 
-use super::stats::Summary;
+use crate::measure::stats::Summary;
 
 /// A whole run.
 #[derive(Clone, Debug, Default, Serialize)]
@@ -250,14 +250,6 @@ impl PathBenchmark {
     }
 }
 
-/// Share of pixels, RGB, that differ by more than a tenth of white in any channel after 1 - exp(-radiance).
-pub fn bad_pixels(image: &[f32], reference: &[f32]) -> f64 {
-    let shown = |x: &f32| 1.0 - (-x).exp();
-    let bad = image.chunks_exact(3).zip(reference.chunks_exact(3));
-    let bad = bad.filter(|(a, b)| !a.iter().zip(*b).all(|(a, b)| (shown(a) - shown(b)).abs() <= 0.1)).count();
-    bad as f64 / (image.len() / 3).max(1) as f64
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -284,15 +276,5 @@ mod tests {
         scene.set_target("x");
         assert_eq!(scene.target.as_ref().unwrap().rmse, 0.25);
         assert_eq!(scene.results[0].seconds_to_target.unwrap().seconds, 16.0);
-    }
-
-    #[test]
-    fn bad_pixels_are_seen() {
-        let reference = [0.0, 0.0, 0.0, 5.0, 5.0, 5.0];
-        assert_eq!(bad_pixels(&reference, &reference), 0.0);
-        // bright ones look alike
-        assert_eq!(bad_pixels(&[0.0, 0.0, 0.0, 9.0, 9.0, 9.0], &reference), 0.0);
-        assert_eq!(bad_pixels(&[0.0, 0.2, 0.0, 5.0, 5.0, 5.0], &reference), 0.5);
-        assert_eq!(bad_pixels(&[0.0, f32::NAN, 0.0, 5.0, 5.0, 5.0], &reference), 0.5);
     }
 }

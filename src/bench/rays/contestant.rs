@@ -3,14 +3,14 @@
 use std::sync::Arc;
 
 use super::peer::Peer;
-use super::process::PeerError;
 use super::streams::{Set, sample};
 use crate::accel::flatten::FlatScene;
+use crate::bench::peers::process::PeerError;
+use crate::bench::record::rays::BuildRecord;
 use crate::error::{Error, Result};
 use crate::film::Control;
 use crate::gpu::{Device, DeviceInfo};
 use crate::integrators::rays::{Mode, PreparedRays};
-use crate::measure::benchmark::BuildRecord;
 use crate::ray::{Hit, Ray};
 use crate::tracer::{BuildOptions, Kernel, Needs, Tracer, TracerKind};
 
@@ -114,7 +114,7 @@ impl<'a> Contestant<'a> {
     /// When the peer fails to build.
     pub fn peer(peers: &mut [Peer], index: usize, kernel: &str, flat: &'a FlatScene<'a>) -> Result<Self, PeerError> {
         let peer = &mut peers[index];
-        let name = peer_kernel(&peer.process.spec.name, kernel);
+        let name = peer.process.spec.title_of(kernel);
         let (build_seconds, bytes) = peer.build(kernel)?;
         let build = BuildRecord {
             contestant: name.clone(),
@@ -180,11 +180,6 @@ impl<'a> Contestant<'a> {
             }
         }
     }
-}
-
-/// A peer's kernel in tables.
-pub fn peer_kernel(peer: &str, kernel: &str) -> String {
-    format!("{peer} {kernel}")
 }
 
 /// A contestant about to trace one stream again and again.

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::scenes::Subject;
+use crate::bench::scenes::Subject;
 use crate::error::{Error, Result};
 use crate::film::Control;
 use crate::film::camera::CameraRecord;

@@ -4,11 +4,10 @@
 
 use plotters::prelude::*;
 
-use super::benchmark::{RayBenchmark, family};
-pub use super::chart::Picture;
-use super::chart::{Area, Chart, HEAD, LEGEND_LINE, PANEL, axes, color, draw_legend, failed, fonts};
-use super::stats::Summary;
+use super::chart::{Area, Chart, HEAD, LEGEND_LINE, PANEL, Picture, axes, color, draw_legend, failed, fonts};
+use crate::bench::record::rays::{RayBenchmark, family};
 use crate::error::{Error, Result};
+use crate::measure::stats::Summary;
 
 /// Draws all results. Scenes of a family (`terrain:N`) are joined by lines: circles for the first family, triangles for the
 /// second, crosses for others; scenes without a family are hollow circles. The dashed line falls as
@@ -131,7 +130,7 @@ fn draw_log_law(chart: &mut Chart, from: Mark, to: f64) -> Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::measure::benchmark::{RunRecord, SceneRecord, StreamRecord};
+    use crate::bench::record::rays::{RunRecord, SceneRecord, StreamRecord};
 
     fn benchmark(rates: &[(&str, u64, f64)]) -> RayBenchmark {
         let run = |rate: f64| RunRecord {

@@ -116,6 +116,11 @@ pub fn read(path: &Path) -> Result<Vec<PeerSpec>> {
 }
 
 impl PeerSpec {
+    /// Name of one of its kernels in tables.
+    pub fn title_of(&self, kernel: &str) -> String {
+        format!("{} {kernel}", self.name)
+    }
+
     /// What it lacks, as the end of a sentence.
     pub fn missing(&self, why: &str) -> String {
         let needs = if self.needs.is_empty() { String::new() } else { format!("; it needs {}", self.needs) };

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use serde_json::Value;
 
-use super::peers_file::PeerSpec;
+use super::file::PeerSpec;
 use crate::error::{Error, Result};
 use crate::terminal::interrupt;
 

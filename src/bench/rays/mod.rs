@@ -1,24 +1,31 @@
 //! `skylit bench rays`: rates of all contestants, taken in turn, so that a machine that slows down for a while slows all of
 //! them down.
 
+mod args;
+mod contestant;
+mod peer;
+mod streams;
+mod table;
+
 use std::sync::Arc;
 use std::time::Instant;
 
-use super::args::BenchRaysArgs;
-use super::contestant::{Contestant, Lap, OWN, Run, peer_kernel};
-use super::peer::Peer;
-use super::peers_file::{self, Measures};
-use super::process::PeerError;
+pub use args::BenchRaysArgs;
+use contestant::{Contestant, Lap, OWN, Run};
+use peer::Peer;
+use streams::{RaySets, STREAMS, Set, StreamKind};
+
+use super::peers::file as peers_file;
+use super::peers::file::Measures;
+use super::peers::process::PeerError;
 use super::scenes::{self, Subject};
-use super::streams::{RaySets, STREAMS, Set, StreamKind};
-use super::table;
 use crate::accel::flatten::FlatScene;
+use crate::bench::plot;
+use crate::bench::record::rays::{CheckRecord, Ratio, RayBenchmark, RunRecord, SceneRecord, StreamRecord};
 use crate::error::{Error, Result};
 use crate::gpu::Device;
 use crate::integrators::rays::Mode;
 use crate::measure::agreement;
-use crate::measure::benchmark::{CheckRecord, Ratio, RayBenchmark, RunRecord, SceneRecord, StreamRecord};
-use crate::measure::plot;
 use crate::measure::stats::{Summary, paired_ratio};
 use crate::ray::Ray;
 use crate::terminal::console::{Console, Failure};
@@ -73,8 +80,11 @@ pub fn run(args: &BenchRaysArgs) -> Result<(), Failure> {
     }
     out.find_scaling();
     let shown = table::scaling(&out).iter().try_for_each(|line| console.line(line));
-    let written =
-        if out.rows().next().is_some() { args.common.write(&out, |f| out.write_csv(f), || plot::draw(&out)) } else { Ok(()) };
+    let written = if out.rows().next().is_some() {
+        args.common.write(&out, |f| out.write_csv(f), || plot::rays::draw(&out))
+    } else {
+        Ok(())
+    };
     let verdict = verdict(args, &out);
     console.close(&out, measured.and(valid).and(shown).and(written).and(verdict))
 }
@@ -201,7 +211,7 @@ impl Bench<'_> {
             self.phase(format!("{how} peer '{}'", spec.name));
             match Peer::start(spec) {
                 Ok(peer) => {
-                    self.out.baselines.extend(spec.baselines.iter().map(|k| peer_kernel(&spec.name, k)));
+                    self.out.baselines.extend(spec.baselines.iter().map(|k| spec.title_of(k)));
                     self.out.peers.push(peer.process.title.clone());
                     self.peers.push(peer);
                 }
