@@ -4,7 +4,9 @@
 #![deny(unsafe_code)]
 
 pub mod accel;
+#[cfg(feature = "bench")]
 pub mod bench;
+#[cfg(feature = "cli")]
 pub mod cli;
 pub mod denoise;
 pub mod error;
@@ -22,6 +24,7 @@ pub mod realtime;
 pub mod sampling;
 pub mod scene;
 pub mod shaders;
+#[cfg(feature = "cli")]
 pub mod terminal;
 pub mod tracer;
 
