@@ -2,15 +2,13 @@
 
 use std::io::Write;
 use std::path::PathBuf;
-use std::sync::Arc;
 use std::time::Duration;
 
 use clap::{Args, ValueHint};
-use serde::Serialize;
 
-use crate::bench::plot::chart::Picture;
+use super::plot::chart::Picture;
+use super::record::BenchRecord;
 use crate::error::{Error, Result};
-use crate::gpu::{self, Device};
 use crate::output;
 use crate::terminal::console::Console;
 use crate::terminal::parse::parse_seconds;
@@ -73,24 +71,11 @@ impl CommonArgs {
         }
     }
 
-    /// Opens the device.
-    ///
-    /// # Errors
-    /// Those of [`Device::open`].
-    pub fn open_device(&self) -> Result<Arc<Device>> {
-        Device::open(&gpu::Options { device: self.device.clone(), validation: self.validation, ..Default::default() })
-    }
-
     /// Writes the files that were asked for; one that cannot be written does not stop the others.
     ///
     /// # Errors
     /// The first that went wrong.
-    pub fn write(
-        &self,
-        record: &impl Serialize,
-        table: impl Fn(&mut dyn Write) -> std::result::Result<(), csv::Error>,
-        picture: impl Fn() -> Result<Picture>,
-    ) -> Result<()> {
+    pub fn write(&self, record: &impl BenchRecord, picture: impl Fn() -> Result<Picture>) -> Result<()> {
         let json = self.json_file().map_or(Ok(()), |path| {
             let text = serde_json::to_string_pretty(record)
                 .map_err(|e| Error::CheckFailed(format!("cannot express the result as JSON: {e}")))?;
@@ -99,7 +84,7 @@ impl CommonArgs {
         let csv = self
             .csv
             .as_ref()
-            .map_or(Ok(()), |path| output::write_atomically(path, |f| table(f).map_err(std::io::Error::other)));
+            .map_or(Ok(()), |path| output::write_atomically(path, |f| record.write_csv(f).map_err(std::io::Error::other)));
         let plot = self.plot.as_ref().map_or(Ok(()), |path| {
             let picture = picture()?;
             output::png::write_rgb(path, &picture.rgb, picture.width, picture.height)

@@ -2,17 +2,21 @@
 //! real-time ambient occlusion and its path tracing are.
 //!
 //! Each benchmark is a folder: `rays`, `ao`, `path`. What they share is beside them: `record` holds what they find, `plot` and `table`
-//! show it, `peers` runs the programs of others, `scenes` knows the well-known scenes.
+//! show it, `peers` runs the programs of others, `scenes` knows the well-known scenes, `session` is a run
+//! under way, and `device` alone opens the device and builds tracers.
 
 mod ao;
 mod args;
 mod common;
+mod device;
 mod path;
 mod peers;
 mod plot;
 mod rays;
 mod record;
+mod reference;
 mod scenes;
+mod session;
 mod table;
 
 pub use args::BenchArgs;

@@ -26,7 +26,8 @@ pub fn draw(benchmark: &AoBenchmark) -> Result<Picture> {
     });
     let panels: Vec<Panel> = views.chain(changes).chain(benchmark.series.iter().flat_map(series)).collect();
     let [width, height] = benchmark.size;
-    let subtitle = format!("{} ({}), tracer {}, {width}x{height}", benchmark.device, benchmark.driver, benchmark.tracer);
+    let subtitle =
+        format!("{} ({}), tracer {}, {width}x{height}", benchmark.host.device, benchmark.host.driver, benchmark.tracer);
     chart::draw("Real-time ambient occlusion", &subtitle, &panels)
 }
 

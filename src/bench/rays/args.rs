@@ -2,7 +2,7 @@
 
 use clap::{Args, ValueHint};
 
-use super::contestant::OWN;
+use super::contestant::KERNELS;
 use super::streams::STREAMS;
 use crate::bench::common::CommonArgs;
 use crate::terminal::device_args::BuildChoice;
@@ -56,7 +56,7 @@ pub struct BenchRaysArgs {
 }
 
 fn kernel_names() -> clap::builder::PossibleValuesParser {
-    OWN.iter().map(|o| o.name).collect::<Vec<_>>().into()
+    KERNELS.iter().map(|o| o.name).collect::<Vec<_>>().into()
 }
 
 fn stream_names() -> clap::builder::PossibleValuesParser {

@@ -5,19 +5,15 @@
 
 use serde::Serialize;
 
+use super::{Completeness, HostInfo};
 use crate::measure::stats::Spread;
 
 /// A whole run.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct AoBenchmark {
-    /// Of skylit.
-    pub version: String,
-    /// Vulkan device.
-    pub device: String,
-    /// Its driver.
-    pub driver: String,
-    /// Logical processors of the host.
-    pub threads: usize,
+    /// What it ran on.
+    #[serde(flatten)]
+    pub host: HostInfo,
     /// What traces rays.
     pub tracer: String,
     /// Pixels of the images, but where a series says otherwise.
@@ -36,17 +32,9 @@ pub struct AoBenchmark {
     pub structures: Vec<StructureRecord>,
     /// One number varied, all others the same.
     pub series: Vec<SeriesRecord>,
-    /// The time limit ended it.
-    pub stopped_early: bool,
-    /// What was left out, and why.
-    pub notes: Vec<String>,
-}
-
-impl AoBenchmark {
-    /// Is there nothing in it?
-    pub fn is_empty(&self) -> bool {
-        self.views.is_empty() && self.changes.is_empty() && self.structures.is_empty() && self.series.is_empty()
-    }
+    /// What is missing.
+    #[serde(flatten)]
+    pub completeness: Completeness,
 }
 
 /// One scene from one place.

@@ -3,6 +3,7 @@
 use std::io::Write;
 
 use super::ao::{AoBenchmark, ChangeResult, Cost, Errors, SeriesPoint, Still};
+use super::{BenchRecord, Completeness};
 use crate::measure::stats::Spread;
 
 const COLUMNS: [&str; 40] = [
@@ -91,12 +92,16 @@ impl Row {
     }
 }
 
-impl AoBenchmark {
-    /// Writes one row a result. What is not known is empty.
-    ///
-    /// # Errors
-    /// Those of `out`.
-    pub fn write_csv(&self, out: impl Write) -> csv::Result<()> {
+impl BenchRecord for AoBenchmark {
+    fn completeness(&mut self) -> &mut Completeness {
+        &mut self.completeness
+    }
+
+    fn is_empty(&self) -> bool {
+        self.views.is_empty() && self.changes.is_empty() && self.structures.is_empty() && self.series.is_empty()
+    }
+
+    fn write_csv(&self, out: &mut dyn Write) -> csv::Result<()> {
         let mut csv = csv::Writer::from_writer(out);
         csv.write_record(COLUMNS)?;
         for row in self.rows() {
@@ -105,7 +110,9 @@ impl AoBenchmark {
         csv.flush()?;
         Ok(())
     }
+}
 
+impl AoBenchmark {
     fn rows(&self) -> Vec<Row> {
         let mut rows = Vec::new();
         self.view_rows(&mut rows);

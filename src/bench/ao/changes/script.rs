@@ -13,7 +13,7 @@ use crate::tracer::{Tracer, UpdateStats};
 pub type Advance<'a> = Box<dyn FnMut(&mut Tracer, u32) -> Result<UpdateStats> + 'a>;
 
 /// A scene, what may change in it, and what does.
-pub struct Script<'a> {
+pub struct ChangeScript<'a> {
     /// In tables.
     pub name: String,
     /// As it is at the beginning.
@@ -31,7 +31,7 @@ pub struct Script<'a> {
 /// Of an animation.
 const FRAMES_PER_SECOND: f64 = 60.0;
 
-impl<'a> Script<'a> {
+impl<'a> ChangeScript<'a> {
     /// A scene's first animation, seen by a camera that stands still; `None` where it has none.
     ///
     /// # Errors
