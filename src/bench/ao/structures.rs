@@ -4,11 +4,11 @@
 use glam::{DAffine3, Vec3};
 
 use super::{Bench, table};
-use crate::accel::flatten::{FlatScene, Motion};
+use crate::accel::flatten::FlatScene;
 use crate::error::{Error, Result};
 use crate::measure::ao_benchmark::StructureRecord;
 use crate::measure::stats::Spread;
-use crate::scene::{Geometry, load};
+use crate::scene::{Geometry, Motion, load};
 use crate::terminal::interrupt;
 use crate::tracer::{Changes, MeshChange, Tracer};
 
