@@ -23,7 +23,6 @@ use common::{assert_validation_clean, device, tracers};
 use glam::{DVec3, Vec3};
 use serde::Deserialize;
 use skylit::accel::flatten::FlatScene;
-use skylit::cli::lights;
 use skylit::film::NoControl;
 use skylit::film::camera::CameraRecord;
 use skylit::gpu::Device;
@@ -32,6 +31,7 @@ use skylit::output::exr;
 use skylit::scene::builtin::shapes;
 use skylit::scene::load::{load_environment, load_file};
 use skylit::scene::{Environment, Scene};
+use skylit::terminal::lights;
 use skylit::tracer::{Needs, Tracer, TracerKind};
 
 /// Scenes for tracers and drivers of which the shading code is known to be right from another's images: alpha, spheres, instances, walls and volumes that rays go through,

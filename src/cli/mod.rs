@@ -7,7 +7,7 @@ mod doctor;
 mod export;
 mod film;
 mod frames;
-pub(crate) mod paths;
+mod paths;
 mod rays;
 mod render;
 mod report;
@@ -24,7 +24,6 @@ use crate::error::{Error, Result};
 use crate::terminal::console::Failure;
 use crate::terminal::warnings::one_line;
 use crate::terminal::{console, panic};
-pub use paths::lights;
 
 /// What the process returns; part of `--help`.
 pub const EXIT_CODES: &str = "\

@@ -3,7 +3,9 @@
 pub mod console;
 pub mod device_args;
 pub mod interrupt;
+pub mod lights;
 pub mod panic;
 pub mod parse;
 pub mod progress;
+pub mod sampling;
 pub mod warnings;

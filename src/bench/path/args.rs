@@ -6,9 +6,9 @@ use std::time::Duration;
 use clap::{Args, ValueHint};
 
 use crate::bench::common::CommonArgs;
-use crate::cli::paths::args::Sampling;
 use crate::terminal::device_args::{BuildChoice, TracerChoice};
 use crate::terminal::parse::{parse_seconds, parse_size};
+use crate::terminal::sampling::Sampling;
 
 /// Pixels, unless said otherwise.
 const DEFAULT_SIZE: [u32; 2] = [256, 256];

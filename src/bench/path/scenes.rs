@@ -7,12 +7,12 @@ use glam::{DAffine3, DMat3, DVec3, Vec3};
 
 use super::args::BenchPathArgs;
 use crate::bench::scenes::{check_there, folder, is_file};
-use crate::cli::paths::lights;
 use crate::error::Result;
 use crate::film::camera::{self, Choice};
 use crate::scene::builtin::shapes;
 use crate::scene::material::MaterialKind;
 use crate::scene::{Camera, Environment, EnvironmentMap, Instance, Material, Mesh, Scene, load};
+use crate::terminal::lights;
 
 /// The map with a sun in it, below the folder of shared scenes.
 const SUN_MAP: &str = "env/spruit_sunrise_1k.hdr";

@@ -6,40 +6,14 @@ use clap::{Args, ValueEnum, ValueHint};
 use glam::{DMat3, Vec3};
 
 use super::denoise::DenoiseChoice;
-use super::lights::LightSpec;
 use crate::cli::args::{Aov, Integrator, RenderArgs};
 use crate::error::{Error, Result};
-use crate::integrators::path::{PixelFilter, Strategy, TextureFilter};
+use crate::integrators::path::{PixelFilter, TextureFilter};
 use crate::output::tone_map::ToneMap;
 use crate::scene::{Environment, load};
+use crate::terminal::lights::{self, LightSpec};
 use crate::terminal::parse::{parse_number, parse_vector, parse_where};
-
-/// How directions are drawn.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Sampling {
-    /// Multiple importance sampling of BSDF and lights, power heuristic
-    Mis,
-    /// BSDF sampling only
-    Bsdf,
-    /// Light sampling for emitters that it can sample, BSDF sampling for the rest
-    Light,
-    /// Cosine-weighted hemisphere sampling
-    Cosine,
-    /// Uniform hemisphere sampling
-    Uniform,
-}
-
-impl From<Sampling> for Strategy {
-    fn from(s: Sampling) -> Self {
-        match s {
-            Sampling::Mis => Strategy::Mis,
-            Sampling::Bsdf => Strategy::Bsdf,
-            Sampling::Light => Strategy::Light,
-            Sampling::Cosine => Strategy::Cosine,
-            Sampling::Uniform => Strategy::Uniform,
-        }
-    }
-}
+use crate::terminal::sampling::Sampling;
 
 /// Reconstruction filter of pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -137,7 +111,7 @@ pub struct PathArgs {
     pub energy_compensation: bool,
     /// Add a light: point, spot, sun, sphere, rectangle or disk, then key=value: position, direction (in which it emits), radius, size=W,H,
     /// intensity (cd), irradiance (lux) or radiance, color=R,G,B or temperature=K, and outer, inner, angle in degrees. May be repeated
-    #[arg(long, value_name = "SPEC", value_parser = super::lights::parse)]
+    #[arg(long, value_name = "SPEC", value_parser = lights::parse)]
     pub light: Vec<LightSpec>,
     /// Albedo of all surfaces with --integrator ao-sky [default: 0.5]
     #[arg(long, value_name = "X", value_parser = parse_albedo, allow_hyphen_values = true)]

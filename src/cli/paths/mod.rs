@@ -2,7 +2,6 @@
 
 pub mod args;
 pub mod denoise;
-pub mod lights;
 mod report;
 
 use std::path::Path;
