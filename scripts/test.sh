@@ -45,7 +45,11 @@ if cargo fmt --version >/dev/null 2>&1; then
 fi
 if cargo clippy --version >/dev/null 2>&1; then
   say "lints"
-  cargo clippy --locked --all-targets -- -D warnings
+  # the program as it is released, the library alone, and the program without benchmarks
+  for features in "" "--no-default-features" "--no-default-features --features cli"; do
+    # shellcheck disable=SC2086 # words, or none
+    cargo clippy --locked $features --all-targets -- -D warnings
+  done
 fi
 
 say "tests on the default driver"

@@ -4,10 +4,14 @@
 #![deny(unsafe_code)]
 
 pub mod accel;
+#[cfg(feature = "bench")]
 pub mod bench;
+#[cfg(feature = "cli")]
 pub mod cli;
+pub mod colour;
 pub mod denoise;
 pub mod error;
+pub mod files;
 pub mod film;
 #[allow(unsafe_code, reason = "Vulkan is called here, and nowhere else")]
 pub mod gpu;
@@ -24,6 +28,7 @@ pub mod sampling;
 pub mod scene;
 pub mod settings;
 pub mod shaders;
+#[cfg(feature = "cli")]
 pub mod terminal;
 pub mod tracer;
 

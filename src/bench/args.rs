@@ -1,157 +1,26 @@
 //! What `skylit bench` takes.
 
-use clap::{Args, Subcommand, ValueHint};
+use clap::{Args, Subcommand};
 
 use super::ao::BenchAoArgs;
-use super::common::CommonArgs;
-use super::contestant::OWN;
 use super::path::BenchPathArgs;
-use super::streams::STREAMS;
-use crate::settings::parse::parse_radius;
-use crate::tracer::BuildOptions;
-use crate::tracer::settings::BuildChoice;
-
-/// Rays of a set, unless said otherwise: an image of 1280x720.
-const DEFAULT_RAYS: u32 = 1280 * 720;
-/// The same with `--quick`: 320x180.
-const QUICK_RAYS: u32 = 320 * 180;
-/// Timed repeats, unless said otherwise.
-const DEFAULT_REPEATS: u32 = 7;
-const QUICK_REPEATS: u32 = 3;
+use super::rays::BenchRaysArgs;
 
 /// `skylit bench`.
 #[derive(Clone, Debug, Args)]
 pub struct BenchArgs {
     /// What is measured
     #[command(subcommand)]
-    pub what: What,
+    pub benchmark: Benchmark,
 }
 
 /// What is measured.
 #[derive(Clone, Debug, Subcommand)]
-pub enum What {
+pub enum Benchmark {
     /// Rays a second of each tracer, kernel and peer, by stream of rays and scene
     Rays(Box<BenchRaysArgs>),
     /// Real-time ambient occlusion: time, rays and error of each preset, by scene, view and kind of motion
     Ao(Box<BenchAoArgs>),
     /// Path tracing: error against time of each sampling strategy and peer, by scene
     Path(Box<BenchPathArgs>),
-}
-
-/// `skylit bench rays`.
-#[derive(Clone, Debug, Args)]
-pub struct BenchRaysArgs {
-    /// Scenes, as `render` takes them [default: the well-known ones that are there, and built-in ones of 10^4 to 2.5*10^7
-    /// triangles]
-    pub scenes: Vec<String>,
-    /// Kernels of our own, separated by commas [default: all that the device runs; slow ones on small scenes only]
-    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = kernel_names())]
-    pub kernels: Vec<String>,
-    /// Streams of rays, separated by commas [default: all]
-    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = stream_names())]
-    pub streams: Vec<String>,
-    /// Timed repeats of each, in turn, after one that warms up [default: 7; 3 with --quick]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
-    pub repeats: Option<u32>,
-    /// About this many rays a set: those of an image of 16:9 [default: 921600; 57600 with --quick]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(64..=1 << 26))]
-    pub rays: Option<u32>,
-    /// Time that the compute tracer's kernels spend on their hierarchies
-    #[arg(long, value_enum, default_value = "default")]
-    pub build: BuildChoice,
-    /// Length of ambient occlusion rays, world units [default: what suits the well-known scenes, else no limit]
-    #[arg(long, value_name = "R", value_parser = parse_radius, allow_hyphen_values = true)]
-    pub ao_radius: Option<f64>,
-    /// Also compare all answers with those of the first kernel; one that rounding does not explain fails the run
-    #[arg(long)]
-    pub check: bool,
-    /// Keep alpha masks; otherwise they count as opaque, for peers do not know them
-    #[arg(long)]
-    pub alpha: bool,
-    /// Peers to run beside: a file like benches/peers.toml, or `none` [default: benches/peers.toml, where it is there]
-    #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
-    pub peers: Option<String>,
-    /// What every benchmark takes
-    #[command(flatten)]
-    pub common: CommonArgs,
-}
-
-fn kernel_names() -> clap::builder::PossibleValuesParser {
-    OWN.iter().map(|o| o.name).collect::<Vec<_>>().into()
-}
-
-fn stream_names() -> clap::builder::PossibleValuesParser {
-    STREAMS.iter().map(|s| s.name).collect::<Vec<_>>().into()
-}
-
-impl BenchRaysArgs {
-    /// How our own hierarchies are built.
-    pub fn build_options(&self) -> BuildOptions {
-        let [width, height] = self.size();
-        // a set of rays is traced once more to warm up
-        let rays = u64::from(width) * u64::from(height) * (u64::from(self.repeats()) + 1);
-        BuildOptions { preset: self.build.preset(), rays, cache: None, streams: Vec::new() }
-    }
-
-    /// Timed repeats.
-    pub fn repeats(&self) -> u32 {
-        self.common.number(self.repeats, DEFAULT_REPEATS, QUICK_REPEATS)
-    }
-
-    /// Pixels of the image whose rays are traced: 16:9, multiples of 8.
-    pub fn size(&self) -> [u32; 2] {
-        let rays = f64::from(self.common.number(self.rays, DEFAULT_RAYS, QUICK_RAYS));
-        let side = |x: f64| ((x / 8.0).round() as u32).max(1) * 8;
-        let width = side((rays * 16.0 / 9.0).sqrt());
-        // exactly as many as asked for where 8 divides them so
-        let height = (rays / f64::from(width)).round() as u32;
-        [width, height.max(1)]
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use clap::Parser;
-
-    use super::*;
-    use crate::accel::BuildPreset;
-
-    #[derive(Parser)]
-    struct Alone {
-        #[command(flatten)]
-        args: BenchRaysArgs,
-    }
-
-    fn parse(extra: &[&str]) -> BenchRaysArgs {
-        Alone::try_parse_from([&["bench"], extra].concat()).unwrap().args
-    }
-
-    #[test]
-    fn sizes_are_those_of_images() {
-        assert_eq!(parse(&[]).size(), [1280, 720]);
-        assert_eq!(parse(&["--quick"]).size(), [320, 180]);
-        assert_eq!((parse(&[]).repeats(), parse(&["--quick"]).repeats()), (7, 3));
-        for n in [64u32, 1000, 10_000, 1_000_000] {
-            let [w, h] = parse(&["--rays", &n.to_string()]).size();
-            assert!((f64::from(w * h) / f64::from(n) - 1.0).abs() < 0.2, "{n}: {w}x{h}");
-        }
-    }
-
-    #[test]
-    fn hierarchies_are_built_as_asked() {
-        let built = |extra: &[&str]| parse(extra).build_options();
-        assert_eq!(built(&[]).preset, Some(BuildPreset::Default));
-        assert_eq!(built(&["--build", "best"]).preset, Some(BuildPreset::Best));
-        let auto = built(&["--build", "auto", "--repeats", "9"]);
-        assert_eq!((auto.preset, auto.rays), (None, 1280 * 720 * 10));
-    }
-
-    #[test]
-    fn json_with_and_without_a_file() {
-        assert!(parse(&["--json"]).common.console().json);
-        let to_file = parse(&["--json=a.json", "scene"]);
-        assert!(!to_file.common.console().json && to_file.common.json_file().is_some() && to_file.scenes == ["scene"]);
-        // a scene after --json is a scene
-        assert_eq!(parse(&["--json", "scene"]).scenes, ["scene"]);
-    }
 }

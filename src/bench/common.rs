@@ -2,15 +2,14 @@
 
 use std::io::Write;
 use std::path::PathBuf;
-use std::sync::Arc;
 use std::time::Duration;
 
 use clap::{Args, ValueHint};
-use serde::Serialize;
 
+use super::plot::chart::Picture;
+use super::record::BenchRecord;
 use crate::error::{Error, Result};
-use crate::gpu::{self, Device};
-use crate::measure::chart::Picture;
+use crate::files;
 use crate::output;
 use crate::settings::parse::parse_seconds;
 use crate::terminal::console::Console;
@@ -63,43 +62,30 @@ impl CommonArgs {
     /// Checks what clap cannot, and that every file can be written.
     ///
     /// # Errors
-    /// [`Error::Usage`]; those of [`output::check_writable`].
+    /// [`Error::Usage`]; those of [`files::check_writable`].
     pub fn check(&self) -> Result<()> {
         match &self.plot {
             Some(p) if p.extension().is_none_or(|e| !e.eq_ignore_ascii_case("png")) => {
                 Err(Error::Usage(format!("--plot {}: the name must end in .png", p.display())))
             }
-            _ => self.outputs().try_for_each(|path| output::check_writable(path)),
+            _ => self.outputs().try_for_each(|path| files::check_writable(path)),
         }
-    }
-
-    /// Opens the device.
-    ///
-    /// # Errors
-    /// Those of [`Device::open`].
-    pub fn open_device(&self) -> Result<Arc<Device>> {
-        Device::open(&gpu::Options { device: self.device.clone(), validation: self.validation, ..Default::default() })
     }
 
     /// Writes the files that were asked for; one that cannot be written does not stop the others.
     ///
     /// # Errors
     /// The first that went wrong.
-    pub fn write(
-        &self,
-        record: &impl Serialize,
-        table: impl Fn(&mut dyn Write) -> std::result::Result<(), csv::Error>,
-        picture: impl Fn() -> Result<Picture>,
-    ) -> Result<()> {
+    pub fn write(&self, record: &impl BenchRecord, picture: impl Fn() -> Result<Picture>) -> Result<()> {
         let json = self.json_file().map_or(Ok(()), |path| {
             let text = serde_json::to_string_pretty(record)
                 .map_err(|e| Error::CheckFailed(format!("cannot express the result as JSON: {e}")))?;
-            output::write_atomically(path, |f| f.write_all(text.as_bytes()).and_then(|()| f.write_all(b"\n")))
+            files::write_atomically(path, |f| f.write_all(text.as_bytes()).and_then(|()| f.write_all(b"\n")))
         });
         let csv = self
             .csv
             .as_ref()
-            .map_or(Ok(()), |path| output::write_atomically(path, |f| table(f).map_err(std::io::Error::other)));
+            .map_or(Ok(()), |path| files::write_atomically(path, |f| record.write_csv(f).map_err(std::io::Error::other)));
         let plot = self.plot.as_ref().map_or(Ok(()), |path| {
             let picture = picture()?;
             output::png::write_rgb(path, &picture.rgb, picture.width, picture.height)

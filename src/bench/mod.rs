@@ -1,28 +1,36 @@
 //! `skylit bench`: how fast skylit's tracers are, beside each other and beside those of others; and how fast and how good its
 //! real-time ambient occlusion and its path tracing are.
+//!
+//! Each benchmark is a folder: `rays`, `ao`, `path`. What they share is beside them: `record` holds what they find, `plot` and `table`
+//! show it, `peers` runs the programs of others, `scenes` knows the well-known scenes, `session` is a run
+//! under way, and `device` alone opens the device and builds tracers.
 
 mod ao;
 mod args;
 mod common;
-mod contestant;
+mod device;
 mod path;
-mod peer;
-mod peers_file;
-mod process;
+mod peers;
+mod plot;
 mod rays;
+mod record;
+mod reference;
 mod scenes;
-mod streams;
+mod session;
 mod table;
 
 pub use args::BenchArgs;
 
 use crate::terminal::console::Failure;
 
-/// Runs the benchmark that was asked for.
+/// Runs a benchmark.
+///
+/// # Errors
+/// Those of the benchmark; what was measured before is written all the same.
 pub fn run(args: &BenchArgs) -> Result<(), Failure> {
-    match &args.what {
-        args::What::Rays(args) => rays::run(args),
-        args::What::Ao(args) => ao::run(args),
-        args::What::Path(args) => path::run(args),
+    match &args.benchmark {
+        args::Benchmark::Rays(args) => rays::run(args),
+        args::Benchmark::Ao(args) => ao::run(args),
+        args::Benchmark::Path(args) => path::run(args),
     }
 }

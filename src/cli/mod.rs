@@ -57,6 +57,7 @@ enum Command {
     /// Compare two images in numbers
     Diff(args::DiffArgs),
     /// Measure how fast rays are traced, beside other tracers, and what real-time ambient occlusion costs and is worth
+    #[cfg(feature = "bench")]
     Bench(crate::bench::BenchArgs),
 }
 
@@ -95,6 +96,7 @@ fn dispatch(command: Command, start: Instant) -> Result<(), Failure> {
         Command::Scenes(args) => scenes::run(&args),
         Command::Doctor(args) => doctor::run(&args),
         Command::Diff(args) => return diff::run(&args),
+        #[cfg(feature = "bench")]
         Command::Bench(args) => return crate::bench::run(&args),
     }
     .map_err(Failure::from)

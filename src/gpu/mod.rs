@@ -19,12 +19,11 @@ mod result;
 
 pub use acceleration_structure::{AccelerationStructure, BottomLevelInput, TopLevelEntry, Update};
 pub use buffer::{Buffer, Memory};
-pub use cache::folder as cache_folder;
 pub use commands::{Commands, Recorder, Timing};
 pub use device::{Device, Options};
 pub use drawing::Drawing;
 pub use graphics_pipeline::{Cull, GraphicsPipeline};
 pub use image::{Image, Targets};
-pub use info::{DeviceInfo, Limits, TracerNeeds, enumerate};
+pub use info::{DeviceInfo, Limits, RayTracingExtensions, enumerate};
 pub use instance::Instance;
 pub use pipeline::{ComputePipeline, HitShaders, KeptPipelines, RayTracingPipeline, Specialization};

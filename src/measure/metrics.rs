@@ -121,3 +121,26 @@ pub fn not_white(image: &[f32], reference: &[f32], channels: usize) -> Vec<f32> 
     let limit = 250.0 / 255.0;
     image.chunks(channels).zip(reference.chunks(channels)).map(|(a, b)| (a[0] < limit || b[0] < limit) as u8 as f32).collect()
 }
+
+/// Share of pixels, RGB, that differ by more than a tenth of white in any channel after 1 - exp(-radiance).
+pub fn bad_pixels(image: &[f32], reference: &[f32]) -> f64 {
+    let shown = |x: &f32| 1.0 - (-x).exp();
+    let bad = image.chunks_exact(3).zip(reference.chunks_exact(3));
+    let bad = bad.filter(|(a, b)| !a.iter().zip(*b).all(|(a, b)| (shown(a) - shown(b)).abs() <= 0.1)).count();
+    bad as f64 / (image.len() / 3).max(1) as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bad_pixels_are_seen() {
+        let reference = [0.0, 0.0, 0.0, 5.0, 5.0, 5.0];
+        assert_eq!(bad_pixels(&reference, &reference), 0.0);
+        // bright ones look alike
+        assert_eq!(bad_pixels(&[0.0, 0.0, 0.0, 9.0, 9.0, 9.0], &reference), 0.0);
+        assert_eq!(bad_pixels(&[0.0, 0.2, 0.0, 5.0, 5.0, 5.0], &reference), 0.5);
+        assert_eq!(bad_pixels(&[0.0, f32::NAN, 0.0, 5.0, 5.0, 5.0], &reference), 0.5);
+    }
+}

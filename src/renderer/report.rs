@@ -411,7 +411,7 @@ impl FramesReport {
         let visibility = if self.primary == Primary::Raster { "rasterized" } else { "ray traced" };
         lines.push(format!("primary visibility {visibility}: {}", self.primary_reason));
         let s = &self.settings;
-        lines.push(match (s.binary(), s.reach()) {
+        lines.push(match (s.attenuation().is_binary(), s.attenuation().reach()) {
             (true, r) if r.is_finite() => format!("binary occlusion: any hit within {r} ends a ray"),
             (true, _) => "binary occlusion: any hit ends a ray".into(),
             (false, r) => format!("occlusion rays end at {r:.4}: what lies beyond changes nothing that can be seen"),

@@ -15,6 +15,7 @@ pub mod light_spec;
 pub mod load;
 pub mod material;
 pub mod mesh;
+pub mod motion;
 pub mod orbit;
 pub mod texture;
 
@@ -24,6 +25,7 @@ pub use camera_path::CameraPath;
 pub use light::{Environment, EnvironmentMap, Light, LightKind};
 pub use material::{AlphaMode, Material, TextureSlot};
 pub use mesh::{Geometry, Mesh, Sphere, TriangleMesh};
+pub use motion::Motion;
 pub use orbit::Orbit;
 pub use texture::{Filter, TexelData, Texture, Wrap};
 

@@ -7,7 +7,10 @@ mod common;
 mod appearance;
 mod bsdf;
 mod camera;
+// these run the program
+#[cfg(feature = "cli")]
 mod cli;
+#[cfg(feature = "cli")]
 mod denoise;
 mod direct;
 mod emitters;

@@ -5,6 +5,8 @@
 mod common;
 
 mod bias;
+// it runs the program
+#[cfg(feature = "cli")]
 mod cli;
 mod constants;
 mod degenerate;

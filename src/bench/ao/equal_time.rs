@@ -1,12 +1,12 @@
 //! How good the preset `balanced` is when it may take as long as the pipeline of the reference work.
 
 use super::candidates::CANDIDATES;
-use super::laps::Laps;
-use super::reference::Truth;
-use super::shot::{Shot, first_timed};
+use super::frame_log::FrameLog;
+use super::reference::AoReference;
+use super::view_renderer::{ViewRenderer, first_timed};
+use crate::bench::record::ao::{EqualTime, ViewRecord};
+use crate::bench::record::ao_verdict::{OURS, THEIRS};
 use crate::error::Result;
-use crate::measure::ao_benchmark::verdict::{OURS, THEIRS};
-use crate::measure::ao_benchmark::{EqualTime, ViewRecord};
 use crate::realtime::Settings;
 
 /// Frames that are timed while the number of rays is looked for.
@@ -21,7 +21,7 @@ const CORRECTIONS: u32 = 3;
 ///
 /// # Errors
 /// Those of making frames.
-pub fn find(shot: &Shot, view: &ViewRecord, truth: &Truth, frames: u32) -> Result<Option<EqualTime>> {
+pub fn find(renderer: &ViewRenderer, view: &ViewRecord, reference: &AoReference, frames: u32) -> Result<Option<EqualTime>> {
     let still = |name: &str| view.results.iter().find(|r| r.preset == name).and_then(|r| r.still.as_ref());
     let (Some(ours), Some(theirs)) = (still(OURS), still(THEIRS)) else { return Ok(None) };
     let Some(their_rmse) = theirs.settled().map(|p| p.errors.rmse_corrected) else { return Ok(None) };
@@ -30,10 +30,10 @@ pub fn find(shot: &Shot, view: &ViewRecord, truth: &Truth, frames: u32) -> Resul
         return Ok(None);
     }
     let Some(candidate) = CANDIDATES.iter().find(|c| c.name == OURS) else { return Ok(None) };
-    let settings = |rays_per_pixel| Settings { rays_per_pixel, ..candidate.settings(&shot.occlusion) };
-    let ms = |laps: &Laps, frames: u32| laps.cost(first_timed(frames)).ms();
+    let settings = |rays_per_pixel| Settings { rays_per_pixel, ..candidate.settings(&renderer.occlusion) };
+    let ms = |log: &FrameLog, frames: u32| log.cost(first_timed(frames)).ms();
     let fits =
-        |rays: u32| -> Result<bool> { Ok(ms(&shot.tremble(&settings(rays), PROBE_FRAMES)?.1, PROBE_FRAMES) <= their_ms) };
+        |rays: u32| -> Result<bool> { Ok(ms(&renderer.tremble(&settings(rays), PROBE_FRAMES)?.1, PROBE_FRAMES) <= their_ms) };
     let (mut fit, mut beyond) = (1, 2);
     while beyond <= MAX_RAYS && fits(beyond)? {
         (fit, beyond) = (beyond, 2 * beyond);
@@ -47,8 +47,8 @@ pub fn find(shot: &Shot, view: &ViewRecord, truth: &Truth, frames: u32) -> Resul
         }
     }
     for _ in 0..CORRECTIONS {
-        let (rmse, laps) = shot.settle(&settings(fit), truth, frames)?;
-        let ms = ms(&laps, frames);
+        let (rmse, log) = renderer.settle(&settings(fit), reference, frames)?;
+        let ms = ms(&log, frames);
         if ms <= their_ms {
             return Ok(Some(EqualTime { rays_per_pixel: fit, ms, their_ms, rmse, rmse_ratio: rmse / their_rmse }));
         }

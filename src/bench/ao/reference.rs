@@ -2,9 +2,10 @@
 //! of the reference itself is known.
 
 use super::candidates::Occlusion;
+use crate::bench::record::ao::Errors;
+use crate::bench::reference::ReferenceHalves;
 use crate::error::Result;
 use crate::film::camera::CameraRecord;
-use crate::measure::ao_benchmark::Errors;
 use crate::measure::flip::{PIXELS_PER_DEGREE, flip};
 use crate::measure::metrics::ImagePair;
 use crate::raster::Primary;
@@ -17,8 +18,8 @@ const AT_ONCE: u32 = 16;
 /// Seeds of the two halves: no preset has them.
 const SEEDS: [u32; 2] = [0x5eed_000a, 0x5eed_000b];
 
-/// What is right.
-pub struct Truth {
+/// A reference image, and what its pixels show.
+pub struct AoReference {
     /// The mean of both halves.
     pub image: Vec<f32>,
     /// 1 where something is.
@@ -31,13 +32,13 @@ pub struct Truth {
 }
 
 /// Makes references of one size.
-pub struct Referee {
+pub struct ReferenceRenderer {
     halves: [Realtime; 2],
     frames: u32,
     width: usize,
 }
 
-impl Referee {
+impl ReferenceRenderer {
     /// Of `rays` a pixel in all, rounded up to what divides evenly.
     ///
     /// # Errors
@@ -53,34 +54,28 @@ impl Referee {
         Ok(Self { halves: [a?, b?], frames: half.div_ceil(at_once), width: size[0] as usize })
     }
 
-    /// What is right now. Two references draw the same samples: what did not change between them is the same to the bit.
+    /// Renders what the tracer holds now. Two references draw the same samples: what did not change between them is the same to the bit.
     ///
     /// # Errors
     /// Those of the device; [`crate::Error::Interrupted`].
-    pub fn truth(&mut self, tracer: &Tracer, camera: &CameraRecord) -> Result<Truth> {
-        let frames = self.frames;
-        let half = |realtime: &mut Realtime| -> Result<Vec<f32>> {
+    pub fn render(&mut self, tracer: &Tracer, camera: &CameraRecord) -> Result<AoReference> {
+        let mut halves = ReferenceHalves::default();
+        for (k, realtime) in self.halves.iter_mut().enumerate() {
             realtime.rewind();
-            let mut sums: Vec<f64> = Vec::new();
-            for _ in 0..frames {
+            for _ in 0..self.frames {
                 interrupt::check()?;
                 realtime.frame(tracer, camera, &[])?;
-                let image = realtime.result()?;
-                sums.resize(image.len(), 0.0);
-                sums.iter_mut().zip(&image).for_each(|(s, v)| *s += f64::from(*v));
+                halves.add(k, &realtime.result()?);
             }
-            Ok(sums.into_iter().map(|s| (s / f64::from(frames)) as f32).collect())
-        };
-        let [a, b] = &mut self.halves;
-        let halves = [half(a)?, half(b)?];
-        let (coverage, surfaces) = (a.coverage()?, a.surfaces()?);
-        let image = halves[0].iter().zip(&halves[1]).map(|(a, b)| 0.5 * (a + b)).collect();
-        let rmse = 0.5 * ImagePair::new(&halves[0], &halves[1], 1, Some(&coverage))?.rmse();
-        Ok(Truth { image, coverage, rmse, surfaces, width: self.width })
+        }
+        let [first, _] = &mut self.halves;
+        let (coverage, surfaces) = (first.coverage()?, first.surfaces()?);
+        let rmse = halves.standard_error(1, Some(&coverage))?;
+        Ok(AoReference { image: halves.mean(), coverage, rmse, surfaces, width: self.width })
     }
 }
 
-impl Truth {
+impl AoReference {
     /// Pixels that show something.
     pub fn covered(&self) -> u64 {
         self.coverage.iter().filter(|c| **c > 0.0).count() as u64

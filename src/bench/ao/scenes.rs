@@ -3,64 +3,11 @@
 use glam::{DAffine3, DVec3};
 
 use super::args::BenchAoArgs;
-use crate::bench::scenes::{folder, is_file};
+use crate::bench::scenes::{LookAt, SceneList, WELL_KNOWN, WellKnownScene};
 use crate::error::{Error, Result};
 use crate::film::camera::{self, Choice};
 use crate::scene::builtin::shapes;
 use crate::scene::{Camera, Geometry, Instance, Material, Mesh, Scene, load};
-
-/// From where, and at what.
-type LookAt = ([f64; 3], [f64; 3]);
-
-/// A file that many measure with.
-struct Known {
-    /// Below the folder of shared scenes.
-    path: &'static str,
-    /// World units.
-    reach: f64,
-    near: LookAt,
-    far: LookAt,
-    /// Degrees, near and far.
-    fov_y: [f64; 2],
-    /// It is put on a plane.
-    plane: bool,
-}
-
-const KNOWN: [Known; 4] = [
-    Known {
-        path: "sponza/sponza.glb",
-        reach: 60.0,
-        // along the nave, from inside; and into the courtyard from above its roof
-        near: ([-120.0, 20.0, -5.0], [50.0, 35.0, 0.0]),
-        far: ([20.0, 330.0, 60.0], [-5.0, 20.0, -4.0]),
-        fov_y: [70.0, 45.0],
-        plane: false,
-    },
-    Known {
-        path: "dragon/dragon.glb",
-        reach: 0.1,
-        near: ([0.03, 0.165, 0.12], [-0.012, 0.128, 0.0]),
-        far: ([0.12, 0.24, 0.38], [-0.006, 0.125, -0.005]),
-        fov_y: [45.0, 45.0],
-        plane: false,
-    },
-    Known {
-        path: "bunny/bunny.glb",
-        reach: 0.1,
-        near: ([0.01, 0.14, 0.115], [-0.02, 0.105, 0.0]),
-        far: ([0.15, 0.27, 0.42], [-0.017, 0.095, 0.0]),
-        fov_y: [45.0, 45.0],
-        plane: true,
-    },
-    Known {
-        path: "flight_helmet/FlightHelmet.gltf",
-        reach: 0.3,
-        near: ([0.1, 0.52, 0.4], [-0.03, 0.46, 0.05]),
-        far: ([0.45, 0.75, 1.25], [-0.02, 0.35, 0.01]),
-        fov_y: [45.0, 45.0],
-        plane: false,
-    },
-];
 
 /// Built-in scenes of the default list.
 const BUILTIN: [&str; 2] = ["builtin:terrain:2450000", "builtin:instances:25000000"];
@@ -73,19 +20,13 @@ const NEARER: f64 = 0.5;
 /// Side of the plane, in the greatest side of what stands on it.
 const PLANE: f64 = 12.0;
 
-/// What to measure, and what of the default list is not there.
-pub fn choose(args: &BenchAoArgs) -> (Vec<String>, Vec<String>) {
-    if !args.scenes.is_empty() {
-        return (args.scenes.clone(), Vec::new());
+/// Scenes to measure.
+pub fn choose(args: &BenchAoArgs) -> SceneList {
+    match args.scenes.as_slice() {
+        [] if args.common.quick => SceneList::of(&QUICK),
+        [] => SceneList::well_known(&WELL_KNOWN).then(SceneList::of(&BUILTIN)),
+        named => SceneList::of(named),
     }
-    if args.common.quick {
-        return (QUICK.map(str::to_owned).to_vec(), Vec::new());
-    }
-    let folder = folder();
-    let (there, absent): (Vec<_>, Vec<_>) = KNOWN.iter().map(|k| folder.join(k.path)).partition(|p| p.is_file());
-    let notes = absent.iter().map(|p| format!("{}: not here, left out (SKYLIT_SHARED_SCENES names its folder)", p.display()));
-    let scenes = there.iter().map(|p| p.display().to_string()).chain(BUILTIN.map(str::to_owned));
-    (scenes.collect(), notes.collect())
 }
 
 /// A camera, and what the one that goes round turns about.
@@ -100,38 +41,34 @@ pub struct View {
 }
 
 /// A scene ready to be measured.
-pub struct Subject {
+pub struct AoScene {
     /// The scene.
     pub scene: Scene,
-    /// World units that occlusion reaches.
+    /// How far occlusion reaches, scene units.
     pub reach: f64,
     /// Near, then far.
     pub views: [View; 2],
     /// The well-known scene whose views these are.
-    pub known: Option<&'static str>,
+    pub well_known: Option<&'static str>,
     /// It was put on a plane.
-    pub plane: bool,
+    pub on_plane: bool,
 }
 
 /// Loads a scene and chooses its views.
 ///
 /// # Errors
 /// Those of loading; [`Error::Scene`] for one without geometry.
-pub fn load(source: &str, aspect: f64) -> Result<Subject> {
+pub fn load(source: &str, aspect: f64) -> Result<AoScene> {
     let mut scene = load::load(source)?;
-    let known = KNOWN.iter().find(|k| is_file(source, k.path));
+    let known = WellKnownScene::find(&WELL_KNOWN, source);
     let (lo, hi) = scene.bounds().ok_or_else(|| Error::Scene(format!("{source}: nothing to look at: no geometry")))?;
-    if known.is_some_and(|k| k.plane) {
+    if known.is_some_and(|k| k.on_plane) {
         add_plane(&mut scene, (lo, hi));
     }
     let views = match known {
         Some(k) => {
-            let view = |name, (eye, target): LookAt, fov_y: f64| View {
-                name,
-                camera: Camera::look_at(eye.into(), target.into(), DVec3::Y, fov_y.to_radians()),
-                middle: target.into(),
-            };
-            [view("near", k.near, k.fov_y[0]), view("far", k.far, k.fov_y[1])]
+            let view = |name, from: &LookAt| View { name, camera: from.camera(), middle: from.target.into() };
+            [view("near", &k.near), view("far", &k.far)]
         }
         None => {
             let middle = (lo + hi) * 0.5;
@@ -142,7 +79,7 @@ pub fn load(source: &str, aspect: f64) -> Result<Subject> {
         }
     };
     let reach = known.map_or(REACH * (hi - lo).length(), |k| k.reach);
-    Ok(Subject { scene, reach, views, known: known.map(|k| k.path), plane: known.is_some_and(|k| k.plane) })
+    Ok(AoScene { scene, reach, views, well_known: known.map(|k| k.path), on_plane: known.is_some_and(|k| k.on_plane) })
 }
 
 /// A plane to stand on.
@@ -162,7 +99,7 @@ mod tests {
     #[test]
     fn any_scene_has_two_views() {
         let s = load("builtin:stairs", 16.0 / 9.0).unwrap();
-        assert!(s.known.is_none() && s.reach > 1.0);
+        assert!(s.well_known.is_none() && s.reach > 1.0);
         let distance = |v: &View| v.camera.camera_to_world.translation.distance(v.middle);
         assert!(s.views[0].name == "near" && distance(&s.views[0]) < distance(&s.views[1]));
     }

@@ -2,15 +2,16 @@
 
 use super::args::Series;
 use super::candidates::{CANDIDATES, Candidate, Occlusion};
-use super::reference::{Referee, Truth};
-use super::scenes::{self, Subject};
-use super::shot::{Shot, first_timed};
-use super::{Bench, table};
+use super::reference::{AoReference, ReferenceRenderer};
+use super::scenes::{self, AoScene};
+use super::session::AoSession;
+use super::table;
+use super::view_renderer::{ViewRenderer, first_timed};
 use crate::accel::flatten::FlatScene;
+use crate::bench::record::ao::{SeriesLine, SeriesPoint, SeriesRecord};
+use crate::bench::record::ao_verdict::{OURS, THEIRS};
 use crate::error::Result;
 use crate::film::camera::CameraRecord;
-use crate::measure::ao_benchmark::verdict::{OURS, THEIRS};
-use crate::measure::ao_benchmark::{SeriesLine, SeriesPoint, SeriesRecord};
 use crate::realtime::Settings;
 use crate::sampling::Sequence;
 
@@ -33,27 +34,27 @@ const QUICK_SIZES: [[u32; 2]; 2] = [[80, 45], [160, 90]];
 const SAMPLED: usize = 4;
 
 /// A whole series. `scenes`: those on the command line, or the default ones.
-pub fn measure(bench: &mut Bench, series: Series, scenes: &[String]) -> Result<()> {
+pub fn measure(session: &mut AoSession, series: Series, scenes: &[String]) -> Result<()> {
     let first = scenes.first().cloned().unwrap_or_default();
     let record = match series {
-        Series::Triangles => triangles(bench, scenes)?,
-        Series::Rays => rays(bench, &first)?,
-        Series::Resolution => resolution(bench, &first)?,
+        Series::Triangles => triangles(session, scenes)?,
+        Series::Rays => rays(session, &first)?,
+        Series::Resolution => resolution(session, &first)?,
         Series::Sampling => {
             for source in scenes.iter().take(SAMPLED) {
-                let record = sampling(bench, source)?;
-                finish(bench, record)?;
+                let record = sampling(session, source)?;
+                finish(session, record)?;
             }
             return Ok(());
         }
     };
-    finish(bench, record)
+    finish(session, record)
 }
 
-fn finish(bench: &mut Bench, record: SeriesRecord) -> Result<()> {
-    bench.lines(&table::series(&record))?;
+fn finish(session: &mut AoSession, record: SeriesRecord) -> Result<()> {
+    session.lines(&table::series(&record))?;
     if record.lines.iter().any(|l| !l.points.is_empty()) {
-        bench.out.series.push(record);
+        session.record.series.push(record);
     }
     Ok(())
 }
@@ -63,48 +64,53 @@ fn of(name: &str) -> impl Iterator<Item = &'static Candidate> {
 }
 
 /// Loads a scene and hands over its near view.
-fn near<R>(bench: &mut Bench, source: &str, work: impl FnOnce(&mut Bench, &Subject, &Shot) -> Result<R>) -> Result<R> {
-    bench.phase(format!("{source}: loading"));
-    let aspect = bench.aspect();
-    let subject = scenes::load(source, aspect)?;
-    let flat = FlatScene::new(&subject.scene);
-    let tracer = bench.tracer(source, &flat)?;
-    let occlusion: Occlusion = bench.args.occlusion(subject.reach)?;
-    let camera = CameraRecord::new(&subject.views[0].camera, flat.origin, aspect);
-    let shot = Shot { tracer: &tracer, size: bench.args.size(), camera, occlusion };
-    work(bench, &subject, &shot)
+fn near<R>(
+    session: &mut AoSession,
+    source: &str,
+    work: impl FnOnce(&mut AoSession, &AoScene, &ViewRenderer) -> Result<R>,
+) -> Result<R> {
+    session.phase(format!("{source}: loading"));
+    let aspect = session.aspect();
+    let loaded = scenes::load(source, aspect)?;
+    let flat = FlatScene::new(&loaded.scene);
+    let tracer = session.tracer(source, &flat)?;
+    let occlusion: Occlusion = session.args.occlusion(loaded.reach)?;
+    let camera = CameraRecord::new(&loaded.views[0].camera, flat.origin, aspect);
+    let renderer = ViewRenderer { tracer: &tracer, size: session.args.size(), camera, occlusion };
+    work(session, &loaded, &renderer)
 }
 
-fn truth(bench: &mut Bench, shot: &Shot) -> Result<Truth> {
-    let mut referee = Referee::new(shot.tracer, shot.size, &shot.occlusion, bench.args.reference_rays())?;
-    referee.truth(shot.tracer, &shot.camera)
+fn reference(session: &mut AoSession, renderer: &ViewRenderer) -> Result<AoReference> {
+    let mut reference_renderer =
+        ReferenceRenderer::new(renderer.tracer, renderer.size, &renderer.occlusion, session.args.reference_rays())?;
+    reference_renderer.render(renderer.tracer, &renderer.camera)
 }
 
 /// Time by the number of triangles.
-fn triangles(bench: &mut Bench, scenes: &[String]) -> Result<SeriesRecord> {
-    let default: Vec<String> = if bench.args.common.quick {
+fn triangles(session: &mut AoSession, scenes: &[String]) -> Result<SeriesRecord> {
+    let default: Vec<String> = if session.args.common.quick {
         QUICK_TRIANGLES.map(str::to_owned).to_vec()
     } else {
         TRIANGLES.map(str::to_owned).to_vec()
     };
-    let sources = if bench.args.scenes.is_empty() { default } else { scenes.to_vec() };
+    let sources = if session.args.scenes.is_empty() { default } else { scenes.to_vec() };
     let mut lines: Vec<SeriesLine> = [OURS, THEIRS].map(|name| SeriesLine { name: name.to_owned(), points: Vec::new() }).into();
     for (k, source) in sources.iter().enumerate() {
-        if k > 0 && bench.is_late() {
-            bench.leave_out(source);
+        if k > 0 && session.is_late() {
+            session.leave_out(source);
             continue;
         }
-        bench.advance(k as f64 / sources.len() as f64);
-        let frames = bench.args.frames();
-        near(bench, source, |bench, subject, shot| {
+        session.advance(k as f64 / sources.len() as f64);
+        let frames = session.args.frames();
+        near(session, source, |session, loaded, renderer| {
             for line in &mut lines {
-                bench.phase(format!("{source}: {}", line.name));
+                session.phase(format!("{source}: {}", line.name));
                 for candidate in of(&line.name) {
-                    let laps = shot.tremble(&candidate.settings(&shot.occlusion), frames)?.1;
+                    let log = renderer.tremble(&candidate.settings(&renderer.occlusion), frames)?.1;
                     line.points.push(SeriesPoint {
                         scene: source.clone(),
-                        x: (subject.scene.triangle_count() + subject.scene.sphere_count()) as f64,
-                        cost: Some(laps.cost(first_timed(frames))),
+                        x: (loaded.scene.triangle_count() + loaded.scene.sphere_count()) as f64,
+                        cost: Some(log.cost(first_timed(frames))),
                         ..Default::default()
                     });
                 }
@@ -117,23 +123,23 @@ fn triangles(bench: &mut Bench, scenes: &[String]) -> Result<SeriesRecord> {
 }
 
 /// Time and error by the number of rays.
-fn rays(bench: &mut Bench, source: &str) -> Result<SeriesRecord> {
-    let numbers: &[u32] = if bench.args.common.quick { &QUICK_RAYS } else { &RAYS };
-    let frames = bench.args.frames();
-    let points = near(bench, source, |bench, _, shot| {
-        bench.phase(format!("{source}: reference"));
-        let truth = truth(bench, shot)?;
+fn rays(session: &mut AoSession, source: &str) -> Result<SeriesRecord> {
+    let numbers: &[u32] = if session.args.common.quick { &QUICK_RAYS } else { &RAYS };
+    let frames = session.args.frames();
+    let points = near(session, source, |session, _, renderer| {
+        session.phase(format!("{source}: reference"));
+        let reference = reference(session, renderer)?;
         let mut points = Vec::new();
         for (k, &rays_per_pixel) in numbers.iter().enumerate() {
-            if k > 0 && bench.is_late() {
-                bench.leave_out(&format!("{rays_per_pixel} rays a pixel"));
+            if k > 0 && session.is_late() {
+                session.leave_out(&format!("{rays_per_pixel} rays a pixel"));
                 continue;
             }
-            bench.phase(format!("{source}: {rays_per_pixel} rays a pixel"));
-            bench.advance(k as f64 / numbers.len() as f64);
+            session.phase(format!("{source}: {rays_per_pixel} rays a pixel"));
+            session.advance(k as f64 / numbers.len() as f64);
             for candidate in of(OURS) {
-                let settings = Settings { rays_per_pixel, ..candidate.settings(&shot.occlusion) };
-                let still = shot.still_with(&Settings { rest: false, ..settings }, &truth, frames)?;
+                let settings = Settings { rays_per_pixel, ..candidate.settings(&renderer.occlusion) };
+                let still = renderer.still_with(&Settings { rest: false, ..settings }, &reference, frames)?;
                 let settled = still.settled();
                 points.push(SeriesPoint {
                     scene: source.to_owned(),
@@ -151,25 +157,25 @@ fn rays(bench: &mut Bench, source: &str) -> Result<SeriesRecord> {
 }
 
 /// Time by the number of pixels.
-fn resolution(bench: &mut Bench, source: &str) -> Result<SeriesRecord> {
-    let sizes: &[[u32; 2]] = if bench.args.common.quick { &QUICK_SIZES } else { &SIZES };
-    let frames = bench.args.frames();
-    let points = near(bench, source, |bench, _, shot| {
+fn resolution(session: &mut AoSession, source: &str) -> Result<SeriesRecord> {
+    let sizes: &[[u32; 2]] = if session.args.common.quick { &QUICK_SIZES } else { &SIZES };
+    let frames = session.args.frames();
+    let points = near(session, source, |session, _, renderer| {
         let mut points = Vec::new();
         for (k, &size) in sizes.iter().enumerate() {
             let name = format!("{}x{}", size[0], size[1]);
-            if k > 0 && bench.is_late() {
-                bench.leave_out(&name);
+            if k > 0 && session.is_late() {
+                session.leave_out(&name);
                 continue;
             }
-            bench.phase(format!("{source}: {name}"));
-            bench.advance(k as f64 / sizes.len() as f64);
+            session.phase(format!("{source}: {name}"));
+            session.advance(k as f64 / sizes.len() as f64);
             for candidate in of(FAST) {
-                let laps = Shot { size, ..*shot }.tremble(&candidate.settings(&shot.occlusion), frames)?.1;
+                let log = ViewRenderer { size, ..*renderer }.tremble(&candidate.settings(&renderer.occlusion), frames)?.1;
                 points.push(SeriesPoint {
                     scene: name.clone(),
                     x: f64::from(size[0]) * f64::from(size[1]),
-                    cost: Some(laps.cost(first_timed(frames))),
+                    cost: Some(log.cost(first_timed(frames))),
                     ..Default::default()
                 });
             }
@@ -181,22 +187,22 @@ fn resolution(bench: &mut Bench, source: &str) -> Result<SeriesRecord> {
 }
 
 /// Error of every sequence of samples: by frames, and when the quickest of them is done.
-fn sampling(bench: &mut Bench, source: &str) -> Result<SeriesRecord> {
-    let frames = bench.args.frames();
-    let lines = near(bench, source, |bench, _, shot| {
-        bench.phase(format!("{source}: reference"));
-        let truth = truth(bench, shot)?;
+fn sampling(session: &mut AoSession, source: &str) -> Result<SeriesRecord> {
+    let frames = session.args.frames();
+    let lines = near(session, source, |session, _, renderer| {
+        session.phase(format!("{source}: reference"));
+        let reference = reference(session, renderer)?;
         let mut lines: Vec<(SeriesLine, Vec<(f64, f64)>)> = Vec::new();
         for (k, sequence) in Sequence::ALL.into_iter().enumerate() {
-            if k > 0 && bench.is_late() {
-                bench.leave_out(&format!("{source}: {}", sequence.name()));
+            if k > 0 && session.is_late() {
+                session.leave_out(&format!("{source}: {}", sequence.name()));
                 continue;
             }
-            bench.phase(format!("{source}: {}", sequence.name()));
-            bench.advance(k as f64 / Sequence::ALL.len() as f64);
+            session.phase(format!("{source}: {}", sequence.name()));
+            session.advance(k as f64 / Sequence::ALL.len() as f64);
             for candidate in of(OURS) {
-                let settings = Settings { sequence, rest: false, ..candidate.settings(&shot.occlusion) };
-                lines.push(one_sequence(shot, &settings, &truth, (source, frames))?);
+                let settings = Settings { sequence, rest: false, ..candidate.settings(&renderer.occlusion) };
+                lines.push(one_sequence(renderer, &settings, &reference, (source, frames))?);
             }
         }
         // all of them get as long as the quickest needs
@@ -214,12 +220,12 @@ fn sampling(bench: &mut Bench, source: &str) -> Result<SeriesRecord> {
 
 /// A sequence's errors, and after each frame the seconds that were spent so far with the error then.
 fn one_sequence(
-    shot: &Shot,
+    renderer: &ViewRenderer,
     settings: &Settings,
-    truth: &Truth,
+    reference: &AoReference,
     (source, frames): (&str, u32),
 ) -> Result<(SeriesLine, Vec<(f64, f64)>)> {
-    let still = shot.still_with(settings, truth, frames)?;
+    let still = renderer.still_with(settings, reference, frames)?;
     // every frame at its median price: single ones are too noisy to be added
     let spent = still.rmse.iter().enumerate().map(|(k, e)| ((k + 1) as f64 * still.cost.ms(), *e)).collect();
     let points = still.curve.iter().map(|p| SeriesPoint {

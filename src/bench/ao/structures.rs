@@ -3,12 +3,13 @@
 
 use glam::{DAffine3, Vec3};
 
-use super::{Bench, table};
-use crate::accel::flatten::{FlatScene, Motion};
+use super::session::AoSession;
+use super::table;
+use crate::accel::flatten::FlatScene;
+use crate::bench::record::ao::StructureRecord;
 use crate::error::{Error, Result};
-use crate::measure::ao_benchmark::StructureRecord;
 use crate::measure::stats::Spread;
-use crate::scene::{Geometry, load};
+use crate::scene::{Geometry, Motion, load};
 use crate::terminal::interrupt;
 use crate::tracer::{Changes, MeshChange, Tracer};
 
@@ -24,27 +25,27 @@ const WAY: f32 = 1e-3;
 const MESH: usize = 0;
 
 /// All scenes.
-pub fn measure(bench: &mut Bench) -> Result<()> {
-    let first = bench.out.structures.len();
-    let sources = if bench.args.common.quick { QUICK } else { SCENES };
+pub fn measure(session: &mut AoSession) -> Result<()> {
+    let first = session.record.structures.len();
+    let sources = if session.args.common.quick { QUICK } else { SCENES };
     for (k, source) in sources.into_iter().enumerate() {
-        if bench.is_late() && !bench.out.is_empty() {
-            bench.leave_out(&format!("structures of {source}"));
+        if session.is_over() {
+            session.leave_out(&format!("structures of {source}"));
             continue;
         }
-        bench.advance(k as f64 / sources.len() as f64);
-        let record = one(bench, source)?;
-        bench.out.structures.push(record);
+        session.advance(k as f64 / sources.len() as f64);
+        let record = one(session, source)?;
+        session.record.structures.push(record);
     }
-    bench.lines(&table::structures(&bench.out.structures[first..]))
+    session.lines(&table::structures(&session.record.structures[first..]))
 }
 
-fn one(bench: &mut Bench, source: &str) -> Result<StructureRecord> {
-    bench.phase(format!("structures of {source}: loading"));
+fn one(session: &mut AoSession, source: &str) -> Result<StructureRecord> {
+    session.phase(format!("structures of {source}: loading"));
     let scene = load::load(source)?;
     let motion = Motion { instances: (0..scene.instances.len()).collect(), meshes: vec![MESH] };
     let flat = FlatScene::with_motion(&scene, motion)?;
-    let mut tracer = bench.tracer(&format!("structures of {source}"), &flat)?;
+    let mut tracer = session.tracer(&format!("structures of {source}"), &flat)?;
     let Some(Geometry::Triangles(mesh)) = scene.meshes.get(MESH).map(|m| &m.geometry) else {
         return Err(Error::Scene(format!("{source}: its first mesh has no triangles to deform")));
     };
@@ -59,8 +60,8 @@ fn one(bench: &mut Bench, source: &str) -> Result<StructureRecord> {
         mesh_triangles: mesh.indices.len() as u64,
         ..Default::default()
     };
-    let repeats = bench.args.repeats();
-    bench.phase(format!("structures of {source}: updating"));
+    let repeats = session.args.repeats();
+    session.phase(format!("structures of {source}: updating"));
     let mut tops = Vec::new();
     for round in 0..=repeats {
         interrupt::check()?;
@@ -78,7 +79,7 @@ fn one(bench: &mut Bench, source: &str) -> Result<StructureRecord> {
     let [refits, rebuilds] = [false, true].map(|rebuild| deform(&mut tracer, &poses, repeats, rebuild));
     let [refits, rebuilds] = [refits?, rebuilds?];
     if rebuilds.is_empty() {
-        bench.note(format!("{source}: the tracer refits its mesh whatever that costs; building it anew was not timed"));
+        session.note(format!("{source}: the tracer refits its mesh whatever that costs; building it anew was not timed"));
     }
     (record.refit, record.rebuild) = (Spread::of(&refits), Spread::of(&rebuilds));
     Ok(record)

@@ -1,9 +1,9 @@
 //! What people read.
 
-use crate::bench::table::{align, number, thousands};
-use crate::measure::ao_benchmark::{
+use crate::bench::record::ao::{
     ChangeRecord, ChangeResult, Cost, Errors, SeriesRecord, StructureRecord, TechniqueRecord, Verdict, ViewRecord,
 };
+use crate::bench::table::{align, number, thousands};
 use crate::measure::stats::Spread;
 
 /// Top levels of the reference work, by million triangles and meshes: milliseconds on a GPU that it does not name.

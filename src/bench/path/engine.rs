@@ -1,10 +1,10 @@
-//! Who renders: a strategy of our own, or a kernel of a peer.
+//! What renders: a strategy of our own, or a kernel of a peer.
 
 use std::time::Instant;
 
-use super::peer::Peer;
 use crate::accel::flatten::FlatScene;
-use crate::bench::process::PeerError;
+use crate::bench::peers::process::{Peer, PeerError};
+use crate::bench::reference::ReferenceHalves;
 use crate::error::Result;
 use crate::film::camera::CameraRecord;
 use crate::integrators::path::{PathIntegrator, PathOptions};
@@ -23,18 +23,18 @@ pub const STEP: u32 = 4;
 const MIN_CHUNKS: u32 = 4;
 
 /// An image and what it took.
-pub struct Shot {
+pub struct TimedImage {
     /// Wall seconds; of a peer, by its own clock.
     pub seconds: f64,
     /// Linear RGB, rows from the top.
-    pub image: Vec<f32>,
+    pub rgb: Vec<f32>,
     /// Rays, where they are counted.
     pub rays: Option<u64>,
     /// Longest launch, device seconds, where it is known.
     pub longest_launch: Option<f64>,
 }
 
-/// Who renders.
+/// What renders.
 pub enum Engine<'a> {
     /// One of our strategies.
     Own {
@@ -70,7 +70,7 @@ impl<'a> Engine<'a> {
     ///
     /// # Errors
     /// Those of the device or the peer; Ctrl-C.
-    pub fn render(&mut self, peers: &mut [Peer], spp: u32, seed: u32) -> Result<Shot, PeerError> {
+    pub fn render(&mut self, peers: &mut [Peer], spp: u32, seed: u32) -> Result<TimedImage, PeerError> {
         match self {
             Self::Own { tracer, camera, integrator } => {
                 let start = Instant::now();
@@ -79,19 +79,19 @@ impl<'a> Engine<'a> {
                 let rays = result.image.primary_rays + result.bounce_rays + result.shadow_rays;
                 let longest = result.image.longest_launch;
                 let longest_launch = (longest > 0.0).then_some(longest);
-                Ok(Shot { seconds, image: result.image.film.mean, rays: Some(rays), longest_launch })
+                Ok(TimedImage { seconds, rgb: result.image.film.mean, rays: Some(rays), longest_launch })
             }
             Self::Peer { peer, kernel, size } => {
-                let (seconds, image) = peers[*peer].render(kernel, spp, seed, *size)?;
-                Ok(Shot { seconds, image, rays: None, longest_launch: None })
+                let (seconds, rgb) = peers[*peer].render(kernel, spp, seed, *size)?;
+                Ok(TimedImage { seconds, rgb, rays: None, longest_launch: None })
             }
         }
     }
 }
 
-/// What is right, in two independent halves.
-pub struct Truth {
-    /// Mean of both.
+/// A reference image.
+pub struct PathReference {
+    /// Linear RGB, rows from the top.
     pub image: Vec<f32>,
     /// Standard error of `image`, root mean square over pixels and channels.
     pub rmse: f64,
@@ -101,40 +101,35 @@ pub struct Truth {
     pub seconds: f64,
 }
 
-/// Renders a reference for so long. `advance` hears the share that is done.
+/// Renders a reference for `limit` seconds. `advance` hears the share that is done.
 ///
 /// # Errors
 /// Those of [`Engine::render`].
-pub fn truth(
+pub fn render_reference(
     engine: &mut Engine,
     peers: &mut [Peer],
     limit: f64,
-    most_spp: u32,
+    max_spp: u32,
     advance: &mut dyn FnMut(f64),
-) -> Result<Truth, PeerError> {
+) -> Result<PathReference, PeerError> {
     // how many paths take about a chunk's time
     let mut spp = 4;
     loop {
-        let shot = engine.render(peers, spp, REFERENCE_SEED)?;
-        if shot.seconds * f64::from(STEP) > CHUNK_SECONDS.min(limit / f64::from(MIN_CHUNKS)) || spp * STEP > most_spp {
+        let image = engine.render(peers, spp, REFERENCE_SEED)?;
+        if image.seconds * f64::from(STEP) > CHUNK_SECONDS.min(limit / f64::from(MIN_CHUNKS)) || spp * STEP > max_spp {
             break;
         }
         spp *= STEP;
     }
-    let (mut halves, mut seconds, mut chunks) = ([Vec::new(), Vec::new()], 0.0, 0u32);
+    let (mut halves, mut seconds, mut chunks) = (ReferenceHalves::default(), 0.0, 0u32);
     // as many in one half as in the other
     while chunks < MIN_CHUNKS || seconds < limit || chunks % 2 == 1 {
-        let shot = engine.render(peers, spp, REFERENCE_SEED + 1 + chunks)?;
-        let half: &mut Vec<f64> = &mut halves[chunks as usize % 2];
-        half.resize(shot.image.len(), 0.0);
-        half.iter_mut().zip(&shot.image).for_each(|(sum, v)| *sum += f64::from(*v));
-        seconds += shot.seconds;
+        let image = engine.render(peers, spp, REFERENCE_SEED + 1 + chunks)?;
+        halves.add(chunks as usize % 2, &image.rgb);
+        seconds += image.seconds;
         chunks += 1;
         advance((seconds / limit).min(1.0));
     }
-    let n = f64::from(chunks / 2);
-    let [a, b] = &halves;
-    let image = a.iter().zip(b).map(|(a, b)| (0.5 * (a + b) / n) as f32).collect();
-    let squares: f64 = a.iter().zip(b).map(|(a, b)| (0.5 * (a - b) / n).powi(2)).sum();
-    Ok(Truth { image, rmse: (squares / a.len() as f64).sqrt(), spp: u64::from(spp) * u64::from(chunks), seconds })
+    let rmse = halves.standard_error(3, None)?;
+    Ok(PathReference { image: halves.mean(), rmse, spp: u64::from(spp) * u64::from(chunks), seconds })
 }

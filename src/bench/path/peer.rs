@@ -1,40 +1,25 @@
-//! A peer that renders paths: a scene in files, images back. docs/benchmarks.md has the protocol.
+//! What is said to a peer that renders paths: a scene in files, images back. docs/benchmarks.md has the protocol.
 
 use std::path::{Path, PathBuf};
 
 use glam::{Affine2, Vec3};
 use serde_json::{Value, json};
 
-use crate::bench::peers_file::PeerSpec;
-use crate::bench::process::{PeerError, Process};
+use crate::bench::peers::process::{Peer, PeerError};
 use crate::error::{Error, Result};
 use crate::scene::{
     AlphaMode, Camera, Environment, Filter, Geometry, LightKind, Material, Projection, Scene, TextureSlot, Wrap,
 };
 
-/// A running peer.
-pub struct Peer {
-    /// How to talk to it.
-    pub process: Process,
-}
-
 impl Peer {
-    /// Builds, starts and greets it.
-    ///
-    /// # Errors
-    /// Those of [`Process::start`].
-    pub fn start(spec: &PeerSpec) -> Result<Self, PeerError> {
-        Ok(Self { process: Process::start(spec)? })
-    }
-
     /// Gives it a scene; the one before is forgotten.
     ///
     /// # Errors
     /// [`PeerError::Failed`] when it knows something of the scene not.
-    pub fn load(&mut self, scene: &Scene, camera: &Camera, size: [u32; 2]) -> Result<(), PeerError> {
-        let folder = self.process.file("scene");
+    pub fn load_scene(&mut self, scene: &Scene, camera: &Camera, size: [u32; 2]) -> Result<(), PeerError> {
+        let folder = self.file("scene");
         write_scene(scene, camera, size, &folder)?;
-        let answer = self.process.ask(&format!("scene {}", folder.display()));
+        let answer = self.ask(&format!("scene {}", folder.display()));
         // it has read it: the space is worth more than the files
         let _ = std::fs::remove_dir_all(&folder);
         answer.map(drop)
@@ -45,9 +30,9 @@ impl Peer {
     /// # Errors
     /// [`PeerError::Failed`] when it does not, or not that many pixels.
     pub fn render(&mut self, kernel: &str, spp: u32, seed: u32, size: [u32; 2]) -> Result<(f64, Vec<f32>), PeerError> {
-        let path = self.process.file("image.bin");
-        let answer = self.process.ask(&format!("render {kernel} {spp} {seed} {}", path.display()))?;
-        let seconds = Process::number(&answer, "seconds")?;
+        let path = self.file("image.bin");
+        let answer = self.ask(&format!("render {kernel} {spp} {seed} {}", path.display()))?;
+        let seconds = Peer::number(&answer, "seconds")?;
         let bytes = std::fs::read(&path).map_err(|e| Error::read(&path, &e))?;
         let _ = std::fs::remove_file(&path);
         let image: Vec<f32> = bytemuck::pod_collect_to_vec(&bytes);

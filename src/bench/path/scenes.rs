@@ -6,7 +6,7 @@ use std::sync::Arc;
 use glam::{DAffine3, DMat3, DVec3, Vec3};
 
 use super::args::BenchPathArgs;
-use crate::bench::scenes::{check_there, folder, is_file};
+use crate::bench::scenes::{FLIGHT_HELMET, SPONZA, SceneList, WellKnownScene, check_exists, shared_folder};
 use crate::error::Result;
 use crate::film::camera::{self, Choice};
 use crate::scene::builtin::shapes;
@@ -19,25 +19,8 @@ const SUN_MAP: &str = "env/spruit_sunrise_1k.hdr";
 /// Pixels of our own map: a texel is 0.7 degrees, about the sun.
 const OWN_MAP: [u32; 2] = [512, 256];
 
-/// A file that many measure with.
-struct Known {
-    /// Below the folder of shared scenes.
-    path: &'static str,
-    /// Eye, target, degrees; `None`: as `render` would.
-    view: Option<([f64; 3], [f64; 3], f64)>,
-    /// As `--light` takes it.
-    light: Option<&'static str>,
-}
-
-const KNOWN: [Known; 2] = [
-    Known { path: "flight_helmet/FlightHelmet.gltf", view: None, light: None },
-    Known {
-        path: "sponza/sponza.glb",
-        // along the nave, from inside, where next to no sky is seen: a lamp hangs in it
-        view: Some(([-120.0, 20.0, -5.0], [50.0, 35.0, 0.0], 70.0)),
-        light: Some("sphere position=30,70,-5 radius=4 radiance=400"),
-    },
-];
+/// Well-known scenes that are measured.
+const FILES: [&WellKnownScene; 2] = [&FLIGHT_HELMET, &SPONZA];
 
 /// A sphere under the sun map.
 struct Ball {
@@ -61,31 +44,25 @@ const DEFAULT_BALLS: usize = 3;
 /// The built-in Cornell box, all of it Lambert's: engines agree about it to the last digit that noise lets them see.
 const CORNELL: &str = "cornell";
 
-/// What to measure, and what of the default list is not there.
-pub fn choose(args: &BenchPathArgs) -> (Vec<String>, Vec<String>) {
-    if !args.scenes.is_empty() {
-        return (args.scenes.clone(), Vec::new());
+/// Scenes to measure.
+pub fn choose(args: &BenchPathArgs) -> SceneList {
+    let balls = |count: usize| SceneList::of(&BALLS[..count].iter().map(|b| b.name).collect::<Vec<_>>());
+    let cornell = SceneList::of(&[CORNELL]);
+    match args.scenes.as_slice() {
+        [] if args.common.quick => cornell.then(balls(1)),
+        [] => cornell.then(SceneList::well_known(&FILES)).then(balls(DEFAULT_BALLS)),
+        named => SceneList::of(named),
     }
-    let cornell = CORNELL.to_owned();
-    if args.common.quick {
-        return (vec![cornell, BALLS[0].name.to_owned()], Vec::new());
-    }
-    let folder = folder();
-    let (there, absent): (Vec<_>, Vec<_>) = KNOWN.iter().map(|k| folder.join(k.path)).partition(|p| p.is_file());
-    let notes = absent.iter().map(|p| format!("{}: not here, left out (SKYLIT_SHARED_SCENES names its folder)", p.display()));
-    let balls = BALLS[..DEFAULT_BALLS].iter().map(|b| b.name.to_owned());
-    let scenes = std::iter::once(cornell).chain(there.iter().map(|p| p.display().to_string())).chain(balls);
-    (scenes.collect(), notes.collect())
 }
 
 /// Fails for a scene that is not there.
 pub fn check(source: &str) -> Result<()> {
     let own = source == CORNELL || BALLS.iter().any(|b| b.name == source);
-    if own { Ok(()) } else { check_there(source) }
+    if own { Ok(()) } else { check_exists(source) }
 }
 
 /// A scene ready to be measured.
-pub struct Subject {
+pub struct PathScene {
     /// The scene, lit.
     pub scene: Scene,
     /// From where it is seen.
@@ -98,7 +75,7 @@ pub struct Subject {
 ///
 /// # Errors
 /// Those of loading the scene or the environment.
-pub fn load(source: &str, args: &BenchPathArgs, aspect: f64) -> Result<Subject> {
+pub fn load(source: &str, args: &BenchPathArgs, aspect: f64) -> Result<PathScene> {
     let mut scene = match BALLS.iter().find(|b| b.name == source) {
         Some(ball) => ball_scene(ball),
         None if source == CORNELL => {
@@ -108,33 +85,28 @@ pub fn load(source: &str, args: &BenchPathArgs, aspect: f64) -> Result<Subject> 
         }
         None => load::load(source)?,
     };
-    let known = KNOWN.iter().find(|k| is_file(source, k.path));
-    let shines = |m: &Mesh| scene.materials[m.material].emissive != Vec3::ZERO;
-    let dark = scene.environment == Environment::Black && scene.lights.is_empty() && !scene.meshes.iter().any(shines);
+    let known = WellKnownScene::find(&FILES, source);
+    let is_emissive = |m: &Mesh| scene.materials[m.material].emissive != Vec3::ZERO;
+    let dark = scene.environment == Environment::Black && scene.lights.is_empty() && !scene.meshes.iter().any(is_emissive);
     if dark || args.environment.is_some() {
         scene.environment = Environment::Map(map(args)?);
     }
-    if let Some(Ok(light)) = known.and_then(|k| k.light).map(light_spec::parse) {
+    if let Some(Ok(light)) = known.and_then(|k| k.area_light).map(light_spec::parse) {
         light.add(&mut scene);
     }
-    let choice = match known.and_then(|k| k.view) {
-        Some((eye, target, fov_y)) => {
-            Choice::LookAt { eye: eye.into(), target: target.into(), up: DVec3::Y, fov_y: fov_y.to_radians() }
-        }
-        None => Choice::Auto,
-    };
+    let choice = known.and_then(|k| k.view).map_or(Choice::Auto, |view| view.choice());
     let camera = camera::choose(&scene, &choice, aspect)?;
     let environment = match &scene.environment {
         Environment::Black => "black".to_owned(),
         Environment::Uniform(c) => format!("{},{},{}", c.x, c.y, c.z),
         Environment::Map(map) => format!("{} ({}x{})", map.name, map.width, map.height),
     };
-    Ok(Subject { scene, camera, environment })
+    Ok(PathScene { scene, camera, environment })
 }
 
 /// The environment that is asked for, the shared one, or our own.
 fn map(args: &BenchPathArgs) -> Result<EnvironmentMap> {
-    let shared = folder().join(SUN_MAP);
+    let shared = shared_folder().join(SUN_MAP);
     match &args.environment {
         Some(path) => load::load_environment(path),
         None if shared.is_file() && !args.common.quick => load::load_environment(&shared),
@@ -181,7 +153,7 @@ fn ball_scene(ball: &Ball) -> Scene {
 /// In tables.
 pub fn name(source: &str) -> String {
     let path = Path::new(source);
-    let named = KNOWN.iter().find(|k| is_file(source, k.path)).and_then(|_| path.file_stem());
+    let named = WellKnownScene::find(&FILES, source).and_then(|_| path.file_stem());
     named.map_or_else(|| source.to_owned(), |s| s.to_string_lossy().into_owned())
 }
 
@@ -201,7 +173,7 @@ mod tests {
 
     #[test]
     fn lights_of_known_scenes_are_lights() {
-        for light in KNOWN.iter().filter_map(|k| k.light) {
+        for light in FILES.iter().filter_map(|k| k.area_light) {
             assert!(light_spec::parse(light).is_ok(), "{light}");
         }
     }

@@ -1,16 +1,16 @@
-//! What people read.
+//! The tables of `skylit bench path`.
 
+use crate::bench::record::path::{ContestantRecord, SceneRecord, TimeEstimate};
 use crate::bench::table::{align, number, thousands};
-use crate::measure::path_benchmark::{Contestant, How, PathScene};
 
 /// One scene's results.
-pub fn scene(record: &PathScene) -> Vec<String> {
+pub fn scene(record: &SceneRecord) -> Vec<String> {
     let mut what = vec![format!("{}x{}", record.size[0], record.size[1]), format!("{} triangles", thousands(record.triangles))];
     if record.spheres > 0 {
         what.push(format!("{} spheres", thousands(record.spheres)));
     }
     what.push(format!("{} lights", record.lights));
-    what.push(format!("around it {}", record.environment));
+    what.push(format!("environment {}", record.environment));
     let mut lines = vec![String::new(), format!("{}: {}", record.scene, what.join(", "))];
     for r in &record.references {
         lines.push(format!(
@@ -42,11 +42,11 @@ pub fn scene(record: &PathScene) -> Vec<String> {
     lines
 }
 
-fn seconds(r: &Contestant) -> Option<f64> {
+fn seconds(r: &ContestantRecord) -> Option<f64> {
     r.seconds_to_target.map(|t| t.seconds)
 }
 
-fn row(r: &Contestant, base: Option<f64>) -> Vec<String> {
+fn row(r: &ContestantRecord, base: Option<f64>) -> Vec<String> {
     let mut out = vec![r.name.clone()];
     let Some(last) = r.points.last() else { return out };
     let median = last.seconds.map_or_else(String::new, |s| format!("{:.2}", s.median));
@@ -56,9 +56,9 @@ fn row(r: &Contestant, base: Option<f64>) -> Vec<String> {
     out.push(format!("{:.2e}", r.efficiency));
     if let Some(t) = r.seconds_to_target {
         let mark = match t.how {
-            How::Between => "",
-            How::Less => "<",
-            How::Extrapolated => "~",
+            TimeEstimate::Between => "",
+            TimeEstimate::Less => "<",
+            TimeEstimate::Extrapolated => "~",
         };
         out.push(format!("{mark}{}", number(t.seconds)));
         out.extend(base.map(|b| format!("{mark}{}", number(t.seconds / b))));

@@ -12,6 +12,7 @@ pub use args::RenderArgs;
 use frame_files::FrameFiles;
 
 use crate::error::{Error, Result};
+use crate::files;
 use crate::film::Control;
 use crate::integrators::aov::AovPixel;
 use crate::output::{self, Channel, Image, ImageFormat, Samples, png};
@@ -34,7 +35,7 @@ pub fn run(args: &RenderArgs, start: Instant) -> Result<(), Failure> {
 
 fn still(args: &RenderArgs, start: Instant) -> Result<(), Failure> {
     for path in args.outputs() {
-        output::check_writable(&path)?;
+        files::check_writable(&path)?;
     }
     interrupt::install();
     let console = args.verbosity.console();
@@ -73,7 +74,7 @@ fn frames(args: &RenderArgs, start: Instant) -> Result<(), Failure> {
     timeline.check_outputs(&args.output)?;
     let range = timeline.range();
     for path in &args.output {
-        output::check_writable(&output::frames::numbered(path, u64::from(range.first))?)?;
+        files::check_writable(&output::frames::numbered(path, u64::from(range.first))?)?;
     }
     interrupt::install();
     let console = args.verbosity.console();
@@ -145,7 +146,7 @@ fn names(args: &RenderArgs) -> String {
 /// Can all that is saved on the way be written? Asked before long work starts.
 fn check_intervals(args: &RenderArgs, hints: &RenderHints, spp: u32) -> Result<()> {
     let intervals = crate::renderer::still::intervals(&args.settings, hints, spp);
-    let check = |path: &PathBuf| intervals.iter().try_for_each(|&n| output::check_writable(&interval_path(path, n)));
+    let check = |path: &PathBuf| intervals.iter().try_for_each(|&n| files::check_writable(&interval_path(path, n)));
     args.output.iter().try_for_each(check)
 }
 
@@ -174,7 +175,7 @@ fn write_depth(path: &Path, pixels: &[AovPixel], size: [u32; 2]) -> Result<()> {
 fn write_rays(args: &RenderArgs, rays: &[Vec<Ray>; 2]) -> Result<()> {
     let Some(prefix) = &args.dump_rays else { return Ok(()) };
     for (kind, rays) in ["primary", "ao"].into_iter().zip(rays) {
-        output::write_atomically(&args::dump_path(prefix, kind), |file| file.write_all(bytemuck::cast_slice(rays)))?;
+        files::write_atomically(&args::dump_path(prefix, kind), |file| file.write_all(bytemuck::cast_slice(rays)))?;
     }
     Ok(())
 }

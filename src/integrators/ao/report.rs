@@ -18,7 +18,7 @@ pub(super) fn report(options: &AoOptions, result: &AoResult) -> IntegratorReport
             "radius": finite(options.radius),
             "falloff": options.falloff,
             "normal": options.hemisphere,
-            "reach": finite(options.reach()),
+            "reach": finite(options.attenuation().reach()),
         },
         "covered_mean": covered_mean,
         "rays": {
@@ -29,11 +29,11 @@ pub(super) fn report(options: &AoOptions, result: &AoResult) -> IntegratorReport
         },
         "mrays_s_wall": mrays_s,
     });
-    let mut explanations = vec![match options.binary() {
+    let mut explanations = vec![match options.attenuation().is_binary() {
         true => "binary occlusion: any hit ends a ray, no nearest one is looked for".into(),
         false => "occlusion falls off with distance: the nearest hit is looked for".into(),
     }];
-    explanations.push(match options.reach() {
+    explanations.push(match options.attenuation().reach() {
         r if r.is_finite() => {
             format!("occlusion rays end at distance {r:.6}: what is beyond changes nothing that can be seen")
         }

@@ -5,11 +5,12 @@ use std::sync::Arc;
 use super::report::{self, environment_text};
 use super::{Lens, MOST_DEPTH, PathOptions, PixelFilter, TextureFilter, View, render, streams};
 use crate::accel::flatten::FlatScene;
+use crate::colour::srgb_decode;
 use crate::error::{Error, Result};
 use crate::film::Control;
 use crate::film::cover::Cover;
 use crate::integrators::{Integrator, IntegratorSettings, PictureOptions, Rendered, Shot};
-use crate::output::{Image, Samples, png};
+use crate::output::{Image, Samples};
 use crate::scene::{Camera, Projection, Scene};
 use crate::shaders::StreamShaders;
 use crate::tracer::{Needs, Tracer};
@@ -213,7 +214,7 @@ impl Integrator for Paths {
             out.channels.retain(|c| self.channels().contains(&c.name.as_str()));
             for channel in &mut out.channels {
                 if let Samples::F32(values) = &mut channel.samples {
-                    values.iter_mut().for_each(|v| *v = png::srgb_decode(f(*v)));
+                    values.iter_mut().for_each(|v| *v = srgb_decode(f(*v)));
                 }
             }
             out

@@ -1,12 +1,13 @@
 //! Something appears under a camera that stands still: how long the image without it stays.
 
-use super::script::Script;
-use super::{Stage, afresh, candidates, ghost, lag, masks, result_of, settled};
-use crate::bench::ao::Bench;
-use crate::bench::ao::laps::Laps;
-use crate::bench::ao::reference::Truth;
+use super::masks;
+use super::script::ChangeScript;
+use super::stage::{ChangeStage, afresh, candidates, ghost, lag, result_of, settled};
+use crate::bench::ao::frame_log::FrameLog;
+use crate::bench::ao::reference::AoReference;
+use crate::bench::ao::session::AoSession;
+use crate::bench::record::ao::{ChangeRecord, ChangeResult};
 use crate::error::Result;
-use crate::measure::ao_benchmark::{ChangeRecord, ChangeResult};
 use crate::measure::stats::Spread;
 use crate::measure::temporal::Ghosting;
 use crate::realtime::Realtime;
@@ -25,28 +26,33 @@ const POOL: i64 = 2;
 const HALF_STEP: f64 = 1.0 / 510.0;
 
 /// Plays it with every preset.
-pub fn play(bench: &mut Bench, script: &mut Script, stage: &mut Stage, record: &mut ChangeRecord) -> Result<()> {
-    bench.phase(format!("{}: references", stage.name));
+pub fn play(
+    session: &mut AoSession,
+    script: &mut ChangeScript,
+    stage: &mut ChangeStage,
+    record: &mut ChangeRecord,
+) -> Result<()> {
+    session.phase(format!("{}: references", stage.name));
     script.to(stage.tracer, 0)?;
-    let wrong = stage.truth()?;
+    let wrong = stage.reference()?;
     script.to(stage.tracer, 1)?;
-    let truth = stage.truth()?;
-    let mask = masks::unchanged(&truth.surfaces, &wrong.surfaces, script.reach);
-    let frames = (bench.args.frames() / 2).max(FRAMES);
+    let reference = stage.reference()?;
+    let mask = masks::unchanged(&reference.surfaces, &wrong.surfaces, script.reach);
+    let frames = (session.args.frames() / 2).max(FRAMES);
     record.frames = frames;
     record.pixels = mask.iter().filter(|m| **m > 0.0).count() as u64;
-    record.reference_rmse = truth.rmse;
-    for candidate in candidates(bench) {
-        if bench.is_late() && !record.results.is_empty() {
-            bench.leave_out(&format!("{}: {}", stage.name, candidate.name));
+    record.reference_rmse = reference.rmse;
+    for candidate in candidates(session) {
+        if session.is_late() && !record.results.is_empty() {
+            session.leave_out(&format!("{}: {}", stage.name, candidate.name));
             continue;
         }
-        bench.phase(format!("{}: {}", stage.name, candidate.name));
+        session.phase(format!("{}: {}", stage.name, candidate.name));
         script.to(stage.tracer, 0)?;
-        let mut realtime = stage.shot().realtime(&candidate.settings(&stage.occlusion))?;
-        let mut laps = Laps::default();
-        for _ in 0..bench.args.frames() {
-            laps.frame(&mut realtime, stage.tracer, &stage.camera, &[])?;
+        let mut realtime = stage.renderer().realtime(&candidate.settings(&stage.occlusion))?;
+        let mut log = FrameLog::default();
+        for _ in 0..session.args.frames() {
+            log.frame(&mut realtime, stage.tracer, &stage.camera, &[])?;
         }
         let mut result = result_of(candidate, stage);
         let update = script.to(stage.tracer, 1)?;
@@ -55,16 +61,16 @@ pub fn play(bench: &mut Bench, script: &mut Script, stage: &mut Stage, record: &
         let mut images = Vec::new();
         for frame in 0..frames {
             let moved = if frame == 0 { update.moved.as_slice() } else { &[] };
-            laps.frame(&mut realtime, stage.tracer, &stage.camera, moved)?;
+            log.frame(&mut realtime, stage.tracer, &stage.camera, moved)?;
             let image = realtime.result()?;
-            result.rmse.push(truth.rmse_over(&image, &mask)?);
+            result.rmse.push(reference.rmse_over(&image, &mask)?);
             images.push(image);
         }
-        let fresh = afresh(&mut realtime, stage, bench.args.frames().max(frames))?;
+        let fresh = afresh(&mut realtime, stage, session.args.frames().max(frames))?;
         let Some(new) = fresh.last() else { continue };
         // what it showed before is all of it, also where that is not what was right
         let share = |image: &[f32], beside: &[f32], ghosting: &mut Ghosting| {
-            ghost(ghosting, (image, beside), (&truth, &wrong), &mask).map_or(f64::NAN, |r| r.share)
+            ghost(ghosting, (image, beside), (&reference, &wrong), &mask).map_or(f64::NAN, |r| r.share)
         };
         let all = share(&old, new, &mut Ghosting::default());
         let mut ghosting = Ghosting::default();
@@ -74,7 +80,7 @@ pub fn play(bench: &mut Bench, script: &mut Script, stage: &mut Stage, record: &
         result.ghosting = Some(ghosting.energy());
         lag(&mut result, residuals, memory);
         let after = &images[STALE_AFTER - 1];
-        stale(&mut result, &mut realtime, stage, (after, &mask), (&truth, &wrong))?;
+        stale(&mut result, &mut realtime, stage, (after, &mask), (&reference, &wrong))?;
         record.results.push(result);
     }
     Ok(())
@@ -84,9 +90,9 @@ pub fn play(bench: &mut Bench, script: &mut Script, stage: &mut Stage, record: &
 fn stale(
     result: &mut ChangeResult,
     realtime: &mut Realtime,
-    stage: &Stage,
+    stage: &ChangeStage,
     (image, mask): (&[f32], &[f32]),
-    (truth, wrong): (&Truth, &Truth),
+    (reference, wrong): (&AoReference, &AoReference),
 ) -> Result<()> {
     // what it draws goes on: each run is another
     let mut fresh = || settled(realtime, stage, STALE_AFTER as u32);
@@ -104,7 +110,7 @@ fn stale(
     let count = |image: &[f32]| {
         let is_stale = |k: &usize| {
             let k = *k;
-            let old = f64::from(wrong.image[k] - truth.image[k]);
+            let old = f64::from(wrong.image[k] - reference.image[k]);
             let off = (f64::from(image[k]) - sums[k] / runs) * old.signum();
             // of one image and of a mean of some
             let variance = variances[k] * (1.0 + 1.0 / runs) + HALF_STEP.powi(2);

@@ -2,8 +2,8 @@
 
 use glam::{DAffine3, DVec3};
 
-use super::script::{Advance, Script};
-use crate::accel::flatten::Motion;
+use super::script::{Advance, ChangeScript};
+use crate::scene::Motion;
 use crate::scene::builtin::shapes;
 use crate::scene::{Camera, Geometry, Instance, Material, Mesh, Projection, Scene};
 use crate::tracer::Changes;
@@ -50,13 +50,13 @@ impl Room {
         Self { scene, mover }
     }
 
-    fn script(&self, what: impl Fn(u32) -> DVec3 + 'static) -> Script<'_> {
+    fn script(&self, what: impl Fn(u32) -> DVec3 + 'static) -> ChangeScript<'_> {
         let mover = self.mover;
         let advance: Advance = Box::new(move |tracer, frame| {
             let instances = vec![(mover, placed(what(frame)))];
             tracer.update(&Changes { instances, ..Default::default() })
         });
-        Script {
+        ChangeScript {
             name: self.scene.name.clone(),
             scene: &self.scene,
             motion: Motion { instances: vec![mover], meshes: Vec::new() },
@@ -67,17 +67,17 @@ impl Room {
     }
 
     /// The box is away at frame 0, and here from frame 1 on.
-    pub fn appearing(&self) -> Script<'_> {
+    pub fn appearing(&self) -> ChangeScript<'_> {
         self.script(|frame| if frame == 0 { AWAY } else { HERE })
     }
 
     /// Nothing moves.
-    pub fn standing(&self) -> Script<'_> {
+    pub fn standing(&self) -> ChangeScript<'_> {
         self.script(|_| HERE)
     }
 
     /// The box slides to and fro, always by the same share of the view's width.
-    pub fn sliding(&self, aspect: f64) -> Script<'_> {
+    pub fn sliding(&self, aspect: f64) -> ChangeScript<'_> {
         let mut script = self.script(|_| HERE);
         let half_height = match script.camera.projection {
             Projection::Perspective { fov_y } => (0.5 * fov_y).tan() * EYE.distance(HERE),

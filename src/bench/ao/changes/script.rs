@@ -1,19 +1,18 @@
 //! A scene over time: anything that can bring a tracer to a frame.
 
-use crate::accel::flatten::Motion;
 use crate::bench::ao::scenes::REACH;
 use crate::error::Result;
 use crate::film::camera::{self, Choice};
 use crate::realtime::sequence::{CameraMotion, Sequence};
 use crate::scene::animation::Rig;
-use crate::scene::{Camera, Scene};
+use crate::scene::{Camera, Motion, Scene};
 use crate::tracer::{Tracer, UpdateStats};
 
 /// Brings the tracer to a frame. Frames need not come in order.
 pub type Advance<'a> = Box<dyn FnMut(&mut Tracer, u32) -> Result<UpdateStats> + 'a>;
 
 /// A scene, what may change in it, and what does.
-pub struct Script<'a> {
+pub struct ChangeScript<'a> {
     /// In tables.
     pub name: String,
     /// As it is at the beginning.
@@ -31,7 +30,7 @@ pub struct Script<'a> {
 /// Of an animation.
 const FRAMES_PER_SECOND: f64 = 60.0;
 
-impl<'a> Script<'a> {
+impl<'a> ChangeScript<'a> {
     /// A scene's first animation, seen by a camera that stands still; `None` where it has none.
     ///
     /// # Errors

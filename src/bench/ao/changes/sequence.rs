@@ -1,52 +1,58 @@
 //! Something moves in every frame: errors, ghosts, and what keeping up costs.
 
-use super::script::Script;
-use super::{Stage, candidates, ghost, masks, result_of, settled};
-use crate::bench::ao::Bench;
-use crate::bench::ao::laps::Laps;
-use crate::bench::ao::moving::measured;
-use crate::bench::ao::reference::Truth;
-use crate::bench::ao::shot::first_timed;
+use super::masks;
+use super::script::ChangeScript;
+use super::stage::{ChangeStage, candidates, ghost, result_of, settled};
+use crate::bench::ao::frame_log::FrameLog;
+use crate::bench::ao::orbit::measured;
+use crate::bench::ao::reference::AoReference;
+use crate::bench::ao::session::AoSession;
+use crate::bench::ao::view_renderer::first_timed;
+use crate::bench::record::ao::{ChangeRecord, Errors};
 use crate::error::Result;
-use crate::measure::ao_benchmark::{ChangeRecord, Errors};
 use crate::measure::stats::Spread;
 use crate::measure::temporal::Ghosting;
 
 /// What is right in a frame, what was in the one before, and the pixels in which both show the same surface at rest.
 struct Moment {
     frame: u32,
-    truth: Truth,
-    before: Truth,
+    reference: AoReference,
+    before: AoReference,
     mask: Vec<f32>,
 }
 
 /// Plays it with every preset.
-pub fn play(bench: &mut Bench, script: &mut Script, stage: &mut Stage, record: &mut ChangeRecord) -> Result<()> {
-    let frames = bench.args.frames();
-    bench.phase(format!("{}: references", stage.name));
+pub fn play(
+    session: &mut AoSession,
+    script: &mut ChangeScript,
+    stage: &mut ChangeStage,
+    record: &mut ChangeRecord,
+) -> Result<()> {
+    let frames = session.args.frames();
+    session.phase(format!("{}: references", stage.name));
     let mut moments = Vec::new();
     for frame in measured(frames) {
         script.to(stage.tracer, frame.saturating_sub(1))?;
-        let before = stage.truth()?;
+        let before = stage.reference()?;
         script.to(stage.tracer, frame)?;
-        let truth = stage.truth()?;
-        let mask = masks::unchanged(&truth.surfaces, &before.surfaces, script.reach);
-        moments.push(Moment { frame, truth, before, mask });
+        let reference = stage.reference()?;
+        let mask = masks::unchanged(&reference.surfaces, &before.surfaces, script.reach);
+        moments.push(Moment { frame, reference, before, mask });
     }
     let count = moments.len().max(1) as f64;
     record.frames = frames;
     record.pixels = moments.iter().map(|m| m.mask.iter().filter(|v| **v > 0.0).count() as u64).sum();
-    record.reference_rmse = moments.iter().map(|m| m.truth.rmse).sum::<f64>() / count;
-    for candidate in candidates(bench) {
-        if bench.is_late() && !record.results.is_empty() {
-            bench.leave_out(&format!("{}: {}", stage.name, candidate.name));
+    record.reference_rmse = moments.iter().map(|m| m.reference.rmse).sum::<f64>() / count;
+    for candidate in candidates(session) {
+        if session.is_late() && !record.results.is_empty() {
+            session.leave_out(&format!("{}: {}", stage.name, candidate.name));
             continue;
         }
-        bench.phase(format!("{}: {}", stage.name, candidate.name));
+        session.phase(format!("{}: {}", stage.name, candidate.name));
         script.to(stage.tracer, 0)?;
-        let mut realtime = stage.shot().realtime(&candidate.settings(&stage.occlusion))?;
+        let mut realtime = stage.renderer().realtime(&candidate.settings(&stage.occlusion))?;
         let mut result = result_of(candidate, stage);
-        let (mut laps, mut updates) = (Laps::default(), Vec::new());
+        let (mut log, mut updates) = (FrameLog::default(), Vec::new());
         let (mut images, mut errors): (Vec<Vec<f32>>, Vec<Errors>) = (Vec::new(), Vec::new());
         for frame in 0..frames {
             let moved = if frame == 0 {
@@ -57,26 +63,26 @@ pub fn play(bench: &mut Bench, script: &mut Script, stage: &mut Stage, record: &
                 update.moved
             };
             let seconds = {
-                laps.frame(&mut realtime, stage.tracer, &stage.camera, &moved)?;
-                laps.seconds().last().copied().unwrap_or_default()
+                log.frame(&mut realtime, stage.tracer, &stage.camera, &moved)?;
+                log.seconds().last().copied().unwrap_or_default()
             };
             // so that structures are built anew where that pays
             stage.tracer.traced(seconds);
             let Some(m) = moments.iter().find(|m| m.frame == frame) else { continue };
             let image = realtime.result()?;
-            errors.push(m.truth.errors_of(&image)?);
+            errors.push(m.reference.errors_of(&image)?);
             images.push(image);
         }
         let mut ghosting = Ghosting::default();
         for (m, image) in moments.iter().zip(&images) {
             script.to(stage.tracer, m.frame)?;
             let settled = settled(&mut realtime, stage, frames)?;
-            let left = ghost(&mut ghosting, (image, &settled), (&m.truth, &m.before), &m.mask);
+            let left = ghost(&mut ghosting, (image, &settled), (&m.reference, &m.before), &m.mask);
             result.residuals.push(left.map_or(f64::NAN, |r| r.share));
         }
         result.ghosting = Some(ghosting.energy());
         result.errors = Errors::mean(&errors);
-        result.cost = Some(laps.cost(first_timed(frames)));
+        result.cost = Some(log.cost(first_timed(frames)));
         result.update_ms = Spread::of(&updates);
         record.results.push(result);
     }

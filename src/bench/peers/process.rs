@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use serde_json::Value;
 
-use super::peers_file::PeerSpec;
+use super::file::PeerSpec;
 use crate::error::{Error, Result};
 use crate::terminal::interrupt;
 
@@ -43,8 +43,8 @@ impl PeerError {
     }
 }
 
-/// A running one.
-pub struct Process {
+/// A running peer. `bench::rays` and `bench::path` add what is said to it.
+pub struct Peer {
     /// From the peers file.
     pub spec: PeerSpec,
     /// As it introduces itself.
@@ -55,7 +55,7 @@ pub struct Process {
     files: tempfile::TempDir,
 }
 
-impl Drop for Process {
+impl Drop for Peer {
     fn drop(&mut self) {
         let _ = writeln!(self.stdin, "quit");
         // it may be in the middle of something, or not listen
@@ -64,7 +64,7 @@ impl Drop for Process {
     }
 }
 
-impl Process {
+impl Peer {
     /// Builds, starts and greets it.
     ///
     /// # Errors

@@ -2,9 +2,9 @@
 
 use std::time::Instant;
 
+use crate::bench::record::ao::{Cost, PassTime};
 use crate::error::Result;
 use crate::film::camera::CameraRecord;
-use crate::measure::ao_benchmark::{Cost, PassTime};
 use crate::measure::stats::Spread;
 use crate::realtime::{FrameStats, Realtime, Technique};
 use crate::terminal::interrupt;
@@ -12,16 +12,16 @@ use crate::tracer::{Moved, Tracer};
 
 /// Frames that were made.
 #[derive(Default)]
-pub struct Laps {
-    frames: Vec<Lap>,
+pub struct FrameLog {
+    frames: Vec<TimedFrame>,
 }
 
-struct Lap {
+struct TimedFrame {
     wall: f64,
     stats: FrameStats,
 }
 
-impl Laps {
+impl FrameLog {
     /// Makes the next frame and takes its time. Fails when the user asked to stop.
     pub fn frame(
         &mut self,
@@ -38,7 +38,7 @@ impl Laps {
             // it would have traced none
             stats.skipped_rays = 0;
         }
-        self.frames.push(Lap { wall, stats });
+        self.frames.push(TimedFrame { wall, stats });
         // just pushed
         Ok(&self.frames[self.frames.len() - 1].stats)
     }
@@ -61,7 +61,7 @@ impl Laps {
     /// Device seconds of each frame, or by the clock where the device has none.
     pub fn seconds(&self) -> Vec<f64> {
         let seconds =
-            |l: &Lap| if l.stats.timings.is_empty() { l.wall } else { l.stats.timings.iter().map(|t| t.seconds).sum() };
+            |l: &TimedFrame| if l.stats.timings.is_empty() { l.wall } else { l.stats.timings.iter().map(|t| t.seconds).sum() };
         self.frames.iter().map(seconds).collect()
     }
 
@@ -81,7 +81,7 @@ impl Laps {
             }
         }
         let of_pass = |name: &str| {
-            let of_frame = |l: &Lap| {
+            let of_frame = |l: &TimedFrame| {
                 let here = l.stats.timings.iter().filter(|t| pass(t.label) == name).map(|t| t.seconds);
                 // a frame that has no need of it says nothing about it
                 here.reduce(|a, b| a + b)
@@ -110,7 +110,7 @@ mod tests {
 
     #[test]
     fn steps_of_a_pass_are_added() {
-        let lap = |k: f64| Lap {
+        let lap = |k: f64| TimedFrame {
             wall: k,
             stats: FrameStats {
                 timings: [("gbuffer trace", 1.0), ("gbuffer deliver", 0.5), ("filter", 0.25)]
@@ -120,11 +120,11 @@ mod tests {
                 ..Default::default()
             },
         };
-        let laps = Laps { frames: vec![lap(100.0), lap(1.0), lap(1.0), lap(2.0)] };
-        let cost = laps.cost(1);
+        let log = FrameLog { frames: vec![lap(100.0), lap(1.0), lap(1.0), lap(2.0)] };
+        let cost = log.cost(1);
         let names: Vec<_> = cost.passes.iter().map(|p| (p.pass.as_str(), p.ms.median)).collect();
         assert_eq!(names, [("gbuffer", 1.5), ("filter", 0.25)]);
         assert!((cost.device_ms.median - 1.75).abs() < 1e-12 && (cost.device_ms.p95 - 3.5).abs() < 1e-12);
-        assert_eq!((laps.rays(), cost.rays), (40, 10.0));
+        assert_eq!((log.rays(), cost.rays), (40, 10.0));
     }
 }

@@ -1,11 +1,10 @@
-//! A peer that traces rays: scenes and rays in files, seconds and hits back. docs/benchmarks.md has the protocol.
+//! What is said to a peer that traces rays: scenes and rays in files, seconds and hits back. docs/benchmarks.md has the protocol.
 
 use std::io::{BufWriter, Write};
 use std::path::Path;
 
-use super::peers_file::PeerSpec;
-use super::process::{PeerError, Process};
 use crate::accel::flatten::FlatScene;
+use crate::bench::peers::process::{Peer, PeerError};
 use crate::error::{Error, Result};
 use crate::integrators::rays::Mode;
 use crate::ray::{Hit, Ray};
@@ -14,26 +13,12 @@ use crate::scene::Geometry;
 /// Of peer scenes: "SKYP".
 const SCENE_MAGIC: u32 = 0x5059_4b53;
 
-/// A running peer.
-pub struct Peer {
-    /// How to talk to it.
-    pub process: Process,
-}
-
 impl Peer {
-    /// Builds, starts and greets it.
-    ///
-    /// # Errors
-    /// Those of [`Process::start`].
-    pub fn start(spec: &PeerSpec) -> Result<Self, PeerError> {
-        Ok(Self { process: Process::start(spec)? })
-    }
-
-    /// Gives it a scene; the one before is forgotten, and all rays.
-    pub fn load_scene(&mut self, flat: &FlatScene) -> Result<(), PeerError> {
-        let path = self.process.file("scene.bin");
+    /// Gives it what rays are traced against; what it had before is forgotten, and all rays.
+    pub fn load_geometry(&mut self, flat: &FlatScene) -> Result<(), PeerError> {
+        let path = self.file("scene.bin");
         write_scene(flat, &path).map_err(|e| Error::write(&path, &e))?;
-        self.process.ask(&format!("scene {}", path.display()))?;
+        self.ask(&format!("scene {}", path.display()))?;
         // it has read it: the space is worth more than the file
         let _ = std::fs::remove_file(&path);
         Ok(())
@@ -41,23 +26,23 @@ impl Peer {
 
     /// Builds what a kernel traces: seconds and bytes, the same for kernels that share a structure.
     pub fn build(&mut self, kernel: &str) -> Result<(f64, f64), PeerError> {
-        let answer = self.process.ask(&format!("build {kernel}"))?;
-        Ok((Process::number(&answer, "build_seconds")?, Process::number(&answer, "bytes")?))
+        let answer = self.ask(&format!("build {kernel}"))?;
+        Ok((Peer::number(&answer, "build_seconds")?, Peer::number(&answer, "bytes")?))
     }
 
     /// Gives it a set of rays under a name.
     pub fn load_rays(&mut self, name: &str, rays: &[Ray]) -> Result<(), PeerError> {
-        let path = self.process.file(&format!("{name}.rays"));
+        let path = self.file(&format!("{name}.rays"));
         std::fs::write(&path, bytemuck::cast_slice(rays)).map_err(|e| Error::write(&path, &e))?;
-        self.process.ask(&format!("rays {name} {}", path.display()))?;
+        self.ask(&format!("rays {name} {}", path.display()))?;
         let _ = std::fs::remove_file(&path);
         Ok(())
     }
 
     /// Traces a set once: seconds by its own clock, and how many rays met something.
     pub fn trace(&mut self, kernel: &str, mode: Mode, name: &str) -> Result<(f64, u64), PeerError> {
-        let answer = self.process.ask(&format!("trace {kernel} {} {name}", mode_name(mode)))?;
-        let (seconds, hits) = (Process::number(&answer, "seconds")?, Process::number(&answer, "hits")?);
+        let answer = self.ask(&format!("trace {kernel} {} {name}", mode_name(mode)))?;
+        let (seconds, hits) = (Peer::number(&answer, "seconds")?, Peer::number(&answer, "hits")?);
         if !(seconds > 0.0 && seconds.is_finite()) {
             return Err(PeerError::Failed(format!("it traced in {seconds} seconds")));
         }
@@ -73,8 +58,8 @@ impl Peer {
         name: &str,
         count: usize,
     ) -> Result<Vec<Hit>, PeerError> {
-        let path = self.process.file("hits.bin");
-        self.process.ask(&format!("hits {kernel} {} {name} {}", mode_name(mode), path.display()))?;
+        let path = self.file("hits.bin");
+        self.ask(&format!("hits {kernel} {} {name} {}", mode_name(mode), path.display()))?;
         let bytes = std::fs::read(&path).map_err(|e| Error::read(&path, &e))?;
         let _ = std::fs::remove_file(&path);
         if bytes.len() != count * size_of::<Hit>() {

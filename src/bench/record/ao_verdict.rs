@@ -1,53 +1,11 @@
 //! What the numbers of a view say about the preset `balanced` beside the pipeline of the reference work.
 
-use serde::Serialize;
-
-use super::{Still, TechniqueRecord, ViewRecord};
+use super::ao::{EqualTime, Still, TechniqueRecord, Verdict, ViewRecord};
 
 /// Who is judged.
 pub const OURS: &str = "balanced";
 /// Beside whom.
 pub const THEIRS: &str = "larsen";
-
-/// Of one view. `None` where one of the two was not measured.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct Verdict {
-    /// Occlusion rays of a frame of ours over those of theirs.
-    pub rays_ratio: Option<f64>,
-    /// The same, camera rays counted: a still camera needs none of ours, theirs always all.
-    pub rays_ratio_with_camera: Option<f64>,
-    /// The same while something moves.
-    pub rays_ratio_moving: Option<f64>,
-    /// Settled RMSE of ours over that of theirs.
-    pub rmse_ratio: Option<f64>,
-    /// The same under the camera that goes round.
-    pub moving_rmse_ratio: Option<f64>,
-    /// Frames until ours is first as good as theirs is settled.
-    pub frames_to_reach: Option<u32>,
-    /// Occlusion rays until then.
-    pub rays_to_reach: Option<u64>,
-    /// These over the occlusion rays of one frame of theirs.
-    pub rays_to_reach_ratio: Option<f64>,
-    /// With as many rays as take their time.
-    pub equal_time: Option<EqualTime>,
-    /// Presets whose filter raises the settled error.
-    pub filter_raises: Vec<String>,
-}
-
-/// The preset `balanced`, with so many rays a pixel that a frame takes no longer than one of theirs.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct EqualTime {
-    /// Rays a pixel.
-    pub rays_per_pixel: u32,
-    /// A frame's, camera rays included.
-    pub ms: f64,
-    /// A frame of theirs.
-    pub their_ms: f64,
-    /// Its settled error.
-    pub rmse: f64,
-    /// That over theirs.
-    pub rmse_ratio: f64,
-}
 
 impl Verdict {
     /// Greatest share of their rays that is aimed at.
@@ -94,7 +52,7 @@ fn raises(r: &TechniqueRecord) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::measure::ao_benchmark::{Cost, Errors, Point};
+    use crate::bench::record::ao::{Cost, Errors, Point};
 
     fn result(preset: &str, rays: f64, camera_rays: f64, rmse: &[f64], unfiltered: f64) -> TechniqueRecord {
         let cost = |camera_rays| Cost { rays, camera_rays, ..Default::default() };

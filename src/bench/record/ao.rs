@@ -3,25 +3,17 @@
 //!
 //! Times are milliseconds, errors are of accessibility (0 to 1) over the pixels that show something.
 
-mod rows;
-pub mod verdict;
-
 use serde::Serialize;
 
-use super::stats::Spread;
-pub use verdict::{EqualTime, Verdict};
+use super::{Completeness, HostInfo};
+use crate::measure::stats::Spread;
 
 /// A whole run.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct AoBenchmark {
-    /// Of skylit.
-    pub version: String,
-    /// Vulkan device.
-    pub device: String,
-    /// Its driver.
-    pub driver: String,
-    /// Logical processors of the host.
-    pub threads: usize,
+    /// What it ran on.
+    #[serde(flatten)]
+    pub host: HostInfo,
     /// What traces rays.
     pub tracer: String,
     /// Pixels of the images, but where a series says otherwise.
@@ -40,17 +32,9 @@ pub struct AoBenchmark {
     pub structures: Vec<StructureRecord>,
     /// One number varied, all others the same.
     pub series: Vec<SeriesRecord>,
-    /// The time limit ended it.
-    pub stopped_early: bool,
-    /// What was left out, and why.
-    pub notes: Vec<String>,
-}
-
-impl AoBenchmark {
-    /// Is there nothing in it?
-    pub fn is_empty(&self) -> bool {
-        self.views.is_empty() && self.changes.is_empty() && self.structures.is_empty() && self.series.is_empty()
-    }
+    /// What is missing.
+    #[serde(flatten)]
+    pub completeness: Completeness,
 }
 
 /// One scene from one place.
@@ -357,4 +341,44 @@ pub struct SeriesPoint {
     pub unfiltered_rmse: Option<f64>,
     /// Error when the quickest line of the series was done.
     pub equal_time_rmse: Option<f64>,
+}
+
+/// Of one view. `None` where one of the two was not measured.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Verdict {
+    /// Occlusion rays of a frame of ours over those of theirs.
+    pub rays_ratio: Option<f64>,
+    /// The same, camera rays counted: a still camera needs none of ours, theirs always all.
+    pub rays_ratio_with_camera: Option<f64>,
+    /// The same while something moves.
+    pub rays_ratio_moving: Option<f64>,
+    /// Settled RMSE of ours over that of theirs.
+    pub rmse_ratio: Option<f64>,
+    /// The same under the camera that goes round.
+    pub moving_rmse_ratio: Option<f64>,
+    /// Frames until ours is first as good as theirs is settled.
+    pub frames_to_reach: Option<u32>,
+    /// Occlusion rays until then.
+    pub rays_to_reach: Option<u64>,
+    /// These over the occlusion rays of one frame of theirs.
+    pub rays_to_reach_ratio: Option<f64>,
+    /// With as many rays as take their time.
+    pub equal_time: Option<EqualTime>,
+    /// Presets whose filter raises the settled error.
+    pub filter_raises: Vec<String>,
+}
+
+/// The preset `balanced`, with so many rays a pixel that a frame takes no longer than one of theirs.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct EqualTime {
+    /// Rays a pixel.
+    pub rays_per_pixel: u32,
+    /// A frame's, camera rays included.
+    pub ms: f64,
+    /// A frame of theirs.
+    pub their_ms: f64,
+    /// Its settled error.
+    pub rmse: f64,
+    /// That over theirs.
+    pub rmse_ratio: f64,
 }

@@ -8,36 +8,31 @@ use std::io::Write;
 
 use serde::Serialize;
 
-use super::stats::Summary;
+use super::{BenchRecord, Completeness, HostInfo};
+use crate::measure::stats::Summary;
 
 /// A whole run.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct PathBenchmark {
-    /// Of skylit.
-    pub version: String,
-    /// Vulkan device.
-    pub device: String,
-    /// Its driver.
-    pub driver: String,
-    /// Logical processors of the host.
-    pub threads: usize,
-    /// How our rays were traced.
+    /// What it ran on.
+    #[serde(flatten)]
+    pub host: HostInfo,
+    /// TimeEstimate our rays were traced.
     pub tracer: String,
     /// Timed images of each kind, after one that warms up.
     pub repeats: u32,
     /// Peers that ran, as they introduce themselves.
     pub peers: Vec<String>,
     /// What was measured.
-    pub scenes: Vec<PathScene>,
-    /// The time limit ended it.
-    pub stopped_early: bool,
-    /// What was left out, and why.
-    pub notes: Vec<String>,
+    pub scenes: Vec<SceneRecord>,
+    /// What is missing.
+    #[serde(flatten)]
+    pub completeness: Completeness,
 }
 
 /// One scene.
 #[derive(Clone, Debug, Default, Serialize)]
-pub struct PathScene {
+pub struct SceneRecord {
     /// As on the command line.
     pub scene: String,
     /// Pixels.
@@ -51,18 +46,18 @@ pub struct PathScene {
     /// What surrounds it.
     pub environment: String,
     /// What images are held against, by engine.
-    pub references: Vec<Reference>,
-    /// How far the references of peers are from ours.
-    pub differences: Vec<Difference>,
-    /// Error that [`Contestant::seconds_to_target`] is about, and whose greatest sample count reached it.
-    pub target: Option<Target>,
+    pub references: Vec<ReferenceRecord>,
+    /// TimeEstimate far the references of peers are from ours.
+    pub differences: Vec<ReferenceDifference>,
+    /// Error that [`ContestantRecord::seconds_to_target`] is about, and whose greatest sample count reached it.
+    pub target: Option<ErrorTarget>,
     /// By contestant.
-    pub results: Vec<Contestant>,
+    pub results: Vec<ContestantRecord>,
 }
 
 /// What is right, as one engine sees it.
 #[derive(Clone, Debug, Default, Serialize)]
-pub struct Reference {
+pub struct ReferenceRecord {
     /// `skylit`, or a peer.
     pub engine: String,
     /// Paths a pixel.
@@ -77,7 +72,7 @@ pub struct Reference {
 
 /// Two references beside each other.
 #[derive(Clone, Debug, Default, Serialize)]
-pub struct Difference {
+pub struct ReferenceDifference {
     /// The peer.
     pub engine: String,
     /// Its mean over ours.
@@ -90,16 +85,16 @@ pub struct Difference {
 
 /// An error, and who set it.
 #[derive(Clone, Debug, Default, Serialize)]
-pub struct Target {
+pub struct ErrorTarget {
     /// Root mean square.
     pub rmse: f64,
-    /// Contestant whose last point it is.
+    /// ContestantRecord whose last point it is.
     pub set_by: String,
 }
 
 /// Images of one sample count.
 #[derive(Clone, Debug, Default, Serialize)]
-pub struct Point {
+pub struct ErrorPoint {
     /// Paths a pixel.
     pub spp: u32,
     /// Wall seconds of an image.
@@ -114,13 +109,13 @@ pub struct Point {
 
 /// What one contestant did.
 #[derive(Clone, Debug, Default, Serialize)]
-pub struct Contestant {
+pub struct ContestantRecord {
     /// In tables.
     pub name: String,
     /// Whose reference it is held against.
     pub engine: String,
     /// By sample count, ascending.
-    pub points: Vec<Point>,
+    pub points: Vec<ErrorPoint>,
     /// Of all images: mean of image - reference, in standard errors of the repeats' means; `None` with fewer than three.
     pub bias_sigmas: Option<f64>,
     /// 10^6 paths a second at the greatest sample count.
@@ -132,22 +127,22 @@ pub struct Contestant {
     /// Longest launch on the device, seconds, where it is known.
     pub longest_launch: Option<f64>,
     /// To the target.
-    pub seconds_to_target: Option<Reached>,
+    pub seconds_to_target: Option<TimeToError>,
 }
 
 /// When an error was reached.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Reached {
+pub struct TimeToError {
     /// Wall seconds of one image.
     pub seconds: f64,
-    /// How it is known.
-    pub how: How,
+    /// TimeEstimate it is known.
+    pub how: TimeEstimate,
 }
 
-/// How a time is known.
+/// TimeEstimate a time is known.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
-pub enum How {
+pub enum TimeEstimate {
     /// It lies between two that were measured.
     Between,
     /// The shortest measured image is better already: it takes less.
@@ -156,26 +151,28 @@ pub enum How {
     Extrapolated,
 }
 
-impl Contestant {
+impl ContestantRecord {
     /// Time at which the error falls to `rmse`: logarithmically between points; after the last one as for independent samples.
-    pub fn time_to(&self, rmse: f64) -> Option<Reached> {
+    pub fn time_to(&self, rmse: f64) -> Option<TimeToError> {
         let curve: Vec<(f64, f64)> =
             self.points.iter().filter_map(|p| Some((p.seconds?.median, p.rmse))).filter(|p| p.1.is_finite()).collect();
         let (first, last) = (curve.first()?, curve.last()?);
         if first.1 <= rmse {
-            return Some(Reached { seconds: first.0, how: How::Less });
+            return Some(TimeToError { seconds: first.0, how: TimeEstimate::Less });
         }
         let between = curve.windows(2).find(|w| w[0].1 > rmse && w[1].1 <= rmse).map(|w| {
             let [(t0, e0), (t1, e1)] = [w[0], w[1]];
             // no error at all is as good as the target
             let share = if e1 > 0.0 { (e0 / rmse).ln() / (e0 / e1).ln() } else { 1.0 };
-            Reached { seconds: t0 * (t1 / t0).powf(share), how: How::Between }
+            TimeToError { seconds: t0 * (t1 / t0).powf(share), how: TimeEstimate::Between }
         });
-        between.or_else(|| (rmse > 0.0).then(|| Reached { seconds: last.0 * (last.1 / rmse).powi(2), how: How::Extrapolated }))
+        between.or_else(|| {
+            (rmse > 0.0).then(|| TimeToError { seconds: last.0 * (last.1 / rmse).powi(2), how: TimeEstimate::Extrapolated })
+        })
     }
 }
 
-impl PathScene {
+impl SceneRecord {
     /// Says when everybody reaches the error that `set_by` had in the end.
     pub fn set_target(&mut self, set_by: &str) {
         let Some(target) = self.results.iter().find(|r| r.name == set_by).and_then(|r| r.points.last()) else { return };
@@ -183,22 +180,21 @@ impl PathScene {
             return;
         }
         let rmse = target.rmse;
-        self.target = Some(Target { rmse, set_by: set_by.to_owned() });
+        self.target = Some(ErrorTarget { rmse, set_by: set_by.to_owned() });
         self.results.iter_mut().for_each(|r| r.seconds_to_target = r.time_to(rmse));
     }
 }
 
-impl PathBenchmark {
-    /// Nothing was measured.
-    pub fn is_empty(&self) -> bool {
+impl BenchRecord for PathBenchmark {
+    fn completeness(&mut self) -> &mut Completeness {
+        &mut self.completeness
+    }
+
+    fn is_empty(&self) -> bool {
         self.scenes.iter().all(|s| s.results.is_empty())
     }
 
-    /// Writes a row for each point.
-    ///
-    /// # Errors
-    /// Those of the writer.
-    pub fn write_csv(&self, out: impl Write) -> csv::Result<()> {
+    fn write_csv(&self, out: &mut dyn Write) -> csv::Result<()> {
         let mut csv = csv::Writer::from_writer(out);
         csv.write_record([
             "scene",
@@ -250,21 +246,13 @@ impl PathBenchmark {
     }
 }
 
-/// Share of pixels, RGB, that differ by more than a tenth of white in any channel after 1 - exp(-radiance).
-pub fn bad_pixels(image: &[f32], reference: &[f32]) -> f64 {
-    let shown = |x: &f32| 1.0 - (-x).exp();
-    let bad = image.chunks_exact(3).zip(reference.chunks_exact(3));
-    let bad = bad.filter(|(a, b)| !a.iter().zip(*b).all(|(a, b)| (shown(a) - shown(b)).abs() <= 0.1)).count();
-    bad as f64 / (image.len() / 3).max(1) as f64
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn curve(points: &[(f64, f64)]) -> Contestant {
-        let point = |&(t, rmse): &(f64, f64)| Point { seconds: Summary::of(&[t]), rmse, ..Point::default() };
-        Contestant { name: "x".into(), points: points.iter().map(point).collect(), ..Contestant::default() }
+    fn curve(points: &[(f64, f64)]) -> ContestantRecord {
+        let point = |&(t, rmse): &(f64, f64)| ErrorPoint { seconds: Summary::of(&[t]), rmse, ..ErrorPoint::default() };
+        ContestantRecord { name: "x".into(), points: points.iter().map(point).collect(), ..ContestantRecord::default() }
     }
 
     #[test]
@@ -272,27 +260,17 @@ mod tests {
         // error 1 / sqrt(t)
         let c = curve(&[(1.0, 1.0), (4.0, 0.5), (16.0, 0.25)]);
         let at = |rmse| c.time_to(rmse).unwrap();
-        assert!((at(0.7).seconds - 1.0 / 0.49).abs() < 1e-9 && at(0.7).how == How::Between);
-        assert!((at(0.125).seconds - 64.0).abs() < 1e-9 && at(0.125).how == How::Extrapolated);
-        assert_eq!(at(2.0), Reached { seconds: 1.0, how: How::Less });
-        assert_eq!(at(0.25), Reached { seconds: 16.0, how: How::Between });
+        assert!((at(0.7).seconds - 1.0 / 0.49).abs() < 1e-9 && at(0.7).how == TimeEstimate::Between);
+        assert!((at(0.125).seconds - 64.0).abs() < 1e-9 && at(0.125).how == TimeEstimate::Extrapolated);
+        assert_eq!(at(2.0), TimeToError { seconds: 1.0, how: TimeEstimate::Less });
+        assert_eq!(at(0.25), TimeToError { seconds: 16.0, how: TimeEstimate::Between });
         assert_eq!(curve(&[]).time_to(1.0), None);
         // one that is exact in the end
         let exact = curve(&[(1.0, 1.0), (2.0, 0.0)]);
-        assert_eq!(exact.time_to(0.5), Some(Reached { seconds: 2.0, how: How::Between }));
-        let mut scene = PathScene { results: vec![c.clone()], ..PathScene::default() };
+        assert_eq!(exact.time_to(0.5), Some(TimeToError { seconds: 2.0, how: TimeEstimate::Between }));
+        let mut scene = SceneRecord { results: vec![c.clone()], ..SceneRecord::default() };
         scene.set_target("x");
         assert_eq!(scene.target.as_ref().unwrap().rmse, 0.25);
         assert_eq!(scene.results[0].seconds_to_target.unwrap().seconds, 16.0);
-    }
-
-    #[test]
-    fn bad_pixels_are_seen() {
-        let reference = [0.0, 0.0, 0.0, 5.0, 5.0, 5.0];
-        assert_eq!(bad_pixels(&reference, &reference), 0.0);
-        // bright ones look alike
-        assert_eq!(bad_pixels(&[0.0, 0.0, 0.0, 9.0, 9.0, 9.0], &reference), 0.0);
-        assert_eq!(bad_pixels(&[0.0, 0.2, 0.0, 5.0, 5.0, 5.0], &reference), 0.5);
-        assert_eq!(bad_pixels(&[0.0, f32::NAN, 0.0, 5.0, 5.0, 5.0], &reference), 0.5);
     }
 }

@@ -116,6 +116,11 @@ pub fn read(path: &Path) -> Result<Vec<PeerSpec>> {
 }
 
 impl PeerSpec {
+    /// Name of one of its kernels in tables.
+    pub fn title_of(&self, kernel: &str) -> String {
+        format!("{} {kernel}", self.name)
+    }
+
     /// What it lacks, as the end of a sentence.
     pub fn missing(&self, why: &str) -> String {
         let needs = if self.needs.is_empty() { String::new() } else { format!("; it needs {}", self.needs) };
@@ -150,7 +155,7 @@ impl PeerSpec {
             let path = self.folder.join(source);
             std::fs::read(&path).map_err(|e| format!("{}: {e}", path.display()))?.hash(&mut hash);
         }
-        let cache = crate::gpu::cache_folder().unwrap_or_else(std::env::temp_dir);
+        let cache = crate::files::cache_folder().unwrap_or_else(std::env::temp_dir);
         Ok(cache.join("peers").join(format!("{}-{:016x}", self.name, hash.finish())))
     }
 

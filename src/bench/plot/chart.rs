@@ -1,4 +1,4 @@
-//! What pictures of benchmarks are made of: panels of two logarithmic axes, lines, a legend.
+//! Parts of the plots of benchmarks: panels of two logarithmic axes, lines, a legend.
 //!
 //! Drawn with the fonts that this program carries, so that it needs neither a display nor fonts on the machine.
 
@@ -16,7 +16,7 @@ pub(super) const PANEL: [u32; 2] = [760, 470];
 /// Pixels above the panels.
 pub(super) const HEAD: u32 = 64;
 /// Pixels of a legend's line.
-pub(super) const LEGEND_LINE: u32 = 26;
+const LEGEND_LINE: u32 = 26;
 
 /// Colours that the colour-blind can tell apart (Okabe and Ito, "Color Universal Design", 2008), and black; then others, for those who
 /// come after.
@@ -52,7 +52,7 @@ pub struct Picture {
 pub(super) type Area<'a> = DrawingArea<BitMapBackend<'a>, Shift>;
 pub(super) type Chart<'a, 'b> = ChartContext<'a, BitMapBackend<'b>, Cartesian2d<LogCoord<f64>, LogCoord<f64>>>;
 
-pub(super) fn fonts() -> Result<()> {
+fn register_fonts() -> Result<()> {
     // registration is global; it happens once
     static DONE: OnceLock<bool> = OnceLock::new();
     let done = *DONE.get_or_init(|| register_font("sans-serif", FontStyle::Normal, epaint_default_fonts::UBUNTU_LIGHT).is_ok());
@@ -107,7 +107,7 @@ pub(super) fn axes<'a, 'b>(
     Ok(Some(chart))
 }
 
-pub(super) fn draw_legend(names: &[&str], columns: u32, width: u32, area: &Area) -> Result<()> {
+fn draw_legend(names: &[&str], columns: u32, width: u32, area: &Area) -> Result<()> {
     let text = ("sans-serif", 17).into_font().color(&BLACK);
     for (k, name) in names.iter().enumerate() {
         let (column, row) = (k as u32 % columns, k as u32 / columns);
@@ -147,18 +147,31 @@ pub struct Panel {
 /// # Errors
 /// [`Error::Usage`] when there is no panel.
 pub fn draw(title: &str, subtitle: &str, panels: &[Panel]) -> Result<Picture> {
-    fonts()?;
-    if panels.is_empty() {
-        return Err(Error::Usage("--plot: nothing was measured, so there is nothing to draw".into()));
-    }
     let mut names: Vec<&str> = Vec::new();
     for line in panels.iter().flat_map(|p| &p.lines) {
         if !names.contains(&line.name.as_str()) {
             names.push(&line.name);
         }
     }
-    let columns = panels.len().min(2) as u32;
-    let rows = (panels.len() as u32).div_ceil(columns);
+    draw_sheet([title, subtitle], &names, panels.len(), |k, area| draw_panel(&panels[k], &names, area))
+}
+
+/// Lays out panels, two in a row, under a title and a subtitle and over the legend of `names`; `draw_panel` fills one, by its index.
+///
+/// # Errors
+/// [`Error::Usage`] when there is no panel; those of `draw_panel`.
+pub(super) fn draw_sheet(
+    [title, subtitle]: [&str; 2],
+    names: &[&str],
+    panels: usize,
+    draw_panel: impl Fn(usize, &Area) -> Result<()>,
+) -> Result<Picture> {
+    register_fonts()?;
+    if panels == 0 {
+        return Err(Error::Usage("--plot: nothing was measured, so there is nothing to draw".into()));
+    }
+    let columns = panels.min(2) as u32;
+    let rows = (panels as u32).div_ceil(columns);
     let legend = (names.len() as u32).div_ceil(2 * columns) * LEGEND_LINE + 16;
     let (width, height) = (columns * PANEL[0], HEAD + rows * PANEL[1] + legend);
     let mut rgb = vec![255u8; 3 * (width * height) as usize];
@@ -170,10 +183,10 @@ pub fn draw(title: &str, subtitle: &str, panels: &[Panel]) -> Result<Picture> {
         let text = |size: f64| ("sans-serif", size).into_font().color(&BLACK);
         head.draw(&Text::new(title.to_owned(), (16, 8), text(26.0))).map_err(failed)?;
         head.draw(&Text::new(subtitle.to_owned(), (16, 40), text(17.0))).map_err(failed)?;
-        for (panel, area) in panels.iter().zip(middle.split_evenly((rows as usize, columns as usize))) {
-            draw_panel(panel, &names, &area)?;
+        for (k, area) in middle.split_evenly((rows as usize, columns as usize)).iter().enumerate().take(panels) {
+            draw_panel(k, area)?;
         }
-        draw_legend(&names, 2 * columns, width, &foot)?;
+        draw_legend(names, 2 * columns, width, &foot)?;
         root.present().map_err(failed)?;
     }
     Ok(Picture { width, height, rgb })
@@ -196,7 +209,7 @@ fn draw_panel(panel: &Panel, names: &[&str], area: &Area) -> Result<()> {
 }
 
 /// 10k, 2.5M, 0.3.
-pub(super) fn short(v: f64) -> String {
+fn short(v: f64) -> String {
     let (scaled, unit) = match v {
         v if v >= 1e6 => (v * 1e-6, "M"),
         v if v >= 1e3 => (v * 1e-3, "k"),

@@ -1,11 +1,11 @@
 //! What a camera sees of a scene, and runs of frames of it.
 
 use super::candidates::{Candidate, Occlusion};
-use super::laps::Laps;
-use super::reference::Truth;
+use super::frame_log::FrameLog;
+use super::reference::AoReference;
+use crate::bench::record::ao::{Errors, Point, Rest, Still};
 use crate::error::Result;
 use crate::film::camera::CameraRecord;
-use crate::measure::ao_benchmark::{Errors, Point, Rest, Still};
 use crate::realtime::{Filter, FilterKind, Realtime, Settings, Technique};
 use crate::tracer::Tracer;
 
@@ -22,7 +22,7 @@ const TREMBLING_SHARE: u32 = 2;
 
 /// A scene as it is seen.
 #[derive(Clone, Copy)]
-pub struct Shot<'a> {
+pub struct ViewRenderer<'a> {
     /// Holds the scene.
     pub tracer: &'a Tracer,
     /// Pixels.
@@ -49,100 +49,100 @@ pub fn first_timed(frames: u32) -> usize {
     frames as usize / 2
 }
 
-impl Shot<'_> {
+impl ViewRenderer<'_> {
     /// Makes frames with these settings.
     pub fn realtime(&self, settings: &Settings) -> Result<Realtime> {
         Realtime::new(self.tracer, self.size, settings, &[])
     }
 
     /// A camera that stands still, with all work done in every frame.
-    pub fn still(&self, candidate: &Candidate, truth: &Truth, frames: u32) -> Result<Still> {
+    pub fn still(&self, candidate: &Candidate, reference: &AoReference, frames: u32) -> Result<Still> {
         let settings = Settings { rest: false, ..candidate.settings(&self.occlusion) };
-        self.still_with(&settings, truth, frames)
+        self.still_with(&settings, reference, frames)
     }
 
     /// The same with settings of one's own.
-    pub fn still_with(&self, settings: &Settings, truth: &Truth, frames: u32) -> Result<Still> {
+    pub fn still_with(&self, settings: &Settings, reference: &AoReference, frames: u32) -> Result<Still> {
         let frames = run_length(settings, frames);
         let mut realtime = self.realtime(settings)?;
-        let (mut laps, mut out) = (Laps::default(), Still::default());
+        let (mut log, mut out) = (FrameLog::default(), Still::default());
         for frame in 1..=frames {
-            laps.frame(&mut realtime, self.tracer, &self.camera, &[])?;
+            log.frame(&mut realtime, self.tracer, &self.camera, &[])?;
             let image = realtime.result()?;
-            out.rmse.push(truth.rmse_of(&image)?);
-            out.rays.push(laps.rays());
+            out.rmse.push(reference.rmse_of(&image)?);
+            out.rays.push(log.rays());
             if frame.is_power_of_two() || frame == frames {
                 let unfiltered = match settings.technique {
                     Technique::Larsen => None,
-                    _ => Some(truth.errors_of(&realtime.unfiltered()?)?),
+                    _ => Some(reference.errors_of(&realtime.unfiltered()?)?),
                 };
-                let errors = truth.errors_of(&image)?;
-                let (rays, camera_rays) = (laps.rays(), laps.camera_rays());
+                let errors = reference.errors_of(&image)?;
+                let (rays, camera_rays) = (log.rays(), log.camera_rays());
                 out.curve.push(Point { frame, rays, camera_rays, errors, unfiltered });
             }
         }
-        out.cost = laps.cost(first_timed(frames));
-        let mut laps = Laps::default();
+        out.cost = log.cost(first_timed(frames));
+        let mut log = FrameLog::default();
         let trembles = (frames / TREMBLING_SHARE).max(2);
         // an odd one first: it differs from the frame before
         for frame in 1..=trembles {
-            laps.frame(&mut realtime, self.tracer, &trembling(&self.camera, frame), &[])?;
+            log.frame(&mut realtime, self.tracer, &trembling(&self.camera, frame), &[])?;
         }
-        out.moving_cost = laps.cost(first_timed(trembles));
+        out.moving_cost = log.cost(first_timed(trembles));
         if let (Technique::Larsen, Some(last)) = (settings.technique, out.curve.last_mut()) {
-            last.unfiltered = Some(self.without_filter(settings, truth, frames.min(THEIRS_SETTLED))?);
+            last.unfiltered = Some(self.without_filter(settings, reference, frames.min(THEIRS_SETTLED))?);
         }
         Ok(out)
     }
 
     /// The settled error of the reference work's pipeline without its box.
-    fn without_filter(&self, settings: &Settings, truth: &Truth, frames: u32) -> Result<Errors> {
+    fn without_filter(&self, settings: &Settings, reference: &AoReference, frames: u32) -> Result<Errors> {
         let filter = Filter { kind: FilterKind::None, ..settings.filter };
         let mut realtime = self.realtime(&Settings { filter, ..*settings })?;
-        let mut laps = Laps::default();
+        let mut log = FrameLog::default();
         for _ in 0..frames {
-            laps.frame(&mut realtime, self.tracer, &self.camera, &[])?;
+            log.frame(&mut realtime, self.tracer, &self.camera, &[])?;
         }
-        truth.errors_of(&realtime.result()?)
+        reference.errors_of(&realtime.result()?)
     }
 
     /// Settled error and cost with settings of one's own, every frame with all of its camera rays.
-    pub fn settle(&self, settings: &Settings, truth: &Truth, frames: u32) -> Result<(f64, Laps)> {
-        let laps_and = self.tremble(settings, frames)?;
-        Ok((truth.errors_of(&laps_and.0)?.rmse_corrected, laps_and.1))
+    pub fn settle(&self, settings: &Settings, reference: &AoReference, frames: u32) -> Result<(f64, FrameLog)> {
+        let last_and_log = self.tremble(settings, frames)?;
+        Ok((reference.errors_of(&last_and_log.0)?.rmse_corrected, last_and_log.1))
     }
 
     /// The last of some frames, every one with all of its camera rays.
-    pub fn tremble(&self, settings: &Settings, frames: u32) -> Result<(Vec<f32>, Laps)> {
+    pub fn tremble(&self, settings: &Settings, frames: u32) -> Result<(Vec<f32>, FrameLog)> {
         let mut realtime = self.realtime(&Settings { rest: false, ..*settings })?;
-        let mut laps = Laps::default();
+        let mut log = FrameLog::default();
         for frame in 0..frames {
-            laps.frame(&mut realtime, self.tracer, &trembling(&self.camera, frame), &[])?;
+            log.frame(&mut realtime, self.tracer, &trembling(&self.camera, frame), &[])?;
         }
-        Ok((realtime.result()?, laps))
+        Ok((realtime.result()?, log))
     }
 
     /// A camera that stands still, until nothing is traced any more; `None` for what never rests.
-    pub fn rest(&self, candidate: &Candidate, truth: &Truth) -> Result<Option<Rest>> {
+    pub fn rest(&self, candidate: &Candidate, reference: &AoReference) -> Result<Option<Rest>> {
         let settings = Settings { rest: true, ..candidate.settings(&self.occlusion) };
         if settings.technique != Technique::Traced || settings.history == 1 {
             return Ok(None);
         }
         let mut realtime = self.realtime(&settings)?;
         let most = settings.history.min(Settings::MAX_SAMPLES).saturating_mul(settings.resolution.period()) + PATIENCE;
-        let mut laps = Laps::default();
+        let mut log = FrameLog::default();
         let mut frames = None;
         for frame in 0..most {
-            if laps.frame(&mut realtime, self.tracer, &self.camera, &[])?.occlusion_rays == 0 {
+            if log.frame(&mut realtime, self.tracer, &self.camera, &[])?.occlusion_rays == 0 {
                 frames = Some(frame);
                 break;
             }
         }
-        let first = laps.len();
+        let first = log.len();
         for _ in 0..AT_REST {
-            laps.frame(&mut realtime, self.tracer, &self.camera, &[])?;
+            log.frame(&mut realtime, self.tracer, &self.camera, &[])?;
         }
-        Ok(Some(Rest { frames, cost: laps.cost(first), errors: truth.errors_of(&realtime.result()?)? }))
+        Ok(Some(Rest { frames, cost: log.cost(first), errors: reference.errors_of(&realtime.result()?)? }))
     }
 }
 

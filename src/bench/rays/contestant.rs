@@ -1,21 +1,19 @@
-//! Who is measured: our own tracers and kernels, and those of peers, behind one interface.
+//! Contestants: our own tracers and kernels, and those of peers, behind one interface.
 
-use std::sync::Arc;
-
-use super::peer::Peer;
-use super::process::PeerError;
 use super::streams::{Set, sample};
 use crate::accel::flatten::FlatScene;
+use crate::bench::device::BenchDevice;
+use crate::bench::peers::process::{Peer, PeerError};
+use crate::bench::record::rays::BuildRecord;
 use crate::error::{Error, Result};
 use crate::film::Control;
-use crate::gpu::{Device, DeviceInfo};
+use crate::gpu::DeviceInfo;
 use crate::integrators::rays::{Mode, PreparedRays};
-use crate::measure::benchmark::BuildRecord;
 use crate::ray::{Hit, Ray};
 use crate::tracer::{BuildOptions, Kernel, Needs, Tracer, TracerKind};
 
-/// A tracer of our own with its kernel. A new one is a line of [`OWN`].
-pub struct Own {
+/// A tracer of our own with its kernel. A new one is a line of [`KERNELS`].
+pub struct OwnKernel {
     /// On the command line and in tables.
     pub name: &'static str,
     /// Which tracer.
@@ -26,28 +24,28 @@ pub struct Own {
     pub divisor: usize,
     /// On a CPU device: it is left out of scenes with more stored primitives, unless asked for by name. Without a tree: with more
     /// to test for each ray.
-    pub most_primitives: usize,
+    pub max_primitives: usize,
 }
 
-const fn compute(kernel: Kernel, name: &'static str, divisor: usize, most_primitives: usize) -> Own {
-    Own { name, tracer: TracerKind::Compute, kernel, divisor, most_primitives }
+const fn compute(kernel: Kernel, name: &'static str, divisor: usize, max_primitives: usize) -> OwnKernel {
+    OwnKernel { name, tracer: TracerKind::Compute, kernel, divisor, max_primitives }
 }
 
 /// All of them; the first that runs makes the rays, and others are checked against it.
-pub const OWN: [Own; 7] = [
+pub const KERNELS: [OwnKernel; 7] = [
     compute(Kernel::Wide, "wide", 1, usize::MAX),
     compute(Kernel::Packet, "packet", 1, usize::MAX),
     compute(Kernel::Nearest, "nearest", 4, 1 << 22),
     compute(Kernel::Direction, "direction", 4, 1 << 22),
     compute(Kernel::Brute, "brute", 64, 2000),
-    Own { name: "pipeline", tracer: TracerKind::Pipeline, kernel: Kernel::Wide, divisor: 16, most_primitives: 1 << 21 },
-    Own { name: "query", tracer: TracerKind::Query, kernel: Kernel::Wide, divisor: 16, most_primitives: 1 << 21 },
+    OwnKernel { name: "pipeline", tracer: TracerKind::Pipeline, kernel: Kernel::Wide, divisor: 16, max_primitives: 1 << 21 },
+    OwnKernel { name: "query", tracer: TracerKind::Query, kernel: Kernel::Wide, divisor: 16, max_primitives: 1 << 21 },
 ];
 
-impl Own {
+impl OwnKernel {
     /// Does it take part on this device and scene? `named`: the user asked for it.
     pub fn takes_part(&self, info: &DeviceInfo, flat: &FlatScene, named: bool) -> Result<(), String> {
-        if !info.supports(self.tracer) {
+        if !self.tracer.is_supported_by(info) {
             return Err("the device does not have what it needs (`skylit doctor`)".into());
         }
         if self.kernel == Kernel::Packet && !info.packets() {
@@ -57,7 +55,7 @@ impl Own {
         // without a tree, a GPU is slow too, and what is placed counts, not what is stored
         let brute = self.kernel == Kernel::Brute;
         let work = if brute { Kernel::brute_tests(flat) } else { flat.primitive_count() };
-        if (brute || info.is_cpu()) && !named && work > self.most_primitives {
+        if (brute || info.is_cpu()) && !named && work > self.max_primitives {
             return Err(format!("slow on so many primitives; --kernels {} asks for it", self.name));
         }
         Ok(())
@@ -70,7 +68,7 @@ enum Engine<'a> {
     Peer { peer: usize, kernel: String, flat: &'a FlatScene<'a> },
 }
 
-/// One of those who are measured, with a scene.
+/// A contestant with a scene.
 pub struct Contestant<'a> {
     /// In tables.
     pub name: String,
@@ -87,9 +85,9 @@ impl<'a> Contestant<'a> {
     /// One of our own.
     ///
     /// # Errors
-    /// Those of [`Tracer::new`].
-    pub fn own(device: &Arc<Device>, flat: &'a FlatScene, own: &Own, build: &BuildOptions) -> Result<Self> {
-        let tracer = Tracer::with_build(device, own.tracer, flat, Needs::default(), own.kernel.into(), build)?;
+    /// Those of [`BenchDevice::tracer`].
+    pub fn own(device: &BenchDevice, flat: &'a FlatScene, own: &OwnKernel, build: &BuildOptions) -> Result<Self> {
+        let tracer = device.tracer(flat, own.tracer, Needs::default(), own.kernel, build)?;
         let stats = tracer.stats();
         let build = BuildRecord {
             contestant: own.name.to_owned(),
@@ -98,7 +96,7 @@ impl<'a> Contestant<'a> {
             bytes_per_primitive: stats.bytes_per_primitive(),
             sah_cost: stats.sah_cost,
         };
-        let divisor = if device.info.is_cpu() { own.divisor } else { 1 };
+        let divisor = if device.info().is_cpu() { own.divisor } else { 1 };
         Ok(Self {
             name: own.name.to_owned(),
             build,
@@ -114,7 +112,7 @@ impl<'a> Contestant<'a> {
     /// When the peer fails to build.
     pub fn peer(peers: &mut [Peer], index: usize, kernel: &str, flat: &'a FlatScene<'a>) -> Result<Self, PeerError> {
         let peer = &mut peers[index];
-        let name = peer_kernel(&peer.process.spec.name, kernel);
+        let name = peer.spec.title_of(kernel);
         let (build_seconds, bytes) = peer.build(kernel)?;
         let build = BuildRecord {
             contestant: name.clone(),
@@ -123,7 +121,7 @@ impl<'a> Contestant<'a> {
             bytes_per_primitive: bytes / flat.primitive_count().max(1) as f64,
             sah_cost: None,
         };
-        let strict = peer.process.spec.strict.iter().any(|k| k == kernel);
+        let strict = peer.spec.strict.iter().any(|k| k == kernel);
         Ok(Self { name, build, strict, kernel: None, engine: Engine::Peer { peer: index, kernel: kernel.to_owned(), flat } })
     }
 
@@ -149,16 +147,17 @@ impl<'a> Contestant<'a> {
     }
 
     /// Makes ready for one stream.
-    pub fn prepare<'c>(&'c self, set: Set, rays: &[Ray], mode: Mode) -> Result<Run<'c>> {
+    pub fn prepare<'c>(&'c self, set: Set, rays: &[Ray], mode: Mode) -> Result<PreparedRun<'c>> {
         match &self.engine {
             Engine::Own { tracer, divisor } => {
                 let rays = sample(rays, *divisor);
                 let prepared = PreparedRays::new(tracer, &rays, mode)?;
-                Ok(Run { rays: rays.len(), how: How::Own(Box::new(prepared)) })
+                Ok(PreparedRun { rays: rays.len(), engine: PreparedEngine::Own(Box::new(prepared)) })
             }
-            Engine::Peer { peer, kernel, .. } => {
-                Ok(Run { rays: rays.len(), how: How::Peer { peer: *peer, kernel, set: set.name(), mode, hits: 0 } })
-            }
+            Engine::Peer { peer, kernel, .. } => Ok(PreparedRun {
+                rays: rays.len(),
+                engine: PreparedEngine::Peer { peer: *peer, kernel, set: set.name(), mode, hits: 0 },
+            }),
         }
     }
 
@@ -182,46 +181,41 @@ impl<'a> Contestant<'a> {
     }
 }
 
-/// A peer's kernel in tables.
-pub fn peer_kernel(peer: &str, kernel: &str) -> String {
-    format!("{peer} {kernel}")
-}
-
 /// A contestant about to trace one stream again and again.
-pub struct Run<'c> {
+pub struct PreparedRun<'c> {
     /// Rays of a repeat.
     pub rays: usize,
-    how: How<'c>,
+    engine: PreparedEngine<'c>,
 }
 
-enum How<'c> {
+enum PreparedEngine<'c> {
     Own(Box<PreparedRays<'c>>),
     Peer { peer: usize, kernel: &'c str, set: &'static str, mode: Mode, hits: u64 },
 }
 
 /// Seconds of one repeat.
-pub struct Lap {
+pub struct RepeatTime {
     /// On the device, or by the peer's own clock.
     pub device: f64,
     /// By our clock; `None` for peers.
     pub wall: Option<f64>,
 }
 
-impl Run<'_> {
+impl PreparedRun<'_> {
     /// One repeat.
     ///
     /// # Errors
     /// Those of the device or the peer.
-    pub fn lap(&mut self, peers: &mut [Peer], control: &mut dyn Control) -> Result<Lap, PeerError> {
-        match &mut self.how {
-            How::Own(prepared) => {
+    pub fn repeat(&mut self, peers: &mut [Peer], control: &mut dyn Control) -> Result<RepeatTime, PeerError> {
+        match &mut self.engine {
+            PreparedEngine::Own(prepared) => {
                 let (device, wall) = prepared.pass(control)?;
-                Ok(Lap { device, wall: Some(wall) })
+                Ok(RepeatTime { device, wall: Some(wall) })
             }
-            How::Peer { peer, kernel, set, mode, hits } => {
+            PreparedEngine::Peer { peer, kernel, set, mode, hits } => {
                 let (seconds, found) = peers[*peer].trace(kernel, *mode, set)?;
                 *hits = found;
-                Ok(Lap { device: seconds, wall: None })
+                Ok(RepeatTime { device: seconds, wall: None })
             }
         }
     }
@@ -231,9 +225,9 @@ impl Run<'_> {
     /// # Errors
     /// Those of the device; [`Error::CheckFailed`] when the driver cut a traversal short.
     pub fn hit_count(&self) -> Result<u64, Error> {
-        match &self.how {
-            How::Own(prepared) => Ok(prepared.hits()?.iter().filter(|h| h.is_hit()).count() as u64),
-            How::Peer { hits, .. } => Ok(*hits),
+        match &self.engine {
+            PreparedEngine::Own(prepared) => Ok(prepared.hits()?.iter().filter(|h| h.is_hit()).count() as u64),
+            PreparedEngine::Peer { hits, .. } => Ok(*hits),
         }
     }
 }

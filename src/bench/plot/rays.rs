@@ -4,20 +4,18 @@
 
 use plotters::prelude::*;
 
-use super::benchmark::{RayBenchmark, family};
-pub use super::chart::Picture;
-use super::chart::{Area, Chart, HEAD, LEGEND_LINE, PANEL, axes, color, draw_legend, failed, fonts};
-use super::stats::Summary;
-use crate::error::{Error, Result};
+use super::chart::{Area, Chart, Picture, axes, color, draw_sheet, failed};
+use crate::bench::record::rays::{RayBenchmark, family};
+use crate::error::Result;
+use crate::measure::stats::Summary;
 
 /// Draws all results. Scenes of a family (`terrain:N`) are joined by lines: circles for the first family, triangles for the
 /// second, crosses for others; scenes without a family are hollow circles. The dashed line falls as
 /// 1 / log n from the first point of the first contestant.
 ///
 /// # Errors
-/// [`Error::Usage`] when there is no result to draw.
+/// [`crate::Error::Usage`] when there is no result to draw.
 pub fn draw(benchmark: &RayBenchmark) -> Result<Picture> {
-    fonts()?;
     let mut streams: Vec<&str> = Vec::new();
     let mut contestants: Vec<&str> = Vec::new();
     for (_, stream, run) in benchmark.rows() {
@@ -28,30 +26,9 @@ pub fn draw(benchmark: &RayBenchmark) -> Result<Picture> {
             contestants.push(&run.contestant);
         }
     }
-    if streams.is_empty() {
-        return Err(Error::Usage("--plot: nothing was measured, so there is nothing to draw".into()));
-    }
-    let columns = streams.len().min(2) as u32;
-    let rows = (streams.len() as u32).div_ceil(columns);
-    let legend = (contestants.len() as u32).div_ceil(2 * columns) * LEGEND_LINE + 16;
-    let (width, height) = (columns * PANEL[0], HEAD + rows * PANEL[1] + legend);
-    let mut rgb = vec![255u8; 3 * (width * height) as usize];
-    {
-        let root = BitMapBackend::with_buffer(&mut rgb, (width, height)).into_drawing_area();
-        root.fill(&WHITE).map_err(failed)?;
-        let (head, rest) = root.split_vertically(HEAD);
-        let (panels, foot) = rest.split_vertically(rows * PANEL[1]);
-        let title = format!("{} ({}), {} threads", benchmark.device, benchmark.driver, benchmark.threads);
-        let text = |size: f64| ("sans-serif", size).into_font().color(&BLACK);
-        head.draw(&Text::new("Mrays/s against triangles and spheres", (16, 8), text(26.0))).map_err(failed)?;
-        head.draw(&Text::new(title, (16, 40), text(17.0))).map_err(failed)?;
-        for (stream, area) in streams.iter().zip(panels.split_evenly((rows as usize, columns as usize))) {
-            panel(benchmark, stream, &contestants, &area)?;
-        }
-        draw_legend(&contestants, 2 * columns, width, &foot)?;
-        root.present().map_err(failed)?;
-    }
-    Ok(Picture { width, height, rgb })
+    let subtitle = format!("{} ({}), {} threads", benchmark.host.device, benchmark.host.driver, benchmark.host.threads);
+    let titles = ["Mrays/s against triangles and spheres", subtitle.as_str()];
+    draw_sheet(titles, &contestants, streams.len(), |k, area| draw_panel(benchmark, streams[k], &contestants, area))
 }
 
 /// One result: size, and median, least and greatest rate.
@@ -63,7 +40,7 @@ struct Mark {
     max: f64,
 }
 
-fn panel(benchmark: &RayBenchmark, stream: &str, contestants: &[&str], area: &Area) -> Result<()> {
+fn draw_panel(benchmark: &RayBenchmark, stream: &str, contestants: &[&str], area: &Area) -> Result<()> {
     let here = || benchmark.rows().filter(|(_, t, r)| t.stream == stream && r.device.median > 0.0);
     let x = here().map(|(s, _, _)| (s.primitives() as f64).max(1.0));
     let y = here().flat_map(|(_, _, r)| [r.device.min, r.device.max]).filter(|v| *v > 0.0);
@@ -131,7 +108,9 @@ fn draw_log_law(chart: &mut Chart, from: Mark, to: f64) -> Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::measure::benchmark::{RunRecord, SceneRecord, StreamRecord};
+    use crate::bench::plot::chart::{HEAD, PANEL};
+    use crate::bench::record::HostInfo;
+    use crate::bench::record::rays::{RunRecord, SceneRecord, StreamRecord};
 
     fn benchmark(rates: &[(&str, u64, f64)]) -> RayBenchmark {
         let run = |rate: f64| RunRecord {
@@ -151,7 +130,11 @@ mod tests {
             streams: vec![StreamRecord { stream: "primary".into(), rays: 1, results: vec![run(rate)] }],
             ..Default::default()
         });
-        RayBenchmark { device: "a device".into(), scenes: scenes.collect(), ..Default::default() }
+        RayBenchmark {
+            host: HostInfo { device: "a device".into(), ..Default::default() },
+            scenes: scenes.collect(),
+            ..Default::default()
+        }
     }
 
     /// Pixels of the first contestant's colour in a picture of the given results.

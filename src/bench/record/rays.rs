@@ -6,20 +6,16 @@ use std::io::Write;
 
 use serde::Serialize;
 
-use super::agreement::Agreement;
-use super::stats::{LogScaling, Summary};
+use super::{BenchRecord, Completeness, HostInfo};
+use crate::measure::agreement::Agreement;
+use crate::measure::stats::{LogScaling, Summary};
 
 /// A whole run.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct RayBenchmark {
-    /// Of skylit.
-    pub version: String,
-    /// Vulkan device.
-    pub device: String,
-    /// Its driver.
-    pub driver: String,
-    /// Logical processors of the host.
-    pub threads: usize,
+    /// What it ran on.
+    #[serde(flatten)]
+    pub host: HostInfo,
     /// Timed repeats that were asked for, after one that warms up.
     pub repeats: u32,
     /// How long our own hierarchies were built: a preset, or `auto`.
@@ -32,10 +28,9 @@ pub struct RayBenchmark {
     pub scenes: Vec<SceneRecord>,
     /// How rates fall with size, over families of scenes.
     pub scaling: Vec<ScalingRecord>,
-    /// The time limit ended it.
-    pub stopped_early: bool,
-    /// What was left out, and why.
-    pub notes: Vec<String>,
+    /// What is missing.
+    #[serde(flatten)]
+    pub completeness: Completeness,
 }
 
 /// One scene.
@@ -232,9 +227,19 @@ impl RayBenchmark {
     pub fn rows(&self) -> impl Iterator<Item = (&SceneRecord, &StreamRecord, &RunRecord)> {
         self.scenes.iter().flat_map(|s| s.streams.iter().flat_map(move |t| t.results.iter().map(move |r| (s, t, r))))
     }
+}
 
-    /// Writes one row a result. Numbers that are not known are empty. A ratio column for each baseline.
-    pub fn write_csv(&self, out: impl Write) -> csv::Result<()> {
+impl BenchRecord for RayBenchmark {
+    fn completeness(&mut self) -> &mut Completeness {
+        &mut self.completeness
+    }
+
+    fn is_empty(&self) -> bool {
+        self.rows().next().is_none()
+    }
+
+    /// A ratio column for each baseline.
+    fn write_csv(&self, out: &mut dyn Write) -> csv::Result<()> {
         let mut csv = csv::Writer::from_writer(out);
         let ratios = self.baselines.iter().map(|b| format!("ratio to {b}"));
         let head = CSV_COLUMNS.iter().map(|c| (*c).to_owned()).chain(ratios);

@@ -2,7 +2,8 @@
 
 use std::io::Write;
 
-use super::{AoBenchmark, ChangeResult, Cost, Errors, SeriesPoint, Still};
+use super::ao::{AoBenchmark, ChangeResult, Cost, Errors, SeriesPoint, Still};
+use super::{BenchRecord, Completeness};
 use crate::measure::stats::Spread;
 
 const COLUMNS: [&str; 40] = [
@@ -91,12 +92,16 @@ impl Row {
     }
 }
 
-impl AoBenchmark {
-    /// Writes one row a result. What is not known is empty.
-    ///
-    /// # Errors
-    /// Those of `out`.
-    pub fn write_csv(&self, out: impl Write) -> csv::Result<()> {
+impl BenchRecord for AoBenchmark {
+    fn completeness(&mut self) -> &mut Completeness {
+        &mut self.completeness
+    }
+
+    fn is_empty(&self) -> bool {
+        self.views.is_empty() && self.changes.is_empty() && self.structures.is_empty() && self.series.is_empty()
+    }
+
+    fn write_csv(&self, out: &mut dyn Write) -> csv::Result<()> {
         let mut csv = csv::Writer::from_writer(out);
         csv.write_record(COLUMNS)?;
         for row in self.rows() {
@@ -105,7 +110,9 @@ impl AoBenchmark {
         csv.flush()?;
         Ok(())
     }
+}
 
+impl AoBenchmark {
     fn rows(&self) -> Vec<Row> {
         let mut rows = Vec::new();
         self.view_rows(&mut rows);
@@ -160,7 +167,7 @@ impl AoBenchmark {
                 }
             }
             if let Some(e) = view.verdict.equal_time {
-                let row = Row::new("equal time", &view.scene).text("view", &view.view).text("preset", super::verdict::OURS);
+                let row = Row::new("equal time", &view.scene).text("view", &view.view).text("preset", super::ao_verdict::OURS);
                 let row = row.number("rays per pixel", f64::from(e.rays_per_pixel)).number("device ms", e.ms);
                 rows.push(row.number("rmse corrected", e.rmse).number("primitives", view.primitives as f64));
             }
@@ -171,7 +178,7 @@ impl AoBenchmark {
 /// Error after each frame that has one; the last also has what a frame costs.
 fn curve(head: &Row, still: &Still) -> Vec<Row> {
     let last = still.curve.len().saturating_sub(1);
-    let row = |(k, p): (usize, &super::Point)| {
+    let row = |(k, p): (usize, &super::ao::Point)| {
         let row = head.clone().number("frame", f64::from(p.frame)).number("cumulative rays", p.rays as f64);
         let row = row.errors(&p.errors, p.unfiltered.as_ref());
         if k == last { row.cost(&still.cost) } else { row }
@@ -205,7 +212,7 @@ fn series_rows(series: &str, line: &str, p: &SeriesPoint) -> Vec<Row> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::measure::ao_benchmark::{PassTime, Point, TechniqueRecord, ViewRecord};
+    use crate::bench::record::ao::{PassTime, Point, TechniqueRecord, ViewRecord};
 
     #[test]
     fn a_row_a_result() {
@@ -215,7 +222,7 @@ mod tests {
         let still = Still { cost: cost.clone(), moving_cost: cost, curve: vec![point(1), point(2)], ..Default::default() };
         let results = vec![TechniqueRecord { preset: "fast, or so".into(), still: Some(still), ..Default::default() }];
         let view = ViewRecord { scene: "a.glb".into(), results, ..Default::default() };
-        let change = super::super::ChangeRecord {
+        let change = crate::bench::record::ao::ChangeRecord {
             change: "appear".into(),
             results: vec![ChangeResult { half_life: Some(f64::INFINITY), ..Default::default() }],
             ..Default::default()

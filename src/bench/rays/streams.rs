@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::scenes::Subject;
+use super::scenes::RayScene;
 use crate::error::{Error, Result};
 use crate::film::Control;
 use crate::film::camera::CameraRecord;
@@ -80,18 +80,17 @@ impl RaySets {
     ///
     /// # Errors
     /// Those of the device.
-    pub fn make(tracer: &Tracer, subject: &Subject, size: [u32; 2], control: &mut dyn Control) -> Result<Self> {
+    pub fn make(tracer: &Tracer, scene: &RayScene, size: [u32; 2], control: &mut dyn Control) -> Result<Self> {
         let aspect = f64::from(size[0]) / f64::from(size[1]);
-        let origin = subject.scene.origin();
-        let camera = CameraRecord::new(&subject.camera, origin, aspect);
-        let options =
-            AoOptions { size, spp: 1, seed: SEED, radius: subject.ao_radius, keep_rays: true, ..AoOptions::default() };
+        let origin = scene.scene.origin();
+        let camera = CameraRecord::new(&scene.camera, origin, aspect);
+        let options = AoOptions { size, spp: 1, seed: SEED, radius: scene.ao_radius, keep_rays: true, ..AoOptions::default() };
         let made = ao::render(tracer, &camera, &options, control)?;
         let (primary, occlusion) = (made.kept_primary, made.kept_occlusion);
         let mut prepared = PreparedRays::new(tracer, &primary, Mode::Closest)?;
         prepared.pass(control)?;
         let hits = prepared.hits()?;
-        let shadow = shadow_rays(&subject.scene, &primary, &hits, &occlusion, subject.light - origin)?;
+        let shadow = shadow_rays(&scene.scene, &primary, &hits, &occlusion, scene.light - origin)?;
         let shuffled = shuffle(&occlusion);
         Ok(Self([primary, occlusion, shuffled, shadow]))
     }

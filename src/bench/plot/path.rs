@@ -1,7 +1,7 @@
 //! A benchmark of path tracing, drawn: error against time, a panel a scene.
 
 use super::chart::{self, Line, Panel, Picture};
-use super::path_benchmark::PathBenchmark;
+use crate::bench::record::path::{PathBenchmark, SceneRecord};
 use crate::error::Result;
 
 /// Draws every scene.
@@ -9,7 +9,7 @@ use crate::error::Result;
 /// # Errors
 /// [`crate::Error::Usage`] when nothing was measured.
 pub fn draw(benchmark: &PathBenchmark) -> Result<Picture> {
-    let panel = |scene: &super::path_benchmark::PathScene| Panel {
+    let panel = |scene: &SceneRecord| Panel {
         title: format!("{}, {}x{}", scene.scene, scene.size[0], scene.size[1]),
         x: "seconds an image".into(),
         y: "RMSE".into(),
@@ -23,7 +23,9 @@ pub fn draw(benchmark: &PathBenchmark) -> Result<Picture> {
             .collect(),
     };
     let panels: Vec<Panel> = benchmark.scenes.iter().filter(|s| !s.results.is_empty()).map(panel).collect();
-    let subtitle =
-        format!("{} ({}), tracer {}, {} threads", benchmark.device, benchmark.driver, benchmark.tracer, benchmark.threads);
+    let subtitle = format!(
+        "{} ({}), tracer {}, {} threads",
+        benchmark.host.device, benchmark.host.driver, benchmark.tracer, benchmark.host.threads
+    );
     chart::draw("Path tracing: error against time", &subtitle, &panels)
 }

@@ -1,8 +1,8 @@
 //! A benchmark of real-time ambient occlusion, drawn: the error of each view against the rays that were traced for it, and the
 //! series against what varies in them. All axes are logarithmic.
 
-use super::ao_benchmark::{AoBenchmark, Cost, SeriesPoint, SeriesRecord, Still, ViewRecord};
 use super::chart::{self, Line, Panel, Picture};
+use crate::bench::record::ao::{AoBenchmark, Cost, SeriesPoint, SeriesRecord, Still, ViewRecord};
 use crate::error::Result;
 
 /// Draws everything that has a curve.
@@ -26,7 +26,8 @@ pub fn draw(benchmark: &AoBenchmark) -> Result<Picture> {
     });
     let panels: Vec<Panel> = views.chain(changes).chain(benchmark.series.iter().flat_map(series)).collect();
     let [width, height] = benchmark.size;
-    let subtitle = format!("{} ({}), tracer {}, {width}x{height}", benchmark.device, benchmark.driver, benchmark.tracer);
+    let subtitle =
+        format!("{} ({}), tracer {}, {width}x{height}", benchmark.host.device, benchmark.host.driver, benchmark.tracer);
     chart::draw("Real-time ambient occlusion", &subtitle, &panels)
 }
 
@@ -53,7 +54,7 @@ fn series(record: &SeriesRecord) -> Vec<Panel> {
         _ => "frames",
     };
     let panel = |what: &str, y: &str, of: &dyn Fn(&SeriesPoint) -> Option<f64>| {
-        let line = |l: &super::ao_benchmark::SeriesLine| Line {
+        let line = |l: &crate::bench::record::ao::SeriesLine| Line {
             name: l.name.clone(),
             points: l.points.iter().filter_map(|p| Some((p.x, of(p)?))).collect(),
         };

@@ -1,0 +1,207 @@
+//! A benchmark under way: its device, peers and record, what is left of its time, and what it shows meanwhile.
+
+use std::time::Instant;
+
+use super::common::CommonArgs;
+use super::device::BenchDevice;
+use super::peers::file::PeerSpec;
+use super::peers::process::{Peer, PeerError};
+use super::plot::chart::Picture;
+use super::record::BenchRecord;
+use crate::error::{Error, Result};
+use crate::scene::Scene;
+use crate::terminal::console::{Console, Failure};
+use crate::terminal::interrupt::{self, ProgressControl};
+use crate::terminal::progress::Progress;
+use crate::terminal::warnings::{one_line, warnings_of};
+
+/// Steps of the progress bar for one job.
+const STEPS: u64 = 1000;
+
+/// A benchmark under way, with its arguments and its record.
+pub struct Session<'a, A, R> {
+    /// Arguments of this benchmark.
+    pub args: &'a A,
+    /// What it runs on.
+    pub device: BenchDevice,
+    /// Peers that started.
+    pub peers: Vec<Peer>,
+    /// Connects long work to the keyboard and to the progress bar.
+    pub control: ProgressControl,
+    /// What was found until now.
+    pub record: R,
+    common: &'a CommonArgs,
+    console: Console,
+    start: Instant,
+    /// Jobs that are done, and all of them.
+    jobs: (u64, u64),
+    /// The first that went wrong.
+    failure: Option<Error>,
+}
+
+impl<'a, A, R: BenchRecord> Session<'a, A, R> {
+    /// Opens the device. `record` makes the record that is filled.
+    ///
+    /// # Errors
+    /// Those of [`CommonArgs::check`] and of [`BenchDevice::open`].
+    pub fn start(args: &'a A, common: &'a CommonArgs, record: impl FnOnce(&BenchDevice) -> R) -> Result<Self> {
+        let start = Instant::now();
+        common.check()?;
+        interrupt::install();
+        let console = common.console();
+        let device = BenchDevice::open(common)?;
+        let control = ProgressControl { progress: Progress::new("measuring", &console), keep_partial: false };
+        let record = record(&device);
+        Ok(Self { args, device, peers: Vec::new(), control, record, common, console, start, jobs: (0, 1), failure: None })
+    }
+
+    /// Starts peers; those that do not start are left out with a note, and so are all where `specs` says why there are none.
+    ///
+    /// # Errors
+    /// Those of our own side; Ctrl-C.
+    pub fn start_peers(&mut self, specs: Result<Vec<PeerSpec>, String>) -> Result<()> {
+        let specs = match specs {
+            Ok(specs) => specs,
+            Err(why) => {
+                self.note(why);
+                return Ok(());
+            }
+        };
+        for spec in &specs {
+            let activity = if spec.is_built() { "starting" } else { "compiling" };
+            self.phase(format!("{activity} peer '{}'", spec.name));
+            match Peer::start(spec) {
+                Ok(peer) => self.peers.push(peer),
+                Err(PeerError::Ours(e)) => return Err(e),
+                Err(PeerError::Failed(why)) => self.note(spec.missing(&why)),
+            }
+        }
+        Ok(())
+    }
+
+    /// Names of the peers that started, as they introduce themselves.
+    pub fn peer_titles(&self) -> Vec<String> {
+        self.peers.iter().map(|p| p.title.clone()).collect()
+    }
+
+    /// Says how many jobs there are.
+    pub fn expect_jobs(&mut self, count: usize) {
+        self.jobs = (0, count.max(1) as u64);
+    }
+
+    /// Does a job, unless it is too late. What goes wrong is noted, and fails the run in the end; only what ends the run is returned.
+    ///
+    /// # Errors
+    /// [`Error::Interrupted`], [`Error::DeviceLost`].
+    pub fn job(&mut self, name: &str, work: impl FnOnce(&mut Self) -> Result<()>) -> Result<()> {
+        if self.is_over() {
+            self.leave_out(name);
+            self.jobs.0 += 1;
+            return Ok(());
+        }
+        self.advance(0.0);
+        let outcome = work(self);
+        self.jobs.0 += 1;
+        match outcome {
+            Ok(()) => Ok(()),
+            Err(e @ (Error::Interrupted | Error::DeviceLost(_))) => Err(e),
+            Err(e) => {
+                self.note(format!("{name}: left out from here: {e}"));
+                self.failure.get_or_insert(e);
+                Ok(())
+            }
+        }
+    }
+
+    /// Warns, and keeps the warning in the record.
+    pub fn note(&mut self, text: String) {
+        self.control.progress.suspend(|| self.console.warning(&text));
+        self.record.completeness().notes.push(text);
+    }
+
+    /// Notes what loading a scene warned of.
+    pub fn note_warnings(&mut self, source: &str, scene: &Scene) {
+        for warning in warnings_of(scene) {
+            self.note(format!("{source}: {}", one_line(&warning)));
+        }
+    }
+
+    /// Notes that the time limit took something.
+    pub fn leave_out(&mut self, what: &str) {
+        self.stop_early();
+        self.note(format!("time limit: {what}: left out"));
+    }
+
+    /// Records that the time limit took something.
+    pub fn stop_early(&mut self) {
+        self.record.completeness().stopped_early = true;
+    }
+
+    /// Shows lines of the result.
+    ///
+    /// # Errors
+    /// When stdout cannot be written.
+    pub fn lines(&self, lines: &[String]) -> Result<()> {
+        self.control.progress.suspend(|| lines.iter().try_for_each(|line| self.console.line(line)))
+    }
+
+    /// Says what is done from here on.
+    pub fn phase(&mut self, label: String) {
+        self.control.progress.phase(label);
+    }
+
+    /// Moves the bar: this share of the job, 0 to 1, is done.
+    pub fn advance(&mut self, share: f64) {
+        advance(&mut self.control.progress, self.jobs, share);
+    }
+
+    /// What moves the bar while the session itself is in use otherwise.
+    pub fn advancer(&mut self) -> (impl FnMut(f64), &mut [Peer]) {
+        let jobs = self.jobs;
+        let progress = &mut self.control.progress;
+        (move |share| advance(progress, jobs, share), &mut self.peers)
+    }
+
+    /// Is the time limit over?
+    pub fn is_late(&self) -> bool {
+        self.common.time_limit.is_some_and(|limit| self.start.elapsed() >= limit)
+    }
+
+    /// Is the time limit over, and was anything measured? A record of nothing says nothing.
+    pub fn is_over(&self) -> bool {
+        self.is_late() && !self.record.is_empty()
+    }
+
+    /// Writes and prints what was measured, whatever went wrong. `scenes_named`: a scene that failed fails the run even if another one did
+    /// not; `checked`: what follows from the record itself.
+    ///
+    /// # Errors
+    /// The first that went wrong.
+    pub fn finish(
+        self,
+        measured: Result<()>,
+        scenes_named: bool,
+        checked: Result<()>,
+        draw: impl Fn(&R) -> Result<Picture>,
+    ) -> Result<(), Failure> {
+        let Self { mut record, device, common, console, failure, control, peers, .. } = self;
+        // before anything is printed
+        drop((control, peers));
+        let valid = device.close(measured.is_ok());
+        let written = if record.is_empty() { Ok(()) } else { common.write(&record, || draw(&record)) };
+        let complete = match failure {
+            Some(e) if record.is_empty() || scenes_named => Err(e),
+            _ if record.is_empty() => {
+                let why = record.completeness().notes.last().map_or("no scene", String::as_str);
+                Err(Error::Usage(format!("nothing was measured: {why}")))
+            }
+            _ => Ok(()),
+        };
+        console.close(&record, measured.and(valid).and(written).and(complete).and(checked))
+    }
+}
+
+fn advance(progress: &mut Progress, jobs: (u64, u64), share: f64) {
+    let steps = (share.clamp(0.0, 1.0) * STEPS as f64) as u64;
+    progress.set(jobs.0 * STEPS + steps, jobs.1 * STEPS);
+}
