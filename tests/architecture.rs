@@ -13,6 +13,7 @@ use syn::{Attribute, Item, ItemMod, ItemUse, Macro, UseTree};
 const LAYERS: &[&[&str]] = &[
     &["error"],
     &["colour", "files", "ray"],
+    &["settings"],
     &["interface", "output", "sampling"],
     &["scene", "shaders"],
     &["accel", "gpu"],
@@ -22,6 +23,7 @@ const LAYERS: &[&[&str]] = &[
     &["integrators"],
     &["realtime"],
     &["denoise"],
+    &["renderer"],
     &["terminal"],
     &["bench"],
     &["cli"],

@@ -8,10 +8,11 @@ use crate::film::camera::{self, Choice};
 use crate::integrators::aov::Aov;
 use crate::integrators::lighting::LightingSettings;
 use crate::integrators::{IntegratorName, IntegratorSettings, PictureOptions};
+use crate::output::parse_size;
 use crate::output::tone_map::ToneMap;
 use crate::realtime::frame_settings::FrameSettings;
 use crate::scene::{Camera, Projection, Scene};
-use crate::settings::parse::{parse_fov, parse_number, parse_size, parse_target, parse_time, parse_vector};
+use crate::settings::parse::{parse_fov, parse_number, parse_target, parse_time, parse_vector};
 use crate::settings::{self, AppliesTo, Given, settings};
 
 /// Samples per pixel when neither the settings nor the scene say.

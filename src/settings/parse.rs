@@ -4,19 +4,8 @@ use std::time::Duration;
 
 use glam::DVec3;
 
-use crate::output;
-
 /// A value, or what was expected.
 pub type Parsed<T> = std::result::Result<T, String>;
-
-/// `WxH`, pixels.
-pub fn parse_size(text: &str) -> Parsed<[u32; 2]> {
-    let side = |s: &str| s.trim().parse::<u32>().map_err(|_| "expected WIDTHxHEIGHT in pixels, like 1280x720".to_owned());
-    let (w, h) = text.split_once(['x', 'X']).ok_or("expected WIDTHxHEIGHT in pixels, like 1280x720")?;
-    let size = [side(w)?, side(h)?];
-    output::check_size(size[0], size[1]).map_err(|e| e.to_string())?;
-    Ok(size)
-}
 
 /// Any number that is not NaN.
 pub fn parse_number(text: &str) -> Parsed<f64> {
@@ -96,15 +85,6 @@ pub fn parse_rate(text: &str) -> Parsed<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn sizes() {
-        assert_eq!(parse_size("1x1"), Ok([1, 1]));
-        assert_eq!(parse_size("16384x16384"), Ok([16384, 16384]));
-        for bad in ["0x5", "5x0", "16385x16384", "5", "x", "-1x5", "1x2x3", "4294967296x1", ""] {
-            assert!(parse_size(bad).is_err(), "{bad}");
-        }
-    }
 
     #[test]
     fn numbers() {

@@ -5,7 +5,7 @@ use clap::{Args, ValueEnum};
 use super::candidates::{CANDIDATES, Candidate, Occlusion};
 use crate::bench::common::CommonArgs;
 use crate::error::Result;
-use crate::settings::parse::parse_size;
+use crate::output::parse_size;
 use crate::tracer::BuildOptions;
 use crate::tracer::settings::{BuildChoice, TracerChoice};
 

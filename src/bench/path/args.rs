@@ -7,7 +7,8 @@ use clap::{Args, ValueHint};
 
 use crate::bench::common::CommonArgs;
 use crate::integrators::path::Strategy;
-use crate::settings::parse::{parse_seconds, parse_size};
+use crate::output::parse_size;
+use crate::settings::parse::parse_seconds;
 use crate::tracer::settings::{BuildChoice, TracerChoice};
 
 /// Pixels, unless said otherwise.
