@@ -61,12 +61,12 @@ pub fn is_default<T: Default + PartialEq>(value: &T) -> bool {
     *value == T::default()
 }
 
-/// Names in a sentence: `a`, `a and b`, `a, b and c`.
+/// Names in a sentence: `a`, `a or b`, `a, b or c`.
 fn list(names: &[&str]) -> String {
     match names {
         [] => "none".into(),
         [one] => (*one).to_owned(),
-        [most @ .., last] => format!("{} and {last}", most.join(", ")),
+        [most @ .., last] => format!("{} or {last}", most.join(", ")),
     }
 }
 
@@ -226,7 +226,7 @@ mod tests {
         assert_eq!(depth.option(), "--max-depth");
         assert!(check(&[depth], "path", None).is_ok());
         let text = |r: Result<()>| r.unwrap_err().to_string();
-        assert!(text(check(&[depth], "ao", None)).contains("use --integrator path and direct"));
+        assert!(text(check(&[depth], "ao", None)).contains("use --integrator path or direct"));
         let fps = Some { fps: Option::Some(24.0), ..Default::default() }.given()[0];
         assert!(text(check(&[depth], "path", Option::Some(&fps))).contains("--fps asks for frames"));
     }
