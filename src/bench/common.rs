@@ -93,8 +93,8 @@ impl CommonArgs {
         json.and(csv).and(plot)
     }
 
-    /// One of two numbers, unless another was asked for: the second with `--quick`.
-    pub fn number(&self, asked: Option<u32>, usual: u32, quick: u32) -> u32 {
-        asked.unwrap_or(if self.quick { quick } else { usual })
+    /// What was `given`, else the default, which is another with `--quick`.
+    pub fn setting<T>(&self, given: Option<T>, default: T, quick: T) -> T {
+        given.unwrap_or(if self.quick { quick } else { default })
     }
 }

@@ -1,6 +1,6 @@
 //! Tables in plain text.
 
-/// A table in plain text: the first `left` columns to the left, the others to the right.
+/// Lines of a table: the first `left` columns to the left, the others to the right.
 pub fn align(rows: &[Vec<String>], left: usize) -> Vec<String> {
     let columns = rows.iter().map(Vec::len).max().unwrap_or(0);
     let width: Vec<usize> =
@@ -12,6 +12,22 @@ pub fn align(rows: &[Vec<String>], left: usize) -> Vec<String> {
     rows.iter().map(|r| r.iter().enumerate().map(cell).collect::<Vec<_>>().join("  ").trim_end().to_owned()).collect()
 }
 
+/// The same, two spaces to the right.
+pub fn indented(rows: &[Vec<String>], left: usize) -> impl Iterator<Item = String> {
+    align(rows, left).into_iter().map(|line| format!("  {line}"))
+}
+
+/// A row of column titles.
+pub fn header(titles: &[&str]) -> Vec<String> {
+    titles.iter().map(|t| (*t).to_owned()).collect()
+}
+
+/// What is known, or a dash.
+pub fn optional<T>(x: Option<T>, show: impl Fn(T) -> String) -> String {
+    x.map_or_else(|| "-".to_owned(), show)
+}
+
+/// Three significant digits; no more than are before the point.
 pub fn number(x: f64) -> String {
     match x {
         x if x >= 100.0 => format!("{x:.0}"),

@@ -25,7 +25,7 @@ const QUICK_REFERENCE_RAYS: u32 = 64;
 const DEFAULT_REPEATS: u32 = 9;
 /// The same with `--quick`.
 const QUICK_REPEATS: u32 = 3;
-/// Presets that are not measured unless they are named: they stand for the truth.
+/// Presets that are not measured unless they are named: they are references themselves.
 const LEFT_OUT: &str = "reference";
 
 /// How occlusion fades with distance.
@@ -153,22 +153,22 @@ impl BenchAoArgs {
 
     /// Pixels.
     pub fn size(&self) -> [u32; 2] {
-        self.size.unwrap_or(if self.common.quick { QUICK_SIZE } else { DEFAULT_SIZE })
+        self.common.setting(self.size, DEFAULT_SIZE, QUICK_SIZE)
     }
 
     /// Frames of a run.
     pub fn frames(&self) -> u32 {
-        self.common.number(self.frames, DEFAULT_FRAMES, QUICK_FRAMES)
+        self.common.setting(self.frames, DEFAULT_FRAMES, QUICK_FRAMES)
     }
 
     /// Rays a pixel of a reference.
     pub fn reference_rays(&self) -> u32 {
-        self.common.number(self.reference_rays, DEFAULT_REFERENCE_RAYS, QUICK_REFERENCE_RAYS)
+        self.common.setting(self.reference_rays, DEFAULT_REFERENCE_RAYS, QUICK_REFERENCE_RAYS)
     }
 
     /// Timed updates.
     pub fn repeats(&self) -> u32 {
-        self.common.number(self.repeats, DEFAULT_REPEATS, QUICK_REPEATS)
+        self.common.setting(self.repeats, DEFAULT_REPEATS, QUICK_REPEATS)
     }
 
     /// How the compute tracer's hierarchies are built.

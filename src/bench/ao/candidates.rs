@@ -50,24 +50,24 @@ impl Candidate {
 /// How occlusion fades with distance in a scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Occlusion {
-    /// World units.
+    /// How far occlusion reaches, scene units.
     pub reach: f64,
     falloff: f64,
     binary: bool,
 }
 
 impl Occlusion {
-    /// Up to `reach` world units, all alike (`binary`) or fading to [`LEAST`] there.
+    /// Up to `reach` scene units, all alike (`binary`) or fading to [`LEAST`] there.
     ///
     /// # Errors
-    /// [`Error::Scene`] for a scene so small that the falloff per world unit is not finite.
+    /// [`Error::Scene`] for a scene so small that the falloff per scene unit is not finite.
     pub fn new(reach: f64, binary: bool) -> Result<Self> {
         let falloff = if binary { 1.0 } else { LEAST.powf(-1.0 / reach) };
         if falloff.is_finite() && reach > 0.0 {
             return Ok(Self { reach, falloff, binary });
         }
         Err(Error::Scene(format!(
-            "occlusion that fades over {reach} world units is too steep to compute: scale the scene up, or say --ao-falloff binary"
+            "occlusion that fades over {reach} scene units is too steep to compute: scale the scene up, or say --ao-falloff binary"
         )))
     }
 

@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use crate::bench::record::ao::{Cost, PassTime};
+use crate::bench::record::ao::{FrameCost, PassTime};
 use crate::error::Result;
 use crate::film::camera::CameraRecord;
 use crate::measure::stats::Spread;
@@ -66,7 +66,7 @@ impl FrameLog {
     }
 
     /// What a frame costs, of those from `first` on: the first ones compile and find their memory.
-    pub fn cost(&self, first: usize) -> Cost {
+    pub fn cost(&self, first: usize) -> FrameCost {
         let frames = &self.frames[first.min(self.frames.len())..];
         let ms = |values: &mut dyn Iterator<Item = f64>| {
             Spread::of(&values.map(|s| s * 1e3).collect::<Vec<_>>()).unwrap_or_default()
@@ -88,7 +88,7 @@ impl FrameLog {
             };
             PassTime { pass: name.to_owned(), ms: ms(&mut frames.iter().filter_map(of_frame)) }
         };
-        Cost {
+        FrameCost {
             passes: passes.iter().map(|name| of_pass(name)).collect(),
             device_ms: ms(&mut frames.iter().map(|l| l.stats.timings.iter().map(|t| t.seconds).sum())),
             wall_ms: ms(&mut frames.iter().map(|l| l.wall)),

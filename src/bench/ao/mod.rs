@@ -1,4 +1,4 @@
-//! `skylit bench ao`: what each preset's frames cost and how far they are from the truth, by scene and view, standing still and
+//! `skylit bench ao`: what each preset's frames cost and how far they are from reference images, by scene and view, standing still and
 //! moving, and what of the past they show where the scene changes. docs/benchmarks.md says what is measured and how.
 
 mod args;

@@ -1,10 +1,10 @@
-//! A camera that goes round, and what is right on its way.
+//! A camera on an orbit, and reference images along it.
 
 use super::candidates::Candidate;
 use super::frame_log::FrameLog;
 use super::reference::{AoReference, ReferenceRenderer};
 use super::view_renderer::{ViewRenderer, first_timed};
-use crate::bench::record::ao::{Errors, Moving};
+use crate::bench::record::ao::{ImageErrors, OrbitRecord};
 use crate::error::Result;
 use crate::film::camera::CameraRecord;
 use crate::realtime::Technique;
@@ -23,7 +23,7 @@ pub fn measured(frames: u32) -> Vec<u32> {
     at
 }
 
-/// Cameras of each frame, and references of some.
+/// Cameras of an orbit, a frame each, and the references of some frames.
 pub struct OrbitRun {
     cameras: Vec<CameraRecord>,
     references: Vec<(u32, AoReference)>,
@@ -47,12 +47,12 @@ impl OrbitRun {
         Ok(Self { cameras, references })
     }
 
-    /// A preset on its way.
-    pub fn follow(&self, renderer: &ViewRenderer, candidate: &Candidate) -> Result<Moving> {
+    /// Renders the frames with a preset.
+    pub fn follow(&self, renderer: &ViewRenderer, candidate: &Candidate) -> Result<OrbitRecord> {
         let settings = candidate.settings(&renderer.occlusion);
         let mut realtime = renderer.realtime(&settings)?;
         let mut log = FrameLog::default();
-        let (mut errors, mut unfiltered): (Vec<Errors>, Vec<Errors>) = (Vec::new(), Vec::new());
+        let (mut errors, mut unfiltered): (Vec<ImageErrors>, Vec<ImageErrors>) = (Vec::new(), Vec::new());
         for (f, camera) in self.cameras.iter().enumerate() {
             log.frame(&mut realtime, renderer.tracer, camera, &[])?;
             let Some((_, reference)) = self.references.iter().find(|t| t.0 as usize == f) else { continue };
@@ -62,12 +62,12 @@ impl OrbitRun {
             }
         }
         let references = self.references.len().max(1) as f64;
-        Ok(Moving {
+        Ok(OrbitRecord {
             degrees_per_frame: 360.0 / FRAMES_PER_TURN,
             cost: log.cost(first_timed(self.cameras.len() as u32)),
             frames: self.references.iter().map(|t| t.0).collect(),
-            errors: Errors::mean(&errors).unwrap_or_default(),
-            unfiltered: Errors::mean(&unfiltered),
+            errors: ImageErrors::mean(&errors).unwrap_or_default(),
+            unfiltered: ImageErrors::mean(&unfiltered),
             reference_rmse: self.references.iter().map(|t| t.1.rmse).sum::<f64>() / references,
         })
     }

@@ -1,8 +1,8 @@
-//! What images are held against: many rays a pixel, through the middles of the pixels, in two independent halves, so that the error
+//! Reference images: many rays a pixel, through the middles of the pixels, in two independent halves, so that the error
 //! of the reference itself is known.
 
 use super::candidates::Occlusion;
-use crate::bench::record::ao::Errors;
+use crate::bench::record::ao::ImageErrors;
 use crate::bench::reference::ReferenceHalves;
 use crate::error::Result;
 use crate::film::camera::CameraRecord;
@@ -92,10 +92,10 @@ impl AoReference {
     }
 
     /// Every error of an image, over the covered pixels.
-    pub fn errors_of(&self, image: &[f32]) -> Result<Errors> {
+    pub fn errors_of(&self, image: &[f32]) -> Result<ImageErrors> {
         let pair = ImagePair::new(image, &self.image, 1, Some(&self.coverage))?;
         let rmse = pair.rmse();
-        Ok(Errors {
+        Ok(ImageErrors {
             rmse,
             rmse_corrected: corrected(rmse, self.rmse),
             bias: pair.bias(),

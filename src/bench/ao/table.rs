@@ -1,27 +1,15 @@
-//! What people read.
+//! The tables of `skylit bench ao`.
 
 use crate::bench::record::ao::{
-    ChangeRecord, ChangeResult, Cost, Errors, SeriesRecord, StructureRecord, TechniqueRecord, Verdict, ViewRecord,
+    ChangeRecord, ChangeResult, FrameCost, ImageErrors, SeriesRecord, StructureRecord, TechniqueRecord, Verdict, ViewRecord,
 };
-use crate::bench::table::{align, number, thousands};
+use crate::bench::table::{header, indented, number, optional, thousands};
 use crate::measure::stats::Spread;
 
 /// Top levels of the reference work, by million triangles and meshes: milliseconds on a GPU that it does not name.
 const THEIR_TOPS: &str = "4.9 M in 4 meshes 0.157, 6.7 M in 5 0.160, 8.6 M in 6 0.160, 25.2 M in 15 0.180";
 /// And the rest of what it says about structures.
 const THEIR_BUILDS: &str = "first build of 25.2 M 230 ms; updating a mesh was guessed at 100 to 200 ms, not measured";
-
-fn head(names: &[&str]) -> Vec<String> {
-    names.iter().map(|n| (*n).to_owned()).collect()
-}
-
-fn indented(rows: &[Vec<String>]) -> impl Iterator<Item = String> {
-    align(rows, 1).into_iter().map(|l| format!("  {l}"))
-}
-
-fn maybe<T>(x: Option<T>, show: impl Fn(T) -> String) -> String {
-    x.map_or_else(|| "-".to_owned(), show)
-}
 
 fn error(x: f64) -> String {
     format!("{x:.4}")
@@ -35,7 +23,7 @@ fn ms(s: Spread) -> String {
     format!("{}..{}", number(s.median), number(s.p95))
 }
 
-fn passes(cost: &Cost) -> String {
+fn passes(cost: &FrameCost) -> String {
     cost.passes.iter().map(|p| format!("{} {}", p.pass, number(p.ms.median))).collect::<Vec<_>>().join(", ")
 }
 
@@ -53,9 +41,9 @@ pub fn view(record: &ViewRecord) -> Vec<String> {
             record.reference_rmse
         ),
     ];
-    lines.extend(indented(&times(&record.results)));
+    lines.extend(indented(&times(&record.results), 1));
     lines.push(String::new());
-    lines.extend(indented(&errors(&record.results)));
+    lines.extend(indented(&errors(&record.results), 1));
     lines.push(String::new());
     for r in &record.results {
         if let Some(s) = &r.still {
@@ -69,21 +57,21 @@ pub fn view(record: &ViewRecord) -> Vec<String> {
 fn times(results: &[TechniqueRecord]) -> Vec<Vec<String>> {
     let columns =
         ["ms a frame", "still..p95", "+camera rays..p95", "wall", "orbit", "at rest", "after", "rays", "skipped", "camera"];
-    let mut rows = vec![head(&columns)];
+    let mut rows = vec![header(&columns)];
     rows[0][0] = "preset".into();
     for r in results {
         let still = r.still.as_ref();
         rows.push(vec![
             r.preset.clone(),
-            maybe(still, |s| ms(s.cost.device_ms)),
-            maybe(still, |s| ms(s.moving_cost.device_ms)),
-            maybe(still, |s| number(s.moving_cost.wall_ms.median)),
-            maybe(r.moving.as_ref(), |m| number(m.cost.ms())),
-            maybe(r.rest.as_ref(), |s| number(s.cost.ms())),
-            maybe(r.rest.as_ref().and_then(|s| s.frames), |f| format!("{f} frames")),
-            maybe(still, |s| thousands(s.cost.rays as u64)),
-            maybe(still, |s| thousands(s.cost.skipped_rays as u64)),
-            maybe(still, |s| thousands(s.moving_cost.camera_rays as u64)),
+            optional(still, |s| ms(s.cost.device_ms)),
+            optional(still, |s| ms(s.moving_cost.device_ms)),
+            optional(still, |s| number(s.moving_cost.wall_ms.median)),
+            optional(r.moving.as_ref(), |m| number(m.cost.ms())),
+            optional(r.rest.as_ref(), |s| number(s.cost.ms())),
+            optional(r.rest.as_ref().and_then(|s| s.frames), |f| format!("{f} frames")),
+            optional(still, |s| thousands(s.cost.rays as u64)),
+            optional(still, |s| thousands(s.cost.skipped_rays as u64)),
+            optional(still, |s| thousands(s.moving_cost.camera_rays as u64)),
         ]);
     }
     rows
@@ -105,27 +93,28 @@ fn errors(results: &[TechniqueRecord]) -> Vec<Vec<String>> {
         "unfiltered",
         "FLIP",
     ];
-    let mut rows = vec![head(&columns)];
+    let mut rows = vec![header(&columns)];
     for r in results {
         let still = r.still.as_ref();
         let settled = still.and_then(|s| s.settled());
-        let of = |show: &dyn Fn(&Errors) -> String| maybe(settled, |p| show(&p.errors));
-        let after = |frame: u32| maybe(still.and_then(|s| s.curve.iter().find(|p| p.frame == frame)), |p| error(p.errors.rmse));
+        let of = |show: &dyn Fn(&ImageErrors) -> String| optional(settled, |p| show(&p.errors));
+        let after =
+            |frame: u32| optional(still.and_then(|s| s.curve.iter().find(|p| p.frame == frame)), |p| error(p.errors.rmse));
         let moving = r.moving.as_ref();
         rows.push(vec![
             r.preset.clone(),
             of(&|e| error(e.rmse)),
             of(&|e| error(e.rmse_corrected)),
-            maybe(settled.and_then(|p| p.unfiltered), |e| error(e.rmse)),
+            optional(settled.and_then(|p| p.unfiltered), |e| error(e.rmse)),
             of(&|e| format!("{:+.4}", e.bias)),
             of(&|e| error(e.flip)),
             of(&|e| format!("{:.6}", e.tanimoto)),
             of(&|e| error(e.minimum_ratio)),
             after(1),
             after(4),
-            maybe(moving, |m| error(m.errors.rmse)),
-            maybe(moving.and_then(|m| m.unfiltered), |e| error(e.rmse)),
-            maybe(moving, |m| error(m.errors.flip)),
+            optional(moving, |m| error(m.errors.rmse)),
+            optional(moving.and_then(|m| m.unfiltered), |e| error(e.rmse)),
+            optional(moving, |m| error(m.errors.flip)),
         ]);
     }
     rows
@@ -143,9 +132,9 @@ fn verdict(v: &Verdict) -> Vec<String> {
         lines.push(format!(
             "  balanced over larsen: {rays:.3} of the rays ({} with camera rays, {} while moving), {rmse:.3} of the settled RMSE \
              ({} on the orbit); a tenth of the rays, no more error: {}",
-            maybe(v.rays_ratio_with_camera, ratio),
-            maybe(v.rays_ratio_moving, ratio),
-            maybe(v.moving_rmse_ratio, ratio),
+            optional(v.rays_ratio_with_camera, ratio),
+            optional(v.rays_ratio_moving, ratio),
+            optional(v.moving_rmse_ratio, ratio),
             met(holds)
         ));
         lines.push(match (v.frames_to_reach, v.rays_to_reach, v.rays_to_reach_ratio) {
@@ -209,48 +198,48 @@ pub fn change(record: &ChangeRecord) -> Vec<String> {
         let cells = used.iter().map(|(_, of)| of(r).unwrap_or_else(|| "-".to_owned()));
         std::iter::once(r.preset.clone()).chain(cells).collect()
     }));
-    lines.extend(indented(&rows));
+    lines.extend(indented(&rows, 1));
     lines
 }
 
 /// What keeping structures up to date took.
 pub fn structures(records: &[StructureRecord]) -> Vec<String> {
     let columns = ["structures, ms", "stored", "placed", "first build", "top level..p95", "mesh", "refit..p95", "rebuild..p95"];
-    let mut rows = vec![head(&columns)];
+    let mut rows = vec![header(&columns)];
     for r in records {
         rows.push(vec![
             r.scene.clone(),
             format!("{} in {}", thousands(r.stored), r.meshes),
             format!("{} in {}", thousands(r.primitives), r.instances),
             number(r.build_ms),
-            maybe(r.top, |s| format!("{} {}", ms(s), if r.top_rebuilt { "built" } else { "refitted" })),
+            optional(r.top, |s| format!("{} {}", ms(s), if r.top_rebuilt { "built" } else { "refitted" })),
             thousands(r.mesh_triangles),
-            maybe(r.refit, ms),
-            maybe(r.rebuild, ms),
+            optional(r.refit, ms),
+            optional(r.rebuild, ms),
         ]);
     }
     let theirs = [format!("  Larsen, top level, ms: {THEIR_TOPS}"), format!("  Larsen: {THEIR_BUILDS}")];
-    std::iter::once(String::new()).chain(indented(&rows)).chain(theirs).collect()
+    std::iter::once(String::new()).chain(indented(&rows, 1)).chain(theirs).collect()
 }
 
 /// One number varied.
 pub fn series(record: &SeriesRecord) -> Vec<String> {
     let columns = ["", "x", "ms..p95", "frames/s", "RMSE", "unfiltered", "at equal time", "passes, ms"];
-    let mut rows = vec![head(&columns)];
+    let mut rows = vec![header(&columns)];
     rows[0][0].clone_from(&record.series);
     for line in &record.lines {
         for p in &line.points {
             rows.push(vec![
                 format!("{} {}", line.name, p.scene),
                 thousands(p.x as u64),
-                maybe(p.cost.as_ref(), |c| ms(c.device_ms)),
-                maybe(p.cost.as_ref().map(Cost::ms).filter(|ms| *ms > 0.0), |ms| number(1e3 / ms)),
-                maybe(p.rmse, error),
-                maybe(p.unfiltered_rmse, error),
-                maybe(p.equal_time_rmse, error),
-                maybe(p.cost.as_ref(), passes),
+                optional(p.cost.as_ref(), |c| ms(c.device_ms)),
+                optional(p.cost.as_ref().map(FrameCost::ms).filter(|ms| *ms > 0.0), |ms| number(1e3 / ms)),
+                optional(p.rmse, error),
+                optional(p.unfiltered_rmse, error),
+                optional(p.equal_time_rmse, error),
+                optional(p.cost.as_ref(), passes),
             ]);
         }
     }
-    std::iter::once(String::new()).chain(indented(&rows)).collect()
+    std::iter::once(String::new()).chain(indented(&rows, 1)).collect()
 }

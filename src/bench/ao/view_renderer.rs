@@ -1,9 +1,9 @@
-//! What a camera sees of a scene, and runs of frames of it.
+//! Runs of frames of one view of a scene.
 
 use super::candidates::{Candidate, Occlusion};
 use super::frame_log::FrameLog;
 use super::reference::AoReference;
-use crate::bench::record::ao::{Errors, Point, Rest, Still};
+use crate::bench::record::ao::{ErrorPoint, ImageErrors, RestRecord, StillRecord};
 use crate::error::Result;
 use crate::film::camera::CameraRecord;
 use crate::realtime::{Filter, FilterKind, Realtime, Settings, Technique};
@@ -20,7 +20,7 @@ const PATIENCE: u32 = 8;
 /// Frames that are timed with camera rays: a share of those without.
 const TREMBLING_SHARE: u32 = 2;
 
-/// A scene as it is seen.
+/// Renders frames of a scene from one camera.
 #[derive(Clone, Copy)]
 pub struct ViewRenderer<'a> {
     /// Holds the scene.
@@ -56,16 +56,16 @@ impl ViewRenderer<'_> {
     }
 
     /// A camera that stands still, with all work done in every frame.
-    pub fn still(&self, candidate: &Candidate, reference: &AoReference, frames: u32) -> Result<Still> {
+    pub fn still(&self, candidate: &Candidate, reference: &AoReference, frames: u32) -> Result<StillRecord> {
         let settings = Settings { rest: false, ..candidate.settings(&self.occlusion) };
         self.still_with(&settings, reference, frames)
     }
 
     /// The same with settings of one's own.
-    pub fn still_with(&self, settings: &Settings, reference: &AoReference, frames: u32) -> Result<Still> {
+    pub fn still_with(&self, settings: &Settings, reference: &AoReference, frames: u32) -> Result<StillRecord> {
         let frames = run_length(settings, frames);
         let mut realtime = self.realtime(settings)?;
-        let (mut log, mut out) = (FrameLog::default(), Still::default());
+        let (mut log, mut out) = (FrameLog::default(), StillRecord::default());
         for frame in 1..=frames {
             log.frame(&mut realtime, self.tracer, &self.camera, &[])?;
             let image = realtime.result()?;
@@ -78,7 +78,7 @@ impl ViewRenderer<'_> {
                 };
                 let errors = reference.errors_of(&image)?;
                 let (rays, camera_rays) = (log.rays(), log.camera_rays());
-                out.curve.push(Point { frame, rays, camera_rays, errors, unfiltered });
+                out.curve.push(ErrorPoint { frame, rays, camera_rays, errors, unfiltered });
             }
         }
         out.cost = log.cost(first_timed(frames));
@@ -96,7 +96,7 @@ impl ViewRenderer<'_> {
     }
 
     /// The settled error of the reference work's pipeline without its box.
-    fn without_filter(&self, settings: &Settings, reference: &AoReference, frames: u32) -> Result<Errors> {
+    fn without_filter(&self, settings: &Settings, reference: &AoReference, frames: u32) -> Result<ImageErrors> {
         let filter = Filter { kind: FilterKind::None, ..settings.filter };
         let mut realtime = self.realtime(&Settings { filter, ..*settings })?;
         let mut log = FrameLog::default();
@@ -123,7 +123,7 @@ impl ViewRenderer<'_> {
     }
 
     /// A camera that stands still, until nothing is traced any more; `None` for what never rests.
-    pub fn rest(&self, candidate: &Candidate, reference: &AoReference) -> Result<Option<Rest>> {
+    pub fn rest(&self, candidate: &Candidate, reference: &AoReference) -> Result<Option<RestRecord>> {
         let settings = Settings { rest: true, ..candidate.settings(&self.occlusion) };
         if settings.technique != Technique::Traced || settings.history == 1 {
             return Ok(None);
@@ -142,7 +142,7 @@ impl ViewRenderer<'_> {
         for _ in 0..AT_REST {
             log.frame(&mut realtime, self.tracer, &self.camera, &[])?;
         }
-        Ok(Some(Rest { frames, cost: log.cost(first), errors: reference.errors_of(&realtime.result()?)? }))
+        Ok(Some(RestRecord { frames, cost: log.cost(first), errors: reference.errors_of(&realtime.result()?)? }))
     }
 }
 

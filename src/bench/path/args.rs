@@ -67,18 +67,17 @@ pub struct BenchPathArgs {
 impl BenchPathArgs {
     /// Pixels.
     pub fn size(&self) -> [u32; 2] {
-        self.size.unwrap_or(if self.common.quick { QUICK_SIZE } else { DEFAULT_SIZE })
+        self.common.setting(self.size, DEFAULT_SIZE, QUICK_SIZE)
     }
 
     /// Timed images of each kind.
     pub fn repeats(&self) -> u32 {
-        self.common.number(self.repeats, DEFAULT_REPEATS, QUICK_REPEATS)
+        self.common.setting(self.repeats, DEFAULT_REPEATS, QUICK_REPEATS)
     }
 
     /// Seconds that one image may take.
     pub fn seconds(&self) -> f64 {
-        let usual = if self.common.quick { QUICK_SECONDS } else { DEFAULT_SECONDS };
-        self.seconds.map_or(usual, |d| d.as_secs_f64())
+        self.common.setting(self.seconds.map(|d| d.as_secs_f64()), DEFAULT_SECONDS, QUICK_SECONDS)
     }
 
     /// Seconds for each reference.

@@ -1,7 +1,7 @@
 //! The tables of `skylit bench path`.
 
 use crate::bench::record::path::{ContestantRecord, SceneRecord, TimeEstimate};
-use crate::bench::table::{align, number, thousands};
+use crate::bench::table::{header, indented, number, thousands};
 
 /// One scene's results.
 pub fn scene(record: &SceneRecord) -> Vec<String> {
@@ -29,16 +29,14 @@ pub fn scene(record: &SceneRecord) -> Vec<String> {
         ));
     }
     let target = record.target.as_ref().map(|t| t.rmse);
-    let mut rows = vec![
-        ["contestant", "spp", "seconds", "RMSE", "bad pixels", "Mpaths/s", "Mrays/s", "1/(MSE s)"].map(str::to_owned).to_vec(),
-    ];
+    let mut rows = vec![header(&["contestant", "spp", "seconds", "RMSE", "bad pixels", "Mpaths/s", "Mrays/s", "1/(MSE s)"])];
     if let Some(rmse) = target {
         rows[0].extend([format!("s to {rmse:.2e}"), "times as long".into()]);
     }
     let base = record.target.as_ref().and_then(|t| record.results.iter().find(|r| r.name == t.set_by)).and_then(seconds);
     rows.extend(record.results.iter().map(|r| row(r, base)));
     lines.push(String::new());
-    lines.extend(align(&rows, 1).into_iter().map(|l| format!("  {l}")));
+    lines.extend(indented(&rows, 1));
     lines
 }
 

@@ -2,7 +2,7 @@
 //! series against what varies in them. All axes are logarithmic.
 
 use super::chart::{self, Line, Panel, Picture};
-use crate::bench::record::ao::{AoBenchmark, Cost, SeriesPoint, SeriesRecord, Still, ViewRecord};
+use crate::bench::record::ao::{AoBenchmark, FrameCost, SeriesPoint, SeriesRecord, StillRecord, ViewRecord};
 use crate::error::Result;
 
 /// Draws everything that has a curve.
@@ -34,7 +34,7 @@ pub fn draw(benchmark: &AoBenchmark) -> Result<Picture> {
 fn view(view: &ViewRecord) -> Option<Panel> {
     // a pixel that shows nothing gets no rays
     let covered = view.covered.max(1) as f64;
-    let points = |s: &Still| s.rays.iter().zip(&s.rmse).map(|(r, e)| (*r as f64 / covered, *e)).collect();
+    let points = |s: &StillRecord| s.rays.iter().zip(&s.rmse).map(|(r, e)| (*r as f64 / covered, *e)).collect();
     let line = |(name, still)| Line { name, points: points(still) };
     let lines: Vec<Line> = view.results.iter().filter_map(|r| Some((r.preset.clone(), r.still.as_ref()?))).map(line).collect();
     (!lines.is_empty()).then(|| Panel {
@@ -62,7 +62,7 @@ fn series(record: &SeriesRecord) -> Vec<Panel> {
         let title = format!("{}: {what}, {}", record.series, record.scene);
         (!lines.is_empty()).then(|| Panel { title, x: x.into(), y: y.into(), lines })
     };
-    let time = panel("time", "ms a frame", &|p| p.cost.as_ref().map(Cost::ms));
+    let time = panel("time", "ms a frame", &|p| p.cost.as_ref().map(FrameCost::ms));
     let error = panel("error", "RMSE", &|p| p.rmse);
     let before = panel("before the filter", "RMSE", &|p| p.unfiltered_rmse);
     [time, error, before].into_iter().flatten().collect()

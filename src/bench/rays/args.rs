@@ -38,7 +38,7 @@ pub struct BenchRaysArgs {
     /// Time that the compute tracer's kernels spend on their hierarchies
     #[arg(long, value_enum, default_value = "default")]
     pub build: BuildChoice,
-    /// Length of ambient occlusion rays, world units [default: what suits the well-known scenes, else no limit]
+    /// Length of ambient occlusion rays, in scene units [default: what suits the well-known scenes, else no limit]
     #[arg(long, value_name = "R", value_parser = parse_radius, allow_hyphen_values = true)]
     pub ao_radius: Option<f64>,
     /// Also compare all answers with those of the first kernel; one that rounding does not explain fails the run
@@ -74,12 +74,12 @@ impl BenchRaysArgs {
 
     /// Timed repeats.
     pub fn repeats(&self) -> u32 {
-        self.common.number(self.repeats, DEFAULT_REPEATS, QUICK_REPEATS)
+        self.common.setting(self.repeats, DEFAULT_REPEATS, QUICK_REPEATS)
     }
 
     /// Pixels of the image whose rays are traced: 16:9, multiples of 8.
     pub fn size(&self) -> [u32; 2] {
-        let rays = f64::from(self.common.number(self.rays, DEFAULT_RAYS, QUICK_RAYS));
+        let rays = f64::from(self.common.setting(self.rays, DEFAULT_RAYS, QUICK_RAYS));
         let side = |x: f64| ((x / 8.0).round() as u32).max(1) * 8;
         let width = side((rays * 16.0 / 9.0).sqrt());
         // exactly as many as asked for where 8 divides them so

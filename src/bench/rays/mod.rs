@@ -46,7 +46,7 @@ type RaySession<'a> = Session<'a, BenchRaysArgs, RayBenchmark>;
 /// # Errors
 /// The first that went wrong; what was measured is written all the same.
 pub fn run(args: &BenchRaysArgs) -> Result<(), Failure> {
-    let scenes = scenes::choose(args);
+    let scenes = scenes::choose(&args.scenes, args.common.quick);
     // before anything that takes long: a broken peers file, a scene that does not exist
     let specs = file::choose(args.peers.as_deref(), Measures::Rays)?;
     scenes.sources.iter().try_for_each(|s| check_exists(s))?;
@@ -125,7 +125,7 @@ impl RaySession<'_> {
     fn scene(&mut self, source: &str, record: &mut SceneRecord) -> Result<()> {
         let size = self.args.size();
         self.phase(format!("{source}: loading"));
-        let loaded = scenes::load(source, self.args, f64::from(size[0]) / f64::from(size[1]))?;
+        let loaded = scenes::load(source, self.args.alpha, self.args.ao_radius, f64::from(size[0]) / f64::from(size[1]))?;
         self.note_warnings(source, &loaded.scene);
         if let Some(known) = loaded.well_known {
             self.note(format!("{source}: seen and lit as {known} is (docs/benchmarks.md)"));

@@ -2,7 +2,6 @@
 
 use glam::DVec3;
 
-use super::args::BenchRaysArgs;
 use crate::bench::scenes::{SceneList, WELL_KNOWN, WellKnownScene};
 use crate::error::Result;
 use crate::film::camera::{self, Choice};
@@ -33,10 +32,10 @@ const QUICK: [&str; 5] = [
     "builtin:instances:25000",
 ];
 
-/// Scenes to measure.
-pub fn choose(args: &BenchRaysArgs) -> SceneList {
-    match args.scenes.as_slice() {
-        [] if args.common.quick => SceneList::of(&QUICK),
+/// Scenes to measure: those that are named, else the default ones; fewer if it is to be `quick`.
+pub fn choose(named: &[String], quick: bool) -> SceneList {
+    match named {
+        [] if quick => SceneList::of(&QUICK),
         [] => SceneList::well_known(&WELL_KNOWN).then(SceneList::of(&BUILTIN)),
         named => SceneList::of(named),
     }
@@ -56,19 +55,19 @@ pub struct RayScene {
     pub well_known: Option<&'static str>,
 }
 
-/// Loads a scene and chooses its view.
+/// Loads a scene and chooses its view. `keep_alpha`: alpha masks do not count as opaque; `ao_radius`: instead of the scene's.
 ///
 /// # Errors
 /// Those of loading.
-pub fn load(source: &str, args: &BenchRaysArgs, aspect: f64) -> Result<RayScene> {
+pub fn load(source: &str, keep_alpha: bool, ao_radius: Option<f64>, aspect: f64) -> Result<RayScene> {
     let mut scene = load::load(source)?;
-    if !args.alpha {
+    if !keep_alpha {
         scene.materials.iter_mut().for_each(|m| m.alpha_mode = AlphaMode::Opaque);
     }
     let known = WellKnownScene::find(&WELL_KNOWN, source);
     let choice = known.and_then(|k| k.view).map_or(Choice::Auto, |view| view.choice());
     let camera = camera::choose(&scene, &choice, aspect)?;
-    let ao_radius = args.ao_radius.or(known.map(|k| k.ao_radius)).unwrap_or(f64::INFINITY);
+    let ao_radius = ao_radius.or(known.map(|k| k.ao_radius)).unwrap_or(f64::INFINITY);
     let (lo, hi) = scene.bounds().unwrap_or_default();
     // outside of the scene, near enough to make rays of different directions
     let outside = || (lo + hi) * 0.5 + TOWARDS_LIGHT.normalize() * (hi - lo).length();

@@ -1,7 +1,7 @@
 //! The tables of `skylit bench rays`.
 
 use crate::bench::record::rays::{RayBenchmark, SceneRecord};
-use crate::bench::table::{align, number, thousands};
+use crate::bench::table::{align, header, indented, number, optional, thousands};
 
 /// One scene's results.
 pub fn scene(record: &SceneRecord, baselines: &[String]) -> Vec<String> {
@@ -13,7 +13,7 @@ pub fn scene(record: &SceneRecord, baselines: &[String]) -> Vec<String> {
         what.push(format!("{} stored, {} instances", thousands(record.stored_primitives), thousands(record.instances as u64)));
     }
     let mut lines = vec![String::new(), format!("{}: {}", record.scene, what.join(", "))];
-    let mut builds = vec![["built", "seconds", "bytes/primitive"].map(str::to_owned).to_vec()];
+    let mut builds = vec![header(&["built", "seconds", "bytes/primitive"])];
     let sah = record.builds.iter().any(|b| b.sah_cost.is_some());
     if sah {
         builds[0].push("SAH cost".into());
@@ -25,17 +25,17 @@ pub fn scene(record: &SceneRecord, baselines: &[String]) -> Vec<String> {
         }
         builds.push(row);
     }
-    lines.extend(align(&builds, 1).into_iter().map(|l| format!("  {l}")));
+    lines.extend(indented(&builds, 1));
     lines.push(String::new());
-    lines.extend(align(&results(record, baselines), 2).into_iter().map(|l| format!("  {l}")));
+    lines.extend(indented(&results(record, baselines), 2));
     if !record.checks.is_empty() {
-        let mut rows = vec![["checked", "stream", "rays", "agree", "ties", "unexplained"].map(str::to_owned).to_vec()];
+        let mut rows = vec![header(&["checked", "stream", "rays", "agree", "ties", "unexplained"])];
         rows.extend(record.checks.iter().map(|c| {
             let counts = [c.rays, c.agree, c.ties, c.unexplained].map(thousands);
             [vec![c.contestant.clone(), c.stream.clone()], counts.to_vec()].concat()
         }));
         lines.push(String::new());
-        lines.extend(align(&rows, 2).into_iter().map(|l| format!("  {l}")));
+        lines.extend(indented(&rows, 2));
     }
     lines
 }
@@ -44,8 +44,7 @@ fn results(record: &SceneRecord, baselines: &[String]) -> Vec<Vec<String>> {
     let runs = || record.streams.iter().flat_map(|t| &t.results);
     // columns that nobody fills stay away
     let (nodes, leaves) = (runs().any(|r| r.nodes_per_ray.is_some()), runs().any(|r| r.leaves_per_ray.is_some()));
-    let mut head: Vec<String> =
-        ["stream", "contestant", "rays", "hit", "Mrays/s", "min..max", "wall"].map(str::to_owned).to_vec();
+    let mut head = header(&["stream", "contestant", "rays", "hit", "Mrays/s", "min..max", "wall"]);
     head.extend(baselines.iter().map(|b| format!("x {b}")));
     if nodes {
         head.push("nodes/ray".into());
@@ -54,7 +53,6 @@ fn results(record: &SceneRecord, baselines: &[String]) -> Vec<Vec<String>> {
         head.push("leaves/ray".into());
     }
     let mut rows = vec![head];
-    let maybe = |x: Option<f64>| x.map_or_else(|| "-".to_owned(), number);
     for stream in &record.streams {
         for (k, run) in stream.results.iter().enumerate() {
             let d = run.device;
@@ -65,14 +63,14 @@ fn results(record: &SceneRecord, baselines: &[String]) -> Vec<Vec<String>> {
                 format!("{:.0}%", 100.0 * run.hit_share),
                 number(d.median),
                 format!("{}..{}", number(d.min), number(d.max)),
-                maybe(run.wall.map(|w| w.median)),
+                optional(run.wall.map(|w| w.median), number),
             ];
-            row.extend(baselines.iter().map(|b| maybe(run.ratio_to(b))));
+            row.extend(baselines.iter().map(|b| optional(run.ratio_to(b), number)));
             if nodes {
-                row.push(maybe(run.nodes_per_ray));
+                row.push(optional(run.nodes_per_ray, number));
             }
             if leaves {
-                row.push(maybe(run.leaves_per_ray));
+                row.push(optional(run.leaves_per_ray, number));
             }
             rows.push(row);
         }
@@ -85,8 +83,8 @@ pub fn scaling(benchmark: &RayBenchmark) -> Vec<String> {
     if benchmark.scaling.is_empty() {
         return Vec::new();
     }
-    let head = ["family", "stream", "contestant", "sizes", "falls as", "worst x log n", "no faster than log n"];
-    let mut rows = vec![head.map(str::to_owned).to_vec()];
+    let titles = ["family", "stream", "contestant", "sizes", "falls as", "worst x log n", "no faster than log n"];
+    let mut rows = vec![header(&titles)];
     for s in &benchmark.scaling {
         let ends = [s.points.first(), s.points.last()].map(|p| p.map_or(0, |p| p.0));
         rows.push(vec![

@@ -1,7 +1,7 @@
-//! What a benchmark of real-time ambient occlusion found: records for programs. `table` writes them a row a result, [`verdict`] says
-//! what follows from them. No renderer in here.
+//! What a benchmark of real-time ambient occlusion found: records for programs. `ao_rows` writes them a row a result, `ao_verdict`
+//! says what follows from them.
 //!
-//! Times are milliseconds, errors are of accessibility (0 to 1) over the pixels that show something.
+//! Times are milliseconds, errors are of ambient visibility (1 - ambient occlusion, 0 to 1) over the pixels that show a surface.
 
 use serde::Serialize;
 
@@ -46,7 +46,7 @@ pub struct ViewRecord {
     pub view: String,
     /// Triangles and spheres over all instances.
     pub primitives: u64,
-    /// World units beyond which occlusion is less than 1/255 (exponential), or none (binary).
+    /// Distance in scene units beyond which occlusion is less than 1/255 (exponential), or none (binary).
     pub reach: f64,
     /// The camera's place, world coordinates.
     pub eye: [f64; 3],
@@ -62,7 +62,7 @@ pub struct ViewRecord {
     pub verdict: Verdict,
 }
 
-/// One preset in one view.
+/// Results of one preset in one view.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct TechniqueRecord {
     /// Its name.
@@ -74,11 +74,11 @@ pub struct TechniqueRecord {
     /// Rays of a pixel that is sampled in a frame.
     pub rays_per_pixel: u32,
     /// Under a camera that stands still, all work done in every frame.
-    pub still: Option<Still>,
+    pub still: Option<StillRecord>,
     /// The same, with what is known already left out.
-    pub rest: Option<Rest>,
+    pub rest: Option<RestRecord>,
     /// Under a camera that goes round.
-    pub moving: Option<Moving>,
+    pub moving: Option<OrbitRecord>,
 }
 
 /// Times of a pass, or of one step of several launches of it.
@@ -92,7 +92,7 @@ pub struct PassTime {
 
 /// What a frame costs.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct Cost {
+pub struct FrameCost {
     /// Each pass.
     pub passes: Vec<PassTime>,
     /// All passes, on the device; 0 where the device has no clock.
@@ -107,7 +107,7 @@ pub struct Cost {
     pub skipped_rays: f64,
 }
 
-impl Cost {
+impl FrameCost {
     /// Median on the device, or by the clock where the device has none.
     pub fn ms(&self) -> f64 {
         if self.device_ms.median > 0.0 { self.device_ms.median } else { self.wall_ms.median }
@@ -121,7 +121,7 @@ impl Cost {
 
 /// How far an image is from the reference.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct Errors {
+pub struct ImageErrors {
     /// Root of the mean squared error, as measured: the reference's own error is in it.
     pub rmse: f64,
     /// Without the reference's: `sqrt(max(0, rmse^2 - reference^2))`.
@@ -136,12 +136,12 @@ pub struct Errors {
     pub minimum_ratio: f64,
 }
 
-impl Errors {
+impl ImageErrors {
     /// Number by number; `None` for none.
-    pub fn mean(of: &[Errors]) -> Option<Errors> {
+    pub fn mean(of: &[ImageErrors]) -> Option<ImageErrors> {
         let n = of.len() as f64;
-        let mean = |f: fn(&Errors) -> f64| of.iter().map(f).sum::<f64>() / n;
-        (!of.is_empty()).then(|| Errors {
+        let mean = |f: fn(&ImageErrors) -> f64| of.iter().map(f).sum::<f64>() / n;
+        (!of.is_empty()).then(|| ImageErrors {
             rmse: mean(|e| e.rmse),
             rmse_corrected: mean(|e| e.rmse_corrected),
             bias: mean(|e| e.bias),
@@ -154,7 +154,7 @@ impl Errors {
 
 /// The error after some frames.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct Point {
+pub struct ErrorPoint {
     /// Frames made.
     pub frame: u32,
     /// Occlusion rays traced for them.
@@ -162,57 +162,57 @@ pub struct Point {
     /// Camera rays traced for them.
     pub camera_rays: u64,
     /// Of the image.
-    pub errors: Errors,
+    pub errors: ImageErrors,
     /// Of what the filter was given.
-    pub unfiltered: Option<Errors>,
+    pub unfiltered: Option<ImageErrors>,
 }
 
 /// A camera that stands still, all work done in every frame.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct Still {
+pub struct StillRecord {
     /// A frame's, as it comes: no camera rays where nothing moved.
-    pub cost: Cost,
+    pub cost: FrameCost,
     /// A frame's with all of its camera rays and reprojection: the camera trembles by less than a thousandth of a pixel.
-    pub moving_cost: Cost,
+    pub moving_cost: FrameCost,
     /// Error after 1, 2, 4, ... frames; the last is the settled one.
-    pub curve: Vec<Point>,
+    pub curve: Vec<ErrorPoint>,
     /// RMSE after each frame.
     pub rmse: Vec<f64>,
     /// Occlusion rays traced until each frame is done.
     pub rays: Vec<u64>,
 }
 
-impl Still {
+impl StillRecord {
     /// The error that it settles at: that of the last frame.
-    pub fn settled(&self) -> Option<&Point> {
+    pub fn settled(&self) -> Option<&ErrorPoint> {
         self.curve.last()
     }
 }
 
 /// A camera that stands still, and what that saves.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct Rest {
+pub struct RestRecord {
     /// Frames until no ray is traced any more; `None`: it never came to rest.
     pub frames: Option<u32>,
     /// Of a frame at rest.
-    pub cost: Cost,
+    pub cost: FrameCost,
     /// At rest.
-    pub errors: Errors,
+    pub errors: ImageErrors,
 }
 
 /// A camera that goes round.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct Moving {
+pub struct OrbitRecord {
     /// How far it goes in a frame.
     pub degrees_per_frame: f64,
     /// A frame's.
-    pub cost: Cost,
+    pub cost: FrameCost,
     /// Frames in which the error was measured.
     pub frames: Vec<u32>,
     /// The mean of these.
-    pub errors: Errors,
+    pub errors: ImageErrors,
     /// The same before the filter.
-    pub unfiltered: Option<Errors>,
+    pub unfiltered: Option<ImageErrors>,
     /// Standard error of the references, the mean.
     pub reference_rmse: f64,
 }
@@ -242,7 +242,7 @@ pub struct ChangeResult {
     pub preset: String,
     /// Where its occlusion comes from.
     pub technique: String,
-    /// Share of the old image in each frame from the change on; of `slide` and `animated`, of the truth of the frame before, in frames
+    /// Share of the old image in each frame from the change on; of `slide` and `animated`, of the reference of the frame before, in frames
     /// that have a reference. What the preset itself ends at counts as 0.
     pub residuals: Vec<f64>,
     /// The same beside frames of the same age without a past, which are as blurred and as noisy: what is remembered, and no more.
@@ -270,9 +270,9 @@ pub struct ChangeResult {
     /// As many of a run that never saw the old: what chance makes.
     pub stale_pixels_by_chance: Option<u64>,
     /// Of whole images, the mean over the frames with a reference.
-    pub errors: Option<Errors>,
+    pub errors: Option<ImageErrors>,
     /// A frame's.
-    pub cost: Option<Cost>,
+    pub cost: Option<FrameCost>,
     /// Milliseconds to bring the tracer up to date.
     pub update_ms: Option<Spread>,
 }
@@ -334,7 +334,7 @@ pub struct SeriesPoint {
     /// The number: triangles, rays a pixel, pixels, frames.
     pub x: f64,
     /// A frame's, with all of its camera rays.
-    pub cost: Option<Cost>,
+    pub cost: Option<FrameCost>,
     /// Settled error.
     pub rmse: Option<f64>,
     /// The same before the filter.

@@ -2,7 +2,7 @@
 
 use std::io::Write;
 
-use super::ao::{AoBenchmark, ChangeResult, Cost, Errors, SeriesPoint, Still};
+use super::ao::{AoBenchmark, ChangeResult, FrameCost, ImageErrors, SeriesPoint, StillRecord};
 use super::{BenchRecord, Completeness};
 use crate::measure::stats::Spread;
 
@@ -74,19 +74,19 @@ impl Row {
         self.number(column, value.map(|s| s.median)).number(&format!("{column} p95"), value.map(|s| s.p95))
     }
 
-    fn errors(self, e: &Errors, unfiltered: Option<&Errors>) -> Self {
+    fn errors(self, e: &ImageErrors, unfiltered: Option<&ImageErrors>) -> Self {
         let row = self.number("rmse", e.rmse).number("rmse corrected", e.rmse_corrected).number("bias", e.bias);
         let row = row.number("flip", e.flip).number("tanimoto", e.tanimoto).number("minimum ratio", e.minimum_ratio);
         row.number("unfiltered rmse", unfiltered.map(|u| u.rmse)).number("unfiltered flip", unfiltered.map(|u| u.flip))
     }
 
-    fn cost(self, c: &Cost) -> Self {
+    fn cost(self, c: &FrameCost) -> Self {
         let row = self.spread("device ms", Some(c.device_ms)).spread("wall ms", Some(c.wall_ms));
         row.number("camera rays", c.camera_rays).number("rays", c.rays).number("skipped rays", c.skipped_rays)
     }
 
     /// One row for each pass.
-    fn passes(&self, c: &Cost) -> Vec<Row> {
+    fn passes(&self, c: &FrameCost) -> Vec<Row> {
         let blank = self.clone();
         c.passes.iter().map(|p| blank.clone().text("pass", &p.pass).spread("device ms", Some(p.ms))).collect()
     }
@@ -176,9 +176,9 @@ impl AoBenchmark {
 }
 
 /// Error after each frame that has one; the last also has what a frame costs.
-fn curve(head: &Row, still: &Still) -> Vec<Row> {
+fn curve(head: &Row, still: &StillRecord) -> Vec<Row> {
     let last = still.curve.len().saturating_sub(1);
-    let row = |(k, p): (usize, &super::ao::Point)| {
+    let row = |(k, p): (usize, &super::ao::ErrorPoint)| {
         let row = head.clone().number("frame", f64::from(p.frame)).number("cumulative rays", p.rays as f64);
         let row = row.errors(&p.errors, p.unfiltered.as_ref());
         if k == last { row.cost(&still.cost) } else { row }
@@ -212,14 +212,15 @@ fn series_rows(series: &str, line: &str, p: &SeriesPoint) -> Vec<Row> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::bench::record::ao::{PassTime, Point, TechniqueRecord, ViewRecord};
+    use crate::bench::record::ao::{ErrorPoint, PassTime, TechniqueRecord, ViewRecord};
 
     #[test]
     fn a_row_a_result() {
         let ms = Spread { median: 2.0, p95: 3.5 };
-        let cost = Cost { passes: vec![PassTime { pass: "gbuffer".into(), ms }], device_ms: ms, ..Default::default() };
-        let point = |frame| Point { frame, ..Default::default() };
-        let still = Still { cost: cost.clone(), moving_cost: cost, curve: vec![point(1), point(2)], ..Default::default() };
+        let cost = FrameCost { passes: vec![PassTime { pass: "gbuffer".into(), ms }], device_ms: ms, ..Default::default() };
+        let point = |frame| ErrorPoint { frame, ..Default::default() };
+        let still =
+            StillRecord { cost: cost.clone(), moving_cost: cost, curve: vec![point(1), point(2)], ..Default::default() };
         let results = vec![TechniqueRecord { preset: "fast, or so".into(), still: Some(still), ..Default::default() }];
         let view = ViewRecord { scene: "a.glb".into(), results, ..Default::default() };
         let change = crate::bench::record::ao::ChangeRecord {

@@ -1,10 +1,10 @@
 //! What the numbers of a view say about the preset `balanced` beside the pipeline of the reference work.
 
-use super::ao::{EqualTime, Still, TechniqueRecord, Verdict, ViewRecord};
+use super::ao::{EqualTime, StillRecord, TechniqueRecord, Verdict, ViewRecord};
 
-/// Who is judged.
+/// Preset that is compared.
 pub const OURS: &str = "balanced";
-/// Beside whom.
+/// Preset it is compared with.
 pub const THEIRS: &str = "larsen";
 
 impl Verdict {
@@ -35,7 +35,7 @@ impl Verdict {
         out
     }
 
-    fn reach(&mut self, ours: &Still, their_rmse: f64, their_rays: f64) {
+    fn reach(&mut self, ours: &StillRecord, their_rmse: f64, their_rays: f64) {
         let Some(k) = ours.rmse.iter().position(|e| *e <= their_rmse) else { return };
         self.frames_to_reach = Some(k as u32 + 1);
         self.rays_to_reach = ours.rays.get(k).copied();
@@ -45,20 +45,21 @@ impl Verdict {
 
 /// Does its filter raise the settled error?
 fn raises(r: &TechniqueRecord) -> bool {
-    let settled = r.still.as_ref().and_then(Still::settled);
+    let settled = r.still.as_ref().and_then(StillRecord::settled);
     settled.and_then(|p| Some(p.errors.rmse > p.unfiltered?.rmse)).unwrap_or(false)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::bench::record::ao::{Cost, Errors, Point};
+    use crate::bench::record::ao::{ErrorPoint, FrameCost, ImageErrors};
 
     fn result(preset: &str, rays: f64, camera_rays: f64, rmse: &[f64], unfiltered: f64) -> TechniqueRecord {
-        let cost = |camera_rays| Cost { rays, camera_rays, ..Default::default() };
-        let errors = |rmse| Errors { rmse, rmse_corrected: rmse, ..Default::default() };
-        let last = Point { errors: errors(rmse[rmse.len() - 1]), unfiltered: Some(errors(unfiltered)), ..Default::default() };
-        let still = Still {
+        let cost = |camera_rays| FrameCost { rays, camera_rays, ..Default::default() };
+        let errors = |rmse| ImageErrors { rmse, rmse_corrected: rmse, ..Default::default() };
+        let last =
+            ErrorPoint { errors: errors(rmse[rmse.len() - 1]), unfiltered: Some(errors(unfiltered)), ..Default::default() };
+        let still = StillRecord {
             cost: cost(camera_rays),
             moving_cost: cost(100.0),
             curve: vec![last],

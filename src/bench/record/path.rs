@@ -17,7 +17,7 @@ pub struct PathBenchmark {
     /// What it ran on.
     #[serde(flatten)]
     pub host: HostInfo,
-    /// TimeEstimate our rays were traced.
+    /// How our rays were traced.
     pub tracer: String,
     /// Timed images of each kind, after one that warms up.
     pub repeats: u32,
@@ -41,13 +41,13 @@ pub struct SceneRecord {
     pub triangles: u64,
     /// Over all instances.
     pub spheres: u64,
-    /// Lights that ours draws from.
+    /// Lights that our integrator samples.
     pub lights: u32,
-    /// What surrounds it.
+    /// Environment light, in words.
     pub environment: String,
-    /// What images are held against, by engine.
+    /// Reference images, by engine.
     pub references: Vec<ReferenceRecord>,
-    /// TimeEstimate far the references of peers are from ours.
+    /// How far the references of peers are from ours.
     pub differences: Vec<ReferenceDifference>,
     /// Error that [`ContestantRecord::seconds_to_target`] is about, and whose greatest sample count reached it.
     pub target: Option<ErrorTarget>,
@@ -55,10 +55,10 @@ pub struct SceneRecord {
     pub results: Vec<ContestantRecord>,
 }
 
-/// What is right, as one engine sees it.
+/// A reference image by one engine.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct ReferenceRecord {
-    /// `skylit`, or a peer.
+    /// `skylit`, or the name of a peer.
     pub engine: String,
     /// Paths a pixel.
     pub spp: u64,
@@ -83,12 +83,12 @@ pub struct ReferenceDifference {
     pub explained: f64,
 }
 
-/// An error, and who set it.
+/// An error, and the contestant that set it.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct ErrorTarget {
     /// Root mean square.
     pub rmse: f64,
-    /// ContestantRecord whose last point it is.
+    /// Contestant whose last point it is.
     pub set_by: String,
 }
 
@@ -112,7 +112,7 @@ pub struct ErrorPoint {
 pub struct ContestantRecord {
     /// In tables.
     pub name: String,
-    /// Whose reference it is held against.
+    /// Engine whose reference it is compared with.
     pub engine: String,
     /// By sample count, ascending.
     pub points: Vec<ErrorPoint>,
@@ -130,24 +130,24 @@ pub struct ContestantRecord {
     pub seconds_to_target: Option<TimeToError>,
 }
 
-/// When an error was reached.
+/// Time at which an error is reached.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct TimeToError {
     /// Wall seconds of one image.
     pub seconds: f64,
-    /// TimeEstimate it is known.
+    /// How it was found.
     pub how: TimeEstimate,
 }
 
-/// TimeEstimate a time is known.
+/// How a time was found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum TimeEstimate {
-    /// It lies between two that were measured.
+    /// Interpolated between two measured images.
     Between,
-    /// The shortest measured image is better already: it takes less.
+    /// An upper bound: the shortest measured image is better already.
     Less,
-    /// By the square root law from the longest measured image.
+    /// Extrapolated by the square root law from the longest measured image.
     Extrapolated,
 }
 

@@ -46,7 +46,7 @@ pub struct SceneRecord {
     pub instances: usize,
     /// Triangles and spheres that are stored; less than what is placed where meshes are placed several times.
     pub stored_primitives: u64,
-    /// Length of the ambient occlusion rays, world units; `None` for no limit.
+    /// Length of the ambient occlusion rays, scene units; `None` for no limit.
     pub ao_radius: Option<f64>,
     /// Light of the shadow rays, world coordinates.
     pub light: [f64; 3],
@@ -54,7 +54,7 @@ pub struct SceneRecord {
     pub builds: Vec<BuildRecord>,
     /// What tracing took.
     pub streams: Vec<StreamRecord>,
-    /// Who answered otherwise, where that was asked.
+    /// Comparisons of answers, with `--check`.
     pub checks: Vec<CheckRecord>,
 }
 
@@ -68,7 +68,7 @@ impl SceneRecord {
 /// Building for one contestant.
 #[derive(Clone, Debug, Serialize)]
 pub struct BuildRecord {
-    /// Who.
+    /// Name of the contestant.
     pub contestant: String,
     /// Seconds to build the hierarchy.
     pub build_seconds: f64,
@@ -94,7 +94,7 @@ pub struct StreamRecord {
 /// One contestant on one stream.
 #[derive(Clone, Debug, Serialize)]
 pub struct RunRecord {
-    /// Who.
+    /// Name of the contestant.
     pub contestant: String,
     /// Rays of a repeat; fewer than the set's for slow tracers, which get a sample of it.
     pub rays: usize,
@@ -126,9 +126,9 @@ pub struct Ratio {
 /// One contestant's answers against the first one's.
 #[derive(Clone, Debug, Serialize)]
 pub struct CheckRecord {
-    /// Who.
+    /// Name of the contestant.
     pub contestant: String,
-    /// Against whom.
+    /// The contestant it was compared with.
     pub reference: String,
     /// Name of the stream.
     pub stream: String,
@@ -181,11 +181,11 @@ pub struct ScalingRecord {
     pub family: String,
     /// Name of the stream.
     pub stream: String,
-    /// Who.
+    /// Name of the contestant.
     pub contestant: String,
     /// (primitives, median Mrays/s), by size.
     pub points: Vec<(u64, f64)>,
-    /// The judgement.
+    /// The fitted law.
     pub law: LogScaling,
     /// Falls no faster than log n.
     pub holds: bool,

@@ -8,7 +8,7 @@ use crate::scene::builtin::shapes;
 use crate::scene::{Camera, Geometry, Instance, Material, Mesh, Projection, Scene};
 use crate::tracer::Changes;
 
-/// World units that occlusion reaches.
+/// How far occlusion reaches, scene units.
 const REACH: f64 = 2.0;
 /// The camera, and what it looks at.
 const EYE: DVec3 = DVec3::new(0.6, 2.2, 6.0);

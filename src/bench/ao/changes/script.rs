@@ -19,7 +19,7 @@ pub struct ChangeScript<'a> {
     pub scene: &'a Scene,
     /// What may change.
     pub motion: Motion,
-    /// World units that occlusion reaches.
+    /// How far occlusion reaches, scene units.
     pub reach: f64,
     /// From where it is seen.
     pub camera: Camera,

@@ -8,12 +8,12 @@ use crate::bench::ao::orbit::measured;
 use crate::bench::ao::reference::AoReference;
 use crate::bench::ao::session::AoSession;
 use crate::bench::ao::view_renderer::first_timed;
-use crate::bench::record::ao::{ChangeRecord, Errors};
+use crate::bench::record::ao::{ChangeRecord, ImageErrors};
 use crate::error::Result;
 use crate::measure::stats::Spread;
 use crate::measure::temporal::Ghosting;
 
-/// What is right in a frame, what was in the one before, and the pixels in which both show the same surface at rest.
+/// References of a frame and of the one before, and the pixels in which both show the same surface at rest.
 struct Moment {
     frame: u32,
     reference: AoReference,
@@ -53,7 +53,7 @@ pub fn play(
         let mut realtime = stage.renderer().realtime(&candidate.settings(&stage.occlusion))?;
         let mut result = result_of(candidate, stage);
         let (mut log, mut updates) = (FrameLog::default(), Vec::new());
-        let (mut images, mut errors): (Vec<Vec<f32>>, Vec<Errors>) = (Vec::new(), Vec::new());
+        let (mut images, mut errors): (Vec<Vec<f32>>, Vec<ImageErrors>) = (Vec::new(), Vec::new());
         for frame in 0..frames {
             let moved = if frame == 0 {
                 Vec::new()
@@ -81,7 +81,7 @@ pub fn play(
             result.residuals.push(left.map_or(f64::NAN, |r| r.share));
         }
         result.ghosting = Some(ghosting.energy());
-        result.errors = Errors::mean(&errors);
+        result.errors = ImageErrors::mean(&errors);
         result.cost = Some(log.cost(first_timed(frames)));
         result.update_ms = Spread::of(&updates);
         record.results.push(result);

@@ -13,7 +13,7 @@ use crate::film::camera::CameraRecord;
 use crate::measure::temporal::recovery;
 use crate::scene::Camera;
 
-/// World units, to the right.
+/// Scene units, to the right.
 const STEP: f64 = 0.5;
 
 /// Plays it with every preset.

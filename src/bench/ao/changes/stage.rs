@@ -62,7 +62,7 @@ pub fn ghost(
     (reference, wrong): (&AoReference, &AoReference),
     mask: &[f32],
 ) -> Option<Residual> {
-    // as if it settled at what is right
+    // as if it settled at the reference
     let shifted: Vec<f32> = image.iter().zip(settled).zip(&reference.image).map(|((v, s), t)| v - s + t).collect();
     ghosting.add(&shifted, &reference.image, &wrong.image, Some(mask))
 }
