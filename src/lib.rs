@@ -8,8 +8,10 @@ pub mod accel;
 pub mod bench;
 #[cfg(feature = "cli")]
 pub mod cli;
+pub mod colour;
 pub mod denoise;
 pub mod error;
+pub mod files;
 pub mod film;
 #[allow(unsafe_code, reason = "Vulkan is called here, and nowhere else")]
 pub mod gpu;

@@ -4,6 +4,8 @@ use std::path::Path;
 use std::process::Command;
 
 use skylit::Error;
+use skylit::colour::{srgb_byte, srgb_decode};
+use skylit::files;
 use skylit::output::{self, Channel, Image, ImageFormat, Samples, exr, png};
 
 fn f32s(name: &str, samples: Vec<f32>) -> Channel {
@@ -105,12 +107,12 @@ fn images_that_contradict_themselves_are_refused() {
 fn srgb_known_answers() {
     // IEC 61966-2-1: the 18 % grey card is 118 (117.6), half is 188 (187.5)
     for (linear, byte) in [(0.0, 0), (1.0, 255), (0.5, 188), (0.18, 118), (0.0031308, 10), (-1.0, 0), (7.0, 255)] {
-        assert_eq!(png::srgb_byte(linear), byte, "{linear}");
+        assert_eq!(srgb_byte(linear), byte, "{linear}");
     }
-    assert_eq!(png::srgb_byte(f32::NAN), 0);
-    assert_eq!(png::srgb_byte(f32::INFINITY), 255);
+    assert_eq!(srgb_byte(f32::NAN), 0);
+    assert_eq!(srgb_byte(f32::INFINITY), 255);
     for byte in 0..=255u8 {
-        assert_eq!(png::srgb_byte(png::srgb_decode(f32::from(byte) / 255.0)), byte);
+        assert_eq!(srgb_byte(srgb_decode(f32::from(byte) / 255.0)), byte);
     }
 }
 
@@ -126,7 +128,7 @@ fn png_round_trip() {
     };
     output::save(&grey, &path).unwrap();
     let back = output::load(&path).unwrap();
-    let bytes = |v: &[f32]| v.iter().map(|&v| png::srgb_byte(v)).collect::<Vec<_>>();
+    let bytes = |v: &[f32]| v.iter().map(|&v| srgb_byte(v)).collect::<Vec<_>>();
     assert_eq!(bytes(back.f32("Y").unwrap()), bytes(grey.f32("Y").unwrap()));
 
     let colour = sample(31, 17);
@@ -137,7 +139,7 @@ fn png_round_trip() {
     }
     // one stop up
     png::write(&grey, &path, 1.0).unwrap();
-    assert_eq!(png::srgb_byte(output::load(&path).unwrap().f32("Y").unwrap()[64]), png::srgb_byte(128.0 / 255.0));
+    assert_eq!(srgb_byte(output::load(&path).unwrap().f32("Y").unwrap()[64]), srgb_byte(128.0 / 255.0));
     // nothing to show
     let ids = Image { width: 1, height: 1, channels: vec![f32s("depth.Z", vec![1.0])], metadata: vec![] };
     assert!(matches!(output::save(&ids, &path), Err(Error::Usage(_))));
@@ -161,15 +163,15 @@ fn unknown_extension_names_both() {
 #[test]
 fn check_writable_says_why_not() {
     let dir = tempfile::tempdir().unwrap();
-    let reason = |p: &Path| output::check_writable(p).unwrap_err().to_string();
+    let reason = |p: &Path| files::check_writable(p).unwrap_err().to_string();
     assert!(reason(&dir.path().join("none/a.exr")).contains("folder does not exist"));
     assert!(reason(dir.path()).contains("is a folder"));
     std::fs::write(dir.path().join("file"), "x").unwrap();
-    assert!(output::check_writable(&dir.path().join("file/a.exr")).is_err());
-    assert!(output::check_writable(Path::new("")).is_err());
-    assert!(output::check_writable(Path::new("/")).is_err());
-    output::check_writable(&dir.path().join("new.exr")).unwrap();
-    output::check_writable(&dir.path().join("file")).unwrap();
+    assert!(files::check_writable(&dir.path().join("file/a.exr")).is_err());
+    assert!(files::check_writable(Path::new("")).is_err());
+    assert!(files::check_writable(Path::new("/")).is_err());
+    files::check_writable(&dir.path().join("new.exr")).unwrap();
+    files::check_writable(&dir.path().join("file")).unwrap();
     assert_eq!(files_in(dir.path()), 1);
     assert_eq!(std::fs::read(dir.path().join("file")).unwrap(), b"x");
 }
@@ -179,7 +181,7 @@ fn failed_write_leaves_the_old_file() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("a");
     std::fs::write(&path, "old").unwrap();
-    let failed = output::write_atomically(&path, |f| {
+    let failed = files::write_atomically(&path, |f| {
         std::io::Write::write_all(f, b"half")?;
         Err(std::io::Error::from_raw_os_error(28)) // ENOSPC
     });
@@ -194,7 +196,7 @@ fn permissions_links_and_devices() {
     use std::os::unix::fs::{FileTypeExt, PermissionsExt, symlink};
     let dir = tempfile::tempdir().unwrap();
     let (path, link) = (dir.path().join("a"), dir.path().join("link"));
-    let fill = |p: &Path, text: &str| output::write_atomically(p, |f| std::io::Write::write_all(f, text.as_bytes()));
+    let fill = |p: &Path, text: &str| files::write_atomically(p, |f| std::io::Write::write_all(f, text.as_bytes()));
     // a new file has the mode that the umask leaves
     fill(&path, "1").unwrap();
     std::fs::write(dir.path().join("plain"), "").unwrap();
@@ -210,7 +212,7 @@ fn permissions_links_and_devices() {
     // devices are written to, not replaced
     fill(Path::new("/dev/null"), "3").unwrap();
     assert!(std::fs::metadata("/dev/null").unwrap().file_type().is_char_device());
-    output::check_writable(Path::new("/dev/null")).unwrap();
+    files::check_writable(Path::new("/dev/null")).unwrap();
     if Path::new("/dev/full").exists() {
         assert!(fill(Path::new("/dev/full"), "4").unwrap_err().to_string().contains("the disk is full"));
     }
@@ -251,7 +253,7 @@ fn full_disk() {
     let results = ["a.exr", "a.png"].map(|name| output::save(&image, &dir.path().join(name)).map_err(|e| e.to_string()));
     let left = files_in(dir.path());
     let read_only =
-        mount(&["-o", "remount,ro"]).then(|| output::check_writable(&dir.path().join("b.exr")).map_err(|e| e.to_string()));
+        mount(&["-o", "remount,ro"]).then(|| files::check_writable(&dir.path().join("b.exr")).map_err(|e| e.to_string()));
     Command::new("umount").arg(dir.path()).status().unwrap();
     assert!(results[0].as_ref().is_err_and(|e| e.ends_with("cannot write: the disk is full")), "{results:?}");
     assert_eq!(left, usize::from(results[1].is_ok()));

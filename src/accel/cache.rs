@@ -14,7 +14,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use xxhash_rust::xxh3::{Xxh3, xxh3_128};
 
 use crate::error::Result;
-use crate::output;
+use crate::files;
 
 /// First bytes of every file; the last is the version of the container.
 const MAGIC: [u8; 8] = *b"skyhier\x01";
@@ -134,7 +134,7 @@ impl Cache {
         let parts = || std::iter::once(table.as_slice()).chain(arrays.iter().map(|a| a.1));
         parts().for_each(|p| hash.update(p));
         let length = HEAD + parts().map(<[u8]>::len).sum::<usize>();
-        output::write_atomically(path, |file| {
+        files::write_atomically(path, |file| {
             file.write_all(&MAGIC)?;
             file.write_all(&(length as u64).to_le_bytes())?;
             file.write_all(&hash.digest128().to_le_bytes())?;

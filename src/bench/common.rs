@@ -9,6 +9,7 @@ use clap::{Args, ValueHint};
 use super::plot::chart::Picture;
 use super::record::BenchRecord;
 use crate::error::{Error, Result};
+use crate::files;
 use crate::output;
 use crate::terminal::console::Console;
 use crate::terminal::parse::parse_seconds;
@@ -61,13 +62,13 @@ impl CommonArgs {
     /// Checks what clap cannot, and that every file can be written.
     ///
     /// # Errors
-    /// [`Error::Usage`]; those of [`output::check_writable`].
+    /// [`Error::Usage`]; those of [`files::check_writable`].
     pub fn check(&self) -> Result<()> {
         match &self.plot {
             Some(p) if p.extension().is_none_or(|e| !e.eq_ignore_ascii_case("png")) => {
                 Err(Error::Usage(format!("--plot {}: the name must end in .png", p.display())))
             }
-            _ => self.outputs().try_for_each(|path| output::check_writable(path)),
+            _ => self.outputs().try_for_each(|path| files::check_writable(path)),
         }
     }
 
@@ -79,12 +80,12 @@ impl CommonArgs {
         let json = self.json_file().map_or(Ok(()), |path| {
             let text = serde_json::to_string_pretty(record)
                 .map_err(|e| Error::CheckFailed(format!("cannot express the result as JSON: {e}")))?;
-            output::write_atomically(path, |f| f.write_all(text.as_bytes()).and_then(|()| f.write_all(b"\n")))
+            files::write_atomically(path, |f| f.write_all(text.as_bytes()).and_then(|()| f.write_all(b"\n")))
         });
         let csv = self
             .csv
             .as_ref()
-            .map_or(Ok(()), |path| output::write_atomically(path, |f| record.write_csv(f).map_err(std::io::Error::other)));
+            .map_or(Ok(()), |path| files::write_atomically(path, |f| record.write_csv(f).map_err(std::io::Error::other)));
         let plot = self.plot.as_ref().map_or(Ok(()), |path| {
             let picture = picture()?;
             output::png::write_rgb(path, &picture.rgb, picture.width, picture.height)

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::args::ExportArgs;
 use crate::error::{Error, Result};
-use crate::output;
+use crate::files;
 use crate::scene::export::{self, Written};
 use crate::scene::{Scene, load};
 use crate::terminal::warnings::{Warnings, warnings_of};
@@ -21,7 +21,7 @@ pub fn run(args: &ExportArgs) -> Result<()> {
             return Err(Error::Usage(format!("{path}: unknown kind of scene: the name must end in .bin, .glb or .gltf")));
         }
     };
-    output::check_writable(&args.output)?;
+    files::check_writable(&args.output)?;
     let scene = load::load(&args.scene)?;
     let mut warnings = Warnings::new(console);
     warnings_of(&scene).iter().for_each(|w| warnings.add(w));

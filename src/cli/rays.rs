@@ -8,10 +8,10 @@ use glam::DVec3;
 use super::args::RaysArgs;
 use crate::accel::flatten::FlatScene;
 use crate::error::{Error, Result};
+use crate::files;
 use crate::gpu::Device;
 use crate::integrators::rays;
 use crate::measure::stats::median;
-use crate::output;
 use crate::ray::Ray;
 use crate::scene::{Scene, export, load};
 use crate::terminal::interrupt::{self, ProgressControl};
@@ -25,7 +25,7 @@ pub fn run(args: &RaysArgs) -> Result<()> {
     interrupt::install();
     let console = args.verbosity.console();
     if let Some(hits) = &args.hits {
-        output::check_writable(hits)?;
+        files::check_writable(hits)?;
     }
     let mut set = read_rays(&args.rays)?;
     rays::check(&set)?;
@@ -45,7 +45,7 @@ pub fn run(args: &RaysArgs) -> Result<()> {
     let (hits, times) = rays::trace(&tracer, &set, args.mode.into(), args.repeats, &mut control)?;
     drop(control);
     if let Some(path) = &args.hits {
-        output::write_atomically(path, |file| file.write_all(bytemuck::cast_slice(&hits)))?;
+        files::write_atomically(path, |file| file.write_all(bytemuck::cast_slice(&hits)))?;
     }
     device.check_validation()?;
     device.save_pipeline_cache();

@@ -11,6 +11,7 @@ use super::rays::move_rays;
 use super::report::{self, Rays, Report, Seconds};
 use crate::accel::flatten::FlatScene;
 use crate::error::{Error, Result};
+use crate::files;
 use crate::film::Film;
 use crate::film::accumulate::Accumulated;
 use crate::film::camera::{self, CameraRecord};
@@ -42,7 +43,7 @@ pub fn run(args: &RenderArgs, start: Instant) -> Result<(), Failure> {
         return super::paths::run(args, start);
     }
     for path in args.outputs() {
-        output::check_writable(&path)?;
+        files::check_writable(&path)?;
     }
     interrupt::install();
     let console = args.verbosity.console();
@@ -278,7 +279,7 @@ fn write_rays(args: &RenderArgs, primary: &mut [Ray], occlusion: &mut [Ray], ori
     for (kind, rays) in [("primary", primary), ("ao", occlusion)] {
         // files are in the scene's world, as its exported mesh is
         move_rays(rays, origin);
-        output::write_atomically(&dump_path(prefix, kind), |file| file.write_all(bytemuck::cast_slice(rays)))?;
+        files::write_atomically(&dump_path(prefix, kind), |file| file.write_all(bytemuck::cast_slice(rays)))?;
     }
     Ok(())
 }

@@ -1,18 +1,14 @@
 //! The pipeline cache on disk: one file per device and driver version, written beside and renamed, ignored when foreign.
 
+use std::io::Write;
 use std::path::PathBuf;
 
 use super::info::DeviceInfo;
-
-/// `$XDG_CACHE_HOME/skylit`, or `~/.cache/skylit`.
-pub fn folder() -> Option<PathBuf> {
-    let base = std::env::var_os("XDG_CACHE_HOME").map(PathBuf::from).filter(|p| p.is_absolute());
-    base.or_else(|| std::env::var_os("HOME").map(|h| PathBuf::from(h).join(".cache"))).map(|p| p.join("skylit"))
-}
+use crate::files;
 
 fn file(info: &DeviceInfo) -> Option<PathBuf> {
     let uuid: String = info.pipeline_cache_uuid.iter().map(|b| format!("{b:02x}")).collect();
-    folder().map(|f| {
+    files::cache_folder().map(|f| {
         // the width of a CPU driver's vectors is no part of what Vulkan calls the same device
         let lanes = info.limits.subgroup_size;
         f.join(format!(
@@ -45,8 +41,8 @@ pub fn store(info: &DeviceInfo, data: &[u8]) {
     }
     let Some(folder) = path.parent() else { return };
     // not worth a warning: a folder that cannot be written to is as good as no cache
-    let _ = std::fs::create_dir_all(folder)
-        .and_then(|()| tempfile::NamedTempFile::new_in(folder))
-        .and_then(|mut f| std::io::Write::write_all(&mut f, data).map(|()| f))
-        .and_then(|f| f.persist(&path).map_err(|e| e.error));
+    let write = || files::write_atomically(&path, |file| file.write_all(data));
+    if std::fs::create_dir_all(folder).is_ok() {
+        let _ = write();
+    }
 }

@@ -29,7 +29,7 @@ fn cache_folder(width: &OsStr) -> Option<PathBuf> {
     let chosen = std::env::var_os(CACHE).map(PathBuf::from);
     let mut name = OsString::from("mesa-");
     name.push(width);
-    chosen.or_else(super::cache::folder).map(|f| f.join(name))
+    chosen.or_else(crate::files::cache_folder).map(|f| f.join(name))
 }
 
 #[cfg(target_arch = "x86_64")]

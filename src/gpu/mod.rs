@@ -19,7 +19,6 @@ mod result;
 
 pub use acceleration_structure::{AccelerationStructure, BottomLevelInput, TopLevelEntry, Update};
 pub use buffer::{Buffer, Memory};
-pub use cache::folder as cache_folder;
 pub use commands::{Commands, Recorder, Timing};
 pub use device::{Device, Options};
 pub use drawing::Drawing;

@@ -8,8 +8,9 @@ use std::path::{Path, PathBuf};
 use ::png::{BitDepth, ColorType, Compression, Encoder, EncodingError, SrgbRenderingIntent, Writer};
 
 use super::png::{Colour, bytes_of};
-use super::{AtomicFile, Image, check_size};
+use super::{Image, check_size};
 use crate::error::{Error, Result};
+use crate::files::AtomicFile;
 
 /// How long a frame is shown: `numerator` / `denominator` seconds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -17,8 +17,9 @@ use exr::prelude::{
     WritableImage,
 };
 
-use super::{Channel, Image, Samples, check_size, write_atomically};
+use super::{Channel, Image, Samples, check_size};
 use crate::error::{Error, Result};
+use crate::files::write_atomically;
 
 /// Prefix of the attributes that hold metadata.
 const PREFIX: &str = "skylit.";

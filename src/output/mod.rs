@@ -1,16 +1,13 @@
 //! Images in files: EXR with named float channels, PNG for looking, APNG for looking at many, and numbers in names for one file
-//! a frame. Files are written beside their target and renamed, so that a run that is broken off leaves no half-written file.
+//! a frame.
 
 pub mod apng;
-mod atomic;
 pub mod exr;
 pub mod frames;
 pub mod png;
 pub mod tone_map;
 
 use std::path::Path;
-
-pub use atomic::{AtomicFile, check_writable, write_atomically};
 
 use crate::error::{Error, Result};
 

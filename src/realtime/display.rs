@@ -4,9 +4,10 @@ use crate::shaders::{self, LANES};
 use bytemuck::{Pod, Zeroable};
 
 use super::settings::{Settings, Technique};
+use crate::colour::srgb_byte;
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, ComputePipeline, Memory, Recorder};
-use crate::output::png::{Colour, srgb_byte};
+use crate::output::png::Colour;
 
 use crate::tracer::{Push, Tracer};
 

@@ -25,7 +25,7 @@ pub struct Written {
 
 /// Lets `fill` write a file that takes its name once it is complete.
 fn write_buffered(path: &Path, fill: impl FnOnce(&mut dyn Write) -> std::io::Result<()>) -> Result<()> {
-    crate::output::write_atomically(path, |file| {
+    crate::files::write_atomically(path, |file| {
         let mut out = BufWriter::with_capacity(1 << 20, file);
         fill(&mut out)?;
         out.flush()

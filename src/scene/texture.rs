@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, LazyLock};
 
-use crate::output::png::srgb_decode;
+use crate::colour::srgb_decode;
 
 /// What happens outside [0, 1].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

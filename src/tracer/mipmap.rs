@@ -132,7 +132,7 @@ impl Taps {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::output::png::srgb_decode;
+    use crate::colour::srgb_decode;
     use crate::scene::{Filter, Wrap};
 
     fn pyramid(texture: &Texture, texels: Texels) -> Vec<[u16; 4]> {

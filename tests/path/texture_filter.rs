@@ -160,7 +160,7 @@ fn gpu_averages_are_those_of_what_texels_mean() {
     let leaf = |x: u32, y: u32| if (x + y).is_multiple_of(2) { [255, 255, 255, 255] } else { [0, 0, 0, 0] };
     let mut masked = wall(texture(32, 32, leaf), 32.0);
     masked.materials[0].alpha_mode = AlphaMode::Mask { cutoff: 0.5 };
-    let light = f64::from(skylit::output::png::srgb_decode(188.0 / 255.0)) / 2.0;
+    let light = f64::from(skylit::colour::srgb_decode(188.0 / 255.0)) / 2.0;
     let nearest = |mut scene: Scene| {
         scene.textures[0].filter = Filter::Nearest;
         scene

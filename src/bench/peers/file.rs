@@ -155,7 +155,7 @@ impl PeerSpec {
             let path = self.folder.join(source);
             std::fs::read(&path).map_err(|e| format!("{}: {e}", path.display()))?.hash(&mut hash);
         }
-        let cache = crate::gpu::cache_folder().unwrap_or_else(std::env::temp_dir);
+        let cache = crate::files::cache_folder().unwrap_or_else(std::env::temp_dir);
         Ok(cache.join("peers").join(format!("{}-{:016x}", self.name, hash.finish())))
     }
 

@@ -10,6 +10,7 @@ pub use report::{Told, tell};
 
 use super::args::RenderArgs;
 use crate::error::{Error, Result};
+use crate::files;
 use crate::film::Control;
 use crate::film::accumulate::Accumulated;
 use crate::film::record_words;
@@ -68,7 +69,7 @@ pub fn options(args: &RenderArgs, hints: &RenderHints, spp: u32, start: Option<F
 /// # Errors
 /// [`Error::Output`], naming the file.
 pub fn check_writable(args: &RenderArgs, options: &FilmOptions) -> Result<()> {
-    let check = |path: &Path| options.intervals.iter().try_for_each(|&n| output::check_writable(&interval_path(path, n)));
+    let check = |path: &Path| options.intervals.iter().try_for_each(|&n| files::check_writable(&interval_path(path, n)));
     args.output.iter().try_for_each(|path| check(path))
 }
 

@@ -10,6 +10,7 @@ use super::args::{Aov, DEFAULT_SIZE, RenderArgs};
 use super::render::{choose_camera, open};
 use crate::accel::flatten::FlatScene;
 use crate::error::{Error, Result};
+use crate::files;
 use crate::film::camera::CameraRecord;
 use crate::integrators::ao::Hemisphere;
 use crate::integrators::aov;
@@ -48,7 +49,7 @@ pub fn run(args: &RenderArgs, start: Instant) -> Result<(), Failure> {
     shown.check(&settings)?;
     let range = args.frames.range();
     for path in &args.output {
-        output::check_writable(&output::frames::numbered(path, u64::from(range.first))?)?;
+        files::check_writable(&output::frames::numbered(path, u64::from(range.first))?)?;
     }
     interrupt::install();
     let console = args.verbosity.console();

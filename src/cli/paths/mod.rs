@@ -13,8 +13,10 @@ use super::film::{self, Saver};
 use super::render::{aov_channels, choose_camera, open, write_depth};
 use super::report::Seconds;
 use crate::accel::flatten::FlatScene;
+use crate::colour::srgb_decode;
 use crate::denoise::Shot;
 use crate::error::{Error, Result};
+use crate::files;
 use crate::film::accumulate::Accumulated;
 use crate::film::camera::CameraRecord;
 use crate::film::cover::Cover;
@@ -41,7 +43,7 @@ const SKY_ALBEDO: f64 = 0.5;
 /// Loads, renders, writes, reports.
 pub fn run(args: &RenderArgs, start: Instant) -> Result<(), Failure> {
     for path in args.outputs() {
-        output::check_writable(&path)?;
+        files::check_writable(&path)?;
     }
     let denoiser = denoise::choose(args.paths.denoise)?;
     interrupt::install();
@@ -241,7 +243,7 @@ fn picture(image: &Image, args: &RenderArgs) -> Image {
         out.channels.retain(|c| ["R", "G", "B"].contains(&c.name.as_str()));
         for channel in &mut out.channels {
             if let Samples::F32(values) = &mut channel.samples {
-                values.iter_mut().for_each(|v| *v = png::srgb_decode(f(*v)));
+                values.iter_mut().for_each(|v| *v = srgb_decode(f(*v)));
             }
         }
         out

@@ -1,4 +1,6 @@
-//! Files that are there as a whole or not at all.
+//! Writing files so that each is there as a whole or not at all, and the folder for what runs keep.
+//!
+//! A file is written beside its target and renamed, so that a run that is broken off leaves no half-written one.
 
 use std::fs::{self, File, OpenOptions, Permissions};
 use std::io::{self, Seek};
@@ -128,4 +130,10 @@ pub fn write_atomically(path: &Path, write: impl FnOnce(&mut File) -> io::Result
     let mut file = AtomicFile::create(path)?;
     write(file.file()).map_err(|e| file.failed(&e))?;
     file.commit()
+}
+
+/// The folder for what runs keep for later ones: `$XDG_CACHE_HOME/skylit`, or `~/.cache/skylit`; `None` without either variable.
+pub fn cache_folder() -> Option<PathBuf> {
+    let base = std::env::var_os("XDG_CACHE_HOME").map(PathBuf::from).filter(|p| p.is_absolute());
+    base.or_else(|| std::env::var_os("HOME").map(|h| PathBuf::from(h).join(".cache"))).map(|p| p.join("skylit"))
 }
