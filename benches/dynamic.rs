@@ -4,10 +4,10 @@
 use divan::Bencher;
 use divan::counter::ItemsCount;
 use glam::{DAffine3, DVec3, Vec3};
-use skylit::accel::flatten::{FlatScene, Motion};
+use skylit::accel::flatten::FlatScene;
 use skylit::accel::{Aabb, BuildPreset, RefitPlan, Wide, build};
 use skylit::gpu::{Device, Options};
-use skylit::scene::{Geometry, Instance, Mesh, Scene, TriangleMesh};
+use skylit::scene::{Geometry, Instance, Mesh, Motion, Scene, TriangleMesh};
 use skylit::tracer::{Changes, MeshChange, Needs, Tracer, TracerKind};
 
 fn main() {

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use common::{ALL, assert_validation_clean, device, tracers};
 use glam::{DAffine3, DMat3, DQuat, DVec3, Vec3};
 use skylit::Error;
-use skylit::accel::flatten::{FlatScene, Motion};
+use skylit::accel::flatten::FlatScene;
 use skylit::film::NoControl;
 use skylit::gpu::Device;
 use skylit::integrators::rays::{Mode, trace};
@@ -17,7 +17,7 @@ use skylit::oracle::Oracle;
 use skylit::oracle::rounding::Rounding;
 use skylit::ray::{Hit, Ray};
 use skylit::scene::builtin::{by_name, shapes};
-use skylit::scene::{Geometry, Scene};
+use skylit::scene::{Geometry, Motion, Scene};
 use skylit::tracer::{Changes, Kernel, MeshChange, Tracer, TracerKind, UpdateStats};
 
 const RAYS: usize = 40_000;

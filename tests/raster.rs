@@ -9,7 +9,7 @@ use std::sync::Arc;
 use bytemuck::Zeroable;
 use common::{ALL, assert_validation_clean, tracer, tracers};
 use glam::{DAffine3, DMat3, DQuat, DVec3, Vec3};
-use skylit::accel::flatten::{FlatScene, Motion};
+use skylit::accel::flatten::FlatScene;
 use skylit::film::NoControl;
 use skylit::film::block::{Block, BlockParams};
 use skylit::film::camera::CameraRecord;
@@ -19,7 +19,7 @@ use skylit::oracle::Oracle;
 use skylit::oracle::camera::camera_ray;
 use skylit::raster::{Drawn, Primary, Raster, View};
 use skylit::scene::builtin::{by_name, shapes};
-use skylit::scene::{Camera, Geometry, Instance, Mesh, Projection, Scene};
+use skylit::scene::{Camera, Geometry, Instance, Mesh, Motion, Projection, Scene};
 use skylit::tracer::{Changes, MeshChange, Push, Tracer, TracerKind};
 
 const NONE: u32 = u32::MAX;

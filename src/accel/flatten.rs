@@ -8,41 +8,8 @@ use glam::{DAffine3, DVec3, Vec3};
 
 use super::Aabb;
 use super::features::{AlphaClass, Blend, alpha_classes};
-use crate::error::{Error, Result};
-use crate::scene::{AlphaMode, Geometry, Scene, Sphere};
-
-/// What of a scene may change while it is traced ([`crate::tracer::Tracer::update`]). Nothing, by default; and then nothing is kept
-/// for it.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Motion {
-    /// Instances that may move, as indices into [`Scene::instances`].
-    pub instances: Vec<usize>,
-    /// Triangle meshes whose vertices may move, as indices into [`Scene::meshes`].
-    pub meshes: Vec<usize>,
-}
-
-impl Motion {
-    /// Nothing moves.
-    pub fn is_none(&self) -> bool {
-        self.instances.is_empty() && self.meshes.is_empty()
-    }
-
-    fn check(&self, scene: &Scene) -> Result<()> {
-        if let Some(i) = self.instances.iter().find(|&&i| i >= scene.instances.len()) {
-            return Err(Error::Usage(format!("instance {i} cannot move: the scene has {}", scene.instances.len())));
-        }
-        for &m in &self.meshes {
-            match scene.meshes.get(m).map(|mesh| &mesh.geometry) {
-                Some(Geometry::Triangles(_)) => (),
-                Some(Geometry::Spheres(_)) => {
-                    return Err(Error::Usage(format!("mesh {m} cannot deform: it holds spheres; move its instances instead")));
-                }
-                None => return Err(Error::Usage(format!("mesh {m} cannot deform: the scene has {}", scene.meshes.len()))),
-            }
-        }
-        Ok(())
-    }
-}
+use crate::error::Result;
+use crate::scene::{AlphaMode, Geometry, Motion, Scene, Sphere};
 
 /// A mesh within a group.
 #[derive(Clone, Debug)]

@@ -4,7 +4,7 @@ use super::args::DoctorArgs;
 use crate::error::{Error, Result};
 use crate::gpu::{Device, DeviceInfo, Instance, Options, enumerate};
 use crate::terminal::console;
-use crate::tracer::TracerKind;
+use crate::tracer::{TracerKind, TracerNeeds};
 
 /// Prints the table and the verdict; fails when nothing can be rendered here.
 pub fn run(args: &DoctorArgs) -> Result<()> {
@@ -22,7 +22,7 @@ pub fn run(args: &DoctorArgs) -> Result<()> {
     if args.json {
         console::json(&serde_json::json!({
             "version": env!("CARGO_PKG_VERSION"),
-            "devices": devices,
+            "devices": devices.iter().map(DeviceRecord::new).collect::<Vec<_>>(),
             "device": chosen.map(|c| c.0),
             "auto": chosen.map(|c| c.1.name()),
             "verdict": verdict,
@@ -38,6 +38,20 @@ pub fn run(args: &DoctorArgs) -> Result<()> {
     match opened {
         Ok(_) => console::print(&format!("{verdict}\n")),
         Err(e) => Err(e),
+    }
+}
+
+/// A device's record in JSON: what the device reports, and beside it what each tracer needs of it.
+#[derive(serde::Serialize)]
+struct DeviceRecord<'a> {
+    #[serde(flatten)]
+    device: &'a DeviceInfo,
+    tracers: [TracerNeeds; 3],
+}
+
+impl<'a> DeviceRecord<'a> {
+    fn new(device: &'a DeviceInfo) -> Self {
+        Self { device, tracers: TracerKind::ALL.map(|kind| kind.needs(device)) }
     }
 }
 
@@ -71,7 +85,7 @@ fn describe(text: &mut String, d: &DeviceInfo, chosen: Option<(usize, TracerKind
         missing => line(format!("  floor    NOT met: lacks {}; skylit cannot use this device", missing.join(", "))),
     }
     let auto = TracerKind::auto(d);
-    for t in &d.tracers {
+    for t in TracerKind::ALL.map(|kind| kind.needs(d)) {
         let state = if !t.missing.is_empty() {
             format!("no: lacks {}", t.missing.join(", "))
         } else if !d.missing_floor.is_empty() {

@@ -12,7 +12,6 @@ use super::info::{DeviceInfo, enumerate};
 use super::instance::{Instance, ValidationLog, no_driver};
 use super::result::Context;
 use crate::error::{Error, Result};
-use crate::tracer::TracerKind;
 
 /// How to open a device.
 #[derive(Clone, Debug, Default)]
@@ -55,8 +54,8 @@ impl Device {
         info.int64 &= !options.no_int64;
         let queue_family = info.queue_family.ok_or_else(no_driver)?;
 
-        let pipeline = info.supports(TracerKind::Pipeline);
-        let query = info.supports(TracerKind::Query);
+        let pipeline = info.has_ray_tracing_pipelines();
+        let query = info.has_ray_queries();
         let mut extensions = Vec::new();
         let mut f12 = vk::PhysicalDeviceVulkan12Features::default().buffer_device_address(true).host_query_reset(true);
         let mut f13 = vk::PhysicalDeviceVulkan13Features::default()

@@ -8,7 +8,6 @@ use super::image::{DEPTH, IDS};
 use super::instance::Instance;
 use super::result::Context;
 use crate::error::Result;
-use crate::tracer::TracerKind;
 
 /// Limits that matter to skylit.
 #[derive(Clone, Debug, serde::Serialize)]
@@ -74,8 +73,12 @@ pub struct DeviceInfo {
     pub int64: bool,
     /// The device reads host memory as fast as its own.
     pub unified_memory: bool,
-    /// What each tracer needs and does not find here; empty: it runs.
-    pub tracers: Vec<TracerNeeds>,
+    /// bufferDeviceAddress.
+    #[serde(skip)]
+    pub buffer_device_address: bool,
+    /// Extensions of ray tracing.
+    #[serde(skip)]
+    pub ray_tracing: RayTracingExtensions,
     /// What rasterising needs and does not find here; empty: it runs.
     pub missing_raster: Vec<String>,
     /// Limits that matter.
@@ -84,21 +87,33 @@ pub struct DeviceInfo {
     pub(super) queue_family: Option<u32>,
 }
 
-/// What a tracer misses on a device.
-#[derive(Clone, Debug, serde::Serialize)]
-pub struct TracerNeeds {
-    /// Which tracer.
-    pub tracer: TracerKind,
-    /// Extensions and features it needs.
-    pub needs: Vec<String>,
-    /// Those that the device lacks; empty: the tracer runs.
-    pub missing: Vec<String>,
+/// Which extensions of ray tracing a device has, each with the feature that it brings.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct RayTracingExtensions {
+    /// VK_KHR_acceleration_structure.
+    pub acceleration_structure: bool,
+    /// VK_KHR_deferred_host_operations, which VK_KHR_acceleration_structure requires.
+    pub deferred_host_operations: bool,
+    /// VK_KHR_ray_tracing_pipeline.
+    pub ray_tracing_pipeline: bool,
+    /// VK_KHR_ray_query.
+    pub ray_query: bool,
 }
 
 impl DeviceInfo {
-    /// Can this tracer run here?
-    pub fn supports(&self, tracer: TracerKind) -> bool {
-        self.missing_floor.is_empty() && self.tracers.iter().any(|t| t.tracer == tracer && t.missing.is_empty())
+    /// Is everything here that VK_KHR_ray_tracing_pipeline is used with?
+    pub(super) fn has_ray_tracing_pipelines(&self) -> bool {
+        self.has_acceleration_structures() && self.ray_tracing.ray_tracing_pipeline
+    }
+
+    /// Is everything here that VK_KHR_ray_query is used with?
+    pub(super) fn has_ray_queries(&self) -> bool {
+        self.has_acceleration_structures() && self.ray_tracing.ray_query
+    }
+
+    fn has_acceleration_structures(&self) -> bool {
+        let extensions = &self.ray_tracing;
+        self.missing_floor.is_empty() && extensions.acceleration_structure && extensions.deferred_host_operations
     }
 
     /// Can it rasterise? Devices for computing alone cannot.
@@ -238,24 +253,12 @@ fn describe(instance: &Instance, index: usize, physical: vk::PhysicalDevice) -> 
     ];
     let missing_raster = missing_raster.iter().filter(|n| !n.0).map(|n| n.1.to_owned()).collect();
 
-    let structure_needs = [
-        ("VK_KHR_acceleration_structure", f_structure.acceleration_structure == vk::TRUE),
-        ("VK_KHR_deferred_host_operations", has(khr::deferred_host_operations::NAME)),
-    ];
-    let needs = |tracer: TracerKind, list: &[(&str, bool)]| TracerNeeds {
-        tracer,
-        needs: list.iter().map(|n| n.0.to_owned()).collect(),
-        missing: list.iter().filter(|n| !n.1).map(|n| n.0.to_owned()).collect(),
+    let ray_tracing = RayTracingExtensions {
+        acceleration_structure: f_structure.acceleration_structure == vk::TRUE,
+        deferred_host_operations: has(khr::deferred_host_operations::NAME),
+        ray_tracing_pipeline: f_pipeline.ray_tracing_pipeline == vk::TRUE,
+        ray_query: f_query.ray_query == vk::TRUE,
     };
-    let with_structure = |own: (&'static str, bool)| [own, structure_needs[0], structure_needs[1]];
-    let tracers = vec![
-        needs(
-            TracerKind::Pipeline,
-            &with_structure(("VK_KHR_ray_tracing_pipeline", f_pipeline.ray_tracing_pipeline == vk::TRUE)),
-        ),
-        needs(TracerKind::Query, &with_structure(("VK_KHR_ray_query", f_query.ray_query == vk::TRUE))),
-        needs(TracerKind::Compute, &[("bufferDeviceAddress", vulkan13 && f12.buffer_device_address == vk::TRUE)]),
-    ];
 
     let memory = unsafe { raw.get_physical_device_memory_properties(physical) };
     let heaps = &memory.memory_heaps[..memory.memory_heap_count as usize];
@@ -288,7 +291,8 @@ fn describe(instance: &Instance, index: usize, physical: vk::PhysicalDevice) -> 
         missing_floor,
         int64,
         unified_memory: matches!(kind, "cpu" | "integrated"),
-        tracers,
+        buffer_device_address: vulkan13 && f12.buffer_device_address == vk::TRUE,
+        ray_tracing,
         missing_raster,
         limits: Limits {
             subgroup_size: v11.subgroup_size,

@@ -24,6 +24,6 @@ pub use device::{Device, Options};
 pub use drawing::Drawing;
 pub use graphics_pipeline::{Cull, GraphicsPipeline};
 pub use image::{Image, Targets};
-pub use info::{DeviceInfo, Limits, TracerNeeds, enumerate};
+pub use info::{DeviceInfo, Limits, RayTracingExtensions, enumerate};
 pub use instance::Instance;
 pub use pipeline::{ComputePipeline, HitShaders, RayTracingPipeline, Specialization};

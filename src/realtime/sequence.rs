@@ -1,10 +1,9 @@
 //! A scene and a camera over time, frame by frame.
 
-use crate::accel::flatten::Motion;
 use crate::error::{Error, Result};
 use crate::scene::animation::{Playback, Pose, Rig};
 use crate::scene::camera_path::CameraPath;
-use crate::scene::{Camera, Orbit, Scene};
+use crate::scene::{Camera, Motion, Orbit, Scene};
 use crate::tracer::{Tracer, UpdateStats};
 
 /// How the camera moves besides what an animation does with it.

@@ -14,6 +14,7 @@ pub mod light;
 pub mod load;
 pub mod material;
 pub mod mesh;
+pub mod motion;
 pub mod orbit;
 pub mod texture;
 
@@ -23,6 +24,7 @@ pub use camera_path::CameraPath;
 pub use light::{Environment, EnvironmentMap, Light, LightKind};
 pub use material::{AlphaMode, Material, TextureSlot};
 pub use mesh::{Geometry, Mesh, Sphere, TriangleMesh};
+pub use motion::Motion;
 pub use orbit::Orbit;
 pub use texture::{Filter, TexelData, Texture, Wrap};
 

@@ -1,6 +1,6 @@
 //! Scenes that change while they are traced: instances move, meshes deform, the rest stays where it is.
 //!
-//! What may change is said when the scene is flattened ([`crate::accel::flatten::Motion`]); [`Tracer::update`] takes what did. The compute tracer refits
+//! What may change is said when the scene is flattened ([`crate::scene::Motion`]); [`Tracer::update`] takes what did. The compute tracer refits
 //! its hierarchies on the host or builds them anew (`dynamic_trees.rs`), the hardware tracers have the driver do so (`hardware.rs`). A tracer of
 //! a scene that never changes has nothing of this.
 
@@ -236,7 +236,7 @@ impl Tracer {
     /// nothing may be tracing meanwhile. The origin stays where it was: a scene that wanders far off loses precision.
     ///
     /// # Errors
-    /// [`Error::Usage`] when something was not announced in [`crate::accel::flatten::Motion`]; [`Error::Scene`] for numbers that are not finite,
+    /// [`Error::Usage`] when something was not announced in [`crate::scene::Motion`]; [`Error::Scene`] for numbers that are not finite,
     /// wrong counts and transforms that cannot be inverted. After these two nothing has changed. [`Error::OutOfMemory`],
     /// [`Error::Vulkan`], [`Error::DeviceLost`]: the tracer must not be used any more.
     pub fn update(&mut self, changes: &Changes) -> Result<UpdateStats> {

@@ -13,6 +13,7 @@ mod dynamic_trees;
 pub mod gpu_scene;
 mod hardware;
 mod kernel;
+mod kind;
 mod mipmap;
 mod motion;
 mod prepared;
@@ -30,63 +31,16 @@ pub use drawable::Drawable;
 pub use dynamic::{Changes, MeshChange, Moved, UpdateStats};
 pub use gpu_scene::Needs;
 pub use kernel::{BuildOptions, ComputeOptions, Kernel, TriangleTest};
+pub use kind::{TracerKind, TracerNeeds};
 pub use stream::{Push, Stream};
 
 use crate::accel::features::SceneFeatures;
 use crate::accel::flatten::FlatScene;
 use crate::error::{Error, Result};
-use crate::gpu::{ComputePipeline, Device, DeviceInfo, Specialization};
+use crate::gpu::{ComputePipeline, Device, Specialization};
 use crate::shaders::{Mode, StreamShaders};
 use gpu_scene::GpuScene;
 use prepared::{Prepared, Recipe};
-
-/// Which tracer runs the streams.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum TracerKind {
-    /// VK_KHR_ray_tracing_pipeline.
-    Pipeline,
-    /// VK_KHR_ray_query in compute shaders.
-    Query,
-    /// Compute shaders over our own hierarchy.
-    Compute,
-}
-
-impl TracerKind {
-    /// All of them, in the order in which they are listed to users.
-    pub const ALL: [TracerKind; 3] = [TracerKind::Pipeline, TracerKind::Query, TracerKind::Compute];
-
-    /// As on the command line.
-    pub fn name(self) -> &'static str {
-        match self {
-            TracerKind::Pipeline => "pipeline",
-            TracerKind::Query => "query",
-            TracerKind::Compute => "compute",
-        }
-    }
-
-    /// What `auto` means on a device, and why.
-    pub fn auto(info: &DeviceInfo) -> (TracerKind, String) {
-        if info.is_cpu() {
-            (
-                TracerKind::Compute,
-                "the device is a CPU: its ray-tracing extensions, where it has them, are slower than our own hierarchy".into(),
-            )
-        } else if info.supports(TracerKind::Pipeline) {
-            (TracerKind::Pipeline, "the device has VK_KHR_ray_tracing_pipeline".into())
-        } else if info.supports(TracerKind::Query) {
-            (TracerKind::Query, "the device has VK_KHR_ray_query but no ray-tracing pipelines".into())
-        } else {
-            (TracerKind::Compute, "the device has no ray-tracing extension".into())
-        }
-    }
-}
-
-impl std::fmt::Display for TracerKind {
-    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
-        f.write_str(self.name())
-    }
-}
 
 /// What making a tracer's structures took.
 #[derive(Clone, Copy, Debug, Default, serde::Serialize)]
@@ -145,7 +99,7 @@ pub struct Tracer {
 }
 
 impl Tracer {
-    /// Uploads a scene and builds what `kind` traces. If the scene was flattened with [`crate::accel::flatten::Motion`], the tracer
+    /// Uploads a scene and builds what `kind` traces. If the scene was flattened with [`crate::scene::Motion`], the tracer
     /// can be brought up to date ([`Tracer::update`]).
     ///
     /// # Errors
@@ -176,9 +130,8 @@ impl Tracer {
         options: ComputeOptions,
         build: &BuildOptions,
     ) -> Result<Self> {
-        if !device.info.supports(kind) {
-            let missing =
-                device.info.tracers.iter().find(|t| t.tracer == kind).map(|t| t.missing.join(", ")).unwrap_or_default();
+        if !kind.is_supported_by(&device.info) {
+            let missing = kind.needs(&device.info).missing.join(", ");
             return Err(Error::Device(format!(
                 "tracer '{kind}' needs {missing}, which '{}' ({}) lacks; use --tracer auto, or see `skylit doctor`",
                 device.info.name, device.info.driver

@@ -28,7 +28,7 @@ pub fn open(options: Options) -> Arc<Device> {
 
 /// The tracers that this device runs. `SKYLIT_EXPECT_TRACERS=pipeline,query,compute` makes a missing one a failure.
 pub fn tracers(device: &Device) -> Vec<TracerKind> {
-    let there: Vec<_> = TracerKind::ALL.into_iter().filter(|&k| device.info.supports(k)).collect();
+    let there: Vec<_> = TracerKind::ALL.into_iter().filter(|&k| k.is_supported_by(&device.info)).collect();
     if let Ok(expected) = std::env::var("SKYLIT_EXPECT_TRACERS") {
         for name in expected.split(',').filter(|n| !n.is_empty()) {
             assert!(

@@ -1,14 +1,14 @@
 //! The reference work's pipeline as it was: half the size, no occlusion where light is, half of the frame before, two patterns in turn.
 
 use glam::{DAffine3, DVec3};
-use skylit::accel::flatten::{FlatScene, Motion};
+use skylit::accel::flatten::FlatScene;
 use skylit::film::NoControl;
 use skylit::film::camera::CameraRecord;
 use skylit::integrators::aov;
 use skylit::oracle::{Oracle, OracleRay};
 use skylit::realtime::{Preset, Realtime, Settings};
 use skylit::scene::builtin::shapes;
-use skylit::scene::{Camera, Scene};
+use skylit::scene::{Camera, Motion, Scene};
 use skylit::tracer::{Changes, Tracer, TracerKind};
 
 use crate::common::{ALL, assert_validation_clean, device, tracers};

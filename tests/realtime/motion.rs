@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use glam::{DAffine3, DQuat, DVec3};
-use skylit::accel::flatten::{FlatScene, Motion};
+use skylit::accel::flatten::FlatScene;
 use skylit::film::NoControl;
 use skylit::film::camera::CameraRecord;
 use skylit::gpu::Device;
@@ -14,7 +14,7 @@ use skylit::realtime::{Preset, Realtime, Settings};
 use skylit::sampling::Sequence;
 use skylit::scene::animation::{Playback, Pose};
 use skylit::scene::builtin::shapes;
-use skylit::scene::{Camera, Scene};
+use skylit::scene::{Camera, Motion, Scene};
 use skylit::tracer::{Changes, Tracer, TracerKind};
 
 use crate::common::{ALL, assert_validation_clean, device, tracers};

@@ -5,11 +5,11 @@ use glam::{DAffine3, Vec3};
 
 use super::session::AoSession;
 use super::table;
-use crate::accel::flatten::{FlatScene, Motion};
+use crate::accel::flatten::FlatScene;
 use crate::bench::record::ao::StructureRecord;
 use crate::error::{Error, Result};
 use crate::measure::stats::Spread;
-use crate::scene::{Geometry, load};
+use crate::scene::{Geometry, Motion, load};
 use crate::terminal::interrupt;
 use crate::tracer::{Changes, MeshChange, Tracer};
 

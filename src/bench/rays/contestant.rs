@@ -45,7 +45,7 @@ pub const KERNELS: [OwnKernel; 7] = [
 impl OwnKernel {
     /// Does it take part on this device and scene? `named`: the user asked for it.
     pub fn takes_part(&self, info: &DeviceInfo, flat: &FlatScene, named: bool) -> Result<(), String> {
-        if !info.supports(self.tracer) {
+        if !self.tracer.is_supported_by(info) {
             return Err("the device does not have what it needs (`skylit doctor`)".into());
         }
         if self.kernel == Kernel::Packet && !info.packets() {

@@ -3,7 +3,7 @@
 //!
 //! [`Parts`] is the description, [`Rig`] the same once it is known to be sound and tied to a scene. A scene of which nothing can
 //! move has no rig. Playing goes in two steps: [`Rig::motion`] says once what an animation will change, so that tracers keep only
-//! that ready ([`crate::accel::flatten::FlatScene::with_motion`]); [`Rig::pose`] gives the state at a time, as often as wanted.
+//! that ready ([`super::Motion`]); [`Rig::pose`] gives the state at a time, as often as wanted.
 //!
 //! Matrices are composed in f64 and vertices are rounded to f32 at the end. A skinned mesh lies in world space, as glTF wants it; its
 //! instance only has a translation, which is zero unless the skeleton stands far from the origin.

@@ -4,10 +4,9 @@ use glam::{DAffine3, DVec3};
 
 use super::transform::{anchor, at_least};
 use super::{Animation, Deformation, Local, Property, Rig, Shape};
-use crate::accel::flatten::Motion;
 use crate::error::{Error, Result};
 use crate::scene::camera::rigid;
-use crate::scene::{Geometry, Scene};
+use crate::scene::{Geometry, Motion, Scene};
 
 /// What happens beyond an animation's end.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

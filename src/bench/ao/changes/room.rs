@@ -3,7 +3,7 @@
 use glam::{DAffine3, DVec3};
 
 use super::script::{Advance, ChangeScript};
-use crate::accel::flatten::Motion;
+use crate::scene::Motion;
 use crate::scene::builtin::shapes;
 use crate::scene::{Camera, Geometry, Instance, Material, Mesh, Projection, Scene};
 use crate::tracer::Changes;

@@ -1,12 +1,11 @@
 //! A scene over time: anything that can bring a tracer to a frame.
 
-use crate::accel::flatten::Motion;
 use crate::bench::ao::scenes::REACH;
 use crate::error::Result;
 use crate::film::camera::{self, Choice};
 use crate::realtime::sequence::{CameraMotion, Sequence};
 use crate::scene::animation::Rig;
-use crate::scene::{Camera, Scene};
+use crate::scene::{Camera, Motion, Scene};
 use crate::tracer::{Tracer, UpdateStats};
 
 /// Brings the tracer to a frame. Frames need not come in order.

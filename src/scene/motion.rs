@@ -1,0 +1,37 @@
+//! What of a scene may change, said before it is traced.
+
+use super::{Geometry, Scene};
+use crate::error::{Error, Result};
+
+/// What of a scene may change while it is traced. Nothing, by default; and then nothing is kept for it.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Motion {
+    /// Instances that may move, as indices into [`Scene::instances`].
+    pub instances: Vec<usize>,
+    /// Triangle meshes whose vertices may move, as indices into [`Scene::meshes`].
+    pub meshes: Vec<usize>,
+}
+
+impl Motion {
+    /// Nothing moves.
+    pub fn is_none(&self) -> bool {
+        self.instances.is_empty() && self.meshes.is_empty()
+    }
+
+    /// Fails for instances and meshes that the scene does not have, and for spheres, which do not deform.
+    pub(crate) fn check(&self, scene: &Scene) -> Result<()> {
+        if let Some(i) = self.instances.iter().find(|&&i| i >= scene.instances.len()) {
+            return Err(Error::Usage(format!("instance {i} cannot move: the scene has {}", scene.instances.len())));
+        }
+        for &m in &self.meshes {
+            match scene.meshes.get(m).map(|mesh| &mesh.geometry) {
+                Some(Geometry::Triangles(_)) => (),
+                Some(Geometry::Spheres(_)) => {
+                    return Err(Error::Usage(format!("mesh {m} cannot deform: it holds spheres; move its instances instead")));
+                }
+                None => return Err(Error::Usage(format!("mesh {m} cannot deform: the scene has {}", scene.meshes.len()))),
+            }
+        }
+        Ok(())
+    }
+}
