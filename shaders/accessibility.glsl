@@ -1,6 +1,6 @@
-// accessibility: the occlusion rays of a frame. From the surface of each pixel that is sampled in this frame they go over the
-// cosine-weighted hemisphere (pbrt-v4's AOIntegrator). Pixels that show nothing have none, and neither have those that know enough
+// accessibility: the occlusion rays of a frame (ao/sample.glsl), from the surface of each pixel that is sampled in this frame. Pixels that show nothing have none, and neither have those that know enough
 // while nothing moves. Built twice: with a falloff the nearest hit counts by its distance, without one any hit will do.
+#include "ao/sample.glsl"
 #include "common/occlusion.glsl"
 
 Ray ray(uint index) {
@@ -22,9 +22,7 @@ Ray ray(uint index) {
     claim(f.ray_count);
     vec3 ng = surface_normal(f, at);
     vec3 w = occlusion_direction(f, pixel, at, ng, k);
-    // about a shading normal some directions are below the surface: they start there, and meet its inside
-    float side = dot(ng, w) < 0.0 ? -1.0 : 1.0;
-    return Ray(surface_position(f, at) + ng * (side * spawn_offset_at(f, at)), 0.0, w, f.reach);
+    return occlusion_ray(surface_position(f, at), spawn_offset_at(f, at), ng, w, f.reach);
 }
 
 void add_sample(uint index, float accessibility) {
@@ -55,6 +53,6 @@ void any(uint index, bool occluded) {
 }
 #else
 void closest(uint index, Hit hit) {
-    add_sample(index, is_hit(hit) ? 1.0 - exp2(-hit.t * FrameParams(push.pass).falloff_log2) : 1.0);
+    add_sample(index, 1.0 - occlusion_of(FrameParams(push.pass).falloff_log2, hit));
 }
 #endif

@@ -4,12 +4,6 @@
 
 layout(buffer_reference, std430, buffer_reference_align = 16) writeonly buffer Aov { uvec4 v[]; };
 
-Ray centre_ray(BlockParams p, uint index) {
-    uvec2 pixel = block_pixel(p, pixel_index(index));
-    if (!in_block(p, pixel)) return no_ray();
-    return camera_ray(p, vec2(pixel + p.block_origin) + 0.5);
-}
-
 Ray ray(uint index) {
     return centre_ray(BlockParams(push.pass), index);
 }

@@ -1,9 +1,10 @@
 // display: a buffer of the frame as it is shown: a word a pixel, red in the lowest byte, 8-bit sRGB, opaque.
 //
 // Every buffer becomes a linear colour first, is brightened by the exposure, and is then encoded. The bytes are those of
-// src/output/png.rs on any device: a driver's own power function only guesses a byte, and the smallest values that the host encodes as
+// src/colour.rs on any device: a driver's own power function only guesses a byte, and the smallest values that the host encodes as
 // this byte and the next decide.
 #include "common/frame.glsl"
+#include "common/srgb.glsl"
 
 layout(local_size_x = LANES) in;
 
@@ -36,7 +37,7 @@ uint srgb_byte(uvec2 thresholds, float linear) {
     // also what is not a number
     if (!(linear > 0.0)) return 0u;
     if (linear >= 1.0) return 255u;
-    float coded = linear <= 0.0031308 ? 12.92 * linear : 1.055 * pow(linear, 1.0 / 2.4) - 0.055;
+    float coded = srgb_encode(linear);
     uint byte = min(uint(255.0 * max(coded, 0.0) + 0.5), 255u);
     Floats smallest = Floats(thresholds);
     if (linear < smallest.v[byte]) return byte - 1u;

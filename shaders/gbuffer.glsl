@@ -1,13 +1,7 @@
 // gbuffer: one camera ray through each pixel's centre; what it meets is kept for the passes of the frame that follow.
-#include "common/camera.glsl"
+#include "ao/hemisphere.glsl"
 #include "common/frame.glsl"
 #include "scene/motion.glsl"
-
-Ray centre_ray(BlockParams p, uint index) {
-    uvec2 pixel = block_pixel(p, pixel_index(index));
-    if (!in_block(p, pixel)) return no_ray();
-    return camera_ray(p, vec2(pixel + p.block_origin) + 0.5);
-}
 
 Ray ray(uint index) {
     return centre_ray(BlockParams(push.pass), index);
@@ -27,18 +21,15 @@ void closest(uint index, Hit hit) {
     Surface s = surface_at(HAS_SPHERES ? centre_ray(p, index) : no_ray(), hit);
     vec4 back = f.world_to_camera[2];
     float depth = -(dot(back.xyz, s.position) + back.w);
-    // the side that the viewer sees
-    float facing = dot(s.ng, view_direction(p, s.position)) > 0.0 ? -1.0 : 1.0;
-    vec3 ng = facing * s.ng;
-    vec3 axis = p.hemisphere != 0u ? facing * s.ns : ng;
-    STORE_PAIR(f.guide, at, make_guide(depth, ng, hit.instance));
+    Hemisphere h = hemisphere_at(p, s);
+    STORE_PAIR(f.guide, at, make_guide(depth, h.ng, hit.instance));
     STORE_PAIR(f.surface, 4u * at, floatBitsToUint(s.position.xy));
     STORE_PAIR(f.surface, 4u * at + 1u, floatBitsToUint(vec2(s.position.z, s.offset)));
-    STORE_PAIR(f.surface, 4u * at + 2u, floatBitsToUint(ng.xy));
-    STORE_PAIR(f.surface, 4u * at + 3u, floatBitsToUint(vec2(ng.z, 0.0)));
+    STORE_PAIR(f.surface, 4u * at + 2u, floatBitsToUint(h.ng.xy));
+    STORE_PAIR(f.surface, 4u * at + 3u, floatBitsToUint(vec2(h.ng.z, 0.0)));
     if (p.hemisphere != 0u) {
         FloatImage axes = FloatImage(f.axes);
-        for (uint k = 0u; k < 3u; k++) axes.v[3u * at + k] = axis[k];
+        for (uint k = 0u; k < 3u; k++) axes.v[3u * at + k] = h.axis[k];
     }
     if (!is_null(f.previous_position)) {
         vec3 before = previous_position(hit, s);

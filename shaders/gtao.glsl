@@ -2,12 +2,13 @@
 // Real-Time Strategies for Accurate Indirect Occlusion", SIGGRAPH 2016 courses. In each of a few slices through the view ray the
 // horizons on both sides are searched, and the cosine-weighted arc between them is integrated in closed form. What the image does not
 // show does not occlude.
+#include "ao/sample.glsl"
 #include "common/frame.glsl"
 #include "common/sequence.glsl"
+#include "common/warp.glsl"
 
 layout(local_size_x = LANES) in;
 
-const float PI = 3.14159265359;
 // The first step leaves the pixel itself, pixels.
 const float MIN_STEP = 1.3;
 // Sine of the angle above a surface's plane from which on something stands on it.
@@ -21,7 +22,7 @@ float arc(float cos_n, float n, float h) {
 float weight(FrameParams f, float d) {
     // the binary radius is not cut sharply: depth images are too coarse for that
     float edge = f.reach < INFINITY ? clamp((f.reach - d) / (0.2 * f.reach), 0.0, 1.0) : 1.0;
-    return edge * exp2(-d * f.falloff_log2);
+    return edge * occlusion_at(f.falloff_log2, d);
 }
 
 // How far it is from a point of the image to its border, pixels.

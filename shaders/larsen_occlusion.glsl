@@ -1,5 +1,6 @@
 // larsen_occlusion: 64 rays per pixel of an image of half the size per axis, where no light is visible; nearest hits, whatever the
 // falloff.
+#include "ao/sample.glsl"
 #include "common/larsen.glsl"
 #include "common/warp.glsl"
 
@@ -46,5 +47,5 @@ Ray ray(uint index) {
 
 void closest(uint index, Hit hit) {
     LarsenParams l = LarsenParams(push.pass);
-    FloatImage(l.samples).v[index - push.first] = is_hit(hit) ? exp2(-hit.t * FrameParams(l.frame).falloff_log2) : 0.0;
+    FloatImage(l.samples).v[index - push.first] = occlusion_of(FrameParams(l.frame).falloff_log2, hit);
 }

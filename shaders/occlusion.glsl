@@ -1,5 +1,6 @@
 // occlusion: the rays that `primary` left in the queue; says what each sample adds to its pixel. Built twice: with a falloff the
 // nearest hit counts by its distance, without one any hit will do.
+#include "ao/sample.glsl"
 #include "common/camera.glsl"
 
 layout(buffer_reference, std430, buffer_reference_align = 4) writeonly buffer Samples { float v[]; };
@@ -20,6 +21,6 @@ void any(uint index, bool occluded) {
 }
 #else
 void closest(uint index, Hit hit) {
-    add_sample(index, is_hit(hit) ? exp2(-hit.t * BlockParams(push.pass).falloff_log2) : 0.0);
+    add_sample(index, occlusion_of(BlockParams(push.pass).falloff_log2, hit));
 }
 #endif

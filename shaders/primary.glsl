@@ -1,9 +1,9 @@
 // primary: one camera ray per sample, jittered within its pixel; where it meets the scene, the occlusion ray that leaves from
-// there is appended to the queue: one over the cosine-weighted hemisphere (pbrt-v4's AOIntegrator). A sample that meets nothing
+// there is appended to the queue (ao/sample.glsl). A sample that meets nothing
 // costs nothing from here on.
-#include "common/camera.glsl"
+#include "ao/hemisphere.glsl"
+#include "ao/sample.glsl"
 #include "common/warp.glsl"
-#include "scene/surface.glsl"
 
 // The index is of the block.
 Ray camera_sample(BlockParams p, uint index) {
@@ -20,16 +20,11 @@ Ray ray(uint index) {
     return r;
 }
 
-Ray occlusion_ray(BlockParams p, uint index, Surface s) {
-    // the side that the viewer sees; ns is on the side of ng
-    float facing = dot(s.ng, view_direction(p, s.position)) > 0.0 ? -1.0 : 1.0;
-    vec3 ng = facing * s.ng;
-    vec3 axis = p.hemisphere != 0u ? facing * s.ns : ng;
+Ray sample_occlusion(BlockParams p, uint index, Surface s) {
+    Hemisphere h = hemisphere_at(p, s);
     uvec2 pixel = block_pixel(p, pixel_index(index)) + p.block_origin;
-    vec3 w = to_world(axis, cosine_hemisphere(sample_2d(p.seed, pixel, sample_index(index), AO_DIRECTION)));
-    // about a shading normal some directions are below the surface: they start there, and meet its inside
-    float side = dot(ng, w) < 0.0 ? -1.0 : 1.0;
-    return Ray(s.position + ng * (side * s.offset), 0.0, w, p.radius);
+    vec3 w = to_world(h.axis, cosine_hemisphere(sample_2d(p.seed, pixel, sample_index(index), AO_DIRECTION)));
+    return occlusion_ray(s.position, s.offset, h.ng, w, p.radius);
 }
 
 void closest(uint index, Hit hit) {
@@ -40,7 +35,7 @@ void closest(uint index, Hit hit) {
     }
     // the point on a triangle follows from its corners; only a sphere asks for the ray again
     Surface s = surface_at(HAS_SPHERES ? camera_sample(p, index) : no_ray(), hit);
-    Ray r = occlusion_ray(p, index, s);
+    Ray r = sample_occlusion(p, index, s);
     dump_ray(p.occlusion_dump, index, r);
     append_ray(p.queue, r, index - push.first);
 }

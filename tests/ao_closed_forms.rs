@@ -122,7 +122,7 @@ fn on_plane(ray: &OracleRay, point: DVec3, normal: DVec3) -> Option<DVec3> {
 /// A falloff hit that is not traced for because it is beyond [`AoOptions::reach`] counts nothing: closed forms with falloff get
 /// that as their radius.
 fn reach(falloff: f64) -> f64 {
-    AoOptions { falloff, ..Default::default() }.reach()
+    AoOptions { falloff, ..Default::default() }.attenuation().reach()
 }
 
 #[test]

@@ -44,7 +44,7 @@ fn render(tracer: &Tracer, scene: &Scene, camera: &Camera, options: &AoOptions) 
 
 fn settings(options: &AoOptions) -> AoSettings {
     // what is beyond the reach is not traced for
-    AoSettings { radius: options.reach(), falloff: options.falloff }
+    AoSettings { radius: options.attenuation().reach(), falloff: options.falloff }
 }
 
 // --- the sampler ---

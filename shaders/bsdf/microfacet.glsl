@@ -7,7 +7,6 @@
 #define BSDF_MICROFACET
 #include "common/warp.glsl"
 
-const float PI = 3.14159265358979;
 // Below this the lobe is narrower than single precision can hold: it counts as a perfect mirror. A roughness of 1 / 255, the least of an 8-bit
 // texture, has an alpha of 1.5e-5.
 const float MIN_ALPHA = 1e-5;

@@ -2,6 +2,7 @@
 #ifndef COMMON_CAMERA
 #define COMMON_CAMERA
 #include "common/types.glsl"
+#include "common/morton.glsl"
 #include "common/queue.glsl"
 #include "common/sampler.glsl"
 
@@ -42,9 +43,7 @@ uint sample_index(uint ray_index) {
 uvec2 block_pixel(BlockParams p, uint pixel) {
     uint tile = pixel >> 6;
     if (!is_null(p.tiles)) tile = Words(p.tiles).v[tile];
-    uint k = pixel & 63u;
-    uvec2 inside = uvec2((k & 1u) | (k >> 1 & 2u) | (k >> 2 & 4u), (k >> 1 & 1u) | (k >> 2 & 2u) | (k >> 3 & 4u));
-    return uvec2(tile % p.tiles_x, tile / p.tiles_x) * 8u + inside;
+    return tile_pixel(tile, p.tiles_x, pixel & 63u);
 }
 
 bool in_block(BlockParams p, uvec2 pixel) {
@@ -63,6 +62,13 @@ Ray camera_ray(BlockParams p, vec2 at) {
     }
     vec3 d = vec3(plane, -1.0);
     return Ray(eye, 0.0, normalize(vec3(dot(rows[0].xyz, d), dot(rows[1].xyz, d), dot(rows[2].xyz, d))), INFINITY);
+}
+
+// Ray of an index through the centre of its pixel; none for padding.
+Ray centre_ray(BlockParams p, uint ray_index) {
+    uvec2 pixel = block_pixel(p, pixel_index(ray_index));
+    if (!in_block(p, pixel)) return no_ray();
+    return camera_ray(p, vec2(pixel + p.block_origin) + 0.5);
 }
 
 // From the camera towards a point, of any length.

@@ -1,6 +1,20 @@
-// Sums over the samples of a pixel. They are compensated (Kahan 1965): a million samples keep their digits.
+// The film on the device, and the pass that adds the samples of a launch to it, a thread a pixel, in the order of the samples: sums do not depend on how
+// the samples were cut into launches, nor on which of them was traced first.
+//
+// Who includes this defines CHANNELS, the values of a pixel, and `add_sample`. Sums are compensated (Kahan 1965): a million samples keep their digits.
 #ifndef COMMON_FILM
 #define COMMON_FILM
+#include "common/camera.glsl"
+
+layout(local_size_x = LANES) in;
+
+struct FilmPixel {
+    vec2 sum[CHANNELS];          // of each channel, and its compensation
+    vec2 sum_squares[CHANNELS];  // likewise
+    uint covered;                // samples whose camera ray met something; what the others add, `add_sample` says
+    uint not_finite;             // samples that were left out
+};
+layout(buffer_reference, std430, buffer_reference_align = 8) buffer Film { FilmPixel v[]; };
 
 // x: sum, y: what it has too much.
 vec2 kahan_add(vec2 sum, float x) {
@@ -9,6 +23,28 @@ vec2 kahan_add(vec2 sum, float x) {
     precise float c = t - sum.x;
     precise float compensation = c - y;
     return vec2(t, compensation);
+}
+
+void add_value(inout FilmPixel pixel, uint channel, float value) {
+    pixel.sum[channel] = kahan_add(pixel.sum[channel], value);
+    pixel.sum_squares[channel] = kahan_add(pixel.sum_squares[channel], value * value);
+}
+
+// Adds sample k of the launch to its pixel. Returns whether that changed the pixel.
+bool add_sample(inout FilmPixel pixel, BlockParams p, uint k);
+
+void main() {
+    uint k = gl_GlobalInvocationID.x;
+    if (k >= push.count >> push.sample_bits) return;
+    BlockParams p = BlockParams(push.pass);
+    Film film = Film(p.film);
+    uint at = pixel_index(push.first) + k;
+    FilmPixel pixel = film.v[at];
+    bool changed = false;
+    for (uint s = 0u; s < 1u << push.sample_bits; s++) {
+        if (add_sample(pixel, p, (k << push.sample_bits) + s)) changed = true;
+    }
+    if (changed) film.v[at] = pixel;
 }
 
 #endif

@@ -10,6 +10,7 @@
 #ifndef COMMON_FRAME
 #define COMMON_FRAME
 #include "common/types.glsl"
+#include "common/morton.glsl"
 #include "common/queue.glsl"
 
 layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer FrameParams {
@@ -75,12 +76,9 @@ void store_vec3(uvec2 image, uint at, vec3 value) {
     for (uint k = 0u; k < 3u; k++) target.v[3u * at + k] = value[k];
 }
 
-// Pixel of a place in the tile order of src/render/block.rs.
+// Pixel of an index that counts the image's tiles of 8x8.
 uvec2 tile_pixel(FrameParams f, uint k) {
-    uint tile = k >> 6;
-    uint j = k & 63u;
-    uvec2 inside = uvec2((j & 1u) | (j >> 1 & 2u) | (j >> 2 & 4u), (j >> 1 & 1u) | (j >> 2 & 2u) | (j >> 3 & 4u));
-    return uvec2(tile % f.tiles_x, tile / f.tiles_x) * 8u + inside;
+    return tile_pixel(k >> 6, f.tiles_x, k & 63u);
 }
 
 uint image_index(FrameParams f, uvec2 pixel) {

@@ -31,9 +31,7 @@ const float LARSEN_REACH = 100.0;
 
 // Pixels of an image in 8x8 tiles.
 uvec2 larsen_pixel(uvec2 size, uint k) {
-    uint tile = k >> 6, tiles_x = (size.x + 7u) / 8u, j = k & 63u;
-    uvec2 inside = uvec2((j & 1u) | (j >> 1 & 2u) | (j >> 2 & 4u), (j >> 1 & 1u) | (j >> 2 & 2u) | (j >> 3 & 4u));
-    return uvec2(tile % tiles_x, tile / tiles_x) * 8u + inside;
+    return tile_pixel(k >> 6, (size.x + 7u) / 8u, k & 63u);
 }
 
 // Position 0 means that nothing is there; so does a surface that happens to lie there.

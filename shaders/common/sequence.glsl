@@ -2,6 +2,7 @@
 // which cites the papers.
 #ifndef COMMON_SEQUENCE
 #define COMMON_SEQUENCE
+#include "common/morton.glsl"
 #include "common/sampler.glsl"
 
 const uint SEQUENCE_WHITE = 0u;
@@ -12,18 +13,6 @@ const uint SEQUENCE_R2 = 4u;
 
 // 2^32 / g and 2^32 / g^2, g = 1.3247... the plastic number
 const uvec2 R2_STEP = uvec2(3242174889u, 2447445414u);
-
-uint spread_bits(uint x) {
-    x &= 0xffffu;
-    x = (x | x << 8) & 0x00ff00ffu;
-    x = (x | x << 4) & 0x0f0f0f0fu;
-    x = (x | x << 2) & 0x33333333u;
-    return (x | x << 1) & 0x55555555u;
-}
-
-uint morton(uvec2 pixel) {
-    return spread_bits(pixel.x) | spread_bits(pixel.y) << 1;
-}
 
 // Sample `index` of `count` that a pixel takes in a frame, as fractions of 2^32.
 uvec2 sequence_bits(uint sequence, uint seed, uvec2 pixel, uint frame, uint index, uint count) {

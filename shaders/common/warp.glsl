@@ -3,6 +3,8 @@
 #ifndef COMMON_WARP
 #define COMMON_WARP
 
+const float PI = 3.14159265358979;
+
 // on [-pi/4, pi/4]
 float sin_quarter(float x) {
     float z = x * x;

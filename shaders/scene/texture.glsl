@@ -2,6 +2,7 @@
 // every driver (the oracle computes it too).
 #ifndef SCENE_TEXTURE
 #define SCENE_TEXTURE
+#include "common/srgb.glsl"
 #include "scene/scene.glsl"
 
 uint wrap_texel(int i, uint size, uint mode) {
@@ -28,15 +29,10 @@ vec4 texel(TextureRecord texture, int x, int y) {
     return unpackUnorm4x8(Words(texture.texels).v[i]);
 }
 
-// sRGB to linear, exact (IEC 61966-2-1)
-vec3 srgb_to_linear(vec3 c) {
-    return mix(c / 12.92, pow((c + 0.055) / 1.055, vec3(2.4)), greaterThan(c, vec3(0.04045)));
-}
-
 vec4 decoded_texel(TextureRecord texture, int x, int y, bool srgb) {
     vec4 c = texel(texture, x, y);
     bool encoded = srgb && !(HAS_DEEP_TEXELS && texture.format == FORMAT_FLOAT);
-    return encoded ? vec4(srgb_to_linear(c.rgb), c.a) : c;
+    return encoded ? vec4(srgb_decode(c.rgb), c.a) : c;
 }
 
 // Coordinates far outside [0, 1] would overflow the integer texel index: fold them first. Repeating with period 2 holds for

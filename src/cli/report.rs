@@ -179,11 +179,11 @@ impl Report<'_> {
             ));
         }
         lines.extend(self.features.iter().cloned());
-        lines.push(match self.options.binary() {
+        lines.push(match self.options.attenuation().is_binary() {
             true => "binary occlusion: any hit ends a ray, no nearest one is looked for".into(),
             false => "occlusion falls off with distance: the nearest hit is looked for".into(),
         });
-        lines.push(match self.options.reach() {
+        lines.push(match self.options.attenuation().reach() {
             r if r.is_finite() => {
                 format!("occlusion rays end at distance {r:.6}: what is beyond changes nothing that can be seen")
             }
@@ -235,7 +235,7 @@ impl Report<'_> {
                 "radius": finite(self.options.radius),
                 "falloff": self.options.falloff,
                 "normal": hemisphere(self.options),
-                "reach": finite(self.options.reach()),
+                "reach": finite(self.options.attenuation().reach()),
             },
             "tracer": self.tracer.name(),
             "tracer_reason": self.why,

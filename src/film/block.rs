@@ -4,6 +4,7 @@
 use bytemuck::{Pod, Zeroable};
 
 use super::camera::CameraRecord;
+use crate::sampling::morton::morton_pixel;
 use crate::tracer::queue::QueueRecord;
 
 /// Pixels of a block at most (1920x1080 fits).
@@ -125,8 +126,7 @@ impl Block {
     /// Pixel within the block of a ray index; outside of `size` for padding. The shaders' `block_pixel`.
     pub fn pixel(&self, index: u32) -> [u32; 2] {
         let (tile, k) = (index >> 6, index & 63);
-        let x = (k & 1) | (k >> 1 & 2) | (k >> 2 & 4);
-        let y = (k >> 1 & 1) | (k >> 2 & 2) | (k >> 3 & 4);
+        let [x, y] = morton_pixel(k);
         [tile % self.tiles_x() * TILE + x, tile / self.tiles_x() * TILE + y]
     }
 

@@ -17,7 +17,7 @@ pub use control::{Control, NoControl};
 pub const MAX_CHANNELS: usize = 3;
 
 /// 32-bit words of a pixel's record on the device: of each channel a sum and what it has too much, of each a sum of squares and what it has too
-/// much, then two counts. `FilmPixel` of shaders/resolve.glsl and shaders/path_resolve.glsl.
+/// much, then two counts. `FilmPixel` of shaders/common/film.glsl.
 pub const fn record_words(channels: usize) -> usize {
     4 * channels + 2
 }

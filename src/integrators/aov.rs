@@ -9,14 +9,8 @@ use crate::film::block::{Block, BlockParams};
 use crate::film::camera::CameraRecord;
 use crate::film::pace::{MOST, Pace};
 use crate::gpu::{Buffer, Commands, Memory};
-use crate::raster::{Primary, Raster, View};
-use crate::tracer::{Push, Stream, Tracer};
-
-/// Where hits come from.
-enum Source {
-    Traced(Box<Stream>),
-    Drawn(Box<Raster>),
-}
+use crate::raster::{CameraRays, Primary, View};
+use crate::tracer::{Push, Tracer};
 
 /// What a pixel's centre shows; `AovPixel` of shaders/aov.glsl.
 #[repr(C)]
@@ -74,13 +68,7 @@ pub fn visit(
 ) -> Result<()> {
     let device = tracer.device();
     let blocks = Block::cut(size);
-    let source = match primary {
-        Primary::Traced => Source::Traced(Box::new(tracer.stream(&shaders::AOV_CLOSEST)?)),
-        Primary::Raster => {
-            let size = blocks.first().map_or([1; 2], |b| b.size);
-            Source::Drawn(Box::new(Raster::new(tracer, &shaders::AOV_CLOSEST, size)?))
-        }
-    };
+    let rays = CameraRays::new(tracer, &shaders::AOV_CLOSEST, primary, blocks.first().map_or([1; 2], |b| b.size))?;
     let mut commands = Commands::new(device)?;
     let record = size_of::<AovPixel>() as u64;
     let most = blocks.iter().map(Block::rays).max().unwrap_or(0).min(MOST);
@@ -92,25 +80,22 @@ pub fn visit(
         if let Some(bytes) = params_buffer.bytes_mut() {
             bytes[..size_of::<BlockParams>()].copy_from_slice(bytemuck::bytes_of(&params));
         }
-        if let Source::Drawn(raster) = &source {
+        if rays.is_rasterized() {
             let view = View { camera: *camera, image_size: size, block: *block, at: [0.5; 2] };
-            let mut drawn = Ok(Default::default());
-            commands.run(|r| drawn = raster.draw(r, tracer, &view))?;
+            let mut drawn = Ok(());
+            commands.run(|r| drawn = rays.draw(r, tracer, &view))?;
             drawn?;
         }
         let mut first = 0;
         while first < block.rays() {
-            let rays = pace.rays();
-            let count = rays.min(block.rays() - first);
+            let launch = pace.rays();
+            let count = launch.min(block.rays() - first);
             let push =
                 Push { scene: tracer.scene_address(), pass: params_buffer.address(), first, count, ..Default::default() };
             let start = std::time::Instant::now();
-            let timings = commands.run(|r| match &source {
-                Source::Traced(stream) => stream.record(r, &push),
-                Source::Drawn(raster) => raster.trace(r, &push),
-            })?;
-            if count == rays {
-                pace.learn(rays, &timings, start.elapsed().as_secs_f64(), 1);
+            let timings = commands.run(|r| rays.record(r, &push))?;
+            if count == launch {
+                pace.learn(launch, &timings, start.elapsed().as_secs_f64(), 1);
             }
             target.read_with(0, record * count as u64, record, |begin, bytes| {
                 for (k, pixel) in bytes.chunks_exact(record as usize).enumerate() {

@@ -5,6 +5,7 @@
 //! when its rays are traced; only where a ray passes an edge within a fraction of a pixel that hardware rounds corners to may the
 //! neighbour be met.
 
+mod camera_rays;
 mod frustum;
 
 use std::ops::Range;
@@ -19,6 +20,7 @@ use crate::shaders::{self, StreamShaders};
 use crate::tracer::drawable::CHUNK;
 use crate::tracer::stream;
 use crate::tracer::{Drawable, Push, Stream, Tracer};
+pub use camera_rays::CameraRays;
 pub use frustum::View;
 use frustum::{Frustum, Sight};
 

@@ -102,7 +102,7 @@ impl Realtime {
     pub fn streams(settings: &Settings) -> [&'static StreamShaders; 2] {
         [
             &shaders::GBUFFER_CLOSEST,
-            if settings.binary() { &shaders::ACCESSIBILITY_ANY } else { &shaders::ACCESSIBILITY_CLOSEST },
+            if settings.attenuation().is_binary() { &shaders::ACCESSIBILITY_ANY } else { &shaders::ACCESSIBILITY_CLOSEST },
         ]
     }
 
@@ -381,8 +381,8 @@ impl Realtime {
             rays_per_pixel: s.rays_per_pixel,
             pattern: s.resolution as u32,
             sequence: s.sequence as u32,
-            reach: s.reach() as f32,
-            falloff_log2: s.falloff.log2() as f32,
+            reach: s.attenuation().reach() as f32,
+            falloff_log2: s.attenuation().falloff_log2() as f32,
             most_samples: s.most_samples() as f32,
             depth_tolerance: DEPTH_TOLERANCE,
             normal_tolerance: NORMAL_TOLERANCE,
@@ -395,7 +395,7 @@ impl Realtime {
             rest: (s.rest && still && self.state.has_history).into(),
             slices: s.gtao[0],
             steps: s.gtao[1],
-            evenness: if s.binary() { 0.0 } else { s.sequence.evenness() },
+            evenness: if s.attenuation().is_binary() { 0.0 } else { s.sequence.evenness() },
             surface: images.surface.address(),
             axes: images.axes.as_ref().map_or(0, Buffer::address),
             guide,

@@ -6,7 +6,7 @@ use super::settings::{Filter, Settings, Technique};
 use crate::error::Result;
 use crate::gpu::{Buffer, ComputePipeline, Recorder, Specialization};
 use crate::interface::constants;
-use crate::raster::{Primary, Raster, View};
+use crate::raster::{CameraRays, Primary, View};
 use crate::shaders::{self, LANES};
 use crate::tracer::stream::LAUNCH_RAYS;
 use crate::tracer::{Push, Stream, Tracer};
@@ -21,22 +21,13 @@ pub struct Passes {
     pub filter: ComputePipeline,
 }
 
-/// What finds what pixels show.
-pub enum CameraRays {
-    Traced(Box<Stream>),
-    Drawn(Box<Raster>),
-}
-
 impl Passes {
     pub fn new(tracer: &Tracer, size: [u32; 2], settings: &Settings, primary: Primary) -> Result<Self> {
         let device = tracer.device();
         let [gbuffer, accessibility] = Realtime::streams(settings);
         let specialization = Specialization::default().set(constants::BENT_NORMALS, settings.bent);
         Ok(Self {
-            gbuffer: match primary {
-                Primary::Traced => CameraRays::Traced(Box::new(tracer.stream(gbuffer)?)),
-                Primary::Raster => CameraRays::Drawn(Box::new(Raster::new(tracer, gbuffer, size)?)),
-            },
+            gbuffer: CameraRays::new(tracer, gbuffer, primary, size)?,
             accessibility: tracer.stream(accessibility)?,
             gather: shaders::GATHER.specialized(device, &specialization)?,
             gtao: shaders::GTAO.pipeline(device)?,
@@ -56,16 +47,11 @@ impl Passes {
     ) -> Result<()> {
         r.fill(guide, guide.size(), f32::INFINITY.to_bits());
         r.barrier();
-        if let CameraRays::Drawn(raster) = &self.gbuffer {
-            raster.draw(r, tracer, view)?;
-        }
+        self.gbuffer.draw(r, tracer, view)?;
         let rays = view.block.rays();
         for first in (0..rays).step_by(LAUNCH_RAYS as usize) {
             let push = Push { first, count: LAUNCH_RAYS.min(rays - first), pass: images.block_params.address(), ..push };
-            match &self.gbuffer {
-                CameraRays::Traced(stream) => stream.record(r, &push),
-                CameraRays::Drawn(raster) => raster.trace(r, &push),
-            }
+            self.gbuffer.record(r, &push);
             r.barrier();
         }
         Ok(())

@@ -1,7 +1,7 @@
 //! How the frames of a real-time renderer are made, and the presets that people choose from.
 
 use crate::error::{Error, Result};
-use crate::integrators::ao::{FALLOFF_CUTOFF, Hemisphere};
+use crate::integrators::ao::{Attenuation, Hemisphere};
 use crate::raster::Primary;
 use crate::sampling::Sequence;
 
@@ -215,14 +215,9 @@ impl Settings {
     /// Samples that a history counts at most: as many as half floats count one by one.
     pub const MAX_SAMPLES: u32 = 2048;
 
-    /// Hits beyond this distance change nothing that can be seen: the radius, or where the falloff has faded.
-    pub fn reach(&self) -> f64 {
-        if self.falloff > 1.0 { self.radius.min(-FALLOFF_CUTOFF.ln() / self.falloff.ln()) } else { self.radius }
-    }
-
-    /// Does any hit do, or has the nearest one to be found?
-    pub fn binary(&self) -> bool {
-        self.falloff <= 1.0
+    /// How far hits occlude, and how much.
+    pub fn attenuation(&self) -> Attenuation {
+        Attenuation { radius: self.radius, falloff: self.falloff }
     }
 
     /// Samples that a history counts at most.

@@ -3,6 +3,7 @@
 //!
 //! Integer arithmetic, mirrored bit for bit by shaders/common/sequence.glsl.
 
+use super::morton::morton;
 use super::sobol::{AO_DIRECTION, Sampler, hash_combine, owen_scramble, sobol_2d, to_unit};
 
 /// A sequence of points in the unit square, for each pixel and frame.
@@ -85,18 +86,6 @@ impl Sequence {
     }
 }
 
-/// Interleaves the lower 16 bits of the coordinates: pixels of aligned squares of 2^k follow each other.
-pub fn morton(pixel: [u32; 2]) -> u32 {
-    let spread = |x: u32| {
-        let x = x & 0xffff;
-        let x = (x | x << 8) & 0x00ff_00ff;
-        let x = (x | x << 4) & 0x0f0f_0f0f;
-        let x = (x | x << 2) & 0x3333_3333;
-        (x | x << 1) & 0x5555_5555
-    };
-    spread(pixel[0]) | spread(pixel[1]) << 1
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -158,11 +147,5 @@ mod tests {
             // random numbers would be 0.0026 off
             assert!(sum.iter().all(|x| (x / f64::from(n) - 0.5).abs() < 0.01), "{s:?} {sum:?}");
         }
-    }
-
-    #[test]
-    fn morton_keeps_squares_together() {
-        assert_eq!([[0, 0], [1, 0], [0, 1], [1, 1], [2, 0]].map(morton), [0, 1, 2, 3, 4]);
-        assert_eq!(morton([0xffff, 0xffff]), u32::MAX);
     }
 }

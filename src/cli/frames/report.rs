@@ -216,7 +216,7 @@ impl<'a> Report<'a> {
             self.primary_reason
         ));
         let s = self.settings;
-        lines.push(match (s.binary(), s.reach()) {
+        lines.push(match (s.attenuation().is_binary(), s.attenuation().reach()) {
             (true, r) if r.is_finite() => format!("binary occlusion: any hit within {r} ends a ray"),
             (true, _) => "binary occlusion: any hit ends a ray".into(),
             (false, r) => format!("occlusion rays end at {r:.4}: what lies beyond changes nothing that can be seen"),

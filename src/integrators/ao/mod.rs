@@ -4,9 +4,13 @@
 //! what each sample adds; `resolve` adds the samples to the film, pixel by pixel and in their order. So an occlusion ray that does
 //! not exist costs nothing, neighbouring rays belong to one pixel, and sums do not depend on launch sizes.
 
+mod attenuation;
+
 use crate::shaders::{self, StreamShaders};
 use std::sync::Arc;
 use std::time::Duration;
+
+pub use attenuation::Attenuation;
 
 use crate::error::Result;
 use crate::film::Control;
@@ -23,9 +27,6 @@ use crate::ray::Ray;
 use crate::tracer::queue::RayQueue;
 
 use crate::tracer::{Push, Stream, Tracer};
-
-/// A hit whose falloff is below this is not looked for: half a step of an 8-bit image.
-pub const FALLOFF_CUTOFF: f64 = 1.0 / 510.0;
 
 /// What a sample that met nothing leaves; no accessibility is negative.
 const MET_NOTHING: f32 = -1.0;
@@ -84,14 +85,9 @@ impl Default for AoOptions {
 }
 
 impl AoOptions {
-    /// Hits beyond this distance change nothing that can be seen: the radius, or where the falloff has faded.
-    pub fn reach(&self) -> f64 {
-        if self.falloff > 1.0 { self.radius.min(-FALLOFF_CUTOFF.ln() / self.falloff.ln()) } else { self.radius }
-    }
-
-    /// Does any hit do, or has the nearest one to be found?
-    pub fn binary(&self) -> bool {
-        self.falloff <= 1.0
+    /// How far hits occlude, and how much.
+    pub fn attenuation(&self) -> Attenuation {
+        Attenuation { radius: self.radius, falloff: self.falloff }
     }
 }
 
@@ -144,7 +140,10 @@ struct Occlusion {
 
 /// The streams that [`render`] traces.
 pub fn streams(options: &AoOptions) -> [&'static StreamShaders; 2] {
-    [&shaders::PRIMARY_CLOSEST, if options.binary() { &shaders::OCCLUSION_ANY } else { &shaders::OCCLUSION_CLOSEST }]
+    [
+        &shaders::PRIMARY_CLOSEST,
+        if options.attenuation().is_binary() { &shaders::OCCLUSION_ANY } else { &shaders::OCCLUSION_CLOSEST },
+    ]
 }
 
 /// Renders ambient occlusion; how it stops, [`accumulate`](crate::film::accumulate) says.
@@ -178,8 +177,8 @@ pub fn render(tracer: &Tracer, camera: &CameraRecord, options: &AoOptions, contr
     };
     let params = BlockParams {
         hemisphere: (options.hemisphere == Hemisphere::Shading) as u32,
-        falloff_log2: options.falloff.log2() as f32,
-        radius: options.reach() as f32,
+        falloff_log2: options.attenuation().falloff_log2() as f32,
+        radius: options.attenuation().reach() as f32,
         samples: estimator.samples.address(),
         queue: estimator.queue.record(),
         ..Default::default()

@@ -1,0 +1,19 @@
+// The hemisphere over which the occlusion rays of a surface point go: on the side that the viewer sees.
+#ifndef AO_HEMISPHERE
+#define AO_HEMISPHERE
+#include "common/camera.glsl"
+#include "scene/surface.glsl"
+
+struct Hemisphere {
+    vec3 ng;    // geometric normal, towards the viewer
+    vec3 axis;  // the same, or the shading normal on its side
+};
+
+Hemisphere hemisphere_at(BlockParams p, Surface s) {
+    float facing = dot(s.ng, view_direction(p, s.position)) > 0.0 ? -1.0 : 1.0;
+    vec3 ng = facing * s.ng;
+    // ns is on the side of ng
+    return Hemisphere(ng, p.hemisphere != 0u ? facing * s.ns : ng);
+}
+
+#endif

@@ -1,0 +1,27 @@
+// Morton order, the same as src/sampling/morton.rs: pixels of aligned squares of 2^k follow each other.
+#ifndef COMMON_MORTON
+#define COMMON_MORTON
+
+uint spread_bits(uint x) {
+    x &= 0xffffu;
+    x = (x | x << 8) & 0x00ff00ffu;
+    x = (x | x << 4) & 0x0f0f0f0fu;
+    x = (x | x << 2) & 0x33333333u;
+    return (x | x << 1) & 0x55555555u;
+}
+
+uint morton(uvec2 pixel) {
+    return spread_bits(pixel.x) | spread_bits(pixel.y) << 1;
+}
+
+// Pixel k of a tile of 8x8.
+uvec2 morton_pixel(uint k) {
+    return uvec2((k & 1u) | (k >> 1 & 2u) | (k >> 2 & 4u), (k >> 1 & 1u) | (k >> 2 & 2u) | (k >> 3 & 4u));
+}
+
+// Pixel k, Morton order within the tile, of a tile of 8x8 of an image with `tiles_x` of them in a row.
+uvec2 tile_pixel(uint tile, uint tiles_x, uint k) {
+    return uvec2(tile % tiles_x, tile / tiles_x) * 8u + morton_pixel(k);
+}
+
+#endif
