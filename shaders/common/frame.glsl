@@ -68,7 +68,6 @@ layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer Fr
 };
 
 layout(buffer_reference, std430, buffer_reference_align = 4) buffer FloatImage { float v[]; };
-layout(buffer_reference, std430, buffer_reference_align = 8) buffer PairImage { uvec2 v[]; };
 layout(buffer_reference, std430, buffer_reference_align = 16) buffer QuadImage { uvec4 v[]; };
 
 void store_vec3(uvec2 image, uint at, vec3 value) {
