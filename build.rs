@@ -41,7 +41,7 @@ macro_rules! registry {
         compute { $($compute:ident = $name:literal;)* }
         stages { $($stage:ident = $path:literal, $kind:ident;)* }
     ) => {
-        fn jobs() -> Vec<Job> {
+        pub fn jobs() -> Vec<Job> {
             let mut jobs = Vec::new();
             $(
                 for variant in Variant::ALL {
@@ -50,12 +50,11 @@ macro_rules! registry {
                     jobs.push((file, variant.applies_to(rays!($rays)).then_some(source)));
                 }
             )*
-            for (int64, bits) in [(false, 32), (true, 64)] {
-                $(jobs.push((format!("{}_{bits}.spv", $name), Some(Source::Compute { pass: $name, int64 })));)*
-                for (mode, name) in [(Mode::Any, "any"), (Mode::Closest, "closest")] {
-                    jobs.push((format!("wide_{name}_{bits}.spv"), Some(Source::Kernel { mode, int64 })));
+            $(
+                for (int64, bits) in [(false, 32), (true, 64)] {
+                    jobs.push((format!("{}_{bits}.spv", $name), Some(Source::Compute { pass: $name, int64 })));
                 }
-            }
+            )*
             $(jobs.push((concat!(stringify!($stage), ".spv").to_owned(), Some(Source::File { path: $path, stage: Stage::$kind })));)*
             jobs
         }
@@ -63,6 +62,26 @@ macro_rules! registry {
 }
 
 include!("src/shaders/registry.rs");
+
+#[cfg(feature = "probes")]
+mod probes {
+    use super::*;
+
+    include!("tests/shaders/registry.rs");
+}
+
+/// Everything that is to be compiled.
+fn all_jobs() -> Vec<Job> {
+    let mut all = jobs();
+    #[cfg(feature = "probes")]
+    all.extend(probes::jobs());
+    for (int64, bits) in [(false, 32), (true, 64)] {
+        for (mode, name) in [(Mode::Any, "any"), (Mode::Closest, "closest")] {
+            all.push((format!("wide_{name}_{bits}.spv"), Some(Source::Kernel { mode, int64 })));
+        }
+    }
+    all
+}
 
 fn main() {
     for file in ["build.rs", "src/interface", "src/shaders/compiler.rs", "src/shaders/source.rs", "src/shaders/registry.rs"] {
@@ -78,7 +97,10 @@ fn main() {
     let out = PathBuf::from(std::env::var_os("OUT_DIR").expect("cargo sets it"));
     let shaders = manifest.join("shaders");
     println!("cargo:rerun-if-changed={}", shaders.display());
-    let (included, mut errors) = compile(&jobs(), &shaders, &out);
+    if cfg!(feature = "probes") {
+        println!("cargo:rerun-if-changed={}", manifest.join(source::PROBES).display());
+    }
+    let (included, mut errors) = compile(&all_jobs(), &manifest, &out);
     for file in included {
         println!("cargo:rerun-if-changed={}", file.display());
     }
@@ -93,9 +115,9 @@ fn main() {
 }
 
 /// Compiles on all cores. Returns the files that were included, and what is wrong, in words.
-fn compile(jobs: &[Job], shaders: &Path, out: &Path) -> (BTreeSet<PathBuf>, Vec<String>) {
+fn compile(jobs: &[Job], manifest: &Path, out: &Path) -> (BTreeSet<PathBuf>, Vec<String>) {
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
-    let compiler = Compiler::new(shaders, interface::glsl::files(), out);
+    let compiler = Compiler::new(&manifest.join("shaders"), source::made_files(interface::glsl::files(), manifest), out);
     let next = Mutex::new(jobs.iter());
     let results = Mutex::new((BTreeSet::new(), Vec::new()));
     std::thread::scope(|scope| {

@@ -75,7 +75,7 @@ fn gpu_sampler_gives_the_hosts_bits() {
     let scene = analytic::plane(1.0, Placement::default());
     for kind in tracers(&device) {
         let tracer = tracer(&device, kind, &scene);
-        let stream = tracer.stream(&shaders::SAMPLER_PROBE_ANY).unwrap();
+        let stream = tracer.stream(&shaders::probes::SAMPLER_PROBE_ANY).unwrap();
         let source = Buffer::from_slice(&device, "probe inputs", &inputs).unwrap();
         let results = Buffer::new(&device, "probe outputs", 48 * count as u64, Memory::Readback).unwrap();
         let probe = Buffer::from_slice(&device, "probe", &[[source.address(), results.address()]]).unwrap();

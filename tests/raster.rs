@@ -30,6 +30,7 @@ const RAYS_BESIDE: usize = 1000;
 
 /// `None`, said on stdout and checked, where the driver's vectors are too wide to draw with.
 fn device() -> Option<Arc<Device>> {
+    skylit::gpu::environment::prefer_vector_bits(256);
     let device = common::device();
     if device.info.can_rasterise() {
         return Some(device);

@@ -9,7 +9,7 @@ use crate::files;
 fn file(info: &DeviceInfo) -> Option<PathBuf> {
     let uuid: String = info.pipeline_cache_uuid.iter().map(|b| format!("{b:02x}")).collect();
     files::cache_folder().map(|f| {
-        // the width of a CPU driver's vectors is no part of what Vulkan calls the same device
+        // the width of a CPU driver's vectors is no part of what Vulkan calls the same device; lanes are that width by 32 bits
         let lanes = info.limits.subgroup_size;
         f.join(format!(
             "pipelines-{:04x}-{:04x}-{:08x}-{lanes}-{uuid}.bin",

@@ -39,9 +39,13 @@ pub struct Instance {
 impl Instance {
     /// Loads Vulkan. With `validation`, every message of VK_LAYER_KHRONOS_validation is kept and can fail the run.
     ///
+    /// The first in a process sets environment variables that Mesa's CPU driver reads ([`super::environment`]): a program whose other threads call C code that
+    /// reads the environment makes it before they start.
+    ///
     /// # Errors
     /// [`Error::Device`] without a loader, without a driver for Vulkan 1.3, or without the layer that was asked for.
     pub fn new(validation: bool) -> Result<Arc<Self>> {
+        super::environment::prepare();
         // SAFETY: the loader's own initialisation code runs, as in every Vulkan program
         let entry = unsafe { ash::Entry::load() }.map_err(|e| {
             Error::Device(format!(

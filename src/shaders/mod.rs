@@ -48,8 +48,10 @@ impl Shader {
         use std::sync::OnceLock;
 
         static COMPILER: OnceLock<compiler::Compiler> = OnceLock::new();
-        let compiler = COMPILER
-            .get_or_init(|| compiler::Compiler::new(&folder(), crate::interface::glsl::files(), Path::new(env!("OUT_DIR"))));
+        let compiler = COMPILER.get_or_init(|| {
+            let files = source::made_files(crate::interface::glsl::files(), Path::new(env!("CARGO_MANIFEST_DIR")));
+            compiler::Compiler::new(&folder(), files, Path::new(env!("OUT_DIR")))
+        });
         compiler.compile(&self.source).map(|c| Cow::Owned(c.spirv)).map_err(crate::Error::Usage)
     }
 }
@@ -212,6 +214,15 @@ static WIDE_CLOSEST_32: Shader = shader!(Source::Kernel { mode: Mode::Closest, i
 static WIDE_CLOSEST_64: Shader = shader!(Source::Kernel { mode: Mode::Closest, int64: true }, "wide_closest_64");
 
 include!("registry.rs");
+
+/// Shaders that only tests use: tests/shaders.
+#[cfg(feature = "probes")]
+pub mod probes {
+    use super::source::{mode, rays};
+    use super::{ComputeShader, Mode, Rays, Shader, Source, StreamShaders, Variant};
+
+    include!("../../tests/shaders/registry.rs");
+}
 
 #[cfg(test)]
 mod tests {

@@ -12,7 +12,6 @@ registry! {
         ACCESSIBILITY_ANY = "accessibility", any, generated;
         ACCESSIBILITY_CLOSEST = "accessibility", closest, generated;
         AOV_CLOSEST = "aov", closest, camera;
-        BSDF_PROBE_ANY = "bsdf_probe", any, generated;
         GBUFFER_CLOSEST = "gbuffer", closest, camera;
         LARSEN_LIGHT_ANY = "larsen_light", any, generated;
         LARSEN_OCCLUSION_CLOSEST = "larsen_occlusion", closest, generated;
@@ -25,7 +24,6 @@ registry! {
         PRIMARY_CLOSEST = "primary", closest, camera;
         RAYS_ANY = "rays", any, generated;
         RAYS_CLOSEST = "rays", closest, generated;
-        SAMPLER_PROBE_ANY = "sampler_probe", any, generated;
     }
     compute {
         BUDGET = "budget";
@@ -39,7 +37,6 @@ registry! {
         LARSEN_TEMPORAL = "larsen_temporal";
         PATH_RESOLVE = "path_resolve";
         RESOLVE = "resolve";
-        SEQUENCE_PROBE = "sequence_probe";
         TEMPORAL = "temporal";
     }
     stages {

@@ -149,6 +149,27 @@ impl Variant {
     }
 }
 
+/// Where the shaders of the feature `probes` are, in the source tree: only tests use them, and they include what is in shaders/.
+#[cfg_attr(not(feature = "live-shaders"), allow(dead_code, reason = "a program that has SPIR-V compiles nothing"))]
+pub const PROBES: &str = "tests/shaders";
+
+/// Files that shaders include and that are not in shaders/: those that are made, and with the feature `probes` the tests' own. `manifest`: the source tree.
+#[cfg_attr(not(feature = "live-shaders"), allow(dead_code, reason = "a program that has SPIR-V compiles nothing"))]
+pub fn made_files(mut made: Vec<(String, String)>, manifest: &Path) -> Vec<(String, String)> {
+    if cfg!(feature = "probes") {
+        // what cannot be read, the compiler misses by name
+        for entry in std::fs::read_dir(manifest.join(PROBES)).into_iter().flatten().flatten() {
+            let name = entry.file_name().to_string_lossy().into_owned();
+            if name.ends_with(".glsl")
+                && let Ok(text) = std::fs::read_to_string(entry.path())
+            {
+                made.push((name, text));
+            }
+        }
+    }
+    made
+}
+
 /// What one shader is compiled from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Source {

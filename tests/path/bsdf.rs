@@ -41,7 +41,7 @@ struct Probe<'a> {
 
 impl Probe<'_> {
     fn new(device: &Arc<Device>, tracer: Tracer) -> Probe<'_> {
-        let stream = tracer.stream(&shaders::BSDF_PROBE_ANY).unwrap();
+        let stream = tracer.stream(&shaders::probes::BSDF_PROBE_ANY).unwrap();
         Probe { device, tracer, stream }
     }
 

@@ -32,7 +32,7 @@ fn gpu_sequences_are_the_hosts_bit_for_bit() {
     let source = Buffer::from_slice(&device, "probe inputs", &inputs).unwrap();
     let results = Buffer::new(&device, "probe outputs", 16 * u64::from(count), Memory::Readback).unwrap();
     let probe = Buffer::from_slice(&device, "probe", &[[source.address(), results.address()]]).unwrap();
-    let pipeline = shaders::SEQUENCE_PROBE.pipeline(&device).unwrap();
+    let pipeline = shaders::probes::SEQUENCE_PROBE.pipeline(&device).unwrap();
     let push = Push { pass: probe.address(), count, ..Default::default() };
     Commands::new(&device).unwrap().run(|r| r.dispatch(&pipeline, &push, count.div_ceil(shaders::LANES))).unwrap();
     let got: Vec<[u32; 4]> = bytemuck::pod_collect_to_vec(&results.read(0, 16 * u64::from(count)).unwrap());

@@ -58,6 +58,7 @@ fn gpu_three_tracers_one_image() {
 /// pixel in its filter's box.
 #[test]
 fn gpu_drawn_and_traced_are_one_image() {
+    skylit::gpu::environment::prefer_vector_bits(256);
     let device = device();
     if !device.info.can_rasterise() {
         println!("skipped: the device lacks {:?}", device.info.missing_raster);
