@@ -10,10 +10,10 @@ use super::plot::chart::Picture;
 use super::record::BenchRecord;
 use crate::error::{Error, Result};
 use crate::scene::Scene;
-use crate::terminal::console::{Console, Failure};
+use crate::terminal::console::{Console, Failure, one_line};
 use crate::terminal::interrupt::{self, ProgressControl};
 use crate::terminal::progress::Progress;
-use crate::terminal::warnings::{one_line, warnings_of};
+use crate::terminal::warnings::warnings_of;
 
 /// Steps of the progress bar for one job.
 const STEPS: u64 = 1000;

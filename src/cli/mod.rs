@@ -17,8 +17,7 @@ use clap::Parser;
 use clap::error::ErrorKind;
 
 use crate::error::{Error, Result};
-use crate::terminal::console::Failure;
-use crate::terminal::warnings::one_line;
+use crate::terminal::console::{Failure, one_line};
 use crate::terminal::{console, panic};
 
 /// What the process returns; part of `--help`.

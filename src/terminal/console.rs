@@ -72,8 +72,7 @@ impl Console {
         match outcome {
             Ok(()) => Ok(self.record(value)?),
             Err(error) => {
-                let record =
-                    Failed { value, error: super::warnings::one_line(&error.to_string()), exit_code: error.exit_code() };
+                let record = Failed { value, error: one_line(&error.to_string()), exit_code: error.exit_code() };
                 // what failed first counts: a stdout that fails as well is told of nowhere
                 let _ = self.record(&record);
                 Err(Failure { error, told: self.json })
@@ -87,6 +86,11 @@ impl Console {
             stderr(&format!("skylit: warning: {text}"));
         }
     }
+}
+
+/// Text without line breaks.
+pub fn one_line(text: &str) -> String {
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
 /// The line that ends a failed run.

@@ -31,6 +31,6 @@ pub fn catch<T>(f: impl FnOnce() -> T) -> Result<T, String> {
     // nothing is used after a panic but the message
     catch_unwind(AssertUnwindSafe(f)).map_err(|_| {
         let first = FIRST.lock().ok().and_then(|mut m| m.take());
-        super::warnings::one_line(&first.unwrap_or_else(|| "internal error; this is a bug in skylit, please report it".into()))
+        super::console::one_line(&first.unwrap_or_else(|| "internal error; this is a bug in skylit, please report it".into()))
     })
 }

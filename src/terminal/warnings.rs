@@ -1,11 +1,6 @@
 //! Warnings, a line each.
 
-use super::console::Console;
-
-/// Text without line breaks.
-pub fn one_line(text: &str) -> String {
-    text.split_whitespace().collect::<Vec<_>>().join(" ")
-}
+use super::console::{Console, one_line};
 
 /// Warnings: shown to people at once, and kept for the record that programs get.
 pub struct Warnings {
