@@ -81,7 +81,7 @@ fn usage_errors() {
     fails(&render(&["--triangle-test", "none"]), 64, "watertight, moller-trumbore");
     fails(&render(&["--tracer", "pipeline", "--build", "best"]), 64, "--tracer compute");
     fails(&render(&["--traversal", "brute", "--build", "best"]), 64, "has no hierarchy");
-    fails(&render(&["--resumable", "--preset", "fast"]), 64, "--resumable is of stills");
+    fails(&render(&["--resumable", "--preset", "fast"]), 64, "--resumable is for stills, and --preset asks for frames");
     fails(&render(&["--resume", "a.exr", "--dump-rays", "r"]), 64, "leave --dump-rays out");
     fails(&render(&["--integrator", "path", "--target-rmse", "0"]), 64, "above 0");
     fails(&render(&["--integrator", "path", "--resume", "a.png"]), 64, "--resume a.png: only an .exr");

@@ -65,11 +65,11 @@ pub fn resume(
     let image = output::exr::read(path)?;
     let state = read_state(&image, names);
     if matches!(state, Read::Nothing) {
-        return Err(Error::input(path, "there is no film in it to go on with; render it with --resumable"));
+        return Err(Error::input(path, "it has no film state to resume; render it with --resumable"));
     }
     let differs = |what: &str, its: &str, ours: &str| {
         Error::Usage(format!(
-            "--resume {}: its {what} is {its}, this run's is {ours}; a film goes on only as it was begun",
+            "--resume {}: its {what} is {its}, this run's is {ours}; all settings must be those of the render that is resumed",
             path.display()
         ))
     };
@@ -81,7 +81,7 @@ pub fn resume(
         return Err(differs("size", &text([image.width, image.height]), &text(size)));
     }
     let Read::State(state) = state else {
-        return Err(Error::input(path, "its film is damaged; render it anew with --resumable"));
+        return Err(Error::input(path, "its film state is damaged; render it anew with --resumable"));
     };
     if state.most_samples() > spp {
         return Err(Error::Usage(format!(
@@ -93,7 +93,7 @@ pub fn resume(
     let other = maker.iter().find(|(key, ours)| image.metadata(key) != Some(ours.as_str()));
     let warning = other.map(|(key, ours)| {
         format!(
-            "{} was begun with {key} {}, and goes on with {ours}: as right as any, but not bit for bit what one run would give",
+            "{} was begun with {key} {}, and is resumed with {ours}: as correct, but not bit for bit what one run would give",
             path.display(),
             image.metadata(key).unwrap_or("unknown")
         )

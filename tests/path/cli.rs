@@ -147,7 +147,7 @@ fn gpu_a_film_goes_on_only_as_it_was_begun() {
     let fails =
         |args: Vec<String>, code: i32, says: &str| fails(&args.iter().map(String::as_str).collect::<Vec<_>>(), code, says);
     fails(with("3", "film.exr"), 64, "has 4 samples per pixel already");
-    fails(with("8", "plain.exr"), 3, "plain.exr: there is no film in it to go on with; render it with --resumable");
+    fails(with("8", "plain.exr"), 3, "plain.exr: it has no film state to resume; render it with --resumable");
     fails(with("8", "none.exr"), 3, "no such file");
     // a film that no run leaves: pixels of one tile with different samples, a channel that is not there, one of another kind
     let image = output::load(film.as_ref()).unwrap();
@@ -289,15 +289,15 @@ fn options_of_frames_are_refused_by_name() {
     let dir = tempfile::tempdir().unwrap();
     let image = place(&dir, "a.exr");
     for (option, value) in [("--animate", "0"), ("--fps", "25"), ("--frames", "0..2"), ("--preset", "fast"), ("--orbit", "9")] {
-        let says = format!("{option} is about frames in real time, and --integrator path renders stills: leave it out, or use");
+        let says = format!("{option} has no effect on --integrator path: leave it out, or use --integrator ao");
         fails(&[&BASE[..], &["-o", &image, option, value]].concat(), 64, &says);
     }
     for (option, value) in [("--ao-radius", "1"), ("--ao-falloff", "2"), ("--dump-rays", "x")] {
-        let says = format!("{option} is about occlusion rays, and --integrator path traces none");
+        let says = format!("{option} has no effect on --integrator path: leave it out, or use --integrator ao");
         fails(&[&BASE[..], &["-o", &image, option, value]].concat(), 64, &says);
     }
     let sky = ["render", BASE[1], "-o", &image, "--integrator", "ao-sky", "--light", "point position=0,1,0 intensity=1"];
-    fails(&sky, 64, "error: --light: nothing but a white sky");
+    fails(&sky, 64, "--light has no effect on --integrator ao-sky: leave it out, or use --integrator path or direct");
 }
 
 /// What nobody asks for is not in the shaders, and it is said.
@@ -352,7 +352,8 @@ fn gpu_texture_filters_are_told_and_kept() {
     assert!(plain["explain"].to_string().contains("mip levels: unused"), "{plain}");
     let [on, never] = ["c.exr", "d.exr"].map(|name| place(&dir, name));
     fails(&[&BASE[..], &["-o", &on, "--spp", "4", "--resume", &film]].concat(), 64, "texture filter");
-    for (integrator, says) in [("ao", "is about paths"), ("depth", "reads no textures"), ("ao-sky", "reads no textures")] {
+    for integrator in ["ao", "depth", "ao-sky"] {
+        let says = &format!("--texture-filter has no effect on --integrator {integrator}");
         let args = ["render", BASE[1], "-o", &never, "--integrator", integrator, "--texture-filter", "ray-cone"];
         fails(&args, 64, says);
     }

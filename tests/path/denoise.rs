@@ -202,9 +202,13 @@ fn wrong_uses_of_denoisers_are_told() {
     let with = |more: &[&str], code: i32, says: &str| {
         fails(&[&["render", "builtin:cornell-box", "-o", &exr][..], more].concat(), code, says);
     };
-    with(&["--denoise", "filter"], 64, "--denoise is about paths: add --integrator path");
-    with(&["--denoise", "filter", "--integrator", "albedo"], 64, "--denoise: --integrator albedo shows surfaces, not light");
-    with(&["--denoise", "filter", "--preset", "fast"], 64, "--denoise is about paths");
+    with(
+        &["--denoise", "filter"],
+        64,
+        "--denoise has no effect on --integrator ao: leave it out, or use --integrator path, direct or ao-sky",
+    );
+    with(&["--denoise", "filter", "--integrator", "albedo"], 64, "--denoise has no effect on --integrator albedo");
+    with(&["--denoise", "filter", "--preset", "fast"], 64, "--denoise is for stills, and --preset asks for frames");
     if !cfg!(feature = "oidn") {
         with(&["--denoise", "oidn", "--integrator", "path"], 2, "build with --features oidn, or use --denoise filter");
     } else if skylit::gpu::oidn::Oidn::open().is_err() {

@@ -130,7 +130,7 @@ impl Control for Warned {
     }
 
     fn warning(&mut self, text: &str) {
-        self.keyboard.progress.suspend(|| self.console.warning(&crate::terminal::warnings::one_line(text)));
+        self.keyboard.progress.suspend(|| self.console.warning(&crate::terminal::console::one_line(text)));
     }
 
     fn should_stop(&mut self) -> Result<bool> {
