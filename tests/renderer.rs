@@ -112,7 +112,7 @@ fn gpu_frames_and_stills_take_turns() {
     let image = frames.image(&mut NoControl).unwrap();
     assert_eq!(image.metadata("frame"), Some("5"));
     let report = frames.report();
-    assert!(report.mean > 0.1 && report.mean < 1.0);
+    assert!(report.mean > 0.0 && report.mean <= 1.0, "{}", report.mean);
     assert!(renderer.still(&timeline, &mut NoControl).is_err_and(|e| e.to_string().contains("--preset is for frames")));
     assert!(renderer.still(&small("ao"), &mut NoControl).is_ok());
     assert_validation_clean(&device);

@@ -63,11 +63,8 @@ impl Renderer {
     pub fn frames(&mut self, settings: &RenderSettings, displays: bool, control: &mut dyn Control) -> Result<Frames<'_>> {
         settings.check()?;
         let timeline = &settings.frames;
-        let mut how = timeline.settings(&settings.integrators.ao, settings.seed())?;
+        let how = frame_settings(settings)?;
         let shown = timeline.show.unwrap_or_default();
-        how.bent = Aov::Bent.among(&settings.image.aov) || shown == Shown::Bent;
-        how.check()?;
-        shown.check(&how)?;
         self.light(&settings.lighting)?;
         let scene = &self.scene;
         let mut warnings = scene_warnings(scene);
@@ -238,6 +235,19 @@ impl Frames<'_> {
     pub fn report(self) -> FramesReport {
         self.report
     }
+}
+
+/// How frames are made, as settings say.
+///
+/// # Errors
+/// [`Error::Usage`] for settings that have no effect together.
+pub fn frame_settings(settings: &RenderSettings) -> Result<Settings> {
+    let mut how = settings.frames.settings(&settings.integrators.ao, settings.seed())?;
+    let shown = settings.frames.show.unwrap_or_default();
+    how.bent = Aov::Bent.among(&settings.image.aov) || shown == Shown::Bent;
+    how.check()?;
+    shown.check(&how)?;
+    Ok(how)
 }
 
 /// Frames of a camera at rest after which nothing changes any more.

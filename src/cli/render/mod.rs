@@ -71,6 +71,8 @@ fn still(args: &RenderArgs, start: Instant) -> Result<(), Failure> {
 
 fn frames(args: &RenderArgs, start: Instant) -> Result<(), Failure> {
     let timeline = &args.settings.frames;
+    // wrong settings are told of before anything is loaded
+    crate::renderer::frames::frame_settings(&args.settings)?;
     timeline.check_outputs(&args.output)?;
     let range = timeline.range();
     for path in &args.output {
@@ -78,8 +80,6 @@ fn frames(args: &RenderArgs, start: Instant) -> Result<(), Failure> {
     }
     interrupt::install();
     let console = args.verbosity.console();
-    // wrong settings are told of before anything is loaded
-    timeline.settings(&args.settings.integrators.ao, args.settings.seed())?.check()?;
     let mut renderer = Renderer::open(&args.scene, &args.device)?;
     interrupt::check()?;
     let mut control = Warned::new(args, console);
