@@ -1,6 +1,27 @@
 //! Compiles every shader of src/shaders/registry.rs into OUT_DIR. With the feature `live-shaders` there is nothing to do: the program compiles what it
 //! needs when it runs.
 
+// what the program derives for the types of interface, build.rs has no use for
+macro_rules! shared_record {
+    ($($item:tt)*) => { $($item)* };
+}
+macro_rules! shared_enumeration {
+    ($($item:tt)*) => { $($item)* };
+}
+macro_rules! shared_choice {
+    (
+        $(#[$meta:meta])* pub enum $name:ident $((default $default:ident))? {
+            $($(#[$about:meta])+ $variant:ident = $setting:literal,)+
+        }
+    ) => {
+        $(#[$meta])*
+        #[derive(Clone, Copy)]
+        pub enum $name {
+            $($(#[$about])+ $variant,)+
+        }
+    };
+}
+
 #[path = "src/shaders/compiler.rs"]
 mod compiler;
 #[path = "src/interface/mod.rs"]
