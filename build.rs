@@ -1,5 +1,26 @@
-//! Compiles every shader of src/shaders/registry.rs into OUT_DIR. With the feature `live-shaders` there is nothing to do: the program compiles what it
-//! needs when it runs.
+//! Compiles every shader of src/shaders/registry.rs into OUT_DIR; not with the feature `live-shaders`: then the program compiles what it needs when it
+//! runs. Before, it checks that the records of src/interface lie for shaders where they lie for the program.
+
+// what the program derives for the types of interface, build.rs has no use for
+macro_rules! shared_record {
+    ($($item:tt)*) => { $($item)* };
+}
+macro_rules! shared_enumeration {
+    ($($item:tt)*) => { $($item)* };
+}
+macro_rules! shared_choice {
+    (
+        $(#[$meta:meta])* pub enum $name:ident $((default $default:ident))? {
+            $($(#[$about:meta])+ $variant:ident = $setting:literal,)+
+        }
+    ) => {
+        $(#[$meta])*
+        #[derive(Clone, Copy)]
+        pub enum $name {
+            $($(#[$about])+ $variant,)+
+        }
+    };
+}
 
 #[path = "src/shaders/compiler.rs"]
 mod compiler;
@@ -10,11 +31,14 @@ mod interface;
 #[allow(dead_code, reason = "the program uses the rest")]
 mod source;
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
 use compiler::Compiler;
+use interface::layout::Reflected;
+use rspirv::dr::{Instruction, Operand};
+use rspirv::spirv::{Decoration, Op};
 use source::{Mode, Rays, Source, Stage, Variant, mode, rays};
 
 // Debian's libshaderc_combined.a leaves glslang and SPIRV-Tools out; their order is that of their dependencies.
@@ -83,9 +107,119 @@ fn all_jobs() -> Vec<Job> {
     all
 }
 
+/// Fails the build where a record lies elsewhere for shaders than for the program.
+fn check_records() -> Result<(), Vec<String>> {
+    let failed = |what: String| vec![format!("the check of records: {what}")];
+    let compiler = shaderc::Compiler::new().map_err(|e| failed(e.to_string()))?;
+    let mut options = shaderc::CompileOptions::new().map_err(|e| failed(e.to_string()))?;
+    options.set_target_env(shaderc::TargetEnv::Vulkan, shaderc::EnvVersion::Vulkan1_3 as u32);
+    options.set_target_spirv(shaderc::SpirvVersion::V1_5);
+    // names stay, and what nothing uses
+    options.set_optimization_level(shaderc::OptimizationLevel::Zero);
+    let text = interface::glsl::check_shader();
+    let kind = shaderc::ShaderKind::Compute;
+    let spirv = compiler
+        .compile_into_spirv(&text, kind, "the check shader of src/interface", "main", Some(&options))
+        .map_err(|e| failed(e.to_string()))?;
+    let module = rspirv::dr::load_words(spirv.as_binary()).map_err(|e| failed(e.to_string()))?;
+    let records = interface::records::FILES.iter().flat_map(|f| f.records);
+    match interface::layout::mismatches(records, &reflect(&module)) {
+        mismatches if mismatches.is_empty() => Ok(()),
+        mismatches => Err(mismatches),
+    }
+}
+
+/// The structures of a module, as the compiler laid them out.
+fn reflect(module: &rspirv::dr::Module) -> Vec<Reflected> {
+    let layout = Layout::new(module);
+    let mut out = Vec::new();
+    for (&id, name) in &layout.names {
+        let Some(fields) = layout.types.get(&id).filter(|t| t.class.opcode == Op::TypeStruct) else { continue };
+        let member = |(k, field): (usize, &Operand)| {
+            let name = layout.member_names.get(&(id, k as u32)).cloned().unwrap_or_default();
+            (name, layout.offsets.get(&(id, k as u32)).map_or(0, |&o| o as usize), layout.size(field.unwrap_id_ref()))
+        };
+        let members = fields.operands.iter().enumerate().map(member).collect();
+        let array = |t: &&&Instruction| {
+            matches!(t.class.opcode, Op::TypeArray | Op::TypeRuntimeArray) && t.operands[0] == Operand::IdRef(id)
+        };
+        let array = layout.types.values().find(array).and_then(|t| layout.strides.get(&t.result_id?));
+        out.push(Reflected { name: name.clone(), members, stride: array.map(|&s| s as usize) });
+    }
+    out
+}
+
+/// What a module says of its types, by their ids; members by their numbers besides.
+#[derive(Default)]
+struct Layout<'m> {
+    types: BTreeMap<u32, &'m Instruction>,
+    names: BTreeMap<u32, String>,
+    member_names: BTreeMap<(u32, u32), String>,
+    offsets: BTreeMap<(u32, u32), u32>,
+    strides: BTreeMap<u32, u32>,
+}
+
+impl<'m> Layout<'m> {
+    fn new(module: &'m rspirv::dr::Module) -> Self {
+        let mut out = Self::default();
+        out.types.extend(module.types_global_values.iter().filter_map(|t| Some((t.result_id?, t))));
+        for i in module.debug_names.iter().chain(&module.annotations) {
+            match (i.class.opcode, i.operands.as_slice()) {
+                (Op::Name, [Operand::IdRef(id), Operand::LiteralString(name)]) => {
+                    out.names.insert(*id, name.clone());
+                }
+                (Op::MemberName, [Operand::IdRef(id), Operand::LiteralBit32(k), Operand::LiteralString(name)]) => {
+                    out.member_names.insert((*id, *k), name.clone());
+                }
+                (
+                    Op::MemberDecorate,
+                    [
+                        Operand::IdRef(id),
+                        Operand::LiteralBit32(k),
+                        Operand::Decoration(Decoration::Offset),
+                        Operand::LiteralBit32(n),
+                    ],
+                ) => {
+                    out.offsets.insert((*id, *k), *n);
+                }
+                (
+                    Op::Decorate,
+                    [Operand::IdRef(id), Operand::Decoration(Decoration::ArrayStride), Operand::LiteralBit32(n)],
+                ) => {
+                    out.strides.insert(*id, *n);
+                }
+                _ => {}
+            }
+        }
+        out
+    }
+
+    /// Bytes of a type; of a structure up to the end of its last member.
+    fn size(&self, id: u32) -> usize {
+        let Some(t) = self.types.get(&id) else { return 0 };
+        match (t.class.opcode, t.operands.as_slice()) {
+            (Op::TypeInt | Op::TypeFloat, [Operand::LiteralBit32(bits), ..]) => *bits as usize / 8,
+            (Op::TypeVector, [Operand::IdRef(of), Operand::LiteralBit32(n)]) => self.size(*of) * *n as usize,
+            (Op::TypeArray, [_, Operand::IdRef(count)]) => {
+                let count = self.types.get(count).map(|c| c.operands[0].clone());
+                let stride = self.strides.get(&id).copied().unwrap_or(0);
+                if let Some(Operand::LiteralBit32(n)) = count { (n * stride) as usize } else { 0 }
+            }
+            (Op::TypeStruct, [.., last]) => {
+                let offset = self.offsets.get(&(id, t.operands.len() as u32 - 1)).copied().unwrap_or(0);
+                offset as usize + self.size(last.unwrap_id_ref())
+            }
+            _ => 0,
+        }
+    }
+}
+
 fn main() {
     for file in ["build.rs", "src/interface", "src/shaders/compiler.rs", "src/shaders/source.rs", "src/shaders/registry.rs"] {
         println!("cargo:rerun-if-changed={file}");
+    }
+    if let Err(mismatches) = check_records() {
+        fail(&mismatches);
     }
     if cfg!(feature = "live-shaders") {
         if cfg!(not(feature = "build-shaderc")) {
@@ -106,12 +240,16 @@ fn main() {
     }
     if !errors.is_empty() {
         errors.sort();
-        for line in errors.iter().flat_map(|e| e.lines()) {
-            println!("cargo:warning={line}");
-        }
-        eprintln!("{}", errors.join("\n"));
-        std::process::exit(1);
+        fail(&errors);
     }
+}
+
+fn fail(errors: &[String]) -> ! {
+    for line in errors.iter().flat_map(|e| e.lines()) {
+        println!("cargo:warning={line}");
+    }
+    eprintln!("{}", errors.join("\n"));
+    std::process::exit(1);
 }
 
 /// Compiles on all cores. Returns the files that were included, and what is wrong, in words.

@@ -5,6 +5,7 @@
 use divan::Bencher;
 use divan::counter::ItemsCount;
 use glam::Vec3;
+use skylit::accel::wide::Block;
 use skylit::accel::{Aabb, BuildPreset, Bvh2, Wide, build};
 
 fn main() {
@@ -50,9 +51,9 @@ fn obvhs_medium(bencher: Bencher, n: usize) {
 #[divan::bench(args = SIZES, sample_count = 5, sample_size = 1)]
 fn wide(bencher: Bencher, n: usize) {
     let boxes = surface(n);
-    bencher
-        .counter(ItemsCount::new(n))
-        .bench(|| Wide::collapse(&build::tree(&boxes, BuildPreset::Default, None), |item| [item; 16]));
+    bencher.counter(ItemsCount::new(n)).bench(|| {
+        Wide::collapse(&build::tree(&boxes, BuildPreset::Default, None), |item| Block { body: [item; 15], ..Block::default() })
+    });
 }
 
 #[divan::bench(args = SIZES, sample_count = 5, sample_size = 1)]

@@ -8,7 +8,7 @@ Ray ray(uint index) {
     return centre_ray(BlockParams(push.pass), index);
 }
 
-// Mirrors AovPixel in src/render/aov.rs.
+// Writes an AovPixel.
 void closest(uint index, Hit hit) {
     BlockParams p = BlockParams(push.pass);
     Aov aov = Aov(p.aov);

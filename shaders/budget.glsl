@@ -20,11 +20,6 @@ layout(local_size_x = LANES) in;
 const float PRIOR_SAMPLES = 16.0;
 const float PRIOR_VARIANCE = 0.25;
 
-// One after the other, in the push constants.
-const uint STAGE_WISHES = 0u;
-const uint STAGE_COARSE = 1u;
-const uint STAGE_FINE = 2u;
-
 shared vec2 tile[LANES];
 shared uint counts[LANES];
 shared uint first_above, list_begin;
@@ -91,13 +86,13 @@ void main() {
     FrameParams f = FrameParams(push.pass);
     BudgetSums sums = BudgetSums(f.budget_sums);
     uint k = gl_GlobalInvocationID.x, lane = gl_LocalInvocationID.x, stage = push.sample_index;
-    if (stage == STAGE_WISHES) {
+    if (stage == STAGE_DESIRED_SAMPLES) {
         STORE_PAIR(f.desired_samples, k, floatBitsToUint(wish_of(f, tile_pixel(f, k))));
         return;
     }
     if (stage == STAGE_COARSE || stage == STAGE_FINE) {
         // one of sixteen in a row, another in each frame, speaks for all
-        uint place = 16u * k + (hash_combine(k, f.frame) & 15u);
+        uint place = BUDGET_SHARE * k + (hash_combine(k, f.frame) & (BUDGET_SHARE - 1u));
         tile[lane] = place < push.count ? uintBitsToFloat(LOAD_PAIR(f.desired_samples, place)) : vec2(0.0);
         barrier();
     }

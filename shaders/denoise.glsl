@@ -1,10 +1,9 @@
-// denoise: the mean of radiance over a pixel's neighbours on the same surface (common/filter.glsl), all channels with the same weights. Mirrors
-// src/render/denoise/filter.rs.
+// denoise: the mean of radiance over a pixel's neighbours on the same surface (common/filter.glsl), all channels with the same weights.
 #include "common/frame.glsl"
 
 layout(local_size_x = LANES) in;
 
-// 32 bytes: mean and number of samples, variance of one sample.
+// Mean and number of samples, variance of one sample; in memory a RadianceRecord.
 struct RadianceEstimate {
     vec3 mean;
     float samples;

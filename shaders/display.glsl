@@ -4,31 +4,13 @@
 // src/colour.rs on any device: a driver's own power function only guesses a byte, and the smallest values that the host encodes as
 // this byte and the next decide.
 #include "common/frame.glsl"
+#include "interface/display.glsl"
+#include "interface/shown.glsl"
 #include "common/srgb.glsl"
 
 layout(local_size_x = LANES) in;
 
-// Mirrors DisplayParams in src/render/realtime/display.rs.
-layout(buffer_reference, std430, buffer_reference_align = 8) readonly buffer DisplayParams {
-    uvec2 frame;       // FrameParams
-    uvec2 thresholds;  // a float a byte: the smallest value that is encoded so
-    uvec2 words;       // a uint a pixel
-    uint shown;        // see below
-    float gain;        // 2^exposure
-    float unit;        // world units
-    uint has_history;  // 0: there is nothing but the result
-};
 layout(buffer_reference, std430, buffer_reference_align = 4) writeonly buffer DisplayWords { uint v[]; };
-
-// As src/render/realtime/display.rs has them.
-const uint SHOWN_ACCESSIBILITY = 0u;
-const uint SHOWN_UNFILTERED = 1u;
-const uint SHOWN_SAMPLES = 2u;
-const uint SHOWN_VARIANCE = 3u;
-const uint SHOWN_DEPTH = 4u;
-const uint SHOWN_NORMAL = 5u;
-const uint SHOWN_POSITION = 6u;
-const uint SHOWN_BENT = 7u;
 
 // Variance of samples that are 0 or 1 at most.
 const float WHITE_VARIANCE = 0.25;

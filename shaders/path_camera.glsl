@@ -1,10 +1,7 @@
 // path_camera: one camera ray per sample, and the first vertex of each path (shaders/path/path.glsl).
+#include "interface/pixel_filter.glsl"
 #include "path/path.glsl"
 
-// Mirrors PixelFilter in src/render/path/mod.rs.
-const uint FILTER_BOX = 0u;
-const uint FILTER_TENT = 1u;
-const uint FILTER_BLACKMAN_HARRIS = 2u;
 const float BLACKMAN_HARRIS_RADIUS = 1.5;
 
 // Share of Blackman and Harris' window (four terms) below x, which goes over it from 0 to 1.

@@ -1,5 +1,6 @@
 // path_resolve: adds the paths of a launch to the film (common/film.glsl).
-#define CHANNELS 3
+#define FilmPixel RgbFilmPixel
+#define Film RgbFilm
 #include "common/film.glsl"
 #include "path/params.glsl"
 

@@ -1,10 +1,7 @@
 // rays: traces a set of rays from memory; writes a hit record each, or whether the way is blocked.
 #include "common/types.glsl"
+#include "interface/ray_set.glsl"
 
-layout(buffer_reference, std430, buffer_reference_align = 8) readonly buffer RaySet {
-    uvec2 rays;     // 8 floats each: origin, tmin, direction, tmax
-    uvec2 results;  // closest: 5 words each, as HITS.bin; any: a word each, 1 = occluded
-};
 layout(buffer_reference, std430, buffer_reference_align = 4) writeonly buffer Results { uint v[]; };
 
 Ray ray(uint index) {

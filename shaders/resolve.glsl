@@ -1,5 +1,6 @@
 // resolve: adds the occlusion samples of a launch to the film (common/film.glsl).
-#define CHANNELS 1
+#define FilmPixel ScalarFilmPixel
+#define Film ScalarFilm
 #include "common/film.glsl"
 
 bool add_sample(inout FilmPixel pixel, BlockParams p, uint k) {

@@ -15,15 +15,6 @@ const float MIN_VARIANCE = 0.02;
 // Half side of the neighbourhood that a history is held to, pixels.
 const int CLAMP_RADIUS = 3;
 
-// What moved, or changed its shape: box around where it was and where it is.
-struct MovedRecord {
-    vec3 lower;
-    float share;  // of what it covers that may have changed in this frame: the way it went by its size, at most 1
-    vec3 upper;
-    float moved_reserved;
-};
-layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer MovedRecords { MovedRecord v[]; };
-
 // By how much the accessibility of a point may have changed in this frame: the share of the cosine-weighted hemisphere that balls around what
 // moved cover.
 float possible_change(FrameParams f, vec3 position, vec3 normal) {

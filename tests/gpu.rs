@@ -3,6 +3,7 @@
 
 mod common;
 
+use skylit::interface::records::ray_set::Probe;
 use skylit::shaders;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -78,7 +79,8 @@ fn gpu_sampler_gives_the_hosts_bits() {
         let stream = tracer.stream(&shaders::probes::SAMPLER_PROBE_ANY).unwrap();
         let source = Buffer::from_slice(&device, "probe inputs", &inputs).unwrap();
         let results = Buffer::new(&device, "probe outputs", 48 * count as u64, Memory::Readback).unwrap();
-        let probe = Buffer::from_slice(&device, "probe", &[[source.address(), results.address()]]).unwrap();
+        let probe =
+            Buffer::from_slice(&device, "probe", &[Probe { inputs: source.address(), outputs: results.address() }]).unwrap();
         let push = Push { scene: tracer.scene_address(), pass: probe.address(), count, ..Default::default() };
         Commands::new(&device).unwrap().run(|r| stream.record(r, &push)).unwrap();
         let results = results.read(0, 48 * count as u64).unwrap();

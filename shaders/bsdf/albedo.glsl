@@ -2,21 +2,9 @@
 // The cosine's axis is a square root, for albedos change fastest at grazing angles.
 #ifndef BSDF_ALBEDO
 #define BSDF_ALBEDO
+#include "interface/albedo.glsl"
 #include "scene/scene.glsl"
 
-const uint ALBEDO_SIZE = 64u;
-const uint ALBEDO_GGX = 0u;         // of GGX that reflects everything, by the stretched cosine
-const uint ALBEDO_SCHLICK = 1u;     // mean of schlick_weight() over what GGX reflects
-const uint ALBEDO_SHEEN = 2u;       // Charlie
-const uint ALBEDO_BECKMANN = 3u;    // of Beckmann's microfacets that reflect everything, by the stretched cosine
-const uint ALBEDO_DIELECTRIC = 4u;  // eight for each index of refraction, DIELECTRIC_* as seen from outside, then from inside
-
-// Of GGX microfacets with the exact Fresnel term F of a dielectric:
-const uint DIELECTRIC_TOTAL = 0u;      // reflected beyond the critical angle, over ALBEDO_GGX
-const uint DIELECTRIC_REFLECTED = 1u;  // reflected where there is refraction, over ALBEDO_GGX
-const uint DIELECTRIC_OPEN = 2u;       // refracted, as if F were 0 where there is refraction
-const uint DIELECTRIC_CLOSED = 3u;     // and what of that F takes away
-const uint DIELECTRIC_LAYERS = 4u;
 
 // x: along cosines, y: along roughness, both from 0 to 1.
 float albedo(uint layer, float x, float y) {

@@ -1,33 +1,11 @@
-// Pixels of a block of the image, and the camera's rays through them. Mirrors BlockParams in src/render/block.rs.
+// Pixels of a block of the image, and the camera's rays through them.
 #ifndef COMMON_CAMERA
 #define COMMON_CAMERA
 #include "common/types.glsl"
+#include "interface/block.glsl"
 #include "common/morton.glsl"
 #include "common/queue.glsl"
 #include "common/sampler.glsl"
-
-layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer BlockParams {
-    vec4 camera_to_world[3];  // relative to the scene's origin
-    vec2 view;                // half width and half height of the view: tangents, or world units when orthographic
-    uint orthographic;
-    uint seed;
-    uvec2 image_size;
-    uvec2 block_origin;       // pixels
-    uvec2 block_size;         // pixels
-    uint tiles_x;             // 8x8 tiles in a row of the block
-    uint hemisphere;          // 0: about the geometric normal, 1: about the shading normal
-    float falloff_log2;       // a hit at distance d counts 2^(-d * falloff_log2)
-    float radius;             // world units beyond which nothing occludes
-    uvec2 film;               // FilmPixel per pixel of the block
-    uvec2 samples;            // a float per ray of a launch: what the sample adds to its pixel, negative where it met nothing
-    uvec2 aov;                // AovPixel per ray of a launch
-    uvec2 tiles;              // a uint each: the tiles that are rendered; null: all
-    RayQueue queue;           // occlusion rays
-    uvec2 ray_dump;           // where to write the camera rays, or null
-    uvec2 occlusion_dump;     // where to write the occlusion rays, or null
-    uvec2 frame;              // FrameParams, or null
-    uvec2 path;               // PathParams, or null
-};
 
 // A ray index counts the samples of a pixel before the pixels of the block, so that neighbouring lanes share a pixel. Pixels are
 // counted in 8x8 tiles, Morton order within: with one sample eight neighbouring lanes are a 4x2 patch.

@@ -1,20 +1,13 @@
 // The film on the device, and the pass that adds the samples of a launch to it, a thread a pixel, in the order of the samples: sums do not depend on how
 // the samples were cut into launches, nor on which of them was traced first.
 //
-// Who includes this defines CHANNELS, the values of a pixel, and `add_sample`. Sums are compensated (Kahan 1965): a million samples keep their digits.
+// Who includes this defines FilmPixel and Film, which are one of the records below, and `add_sample`. Sums are compensated (Kahan 1965): a million samples keep their digits.
 #ifndef COMMON_FILM
 #define COMMON_FILM
 #include "common/camera.glsl"
+#include "interface/film.glsl"
 
 layout(local_size_x = LANES) in;
-
-struct FilmPixel {
-    vec2 sum[CHANNELS];          // of each channel, and its compensation
-    vec2 sum_squares[CHANNELS];  // likewise
-    uint covered;                // samples whose camera ray met something; what the others add, `add_sample` says
-    uint not_finite;             // samples that were left out
-};
-layout(buffer_reference, std430, buffer_reference_align = 8) buffer Film { FilmPixel v[]; };
 
 // x: sum, y: what it has too much.
 vec2 kahan_add(vec2 sum, float x) {

@@ -37,8 +37,6 @@ float mean_variance(FrameParams f, float n) {
 
 // A step of the filter, in the push constants: estimates from `rays` to `queued`, or accessibility to the result where that is null.
 // Sides of the box on which it reaches to the radius, and the distance of its taps.
-const uint STEP_HORIZONTAL = 1u;
-const uint STEP_VERTICAL = 2u;
 
 // Pixels to each side.
 int box_radius(FrameParams f, float samples) {

@@ -1,71 +1,11 @@
-// What the passes of a frame share. Mirrors FrameParams in src/render/realtime/params.rs.
-//
-// Images are in plain memory, rows from the top, one record a pixel:
-//   surface   2 x 16 bytes: position and spawn offset; geometric normal on the viewer's side
-//   guide     8 bytes: view depth (infinite: nothing is there), normal and id packed: what edge tests of neighbours read
-//   history   8 bytes: mean accessibility; number of samples behind it, variance of one of them
-//   current   8 bytes: the same of this frame's samples alone; no samples: 0 of them
-//   bent      12 bytes, where asked for: mean of accessibility times direction (bent normal), world space; one for each of
-//             this frame's samples, history and the filtered result. Its samples are those of the accessibility beside it.
+// What the passes of a frame share.
 #ifndef COMMON_FRAME
 #define COMMON_FRAME
 #include "common/types.glsl"
 #include "common/morton.glsl"
 #include "common/queue.glsl"
-
-layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer FrameParams {
-    vec4 camera_to_world[3];           // relative to the scene's origin
-    vec4 world_to_camera[3];
-    vec4 previous_world_to_camera[3];
-    vec2 view;                         // half width and half height of the view: tangents, or world units when orthographic
-    vec2 previous_view;
-    uint orthographic;
-    uint previous_orthographic;
-    uvec2 size;                        // pixels
-    uint tiles_x;                      // 8x8 tiles in a row
-    uint frame;                        // counts up; where samples differ from frame to frame
-    uint seed;
-    uint rays_per_pixel;               // of a pixel that is sampled in this frame; with a budget: at most
-    uint pattern;                      // which pixels are sampled: 0 all, 1 every second, 2 one of four
-    uint sequence;                     // see common/sequence.glsl
-    float reach;                       // world units: occlusion rays end there
-    float falloff_log2;                // a hit at distance d counts 2^(-d * falloff_log2)
-    float most_samples;                // that a history counts at most
-    float depth_tolerance;             // distance from a pixel's plane, in pixels' footprints, at which an edge begins
-    float normal_tolerance;            // cosine between normals at which an edge begins
-    uint still;                        // 1: neither camera nor scene have moved since the previous frame
-    uint has_history;                  // 0: what lies in the history buffers means nothing
-    uint moved_count;
-    float clamp_width;                 // standard errors by which a history may differ from its surroundings where things move; 0: any
-    float moved_weight;                // how much what moves shortens histories
-    float filter_samples;              // samples that a filtered value should rest on
-    uint rest;                         // 1: nothing moves, and pixels with all their samples get no more
-    uint slices;                       // of gtao
-    uint steps;                        // of gtao, on each side of a slice
-    float evenness;                    // the variance of the mean of n samples falls as n^-(1 + evenness)
-    uint most_rays;                    // of a pixel in a frame with a budget
-    uvec2 surface;
-    uvec2 axes;                        // 3 floats a pixel: the hemisphere's axis where it is not the geometric normal; or null
-    uvec2 guide;
-    uvec2 previous_guide;
-    uvec2 history;
-    uvec2 previous_history;
-    uvec2 current;
-    uvec2 samples;                     // a float per ray of a launch, where a pixel has several
-    uvec2 previous_position;           // 3 floats a pixel: where its surface was in the previous frame; null: nothing moves
-    uvec2 result;                      // a float a pixel: accessibility
-    uvec2 moved;                       // MovedRecord: what has moved since the previous frame
-    uvec2 ray_count;                   // a uint: occlusion rays of the frame
-    uvec2 current_bent;                // 3 floats a pixel, of each bent image: of this frame's samples; null, as the others: not asked for
-    uvec2 previous_bent_history;
-    uvec2 bent[4];                     // history; two between the steps of the filter; filtered
-    uvec2 plan;                        // 8 bytes a pixel: number of its first ray in its sequence (24 bits), rays; samples that its
-                                       // history counts at most; null, as what follows: every pixel has as many
-    uvec2 list;                        // a uint a ray: pixel (28 bits), which of its rays
-    uvec2 taken;                       // a uint a pixel: rays that it has had
-    uvec2 desired_samples;                      // 8 bytes a pixel, in tiles: deviation of one sample, samples
-    uvec2 budget_sums;                 // see common/budget.glsl
-};
+#include "interface/frame.glsl"
+#include "interface/pattern.glsl"
 
 layout(buffer_reference, std430, buffer_reference_align = 4) buffer FloatImage { float v[]; };
 layout(buffer_reference, std430, buffer_reference_align = 16) buffer QuadImage { uvec4 v[]; };
@@ -196,8 +136,6 @@ struct Estimate {
     float variance;
 };
 
-const float MAX_VARIANCE = 0.5;  // of values from 0 to 1: a quarter, and half of it more for an unbiased estimate from two
-
 uvec2 pack_estimate(Estimate e) {
     // sixteenths of a sample: interpolated histories have parts of them
     uint samples = uint(clamp(e.samples, 0.0, 4095.0) * 16.0 + 0.5);
@@ -208,9 +146,6 @@ uvec2 pack_estimate(Estimate e) {
 Estimate unpack_estimate(uvec2 bits) {
     return Estimate(uintBitsToFloat(bits.x), float(bits.y >> 16) * 0.0625, float(bits.y & 0xffffu) * (MAX_VARIANCE / 65535.0));
 }
-
-const uint PATTERN_CHECKER = 1u;
-const uint PATTERN_QUARTER = 2u;
 
 bool is_sampled(FrameParams f, uvec2 pixel) {
     if (f.pattern == PATTERN_CHECKER) return ((pixel.x + pixel.y + f.frame) & 1u) == 0u;

@@ -7,13 +7,8 @@
 #define COMMON_QUEUE
 #include "common/ray_seed.glsl"
 #include "common/types.glsl"
+#include "interface/queue.glsl"
 
-// Mirrors QueueRecord in src/tracer/queue.rs.
-struct RayQueue {
-    uvec2 rays;   // 32 bytes each
-    uvec2 tags;   // a uint each: for the callback of the stream that traces the queue
-    uvec2 count;  // a uint; the host clears it and sees to it that the queue is large enough
-};
 layout(buffer_reference, std430, buffer_reference_align = 4) buffer QueueCount { uint v[]; };
 layout(buffer_reference, std430, buffer_reference_align = 4) writeonly buffer QueueTags { uint v[]; };
 
@@ -34,7 +29,7 @@ uint claim(uvec2 counter) {
 uint next_ray_seed = 0u;
 
 // Returns the ray's place in the queue: the index with which a stream over the queue will be called.
-uint append_ray(RayQueue queue, Ray ray, uint tag) {
+uint append_ray(QueueRecord queue, Ray ray, uint tag) {
     uint slot = claim(queue.count);
     if (next_ray_seed != 0u) {
         ray.tmin = tmin_of_seed(next_ray_seed);

@@ -2,11 +2,8 @@
 // the papers.
 #ifndef COMMON_SAMPLER
 #define COMMON_SAMPLER
+#include "interface/sampler.glsl"
 
-const uint CAMERA_FILM = 0u;
-const uint CAMERA_LENS = 1u;
-const uint AO_DIRECTION = 2u;
-const uint RAY_SEED = 3u;
 
 uint hash(uint x) {
     x ^= x >> 16;

@@ -4,12 +4,8 @@
 #define COMMON_SEQUENCE
 #include "common/morton.glsl"
 #include "common/sampler.glsl"
+#include "interface/sequence.glsl"
 
-const uint SEQUENCE_WHITE = 0u;
-const uint SEQUENCE_STRATIFIED = 1u;
-const uint SEQUENCE_SOBOL = 2u;
-const uint SEQUENCE_BLUE = 3u;
-const uint SEQUENCE_R2 = 4u;
 
 // 2^32 / g and 2^32 / g^2, g = 1.3247... the plastic number
 const uvec2 R2_STEP = uvec2(3242174889u, 2447445414u);

@@ -2,27 +2,8 @@
 #ifndef COMMON_TYPES
 #define COMMON_TYPES
 #include "interface/constants.glsl"
+#include "interface/ray.glsl"
 
-// The points origin + t * direction with tmin < t < tmax. A ray with tmax <= tmin is no ray: it is not traced, and its
-// callback reports a miss.
-struct Ray {
-    vec3 origin;
-    float tmin;
-    vec3 direction;
-    float tmax;
-};
-
-// What a ray met. t = inf and ids = INVALID for a miss. Ids are those of the scene: placed mesh, and triangle or sphere
-// in it; u, v are the barycentric weights of the triangle's second and third corner.
-struct Hit {
-    float t;
-    uint instance;
-    uint primitive;
-    float u;
-    float v;
-};
-
-const uint INVALID = 0xffffffffu;
 const float INFINITY = 1.0 / 0.0;
 
 Ray no_ray() { return Ray(vec3(0.0), 0.0, vec3(0.0, 0.0, 1.0), -1.0); }
@@ -76,18 +57,6 @@ Ray load_ray(uvec2 rays, uint k) {
     vec4 a = uintBitsToFloat(Quads(rays).v[2u * k]), b = uintBitsToFloat(Quads(rays).v[2u * k + 1u]);
     return Ray(a.xyz, a.w, b.xyz, b.w);
 }
-
-// Every stream has this block; `pass` is the address of the pass's own parameters.
-layout(push_constant) uniform Push {
-    uvec2 scene;       // SceneRoot
-    uvec2 pass;
-    uvec2 rays;        // the rays of this launch, where they are in memory: a queue's, or the compute tracer's own; or what was drawn (trace/visibility.glsl)
-    uvec2 queued;      // address of a uint: how many rays the queue holds; null when the host knows
-    uint first;        // index of the first ray of this launch
-    uint count;        // rays in this launch; of a queue: at most
-    uint sample_index; // the first sample
-    uint sample_bits;  // a launch takes 2^sample_bits samples of each of its pixels
-} push;
 
 // Rays that this launch has to trace. Everything beyond is to be left alone.
 uint ray_count() {

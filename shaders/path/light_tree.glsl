@@ -1,26 +1,11 @@
 // A light for a point out of many: a tree over them, descended towards what may be bright there (Conty Estevez and Kulla, "Importance
-// Sampling of Many Lights with Adaptive Tree Splitting", HPG 2018; the bounds are those of pbrt-v4, 12.6.3). Mirrors src/render/path/light_tree.rs.
+// Sampling of Many Lights with Adaptive Tree Splitting", HPG 2018; the bounds are those of pbrt-v4, 12.6.3).
 #ifndef PATH_LIGHT_TREE
 #define PATH_LIGHT_TREE
 #include "common/types.glsl"
 #include "common/sampler.glsl"
+#include "interface/lights.glsl"
 
-// What a subtree's lights may do at most. Where and how large: a ball. Where they shine: within an angle o + e of an axis, fading beyond o.
-struct LightNode {
-    vec3 center;
-    float radius;
-    vec3 axis;
-    float intensity;  // brightness per solid angle, in its best direction
-    float cos_o;
-    float sin_o;
-    float cos_e;
-    uint link;        // of an inner node: its first child, the second follows; of a leaf: its light
-};
-layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer LightNodes { LightNode v[]; };
-
-const uint LIGHT_LEAF = 0x80000000u;
-const uint LIGHT_BOTH_WAYS = 0x40000000u;  // it shines along its axis and against it
-const uint LIGHT_LINK = 0x3fffffffu;
 // A sample's number is stretched at each choice; below this share of it, too few of its bits are left, and another takes its place.
 const float MIN_STRETCH = 1.0 / 4096.0;
 

@@ -1,5 +1,4 @@
-// Lights: what emits, how one is chosen (by power, or from a tree), how a point on it is sampled and with which density. Mirrors
-// src/render/path/lights.rs.
+// Lights: what emits, how one is chosen (by power, or from a tree), how a point on it is sampled and with which density.
 //
 // One two-dimensional sample does it all: its first number chooses the light, and what is left of it places the point. Every light then gets points
 // that are as evenly distributed as the samples are, where a choice by a number of its own would give each light a random subset of them.
@@ -11,30 +10,6 @@
 #include "path/light_tree.glsl"
 #include "path/shading.glsl"
 
-
-const uint LIGHT_TWO_SIDED = 1u;  // triangle, rectangle: it emits from its back, too
-const uint LIGHT_MIRRORED = 2u;   // triangle, rectangle: a mirroring transform has turned its winding
-const uint LIGHT_ALPHA = 4u;      // triangle: its material's alpha says how much of it is there
-
-struct LightRecord {
-    vec3 position;      // point, spot: where; triangle, rectangle: a corner; sphere: centre
-    float radius;       // sphere; directional: 1 - cosine of half the angle that it fills
-    vec3 axis;          // spot, directional: where it shines; triangle, rectangle: first edge
-    float cos_inner;    // spot
-    vec3 edge;          // triangle, rectangle: second edge
-    float cos_outer;    // spot
-    vec3 intensity;     // point, spot: per solid angle; directional: irradiance; else: radiance, before any texture
-    float range;        // point, spot: without effect beyond
-    float probability;  // of being chosen
-    uint trail;         // of a light in the tree: its way from the root
-    uint light_reserved;
-    uint kind;
-    uint instance;      // triangle, rectangle, sphere: what is seen of it
-    uint primitive;
-    uint flags;         // LIGHT_TWO_SIDED, LIGHT_MIRRORED, LIGHT_ALPHA
-    float lift;         // triangle, rectangle, sphere: how far above itself rounding may have put it
-};
-layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer LightRecords { LightRecord v[]; };
 
 struct LightSample {
     vec3 wi;          // unit, towards the light

@@ -1,5 +1,5 @@
 // Environments from images: radiance from a direction, and directions by how much light comes from there. Texels are looked up bilinearly.
-// Directions are drawn by weights of texels (src/render/path/environment.rs), interpolated likewise: a row of patches between the middles of texels, a
+// Directions are drawn by weights of texels (src/integrators/path/environment.rs), interpolated likewise: a row of patches between the middles of texels, a
 // patch of it, and a place in the patch (src/sampling/patches.rs has the formulas). The two numbers that a direction is drawn with stay in order, so that those which are
 // spread evenly are directions that are; of an emitter that nothing hides little is left to chance.
 #ifndef PATH_MAP
@@ -8,7 +8,7 @@
 #include "path/params.glsl"
 #include "bsdf/microfacet.glsl"
 
-vec3 map_direction(EnvironmentMap map, vec3 w) {
+vec3 map_direction(EnvironmentRecord map, vec3 w) {
     return vec3(dot(map.to_map[0].xyz, w), dot(map.to_map[1].xyz, w), dot(map.to_map[2].xyz, w));
 }
 
@@ -17,13 +17,13 @@ vec2 map_coordinates(vec3 d) {
     return vec2(0.5 + turns_of(d.x, -d.z), 2.0 * turns_of(length(d.xz), d.y));
 }
 
-vec4 map_texel(EnvironmentMap map, int x, int y) {
+vec4 map_texel(EnvironmentRecord map, int x, int y) {
     int w = int(map.width);
     x = x < 0 ? x + w : x >= w ? x - w : x;
     return load_quad(map.texels, uint(clamp(y, 0, int(map.height) - 1) * w + x));
 }
 
-vec3 map_lookup(EnvironmentMap map, vec2 uv) {
+vec3 map_lookup(EnvironmentRecord map, vec2 uv) {
     vec2 p = uv * vec2(map.width, map.height) - 0.5;
     ivec2 i = ivec2(floor(p));
     vec2 f = p - vec2(i);
@@ -33,7 +33,7 @@ vec3 map_lookup(EnvironmentMap map, vec2 uv) {
         f.y);
 }
 
-vec3 map_radiance(EnvironmentMap map, vec3 w) {
+vec3 map_radiance(EnvironmentRecord map, vec3 w) {
     return map_lookup(map, map_coordinates(map_direction(map, w)));
 }
 
@@ -46,20 +46,20 @@ struct Patch {
 vec4 patch_value(Patch q) { return mix(mix(q.a, q.b, q.at.x), mix(q.c, q.d, q.at.x), q.at.y); }
 
 // x: column; y: row, of which those at the poles are halves. at: in the patch.
-Patch map_patch(EnvironmentMap map, ivec2 i, vec2 at) {
+Patch map_patch(EnvironmentRecord map, ivec2 i, vec2 at) {
     return Patch(map_texel(map, i.x, i.y - 1), map_texel(map, i.x + 1, i.y - 1), map_texel(map, i.x, i.y), map_texel(map, i.x + 1, i.y), at);
 }
 
 // Where a patch begins among numbers from 0 to 1, and where it ends; those of rows come first.
-vec2 map_interval(EnvironmentMap map, uint at) {
+vec2 map_interval(EnvironmentRecord map, uint at) {
     Floats table = Floats(map.table);
     return vec2(table.v[at], table.v[at + 1u]);
 }
 
-uint map_columns(EnvironmentMap map, uint row) { return map.height + 2u + row * (map.width + 1u); }
+uint map_columns(EnvironmentRecord map, uint row) { return map.height + 2u + row * (map.width + 1u); }
 
 // Density per solid angle of a direction in a patch whose row and column have these intervals.
-float map_density(EnvironmentMap map, Patch q, uint row, vec2 rows, vec2 columns, float sin_theta) {
+float map_density(EnvironmentRecord map, Patch q, uint row, vec2 rows, vec2 columns, float sin_theta) {
     float mean = 0.25 * (q.a.w + q.b.w + q.c.w + q.d.w);
     if (!(mean > 0.0 && sin_theta > 0.0)) return 0.0;
     float halves = row == 0u || row == map.height ? 2.0 : 1.0;
@@ -67,7 +67,7 @@ float map_density(EnvironmentMap map, Patch q, uint row, vec2 rows, vec2 columns
     return density * (float(map.width) * float(map.height) / (2.0 * PI * PI * sin_theta));
 }
 
-float map_pdf(EnvironmentMap map, vec3 w) {
+float map_pdf(EnvironmentRecord map, vec3 w) {
     vec3 d = map_direction(map, w);
     vec2 p = map_coordinates(d) * vec2(map.width, map.height) - 0.5;
     ivec2 i = ivec2(floor(p));
@@ -87,7 +87,7 @@ struct MapSample {
 };
 
 // The interval among `count` that holds u, which begin at the table's place `first`; what is left of u is as even as it was.
-uint find_interval(EnvironmentMap map, uint first, uint count, inout float u, out vec2 interval) {
+uint find_interval(EnvironmentRecord map, uint first, uint count, inout float u, out vec2 interval) {
     Floats table = Floats(map.table);
     uint low = 0u;
     while (count > 1u) {
@@ -110,7 +110,7 @@ float sample_linear(float u, float a, float b) {
     return a + root > 0.0 ? min(u / (a + root), 0.99999994) : 0.0;
 }
 
-MapSample sample_map(EnvironmentMap map, vec2 u) {
+MapSample sample_map(EnvironmentRecord map, vec2 u) {
     vec2 rows, columns;
     uint row = find_interval(map, 0u, map.height + 1u, u.y, rows);
     uint column = find_interval(map, map_columns(map, row), map.width, u.x, columns);

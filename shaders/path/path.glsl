@@ -9,8 +9,6 @@
 #include "path/view.glsl"
 
 // Dimensions of the sampler (src/sampling/sobol.rs), in pairs: vertex n begins at PATH_FIRST + n * PATH_STRIDE.
-const uint PATH_FIRST = 8u;
-const uint PATH_STRIDE = 8u;
 const uint BSDF_DIRECTION = 0u;
 const uint BSDF_LOBE = 1u;     // and Russian roulette
 const uint LIGHT_POINT_ON = 2u;  // which light, and where on it

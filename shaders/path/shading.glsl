@@ -1,4 +1,4 @@
-// From a material to its BSDF and to what it emits. Mirrors ShadingRecord of src/tracer/shading.rs.
+// From a material to its BSDF and to what it emits.
 #ifndef PATH_SHADING
 #define PATH_SHADING
 #include "scene/surface.glsl"
@@ -7,37 +7,8 @@
 #include "path/cone.glsl"
 #include "bsdf/bsdf.glsl"
 #include "interface/material_model.glsl"
+#include "interface/shading.glsl"
 #include "interface/walls.glsl"
-
-struct ShadingRecord {
-    vec3 emission;         // radiance
-    uint model;
-    float metallic;
-    float roughness;
-    float ior;
-    float specular;        // KHR_materials_specular
-    vec3 specular_color;   // of mirror, glass, conductor: factor of what is reflected
-    uint emits_back;       // from both sides
-    vec3 eta;              // conductor
-    float transmission;
-    vec3 k;
-    float clearcoat;
-    vec3 transmitted;      // glass: factor of what is refracted
-    float clearcoat_roughness;
-    vec3 sheen_color;
-    float sheen_roughness;
-    vec3 absorption;       // per unit of length in the volume
-    uint walls;            // WALLS_*
-    vec2 anisotropy;       // strength times cosine and sine of its angle from the tangent
-    float normal_scale;
-    float clearcoat_normal_scale;
-    uint glass_layer;      // of the albedo tables: among the indices of refraction
-    int priority;          // of a volume among those that overlap (path/media.glsl)
-    uint shading_reserved0;
-    uint shading_reserved1;
-    TextureUse uses[TEXTURE_FEATURES_COUNT];
-};
-layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer ShadingRecords { ShadingRecord v[]; };
 
 // The record of a material, read where it is asked: what a branch asks for that nobody takes is not fetched.
 #define SHADING_OF(material) ShadingRecords(SceneRoot(push.scene).shading).v[material]

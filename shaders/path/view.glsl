@@ -1,13 +1,8 @@
-// What a camera ray sees of a surface, where no light is asked for. Mirrors View in src/render/path/mod.rs.
+// What a camera ray sees of a surface, where no light is asked for.
 #ifndef PATH_VIEW
 #define PATH_VIEW
+#include "interface/view.glsl"
 #include "path/shading.glsl"
-
-const uint VIEW_NONE = 0u;
-const uint VIEW_NORMALS = 1u;
-const uint VIEW_ALBEDO = 2u;
-const uint VIEW_DEPTH = 3u;
-const uint VIEW_BAKED_OCCLUSION = 4u;
 
 vec3 view_value(uint view, Surface s, Shading shown, float distance_, float log_side) {
     if (view == VIEW_DEPTH) return vec3(distance_);

@@ -3,16 +3,8 @@
 #ifndef RASTER_VIEW
 #define RASTER_VIEW
 #include "common/camera.glsl"
+#include "interface/raster.glsl"
 #include "scene/scene.glsl"
-
-// Mirrors RasterParams in src/render/raster.rs.
-layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer RasterParams {
-    vec4 clip[4];   // rows: from a place relative to the eye to clip space
-    vec3 eye;
-    float turned;   // -1 where the camera's transform turns the winding, else 1
-    vec2 at;        // where in a pixel its ray passes
-    uvec2 block;    // BlockParams
-};
 
 // Clip space of a place relative to the eye.
 vec4 to_clip(vec3 d) {

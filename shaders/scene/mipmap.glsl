@@ -1,22 +1,9 @@
 // Levels of textures: each half as wide and high as the one before, rounded down, every texel the mean of what it covers. Level 0 is the texture
-// itself (scene/texture.glsl); the others are linear, 16 bits a channel, or floats where the texture has more than 8 bits itself. Mirrors src/tracer/mipmap.rs.
+// itself (scene/texture.glsl); the others are linear, 16 bits a channel, or floats where the texture has more than 8 bits itself.
 #ifndef SCENE_MIPMAP
 #define SCENE_MIPMAP
+#include "interface/texels.glsl"
 #include "scene/texture.glsl"
-
-// What a texture's colours are, and so how they were averaged.
-const uint TEXELS_LINEAR = 0u;
-const uint TEXELS_SRGB = 1u;
-const uint TEXELS_COVERED = 2u;  // sRGB of what alpha lets through: weighted by it, and stored so
-
-const uint MAX_LEVELS = 15u;    // beside level 0
-
-struct MipRecord {
-    uvec2 texels[3];          // of level 1, for each TEXELS_*: a uvec2 each, or a vec4; null: unused
-    uint last;                // the smallest level
-    uint first[MAX_LEVELS];  // texels before each level, from level 1 on
-};
-layout(buffer_reference, std430, buffer_reference_align = 8) readonly buffer MipRecords { MipRecord v[]; };
 
 // A texel of the levels from 1 on.
 vec4 mean_texel(TextureRecord texture, uvec2 texels, uint i) {

@@ -1,15 +1,7 @@
-// Where surfaces were in the previous frame. Mirrors src/tracer/motion.rs.
+// Where surfaces were in the previous frame.
 #ifndef SCENE_MOTION
 #define SCENE_MOTION
 #include "scene/surface.glsl"
-
-// For each entry of the top level.
-struct MotionRecord {
-    vec4 previous_group_to_world[3];
-    uvec2 previous_positions;  // of the group's vertices; null: as they are
-    uvec2 motion_reserved;
-};
-layout(buffer_reference, std430, buffer_reference_align = 16) readonly buffer MotionRecords { MotionRecord v[]; };
 
 // World position, in the previous frame, of the point of the surface that `hit` is.
 vec3 previous_position(Hit hit, Surface s) {

@@ -7,8 +7,8 @@
 
 uint wrap_texel(int i, uint size, uint mode) {
     int n = int(size);
-    if (mode == 2u) return uint(clamp(i, 0, n - 1));
-    if (mode == 1u) {
+    if (mode == WRAP_CLAMP) return uint(clamp(i, 0, n - 1));
+    if (mode == WRAP_MIRROR) {
         int m = i % (2 * n);
         m += m < 0 ? 2 * n : 0;
         return uint(m < n ? m : 2 * n - 1 - m);
@@ -39,7 +39,7 @@ vec4 decoded_texel(TextureRecord texture, int x, int y, bool srgb) {
 // repeat and mirror; clamp needs no more than the neighbourhood.
 vec2 fold(vec2 uv, TextureRecord texture) {
     vec2 folded = uv - 2.0 * floor(uv * 0.5);
-    return vec2(texture.wrap_u == 2u ? clamp(uv.x, -1.0, 2.0) : folded.x, texture.wrap_v == 2u ? clamp(uv.y, -1.0, 2.0) : folded.y);
+    return vec2(texture.wrap_u == WRAP_CLAMP ? clamp(uv.x, -1.0, 2.0) : folded.x, texture.wrap_v == WRAP_CLAMP ? clamp(uv.y, -1.0, 2.0) : folded.y);
 }
 
 // Filtered value at uv (v down). sRGB is decoded before filtering.

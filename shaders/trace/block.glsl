@@ -2,6 +2,7 @@
 #ifndef TRACE_BLOCK
 #define TRACE_BLOCK
 #include "common/types.glsl"
+#include "interface/hierarchy.glsl"
 
 // On a CPU driver a divergent load is one gather, of 32 or of 64 bits alike: load pairs where 64-bit integers exist.
 #ifdef LOAD64
@@ -25,9 +26,6 @@ uvec2 block_address(uvec2 blocks, uint block) {
     uvec2 address = offset_address(blocks, block << 6);
     return uvec2(address.x, address.y + (block >> 26));
 }
-
-// Bit of a block's last word: it is a leaf.
-const uint LEAF = 0x80000000u;
 
 #define BYTE(w, k) ((k) == 0 ? (w).x & 0xffu : (k) == 3 ? (w).x >> 24 : (k) < 3 ? ((w).x >> ((k) * 8)) & 0xffu : (k) == 4 ? (w).y & 0xffu : ((w).y >> (((k) - 4) * 8)) & 0xffu)
 

@@ -1,22 +1,17 @@
 // Results of one launch of the compute tracer's fast kernel, in memory between its steps. The rays are at push.rays.
 #ifndef TRACE_LAUNCH
 #define TRACE_LAUNCH
+#include "interface/hierarchy.glsl"
 #include "scene/scene.glsl"
-#include "trace/records.glsl"
 
 layout(buffer_reference, std430, buffer_reference_align = 8) buffer LaunchHits { uvec2 v[]; };
 layout(buffer_reference, std430, buffer_reference_align = 4) buffer LaunchFlags { uint v[]; };
-
-// Stands where a result will be. Some CPU drivers leave any loop after 65,535 turns: a ray that this happens to keeps the mark,
-// and is reported instead of delivering what an earlier launch left there. Mirrored in src/tracer/stream.rs: where rays come
-// from a queue, the host puts it.
-const uint UNFINISHED = 0x7fc0dead;
 
 void mark_unfinished(SceneRoot root, uint k) {
 #ifdef STREAM_ANY
     LaunchFlags(root.launch_hits).v[k] = UNFINISHED;
 #else
-    LaunchHits(root.launch_hits).v[3u * k].x = UNFINISHED;
+    LaunchHits(root.launch_hits).v[LAUNCH_HIT_PAIRS * k].x = UNFINISHED;
 #endif
 }
 
@@ -24,7 +19,7 @@ bool is_finished(SceneRoot root, uint k) {
 #ifdef STREAM_ANY
     bool finished = LaunchFlags(root.launch_hits).v[k] != UNFINISHED;
 #else
-    bool finished = LaunchHits(root.launch_hits).v[3u * k].x != UNFINISHED;
+    bool finished = LaunchHits(root.launch_hits).v[LAUNCH_HIT_PAIRS * k].x != UNFINISHED;
 #endif
     if (!finished) atomicAdd(LaunchFlags(root.unfinished).v[0], 1u);
     return finished;
@@ -40,18 +35,18 @@ bool load_any(SceneRoot root, uint k) {
 
 // The tracer's own ids; scene ids are found when the hit is delivered.
 void store_closest(SceneRoot root, uint k, float t, uint instance, uint primitive, vec2 uv) {
-    STORE_PAIR(root.launch_hits, 3u * k, uvec2(floatBitsToUint(t), instance));
+    STORE_PAIR(root.launch_hits, LAUNCH_HIT_PAIRS * k, uvec2(floatBitsToUint(t), instance));
     // of a miss nothing else is read
     if (t == INFINITY) return;
-    STORE_PAIR(root.launch_hits, 3u * k + 1u, uvec2(primitive, floatBitsToUint(uv.x)));
-    STORE_PAIR(root.launch_hits, 3u * k + 2u, uvec2(floatBitsToUint(uv.y), 0u));
+    STORE_PAIR(root.launch_hits, LAUNCH_HIT_PAIRS * k + 1u, uvec2(primitive, floatBitsToUint(uv.x)));
+    STORE_PAIR(root.launch_hits, LAUNCH_HIT_PAIRS * k + 2u, uvec2(floatBitsToUint(uv.y), 0u));
 }
 
 Hit load_closest(SceneRoot root, uint k) {
-    uvec2 a = LOAD_PAIR(root.launch_hits, 3u * k);
+    uvec2 a = LOAD_PAIR(root.launch_hits, LAUNCH_HIT_PAIRS * k);
     if (uintBitsToFloat(a.x) == INFINITY) return miss();
-    uvec2 b = LOAD_PAIR(root.launch_hits, 3u * k + 1u);
-    uvec2 c = LOAD_PAIR(root.launch_hits, 3u * k + 2u);
+    uvec2 b = LOAD_PAIR(root.launch_hits, LAUNCH_HIT_PAIRS * k + 1u);
+    uvec2 c = LOAD_PAIR(root.launch_hits, LAUNCH_HIT_PAIRS * k + 2u);
     return scene_hit(uintBitsToFloat(a.x), a.y, b.x, uintBitsToFloat(uvec2(b.y, c.x)));
 }
 

@@ -1,10 +1,15 @@
-// The fast kernels' leaves: a sphere, or a pair of triangles that share an edge (src/bvh/pairs.rs).
+// The fast kernels' leaves: a sphere, or a pair of triangles that share an edge (src/accel/pairs.rs).
 #ifndef TRACE_LEAF
 #define TRACE_LEAF
+#include "interface/hierarchy.glsl"
 #include "scene/material.glsl"
 #include "scene/sphere.glsl"
-#include "trace/records.glsl"
 #include "trace/triangle.glsl"
+
+// The words of a leaf of primitives, of either kind: their numbers with flags, and the order of triangles' corners.
+#define FIRST_ID TRIANGLE_LEAF_PRIMITIVES.x
+#define SECOND_ID TRIANGLE_LEAF_PRIMITIVES.y
+#define ORDER TRIANGLE_LEAF_ORDER
 
 // The weight of the corner that lies at place `k` of a triangle.
 float pick_weight(vec3 weights, uint k) {

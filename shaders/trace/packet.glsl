@@ -139,15 +139,15 @@ void main() {
         uvec2 w7 = uvec2(subgroupBroadcast(own.x, 7), subgroupBroadcast(own.y, 7));
         uint octant = 7u - (class_ & 7u);
         uint nearest = INVALID;
-        if ((w7.y & LEAF) == 0u) {
+        if ((BLOCK_FLAGS & LEAF) == 0u) {
             vec3 scale[PACKET_RAYS], corner[PACKET_RAYS];
             FOR_RAYS {
-                scale[j] = uintBitsToFloat(uvec3(w2.y >> 24, w4.y >> 24, w6.y >> 24) << 23) * inverse[j];
-                corner[j] = (uintBitsToFloat(uvec3(w0, w1.x)) - origin[j]) * inverse[j];
+                scale[j] = uintBitsToFloat(uvec3(WIDE_NODE_LOWER_X.y >> 24, WIDE_NODE_LOWER_Y.y >> 24, WIDE_NODE_LOWER_Z.y >> 24) << 23) * inverse[j];
+                corner[j] = (uintBitsToFloat(WIDE_NODE_CORNER(uvec3)) - origin[j]) * inverse[j];
             }
-            uvec2 near_x = (class_ & 4u) != 0u ? w3 : w2, far_x = (class_ & 4u) != 0u ? w2 : w3;
-            uvec2 near_y = (class_ & 2u) != 0u ? w5 : w4, far_y = (class_ & 2u) != 0u ? w4 : w5;
-            uvec2 near_z = (class_ & 1u) != 0u ? w7 : w6, far_z = (class_ & 1u) != 0u ? w6 : w7;
+            uvec2 near_x = (class_ & 4u) != 0u ? WIDE_NODE_UPPER_X : WIDE_NODE_LOWER_X, far_x = (class_ & 4u) != 0u ? WIDE_NODE_LOWER_X : WIDE_NODE_UPPER_X;
+            uvec2 near_y = (class_ & 2u) != 0u ? WIDE_NODE_UPPER_Y : WIDE_NODE_LOWER_Y, far_y = (class_ & 2u) != 0u ? WIDE_NODE_LOWER_Y : WIDE_NODE_UPPER_Y;
+            uvec2 near_z = (class_ & 1u) != 0u ? WIDE_NODE_UPPER_Z : WIDE_NODE_LOWER_Z, far_z = (class_ & 1u) != 0u ? WIDE_NODE_LOWER_Z : WIDE_NODE_UPPER_Z;
             uint hits = 0u;
             [[unroll]] for (int k = 0; k < 7; k++) {
                 vec3 lower = vec3(BYTE(near_x, k), BYTE(near_y, k), BYTE(near_z, k));
@@ -166,7 +166,7 @@ void main() {
                 }
                 hits |= any_hit ? 1u << k : 0u;
             }
-            uint present = w5.y >> 24;
+            uint present = WIDE_NODE_UPPER_Y.y >> 24;
             hits = all_or(hits) & present;
 #ifdef STREAM_CLOSEST
             nearest = all_min(nearest);
@@ -176,7 +176,7 @@ void main() {
                 if (has_siblings(group)) {
                     PUSH(base, group)
                 }
-                base = w1.y;
+                base = WIDE_NODE_FIRST_CHILD;
                 group = make_group(hits, present, octant);
             }
         } else if (!SINGLE_LEVEL && !in_group) {
@@ -186,7 +186,8 @@ void main() {
             }
             // the way back
             PUSH(0u, 0u)
-            vec4 rows[3] = vec4[3](uintBitsToFloat(uvec4(w0, w1)), uintBitsToFloat(uvec4(w2, w3)), uintBitsToFloat(uvec4(w4, w5)));
+            vec4 rows[3] = vec4[3](uintBitsToFloat(INSTANCE_LEAF_WORLD_TO_GROUP_0(uvec4)), uintBitsToFloat(INSTANCE_LEAF_WORLD_TO_GROUP_1(uvec4)),
+                    uintBitsToFloat(INSTANCE_LEAF_WORLD_TO_GROUP_2(uvec4)));
             FOR_RAYS {
                 world_waiting[j] = waiting[j];
                 world_active[j] = limit[j] > tmin[j];
@@ -194,8 +195,8 @@ void main() {
                 SET_RAY(j, transform_point(rows, world_origin[j]), transform_vector(rows, world_direction[j]))
             }
             in_group = true;
-            instance = w6.y;
-            instance_root = w6.x;
+            instance = INSTANCE_LEAF_INSTANCE;
+            instance_root = INSTANCE_LEAF_ROOT;
             NEXT_CLASS
             octant = 7u - (class_ & 7u);
             base = instance_root;
@@ -204,15 +205,15 @@ void main() {
             bool found = false;
             float t;
             vec2 uv;
-            if (HAS_SPHERES && (w6.x & SPHERE) != 0u) {
-                vec3 center = uintBitsToFloat(uvec3(w0, w1.x));
+            if (HAS_SPHERES && (FIRST_ID & SPHERE) != 0u) {
+                vec3 center = uintBitsToFloat(SPHERE_LEAF_CENTER(uvec3));
                 FOR_RAYS {
-                    if (meets_sphere(origin[j], direction[j], center, uintBitsToFloat(w1.y), tmin[j], limit[j], t, uv)) { ACCEPT(w6.x) }
+                    if (meets_sphere(origin[j], direction[j], center, uintBitsToFloat(SPHERE_LEAF_RADIUS), tmin[j], limit[j], t, uv)) { ACCEPT(FIRST_ID) }
                 }
             } else {
                 uint axis = class_ >> 3;
-                vec3 v0 = uintBitsToFloat(uvec3(w0, w1.x)), v1 = uintBitsToFloat(uvec3(w1.y, w2));
-                vec3 v2 = uintBitsToFloat(uvec3(w3, w4.x)), v3 = uintBitsToFloat(uvec3(w4.y, w5));
+                vec3 v0 = uintBitsToFloat(TRIANGLE_LEAF_CORNERS_0(uvec3)), v1 = uintBitsToFloat(TRIANGLE_LEAF_CORNERS_1(uvec3));
+                vec3 v2 = uintBitsToFloat(TRIANGLE_LEAF_CORNERS_2(uvec3)), v3 = uintBitsToFloat(TRIANGLE_LEAF_CORNERS_3(uvec3));
                 FOR_RAYS {
                     vec3 o = origin[j], r = direction[j];
                     if (WATERTIGHT) {
@@ -223,14 +224,14 @@ void main() {
                         // rays of another class see nonsense
                         bool live = limit[j] > tmin[j];
                         if (live && is_inside(first)) {
-                            if (meets_triangle(w6.x, w7.x, instance, s, o, r, v0, v1, v2, a, b, c, first, tmin[j], limit[j], t, uv)) { ACCEPT(w6.x) }
+                            if (meets_triangle(FIRST_ID, ORDER, instance, s, o, r, v0, v1, v2, a, b, c, first, tmin[j], limit[j], t, uv)) { ACCEPT(FIRST_ID) }
                         }
-                        if (live && is_inside(second) && w6.y != INVALID) {
-                            if (meets_triangle(w6.y, w7.x >> 4, instance, s, o, r, v0, v2, v3, a, c, d, second, tmin[j], limit[j], t, uv)) { ACCEPT(w6.y) }
+                        if (live && is_inside(second) && SECOND_ID != INVALID) {
+                            if (meets_triangle(SECOND_ID, ORDER >> 4, instance, s, o, r, v0, v2, v3, a, c, d, second, tmin[j], limit[j], t, uv)) { ACCEPT(SECOND_ID) }
                         }
                     } else {
-                        if (meets_moller_trumbore(w6.x, w7.x, instance, o, r, v0, v1, v2, tmin[j], limit[j], t, uv)) { ACCEPT(w6.x) }
-                        if (meets_moller_trumbore(w6.y, w7.x >> 4, instance, o, r, v0, v2, v3, tmin[j], limit[j], t, uv)) { ACCEPT(w6.y) }
+                        if (meets_moller_trumbore(FIRST_ID, ORDER, instance, o, r, v0, v1, v2, tmin[j], limit[j], t, uv)) { ACCEPT(FIRST_ID) }
+                        if (meets_moller_trumbore(SECOND_ID, ORDER >> 4, instance, o, r, v0, v2, v3, tmin[j], limit[j], t, uv)) { ACCEPT(SECOND_ID) }
                     }
                 }
             }

@@ -12,18 +12,12 @@
 layout(local_size_x = LANES) in;
 
 // STACK_SIZE is what the scene's trees need at most: every inner node pushes at most one child, so depth of the
-// top level + 1 + depth of the deepest group can never be exceeded. See src/bvh/bvh2.rs for the bound on the depth.
+// top level + 1 + depth of the deepest group can never be exceeded. See src/accel/bvh2.rs for the bound on the depth.
 
-// References. An inner node has its number in bits 0-26 and in bits 27-28 the axis along which its children lie apart, the
-// lower one first. A leaf holds count - 1 in bits 27-30 and its first primitive in bits 0-26; a leaf of the top level holds an
-// InstanceRecord.
-const uint LEAF = 0x80000000u;
+// References, beside those of BinaryNode.
 const uint FINISHED = 0x7fffffffu;
 const uint LEAVE_INSTANCE = 0x7ffffffeu;
-const uint NEXT = 0x7ffffffdu;
 const uint LAST_NODE = 0x7ffffff0u;
-const uint NODE_NUMBER = 0x07ffffffu;
-const uint AXIS_SHIFT = 27u;
 layout(buffer_reference, std430, buffer_reference_align = 4) buffer Counter { uint v; };
 
 // Entry distance of a box, or INFINITY when it is missed.
@@ -74,12 +68,12 @@ void main() {
 
     while (true) {
         if (current < LAST_NODE) {
-            uint at = 8u * (current & NODE_NUMBER);
-            vec2 a = LOAD_FLOATS(nodes, at), b = LOAD_FLOATS(nodes, at + 1u), c = LOAD_FLOATS(nodes, at + 2u);
-            vec2 d = LOAD_FLOATS(nodes, at + 3u), e = LOAD_FLOATS(nodes, at + 4u), f = LOAD_FLOATS(nodes, at + 5u);
-            uvec2 children = LOAD_PAIR(nodes, at + 6u);
-            float near0 = enter_box(vec3(a, b.x), vec3(b.y, c), origin, inverse, world.tmin, best);
-            float near1 = enter_box(vec3(d, e.x), vec3(e.y, f), origin, inverse, world.tmin, best);
+            uint at = BINARY_NODE_PAIRS * (current & NODE_NUMBER);
+            vec2 w0 = LOAD_FLOATS(nodes, at), w1 = LOAD_FLOATS(nodes, at + 1u), w2 = LOAD_FLOATS(nodes, at + 2u);
+            vec2 w3 = LOAD_FLOATS(nodes, at + 3u), w4 = LOAD_FLOATS(nodes, at + 4u), w5 = LOAD_FLOATS(nodes, at + 5u);
+            uvec2 w6 = LOAD_PAIR(nodes, at + 6u);
+            float near0 = enter_box(BINARY_NODE_BOXES_0(vec3), BINARY_NODE_BOXES_1(vec3), origin, inverse, world.tmin, best);
+            float near1 = enter_box(BINARY_NODE_BOXES_2(vec3), BINARY_NODE_BOXES_3(vec3), origin, inverse, world.tmin, best);
             bool swap;
             if (BY_DIRECTION) {
                 uint axis = current >> AXIS_SHIFT;
@@ -91,9 +85,9 @@ void main() {
             }
             float first = swap ? near1 : near0;
             float second = swap ? near0 : near1;
-            current = first < INFINITY ? (swap ? children.y : children.x) : NEXT;
+            current = first < INFINITY ? (swap ? BINARY_NODE_CHILDREN.y : BINARY_NODE_CHILDREN.x) : NEXT;
             if (second < INFINITY) {
-                stack[depth] = swap ? children.x : children.y;
+                stack[depth] = swap ? BINARY_NODE_CHILDREN.x : BINARY_NODE_CHILDREN.y;
 #ifndef STREAM_ANY
                 stack_near[depth] = second;
 #endif
@@ -102,7 +96,7 @@ void main() {
         }
         if ((current & LEAF) != 0u) {
             if (SINGLE_LEVEL || in_group) {
-                uint i = current & 0x07ffffffu;
+                uint i = current & NODE_NUMBER;
                 uint primitive;
                 float t;
                 vec2 uv;
@@ -122,7 +116,7 @@ void main() {
                 }
 #endif
             } else {
-                instance = current & 0x07ffffffu;
+                instance = current & NODE_NUMBER;
                 InstanceRecord record = instances.v[instance];
                 direction = transform_vector(record.world_to_group, world.direction);
                 origin = transform_point(record.world_to_group, world.origin);

@@ -1,4 +1,4 @@
-// No tracer: what the camera's rays meet was drawn (src/render/raster.rs). One compute thread a ray; each looks up what its pixel
+// No tracer: what the camera's rays meet was drawn (src/raster). One compute thread a ray; each looks up what its pixel
 // shows and meets that one primitive. For streams of camera rays, one a pixel, whose parameters are BlockParams. At push.rays are two words
 // for each pixel of the block, row by row: the entry of the top level and one, and the primitive of its group; zero for nothing.
 #ifndef TRACE_VISIBILITY

@@ -1,4 +1,4 @@
-// The compute tracer's fast kernel: one ray per lane through a seven-wide hierarchy of 64-byte blocks (src/bvh/wide.rs), each a node with
+// The compute tracer's fast kernel: one ray per lane through a seven-wide hierarchy of 64-byte blocks (src/accel/wide.rs), each a node with
 // quantised boxes (after Ylitie, Karras, Laine, "Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs", HPG 2017)
 // or a leaf.
 //
@@ -91,13 +91,12 @@ void main() {
         vec3 next_origin = world.origin, next_direction = world.direction;
         // the child that lies first along the ray, where distance decides and not the octant
         uint nearest = INVALID;
-        if ((w7.y & LEAF) == 0u) {
-            // w0, w1.x: corner; w1.y: first child; then planes, seven bytes each, and in the eighth: exponents, which children there are
-            vec3 scale = uintBitsToFloat(uvec3(w2.y >> 24, w4.y >> 24, w6.y >> 24) << 23) * inverse;
-            vec3 corner = (uintBitsToFloat(uvec3(w0, w1.x)) - origin) * inverse;
-            uvec2 near_x = negative.x ? w3 : w2, far_x = negative.x ? w2 : w3;
-            uvec2 near_y = negative.y ? w5 : w4, far_y = negative.y ? w4 : w5;
-            uvec2 near_z = negative.z ? w7 : w6, far_z = negative.z ? w6 : w7;
+        if ((BLOCK_FLAGS & LEAF) == 0u) {
+            vec3 scale = uintBitsToFloat(uvec3(WIDE_NODE_LOWER_X.y >> 24, WIDE_NODE_LOWER_Y.y >> 24, WIDE_NODE_LOWER_Z.y >> 24) << 23) * inverse;
+            vec3 corner = (uintBitsToFloat(WIDE_NODE_CORNER(uvec3)) - origin) * inverse;
+            uvec2 near_x = negative.x ? WIDE_NODE_UPPER_X : WIDE_NODE_LOWER_X, far_x = negative.x ? WIDE_NODE_LOWER_X : WIDE_NODE_UPPER_X;
+            uvec2 near_y = negative.y ? WIDE_NODE_UPPER_Y : WIDE_NODE_LOWER_Y, far_y = negative.y ? WIDE_NODE_LOWER_Y : WIDE_NODE_UPPER_Y;
+            uvec2 near_z = negative.z ? WIDE_NODE_UPPER_Z : WIDE_NODE_LOWER_Z, far_z = negative.z ? WIDE_NODE_LOWER_Z : WIDE_NODE_UPPER_Z;
             uint hits = 0u;
             [[unroll]] for (int k = 0; k < 7; k++) {
                 vec3 n = vec3(BYTE(near_x, k), BYTE(near_y, k), BYTE(near_z, k)) * scale + corner;
@@ -111,14 +110,14 @@ void main() {
                 nearest = min(nearest, hit ? (floatBitsToUint(near) & ~7u) | k : INVALID);
 #endif
             }
-            uint present = w5.y >> 24;
+            uint present = WIDE_NODE_UPPER_Y.y >> 24;
             hits &= present;
             if ((present >> (nearest & 7u) & 1u) == 0u) nearest = INVALID;
             if (hits != 0u) {
                 if (has_siblings(group)) {
                     PUSH(base, group)
                 }
-                base = w1.y;
+                base = WIDE_NODE_FIRST_CHILD;
                 group = make_group(hits, present, octant);
             }
         } else if (!SINGLE_LEVEL && at_top != 0u) {
@@ -129,38 +128,39 @@ void main() {
             entry_depth = depth;
             // Lanes that hold something else compute this too, on words that are often denormal as floats, which cost a CPU a
             // hundred times the cycles: theirs are zeroed, by arithmetic that no compiler takes for this branch's condition.
-            uint mine = uint(int(w7.y) >> 31) & at_top;
-            vec4 rows[3] = vec4[3](uintBitsToFloat(uvec4(w0, w1) & mine), uintBitsToFloat(uvec4(w2, w3) & mine), uintBitsToFloat(uvec4(w4, w5) & mine));
+            uint mine = uint(int(BLOCK_FLAGS) >> 31) & at_top;
+            vec4 rows[3] = vec4[3](uintBitsToFloat(INSTANCE_LEAF_WORLD_TO_GROUP_0(uvec4) & mine), uintBitsToFloat(INSTANCE_LEAF_WORLD_TO_GROUP_1(uvec4) & mine),
+                    uintBitsToFloat(INSTANCE_LEAF_WORLD_TO_GROUP_2(uvec4) & mine));
             next_origin = transform_point(rows, world.origin);
             next_direction = transform_vector(rows, world.direction);
             turns_to = true;
             at_top = 0u;
-            instance = w6.y;
-            base = w6.x;
+            instance = INSTANCE_LEAF_INSTANCE;
+            base = INSTANCE_LEAF_ROOT;
             group = ROOT_GROUP;
         } else {
             float t;
             vec2 uv;
-            if (HAS_SPHERES && (w6.x & SPHERE) != 0u) {
-                vec3 center = uintBitsToFloat(uvec3(w0, w1.x));
-                if (meets_sphere(origin, direction, center, uintBitsToFloat(w1.y), world.tmin, best, t, uv)) { ACCEPT(w6.x) }
+            if (HAS_SPHERES && (FIRST_ID & SPHERE) != 0u) {
+                vec3 center = uintBitsToFloat(SPHERE_LEAF_CENTER(uvec3));
+                if (meets_sphere(origin, direction, center, uintBitsToFloat(SPHERE_LEAF_RADIUS), world.tmin, best, t, uv)) { ACCEPT(FIRST_ID) }
             } else {
-                vec3 v0 = uintBitsToFloat(uvec3(w0, w1.x)), v1 = uintBitsToFloat(uvec3(w1.y, w2));
-                vec3 v2 = uintBitsToFloat(uvec3(w3, w4.x)), v3 = uintBitsToFloat(uvec3(w4.y, w5));
+                vec3 v0 = uintBitsToFloat(TRIANGLE_LEAF_CORNERS_0(uvec3)), v1 = uintBitsToFloat(TRIANGLE_LEAF_CORNERS_1(uvec3));
+                vec3 v2 = uintBitsToFloat(TRIANGLE_LEAF_CORNERS_2(uvec3)), v3 = uintBitsToFloat(TRIANGLE_LEAF_CORNERS_3(uvec3));
                 if (WATERTIGHT) {
                     Corner a = make_corner(shear, origin, v0), b = make_corner(shear, origin, v1);
                     Corner c = make_corner(shear, origin, v2), d = make_corner(shear, origin, v3);
                     float ab = edge(b, a), bc = edge(c, b), ca = edge(a, c), cd = edge(d, c), da = edge(a, d);
                     vec3 first = vec3(bc, ca, ab), second = vec3(cd, da, -ca);
                     if (is_inside(first)) {
-                        if (meets_triangle(w6.x, w7.x, instance, shear, origin, direction, v0, v1, v2, a, b, c, first, world.tmin, best, t, uv)) { ACCEPT(w6.x) }
+                        if (meets_triangle(FIRST_ID, ORDER, instance, shear, origin, direction, v0, v1, v2, a, b, c, first, world.tmin, best, t, uv)) { ACCEPT(FIRST_ID) }
                     }
-                    if (is_inside(second) && w6.y != INVALID) {
-                        if (meets_triangle(w6.y, w7.x >> 4, instance, shear, origin, direction, v0, v2, v3, a, c, d, second, world.tmin, best, t, uv)) { ACCEPT(w6.y) }
+                    if (is_inside(second) && SECOND_ID != INVALID) {
+                        if (meets_triangle(SECOND_ID, ORDER >> 4, instance, shear, origin, direction, v0, v2, v3, a, c, d, second, world.tmin, best, t, uv)) { ACCEPT(SECOND_ID) }
                     }
                 } else {
-                    if (meets_moller_trumbore(w6.x, w7.x, instance, origin, direction, v0, v1, v2, world.tmin, best, t, uv)) { ACCEPT(w6.x) }
-                    if (meets_moller_trumbore(w6.y, w7.x >> 4, instance, origin, direction, v0, v2, v3, world.tmin, best, t, uv)) { ACCEPT(w6.y) }
+                    if (meets_moller_trumbore(FIRST_ID, ORDER, instance, origin, direction, v0, v1, v2, world.tmin, best, t, uv)) { ACCEPT(FIRST_ID) }
+                    if (meets_moller_trumbore(SECOND_ID, ORDER >> 4, instance, origin, direction, v0, v2, v3, world.tmin, best, t, uv)) { ACCEPT(SECOND_ID) }
                 }
             }
 #ifdef STREAM_ANY

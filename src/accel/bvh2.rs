@@ -7,44 +7,25 @@
 //! A reference to an inner node also says along which axis that node's children lie apart, the lower one first. A traversal that
 //! orders children by the sign of the ray's direction thus knows the order without loading anything more, and nodes do not grow.
 
-use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
 use super::build::MAX_DEPTH;
 use super::{Aabb, BuildPreset, build};
+pub use crate::interface::records::hierarchy::BinaryNode;
+use crate::interface::records::hierarchy::{AXIS_SHIFT, LEAF, NEXT, NODE_NUMBER};
 
 /// Most primitives that a leaf reference can hold.
 pub const MAX_LEAF: u32 = 16;
 /// Primitives that a reference can number, over all trees of a scene.
 pub const MAX_PRIMITIVES: usize = 1 << 27;
 /// Reference of a tree without primitives: the traversal goes on with what is on its stack.
-pub const EMPTY: u32 = 0x7fff_fffd;
-
-const LEAF: u32 = 0x8000_0000;
-/// Bits 27-28 of a reference to an inner node: 0, 1, 2 for x, y, z. There are fewer nodes than primitives, so the number fits
-/// below.
-const AXIS_SHIFT: u32 = 27;
-/// The number of an inner node, or of the first primitive of a leaf.
-const NUMBER: u32 = (1 << AXIS_SHIFT) - 1;
-
-/// An inner node: boxes of both children, then the references to them.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
-pub struct Node {
-    /// Lower and upper corner of both children.
-    pub boxes: [[[f32; 3]; 2]; 2],
-    /// Bit 31 set: a leaf with count - 1 in bits 27-30 and the first primitive in bits 0-26; otherwise an inner node with the
-    /// axis of its own children in bits 27-28 and its number in bits 0-26. Along that axis child 0 is the lower one.
-    pub children: [u32; 2],
-    /// To 64 bytes: one cache line.
-    pub reserved: [u32; 2],
-}
+pub const EMPTY: u32 = NEXT;
 
 /// A binary hierarchy in the layout of the compute tracer.
 #[derive(Clone, Debug, Default)]
 pub struct Bvh2 {
     /// Inner nodes, parents before their children; references are relative to this tree.
-    pub nodes: Vec<Node>,
+    pub nodes: Vec<BinaryNode>,
     /// For each slot of the leaves, the number of the primitive that lies there.
     pub primitives: Vec<u32>,
     /// Where traversal begins: an inner node, a leaf, or [`EMPTY`].
@@ -60,12 +41,12 @@ fn leaf_reference(first: u32, count: u32) -> u32 {
 
 /// Splits a leaf reference into its first primitive and their number.
 pub fn leaf_range(reference: u32) -> Option<(u32, u32)> {
-    (reference & LEAF != 0).then_some((reference & NUMBER, (reference >> 27 & 0xf) + 1))
+    (reference & LEAF != 0).then_some((reference & NODE_NUMBER, (reference >> 27 & 0xf) + 1))
 }
 
 /// Splits a reference to an inner node into its number and the axis (0, 1, 2) along which its children lie apart.
 pub fn inner_node(reference: u32) -> Option<(u32, usize)> {
-    (reference & LEAF == 0 && reference != EMPTY).then_some((reference & NUMBER, (reference >> AXIS_SHIFT) as usize))
+    (reference & LEAF == 0 && reference != EMPTY).then_some((reference & NODE_NUMBER, (reference >> AXIS_SHIFT) as usize))
 }
 
 /// The axis along which the centres of two boxes lie farthest apart, and whether the first box is the upper one there.
@@ -114,7 +95,7 @@ impl Bvh2 {
                 let (axis, swap) = split_axis(&bounds(first), &bounds(first + 1));
                 let (lower, upper) = if swap { (first + 1, first) } else { (first, first + 1) };
                 let corners = |k: usize| [tree.nodes[k].min.to_array(), tree.nodes[k].max.to_array()];
-                out.nodes.push(Node { boxes: [corners(lower), corners(upper)], children: [0; 2], reserved: [0; 2] });
+                out.nodes.push(BinaryNode { boxes: [corners(lower), corners(upper)], children: [0; 2], reserved: [0; 2] });
                 work.push((upper, depth + 1, Some((index, 1))));
                 work.push((lower, depth + 1, Some((index, 0))));
                 axis << AXIS_SHIFT | index as u32

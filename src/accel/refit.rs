@@ -147,7 +147,7 @@ fn fit(block: &mut Block, leaf: &impl Fn(&mut Block) -> Aabb, box_of: impl Fn(u3
     }
     // the root over nothing
     if count > 0 {
-        *block = wide::node(bounds, &children[..count], block[3]);
+        *block = wide::node(bounds, &children[..count], wide::first_child(block));
     }
     bounds
 }
@@ -252,11 +252,7 @@ mod tests {
             return Wide::default();
         }
         let padded: Vec<_> = boxes.iter().map(|b| Aabb { min: b.min - PAD, max: b.max + PAD }).collect();
-        Wide::collapse(&build::tree(&padded, BuildPreset::Default, None), |item| {
-            let mut b = [0; 16];
-            b[0] = item;
-            b
-        })
+        Wide::collapse(&build::tree(&padded, BuildPreset::Default, None), wide::tests::of_item)
     }
 
     const SIZES: [usize; 10] = [0, 1, 2, 7, 8, 50, 1000, 5000, 20_000, 70_000];
@@ -267,7 +263,7 @@ mod tests {
             let b = boxes(n, 1, 100.0);
             let built = tree(&b);
             let mut refitted = built.clone();
-            refitted.refit(&RefitPlan::new(&built.blocks, 0), PAD, |block| b[block[0] as usize]);
+            refitted.refit(&RefitPlan::new(&built.blocks, 0), PAD, |block| b[block.body[0] as usize]);
             assert!(built.blocks == refitted.blocks, "{n} boxes");
             assert_eq!(built.bounds, refitted.bounds);
             assert!(
@@ -289,14 +285,14 @@ mod tests {
                 let base = 1234;
                 let mut moved: Vec<_> = built.blocks.iter().map(|b| wide::rebased(*b, base)).collect();
                 let plan = RefitPlan::new(&moved, base);
-                let leaf = |block: &mut Block| after[block[0] as usize];
+                let leaf = |block: &mut Block| after[block.body[0] as usize];
                 refit(&mut moved, base, &plan, PAD, leaf);
                 built.refit(&plan, PAD, leaf);
                 assert!(built.blocks.iter().zip(&moved).all(|(a, b)| wide::rebased(*a, base) == *b));
-                built.validate(|b| vec![after[b[0] as usize]]).unwrap_or_else(|e| panic!("{n} boxes, seed {seed}: {e}"));
+                built.validate(|b| vec![after[b.body[0] as usize]]).unwrap_or_else(|e| panic!("{n} boxes, seed {seed}: {e}"));
                 // and a tree that was not refitted would not
                 if n > 0 && seed == 3 {
-                    assert!(tree(&before).validate(|b| vec![after[b[0] as usize]]).is_err());
+                    assert!(tree(&before).validate(|b| vec![after[b.body[0] as usize]]).is_err());
                 }
             }
         }
@@ -314,9 +310,9 @@ mod tests {
         let b = boxes(5000, 1, 100.0);
         let mut t = tree(&b);
         let (cost, plan) = (t.sah_cost, RefitPlan::new(&t.blocks, 0));
-        t.refit(&plan, PAD, |block| b[(block[0] as usize * 2503) % 5000]);
+        t.refit(&plan, PAD, |block| b[(block.body[0] as usize * 2503) % 5000]);
         assert!(t.sah_cost > 3.0 * cost, "{} after {cost}", t.sah_cost);
-        t.refit(&plan, PAD, |block| b[block[0] as usize]);
+        t.refit(&plan, PAD, |block| b[block.body[0] as usize]);
         assert!((t.sah_cost - cost).abs() < 1e-3 * cost);
     }
 

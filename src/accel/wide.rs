@@ -5,16 +5,7 @@
 //! siblings is one number and a few bits, and one fetch serves whatever is next. Which nodes of the binary tree become wide ones is chosen
 //! by dynamic programming for the least expected number of blocks that a ray visits (the paper's section 3.1 with one kind of leaf).
 //!
-//! A node, in words of 32 bits:
-//! | words | what |
-//! |---|---|
-//! | 0-2 | lower corner, f32 |
-//! | 3 | block of the first child |
-//! | 4-7 | lower planes along x of children 0-6, a byte each, then the exponent of the x scale; the same for upper planes, with a zero |
-//! | 8-11 | along y; the second eighth byte is the mask of slots that hold children |
-//! | 12-15 | along z; the second eighth byte is 0: the last word's top bit says "leaf" |
-//!
-//! A leaf is the caller's, but for the top bit of its last word.
+//! [`WideNode`] is a node, and a leaf is the caller's, but for the flag in the last word of its [`Block`].
 //!
 //! The traversal's stack cannot overflow: a node visit pushes at most one entry (the rest of a group of siblings), so a
 //! tree needs as many entries as its longest path has nodes.
@@ -24,18 +15,14 @@ use obvhs::bvh2::Bvh2;
 use rayon::prelude::*;
 
 use super::Aabb;
+pub use crate::interface::records::hierarchy::{Block, LEAF, WideNode};
 
 /// Children of a node at most.
 pub const WIDTH: usize = 7;
-/// Bit of a block's last word.
-pub const LEAF: u32 = 0x8000_0000;
 /// Bytes of a block.
 pub const BLOCK_BYTES: u64 = size_of::<Block>() as u64;
 /// Subtrees that are collapsed side by side.
 const TASKS: usize = 256;
-
-/// A node or a leaf.
-pub type Block = [u32; 16];
 
 /// A wide hierarchy.
 #[derive(Clone, Debug)]
@@ -61,7 +48,7 @@ struct Piece {
 
 impl Default for Wide {
     fn default() -> Self {
-        Self { blocks: vec![[0; 16]], depth: 1, bounds: None, sah_cost: 0.0 }
+        Self { blocks: vec![Block::default()], depth: 1, bounds: None, sah_cost: 0.0 }
     }
 }
 
@@ -107,7 +94,7 @@ impl Wide {
             ends.push((piece, end));
             end += p.blocks.len() - 1;
         }
-        out.blocks.resize(end, [0; 16]);
+        out.blocks.resize(end, Block::default());
         let mut rest = &mut out.blocks[ends.first().map_or(end, |e| e.1)..];
         let mut targets = Vec::new();
         for &(piece, begin) in &ends {
@@ -166,33 +153,43 @@ impl Wide {
 
 /// Is it a leaf?
 pub fn is_leaf(block: &Block) -> bool {
-    block[15] & LEAF != 0
+    block.flags & LEAF != 0
+}
+
+/// A block that is a node.
+fn as_node(block: &Block) -> &WideNode {
+    bytemuck::cast_ref(block)
 }
 
 /// A block of a tree whose blocks begin `by` further on.
 pub fn rebased(mut block: Block, by: u32) -> Block {
     if !is_leaf(&block) {
-        block[3] = block[3].wrapping_add(by);
+        let node: &mut WideNode = bytemuck::cast_mut(&mut block);
+        node.first_child = node.first_child.wrapping_add(by);
     }
     block
 }
 
-/// Slots and blocks of a node's children.
-pub fn children(node: &Block) -> impl Iterator<Item = (usize, u32)> {
-    let (first, present) = (node[3], node[11] >> 24);
-    (0..WIDTH).filter(move |s| present >> s & 1 == 1).zip(first..)
+/// Block of a node's first child.
+pub(super) fn first_child(node: &Block) -> u32 {
+    as_node(node).first_child
 }
 
-fn byte(node: &Block, k: usize) -> u8 {
-    (node[k / 4] >> (k % 4 * 8)) as u8
+/// Slots and blocks of a node's children.
+pub fn children(node: &Block) -> impl Iterator<Item = (usize, u32)> {
+    let node = as_node(node);
+    let (first, present) = (node.first_child, node.upper_y[WIDTH]);
+    (0..WIDTH).filter(move |s| present >> s & 1 == 1).zip(first..)
 }
 
 /// Box of a slot's child: lower and upper plane per axis.
 pub fn child_box(node: &Block, slot: usize) -> [[f64; 2]; 3] {
-    std::array::from_fn(|a| {
-        let scale = f32::from_bits((byte(node, 23 + 16 * a) as u32) << 23) as f64;
-        let plane = |k: usize| f32::from_bits(node[a]) as f64 + byte(node, 16 + 16 * a + k) as f64 * scale;
-        [plane(slot), plane(8 + slot)]
+    let node = as_node(node);
+    let planes = [(node.lower_x, node.upper_x), (node.lower_y, node.upper_y), (node.lower_z, node.upper_z)];
+    std::array::from_fn(|axis| {
+        let (lower, upper) = planes[axis];
+        let scale = f64::from(f32::from_bits(u32::from(lower[WIDTH]) << 23));
+        [lower[slot], upper[slot]].map(|plane| f64::from(node.corner[axis]) + f64::from(plane) * scale)
     })
 }
 
@@ -263,7 +260,7 @@ impl Piece {
                 }
             };
         }
-        let mut out = Self { blocks: vec![[0; 16]], depth: 1, cost: locals[0].cost[0], inserts: Vec::new() };
+        let mut out = Self { blocks: vec![Block::default()], depth: 1, cost: locals[0].cost[0], inserts: Vec::new() };
         let mut work = vec![(0usize, 0usize, 1u32)];
         let (mut found, mut open) = (Vec::new(), Vec::new());
         while let Some((k, at, level)) = work.pop() {
@@ -302,11 +299,11 @@ impl Piece {
                 let binary = &tree.nodes[number as usize];
                 if binary.is_leaf() {
                     let mut block = leaf(tree.primitive_indices[binary.first_index as usize]);
-                    block[15] |= LEAF;
+                    block.flags |= LEAF;
                     out.blocks.push(block);
                     continue;
                 }
-                out.blocks.push([0; 16]);
+                out.blocks.push(Block::default());
                 match cut(number) {
                     Some(piece) => out.inserts.push((place as u32, piece, level + 1)),
                     None => work.push((child, place, level + 1)),
@@ -350,9 +347,7 @@ fn assign_slots(children: &mut [(usize, Aabb)], parent: Aabb) {
 
 /// A node over its children's boxes by slot, whose blocks begin at `first`: planes are rounded outwards.
 pub(super) fn node(bounds: Aabb, children: &[(usize, Aabb)], first: u32) -> Block {
-    let mut bytes = [0u8; 64];
-    bytes[12..16].copy_from_slice(&first.to_le_bytes());
-    let mut present = 0u8;
+    let (mut lower, mut upper, mut present) = ([[0u8; WIDTH + 1]; 3], [[0u8; WIDTH + 1]; 3], 0u8);
     for axis in 0..3 {
         let low = bounds.min[axis] as f64;
         let extent = bounds.max[axis] as f64 - low;
@@ -363,23 +358,22 @@ pub(super) fn node(bounds: Aabb, children: &[(usize, Aabb)], first: u32) -> Bloc
         }
         let exponent = exponent.max(1);
         let scale = 1.0 / f32::from_bits(exponent << 23) as f64;
-        let at = 16 + 16 * axis;
-        bytes[at..at + WIDTH].fill(255);
+        lower[axis] = [255; WIDTH + 1];
         for &(slot, b) in children {
-            bytes[at + slot] = ((b.min[axis] as f64 - low) * scale).floor().clamp(0.0, 255.0) as u8;
-            bytes[at + 8 + slot] = ((b.max[axis] as f64 - low) * scale).ceil().clamp(0.0, 255.0) as u8;
+            lower[axis][slot] = ((b.min[axis] as f64 - low) * scale).floor().clamp(0.0, 255.0) as u8;
+            upper[axis][slot] = ((b.max[axis] as f64 - low) * scale).ceil().clamp(0.0, 255.0) as u8;
             present |= 1 << slot;
         }
-        bytes[at + 7] = exponent as u8;
+        lower[axis][WIDTH] = exponent as u8;
     }
-    bytes[47] = present;
-    let mut block: Block = std::array::from_fn(|k| u32::from_le_bytes([0, 1, 2, 3].map(|j| bytes[4 * k + j])));
-    block[..3].copy_from_slice(&bounds.min.to_array().map(f32::to_bits));
-    block
+    upper[1][WIDTH] = present;
+    let ([lower_x, lower_y, lower_z], [upper_x, upper_y, upper_z]) = (lower, upper);
+    let corner = bounds.min.to_array();
+    bytemuck::cast(WideNode { corner, first_child: first, lower_x, upper_x, lower_y, upper_y, lower_z, upper_z })
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::accel::{BuildPreset, build};
 
@@ -393,16 +387,19 @@ mod tests {
             .collect()
     }
 
+    /// A leaf that holds nothing but a number.
+    pub fn of_item(item: u32) -> Block {
+        let mut block = Block::default();
+        block.body[0] = item;
+        block
+    }
+
     fn tree(boxes: &[Aabb]) -> Wide {
         if boxes.is_empty() {
             return Wide::default();
         }
         let binary = build::tree(boxes, BuildPreset::Default, None);
-        Wide::collapse(&binary, |item| {
-            let mut b = [0; 16];
-            b[0] = item;
-            b
-        })
+        Wide::collapse(&binary, of_item)
     }
 
     /// Areas beyond the range of a float, below it, and none at all.
@@ -417,12 +414,12 @@ mod tests {
     }
 
     fn check(tree: &Wide, boxes: &[Aabb]) -> Result<(), String> {
-        let mut items: Vec<u32> = tree.blocks.iter().filter(|b| is_leaf(b)).map(|b| b[0]).collect();
+        let mut items: Vec<u32> = tree.blocks.iter().filter(|b| is_leaf(b)).map(|b| b.body[0]).collect();
         items.sort_unstable();
         if items != (0..boxes.len() as u32).collect::<Vec<_>>() {
             return Err("not every item has one leaf".into());
         }
-        tree.validate(|b| vec![boxes[b[0] as usize]])
+        tree.validate(|b| vec![boxes[b.body[0] as usize]])
     }
 
     #[test]
@@ -440,10 +437,10 @@ mod tests {
         let b = boxes(500, 1.0, 0.0);
         let good = tree(&b);
         let mut bad = good.clone();
-        bad.blocks[0][0] = (f32::from_bits(bad.blocks[0][0]) + 20.0).to_bits();
+        bytemuck::cast_mut::<Block, WideNode>(&mut bad.blocks[0]).corner[0] += 20.0;
         assert!(check(&bad, &b).is_err());
         let mut bad = good.clone();
-        bad.blocks[0][3] += 1;
+        bytemuck::cast_mut::<Block, WideNode>(&mut bad.blocks[0]).first_child += 1;
         assert!(check(&bad, &b).is_err());
         let mut bad = good;
         bad.depth += 1;

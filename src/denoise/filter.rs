@@ -8,7 +8,6 @@
 use crate::shaders::{self, LANES};
 use std::time::Instant;
 
-use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
 use super::Shot;
@@ -18,6 +17,8 @@ use crate::film::Control;
 use crate::film::Film;
 use crate::film::pace::Pace;
 use crate::gpu::{Buffer, Commands, Memory};
+use crate::interface::records::denoise::RadianceRecord;
+use crate::interface::records::frame::SurfaceRecord;
 use crate::realtime::params::FrameParams;
 use crate::realtime::settings::FilterStep;
 use crate::realtime::{DEPTH_TOLERANCE, Filter, FilterKind, inverse};
@@ -46,31 +47,11 @@ impl Default for Settings {
 const MIN_ALBEDO: f32 = 0.01;
 /// Below this roughness metals count as mirrors.
 const POLISHED: f32 = 0.25;
-/// `RadianceEstimate` of shaders/denoise.glsl.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
-struct Estimate {
-    mean: [f32; 3],
-    samples: f32,
-    variance: [f32; 3],
-    reserved: f32,
-}
-
-/// `surface` of shaders/common/frame.glsl.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
-struct SurfaceRecord {
-    position: [f32; 3],
-    spawn_offset: f32,
-    normal: [f32; 3],
-    reserved: f32,
-}
-
 /// Which pixels are averaged, and how they look to the shader.
 struct Guided {
     surfaces: Vec<SurfaceRecord>,
     guides: Vec<[u32; 2]>,
-    estimates: Vec<Estimate>,
+    estimates: Vec<RadianceRecord>,
     /// Of each pixel; zero where it is left as it is.
     divisors: Vec<Vec3>,
 }
@@ -122,7 +103,7 @@ fn guide(shot: &Shot, film: &Film, features: &Features) -> Guided {
     let mut out = Guided {
         surfaces: vec![SurfaceRecord::default(); pixels],
         guides: vec![[f32::INFINITY.to_bits(), 0]; pixels],
-        estimates: vec![Estimate::default(); pixels],
+        estimates: vec![RadianceRecord::default(); pixels],
         divisors: vec![Vec3::ZERO; pixels],
     };
     let look = Look::new(camera, film.height);
@@ -142,7 +123,7 @@ fn guide(shot: &Shot, film: &Film, features: &Features) -> Guided {
         let divisor = if options.lens.is_some() { Vec3::ONE } else { reflects.max(Vec3::splat(MIN_ALBEDO)) };
         // the shader wants the mean square about the pixel's own mean
         let variance = rgb(&film.variance, k) * (1.0 - 1.0 / samples as f32) / (divisor * divisor);
-        out.estimates[k] = Estimate {
+        out.estimates[k] = RadianceRecord {
             mean: (rgb(&film.mean, k) / divisor).to_array(),
             samples: samples as f32,
             variance: variance.to_array(),
@@ -164,7 +145,13 @@ fn pack_normal(n: Vec3) -> u32 {
 }
 
 /// Filters on the device, in launches that are short.
-fn run(shot: &Shot, size: [u32; 2], guided: &Guided, settings: &Settings, control: &mut dyn Control) -> Result<Vec<Estimate>> {
+fn run(
+    shot: &Shot,
+    size: [u32; 2],
+    guided: &Guided,
+    settings: &Settings,
+    control: &mut dyn Control,
+) -> Result<Vec<RadianceRecord>> {
     let (device, camera) = (shot.tracer.device(), shot.camera);
     let pixels = guided.estimates.len() as u32;
     let surface = Buffer::from_slice(device, "surfaces", &guided.surfaces)?;

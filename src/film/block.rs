@@ -1,64 +1,14 @@
 //! A block of the image: what one set of device buffers holds. Images larger than a block are rendered block by block, so
 //! that device memory does not grow with the image.
 
-use bytemuck::{Pod, Zeroable};
-
 use super::camera::CameraRecord;
+pub use crate::interface::records::block::{BlockParams, TILE};
 use crate::sampling::morton::morton_pixel;
-use crate::tracer::queue::QueueRecord;
 
 /// Pixels of a block at most (1920x1080 fits).
 const MOST_PIXELS: u64 = 1 << 21;
-/// Edge of the tiles in which pixels are numbered; shaders/common/camera.glsl.
-pub const TILE: u32 = 8;
 /// Pixels of a tile.
 pub const TILE_PIXELS: u32 = TILE * TILE;
-
-/// `BlockParams` of shaders/common/camera.glsl.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
-pub struct BlockParams {
-    /// Three rows, relative to the scene's origin.
-    pub camera_to_world: [[f32; 4]; 3],
-    /// Half extents of the view.
-    pub view: [f32; 2],
-    /// 1: parallel rays.
-    pub orthographic: u32,
-    /// Of the sampler.
-    pub seed: u32,
-    /// Pixels.
-    pub image_size: [u32; 2],
-    /// Pixels.
-    pub block_origin: [u32; 2],
-    /// Pixels.
-    pub block_size: [u32; 2],
-    /// Tiles in a row.
-    pub tiles_x: u32,
-    /// 1: hemisphere about the shading normal.
-    pub hemisphere: u32,
-    /// Exponent per world unit.
-    pub falloff_log2: f32,
-    /// World units; infinite for no limit.
-    pub radius: f32,
-    /// Film pixels.
-    pub film: u64,
-    /// Samples of a launch.
-    pub samples: u64,
-    /// Auxiliary outputs of a launch.
-    pub aov: u64,
-    /// Tiles that are rendered, or 0: all.
-    pub tiles: u64,
-    /// Occlusion rays.
-    pub queue: QueueRecord,
-    /// Where camera rays are written, or 0.
-    pub ray_dump: u64,
-    /// Where occlusion rays are written, or 0.
-    pub occlusion_dump: u64,
-    /// Parameters of a frame's passes, or 0.
-    pub frame: u64,
-    /// Parameters of the path tracer, or 0.
-    pub path: u64,
-}
 
 impl BlockParams {
     /// The same for a block of an image.

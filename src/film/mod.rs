@@ -13,14 +13,18 @@ pub mod state;
 
 pub use control::{Control, NoControl};
 
+use crate::interface::records::film::{RgbFilmPixel, ScalarFilmPixel};
+
 /// Values of a pixel at most.
 pub const MAX_CHANNELS: usize = 3;
 
 /// 32-bit words of a pixel's record on the device: of each channel a sum and what it has too much, of each a sum of squares and what it has too
-/// much, then two counts. `FilmPixel` of shaders/common/film.glsl.
+/// much, then two counts. [`ScalarFilmPixel`] and [`RgbFilmPixel`] of one and of three.
 pub const fn record_words(channels: usize) -> usize {
     4 * channels + 2
 }
+
+const _: () = assert!(size_of::<ScalarFilmPixel>() == 4 * record_words(1) && size_of::<RgbFilmPixel>() == 4 * record_words(3));
 
 /// Bytes of a pixel's record on the device.
 pub const fn record_bytes(channels: usize) -> u64 {

@@ -13,10 +13,11 @@ use super::device::Device;
 use super::result::Context;
 use crate::error::{Error, Result};
 use crate::interface::constants::Constant;
+use crate::interface::records::ray::Push;
 use crate::shaders::{ComputeShader, Shader};
 
-/// Size of the push-constant block that every stream has (`Push` in shaders/common/types.glsl).
-pub(super) const PUSH_BYTES: u32 = 48;
+/// Size of the push-constant block that every stream has.
+pub(super) const PUSH_BYTES: u32 = size_of::<Push>() as u32;
 
 pub(super) const RAY_STAGES: vk::ShaderStageFlags = vk::ShaderStageFlags::from_raw(
     vk::ShaderStageFlags::RAYGEN_KHR.as_raw()

@@ -1,7 +1,7 @@
 //! Auxiliary outputs: what a ray through each pixel's centre meets.
 
 use crate::shaders;
-use bytemuck::{Pod, Zeroable};
+use bytemuck::Zeroable;
 use glam::DVec3;
 
 use crate::error::Result;
@@ -10,6 +10,7 @@ use crate::film::block::{Block, BlockParams};
 use crate::film::camera::CameraRecord;
 use crate::film::pace::{MOST, Pace};
 use crate::gpu::{Buffer, Commands, Memory};
+pub use crate::interface::records::aov::AovPixel;
 use crate::output::{Channel, Samples};
 use crate::raster::{CameraRays, Primary, View};
 use crate::settings::choices;
@@ -42,32 +43,6 @@ impl Aov {
     pub fn among(self, wanted: &[Aov]) -> bool {
         wanted.contains(&self) || self != Aov::Bent && wanted.contains(&Aov::All)
     }
-}
-
-/// What a pixel's centre shows; `AovPixel` of shaders/aov.glsl.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
-pub struct AovPixel {
-    /// Distance along the ray (world units); infinite where nothing is met.
-    pub depth: f32,
-    /// Index into the scene's instances; `u32::MAX` where nothing is met.
-    pub instance: u32,
-    /// Triangle or sphere of the instance's mesh.
-    pub primitive: u32,
-    /// Index into the scene's materials.
-    pub material: u32,
-    /// World position relative to the scene's origin.
-    pub position: [f32; 3],
-    /// Linear base colour: red.
-    pub red: f32,
-    /// Unit geometric normal, world, front side.
-    pub ng: [f32; 3],
-    /// Linear base colour: green.
-    pub green: f32,
-    /// Unit shading normal, on the side of `ng`.
-    pub ns: [f32; 3],
-    /// Linear base colour: blue.
-    pub blue: f32,
 }
 
 /// Renders the outputs of an image, rows from the top. The tracer's [`crate::tracer::Needs`] must cover what is looked at.

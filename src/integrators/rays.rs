@@ -2,12 +2,12 @@
 
 use crate::settings::choices;
 use crate::shaders;
-use bytemuck::{Pod, Zeroable};
 
 use crate::error::{Error, Result};
 use crate::film::Control;
 use crate::film::pace::{MOST, Pace};
 use crate::gpu::{Buffer, Commands, Memory};
+use crate::interface::records::ray_set::RaySet;
 use crate::ray::{Hit, Ray};
 use crate::tracer::{Push, Stream, Tracer};
 
@@ -19,13 +19,6 @@ choices! {
         /// Closest hit
         Closest = "closest",
     }
-}
-
-#[repr(C)]
-#[derive(Clone, Copy, Pod, Zeroable)]
-struct RaySet {
-    rays: u64,
-    results: u64,
 }
 
 /// How fast a set was traced.

@@ -2,14 +2,42 @@
 
 use std::fmt::Write as _;
 
-use super::{constants, enumerations, features};
+use super::layout::{Field, File, Form, Number, Record};
+use super::{constants, enumerations, features, records};
 
 /// Files that shaders include: names and texts.
 pub fn files() -> Vec<(String, String)> {
     let mut files = vec![file("constants", &constants())];
     files.extend(features::SETS.iter().map(|set| file(set.name, &feature_set(set))));
-    files.extend(enumerations::ALL.iter().map(|e| file(e.name, &enumeration(e))));
+    files.extend(enumerations::ALL.iter().chain(enumerations::CHOICES).map(|e| file(e.name, &enumeration(e))));
+    files.extend(records::FILES.iter().map(|f| {
+        let includes: String = f.includes.iter().map(|name| format!("#include \"interface/{name}.glsl\"\n")).collect();
+        file(f.name, &(includes + &record_file(f)))
+    }));
     files
+}
+
+/// A compute shader that declares every record, for build.rs to read from its SPIR-V how the compiler lays them out. It includes nothing.
+pub fn check_shader() -> String {
+    let mut text =
+        "#version 460\n#extension GL_EXT_buffer_reference : require\n#extension GL_EXT_buffer_reference_uvec2 : require\n\
+                    layout(local_size_x = 1) in;\n"
+            .to_owned();
+    records::FILES.iter().for_each(|f| text += &record_file(f));
+    for (binding, record) in records::FILES.iter().flat_map(|f| f.records).enumerate() {
+        let member = match record.form {
+            Form::Structure | Form::Array { .. } => "v[]",
+            Form::Block { .. } => "v",
+            // declared with a variable already; not laid out by the compiler
+            Form::Push | Form::Words => continue,
+        };
+        let _ = writeln!(
+            text,
+            "layout(std430, binding = {binding}) buffer Check{0} {{ {0} {member}; }} check{binding};",
+            record.name
+        );
+    }
+    text + "void main() {}\n"
 }
 
 fn file(name: &str, text: &str) -> (String, String) {
@@ -49,9 +77,135 @@ fn feature_set(set: &features::Declaration) -> String {
 
 fn enumeration(e: &enumerations::Declaration) -> String {
     let mut text = String::new();
-    for (number, (name, about)) in e.variants.iter().enumerate() {
+    for (name, number, about) in e.variants {
         let _ = writeln!(text, "const uint {name} = {number}u;  //{about}");
     }
     let _ = writeln!(text, "const uint {}_COUNT = {}u;", e.name.to_uppercase(), e.variants.len());
     text
+}
+
+fn record_file(file: &File) -> String {
+    let mut text = String::new();
+    for value in file.values {
+        let (kind, number) = match value.number {
+            Number::uint(n) => ("uint", format!("{n}u")),
+            Number::float(x) => ("float", format!("{x:?}")),
+        };
+        let _ = writeln!(text, "const {kind} {} = {number};  //{}", value.name, value.about.concat());
+    }
+    file.records.iter().for_each(|r| text += &record(r));
+    text
+}
+
+/// A record, and what it takes in memory.
+fn record(record: &Record) -> String {
+    let (name, constant) = (record.name, constant_name(record.name));
+    let mut text: String = record.about.iter().map(|line| format!("//{line}\n")).collect();
+    let buffer = |access: &str, align: usize| {
+        let access = if access.is_empty() { String::new() } else { format!("{access} ") };
+        format!("layout(buffer_reference, std430, buffer_reference_align = {align}) {access}buffer")
+    };
+    let members: String = record.fields.iter().map(member).collect();
+    let _ = match record.form {
+        Form::Structure => writeln!(text, "struct {name} {{\n{members}}};"),
+        Form::Array { buffer: array, access, align } => {
+            writeln!(text, "struct {name} {{\n{members}}};\n{} {array} {{ {name} v[]; }};", buffer(access, align))
+        }
+        Form::Block { access, align } => writeln!(text, "{} {name} {{\n{members}}};", buffer(access, align)),
+        Form::Push => writeln!(text, "layout(push_constant) uniform {name} {{\n{members}}} push;"),
+        Form::Words => {
+            record.fields.iter().for_each(|f| text += &word_macros(&constant, f));
+            writeln!(text, "const uint {constant}_PAIRS = {}u;", record.size / 8)
+        }
+    };
+    let _ = writeln!(text, "const uint {constant}_BYTES = {}u;", record.size);
+    text
+}
+
+fn member(field: &Field) -> String {
+    let kind = match field.kind {
+        "address" | "bytes8" => "uvec2",
+        kind => kind,
+    };
+    let counts: String = field.counts.iter().map(|n| format!("[{n}]")).collect();
+    format!("    {kind} {}{counts};  //{}\n", field.name, field.about.concat())
+}
+
+/// Macros for the words of a field, one for each element of an array, numbered. Those of more than two words, or of two that lie in two pairs, take the
+/// constructor that makes a vector of them.
+fn word_macros(record: &str, field: &Field) -> String {
+    let elements: usize = field.counts.iter().product();
+    let words = field.size / 4 / elements;
+    let mut text = String::new();
+    for element in 0..elements {
+        let first = field.offset / 4 + element * words;
+        let mut parts = Vec::new();
+        let mut word = first;
+        while word < first + words {
+            let pair = word.is_multiple_of(2) && word + 1 < first + words;
+            parts.push(format!("w{}{}", word / 2, if pair { "" } else { [".x", ".y"][word % 2] }));
+            word += 1 + usize::from(pair);
+        }
+        let mut name = format!("{record}_{}", field.name.to_uppercase());
+        if !field.counts.is_empty() {
+            let _ = write!(name, "_{element}");
+        }
+        let _ = match parts.as_slice() {
+            [one] => writeln!(text, "#define {name} {one}  //{}", field.about.concat()),
+            several => writeln!(text, "#define {name}(T) T({})  //{}", several.join(", "), field.about.concat()),
+        };
+    }
+    text
+}
+
+/// `QueueRecord` as `QUEUE_RECORD`.
+fn constant_name(name: &str) -> String {
+    let mut out = String::new();
+    for (k, c) in name.char_indices() {
+        if k > 0 && c.is_uppercase() {
+            out.push('_');
+        }
+        out.extend(c.to_uppercase());
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A file by its name.
+    fn text(name: &str) -> String {
+        files().into_iter().find(|f| f.0 == format!("interface/{name}.glsl")).unwrap().1
+    }
+
+    #[test]
+    fn records_are_structs_and_buffers() {
+        let queue = text("queue");
+        assert!(queue.contains("struct QueueRecord {\n    uvec2 rays;  // "), "{queue}");
+        assert!(queue.contains("const uint QUEUE_RECORD_BYTES = 24u;"), "{queue}");
+        let scene = text("scene");
+        assert!(scene.contains("readonly buffer InstanceRecords { InstanceRecord v[]; };"), "{scene}");
+        assert!(scene.contains("    vec4 group_to_world[3];"), "{scene}");
+        assert!(text("block").starts_with("// Made of") && text("block").contains("#include \"interface/queue.glsl\"\n"));
+        assert!(text("ray").contains("layout(push_constant) uniform Push {"));
+    }
+
+    #[test]
+    fn words_are_named() {
+        let hierarchy = text("hierarchy");
+        for line in [
+            "#define WIDE_NODE_CORNER(T) T(w0, w1.x)",
+            "#define WIDE_NODE_FIRST_CHILD w1.y",
+            "#define WIDE_NODE_UPPER_Z w7",
+            "#define TRIANGLE_LEAF_CORNERS_1(T) T(w1.y, w2)",
+            "#define TRIANGLE_LEAF_PRIMITIVES w6",
+            "#define INSTANCE_LEAF_WORLD_TO_GROUP_2(T) T(w4, w5)",
+            "#define BLOCK_FLAGS w7.y",
+            "#define LAUNCH_HIT_UV(T) T(w1.y, w2.x)",
+            "const uint LAUNCH_HIT_PAIRS = 3u;",
+        ] {
+            assert!(hierarchy.contains(line), "{line}\n{hierarchy}");
+        }
+    }
 }

@@ -17,6 +17,7 @@ use bytemuck::{Pod, Zeroable};
 use crate::error::Result;
 use crate::film::block::BlockParams;
 use crate::gpu::{Buffer, Cull, Device, GraphicsPipeline, Memory, Recorder, Targets};
+use crate::interface::records::raster::RasterParams;
 use crate::shaders::{self, StreamShaders};
 use crate::tracer::drawable::CHUNK;
 use crate::tracer::stream;
@@ -28,16 +29,12 @@ use frustum::{Frustum, Sight};
 /// Vertices of the box around a sphere; shaders/raster/sphere.vert.
 const BOX_VERTICES: u32 = 36;
 
-/// `RasterParams` of shaders/raster/view.glsl, and the block's behind it.
+/// Parameters of what is rasterized, and those of its block behind them.
 #[repr(C)]
 #[derive(Clone, Copy, Zeroable, Pod)]
-struct RasterParams {
-    clip: [[f32; 4]; 4],
-    eye: [f32; 3],
-    turned: f32,
-    at: [f32; 2],
-    block: u64,
-    params: BlockParams,
+struct RasterMemory {
+    raster: RasterParams,
+    block: BlockParams,
 }
 
 choices! {
@@ -126,7 +123,7 @@ impl Raster {
             spheres: features.spheres.then(spheres).transpose()?,
             targets,
             drawn: buffer(device, "drawn primitives", 8 * size[0] as u64 * size[1] as u64)?,
-            params: buffer(device, "raster parameters", size_of::<RasterParams>() as u64)?,
+            params: buffer(device, "raster parameters", size_of::<RasterMemory>() as u64)?,
             stream: tracer.rasterized_stream(shaders)?,
         })
     }
@@ -149,13 +146,15 @@ impl Raster {
         let size = view.block.size;
         let frustum = Frustum::new(view)?;
         let (draws, depth, drawn) = self.collect(tracer, &frustum);
-        let params = RasterParams {
-            clip: frustum.clip(depth, tracer.device().viewport_factor(size) as f64),
-            eye: frustum.eye.to_array(),
-            turned: if frustum.turned { -1.0 } else { 1.0 },
-            at: view.at,
-            block: self.params.address() + std::mem::offset_of!(RasterParams, params) as u64,
-            params: view.block.params(view.image_size, &view.camera, 0),
+        let params = RasterMemory {
+            raster: RasterParams {
+                clip: frustum.clip(depth, tracer.device().viewport_factor(size) as f64),
+                eye: frustum.eye.to_array(),
+                turned: if frustum.turned { -1.0 } else { 1.0 },
+                at: view.at,
+                block: self.params.address() + std::mem::offset_of!(RasterMemory, block) as u64,
+            },
+            block: view.block.params(view.image_size, &view.camera, 0),
         };
         recorder.barrier();
         recorder.update(&self.params, &params);

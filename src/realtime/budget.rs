@@ -5,18 +5,19 @@ use super::settings::Settings;
 use crate::error::Result;
 use crate::film::block::Block;
 use crate::gpu::{Buffer, ComputePipeline, Memory, Recorder};
+use crate::interface::BudgetStage;
+use crate::interface::records::frame::{BUDGET_SHARE, SUMS_COUNT, SUMS_LISTED};
 use crate::shaders::{self, LANES};
 use crate::tracer::stream::LAUNCH_RAYS;
 use crate::tracer::{Push, Tracer};
 
-/// Words of the sums, and which of them counts the rays that are listed: shaders/common/budget.glsl.
-const SUMS: u64 = 131;
-const LISTED: u64 = 130;
-/// Rounds of the pass: desired samples at levels far apart, at levels between two of them, and the rays.
-const STAGES: [(&str, u32); 4] = [("budget wishes", 1), ("budget sums", SHARE), ("budget sums", SHARE), ("budget rays", 1)];
-/// One of so many pixels speaks for all where desired samples are added up.
-const SHARE: u32 = 16;
-
+/// Rounds of the pass, each with the pixels that one lane works for.
+const STAGES: [(&str, BudgetStage, u32); 4] = [
+    ("budget wishes", BudgetStage::DesiredSamples, 1),
+    ("budget sums", BudgetStage::Coarse, BUDGET_SHARE),
+    ("budget sums", BudgetStage::Fine, BUDGET_SHARE),
+    ("budget rays", BudgetStage::Rays, 1),
+];
 /// The pass and its memory.
 pub(super) struct BudgetPass {
     pipeline: ComputePipeline,
@@ -47,7 +48,7 @@ impl BudgetPass {
             // sequences may begin anywhere
             taken: image("rays taken", 4)?,
             desired_samples: Buffer::new(device, "desired samples", 8 * u64::from(places), Memory::Device)?,
-            sums: Buffer::new(device, "sums of desired samples", 4 * SUMS, Memory::Device)?,
+            sums: Buffer::new(device, "sums of desired samples", 4 * u64::from(SUMS_COUNT), Memory::Device)?,
             samples: image("samples", 4 * u64::from(most_rays))?,
         })
     }
@@ -69,8 +70,8 @@ impl BudgetPass {
     /// Before the occlusion rays.
     pub fn record(&self, r: &mut Recorder, push: Push) {
         r.clear(&self.sums);
-        for (stage, (label, share)) in (0..).zip(STAGES) {
-            let push = Push { first: 0, count: self.places, sample_index: stage, ..push };
+        for (label, stage, share) in STAGES {
+            let push = Push { first: 0, count: self.places, sample_index: stage as u32, ..push };
             r.barrier();
             r.timed(label, |r| r.dispatch(&self.pipeline, &push, self.places.div_ceil(LANES * share)));
         }
@@ -80,7 +81,7 @@ impl BudgetPass {
     /// Launches of as many rays as there may be; how many there are, the device knows.
     pub fn launches(&self, pixels: u64, push: Push) -> Vec<Push> {
         let all = pixels as u32 * self.most_rays;
-        let queued = self.sums.address() + 4 * LISTED;
+        let queued = self.sums.address() + 4 * u64::from(SUMS_LISTED);
         (0..all)
             .step_by(LAUNCH_RAYS as usize)
             .map(|first| Push { first, count: LAUNCH_RAYS.min(all - first), queued, ..push })

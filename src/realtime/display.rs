@@ -1,38 +1,16 @@
 //! A buffer of the frame as it is shown: RGBA words in device memory, which a window takes as they are and files without alpha.
 
-use crate::settings::choices;
 use crate::shaders::{self, LANES};
-use bytemuck::{Pod, Zeroable};
 
 use super::settings::{Settings, Technique};
 use crate::colour::srgb_byte;
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, ComputePipeline, Memory, Recorder};
+pub use crate::interface::Shown;
+use crate::interface::records::display::DisplayParams;
 use crate::output::png::Colour;
 
 use crate::tracer::{Push, Tracer};
-
-choices! {
-    /// What is shown of a frame. shaders/display.glsl numbers them in this order.
-    pub enum Shown {
-        /// The filtered result
-        Accessibility = "accessibility",
-        /// The input of the spatial filter
-        Unfiltered = "unfiltered",
-        /// Accumulated samples; white: maximum history length
-        Samples = "samples",
-        /// Variance of one sample; white: 0.25
-        Variance = "variance",
-        /// Depth along the view; white is near
-        Depth = "depth",
-        /// Geometric normal, -1 to 1 mapped to 0 to 1
-        Normal = "normal",
-        /// World position, repeating every quarter of the scene
-        Position = "position",
-        /// Bent normal, -1 to 1 mapped to 0 to 1
-        Bent = "bent",
-    }
-}
 
 impl Shown {
     /// What a file without alpha needs for it.
@@ -68,19 +46,6 @@ pub struct Display {
     pub exposure: f32,
     /// World units: what depths and positions are measured in.
     pub unit: f32,
-}
-
-/// `DisplayParams` of shaders/display.glsl.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
-struct DisplayParams {
-    frame: u64,
-    thresholds: u64,
-    words: u64,
-    shown: u32,
-    gain: f32,
-    unit: f32,
-    has_history: u32,
 }
 
 /// The pass and its memory.

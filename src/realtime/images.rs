@@ -7,11 +7,12 @@ use crate::error::Result;
 use crate::film::block::BlockParams;
 use crate::gpu::{Buffer, Memory};
 use crate::integrators::ao::Hemisphere;
+use crate::interface::records::frame::SurfaceRecord;
 use crate::tracer::Tracer;
 use crate::tracer::stream::LAUNCH_RAYS;
 
-/// Bytes of a pixel's surface (`surface` in shaders/common/frame.glsl).
-pub const SURFACE_BYTES: u64 = 32;
+/// Bytes of a pixel's surface.
+pub const SURFACE_BYTES: u64 = size_of::<SurfaceRecord>() as u64;
 /// Bytes of where it was.
 pub const POSITION_BYTES: u64 = 12;
 

@@ -6,41 +6,14 @@
 use crate::shaders::{self, LANES};
 use std::sync::Arc;
 
-use bytemuck::{Pod, Zeroable};
-
 use super::settings::{FilterKind, Settings};
 use crate::error::Result;
 use crate::film::block::Block;
 use crate::gpu::{Buffer, ComputePipeline, Device, Memory, Recorder};
+use crate::interface::records::larsen::{LARSEN_NOISE, LARSEN_RAYS, LarsenParams};
 use crate::sampling::{best_candidates, blue_noise};
 use crate::tracer::stream::LAUNCH_RAYS;
 use crate::tracer::{Push, Stream, Tracer};
-
-/// Occlusion rays of a pixel of the occlusion image.
-const RAYS: u32 = 64;
-/// Side of the tile of noise, pixels.
-const NOISE: usize = 64;
-
-/// `LarsenParams` of shaders/common/larsen.glsl.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
-struct LarsenParams {
-    frame: u64,
-    lights: u64,
-    light_count: u32,
-    frame_parity: u32,
-    half_size: [u32; 2],
-    unit: f32,
-    reserved: f32,
-    points: u64,
-    noise: u64,
-    lit: u64,
-    samples: u64,
-    occlusion: u64,
-    combined: u64,
-    previous: u64,
-    rays: u64,
-}
 
 /// Its passes and memory.
 pub(super) struct Larsen {
@@ -70,8 +43,8 @@ impl Larsen {
         let light_records: Vec<[f32; 4]> = lights.iter().map(|p| [p[0], p[1], p[2], 0.0]).collect();
         let others = [
             Buffer::from_slice(device, "lights", &light_records)?,
-            Buffer::from_slice(device, "points", &best_candidates(RAYS as usize, 1))?,
-            Buffer::from_slice(device, "noise", &blue_noise(NOISE, 1))?,
+            Buffer::from_slice(device, "points", &best_candidates(LARSEN_RAYS as usize, 1))?,
+            Buffer::from_slice(device, "noise", &blue_noise(LARSEN_NOISE as usize, 1))?,
             image("samples", u64::from(LAUNCH_RAYS))?,
             image("occlusion", pixels(half))?,
             image("combined", pixels(size))?,
@@ -132,11 +105,11 @@ impl Larsen {
             self.light.record(r, &Push { first, count, ..push });
             r.barrier();
         }
-        for (first, count) in launches(tiles(self.params.half_size) * RAYS) {
+        for (first, count) in launches(tiles(self.params.half_size) * LARSEN_RAYS) {
             let push = Push { first, count, ..push };
             self.occlusion.record(r, &push);
             r.barrier();
-            r.timed("sum", |r| r.dispatch(&self.sum, &push, (count / RAYS).div_ceil(LANES)));
+            r.timed("sum", |r| r.dispatch(&self.sum, &push, (count / LARSEN_RAYS).div_ceil(LANES)));
             r.barrier();
         }
         let all = Push { count: self.size[0] * self.size[1], sample_bits: self.blurred.into(), ..push };

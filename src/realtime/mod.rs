@@ -24,6 +24,7 @@ use crate::film::block::{Block, BlockParams};
 use crate::film::camera::CameraRecord;
 use crate::gpu::{Buffer, Commands, Timing};
 use crate::integrators::ao::Hemisphere;
+use crate::interface::records::frame::MAX_VARIANCE;
 use crate::raster::{Primary, View};
 use crate::tracer::gpu_scene::rows;
 use crate::tracer::stream::LAUNCH_RAYS;
@@ -32,7 +33,7 @@ use budget::BudgetPass;
 use display::{Display, DisplayPass};
 use images::{Images, POSITION_BYTES, SURFACE_BYTES};
 use larsen::Larsen;
-use params::{FrameParams, MovedRecord};
+use params::{FrameParams, MovedRecord, moved_records};
 use passes::Passes;
 pub use settings::{Budget, Filter, FilterKind, Preset, Resolution, Settings, Technique};
 
@@ -179,7 +180,7 @@ impl Realtime {
     /// # Errors
     /// Those of the device.
     pub fn frame(&mut self, tracer: &Tracer, camera: &CameraRecord, moved: &[Moved]) -> Result<FrameStats> {
-        let moved = MovedRecord::of(moved);
+        let moved = moved_records(moved);
         // the reference work's pipeline makes everything anew
         let still = moved.is_empty() && self.state.camera == Some(*camera) && self.larsen.is_none();
         if !still {
@@ -307,10 +308,10 @@ impl Realtime {
     fn estimates(&self) -> Result<Vec<[f32; 3]>> {
         let history: Vec<[u32; 2]> =
             bytemuck::pod_collect_to_vec(&self.images.histories[self.state.history].read(0, 8 * self.pixels())?);
-        // `pack_estimate` of shaders/common/frame.glsl
+        // as shaders pack it (`pack_estimate`)
         Ok(history
             .iter()
-            .map(|h| [f32::from_bits(h[0]), (h[1] >> 16) as f32 / 16.0, (h[1] & 0xffff) as f32 * (0.5 / 65535.0)])
+            .map(|h| [f32::from_bits(h[0]), (h[1] >> 16) as f32 / 16.0, (h[1] & 0xffff) as f32 * (MAX_VARIANCE / 65535.0)])
             .collect())
     }
 

@@ -2,6 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::integrators::ao::{Attenuation, Hemisphere};
+pub use crate::interface::Resolution;
 use crate::raster::Primary;
 use crate::sampling::Sequence;
 use crate::settings::choices;
@@ -15,18 +16,6 @@ choices! {
         Gtao = "gtao",
         /// The pipeline of Larsen (2019)
         Larsen = "larsen",
-    }
-}
-
-choices! {
-    /// Which pixels are sampled in a frame.
-    pub enum Resolution {
-        /// Every pixel in every frame
-        Full = "full",
-        /// Half of the pixels per frame, alternating
-        Checkerboard = "checkerboard",
-        /// A quarter of the pixels per frame: half the resolution per axis
-        Half = "half",
     }
 }
 

@@ -4,7 +4,7 @@
 //! [`cumulative`] chooses among many, [`patches`] places in an image of the sphere; [`sequence`] has what images of few samples and many frames draw.
 //! [`morton`] numbers pixels so that those of a square follow each other.
 //! [`best_candidates`] and [`blue_noise`] make the tables of the reference work.
-//! [`warp`] maps points of the unit square to disks, hemispheres and frames; `f32`, mirrored by the shaders line by line.
+//! [`warp`] maps points of the unit square to disks, hemispheres and frames; `f32`, as the shaders compute them, line by line.
 
 pub mod cumulative;
 pub mod morton;

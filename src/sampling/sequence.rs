@@ -1,33 +1,12 @@
 //! Sequences for images that are made frame after frame, with few samples in each: where the error lies in the image, and how it
 //! changes from frame to frame, decides what a filter over pixels and frames leaves of it.
 //!
-//! Integer arithmetic, mirrored bit for bit by shaders/common/sequence.glsl.
+//! Integer arithmetic: shaders/common/sequence.glsl has the same functions, equal bit for bit.
 
 use super::morton::morton;
-use super::sobol::{AO_DIRECTION, Sampler, hash_combine, owen_scramble, sobol_2d, to_unit};
-use crate::settings::choices;
+pub use crate::interface::Sequence;
 
-choices! {
-    /// A sequence of points in the unit square, for each pixel and frame.
-    ///
-    /// `Stratified`: sixteen samples in a row, over a pixel's frames, visit each cell of the grid once. `Sobol`: each pixel has a sequence of its own, which
-    /// frames continue (Burley 2020). `Blue`: one sequence over the image, in the order of a shuffled Morton curve: the samples of an aligned
-    /// square of pixels are a net, so that filtering it leaves little error (Ahmed and Wonka, "Screen-Space Blue-Noise Diffusion of Monte Carlo
-    /// Sampling Error via Hierarchical Ordering of Pixels", ACM TOG 39(6), 2020); from frame to frame all points are shifted by Roberts' R2 sequence ("The
-    /// Unreasonable Effectiveness of Quasirandom Sequences", 2018).
-    pub enum Sequence (default Blue) {
-        /// Independent random numbers
-        White = "white",
-        /// Jittered on a 4x4 grid
-        Stratified = "stratified",
-        /// Owen-scrambled Sobol, one sequence per pixel
-        Sobol = "sobol",
-        /// Owen-scrambled Sobol over the image: blue-noise error
-        Blue = "blue",
-        /// R2 sequence (Roberts), Cranley-Patterson rotation per pixel
-        R2 = "r2",
-    }
-}
+use super::sobol::{AO_DIRECTION, Sampler, hash_combine, owen_scramble, sobol_2d, to_unit};
 
 /// 2^32 / g and 2^32 / g^2, where g^3 = g + 1.
 const R2_STEP: [u32; 2] = [3_242_174_889, 2_447_445_414];

@@ -8,18 +8,7 @@
 //! Everything is unsigned 32-bit arithmetic that wraps: GLSL `uint` gives the same bits (`bitfieldReverse` is
 //! [`u32::reverse_bits`]).
 
-/// Dimension pair of the position within the pixel.
-pub const CAMERA_FILM: u32 = 0;
-/// Dimension pair of the position on the lens.
-pub const CAMERA_LENS: u32 = 1;
-/// Dimension pair of the direction of an ambient occlusion ray.
-pub const AO_DIRECTION: u32 = 2;
-/// In place of a dimension pair, for the random number of each ray by which partial coverage is decided (`shaders/common/ray_seed.glsl`).
-pub const RAY_SEED: u32 = 3;
-/// First dimension pair of path vertices; vertex `n` uses [`PATH_STRIDE`] pairs from `PATH_FIRST + n * PATH_STRIDE`.
-pub const PATH_FIRST: u32 = 8;
-/// Dimension pairs that one path vertex may use.
-pub const PATH_STRIDE: u32 = 8;
+pub use crate::interface::records::sampler::{AO_DIRECTION, CAMERA_FILM, CAMERA_LENS, PATH_FIRST, PATH_STRIDE, RAY_SEED};
 
 /// A good 32-bit mixer: Wellons' `lowbias32` (<https://nullprogram.com/blog/2018/07/31/>). A bijection with `hash(0) == 0`.
 pub const fn hash(x: u32) -> u32 {

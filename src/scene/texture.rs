@@ -3,18 +3,7 @@
 use std::sync::{Arc, LazyLock};
 
 use crate::colour::srgb_decode;
-
-/// What happens outside [0, 1].
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Wrap {
-    /// Tile (glTF's default).
-    #[default]
-    Repeat,
-    /// Tile, every second tile mirrored.
-    Mirror,
-    /// Extend the border.
-    Clamp,
-}
+pub use crate::interface::Wrap;
 
 /// How texels are interpolated.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -12,8 +12,10 @@ use std::f64::consts::PI;
 
 use rayon::prelude::*;
 
-/// Entries along cosine and along roughness, both from 0 to 1: `ALBEDO_SIZE` of shaders/bsdf/albedo.glsl.
-const SIZE: usize = 64;
+use crate::interface::records::albedo::ALBEDO_SIZE;
+
+/// Entries along cosine and along roughness, both from 0 to 1.
+const SIZE: usize = ALBEDO_SIZE as usize;
 /// Points along each axis of an integral.
 const POINTS: usize = 32;
 /// Points in all of one with a critical angle.

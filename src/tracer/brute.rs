@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use super::compute::{Hierarchy, PRIMITIVE_BYTES, record, unfinished_counter, write_records};
+use super::compute::{Hierarchy, record, unfinished_counter, write_records};
 use super::kernel::Kernel;
 use crate::accel::flatten::FlatScene;
 use crate::error::{Error, Result};
@@ -38,8 +38,8 @@ pub(super) fn upload(device: &Arc<Device>, flat: &FlatScene) -> Result<Hierarchy
     let mut entries = flat.placements.iter().map(|p| ranges[p.group]);
     Ok(Hierarchy {
         kernel: Kernel::Brute,
-        nodes: write_records::<[u32; 2]>(device, "instance ranges", 8, flat.placements.len() as u64, &mut entries)?,
-        primitives: Some(write_records(device, "primitives", PRIMITIVE_BYTES, u64::from(total), &mut records)?),
+        nodes: write_records(device, "instance ranges", flat.placements.len() as u64, &mut entries)?,
+        primitives: Some(write_records(device, "primitives", u64::from(total), &mut records)?),
         root: flat.placements.len() as u32,
         instance_roots: flat.placements.iter().map(|p| ranges[p.group][0]).collect(),
         stack_entries: 0,

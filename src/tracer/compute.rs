@@ -13,6 +13,7 @@ use crate::accel::flatten::{FlatScene, Group, Placement};
 use crate::accel::{Aabb, bvh2};
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, Device, DeviceInfo, Memory};
+use crate::interface::records::hierarchy::{ALPHA_TESTED, SPHERE, STACK_IN_REGISTERS, SphereRecord, TriangleRecord};
 
 /// Rays that a lane of the fast kernel takes one after the other on a CPU driver, where idle lanes of a vector cost most.
 const RAYS_PER_LANE_CPU: u32 = 16;
@@ -37,13 +38,6 @@ pub(super) const USUAL_STACK: u32 = 16;
 
 /// After so many turns some drivers leave any loop: [`DeviceInfo::cuts_long_loops`].
 const CUT_LOOP_TURNS: u32 = 65_535;
-
-/// Bytes of a primitive record.
-pub(super) const PRIMITIVE_BYTES: u64 = 40;
-pub(super) const ALPHA_TESTED: u32 = 0x8000_0000;
-pub(super) const SPHERE: u32 = 0x4000_0000;
-/// Bytes of a closest hit between the steps of a launch.
-pub(super) const HIT_BYTES: u64 = 24;
 
 /// Hierarchies on the host.
 pub(super) enum Trees {
@@ -99,7 +93,7 @@ impl Hierarchy {
     /// rounded up, so that scenes share compiled shaders.
     pub fn stack_constant(&self) -> u32 {
         match self.kernel {
-            Kernel::Auto | Kernel::Wide | Kernel::Packet => match self.stack_entries.saturating_sub(wide::STACK_IN_REGISTERS) {
+            Kernel::Auto | Kernel::Wide | Kernel::Packet => match self.stack_entries.saturating_sub(STACK_IN_REGISTERS) {
                 0 => 0,
                 n => n.next_power_of_two().max(USUAL_STACK),
             },
@@ -188,10 +182,10 @@ pub(super) fn unfinished_counter(device: &Arc<Device>) -> Result<Buffer> {
 pub(super) fn write_records<T: bytemuck::NoUninit>(
     device: &Arc<Device>,
     name: &str,
-    size: u64,
     count: u64,
     records: &mut dyn Iterator<Item = T>,
 ) -> Result<Buffer> {
+    let size = size_of::<T>() as u64;
     let mut buffer = Buffer::new(device, name, size * count, Memory::Device)?;
     buffer.fill(size * count, size, |_, bytes| {
         for (out, r) in bytes.chunks_exact_mut(size as usize).zip(&mut *records) {
@@ -247,20 +241,16 @@ pub(super) fn placed(to_world: &DAffine3, b: Aabb) -> Aabb {
     })
 }
 
-/// A primitive of a group as the shaders read it.
-pub(super) fn record(flat: &FlatScene, group: &Group, primitive: u32) -> [u32; 10] {
+/// A primitive of a group as the readable kernels take it: a sphere lies where a triangle might be.
+pub(super) fn record(flat: &FlatScene, group: &Group, primitive: u32) -> TriangleRecord {
     let part = flat.part_of(group, primitive as usize);
     let k = primitive as usize - part.first_primitive;
-    let mut out = [0u32; 10];
     if group.spheres {
         let s = flat.sphere(part, k);
-        out[..4].copy_from_slice(&[s.center.x, s.center.y, s.center.z, s.radius].map(f32::to_bits));
-        out[9] = primitive | SPHERE;
-    } else {
-        for (c, v) in flat.triangle(part, k).iter().enumerate() {
-            out[3 * c..3 * c + 3].copy_from_slice(&v.to_array().map(f32::to_bits));
-        }
-        out[9] = primitive | if part.alpha_tested { ALPHA_TESTED } else { 0 };
+        let sphere =
+            SphereRecord { center: s.center.to_array(), radius: s.radius, number: primitive | SPHERE, ..Default::default() };
+        return bytemuck::cast(sphere);
     }
-    out
+    let flag = if part.alpha_tested { ALPHA_TESTED } else { 0 };
+    TriangleRecord { corners: flat.triangle(part, k).map(|v| v.to_array()), number: primitive | flag }
 }

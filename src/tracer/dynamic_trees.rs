@@ -1,5 +1,5 @@
 //! The fast kernel's hierarchies of a scene that changes: kept up to date on the host, where they lie. On a device that shares
-//! the host's memory nothing is copied; on others a mirror is kept and the parts that changed are written.
+//! the host's memory nothing is copied; on others a copy is kept and the parts that changed are written.
 //!
 //! Trees have room to grow in the array of blocks, and the kernel's stack some more entries than the first trees need: streams are
 //! compiled once. A tree that needs more room moves the array, one that would be deeper is made shallower.
@@ -11,17 +11,18 @@ use std::time::Instant;
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::compute::{ALPHA_TESTED, padding, placed, placement_padding, reach_padding};
+use super::compute::{padding, placed, placement_padding, reach_padding};
 use super::dynamic::group_of;
 use super::gpu_scene::rows;
 use super::wide::{Trees, Triangles, tree, triangle_tree_of};
 use crate::accel::build::MAX_DEPTH;
 use crate::accel::flatten::{FlatScene, Placement};
 use crate::accel::refit::{RefitPlan, RefitPolicy, refit};
-use crate::accel::wide::{self, BLOCK_BYTES, Block, Wide};
+use crate::accel::wide::{self, BLOCK_BYTES, Block, LEAF, Wide};
 use crate::accel::{Aabb, BuildPreset, pairs};
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, Device, Memory};
+use crate::interface::records::hierarchy::{ALPHA_TESTED, InstanceLeaf, TriangleLeaf};
 use crate::scene::Geometry;
 
 /// A top level of so many entries is always built anew: docs/traversal.md has the measurement.
@@ -70,7 +71,7 @@ struct Deforming {
 /// The hierarchies of a scene that changes.
 pub(super) struct DynamicTrees {
     /// What is in device memory, where the host cannot reach it.
-    mirror: Option<Vec<Block>>,
+    copy: Option<Vec<Block>>,
     top: Option<Tree>,
     groups: Vec<Tree>,
     deforming: Vec<Option<Deforming>>,
@@ -147,13 +148,13 @@ impl DynamicTrees {
                 Deforming { indices: t.indices.clone(), used, opaque: g.opaque_count as u32 }
             })
         });
-        Self { mirror: None, top, groups, deforming: deforming.collect() }
+        Self { copy: None, top, groups, deforming: deforming.collect() }
     }
 
     /// Keeps a copy of the array, where the host cannot reach the device's.
-    pub fn mirror(&mut self, device: &Device, nodes: &Buffer) -> Result<()> {
+    pub fn keep_copy(&mut self, device: &Device, nodes: &Buffer) -> Result<()> {
         if !device.info.unified_memory {
-            self.mirror = Some(bytemuck::pod_collect_to_vec(&nodes.read(0, nodes.size())?));
+            self.copy = Some(bytemuck::pod_collect_to_vec(&nodes.read(0, nodes.size())?));
         }
         Ok(())
     }
@@ -178,7 +179,7 @@ impl DynamicTrees {
             if built.blocks.len() > self.groups[group].room {
                 self.make_room(device, nodes, group, more_room(built.blocks.len()))?;
             }
-            self.groups[group].replace(blocks(&mut self.mirror, nodes)?, &built, seconds);
+            self.groups[group].replace(blocks(&mut self.copy, nodes)?, &built, seconds);
             self.flush(nodes, self.groups[group].range())?;
             return Ok((true, 1.0));
         }
@@ -188,7 +189,7 @@ impl DynamicTrees {
         };
         let pad = reach_padding(positions.par_iter().with_min_len(4096).enumerate().map(reach).reduce(|| 0.0, f32::max));
         let leaf = |block: &mut Block| rewrite_pair(block, positions, &deforming.indices);
-        self.groups[group].refit(blocks(&mut self.mirror, nodes)?, pad, leaf, start);
+        self.groups[group].refit(blocks(&mut self.copy, nodes)?, pad, leaf, start);
         self.flush(nodes, self.groups[group].range())?;
         Ok((false, self.groups[group].growth()))
     }
@@ -203,26 +204,23 @@ impl DynamicTrees {
         let mut boxes: Vec<Aabb> = placements.par_iter().map(|p| placed(&p.to_world, groups[p.group].bounds)).collect();
         let pad = placement_padding(boxes.iter().fold(0.0f32, |m, b| m.max(b.min.abs().max(b.max.abs()).max_element())));
         boxes.par_iter_mut().for_each(|b| *b = Aabb { min: b.min - pad, max: b.max + pad });
-        let leaf = |block: &mut Block, entry: u32| {
+        let leaf = |entry: u32| {
             let placement = &placements[entry as usize];
-            entry_block(block, entry, placement, groups[placement.group].base as u32);
+            instance_leaf(entry, placement, groups[placement.group].base as u32)
         };
         let rebuild = placements.len() <= TOP_BUILD_MOST || top.should_rebuild();
         if rebuild {
-            let built = tree(boxes, BuildPreset::Fast, Some(top.depth), |entry| {
-                let mut block = [0; 16];
-                leaf(&mut block, entry);
-                block
-            });
-            top.replace(blocks(&mut self.mirror, nodes)?, &built, start.elapsed().as_secs_f64());
+            let built = tree(boxes, BuildPreset::Fast, Some(top.depth), |entry| bytemuck::cast(leaf(entry)));
+            top.replace(blocks(&mut self.copy, nodes)?, &built, start.elapsed().as_secs_f64());
         } else {
             let pad = padding(boxes.iter());
             let leaf = |block: &mut Block| {
-                let entry = block[13];
-                leaf(block, entry);
+                let entry = bytemuck::cast_ref::<Block, InstanceLeaf>(block).instance;
+                *block = bytemuck::cast(leaf(entry));
+                block.flags |= LEAF;
                 boxes[entry as usize]
             };
-            top.refit(blocks(&mut self.mirror, nodes)?, pad, leaf, start);
+            top.refit(blocks(&mut self.copy, nodes)?, pad, leaf, start);
         }
         let (range, bounds) = (top.range(), top.bounds);
         self.flush(nodes, range)?;
@@ -249,7 +247,7 @@ impl DynamicTrees {
 
     /// Gives a group more room: the whole array moves.
     fn make_room(&mut self, device: &Arc<Device>, nodes: &mut Buffer, group: usize, room: usize) -> Result<()> {
-        let old: Vec<Block> = blocks(&mut self.mirror, nodes)?.to_vec();
+        let old: Vec<Block> = blocks(&mut self.copy, nodes)?.to_vec();
         let before: Vec<usize> = self.groups.iter().map(|g| g.base).collect();
         self.groups[group].room = room;
         let mut at = self.top.as_ref().map_or(0, |t| t.room);
@@ -260,7 +258,7 @@ impl DynamicTrees {
         if u32::try_from(at).is_err() {
             return Err(Error::Scene(format!("its hierarchy has {at} blocks; the compute tracer addresses 2^32")));
         }
-        let mut new = vec![[0; 16]; at];
+        let mut new = vec![Block::default(); at];
         if let Some(top) = &self.top {
             // its entries name the groups' roots; whoever makes room places them anew
             new[..top.len].copy_from_slice(&old[..top.len]);
@@ -273,12 +271,12 @@ impl DynamicTrees {
         }
         *nodes = Buffer::new(device, "hierarchy", BLOCK_BYTES * at as u64, Memory::Device)?;
         nodes.write(0, bytemuck::cast_slice(&new))?;
-        self.mirror = self.mirror.is_some().then_some(new);
+        self.copy = self.copy.is_some().then_some(new);
         Ok(())
     }
 
     fn flush(&self, nodes: &mut Buffer, range: Range<usize>) -> Result<()> {
-        match &self.mirror {
+        match &self.copy {
             Some(blocks) => nodes.write(range.start as u64 * BLOCK_BYTES, bytemuck::cast_slice(&blocks[range])),
             None => Ok(()),
         }
@@ -286,8 +284,8 @@ impl DynamicTrees {
 }
 
 /// The array, where the host can write.
-fn blocks<'a>(mirror: &'a mut Option<Vec<Block>>, nodes: &'a mut Buffer) -> Result<&'a mut [Block]> {
-    match mirror {
+fn blocks<'a>(copy: &'a mut Option<Vec<Block>>, nodes: &'a mut Buffer) -> Result<&'a mut [Block]> {
+    match copy {
         Some(blocks) => Ok(blocks),
         None => {
             let bytes = nodes.bytes_mut().ok_or_else(|| Error::Vulkan("the hierarchy is not mapped".into()))?;
@@ -334,29 +332,28 @@ impl Tree {
     }
 }
 
-/// What is said of an entry of the top level.
-pub(super) fn entry_block(block: &mut Block, entry: u32, placement: &Placement, root: u32) {
-    block[..12].copy_from_slice(bytemuck::cast_slice(rows(&placement.to_world.inverse()).as_flattened()));
-    block[12] = root;
-    block[13] = entry;
+/// The leaf of an entry of the top level, whose group's root is block `root`.
+pub(super) fn instance_leaf(entry: u32, placement: &Placement, root: u32) -> InstanceLeaf {
+    InstanceLeaf { world_to_group: rows(&placement.to_world.inverse()), root, instance: entry, ..Default::default() }
 }
 
 /// Moves the corners of a leaf to where its vertices are now, and gives their box. Which vertex is which corner follows from the numbers of the
 /// triangles and the places of their corners, as the shader reads them.
 fn rewrite_pair(block: &mut Block, positions: &[Vec3], indices: &[[u32; 3]]) -> Aabb {
     let places = |word: u32| [word as usize & 3, word as usize >> 2 & 3];
-    let [second, third] = places(block[14]);
+    let leaf: &mut TriangleLeaf = bytemuck::cast_mut(block);
+    let [second, third] = places(leaf.order);
     let mut corners = [0u32; 4];
-    let [a, b, c] = indices[(block[12] & !ALPHA_TESTED) as usize];
+    let [a, b, c] = indices[(leaf.primitives[0] & !ALPHA_TESTED) as usize];
     // the places of a triangle's corners are 0, 1 and 2
     corners[3 - second - third] = a;
     corners[second] = b;
     corners[third] = c;
     corners[3] = corners[2];
-    if block[13] != pairs::NONE {
+    if leaf.primitives[1] != pairs::NONE {
         // places 0, 1, 2 are corners 0, 2, 3 here
-        let [second, third] = places(block[14] >> 4);
-        let t = indices[(block[13] & !ALPHA_TESTED) as usize];
+        let [second, third] = places(leaf.order >> 4);
+        let t = indices[(leaf.primitives[1] & !ALPHA_TESTED) as usize];
         corners[3] = if second == 2 {
             t[1]
         } else if third == 2 {
@@ -366,8 +363,6 @@ fn rewrite_pair(block: &mut Block, positions: &[Vec3], indices: &[[u32; 3]]) -> 
         };
     }
     let points = corners.map(|v| positions[v as usize]);
-    for (k, p) in points.iter().enumerate() {
-        block[3 * k..3 * k + 3].copy_from_slice(&p.to_array().map(f32::to_bits));
-    }
+    leaf.corners = points.map(|p| p.to_array());
     Aabb::of_points(&points)
 }

@@ -1,23 +1,27 @@
-//! The scene in device memory. The records mirror shaders/scene/scene.glsl field by field.
+//! The scene in device memory: the records of [`crate::interface::records::scene`].
 
 use std::borrow::Cow;
 use std::sync::Arc;
 
-use bytemuck::{Pod, Zeroable};
+use bytemuck::Pod;
 use glam::{DAffine3, Vec3, Vec4};
 
 use super::albedo;
 use super::compute::Hierarchy;
 use super::drawable::{Drawable, Shape};
-use super::mipmap::{self, MipRecord, Texels};
+use super::mipmap;
 use super::motion::Motion;
-use super::shading::{self, ShadingRecord, TextureUse};
+use super::shading;
 use crate::accel::features::{Blend, alpha_cutoff};
 use crate::accel::flatten::{FlatScene, Group, Part, Placement};
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, Device, Memory};
-use crate::interface::MaterialFeature;
-use crate::scene::{AlphaMode, Filter, Geometry, Material, TexelData, TextureSlot, TriangleMesh, Wrap};
+use crate::interface::records::ray::INVALID;
+use crate::interface::records::scene::{
+    InstanceRecord, MaterialRecord, MipRecord, PartRecord, SceneRoot, TextureRecord, TextureUse,
+};
+use crate::interface::{MaterialFeature, TexelFormat, Texels};
+use crate::scene::{AlphaMode, Filter, Geometry, Material, TexelData, TextureSlot, TriangleMesh};
 
 /// What the passes will ask of the scene; the rest is not uploaded.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -37,89 +41,6 @@ pub struct Needs {
     /// With `shading`: levels of textures, for paths that know how wide they are ([`crate::integrators::path::TextureFilter::RayCone`]).
     pub mip_levels: bool,
 }
-
-#[repr(C)]
-#[derive(Clone, Copy, Default, Pod, Zeroable)]
-struct SceneRoot {
-    instances: u64,
-    parts: u64,
-    placements: u64,
-    materials: u64,
-    textures: u64,
-    nodes: u64,
-    primitives: u64,
-    top_level: u64,
-    part_count: u32,
-    reserved1: u32,
-    launch_hits: u64,
-    root: u32,
-    reserved: u32,
-    unfinished: u64,
-    launch_counters: u64,
-    motion: u64,
-    shading: u64,
-    albedo: u64,
-    bounds_min: [f32; 4],
-    bounds_max: [f32; 4],
-    mips: u64,
-    reserved2: u64,
-}
-
-#[repr(C)]
-#[derive(Clone, Copy, Default, Pod, Zeroable)]
-struct InstanceRecord {
-    group_to_world: [[f32; 4]; 3],
-    world_to_group: [[f32; 4]; 3],
-    part_of: u64,
-    first_part: u32,
-    scene_instance: u32,
-    root: u32,
-    opaque_count: u32,
-    reserved: [u32; 2],
-}
-
-#[repr(C)]
-#[derive(Clone, Copy, Default, Pod, Zeroable)]
-struct PartRecord {
-    indices: u64,
-    positions: u64,
-    normals: u64,
-    texcoords: [u64; 2],
-    colors: u64,
-    first_primitive: u32,
-    first_vertex: u32,
-    material: u32,
-    scene_instance: u32,
-    mirrored: u32,
-    reserved: u32,
-    tangents: u64,
-}
-
-#[repr(C)]
-#[derive(Clone, Copy, Default, Pod, Zeroable)]
-struct MaterialRecord {
-    base_color: [f32; 4],
-    texcoord_transform: [f32; 4],
-    texcoord_offset: [f32; 2],
-    base_color_texture: u32,
-    texcoord_set: u32,
-    alpha_cutoff: f32,
-    coverage: u32,
-    reserved: [u32; 2],
-}
-
-#[repr(C)]
-#[derive(Clone, Copy, Default, Pod, Zeroable)]
-struct TextureRecord {
-    texels: u64,
-    width: u32,
-    height: u32,
-    wrap: [u32; 2],
-    nearest: u32,
-    format: u32,
-}
-
-const INVALID: u32 = u32::MAX;
 
 /// The three rows of an affine map in single precision, as shaders and Vulkan's instances take it.
 pub fn rows(t: &DAffine3) -> [[f32; 4]; 3] {
@@ -180,10 +101,8 @@ impl GpuScene {
                     indices: buffers.indices.as_ref().map_or(0, Buffer::address),
                     positions: buffers.positions.address(),
                     normals: attributes.address(part, k, Attribute::Normals),
-                    texcoords: [
-                        attributes.address(part, k, Attribute::Texcoords(0)),
-                        attributes.address(part, k, Attribute::Texcoords(1)),
-                    ],
+                    texcoords0: attributes.address(part, k, Attribute::Texcoords(0)),
+                    texcoords1: attributes.address(part, k, Attribute::Texcoords(1)),
                     colors: attributes.address(part, k, Attribute::Colors),
                     first_primitive: part.first_primitive as u32,
                     first_vertex: part.first_vertex as u32,
@@ -206,7 +125,7 @@ impl GpuScene {
                 scene_instance: p.scene_instance.map_or(INVALID, |i| i as u32),
                 root: 0,
                 opaque_count: flat.groups[p.group].opaque_count as u32,
-                reserved: [0; 2],
+                ..Default::default()
             })
             .collect();
         if let Some(bad) =
@@ -236,7 +155,7 @@ impl GpuScene {
         let indices = shading::indices_of_refraction(&flat.scene.materials);
         let shading: Vec<_> = match needs.shading {
             true => {
-                let record = |m| ShadingRecord::new(m, needs, &indices, |slot| textures.slot(slot));
+                let record = |m| shading::record(m, needs, &indices, |slot| textures.slot(slot));
                 flat.scene.materials.iter().map(record).collect()
             }
             false => Vec::new(),
@@ -613,7 +532,7 @@ impl Mips {
     /// Of the scene's textures that are used, as each is used (by [`Texels`]).
     fn upload(device: &Arc<Device>, flat: &FlatScene, used: &[usize], uses: &[[bool; 3]]) -> Result<Self> {
         let texture = |t: usize| &flat.scene.textures[t];
-        let mut records: Vec<_> = used.iter().map(|&t| MipRecord::new([texture(t).width, texture(t).height])).collect();
+        let mut records: Vec<_> = used.iter().map(|&t| mipmap::record([texture(t).width, texture(t).height])).collect();
         // textures that share an image share its levels, too
         let mut pyramids: Vec<Cow<[u8]>> = Vec::new();
         let mut pyramid_of = std::collections::HashMap::new();
@@ -666,11 +585,6 @@ impl Textures {
             }));
         }
         let (texels, addresses) = concatenate(device, "texels", &images)?;
-        let wrap = |w: Wrap| match w {
-            Wrap::Repeat => 0,
-            Wrap::Mirror => 1,
-            Wrap::Clamp => 2,
-        };
         let records = used
             .iter()
             .zip(image)
@@ -680,13 +594,14 @@ impl Textures {
                     texels: addresses[image],
                     width: texture.width,
                     height: texture.height,
-                    wrap: texture.wrap.map(wrap),
+                    wrap_u: texture.wrap[0] as u32,
+                    wrap_v: texture.wrap[1] as u32,
                     nearest: (texture.filter == Filter::Nearest) as u32,
                     format: match texture.texels {
-                        TexelData::Unorm8(_) => 0,
-                        TexelData::Unorm16(_) => 1,
-                        TexelData::Float(_) => 2,
-                    },
+                        TexelData::Unorm8(_) => TexelFormat::Unorm8,
+                        TexelData::Unorm16(_) => TexelFormat::Unorm16,
+                        TexelData::Float(_) => TexelFormat::Float,
+                    } as u32,
                 }
             })
             .collect();
@@ -721,7 +636,7 @@ impl Textures {
             texcoord_set: slot.map_or(0, |s| s.texcoord as u32),
             alpha_cutoff: alpha_cutoff(m).unwrap_or(-1.0),
             coverage: (blend == Blend::Covered && m.alpha_mode == AlphaMode::Blend).into(),
-            reserved: [0; 2],
+            ..Default::default()
         }
     }
 }

@@ -1,62 +1,30 @@
-//! Levels of textures, for footprints wider than a texel: made on the host, only where somebody asks. Mirrors shaders/scene/mipmap.glsl.
+//! Levels of textures, for footprints wider than a texel: made on the host, only where somebody asks.
 
 use std::ops::Range;
 
-use bytemuck::{Pod, Zeroable};
 use glam::Vec4;
 use rayon::prelude::*;
 
+use crate::interface::Texels;
+use crate::interface::records::scene::{MAX_LEVELS, MipRecord};
 use crate::scene::{TexelData, Texture};
 
-/// Beside level 0: `MAX_LEVELS` of shaders/scene/mipmap.glsl. Enough for 65535 texels.
-const MAX_LEVELS: usize = 15;
-
-/// What a texture's colours are, and so how they are averaged: `TEXELS_*` of shaders/scene/mipmap.glsl. All levels hold linear values: a texture that
-/// is used in two ways has two sets of them.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub(super) enum Texels {
-    /// Numbers; of normal maps vectors, whose mean is shorter the more they differ. Shaders normalise that away.
-    Linear,
-    /// sRGB: averaged as light.
-    Srgb,
-    /// sRGB of a surface that is there as alpha says. What is not there counts nothing: colours are multiplied by alpha, and stay so.
-    Covered,
-}
-
-impl Texels {
-    pub const ALL: [Texels; 3] = [Texels::Linear, Texels::Srgb, Texels::Covered];
-}
-
-/// `MipRecord` of shaders/scene/mipmap.glsl.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
-pub(super) struct MipRecord {
-    /// Addresses, by [`Texels`]; 0 where nobody asks.
-    pub texels: [u64; 3],
-    /// The smallest level.
-    pub last: u32,
-    /// Texels before each level, from level 1 on.
-    pub first: [u32; MAX_LEVELS],
-}
-
-impl MipRecord {
-    /// Of a texture of this size, without addresses.
-    pub fn new(size: [u32; 2]) -> Self {
-        let mut record = Self::default();
-        let mut texels = 0;
-        for (k, size) in levels(size).enumerate() {
-            record.first[k] = texels;
-            record.last = k as u32 + 1;
-            texels += size[0] * size[1];
-        }
-        record
+/// Levels of a texture of this size, without addresses.
+pub(super) fn record(size: [u32; 2]) -> MipRecord {
+    let mut record = MipRecord::default();
+    let mut texels = 0;
+    for (k, size) in levels(size).enumerate() {
+        record.first[k] = texels;
+        record.last = k as u32 + 1;
+        texels += size[0] * size[1];
     }
+    record
 }
 
 /// Sizes of the levels from level 1 on: each half of the one before, rounded down, to one texel.
 fn levels(size: [u32; 2]) -> impl Iterator<Item = [u32; 2]> {
     let halves = std::iter::successors(Some(size), |s| (*s != [1, 1]).then(|| s.map(|n| (n / 2).max(1))));
-    halves.skip(1).take(MAX_LEVELS)
+    halves.skip(1).take(MAX_LEVELS as usize)
 }
 
 /// All levels from 1 on as they lie in device memory, one after the other, rows from the top: four numbers of 16 bits a texel, to 2^-17, or four floats
@@ -172,7 +140,7 @@ mod tests {
                 (state >> 24) as u8
             };
             let t = texture(width, height, (0..4 * width * height).map(|_| random()).collect());
-            let record = MipRecord::new([width, height]);
+            let record = super::record([width, height]);
             for texels in Texels::ALL {
                 let levels = pyramid(&t, texels);
                 let value = |c: usize| {

@@ -1,23 +1,14 @@
-//! Where what changes was before the last update, in device memory: surfaces are looked up there in the previous frame. Mirrors
-//! shaders/scene/motion.glsl. Scenes that never change have nothing of it.
+//! Where what changes was before the last update, in device memory: surfaces are looked up there in the previous frame.
+//! Scenes that never change have nothing of it.
 
 use std::sync::Arc;
-
-use bytemuck::{Pod, Zeroable};
 
 use super::dynamic::group_of;
 use super::gpu_scene::rows;
 use crate::accel::flatten::{FlatScene, Placement};
 use crate::error::Result;
 use crate::gpu::{Buffer, Device, Memory};
-
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
-struct MotionRecord {
-    previous_group_to_world: [[f32; 4]; 3],
-    previous_positions: u64,
-    reserved: u64,
-}
+use crate::interface::records::scene::MotionRecord;
 
 /// The scene as it was before the last update.
 pub(super) struct Motion {

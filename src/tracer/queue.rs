@@ -4,24 +4,11 @@
 
 use std::sync::Arc;
 
-use bytemuck::{Pod, Zeroable};
-
 use super::Push;
 use crate::error::Result;
 use crate::gpu::{Buffer, Device, Memory, Recorder};
+pub use crate::interface::records::queue::QueueRecord;
 use crate::ray::Ray;
-
-/// `RayQueue` of shaders/common/queue.glsl: part of the parameters of the passes that fill it and read its tags.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
-pub struct QueueRecord {
-    /// Address of the rays, 32 bytes each.
-    pub rays: u64,
-    /// Address of a `u32` per ray, for the callback.
-    pub tags: u64,
-    /// Address of a `u32`: how many there are.
-    pub count: u64,
-}
 
 /// A queue and its memory: 36 bytes per ray.
 pub struct RayQueue {

@@ -3,9 +3,7 @@
 
 use std::sync::Arc;
 
-use super::compute::{
-    Hierarchy, PRIMITIVE_BYTES, padding, placement_boxes, primitive_boxes, record, unfinished_counter, write_records,
-};
+use super::compute::{Hierarchy, padding, placement_boxes, primitive_boxes, record, unfinished_counter, write_records};
 use super::kernel::BuildOptions;
 use super::kernel::Kernel;
 use crate::accel::build::MAX_DEPTH;
@@ -62,19 +60,13 @@ impl Trees {
         };
         let top_nodes = self.top.iter().flat_map(|t| padded(t, |c| top_reference(t, c)));
         let group_nodes = self.groups.iter().zip(bases).flat_map(|(t, b)| padded(t, move |c| bvh2::rebase(c, b.0, b.1)));
-        let nodes = write_records(
-            device,
-            "hierarchy nodes",
-            size_of::<bvh2::Node>() as u64,
-            node as u64,
-            &mut top_nodes.chain(group_nodes),
-        )?;
+        let nodes = write_records(device, "hierarchy nodes", node as u64, &mut top_nodes.chain(group_nodes))?;
         let mut records = self
             .groups
             .iter()
             .zip(&flat.groups)
             .flat_map(|(t, group)| t.primitives.iter().map(move |&p| record(flat, group, p)));
-        let primitives = write_records(device, "hierarchy primitives", PRIMITIVE_BYTES, primitive as u64, &mut records)?;
+        let primitives = write_records(device, "hierarchy primitives", primitive as u64, &mut records)?;
         Ok(Hierarchy {
             kernel,
             nodes,
@@ -99,10 +91,10 @@ fn top_reference(top: &Bvh2, reference: u32) -> u32 {
 }
 
 /// A tree's nodes with padded boxes and changed references.
-fn padded<'a>(tree: &'a Bvh2, change: impl Fn(u32) -> u32 + 'a) -> impl Iterator<Item = bvh2::Node> + 'a {
+fn padded<'a>(tree: &'a Bvh2, change: impl Fn(u32) -> u32 + 'a) -> impl Iterator<Item = bvh2::BinaryNode> + 'a {
     let root = tree.nodes.first().map(|n| n.boxes.map(|b| Aabb { min: b[0].into(), max: b[1].into() }));
     let pad = padding(root.iter().flatten());
-    tree.nodes.iter().map(move |n| bvh2::Node {
+    tree.nodes.iter().map(move |n| bvh2::BinaryNode {
         boxes: n.boxes.map(|[lo, hi]| [lo.map(|x| x - pad), hi.map(|x| x + pad)]),
         children: n.children.map(&change),
         ..*n

@@ -1,61 +1,17 @@
-//! What of materials the path tracer gets: `ShadingRecord` of shaders/path/shading.glsl, and which of it the scene asks for at all.
-
-use bytemuck::{Pod, Zeroable};
+//! What of materials the path tracer gets: [`ShadingRecord`], and which of it the scene requires.
 
 use super::gpu_scene::Needs;
-use super::mipmap::Texels;
 use crate::accel::flatten::FlatScene;
+use crate::interface::records::scene::TextureUse;
+use crate::interface::records::shading::ShadingRecord;
 use crate::interface::{
-    MaterialFeature, MaterialFeatures, MaterialModel, ShadingFeatures, TextureFeature, TextureFeatures, Walls,
+    MaterialFeature, MaterialFeatures, MaterialModel, ShadingFeatures, Texels, TextureFeature, TextureFeatures, Walls,
 };
 use crate::scene::material::MaterialKind;
 use crate::scene::{Geometry, Material, TextureSlot};
 
 /// Textures of a material beside its base colour's, numbered as [`TextureFeature`].
 pub(super) const SLOTS: usize = TextureFeature::ALL.len();
-
-/// `TextureUse` of shaders/scene/scene.glsl.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
-pub(super) struct TextureUse {
-    /// 2x2, column by column.
-    pub transform: [f32; 4],
-    pub offset: [f32; 2],
-    /// Texture record, or all ones.
-    pub texture: u32,
-    /// Of texture coordinates.
-    pub set: u32,
-}
-
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
-pub(super) struct ShadingRecord {
-    emission: [f32; 3],
-    model: u32,
-    metallic: f32,
-    roughness: f32,
-    ior: f32,
-    specular: f32,
-    specular_color: [f32; 3],
-    emits_back: u32,
-    eta: [f32; 3],
-    transmission: f32,
-    k: [f32; 3],
-    clearcoat: f32,
-    transmitted: [f32; 3],
-    clearcoat_roughness: f32,
-    sheen_color: [f32; 3],
-    sheen_roughness: f32,
-    absorption: [f32; 3],
-    walls: u32,
-    anisotropy: [f32; 2],
-    normal_scale: f32,
-    clearcoat_normal_scale: f32,
-    glass_layer: u32,
-    priority: i32,
-    reserved: [u32; 2],
-    uses: [TextureUse; SLOTS],
-}
 
 /// Complex index of refraction of a metal at the wavelengths of sRGB's primaries: eta and k of the measurements of Palik's handbook (1985) as
 /// Mitsuba and pbrt carry them, integrated to linear sRGB.
@@ -190,47 +146,50 @@ pub(super) fn features(flat: &FlatScene, needs: Needs) -> ShadingFeatures {
     ShadingFeatures { materials, textures }
 }
 
-impl ShadingRecord {
-    /// `indices`: those of [`indices_of_refraction`].
-    pub fn new(m: &Material, needs: Needs, indices: &[f32], texture: impl Fn(Option<TextureSlot>) -> TextureUse) -> Self {
-        let metal = metal(m.kind);
-        // the colour of a metal is in its index of refraction already
-        let tint = if metal.is_some() { [1.0; 3] } else { m.specular_color.to_array() };
-        let specular_color = if m.kind == MaterialKind::MetallicRoughness { m.specular.color.to_array() } else { tint };
-        let (sin, cos) = m.anisotropy.rotation.sin_cos();
-        Self {
-            emission: if m.unlit { [0.0; 3] } else { m.emissive.to_array() },
-            model: match m.kind {
-                _ if m.unlit => MaterialModel::Unlit as u32,
-                MaterialKind::MetallicRoughness => MaterialModel::Gltf as u32,
-                MaterialKind::Matte => MaterialModel::Matte as u32,
-                MaterialKind::Mirror => MaterialModel::Mirror as u32,
-                MaterialKind::Glass => MaterialModel::Glass as u32,
-                MaterialKind::Copper | MaterialKind::Gold => MaterialModel::Conductor as u32,
-            },
-            metallic: m.metallic,
-            roughness: m.roughness,
-            ior: m.ior,
-            specular: m.specular.factor,
-            specular_color,
-            emits_back: m.double_sided.into(),
-            eta: metal.map_or([0.0; 3], |m| m[0]),
-            k: metal.map_or([0.0; 3], |m| m[1]),
-            transmitted: m.transmittance.to_array(),
-            transmission: m.transmission.factor,
-            clearcoat: m.clearcoat.factor,
-            clearcoat_roughness: m.clearcoat.roughness,
-            sheen_color: m.sheen.color.to_array(),
-            sheen_roughness: m.sheen.roughness,
-            absorption: absorption(m),
-            walls: walls(m) as u32,
-            anisotropy: [m.anisotropy.strength * cos, m.anisotropy.strength * sin],
-            normal_scale: m.normal_scale,
-            clearcoat_normal_scale: m.clearcoat.normal_scale,
-            glass_layer: indices.iter().position(|&ior| ior == m.ior).unwrap_or(0) as u32,
-            priority: m.dielectric_priority,
-            reserved: [0; 2],
-            uses: slots(m, needs).map(texture),
-        }
+/// The record of a material. `indices`: those of [`indices_of_refraction`].
+pub(super) fn record(
+    m: &Material,
+    needs: Needs,
+    indices: &[f32],
+    texture: impl Fn(Option<TextureSlot>) -> TextureUse,
+) -> ShadingRecord {
+    let metal = metal(m.kind);
+    // the colour of a metal is in its index of refraction already
+    let tint = if metal.is_some() { [1.0; 3] } else { m.specular_color.to_array() };
+    let specular_color = if m.kind == MaterialKind::MetallicRoughness { m.specular.color.to_array() } else { tint };
+    let (sin, cos) = m.anisotropy.rotation.sin_cos();
+    ShadingRecord {
+        emission: if m.unlit { [0.0; 3] } else { m.emissive.to_array() },
+        model: match m.kind {
+            _ if m.unlit => MaterialModel::Unlit as u32,
+            MaterialKind::MetallicRoughness => MaterialModel::Gltf as u32,
+            MaterialKind::Matte => MaterialModel::Matte as u32,
+            MaterialKind::Mirror => MaterialModel::Mirror as u32,
+            MaterialKind::Glass => MaterialModel::Glass as u32,
+            MaterialKind::Copper | MaterialKind::Gold => MaterialModel::Conductor as u32,
+        },
+        metallic: m.metallic,
+        roughness: m.roughness,
+        ior: m.ior,
+        specular: m.specular.factor,
+        specular_color,
+        emits_back: m.double_sided.into(),
+        eta: metal.map_or([0.0; 3], |m| m[0]),
+        k: metal.map_or([0.0; 3], |m| m[1]),
+        transmitted: m.transmittance.to_array(),
+        transmission: m.transmission.factor,
+        clearcoat: m.clearcoat.factor,
+        clearcoat_roughness: m.clearcoat.roughness,
+        sheen_color: m.sheen.color.to_array(),
+        sheen_roughness: m.sheen.roughness,
+        absorption: absorption(m),
+        walls: walls(m) as u32,
+        anisotropy: [m.anisotropy.strength * cos, m.anisotropy.strength * sin],
+        normal_scale: m.normal_scale,
+        clearcoat_normal_scale: m.clearcoat.normal_scale,
+        glass_layer: indices.iter().position(|&ior| ior == m.ior).unwrap_or(0) as u32,
+        priority: m.dielectric_priority,
+        uses: slots(m, needs).map(texture),
+        ..Default::default()
     }
 }

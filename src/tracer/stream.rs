@@ -2,43 +2,17 @@
 
 use std::sync::Arc;
 
-use bytemuck::{Pod, Zeroable};
-
-use super::compute::HIT_BYTES;
 use crate::accel::features::SceneFeatures;
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, ComputePipeline, Device, HitShaders, RayTracingPipeline, Recorder, Specialization};
 use crate::interface::constants;
+use crate::interface::records::hierarchy::{LaunchHit, UNFINISHED};
+pub use crate::interface::records::ray::Push;
 use crate::ray::Ray;
 use crate::shaders::{self, LANES, Mode, PACKET_RAYS, RUN, Rays, SPREAD, StreamShaders, Variant};
 
-/// The push constants of every stream; `Push` in shaders/common/types.glsl.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
-pub struct Push {
-    /// [`super::Tracer::scene_address`].
-    pub scene: u64,
-    /// Address of the pass's parameters.
-    pub pass: u64,
-    /// Address of ray number `first` of a queue ([`super::queue`]), 32 bytes each; 0 for streams that make their own rays. Where those
-    /// were drawn: of what was drawn ([`crate::raster`]).
-    pub rays: u64,
-    /// Address of a `u32`: how many rays the queue holds; 0 when `count` says it.
-    pub queued: u64,
-    /// Index of the first ray.
-    pub first: u32,
-    /// Rays to trace; of a queue: at most.
-    pub count: u32,
-    /// The first sample of each pixel.
-    pub sample_index: u32,
-    /// 2^`sample_bits` samples of each pixel are taken; their rays follow each other.
-    pub sample_bits: u32,
-}
-
 /// Rays that the compute tracer's buffers hold between the steps of a launch.
 pub const LAUNCH_RAYS: u32 = 1 << 19;
-/// Stands where a result will be: `UNFINISHED` of shaders/trace/launch.glsl.
-const UNFINISHED: u32 = 0x7fc0_dead;
 
 #[derive(Clone)]
 enum Pipeline {
@@ -140,7 +114,7 @@ impl Stream {
             deliver: compile(device, shaders, deliver, s)?,
             rays_per_group: LANES * rays_per_lane,
             memory,
-            record: if shaders.mode == Mode::Any { 4 } else { HIT_BYTES },
+            record: if shaders.mode == Mode::Any { 4 } else { size_of::<LaunchHit>() as u64 },
         };
         Ok(Self { pipeline, shaders })
     }

@@ -3,12 +3,12 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::compute::SPHERE;
 use super::kernel::BuildOptions;
 use super::wide::Trees;
 use crate::accel::flatten::FlatScene;
 use crate::accel::pairs::NONE;
-use crate::accel::wide::{self, Block, LEAF};
+use crate::accel::wide::{self, Block};
+use crate::interface::records::hierarchy::{SPHERE, TriangleLeaf};
 use crate::ray::Ray;
 
 /// The hierarchy of a scene, for counting.
@@ -108,9 +108,9 @@ impl VisitCounter {
 
 /// Where the ray meets a leaf's triangles nearest, if within (tmin, tmax).
 fn meet(block: &Block, origin: Vec3, direction: Vec3, tmin: f32, tmax: f32) -> Option<f32> {
-    debug_assert!(block[15] & LEAF != 0 && (block[12] == NONE || block[12] & SPHERE == 0));
-    let corner = |k: usize| Vec3::from_array(std::array::from_fn(|a| f32::from_bits(block[3 * k + a])));
-    let corners = [0, 1, 2, 3].map(corner);
+    let leaf: &TriangleLeaf = bytemuck::cast_ref(block);
+    debug_assert!(wide::is_leaf(block) && (leaf.primitives[0] == NONE || leaf.primitives[0] & SPHERE == 0));
+    let corners = leaf.corners.map(Vec3::from_array);
     let mut best = tmax;
     for [b, c] in [[1, 2], [2, 3]] {
         // Moeller and Trumbore: what it loses at edges does not show in a mean

@@ -1,13 +1,6 @@
 //! What the compute tracer's fast kernel walks (`shaders/trace/wide.glsl`): a wide hierarchy per group and one over the placed
-//! groups, all in one array of blocks. Here are the leaves.
-//!
-//! | leaf | words 0-11 | 12, 13 | 14 |
-//! |---|---|---|---|
-//! | triangles | four corners: of (0, 1, 2) and (0, 2, 3) | their numbers, the second may be none | places of each one's second and third corner, two bits each |
-//! | sphere | centre, radius | its number, none | |
-//! | entry of the top level | world to group, three rows | root block, number of the entry | |
-//!
-//! A number has flags above it: alpha-tested, sphere.
+//! groups, all in one array of blocks. Here are the leaves: [`TriangleLeaf`], [`SphereLeaf`]
+//! and, in the top level, [`InstanceLeaf`].
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -16,10 +9,8 @@ use glam::Vec3;
 use obvhs::bvh2::Bvh2;
 use rayon::prelude::*;
 
-use super::compute::{
-    ALPHA_TESTED, HIT_BYTES, Hierarchy, SPHERE, padding, placement_boxes, primitive_boxes, unfinished_counter, write_records,
-};
-use super::dynamic_trees::{DynamicTrees, entry_block, provide};
+use super::compute::{Hierarchy, padding, placement_boxes, primitive_boxes, unfinished_counter, write_records};
+use super::dynamic_trees::{DynamicTrees, instance_leaf, provide};
 use super::kernel::BuildOptions;
 use super::kernel::Kernel;
 use super::stream::{LAUNCH_RAYS, LaunchMemory};
@@ -27,15 +18,13 @@ use crate::accel::build::{self, MAX_DEPTH};
 use crate::accel::cache::KeyBuilder;
 use crate::accel::flatten::{FlatScene, Group};
 use crate::accel::pairs::{self, Fan, Pair};
-use crate::accel::wide::{self, BLOCK_BYTES, Block, Wide};
+use crate::accel::wide::{self, Block, Wide};
 use crate::accel::{Aabb, BuildPreset};
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, Device, Memory};
+use crate::interface::records::hierarchy::{ALPHA_TESTED, InstanceLeaf, LaunchHit, SPHERE, SphereLeaf, TriangleLeaf};
 use crate::ray::Ray;
 use crate::scene::Geometry;
-
-/// Entries of the stack that the kernel keeps in registers: `TOP` in the shader.
-pub(super) const STACK_IN_REGISTERS: u32 = 6;
 
 /// The hierarchies on the host.
 pub(super) struct Trees {
@@ -58,10 +47,8 @@ impl Trees {
         let top = (!flat.is_single_level()).then(|| {
             let bounds: Vec<_> = groups.iter().map(|g| g.bounds.unwrap_or(Aabb::EMPTY)).collect();
             tree(placement_boxes(flat, &bounds), options.preset(flat.placements.len()), None, |entry| {
-                let mut block = [0; 16];
                 // the root is filled in when the groups have their places
-                entry_block(&mut block, entry, &flat.placements[entry as usize], 0);
-                block
+                bytemuck::cast(instance_leaf(entry, &flat.placements[entry as usize], 0))
             })
         });
         Self { groups, top, seconds, top_seconds: start.elapsed().as_secs_f64() }
@@ -100,7 +87,8 @@ impl Trees {
         }
         if let Some(top) = &mut self.top {
             for block in top.blocks.iter_mut().filter(|b| wide::is_leaf(b)) {
-                block[12] = roots[flat.placements[block[13] as usize].group];
+                let leaf: &mut InstanceLeaf = bytemuck::cast_mut(block);
+                leaf.root = roots[flat.placements[leaf.instance as usize].group];
             }
         }
         let trees = self
@@ -109,12 +97,12 @@ impl Trees {
             .map(|t| (t, 0, rooms.top))
             .chain(self.groups.iter().zip(roots.iter().copied()).zip(&rooms.groups).map(|((t, by), &room)| (t, by, room)));
         let in_room = trees.flat_map(|(t, by, room)| {
-            let free = std::iter::repeat_n([0; 16], room - t.blocks.len());
+            let free = std::iter::repeat_n(Block::default(), room - t.blocks.len());
             t.blocks.iter().map(move |b| wide::rebased(*b, by)).chain(free)
         });
         // an empty scene has a node without children
-        let in_room = in_room.chain(std::iter::repeat_n([0; 16], usize::from(count == 0)));
-        let nodes = write_records(device, "hierarchy", BLOCK_BYTES, count.max(1) as u64, &mut { in_room })?;
+        let in_room = in_room.chain(std::iter::repeat_n(Block::default(), usize::from(count == 0)));
+        let nodes = write_records(device, "hierarchy", count.max(1) as u64, &mut { in_room })?;
         let launch = |name, bytes| Buffer::new(device, name, bytes * LAUNCH_RAYS as u64, Memory::Device).map(Arc::new);
         Ok(Hierarchy {
             kernel,
@@ -124,11 +112,11 @@ impl Trees {
             stack_entries,
             bounds,
             unfinished: unfinished_counter(device)?,
-            dynamic: dynamic.map(|mut d| d.mirror(device, &nodes).map(|()| d)).transpose()?,
+            dynamic: dynamic.map(|mut d| d.keep_copy(device, &nodes).map(|()| d)).transpose()?,
             nodes,
             launch: Some(LaunchMemory {
                 rays: launch("launch rays", size_of::<Ray>() as u64)?,
-                hits: launch("launch hits", HIT_BYTES)?,
+                hits: launch("launch hits", size_of::<LaunchHit>() as u64)?,
                 counters: launch("launch counters", 4)?,
             }),
         })
@@ -209,10 +197,9 @@ fn sphere_tree(flat: &FlatScene, group: &Group, options: &BuildOptions) -> Wide 
         .collect();
     kept(options, preset, &[b"spheres", bytemuck::cast_slice(&spheres)], || {
         tree(primitive_boxes(flat, group).collect(), preset, None, |primitive| {
-            let mut block = [0; 16];
-            block[..4].copy_from_slice(bytemuck::cast_slice(&spheres[primitive as usize]));
-            block[12..14].copy_from_slice(&[primitive | SPHERE, pairs::NONE]);
-            block
+            let [x, y, z, radius] = spheres[primitive as usize];
+            let primitives = [primitive | SPHERE, pairs::NONE];
+            bytemuck::cast(SphereLeaf { center: [x, y, z], radius, primitives, ..Default::default() })
         })
     })
 }
@@ -283,10 +270,6 @@ fn pair_block(triangles: &Triangles, pair: Pair, opaque: u32) -> Block {
     } else {
         Fan::of(corners(a), corners(b)).expect("a pair shares an edge")
     };
-    let mut block = [0; 16];
-    for (k, v) in fan.corners.into_iter().enumerate() {
-        block[3 * k..3 * k + 3].copy_from_slice(&triangles.positions[v as usize].to_array().map(f32::to_bits));
-    }
     let number = |t: u32| {
         if t == pairs::NONE {
             t
@@ -296,11 +279,13 @@ fn pair_block(triangles: &Triangles, pair: Pair, opaque: u32) -> Block {
             t
         }
     };
-    block[12] = number(a);
-    block[13] = number(b);
     let places = fan.second_third.map(|[second, third]| (second | third << 2) as u32);
-    block[14] = places[0] | places[1] << 4;
-    block
+    bytemuck::cast(TriangleLeaf {
+        corners: fan.corners.map(|v| triangles.positions[v as usize].to_array()),
+        primitives: [a, b].map(number),
+        order: places[0] | places[1] << 4,
+        ..Default::default()
+    })
 }
 
 #[cfg(test)]
@@ -317,22 +302,25 @@ mod tests {
         for (tree, group) in trees.groups.iter().zip(&flat.groups) {
             let triangles = Triangles::of(&flat, group);
             let boxes: Vec<Aabb> = primitive_boxes(&flat, group).collect();
-            let held = |b: &Block| [b[12], b[13]].into_iter().filter(|&id| id != pairs::NONE);
+            // what a leaf of a sphere holds is read as a triangle's: their numbers are in one place
+            let leaf = |b: &Block| *bytemuck::cast_ref::<Block, TriangleLeaf>(b);
+            let held = |b: &Block| leaf(b).primitives.into_iter().filter(|&id| id != pairs::NONE);
             let number = |id: u32| (id & !(ALPHA_TESTED | SPHERE)) as usize;
             tree.validate(|b| held(b).map(|id| boxes[number(id)]).collect()).unwrap_or_else(|e| panic!("{name}: {e}"));
             let mut seen = vec![0; group.primitive_count];
             for block in tree.blocks.iter().filter(|b| wide::is_leaf(b)) {
-                for (k, id) in [block[12], block[13]].into_iter().enumerate().filter(|(_, id)| *id != pairs::NONE) {
+                let leaf = leaf(block);
+                for (k, id) in leaf.primitives.into_iter().enumerate().filter(|(_, id)| *id != pairs::NONE) {
                     seen[number(id)] += 1;
                     assert_eq!(id & SPHERE != 0, group.spheres, "{name}: {id:x}");
                     if group.spheres {
                         continue;
                     }
                     assert_eq!(id & ALPHA_TESTED != 0, number(id) >= group.opaque_count, "{name}: {id:x}");
-                    let corner = |c: usize| [0, 1, 2].map(|a| block[3 * c + a]);
                     let corners = if k == 0 { [0, 1, 2] } else { [0, 2, 3] };
-                    let (second, third) = (block[14] >> (4 * k) & 3, block[14] >> (4 * k + 2) & 3);
-                    let order = [3 - second - third, second, third].map(|p| corner(corners[p as usize]));
+                    let (second, third) = (leaf.order >> (4 * k) & 3, leaf.order >> (4 * k + 2) & 3);
+                    let order =
+                        [3 - second - third, second, third].map(|p| leaf.corners[corners[p as usize]].map(f32::to_bits));
                     let own = triangles.corners(triangles.indices[number(id)]).map(|v| v.to_array().map(f32::to_bits));
                     assert_eq!(order, own, "{name}: triangle {}", number(id));
                 }
@@ -342,7 +330,8 @@ mod tests {
         if let Some(top) = &trees.top {
             let bounds: Vec<_> = trees.groups.iter().map(|g| g.bounds.unwrap_or(Aabb::EMPTY)).collect();
             let boxes = placement_boxes(&flat, &bounds);
-            top.validate(|b| vec![boxes[b[13] as usize]]).unwrap_or_else(|e| panic!("{name}: {e}"));
+            top.validate(|b| vec![boxes[bytemuck::cast_ref::<Block, InstanceLeaf>(b).instance as usize]])
+                .unwrap_or_else(|e| panic!("{name}: {e}"));
         }
     }
 

@@ -3,6 +3,7 @@
 
 use super::*;
 use skylit::gpu::{Buffer, Commands, Memory};
+use skylit::interface::records::ray_set;
 use skylit::scene::TriangleMesh;
 use skylit::scene::material::{Anisotropy, Clearcoat, Sheen, Specular, Transmission};
 use skylit::shaders;
@@ -67,7 +68,7 @@ impl Probe<'_> {
         let source = Buffer::from_slice(self.device, "probe inputs", &inputs).unwrap();
         let bytes = 48 * inputs.len() as u64;
         let results = Buffer::new(self.device, "probe outputs", bytes, Memory::Readback).unwrap();
-        let probe = [[source.address(), results.address()]];
+        let probe = [ray_set::Probe { inputs: source.address(), outputs: results.address() }];
         let probe = Buffer::from_slice(self.device, "probe", &probe).unwrap();
         let count = inputs.len() as u32;
         let push = Push { scene: self.tracer.scene_address(), pass: probe.address(), count, ..Default::default() };

@@ -1,6 +1,7 @@
 //! Sequences on the device.
 
 use skylit::gpu::{Buffer, Commands, Memory};
+use skylit::interface::records::ray_set::Probe;
 use skylit::sampling::Sequence;
 use skylit::sampling::sobol::hash_combine;
 use skylit::shaders;
@@ -31,7 +32,8 @@ fn gpu_sequences_are_the_hosts_bit_for_bit() {
     let count = inputs.len() as u32;
     let source = Buffer::from_slice(&device, "probe inputs", &inputs).unwrap();
     let results = Buffer::new(&device, "probe outputs", 16 * u64::from(count), Memory::Readback).unwrap();
-    let probe = Buffer::from_slice(&device, "probe", &[[source.address(), results.address()]]).unwrap();
+    let probe =
+        Buffer::from_slice(&device, "probe", &[Probe { inputs: source.address(), outputs: results.address() }]).unwrap();
     let pipeline = shaders::probes::SEQUENCE_PROBE.pipeline(&device).unwrap();
     let push = Push { pass: probe.address(), count, ..Default::default() };
     Commands::new(&device).unwrap().run(|r| r.dispatch(&pipeline, &push, count.div_ceil(shaders::LANES))).unwrap();

@@ -1,17 +1,16 @@
 // bsdf_probe: traces nothing; writes what the BSDF of a part's material makes of given directions, so that a test can hold density, samples and
 // values to each other on every tracer and driver.
 #include "path/path.glsl"
+#include "interface/ray_set.glsl"
 
-layout(buffer_reference, std430, buffer_reference_align = 8) readonly buffer BsdfProbe {
-    uvec2 inputs;   // three quads each: towards the viewer, and the part; wi, or where to sample and which lobe; shading normal, and 1 to sample
-    uvec2 outputs;  // three quads each: value times |cos|, density; wi, 1 for a delta lobe; weight, eta
-};
+// inputs: three quads each: towards the viewer, and the part; wi, or where to sample and which lobe; shading normal, and 1 to sample
+// outputs: three quads each: value times |cos|, density; wi, 1 for a delta lobe; weight, eta
 
 Ray ray(uint index) { return no_ray(); }
 
 // About a geometric normal of z. Directions are the world's.
 void any(uint index, bool occluded) {
-    BsdfProbe probe = BsdfProbe(push.pass);
+    Probe probe = Probe(push.pass);
     uvec4 a = Quads(probe.inputs).v[3u * index], b = Quads(probe.inputs).v[3u * index + 1u], c = Quads(probe.inputs).v[3u * index + 2u];
     vec3 viewer = uintBitsToFloat(a.xyz), given = uintBitsToFloat(b.xyz);
     Surface s;

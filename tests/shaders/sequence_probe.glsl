@@ -1,11 +1,10 @@
 // sequence_probe: writes what the sequences make of given inputs, so that a test can hold them to src/sampling/sequence.rs.
 #include "common/types.glsl"
 #include "common/sequence.glsl"
+#include "interface/ray_set.glsl"
 
-layout(buffer_reference, std430, buffer_reference_align = 8) readonly buffer Probe {
-    uvec2 inputs;   // two uvec4 each: sequence, seed, pixel; frame, index, count
-    uvec2 outputs;  // a uvec4 each: the bits, and as fractions
-};
+// inputs: two uvec4 each: sequence, seed, pixel; frame, index, count
+// outputs: a uvec4 each: the bits, and as fractions
 layout(buffer_reference, std430, buffer_reference_align = 16) writeonly buffer ProbeOutputs { uvec4 v[]; };
 
 layout(local_size_x = LANES) in;

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::Vec3;
 
 use super::lights::brightness;
-use super::params::MapRecord;
+use super::params::EnvironmentRecord;
 use crate::error::Result;
 use crate::gpu::{Buffer, Device};
 use crate::sampling::Patches;
@@ -13,7 +13,7 @@ use crate::scene::{Environment, EnvironmentMap};
 
 /// What shaders get of an environment.
 pub(super) struct DeviceEnvironment {
-    pub map: MapRecord,
+    pub map: EnvironmentRecord,
     /// Radiance, or factor of the map's.
     pub factor: Vec3,
     /// Radiance averaged over the sphere.
@@ -24,7 +24,7 @@ pub(super) struct DeviceEnvironment {
 impl DeviceEnvironment {
     /// Uploads what there is to upload. `compensated`: light samples are weighed against BSDF samples, and can leave to them what is no brighter than the mean.
     pub fn new(device: &Arc<Device>, environment: &Environment, compensated: bool) -> Result<Self> {
-        let plain = |c: Vec3| Self { map: MapRecord::default(), factor: c, mean: c, _buffers: Vec::new() };
+        let plain = |c: Vec3| Self { map: EnvironmentRecord::default(), factor: c, mean: c, _buffers: Vec::new() };
         let map = match environment {
             Environment::Black => return Ok(plain(Vec3::ZERO)),
             Environment::Uniform(c) => return Ok(plain(*c)),
@@ -42,13 +42,13 @@ impl DeviceEnvironment {
         let table = Buffer::from_slice(device, "environment's patches", &patches.table)?;
         let m = map.to_map;
         let row = |k: usize| [m.x_axis[k] as f32, m.y_axis[k] as f32, m.z_axis[k] as f32, 0.0];
-        let record = MapRecord {
+        let record = EnvironmentRecord {
             texels: texels.address(),
             table: table.address(),
             width: map.width,
             height: map.height,
-            reserved: [0; 2],
             to_map: [row(0), row(1), row(2)],
+            ..Default::default()
         };
         Ok(Self { map: record, factor: map.factor, mean: mean_radiance(map) * map.factor, _buffers: vec![texels, table] })
     }

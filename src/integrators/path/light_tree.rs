@@ -1,12 +1,13 @@
-//! A tree over lights, from which one is drawn by what it may do at a point: `LightNode` of shaders/path/light_tree.glsl.
+//! A tree over lights, from which one is drawn by what it may do at a point: [`LightNode`].
 //!
 //! Conty Estevez, Kulla, "Importance Sampling of Many Lights with Adaptive Tree Splitting", HPG 2018, without the splitting; its measure of a split
 //! (surface area, orientation, power), with bounding balls in place of boxes at the nodes.
 
 use std::f64::consts::PI;
 
-use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
+
+use crate::interface::records::lights::{LIGHT_BOTH_WAYS, LIGHT_LEAF, LightNode};
 
 /// Levels after which lights are halved whatever that costs: a light's way from the root is 32 bits.
 const MEASURED_LEVELS: u32 = 12;
@@ -14,22 +15,6 @@ const MEASURED_LEVELS: u32 = 12;
 pub(super) const MAX_LIGHTS: usize = 1 << 19;
 /// Bins along an axis where splits are looked for.
 const BINS: usize = 12;
-
-const LEAF: u32 = 0x8000_0000;
-const BOTH_WAYS: u32 = 0x4000_0000;
-
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
-pub(super) struct LightNode {
-    center: [f32; 3],
-    radius: f32,
-    axis: [f32; 3],
-    intensity: f32,
-    cos_o: f32,
-    sin_o: f32,
-    cos_e: f32,
-    link: u32,
-}
 
 /// What a light, or several, may do at most.
 #[derive(Clone, Copy, Debug)]
@@ -94,7 +79,7 @@ impl Bounds {
             cos_o: spread.cos() as f32,
             sin_o: spread.sin() as f32,
             cos_e: (self.falloff + 1e-4).min(PI).cos() as f32,
-            link: link | if self.both_ways { BOTH_WAYS } else { 0 },
+            link: link | if self.both_ways { LIGHT_BOTH_WAYS } else { 0 },
         }
     }
 }
@@ -136,7 +121,7 @@ impl Tree<'_> {
         if let [light] = *of {
             self.trails[light as usize] = trail;
             let bounds = self.lights[light as usize];
-            self.nodes[at] = bounds.node(LEAF | light);
+            self.nodes[at] = bounds.node(LIGHT_LEAF | light);
             return bounds;
         }
         let middle = self.split(of, level);
@@ -214,6 +199,7 @@ fn partition<T: Copy>(items: &mut [T], holds: impl Fn(&T) -> bool) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::interface::records::lights::LIGHT_LINK;
     use crate::sampling::sobol::{hash_combine, to_unit};
 
     fn random(seed: u32, k: u32) -> f64 {
@@ -242,7 +228,7 @@ mod tests {
             return f64::from(n.intensity) / r2.max(1e-30);
         }
         let mut c = glam::Vec3::from_array(n.axis).as_dvec3().dot(d) / d2.sqrt();
-        if n.link & BOTH_WAYS != 0 {
+        if n.link & LIGHT_BOTH_WAYS != 0 {
             c = c.abs();
         }
         let w = (c, (1.0 - c * c).max(0.0).sqrt());
@@ -264,12 +250,12 @@ mod tests {
                     let k = light as u32 * 20 + sample;
                     let from = DVec3::new(random(k, 20), random(k, 21), random(k, 22)) * 14.0 - 2.0;
                     let (mut node, mut way, mut above) = (&nodes[0], *trail, vec![]);
-                    while node.link & LEAF == 0 {
+                    while node.link & LIGHT_LEAF == 0 {
                         above.push(importance(node, from));
-                        node = &nodes[(node.link & 0x3fff_ffff) as usize + (way & 1) as usize];
+                        node = &nodes[(node.link & LIGHT_LINK) as usize + (way & 1) as usize];
                         way >>= 1;
                     }
-                    assert_eq!(node.link & 0x3fff_ffff, light as u32);
+                    assert_eq!(node.link & LIGHT_LINK, light as u32);
                     if importance(node, from) > 0.0 {
                         assert!(above.iter().all(|&i| i > 0.0), "light {light} of {n} is lost at {from}: {above:?}");
                     }

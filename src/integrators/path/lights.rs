@@ -1,48 +1,23 @@
-//! The lights of a scene as the path tracer samples them: `LightRecord` of shaders/path/lights.glsl. Few are chosen by their power; of many, a tree
+//! The lights of a scene as the path tracer samples them: [`LightRecord`]. Few are chosen by their power; of many, a tree
 //! chooses by what they may do at a point ([`super::light_tree`]).
 
 use std::collections::HashMap;
 use std::f64::consts::PI;
 use std::ops::Range;
 
-use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, DVec4, Vec3, Vec4};
 
-use super::light_tree::{self, Bounds, LightNode};
+use super::light_tree::{self, Bounds};
 use super::params::INVALID;
 use crate::accel::features::{AlphaClass, alpha_classes};
 use crate::accel::flatten::FlatScene;
+use crate::interface::records::lights::{LIGHT_ALPHA, LIGHT_MIRRORED, LIGHT_TWO_SIDED, LightNode, LightRecord};
 use crate::interface::{LightKind as Kind, PathFeature};
 use crate::sampling::CumulativeTable;
 use crate::scene::{AlphaMode, Geometry, Light, LightKind, Material, TriangleMesh};
 
 /// More lights with a position than these are chosen from a tree.
 const MAX_BY_POWER: usize = 256;
-
-const TWO_SIDED: u32 = 1;
-const MIRRORED: u32 = 2;
-const ALPHA: u32 = 4;
-
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
-pub(super) struct LightRecord {
-    position: [f32; 3],
-    radius: f32,
-    axis: [f32; 3],
-    cos_inner: f32,
-    edge: [f32; 3],
-    cos_outer: f32,
-    intensity: [f32; 3],
-    range: f32,
-    probability: f32,
-    trail: u32,
-    reserved: u32,
-    kind: u32,
-    instance: u32,
-    primitive: u32,
-    flags: u32,
-    lift: f32,
-}
 
 /// All lights.
 #[derive(Clone, Debug, Default)]
@@ -221,7 +196,7 @@ fn add_surfaces(all: &mut Gathered, flat: &FlatScene) -> Vec<u32> {
         let base = LightRecord {
             intensity: material.emissive.to_array(),
             instance: i as u32,
-            flags: if material.double_sided { TWO_SIDED } else { 0 },
+            flags: if material.double_sided { LIGHT_TWO_SIDED } else { 0 },
             ..Default::default()
         };
         let mut mean = |texture: Option<usize>| *means.entry(texture).or_insert_with(|| mean_texture(flat, texture));
@@ -235,8 +210,8 @@ fn add_surfaces(all: &mut Gathered, flat: &FlatScene) -> Vec<u32> {
         match &mesh.geometry {
             Geometry::Triangles(t) => {
                 let flags = base.flags
-                    | if to_world.matrix3.determinant() < 0.0 { MIRRORED } else { 0 }
-                    | if is_tested { ALPHA } else { 0 };
+                    | if to_world.matrix3.determinant() < 0.0 { LIGHT_MIRRORED } else { 0 }
+                    | if is_tested { LIGHT_ALPHA } else { 0 };
                 let plain = material.emissive_texture.is_none() && !is_tested;
                 let point = |k: u32| to_world.transform_point3(t.positions[k as usize].as_dvec3()) - flat.origin;
                 add_triangles(all, t, point, plain, brightness, LightRecord { flags, ..base }, &mut of_primitives);
@@ -290,9 +265,9 @@ fn add_triangles(
     base: LightRecord,
     of_primitives: &mut Vec<u32>,
 ) {
-    let both_ways = base.flags & TWO_SIDED != 0;
+    let both_ways = base.flags & LIGHT_TWO_SIDED != 0;
     // a transform that mirrors turns the winding
-    let turn = if base.flags & MIRRORED != 0 { -1.0 } else { 1.0 };
+    let turn = if base.flags & LIGHT_MIRRORED != 0 { -1.0 } else { 1.0 };
     let mut push = |kind: Kind, [a, e1, e2]: [DVec3; 3], primitive: usize, slack: f64| {
         let normal = turn * e1.cross(e2);
         let area = if kind == Kind::Rectangle { 1.0 } else { 0.5 } * normal.length();

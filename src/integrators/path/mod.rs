@@ -30,6 +30,7 @@ use crate::film::cover::Cover;
 use crate::film::schedule::FilmOptions;
 use crate::gpu::{Buffer, Commands, ComputePipeline, Memory, Specialization, Timing};
 use crate::interface::{MaterialFeature, PathFeature, PathFeatures};
+pub use crate::interface::{PixelFilter, View};
 use crate::scene::Environment;
 use crate::tracer::queue::RayQueue;
 
@@ -65,46 +66,6 @@ choices! {
 impl Strategy {
     fn samples_lights(self) -> bool {
         matches!(self, Strategy::Mis | Strategy::Light)
-    }
-}
-
-choices! {
-    /// Reconstruction filter of pixels, by importance sampling: positions are sampled in proportion to the filter, and count alike (Ernst, Stamminger, Greiner,
-    /// "Filter Importance Sampling", 2006).
-    pub enum PixelFilter {
-        /// Box filter of one pixel
-        Box = "box",
-        /// Tent filter of radius 1
-        Tent = "tent",
-        /// Blackman-Harris filter of radius 1.5
-        BlackmanHarris = "blackman-harris",
-    }
-}
-
-/// What a camera ray sees of a surface, instead of light.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum View {
-    /// Unit shading normals, world, on the viewer's side; normal maps included.
-    Normals,
-    /// Base colours, linear; of mirrors, glass and measured metals what they reflect at normal incidence.
-    Albedo,
-    /// Distance along the ray, world units.
-    Depth,
-    /// Occlusion that is baked into the material's texture; 1 where there is none.
-    BakedOcclusion,
-}
-
-impl View {
-    /// As shaders/path/view.glsl numbers them.
-    fn number(view: Option<Self>) -> u32 {
-        match view {
-            None => 0,
-            Some(View::Normals) => 1,
-            Some(View::Albedo) => 2,
-            Some(View::Depth) => 3,
-            Some(View::BakedOcclusion) => 4,
-        }
     }
 }
 
@@ -410,7 +371,7 @@ impl Paths {
             contributions: keep(contributions),
             shadow: shadow_queue.record(),
             max_depth: most_depth(options),
-            view: View::number(options.view),
+            view: options.view.map_or(0, |v| v as u32),
             rr_depth: options.rr_depth,
             clamp_to: options.firefly_clamp,
             albedo: options.white_sky.unwrap_or(0.0),

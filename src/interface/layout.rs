@@ -1,0 +1,316 @@
+//! How records are declared: memory that the CPU writes and shaders read, or the other way. `records!` makes of one declaration the `#[repr(C)]` struct, its
+//! documentation, and a table of its fields; [`super::glsl`] makes the shaders' side of the table, and build.rs holds that against what the shader compiler
+//! made of it ([`mismatches`]).
+//!
+//! Types are GLSL's: `float`, `int`, `uint`, `vec2` to `vec4`, `uvec2` to `uvec4`, other records, and arrays of these. Besides there are `address`, of
+//! device memory (`u64`; a `uvec2` in shaders, which need no 64-bit integers then), and `bytes8` (`[u8; 8]`; a `uvec2`).
+
+/// A file of records, which shaders include as `interface/NAME.glsl`.
+#[derive(Debug)]
+pub struct File {
+    /// Its name.
+    pub name: &'static str,
+    /// Other such files whose records it uses.
+    pub includes: &'static [&'static str],
+    /// Numbers that both sides know.
+    pub values: &'static [Value],
+    /// The records.
+    pub records: &'static [Record],
+}
+
+/// A number that both sides know.
+#[derive(Debug)]
+pub struct Value {
+    /// Its name on both sides.
+    pub name: &'static str,
+    /// What it is.
+    pub number: Number,
+    /// Documentation, in lines.
+    pub about: &'static [&'static str],
+}
+
+/// A number of one of GLSL's types.
+#[derive(Clone, Copy, Debug)]
+#[allow(non_camel_case_types, reason = "GLSL's names")]
+pub enum Number {
+    /// Unsigned, 32 bits.
+    uint(u32),
+    /// Single precision.
+    float(f32),
+}
+
+/// A record.
+#[derive(Debug)]
+pub struct Record {
+    /// Its name on both sides.
+    pub name: &'static str,
+    /// What shaders read it as.
+    pub form: Form,
+    /// Bytes on the CPU's side.
+    pub size: usize,
+    /// Its fields, in order.
+    pub fields: &'static [Field],
+    /// Documentation, in lines.
+    pub about: &'static [&'static str],
+}
+
+/// A field of a record.
+#[derive(Debug)]
+pub struct Field {
+    /// Its name on both sides.
+    pub name: &'static str,
+    /// Its type, or that of an array's elements.
+    pub kind: &'static str,
+    /// Lengths of an array's dimensions, the outer one first; empty: it is no array.
+    pub counts: &'static [usize],
+    /// Bytes from the beginning of the record on the CPU's side.
+    pub offset: usize,
+    /// Bytes on the CPU's side.
+    pub size: usize,
+    /// Documentation, in lines.
+    pub about: &'static [&'static str],
+}
+
+/// What shaders read a record as.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Form {
+    /// A `struct`, part of other records or read by code of its own.
+    Structure,
+    /// A `struct`, and a buffer of them by address.
+    Array {
+        /// Name of the buffer's type, whose member `v` is the array.
+        buffer: &'static str,
+        /// `readonly`, `writeonly`, or nothing.
+        access: &'static str,
+        /// Bytes that addresses of the buffer are a multiple of.
+        align: usize,
+    },
+    /// A buffer by address that holds one record.
+    Block {
+        /// `readonly`, `writeonly`, or nothing.
+        access: &'static str,
+        /// Bytes that addresses of it are a multiple of.
+        align: usize,
+    },
+    /// The push constants, as `push`.
+    Push,
+    /// Pairs of 32-bit words, loaded by code of its own into `w0`, `w1`, ...: macros name the fields. So are records that are read as one of several kinds, or
+    /// whose fields do not lie where GLSL would have them.
+    Words,
+}
+
+/// A record as the shader compiler laid it out.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Reflected {
+    /// Its name.
+    pub name: String,
+    /// Name, offset and size of each member, bytes.
+    pub members: Vec<(String, usize, usize)>,
+    /// Bytes from one to the next in an array, where there is one.
+    pub stride: Option<usize>,
+}
+
+/// Where records lie elsewhere for shaders than for the CPU: of each its first such field, with both names and offsets.
+pub fn mismatches<'a>(records: impl IntoIterator<Item = &'a Record>, reflected: &[Reflected]) -> Vec<String> {
+    let mut out = Vec::new();
+    for record in records.into_iter().filter(|r| r.form != Form::Words) {
+        let name = record.name;
+        let Some(other) = reflected.iter().find(|r| r.name == name) else {
+            out.push(format!("record {name}: the check shader has none"));
+            continue;
+        };
+        if record.fields.len() != other.members.len() {
+            out.push(format!("record {name}: {} fields in Rust, {} in SPIR-V", record.fields.len(), other.members.len()));
+        }
+        // what follows a field that lies elsewhere, does so, too
+        let mut pairs = record.fields.iter().zip(&other.members);
+        if let Some((field, (member, offset, size))) =
+            pairs.find(|(field, (member, offset, size))| (field.name, field.offset, field.size) != (member, *offset, *size))
+        {
+            out.push(format!(
+                "record {name}: field {} is {} bytes at offset {} in Rust, {member} is {size} bytes at offset {offset} in SPIR-V",
+                field.name, field.size, field.offset
+            ));
+        }
+        let is_in_arrays = matches!(record.form, Form::Structure | Form::Array { .. });
+        if is_in_arrays && other.stride != Some(record.size) {
+            let stride = other.stride.map_or("no array".to_owned(), |s| format!("{s} bytes"));
+            out.push(format!("record {name}: {} bytes in Rust, {stride} from one to the next in SPIR-V", record.size));
+        }
+    }
+    out
+}
+
+/// The CPU's side of a type.
+macro_rules! rust_type {
+    (float) => {
+        f32
+    };
+    (int) => {
+        i32
+    };
+    (uint) => {
+        u32
+    };
+    (vec2) => {
+        [f32; 2]
+    };
+    (vec3) => {
+        [f32; 3]
+    };
+    (vec4) => {
+        [f32; 4]
+    };
+    (uvec2) => {
+        [u32; 2]
+    };
+    (uvec3) => {
+        [u32; 3]
+    };
+    (uvec4) => {
+        [u32; 4]
+    };
+    (address) => {
+        u64
+    };
+    (bytes8) => {
+        [u8; 8]
+    };
+    ($record:ident) => {
+        $record
+    };
+    ($kind:ident [$count:expr]) => {
+        [rust_type!($kind); $count]
+    };
+    ($kind:ident [$outer:expr] [$inner:expr]) => {
+        [[rust_type!($kind); $inner]; $outer]
+    };
+}
+
+macro_rules! form {
+    (structure) => {
+        Form::Structure
+    };
+    (push) => {
+        Form::Push
+    };
+    (words) => {
+        Form::Words
+    };
+    (block $access:ident $align:literal) => {
+        Form::Block { access: access!($access), align: $align }
+    };
+    (array $buffer:ident $access:ident $align:literal) => {
+        Form::Array { buffer: stringify!($buffer), access: access!($access), align: $align }
+    };
+}
+
+macro_rules! access {
+    (readwrite) => {
+        ""
+    };
+    ($access:ident) => {
+        stringify!($access)
+    };
+}
+
+/// Declares the records of a file.
+macro_rules! records {
+    (
+        $file:literal
+        $(includes $($include:literal)+)?
+        $(values {
+            $($(#[doc = $value_about:literal])* $value:ident: $value_kind:ident = $number:expr;)*
+        })?;
+        $(
+            $(#[doc = $about:literal])*
+            $name:ident: $form:ident $($argument:ident)* $($align:literal)? {
+                $($(#[doc = $field_about:literal])* $field:ident: $kind:ident $([$count:expr])*,)*
+            }
+        )*
+    ) => {
+        #[allow(unused_imports, reason = "a file may have values alone, or records alone")]
+        use super::super::layout::{Field, File, Form, Number, Record, Value};
+        $($(
+            $(#[doc = $value_about])*
+            pub const $value: rust_type!($value_kind) = $number;
+        )*)?
+        $(
+            shared_record! {
+                $(#[doc = $about])*
+                #[repr(C)]
+                #[derive(Clone, Copy, Debug, Default, PartialEq)]
+                pub struct $name {
+                    $($(#[doc = $field_about])* pub $field: rust_type!($kind $([$count])*),)*
+                }
+            }
+        )*
+        /// What shaders are told.
+        pub const FILE: File = File {
+            name: $file,
+            includes: &[$($($include),+)?],
+            values: &[$($(Value {
+                name: stringify!($value),
+                number: Number::$value_kind($value),
+                about: &[$($value_about),*],
+            },)*)?],
+            records: &[$(Record {
+                name: stringify!($name),
+                form: form!($form $($argument)* $($align)?),
+                size: size_of::<$name>(),
+                fields: &[$(Field {
+                    name: stringify!($field),
+                    kind: stringify!($kind),
+                    counts: &[$($count),*],
+                    offset: core::mem::offset_of!($name, $field),
+                    size: size_of::<rust_type!($kind $([$count])*)>(),
+                    about: &[$($field_about),*],
+                },)*],
+                about: &[$($about),*],
+            },)*],
+        };
+    };
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const RIGHT: Record = Record {
+        name: "Sphere",
+        form: Form::Array { buffer: "Spheres", access: "readonly", align: 16 },
+        size: 16,
+        fields: &[
+            Field { name: "center", kind: "vec3", counts: &[], offset: 0, size: 12, about: &[] },
+            Field { name: "radius", kind: "float", counts: &[], offset: 12, size: 4, about: &[] },
+        ],
+        about: &[],
+    };
+
+    fn reflected() -> Reflected {
+        Reflected { name: "Sphere".into(), members: vec![("center".into(), 0, 12), ("radius".into(), 12, 4)], stride: Some(16) }
+    }
+
+    #[test]
+    fn equal_layouts_are_accepted() {
+        assert_eq!(mismatches([&RIGHT], &[reflected()]), [""; 0]);
+    }
+
+    #[test]
+    fn a_wrong_table_is_named() {
+        let fields = &[
+            Field { name: "radius", kind: "float", counts: &[], offset: 0, size: 4, about: &[] },
+            Field { name: "center", kind: "vec3", counts: &[], offset: 4, size: 12, about: &[] },
+        ];
+        let swapped = mismatches([&Record { fields, ..RIGHT }], &[reflected()]);
+        assert_eq!(
+            swapped,
+            ["record Sphere: field radius is 4 bytes at offset 0 in Rust, center is 12 bytes at offset 0 in SPIR-V"]
+        );
+        let larger = mismatches([&Record { size: 20, ..RIGHT }], &[reflected()]);
+        assert_eq!(larger, ["record Sphere: 20 bytes in Rust, 16 bytes from one to the next in SPIR-V"]);
+        let longer = mismatches([&RIGHT], &[Reflected { members: vec![], ..reflected() }]);
+        assert_eq!(longer, ["record Sphere: 2 fields in Rust, 0 in SPIR-V"]);
+        assert_eq!(mismatches([&RIGHT], &[]), ["record Sphere: the check shader has none"]);
+    }
+}

@@ -1,0 +1,44 @@
+//! Records in device memory, push constants and numbers that both sides know, a file a subject.
+
+pub mod albedo;
+pub mod aov;
+pub mod block;
+pub mod denoise;
+pub mod display;
+pub mod film;
+pub mod frame;
+pub mod hierarchy;
+pub mod larsen;
+pub mod lights;
+pub mod path;
+pub mod queue;
+pub mod raster;
+pub mod ray;
+pub mod ray_set;
+pub mod sampler;
+pub mod scene;
+pub mod shading;
+
+use super::layout::File;
+
+/// All files; each after those that it includes.
+pub const FILES: [&File; 18] = [
+    &ray::FILE,
+    &queue::FILE,
+    &scene::FILE,
+    &shading::FILE,
+    &block::FILE,
+    &film::FILE,
+    &path::FILE,
+    &lights::FILE,
+    &frame::FILE,
+    &larsen::FILE,
+    &display::FILE,
+    &denoise::FILE,
+    &raster::FILE,
+    &aov::FILE,
+    &ray_set::FILE,
+    &hierarchy::FILE,
+    &sampler::FILE,
+    &albedo::FILE,
+];
