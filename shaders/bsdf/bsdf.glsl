@@ -4,21 +4,19 @@
 //                                             without the delta lobes
 //     BsdfSample bsdf_sample(Bsdf, wo, u, v)  a direction, and of a delta lobe weight and probability; of the others bsdf_eval knows them
 //
+//     has_rough_part(Bsdf), has_smooth_part(Bsdf)   is there anything that light samples could find, or that only samples of the BSDF can
+//     bsdf_setup(Bsdf, MaterialPoint)         fills in a Bsdf of its kind from a material's record and textures (path/shading.glsl)
+//
 // Directions are unit vectors in the frame of the shading normal, z on the side from which the surface is seen: wo.z > 0. The integrator knows
-// no more than this: a model is a file in this folder and a line in each of the functions below. docs/materials.md has the formulas.
+// no more than this: a model is a file in this folder that defines these functions with its name before them, and a line in src/interface/features.rs (`BsdfModels`), of
+// which the functions above are made. docs/materials.md has the formulas.
 #ifndef BSDF_BSDF
 #define BSDF_BSDF
 #include "common/warp.glsl"
+#include "interface/bsdf_models.glsl"
 #include "bsdf/features.glsl"
 #include "bsdf/microfacet.glsl"
 #include "bsdf/albedo.glsl"
-
-const uint BSDF_NONE = 0u;        // absorbs everything
-const uint BSDF_DIFFUSE = 1u;     // Lambert: `diffuse`
-const uint BSDF_GLTF = 2u;        // glTF 2.0, appendix B, with extensions
-const uint BSDF_CONDUCTOR = 3u;   // microfacets of `f0` + i `k`, tinted by `tint`
-const uint BSDF_DIELECTRIC = 4u;  // microfacets that reflect and refract, `eta`
-const uint BSDF_MIRROR = 5u;      // reflects `tint` of all light
 
 // A layer over another: clearcoat.
 struct Clearcoat {
@@ -113,47 +111,7 @@ float shadowing(vec3 ng, vec3 n, vec3 wi) {
 
 const vec3 FRAME_NORMAL = vec3(0.0, 0.0, 1.0);
 
-#include "bsdf/gltf.glsl"
-#include "bsdf/conductor.glsl"
-#include "bsdf/dielectric.glsl"
-
-bool is_kind(Bsdf b, uint kind, bool feature) { return feature && b.kind == kind; }
-
-// Is there anything that samples of the BSDF alone can find?
-bool has_smooth_part(Bsdf b) {
-    if (is_kind(b, BSDF_MIRROR, HAS_MIRROR)) return true;
-    if (is_kind(b, BSDF_GLTF, HAS_GLTF)) return is_smooth(b.facets) || HAS_CLEARCOAT && b.clearcoat.weight > 0.0 && is_smooth(b.clearcoat.facets);
-    return (is_kind(b, BSDF_CONDUCTOR, HAS_CONDUCTOR) || is_kind(b, BSDF_DIELECTRIC, HAS_GLASS)) && is_smooth(b.facets);
-}
-
-// Is there anything that light samples could find?
-bool has_rough_part(Bsdf b) {
-    if (is_kind(b, BSDF_DIFFUSE, HAS_DIFFUSE)) return true;
-    if (is_kind(b, BSDF_GLTF, HAS_GLTF)) return gltf_has_rough_part(b);
-    return (is_kind(b, BSDF_CONDUCTOR, HAS_CONDUCTOR) || is_kind(b, BSDF_DIELECTRIC, HAS_GLASS)) && !is_smooth(b.facets);
-}
-
-BsdfValue bsdf_eval(Bsdf b, vec3 wo, vec3 wi) {
-    BsdfValue value = NO_VALUE;
-    if (is_kind(b, BSDF_GLTF, HAS_GLTF)) return gltf_eval(b, wo, wi);
-    if (is_kind(b, BSDF_DIFFUSE, HAS_DIFFUSE)) {
-        float pdf = max(wi.z, 0.0) / PI;
-        value = BsdfValue(b.diffuse * pdf, pdf);
-    }
-    if (is_kind(b, BSDF_CONDUCTOR, HAS_CONDUCTOR)) value = conductor_eval(b, wo, wi);
-    if (is_kind(b, BSDF_DIELECTRIC, HAS_GLASS)) value = dielectric_eval(b, wo, wi);
-    value.f *= shadowing(b.ng, FRAME_NORMAL, wi);
-    return value;
-}
-
-// u: where; v: which lobe.
-BsdfSample bsdf_sample(Bsdf b, vec3 wo, vec2 u, float v) {
-    if (is_kind(b, BSDF_DIFFUSE, HAS_DIFFUSE)) return proposed(cosine_hemisphere(u), 1.0);
-    if (is_kind(b, BSDF_GLTF, HAS_GLTF)) return gltf_sample(b, wo, u, v);
-    if (is_kind(b, BSDF_CONDUCTOR, HAS_CONDUCTOR)) return conductor_sample(b, wo, u);
-    if (is_kind(b, BSDF_DIELECTRIC, HAS_GLASS)) return dielectric_sample(b, wo, u, v);
-    if (is_kind(b, BSDF_MIRROR, HAS_MIRROR)) return BsdfSample(vec3(-wo.xy, wo.z), b.tint, 1.0, true, 1.0);
-    return NO_SAMPLE;
-}
+// Is it of this kind? What no material is is not compiled.
+bool is_bsdf(Bsdf b, uint kind, bool feature) { return feature && b.kind == kind; }
 
 #endif

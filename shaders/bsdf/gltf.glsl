@@ -227,4 +227,58 @@ vec3 gltf_straight(Bsdf b, vec3 wo) {
     return b.transmitted * (interface_fresnel(b, wo.z).transmitted * layers_transmit(b, wo, -wo));
 }
 
+// Turns and stretches microfacets along KHR_materials_anisotropy's direction. Returns it, in the plane of tangent and bitangent.
+vec2 anisotropic(MaterialTextures textures, uint m, inout vec2 alpha) {
+    vec3 t = textures.at[USE_ANISOTROPY].xyz;
+    vec2 d = SHADING_OF(m).uses[USE_ANISOTROPY].texture != INVALID ? t.xy * 2.0 - 1.0 : vec2(1.0, 0.0);
+    float strength = length(SHADING_OF(m).anisotropy) * t.z;
+    alpha.x = mix(alpha.x, 1.0, strength * strength);
+    if (alpha.x >= MIN_ALPHA) alpha = max(alpha, vec2(MIN_ALPHA));
+    vec2 turn = strength > 0.0 ? normalize(SHADING_OF(m).anisotropy) : vec2(1.0, 0.0);
+    return vec2(turn.x * d.x - turn.y * d.y, turn.y * d.x + turn.x * d.y);
+}
+
+// But for the frame; `point.along` is the direction of anisotropy.
+void gltf_setup(inout Bsdf b, inout MaterialPoint point) {
+    uint m = point.material;
+    vec3 base = point.base;
+    bool front = point.front;
+    float cos_o = point.cos_o;
+    vec4 mr = point.textures.at[USE_METALLIC_ROUGHNESS];
+    float metallic = SHADING_OF(m).metallic * mr.b, roughness = SHADING_OF(m).roughness * mr.g;
+    float specular = SHADING_OF(m).specular * point.textures.at[USE_SPECULAR].a;
+    vec3 specular_color = SHADING_OF(m).specular_color * point.textures.at[USE_SPECULAR_COLOR].rgb;
+    float r0 = (SHADING_OF(m).ior - 1.0) / (SHADING_OF(m).ior + 1.0);
+    b.diffuse = base * (1.0 - metallic);
+    vec3 f0 = min(r0 * r0 * specular_color, vec3(1.0)) * specular;
+    b.facets = Microfacets(vec2(roughness * roughness), false);
+    if (HAS_ANISOTROPY && SHADING_OF(m).anisotropy != vec2(0.0)) point.along = anisotropic(point.textures, m, b.facets.alpha);
+    if (has_transmission() && SHADING_OF(m).walls != WALLS_NONE) {
+        float transmission = SHADING_OF(m).transmission * point.textures.at[USE_TRANSMISSION].r;
+        b.transmitted = b.diffuse * transmission;
+        b.diffuse *= 1.0 - transmission;
+        b.volume = HAS_VOLUMES && SHADING_OF(m).walls == WALLS_VOLUME;
+        if (b.volume) {
+            b.eta = front ? SHADING_OF(m).ior : 1.0 / SHADING_OF(m).ior;
+            b.tint = min(specular_color, vec3(1.0)) * specular;
+        }
+    }
+    if (HAS_SHEEN && highest(SHADING_OF(m).sheen_color) > 0.0) {
+        float r = SHADING_OF(m).sheen_roughness * point.textures.at[USE_SHEEN_ROUGHNESS].a;
+        b.sheen = Sheen(SHADING_OF(m).sheen_color * point.textures.at[USE_SHEEN].rgb, max(r * r, MIN_SHEEN_ALPHA), 1.0);
+        b.sheen.kept = sheen_kept(b.sheen, cos_o);
+    }
+    if (HAS_CLEARCOAT && SHADING_OF(m).clearcoat > 0.0) {
+        float r = SHADING_OF(m).clearcoat_roughness * point.textures.at[USE_CLEARCOAT_ROUGHNESS].g;
+        b.clearcoat.weight = SHADING_OF(m).clearcoat * point.textures.at[USE_CLEARCOAT].r;
+        b.clearcoat.facets = Microfacets(vec2(r * r), false);
+    }
+    set_interface(b, f0, specular, base, metallic, cos_o, roughness, dielectric_layer(m, front));
+    set_probabilities(b, cos_o);
+}
+
+bool gltf_has_smooth_part(Bsdf b) {
+    return is_smooth(b.facets) || HAS_CLEARCOAT && b.clearcoat.weight > 0.0 && is_smooth(b.clearcoat.facets);
+}
+
 #endif

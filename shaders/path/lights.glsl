@@ -29,7 +29,7 @@ vec3 environment_radiance(PathParams p, vec3 w) {
 }
 
 // Can light from behind the surface be scattered to the viewer?
-bool transmits_light(Shading m) { return (has_transmission() || HAS_GLASS) && m.bsdf.transmitted != vec3(0.0); }
+bool transmits_light(Shading m) { return (has_transmission() || HAS_DIELECTRIC) && m.bsdf.transmitted != vec3(0.0); }
 
 // A constant environment is sampled by the cosine to the shading normal, as a diffuse surface scatters it, on each side that light may come from. Per solid
 // angle.

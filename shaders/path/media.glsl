@@ -9,7 +9,7 @@
 #define MediaStack uvec4
 
 bool is_medium(uint material) {
-    return HAS_VOLUMES && SHADING_OF(material).walls == WALLS_VOLUME || HAS_GLASS && SHADING_OF(material).model == MODEL_GLASS;
+    return HAS_VOLUMES && SHADING_OF(material).walls == WALLS_VOLUME || HAS_DIELECTRIC && SHADING_OF(material).model == BSDF_DIELECTRIC;
 }
 
 // The volume that a path with this stack is in.

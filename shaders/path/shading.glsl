@@ -6,7 +6,6 @@
 #include "path/params.glsl"
 #include "path/cone.glsl"
 #include "bsdf/bsdf.glsl"
-#include "interface/material_model.glsl"
 #include "interface/shading.glsl"
 #include "interface/walls.glsl"
 
@@ -82,12 +81,12 @@ struct Shading {
 };
 
 // What the material's textures say at a surface, 1 where it has none.
-struct Looked {
+struct MaterialTextures {
     vec4 at[TEXTURE_FEATURES_COUNT];
 };
 
-Looked look_up(Surface s, PartRecord part, float log_side) {
-    Looked found;
+MaterialTextures look_up(Surface s, PartRecord part, float log_side) {
+    MaterialTextures found;
     const uint SRGB = 1u << USE_EMISSION | 1u << USE_SHEEN | 1u << USE_SPECULAR_COLOR;
     uint m = part.material;
     // all places are constants once it is unrolled: CPU drivers write to others lane by lane
@@ -116,73 +115,22 @@ vec3 towards(vec3 n, vec3 wo) {
     return c < LEAST_COSINE ? normalize(n + (LEAST_COSINE - c) * wo) : n;
 }
 
-// Turns and stretches microfacets along KHR_materials_anisotropy's direction. Returns it, in the plane of tangent and bitangent.
-vec2 anisotropic(Looked looked, uint m, inout vec2 alpha) {
-    vec3 t = looked.at[USE_ANISOTROPY].xyz;
-    vec2 d = SHADING_OF(m).uses[USE_ANISOTROPY].texture != INVALID ? t.xy * 2.0 - 1.0 : vec2(1.0, 0.0);
-    float strength = length(SHADING_OF(m).anisotropy) * t.z;
-    alpha.x = mix(alpha.x, 1.0, strength * strength);
-    if (alpha.x >= MIN_ALPHA) alpha = max(alpha, vec2(MIN_ALPHA));
-    vec2 turn = strength > 0.0 ? normalize(SHADING_OF(m).anisotropy) : vec2(1.0, 0.0);
-    return vec2(turn.x * d.x - turn.y * d.y, turn.y * d.x + turn.x * d.y);
-}
-
 // First layer of the albedo tables of a material that refracts, as seen from a side.
 uint dielectric_layer(uint m, bool front) {
     return ALBEDO_DIELECTRIC + DIELECTRIC_LAYERS * (2u * SHADING_OF(m).glass_layer + (front ? 0u : 1u));
 }
 
-// Factors that give back what microfacets of one bounce lose (docs/materials.md, Energy). glTF's are in set_interface().
-void compensate(inout Bsdf b, uint m, float cos_o, float roughness, bool front) {
-    if (!HAS_COMPENSATION || is_smooth(b.facets)) return;
-    if (b.kind == BSDF_CONDUCTOR) {
-        float e = beckmann_albedo(cos_o, roughness);
-        b.tint *= 1.0 + fresnel_conductor(1.0, b.f0, b.k) * ((1.0 - e) / e);
-    } else {
-        DielectricAlbedo a = dielectric_albedo(dielectric_layer(m, front), cos_o, roughness, ggx_albedo(cos_o, roughness), 1.0);
-        float gain = 1.0 / (a.reflected + a.transmitted);
-        b.tint *= gain;
-        b.transmitted *= gain;
-    }
-}
+// What a material's BSDF is made of at a point.
+struct MaterialPoint {
+    uint material;
+    vec3 base;    // linear base colour
+    bool front;   // seen from its front
+    float cos_o;  // between shading normal and view
+    MaterialTextures textures;
+    vec2 along;   // direction of anisotropy, in the plane of tangent and bitangent
+};
 
-// The BSDF of a glTF material but for the frame; returns the direction of anisotropy.
-vec2 gltf_bsdf(inout Bsdf b, Looked looked, uint m, vec3 base, bool front, float cos_o) {
-    vec4 mr = looked.at[USE_METALLIC_ROUGHNESS];
-    float metallic = SHADING_OF(m).metallic * mr.b, roughness = SHADING_OF(m).roughness * mr.g;
-    float specular = SHADING_OF(m).specular * looked.at[USE_SPECULAR].a;
-    vec3 specular_color = SHADING_OF(m).specular_color * looked.at[USE_SPECULAR_COLOR].rgb;
-    float r0 = (SHADING_OF(m).ior - 1.0) / (SHADING_OF(m).ior + 1.0);
-    b.kind = BSDF_GLTF;
-    b.diffuse = base * (1.0 - metallic);
-    vec3 f0 = min(r0 * r0 * specular_color, vec3(1.0)) * specular;
-    b.facets = Microfacets(vec2(roughness * roughness), false);
-    vec2 along = vec2(1.0, 0.0);
-    if (HAS_ANISOTROPY && SHADING_OF(m).anisotropy != vec2(0.0)) along = anisotropic(looked, m, b.facets.alpha);
-    if (has_transmission() && SHADING_OF(m).walls != WALLS_NONE) {
-        float transmission = SHADING_OF(m).transmission * looked.at[USE_TRANSMISSION].r;
-        b.transmitted = b.diffuse * transmission;
-        b.diffuse *= 1.0 - transmission;
-        b.volume = HAS_VOLUMES && SHADING_OF(m).walls == WALLS_VOLUME;
-        if (b.volume) {
-            b.eta = front ? SHADING_OF(m).ior : 1.0 / SHADING_OF(m).ior;
-            b.tint = min(specular_color, vec3(1.0)) * specular;
-        }
-    }
-    if (HAS_SHEEN && highest(SHADING_OF(m).sheen_color) > 0.0) {
-        float r = SHADING_OF(m).sheen_roughness * looked.at[USE_SHEEN_ROUGHNESS].a;
-        b.sheen = Sheen(SHADING_OF(m).sheen_color * looked.at[USE_SHEEN].rgb, max(r * r, MIN_SHEEN_ALPHA), 1.0);
-        b.sheen.kept = sheen_kept(b.sheen, cos_o);
-    }
-    if (HAS_CLEARCOAT && SHADING_OF(m).clearcoat > 0.0) {
-        float r = SHADING_OF(m).clearcoat_roughness * looked.at[USE_CLEARCOAT_ROUGHNESS].g;
-        b.clearcoat.weight = SHADING_OF(m).clearcoat * looked.at[USE_CLEARCOAT].r;
-        b.clearcoat.facets = Microfacets(vec2(r * r), false);
-    }
-    set_interface(b, f0, specular, base, metallic, cos_o, roughness, dielectric_layer(m, front));
-    set_probabilities(b, cos_o);
-    return along;
-}
+#include "interface/bsdf_dispatch.glsl"
 
 // A surface that absorbs everything.
 Shading black_shading(Surface s, vec3 wo) {
@@ -209,12 +157,12 @@ Shading shade(Surface s, vec3 wo, float log_side) {
     Shading out_ = black_shading(s, wo);
     out_.material = part.material;
     vec3 n = out_.frame.n;
-    Looked looked = look_up(s, part, log_side);
+    MaterialTextures textures = look_up(s, part, log_side);
     if (HAS_EMISSION && SHADING_OF(m).emission != vec3(0.0) && (front || SHADING_OF(m).emits_back != 0u)) {
-        out_.emission = SHADING_OF(m).emission * looked.at[USE_EMISSION].rgb;
+        out_.emission = SHADING_OF(m).emission * textures.at[USE_EMISSION].rgb;
     }
     vec3 base = shown_color(s, part, MaterialRecords(root.materials).v[part.material], log_side);
-    if (HAS_UNLIT && SHADING_OF(m).model == MODEL_UNLIT) {
+    if (HAS_UNLIT && SHADING_OF(m).model == BSDF_NONE) {
         // such a material shows its base colour; what it emits is ignored
         out_.unlit = true;
         out_.emission = base;
@@ -224,38 +172,20 @@ Shading shade(Surface s, vec3 wo, float log_side) {
     bool mapped = has_map(m, USE_NORMAL), clearcoat_mapped = HAS_CLEARCOAT && has_map(m, USE_CLEARCOAT_NORMAL);
     if ((mapped || clearcoat_mapped || HAS_ANISOTROPY) && !is_null(part.tangents)) tangent = tangent_at(s, part);
     if (mapped && tangent.w != 0.0) {
-        n = towards(mapped_normal(looked.at[USE_NORMAL], SHADING_OF(m).normal_scale, s.ns, tangent) * side, wo);
+        n = towards(mapped_normal(textures.at[USE_NORMAL], SHADING_OF(m).normal_scale, s.ns, tangent) * side, wo);
         out_.frame = frame_about(n);
     }
     float cos_o = max(dot(n, wo), LEAST_COSINE);
-    if (HAS_DIFFUSE && SHADING_OF(m).model == MODEL_MATTE) {
-        out_.bsdf.kind = BSDF_DIFFUSE;
-        out_.bsdf.diffuse = base;
-    } else if (HAS_MIRROR && SHADING_OF(m).model == MODEL_MIRROR) {
-        out_.bsdf.kind = BSDF_MIRROR;
-        out_.bsdf.tint = SHADING_OF(m).specular_color;
-    } else if (HAS_GLASS && SHADING_OF(m).model == MODEL_GLASS) {
-        out_.bsdf.kind = BSDF_DIELECTRIC;
-        out_.bsdf.tint = SHADING_OF(m).specular_color;
-        out_.bsdf.transmitted = SHADING_OF(m).transmitted;
-        out_.bsdf.eta = front ? SHADING_OF(m).ior : 1.0 / SHADING_OF(m).ior;
-        out_.bsdf.facets = Microfacets(vec2(SHADING_OF(m).roughness * SHADING_OF(m).roughness), false);
-        compensate(out_.bsdf, m, cos_o, SHADING_OF(m).roughness, front);
-    } else if (HAS_CONDUCTOR && SHADING_OF(m).model == MODEL_CONDUCTOR) {
-        out_.bsdf.kind = BSDF_CONDUCTOR;
-        out_.bsdf.tint = SHADING_OF(m).specular_color;
-        out_.bsdf.f0 = SHADING_OF(m).eta;
-        out_.bsdf.k = SHADING_OF(m).k;
-        out_.bsdf.facets = Microfacets(vec2(SHADING_OF(m).roughness * SHADING_OF(m).roughness), true);
-        compensate(out_.bsdf, m, cos_o, SHADING_OF(m).roughness, front);
-    } else if (HAS_GLTF) {
-        vec2 along = gltf_bsdf(out_.bsdf, looked, m, base, front, cos_o);
+    MaterialPoint point = MaterialPoint(m, base, front, cos_o, textures, vec2(1.0, 0.0));
+    out_.bsdf.kind = SHADING_OF(m).model;
+    bsdf_setup(out_.bsdf, point);
+    if (is_bsdf(out_.bsdf, BSDF_GLTF, HAS_GLTF)) {
         if (HAS_ANISOTROPY && SHADING_OF(m).anisotropy != vec2(0.0) && tangent.w != 0.0) {
-            vec3 d = tangent.xyz * along.x + cross(s.ns, tangent.xyz) * (tangent.w * along.y);
+            vec3 d = tangent.xyz * point.along.x + cross(s.ns, tangent.xyz) * (tangent.w * point.along.y);
             out_.frame = frame_along(n, d);
         }
         if (clearcoat_mapped && tangent.w != 0.0) {
-            vec3 nc = mapped_normal(looked.at[USE_CLEARCOAT_NORMAL], SHADING_OF(m).clearcoat_normal_scale, s.ns, tangent) * side;
+            vec3 nc = mapped_normal(textures.at[USE_CLEARCOAT_NORMAL], SHADING_OF(m).clearcoat_normal_scale, s.ns, tangent) * side;
             out_.bsdf.clearcoat.normal = to_frame(out_.frame, towards(nc, wo));
         } else if (HAS_CLEARCOAT && mapped) {
             // the clearcoat has its own normals, or none

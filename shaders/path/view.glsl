@@ -10,10 +10,10 @@ vec3 view_value(uint view, Surface s, Shading shown, float distance_, float log_
     PartRecord part = PartRecords(SceneRoot(push.scene).parts).v[s.part];
     ShadingRecord m = SHADING_OF(part.material);
     if (view == VIEW_BAKED_OCCLUSION) return vec3(look_up(s, part, log_side).at[USE_OCCLUSION].r);
-    bool coloured = m.model == MODEL_MIRROR || m.model == MODEL_GLASS || m.model == MODEL_CONDUCTOR;
+    bool coloured = m.model == BSDF_MIRROR || m.model == BSDF_DIELECTRIC || m.model == BSDF_CONDUCTOR;
     vec3 base = shown_color(s, part, MaterialRecords(SceneRoot(push.scene).materials).v[part.material], log_side);
     if (!coloured) return base;
-    return m.model == MODEL_CONDUCTOR ? m.specular_color * fresnel_conductor(1.0, m.eta, m.k) : m.specular_color;
+    return m.model == BSDF_CONDUCTOR ? m.specular_color * fresnel_conductor(1.0, m.eta, m.k) : m.specular_color;
 }
 
 #endif

@@ -82,22 +82,6 @@ enumerations! {
         Rectangle = "LIGHT_RECTANGLE",
     }
 
-    /// Which reflection model a material has.
-    MaterialModel: "material_model" {
-        /// glTF's metallic-roughness with its extensions.
-        Gltf = "MODEL_GLTF",
-        /// Lambert.
-        Matte = "MODEL_MATTE",
-        /// A perfect mirror.
-        Mirror = "MODEL_MIRROR",
-        /// A dielectric that light goes through.
-        Glass = "MODEL_GLASS",
-        /// A metal by its measured index of refraction.
-        Conductor = "MODEL_CONDUCTOR",
-        /// Shows its colour whatever the light, and reflects none.
-        Unlit = "MODEL_UNLIT",
-    }
-
     /// How light goes through a material.
     Walls: "walls" {
         /// It does not.

@@ -94,19 +94,27 @@ macro_rules! feature_set {
     };
 }
 
-const MATERIAL_FIRST: u32 = constants::ALL.len() as u32;
+const BSDF_FIRST: u32 = constants::ALL.len() as u32;
+const MATERIAL_FIRST: u32 = BSDF_FIRST + BsdfModels::WORDS as u32;
 const TEXTURE_FIRST: u32 = MATERIAL_FIRST + MaterialFeatures::WORDS as u32;
 const PATH_FIRST: u32 = TEXTURE_FIRST + TextureFeatures::WORDS as u32;
+
+feature_set! {
+    /// The reflection models of a scene's materials.
+    BsdfModels of /// A reflection model: `HAS_NAME` stands for `shaders/bsdf/name.glsl`, which defines `name_setup`, `name_eval`, `name_sample`, `name_has_smooth_part` and
+    /// `name_has_rough_part` (shaders/bsdf/bsdf.glsl says what they do). What calls them is made of this list ([`super::glsl`]).
+    BsdfModel: "bsdf_models", from BSDF_FIRST, full true, indexed false, BSDF;
+    Gltf = "HAS_GLTF", "metallic-roughness";
+    Diffuse = "HAS_DIFFUSE", "Lambert";
+    Conductor = "HAS_CONDUCTOR", "conductors";
+    Dielectric = "HAS_DIELECTRIC", "glass";
+    Mirror = "HAS_MIRROR", "mirrors";
+}
 
 feature_set! {
     /// What the materials of a scene require.
     MaterialFeatures of /// What a material may require of shaders.
     MaterialFeature: "material_features", from MATERIAL_FIRST, full true, indexed false, MATERIAL;
-    Diffuse = "HAS_DIFFUSE", "Lambert";
-    Gltf = "HAS_GLTF", "metallic-roughness";
-    Conductor = "HAS_CONDUCTOR", "conductors";
-    Glass = "HAS_GLASS", "glass";
-    Mirror = "HAS_MIRROR", "mirrors";
     Unlit = "HAS_UNLIT", "unlit surfaces";
     Clearcoat = "HAS_CLEARCOAT", "clearcoat";
     Sheen = "HAS_SHEEN", "sheen";
@@ -173,14 +181,23 @@ feature_set! {
 /// What of the path tracer's shaders a scene requires.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct ShadingFeatures {
-    /// Of its materials.
+    /// Reflection models of its materials.
+    pub bsdfs: BsdfModels,
+    /// What else its materials require.
     pub materials: MaterialFeatures,
     /// Of their textures.
     pub textures: TextureFeatures,
 }
 
 /// All sets.
-pub(super) const SETS: [&Declaration; 3] = [&MATERIAL, &TEXTURE, &PATH];
+pub(super) const SETS: [&Declaration; 4] = [&BSDF, &MATERIAL, &TEXTURE, &PATH];
+
+impl BsdfModel {
+    /// As records hold it: 0 is no model, which absorbs everything.
+    pub const fn number(self) -> u32 {
+        self as u32 + 1
+    }
+}
 
 #[cfg(test)]
 mod tests {
@@ -205,6 +222,7 @@ mod tests {
     #[test]
     fn numbers_are_given_out_once() {
         let mut ids: Vec<u32> = (0..constants::ALL.len() as u32).collect();
+        ids.extend(BsdfModels::default().constants().map(|c| c.0.id));
         ids.extend(MaterialFeatures::default().constants().map(|c| c.0.id));
         ids.extend(TextureFeatures::default().constants().map(|c| c.0.id));
         ids.extend(PathFeatures::default().constants().map(|c| c.0.id));

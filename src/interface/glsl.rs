@@ -9,6 +9,7 @@ use super::{constants, enumerations, features, records};
 pub fn files() -> Vec<(String, String)> {
     let mut files = vec![file("constants", &constants())];
     files.extend(features::SETS.iter().map(|set| file(set.name, &feature_set(set))));
+    files.push(file("bsdf_dispatch", &bsdf_dispatch()));
     files.extend(enumerations::ALL.iter().chain(enumerations::CHOICES).map(|e| file(e.name, &enumeration(e))));
     files.extend(records::FILES.iter().map(|f| {
         let includes: String = f.includes.iter().map(|name| format!("#include \"interface/{name}.glsl\"\n")).collect();
@@ -60,6 +61,12 @@ fn constants() -> String {
 
 fn feature_set(set: &features::Declaration) -> String {
     let mut text = String::new();
+    if set.name == features::BSDF.name {
+        let _ = writeln!(text, "const uint BSDF_NONE = 0u;  // absorbs everything");
+        for (number, (name, about)) in (1..).zip(set.features) {
+            let _ = writeln!(text, "const uint BSDF_{} = {number}u;  // {about}", name.trim_start_matches("HAS_"));
+        }
+    }
     let (words, all) = (set.name.to_uppercase(), if set.is_full { "0xffffffffu" } else { "0u" });
     for word in 0..set.features.len().div_ceil(32) {
         let _ = writeln!(text, "layout(constant_id = {}) const uint {words}_{word} = {all};", set.first_id as usize + word);
@@ -72,6 +79,31 @@ fn feature_set(set: &features::Declaration) -> String {
         }
         let _ = writeln!(text, "const bool {name} = ({words}_{} & 0x{:x}u) != 0u;  // {about}", k / 32, 1u32 << (k % 32));
     }
+    text
+}
+
+/// The reflection models' numbers in records, and the functions that choose among them. Models that no material has are not compiled.
+fn bsdf_dispatch() -> String {
+    // HAS_NAME
+    let names: Vec<_> = features::BSDF.features.iter().map(|(name, _)| name.trim_start_matches("HAS_").to_owned()).collect();
+    let mut text: String = names.iter().map(|name| format!("#include \"bsdf/{}.glsl\"\n", name.to_lowercase())).collect();
+    let mut function = |head: &str, call: &str, otherwise: &str| {
+        let _ = writeln!(text, "{head} {{");
+        for name in &names {
+            let call = call.replace("NAME", &name.to_lowercase());
+            let _ = writeln!(text, "    if (is_bsdf(b, BSDF_{name}, HAS_{name})) {call}");
+        }
+        let _ = writeln!(text, "    {otherwise}\n}}");
+    };
+    function("void bsdf_setup(inout Bsdf b, inout MaterialPoint point)", "{ NAME_setup(b, point); return; }", "");
+    function("bool has_smooth_part(Bsdf b)", "return NAME_has_smooth_part(b);", "return false;");
+    function("bool has_rough_part(Bsdf b)", "return NAME_has_rough_part(b);", "return false;");
+    function("BsdfValue bsdf_eval(Bsdf b, vec3 wo, vec3 wi)", "return NAME_eval(b, wo, wi);", "return NO_VALUE;");
+    function(
+        "BsdfSample bsdf_sample(Bsdf b, vec3 wo, vec2 u, float v)",
+        "return NAME_sample(b, wo, u, v);",
+        "return NO_SAMPLE;",
+    );
     text
 }
 

@@ -14,8 +14,9 @@ pub mod layout;
 pub mod records;
 
 pub use enumerations::{
-    BudgetStage, LightKind, MaterialModel, PixelFilter, Resolution, Sequence, Shown, TexelFormat, Texels, View, Walls, Wrap,
+    BudgetStage, LightKind, PixelFilter, Resolution, Sequence, Shown, TexelFormat, Texels, View, Walls, Wrap,
 };
 pub use features::{
-    MaterialFeature, MaterialFeatures, PathFeature, PathFeatures, ShadingFeatures, TextureFeature, TextureFeatures,
+    BsdfModel, BsdfModels, MaterialFeature, MaterialFeatures, PathFeature, PathFeatures, ShadingFeatures, TextureFeature,
+    TextureFeatures,
 };

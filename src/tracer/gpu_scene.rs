@@ -20,7 +20,7 @@ use crate::interface::records::ray::INVALID;
 use crate::interface::records::scene::{
     InstanceRecord, MaterialRecord, MipRecord, PartRecord, SceneRoot, TextureRecord, TextureUse,
 };
-use crate::interface::{MaterialFeature, TexelFormat, Texels};
+use crate::interface::{BsdfModel, MaterialFeature, ShadingFeatures, TexelFormat, Texels};
 use crate::scene::{AlphaMode, Filter, Geometry, Material, TexelData, TextureSlot, TriangleMesh};
 
 /// What the passes will ask of the scene; the rest is not uploaded.
@@ -313,11 +313,11 @@ impl GpuScene {
 
 /// What materials ask about albedos, if any does.
 fn albedo_tables(flat: &FlatScene, needs: Needs, indices: &[f32]) -> Option<Vec<f32>> {
-    let materials = shading::features(flat, needs).materials;
+    let ShadingFeatures { bsdfs, materials, .. } = shading::features(flat, needs);
     let wanted = albedo::Wanted {
-        ggx: needs.compensation && materials.contains(MaterialFeature::Gltf),
+        ggx: needs.compensation && bsdfs.contains(BsdfModel::Gltf),
         sheen: materials.contains(MaterialFeature::Sheen),
-        beckmann: needs.compensation && materials.contains(MaterialFeature::Conductor),
+        beckmann: needs.compensation && bsdfs.contains(BsdfModel::Conductor),
     };
     let glass = if needs.compensation && !needs.white { indices } else { &[] };
     let any = wanted.ggx || wanted.sheen || wanted.beckmann || !glass.is_empty();

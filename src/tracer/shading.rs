@@ -5,7 +5,7 @@ use crate::accel::flatten::FlatScene;
 use crate::interface::records::scene::TextureUse;
 use crate::interface::records::shading::ShadingRecord;
 use crate::interface::{
-    MaterialFeature, MaterialFeatures, MaterialModel, ShadingFeatures, Texels, TextureFeature, TextureFeatures, Walls,
+    BsdfModel, BsdfModels, MaterialFeature, MaterialFeatures, ShadingFeatures, Texels, TextureFeature, TextureFeatures, Walls,
 };
 use crate::scene::material::MaterialKind;
 use crate::scene::{Geometry, Material, TextureSlot};
@@ -20,6 +20,18 @@ fn metal(kind: MaterialKind) -> Option<[[f32; 3]; 2]> {
         MaterialKind::Copper => Some([[0.200_438, 0.924_033, 1.102_212], [3.912_949, 2.452_848, 2.142_188]]),
         MaterialKind::Gold => Some([[0.143_119, 0.374_957, 1.442_479], [3.983_16, 2.385_721, 1.603_215]]),
         _ => None,
+    }
+}
+
+/// The reflection model of a material; `None`: it is unlit.
+fn model(m: &Material) -> Option<BsdfModel> {
+    match m.kind {
+        _ if m.unlit => None,
+        MaterialKind::MetallicRoughness => Some(BsdfModel::Gltf),
+        MaterialKind::Matte => Some(BsdfModel::Diffuse),
+        MaterialKind::Mirror => Some(BsdfModel::Mirror),
+        MaterialKind::Glass => Some(BsdfModel::Dielectric),
+        MaterialKind::Copper | MaterialKind::Gold => Some(BsdfModel::Conductor),
     }
 }
 
@@ -102,7 +114,8 @@ fn refracts(m: &Material) -> bool {
 /// What the materials of a scene require of paths.
 pub(super) fn features(flat: &FlatScene, needs: Needs) -> ShadingFeatures {
     // under a white sky surfaces are diffuse, whatever they are made of
-    let mut materials: MaterialFeatures = [MaterialFeature::Diffuse].into_iter().collect();
+    let mut bsdfs: BsdfModels = [BsdfModel::Diffuse].into_iter().collect();
+    let mut materials = MaterialFeatures::default();
     let mut textures = TextureFeatures::default();
     materials.insert_if(needs.compensation, MaterialFeature::Compensation);
     materials.insert_if(needs.white, MaterialFeature::White);
@@ -116,14 +129,10 @@ pub(super) fn features(flat: &FlatScene, needs: Needs) -> ShadingFeatures {
             continue;
         }
         let gltf = m.kind == MaterialKind::MetallicRoughness && !m.unlit;
-        materials.insert(match m.kind {
-            _ if m.unlit => MaterialFeature::Unlit,
-            MaterialKind::MetallicRoughness => MaterialFeature::Gltf,
-            MaterialKind::Matte => MaterialFeature::Diffuse,
-            MaterialKind::Mirror => MaterialFeature::Mirror,
-            MaterialKind::Glass => MaterialFeature::Glass,
-            MaterialKind::Copper | MaterialKind::Gold => MaterialFeature::Conductor,
-        });
+        match model(m) {
+            Some(model) => bsdfs.insert(model),
+            None => materials.insert(MaterialFeature::Unlit),
+        }
         let normal_maps = m.normal_texture.is_some() || m.clearcoat.factor > 0.0 && m.clearcoat.normal_texture.is_some();
         let varies = matches!(&mesh.geometry, Geometry::Triangles(t) if !t.colors.is_empty() || m.base_color_texture.is_some());
         for (slot, &feature) in slots(m, needs).iter().zip(TextureFeature::ALL) {
@@ -143,7 +152,7 @@ pub(super) fn features(flat: &FlatScene, needs: Needs) -> ShadingFeatures {
             materials.insert_if(required, feature);
         }
     }
-    ShadingFeatures { materials, textures }
+    ShadingFeatures { bsdfs, materials, textures }
 }
 
 /// The record of a material. `indices`: those of [`indices_of_refraction`].
@@ -160,14 +169,7 @@ pub(super) fn record(
     let (sin, cos) = m.anisotropy.rotation.sin_cos();
     ShadingRecord {
         emission: if m.unlit { [0.0; 3] } else { m.emissive.to_array() },
-        model: match m.kind {
-            _ if m.unlit => MaterialModel::Unlit as u32,
-            MaterialKind::MetallicRoughness => MaterialModel::Gltf as u32,
-            MaterialKind::Matte => MaterialModel::Matte as u32,
-            MaterialKind::Mirror => MaterialModel::Mirror as u32,
-            MaterialKind::Glass => MaterialModel::Glass as u32,
-            MaterialKind::Copper | MaterialKind::Gold => MaterialModel::Conductor as u32,
-        },
+        model: model(m).map_or(0, BsdfModel::number),
         metallic: m.metallic,
         roughness: m.roughness,
         ior: m.ior,

@@ -62,7 +62,9 @@ pub(crate) fn scene_specialization(features: SceneFeatures) -> Specialization {
         .set(constants::HAS_COVERAGE, features.coverage)
         .set(constants::HAS_DEEP_TEXELS, features.deep_texels);
     match features.shading {
-        Some(shading) => s.set_all(shading.materials.constants()).set_all(shading.textures.constants()),
+        Some(shading) => {
+            s.set_all(shading.bsdfs.constants()).set_all(shading.materials.constants()).set_all(shading.textures.constants())
+        }
         None => s,
     }
 }

@@ -51,7 +51,7 @@ pub(super) fn report(tracer: &Tracer, flat: &FlatScene, shot: &Shot, o: &PathOpt
     }
     let shading = tracer.features().shading.unwrap_or_default();
     let mut explanations = vec![
-        compiled("materials require", shading.materials.labels()),
+        compiled("materials require", joined(shading.bsdfs.labels(), shading.materials.labels())),
         compiled("textures beside base colours:", shading.textures.labels()),
         compiled("lights and options require", result.features.labels()),
         mip_levels(o, &stats),
@@ -114,6 +114,12 @@ fn mip_levels(o: &PathOptions, stats: &BuildStats) -> String {
         TextureFilter::RayCone if stats.mip_levels == 0 => "mip levels: none, no surface has a texture".into(),
         TextureFilter::RayCone => format!("mip levels: up to {}, {} bytes beside the first", stats.mip_levels, stats.mip_bytes),
     }
+}
+
+/// Labels of two sets, as of one.
+fn joined(a: [Vec<&'static str>; 2], b: [Vec<&'static str>; 2]) -> [Vec<&'static str>; 2] {
+    let ([required, other], [more_required, more_other]) = (a, b);
+    [[required, more_required].concat(), [other, more_other].concat()]
 }
 
 /// Which of the code that `labels` stand for is compiled.

@@ -10,7 +10,7 @@ records! {
     ShadingRecord: array ShadingRecords readonly 16 {
         /// Radiance.
         emission: vec3,
-        /// One of `MODEL_*`.
+        /// One of `BSDF_*`; `BSDF_NONE` of unlit materials.
         model: uint,
         /// 0 to 1.
         metallic: float,
