@@ -1,5 +1,7 @@
 //! Materials as files describe them: glTF metallic-roughness with its extensions, and the named materials of `.brhan`.
 
+use std::collections::BTreeMap;
+
 use glam::{Affine2, Vec3, Vec4};
 
 /// Use of a texture by a material.
@@ -195,6 +197,9 @@ pub struct Material {
     pub specular: Specular,
     /// KHR_materials_anisotropy.
     pub anisotropy: Anisotropy,
+    /// Numbers for reflection models that the file's format knows nothing of, by name: numeric `extras` of a glTF material, unknown statements of an MTL file,
+    /// `sigma[]` of `.brhan`. docs/materials.md lists those that have a meaning.
+    pub parameters: BTreeMap<String, f32>,
 }
 
 impl Default for Material {
@@ -225,6 +230,7 @@ impl Default for Material {
             dielectric_priority: 0,
             specular: Specular::default(),
             anisotropy: Anisotropy::default(),
+            parameters: BTreeMap::new(),
         }
     }
 }
@@ -256,6 +262,11 @@ impl Material {
         let mut copy = self.clone();
         let slots = copy.texture_slots_mut().map(|slot| *slot);
         slots.into_iter().flatten()
+    }
+
+    /// A number that the file gives by this name.
+    pub fn parameter(&self, name: &str) -> Option<f32> {
+        self.parameters.get(name).copied()
     }
 
     /// Whether shading needs the tangents of a mesh: a normal map, or anisotropy.

@@ -191,7 +191,7 @@ pub(super) fn record(
         clearcoat_normal_scale: m.clearcoat.normal_scale,
         glass_layer: indices.iter().position(|&ior| ior == m.ior).unwrap_or(0) as u32,
         priority: m.dielectric_priority,
+        parameters: [0.0; 2],
         uses: slots(m, needs).map(texture),
-        ..Default::default()
     }
 }

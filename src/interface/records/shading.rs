@@ -54,10 +54,8 @@ records! {
         glass_layer: uint,
         /// Of a volume among those that overlap (path/media.glsl).
         priority: int,
-        /// To a multiple of 16 bytes.
-        reserved0: uint,
-        /// To a multiple of 16 bytes.
-        reserved1: uint,
+        /// Of the reflection model; what they are, its file in shaders/bsdf says.
+        parameters: vec2,
         /// Its textures beside the base colour's, by `TextureFeature`.
         uses: TextureUse[TextureFeature::ALL.len()],
     }

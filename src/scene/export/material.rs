@@ -42,6 +42,9 @@ pub(super) fn material(material: &Material, used: &mut BTreeSet<&'static str>) -
     if strength > 1.0 {
         writer.extension("KHR_materials_emissive_strength", json!({ "emissiveStrength": strength }));
     }
+    if !material.parameters.is_empty() {
+        out["extras"] = json!(material.parameters);
+    }
     writer.extensions_of(material);
     if !writer.extensions.is_empty() {
         out["extensions"] = Value::Object(writer.extensions);

@@ -204,6 +204,7 @@ fn material(s: &mut Statement) -> Result<Option<Material>, String> {
     let specular = s.color("specular")?;
     let reflectance = s.color("reflectance")?;
     let transmittance = s.color("transmittance")?;
+    let sigma = s.number("sigma")?;
     let Some(name) = name else { return Ok(None) };
     let kind = match name {
         "matte" => MaterialKind::Matte,
@@ -239,6 +240,7 @@ fn material(s: &mut Statement) -> Result<Option<Material>, String> {
         transmittance: if glass { transmittance.unwrap_or(Vec3::ONE) } else { Vec3::ZERO },
         transmission: Transmission { factor: if glass { 1.0 } else { 0.0 }, ..Default::default() },
         double_sided: true,
+        parameters: sigma.map(|v| ("sigma".to_owned(), v as f32)).into_iter().collect(),
         ..Material::default()
     }))
 }

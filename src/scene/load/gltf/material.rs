@@ -1,5 +1,7 @@
 //! Materials: core metallic-roughness and the KHR_materials extensions, to [`crate::scene::Material`].
 
+use std::collections::BTreeMap;
+
 use ::gltf::json::extensions::texture::TextureTransform;
 use ::gltf::json::material::{self as json, AlphaMode as JsonAlphaMode};
 use ::gltf::json::texture::Info;
@@ -146,8 +148,16 @@ pub(super) fn convert(material: &json::Material) -> Result<Material, String> {
             color_texture: slot(&s.specular_color_texture),
         }),
         anisotropy: AnisotropyJson::of(others)?.to_scene(),
+        parameters: parameters(material),
         ..Material::default()
     })
+}
+
+/// Numbers among the material's `extras`.
+fn parameters(material: &json::Material) -> BTreeMap<String, f32> {
+    let extras = material.extras.as_ref().and_then(|e| serde_json::from_str::<BTreeMap<String, Value>>(e.get()).ok());
+    let numbers = extras.unwrap_or_default().into_iter().filter_map(|(name, value)| Some((name, value.as_f64()? as f32)));
+    numbers.filter(|(_, value)| value.is_finite()).collect()
 }
 
 /// `extras.dielectricPriority`; other extras are somebody else's.

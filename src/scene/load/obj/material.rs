@@ -55,6 +55,7 @@ impl Library {
             ior: m.ior.filter(|&i| i >= 1.0).unwrap_or(1.5),
             specular_color: specular,
             double_sided: true,
+            parameters: m.parameters.clone(),
             ..Material::default()
         };
         if kind == MaterialKind::Glass {

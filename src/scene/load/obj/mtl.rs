@@ -1,5 +1,7 @@
 //! The statements of an MTL file.
 
+use std::collections::BTreeMap;
+
 use glam::{Affine2, Mat2, Vec2, Vec3};
 
 /// A texture map with its options.
@@ -34,6 +36,8 @@ pub(super) struct MtlMaterial {
     pub map_emissive: Option<Map>,
     pub map_dissolve: Option<Map>,
     pub map_normal: Option<Map>,
+    /// Numbers of statements that are not the format's.
+    pub parameters: BTreeMap<String, f32>,
 }
 
 /// Parses a library. Lines that make no sense are noted with their number and skipped: a broken material must not hide
@@ -74,7 +78,11 @@ fn statement(material: &mut MtlMaterial, key: &str, rest: &str) -> Result<(), St
         "map_d" => material.map_dissolve = Some(map(rest)?),
         // `bump` holds heights, not normals
         "norm" => material.map_normal = Some(map(rest)?),
-        _ => {}
+        _ => {
+            if let Ok(value) = number(rest) {
+                material.parameters.insert(key.to_owned(), value);
+            }
+        }
     }
     Ok(())
 }
