@@ -109,6 +109,7 @@ feature_set! {
     Conductor = "HAS_CONDUCTOR", "conductors";
     Dielectric = "HAS_DIELECTRIC", "glass";
     Mirror = "HAS_MIRROR", "mirrors";
+    OrenNayar = "HAS_OREN_NAYAR", "Oren-Nayar";
 }
 
 feature_set! {

@@ -27,11 +27,22 @@ fn metal(kind: MaterialKind) -> Option<[[f32; 3]; 2]> {
 fn model(m: &Material) -> Option<BsdfModel> {
     match m.kind {
         _ if m.unlit => None,
+        MaterialKind::Matte | MaterialKind::MetallicRoughness if m.parameter("sigma").is_some_and(|sigma| sigma > 0.0) => {
+            Some(BsdfModel::OrenNayar)
+        }
         MaterialKind::MetallicRoughness => Some(BsdfModel::Gltf),
         MaterialKind::Matte => Some(BsdfModel::Diffuse),
         MaterialKind::Mirror => Some(BsdfModel::Mirror),
         MaterialKind::Glass => Some(BsdfModel::Dielectric),
         MaterialKind::Copper | MaterialKind::Gold => Some(BsdfModel::Conductor),
+    }
+}
+
+/// What a reflection model takes beside what all have.
+fn parameters(m: &Material) -> [f32; 2] {
+    match model(m) {
+        Some(BsdfModel::OrenNayar) => [m.parameter("sigma").unwrap_or(0.0).clamp(0.0, 1.0), 0.0],
+        _ => [0.0; 2],
     }
 }
 
@@ -191,7 +202,7 @@ pub(super) fn record(
         clearcoat_normal_scale: m.clearcoat.normal_scale,
         glass_layer: indices.iter().position(|&ior| ior == m.ior).unwrap_or(0) as u32,
         priority: m.dielectric_priority,
-        parameters: [0.0; 2],
+        parameters: parameters(m),
         uses: slots(m, needs).map(texture),
     }
 }

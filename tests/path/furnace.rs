@@ -5,7 +5,7 @@ use skylit::scene::builtin::shapes;
 use skylit::scene::material::{Anisotropy, Transmission};
 
 /// A sphere that fills the view, in an environment of radiance 1.
-fn furnace(material: Material) -> Scene {
+pub fn furnace(material: Material) -> Scene {
     let camera = Camera::look_at(DVec3::new(0.0, 0.0, 2.0), DVec3::ZERO, DVec3::Y, 0.9);
     Scene {
         environment: Environment::Uniform(Vec3::ONE),
@@ -13,7 +13,7 @@ fn furnace(material: Material) -> Scene {
     }
 }
 
-fn options(spp: u32, strategy: Strategy) -> PathOptions {
+pub fn options(spp: u32, strategy: Strategy) -> PathOptions {
     PathOptions { size: [24, 24], spp, seed: 3, strategy, ..Default::default() }
 }
 
@@ -58,7 +58,7 @@ fn gpu_what_loses_energy_loses_so_much() {
 }
 
 /// A plane that fills the view, seen under one angle all over, from far away; light comes from everywhere.
-fn plane(material: Material, cos_o: f64) -> Scene {
+pub fn plane(material: Material, cos_o: f64) -> Scene {
     let eye = DVec3::new((1.0 - cos_o * cos_o).sqrt(), cos_o, 0.0) * 50.0;
     let camera = Camera::look_at(eye, DVec3::ZERO, DVec3::Y, 0.002);
     Scene {

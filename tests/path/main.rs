@@ -18,6 +18,7 @@ mod film;
 mod furnace;
 mod materials;
 mod media;
+mod oren_nayar;
 mod shading_normals;
 mod texture_filter;
 mod transport;
