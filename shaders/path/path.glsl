@@ -232,6 +232,8 @@ vec3 path_vertex(BlockParams block, uint k, PathState state, Ray ray, Hit hit) {
     BsdfSample b = sample_direction(m, wo, sample_2d(block.seed, pixel, n, dimension + BSDF_DIRECTION), lobe.x);
     float side = dot(m.ng, b.wi);
     if (!(b.pdf > 0.0) || side == 0.0) return added;
+    // light samples have brought all other light
+    if (WITH_SPECULAR_ONLY && !b.delta) return added;
     state.throughput *= b.weight;
     float brightest = highest(state.throughput);
     if (!(brightest > 0.0)) return added;

@@ -11,7 +11,7 @@ use crate::settings::parse::{parse_factor, parse_number, parse_vector};
 use crate::settings::{AppliesTo, settings};
 
 /// What is lit by lights.
-const LIT: AppliesTo = AppliesTo::stills_of(&["path", "direct"]);
+const LIT: AppliesTo = AppliesTo::stills_of(&["path", "direct", "whitted"]);
 
 settings! {
     /// Light besides the scene's.

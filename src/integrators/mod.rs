@@ -29,10 +29,11 @@ use crate::shaders::StreamShaders;
 use crate::tracer::{Needs, Tracer};
 
 /// All integrators, in the order in which they are listed to users.
-pub static ALL: [&dyn Integrator; 8] = [
+pub static ALL: [&dyn Integrator; 9] = [
     &ao::AmbientOcclusion,
     &path::kinds::PATH,
     &path::kinds::DIRECT,
+    &path::kinds::WHITTED,
     &path::kinds::AO_SKY,
     &path::kinds::NORMALS,
     &path::kinds::ALBEDO,

@@ -177,6 +177,7 @@ feature_set! {
     DistantDisks = "WITH_DISTANT_DISKS", "directional lights of angular diameter above 0";
     Media = "WITH_MEDIA", "volumes that absorb or nest";
     ClearWalls = "WITH_CLEAR_WALLS", "thin walls that light passes straight";
+    SpecularOnly = "WITH_SPECULAR_ONLY", "paths of delta lobes alone";
 }
 
 /// What of the path tracer's shaders a scene requires.

@@ -24,7 +24,7 @@ pub const DEFAULT_FOV_Y: f64 = 45.0;
 
 /// Every integrator whose images are light, which is mapped to what a display can show; views of surfaces but normals and depth are shown as they are.
 const TONE_MAPPED: AppliesTo =
-    AppliesTo::stills_of(&["path", "direct", "ao-sky", "normals", "albedo", "depth", "baked-occlusion"]);
+    AppliesTo::stills_of(&["path", "direct", "whitted", "ao-sky", "normals", "albedo", "depth", "baked-occlusion"]);
 
 settings! {
     /// The image.

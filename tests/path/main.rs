@@ -22,6 +22,7 @@ mod oren_nayar;
 mod shading_normals;
 mod texture_filter;
 mod transport;
+mod whitted;
 
 use std::sync::Arc;
 

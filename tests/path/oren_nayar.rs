@@ -62,10 +62,10 @@ impl Exact {
 fn gpu_rough_surfaces_reflect_as_a_second_implementation_says() {
     let device = device();
     for (albedo, sigma, cos_o) in [(0.5, 0.5, 0.9), (0.8, 1.0, 0.25), (0.2, 1.0, 0.6)] {
-        let expected = Exact { r: f64::from(sigma) }.with_albedo(f64::from(albedo), f64::from(cos_o));
+        let expected = Exact { r: f64::from(sigma) }.with_albedo(f64::from(albedo), cos_o);
         let what = format!("albedo {albedo}, sigma {sigma}, cosine {cos_o}: {expected:.4}");
         assert!((expected - f64::from(albedo)).abs() > 1e-3, "{what}: as smooth as Lambert");
-        let (scene, options) = (plane(rough(albedo, sigma), f64::from(cos_o)), options(512, Strategy::Mis));
+        let (scene, options) = (plane(rough(albedo, sigma), cos_o), options(512, Strategy::Mis));
         // the paper's polynomial for the directional albedo is exact to 0.1 %
         holds_with(&tracers(&device), 1e-3, &device, &what, &scene, &options, expected, 3e-3);
     }

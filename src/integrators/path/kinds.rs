@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::report::{self, environment_text};
-use super::{Lens, MOST_DEPTH, PathOptions, PixelFilter, TextureFilter, View, render, streams};
+use super::{Lens, MOST_DEPTH, PathOptions, PixelFilter, Strategy, TextureFilter, View, render, streams};
 use crate::accel::flatten::FlatScene;
 use crate::colour::srgb_decode;
 use crate::error::{Error, Result};
@@ -21,6 +21,12 @@ pub static PATH: Paths =
 /// Paths of one bounce.
 pub static DIRECT: Paths =
     Paths { name: "direct", help: "Direct lighting: paths of one bounce", kind: Kind::Light { max_depth: Some(1) } };
+/// Mirrors and glass, and direct light on everything else.
+pub static WHITTED: Paths = Paths {
+    name: "whitted",
+    help: "Whitted (1980): chains of mirrors and glass, direct light on everything else",
+    kind: Kind::Whitted,
+};
 /// What ambient occlusion approximates.
 pub static AO_SKY: Paths = Paths {
     name: "ao-sky",
@@ -46,6 +52,8 @@ const SENSOR_HEIGHT: f64 = 0.024;
 enum Kind {
     /// Light, up to so many bounces; `None`: as many as settings say.
     Light { max_depth: Option<u32> },
+    /// Light that comes by delta lobes alone, or straight from a light sample.
+    Whitted,
     /// A white sky's light from grey surfaces.
     WhiteSky,
     /// No light, but what camera rays see.
@@ -64,6 +72,10 @@ impl Paths {
         if let Kind::View(view) = self.kind { Some(view) } else { None }
     }
 
+    fn is_whitted(&self) -> bool {
+        matches!(self.kind, Kind::Whitted)
+    }
+
     fn options(&self, shot: &Shot) -> Result<PathOptions> {
         let settings = &shot.settings.path;
         let wanted = settings.max_depth.or(shot.scene.hints.max_depth).unwrap_or(MOST_DEPTH);
@@ -77,7 +89,9 @@ impl Paths {
             max_depth: if let Kind::Light { max_depth: Some(depth) } = self.kind { depth } else { wanted },
             rr_depth: settings.rr_depth.unwrap_or(PathOptions::default().rr_depth),
             firefly_clamp: settings.firefly_clamp.map_or(f32::INFINITY, |c| c as f32),
-            strategy: settings.sampling.unwrap_or_default(),
+            // nothing but light samples brings light to what scatters it
+            strategy: if self.is_whitted() { Strategy::Light } else { settings.sampling.unwrap_or_default() },
+            specular_only: self.is_whitted(),
             view: self.view(),
             white_sky: matches!(self.kind, Kind::WhiteSky).then(|| settings.sky_albedo.unwrap_or(SKY_ALBEDO) as f32),
             time_limit: shot.time_limit,
@@ -115,7 +129,7 @@ impl Integrator for Paths {
     fn quantity(&self) -> &'static str {
         match self.kind {
             Kind::View(_) => "value",
-            Kind::Light { .. } | Kind::WhiteSky => "radiance",
+            Kind::Light { .. } | Kind::Whitted | Kind::WhiteSky => "radiance",
         }
     }
 
@@ -147,7 +161,7 @@ impl Integrator for Paths {
         let black = match self.kind {
             Kind::View(_) => true,
             Kind::WhiteSky => false,
-            Kind::Light { .. } => !shot.scene.has_visible_sky(),
+            Kind::Light { .. } | Kind::Whitted => !shot.scene.has_visible_sky(),
         };
         let settings = &shot.settings.path;
         let is_pinhole = settings.f_number.is_none() || settings.focus_distance.is_none();
@@ -175,6 +189,7 @@ impl Integrator for Paths {
             strategy,
             white_sky,
             view: _,
+            specular_only: _,
             pixel_filter,
             texture_filter,
             lens,

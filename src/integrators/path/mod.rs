@@ -103,8 +103,10 @@ pub struct PathOptions {
     pub rr_depth: u32,
     /// No path vertex but the first adds more than this radiance in any channel; infinite: unbiased.
     pub firefly_clamp: f32,
-    /// How directions are drawn.
+    /// How directions are sampled.
     pub strategy: Strategy,
+    /// Paths go on by delta lobes alone, so that light samples bring all other light: with [`Strategy::Light`].
+    pub specular_only: bool,
     /// Every surface is diffuse and of this grey, and nothing shines but a white sky: the rendering equation that ambient occlusion
     /// approximates.
     pub white_sky: Option<f32>,
@@ -134,6 +136,7 @@ impl Default for PathOptions {
             rr_depth: 5,
             firefly_clamp: f32::INFINITY,
             strategy: Strategy::Mis,
+            specular_only: false,
             white_sky: None,
             view: None,
             pixel_filter: PixelFilter::Box,

@@ -5,13 +5,16 @@ use crate::settings::parse::{parse_albedo, parse_positive};
 use crate::settings::{AppliesTo, choices, settings};
 
 /// What follows light.
-const LIGHT: AppliesTo = AppliesTo::stills_of(&["path", "direct", "ao-sky"]);
+const LIGHT: AppliesTo = AppliesTo::stills_of(&["path", "direct", "whitted", "ao-sky"]);
 /// Paths of any length.
-const LONG: AppliesTo = AppliesTo::stills_of(&["path", "ao-sky"]);
+const LONG: AppliesTo = AppliesTo::stills_of(&["path", "whitted", "ao-sky"]);
 /// What looks through a camera.
-const CAMERA: AppliesTo = AppliesTo::stills_of(&["path", "direct", "ao-sky", "normals", "albedo", "depth", "baked-occlusion"]);
+const CAMERA: AppliesTo =
+    AppliesTo::stills_of(&["path", "direct", "whitted", "ao-sky", "normals", "albedo", "depth", "baked-occlusion"]);
 /// What reads textures.
-const TEXTURES: AppliesTo = AppliesTo::stills_of(&["path", "direct", "normals", "albedo", "baked-occlusion"]);
+const TEXTURES: AppliesTo = AppliesTo::stills_of(&["path", "direct", "whitted", "normals", "albedo", "baked-occlusion"]);
+/// What samples directions by a strategy of choice.
+const SAMPLED: AppliesTo = AppliesTo::stills_of(&["path", "direct", "ao-sky"]);
 /// The white sky alone.
 const SKY: AppliesTo = AppliesTo::stills_of(&["ao-sky"]);
 
@@ -38,7 +41,7 @@ settings! {
         /// Clamp indirect radiance to X (reduces fireflies; biased) [default: off]
         firefly_clamp: Option<f64>, option(value_name = "X", value_parser = parse_positive, allow_hyphen_values = true), applies(LIGHT);
         /// Sampling strategy; all but the default are for comparison [default: mis]
-        sampling: Option<Strategy>, option(value_enum), applies(LIGHT);
+        sampling: Option<Strategy>, option(value_enum), applies(SAMPLED);
         /// Compensate for energy lost to multiple scattering between microfacets (Turquin 2019)
         energy_compensation: bool, option(), applies(LIGHT);
         /// Albedo of all surfaces with --integrator ao-sky [default: 0.5]
