@@ -45,7 +45,7 @@ report=$out/report.md
     printf '| %s | %s | %s |\n|---|---|---|\n' "${tracers[@]}"
     printf '|'
     for tracer in "${tracers[@]}"; do printf ' ![%s](%s-%s.png) |' "$tracer" "$scene" "$tracer"; done
-    printf '\n\nDifferences of the accessibility (channel Y, 0 to 1):\n\n'
+    printf '\n\nDifferences of the ambient visibility (channel Y, 0 to 1):\n\n'
     for pair in "pipeline query" "pipeline compute" "query compute"; do
       a=${pair% *} b=${pair#* }
       # an assignment of its own: inside printf's arguments a failure would go unnoticed

@@ -4,7 +4,7 @@
 #
 #   ./scripts/test.sh [--full] [FILTER]      FILTER: only tests whose name contains it
 #
-# --full, before a release: every scene of the reference renderer (docs/judge.md) on every tracer and driver, and every device test on the floor driver.
+# --full, before a release: every scene of the reference renderer (docs/mitsuba.md) on every tracer and driver, and every device test on the floor driver.
 # Without it the other tracers and the floor driver render the scenes in which they differ from the compute tracer, and the floor driver leaves out tests of
 # code that knows no driver: how paths are shaded (tests/path), and what frames show (tests/realtime, but for those that compare tracers).
 #

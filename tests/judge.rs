@@ -1,6 +1,6 @@
 //! Path-traced images by every tracer against Mitsuba 3's of the same scenes: an implementation of others as judge.
 //!
-//! `scripts/judge` writes scenes and the judge's images (`tests/judge`); docs/judge.md says what they cover, where conventions differ, and what
+//! `scripts/judge` writes scenes and the judge's images (`tests/judge`); docs/mitsuba.md says what they cover, where conventions differ, and what
 //! this test can see. Images are noisy on both sides, so what is asked is whether they differ by more than noise explains:
 //!
 //! - **pixels**: a Z-test of every pixel and channel, Sidak-corrected to a level of 1 % for the whole image (Subr, Arvo 2007; Rousselle, Jarosz,

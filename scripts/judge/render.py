@@ -7,7 +7,7 @@
     venv/bin/python scripts/judge/render.py glass cornell    # these
 
 The variant llvm_ad_rgb needs LLVM's shared library (Debian: libllvm15). Images come as blocks of samples with seeds of their own; the variance is
-that of the blocks' means. docs/judge.md says what is compared, and how."""
+that of the blocks' means. docs/mitsuba.md says what is compared, and how."""
 
 from __future__ import annotations
 

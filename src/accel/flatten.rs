@@ -96,7 +96,7 @@ impl<'a> FlatScene<'a> {
     /// Groups the meshes of a scene; what may change is not baked into anything: its mesh is a group of its own, in object space.
     ///
     /// # Errors
-    /// [`Error::Usage`] when `motion` names what is not there, or spheres to deform.
+    /// [`crate::Error::Usage`] when `motion` names what is not there, or spheres to deform.
     pub fn with_motion(scene: &'a Scene, motion: Motion) -> Result<Self> {
         motion.check(scene)?;
         Ok(Self::group(scene, motion, Blend::Masked))

@@ -1,4 +1,4 @@
-//! Films of radiance with less noise, and a bias in its place: [`filter`] is the filter of frames in real time over radiance, on the device of the
+//! Films of radiance with less noise, and a bias in its place: `filter` is the filter of frames in real time over radiance, on the device of the
 //! tracer; [`Oidn`] is Intel's Open Image Denoise. Both are told what the pixels show by [`Features`].
 
 mod features;

@@ -1,5 +1,5 @@
 //! Samples of every pixel, added up on a film: step by step ([`super::schedule`]), in each the image block by block, batch by batch and launch by
-//! launch, with progress, a time limit and a way to stop that leaves whole samples of all pixels. What a sample is, an [`Estimator`] knows.
+//! launch, with progress, a time limit and a way to stop that leaves whole samples of all pixels. What a sample is, an `Estimator` knows.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;

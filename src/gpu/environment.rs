@@ -5,7 +5,7 @@
 //! the CPU's widest vectors; a width that the user has set stays.
 //!
 //! Mesa's cache of compiled shaders does not tell widths apart, and code for one gives wrong results with another. So a width that is not the driver's own choice
-//! has a folder of its own, and the pipeline cache has the width in its files' names ([`super::cache`]).
+//! has a folder of its own, and the pipeline cache has the width in its files' names (`cache.rs`).
 
 use std::ffi::{OsStr, OsString};
 use std::path::PathBuf;

@@ -1,4 +1,4 @@
-//! The scene: plain host data, no Vulkan. Loaders make it, [`flatten`] turns it into what tracers consume.
+//! The scene: plain host data, no Vulkan. Loaders make it, [`crate::accel::flatten`] turns it into what tracers consume.
 //!
 //! Conventions, everywhere: right-handed, lengths in world units (metres in glTF), angles in radians, colours linear with
 //! sRGB primaries, triangles counter-clockwise seen from their front.

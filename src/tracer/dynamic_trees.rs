@@ -25,7 +25,7 @@ use crate::gpu::{Buffer, Device, Memory};
 use crate::interface::records::hierarchy::{ALPHA_TESTED, InstanceLeaf, TriangleLeaf};
 use crate::scene::Geometry;
 
-/// A top level of so many entries is always built anew: docs/traversal.md has the measurement.
+/// A top level of so many entries is always built anew: docs/dynamic-scenes.md has the measurement.
 const TOP_BUILD_MOST: usize = 256;
 /// Levels that a tree may grow by when it is built anew.
 const MORE_LEVELS: u32 = 4;

@@ -143,7 +143,7 @@ impl DeviceSettings {
     /// where `--tracer` leaves the choice.
     ///
     /// # Errors
-    /// Those of [`DeviceArgs::check`].
+    /// Those of [`DeviceSettings::check`].
     pub fn choose(&self, info: &crate::gpu::DeviceInfo) -> Result<(TracerKind, String, ComputeOptions)> {
         self.check()?;
         let (kind, why) = match (self.tracer.unwrap_or_default(), self.about_compute()) {

@@ -1,5 +1,5 @@
 //! `skylit bench ao`: what each preset's frames cost and how far they are from reference images, by scene and view, standing still and
-//! moving, and what of the past they show where the scene changes. docs/benchmarks.md says what is measured and how.
+//! moving, and what of the past they show where the scene changes. docs/bench-ao.md says what is measured and how.
 
 mod args;
 mod candidates;

@@ -1,5 +1,5 @@
 //! `skylit bench path`: how the error of path-traced images falls with time, by sampling strategy and beside peers.
-//! docs/benchmarks.md says what is measured and how.
+//! docs/bench-path.md says what is measured and how.
 
 mod args;
 mod contestant;

@@ -1,0 +1,101 @@
+#!/usr/bin/env python3
+"""Makes the pictures of the README: one view of the stairs as real-time ambient occlusion, as a path tracer sees it, and how far apart the two are.
+
+    python3 scripts/pictures.py [SKYLIT]        # the program, target/release/skylit unless given; about a minute on two cores
+
+They go to docs/images. Python's own library is enough. The difference is that of the two PNGs' linear values: orange where ambient occlusion is darker than
+the path-traced image, blue where it is brighter, white where they agree, and full colour at a difference of 0.25."""
+
+from __future__ import annotations
+
+import struct
+import subprocess
+import sys
+import zlib
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+VIEW = ["builtin:stairs", "--size", "360x270", "--eye=-2.2,2.4,6", "--target=-0.3,0.8,0", "--fov-y", "36"]
+FULL = 0.25
+
+
+def read(path: Path) -> tuple[int, int, list[bytes]]:
+    """Width, height, and rows of sRGB bytes of a PNG with 8-bit RGB or grey."""
+    data, at, body, head = path.read_bytes(), 8, b"", (0, 0, 0)
+    while at < len(data):
+        length, kind = struct.unpack(">I4s", data[at : at + 8])
+        chunk = data[at + 8 : at + 8 + length]
+        if kind == b"IHDR":
+            width, height, depth, color = struct.unpack(">IIBB", chunk[:10])
+            if depth != 8 or color not in (0, 2, 6):
+                sys.exit(f"{path}: {depth} bits, color type {color}: expected 8-bit grey, RGB or RGBA")
+            head = (width, height, {0: 1, 2: 3, 6: 4}[color])
+        elif kind == b"IDAT":
+            body += chunk
+        at += 12 + length
+    width, height, channels = head
+    raw, stride, rows, last = zlib.decompress(body), width * channels, [], bytes(width * channels)
+    for y in range(height):
+        kind, line = raw[y * (stride + 1)], bytearray(raw[y * (stride + 1) + 1 : (y + 1) * (stride + 1)])
+        for i in range(stride):
+            a = line[i - channels] if i >= channels else 0
+            b = last[i]
+            c = last[i - channels] if i >= channels else 0
+            if kind == 1:
+                line[i] = line[i] + a & 255
+            elif kind == 2:
+                line[i] = line[i] + b & 255
+            elif kind == 3:
+                line[i] = line[i] + (a + b) // 2 & 255
+            elif kind == 4:
+                p = a + b - c
+                distance = [(abs(p - v), k) for k, v in enumerate((a, b, c))]
+                line[i] = line[i] + (a, b, c)[min(distance)[1]] & 255
+        last = bytes(line)
+        rows.append(bytes(line[i] for x in range(width) for i in ([x] * 3 if channels == 1 else range(x * channels, x * channels + 3))))
+    return width, height, rows
+
+
+def write(path: Path, width: int, height: int, rows: list[bytes]) -> None:
+    def chunk(kind: bytes, data: bytes) -> bytes:
+        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+    body = zlib.compress(b"".join(b"\0" + row for row in rows), 9)
+    head = struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)
+    path.write_bytes(b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", head) + chunk(b"IDAT", body) + chunk(b"IEND", b""))
+
+
+def linear(byte: int) -> float:
+    v = byte / 255
+    return v / 12.92 if v <= 0.04045 else ((v + 0.055) / 1.055) ** 2.4
+
+
+def srgb(value: float) -> int:
+    v = value * 12.92 if value <= 0.0031308 else 1.055 * value ** (1 / 2.4) - 0.055
+    return max(0, min(255, round(v * 255)))
+
+
+def main() -> None:
+    skylit = sys.argv[1] if len(sys.argv) > 1 else ROOT / "target/release/skylit"
+    folder = ROOT / "docs/images"
+    folder.mkdir(exist_ok=True)
+    names = {"ao": ["--preset", "balanced"], "path": ["--integrator", "ao-sky", "--spp", "256"]}
+    for name, options in names.items():
+        subprocess.run([skylit, "render", *VIEW, *options, "-o", folder / f"{name}.png", "--quiet"], check=True, cwd=ROOT)
+    width, height, a = read(folder / "ao.png")
+    _, _, b = read(folder / "path.png")
+    table = [linear(i) for i in range(256)]
+    rows = []
+    for row_a, row_b in zip(a, b, strict=True):
+        row = bytearray()
+        for x in range(width):
+            d = table[row_a[3 * x]] - table[row_b[3 * x]]
+            weight = min(1, abs(d) / FULL)
+            full = (0.8, 0.2, 0.0) if d < 0 else (0.0, 0.25, 0.8)
+            row += bytes(srgb(1 + (v - 1) * weight) for v in full)
+        rows.append(bytes(row))
+    write(folder / "difference.png", width, height, rows)
+
+
+if __name__ == "__main__":
+    main()
