@@ -56,9 +56,9 @@ vec2 wish_of(FrameParams f, uvec2 pixel) {
 }
 
 // Rays that a pixel wants at a level.
-float wanted(FrameParams f, vec2 wish, float level) {
+float wanted(BudgetParams p, vec2 wish, float level) {
     if (!(wish.x > 0.0)) return 0.0;
-    return clamp(level * wish.x - wish.y, wish.y > 0.0 ? 0.0 : 1.0, float(f.most_rays));
+    return clamp(level * wish.x - wish.y, wish.y > 0.0 ? 0.0 : 1.0, float(p.most_rays));
 }
 
 float coarse_level(float k) {
@@ -76,28 +76,29 @@ uint crossing(BudgetSums sums, uint from, uint target, uint lane) {
     return found;
 }
 
-void add_levels(FrameParams f, BudgetSums sums, uint to, float level, uint lane) {
+void add_levels(BudgetParams p, BudgetSums sums, uint to, float level, uint lane) {
     float sum = 0.0;
-    for (uint k = 0u; k < LANES; k++) sum += wanted(f, tile[k], level);
+    for (uint k = 0u; k < LANES; k++) sum += wanted(p, tile[k], level);
     atomicAdd(sums.v[to + lane], uint(sum * SUM_UNITS + 0.5));
 }
 
 void main() {
-    FrameParams f = FrameParams(push.pass);
-    BudgetSums sums = BudgetSums(f.budget_sums);
-    uint k = gl_GlobalInvocationID.x, lane = gl_LocalInvocationID.x, stage = push.sample_index;
+    BudgetParams p = BudgetParams(push.pass);
+    FrameParams f = FrameParams(p.frame);
+    BudgetSums sums = BudgetSums(p.sums);
+    uint k = gl_GlobalInvocationID.x, lane = gl_LocalInvocationID.x, stage = p.stage;
     if (stage == STAGE_DESIRED_SAMPLES) {
-        STORE_PAIR(f.desired_samples, k, floatBitsToUint(wish_of(f, tile_pixel(f, k))));
+        STORE_PAIR(p.desired_samples, k, floatBitsToUint(wish_of(f, tile_pixel(f, k))));
         return;
     }
     if (stage == STAGE_COARSE || stage == STAGE_FINE) {
         // one of sixteen in a row, another in each frame, speaks for all
         uint place = BUDGET_SHARE * k + (hash_combine(k, f.frame) & (BUDGET_SHARE - 1u));
-        tile[lane] = place < push.count ? uintBitsToFloat(LOAD_PAIR(f.desired_samples, place)) : vec2(0.0);
+        tile[lane] = place < push.count ? uintBitsToFloat(LOAD_PAIR(p.desired_samples, place)) : vec2(0.0);
         barrier();
     }
     if (stage == STAGE_COARSE) {
-        add_levels(f, sums, SUMS_COARSE, coarse_level(float(lane)), lane);
+        add_levels(p, sums, SUMS_COARSE, coarse_level(float(lane)), lane);
         if (lane == 0u) {
             float deviations = 0.0;
             uint pixels = 0u;
@@ -115,11 +116,11 @@ void main() {
     float low = coarse > 0u ? coarse_level(float(coarse) - 1.0) : 0.0;
     float high = coarse_level(float(min(coarse, 63u)));
     if (stage == STAGE_FINE) {
-        add_levels(f, sums, SUMS_FINE, mix(low, high, float(lane + 1u) / 64.0), lane);
+        add_levels(p, sums, SUMS_FINE, mix(low, high, float(lane + 1u) / 64.0), lane);
         return;
     }
     uvec2 pixel = tile_pixel(f, k);
-    vec2 wish = uintBitsToFloat(LOAD_PAIR(f.desired_samples, k));
+    vec2 wish = uintBitsToFloat(LOAD_PAIR(p.desired_samples, k));
     uint fine = crossing(sums, SUMS_FINE, target, lane);
     float level = high;
     if (fine < 64u) {
@@ -131,7 +132,7 @@ void main() {
     float mean_deviation = float(sums.v[SUMS_DEVIATION]) / (DEVIATION_UNITS * float(max(sums.v[SUMS_PIXELS], 1u)));
     float full = f.most_samples / max(mean_deviation, 1e-3);
     if (f.rest != 0u) level = min(level, full);
-    float expected = wanted(f, wish, level);
+    float expected = wanted(p, wish, level);
     // every pixel rounds up as often as its fraction says, the times far apart
     uint phase = hash_combine(hash_combine(hash_combine(f.seed, pixel.x), pixel.y), 0x62756467u) + f.frame * 0x9e3779b9u;
     uint count = uint(expected + float(phase >> 8) * (1.0 / 16777216.0));
@@ -146,11 +147,11 @@ void main() {
     barrier();
     if (any(greaterThanEqual(pixel, f.size))) return;
     uint at = image_index(f, pixel);
-    FrameWords taken = FrameWords(f.taken);
+    FrameWords taken = FrameWords(p.taken);
     uint first = f.has_history != 0u ? taken.v[at] : 0u;
     taken.v[at] = first + count;
     float most = min(full * abs(wish.x), MAX_CAP);
-    STORE_PAIR(f.plan, at, uvec2(first << 8 | count, floatBitsToUint(most)));
-    FrameWords list = FrameWords(f.list);
+    STORE_PAIR(p.plan, at, uvec2(first << 8 | count, floatBitsToUint(most)));
+    FrameWords list = FrameWords(p.list);
     for (uint j = 0u; j < count; j++) list.v[list_begin + before + j] = at << 4 | j;
 }

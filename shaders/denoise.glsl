@@ -1,5 +1,6 @@
 // denoise: the mean of radiance over a pixel's neighbours on the same surface (common/filter.glsl), all channels with the same weights.
 #include "common/frame.glsl"
+#include "interface/passes.glsl"
 
 layout(local_size_x = LANES) in;
 
@@ -36,14 +37,14 @@ vec3 prior_variance(vec3 mean, vec3 spread, float samples) { return spread * sam
 
 float total(vec3 value) { return value.r + value.g + value.b; }
 
-void finish(FrameParams f, uint at, RadianceEstimate e, vec3 bent) {
-    QuadImage to = QuadImage(push.queued);
+void finish(FilterParams p, FrameParams f, uint at, RadianceEstimate e, vec3 bent) {
+    QuadImage to = QuadImage(p.to);
     to.v[2u * at] = floatBitsToUint(vec4(e.mean, e.samples));
     to.v[2u * at + 1u] = floatBitsToUint(vec4(e.variance, 0.0));
 }
 
-void finish_nothing(FrameParams f, uint at) { finish(f, at, RadianceEstimate(vec3(0.0), 0.0, vec3(0.0)), vec3(0.0)); }
+void finish_nothing(FilterParams p, FrameParams f, uint at) { finish(p, f, at, RadianceEstimate(vec3(0.0), 0.0, vec3(0.0)), vec3(0.0)); }
 
-RadianceEstimate guess(FrameParams f, uvec2 estimates, ivec2 pixel, RadianceEstimate own) { return own; }
+RadianceEstimate guess(FilterParams p, FrameParams f, uvec2 estimates, ivec2 pixel, RadianceEstimate own) { return own; }
 
 #include "common/filter.glsl"

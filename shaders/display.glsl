@@ -32,14 +32,14 @@ vec3 fold(vec3 v) {
 }
 
 vec3 colour(DisplayParams d, FrameParams f, uint at) {
-    if (d.shown == SHOWN_ACCESSIBILITY || d.shown == SHOWN_UNFILTERED && d.has_history == 0u) return vec3(FloatImage(f.result).v[at]);
+    if (d.shown == SHOWN_ACCESSIBILITY || d.shown == SHOWN_UNFILTERED && d.has_history == 0u) return vec3(FloatImage(d.result).v[at]);
     uvec2 guide = LOAD_PAIR(f.guide, at);
     if (!is_surface(guide)) return vec3(0.0);
     if (d.shown == SHOWN_DEPTH) return vec3(d.unit / (d.unit + uintBitsToFloat(guide.x)));
     if (d.shown == SHOWN_NORMAL) return 0.5 + 0.5 * surface_normal(f, at);
     if (d.shown == SHOWN_POSITION) return fold(surface_position(f, at) / d.unit);
-    if (d.shown == SHOWN_BENT) return 0.5 + 0.5 * load_vec3(f.bent[3], at);
-    Estimate e = unpack_estimate(LOAD_PAIR(f.history, at));
+    if (d.shown == SHOWN_BENT) return 0.5 + 0.5 * load_vec3(d.bent, at);
+    Estimate e = unpack_estimate(LOAD_PAIR(d.history, at));
     if (d.shown == SHOWN_SAMPLES) return vec3(e.samples / f.most_samples);
     return vec3(d.shown == SHOWN_VARIANCE ? e.variance / WHITE_VARIANCE : e.mean);
 }

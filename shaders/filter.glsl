@@ -1,6 +1,7 @@
 // filter: the mean of the accessibility over a pixel's neighbours on the same surface, and of bent normals with the same weights
 // (common/filter.glsl).
 #include "common/frame.glsl"
+#include "interface/passes.glsl"
 
 layout(local_size_x = LANES) in;
 
@@ -21,29 +22,29 @@ float prior_variance(float mean, float spread, float samples) { return mean * (1
 
 float total(float value) { return value; }
 
-void finish(FrameParams f, uint at, Estimate e, vec3 bent) {
+void finish(FilterParams p, FrameParams f, uint at, Estimate e, vec3 bent) {
     if (BENT_NORMALS) {
-        bool open = is_null(push.queued) && e.samples == 0.0;
-        store_vec3(f.bent[push.first >> 2], at, open ? (2.0 / 3.0) * surface_normal(f, at) : bent);
+        bool open = is_null(p.to) && e.samples == 0.0;
+        store_vec3(p.bent_to, at, open ? (2.0 / 3.0) * surface_normal(f, at) : bent);
     }
-    if (!is_null(push.queued)) {
-        STORE_PAIR(push.queued, at, pack_estimate(e));
+    if (!is_null(p.to)) {
+        STORE_PAIR(p.to, at, pack_estimate(e));
         return;
     }
     // where nobody knows: as if nothing were in the way
-    FloatImage(f.result).v[at] = e.samples > 0.0 ? e.mean : 1.0;
+    FloatImage(p.result).v[at] = e.samples > 0.0 ? e.mean : 1.0;
 }
 
-void finish_nothing(FrameParams f, uint at) {
-    if (is_null(push.queued)) FloatImage(f.result).v[at] = 0.0;
-    else STORE_PAIR(push.queued, at, uvec2(0u));
-    if (BENT_NORMALS) store_vec3(f.bent[push.first >> 2], at, vec3(0.0));
+void finish_nothing(FilterParams p, FrameParams f, uint at) {
+    if (is_null(p.to)) FloatImage(p.result).v[at] = 0.0;
+    else STORE_PAIR(p.to, at, uvec2(0u));
+    if (BENT_NORMALS) store_vec3(p.bent_to, at, vec3(0.0));
 }
 
 // By the pixels around, whatever they show: for one that is the only one of its surface, before it has had its turn. A guess, but a
 // better one than that nothing is in the way.
-Estimate guess(FrameParams f, uvec2 estimates, ivec2 pixel, Estimate own) {
-    if (!is_null(push.queued)) return own;
+Estimate guess(FilterParams p, FrameParams f, uvec2 estimates, ivec2 pixel, Estimate own) {
+    if (!is_null(p.to)) return own;
     ivec2 lower = max(pixel - 1, ivec2(0)), upper = min(pixel + 1, ivec2(f.size) - 1);
     float sum = 0.0, n = 0.0;
     for (int y = lower.y; y <= upper.y; y++) {

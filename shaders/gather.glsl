@@ -5,9 +5,10 @@
 layout(local_size_x = LANES) in;
 
 void main() {
-    FrameParams f = FrameParams(push.pass);
+    AoTraceParams p = AoTraceParams(push.pass);
+    FrameParams f = FrameParams(p.frame);
     // with a budget all of a frame at once, a place for each pixel's samples
-    bool planned = !is_null(f.plan);
+    bool planned = !is_null(p.plan);
     uint n = planned ? 1u : f.rays_per_pixel;
     uint k = gl_GlobalInvocationID.x;
     if (k >= push.count / n) return;
@@ -15,11 +16,11 @@ void main() {
     if (any(greaterThanEqual(pixel, f.size))) return;
     uint at = image_index(f, pixel), begin = k * n;
     if (planned) {
-        n = LOAD_PAIR(f.plan, at).x & 0xffu;
-        begin = at * f.most_rays;
+        n = LOAD_PAIR(p.plan, at).x & 0xffu;
+        begin = at * p.most_rays;
         if (n == 0u) return;
     } else if (!has_rays(f, pixel, at)) return;
-    Floats samples = Floats(f.samples);
+    Floats samples = Floats(p.samples);
     float sum = 0.0, squares = 0.0;
     for (uint s = 0u; s < n; s++) {
         float x = samples.v[begin + s];
@@ -28,10 +29,10 @@ void main() {
     }
     float mean = sum / float(n);
     float variance = n > 1u ? max(squares - sum * mean, 0.0) / float(n - 1u) : 0.0;
-    STORE_PAIR(f.current, at, pack_estimate(Estimate(mean, float(n), variance)));
+    STORE_PAIR(p.current, at, pack_estimate(Estimate(mean, float(n), variance)));
     if (BENT_NORMALS) {
         vec3 ng = surface_normal(f, at), bent = vec3(0.0);
-        for (uint s = 0u; s < n; s++) bent += samples.v[begin + s] * occlusion_direction(f, pixel, at, ng, s);
-        store_vec3(f.current_bent, at, bent / float(n));
+        for (uint s = 0u; s < n; s++) bent += samples.v[begin + s] * occlusion_direction(p, f, pixel, at, ng, s);
+        store_vec3(p.current_bent, at, bent / float(n));
     }
 }

@@ -6,6 +6,7 @@
 #include "common/frame.glsl"
 #include "common/sequence.glsl"
 #include "common/warp.glsl"
+#include "interface/passes.glsl"
 
 layout(local_size_x = LANES) in;
 
@@ -34,7 +35,8 @@ float to_border(FrameParams f, vec2 from, vec2 direction) {
 void main() {
     uint at = push.first + gl_GlobalInvocationID.x;
     if (gl_GlobalInvocationID.x >= push.count) return;
-    FrameParams f = FrameParams(push.pass);
+    GtaoParams g = GtaoParams(push.pass);
+    FrameParams f = FrameParams(g.frame);
     uvec2 guide = LOAD_PAIR(f.guide, at);
     if (!is_surface(guide)) return;
     bool orthographic = f.orthographic != 0u;
@@ -50,8 +52,8 @@ void main() {
     float radius = f.reach / footprint(f, f.view, orthographic, depth);
     vec2 u = sequence_2d(f.sequence, f.seed, pixel, f.frame, 0u, 1u);
     float accessibility = 0.0, open = 0.0;
-    for (uint slice = 0u; slice < f.slices; slice++) {
-        float phi = PI * (float(slice) + u.x) / float(f.slices);
+    for (uint slice = 0u; slice < g.slices; slice++) {
+        float phi = PI * (float(slice) + u.x) / float(g.slices);
         // slices are even about the view ray, which those that are even in the image are not beside its middle
         vec3 tangent = cos(phi) * right + sin(phi) * up;
         // image rows go down, the camera's y goes up
@@ -70,8 +72,8 @@ void main() {
             float horizon = low;
             // what lies beyond the border is not known: all steps are spent within
             float search = min(radius, to_border(f, centre, sgn * along));
-            for (uint k = 0u; k < f.steps; k++) {
-                float s = (float(k) + u.y) / float(f.steps);
+            for (uint k = 0u; k < g.steps; k++) {
+                float s = (float(k) + u.y) / float(g.steps);
                 vec2 q = centre + sgn * along * max(s * s * search, MIN_STEP + float(k));
                 if (any(lessThan(q, vec2(0.0))) || any(greaterThanEqual(q, vec2(f.size)))) break;
                 uvec2 tap = uvec2(q);
@@ -93,5 +95,5 @@ void main() {
     }
     // of what these slices would be without anything in them, which a few are not evenly
     accessibility = open > 0.0 ? clamp(accessibility / open, 0.0, 1.0) : 1.0;
-    STORE_PAIR(f.current, at, pack_estimate(Estimate(accessibility, 1.0, 0.0)));
+    STORE_PAIR(g.current, at, pack_estimate(Estimate(accessibility, 1.0, 0.0)));
 }

@@ -28,7 +28,7 @@ void main() {
     vec2 middle = uv * vec2(l.half_size) - 0.5;
     float occlusion = bilinear(l, middle);
     // without a filter: to see what it does
-    if (occlusion != 0.0 && push.sample_bits > 0u) {
+    if (occlusion != 0.0 && l.blurred != 0u) {
         occlusion = 0.0;
         for (int k = 0; k < 9; k++) occlusion += bilinear(l, middle + vec2(k % 3 - 1, k / 3 - 1)) / 9.0;
     }

@@ -26,5 +26,5 @@ void main() {
         float before = mix(mix(texel(l, f, base), texel(l, f, base + ivec2(1, 0)), w.x), mix(texel(l, f, base + ivec2(0, 1)), texel(l, f, base + ivec2(1, 1)), w.x), w.y);
         now = mix(before, now, 0.5);
     }
-    FloatImage(f.result).v[at] = now;
+    FloatImage(l.result).v[at] = now;
 }

@@ -7,6 +7,7 @@
 // the variance that a frame adds (a Kalman filter's process noise), and where it counts the history is also held to what this frame's
 // samples around say (Karis, "High-Quality Temporal Supersampling", 2014, with the standard error of their mean for a width).
 #include "common/frame.glsl"
+#include "interface/passes.glsl"
 
 layout(local_size_x = LANES) in;
 
@@ -17,10 +18,10 @@ const int CLAMP_RADIUS = 3;
 
 // By how much the accessibility of a point may have changed in this frame: the share of the cosine-weighted hemisphere that balls around what
 // moved cover.
-float possible_change(FrameParams f, vec3 position, vec3 normal) {
+float possible_change(TemporalParams p, FrameParams f, vec3 position, vec3 normal) {
     float change = 0.0;
-    MovedRecords moved = MovedRecords(f.moved);
-    for (uint k = 0u; k < f.moved_count; k++) {
+    MovedRecords moved = MovedRecords(p.moved);
+    for (uint k = 0u; k < p.moved_count; k++) {
         MovedRecord m = moved.v[k];
         vec3 nearest = clamp(position, m.lower, m.upper) - position;
         float gap2 = dot(nearest, nearest);
@@ -38,9 +39,9 @@ float possible_change(FrameParams f, vec3 position, vec3 normal) {
 }
 
 // Mean of this frame's samples over the pixels around that show the same surface; variance: of that mean.
-Estimate surroundings(FrameParams f, ivec2 pixel, EdgeTest edge) {
+Estimate surroundings(TemporalParams p, FrameParams f, ivec2 pixel, EdgeTest edge) {
     float sum = 0.0, squares = 0.0, n = 0.0;
-    uvec2 current = f.current, guide = f.guide;
+    uvec2 current = p.current, guide = f.guide;
     uint width = f.size.x;
     ivec2 lower = max(pixel - CLAMP_RADIUS, ivec2(0)), upper = min(pixel + CLAMP_RADIUS, ivec2(f.size) - 1);
     for (int y = lower.y; y <= upper.y; y++) {
@@ -59,7 +60,7 @@ Estimate surroundings(FrameParams f, ivec2 pixel, EdgeTest edge) {
 }
 
 // The history of a surface's point; no samples: there is none. `bent`: that of its bent normal.
-Estimate reprojected(FrameParams f, vec3 before, vec3 normal, uint id, inout vec3 bent) {
+Estimate reprojected(TemporalParams p, FrameParams f, vec3 before, vec3 normal, uint id, inout vec3 bent) {
     Estimate none = Estimate(0.0, 0.0, 0.0);
     vec3 c = affine(f.previous_world_to_camera, before);
     bool orthographic = f.previous_orthographic != 0u;
@@ -89,7 +90,7 @@ Estimate reprojected(FrameParams f, vec3 before, vec3 normal, uint id, inout vec
         mean += w * e.mean;
         samples += w * e.samples;
         variance += w * e.variance;
-        if (BENT_NORMALS) bents += w * load_vec3(f.previous_bent_history, tap);
+        if (BENT_NORMALS) bents += w * load_vec3(p.previous_bent_history, tap);
     }
     // less than a hundredth of the footprint was seen
     if (weight < 0.01) return none;
@@ -100,13 +101,14 @@ Estimate reprojected(FrameParams f, vec3 before, vec3 normal, uint id, inout vec
 void main() {
     uint at = push.first + gl_GlobalInvocationID.x;
     if (gl_GlobalInvocationID.x >= push.count) return;
-    FrameParams f = FrameParams(push.pass);
+    TemporalParams p = TemporalParams(push.pass);
+    FrameParams f = FrameParams(p.frame);
     uvec2 guide = LOAD_PAIR(f.guide, at);
     if (!is_surface(guide)) {
-        STORE_PAIR(f.history, at, uvec2(0u));
+        STORE_PAIR(p.history, at, uvec2(0u));
         return;
     }
-    Estimate now = unpack_estimate(LOAD_PAIR(f.current, at));
+    Estimate now = unpack_estimate(LOAD_PAIR(p.current, at));
     // what is not a number never enters a history
     if (!(now.mean >= 0.0 && now.mean <= 1.0)) now = Estimate(0.0, 0.0, 0.0);
     Estimate past = Estimate(0.0, 0.0, 0.0);
@@ -114,27 +116,27 @@ void main() {
     if (f.has_history != 0u) {
         if (f.still != 0u) {
             past = unpack_estimate(LOAD_PAIR(f.previous_history, at));
-            if (BENT_NORMALS) bent = load_vec3(f.previous_bent_history, at);
+            if (BENT_NORMALS) bent = load_vec3(p.previous_bent_history, at);
         } else {
             vec3 position = surface_position(f, at), normal = surface_normal(f, at);
             vec3 before = is_null(f.previous_position) ? position : load_vec3(f.previous_position, at);
-            past = reprojected(f, before, normal, guide.y >> 24, bent);
-            float change = f.moved_count > 0u && past.samples > 0.0 ? f.moved_weight * possible_change(f, position, normal) : 0.0;
+            past = reprojected(p, f, before, normal, guide.y >> 24, bent);
+            float change = p.moved_count > 0u && past.samples > 0.0 ? p.moved_weight * possible_change(p, f, position, normal) : 0.0;
             if (change > 0.0) {
                 past.samples /= 1.0 + past.samples * change * change / max(past.variance, MIN_VARIANCE);
-                if (f.clamp_width > 0.0) {
+                if (p.clamp_width > 0.0) {
                     uvec2 pixel = uvec2(at % f.size.x, at / f.size.x);
                     EdgeTest edge = edge_test(f, f.world_to_camera, f.view, f.orthographic != 0u, position, normal, vec2(pixel) + 0.5);
-                    Estimate around = surroundings(f, ivec2(pixel), edge);
+                    Estimate around = surroundings(p, f, ivec2(pixel), edge);
                     if (around.samples > 0.0) {
-                        float width = f.clamp_width * sqrt(around.variance);
+                        float width = p.clamp_width * sqrt(around.variance);
                         past.mean = clamp(past.mean, around.mean - width, around.mean + width);
                     }
                 }
             }
         }
     }
-    float most = is_null(f.plan) ? f.most_samples : uintBitsToFloat(LOAD_PAIR(f.plan, at).y);
+    float most = is_null(p.plan) ? f.most_samples : uintBitsToFloat(LOAD_PAIR(p.plan, at).y);
     past.samples = min(past.samples, max(most - now.samples, 0.0));
     float total = past.samples + now.samples;
     Estimate e = Estimate(0.0, total, 0.0);
@@ -145,8 +147,8 @@ void main() {
         // of all samples about their common mean
         e.variance = mix(past.variance, now.variance, share) + share * (1.0 - share) * difference * difference;
         // without samples there is nothing at its place
-        if (BENT_NORMALS && now.samples > 0.0) bent = mix(bent, load_vec3(f.current_bent, at), share);
+        if (BENT_NORMALS && now.samples > 0.0) bent = mix(bent, load_vec3(p.current_bent, at), share);
     }
-    STORE_PAIR(f.history, at, pack_estimate(e));
-    if (BENT_NORMALS) store_vec3(f.bent[0], at, bent);
+    STORE_PAIR(p.history, at, pack_estimate(e));
+    if (BENT_NORMALS) store_vec3(p.bent_history, at, bent);
 }

@@ -17,61 +17,59 @@
 //   VALUE prior_variance(mean, spread, samples)    what to take for the variance where samples have not told of it: by the mean of a box,
 //                                                  the variance of its pixels and the samples that a pixel has
 //   float total(value)                             a sum over channels
-//   ESTIMATE guess(f, image, pixel, own)           of a pixel without samples in its box
-//   void finish(f, at, estimate, bent)             writes the result; finish_nothing(f, at): of a pixel that is not filtered
+//   ESTIMATE guess(p, f, image, pixel, own)        of a pixel without samples in its box
+//   void finish(p, f, at, estimate, bent)          writes the result; finish_nothing(p, f, at): of a pixel that is not filtered
 //   PRIOR_SAMPLES                                  so many samples count as few
 //   LONELY                                         a pixel whose box holds fewer samples of its surface also takes those of surfaces that are
 //                                                  turned and offset a little more
 #ifndef COMMON_FILTER
 #define COMMON_FILTER
 #include "common/frame.glsl"
+#include "interface/passes.glsl"
 
 const float LONELY_COSINE = 0.5;
 const float LONELY_TOLERANCE = 2.0;
 
 // n times the variance of the mean of n samples, by that of one: 1 of random ones, and less where a sequence fills the square evenly
 // and what is sampled is smooth, as it is with a falloff (Sequence::evenness in src/sampling/sequence.rs).
-float mean_variance(FrameParams f, float n) {
-    return f.evenness > 0.0 ? pow(max(n, 1.0), -f.evenness) : 1.0;
+float mean_variance(FilterParams p, float n) {
+    return p.evenness > 0.0 ? pow(max(n, 1.0), -p.evenness) : 1.0;
 }
-
-// A step of the filter, in the push constants: estimates from `rays` to `queued`, or accessibility to the result where that is null.
-// Sides of the box on which it reaches to the radius, and the distance of its taps.
 
 // Pixels to each side.
-int box_radius(FrameParams f, float samples) {
-    float side = sqrt(f.filter_samples / max(samples, 0.25));
-    return int(clamp(ceil(0.5 * (side - 1.0)), 0.0, float(push.sample_bits)));
+int box_radius(FilterParams p, float samples) {
+    float side = sqrt(p.samples / max(samples, 0.25));
+    return int(clamp(ceil(0.5 * (side - 1.0)), 0.0, float(p.radius)));
 }
 
-// Bent normals beside them are at `bent` of the frame's parameters; from where to where is in `first`.
-vec3 load_bent(FrameParams f, uint at) {
-    return load_vec3(f.bent[push.first & 3u], at);
+vec3 load_bent(FilterParams p, uint at) {
+    return load_vec3(p.bent_from, at);
 }
 
 void main() {
     uint at = filtered_pixel();
     if (at >= push.count) return;
-    FrameParams f = FrameParams(push.pass);
+    FilterParams p = FilterParams(push.pass);
+    FrameParams f = FrameParams(p.frame);
     uvec2 own_guide = LOAD_PAIR(f.guide, at);
     if (!is_surface(own_guide)) {
-        finish_nothing(f, at);
+        finish_nothing(p, f, at);
         return;
     }
-    uvec2 guides = f.guide, estimates = push.rays;
+    uvec2 guides = f.guide, estimates = p.from;
     ESTIMATE own = load_estimate(estimates, at);
-    vec3 own_bent = BENT_NORMALS ? load_bent(f, at) : vec3(0.0);
-    int stride = int(push.sample_index >> 2);
+    vec3 own_bent = BENT_NORMALS ? load_bent(p, at) : vec3(0.0);
+    int stride = int(p.stride);
     // a step with holes is of one size; it is left out where there are samples enough
-    int radius = stride > 1 ? (own.samples < f.filter_samples ? int(push.sample_bits) : 0) : box_radius(f, own.samples);
+    int radius = stride > 1 ? (own.samples < p.samples ? int(p.radius) : 0) : box_radius(p, own.samples);
     if (radius == 0) {
-        finish(f, at, own, own_bent);
+        finish(p, f, at, own, own_bent);
         return;
     }
     uint width = f.size.x;
     ivec2 pixel = ivec2(at % width, at / width);
     EdgeTest edge = edge_test(f, f.world_to_camera, f.view, f.orthographic != 0u, surface_position(f, at), surface_normal(f, at), vec2(pixel) + 0.5);
-    ivec2 reach = radius * ivec2(push.sample_index & STEP_HORIZONTAL, (push.sample_index & STEP_VERTICAL) >> 1);
+    ivec2 reach = radius * ivec2(p.sides & STEP_HORIZONTAL, (p.sides & STEP_VERTICAL) >> 1);
     // taps within the image
     ivec2 lower = max(-reach, -(pixel / stride)), upper = min(reach, (ivec2(f.size) - 1 - pixel) / stride);
     VALUE sum, squares, variances;
@@ -90,11 +88,11 @@ void main() {
                 sum += e.mean * e.samples;
                 squares += e.mean * e.mean * e.samples;
                 variances += e.variance * e.samples;
-                if (BENT_NORMALS) bent += load_bent(f, tap) * e.samples;
+                if (BENT_NORMALS) bent += load_bent(p, tap) * e.samples;
                 n += e.samples;
                 count += e.samples > 0.0 ? 1.0 : 0.0;
                 // its samples times the variance of their mean
-                noise += e.samples > 0.0 ? mean_variance(f, e.samples) : 0.0;
+                noise += e.samples > 0.0 ? mean_variance(p, e.samples) : 0.0;
             }
         }
         if (n >= LONELY) break;
@@ -103,7 +101,7 @@ void main() {
         edge.tolerance *= LONELY_TOLERANCE;
     }
     if (n == 0.0) {
-        finish(f, at, guess(f, estimates, pixel, own), own_bent);
+        finish(p, f, at, guess(p, f, estimates, pixel, own), own_bent);
         return;
     }
     VALUE mean = sum / n;
@@ -112,7 +110,7 @@ void main() {
     VALUE variance = (variances + prior_variance(mean, spread, n / max(count, 1.0)) * PRIOR_SAMPLES) / (max(n - count, 0.0) + PRIOR_SAMPLES);
     float keep = 0.0;
     if (own.samples > 0.0) {
-        float own_noise = total(variance) * mean_variance(f, own.samples) / own.samples;
+        float own_noise = total(variance) * mean_variance(p, own.samples) / own.samples;
         // of the pixel about the box: detail, which is what noise does not explain of the spread, and its own noise
         float unlike = total(spread) * count / max(count - 1.0, 1.0) - total(variance) * noise / n + own_noise;
         // with 3 of `count` pixels taken off, the sum of squared errors of what is kept is never above that of the pixels as they are;
@@ -120,7 +118,7 @@ void main() {
         float careful = 1.0 + 2.0 * min(own.samples / f.most_samples, 1.0);
         keep = unlike > 0.0 ? clamp(1.0 - max(count - careful, 0.0) / count * own_noise / unlike, 0.0, 1.0) : 0.0;
     }
-    finish(f, at, ESTIMATE(mix(mean, own.mean, keep), mix(n, own.samples, keep), variance), mix(bent / n, own_bent, keep));
+    finish(p, f, at, ESTIMATE(mix(mean, own.mean, keep), mix(n, own.samples, keep), variance), mix(bent / n, own_bent, keep));
 }
 
 #endif

@@ -19,6 +19,7 @@ use crate::film::pace::Pace;
 use crate::gpu::{Buffer, Commands, Memory};
 use crate::interface::records::denoise::RadianceRecord;
 use crate::interface::records::frame::SurfaceRecord;
+use crate::interface::records::passes::FilterParams;
 use crate::realtime::params::FrameParams;
 use crate::realtime::settings::FilterStep;
 use crate::realtime::{DEPTH_TOLERANCE, Filter, FilterKind, inverse};
@@ -169,32 +170,30 @@ fn run(
         size,
         depth_tolerance: DEPTH_TOLERANCE,
         normal_tolerance: settings.cosine,
-        filter_samples: filter.samples,
         // every estimate is final: none gets better by itself
         most_samples: 1.0,
         surface: surface.address(),
         guide: guide.address(),
         ..Default::default()
     };
-    let params = Buffer::from_slice(device, "filter parameters", &[params])?;
+    let params = Buffer::from_slice(device, "frame parameters", &[params])?;
     let pipeline = shaders::DENOISE.pipeline(device)?;
     let (mut commands, mut pace) = (Commands::new(device)?, Pace::default());
     let mut from = &given;
     for (k, step) in steps.iter().enumerate() {
         let to = &between[k % between.len()];
+        let step = FilterParams {
+            frame: params.address(),
+            from: from.address(),
+            to: to.address(),
+            samples: filter.samples,
+            ..step.params()
+        };
+        let step = Buffer::from_slice(device, "filter parameters", &[step])?;
         let mut first = 0;
         while first < pixels {
             let n = pace.rays().min(pixels - first);
-            let push = Push {
-                pass: params.address(),
-                rays: from.address(),
-                queued: to.address(),
-                sample_index: u32::from(step.sides[0]) | u32::from(step.sides[1]) << 1 | step.stride << 2,
-                sample_bits: step.radius,
-                first,
-                count: first + n,
-                ..Default::default()
-            };
+            let push = Push { pass: step.address(), first, count: first + n, ..Default::default() };
             let start = Instant::now();
             let timings = commands.run(|r| r.timed("denoise", |r| r.dispatch(&pipeline, &push, n.div_ceil(LANES))))?;
             if n == pace.rays() {

@@ -3,6 +3,8 @@
 use crate::error::{Error, Result};
 use crate::integrators::ao::{Attenuation, Hemisphere};
 pub use crate::interface::Resolution;
+use crate::interface::records::frame::{STEP_HORIZONTAL, STEP_VERTICAL};
+use crate::interface::records::passes::FilterParams;
 use crate::raster::Primary;
 use crate::sampling::Sequence;
 use crate::settings::choices;
@@ -59,6 +61,19 @@ pub struct FilterStep {
     pub radius: u32,
     /// Pixels from tap to tap.
     pub stride: u32,
+}
+
+impl FilterStep {
+    /// What shaders are told of it, everything else 0.
+    pub fn params(&self) -> FilterParams {
+        let [along_rows, along_columns] = self.sides;
+        FilterParams {
+            sides: if along_rows { STEP_HORIZONTAL } else { 0 } | if along_columns { STEP_VERTICAL } else { 0 },
+            stride: self.stride,
+            radius: self.radius,
+            ..Default::default()
+        }
+    }
 }
 
 /// How frames are filtered.
@@ -155,6 +170,11 @@ impl Settings {
     /// Samples that a history counts at most.
     pub fn most_samples(&self) -> u32 {
         (self.history.saturating_mul(self.rays_per_pixel)).min(Self::MAX_SAMPLES).max(self.rays_per_pixel)
+    }
+
+    /// Rays of a pixel in a frame at most, where a budget distributes them; else 0.
+    pub fn most_rays(&self) -> u32 {
+        if self.budget == Budget::Variance { Self::MAX_SHARE * self.rays_per_pixel } else { 0 }
     }
 
     /// Are the numbers in their ranges?

@@ -9,8 +9,8 @@
 // stages: what streams of the pipeline tracer share, and what rasterizes.
 registry! {
     streams {
-        ACCESSIBILITY_ANY = "accessibility", any, generated;
-        ACCESSIBILITY_CLOSEST = "accessibility", closest, generated;
+        AO_TRACE_ANY = "ao_trace", any, generated;
+        AO_TRACE_CLOSEST = "ao_trace", closest, generated;
         AOV_CLOSEST = "aov", closest, camera;
         GBUFFER_CLOSEST = "gbuffer", closest, camera;
         LARSEN_LIGHT_ANY = "larsen_light", any, generated;

@@ -11,6 +11,12 @@ records! {
         thresholds: address,
         /// A `uint` a pixel.
         words: address,
+        /// A float a pixel: ambient visibility.
+        result: address,
+        /// Estimates.
+        history: address,
+        /// 3 floats a pixel: filtered bent normals, or 0.
+        bent: address,
         /// One of `SHOWN_*`.
         shown: uint,
         /// `2^exposure`.

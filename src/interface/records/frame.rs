@@ -34,7 +34,8 @@ records! {
         STEP_VERTICAL: uint = 2;
     };
 
-    /// Parameters of a frame's passes.
+    /// What all passes of a frame share: its cameras, how it is sampled, and the images that tell what pixels show. What else a pass reads and writes is in a record
+    /// of its own (src/interface/records/passes.rs).
     FrameParams: block readonly 16 {
         /// Rows, relative to the scene's origin.
         camera_to_world: vec4[3],
@@ -78,24 +79,8 @@ records! {
         still: uint,
         /// 0: the history buffers hold nothing.
         has_history: uint,
-        /// Records at `moved`.
-        moved_count: uint,
-        /// Standard errors by which a history may differ from its surroundings where things move; 0: any.
-        clamp_width: float,
-        /// How much what moves shortens histories.
-        moved_weight: float,
-        /// Samples that a filtered value should rest on.
-        filter_samples: float,
         /// 1: nothing moves, and pixels with all their samples get no more.
         rest: uint,
-        /// Of gtao.
-        slices: uint,
-        /// Of gtao, on each side of a slice.
-        steps: uint,
-        /// The variance of the mean of n samples falls as `n^-(1 + evenness)`.
-        evenness: float,
-        /// Of a pixel in a frame with a budget.
-        most_rays: uint,
         /// `SurfaceRecord`s.
         surface: address,
         /// 3 floats a pixel: the hemisphere's axis where it is not the geometric normal; or 0.
@@ -104,39 +89,10 @@ records! {
         guide: address,
         /// Of the previous frame.
         previous_guide: address,
-        /// Estimates.
-        history: address,
         /// Of the previous frame.
         previous_history: address,
-        /// This frame's samples.
-        current: address,
-        /// A float per ray of a launch, where a pixel has several.
-        samples: address,
         /// 3 floats a pixel: where its surface was in the previous frame; 0: nothing moves.
         previous_position: address,
-        /// A float a pixel: accessibility.
-        result: address,
-        /// `MovedRecord`s: what has moved since the previous frame.
-        moved: address,
-        /// A `uint`: occlusion rays of the frame.
-        ray_count: address,
-        /// 3 floats a pixel, of each bent image: of this frame's samples; 0, as the others: unused.
-        current_bent: address,
-        /// Bent normals of the previous frame's history.
-        previous_bent_history: address,
-        /// History; two between the steps of the filter; filtered.
-        bent: address[4],
-        /// 8 bytes a pixel: number of its first ray in its sequence (24 bits), rays; samples that its history counts at most; 0, as what follows: every pixel
-        /// has as many.
-        plan: address,
-        /// A `uint` a ray: pixel (28 bits), which of its rays.
-        list: address,
-        /// A `uint` a pixel: rays that it has had.
-        taken: address,
-        /// 8 bytes a pixel, in tiles: deviation of one sample, samples.
-        desired_samples: address,
-        /// Uints: `SUMS_*`.
-        budget_sums: address,
     }
 
     /// What moved, or changed its shape: box around where it was and where it is.

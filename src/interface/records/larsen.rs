@@ -22,8 +22,8 @@ records! {
         half_size: uvec2,
         /// World units that one of its own is.
         unit: float,
-        /// To a multiple of 8 bytes.
-        reserved: float,
+        /// 0: without the blur.
+        blurred: uint,
         /// 2 floats each: 64 of Mitchell's best candidates.
         points: address,
         /// A float each: 64 x 64 blue noise.
@@ -38,6 +38,8 @@ records! {
         combined: address,
         /// A float a pixel: the result of the frame before.
         previous: address,
+        /// A float a pixel: ambient visibility.
+        result: address,
         /// A `uint`: occlusion rays traced.
         rays: address,
     }

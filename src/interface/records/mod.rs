@@ -10,6 +10,7 @@ pub mod frame;
 pub mod hierarchy;
 pub mod larsen;
 pub mod lights;
+pub mod passes;
 pub mod path;
 pub mod queue;
 pub mod raster;
@@ -22,7 +23,7 @@ pub mod shading;
 use super::layout::File;
 
 /// All files; each after those that it includes.
-pub const FILES: [&File; 18] = [
+pub const FILES: [&File; 19] = [
     &ray::FILE,
     &queue::FILE,
     &scene::FILE,
@@ -32,6 +33,7 @@ pub const FILES: [&File; 18] = [
     &path::FILE,
     &lights::FILE,
     &frame::FILE,
+    &passes::FILE,
     &larsen::FILE,
     &display::FILE,
     &denoise::FILE,

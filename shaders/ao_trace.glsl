@@ -1,39 +1,41 @@
-// accessibility: the occlusion rays of a frame (ao/sample.glsl), from the surface of each pixel that is sampled in this frame. Pixels that show nothing have none, and neither have those that know enough
+// ao_trace: the occlusion rays of a frame (ao/sample.glsl), from the surface of each pixel that is sampled in this frame. Pixels that show nothing have none, and neither have those that know enough
 // while nothing moves. Built twice: with a falloff the nearest hit counts by its distance, without one any hit will do.
 #include "ao/sample.glsl"
 #include "common/occlusion.glsl"
 
 Ray ray(uint index) {
-    FrameParams f = FrameParams(push.pass);
+    AoTraceParams p = AoTraceParams(push.pass);
+    FrameParams f = FrameParams(p.frame);
     uvec2 pixel;
     uint at, k;
-    if (is_null(f.list)) {
+    if (is_null(p.list)) {
         pixel = tile_pixel(f, index / f.rays_per_pixel);
         k = index % f.rays_per_pixel;
         if (any(greaterThanEqual(pixel, f.size))) return no_ray();
         at = image_index(f, pixel);
         if (!has_rays(f, pixel, at)) return no_ray();
     } else {
-        uint entry = Words(f.list).v[index];
+        uint entry = Words(p.list).v[index];
         at = entry >> 4;
         k = entry & 15u;
         pixel = uvec2(at % f.size.x, at / f.size.x);
     }
-    claim(f.ray_count);
+    claim(p.ray_count);
     vec3 ng = surface_normal(f, at);
-    vec3 w = occlusion_direction(f, pixel, at, ng, k);
+    vec3 w = occlusion_direction(p, f, pixel, at, ng, k);
     return occlusion_ray(surface_position(f, at), spawn_offset_at(f, at), ng, w, f.reach);
 }
 
 void add_sample(uint index, float accessibility) {
-    FrameParams f = FrameParams(push.pass);
-    if (!is_null(f.list)) {
-        uint entry = Words(f.list).v[index];
-        FloatImage(f.samples).v[(entry >> 4) * f.most_rays + (entry & 15u)] = accessibility;
+    AoTraceParams p = AoTraceParams(push.pass);
+    FrameParams f = FrameParams(p.frame);
+    if (!is_null(p.list)) {
+        uint entry = Words(p.list).v[index];
+        FloatImage(p.samples).v[(entry >> 4) * p.most_rays + (entry & 15u)] = accessibility;
         return;
     }
     if (f.rays_per_pixel > 1u) {
-        FloatImage(f.samples).v[index - push.first] = accessibility;
+        FloatImage(p.samples).v[index - push.first] = accessibility;
         return;
     }
     uvec2 pixel = tile_pixel(f, index);
@@ -41,9 +43,9 @@ void add_sample(uint index, float accessibility) {
     uint at = image_index(f, pixel);
     // what is written where nothing is, nobody reads
     if (!is_sampled(f, pixel) || is_resting(f, at)) return;
-    STORE_PAIR(f.current, at, pack_estimate(Estimate(accessibility, 1.0, 0.0)));
-    if (!is_null(f.current_bent)) {
-        store_vec3(f.current_bent, at, accessibility * occlusion_direction(f, pixel, at, surface_normal(f, at), 0u));
+    STORE_PAIR(p.current, at, pack_estimate(Estimate(accessibility, 1.0, 0.0)));
+    if (!is_null(p.current_bent)) {
+        store_vec3(p.current_bent, at, accessibility * occlusion_direction(p, f, pixel, at, surface_normal(f, at), 0u));
     }
 }
 
@@ -53,6 +55,6 @@ void any(uint index, bool occluded) {
 }
 #else
 void closest(uint index, Hit hit) {
-    add_sample(index, 1.0 - occlusion_of(FrameParams(push.pass).falloff_log2, hit));
+    add_sample(index, 1.0 - occlusion_of(FrameParams(AoTraceParams(push.pass).frame).falloff_log2, hit));
 }
 #endif

@@ -1,0 +1,76 @@
+//! `budget`: a frame's occlusion rays, distributed by what each pixel knows, in four rounds.
+
+use std::sync::Arc;
+
+use crate::error::Result;
+use crate::gpu::{ComputePipeline, Recorder};
+use crate::interface::BudgetStage;
+use crate::interface::records::frame::BUDGET_SHARE;
+use crate::interface::records::passes::BudgetParams;
+use crate::realtime::display::Display;
+use crate::realtime::graph::{Frame, Params, Pass, Range, Stage, Uses};
+use crate::realtime::resources::{Resource, Resources};
+use crate::realtime::settings::Settings;
+use crate::shaders::{self, LANES};
+use crate::tracer::Tracer;
+
+/// One round.
+struct Budget {
+    pipeline: Arc<ComputePipeline>,
+    params: Params<BudgetParams>,
+    label: &'static str,
+    stage: BudgetStage,
+    /// Pixels that one lane works for.
+    share: u32,
+}
+
+/// The rounds over so many pixels, those that fill tiles included.
+pub fn stages(tracer: &Tracer, tiled_pixels: u32, _: &Settings) -> Result<Vec<Stage>> {
+    let device = tracer.device();
+    let pipeline = Arc::new(shaders::BUDGET.pipeline(device)?);
+    let stage = |(label, stage, share)| {
+        let params = Params::new(device, "parameters of the budget")?;
+        let pass = Budget { pipeline: pipeline.clone(), params, label, stage, share };
+        Ok(Stage::new(vec![Box::new(pass)], Range::all(tiled_pixels)))
+    };
+    let rounds = [
+        ("budget desired", BudgetStage::DesiredSamples, 1),
+        ("budget sums", BudgetStage::Coarse, BUDGET_SHARE),
+        ("budget sums", BudgetStage::Fine, BUDGET_SHARE),
+        ("budget rays", BudgetStage::Rays, 1),
+    ];
+    rounds.into_iter().map(stage).collect()
+}
+
+impl Pass for Budget {
+    fn uses(&self, _: Option<&Display>) -> Uses {
+        use Resource::{DesiredSamples, FrameNumber, Guide, History, List, Plan, PreviousPosition, Sums, Surface, Taken};
+        match self.stage {
+            BudgetStage::DesiredSamples => {
+                Uses::new(&[FrameNumber, Guide, Surface, PreviousPosition], &[DesiredSamples]).previous(&[Guide, History])
+            }
+            BudgetStage::Coarse => Uses::new(&[FrameNumber, DesiredSamples], &[Sums]).clears(Sums, 0),
+            BudgetStage::Fine => Uses::new(&[FrameNumber, DesiredSamples], &[Sums]),
+            BudgetStage::Rays => Uses::new(&[FrameNumber, DesiredSamples], &[Sums, Plan, List, Taken]),
+        }
+    }
+
+    fn prepare(&mut self, frame: &Frame, resources: &Resources) -> Result<()> {
+        self.params.write(&BudgetParams {
+            frame: frame.params,
+            desired_samples: resources.address(Resource::DesiredSamples),
+            sums: resources.address(Resource::Sums),
+            plan: resources.address(Resource::Plan),
+            list: resources.address(Resource::List),
+            taken: resources.address(Resource::Taken),
+            stage: self.stage as u32,
+            most_rays: frame.settings.most_rays(),
+        })
+    }
+
+    fn record(&self, r: &mut Recorder, frame: &Frame, _: &Resources, range: Range) -> Result<()> {
+        let push = self.params.push(frame, range);
+        r.timed(self.label, |r| r.dispatch(&self.pipeline, &push, range.count.div_ceil(LANES * self.share)));
+        Ok(())
+    }
+}

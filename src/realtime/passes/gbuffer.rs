@@ -1,0 +1,61 @@
+//! `gbuffer`: what each pixel's centre shows, by camera rays that are traced or rasterized. Where neither the camera nor the scene has
+//! changed it is left out.
+
+use crate::error::Result;
+use crate::film::block::{Block, BlockParams};
+use crate::gpu::Recorder;
+use crate::integrators::ao::Hemisphere;
+use crate::raster::{CameraRays, Primary, View};
+use crate::realtime::display::Display;
+use crate::realtime::graph::{Frame, Params, Pass, Range, Stage, Uses};
+use crate::realtime::resources::{Resource, Resources};
+use crate::realtime::settings::Settings;
+use crate::shaders::{self, StreamShaders};
+use crate::tracer::Tracer;
+
+/// What it traces.
+pub const STREAM: &StreamShaders = &shaders::GBUFFER_CLOSEST;
+
+struct Gbuffer {
+    rays: CameraRays,
+    params: Params<BlockParams>,
+    has_axes: bool,
+    is_dynamic: bool,
+}
+
+/// The pass over all pixels of an image.
+pub fn stage(tracer: &Tracer, block: Block, settings: &Settings, primary: Primary) -> Result<Stage> {
+    let pass = Gbuffer {
+        rays: CameraRays::new(tracer, STREAM, primary, block.size)?,
+        params: Params::new(tracer.device(), "G-buffer parameters")?,
+        has_axes: settings.hemisphere == Hemisphere::Shading,
+        is_dynamic: tracer.is_dynamic(),
+    };
+    Ok(Stage::new(vec![Box::new(pass)], Range::launches(block.rays(), 1)))
+}
+
+impl Pass for Gbuffer {
+    fn uses(&self, _: Option<&Display>) -> Uses {
+        Uses::new(&[Resource::Camera, Resource::Scene], &[Resource::Guide, Resource::Surface])
+            .and_writes(self.has_axes, &[Resource::Axes])
+            .and_writes(self.is_dynamic, &[Resource::PreviousPosition])
+            .clears(Resource::Guide, f32::INFINITY.to_bits())
+    }
+
+    fn prepare(&mut self, frame: &Frame, _: &Resources) -> Result<()> {
+        self.params.write(&BlockParams {
+            hemisphere: self.has_axes.into(),
+            frame: frame.params,
+            ..frame.block.params(frame.block.size, &frame.camera, frame.settings.seed)
+        })
+    }
+
+    fn record(&self, r: &mut Recorder, frame: &Frame, _: &Resources, range: Range) -> Result<()> {
+        if range.first == 0 {
+            let view = View { camera: frame.camera, image_size: frame.block.size, block: frame.block, at: [0.5; 2] };
+            self.rays.draw(r, frame.tracer, &view)?;
+        }
+        self.rays.record(r, &self.params.push(frame, range));
+        Ok(())
+    }
+}

@@ -1,0 +1,135 @@
+//! The pipeline that the paper by Larsen (2019) measured, exactly as it was: half resolution per axis, 64 nearest-hit rays from
+//! one turned table of points, occlusion only where no point light is visible, a box of 3x3 that knows no edges, half of the frame
+//! before. What its text leaves open is taken as favourable to it: the geometric normal, a bias and a reach that fit the scene's scale
+//! ([`Settings::unit`]), white surfaces.
+
+use std::sync::Arc;
+
+use crate::error::Result;
+use crate::film::block::Block;
+use crate::gpu::{Buffer, ComputePipeline, Recorder};
+use crate::interface::records::larsen::{LARSEN_NOISE, LARSEN_RAYS, LarsenParams};
+use crate::realtime::display::Display;
+use crate::realtime::graph::{Frame, Params, Pass, Range, Stage, Uses};
+use crate::realtime::resources::{Resource, Resources};
+use crate::realtime::settings::{FilterKind, Settings};
+use crate::sampling::{best_candidates, blue_noise};
+use crate::shaders::{self, LANES};
+use crate::tracer::{Stream, Tracer};
+
+/// What its passes share: one record of parameters, each with its own copy.
+struct Shared {
+    params: LarsenParams,
+    // reached by address
+    _tables: [Buffer; 3],
+}
+
+/// What one of its passes runs.
+enum Work {
+    /// The result of the frame before is kept.
+    Keep,
+    Light(Stream),
+    Occlusion(Stream),
+    Sum(ComputePipeline),
+    Blur(ComputePipeline),
+    Temporal(ComputePipeline),
+}
+
+struct Larsen {
+    work: Work,
+    shared: Arc<Shared>,
+    params: Params<LarsenParams>,
+}
+
+/// Its passes after the G-buffer, over an image of `size` pixels. `lights`: positions of point lights relative to the scene's origin.
+pub fn stages(tracer: &Tracer, size: [u32; 2], settings: &Settings, lights: &[[f32; 3]]) -> Result<Vec<Stage>> {
+    let device = tracer.device();
+    let half = size.map(|n| n.div_ceil(2));
+    let light_records: Vec<[f32; 4]> = lights.iter().map(|p| [p[0], p[1], p[2], 0.0]).collect();
+    let tables = [
+        Buffer::from_slice(device, "lights", &light_records)?,
+        Buffer::from_slice(device, "points", &best_candidates(LARSEN_RAYS as usize, 1))?,
+        Buffer::from_slice(device, "noise", &blue_noise(LARSEN_NOISE as usize, 1))?,
+    ];
+    let params = LarsenParams {
+        lights: tables[0].address(),
+        light_count: lights.len() as u32,
+        half_size: half,
+        unit: settings.unit as f32,
+        blurred: (settings.filter.kind != FilterKind::None).into(),
+        points: tables[1].address(),
+        noise: tables[2].address(),
+        ..Default::default()
+    };
+    let shared = Arc::new(Shared { params, _tables: tables });
+    let pass = |work| -> Result<Box<dyn Pass>> {
+        Ok(Box::new(Larsen { work, shared: shared.clone(), params: Params::new(device, "parameters of Larsen's pipeline")? }))
+    };
+    let tiles = |size: [u32; 2]| Block { origin: [0, 0], size }.rays();
+    let light_rays = tiles(size) * lights.len() as u32;
+    let pixels = Range::all(size[0] * size[1]);
+    let mut stages = vec![Stage::new(vec![pass(Work::Keep)?], pixels.clone())];
+    // without rays it still says that no light is visible
+    let light_ranges = if light_rays > 0 { Range::launches(light_rays, 1) } else { Range::all(0) };
+    stages.push(Stage::new(vec![pass(Work::Light(tracer.stream(&shaders::LARSEN_LIGHT_ANY)?))?], light_ranges));
+    stages.push(Stage::new(
+        vec![
+            pass(Work::Occlusion(tracer.stream(&shaders::LARSEN_OCCLUSION_CLOSEST)?))?,
+            pass(Work::Sum(shaders::LARSEN_SUM.pipeline(device)?))?,
+        ],
+        Range::launches(tiles(half) * LARSEN_RAYS, LARSEN_RAYS),
+    ));
+    stages.push(Stage::new(vec![pass(Work::Blur(shaders::LARSEN_BLUR.pipeline(device)?))?], pixels.clone()));
+    stages.push(Stage::new(vec![pass(Work::Temporal(shaders::LARSEN_TEMPORAL.pipeline(device)?))?], pixels));
+    Ok(stages)
+}
+
+impl Pass for Larsen {
+    fn uses(&self, _: Option<&Display>) -> Uses {
+        use Resource::{Combined, FrameNumber, Guide, Lit, Occlusion, PreviousResult, RayCount, Result, Samples, Surface};
+        let surfaces = [FrameNumber, Guide, Surface];
+        match self.work {
+            Work::Keep => Uses::new(&[Result], &[PreviousResult]),
+            Work::Light(_) => Uses::new(&surfaces, &[Lit]).clears(Lit, 0),
+            Work::Occlusion(_) => Uses::new(&surfaces, &[Samples]).and_reads(&[Lit]),
+            Work::Sum(_) => Uses::new(&surfaces, &[Occlusion, RayCount]).and_reads(&[Lit, Samples]).clears(RayCount, 0),
+            Work::Blur(_) => Uses::new(&surfaces, &[Combined]).and_reads(&[Occlusion]),
+            Work::Temporal(_) => Uses::new(&surfaces, &[Result]).and_reads(&[Combined, PreviousResult]),
+        }
+    }
+
+    fn prepare(&mut self, frame: &Frame, resources: &Resources) -> Result<()> {
+        self.params.write(&LarsenParams {
+            frame: frame.params,
+            // the count that turns the table only ever alternates between two values
+            frame_parity: frame.number & 1,
+            lit: resources.address(Resource::Lit),
+            samples: resources.address(Resource::Samples),
+            occlusion: resources.address(Resource::Occlusion),
+            combined: resources.address(Resource::Combined),
+            previous: resources.address(Resource::PreviousResult),
+            result: resources.address(Resource::Result),
+            rays: resources.address(Resource::RayCount),
+            ..self.shared.params
+        })
+    }
+
+    fn record(&self, r: &mut Recorder, frame: &Frame, resources: &Resources, range: Range) -> Result<()> {
+        match &self.work {
+            Work::Keep => {
+                if let (Some(from), Some(to)) = (resources.buffer(Resource::Result), resources.buffer(Resource::PreviousResult))
+                {
+                    r.copy(from, 0, to, 0, to.size());
+                }
+            }
+            Work::Light(stream) | Work::Occlusion(stream) => stream.record(r, &self.params.push(frame, range)),
+            Work::Sum(pipeline) => {
+                let push = self.params.push(frame, range);
+                r.timed("sum", |r| r.dispatch(pipeline, &push, (range.count / LARSEN_RAYS).div_ceil(LANES)));
+            }
+            Work::Blur(pipeline) => self.params.dispatch(r, "blur", pipeline, frame, range),
+            Work::Temporal(pipeline) => self.params.dispatch(r, "temporal", pipeline, frame, range),
+        }
+        Ok(())
+    }
+}
