@@ -4,7 +4,8 @@
 #
 #   ./scripts/demo.sh [SPP]         samples per pixel, 64 unless given
 #
-# SKYLIT_PROFILE  profile to build with, release unless given
+# SKYLIT_PROFILE   profile to build with, release unless given
+# SKYLIT_FEATURES  cargo features to build with besides
 set -euo pipefail
 cd "$(dirname "$0")/.."
 spp=${1:-${SKYLIT_DEMO_SPP:-64}}
@@ -18,7 +19,7 @@ say() { printf 'demo: %s\n' "$*"; }
 ./scripts/setup.sh
 say "building"
 profile=${SKYLIT_PROFILE:-release}
-cargo build --profile "$profile" --locked
+cargo build --profile "$profile" --locked ${SKYLIT_FEATURES:+--features "$SKYLIT_FEATURES"}
 # cargo's folder of the profile dev
 skylit=${CARGO_TARGET_DIR:-target}/${profile/#dev/debug}/skylit
 mkdir -p "$out"

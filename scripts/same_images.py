@@ -6,7 +6,7 @@
     python3 scripts/same_images.py OLD NEW --list
 
 For changes that move and rename and are not to change any image. Small images of every integrator, preset, tracer and option, and of the glTF features that
-the scenes of tests/judge have; tracers that the device lacks are skipped, and said. Images of one driver and CPU can be compared: rounding differs between
+the scenes of tests/mitsuba have; tracers that the device lacks are skipped, and said. Images of one driver and CPU can be compared: rounding differs between
 drivers. A case fails where a channel is missing on one side, where any value differs, or where one of the programs ends with an error and the other does not."""
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ import tempfile
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
-JUDGE = "tests/judge/scenes"
+JUDGE = "tests/mitsuba/scenes"
 
 # (name, scene, options); a case is rendered by each tracer where it says so
 STILLS: list[tuple[str, str, str]] = [
@@ -72,7 +72,7 @@ FRAMES: list[tuple[str, str, str]] = [
 
 
 def judged() -> list[tuple[str, str, str]]:
-    """A few of the scenes that tests/judge.rs renders: a glTF feature each."""
+    """A few of the scenes that tests/mitsuba/main.rs renders: a glTF feature each."""
     names = ["emitter-alpha", "metal-ramp", "normal-map", "nested", "thin", "layers", "anisotropy", "sheen", "texture-transform", "vertex-colors", "lights-all", "light-many"]
     return [(f"gltf-{n}", f"{JUDGE}/{n}.gltf", "--integrator path --spp 4") for n in names if (ROOT / JUDGE / f"{n}.gltf").exists()]
 

@@ -4,9 +4,14 @@
 #
 #   ./scripts/test.sh [--full] [FILTER]      FILTER: only tests whose name contains it
 #
-# --full, before a release: every scene of the reference renderer (docs/mitsuba.md) on every tracer and driver, and every device test on the floor driver.
-# Without it the other tracers and the floor driver render the scenes in which they differ from the compute tracer, and the floor driver leaves out tests of
-# code that knows no driver: how paths are shaded (tests/path), and what frames show (tests/realtime, but for those that compare tracers).
+# --full, before a release: every scene of the reference renderer (docs/mitsuba.md) on every tracer and driver and with the validation layer, every device test on
+# the floor driver, and there as many rays as on the default driver.
+# Without it the other tracers and the floor driver render the scenes in which they differ from the compute tracer, without the layer (all other tests have it), and
+# the floor driver leaves out tests of code that knows no driver: how paths are shaded (tests/path), what frames show (tests/realtime, but for those
+# that compare tracers), and the program from outside (tests/cli, but for the program's own device tests).
+#
+# Tests run a process each, but for those of tracers, stills and paths: they run as threads of a process for each subject, so that they share a device and its
+# pipelines. On a CPU driver compiling pipelines is most of what they cost.
 #
 # SKYLIT_EXPECT_TRACERS  tracers that must run; a missing one fails instead of being skipped. Set here for lavapipe; set it
 #                        yourself for another device, or to nothing to skip what it lacks.
@@ -15,8 +20,10 @@ cd "$(dirname "$0")/.."
 full=
 if [ "${1:-}" = --full ]; then full=1 && shift; fi
 filter=${1:-}
-# read by tests/judge.rs
+# read by tests/mitsuba
 if [ -n "$full" ]; then export SKYLIT_FULL=1; fi
+# binaries whose tests share a device
+shared=(tracer ao path mitsuba)
 
 say() { printf 'test: %s\n' "$*"; }
 
@@ -24,16 +31,25 @@ log=$(mktemp)
 summaries=$(mktemp)
 trap 'rm -f "$log" "$summaries"' EXIT
 
-# run_tests LABEL [NAME...]: runs the tests whose names contain one of the NAMEs; all without. Keeps the summary for the end.
-run_tests() {
+# keep_summary LABEL: what the log says of a run, for the end
+keep_summary() { grep -E '^ *Summary |^test result:' "$log" | sed "s/^ */test: $1: /" >> "$summaries" || true; }
+
+# run_alone LABEL OPTION...: tests in processes of their own, those that nextest's options name
+run_alone() {
   local label=$1 status=0
   shift
-  if cargo nextest --version >/dev/null 2>&1; then
-    cargo nextest run --locked --no-tests=pass --no-fail-fast "$@" 2>&1 | tee "$log" || status=$?
-  else
-    cargo test --locked --no-fail-fast -- "$@" 2>&1 | tee "$log" || status=$?
-  fi
-  grep -E '^ *Summary |^test result:' "$log" | sed "s/^ */test: $label: /" >> "$summaries" || true
+  cargo nextest run --locked --no-tests=pass --no-fail-fast "$@" 2>&1 | tee "$log" || status=$?
+  keep_summary "$label"
+  return "$status"
+}
+
+# run_shared LABEL BINARY... -- [NAME...]: tests of these binaries whose names contain one of the NAMEs; all without
+run_shared() {
+  local label=$1 status=0 binaries=()
+  shift
+  while [ "$1" != -- ]; do binaries+=("--test=$1") && shift; done
+  cargo test --locked --no-fail-fast "${binaries[@]}" "$@" 2>&1 | tee "$log" || status=$?
+  keep_summary "$label"
   return "$status"
 }
 
@@ -55,20 +71,29 @@ fi
 say "tests on the default driver"
 export SKYLIT_EXPECT_TRACERS=${SKYLIT_EXPECT_TRACERS-pipeline,query,compute}
 status=0
-run_tests "default driver" ${filter:+"$filter"} || status=1
+if cargo nextest --version >/dev/null 2>&1; then
+  others=$(printf ' - binary(%s)' "${shared[@]}")
+  run_alone "default driver" -E "all()$others" ${filter:+"$filter"} || status=1
+  run_shared "default driver" "${shared[@]}" -- ${filter:+"$filter"} || status=1
+else
+  cargo test --locked --no-fail-fast -- ${filter:+"$filter"} 2>&1 | tee "$log" || status=1
+  keep_summary "default driver"
+fi
 
 floor=${SKYLIT_DRIVERS_DIR:-$PWD/target/drivers}/mesa-22.3.6/lvp_icd.json
 if [ -f "$floor" ]; then
   say "device tests on the floor driver, $floor"
   export VK_DRIVER_FILES=$floor VK_ICD_FILENAMES=$floor SKYLIT_EXPECT_TRACERS=compute SKYLIT_REQUIRE_DRIVER=22.3.6
   if [ -n "$filter" ]; then
-    names=("$filter")
-  elif [ -n "$full" ] || ! cargo nextest --version >/dev/null 2>&1; then
-    names=(gpu_ floor_)
+    run_shared "floor driver" "${shared[@]}" realtime raster cli -- "$filter" || status=1
+  elif [ -n "$full" ]; then
+    run_shared "floor driver" "${shared[@]}" realtime raster cli renderer -- gpu_ || status=1
   else
-    names=(-E '(test(gpu_) - binary(path) - (binary(realtime) - test(/^tracers::/))) + test(floor_)')
+    # rays of each set: rounding is the driver's, and a fifth of them shows what it does
+    export SKYLIT_PARITY_RAYS=200000
+    run_shared "floor driver" tracer ao mitsuba raster -- gpu_ || status=1
+    run_shared "floor driver" realtime cli -- tracers:: program::gpu_ || status=1
   fi
-  run_tests "floor driver" "${names[@]}" || status=1
 else
   say "no floor driver here (setup.sh unpacks it on Debian 12): its tests are left out"
 fi

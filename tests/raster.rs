@@ -1,5 +1,5 @@
 //! Drawn against traced: what a pixel's centre shows must be the same, but for edges within the fraction of a pixel that a rasteriser
-//! rounds corners to.
+//! rounds corners to. A binary of its own: Mesa draws with vectors of 256 bits at most, and a process has one width.
 
 mod common;
 
@@ -7,7 +7,6 @@ use skylit::shaders;
 use std::sync::Arc;
 
 use bytemuck::Zeroable;
-use common::{ALL, assert_validation_clean, tracer, tracers};
 use glam::{DAffine3, DMat3, DQuat, DVec3, Vec3};
 use skylit::accel::flatten::FlatScene;
 use skylit::film::NoControl;
@@ -18,9 +17,11 @@ use skylit::integrators::aov::{self, AovPixel};
 use skylit::oracle::Oracle;
 use skylit::oracle::camera::camera_ray;
 use skylit::raster::{Drawn, Primary, Raster, View};
-use skylit::scene::builtin::{by_name, shapes};
+use skylit::scene::builtin::shapes;
 use skylit::scene::{Camera, Geometry, Instance, Mesh, Motion, Projection, Scene};
 use skylit::tracer::{Changes, MeshChange, Push, Tracer, TracerKind};
+
+use common::{ALL, assert_validation_clean, scene, tracer, tracers};
 
 const NONE: u32 = u32::MAX;
 const SIZE: [u32; 2] = [320, 200];
@@ -46,10 +47,6 @@ fn device() -> Option<Arc<Device>> {
     assert!(error.to_string().contains("LP_NATIVE_VECTOR_WIDTH") && error.to_string().contains("--primary traced"), "{error}");
     assert_eq!(Primary::auto(&tracer, 1 << 20).0, Primary::Traced);
     None
-}
-
-fn scene(name: &str) -> Scene {
-    by_name(name).unwrap_or_else(|| panic!("no built-in scene {name}"))
 }
 
 /// How two images differ.

@@ -23,6 +23,8 @@ pub struct Options {
     pub validation: bool,
     /// Use 32-bit loads even where shaderInt64 is there: to test that path.
     pub no_int64: bool,
+    /// Keep every pipeline for as long as the process runs, and with it the device: for processes that render many scenes with one device.
+    pub keep_pipelines: bool,
 }
 
 /// An open device.
@@ -115,7 +117,7 @@ impl Device {
             queue: Mutex::new(queue),
             queue_family,
             pipeline_cache,
-            live: LivePipelines::default(),
+            live: LivePipelines::new(options.keep_pipelines),
             info,
             validation: instance.validation.clone(),
             raw,

@@ -130,13 +130,20 @@ impl Drop for Compiled {
 }
 
 /// The pipelines of a device that are alive.
-#[derive(Default)]
-pub(super) struct LivePipelines(Mutex<HashMap<Key, Weak<Compiled>>>);
+pub(super) struct LivePipelines {
+    all: Mutex<HashMap<Key, Weak<Compiled>>>,
+    /// [`super::Options::keep_pipelines`]: they hold their device, which is then never closed.
+    kept: Option<Mutex<Vec<Arc<Compiled>>>>,
+}
 
 impl LivePipelines {
+    pub(super) fn new(keep: bool) -> Self {
+        Self { all: Mutex::default(), kept: keep.then(Mutex::default) }
+    }
+
     /// The pipeline that was made of this, or what `make` gives.
     fn get(&self, key: Key, make: impl FnOnce() -> Result<Compiled>) -> Result<Arc<Compiled>> {
-        let all = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let all = || self.all.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(pipeline) = all().get(&key).and_then(Weak::upgrade) {
             return Ok(pipeline);
         }
@@ -145,6 +152,9 @@ impl LivePipelines {
         let mut all = all();
         all.retain(|_, pipeline| pipeline.strong_count() > 0);
         all.insert(key, Arc::downgrade(&made));
+        if let Some(kept) = &self.kept {
+            kept.lock().unwrap_or_else(PoisonError::into_inner).push(made.clone());
+        }
         Ok(made)
     }
 }
@@ -159,7 +169,7 @@ pub struct KeptPipelines {
 impl Device {
     /// All pipelines that are alive. While this is kept, who asks for one of them again gets it without compiling.
     pub fn live_pipelines(&self) -> KeptPipelines {
-        let all = self.live.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let all = self.live.all.lock().unwrap_or_else(PoisonError::into_inner);
         KeptPipelines { pipelines: all.values().filter_map(Weak::upgrade).collect() }
     }
 }

@@ -5,9 +5,13 @@ use std::path::PathBuf;
 use glam::{DMat3, Vec3};
 
 use crate::error::{Error, Result};
-use crate::scene::light_spec::{self, LightSpec};
+#[cfg(feature = "cli")]
+use crate::scene::light_spec;
+use crate::scene::light_spec::LightSpec;
 use crate::scene::{Environment, Scene, load};
-use crate::settings::parse::{parse_factor, parse_number, parse_vector};
+use crate::settings::parse::parse_vector;
+#[cfg(feature = "cli")]
+use crate::settings::parse::{parse_factor, parse_number};
 use crate::settings::{AppliesTo, settings};
 
 /// What is lit by lights.
@@ -15,7 +19,7 @@ const LIT: AppliesTo = AppliesTo::stills_of(&["path", "direct", "whitted"]);
 
 settings! {
     /// Light besides the scene's.
-    "Light (--integrator path, direct)"
+    "Light (--integrator path, direct, whitted)"
     pub struct LightingSettings {
         /// Environment light: an equirectangular map (.hdr, .exr), or a constant radiance R,G,B [default: the scene's]
         environment: Option<String>, option(value_name = "FILE|R,G,B"), applies(LIT);

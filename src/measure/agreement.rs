@@ -2,7 +2,7 @@
 //!
 //! Where the answers differ, a double-precision oracle over only those primitives that either of them names decides: the
 //! difference is a tie when rounding allows both answers ([`super::parity`]), unexplained otherwise. What both miss is not
-//! seen; `tests/parity.rs` has that. It is what fits a benchmark: scenes of 10^7 triangles, differences of a few rays.
+//! seen; `tests/tracer/parity.rs` has that. It is what fits a benchmark: scenes of 10^7 triangles, differences of a few rays.
 
 use std::collections::{HashMap, HashSet};
 

@@ -9,6 +9,7 @@ use crate::raster::Primary;
 use crate::realtime::display::Shown;
 use crate::realtime::{Budget, FilterKind, Preset, Resolution, Settings, Technique};
 use crate::sampling::Sequence;
+#[cfg(feature = "cli")]
 use crate::settings::parse::parse_rate;
 use crate::settings::{AppliesTo, choices, settings};
 

@@ -8,10 +8,12 @@ use crate::film::camera::{self, Choice};
 use crate::integrators::aov::Aov;
 use crate::integrators::lighting::LightingSettings;
 use crate::integrators::{IntegratorName, IntegratorSettings, PictureOptions};
+#[cfg(feature = "cli")]
 use crate::output::parse_size;
 use crate::output::tone_map::ToneMap;
 use crate::realtime::frame_settings::FrameSettings;
 use crate::scene::{Camera, Projection, Scene};
+#[cfg(feature = "cli")]
 use crate::settings::parse::{parse_fov, parse_number, parse_target, parse_time, parse_vector};
 use crate::settings::{self, AppliesTo, Given, settings};
 

@@ -1,10 +1,30 @@
-//! The program from outside: what it says when it fails, and whether there is a device for it.
+//! The program from outside: how it is started, what it prints, how it fails, and whether there is a device for it.
 
-use std::process::{Command, Output};
+use std::path::Path;
+use std::process::{Command, Output, Stdio};
+
+use serde_json::Value;
+
+/// The program with these arguments, ready to run.
+pub fn skylit(args: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_skylit"));
+    command.args(args).env_remove("RUST_BACKTRACE").stdin(Stdio::null());
+    command
+}
+
+pub fn run(args: &[&str]) -> Output {
+    skylit(args).output().unwrap()
+}
+
+/// The record that a run which succeeded printed.
+pub fn json(out: &Output) -> Value {
+    assert!(out.status.success(), "{}", stderr(out));
+    serde_json::from_slice(&out.stdout).unwrap()
+}
 
 /// Is there a device? There must be where tracers are expected.
 pub fn device() -> bool {
-    let there = Command::new(env!("CARGO_BIN_EXE_skylit")).arg("doctor").output().unwrap().status.success();
+    let there = run(&["doctor"]).status.success();
     assert!(there || std::env::var_os("SKYLIT_EXPECT_TRACERS").is_none(), "no usable Vulkan device");
     if !there {
         println!("skipped: no usable Vulkan device");
@@ -16,10 +36,31 @@ pub fn stderr(out: &Output) -> String {
     String::from_utf8_lossy(&out.stderr).into_owned()
 }
 
-/// It failed with this code, and its last line is an error that says all of these.
+/// It failed with this code, and its last line is its only error and says all of these.
 pub fn fails(out: &Output, code: i32, says: &[&str]) {
     let text = stderr(out);
     assert_eq!(out.status.code(), Some(code), "{text}");
-    let last = text.lines().last().unwrap();
-    assert!(last.starts_with("skylit: error: ") && says.iter().all(|s| last.contains(s)), "{text}");
+    let errors: Vec<_> = text.lines().filter(|l| l.starts_with("skylit: error: ")).collect();
+    assert!(errors.len() == 1 && text.lines().last() == errors.first().copied(), "{text}");
+    assert!(says.iter().all(|s| errors[0].contains(s)), "{text}");
+}
+
+/// A command that must fail with this code and one line that contains `says`; it prints nothing besides, but for the record of `--json`.
+pub fn refuses(args: &[&str], code: i32, says: &str) {
+    assert_refusal(&run(args), code, says, args);
+}
+
+pub fn assert_refusal(out: &Output, code: i32, says: &str, args: &[&str]) {
+    fails(out, code, &[says]);
+    assert!(out.stdout.is_empty() || args.contains(&"--json"), "{args:?}");
+}
+
+/// A file in a temporary folder.
+pub fn place(dir: &tempfile::TempDir, name: &str) -> String {
+    dir.path().join(name).to_str().unwrap().to_owned()
+}
+
+/// How many files a folder has.
+pub fn count(folder: &Path) -> usize {
+    std::fs::read_dir(folder).unwrap().count()
 }

@@ -1,17 +1,38 @@
-//! What the device tests share: one device with the validation layer, and the list of tracers to run.
-#![allow(dead_code, reason = "each test file uses its part of this module")]
+//! What the tests share: one device with the validation layer, the tracers to run, scenes and rays by name, and the program from outside.
+#![allow(dead_code, reason = "each test binary uses its part of this module")]
 
-use std::sync::Arc;
+// it runs the program
+#[cfg(feature = "cli")]
+pub mod command;
+
+use std::sync::{Arc, OnceLock};
 
 use skylit::Error;
 use skylit::accel::flatten::FlatScene;
+use skylit::film::NoControl;
+use skylit::film::camera::CameraRecord;
 use skylit::gpu::{Device, Options};
-use skylit::scene::Scene;
+use skylit::integrators::rays::{Mode, trace};
+use skylit::ray::{Hit, Ray};
+use skylit::scene::builtin::by_name;
+use skylit::scene::{Camera, Scene};
 use skylit::tracer::{Needs, Tracer, TracerKind};
 
-/// Opens the default device with the validation layer. A machine without Vulkan fails the tests: software drivers exist.
+/// The default device with the validation layer; a machine without Vulkan fails the tests: software drivers exist. All tests of a process
+/// have the same one, and compile a pipeline once between them: compiling is most of what small images cost on a CPU driver.
 pub fn device() -> Arc<Device> {
-    open(Options { validation: true, ..Default::default() })
+    static DEVICE: OnceLock<Arc<Device>> = OnceLock::new();
+    DEVICE.get_or_init(|| open(Options { keep_pipelines: true, ..validated() })).clone()
+}
+
+/// A device of one's own, for tests of what devices do.
+pub fn new_device() -> Arc<Device> {
+    open(validated())
+}
+
+/// With the validation layer; `SKYLIT_VALIDATION=off` does without where there is none, and only there should it be set.
+pub fn validated() -> Options {
+    Options { validation: std::env::var("SKYLIT_VALIDATION").as_deref() != Ok("off"), ..Options::default() }
 }
 
 pub fn open(options: Options) -> Arc<Device> {
@@ -56,6 +77,24 @@ pub const ALL: Needs = Needs {
 pub fn tracer(device: &Arc<Device>, kind: TracerKind, scene: &Scene) -> Tracer {
     let flat = FlatScene::new(scene);
     Tracer::new(device, kind, &flat, ALL).unwrap_or_else(|e| panic!("{kind}: {e}"))
+}
+
+/// A built-in scene.
+pub fn scene(name: &str) -> Scene {
+    by_name(name).unwrap_or_else(|| panic!("no built-in scene {name}"))
+}
+
+/// A camera of a scene as passes take it, for images of this size.
+pub fn record(scene: &Scene, camera: &Camera, size: [u32; 2]) -> CameraRecord {
+    CameraRecord::new(camera, scene.origin(), f64::from(size[0]) / f64::from(size[1]))
+}
+
+pub fn hits(tracer: &Tracer, rays: &[Ray], mode: Mode) -> Vec<Hit> {
+    trace(tracer, rays, mode, 1, &mut NoControl).unwrap_or_else(|e| panic!("{}: {e}", tracer.kind())).0
+}
+
+pub fn closest(tracer: &Tracer, rays: &[Ray]) -> Vec<Hit> {
+    hits(tracer, rays, Mode::Closest)
 }
 
 /// The validation layer had nothing to say.

@@ -3,6 +3,7 @@
 mod animation;
 mod brhan;
 mod build;
+mod camera_path;
 mod errors;
 mod export;
 mod fuzz;

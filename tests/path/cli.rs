@@ -1,41 +1,20 @@
 //! `skylit render` where it goes on with films, saves them on their way, and stops where they are good enough.
 
 use std::path::Path;
-use std::process::{Command, Output, Stdio};
+use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 use serde_json::Value;
 use skylit::output::{self, Samples};
 
+use crate::common::command::{json, place, refuses, run, skylit};
+
 const BASE: [&str; 8] = ["render", "builtin:cornell-box", "--integrator", "path", "--size", "40x24", "--seed", "5"];
-
-fn skylit(args: &[&str]) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_skylit"));
-    command.args(args).env_remove("RUST_BACKTRACE").stdin(Stdio::null());
-    command
-}
-
-pub fn run(args: &[&str]) -> Output {
-    skylit(args).output().unwrap()
-}
 
 /// Runs `render` of the scene that all tests share, with more options; returns its record.
 pub fn render(more: &[&str]) -> Value {
     let args = [&BASE[..], more, &["--json", "--validation"]].concat();
-    let out = run(&args);
-    assert!(out.status.success(), "{args:?}: {}", String::from_utf8_lossy(&out.stderr));
-    serde_json::from_slice(&out.stdout).unwrap()
-}
-
-/// Ends with this code, one line that contains `says`, and nothing else.
-pub fn fails(args: &[&str], code: i32, says: &str) {
-    let out = run(args);
-    let stderr = String::from_utf8_lossy(&out.stderr);
-    assert_eq!(out.status.code(), Some(code), "{args:?}: {stderr}");
-    let errors: Vec<_> = stderr.lines().filter(|l| l.starts_with("skylit: error: ")).collect();
-    assert!(errors.len() == 1 && stderr.lines().last() == errors.first().copied(), "{args:?}: {stderr}");
-    assert!(errors[0].contains(says), "{args:?}: {stderr}");
-    assert!(out.stdout.is_empty(), "{args:?}");
+    json(&run(&args))
 }
 
 pub fn names(folder: &Path) -> Vec<String> {
@@ -43,10 +22,6 @@ pub fn names(folder: &Path) -> Vec<String> {
         std::fs::read_dir(folder).unwrap().map(|f| f.unwrap().file_name().to_str().unwrap().to_owned()).collect();
     names.sort();
     names
-}
-
-pub fn place(dir: &tempfile::TempDir, name: &str) -> String {
-    dir.path().join(name).to_str().unwrap().to_owned()
 }
 
 pub fn bytes(path: &str) -> Vec<u8> {
@@ -119,7 +94,7 @@ fn gpu_a_film_goes_on_only_as_it_was_begun() {
     };
     let differs = |more: &[&'static str], says: &str| {
         let args = go_on(more);
-        fails(&args.iter().map(String::as_str).collect::<Vec<_>>(), 64, says);
+        refuses(&args.iter().map(String::as_str).collect::<Vec<_>>(), 64, says);
     };
     differs(&["--seed", "6"], "its seed is 5, this run's is 6");
     differs(&["--size", "24x40"], "its size is 40x24, this run's is 24x40");
@@ -145,7 +120,7 @@ fn gpu_a_film_goes_on_only_as_it_was_begun() {
         args.iter().map(|a| (*a).to_owned()).collect::<Vec<_>>()
     };
     let fails =
-        |args: Vec<String>, code: i32, says: &str| fails(&args.iter().map(String::as_str).collect::<Vec<_>>(), code, says);
+        |args: Vec<String>, code: i32, says: &str| refuses(&args.iter().map(String::as_str).collect::<Vec<_>>(), code, says);
     fails(with("3", "film.exr"), 64, "has 4 samples per pixel already");
     fails(with("8", "plain.exr"), 3, "plain.exr: it has no film state to resume; render it with --resumable");
     fails(with("8", "none.exr"), 3, "no such file");
@@ -279,7 +254,7 @@ fn gpu_a_run_that_is_broken_off_leaves_whole_files() {
     // a name on the way that cannot be written is known before anything is done
     let dir = tempfile::tempdir().unwrap();
     std::fs::create_dir(dir.path().join("x.0008.exr")).unwrap();
-    fails(&[&BASE[..], &["--spp", "16", "--intervals", "-o", &place(&dir, "x.exr")]].concat(), 4, "x.0008.exr");
+    refuses(&[&BASE[..], &["--spp", "16", "--intervals", "-o", &place(&dir, "x.exr")]].concat(), 4, "x.0008.exr");
     assert_eq!(names(dir.path()), ["x.0008.exr"]);
 }
 
@@ -290,14 +265,14 @@ fn options_of_frames_are_refused_by_name() {
     let image = place(&dir, "a.exr");
     for (option, value) in [("--animate", "0"), ("--fps", "25"), ("--frames", "0..2"), ("--preset", "fast"), ("--orbit", "9")] {
         let says = format!("{option} has no effect on --integrator path: leave it out, or use --integrator ao");
-        fails(&[&BASE[..], &["-o", &image, option, value]].concat(), 64, &says);
+        refuses(&[&BASE[..], &["-o", &image, option, value]].concat(), 64, &says);
     }
     for (option, value) in [("--ao-radius", "1"), ("--ao-falloff", "2"), ("--dump-rays", "x")] {
         let says = format!("{option} has no effect on --integrator path: leave it out, or use --integrator ao");
-        fails(&[&BASE[..], &["-o", &image, option, value]].concat(), 64, &says);
+        refuses(&[&BASE[..], &["-o", &image, option, value]].concat(), 64, &says);
     }
     let sky = ["render", BASE[1], "-o", &image, "--integrator", "ao-sky", "--light", "point position=0,1,0 intensity=1"];
-    fails(&sky, 64, "--light has no effect on --integrator ao-sky: leave it out, or use --integrator path or direct");
+    refuses(&sky, 64, "--light has no effect on --integrator ao-sky: leave it out, or use --integrator path or direct");
 }
 
 /// What nobody asks for is not in the shaders, and it is said.
@@ -351,10 +326,10 @@ fn gpu_texture_filters_are_told_and_kept() {
     assert_eq!(plain["texture_filter"], "bilinear");
     assert!(plain["explain"].to_string().contains("mip levels: unused"), "{plain}");
     let [on, never] = ["c.exr", "d.exr"].map(|name| place(&dir, name));
-    fails(&[&BASE[..], &["-o", &on, "--spp", "4", "--resume", &film]].concat(), 64, "texture filter");
+    refuses(&[&BASE[..], &["-o", &on, "--spp", "4", "--resume", &film]].concat(), 64, "texture filter");
     for integrator in ["ao", "depth", "ao-sky"] {
         let says = &format!("--texture-filter has no effect on --integrator {integrator}");
         let args = ["render", BASE[1], "-o", &never, "--integrator", integrator, "--texture-filter", "ray-cone"];
-        fails(&args, 64, says);
+        refuses(&args, 64, says);
     }
 }

@@ -1,7 +1,8 @@
 //! Denoised films: less error, nothing over edges, constants as they are, mirrors and glass left alone; and what the command makes of it.
 
-use super::cli::{bytes, fails, names, place, render as command, run};
+use super::cli::{bytes, names, render as command};
 use super::*;
+use crate::common::command::{place, refuses, run};
 use skylit::denoise::{Denoiser, Features, Mix, Shot};
 use skylit::output::{self, Samples};
 use skylit::scene::builtin::{by_name, shapes};
@@ -200,7 +201,7 @@ fn wrong_uses_of_denoisers_are_told() {
     let dir = tempfile::tempdir().unwrap();
     let exr = place(&dir, "x.exr");
     let with = |more: &[&str], code: i32, says: &str| {
-        fails(&[&["render", "builtin:cornell-box", "-o", &exr][..], more].concat(), code, says);
+        refuses(&[&["render", "builtin:cornell-box", "-o", &exr][..], more].concat(), code, says);
     };
     with(
         &["--denoise", "filter"],

@@ -162,10 +162,10 @@ fn gpu_films_of_many_blocks_and_few_tiles() {
     let behind = shapes::sphere(DVec3::Z * 5.0, 1.0);
     let scene = Scene { environment, ..scene_of(vec![(behind, matte(0.5))], camera) };
     let flat = FlatScene::new(&scene);
-    let tracer_of = |flat: &FlatScene| tracer(&device, TracerKind::Compute, flat);
+    let tracer = |flat: &FlatScene| tracer(&device, TracerKind::Compute, flat);
     let tall = PathOptions { size: [3, 262_200], seed: 2, max_depth: 0, ..Default::default() };
     assert_eq!(skylit::film::block::Block::cut(tall.size).len(), 2);
-    let compute = tracer_of(&flat);
+    let compute = tracer(&flat);
     let whole = render(&compute, &flat, &up_to(&tall, 3, None)).image;
     let film = FilmOptions { intervals: vec![1], ..Default::default() };
     same("two blocks", &render(&compute, &flat, &up_to(&PathOptions { film, ..tall }, 3, None)).image, &whole);
@@ -175,7 +175,7 @@ fn gpu_films_of_many_blocks_and_few_tiles() {
     let camera = Camera::look_at(DVec3::new(0.0, 0.0, 8.0), DVec3::ZERO, DVec3::Y, 0.8);
     let scene = scene_of(vec![(shapes::sphere(DVec3::new(1.0, 0.5, 0.0), 0.4), emitter(2.0))], camera);
     let flat = FlatScene::new(&scene);
-    let compute = tracer_of(&flat);
+    let compute = tracer(&flat);
     let options = PathOptions { size: [80, 60], seed: 6, ..Default::default() };
     let record = CameraRecord::new(&scene.cameras[0], flat.origin, 4.0 / 3.0);
     let cover = Cover::new(&flat, &record, options.size, 16).map(Arc::new);

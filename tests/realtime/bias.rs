@@ -8,8 +8,8 @@ use skylit::scene::Camera;
 use skylit::scene::builtin::{Placement, analytic};
 use skylit::tracer::Tracer;
 
-use crate::common::{assert_validation_clean, device, tracers};
-use crate::{NO_FILTER, SIZE, frames, mean, one_tracer, realtime, record, reference, scene, traced, tracer_of};
+use crate::common::{assert_validation_clean, device, record, scene, tracer, tracers};
+use crate::{NO_FILTER, SIZE, frames, mean, one_tracer, realtime, reference, traced};
 
 /// Mean error of images of several seeds, and its standard error. Seeds are independent of each other, whatever the sequence.
 fn error(
@@ -67,7 +67,7 @@ fn gpu_no_sequence_resolution_or_filter_is_biased_in_a_groove() {
     cases.push(Settings { rays_per_pixel: 7, ..base });
     let kinds = tracers(&device);
     for &kind in &kinds {
-        let tracer = tracer_of(&device, kind, &scene);
+        let tracer = tracer(&device, kind, &scene);
         // one tracer takes all of it, the others one case: their rays are the same
         let cases = if kind == kinds[0] { &cases[..] } else { &cases[3..4] };
         for s in cases {
@@ -86,7 +86,7 @@ fn gpu_filters_keep_the_mean_where_there_is_detail() {
     let kind = one_tracer(&device)[0];
     for (name, falloff) in [("sphere-over-plane", 1.0), ("stairs", 4.0)] {
         let scene = scene(name);
-        let tracer = tracer_of(&device, kind, &scene);
+        let tracer = tracer(&device, kind, &scene);
         let camera = record(&scene, &scene.cameras[0], SIZE);
         let base = Settings { falloff, ..traced(Preset::Balanced) };
         let want = reference(&tracer, SIZE, &base, &camera);

@@ -1,44 +1,15 @@
 //! `skylit render` where it makes frames.
 
 use std::path::Path;
-use std::process::{Command, Output, Stdio};
+use std::process::{Command, Stdio};
 
 use serde_json::Value;
 use skylit::output;
 
-fn skylit(args: &[&str]) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_skylit"));
-    command.args(args).env_remove("RUST_BACKTRACE").stdin(Stdio::null());
-    command
-}
-
-fn run(args: &[&str]) -> Output {
-    skylit(args).output().unwrap()
-}
+use crate::common::command::{self, count, place, refuses, run, skylit};
 
 fn json(args: &[&str]) -> Value {
-    let out = run(args);
-    assert!(out.status.success(), "{args:?}: {}", String::from_utf8_lossy(&out.stderr));
-    serde_json::from_slice(&out.stdout).unwrap()
-}
-
-/// Ends with 64, one line that contains `says`, and nothing else.
-fn refused(args: &[&str], says: &str) {
-    let out = run(args);
-    let stderr = String::from_utf8_lossy(&out.stderr);
-    assert_eq!(out.status.code(), Some(64), "{args:?}: {stderr}");
-    let errors: Vec<_> = stderr.lines().filter(|l| l.starts_with("skylit: error: ")).collect();
-    assert!(errors.len() == 1 && stderr.lines().last() == errors.first().copied(), "{args:?}: {stderr}");
-    assert!(errors[0].contains(says), "{args:?}: {stderr}");
-    assert!(out.stdout.is_empty(), "{args:?}");
-}
-
-fn count(folder: &Path) -> usize {
-    std::fs::read_dir(folder).unwrap().count()
-}
-
-fn place(dir: &tempfile::TempDir, name: &str) -> String {
-    dir.path().join(name).to_str().unwrap().to_owned()
+    command::json(&run(args))
 }
 
 #[test]
@@ -182,7 +153,7 @@ fn what_does_not_go_together_is_refused() {
         (&["--preset", "fast", "-o", "x.jpg"], ".exr"),
     ] {
         let args = render(extra);
-        refused(&args.iter().map(String::as_str).collect::<Vec<_>>(), says);
+        refuses(&args.iter().map(String::as_str).collect::<Vec<_>>(), 64, says);
     }
     assert_eq!(count(dir.path()), 0);
 }
@@ -198,7 +169,7 @@ fn gpu_runs_that_fail_leave_nothing() {
         (&["builtin:parade", "--camera", "nobody"], "no such camera"),
         (&["builtin:parade", "--rays-per-pixel", "4096", "--size", "4096x4096"], "2^32 rays"),
     ] {
-        refused(&[&["render"], extra, &["--preset", "fast", "--frames", "0..3", "-o", &apng]].concat(), says);
+        refuses(&[&["render"], extra, &["--preset", "fast", "--frames", "0..3", "-o", &apng]].concat(), 64, says);
     }
     assert_eq!(count(dir.path()), 0);
 }

@@ -6,8 +6,8 @@ use skylit::scene::Scene;
 use skylit::scene::builtin::{Placement, analytic};
 use skylit::tracer::TracerKind;
 
-use crate::common::{assert_validation_clean, device, tracers};
-use crate::{realtime, stepped, traced, tracer_of};
+use crate::common::{assert_validation_clean, device, tracer, tracers};
+use crate::{realtime, stepped, traced};
 
 /// All that trace, and the filters that no preset has.
 fn pipelines(falloff: f64) -> Vec<(String, Settings)> {
@@ -26,7 +26,7 @@ fn pipelines(falloff: f64) -> Vec<(String, Settings)> {
 fn check(scene: &Scene, falloff: f64, step: f64, value: f32, allowed: impl Fn(TracerKind) -> usize) {
     let device = device();
     for kind in tracers(&device) {
-        let tracer = tracer_of(&device, kind, scene);
+        let tracer = tracer(&device, kind, scene);
         // tracers differ in what they trace, not in what is done with it
         let mut all = pipelines(falloff);
         all.truncate(if kind == TracerKind::Compute { all.len() } else { 2 });
@@ -61,7 +61,7 @@ fn gpu_a_plane_is_one_in_every_frame() {
     check(&plane, 4.0, 0.05, 1.0, |_| 0);
 }
 
-/// The hardware tracers' watertightness is their driver's affair (tests/ao_closed_forms.rs): a ray of a hundred thousand may get out, and
+/// The hardware tracers' watertightness is their driver's affair (tests/ao/closed_forms.rs): a ray of a hundred thousand may get out, and
 /// then the filter shows it in up to 15 x 15 pixels of the frames that follow.
 #[test]
 fn gpu_a_closed_box_is_zero_in_every_frame() {

@@ -8,8 +8,8 @@ use skylit::scene::builtin::{Placement, analytic};
 use skylit::scene::{Camera, Geometry, Projection, Scene};
 use skylit::tracer::TracerKind;
 
-use crate::common::{assert_validation_clean, device, tracers};
-use crate::{assert_sound, frames, realtime, record, scene, traced, tracer_of};
+use crate::common::{assert_validation_clean, device, record, scene, tracer, tracers};
+use crate::{assert_sound, frames, realtime, traced};
 
 const SMALL: [u32; 2] = [32, 18];
 
@@ -27,7 +27,7 @@ fn pipelines() -> Vec<Settings> {
 fn check(what: &str, scene: &Scene, good: &CameraRecord, bad: &[CameraRecord]) {
     let device = device();
     for kind in tracers(&device) {
-        let tracer = tracer_of(&device, kind, scene);
+        let tracer = tracer(&device, kind, scene);
         // tracers differ in what they trace, not in what is done with it
         let all = pipelines();
         let count = if kind == TracerKind::Compute { all.len() } else { 1 };

@@ -12,8 +12,8 @@ use skylit::realtime::{Filter, FilterKind, Preset, Resolution, Settings};
 use skylit::scene::builtin::shapes;
 use skylit::scene::{Camera, Scene, TriangleMesh};
 
-use crate::common::{assert_validation_clean, device, tracers};
-use crate::{SIZE, bits, realtime, record, scene_of, traced, tracer_of};
+use crate::common::{assert_validation_clean, device, record, tracer, tracers};
+use crate::{SIZE, bits, realtime, scene_of, traced};
 
 const EYE: f64 = 5.0;
 
@@ -68,7 +68,7 @@ fn gpu_nothing_crosses_an_edge_in_depth() {
             let mut images = Vec::new();
             for tilted in [[false, false], [true, false], [false, true]] {
                 let scene = walls(gap, tilted);
-                let tracer = tracer_of(&device, kind, &scene);
+                let tracer = tracer(&device, kind, &scene);
                 let oracle = Oracle::new(&scene, DVec3::ZERO);
                 let mut realtime = realtime(&tracer, SIZE, &settings);
                 let mut seen = Vec::new();

@@ -10,8 +10,8 @@ use skylit::scene::builtin::{Placement, analytic};
 use skylit::scene::{Camera, Projection, Scene};
 use skylit::tracer::Tracer;
 
-use crate::common::{assert_validation_clean, device};
-use crate::{NO_FILTER, SIZE, frames, mean, one_tracer, realtime, record, reference, scene, traced, tracer_of};
+use crate::common::{assert_validation_clean, device, record, scene, tracer};
+use crate::{NO_FILTER, SIZE, frames, mean, one_tracer, realtime, reference, traced};
 
 /// With steps and slices as many; the presets have few.
 fn dense() -> Settings {
@@ -32,7 +32,7 @@ fn image(tracer: &Tracer, settings: &Settings, camera: &CameraRecord) -> (Vec<f3
 /// One tracer: none of this depends on which.
 fn with_tracer(scene: &Scene, claim: impl Fn(&Tracer)) {
     let device = device();
-    one_tracer(&device).into_iter().for_each(|kind| claim(&tracer_of(&device, kind, scene)));
+    one_tracer(&device).into_iter().for_each(|kind| claim(&tracer(&device, kind, scene)));
     assert_validation_clean(&device);
 }
 

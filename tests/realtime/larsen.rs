@@ -11,8 +11,8 @@ use skylit::scene::builtin::shapes;
 use skylit::scene::{Camera, Motion, Scene};
 use skylit::tracer::{Changes, Tracer, TracerKind};
 
-use crate::common::{ALL, assert_validation_clean, device, tracers};
-use crate::{SIZE, frames, mean, one_tracer, record, scene_of, traced, triangles};
+use crate::common::{ALL, assert_validation_clean, device, record, tracers};
+use crate::{SIZE, frames, mean, one_tracer, scene_of, traced, triangles};
 
 /// A floor that fills the view, and a hall around all of it, which may move away. No normal that is seen lies along z.
 fn hall() -> Scene {

@@ -6,8 +6,8 @@ use glam::DVec3;
 use skylit::measure::temporal::Drift;
 use skylit::realtime::Preset;
 
-use crate::common::{assert_validation_clean, device, tracers};
-use crate::{assert_sound, mean, realtime, scene, stepped, traced, tracer_of};
+use crate::common::{assert_validation_clean, device, scene, tracer, tracers};
+use crate::{assert_sound, mean, realtime, stepped, traced};
 
 const FRAMES: &str = "SKYLIT_TEST_FRAMES";
 /// Frames after which the camera is where it was.
@@ -40,7 +40,7 @@ fn gpu_ten_thousand_frames_stay_level() {
     let scene = scene("stairs");
     let size = [16, 9];
     for kind in tracers(&device) {
-        let tracer = tracer_of(&device, kind, &scene);
+        let tracer = tracer(&device, kind, &scene);
         let mut realtime = realtime(&tracer, size, &traced(Preset::Fast));
         let (mut level, mut turn, mut first) = (Vec::new(), Vec::new(), None);
         for frame in 0..count {

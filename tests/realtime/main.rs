@@ -4,12 +4,15 @@
 #[path = "../common/mod.rs"]
 mod common;
 
+mod bent;
 mod bias;
+mod budget;
 // it runs the program
 #[cfg(feature = "cli")]
 mod cli;
 mod constants;
 mod degenerate;
+mod display;
 mod edges;
 mod gtao;
 mod larsen;
@@ -20,14 +23,12 @@ mod settings;
 mod skips;
 mod tracers;
 
-use std::sync::Arc;
-
+use common::record;
 use glam::{DAffine3, DVec3};
 use skylit::film::camera::CameraRecord;
 use skylit::gpu::Device;
 use skylit::raster::Primary;
 use skylit::realtime::{Filter, FilterKind, FrameStats, Preset, Realtime, Settings};
-use skylit::scene::builtin::by_name;
 use skylit::scene::{Camera, Geometry, Instance, Material, Mesh, Scene, TriangleMesh};
 use skylit::tracer::{Tracer, TracerKind};
 
@@ -39,14 +40,6 @@ fn one_tracer(device: &Device) -> Vec<TracerKind> {
 
 /// Of most images here.
 const SIZE: [u32; 2] = [96, 54];
-
-fn scene(name: &str) -> Scene {
-    by_name(name).unwrap_or_else(|| panic!("no built-in scene {name}"))
-}
-
-fn record(scene: &Scene, camera: &Camera, size: [u32; 2]) -> CameraRecord {
-    CameraRecord::new(camera, scene.origin(), f64::from(size[0]) / f64::from(size[1]))
-}
 
 /// The scene's own camera, moved along its own axes.
 fn stepped(scene: &Scene, size: [u32; 2], step: DVec3) -> CameraRecord {
@@ -128,8 +121,4 @@ fn triangles(geometry: Geometry) -> TriangleMesh {
 
 fn bits(values: &[f32]) -> Vec<u32> {
     values.iter().map(|v| v.to_bits()).collect()
-}
-
-fn tracer_of(device: &Arc<Device>, kind: TracerKind, scene: &Scene) -> Tracer {
-    common::tracer(device, kind, scene)
 }

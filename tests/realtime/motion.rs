@@ -17,11 +17,8 @@ use skylit::scene::builtin::shapes;
 use skylit::scene::{Camera, Motion, Scene};
 use skylit::tracer::{Changes, Tracer, TracerKind};
 
-use crate::common::{ALL, assert_validation_clean, device, tracers};
-use crate::{
-    NO_FILTER, SIZE, frames, mean, one_tracer, realtime, record, reference, rmse, scene, scene_of, stepped, traced, tracer_of,
-    triangles,
-};
+use crate::common::{ALL, assert_validation_clean, device, record, scene, tracer, tracers};
+use crate::{NO_FILTER, SIZE, frames, mean, one_tracer, realtime, reference, rmse, scene_of, stepped, traced, triangles};
 
 #[test]
 fn gpu_a_moving_camera_is_hardly_worse_than_a_still_one() {
@@ -29,7 +26,7 @@ fn gpu_a_moving_camera_is_hardly_worse_than_a_still_one() {
     let scene = scene("stairs");
     let end = stepped(&scene, SIZE, DVec3::ZERO);
     for kind in one_tracer(&device) {
-        let tracer = tracer_of(&device, kind, &scene);
+        let tracer = tracer(&device, kind, &scene);
         // about places, not about evenness, which a still pixel's own Sobol sequence has more of than what is interpolated from several
         let blue = Settings { sequence: Sequence::Blue, ..traced(Preset::Fast) };
         for settings in [blue, Settings { filter: NO_FILTER, ..blue }] {
@@ -96,7 +93,7 @@ fn gpu_what_comes_into_sight_recovers() {
     let [from, to] = [0.6, 0.0].map(|x| stepped(&scene, SIZE, DVec3::X * x));
     let settings = Settings { filter: NO_FILTER, ..traced(Preset::Fast) };
     for kind in one_tracer(&device) {
-        let tracer = tracer_of(&device, kind, &scene);
+        let tracer = tracer(&device, kind, &scene);
         let want = reference(&tracer, SIZE, &settings, &to);
         let mut realtime = realtime(&tracer, SIZE, &settings);
         frames(&mut realtime, &tracer, &from, 32);

@@ -8,11 +8,8 @@ use skylit::scene::builtin::{Placement, analytic};
 use skylit::scene::{Camera, Projection};
 use skylit::tracer::TracerKind;
 
-use crate::common::{assert_validation_clean, device, tracers};
-use crate::{
-    NO_FILTER, SIZE, assert_sound, frames, mean, one_tracer, realtime, record, reference, rmse, scene, stepped, traced,
-    tracer_of,
-};
+use crate::common::{assert_validation_clean, device, record, scene, tracer, tracers};
+use crate::{NO_FILTER, SIZE, assert_sound, frames, mean, one_tracer, realtime, reference, rmse, stepped, traced};
 
 #[test]
 fn settings_out_of_range_are_named() {
@@ -51,7 +48,7 @@ fn settings_out_of_range_are_named() {
 fn gpu_bad_settings_and_too_many_rays_are_refused() {
     let device = device();
     let kind = tracers(&device)[0];
-    let tracer = tracer_of(&device, kind, &scene("plane"));
+    let tracer = tracer(&device, kind, &scene("plane"));
     let refused = |size, settings: &Settings, says: &str| {
         let Err(error) = Realtime::new(&tracer, size, settings, &[]) else { panic!("{says}") };
         assert!(matches!(error, Error::Usage(_)) && error.to_string().contains(says), "{error}");
@@ -66,7 +63,7 @@ fn gpu_images_of_any_size() {
     let device = device();
     let scene = scene("cornell-box");
     for kind in tracers(&device) {
-        let tracer = tracer_of(&device, kind, &scene);
+        let tracer = tracer(&device, kind, &scene);
         for size in [[1, 1], [7, 5], [1, 17], [33, 1]] {
             let all = [
                 traced(Preset::Quality),
@@ -105,7 +102,7 @@ fn gpu_orthographic_cameras_keep_their_histories() {
     let scene = scene("stairs");
     let settings = Settings { filter: NO_FILTER, ..traced(Preset::Fast) };
     for kind in one_tracer(&device) {
-        let tracer = tracer_of(&device, kind, &scene);
+        let tracer = tracer(&device, kind, &scene);
         let mut realtime = realtime(&tracer, SIZE, &settings);
         let at = |frame: u32| {
             let mut camera = Camera { projection: Projection::Orthographic { half_height: 1.7 }, ..scene.cameras[0].clone() };
@@ -132,7 +129,7 @@ fn gpu_rays_of_one_frame_or_of_many_are_the_same_rays() {
     let device = device();
     let scene = scene("stairs");
     for kind in tracers(&device) {
-        let tracer = tracer_of(&device, kind, &scene);
+        let tracer = tracer(&device, kind, &scene);
         // any hit, and nearest hits
         let falloffs = if kind == TracerKind::Compute { &[1.0, 5.0][..] } else { &[5.0] };
         for &falloff in falloffs {
@@ -164,7 +161,7 @@ fn gpu_a_thousand_rays_a_pixel() {
     // nine launches of 2^19 rays, eight of which are one submission
     let size = [72, 64];
     for kind in one_tracer(&device) {
-        let tracer = tracer_of(&device, kind, &scene);
+        let tracer = tracer(&device, kind, &scene);
         let at = record(&scene, &camera, size);
         let run = |rays: u32, seed: u32| {
             let settings = Settings {

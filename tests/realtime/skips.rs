@@ -3,8 +3,8 @@
 use glam::DVec3;
 use skylit::realtime::{Preset, Resolution, Settings, Technique};
 
-use crate::common::{assert_validation_clean, device, tracers};
-use crate::{SIZE, bits, frames, realtime, scene, stepped, traced, tracer_of};
+use crate::common::{assert_validation_clean, device, scene, tracer, tracers};
+use crate::{SIZE, bits, frames, realtime, stepped, traced};
 
 fn covered(realtime: &skylit::realtime::Realtime) -> u64 {
     realtime.coverage().unwrap().iter().filter(|c| **c > 0.0).count() as u64
@@ -19,7 +19,7 @@ fn gpu_what_has_not_moved_is_not_traced_again() {
     let still = stepped(&scene, SIZE, DVec3::ZERO);
     let moved = stepped(&scene, SIZE, DVec3::X * 0.01);
     for kind in tracers(&device) {
-        let tracer = tracer_of(&device, kind, &scene);
+        let tracer = tracer(&device, kind, &scene);
         for (history, rays, rest) in [(8, 1, true), (3, 4, true), (4, 1, false)] {
             let settings = Settings { history, rays_per_pixel: rays, rest, ..traced(Preset::Fast) };
             let mut realtime = realtime(&tracer, SIZE, &settings);
@@ -56,7 +56,7 @@ fn gpu_parts_of_the_pixels_are_traced_in_turn() {
     // odd sides: the parts are not of one size
     let size = [61, 35];
     for kind in tracers(&device) {
-        let tracer = tracer_of(&device, kind, &scene);
+        let tracer = tracer(&device, kind, &scene);
         for resolution in Resolution::ALL {
             for rays in [1, 5] {
                 let settings = Settings { resolution, rays_per_pixel: rays, ..traced(Preset::Fast) };
@@ -104,7 +104,7 @@ fn gpu_the_screen_space_technique_traces_no_occlusion_ray() {
     let scene = scene("stairs");
     let settings = Settings { technique: Technique::Gtao, ..traced(Preset::Fast) };
     for kind in tracers(&device) {
-        let tracer = tracer_of(&device, kind, &scene);
+        let tracer = tracer(&device, kind, &scene);
         let mut realtime = realtime(&tracer, SIZE, &settings);
         let stats = frames(&mut realtime, &tracer, &stepped(&scene, SIZE, DVec3::ZERO), 3);
         assert!(stats.iter().all(|s| s.occlusion_rays == 0), "{kind}");

@@ -6,8 +6,8 @@ use skylit::realtime::{Preset, Realtime, Settings};
 use skylit::scene::Scene;
 use skylit::tracer::Tracer;
 
-use crate::common::{assert_validation_clean, device, tracers};
-use crate::{NO_FILTER, SIZE, bits, mean, realtime, scene, stepped, traced, tracer_of};
+use crate::common::{assert_validation_clean, device, scene, tracer, tracers};
+use crate::{NO_FILTER, SIZE, bits, mean, realtime, stepped, traced};
 
 /// Histories and results of two frames from one place and four from others.
 fn run(tracer: &Tracer, scene: &Scene, settings: &Settings) -> Vec<[Vec<f32>; 3]> {
@@ -41,14 +41,14 @@ fn gpu_three_tracers_one_image() {
     for (name, falloff) in [("leaf-cards", 1.0), ("cornell-spheres", 4.0), ("grid:2", 1.0), ("stairs", 4.0)] {
         let scene = scene(name);
         let settings = Settings { falloff, radius: 3.0, ..traced(Preset::Balanced) };
-        let runs: Vec<_> = kinds.iter().map(|&kind| run(&tracer_of(&device, kind, &scene), &scene, &settings)).collect();
+        let runs: Vec<_> = kinds.iter().map(|&kind| run(&tracer(&device, kind, &scene), &scene, &settings)).collect();
         for (kind, other) in kinds.iter().zip(&runs).skip(1) {
             let (shares, by) = differences(&runs[0], other);
             println!("{name}, falloff {falloff}: {} and {kind}: shares {shares:.5?}, means by {by:.1e}", kinds[0]);
             assert!(shares[0] <= 5e-4 && shares[1] <= 5e-3 && by <= 2e-5, "{name}: {} and {kind}: {shares:?} {by}", kinds[0]);
         }
         // another seed is another image, so the comparison sees something
-        let other = run(&tracer_of(&device, kinds[0], &scene), &scene, &Settings { seed: 1, ..settings });
+        let other = run(&tracer(&device, kinds[0], &scene), &scene, &Settings { seed: 1, ..settings });
         assert!(differences(&runs[0], &other).0[0] > 0.1);
     }
     assert_validation_clean(&device);
@@ -67,7 +67,7 @@ fn gpu_drawn_and_traced_are_one_image() {
     let kind = *tracers(&device).last().unwrap();
     for name in ["cornell-box", "leaf-cards", "cornell-spheres", "grid:2"] {
         let scene = scene(name);
-        let tracer = tracer_of(&device, kind, &scene);
+        let tracer = tracer(&device, kind, &scene);
         let [a, b] = [Primary::Traced, Primary::Raster]
             .map(|primary| run(&tracer, &scene, &Settings { primary: Some(primary), ..Preset::Balanced.settings() }));
         let (shares, by) = differences(&a, &b);
@@ -83,7 +83,7 @@ fn gpu_the_same_run_has_the_same_bits_and_another_seed_other_noise() {
     let scene = scene("stairs");
     let whole = |run: &[[Vec<f32>; 3]]| run.iter().flatten().map(|v| bits(v)).collect::<Vec<_>>();
     for kind in tracers(&device) {
-        let tracer = tracer_of(&device, kind, &scene);
+        let tracer = tracer(&device, kind, &scene);
         for settings in [traced(Preset::Fast), Settings { falloff: 3.0, ..traced(Preset::Quality) }] {
             let first = run(&tracer, &scene, &settings);
             assert!(whole(&first) == whole(&run(&tracer, &scene, &settings)), "{kind}: other bits");
@@ -103,7 +103,7 @@ fn gpu_after_a_reset_nothing_is_known() {
     let device = device();
     let scene = scene("stairs");
     for kind in tracers(&device) {
-        let tracer = tracer_of(&device, kind, &scene);
+        let tracer = tracer(&device, kind, &scene);
         let settings = Settings { filter: NO_FILTER, ..traced(Preset::Fast) };
         let mut realtime: Realtime = realtime(&tracer, SIZE, &settings);
         let camera = stepped(&scene, SIZE, DVec3::ZERO);

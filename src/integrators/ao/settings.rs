@@ -1,6 +1,7 @@
 //! Settings of ambient occlusion, of stills and of frames in real time.
 
 use super::Hemisphere;
+#[cfg(feature = "cli")]
 use crate::settings::parse::{parse_falloff, parse_radius};
 use crate::settings::{AppliesTo, settings};
 

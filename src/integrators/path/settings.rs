@@ -1,6 +1,7 @@
 //! Settings of path tracing, and of the integrators that are made of it.
 
 use super::{PixelFilter, Strategy, TextureFilter};
+#[cfg(feature = "cli")]
 use crate::settings::parse::{parse_albedo, parse_positive};
 use crate::settings::{AppliesTo, choices, settings};
 

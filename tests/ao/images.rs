@@ -1,0 +1,154 @@
+//! Images against the double-precision oracle's, and against each other.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use rayon::prelude::*;
+use skylit::film::block::Block;
+use skylit::gpu::Device;
+use skylit::oracle::Oracle;
+use skylit::oracle::ao as oracle_ao;
+use skylit::oracle::camera::camera_ray;
+use skylit::sampling::sobol::hash_combine;
+use skylit::sampling::{CAMERA_FILM, Sampler, to_unit};
+use skylit::scene::{Camera, Projection, Scene};
+
+use crate::common::{assert_validation_clean, device, scene, tracer, tracers};
+use crate::{AoOptions, differences, oracle_image, render, settings};
+
+/// Samples are the same points on both sides, so an image differs from the oracle's only where rounding turns a sample: a ray
+/// that passes an edge within rounding. Of a thousand pixels, at most two.
+fn compare_with_oracle(device: &Arc<Device>, what: &str, scene: &Scene, camera: &Camera, options: &AoOptions) {
+    let oracle = Oracle::new(scene, scene.origin());
+    let want = oracle_image(&oracle, camera, options);
+    let pixels = want.accessibility.len();
+    let allowed = pixels.div_ceil(500);
+    // a turned sample moves a pixel by up to 1/spp; rounding alone by far less
+    let threshold = 1e-4;
+    let mut images: Vec<(skylit::tracer::TracerKind, Vec<f32>)> = Vec::new();
+    for kind in tracers(device) {
+        let tracer = tracer(device, kind, scene);
+        let image = render(&tracer, scene, camera, options);
+        assert!(image.image.film.samples.iter().all(|&s| s == options.spp), "{what} {kind}: samples are missing");
+        let (count, greatest, mean) = differences(&image.image.film.mean, &want.accessibility, threshold);
+        let (covers, ..) = differences(&image.image.film.coverage, &want.coverage, 1e-6);
+        println!(
+            "{what} {kind} and the oracle: {count} of {pixels} pixels differ (at most {greatest:.1e}), {covers} in coverage; means by {mean:+.1e}"
+        );
+        assert!(count <= allowed && covers <= allowed, "{what} {kind}: {count} pixels differ, {covers} in coverage");
+        assert!(mean.abs() <= 1e-4, "{what} {kind}: means differ by {mean}");
+        for (other, pixels_of_other) in &images {
+            let (count, greatest, mean) = differences(&image.image.film.mean, pixels_of_other, threshold);
+            println!(
+                "{what} {kind} and {other}: {count} of {pixels} pixels differ (at most {greatest:.1e}); means by {mean:+.1e}"
+            );
+            assert!(
+                count <= allowed && mean.abs() <= 1e-4,
+                "{what} {kind} and {other}: {count} pixels differ, means by {mean}"
+            );
+        }
+        images.push((kind, image.image.film.mean));
+    }
+}
+
+#[test]
+fn gpu_images_equal_the_oracles() {
+    let device = device();
+    for name in ["cornell-box", "stairs", "leaf-cards", "spheres:300", "grid:4", "far-away", "cornell-spheres"] {
+        let scene = scene(name);
+        let options = AoOptions { size: [96, 72], spp: 8, seed: 3, ..Default::default() };
+        compare_with_oracle(&device, name, &scene, &scene.cameras[0], &options);
+    }
+    for (name, falloff, radius) in [("stairs", 8.0, f64::INFINITY), ("leaf-cards", 2.0, 0.6), ("spheres:300", 1.0, 0.5)] {
+        let scene = scene(name);
+        let options = AoOptions { size: [96, 72], spp: 8, seed: 4, falloff, radius, ..Default::default() };
+        let what = format!("{name}, falloff {falloff}, radius {radius}");
+        compare_with_oracle(&device, &what, &scene, &scene.cameras[0], &options);
+    }
+    assert_validation_clean(&device);
+}
+
+#[test]
+fn gpu_images_of_any_size() {
+    let device = device();
+    let scene = scene("cornell-box");
+    for size in [[1, 1], [1, 2], [7, 3], [8, 8], [9, 17], [65, 33], [1, 300], [300, 1]] {
+        for spp in [1, 3] {
+            let options = AoOptions { size, spp, ..Default::default() };
+            compare_with_oracle(&device, &format!("{size:?} at {spp}"), &scene, &scene.cameras[0], &options);
+        }
+    }
+    assert_validation_clean(&device);
+}
+
+#[test]
+fn gpu_orthographic_images() {
+    let device = device();
+    let scene = scene("stairs");
+    let mut camera = scene.cameras[0].clone();
+    camera.projection = Projection::Orthographic { half_height: 1.7 };
+    let options = AoOptions { size: [90, 60], spp: 8, ..Default::default() };
+    compare_with_oracle(&device, "stairs, orthographic", &scene, &camera, &options);
+    assert_validation_clean(&device);
+}
+
+/// An image of more than one block: blocks are numbered, sized and put together rightly. Judged on a few thousand of its
+/// pixels, those on both sides of the seam among them.
+#[test]
+fn gpu_images_of_several_blocks() {
+    let device = device();
+    let scene = scene("cornell-box");
+    let camera = &scene.cameras[0];
+    let oracle = Oracle::new(&scene, scene.origin());
+    let options = AoOptions { size: [3000, 1000], spp: 1, seed: 11, ..Default::default() };
+    let blocks = Block::cut(options.size);
+    assert!(blocks.len() > 1);
+    let seam = blocks[1].origin[1];
+    assert!(seam > 0 && blocks[1].origin[0] == 0);
+    let mut pixels: Vec<[u32; 2]> =
+        (0..4000).map(|i| [0, 1].map(|k| (to_unit(hash_combine(i, k)) * options.size[k as usize] as f32) as u32)).collect();
+    pixels.extend((0..3000).step_by(5).flat_map(|x| [[x, seam - 1], [x, seam]]));
+    let sampler = Sampler { seed: options.seed };
+    let want: Vec<f32> = pixels
+        .par_iter()
+        .map(|&pixel| {
+            let u = sampler.get_2d_unit(pixel, 0, CAMERA_FILM);
+            let ray = camera_ray(camera, oracle.origin(), options.size, [0, 1].map(|k| pixel[k] as f64 + u[k] as f64));
+            let hit = oracle.closest(ray);
+            if !hit.is_hit() {
+                return 0.0;
+            }
+            let normal = oracle.facing_normal(&ray, &hit);
+            let direction = oracle_ao::ao_direction(sampler, pixel, 0, normal);
+            1.0 - oracle_ao::ray_occlusion(&oracle, ray.at(hit.t), normal, direction, &settings(&options)) as f32
+        })
+        .collect();
+    assert!(want.iter().filter(|&&w| w == 1.0).count() > pixels.len() / 50);
+    for kind in tracers(&device) {
+        let tracer = tracer(&device, kind, &scene);
+        let image = render(&tracer, &scene, camera, &options);
+        assert!(image.image.film.samples.iter().all(|&s| s == 1), "{kind}: pixels without their sample");
+        let got: Vec<f32> = pixels.iter().map(|&[x, y]| image.image.film.mean[(y * options.size[0] + x) as usize]).collect();
+        let (count, ..) = differences(&got, &want, 1e-4);
+        println!(
+            "{kind}: {count} of {} pixels differ; {} + {} rays, {} skipped, in {:.2} s; the longest launch took {:.3} s",
+            pixels.len(),
+            image.image.primary_rays,
+            image.occlusion_rays,
+            image.skipped_rays,
+            image.image.trace_seconds,
+            image.image.longest_launch
+        );
+        assert!(count <= pixels.len() / 1000, "{kind}: {count} of {} pixels differ", pixels.len());
+        assert_eq!(image.image.primary_rays, 3_000_000);
+        assert_eq!(image.occlusion_rays + image.skipped_rays, 3_000_000);
+        // no time at all: every block still gets one sample, or there would be no image
+        let hurried = AoOptions { spp: 4, time_limit: Some(Duration::ZERO), ..options.clone() };
+        let image = render(&tracer, &scene, camera, &hurried);
+        assert!(
+            image.image.stopped_early && image.image.spp == 1 && image.image.film.samples.iter().all(|&s| s == 1),
+            "{kind}"
+        );
+    }
+    assert_validation_clean(&device);
+}

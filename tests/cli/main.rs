@@ -1,0 +1,12 @@
+//! The program from outside: what it prints, where, and how it ends.
+
+#[path = "../common/mod.rs"]
+mod common;
+
+#[cfg(unix)]
+mod bench_ao;
+#[cfg(unix)]
+mod bench_path;
+#[cfg(unix)]
+mod bench_rays;
+mod program;

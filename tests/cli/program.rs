@@ -1,0 +1,358 @@
+//! The program from outside: what it prints, where, and how it ends.
+
+use std::path::Path;
+use std::process::{Command, Stdio};
+
+use serde_json::Value;
+
+use crate::common::command::{assert_refusal, json, refuses, run, skylit};
+
+fn path(p: &Path) -> &str {
+    p.to_str().unwrap()
+}
+
+#[test]
+fn help_and_version() {
+    for args in [&["--help"][..], &["-h"], &["--version"], &["render", "--help"], &["doctor", "-h"], &["diff", "--help"]] {
+        let out = run(args);
+        assert!(out.status.success() && out.stderr.is_empty() && !out.stdout.is_empty(), "{args:?}");
+    }
+    let help = String::from_utf8(run(&["--help"]).stdout).unwrap();
+    assert!(help.contains("Exit codes") && help.contains("130"));
+}
+
+#[test]
+fn usage_errors() {
+    let out = "/nonexistent/a.exr";
+    let render = |extra: &[&'static str]| [&["render", "builtin:plane", "-o", out], extra].concat();
+    refuses(&[], 64, "no command");
+    refuses(&["fly"], 64, "fly");
+    refuses(&["render", "builtin:plane"], 64, "--output");
+    refuses(&["render", "builtin:plane", "-o", "a.jpg"], 64, ".exr or .png");
+    refuses(&["render", "builtin:plane", "-o", "a.png", "--aov", "depth"], 64, "--aov needs an .exr");
+    refuses(&render(&["--aov", "bent"]), 64, "--aov bent is of frames in real time");
+    refuses(&render(&["--preset", "fast", "--show", "normal"]), 64, "--show is of .png and .apng");
+    refuses(&["render", "builtin:plane", "-o", "a.png", "--preset", "larsen", "--show", "samples"], 64, "counts no samples");
+    refuses(&["render", "builtin:plane", "-o", "a.png", "--technique", "gtao", "--show", "bent"], 64, "technique traced");
+    refuses(&render(&["--preset", "larsen-fixed", "--budget", "variance"]), 64, "1 to 4 rays per pixel");
+    refuses(&render(&["--preset", "larsen", "--budget", "variance"]), 64, "--budget has no effect on --preset larsen");
+    refuses(&render(&["--tracer", "magic"]), 64, "pipeline, query, compute");
+    refuses(&render(&["--size", "0x5"]), 64, "at least 1");
+    refuses(&render(&["--size", "20000x20000"]), 64, "16384x16384 is the most");
+    refuses(&render(&["--size", "5"]), 64, "WIDTHxHEIGHT");
+    refuses(&render(&["--spp", "0"]), 64, "--spp");
+    refuses(&render(&["--fov-y", "nan"]), 64, "--fov-y");
+    refuses(&render(&["--ao-falloff", "0.5"]), 64, "at least 1");
+    refuses(&render(&["--ao-radius", "-1"]), 64, "above 0");
+    refuses(&render(&["--time-limit", "-3"]), 64, "above 0");
+    refuses(&render(&["--eye", "1,2,3"]), 64, "--target");
+    refuses(&render(&["--eye", "1,2", "--target", "0,0,0"]), 64, "X,Y,Z");
+    refuses(&render(&["--eye", "1,2,3", "--target", "1,2,3"]), 64, "same point");
+    refuses(&render(&["--aov", "depth,smell"]), 64, "smell");
+    refuses(&render(&["--traversal", "backwards"]), 64, "auto, wide, packet, nearest, direction, brute");
+    refuses(&render(&["--triangle-test", "none"]), 64, "watertight, moller-trumbore");
+    refuses(&render(&["--tracer", "pipeline", "--build", "best"]), 64, "--tracer compute");
+    refuses(&render(&["--traversal", "brute", "--build", "best"]), 64, "has no hierarchy");
+    refuses(&render(&["--resumable", "--preset", "fast"]), 64, "--resumable is for stills, and --preset asks for frames");
+    refuses(&render(&["--resume", "a.exr", "--dump-rays", "r"]), 64, "leave --dump-rays out");
+    refuses(&render(&["--integrator", "path", "--target-rmse", "0"]), 64, "above 0");
+    refuses(&render(&["--integrator", "path", "--resume", "a.png"]), 64, "--resume a.png: only an .exr");
+    refuses(
+        &["render", "builtin:plane", "-o", "a.png", "--integrator", "path", "--resumable"],
+        64,
+        "--resumable needs an .exr",
+    );
+    refuses(&["rays", "--mesh", "a.bin", "--rays", "r.bin", "--traversal", "nearest", "--bvh-cache", "d"], 64, "keeps none");
+    refuses(&["diff", "a.exr"], 64, "<B>");
+    refuses(&["export", "builtin:plane", "a.txt"], 64, ".bin, .glb or .gltf");
+}
+
+#[test]
+fn missing_inputs_and_bad_places() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = |name: &str| path(&dir.path().join(name)).to_owned();
+    // before any work is done, so no device is needed
+    refuses(&["render", "builtin:plane", "-o", &at("no/such/folder.exr")], 4, "folder does not exist");
+    std::fs::create_dir(dir.path().join("folder.exr")).unwrap();
+    refuses(&["render", "builtin:plane", "-o", &at("folder.exr")], 4, "is a folder");
+    refuses(&["rays", "--mesh", "builtin:plane", "--rays", &at("none.bin")], 3, "no such file");
+    std::fs::write(dir.path().join("odd.bin"), [0; 33]).unwrap();
+    refuses(&["rays", "--mesh", "builtin:plane", "--rays", &at("odd.bin")], 3, "32 bytes");
+    refuses(&["diff", &at("none.exr"), &at("none.exr")], 3, "no such file");
+    std::fs::write(dir.path().join("text.exr"), "not an image").unwrap();
+    refuses(&["diff", &at("text.exr"), &at("text.exr")], 3, "text.exr");
+    std::fs::write(dir.path().join("text.png"), "not an image").unwrap();
+    refuses(&["diff", &at("text.png"), &at("text.png")], 3, "text.png");
+    assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 4);
+}
+
+#[test]
+fn failures_as_json() {
+    let args = ["render", "builtin:plane", "-o", "a.jpg", "--json"];
+    let out = run(&args);
+    assert_refusal(&out, 64, ".exr", &args);
+    let record: Value = serde_json::from_slice(&out.stdout).unwrap();
+    assert_eq!(record["exit_code"], 64);
+    assert!(record["error"].as_str().unwrap().contains(".png"));
+}
+
+#[test]
+fn scenes_are_listed() {
+    let out = run(&["scenes"]);
+    let text = String::from_utf8(out.stdout).unwrap();
+    assert!(text.lines().any(|l| l.starts_with("builtin:cornell-box ")));
+    let list = json(&run(&["scenes", "--json"]));
+    assert_eq!(list.as_array().unwrap().len(), text.lines().count());
+}
+
+#[cfg(unix)]
+#[test]
+fn a_reader_that_goes_away_is_no_error() {
+    let mut child = skylit(&["scenes"]).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    drop(child.stdout.take());
+    let out = child.wait_with_output().unwrap();
+    assert!(out.status.success() && out.stderr.is_empty(), "{}", String::from_utf8_lossy(&out.stderr));
+    if let Ok(full) = std::fs::OpenOptions::new().write(true).open("/dev/full") {
+        let out = skylit(&["scenes"]).stdout(full).output().unwrap();
+        assert_refusal(&out, 4, "the disk is full", &["scenes"]);
+    }
+}
+
+#[test]
+fn no_driver_is_exit_code_2() {
+    let dir = tempfile::tempdir().unwrap();
+    let file = dir.path().join("a.png");
+    for args in [&["doctor"][..], &["render", "builtin:plane", "-o", path(&file)]] {
+        let out = skylit(args).env("VK_DRIVER_FILES", "/nonexistent").env("VK_ICD_FILENAMES", "/nonexistent").output().unwrap();
+        assert_refusal(&out, 2, "Vulkan", args);
+    }
+    assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 0);
+}
+
+/// A kept hierarchy gives the same image, a damaged one is mended with a warning, and a folder that cannot be is a warning.
+#[test]
+fn gpu_kept_hierarchies() {
+    let dir = tempfile::tempdir().unwrap();
+    let cache = dir.path().join("kept");
+    let render = |name: &str, cache: &Path| {
+        let image = dir.path().join(name);
+        let args = ["render", "builtin:cornell-box", "--tracer", "compute", "--size", "64x48", "--spp", "1", "--build", "best"];
+        let out = skylit(&args).args(["-o", path(&image), "--bvh-cache", path(cache)]).output().unwrap();
+        let said = String::from_utf8_lossy(&out.stderr).into_owned();
+        assert!(out.status.success(), "{said}");
+        (std::fs::read(image).unwrap(), said)
+    };
+    let files = || std::fs::read_dir(&cache).unwrap().map(|f| f.unwrap().path()).collect::<Vec<_>>();
+    let (built, _) = render("a.png", &cache);
+    let [file] = &files()[..] else { panic!("{:?}", files()) };
+    let whole = std::fs::read(file).unwrap();
+    assert_eq!(render("b.png", &cache).0, built);
+    std::fs::write(file, &whole[..whole.len() / 2]).unwrap();
+    let (mended, said) = render("c.png", &cache);
+    assert_eq!(mended, built);
+    assert!(said.contains("damaged"), "{said}");
+    assert_eq!(std::fs::read(file).unwrap(), whole);
+    let (unkept, said) = render("d.png", &file.join("below-a-file"));
+    assert_eq!(unkept, built);
+    assert!(said.contains("not kept"), "{said}");
+    let image = dir.path().join("e.png");
+    let args = ["render", "builtin:cornell-box", "--size", "64x48", "--spp", "1", "--json", "--bvh-cache"];
+    let record = json(&skylit(&args).args([path(&file.join("below-a-file")), "-o", path(&image)]).output().unwrap());
+    assert!(record["warnings"].to_string().contains("not kept"), "{record}");
+}
+
+/// A command that has a result though it fails prints one record, with both.
+#[test]
+fn one_record_for_a_check_that_fails() {
+    let dir = tempfile::tempdir().unwrap();
+    let write = |name: &str, grey: u8| {
+        let file = dir.path().join(name);
+        skylit::output::png::write_grey(&file, &[grey; 16], 4, 4).unwrap();
+        file
+    };
+    let (a, b) = (write("a.png", 10), write("b.png", 200));
+    let args = ["diff", path(&a), path(&b), "--max-rmse", "0.1", "--json"];
+    let out = run(&args);
+    assert_refusal(&out, 1, "RMSE", &args);
+    let record: Value = serde_json::from_slice(&out.stdout).unwrap();
+    assert_eq!((record["exit_code"].as_u64(), record["channels"].as_array().map(Vec::len)), (Some(1), Some(1)));
+    assert!(record["error"].as_str().unwrap().contains("RMSE"));
+    assert!(record["flip"]["mean"].as_f64().is_some_and(|v| (0.5..1.0).contains(&v)), "{record}");
+    assert!(json(&run(&["diff", path(&a), path(&a), "--max-rmse", "0.1", "--json"]))["error"].is_null());
+}
+
+/// What people are warned of is in the record for programs.
+#[test]
+fn warnings_are_in_the_record() {
+    let dir = tempfile::tempdir().unwrap();
+    for (name, format) in [("a.bin", "MESH.bin"), ("a.glb", "glTF")] {
+        let file = dir.path().join(name);
+        let args = ["export", "builtin:spheres:10", path(&file)];
+        let record = json(&run(&[&args[..], &["--json"]].concat()));
+        let warning = record["warnings"][0].as_str().unwrap();
+        assert!(
+            warning.starts_with("10 spheres become ") && warning.ends_with(&format!("{format} has no spheres")),
+            "{warning}"
+        );
+        assert!(record["triangles_written"].as_u64() > record["triangles"].as_u64(), "{record}");
+        let said = String::from_utf8(run(&args).stderr).unwrap();
+        assert_eq!(said, format!("skylit: warning: {warning}\n"));
+    }
+}
+
+/// What pictures of frames show, and what is beside it in .exr files.
+#[test]
+fn gpu_frames_as_pictures() {
+    if !run(&["doctor"]).status.success() {
+        assert!(std::env::var_os("SKYLIT_EXPECT_TRACERS").is_none(), "no usable Vulkan device");
+        println!("skipped: no usable Vulkan device");
+        return;
+    }
+    let dir = tempfile::tempdir().unwrap();
+    let at = |name: &str| path(&dir.path().join(name)).to_owned();
+    let base =
+        ["render", "builtin:stairs", "--size", "64x48", "--preset", "fast", "--frames", "2..4", "--validation", "--json"];
+    let (exr, png, apng) = (at("a.##.exr"), at("a.##.png"), at("a.apng"));
+    let record = json(&run(&[&base[..], &["--aov", "bent", "-o", &exr, "-o", &png, "-o", &apng]].concat()));
+    assert!(record["passes"]["display"].is_object() && record["mean"].as_f64().unwrap() > 0.1);
+    for frame in ["02", "03"] {
+        let numbers = skylit::output::load(at(&format!("a.{frame}.exr")).as_ref()).unwrap();
+        assert!(["Y", "A", "samples", "bent.X", "bent.Y", "bent.Z"].iter().all(|name| numbers.f32(name).is_some()));
+        assert!(numbers.f32("depth.Z").is_none());
+        // the same picture as from the numbers
+        let again = at("again.png");
+        skylit::output::save(&numbers, again.as_ref()).unwrap();
+        assert_eq!(std::fs::read(again).unwrap(), std::fs::read(at(&format!("a.{frame}.png"))).unwrap());
+    }
+    json(&run(&[&base[..], &["--show", "normal", "-o", &png, "-o", &apng]].concat()));
+    let picture = skylit::output::load(at("a.03.png").as_ref()).unwrap();
+    assert!(["R", "G", "B"].iter().all(|name| picture.f32(name).is_some()));
+    // numbers alone: nothing is shown
+    let record = json(&run(&[&base[..], &["-o", &exr]].concat()));
+    assert!(record["passes"]["display"].is_null());
+}
+
+/// From a scene to files and back to numbers, on whatever device there is.
+#[test]
+fn gpu_render_end_to_end() {
+    if !run(&["doctor"]).status.success() {
+        assert!(std::env::var_os("SKYLIT_EXPECT_TRACERS").is_none(), "no usable Vulkan device");
+        println!("skipped: no usable Vulkan device");
+        return;
+    }
+    let dir = tempfile::tempdir().unwrap();
+    let at = |name: &str| path(&dir.path().join(name)).to_owned();
+    let (exr, png, depth, rays) = (at("a.exr"), at("a.png"), at("d.png"), at("r"));
+    let base = ["render", "builtin:cornell-box", "--size", "64x48", "--spp", "4", "--validation", "-o"];
+    let extra = ["--aov", "all", "--depth-image", &depth, "--dump-rays", &rays, "--explain", "--json"];
+    let record = json(&run(&[&base[..], &[&exr], &extra].concat()));
+    assert_eq!((record["spp"].as_u64(), record["width"].as_u64()), (Some(4), Some(64)));
+    assert!(record["explain"].as_array().is_some_and(|a| !a.is_empty()));
+    let mean = record["mean"].as_f64().unwrap();
+    assert!(mean > 0.0 && mean < 1.0);
+
+    // the file says the same
+    let image = skylit::output::load(exr.as_ref()).unwrap();
+    let y = image.f32("Y").unwrap();
+    assert!((y.iter().map(|&v| f64::from(v)).sum::<f64>() / y.len() as f64 - mean).abs() < 1e-6);
+    for name in ["A", "variance", "depth.Z", "position.Y", "Ng.Z", "Ns.X", "albedo.G"] {
+        assert!(image.f32(name).is_some(), "{name}");
+    }
+    for key in ["scene", "camera", "spp", "tracer", "device", "version"] {
+        assert!(image.metadata(key).is_some(), "{key}");
+    }
+
+    // the same command gives the same bytes
+    json(&run(&[&base[..], &[&at("b.exr")], &["--aov", "all", "--json"]].concat()));
+    assert_eq!(std::fs::read(&exr).unwrap(), std::fs::read(at("b.exr")).unwrap());
+
+    // PNG, and the difference between the two is what 8 bits lose
+    let quiet = run(&[&base[..], &[&png], &["--quiet"]].concat());
+    assert!(quiet.status.success() && quiet.stdout.is_empty());
+    let difference = json(&run(&["diff", &png, &exr, "--json"]));
+    let channel = &difference["channels"][0];
+    assert!(channel["max"].as_f64().unwrap() < 0.005, "{channel}");
+    refuses(&["diff", &png, &exr, "--max-rmse", "0", "--quiet"], 1, "RMSE");
+
+    // the rays that were dumped, traced again
+    let mesh = at("mesh.bin");
+    assert!(run(&["export", "builtin:cornell-box", &mesh]).status.success());
+    let traced = json(&run(&[
+        "rays",
+        "--mesh",
+        &mesh,
+        "--rays",
+        &format!("{rays}.primary.bin"),
+        "--hits",
+        &at("h.bin"),
+        "--repeats",
+        "1",
+        "--json",
+    ]));
+    assert_eq!(traced["rays"].as_u64(), Some(64 * 48));
+    assert_eq!(std::fs::metadata(at("h.bin")).unwrap().len(), 64 * 48 * 20);
+    // each hit of a camera ray started one occlusion ray
+    let occlusion = std::fs::metadata(format!("{rays}.ao.bin")).unwrap().len() / 32;
+    assert_eq!(traced["hits"].as_u64(), Some(occlusion));
+
+    // every traversal gives the same image, and the record says which it was
+    for traversal in ["auto", "wide", "packet", "nearest", "direction", "brute"] {
+        let again = at("t.exr");
+        let record = json(&run(&[&base[..], &[&again], &["--traversal", traversal, "--explain", "--json"]].concat()));
+        assert_eq!((record["tracer"].as_str(), record["traversal"].as_str()), (Some("compute"), Some(traversal)));
+        assert_eq!(record["triangle_test"], "watertight");
+        let told = record["explain"].as_array().unwrap().iter().any(|l| l.as_str().unwrap().contains(traversal));
+        assert!(told, "{}", record["explain"]);
+        assert!((record["mean"].as_f64().unwrap() - mean).abs() < 1e-4, "{traversal}: {} is not {mean}", record["mean"]);
+    }
+    let other = ["--tracer", "pipeline", "--traversal", "nearest"];
+    refuses(&[&base[..], &[&png], &other].concat(), 64, "--tracer compute");
+    let many = ["render", "builtin:spheres:50000", "--size", "8x8", "--traversal", "brute", "-o", &png];
+    refuses(&many, 3, "use another --traversal");
+
+    let missing = ["--camera", "nobody"];
+    refuses(&[&base[..], &[&png], &missing].concat(), 64, "no such camera");
+    refuses(&[&base[..], &[&png], &["--device", "no such device"]].concat(), 2, "no such device");
+    refuses(&["render", "builtin:no-such-scene", "-o", &png], 64, "no-such-scene");
+}
+
+/// A time limit writes what there is; Ctrl-C does only when asked.
+#[cfg(unix)]
+#[test]
+fn gpu_stopping_early() {
+    if !run(&["doctor"]).status.success() {
+        println!("skipped: no usable Vulkan device");
+        return;
+    }
+    let dir = tempfile::tempdir().unwrap();
+    let out = dir.path().join("a.exr");
+    let base = ["render", "builtin:stairs", "--size", "320x200", "--spp", "100000", "-o", path(&out)];
+    let record = json(&run(&[&base[..], &["--time-limit", "0.5", "--json"]].concat()));
+    assert_eq!(record["stopped_early"], true);
+    assert!(out.exists());
+    std::fs::remove_file(&out).unwrap();
+    for keep in [false, true] {
+        let args = if keep { [&base[..], &["--keep-partial", "--json"]].concat() } else { base.to_vec() };
+        // rendering begins as soon as the hierarchy has been kept
+        let cache = tempfile::tempdir().unwrap();
+        let mut command = skylit(&args);
+        command.args(["--build", "best", "--bvh-cache", path(cache.path())]);
+        let child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+        let start = std::time::Instant::now();
+        let kept = || std::fs::read_dir(cache.path()).unwrap().any(|f| f.unwrap().path().extension().is_some());
+        while !kept() {
+            assert!(start.elapsed().as_secs() < 120, "no hierarchy was kept");
+            std::thread::sleep(std::time::Duration::from_millis(20));
+        }
+        assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
+        let done = child.wait_with_output().unwrap();
+        assert_eq!(done.status.code(), Some(130), "{}", String::from_utf8_lossy(&done.stderr));
+        assert!(String::from_utf8_lossy(&done.stderr).contains("skylit: error: interrupted"));
+        assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), usize::from(keep));
+        if keep {
+            let record: Value = serde_json::from_slice(&done.stdout).unwrap();
+            assert_eq!((record["exit_code"].as_u64(), record["error"].as_str()), (Some(130), Some("interrupted")));
+            assert!(record["spp"].as_u64() > Some(0));
+        }
+    }
+}

@@ -1,0 +1,164 @@
+//! What is shown of frames, against what the host makes of the same numbers.
+
+use glam::DVec3;
+use skylit::Error;
+use skylit::colour::srgb_byte;
+use skylit::film::camera::CameraRecord;
+use skylit::realtime::display::{Display, Shown};
+use skylit::realtime::{FrameStats, Preset, Realtime, Settings};
+use skylit::scene::Camera;
+use skylit::scene::builtin::{Placement, analytic, by_name};
+use skylit::tracer::Tracer;
+
+use crate::common::{assert_validation_clean, device, record, tracer, tracers};
+
+const SIZE: [u32; 2] = [93, 50];
+
+fn display(shown: Shown, exposure: f32) -> Display {
+    Display { shown, exposure, unit: 2.0 }
+}
+
+/// A frame as it is shown, after `frames` before it.
+fn show(tracer: &Tracer, realtime: &mut Realtime, camera: &CameraRecord, frames: u32, shown: Display) -> Vec<[u8; 4]> {
+    for _ in 0..frames {
+        realtime.frame(tracer, camera, &[]).unwrap();
+    }
+    realtime.display(tracer, Some(shown)).unwrap();
+    realtime.frame(tracer, camera, &[]).unwrap();
+    words(realtime)
+}
+
+fn words(realtime: &Realtime) -> Vec<[u8; 4]> {
+    let bytes = realtime.displayed().unwrap().read(0, 4 * u64::from(SIZE[0] * SIZE[1])).unwrap();
+    bytes.chunks_exact(4).map(|w| [w[0], w[1], w[2], w[3]]).collect()
+}
+
+/// Grey within `off` bytes of what the host encodes.
+#[track_caller]
+fn assert_grey(shown: &[[u8; 4]], linear: &[f32], gain: f32, off: u8) {
+    assert_eq!(shown.len(), linear.len());
+    for (at, (word, value)) in shown.iter().zip(linear).enumerate() {
+        let expected = srgb_byte(value * gain);
+        assert!(word[0] == word[1] && word[1] == word[2] && word[3] == 255, "pixel {at}: {word:?}");
+        assert!(word[0].abs_diff(expected) <= off, "pixel {at}: {} for {value}, which is {expected}", word[0]);
+    }
+}
+
+#[test]
+fn gpu_displayed_accessibility_has_the_bytes_of_a_png() {
+    let device = device();
+    let scene = by_name("stairs").unwrap();
+    let camera = record(&scene, &scene.cameras[0], SIZE);
+    for kind in tracers(&device) {
+        let tracer = tracer(&device, kind, &scene);
+        for preset in [Preset::Balanced, Preset::Larsen] {
+            // with a falloff samples take all values
+            let settings = Settings { falloff: 2.0, ..preset.settings() };
+            let mut realtime = Realtime::new(&tracer, SIZE, &settings, &[]).unwrap();
+            let mut bytes = std::collections::BTreeSet::new();
+            for exposure in [0.0, 0.7, -1.6, -3.3f32] {
+                let shown = show(&tracer, &mut realtime, &camera, 1, display(Shown::Accessibility, exposure));
+                assert_grey(&shown, &realtime.result().unwrap(), exposure.exp2(), 0);
+                bytes.extend(shown.iter().map(|w| w[0]));
+            }
+            assert!(bytes.len() > 120, "{kind}: only {} different bytes", bytes.len());
+            let shown = show(&tracer, &mut realtime, &camera, 0, display(Shown::Unfiltered, 0.0));
+            assert_grey(&shown, &realtime.unfiltered().unwrap(), 1.0, 0);
+        }
+    }
+    assert_validation_clean(&device);
+}
+
+#[test]
+fn gpu_displayed_numbers() {
+    let device = device();
+    // a square that does not fill the image
+    let scene = analytic::plane(20.0, Placement::default());
+    let camera = record(&scene, &scene.cameras[0], SIZE);
+    let kind = tracers(&device)[0];
+    let tracer = tracer(&device, kind, &scene);
+    let settings = Settings { bent: true, filter: Preset::Fast.settings().filter, ..Preset::Balanced.settings() };
+    let mut realtime = Realtime::new(&tracer, SIZE, &settings, &[]).unwrap();
+    let covered = |realtime: &Realtime| realtime.coverage().unwrap();
+    let expect = |shown: Vec<[u8; 4]>, coverage: &[f32], colour: [f32; 3], what: &str| {
+        let bytes = colour.map(srgb_byte);
+        assert!(coverage.contains(&1.0) && coverage.contains(&0.0));
+        for (word, c) in shown.iter().zip(coverage) {
+            let expected = if *c == 1.0 { bytes } else { [0; 3] };
+            assert!((0..3).all(|k| word[k].abs_diff(expected[k]) <= 1) && word[3] == 255, "{what}: {word:?}, not {expected:?}");
+        }
+    };
+    let shown = show(&tracer, &mut realtime, &camera, 3, display(Shown::Samples, 0.0));
+    expect(shown, &covered(&realtime), [4.0 / 64.0; 3], "four samples of 64");
+    // an open plane has no variance, and its bent normal is two thirds of the normal
+    let shown = show(&tracer, &mut realtime, &camera, 0, display(Shown::Variance, 0.0));
+    expect(shown, &covered(&realtime), [0.0; 3], "variance");
+    let shown = show(&tracer, &mut realtime, &camera, 0, display(Shown::Normal, 0.0));
+    expect(shown, &covered(&realtime), [0.5, 1.0, 0.5], "normal");
+    let shown = show(&tracer, &mut realtime, &camera, 0, display(Shown::Normal, -1.0));
+    expect(shown, &covered(&realtime), [0.25, 0.5, 0.25], "normal, half as bright");
+    let shown = show(&tracer, &mut realtime, &camera, 250, display(Shown::Bent, 0.0));
+    let middle = shown[(SIZE[1] / 2 * SIZE[0] + SIZE[0] / 2) as usize];
+    let expected = [0.5, 5.0 / 6.0, 0.5].map(srgb_byte);
+    assert!((0..3).all(|k| middle[k].abs_diff(expected[k]) <= 12), "bent: {middle:?}, not {expected:?}");
+    assert_validation_clean(&device);
+}
+
+#[test]
+fn gpu_displayed_distances() {
+    let device = device();
+    let scene = analytic::plane(1e3, Placement::default());
+    // from above, all at one depth; a metre of the floor is as wide as the image is high
+    let camera = Camera::look_at(DVec3::Y * 6.0, DVec3::ZERO, DVec3::NEG_Z, 2.0 * (0.5f64 / 6.0).atan());
+    let camera = CameraRecord::new(&camera, scene.origin(), f64::from(SIZE[0]) / f64::from(SIZE[1]));
+    let tracer = tracer(&device, tracers(&device)[0], &scene);
+    let mut realtime = Realtime::new(&tracer, SIZE, &Preset::Fast.settings(), &[]).unwrap();
+    let shown = show(&tracer, &mut realtime, &camera, 0, display(Shown::Depth, 0.0));
+    assert_grey(&shown, &vec![2.0 / 8.0; shown.len()], 1.0, 1);
+    let shown = show(&tracer, &mut realtime, &camera, 0, display(Shown::Position, 0.0));
+    for (at, word) in shown.iter().enumerate() {
+        let [x, y] = [at as u32 % SIZE[0], at as u32 / SIZE[0]].map(f64::from);
+        let side = 1.0 / f64::from(SIZE[1]);
+        // the floor's height is 0: white
+        let position = [(x + 0.5 - 0.5 * f64::from(SIZE[0])) * side, 0.0, (y + 0.5 - 0.5 * f64::from(SIZE[1])) * side];
+        let expected = position.map(|p| srgb_byte((1.0 - p.abs() / 2.0) as f32));
+        assert!((0..3).all(|k| word[k].abs_diff(expected[k]) <= 1), "pixel {at}: {word:?}, not {expected:?}");
+    }
+    assert_validation_clean(&device);
+}
+
+/// It is a part of the frame where it is asked for, and changes nothing else.
+#[test]
+fn gpu_display_is_a_choice() {
+    let device = device();
+    let scene = by_name("cornell-box").unwrap();
+    let camera = record(&scene, &scene.cameras[0], SIZE);
+    let tracer = tracer(&device, tracers(&device)[0], &scene);
+    let mut realtime = Realtime::new(&tracer, SIZE, &Preset::Fast.settings(), &[]).unwrap();
+    let mut plain = Realtime::new(&tracer, SIZE, &Preset::Fast.settings(), &[]).unwrap();
+    let recorded = |stats: &FrameStats| stats.timings.iter().filter(|t| t.label == "display").count();
+    assert!(realtime.displayed().is_none());
+    let mut last = Vec::new();
+    for (frame, shown) in [None, Some(Shown::Accessibility), Some(Shown::Depth), None].into_iter().enumerate() {
+        realtime.display(&tracer, shown.map(|s| display(s, 0.0))).unwrap();
+        let stats = realtime.frame(&tracer, &camera, &[]).unwrap();
+        assert_eq!(recorded(&stats), usize::from(shown.is_some()), "frame {frame}");
+        if shown.is_some() {
+            assert_eq!(stats.timings.last().unwrap().label, "display");
+        }
+        plain.frame(&tracer, &camera, &[]).unwrap();
+        assert_eq!(realtime.result().unwrap(), plain.result().unwrap());
+        if frame == 3 {
+            assert_eq!(words(&realtime), last, "what is not recorded stays");
+        } else if shown.is_some() {
+            last = words(&realtime);
+        }
+    }
+    let refused = |preset: Preset, shown: Shown| {
+        let mut realtime = Realtime::new(&tracer, SIZE, &preset.settings(), &[]).unwrap();
+        matches!(realtime.display(&tracer, Some(display(shown, 0.0))), Err(Error::Usage(_)))
+    };
+    assert!(refused(Preset::Fast, Shown::Bent) && refused(Preset::Larsen, Shown::Variance));
+    assert!(!refused(Preset::Fast, Shown::Variance) && !refused(Preset::Larsen, Shown::Normal));
+    assert_validation_clean(&device);
+}
