@@ -23,8 +23,9 @@ pub struct Options {
     pub validation: bool,
     /// Use 32-bit loads even where shaderInt64 is there: to test that path.
     pub no_int64: bool,
-    /// Keep every pipeline for as long as the process runs, and with it the device: for processes that render many scenes with one device.
-    pub keep_pipelines: bool,
+    /// How many of the pipelines that were made last stay compiled though nobody has them any more: for processes that render many scenes with one device,
+    /// which is then never closed. A CPU driver's take megabytes each.
+    pub keep_pipelines: usize,
 }
 
 /// An open device.

@@ -3,7 +3,7 @@
 //! A pipeline is a handle: the device knows those that are alive, and gives the same one to whoever asks for the same SPIR-V and the same
 //! constants. Whoever wants pipelines to outlive the work that they were compiled for keeps [`Device::live_pipelines`].
 
-use std::collections::HashMap;
+use std::collections::{HashMap, VecDeque};
 use std::sync::{Arc, Mutex, PoisonError, Weak};
 
 use ash::vk;
@@ -132,13 +132,15 @@ impl Drop for Compiled {
 /// The pipelines of a device that are alive.
 pub(super) struct LivePipelines {
     all: Mutex<HashMap<Key, Weak<Compiled>>>,
-    /// [`super::Options::keep_pipelines`]: they hold their device, which is then never closed.
-    kept: Option<Mutex<Vec<Arc<Compiled>>>>,
+    /// Those that were made last, at most `most`: they hold their device, which is then never closed.
+    kept: Mutex<VecDeque<Arc<Compiled>>>,
+    most: usize,
 }
 
 impl LivePipelines {
-    pub(super) fn new(keep: bool) -> Self {
-        Self { all: Mutex::default(), kept: keep.then(Mutex::default) }
+    /// most: [`super::Options::keep_pipelines`].
+    pub(super) fn new(most: usize) -> Self {
+        Self { all: Mutex::default(), kept: Mutex::default(), most }
     }
 
     /// The pipeline that was made of this, or what `make` gives.
@@ -152,10 +154,19 @@ impl LivePipelines {
         let mut all = all();
         all.retain(|_, pipeline| pipeline.strong_count() > 0);
         all.insert(key, Arc::downgrade(&made));
-        if let Some(kept) = &self.kept {
-            kept.lock().unwrap_or_else(PoisonError::into_inner).push(made.clone());
+        drop(all);
+        Ok(self.keep(made))
+    }
+
+    fn keep(&self, pipeline: Arc<Compiled>) -> Arc<Compiled> {
+        if self.most > 0 {
+            let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
+            if kept.len() == self.most {
+                kept.pop_front();
+            }
+            kept.push_back(pipeline.clone());
         }
-        Ok(made)
+        pipeline
     }
 }
 

@@ -21,8 +21,10 @@ use skylit::tracer::{Needs, Tracer, TracerKind};
 /// The default device with the validation layer; a machine without Vulkan fails the tests: software drivers exist. All tests of a process
 /// have the same one, and compile a pipeline once between them: compiling is most of what small images cost on a CPU driver.
 pub fn device() -> Arc<Device> {
+    // gigabytes at most
+    const KEPT: usize = 256;
     static DEVICE: OnceLock<Arc<Device>> = OnceLock::new();
-    DEVICE.get_or_init(|| open(Options { keep_pipelines: true, ..validated() })).clone()
+    DEVICE.get_or_init(|| open(Options { keep_pipelines: KEPT, ..validated() })).clone()
 }
 
 /// A device of one's own, for tests of what devices do.

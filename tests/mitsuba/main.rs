@@ -363,8 +363,7 @@ fn full() -> bool {
 /// One device for all tracers. The validation layer would take a third of the time, and hear nothing that it does not hear from the tests of paths.
 fn device() -> Arc<Device> {
     static DEVICE: OnceLock<Arc<Device>> = OnceLock::new();
-    let options =
-        || Options { keep_pipelines: true, validation: full() && common::validated().validation, ..Options::default() };
+    let options = || Options { keep_pipelines: 64, validation: full() && common::validated().validation, ..Options::default() };
     DEVICE.get_or_init(|| common::open(options())).clone()
 }
 
