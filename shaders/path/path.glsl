@@ -152,7 +152,7 @@ vec3 path_vertex(BlockParams block, uint k, PathState state, Ray ray, Hit hit) {
         // as with ambient occlusion, what shows nothing counts nothing
         if ((WITH_CONSTANT_ALBEDO || WITH_VIEW) && state.depth == 0u) return vec3(0.0);
         float light = 0.0;
-        if (WITH_LIGHT_SAMPLES && WITH_ENVIRONMENT && state.depth > 0u) {
+        if (WITH_LIGHT_SAMPLES && HAS_ENVIRONMENT_LIGHTS && state.depth > 0u) {
             float of_sky = LightRecords(p.lights).v[p.environment_light].probability;
             light = of_sky * (WITH_ENVIRONMENT_MAP ? map_pdf(p.map, ray.direction) : Floats(p.environment_pdfs).v[k]);
         }
@@ -183,7 +183,7 @@ vec3 path_vertex(BlockParams block, uint k, PathState state, Ray ray, Hit hit) {
             float before = straight_length(p, k, state);
             Hit seen = hit;
             seen.t += before;
-            light = light_pdf(p, seen, ray.origin - before * ray.direction, ray.direction);
+            light = met_light_pdf(p, seen, ray.origin - before * ray.direction, ray.direction);
         }
         added = clamp_radiance(p, state.throughput * m.emission * emission_weight(p, state, light), state.depth);
     }
@@ -246,7 +246,7 @@ vec3 path_vertex(BlockParams block, uint k, PathState state, Ray ray, Hit hit) {
         state.eta_scale *= b.eta * b.eta;
         state.depth++;
         if (WITH_CLEAR_WALLS) StoredFloats(p.straight).v[k] = 0.0;
-        if (WITH_LIGHT_SAMPLES && WITH_ENVIRONMENT && !WITH_ENVIRONMENT_MAP) StoredFloats(p.environment_pdfs).v[k] = constant_environment_pdf(m, b.wi);
+        if (WITH_LIGHT_SAMPLES && HAS_ENVIRONMENT_LIGHTS && !WITH_ENVIRONMENT_MAP) StoredFloats(p.environment_pdfs).v[k] = constant_environment_pdf(m, b.wi);
         if (state.depth >= p.rr_depth) {
             float survival = min(brightest * state.eta_scale, MAX_SURVIVAL);
             if (lobe.y >= survival) return added;

@@ -3,14 +3,21 @@
 use super::lights::Lights;
 use super::{PathOptions, PixelFilter, Strategy, media};
 use crate::accel::flatten::FlatScene;
-use crate::interface::{PathFeature, PathFeatures};
+use crate::interface::{LightKinds, PathFeature, PathFeatures};
 use crate::tracer::shading;
 
 /// What is required. `map`: the environment is an image; `cones`: textures are read over ray cones.
-pub(super) fn features(options: &PathOptions, flat: &FlatScene, lights: &Lights, map: bool, cones: bool) -> PathFeatures {
+pub(super) fn features(
+    options: &PathOptions,
+    flat: &FlatScene,
+    lights: &Lights,
+    map: bool,
+    cones: bool,
+) -> (PathFeatures, LightKinds) {
     let plain = options.white_sky.is_some() || options.view.is_some();
     let drawn = options.strategy.samples_lights() && !lights.records.is_empty();
     let features = [
+        (PathFeature::LightTree, drawn && !lights.tree.is_empty()),
         (PathFeature::LightChoice, drawn && lights.choices() > 1),
         (PathFeature::EnvironmentMap, map),
         (PathFeature::LightSamples, drawn),
@@ -28,9 +35,6 @@ pub(super) fn features(options: &PathOptions, flat: &FlatScene, lights: &Lights,
         (PathFeature::Media, !plain && media::matter(flat)),
         (PathFeature::ClearWalls, !plain && flat.scene.materials.iter().any(shading::has_clear_walls)),
     ];
-    let mut all: PathFeatures = features.into_iter().filter_map(|(feature, required)| required.then_some(feature)).collect();
-    if drawn {
-        lights.kinds().for_each(|kind| all.insert(kind));
-    }
-    all
+    let all = features.into_iter().filter_map(|(feature, required)| required.then_some(feature)).collect();
+    (all, if drawn { lights.kinds() } else { LightKinds::default() })
 }

@@ -29,7 +29,7 @@ use crate::film::camera::CameraRecord;
 use crate::film::cover::Cover;
 use crate::film::schedule::FilmOptions;
 use crate::gpu::{Buffer, Commands, ComputePipeline, Memory, Specialization, Timing};
-use crate::interface::{MaterialFeature, PathFeature, PathFeatures};
+use crate::interface::{LightKinds, MaterialFeature, PathFeature, PathFeatures};
 pub use crate::interface::{PixelFilter, View};
 use crate::scene::Environment;
 use crate::tracer::queue::RayQueue;
@@ -173,6 +173,8 @@ pub struct PathResult {
     pub light_tree: bool,
     /// What of the shaders was compiled.
     pub features: PathFeatures,
+    /// Kinds of lights that light samples were compiled for.
+    pub light_kinds: LightKinds,
 }
 
 /// The streams that [`render`] traces and that nothing but the scene's geometry is needed for.
@@ -251,6 +253,7 @@ impl PathIntegrator {
             lights: paths.lights,
             light_tree: paths.light_tree,
             features: paths.features,
+            light_kinds: paths.light_kinds,
         })
     }
 }
@@ -300,6 +303,7 @@ struct Paths {
     lights: u32,
     light_tree: bool,
     features: PathFeatures,
+    light_kinds: LightKinds,
     _buffers: Vec<Buffer>,
     _environment: DeviceEnvironment,
 }
@@ -334,11 +338,11 @@ impl Paths {
             Some(_) => Lights::sky_only(),
             None => Lights::new(flat, environment.mean),
         };
-        let features = features::features(options, flat, &lights, environment.map.texels != 0, cones);
+        let (features, light_kinds) = features::features(options, flat, &lights, environment.map.texels != 0, cones);
         let [has_media, has_clear_walls] = [PathFeature::Media, PathFeature::ClearWalls].map(|f| features.contains(f));
         let samples_constant_environment =
             features.contains(PathFeature::LightSamples) && lights.environment.is_some() && environment.map.texels == 0;
-        let constants = Specialization::default().set_all(features.constants());
+        let constants = Specialization::default().set_all(features.constants()).set_all(light_kinds.constants());
         let quads = |name: &str| Buffer::new(device, name, QUAD_BYTES * most as u64, Memory::Device);
         let queues = [RayQueue::new(device, most)?, RayQueue::new(device, most)?];
         let shadow_queue = RayQueue::new(device, most)?;
@@ -455,6 +459,7 @@ impl Paths {
             lights: if options.strategy.samples_lights() { lights.count() } else { 0 },
             light_tree: !lights.tree.is_empty(),
             features,
+            light_kinds,
             _buffers: buffers,
             _environment: environment,
         })

@@ -53,7 +53,7 @@ pub(super) fn report(tracer: &Tracer, flat: &FlatScene, shot: &Shot, o: &PathOpt
     let mut explanations = vec![
         compiled("materials require", joined(shading.bsdfs.labels(), shading.materials.labels())),
         compiled("textures beside base colours:", shading.textures.labels()),
-        compiled("lights and options require", result.features.labels()),
+        compiled("lights and options require", joined(result.light_kinds.labels(), result.features.labels())),
         mip_levels(o, &stats),
     ];
     explanations.push(match result.lights {

@@ -40,7 +40,7 @@ records! {
         trail: uint,
         /// To a multiple of 16 bytes.
         reserved: uint,
-        /// One of `LIGHT_*` of light_kind.
+        /// One of `LIGHT_*` of light_kinds.
         kind: uint,
         /// Triangle, rectangle, sphere: index of its instance; else `INVALID`.
         instance: uint,
