@@ -211,5 +211,7 @@ choices! {
         Position = "position", "SHOWN_POSITION";
         /// Bent normal, -1 to 1 mapped to 0 to 1
         Bent = "bent", "SHOWN_BENT";
+        /// BVH nodes that camera rays visit, as a heat map; needs `--tracer compute`
+        Nodes = "nodes", "SHOWN_NODES";
     }
 }
