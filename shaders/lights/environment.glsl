@@ -2,6 +2,7 @@
 #ifndef LIGHTS_ENVIRONMENT
 #define LIGHTS_ENVIRONMENT
 #include "lights/light.glsl"
+#include "lights/portal.glsl"
 #include "path/map.glsl"
 
 // Radiance of the environment from direction w.
@@ -29,13 +30,32 @@ vec4 sample_constant_environment(Shading m, vec2 u) {
     return vec4(w, constant_environment_pdf(m, w));
 }
 
+// Without portals that of a map does not depend on the surface.
+const bool SKY_PDF_OF_SURFACE = HAS_ENVIRONMENT_LIGHTS && !WITH_ENVIRONMENT_MAP || HAS_PORTAL_LIGHTS;
+
+float sky_pdf(PathParams p, Shading m, vec3 from, vec3 wi) {
+    float all_ = LightRecords(p.lights).v[p.environment_light].probability * (WITH_ENVIRONMENT_MAP ? map_pdf(p.map, wi) : constant_environment_pdf(m, wi));
+    if (HAS_PORTAL_LIGHTS) all_ += portals_pdf(p, from, wi);
+    return all_;
+}
+
 LightSample environment_sample(PathParams p, LightRecord light, vec3 from, Shading m, vec2 u) {
+    LightSample l = NO_LIGHT_SAMPLE;
+    l.distance = INFINITY;
     if (WITH_ENVIRONMENT_MAP) {
         MapSample s = sample_map(p.map, u);
-        return LightSample(s.wi, INFINITY, vec3(0.0), p.environment * s.radiance, light.probability * s.pdf, false);
+        l.wi = s.wi;
+        l.radiance = p.environment * s.radiance;
+        l.pdf = light.probability * s.pdf;
+    } else {
+        vec4 s = sample_constant_environment(m, u);
+        l.wi = s.xyz;
+        l.radiance = p.environment;
+        l.pdf = light.probability * s.w;
     }
-    vec4 s = sample_constant_environment(m, u);
-    return LightSample(s.xyz, INFINITY, vec3(0.0), p.environment, light.probability * s.w, false);
+    // what a portal could have sampled as well counts once
+    if (HAS_PORTAL_LIGHTS && l.pdf > 0.0) l.pdf += portals_pdf(p, from, l.wi);
+    return l;
 }
 
 // No surface: path/path.glsl weighs what a ray meets that leaves the scene.

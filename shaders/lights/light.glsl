@@ -4,6 +4,8 @@
 //     float light_pdf(LightRecord, from, wi, distance)    density with which light_sample finds what a ray met there, per solid angle; 0 for what no ray
 //                                                         meets, and for what is outside the scene (path/path.glsl weighs that)
 //
+//     float sky_pdf(PathParams, Shading, from, wi)    density with which light_sample finds what is outside the scene in a direction, but for distant disks
+//
 // The integrator knows no more than this: a kind is a file in this folder that defines both with its name before them (`spot_sample`, `spot_pdf`), and a line in
 // src/interface/features.rs (`LightKinds`), of which the functions above are made. Both densities are multiplied by the probability of choosing the light,
 // LightRecord.probability.
@@ -24,6 +26,8 @@ struct LightSample {
 };
 
 const LightSample NO_LIGHT_SAMPLE = LightSample(vec3(0.0, 0.0, 1.0), 0.0, vec3(0.0), vec3(0.0), 0.0, false);
+
+float sky_pdf(PathParams p, Shading m, vec3 from, vec3 wi);
 
 // Is it of this kind? What the scene has not is not compiled; and where all lights are of one kind, nothing is compared.
 bool is_kind(LightRecord light, uint kind) {

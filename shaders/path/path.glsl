@@ -153,8 +153,8 @@ vec3 path_vertex(BlockParams block, uint k, PathState state, Ray ray, Hit hit) {
         if ((WITH_CONSTANT_ALBEDO || WITH_VIEW) && state.depth == 0u) return vec3(0.0);
         float light = 0.0;
         if (WITH_LIGHT_SAMPLES && HAS_ENVIRONMENT_LIGHTS && state.depth > 0u) {
-            float of_sky = LightRecords(p.lights).v[p.environment_light].probability;
-            light = of_sky * (WITH_ENVIRONMENT_MAP ? map_pdf(p.map, ray.direction) : Floats(p.environment_pdfs).v[k]);
+            if (SKY_PDF_OF_SURFACE) light = Floats(p.sky_pdfs).v[k];
+            else light = LightRecords(p.lights).v[p.environment_light].probability * map_pdf(p.map, ray.direction);
         }
         vec3 c = environment_radiance(p, ray.direction) * emission_weight(p, state, light);
         if (WITH_DISTANT_DISKS) c += disks_met(p, state, ray.direction);
@@ -246,7 +246,7 @@ vec3 path_vertex(BlockParams block, uint k, PathState state, Ray ray, Hit hit) {
         state.eta_scale *= b.eta * b.eta;
         state.depth++;
         if (WITH_CLEAR_WALLS) StoredFloats(p.straight).v[k] = 0.0;
-        if (WITH_LIGHT_SAMPLES && HAS_ENVIRONMENT_LIGHTS && !WITH_ENVIRONMENT_MAP) StoredFloats(p.environment_pdfs).v[k] = constant_environment_pdf(m, b.wi);
+        if (WITH_LIGHT_SAMPLES && SKY_PDF_OF_SURFACE) StoredFloats(p.sky_pdfs).v[k] = sky_pdf(p, m, s.position, b.wi);
         if (state.depth >= p.rr_depth) {
             float survival = min(brightest * state.eta_scale, MAX_SURVIVAL);
             if (lobe.y >= survival) return added;

@@ -183,6 +183,7 @@ feature_set! {
     Triangle = "HAS_TRIANGLE_LIGHTS", "emissive triangles";
     Sphere = "HAS_SPHERE_LIGHTS", "emissive spheres";
     Environment = "HAS_ENVIRONMENT_LIGHTS", "environment light";
+    Portal = "HAS_PORTAL_LIGHTS", "portals";
     Directional = "HAS_DIRECTIONAL_LIGHTS", "directional lights";
     Point = "HAS_POINT_LIGHTS", "point lights";
     Spot = "HAS_SPOT_LIGHTS", "spot lights";

@@ -29,7 +29,7 @@ use crate::film::camera::CameraRecord;
 use crate::film::cover::Cover;
 use crate::film::schedule::FilmOptions;
 use crate::gpu::{Buffer, Commands, ComputePipeline, Memory, Specialization, Timing};
-use crate::interface::{LightKinds, MaterialFeature, PathFeature, PathFeatures};
+use crate::interface::{LightKind, LightKinds, MaterialFeature, PathFeature, PathFeatures};
 pub use crate::interface::{PixelFilter, View};
 use crate::scene::Environment;
 use crate::tracer::queue::RayQueue;
@@ -38,7 +38,7 @@ use crate::tracer::{Push, Stream, Tracer};
 use environment::DeviceEnvironment;
 use lights::Lights;
 use media::Bodies;
-use params::{CONE_BYTES, ENVIRONMENT_PDF_BYTES, INVALID, MEDIA_BYTES, PathParams, QUAD_BYTES, STATE_BYTES, STRAIGHT_BYTES};
+use params::{CONE_BYTES, INVALID, MEDIA_BYTES, PathParams, QUAD_BYTES, SKY_PDF_BYTES, STATE_BYTES, STRAIGHT_BYTES};
 
 /// Bounces of a submission; then the host asks how many paths are left.
 const BOUNCES: u32 = 4;
@@ -340,8 +340,9 @@ impl Paths {
         };
         let (features, light_kinds) = features::features(options, flat, &lights, environment.map.texels != 0, cones);
         let [has_media, has_clear_walls] = [PathFeature::Media, PathFeature::ClearWalls].map(|f| features.contains(f));
-        let samples_constant_environment =
-            features.contains(PathFeature::LightSamples) && lights.environment.is_some() && environment.map.texels == 0;
+        let stores_sky_pdfs = features.contains(PathFeature::LightSamples)
+            && lights.environment.is_some()
+            && (environment.map.texels == 0 || light_kinds.contains(LightKind::Portal));
         let constants = Specialization::default().set_all(features.constants()).set_all(light_kinds.constants());
         let quads = |name: &str| Buffer::new(device, name, QUAD_BYTES * most as u64, Memory::Device);
         let queues = [RayQueue::new(device, most)?, RayQueue::new(device, most)?];
@@ -398,10 +399,8 @@ impl Paths {
                 true => keep(Buffer::new(device, "straight lengths of paths", STRAIGHT_BYTES * most as u64, Memory::Device)?),
                 false => 0,
             },
-            environment_pdfs: match samples_constant_environment {
-                true => {
-                    keep(Buffer::new(device, "environment pdfs of paths", ENVIRONMENT_PDF_BYTES * most as u64, Memory::Device)?)
-                }
+            sky_pdfs: match stores_sky_pdfs {
+                true => keep(Buffer::new(device, "densities of the sky", SKY_PDF_BYTES * most as u64, Memory::Device)?),
                 false => 0,
             },
             camera_media: [INVALID; 4],

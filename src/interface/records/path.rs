@@ -89,8 +89,8 @@ records! {
         later: QueueRecord,
         /// As `contributions`.
         later_contributions: address,
-        /// A float a path: density with which light samples at its last bounce sample its direction from a constant environment.
-        environment_pdfs: address,
+        /// A float a path: density with which light samples at its last bounce find what is outside the scene in its direction.
+        sky_pdfs: address,
     }
 
     /// A path between two bounces.

@@ -1,6 +1,7 @@
 //! The lights of a scene as the path tracer samples them: [`LightRecord`]. Few are chosen by their power; of many, a tree
 //! chooses by what they may do at a point ([`super::light_tree`]).
 
+mod portals;
 mod punctual;
 mod surfaces;
 
@@ -111,9 +112,7 @@ impl Lights {
         if environment != Vec3::ZERO {
             // what crosses the disk that the scene fills, from everywhere
             let power = 4.0 * PI.powi(2) * radius(flat).powi(2) * brightness(environment);
-            let index =
-                all.push(LightRecord { kind: Kind::Environment as u32, instance: INVALID, ..Default::default() }, power, None);
-            lights.environment = Some(index).filter(|&k| k != INVALID);
+            lights.environment = portals::add_environment(&mut all, flat, brightness(environment), power);
         }
         let placed = all.bounds.len();
         if placed > MAX_BY_POWER && placed <= light_tree::MAX_LIGHTS {
