@@ -26,7 +26,9 @@ float power_heuristic(float a, float b) {
     return 1.0 / (1.0 + r * r);
 }
 
-vec3 clamp_radiance(PathParams p, vec3 c, uint depth) {
+// Radiance that counts, of what reaches the camera after so many bounces.
+vec3 counted_radiance(PathParams p, vec3 c, uint depth) {
+    if (WITH_MIN_DEPTH && depth < p.min_depth) return vec3(0.0);
     return WITH_CLAMP && depth > 0u ? min(c, vec3(p.clamp_to)) : c;
 }
 
@@ -111,7 +113,7 @@ void sample_direct_light(BlockParams block, PathParams p, uint k, PathState stat
     }
     c *= transmittance(side > 0.0 ? state.medium : beyond, l.distance);
     uint slot = append_ray(p.shadow, shadow, k);
-    store_quad(p.contributions, slot, vec4(clamp_radiance(p, c, state.depth + 1u), 0.0));
+    store_quad(p.contributions, slot, vec4(counted_radiance(p, c, state.depth + 1u), 0.0));
 }
 
 // Goes on behind a surface as if it were not there.
@@ -158,7 +160,7 @@ vec3 path_vertex(BlockParams block, uint k, PathState state, Ray ray, Hit hit) {
         }
         vec3 c = environment_radiance(p, ray.direction) * emission_weight(p, state, light);
         if (WITH_DISTANT_DISKS) c += disks_met(p, state, ray.direction);
-        return clamp_radiance(p, state.throughput * c, state.depth);
+        return counted_radiance(p, state.throughput * c, state.depth);
     }
     Surface s = surface_at(ray, hit);
     vec3 towards_viewer = -ray.direction;
@@ -185,7 +187,7 @@ vec3 path_vertex(BlockParams block, uint k, PathState state, Ray ray, Hit hit) {
             seen.t += before;
             light = met_light_pdf(p, seen, ray.origin - before * ray.direction, ray.direction);
         }
-        added = clamp_radiance(p, state.throughput * m.emission * emission_weight(p, state, light), state.depth);
+        added = counted_radiance(p, state.throughput * m.emission * emission_weight(p, state, light), state.depth);
     }
     Boundary boundary;
     boundary.medium = state.medium;

@@ -165,6 +165,7 @@ feature_set! {
     ConstantAlbedo = "WITH_CONSTANT_ALBEDO", "constant albedo";
     View = "WITH_VIEW", "auxiliary view";
     Clamp = "WITH_CLAMP", "radiance clamp";
+    MinDepth = "WITH_MIN_DEPTH", "least number of bounces";
     Lens = "WITH_LENS", "thin lens";
     PixelFilter = "WITH_PIXEL_FILTER", "pixel filter";
     RayCones = "WITH_RAY_CONES", "ray cones";
@@ -225,7 +226,7 @@ mod tests {
             );
         }
         assert_eq!(set.labels()[0], ["light tree", "thin walls that light passes straight"]);
-        assert_eq!(set.constants().map(|c| c.1).collect::<Vec<_>>(), [1 | 1 << 15]);
+        assert_eq!(set.constants().map(|c| c.1).collect::<Vec<_>>(), [1 | 1 << PathFeature::ClearWalls as u32]);
     }
 
     /// No two constants have one number: those by name, then the words of each set.

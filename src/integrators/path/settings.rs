@@ -50,6 +50,8 @@ settings! {
     pub struct PathSettings {
         /// Maximum path length in bounces: 0 is emitted light, 1 adds direct light [default: the scene's, or no limit]
         max_depth: Option<u32>, option(value_name = "N"), applies(LONG);
+        /// Leave out paths of fewer bounces: 1 hides emitters and the environment behind the scene, 2 leaves indirect light alone [default: 0]
+        min_depth: Option<u32>, option(value_name = "N"), applies(LIGHT);
         /// Bounces before Russian roulette may end a path [default: 5]
         rr_depth: Option<u32>, option(value_name = "N"), applies(LIGHT);
         /// Clamp indirect radiance to X (reduces fireflies; biased) [default: off]
@@ -137,6 +139,8 @@ pub struct PathOptions {
     pub seed: u32,
     /// Bounces at most: 0 shows what emits, 1 adds direct light. [`MOST_DEPTH`] is the limit, which nobody reaches.
     pub max_depth: u32,
+    /// Paths of fewer bounces add nothing: 1 leaves out what emits, 2 direct light as well.
+    pub min_depth: u32,
     /// Bounces before Russian roulette.
     pub rr_depth: u32,
     /// No path vertex but the first adds more than this radiance in any channel; infinite: unbiased.
@@ -171,6 +175,7 @@ impl Default for PathOptions {
             spp: 16,
             seed: 0,
             max_depth: MOST_DEPTH,
+            min_depth: 0,
             rr_depth: 5,
             firefly_clamp: f32::INFINITY,
             strategy: Strategy::Mis,
@@ -217,6 +222,7 @@ impl PathOptions {
             spp: shot.spp,
             seed: shot.seed,
             max_depth: settings.max_depth.or(shot.scene.hints.max_depth).unwrap_or(MOST_DEPTH),
+            min_depth: settings.min_depth.unwrap_or(default.min_depth),
             rr_depth: settings.rr_depth.unwrap_or(default.rr_depth),
             firefly_clamp: settings.firefly_clamp.map_or(f32::INFINITY, |c| c as f32),
             strategy: settings.sampling.unwrap_or_default(),
@@ -240,6 +246,7 @@ impl PathOptions {
             film: _,
             seed: _,
             max_depth,
+            min_depth,
             rr_depth,
             firefly_clamp,
             strategy,
@@ -252,6 +259,7 @@ impl PathOptions {
         } = self;
         vec![
             ("max_depth", Some(depth_text(*max_depth))),
+            ("min_depth", (*min_depth > 0).then(|| min_depth.to_string())),
             ("rr_depth", Some(rr_depth.to_string())),
             ("sampling", Some(strategy.to_string())),
             ("firefly_clamp", firefly_clamp.is_finite().then(|| firefly_clamp.to_string())),
@@ -270,6 +278,7 @@ impl PathOptions {
             (PathFeature::SpecularOnly, self.specular_only),
             (PathFeature::ConstantAlbedo, self.white_sky.is_some()),
             (PathFeature::View, self.view.is_some()),
+            (PathFeature::MinDepth, self.min_depth > 0),
             (PathFeature::Clamp, self.firefly_clamp.is_finite()),
             (PathFeature::Lens, self.lens.is_some_and(|l| l.radius > 0.0)),
             (PathFeature::PixelFilter, self.pixel_filter != PixelFilter::Box),
@@ -286,6 +295,7 @@ impl PathOptions {
         PathParams {
             max_depth: self.bounces(),
             view: self.view.map_or(0, |v| v as u32),
+            min_depth: self.min_depth,
             rr_depth: self.rr_depth,
             clamp_to: self.firefly_clamp,
             albedo: self.white_sky.unwrap_or(0.0),
@@ -312,6 +322,7 @@ impl PathOptions {
     pub(super) fn record(&self) -> Value {
         json!({
             "max_depth": if self.max_depth >= MOST_DEPTH { Value::Null } else { json!(self.max_depth) },
+            "min_depth": self.min_depth,
             "rr_depth": self.rr_depth,
             "firefly_clamp": if self.firefly_clamp.is_finite() { json!(self.firefly_clamp) } else { Value::Null },
             "sampling": self.strategy,

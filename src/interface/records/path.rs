@@ -59,6 +59,10 @@ records! {
         albedo: float,
         /// Index of the environment among the lights, or `INVALID`.
         environment_light: uint,
+        /// Paths of fewer bounces add nothing, with `WITH_MIN_DEPTH`.
+        min_depth: uint,
+        /// To a multiple of 16 bytes.
+        reserved: uint[3],
         /// One of `FILTER_*`.
         pixel_filter: uint,
         /// World units; 0: a pinhole.
