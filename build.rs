@@ -255,7 +255,7 @@ fn fail(errors: &[String]) -> ! {
 /// Compiles on all cores. Returns the files that were included, and what is wrong, in words.
 fn compile(jobs: &[Job], manifest: &Path, out: &Path) -> (BTreeSet<PathBuf>, Vec<String>) {
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
-    let compiler = Compiler::new(&manifest.join("shaders"), source::made_files(interface::glsl::files(), manifest), out);
+    let compiler = Compiler::new(&manifest.join("shaders"), source::generated_files(interface::glsl::files(), manifest), out);
     let next = Mutex::new(jobs.iter());
     let results = Mutex::new((BTreeSet::new(), Vec::new()));
     std::thread::scope(|scope| {

@@ -11,7 +11,7 @@ use crate::terminal::console::Failure;
 
 /// How far apart two channels are, over the pixels where both are finite and at least one image has something.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
-struct Difference {
+struct ChannelDifference {
     /// Pixels compared.
     pixels: u64,
     /// Pixels whose values are not the same.
@@ -20,11 +20,11 @@ struct Difference {
     broken: u64,
     /// The metrics of [`crate::measure::metrics`]; ids have none.
     #[serde(flatten)]
-    numbers: Option<Numbers>,
+    metrics: Option<Metrics>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
-struct Numbers {
+struct Metrics {
     rmse: f64,
     bias: f64,
     max: f64,
@@ -36,7 +36,7 @@ struct Numbers {
 
 /// How different the colours look, over the pixels where all of them are finite and at least one image has something.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
-struct Look {
+struct FlipDifference {
     /// Channels that make the colour: `R`, `G` and `B`, or a grey one.
     channels: Vec<String>,
     /// Pixels counted.
@@ -62,7 +62,7 @@ pub fn run(args: &DiffArgs) -> Result<(), Failure> {
     for (x, y) in &pairs {
         let d = compare(&x.samples, &y.samples, mask.as_deref())?;
         let mut line = format!("{:12} ", x.name);
-        if let Some(n) = &d.numbers {
+        if let Some(n) = &d.metrics {
             // a pixel that is broken in one image only is no small difference
             worst = worst.max(if d.broken > 0 { f64::INFINITY } else { n.rmse });
             line += &format!("rmse {:.3e}  bias {:+.3e}  max {:.3e}  psnr {:.1} dB  ", n.rmse, n.bias, n.max, n.psnr);
@@ -75,7 +75,7 @@ pub fn run(args: &DiffArgs) -> Result<(), Failure> {
     if records.is_empty() {
         return Err(Error::Usage("the images have no channel in common".into()).into());
     }
-    let look = look(&pairs, a.width as usize, mask.as_deref())?;
+    let look = flip_difference(&pairs, a.width as usize, mask.as_deref())?;
     if let Some(l) = &look {
         console.line(&format!(
             "{:12} flip {:.4} ({:.0} pixels a degree)",
@@ -120,7 +120,7 @@ fn coverage(a: &Image, b: &Image) -> Option<Vec<f32>> {
 }
 
 /// FLIP of the colour that the images have in common, if they have any.
-fn look(pairs: &[(&Channel, &Channel)], width: usize, mask: Option<&[f32]>) -> Result<Option<Look>> {
+fn flip_difference(pairs: &[(&Channel, &Channel)], width: usize, mask: Option<&[f32]>) -> Result<Option<FlipDifference>> {
     let find = |name: &str| {
         pairs.iter().find(|(x, _)| x.name == name).and_then(|(x, y)| match (&x.samples, &y.samples) {
             (Samples::F32(a), Samples::F32(b)) => Some((&x.name, [a, b])),
@@ -142,12 +142,12 @@ fn look(pairs: &[(&Channel, &Channel)], width: usize, mask: Option<&[f32]>) -> R
     let [image, reference] = [0, 1].map(|k| (0..count).flat_map(|i| planes.iter().map(move |p| p[k][i])).collect::<Vec<_>>());
     let pair = ImagePair::new(&image, &reference, channels.len(), Some(&counted))?;
     let mean = flip(&pair, width, PIXELS_PER_DEGREE)?.mean;
-    Ok(Some(Look { channels, pixels, mean, pixels_per_degree: PIXELS_PER_DEGREE }))
+    Ok(Some(FlipDifference { channels, pixels, mean, pixels_per_degree: PIXELS_PER_DEGREE }))
 }
 
-fn compare(a: &Samples, b: &Samples, mask: Option<&[f32]>) -> Result<Difference> {
+fn compare(a: &Samples, b: &Samples, mask: Option<&[f32]>) -> Result<ChannelDifference> {
     let inside = |i: usize| mask.is_none_or(|m| m[i] > 0.0);
-    let mut d = Difference { pixels: 0, differing: 0, broken: 0, numbers: None };
+    let mut d = ChannelDifference { pixels: 0, differing: 0, broken: 0, metrics: None };
     match (a, b) {
         (Samples::F32(a), Samples::F32(b)) => {
             let finite: Vec<f32> =
@@ -159,7 +159,7 @@ fn compare(a: &Samples, b: &Samples, mask: Option<&[f32]>) -> Result<Difference>
             }
             let pair = ImagePair::new(a, b, 1, Some(&finite))?;
             d.pixels = pair.count();
-            d.numbers = (d.pixels > 0).then(|| Numbers {
+            d.metrics = (d.pixels > 0).then(|| Metrics {
                 rmse: pair.rmse(),
                 bias: pair.bias(),
                 max: pair.max_abs_difference(),
@@ -178,10 +178,10 @@ fn compare(a: &Samples, b: &Samples, mask: Option<&[f32]>) -> Result<Difference>
         _ => {}
     }
     // no pixel in common, but some broken: the limit must still be passed
-    if d.numbers.is_none() && d.broken > 0 {
+    if d.metrics.is_none() && d.broken > 0 {
         let nan = f64::NAN;
-        d.numbers =
-            Some(Numbers { rmse: nan, bias: nan, max: nan, rel_mse: nan, psnr: nan, minimum_ratio: nan, tanimoto: nan });
+        d.metrics =
+            Some(Metrics { rmse: nan, bias: nan, max: nan, rel_mse: nan, psnr: nan, minimum_ratio: nan, tanimoto: nan });
     }
     Ok(d)
 }
@@ -195,30 +195,33 @@ mod tests {
         let inf = f32::INFINITY;
         let (a, b) = (Samples::F32(vec![1.0, 2.0, inf, inf, f32::NAN]), Samples::F32(vec![1.0, 4.0, inf, 1.0, f32::NAN]));
         let d = compare(&a, &b, None).unwrap();
-        let n = d.numbers.unwrap();
+        let n = d.metrics.unwrap();
         assert_eq!((d.pixels, d.differing, d.broken, n.max, n.bias), (2, 1, 1, 2.0, -1.0));
         assert!((n.rmse - 2f64.sqrt()).abs() < 1e-12);
         let masked = compare(&a, &b, Some(&[1.0, 0.0, 1.0, 0.0, 1.0])).unwrap();
         assert_eq!((masked.pixels, masked.differing, masked.broken), (1, 0, 0));
         let ids = compare(&Samples::U32(vec![1, 2]), &Samples::U32(vec![1, 3]), None).unwrap();
-        assert_eq!((ids.pixels, ids.differing, ids.numbers), (2, 1, None));
+        assert_eq!((ids.pixels, ids.differing, ids.metrics), (2, 1, None));
     }
 
     #[test]
     fn looks_are_compared_where_there_is_colour() {
         let channel = |name: &str, values: &[f32]| Channel { name: name.into(), samples: Samples::F32(values.to_vec()) };
         let [black, white, broken] = [[0.0; 4], [1.0; 4], [f32::NAN, 1.0, 1.0, 1.0]].map(|v| channel("Y", &v));
-        let of = |x: &Channel, y: &Channel, mask: Option<&[f32]>| look(&[(x, y)], 2, mask).unwrap();
+        let of = |x: &Channel, y: &Channel, mask: Option<&[f32]>| flip_difference(&[(x, y)], 2, mask).unwrap();
         let far = of(&black, &white, None).unwrap();
         assert_eq!((&far.channels[..], far.pixels), (&["Y".to_owned()][..], 4));
         assert!((far.mean - 0.967).abs() < 1e-3);
         assert_eq!(of(&broken, &broken, None).unwrap().pixels, 3);
-        assert_eq!(of(&white, &white, Some(&[1.0, 0.0, 0.0, 0.0])).unwrap(), Look { mean: 0.0, pixels: 1, ..far.clone() });
+        assert_eq!(
+            of(&white, &white, Some(&[1.0, 0.0, 0.0, 0.0])).unwrap(),
+            FlipDifference { mean: 0.0, pixels: 1, ..far.clone() }
+        );
         assert_eq!(of(&white, &white, Some(&[0.0; 4])), None);
         assert_eq!(of(&channel("depth.Z", &[0.0; 4]), &channel("depth.Z", &[1.0; 4]), None), None);
         let planes = |v: f32| ["B", "G", "R"].map(|name| channel(name, &[v; 4]));
         let (a, b) = (planes(0.2), planes(0.3));
-        let colour = look(&a.iter().zip(&b).collect::<Vec<_>>(), 2, None).unwrap().unwrap();
+        let colour = flip_difference(&a.iter().zip(&b).collect::<Vec<_>>(), 2, None).unwrap().unwrap();
         assert!(colour.channels == ["R", "G", "B"] && colour.mean > 0.01, "{colour:?}");
     }
 }

@@ -40,7 +40,7 @@ choices! {
 
 impl Aov {
     /// Is this one among those that are wanted?
-    pub fn among(self, wanted: &[Aov]) -> bool {
+    pub fn is_in(self, wanted: &[Aov]) -> bool {
         wanted.contains(&self) || self != Aov::Bent && wanted.contains(&Aov::All)
     }
 }
@@ -120,7 +120,7 @@ pub fn visit(
 
 /// Auxiliary outputs as channels of an image. `origin`: of the tracers' scene, in the file's world.
 pub fn channels(wanted: &[Aov], pixels: &[AovPixel], origin: DVec3) -> Vec<Channel> {
-    let wants = |aov: Aov| aov.among(wanted);
+    let wants = |aov: Aov| aov.is_in(wanted);
     let mut out = Vec::new();
     let plane = |name: &str, f: &dyn Fn(&AovPixel) -> f32| Channel {
         name: name.into(),

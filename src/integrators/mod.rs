@@ -56,13 +56,13 @@ pub struct IntegratorSettings {
 
 impl IntegratorSettings {
     /// The settings that were given.
-    pub fn given(&self) -> Vec<crate::settings::Given> {
+    pub fn given(&self) -> Vec<crate::settings::GivenSetting> {
         [self.ao.given(), self.path.given()].concat()
     }
 }
 
 /// A still that is to be rendered.
-pub struct Shot<'a> {
+pub struct RenderJob<'a> {
     /// The scene.
     pub scene: &'a Scene,
     /// The camera.
@@ -146,13 +146,13 @@ pub trait Integrator: Sync {
     fn rays_per_sample(&self) -> u64;
 
     /// Can tiles of the image be skipped in which no primitive projects?
-    fn skips_empty_tiles(&self, shot: &Shot) -> bool;
+    fn skips_empty_tiles(&self, job: &RenderJob) -> bool;
 
     /// Does it see the scene's environment, so that the image depends on it?
     fn sees_environment(&self) -> bool;
 
     /// All that the samples of an image depend on beside scene, camera, size and seed: keys of its metadata, and values. `None`: not in the metadata.
-    fn identity(&self, shot: &Shot) -> Vec<(&'static str, Option<String>)>;
+    fn identity(&self, job: &RenderJob) -> Vec<(&'static str, Option<String>)>;
 
     /// Renders. `cover` says which tiles are to be skipped.
     ///
@@ -162,7 +162,7 @@ pub trait Integrator: Sync {
         &self,
         tracer: &Tracer,
         flat: &FlatScene,
-        shot: &Shot,
+        job: &RenderJob,
         cover: Option<Arc<Cover>>,
         control: &mut dyn Control,
     ) -> Result<Rendered>;
@@ -174,13 +174,13 @@ pub trait Integrator: Sync {
     ///
     /// # Errors
     /// Those of [`Integrator::render`] that settings have.
-    fn path_options(&self, shot: &Shot) -> Result<Option<path::PathOptions>> {
-        let _ = shot;
+    fn path_options(&self, job: &RenderJob) -> Result<Option<path::PathOptions>> {
+        let _ = job;
         Ok(None)
     }
 }
 
-impl Shot<'_> {
+impl RenderJob<'_> {
     /// Width over height.
     pub fn aspect(&self) -> f64 {
         f64::from(self.size[0]) / f64::from(self.size[1])

@@ -1,4 +1,4 @@
-//! Specialization constants: what a scene, a device or an option decides before a driver compiles a shader. Their numbers are given out here.
+//! Specialization constants: values that the scene, the device or an option fixes before the driver compiles a shader. This file assigns their ids.
 
 /// A specialization constant of 32 bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -7,23 +7,23 @@ pub struct Constant {
     pub id: u32,
 }
 
-/// What the shaders' side is made of.
+/// A constant, as its GLSL declaration is generated from it.
 pub(super) struct Declaration {
     pub name: &'static str,
     pub kind: &'static str,
-    /// Where nobody sets it.
+    /// Value when the host does not specialize it.
     pub default: &'static str,
-    pub about: &'static str,
+    pub doc: &'static str,
 }
 
 macro_rules! constants {
-    ($(#[doc = $about:literal] $name:ident: $kind:ident = $default:literal;)*) => {
+    ($(#[doc = $doc:literal] $name:ident: $kind:ident = $default:literal;)*) => {
         #[allow(non_camel_case_types, clippy::upper_case_acronyms, reason = "it counts, and has the names of what it counts")]
         enum Number {
             $($name,)*
         }
         $(
-            #[doc = $about]
+            #[doc = $doc]
             pub const $name: Constant = Constant { id: Number::$name as u32 };
         )*
         pub(super) const ALL: &[Declaration] = &[
@@ -31,35 +31,35 @@ macro_rules! constants {
                 name: stringify!($name),
                 kind: stringify!($kind),
                 default: stringify!($default),
-                about: $about,
+                doc: $doc,
             },)*
         ];
     };
 }
 
 constants! {
-    #[doc = "Some surfaces have alpha on both sides of their cutoff: hits ask their material."]
+    #[doc = "Some surfaces have alpha on both sides of their cutoff, so hits are alpha tested."]
     HAS_ALPHA: bool = true;
-    #[doc = "There are analytic spheres."]
+    #[doc = "The scene has analytic spheres."]
     HAS_SPHERES: bool = true;
-    #[doc = "All geometry is one group without a transform: there is no top level."]
+    #[doc = "All geometry is in one BLAS without a transform: there is no TLAS."]
     SINGLE_LEVEL: bool = false;
-    #[doc = "Some surfaces are there with a probability of their alpha."]
+    #[doc = "Some surfaces have stochastic alpha: a hit counts with a probability of its alpha."]
     HAS_COVERAGE: bool = true;
-    #[doc = "Some textures have more than 8 bits a channel."]
+    #[doc = "Some textures have more than 8 bits per channel."]
     HAS_DEEP_TEXELS: bool = true;
-    #[doc = "Entries of a traversal's stack."]
+    #[doc = "Entries of the traversal stack."]
     STACK_SIZE: uint = 64;
-    #[doc = "Rays of each lane of the kernel that traces rays one by one."]
+    #[doc = "Rays per invocation in the kernel that traces single rays."]
     RAYS_PER_LANE: uint = 1;
     #[doc = "Children are visited in the order of the ray's direction on the split axis, not by distance."]
     BY_DIRECTION: bool = false;
-    #[doc = "No ray slips between triangles that share an edge."]
+    #[doc = "Watertight intersection: no ray passes between triangles that share an edge."]
     WATERTIGHT: bool = true;
-    #[doc = "Lanes of a subgroup, a power of two."]
+    #[doc = "Subgroup size, a power of two."]
     SUBGROUP_SIZE: uint = 8;
-    #[doc = "A lane that has made so many iterations takes no further ray; 0: no limit."]
+    #[doc = "An invocation that has made this many iterations fetches no further ray; 0: no limit."]
     MAX_ITERATIONS: uint = 0;
-    #[doc = "Frames have bent normals."]
+    #[doc = "Bent normals are computed."]
     BENT_NORMALS: bool = false;
 }

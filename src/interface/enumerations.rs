@@ -1,6 +1,6 @@
-//! Numbered alternatives that records hold.
+//! Enumerations whose numbers records hold.
 
-/// What the shaders' side is made of.
+/// An enumeration, as its GLSL constants are generated from it.
 pub(super) struct Declaration {
     /// Its file in interface/.
     pub name: &'static str,
@@ -17,23 +17,23 @@ macro_rules! first_number {
     };
 }
 
-/// `from N` numbers the alternatives from N on, `default A` makes one the default.
+/// Declares enumerations: `from N` numbers the variants from N on, `default A` makes one the default.
 macro_rules! enumerations {
     ($(
-        $(#[doc = $about:literal])*
+        $(#[doc = $doc:literal])*
         $name:ident: $file:literal $(from $from:literal)? $(default $default:ident)? {
-            $(#[doc = $first_about:literal])* $first:ident = $first_glsl:literal,
-            $($(#[doc = $variant_about:literal])* $variant:ident = $glsl:literal,)*
+            $(#[doc = $first_doc:literal])* $first:ident = $first_glsl:literal,
+            $($(#[doc = $variant_doc:literal])* $variant:ident = $glsl:literal,)*
         }
     )*) => {
         $(
             shared_enumeration! {
-                $(#[doc = $about])*
+                $(#[doc = $doc])*
                 #[repr(u32)]
                 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
                 pub enum $name {
-                    $(#[doc = $first_about])* $first = first_number!($($from)?),
-                    $($(#[doc = $variant_about])* $variant,)*
+                    $(#[doc = $first_doc])* $first = first_number!($($from)?),
+                    $($(#[doc = $variant_doc])* $variant,)*
                 }
             }
 
@@ -54,106 +54,107 @@ macro_rules! enumerations {
         pub(super) const ALL: &[Declaration] = &[$(Declaration {
             name: $file,
             variants: &[
-                ($first_glsl, $name::$first as u32, concat!($($first_about),*)),
-                $(($glsl, $name::$variant as u32, concat!($($variant_about),*)),)*
+                ($first_glsl, $name::$first as u32, concat!($($first_doc),*)),
+                $(($glsl, $name::$variant as u32, concat!($($variant_doc),*)),)*
             ],
         },)*];
     };
 }
 
 enumerations! {
-    /// How light goes through a material.
+    /// Transmission mode of a material.
     Walls: "walls" {
-        /// It does not.
+        /// No transmission.
         Opaque = "WALLS_NONE",
-        /// Straight on, through surfaces without thickness.
+        /// Straight through thin walls, without refraction.
         Thin = "WALLS_THIN",
-        /// Refracted, into a volume.
+        /// Refraction into a volume.
         Volume = "WALLS_VOLUME",
     }
 
-    /// What a texture looks up outside [0, 1].
+    /// Wrap mode of texture coordinates outside [0, 1].
     Wrap: "wrap" default Repeat {
         /// Tile (glTF's default).
         Repeat = "WRAP_REPEAT",
         /// Tile, every second tile mirrored.
         Mirror = "WRAP_MIRROR",
-        /// Extend the border.
+        /// Clamp to the edge.
         Clamp = "WRAP_CLAMP",
     }
 
-    /// How texels are stored, four channels each.
+    /// Storage of texels, four channels each.
     TexelFormat: "texel_format" {
-        /// 8 bits a channel, a `uint` each.
+        /// 8 bits per channel, a `uint` per texel.
         Unorm8 = "FORMAT_UNORM8",
-        /// 16 bits a channel, a `uvec2` each.
+        /// 16 bits per channel, a `uvec2` per texel.
         Unorm16 = "FORMAT_UNORM16",
-        /// Single precision, a `vec4` each: linear, whatever the use.
+        /// 32-bit floats, a `vec4` per texel: linear, whatever the use.
         Float = "FORMAT_FLOAT",
     }
 
-    /// What a texture's colours are, and so how they are averaged. All levels hold linear values: a texture that is used in two ways has two sets of them.
+    /// The meaning of a texture's values, which decides how mip levels average them. All levels hold linear values: a texture that is used in two ways has two
+    /// sets of levels.
     Texels: "texels" {
-        /// Numbers; of normal maps vectors, whose mean is shorter the more they differ. Shaders normalize that away.
+        /// Linear data. The mean of a normal map's vectors is shorter the more they differ; shaders normalize it.
         Linear = "TEXELS_LINEAR",
-        /// sRGB: averaged as light.
+        /// sRGB colours, averaged as linear light.
         Srgb = "TEXELS_SRGB",
-        /// sRGB of a surface that is there as alpha says. What is not there counts nothing: colours are multiplied by alpha, and stay so.
+        /// sRGB colours with alpha: levels are premultiplied, so that texels of alpha 0 do not contribute.
         Covered = "TEXELS_COVERED",
     }
 
-    /// What a camera ray sees of a surface, instead of light, which is number 0.
+    /// Surface property that a camera ray returns in place of radiance, which is number 0.
     View: "view" from 1 {
-        /// Unit shading normals, world, on the viewer's side; normal maps included.
+        /// Unit shading normals, world space, on the viewer's side; normal maps included.
         Normals = "VIEW_NORMALS",
-        /// Base colours, linear; of mirrors, glass and conductors what they reflect at normal incidence.
+        /// Base colours, linear; for mirrors, glass and conductors the reflectance at normal incidence.
         Albedo = "VIEW_ALBEDO",
-        /// Distance along the ray, world units.
+        /// Distance along the ray, scene units.
         Depth = "VIEW_DEPTH",
-        /// Occlusion that is baked into the material's texture; 1 where there is none.
+        /// Occlusion texture of the material; 1 without one.
         BakedOcclusion = "VIEW_BAKED_OCCLUSION",
     }
 
-    /// Rounds of the pass that gives each pixel its rays of a frame's budget.
+    /// Stages of the pass that distributes a frame's ray budget over pixels.
     BudgetStage: "budget_stage" {
-        /// What each pixel wants.
+        /// The number of samples that each pixel desires.
         DesiredSamples = "STAGE_DESIRED_SAMPLES",
-        /// Sums at levels far apart.
+        /// Sums of desired samples at widely spaced levels.
         Coarse = "STAGE_COARSE",
-        /// Sums at levels between two of them.
+        /// Sums of desired samples at levels between two coarse ones.
         Fine = "STAGE_FINE",
-        /// The rays.
+        /// The list of rays.
         Rays = "STAGE_RAYS",
     }
 }
 
-/// Alternatives that are settings, too: each with its name on the command line and its name in shaders.
+/// Declares enumerations that are also settings: each variant has a name on the command line and a name in shaders.
 macro_rules! choices {
     ($(
-        $(#[doc = $about:literal])*
+        $(#[doc = $doc:literal])*
         $name:ident: $file:literal $(default $default:ident)? {
-            $($(#[doc = $variant_about:literal])+ $variant:ident = $setting:literal, $glsl:literal;)+
+            $($(#[doc = $variant_doc:literal])+ $variant:ident = $setting:literal, $glsl:literal;)+
         }
     )*) => {
         $(
             shared_choice! {
-                $(#[doc = $about])*
+                $(#[doc = $doc])*
                 #[repr(u32)]
                 pub enum $name $((default $default))? {
-                    $($(#[doc = $variant_about])+ $variant = $setting,)+
+                    $($(#[doc = $variant_doc])+ $variant = $setting,)+
                 }
             }
         )*
         pub(super) const CHOICES: &[Declaration] = &[$(Declaration {
             name: $file,
-            variants: &[$(($glsl, $name::$variant as u32, concat!($($variant_about),*)),)*],
+            variants: &[$(($glsl, $name::$variant as u32, concat!($($variant_doc),*)),)*],
         },)*];
     };
 }
 
 choices! {
-    /// Reconstruction filter of pixels, by importance sampling: positions are sampled in proportion to the filter, and count alike (Ernst, Stamminger, Greiner,
-    /// "Filter Importance Sampling", 2006).
+    /// Reconstruction filter of pixels, by importance sampling: positions are sampled in proportion to the filter, and samples have equal weights (Ernst,
+    /// Stamminger, Greiner, "Filter Importance Sampling", 2006).
     PixelFilter: "pixel_filter" {
         /// Box filter of one pixel
         Box = "box", "FILTER_BOX";
@@ -163,9 +164,9 @@ choices! {
         BlackmanHarris = "blackman-harris", "FILTER_BLACKMAN_HARRIS";
     }
 
-    /// A sequence of points in the unit square, for each pixel and frame.
+    /// Sampler of ray directions: a sequence of points in the unit square for each pixel, continued from frame to frame.
     ///
-    /// `Stratified`: sixteen samples in a row, over a pixel's frames, visit each cell of the grid once. `Sobol`: each pixel has a sequence of its own, which
+    /// `Stratified`: sixteen consecutive samples of a pixel, over its frames, visit each cell of a 4x4 grid once. `Sobol`: each pixel has its own sequence, which
     /// frames continue (Burley 2020). `Blue`: one sequence over the image, in the order of a shuffled Morton curve: the samples of an aligned
     /// square of pixels are a net, so that filtering it leaves little error (Ahmed and Wonka, "Screen-Space Blue-Noise Diffusion of Monte Carlo
     /// Sampling Error via Hierarchical Ordering of Pixels", ACM TOG 39(6), 2020); from frame to frame all points are shifted by Roberts' R2 sequence ("The
@@ -183,7 +184,7 @@ choices! {
         R2 = "r2", "SEQUENCE_R2";
     }
 
-    /// Which pixels are sampled in a frame.
+    /// Pattern of the pixels that are sampled in a frame.
     Resolution: "pattern" {
         /// Every pixel in every frame
         Full = "full", "PATTERN_FULL";
@@ -193,8 +194,8 @@ choices! {
         Half = "half", "PATTERN_QUARTER";
     }
 
-    /// What is shown of a frame.
-    Shown: "shown" {
+    /// Buffer of a frame that is displayed.
+    DisplayMode: "shown" {
         /// The filtered result
         Accessibility = "accessibility", "SHOWN_ACCESSIBILITY";
         /// The input of the spatial filter

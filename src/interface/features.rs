@@ -1,17 +1,17 @@
-//! Sets of features: what scenes and options require of the path tracer's shaders. A feature that is not in its set is not compiled. Each set is as many
-//! words as it needs, a specialization constant each, and a feature is a `bool` in the shaders.
+//! Sets of features that scenes and options require of the path tracer's shaders. Code of a feature that is not in its set is specialized out. A set is
+//! stored in as many 32-bit specialization constants as it needs, and a feature is a `bool` in the shaders.
 
 use super::constants::{self, Constant};
 
-/// What the shaders' side is made of.
+/// A set, as its GLSL constants are generated from it.
 pub(super) struct Declaration {
-    /// Its file in interface/, and its words' names in upper case.
+    /// Name of its file in interface/, and in upper case the prefix of its words.
     pub name: &'static str,
-    /// Of the first word.
+    /// `constant_id` of the first word.
     pub first_id: u32,
-    /// Features are in the set where nobody says what is.
+    /// All features are in the set when the host does not specialize it.
     pub is_full: bool,
-    /// In the shaders a feature is its number, to be looked up, and no `bool`.
+    /// In the shaders a feature is a number, to be looked up in the set, and not a `bool`.
     pub is_indexed: bool,
     /// Names in the shaders, and what they mean.
     pub features: &'static [(&'static str, &'static str)],
@@ -19,11 +19,11 @@ pub(super) struct Declaration {
 
 macro_rules! feature_set {
     (
-        $(#[doc = $set_about:literal])*
-        $set:ident of $(#[doc = $feature_about:literal])* $feature:ident: $file:literal, from $first:expr, full $is_full:literal, indexed $is_indexed:literal, $declaration:ident;
+        $(#[doc = $set_doc:literal])*
+        $set:ident of $(#[doc = $feature_doc:literal])* $feature:ident: $file:literal, from $first:expr, full $is_full:literal, indexed $is_indexed:literal, $declaration:ident;
         $($variant:ident = $name:literal, $label:literal;)*
     ) => {
-        $(#[doc = $feature_about])*
+        $(#[doc = $feature_doc])*
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
         #[allow(missing_docs, reason = "label() says what each is")]
         pub enum $feature {
@@ -34,7 +34,7 @@ macro_rules! feature_set {
             /// All of them, in order.
             pub const ALL: &'static [Self] = &[$(Self::$variant,)*];
 
-            /// What it is, in words.
+            /// Name for people.
             pub fn label(self) -> &'static str {
                 match self {
                     $(Self::$variant => $label,)*
@@ -42,7 +42,7 @@ macro_rules! feature_set {
             }
         }
 
-        $(#[doc = $set_about])*
+        $(#[doc = $set_doc])*
         #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
         pub struct $set {
             words: [u32; Self::WORDS],
@@ -68,12 +68,12 @@ macro_rules! feature_set {
                 }
             }
 
-            /// The specialization constants that say it to shaders, with their values.
+            /// The specialization constants of the set, with their values.
             pub fn constants(self) -> impl Iterator<Item = (Constant, u32)> {
                 self.words.into_iter().zip($first..).map(|(word, id)| (Constant { id }, word))
             }
 
-            /// Words of what is in the set, and of what is not.
+            /// Labels of the features that are in the set, and of those that are not.
             pub fn labels(self) -> [Vec<&'static str>; 2] {
                 [true, false].map(|there| {
                     $feature::ALL.iter().filter(|&&f| self.contains(f) == there).map(|f| f.label()).collect()
@@ -103,7 +103,7 @@ const LIGHT_FIRST: u32 = PATH_FIRST + PathFeatures::WORDS as u32;
 feature_set! {
     /// The reflection models of a scene's materials.
     BsdfModels of /// A reflection model: `HAS_NAME` stands for `shaders/bsdf/name.glsl`, which defines `name_setup`, `name_eval`, `name_sample`, `name_has_smooth_part` and
-    /// `name_has_rough_part` (shaders/bsdf/bsdf.glsl says what they do). What calls them is made of this list ([`super::glsl`]).
+    /// `name_has_rough_part` (shaders/bsdf/bsdf.glsl says what they do). The functions that dispatch to them are generated from this list ([`super::glsl`]).
     BsdfModel: "bsdf_models", from BSDF_FIRST, full true, indexed false, BSDF;
     Gltf = "HAS_GLTF", "metallic-roughness";
     Diffuse = "HAS_DIFFUSE", "Lambert";
@@ -114,8 +114,8 @@ feature_set! {
 }
 
 feature_set! {
-    /// What the materials of a scene require.
-    MaterialFeatures of /// What a material may require of shaders.
+    /// Features that the materials of a scene require.
+    MaterialFeatures of /// A feature that materials may require of shaders.
     MaterialFeature: "material_features", from MATERIAL_FIRST, full true, indexed false, MATERIAL;
     Unlit = "HAS_UNLIT", "unlit surfaces";
     Clearcoat = "HAS_CLEARCOAT", "clearcoat";
@@ -134,7 +134,7 @@ feature_set! {
 
 feature_set! {
     /// Which textures the materials of a scene have.
-    TextureFeatures of /// Textures of a material beside its base colour's; numbered as the slots of a material.
+    TextureFeatures of /// A texture of a material other than its base colour's; the number is its slot in `ShadingRecord::uses`.
     TextureFeature: "texture_features", from TEXTURE_FIRST, full true, indexed true, TEXTURE;
     MetallicRoughness = "USE_METALLIC_ROUGHNESS", "metallic-roughness";
     Emission = "USE_EMISSION", "emissive";
@@ -152,8 +152,8 @@ feature_set! {
 }
 
 feature_set! {
-    /// What the lights of a scene and the options of a render require of paths.
-    PathFeatures of /// What lights and options may require of paths.
+    /// Features that the lights of a scene and the options of a render require of paths.
+    PathFeatures of /// A feature that lights and options may require of paths.
     PathFeature: "path_features", from PATH_FIRST, full false, indexed false, PATH;
     LightTree = "WITH_LIGHT_TREE", "light tree";
     LightChoice = "WITH_LIGHT_CHOICE", "a choice among lights";
@@ -165,14 +165,14 @@ feature_set! {
     ConstantAlbedo = "WITH_CONSTANT_ALBEDO", "constant albedo";
     View = "WITH_VIEW", "auxiliary view";
     Clamp = "WITH_CLAMP", "radiance clamp";
-    MinDepth = "WITH_MIN_DEPTH", "least number of bounces";
+    MinDepth = "WITH_MIN_DEPTH", "minimum depth";
     Lens = "WITH_LENS", "thin lens";
     PixelFilter = "WITH_PIXEL_FILTER", "pixel filter";
     RayCones = "WITH_RAY_CONES", "ray cones";
     DistantDisks = "WITH_DISTANT_DISKS", "directional lights of angular diameter above 0";
     Media = "WITH_MEDIA", "volumes that absorb or nest";
     ClearWalls = "WITH_CLEAR_WALLS", "thin walls that light passes straight";
-    SpecularOnly = "WITH_SPECULAR_ONLY", "paths of delta lobes alone";
+    SpecularOnly = "WITH_SPECULAR_ONLY", "paths of delta lobes only";
 }
 
 feature_set! {
@@ -190,22 +190,22 @@ feature_set! {
     Spot = "HAS_SPOT_LIGHTS", "spot lights";
 }
 
-/// What of the path tracer's shaders a scene requires.
+/// The features of the path tracer's shaders that a scene's materials require.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct ShadingFeatures {
-    /// Reflection models of its materials.
+    /// Reflection models.
     pub bsdfs: BsdfModels,
-    /// What else its materials require.
+    /// Other features of materials.
     pub materials: MaterialFeatures,
-    /// Of their textures.
+    /// Textures of materials.
     pub textures: TextureFeatures,
 }
 
-/// All sets.
+/// All sets, in the order of their specialization constants.
 pub(super) const SETS: [&Declaration; 5] = [&BSDF, &MATERIAL, &TEXTURE, &PATH, &LIGHTS];
 
 impl BsdfModel {
-    /// As records hold it: 0 is no model, which absorbs everything.
+    /// Number in records; 0 is no model, which absorbs everything.
     pub const fn number(self) -> u32 {
         self as u32 + 1
     }
@@ -229,7 +229,7 @@ mod tests {
         assert_eq!(set.constants().map(|c| c.1).collect::<Vec<_>>(), [1 | 1 << PathFeature::ClearWalls as u32]);
     }
 
-    /// No two constants have one number: those by name, then the words of each set.
+    /// All specialization constants have different ids: the named ones, then the words of each set.
     #[test]
     fn numbers_are_given_out_once() {
         let mut ids: Vec<u32> = (0..constants::ALL.len() as u32).collect();

@@ -1,4 +1,4 @@
-//! The shaders' side of the declarations.
+//! Generates the GLSL side of the declarations.
 
 use std::fmt::Write as _;
 
@@ -46,7 +46,7 @@ fn file(name: &str, text: &str) -> (String, String) {
     let guard = format!("INTERFACE_{}", name.to_uppercase());
     (
         format!("interface/{name}.glsl"),
-        format!("// Made of the declarations in src/interface.\n#ifndef {guard}\n#define {guard}\n{text}#endif\n"),
+        format!("// Generated from the declarations in src/interface.\n#ifndef {guard}\n#define {guard}\n{text}#endif\n"),
     )
 }
 
@@ -54,8 +54,7 @@ fn constants() -> String {
     let mut text = String::new();
     for (id, c) in constants::ALL.iter().enumerate() {
         let suffix = if c.kind == "uint" { "u" } else { "" };
-        let _ =
-            writeln!(text, "layout(constant_id = {id}) const {} {} = {}{suffix};  //{}", c.kind, c.name, c.default, c.about);
+        let _ = writeln!(text, "layout(constant_id = {id}) const {} {} = {}{suffix};  //{}", c.kind, c.name, c.default, c.doc);
     }
     text
 }
@@ -64,14 +63,14 @@ fn feature_set(set: &features::Declaration) -> String {
     let mut text = String::new();
     if set.name == features::BSDF.name {
         let _ = writeln!(text, "const uint BSDF_NONE = 0u;  // absorbs everything");
-        for (number, (name, about)) in (1..).zip(set.features) {
-            let _ = writeln!(text, "const uint BSDF_{} = {number}u;  // {about}", name.trim_start_matches("HAS_"));
+        for (number, (name, doc)) in (1..).zip(set.features) {
+            let _ = writeln!(text, "const uint BSDF_{} = {number}u;  // {doc}", name.trim_start_matches("HAS_"));
         }
     }
     if set.name == features::LIGHTS.name {
-        for (number, (name, about)) in set.features.iter().enumerate() {
+        for (number, (name, doc)) in set.features.iter().enumerate() {
             let name = name.trim_start_matches("HAS_").trim_end_matches("_LIGHTS");
-            let _ = writeln!(text, "const uint LIGHT_{name} = {number}u;  // {about}");
+            let _ = writeln!(text, "const uint LIGHT_{name} = {number}u;  // {doc}");
         }
     }
     let (words, all) = (set.name.to_uppercase(), if set.is_full { "0xffffffffu" } else { "0u" });
@@ -79,17 +78,17 @@ fn feature_set(set: &features::Declaration) -> String {
         let _ = writeln!(text, "layout(constant_id = {}) const uint {words}_{word} = {all};", set.first_id as usize + word);
     }
     let _ = writeln!(text, "const uint {words}_COUNT = {}u;", set.features.len());
-    for (k, (name, about)) in set.features.iter().enumerate() {
+    for (k, (name, doc)) in set.features.iter().enumerate() {
         if set.is_indexed {
-            let _ = writeln!(text, "const uint {name} = {k}u;  // {about}");
+            let _ = writeln!(text, "const uint {name} = {k}u;  // {doc}");
             continue;
         }
-        let _ = writeln!(text, "const bool {name} = ({words}_{} & 0x{:x}u) != 0u;  // {about}", k / 32, 1u32 << (k % 32));
+        let _ = writeln!(text, "const bool {name} = ({words}_{} & 0x{:x}u) != 0u;  // {doc}", k / 32, 1u32 << (k % 32));
     }
     text
 }
 
-/// The reflection models' numbers in records, and the functions that choose among them. Models that no material has are not compiled.
+/// Generates the numbers of reflection models, and the functions that dispatch to them. Models that no material has are not compiled.
 fn bsdf_dispatch() -> String {
     // HAS_NAME
     let names: Vec<_> = features::BSDF.features.iter().map(|(name, _)| name.trim_start_matches("HAS_").to_owned()).collect();
@@ -114,7 +113,7 @@ fn bsdf_dispatch() -> String {
     text
 }
 
-/// The functions that choose among kinds of lights. Kinds that no light has are not compiled, and where all lights are of one kind, nothing is compared.
+/// Generates the functions that dispatch to kinds of lights. Kinds that no light has are not compiled, and if all lights are of one kind, there is no branch.
 fn light_dispatch() -> String {
     let names: Vec<_> = features::LIGHTS
         .features
@@ -144,8 +143,8 @@ fn light_dispatch() -> String {
 
 fn enumeration(e: &enumerations::Declaration) -> String {
     let mut text = String::new();
-    for (name, number, about) in e.variants {
-        let _ = writeln!(text, "const uint {name} = {number}u;  //{about}");
+    for (name, number, doc) in e.variants {
+        let _ = writeln!(text, "const uint {name} = {number}u;  //{doc}");
     }
     let _ = writeln!(text, "const uint {}_COUNT = {}u;", e.name.to_uppercase(), e.variants.len());
     text
@@ -158,16 +157,16 @@ fn record_file(file: &File) -> String {
             Number::uint(n) => ("uint", format!("{n}u")),
             Number::float(x) => ("float", format!("{x:?}")),
         };
-        let _ = writeln!(text, "const {kind} {} = {number};  //{}", value.name, value.about.concat());
+        let _ = writeln!(text, "const {kind} {} = {number};  //{}", value.name, value.doc.concat());
     }
     file.records.iter().for_each(|r| text += &record(r));
     text
 }
 
-/// A record, and what it takes in memory.
+/// Declares a record, and constants of its size.
 fn record(record: &Record) -> String {
     let (name, constant) = (record.name, constant_name(record.name));
-    let mut text: String = record.about.iter().map(|line| format!("//{line}\n")).collect();
+    let mut text: String = record.doc.iter().map(|line| format!("//{line}\n")).collect();
     let buffer = |access: &str, align: usize| {
         let access = if access.is_empty() { String::new() } else { format!("{access} ") };
         format!("layout(buffer_reference, std430, buffer_reference_align = {align}) {access}buffer")
@@ -195,11 +194,11 @@ fn member(field: &Field) -> String {
         kind => kind,
     };
     let counts: String = field.counts.iter().map(|n| format!("[{n}]")).collect();
-    format!("    {kind} {}{counts};  //{}\n", field.name, field.about.concat())
+    format!("    {kind} {}{counts};  //{}\n", field.name, field.doc.concat())
 }
 
-/// Macros for the words of a field, one for each element of an array, numbered. Those of more than two words, or of two that lie in two pairs, take the
-/// constructor that makes a vector of them.
+/// Generates macros for the words of a field, one for each element of an array, numbered. Macros of more than two words, or of two words in different pairs,
+/// take the constructor of their vector as a parameter.
 fn word_macros(record: &str, field: &Field) -> String {
     let elements: usize = field.counts.iter().product();
     let words = field.size / 4 / elements;
@@ -218,8 +217,8 @@ fn word_macros(record: &str, field: &Field) -> String {
             let _ = write!(name, "_{element}");
         }
         let _ = match parts.as_slice() {
-            [one] => writeln!(text, "#define {name} {one}  //{}", field.about.concat()),
-            several => writeln!(text, "#define {name}(T) T({})  //{}", several.join(", "), field.about.concat()),
+            [one] => writeln!(text, "#define {name} {one}  //{}", field.doc.concat()),
+            several => writeln!(text, "#define {name}(T) T({})  //{}", several.join(", "), field.doc.concat()),
         };
     }
     text
@@ -254,7 +253,9 @@ mod tests {
         let scene = text("scene");
         assert!(scene.contains("readonly buffer InstanceRecords { InstanceRecord v[]; };"), "{scene}");
         assert!(scene.contains("    vec4 group_to_world[3];"), "{scene}");
-        assert!(text("block").starts_with("// Made of") && text("block").contains("#include \"interface/queue.glsl\"\n"));
+        assert!(
+            text("block").starts_with("// Generated from") && text("block").contains("#include \"interface/queue.glsl\"\n")
+        );
         assert!(text("ray").contains("layout(push_constant) uniform Push {"));
     }
 

@@ -1,6 +1,6 @@
-//! How records are declared: memory that the CPU writes and shaders read, or the other way. `records!` makes of one declaration the `#[repr(C)]` struct, its
-//! documentation, and a table of its fields; [`super::glsl`] makes the shaders' side of the table, and build.rs holds that against what the shader compiler
-//! made of it ([`mismatches`]).
+//! Declares records: memory that the CPU writes and shaders read, or vice versa. From one declaration `records!` generates the `#[repr(C)]` struct, its
+//! documentation, and a table of its fields; [`super::glsl`] generates the GLSL declaration from the table, and build.rs compares its layout in SPIR-V with
+//! the table ([`mismatches`]).
 //!
 //! Types are GLSL's: `float`, `int`, `uint`, `vec2` to `vec4`, `uvec2` to `uvec4`, other records, and arrays of these. Besides there are `address`, of
 //! device memory (`u64`; a `uvec2` in shaders, which need no 64-bit integers then), and `bytes8` (`[u8; 8]`; a `uvec2`).
@@ -12,21 +12,21 @@ pub struct File {
     pub name: &'static str,
     /// Other such files whose records it uses.
     pub includes: &'static [&'static str],
-    /// Numbers that both sides know.
+    /// Constants that Rust and GLSL share.
     pub values: &'static [Value],
     /// The records.
     pub records: &'static [Record],
 }
 
-/// A number that both sides know.
+/// A constant that Rust and GLSL share.
 #[derive(Debug)]
 pub struct Value {
     /// Its name on both sides.
     pub name: &'static str,
-    /// What it is.
+    /// Its value.
     pub number: Number,
     /// Documentation, in lines.
-    pub about: &'static [&'static str],
+    pub doc: &'static [&'static str],
 }
 
 /// A number of one of GLSL's types.
@@ -44,14 +44,14 @@ pub enum Number {
 pub struct Record {
     /// Its name on both sides.
     pub name: &'static str,
-    /// What shaders read it as.
+    /// How shaders access it.
     pub form: Form,
     /// Bytes on the CPU's side.
     pub size: usize,
     /// Its fields, in order.
     pub fields: &'static [Field],
     /// Documentation, in lines.
-    pub about: &'static [&'static str],
+    pub doc: &'static [&'static str],
 }
 
 /// A field of a record.
@@ -68,13 +68,13 @@ pub struct Field {
     /// Bytes on the CPU's side.
     pub size: usize,
     /// Documentation, in lines.
-    pub about: &'static [&'static str],
+    pub doc: &'static [&'static str],
 }
 
-/// What shaders read a record as.
+/// How shaders access a record.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Form {
-    /// A `struct`, part of other records or read by code of its own.
+    /// A `struct`, part of other records or loaded by hand-written code.
     Structure,
     /// A `struct`, and a buffer of them by address.
     Array {
@@ -94,8 +94,8 @@ pub enum Form {
     },
     /// The push constants, as `push`.
     Push,
-    /// Pairs of 32-bit words, loaded by code of its own into `w0`, `w1`, ...: macros name the fields. So are records that are read as one of several kinds, or
-    /// whose fields do not lie where GLSL would have them.
+    /// Pairs of 32-bit words, loaded by hand-written code into `w0`, `w1`, ...: macros name the fields. For records that may be of several kinds, or whose
+    /// layout is not GLSL's.
     Words,
 }
 
@@ -110,7 +110,7 @@ pub struct Reflected {
     pub stride: Option<usize>,
 }
 
-/// Where records lie elsewhere for shaders than for the CPU: of each its first such field, with both names and offsets.
+/// Finds records whose layout in SPIR-V differs from that in Rust, and describes the first such field of each.
 pub fn mismatches<'a>(records: impl IntoIterator<Item = &'a Record>, reflected: &[Reflected]) -> Vec<String> {
     let mut out = Vec::new();
     for record in records.into_iter().filter(|r| r.form != Form::Words) {
@@ -122,7 +122,7 @@ pub fn mismatches<'a>(records: impl IntoIterator<Item = &'a Record>, reflected: 
         if record.fields.len() != other.members.len() {
             out.push(format!("record {name}: {} fields in Rust, {} in SPIR-V", record.fields.len(), other.members.len()));
         }
-        // what follows a field that lies elsewhere, does so, too
+        // the fields after a misplaced one are misplaced, too: report the first
         let mut pairs = record.fields.iter().zip(&other.members);
         if let Some((field, (member, offset, size))) =
             pairs.find(|(field, (member, offset, size))| (field.name, field.offset, field.size) != (member, *offset, *size))
@@ -141,7 +141,7 @@ pub fn mismatches<'a>(records: impl IntoIterator<Item = &'a Record>, reflected: 
     out
 }
 
-/// The CPU's side of a type.
+/// The Rust type of a GLSL type.
 macro_rules! rust_type {
     (float) => {
         f32
@@ -220,39 +220,39 @@ macro_rules! records {
         $file:literal
         $(includes $($include:literal)+)?
         $(values {
-            $($(#[doc = $value_about:literal])* $value:ident: $value_kind:ident = $number:expr;)*
+            $($(#[doc = $value_doc:literal])* $value:ident: $value_kind:ident = $number:expr;)*
         })?;
         $(
-            $(#[doc = $about:literal])*
+            $(#[doc = $doc:literal])*
             $name:ident: $form:ident $($argument:ident)* $($align:literal)? {
-                $($(#[doc = $field_about:literal])* $field:ident: $kind:ident $([$count:expr])*,)*
+                $($(#[doc = $field_doc:literal])* $field:ident: $kind:ident $([$count:expr])*,)*
             }
         )*
     ) => {
         #[allow(unused_imports, reason = "a file may have values alone, or records alone")]
         use super::super::layout::{Field, File, Form, Number, Record, Value};
         $($(
-            $(#[doc = $value_about])*
+            $(#[doc = $value_doc])*
             pub const $value: rust_type!($value_kind) = $number;
         )*)?
         $(
             shared_record! {
-                $(#[doc = $about])*
+                $(#[doc = $doc])*
                 #[repr(C)]
                 #[derive(Clone, Copy, Debug, Default, PartialEq)]
                 pub struct $name {
-                    $($(#[doc = $field_about])* pub $field: rust_type!($kind $([$count])*),)*
+                    $($(#[doc = $field_doc])* pub $field: rust_type!($kind $([$count])*),)*
                 }
             }
         )*
-        /// What shaders are told.
+        /// The table from which the GLSL declarations are generated.
         pub const FILE: File = File {
             name: $file,
             includes: &[$($($include),+)?],
             values: &[$($(Value {
                 name: stringify!($value),
                 number: Number::$value_kind($value),
-                about: &[$($value_about),*],
+                doc: &[$($value_doc),*],
             },)*)?],
             records: &[$(Record {
                 name: stringify!($name),
@@ -264,9 +264,9 @@ macro_rules! records {
                     counts: &[$($count),*],
                     offset: core::mem::offset_of!($name, $field),
                     size: size_of::<rust_type!($kind $([$count])*)>(),
-                    about: &[$($field_about),*],
+                    doc: &[$($field_doc),*],
                 },)*],
-                about: &[$($about),*],
+                doc: &[$($doc),*],
             },)*],
         };
     };
@@ -281,10 +281,10 @@ mod tests {
         form: Form::Array { buffer: "Spheres", access: "readonly", align: 16 },
         size: 16,
         fields: &[
-            Field { name: "center", kind: "vec3", counts: &[], offset: 0, size: 12, about: &[] },
-            Field { name: "radius", kind: "float", counts: &[], offset: 12, size: 4, about: &[] },
+            Field { name: "center", kind: "vec3", counts: &[], offset: 0, size: 12, doc: &[] },
+            Field { name: "radius", kind: "float", counts: &[], offset: 12, size: 4, doc: &[] },
         ],
-        about: &[],
+        doc: &[],
     };
 
     fn reflected() -> Reflected {
@@ -299,8 +299,8 @@ mod tests {
     #[test]
     fn a_wrong_table_is_named() {
         let fields = &[
-            Field { name: "radius", kind: "float", counts: &[], offset: 0, size: 4, about: &[] },
-            Field { name: "center", kind: "vec3", counts: &[], offset: 4, size: 12, about: &[] },
+            Field { name: "radius", kind: "float", counts: &[], offset: 0, size: 4, doc: &[] },
+            Field { name: "center", kind: "vec3", counts: &[], offset: 4, size: 12, doc: &[] },
         ];
         let swapped = mismatches([&Record { fields, ..RIGHT }], &[reflected()]);
         assert_eq!(

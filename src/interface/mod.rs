@@ -1,9 +1,9 @@
-//! What the program and its shaders share, declared once: records in device memory and push constants, numbers, specialization constants, sets of features,
-//! and numbered alternatives. The shaders' side is text that [`glsl::files`] makes of the same declarations: a shader says
+//! The interface of the program and its shaders, declared once: records in device memory and push constants, numbers, specialization constants, sets of
+//! features, and enumerations. The GLSL side is text that [`glsl::files`] generates from the same declarations: a shader includes it by
 //! `#include "interface/scene.glsl"`.
 //!
-//! build.rs compiles this folder, too, so nothing of the crate is used here, nor of its dependencies: what the crate derives for these types beside, its
-//! macros `shared_record`, `shared_enumeration` and `shared_choice` say (src/lib.rs); those of build.rs derive nothing.
+//! build.rs compiles this folder, too, so it uses nothing of the crate or its dependencies. The crate's macros `shared_record`, `shared_enumeration` and
+//! `shared_choice` (src/lib.rs) add derives to these types; those of build.rs derive nothing.
 
 pub mod constants;
 pub mod enumerations;
@@ -13,7 +13,7 @@ pub mod glsl;
 pub mod layout;
 pub mod records;
 
-pub use enumerations::{BudgetStage, PixelFilter, Resolution, Sequence, Shown, TexelFormat, Texels, View, Walls, Wrap};
+pub use enumerations::{BudgetStage, DisplayMode, PixelFilter, Resolution, Sequence, TexelFormat, Texels, View, Walls, Wrap};
 pub use features::{
     BsdfModel, BsdfModels, LightKind, LightKinds, MaterialFeature, MaterialFeatures, PathFeature, PathFeatures,
     ShadingFeatures, TextureFeature, TextureFeatures,

@@ -6,7 +6,7 @@ use crate::error::{Error, Result};
 use crate::integrators::ao::settings::AoSettings;
 use crate::output::{apng, frames};
 use crate::raster::Primary;
-use crate::realtime::display::Shown;
+use crate::realtime::display::DisplayMode;
 use crate::realtime::{Budget, FilterKind, Preset, Resolution, Settings, Technique};
 use crate::sampling::Sequence;
 #[cfg(feature = "cli")]
@@ -104,7 +104,7 @@ settings! {
         /// Maximum filter radius in pixels [default: the preset's]
         filter_radius: Option<u32>, option(value_name = "PIXELS", value_parser = clap::value_parser!(u32).range(0..=16)), applies(FRAMES);
         /// What .png and .apng outputs show [default: accessibility]
-        show: Option<Shown>, option(value_name = "NAME", value_enum), applies(FRAMES);
+        show: Option<DisplayMode>, option(value_name = "NAME", value_enum), applies(FRAMES);
     }
 }
 

@@ -63,7 +63,7 @@ impl Range {
 
 /// What a pass reads and writes.
 #[derive(Clone, Debug, Default)]
-pub struct Uses {
+pub struct ResourceUse {
     /// What it reads.
     pub reads: Vec<Resource>,
     /// What it reads as the previous frame left it.
@@ -74,7 +74,7 @@ pub struct Uses {
     pub clears: Vec<(Resource, u32)>,
 }
 
-impl Uses {
+impl ResourceUse {
     /// Reads and writes.
     pub fn new(reads: &[Resource], writes: &[Resource]) -> Self {
         Self { reads: reads.to_vec(), writes: writes.to_vec(), ..Default::default() }
@@ -113,7 +113,7 @@ impl Uses {
 /// A pass of a frame: a file in src/realtime/passes.
 pub trait Pass {
     /// What it reads and writes with this display.
-    fn uses(&self, display: Option<&Display>) -> Uses;
+    fn uses(&self, display: Option<&Display>) -> ResourceUse;
 
     /// Does it take part in frames with this display?
     fn is_enabled(&self, _display: Option<&Display>) -> bool {
@@ -148,7 +148,7 @@ impl Stage {
     }
 
     /// What its passes read and write while nothing is shown.
-    pub fn uses(&self) -> impl Iterator<Item = Uses> + '_ {
+    pub fn uses(&self) -> impl Iterator<Item = ResourceUse> + '_ {
         self.passes.iter().map(|p| p.uses(None))
     }
 }
@@ -192,7 +192,7 @@ impl Graph {
         let mut recorded = Vec::new();
         for (k, stage) in self.stages.iter_mut().enumerate() {
             let enabled = || stage.passes.iter().filter(|p| p.is_enabled(display));
-            let uses: Vec<Uses> = enabled().map(|p| p.uses(display)).collect();
+            let uses: Vec<ResourceUse> = enabled().map(|p| p.uses(display)).collect();
             if uses.is_empty() {
                 continue;
             }

@@ -24,7 +24,7 @@ use crate::raster::Primary;
 use crate::shaders::StreamShaders;
 use crate::tracer::gpu_scene::rows;
 use crate::tracer::{Moved, Tracer};
-use display::{Display, Shown};
+use display::{Display, DisplayMode};
 use graph::{Frame, Graph, Params};
 use params::{FrameParams, moved_records};
 pub use passes::display;
@@ -48,7 +48,7 @@ pub struct FrameStats {
     pub occlusion_rays: u64,
     /// Occlusion rays that this many pixels would have taken, and that were left out: nothing is there, or all is known.
     pub skipped_rays: u64,
-    /// BVH nodes that the frame's camera rays visit; `None` unless they are shown ([`Shown::Nodes`]).
+    /// BVH nodes that the frame's camera rays visit; `None` unless they are shown ([`DisplayMode::Nodes`]).
     pub nodes: Option<NodeVisits>,
 }
 
@@ -204,7 +204,7 @@ impl Realtime {
             primary_rays: if still || self.settings.primary == Some(Primary::Raster) { 0 } else { pixels },
             occlusion_rays,
             skipped_rays: all.saturating_sub(occlusion_rays),
-            nodes: match self.display.is_some_and(|d| d.shown == Shown::Nodes) {
+            nodes: match self.display.is_some_and(|d| d.shown == DisplayMode::Nodes) {
                 true => Some(NodeVisits::read(self.graph.resources(), pixels)?),
                 false => None,
             },
@@ -219,7 +219,7 @@ impl Realtime {
     pub fn display(&mut self, tracer: &Tracer, display: Option<Display>) -> Result<()> {
         if let Some(display) = &display {
             display.shown.check(&self.settings)?;
-            let is_nodes = display.shown == Shown::Nodes;
+            let is_nodes = display.shown == DisplayMode::Nodes;
             if !self.has_display[usize::from(is_nodes)] {
                 let stage = match is_nodes {
                     true => nodes::stage(tracer, self.block())?,
@@ -239,7 +239,7 @@ impl Realtime {
     /// The last frame as [`Realtime::display`] asked for it, in device memory: a word a pixel, rows from the top, the bytes red, green,
     /// blue and 255. `None` before the first time.
     pub fn displayed(&self) -> Option<&Buffer> {
-        self.graph.resources().buffer(Resource::Words)
+        self.graph.resources().buffer(Resource::DisplayImage)
     }
 
     /// Ambient visibility of each pixel of the last frame, rows from the top; 0 where nothing is.
@@ -269,7 +269,7 @@ impl Realtime {
     /// [`Error::Usage`] without [`Settings::bent`], and those of the device.
     pub fn bent(&self) -> Result<Vec<[f32; 3]>> {
         if !self.settings.bent {
-            return Err(display::bent_is_off());
+            return Err(display::bent_normals_disabled());
         }
         self.read(Resource::BentResult)
     }

@@ -55,7 +55,7 @@ pub enum Resource {
     /// Filtered bent normals.
     BentResult,
     /// The frame as it is shown.
-    Words,
+    DisplayImage,
     /// BVH nodes that camera rays visit.
     Nodes,
     /// Budget: deviation of one sample and number of samples, pixels in tiles.
@@ -65,11 +65,11 @@ pub enum Resource {
     /// Budget: each pixel's rays and its limit of samples.
     Plan,
     /// Budget: each ray's pixel.
-    List,
+    RayPixels,
     /// Budget: rays that each pixel has had in all frames.
-    Taken,
+    TotalRays,
     /// Larsen: lights that each pixel sees.
-    Lit,
+    VisibleLights,
     /// Larsen: occlusion at half resolution.
     Occlusion,
     /// Larsen: one minus occlusion, blurred, at full resolution.
@@ -135,14 +135,14 @@ impl Resource {
             Self::FilteredBent(_) => device("filtered bent normals", VECTOR_BYTES * pixels, Frame),
             Self::Result => readback("ambient visibility", 4 * pixels),
             Self::BentResult => device("bent normals", VECTOR_BYTES * pixels, Kept),
-            Self::Words => device("display", 4 * pixels, Kept),
+            Self::DisplayImage => device("display", 4 * pixels, Kept),
             Self::Nodes => readback("visited nodes", 4 * pixels),
             Self::DesiredSamples => device("desired samples", 8 * tiled_pixels, Frame),
             Self::Sums => device("sums of desired samples", 4 * u64::from(SUMS_COUNT), Frame),
             Self::Plan => device("plan of rays", 8 * pixels, Frame),
-            Self::List => device("list of rays", 4 * most_rays * pixels, Frame),
-            Self::Taken => device("rays taken", 4 * pixels, Kept),
-            Self::Lit => device("visible lights", 4 * pixels, Frame),
+            Self::RayPixels => device("list of rays", 4 * most_rays * pixels, Frame),
+            Self::TotalRays => device("rays taken", 4 * pixels, Kept),
+            Self::VisibleLights => device("visible lights", 4 * pixels, Frame),
             Self::Occlusion => device("occlusion", 4 * half_pixels, Frame),
             Self::Combined => device("combined", 4 * pixels, Frame),
             Self::PreviousResult => device("previous frame", 4 * pixels, Frame),

@@ -20,7 +20,7 @@ pub enum CameraMotion {
 
 /// An animation that is played.
 #[derive(Debug)]
-struct Played<'a> {
+struct AnimationPlayback<'a> {
     rig: &'a Rig,
     animation: usize,
     pose: Pose,
@@ -28,12 +28,12 @@ struct Played<'a> {
 
 /// What frames of a scene show.
 #[derive(Debug)]
-pub struct Sequence<'a> {
+pub struct FrameSequence<'a> {
     camera: Camera,
     /// The camera's index in the file, where it is one of the file's.
     file_camera: Option<usize>,
     motion: CameraMotion,
-    played: Option<Played<'a>>,
+    played: Option<AnimationPlayback<'a>>,
     frames_per_second: f64,
 }
 
@@ -51,7 +51,7 @@ pub fn find_animation(scene: &Scene, wanted: &str) -> Result<usize> {
     })
 }
 
-impl<'a> Sequence<'a> {
+impl<'a> FrameSequence<'a> {
     /// `file_camera`: the index of `camera` in the scene, so that an animation that moves it is followed. `animation`: an index
     /// ([`find_animation`]).
     ///
@@ -69,7 +69,7 @@ impl<'a> Sequence<'a> {
             None => None,
             Some(animation) => {
                 let rig = scene.rig.as_ref().ok_or_else(|| Error::Usage("the scene has no animations".into()))?;
-                Some(Played { rig, animation, pose: Pose::default() })
+                Some(AnimationPlayback { rig, animation, pose: Pose::default() })
             }
         };
         Ok(Self { camera, file_camera, motion, played, frames_per_second })

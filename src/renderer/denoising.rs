@@ -16,16 +16,16 @@ use crate::output::{Channel, Samples};
 const CHANNELS: [&str; 3] = ["R", "G", "B"];
 
 /// Interruptions are errors where work is to be given up, and nothing where what there is is kept: it is denoised to its end.
-struct Unstoppable<'a>(&'a mut dyn Control);
+struct UninterruptedControl<'a>(&'a mut dyn Control);
 
-impl Control for Unstoppable<'_> {
+impl Control for UninterruptedControl<'_> {
     fn should_stop(&mut self) -> Result<bool> {
         self.0.should_stop().map(|_| false)
     }
 }
 
 /// A denoiser, and why it is that one.
-pub struct Chosen {
+pub struct SelectedDenoiser {
     denoiser: Denoiser,
     why: String,
 }
@@ -34,26 +34,26 @@ pub struct Chosen {
 ///
 /// # Errors
 /// [`crate::Error::Device`] for one that is not there, and what helps.
-pub fn choose(choice: Option<DenoiseChoice>) -> Result<Option<Chosen>> {
+pub fn choose(choice: Option<DenoiseChoice>) -> Result<Option<SelectedDenoiser>> {
     let Some(choice) = choice else { return Ok(None) };
     let filter = || Denoiser::Filter(Default::default());
     let oidn = |oidn: Oidn| {
         let why = format!("Open Image Denoise {}", oidn.version());
-        Chosen { denoiser: Denoiser::Oidn(oidn), why }
+        SelectedDenoiser { denoiser: Denoiser::Oidn(oidn), why }
     };
     Ok(Some(match choice {
-        DenoiseChoice::Filter => Chosen { denoiser: filter(), why: "asked for".into() },
+        DenoiseChoice::Filter => SelectedDenoiser { denoiser: filter(), why: "asked for".into() },
         DenoiseChoice::Oidn => oidn(Oidn::open()?),
         DenoiseChoice::Auto => match Oidn::open() {
             Ok(library) => oidn(library),
-            Err(e) => Chosen { denoiser: filter(), why: e.to_string() },
+            Err(e) => SelectedDenoiser { denoiser: filter(), why: e.to_string() },
         },
     }))
 }
 
 /// Denoises films of one scene and camera.
 pub struct Denoising<'a> {
-    chosen: &'a Chosen,
+    chosen: &'a SelectedDenoiser,
     shot: Shot<'a>,
     // those of the first film serve the next
     features: RefCell<Option<Features>>,
@@ -61,7 +61,7 @@ pub struct Denoising<'a> {
 }
 
 impl<'a> Denoising<'a> {
-    pub fn new(chosen: &'a Chosen, shot: Shot<'a>) -> Self {
+    pub fn new(chosen: &'a SelectedDenoiser, shot: Shot<'a>) -> Self {
         Self { chosen, shot, features: RefCell::new(None), seconds: Cell::new(0.0) }
     }
 
@@ -79,7 +79,7 @@ impl<'a> Denoising<'a> {
         control: &mut dyn Control,
     ) -> Result<Vec<Channel>> {
         let start = Instant::now();
-        let mut stop = Unstoppable(control);
+        let mut stop = UninterruptedControl(control);
         let features = match self.features.take() {
             Some(features) => features,
             None => Features::render(&self.shot, &mut stop)?,

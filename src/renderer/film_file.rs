@@ -64,7 +64,7 @@ pub fn resume(
 ) -> Result<Resumed> {
     let image = output::exr::read(path)?;
     let state = read_state(&image, names);
-    if matches!(state, Read::Nothing) {
+    if matches!(state, StoredState::None) {
         return Err(Error::input(path, "it has no film state to resume; render it with --resumable"));
     }
     let differs = |what: &str, its: &str, ours: &str| {
@@ -80,7 +80,7 @@ pub fn resume(
         let text = |[w, h]: [u32; 2]| format!("{w}x{h}");
         return Err(differs("size", &text([image.width, image.height]), &text(size)));
     }
-    let Read::State(state) = state else {
+    let StoredState::Intact(state) = state else {
         return Err(Error::input(path, "its film state is damaged; render it anew with --resumable"));
     };
     if state.most_samples() > spp {
@@ -122,15 +122,15 @@ fn difference(image: &Image, identity: &Identity, scene: &str) -> Option<(String
 }
 
 /// What there is of a film in an image.
-enum Read {
-    Nothing,
+enum StoredState {
+    None,
     Damaged,
-    State(FilmState),
+    Intact(FilmState),
 }
 
-fn read_state(image: &Image, names: &[&str]) -> Read {
+fn read_state(image: &Image, names: &[&str]) -> StoredState {
     if !image.channels.iter().any(|c| c.name.strip_prefix(LAYER).is_some_and(|rest| rest.starts_with('.'))) {
-        return Read::Nothing;
+        return StoredState::None;
     }
     let find = |name: &str| image.channels.iter().find(|c| c.name == format!("{LAYER}.{name}")).map(|c| &c.samples);
     let mut planes = Vec::with_capacity(record_words(names.len()));
@@ -138,12 +138,12 @@ fn read_state(image: &Image, names: &[&str]) -> Read {
         match (find(&word.name), word.float) {
             (Some(Samples::F32(plane)), true) => planes.push(plane.iter().map(|v| v.to_bits()).collect()),
             (Some(Samples::U32(plane)), false) => planes.push(plane.clone()),
-            _ => return Read::Damaged,
+            _ => return StoredState::Damaged,
         }
     }
-    let Some(Samples::U32(samples)) = find("samples") else { return Read::Damaged };
+    let Some(Samples::U32(samples)) = find("samples") else { return StoredState::Damaged };
     let state = FilmState::from_planes([image.width, image.height], names.len(), &planes, samples);
-    state.map_or(Read::Damaged, Read::State)
+    state.map_or(StoredState::Damaged, StoredState::Intact)
 }
 
 #[cfg(test)]

@@ -13,9 +13,9 @@ use crate::gpu::{Buffer, Device};
 use crate::integrators::ao::Hemisphere;
 use crate::integrators::aov::{self, Aov};
 use crate::output::{self, Channel, Image, Samples};
-use crate::realtime::display::{Display, Shown};
+use crate::realtime::display::{Display, DisplayMode};
 use crate::realtime::frame_settings::FrameRange;
-use crate::realtime::sequence::{self, CameraMotion, Sequence};
+use crate::realtime::sequence::{self, CameraMotion, FrameSequence};
 use crate::realtime::{Realtime, Settings, Technique};
 use crate::scene::load::load_camera_path;
 use crate::scene::{LightKind, Orbit, Scene};
@@ -31,7 +31,7 @@ const UNIT_OF_SCENE: f32 = 0.25;
 /// Frames of a scene, rendered one after the other ([`Renderer::frames`]).
 pub struct Frames<'r> {
     device: &'r Device,
-    sequence: Sequence<'r>,
+    sequence: FrameSequence<'r>,
     tracer: Tracer,
     realtime: Realtime,
     size: [u32; 2],
@@ -87,7 +87,7 @@ impl Renderer {
         };
         let animation = timeline.animate.as_deref().map(|a| sequence::find_animation(scene, a)).transpose()?;
         let file_camera = scene.cameras.iter().position(|c| *c == camera);
-        let sequence = Sequence::new(scene, camera.clone(), file_camera, motion, animation, fps)?;
+        let sequence = FrameSequence::new(scene, camera.clone(), file_camera, motion, animation, fps)?;
         let flat = FlatScene::with_motion(scene, sequence.motion()?)?;
         let needs = Needs { normals: how.hemisphere == Hemisphere::Shading, ..Default::default() };
         let warm_up = timeline.warm_up.unwrap_or_else(|| if timeline.frames.is_some() { 0 } else { settling_frames(&how) });
@@ -214,7 +214,7 @@ impl Frames<'_> {
             let pixels = aov::render(&self.tracer, &self.last_camera, self.size, control)?;
             channels.extend(aov::channels(&self.aov, &pixels, self.origin));
         }
-        if Aov::Bent.among(&self.aov) {
+        if Aov::Bent.is_in(&self.aov) {
             let bent = realtime.bent()?;
             let axis = |k: usize| bent.iter().map(|b| b[k]).collect();
             channels.extend(["bent.X", "bent.Y", "bent.Z"].iter().enumerate().map(|(k, name)| f32s(name, axis(k))));
@@ -244,7 +244,7 @@ impl Frames<'_> {
 pub fn frame_settings(settings: &RenderSettings) -> Result<Settings> {
     let mut how = settings.frames.settings(&settings.integrators.ao, settings.seed())?;
     let shown = settings.frames.show.unwrap_or_default();
-    how.bent = Aov::Bent.among(&settings.image.aov) || shown == Shown::Bent;
+    how.bent = Aov::Bent.is_in(&settings.image.aov) || shown == DisplayMode::Bent;
     how.check()?;
     shown.check(&how)?;
     Ok(how)

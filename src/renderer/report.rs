@@ -183,7 +183,7 @@ pub struct StillReport {
     /// Samples that any pixel got at most.
     pub most_spp: u32,
     /// Samples that were asked for.
-    pub wanted_spp: u32,
+    pub requested_spp: u32,
     /// Seed of the sampler.
     pub seed: u32,
     /// Fewer samples than were asked for.
@@ -233,7 +233,7 @@ impl StillReport {
         lines.extend(self.denoise.iter().map(|d| d.line.clone()));
         lines.extend(self.film.lines.iter().cloned());
         if self.stopped_early {
-            lines.push(format!("stopped early: {} of {} samples per pixel", self.spp, self.wanted_spp));
+            lines.push(format!("stopped early: {} of {} samples per pixel", self.spp, self.requested_spp));
         }
         if explain {
             lines.extend(self.explanations().into_iter().map(|l| format!("explain: {l}")));
@@ -273,7 +273,7 @@ impl StillReport {
             "width": self.size[0],
             "height": self.size[1],
             "spp": self.spp,
-            "spp_asked": self.wanted_spp,
+            "spp_asked": self.requested_spp,
             "stopped_early": self.stopped_early,
             "seed": self.seed,
             "traversal": self.compute.map(|o| o.kernel),

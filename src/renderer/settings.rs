@@ -15,7 +15,7 @@ use crate::realtime::frame_settings::FrameSettings;
 use crate::scene::{Camera, Projection, Scene};
 #[cfg(feature = "cli")]
 use crate::settings::parse::{parse_fov, parse_number, parse_target, parse_time, parse_vector};
-use crate::settings::{self, AppliesTo, Given, settings};
+use crate::settings::{self, AppliesTo, GivenSetting, settings};
 
 /// Samples per pixel when neither the settings nor the scene say.
 pub const DEFAULT_SPP: u32 = 16;
@@ -189,7 +189,7 @@ impl RenderSettings {
     }
 
     /// The settings that were given.
-    pub fn given(&self) -> Vec<Given> {
+    pub fn given(&self) -> Vec<GivenSetting> {
         [
             self.image.given(),
             self.camera.given(),
@@ -203,7 +203,7 @@ impl RenderSettings {
     }
 
     /// The first setting that only frames in real time have, if one was given: then frames are asked for.
-    pub fn asks_for_frames(&self) -> Option<Given> {
+    pub fn realtime_setting(&self) -> Option<GivenSetting> {
         self.frames.given().into_iter().next()
     }
 
@@ -212,9 +212,9 @@ impl RenderSettings {
     /// # Errors
     /// [`Error::Usage`], naming the setting and what to do about it.
     pub fn check(&self) -> Result<()> {
-        let frames = self.asks_for_frames();
+        let frames = self.realtime_setting();
         settings::check(&self.given(), self.integrator().name(), frames.as_ref())?;
-        if frames.is_none() && Aov::Bent.among(&self.image.aov) {
+        if frames.is_none() && Aov::Bent.is_in(&self.image.aov) {
             return Err(Error::Usage("--aov bent is of frames in real time: add --preset".into()));
         }
         self.camera.check()

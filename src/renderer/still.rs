@@ -17,7 +17,7 @@ use crate::film::accumulate::Accumulated;
 use crate::film::cover::Cover;
 use crate::film::schedule::FilmOptions;
 use crate::integrators::aov::{self, Aov, AovPixel};
-use crate::integrators::{Integrator, PictureOptions, Shot};
+use crate::integrators::{Integrator, PictureOptions, RenderJob};
 use crate::output::{self, Channel, Image, ImageFormat, Samples, png};
 use crate::ray::Ray;
 use crate::scene::{Camera, Projection, RenderHints, fingerprint};
@@ -57,7 +57,7 @@ impl Still {
 }
 
 /// An image that is not finished, on its way to a file ([`Renderer::still_with`]).
-pub struct Interval<'a> {
+pub struct IntermediateImage<'a> {
     image: &'a Image,
     /// Samples that any pixel has at most.
     pub samples: u32,
@@ -65,7 +65,7 @@ pub struct Interval<'a> {
     picture: PictureOptions,
 }
 
-impl Interval<'_> {
+impl IntermediateImage<'_> {
     /// As [`Still::save`].
     ///
     /// # Errors
@@ -100,10 +100,10 @@ impl Renderer {
         settings: &RenderSettings,
         extras: StillExtras,
         control: &mut dyn Control,
-        save: &mut dyn FnMut(&Interval) -> Result<()>,
+        save: &mut dyn FnMut(&IntermediateImage) -> Result<()>,
     ) -> Result<Still> {
         settings.check()?;
-        if let Some(frames) = settings.asks_for_frames() {
+        if let Some(frames) = settings.realtime_setting() {
             return Err(Error::Usage(format!("{} is for frames in real time, and this is a still", frames.option())));
         }
         let start = Instant::now();
@@ -118,7 +118,7 @@ impl Renderer {
         let scene = &self.scene;
         let mut warnings = scene_warnings(scene);
         warnings.iter().for_each(|w| control.warning(w));
-        let mut shot = Shot {
+        let mut job = RenderJob {
             scene,
             camera: &camera,
             size,
@@ -130,24 +130,24 @@ impl Renderer {
             film: FilmOptions::default(),
         };
         let prints = settings.film.keeps_state().then(|| fingerprint::of_scene(scene));
-        let identity = identity(integrator, &shot, prints);
+        let identity = identity(integrator, &job, prints);
         let maker: Maker =
             [("tracer", kind.name().into()), ("device", format!("{} ({})", device.info.name, device.info.driver))];
         let resumed = settings
             .film
             .resume
             .as_ref()
-            .map(|path| film_file::resume(path, &self.name, integrator.channels(), size, shot.spp, &identity, &maker));
+            .map(|path| film_file::resume(path, &self.name, integrator.channels(), size, job.spp, &identity, &maker));
         let resumed = resumed.transpose()?;
         let samples_before = resumed.as_ref().map(|r| r.state.most_samples());
         if let Some(warning) = resumed.as_ref().and_then(|r| r.warning.clone()) {
             control.warning(&warning);
             warnings.push(warning);
         }
-        shot.film = FilmOptions {
+        job.film = FilmOptions {
             start: resumed.map(|r| r.state.into()),
             keep_state: settings.film.keeps_state(),
-            intervals: intervals(settings, &scene.hints, shot.spp),
+            intervals: intervals(settings, &scene.hints, job.spp),
             target_rmse: settings.film.target_rmse,
         };
         let flat = integrator.flatten(scene)?;
@@ -156,7 +156,7 @@ impl Renderer {
         let ready = match ready.filter(|r| r.blend == flat.blend && r.needs == needs) {
             Some(ready) => ready,
             None => {
-                let rays = integrator.rays_per_sample() * u64::from(shot.spp) * u64::from(size[0]) * u64::from(size[1]);
+                let rays = integrator.rays_per_sample() * u64::from(job.spp) * u64::from(size[0]) * u64::from(size[1]);
                 let streams = integrator.streams(&settings.integrators);
                 let request = TracerRequest { needs, streams, rays, control: &mut *control, warnings: &mut warnings };
                 let tracer = request.build(&device, kind, &flat, compute, &self.settings)?;
@@ -164,9 +164,9 @@ impl Renderer {
             }
         };
         let tracer = &ready.tracer;
-        let record = shot.camera_record(&flat);
-        let cover = match integrator.skips_empty_tiles(&shot) {
-            true => Cover::new(&flat, &record, size, shot.spp).map(Arc::new),
+        let record = job.camera_record(&flat);
+        let cover = match integrator.skips_empty_tiles(&job) {
+            true => Cover::new(&flat, &record, size, job.spp).map(Arc::new),
             false => None,
         };
 
@@ -177,7 +177,7 @@ impl Renderer {
             false => aov::render(tracer, &record, size, control)?,
         };
         let aov_seconds = aov_start.elapsed().as_secs_f64();
-        let path_options = integrator.path_options(&shot)?;
+        let path_options = integrator.path_options(&job)?;
         let denoising = denoiser
             .as_ref()
             .zip(path_options.as_ref())
@@ -195,14 +195,14 @@ impl Renderer {
             denoising: denoising.as_ref(),
         };
         let picture = settings.picture.options();
-        let mut on_way = OnWay {
+        let mut interval_control = IntervalControl {
             control: &mut *control,
             save: &mut |accumulated, control| {
                 let image = composer.image(accumulated, control)?;
-                save(&Interval { image: &image, samples: accumulated.most_spp, integrator, picture })
+                save(&IntermediateImage { image: &image, samples: accumulated.most_spp, integrator, picture })
             },
         };
-        let rendered = integrator.render(tracer, &flat, &shot, cover, &mut on_way)?;
+        let rendered = integrator.render(tracer, &flat, &job, cover, &mut interval_control)?;
         device.check_validation()?;
         let image = composer.image(&rendered.image, control)?;
         device.check_validation()?;
@@ -223,12 +223,12 @@ impl Renderer {
             size,
             spp: rendered.image.spp,
             most_spp: rendered.image.most_spp,
-            wanted_spp: shot.spp,
-            seed: shot.seed,
+            requested_spp: job.spp,
+            seed: job.seed,
             stopped_early: rendered.image.stopped_early,
             mean,
             mean_standard_error,
-            film: FilmReport::new(&settings.film, &scene.hints, &rendered.image, samples_before, shot.spp),
+            film: FilmReport::new(&settings.film, &scene.hints, &rendered.image, samples_before, job.spp),
             compute: tracer.compute_options(),
             coherent_kernel: tracer.compute_options().map(|o| o.kernel.for_coherent(&device.info)),
             primary_rays: rendered.image.primary_rays,
@@ -271,18 +271,18 @@ pub fn camera_text(camera: &Camera) -> String {
 
 /// What has to agree when an image is gone on with: all that its samples depend on, but for its size. `print`: the scene's fingerprint, where the film
 /// is kept.
-fn identity(integrator: &dyn Integrator, shot: &Shot, print: Option<String>) -> Identity {
-    let environment = || fingerprint::of_environment(&shot.scene.environment);
+fn identity(integrator: &dyn Integrator, job: &RenderJob, print: Option<String>) -> Identity {
+    let environment = || fingerprint::of_environment(&job.scene.environment);
     let around = print.as_ref().filter(|_| integrator.sees_environment()).map(|_| environment());
     let mut out = vec![
         ("version", Some(env!("CARGO_PKG_VERSION").into())),
         ("integrator", Some(integrator.name().to_owned())),
         ("scene.hash", print),
         ("environment.hash", around),
-        ("camera", Some(camera_text(shot.camera))),
-        ("seed", Some(shot.seed.to_string())),
+        ("camera", Some(camera_text(job.camera))),
+        ("seed", Some(job.seed.to_string())),
     ];
-    out.extend(integrator.identity(shot));
+    out.extend(integrator.identity(job));
     out
 }
 
@@ -357,12 +357,12 @@ impl Composer<'_> {
 }
 
 /// Saves an image on its way.
-struct OnWay<'a> {
+struct IntervalControl<'a> {
     control: &'a mut dyn Control,
     save: &'a mut dyn FnMut(&Accumulated, &mut dyn Control) -> Result<()>,
 }
 
-impl Control for OnWay<'_> {
+impl Control for IntervalControl<'_> {
     fn progress(&mut self, done: u64, total: u64) {
         self.control.progress(done, total);
     }
@@ -382,5 +382,5 @@ impl Control for OnWay<'_> {
 
 /// Needs of the tracer that auxiliary outputs have.
 pub(super) fn aov_needs(needs: Needs, wanted: &[Aov]) -> Needs {
-    Needs { normals: needs.normals || Aov::Ns.among(wanted), albedo: needs.albedo || Aov::Albedo.among(wanted), ..needs }
+    Needs { normals: needs.normals || Aov::Ns.is_in(wanted), albedo: needs.albedo || Aov::Albedo.is_in(wanted), ..needs }
 }

@@ -42,14 +42,14 @@ impl AppliesTo {
 
 /// A setting that differs from its default.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Given {
+pub struct GivenSetting {
     /// As in files: `max_depth`.
     pub name: &'static str,
     /// What it has an effect on.
     pub applies: AppliesTo,
 }
 
-impl Given {
+impl GivenSetting {
     /// As on the command line: `--max-depth`.
     pub fn option(&self) -> String {
         format!("--{}", self.name.replace('_', "-"))
@@ -74,7 +74,7 @@ fn list(names: &[&str]) -> String {
 ///
 /// # Errors
 /// [`Error::Usage`] for the first that has none.
-pub fn check(given: &[Given], integrator: &str, frames: Option<&Given>) -> Result<()> {
+pub fn check(given: &[GivenSetting], integrator: &str, frames: Option<&GivenSetting>) -> Result<()> {
     let wrong = |text: String| Err(Error::Usage(text));
     for setting in given {
         let (option, applies) = (setting.option(), setting.applies);
@@ -124,11 +124,11 @@ macro_rules! settings {
 
         impl $name {
             /// The settings that were given.
-            pub fn given(&self) -> Vec<$crate::settings::Given> {
+            pub fn given(&self) -> Vec<$crate::settings::GivenSetting> {
                 let mut out = Vec::new();
                 $(
                     if !$crate::settings::is_default(&self.$field) {
-                        out.push($crate::settings::Given { name: stringify!($field), applies: $applies });
+                        out.push($crate::settings::GivenSetting { name: stringify!($field), applies: $applies });
                     }
                 )*
                 out

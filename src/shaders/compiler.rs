@@ -23,7 +23,7 @@ struct Cache {
 }
 
 /// More shaders than this are not kept; the oldest go first.
-const MAX_KEPT: usize = 1500;
+const MAX_ENTRIES: usize = 1500;
 
 /// Three quarters of the time go into optimisation. Whoever edits a shader wants to see it: the driver optimises, too.
 const OPTIMIZATION: OptimizationLevel =
@@ -70,16 +70,16 @@ impl Compiler {
         let text = source.text(&self.shaders)?;
         // `None` where an included file cannot be read: the compiler says it better
         let (key, included) = self.key(&text, source.stage()).unzip();
-        let place = self.cache.as_ref().zip(key).map(|(cache, key)| cache.place(&key));
-        if let (Some(place), Some(included)) = (&place, included)
-            && let Ok(spirv) = std::fs::read(place)
+        let path = self.cache.as_ref().zip(key).map(|(cache, key)| cache.path(&key));
+        if let (Some(path), Some(included)) = (&path, included)
+            && let Ok(spirv) = std::fs::read(path)
             && !spirv.is_empty()
         {
             return Ok(Compiled { spirv, included });
         }
         let compiled = self.run(source, &text)?;
-        if let Some(place) = place {
-            Cache::keep(&place, &compiled.spirv);
+        if let Some(path) = path {
+            Cache::store(&path, &compiled.spirv);
         }
         Ok(compiled)
     }
@@ -146,8 +146,8 @@ impl Cache {
         if cfg!(feature = "build-shaderc") {
             return None;
         }
-        let said = Command::new("pkg-config").args(["--modversion", "shaderc", "SPIRV-Tools"]).output().ok()?;
-        let compiler = said.status.success().then(|| String::from_utf8_lossy(&said.stdout).into_owned())?;
+        let version = Command::new("pkg-config").args(["--modversion", "shaderc", "SPIRV-Tools"]).output().ok()?;
+        let compiler = version.status.success().then(|| String::from_utf8_lossy(&version.stdout).into_owned())?;
         // target/PROFILE/build/PACKAGE/out
         let folder = out.ancestors().nth(4)?.join("spirv");
         std::fs::create_dir_all(&folder).ok()?;
@@ -162,12 +162,12 @@ impl Cache {
         let mut all: Vec<_> =
             entries.filter_map(|e| e.ok()).filter_map(|e| Some((e.metadata().ok()?.modified().ok()?, e.path()))).collect();
         all.sort();
-        for (_, path) in all.iter().take(all.len().saturating_sub(MAX_KEPT)) {
+        for (_, path) in all.iter().take(all.len().saturating_sub(MAX_ENTRIES)) {
             let _ = std::fs::remove_file(path);
         }
     }
 
-    fn place(&self, key: &str) -> PathBuf {
+    fn path(&self, key: &str) -> PathBuf {
         let mut hash = DefaultHasher::new();
         self.compiler.hash(&mut hash);
         include_str!("compiler.rs").hash(&mut hash);
@@ -175,10 +175,10 @@ impl Cache {
     }
 
     /// Beside, then renamed: builds of two profiles and other programs may run at once. What fails is compiled again next time.
-    fn keep(place: &Path, spirv: &[u8]) {
-        let beside = place.with_extension(std::process::id().to_string());
-        if std::fs::write(&beside, spirv).is_err() || std::fs::rename(&beside, place).is_err() {
-            let _ = std::fs::remove_file(&beside);
+    fn store(path: &Path, spirv: &[u8]) {
+        let temporary = path.with_extension(std::process::id().to_string());
+        if std::fs::write(&temporary, spirv).is_err() || std::fs::rename(&temporary, path).is_err() {
+            let _ = std::fs::remove_file(&temporary);
         }
     }
 }

@@ -49,7 +49,7 @@ impl Shader {
 
         static COMPILER: OnceLock<compiler::Compiler> = OnceLock::new();
         let compiler = COMPILER.get_or_init(|| {
-            let files = source::made_files(crate::interface::glsl::files(), Path::new(env!("CARGO_MANIFEST_DIR")));
+            let files = source::generated_files(crate::interface::glsl::files(), Path::new(env!("CARGO_MANIFEST_DIR")));
             compiler::Compiler::new(&folder(), files, Path::new(env!("OUT_DIR")))
         });
         compiler.compile(&self.source).map(|c| Cow::Owned(c.spirv)).map_err(crate::Error::Usage)
@@ -185,7 +185,7 @@ macro_rules! registry {
                     variant!($pass, $mode, Deliver),
                     variant!($pass, $mode, Deliver64),
                     variant!($pass, $mode, Packet),
-                    variant!($pass, $mode, Reference),
+                    variant!($pass, $mode, Bvh2),
                     variant!($pass, $mode, Brute),
                     variant!($pass, $mode, Query),
                     variant!($pass, $mode, Raygen),

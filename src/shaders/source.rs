@@ -88,7 +88,7 @@ pub enum Variant {
     /// Compute tracer: the rays of a subgroup together.
     Packet,
     /// Compute tracer: the readable kernel over a binary tree.
-    Reference,
+    Bvh2,
     /// Compute tracer: every primitive of every instance.
     Brute,
     /// Query tracer.
@@ -107,7 +107,7 @@ impl Variant {
         Self::Deliver,
         Self::Deliver64,
         Self::Packet,
-        Self::Reference,
+        Self::Bvh2,
         Self::Brute,
         Self::Query,
         Self::Raygen,
@@ -128,7 +128,7 @@ impl Variant {
             Self::Generate | Self::Generate64 => "trace/generate.glsl",
             Self::Deliver | Self::Deliver64 => "trace/deliver.glsl",
             Self::Packet => "trace/packet.glsl",
-            Self::Reference => "trace/reference.glsl",
+            Self::Bvh2 => "trace/reference.glsl",
             Self::Brute => "trace/brute.glsl",
             Self::Query => "trace/query.glsl",
             Self::Raygen => "trace/pipeline.glsl",
@@ -155,7 +155,7 @@ pub const PROBES: &str = "tests/shaders";
 
 /// Files that shaders include and that are not in shaders/: those that are made, and with the feature `probes` the tests' own. `manifest`: the source tree.
 #[cfg_attr(not(feature = "live-shaders"), allow(dead_code, reason = "a program that has SPIR-V compiles nothing"))]
-pub fn made_files(mut made: Vec<(String, String)>, manifest: &Path) -> Vec<(String, String)> {
+pub fn generated_files(mut made: Vec<(String, String)>, manifest: &Path) -> Vec<(String, String)> {
     if cfg!(feature = "probes") {
         // what cannot be read, the compiler misses by name
         for entry in std::fs::read_dir(manifest.join(PROBES)).into_iter().flatten().flatten() {

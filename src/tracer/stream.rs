@@ -133,7 +133,7 @@ impl Stream {
         s: &Specialization,
         rays_per_lane: u32,
     ) -> Result<Self> {
-        let pipeline = compile(device, shaders, Variant::Reference, s)?;
+        let pipeline = compile(device, shaders, Variant::Bvh2, s)?;
         Ok(Self { pipeline: Pipeline::Single { pipeline, rays_per_group: LANES * rays_per_lane }, shaders })
     }
 

@@ -27,7 +27,7 @@ use skylit::accel::flatten::FlatScene;
 use skylit::film::NoControl;
 use skylit::film::camera::CameraRecord;
 use skylit::gpu::{Device, Options};
-use skylit::integrators::path::{Lens, MOST_DEPTH, PathIntegrator, PathOptions};
+use skylit::integrators::path::{Lens, MAX_DEPTH, PathIntegrator, PathOptions};
 use skylit::output::exr;
 use skylit::scene::builtin::shapes;
 use skylit::scene::light_spec;
@@ -197,7 +197,7 @@ impl Entry {
         let options = PathOptions {
             size: self.size,
             spp: self.spp / BLOCKS,
-            max_depth: self.max_depth.unwrap_or(MOST_DEPTH),
+            max_depth: self.max_depth.unwrap_or(MAX_DEPTH),
             lens: self.lens.as_ref().map(|l| Lens { radius: l.radius, focus: l.focus }),
             ..Default::default()
         };

@@ -6,7 +6,7 @@ use skylit::accel::flatten::FlatScene;
 use skylit::colour::srgb_byte;
 use skylit::film::camera::CameraRecord;
 use skylit::ray::Ray;
-use skylit::realtime::display::{Display, Shown};
+use skylit::realtime::display::{Display, DisplayMode};
 use skylit::realtime::{FrameStats, Preset, Realtime, Settings};
 use skylit::scene::Camera;
 use skylit::scene::builtin::{Placement, analytic, by_name};
@@ -17,7 +17,7 @@ use crate::common::{assert_validation_clean, device, record, tracer, tracers};
 
 const SIZE: [u32; 2] = [93, 50];
 
-fn display(shown: Shown, exposure: f32) -> Display {
+fn display(shown: DisplayMode, exposure: f32) -> Display {
     Display { shown, exposure, unit: 2.0 }
 }
 
@@ -60,12 +60,12 @@ fn gpu_displayed_accessibility_has_the_bytes_of_a_png() {
             let mut realtime = Realtime::new(&tracer, SIZE, &settings, &[]).unwrap();
             let mut bytes = std::collections::BTreeSet::new();
             for exposure in [0.0, 0.7, -1.6, -3.3f32] {
-                let shown = show(&tracer, &mut realtime, &camera, 1, display(Shown::Accessibility, exposure));
+                let shown = show(&tracer, &mut realtime, &camera, 1, display(DisplayMode::Accessibility, exposure));
                 assert_grey(&shown, &realtime.result().unwrap(), exposure.exp2(), 0);
                 bytes.extend(shown.iter().map(|w| w[0]));
             }
             assert!(bytes.len() > 120, "{kind}: only {} different bytes", bytes.len());
-            let shown = show(&tracer, &mut realtime, &camera, 0, display(Shown::Unfiltered, 0.0));
+            let shown = show(&tracer, &mut realtime, &camera, 0, display(DisplayMode::Unfiltered, 0.0));
             assert_grey(&shown, &realtime.unfiltered().unwrap(), 1.0, 0);
         }
     }
@@ -91,16 +91,16 @@ fn gpu_displayed_numbers() {
             assert!((0..3).all(|k| word[k].abs_diff(expected[k]) <= 1) && word[3] == 255, "{what}: {word:?}, not {expected:?}");
         }
     };
-    let shown = show(&tracer, &mut realtime, &camera, 3, display(Shown::Samples, 0.0));
+    let shown = show(&tracer, &mut realtime, &camera, 3, display(DisplayMode::Samples, 0.0));
     expect(shown, &covered(&realtime), [4.0 / 64.0; 3], "four samples of 64");
     // an open plane has no variance, and its bent normal is two thirds of the normal
-    let shown = show(&tracer, &mut realtime, &camera, 0, display(Shown::Variance, 0.0));
+    let shown = show(&tracer, &mut realtime, &camera, 0, display(DisplayMode::Variance, 0.0));
     expect(shown, &covered(&realtime), [0.0; 3], "variance");
-    let shown = show(&tracer, &mut realtime, &camera, 0, display(Shown::Normal, 0.0));
+    let shown = show(&tracer, &mut realtime, &camera, 0, display(DisplayMode::Normal, 0.0));
     expect(shown, &covered(&realtime), [0.5, 1.0, 0.5], "normal");
-    let shown = show(&tracer, &mut realtime, &camera, 0, display(Shown::Normal, -1.0));
+    let shown = show(&tracer, &mut realtime, &camera, 0, display(DisplayMode::Normal, -1.0));
     expect(shown, &covered(&realtime), [0.25, 0.5, 0.25], "normal, half as bright");
-    let shown = show(&tracer, &mut realtime, &camera, 250, display(Shown::Bent, 0.0));
+    let shown = show(&tracer, &mut realtime, &camera, 250, display(DisplayMode::Bent, 0.0));
     let middle = shown[(SIZE[1] / 2 * SIZE[0] + SIZE[0] / 2) as usize];
     let expected = [0.5, 5.0 / 6.0, 0.5].map(srgb_byte);
     assert!((0..3).all(|k| middle[k].abs_diff(expected[k]) <= 12), "bent: {middle:?}, not {expected:?}");
@@ -116,9 +116,9 @@ fn gpu_displayed_distances() {
     let camera = CameraRecord::new(&camera, scene.origin(), f64::from(SIZE[0]) / f64::from(SIZE[1]));
     let tracer = tracer(&device, tracers(&device)[0], &scene);
     let mut realtime = Realtime::new(&tracer, SIZE, &Preset::Fast.settings(), &[]).unwrap();
-    let shown = show(&tracer, &mut realtime, &camera, 0, display(Shown::Depth, 0.0));
+    let shown = show(&tracer, &mut realtime, &camera, 0, display(DisplayMode::Depth, 0.0));
     assert_grey(&shown, &vec![2.0 / 8.0; shown.len()], 1.0, 1);
-    let shown = show(&tracer, &mut realtime, &camera, 0, display(Shown::Position, 0.0));
+    let shown = show(&tracer, &mut realtime, &camera, 0, display(DisplayMode::Position, 0.0));
     for (at, word) in shown.iter().enumerate() {
         let [x, y] = [at as u32 % SIZE[0], at as u32 / SIZE[0]].map(f64::from);
         let side = 1.0 / f64::from(SIZE[1]);
@@ -154,7 +154,7 @@ fn gpu_visited_nodes_are_counted_on_request() {
         let tracer = tracer(&device, TracerKind::Compute, &scene);
         let mut realtime = Realtime::new(&tracer, SIZE, &Preset::Fast.settings(), &[]).unwrap();
         let mut plain = Realtime::new(&tracer, SIZE, &Preset::Fast.settings(), &[]).unwrap();
-        realtime.display(&tracer, Some(display(Shown::Nodes, 0.0))).unwrap();
+        realtime.display(&tracer, Some(display(DisplayMode::Nodes, 0.0))).unwrap();
         let mut nodes = None;
         // camera at rest: the second frame keeps the counts of the first
         for frame in 0..2 {
@@ -183,7 +183,7 @@ fn gpu_visited_nodes_are_counted_on_request() {
     for kind in tracers(&device).into_iter().filter(|k| *k != TracerKind::Compute) {
         let tracer = tracer(&device, kind, &by_name("plane").unwrap());
         let mut realtime = Realtime::new(&tracer, SIZE, &Preset::Fast.settings(), &[]).unwrap();
-        let error = realtime.display(&tracer, Some(display(Shown::Nodes, 0.0))).unwrap_err();
+        let error = realtime.display(&tracer, Some(display(DisplayMode::Nodes, 0.0))).unwrap_err();
         assert!(error.to_string().contains("--show nodes needs the compute tracer"), "{error}");
     }
     assert_validation_clean(&device);
@@ -201,7 +201,7 @@ fn gpu_display_is_a_choice() {
     let recorded = |stats: &FrameStats| stats.timings.iter().filter(|t| t.label == "display").count();
     assert!(realtime.displayed().is_none());
     let mut last = Vec::new();
-    for (frame, shown) in [None, Some(Shown::Accessibility), Some(Shown::Depth), None].into_iter().enumerate() {
+    for (frame, shown) in [None, Some(DisplayMode::Accessibility), Some(DisplayMode::Depth), None].into_iter().enumerate() {
         realtime.display(&tracer, shown.map(|s| display(s, 0.0))).unwrap();
         let stats = realtime.frame(&tracer, &camera, &[]).unwrap();
         assert_eq!(recorded(&stats), usize::from(shown.is_some()), "frame {frame}");
@@ -216,11 +216,11 @@ fn gpu_display_is_a_choice() {
             last = words(&realtime);
         }
     }
-    let refused = |preset: Preset, shown: Shown| {
+    let refused = |preset: Preset, shown: DisplayMode| {
         let mut realtime = Realtime::new(&tracer, SIZE, &preset.settings(), &[]).unwrap();
         matches!(realtime.display(&tracer, Some(display(shown, 0.0))), Err(Error::Usage(_)))
     };
-    assert!(refused(Preset::Fast, Shown::Bent) && refused(Preset::Larsen, Shown::Variance));
-    assert!(!refused(Preset::Fast, Shown::Variance) && !refused(Preset::Larsen, Shown::Normal));
+    assert!(refused(Preset::Fast, DisplayMode::Bent) && refused(Preset::Larsen, DisplayMode::Variance));
+    assert!(!refused(Preset::Fast, DisplayMode::Variance) && !refused(Preset::Larsen, DisplayMode::Normal));
     assert_validation_clean(&device);
 }

@@ -36,17 +36,17 @@ fn walls(gap: f64, tilted: [bool; 2]) -> Scene {
 
 /// What a pixel shows: which wall, and its face or another side.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Shown {
+struct DisplayMode {
     near: bool,
     face: bool,
 }
 
-fn shown(oracle: &Oracle, camera: &Camera) -> Vec<Shown> {
+fn shown(oracle: &Oracle, camera: &Camera) -> Vec<DisplayMode> {
     let of = |i: u32| {
         let ray = camera_ray(camera, DVec3::ZERO, SIZE, [i % SIZE[0], i / SIZE[0]].map(|v| f64::from(v) + 0.5));
         let hit = oracle.closest(ray);
         // a wall has twelve triangles
-        Shown { near: hit.primitive < 12, face: oracle.facing_normal(&ray, &hit).z > 0.5 }
+        DisplayMode { near: hit.primitive < 12, face: oracle.facing_normal(&ray, &hit).z > 0.5 }
     };
     (0..SIZE[0] * SIZE[1]).map(of).collect()
 }
@@ -87,13 +87,13 @@ fn gpu_nothing_crosses_an_edge_in_depth() {
             let [plain, near_tilted, far_tilted] = [0, 1, 2].map(|k: usize| images[k].iter());
             for (frame, ((plain, near_tilted), far_tilted)) in plain.zip(near_tilted).zip(far_tilted).enumerate() {
                 for i in 0..plain.0.len() {
-                    let Shown { near, face } = plain.0[i];
+                    let DisplayMode { near, face } = plain.0[i];
                     // as narrow as the other sides are seen, a pixel may be the only one of one, and guesses until it has had its turn
                     if !face && settings.resolution != Resolution::Full {
                         continue;
                     }
                     let (same, other) = if near { (far_tilted, near_tilted) } else { (near_tilted, far_tilted) };
-                    let values = |image: &(Vec<Shown>, Vec<f32>, Vec<f32>)| bits(&[image.1[i], image.2[i]]);
+                    let values = |image: &(Vec<DisplayMode>, Vec<f32>, Vec<f32>)| bits(&[image.1[i], image.2[i]]);
                     assert_eq!(
                         values(plain),
                         values(same),

@@ -60,7 +60,7 @@ impl RenderArgs {
         if self.settings.frames.show.is_some() && !self.writes_picture() {
             return wrong("--show is of .png and .apng outputs: an .exr has its channels, see --aov".into());
         }
-        let frames = self.settings.asks_for_frames();
+        let frames = self.settings.realtime_setting();
         let images = self.output.iter().filter(|p| frames.is_none() || !apng::is_apng(p));
         let formats = images.map(|p| ImageFormat::of(p)).collect::<Result<Vec<_>>>()?;
         let of_stills = [

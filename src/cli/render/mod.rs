@@ -27,7 +27,7 @@ use crate::terminal::progress::Progress;
 /// Loads, renders, writes, reports.
 pub fn run(args: &RenderArgs, start: Instant) -> Result<(), Failure> {
     args.check()?;
-    match args.settings.asks_for_frames() {
+    match args.settings.realtime_setting() {
         Some(_) => frames(args, start),
         None => still(args, start),
     }
@@ -42,7 +42,7 @@ fn still(args: &RenderArgs, start: Instant) -> Result<(), Failure> {
     let mut renderer = Renderer::open(&args.scene, &args.device)?;
     interrupt::check()?;
     check_intervals(args, &renderer.scene().hints, args.settings.spp(renderer.scene()))?;
-    let mut control = Warned::new(args, console);
+    let mut control = CliControl::new(args, console);
     let extras = StillExtras { keep_rays: args.dump_rays.is_some(), aov: args.depth_image.is_some() };
     let still = renderer.still_with(&args.settings, extras, &mut control, &mut |on_way| {
         args.output.iter().try_for_each(|path| on_way.save(&interval_path(path, on_way.samples)))
@@ -82,7 +82,7 @@ fn frames(args: &RenderArgs, start: Instant) -> Result<(), Failure> {
     let console = args.verbosity.console();
     let mut renderer = Renderer::open(&args.scene, &args.device)?;
     interrupt::check()?;
-    let mut control = Warned::new(args, console);
+    let mut control = CliControl::new(args, console);
     let mut frames = renderer.frames(&args.settings, args.writes_picture(), &mut control)?;
     let colour = timeline.show.unwrap_or_default().colour();
     let mut files = FrameFiles::create(&args.output, frames.size(), range.end - range.first, frames.fps(), colour)?;
@@ -111,30 +111,30 @@ fn frames(args: &RenderArgs, start: Instant) -> Result<(), Failure> {
     console.close(&record, Ok(()))
 }
 
-/// The keyboard and the progress bar; warnings are shown at once.
-struct Warned {
-    keyboard: ProgressControl,
+/// The progress and the progress bar; warnings are shown at once.
+struct CliControl {
+    progress: ProgressControl,
     console: Console,
 }
 
-impl Warned {
+impl CliControl {
     fn new(args: &RenderArgs, console: Console) -> Self {
         let progress = Progress::new("rendering", &console);
-        Self { keyboard: ProgressControl { progress, keep_partial: args.keep_partial }, console }
+        Self { progress: ProgressControl { progress, keep_partial: args.keep_partial }, console }
     }
 }
 
-impl Control for Warned {
+impl Control for CliControl {
     fn progress(&mut self, done: u64, total: u64) {
-        self.keyboard.progress(done, total);
+        self.progress.progress(done, total);
     }
 
     fn warning(&mut self, text: &str) {
-        self.keyboard.progress.suspend(|| self.console.warning(&crate::terminal::console::one_line(text)));
+        self.progress.progress.suspend(|| self.console.warning(&crate::terminal::console::one_line(text)));
     }
 
     fn should_stop(&mut self) -> Result<bool> {
-        self.keyboard.should_stop()
+        self.progress.should_stop()
     }
 }
 

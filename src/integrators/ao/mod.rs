@@ -15,7 +15,7 @@ use std::time::Duration;
 
 pub use attenuation::Attenuation;
 
-use super::{Integrator, IntegratorSettings, PictureOptions, Rendered, Shot};
+use super::{Integrator, IntegratorSettings, PictureOptions, RenderJob, Rendered};
 use crate::accel::flatten::FlatScene;
 use crate::error::Result;
 use crate::film::Control;
@@ -33,7 +33,7 @@ use crate::tracer::queue::RayQueue;
 use crate::tracer::{Needs, Push, Stream, Tracer};
 
 /// What a sample that met nothing leaves; no accessibility is negative.
-const MET_NOTHING: f32 = -1.0;
+const NO_HIT: f32 = -1.0;
 
 choices! {
     /// The axis of the hemisphere that occlusion rays fill.
@@ -98,19 +98,19 @@ impl AoOptions {
 pub struct AmbientOcclusion;
 
 impl AmbientOcclusion {
-    fn options(shot: &Shot) -> AoOptions {
-        let ao = &shot.settings.ao;
+    fn options(job: &RenderJob) -> AoOptions {
+        let ao = &job.settings.ao;
         AoOptions {
-            size: shot.size,
-            spp: shot.spp,
-            seed: shot.seed,
+            size: job.size,
+            spp: job.spp,
+            seed: job.seed,
             radius: ao.radius(),
             falloff: ao.ao_falloff.unwrap_or(1.0),
             hemisphere: ao.hemisphere(),
-            time_limit: shot.time_limit,
-            keep_rays: shot.keep_rays,
+            time_limit: job.time_limit,
+            keep_rays: job.keep_rays,
             cover: None,
-            film: shot.film.clone(),
+            film: job.film.clone(),
         }
     }
 }
@@ -151,18 +151,18 @@ impl Integrator for AmbientOcclusion {
     }
 
     /// A dump of rays is a set to compare with: all of them.
-    fn skips_empty_tiles(&self, shot: &Shot) -> bool {
-        !shot.keep_rays
+    fn skips_empty_tiles(&self, job: &RenderJob) -> bool {
+        !job.keep_rays
     }
 
     fn sees_environment(&self) -> bool {
         false
     }
 
-    fn identity(&self, shot: &Shot) -> Vec<(&'static str, Option<String>)> {
+    fn identity(&self, job: &RenderJob) -> Vec<(&'static str, Option<String>)> {
         // no `..`: a new option has to be put where it belongs
         let AoOptions { size: _, spp: _, time_limit: _, keep_rays: _, cover: _, film: _, seed: _, radius, falloff, hemisphere } =
-            Self::options(shot);
+            Self::options(job);
         vec![
             ("ao.radius", Some(radius.to_string())),
             ("ao.falloff", Some(falloff.to_string())),
@@ -174,12 +174,12 @@ impl Integrator for AmbientOcclusion {
         &self,
         tracer: &Tracer,
         flat: &FlatScene,
-        shot: &Shot,
+        job: &RenderJob,
         cover: Option<Arc<Cover>>,
         control: &mut dyn Control,
     ) -> Result<Rendered> {
-        let options = AoOptions { cover, ..Self::options(shot) };
-        let result = render(tracer, &shot.camera_record(flat), &options, control)?;
+        let options = AoOptions { cover, ..Self::options(job) };
+        let result = render(tracer, &job.camera_record(flat), &options, control)?;
         let report = report::report(&options, &result);
         Ok(Rendered { image: result.image, report, kept_rays: [result.kept_primary, result.kept_occlusion] })
     }
@@ -205,7 +205,7 @@ pub struct AoResult {
 }
 
 /// What all launches use.
-struct Occlusion {
+struct AoEstimator {
     primary: Stream,
     occlusion: Stream,
     resolve: ComputePipeline,
@@ -232,7 +232,7 @@ pub fn render(tracer: &Tracer, camera: &CameraRecord, options: &AoOptions, contr
     let device = tracer.device();
     let most = most_rays(options.size, options.spp);
     let [primary, occlusion] = streams(options);
-    let mut estimator = Occlusion {
+    let mut estimator = AoEstimator {
         primary: tracer.stream(primary)?,
         occlusion: tracer.stream(occlusion)?,
         resolve: shaders::RESOLVE.pipeline(device)?,
@@ -272,7 +272,7 @@ fn ray_buffer(device: &Arc<Device>, rays: u32) -> Result<Buffer> {
     Buffer::new(device, "ray dump", size_of::<Ray>() as u64 * rays as u64, Memory::Readback)
 }
 
-impl Estimator for Occlusion {
+impl Estimator for AoEstimator {
     const CHANNELS: usize = 1;
 
     fn keeps_first(&self) -> bool {
@@ -292,7 +292,7 @@ impl Estimator for Occlusion {
         let timings = commands.run(|r| {
             for push in launches {
                 queue.clear(r);
-                r.fill(samples, size_of::<f32>() as u64 * push.count as u64, MET_NOTHING.to_bits());
+                r.fill(samples, size_of::<f32>() as u64 * push.count as u64, NO_HIT.to_bits());
                 r.barrier();
                 self.primary.record(r, push);
                 r.barrier();

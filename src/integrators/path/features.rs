@@ -24,7 +24,7 @@ pub(super) fn features(
         (PathFeature::Mis, drawn && options.strategy == Strategy::Mis),
         (PathFeature::RayCones, cones),
         (PathFeature::DistantDisks, lights.has_disks),
-        (PathFeature::Media, !plain && media::matter(flat)),
+        (PathFeature::Media, !plain && media::need_tracking(flat)),
         (PathFeature::ClearWalls, !plain && flat.scene.materials.iter().any(shading::has_clear_walls)),
     ];
     let all =

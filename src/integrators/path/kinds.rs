@@ -9,39 +9,41 @@ use crate::colour::srgb_decode;
 use crate::error::Result;
 use crate::film::Control;
 use crate::film::cover::Cover;
-use crate::integrators::{Integrator, IntegratorSettings, PictureOptions, Rendered, Shot};
+use crate::integrators::{Integrator, IntegratorSettings, PictureOptions, RenderJob, Rendered};
 use crate::output::{Image, Samples};
 use crate::scene::Scene;
 use crate::shaders::StreamShaders;
 use crate::tracer::{Needs, Tracer};
 
 /// Path tracing.
-pub static PATH: Paths =
-    Paths { name: "path", help: "Path tracing: global illumination", kind: Kind::Light { max_depth: None } };
+pub static PATH: PathVariant =
+    PathVariant { name: "path", help: "Path tracing: global illumination", kind: Kind::Light { max_depth: None } };
 /// Paths of one bounce.
-pub static DIRECT: Paths =
-    Paths { name: "direct", help: "Direct lighting: paths of one bounce", kind: Kind::Light { max_depth: Some(1) } };
+pub static DIRECT: PathVariant =
+    PathVariant { name: "direct", help: "Direct lighting: paths of one bounce", kind: Kind::Light { max_depth: Some(1) } };
 /// Mirrors and glass, and direct light on everything else.
-pub static WHITTED: Paths = Paths {
+pub static WHITTED: PathVariant = PathVariant {
     name: "whitted",
     help: "Whitted (1980): chains of mirrors and glass, direct light on everything else",
     kind: Kind::Whitted,
 };
 /// What ambient occlusion approximates.
-pub static AO_SKY: Paths = Paths {
+pub static AO_SKY: PathVariant = PathVariant {
     name: "ao-sky",
     help: "Path traced grey diffuse surfaces under a white sky, divided by albedo: the ground truth that AO approximates",
     kind: Kind::WhiteSky,
 };
 /// Shading normals.
-pub static NORMALS: Paths = Paths { name: "normals", help: "Shading normals, in world space", kind: Kind::View(View::Normals) };
+pub static NORMALS: PathVariant =
+    PathVariant { name: "normals", help: "Shading normals, in world space", kind: Kind::View(View::Normals) };
 /// Base colours.
-pub static ALBEDO: Paths = Paths { name: "albedo", help: "Base colours", kind: Kind::View(View::Albedo) };
+pub static ALBEDO: PathVariant = PathVariant { name: "albedo", help: "Base colours", kind: Kind::View(View::Albedo) };
 /// Distances.
-pub static DEPTH: Paths = Paths { name: "depth", help: "Distance along camera rays", kind: Kind::View(View::Depth) };
+pub static DEPTH: PathVariant =
+    PathVariant { name: "depth", help: "Distance along camera rays", kind: Kind::View(View::Depth) };
 /// Occlusion from textures.
-pub static BAKED_OCCLUSION: Paths =
-    Paths { name: "baked-occlusion", help: "Baked occlusion textures", kind: Kind::View(View::BakedOcclusion) };
+pub static BAKED_OCCLUSION: PathVariant =
+    PathVariant { name: "baked-occlusion", help: "Baked occlusion textures", kind: Kind::View(View::BakedOcclusion) };
 
 /// What paths gather.
 enum Kind {
@@ -56,31 +58,31 @@ enum Kind {
 }
 
 /// An integrator that traces paths.
-pub struct Paths {
+pub struct PathVariant {
     name: &'static str,
     help: &'static str,
     kind: Kind,
 }
 
-impl Paths {
+impl PathVariant {
     fn view(&self) -> Option<View> {
         if let Kind::View(view) = self.kind { Some(view) } else { None }
     }
 
-    fn options(&self, shot: &Shot) -> Result<PathOptions> {
-        let options = PathOptions::new(shot)?;
+    fn options(&self, job: &RenderJob) -> Result<PathOptions> {
+        let options = PathOptions::new(job)?;
         Ok(match self.kind {
             Kind::Light { max_depth: Some(max_depth) } => PathOptions { max_depth, ..options },
             Kind::Light { max_depth: None } => options,
             // nothing but light samples brings light to what scatters it
             Kind::Whitted => PathOptions { strategy: Strategy::Light, specular_only: true, ..options },
-            Kind::WhiteSky => PathOptions { white_sky: Some(shot.settings.path.sky_albedo()), ..options },
+            Kind::WhiteSky => PathOptions { white_sky: Some(job.settings.path.sky_albedo()), ..options },
             Kind::View(view) => PathOptions { view: Some(view), ..options },
         })
     }
 }
 
-impl Integrator for Paths {
+impl Integrator for PathVariant {
     fn name(&self) -> &'static str {
         self.name
     }
@@ -124,13 +126,13 @@ impl Integrator for Paths {
     }
 
     /// What surrounds the scene is seen where nothing is; lenses and wide filters look beside the pixel.
-    fn skips_empty_tiles(&self, shot: &Shot) -> bool {
+    fn skips_empty_tiles(&self, job: &RenderJob) -> bool {
         let black = match self.kind {
             Kind::View(_) => true,
             Kind::WhiteSky => false,
-            Kind::Light { .. } | Kind::Whitted => !shot.scene.has_visible_sky(),
+            Kind::Light { .. } | Kind::Whitted => !job.scene.has_visible_sky(),
         };
-        let settings = &shot.settings.path;
+        let settings = &job.settings.path;
         let is_pinhole = settings.f_number.is_none() || settings.focus_distance.is_none();
         black && is_pinhole && settings.pixel_filter.unwrap_or_default() == PixelFilter::Box
     }
@@ -139,12 +141,12 @@ impl Integrator for Paths {
         !matches!(self.kind, Kind::WhiteSky)
     }
 
-    fn identity(&self, shot: &Shot) -> Vec<(&'static str, Option<String>)> {
+    fn identity(&self, job: &RenderJob) -> Vec<(&'static str, Option<String>)> {
         // without its lens a camera is refused when the image is rendered
-        let Ok(options) = self.options(shot) else { return Vec::new() };
+        let Ok(options) = self.options(job) else { return Vec::new() };
         let mut identity = vec![
-            ("environment", Some(environment_text(shot.scene, &options))),
-            ("energy_compensation", shot.settings.path.energy_compensation.then(|| "on".into())),
+            ("environment", Some(environment_text(job.scene, &options))),
+            ("energy_compensation", job.settings.path.energy_compensation.then(|| "on".into())),
         ];
         identity.extend(options.identity());
         identity
@@ -154,13 +156,13 @@ impl Integrator for Paths {
         &self,
         tracer: &Tracer,
         flat: &FlatScene,
-        shot: &Shot,
+        job: &RenderJob,
         cover: Option<Arc<Cover>>,
         control: &mut dyn Control,
     ) -> Result<Rendered> {
-        let options = PathOptions { cover, ..self.options(shot)? };
-        let result = render(tracer, flat, &shot.camera_record(flat), &options, control)?;
-        let report = report::report(tracer, flat, shot, &options, &result);
+        let options = PathOptions { cover, ..self.options(job)? };
+        let result = render(tracer, flat, &job.camera_record(flat), &options, control)?;
+        let report = report::report(tracer, flat, job, &options, &result);
         Ok(Rendered { image: result.image, report, ..Default::default() })
     }
 
@@ -187,7 +189,7 @@ impl Integrator for Paths {
         }
     }
 
-    fn path_options(&self, shot: &Shot) -> Result<Option<PathOptions>> {
-        self.options(shot).map(Some)
+    fn path_options(&self, job: &RenderJob) -> Result<Option<PathOptions>> {
+        self.options(job).map(Some)
     }
 }

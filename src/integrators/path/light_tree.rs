@@ -30,16 +30,16 @@ pub(super) struct Bounds {
     /// How far from a normal it shines, radians.
     pub falloff: f64,
     /// Along its axis and against it.
-    pub both_ways: bool,
+    pub two_sided: bool,
     /// Luminance per solid angle in its best direction.
     pub intensity: f64,
 }
 
 impl Bounds {
     fn union(&self, o: &Self) -> Self {
-        let both_ways = self.both_ways || o.both_ways;
+        let two_sided = self.two_sided || o.two_sided;
         // where one of them shines both ways the other's axis may be turned
-        let other = if both_ways && self.axis.dot(o.axis) < 0.0 { -o.axis } else { o.axis };
+        let other = if two_sided && self.axis.dot(o.axis) < 0.0 { -o.axis } else { o.axis };
         let (axis, spread) = cone_union((self.axis, self.spread), (other, o.spread));
         Self {
             lo: self.lo.min(o.lo),
@@ -47,12 +47,12 @@ impl Bounds {
             axis,
             spread,
             falloff: self.falloff.max(o.falloff),
-            both_ways,
+            two_sided,
             intensity: self.intensity + o.intensity,
         }
     }
 
-    fn middle(&self) -> DVec3 {
+    fn centroid(&self) -> DVec3 {
         0.5 * (self.lo + self.hi)
     }
 
@@ -66,20 +66,20 @@ impl Bounds {
     }
 
     fn node(&self, link: u32) -> LightNode {
-        let middle = self.middle().as_vec3();
-        // the middle's own rounding, and the radius's, may leave nothing outside
-        let radius = (self.hi - middle.as_dvec3()).length().max((self.lo - middle.as_dvec3()).length()) * (1.0 + 1e-6);
+        let centroid = self.centroid().as_vec3();
+        // the centroid's own rounding, and the radius's, may leave nothing outside
+        let radius = (self.hi - centroid.as_dvec3()).length().max((self.lo - centroid.as_dvec3()).length()) * (1.0 + 1e-6);
         // a little wider than the cone is: single precision
         let spread = (self.spread + 1e-4).min(PI);
         LightNode {
-            center: middle.to_array(),
+            center: centroid.to_array(),
             radius: radius as f32,
             axis: self.axis.as_vec3().to_array(),
             intensity: self.intensity as f32,
             cos_o: spread.cos() as f32,
             sin_o: spread.sin() as f32,
             cos_e: (self.falloff + 1e-4).min(PI).cos() as f32,
-            link: link | if self.both_ways { LIGHT_BOTH_WAYS } else { 0 },
+            link: link | if self.two_sided { LIGHT_BOTH_WAYS } else { 0 },
         }
     }
 }
@@ -137,14 +137,14 @@ impl Tree<'_> {
 
     /// Sorts lights into two parts, neither empty; returns how many are in the first.
     fn split(&self, of: &mut [u32], level: u32) -> usize {
-        let middle = |k: u32| self.lights[k as usize].middle();
+        let centroid = |k: u32| self.lights[k as usize].centroid();
         let (lo, hi) =
-            of.iter().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(lo, hi), &k| (lo.min(middle(k)), hi.max(middle(k))));
+            of.iter().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(lo, hi), &k| (lo.min(centroid(k)), hi.max(centroid(k))));
         let extent = hi - lo;
         let mut best: Option<(f64, usize, f64)> = None;
         let axes = if level < MEASURED_LEVELS { 0..3 } else { 0..0 };
         for axis in axes.filter(|&a| extent[a] > 0.0) {
-            let bin = |k: u32| (((middle(k)[axis] - lo[axis]) / extent[axis] * BINS as f64) as usize).min(BINS - 1);
+            let bin = |k: u32| (((centroid(k)[axis] - lo[axis]) / extent[axis] * BINS as f64) as usize).min(BINS - 1);
             let mut bins: [Option<Bounds>; BINS] = [None; BINS];
             for &k in of.iter() {
                 let b = &self.lights[k as usize];
@@ -166,7 +166,7 @@ impl Tree<'_> {
             }
         }
         if let Some((_, axis, cut)) = best {
-            let of_first = partition(of, |&k| middle(k)[axis] < cut);
+            let of_first = partition(of, |&k| centroid(k)[axis] < cut);
             if of_first > 0 && of_first < of.len() {
                 return of_first;
             }
@@ -179,7 +179,7 @@ impl Tree<'_> {
             2
         };
         let half = of.len() / 2;
-        of.select_nth_unstable_by(half, |&a, &b| middle(a)[axis].total_cmp(&middle(b)[axis]).then(a.cmp(&b)));
+        of.select_nth_unstable_by(half, |&a, &b| centroid(a)[axis].total_cmp(&centroid(b)[axis]).then(a.cmp(&b)));
         half
     }
 }
@@ -213,7 +213,7 @@ mod tests {
                 let axis = (DVec3::new(random(i, 3), random(i, 4), random(i, 5)) - 0.5).normalize();
                 let size = DVec3::splat(0.05 * random(i, 6));
                 let (spread, falloff) = if i % 5 == 0 { (PI, 0.5 * PI) } else { (0.0, 0.5 * PI) };
-                Bounds { lo: at - size, hi: at + size, axis, spread, falloff, both_ways: i % 3 == 0, intensity: random(i, 7) }
+                Bounds { lo: at - size, hi: at + size, axis, spread, falloff, two_sided: i % 3 == 0, intensity: random(i, 7) }
             })
             .collect()
     }

@@ -18,7 +18,7 @@ const DIRECTIONS: [DVec3; 3] = [
 ];
 
 /// Does it matter? Not in a scene of one volume that absorbs nothing: which side of a surface is inside its winding says.
-pub(super) fn matter(flat: &FlatScene) -> bool {
+pub(super) fn need_tracking(flat: &FlatScene) -> bool {
     let mut used: Vec<usize> = flat.scene.instances.iter().map(|i| flat.scene.meshes[i.mesh].material).collect();
     used.sort_unstable();
     used.dedup();
@@ -27,10 +27,10 @@ pub(super) fn matter(flat: &FlatScene) -> bool {
 }
 
 /// Surfaces of volumes, in double precision.
-pub(super) struct Bodies(Vec<Body>);
+pub(super) struct ClosedVolumes(Vec<VolumeMesh>);
 
 /// A mesh of a volume.
-struct Body {
+struct VolumeMesh {
     material: u32,
     /// From the world (relative to the scene's origin) to the mesh's own space, where the winding is what it is.
     to_object: DAffine3,
@@ -39,7 +39,7 @@ struct Body {
     spheres: Vec<(DVec3, f64)>,
 }
 
-impl Bodies {
+impl ClosedVolumes {
     /// Those of a scene.
     pub fn new(flat: &FlatScene) -> Self {
         let scene = flat.scene;
@@ -58,7 +58,7 @@ impl Bodies {
                 })),
                 Geometry::Spheres(all) => spheres.extend(all.iter().map(|s| (s.center.as_dvec3(), f64::from(s.radius)))),
             }
-            Some(Body { material: mesh.material as u32, to_object: to_world.inverse(), triangles, spheres })
+            Some(VolumeMesh { material: mesh.material as u32, to_object: to_world.inverse(), triangles, spheres })
         };
         Self(scene.instances.iter().filter_map(body).collect())
     }
@@ -76,7 +76,7 @@ impl Bodies {
 
     /// The same, as one direction tells.
     fn along(&self, point: DVec3, direction: DVec3) -> Vec<u32> {
-        let exit = |body: &Body| {
+        let exit = |body: &VolumeMesh| {
             let (o, d) = (body.to_object.transform_point3(point), body.to_object.transform_vector3(direction));
             let of_triangles = body.triangles.iter().filter_map(|t| crossing(o, d, *t));
             let of_spheres = body.spheres.iter().filter_map(|&(centre, radius)| {

@@ -30,9 +30,9 @@ use crate::tracer::queue::RayQueue;
 use crate::tracer::{Push, Stream, Tracer};
 use environment::DeviceEnvironment;
 use lights::Lights;
-use media::Bodies;
+use media::ClosedVolumes;
 use params::{CONE_BYTES, INVALID, MEDIA_BYTES, PathParams, QUAD_BYTES, SKY_PDF_BYTES, STATE_BYTES, STRAIGHT_BYTES};
-pub use settings::{Lens, MOST_DEPTH, PathOptions, Strategy, TextureFilter};
+pub use settings::{Lens, MAX_DEPTH, PathOptions, Strategy, TextureFilter};
 
 /// Bounces of a submission; then the host asks how many paths are left.
 const BOUNCES: u32 = 4;
@@ -80,7 +80,7 @@ pub fn render(
 
 /// Renders one scene again and again: lights, environment, queues and pipelines are made once.
 pub struct PathIntegrator {
-    paths: Paths,
+    paths: PathEstimator,
     options: PathOptions,
 }
 
@@ -91,7 +91,7 @@ impl PathIntegrator {
     /// # Errors
     /// Those of the device; [`Error::Usage`] for a tracer that was made for less.
     pub fn new(tracer: &Tracer, flat: &FlatScene, options: &PathOptions) -> Result<Self> {
-        Ok(Self { paths: Paths::new(tracer, flat, options)?, options: options.clone() })
+        Ok(Self { paths: PathEstimator::new(tracer, flat, options)?, options: options.clone() })
     }
 
     /// Lights that light samples are drawn from.
@@ -112,7 +112,7 @@ impl PathIntegrator {
         control: &mut dyn Control,
     ) -> Result<PathResult> {
         let Self { paths, options } = self;
-        paths.place_camera(camera)?;
+        paths.find_camera_media(camera)?;
         if spp > options.spp {
             return Err(Error::Usage(format!("{spp} paths a pixel: the integrator was made for {}", options.spp)));
         }
@@ -124,9 +124,9 @@ impl PathIntegrator {
             cover: options.cover.as_deref(),
             film: &options.film,
         };
-        paths.traced = Traced::default();
+        paths.traced = PathCounts::default();
         let image = accumulate(tracer, camera, &plan, &BlockParams::default(), paths, control)?;
-        let Traced { bounce_rays, shadow_rays, longest_path } = paths.traced;
+        let PathCounts { bounce_rays, shadow_rays, longest_path } = paths.traced;
         Ok(PathResult {
             image,
             bounce_rays,
@@ -142,14 +142,14 @@ impl PathIntegrator {
 
 /// What an image took.
 #[derive(Clone, Copy, Default)]
-struct Traced {
+struct PathCounts {
     bounce_rays: u64,
     shadow_rays: u64,
     longest_path: u32,
 }
 
 /// What rays to lights need where thin walls let them through.
-struct Walls {
+struct TransmittedShadowRays {
     stream: Stream,
     /// Rays that have come through one wall more; they go back and forth between this queue and that of rays to lights.
     later: RayQueue,
@@ -157,7 +157,7 @@ struct Walls {
     count: Buffer,
 }
 
-struct Paths {
+struct PathEstimator {
     camera: Stream,
     bounce: Stream,
     shadow: Stream,
@@ -169,14 +169,14 @@ struct Paths {
     block_params: Vec<Buffer>,
     path_params: Vec<Buffer>,
     records: Vec<PathParams>,
-    walls: Option<Walls>,
+    walls: Option<TransmittedShadowRays>,
     /// What paths may be inside of, where it matters.
-    bodies: Option<Bodies>,
+    volumes: Option<ClosedVolumes>,
     /// How many rays each bounce and its light samples traced.
     counts: Buffer,
     max_depth: u32,
     samples_lights: bool,
-    traced: Traced,
+    traced: PathCounts,
     lights: u32,
     light_tree: bool,
     features: PathFeatures,
@@ -185,7 +185,7 @@ struct Paths {
     _environment: DeviceEnvironment,
 }
 
-impl Paths {
+impl PathEstimator {
     fn new(tracer: &Tracer, flat: &FlatScene, options: &PathOptions) -> Result<Self> {
         let device = tracer.device();
         // a tracer that was made for less would make a wrong image, and say nothing
@@ -212,7 +212,7 @@ impl Paths {
         let environment = DeviceEnvironment::new(device, around, options.strategy == Strategy::Mis)?;
         let lights = match options.white_sky {
             _ if options.view.is_some() => Lights::default(),
-            Some(_) => Lights::sky_only(),
+            Some(_) => Lights::environment_only(),
             None => Lights::new(flat, environment.mean),
         };
         let (features, light_kinds) = features::features(options, flat, &lights, environment.map.texels != 0, cones);
@@ -278,7 +278,7 @@ impl Paths {
         let states = [keep(states()?), keep(states()?)];
         let samples_lights = options.strategy.samples_lights() && !lights.records.is_empty() && options.view.is_none();
         let walls = match has_clear_walls && samples_lights {
-            true => Some(Walls {
+            true => Some(TransmittedShadowRays {
                 stream: tracer.specialized(&shaders::PATH_SHADOW_WALLS_CLOSEST, &constants)?,
                 later: RayQueue::new(device, most)?,
                 contributions: quads("what lights bring through walls")?,
@@ -319,11 +319,11 @@ impl Paths {
             path_params,
             records,
             walls,
-            bodies: has_media.then(|| Bodies::new(flat)),
+            volumes: has_media.then(|| ClosedVolumes::new(flat)),
             counts: Buffer::new(device, "numbers of rays", 4 * 2 * u64::from(BOUNCES + 1), Memory::Readback)?,
             max_depth: options.bounces(),
             samples_lights,
-            traced: Traced::default(),
+            traced: PathCounts::default(),
             lights: if options.strategy.samples_lights() { lights.count() } else { 0 },
             light_tree: !lights.tree.is_empty(),
             features,
@@ -334,10 +334,10 @@ impl Paths {
     }
 
     /// Says which volumes the camera is in. Parallel rays and those through a lens count as starting where the camera is.
-    fn place_camera(&mut self, camera: &CameraRecord) -> Result<()> {
-        let Some(bodies) = &self.bodies else { return Ok(()) };
+    fn find_camera_media(&mut self, camera: &CameraRecord) -> Result<()> {
+        let Some(volumes) = &self.volumes else { return Ok(()) };
         let eye = glam::DVec3::from_array([0, 1, 2].map(|row| f64::from(camera.camera_to_world[row][3])));
-        let camera_media = bodies.around(eye);
+        let camera_media = volumes.around(eye);
         for (record, buffer) in self.records.iter_mut().zip(&mut self.path_params) {
             record.camera_media = camera_media;
             buffer.write(0, bytemuck::bytes_of(record))?;
@@ -396,7 +396,7 @@ impl Paths {
         let passes = [0, 1].map(|k| self.block_params[k].address());
         let push = |fills: usize| Push { pass: passes[fills], ..push };
         // what a path goes straight through is no bounce, but it takes a launch
-        let straight = self.bodies.is_some() || self.features.contains(PathFeature::ClearWalls);
+        let straight = self.volumes.is_some() || self.features.contains(PathFeature::ClearWalls);
         let max_launches = if straight { self.max_depth.saturating_add(MAX_STRAIGHT) } else { self.max_depth };
         let (mut timings, mut depth, mut left, mut started) = (Vec::new(), 0, push(0).count, false);
         // vertex `depth` fills queue `depth % 2`
@@ -450,7 +450,7 @@ impl Paths {
     }
 }
 
-impl Estimator for Paths {
+impl Estimator for PathEstimator {
     const CHANNELS: usize = 3;
 
     fn begin(&mut self, params: BlockParams, _: bool) -> Result<u64> {

@@ -5,7 +5,7 @@ use serde_json::json;
 use super::settings::depth_text;
 use super::{PathOptions, PathResult, TextureFilter};
 use crate::accel::flatten::FlatScene;
-use crate::integrators::{IntegratorReport, Shot};
+use crate::integrators::{IntegratorReport, RenderJob};
 use crate::scene::{Environment, Scene};
 use crate::tracer::{BuildStats, Tracer};
 
@@ -26,7 +26,13 @@ fn emits(flat: &FlatScene) -> bool {
 }
 
 /// Says it.
-pub(super) fn report(tracer: &Tracer, flat: &FlatScene, shot: &Shot, o: &PathOptions, result: &PathResult) -> IntegratorReport {
+pub(super) fn report(
+    tracer: &Tracer,
+    flat: &FlatScene,
+    job: &RenderJob,
+    o: &PathOptions,
+    result: &PathResult,
+) -> IntegratorReport {
     let (image, stats) = (&result.image, tracer.stats());
     let (paths, rays) = (image.primary_rays, image.primary_rays + result.bounce_rays + result.shadow_rays);
     let per_second = |n: u64| n as f64 / image.trace_seconds.max(1e-9) / 1e6;
@@ -53,10 +59,10 @@ pub(super) fn report(tracer: &Tracer, flat: &FlatScene, shot: &Shot, o: &PathOpt
         n => format!("{n} lights, sampled by power"),
     });
     let record = json!({
-        "environment": environment_text(shot.scene, o),
+        "environment": environment_text(job.scene, o),
         "mip_levels": stats.mip_levels,
         "mip_bytes": stats.mip_bytes,
-        "energy_compensation": shot.settings.path.energy_compensation,
+        "energy_compensation": job.settings.path.energy_compensation,
         "not_finite": image.film.not_finite,
         "lights": result.lights,
         "light_tree": result.light_tree,

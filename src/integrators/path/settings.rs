@@ -11,7 +11,7 @@ use super::{PixelFilter, View};
 use crate::error::{Error, Result};
 use crate::film::cover::Cover;
 use crate::film::schedule::FilmOptions;
-use crate::integrators::Shot;
+use crate::integrators::RenderJob;
 use crate::interface::PathFeature;
 use crate::scene::Projection;
 #[cfg(feature = "cli")]
@@ -80,7 +80,7 @@ settings! {
 }
 
 /// Longest path: with Russian roulette, which lets no more than 0.95 of paths go on, none gets here.
-pub const MOST_DEPTH: u32 = 4096;
+pub const MAX_DEPTH: u32 = 4096;
 
 /// Grey of `ao-sky`.
 const SKY_ALBEDO: f64 = 0.5;
@@ -137,7 +137,7 @@ pub struct PathOptions {
     pub spp: u32,
     /// Of the sampler.
     pub seed: u32,
-    /// Bounces at most: 0 shows what emits, 1 adds direct light. [`MOST_DEPTH`] is the limit, which nobody reaches.
+    /// Bounces at most: 0 shows what emits, 1 adds direct light. [`MAX_DEPTH`] is the limit, which nobody reaches.
     pub max_depth: u32,
     /// Paths of fewer bounces add nothing: 1 leaves out what emits, 2 direct light as well.
     pub min_depth: u32,
@@ -174,7 +174,7 @@ impl Default for PathOptions {
             size: [1280, 720],
             spp: 16,
             seed: 0,
-            max_depth: MOST_DEPTH,
+            max_depth: MAX_DEPTH,
             min_depth: 0,
             rr_depth: 5,
             firefly_clamp: f32::INFINITY,
@@ -214,23 +214,23 @@ impl PathSettings {
 }
 
 impl PathOptions {
-    /// Those of a shot's settings: of light, by all that finds it.
-    pub(super) fn new(shot: &Shot) -> Result<Self> {
-        let (settings, default) = (&shot.settings.path, Self::default());
+    /// Those of a job's settings: of light, by all that finds it.
+    pub(super) fn new(job: &RenderJob) -> Result<Self> {
+        let (settings, default) = (&job.settings.path, Self::default());
         Ok(Self {
-            size: shot.size,
-            spp: shot.spp,
-            seed: shot.seed,
-            max_depth: settings.max_depth.or(shot.scene.hints.max_depth).unwrap_or(MOST_DEPTH),
+            size: job.size,
+            spp: job.spp,
+            seed: job.seed,
+            max_depth: settings.max_depth.or(job.scene.hints.max_depth).unwrap_or(MAX_DEPTH),
             min_depth: settings.min_depth.unwrap_or(default.min_depth),
             rr_depth: settings.rr_depth.unwrap_or(default.rr_depth),
             firefly_clamp: settings.firefly_clamp.map_or(f32::INFINITY, |c| c as f32),
             strategy: settings.sampling.unwrap_or_default(),
             pixel_filter: settings.pixel_filter.unwrap_or_default(),
             texture_filter: settings.texture_filter.unwrap_or_default(),
-            lens: settings.lens(shot.camera.projection)?,
-            time_limit: shot.time_limit,
-            film: shot.film.clone(),
+            lens: settings.lens(job.camera.projection)?,
+            time_limit: job.time_limit,
+            film: job.film.clone(),
             ..default
         })
     }
@@ -287,7 +287,7 @@ impl PathOptions {
 
     /// Bounces at most.
     pub(super) fn bounces(&self) -> u32 {
-        if self.view.is_some() { 0 } else { self.max_depth.min(MOST_DEPTH) }
+        if self.view.is_some() { 0 } else { self.max_depth.min(MAX_DEPTH) }
     }
 
     /// What of them shaders read.
@@ -321,7 +321,7 @@ impl PathOptions {
     /// Their part of `--json`.
     pub(super) fn record(&self) -> Value {
         json!({
-            "max_depth": if self.max_depth >= MOST_DEPTH { Value::Null } else { json!(self.max_depth) },
+            "max_depth": if self.max_depth >= MAX_DEPTH { Value::Null } else { json!(self.max_depth) },
             "min_depth": self.min_depth,
             "rr_depth": self.rr_depth,
             "firefly_clamp": if self.firefly_clamp.is_finite() { json!(self.firefly_clamp) } else { Value::Null },
@@ -340,5 +340,5 @@ impl PathOptions {
 
 /// A limit of bounces in words.
 pub(super) fn depth_text(max_depth: u32) -> String {
-    if max_depth >= MOST_DEPTH { "unlimited".into() } else { max_depth.to_string() }
+    if max_depth >= MAX_DEPTH { "unlimited".into() } else { max_depth.to_string() }
 }

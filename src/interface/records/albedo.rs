@@ -4,25 +4,25 @@ records! {
     "albedo" values {
         /// Entries along cosine and along roughness, both from 0 to 1.
         ALBEDO_SIZE: uint = 64;
-        /// Of GGX that reflects everything, by the stretched cosine.
+        /// Layer: albedo of perfectly reflecting GGX microfacets, by the stretched cosine.
         ALBEDO_GGX: uint = 0;
-        /// Mean of `schlick_weight()` over what GGX reflects.
+        /// Layer: mean of `schlick_weight()` over what GGX reflects.
         ALBEDO_SCHLICK: uint = 1;
-        /// Of Charlie.
+        /// Layer: albedo of Charlie sheen.
         ALBEDO_SHEEN: uint = 2;
-        /// Of Beckmann's microfacets that reflect everything, by the stretched cosine.
+        /// Layer: albedo of perfectly reflecting Beckmann microfacets, by the stretched cosine.
         ALBEDO_BECKMANN: uint = 3;
-        /// Eight for each index of refraction, `DIELECTRIC_*` as seen from outside, then from inside.
+        /// First of eight layers for each index of refraction: `DIELECTRIC_*` as seen from outside, then from inside.
         ALBEDO_DIELECTRIC: uint = 4;
-        /// Of GGX microfacets with the exact Fresnel term F of a dielectric: reflected beyond the critical angle, over `ALBEDO_GGX`.
+        /// GGX microfacets with the exact Fresnel term F of a dielectric: light reflected beyond the critical angle, over `ALBEDO_GGX`.
         DIELECTRIC_TOTAL: uint = 0;
-        /// Reflected where there is refraction, over `ALBEDO_GGX`.
+        /// Light reflected below the critical angle, over `ALBEDO_GGX`.
         DIELECTRIC_REFLECTED: uint = 1;
-        /// Refracted, as if F were 0 where there is refraction.
+        /// Light refracted if F were 0 below the critical angle.
         DIELECTRIC_OPEN: uint = 2;
-        /// And what of that F takes away.
+        /// Share of `DIELECTRIC_OPEN` that F removes.
         DIELECTRIC_CLOSED: uint = 3;
-        /// How many of these there are.
+        /// Number of `DIELECTRIC_*` layers.
         DIELECTRIC_LAYERS: uint = 4;
     };
 }

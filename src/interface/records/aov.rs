@@ -3,13 +3,13 @@
 records! {
     "aov";
 
-    /// What a pixel's centre shows.
+    /// What the ray through a pixel's centre hits.
     AovPixel: words {
-        /// Distance along the ray (world units); infinite where nothing is met.
+        /// Distance along the ray, scene units; infinite for a miss.
         depth: float,
-        /// Index into the scene's instances; all ones where nothing is met.
+        /// Index into the scene's instances; `INVALID` for a miss.
         instance: uint,
-        /// Triangle or sphere of the instance's mesh.
+        /// Index of the triangle or sphere in the instance's mesh.
         primitive: uint,
         /// Index into the scene's materials.
         material: uint,
@@ -17,7 +17,7 @@ records! {
         position: vec3,
         /// Linear base colour: red.
         red: float,
-        /// Unit geometric normal, world, front side.
+        /// Unit geometric normal, world space, on the front side.
         ng: vec3,
         /// Linear base colour: green.
         green: float,

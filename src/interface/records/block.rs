@@ -10,45 +10,45 @@ records! {
 
     /// A block of an image, its camera, and what its passes read and write.
     BlockParams: block readonly 16 {
-        /// Rows, relative to the scene's origin.
+        /// Camera to world, three rows; the world is relative to the scene's origin.
         camera_to_world: vec4[3],
-        /// Half width and half height of the view: tangents, or world units when orthographic.
+        /// Half width and half height of the view: tangents for a perspective camera, scene units for an orthographic one.
         view: vec2,
-        /// 1: parallel rays.
+        /// 1: the camera is orthographic.
         orthographic: uint,
-        /// Of the sampler.
+        /// Seed of the sampler.
         seed: uint,
-        /// Pixels.
+        /// Image size, pixels.
         image_size: uvec2,
-        /// Its upper left pixel.
+        /// Upper left pixel of the block.
         block_origin: uvec2,
-        /// Pixels.
+        /// Size of the block, pixels.
         block_size: uvec2,
-        /// Tiles in a row of the block.
+        /// Number of tiles in a row of the block.
         tiles_x: uint,
         /// Axis of the hemisphere: 0 the geometric normal, 1 the shading normal.
         hemisphere: uint,
-        /// A hit at distance d counts `2^(-d * falloff_log2)`.
+        /// Falloff: a hit at distance d occludes by `2^(-d * falloff_log2)`.
         falloff_log2: float,
-        /// World units beyond which nothing occludes; infinite: no limit.
+        /// AO radius, scene units: hits beyond do not occlude; infinite: no limit.
         radius: float,
-        /// A film pixel for each pixel of the block.
+        /// The film's pixels, in the order of the block.
         film: address,
-        /// A float per ray of a launch: what the sample adds to its pixel, negative where it met nothing.
+        /// A float per ray of a launch: value of the sample, negative if its camera ray missed.
         samples: address,
-        /// `AovPixel` per ray of a launch.
+        /// `AovPixel` of each ray of a launch.
         aov: address,
-        /// A `uint` each: the tiles that are rendered; 0: all.
+        /// A `uint` per tile that is rendered: its index; 0: all tiles.
         tiles: address,
-        /// Occlusion rays.
+        /// The queue of occlusion rays.
         queue: QueueRecord,
-        /// Where camera rays are written, or 0.
+        /// Output for camera rays, or 0.
         ray_dump: address,
-        /// Where occlusion rays are written, or 0.
+        /// Output for occlusion rays, or 0.
         occlusion_dump: address,
-        /// `FrameParams`, or 0.
+        /// Address of the `FrameParams`, or 0.
         frame: address,
-        /// `PathParams`, or 0.
+        /// Address of the `PathParams`, or 0.
         path: address,
     }
 }

@@ -1,17 +1,17 @@
-//! What the denoiser's filter averages.
+//! The input of the denoiser's filter.
 
 records! {
     "denoise";
 
-    /// A mean of radiance over samples.
+    /// Statistics of a pixel's radiance samples.
     RadianceRecord: words {
-        /// Linear RGB.
+        /// Mean, linear RGB.
         mean: vec3,
-        /// How many.
+        /// Number of samples.
         samples: float,
-        /// Of one sample.
+        /// Variance of one sample, by channel.
         variance: vec3,
-        /// To a multiple of 16 bytes.
+        /// Padding to a multiple of 16 bytes.
         reserved: float,
     }
 }

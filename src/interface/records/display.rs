@@ -1,29 +1,29 @@
-//! Parameters of the pass that shows a buffer of a frame.
+//! Parameters of the pass that displays a buffer of a frame.
 
 records! {
     "display";
 
-    /// What is shown, and how.
+    /// Parameters of the pass `display`.
     DisplayParams: block readonly 8 {
-        /// `FrameParams`.
+        /// Address of the `FrameParams`.
         frame: address,
-        /// A float a byte: the smallest value that is encoded so.
+        /// 256 floats: the smallest linear value that sRGB encodes as each byte.
         thresholds: address,
-        /// A `uint` a pixel.
+        /// Output, a `uint` per pixel: 8-bit RGBA.
         words: address,
-        /// A float a pixel: ambient visibility.
+        /// Ambient visibility, a float per pixel.
         result: address,
-        /// Estimates.
+        /// Accumulated estimates, 8 bytes per pixel.
         history: address,
-        /// 3 floats a pixel: filtered bent normals, or 0.
+        /// Filtered bent normals, 3 floats per pixel, or 0.
         bent: address,
-        /// One of `SHOWN_*`.
+        /// One of `SHOWN_*`: the buffer that is displayed.
         shown: uint,
-        /// `2^exposure`.
+        /// Exposure as a factor: `2^exposure`.
         gain: float,
-        /// World units that depths and positions are measured in.
+        /// Length by which depths and positions are divided, scene units.
         unit: float,
-        /// 0: there is nothing but the result.
+        /// 0: the technique has no history, only a result.
         has_history: uint,
     }
 }

@@ -1,121 +1,121 @@
-//! What the passes of a frame in real time share.
+//! Parameters and images that the passes of a real-time frame share.
 //!
-//! Images are in plain memory, rows from the top, one record a pixel:
+//! Images are buffers, rows from the top, one record per pixel:
 //!
 //! | image | bytes | what |
 //! |---|---|---|
 //! | surface | 32 | `SurfaceRecord` |
-//! | guide | 8 | view depth (infinite: nothing is there), normal and id packed: what edge tests of neighbours read |
-//! | history | 8 | mean accessibility; number of samples behind it, variance of one of them |
-//! | current | 8 | the same of this frame's samples alone; no samples: 0 of them |
-//! | bent | 12 | where required: mean of accessibility times direction (bent normal), world space; one for each of this frame's samples, history and the filtered result. Its samples are those of the accessibility beside it |
+//! | guide | 8 | view depth (infinite for background), packed normal and id: for edge tests between neighbours |
+//! | history | 8 | mean ambient visibility; number of samples, and variance of one sample |
+//! | current | 8 | the same for this frame's samples alone; 0 samples where a pixel has none |
+//! | bent | 12 | optional: bent normal, the mean of ambient visibility times direction, world space; one image each for this frame, the history and the filtered result, from the same samples as ambient visibility |
 
 records! {
     "frame" values {
         /// Largest variance that a packed estimate holds, of values from 0 to 1: a quarter, and half of it more for an unbiased estimate from two.
         MAX_VARIANCE: float = 0.5;
-        /// Budget: sums of desired samples at 64 levels far apart.
+        /// Budget: index of the first of 64 sums of desired samples, at widely spaced levels.
         SUMS_COARSE: uint = 0;
-        /// Budget: sums of desired samples at 64 levels between two of those.
+        /// Budget: index of the first of 64 sums of desired samples, at levels between two of the coarse ones.
         SUMS_FINE: uint = 64;
-        /// Budget: sum of deviations.
+        /// Budget: index of the sum of standard deviations.
         SUMS_DEVIATION: uint = 128;
-        /// Budget: number of pixels.
+        /// Budget: index of the number of pixels.
         SUMS_PIXELS: uint = 129;
-        /// Budget: number of rays that are listed.
+        /// Budget: index of the number of rays listed.
         SUMS_LISTED: uint = 130;
-        /// Budget: how many sums there are.
+        /// Budget: number of sums.
         SUMS_COUNT: uint = 131;
-        /// Budget: one of so many pixels speaks for all where desired samples are added up.
+        /// Budget: desired samples are summed over one pixel in this many.
         BUDGET_SHARE: uint = 16;
-        /// Step of a filter: its box reaches along rows.
+        /// Flag of a filter step: its box extends along rows.
         STEP_HORIZONTAL: uint = 1;
-        /// Step of a filter: its box reaches along columns.
+        /// Flag of a filter step: its box extends along columns.
         STEP_VERTICAL: uint = 2;
     };
 
-    /// What all passes of a frame share: its cameras, how it is sampled, and the images that tell what pixels show. What else a pass reads and writes is in a record
-    /// of its own (src/interface/records/passes.rs).
+    /// Parameters that all passes of a frame share: the cameras of this frame and of the previous one, the sampling settings, and the G-buffer. Parameters of a
+    /// single pass are in src/interface/records/passes.rs.
     FrameParams: block readonly 16 {
-        /// Rows, relative to the scene's origin.
+        /// Camera to world, three rows; the world is relative to the scene's origin.
         camera_to_world: vec4[3],
-        /// Rows of the inverse.
+        /// World to camera, three rows.
         world_to_camera: vec4[3],
-        /// Of the previous frame.
+        /// World to camera of the previous frame, three rows.
         previous_world_to_camera: vec4[3],
-        /// Half width and half height of the view: tangents, or world units when orthographic.
+        /// Half width and half height of the view: tangents for a perspective camera, scene units for an orthographic one.
         view: vec2,
-        /// Of the previous frame.
+        /// `view` of the previous frame.
         previous_view: vec2,
-        /// 1: parallel rays.
+        /// 1: the camera is orthographic.
         orthographic: uint,
-        /// Of the previous frame.
+        /// `orthographic` of the previous frame.
         previous_orthographic: uint,
-        /// Pixels.
+        /// Image size, pixels.
         size: uvec2,
-        /// 8x8 tiles in a row.
+        /// Number of 8x8 tiles in a row of the image.
         tiles_x: uint,
-        /// Counts up; where samples differ from frame to frame.
+        /// Frame index, from which the sampler's points follow.
         frame: uint,
-        /// Of the sequence.
+        /// Seed of the sampler.
         seed: uint,
-        /// Of a pixel that is sampled in this frame; with a budget: at most.
+        /// Occlusion rays of each pixel that is sampled in this frame; with a variance budget, the maximum.
         rays_per_pixel: uint,
-        /// One of `PATTERN_*`: which pixels are sampled.
+        /// One of `PATTERN_*`: which pixels are sampled in this frame.
         pattern: uint,
-        /// One of `SEQUENCE_*`.
+        /// One of `SEQUENCE_*`: the sampler of ray directions.
         sequence: uint,
-        /// Length of occlusion rays, world units.
+        /// Length of occlusion rays, scene units.
         reach: float,
-        /// A hit at distance d counts `2^(-d * falloff_log2)`.
+        /// Falloff: a hit at distance d occludes by `2^(-d * falloff_log2)`.
         falloff_log2: float,
-        /// That a history counts at most.
+        /// Maximum history length, in samples.
         most_samples: float,
-        /// Distance from a pixel's plane, in pixels' footprints, at which an edge begins.
+        /// Distance from a pixel's tangent plane, in pixel footprints, from which a neighbour counts as another surface.
         depth_tolerance: float,
-        /// Cosine between normals at which an edge begins.
+        /// Cosine between normals below which a neighbour counts as another surface.
         normal_tolerance: float,
-        /// 1: neither camera nor scene have moved since the previous frame.
+        /// 1: neither the camera nor the scene has moved since the previous frame.
         still: uint,
-        /// 0: the history buffers hold nothing.
+        /// 0: the history buffers hold no data yet.
         has_history: uint,
-        /// 1: nothing moves, and pixels with all their samples get no more.
+        /// 1: nothing moves, and pixels whose history is full get no more rays.
         rest: uint,
-        /// `SurfaceRecord`s.
+        /// `SurfaceRecord` of each pixel.
         surface: address,
-        /// 3 floats a pixel: the hemisphere's axis where it is not the geometric normal; or 0.
+        /// Axis of each pixel's hemisphere, 3 floats; 0: the geometric normal is the axis.
         axes: address,
-        /// For edge tests.
+        /// Guide image of this frame, for edge tests.
         guide: address,
-        /// Of the previous frame.
+        /// Guide image of the previous frame.
         previous_guide: address,
-        /// Of the previous frame.
+        /// History of the previous frame.
         previous_history: address,
-        /// 3 floats a pixel: where its surface was in the previous frame; 0: nothing moves.
+        /// Position of each pixel's surface in the previous frame, 3 floats; 0: nothing moves.
         previous_position: address,
     }
 
-    /// What moved, or changed its shape: box around where it was and where it is.
+    /// An object that moved or deformed: a box around its bounds in the previous frame and in this one.
     MovedRecord: array MovedRecords readonly 16 {
-        /// Lower corner, world space.
+        /// Lower corner, world space relative to the scene's origin.
         lower: vec3,
-        /// Of what it covers that may have changed in this frame: the way it went by its size, at most 1.
+        /// Fraction of the hemisphere part that the box covers which may have changed in this frame: distance moved over size, at most 1.
         share: float,
         /// Upper corner.
         upper: vec3,
-        /// To a multiple of 16 bytes.
+        /// Padding to a multiple of 16 bytes.
         reserved: float,
     }
 
-    /// What a pixel shows.
+    /// The surface point at a pixel's centre.
     SurfaceRecord: words {
-        /// World space, relative to the scene's origin.
+        /// Position, world space relative to the scene's origin.
         position: vec3,
-        /// How far off the surface a ray has to start so that it does not meet it, world units.
+        /// Distance along the normal at which a ray must start to avoid self-intersection, scene units.
         spawn_offset: float,
-        /// Unit geometric normal on the viewer's side.
+        /// Unit geometric normal, on the viewer's side.
         normal: vec3,
-        /// To a multiple of 16 bytes.
+        /// Padding to a multiple of 16 bytes.
         reserved: float,
     }
 }

@@ -1,42 +1,42 @@
-//! What the compute tracer's kernels walk: blocks of the wide hierarchy, each a node or a leaf of one of three kinds; nodes of the binary one, and its
-//! primitives; and what the wide kernel's launches leave. Records are loaded as pairs of words.
+//! The compute tracer's acceleration structures: blocks of the wide BVH, each a node or a leaf of one of three kinds; nodes and primitives of the binary BVH;
+//! and the hits of a launch. Records are loaded as pairs of words. A primitive's group is its BLAS.
 
 records! {
     "hierarchy" values {
-        /// Flag of a primitive's number in its group: its alpha is tested.
+        /// Flag of a primitive's index in its BLAS: it is alpha tested.
         ALPHA_TESTED: uint = 0x8000_0000;
-        /// Flag of a primitive's number in its group: it is a sphere.
+        /// Flag of a primitive's index in its BLAS: it is a sphere.
         SPHERE: uint = 0x4000_0000;
-        /// The number below these flags.
+        /// Mask of the index below these flags.
         NUMBER: uint = 0x3fff_ffff;
-        /// Of `Block.flags`: it is a leaf. Of a reference of the binary hierarchy: likewise.
+        /// Flag of `Block.flags` and of references in the binary BVH: a leaf.
         LEAF: uint = 0x8000_0000;
-        /// Of a reference to an inner node of the binary hierarchy: bits from here on are the axis along which its children lie apart.
+        /// Binary BVH: first bit of the split axis in a reference to an inner node.
         AXIS_SHIFT: uint = 27;
-        /// Of such a reference: the node; of one to a leaf: its first primitive.
+        /// Binary BVH: mask of the node index in a reference to an inner node, or of the first primitive in one to a leaf.
         NODE_NUMBER: uint = 0x07ff_ffff;
-        /// The reference to nothing: the traversal goes on with what is on its stack.
+        /// The null reference: traversal pops the next one from its stack.
         NEXT: uint = 0x7fff_fffd;
-        /// Entries of the wide kernels' stack that are kept in registers.
+        /// Entries of the wide kernels' traversal stack that are kept in registers.
         STACK_IN_REGISTERS: uint = 6;
-        /// Stands where a result will be. Some CPU drivers leave any loop after 65,535 iterations: a ray that this happens to keeps the mark, and is reported
-        /// instead of delivering what an earlier launch left there.
+        /// Initial value of `LaunchHit.t`. Some CPU drivers leave any loop after 65,535 iterations: a ray to which this happens keeps this value, and is reported
+        /// instead of returning the result of an earlier launch.
         UNFINISHED: uint = 0x7fc0_dead;
     };
 
-    /// A node or a leaf of the wide hierarchy, before its kind is known: a cache line.
+    /// A node or a leaf of the wide BVH before its kind is known: one cache line, 64 bytes.
     Block: words {
-        /// By its kind.
+        /// Data of the node or leaf.
         body: uint[15],
-        /// `LEAF` says that it is a leaf; of a node, the last four upper planes along z.
+        /// `LEAF` for a leaf; for a node the last four upper planes along z.
         flags: uint,
     }
 
-    /// A node of the wide hierarchy: boxes of up to seven children, quantized to 8 bits a plane. The eighth byte of each `bytes8` is no plane.
+    /// A node of the wide BVH: boxes of up to seven children, quantized to 8 bits per plane. The eighth byte of each `bytes8` holds other data.
     WideNode: words {
         /// Lower corner of the node.
         corner: vec3,
-        /// Block of the first child; the others follow, in the order of their slots.
+        /// Index of the first child's block; the others follow in slot order.
         first_child: uint,
         /// Lower planes along x of children 0 to 6; then the exponent of the scale along x, biased as a float's.
         lower_x: bytes8,
@@ -52,27 +52,27 @@ records! {
         upper_z: bytes8,
     }
 
-    /// A leaf of the wide hierarchy: one triangle, or two with a common edge.
+    /// A leaf of the wide BVH: one triangle, or two with a common edge.
     TriangleLeaf: words {
-        /// The triangles are (0, 1, 2) and (0, 2, 3) of these.
+        /// Vertices, BLAS space: the triangles are (0, 1, 2) and (0, 2, 3).
         corners: vec3[4],
-        /// Their numbers in the group, with flags; the second may be all ones: there is none.
+        /// Indices of the triangles in the BLAS, with flags; all ones: there is no second triangle.
         primitives: uvec2,
-        /// Of each triangle four bits: at which places of (0, 1, 2) and (0, 2, 3) its own second and third corner lie, two bits each.
+        /// Four bits per triangle: the positions of its second and third vertex in (0, 1, 2) or (0, 2, 3), two bits each.
         order: uint,
         /// `LEAF`.
         flags: uint,
     }
 
-    /// A leaf of the wide hierarchy: a sphere.
+    /// A leaf of the wide BVH: a sphere.
     SphereLeaf: words {
-        /// In the group's space.
+        /// Centre, BLAS space.
         center: vec3,
-        /// In the group's units.
+        /// Radius, BLAS space.
         radius: float,
         /// Zero.
         unused0: uint[8],
-        /// Its number in the group, with flags; then all ones.
+        /// Index of the sphere in the BLAS, with flags; then all ones.
         primitives: uvec2,
         /// Zero.
         unused1: uint,
@@ -80,11 +80,11 @@ records! {
         flags: uint,
     }
 
-    /// A leaf of the wide hierarchy's top level: an instance.
+    /// A leaf of the wide TLAS: an instance.
     InstanceLeaf: words {
-        /// Rows.
+        /// World to BLAS space, three rows.
         world_to_group: vec4[3],
-        /// Block of its group's root.
+        /// Block of the root node of its BLAS.
         root: uint,
         /// Index of its `InstanceRecord`.
         instance: uint,
@@ -94,48 +94,48 @@ records! {
         flags: uint,
     }
 
-    /// An inner node of the binary hierarchy: boxes of both children, and references to them.
+    /// An inner node of the binary BVH: boxes of both children, and references to them.
     BinaryNode: words {
         /// Lower and upper corner of both children.
         boxes: vec3[2][2],
         /// Bit 31 set: a leaf with count - 1 in bits 27-30 and the first primitive in bits 0-26; otherwise an inner node with the axis of its own children in
         /// bits 27-28 and its number in bits 0-26. Along that axis child 0 is the lower one. A leaf of the top level holds an `InstanceRecord`.
         children: uvec2,
-        /// To 64 bytes: one cache line.
+        /// Padding to 64 bytes, one cache line.
         reserved: uvec2,
     }
 
-    /// A triangle of the readable kernels.
+    /// A triangle of the `bvh2` and `brute` kernels.
     TriangleRecord: words {
-        /// In the group's space.
+        /// Vertices, BLAS space.
         corners: vec3[3],
-        /// Its number in the group, with flags.
+        /// Index in the BLAS, with flags.
         number: uint,
     }
 
-    /// A sphere of the readable kernels, where a `TriangleRecord` might be.
+    /// A sphere of the `bvh2` and `brute` kernels, of the size of a `TriangleRecord`.
     SphereRecord: words {
-        /// In the group's space.
+        /// Centre, BLAS space.
         center: vec3,
-        /// In the group's units.
+        /// Radius, BLAS space.
         radius: float,
         /// Zero.
         unused: uint[5],
-        /// Its number in the group, with flags.
+        /// Index in the BLAS, with flags.
         number: uint,
     }
 
-    /// A nearest hit between the steps of a launch. Of a miss nothing but `t` is written.
+    /// A closest hit between the steps of a launch. For a miss only `t` is written.
     LaunchHit: words {
-        /// Infinite for a miss.
+        /// Ray parameter; infinite for a miss.
         t: float,
-        /// Entry of the top level.
+        /// Index of the TLAS instance.
         instance: uint,
-        /// In the group.
+        /// Index of the primitive in the BLAS.
         primitive: uint,
-        /// Barycentric weights of the second and third corner.
+        /// Barycentric coordinates: weights of the second and third vertex.
         uv: vec2,
-        /// To a multiple of 8 bytes.
+        /// Padding to a multiple of 8 bytes.
         reserved: uint,
     }
 }

@@ -1,46 +1,46 @@
-//! What the passes of Larsen's pipeline (2019) share.
+//! Parameters that the passes of Larsen's pipeline (2019) share.
 
 records! {
     "larsen" values {
-        /// Occlusion rays of a pixel of the occlusion image.
+        /// Occlusion rays per pixel of the half-resolution occlusion image.
         LARSEN_RAYS: uint = 64;
-        /// Side of the tile of noise, pixels.
+        /// Side of the blue-noise tile, pixels.
         LARSEN_NOISE: uint = 64;
     };
 
     /// Parameters of Larsen's pipeline.
     LarsenParams: block readonly 16 {
-        /// `FrameParams`.
+        /// Address of the `FrameParams`.
         frame: address,
-        /// 4 floats each: position relative to the scene's origin.
+        /// 4 floats per point light: position relative to the scene's origin, and padding.
         lights: address,
-        /// How many there are.
+        /// Number of point lights.
         light_count: uint,
-        /// The frame's number, modulo 2.
+        /// Frame index modulo 2.
         frame_parity: uint,
-        /// Pixels of the occlusion image.
+        /// Size of the occlusion image, pixels.
         half_size: uvec2,
-        /// World units that one of its own is.
+        /// Scene units per unit of length in the paper.
         unit: float,
-        /// 0: without the blur.
+        /// 0: the blur is off.
         blurred: uint,
-        /// 2 floats each: 64 of Mitchell's best candidates.
+        /// Sample points, 2 floats each: 64 points by Mitchell's best candidates.
         points: address,
-        /// A float each: 64 x 64 blue noise.
+        /// Blue-noise tile, 64 x 64 floats.
         noise: address,
-        /// A `uint` a pixel: lights that are visible.
+        /// A `uint` per pixel: number of visible point lights.
         lit: address,
-        /// A float per ray of a launch.
+        /// A float per ray of a launch: its occlusion.
         samples: address,
         /// A float per pixel of the occlusion image.
         occlusion: address,
-        /// A float a pixel.
+        /// A float per pixel: one minus blurred occlusion.
         combined: address,
-        /// A float a pixel: the result of the frame before.
+        /// A float per pixel: result of the previous frame.
         previous: address,
-        /// A float a pixel: ambient visibility.
+        /// Output, a float per pixel: ambient visibility.
         result: address,
-        /// A `uint`: occlusion rays traced.
+        /// A `uint`: number of occlusion rays traced.
         rays: address,
     }
 }

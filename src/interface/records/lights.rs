@@ -1,66 +1,67 @@
-//! Lights, and the tree over many.
+//! Light records, and the nodes of the light tree.
 
 records! {
     "lights" values {
-        /// Triangle, rectangle: it emits from its back, too.
+        /// Flag of a triangle or rectangle: it emits from both sides.
         LIGHT_TWO_SIDED: uint = 1;
-        /// Triangle, rectangle: a transform that mirrors has turned its winding.
+        /// Flag of a triangle or rectangle: a mirroring transform has reversed its winding.
         LIGHT_MIRRORED: uint = 2;
-        /// Triangle: its material's alpha says how much of it is there.
+        /// Flag of a triangle: its material has alpha, which scales what it emits.
         LIGHT_ALPHA: uint = 4;
-        /// Of `LightNode.link`: the node is a leaf.
+        /// Flag of `LightNode.link`: the node is a leaf.
         LIGHT_LEAF: uint = 0x8000_0000;
-        /// Of `LightNode.link`: it emits along its axis and against it.
+        /// Flag of `LightNode.link`: the lights emit along the axis and against it.
         LIGHT_BOTH_WAYS: uint = 0x4000_0000;
-        /// Of `LightNode.link`: the number.
+        /// Mask of the index in `LightNode.link`.
         LIGHT_LINK: uint = 0x3fff_ffff;
     };
 
-    /// A light.
+    /// A light of the scene.
     LightRecord: array LightRecords readonly 16 {
         /// Point, spot: position; triangle, rectangle, portal: a corner; sphere: centre. World space.
         position: vec3,
         /// Sphere: radius; directional: 1 - cosine of half its angular diameter.
         radius: float,
-        /// Spot, directional: direction of its light; triangle, rectangle, portal: first edge.
+        /// Spot, directional: direction of emission; triangle, rectangle, portal: first edge.
         axis: vec3,
-        /// Spot: cosine of the angle up to which it is undiminished.
+        /// Spot: cosine of the inner cone angle.
         cos_inner: float,
         /// Triangle, rectangle, portal: second edge.
         edge: vec3,
-        /// Spot: cosine of the angle beyond which it is dark.
+        /// Spot: cosine of the outer cone angle.
         cos_outer: float,
-        /// Point, spot: radiant intensity; directional: irradiance; else: radiance, before any texture. Linear RGB.
+        /// Point, spot: radiant intensity; directional: irradiance; other kinds: radiance, before any texture. Linear RGB.
         intensity: vec3,
-        /// Point, spot: without effect beyond, world units.
+        /// Point, spot: range beyond which the light has no effect, scene units.
         range: float,
-        /// Of being chosen by power.
+        /// Probability of being chosen by power.
         probability: float,
-        /// Of a light in the tree: its way from the root, bit k set where it is in the second child at level k.
+        /// Bit trail of a light in the tree: bit k is set where the light is in the second child at level k.
         trail: uint,
-        /// To a multiple of 16 bytes.
+        /// Padding to a multiple of 16 bytes.
         reserved: uint,
-        /// One of `LIGHT_*` of light_kinds.
+        /// One of `LIGHT_*` of interface/light_kinds.glsl.
         kind: uint,
         /// Triangle, rectangle, sphere: index of its instance; else `INVALID`.
         instance: uint,
-        /// Triangle, rectangle, sphere: index in the instance's mesh; environment: number of portals, which follow it.
+        /// Triangle, rectangle, sphere: index in the instance's mesh; environment: number of portals, whose records follow it.
         primitive: uint,
-        /// `LIGHT_TWO_SIDED`, `LIGHT_MIRRORED`, `LIGHT_ALPHA`.
+        /// Flags `LIGHT_TWO_SIDED`, `LIGHT_MIRRORED`, `LIGHT_ALPHA`.
         flags: uint,
-        /// Triangle, rectangle, sphere: how far above itself rounding may have put it, world units.
+        /// Triangle, rectangle, sphere: bound of the rounding error of its position along its normal, scene units.
         lift: float,
     }
 
-    /// Bounds of what the lights of a subtree emit: from a ball, within an angle o + e of an axis, fading beyond o.
+    /// A node of the light tree: emission bounds of the lights below it. They lie in a bounding sphere, their normals within an angle o of an axis, and emission
+    /// ends at an angle e beyond that.
     LightNode: array LightNodes readonly 16 {
-        /// Of the ball.
+        /// Centre of the bounding sphere.
         center: vec3,
-        /// Of the ball, world units.
+        /// Radius of the bounding sphere, scene units.
         radius: float,
-        /// Unit.
+        /// Unit axis of the cone of normals.
         axis: vec3,
-        /// Brightness per solid angle, in its best direction.
+        /// Maximum intensity over all directions.
         intensity: float,
         /// Cosine of o.
         cos_o: float,
@@ -68,7 +69,7 @@ records! {
         sin_o: float,
         /// Cosine of e.
         cos_e: float,
-        /// Of an inner node: its first child, the second follows; of a leaf: its light; with flags above.
+        /// Inner node: index of its first child, which the second follows; leaf: index of its light; with flags above.
         link: uint,
     }
 }

@@ -1,4 +1,4 @@
-//! Records in device memory, push constants and numbers that both sides know, a file a subject.
+//! Records in device memory, push constants and shared numbers, one file per subject.
 
 pub mod albedo;
 pub mod aov;

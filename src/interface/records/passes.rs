@@ -1,130 +1,130 @@
-//! Parameters of the passes of a frame in real time, a record a pass. Each leads to the `FrameParams` that all share.
+//! Parameters of the passes of a real-time frame, one record per pass. Each holds the address of the `FrameParams` that all share.
 
 records! {
     "passes";
 
-    /// Of `ao_trace`, and of `gather`, which adds up what that traces.
+    /// Parameters of `ao_trace`, and of `gather`, which averages its results.
     AoTraceParams: block readonly 8 {
-        /// `FrameParams`.
+        /// Address of the `FrameParams`.
         frame: address,
-        /// A float a ray: of a launch, or with a budget of the frame. Used where a pixel may have several.
+        /// Ambient visibility of each ray, a float: of the launch, or with a variance budget of the frame. Unused when each pixel has one ray.
         samples: address,
-        /// This frame's estimates.
+        /// Estimates of this frame, 8 bytes per pixel.
         current: address,
-        /// 3 floats a pixel: this frame's bent normals; 0: unused.
+        /// Bent normals of this frame, 3 floats per pixel; 0: unused.
         current_bent: address,
-        /// 8 bytes a pixel: number of its first ray in its sequence (24 bits), rays; samples that its history counts at most. 0, as what follows: every pixel has
-        /// as many.
+        /// With a variance budget, 8 bytes per pixel: index of its first ray in its sequence (24 bits) and number of rays; maximum history length in samples. 0,
+        /// as the two that follow: all pixels have the same number of rays.
         plan: address,
-        /// A `uint` a ray: pixel (28 bits), which of its rays.
+        /// A `uint` per ray: pixel (28 bits) and index of the ray within the pixel.
         list: address,
-        /// A `uint`: occlusion rays of the frame.
+        /// A `uint`: number of occlusion rays of the frame.
         ray_count: address,
-        /// Rays of a pixel in a frame with a budget, at most.
+        /// Maximum rays of a pixel in a frame, with a variance budget.
         most_rays: uint,
-        /// To a multiple of 8 bytes.
+        /// Padding to a multiple of 8 bytes.
         reserved: uint,
     }
 
-    /// Of `gtao`.
+    /// Parameters of `gtao`.
     GtaoParams: block readonly 8 {
-        /// `FrameParams`.
+        /// Address of the `FrameParams`.
         frame: address,
-        /// This frame's estimates.
+        /// Estimates of this frame, 8 bytes per pixel.
         current: address,
-        /// Slices through the view ray.
+        /// Number of slices through the view ray.
         slices: uint,
-        /// On each side of a slice.
+        /// Number of steps on each side of a slice.
         steps: uint,
     }
 
-    /// Of `budget`.
+    /// Parameters of `budget`.
     BudgetParams: block readonly 8 {
-        /// `FrameParams`.
+        /// Address of the `FrameParams`.
         frame: address,
-        /// 8 bytes a pixel, in tiles: deviation of one sample, samples.
+        /// 8 bytes per pixel, in tile order: standard deviation of one sample, number of samples.
         desired_samples: address,
-        /// Uints: `SUMS_*`.
+        /// `SUMS_COUNT` uints, indexed by `SUMS_*`.
         sums: address,
-        /// As in `AoTraceParams`.
+        /// The rays of each pixel, as in `AoTraceParams`.
         plan: address,
-        /// As in `AoTraceParams`.
+        /// The pixel of each ray, as in `AoTraceParams`.
         list: address,
-        /// A `uint` a pixel: rays that it has had.
+        /// A `uint` per pixel: rays traced in all frames so far.
         taken: address,
         /// One of `STAGE_*`.
         stage: uint,
-        /// Rays of a pixel in a frame, at most.
+        /// Maximum rays of a pixel in a frame.
         most_rays: uint,
     }
 
-    /// Of `temporal`.
+    /// Parameters of `temporal`.
     TemporalParams: block readonly 8 {
-        /// `FrameParams`.
+        /// Address of the `FrameParams`.
         frame: address,
-        /// This frame's estimates.
+        /// Estimates of this frame, 8 bytes per pixel.
         current: address,
-        /// Estimates of this frame and those before, written.
+        /// Output: estimates from this frame and the frames before.
         history: address,
-        /// 3 floats a pixel each: bent normals of this frame's samples; 0, as the others: unused.
+        /// Bent normals of this frame, 3 floats per pixel; 0, as the two that follow: unused.
         current_bent: address,
-        /// Bent normals of the history, written.
+        /// Output: bent normals of the history.
         bent_history: address,
         /// Bent normals of the previous frame's history.
         previous_bent_history: address,
-        /// As in `AoTraceParams`.
+        /// The rays of each pixel, as in `AoTraceParams`.
         plan: address,
-        /// `MovedRecord`s: what has moved since the previous frame.
+        /// `MovedRecord`s of this frame.
         moved: address,
-        /// How many there are.
+        /// Number of `MovedRecord`s.
         moved_count: uint,
-        /// How much what moves shortens histories.
+        /// Strength with which moving objects shorten histories; 0: none.
         moved_weight: float,
-        /// Standard errors by which a history may differ from its surroundings where things move; 0: any.
+        /// Half width of history clamping near moving objects, in standard errors of the neighbourhood's mean; 0: no clamping.
         clamp_width: float,
-        /// To a multiple of 8 bytes.
+        /// Padding to a multiple of 8 bytes.
         reserved: float,
     }
 
-    /// Of `nodes`.
+    /// Parameters of `nodes`.
     NodesParams: block readonly 8 {
-        /// `BlockParams`.
+        /// Address of the `BlockParams`.
         block: address,
-        /// A `uint` a pixel: BVH nodes that its camera ray visits.
+        /// Output, a `uint` per pixel: BVH nodes visited by its camera ray.
         nodes: address,
-        /// A `uint` a pixel: colours.
+        /// Output, a `uint` per pixel: colour, 8-bit RGBA.
         words: address,
         /// `2^exposure`.
         gain: float,
-        /// Number of nodes that has the colour in the middle of the scale.
+        /// Number of nodes at the middle of the colour scale.
         middle: float,
     }
 
-    /// Of a step of a filter: `filter`, `denoise`.
+    /// Parameters of one step of a spatial filter (`filter`, `denoise`).
     FilterParams: block readonly 8 {
-        /// `FrameParams`.
+        /// Address of the `FrameParams`.
         frame: address,
-        /// Estimates, read.
+        /// Input estimates.
         from: address,
-        /// Estimates, written; 0: the step is the last and writes the result.
+        /// Output estimates; 0: this is the last step, which writes `result`.
         to: address,
-        /// A float a pixel: ambient visibility.
+        /// Output of the last step, a float per pixel: ambient visibility.
         result: address,
-        /// 3 floats a pixel each: bent normals, read; 0: unused.
+        /// Input bent normals, 3 floats per pixel; 0: unused.
         bent_from: address,
-        /// Bent normals, written.
+        /// Output bent normals, 3 floats per pixel.
         bent_to: address,
-        /// `STEP_HORIZONTAL`, `STEP_VERTICAL`: sides of the box on which it reaches to the radius.
+        /// Axes along which the box extends: `STEP_HORIZONTAL`, `STEP_VERTICAL`.
         sides: uint,
-        /// Distance of taps, pixels.
+        /// Distance between taps, pixels.
         stride: uint,
-        /// Taps to each side at most.
+        /// Maximum number of taps to each side.
         radius: uint,
-        /// Samples that a filtered value should rest on.
+        /// Samples that a filtered value should average: the box grows until it holds this many.
         samples: float,
-        /// The variance of the mean of n samples falls as `n^-(1 + evenness)`.
+        /// Convergence of the sampler: the variance of the mean of n samples falls as `n^-(1 + evenness)`.
         evenness: float,
-        /// To a multiple of 8 bytes.
+        /// Padding to a multiple of 8 bytes.
         reserved: float,
     }
 }

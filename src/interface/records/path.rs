@@ -1,25 +1,25 @@
-//! Parameters of the path tracer's passes, and what it keeps of each path.
+//! Parameters of the path tracer's passes, and the state of each path.
 
 use super::queue::QueueRecord;
 
 records! {
     "path" includes "queue";
 
-    /// An environment in equirectangular projection.
+    /// An environment map in equirectangular projection.
     EnvironmentRecord: structure {
-        /// A `vec4` each: linear radiance, and the weight with which directions there are sampled; 0: the environment is constant.
+        /// A `vec4` per texel: linear radiance, and the weight for importance sampling; 0: the environment is constant.
         texels: address,
-        /// Floats: what directions are sampled with (path/map.glsl).
+        /// Floats: the sampling table (path/map.glsl).
         table: address,
-        /// Texels in x.
+        /// Width in texels.
         width: uint,
-        /// Texels in y.
+        /// Height in texels.
         height: uint,
-        /// To a multiple of 16 bytes.
+        /// Padding to a multiple of 16 bytes.
         reserved0: uint,
-        /// To a multiple of 16 bytes.
+        /// Padding to a multiple of 16 bytes.
         reserved1: uint,
-        /// Rows: world directions to the map's own, in which +y is up and -z in the middle.
+        /// World to map, three rows; in the map's space +y is up and -z is at its centre.
         to_map: vec4[3],
     }
 
@@ -27,89 +27,90 @@ records! {
     PathParams: block readonly 16 {
         /// The environment map.
         map: EnvironmentRecord,
-        /// Radiance of the constant environment; factor of the map's.
+        /// Radiance of a constant environment; scale factor of an environment map. Linear RGB.
         environment: vec3,
-        /// Lights that are chosen by power.
+        /// Number of lights that are chosen by power.
         light_count: uint,
-        /// `LightRecord`s.
+        /// The `LightRecord`s.
         lights: address,
-        /// Uints: for each instance of the scene the index in this table at which its primitives' lights begin, or `INVALID`; then those lights.
+        /// Uints: for each instance of the scene the index in this table at which the lights of its primitives begin, or `INVALID`; then the light of each
+        /// primitive, or `INVALID`.
         light_of: address,
         /// `PathRecord` of each ray of the queue that is traced.
         states: address,
-        /// Of the next bounce's.
+        /// `PathRecord` of each ray of the next bounce.
         next_states: address,
-        /// A `vec4` a path: radiance, and 1 where its camera ray met something.
+        /// A `vec4` per path: radiance, and 1 if its camera ray hit the scene.
         radiance: address,
-        /// A `vec4` for each ray of the shadow queue: what it adds if nothing is in the way.
+        /// A `vec4` per shadow ray: the radiance that it adds if it is unoccluded.
         contributions: address,
-        /// A `uint` a ray of the queue that is traced: its path.
+        /// A `uint` per ray of the queue that is traced: index of its path.
         tags: address,
-        /// Rays of the next bounce.
+        /// The queue of the next bounce.
         next: QueueRecord,
-        /// Rays to lights.
+        /// The queue of shadow rays.
         shadow: QueueRecord,
-        /// Bounces.
+        /// Maximum number of bounces.
         max_depth: uint,
         /// Bounces before Russian roulette.
         rr_depth: uint,
-        /// No path vertex adds more than this in any channel; infinite: unclamped.
+        /// Maximum radiance that an indirect vertex adds, in any channel; infinite: unclamped.
         clamp_to: float,
-        /// Of every surface, with `WITH_CONSTANT_ALBEDO`.
+        /// Albedo of all surfaces, with `WITH_CONSTANT_ALBEDO`.
         albedo: float,
         /// Index of the environment among the lights, or `INVALID`.
         environment_light: uint,
         /// Paths of fewer bounces add nothing, with `WITH_MIN_DEPTH`.
         min_depth: uint,
-        /// To a multiple of 16 bytes.
+        /// Padding to a multiple of 16 bytes.
         reserved: uint[3],
-        /// One of `FILTER_*`.
+        /// One of `FILTER_*`: the reconstruction filter.
         pixel_filter: uint,
-        /// World units; 0: a pinhole.
+        /// Radius of the thin lens, scene units; 0: a pinhole.
         lens_radius: float,
-        /// Distance along the view at which the image is sharp, world units.
+        /// Focus distance along the view, scene units.
         focus: float,
-        /// One of `VIEW_*`: what camera rays see instead of light; 0: light.
+        /// One of `VIEW_*`: the surface property that is rendered in place of radiance; 0: radiance.
         view: uint,
-        /// The first of the lights that are chosen by power.
+        /// Index of the first light that is chosen by power.
         light_first: uint,
-        /// `LightNode`s over the lights before.
+        /// `LightNode`s of the tree over the lights before `light_first`.
         light_tree: address,
-        /// A `vec2` a path: width and spread of its cone (path/cone.glsl).
+        /// A `vec2` per path: width and spread of its ray cone (path/cone.glsl).
         cones: address,
-        /// A `uint` for each light that is chosen by power, and one more: from which number on it is chosen.
+        /// The cumulative distribution of lights by power, `light_count + 1` uints.
         light_starts: address,
-        /// The first directional light.
+        /// Index of the first directional light.
         first_disk: uint,
-        /// How many there are.
+        /// Number of directional lights.
         disk_count: uint,
-        /// A `uvec4` a path: the volumes that it is in (path/media.glsl).
+        /// A `uvec4` per path: stack of the volumes that it is in (path/media.glsl).
         media: address,
-        /// A float a path: how far it has come straight through thin walls.
+        /// A float per path: distance since its last bounce, through thin walls that transmit without scattering, scene units.
         straight: address,
-        /// Volumes that the camera is in.
+        /// Stack of the volumes that the camera is in.
         camera_media: uvec4,
-        /// Rays to lights that have come through thin walls.
+        /// The queue of shadow rays that continue behind a thin wall.
         later: QueueRecord,
-        /// As `contributions`.
+        /// `contributions` of the queue `later`.
         later_contributions: address,
-        /// A float a path: density with which light samples at its last bounce find what is outside the scene in its direction.
+        /// A float per path: probability density of light sampling at its last bounce for the environment in its direction.
         sky_pdfs: address,
     }
 
-    /// A path between two bounces.
+    /// The state of a path between two bounces.
     PathRecord: words {
-        /// Linear.
+        /// Throughput, linear RGB.
         throughput: vec3,
-        /// Density with which the BSDF proposed its ray; negative: nothing else could have.
+        /// Probability density of BSDF sampling for the ray's direction; negative: no other technique could have sampled it, so it has no MIS weight.
         pdf: float,
-        /// Of its camera ray.
+        /// Index of its camera ray.
         index: uint,
-        /// Bounces so far in the lower 16 bits; above them the surfaces that it went straight through, which are no bounces.
+        /// Number of bounces in the lower 16 bits; above them the number of surfaces passed straight through, which are no bounces.
         depth_passes: uint,
-        /// Refraction changed radiance by 1 / this.
+        /// Product of the squared relative indices of refraction along the path, by which Russian roulette scales throughput.
         eta_scale: float,
-        /// Material of the volume that it is in, or `INVALID`.
+        /// Material of the volume that the path is in, or `INVALID`.
         medium: uint,
     }
 }

@@ -5,11 +5,11 @@ records! {
 
     /// A queue of rays: part of the parameters of the passes that fill it and read its tags.
     QueueRecord: structure {
-        /// `Ray`s, 32 bytes each.
+        /// The `Ray`s, 32 bytes each.
         rays: address,
-        /// A `uint` a ray, for the callback of the stream that traces the queue.
+        /// A `uint` per ray, which the callback of the stream that traces the queue receives.
         tags: address,
-        /// A `uint`: how many rays there are. The host clears it and sees to it that the queue is large enough.
+        /// A `uint`: number of rays in the queue. The host clears it, and allocates enough memory for all rays of a launch.
         count: address,
     }
 }

@@ -1,19 +1,19 @@
-//! Parameters of what rasterizes.
+//! Parameters of rasterization.
 
 records! {
     "raster";
 
-    /// What is rasterized, and from where.
+    /// Parameters of rasterization.
     RasterParams: block readonly 16 {
-        /// Rows: from a point relative to the eye to clip space.
+        /// Eye-relative position to clip space, four rows.
         clip: vec4[4],
-        /// The camera's position, relative to the scene's origin.
+        /// Camera position, relative to the scene's origin.
         eye: vec3,
-        /// -1 where the camera's transform turns the winding, else 1.
+        /// -1 where the camera's transform mirrors and reverses the winding, else 1.
         turned: float,
-        /// Where in a pixel its ray passes.
+        /// Position in a pixel through which its ray passes, 0 to 1.
         at: vec2,
-        /// `BlockParams`.
+        /// Address of the `BlockParams`.
         block: address,
     }
 }

@@ -2,29 +2,27 @@
 
 records! {
     "ray" values {
-        /// Names nothing: no instance, no texture, no light.
+        /// The null index: no instance, no texture, no light.
         INVALID: uint = u32::MAX;
     };
 
-    /// One ray: the points `origin + t * direction` with `tmin < t < tmax`. 32 bytes, the record of RAYS.bin. A ray with `tmax <= tmin` is no ray: it is not
-    /// traced, and its callback reports a miss.
-    ///
-    /// The direction need not be of unit length; `t` is measured in units of it. Lengths are world units (metres in glTF) relative to the scene's origin
-    /// (`Scene::origin`).
+    /// A ray: the points `origin + t * direction` with `tmin < t < tmax`. 32 bytes, the record of RAYS.bin. A ray with `tmax <= tmin` is inactive: it is not
+    /// traced, and its callback reports a miss. The direction need not be of unit length; `t` is measured in units of it. Lengths are scene units (metres in
+    /// glTF), relative to the scene's origin (`Scene::origin`).
     Ray: structure {
-        /// Start.
+        /// Origin.
         origin: vec3,
-        /// Hits at or before this parameter do not count. At least 0.
+        /// Exclusive lower bound of `t`, at least 0.
         tmin: float,
         /// Direction, not necessarily of unit length, never zero.
         direction: vec3,
-        /// Hits at or beyond this parameter do not count. May be infinite.
+        /// Exclusive upper bound of `t`; may be infinite.
         tmax: float,
     }
 
-    /// What a ray met. 20 bytes, the record of HITS.bin.
+    /// The result of tracing a ray. 20 bytes, the record of HITS.bin.
     Hit: structure {
-        /// Ray parameter of the hit; infinite for a miss. A stream that only asks whether something is in the way writes 0 for "occluded".
+        /// Ray parameter of the hit; infinite for a miss. Any-hit streams write 0 for an occluded ray.
         t: float,
         /// Index into the scene's instances; all ones for a miss.
         instance: uint,
@@ -38,22 +36,22 @@ records! {
 
     /// The push constants of every stream and pass.
     Push: push {
-        /// `SceneRoot` of what is traced (`Tracer::scene_address`).
+        /// Address of the `SceneRoot` that is traced (`Tracer::scene_address`).
         scene: address,
-        /// The pass's own parameters.
+        /// Address of the pass's own parameters.
         pass: address,
-        /// Ray number `first`, where the rays of this launch are in memory: a queue's, or the compute tracer's own; 0 for streams that make their own. Where
-        /// those were rasterized: what was (trace/visibility.glsl).
+        /// Address of ray `first`, if the rays of this launch are in memory: those of a queue, or the compute tracer's own; 0 for streams that generate their
+        /// rays. When camera rays are rasterized: the visibility buffer (trace/visibility.glsl).
         rays: address,
-        /// A `uint`: how many rays the queue holds; 0 when `count` says it.
+        /// A `uint`: number of rays in the queue; 0: `count` is the number.
         queued: address,
         /// Index of the first ray of this launch.
         first: uint,
-        /// Rays in this launch; of a queue: at most.
+        /// Number of rays in this launch; for a queue the maximum.
         count: uint,
-        /// The first sample of each pixel.
+        /// Index of the first sample of each pixel.
         sample_index: uint,
-        /// A launch takes `2^sample_bits` samples of each of its pixels; their rays follow each other.
+        /// A launch traces `2^sample_bits` consecutive samples of each of its pixels.
         sample_bits: uint,
     }
 }

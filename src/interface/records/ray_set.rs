@@ -1,21 +1,21 @@
-//! Parameters of the pass that traces a set of rays, and of those that tests ask.
+//! Parameters of the pass that traces a set of rays, and of test shaders.
 
 records! {
     "ray_set";
 
-    /// A set of rays and what they met.
+    /// A set of rays and their results.
     RaySet: block readonly 8 {
-        /// `Ray`s.
+        /// The `Ray`s.
         rays: address,
-        /// Nearest hits: `Hit`s, as HITS.bin; any: a `uint` each, 1 = occluded.
+        /// Closest: a `Hit` per ray, as in HITS.bin; any: a `uint` per ray, 1 = occluded.
         results: address,
     }
 
-    /// What a test gives a shader, and what it makes of that.
+    /// Input and output buffers of a test shader.
     Probe: block readonly 8 {
-        /// The shader says what.
+        /// Input, as the shader declares it.
         inputs: address,
-        /// The shader says what.
+        /// Output, as the shader declares it.
         outputs: address,
     }
 }

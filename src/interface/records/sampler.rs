@@ -8,11 +8,11 @@ records! {
         CAMERA_LENS: uint = 1;
         /// Direction of an ambient occlusion ray.
         AO_DIRECTION: uint = 2;
-        /// In place of a dimension pair, for the random number of each ray by which partial coverage is decided.
+        /// Used in place of a dimension pair for the random number of each ray that decides stochastic alpha.
         RAY_SEED: uint = 3;
-        /// The first of a path's: vertex n begins at `PATH_FIRST + n * PATH_STRIDE`.
+        /// First dimension pair of a path: those of vertex n begin at `PATH_FIRST + n * PATH_STRIDE`.
         PATH_FIRST: uint = 8;
-        /// Of a vertex of a path.
+        /// Number of dimension pairs per path vertex.
         PATH_STRIDE: uint = 8;
     };
 }

@@ -1,5 +1,5 @@
-//! The scene in device memory, reached from one root by device address. Matrices are three rows of an affine map. Group space is the space of the bottom
-//! level's vertices.
+//! The scene in device memory, reached from one root by device address. Matrices are the three rows of an affine map. A group is a
+//! bottom-level acceleration structure (BLAS), a part is a submesh of it; BLAS space is the space of its vertices.
 
 use super::super::enumerations::Texels;
 
@@ -9,11 +9,11 @@ records! {
         MAX_LEVELS: uint = 15;
     };
 
-    /// Where shaders begin.
+    /// The root of the scene: all other data is reached from here.
     SceneRoot: block readonly 16 {
-        /// `InstanceRecord` of each entry of the top level.
+        /// `InstanceRecord` of each TLAS instance.
         instances: address,
-        /// `PartRecord` of each mesh within a group.
+        /// `PartRecord` of each submesh of a BLAS.
         parts: address,
         /// A `uvec2` per instance of the scene: its `InstanceRecord` and its `PartRecord`.
         placements: address,
@@ -21,163 +21,163 @@ records! {
         materials: address,
         /// `TextureRecord`s.
         textures: address,
-        /// Compute tracer: nodes of its hierarchy.
+        /// Compute tracer: nodes of the BVH.
         nodes: address,
-        /// Compute tracer, readable kernels: `PrimitiveRecord`s.
+        /// Compute tracer, `bvh2` and `brute` kernels: the primitives.
         primitives: address,
         /// Hardware tracers: the top-level acceleration structure.
         top_level: address,
-        /// Records in `parts`.
+        /// Number of records in `parts`.
         part_count: uint,
-        /// To a multiple of 8 bytes.
+        /// Padding to a multiple of 8 bytes.
         reserved0: uint,
-        /// Compute tracer: what a launch's rays met.
+        /// Compute tracer: the hits of a launch.
         launch_hits: address,
-        /// Compute tracer: where traversal begins.
+        /// Compute tracer: reference to the root node.
         root: uint,
-        /// To a multiple of 8 bytes.
+        /// Padding to a multiple of 8 bytes.
         reserved1: uint,
-        /// Compute tracer: a `uint` that counts rays whose traversal the driver cut short.
+        /// Compute tracer: a `uint` that counts rays whose traversal the driver ended early.
         unfinished: address,
         /// Compute tracer: rays processed by each work-group.
         launch_counters: address,
-        /// `MotionRecord` of each entry of the top level; 0: nothing moves.
+        /// `MotionRecord` of each TLAS instance; 0: nothing moves.
         motion: address,
         /// `ShadingRecord` of each material; 0: unused.
         shading: address,
         /// Tables of directional albedos (bsdf/albedo.glsl); 0: required by no material.
         albedo: address,
-        /// Compute tracer: lower corner of everything, padded as the hierarchy's boxes are.
+        /// Compute tracer: lower corner of the scene's bounds, padded as BVH boxes are.
         bounds_min: vec4,
-        /// The upper one.
+        /// Compute tracer: upper corner of the scene's bounds.
         bounds_max: vec4,
         /// `MipRecord` of each texture; 0: unused.
         mips: address,
-        /// To a multiple of 16 bytes.
+        /// Padding to a multiple of 16 bytes.
         reserved2: address,
     }
 
-    /// An entry of the top level.
+    /// A TLAS instance.
     InstanceRecord: array InstanceRecords readonly 16 {
-        /// Rows.
+        /// BLAS space to world, three rows.
         group_to_world: vec4[3],
-        /// Rows of the inverse.
+        /// World to BLAS space, three rows.
         world_to_group: vec4[3],
-        /// A `uint` per primitive of the group: its part, counted from `first_part`; 0 when there is one part.
+        /// A `uint` per primitive of the BLAS: its submesh, counted from `first_part`; 0 when there is only one.
         part_of: address,
         /// Index into `SceneRoot.parts`.
         first_part: uint,
-        /// Index of the instance in the scene; `INVALID`: the part knows it.
+        /// Index of the instance in the scene; `INVALID`: several were baked into one BLAS, and each submesh has its own.
         scene_instance: uint,
-        /// Compute tracer, readable kernels: node of this group.
+        /// Compute tracer, `bvh2` kernel: root node of the BLAS.
         root: uint,
-        /// Hardware tracers: primitives from here on are in the second geometry (alpha tested).
+        /// Hardware tracers: index of the first primitive of the second BLAS geometry, which is alpha tested.
         opaque_count: uint,
-        /// To a multiple of 16 bytes.
+        /// Padding to a multiple of 16 bytes.
         reserved0: uint,
-        /// To a multiple of 16 bytes.
+        /// Padding to a multiple of 16 bytes.
         reserved1: uint,
     }
 
-    /// A mesh within a group.
+    /// A submesh of a BLAS.
     PartRecord: array PartRecords readonly 16 {
-        /// 3 uints per triangle of the group; 0 for spheres.
+        /// 3 uints per triangle of the BLAS; 0 for spheres.
         indices: address,
-        /// 3 floats per vertex of the group; 4 per sphere: centre and radius.
+        /// 3 floats per vertex of the BLAS; 4 per sphere: centre and radius.
         positions: address,
-        /// 3 floats per vertex of the part; 0: flat.
+        /// 3 floats per vertex of the submesh; 0: flat shading.
         normals: address,
-        /// 2 floats per vertex of the part: the first set; 0: none.
+        /// 2 floats per vertex of the submesh: texture coordinate set 0; 0: none.
         texcoords0: address,
-        /// The second set.
+        /// 2 floats per vertex of the submesh: texture coordinate set 1; 0: none.
         texcoords1: address,
-        /// 4 floats per vertex of the part; 0: none.
+        /// 4 floats per vertex of the submesh: vertex colours; 0: none.
         colors: address,
-        /// Of the group's primitives.
+        /// Index of its first primitive in the BLAS.
         first_primitive: uint,
-        /// Of the group's vertices.
+        /// Index of its first vertex in the BLAS.
         first_vertex: uint,
         /// Index of the material.
         material: uint,
-        /// Index of the instance in the scene, where the group was baked; else `INVALID`.
+        /// Index of the instance in the scene, if it was baked into the BLAS; else `INVALID`.
         scene_instance: uint,
-        /// 1: the vertices were baked through a transform that turned their winding.
+        /// 1: the vertices were baked through a mirroring transform, which reversed their winding.
         mirrored: uint,
-        /// To a multiple of 8 bytes.
+        /// Padding to a multiple of 8 bytes.
         reserved: uint,
-        /// 4 floats per vertex of the part; 0: required by no material.
+        /// 4 floats per vertex of the submesh: tangents; 0: required by no material.
         tangents: address,
     }
 
-    /// What rays ask of a material: colour and alpha.
+    /// The properties of a material that traversal needs: base colour and alpha.
     MaterialRecord: array MaterialRecords readonly 16 {
-        /// Linear, with alpha.
+        /// Base colour, linear RGB, and alpha.
         base_color: vec4,
-        /// 2x2, column by column.
+        /// Transform of texture coordinates, 2x2, column by column.
         texcoord_transform: vec4,
         /// Added to the transformed texture coordinates.
         texcoord_offset: vec2,
-        /// Index of the texture; `INVALID`: none.
+        /// Index of the base colour texture, or `INVALID`.
         base_color_texture: uint,
-        /// Of texture coordinates, 0 or 1.
+        /// Texture coordinate set, 0 or 1.
         texcoord_set: uint,
-        /// Present where alpha is at least this; negative: always.
+        /// Alpha cutoff: hits with less alpha are ignored; negative: opaque.
         alpha_cutoff: float,
-        /// 1: present with a probability of alpha, whatever the cutoff.
+        /// 1: stochastic alpha, a hit counts with a probability of alpha, whatever the cutoff.
         coverage: uint,
-        /// To a multiple of 16 bytes.
+        /// Padding to a multiple of 16 bytes.
         reserved0: uint,
-        /// To a multiple of 16 bytes.
+        /// Padding to a multiple of 16 bytes.
         reserved1: uint,
     }
 
-    /// A texture and which point of it a surface shows.
+    /// A material's reference to a texture, with its transform (KHR_texture_transform).
     TextureUse: structure {
-        /// 2x2, column by column.
+        /// Transform of texture coordinates, 2x2, column by column.
         transform: vec4,
         /// Added to the transformed texture coordinates.
         offset: vec2,
-        /// Index of the texture; `INVALID`: none.
+        /// Index of the texture, or `INVALID`.
         texture: uint,
-        /// Of texture coordinates, 0 or 1.
+        /// Texture coordinate set, 0 or 1.
         set: uint,
     }
 
     /// A texture.
     TextureRecord: array TextureRecords readonly 16 {
-        /// RGBA, rows from the top.
+        /// RGBA texels, rows from the top.
         texels: address,
-        /// Texels in x.
+        /// Width in texels.
         width: uint,
-        /// Texels in y.
+        /// Height in texels.
         height: uint,
-        /// One of `WRAP_*`, along u.
+        /// One of `WRAP_*`: wrap mode along u.
         wrap_u: uint,
-        /// Along v.
+        /// One of `WRAP_*`: wrap mode along v.
         wrap_v: uint,
-        /// 1: nearest texel, 0: bilinear.
+        /// 1: nearest filtering, 0: bilinear.
         nearest: uint,
-        /// One of `FORMAT_*`.
+        /// One of `FORMAT_*`: texel format.
         format: uint,
     }
 
-    /// Levels of a texture.
+    /// The mip levels of a texture above level 0.
     MipRecord: array MipRecords readonly 8 {
-        /// Of level 1, for each `TEXELS_*`: a `uvec2` each, or a `vec4`; 0: unused.
+        /// Texels of level 1, for each of `TEXELS_*`: a `uvec2` or a `vec4` per texel; 0: unused.
         texels: address[Texels::ALL.len()],
-        /// The smallest level.
+        /// Index of the smallest level.
         last: uint,
-        /// Texels before each level, from level 1 on.
+        /// Number of texels before each level, from level 1 on.
         first: uint[MAX_LEVELS as usize],
     }
 
-    /// Where an entry of the top level was in the previous frame.
+    /// A TLAS instance in the previous frame.
     MotionRecord: array MotionRecords readonly 16 {
-        /// Rows.
+        /// BLAS space to world in the previous frame, three rows.
         previous_group_to_world: vec4[3],
-        /// 3 floats per vertex of the group; 0: as they are.
+        /// 3 floats per vertex of the BLAS: positions in the previous frame; 0: unchanged.
         previous_positions: address,
-        /// To a multiple of 16 bytes.
+        /// Padding to a multiple of 16 bytes.
         reserved: address,
     }
 }

@@ -1,4 +1,4 @@
-//! What the path tracer knows of a material.
+//! Material records of the path tracer.
 
 use super::super::features::TextureFeature;
 use super::scene::TextureUse;
@@ -6,57 +6,57 @@ use super::scene::TextureUse;
 records! {
     "shading" includes "scene";
 
-    /// A material as paths shade it. Factors are linear.
+    /// A material for path tracing. Factors are linear.
     ShadingRecord: array ShadingRecords readonly 16 {
-        /// Radiance.
+        /// Emitted radiance, linear RGB.
         emission: vec3,
         /// One of `BSDF_*`; `BSDF_NONE` of unlit materials.
         model: uint,
-        /// 0 to 1.
+        /// Metallic factor, 0 to 1.
         metallic: float,
-        /// 0 to 1, before it is squared.
+        /// Perceptual roughness, 0 to 1: alpha is its square.
         roughness: float,
         /// Index of refraction.
         ior: float,
-        /// KHR_materials_specular.
+        /// Specular factor (KHR_materials_specular).
         specular: float,
-        /// Of mirror, glass, conductor: factor of what is reflected.
+        /// Mirror, glass, conductor: factor of reflected light.
         specular_color: vec3,
         /// 1: emits from both sides.
         emits_back: uint,
-        /// Of a conductor: real part of its index of refraction.
+        /// Conductor: real part of its index of refraction, by channel.
         eta: vec3,
-        /// KHR_materials_transmission.
+        /// Transmission factor (KHR_materials_transmission).
         transmission: float,
-        /// Of a conductor: imaginary part of its index of refraction.
+        /// Conductor: imaginary part of its index of refraction, by channel.
         k: vec3,
-        /// KHR_materials_clearcoat.
+        /// Clearcoat factor (KHR_materials_clearcoat).
         clearcoat: float,
-        /// Of glass: factor of what is refracted.
+        /// Glass: factor of refracted light.
         transmitted: vec3,
-        /// As `roughness`.
+        /// Perceptual roughness of the clearcoat, 0 to 1.
         clearcoat_roughness: float,
-        /// KHR_materials_sheen.
+        /// Sheen colour (KHR_materials_sheen).
         sheen_color: vec3,
-        /// As `roughness`.
+        /// Perceptual roughness of the sheen, 0 to 1.
         sheen_roughness: float,
-        /// Attenuation per world unit in the volume.
+        /// Absorption coefficient of the volume, per scene unit.
         absorption: vec3,
-        /// One of `WALLS_*`.
+        /// One of `WALLS_*`: transmission mode.
         walls: uint,
-        /// Strength times cosine and sine of its angle from the tangent.
+        /// Anisotropy strength times the cosine and sine of its angle from the tangent.
         anisotropy: vec2,
-        /// Of the normal map.
+        /// Scale of the normal map.
         normal_scale: float,
-        /// Of the clearcoat's normal map.
+        /// Scale of the clearcoat's normal map.
         clearcoat_normal_scale: float,
-        /// Of the albedo tables: its place among the indices of refraction.
+        /// Index of its index of refraction in the albedo tables.
         glass_layer: uint,
-        /// Of a volume among those that overlap (path/media.glsl).
+        /// Priority among overlapping volumes (path/media.glsl).
         priority: int,
-        /// Of the reflection model; what they are, its file in shaders/bsdf says.
+        /// Further parameters of the reflection model; its file in shaders/bsdf says what they are.
         parameters: vec2,
-        /// Its textures beside the base colour's, by `TextureFeature`.
+        /// Textures other than the base colour's, indexed by `TextureFeature`.
         uses: TextureUse[TextureFeature::ALL.len()],
     }
 }

@@ -5,7 +5,7 @@ use crate::gpu::Recorder;
 use crate::interface::records::frame::SUMS_LISTED;
 use crate::interface::records::passes::AoTraceParams;
 use crate::realtime::display::Display;
-use crate::realtime::graph::{Frame, Params, Pass, Range, Uses};
+use crate::realtime::graph::{Frame, Params, Pass, Range, ResourceUse};
 use crate::realtime::resources::{Resource, Resources};
 use crate::realtime::settings::{Budget, Settings};
 use crate::shaders::{self, StreamShaders};
@@ -34,7 +34,7 @@ pub fn params(frame: &Frame, resources: &Resources) -> AoTraceParams {
         current: resources.address(Resource::Current),
         current_bent: resources.address(Resource::CurrentBent),
         plan: resources.address(Resource::Plan),
-        list: resources.address(Resource::List),
+        list: resources.address(Resource::RayPixels),
         ray_count: resources.address(Resource::RayCount),
         most_rays: frame.settings.most_rays(),
         reserved: 0,
@@ -49,7 +49,7 @@ pub const READS: &[Resource] = &[
     Resource::Surface,
     Resource::Axes,
     Resource::Plan,
-    Resource::List,
+    Resource::RayPixels,
     Resource::Sums,
 ];
 
@@ -68,8 +68,8 @@ impl AoTrace {
 }
 
 impl Pass for AoTrace {
-    fn uses(&self, _: Option<&Display>) -> Uses {
-        let uses = Uses::new(READS, &[Resource::RayCount])
+    fn uses(&self, _: Option<&Display>) -> ResourceUse {
+        let uses = ResourceUse::new(READS, &[Resource::RayCount])
             .previous(&[Resource::History])
             .and_writes(self.has_several, &[Resource::Samples])
             .and_writes(!self.has_several, &[Resource::Current])

@@ -8,7 +8,7 @@ use crate::interface::BudgetStage;
 use crate::interface::records::frame::BUDGET_SHARE;
 use crate::interface::records::passes::BudgetParams;
 use crate::realtime::display::Display;
-use crate::realtime::graph::{Frame, Params, Pass, Range, Stage, Uses};
+use crate::realtime::graph::{Frame, Params, Pass, Range, ResourceUse, Stage};
 use crate::realtime::resources::{Resource, Resources};
 use crate::realtime::settings::Settings;
 use crate::shaders::{self, LANES};
@@ -43,15 +43,18 @@ pub fn stages(tracer: &Tracer, tiled_pixels: u32, _: &Settings) -> Result<Vec<St
 }
 
 impl Pass for Budget {
-    fn uses(&self, _: Option<&Display>) -> Uses {
-        use Resource::{DesiredSamples, FrameNumber, Guide, History, List, Plan, PreviousPosition, Sums, Surface, Taken};
+    fn uses(&self, _: Option<&Display>) -> ResourceUse {
+        use Resource::{
+            DesiredSamples, FrameNumber, Guide, History, Plan, PreviousPosition, RayPixels, Sums, Surface, TotalRays,
+        };
         match self.stage {
             BudgetStage::DesiredSamples => {
-                Uses::new(&[FrameNumber, Guide, Surface, PreviousPosition], &[DesiredSamples]).previous(&[Guide, History])
+                ResourceUse::new(&[FrameNumber, Guide, Surface, PreviousPosition], &[DesiredSamples])
+                    .previous(&[Guide, History])
             }
-            BudgetStage::Coarse => Uses::new(&[FrameNumber, DesiredSamples], &[Sums]).clears(Sums, 0),
-            BudgetStage::Fine => Uses::new(&[FrameNumber, DesiredSamples], &[Sums]),
-            BudgetStage::Rays => Uses::new(&[FrameNumber, DesiredSamples], &[Sums, Plan, List, Taken]),
+            BudgetStage::Coarse => ResourceUse::new(&[FrameNumber, DesiredSamples], &[Sums]).clears(Sums, 0),
+            BudgetStage::Fine => ResourceUse::new(&[FrameNumber, DesiredSamples], &[Sums]),
+            BudgetStage::Rays => ResourceUse::new(&[FrameNumber, DesiredSamples], &[Sums, Plan, RayPixels, TotalRays]),
         }
     }
 
@@ -61,8 +64,8 @@ impl Pass for Budget {
             desired_samples: resources.address(Resource::DesiredSamples),
             sums: resources.address(Resource::Sums),
             plan: resources.address(Resource::Plan),
-            list: resources.address(Resource::List),
-            taken: resources.address(Resource::Taken),
+            list: resources.address(Resource::RayPixels),
+            taken: resources.address(Resource::TotalRays),
             stage: self.stage as u32,
             most_rays: frame.settings.most_rays(),
         })

@@ -3,20 +3,20 @@
 use crate::colour::srgb_byte;
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, ComputePipeline, Recorder};
-pub use crate::interface::Shown;
+pub use crate::interface::DisplayMode;
 use crate::interface::records::display::DisplayParams;
 use crate::output::png::Colour;
-use crate::realtime::graph::{Frame, Params, Pass, Range, Stage, Uses};
+use crate::realtime::graph::{Frame, Params, Pass, Range, ResourceUse, Stage};
 use crate::realtime::resources::{Resource, Resources};
 use crate::realtime::settings::{Settings, Technique};
 use crate::shaders;
 use crate::tracer::Tracer;
 
-impl Shown {
+impl DisplayMode {
     /// What a file without alpha needs for it.
     pub fn colour(self) -> Colour {
         match self {
-            Shown::Normal | Shown::Position | Shown::Bent | Shown::Nodes => Colour::Rgb,
+            DisplayMode::Normal | DisplayMode::Position | DisplayMode::Bent | DisplayMode::Nodes => Colour::Rgb,
             _ => Colour::Grey,
         }
     }
@@ -28,8 +28,8 @@ impl Shown {
     pub fn check(self, settings: &Settings) -> Result<()> {
         let wrong = |what: &str| Err(Error::Usage(what.to_owned()));
         match self {
-            Shown::Bent if !settings.bent => Err(bent_is_off()),
-            Shown::Samples | Shown::Variance if settings.technique == Technique::Larsen => {
+            DisplayMode::Bent if !settings.bent => Err(bent_normals_disabled()),
+            DisplayMode::Samples | DisplayMode::Variance if settings.technique == Technique::Larsen => {
                 wrong("the reference work's pipeline counts no samples: show something else")
             }
             _ => Ok(()),
@@ -38,7 +38,7 @@ impl Shown {
 }
 
 /// The settings have no bent normals.
-pub fn bent_is_off() -> Error {
+pub fn bent_normals_disabled() -> Error {
     Error::Usage("bent normals are made only where the settings ask for them".into())
 }
 
@@ -46,7 +46,7 @@ pub fn bent_is_off() -> Error {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Display {
     /// What.
-    pub shown: Shown,
+    pub shown: DisplayMode,
     /// Stops: 0 as it is, 1 twice as bright.
     pub exposure: f32,
     /// World units: what depths and positions are measured in.
@@ -71,25 +71,25 @@ pub fn stage(tracer: &Tracer, pixels: u32) -> Result<Stage> {
 }
 
 impl Pass for DisplayPass {
-    fn uses(&self, display: Option<&Display>) -> Uses {
-        use Resource::{BentResult, DisplaySettings, Guide, History, Result, Surface, Words};
-        let uses = Uses::new(&[DisplaySettings], &[Words]);
+    fn uses(&self, display: Option<&Display>) -> ResourceUse {
+        use Resource::{BentResult, DisplayImage, DisplaySettings, Guide, History, Result, Surface};
+        let uses = ResourceUse::new(&[DisplaySettings], &[DisplayImage]);
         let Some(display) = display else { return uses };
         match display.shown {
-            Shown::Accessibility => uses.and_reads(&[Result]),
+            DisplayMode::Accessibility => uses.and_reads(&[Result]),
             // where there is no history, the result stands for it
-            Shown::Unfiltered => uses.and_reads(&[Guide, History, Result]),
-            Shown::Samples | Shown::Variance => uses.and_reads(&[Guide, History]),
-            Shown::Depth => uses.and_reads(&[Guide]),
-            Shown::Normal | Shown::Position => uses.and_reads(&[Guide, Surface]),
-            Shown::Bent => uses.and_reads(&[Guide, BentResult]),
+            DisplayMode::Unfiltered => uses.and_reads(&[Guide, History, Result]),
+            DisplayMode::Samples | DisplayMode::Variance => uses.and_reads(&[Guide, History]),
+            DisplayMode::Depth => uses.and_reads(&[Guide]),
+            DisplayMode::Normal | DisplayMode::Position => uses.and_reads(&[Guide, Surface]),
+            DisplayMode::Bent => uses.and_reads(&[Guide, BentResult]),
             // the pass `nodes` shows them
-            Shown::Nodes => uses,
+            DisplayMode::Nodes => uses,
         }
     }
 
     fn is_enabled(&self, display: Option<&Display>) -> bool {
-        display.is_some_and(|d| d.shown != Shown::Nodes)
+        display.is_some_and(|d| d.shown != DisplayMode::Nodes)
     }
 
     fn prepare(&mut self, frame: &Frame, resources: &Resources) -> Result<()> {
@@ -97,7 +97,7 @@ impl Pass for DisplayPass {
         self.params.write(&DisplayParams {
             frame: frame.params,
             thresholds: self.thresholds.address(),
-            words: resources.address(Resource::Words),
+            words: resources.address(Resource::DisplayImage),
             result: resources.address(Resource::Result),
             history: resources.address(Resource::History),
             bent: resources.address(Resource::BentResult),

@@ -7,7 +7,7 @@ use crate::gpu::{ComputePipeline, Recorder, Specialization};
 use crate::interface::constants;
 use crate::interface::records::passes::FilterParams;
 use crate::realtime::display::Display;
-use crate::realtime::graph::{Frame, Params, Pass, Range, Stage, Uses};
+use crate::realtime::graph::{Frame, Params, Pass, Range, ResourceUse, Stage};
 use crate::realtime::resources::{Resource, Resources};
 use crate::realtime::settings::{FilterStep, Settings};
 use crate::shaders;
@@ -54,9 +54,9 @@ impl Filter {
 }
 
 impl Pass for Filter {
-    fn uses(&self, _: Option<&Display>) -> Uses {
+    fn uses(&self, _: Option<&Display>) -> ResourceUse {
         let [values, bent] = self.targets();
-        Uses::new(&[Resource::Camera, Resource::Guide, Resource::Surface], &[values])
+        ResourceUse::new(&[Resource::Camera, Resource::Guide, Resource::Surface], &[values])
             .and_reads(&self.from)
             .and_writes(self.has_bent, &[bent])
     }

@@ -6,7 +6,7 @@ use crate::gpu::{ComputePipeline, Recorder, Specialization};
 use crate::interface::constants;
 use crate::interface::records::passes::AoTraceParams;
 use crate::realtime::display::Display;
-use crate::realtime::graph::{Frame, Params, Pass, Range, Uses};
+use crate::realtime::graph::{Frame, Params, Pass, Range, ResourceUse};
 use crate::realtime::resources::{Resource, Resources};
 use crate::realtime::settings::{Budget, Settings};
 use crate::shaders::{self, LANES};
@@ -35,8 +35,8 @@ impl Gather {
 }
 
 impl Pass for Gather {
-    fn uses(&self, _: Option<&Display>) -> Uses {
-        Uses::new(ao_trace::READS, &[Resource::Current])
+    fn uses(&self, _: Option<&Display>) -> ResourceUse {
+        ResourceUse::new(ao_trace::READS, &[Resource::Current])
             .and_reads(&[Resource::Samples])
             .previous(&[Resource::History])
             .and_writes(self.has_bent, &[Resource::CurrentBent])

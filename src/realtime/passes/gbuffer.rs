@@ -7,7 +7,7 @@ use crate::gpu::Recorder;
 use crate::integrators::ao::Hemisphere;
 use crate::raster::{CameraRays, Primary, View};
 use crate::realtime::display::Display;
-use crate::realtime::graph::{Frame, Params, Pass, Range, Stage, Uses};
+use crate::realtime::graph::{Frame, Params, Pass, Range, ResourceUse, Stage};
 use crate::realtime::resources::{Resource, Resources};
 use crate::realtime::settings::Settings;
 use crate::shaders::{self, StreamShaders};
@@ -35,8 +35,8 @@ pub fn stage(tracer: &Tracer, block: Block, settings: &Settings, primary: Primar
 }
 
 impl Pass for Gbuffer {
-    fn uses(&self, _: Option<&Display>) -> Uses {
-        Uses::new(&[Resource::Camera, Resource::Scene], &[Resource::Guide, Resource::Surface])
+    fn uses(&self, _: Option<&Display>) -> ResourceUse {
+        ResourceUse::new(&[Resource::Camera, Resource::Scene], &[Resource::Guide, Resource::Surface])
             .and_writes(self.has_axes, &[Resource::Axes])
             .and_writes(self.is_dynamic, &[Resource::PreviousPosition])
             .clears(Resource::Guide, f32::INFINITY.to_bits())

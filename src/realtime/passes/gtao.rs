@@ -4,7 +4,7 @@ use crate::error::Result;
 use crate::gpu::{ComputePipeline, Recorder};
 use crate::interface::records::passes::GtaoParams;
 use crate::realtime::display::Display;
-use crate::realtime::graph::{Frame, Params, Pass, Range, Stage, Uses};
+use crate::realtime::graph::{Frame, Params, Pass, Range, ResourceUse, Stage};
 use crate::realtime::resources::{Resource, Resources};
 use crate::shaders;
 use crate::tracer::Tracer;
@@ -22,8 +22,8 @@ pub fn stage(tracer: &Tracer, pixels: u32) -> Result<Stage> {
 }
 
 impl Pass for Gtao {
-    fn uses(&self, _: Option<&Display>) -> Uses {
-        Uses::new(&[Resource::FrameNumber, Resource::Camera, Resource::Guide, Resource::Surface], &[Resource::Current])
+    fn uses(&self, _: Option<&Display>) -> ResourceUse {
+        ResourceUse::new(&[Resource::FrameNumber, Resource::Camera, Resource::Guide, Resource::Surface], &[Resource::Current])
             .clears(Resource::Current, 0)
     }
 

@@ -10,7 +10,7 @@ use crate::film::block::Block;
 use crate::gpu::{Buffer, ComputePipeline, Recorder};
 use crate::interface::records::larsen::{LARSEN_NOISE, LARSEN_RAYS, LarsenParams};
 use crate::realtime::display::Display;
-use crate::realtime::graph::{Frame, Params, Pass, Range, Stage, Uses};
+use crate::realtime::graph::{Frame, Params, Pass, Range, ResourceUse, Stage};
 use crate::realtime::resources::{Resource, Resources};
 use crate::realtime::settings::{FilterKind, Settings};
 use crate::sampling::{best_candidates, blue_noise};
@@ -85,16 +85,20 @@ pub fn stages(tracer: &Tracer, size: [u32; 2], settings: &Settings, lights: &[[f
 }
 
 impl Pass for Larsen {
-    fn uses(&self, _: Option<&Display>) -> Uses {
-        use Resource::{Combined, FrameNumber, Guide, Lit, Occlusion, PreviousResult, RayCount, Result, Samples, Surface};
+    fn uses(&self, _: Option<&Display>) -> ResourceUse {
+        use Resource::{
+            Combined, FrameNumber, Guide, Occlusion, PreviousResult, RayCount, Result, Samples, Surface, VisibleLights,
+        };
         let surfaces = [FrameNumber, Guide, Surface];
         match self.work {
-            Work::Keep => Uses::new(&[Result], &[PreviousResult]),
-            Work::Light(_) => Uses::new(&surfaces, &[Lit]).clears(Lit, 0),
-            Work::Occlusion(_) => Uses::new(&surfaces, &[Samples]).and_reads(&[Lit]),
-            Work::Sum(_) => Uses::new(&surfaces, &[Occlusion, RayCount]).and_reads(&[Lit, Samples]).clears(RayCount, 0),
-            Work::Blur(_) => Uses::new(&surfaces, &[Combined]).and_reads(&[Occlusion]),
-            Work::Temporal(_) => Uses::new(&surfaces, &[Result]).and_reads(&[Combined, PreviousResult]),
+            Work::Keep => ResourceUse::new(&[Result], &[PreviousResult]),
+            Work::Light(_) => ResourceUse::new(&surfaces, &[VisibleLights]).clears(VisibleLights, 0),
+            Work::Occlusion(_) => ResourceUse::new(&surfaces, &[Samples]).and_reads(&[VisibleLights]),
+            Work::Sum(_) => {
+                ResourceUse::new(&surfaces, &[Occlusion, RayCount]).and_reads(&[VisibleLights, Samples]).clears(RayCount, 0)
+            }
+            Work::Blur(_) => ResourceUse::new(&surfaces, &[Combined]).and_reads(&[Occlusion]),
+            Work::Temporal(_) => ResourceUse::new(&surfaces, &[Result]).and_reads(&[Combined, PreviousResult]),
         }
     }
 
@@ -103,7 +107,7 @@ impl Pass for Larsen {
             frame: frame.params,
             // the count that turns the table only ever alternates between two values
             frame_parity: frame.number & 1,
-            lit: resources.address(Resource::Lit),
+            lit: resources.address(Resource::VisibleLights),
             samples: resources.address(Resource::Samples),
             occlusion: resources.address(Resource::Occlusion),
             combined: resources.address(Resource::Combined),

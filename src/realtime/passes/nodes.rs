@@ -4,10 +4,10 @@
 use crate::error::Result;
 use crate::film::block::{Block, BlockParams};
 use crate::gpu::{ComputePipeline, Recorder};
-use crate::interface::Shown;
+use crate::interface::DisplayMode;
 use crate::interface::records::passes::NodesParams;
 use crate::realtime::display::Display;
-use crate::realtime::graph::{Frame, Params, Pass, Range, Stage, Uses};
+use crate::realtime::graph::{Frame, Params, Pass, Range, ResourceUse, Stage};
 use crate::realtime::resources::{Resource, Resources};
 use crate::shaders;
 use crate::tracer::Tracer;
@@ -54,13 +54,13 @@ impl NodeVisits {
 }
 
 impl Pass for Nodes {
-    fn uses(&self, _: Option<&Display>) -> Uses {
-        use Resource::{Camera, DisplaySettings, Nodes, Scene, Words};
-        Uses::new(&[Camera, Scene, DisplaySettings], &[Nodes, Words])
+    fn uses(&self, _: Option<&Display>) -> ResourceUse {
+        use Resource::{Camera, DisplayImage, DisplaySettings, Nodes, Scene};
+        ResourceUse::new(&[Camera, Scene, DisplaySettings], &[Nodes, DisplayImage])
     }
 
     fn is_enabled(&self, display: Option<&Display>) -> bool {
-        display.is_some_and(|d| d.shown == Shown::Nodes)
+        display.is_some_and(|d| d.shown == DisplayMode::Nodes)
     }
 
     fn prepare(&mut self, frame: &Frame, resources: &Resources) -> Result<()> {
@@ -68,7 +68,7 @@ impl Pass for Nodes {
         self.params.write(&NodesParams {
             block: self.block.address(),
             nodes: resources.address(Resource::Nodes),
-            words: resources.address(Resource::Words),
+            words: resources.address(Resource::DisplayImage),
             gain: frame.display.map_or(1.0, |d| d.exposure.exp2()),
             middle: MIDDLE,
         })

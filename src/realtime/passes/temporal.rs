@@ -5,7 +5,7 @@ use crate::gpu::{Buffer, ComputePipeline, Memory, Recorder, Specialization};
 use crate::interface::constants;
 use crate::interface::records::passes::TemporalParams;
 use crate::realtime::display::Display;
-use crate::realtime::graph::{Frame, Params, Pass, Range, Stage, Uses};
+use crate::realtime::graph::{Frame, Params, Pass, Range, ResourceUse, Stage};
 use crate::realtime::params::{MAX_MOVED, MovedRecord};
 use crate::realtime::resources::{Resource, Resources};
 use crate::realtime::settings::Settings;
@@ -34,11 +34,11 @@ pub fn stage(tracer: &Tracer, pixels: u32, settings: &Settings) -> Result<Stage>
 }
 
 impl Pass for Temporal {
-    fn uses(&self, _: Option<&Display>) -> Uses {
+    fn uses(&self, _: Option<&Display>) -> ResourceUse {
         use Resource::{
             BentHistory, Current, CurrentBent, FrameNumber, Guide, History, Plan, PreviousPosition, Scene, Surface,
         };
-        Uses::new(&[FrameNumber, Scene, Guide, Surface, PreviousPosition, Current, CurrentBent, Plan], &[History])
+        ResourceUse::new(&[FrameNumber, Scene, Guide, Surface, PreviousPosition, Current, CurrentBent, Plan], &[History])
             .previous(&[Guide, History, BentHistory])
             .and_writes(self.has_bent, &[BentHistory])
     }

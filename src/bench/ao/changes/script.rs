@@ -3,7 +3,7 @@
 use crate::bench::ao::scenes::REACH;
 use crate::error::Result;
 use crate::film::camera::{self, Choice};
-use crate::realtime::sequence::{CameraMotion, Sequence};
+use crate::realtime::sequence::{CameraMotion, FrameSequence};
 use crate::scene::animation::Rig;
 use crate::scene::{Camera, Motion, Scene};
 use crate::tracer::{Tracer, UpdateStats};
@@ -34,13 +34,13 @@ impl<'a> ChangeScript<'a> {
     /// A scene's first animation, seen by a camera that stands still; `None` where it has none.
     ///
     /// # Errors
-    /// Those of [`Sequence::new`] and of choosing the camera.
+    /// Those of [`FrameSequence::new`] and of choosing the camera.
     pub fn animated(name: &str, scene: &'a Scene, aspect: f64) -> Result<Option<Self>> {
         if scene.rig.as_ref().is_none_or(|rig: &Rig| rig.animations().is_empty()) {
             return Ok(None);
         }
         let camera = camera::choose(scene, &Choice::Auto, aspect)?;
-        let mut sequence = Sequence::new(scene, camera.clone(), None, CameraMotion::Still, Some(0), FRAMES_PER_SECOND)?;
+        let mut sequence = FrameSequence::new(scene, camera.clone(), None, CameraMotion::Still, Some(0), FRAMES_PER_SECOND)?;
         let (lo, hi) = scene.bounds().unwrap_or_default();
         Ok(Some(Self {
             name: name.to_owned(),

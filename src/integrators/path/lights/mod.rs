@@ -50,13 +50,13 @@ pub(super) fn brightness(c: Vec3) -> f64 {
 
 /// Lights that are being gathered: each with its power, and with bounds where it has a position.
 #[derive(Default)]
-struct Gathered {
+struct LightCollector {
     records: Vec<LightRecord>,
     powers: Vec<f64>,
     bounds: Vec<Bounds>,
 }
 
-impl Gathered {
+impl LightCollector {
     /// Returns its index. What has no power is not sampled: [`INVALID`].
     fn push(&mut self, record: LightRecord, power: f64, bounds: Option<Bounds>) -> u32 {
         debug_assert!(bounds.is_none() || self.bounds.len() == self.records.len(), "lights with a position come first");
@@ -72,7 +72,7 @@ impl Gathered {
 
 impl Lights {
     /// Nothing but an environment.
-    pub fn sky_only() -> Self {
+    pub fn environment_only() -> Self {
         let record = LightRecord { kind: Kind::Environment as u32, instance: INVALID, probability: 1.0, ..Default::default() };
         Self { records: vec![record], starts: vec![0; 2], environment: Some(0), ..Default::default() }
     }
@@ -99,7 +99,7 @@ impl Lights {
 
     /// Those of a scene. `environment`: radiance of what surrounds it, averaged over the sphere.
     pub fn new(flat: &FlatScene, environment: Vec3) -> Self {
-        let mut all = Gathered::default();
+        let mut all = LightCollector::default();
         let scene = flat.scene;
         let is_far = |light: &&Light| matches!(light.kind, LightKind::Directional { .. });
         scene.lights.iter().filter(|l| !is_far(l)).for_each(|l| punctual::add(&mut all, flat, l));

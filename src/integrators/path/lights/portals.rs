@@ -3,21 +3,21 @@
 use std::f64::consts::PI;
 
 use super::super::params::INVALID;
-use super::Gathered;
+use super::LightCollector;
 use crate::accel::flatten::FlatScene;
 use crate::interface::LightKind as Kind;
 use crate::interface::records::lights::LightRecord;
 
 /// Share of its samples that the environment keeps where there are portals: light may come in elsewhere.
-const KEPT: f64 = 0.2;
+const ENVIRONMENT_SHARE: f64 = 0.2;
 
 /// Adds the environment, of this mean brightness and power, and behind it the scene's portals; returns its index. With portals the power is what comes through
 /// them, as through a lamp of their size: the environment's own would leave other lights of a room hardly any samples.
-pub(super) fn add_environment(all: &mut Gathered, flat: &FlatScene, brightness: f64, power: f64) -> Option<u32> {
+pub(super) fn add_environment(all: &mut LightCollector, flat: &FlatScene, brightness: f64, power: f64) -> Option<u32> {
     let portals: Vec<_> = flat.scene.portals.iter().filter(|p| p.area() > 0.0).collect();
     let through = |area: f64| PI * area * brightness;
     let of_portals: f64 = portals.iter().map(|p| through(p.area())).sum();
-    let own = if portals.is_empty() { power } else { of_portals * KEPT / (1.0 - KEPT) };
+    let own = if portals.is_empty() { power } else { of_portals * ENVIRONMENT_SHARE / (1.0 - ENVIRONMENT_SHARE) };
     let record = LightRecord {
         kind: Kind::Environment as u32,
         instance: INVALID,

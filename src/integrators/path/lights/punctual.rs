@@ -6,14 +6,14 @@ use glam::DVec3;
 
 use super::super::light_tree::Bounds;
 use super::super::params::INVALID;
-use super::{Gathered, brightness, radius};
+use super::{LightCollector, brightness, radius};
 use crate::accel::flatten::FlatScene;
 use crate::interface::LightKind as Kind;
 use crate::interface::records::lights::LightRecord;
 use crate::scene::{Light, LightKind};
 
 /// Adds one.
-pub(super) fn add(all: &mut Gathered, flat: &FlatScene, light: &Light) {
+pub(super) fn add(all: &mut LightCollector, flat: &FlatScene, light: &Light) {
     let position = light.position - flat.origin;
     let brightness = brightness(light.intensity);
     let base = LightRecord {
@@ -30,7 +30,7 @@ pub(super) fn add(all: &mut Gathered, flat: &FlatScene, light: &Light) {
         axis,
         spread,
         falloff,
-        both_ways: false,
+        two_sided: false,
         intensity: brightness,
     };
     match light.kind {

@@ -7,7 +7,7 @@ use glam::{DVec3, DVec4, Vec3, Vec4};
 
 use super::super::light_tree::Bounds;
 use super::super::params::INVALID;
-use super::{Gathered, brightness};
+use super::{LightCollector, brightness};
 use crate::accel::features::{AlphaClass, alpha_classes};
 use crate::accel::flatten::FlatScene;
 use crate::interface::LightKind as Kind;
@@ -15,10 +15,10 @@ use crate::interface::records::lights::{LIGHT_ALPHA, LIGHT_MIRRORED, LIGHT_TWO_S
 use crate::scene::{AlphaMode, Geometry, Material, TriangleMesh};
 
 /// Share of its coordinates by which rounding may have moved a point of a light.
-const LIFT: f64 = 8.0 / 16_777_216.0;
+const ROUNDING_BOUND: f64 = 8.0 / 16_777_216.0;
 
 /// Every primitive whose material emits; returns [`super::Lights::light_of`]. A sphere that its instance stretches has no closed form: BSDF samples find it.
-pub(super) fn add(all: &mut Gathered, flat: &FlatScene) -> Vec<u32> {
+pub(super) fn add(all: &mut LightCollector, flat: &FlatScene) -> Vec<u32> {
     let scene = flat.scene;
     let (mut light_of, mut of_primitives) = (vec![INVALID; scene.instances.len()], Vec::new());
     let alpha = alpha_classes(scene, flat.blend);
@@ -68,7 +68,7 @@ pub(super) fn add(all: &mut Gathered, flat: &FlatScene) -> Vec<u32> {
                         position: centre.as_vec3().to_array(),
                         radius: radius as f32,
                         primitive: primitive as u32,
-                        lift: ((centre.abs().max_element() + radius) * LIFT) as f32,
+                        lift: ((centre.abs().max_element() + radius) * ROUNDING_BOUND) as f32,
                         ..base
                     };
                     let bounds = Bounds {
@@ -77,7 +77,7 @@ pub(super) fn add(all: &mut Gathered, flat: &FlatScene) -> Vec<u32> {
                         axis: DVec3::Z,
                         spread: PI,
                         falloff: 0.5 * PI,
-                        both_ways: false,
+                        two_sided: false,
                         intensity: PI * radius * radius * brightness,
                     };
                     of_primitives.push(all.push(record, 4.0 * PI.powi(2) * radius * radius * brightness, Some(bounds)));
@@ -95,7 +95,7 @@ pub(super) fn add(all: &mut Gathered, flat: &FlatScene) -> Vec<u32> {
 
 /// The triangles of a mesh: two neighbours that make a rectangle of one radiance (`plain`) are one light.
 fn add_triangles(
-    all: &mut Gathered,
+    all: &mut LightCollector,
     mesh: &TriangleMesh,
     point: impl Fn(u32) -> DVec3,
     plain: bool,
@@ -103,7 +103,7 @@ fn add_triangles(
     base: LightRecord,
     of_primitives: &mut Vec<u32>,
 ) {
-    let both_ways = base.flags & LIGHT_TWO_SIDED != 0;
+    let two_sided = base.flags & LIGHT_TWO_SIDED != 0;
     // a transform that mirrors turns the winding
     let turn = if base.flags & LIGHT_MIRRORED != 0 { -1.0 } else { 1.0 };
     let mut push = |kind: Kind, [a, e1, e2]: [DVec3; 3], primitive: usize, slack: f64| {
@@ -119,7 +119,7 @@ fn add_triangles(
             axis: e1.as_vec3().to_array(),
             edge: e2.as_vec3().to_array(),
             primitive: primitive as u32,
-            lift: (extent * LIFT + slack) as f32,
+            lift: (extent * ROUNDING_BOUND + slack) as f32,
             ..base
         };
         let bounds = Bounds {
@@ -128,10 +128,10 @@ fn add_triangles(
             axis: normal.normalize_or(DVec3::Z),
             spread: 0.0,
             falloff: 0.5 * PI,
-            both_ways,
+            two_sided,
             intensity: area * brightness,
         };
-        all.push(record, if both_ways { 2.0 } else { 1.0 } * PI * area * brightness, Some(bounds))
+        all.push(record, if two_sided { 2.0 } else { 1.0 } * PI * area * brightness, Some(bounds))
     };
     let mut k = 0;
     while k < mesh.indices.len() {
