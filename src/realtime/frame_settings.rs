@@ -1,4 +1,4 @@
-//! Settings of frames in real time: which frames, and how they are made.
+//! Settings of real-time frames: the range of frames, and the pipeline's settings.
 
 use std::path::PathBuf;
 
@@ -13,7 +13,7 @@ use crate::sampling::Sequence;
 use crate::settings::parse::parse_rate;
 use crate::settings::{AppliesTo, choices, settings};
 
-/// What frames in real time are made of.
+/// Settings of real-time frames of ambient occlusion.
 const FRAMES: AppliesTo = AppliesTo { integrators: &["ao"], ..AppliesTo::FRAMES };
 
 choices! {
@@ -28,12 +28,12 @@ choices! {
     }
 }
 
-/// Frames from the first to the one before the last: `A..B`; a number is one frame.
+/// A half-open range of frames, `A..B`; a single number is one frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FrameRange {
-    /// The first.
+    /// First frame.
     pub first: u32,
-    /// One more than the last.
+    /// One past the last frame.
     pub end: u32,
 }
 
@@ -78,7 +78,7 @@ settings! {
         camera_path: Option<PathBuf>,
             option(value_name = "FILE", value_hint = clap::ValueHint::FilePath, conflicts_with_all = ["orbit", "eye", "camera", "fov_y"]),
             applies(FRAMES);
-        /// Orbit the camera around the centre of the scene, one turn in this many frames
+        /// Orbit the camera around the centre of the scene, one revolution in this many frames
         orbit: Option<u32>,
             option(value_name = "FRAMES", num_args = 0..=1, default_missing_value = "240", value_parser = clap::value_parser!(u32).range(1..)),
             applies(FRAMES);
@@ -109,12 +109,12 @@ settings! {
 }
 
 impl FrameSettings {
-    /// The frames that are kept.
+    /// The range of frames that are kept.
     pub fn range(&self) -> FrameRange {
         self.frames.unwrap_or(FrameRange { first: 0, end: 1 })
     }
 
-    /// The preset with what was said otherwise, for ambient occlusion with these settings.
+    /// The settings of the pipeline: the preset's, with the settings given, for ambient occlusion with settings `ao`.
     ///
     /// # Errors
     /// [`Error::Usage`] for what has no effect together.
@@ -122,7 +122,7 @@ impl FrameSettings {
         let mut s = self.preset.unwrap_or_default().settings();
         let technique = self.technique.unwrap_or(s.technique);
         if technique == Technique::Larsen && s.technique != Technique::Larsen {
-            return Err(Error::Usage("--technique larsen is --preset larsen: its settings are its own".into()));
+            return Err(Error::Usage("--technique larsen: use --preset larsen, which fixes its settings".into()));
         }
         if s.technique == Technique::Larsen {
             let own = [
@@ -161,7 +161,7 @@ impl FrameSettings {
         Ok(s)
     }
 
-    /// Can each output hold what there is to write?
+    /// Checks that each output can hold the frames.
     ///
     /// # Errors
     /// [`Error::Usage`].
@@ -171,11 +171,11 @@ impl FrameSettings {
             let numbered = frames::is_pattern(path)?;
             if apng::is_apng(path) {
                 if numbered {
-                    return Err(Error::Usage(format!("{}: an animation holds all frames; leave the # out", path.display())));
+                    return Err(Error::Usage(format!("{}: an animation holds all frames; leave out the #", path.display())));
                 }
             } else if range.end - range.first > 1 && !numbered {
                 return Err(Error::Usage(format!(
-                    "{}: {} frames need a name with a place for their number, like out.####.exr, or an animation, like out.apng",
+                    "{}: {} frames need a name with a # for each digit of the frame number, like out.####.exr, or an animation, like out.apng",
                     path.display(),
                     range.end - range.first
                 )));

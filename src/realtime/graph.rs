@@ -1,5 +1,5 @@
-//! The frame graph: what passes read and write is declared, and what follows from it is derived here: which memory there is, where
-//! barriers are, what is timed, and which passes are left out because nothing that they read has changed.
+//! The frame graph: passes declare which resources they read and write. From these declarations follow memory allocation, barriers,
+//! timings, and which passes are skipped because no input has changed.
 
 use std::marker::PhantomData;
 use std::sync::Arc;
@@ -16,95 +16,95 @@ use crate::shaders::LANES;
 use crate::tracer::stream::LAUNCH_RAYS;
 use crate::tracer::{Push, Tracer};
 
-/// Launches of a submission: between them others get their turn on the device.
+/// Maximum launches per submission, so that other users of the device are not blocked for long.
 const MAX_LAUNCHES: usize = 8;
 
-/// What passes are told of a frame.
+/// The inputs of the passes of a frame.
 pub struct Frame<'a> {
-    /// What traces.
+    /// The tracer, which holds the scene.
     pub tracer: &'a Tracer,
-    /// How frames are made.
+    /// Settings of the pipeline.
     pub settings: &'a Settings,
-    /// All of the image.
+    /// The whole image as a block.
     pub block: Block,
-    /// From where it is seen.
+    /// The camera of this frame.
     pub camera: CameraRecord,
-    /// What has moved since the previous frame.
+    /// Objects that moved since the previous frame.
     pub moved: &'a [MovedRecord],
-    /// Counts up.
+    /// Frame index.
     pub number: u32,
     /// Address of the frame's `FrameParams`.
     pub params: u64,
-    /// What is shown, if anything.
+    /// The buffer to display, if any.
     pub display: Option<Display>,
 }
 
-/// Invocations or rays of a pass: `first .. first + count`.
+/// A range of invocations or rays of a pass: `first .. first + count`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Range {
-    /// The first.
+    /// First index.
     pub first: u32,
-    /// How many.
+    /// Number of invocations or rays.
     pub count: u32,
 }
 
 impl Range {
-    /// One for all.
+    /// A single range of `count` invocations.
     pub fn all(count: u32) -> Vec<Self> {
         vec![Self { first: 0, count }]
     }
 
-    /// Launches of rays, each of whole groups of `group` rays.
+    /// Splits rays into launches of whole groups of `group` rays.
     pub fn launches(rays: u32, group: u32) -> Vec<Self> {
         let most = LAUNCH_RAYS / group * group;
         (0..rays).step_by(most as usize).map(|first| Self { first, count: most.min(rays - first) }).collect()
     }
 }
 
-/// What a pass reads and writes.
+/// The resources that a pass reads and writes: its inputs to barriers, memory allocation and culling.
 #[derive(Clone, Debug, Default)]
 pub struct ResourceUse {
-    /// What it reads.
+    /// Resources read.
     pub reads: Vec<Resource>,
-    /// What it reads as the previous frame left it.
+    /// Resources of the previous frame that are read.
     pub previous: Vec<Resource>,
-    /// What it writes, and may read besides.
+    /// Resources written, which may be read, too.
     pub writes: Vec<Resource>,
-    /// Of what it writes: what is filled with a word before.
+    /// Resources among the written ones that are filled with a word first.
     pub clears: Vec<(Resource, u32)>,
 }
 
 impl ResourceUse {
-    /// Reads and writes.
+    /// Declares resources that are read and written.
     pub fn new(reads: &[Resource], writes: &[Resource]) -> Self {
         Self { reads: reads.to_vec(), writes: writes.to_vec(), ..Default::default() }
     }
 
-    /// Reads besides what the previous frame left.
+    /// Adds resources of the previous frame that are read.
     pub fn previous(mut self, resources: &[Resource]) -> Self {
         self.previous.extend(resources);
         self
     }
 
-    /// Reads besides.
+    /// Adds resources that are read.
     pub fn and_reads(mut self, resources: &[Resource]) -> Self {
         self.reads.extend(resources);
         self
     }
 
-    /// Writes besides, where `wanted`.
+    /// Adds resources that are written if `wanted` is true.
     pub fn and_writes(mut self, wanted: bool, resources: &[Resource]) -> Self {
         self.writes.extend(resources.iter().filter(|_| wanted));
         self
     }
 
-    /// What is filled with a word before.
+    /// Adds a resource that is filled with a word first.
     pub fn clears(mut self, resource: Resource, word: u32) -> Self {
         self.clears.push((resource, word));
         self
     }
 
-    /// All of them.
+    /// All resources of this frame that are read or written.
     pub fn touched(&self) -> impl Iterator<Item = Resource> + '_ {
         self.reads.iter().chain(&self.previous).chain(&self.writes).copied()
     }
@@ -112,42 +112,42 @@ impl ResourceUse {
 
 /// A pass of a frame: a file in src/realtime/passes.
 pub trait Pass {
-    /// What it reads and writes with this display.
+    /// The resources that it reads and writes with this display.
     fn uses(&self, display: Option<&Display>) -> ResourceUse;
 
-    /// Does it take part in frames with this display?
+    /// Returns true if the pass runs in frames with this display.
     fn is_enabled(&self, _display: Option<&Display>) -> bool {
         true
     }
 
-    /// Writes the record of its parameters, before the frame is recorded.
+    /// Writes the parameters of the pass, before the frame is recorded.
     ///
     /// # Errors
     /// Those of the device.
     fn prepare(&mut self, frame: &Frame, resources: &Resources) -> Result<()>;
 
-    /// Records it over a range, timed under its name.
+    /// Records the pass over a range, timed under its label.
     ///
     /// # Errors
     /// Those of what it draws.
     fn record(&self, recorder: &mut Recorder, frame: &Frame, resources: &Resources, range: Range) -> Result<()>;
 }
 
-/// Passes that are recorded in turn for each of several ranges; mostly it is one pass and one range.
+/// Passes that are recorded one after another for each of several ranges; mostly one pass and one range.
 pub struct Stage {
     passes: Vec<Box<dyn Pass>>,
     ranges: Vec<Range>,
-    /// Versions of what its passes read when they were last recorded.
+    /// Versions of the resources read when the stage was last recorded.
     versions: Vec<u64>,
 }
 
 impl Stage {
-    /// Passes that hand results on within a range.
+    /// Creates a stage of passes that hand results on within a range.
     pub fn new(passes: Vec<Box<dyn Pass>>, ranges: Vec<Range>) -> Self {
         Self { passes, ranges, versions: Vec::new() }
     }
 
-    /// What its passes read and write while nothing is shown.
+    /// The resources that its passes read and write without a display.
     pub fn uses(&self) -> impl Iterator<Item = ResourceUse> + '_ {
         self.passes.iter().map(|p| p.uses(None))
     }
@@ -161,7 +161,7 @@ pub struct Graph {
 }
 
 impl Graph {
-    /// Allocates what the passes need.
+    /// Allocates the resources of the stages.
     pub fn new(device: &Arc<Device>, extent: Extent, stages: Vec<Stage>) -> Result<Self> {
         let mut resources = Resources::new(extent);
         resources.allocate(device, &stages)?;
@@ -180,14 +180,14 @@ impl Graph {
         &self.resources
     }
 
-    /// Notes that something on the host has changed.
+    /// Marks a resource as changed by the host.
     pub fn touch(&mut self, resource: Resource) {
         self.resources.touch(resource);
     }
 
-    /// Decides which stages are recorded in this frame: those that read something that has changed since they were last, or that the
-    /// previous frame left, or that write something that does not outlive a frame. Resources with two buffers take turns where they are
-    /// written again, so what [`Graph::resources`] says is this frame's from here on.
+    /// Chooses the stages to record in this frame: those that read a resource that has changed since they were last recorded, or one of the
+    /// previous frame, and those that write a transient resource. Double-buffered resources that are written again are swapped, so
+    /// [`Graph::resources`] is valid for this frame from here on.
     pub fn begin(&mut self, display: Option<&Display>) -> Vec<usize> {
         let mut recorded = Vec::new();
         for (k, stage) in self.stages.iter_mut().enumerate() {
@@ -280,7 +280,7 @@ fn record_range(
     Ok(())
 }
 
-/// Buffers that were read and written since the last barrier.
+/// Buffers read and written since the last barrier.
 #[derive(Default)]
 struct Hazards {
     read: Vec<usize>,
@@ -288,7 +288,7 @@ struct Hazards {
 }
 
 impl Hazards {
-    /// A barrier, where what comes next reads what was written, or writes what was read or written. Then notes what comes next.
+    /// Records a barrier if what follows reads a written buffer, or writes a read or written one; then notes what follows.
     fn before(&mut self, r: &mut Recorder, reads: &[Option<usize>], writes: &[Option<usize>]) {
         if self.conflicts(reads, writes) {
             r.barrier();
@@ -304,35 +304,35 @@ impl Hazards {
     }
 }
 
-/// A pass's record of parameters in device memory.
+/// The parameter record of a pass in device memory.
 pub struct Params<T> {
     buffer: Buffer,
     record: PhantomData<T>,
 }
 
 impl<T: bytemuck::NoUninit> Params<T> {
-    /// Allocates it.
+    /// Allocates the record.
     pub fn new(device: &Arc<Device>, name: &str) -> Result<Self> {
         Ok(Self { buffer: Buffer::new(device, name, size_of::<T>() as u64, Memory::Upload)?, record: PhantomData })
     }
 
-    /// Writes it; nothing may be in flight.
+    /// Writes the record; no submission that reads it may be in flight.
     pub fn write(&mut self, record: &T) -> Result<()> {
         self.buffer.write(0, bytemuck::bytes_of(record))
     }
 
-    /// Where it is.
+    /// Device address.
     pub fn address(&self) -> u64 {
         self.buffer.address()
     }
 
-    /// Push constants for a range: scene, parameters and range, and nothing else.
+    /// Push constants of a range: scene, parameters and range.
     pub fn push(&self, frame: &Frame, range: Range) -> Push {
         let Range { first, count } = range;
         Push { scene: frame.tracer.scene_address(), pass: self.address(), first, count, ..Default::default() }
     }
 
-    /// Records a compute pipeline with an invocation for each of `range`.
+    /// Records a compute pipeline with one invocation per element of `range`.
     pub fn dispatch(&self, r: &mut Recorder, label: &'static str, pipeline: &ComputePipeline, frame: &Frame, range: Range) {
         let push = self.push(frame, range);
         r.timed(label, |r| r.dispatch(pipeline, &push, range.count.div_ceil(LANES)));

@@ -1,9 +1,9 @@
 //! Ambient occlusion frame after frame, in passes ([`passes`]) over the images of a frame ([`resources`]).
 //!
-//! `gbuffer` finds what each pixel's centre shows; `ao_trace` traces occlusion rays of the pixels that are sampled in this
-//! frame; `gather` adds up those of a pixel where there are several; `temporal` adds them to what earlier
-//! frames know of the same surface; `filter` averages over neighbours. What nothing has changed since the previous frame is not
-//! done again ([`graph`]): while neither the camera nor the scene moves there are no camera rays, and pixels with a full history rest.
+//! `gbuffer` finds the surface at each pixel's centre; `ao_trace` traces occlusion rays of the pixels that are sampled in this
+//! frame; `gather` averages the samples of a pixel if there are several; `temporal` adds them to the
+//! history of the same surface, reprojected from the previous frame; `filter` averages over neighbours. Passes whose inputs have not changed
+//! are skipped ([`graph`]): while neither the camera nor the scene moves no camera rays are traced, nor occlusion rays of pixels with a full history.
 
 pub mod frame_settings;
 mod graph;
@@ -33,11 +33,11 @@ pub use passes::nodes::NodeVisits;
 use resources::{Extent, Resource, SURFACE_BYTES};
 pub use settings::{Budget, Filter, FilterKind, Preset, Resolution, Settings, Technique};
 
-/// Distance from a pixel's plane, in footprints of the pixel, at which its neighbours belong to another surface.
+/// Distance from a pixel's tangent plane, in pixel footprints, from which a neighbour counts as another surface.
 pub(super) const DEPTH_TOLERANCE: f32 = 1.5;
-/// Cosine between normals, likewise.
+/// Cosine between normals below which a neighbour counts as another surface.
 const NORMAL_TOLERANCE: f32 = 0.9;
-/// What making a frame took.
+/// Work and timings of a frame.
 #[derive(Clone, Debug, Default)]
 pub struct FrameStats {
     /// Device seconds of each step of each pass, in order.
@@ -46,43 +46,43 @@ pub struct FrameStats {
     pub primary_rays: u64,
     /// Occlusion rays traced.
     pub occlusion_rays: u64,
-    /// Occlusion rays that this many pixels would have taken, and that were left out: nothing is there, or all is known.
+    /// Occlusion rays of sampled pixels that were not traced: background, or a full history while nothing moves.
     pub skipped_rays: u64,
-    /// BVH nodes that the frame's camera rays visit; `None` unless they are shown ([`DisplayMode::Nodes`]).
+    /// BVH nodes that the frame's camera rays visit; `None` unless they are displayed ([`DisplayMode::Nodes`]).
     pub nodes: Option<NodeVisits>,
 }
 
-/// A pixel's surface.
+/// The surface point at a pixel's centre.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Surface {
-    /// Its point, relative to the scene's origin.
+    /// Position, relative to the scene's origin.
     pub position: [f32; 3],
-    /// Where that point was before the scene's last update.
+    /// Position of the same point before the scene's last update.
     pub before: [f32; 3],
 }
 
 impl FrameStats {
-    /// Device seconds of what traces rays, which hierarchies that change are judged by ([`Tracer::traced`]).
+    /// Device seconds of the passes that trace rays, by which the quality of refitted hierarchies is judged ([`Tracer::traced`]).
     pub fn tracing_seconds(&self) -> f64 {
         self.timings.iter().filter(|t| t.label.ends_with(" trace") || t.label == "gbuffer").map(|t| t.seconds).sum()
     }
 }
 
-/// The frames of one image size.
+/// The real-time pipeline at one image size.
 pub struct Realtime {
     size: [u32; 2],
     settings: Settings,
     graph: Graph,
     params: Params<FrameParams>,
-    /// What frames show; `None`: nothing.
+    /// The buffer to display, if any.
     display: Option<Display>,
-    /// Whether there is the pass `display`, and the pass `nodes`.
+    /// Whether the passes `display` and `nodes` exist.
     has_display: [bool; 2],
     primary_reason: String,
     state: State,
 }
 
-/// What is known from the frames before.
+/// State that the next frame depends on.
 #[derive(Default)]
 struct State {
     frame: u32,
@@ -96,8 +96,8 @@ impl Realtime {
         passes::streams(settings)
     }
 
-    /// For images of `size` pixels of the tracer's scene. `lights` are the positions of its point lights, relative to its origin: the
-    /// reference work's pipeline asks for them.
+    /// Creates the pipeline for images of `size` pixels of the tracer's scene. `lights` are the positions of the scene's point lights relative to its origin,
+    /// which Larsen's pipeline needs.
     ///
     /// # Errors
     /// [`Error::Usage`] for settings out of range, [`Error::OutOfMemory`], and those of compiling shaders.
@@ -112,7 +112,7 @@ impl Realtime {
             )));
         }
         let (primary, primary_reason) = match settings.primary {
-            Some(primary) => (primary, "asked for".to_owned()),
+            Some(primary) => (primary, "requested".to_owned()),
             None => Primary::auto(tracer, u64::from(size[0]) * u64::from(size[1])),
         };
         let pixels = |size: [u32; 2]| u64::from(size[0]) * u64::from(size[1]);
@@ -135,41 +135,41 @@ impl Realtime {
         })
     }
 
-    /// Pixels.
+    /// Image size in pixels.
     pub fn size(&self) -> [u32; 2] {
         self.size
     }
 
-    /// How frames are made; [`Settings::primary`] is what it turned out to be.
+    /// Settings of the pipeline; [`Settings::primary`] is resolved.
     pub fn settings(&self) -> &Settings {
         &self.settings
     }
 
-    /// Why camera rays are traced, or the scene drawn.
+    /// Why camera rays are traced or rasterized.
     pub fn primary_reason(&self) -> &str {
         &self.primary_reason
     }
 
-    /// Forgets what earlier frames know.
+    /// Discards the history.
     pub fn reset(&mut self) {
         self.state.has_history = false;
         self.state.camera = None;
     }
 
-    /// As [`Realtime::reset`], and draws the same samples again, from the first frame on.
+    /// Discards the history as [`Realtime::reset`] does, and restarts the sampler at the first frame.
     pub fn rewind(&mut self) {
         self.reset();
         self.state.frame = 0;
     }
 
-    /// Makes the next frame. `moved` is what has moved in the scene since the one before ([`crate::tracer::UpdateStats::moved`]).
+    /// Renders the next frame. `moved` is what has moved in the scene since the previous one ([`crate::tracer::UpdateStats::moved`]).
     ///
     /// # Errors
     /// Those of the device.
     pub fn frame(&mut self, tracer: &Tracer, camera: &CameraRecord, moved: &[Moved]) -> Result<FrameStats> {
         let moved = moved_records(moved);
         let is_larsen = self.settings.technique == Technique::Larsen;
-        // Larsen's pipeline makes everything anew
+        // Larsen's pipeline skips no pass
         let still = moved.is_empty() && self.state.camera == Some(*camera) && !is_larsen;
         for (resource, changed) in
             [(Resource::FrameNumber, true), (Resource::Camera, !still), (Resource::Scene, !moved.is_empty())]
@@ -211,11 +211,11 @@ impl Realtime {
         })
     }
 
-    /// What frames from the next on leave in [`Realtime::displayed`], beside everything else and in the same submission; `None`: nothing,
-    /// at no cost. May change before every frame: the first time compiles the pass, later ones write its parameters.
+    /// Sets the buffer that the next frames write to [`Realtime::displayed`], in the same submission; `None`: none, at no cost. It may change
+    /// before every frame: the first call compiles the pass, later ones write its parameters.
     ///
     /// # Errors
-    /// [`Error::Usage`] for what these settings do not make, and those of compiling the shader.
+    /// [`Error::Usage`] for a buffer that these settings do not produce, and those of compiling the shader.
     pub fn display(&mut self, tracer: &Tracer, display: Option<Display>) -> Result<()> {
         if let Some(display) = &display {
             display.shown.check(&self.settings)?;
@@ -236,19 +236,18 @@ impl Realtime {
         Ok(())
     }
 
-    /// The last frame as [`Realtime::display`] asked for it, in device memory: a word a pixel, rows from the top, the bytes red, green,
-    /// blue and 255. `None` before the first time.
+    /// The displayed image of the last frame, in device memory: 8-bit RGBA with alpha 255, rows from the top. `None` before the first call of
+    /// [`Realtime::display`].
     pub fn displayed(&self) -> Option<&Buffer> {
         self.graph.resources().buffer(Resource::DisplayImage)
     }
 
-    /// Ambient visibility of each pixel of the last frame, rows from the top; 0 where nothing is.
+    /// Ambient visibility of each pixel of the last frame, rows from the top; 0 for background.
     pub fn result(&self) -> Result<Vec<f32>> {
         self.read(Resource::Result)
     }
 
-    /// What the last frame's filter was given, rows from the top; 0 where nothing is and where there is no sample yet. Of Larsen's
-    /// pipeline: the result.
+    /// Input of the last frame's spatial filter, rows from the top; 0 for background and for pixels without a sample yet. With Larsen's pipeline: the result.
     pub fn unfiltered(&self) -> Result<Vec<f32>> {
         match self.settings.technique {
             Technique::Larsen => self.result(),
@@ -256,14 +255,14 @@ impl Realtime {
         }
     }
 
-    /// Samples behind each pixel of the last frame.
+    /// Number of samples accumulated in each pixel of the last frame.
     pub fn samples(&self) -> Result<Vec<f32>> {
         Ok(self.estimates()?.into_iter().map(|e| e[1]).collect())
     }
 
     /// Bent normal of each pixel of the last frame, rows from the top: the mean over the cosine-weighted hemisphere of ambient visibility
-    /// times direction, world space. Its length tells how much is open, and how much to one side: on an open plane two thirds, where nothing
-    /// is open 0. Divided by [`Realtime::result`] it is the mean of the open directions. 0 where nothing is.
+    /// times direction, world space. Its length is two thirds on an unoccluded plane, and 0 if everything is occluded. Divided by
+    /// [`Realtime::result`] it is the mean unoccluded direction. 0 for background.
     ///
     /// # Errors
     /// [`Error::Usage`] without [`Settings::bent`], and those of the device.
@@ -274,7 +273,7 @@ impl Realtime {
         self.read(Resource::BentResult)
     }
 
-    /// What a resource holds, a record a pixel.
+    /// Reads back a resource, one record per pixel.
     fn read<T: bytemuck::AnyBitPattern + bytemuck::NoUninit>(&self, resource: Resource) -> Result<Vec<T>> {
         self.graph.resources().read(resource, self.pixels())
     }
@@ -291,13 +290,13 @@ impl Realtime {
             .collect())
     }
 
-    /// Where the last frame shows something: 1, elsewhere 0; rows from the top.
+    /// Coverage of the last frame: 1 where a pixel's centre shows the scene, else 0; rows from the top.
     pub fn coverage(&self) -> Result<Vec<f32>> {
         let guide: Vec<[f32; 2]> = self.read(Resource::Guide)?;
         Ok(guide.iter().map(|g| if g[0] < f32::INFINITY { 1.0 } else { 0.0 }).collect())
     }
 
-    /// What each pixel of the last frame shows, rows from the top; `None` where nothing is.
+    /// Surface point of each pixel of the last frame, rows from the top; `None` for background.
     pub fn surfaces(&self) -> Result<Vec<Option<Surface>>> {
         const WORDS: usize = SURFACE_BYTES as usize / 4;
         let now: Vec<[f32; WORDS]> = self.read(Resource::Surface)?;
@@ -319,7 +318,7 @@ impl Realtime {
         Block { origin: [0, 0], size: self.size }
     }
 
-    /// What all passes share.
+    /// Parameters that all passes share.
     fn frame_params(&self, camera: &CameraRecord, still: bool) -> FrameParams {
         let (s, resources) = (&self.settings, self.graph.resources());
         let previous = self.state.camera.unwrap_or(*camera);
@@ -356,7 +355,7 @@ impl Realtime {
     }
 }
 
-/// World to camera, from the camera's own.
+/// World to camera, from camera to world.
 pub(super) fn inverse(camera: &CameraRecord) -> [[f32; 4]; 3] {
     let m = camera.camera_to_world.map(|row| row.map(f64::from));
     let column = |k: usize| DVec3::new(m[0][k], m[1][k], m[2][k]);

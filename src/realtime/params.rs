@@ -1,12 +1,12 @@
-//! What the passes of a frame share: [`FrameParams`], and what has moved.
+//! Parameters that the passes of a frame share: [`FrameParams`], and records of moved objects.
 
 pub use crate::interface::records::frame::{FrameParams, MovedRecord};
 use crate::tracer::Moved;
 
-/// Boxes that a frame's passes look at, each for every pixel.
+/// Maximum number of boxes of moved objects, each of which is tested for every pixel.
 pub const MAX_MOVED: usize = 16;
 
-/// Of what an update moved: the largest each by itself, the others in one box.
+/// Records of the objects that an update moved: one each for the largest, and one box around the others.
 pub fn moved_records(moved: &[Moved]) -> Vec<MovedRecord> {
     let mut all: Vec<&Moved> = moved.iter().filter(|m| m.share > 0.0).collect();
     let size = |m: &Moved| m.share * m.bounds.half_area();

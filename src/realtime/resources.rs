@@ -1,4 +1,4 @@
-//! The resources of a frame: what its passes read and write, by name, and the device memory behind the names.
+//! The resources of a frame, which its passes read and write, and their device memory.
 
 use std::sync::Arc;
 
@@ -8,103 +8,103 @@ use crate::gpu::{Buffer, Device, Memory};
 use crate::interface::records::frame::{SUMS_COUNT, SurfaceRecord};
 use crate::tracer::stream::LAUNCH_RAYS;
 
-/// Bytes of a pixel's surface.
+/// Bytes of a `SurfaceRecord`.
 pub const SURFACE_BYTES: u64 = size_of::<SurfaceRecord>() as u64;
 /// Bytes of three floats.
 pub const VECTOR_BYTES: u64 = 12;
 /// Bytes of a guide or an estimate (src/interface/records/frame.rs).
 pub const PAIR_BYTES: u64 = 8;
 
-/// What a pass may read or write.
+/// A resource that a pass may read or write.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Resource {
-    /// The frame's camera, on the host.
+    /// The camera, on the host.
     Camera,
-    /// The scene as it is now.
+    /// The scene, in the tracer's memory.
     Scene,
-    /// The number of the frame, which its samples follow from: it changes in every frame.
+    /// The frame index, which selects the sampler's points: it changes in every frame.
     FrameNumber,
-    /// What is shown, and how, on the host.
+    /// The display settings, on the host.
     DisplaySettings,
     /// Depth, normal and id of a pixel, for edge tests.
     Guide,
-    /// `SurfaceRecord`s.
+    /// `SurfaceRecord` of each pixel.
     Surface,
-    /// Axes of hemispheres.
+    /// Axis of each pixel's hemisphere.
     Axes,
-    /// Where surfaces were in the previous frame.
+    /// Position of each pixel's surface in the previous frame.
     PreviousPosition,
-    /// Estimates from this frame's samples alone.
+    /// Estimates of this frame's samples alone.
     Current,
     /// Bent normals of this frame's samples.
     CurrentBent,
     /// Ambient visibility of each ray of a launch, or with a budget of the frame.
     Samples,
-    /// Number of occlusion rays.
+    /// Number of occlusion rays traced.
     RayCount,
-    /// Estimates from the samples of this frame and those before.
+    /// Estimates accumulated over this frame and those before.
     History,
-    /// Bent normals beside them.
+    /// Accumulated bent normals.
     BentHistory,
-    /// Estimates between the steps of a filter of several, which take turns.
+    /// Estimates between the steps of a filter, two buffers used alternately.
     Filtered(usize),
-    /// Bent normals beside them.
+    /// Bent normals between the steps of a filter.
     FilteredBent(usize),
-    /// Ambient visibility.
+    /// Ambient visibility, filtered.
     Result,
-    /// Filtered bent normals.
+    /// Bent normals, filtered.
     BentResult,
-    /// The frame as it is shown.
+    /// The displayed image, 8-bit RGBA.
     DisplayImage,
-    /// BVH nodes that camera rays visit.
+    /// BVH nodes visited by camera rays.
     Nodes,
-    /// Budget: deviation of one sample and number of samples, pixels in tiles.
+    /// Budget: standard deviation of one sample and number of samples, pixels in tile order.
     DesiredSamples,
-    /// Budget: `SUMS_*`.
+    /// Budget: sums, indexed by `SUMS_*`.
     Sums,
-    /// Budget: each pixel's rays and its limit of samples.
+    /// Budget: number of rays and maximum history length of each pixel.
     Plan,
-    /// Budget: each ray's pixel.
+    /// Budget: pixel of each ray.
     RayPixels,
-    /// Budget: rays that each pixel has had in all frames.
+    /// Budget: rays traced for each pixel in all frames.
     TotalRays,
-    /// Larsen: lights that each pixel sees.
+    /// Larsen: number of point lights visible from each pixel.
     VisibleLights,
     /// Larsen: occlusion at half resolution.
     Occlusion,
     /// Larsen: one minus occlusion, blurred, at full resolution.
     Combined,
-    /// Larsen: the result of the frame before.
+    /// Larsen: result of the previous frame.
     PreviousResult,
 }
 
-/// How long what a resource holds is needed.
+/// How long the contents of a resource are needed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Lifetime {
-    /// On the host, or the tracer's: there is no buffer.
+    /// On the host, or in the tracer's memory: no buffer is allocated.
     Host,
-    /// From its first pass to its last in a frame: resources whose turns do not overlap share memory.
+    /// From its first pass to its last in a frame: resources whose lifetimes do not overlap share memory.
     Frame,
     /// Until it is written again.
     Kept,
-    /// Until the next frame has used it: two buffers, which take turns.
+    /// Until the next frame has used it: double buffered.
     Pair,
 }
 
-/// What the sizes of resources follow from.
+/// Quantities from which the sizes of resources follow.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Extent {
-    /// Pixels.
+    /// Number of pixels.
     pub pixels: u64,
-    /// Pixels, those that fill tiles of 8x8 included.
+    /// Number of pixels, including those that fill up 8x8 tiles.
     pub tiled_pixels: u64,
-    /// Pixels of an image of half the size per axis.
+    /// Number of pixels at half resolution per axis.
     pub half_pixels: u64,
-    /// With a budget: rays of a pixel at most; else 0.
+    /// With a variance budget the maximum rays per pixel; else 0.
     pub most_rays: u64,
 }
 
-/// A resource's buffer.
+/// Description of a resource's buffer.
 struct Description {
     name: &'static str,
     bytes: u64,
@@ -149,18 +149,18 @@ impl Resource {
         }
     }
 
-    /// Is what it holds lost when its last pass of a frame is done?
+    /// Returns true if its contents are lost after its last pass in a frame.
     pub fn is_transient(self) -> bool {
         self.describe(&Extent::default()).lifetime == Lifetime::Frame
     }
 }
 
-/// A resource that has memory.
+/// A resource that has a buffer.
 struct Entry {
     resource: Resource,
     /// Indices of its buffers: one, or with [`Lifetime::Pair`] this frame's and the previous frame's.
     buffers: [usize; 2],
-    /// Grows whenever it is written.
+    /// Incremented whenever it is written.
     version: u64,
 }
 
@@ -169,19 +169,19 @@ pub struct Resources {
     extent: Extent,
     buffers: Vec<Buffer>,
     entries: Vec<Entry>,
-    /// Versions of what is on the host.
+    /// Versions of resources on the host.
     host: Vec<(Resource, u64)>,
 }
 
 impl Resources {
-    /// Nothing yet.
+    /// Creates it without any buffer.
     pub fn new(extent: Extent) -> Self {
         Self { extent, buffers: Vec::new(), entries: Vec::new(), host: Vec::new() }
     }
 
-    /// Allocates what these stages write and what is not there yet. What nothing writes is not allocated, and its address is 0.
+    /// Allocates buffers of resources that these stages write and that have none yet. A resource that no pass writes has no buffer, and the address 0.
     pub fn allocate(&mut self, device: &Arc<Device>, stages: &[Stage]) -> Result<()> {
-        // of each resource the first and the last stage that touches it, in the order in which they are first written
+        // for each resource the first and the last stage that uses it, in the order in which they are first written
         let mut spans: Vec<(Resource, [usize; 2])> = Vec::new();
         for (k, stage) in stages.iter().enumerate() {
             for uses in stage.uses() {
@@ -196,7 +196,7 @@ impl Resources {
                 }
             }
         }
-        // buffers of resources of a frame, with the stage after which they are free
+        // buffers of transient resources, with the last stage that uses them
         let mut shared: Vec<(usize, u64, usize)> = Vec::new();
         for (resource, [first, last]) in spans {
             let Description { name, bytes, memory, lifetime } = resource.describe(&self.extent);
@@ -227,32 +227,32 @@ impl Resources {
         self.entries.iter().find(|e| e.resource == resource)
     }
 
-    /// Which buffer holds a resource; resources that share memory have the same.
+    /// Index of a resource's buffer; resources that share memory have the same.
     pub fn buffer_index(&self, resource: Resource) -> Option<usize> {
         self.entry(resource).map(|e| e.buffers[0])
     }
 
-    /// Which buffer holds what the previous frame left.
+    /// Index of the buffer that holds the previous frame's contents.
     pub fn previous_index(&self, resource: Resource) -> Option<usize> {
         self.entry(resource).map(|e| e.buffers[1])
     }
 
-    /// The buffer; `None` where no pass writes it.
+    /// Buffer of a resource; `None` if no pass writes it.
     pub fn buffer(&self, resource: Resource) -> Option<&Buffer> {
         self.buffer_index(resource).map(|k| &self.buffers[k])
     }
 
-    /// Its address; 0 where no pass writes it.
+    /// Device address of a resource; 0 if no pass writes it.
     pub fn address(&self, resource: Resource) -> u64 {
         self.buffer(resource).map_or(0, Buffer::address)
     }
 
-    /// Address of what the previous frame left, of a resource with two buffers.
+    /// Device address of the previous frame's contents of a double-buffered resource.
     pub fn previous_address(&self, resource: Resource) -> u64 {
         self.previous_index(resource).map_or(0, |k| self.buffers[k].address())
     }
 
-    /// A `uint` a pixel or another record each, read back; nothing where no pass writes it.
+    /// Reads back `count` records; none if no pass writes the resource.
     pub fn read<T: bytemuck::AnyBitPattern + bytemuck::NoUninit>(&self, resource: Resource, count: u64) -> Result<Vec<T>> {
         match self.buffer(resource) {
             Some(buffer) => Ok(bytemuck::pod_collect_to_vec(&buffer.read(0, count * size_of::<T>() as u64)?)),
@@ -260,7 +260,7 @@ impl Resources {
         }
     }
 
-    /// Notes that a resource has changed.
+    /// Marks a resource as changed.
     pub fn touch(&mut self, resource: Resource) {
         if let Some(entry) = self.entries.iter_mut().find(|e| e.resource == resource) {
             entry.version += 1;
@@ -271,13 +271,13 @@ impl Resources {
         }
     }
 
-    /// How often a resource has changed.
+    /// Version of a resource, which is incremented with each change.
     pub fn version(&self, resource: Resource) -> u64 {
         let host = || self.host.iter().find(|h| h.0 == resource).map_or(0, |h| h.1);
         self.entry(resource).map_or_else(host, |e| e.version)
     }
 
-    /// Makes this frame's buffer of a resource with two the previous frame's.
+    /// Swaps the buffers of a double-buffered resource.
     pub fn swap(&mut self, resource: Resource) {
         if let Some(entry) = self.entries.iter_mut().find(|e| e.resource == resource) {
             entry.buffers.swap(0, 1);

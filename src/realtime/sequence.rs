@@ -6,15 +6,15 @@ use crate::scene::camera_path::CameraPath;
 use crate::scene::{Camera, Motion, Orbit, Scene};
 use crate::tracer::{Tracer, UpdateStats};
 
-/// How the camera moves besides what an animation does with it.
+/// Camera motion, in addition to an animation of the camera.
 #[derive(Clone, Debug, Default)]
 pub enum CameraMotion {
-    /// Not at all.
+    /// No motion.
     #[default]
     Still,
-    /// From key to key.
+    /// Interpolation of key frames.
     Path(CameraPath),
-    /// Around a point.
+    /// An orbit around a point.
     Orbit(Orbit),
 }
 
@@ -26,27 +26,27 @@ struct AnimationPlayback<'a> {
     pose: Pose,
 }
 
-/// What frames of a scene show.
+/// A scene and a camera over a sequence of frames.
 #[derive(Debug)]
 pub struct FrameSequence<'a> {
     camera: Camera,
-    /// The camera's index in the file, where it is one of the file's.
+    /// Index of the camera in the file, if it is one of the file's.
     file_camera: Option<usize>,
     motion: CameraMotion,
     played: Option<AnimationPlayback<'a>>,
     frames_per_second: f64,
 }
 
-/// The animation that is called so, or has this index.
+/// Index of the animation with this name or index.
 ///
 /// # Errors
-/// [`Error::Usage`] when there is none, listing those that there are.
+/// [`Error::Usage`] if the scene has no such animation, listing those that it has.
 pub fn find_animation(scene: &Scene, wanted: &str) -> Result<usize> {
     let all = scene.rig.as_ref().map_or(&[][..], Rig::animations);
     let by_index = wanted.parse::<usize>().ok().filter(|k| *k < all.len());
     by_index.or_else(|| all.iter().position(|a| a.name == wanted)).ok_or_else(|| {
         let names: Vec<_> = all.iter().enumerate().map(|(k, a)| format!("{k} '{}'", a.name)).collect();
-        let there = if names.is_empty() { "the scene has none".to_owned() } else { format!("there is {}", names.join(", ")) };
+        let there = if names.is_empty() { "the scene has none".to_owned() } else { format!("it has {}", names.join(", ")) };
         Error::Usage(format!("--animate {wanted}: no such animation; {there}"))
     })
 }
@@ -75,7 +75,7 @@ impl<'a> FrameSequence<'a> {
         Ok(Self { camera, file_camera, motion, played, frames_per_second })
     }
 
-    /// What of the scene changes: what it is to be flattened with.
+    /// The motion that the scene must be flattened with ([`crate::accel::flatten::FlatScene::with_motion`]).
     ///
     /// # Errors
     /// [`Error::Usage`] when the scene has no such animation.
@@ -83,7 +83,7 @@ impl<'a> FrameSequence<'a> {
         self.played.as_ref().map_or(Ok(Motion::default()), |p| p.rig.motion(p.animation))
     }
 
-    /// Brings the tracer to a frame, and says from where it is seen and what an update did. Animations loop.
+    /// Updates the tracer to a frame, and returns the camera and the statistics of the update. Animations loop.
     ///
     /// # Errors
     /// Those of [`Tracer::update`].
@@ -108,7 +108,7 @@ impl<'a> FrameSequence<'a> {
         Ok((camera, stats))
     }
 
-    /// Does anything move from frame to frame?
+    /// Returns true if the camera or the scene changes from frame to frame.
     pub fn moves(&self) -> bool {
         self.played.is_some() || !matches!(self.motion, CameraMotion::Still)
     }

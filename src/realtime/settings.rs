@@ -1,4 +1,4 @@
-//! How the frames of a real-time renderer are made, and the presets that people choose from.
+//! Settings of the real-time pipeline, and presets.
 
 use crate::error::{Error, Result};
 use crate::integrators::ao::{Attenuation, Hemisphere};
@@ -22,7 +22,7 @@ choices! {
 }
 
 impl Resolution {
-    /// Frames after which every pixel was sampled.
+    /// Number of frames after which every pixel has been sampled once.
     pub fn period(self) -> u32 {
         1 << self as u32
     }
@@ -52,19 +52,19 @@ choices! {
     }
 }
 
-/// A step of a filter: half sides of its box in taps, and their distance in pixels.
+/// A step of a filter: a box along rows, columns or both, with a distance between taps.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FilterStep {
-    /// Along rows, along columns.
+    /// Whether the box extends along rows and along columns.
     pub sides: [bool; 2],
-    /// Taps to each side at most.
+    /// Maximum number of taps to each side.
     pub radius: u32,
-    /// Pixels from tap to tap.
+    /// Distance between taps, in pixels.
     pub stride: u32,
 }
 
 impl FilterStep {
-    /// What shaders are told of it, everything else 0.
+    /// Parameters for shaders; all other fields are 0.
     pub fn params(&self) -> FilterParams {
         let [along_rows, along_columns] = self.sides;
         FilterParams {
@@ -76,19 +76,19 @@ impl FilterStep {
     }
 }
 
-/// How frames are filtered.
+/// Settings of the spatial filter.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Filter {
-    /// How.
+    /// Kind of filter.
     pub kind: FilterKind,
-    /// Pixels; the box grows no further.
+    /// Maximum radius, in pixels.
     pub radius: u32,
-    /// Samples that a filtered pixel should rest on: the box grows until it holds so many.
+    /// Samples that a filtered pixel should average: the box grows until it holds this many.
     pub samples: f32,
 }
 
 impl Filter {
-    /// What is done one after the other. There is one step at least: it turns estimates into what is shown.
+    /// The steps of the filter, in order; at least one, because the last step converts estimates to the result.
     pub fn steps(&self) -> Vec<FilterStep> {
         let step = |sides, radius, stride| FilterStep { sides, radius, stride };
         match self.kind {
@@ -104,45 +104,45 @@ impl Filter {
     }
 }
 
-/// How frames are made.
+/// Settings of the real-time pipeline.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Settings {
-    /// Where occlusion comes from. What follows is of the traced one, and but for rays of the screen-space one.
+    /// AO technique. The settings below are for ray-traced AO; those but the rays also apply to the screen-space technique.
     pub technique: Technique,
-    /// How it is found what pixels show; `None`: what costs less ([`Primary::auto`]).
+    /// Primary visibility; `None`: the faster one on the device ([`Primary::auto`]).
     pub primary: Option<Primary>,
-    /// Rays of a pixel that is sampled in a frame; 1 to [`Settings::MAX_RAYS`].
+    /// Occlusion rays of each pixel that is sampled in a frame, 1 to [`Settings::MAX_RAYS`].
     pub rays_per_pixel: u32,
-    /// Whose they are: so many on average, or each pixel's own.
+    /// Distribution of rays over pixels.
     pub budget: Budget,
-    /// Which pixels are.
+    /// Pattern of pixels that are sampled in a frame.
     pub resolution: Resolution,
-    /// Where their directions come from.
+    /// Sampler of ray directions.
     pub sequence: Sequence,
-    /// Of the sequence.
+    /// Seed of the sampler.
     pub seed: u32,
-    /// World units beyond which nothing occludes; infinite for no limit.
+    /// AO radius in scene units: hits beyond do not occlude; infinite for no limit.
     pub radius: f64,
-    /// c: a hit at distance d counts c^-d; 1 counts every hit alike.
+    /// AO falloff, at least 1: a hit at distance d occludes by `falloff^-d`; 1 is binary.
     pub falloff: f64,
     /// Axis of the hemisphere.
     #[serde(skip)]
     pub hemisphere: Hemisphere,
-    /// Frames that a history counts at most; 1: none is kept.
+    /// Maximum history length, in frames; 1 disables temporal accumulation.
     pub history: u32,
-    /// Pixels with a full history get no more rays while nothing moves.
+    /// Stop tracing rays for pixels whose history is full while nothing moves.
     pub rest: bool,
-    /// Where things move: standard errors by which a history may differ from its surroundings; 0: by any.
+    /// History clamping near moving objects: half width in standard errors of the neighbourhood's mean; 0: off.
     pub clamp: f32,
-    /// Where things move: how much that shortens histories; 0: not.
+    /// Strength with which moving objects shorten histories; 0: off.
     pub moved_weight: f32,
-    /// Over pixels.
+    /// Spatial filter.
     pub filter: Filter,
-    /// Of the screen-space technique: slices through the view ray, and steps on each side of one.
+    /// Screen-space technique: number of slices through the view ray, and of steps on each side of a slice.
     pub gtao: [u32; 2],
-    /// Of the reference work's pipeline: world units that one of its own is.
+    /// Larsen's pipeline: scene units per unit of length in the paper.
     pub unit: f64,
-    /// Bent normals besides: the mean direction in which a point is open.
+    /// Also compute bent normals: the mean unoccluded direction.
     pub bent: bool,
 }
 
@@ -153,31 +153,31 @@ impl Default for Settings {
 }
 
 impl Settings {
-    /// Rays of a pixel in a frame at most.
+    /// Maximum rays per pixel and frame.
     pub const MAX_RAYS: u32 = 4096;
-    /// With a budget: rays of a pixel in a frame at most, times those that it has on average.
+    /// With a variance budget: maximum rays of a pixel in a frame, as a multiple of the average.
     pub const MAX_SHARE: u32 = 4;
-    /// With a budget: rays of a pixel in a frame on average at most. Four bits count them.
+    /// With a variance budget: maximum average rays per pixel. Four bits store the number of a pixel's rays.
     const MAX_BUDGET: u32 = 4;
-    /// Samples that a history counts at most: as many as half floats count one by one.
+    /// Maximum history length in samples: the largest number up to which half floats represent all integers.
     pub const MAX_SAMPLES: u32 = 2048;
 
-    /// How far hits occlude, and how much.
+    /// Attenuation of occlusion with distance.
     pub fn attenuation(&self) -> Attenuation {
         Attenuation { radius: self.radius, falloff: self.falloff }
     }
 
-    /// Samples that a history counts at most.
+    /// Maximum history length, in samples.
     pub fn most_samples(&self) -> u32 {
         (self.history.saturating_mul(self.rays_per_pixel)).min(Self::MAX_SAMPLES).max(self.rays_per_pixel)
     }
 
-    /// Rays of a pixel in a frame at most, where a budget distributes them; else 0.
+    /// Maximum rays of a pixel in a frame with a variance budget; else 0.
     pub fn most_rays(&self) -> u32 {
         if self.budget == Budget::Variance { Self::MAX_SHARE * self.rays_per_pixel } else { 0 }
     }
 
-    /// Are the numbers in their ranges?
+    /// Checks that the settings are in their ranges and fit together.
     ///
     /// # Errors
     /// [`Error::Usage`], naming the first that is not.
@@ -195,17 +195,17 @@ impl Settings {
             ));
         }
         if self.history == 0 {
-            return wrong("a history of 0 frames: 1 keeps none");
+            return wrong("the history must be at least 1 frame (1 = no temporal accumulation)");
         }
         let good = self.radius > 0.0 && self.falloff >= 1.0 && self.falloff.is_finite();
         if !good {
             return wrong("the radius must be above 0, and the falloff at least 1 (1 = binary) and finite");
         }
         if !(self.clamp >= 0.0 && self.moved_weight >= 0.0 && self.filter.samples >= 0.0) {
-            return wrong("clamp, weight of motion and samples of the filter must not be negative");
+            return wrong("clamp, moved weight and filter samples must not be negative");
         }
         if self.bent && self.technique != Technique::Traced {
-            return wrong("bent normals are made of traced directions: choose the technique traced");
+            return wrong("bent normals need traced directions: choose --technique traced");
         }
         Ok(())
     }
@@ -230,7 +230,7 @@ choices! {
 }
 
 impl Preset {
-    /// What it stands for.
+    /// The settings of the preset.
     pub fn settings(self) -> Settings {
         let common = Settings {
             technique: Technique::Traced,
@@ -253,7 +253,7 @@ impl Preset {
             bent: false,
         };
         match self {
-            // it looks for the nearest hit up to 100 units, whatever the falloff leaves of it
+            // the paper traces closest hits up to 100 units, whatever the falloff
             Preset::Larsen => Settings {
                 technique: Technique::Larsen,
                 rays_per_pixel: 64,

@@ -132,7 +132,7 @@ fn what_does_not_go_together_is_refused() {
     let render =
         |extra: &[&str]| [&["render", "builtin:stairs"], extra].concat().iter().map(|s| (*s).to_owned()).collect::<Vec<_>>();
     for (extra, says) in [
-        (&["--preset", "fast", "--frames", "0..3", "-o", &exr][..], "a place for their number"),
+        (&["--preset", "fast", "--frames", "0..3", "-o", &exr][..], "a # for each digit"),
         (&["--preset", "fast", "--frames", "0..3", "-o", &pattern], "leave the # out"),
         (&["--preset", "fast", "--frames", "3..3", "-o", &apng], "no frames"),
         (&["--preset", "fast", "--frames", "x", "-o", &apng], "A..B"),
@@ -165,7 +165,7 @@ fn gpu_runs_that_fail_leave_nothing() {
     let apng = place(&dir, "x.apng");
     for (extra, says) in [
         (&["builtin:stairs", "--animate"][..], "no such animation"),
-        (&["builtin:parade", "--animate", "fly"], "there is 0 'parade', 1 'bend'"),
+        (&["builtin:parade", "--animate", "fly"], "it has 0 'parade', 1 'bend'"),
         (&["builtin:parade", "--camera", "nobody"], "no such camera"),
         (&["builtin:parade", "--rays-per-pixel", "4096", "--size", "4096x4096"], "2^32 rays"),
     ] {

@@ -31,7 +31,7 @@ fn settings_out_of_range_are_named() {
         (Settings { falloff: f64::INFINITY, ..good }, "falloff"),
         (Settings { clamp: -1.0, ..good }, "clamp"),
         (Settings { clamp: f32::NAN, ..good }, "clamp"),
-        (Settings { moved_weight: -0.1, ..good }, "weight of motion"),
+        (Settings { moved_weight: -0.1, ..good }, "moved weight"),
         (Settings { filter: filter(-1.0), ..good }, "samples of the filter"),
         (Settings { filter: filter(f32::NAN), ..good }, "samples of the filter"),
     ] {

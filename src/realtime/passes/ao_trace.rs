@@ -15,18 +15,18 @@ use crate::tracer::{Push, Stream, Tracer};
 pub struct AoTrace {
     stream: Stream,
     params: Params<AoTraceParams>,
-    /// Pixels have several samples, which `gather` adds up.
+    /// Pixels have several samples, which `gather` averages.
     has_several: bool,
     has_budget: bool,
     has_bent: bool,
 }
 
-/// What it traces: without a falloff any hit will do.
+/// The stream that it traces: without a falloff any hit ends a ray.
 pub fn stream(settings: &Settings) -> &'static StreamShaders {
     if settings.attenuation().is_binary() { &shaders::AO_TRACE_ANY } else { &shaders::AO_TRACE_CLOSEST }
 }
 
-/// What decides where a frame's rays go: `ao_trace` and `gather` agree on it.
+/// Parameters that distribute a frame's rays over pixels, shared by `ao_trace` and `gather`.
 pub fn params(frame: &Frame, resources: &Resources) -> AoTraceParams {
     AoTraceParams {
         frame: frame.params,
@@ -41,7 +41,7 @@ pub fn params(frame: &Frame, resources: &Resources) -> AoTraceParams {
     }
 }
 
-/// What it depends on.
+/// Resources that it reads.
 pub const READS: &[Resource] = &[
     Resource::FrameNumber,
     Resource::Scene,
@@ -54,7 +54,7 @@ pub const READS: &[Resource] = &[
 ];
 
 impl AoTrace {
-    /// Compiles it.
+    /// Compiles the pass.
     pub fn new(tracer: &Tracer, settings: &Settings) -> Result<Self> {
         let has_budget = settings.budget == Budget::Variance;
         Ok(Self {
@@ -83,7 +83,7 @@ impl Pass for AoTrace {
     }
 
     fn record(&self, r: &mut Recorder, frame: &Frame, resources: &Resources, range: Range) -> Result<()> {
-        // with a budget it is the device that knows how many rays there are
+        // with a variance budget only the device knows the number of rays
         let listed = || resources.address(Resource::Sums) + 4 * u64::from(SUMS_LISTED);
         let queued = if self.has_budget { listed() } else { 0 };
         self.stream.record(r, &Push { queued, ..self.params.push(frame, range) });

@@ -1,4 +1,4 @@
-//! `budget`: a frame's occlusion rays, distributed by what each pixel knows, in four rounds.
+//! `budget`: distributes a frame's occlusion rays over pixels by their standard errors, in four stages.
 
 use std::sync::Arc;
 
@@ -14,17 +14,17 @@ use crate::realtime::settings::Settings;
 use crate::shaders::{self, LANES};
 use crate::tracer::Tracer;
 
-/// One round.
+/// One stage of the pass.
 struct Budget {
     pipeline: Arc<ComputePipeline>,
     params: Params<BudgetParams>,
     label: &'static str,
     stage: BudgetStage,
-    /// Pixels that one lane works for.
+    /// Number of pixels per invocation.
     share: u32,
 }
 
-/// The rounds over so many pixels, those that fill tiles included.
+/// The stages of the pass over all pixels, including those that fill up tiles.
 pub fn stages(tracer: &Tracer, tiled_pixels: u32, _: &Settings) -> Result<Vec<Stage>> {
     let device = tracer.device();
     let pipeline = Arc::new(shaders::BUDGET.pipeline(device)?);

@@ -1,4 +1,4 @@
-//! `display`: a buffer of the frame as it is shown: RGBA words in device memory, which a window takes as they are and files without alpha.
+//! `display`: converts a buffer of the frame to 8-bit RGBA in device memory, for windows, and without alpha for files.
 
 use crate::colour::srgb_byte;
 use crate::error::{Error, Result};
@@ -13,7 +13,7 @@ use crate::shaders;
 use crate::tracer::Tracer;
 
 impl DisplayMode {
-    /// What a file without alpha needs for it.
+    /// Colour type of files without alpha that store it.
     pub fn colour(self) -> Colour {
         match self {
             DisplayMode::Normal | DisplayMode::Position | DisplayMode::Bent | DisplayMode::Nodes => Colour::Rgb,
@@ -21,7 +21,7 @@ impl DisplayMode {
         }
     }
 
-    /// Is it there with these settings?
+    /// Checks that the buffer exists with these settings.
     ///
     /// # Errors
     /// [`Error::Usage`], saying what it takes.
@@ -30,26 +30,26 @@ impl DisplayMode {
         match self {
             DisplayMode::Bent if !settings.bent => Err(bent_normals_disabled()),
             DisplayMode::Samples | DisplayMode::Variance if settings.technique == Technique::Larsen => {
-                wrong("the reference work's pipeline counts no samples: show something else")
+                wrong("--preset larsen counts no samples: choose another --show")
             }
             _ => Ok(()),
         }
     }
 }
 
-/// The settings have no bent normals.
+/// The error that bent normals are disabled.
 pub fn bent_normals_disabled() -> Error {
-    Error::Usage("bent normals are made only where the settings ask for them".into())
+    Error::Usage("bent normals are not computed: enable them in the settings".into())
 }
 
-/// What is shown, and how.
+/// What is displayed, and how.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Display {
-    /// What.
+    /// Buffer to display.
     pub shown: DisplayMode,
-    /// Stops: 0 as it is, 1 twice as bright.
+    /// Exposure in stops: 0 unchanged, 1 twice as bright.
     pub exposure: f32,
-    /// World units: what depths and positions are measured in.
+    /// Length by which depths and positions are divided, scene units.
     pub unit: f32,
 }
 
@@ -77,13 +77,13 @@ impl Pass for DisplayPass {
         let Some(display) = display else { return uses };
         match display.shown {
             DisplayMode::Accessibility => uses.and_reads(&[Result]),
-            // where there is no history, the result stands for it
+            // without a history the result is read in its place
             DisplayMode::Unfiltered => uses.and_reads(&[Guide, History, Result]),
             DisplayMode::Samples | DisplayMode::Variance => uses.and_reads(&[Guide, History]),
             DisplayMode::Depth => uses.and_reads(&[Guide]),
             DisplayMode::Normal | DisplayMode::Position => uses.and_reads(&[Guide, Surface]),
             DisplayMode::Bent => uses.and_reads(&[Guide, BentResult]),
-            // the pass `nodes` shows them
+            // the pass `nodes` writes the image
             DisplayMode::Nodes => uses,
         }
     }
@@ -114,10 +114,10 @@ impl Pass for DisplayPass {
     }
 }
 
-/// Of each byte: the smallest value that [`srgb_byte`] encodes as this byte or a larger one.
+/// For each byte the smallest value that [`srgb_byte`] encodes as this byte or a larger one.
 fn thresholds() -> [f32; 256] {
     std::array::from_fn(|byte| {
-        // bits of floats that are not negative are in the order of the floats
+        // the bits of non-negative floats are ordered as the floats are
         let (mut lo, mut hi) = (0, 1f32.to_bits());
         while lo < hi {
             let middle = lo + (hi - lo) / 2;

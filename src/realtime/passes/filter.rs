@@ -13,24 +13,24 @@ use crate::realtime::settings::{FilterStep, Settings};
 use crate::shaders;
 use crate::tracer::Tracer;
 
-/// One step.
+/// One step of the filter.
 struct Filter {
     pipeline: Arc<ComputePipeline>,
     params: Params<FilterParams>,
     step: FilterStep,
-    /// Estimates and their bent normals: which are read, and which are written; the last step writes results.
+    /// Input estimates and bent normals.
     from: [Resource; 2],
     to: Option<[Resource; 2]>,
     has_bent: bool,
 }
 
-/// The steps over all pixels.
+/// The steps of the filter over all pixels.
 pub fn stages(tracer: &Tracer, pixels: u32, settings: &Settings) -> Result<Vec<Stage>> {
     let device = tracer.device();
     let specialization = Specialization::default().set(constants::BENT_NORMALS, settings.bent);
     let pipeline = Arc::new(shaders::FILTER.specialized(device, &specialization)?);
     let steps = settings.filter.steps();
-    // steps hand on to each other through two images, which take turns
+    // steps alternate between two images
     let after = |k: usize| [Resource::Filtered(k % 2), Resource::FilteredBent(k % 2)];
     let stage = |(k, step): (usize, &FilterStep)| {
         let pass = Filter {
@@ -47,7 +47,7 @@ pub fn stages(tracer: &Tracer, pixels: u32, settings: &Settings) -> Result<Vec<S
 }
 
 impl Filter {
-    /// What it writes: estimates, or the result, and bent normals.
+    /// Resources written: estimates or the result, and bent normals.
     fn targets(&self) -> [Resource; 2] {
         self.to.unwrap_or([Resource::Result, Resource::BentResult])
     }

@@ -1,4 +1,4 @@
-//! `gather`: mean and variance of a pixel's samples in this frame, where it may have several.
+//! `gather`: mean and variance of a pixel's samples in this frame, if it may have several.
 
 use super::ao_trace;
 use crate::error::Result;
@@ -16,13 +16,13 @@ use crate::tracer::Tracer;
 pub struct Gather {
     pipeline: ComputePipeline,
     params: Params<AoTraceParams>,
-    /// Rays of the range that belong to a pixel; with a budget the range is of pixels.
+    /// Rays per pixel in the range; with a variance budget the range is one of pixels.
     rays_per_pixel: u32,
     has_bent: bool,
 }
 
 impl Gather {
-    /// Compiles it.
+    /// Compiles the pass.
     pub fn new(tracer: &Tracer, settings: &Settings) -> Result<Self> {
         let specialization = Specialization::default().set(constants::BENT_NORMALS, settings.bent);
         Ok(Self {

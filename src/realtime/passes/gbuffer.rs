@@ -1,5 +1,5 @@
-//! `gbuffer`: what each pixel's centre shows, by camera rays that are traced or rasterized. Where neither the camera nor the scene has
-//! changed it is left out.
+//! `gbuffer`: the surface at each pixel's centre, by camera rays that are traced or rasterized. It is skipped while neither the camera nor
+//! the scene changes.
 
 use crate::error::Result;
 use crate::film::block::{Block, BlockParams};
@@ -13,7 +13,7 @@ use crate::realtime::settings::Settings;
 use crate::shaders::{self, StreamShaders};
 use crate::tracer::Tracer;
 
-/// What it traces.
+/// The stream that it traces.
 pub const STREAM: &StreamShaders = &shaders::GBUFFER_CLOSEST;
 
 struct Gbuffer {

@@ -1,6 +1,6 @@
-//! The pipeline that the paper by Larsen (2019) measured, exactly as it was: half resolution per axis, 64 nearest-hit rays from
-//! one turned table of points, occlusion only where no point light is visible, a box of 3x3 that knows no edges, half of the frame
-//! before. What its text leaves open is taken as favourable to it: the geometric normal, a bias and a reach that fit the scene's scale
+//! The pipeline that Larsen (2019) measured, as the paper describes it: half resolution per axis, 64 closest-hit rays from one rotated
+//! table of points, occlusion only where no point light is visible, a 3x3 box filter without edge tests, and half of the previous frame.
+//! Where the paper is silent, the choice favours it: the geometric normal, a bias and a ray length that fit the scene's scale
 //! ([`Settings::unit`]), white surfaces.
 
 use std::sync::Arc;
@@ -17,16 +17,16 @@ use crate::sampling::{best_candidates, blue_noise};
 use crate::shaders::{self, LANES};
 use crate::tracer::{Stream, Tracer};
 
-/// What its passes share: one record of parameters, each with its own copy.
+/// Parameters that its passes share, each of which has its own copy.
 struct Shared {
     params: LarsenParams,
-    // reached by address
+    // referenced by address
     _tables: [Buffer; 3],
 }
 
-/// What one of its passes runs.
+/// What a pass of the pipeline does.
 enum Work {
-    /// The result of the frame before is kept.
+    /// Copies the result of the previous frame.
     Keep,
     Light(Stream),
     Occlusion(Stream),
@@ -41,7 +41,7 @@ struct Larsen {
     params: Params<LarsenParams>,
 }
 
-/// Its passes after the G-buffer, over an image of `size` pixels. `lights`: positions of point lights relative to the scene's origin.
+/// The passes after the G-buffer, for an image of `size` pixels. `lights`: positions of point lights relative to the scene's origin.
 pub fn stages(tracer: &Tracer, size: [u32; 2], settings: &Settings, lights: &[[f32; 3]]) -> Result<Vec<Stage>> {
     let device = tracer.device();
     let half = size.map(|n| n.div_ceil(2));
@@ -69,7 +69,7 @@ pub fn stages(tracer: &Tracer, size: [u32; 2], settings: &Settings, lights: &[[f
     let light_rays = tiles(size) * lights.len() as u32;
     let pixels = Range::all(size[0] * size[1]);
     let mut stages = vec![Stage::new(vec![pass(Work::Keep)?], pixels.clone())];
-    // without rays it still says that no light is visible
+    // without lights the pass runs, too, and clears the number of visible lights
     let light_ranges = if light_rays > 0 { Range::launches(light_rays, 1) } else { Range::all(0) };
     stages.push(Stage::new(vec![pass(Work::Light(tracer.stream(&shaders::LARSEN_LIGHT_ANY)?))?], light_ranges));
     stages.push(Stage::new(
@@ -105,7 +105,7 @@ impl Pass for Larsen {
     fn prepare(&mut self, frame: &Frame, resources: &Resources) -> Result<()> {
         self.params.write(&LarsenParams {
             frame: frame.params,
-            // the count that turns the table only ever alternates between two values
+            // the frame index that rotates the table alternates between two values, as in the paper
             frame_parity: frame.number & 1,
             lit: resources.address(Resource::VisibleLights),
             samples: resources.address(Resource::Samples),

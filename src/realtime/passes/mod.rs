@@ -1,4 +1,4 @@
-//! The passes of a frame, a file each: what a pass reads and writes, its parameters, and how it is recorded.
+//! The passes of a frame, one file each: the resources that a pass reads and writes, its parameters, and how it is recorded.
 
 mod ao_trace;
 mod budget;
@@ -24,7 +24,7 @@ pub fn streams(settings: &Settings) -> [&'static StreamShaders; 2] {
     [gbuffer::STREAM, ao_trace::stream(settings)]
 }
 
-/// The passes that make frames, in order. `lights`: positions of point lights.
+/// The stages of a frame, in order. `lights`: positions of point lights relative to the scene's origin.
 pub fn stages(tracer: &Tracer, block: Block, settings: &Settings, primary: Primary, lights: &[[f32; 3]]) -> Result<Vec<Stage>> {
     let pixels = block.size[0] * block.size[1];
     let mut stages = vec![gbuffer::stage(tracer, block, settings, primary)?];

@@ -1,5 +1,5 @@
-//! `nodes`: a heat map of the BVH nodes that camera rays visit with the compute tracer. Only frames that show it compile and run it; it has
-//! a traversal kernel of its own, and no other pass reads what it writes.
+//! `nodes`: a heat map of the BVH nodes that camera rays visit with the compute tracer. It is compiled and run only for frames that display it; it has
+//! its own traversal kernel, and no other pass reads its output.
 
 use crate::error::Result;
 use crate::film::block::{Block, BlockParams};
@@ -12,7 +12,7 @@ use crate::realtime::resources::{Resource, Resources};
 use crate::shaders;
 use crate::tracer::Tracer;
 
-/// Number of nodes that has the colour in the middle of the scale.
+/// Number of nodes at the middle of the colour scale.
 const MIDDLE: f32 = 16.0;
 
 /// BVH nodes that the camera rays of a frame visit, one ray through the centre of each pixel.
@@ -20,7 +20,7 @@ const MIDDLE: f32 = 16.0;
 pub struct NodeVisits {
     /// Mean over all pixels of the image.
     pub mean: f64,
-    /// Largest number of a pixel.
+    /// Maximum over all pixels.
     pub max: u32,
 }
 
@@ -45,7 +45,7 @@ pub fn stage(tracer: &Tracer, block: Block) -> Result<Stage> {
 }
 
 impl NodeVisits {
-    /// Reads the counts of the last frame that showed them, of `pixels` pixels.
+    /// Reads the counts of the last frame that displayed them, for `pixels` pixels.
     pub fn read(resources: &Resources, pixels: u64) -> Result<Self> {
         let nodes: Vec<u32> = resources.read(Resource::Nodes, pixels)?;
         let sum: u64 = nodes.iter().map(|&n| u64::from(n)).sum();

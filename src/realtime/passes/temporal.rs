@@ -1,4 +1,4 @@
-//! `temporal`: adds this frame's samples to what earlier frames know of the same surface.
+//! `temporal`: adds this frame's samples to the reprojected history of the same surface.
 
 use crate::error::Result;
 use crate::gpu::{Buffer, ComputePipeline, Memory, Recorder, Specialization};
@@ -27,7 +27,7 @@ pub fn stage(tracer: &Tracer, pixels: u32, settings: &Settings) -> Result<Stage>
     let pass = Temporal {
         pipeline: shaders::TEMPORAL.specialized(device, &specialization)?,
         params: Params::new(device, "parameters of temporal accumulation")?,
-        moved: Buffer::new(device, "what moved", moved_bytes, Memory::Upload)?,
+        moved: Buffer::new(device, "moved objects", moved_bytes, Memory::Upload)?,
         has_bent: settings.bent,
     };
     Ok(Stage::new(vec![Box::new(pass)], Range::all(pixels)))
