@@ -1,4 +1,4 @@
-//! Auxiliary outputs: what a ray through each pixel's centre meets.
+//! Auxiliary outputs: properties of the surface at each pixel's centre.
 
 use crate::shaders;
 use bytemuck::Zeroable;
@@ -39,18 +39,18 @@ choices! {
 }
 
 impl Aov {
-    /// Is this one among those that are wanted?
+    /// Returns true if this output is among `wanted`.
     pub fn is_in(self, wanted: &[Aov]) -> bool {
         wanted.contains(&self) || self != Aov::Bent && wanted.contains(&Aov::All)
     }
 }
 
-/// Renders the outputs of an image, rows from the top. The tracer's [`crate::tracer::Needs`] must cover what is looked at.
+/// Renders the outputs of an image, rows from the top. The tracer must have been built with the [`crate::tracer::Needs`] of the outputs.
 pub fn render(tracer: &Tracer, camera: &CameraRecord, size: [u32; 2], control: &mut dyn Control) -> Result<Vec<AovPixel>> {
     render_with(tracer, camera, size, Primary::Traced, control)
 }
 
-/// As [`render`], with a choice of how it is found what the rays meet.
+/// As [`render`], with a choice of primary visibility.
 pub fn render_with(
     tracer: &Tracer,
     camera: &CameraRecord,
@@ -63,8 +63,8 @@ pub fn render_with(
     Ok(out)
 }
 
-/// As [`render_with`], for images of which less is kept: `take` gets every pixel once, with its place (rows from the top), in an order that is the same for
-/// the same size.
+/// As [`render_with`], but without storing the image: `take` receives each pixel once, with its index (rows from the top), in an order that depends on the image
+/// size alone.
 pub fn visit(
     tracer: &Tracer,
     camera: &CameraRecord,
@@ -118,7 +118,7 @@ pub fn visit(
     tracer.check_finished()
 }
 
-/// Auxiliary outputs as channels of an image. `origin`: of the tracers' scene, in the file's world.
+/// Auxiliary outputs as channels of an image. `origin`: origin of the tracer's scene in world space.
 pub fn channels(wanted: &[Aov], pixels: &[AovPixel], origin: DVec3) -> Vec<Channel> {
     let wants = |aov: Aov| aov.is_in(wanted);
     let mut out = Vec::new();

@@ -1,4 +1,4 @@
-//! Light that is not in a scene's file.
+//! Lights and environments in addition to those of the scene's file.
 
 use std::path::PathBuf;
 
@@ -14,7 +14,7 @@ use crate::settings::parse::parse_vector;
 use crate::settings::parse::{parse_factor, parse_number};
 use crate::settings::{AppliesTo, settings};
 
-/// What is lit by lights.
+/// Integrators that lights apply to.
 const LIT: AppliesTo = AppliesTo::stills_of(&["path", "direct", "whitted"]);
 
 settings! {
@@ -37,7 +37,7 @@ settings! {
 }
 
 impl LightingSettings {
-    /// Puts the lights into a scene, and replaces its environment if another is asked for.
+    /// Adds the lights to a scene, and replaces its environment if one is given.
     ///
     /// # Errors
     /// [`Error::Input`] for a map that cannot be read, [`Error::Usage`] for a negative radiance.
@@ -54,7 +54,7 @@ impl LightingSettings {
         let scale = self.environment_scale.unwrap_or(1.0) as f32;
         if let Ok(colour) = parse_vector(text) {
             if colour.min_element() < 0.0 {
-                return Err(Error::Usage(format!("--environment {text}: radiance is not negative")));
+                return Err(Error::Usage(format!("--environment {text}: radiance must not be negative")));
             }
             return Ok(Some(Environment::Uniform(colour.as_vec3() * scale)));
         }

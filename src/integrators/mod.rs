@@ -1,7 +1,7 @@
-//! Integrators of stills: how samples become pixels, a folder each. [`ALL`] is the one list of them; the command line, the renderer and reports know an
-//! integrator by what [`Integrator`] says.
+//! Integrators of stills, one folder each. [`ALL`] is the only list of them; the command line, the renderer and reports access an integrator
+//! through the trait [`Integrator`].
 //!
-//! [`aov`] are auxiliary outputs, and [`rays`] traces a set of rays as it is.
+//! [`aov`] renders auxiliary outputs, and [`rays`] traces a given set of rays.
 
 pub mod ao;
 pub mod aov;
@@ -41,7 +41,7 @@ pub static ALL: [&dyn Integrator; 9] = [
     &path::kinds::BAKED_OCCLUSION,
 ];
 
-/// The settings of all integrators: a struct each.
+/// The settings of all integrators.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(default, deny_unknown_fields)]
 #[cfg_attr(feature = "cli", derive(clap::Args))]
@@ -61,7 +61,7 @@ impl IntegratorSettings {
     }
 }
 
-/// A still that is to be rendered.
+/// A still to be rendered: the inputs of an integrator.
 pub struct RenderJob<'a> {
     /// The scene.
     pub scene: &'a Scene,
@@ -75,86 +75,87 @@ pub struct RenderJob<'a> {
     pub seed: u32,
     /// Settings of integrators.
     pub settings: &'a IntegratorSettings,
-    /// Stop after this time with what there is.
+    /// Stop after this time and keep the image so far.
     pub time_limit: Option<Duration>,
     /// Keep the rays of the first sample.
     pub keep_rays: bool,
-    /// What the film starts from, and where it stops on its way.
+    /// The film to resume, and when to save it.
     pub film: FilmOptions,
 }
 
-/// How a picture of 8 bits is made of an image.
+/// Options of the conversion to 8 bits per channel.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct PictureOptions {
     /// Tone mapping operator.
     pub tone_map: ToneMap,
-    /// Stops.
+    /// Exposure in stops.
     pub exposure: f32,
 }
 
-/// What an integrator has to say of an image, for people and for programs.
+/// An integrator's report of an image, for people and for programs.
 #[derive(Clone, Debug, Default)]
 pub struct IntegratorReport {
-    /// Sentences.
+    /// Lines for people.
     pub lines: Vec<String>,
-    /// What was skipped because neither the scene nor the settings need it, a sentence each.
+    /// Sentences about work that was skipped because neither the scene nor the settings require it.
     pub explanations: Vec<String>,
-    /// Keys of the record besides those that all images have.
+    /// Keys of the JSON record in addition to those of all images.
     pub record: Map<String, Value>,
-    /// What the user should know.
+    /// Warnings for the user, a sentence each.
     pub warnings: Vec<String>,
 }
 
-/// An image and how it came about.
+/// The result of an integrator.
 #[derive(Default)]
 pub struct Rendered {
-    /// The film and the work that it took.
+    /// The film and statistics of its accumulation.
     pub image: Accumulated,
-    /// What the integrator says of it.
+    /// The integrator's report.
     pub report: IntegratorReport,
-    /// Camera rays and occlusion rays of the first sample, if they were to be kept.
+    /// Camera rays and occlusion rays of the first sample, if [`RenderJob::keep_rays`] is set.
     pub kept_rays: [Vec<Ray>; 2],
 }
 
 /// An integrator of stills.
 pub trait Integrator: Sync {
-    /// As on the command line and in files.
+    /// Name on the command line and in files.
     fn name(&self) -> &'static str;
 
-    /// What it computes, in a line.
+    /// Description in one line.
     fn help(&self) -> &'static str;
 
-    /// Names of its film's channels: one, or three.
+    /// Names of the film's channels: one or three.
     fn channels(&self) -> &'static [&'static str];
 
-    /// Of what the mean of its channels is reported: `radiance`.
+    /// Name of the quantity whose mean is reported: `radiance`.
     fn quantity(&self) -> &'static str;
 
-    /// The scene as it traces it.
+    /// Flattens the scene for this integrator.
     ///
     /// # Errors
     /// [`crate::Error::Scene`].
     fn flatten<'s>(&self, scene: &'s Scene) -> Result<FlatScene<'s>>;
 
-    /// What it needs of the scene in device memory.
+    /// Scene data that it needs in device memory.
     fn needs(&self, settings: &IntegratorSettings) -> Needs;
 
-    /// Streams that it will trace, as far as they can be known before the scene is there: they are compiled beside the hierarchy's build.
+    /// Streams that it will trace, as far as they are known before the scene is loaded: they are compiled while the BVH is built.
     fn streams(&self, settings: &IntegratorSettings) -> Vec<&'static StreamShaders>;
 
-    /// Rays of a sample, about: what the hierarchy's build is planned for.
+    /// Approximate number of rays per sample, by which the quality of the BVH build is chosen.
     fn rays_per_sample(&self) -> u64;
 
-    /// Can tiles of the image be skipped in which no primitive projects?
+    /// Returns true if tiles of the image into which no primitive projects may be skipped.
     fn skips_empty_tiles(&self, job: &RenderJob) -> bool;
 
-    /// Does it see the scene's environment, so that the image depends on it?
+    /// Returns true if the image depends on the scene's environment.
     fn sees_environment(&self) -> bool;
 
-    /// All that the samples of an image depend on beside scene, camera, size and seed: keys of its metadata, and values. `None`: not in the metadata.
+    /// Everything that the samples of an image depend on besides scene, camera, size and seed: metadata keys and values. `None`: the key is absent from the
+    /// metadata.
     fn identity(&self, job: &RenderJob) -> Vec<(&'static str, Option<String>)>;
 
-    /// Renders. `cover` says which tiles are to be skipped.
+    /// Renders. `cover`: the tiles of the image that show geometry; the others are skipped.
     ///
     /// # Errors
     /// Those of the device; [`crate::Error::Usage`] for settings that do not fit the camera; [`crate::Error::Interrupted`] when `control` says so.
@@ -167,10 +168,10 @@ pub trait Integrator: Sync {
         control: &mut dyn Control,
     ) -> Result<Rendered>;
 
-    /// How the image is shown with 8 bits a channel.
+    /// Converts the image to what an 8-bit file shows.
     fn picture(&self, image: &Image, options: &PictureOptions) -> Image;
 
-    /// How paths are traced, if it traces paths: what denoisers need to know.
+    /// Options of path tracing, if it traces paths, as denoisers need them.
     ///
     /// # Errors
     /// Those of [`Integrator::render`] that settings have.
@@ -186,23 +187,23 @@ impl RenderJob<'_> {
         f64::from(self.size[0]) / f64::from(self.size[1])
     }
 
-    /// The camera as shaders take it.
+    /// The camera as shaders read it.
     pub fn camera_record(&self, flat: &FlatScene) -> CameraRecord {
         CameraRecord::new(self.camera, flat.origin, self.aspect())
     }
 }
 
-/// The name of an integrator that there is.
+/// The name of an existing integrator.
 #[derive(Clone, Copy)]
 pub struct IntegratorName(&'static dyn Integrator);
 
 impl IntegratorName {
-    /// The integrator that is called so.
+    /// Finds an integrator by name.
     pub fn find(name: &str) -> Option<Self> {
         ALL.iter().find(|i| i.name() == name).map(|i| Self(*i))
     }
 
-    /// As on the command line and in files.
+    /// Name on the command line and in files.
     pub fn name(self) -> &'static str {
         self.0.name()
     }
@@ -236,7 +237,7 @@ impl std::str::FromStr for IntegratorName {
 
     fn from_str(name: &str) -> Result<Self, String> {
         let names = || ALL.iter().map(|i| i.name()).collect::<Vec<_>>().join(", ");
-        Self::find(name).ok_or_else(|| format!("no integrator is called {name}; there are {}", names()))
+        Self::find(name).ok_or_else(|| format!("unknown integrator {name}; choose one of {}", names()))
     }
 }
 
@@ -252,7 +253,7 @@ impl<'de> serde::Deserialize<'de> for IntegratorName {
     }
 }
 
-/// For the command line: lists the integrators with what they compute.
+/// Parser of the command line, which lists the integrators with their descriptions.
 #[cfg(feature = "cli")]
 pub fn parser() -> impl clap::builder::TypedValueParser<Value = IntegratorName> {
     use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
@@ -270,10 +271,10 @@ mod tests {
             assert_eq!(IntegratorName::find(integrator.name()).unwrap().name(), integrator.name());
             assert_eq!(ALL.iter().filter(|i| i.name() == integrator.name()).count(), 1);
         }
-        assert!("ambient".parse::<IntegratorName>().unwrap_err().contains("there are ao, path"));
+        assert!("ambient".parse::<IntegratorName>().unwrap_err().contains("choose one of ao, path"));
     }
 
-    /// A setting that names an integrator which does not exist would be of no use.
+    /// A setting that applies only to unknown integrators would have no effect.
     #[test]
     fn settings_name_integrators_that_exist() {
         let every = serde_json::json!({

@@ -1,4 +1,4 @@
-//! Traces a set of rays: what joins skylit's tracers to any other.
+//! Traces a given set of rays, for comparison with other ray tracers.
 
 use crate::settings::choices;
 use crate::shaders;
@@ -21,16 +21,16 @@ choices! {
     }
 }
 
-/// How fast a set was traced.
+/// Times of tracing a set of rays.
 #[derive(Clone, Debug, Default)]
 pub struct RayTimes {
-    /// Device seconds of each repeat.
+    /// Device seconds of each repetition.
     pub device: Vec<f64>,
-    /// Wall seconds of each repeat, submission included.
+    /// Wall clock seconds of each repetition, submission included.
     pub wall: Vec<f64>,
 }
 
-/// Checks what the tracers assume of a ray.
+/// Checks that rays are valid for the tracers.
 ///
 /// # Errors
 /// [`Error::Scene`], naming the first bad ray.
@@ -44,14 +44,14 @@ pub fn check(rays: &[Ray]) -> Result<()> {
     match rays.iter().position(bad) {
         None => Ok(()),
         Some(k) => Err(Error::Scene(format!(
-            "ray {k} is broken ({:?}): origin and direction must be finite, the direction not zero, tmin >= 0",
+            "ray {k} is invalid ({:?}): origin and direction must be finite, the direction not zero, tmin >= 0",
             rays[k]
         ))),
     }
 }
 
-/// Traces the set `repeats` times (at least once) after a first pass that finds the size of launches, and returns the hits.
-/// In mode [`Mode::Any`] an occluded ray's hit has t = 0 and no ids.
+/// Traces the set `repeats` times (at least once) after a warm-up, which finds the size of launches, and returns the hits. In mode [`Mode::Any`] an occluded
+/// ray's hit has t = 0 and no ids.
 pub fn trace(
     tracer: &Tracer,
     rays: &[Ray],
@@ -72,7 +72,7 @@ pub fn trace(
     Ok((set.hits()?, times))
 }
 
-/// A set of rays in device memory and all that it takes to trace it again and again.
+/// A set of rays in device memory, with the buffers and pipelines to trace it repeatedly.
 pub struct PreparedRays<'t> {
     tracer: &'t Tracer,
     stream: Stream,
@@ -101,7 +101,7 @@ impl<'t> PreparedRays<'t> {
         let count = u32::try_from(rays.len())
             .ok()
             .filter(|&n| n < 1 << 28)
-            .ok_or_else(|| Error::Usage(format!("{} rays: at most 2^28 at a time", rays.len())))?;
+            .ok_or_else(|| Error::Usage(format!("{} rays: the maximum is 2^28", rays.len())))?;
         let source = Buffer::from_slice(device, "rays", rays)?;
         let results = Buffer::new(device, "hits", Self::record(mode) * count as u64, Memory::Readback)?;
         let set = Buffer::from_slice(device, "ray set", &[RaySet { rays: source.address(), results: results.address() }])?;
@@ -114,8 +114,8 @@ impl<'t> PreparedRays<'t> {
         if mode == Mode::Any { 4 } else { size_of::<Hit>() as u64 }
     }
 
-    /// Traces the whole set once; seconds on the device (by the clock where it has no timestamps) and by the clock,
-    /// submission included. The first pass finds the size of launches and makes the driver compile: its times say little.
+    /// Traces the whole set once; returns device seconds (wall clock seconds if the device has no timestamps) and wall clock seconds, submission included. The
+    /// first call finds the size of launches and makes the driver compile: its times are not representative.
     pub fn pass(&mut self, control: &mut dyn Control) -> Result<(f64, f64)> {
         let (n, learning) = (self.count, self.passes == 0);
         let (mut first, mut device_seconds, mut wall_seconds) = (0, 0.0, 0.0);
@@ -148,7 +148,7 @@ impl<'t> PreparedRays<'t> {
         Ok((device_seconds, wall_seconds))
     }
 
-    /// What the last pass found.
+    /// Results of the last pass.
     pub fn hits(&self) -> Result<Vec<Hit>> {
         self.tracer.check_finished()?;
         let record = Self::record(self.mode);

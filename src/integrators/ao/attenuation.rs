@@ -1,29 +1,29 @@
-//! How ambient occlusion fades with distance, for images and for frames.
+//! Attenuation of ambient occlusion with distance, for stills and real-time frames.
 
-/// Below this a hit's share is not looked for: half a step of an 8-bit image.
+/// Occlusion below which hits are not searched for: half a step of an 8-bit image.
 const CUTOFF: f64 = 1.0 / 510.0;
 
-/// How far hits occlude, and how much. shaders/ao/sample.glsl applies it.
+/// Attenuation of occlusion with distance, as shaders/ao/sample.glsl applies it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Attenuation {
-    /// World units beyond which nothing occludes; infinite for no limit.
+    /// AO radius in scene units: hits beyond do not occlude; infinite for no limit.
     pub radius: f64,
-    /// c, at least 1: a hit at distance d counts c^-d; 1 counts every hit alike.
+    /// AO falloff c, at least 1: a hit at distance d occludes by c^-d; 1 is binary.
     pub falloff: f64,
 }
 
 impl Attenuation {
-    /// Hits beyond this distance change nothing that can be seen: the radius, or where the falloff has faded.
+    /// Length of occlusion rays in scene units: the radius, or where the falloff makes occlusion invisible.
     pub fn reach(self) -> f64 {
         if self.is_binary() { self.radius } else { self.radius.min(-CUTOFF.ln() / self.falloff.ln()) }
     }
 
-    /// Does any hit do, or has the nearest one to be found?
+    /// Returns true if any hit occludes fully, so that the closest one need not be found.
     pub fn is_binary(self) -> bool {
         self.falloff <= 1.0
     }
 
-    /// Exponent per world unit: what shaders are given.
+    /// Base 2 logarithm of the falloff, per scene unit, as shaders read it.
     pub fn falloff_log2(self) -> f64 {
         self.falloff.log2()
     }

@@ -1,8 +1,8 @@
-//! Ambient occlusion images: the passes `primary`, `occlusion` and `resolve`, several samples of each pixel at a time.
+//! Ambient occlusion stills: the passes `primary`, `occlusion` and `resolve`, several samples of each pixel at a time.
 //!
-//! `primary` traces camera rays; what they met, it turns into occlusion rays, in a queue; `occlusion` traces that queue and says
-//! what each sample adds; `resolve` adds the samples to the film, pixel by pixel and in their order. So an occlusion ray that does
-//! not exist costs nothing, neighbouring rays belong to one pixel, and sums do not depend on launch sizes.
+//! `primary` traces camera rays and appends an occlusion ray to a queue for each hit; `occlusion` traces the queue and writes the
+//! value of each sample; `resolve` adds the samples to the film, pixel by pixel and in order. So camera rays that miss cost
+//! nothing more, neighbouring occlusion rays belong to one pixel, and sums do not depend on launch sizes.
 
 mod attenuation;
 use crate::settings::choices;
@@ -32,7 +32,7 @@ use crate::tracer::queue::RayQueue;
 
 use crate::tracer::{Needs, Push, Stream, Tracer};
 
-/// What a sample that met nothing leaves; no accessibility is negative.
+/// Value of a sample whose camera ray missed; ambient visibility is never negative.
 const NO_HIT: f32 = -1.0;
 
 choices! {
@@ -45,28 +45,28 @@ choices! {
     }
 }
 
-/// What to render.
+/// Options of an ambient occlusion image.
 #[derive(Clone, Debug)]
 pub struct AoOptions {
     /// Image size in pixels.
     pub size: [u32; 2],
     /// Samples per pixel: one camera ray and one occlusion ray each.
     pub spp: u32,
-    /// Of the sampler.
+    /// Seed of the sampler.
     pub seed: u32,
-    /// World units beyond which nothing occludes; infinite for no limit.
+    /// AO radius in scene units: hits beyond do not occlude; infinite for no limit.
     pub radius: f64,
-    /// c: a hit at distance d counts c^-d; 1 counts every hit alike.
+    /// AO falloff c, at least 1: a hit at distance d occludes by c^-d; 1 is binary.
     pub falloff: f64,
     /// Axis of the hemisphere.
     pub hemisphere: Hemisphere,
-    /// Stop after this time with what there is.
+    /// Stop after this time and keep the image so far.
     pub time_limit: Option<Duration>,
     /// Keep the rays of the first sample.
     pub keep_rays: bool,
-    /// Which tiles of the image show anything; without it all are traced.
+    /// Tiles of the image that show geometry; `None`: all tiles are traced.
     pub cover: Option<Arc<Cover>>,
-    /// What the film starts from, and where it stops on its way. Rays are kept only of a film that starts empty.
+    /// The film to resume, and when to save it. Rays are kept only if the film starts empty.
     pub film: FilmOptions,
 }
 
@@ -88,13 +88,13 @@ impl Default for AoOptions {
 }
 
 impl AoOptions {
-    /// How far hits occlude, and how much.
+    /// Attenuation of occlusion with distance.
     pub fn attenuation(&self) -> Attenuation {
         Attenuation { radius: self.radius, falloff: self.falloff }
     }
 }
 
-/// Ambient occlusion: the fraction of the cosine-weighted hemisphere over a point that is open.
+/// Ambient occlusion: the unoccluded fraction of the cosine-weighted hemisphere over a point.
 pub struct AmbientOcclusion;
 
 impl AmbientOcclusion {
@@ -150,7 +150,7 @@ impl Integrator for AmbientOcclusion {
         2
     }
 
-    /// A dump of rays is a set to compare with: all of them.
+    /// Not if rays are dumped: a dump must hold the rays of all pixels.
     fn skips_empty_tiles(&self, job: &RenderJob) -> bool {
         !job.keep_rays
     }
@@ -160,7 +160,7 @@ impl Integrator for AmbientOcclusion {
     }
 
     fn identity(&self, job: &RenderJob) -> Vec<(&'static str, Option<String>)> {
-        // no `..`: a new option has to be put where it belongs
+        // without `..`, so that a new option must be added here
         let AoOptions { size: _, spp: _, time_limit: _, keep_rays: _, cover: _, film: _, seed: _, radius, falloff, hemisphere } =
             Self::options(job);
         vec![
@@ -189,22 +189,22 @@ impl Integrator for AmbientOcclusion {
     }
 }
 
-/// An image and how it came about.
+/// An image and statistics of its rays.
 #[derive(Clone, Debug, Default)]
 pub struct AoResult {
-    /// The image and the work of its camera rays.
+    /// The image and statistics of its camera rays.
     pub image: Accumulated,
     /// Occlusion rays traced.
     pub occlusion_rays: u64,
-    /// Occlusion rays not traced because there is no surface that they could start from.
+    /// Occlusion rays not traced because their camera ray missed.
     pub skipped_rays: u64,
-    /// Camera rays of the first sample, when asked for.
+    /// Camera rays of the first sample, if [`AoOptions::keep_rays`] is set.
     pub kept_primary: Vec<Ray>,
-    /// Occlusion rays of the first sample, when asked for.
+    /// Occlusion rays of the first sample, if [`AoOptions::keep_rays`] is set.
     pub kept_occlusion: Vec<Ray>,
 }
 
-/// What all launches use.
+/// Streams and buffers of all launches.
 struct AoEstimator {
     primary: Stream,
     occlusion: Stream,
@@ -224,7 +224,7 @@ pub fn streams(options: &AoOptions) -> [&'static StreamShaders; 2] {
     ]
 }
 
-/// Renders ambient occlusion; how it stops, [`accumulate`](crate::film::accumulate) says.
+/// Renders ambient occlusion. [`accumulate`](crate::film::accumulate) says when it stops.
 ///
 /// # Errors
 /// Those of the device, and [`crate::Error::Interrupted`] when `control` says so.
@@ -313,7 +313,7 @@ impl Estimator for AoEstimator {
     }
 }
 
-/// Appends the rays of a dump that were traced.
+/// Appends the active rays of a dump.
 fn take_rays(from: &Buffer, count: u32, to: &mut Vec<Ray>) -> Result<()> {
     let size = size_of::<Ray>() as u64;
     from.read_with(0, size * count as u64, size, |_, bytes| {

@@ -1,4 +1,4 @@
-//! What there is to say of an image of ambient occlusion.
+//! The report of an ambient occlusion image.
 
 use serde_json::{Value, json};
 
@@ -6,7 +6,7 @@ use super::{AoOptions, AoResult};
 use crate::film::Film;
 use crate::integrators::IntegratorReport;
 
-/// Says it.
+/// Composes the report of an ambient occlusion image.
 pub(super) fn report(options: &AoOptions, result: &AoResult) -> IntegratorReport {
     let image = &result.image;
     let covered_mean = covered_mean(&image.film);
@@ -30,18 +30,18 @@ pub(super) fn report(options: &AoOptions, result: &AoResult) -> IntegratorReport
         "mrays_s_wall": mrays_s,
     });
     let mut explanations = vec![match options.attenuation().is_binary() {
-        true => "binary occlusion: any hit ends a ray, no nearest one is looked for".into(),
-        false => "occlusion falls off with distance: the nearest hit is looked for".into(),
+        true => "binary occlusion: any-hit rays".into(),
+        false => "occlusion falls off with distance: closest-hit rays".into(),
     }];
     explanations.push(match options.attenuation().reach() {
         r if r.is_finite() => {
-            format!("occlusion rays end at distance {r:.6}: what is beyond changes nothing that can be seen")
+            format!("occlusion rays end at distance {r:.6}: hits beyond do not occlude visibly")
         }
-        _ => "occlusion rays have no end: no radius and no falloff was given".into(),
+        _ => "occlusion rays are infinite: neither --ao-radius nor --ao-falloff is given".into(),
     });
     let all = result.occlusion_rays + result.skipped_rays;
     explanations.push(format!(
-        "{} of {all} occlusion rays ({:.1} %) not traced: their sample's camera ray meets nothing",
+        "{} of {all} occlusion rays ({:.1} %) not traced: their camera ray missed",
         result.skipped_rays,
         100.0 * result.skipped_rays as f64 / all.max(1) as f64
     ));
@@ -53,7 +53,7 @@ pub(super) fn report(options: &AoOptions, result: &AoResult) -> IntegratorReport
     }
 }
 
-/// Mean over what the scene covers.
+/// Mean over the samples that hit the scene.
 fn covered_mean(film: &Film) -> f64 {
     let sum = |v: &[f32]| v.iter().map(|&x| f64::from(x)).sum::<f64>();
     let covered = sum(&film.coverage);

@@ -1,11 +1,11 @@
-//! Settings of ambient occlusion, of stills and of frames in real time.
+//! Settings of ambient occlusion, for stills and real-time frames.
 
 use super::Hemisphere;
 #[cfg(feature = "cli")]
 use crate::settings::parse::{parse_falloff, parse_radius};
 use crate::settings::{AppliesTo, settings};
 
-/// Integrators that these settings are for.
+/// Integrators that these settings apply to.
 const AO: AppliesTo = AppliesTo::of(&["ao"]);
 
 settings! {
@@ -22,12 +22,12 @@ settings! {
 }
 
 impl AoSettings {
-    /// The radius, scene units; infinite for no limit.
+    /// AO radius in scene units; infinite for no limit.
     pub fn radius(&self) -> f64 {
         self.ao_radius.unwrap_or(f64::INFINITY)
     }
 
-    /// The axis of the hemisphere.
+    /// Axis of the hemisphere.
     pub fn hemisphere(&self) -> Hemisphere {
         self.ao_normal.unwrap_or_default()
     }

@@ -1,4 +1,4 @@
-//! Environments in device memory: texels, and the table that directions are drawn with (shaders/path/map.glsl).
+//! Environments in device memory: texels, and the table for importance sampling (shaders/path/map.glsl).
 
 use std::sync::Arc;
 
@@ -11,10 +11,10 @@ use crate::gpu::{Buffer, Device};
 use crate::sampling::Patches;
 use crate::scene::{Environment, EnvironmentMap};
 
-/// What shaders get of an environment.
+/// An environment in device memory.
 pub(super) struct DeviceEnvironment {
     pub map: EnvironmentRecord,
-    /// Radiance, or factor of the map's.
+    /// Radiance of a constant environment; scale factor of an environment map.
     pub factor: Vec3,
     /// Radiance averaged over the sphere.
     pub mean: Vec3,
@@ -22,7 +22,7 @@ pub(super) struct DeviceEnvironment {
 }
 
 impl DeviceEnvironment {
-    /// Uploads what there is to upload. `compensated`: light samples are weighed against BSDF samples, and can leave to them what is no brighter than the mean.
+    /// Uploads the environment. `compensated`: build the sampling table with MIS compensation, which needs MIS with BSDF sampling.
     pub fn new(device: &Arc<Device>, environment: &Environment, compensated: bool) -> Result<Self> {
         let plain = |c: Vec3| Self { map: EnvironmentRecord::default(), factor: c, mean: c, _buffers: Vec::new() };
         let map = match environment {
@@ -39,7 +39,7 @@ impl DeviceEnvironment {
         let patches = Patches::new(width, height, &weights);
         let texels: Vec<[f32; 4]> = map.radiance.iter().zip(&weights).map(|(c, &l)| c.extend(l as f32).to_array()).collect();
         let texels = Buffer::from_slice(device, "environment", &texels)?;
-        let table = Buffer::from_slice(device, "environment's patches", &patches.table)?;
+        let table = Buffer::from_slice(device, "environment sampling table", &patches.table)?;
         let m = map.to_map;
         let row = |k: usize| [m.x_axis[k] as f32, m.y_axis[k] as f32, m.z_axis[k] as f32, 0.0];
         let record = EnvironmentRecord {
@@ -54,9 +54,8 @@ impl DeviceEnvironment {
     }
 }
 
-/// Leaves of weights what they have above their mean over the sphere: "MIS compensation" (Karlik, Sik, Vevoda, Skrivan, Krivanek, SIGGRAPH Asia 2019,
-/// section 5). Directions of the rest are drawn by BSDF samples anyway, and these draw them better: the map knows nothing of the surface. An even map is
-/// left as it is.
+/// Subtracts the mean over the sphere from the weights and clamps at 0: "MIS compensation" (Karlik, Sik, Vevoda, Skrivan, Krivanek, SIGGRAPH Asia 2019, section
+/// 5). Directions below the mean are left to BSDF sampling, which knows the surface. A constant map keeps its weights.
 fn compensate(weights: &mut [f64], mean: f64) {
     if weights.iter().any(|&w| w > mean * 1.0001) {
         weights.iter_mut().for_each(|w| *w = (*w - mean).max(0.0));
@@ -69,7 +68,7 @@ fn mean_radiance(map: &EnvironmentMap) -> Vec3 {
     Vec3::new(channel(0), channel(1), channel(2))
 }
 
-/// Mean over the sphere of what a map's texels have.
+/// Mean of the texels' values over the sphere.
 fn mean(map: &EnvironmentMap, values: &[f64]) -> f64 {
     let (mut sum, mut total) = (0.0, 0.0);
     for (y, row) in values.chunks_exact(map.width as usize).enumerate() {
@@ -89,7 +88,7 @@ mod tests {
         let mut weights = vec![1.0, 1.0, 1.0, 9.0];
         compensate(&mut weights, 3.0);
         assert_eq!(weights, [0.0, 0.0, 0.0, 6.0]);
-        // an even map has nothing above it, and rounding makes nothing of it
+        // a constant map is nowhere above its mean, whatever the rounding
         for even in [vec![2.0; 4], vec![2.0, 2.0, 2.0, 2.0 + 1e-6]] {
             let mut weights = even.clone();
             compensate(&mut weights, 2.0);

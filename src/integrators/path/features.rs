@@ -1,4 +1,4 @@
-//! What a scene's lights and a render's options require of paths: what they do not is not compiled.
+//! Features that lights and options require of the path tracer's shaders; all others are specialized out.
 
 use super::lights::Lights;
 use super::{PathOptions, Strategy, media};
@@ -6,7 +6,7 @@ use crate::accel::flatten::FlatScene;
 use crate::interface::{LightKinds, PathFeature, PathFeatures};
 use crate::tracer::shading;
 
-/// What is required. `map`: the environment is an image; `cones`: textures are read over ray cones.
+/// Features that are required. `map`: the environment is a map; `cones`: textures are filtered by ray cones.
 pub(super) fn features(
     options: &PathOptions,
     flat: &FlatScene,

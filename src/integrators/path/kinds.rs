@@ -21,13 +21,13 @@ pub static PATH: PathVariant =
 /// Paths of one bounce.
 pub static DIRECT: PathVariant =
     PathVariant { name: "direct", help: "Direct lighting: paths of one bounce", kind: Kind::Light { max_depth: Some(1) } };
-/// Mirrors and glass, and direct light on everything else.
+/// Specular reflection and refraction, and direct lighting on all other surfaces.
 pub static WHITTED: PathVariant = PathVariant {
     name: "whitted",
     help: "Whitted (1980): chains of mirrors and glass, direct light on everything else",
     kind: Kind::Whitted,
 };
-/// What ambient occlusion approximates.
+/// The ground truth that ambient occlusion approximates.
 pub static AO_SKY: PathVariant = PathVariant {
     name: "ao-sky",
     help: "Path traced grey diffuse surfaces under a white sky, divided by albedo: the ground truth that AO approximates",
@@ -41,17 +41,17 @@ pub static ALBEDO: PathVariant = PathVariant { name: "albedo", help: "Base colou
 /// Distances.
 pub static DEPTH: PathVariant =
     PathVariant { name: "depth", help: "Distance along camera rays", kind: Kind::View(View::Depth) };
-/// Occlusion from textures.
+/// Occlusion textures.
 pub static BAKED_OCCLUSION: PathVariant =
     PathVariant { name: "baked-occlusion", help: "Baked occlusion textures", kind: Kind::View(View::BakedOcclusion) };
 
-/// What paths gather.
+/// What an integrator computes.
 enum Kind {
     /// Light, up to so many bounces; `None`: as many as settings say.
     Light { max_depth: Option<u32> },
-    /// Light that comes by delta lobes alone, or straight from a light sample.
+    /// Radiance by delta lobes and light sampling only.
     Whitted,
-    /// A white sky's light from grey surfaces.
+    /// Radiance of grey surfaces under a white sky.
     WhiteSky,
     /// No light, but what camera rays see.
     View(View),
@@ -74,7 +74,7 @@ impl PathVariant {
         Ok(match self.kind {
             Kind::Light { max_depth: Some(max_depth) } => PathOptions { max_depth, ..options },
             Kind::Light { max_depth: None } => options,
-            // nothing but light samples brings light to what scatters it
+            // only light sampling finds light on surfaces that scatter it
             Kind::Whitted => PathOptions { strategy: Strategy::Light, specular_only: true, ..options },
             Kind::WhiteSky => PathOptions { white_sky: Some(job.settings.path.sky_albedo()), ..options },
             Kind::View(view) => PathOptions { view: Some(view), ..options },
@@ -125,7 +125,7 @@ impl Integrator for PathVariant {
         6
     }
 
-    /// What surrounds the scene is seen where nothing is; lenses and wide filters look beside the pixel.
+    /// Only if the environment is black, and no lens or wide filter makes a pixel see beyond its area.
     fn skips_empty_tiles(&self, job: &RenderJob) -> bool {
         let black = match self.kind {
             Kind::View(_) => true,
@@ -142,7 +142,7 @@ impl Integrator for PathVariant {
     }
 
     fn identity(&self, job: &RenderJob) -> Vec<(&'static str, Option<String>)> {
-        // without its lens a camera is refused when the image is rendered
+        // invalid options are reported when the image is rendered
         let Ok(options) = self.options(job) else { return Vec::new() };
         let mut identity = vec![
             ("environment", Some(environment_text(job.scene, &options))),
@@ -166,7 +166,7 @@ impl Integrator for PathVariant {
         Ok(Rendered { image: result.image, report, ..Default::default() })
     }
 
-    /// Light; of views, normals about the middle of the range, and depths over the greatest.
+    /// Tone mapped radiance; normals are mapped from -1..1 to 0..1, depths divided by their maximum.
     fn picture(&self, image: &Image, options: &PictureOptions) -> Image {
         let shown = |f: &dyn Fn(f32) -> f32| {
             let mut out = image.clone();

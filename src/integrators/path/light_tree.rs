@@ -1,7 +1,7 @@
-//! A tree over lights, from which one is drawn by what it may do at a point: [`LightNode`].
+//! A light tree, which samples a light in proportion to a bound of its contribution at a point: [`LightNode`].
 //!
-//! Conty Estevez, Kulla, "Importance Sampling of Many Lights with Adaptive Tree Splitting", HPG 2018, without the splitting; its measure of a split
-//! (surface area, orientation, power), with bounding balls in place of boxes at the nodes.
+//! Conty Estevez, Kulla, "Importance Sampling of Many Lights with Adaptive Tree Splitting", HPG 2018, without the splitting; its cost of a split
+//! (surface area, orientation, power), with bounding spheres in place of boxes at the nodes.
 
 use std::f64::consts::PI;
 
@@ -9,36 +9,36 @@ use glam::DVec3;
 
 use crate::interface::records::lights::{LIGHT_BOTH_WAYS, LIGHT_LEAF, LightNode};
 
-/// Levels after which lights are halved whatever that costs: a light's way from the root is 32 bits.
+/// Levels below which lights are split into halves without evaluating costs: a bit trail has 32 bits.
 const MEASURED_LEVELS: u32 = 12;
-/// Most lights of a tree: with the levels above, no way is longer than 32.
+/// Maximum number of lights in a tree: with the levels above, no bit trail is longer than 32.
 pub(super) const MAX_LIGHTS: usize = 1 << 19;
-/// Bins along an axis where splits are looked for.
+/// Bins per axis for split candidates.
 const BINS: usize = 12;
 
-/// What a light, or several, may do at most.
+/// Emission bounds of one or several lights.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Bounds {
-    /// Box that holds it.
+    /// Lower corner of the bounding box.
     pub lo: DVec3,
-    /// The other corner.
+    /// Upper corner of the bounding box.
     pub hi: DVec3,
-    /// Axis of the cone of its normals.
+    /// Axis of the cone of normals.
     pub axis: DVec3,
-    /// Half angle of that cone, radians.
+    /// Half angle of the cone of normals (theta_o in the paper), radians.
     pub spread: f64,
-    /// How far from a normal it shines, radians.
+    /// Maximum angle between a normal and emitted light (theta_e in the paper), radians.
     pub falloff: f64,
-    /// Along its axis and against it.
+    /// Light is emitted along the axis and against it.
     pub two_sided: bool,
-    /// Luminance per solid angle in its best direction.
+    /// Maximum intensity over all directions: luminance per solid angle.
     pub intensity: f64,
 }
 
 impl Bounds {
     fn union(&self, o: &Self) -> Self {
         let two_sided = self.two_sided || o.two_sided;
-        // where one of them shines both ways the other's axis may be turned
+        // if one of them is two-sided, the other's axis may be reversed
         let other = if two_sided && self.axis.dot(o.axis) < 0.0 { -o.axis } else { o.axis };
         let (axis, spread) = cone_union((self.axis, self.spread), (other, o.spread));
         Self {
@@ -56,7 +56,7 @@ impl Bounds {
         0.5 * (self.lo + self.hi)
     }
 
-    /// Conty Estevez and Kulla's measure: what it costs to be drawn in vain.
+    /// Split cost of Conty Estevez and Kulla: area, orientation and power.
     fn cost(&self) -> f64 {
         let (o, w) = (self.spread, (self.spread + self.falloff).min(PI));
         let solid =
@@ -67,7 +67,7 @@ impl Bounds {
 
     fn node(&self, link: u32) -> LightNode {
         let centroid = self.centroid().as_vec3();
-        // the centroid's own rounding, and the radius's, may leave nothing outside
+        // conservative: rounding of centre and radius must not leave a light outside
         let radius = (self.hi - centroid.as_dvec3()).length().max((self.lo - centroid.as_dvec3()).length()) * (1.0 + 1e-6);
         // a little wider than the cone is: single precision
         let spread = (self.spread + 1e-4).min(PI);
@@ -84,7 +84,7 @@ impl Bounds {
     }
 }
 
-/// Smallest cone that holds two, each an axis and a half angle.
+/// Smallest cone that contains two cones, each an axis and a half angle.
 fn cone_union(a: (DVec3, f64), b: (DVec3, f64)) -> (DVec3, f64) {
     let (a, b) = if a.1 >= b.1 { (a, b) } else { (b, a) };
     let between = a.0.angle_between(b.0);
@@ -100,7 +100,7 @@ fn cone_union(a: (DVec3, f64), b: (DVec3, f64)) -> (DVec3, f64) {
     (axis.normalize(), spread)
 }
 
-/// The nodes, root first, and each light's way from the root: bit k is set where it is in the second child at level k.
+/// Builds the nodes, root first, and each light's bit trail: bit k is set where the light is in the second child at level k.
 pub(super) fn build(lights: &[Bounds]) -> (Vec<LightNode>, Vec<u32>) {
     assert!(!lights.is_empty() && lights.len() <= MAX_LIGHTS, "{} lights", lights.len());
     let mut tree = Tree { lights, nodes: vec![LightNode::default()], trails: vec![0; lights.len()] };
@@ -116,7 +116,7 @@ struct Tree<'a> {
 }
 
 impl Tree<'_> {
-    /// Makes node `at` of some lights.
+    /// Fills node `at` with the lights `of`.
     fn fill(&mut self, at: usize, of: &mut [u32], trail: u32, level: u32) -> Bounds {
         if let [light] = *of {
             self.trails[light as usize] = trail;
@@ -135,7 +135,7 @@ impl Tree<'_> {
         bounds
     }
 
-    /// Sorts lights into two parts, neither empty; returns how many are in the first.
+    /// Partitions lights into two non-empty sets; returns the size of the first.
     fn split(&self, of: &mut [u32], level: u32) -> usize {
         let centroid = |k: u32| self.lights[k as usize].centroid();
         let (lo, hi) =
@@ -158,7 +158,7 @@ impl Tree<'_> {
             for cut in 1..BINS {
                 let (left, right) = (bins[..cut].iter().fold(None, join), bins[cut..].iter().fold(None, join));
                 let (Some(left), Some(right)) = (left, right) else { continue };
-                // long boxes are cut across
+                // prefer splits along the longest axis
                 let cost = extent.max_element() / extent[axis] * (left.cost() + right.cost());
                 if best.is_none_or(|b| cost < b.0) {
                     best = Some((cost, axis, lo[axis] + extent[axis] * cut as f64 / BINS as f64));
@@ -184,7 +184,7 @@ impl Tree<'_> {
     }
 }
 
-/// Those that hold first; returns how many.
+/// Moves the items for which `holds` is true to the front; returns their number.
 fn partition<T: Copy>(items: &mut [T], holds: impl Fn(&T) -> bool) -> usize {
     let mut first = 0;
     for k in 0..items.len() {
@@ -237,8 +237,8 @@ mod tests {
         if left.0 > f64::from(n.cos_e) { f64::from(n.intensity) * left.0.max(1e-4) / d2 } else { 0.0 }
     }
 
-    /// Every light is where its way leads, once, and a parent's bounds hold its children's: what shines at a point has all its ancestors
-    /// important there.
+    /// Every bit trail leads to its light, and a parent's bounds contain its children's: if a light contributes at a point, all its
+    /// ancestors have an importance above 0 there.
     #[test]
     fn bounds_hold_what_is_below() {
         for n in [1, 2, 3, 100, 3000] {
@@ -264,7 +264,7 @@ mod tests {
         }
     }
 
-    /// Lights in one place can only be halved.
+    /// Lights at one position have no split by cost and are halved.
     #[test]
     fn coincident_lights_end() {
         let one = lights(1)[0];

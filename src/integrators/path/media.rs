@@ -1,4 +1,4 @@
-//! Which volumes a camera is in, and whether it matters to a scene in which volumes a path is: shaders/path/media.glsl.
+//! The volumes that a camera is in, and whether paths must track the volumes that they are in: shaders/path/media.glsl.
 
 use glam::{DAffine3, DVec3};
 
@@ -7,17 +7,19 @@ use crate::accel::flatten::FlatScene;
 use crate::scene::{Geometry, Instance, Material};
 use crate::tracer::shading::{absorbs, is_medium};
 
-/// Volumes that a path can be in at once.
+/// Maximum number of volumes that a path can be in at once.
 const MAX_NESTED: usize = 4;
 
-/// Directions along which it is asked whether a point is inside; of no scene's symmetry. The majority decides, should one pass through an edge.
+/// Directions of the rays that test whether a point is inside a volume, unlikely to be symmetry axes of a scene. The majority decides, in case one ray passes
+/// through an edge.
 const DIRECTIONS: [DVec3; 3] = [
     DVec3::new(0.412_31, 0.827_17, 0.381_93),
     DVec3::new(-0.713_29, 0.211_07, 0.668_37),
     DVec3::new(0.137_83, -0.591_61, -0.794_33),
 ];
 
-/// Does it matter? Not in a scene of one volume that absorbs nothing: which side of a surface is inside its winding says.
+/// Returns true if paths must track the volumes that they are in. A scene with one volume that does not absorb needs no tracking: the winding tells inside from
+/// outside.
 pub(super) fn need_tracking(flat: &FlatScene) -> bool {
     let mut used: Vec<usize> = flat.scene.instances.iter().map(|i| flat.scene.meshes[i.mesh].material).collect();
     used.sort_unstable();
@@ -26,21 +28,21 @@ pub(super) fn need_tracking(flat: &FlatScene) -> bool {
     media.len() > 1 || media.iter().any(|m| absorbs(m))
 }
 
-/// Surfaces of volumes, in double precision.
+/// Surfaces of the scene's volumes, in double precision.
 pub(super) struct ClosedVolumes(Vec<VolumeMesh>);
 
-/// A mesh of a volume.
+/// A mesh that bounds a volume.
 struct VolumeMesh {
     material: u32,
-    /// From the world (relative to the scene's origin) to the mesh's own space, where the winding is what it is.
+    /// World (relative to the scene's origin) to object space, in which the winding is the mesh's own.
     to_object: DAffine3,
-    /// A corner and two edges each.
+    /// A corner and two edges of each triangle.
     triangles: Vec<[DVec3; 3]>,
     spheres: Vec<(DVec3, f64)>,
 }
 
 impl ClosedVolumes {
-    /// Those of a scene.
+    /// Collects the volumes of a scene.
     pub fn new(flat: &FlatScene) -> Self {
         let scene = flat.scene;
         let body = |instance: &Instance| {
@@ -63,18 +65,18 @@ impl ClosedVolumes {
         Self(scene.instances.iter().filter_map(body).collect())
     }
 
-    /// The volumes around a point (relative to the scene's origin), the innermost first: those out of whose surfaces a ray from there comes more often
-    /// than it goes in, in the order in which it leaves them. [`INVALID`] at the end.
+    /// The volumes that contain a point (relative to the scene's origin), innermost first: those whose surfaces a ray from there leaves more often than it
+    /// enters, in the order of leaving. [`INVALID`] at the end.
     pub fn around(&self, point: DVec3) -> [u32; MAX_NESTED] {
         let by_direction = DIRECTIONS.map(|d| self.along(point, d));
-        // what two of the three say; where all differ, the first
+        // the majority; if all three differ, the first
         let most = by_direction.iter().find(|a| by_direction.iter().filter(|b| b == a).count() > 1).unwrap_or(&by_direction[0]);
         let mut stack = [INVALID; MAX_NESTED];
         stack.iter_mut().zip(most).for_each(|(slot, &material)| *slot = material);
         stack
     }
 
-    /// The same, as one direction tells.
+    /// The volumes that contain a point, tested along one direction.
     fn along(&self, point: DVec3, direction: DVec3) -> Vec<u32> {
         let exit = |body: &VolumeMesh| {
             let (o, d) = (body.to_object.transform_point3(point), body.to_object.transform_vector3(direction));
@@ -98,13 +100,13 @@ impl ClosedVolumes {
     }
 }
 
-/// Where a ray meets a triangle (a corner and two edges), and whether it comes out of its back (Möller and Trumbore 1997).
+/// Intersects a ray with a triangle (a corner and two edges); returns the parameter, and whether the ray leaves through the back (Möller and Trumbore 1997).
 fn crossing(o: DVec3, d: DVec3, [a, e1, e2]: [DVec3; 3]) -> Option<(f64, bool)> {
     let p = d.cross(e2);
     let det = e1.dot(p);
     let s = o - a;
     let q = s.cross(e1);
     let (u, v, t) = (s.dot(p) / det, d.dot(q) / det, e2.dot(q) / det);
-    // a determinant of 0 leaves no number that passes
+    // a determinant of 0 makes the comparisons below false
     (u >= 0.0 && v >= 0.0 && u + v <= 1.0 && t > 0.0 && t.is_finite()).then_some((t, det < 0.0))
 }

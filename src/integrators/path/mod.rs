@@ -1,9 +1,9 @@
-//! Path tracing: the truth that ambient occlusion stands in for. The streams `path_camera`, `path_bounce` and `path_shadow` and the pass
+//! Path tracing: the ground truth that ambient occlusion approximates. The streams `path_camera`, `path_bounce` and `path_shadow` and the pass
 //! `path_resolve`, several samples of each pixel at a time.
 //!
-//! A wavefront (Laine, Karras, Aila 2013): `path_camera` traces camera rays and shades what they meet, which leaves rays to lights in one
-//! queue and rays of the next bounce in another; `path_shadow` traces the first, `path_bounce` the second, and so on until a queue is
-//! empty. Every path writes to places of its own only, so images do not depend on the order in which rays arrive.
+//! A wavefront (Laine, Karras, Aila 2013): `path_camera` traces camera rays and shades their hits, which appends shadow rays to one
+//! queue and rays of the next bounce to another; `path_shadow` traces the first, `path_bounce` the second, until a queue is empty.
+//! Every path writes to its own memory only, so images do not depend on the order in which rays are processed.
 
 mod environment;
 mod features;
@@ -34,37 +34,37 @@ use media::ClosedVolumes;
 use params::{CONE_BYTES, INVALID, MEDIA_BYTES, PathParams, QUAD_BYTES, SKY_PDF_BYTES, STATE_BYTES, STRAIGHT_BYTES};
 pub use settings::{Lens, MAX_DEPTH, PathOptions, Strategy, TextureFilter};
 
-/// Bounces of a submission; then the host asks how many paths are left.
+/// Bounces per submission, after which the host reads how many paths are left.
 const BOUNCES: u32 = 4;
-/// Surfaces that a path goes straight through at most: more of them end it.
+/// Maximum number of surfaces that a path passes straight through; one more ends it.
 const MAX_STRAIGHT: u32 = 4096;
-/// An image and how it came about.
+/// An image and statistics of its rays.
 #[derive(Clone, Debug, Default)]
 pub struct PathResult {
-    /// The image, linear RGB radiance, and the work of its camera rays.
+    /// The image, linear RGB radiance, and statistics of its camera rays.
     pub image: Accumulated,
-    /// Rays of all bounces but the first.
+    /// Rays of all bounces but camera rays.
     pub bounce_rays: u64,
-    /// Rays to lights.
+    /// Shadow rays.
     pub shadow_rays: u64,
-    /// Bounces of the longest path.
+    /// Number of bounces of the longest path.
     pub longest_path: u32,
-    /// Lights that light samples are drawn from.
+    /// Number of lights that light sampling chooses from.
     pub lights: u32,
-    /// They are so many that a tree chooses among them.
+    /// A light tree chooses among them.
     pub light_tree: bool,
-    /// What of the shaders was compiled.
+    /// Features that the shaders were compiled with.
     pub features: PathFeatures,
-    /// Kinds of lights that light samples were compiled for.
+    /// Kinds of lights that light sampling was compiled for.
     pub light_kinds: LightKinds,
 }
 
-/// The streams that [`render`] traces and that nothing but the scene's geometry is needed for.
+/// The streams that [`render`] traces and that depend on nothing but the scene's geometry.
 pub fn streams() -> [&'static StreamShaders; 2] {
     [&shaders::PATH_BOUNCE_CLOSEST, &shaders::PATH_SHADOW_ANY]
 }
 
-/// Renders. The tracer must have been made of `flat` with [`crate::tracer::Needs::shading`].
+/// Renders. The tracer must have been built from `flat` with [`crate::tracer::Needs::shading`].
 ///
 /// # Errors
 /// Those of the device, and [`crate::Error::Interrupted`] when `control` says so.
@@ -78,31 +78,30 @@ pub fn render(
     PathIntegrator::new(tracer, flat, options)?.render(tracer, camera, options.spp, options.seed, control)
 }
 
-/// Renders one scene again and again: lights, environment, queues and pipelines are made once.
+/// Renders one scene repeatedly: lights, environment, queues and pipelines are created once.
 pub struct PathIntegrator {
     paths: PathEstimator,
     options: PathOptions,
 }
 
 impl PathIntegrator {
-    /// For images of `options.spp` paths a pixel at most. The tracer must have been made of `flat` with
-    /// [`crate::tracer::Needs::shading`].
+    /// Creates it for images of at most `options.spp` paths per pixel. The tracer must have been built from `flat` with [`crate::tracer::Needs::shading`].
     ///
     /// # Errors
-    /// Those of the device; [`Error::Usage`] for a tracer that was made for less.
+    /// Those of the device; [`Error::Usage`] for a tracer that was built without the data that paths need.
     pub fn new(tracer: &Tracer, flat: &FlatScene, options: &PathOptions) -> Result<Self> {
         Ok(Self { paths: PathEstimator::new(tracer, flat, options)?, options: options.clone() })
     }
 
-    /// Lights that light samples are drawn from.
+    /// Number of lights that light sampling chooses from.
     pub fn lights(&self) -> u32 {
         self.paths.lights
     }
 
-    /// Renders `spp` paths a pixel. `tracer` must be the one that it was made with.
+    /// Renders `spp` paths per pixel. `tracer` must be the one that the integrator was created with.
     ///
     /// # Errors
-    /// Those of the device; [`Error::Usage`] for more paths than it was made for; [`crate::Error::Interrupted`] when `control` says so.
+    /// Those of the device; [`Error::Usage`] for more paths than `options.spp`; [`crate::Error::Interrupted`] when `control` says so.
     pub fn render(
         &mut self,
         tracer: &Tracer,
@@ -114,7 +113,7 @@ impl PathIntegrator {
         let Self { paths, options } = self;
         paths.find_camera_media(camera)?;
         if spp > options.spp {
-            return Err(Error::Usage(format!("{spp} paths a pixel: the integrator was made for {}", options.spp)));
+            return Err(Error::Usage(format!("{spp} paths per pixel: the integrator was created for at most {}", options.spp)));
         }
         let plan = Plan {
             size: options.size,
@@ -140,7 +139,7 @@ impl PathIntegrator {
     }
 }
 
-/// What an image took.
+/// Statistics of an image's rays.
 #[derive(Clone, Copy, Default)]
 struct PathCounts {
     bounce_rays: u64,
@@ -148,10 +147,10 @@ struct PathCounts {
     longest_path: u32,
 }
 
-/// What rays to lights need where thin walls let them through.
+/// Resources of shadow rays that pass straight through thin walls.
 struct TransmittedShadowRays {
     stream: Stream,
-    /// Rays that have come through one wall more; they go back and forth between this queue and that of rays to lights.
+    /// Shadow rays behind one more wall; rays alternate between this queue and that of shadow rays.
     later: RayQueue,
     contributions: Buffer,
     count: Buffer,
@@ -162,17 +161,17 @@ struct PathEstimator {
     bounce: Stream,
     shadow: Stream,
     resolve: ComputePipeline,
-    /// Of bounces: what one is traced from, the other is filled with.
+    /// The queues of bounces: one is traced while the other is filled.
     queues: [RayQueue; 2],
     shadow_queue: RayQueue,
-    /// Parameters that fill either queue; then those of rays that come through walls, out of either queue of rays to lights.
+    /// Parameters for filling either queue of bounces; then those for tracing either queue of shadow rays behind walls.
     block_params: Vec<Buffer>,
     path_params: Vec<Buffer>,
     records: Vec<PathParams>,
     walls: Option<TransmittedShadowRays>,
-    /// What paths may be inside of, where it matters.
+    /// The volumes that paths may be in, if they must be tracked.
     volumes: Option<ClosedVolumes>,
-    /// How many rays each bounce and its light samples traced.
+    /// Numbers of rays traced at each bounce, and of its shadow rays.
     counts: Buffer,
     max_depth: u32,
     samples_lights: bool,
@@ -188,23 +187,23 @@ struct PathEstimator {
 impl PathEstimator {
     fn new(tracer: &Tracer, flat: &FlatScene, options: &PathOptions) -> Result<Self> {
         let device = tracer.device();
-        // a tracer that was made for less would make a wrong image, and say nothing
+        // without this data the image would be wrong without any error
         let Some(shading) = tracer.features().shading else {
-            return Err(Error::Usage("paths need a tracer that was made with Needs::shading".into()));
+            return Err(Error::Usage("path tracing needs a tracer that was built with Needs::shading".into()));
         };
         if shading.materials.contains(MaterialFeature::White) && options.white_sky.is_none() {
             return Err(Error::Usage(
-                "a tracer that was made with Needs::white knows no materials: paths under other skies need them".into(),
+                "a tracer that was built with Needs::white has no materials, which paths need without a white sky".into(),
             ));
         }
         let cones = options.texture_filter == TextureFilter::RayCone && options.white_sky.is_none();
         if cones && !shading.materials.contains(MaterialFeature::RayCones) {
-            return Err(Error::Usage("ray cones need a tracer that was made with Needs::mip_levels".into()));
+            return Err(Error::Usage("ray cones need a tracer that was built with Needs::mip_levels".into()));
         }
         let most = most_rays(options.size, options.spp);
         let white = Environment::Uniform(glam::Vec3::ONE);
         let around = match options.view {
-            // it shows surfaces, whatever shines on them
+            // a view shows surfaces, independent of lights
             Some(_) => &Environment::Black,
             None if options.white_sky.is_some() => &white,
             None => &flat.scene.environment,
@@ -224,7 +223,7 @@ impl PathEstimator {
         let quads = |name: &str| Buffer::new(device, name, QUAD_BYTES * most as u64, Memory::Device);
         let queues = [RayQueue::new(device, most)?, RayQueue::new(device, most)?];
         let shadow_queue = RayQueue::new(device, most)?;
-        let (radiance, contributions) = (quads("radiance of paths")?, quads("what lights bring")?);
+        let (radiance, contributions) = (quads("radiance of paths")?, quads("shadow ray contributions")?);
         let states = || Buffer::new(device, "paths", STATE_BYTES * most as u64, Memory::Device);
         let mut buffers = Vec::new();
         let mut keep = |buffer: Buffer| {
@@ -239,16 +238,16 @@ impl PathEstimator {
             light_first: lights.first,
             light_tree: match lights.tree.is_empty() {
                 true => 0,
-                false => keep(Buffer::from_slice(device, "tree of lights", &lights.tree)?),
+                false => keep(Buffer::from_slice(device, "light tree", &lights.tree)?),
             },
             lights: if lights.records.is_empty() { 0 } else { keep(Buffer::from_slice(device, "lights", &lights.records)?) },
             light_of: match lights.light_of.is_empty() {
                 true => 0,
-                false => keep(Buffer::from_slice(device, "lights of instances", &lights.light_of)?),
+                false => keep(Buffer::from_slice(device, "light indices", &lights.light_of)?),
             },
             light_starts: match lights.starts.is_empty() {
                 true => 0,
-                false => keep(Buffer::from_slice(device, "distribution of lights", &lights.starts)?),
+                false => keep(Buffer::from_slice(device, "light distribution", &lights.starts)?),
             },
             first_disk: lights.directional.start,
             disk_count: lights.directional.end - lights.directional.start,
@@ -257,19 +256,19 @@ impl PathEstimator {
             shadow: shadow_queue.record(),
             environment_light: lights.environment.unwrap_or(INVALID),
             cones: match cones {
-                true => keep(Buffer::new(device, "cones of paths", CONE_BYTES * most as u64, Memory::Device)?),
+                true => keep(Buffer::new(device, "ray cones", CONE_BYTES * most as u64, Memory::Device)?),
                 false => 0,
             },
             media: match has_media {
-                true => keep(Buffer::new(device, "volumes around paths", MEDIA_BYTES * most as u64, Memory::Device)?),
+                true => keep(Buffer::new(device, "media stacks", MEDIA_BYTES * most as u64, Memory::Device)?),
                 false => 0,
             },
             straight: match has_clear_walls {
-                true => keep(Buffer::new(device, "straight lengths of paths", STRAIGHT_BYTES * most as u64, Memory::Device)?),
+                true => keep(Buffer::new(device, "straight path lengths", STRAIGHT_BYTES * most as u64, Memory::Device)?),
                 false => 0,
             },
             sky_pdfs: match stores_sky_pdfs {
-                true => keep(Buffer::new(device, "densities of the sky", SKY_PDF_BYTES * most as u64, Memory::Device)?),
+                true => keep(Buffer::new(device, "environment densities", SKY_PDF_BYTES * most as u64, Memory::Device)?),
                 false => 0,
             },
             camera_media: [INVALID; 4],
@@ -281,18 +280,18 @@ impl PathEstimator {
             true => Some(TransmittedShadowRays {
                 stream: tracer.specialized(&shaders::PATH_SHADOW_WALLS_CLOSEST, &constants)?,
                 later: RayQueue::new(device, most)?,
-                contributions: quads("what lights bring through walls")?,
-                count: Buffer::new(device, "number of rays behind walls", 4, Memory::Readback)?,
+                contributions: quads("transmitted shadow ray contributions")?,
+                count: Buffer::new(device, "number of transmitted shadow rays", 4, Memory::Readback)?,
             }),
             false => None,
         };
-        // those with number k fill queue k, and read what belongs to the other
+        // parameters k fill queue k, and read the state of the other
         let of_bounces = |k: usize| {
             let (next, tags) = (queues[k].record(), queues[k ^ 1].record().tags);
             PathParams { next, tags, states: states[k ^ 1], next_states: states[k], ..base }
         };
         let mut records = vec![of_bounces(0), of_bounces(1)];
-        // rays to lights go from one queue to the other at each wall
+        // shadow rays move from one queue to the other at each wall
         if let Some(w) = &walls {
             let (later, later_contributions) = (w.later.record(), w.contributions.address());
             records.push(PathParams { later, later_contributions, ..base });
@@ -302,7 +301,7 @@ impl PathEstimator {
         }
         let path_params = records
             .iter()
-            .map(|record| Buffer::from_slice(device, "parameters of paths", &[*record]))
+            .map(|record| Buffer::from_slice(device, "path parameters", &[*record]))
             .collect::<Result<Vec<_>>>()?;
         let block_params = records
             .iter()
@@ -320,7 +319,7 @@ impl PathEstimator {
             records,
             walls,
             volumes: has_media.then(|| ClosedVolumes::new(flat)),
-            counts: Buffer::new(device, "numbers of rays", 4 * 2 * u64::from(BOUNCES + 1), Memory::Readback)?,
+            counts: Buffer::new(device, "ray counts", 4 * 2 * u64::from(BOUNCES + 1), Memory::Readback)?,
             max_depth: options.bounces(),
             samples_lights,
             traced: PathCounts::default(),
@@ -333,7 +332,7 @@ impl PathEstimator {
         })
     }
 
-    /// Says which volumes the camera is in. Parallel rays and those through a lens count as starting where the camera is.
+    /// Sets the volumes that the camera is in. Rays of an orthographic camera or a lens count as starting at the camera's position.
     fn find_camera_media(&mut self, camera: &CameraRecord) -> Result<()> {
         let Some(volumes) = &self.volumes else { return Ok(()) };
         let eye = glam::DVec3::from_array([0, 1, 2].map(|row| f64::from(camera.camera_to_world[row][3])));
@@ -345,7 +344,7 @@ impl PathEstimator {
         Ok(())
     }
 
-    /// Traces the rays to lights that a vertex left; notes how many in place `slot`.
+    /// Records the shadow rays that a vertex generated; their number is read back from `slot`.
     fn record_shadow(&self, r: &mut crate::gpu::Recorder, push: Push, most: u32, slot: u32) {
         if !self.samples_lights {
             return;
@@ -366,12 +365,12 @@ impl PathEstimator {
         r.copy(self.shadow_queue.count(), 0, &self.counts, 8 * u64::from(slot) + 4, 4);
     }
 
-    /// Traces rays to lights that have come through a wall, wall after wall, until none is left.
+    /// Traces shadow rays that have passed a thin wall, wall after wall, until none is left.
     fn trace_behind_walls(&mut self, commands: &mut Commands, push: Push) -> Result<Vec<Timing>> {
         let mut timings = Vec::new();
         let Some(walls) = self.walls.as_ref().filter(|_| self.samples_lights) else { return Ok(timings) };
         let queues = [&self.shadow_queue, &walls.later];
-        // those that vertices left went from the first queue to the second
+        // the shadow rays of vertices went from the first queue to the second
         let mut from = 1;
         loop {
             let left: u32 = bytemuck::pod_read_unaligned(&walls.count.read(0, 4)?);
@@ -391,17 +390,17 @@ impl PathEstimator {
         }
     }
 
-    /// All bounces of a launch, `BOUNCES` to a submission; behind walls that let light through, one.
+    /// Traces all bounces of a launch, `BOUNCES` per submission; with thin walls that transmit, one.
     fn launch_one(&mut self, commands: &mut Commands, push: Push) -> Result<Vec<Timing>> {
         let passes = [0, 1].map(|k| self.block_params[k].address());
         let push = |fills: usize| Push { pass: passes[fills], ..push };
-        // what a path goes straight through is no bounce, but it takes a launch
+        // a surface that a path passes straight through is no bounce, but needs a launch
         let straight = self.volumes.is_some() || self.features.contains(PathFeature::ClearWalls);
         let max_launches = if straight { self.max_depth.saturating_add(MAX_STRAIGHT) } else { self.max_depth };
         let (mut timings, mut depth, mut left, mut started) = (Vec::new(), 0, push(0).count, false);
         // vertex `depth` fills queue `depth % 2`
         loop {
-            // rays behind walls are traced before the next vertices leave others
+            // rays behind walls are traced before the next vertices append others
             let bounces = if self.walls.is_some() { u32::from(started) } else { BOUNCES };
             let (begin, last) = (depth, depth + bounces);
             timings.extend(commands.run(|r| {
@@ -425,7 +424,7 @@ impl PathEstimator {
                     self.record_shadow(r, push(fills), left, (depth - 1) % BOUNCES);
                 }
                 r.barrier();
-                // what is left for the next submission
+                // number of rays that are left for the next submission
                 r.copy(self.queues[depth as usize % 2].count(), 0, &self.counts, 8 * u64::from(BOUNCES), 4);
             })?);
             started = true;

@@ -1,4 +1,4 @@
-//! What there is to say of a path-traced image.
+//! The report of a path-traced image.
 
 use serde_json::json;
 
@@ -9,7 +9,7 @@ use crate::integrators::{IntegratorReport, RenderJob};
 use crate::scene::{Environment, Scene};
 use crate::tracer::{BuildStats, Tracer};
 
-/// What light comes from all around, in words.
+/// Description of the environment, for metadata.
 pub(super) fn environment_text(scene: &Scene, options: &PathOptions) -> String {
     match &scene.environment {
         _ if options.view.is_some() => "none".into(),
@@ -20,12 +20,12 @@ pub(super) fn environment_text(scene: &Scene, options: &PathOptions) -> String {
     }
 }
 
-/// Does any surface emit?
+/// Returns true if any surface emits.
 fn emits(flat: &FlatScene) -> bool {
     flat.scene.meshes.iter().any(|m| flat.scene.materials[m.material].emissive != glam::Vec3::ZERO)
 }
 
-/// Says it.
+/// Composes the report of a path-traced image.
 pub(super) fn report(
     tracer: &Tracer,
     flat: &FlatScene,
@@ -37,7 +37,7 @@ pub(super) fn report(
     let (paths, rays) = (image.primary_rays, image.primary_rays + result.bounce_rays + result.shadow_rays);
     let per_second = |n: u64| n as f64 / image.trace_seconds.max(1e-9) / 1e6;
     let mut lines = vec![format!(
-        "{:.2} Mpaths/s, {:.2} Mrays/s; a path has {:.2} rays, {:.2} of them to lights; the longest {} bounces (limit {})",
+        "{:.2} Mpaths/s, {:.2} Mrays/s; {:.2} rays per path, {:.2} of them shadow rays; longest path {} bounces (limit {})",
         per_second(paths),
         per_second(rays),
         rays as f64 / paths.max(1) as f64,
@@ -82,7 +82,7 @@ fn warnings(flat: &FlatScene, o: &PathOptions, not_finite: u64, spp: u32) -> Vec
     let mut warnings = Vec::new();
     if not_finite > 0 {
         warnings.push(format!(
-            "{not_finite} of {} samples were not finite and were left out: please report this scene",
+            "{not_finite} of {} samples were not finite and were ignored: please report this scene",
             u64::from(spp) * u64::from(o.size[0]) * u64::from(o.size[1])
         ));
     }
@@ -102,13 +102,13 @@ fn mip_levels(o: &PathOptions, stats: &BuildStats) -> String {
     }
 }
 
-/// Labels of two sets, as of one.
+/// Joins the labels of two sets.
 fn joined(a: [Vec<&'static str>; 2], b: [Vec<&'static str>; 2]) -> [Vec<&'static str>; 2] {
     let ([required, other], [more_required, more_other]) = (a, b);
     [[required, more_required].concat(), [other, more_other].concat()]
 }
 
-/// Which of the code that `labels` stand for is compiled.
+/// Lists the features that are compiled in, and those that are specialized out.
 fn compiled(what: &str, labels: [Vec<&'static str>; 2]) -> String {
     let [required, other] = labels.map(|labels| if labels.is_empty() { "nothing".into() } else { labels.join(", ") });
     format!("{what} {required}; specialized out: {other}")

@@ -1,5 +1,5 @@
-//! Settings of path tracing and of the integrators that are made of it: how they are given ([`PathSettings`]), what a render does with them ([`PathOptions`]), what
-//! they require of shaders, and what of them an image's metadata and record say. An option is added in this file.
+//! Settings of path tracing and of the integrators based on it: the settings as given ([`PathSettings`]), the resolved options of a render ([`PathOptions`]),
+//! the shader features that they require, and their metadata and JSON record. A new option needs changes in this file only.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -18,18 +18,18 @@ use crate::scene::Projection;
 use crate::settings::parse::{parse_albedo, parse_positive};
 use crate::settings::{AppliesTo, choices, settings};
 
-/// What follows light.
+/// Integrators that trace light paths.
 const LIGHT: AppliesTo = AppliesTo::stills_of(&["path", "direct", "whitted", "ao-sky"]);
-/// Paths of any length.
+/// Integrators whose path length is configurable.
 const LONG: AppliesTo = AppliesTo::stills_of(&["path", "whitted", "ao-sky"]);
-/// What looks through a camera.
+/// Integrators that use a pixel filter and a lens.
 const CAMERA: AppliesTo =
     AppliesTo::stills_of(&["path", "direct", "whitted", "ao-sky", "normals", "albedo", "depth", "baked-occlusion"]);
-/// What reads textures.
+/// Integrators that read textures.
 const TEXTURES: AppliesTo = AppliesTo::stills_of(&["path", "direct", "whitted", "normals", "albedo", "baked-occlusion"]);
-/// What samples directions by a strategy of choice.
+/// Integrators with a choice of sampling strategy.
 const SAMPLED: AppliesTo = AppliesTo::stills_of(&["path", "direct", "ao-sky"]);
-/// The white sky alone.
+/// The integrator with a white sky.
 const SKY: AppliesTo = AppliesTo::stills_of(&["ao-sky"]);
 
 choices! {
@@ -46,7 +46,7 @@ choices! {
 
 settings! {
     /// Paths.
-    "Paths (--integrator path, direct, ao-sky; views)"
+    "Path tracing (--integrator path, direct, whitted, ao-sky; views)"
     pub struct PathSettings {
         /// Maximum path length in bounces: 0 is emitted light, 1 adds direct light [default: the scene's, or no limit]
         max_depth: Option<u32>, option(value_name = "N"), applies(LONG);
@@ -79,12 +79,12 @@ settings! {
     }
 }
 
-/// Longest path: with Russian roulette, which lets no more than 0.95 of paths go on, none gets here.
+/// Maximum path length in bounces. Russian roulette continues at most 0.95 of all paths, so that practically none gets here.
 pub const MAX_DEPTH: u32 = 4096;
 
-/// Grey of `ao-sky`.
+/// Default albedo of `ao-sky`.
 const SKY_ALBEDO: f64 = 0.5;
-/// Height of the sensor that an f-number is about, metres.
+/// Height of the sensor that an f-number refers to, metres.
 const SENSOR_HEIGHT: f64 = 0.024;
 
 choices! {
@@ -122,49 +122,48 @@ choices! {
 /// A thin lens.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Lens {
-    /// World units.
+    /// Lens radius, scene units.
     pub radius: f32,
-    /// Distance along the view at which the image is sharp, world units.
+    /// Focus distance along the view, scene units.
     pub focus: f32,
 }
 
-/// What to render.
+/// Options of a path-traced image.
 #[derive(Clone, Debug)]
 pub struct PathOptions {
     /// Image size in pixels.
     pub size: [u32; 2],
     /// Paths per pixel.
     pub spp: u32,
-    /// Of the sampler.
+    /// Seed of the sampler.
     pub seed: u32,
-    /// Bounces at most: 0 shows what emits, 1 adds direct light. [`MAX_DEPTH`] is the limit, which nobody reaches.
+    /// Maximum path length in bounces: 0 is emitted light, 1 adds direct light; at most [`MAX_DEPTH`].
     pub max_depth: u32,
-    /// Paths of fewer bounces add nothing: 1 leaves out what emits, 2 direct light as well.
+    /// Paths of fewer bounces add nothing: 1 leaves out emitted light, 2 direct light as well.
     pub min_depth: u32,
-    /// Bounces before Russian roulette.
+    /// Bounces before Russian roulette may end a path.
     pub rr_depth: u32,
-    /// No path vertex but the first adds more than this radiance in any channel; infinite: unbiased.
+    /// Maximum radiance that a path vertex other than the first adds, in any channel; infinite: unbiased.
     pub firefly_clamp: f32,
-    /// How directions are sampled.
+    /// Sampling strategy.
     pub strategy: Strategy,
-    /// Paths go on by delta lobes alone, so that light samples bring all other light: with [`Strategy::Light`].
+    /// Continue paths by delta lobes only, so that light sampling accounts for all other light: with [`Strategy::Light`].
     pub specular_only: bool,
-    /// Every surface is diffuse and of this grey, and nothing shines but a white sky: the rendering equation that ambient occlusion
-    /// approximates.
+    /// Albedo of all surfaces, which are diffuse, under a white sky as the only emitter: the rendering equation that ambient occlusion approximates.
     pub white_sky: Option<f32>,
-    /// No light, but what camera rays see. Misses count 0.
+    /// Surface property that is rendered in place of radiance; 0 where camera rays miss.
     pub view: Option<View>,
-    /// What a pixel is the mean of.
+    /// Pixel reconstruction filter.
     pub pixel_filter: PixelFilter,
-    /// How textures are read; [`TextureFilter::RayCone`] asks for [`crate::tracer::Needs::mip_levels`].
+    /// Texture filter; [`TextureFilter::RayCone`] requires [`crate::tracer::Needs::mip_levels`].
     pub texture_filter: TextureFilter,
-    /// A perspective camera's; without it a pinhole.
+    /// Thin lens of a perspective camera; `None`: a pinhole.
     pub lens: Option<Lens>,
-    /// Stop after this time with what there is.
+    /// Stop after this time and keep the image so far.
     pub time_limit: Option<Duration>,
-    /// Which tiles of the image show anything; only where the environment is black and [`PathOptions::is_sharp`].
+    /// Tiles of the image that show geometry; only if the environment is black and [`PathOptions::is_sharp`].
     pub cover: Option<Arc<Cover>>,
-    /// What the film starts from, and where it stops on its way.
+    /// The film to resume, and when to save it.
     pub film: FilmOptions,
 }
 
@@ -198,7 +197,7 @@ impl PathSettings {
         self.sky_albedo.unwrap_or(SKY_ALBEDO) as f32
     }
 
-    /// The lens that is described, if any.
+    /// The thin lens that the settings describe, if any.
     fn lens(&self, projection: Projection) -> Result<Option<Lens>> {
         let (Some(f_number), Some(focus)) = (self.f_number, self.focus_distance) else { return Ok(None) };
         match projection {
@@ -214,7 +213,7 @@ impl PathSettings {
 }
 
 impl PathOptions {
-    /// Those of a job's settings: of light, by all that finds it.
+    /// The options of a job for rendering light with all strategies.
     pub(super) fn new(job: &RenderJob) -> Result<Self> {
         let (settings, default) = (&job.settings.path, Self::default());
         Ok(Self {
@@ -235,9 +234,9 @@ impl PathOptions {
         })
     }
 
-    /// What the samples of an image depend on: keys of its metadata, and values. `None`: not in the metadata.
+    /// Everything that the samples of an image depend on: metadata keys and values. `None`: the key is absent from the metadata.
     pub(super) fn identity(&self) -> Vec<(&'static str, Option<String>)> {
-        // no `..`: a new option has to be put where it belongs
+        // without `..`, so that a new option must be added here
         let Self {
             size: _,
             spp: _,
@@ -270,7 +269,7 @@ impl PathOptions {
         ]
     }
 
-    /// What of shaders the options decide, whatever the scene.
+    /// Shader features that the options require, whatever the scene.
     pub(super) fn features(&self) -> Vec<(PathFeature, bool)> {
         vec![
             (PathFeature::CosineSampling, self.strategy == Strategy::Cosine),
@@ -285,12 +284,12 @@ impl PathOptions {
         ]
     }
 
-    /// Bounces at most.
+    /// Maximum number of bounces.
     pub(super) fn bounces(&self) -> u32 {
         if self.view.is_some() { 0 } else { self.max_depth.min(MAX_DEPTH) }
     }
 
-    /// What of them shaders read.
+    /// The options as shaders read them; other fields are 0.
     pub(super) fn params(&self) -> PathParams {
         PathParams {
             max_depth: self.bounces(),
@@ -306,7 +305,7 @@ impl PathOptions {
         }
     }
 
-    /// What a user should know of an image that was rendered with them.
+    /// Remarks for the user about bias in the image.
     pub(super) fn remarks(&self) -> Vec<String> {
         let mut remarks = Vec::new();
         if self.firefly_clamp.is_finite() {
@@ -318,7 +317,7 @@ impl PathOptions {
         remarks
     }
 
-    /// Their part of `--json`.
+    /// The options' part of the JSON record.
     pub(super) fn record(&self) -> Value {
         json!({
             "max_depth": if self.max_depth >= MAX_DEPTH { Value::Null } else { json!(self.max_depth) },
@@ -332,13 +331,13 @@ impl PathOptions {
         })
     }
 
-    /// Does every pixel see nothing but what projects into it?
+    /// Returns true if a pixel sees only what projects into its area: no lens and no wide filter.
     pub fn is_sharp(&self) -> bool {
         self.pixel_filter == PixelFilter::Box && self.lens.is_none()
     }
 }
 
-/// A limit of bounces in words.
+/// Text of a maximum number of bounces.
 pub(super) fn depth_text(max_depth: u32) -> String {
     if max_depth >= MAX_DEPTH { "unlimited".into() } else { max_depth.to_string() }
 }

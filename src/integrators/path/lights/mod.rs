@@ -1,5 +1,5 @@
-//! The lights of a scene as the path tracer samples them: [`LightRecord`]. Few are chosen by their power; of many, a tree
-//! chooses by what they may do at a point ([`super::light_tree`]).
+//! The lights of a scene as the path tracer samples them: [`LightRecord`]. Few lights are chosen by power; among many, a tree
+//! chooses by a bound of their contribution at a point ([`super::light_tree`]).
 
 mod portals;
 mod punctual;
@@ -18,37 +18,37 @@ use crate::interface::{LightKind as Kind, LightKinds};
 use crate::sampling::CumulativeTable;
 use crate::scene::{Light, LightKind};
 
-/// More lights with a position than these are chosen from a tree.
+/// With more positional lights than this, a light tree chooses among them.
 const MAX_BY_POWER: usize = 256;
 
-/// All lights.
+/// The lights of a scene.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Lights {
     pub records: Vec<LightRecord>,
-    /// The first of the records that are chosen by power, which are all from there on.
+    /// Index of the first record that is chosen by power, as all records from there on are.
     pub first: u32,
-    /// [`CumulativeTable::starts`] of the power of those.
+    /// [`CumulativeTable::starts`] of the power of the lights that are chosen by power.
     pub starts: Vec<u32>,
-    /// Over the lights that have a position, where they are many: the tree then is the last that is chosen by power.
+    /// The tree over positional lights, if there are many: the tree is then the last choice by power.
     pub tree: Vec<LightNode>,
-    /// For each instance of the scene, the place further on in this table where the lights of its primitives begin, or [`INVALID`]; then those
-    /// lights, one for each primitive, or [`INVALID`]. Empty where no surface is a light.
+    /// For each instance of the scene the index in this table at which the lights of its primitives begin, or [`INVALID`]; then the light of each primitive, or
+    /// [`INVALID`]. Empty if no surface emits.
     pub light_of: Vec<u32>,
-    /// Index of the environment.
+    /// Index of the environment, if it is sampled.
     pub environment: Option<u32>,
-    /// Directional lights.
+    /// Indices of the directional lights.
     pub directional: Range<u32>,
-    /// Some of them have an extent: paths meet them.
+    /// Some directional lights have an angular diameter above 0, so that rays can hit them.
     pub has_disks: bool,
 }
 
-/// How much a light of this radiance (or intensity, or irradiance; linear RGB) counts: the root mean square of its channels. Sampled in proportion to it, the
-/// squared error summed over channels is least. In proportion to luminance, blue lights would be sampled too seldom, and be noise.
+/// Importance of a light of this radiance (or intensity, or irradiance; linear RGB): the root mean square of its channels. Sampling in proportion to it minimizes
+/// the squared error summed over channels; in proportion to luminance, blue lights would be undersampled and noisy.
 pub(super) fn brightness(c: Vec3) -> f64 {
     (c.as_dvec3().length_squared() / 3.0).sqrt()
 }
 
-/// Lights that are being gathered: each with its power, and with bounds where it has a position.
+/// Collects lights, with the power of each, and bounds of positional ones.
 #[derive(Default)]
 struct LightCollector {
     records: Vec<LightRecord>,
@@ -57,7 +57,7 @@ struct LightCollector {
 }
 
 impl LightCollector {
-    /// Returns its index. What has no power is not sampled: [`INVALID`].
+    /// Adds a light and returns its index. A light without power is not sampled: [`INVALID`].
     fn push(&mut self, record: LightRecord, power: f64, bounds: Option<Bounds>) -> u32 {
         debug_assert!(bounds.is_none() || self.bounds.len() == self.records.len(), "lights with a position come first");
         if power.is_nan() || power <= 0.0 {
@@ -71,28 +71,28 @@ impl LightCollector {
 }
 
 impl Lights {
-    /// Nothing but an environment.
+    /// No lights but the environment.
     pub fn environment_only() -> Self {
         let record = LightRecord { kind: Kind::Environment as u32, instance: INVALID, probability: 1.0, ..Default::default() };
         Self { records: vec![record], starts: vec![0; 2], environment: Some(0), ..Default::default() }
     }
 
-    /// The kinds that are sampled.
+    /// The kinds of lights that are sampled.
     pub fn kinds(&self) -> LightKinds {
         self.sampled().iter().map(|r| Kind::ALL[r.kind as usize]).collect()
     }
 
-    /// All but the tree, which stands for those with a position and is chosen last.
+    /// All records but the tree, which stands for the positional lights and is the last choice.
     fn sampled(&self) -> &[LightRecord] {
         &self.records[..self.records.len() - usize::from(!self.tree.is_empty())]
     }
 
-    /// How many are chosen by power.
+    /// Number of lights that are chosen by power.
     pub fn choices(&self) -> u32 {
         self.records.len() as u32 - self.first
     }
 
-    /// How many there are.
+    /// Number of lights.
     pub fn count(&self) -> u32 {
         self.sampled().len() as u32
     }
@@ -110,7 +110,7 @@ impl Lights {
         let has_disks = all.records[first_far as usize..].iter().any(|r| r.radius > 0.0);
         let mut lights = Self { light_of, directional, has_disks, ..Default::default() };
         if environment != Vec3::ZERO {
-            // what crosses the disk that the scene fills, from everywhere
+            // the power that crosses the scene's bounding disk, from all directions
             let power = 4.0 * PI.powi(2) * radius(flat).powi(2) * brightness(environment);
             lights.environment = portals::add_environment(&mut all, flat, brightness(environment), power);
         }
@@ -135,7 +135,7 @@ impl Lights {
     }
 }
 
-/// Of the ball that holds the scene.
+/// Radius of the bounding sphere of the scene.
 fn radius(flat: &FlatScene) -> f64 {
     flat.scene.bounds().map_or(1.0, |(lo, hi)| 0.5 * (hi - lo).length()).max(1e-30)
 }
@@ -144,7 +144,7 @@ fn radius(flat: &FlatScene) -> f64 {
 mod tests {
     use super::*;
 
-    /// What matters of a light is how much it brings, in whichever channel.
+    /// The importance of a light does not depend on the channel of its radiance.
     #[test]
     fn colours_count_alike() {
         let colours = [Vec3::X, Vec3::Y, Vec3::Z, Vec3::ONE];

@@ -8,11 +8,11 @@ use crate::accel::flatten::FlatScene;
 use crate::interface::LightKind as Kind;
 use crate::interface::records::lights::LightRecord;
 
-/// Share of its samples that the environment keeps where there are portals: light may come in elsewhere.
+/// Fraction of the environment's samples that do not use portals, because light may enter elsewhere.
 const ENVIRONMENT_SHARE: f64 = 0.2;
 
-/// Adds the environment, of this mean brightness and power, and behind it the scene's portals; returns its index. With portals the power is what comes through
-/// them, as through a lamp of their size: the environment's own would leave other lights of a room hardly any samples.
+/// Adds the environment, of this mean brightness and power, followed by the scene's portals; returns its index. With portals its power is that of the light
+/// which enters through them, as if they were area lights: with the power of the whole environment, the other lights of a room would get too few samples.
 pub(super) fn add_environment(all: &mut LightCollector, flat: &FlatScene, brightness: f64, power: f64) -> Option<u32> {
     let portals: Vec<_> = flat.scene.portals.iter().filter(|p| p.area() > 0.0).collect();
     let through = |area: f64| PI * area * brightness;

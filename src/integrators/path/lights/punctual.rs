@@ -1,4 +1,4 @@
-//! Lights without a surface: at a position, or parallel.
+//! Lights without a surface: point, spot and directional lights.
 
 use std::f64::consts::PI;
 
@@ -12,7 +12,7 @@ use crate::interface::LightKind as Kind;
 use crate::interface::records::lights::LightRecord;
 use crate::scene::{Light, LightKind};
 
-/// Adds one.
+/// Adds a punctual light (KHR_lights_punctual).
 pub(super) fn add(all: &mut LightCollector, flat: &FlatScene, light: &Light) {
     let position = light.position - flat.origin;
     let brightness = brightness(light.intensity);
@@ -43,7 +43,7 @@ pub(super) fn add(all: &mut LightCollector, flat: &FlatScene, light: &Light) {
         }
         LightKind::Spot { inner_angle, outer_angle } => {
             let (inner, outer) = (inner_angle.cos(), outer_angle.cos());
-            // as if it fell off half-way between the two
+            // approximates the falloff by a step half-way between the inner and the outer angle
             let solid = 2.0 * PI * (1.0 - 0.5 * f64::from(inner + outer));
             let record = LightRecord { kind: Kind::Spot as u32, cos_inner: inner, cos_outer: outer, ..base };
             let (spread, reach) = (f64::from(inner_angle), f64::from(outer_angle));

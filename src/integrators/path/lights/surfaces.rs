@@ -1,4 +1,4 @@
-//! Lights that are surfaces: triangles, rectangles and spheres whose material emits.
+//! Area lights: triangles, rectangles and spheres whose material emits.
 
 use std::collections::HashMap;
 use std::f64::consts::PI;
@@ -14,10 +14,11 @@ use crate::interface::LightKind as Kind;
 use crate::interface::records::lights::{LIGHT_ALPHA, LIGHT_MIRRORED, LIGHT_TWO_SIDED, LightRecord};
 use crate::scene::{AlphaMode, Geometry, Material, TriangleMesh};
 
-/// Share of its coordinates by which rounding may have moved a point of a light.
+/// Bound of the rounding error of a point on a light, as a fraction of its coordinates.
 const ROUNDING_BOUND: f64 = 8.0 / 16_777_216.0;
 
-/// Every primitive whose material emits; returns [`super::Lights::light_of`]. A sphere that its instance stretches has no closed form: BSDF samples find it.
+/// Adds all primitives whose material emits; returns [`super::Lights::light_of`]. A sphere under a non-uniform scale has no closed form: only BSDF sampling finds
+/// it.
 pub(super) fn add(all: &mut LightCollector, flat: &FlatScene) -> Vec<u32> {
     let scene = flat.scene;
     let (mut light_of, mut of_primitives) = (vec![INVALID; scene.instances.len()], Vec::new());
@@ -26,7 +27,7 @@ pub(super) fn add(all: &mut LightCollector, flat: &FlatScene) -> Vec<u32> {
     for (i, instance) in scene.instances.iter().enumerate() {
         let mesh = &scene.meshes[instance.mesh];
         let material = &scene.materials[mesh.material];
-        // an unlit surface lights nothing: it only shows; what no ray meets does neither
+        // unlit surfaces are visible but illuminate nothing; surfaces that no ray can hit are neither
         if material.emissive == Vec3::ZERO || material.unlit || alpha[instance.mesh] == AlphaClass::Absent {
             continue;
         }
@@ -93,7 +94,7 @@ pub(super) fn add(all: &mut LightCollector, flat: &FlatScene) -> Vec<u32> {
     light_of
 }
 
-/// The triangles of a mesh: two neighbours that make a rectangle of one radiance (`plain`) are one light.
+/// Adds the triangles of a mesh. Two neighbours that form a rectangle of one radiance (`plain`) are one light.
 fn add_triangles(
     all: &mut LightCollector,
     mesh: &TriangleMesh,
@@ -104,7 +105,7 @@ fn add_triangles(
     of_primitives: &mut Vec<u32>,
 ) {
     let two_sided = base.flags & LIGHT_TWO_SIDED != 0;
-    // a transform that mirrors turns the winding
+    // a mirroring transform reverses the winding
     let turn = if base.flags & LIGHT_MIRRORED != 0 { -1.0 } else { 1.0 };
     let mut push = |kind: Kind, [a, e1, e2]: [DVec3; 3], primitive: usize, slack: f64| {
         let normal = turn * e1.cross(e2);
@@ -112,7 +113,7 @@ fn add_triangles(
         let (b, c) = (a + e1, a + e2);
         let far = if kind == Kind::Rectangle { a + e1 + e2 } else { a };
         let extent = a.abs().max(b.abs()).max(c.abs()).max_element() + e1.abs().max(e2.abs()).max_element();
-        // barycentrics follow the corners; a turned winding is a turned normal
+        // barycentric coordinates follow the vertices; a reversed winding reverses the normal
         let record = LightRecord {
             kind: kind as u32,
             position: a.as_vec3().to_array(),
@@ -149,10 +150,10 @@ fn add_triangles(
     }
 }
 
-/// The rectangle that two triangles make, as a corner and two edges, and how far a corner is from where it should be; `None` where they make none.
+/// The rectangle that two triangles form, as a corner and two edges, with the error of its corners; `None` if they form none.
 fn rectangle(first: [DVec3; 3], second: [DVec3; 3]) -> Option<([DVec3; 3], f64)> {
     let extent = first.iter().chain(&second).fold(0.0f64, |e, p| e.max(p.abs().max_element()));
-    // positions are rounded to single precision, of their own coordinates and of the instance's
+    // positions are rounded to single precision, both in object and in world space
     let slack = 2.0 * extent / 16_777_216.0;
     for k in 0..3 {
         let [a, b, c] = [first[k], first[(k + 1) % 3], first[(k + 2) % 3]];
@@ -161,7 +162,7 @@ fn rectangle(first: [DVec3; 3], second: [DVec3; 3]) -> Option<([DVec3; 3], f64)>
         if shorter.is_nan() || shorter <= 1e4 * slack || e1.dot(e2).abs() > 1e-5 * e1.length() * e2.length() {
             continue;
         }
-        // the other has the diagonal, the other way round, and the fourth corner
+        // the second triangle shares the diagonal, in the opposite direction
         let d = a + e1 + e2;
         for j in 0..3 {
             let other = [second[j], second[(j + 1) % 3], second[(j + 2) % 3]];
@@ -173,7 +174,7 @@ fn rectangle(first: [DVec3; 3], second: [DVec3; 3]) -> Option<([DVec3; 3], f64)>
     None
 }
 
-/// Mean of the alpha of an emitter that is not everywhere: only its order of magnitude matters, for how often it is chosen.
+/// Mean alpha of an emitter with transparency, as a factor of its power; an estimate suffices.
 fn mean_alpha(material: &Material, geometry: &Geometry, of_texture: f32) -> f64 {
     let of_vertices = match geometry {
         Geometry::Triangles(t) if !t.colors.is_empty() => t.colors.iter().map(|c| c.w).sum::<f32>() / t.colors.len() as f32,
@@ -181,13 +182,13 @@ fn mean_alpha(material: &Material, geometry: &Geometry, of_texture: f32) -> f64 
     };
     let mean = material.base_color.w * of_texture * of_vertices;
     match material.alpha_mode {
-        // of a mask it says too little: present texels may have any alpha above the cutoff
+        // for a mask the mean says little: opaque texels may have any alpha above the cutoff
         AlphaMode::Mask { .. } => f64::from(mean.clamp(0.25, 1.0)),
         _ => f64::from(mean.clamp(1e-3, 1.0)),
     }
 }
 
-/// Mean of a texture of sRGB colours, linear, and of its alpha.
+/// Mean of an sRGB texture, linear, and of its alpha.
 fn mean_texture(flat: &FlatScene, texture: Option<usize>) -> Vec4 {
     let Some(texture) = texture else { return Vec4::ONE };
     let texels = &flat.scene.textures[texture].texels;
