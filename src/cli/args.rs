@@ -1,4 +1,4 @@
-//! What each command takes, checked as far as that goes without looking at a scene or a device. `render` has its own file.
+//! The arguments of each command, checked as far as possible without a scene or a device. `render` has its own file.
 
 use std::path::PathBuf;
 
@@ -21,7 +21,7 @@ pub struct RaysArgs {
     /// What to find
     #[arg(long, value_enum, default_value = "closest")]
     pub mode: Mode,
-    /// What it runs on
+    /// Device and tracer
     #[command(flatten)]
     pub device: DeviceSettings,
     /// Where to write the hits: f32 t (inf = miss), u32 instance, u32 primitive, f32 u, f32 v each

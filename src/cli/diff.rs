@@ -1,4 +1,4 @@
-//! `skylit diff`: two images in numbers, channel by channel.
+//! `skylit diff`: compares two images by metrics, channel by channel.
 
 use serde_json::json;
 
@@ -9,14 +9,14 @@ use crate::measure::metrics::ImagePair;
 use crate::output::{self, Channel, Image, Samples};
 use crate::terminal::console::Failure;
 
-/// How far apart two channels are, over the pixels where both are finite and at least one image has something.
+/// Difference of two channels, over pixels where both are finite and at least one image has coverage.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 struct ChannelDifference {
     /// Pixels compared.
     pixels: u64,
     /// Pixels whose values are not the same.
     differing: u64,
-    /// Pixels where one image is finite and the other is not, or both are infinite in different ways.
+    /// Pixels where one image is finite and the other is not, or where they are not finite in different ways.
     broken: u64,
     /// The metrics of [`crate::measure::metrics`]; ids have none.
     #[serde(flatten)]
@@ -34,20 +34,20 @@ struct Metrics {
     tanimoto: f64,
 }
 
-/// How different the colours look, over the pixels where all of them are finite and at least one image has something.
+/// Perceptual difference of the colours (FLIP), over pixels where all of them are finite and at least one image has coverage.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 struct FlipDifference {
-    /// Channels that make the colour: `R`, `G` and `B`, or a grey one.
+    /// Channels of the colour: `R`, `G` and `B`, or a grey one.
     channels: Vec<String>,
-    /// Pixels counted.
+    /// Pixels compared.
     pixels: u64,
     /// Mean FLIP, 0 to 1.
     mean: f64,
-    /// Of the display that the images are thought to be seen on.
+    /// Assumed resolution of the display, pixels per degree of visual angle.
     pixels_per_degree: f64,
 }
 
-/// Compares and prints; fails when a limit was given and is passed.
+/// Compares and prints; fails if a limit is given and exceeded.
 pub fn run(args: &DiffArgs) -> Result<(), Failure> {
     let console = args.verbosity.console();
     let (a, b) = (output::load(&args.a)?, output::load(&args.b)?);
@@ -63,7 +63,7 @@ pub fn run(args: &DiffArgs) -> Result<(), Failure> {
         let d = compare(&x.samples, &y.samples, mask.as_deref())?;
         let mut line = format!("{:12} ", x.name);
         if let Some(n) = &d.metrics {
-            // a pixel that is broken in one image only is no small difference
+            // a pixel that is not finite in one image only exceeds any limit
             worst = worst.max(if d.broken > 0 { f64::INFINITY } else { n.rmse });
             line += &format!("rmse {:.3e}  bias {:+.3e}  max {:.3e}  psnr {:.1} dB  ", n.rmse, n.bias, n.max, n.psnr);
         }
@@ -78,7 +78,7 @@ pub fn run(args: &DiffArgs) -> Result<(), Failure> {
     let look = flip_difference(&pairs, a.width as usize, mask.as_deref())?;
     if let Some(l) = &look {
         console.line(&format!(
-            "{:12} flip {:.4} ({:.0} pixels a degree)",
+            "{:12} flip {:.4} ({:.0} pixels per degree)",
             l.channels.join(" "),
             l.mean,
             l.pixels_per_degree
@@ -95,7 +95,7 @@ pub fn run(args: &DiffArgs) -> Result<(), Failure> {
     console.close(&record, verdict)
 }
 
-/// Channels of the same name and type; a grey image (`Y`) also goes with one that calls it `R`. The sums of a film (`state`) are no image.
+/// Pairs channels of the same name and type; a grey channel `Y` also pairs with one called `R`. A film's sums (`state`) are not compared.
 fn pairs<'a>(a: &'a Image, b: &'a Image) -> Vec<(&'a Channel, &'a Channel)> {
     let same_type = |x: &Channel, y: &Channel| std::mem::discriminant(&x.samples) == std::mem::discriminant(&y.samples);
     let find = |image: &'a Image, name: &str| image.channels.iter().find(|c| c.name == name);
@@ -113,13 +113,13 @@ fn pairs<'a>(a: &'a Image, b: &'a Image) -> Vec<(&'a Channel, &'a Channel)> {
     found
 }
 
-/// 1 for pixels that at least one image covers, when both know their coverage: background flatters every mean.
+/// A mask that is above 0 for pixels that at least one image covers, if both have an alpha channel: background would lower every mean.
 fn coverage(a: &Image, b: &Image) -> Option<Vec<f32>> {
     let (a, b) = (a.f32("A")?, b.f32("A")?);
     Some(a.iter().zip(b).map(|(x, y)| x.max(*y)).collect())
 }
 
-/// FLIP of the colour that the images have in common, if they have any.
+/// FLIP of the colour channels that the images have in common, if any.
 fn flip_difference(pairs: &[(&Channel, &Channel)], width: usize, mask: Option<&[f32]>) -> Result<Option<FlipDifference>> {
     let find = |name: &str| {
         pairs.iter().find(|(x, _)| x.name == name).and_then(|(x, y)| match (&x.samples, &y.samples) {
@@ -153,7 +153,7 @@ fn compare(a: &Samples, b: &Samples, mask: Option<&[f32]>) -> Result<ChannelDiff
             let finite: Vec<f32> =
                 (0..a.len()).map(|i| f32::from(u8::from(inside(i) && a[i].is_finite() && b[i].is_finite()))).collect();
             for i in (0..a.len()).filter(|&i| inside(i)) {
-                // both infinite alike (background depth), or both NaN: nothing differs
+                // equal infinities (background depth) and two NaNs count as equal
                 let same = a[i] == b[i] || a[i].is_nan() && b[i].is_nan();
                 if finite[i] > 0.0 { d.differing += u64::from(!same) } else { d.broken += u64::from(!same) }
             }
@@ -177,7 +177,7 @@ fn compare(a: &Samples, b: &Samples, mask: Option<&[f32]>) -> Result<ChannelDiff
         }
         _ => {}
     }
-    // no pixel in common, but some broken: the limit must still be passed
+    // no finite pixel in common, but some broken: the comparison must still fail
     if d.metrics.is_none() && d.broken > 0 {
         let nan = f64::NAN;
         d.metrics =

@@ -1,4 +1,4 @@
-//! `skylit doctor`: what this machine offers, and what skylit makes of it.
+//! `skylit doctor`: the Vulkan devices of this machine, and what skylit can use.
 
 use super::args::DoctorArgs;
 use crate::error::{Error, Result};
@@ -6,7 +6,7 @@ use crate::gpu::{Device, DeviceInfo, Instance, Options, enumerate};
 use crate::terminal::console;
 use crate::tracer::{TracerKind, TracerNeeds};
 
-/// Prints the table and the verdict; fails when nothing can be rendered here.
+/// Prints the table and the verdict; fails if no device is usable.
 pub fn run(args: &DoctorArgs) -> Result<()> {
     let instance = Instance::new(false)?;
     let devices = enumerate(&instance)?;
@@ -27,7 +27,7 @@ pub fn run(args: &DoctorArgs) -> Result<()> {
             "auto": chosen.map(|c| c.1.name()),
             "verdict": verdict,
         }))?;
-        // the record is complete; the exit code says the rest
+        // the record contains the error; return it for the exit code only
         return opened.map(drop).map_err(|e| Error::Device(e.to_string()));
     }
     let mut text = format!("skylit {}\n", env!("CARGO_PKG_VERSION"));
@@ -41,7 +41,7 @@ pub fn run(args: &DoctorArgs) -> Result<()> {
     }
 }
 
-/// A device's record in JSON: what the device reports, and beside it what each tracer needs of it.
+/// A device's JSON record: its properties, and the requirements of each tracer.
 #[derive(serde::Serialize)]
 struct DeviceRecord<'a> {
     #[serde(flatten)]
@@ -60,7 +60,7 @@ fn describe(text: &mut String, d: &DeviceInfo, chosen: Option<(usize, TracerKind
         text.push_str(&s);
         text.push('\n');
     };
-    let mark = if chosen.is_some_and(|c| c.0 == d.index) { " (the one that is used)" } else { "" };
+    let mark = if chosen.is_some_and(|c| c.0 == d.index) { " (used)" } else { "" };
     line(format!("device {}: {}, {}{mark}", d.index, d.name, d.kind));
     line(format!("  driver   {}, Vulkan {}", d.driver, d.api_version));
     let l = &d.limits;
@@ -91,7 +91,7 @@ fn describe(text: &mut String, d: &DeviceInfo, chosen: Option<(usize, TracerKind
         } else if !d.missing_floor.is_empty() {
             "no: the device is below the floor".into()
         } else if t.tracer == auto.0 {
-            format!("yes, picked by `auto`: {}", auto.1)
+            format!("available, chosen by `auto`: {}", auto.1)
         } else {
             "available, not chosen by `auto`".into()
         };

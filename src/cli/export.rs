@@ -1,4 +1,4 @@
-//! `skylit export`: a scene as glTF, or as the plain triangles that other tracers read.
+//! `skylit export`: writes a scene as glTF, or as a triangle soup for other ray tracers.
 
 use std::path::Path;
 
@@ -18,7 +18,7 @@ pub fn run(args: &ExportArgs) -> Result<()> {
         "glb" | "gltf" => export::export_gltf,
         _ => {
             let path = args.output.display();
-            return Err(Error::Usage(format!("{path}: unknown kind of scene: the name must end in .bin, .glb or .gltf")));
+            return Err(Error::Usage(format!("{path}: unknown format: the name must end in .bin, .glb or .gltf")));
         }
     };
     files::check_writable(&args.output)?;

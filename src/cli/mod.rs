@@ -1,4 +1,4 @@
-//! The command line: one file a command. Every failure ends as one line on stderr (and a record on stdout with `--json`) and
+//! The command line: one file per command. Every failure ends as one line on stderr (and a record on stdout with `--json`) and
 //! an exit code of [`EXIT_CODES`].
 
 mod args;
@@ -20,12 +20,12 @@ use crate::error::{Error, Result};
 use crate::terminal::console::{Failure, one_line};
 use crate::terminal::{console, panic};
 
-/// What the process returns; part of `--help`.
+/// Exit codes of the process; part of `--help`.
 pub const EXIT_CODES: &str = "\
 Exit codes:
   0    done
   1    a check did not hold (images differ, validation messages), or a Vulkan call failed
-  2    no Vulkan loader, no device, or a device below what is needed (see `skylit doctor`); no Open Image Denoise
+  2    no Vulkan loader, no device, or one that lacks a requirement (see `skylit doctor`); no Open Image Denoise
   3    an input file is missing or broken, or the scene cannot be rendered
   4    an output file cannot be written; nothing half-written is left
   5    out of memory
@@ -45,17 +45,17 @@ struct Cli {
 enum Command {
     /// Render the ambient occlusion of a scene: an image, or frames in real time
     Render(Box<render::RenderArgs>),
-    /// Trace a raw set of rays against a mesh and report how fast that was
+    /// Trace a set of rays against a mesh and report the ray throughput
     Rays(args::RaysArgs),
     /// Write a scene as glTF (.glb, .gltf) or as a world-space triangle soup (.bin)
     Export(args::ExportArgs),
     /// List the built-in scenes
     Scenes(args::ScenesArgs),
-    /// Show the Vulkan devices, what each tracer needs and has, and which one `auto` picks
+    /// Show the Vulkan devices, what each tracer requires and supports, and which one `auto` chooses
     Doctor(args::DoctorArgs),
-    /// Compare two images in numbers
+    /// Compare two images by error metrics
     Diff(args::DiffArgs),
-    /// Measure how fast rays are traced, beside other tracers, and what real-time ambient occlusion costs and is worth
+    /// Benchmark ray throughput against other ray tracers, and cost and quality of real-time ambient occlusion
     #[cfg(feature = "bench")]
     Bench(crate::bench::BenchArgs),
 }
@@ -67,7 +67,7 @@ pub fn run() -> ExitCode {
 
 fn run_from(arguments: Vec<OsString>) -> ExitCode {
     let start = Instant::now();
-    // before parsing: a wrong command line is to be reported as asked, too
+    // before parsing: usage errors must be reported as JSON, too
     let json = arguments.iter().any(|a| a == "--json");
     panic::install();
     let outcome = panic::catch(|| match Cli::try_parse_from(arguments) {

@@ -1,4 +1,4 @@
-//! `skylit rays`: one raw set of rays, traced and timed. It joins skylit to any other tracer: both read the same files.
+//! `skylit rays`: traces and times a set of rays, in files that other ray tracers can read, too.
 
 use std::io::Write;
 use std::path::Path;
@@ -17,7 +17,7 @@ use crate::terminal::progress::Progress;
 use crate::terminal::warnings::{Warnings, warnings_of};
 use crate::tracer::{Needs, Tracer};
 
-/// Loads, traces, reports.
+/// Loads, traces, and reports.
 pub fn run(args: &RaysArgs) -> Result<()> {
     args.device.check()?;
     interrupt::install();
@@ -34,7 +34,7 @@ pub fn run(args: &RaysArgs) -> Result<()> {
     translate(&mut set, -flat.origin);
     let device = Device::open(&args.device.options())?;
     let (kind, _, compute) = args.device.choose(&device.info)?;
-    // and once more to warm up
+    // one more repetition to warm up
     let build = args.device.build_options(set.len() as u64 * (args.repeats as u64 + 1));
     let tracer = Tracer::with_build(&device, kind, &flat, Needs::default(), compute, &build)?;
     build.take_warnings().iter().for_each(|w| warnings.add(w));
@@ -84,7 +84,7 @@ pub fn run(args: &RaysArgs) -> Result<()> {
     }))
 }
 
-/// A triangle soup by its extension, or any scene.
+/// Reads a triangle soup (.bin), or any scene.
 fn read_mesh(source: &str) -> Result<Scene> {
     let path = Path::new(source);
     let soup = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("bin"));
@@ -95,7 +95,8 @@ fn read_mesh(source: &str) -> Result<Scene> {
 fn read_rays(path: &Path) -> Result<Vec<Ray>> {
     let bytes = std::fs::read(path).map_err(|e| Error::read(path, &e))?;
     if bytes.is_empty() || bytes.len() % size_of::<Ray>() != 0 {
-        let message = format!("{} bytes: not a whole number of rays of {} bytes, or none", bytes.len(), size_of::<Ray>());
+        let message =
+            format!("{} bytes: expected a whole number of rays of {} bytes, at least one", bytes.len(), size_of::<Ray>());
         return Err(Error::input(path, message));
     }
     Ok(bytemuck::pod_collect_to_vec(&bytes))

@@ -1,4 +1,4 @@
-//! `skylit scenes`: the scenes written in code.
+//! `skylit scenes`: lists the built-in scenes.
 
 use super::args::ScenesArgs;
 use crate::error::Result;

@@ -1,4 +1,4 @@
-//! Denoising of stills: which denoiser runs, what it is told, and what is said of it.
+//! Denoising of stills: choice of the denoiser, its inputs, and its report.
 
 use std::cell::{Cell, RefCell};
 use std::time::Instant;
@@ -12,10 +12,10 @@ use crate::film::accumulate::Accumulated;
 use crate::integrators::path::settings::DenoiseChoice;
 use crate::output::{Channel, Samples};
 
-/// The channels that are denoised.
+/// Names of the channels that are denoised.
 const CHANNELS: [&str; 3] = ["R", "G", "B"];
 
-/// Interruptions are errors where work is to be given up, and nothing where what there is is kept: it is denoised to its end.
+/// A control that ignores a request to keep the image so far: denoising runs to its end. If the request is an error, it is returned.
 struct UninterruptedControl<'a>(&'a mut dyn Control);
 
 impl Control for UninterruptedControl<'_> {
@@ -24,16 +24,16 @@ impl Control for UninterruptedControl<'_> {
     }
 }
 
-/// A denoiser, and why it is that one.
+/// A denoiser, and the reason why it was chosen.
 pub struct SelectedDenoiser {
     denoiser: Denoiser,
     why: String,
 }
 
-/// The denoiser that is asked for, if one is.
+/// Chooses the denoiser that is requested, if any.
 ///
 /// # Errors
-/// [`crate::Error::Device`] for one that is not there, and what helps.
+/// [`crate::Error::Device`] if it is not available, with the remedy.
 pub fn choose(choice: Option<DenoiseChoice>) -> Result<Option<SelectedDenoiser>> {
     let Some(choice) = choice else { return Ok(None) };
     let filter = || Denoiser::Filter(Default::default());
@@ -42,7 +42,7 @@ pub fn choose(choice: Option<DenoiseChoice>) -> Result<Option<SelectedDenoiser>>
         SelectedDenoiser { denoiser: Denoiser::Oidn(oidn), why }
     };
     Ok(Some(match choice {
-        DenoiseChoice::Filter => SelectedDenoiser { denoiser: filter(), why: "asked for".into() },
+        DenoiseChoice::Filter => SelectedDenoiser { denoiser: filter(), why: "requested".into() },
         DenoiseChoice::Oidn => oidn(Oidn::open()?),
         DenoiseChoice::Auto => match Oidn::open() {
             Ok(library) => oidn(library),
@@ -55,7 +55,7 @@ pub fn choose(choice: Option<DenoiseChoice>) -> Result<Option<SelectedDenoiser>>
 pub struct Denoising<'a> {
     chosen: &'a SelectedDenoiser,
     shot: Shot<'a>,
-    // those of the first film serve the next
+    // rendered for the first film, and reused
     features: RefCell<Option<Features>>,
     seconds: Cell<f64>,
 }
@@ -65,13 +65,13 @@ impl<'a> Denoising<'a> {
         Self { chosen, shot, features: RefCell::new(None), seconds: Cell::new(0.0) }
     }
 
-    /// What the image is called by in its metadata.
+    /// Name of the denoiser in the image's metadata.
     pub fn name(&self) -> &'static str {
         self.chosen.denoiser.name()
     }
 
-    /// The channels of a denoised film in place of its means, which follow as `noisy.R`, `noisy.G`, `noisy.B`. An interruption ends it, unless `control`
-    /// wants what there is: then that is denoised, too.
+    /// Replaces the means of a film's channels by denoised ones, and adds the means as `noisy.R`, `noisy.G`, `noisy.B`. An interruption ends it, unless `control`
+    /// keeps the image so far, which is then denoised, too.
     pub fn channels(
         &self,
         accumulated: &Accumulated,
@@ -98,19 +98,19 @@ impl<'a> Denoising<'a> {
         Ok(channels)
     }
 
-    /// What there is to say of it.
+    /// The report of the denoiser.
     pub fn report(&self) -> DenoiseReport {
         let (name, why, seconds) = (self.name(), &self.chosen.why, self.seconds.get());
         DenoiseReport {
             line: format!(
-                "denoised by {name} ({why}) in {seconds:.3} s: the image is biased; noisy.R, noisy.G and noisy.B of an .exr are the mean without"
+                "denoised by {name} ({why}) in {seconds:.3} s: the image is biased; an .exr keeps the noisy image as noisy.R, noisy.G and noisy.B"
             ),
             explanation: format!(
-                "denoiser {name}: {why}; it knows surfaces by {} camera rays a pixel{}",
+                "denoiser {name}: {why}; feature images with {} camera rays per pixel{}",
                 GRID * GRID + 1,
                 match self.chosen.denoiser {
                     Denoiser::Filter(_) => "",
-                    Denoiser::Oidn(_) => ", and takes them for noisy",
+                    Denoiser::Oidn(_) => ", treated as noisy",
                 }
             ),
             record: json!({ "denoiser": name, "reason": why, "seconds": seconds, "biased": true }),
@@ -118,13 +118,13 @@ impl<'a> Denoising<'a> {
     }
 }
 
-/// The same for people and for programs.
+/// The report of a denoiser, for people and for programs.
 #[derive(Clone, Debug)]
 pub struct DenoiseReport {
-    /// A sentence.
+    /// A line for people.
     pub line: String,
-    /// For `--explain`.
+    /// A line for `--explain`.
     pub explanation: String,
-    /// A map.
+    /// The JSON record, a map.
     pub record: Value,
 }

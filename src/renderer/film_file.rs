@@ -1,4 +1,4 @@
-//! Films that are put down in an image file and taken up again: their sums, and what has to agree.
+//! Saves films in image files, and resumes them: their sums, and the metadata that must agree.
 
 use std::path::Path;
 
@@ -7,18 +7,18 @@ use crate::film::record_words;
 use crate::film::state::{FilmState, words};
 use crate::output::{self, Channel, Image, Samples};
 
-/// The layer that holds a film's sums.
+/// The EXR layer that holds a film's sums.
 const LAYER: &str = "state";
-/// Ends the keys of metadata that stand for the contents of what the key without it names.
+/// Suffix of metadata keys whose value is a hash of the contents of what the key without it names.
 const HASH: &str = ".hash";
 
-/// What of an image has to agree with what it was begun with: keys of the metadata and their values, none where the image does not have it.
+/// Metadata that must agree between an image and the render that resumes it: keys and values, `None` if the image lacks the key.
 pub type Identity = Vec<(&'static str, Option<String>)>;
 
-/// What made an image: its tracer and its device.
+/// The tracer and the device that rendered an image.
 pub type Maker = [(&'static str, String); 2];
 
-/// A film's sums as channels of an image; `names` are those of its values.
+/// A film's sums as channels of an image; `names` are the names of its values.
 pub fn state_channels(state: &FilmState, names: &[&str]) -> Vec<Channel> {
     let channel = |name: &str, samples| Channel { name: format!("{LAYER}.{name}"), samples };
     let mut out: Vec<Channel> = words(names)
@@ -39,20 +39,20 @@ pub fn state_channels(state: &FilmState, names: &[&str]) -> Vec<Channel> {
     out
 }
 
-/// A film that is gone on with.
+/// A film that is resumed.
 pub struct Resumed {
-    /// Its sums.
+    /// The film's sums.
     pub state: FilmState,
-    /// Something to know that is no failure.
+    /// A warning for the user, if any.
     pub warning: Option<String>,
 }
 
-/// Reads the film that an image file holds, for an image of `size` pixels, whose values are called `names`, with `spp` samples in all.
-/// `scene` is its name, `identity` is that of this run, `maker` its tracer and its device.
+/// Reads the film from an image file, for an image of `size` pixels with `spp` samples in all, whose values are called `names`. `scene` is the scene's name;
+/// `identity` and `maker` are those of this render.
 ///
 /// # Errors
-/// [`Error::Input`] for a file that cannot be read or has no film; [`Error::Usage`], naming what differs, for one that another run
-/// has begun, and for one that has more samples already.
+/// [`Error::Input`] for a file that cannot be read or has no film; [`Error::Usage`], naming the difference, for one of a
+/// different render, and for one that has more than `spp` samples already.
 pub fn resume(
     path: &Path,
     scene: &str,
@@ -85,7 +85,7 @@ pub fn resume(
     };
     if state.most_samples() > spp {
         return Err(Error::Usage(format!(
-            "--spp {spp}: {} has {} samples per pixel already; ask for as many at least",
+            "--spp {spp}: {} has {} samples per pixel already; give at least as many",
             path.display(),
             state.most_samples()
         )));
@@ -93,7 +93,7 @@ pub fn resume(
     let other = maker.iter().find(|(key, ours)| image.metadata(key) != Some(ours.as_str()));
     let warning = other.map(|(key, ours)| {
         format!(
-            "{} was begun with {key} {}, and is resumed with {ours}: as correct, but not bit for bit what one run would give",
+            "{} was started with {key} {}, and is resumed with {ours}: correct, but not bit-identical to an uninterrupted render",
             path.display(),
             image.metadata(key).unwrap_or("unknown")
         )
@@ -101,7 +101,7 @@ pub fn resume(
     Ok(Resumed { state, warning })
 }
 
-/// The first key that differs, and both values.
+/// The first key that differs, with both values.
 fn difference(image: &Image, identity: &Identity, scene: &str) -> Option<(String, String, String)> {
     let (key, ours) = identity.iter().find(|(key, ours)| image.metadata(key) != ours.as_deref())?;
     let its = image.metadata(key);
@@ -109,7 +109,7 @@ fn difference(image: &Image, identity: &Identity, scene: &str) -> Option<(String
         let text = |value: Option<&str>| value.unwrap_or("none").to_owned();
         return Some((key.replace('_', " "), text(its), text(ours.as_deref())));
     };
-    // the contents differ; the names may, too
+    // the contents differ; the names may differ, too
     let ours_named = match named {
         "scene" => Some(scene),
         _ => identity.iter().find(|(key, _)| *key == named).and_then(|(_, v)| v.as_deref()),
@@ -121,7 +121,7 @@ fn difference(image: &Image, identity: &Identity, scene: &str) -> Option<(String
     Some((named.to_owned(), text(image.metadata(named), its), text(ours_named, ours.as_deref())))
 }
 
-/// What there is of a film in an image.
+/// The film state found in an image.
 enum StoredState {
     None,
     Damaged,

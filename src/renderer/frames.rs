@@ -1,4 +1,4 @@
-//! Frames in real time: one image after another, with what is known from those before.
+//! Real-time frames: one image after another, with temporal accumulation.
 
 use std::time::Instant;
 
@@ -21,14 +21,14 @@ use crate::scene::load::load_camera_path;
 use crate::scene::{LightKind, Orbit, Scene};
 use crate::tracer::{Needs, Tracer};
 
-/// Frames a second, unless said otherwise.
+/// Default frame rate, frames per second.
 const DEFAULT_FPS: f64 = 30.0;
-/// Exposure of pictures, stops.
+/// Exposure of displayed frames, in stops.
 const EXPOSURE: f32 = 0.0;
-/// Of the scene's diagonal: what shown depths and positions are measured in.
+/// Unit of displayed depths and positions, as a fraction of the scene's diagonal.
 const UNIT_OF_SCENE: f32 = 0.25;
 
-/// Frames of a scene, rendered one after the other ([`Renderer::frames`]).
+/// Real-time frames of a scene, rendered one after another ([`Renderer::frames`]).
 pub struct Frames<'r> {
     device: &'r Device,
     sequence: FrameSequence<'r>,
@@ -46,17 +46,17 @@ pub struct Frames<'r> {
     metadata: Vec<(&'static str, String)>,
 }
 
-/// A frame that was rendered.
+/// A rendered frame.
 #[derive(Clone, Copy, Debug)]
 pub struct FrameOutput {
-    /// Its number.
+    /// Frame number.
     pub number: u32,
-    /// It is no frame of the warm-up.
+    /// False for frames of the warm-up.
     pub kept: bool,
 }
 
 impl Renderer {
-    /// Prepares frames in real time: those that `settings.frames` names, after the warm-up. `displays`: pictures of them are wanted ([`Frames::displayed`]).
+    /// Prepares real-time frames: those of `settings.frames`, after the warm-up. `displays`: convert each frame to 8 bits ([`Frames::displayed`]).
     ///
     /// # Errors
     /// [`Error::Usage`] for settings that have no effect together or do not fit the scene; those of the device.
@@ -138,7 +138,7 @@ impl Renderer {
             mean: 0.0,
             seconds: Seconds::default(),
         };
-        // what a later call asks for again
+        // pipelines that later calls reuse
         self.pipelines = self.device.live_pipelines();
         Ok(Frames {
             device: &self.device,
@@ -160,17 +160,17 @@ impl Renderer {
 }
 
 impl Frames<'_> {
-    /// Frames in all, those of the warm-up included.
+    /// Number of frames, including those of the warm-up.
     pub fn count(&self) -> u32 {
         self.warm_up + self.range.end - self.range.first
     }
 
-    /// Frames a second.
+    /// Frame rate, frames per second.
     pub fn fps(&self) -> f64 {
         self.fps
     }
 
-    /// Pixels.
+    /// Image size in pixels.
     pub fn size(&self) -> [u32; 2] {
         self.size
     }
@@ -201,7 +201,7 @@ impl Frames<'_> {
         Ok(Some(FrameOutput { number, kept }))
     }
 
-    /// The last frame as an image: `Y` ambient visibility, `A` 1 where the scene is, `samples` behind each pixel, and auxiliary outputs.
+    /// The last frame as an image: `Y` ambient visibility, `A` coverage, `samples` accumulated in each pixel, and auxiliary outputs.
     ///
     /// # Errors
     /// Those of the device.
@@ -226,18 +226,18 @@ impl Frames<'_> {
         Ok(Image { width: self.size[0], height: self.size[1], channels, metadata })
     }
 
-    /// The last frame as it is shown, in device memory: a word a pixel, rows from the top.
+    /// The last frame in device memory, 8-bit RGBA, rows from the top; `None` if it is not displayed.
     pub fn displayed(&self) -> Option<&Buffer> {
         self.realtime.displayed()
     }
 
-    /// How the frames came about.
+    /// The report of the frames.
     pub fn report(self) -> FramesReport {
         self.report
     }
 }
 
-/// How frames are made, as settings say.
+/// The pipeline's settings that `settings` describe.
 ///
 /// # Errors
 /// [`Error::Usage`] for settings that have no effect together.
@@ -250,7 +250,7 @@ pub fn frame_settings(settings: &RenderSettings) -> Result<Settings> {
     Ok(how)
 }
 
-/// Frames of a camera at rest after which nothing changes any more.
+/// Number of frames of a static view after which the image no longer changes.
 fn settling_frames(settings: &Settings) -> u32 {
     match settings.technique {
         Technique::Larsen => 4,
@@ -258,24 +258,24 @@ fn settling_frames(settings: &Settings) -> u32 {
     }
 }
 
-/// Mean over what is covered.
+/// Mean over covered pixels.
 fn covered_mean(values: &[f32], coverage: &[f32]) -> f64 {
     let sum = |v: &[f32]| v.iter().map(|&x| f64::from(x)).sum::<f64>();
     let covered = sum(coverage);
     if covered > 0.0 { sum(values) / covered } else { 0.0 }
 }
 
-/// Diagonal, scene units; 1 where there is nothing.
+/// Diagonal of the scene's bounds, scene units; 1 for an empty scene.
 fn scene_size(scene: &Scene) -> f64 {
     scene.bounds().map(|(lo, hi)| (hi - lo).length()).filter(|d| *d > 0.0).unwrap_or(1.0)
 }
 
 fn orbit(scene: &Scene, frames: f64) -> Result<Orbit> {
-    let (lo, hi) = scene.bounds().ok_or_else(|| Error::Scene("nothing to turn about: the scene has no geometry".into()))?;
+    let (lo, hi) = scene.bounds().ok_or_else(|| Error::Scene("--orbit: the scene has no geometry to orbit around".into()))?;
     Orbit::vertical((lo + hi) * 0.5, frames)
 }
 
-/// Positions relative to the tracers' origin.
+/// Positions of point lights, relative to the tracer's origin.
 fn point_lights(scene: &Scene, flat: &FlatScene) -> Vec<[f32; 3]> {
     let point = scene.lights.iter().filter(|l| matches!(l.kind, LightKind::Point));
     point.map(|l| (l.position - flat.origin).as_vec3().to_array()).collect()

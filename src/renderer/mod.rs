@@ -1,7 +1,7 @@
-//! The renderer: a device, a scene, the tracer that was built for it and the pipelines that were compiled, behind two verbs: [`Renderer::still`] and
+//! The renderer: a device, a scene, the tracer that was built for it and the pipelines that were compiled, behind two functions: [`Renderer::still`] and
 //! [`Renderer::frames`].
 //!
-//! What one call has built, the next one uses: the tracer, where settings need the same of the scene, and every pipeline.
+//! Later calls reuse what earlier ones have built: the tracer, if the settings need the same scene data, and all pipelines.
 //!
 //! ```
 //! use skylit::film::NoControl;
@@ -44,7 +44,7 @@ pub use report::{FramesReport, StillReport};
 pub use settings::RenderSettings;
 pub use still::Still;
 
-/// Device, scene, tracer and pipelines.
+/// A device, a scene, and the tracer and pipelines that were built for it.
 pub struct Renderer {
     device: Arc<Device>,
     name: String,
@@ -55,32 +55,32 @@ pub struct Renderer {
     kind_reason: String,
     compute: ComputeOptions,
     tracer: Option<ReadyTracer>,
-    /// Pipelines of all that was rendered: they are not compiled again.
+    /// Pipelines of all images so far, kept so that they are not compiled again.
     pipelines: KeptPipelines,
     open_seconds: OpenSeconds,
 }
 
-/// What opening took. Loading and starting the device overlap.
+/// Seconds of opening a renderer. Loading and starting the device overlap.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct OpenSeconds {
-    /// Reading the scene.
+    /// Loading the scene.
     pub load: f64,
     /// Starting the device.
     pub device: f64,
 }
 
-/// A tracer, and what it was made for.
+/// A tracer, and the requirements that it was built for.
 struct ReadyTracer {
     tracer: Tracer,
     blend: Blend,
     needs: Needs,
 }
 
-/// What was added to a scene, so that it can be taken away again.
+/// The lights that settings added to a scene, and how to remove them again.
 #[derive(Default)]
 struct Lighting {
     settings: LightingSettings,
-    /// Lengths of the scene's own lists: lights, materials, meshes and instances.
+    /// Lengths of the scene's own lists before: lights, materials, meshes and instances.
     own: [usize; 4],
     environment: Option<Environment>,
 }
@@ -111,7 +111,7 @@ impl Renderer {
         Ok(renderer)
     }
 
-    /// For a scene that is there, on a device that is open.
+    /// Creates a renderer for a loaded scene and an open device.
     ///
     /// # Errors
     /// [`crate::Error::Usage`] for settings that contradict each other.
@@ -132,7 +132,7 @@ impl Renderer {
         })
     }
 
-    /// The scene, with the lights of the last settings.
+    /// The scene, including the lights of the last settings.
     pub fn scene(&self) -> &Scene {
         &self.scene
     }
@@ -142,18 +142,18 @@ impl Renderer {
         &self.device
     }
 
-    /// The tracer that is used, and why this one.
+    /// The tracer in use, and why it was chosen.
     pub fn tracer_kind(&self) -> (TracerKind, &str) {
         (self.kind, &self.kind_reason)
     }
 
-    /// Keeps every pipeline that is alive, and what the driver can keep on disk.
+    /// Keeps all live pipelines, and saves the driver's pipeline cache to disk.
     fn keep_pipelines(&mut self) {
         self.pipelines = self.device.live_pipelines();
         self.device.save_pipeline_cache();
     }
 
-    /// Lights the scene as settings say. Lights of the settings before are taken away.
+    /// Adds the lights of the settings to the scene, and removes those of the previous settings.
     fn light(&mut self, settings: &LightingSettings) -> Result<()> {
         if self.lighting.settings == *settings {
             return Ok(());
@@ -168,7 +168,7 @@ impl Renderer {
             s.instances.truncate(instances);
             s.environment = before.environment.unwrap_or_default();
         }
-        // what is traced changes
+        // the traced scene changes
         self.tracer = None;
         let own = [s.lights.len(), s.materials.len(), s.meshes.len(), s.instances.len()];
         let environment = Some(s.environment.clone());
@@ -178,11 +178,11 @@ impl Renderer {
     }
 }
 
-/// A tracer for a scene: the one that is there, if it was made for at least this; else a new one.
+/// The requirements of a new tracer.
 struct TracerRequest<'a> {
     needs: Needs,
     streams: Vec<&'static StreamShaders>,
-    /// Rays that will be traced, about.
+    /// Approximate number of rays that will be traced.
     rays: u64,
     control: &'a mut dyn Control,
     warnings: &'a mut Vec<String>,

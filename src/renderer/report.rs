@@ -1,4 +1,4 @@
-//! What there is to say of a render: lines for people, a record for programs. Stills and frames say the same of what they have in common.
+//! Reports of a render: lines for people, a JSON record for programs. Stills and frames share the parts that they have in common.
 
 use std::collections::BTreeMap;
 
@@ -21,15 +21,15 @@ use crate::tracer::{BuildStats, ComputeOptions, Kernel, Tracer, TracerKind};
 /// Seconds of each part of a run. Loading and starting the device overlap.
 #[derive(Clone, Copy, Debug, Default, serde::Serialize)]
 pub struct Seconds {
-    /// Reading the scene.
+    /// Loading the scene.
     pub load: f64,
     /// Starting the device.
     pub device: f64,
-    /// Tracing, compiling included.
+    /// Tracing, including shader compilation.
     pub trace: f64,
     /// Auxiliary outputs.
     pub aov: f64,
-    /// All of a still: building, tracing, denoising.
+    /// Rendering of a still: building, tracing, denoising.
     pub render: f64,
     /// Writing files.
     pub write: f64,
@@ -37,36 +37,36 @@ pub struct Seconds {
     pub total: f64,
 }
 
-/// What an image was made of and with.
+/// The scene, device and tracer of an image.
 #[derive(Clone, Debug)]
 pub struct Setup {
-    /// The scene, as it was asked for.
+    /// The scene as named by the user.
     pub scene: String,
     /// Triangles over all instances.
     pub triangles: u64,
     /// Spheres over all instances.
     pub spheres: u64,
-    /// Triangles that were dropped when the scene was loaded.
+    /// Degenerate triangles that were dropped when the scene was loaded.
     pub degenerate_triangles: usize,
     /// The camera in words.
     pub camera: String,
     /// Name of the device.
     pub device: String,
-    /// Its driver.
+    /// Name of the driver.
     pub driver: String,
     /// The tracer.
     pub tracer: TracerKind,
-    /// Why this tracer.
+    /// Why the tracer was chosen.
     pub tracer_reason: String,
-    /// What building took.
+    /// Statistics of the acceleration structure's build.
     pub stats: BuildStats,
-    /// What the scene does not need, a sentence each.
+    /// Sentences about shader features that the scene does not require.
     pub features: Vec<String>,
-    /// What the user should know.
+    /// Warnings for the user, a sentence each.
     pub warnings: Vec<String>,
-    /// Reading the scene, and starting the device.
+    /// Seconds of loading the scene and starting the device.
     pub open: super::OpenSeconds,
-    /// The scene's file wants a depth image.
+    /// The scene's file requests a depth image.
     pub wants_depth_image: bool,
 }
 
@@ -130,7 +130,7 @@ impl Setup {
     }
 }
 
-/// What there is to say of a film: how good it is, and how that was come by.
+/// The report of a film: its estimated error and its numbers of samples.
 #[derive(Clone, Debug)]
 pub struct FilmReport {
     lines: Vec<String>,
@@ -138,7 +138,7 @@ pub struct FilmReport {
 }
 
 impl FilmReport {
-    /// Of a film that was to get `spp` samples per pixel, and had `before` when it was resumed.
+    /// The report of a film with at most `spp` samples per pixel, which had `before` when it was resumed.
     pub(super) fn new(options: &FilmSettings, hints: &RenderHints, image: &Accumulated, before: Option<u32>, spp: u32) -> Self {
         let (min, mean, max) = image.film.samples_range();
         let estimated = image.film.estimated_rmse();
@@ -148,12 +148,12 @@ impl FilmReport {
         }
         if let (Some(tiles), Some(target)) = (image.converged, options.target_rmse) {
             lines.push(format!(
-                "estimated rmse {estimated:.3e} (target {target:e}): {} of {} tiles done; {min} to {max} samples per pixel, {mean:.1} in the mean",
+                "estimated rmse {estimated:.3e} (target {target:e}): {} of {} tiles done; {min} to {max} samples per pixel, {mean:.1} on average",
                 tiles.done, tiles.all
             ));
         }
         if !options.intervals && hints.save_intervals.iter().any(|&n| n < spp) {
-            lines.push("the scene asks for intermediate images: add --intervals".into());
+            lines.push("the scene requests intermediate images: add --intervals".into());
         }
         let record = json!({
             "samples": { "min": min, "mean": mean, "max": max },
@@ -167,55 +167,55 @@ impl FilmReport {
     }
 }
 
-/// All there is to say about a still.
+/// The report of a still.
 #[derive(Clone, Debug)]
 pub struct StillReport {
-    /// What it was made of and with.
+    /// Scene, device and tracer.
     pub setup: Setup,
     /// Name of the integrator.
     pub integrator: &'static str,
-    /// What the mean is of.
+    /// Name of the quantity that `mean` is the mean of.
     pub quantity: &'static str,
-    /// Pixels.
+    /// Image size in pixels.
     pub size: [u32; 2],
-    /// Samples that every pixel got.
+    /// Minimum number of samples per pixel.
     pub spp: u32,
-    /// Samples that any pixel got at most.
+    /// Maximum number of samples per pixel.
     pub most_spp: u32,
-    /// Samples that were asked for.
+    /// Requested number of samples per pixel.
     pub requested_spp: u32,
     /// Seed of the sampler.
     pub seed: u32,
-    /// Fewer samples than were asked for.
+    /// The image has fewer samples than requested.
     pub stopped_early: bool,
-    /// Mean over all pixels and channels; background counts 0 where nothing is seen there.
+    /// Mean over all pixels and channels; background without an environment counts 0.
     pub mean: f64,
-    /// Its standard error, from the pixels' own variances.
+    /// Standard error of the mean, from the variances of pixels.
     pub mean_standard_error: f64,
-    /// Of the film.
+    /// Report of the film.
     pub film: FilmReport,
-    /// How the compute tracer worked, where it was the one.
+    /// Options of the compute tracer, if it was used.
     pub compute: Option<ComputeOptions>,
-    /// The kernel that traced coherent rays, likewise.
+    /// The compute tracer's kernel for camera rays, if it was used.
     pub coherent_kernel: Option<Kernel>,
     /// Camera rays traced.
     pub primary_rays: u64,
-    /// Camera rays not traced: nothing is in their tile of the image.
+    /// Camera rays not traced because their tile of the image shows no geometry.
     pub skipped_primary_rays: u64,
     /// Device seconds of each step of each pass.
     pub device_seconds: Vec<(&'static str, f64)>,
-    /// Longest launch in device seconds.
+    /// Device seconds of the longest launch.
     pub longest_launch: f64,
-    /// What the integrator says.
+    /// Report of the integrator.
     pub details: IntegratorReport,
-    /// Of the denoiser, if there was one.
+    /// Report of the denoiser, if one was used.
     pub denoise: Option<DenoiseReport>,
-    /// Times.
+    /// Seconds of each part of the run.
     pub seconds: Seconds,
 }
 
 impl StillReport {
-    /// Lines for people. `outputs`: where the image is; `explain`: with what was skipped.
+    /// Lines for people. `outputs`: names of the image files; `explain`: add lines about skipped work.
     pub fn lines(&self, outputs: &str, explain: bool) -> Vec<String> {
         let ([width, height], s) = (self.size, &self.seconds);
         let mut lines = vec![format!(
@@ -251,7 +251,7 @@ impl StillReport {
         lines.extend(self.details.explanations.iter().cloned());
         let all = self.primary_rays + self.skipped_primary_rays;
         lines.push(format!(
-            "{} of {all} camera rays ({:.1} %) not traced: nothing is in their part of the image",
+            "{} of {all} camera rays ({:.1} %) not traced: their tiles show no geometry",
             self.skipped_primary_rays,
             100.0 * self.skipped_primary_rays as f64 / all.max(1) as f64
         ));
@@ -298,45 +298,45 @@ impl StillReport {
     }
 }
 
-/// One frame.
+/// The report of a frame.
 #[derive(Clone, Debug)]
 pub struct FrameReport {
-    /// Its number.
+    /// Frame number.
     pub number: u32,
-    /// It was not a frame of the warm-up.
+    /// False for frames of the warm-up.
     pub kept: bool,
-    /// From the scene's update to the finished image in device memory.
+    /// Seconds from the scene's update to the finished image in device memory.
     pub seconds: f64,
-    /// Of these, for updating the scene.
+    /// Seconds of the scene's update, included in `seconds`.
     pub update_seconds: f64,
-    /// Passes and rays.
+    /// Work and timings of the passes.
     pub stats: FrameStats,
 }
 
-/// All there is to say about frames.
+/// The report of real-time frames.
 #[derive(Clone, Debug)]
 pub struct FramesReport {
-    /// What they were made of and with.
+    /// Scene, device and tracer.
     pub setup: Setup,
     /// The preset.
     pub preset: Preset,
-    /// How they were made.
+    /// Settings of the pipeline.
     pub settings: Settings,
     /// Primary visibility.
     pub primary: Primary,
-    /// Why this one.
+    /// Why camera rays are traced or rasterized.
     pub primary_reason: String,
-    /// Frame by frame, those of the warm-up included.
+    /// Reports of all frames, including those of the warm-up.
     pub frames: Vec<FrameReport>,
-    /// Mean ambient visibility of the last frame, over pixels that show the scene.
+    /// Mean ambient visibility of the last frame, over covered pixels.
     pub mean: f64,
-    /// Times.
+    /// Seconds of each part of the run.
     pub seconds: Seconds,
 }
 
 impl FramesReport {
-    /// Milliseconds of each pass: median and 95th percentile over the frames that have it. The first frame compiles the shaders on some
-    /// drivers; where there are others it is left out.
+    /// Median and 95th percentile of the milliseconds of each pass, over the frames that run it. The first frame, in which some drivers compile shaders, is
+    /// ignored unless it is the only one.
     fn passes(&self) -> Vec<(&'static str, f64, f64)> {
         let from = usize::from(self.frames.len() > 1);
         let mut labels: Vec<&'static str> = Vec::new();
@@ -359,7 +359,7 @@ impl FramesReport {
         out
     }
 
-    /// Milliseconds of a frame: median and 95th percentile.
+    /// Median and 95th percentile of the milliseconds per frame.
     fn frame_ms(&self) -> (f64, f64) {
         let from = usize::from(self.frames.len() > 1);
         let ms: Vec<f64> = self.frames[from..].iter().map(|f| 1e3 * f.seconds).collect();
@@ -371,7 +371,7 @@ impl FramesReport {
         [sum(|s| s.primary_rays), sum(|s| s.occlusion_rays), sum(|s| s.skipped_rays)]
     }
 
-    /// Lines for people. `outputs`: where the frames are; `explain`: with what was skipped.
+    /// Lines for people. `outputs`: names of the files; `explain`: add lines about skipped work.
     pub fn lines(&self, outputs: &str, explain: bool) -> Vec<String> {
         let (kept, all) = (self.frames.iter().filter(|f| f.kept).count(), self.frames.len());
         let (median, p95) = self.frame_ms();
@@ -387,9 +387,9 @@ impl FramesReport {
                 self.setup.device,
                 self.mean,
             ),
-            format!("a frame: {median:.1} ms (95 %: {p95:.1}), {:.1} frames a second", 1e3 / median.max(1e-6)),
+            format!("frame time: {median:.1} ms (95 %: {p95:.1}), {:.1} frames per second", 1e3 / median.max(1e-6)),
             format!(
-                "rays a frame: {} camera, {} occlusion, {} not traced",
+                "rays per frame: {} camera, {} occlusion, {} not traced",
                 primary / all.max(1) as u64,
                 occlusion / all.max(1) as u64,
                 skipped / all.max(1) as u64
@@ -414,7 +414,7 @@ impl FramesReport {
         lines.push(match (s.attenuation().is_binary(), s.attenuation().reach()) {
             (true, r) if r.is_finite() => format!("binary occlusion: any hit within {r} ends a ray"),
             (true, _) => "binary occlusion: any hit ends a ray".into(),
-            (false, r) => format!("occlusion rays end at {r:.4}: what lies beyond changes nothing that can be seen"),
+            (false, r) => format!("occlusion rays end at distance {r:.4}: hits beyond do not occlude visibly"),
         });
         let resting = self.frames.iter().filter(|f| f.stats.primary_rays == 0).count();
         lines.push(format!(
@@ -423,7 +423,7 @@ impl FramesReport {
         ));
         let [_, traced, skipped] = self.rays();
         lines.push(format!(
-            "{skipped} of {} occlusion rays ({:.1} %) not traced: nothing is there, or the pixel has all its samples",
+            "{skipped} of {} occlusion rays ({:.1} %) not traced: background, or the pixel's history is full",
             traced + skipped,
             100.0 * skipped as f64 / (traced + skipped).max(1) as f64
         ));

@@ -17,14 +17,14 @@ use crate::scene::{Camera, Projection, Scene};
 use crate::settings::parse::{parse_fov, parse_number, parse_target, parse_time, parse_vector};
 use crate::settings::{self, AppliesTo, GivenSetting, settings};
 
-/// Samples per pixel when neither the settings nor the scene say.
+/// Samples per pixel when neither the settings nor the scene give them.
 pub const DEFAULT_SPP: u32 = 16;
-/// Image size when neither the settings nor the scene say.
+/// Image size in pixels when neither the settings nor the scene give it.
 pub const DEFAULT_SIZE: [u32; 2] = [1280, 720];
-/// Field of view of cameras that are given by their position, degrees.
+/// Vertical field of view of cameras given by --eye, degrees.
 pub const DEFAULT_FOV_Y: f64 = 45.0;
 
-/// Every integrator whose images are light, which is mapped to what a display can show; views of surfaces but normals and depth are shown as they are.
+/// Integrators to whose images tone mapping and exposure apply.
 const TONE_MAPPED: AppliesTo =
     AppliesTo::stills_of(&["path", "direct", "whitted", "ao-sky", "normals", "albedo", "depth", "baked-occlusion"]);
 
@@ -67,24 +67,24 @@ settings! {
 }
 
 impl CameraSettings {
-    /// Checks what concerns more than one setting.
+    /// Checks conditions on more than one setting.
     ///
     /// # Errors
     /// [`Error::Usage`].
     pub fn check(&self) -> Result<()> {
         if self.eye.is_some() && self.eye == self.target {
-            return Err(Error::Usage("--eye and --target are the same point: the view has no direction".into()));
+            return Err(Error::Usage("--eye and --target are the same point: move one of them".into()));
         }
         if self.up == Some(DVec3::ZERO) {
-            return Err(Error::Usage("--up 0,0,0 is no direction".into()));
+            return Err(Error::Usage("--up 0,0,0 has no direction: give a vector of another length than 0".into()));
         }
         Ok(())
     }
 
-    /// The camera of a scene, for images of `aspect` = width / height.
+    /// Chooses the camera for images of `aspect` = width / height.
     ///
     /// # Errors
-    /// [`Error::Usage`] for a camera that the scene does not have, [`Error::Scene`] where there is nothing to look at.
+    /// [`Error::Usage`] for a camera that the scene does not have, [`Error::Scene`] if the scene has neither a camera nor geometry.
     pub fn choose(&self, scene: &Scene, aspect: f64) -> Result<Camera> {
         let choice = match (self.eye, self.target, &self.camera) {
             (Some(eye), Some(target), _) => Choice::LookAt {
@@ -110,7 +110,7 @@ impl CameraSettings {
 }
 
 settings! {
-    /// How pictures of 8 bits are made.
+    /// Conversion to 8-bit images.
     "Pictures"
     pub struct PictureSettings {
         /// Tone mapping operator of .png outputs [default: linear]
@@ -121,7 +121,7 @@ settings! {
 }
 
 impl PictureSettings {
-    /// With what was not given.
+    /// The options, with defaults for settings that were not given.
     pub fn options(&self) -> PictureOptions {
         PictureOptions { tone_map: self.tone_map.unwrap_or_default(), exposure: self.exposure.unwrap_or(0.0) as f32 }
     }
@@ -145,13 +145,13 @@ settings! {
 }
 
 impl FilmSettings {
-    /// Will images have the film's sums?
+    /// Returns true if images will contain the film's sums.
     pub fn keeps_state(&self) -> bool {
         self.resumable || self.intervals || self.resume.is_some()
     }
 }
 
-/// What is rendered, and how.
+/// All settings of a render.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(default, deny_unknown_fields)]
 #[cfg_attr(feature = "cli", derive(clap::Args))]
@@ -165,19 +165,19 @@ pub struct RenderSettings {
     /// The camera.
     #[cfg_attr(feature = "cli", command(flatten))]
     pub camera: CameraSettings,
-    /// Of integrators.
+    /// Settings of integrators.
     #[cfg_attr(feature = "cli", command(flatten))]
     pub integrators: IntegratorSettings,
-    /// Light besides the scene's.
+    /// Lights in addition to the scene's.
     #[cfg_attr(feature = "cli", command(flatten))]
     pub lighting: LightingSettings,
-    /// Pictures of 8 bits.
+    /// Conversion to 8 bits per channel.
     #[cfg_attr(feature = "cli", command(flatten))]
     pub picture: PictureSettings,
     /// The film of stills.
     #[cfg_attr(feature = "cli", command(flatten))]
     pub film: FilmSettings,
-    /// Frames in real time.
+    /// Settings of real-time frames.
     #[cfg_attr(feature = "cli", command(flatten))]
     pub frames: FrameSettings,
 }
@@ -202,12 +202,12 @@ impl RenderSettings {
         .concat()
     }
 
-    /// The first setting that only frames in real time have, if one was given: then frames are asked for.
+    /// The first setting given that only real-time frames have, if any: its presence selects real-time frames.
     pub fn realtime_setting(&self) -> Option<GivenSetting> {
         self.frames.given().into_iter().next()
     }
 
-    /// Checks what concerns more than one setting: none may be given that would have no effect.
+    /// Checks conditions on more than one setting: none may be given that would have no effect.
     ///
     /// # Errors
     /// [`Error::Usage`], naming the setting and what to do about it.
@@ -215,7 +215,7 @@ impl RenderSettings {
         let frames = self.realtime_setting();
         settings::check(&self.given(), self.integrator().name(), frames.as_ref())?;
         if frames.is_none() && Aov::Bent.is_in(&self.image.aov) {
-            return Err(Error::Usage("--aov bent is of frames in real time: add --preset".into()));
+            return Err(Error::Usage("--aov bent is for frames in real time: add --preset".into()));
         }
         self.camera.check()
     }

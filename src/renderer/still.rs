@@ -1,4 +1,4 @@
-//! Stills: one image, sample by sample.
+//! Stills: one image, rendered sample by sample.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -23,31 +23,31 @@ use crate::ray::Ray;
 use crate::scene::{Camera, Projection, RenderHints, fingerprint};
 use crate::tracer::Needs;
 
-/// What a still is wanted for beside its image.
+/// Additional results of a still.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct StillExtras {
     /// Keep the rays of the first sample.
     pub keep_rays: bool,
-    /// Render auxiliary outputs even where settings name none: a depth image is made of them.
+    /// Render auxiliary outputs even if settings name none, for a depth image.
     pub aov: bool,
 }
 
-/// A finished still.
+/// A finished still image.
 pub struct Still {
-    /// Its channels and metadata, all of them.
+    /// All channels and the metadata.
     pub image: Image,
-    /// Auxiliary outputs, rows from the top, if any were wanted.
+    /// Auxiliary outputs, rows from the top, if requested.
     pub aov: Vec<AovPixel>,
-    /// Camera rays and occlusion rays of the first sample, in the file's world, if they were to be kept.
+    /// Camera rays and occlusion rays of the first sample in world space, if [`StillExtras::keep_rays`] is set.
     pub rays: [Vec<Ray>; 2],
-    /// How it came about.
+    /// The report of the render.
     pub report: StillReport,
     integrator: &'static dyn Integrator,
     picture: PictureOptions,
 }
 
 impl Still {
-    /// Writes it in the format that the file's name says.
+    /// Writes the image in the format of the file name's extension.
     ///
     /// # Errors
     /// [`Error::Usage`] for an unknown format, [`Error::Output`].
@@ -56,17 +56,17 @@ impl Still {
     }
 }
 
-/// An image that is not finished, on its way to a file ([`Renderer::still_with`]).
+/// An image of a render that is still running ([`Renderer::still_with`]).
 pub struct IntermediateImage<'a> {
     image: &'a Image,
-    /// Samples that any pixel has at most.
+    /// Maximum number of samples of a pixel.
     pub samples: u32,
     integrator: &'static dyn Integrator,
     picture: PictureOptions,
 }
 
 impl IntermediateImage<'_> {
-    /// As [`Still::save`].
+    /// Writes the image as [`Still::save`] does.
     ///
     /// # Errors
     /// Those of [`Still::save`].
@@ -86,15 +86,15 @@ impl Renderer {
     /// Renders a still.
     ///
     /// # Errors
-    /// [`Error::Usage`] for settings that have no effect together or do not fit the scene; those of the device; what `control` says.
+    /// [`Error::Usage`] for settings that have no effect together or do not fit the scene; those of the device; those of `control`.
     pub fn still(&mut self, settings: &RenderSettings, control: &mut dyn Control) -> Result<Still> {
         self.still_with(settings, StillExtras::default(), control, &mut |_| Ok(()))
     }
 
-    /// As [`Renderer::still`]; `save` gets the image on its way, at the samples that [`super::settings::FilmSettings::intervals`] means.
+    /// As [`Renderer::still`]; `save` receives intermediate images, at the numbers of samples that [`super::settings::FilmSettings::intervals`] selects.
     ///
     /// # Errors
-    /// As [`Renderer::still`], and what `save` says.
+    /// As [`Renderer::still`], and those of `save`.
     pub fn still_with(
         &mut self,
         settings: &RenderSettings,
@@ -104,7 +104,10 @@ impl Renderer {
     ) -> Result<Still> {
         settings.check()?;
         if let Some(frames) = settings.realtime_setting() {
-            return Err(Error::Usage(format!("{} is for frames in real time, and this is a still", frames.option())));
+            return Err(Error::Usage(format!(
+                "{} is for frames in real time, and a still is rendered: leave it out",
+                frames.option()
+            )));
         }
         let start = Instant::now();
         let denoiser = denoising::choose(settings.integrators.path.denoise)?;
@@ -170,7 +173,7 @@ impl Renderer {
             false => None,
         };
 
-        // first, because what is saved on the way has them, too
+        // first, because intermediate images contain them, too
         let aov_start = Instant::now();
         let pixels = match wanted.is_empty() && !extras.aov {
             true => Vec::new(),
@@ -208,7 +211,7 @@ impl Renderer {
         device.check_validation()?;
         let mut rays = rendered.kept_rays;
         for rays in &mut rays {
-            // in the scene's world, as its exported mesh is
+            // to world space, as exported meshes are
             crate::ray::translate(rays, flat.origin);
         }
         for warning in &rendered.report.warnings {
@@ -251,7 +254,7 @@ impl Renderer {
     }
 }
 
-/// What the loader of a scene warns of, a sentence each.
+/// Warnings of the scene's loader, a sentence each.
 pub(super) fn scene_warnings(scene: &crate::scene::Scene) -> Vec<String> {
     let report = &scene.report;
     let dropped =
@@ -259,7 +262,7 @@ pub(super) fn scene_warnings(scene: &crate::scene::Scene) -> Vec<String> {
     report.warnings.iter().cloned().chain(dropped).collect()
 }
 
-/// A camera in words.
+/// Description of a camera, for metadata.
 pub fn camera_text(camera: &Camera) -> String {
     let m = &camera.camera_to_world;
     let lens = match camera.projection {
@@ -269,7 +272,7 @@ pub fn camera_text(camera: &Camera) -> String {
     format!("{:?} eye {}, forward {}, up {}; {lens}", camera.name, m.translation, -m.matrix3.z_axis, m.matrix3.y_axis)
 }
 
-/// What has to agree when an image is gone on with: all that its samples depend on, but for its size. `print`: the scene's fingerprint, where the film
+/// Everything that must agree for a render to be resumed: all that its samples depend on, except its size. `print`: the scene's fingerprint, if the film's state
 /// is kept.
 fn identity(integrator: &dyn Integrator, job: &RenderJob, print: Option<String>) -> Identity {
     let environment = || fingerprint::of_environment(&job.scene.environment);
@@ -286,7 +289,7 @@ fn identity(integrator: &dyn Integrator, job: &RenderJob, print: Option<String>)
     out
 }
 
-/// Samples at which the image is saved on its way. A scene names some of its own.
+/// Numbers of samples at which intermediate images are saved: powers of two, and those that the scene names.
 pub fn intervals(settings: &RenderSettings, hints: &RenderHints, spp: u32) -> Vec<u32> {
     let mut intervals: Vec<u32> = match settings.film.intervals {
         true => (0..u32::BITS).map(|k| 1 << k).chain(hints.save_intervals.iter().copied()).collect(),
@@ -298,12 +301,12 @@ pub fn intervals(settings: &RenderSettings, hints: &RenderHints, spp: u32) -> Ve
     intervals
 }
 
-/// Samples per pixel: the fewest and the most.
+/// Text of a range of samples per pixel.
 pub(super) fn spp_text(least: u32, most: u32) -> String {
     if least == most { most.to_string() } else { format!("{least} to {most}") }
 }
 
-/// Makes images of films.
+/// Composes images from films.
 struct Composer<'a> {
     name: &'a str,
     integrator: &'static dyn Integrator,
@@ -329,7 +332,7 @@ impl Composer<'_> {
         Ok(Image { width: self.size[0], height: self.size[1], channels, metadata })
     }
 
-    /// The film as named channels: means, coverage, of each channel the variance of one sample, and the film's sums, if it is to go on.
+    /// The film as named channels: means, coverage, the variance of one sample of each channel, and the film's sums if its state is kept.
     fn channels(&self, image: &Accumulated) -> Vec<Channel> {
         let (film, names) = (&image.film, self.integrator.channels());
         let f32s = |name: String, samples| Channel { name, samples: Samples::F32(samples) };
@@ -344,7 +347,7 @@ impl Composer<'_> {
         out
     }
 
-    /// Text attributes. Nothing in it differs between two runs of the same command.
+    /// Text attributes. They are identical for two runs of the same command.
     fn metadata(&self, image: &Accumulated) -> Vec<(String, String)> {
         let mut out = vec![("scene", self.name.to_owned()), ("spp", spp_text(image.spp, image.most_spp))];
         out.extend(self.maker.iter().cloned());
@@ -356,7 +359,7 @@ impl Composer<'_> {
     }
 }
 
-/// Saves an image on its way.
+/// A control that saves intermediate images.
 struct IntervalControl<'a> {
     control: &'a mut dyn Control,
     save: &'a mut dyn FnMut(&Accumulated, &mut dyn Control) -> Result<()>,
@@ -380,7 +383,7 @@ impl Control for IntervalControl<'_> {
     }
 }
 
-/// Needs of the tracer that auxiliary outputs have.
+/// Adds the scene data that auxiliary outputs need to `needs`.
 pub(super) fn aov_needs(needs: Needs, wanted: &[Aov]) -> Needs {
     Needs { normals: needs.normals || Aov::Ns.is_in(wanted), albedo: needs.albedo || Aov::Albedo.is_in(wanted), ..needs }
 }

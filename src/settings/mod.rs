@@ -1,19 +1,19 @@
-//! How settings are declared: once, as a struct that is a command line (with the feature `cli`), a JSON record and the metadata of an image alike.
+//! Declares settings: one struct is a part of the command line (with the feature `cli`), of settings files and of the JSON record.
 //!
-//! Each setting knows which integrators it is for, and whether it is of stills, of frames in real time, or of both: [`check`] finds the one that would have no effect.
+//! Each setting declares the integrators that it applies to, and whether it applies to stills, real-time frames, or both: [`check`] rejects settings without effect.
 
 pub mod parse;
 
 use crate::error::{Error, Result};
 
-/// What a setting has an effect on.
+/// The integrators and kinds of output that a setting has an effect on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct AppliesTo {
-    /// Names of integrators; none: all of them.
+    /// Names of integrators; empty: all.
     pub integrators: &'static [&'static str],
-    /// Stills.
+    /// It applies to stills.
     pub stills: bool,
-    /// Frames in real time.
+    /// It applies to real-time frames.
     pub frames: bool,
 }
 
@@ -22,7 +22,7 @@ impl AppliesTo {
     pub const ALL: Self = Self { integrators: &[], stills: true, frames: true };
     /// Stills of any integrator.
     pub const STILLS: Self = Self { integrators: &[], stills: true, frames: false };
-    /// Frames in real time.
+    /// Real-time frames of any integrator.
     pub const FRAMES: Self = Self { integrators: &[], stills: false, frames: true };
 
     /// Stills of some integrators.
@@ -40,28 +40,28 @@ impl AppliesTo {
     }
 }
 
-/// A setting that differs from its default.
+/// A setting that the user has given.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct GivenSetting {
-    /// As in files: `max_depth`.
+    /// Name in files: `max_depth`.
     pub name: &'static str,
-    /// What it has an effect on.
+    /// What the setting has an effect on.
     pub applies: AppliesTo,
 }
 
 impl GivenSetting {
-    /// As on the command line: `--max-depth`.
+    /// Name on the command line: `--max-depth`.
     pub fn option(&self) -> String {
         format!("--{}", self.name.replace('_', "-"))
     }
 }
 
-/// Is a value that of a setting which was not given?
+/// Returns true if the value is the default, so that the setting was not given.
 pub fn is_default<T: Default + PartialEq>(value: &T) -> bool {
     *value == T::default()
 }
 
-/// Names in a sentence: `a`, `a or b`, `a, b or c`.
+/// A list in words: `a`, `a or b`, `a, b or c`.
 fn list(names: &[&str]) -> String {
     match names {
         [] => "none".into(),
@@ -70,17 +70,17 @@ fn list(names: &[&str]) -> String {
     }
 }
 
-/// Has each of these settings an effect on what `integrator` renders: frames in real time because `frames`, if there is one, was given; else a still?
+/// Checks that each of these settings has an effect on what `integrator` renders: real-time frames if `frames` is the setting that selects them, else a still.
 ///
 /// # Errors
-/// [`Error::Usage`] for the first that has none.
+/// [`Error::Usage`] for the first setting without effect.
 pub fn check(given: &[GivenSetting], integrator: &str, frames: Option<&GivenSetting>) -> Result<()> {
     let wrong = |text: String| Err(Error::Usage(text));
     for setting in given {
         let (option, applies) = (setting.option(), setting.applies);
         if let (Some(frames), false) = (frames, applies.frames) {
             return wrong(format!(
-                "{option} is for stills, and {} asks for frames in real time: leave one of them out",
+                "{option} is for stills, and {} selects frames in real time: leave one of them out",
                 frames.option()
             ));
         }
@@ -94,9 +94,9 @@ pub fn check(given: &[GivenSetting], integrator: &str, frames: Option<&GivenSett
     Ok(())
 }
 
-/// Declares settings: `name: type, option(what clap is told), applies(to what);`, each with its doc, which is its help.
+/// Declares settings: `name: type, option(arguments of clap), applies(AppliesTo);`, each with its documentation, which is its help text.
 ///
-/// A setting is an `Option`, a `bool` or a `Vec`; its default means that it was not given.
+/// A setting is an `Option`, a `bool` or a `Vec`; the default value means that it was not given.
 macro_rules! settings {
     (
         $(#[$meta:meta])*
@@ -138,7 +138,7 @@ macro_rules! settings {
 }
 pub(crate) use settings;
 
-/// Declares a choice among named alternatives: `/// help` and `Variant = "name",` each; the first is the default unless another is named. The doc of an alternative is the help of the command line.
+/// Declares an enumeration of named values: `/// help` and `Variant = "name",` each; the first is the default unless another is named. The documentation of a variant is its help text on the command line.
 macro_rules! choices {
     (
         $(#[$meta:meta])*
@@ -160,17 +160,17 @@ macro_rules! choices {
         }
 
         impl $type {
-            /// All of them.
+            /// All variants.
             pub const ALL: [Self; [$($name),+].len()] = [$(Self::$variant),+];
 
-            /// As on the command line and in files.
+            /// Name on the command line and in files.
             pub const fn name(self) -> &'static str {
                 match self {
                     $(Self::$variant => $name,)+
                 }
             }
 
-            /// What it is, in a line.
+            /// Description in one line.
             pub fn help(self) -> &'static str {
                 match self {
                     $(Self::$variant => concat!($($doc),+).trim(),)+
@@ -228,7 +228,7 @@ mod tests {
         let text = |r: Result<()>| r.unwrap_err().to_string();
         assert!(text(check(&[depth], "ao", None)).contains("use --integrator path or direct"));
         let fps = Some { fps: Option::Some(24.0), ..Default::default() }.given()[0];
-        assert!(text(check(&[depth], "path", Option::Some(&fps))).contains("--fps asks for frames"));
+        assert!(text(check(&[depth], "path", Option::Some(&fps))).contains("--fps selects frames"));
     }
 
     #[test]

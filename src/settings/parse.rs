@@ -1,10 +1,10 @@
-//! Values of options: from text to numbers in their ranges.
+//! Parses values of options, and checks their ranges.
 
 use std::time::Duration;
 
 use glam::DVec3;
 
-/// A value, or what was expected.
+/// A value, or a description of what is expected.
 pub type Parsed<T> = std::result::Result<T, String>;
 
 /// Any number that is not NaN.
@@ -21,18 +21,18 @@ pub fn parse_vector(text: &str) -> Parsed<DVec3> {
     }
 }
 
-/// A number for which something holds; `rule` says what.
+/// Parses a number for which `holds` is true; `rule` is the error message.
 pub fn parse_where(text: &str, holds: impl Fn(f64) -> bool, rule: &str) -> Parsed<f64> {
     parse_number(text).and_then(|v| if holds(v) { Ok(v) } else { Err(rule.to_owned()) })
 }
 
-/// A field of view, degrees.
+/// A field of view, 0.001 to 179 degrees.
 pub fn parse_fov(text: &str) -> Parsed<f64> {
-    // beyond this the tangent of single precision loses the image
+    // beyond this range, the tangent in single precision is too inaccurate
     parse_where(text, |v| (0.001..=179.0).contains(&v), "must be between 0.001 and 179 degrees")
 }
 
-/// A distance above 0, in world units.
+/// A distance above 0 in scene units; may be infinite.
 pub fn parse_radius(text: &str) -> Parsed<f64> {
     parse_where(text, |v| v > 0.0, "must be above 0 (`inf` for no limit)")
 }
@@ -77,9 +77,9 @@ pub fn parse_target(text: &str) -> Parsed<f64> {
     parse_where(text, |v| v > 0.0 && v.is_finite(), "must be finite and above 0")
 }
 
-/// Frames a second: 0.01 to 1000.
+/// A frame rate, 0.01 to 1000 frames per second.
 pub fn parse_rate(text: &str) -> Parsed<f64> {
-    parse_where(text, |v| (0.01..=1000.0).contains(&v), "must be between 0.01 and 1000 frames a second")
+    parse_where(text, |v| (0.01..=1000.0).contains(&v), "must be between 0.01 and 1000 frames per second")
 }
 
 #[cfg(test)]

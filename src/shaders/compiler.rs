@@ -1,5 +1,5 @@
-//! From GLSL to SPIR-V, with a cache on disk. Used by build.rs, which compiles every shader, and by programs that were built with the feature
-//! `live-shaders`, which compile the ones that they need.
+//! Compiles GLSL to SPIR-V, with a cache on disk. Used by build.rs, which compiles all shaders, and by programs that were built with the feature
+//! `live-shaders`, which compile shaders on demand.
 
 use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet};
@@ -14,30 +14,30 @@ use shaderc::{
 
 use super::source::{Source, Stage};
 
-/// What was compiled before, by what it was compiled from: builds of other profiles and later runs find theirs here, and a change compiles anew only what
-/// includes it. A file `KEY.spv` each, in the folder `spirv` beside the profiles'.
+/// A cache of SPIR-V on disk, shared by all build profiles and later runs: files `KEY.spv` in the folder `target/spirv`. The key is a hash of the source with all
+/// includes, so that a change recompiles only the shaders that include it.
 struct Cache {
     folder: PathBuf,
     // version of the compiler
     compiler: String,
 }
 
-/// More shaders than this are not kept; the oldest go first.
+/// Maximum number of cached shaders; the oldest are removed first.
 const MAX_ENTRIES: usize = 1500;
 
-/// Three quarters of the time go into optimisation. Whoever edits a shader wants to see it: the driver optimises, too.
+/// Optimization takes three quarters of the compile time. Live shaders are not optimized here, for short edit cycles: the driver optimizes, too.
 const OPTIMIZATION: OptimizationLevel =
     if cfg!(feature = "live-shaders") { OptimizationLevel::Zero } else { OptimizationLevel::Performance };
 
-/// Compiles shaders of one folder.
+/// Compiles the shaders of one folder.
 pub struct Compiler {
     shaders: PathBuf,
-    // files that are made, by name
+    // generated files, by name
     interface: BTreeMap<String, String>,
     cache: Option<Cache>,
 }
 
-/// A shader that was compiled.
+/// A compiled shader.
 pub struct Compiled {
     /// Its SPIR-V.
     pub spirv: Vec<u8>,
@@ -47,12 +47,13 @@ pub struct Compiled {
 }
 
 impl Compiler {
-    /// shaders: the folder. interface: further files, by name. out: OUT_DIR; the cache lies beside the profiles'. Without pkg-config, which says which compiler this is, there is no cache.
+    /// `shaders`: the folder. `interface`: generated files, by name. `out`: OUT_DIR, from which the folder of the cache follows. Without pkg-config, which tells
+    /// the compiler's version, there is no cache.
     pub fn new(shaders: &Path, interface: Vec<(String, String)>, out: &Path) -> Self {
         Self { shaders: shaders.to_owned(), interface: interface.into_iter().collect(), cache: Cache::open(out) }
     }
 
-    /// The text of a file that is included, and its path where it has one.
+    /// The text of an included file, and its path if it has one.
     fn read(&self, name: &str) -> Result<(String, Option<PathBuf>), String> {
         if let Some(text) = self.interface.get(name) {
             return Ok((text.clone(), None));
@@ -62,13 +63,13 @@ impl Compiler {
         Ok((text, Some(path)))
     }
 
-    /// Compiles, or takes what was compiled before.
+    /// Compiles a shader, or reads it from the cache.
     ///
     /// # Errors
-    /// The compiler's words, and how the file that the first of them names was included.
+    /// The compiler's message, with the include chain of the first file that it names.
     pub fn compile(&self, source: &Source) -> Result<Compiled, String> {
         let text = source.text(&self.shaders)?;
-        // `None` where an included file cannot be read: the compiler says it better
+        // `None` if an included file cannot be read: the compiler reports the error
         let (key, included) = self.key(&text, source.stage()).unzip();
         let path = self.cache.as_ref().zip(key).map(|(cache, key)| cache.path(&key));
         if let (Some(path), Some(included)) = (&path, included)
@@ -84,9 +85,9 @@ impl Compiler {
         Ok(compiled)
     }
 
-    /// A key of a text, of all that it includes and of the kind of shader; and the files that it includes.
+    /// A key of a text with all its includes and of the kind of shader; and the included files.
     fn key(&self, text: &str, stage: Stage) -> Option<(String, BTreeSet<PathBuf>)> {
-        // two numbers of 64 bits
+        // two hashes of 64 bits
         let mut hashes = [DefaultHasher::new(), DefaultHasher::new()];
         hashes[1].write_u8(1);
         let mut add = |text: &str| hashes.iter_mut().for_each(|h| text.hash(h));
@@ -106,11 +107,11 @@ impl Compiler {
     }
 
     fn run(&self, source: &Source, text: &str) -> Result<Compiled, String> {
-        // who included what, to name the chain when a file does not compile
+        // pairs of included and including file, for the include chain in error messages
         let chain: RefCell<Vec<(String, String)>> = RefCell::new(Vec::new());
         let included = RefCell::new(BTreeSet::new());
-        let compiler = shaderc::Compiler::new().map_err(|e| format!("shaderc does not start: {e}"))?;
-        let mut options = CompileOptions::new().map_err(|e| format!("shaderc does not start: {e}"))?;
+        let compiler = shaderc::Compiler::new().map_err(|e| format!("cannot start shaderc: {e}"))?;
+        let mut options = CompileOptions::new().map_err(|e| format!("cannot start shaderc: {e}"))?;
         options.set_target_env(TargetEnv::Vulkan, EnvVersion::Vulkan1_3 as u32);
         options.set_target_spirv(SpirvVersion::V1_5);
         options.set_optimization_level(OPTIMIZATION);
@@ -156,7 +157,7 @@ impl Cache {
         Some(cache)
     }
 
-    /// Removes what is oldest beyond what it may hold.
+    /// Removes the oldest entries beyond the maximum.
     fn prune(&self) {
         let Ok(entries) = std::fs::read_dir(&self.folder) else { return };
         let mut all: Vec<_> =
@@ -174,7 +175,7 @@ impl Cache {
         self.folder.join(format!("{key}{:016x}.spv", hash.finish()))
     }
 
-    /// Beside, then renamed: builds of two profiles and other programs may run at once. What fails is compiled again next time.
+    /// Writes a temporary file and renames it, because other builds and programs may run at the same time. If it fails, the shader is compiled again next time.
     fn store(path: &Path, spirv: &[u8]) {
         let temporary = path.with_extension(std::process::id().to_string());
         if std::fs::write(&temporary, spirv).is_err() || std::fs::rename(&temporary, path).is_err() {
@@ -183,7 +184,7 @@ impl Cache {
     }
 }
 
-/// The compiler's words, and how the file that the first of them names came in.
+/// Adds the include chain of the first file that the compiler's message names.
 fn explain(source: &Source, text: &str, chain: &[(String, String)]) -> String {
     let mut message = format!("shader {source} does not compile:\n{text}");
     if let Some(mut file) =

@@ -1,8 +1,8 @@
-//! The shaders, as SPIR-V: each one stands in `registry.rs`, and build.rs compiles all of them into the program.
+//! The shaders, as SPIR-V: `registry.rs` lists all of them, and build.rs compiles them into the program.
 //!
-//! A program that was built with the cargo feature `live-shaders` has none of it: it reads shaders/ in the source tree when it runs, and compiles what it
-//! needs when it first needs it, into a cache that all builds share. An edit of a shader then takes effect with the next run, or with the next pipeline that
-//! is made, and nothing of Rust is compiled for it.
+//! A program that was built with the cargo feature `live-shaders` contains no SPIR-V: it reads shaders/ in the source tree when it runs, and compiles
+//! shaders on first use, into a cache that all builds share. An edit of a shader then takes effect with the next run, or with the next pipeline that
+//! is created, without compiling any Rust.
 
 #[cfg(feature = "live-shaders")]
 mod compiler;
@@ -15,7 +15,7 @@ use source::{mode, rays};
 
 use crate::error::Result;
 
-/// A shader, ready for the driver.
+/// A shader as SPIR-V.
 #[derive(Debug)]
 pub struct Shader {
     source: Source,
@@ -24,7 +24,7 @@ pub struct Shader {
 }
 
 impl Shader {
-    /// What it is compiled from.
+    /// Its source.
     pub fn source(&self) -> &Source {
         &self.source
     }
@@ -32,7 +32,7 @@ impl Shader {
     /// Its SPIR-V.
     ///
     /// # Errors
-    /// None, but with the feature `live-shaders`: then [`crate::Error::Usage`] has the compiler's words.
+    /// None, except with the feature `live-shaders`: [`crate::Error::Usage`] with the compiler's message.
     #[cfg(not(feature = "live-shaders"))]
     pub fn spirv(&self) -> Result<Cow<'static, [u8]>> {
         Ok(Cow::Borrowed(self.spirv))
@@ -41,7 +41,7 @@ impl Shader {
     /// Its SPIR-V, compiled from the files as they are now.
     ///
     /// # Errors
-    /// [`crate::Error::Usage`] with the compiler's words.
+    /// [`crate::Error::Usage`] with the compiler's message.
     #[cfg(feature = "live-shaders")]
     pub fn spirv(&self) -> Result<Cow<'static, [u8]>> {
         use std::path::Path;
@@ -56,14 +56,13 @@ impl Shader {
     }
 }
 
-/// Where the shaders' sources are read from, with the feature `live-shaders`.
+/// Folder of the shader sources, with the feature `live-shaders`.
 #[cfg(feature = "live-shaders")]
 fn folder() -> std::path::PathBuf {
     std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("shaders")
 }
 
-/// When a shader's source was last changed: pipelines that were made before then are of another text. `None` without the feature `live-shaders`, where
-/// shaders never change, and where the folder cannot be read.
+/// Time of the last change of a shader source: older pipelines are outdated. `None` without the feature `live-shaders`, or if the folder cannot be read.
 pub fn last_change() -> Option<std::time::SystemTime> {
     #[cfg(feature = "live-shaders")]
     {
@@ -83,19 +82,19 @@ pub fn last_change() -> Option<std::time::SystemTime> {
     None
 }
 
-/// A stream's shaders, one for each tracer and step.
+/// The shaders of a stream, one for each tracer and step.
 pub struct StreamShaders {
     /// Pass and mode.
     pub name: &'static str,
-    /// Pass: what its time is listed under where a stream is one shader.
+    /// Name of the pass: label of its timings if the stream is a single shader.
     pub pass: &'static str,
-    /// What the time of each step is listed under where a stream is three.
+    /// Labels of the timings of each step if the stream is three shaders.
     pub steps: [&'static str; 3],
-    /// What it asks of its rays.
+    /// What it finds for each ray.
     pub mode: Mode,
-    /// Where they come from.
+    /// Source of its rays.
     pub rays: Rays,
-    // in the order of Variant::ALL; those that do not apply are empty
+    // in the order of Variant::ALL; the source of a variant that does not apply is never compiled
     variants: [Shader; 10],
 }
 
@@ -112,7 +111,7 @@ impl std::fmt::Debug for StreamShaders {
     }
 }
 
-/// The shaders of a pass that traces nothing.
+/// The shaders of a pass that traces no rays.
 #[derive(Debug)]
 pub struct ComputeShader {
     /// The pass.
@@ -122,13 +121,13 @@ pub struct ComputeShader {
 }
 
 impl ComputeShader {
-    /// The one for devices that have 64-bit integers, or have not.
+    /// The shader for devices with or without 64-bit integers.
     pub fn variant(&self, int64: bool) -> &Shader {
         if int64 { &self.int64 } else { &self.plain }
     }
 }
 
-/// The compute tracer's fast kernel, which all streams of a mode share.
+/// The compute tracer's wide kernel, which all streams of a mode share.
 pub fn wide_kernel(mode: Mode, int64: bool) -> &'static Shader {
     match (mode, int64) {
         (Mode::Any, true) => &WIDE_ANY_64,
@@ -194,7 +193,7 @@ macro_rules! registry {
             };
         )*
         $(
-            #[doc = concat!("`shaders/", $name, ".glsl`, which traces nothing.")]
+            #[doc = concat!("`shaders/", $name, ".glsl`, which traces no rays.")]
             pub static $compute: ComputeShader = ComputeShader {
                 name: $name,
                 plain: shader!(Source::Compute { pass: $name, int64: false }, $name, "_32"),

@@ -1,12 +1,12 @@
-// Every shader, once: a line here and a file in shaders/ make a pass. build.rs includes this file and compiles what it lists; src/shaders/mod.rs includes it
-// and makes constants of it.
+// All shaders: a pass is a line here and a file in shaders/. build.rs includes this file and compiles the shaders that it lists; src/shaders/mod.rs includes
+// it and defines a constant for each.
 //
-// streams: passes that trace rays. CONSTANT = file, what each ray asks for (any, closest), and where the rays come from:
-//     generated   the pass makes them
-//     camera      the pass makes them, and neighbours take much the same way: packets of rays pay, and what they meet can be rasterized instead of traced
+// streams: passes that trace rays. CONSTANT = file, any or closest hit, and the source of rays:
+//     generated   the pass generates them
+//     camera      the pass generates coherent rays: neighbours are traced as packets, and primary visibility can be rasterized instead
 //     queue       they are in memory before the pass begins
-// compute: passes that trace nothing.
-// stages: what streams of the pipeline tracer share, and what rasterizes.
+// compute: passes that trace no rays.
+// stages: shaders that streams of the pipeline tracer share, and shaders of rasterization.
 registry! {
     streams {
         AO_TRACE_ANY = "ao_trace", any, generated;

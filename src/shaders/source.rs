@@ -1,35 +1,35 @@
-//! What a shader is compiled from: how a tracer's template and a pass make one source text. Used by build.rs and by the program.
+//! Sources of shaders: combines a tracer's template and a pass into one text. Used by build.rs and by the program.
 
 use std::fmt;
 use std::path::Path;
 
-/// Threads of a work-group of a stream.
+/// Invocations per workgroup of a stream.
 pub const LANES: u32 = 64;
 
-/// Runs of work-groups of streams that follow each other take runs of parts of a dispatch that are so far apart (shaders/trace/spread.glsl).
+/// Number of distant parts of a dispatch from which consecutive runs of workgroups take their work (shaders/trace/spread.glsl).
 pub const SPREAD: u32 = 16;
 
-/// Work-groups that take neighbouring parts, where a part is a ray for each lane: memory is fetched ahead.
+/// Consecutive workgroups that take neighbouring work, one ray per invocation each, so that memory is prefetched.
 pub const RUN: u32 = 4;
 
-/// Rays of each lane of a packet.
+/// Rays per invocation of a packet.
 pub const PACKET_RAYS: u32 = 2;
 
 const EXTENSIONS: &str = "#extension GL_EXT_buffer_reference : require\n#extension GL_EXT_buffer_reference_uvec2 : require\n\
                           #extension GL_EXT_control_flow_attributes : require\n";
 
-/// Loads and stores of 64 bits, where the device has such integers.
+/// Enables loads and stores of 64 bits, for devices with 64-bit integers.
 const HEAD_64: &str = "#extension GL_EXT_shader_explicit_arithmetic_types_int64 : require\n#define LOAD64\n";
 
-/// Subgroup ballots besides: one atomic for all lanes that append to a queue.
+/// Enables subgroup ballots: one atomic operation for all invocations that append to a queue.
 const HEAD_BALLOT: &str = "#extension GL_KHR_shader_subgroup_ballot : require\n#define BALLOT\n";
 
-/// What a stream asks of its rays.
+/// What a stream finds for its rays.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mode {
-    /// Whether something is in the way.
+    /// Whether a ray is occluded.
     Any,
-    /// The nearest hit.
+    /// The closest hit.
     Closest,
 }
 
@@ -49,12 +49,12 @@ impl Mode {
     }
 }
 
-/// Where a stream's rays come from.
+/// Source of a stream's rays.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Rays {
-    /// The pass makes them.
+    /// The pass generates them.
     Generated,
-    /// The pass makes them, and neighbours take much the same way; what they meet can be rasterized instead of traced.
+    /// The pass generates coherent rays: neighbours are traced as packets, and primary visibility can be rasterized instead.
     Camera,
     /// They are in memory before the pass begins.
     Queue,
@@ -77,25 +77,25 @@ pub enum Stage {
 /// How a tracer turns a stream into a shader.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Variant {
-    /// Compute tracer: rays to memory.
+    /// Compute tracer: generates rays into memory.
     Generate,
     /// The same for devices with 64-bit integers and subgroup ballots.
     Generate64,
-    /// Compute tracer: hits to the pass.
+    /// Compute tracer: passes hits to the pass's callback.
     Deliver,
     /// The same for devices with 64-bit integers and subgroup ballots.
     Deliver64,
-    /// Compute tracer: the rays of a subgroup together.
+    /// Compute tracer: traces the rays of a subgroup together.
     Packet,
-    /// Compute tracer: the readable kernel over a binary tree.
+    /// Compute tracer: the `bvh2` kernel over a binary tree, written for readability.
     Bvh2,
-    /// Compute tracer: every primitive of every instance.
+    /// Compute tracer: the `brute` kernel, which tests every primitive of every instance.
     Brute,
     /// Query tracer.
     Query,
     /// Pipeline tracer.
     Raygen,
-    /// No tracer: what is at each pixel was rasterized.
+    /// No tracer: reads a rasterized visibility buffer.
     Visibility,
 }
 
@@ -114,7 +114,7 @@ impl Variant {
         Self::Visibility,
     ];
 
-    /// Is there such a shader of streams whose rays come from there?
+    /// Returns true if streams with this source of rays have this variant.
     pub fn applies_to(self, rays: Rays) -> bool {
         match self {
             Self::Generate | Self::Generate64 | Self::Packet => rays != Rays::Queue,
@@ -149,15 +149,15 @@ impl Variant {
     }
 }
 
-/// Where the shaders of the feature `probes` are, in the source tree: only tests use them, and they include what is in shaders/.
+/// Folder of the test shaders of the feature `probes`, in the source tree; they include files of shaders/.
 #[cfg_attr(not(feature = "live-shaders"), allow(dead_code, reason = "a program that has SPIR-V compiles nothing"))]
 pub const PROBES: &str = "tests/shaders";
 
-/// Files that shaders include and that are not in shaders/: those that are made, and with the feature `probes` the tests' own. `manifest`: the source tree.
+/// Files that shaders include and that are not in shaders/: generated ones, and with the feature `probes` those of the tests. `manifest`: the source tree.
 #[cfg_attr(not(feature = "live-shaders"), allow(dead_code, reason = "a program that has SPIR-V compiles nothing"))]
 pub fn generated_files(mut made: Vec<(String, String)>, manifest: &Path) -> Vec<(String, String)> {
     if cfg!(feature = "probes") {
-        // what cannot be read, the compiler misses by name
+        // the compiler reports files that cannot be read
         for entry in std::fs::read_dir(manifest.join(PROBES)).into_iter().flatten().flatten() {
             let name = entry.file_name().to_string_lossy().into_owned();
             if name.ends_with(".glsl")
@@ -170,7 +170,7 @@ pub fn generated_files(mut made: Vec<(String, String)>, manifest: &Path) -> Vec<
     made
 }
 
-/// What one shader is compiled from.
+/// The source of a shader.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Source {
     /// A stream in a tracer's template.
@@ -182,14 +182,14 @@ pub enum Source {
         /// The template.
         variant: Variant,
     },
-    /// A pass that traces nothing.
+    /// A pass that traces no rays.
     Compute {
         /// File in shaders/, without its ending.
         pass: &'static str,
         /// For devices with 64-bit integers.
         int64: bool,
     },
-    /// The compute tracer's fast kernel: no stream's code is in it.
+    /// The compute tracer's wide kernel, which contains no code of a stream.
     Kernel {
         /// What rays ask for.
         mode: Mode,
@@ -215,7 +215,7 @@ impl Source {
         }
     }
 
-    /// The text, with its includes as they stand. `shaders`: the folder.
+    /// The GLSL text, with unresolved includes. `shaders`: the folder.
     ///
     /// # Errors
     /// A file that cannot be read, in words.
@@ -258,7 +258,7 @@ impl fmt::Display for Source {
     }
 }
 
-// the words of registry.rs
+// the keywords of registry.rs
 macro_rules! mode {
     (any) => {
         Mode::Any

@@ -30,8 +30,8 @@ fn usage_errors() {
     refuses(&["render", "builtin:plane"], 64, "--output");
     refuses(&["render", "builtin:plane", "-o", "a.jpg"], 64, ".exr or .png");
     refuses(&["render", "builtin:plane", "-o", "a.png", "--aov", "depth"], 64, "--aov needs an .exr");
-    refuses(&render(&["--aov", "bent"]), 64, "--aov bent is of frames in real time");
-    refuses(&render(&["--preset", "fast", "--show", "normal"]), 64, "--show is of .png and .apng");
+    refuses(&render(&["--aov", "bent"]), 64, "--aov bent is for frames in real time");
+    refuses(&render(&["--preset", "fast", "--show", "normal"]), 64, "--show is for .png and .apng");
     refuses(&["render", "builtin:plane", "-o", "a.png", "--preset", "larsen", "--show", "samples"], 64, "counts no samples");
     refuses(&["render", "builtin:plane", "-o", "a.png", "--technique", "gtao", "--show", "bent"], 64, "technique traced");
     refuses(&render(&["--preset", "larsen-fixed", "--budget", "variance"]), 64, "1 to 4 rays per pixel");
@@ -53,7 +53,7 @@ fn usage_errors() {
     refuses(&render(&["--triangle-test", "none"]), 64, "watertight, moller-trumbore");
     refuses(&render(&["--tracer", "pipeline", "--build", "best"]), 64, "--tracer compute");
     refuses(&render(&["--traversal", "brute", "--build", "best"]), 64, "has no hierarchy");
-    refuses(&render(&["--resumable", "--preset", "fast"]), 64, "--resumable is for stills, and --preset asks for frames");
+    refuses(&render(&["--resumable", "--preset", "fast"]), 64, "--resumable is for stills, and --preset selects frames");
     refuses(&render(&["--resume", "a.exr", "--dump-rays", "r"]), 64, "leave --dump-rays out");
     refuses(&render(&["--integrator", "path", "--target-rmse", "0"]), 64, "above 0");
     refuses(&render(&["--integrator", "path", "--resume", "a.png"]), 64, "--resume a.png: only an .exr");

@@ -151,7 +151,7 @@ fn gpu_a_film_goes_on_only_as_it_was_begun() {
     other.metadata.iter_mut().filter(|(key, _)| key == "tracer").for_each(|(_, tracer)| *tracer = "another".into());
     output::save(&other, film.as_ref()).unwrap();
     let record = render(&["--spp", "8", "--resume", &film, "-o", &out]);
-    assert!(record["warnings"][0].as_str().unwrap().contains("was begun with tracer another"), "{record}");
+    assert!(record["warnings"][0].as_str().unwrap().contains("was started with tracer another"), "{record}");
 }
 
 #[test]

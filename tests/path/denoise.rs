@@ -209,7 +209,7 @@ fn wrong_uses_of_denoisers_are_told() {
         "--denoise has no effect on --integrator ao: leave it out, or use --integrator path, direct or ao-sky",
     );
     with(&["--denoise", "filter", "--integrator", "albedo"], 64, "--denoise has no effect on --integrator albedo");
-    with(&["--denoise", "filter", "--preset", "fast"], 64, "--denoise is for stills, and --preset asks for frames");
+    with(&["--denoise", "filter", "--preset", "fast"], 64, "--denoise is for stills, and --preset selects frames");
     if !cfg!(feature = "oidn") {
         with(&["--denoise", "oidn", "--integrator", "path"], 2, "build with --features oidn, or use --denoise filter");
     } else if skylit::gpu::oidn::Oidn::open().is_err() {

@@ -137,7 +137,7 @@ fn what_does_not_go_together_is_refused() {
         (&["--preset", "fast", "--frames", "3..3", "-o", &apng], "no frames"),
         (&["--preset", "fast", "--frames", "x", "-o", &apng], "A..B"),
         (&["--preset", "slow", "-o", &png], "balanced"),
-        (&["--preset", "fast", "--fps", "0", "-o", &png], "frames a second"),
+        (&["--preset", "fast", "--fps", "0", "-o", &png], "frames per second"),
         (&["--preset", "fast", "--rays-per-pixel", "0", "-o", &png], "--rays-per-pixel"),
         (&["--preset", "fast", "--rays-per-pixel", "5000", "-o", &png], "--rays-per-pixel"),
         (&["--preset", "fast", "--history", "0", "-o", &png], "--history"),

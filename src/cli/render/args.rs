@@ -1,4 +1,4 @@
-//! What `skylit render` takes: a scene, settings, and where images go.
+//! The arguments of `skylit render`: a scene, settings, and output files.
 
 use std::path::{Path, PathBuf};
 
@@ -33,7 +33,7 @@ pub struct RenderArgs {
     /// What is rendered, and how
     #[command(flatten)]
     pub settings: RenderSettings,
-    /// What it runs on
+    /// Device and tracer
     #[command(flatten)]
     pub device: DeviceSettings,
     /// How results are shown
@@ -42,23 +42,23 @@ pub struct RenderArgs {
 }
 
 impl RenderArgs {
-    /// Will an .exr be written?
+    /// Returns true if an .exr is written.
     pub fn writes_exr(&self) -> bool {
         self.output.iter().any(|p| ImageFormat::of(p).is_ok_and(|f| f == ImageFormat::Exr))
     }
 
-    /// Will a picture be written, a still or an animation, rather than numbers?
+    /// Returns true if an 8-bit image or animation is written.
     pub fn writes_picture(&self) -> bool {
         self.output.iter().any(|p| apng::is_apng(p) || ImageFormat::of(p).is_ok_and(|f| f == ImageFormat::Png))
     }
 
-    /// Checks what concerns more than one option.
+    /// Checks conditions on more than one option.
     pub fn check(&self) -> Result<()> {
         self.device.check()?;
         self.settings.check()?;
         let wrong = |text: String| Err(Error::Usage(text));
         if self.settings.frames.show.is_some() && !self.writes_picture() {
-            return wrong("--show is of .png and .apng outputs: an .exr has its channels, see --aov".into());
+            return wrong("--show is for .png and .apng outputs: for an .exr use --aov".into());
         }
         let frames = self.settings.realtime_setting();
         let images = self.output.iter().filter(|p| frames.is_none() || !apng::is_apng(p));
@@ -69,7 +69,7 @@ impl RenderArgs {
             (self.dump_rays.is_some(), "--dump-rays", "leave it out"),
         ];
         if let (Some(frames), Some((_, option, remedy))) = (frames, of_stills.iter().find(|o| o.0)) {
-            return wrong(format!("{option} is for stills, and {} asks for frames in real time: {remedy}", frames.option()));
+            return wrong(format!("{option} is for stills, and {} selects frames in real time: {remedy}", frames.option()));
         }
         if self.dump_rays.is_some() && self.settings.integrator().name() != "ao" {
             let name = self.settings.integrator().name();
@@ -101,14 +101,14 @@ impl RenderArgs {
         }
     }
 
-    /// Every file that will be written.
+    /// All files that will be written.
     pub fn outputs(&self) -> Vec<PathBuf> {
         let dumps = self.dump_rays.iter().flat_map(|p| [dump_path(p, "primary"), dump_path(p, "ao")]);
         self.output.iter().chain(&self.depth_image).cloned().chain(dumps).collect()
     }
 }
 
-/// PREFIX.KIND.bin; the prefix may hold dots itself.
+/// PREFIX.KIND.bin; the prefix may contain dots.
 pub fn dump_path(prefix: &Path, kind: &str) -> PathBuf {
     let mut name = prefix.as_os_str().to_owned();
     name.push(format!(".{kind}.bin"));

@@ -1,4 +1,4 @@
-//! Where frames go: files by number, or one animation.
+//! Output of frames: numbered files, or an animation.
 
 use std::path::PathBuf;
 
@@ -8,7 +8,7 @@ use crate::output::apng::{self, Animation, ApngWriter, Delay};
 use crate::output::png::{self, Colour};
 use crate::output::{self, Image, ImageFormat, frames};
 
-/// Everything that frames are written to.
+/// The files that frames are written to.
 pub struct FrameFiles {
     images: Vec<PathBuf>,
     pictures: Vec<PathBuf>,
@@ -17,7 +17,7 @@ pub struct FrameFiles {
 }
 
 impl FrameFiles {
-    /// Starts the animations. They appear when [`FrameFiles::finish`] is called. `colour`: of pictures.
+    /// Starts the animations, which appear when [`FrameFiles::finish`] is called. `colour`: colour type of 8-bit files.
     pub fn create(outputs: &[PathBuf], size: [u32; 2], frames: u32, fps: f64, colour: Colour) -> Result<Self> {
         let (animations, files): (Vec<_>, Vec<_>) = outputs.iter().cloned().partition(|p| apng::is_apng(p));
         let (mut images, mut pictures) = (Vec::new(), Vec::new());
@@ -29,7 +29,7 @@ impl FrameFiles {
         Ok(Self { images, pictures, animations: animations.iter().map(start).collect::<Result<_>>()?, colour })
     }
 
-    /// Writes a frame: its channels, and what is shown of it ([`crate::renderer::Frames::displayed`]), each where there are files for it.
+    /// Writes a frame: its channels to .exr files, and its display ([`crate::renderer::Frames::displayed`]) to 8-bit files and animations.
     pub fn add(&mut self, number: u32, [width, height]: [u32; 2], image: Option<&Image>, shown: Option<&Buffer>) -> Result<()> {
         if let Some(image) = image {
             for path in &self.images {
@@ -56,7 +56,7 @@ impl FrameFiles {
         Ok(())
     }
 
-    /// Closes the animations.
+    /// Finishes the animations.
     pub fn finish(self) -> Result<()> {
         self.animations.into_iter().try_for_each(ApngWriter::finish)
     }

@@ -1,4 +1,4 @@
-//! `skylit render`: a scene to images, stills or frames in real time.
+//! `skylit render`: renders a scene, stills or frames in real time.
 
 mod args;
 mod frame_files;
@@ -61,7 +61,7 @@ fn still(args: &RenderArgs, start: Instant) -> Result<(), Failure> {
         console.line(&line)?;
     }
     if report.setup.wants_depth_image && args.depth_image.is_none() {
-        console.line("the scene asks for a depth image: add --depth-image FILE")?;
+        console.line("the scene requests a depth image: add --depth-image FILE")?;
     }
     let mut record = report.record(args.explain);
     record["output"] = serde_json::json!(args.output);
@@ -71,7 +71,7 @@ fn still(args: &RenderArgs, start: Instant) -> Result<(), Failure> {
 
 fn frames(args: &RenderArgs, start: Instant) -> Result<(), Failure> {
     let timeline = &args.settings.frames;
-    // wrong settings are told of before anything is loaded
+    // report invalid settings before anything is loaded
     crate::renderer::frames::frame_settings(&args.settings)?;
     timeline.check_outputs(&args.output)?;
     let range = timeline.range();
@@ -111,7 +111,7 @@ fn frames(args: &RenderArgs, start: Instant) -> Result<(), Failure> {
     console.close(&record, Ok(()))
 }
 
-/// The progress and the progress bar; warnings are shown at once.
+/// Progress bar and interruption by Ctrl-C; warnings are printed at once.
 struct CliControl {
     progress: ProgressControl,
     console: Console,
@@ -138,19 +138,19 @@ impl Control for CliControl {
     }
 }
 
-/// The outputs, for people.
+/// The outputs' names in a line.
 fn names(args: &RenderArgs) -> String {
     args.output.iter().map(|p| p.display().to_string()).collect::<Vec<_>>().join(", ")
 }
 
-/// Can all that is saved on the way be written? Asked before long work starts.
+/// Checks before rendering starts that intermediate images can be written.
 fn check_intervals(args: &RenderArgs, hints: &RenderHints, spp: u32) -> Result<()> {
     let intervals = crate::renderer::still::intervals(&args.settings, hints, spp);
     let check = |path: &PathBuf| intervals.iter().try_for_each(|&n| files::check_writable(&interval_path(path, n)));
     args.output.iter().try_for_each(check)
 }
 
-/// NAME.0016.exr: the name of an output once it has `samples` samples.
+/// NAME.0016.exr: name of an output's intermediate image with `samples` samples.
 fn interval_path(path: &Path, samples: u32) -> PathBuf {
     let mut name = OsString::from(path.file_stem().unwrap_or_default());
     name.push(format!(".{samples:04}"));
