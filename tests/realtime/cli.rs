@@ -133,7 +133,7 @@ fn what_does_not_go_together_is_refused() {
         |extra: &[&str]| [&["render", "builtin:stairs"], extra].concat().iter().map(|s| (*s).to_owned()).collect::<Vec<_>>();
     for (extra, says) in [
         (&["--preset", "fast", "--frames", "0..3", "-o", &exr][..], "a # for each digit"),
-        (&["--preset", "fast", "--frames", "0..3", "-o", &pattern], "leave the # out"),
+        (&["--preset", "fast", "--frames", "0..3", "-o", &pattern], "leave out the #"),
         (&["--preset", "fast", "--frames", "3..3", "-o", &apng], "no frames"),
         (&["--preset", "fast", "--frames", "x", "-o", &apng], "A..B"),
         (&["--preset", "slow", "-o", &png], "balanced"),

@@ -32,8 +32,8 @@ fn settings_out_of_range_are_named() {
         (Settings { clamp: -1.0, ..good }, "clamp"),
         (Settings { clamp: f32::NAN, ..good }, "clamp"),
         (Settings { moved_weight: -0.1, ..good }, "moved weight"),
-        (Settings { filter: filter(-1.0), ..good }, "samples of the filter"),
-        (Settings { filter: filter(f32::NAN), ..good }, "samples of the filter"),
+        (Settings { filter: filter(-1.0), ..good }, "filter samples"),
+        (Settings { filter: filter(f32::NAN), ..good }, "filter samples"),
     ] {
         let error = settings.check().expect_err(says);
         assert!(matches!(error, Error::Usage(_)) && error.exit_code() == 64, "{error}");
