@@ -61,18 +61,18 @@ pub fn check_writable(path: &Path) -> Result<()> {
     check().map_err(|e| Error::write(path, &e))
 }
 
-/// A file that is written beside its place and takes it once it is complete. What was there before stays until then; dropped
+/// A file that is written beside its target and takes it once it is complete. What was there before stays until then; dropped
 /// before, it leaves nothing behind. An existing file keeps its permissions, a symbolic link stays a link; a device or FIFO
 /// receives the bytes once they are all there.
 #[derive(Debug)]
 pub struct AtomicFile {
     /// As the user named it.
     path: PathBuf,
-    place: Place,
+    destination: Destination,
 }
 
 #[derive(Debug)]
-enum Place {
+enum Destination {
     Beside { file: tempfile::NamedTempFile, path: PathBuf, permissions: Option<Permissions> },
     Stream(File),
 }
@@ -80,19 +80,19 @@ enum Place {
 impl AtomicFile {
     /// An empty one that is to become `path`.
     pub fn create(path: &Path) -> Result<Self> {
-        let place = || match target(path)? {
-            Target::File { path, permissions } => Ok(Place::Beside { file: temporary_beside(&path)?, path, permissions }),
-            Target::Stream => Ok(Place::Stream(tempfile::tempfile()?)),
+        let destination = || match target(path)? {
+            Target::File { path, permissions } => Ok(Destination::Beside { file: temporary_beside(&path)?, path, permissions }),
+            Target::Stream => Ok(Destination::Stream(tempfile::tempfile()?)),
         };
-        let place = place().map_err(|e| Error::write(path, &e))?;
-        Ok(Self { path: path.to_owned(), place })
+        let destination = destination().map_err(|e| Error::write(path, &e))?;
+        Ok(Self { path: path.to_owned(), destination })
     }
 
     /// Where to write.
     pub fn file(&mut self) -> &mut File {
-        match &mut self.place {
-            Place::Beside { file, .. } => file.as_file_mut(),
-            Place::Stream(file) => file,
+        match &mut self.destination {
+            Destination::Beside { file, .. } => file.as_file_mut(),
+            Destination::Stream(file) => file,
         }
     }
 
@@ -103,15 +103,15 @@ impl AtomicFile {
 
     /// Puts what was written in its place.
     pub fn commit(self) -> Result<()> {
-        let Self { path: named, place } = self;
-        let run = || match place {
-            Place::Beside { file, path, permissions } => {
+        let Self { path: named, destination } = self;
+        let run = || match destination {
+            Destination::Beside { file, path, permissions } => {
                 if let Some(permissions) = permissions {
                     file.as_file().set_permissions(permissions)?;
                 }
                 file.persist(&path).map(drop).map_err(|e| e.error)
             }
-            Place::Stream(mut file) => {
+            Destination::Stream(mut file) => {
                 file.rewind()?;
                 io::copy(&mut file, &mut OpenOptions::new().write(true).open(&named)?).map(drop)
             }

@@ -12,7 +12,7 @@ use obvhs::bvh2::node::Bvh2Node;
 use rayon::prelude::*;
 
 use super::clip::Triangles;
-use super::reinsert::{self, Effort};
+use super::reinsert::{self, ReinsertionOptions};
 use super::{Aabb, sah, spatial};
 
 /// No tree is deeper than this (inner nodes on the longest path). 2^27 primitives in a balanced tree need 27.
@@ -42,11 +42,11 @@ impl BuildPreset {
         if primitives >= 10_000_000 || rays < primitives as u64 { Self::Fast } else { Self::Default }
     }
 
-    fn effort(self) -> Effort {
+    fn effort(self) -> ReinsertionOptions {
         match self {
-            Self::Fast => Effort { share: 0.0, rounds: 0, worthwhile: 1.0 },
-            Self::Default => Effort { share: 0.003, rounds: 16, worthwhile: 0.001 },
-            Self::Best => Effort { share: 0.02, rounds: 16, worthwhile: 0.001 },
+            Self::Fast => ReinsertionOptions { share: 0.0, rounds: 0, worthwhile: 1.0 },
+            Self::Default => ReinsertionOptions { share: 0.003, rounds: 16, worthwhile: 0.001 },
+            Self::Best => ReinsertionOptions { share: 0.02, rounds: 16, worthwhile: 0.001 },
         }
     }
 }

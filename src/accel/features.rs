@@ -31,7 +31,7 @@ pub enum Blend {
     #[default]
     Masked,
     /// There with a probability of alpha, drawn anew for each ray: what paths ask. Spheres, which have no coordinates to draw by, are masked.
-    Covered,
+    Stochastic,
 }
 
 /// Class of each mesh of the scene, from the range of alpha that its material and vertices can reach.
@@ -57,7 +57,7 @@ pub fn alpha_classes(scene: &Scene, blend: Blend) -> Vec<AlphaClass> {
             }
             // interpolation rounds: a range that just reaches the cutoff is tested
             let margin = 1e-5;
-            let covered = blend == Blend::Covered && material.alpha_mode == AlphaMode::Blend;
+            let covered = blend == Blend::Stochastic && material.alpha_mode == AlphaMode::Blend;
             if covered && matches!(mesh.geometry, Geometry::Triangles(_)) {
                 return match (lo >= 1.0 - margin, hi <= 0.0) {
                     (true, _) => AlphaClass::Opaque,
@@ -90,8 +90,8 @@ fn alpha_range(texels: &TexelData) -> (f32, f32) {
 pub struct SceneFeatures {
     /// Some triangles are alpha tested.
     pub alpha: bool,
-    /// Some of them are there for a part of the rays ([`Blend::Covered`]).
-    pub coverage: bool,
+    /// Some of them are there for a part of the rays ([`Blend::Stochastic`]).
+    pub stochastic_alpha: bool,
     /// Some textures have more than 8 bits a channel.
     pub deep_texels: bool,
     /// There are analytic spheres.
@@ -107,7 +107,7 @@ impl SceneFeatures {
     pub fn of(flat: &FlatScene) -> Self {
         Self {
             alpha: flat.has_alpha(),
-            coverage: flat.has_coverage(),
+            stochastic_alpha: flat.has_stochastic_alpha(),
             deep_texels: flat.scene.textures.iter().any(|t| !matches!(t.texels, TexelData::Unorm8(_))),
             spheres: flat.has_spheres(),
             single_level: flat.is_single_level(),
@@ -137,7 +137,11 @@ impl SceneFeatures {
                 if n == 1 { "" } else { "es" }
             ));
         } else {
-            lines.push(format!("two levels: {} groups, {} entries in the top level", flat.groups.len(), flat.placements.len()));
+            lines.push(format!(
+                "two levels: {} groups, {} entries in the top level",
+                flat.groups.len(),
+                flat.tlas_instances.len()
+            ));
         }
         if flat.absent_primitives > 0 {
             lines.push(format!("{} primitives are transparent everywhere and left out", flat.absent_primitives));

@@ -15,8 +15,8 @@ pub mod wide;
 
 pub use build::BuildPreset;
 pub use bvh2::Bvh2;
-pub use refit::{RefitPlan, RefitPolicy, Refitted};
-pub use wide::Wide;
+pub use refit::{RefitPlan, RefitPolicy, RefitResult};
+pub use wide::WideBvh;
 
 /// An axis-aligned box in f32.
 #[derive(Clone, Copy, Debug, PartialEq)]

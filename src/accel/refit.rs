@@ -9,7 +9,7 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 use super::Aabb;
-use super::wide::{self, Block, WIDTH, Wide};
+use super::wide::{self, Block, WIDTH, WideBvh};
 
 /// Blocks of a part that is refitted by one thread, at least: below that the hand-over costs more than the work.
 const TASK_BLOCKS: usize = 2048;
@@ -28,10 +28,10 @@ pub struct RefitPlan {
 
 /// What a refit found.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Refitted {
+pub struct RefitResult {
     /// Bounds of everything, padded; `None` over nothing.
     pub bounds: Option<Aabb>,
-    /// As [`Wide::sah_cost`], for the boxes as they are now.
+    /// As [`WideBvh::sah_cost`], for the boxes as they are now.
     pub sah_cost: f64,
 }
 
@@ -83,7 +83,7 @@ pub fn refit(
     plan: &RefitPlan,
     pad: f32,
     leaf: impl Fn(&mut Block) -> Aabb + Sync,
-) -> Refitted {
+) -> RefitResult {
     let padded = |block: &mut Block| {
         let b = leaf(block);
         Aabb { min: b.min - pad, max: b.max + pad }
@@ -128,9 +128,9 @@ pub fn refit(
         Some(b) if b.min.cmple(b.max).all() => {
             // a point or a line has no area, and all is in one place
             let whole = b.half_area() as f64;
-            Refitted { bounds: Some(*b), sah_cost: if whole > 0.0 { area / whole } else { blocks.len() as f64 } }
+            RefitResult { bounds: Some(*b), sah_cost: if whole > 0.0 { area / whole } else { blocks.len() as f64 } }
         }
-        _ => Refitted { bounds: None, sah_cost: 0.0 },
+        _ => RefitResult { bounds: None, sah_cost: 0.0 },
     }
 }
 
@@ -152,7 +152,7 @@ fn fit(block: &mut Block, leaf: &impl Fn(&mut Block) -> Aabb, box_of: impl Fn(u3
     bounds
 }
 
-impl Wide {
+impl WideBvh {
     /// Refits this tree, for callers that keep it on the host: see [`refit`].
     pub fn refit(&mut self, plan: &RefitPlan, pad: f32, leaf: impl Fn(&mut Block) -> Aabb + Sync) {
         let refitted = refit(&mut self.blocks, 0, plan, pad, leaf);
@@ -181,7 +181,7 @@ impl RefitPolicy {
     /// Growth of the SAH cost at which a tree is built anew while no trace was timed.
     pub const GROWTH_UNTIMED: f64 = 1.4;
 
-    /// For a tree that was built in `build_seconds` with this [`Wide::sah_cost`].
+    /// For a tree that was built in `build_seconds` with this [`WideBvh::sah_cost`].
     pub fn new(sah_cost: f64, build_seconds: f64) -> Self {
         Self { built_cost: sah_cost, growth: 1.0, build_seconds, refit_seconds: 0.0, lost_seconds: 0.0, timed: false }
     }
@@ -247,12 +247,12 @@ mod tests {
             .collect()
     }
 
-    fn tree(boxes: &[Aabb]) -> Wide {
+    fn tree(boxes: &[Aabb]) -> WideBvh {
         if boxes.is_empty() {
-            return Wide::default();
+            return WideBvh::default();
         }
         let padded: Vec<_> = boxes.iter().map(|b| Aabb { min: b.min - PAD, max: b.max + PAD }).collect();
-        Wide::collapse(&build::tree(&padded, BuildPreset::Default, None), wide::tests::of_item)
+        WideBvh::collapse(&build::tree(&padded, BuildPreset::Default, None), wide::tests::of_item)
     }
 
     const SIZES: [usize; 10] = [0, 1, 2, 7, 8, 50, 1000, 5000, 20_000, 70_000];

@@ -48,7 +48,7 @@ const SMALLEST_BATCH: usize = 512;
 
 /// How long to optimise.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Effort {
+pub struct ReinsertionOptions {
     /// Share of the nodes (0 to 1) that a round looks at, largest first.
     pub share: f32,
     /// Most rounds.
@@ -58,7 +58,7 @@ pub struct Effort {
 }
 
 /// Optimises a tree. Afterwards children may have lower numbers than their parents.
-pub fn optimise(nodes: &mut [Bvh2Node], effort: Effort) {
+pub fn optimise(nodes: &mut [Bvh2Node], effort: ReinsertionOptions) {
     if nodes.len() < 7 || effort.rounds == 0 {
         return;
     }

@@ -1,5 +1,5 @@
 //! The hierarchy that `shaders/trace/wide.glsl` walks: up to seven children a node, boxes quantised to eight bits a plane (after
-//! Ylitie, Karras, Laine, "Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs", HPG 2017).
+//! Ylitie, Karras, Laine, "Efficient Incoherent Ray Traversal on GPUs Through Compressed WideBvh BVHs", HPG 2017).
 //!
 //! Nodes and leaves are blocks of 64 bytes, a cache line, in one array; the children of a node lie side by side. So a group of
 //! siblings is one number and a few bits, and one fetch serves whatever is next. Which nodes of the binary tree become wide ones is chosen
@@ -26,7 +26,7 @@ const TASKS: usize = 256;
 
 /// A wide hierarchy.
 #[derive(Clone, Debug)]
-pub struct Wide {
+pub struct WideBvh {
     /// Nodes and leaves; the root node is the first. There is one even over nothing.
     pub blocks: Vec<Block>,
     /// Nodes on the longest path from the root.
@@ -46,13 +46,13 @@ struct Piece {
     inserts: Vec<(u32, usize, u32)>,
 }
 
-impl Default for Wide {
+impl Default for WideBvh {
     fn default() -> Self {
         Self { blocks: vec![Block::default()], depth: 1, bounds: None, sah_cost: 0.0 }
     }
 }
 
-impl Wide {
+impl WideBvh {
     /// Collapses a binary tree whose leaves hold one item each, and whose boxes are padded by what quantisation and traversal round
     /// away. `leaf` makes an item's block.
     pub fn collapse(tree: &Bvh2, leaf: impl Fn(u32) -> Block + Sync) -> Self {
@@ -394,12 +394,12 @@ pub(super) mod tests {
         block
     }
 
-    fn tree(boxes: &[Aabb]) -> Wide {
+    fn tree(boxes: &[Aabb]) -> WideBvh {
         if boxes.is_empty() {
-            return Wide::default();
+            return WideBvh::default();
         }
         let binary = build::tree(boxes, BuildPreset::Default, None);
-        Wide::collapse(&binary, of_item)
+        WideBvh::collapse(&binary, of_item)
     }
 
     /// Areas beyond the range of a float, below it, and none at all.
@@ -413,7 +413,7 @@ pub(super) mod tests {
         }
     }
 
-    fn check(tree: &Wide, boxes: &[Aabb]) -> Result<(), String> {
+    fn check(tree: &WideBvh, boxes: &[Aabb]) -> Result<(), String> {
         let mut items: Vec<u32> = tree.blocks.iter().filter(|b| is_leaf(b)).map(|b| b.body[0]).collect();
         items.sort_unstable();
         if items != (0..boxes.len() as u32).collect::<Vec<_>>() {

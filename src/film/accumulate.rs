@@ -8,10 +8,10 @@ use std::time::{Duration, Instant};
 use super::block::{Block, BlockParams, TILE_PIXELS};
 use super::camera::CameraRecord;
 use super::convergence::{TileCount, TileErrors};
-use super::cover::Cover;
-use super::pace::{MOST, Pace};
+use super::pace::{MAX_RAYS, Pace};
 use super::schedule::{FilmOptions, Step};
 use super::state::{FilmState, tiles};
+use super::tile_mask::TileMask;
 use super::{Film, FilmPixel, MAX_CHANNELS, record_bytes, record_words};
 use crate::error::{Error, Result};
 use crate::film::Control;
@@ -50,7 +50,7 @@ pub(crate) struct Plan<'a> {
     /// Stop after this time with what there is.
     pub time_limit: Option<Duration>,
     /// Which tiles of the image show anything; without it all are traced.
-    pub cover: Option<&'a Cover>,
+    pub tile_mask: Option<&'a TileMask>,
     /// What the film starts from, and where it stops on its way.
     pub film: &'a FilmOptions,
 }
@@ -65,7 +65,7 @@ pub struct Accumulated {
     /// Samples that every pixel got.
     pub spp: u32,
     /// Samples that any pixel got at most.
-    pub most_spp: u32,
+    pub max_spp: u32,
     /// Stopped before all samples were taken.
     pub stopped_early: bool,
     /// Tiles that know enough, where there is a target.
@@ -85,14 +85,14 @@ pub struct Accumulated {
 }
 
 /// Rays of a launch at most, for a plan: what an estimator's buffers hold.
-pub(crate) fn most_rays(size: [u32; 2], spp: u32) -> u32 {
-    let most_pixels = Block::cut(size).iter().map(Block::rays).max().unwrap_or(0) as u64;
+pub(crate) fn max_rays(size: [u32; 2], spp: u32) -> u32 {
+    let max_pixels = Block::cut(size).iter().map(Block::rays).max().unwrap_or(0) as u64;
     let bits = Batch::next(0, spp.max(1), u32::MAX).bits;
-    (most_pixels << bits).min(MOST as u64) as u32
+    (max_pixels << bits).min(MAX_RAYS as u64) as u32
 }
 
 /// Tiles of a block that have as many samples, and get more together.
-struct Group {
+struct TileGroup {
     block: Block,
     // place of the block among all
     number: usize,
@@ -105,7 +105,7 @@ struct Group {
 }
 
 /// A group's pixels on the device, and their film.
-struct Plot {
+struct PixelBatch {
     params: BlockParams,
     tiles: Option<Vec<u32>>,
     pixels: u32,
@@ -238,9 +238,9 @@ impl Rate {
 impl<E: Estimator> Run<'_, E> {
     /// Takes the samples of a step; says whether it had to stop before all of the plan's were taken.
     fn step(&mut self, step: &Step, control: &mut dyn Control) -> Result<bool> {
-        let groups: Vec<Group> =
+        let groups: Vec<TileGroup> =
             self.blocks.iter().enumerate().flat_map(|(number, block)| self.groups(step, number, block)).collect();
-        let work = |g: &Group| f64::from(step.goal - g.first) * g.tiles.len() as f64;
+        let work = |g: &TileGroup| f64::from(step.goal - g.first) * g.tiles.len() as f64;
         let (mut to_do, mut late, mut asked) = (groups.iter().map(work).sum::<f64>(), false, false);
         let pixels_of = |tiles: usize| tiles as u64 * u64::from(TILE_PIXELS);
         let total = pixels_of(self.tile_samples.len()) * u64::from(self.plan.spp);
@@ -257,7 +257,7 @@ impl<E: Estimator> Run<'_, E> {
                 let left = limit.saturating_sub(self.start.elapsed());
                 Instant::now() + left.mul_f64(share.min(1.0))
             });
-            let mut plot = self.plot(&group)?;
+            let mut pixel_batch = self.pixel_batch(&group)?;
             let (pixels, mut sample) = (pixels_of(group.tiles.len()), group.first);
             while sample < step.goal {
                 let keep = self.launcher.estimator.keeps_first() && sample == 0;
@@ -265,7 +265,7 @@ impl<E: Estimator> Run<'_, E> {
                 let most = match deadline {
                     _ if keep => 1,
                     None => u32::MAX,
-                    Some(d) => self.rates[group.number].fit(d.saturating_duration_since(Instant::now()), plot.pixels),
+                    Some(d) => self.rates[group.number].fit(d.saturating_duration_since(Instant::now()), pixel_batch.pixels),
                 };
                 let batch = Batch::next(sample, step.goal, most);
                 let before = done + pixels * u64::from(sample - group.first);
@@ -274,7 +274,7 @@ impl<E: Estimator> Run<'_, E> {
                     control.progress(before + part, total);
                 };
                 let began = Instant::now();
-                let taken = self.launcher.batch(&mut plot, batch, keep, &mut self.out, control, &mut report)?;
+                let taken = self.launcher.batch(&mut pixel_batch, batch, keep, &mut self.out, control, &mut report)?;
                 let Some(batch) = taken else {
                     asked = true;
                     break;
@@ -282,7 +282,7 @@ impl<E: Estimator> Run<'_, E> {
                 sample += batch.samples();
                 let rate = &mut self.rates[group.number];
                 rate.seconds += began.elapsed().as_secs_f64();
-                rate.samples += u64::from(plot.pixels) * u64::from(batch.samples());
+                rate.samples += u64::from(pixel_batch.pixels) * u64::from(batch.samples());
                 control.progress(done + pixels * u64::from(sample - group.first), total);
                 if sample >= self.plan.spp {
                     break;
@@ -295,13 +295,13 @@ impl<E: Estimator> Run<'_, E> {
                 }
             }
             done += pixels * u64::from(step.goal - group.first);
-            self.take(&group, &plot, sample)?;
+            self.take(&group, &pixel_batch, sample)?;
         }
         Ok(late || asked)
     }
 
     /// The tiles of a block that a step is about, those with as many samples together.
-    fn groups(&self, step: &Step, number: usize, block: &Block) -> Vec<Group> {
+    fn groups(&self, step: &Step, number: usize, block: &Block) -> Vec<TileGroup> {
         let width = self.plan.size[0];
         let mut of_samples: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
         for tile in 0..block.tiles() {
@@ -310,7 +310,7 @@ impl<E: Estimator> Run<'_, E> {
                 of_samples.entry(self.tile_samples[at]).or_default().push(tile);
             }
         }
-        let live = self.plan.cover.and_then(|c| c.tiles(block));
+        let live = self.plan.tile_mask.and_then(|c| c.tiles(block));
         let group = |(first, tiles): (u32, Vec<u32>)| {
             let traced = match &live {
                 None if tiles.len() as u32 == block.tiles() => None,
@@ -318,20 +318,20 @@ impl<E: Estimator> Run<'_, E> {
                 // both ascend
                 Some(live) => Some(tiles.iter().copied().filter(|t| live.binary_search(t).is_ok()).collect()),
             };
-            Group { block: *block, number, first, tiles, traced }
+            TileGroup { block: *block, number, first, tiles, traced }
         };
         of_samples.into_iter().map(group).collect()
     }
 
     /// Puts a group on the device, with what its pixels have.
-    fn plot(&mut self, group: &Group) -> Result<Plot> {
+    fn pixel_batch(&mut self, group: &TileGroup) -> Result<PixelBatch> {
         let device = self.launcher.tracer.device();
-        let mut plot = Plot::new(device, group, self.camera, self.plan, self.params, E::CHANNELS)?;
+        let mut pixel_batch = PixelBatch::new(device, group, self.camera, self.plan, self.params, E::CHANNELS)?;
         let record = record_bytes(E::CHANNELS);
         match &self.out.state {
             Some(state) if group.first > 0 => {
-                let (tiles, width) = (plot.tiles.as_deref(), self.plan.size[0]);
-                plot.film.fill(record * plot.pixels as u64, record, |first, bytes| {
+                let (tiles, width) = (pixel_batch.tiles.as_deref(), self.plan.size[0]);
+                pixel_batch.film.fill(record * pixel_batch.pixels as u64, record, |first, bytes| {
                     for (k, bytes) in bytes.chunks_exact_mut(record as usize).enumerate() {
                         match group.place(tiles, first as u32 + k as u32, width) {
                             Some(at) => bytes.copy_from_slice(bytemuck::cast_slice(state.record(at))),
@@ -340,13 +340,13 @@ impl<E: Estimator> Run<'_, E> {
                     }
                 })?;
             }
-            _ => self.launcher.commands.run(|r| r.clear(&plot.film)).map(drop)?,
+            _ => self.launcher.commands.run(|r| r.clear(&pixel_batch.film)).map(drop)?,
         }
-        Ok(plot)
+        Ok(pixel_batch)
     }
 
     /// Takes a group's pixels, which have `samples` samples each now, from the device.
-    fn take(&mut self, group: &Group, plot: &Plot, samples: u32) -> Result<()> {
+    fn take(&mut self, group: &TileGroup, pixel_batch: &PixelBatch, samples: u32) -> Result<()> {
         let (width, out) = (self.plan.size[0], &mut self.out);
         let taken = u64::from(samples - group.first);
         let mut inside = 0u64;
@@ -361,9 +361,9 @@ impl<E: Estimator> Run<'_, E> {
             }
         }
         let (record, mut traced) = (record_bytes(E::CHANNELS), 0u64);
-        plot.film.read_with(0, record * plot.pixels as u64, record, |first, bytes| {
+        pixel_batch.film.read_with(0, record * pixel_batch.pixels as u64, record, |first, bytes| {
             for (k, bytes) in bytes.chunks_exact(record as usize).enumerate() {
-                let Some(at) = group.place(plot.tiles.as_deref(), first as u32 + k as u32, width) else { continue };
+                let Some(at) = group.place(pixel_batch.tiles.as_deref(), first as u32 + k as u32, width) else { continue };
                 let mut words = [0u32; record_words(MAX_CHANNELS)];
                 let words = &mut words[..record_words(E::CHANNELS)];
                 bytemuck::cast_slice_mut::<u32, u8>(words).copy_from_slice(bytes);
@@ -388,12 +388,12 @@ impl<E: Estimator> Run<'_, E> {
     /// What there is to say of the image so far.
     fn sum_up(&mut self) {
         self.out.spp = self.tile_samples.iter().copied().min().unwrap_or(0);
-        self.out.most_spp = self.tile_samples.iter().copied().max().unwrap_or(0);
+        self.out.max_spp = self.tile_samples.iter().copied().max().unwrap_or(0);
         self.out.converged = self.plan.film.target_rmse.map(|target| TileErrors::of(&self.out.film).count(target));
     }
 }
 
-impl Group {
+impl TileGroup {
     /// Place in an image of the given width of the pixel with this number among those on the device; `None` for padding.
     fn place(&self, tiles: Option<&[u32]>, index: u32, width: u32) -> Option<usize> {
         let index = match tiles {
@@ -417,20 +417,20 @@ impl<E: Estimator> Launcher<'_, E> {
     /// and the film is as it was. `report` gets the share of the batch that is done.
     fn batch(
         &mut self,
-        plot: &mut Plot,
+        pixel_batch: &mut PixelBatch,
         mut batch: Batch,
         keep: bool,
         out: &mut Accumulated,
         control: &mut dyn Control,
         report: &mut dyn FnMut(f64, &mut dyn Control),
     ) -> Result<Option<Batch>> {
-        let pass = self.estimator.begin(plot.params, keep)?;
-        plot.save(&mut self.commands, batch)?;
+        let pass = self.estimator.begin(pixel_batch.params, keep)?;
+        pixel_batch.save(&mut self.commands, batch)?;
         let (mut first, mut given_up) = (0u64, false);
-        while first < (plot.pixels as u64) << batch.bits {
-            let all = (plot.pixels as u64) << batch.bits;
+        while first < (pixel_batch.pixels as u64) << batch.bits {
+            let all = (pixel_batch.pixels as u64) << batch.bits;
             // pixels are rendered whole
-            let rays = self.pace.rays().min(MOST);
+            let rays = self.pace.rays().min(MAX_RAYS);
             let wanted = if keep { 1 } else { self.pace.launches() };
             let (begin, start) = (first, Instant::now());
             let mut launches = Vec::new();
@@ -456,7 +456,7 @@ impl<E: Estimator> Launcher<'_, E> {
                 report(first as f64 / all as f64, control);
             }
             if first < all && control.should_stop()? && (batch.first > 0 || batch.bits > 0) {
-                plot.restore(&mut self.commands, batch)?;
+                pixel_batch.restore(&mut self.commands, batch)?;
                 if batch.first > 0 {
                     return Ok(None);
                 }
@@ -470,11 +470,11 @@ impl<E: Estimator> Launcher<'_, E> {
     }
 }
 
-impl Plot {
+impl PixelBatch {
     /// Room for a group's pixels, its film not yet filled.
     fn new(
         device: &Arc<Device>,
-        group: &Group,
+        group: &TileGroup,
         camera: &CameraRecord,
         plan: &Plan,
         params: &BlockParams,

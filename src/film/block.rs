@@ -6,7 +6,7 @@ pub use crate::interface::records::block::{BlockParams, TILE};
 use crate::sampling::morton::morton_pixel;
 
 /// Pixels of a block at most (1920x1080 fits).
-const MOST_PIXELS: u64 = 1 << 21;
+const MAX_PIXELS: u64 = 1 << 21;
 /// Pixels of a tile.
 pub const TILE_PIXELS: u32 = TILE * TILE;
 
@@ -40,8 +40,8 @@ impl Block {
     /// Cuts an image into blocks.
     pub fn cut(size: [u32; 2]) -> Vec<Block> {
         let step = |n: u32, most: u64| (n as u64).min(most).max(1) as u32;
-        let width = step(size[0], MOST_PIXELS / TILE as u64);
-        let rows = MOST_PIXELS / (width.next_multiple_of(TILE) as u64) / TILE as u64 * TILE as u64;
+        let width = step(size[0], MAX_PIXELS / TILE as u64);
+        let rows = MAX_PIXELS / (width.next_multiple_of(TILE) as u64) / TILE as u64 * TILE as u64;
         let height = step(size[1], rows.max(TILE as u64));
         let mut blocks = Vec::new();
         for y in (0..size[1]).step_by(height as usize) {
@@ -102,7 +102,7 @@ mod tests {
         for size in [[1, 1], [7, 3], [64, 64], [1280, 720], [3001, 1403], [1, 20000], [20000, 1]] {
             let mut seen = vec![0u8; size[0] as usize * size[1] as usize];
             for b in Block::cut(size) {
-                assert!(b.rays() as u64 <= MOST_PIXELS + 8 * 20000 * 8);
+                assert!(b.rays() as u64 <= MAX_PIXELS + 8 * 20000 * 8);
                 for k in 0..b.rays() {
                     if let Some(i) = b.image_index(k, size[0]) {
                         seen[i] += 1;

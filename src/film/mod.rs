@@ -6,10 +6,10 @@ pub mod block;
 pub mod camera;
 mod control;
 pub mod convergence;
-pub mod cover;
 pub mod pace;
 pub mod schedule;
 pub mod state;
+pub mod tile_mask;
 
 pub use control::{Control, NoControl};
 

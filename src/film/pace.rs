@@ -8,7 +8,7 @@ const TARGET: f64 = 0.05;
 /// Rays of the first launch: it also compiles the shaders on drivers that do so late.
 const FIRST: u32 = 1 << 13;
 /// Rays of a launch at most: passes address their results from a launch's first ray on, so that the tracer must not divide it.
-pub const MOST: u32 = crate::tracer::stream::LAUNCH_RAYS;
+pub const MAX_RAYS: u32 = crate::tracer::stream::LAUNCH_RAYS;
 
 /// Finds the size of launches from the time that earlier ones took.
 #[derive(Clone, Debug)]
@@ -32,7 +32,7 @@ impl Pace {
     /// Launches of this many rays that fit into one submission, so that the host is asked about ten times a second.
     pub fn launches(&self) -> u32 {
         // a launch takes at most TARGET once the pace is found
-        if self.rays < MOST { 2 } else { 4 }
+        if self.rays < MAX_RAYS { 2 } else { 4 }
     }
 
     /// Learns from the longest region of a submission whose launches had at most `rays` rays.
@@ -43,7 +43,7 @@ impl Pace {
         let fit = rays as f64 * TARGET / seconds.max(1e-6);
         // the first launch may have compiled the shader: its time is an upper bound that says little
         let growth = if self.seen { 2.0 } else { 4.0 };
-        let next = fit.clamp(self.rays as f64 * 0.25, self.rays as f64 * growth).clamp(64.0 * 16.0, MOST as f64);
+        let next = fit.clamp(self.rays as f64 * 0.25, self.rays as f64 * growth).clamp(64.0 * 16.0, MAX_RAYS as f64);
         self.rays = (next as u32) & !63;
         self.seen = true;
     }
@@ -63,7 +63,7 @@ mod tests {
             }
             let seconds = pace.rays() as f64 / rate;
             assert!(seconds <= 0.06, "{rate}: {seconds}");
-            assert!(pace.rays() == MOST || seconds > 0.03, "{rate}: {seconds}");
+            assert!(pace.rays() == MAX_RAYS || seconds > 0.03, "{rate}: {seconds}");
             assert_eq!(pace.rays() % 64, 0);
         }
     }

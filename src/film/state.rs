@@ -102,7 +102,7 @@ impl FilmState {
     }
 
     /// Most samples that any pixel has.
-    pub fn most_samples(&self) -> u32 {
+    pub fn max_samples(&self) -> u32 {
         self.tile_samples.iter().copied().max().unwrap_or(0)
     }
 

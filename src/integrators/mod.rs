@@ -19,8 +19,8 @@ use crate::error::Result;
 use crate::film::Control;
 use crate::film::accumulate::Accumulated;
 use crate::film::camera::CameraRecord;
-use crate::film::cover::Cover;
 use crate::film::schedule::FilmOptions;
+use crate::film::tile_mask::TileMask;
 use crate::output::Image;
 use crate::output::tone_map::ToneMap;
 use crate::ray::Ray;
@@ -154,7 +154,7 @@ pub trait Integrator: Sync {
     /// All that the samples of an image depend on beside scene, camera, size and seed: keys of its metadata, and values. `None`: not in the metadata.
     fn identity(&self, shot: &Shot) -> Vec<(&'static str, Option<String>)>;
 
-    /// Renders. `cover` says which tiles are to be skipped.
+    /// Renders. `tile_mask` says which tiles are to be skipped.
     ///
     /// # Errors
     /// Those of the device; [`crate::Error::Usage`] for settings that do not fit the camera; [`crate::Error::Interrupted`] when `control` says so.
@@ -163,7 +163,7 @@ pub trait Integrator: Sync {
         tracer: &Tracer,
         flat: &FlatScene,
         shot: &Shot,
-        cover: Option<Arc<Cover>>,
+        tile_mask: Option<Arc<TileMask>>,
         control: &mut dyn Control,
     ) -> Result<Rendered>;
 

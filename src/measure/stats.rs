@@ -25,14 +25,14 @@ impl Summary {
 
 /// Median of some values, and what all but the slowest twentieth stay within. The unit is theirs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct Spread {
+pub struct MedianP95 {
     /// Middle value.
     pub median: f64,
     /// The 95th percentile, by nearest rank: a value that occurred.
     pub p95: f64,
 }
 
-impl Spread {
+impl MedianP95 {
     /// Of some values; `None` for no values.
     pub fn of(values: &[f64]) -> Option<Self> {
         let mut sorted = values.to_vec();
@@ -123,9 +123,9 @@ mod tests {
         assert_eq!(median(&[4.0, 1.0, 2.0, 3.0]), Some(2.5));
         assert_eq!(median(&[7.0]), Some(7.0));
         let hundred: Vec<f64> = (1..=100).rev().map(f64::from).collect();
-        assert_eq!(Spread::of(&hundred), Some(Spread { median: 50.5, p95: 95.0 }));
-        assert_eq!(Spread::of(&[2.0, 1.0]), Some(Spread { median: 1.5, p95: 2.0 }));
-        assert_eq!(Spread::of(&[]), None);
+        assert_eq!(MedianP95::of(&hundred), Some(MedianP95 { median: 50.5, p95: 95.0 }));
+        assert_eq!(MedianP95::of(&[2.0, 1.0]), Some(MedianP95 { median: 1.5, p95: 2.0 }));
+        assert_eq!(MedianP95::of(&[]), None);
         assert_eq!(percentile(&[], 0.95), None);
         assert_eq!(percentile(&[3.0, 1.0, 2.0, 4.0, 5.0], 0.5), Some(3.0));
         assert_eq!(percentile(&[3.0, 1.0, 2.0, 4.0, 5.0], 0.95), Some(4.8));

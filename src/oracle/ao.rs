@@ -52,7 +52,7 @@ pub struct Estimate {
 
 /// Accessibility of `point` (relative to the oracle's origin) around the unit vector `normal`, from `samples` rays. `pixel`
 /// chooses the point set.
-pub fn accessibility(
+pub fn ambient_visibility(
     oracle: &Oracle,
     point: DVec3,
     normal: DVec3,
@@ -87,8 +87,8 @@ pub fn ao_direction(sampler: Sampler, pixel: [u32; 2], index: u32, normal: DVec3
 pub struct AoImage {
     /// Width and height.
     pub size: [u32; 2],
-    /// Mean accessibility of the samples that met a surface; 0 where none did. Rows from the top.
-    pub accessibility: Vec<f32>,
+    /// Mean ambient_visibility of the samples that met a surface; 0 where none did. Rows from the top.
+    pub ambient_visibility: Vec<f32>,
     /// Share of the samples that met a surface.
     pub coverage: Vec<f32>,
     /// Variance of a single covered sample (not of the mean).
@@ -123,7 +123,7 @@ pub fn render(oracle: &Oracle, camera: &Camera, size: [u32; 2], spp: u32, seed: 
         .collect();
     AoImage {
         size,
-        accessibility: pixels.iter().map(|p| p[0]).collect(),
+        ambient_visibility: pixels.iter().map(|p| p[0]).collect(),
         coverage: pixels.iter().map(|p| p[1]).collect(),
         variance: pixels.iter().map(|p| p[2]).collect(),
     }

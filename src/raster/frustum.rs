@@ -33,13 +33,13 @@ pub struct View {
 
 /// How much of a box is in the view.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Sight {
+pub(super) enum FrustumTest {
     /// Nothing, for certain.
-    Nothing,
+    Outside,
     /// Some of it, perhaps.
-    Part,
+    Intersecting,
     /// All.
-    All,
+    Inside,
 }
 
 /// Where something is: positive inside. In terms of the place relative to the eye.
@@ -133,19 +133,19 @@ impl Frustum {
     }
 
     /// How much of a group's box is seen.
-    pub fn sight(&self, bounds: &Aabb, to_world: &[[f32; 4]; 3]) -> Sight {
-        let mut sight = Sight::All;
+    pub fn classify(&self, bounds: &Aabb, to_world: &[[f32; 4]; 3]) -> FrustumTest {
+        let mut result = FrustumTest::Inside;
         for plane in &self.planes {
             let [least, most] = plane.range(bounds, to_world, self.eye.as_dvec3());
             if most < 0.0 {
-                return Sight::Nothing;
+                return FrustumTest::Outside;
             }
             // NaN is no reason to leave anything out, nor to take all for seen
             if least.is_nan() || least < 0.0 {
-                sight = Sight::Part;
+                result = FrustumTest::Intersecting;
             }
         }
-        sight
+        result
     }
 
     /// Least and greatest depth of a group's box.

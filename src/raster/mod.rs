@@ -24,7 +24,7 @@ use crate::tracer::stream;
 use crate::tracer::{Drawable, Push, Stream, Tracer};
 pub use camera_rays::CameraRays;
 pub use frustum::View;
-use frustum::{Frustum, Sight};
+use frustum::{Frustum, FrustumTest};
 
 /// Vertices of the box around a sphere; shaders/raster/sphere.vert.
 const BOX_VERTICES: u32 = 36;
@@ -69,7 +69,7 @@ impl Primary {
 
 /// What was drawn.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Drawn {
+pub struct DrawStats {
     /// Draw calls.
     pub draws: usize,
     /// Primitives in them.
@@ -132,7 +132,7 @@ impl Raster {
     ///
     /// # Errors
     /// Those of [`Raster::draw`].
-    pub fn record(&self, recorder: &mut Recorder, tracer: &Tracer, push: &Push, view: &View) -> Result<Drawn> {
+    pub fn record(&self, recorder: &mut Recorder, tracer: &Tracer, push: &Push, view: &View) -> Result<DrawStats> {
         let drawn = self.draw(recorder, tracer, view)?;
         self.trace(recorder, push);
         Ok(drawn)
@@ -142,7 +142,7 @@ impl Raster {
     ///
     /// # Errors
     /// [`crate::Error::Scene`] when the camera's transform is flat.
-    pub fn draw(&self, recorder: &mut Recorder, tracer: &Tracer, view: &View) -> Result<Drawn> {
+    pub fn draw(&self, recorder: &mut Recorder, tracer: &Tracer, view: &View) -> Result<DrawStats> {
         let size = view.block.size;
         let frustum = Frustum::new(view)?;
         let (draws, depth, drawn) = self.collect(tracer, &frustum);
@@ -200,18 +200,18 @@ impl Raster {
     }
 
     /// What has to be drawn, the range of its depth, and how much that is.
-    fn collect(&self, tracer: &Tracer, frustum: &Frustum) -> (Draws, [f64; 2], Drawn) {
-        let (mut draws, mut drawn) = (Draws::default(), Drawn::default());
+    fn collect(&self, tracer: &Tracer, frustum: &Frustum) -> (Draws, [f64; 2], DrawStats) {
+        let (mut draws, mut drawn) = (Draws::default(), DrawStats::default());
         let mut depth = [f64::INFINITY, 0.0f64];
         for entry in tracer.drawables() {
             drawn.placed += entry.shape.primitives as u64;
-            let sight = frustum.sight(&entry.shape.bounds, &entry.to_world);
-            if sight == Sight::Nothing {
+            let overlap = frustum.classify(&entry.shape.bounds, &entry.to_world);
+            if overlap == FrustumTest::Outside {
                 continue;
             }
             let [least, most] = frustum.depth(&entry.shape.bounds, &entry.to_world);
             depth = [depth[0].min(least), depth[1].max(most)];
-            self.collect_entry(tracer, frustum, &entry, sight, &mut draws);
+            self.collect_entry(tracer, frustum, &entry, overlap, &mut draws);
         }
         for draw in [&draws.triangles, &draws.alpha_tested, &draws.spheres].into_iter().flatten() {
             drawn.draws += 1;
@@ -220,7 +220,7 @@ impl Raster {
         (draws, depth, drawn)
     }
 
-    fn collect_entry(&self, tracer: &Tracer, frustum: &Frustum, entry: &Drawable, sight: Sight, draws: &mut Draws) {
+    fn collect_entry(&self, tracer: &Tracer, frustum: &Frustum, entry: &Drawable, overlap: FrustumTest, draws: &mut Draws) {
         let push = Push {
             scene: tracer.scene_address(),
             pass: self.params.address(),
@@ -245,11 +245,11 @@ impl Raster {
                 push_range(&mut draws.alpha_tested, range.start.max(shape.opaque)..range.end);
             }
         };
-        if sight == Sight::All || shape.chunks.is_empty() {
+        if overlap == FrustumTest::Inside || shape.chunks.is_empty() {
             return add(0..shape.primitives);
         }
         for (k, bounds) in (0..).zip(&shape.chunks) {
-            if frustum.sight(bounds, &entry.to_world) != Sight::Nothing {
+            if frustum.classify(bounds, &entry.to_world) != FrustumTest::Outside {
                 add(CHUNK * k..(CHUNK * (k + 1)).min(shape.primitives));
             }
         }

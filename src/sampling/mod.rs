@@ -6,16 +6,16 @@
 //! [`best_candidates`] and [`blue_noise`] make the tables of the reference work.
 //! [`warp`] maps points of the unit square to disks, hemispheres and frames; `f32`, as the shaders compute them, line by line.
 
+pub mod bilinear;
 pub mod cumulative;
 pub mod morton;
-pub mod patches;
 pub mod sequence;
 pub mod sobol;
 mod tables;
 pub mod warp;
 
+pub use bilinear::BilinearDistribution;
 pub use cumulative::CumulativeTable;
-pub use patches::Patches;
 pub use sequence::Sequence;
 pub use sobol::{AO_DIRECTION, CAMERA_FILM, CAMERA_LENS, Sampler, to_unit};
 pub use tables::{best_candidates, blue_noise};

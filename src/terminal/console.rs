@@ -12,12 +12,12 @@ pub struct Failure {
     /// Why.
     pub error: Error,
     /// The record on stdout says so already.
-    pub told: bool,
+    pub reported: bool,
 }
 
 impl From<Error> for Failure {
     fn from(error: Error) -> Self {
-        Self { error, told: false }
+        Self { error, reported: false }
     }
 }
 
@@ -73,9 +73,9 @@ impl Console {
             Ok(()) => Ok(self.record(value)?),
             Err(error) => {
                 let record = Failed { value, error: one_line(&error.to_string()), exit_code: error.exit_code() };
-                // what failed first counts: a stdout that fails as well is told of nowhere
+                // what failed first counts: a stdout that fails as well is reported of nowhere
                 let _ = self.record(&record);
-                Err(Failure { error, told: self.json })
+                Err(Failure { error, reported: self.json })
             }
         }
     }

@@ -16,9 +16,9 @@ use super::dynamic::group_of;
 use super::gpu_scene::rows;
 use super::wide::{Trees, Triangles, tree, triangle_tree_of};
 use crate::accel::build::MAX_DEPTH;
-use crate::accel::flatten::{FlatScene, Placement};
+use crate::accel::flatten::{FlatScene, TlasInstance};
 use crate::accel::refit::{RefitPlan, RefitPolicy, refit};
-use crate::accel::wide::{self, BLOCK_BYTES, Block, LEAF, Wide};
+use crate::accel::wide::{self, BLOCK_BYTES, Block, LEAF, WideBvh};
 use crate::accel::{Aabb, BuildPreset, pairs};
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, Device, Memory};
@@ -101,11 +101,11 @@ fn may_deform(flat: &FlatScene) -> Vec<bool> {
 /// Rooms and depths that a scene's trees get: what they need, and more for those that change.
 pub(super) fn provide(trees: &Trees, flat: &FlatScene) -> (Rooms, Depths) {
     let deform = may_deform(flat);
-    let rooms = |t: &Wide, more: bool| if more { more_room(t.blocks.len()) } else { t.blocks.len() };
+    let rooms = |t: &WideBvh, more: bool| if more { more_room(t.blocks.len()) } else { t.blocks.len() };
     let top = trees.top.as_ref().map_or((0, 0), |t| match flat.motion.is_none() {
         true => (t.blocks.len(), t.depth),
         // every node but the root has two children at least
-        false => (2 * flat.placements.len() + 1, most_depth(t.depth, flat.placements.len())),
+        false => (2 * flat.tlas_instances.len() + 1, most_depth(t.depth, flat.tlas_instances.len())),
     });
     let groups = trees
         .groups
@@ -121,7 +121,7 @@ impl DynamicTrees {
     /// Of trees that lie in the array with these rooms, the top level first.
     pub fn new(trees: &Trees, flat: &FlatScene, rooms: &Rooms, depths: &Depths) -> Self {
         let deform = may_deform(flat);
-        let describe = |t: &Wide, base, room, depth, seconds, changes: bool| Tree {
+        let describe = |t: &WideBvh, base, room, depth, seconds, changes: bool| Tree {
             base,
             room,
             len: t.blocks.len(),
@@ -195,20 +195,20 @@ impl DynamicTrees {
     }
 
     /// Entries or groups have moved: refits the top level or builds it anew. Gives whether it did the latter, and the bounds of everything.
-    pub fn place(&mut self, nodes: &mut Buffer, placements: &[Placement]) -> Result<(bool, Aabb)> {
+    pub fn place(&mut self, nodes: &mut Buffer, tlas_instances: &[TlasInstance]) -> Result<(bool, Aabb)> {
         let Some(top) = &mut self.top else {
             return Ok((false, self.groups.first().map_or(Aabb::EMPTY, |g| g.bounds)));
         };
         let start = Instant::now();
         let groups = &self.groups;
-        let mut boxes: Vec<Aabb> = placements.par_iter().map(|p| placed(&p.to_world, groups[p.group].bounds)).collect();
+        let mut boxes: Vec<Aabb> = tlas_instances.par_iter().map(|p| placed(&p.to_world, groups[p.group].bounds)).collect();
         let pad = placement_padding(boxes.iter().fold(0.0f32, |m, b| m.max(b.min.abs().max(b.max.abs()).max_element())));
         boxes.par_iter_mut().for_each(|b| *b = Aabb { min: b.min - pad, max: b.max + pad });
         let leaf = |entry: u32| {
-            let placement = &placements[entry as usize];
+            let placement = &tlas_instances[entry as usize];
             instance_leaf(entry, placement, groups[placement.group].base as u32)
         };
-        let rebuild = placements.len() <= TOP_BUILD_MOST || top.should_rebuild();
+        let rebuild = tlas_instances.len() <= TOP_BUILD_MOST || top.should_rebuild();
         if rebuild {
             let built = tree(boxes, BuildPreset::Fast, Some(top.depth), |entry| bytemuck::cast(leaf(entry)));
             top.replace(blocks(&mut self.copy, nodes)?, &built, start.elapsed().as_secs_f64());
@@ -228,10 +228,10 @@ impl DynamicTrees {
     }
 
     /// Shares out the time of tracing among the trees, by how many blocks of each a ray is expected to visit.
-    pub fn traced(&mut self, seconds: f64, placements: &[Placement]) {
+    pub fn traced(&mut self, seconds: f64, tlas_instances: &[TlasInstance]) {
         let mut visits = vec![0.0f64; self.groups.len()];
         let whole = self.top.as_ref().map_or(1.0, |t| t.bounds.half_area() as f64).max(f64::MIN_POSITIVE);
-        for p in placements {
+        for p in tlas_instances {
             let g = &self.groups[p.group];
             let share = if self.top.is_some() { placed(&p.to_world, g.bounds).half_area() as f64 / whole } else { 1.0 };
             visits[p.group] += share * g.sah_cost;
@@ -318,7 +318,7 @@ impl Tree {
     }
 
     /// Puts a tree in the place of this one. It fits.
-    fn replace(&mut self, array: &mut [Block], built: &Wide, seconds: f64) {
+    fn replace(&mut self, array: &mut [Block], built: &WideBvh, seconds: f64) {
         self.len = built.blocks.len();
         (self.bounds, self.sah_cost) = (built.bounds.unwrap_or(Aabb::EMPTY), built.sah_cost);
         let base = self.base as u32;
@@ -333,7 +333,7 @@ impl Tree {
 }
 
 /// The leaf of an entry of the top level, whose group's root is block `root`.
-pub(super) fn instance_leaf(entry: u32, placement: &Placement, root: u32) -> InstanceLeaf {
+pub(super) fn instance_leaf(entry: u32, placement: &TlasInstance, root: u32) -> InstanceLeaf {
     InstanceLeaf { world_to_group: rows(&placement.to_world.inverse()), root, instance: entry, ..Default::default() }
 }
 

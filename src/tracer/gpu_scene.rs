@@ -13,7 +13,7 @@ use super::mipmap;
 use super::motion::Motion;
 use super::shading;
 use crate::accel::features::{Blend, alpha_cutoff};
-use crate::accel::flatten::{FlatScene, Group, Part, Placement};
+use crate::accel::flatten::{BlasGeometry, FlatScene, Submesh, TlasInstance};
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, Device, Memory};
 use crate::interface::records::ray::INVALID;
@@ -115,7 +115,7 @@ impl GpuScene {
             }
         }
         let instances: Vec<_> = flat
-            .placements
+            .tlas_instances
             .iter()
             .map(|p| InstanceRecord {
                 group_to_world: rows(&p.to_world),
@@ -131,14 +131,14 @@ impl GpuScene {
         if let Some(bad) =
             instances.iter().position(|i| !i.group_to_world.iter().chain(&i.world_to_group).flatten().all(|x| x.is_finite()))
         {
-            let name = flat.placements[bad].scene_instance.map_or("", |i| flat.scene.instances[i].name.as_str());
+            let name = flat.tlas_instances[bad].scene_instance.map_or("", |i| flat.scene.instances[i].name.as_str());
             return Err(Error::Scene(format!(
                 "instance {bad} '{name}' has a transform that cannot be inverted (a scale of zero?)"
             )));
         }
         // which record and part stand for each instance of the scene
         let mut placements = vec![[0u32; 2]; flat.scene.instances.len()];
-        for (k, p) in flat.placements.iter().enumerate() {
+        for (k, p) in flat.tlas_instances.iter().enumerate() {
             match p.scene_instance {
                 Some(i) => placements[i] = [k as u32, first_part[p.group]],
                 None => {
@@ -197,7 +197,7 @@ impl GpuScene {
         root.motion = motion.as_ref().map_or(0, Motion::address);
         let root_buffer = Buffer::from_slice(device, "scene root", &[root])?;
         let shapes = flat.groups.iter().map(|g| Shape::new(flat, g)).collect();
-        let group_of = flat.placements.iter().map(|p| p.group as u32).collect();
+        let group_of = flat.tlas_instances.iter().map(|p| p.group as u32).collect();
         let attributes = attributes.buffer;
         Ok(Self {
             root,
@@ -247,7 +247,12 @@ impl GpuScene {
     }
 
     /// Before an update that moves these entries of the top level, now at `placements`, and deforms these groups.
-    pub(super) fn begin_update(&mut self, placements: &[Placement], moving: Vec<usize>, deforming: Vec<usize>) -> Result<()> {
+    pub(super) fn begin_update(
+        &mut self,
+        placements: &[TlasInstance],
+        moving: Vec<usize>,
+        deforming: Vec<usize>,
+    ) -> Result<()> {
         let groups = &self.groups;
         match &mut self.motion {
             Some(motion) => motion.begin(placements, |g| &groups[g].positions, moving, deforming),
@@ -329,7 +334,7 @@ fn write_all<T: Pod>(buffer: &mut Buffer, data: &[T]) -> Result<()> {
     buffer.fill(bytes.len() as u64, 1, |first, chunk| chunk.copy_from_slice(&bytes[first as usize..][..chunk.len()]))
 }
 
-fn group_buffers(device: &Arc<Device>, flat: &FlatScene, group: &Group) -> Result<GroupBuffers> {
+fn group_buffers(device: &Arc<Device>, flat: &FlatScene, group: &BlasGeometry) -> Result<GroupBuffers> {
     let n = group.primitive_count as u64;
     if group.spheres {
         let mut positions = Buffer::new(device, "spheres", 16 * n, Memory::Device)?;
@@ -343,7 +348,7 @@ fn group_buffers(device: &Arc<Device>, flat: &FlatScene, group: &Group) -> Resul
         })?;
         return Ok(GroupBuffers { positions, indices: None, part_of: part_of(device, group)? });
     }
-    let triangles = |part: &Part| match &flat.scene.meshes[part.mesh].geometry {
+    let triangles = |part: &Submesh| match &flat.scene.meshes[part.mesh].geometry {
         Geometry::Triangles(t) => t,
         Geometry::Spheres(_) => unreachable!("a triangle group holds triangles"),
     };
@@ -369,7 +374,7 @@ fn group_buffers(device: &Arc<Device>, flat: &FlatScene, group: &Group) -> Resul
 }
 
 /// The part of each primitive, where there is more than one.
-fn part_of(device: &Arc<Device>, group: &Group) -> Result<Option<Buffer>> {
+fn part_of(device: &Arc<Device>, group: &BlasGeometry) -> Result<Option<Buffer>> {
     if group.parts.len() <= 1 {
         return Ok(None);
     }
@@ -450,7 +455,7 @@ struct Attributes {
 
 impl Attributes {
     /// Baked normals and tangents differ from part to part; everything else is the mesh's own.
-    fn key(part: &Part, index: usize, attribute: Attribute) -> (usize, Option<usize>, Attribute) {
+    fn key(part: &Submesh, index: usize, attribute: Attribute) -> (usize, Option<usize>, Attribute) {
         let baked =
             matches!(attribute, Attribute::Normals | Attribute::Tangents) && part.to_group.matrix3 != glam::DMat3::IDENTITY;
         (part.mesh, baked.then_some(index), attribute)
@@ -485,12 +490,12 @@ impl Attributes {
         Ok(Self { buffer, addresses: keys.into_iter().zip(addresses).collect() })
     }
 
-    fn address(&self, part: &Part, index: usize, attribute: Attribute) -> u64 {
+    fn address(&self, part: &Submesh, index: usize, attribute: Attribute) -> u64 {
         self.addresses.get(&Self::key(part, index, attribute)).copied().unwrap_or(0)
     }
 }
 
-fn attribute_bytes<'a>(t: &'a TriangleMesh, part: &Part, attribute: Attribute) -> Cow<'a, [u8]> {
+fn attribute_bytes<'a>(t: &'a TriangleMesh, part: &Submesh, attribute: Attribute) -> Cow<'a, [u8]> {
     match attribute {
         Attribute::Normals if part.to_group.matrix3 == glam::DMat3::IDENTITY => Cow::Borrowed(bytemuck::cast_slice(&t.normals)),
         Attribute::Normals => {
@@ -635,7 +640,7 @@ impl Textures {
             base_color_texture: slot.map_or(INVALID, |s| self.record_of[s.texture]),
             texcoord_set: slot.map_or(0, |s| s.texcoord as u32),
             alpha_cutoff: alpha_cutoff(m).unwrap_or(-1.0),
-            coverage: (blend == Blend::Covered && m.alpha_mode == AlphaMode::Blend).into(),
+            coverage: (blend == Blend::Stochastic && m.alpha_mode == AlphaMode::Blend).into(),
             ..Default::default()
         }
     }

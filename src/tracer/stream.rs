@@ -59,7 +59,7 @@ pub(crate) fn scene_specialization(features: SceneFeatures) -> Specialization {
         .set(constants::HAS_ALPHA, features.alpha)
         .set(constants::HAS_SPHERES, features.spheres)
         .set(constants::SINGLE_LEVEL, features.single_level)
-        .set(constants::HAS_COVERAGE, features.coverage)
+        .set(constants::HAS_COVERAGE, features.stochastic_alpha)
         .set(constants::HAS_DEEP_TEXELS, features.deep_texels);
     match features.shading {
         Some(shading) => {

@@ -16,9 +16,9 @@ use super::kernel::Kernel;
 use super::stream::{LAUNCH_RAYS, LaunchMemory};
 use crate::accel::build::{self, MAX_DEPTH};
 use crate::accel::cache::KeyBuilder;
-use crate::accel::flatten::{FlatScene, Group};
+use crate::accel::flatten::{BlasGeometry, FlatScene};
 use crate::accel::pairs::{self, Fan, Pair};
-use crate::accel::wide::{self, Block, Wide};
+use crate::accel::wide::{self, Block, WideBvh};
 use crate::accel::{Aabb, BuildPreset};
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, Device, Memory};
@@ -28,8 +28,8 @@ use crate::scene::Geometry;
 
 /// The hierarchies on the host.
 pub(super) struct Trees {
-    pub groups: Vec<Wide>,
-    pub top: Option<Wide>,
+    pub groups: Vec<WideBvh>,
+    pub top: Option<WideBvh>,
     /// What each group took to build; what the top level took.
     pub seconds: Vec<f64>,
     pub top_seconds: f64,
@@ -37,7 +37,7 @@ pub(super) struct Trees {
 
 impl Trees {
     pub fn build(flat: &FlatScene, options: &BuildOptions) -> Self {
-        let timed = |g: &Group| {
+        let timed = |g: &BlasGeometry| {
             let start = Instant::now();
             let tree = if g.spheres { sphere_tree(flat, g, options) } else { triangle_tree(flat, g, options) };
             (tree, start.elapsed().as_secs_f64())
@@ -46,16 +46,16 @@ impl Trees {
         let start = Instant::now();
         let top = (!flat.is_single_level()).then(|| {
             let bounds: Vec<_> = groups.iter().map(|g| g.bounds.unwrap_or(Aabb::EMPTY)).collect();
-            tree(placement_boxes(flat, &bounds), options.preset(flat.placements.len()), None, |entry| {
+            tree(placement_boxes(flat, &bounds), options.preset(flat.tlas_instances.len()), None, |entry| {
                 // the root is filled in when the groups have their places
-                bytemuck::cast(instance_leaf(entry, &flat.placements[entry as usize], 0))
+                bytemuck::cast(instance_leaf(entry, &flat.tlas_instances[entry as usize], 0))
             })
         });
         Self { groups, top, seconds, top_seconds: start.elapsed().as_secs_f64() }
     }
 
     /// The tree of the only group, where there is one and no top level.
-    pub fn into_only_group(mut self) -> Option<Wide> {
+    pub fn into_only_group(mut self) -> Option<WideBvh> {
         if self.top.is_none() { self.groups.pop() } else { None }
     }
 
@@ -88,7 +88,7 @@ impl Trees {
         if let Some(top) = &mut self.top {
             for block in top.blocks.iter_mut().filter(|b| wide::is_leaf(b)) {
                 let leaf: &mut InstanceLeaf = bytemuck::cast_mut(block);
-                leaf.root = roots[flat.placements[leaf.instance as usize].group];
+                leaf.root = roots[flat.tlas_instances[leaf.instance as usize].group];
             }
         }
         let trees = self
@@ -124,9 +124,14 @@ impl Trees {
 }
 
 /// A tree over boxes, not yet padded. `depth`: nodes that may lie on a path, where they are bounded.
-pub(super) fn tree(mut boxes: Vec<Aabb>, preset: BuildPreset, depth: Option<u32>, leaf: impl Fn(u32) -> Block + Sync) -> Wide {
+pub(super) fn tree(
+    mut boxes: Vec<Aabb>,
+    preset: BuildPreset,
+    depth: Option<u32>,
+    leaf: impl Fn(u32) -> Block + Sync,
+) -> WideBvh {
     if boxes.is_empty() {
-        return Wide::default();
+        return WideBvh::default();
     }
     let pad = padding(boxes.iter());
     boxes.par_iter_mut().for_each(|b| *b = Aabb { min: b.min - pad, max: b.max + pad });
@@ -136,11 +141,11 @@ pub(super) fn tree(mut boxes: Vec<Aabb>, preset: BuildPreset, depth: Option<u32>
 }
 
 /// With at most `depth` nodes on a path, where they are bounded.
-fn collapse(binary: Bvh2, depth: Option<u32>, leaf: impl Fn(u32) -> Block + Sync) -> Wide {
-    let built = Wide::collapse(&binary, &leaf);
+fn collapse(binary: Bvh2, depth: Option<u32>, leaf: impl Fn(u32) -> Block + Sync) -> WideBvh {
+    let built = WideBvh::collapse(&binary, &leaf);
     match depth {
         // a binary tree is never shallower than the wide one that it becomes
-        Some(most) if built.depth > most => Wide::collapse(&build::limit_depth(binary, most), leaf),
+        Some(most) if built.depth > most => WideBvh::collapse(&build::limit_depth(binary, most), leaf),
         _ => built,
     }
 }
@@ -159,14 +164,14 @@ struct Kept {
 }
 
 /// The hierarchy over what these bytes describe, from the cache if it is there, otherwise built and kept.
-fn kept(options: &BuildOptions, preset: BuildPreset, content: &[&[u8]], build: impl FnOnce() -> Wide) -> Wide {
+fn kept(options: &BuildOptions, preset: BuildPreset, content: &[&[u8]], build: impl FnOnce() -> WideBvh) -> WideBvh {
     let Some(cache) = &options.cache else { return build() };
     let head = KeyBuilder::default().with(&LAYOUT_VERSION.to_le_bytes()).with(format!("{preset:?}").as_bytes());
     let key = content.iter().fold(head, |k, bytes| k.with(bytes)).finish();
     let loaded = cache.load(key).and_then(|entries| {
         let kept = *entries.get::<Kept>("tree")?.first()?;
         let [min, max] = kept.bounds.map(Vec3::from);
-        Some(Wide {
+        Some(WideBvh {
             blocks: entries.get("blocks")?,
             depth: kept.depth,
             bounds: Some(Aabb { min, max }),
@@ -185,7 +190,7 @@ fn kept(options: &BuildOptions, preset: BuildPreset, content: &[&[u8]], build: i
     wide
 }
 
-fn sphere_tree(flat: &FlatScene, group: &Group, options: &BuildOptions) -> Wide {
+fn sphere_tree(flat: &FlatScene, group: &BlasGeometry, options: &BuildOptions) -> WideBvh {
     let preset = options.preset(group.primitive_count);
     let spheres: Vec<[f32; 4]> = (0..group.primitive_count)
         .into_par_iter()
@@ -211,7 +216,7 @@ pub(super) struct Triangles {
 }
 
 impl Triangles {
-    fn of(flat: &FlatScene, group: &Group) -> Self {
+    fn of(flat: &FlatScene, group: &BlasGeometry) -> Self {
         let mut out =
             Self { positions: Vec::with_capacity(group.vertex_count), indices: Vec::with_capacity(group.primitive_count) };
         for part in &group.parts {
@@ -227,7 +232,7 @@ impl Triangles {
     }
 }
 
-fn triangle_tree(flat: &FlatScene, group: &Group, options: &BuildOptions) -> Wide {
+fn triangle_tree(flat: &FlatScene, group: &BlasGeometry, options: &BuildOptions) -> WideBvh {
     let triangles = Triangles::of(flat, group);
     let preset = options.preset(triangles.indices.len());
     let opaque = group.opaque_count as u32;
@@ -237,7 +242,7 @@ fn triangle_tree(flat: &FlatScene, group: &Group, options: &BuildOptions) -> Wid
 }
 
 /// `opaque`: triangles before the first alpha-tested one; `depth` as in [`tree`].
-pub(super) fn triangle_tree_of(triangles: &Triangles, opaque: u32, preset: BuildPreset, depth: Option<u32>) -> Wide {
+pub(super) fn triangle_tree_of(triangles: &Triangles, opaque: u32, preset: BuildPreset, depth: Option<u32>) -> WideBvh {
     let single: Vec<Aabb> = triangles.indices.par_iter().map(|&t| Aabb::of_points(&triangles.corners(t))).collect();
     let pairs = pairs::pair_up(&triangles.indices, &single, triangles.positions.len());
     let boxes: Vec<Aabb> = pairs
@@ -249,7 +254,7 @@ pub(super) fn triangle_tree_of(triangles: &Triangles, opaque: u32, preset: Build
         .collect();
     drop(single);
     if boxes.is_empty() {
-        return Wide::default();
+        return WideBvh::default();
     }
     let pad = padding(boxes.iter());
     let of_pair = |pair: u32, see: &mut dyn FnMut([Vec3; 3])| {

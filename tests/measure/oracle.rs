@@ -253,7 +253,7 @@ fn baked_scenes_are_the_same_scenes() {
 
 mod ao {
     use super::*;
-    use skylit::oracle::ao::{AoSettings, accessibility, render};
+    use skylit::oracle::ao::{AoSettings, ambient_visibility, render};
     use skylit::oracle::closed_form as exact;
     use skylit::sampling::Sampler;
 
@@ -274,7 +274,7 @@ mod ao {
         assert!(hit.is_hit(), "{what}: no surface");
         let (point, normal) = (above.at(hit.t), o.facing_normal(&above, &hit));
         for seed in 0..2 {
-            let got = accessibility(&o, point, normal, &settings, SAMPLES, Sampler { seed }, [3, 4]);
+            let got = ambient_visibility(&o, point, normal, &settings, SAMPLES, Sampler { seed }, [3, 4]);
             let difference = (got.mean - want).abs();
             println!("{what}: {:.6} want {want:.6}, difference {difference:.1e}", got.mean);
             assert!(difference <= (3.0 * got.standard_error).clamp(1e-12, 5e-4), "{what}: {got:?}, want {want}");
@@ -366,11 +366,11 @@ mod ao {
         let s = scene("closed-box");
         let o = Oracle::new(&s, s.origin());
         let image = render(&o, &s.cameras[0], [16, 9], 4, 1, &AoSettings::default());
-        assert!(image.accessibility.iter().all(|a| *a == 0.0) && image.coverage.iter().all(|c| *c == 1.0));
+        assert!(image.ambient_visibility.iter().all(|a| *a == 0.0) && image.coverage.iter().all(|c| *c == 1.0));
         let s = scene("plane");
         let o = Oracle::new(&s, s.origin());
         let image = render(&o, &s.cameras[0], [32, 18], 4, 1, &AoSettings::default());
-        let (a, c) = (&image.accessibility, &image.coverage);
+        let (a, c) = (&image.ambient_visibility, &image.coverage);
         assert!(a.iter().zip(c).all(|(a, c)| *a == (*c > 0.0) as u8 as f32), "1 on the plane, nothing elsewhere");
         assert!(c.contains(&0.0) && c.contains(&1.0));
     }

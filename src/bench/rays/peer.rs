@@ -83,7 +83,7 @@ fn mode_name(mode: Mode) -> &'static str {
 /// From placement and primitive of its group to instance and primitive of its mesh. Ids that do not exist stay: nothing is
 /// there under them, and a check will say so.
 fn rename(flat: &FlatScene, hit: &mut Hit) {
-    let Some(placement) = flat.placements.get(hit.instance as usize) else { return };
+    let Some(placement) = flat.tlas_instances.get(hit.instance as usize) else { return };
     let group = &flat.groups[placement.group];
     if hit.primitive as usize >= group.primitive_count {
         return;
@@ -99,7 +99,7 @@ fn rename(flat: &FlatScene, hit: &mut Hit) {
 fn write_scene(flat: &FlatScene, path: &Path) -> std::io::Result<()> {
     let mut out = BufWriter::with_capacity(1 << 20, std::fs::File::create(path)?);
     let mut words = |w: &[u32]| w.iter().try_for_each(|x| out.write_all(&x.to_le_bytes()));
-    words(&[SCENE_MAGIC, 1, flat.groups.len() as u32, flat.placements.len() as u32])?;
+    words(&[SCENE_MAGIC, 1, flat.groups.len() as u32, flat.tlas_instances.len() as u32])?;
     for group in &flat.groups {
         let vertices = if group.spheres { group.primitive_count } else { group.vertex_count };
         words(&[u32::from(group.spheres), vertices as u32, group.primitive_count as u32])?;
@@ -124,7 +124,7 @@ fn write_scene(flat: &FlatScene, path: &Path) -> std::io::Result<()> {
             }
         }
     }
-    for placement in &flat.placements {
+    for placement in &flat.tlas_instances {
         words(&[placement.group as u32])?;
         for row in crate::tracer::gpu_scene::rows(&placement.to_world) {
             words(&row.map(f32::to_bits))?;

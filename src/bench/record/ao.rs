@@ -6,7 +6,7 @@
 use serde::Serialize;
 
 use super::{Completeness, HostInfo};
-use crate::measure::stats::Spread;
+use crate::measure::stats::MedianP95;
 
 /// A whole run.
 #[derive(Clone, Debug, Default, Serialize)]
@@ -87,7 +87,7 @@ pub struct PassTime {
     /// Name of the pass.
     pub pass: String,
     /// On the device, over the frames that count.
-    pub ms: Spread,
+    pub ms: MedianP95,
 }
 
 /// What a frame costs.
@@ -96,9 +96,9 @@ pub struct FrameCost {
     /// Each pass.
     pub passes: Vec<PassTime>,
     /// All passes, on the device; 0 where the device has no clock.
-    pub device_ms: Spread,
+    pub device_ms: MedianP95,
     /// By the clock of the process, submission included.
-    pub wall_ms: Spread,
+    pub wall_ms: MedianP95,
     /// Camera rays, the mean of a frame.
     pub camera_rays: f64,
     /// Occlusion rays traced, the mean of a frame.
@@ -274,7 +274,7 @@ pub struct ChangeResult {
     /// A frame's.
     pub cost: Option<FrameCost>,
     /// Milliseconds to bring the tracer up to date.
-    pub update_ms: Option<Spread>,
+    pub update_ms: Option<MedianP95>,
 }
 
 /// Keeping structures up to date.
@@ -295,15 +295,15 @@ pub struct StructureRecord {
     /// Writing the scene into device memory, milliseconds.
     pub upload_ms: f64,
     /// The top level, all instances moved.
-    pub top: Option<Spread>,
+    pub top: Option<MedianP95>,
     /// It was built anew, not refitted.
     pub top_rebuilt: bool,
     /// Triangles of the mesh that deforms.
     pub mesh_triangles: u64,
     /// Refitting that mesh, its vertices written.
-    pub refit: Option<Spread>,
+    pub refit: Option<MedianP95>,
     /// Building it anew, its vertices written; `None` where the tracer would not.
-    pub rebuild: Option<Spread>,
+    pub rebuild: Option<MedianP95>,
 }
 
 /// One number varied.

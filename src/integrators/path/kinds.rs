@@ -8,7 +8,7 @@ use crate::accel::flatten::FlatScene;
 use crate::colour::srgb_decode;
 use crate::error::{Error, Result};
 use crate::film::Control;
-use crate::film::cover::Cover;
+use crate::film::tile_mask::TileMask;
 use crate::integrators::{Integrator, IntegratorSettings, PictureOptions, Rendered, Shot};
 use crate::output::{Image, Samples};
 use crate::scene::{Camera, Projection, Scene};
@@ -95,7 +95,7 @@ impl Paths {
             view: self.view(),
             white_sky: matches!(self.kind, Kind::WhiteSky).then(|| settings.sky_albedo.unwrap_or(SKY_ALBEDO) as f32),
             time_limit: shot.time_limit,
-            cover: None,
+            tile_mask: None,
             film: shot.film.clone(),
         })
     }
@@ -180,7 +180,7 @@ impl Integrator for Paths {
             size: _,
             spp: _,
             time_limit: _,
-            cover: _,
+            tile_mask: _,
             film: _,
             seed: _,
             max_depth,
@@ -213,10 +213,10 @@ impl Integrator for Paths {
         tracer: &Tracer,
         flat: &FlatScene,
         shot: &Shot,
-        cover: Option<Arc<Cover>>,
+        tile_mask: Option<Arc<TileMask>>,
         control: &mut dyn Control,
     ) -> Result<Rendered> {
-        let options = PathOptions { cover, ..self.options(shot)? };
+        let options = PathOptions { tile_mask, ..self.options(shot)? };
         let result = render(tracer, flat, &shot.camera_record(flat), &options, control)?;
         let report = report::report(tracer, flat, shot, &options, &result);
         Ok(Rendered { image: result.image, report, ..Default::default() })

@@ -23,11 +23,11 @@ use std::time::Duration;
 use crate::accel::flatten::FlatScene;
 use crate::error::{Error, Result};
 use crate::film::Control;
-use crate::film::accumulate::{Accumulated, Estimator, Plan, accumulate, most_rays};
+use crate::film::accumulate::{Accumulated, Estimator, Plan, accumulate, max_rays};
 use crate::film::block::BlockParams;
 use crate::film::camera::CameraRecord;
-use crate::film::cover::Cover;
 use crate::film::schedule::FilmOptions;
+use crate::film::tile_mask::TileMask;
 use crate::gpu::{Buffer, Commands, ComputePipeline, Memory, Specialization, Timing};
 use crate::interface::{MaterialFeature, PathFeature, PathFeatures};
 pub use crate::interface::{PixelFilter, View};
@@ -121,7 +121,7 @@ pub struct PathOptions {
     /// Stop after this time with what there is.
     pub time_limit: Option<Duration>,
     /// Which tiles of the image show anything; only where the environment is black and [`PathOptions::is_sharp`].
-    pub cover: Option<Arc<Cover>>,
+    pub tile_mask: Option<Arc<TileMask>>,
     /// What the film starts from, and where it stops on its way.
     pub film: FilmOptions,
 }
@@ -143,7 +143,7 @@ impl Default for PathOptions {
             texture_filter: TextureFilter::Bilinear,
             lens: None,
             time_limit: None,
-            cover: None,
+            tile_mask: None,
             film: FilmOptions::default(),
         }
     }
@@ -237,7 +237,7 @@ impl PathIntegrator {
             spp,
             seed,
             time_limit: options.time_limit,
-            cover: options.cover.as_deref(),
+            tile_mask: options.tile_mask.as_deref(),
             film: &options.film,
         };
         paths.traced = Traced::default();
@@ -320,7 +320,7 @@ impl Paths {
         if cones && !shading.materials.contains(MaterialFeature::RayCones) {
             return Err(Error::Usage("ray cones need a tracer that was made with Needs::mip_levels".into()));
         }
-        let most = most_rays(options.size, options.spp);
+        let most = max_rays(options.size, options.spp);
         let white = Environment::Uniform(glam::Vec3::ONE);
         let around = match options.view {
             // it shows surfaces, whatever shines on them

@@ -7,13 +7,13 @@
 
 /// Intervals of numbers from 0 to 1 that rows and patches are drawn with.
 #[derive(Clone, Debug, Default)]
-pub struct Patches {
+pub struct BilinearDistribution {
     /// Where each row begins, `height + 1` of them, and 1; then of each row where its patches begin, `width` of them, and 1. What single precision
     /// rounds to nothing is never drawn: its density is 0.
     pub table: Vec<f32>,
 }
 
-impl Patches {
+impl BilinearDistribution {
     /// From values at texels, not negative and finite, rows from the pole at +y.
     pub fn new(width: usize, height: usize, values: &[f64]) -> Self {
         let at = |x: usize, y: isize| values[y.clamp(0, height as isize - 1) as usize * width + x % width];
@@ -61,7 +61,7 @@ mod tests {
     #[test]
     fn an_even_image_is_even_over_the_sphere() {
         let (w, h) = (8, 4);
-        let patches = Patches::new(w, h, &vec![3.0; w * h]);
+        let patches = BilinearDistribution::new(w, h, &vec![3.0; w * h]);
         assert_eq!(patches.table.len(), h + 2 + (h + 1) * (w + 1));
         let rows = widths(&patches.table[..h + 2]);
         for (row, width) in rows.iter().enumerate() {
@@ -80,7 +80,7 @@ mod tests {
         let (w, h) = (4, 3);
         let mut values = vec![0.0; w * h];
         values[w + 3] = 1.0;
-        let patches = Patches::new(w, h, &values);
+        let patches = BilinearDistribution::new(w, h, &values);
         let rows = widths(&patches.table[..h + 2]);
         // rows of patches above and below the middle one of three rows of texels, and none at the poles
         assert_eq!((rows[0], rows[3]), (0.0, 0.0));
@@ -91,6 +91,6 @@ mod tests {
             assert_eq!(widths(&patches.table[first..first + w + 1]), [0.0, 0.0, 0.5, 0.5]);
         }
         // nothing at all: no interval is broken
-        assert!(Patches::new(2, 1, &[0.0; 2]).table.iter().all(|v| (0.0..=1.0).contains(v)));
+        assert!(BilinearDistribution::new(2, 1, &[0.0; 2]).table.iter().all(|v| (0.0..=1.0).contains(v)));
     }
 }
