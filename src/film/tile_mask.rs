@@ -1,7 +1,7 @@
-//! Which tiles of an image the scene can be seen in. Camera rays through the others meet nothing and need not be traced.
+//! The tiles of an image that can contain geometry. Camera rays through the others hit nothing and need not be traced.
 //!
-//! Every primitive is projected and the tiles under its bounding rectangle are marked, a margin around it that covers the rounding
-//! of the rays included: what is left out is certain to be empty.
+//! The screen bounding rectangle of every primitive is marked, with a margin for the rounding of the rays, so the mask is conservative:
+//! unmarked tiles are certain to be empty.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -14,24 +14,24 @@ use crate::accel::Aabb;
 use crate::accel::flatten::{BlasGeometry, FlatScene, Submesh, TlasInstance};
 use crate::scene::Geometry;
 
-/// Placed primitives that are projected one by one at most, per camera ray of the image: beyond, tracing the rays costs less.
+/// Maximum number of instanced primitives per camera ray that are projected one by one: above that, tracing the rays costs less.
 /// A projection takes 10 to 20 ns, a camera ray that misses a good scene's hierarchy about 50 ns.
 const PRIMITIVES_PER_RAY: f64 = 0.5;
 /// Relative rounding of ray origins, directions and transformed vertices: 16 half-ulps.
 const ROUNDING: f64 = 16.0 * f32::EPSILON as f64 * 0.5;
-/// Margin where nothing is rounded, pixels.
+/// Minimum margin, pixels.
 const MIN_MARGIN: f64 = 0.5;
-/// With a larger margin in pixels (a view so narrow that single precision does not resolve it) nothing is left out.
+/// Maximum margin, pixels. With a larger one (a view too narrow for single precision) no tile is skipped.
 const MAX_MARGIN: f64 = 64.0;
 
-/// The tiles of an image in which something may be seen.
+/// The tiles of an image that can contain geometry.
 #[derive(Debug)]
 pub struct TileMask {
     tiles_x: u32,
     live: Vec<bool>,
 }
 
-/// From world (relative to the origin) to the image.
+/// Projection from world space (relative to the scene's origin) to the image.
 struct View {
     world_to_camera: DAffine3,
     orthographic: bool,
@@ -49,8 +49,8 @@ struct Rectangle {
 }
 
 impl TileMask {
-    /// The tiles of an image of `size` pixels with `spp` samples each. `None` when nothing can be left out: the camera is in the
-    /// scene's bounds or beside them, or there is nothing.
+    /// The mask of an image of `size` pixels with `spp` samples each. `None` if no tile can be skipped: the camera is inside or
+    /// beside the scene's bounds, or every tile is marked.
     pub fn new(flat: &FlatScene, camera: &CameraRecord, size: [u32; 2], spp: u32) -> Option<Self> {
         let bounds = flat.bounds();
         let view = View::new(camera, size, bounds, &flat.tlas_instances)?;
@@ -60,7 +60,7 @@ impl TileMask {
             tiles_y: size[1].div_ceil(TILE),
             live: std::iter::repeat_with(AtomicBool::default).take((tiles_x * size[1].div_ceil(TILE)) as usize).collect(),
         };
-        // the whole first: most of a distant scene's image is outside of it
+        // the scene's bounds first: for a distant scene they cover only a small part of the image
         let whole = view.rectangle(bounds, &DAffine3::IDENTITY)?;
         let placed: f64 = flat.tlas_instances.iter().map(|p| flat.groups[p.group].primitive_count as f64).sum();
         let rays = whole.clipped_area(size) * spp as f64;
@@ -78,14 +78,14 @@ impl TileMask {
         live.iter().any(|l| !l).then_some(Self { tiles_x, live })
     }
 
-    /// The tiles of a block, as the block counts them; `None` when all are live.
+    /// Indices within a block of its marked tiles; `None` if all are marked.
     pub fn tiles(&self, block: &Block) -> Option<Vec<u32>> {
         let width = self.tiles_x * TILE;
         let live: Vec<u32> = (0..block.tiles()).filter(|&t| self.live[block.image_tile(t, width)]).collect();
         (live.len() < block.tiles() as usize).then_some(live)
     }
 
-    /// Tiles in which something may be seen, and all tiles.
+    /// Number of marked tiles, and of all tiles.
     pub fn count(&self) -> (usize, usize) {
         (self.live.iter().filter(|l| **l).count(), self.live.len())
     }
@@ -110,7 +110,7 @@ fn mark_part(flat: &FlatScene, placement: &TlasInstance, group: &BlasGeometry, p
             let bounds = flat.primitive_bounds(group, part, part.first_primitive + k);
             match view.rectangle(bounds, &to_world) {
                 Some(r) => tiles.mark(r, view.margin),
-                // its box, unlike the sphere, may reach behind the camera
+                // the sphere's box may extend behind the camera
                 None => tiles.mark(Rectangle { min: [f64::NEG_INFINITY; 2], max: [f64::INFINITY; 2] }, 0.0),
             }
         }),
@@ -135,7 +135,7 @@ impl View {
             middle: image.map(|n| 0.5 * n),
             margin: 0.0,
         };
-        // everything has to lie before the camera
+        // all geometry has to be in front of the camera
         let corners = corners(bounds).map(|c| view.world_to_camera.transform_point3(c));
         let near = corners.iter().map(|c| -c.z).fold(f64::INFINITY, f64::min);
         let reach = corners.iter().map(|c| c.length()).fold(0.0, f64::max);
@@ -148,7 +148,7 @@ impl View {
         if !(reach.is_finite() && (view.orthographic || near > 1e-3 * reach)) {
             return None;
         }
-        // of points and of directions, on the plane at unit distance
+        // error of points and directions on the image plane at unit distance
         let error = match view.orthographic {
             true => ROUNDING * (coordinates + half[0] + half[1] + reach),
             false => ROUNDING * (coordinates / near + 1.0) * (1.0 + half[0] * half[0] + half[1] * half[1]),
@@ -157,14 +157,14 @@ impl View {
         (view.margin <= MAX_MARGIN).then_some(view)
     }
 
-    /// Where a point is in the image, pixels from the upper left corner.
+    /// Projects a point to the image, in pixels from the upper left corner.
     fn project(&self, to_world: &DAffine3, point: Vec3) -> [f64; 2] {
         let p = self.world_to_camera.transform_point3(to_world.transform_point3(point.as_dvec3()));
         let depth = if self.orthographic { 1.0 } else { -p.z };
         [self.middle[0] + self.scale[0] * p.x / depth, self.middle[1] - self.scale[1] * p.y / depth]
     }
 
-    /// Around a box; `None` when it reaches behind the camera.
+    /// Bounding rectangle of a projected box; `None` if the box extends behind the camera.
     fn rectangle(&self, bounds: Aabb, to_world: &DAffine3) -> Option<Rectangle> {
         let corners = corners(bounds);
         let before = |c: &DVec3| -self.world_to_camera.transform_point3(to_world.transform_point3(*c)).z > 0.0;
@@ -173,7 +173,7 @@ impl View {
     }
 }
 
-/// By how much a matrix and its inverse together magnify errors: 1 for rotation and uniform scale.
+/// Condition number of a matrix (Frobenius norm), scaled to 1 for rotation and uniform scale.
 fn condition(m: DMat3) -> f64 {
     let norm = |m: DMat3| m.to_cols_array().iter().map(|x| x * x).sum::<f64>().sqrt();
     let k = norm(m) * norm(m.inverse()) / 3.0;
@@ -193,7 +193,7 @@ impl Rectangle {
         })
     }
 
-    /// Pixels of it that are in the image.
+    /// Area of the part inside the image, pixels.
     fn clipped_area(&self, size: [u32; 2]) -> f64 {
         let side = |k: usize| (self.max[k].min(size[k] as f64) - self.min[k].max(0.0)).max(0.0);
         side(0) * side(1)
@@ -214,7 +214,7 @@ impl Marks {
         for y in first(r.min[1])..end(r.max[1], self.tiles_y) {
             for x in first(r.min[0])..end(r.max[0], self.tiles_x) {
                 let tile = &self.live[(y * self.tiles_x + x) as usize];
-                // most are: a read leaves the cache line where it is
+                // most tiles are marked already: a read does not invalidate other cores' cache lines
                 if !tile.load(Ordering::Relaxed) {
                     tile.store(true, Ordering::Relaxed);
                 }

@@ -154,11 +154,11 @@ fn gpu_kept_hierarchies() {
     assert_eq!(std::fs::read(file).unwrap(), whole);
     let (unkept, said) = render("d.png", &file.join("below-a-file"));
     assert_eq!(unkept, built);
-    assert!(said.contains("not kept"), "{said}");
+    assert!(said.contains("not cached"), "{said}");
     let image = dir.path().join("e.png");
     let args = ["render", "builtin:cornell-box", "--size", "64x48", "--spp", "1", "--json", "--bvh-cache"];
     let record = json(&skylit(&args).args([path(&file.join("below-a-file")), "-o", path(&image)]).output().unwrap());
-    assert!(record["warnings"].to_string().contains("not kept"), "{record}");
+    assert!(record["warnings"].to_string().contains("not cached"), "{record}");
 }
 
 /// A command that has a result though it fails prints one record, with both.

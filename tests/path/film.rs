@@ -200,7 +200,7 @@ fn gpu_a_film_of_another_size_is_refused() {
         let options = up_to(&PathOptions { size: [8, 8], ..Default::default() }, 4, Some(other));
         let error = path::render(&tracer, &flat, &record, &options, &mut NoControl).unwrap_err();
         assert_eq!(error.exit_code(), 64);
-        assert!(error.to_string().contains("does not go on as one of 8x8 with 3"), "{error}");
+        assert!(error.to_string().contains("cannot be resumed as one of 8x8 with 3"), "{error}");
     }
 }
 
