@@ -9,12 +9,12 @@ use crate::measure::metrics::ImagePair;
 use crate::output::{self, Channel, Image, Samples};
 use crate::terminal::console::Failure;
 
-/// How far apart two channels are, over the pixels where both are finite and at least one image has something.
+/// Difference of two channels, over the pixels where both are finite and at least one image has coverage.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 struct Difference {
     /// Pixels compared.
     pixels: u64,
-    /// Pixels whose values are not the same.
+    /// Pixels whose values differ.
     differing: u64,
     /// Pixels where one image is finite and the other is not, or both are infinite in different ways.
     broken: u64,
@@ -34,20 +34,20 @@ struct Numbers {
     tanimoto: f64,
 }
 
-/// How different the colours look, over the pixels where all of them are finite and at least one image has something.
+/// Perceived difference of the colours (FLIP), over the pixels where all channels are finite and at least one image has coverage.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 struct Look {
-    /// Channels that make the colour: `R`, `G` and `B`, or a grey one.
+    /// Colour channels: `R`, `G` and `B`, or a single grey one.
     channels: Vec<String>,
     /// Pixels counted.
     pixels: u64,
     /// Mean FLIP, 0 to 1.
     mean: f64,
-    /// Of the display that the images are thought to be seen on.
+    /// Assumed angular resolution of the display, pixels per degree.
     pixels_per_degree: f64,
 }
 
-/// Compares and prints; fails when a limit was given and is passed.
+/// Compares and prints; fails if the limit is given and exceeded.
 pub fn run(args: &DiffArgs) -> Result<(), Failure> {
     let console = args.verbosity.console();
     let (a, b) = (output::load(&args.a)?, output::load(&args.b)?);
@@ -63,7 +63,7 @@ pub fn run(args: &DiffArgs) -> Result<(), Failure> {
         let d = compare(&x.samples, &y.samples, mask.as_deref())?;
         let mut line = format!("{:12} ", x.name);
         if let Some(n) = &d.numbers {
-            // a pixel that is broken in one image only is no small difference
+            // a pixel that is not finite in one image only always exceeds the limit
             worst = worst.max(if d.broken > 0 { f64::INFINITY } else { n.rmse });
             line += &format!("rmse {:.3e}  bias {:+.3e}  max {:.3e}  psnr {:.1} dB  ", n.rmse, n.bias, n.max, n.psnr);
         }
@@ -78,7 +78,7 @@ pub fn run(args: &DiffArgs) -> Result<(), Failure> {
     let look = look(&pairs, a.width as usize, mask.as_deref())?;
     if let Some(l) = &look {
         console.line(&format!(
-            "{:12} flip {:.4} ({:.0} pixels a degree)",
+            "{:12} flip {:.4} ({:.0} pixels per degree)",
             l.channels.join(" "),
             l.mean,
             l.pixels_per_degree
@@ -95,7 +95,7 @@ pub fn run(args: &DiffArgs) -> Result<(), Failure> {
     console.close(&record, verdict)
 }
 
-/// Channels of the same name and type; a grey image (`Y`) also goes with one that calls it `R`. The sums of a film (`state`) are no image.
+/// Channels of the same name and type; a grey image (`Y`) is also compared with one that names its channel `R`. The film state (`state.*`) is not compared.
 fn pairs<'a>(a: &'a Image, b: &'a Image) -> Vec<(&'a Channel, &'a Channel)> {
     let same_type = |x: &Channel, y: &Channel| std::mem::discriminant(&x.samples) == std::mem::discriminant(&y.samples);
     let find = |image: &'a Image, name: &str| image.channels.iter().find(|c| c.name == name);
@@ -113,7 +113,7 @@ fn pairs<'a>(a: &'a Image, b: &'a Image) -> Vec<(&'a Channel, &'a Channel)> {
     found
 }
 
-/// 1 for pixels that at least one image covers, when both know their coverage: background flatters every mean.
+/// 1 for pixels that at least one image covers, if both have an alpha channel: equal background would flatter every mean.
 fn coverage(a: &Image, b: &Image) -> Option<Vec<f32>> {
     let (a, b) = (a.f32("A")?, b.f32("A")?);
     Some(a.iter().zip(b).map(|(x, y)| x.max(*y)).collect())
@@ -177,7 +177,7 @@ fn compare(a: &Samples, b: &Samples, mask: Option<&[f32]>) -> Result<Difference>
         }
         _ => {}
     }
-    // no pixel in common, but some broken: the limit must still be passed
+    // no comparable pixel, but some that are not finite in one image: the limit must be exceeded
     if d.numbers.is_none() && d.broken > 0 {
         let nan = f64::NAN;
         d.numbers =

@@ -1,20 +1,20 @@
-//! Choosing a place in an image of the sphere by how bright it is there: what is interpolated bilinearly between texels, as the shader
-//! does it (shaders/path/map.glsl), after the sampling of piecewise bilinear functions in Mitsuba 3 and pbrt-v4 (A.5).
+//! Importance sampling of an environment map by luminance, interpolated bilinearly between texels as in the shader
+//! (shaders/path/map.glsl), after the sampling of piecewise bilinear functions in Mitsuba 3 and pbrt-v4 (A.5).
 //!
-//! Patches lie between the middles of texels: `width` columns (the last one wraps round) and `height + 1` rows, of which those at the poles
-//! are halves. A row is drawn by its weight, then a patch of the row by its own, both by inversion: what is left of each number
-//! after that places the sample in the patch, by the bilinear function there. Numbers that are spread evenly stay so.
+//! Patches lie between the centers of texels: `width` columns (the last one wraps round) and `height + 1` rows, of which those at the poles
+//! are halves. A row is sampled by its weight, then a patch of the row by its own, both by inversion. The remainder of each number
+//! then samples the bilinear function within the patch, which preserves stratification.
 
-/// Intervals of numbers from 0 to 1 that rows and patches are drawn with.
+/// Cumulative distribution of the rows, and of the patches in each row.
 #[derive(Clone, Debug, Default)]
 pub struct BilinearDistribution {
-    /// Where each row begins, `height + 1` of them, and 1; then of each row where its patches begin, `width` of them, and 1. What single precision
-    /// rounds to nothing is never drawn: its density is 0.
+    /// Where each row begins, `height + 1` of them, and 1; then of each row where its patches begin, `width` of them, and 1. An interval that
+    /// single precision rounds to zero length is never sampled: its density is 0.
     pub table: Vec<f32>,
 }
 
 impl BilinearDistribution {
-    /// From values at texels, not negative and finite, rows from the pole at +y.
+    /// Builds the distribution of texel values, finite and not negative, rows from the pole at +y.
     pub fn new(width: usize, height: usize, values: &[f64]) -> Self {
         let at = |x: usize, y: isize| values[y.clamp(0, height as isize - 1) as usize * width + x % width];
         let mut rows = Vec::with_capacity(height + 1);
@@ -26,7 +26,7 @@ impl BilinearDistribution {
                     0.25 * (at(x, above) + at(x + 1, above) + at(x, below) + at(x + 1, below))
                 })
                 .collect();
-            // of the solid angle between the middles of two rows of texels
+            // weighted by the solid angle between the centers of two rows of texels
             let cos = |y: f64| (y.clamp(0.0, height as f64) / height as f64 * std::f64::consts::PI).cos();
             rows.push(weights.iter().sum::<f64>() * (cos(row as f64 - 0.5) - cos(row as f64 + 0.5)));
             push_intervals(&mut columns, &weights);
@@ -38,7 +38,7 @@ impl BilinearDistribution {
     }
 }
 
-/// Where each interval begins, and 1. Without any weight all are alike.
+/// Appends the start of each interval, and 1. Without any weight all intervals are equal.
 fn push_intervals(table: &mut Vec<f32>, weights: &[f64]) {
     let total: f64 = weights.iter().sum();
     let mut sum = 0.0;
