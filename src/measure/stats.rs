@@ -1,20 +1,20 @@
-//! Numbers about repeated measurements: what a benchmark says of several timings of one thing.
+//! Statistics of repeated measurements.
 
 use serde::Serialize;
 
-/// Median and extremes of some values. The unit is theirs.
+/// Median, minimum and maximum of some values, in their unit.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Summary {
     /// Middle value; the mean of the two in the middle of an even number.
     pub median: f64,
-    /// Least.
+    /// Minimum.
     pub min: f64,
-    /// Greatest.
+    /// Maximum.
     pub max: f64,
 }
 
 impl Summary {
-    /// Of some values; `None` for no values.
+    /// Summarizes values; `None` for no values.
     pub fn of(values: &[f64]) -> Option<Self> {
         let mut sorted = values.to_vec();
         sorted.sort_by(f64::total_cmp);
@@ -23,7 +23,7 @@ impl Summary {
     }
 }
 
-/// Median of some values, and what all but the slowest twentieth stay within. The unit is theirs.
+/// Median and 95th percentile of some values, in their unit.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct MedianP95 {
     /// Middle value.
@@ -33,7 +33,7 @@ pub struct MedianP95 {
 }
 
 impl MedianP95 {
-    /// Of some values; `None` for no values.
+    /// Summarizes values; `None` for no values.
     pub fn of(values: &[f64]) -> Option<Self> {
         let mut sorted = values.to_vec();
         sorted.sort_by(f64::total_cmp);

@@ -308,7 +308,7 @@ mod parity {
         }
         // grazing: in the plane of the floor
         let grazing = Ray { origin: [-3.0, 0.0, 0.2], tmin: 0.0, direction: [1.0, 0.0, 0.0], tmax: f32::INFINITY };
-        assert_ne!(judge(grazing, Hit::MISS), Verdict::Unexplained("misses what it certainly meets"));
+        assert_ne!(judge(grazing, Hit::MISS), Verdict::Unexplained("misses a primitive that it certainly hits"));
         assert!(!matches!(judge(grazing, hit(0, 3.0)), Verdict::Unexplained(_)));
         assert!(matches!(judge(grazing, hit(0, 7.0)), Verdict::Unexplained(_)), "beyond the floor's extent");
     }
