@@ -1,6 +1,6 @@
 //! Accumulates samples of every pixel on a film: step by step ([`super::schedule`]), and within a step block by block, batch by batch and
 //! launch by launch. Reports progress, respects a time limit, and can be stopped so that every pixel has complete samples. An
-//! [`Estimator`] evaluates the samples.
+//! `Estimator` evaluates the samples.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
