@@ -141,7 +141,7 @@ impl SceneFeatures {
             lines.push(format!(
                 "two levels: {} bottom-level structures, {} instances in the top level",
                 flat.groups.len(),
-                flat.tlas_instances.len()
+                flat.instances.len()
             ));
         }
         if flat.absent_primitives > 0 {

@@ -40,7 +40,7 @@ impl Submesh {
 
 /// The geometry of one bottom-level acceleration structure (a group): triangles or spheres, never both.
 #[derive(Clone, Debug)]
-pub struct BlasGeometry {
+pub struct BlasGroup {
     /// True for spheres, false for triangles.
     pub spheres: bool,
     /// Its submeshes; alpha-tested ones last.
@@ -72,9 +72,9 @@ pub struct FlatScene<'a> {
     /// World position of the tracers' coordinate origin ([`Scene::origin`]).
     pub origin: DVec3,
     /// Geometry of each bottom-level structure.
-    pub groups: Vec<BlasGeometry>,
+    pub groups: Vec<BlasGroup>,
     /// Instances in the top-level structure.
-    pub tlas_instances: Vec<TlasInstance>,
+    pub instances: Vec<TlasInstance>,
     /// Number of triangles and spheres dropped because their material is fully transparent.
     pub absent_primitives: usize,
     /// Instances and meshes that may move or deform between frames.
@@ -116,8 +116,8 @@ impl<'a> FlatScene<'a> {
         }
         let relative = |t: DAffine3| DAffine3 { translation: t.translation - origin, ..t };
         let mut flat =
-            Self { scene, origin, groups: Vec::new(), tlas_instances: Vec::new(), absent_primitives: 0, motion, blend };
-        let mut world = [BlasGeometry::empty(false), BlasGeometry::empty(true)];
+            Self { scene, origin, groups: Vec::new(), instances: Vec::new(), absent_primitives: 0, motion, blend };
+        let mut world = [BlasGroup::empty(false), BlasGroup::empty(true)];
         let mut own: Vec<Option<usize>> = vec![None; scene.meshes.len()];
         // opaque meshes first, so that alpha-tested primitives are the tail of every group
         for tested in [false, true] {
@@ -137,17 +137,17 @@ impl<'a> FlatScene<'a> {
                     world[spheres as usize].push(scene, instance.mesh, Some(k), to_world, tested);
                 } else {
                     let group = *own[instance.mesh].get_or_insert_with(|| {
-                        let mut g = BlasGeometry::empty(spheres);
+                        let mut g = BlasGroup::empty(spheres);
                         g.push(scene, instance.mesh, None, DAffine3::IDENTITY, tested);
                         flat.groups.push(g);
                         flat.groups.len() - 1
                     });
-                    flat.tlas_instances.push(TlasInstance { group, to_world, scene_instance: Some(k) });
+                    flat.instances.push(TlasInstance { group, to_world, scene_instance: Some(k) });
                 }
             }
         }
         for group in world.into_iter().filter(|g| g.primitive_count > 0) {
-            flat.tlas_instances.push(TlasInstance {
+            flat.instances.push(TlasInstance {
                 group: flat.groups.len(),
                 to_world: DAffine3::IDENTITY,
                 scene_instance: None,
@@ -159,7 +159,7 @@ impl<'a> FlatScene<'a> {
 
     /// Is there a single TLAS instance without a transform, so that the top level can be skipped?
     pub fn is_single_level(&self) -> bool {
-        self.motion.instances.is_empty() && matches!(self.tlas_instances.as_slice(), [p] if p.to_world == DAffine3::IDENTITY)
+        self.motion.instances.is_empty() && matches!(self.instances.as_slice(), [p] if p.to_world == DAffine3::IDENTITY)
     }
 
     /// Does any primitive need an alpha test?
@@ -217,12 +217,12 @@ impl<'a> FlatScene<'a> {
     }
 
     /// The submesh that contains a group's primitive.
-    pub fn part_of<'g>(&self, group: &'g BlasGeometry, primitive: usize) -> &'g Submesh {
+    pub fn part_of<'g>(&self, group: &'g BlasGroup, primitive: usize) -> &'g Submesh {
         &group.parts[group.parts.partition_point(|p| p.first_primitive <= primitive) - 1]
     }
 
     /// Bounding box of a group's primitive in group space. `primitive` is an index into the group.
-    pub fn primitive_bounds(&self, group: &BlasGeometry, part: &Submesh, primitive: usize) -> Aabb {
+    pub fn primitive_bounds(&self, group: &BlasGroup, part: &Submesh, primitive: usize) -> Aabb {
         let k = primitive - part.first_primitive;
         if group.spheres {
             let s = self.sphere(part, k);
@@ -249,7 +249,7 @@ fn is_similarity(t: &DAffine3) -> bool {
     (a - b).abs() <= tolerance && (a - c).abs() <= tolerance && skew <= tolerance
 }
 
-impl BlasGeometry {
+impl BlasGroup {
     fn empty(spheres: bool) -> Self {
         Self { spheres, parts: Vec::new(), primitive_count: 0, vertex_count: 0, opaque_count: 0 }
     }

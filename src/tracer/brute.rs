@@ -35,13 +35,13 @@ pub(super) fn upload(device: &Arc<Device>, flat: &FlatScene) -> Result<Hierarchy
         })
         .collect();
     let mut records = flat.groups.iter().flat_map(|g| (0..g.primitive_count as u32).map(move |p| record(flat, g, p)));
-    let mut entries = flat.tlas_instances.iter().map(|p| ranges[p.group]);
+    let mut entries = flat.instances.iter().map(|p| ranges[p.group]);
     Ok(Hierarchy {
         kernel: Kernel::Brute,
-        nodes: write_records(device, "instance ranges", flat.tlas_instances.len() as u64, &mut entries)?,
+        nodes: write_records(device, "instance ranges", flat.instances.len() as u64, &mut entries)?,
         primitives: Some(write_records(device, "primitives", u64::from(total), &mut records)?),
-        root: flat.tlas_instances.len() as u32,
-        instance_roots: flat.tlas_instances.iter().map(|p| ranges[p.group][0]).collect(),
+        root: flat.instances.len() as u32,
+        instance_roots: flat.instances.iter().map(|p| ranges[p.group][0]).collect(),
         stack_entries: 0,
         bounds: flat.bounds(),
         unfinished: unfinished_counter(device)?,

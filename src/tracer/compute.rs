@@ -9,7 +9,7 @@ use super::dynamic_trees::DynamicTrees;
 use super::kernel::{BuildOptions, Kernel};
 use super::stream::LaunchMemory;
 use super::{brute, reference, wide};
-use crate::accel::flatten::{BlasGeometry, FlatScene, TlasInstance};
+use crate::accel::flatten::{BlasGroup, FlatScene, TlasInstance};
 use crate::accel::{Aabb, bvh2};
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, Device, DeviceInfo, Memory};
@@ -114,17 +114,17 @@ impl Hierarchy {
     }
 
     /// See [`DynamicTrees::place`].
-    pub fn place(&mut self, tlas_instances: &[TlasInstance]) -> Result<bool> {
+    pub fn place(&mut self, instances: &[TlasInstance]) -> Result<bool> {
         let Some(dynamic) = &mut self.dynamic else { return Ok(false) };
-        let (rebuilt, bounds) = dynamic.place(&mut self.nodes, tlas_instances)?;
+        let (rebuilt, bounds) = dynamic.place(&mut self.nodes, instances)?;
         self.bounds = bounds;
         Ok(rebuilt)
     }
 
     /// See [`DynamicTrees::traced`].
-    pub fn traced(&mut self, seconds: f64, tlas_instances: &[TlasInstance]) {
+    pub fn traced(&mut self, seconds: f64, instances: &[TlasInstance]) {
         if let Some(dynamic) = &mut self.dynamic {
-            dynamic.traced(seconds, tlas_instances);
+            dynamic.traced(seconds, instances);
         }
     }
 }
@@ -132,10 +132,10 @@ impl Hierarchy {
 impl Trees {
     pub fn build(flat: &FlatScene, kernel: Kernel, options: &BuildOptions) -> Result<Self> {
         let total = flat.primitive_count();
-        if total > bvh2::MAX_PRIMITIVES || flat.tlas_instances.len() > bvh2::MAX_PRIMITIVES {
+        if total > bvh2::MAX_PRIMITIVES || flat.instances.len() > bvh2::MAX_PRIMITIVES {
             return Err(Error::Scene(format!(
                 "{total} primitives and {} instances; the compute tracer numbers at most {} of each",
-                flat.tlas_instances.len(),
+                flat.instances.len(),
                 bvh2::MAX_PRIMITIVES
             )));
         }
@@ -207,7 +207,7 @@ pub(super) fn reach_padding(reach: f32) -> f32 {
     (4.0 * f32::EPSILON * reach).max(1e-30)
 }
 
-pub(super) fn primitive_boxes(flat: &FlatScene, group: &BlasGeometry) -> impl Iterator<Item = Aabb> {
+pub(super) fn primitive_boxes(flat: &FlatScene, group: &BlasGroup) -> impl Iterator<Item = Aabb> {
     group.parts.iter().flat_map(move |part| {
         let count = flat.scene.meshes[part.mesh].geometry.primitive_count();
         (part.first_primitive..part.first_primitive + count).map(move |p| flat.primitive_bounds(group, part, p))
@@ -218,7 +218,7 @@ pub(super) fn primitive_boxes(flat: &FlatScene, group: &BlasGeometry) -> impl It
 pub(super) fn placement_boxes(flat: &FlatScene, bounds: &[Aabb]) -> Vec<Aabb> {
     let scene = flat.bounds();
     let pad = placement_padding(scene.min.abs().max(scene.max.abs()).max_element().max(0.0));
-    flat.tlas_instances
+    flat.instances
         .iter()
         .map(|p| {
             let b = placed(&p.to_world, bounds[p.group]);
@@ -242,7 +242,7 @@ pub(super) fn placed(to_world: &DAffine3, b: Aabb) -> Aabb {
 }
 
 /// A primitive of a group as the readable kernels take it: a sphere lies where a triangle might be.
-pub(super) fn record(flat: &FlatScene, group: &BlasGeometry, primitive: u32) -> TriangleRecord {
+pub(super) fn record(flat: &FlatScene, group: &BlasGroup, primitive: u32) -> TriangleRecord {
     let part = flat.part_of(group, primitive as usize);
     let k = primitive as usize - part.first_primitive;
     if group.spheres {

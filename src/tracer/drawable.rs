@@ -4,7 +4,7 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use crate::accel::Aabb;
-use crate::accel::flatten::{BlasGeometry, FlatScene};
+use crate::accel::flatten::{BlasGroup, FlatScene};
 
 /// Primitives that follow each other and are left out or drawn together.
 pub const CHUNK: u32 = 256;
@@ -38,7 +38,7 @@ pub struct Drawable<'a> {
 }
 
 impl Shape {
-    pub(super) fn new(flat: &FlatScene, group: &BlasGeometry) -> Self {
+    pub(super) fn new(flat: &FlatScene, group: &BlasGroup) -> Self {
         let primitives = group.primitive_count;
         let chunk = |k: usize| {
             let first = k * CHUNK as usize;

@@ -14,7 +14,7 @@ use super::compute::placed;
 use super::gpu_scene::rows;
 use super::{Structure, Tracer};
 use crate::accel::Aabb;
-use crate::accel::flatten::{BlasGeometry, FlatScene, Submesh, TlasInstance};
+use crate::accel::flatten::{BlasGroup, FlatScene, Submesh, TlasInstance};
 use crate::error::{Error, Result};
 use crate::scene::Geometry;
 use crate::scene::animation::{Pose, PosedMesh};
@@ -91,7 +91,7 @@ struct DeformingMesh {
 /// What a tracer of a changing scene keeps on the host.
 pub(super) struct Dynamic {
     origin: DVec3,
-    tlas_instances: Vec<TlasInstance>,
+    instances: Vec<TlasInstance>,
     /// Of each group, in its own space.
     bounds: Vec<Aabb>,
     /// Entry of the top level for each instance that may move, where it has one.
@@ -106,7 +106,7 @@ impl Dynamic {
             return None;
         }
         let placed: HashMap<usize, usize> =
-            flat.tlas_instances.iter().enumerate().filter_map(|(k, p)| Some((p.scene_instance?, k))).collect();
+            flat.instances.iter().enumerate().filter_map(|(k, p)| Some((p.scene_instance?, k))).collect();
         let meshes = flat.motion.meshes.iter().filter_map(|&mesh| {
             let Geometry::Triangles(t) = &flat.scene.meshes[mesh].geometry else { return None };
             let group = group_of(flat, mesh);
@@ -114,7 +114,7 @@ impl Dynamic {
         });
         Some(Self {
             origin: flat.origin,
-            tlas_instances: flat.tlas_instances.clone(),
+            instances: flat.instances.clone(),
             bounds: flat.groups.iter().map(|g| group_bounds(flat, g)).collect(),
             entries: flat.motion.instances.iter().map(|i| (*i, placed.get(i).copied())).collect(),
             meshes: meshes.collect(),
@@ -166,7 +166,7 @@ impl Dynamic {
 }
 
 /// Box of a group's primitives.
-fn group_bounds(flat: &FlatScene, group: &BlasGeometry) -> Aabb {
+fn group_bounds(flat: &FlatScene, group: &BlasGroup) -> Aabb {
     let part = |part: &Submesh| {
         let count = flat.scene.meshes[part.mesh].geometry.primitive_count();
         (part.first_primitive..part.first_primitive + count)
@@ -207,7 +207,7 @@ impl Dynamic {
         // of an entry that is named twice the last counts
         let latest: HashMap<usize, DAffine3> = moved.iter().copied().collect();
         let mut out = Vec::new();
-        for (k, p) in self.tlas_instances.iter_mut().enumerate() {
+        for (k, p) in self.instances.iter_mut().enumerate() {
             let (old, new) = (p.to_world, latest.get(&k).copied().unwrap_or(p.to_world));
             let deformed = ways.get(&p.group).copied();
             if old == new && deformed.is_none() {
@@ -247,7 +247,7 @@ impl Tracer {
         let mut stats = UpdateStats { growth: 1.0, ..Default::default() };
         let start = Instant::now();
         let deforming = changes.meshes.iter().filter_map(|c| dynamic.meshes.get(&c.mesh)?.group).collect();
-        self.scene.begin_update(&dynamic.tlas_instances, moved.iter().map(|m| m.0).collect(), deforming)?;
+        self.scene.begin_update(&dynamic.instances, moved.iter().map(|m| m.0).collect(), deforming)?;
         stats.moved = dynamic.advance(changes, &moved);
         let mut deformed = false;
         for change in &changes.meshes {
@@ -271,11 +271,11 @@ impl Tracer {
             return Ok(stats);
         }
         let start = Instant::now();
-        let latest: Vec<_> = moved.iter().map(|m| (m.0, dynamic.tlas_instances[m.0].to_world)).collect();
+        let latest: Vec<_> = moved.iter().map(|m| (m.0, dynamic.instances[m.0].to_world)).collect();
         self.scene.set_transforms(&latest)?;
         match &mut self.structure {
             Structure::Compute(h) => {
-                stats.top_rebuilt = h.place(&dynamic.tlas_instances)?;
+                stats.top_rebuilt = h.place(&dynamic.instances)?;
                 self.scene.set_hierarchy(h)?;
             }
             Structure::Hardware { levels } => {
@@ -292,7 +292,7 @@ impl Tracer {
     pub fn traced(&mut self, seconds: f64) {
         let Some(dynamic) = &self.dynamic else { return };
         match &mut self.structure {
-            Structure::Compute(h) => h.traced(seconds, &dynamic.tlas_instances),
+            Structure::Compute(h) => h.traced(seconds, &dynamic.instances),
             Structure::Hardware { levels } => levels.traced(seconds),
         }
     }

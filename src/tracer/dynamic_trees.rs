@@ -105,7 +105,7 @@ pub(super) fn provide(trees: &Trees, flat: &FlatScene) -> (Rooms, Depths) {
     let top = trees.top.as_ref().map_or((0, 0), |t| match flat.motion.is_none() {
         true => (t.blocks.len(), t.depth),
         // every node but the root has two children at least
-        false => (2 * flat.tlas_instances.len() + 1, most_depth(t.depth, flat.tlas_instances.len())),
+        false => (2 * flat.instances.len() + 1, most_depth(t.depth, flat.instances.len())),
     });
     let groups = trees
         .groups
@@ -195,20 +195,20 @@ impl DynamicTrees {
     }
 
     /// Entries or groups have moved: refits the top level or builds it anew. Gives whether it did the latter, and the bounds of everything.
-    pub fn place(&mut self, nodes: &mut Buffer, tlas_instances: &[TlasInstance]) -> Result<(bool, Aabb)> {
+    pub fn place(&mut self, nodes: &mut Buffer, instances: &[TlasInstance]) -> Result<(bool, Aabb)> {
         let Some(top) = &mut self.top else {
             return Ok((false, self.groups.first().map_or(Aabb::EMPTY, |g| g.bounds)));
         };
         let start = Instant::now();
         let groups = &self.groups;
-        let mut boxes: Vec<Aabb> = tlas_instances.par_iter().map(|p| placed(&p.to_world, groups[p.group].bounds)).collect();
+        let mut boxes: Vec<Aabb> = instances.par_iter().map(|p| placed(&p.to_world, groups[p.group].bounds)).collect();
         let pad = placement_padding(boxes.iter().fold(0.0f32, |m, b| m.max(b.min.abs().max(b.max.abs()).max_element())));
         boxes.par_iter_mut().for_each(|b| *b = Aabb { min: b.min - pad, max: b.max + pad });
         let leaf = |entry: u32| {
-            let placement = &tlas_instances[entry as usize];
+            let placement = &instances[entry as usize];
             instance_leaf(entry, placement, groups[placement.group].base as u32)
         };
-        let rebuild = tlas_instances.len() <= TOP_BUILD_MOST || top.should_rebuild();
+        let rebuild = instances.len() <= TOP_BUILD_MOST || top.should_rebuild();
         if rebuild {
             let built = tree(boxes, BuildPreset::Fast, Some(top.depth), |entry| bytemuck::cast(leaf(entry)));
             top.replace(blocks(&mut self.copy, nodes)?, &built, start.elapsed().as_secs_f64());
@@ -228,10 +228,10 @@ impl DynamicTrees {
     }
 
     /// Shares out the time of tracing among the trees, by how many blocks of each a ray is expected to visit.
-    pub fn traced(&mut self, seconds: f64, tlas_instances: &[TlasInstance]) {
+    pub fn traced(&mut self, seconds: f64, instances: &[TlasInstance]) {
         let mut visits = vec![0.0f64; self.groups.len()];
         let whole = self.top.as_ref().map_or(1.0, |t| t.bounds.half_area() as f64).max(f64::MIN_POSITIVE);
-        for p in tlas_instances {
+        for p in instances {
             let g = &self.groups[p.group];
             let share = if self.top.is_some() { placed(&p.to_world, g.bounds).half_area() as f64 / whole } else { 1.0 };
             visits[p.group] += share * g.sah_cost;

@@ -13,7 +13,7 @@ use super::mipmap;
 use super::motion::Motion;
 use super::shading;
 use crate::accel::features::{Blend, alpha_cutoff};
-use crate::accel::flatten::{BlasGeometry, FlatScene, Submesh, TlasInstance};
+use crate::accel::flatten::{BlasGroup, FlatScene, Submesh, TlasInstance};
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, Device, Memory};
 use crate::interface::records::ray::INVALID;
@@ -115,7 +115,7 @@ impl GpuScene {
             }
         }
         let instances: Vec<_> = flat
-            .tlas_instances
+            .instances
             .iter()
             .map(|p| InstanceRecord {
                 group_to_world: rows(&p.to_world),
@@ -131,14 +131,14 @@ impl GpuScene {
         if let Some(bad) =
             instances.iter().position(|i| !i.group_to_world.iter().chain(&i.world_to_group).flatten().all(|x| x.is_finite()))
         {
-            let name = flat.tlas_instances[bad].scene_instance.map_or("", |i| flat.scene.instances[i].name.as_str());
+            let name = flat.instances[bad].scene_instance.map_or("", |i| flat.scene.instances[i].name.as_str());
             return Err(Error::Scene(format!(
                 "instance {bad} '{name}' has a transform that cannot be inverted (a scale of zero?)"
             )));
         }
         // which record and part stand for each instance of the scene
         let mut placements = vec![[0u32; 2]; flat.scene.instances.len()];
-        for (k, p) in flat.tlas_instances.iter().enumerate() {
+        for (k, p) in flat.instances.iter().enumerate() {
             match p.scene_instance {
                 Some(i) => placements[i] = [k as u32, first_part[p.group]],
                 None => {
@@ -197,7 +197,7 @@ impl GpuScene {
         root.motion = motion.as_ref().map_or(0, Motion::address);
         let root_buffer = Buffer::from_slice(device, "scene root", &[root])?;
         let shapes = flat.groups.iter().map(|g| Shape::new(flat, g)).collect();
-        let group_of = flat.tlas_instances.iter().map(|p| p.group as u32).collect();
+        let group_of = flat.instances.iter().map(|p| p.group as u32).collect();
         let attributes = attributes.buffer;
         Ok(Self {
             root,
@@ -334,7 +334,7 @@ fn write_all<T: Pod>(buffer: &mut Buffer, data: &[T]) -> Result<()> {
     buffer.fill(bytes.len() as u64, 1, |first, chunk| chunk.copy_from_slice(&bytes[first as usize..][..chunk.len()]))
 }
 
-fn group_buffers(device: &Arc<Device>, flat: &FlatScene, group: &BlasGeometry) -> Result<GroupBuffers> {
+fn group_buffers(device: &Arc<Device>, flat: &FlatScene, group: &BlasGroup) -> Result<GroupBuffers> {
     let n = group.primitive_count as u64;
     if group.spheres {
         let mut positions = Buffer::new(device, "spheres", 16 * n, Memory::Device)?;
@@ -374,7 +374,7 @@ fn group_buffers(device: &Arc<Device>, flat: &FlatScene, group: &BlasGeometry) -
 }
 
 /// The part of each primitive, where there is more than one.
-fn part_of(device: &Arc<Device>, group: &BlasGeometry) -> Result<Option<Buffer>> {
+fn part_of(device: &Arc<Device>, group: &BlasGroup) -> Result<Option<Buffer>> {
     if group.parts.len() <= 1 {
         return Ok(None);
     }

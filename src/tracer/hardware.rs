@@ -8,7 +8,7 @@ use glam::DAffine3;
 use super::dynamic::group_of;
 use super::gpu_scene::{GpuScene, GroupBuffers, rows};
 use crate::accel::RefitPolicy;
-use crate::accel::flatten::{BlasGeometry, FlatScene};
+use crate::accel::flatten::{BlasGroup, FlatScene};
 use crate::error::{Error, Result};
 use crate::gpu::{AccelerationStructure, BottomLevelInput, Buffer, Commands, Device, Memory, TopLevelEntry, Update};
 
@@ -94,7 +94,7 @@ impl Structures {
             bottom.push(AccelerationStructure::bottom_level(device, &mut commands, "bottom level", &input)?);
         }
         let entries: Vec<_> = flat
-            .tlas_instances
+            .instances
             .iter()
             .enumerate()
             .map(|(k, p)| {
@@ -160,7 +160,7 @@ impl Structures {
     }
 }
 
-fn sphere_boxes(device: &Arc<Device>, flat: &FlatScene, group: &BlasGeometry) -> Result<Buffer> {
+fn sphere_boxes(device: &Arc<Device>, flat: &FlatScene, group: &BlasGroup) -> Result<Buffer> {
     let size = 24 * group.primitive_count as u64;
     let mut buffer = Buffer::new(device, "sphere boxes", size, Memory::Device)?;
     buffer.fill(size, 24, |first, bytes| {

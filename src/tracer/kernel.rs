@@ -32,7 +32,7 @@ impl Kernel {
 
     /// What [`Kernel::Brute`] goes through for each ray of a scene: primitives, each instance's counted, and instances.
     pub fn brute_tests(flat: &FlatScene) -> usize {
-        flat.tlas_instances.iter().map(|p| flat.groups[p.group].primitive_count + 1).sum()
+        flat.instances.iter().map(|p| flat.groups[p.group].primitive_count + 1).sum()
     }
 
     /// What traces coherent streams on a device. A packet has many more turns than a ray and no bound on them: where drivers cut

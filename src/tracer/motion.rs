@@ -33,7 +33,7 @@ impl Motion {
             previous[group] = Some(Buffer::new(device, "previous vertices", positions(group), Memory::Device)?);
         }
         let records: Vec<_> = flat
-            .tlas_instances
+            .instances
             .iter()
             .map(|p| MotionRecord {
                 previous_group_to_world: rows(&p.to_world),
@@ -54,7 +54,7 @@ impl Motion {
     /// Before an update that moves these entries and deforms these groups: what is, becomes what was.
     pub fn begin<'a>(
         &mut self,
-        tlas_instances: &[TlasInstance],
+        instances: &[TlasInstance],
         positions: impl Fn(usize) -> &'a Buffer,
         moving: Vec<usize>,
         deforming: Vec<usize>,
@@ -62,7 +62,7 @@ impl Motion {
         let (moved, deformed) = (std::mem::replace(&mut self.moved, moving), std::mem::replace(&mut self.deformed, deforming));
         let mut changed = false;
         for &k in moved.iter().chain(&self.moved) {
-            self.records[k].previous_group_to_world = rows(&tlas_instances[k].to_world);
+            self.records[k].previous_group_to_world = rows(&instances[k].to_world);
             changed = true;
         }
         if changed {

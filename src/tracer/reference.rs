@@ -72,7 +72,7 @@ impl Trees {
             nodes,
             primitives: Some(primitives),
             root,
-            instance_roots: flat.tlas_instances.iter().map(|p| roots[p.group]).collect(),
+            instance_roots: flat.instances.iter().map(|p| roots[p.group]).collect(),
             stack_entries,
             bounds: self.bounds,
             unfinished: unfinished_counter(device)?,

@@ -16,7 +16,7 @@ use super::kernel::Kernel;
 use super::stream::{LAUNCH_RAYS, LaunchMemory};
 use crate::accel::build::{self, MAX_DEPTH};
 use crate::accel::cache::KeyBuilder;
-use crate::accel::flatten::{BlasGeometry, FlatScene};
+use crate::accel::flatten::{BlasGroup, FlatScene};
 use crate::accel::pairs::{self, Fan, Pair};
 use crate::accel::wide::{self, Block, WideBvh};
 use crate::accel::{Aabb, BuildPreset};
@@ -37,7 +37,7 @@ pub(super) struct Trees {
 
 impl Trees {
     pub fn build(flat: &FlatScene, options: &BuildOptions) -> Self {
-        let timed = |g: &BlasGeometry| {
+        let timed = |g: &BlasGroup| {
             let start = Instant::now();
             let tree = if g.spheres { sphere_tree(flat, g, options) } else { triangle_tree(flat, g, options) };
             (tree, start.elapsed().as_secs_f64())
@@ -46,9 +46,9 @@ impl Trees {
         let start = Instant::now();
         let top = (!flat.is_single_level()).then(|| {
             let bounds: Vec<_> = groups.iter().map(|g| g.bounds.unwrap_or(Aabb::EMPTY)).collect();
-            tree(placement_boxes(flat, &bounds), options.preset(flat.tlas_instances.len()), None, |entry| {
+            tree(placement_boxes(flat, &bounds), options.preset(flat.instances.len()), None, |entry| {
                 // the root is filled in when the groups have their places
-                bytemuck::cast(instance_leaf(entry, &flat.tlas_instances[entry as usize], 0))
+                bytemuck::cast(instance_leaf(entry, &flat.instances[entry as usize], 0))
             })
         });
         Self { groups, top, seconds, top_seconds: start.elapsed().as_secs_f64() }
@@ -88,7 +88,7 @@ impl Trees {
         if let Some(top) = &mut self.top {
             for block in top.blocks.iter_mut().filter(|b| wide::is_leaf(b)) {
                 let leaf: &mut InstanceLeaf = bytemuck::cast_mut(block);
-                leaf.root = roots[flat.tlas_instances[leaf.instance as usize].group];
+                leaf.root = roots[flat.instances[leaf.instance as usize].group];
             }
         }
         let trees = self
@@ -190,7 +190,7 @@ fn kept(options: &BuildOptions, preset: BuildPreset, content: &[&[u8]], build: i
     wide
 }
 
-fn sphere_tree(flat: &FlatScene, group: &BlasGeometry, options: &BuildOptions) -> WideBvh {
+fn sphere_tree(flat: &FlatScene, group: &BlasGroup, options: &BuildOptions) -> WideBvh {
     let preset = options.preset(group.primitive_count);
     let spheres: Vec<[f32; 4]> = (0..group.primitive_count)
         .into_par_iter()
@@ -216,7 +216,7 @@ pub(super) struct Triangles {
 }
 
 impl Triangles {
-    fn of(flat: &FlatScene, group: &BlasGeometry) -> Self {
+    fn of(flat: &FlatScene, group: &BlasGroup) -> Self {
         let mut out =
             Self { positions: Vec::with_capacity(group.vertex_count), indices: Vec::with_capacity(group.primitive_count) };
         for part in &group.parts {
@@ -232,7 +232,7 @@ impl Triangles {
     }
 }
 
-fn triangle_tree(flat: &FlatScene, group: &BlasGeometry, options: &BuildOptions) -> WideBvh {
+fn triangle_tree(flat: &FlatScene, group: &BlasGroup, options: &BuildOptions) -> WideBvh {
     let triangles = Triangles::of(flat, group);
     let preset = options.preset(triangles.indices.len());
     let opaque = group.opaque_count as u32;

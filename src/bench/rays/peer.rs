@@ -83,7 +83,7 @@ fn mode_name(mode: Mode) -> &'static str {
 /// Maps TLAS instance and group primitive to scene instance and mesh primitive. Invalid ids are unchanged, so that the check reports
 /// them.
 fn rename(flat: &FlatScene, hit: &mut Hit) {
-    let Some(entry) = flat.tlas_instances.get(hit.instance as usize) else { return };
+    let Some(entry) = flat.instances.get(hit.instance as usize) else { return };
     let group = &flat.groups[entry.group];
     if hit.primitive as usize >= group.primitive_count {
         return;
@@ -99,7 +99,7 @@ fn rename(flat: &FlatScene, hit: &mut Hit) {
 fn write_scene(flat: &FlatScene, path: &Path) -> std::io::Result<()> {
     let mut out = BufWriter::with_capacity(1 << 20, std::fs::File::create(path)?);
     let mut words = |w: &[u32]| w.iter().try_for_each(|x| out.write_all(&x.to_le_bytes()));
-    words(&[SCENE_MAGIC, 1, flat.groups.len() as u32, flat.tlas_instances.len() as u32])?;
+    words(&[SCENE_MAGIC, 1, flat.groups.len() as u32, flat.instances.len() as u32])?;
     for group in &flat.groups {
         let vertices = if group.spheres { group.primitive_count } else { group.vertex_count };
         words(&[u32::from(group.spheres), vertices as u32, group.primitive_count as u32])?;
@@ -124,7 +124,7 @@ fn write_scene(flat: &FlatScene, path: &Path) -> std::io::Result<()> {
             }
         }
     }
-    for entry in &flat.tlas_instances {
+    for entry in &flat.instances {
         words(&[entry.group as u32])?;
         for row in crate::tracer::gpu_scene::rows(&entry.to_world) {
             words(&row.map(f32::to_bits))?;
