@@ -131,13 +131,13 @@ impl SceneFeatures {
             lines.push("no spheres: their intersection code is not compiled".to_owned());
         }
         if self.single_level {
-            let n = flat.groups.first().map_or(0, |g| g.parts.len());
+            let n = flat.groups.first().map_or(0, |g| g.submeshes.len());
             lines.push(format!(
                 "one level: {n} mesh{} baked into world space, the top level is skipped",
                 if n == 1 { "" } else { "es" }
             ));
         } else {
-            lines.push(format!("two levels: {} groups, {} entries in the top level", flat.groups.len(), flat.placements.len()));
+            lines.push(format!("two levels: {} groups, {} entries in the top level", flat.groups.len(), flat.instances.len()));
         }
         if flat.absent_primitives > 0 {
             lines.push(format!("{} primitives are transparent everywhere and left out", flat.absent_primitives));

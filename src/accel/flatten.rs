@@ -13,7 +13,7 @@ use crate::scene::{AlphaMode, Geometry, Motion, Scene, Sphere};
 
 /// A mesh within a group.
 #[derive(Clone, Debug)]
-pub struct Part {
+pub struct Submesh {
     /// Index into [`Scene::meshes`].
     pub mesh: usize,
     /// The instance it stands for, when the group is placed once; otherwise the entry of the top level says it.
@@ -30,7 +30,7 @@ pub struct Part {
     pub alpha_tested: bool,
 }
 
-impl Part {
+impl Submesh {
     /// The primitive of the group that follows its last.
     pub fn end(&self, flat: &FlatScene) -> usize {
         self.first_primitive + flat.scene.meshes[self.mesh].geometry.primitive_count()
@@ -39,11 +39,11 @@ impl Part {
 
 /// What one bottom-level structure is built over: triangles or spheres, never both.
 #[derive(Clone, Debug)]
-pub struct Group {
+pub struct BlasGroup {
     /// Spheres (true) or triangles.
     pub spheres: bool,
     /// Its meshes; alpha-tested ones last.
-    pub parts: Vec<Part>,
+    pub submeshes: Vec<Submesh>,
     /// Triangles or spheres.
     pub primitive_count: usize,
     /// Vertices (triangles only).
@@ -54,7 +54,7 @@ pub struct Group {
 
 /// An entry of the top level.
 #[derive(Clone, Debug)]
-pub struct Placement {
+pub struct TlasInstance {
     /// Index into [`FlatScene::groups`].
     pub group: usize,
     /// Group space to world, relative to [`FlatScene::origin`].
@@ -71,9 +71,9 @@ pub struct FlatScene<'a> {
     /// The file's world coordinates of the tracers' origin ([`Scene::origin`]).
     pub origin: DVec3,
     /// Bottom-level structures.
-    pub groups: Vec<Group>,
+    pub groups: Vec<BlasGroup>,
     /// Top-level entries.
-    pub placements: Vec<Placement>,
+    pub instances: Vec<TlasInstance>,
     /// Triangles and spheres left out because their material is nowhere opaque enough to be seen.
     pub absent_primitives: usize,
     /// What may change.
@@ -114,8 +114,8 @@ impl<'a> FlatScene<'a> {
             changes[mesh] = true;
         }
         let relative = |t: DAffine3| DAffine3 { translation: t.translation - origin, ..t };
-        let mut flat = Self { scene, origin, groups: Vec::new(), placements: Vec::new(), absent_primitives: 0, motion, blend };
-        let mut world = [Group::empty(false), Group::empty(true)];
+        let mut flat = Self { scene, origin, groups: Vec::new(), instances: Vec::new(), absent_primitives: 0, motion, blend };
+        let mut world = [BlasGroup::empty(false), BlasGroup::empty(true)];
         let mut own: Vec<Option<usize>> = vec![None; scene.meshes.len()];
         // opaque meshes first, so that alpha-tested primitives are the tail of every group
         for tested in [false, true] {
@@ -135,17 +135,17 @@ impl<'a> FlatScene<'a> {
                     world[spheres as usize].push(scene, instance.mesh, Some(k), to_world, tested);
                 } else {
                     let group = *own[instance.mesh].get_or_insert_with(|| {
-                        let mut g = Group::empty(spheres);
+                        let mut g = BlasGroup::empty(spheres);
                         g.push(scene, instance.mesh, None, DAffine3::IDENTITY, tested);
                         flat.groups.push(g);
                         flat.groups.len() - 1
                     });
-                    flat.placements.push(Placement { group, to_world, scene_instance: Some(k) });
+                    flat.instances.push(TlasInstance { group, to_world, scene_instance: Some(k) });
                 }
             }
         }
         for group in world.into_iter().filter(|g| g.primitive_count > 0) {
-            flat.placements.push(Placement { group: flat.groups.len(), to_world: DAffine3::IDENTITY, scene_instance: None });
+            flat.instances.push(TlasInstance { group: flat.groups.len(), to_world: DAffine3::IDENTITY, scene_instance: None });
             flat.groups.push(group);
         }
         flat
@@ -153,7 +153,7 @@ impl<'a> FlatScene<'a> {
 
     /// One entry that needs no transform: the second level can be skipped.
     pub fn is_single_level(&self) -> bool {
-        self.motion.instances.is_empty() && matches!(self.placements.as_slice(), [p] if p.to_world == DAffine3::IDENTITY)
+        self.motion.instances.is_empty() && matches!(self.instances.as_slice(), [p] if p.to_world == DAffine3::IDENTITY)
     }
 
     /// Does any primitive need its material asked at every hit?
@@ -163,8 +163,8 @@ impl<'a> FlatScene<'a> {
 
     /// Is any of them there for a part of the rays only?
     pub fn has_coverage(&self) -> bool {
-        let covers = |p: &Part| self.scene.materials[self.scene.meshes[p.mesh].material].alpha_mode == AlphaMode::Blend;
-        self.blend == Blend::Covered && self.groups.iter().flat_map(|g| &g.parts).any(|p| p.alpha_tested && covers(p))
+        let covers = |p: &Submesh| self.scene.materials[self.scene.meshes[p.mesh].material].alpha_mode == AlphaMode::Blend;
+        self.blend == Blend::Covered && self.groups.iter().flat_map(|g| &g.submeshes).any(|p| p.alpha_tested && covers(p))
     }
 
     /// Is there a sphere?
@@ -184,7 +184,7 @@ impl<'a> FlatScene<'a> {
     }
 
     /// Position of a part's vertex in group space, exactly as it lies in device memory.
-    pub fn vertex(&self, part: &Part, vertex: usize) -> Vec3 {
+    pub fn vertex(&self, part: &Submesh, vertex: usize) -> Vec3 {
         match &self.scene.meshes[part.mesh].geometry {
             Geometry::Triangles(t) => place(part, t.positions[vertex]),
             Geometry::Spheres(s) => place(part, s[vertex].center),
@@ -192,7 +192,7 @@ impl<'a> FlatScene<'a> {
     }
 
     /// Corners of a part's triangle in group space. `triangle` counts in the mesh.
-    pub fn triangle(&self, part: &Part, triangle: usize) -> [Vec3; 3] {
+    pub fn triangle(&self, part: &Submesh, triangle: usize) -> [Vec3; 3] {
         match &self.scene.meshes[part.mesh].geometry {
             Geometry::Triangles(t) => t.indices[triangle].map(|i| place(part, t.positions[i as usize])),
             Geometry::Spheres(_) => unreachable!("triangles are asked of triangle groups only"),
@@ -200,7 +200,7 @@ impl<'a> FlatScene<'a> {
     }
 
     /// A part's sphere in group space.
-    pub fn sphere(&self, part: &Part, sphere: usize) -> Sphere {
+    pub fn sphere(&self, part: &Submesh, sphere: usize) -> Sphere {
         match &self.scene.meshes[part.mesh].geometry {
             Geometry::Spheres(s) => {
                 let scale = part.to_group.matrix3.x_axis.length();
@@ -211,12 +211,12 @@ impl<'a> FlatScene<'a> {
     }
 
     /// The part that holds a group's primitive.
-    pub fn part_of<'g>(&self, group: &'g Group, primitive: usize) -> &'g Part {
-        &group.parts[group.parts.partition_point(|p| p.first_primitive <= primitive) - 1]
+    pub fn submesh_of<'g>(&self, group: &'g BlasGroup, primitive: usize) -> &'g Submesh {
+        &group.submeshes[group.submeshes.partition_point(|p| p.first_primitive <= primitive) - 1]
     }
 
     /// Box of a group's primitive in group space.
-    pub fn primitive_bounds(&self, group: &Group, part: &Part, primitive: usize) -> Aabb {
+    pub fn primitive_bounds(&self, group: &BlasGroup, part: &Submesh, primitive: usize) -> Aabb {
         let k = primitive - part.first_primitive;
         if group.spheres {
             let s = self.sphere(part, k);
@@ -229,7 +229,7 @@ impl<'a> FlatScene<'a> {
     }
 }
 
-fn place(part: &Part, p: Vec3) -> Vec3 {
+fn place(part: &Submesh, p: Vec3) -> Vec3 {
     if part.to_group == DAffine3::IDENTITY { p } else { part.to_group.transform_point3(p.as_dvec3()).as_vec3() }
 }
 
@@ -243,9 +243,9 @@ fn is_similarity(t: &DAffine3) -> bool {
     (a - b).abs() <= tolerance && (a - c).abs() <= tolerance && skew <= tolerance
 }
 
-impl Group {
+impl BlasGroup {
     fn empty(spheres: bool) -> Self {
-        Self { spheres, parts: Vec::new(), primitive_count: 0, vertex_count: 0, opaque_count: 0 }
+        Self { spheres, submeshes: Vec::new(), primitive_count: 0, vertex_count: 0, opaque_count: 0 }
     }
 
     fn push(&mut self, scene: &Scene, mesh: usize, scene_instance: Option<usize>, to_group: DAffine3, alpha_tested: bool) {
@@ -253,7 +253,7 @@ impl Group {
             Geometry::Triangles(t) => (t.indices.len(), t.positions.len()),
             Geometry::Spheres(s) => (s.len(), 0),
         };
-        self.parts.push(Part {
+        self.submeshes.push(Submesh {
             mesh,
             scene_instance,
             to_group,

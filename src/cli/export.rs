@@ -5,7 +5,7 @@ use std::path::Path;
 use super::args::ExportArgs;
 use crate::error::{Error, Result};
 use crate::files;
-use crate::scene::export::{self, Written};
+use crate::scene::export::{self, ExportStats};
 use crate::scene::{Scene, load};
 use crate::terminal::warnings::{Warnings, warnings_of};
 
@@ -13,7 +13,7 @@ use crate::terminal::warnings::{Warnings, warnings_of};
 pub fn run(args: &ExportArgs) -> Result<()> {
     let console = args.verbosity.console();
     let extension = args.output.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
-    let write: fn(&Scene, &Path) -> Result<Written> = match extension.as_str() {
+    let write: fn(&Scene, &Path) -> Result<ExportStats> = match extension.as_str() {
         "bin" => export::write_mesh_bin,
         "glb" | "gltf" => export::export_gltf,
         _ => {

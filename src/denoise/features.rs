@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::Shot;
+use super::DenoiseInput;
 use crate::error::Result;
 use crate::film::Control;
 use crate::film::camera::CameraRecord;
@@ -15,18 +15,18 @@ use crate::scene::material::{Material, MaterialKind};
 /// Points of a pixel in x and in y.
 pub const GRID: u32 = 4;
 /// Of points of one surface: cosine between their normals and that of the pixel's middle.
-const LEAST_COSINE: f32 = 0.95;
+const MIN_COSINE: f32 = 0.95;
 
 /// How much of a pixel is the surface in its middle.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Mix {
+pub enum PixelContent {
     /// All of it.
     #[default]
-    One,
+    OneSurface,
     /// It may be that others show in it.
-    Several,
+    SeveralSurfaces,
     /// What emits or what surrounds the scene shows in it as well: far brighter, or without noise.
-    Source,
+    Emitter,
 }
 
 /// Images of surfaces, rows from the top.
@@ -40,13 +40,13 @@ pub struct Features {
     /// Share of the pixel in which something is.
     pub coverage: Vec<f32>,
     /// What shows in the pixel.
-    pub mix: Vec<Mix>,
+    pub mix: Vec<PixelContent>,
     /// What its middle shows.
     pub centres: Vec<AovPixel>,
 }
 
 /// The camera's view of points.
-pub(super) struct Look {
+pub(super) struct PinholeView {
     position: Vec3,
     back: Vec3,
     orthographic: bool,
@@ -54,7 +54,7 @@ pub(super) struct Look {
     pixel: f32,
 }
 
-impl Look {
+impl PinholeView {
     /// `height` in pixels.
     pub fn new(camera: &CameraRecord, height: u32) -> Self {
         let column = |c: usize| Vec3::from_array(camera.camera_to_world.map(|row| row[c]));
@@ -77,7 +77,7 @@ impl Look {
         let off = (Vec3::from(point.position) - Vec3::from(centre.position)).dot(Vec3::from(centre.ng));
         point.material == centre.material
             && off.abs() <= DEPTH_TOLERANCE * footprint
-            && Vec3::from(point.ns).dot(Vec3::from(centre.ns)) >= LEAST_COSINE
+            && Vec3::from(point.ns).dot(Vec3::from(centre.ns)) >= MIN_COSINE
     }
 }
 
@@ -86,16 +86,16 @@ impl Features {
     ///
     /// # Errors
     /// Those of [`aov::render`].
-    pub fn render(shot: &Shot, control: &mut dyn Control) -> Result<Self> {
-        let Shot { tracer, scene, camera, options } = *shot;
+    pub fn render(shot: &DenoiseInput, control: &mut dyn Control) -> Result<Self> {
+        let DenoiseInput { tracer, scene, camera, options } = *shot;
         let [width, height] = options.size;
         let pixels = width as usize * height as usize;
         let centres = aov::render(tracer, camera, options.size, control)?;
         let mut albedo = vec![Vec3::ZERO; pixels];
         let mut normals = vec![Vec3::ZERO; pixels];
         let mut coverage = vec![0.0; pixels];
-        let mut mix = vec![Mix::One; pixels];
-        let look = Look::new(camera, height);
+        let mut mix = vec![PixelContent::OneSurface; pixels];
+        let look = PinholeView::new(camera, height);
         let reach = reach(options.pixel_filter);
         let share = 1.0 / (GRID * GRID) as f32;
         let fine = [width * GRID, height * GRID];
@@ -108,7 +108,7 @@ impl Features {
                 normals[at] += Vec3::from(point.ns) * share;
                 coverage[at] += share;
             }
-            let source = material.is_none_or(|m| options.white_sky.is_none() && is_source(m));
+            let source = material.is_none_or(|m| options.white_sky.is_none() && is_uniform_emitter(m));
             // every pixel whose filter may take this point in
             let range = |p: usize, n: u32| {
                 let grid = GRID as usize;
@@ -119,9 +119,9 @@ impl Features {
                     let k = row * width as usize + column;
                     let centre = &centres[k];
                     let found = match centre.depth < f32::INFINITY && material.is_some() && look.is_same(centre, point) {
-                        true => Mix::One,
-                        false if source => Mix::Source,
-                        false => Mix::Several,
+                        true => PixelContent::OneSurface,
+                        false if source => PixelContent::Emitter,
+                        false => PixelContent::SeveralSurfaces,
                     };
                     mix[k] = mix[k].max(found);
                 }
@@ -143,7 +143,7 @@ fn reach(filter: PixelFilter) -> usize {
 }
 
 /// Does a surface of it shine by itself, everywhere alike?
-pub(super) fn is_source(material: &Material) -> bool {
+pub(super) fn is_uniform_emitter(material: &Material) -> bool {
     material.unlit || material.emissive != Vec3::ZERO && material.emissive_texture.is_none()
 }
 

@@ -10,8 +10,8 @@ use std::time::Instant;
 
 use glam::Vec3;
 
-use super::Shot;
-use super::features::{Features, Look, Mix, is_source};
+use super::DenoiseInput;
+use super::features::{Features, PinholeView, PixelContent, is_uniform_emitter};
 use crate::error::Result;
 use crate::film::Control;
 use crate::film::Film;
@@ -59,7 +59,7 @@ struct Guided {
 
 /// See [`super::Denoiser::denoise`].
 pub fn filter(
-    shot: &Shot,
+    shot: &DenoiseInput,
     film: &Film,
     features: &Features,
     settings: &Settings,
@@ -98,8 +98,8 @@ fn uncoloured(material: &Material) -> f32 {
     }
 }
 
-fn guide(shot: &Shot, film: &Film, features: &Features) -> Guided {
-    let Shot { scene, camera, options, .. } = *shot;
+fn guide(shot: &DenoiseInput, film: &Film, features: &Features) -> Guided {
+    let DenoiseInput { scene, camera, options, .. } = *shot;
     let pixels = film.samples.len();
     let mut out = Guided {
         surfaces: vec![SurfaceRecord::default(); pixels],
@@ -107,7 +107,7 @@ fn guide(shot: &Shot, film: &Film, features: &Features) -> Guided {
         estimates: vec![RadianceRecord::default(); pixels],
         divisors: vec![Vec3::ZERO; pixels],
     };
-    let look = Look::new(camera, film.height);
+    let look = PinholeView::new(camera, film.height);
     let white = options.white_sky.is_some();
     for k in 0..pixels {
         let (centre, samples, mix) = (&features.centres[k], film.samples[k], features.mix[k]);
@@ -116,8 +116,8 @@ fn guide(shot: &Shot, film: &Film, features: &Features) -> Guided {
         };
         let albedo = rgb(&features.albedo, k) / features.coverage[k].max(f32::MIN_POSITIVE);
         let reflects = if white { albedo } else { albedo + uncoloured(material) };
-        let left = !white && (shows_others(material) || is_source(material) || reflects.max_element() <= MIN_ALBEDO);
-        if samples == 0 || mix == Mix::Source || left {
+        let left = !white && (shows_others(material) || is_uniform_emitter(material) || reflects.max_element() <= MIN_ALBEDO);
+        if samples == 0 || mix == PixelContent::Emitter || left {
             continue;
         }
         // a lens blurs what is divided, but not what it is divided by
@@ -132,7 +132,7 @@ fn guide(shot: &Shot, film: &Film, features: &Features) -> Guided {
         };
         out.surfaces[k] = SurfaceRecord { position: centre.position, normal: centre.ng, ..Default::default() };
         // eight bits: seven of the material, and whether it is the only surface of the pixel
-        let class = (centre.material.wrapping_mul(0x9e37_79b1) >> 25) << 1 | u32::from(mix == Mix::Several);
+        let class = (centre.material.wrapping_mul(0x9e37_79b1) >> 25) << 1 | u32::from(mix == PixelContent::SeveralSurfaces);
         out.guides[k] = [look.depth(centre.position).to_bits(), pack_normal(Vec3::from(centre.ns)) | class << 24];
         out.divisors[k] = divisor;
     }
@@ -147,7 +147,7 @@ fn pack_normal(n: Vec3) -> u32 {
 
 /// Filters on the device, in launches that are short.
 fn run(
-    shot: &Shot,
+    shot: &DenoiseInput,
     size: [u32; 2],
     guided: &Guided,
     settings: &Settings,

@@ -5,7 +5,7 @@ mod features;
 mod filter;
 
 pub use crate::gpu::oidn::Oidn;
-pub use features::{Features, GRID, Mix};
+pub use features::{Features, GRID, PixelContent};
 pub use filter::Settings;
 
 use crate::error::Result;
@@ -18,7 +18,7 @@ use crate::tracer::Tracer;
 
 /// What films show.
 #[derive(Clone, Copy)]
-pub struct Shot<'a> {
+pub struct DenoiseInput<'a> {
     /// Made for paths.
     pub tracer: &'a Tracer,
     /// The tracer's.
@@ -51,7 +51,13 @@ impl Denoiser {
     ///
     /// # Errors
     /// Those of the device, [`crate::Error::Interrupted`] when `control` says so, and those of the library.
-    pub fn denoise(&self, shot: &Shot, film: &Film, features: &Features, control: &mut dyn Control) -> Result<Vec<f32>> {
+    pub fn denoise(
+        &self,
+        shot: &DenoiseInput,
+        film: &Film,
+        features: &Features,
+        control: &mut dyn Control,
+    ) -> Result<Vec<f32>> {
         match self {
             Denoiser::Filter(settings) => filter::filter(shot, film, features, settings, control),
             Denoiser::Oidn(oidn) => oidn.denoise([film.width, film.height], &film.mean, &features.albedo, &features.normals),

@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use super::block::{Block, TILE};
 use super::camera::CameraRecord;
 use crate::accel::Aabb;
-use crate::accel::flatten::{FlatScene, Group, Part, Placement};
+use crate::accel::flatten::{BlasGroup, FlatScene, Submesh, TlasInstance};
 use crate::scene::Geometry;
 
 /// Placed primitives that are projected one by one at most, per camera ray of the image: beyond, tracing the rays costs less.
@@ -53,7 +53,7 @@ impl Cover {
     /// scene's bounds or beside them, or there is nothing.
     pub fn new(flat: &FlatScene, camera: &CameraRecord, size: [u32; 2], spp: u32) -> Option<Self> {
         let bounds = flat.bounds();
-        let view = View::new(camera, size, bounds, &flat.placements)?;
+        let view = View::new(camera, size, bounds, &flat.instances)?;
         let tiles_x = size[0].div_ceil(TILE);
         let tiles = Marks {
             tiles_x,
@@ -62,15 +62,15 @@ impl Cover {
         };
         // the whole first: most of a distant scene's image is outside of it
         let whole = view.rectangle(bounds, &DAffine3::IDENTITY)?;
-        let placed: f64 = flat.placements.iter().map(|p| flat.groups[p.group].primitive_count as f64).sum();
+        let placed: f64 = flat.instances.iter().map(|p| flat.groups[p.group].primitive_count as f64).sum();
         let rays = whole.clipped_area(size) * spp as f64;
         if placed > PRIMITIVES_PER_RAY * rays {
             tiles.mark(whole, view.margin);
         } else {
-            for placement in &flat.placements {
-                let group = &flat.groups[placement.group];
-                for part in &group.parts {
-                    mark_part(flat, placement, group, part, &view, &tiles);
+            for instance in &flat.instances {
+                let group = &flat.groups[instance.group];
+                for part in &group.submeshes {
+                    mark_part(flat, instance, group, part, &view, &tiles);
                 }
             }
         }
@@ -91,8 +91,8 @@ impl Cover {
     }
 }
 
-fn mark_part(flat: &FlatScene, placement: &Placement, group: &Group, part: &Part, view: &View, tiles: &Marks) {
-    let to_world = placement.to_world;
+fn mark_part(flat: &FlatScene, instance: &TlasInstance, group: &BlasGroup, part: &Submesh, view: &View, tiles: &Marks) {
+    let to_world = instance.to_world;
     match &flat.scene.meshes[part.mesh].geometry {
         Geometry::Triangles(mesh) => {
             // each vertex once, though several triangles share it
@@ -118,7 +118,7 @@ fn mark_part(flat: &FlatScene, placement: &Placement, group: &Group, part: &Part
 }
 
 impl View {
-    fn new(camera: &CameraRecord, size: [u32; 2], bounds: Aabb, placements: &[Placement]) -> Option<Self> {
+    fn new(camera: &CameraRecord, size: [u32; 2], bounds: Aabb, instances: &[TlasInstance]) -> Option<Self> {
         let rows = camera.camera_to_world.map(|r| r.map(f64::from));
         let column = |k: usize| DVec3::new(rows[0][k], rows[1][k], rows[2][k]);
         let matrix = DMat3::from_cols(column(0), column(1), column(2));
@@ -140,7 +140,7 @@ impl View {
         let near = corners.iter().map(|c| -c.z).fold(f64::INFINITY, f64::min);
         let reach = corners.iter().map(|c| c.length()).fold(0.0, f64::max);
         // as in oracle/rounding.rs: going to a group's space and back errs by the translation too, and the more the worse conditioned
-        let moved = || placements.iter().map(|p| p.to_world).filter(|t| *t != DAffine3::IDENTITY);
+        let moved = || instances.iter().map(|p| p.to_world).filter(|t| *t != DAffine3::IDENTITY);
         let translation = moved().map(|t| t.translation.length()).fold(0.0, f64::max);
         let condition = moved().map(|t| condition(t.matrix3)).fold(1.0, f64::max);
         let coordinates =
@@ -248,10 +248,10 @@ mod tests {
 
     fn view(scene: &Scene) -> Option<View> {
         let flat = FlatScene::new(scene);
-        assert_eq!(flat.placements.len(), 2, "the mesh is not baked");
+        assert_eq!(flat.instances.len(), 2, "the mesh is not baked");
         let camera = Camera::look_at(DVec3::new(1.0, 0.5, 20.0), DVec3::new(1.0, 0.5, 0.0), DVec3::Y, 0.7);
         let camera = CameraRecord::new(&camera, flat.origin, 1.0);
-        View::new(&camera, [256, 256], flat.bounds(), &flat.placements)
+        View::new(&camera, [256, 256], flat.bounds(), &flat.instances)
     }
 
     #[test]
@@ -262,7 +262,7 @@ mod tests {
         let far = view(&scene).unwrap();
         // a ray's origin, rounded where the vertices are, is off by half an ulp of each coordinate; so its hit may be seen so far beside
         let ulp = (1.0e6f32.next_up() - 1.0e6f32) as f64;
-        let to_world = FlatScene::new(&scene).placements[0].to_world;
+        let to_world = FlatScene::new(&scene).instances[0].to_world;
         let at = |p: DVec3| {
             let p = far.world_to_camera.transform_point3(to_world.transform_point3(p));
             [far.scale[0] * p.x / -p.z, far.scale[1] * p.y / -p.z]

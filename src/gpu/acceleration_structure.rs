@@ -38,7 +38,7 @@ pub enum BottomLevelInput<'a> {
 }
 
 /// An entry of the top level.
-pub struct TopLevelEntry {
+pub struct AccelerationStructureInstance {
     /// Group to world, three rows.
     pub transform: [f32; 12],
     /// What shaders see as the custom index; below 2^24.
@@ -111,13 +111,13 @@ impl AccelerationStructure {
     }
 
     /// Builds a top level.
-    pub fn top_level(device: &Arc<Device>, commands: &mut Commands, entries: &[TopLevelEntry]) -> Result<Self> {
+    pub fn top_level(device: &Arc<Device>, commands: &mut Commands, entries: &[AccelerationStructureInstance]) -> Result<Self> {
         let records = entry_records(device, entries)?;
         Inputs::top_level(&records, entries.len()).build(device, commands, "top level")
     }
 
     /// Builds a top level anew, where it lies, for as many entries as before. Its address stays.
-    pub fn rebuild_top_level(&self, commands: &mut Commands, entries: &[TopLevelEntry]) -> Result<()> {
+    pub fn rebuild_top_level(&self, commands: &mut Commands, entries: &[AccelerationStructureInstance]) -> Result<()> {
         let records = entry_records(&self.device, entries)?;
         Inputs::top_level(&records, entries.len()).record(self, commands, Update::Rebuild)
     }
@@ -223,7 +223,7 @@ fn bottom_level_geometry<'a>(input: &BottomLevelInput) -> (Vec<Geometry<'a>>, Ve
 }
 
 /// The top level's input in memory that the device reads.
-fn entry_records(device: &Arc<Device>, entries: &[TopLevelEntry]) -> Result<Buffer> {
+fn entry_records(device: &Arc<Device>, entries: &[AccelerationStructureInstance]) -> Result<Buffer> {
     if entries.len() >= 1 << 24 {
         return Err(Error::Scene(format!(
             "{} instances: Vulkan's top level numbers at most 2^24; use --tracer compute",

@@ -28,7 +28,7 @@ impl Device {
 }
 
 /// Records draws into targets; made by [`Recorder::draw_into`].
-pub struct Drawing<'r, 'd> {
+pub struct DrawRecorder<'r, 'd> {
     recorder: &'r mut Recorder<'d>,
     bound: Option<vk::PipelineLayout>,
 }
@@ -36,7 +36,7 @@ pub struct Drawing<'r, 'd> {
 impl<'d> Recorder<'d> {
     /// Clears the upper left `size` pixels of the targets to zero and draws there. Clip space is [`Device::viewport_factor`] times as large
     /// as the image. What the targets held before is lost.
-    pub fn draw_into(&mut self, targets: &Targets, size: [u32; 2], record: impl FnOnce(&mut Drawing<'_, 'd>)) {
+    pub fn draw_into(&mut self, targets: &Targets, size: [u32; 2], record: impl FnOnce(&mut DrawRecorder<'_, 'd>)) {
         assert!(size[0] <= targets.size()[0] && size[1] <= targets.size()[1]);
         self.transition(
             &targets.ids,
@@ -74,7 +74,7 @@ impl<'d> Recorder<'d> {
             raw.cmd_set_viewport(buffer, 0, &[viewport]);
             raw.cmd_set_scissor(buffer, 0, &[area]);
         }
-        record(&mut Drawing { recorder: self, bound: None });
+        record(&mut DrawRecorder { recorder: self, bound: None });
         self.drew = true;
         // SAFETY: begun above
         unsafe { self.device.raw.cmd_end_rendering(self.buffer) };
@@ -122,7 +122,7 @@ impl<'d> Recorder<'d> {
     }
 }
 
-impl Drawing<'_, '_> {
+impl DrawRecorder<'_, '_> {
     /// Says what the next draws are made with.
     pub fn bind(&mut self, pipeline: &GraphicsPipeline) {
         let (raw, buffer) = (&self.recorder.device.raw, self.recorder.buffer);
@@ -132,14 +132,14 @@ impl Drawing<'_, '_> {
     }
 
     /// Sets what the shaders of the next draws see. The addresses within `push` must lead to living buffers of the layout that they
-    /// expect. To be called after [`Drawing::bind`].
+    /// expect. To be called after [`DrawRecorder::bind`].
     pub fn push<P: bytemuck::NoUninit>(&mut self, push: &P) {
         if let Some(layout) = self.bound {
             self.recorder.push(layout, DRAW_STAGES, push);
         }
     }
 
-    /// Draws triangles from consecutive vertices, once for each of the instances. To be called after [`Drawing::push`].
+    /// Draws triangles from consecutive vertices, once for each of the instances. To be called after [`DrawRecorder::push`].
     pub fn draw(&mut self, vertices: Range<u32>, instances: Range<u32>) {
         if self.bound.is_none() || vertices.is_empty() || instances.is_empty() {
             return;

@@ -19,7 +19,7 @@ pub(super) const DRAW_STAGES: vk::ShaderStageFlags =
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Cull {
     /// None: both sides are seen.
-    Nothing,
+    None,
     /// Those whose corners go round counter-clockwise in the image.
     Front,
 }
@@ -50,7 +50,7 @@ impl GraphicsPipeline {
         let rasterization = vk::PipelineRasterizationStateCreateInfo::default()
             .polygon_mode(vk::PolygonMode::FILL)
             .cull_mode(match cull {
-                Cull::Nothing => vk::CullModeFlags::NONE,
+                Cull::None => vk::CullModeFlags::NONE,
                 Cull::Front => vk::CullModeFlags::FRONT,
             })
             .front_face(vk::FrontFace::COUNTER_CLOCKWISE)

@@ -16,7 +16,7 @@ use crate::error::Result;
 
 /// What a scene has become in a file.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Written {
+pub struct ExportStats {
     /// Triangles placed, those that stand for spheres included.
     pub triangles: u64,
     /// What the file does not hold as the scene does, a sentence each.

@@ -19,7 +19,7 @@ pub mod motion;
 pub mod orbit;
 pub mod texture;
 
-pub use animation::Rig;
+pub use animation::AnimationRig;
 pub use camera::{Camera, Projection};
 pub use camera_path::CameraPath;
 pub use light::{Environment, EnvironmentMap, Light, LightKind};
@@ -92,7 +92,7 @@ pub struct Scene {
     /// Wishes of the file about how to render it.
     pub hints: RenderHints,
     /// What of it moves over time; `None` where nothing does.
-    pub rig: Option<Rig>,
+    pub rig: Option<AnimationRig>,
     /// What the loader noticed.
     pub report: LoadReport,
 }

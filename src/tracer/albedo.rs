@@ -27,7 +27,7 @@ const MIN_COSINE: f64 = 1e-7;
 
 /// Which tables are asked for; the others stay 0.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Wanted {
+pub(super) struct AlbedoTables {
     /// Of GGX.
     pub ggx: bool,
     /// Of Charlie's fibres.
@@ -37,7 +37,7 @@ pub(super) struct Wanted {
 }
 
 /// Layers of `SIZE` squared in the order of shaders/bsdf/albedo.glsl, rows by roughness; `glass`: indices of refraction.
-pub(super) fn tables(wanted: Wanted, glass: &[f32]) -> Vec<f32> {
+pub(super) fn tables(wanted: AlbedoTables, glass: &[f32]) -> Vec<f32> {
     let ggx_wanted = wanted.ggx || !glass.is_empty();
     let mut all = table(ggx_wanted, |x, r| [ggx(unstretched(x, r), r)[0]]);
     all.extend(table(ggx_wanted, |x, r| {
@@ -290,7 +290,7 @@ mod tests {
     /// Tables as the shader reads them, between their entries, against integrals of many points: what compensation is off by.
     #[test]
     fn tables_hold_between_their_entries() {
-        let tables = tables(Wanted { ggx: true, sheen: true, beckmann: true }, &[]);
+        let tables = tables(AlbedoTables { ggx: true, sheen: true, beckmann: true }, &[]);
         let at = |layer: usize, x: f64, y: f64| {
             let (x, y) = (x * (SIZE - 1) as f64, y * (SIZE - 1) as f64);
             let (i, j) = ((x as usize).min(SIZE - 2), (y as usize).min(SIZE - 2));

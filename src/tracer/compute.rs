@@ -1,4 +1,4 @@
-//! What the compute tracer walks: a hierarchy per group and one over the placed groups, all in one node array. Here is the fast
+//! What the compute tracer walks: a hierarchy per group and one over their instances, all in one node array. Here is the fast
 //! kernel's and what all share; the readable kernel's is in `reference.rs`, and `brute.rs` has none.
 
 use std::sync::Arc;
@@ -9,7 +9,7 @@ use super::dynamic_trees::DynamicTrees;
 use super::kernel::{BuildOptions, Kernel};
 use super::stream::LaunchMemory;
 use super::{brute, reference, wide};
-use crate::accel::flatten::{FlatScene, Group, Placement};
+use crate::accel::flatten::{BlasGroup, FlatScene, TlasInstance};
 use crate::accel::{Aabb, bvh2};
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, Device, DeviceInfo, Memory};
@@ -114,17 +114,17 @@ impl Hierarchy {
     }
 
     /// See [`DynamicTrees::place`].
-    pub fn place(&mut self, placements: &[Placement]) -> Result<bool> {
+    pub fn place(&mut self, instances: &[TlasInstance]) -> Result<bool> {
         let Some(dynamic) = &mut self.dynamic else { return Ok(false) };
-        let (rebuilt, bounds) = dynamic.place(&mut self.nodes, placements)?;
+        let (rebuilt, bounds) = dynamic.place(&mut self.nodes, instances)?;
         self.bounds = bounds;
         Ok(rebuilt)
     }
 
     /// See [`DynamicTrees::traced`].
-    pub fn traced(&mut self, seconds: f64, placements: &[Placement]) {
+    pub fn traced(&mut self, seconds: f64, instances: &[TlasInstance]) {
         if let Some(dynamic) = &mut self.dynamic {
-            dynamic.traced(seconds, placements);
+            dynamic.traced(seconds, instances);
         }
     }
 }
@@ -132,10 +132,10 @@ impl Hierarchy {
 impl Trees {
     pub fn build(flat: &FlatScene, kernel: Kernel, options: &BuildOptions) -> Result<Self> {
         let total = flat.primitive_count();
-        if total > bvh2::MAX_PRIMITIVES || flat.placements.len() > bvh2::MAX_PRIMITIVES {
+        if total > bvh2::MAX_PRIMITIVES || flat.instances.len() > bvh2::MAX_PRIMITIVES {
             return Err(Error::Scene(format!(
                 "{total} primitives and {} instances; the compute tracer numbers at most {} of each",
-                flat.placements.len(),
+                flat.instances.len(),
                 bvh2::MAX_PRIMITIVES
             )));
         }
@@ -207,33 +207,33 @@ pub(super) fn reach_padding(reach: f32) -> f32 {
     (4.0 * f32::EPSILON * reach).max(1e-30)
 }
 
-pub(super) fn primitive_boxes(flat: &FlatScene, group: &Group) -> impl Iterator<Item = Aabb> {
-    group.parts.iter().flat_map(move |part| {
+pub(super) fn primitive_boxes(flat: &FlatScene, group: &BlasGroup) -> impl Iterator<Item = Aabb> {
+    group.submeshes.iter().flat_map(move |part| {
         let count = flat.scene.meshes[part.mesh].geometry.primitive_count();
         (part.first_primitive..part.first_primitive + count).map(move |p| flat.primitive_bounds(group, part, p))
     })
 }
 
-/// World boxes of the placed groups from each group's own, widened by what rounding a ray into a group's space may move it.
-pub(super) fn placement_boxes(flat: &FlatScene, bounds: &[Aabb]) -> Vec<Aabb> {
+/// World-space bounds of the instances, from each group's own, widened by what rounding a ray into a group's space may move it.
+pub(super) fn instance_boxes(flat: &FlatScene, bounds: &[Aabb]) -> Vec<Aabb> {
     let scene = flat.bounds();
-    let pad = placement_padding(scene.min.abs().max(scene.max.abs()).max_element().max(0.0));
-    flat.placements
+    let pad = instance_padding(scene.min.abs().max(scene.max.abs()).max_element().max(0.0));
+    flat.instances
         .iter()
         .map(|p| {
-            let b = placed(&p.to_world, bounds[p.group]);
+            let b = transformed_bounds(&p.to_world, bounds[p.group]);
             Aabb { min: b.min - pad, max: b.max + pad }
         })
         .collect()
 }
 
 /// 16 half-ulps of the largest coordinate: two transforms of three products each, and the inverse's own rounding.
-pub(super) fn placement_padding(reach: f32) -> f32 {
+pub(super) fn instance_padding(reach: f32) -> f32 {
     16.0 * f32::EPSILON * 0.5 * reach
 }
 
 /// Box around a transformed box, rounded but not widened.
-pub(super) fn placed(to_world: &DAffine3, b: Aabb) -> Aabb {
+pub(super) fn transformed_bounds(to_world: &DAffine3, b: Aabb) -> Aabb {
     (0..8u32).fold(Aabb::EMPTY, |out, k| {
         let pick = |axis: usize| if k >> axis & 1 == 0 { b.min[axis] } else { b.max[axis] };
         let corner = to_world.transform_point3(Vec3::new(pick(0), pick(1), pick(2)).as_dvec3()).as_vec3();
@@ -242,8 +242,8 @@ pub(super) fn placed(to_world: &DAffine3, b: Aabb) -> Aabb {
 }
 
 /// A primitive of a group as the readable kernels take it: a sphere lies where a triangle might be.
-pub(super) fn record(flat: &FlatScene, group: &Group, primitive: u32) -> TriangleRecord {
-    let part = flat.part_of(group, primitive as usize);
+pub(super) fn record(flat: &FlatScene, group: &BlasGroup, primitive: u32) -> TriangleRecord {
+    let part = flat.submesh_of(group, primitive as usize);
     let k = primitive as usize - part.first_primitive;
     if group.spheres {
         let s = flat.sphere(part, k);

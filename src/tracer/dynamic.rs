@@ -10,11 +10,11 @@ use std::time::Instant;
 use glam::{DAffine3, DVec3, Vec3};
 use rayon::prelude::*;
 
-use super::compute::placed;
+use super::compute::transformed_bounds;
 use super::gpu_scene::rows;
 use super::{Structure, Tracer};
 use crate::accel::Aabb;
-use crate::accel::flatten::{FlatScene, Group, Part, Placement};
+use crate::accel::flatten::{BlasGroup, FlatScene, Submesh, TlasInstance};
 use crate::error::{Error, Result};
 use crate::scene::Geometry;
 use crate::scene::animation::{Pose, PosedMesh};
@@ -42,7 +42,7 @@ pub struct Changes<'a> {
 
 /// Something that moved or changed its shape in an update.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Moved {
+pub struct MovedBounds {
     /// Box around where it was and where it is, relative to the scene's origin.
     pub bounds: Aabb,
     /// The longest way that a point of it went, by half its diagonal: 1 and more where nothing of it is where it was.
@@ -76,7 +76,7 @@ pub struct UpdateStats {
     pub growth: f64,
     /// What is no longer where it was.
     #[serde(skip)]
-    pub moved: Vec<Moved>,
+    pub moved: Vec<MovedBounds>,
 }
 
 /// A mesh that may deform.
@@ -91,7 +91,7 @@ struct DeformingMesh {
 /// What a tracer of a changing scene keeps on the host.
 pub(super) struct Dynamic {
     origin: DVec3,
-    placements: Vec<Placement>,
+    instances: Vec<TlasInstance>,
     /// Of each group, in its own space.
     bounds: Vec<Aabb>,
     /// Entry of the top level for each instance that may move, where it has one.
@@ -106,7 +106,7 @@ impl Dynamic {
             return None;
         }
         let placed: HashMap<usize, usize> =
-            flat.placements.iter().enumerate().filter_map(|(k, p)| Some((p.scene_instance?, k))).collect();
+            flat.instances.iter().enumerate().filter_map(|(k, p)| Some((p.scene_instance?, k))).collect();
         let meshes = flat.motion.meshes.iter().filter_map(|&mesh| {
             let Geometry::Triangles(t) = &flat.scene.meshes[mesh].geometry else { return None };
             let group = group_of(flat, mesh);
@@ -114,7 +114,7 @@ impl Dynamic {
         });
         Some(Self {
             origin: flat.origin,
-            placements: flat.placements.clone(),
+            instances: flat.instances.clone(),
             bounds: flat.groups.iter().map(|g| group_bounds(flat, g)).collect(),
             entries: flat.motion.instances.iter().map(|i| (*i, placed.get(i).copied())).collect(),
             meshes: meshes.collect(),
@@ -166,8 +166,8 @@ impl Dynamic {
 }
 
 /// Box of a group's primitives.
-fn group_bounds(flat: &FlatScene, group: &Group) -> Aabb {
-    let part = |part: &Part| {
+fn group_bounds(flat: &FlatScene, group: &BlasGroup) -> Aabb {
+    let part = |part: &Submesh| {
         let count = flat.scene.meshes[part.mesh].geometry.primitive_count();
         (part.first_primitive..part.first_primitive + count)
             .into_par_iter()
@@ -175,17 +175,17 @@ fn group_bounds(flat: &FlatScene, group: &Group) -> Aabb {
             .map(|k| flat.primitive_bounds(group, part, k))
             .reduce(|| Aabb::EMPTY, |a, b| a.union(b))
     };
-    group.parts.iter().map(part).fold(Aabb::EMPTY, |a, b| a.union(b))
+    group.submeshes.iter().map(part).fold(Aabb::EMPTY, |a, b| a.union(b))
 }
 
 /// The group of a mesh that was not baked.
 pub(super) fn group_of(flat: &FlatScene, mesh: usize) -> Option<usize> {
-    flat.groups.iter().position(|g| matches!(g.parts.as_slice(), [p] if p.mesh == mesh))
+    flat.groups.iter().position(|g| matches!(g.submeshes.as_slice(), [p] if p.mesh == mesh))
 }
 
 impl Dynamic {
     /// Takes what has changed, and says where that was and is. Entries whose transform or shape is what it was have not moved.
-    fn advance(&mut self, changes: &Changes, moved: &[(usize, DAffine3)]) -> Vec<Moved> {
+    fn advance(&mut self, changes: &Changes, moved: &[(usize, DAffine3)]) -> Vec<MovedBounds> {
         // of a group's own points, by group
         let mut ways: HashMap<usize, (Aabb, f32)> = HashMap::new();
         for change in &changes.meshes {
@@ -207,7 +207,7 @@ impl Dynamic {
         // of an entry that is named twice the last counts
         let latest: HashMap<usize, DAffine3> = moved.iter().copied().collect();
         let mut out = Vec::new();
-        for (k, p) in self.placements.iter_mut().enumerate() {
+        for (k, p) in self.instances.iter_mut().enumerate() {
             let (old, new) = (p.to_world, latest.get(&k).copied().unwrap_or(p.to_world));
             let deformed = ways.get(&p.group).copied();
             if old == new && deformed.is_none() {
@@ -216,11 +216,11 @@ impl Dynamic {
             p.to_world = new;
             let now = self.bounds[p.group];
             let (before, way) = deformed.unwrap_or((now, 0.0));
-            let (from, to) = (placed(&old, before), placed(&new, now));
+            let (from, to) = (transformed_bounds(&old, before), transformed_bounds(&new, now));
             let scale = new.matrix3.x_axis.length().max(new.matrix3.y_axis.length()).max(new.matrix3.z_axis.length());
             let carried = corners(now).map(|c| old.transform_point3(c).distance(new.transform_point3(c))).fold(0.0, f64::max);
             let half = 0.5 * (to.max - to.min).length().max(f32::MIN_POSITIVE);
-            out.push(Moved { bounds: from.union(to), share: (f64::from(way) * scale + carried) as f32 / half });
+            out.push(MovedBounds { bounds: from.union(to), share: (f64::from(way) * scale + carried) as f32 / half });
         }
         out
     }
@@ -247,7 +247,7 @@ impl Tracer {
         let mut stats = UpdateStats { growth: 1.0, ..Default::default() };
         let start = Instant::now();
         let deforming = changes.meshes.iter().filter_map(|c| dynamic.meshes.get(&c.mesh)?.group).collect();
-        self.scene.begin_update(&dynamic.placements, moved.iter().map(|m| m.0).collect(), deforming)?;
+        self.scene.begin_update(&dynamic.instances, moved.iter().map(|m| m.0).collect(), deforming)?;
         stats.moved = dynamic.advance(changes, &moved);
         let mut deformed = false;
         for change in &changes.meshes {
@@ -271,11 +271,11 @@ impl Tracer {
             return Ok(stats);
         }
         let start = Instant::now();
-        let latest: Vec<_> = moved.iter().map(|m| (m.0, dynamic.placements[m.0].to_world)).collect();
+        let latest: Vec<_> = moved.iter().map(|m| (m.0, dynamic.instances[m.0].to_world)).collect();
         self.scene.set_transforms(&latest)?;
         match &mut self.structure {
             Structure::Compute(h) => {
-                stats.top_rebuilt = h.place(&dynamic.placements)?;
+                stats.top_rebuilt = h.place(&dynamic.instances)?;
                 self.scene.set_hierarchy(h)?;
             }
             Structure::Hardware { levels } => {
@@ -292,7 +292,7 @@ impl Tracer {
     pub fn traced(&mut self, seconds: f64) {
         let Some(dynamic) = &self.dynamic else { return };
         match &mut self.structure {
-            Structure::Compute(h) => h.traced(seconds, &dynamic.placements),
+            Structure::Compute(h) => h.traced(seconds, &dynamic.instances),
             Structure::Hardware { levels } => levels.traced(seconds),
         }
     }

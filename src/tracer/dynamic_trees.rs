@@ -11,12 +11,12 @@ use std::time::Instant;
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::compute::{padding, placed, placement_padding, reach_padding};
+use super::compute::{instance_padding, padding, reach_padding, transformed_bounds};
 use super::dynamic::group_of;
 use super::gpu_scene::rows;
 use super::wide::{Trees, Triangles, tree, triangle_tree_of};
 use crate::accel::build::MAX_DEPTH;
-use crate::accel::flatten::{FlatScene, Placement};
+use crate::accel::flatten::{FlatScene, TlasInstance};
 use crate::accel::refit::{RefitPlan, RefitPolicy, refit};
 use crate::accel::wide::{self, BLOCK_BYTES, Block, LEAF, Wide};
 use crate::accel::{Aabb, BuildPreset, pairs};
@@ -26,18 +26,18 @@ use crate::interface::records::hierarchy::{ALPHA_TESTED, InstanceLeaf, TriangleL
 use crate::scene::Geometry;
 
 /// A top level of so many entries is always built anew: docs/dynamic-scenes.md has the measurement.
-const TOP_BUILD_MOST: usize = 256;
+const MAX_TOP_REBUILD: usize = 256;
 /// Levels that a tree may grow by when it is built anew.
 const MORE_LEVELS: u32 = 4;
 
 /// Blocks that trees take in the array, with room to grow.
-pub(super) struct Rooms {
+pub(super) struct TreeCapacities {
     pub top: usize,
     pub groups: Vec<usize>,
 }
 
 /// Nodes that may lie on a path, for the kernel's stack.
-pub(super) struct Depths {
+pub(super) struct TreeDepths {
     pub top: u32,
     pub groups: Vec<u32>,
 }
@@ -98,14 +98,14 @@ fn may_deform(flat: &FlatScene) -> Vec<bool> {
     out
 }
 
-/// Rooms and depths that a scene's trees get: what they need, and more for those that change.
-pub(super) fn provide(trees: &Trees, flat: &FlatScene) -> (Rooms, Depths) {
+/// TreeCapacities and depths that a scene's trees get: what they need, and more for those that change.
+pub(super) fn provide(trees: &Trees, flat: &FlatScene) -> (TreeCapacities, TreeDepths) {
     let deform = may_deform(flat);
     let rooms = |t: &Wide, more: bool| if more { more_room(t.blocks.len()) } else { t.blocks.len() };
     let top = trees.top.as_ref().map_or((0, 0), |t| match flat.motion.is_none() {
         true => (t.blocks.len(), t.depth),
         // every node but the root has two children at least
-        false => (2 * flat.placements.len() + 1, most_depth(t.depth, flat.placements.len())),
+        false => (2 * flat.instances.len() + 1, most_depth(t.depth, flat.instances.len())),
     });
     let groups = trees
         .groups
@@ -114,12 +114,12 @@ pub(super) fn provide(trees: &Trees, flat: &FlatScene) -> (Rooms, Depths) {
         .zip(deform)
         .map(|((t, g), more)| (rooms(t, more), if more { most_depth(t.depth, g.primitive_count) } else { t.depth }));
     let (room, depth) = groups.unzip();
-    (Rooms { top: top.0, groups: room }, Depths { top: top.1, groups: depth })
+    (TreeCapacities { top: top.0, groups: room }, TreeDepths { top: top.1, groups: depth })
 }
 
 impl DynamicTrees {
     /// Of trees that lie in the array with these rooms, the top level first.
-    pub fn new(trees: &Trees, flat: &FlatScene, rooms: &Rooms, depths: &Depths) -> Self {
+    pub fn new(trees: &Trees, flat: &FlatScene, rooms: &TreeCapacities, depths: &TreeDepths) -> Self {
         let deform = may_deform(flat);
         let describe = |t: &Wide, base, room, depth, seconds, changes: bool| Tree {
             base,
@@ -140,7 +140,7 @@ impl DynamicTrees {
         let groups = groups.collect();
         let top = trees.top.as_ref().map(|t| describe(t, 0, rooms.top, depths.top, trees.top_seconds, true));
         let deforming = flat.groups.iter().zip(&deform).map(|(g, &deform)| {
-            let Geometry::Triangles(t) = &flat.scene.meshes[g.parts[0].mesh].geometry else { return None };
+            let Geometry::Triangles(t) = &flat.scene.meshes[g.submeshes[0].mesh].geometry else { return None };
             deform.then(|| {
                 let mut used = vec![false; t.positions.len()];
                 t.indices.iter().flatten().for_each(|&v| used[v as usize] = true);
@@ -195,20 +195,21 @@ impl DynamicTrees {
     }
 
     /// Entries or groups have moved: refits the top level or builds it anew. Gives whether it did the latter, and the bounds of everything.
-    pub fn place(&mut self, nodes: &mut Buffer, placements: &[Placement]) -> Result<(bool, Aabb)> {
+    pub fn place(&mut self, nodes: &mut Buffer, instances: &[TlasInstance]) -> Result<(bool, Aabb)> {
         let Some(top) = &mut self.top else {
             return Ok((false, self.groups.first().map_or(Aabb::EMPTY, |g| g.bounds)));
         };
         let start = Instant::now();
         let groups = &self.groups;
-        let mut boxes: Vec<Aabb> = placements.par_iter().map(|p| placed(&p.to_world, groups[p.group].bounds)).collect();
-        let pad = placement_padding(boxes.iter().fold(0.0f32, |m, b| m.max(b.min.abs().max(b.max.abs()).max_element())));
+        let mut boxes: Vec<Aabb> =
+            instances.par_iter().map(|p| transformed_bounds(&p.to_world, groups[p.group].bounds)).collect();
+        let pad = instance_padding(boxes.iter().fold(0.0f32, |m, b| m.max(b.min.abs().max(b.max.abs()).max_element())));
         boxes.par_iter_mut().for_each(|b| *b = Aabb { min: b.min - pad, max: b.max + pad });
         let leaf = |entry: u32| {
-            let placement = &placements[entry as usize];
-            instance_leaf(entry, placement, groups[placement.group].base as u32)
+            let instance = &instances[entry as usize];
+            instance_leaf(entry, instance, groups[instance.group].base as u32)
         };
-        let rebuild = placements.len() <= TOP_BUILD_MOST || top.should_rebuild();
+        let rebuild = instances.len() <= MAX_TOP_REBUILD || top.should_rebuild();
         if rebuild {
             let built = tree(boxes, BuildPreset::Fast, Some(top.depth), |entry| bytemuck::cast(leaf(entry)));
             top.replace(blocks(&mut self.copy, nodes)?, &built, start.elapsed().as_secs_f64());
@@ -228,12 +229,13 @@ impl DynamicTrees {
     }
 
     /// Shares out the time of tracing among the trees, by how many blocks of each a ray is expected to visit.
-    pub fn traced(&mut self, seconds: f64, placements: &[Placement]) {
+    pub fn traced(&mut self, seconds: f64, instances: &[TlasInstance]) {
         let mut visits = vec![0.0f64; self.groups.len()];
         let whole = self.top.as_ref().map_or(1.0, |t| t.bounds.half_area() as f64).max(f64::MIN_POSITIVE);
-        for p in placements {
+        for p in instances {
             let g = &self.groups[p.group];
-            let share = if self.top.is_some() { placed(&p.to_world, g.bounds).half_area() as f64 / whole } else { 1.0 };
+            let share =
+                if self.top.is_some() { transformed_bounds(&p.to_world, g.bounds).half_area() as f64 / whole } else { 1.0 };
             visits[p.group] += share * g.sah_cost;
         }
         let top_visits = self.top.as_ref().map_or(0.0, |t| t.sah_cost);
@@ -333,8 +335,8 @@ impl Tree {
 }
 
 /// The leaf of an entry of the top level, whose group's root is block `root`.
-pub(super) fn instance_leaf(entry: u32, placement: &Placement, root: u32) -> InstanceLeaf {
-    InstanceLeaf { world_to_group: rows(&placement.to_world.inverse()), root, instance: entry, ..Default::default() }
+pub(super) fn instance_leaf(entry: u32, instance: &TlasInstance, root: u32) -> InstanceLeaf {
+    InstanceLeaf { world_to_group: rows(&instance.to_world.inverse()), root, instance: entry, ..Default::default() }
 }
 
 /// Moves the corners of a leaf to where its vertices are now, and gives their box. Which vertex is which corner follows from the numbers of the

@@ -8,12 +8,12 @@ use glam::{DAffine3, Vec3, Vec4};
 
 use super::albedo;
 use super::compute::Hierarchy;
-use super::drawable::{Drawable, Shape};
 use super::mipmap;
-use super::motion::Motion;
+use super::previous_frame::PreviousFrame;
+use super::raster_instance::{RasterGeometry, RasterInstance};
 use super::shading;
 use crate::accel::features::{Blend, alpha_cutoff};
-use crate::accel::flatten::{FlatScene, Group, Part, Placement};
+use crate::accel::flatten::{BlasGroup, FlatScene, Submesh, TlasInstance};
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, Device, Memory};
 use crate::interface::records::ray::INVALID;
@@ -64,14 +64,14 @@ pub struct GpuScene {
     instances: Vec<InstanceRecord>,
     instance_buffer: Buffer,
     pub(super) groups: Vec<GroupBuffers>,
-    shapes: Vec<Shape>,
+    shapes: Vec<RasterGeometry>,
     /// The group of each entry of the top level.
     group_of: Vec<u32>,
     attributes: Buffer,
     /// Where in `attributes` the normals of meshes that may deform lie.
     normals: Vec<(usize, u64)>,
     /// Before the last update; `None` where nothing ever changes.
-    motion: Option<Motion>,
+    motion: Option<PreviousFrame>,
     others: Vec<Buffer>,
     mips: MipStats,
 }
@@ -96,7 +96,7 @@ impl GpuScene {
         let attributes = Attributes::upload(device, flat, needs)?;
         for (group, buffers) in flat.groups.iter().zip(&groups) {
             first_part.push(parts.len() as u32);
-            for (k, part) in group.parts.iter().enumerate() {
+            for (k, part) in group.submeshes.iter().enumerate() {
                 parts.push(PartRecord {
                     indices: buffers.indices.as_ref().map_or(0, Buffer::address),
                     positions: buffers.positions.address(),
@@ -115,7 +115,7 @@ impl GpuScene {
             }
         }
         let instances: Vec<_> = flat
-            .placements
+            .instances
             .iter()
             .map(|p| InstanceRecord {
                 group_to_world: rows(&p.to_world),
@@ -131,18 +131,18 @@ impl GpuScene {
         if let Some(bad) =
             instances.iter().position(|i| !i.group_to_world.iter().chain(&i.world_to_group).flatten().all(|x| x.is_finite()))
         {
-            let name = flat.placements[bad].scene_instance.map_or("", |i| flat.scene.instances[i].name.as_str());
+            let name = flat.instances[bad].scene_instance.map_or("", |i| flat.scene.instances[i].name.as_str());
             return Err(Error::Scene(format!(
                 "instance {bad} '{name}' has a transform that cannot be inverted (a scale of zero?)"
             )));
         }
         // which record and part stand for each instance of the scene
         let mut placements = vec![[0u32; 2]; flat.scene.instances.len()];
-        for (k, p) in flat.placements.iter().enumerate() {
+        for (k, p) in flat.instances.iter().enumerate() {
             match p.scene_instance {
                 Some(i) => placements[i] = [k as u32, first_part[p.group]],
                 None => {
-                    for (j, part) in flat.groups[p.group].parts.iter().enumerate() {
+                    for (j, part) in flat.groups[p.group].submeshes.iter().enumerate() {
                         if let Some(i) = part.scene_instance {
                             placements[i] = [k as u32, first_part[p.group] + j as u32];
                         }
@@ -193,11 +193,11 @@ impl GpuScene {
             Some((mesh, address - attributes.buffer.address()))
         };
         let normals = flat.motion.meshes.iter().filter_map(normals).collect();
-        let motion = Motion::new(device, flat, |group| groups[group].positions.size())?;
-        root.motion = motion.as_ref().map_or(0, Motion::address);
+        let motion = PreviousFrame::new(device, flat, |group| groups[group].positions.size())?;
+        root.motion = motion.as_ref().map_or(0, PreviousFrame::address);
         let root_buffer = Buffer::from_slice(device, "scene root", &[root])?;
-        let shapes = flat.groups.iter().map(|g| Shape::new(flat, g)).collect();
-        let group_of = flat.placements.iter().map(|p| p.group as u32).collect();
+        let shapes = flat.groups.iter().map(|g| RasterGeometry::new(flat, g)).collect();
+        let group_of = flat.instances.iter().map(|p| p.group as u32).collect();
         let attributes = attributes.buffer;
         Ok(Self {
             root,
@@ -216,10 +216,10 @@ impl GpuScene {
     }
 
     /// What there is to draw, entry by entry of the top level, as it is now.
-    pub(super) fn drawables(&self) -> impl Iterator<Item = Drawable<'_>> {
+    pub(super) fn raster_instances(&self) -> impl Iterator<Item = RasterInstance<'_>> {
         (0..).zip(self.instances.iter().zip(&self.group_of)).map(|(entry, (instance, &group))| {
             let buffers = &self.groups[group as usize];
-            Drawable {
+            RasterInstance {
                 entry,
                 to_world: instance.group_to_world,
                 shape: &self.shapes[group as usize],
@@ -247,10 +247,10 @@ impl GpuScene {
     }
 
     /// Before an update that moves these entries of the top level, now at `placements`, and deforms these groups.
-    pub(super) fn begin_update(&mut self, placements: &[Placement], moving: Vec<usize>, deforming: Vec<usize>) -> Result<()> {
+    pub(super) fn begin_update(&mut self, instances: &[TlasInstance], moving: Vec<usize>, deforming: Vec<usize>) -> Result<()> {
         let groups = &self.groups;
         match &mut self.motion {
-            Some(motion) => motion.begin(placements, |g| &groups[g].positions, moving, deforming),
+            Some(motion) => motion.begin(instances, |g| &groups[g].positions, moving, deforming),
             None => Ok(()),
         }
     }
@@ -314,7 +314,7 @@ impl GpuScene {
 /// What materials ask about albedos, if any does.
 fn albedo_tables(flat: &FlatScene, needs: Needs, indices: &[f32]) -> Option<Vec<f32>> {
     let ShadingFeatures { bsdfs, materials, .. } = shading::features(flat, needs);
-    let wanted = albedo::Wanted {
+    let wanted = albedo::AlbedoTables {
         ggx: needs.compensation && bsdfs.contains(BsdfModel::Gltf),
         sheen: materials.contains(MaterialFeature::Sheen),
         beckmann: needs.compensation && bsdfs.contains(BsdfModel::Conductor),
@@ -329,38 +329,38 @@ fn write_all<T: Pod>(buffer: &mut Buffer, data: &[T]) -> Result<()> {
     buffer.fill(bytes.len() as u64, 1, |first, chunk| chunk.copy_from_slice(&bytes[first as usize..][..chunk.len()]))
 }
 
-fn group_buffers(device: &Arc<Device>, flat: &FlatScene, group: &Group) -> Result<GroupBuffers> {
+fn group_buffers(device: &Arc<Device>, flat: &FlatScene, group: &BlasGroup) -> Result<GroupBuffers> {
     let n = group.primitive_count as u64;
     if group.spheres {
         let mut positions = Buffer::new(device, "spheres", 16 * n, Memory::Device)?;
         positions.fill(16 * n, 16, |first, bytes| {
             for (k, out) in bytes.chunks_exact_mut(16).enumerate() {
                 let primitive = first as usize + k;
-                let part = flat.part_of(group, primitive);
+                let part = flat.submesh_of(group, primitive);
                 let s = flat.sphere(part, primitive - part.first_primitive);
                 out.copy_from_slice(bytemuck::bytes_of(&[s.center.x, s.center.y, s.center.z, s.radius]));
             }
         })?;
         return Ok(GroupBuffers { positions, indices: None, part_of: part_of(device, group)? });
     }
-    let triangles = |part: &Part| match &flat.scene.meshes[part.mesh].geometry {
+    let triangles = |part: &Submesh| match &flat.scene.meshes[part.mesh].geometry {
         Geometry::Triangles(t) => t,
         Geometry::Spheres(_) => unreachable!("a triangle group holds triangles"),
     };
     let mut positions = Buffer::new(device, "vertices", 12 * group.vertex_count as u64, Memory::Device)?;
-    let mut cursor = Cursor::new(group.parts.iter().map(|p| triangles(p).positions.len()));
+    let mut cursor = Cursor::new(group.submeshes.iter().map(|p| triangles(p).positions.len()));
     positions.fill(12 * group.vertex_count as u64, 12, |_, bytes| {
         for out in bytes.chunks_exact_mut(12) {
             let (part, vertex) = cursor.next();
-            out.copy_from_slice(bytemuck::bytes_of(&flat.vertex(&group.parts[part], vertex).to_array()));
+            out.copy_from_slice(bytemuck::bytes_of(&flat.vertex(&group.submeshes[part], vertex).to_array()));
         }
     })?;
     let mut indices = Buffer::new(device, "indices", 12 * n, Memory::Device)?;
-    let mut cursor = Cursor::new(group.parts.iter().map(|p| triangles(p).indices.len()));
+    let mut cursor = Cursor::new(group.submeshes.iter().map(|p| triangles(p).indices.len()));
     indices.fill(12 * n, 12, |_, bytes| {
         for out in bytes.chunks_exact_mut(12) {
             let (part, triangle) = cursor.next();
-            let part = &group.parts[part];
+            let part = &group.submeshes[part];
             let corners = triangles(part).indices[triangle].map(|i| i + part.first_vertex as u32);
             out.copy_from_slice(bytemuck::bytes_of(&corners));
         }
@@ -369,12 +369,12 @@ fn group_buffers(device: &Arc<Device>, flat: &FlatScene, group: &Group) -> Resul
 }
 
 /// The part of each primitive, where there is more than one.
-fn part_of(device: &Arc<Device>, group: &Group) -> Result<Option<Buffer>> {
-    if group.parts.len() <= 1 {
+fn part_of(device: &Arc<Device>, group: &BlasGroup) -> Result<Option<Buffer>> {
+    if group.submeshes.len() <= 1 {
         return Ok(None);
     }
-    let ends = group.parts.iter().skip(1).map(|p| p.first_primitive).chain([group.primitive_count]);
-    let sizes: Vec<_> = group.parts.iter().zip(ends).map(|(p, end)| end - p.first_primitive).collect();
+    let ends = group.submeshes.iter().skip(1).map(|p| p.first_primitive).chain([group.primitive_count]);
+    let sizes: Vec<_> = group.submeshes.iter().zip(ends).map(|(p, end)| end - p.first_primitive).collect();
     let mut buffer = Buffer::new(device, "part of each primitive", 4 * group.primitive_count as u64, Memory::Device)?;
     let mut cursor = Cursor::new(sizes.into_iter());
     buffer.fill(4 * group.primitive_count as u64, 4, |_, bytes| {
@@ -450,7 +450,7 @@ struct Attributes {
 
 impl Attributes {
     /// Baked normals and tangents differ from part to part; everything else is the mesh's own.
-    fn key(part: &Part, index: usize, attribute: Attribute) -> (usize, Option<usize>, Attribute) {
+    fn key(part: &Submesh, index: usize, attribute: Attribute) -> (usize, Option<usize>, Attribute) {
         let baked =
             matches!(attribute, Attribute::Normals | Attribute::Tangents) && part.to_group.matrix3 != glam::DMat3::IDENTITY;
         (part.mesh, baked.then_some(index), attribute)
@@ -459,7 +459,7 @@ impl Attributes {
     fn upload(device: &Arc<Device>, flat: &FlatScene, needs: Needs) -> Result<Self> {
         let (mut keys, mut arrays) = (Vec::new(), Vec::new());
         let mut seen = std::collections::HashSet::new();
-        for (index, part) in flat.groups.iter().flat_map(|g| g.parts.iter().enumerate()) {
+        for (index, part) in flat.groups.iter().flat_map(|g| g.submeshes.iter().enumerate()) {
             let mesh = &flat.scene.meshes[part.mesh];
             let Geometry::Triangles(t) = &mesh.geometry else { continue };
             let color = needs.albedo || part.alpha_tested;
@@ -485,12 +485,12 @@ impl Attributes {
         Ok(Self { buffer, addresses: keys.into_iter().zip(addresses).collect() })
     }
 
-    fn address(&self, part: &Part, index: usize, attribute: Attribute) -> u64 {
+    fn address(&self, part: &Submesh, index: usize, attribute: Attribute) -> u64 {
         self.addresses.get(&Self::key(part, index, attribute)).copied().unwrap_or(0)
     }
 }
 
-fn attribute_bytes<'a>(t: &'a TriangleMesh, part: &Part, attribute: Attribute) -> Cow<'a, [u8]> {
+fn attribute_bytes<'a>(t: &'a TriangleMesh, part: &Submesh, attribute: Attribute) -> Cow<'a, [u8]> {
     match attribute {
         Attribute::Normals if part.to_group.matrix3 == glam::DMat3::IDENTITY => Cow::Borrowed(bytemuck::cast_slice(&t.normals)),
         Attribute::Normals => {
@@ -558,7 +558,7 @@ impl Textures {
     fn upload(device: &Arc<Device>, flat: &FlatScene, needs: Needs) -> Result<Self> {
         let mut record_of = vec![INVALID; flat.scene.textures.len()];
         let (mut used, mut uses) = (Vec::new(), Vec::new());
-        for part in flat.groups.iter().flat_map(|g| &g.parts) {
+        for part in flat.groups.iter().flat_map(|g| &g.submeshes) {
             let material = &flat.scene.materials[flat.scene.meshes[part.mesh].material];
             let base = material.base_color_texture.filter(|_| needs.albedo || part.alpha_tested);
             let base_texels = if alpha_cutoff(material).is_some() { Texels::Covered } else { Texels::Srgb };

@@ -8,9 +8,11 @@ use glam::DAffine3;
 use super::dynamic::group_of;
 use super::gpu_scene::{GpuScene, GroupBuffers, rows};
 use crate::accel::RefitPolicy;
-use crate::accel::flatten::{FlatScene, Group};
+use crate::accel::flatten::{BlasGroup, FlatScene};
 use crate::error::{Error, Result};
-use crate::gpu::{AccelerationStructure, BottomLevelInput, Buffer, Commands, Device, Memory, TopLevelEntry, Update};
+use crate::gpu::{
+    AccelerationStructure, AccelerationStructureInstance, BottomLevelInput, Buffer, Commands, Device, Memory, Update,
+};
 
 // hit groups of the pipeline: see gpu::RayTracingPipeline
 const OPAQUE_TRIANGLES: u32 = 0;
@@ -27,7 +29,7 @@ pub(super) struct Structures {
 
 /// What is built anew when something has moved.
 struct Changing {
-    entries: Vec<TopLevelEntry>,
+    entries: Vec<AccelerationStructureInstance>,
     deforming: Vec<Option<Deforming>>,
 }
 
@@ -94,7 +96,7 @@ impl Structures {
             bottom.push(AccelerationStructure::bottom_level(device, &mut commands, "bottom level", &input)?);
         }
         let entries: Vec<_> = flat
-            .placements
+            .instances
             .iter()
             .enumerate()
             .map(|(k, p)| {
@@ -106,7 +108,7 @@ impl Structures {
                 };
                 let mut transform = [0.0; 12];
                 transform.copy_from_slice(rows(&p.to_world).as_flattened());
-                TopLevelEntry { transform, index: k as u32, hit_group, bottom_level: bottom[p.group].address() }
+                AccelerationStructureInstance { transform, index: k as u32, hit_group, bottom_level: bottom[p.group].address() }
             })
             .collect();
         let top = AccelerationStructure::top_level(device, &mut commands, &entries)?;
@@ -160,13 +162,13 @@ impl Structures {
     }
 }
 
-fn sphere_boxes(device: &Arc<Device>, flat: &FlatScene, group: &Group) -> Result<Buffer> {
+fn sphere_boxes(device: &Arc<Device>, flat: &FlatScene, group: &BlasGroup) -> Result<Buffer> {
     let size = 24 * group.primitive_count as u64;
     let mut buffer = Buffer::new(device, "sphere boxes", size, Memory::Device)?;
     buffer.fill(size, 24, |first, bytes| {
         for (k, out) in bytes.chunks_exact_mut(24).enumerate() {
             let primitive = first as usize + k;
-            let b = flat.primitive_bounds(group, flat.part_of(group, primitive), primitive);
+            let b = flat.primitive_bounds(group, flat.submesh_of(group, primitive), primitive);
             out.copy_from_slice(bytemuck::cast_slice(&[b.min.to_array(), b.max.to_array()]));
         }
     })?;

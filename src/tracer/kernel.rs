@@ -28,11 +28,11 @@ choices! {
 impl Kernel {
     /// Primitives, each instance's counted, and instances that [`Kernel::Brute`] takes at most together. Mesa before 23 leaves
     /// a loop after 65,535 turns; and a launch of the fewest rays should not stall a device for long.
-    pub const BRUTE_MOST: usize = 40_000;
+    pub const MAX_BRUTE_TESTS: usize = 40_000;
 
     /// What [`Kernel::Brute`] goes through for each ray of a scene: primitives, each instance's counted, and instances.
     pub fn brute_tests(flat: &FlatScene) -> usize {
-        flat.placements.iter().map(|p| flat.groups[p.group].primitive_count + 1).sum()
+        flat.instances.iter().map(|p| flat.groups[p.group].primitive_count + 1).sum()
     }
 
     /// What traces coherent streams on a device. A packet has many more turns than a ray and no bound on them: where drivers cut

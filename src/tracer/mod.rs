@@ -7,7 +7,6 @@
 mod albedo;
 mod brute;
 mod compute;
-pub mod drawable;
 mod dynamic;
 mod dynamic_trees;
 pub mod gpu_scene;
@@ -15,9 +14,10 @@ mod hardware;
 mod kernel;
 mod kind;
 mod mipmap;
-mod motion;
-mod prepared;
+mod precompiled;
+mod previous_frame;
 pub mod queue;
+pub mod raster_instance;
 mod reference;
 pub mod settings;
 pub(crate) mod shading;
@@ -28,11 +28,11 @@ mod wide;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::time::Instant;
 
-pub use drawable::Drawable;
-pub use dynamic::{Changes, MeshChange, Moved, UpdateStats};
+pub use dynamic::{Changes, MeshChange, MovedBounds, UpdateStats};
 pub use gpu_scene::Needs;
 pub use kernel::{BuildOptions, ComputeOptions, Kernel, TriangleTest};
 pub use kind::{TracerKind, TracerNeeds};
+pub use raster_instance::RasterInstance;
 pub use settings::{BuildChoice, DeviceSettings, TracerChoice};
 pub use stream::{Push, Stream};
 
@@ -42,7 +42,7 @@ use crate::error::{Error, Result};
 use crate::gpu::{ComputePipeline, Device, Specialization};
 use crate::shaders::{Mode, StreamShaders};
 use gpu_scene::GpuScene;
-use prepared::{Prepared, Recipe};
+use precompiled::{PipelineSpec, PrecompiledPipelines};
 
 /// What making a tracer's structures took.
 #[derive(Clone, Copy, Debug, Default, serde::Serialize)]
@@ -95,7 +95,7 @@ pub struct Tracer {
     dynamic: Option<Box<dynamic::Dynamic>>,
     // by mode
     kernels: [OnceLock<Arc<ComputePipeline>>; 2],
-    prepared: Prepared,
+    prepared: PrecompiledPipelines,
     // those that were asked for: who renders twice compiles once
     streams: Mutex<Vec<(Specialization, Stream)>>,
 }
@@ -146,9 +146,11 @@ impl Tracer {
         let start = Instant::now();
         let (hierarchy, prepared) = match kind {
             TracerKind::Compute => {
-                let recipes = Prepared::recipes(&device.info, features, options, &build.streams, flat.primitive_count());
+                let recipes =
+                    PrecompiledPipelines::recipes(&device.info, features, options, &build.streams, flat.primitive_count());
                 std::thread::scope(|scope| {
-                    let prepared = (!recipes.is_empty()).then(|| scope.spawn(|| Prepared::compile(device, recipes)));
+                    let prepared =
+                        (!recipes.is_empty()).then(|| scope.spawn(|| PrecompiledPipelines::compile(device, recipes)));
                     let trees = compute::Trees::build(flat, options.kernel, build);
                     // the driver's work is not the hierarchy's
                     stats.build_seconds = start.elapsed().as_secs_f64();
@@ -156,7 +158,7 @@ impl Tracer {
                     trees.map(|t| (Some(t), prepared.unwrap_or_default()))
                 })?
             }
-            _ => (None, Prepared::default()),
+            _ => (None, PrecompiledPipelines::default()),
         };
         let start = Instant::now();
         let mut scene = GpuScene::new(device, flat, needs)?;
@@ -278,19 +280,19 @@ impl Tracer {
             Structure::Compute(h) => {
                 let (info, options) =
                     (&self.device.info, ComputeOptions { kernel: h.kernel, triangle_test: self.triangle_test });
-                let s = prepared::specialization(info, self.features, options, h.stack_constant());
+                let s = precompiled::specialization(info, self.features, options, h.stack_constant());
                 let all = s.clone().and(constants);
                 let (rays_per_lane, _) = compute::lane_budget(info);
                 match h.kernel {
                     Kernel::Nearest | Kernel::Direction => Stream::reference(&self.device, shaders, &all, rays_per_lane),
                     Kernel::Brute => Stream::brute(&self.device, shaders, &all),
                     Kernel::Auto | Kernel::Wide | Kernel::Packet => {
-                        if prepared::in_packets(info, h.kernel, shaders) {
-                            let recipe = prepared::large(info, h.kernel, shaders, &all);
+                        if precompiled::in_packets(info, h.kernel, shaders) {
+                            let recipe = precompiled::large(info, h.kernel, shaders, &all);
                             return Ok(Stream::packets(self.prepared.take(&self.device, &recipe)?, shaders));
                         }
                         // of the pass it knows nothing: streams share it
-                        let kernel = self.kernel(shaders.mode, &prepared::large(info, h.kernel, shaders, &s))?;
+                        let kernel = self.kernel(shaders.mode, &precompiled::large(info, h.kernel, shaders, &s))?;
                         Stream::steps(&self.device, shaders, &all, kernel, rays_per_lane, h.launch_memory()?)
                     }
                 }
@@ -306,12 +308,12 @@ impl Tracer {
     }
 
     /// What there is to draw, entry by entry of the top level, as it is since the last [`Tracer::update`].
-    pub fn drawables(&self) -> impl Iterator<Item = Drawable<'_>> {
-        self.scene.drawables()
+    pub fn raster_instances(&self) -> impl Iterator<Item = RasterInstance<'_>> {
+        self.scene.raster_instances()
     }
 
     /// The fast kernel, compiled once for all streams of a mode.
-    fn kernel(&self, mode: Mode, recipe: &Recipe) -> Result<Arc<ComputePipeline>> {
+    fn kernel(&self, mode: Mode, recipe: &PipelineSpec) -> Result<Arc<ComputePipeline>> {
         let slot = &self.kernels[mode as usize];
         if let Some(kernel) = slot.get() {
             return Ok(kernel.clone());

@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use super::compute::{Hierarchy, padding, placement_boxes, primitive_boxes, record, unfinished_counter, write_records};
+use super::compute::{Hierarchy, instance_boxes, padding, primitive_boxes, record, unfinished_counter, write_records};
 use super::kernel::BuildOptions;
 use super::kernel::Kernel;
 use crate::accel::build::MAX_DEPTH;
@@ -33,7 +33,7 @@ impl Trees {
         }
         let mut top = None;
         if !flat.is_single_level() {
-            bounds = placement_boxes(flat, &bounds);
+            bounds = instance_boxes(flat, &bounds);
             // a leaf of the top level holds one entry: entering it leaves the tree
             top = Some(Bvh2::build(&bounds, options.preset(bounds.len()), 1));
         }
@@ -72,7 +72,7 @@ impl Trees {
             nodes,
             primitives: Some(primitives),
             root,
-            instance_roots: flat.placements.iter().map(|p| roots[p.group]).collect(),
+            instance_roots: flat.instances.iter().map(|p| roots[p.group]).collect(),
             stack_entries,
             bounds: self.bounds,
             unfinished: unfinished_counter(device)?,

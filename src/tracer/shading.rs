@@ -131,7 +131,7 @@ pub(super) fn features(flat: &FlatScene, needs: Needs) -> ShadingFeatures {
     materials.insert_if(needs.compensation, MaterialFeature::Compensation);
     materials.insert_if(needs.white, MaterialFeature::White);
     materials.insert_if(needs.mip_levels && !needs.white, MaterialFeature::RayCones);
-    for part in flat.groups.iter().flat_map(|g| &g.parts) {
+    for part in flat.groups.iter().flat_map(|g| &g.submeshes) {
         let mesh = &flat.scene.meshes[part.mesh];
         let m = &flat.scene.materials[mesh.material];
         let has_normals = matches!(&mesh.geometry, Geometry::Triangles(t) if !t.normals.is_empty());

@@ -9,14 +9,14 @@ use glam::Vec3;
 use obvhs::bvh2::Bvh2;
 use rayon::prelude::*;
 
-use super::compute::{Hierarchy, padding, placement_boxes, primitive_boxes, unfinished_counter, write_records};
+use super::compute::{Hierarchy, instance_boxes, padding, primitive_boxes, unfinished_counter, write_records};
 use super::dynamic_trees::{DynamicTrees, instance_leaf, provide};
 use super::kernel::BuildOptions;
 use super::kernel::Kernel;
 use super::stream::{LAUNCH_RAYS, LaunchMemory};
 use crate::accel::build::{self, MAX_DEPTH};
 use crate::accel::cache::KeyBuilder;
-use crate::accel::flatten::{FlatScene, Group};
+use crate::accel::flatten::{BlasGroup, FlatScene};
 use crate::accel::pairs::{self, Fan, Pair};
 use crate::accel::wide::{self, Block, Wide};
 use crate::accel::{Aabb, BuildPreset};
@@ -37,7 +37,7 @@ pub(super) struct Trees {
 
 impl Trees {
     pub fn build(flat: &FlatScene, options: &BuildOptions) -> Self {
-        let timed = |g: &Group| {
+        let timed = |g: &BlasGroup| {
             let start = Instant::now();
             let tree = if g.spheres { sphere_tree(flat, g, options) } else { triangle_tree(flat, g, options) };
             (tree, start.elapsed().as_secs_f64())
@@ -46,9 +46,9 @@ impl Trees {
         let start = Instant::now();
         let top = (!flat.is_single_level()).then(|| {
             let bounds: Vec<_> = groups.iter().map(|g| g.bounds.unwrap_or(Aabb::EMPTY)).collect();
-            tree(placement_boxes(flat, &bounds), options.preset(flat.placements.len()), None, |entry| {
+            tree(instance_boxes(flat, &bounds), options.preset(flat.instances.len()), None, |entry| {
                 // the root is filled in when the groups have their places
-                bytemuck::cast(instance_leaf(entry, &flat.placements[entry as usize], 0))
+                bytemuck::cast(instance_leaf(entry, &flat.instances[entry as usize], 0))
             })
         });
         Self { groups, top, seconds, top_seconds: start.elapsed().as_secs_f64() }
@@ -88,7 +88,7 @@ impl Trees {
         if let Some(top) = &mut self.top {
             for block in top.blocks.iter_mut().filter(|b| wide::is_leaf(b)) {
                 let leaf: &mut InstanceLeaf = bytemuck::cast_mut(block);
-                leaf.root = roots[flat.placements[leaf.instance as usize].group];
+                leaf.root = roots[flat.instances[leaf.instance as usize].group];
             }
         }
         let trees = self
@@ -151,7 +151,7 @@ const LAYOUT_VERSION: u32 = 3;
 /// What lies next to the blocks of a kept hierarchy.
 #[repr(C)]
 #[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
-struct Kept {
+struct CachedTree {
     bounds: [[f32; 3]; 2],
     depth: u32,
     reserved: u32,
@@ -159,12 +159,12 @@ struct Kept {
 }
 
 /// The hierarchy over what these bytes describe, from the cache if it is there, otherwise built and kept.
-fn kept(options: &BuildOptions, preset: BuildPreset, content: &[&[u8]], build: impl FnOnce() -> Wide) -> Wide {
+fn load_or_build(options: &BuildOptions, preset: BuildPreset, content: &[&[u8]], build: impl FnOnce() -> Wide) -> Wide {
     let Some(cache) = &options.cache else { return build() };
     let head = KeyBuilder::default().with(&LAYOUT_VERSION.to_le_bytes()).with(format!("{preset:?}").as_bytes());
     let key = content.iter().fold(head, |k, bytes| k.with(bytes)).finish();
     let loaded = cache.load(key).and_then(|entries| {
-        let kept = *entries.get::<Kept>("tree")?.first()?;
+        let kept = *entries.get::<CachedTree>("tree")?.first()?;
         let [min, max] = kept.bounds.map(Vec3::from);
         Some(Wide {
             blocks: entries.get("blocks")?,
@@ -179,23 +179,23 @@ fn kept(options: &BuildOptions, preset: BuildPreset, content: &[&[u8]], build: i
     let wide = build();
     if let Some(b) = wide.bounds {
         let bounds = [b.min.to_array(), b.max.to_array()];
-        let kept = Kept { bounds, depth: wide.depth, reserved: 0, sah_cost: wide.sah_cost };
+        let kept = CachedTree { bounds, depth: wide.depth, reserved: 0, sah_cost: wide.sah_cost };
         cache.store(key, &[("tree", bytemuck::bytes_of(&kept)), ("blocks", bytemuck::cast_slice(&wide.blocks))]);
     }
     wide
 }
 
-fn sphere_tree(flat: &FlatScene, group: &Group, options: &BuildOptions) -> Wide {
+fn sphere_tree(flat: &FlatScene, group: &BlasGroup, options: &BuildOptions) -> Wide {
     let preset = options.preset(group.primitive_count);
     let spheres: Vec<[f32; 4]> = (0..group.primitive_count)
         .into_par_iter()
         .map(|primitive| {
-            let part = flat.part_of(group, primitive);
+            let part = flat.submesh_of(group, primitive);
             let s = flat.sphere(part, primitive - part.first_primitive);
             [s.center.x, s.center.y, s.center.z, s.radius]
         })
         .collect();
-    kept(options, preset, &[b"spheres", bytemuck::cast_slice(&spheres)], || {
+    load_or_build(options, preset, &[b"spheres", bytemuck::cast_slice(&spheres)], || {
         tree(primitive_boxes(flat, group).collect(), preset, None, |primitive| {
             let [x, y, z, radius] = spheres[primitive as usize];
             let primitives = [primitive | SPHERE, pairs::NONE];
@@ -211,10 +211,10 @@ pub(super) struct Triangles {
 }
 
 impl Triangles {
-    fn of(flat: &FlatScene, group: &Group) -> Self {
+    fn of(flat: &FlatScene, group: &BlasGroup) -> Self {
         let mut out =
             Self { positions: Vec::with_capacity(group.vertex_count), indices: Vec::with_capacity(group.primitive_count) };
-        for part in &group.parts {
+        for part in &group.submeshes {
             let Geometry::Triangles(t) = &flat.scene.meshes[part.mesh].geometry else { continue };
             out.positions.par_extend((0..t.positions.len()).into_par_iter().map(|v| flat.vertex(part, v)));
             out.indices.par_extend(t.indices.par_iter().map(|t| t.map(|v| v + part.first_vertex as u32)));
@@ -227,13 +227,13 @@ impl Triangles {
     }
 }
 
-fn triangle_tree(flat: &FlatScene, group: &Group, options: &BuildOptions) -> Wide {
+fn triangle_tree(flat: &FlatScene, group: &BlasGroup, options: &BuildOptions) -> Wide {
     let triangles = Triangles::of(flat, group);
     let preset = options.preset(triangles.indices.len());
     let opaque = group.opaque_count as u32;
     let content: [&[u8]; 3] =
         [&opaque.to_le_bytes(), bytemuck::cast_slice(&triangles.positions), bytemuck::cast_slice(&triangles.indices)];
-    kept(options, preset, &content, || triangle_tree_of(&triangles, opaque, preset, None))
+    load_or_build(options, preset, &content, || triangle_tree_of(&triangles, opaque, preset, None))
 }
 
 /// `opaque`: triangles before the first alpha-tested one; `depth` as in [`tree`].
@@ -329,7 +329,7 @@ mod tests {
         }
         if let Some(top) = &trees.top {
             let bounds: Vec<_> = trees.groups.iter().map(|g| g.bounds.unwrap_or(Aabb::EMPTY)).collect();
-            let boxes = placement_boxes(&flat, &bounds);
+            let boxes = instance_boxes(&flat, &bounds);
             top.validate(|b| vec![boxes[bytemuck::cast_ref::<Block, InstanceLeaf>(b).instance as usize]])
                 .unwrap_or_else(|e| panic!("{name}: {e}"));
         }

@@ -2,7 +2,7 @@
 
 use glam::{Affine2, DAffine3, DQuat, DVec3, Vec2, Vec3, Vec4};
 use skylit::Error;
-use skylit::scene::export::{Written, export_gltf, mesh_bin, read_mesh_bin, write_mesh_bin};
+use skylit::scene::export::{ExportStats, export_gltf, mesh_bin, read_mesh_bin, write_mesh_bin};
 use skylit::scene::material::{Anisotropy, Clearcoat, Sheen, Specular, Transmission};
 use skylit::scene::*;
 
@@ -236,7 +236,7 @@ fn mesh_bin_round_trips() {
         t.indices.push([1, 1, 2]);
     }
     let path = folder.path("a.bin");
-    assert_eq!(write_mesh_bin(&original, &path).unwrap(), Written { triangles: 7, warnings: Vec::new() });
+    assert_eq!(write_mesh_bin(&original, &path).unwrap(), ExportStats { triangles: 7, warnings: Vec::new() });
     assert_eq!(std::fs::metadata(&path).unwrap().len(), 8 + 12 * 12 + 7 * 12);
     let scene = read_mesh_bin(&path).unwrap();
     let m = mesh(&scene, 0);

@@ -478,7 +478,7 @@ fn gpu_degenerate_slivers_do_not_meet_themselves() {
 #[test]
 fn gpu_degenerate_coarse_coordinates() {
     let device = device();
-    let place = skylit::scene::builtin::Placement { scale: 100.0, offset: DVec3::new(1e6, -2e6, 3e6) };
+    let place = skylit::scene::builtin::SceneTransform { scale: 100.0, offset: DVec3::new(1e6, -2e6, 3e6) };
     // baked, then hidden from rebasing by a triangle near the origin
     let mut scene = skylit::scene::builtin::bake(&skylit::scene::builtin::analytic::closed_box(1.0, place));
     let far = self::scene(vec![(triangles([[DVec3::ZERO, DVec3::X, DVec3::Y]]), vec![HERE])]);

@@ -80,30 +80,30 @@ fn mode_name(mode: Mode) -> &'static str {
     }
 }
 
-/// From placement and primitive of its group to instance and primitive of its mesh. Ids that do not exist stay: nothing is
+/// From instance and primitive of its group to instance and primitive of its mesh. Ids that do not exist stay: nothing is
 /// there under them, and a check will say so.
 fn rename(flat: &FlatScene, hit: &mut Hit) {
-    let Some(placement) = flat.placements.get(hit.instance as usize) else { return };
-    let group = &flat.groups[placement.group];
+    let Some(instance) = flat.instances.get(hit.instance as usize) else { return };
+    let group = &flat.groups[instance.group];
     if hit.primitive as usize >= group.primitive_count {
         return;
     }
-    let part = flat.part_of(group, hit.primitive as usize);
+    let part = flat.submesh_of(group, hit.primitive as usize);
     hit.primitive -= part.first_primitive as u32;
-    if let Some(instance) = placement.scene_instance.or(part.scene_instance) {
+    if let Some(instance) = instance.scene_instance.or(part.scene_instance) {
         hit.instance = instance as u32;
     }
 }
 
-/// Writes the groups and placements that our tracers build over, vertices as they lie in device memory.
+/// Writes the groups and instances that our tracers build over, vertices as they lie in device memory.
 fn write_scene(flat: &FlatScene, path: &Path) -> std::io::Result<()> {
     let mut out = BufWriter::with_capacity(1 << 20, std::fs::File::create(path)?);
     let mut words = |w: &[u32]| w.iter().try_for_each(|x| out.write_all(&x.to_le_bytes()));
-    words(&[SCENE_MAGIC, 1, flat.groups.len() as u32, flat.placements.len() as u32])?;
+    words(&[SCENE_MAGIC, 1, flat.groups.len() as u32, flat.instances.len() as u32])?;
     for group in &flat.groups {
         let vertices = if group.spheres { group.primitive_count } else { group.vertex_count };
         words(&[u32::from(group.spheres), vertices as u32, group.primitive_count as u32])?;
-        for part in &group.parts {
+        for part in &group.submeshes {
             match &flat.scene.meshes[part.mesh].geometry {
                 Geometry::Spheres(s) => {
                     for k in 0..s.len() {
@@ -118,15 +118,15 @@ fn write_scene(flat: &FlatScene, path: &Path) -> std::io::Result<()> {
                 }
             }
         }
-        for part in &group.parts {
+        for part in &group.submeshes {
             if let Geometry::Triangles(t) = &flat.scene.meshes[part.mesh].geometry {
                 t.indices.iter().try_for_each(|i| words(&i.map(|k| k + part.first_vertex as u32)))?;
             }
         }
     }
-    for placement in &flat.placements {
-        words(&[placement.group as u32])?;
-        for row in crate::tracer::gpu_scene::rows(&placement.to_world) {
+    for instance in &flat.instances {
+        words(&[instance.group as u32])?;
+        for row in crate::tracer::gpu_scene::rows(&instance.to_world) {
             words(&row.map(f32::to_bits))?;
         }
     }

@@ -16,7 +16,7 @@ pub struct Influences {
 
 /// What a morph target adds to a mesh at a weight of one. Each is empty (zero) or as long as the mesh has vertices.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Target {
+pub struct MorphTarget {
     /// Displacements of positions.
     pub positions: Vec<Vec3>,
     /// Differences of normals.
@@ -28,20 +28,20 @@ pub struct Target {
 pub struct Deformation {
     /// Index into [`crate::scene::Scene::meshes`].
     pub mesh: usize,
-    /// The node that carries it ([`super::Parts::nodes`]), whose weights its targets take. Its transform does not touch a mesh that
+    /// The node that carries it ([`super::RigParts::nodes`]), whose weights its targets take. Its transform does not touch a mesh that
     /// has a skin.
     pub node: usize,
-    /// Index into [`super::Parts::skins`].
+    /// Index into [`super::RigParts::skins`].
     pub skin: Option<usize>,
     /// Joints of each vertex, one set or two; empty without a skin.
     pub influences: Vec<Influences>,
     /// Morph targets.
-    pub targets: Vec<Target>,
+    pub targets: Vec<MorphTarget>,
 }
 
-/// Vertices in one shape of a mesh: as modelled, or posed. Normals and tangents may be empty.
+/// Vertices in one shape of a mesh: undeformed or posed. Normals and tangents may be empty.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Shape {
+pub struct VertexData {
     /// Object space.
     pub positions: Vec<Vec3>,
     /// Unit normals.
@@ -50,7 +50,7 @@ pub struct Shape {
     pub tangents: Vec<Vec4>,
 }
 
-impl Shape {
+impl VertexData {
     /// Takes a mesh's vertices out of it.
     pub(in crate::scene) fn take(mesh: &mut TriangleMesh) -> Self {
         let TriangleMesh { positions, normals, tangents, .. } = mesh;
@@ -71,7 +71,7 @@ impl Deformation {
             && self.targets.iter().all(|t| t.positions.is_empty() || t.positions[a] == t.positions[b])
     }
 
-    /// A triangle without area as modelled: will it stay so in every pose? Only where two of its corners lie in one place and move
+    /// A triangle without area in the undeformed mesh: will it stay so in every pose? Only where two of its corners lie in one place and move
     /// alike, or all three lie on a line and move alike; others may open up.
     pub(in crate::scene) fn stays_flat(&self, triangle: [u32; 3], positions: &[Vec3]) -> bool {
         let [a, b, c] = triangle.map(|i| i as usize);
@@ -79,9 +79,9 @@ impl Deformation {
         one(a, b) || one(b, c) || one(c, a) || (self.alike(a, b) && self.alike(b, c))
     }
 
-    /// How large the mesh is as modelled or with one target in full, whichever is most.
-    pub(super) fn extent(&self, base: &Shape) -> f64 {
-        let size = |target: Option<&Target>| {
+    /// How large the mesh is undeformed or with one target in full, whichever is most.
+    pub(super) fn extent(&self, base: &VertexData) -> f64 {
+        let size = |target: Option<&MorphTarget>| {
             let points = base.positions.iter().enumerate().map(|(v, p)| {
                 let moved = target.and_then(|t| t.positions.get(v)).copied().unwrap_or_default();
                 p.as_dvec3() + moved.as_dvec3()
@@ -112,8 +112,16 @@ impl Deformation {
 
     /// Poses `base` into `out`, whose buffers are used again. `weights`: of the targets; `joints`: what each joint of the skin does to
     /// vertices. Tangents are only posed if asked for.
-    pub(in crate::scene) fn pose(&self, base: &Shape, weights: &[f64], joints: &[DAffine3], tangents: bool, out: &mut Shape) {
-        let active: Vec<(&Target, f64)> = self.targets.iter().zip(weights.iter().copied()).filter(|(_, w)| *w != 0.0).collect();
+    pub(in crate::scene) fn pose(
+        &self,
+        base: &VertexData,
+        weights: &[f64],
+        joints: &[DAffine3],
+        tangents: bool,
+        out: &mut VertexData,
+    ) {
+        let active: Vec<(&MorphTarget, f64)> =
+            self.targets.iter().zip(weights.iter().copied()).filter(|(_, w)| *w != 0.0).collect();
         let matrix = |v: usize| self.matrix(v, joints);
         let position = |v: usize, m: &DAffine3| {
             let moved = active.iter().filter_map(|(t, w)| Some(t.positions.get(v)?.as_dvec3() * *w));
@@ -122,7 +130,7 @@ impl Deformation {
         let normal = |v: usize, m: &DAffine3| {
             let turned = active.iter().filter_map(|(t, w)| Some(t.normals.get(v)?.as_dvec3() * *w));
             let n = cofactor(&m.matrix3) * (base.normals[v].as_dvec3() + turned.sum::<DVec3>());
-            // what targets or a collapsed joint leave without a direction keeps the one it was modelled with
+            // what targets or a collapsed joint leave without a direction keeps the one of the undeformed mesh
             n.try_normalize().map_or(base.normals[v], |n| n.as_vec3())
         };
         let count = base.positions.len();

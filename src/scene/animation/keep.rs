@@ -1,9 +1,9 @@
 //! A rig follows its scene while loaders mend it: meshes and instances are dropped, vertices reordered.
 
-use super::{Deformation, Rig};
+use super::{AnimationRig, Deformation};
 use crate::scene::Scene;
 
-impl Rig {
+impl AnimationRig {
     /// What each mesh of a scene of `meshes` does, if it deforms.
     pub(in crate::scene) fn deformations_mut(&mut self, meshes: usize) -> Vec<Option<&mut Deformation>> {
         let mut all: Vec<Option<&mut Deformation>> = (0..meshes).map(|_| None).collect();

@@ -1,9 +1,9 @@
 //! What moves: a tree of nodes, skins, morph targets, and animations that change them over time. Plain data and arithmetic on the
 //! host; nothing here knows a tracer.
 //!
-//! [`Parts`] is the description, [`Rig`] the same once it is known to be sound and tied to a scene. A scene of which nothing can
-//! move has no rig. Playing goes in two steps: [`Rig::motion`] says once what an animation will change, so that tracers keep only
-//! that ready ([`super::Motion`]); [`Rig::pose`] gives the state at a time, as often as wanted.
+//! [`RigParts`] is the description, [`AnimationRig`] the same once it is known to be sound and tied to a scene. A scene of which nothing can
+//! move has no rig. Playing goes in two steps: [`AnimationRig::motion`] says once what an animation will change, so that tracers keep only
+//! that ready ([`super::Motion`]); [`AnimationRig::pose`] gives the state at a time, as often as wanted.
 //!
 //! Matrices are composed in f64 and vertices are rounded to f32 at the end. A skinned mesh lies in world space, as glTF wants it; its
 //! instance only has a translation, which is zero unless the skeleton stands far from the origin.
@@ -15,7 +15,7 @@ mod pose;
 mod sampler;
 mod transform;
 
-pub use deform::{Deformation, Influences, Shape, Target};
+pub use deform::{Deformation, Influences, MorphTarget, VertexData};
 pub use pose::{Playback, Pose, PosedMesh};
 pub use sampler::{Interpolation, Sampler};
 pub(in crate::scene) use transform::anchor;
@@ -27,9 +27,9 @@ use crate::error::{Error, Result};
 
 /// Where a node stands relative to its parent.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Local {
+pub enum LocalTransform {
     /// Scaled, then turned, then moved: what animations can change.
-    Parts {
+    Trs {
         /// Moved by.
         translation: DVec3,
         /// Turned by; unit length.
@@ -41,17 +41,17 @@ pub enum Local {
     Matrix(DAffine3),
 }
 
-impl Default for Local {
+impl Default for LocalTransform {
     fn default() -> Self {
-        Self::Parts { translation: DVec3::ZERO, rotation: DQuat::IDENTITY, scale: DVec3::ONE }
+        Self::Trs { translation: DVec3::ZERO, rotation: DQuat::IDENTITY, scale: DVec3::ONE }
     }
 }
 
-impl Local {
+impl LocalTransform {
     /// Node to parent.
     pub fn affine(&self) -> DAffine3 {
         match *self {
-            Self::Parts { translation, rotation, scale } => {
+            Self::Trs { translation, rotation, scale } => {
                 DAffine3::from_scale_rotation_translation(scale, rotation, translation)
             }
             Self::Matrix(m) => m,
@@ -64,10 +64,10 @@ impl Local {
 pub struct Node {
     /// Name in the file; may be empty.
     pub name: String,
-    /// Its parent, which comes before it in [`Parts::nodes`].
+    /// Its parent, which comes before it in [`RigParts::nodes`].
     pub parent: Option<usize>,
     /// Where it stands.
-    pub local: Local,
+    pub local: LocalTransform,
     /// Weights of the morph targets of the meshes that it carries; as many as these have targets.
     pub weights: Vec<f32>,
 }
@@ -79,7 +79,7 @@ pub struct Skin {
     pub name: String,
     /// Nodes.
     pub joints: Vec<usize>,
-    /// For each joint, from the mesh as modelled to the joint.
+    /// For each joint, from the undeformed mesh to the joint.
     pub inverse_bind: Vec<DAffine3>,
 }
 
@@ -100,7 +100,7 @@ pub enum Property {
 /// Keys for one property of one node.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Channel {
-    /// Index into [`Parts::nodes`].
+    /// Index into [`RigParts::nodes`].
     pub node: usize,
     /// What of the node.
     pub property: Property,
@@ -119,9 +119,9 @@ pub struct Animation {
     pub channels: Vec<Channel>,
 }
 
-/// What a [`Rig`] is made of.
+/// What a [`AnimationRig`] is made of.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Parts {
+pub struct RigParts {
     /// The tree, parents before children.
     pub nodes: Vec<Node>,
     /// Skeletons.
@@ -138,35 +138,35 @@ pub struct Parts {
 
 /// A scene's animations and what they act on.
 #[derive(Clone, Debug)]
-pub struct Rig {
-    parts: Parts,
+pub struct AnimationRig {
+    parts: RigParts,
     /// World transforms of the nodes at rest.
     rest: Vec<DAffine3>,
     /// For each channel of each animation: it keeps its property as it is at rest.
     still: Vec<Vec<bool>>,
-    /// For each deformation its mesh as modelled. Empty until [`Rig::settle`].
-    shapes: Vec<Shape>,
+    /// For each deformation its undeformed mesh. Empty until [`AnimationRig::apply_rest_pose`].
+    shapes: Vec<VertexData>,
     /// For each instance the least scale, below which nothing could be seen.
     floors: Vec<f64>,
 }
 
-impl Rig {
-    /// Gives a scene made in code its rig. Meshes that deform hold their shape as modelled before, that at rest afterwards; what nodes
+impl AnimationRig {
+    /// Gives a scene made in code its rig. Meshes that deform hold their undeformed shape before, that at rest afterwards; what nodes
     /// place or carry is put where they are at rest.
     ///
     /// # Errors
     /// [`Error::Scene`] for indices out of range, wrong counts, numbers that are not finite.
-    pub fn attach(scene: &mut Scene, parts: Parts) -> Result<()> {
+    pub fn attach(scene: &mut Scene, parts: RigParts) -> Result<()> {
         scene.rig = Some(Self::new(scene, parts).map_err(|e| Error::Scene(format!("{}: {e}", scene.name)))?);
-        Self::settle(scene);
+        Self::apply_rest_pose(scene);
         Ok(())
     }
 
-    /// The rig of `scene`, whose meshes are as modelled.
+    /// The rig of `scene`, whose meshes are undeformed.
     ///
     /// # Errors
     /// What is wrong, in words.
-    pub(in crate::scene) fn new(scene: &Scene, parts: Parts) -> Result<Self, String> {
+    pub(in crate::scene) fn new(scene: &Scene, parts: RigParts) -> Result<Self, String> {
         check::check(scene, &parts)?;
         let mut rest: Vec<DAffine3> = Vec::with_capacity(parts.nodes.len());
         for node in &parts.nodes {
@@ -176,12 +176,12 @@ impl Rig {
         if let Some(i) = rest.iter().position(|m| !m.is_finite()) {
             return Err(format!("node {i} `{}` has a transform that is not finite", parts.nodes[i].name));
         }
-        let still = parts.animations.iter().map(|a| a.channels.iter().map(|c| c.is_still(&parts.nodes[c.node])).collect());
+        let still = parts.animations.iter().map(|a| a.channels.iter().map(|c| c.is_constant(&parts.nodes[c.node])).collect());
         Ok(Self { still: still.collect(), rest, shapes: Vec::new(), floors: Vec::new(), parts })
     }
 
     /// What it is made of.
-    pub fn parts(&self) -> &Parts {
+    pub fn parts(&self) -> &RigParts {
         &self.parts
     }
 
@@ -190,8 +190,8 @@ impl Rig {
         &self.parts.animations
     }
 
-    /// A deforming mesh as modelled, before targets and skin. `deformation` is an index into [`Parts::deformations`].
-    pub fn modelled(&self, deformation: usize) -> Option<&Shape> {
+    /// A deforming undeformed mesh, before targets and skin. `deformation` is an index into [`RigParts::deformations`].
+    pub fn undeformed(&self, deformation: usize) -> Option<&VertexData> {
         self.shapes.get(deformation)
     }
 }
@@ -207,22 +207,22 @@ impl Channel {
     }
 
     /// Does it keep the node as it is at rest, but for rounding? Exporters write such channels for all that could be animated.
-    pub(in crate::scene) fn is_still(&self, node: &Node) -> bool {
+    pub(in crate::scene) fn is_constant(&self, node: &Node) -> bool {
         let close =
             |a: f64, b: f32| (a - f64::from(b)).abs() <= 2.0 * f64::from(f32::EPSILON) * a.abs().max(f64::from(b.abs()));
         let same = |v: &[f32]| match (self.property, node.local) {
             (Property::Weights, _) => v == node.weights,
-            (Property::Translation, Local::Parts { translation: at, .. }) => {
+            (Property::Translation, LocalTransform::Trs { translation: at, .. }) => {
                 at.to_array().iter().zip(v).all(|(a, b)| close(*a, *b))
             }
-            (Property::Scale, Local::Parts { scale, .. }) => scale.to_array().iter().zip(v).all(|(a, b)| close(*a, *b)),
-            (Property::Rotation, Local::Parts { rotation, .. }) => {
+            (Property::Scale, LocalTransform::Trs { scale, .. }) => scale.to_array().iter().zip(v).all(|(a, b)| close(*a, *b)),
+            (Property::Rotation, LocalTransform::Trs { rotation, .. }) => {
                 let q = glam::DVec4::from_array([0, 1, 2, 3].map(|i| v.get(i).map_or(0.0, |&x| f64::from(x))));
                 // within a millionth of a radian
                 sampler::unit(q).dot(rotation).abs() > 1.0 - 1e-13
             }
             _ => false,
         };
-        self.sampler.is_still(self.width(node), same)
+        self.sampler.is_constant(self.width(node), same)
     }
 }

@@ -3,7 +3,7 @@
 use glam::{DAffine3, DVec3};
 
 use super::transform::{anchor, at_least};
-use super::{Animation, Deformation, Local, Property, Rig, Shape};
+use super::{Animation, AnimationRig, Deformation, LocalTransform, Property, VertexData};
 use crate::error::{Error, Result};
 use crate::scene::camera::rigid;
 use crate::scene::{Geometry, Motion, Scene};
@@ -35,7 +35,7 @@ pub struct PosedMesh {
     /// Index into [`Scene::meshes`].
     pub mesh: usize,
     /// Its vertices. Normals are empty where the mesh has none; tangents always.
-    pub shape: Shape,
+    pub shape: VertexData,
 }
 
 /// How what an animation changes stands at some time. Its buffers are used again when it is filled again.
@@ -53,7 +53,7 @@ pub struct Pose {
 #[derive(Clone, Debug, Default)]
 struct Scratch {
     live: Vec<bool>,
-    locals: Vec<Local>,
+    locals: Vec<LocalTransform>,
     world: Vec<DAffine3>,
     joints: Vec<DAffine3>,
     weights: Vec<f64>,
@@ -81,7 +81,7 @@ impl Pose {
     }
 }
 
-impl Rig {
+impl AnimationRig {
     /// The instances that an animation moves and the meshes that it deforms, and nothing else: keys that leave a node as it is at rest
     /// move nothing. What it does to cameras concerns no tracer.
     ///
@@ -108,7 +108,7 @@ impl Rig {
         Ok(self.moved(&self.parts.cameras, &live).map(|(i, _)| i).collect())
     }
 
-    /// How everything that an animation changes ([`Rig::motion`]) stands `seconds` after it was started. `pose` may come from any rig
+    /// How everything that an animation changes ([`AnimationRig::motion`]) stands `seconds` after it was started. `pose` may come from any rig
     /// and time.
     ///
     /// # Errors
@@ -120,7 +120,7 @@ impl Rig {
         locals.clear();
         locals.extend(self.parts.nodes.iter().map(|n| n.local));
         for (channel, _) in playing.channels.iter().zip(&self.still[animation]).filter(|(_, still)| !**still) {
-            let Local::Parts { translation, rotation, scale } = &mut locals[channel.node] else { continue };
+            let LocalTransform::Trs { translation, rotation, scale } = &mut locals[channel.node] else { continue };
             match channel.property {
                 Property::Translation => *translation = channel.sampler.vector(seconds),
                 Property::Rotation => *rotation = channel.sampler.rotation(seconds),
@@ -219,18 +219,18 @@ impl Rig {
         self.floors.get(instance).copied().unwrap_or(1e-7)
     }
 
-    /// Puts a scene whose meshes are as modelled into its rest pose, and keeps what it takes to pose it otherwise.
-    pub(in crate::scene) fn settle(scene: &mut Scene) {
+    /// Puts a scene whose meshes are undeformed into its rest pose, and keeps what it takes to pose it otherwise.
+    pub(in crate::scene) fn apply_rest_pose(scene: &mut Scene) {
         let Some(mut rig) = scene.rig.take() else { return };
         rig.shapes.clear();
         let (mut weights, mut joints) = (Vec::new(), Vec::new());
         for deformation in &rig.parts.deformations {
             // other geometry was refused when the rig was made
             let Geometry::Triangles(t) = &mut scene.meshes[deformation.mesh].geometry else { continue };
-            let base = Shape::take(t);
+            let base = VertexData::take(t);
             rig.weights(deformation, None, &mut weights);
             rig.joints(deformation, &rig.rest, &mut joints);
-            let mut shape = Shape::default();
+            let mut shape = VertexData::default();
             deformation.pose(&base, &weights, &joints, true, &mut shape);
             shape.give(t);
             rig.shapes.push(base);

@@ -29,7 +29,7 @@ pub struct Sampler {
 }
 
 /// Where a time lies: key `key`, `share` of the way (0 to 1) to the next one, which is `seconds` later; 0 when there is none.
-struct Between {
+struct KeyInterval {
     key: usize,
     share: f64,
     seconds: f64,
@@ -81,17 +81,17 @@ impl Sampler {
     }
 
     /// Before the first key and after the last one time stands still.
-    fn locate(&self, seconds: f64) -> Between {
+    fn locate(&self, seconds: f64) -> KeyInterval {
         let next = self.times.partition_point(|&t| f64::from(t) <= seconds);
         if next == 0 || next == self.times.len() {
-            return Between { key: next.saturating_sub(1), share: 0.0, seconds: 0.0 };
+            return KeyInterval { key: next.saturating_sub(1), share: 0.0, seconds: 0.0 };
         }
         let (from, to) = (f64::from(self.times[next - 1]), f64::from(self.times[next]));
-        Between { key: next - 1, share: (seconds - from) / (to - from), seconds: to - from }
+        KeyInterval { key: next - 1, share: (seconds - from) / (to - from), seconds: to - from }
     }
 
     /// Number `i` of a value of `width` numbers; straight lines for [`Interpolation::Linear`].
-    fn number(&self, b: &Between, width: usize, i: usize) -> f64 {
+    fn number(&self, b: &KeyInterval, width: usize, i: usize) -> f64 {
         let at = |key, part| self.numbers(key, width, part).get(i).map_or(0.0, |&v| f64::from(v));
         let (here, u) = (at(b.key, 0), b.share);
         if b.seconds == 0.0 {
@@ -140,7 +140,7 @@ impl Sampler {
     }
 
     /// All keys have one value, and it is the one that `same` recognises: nothing is animated.
-    pub(super) fn is_still(&self, width: usize, same: impl Fn(&[f32]) -> bool) -> bool {
+    pub(super) fn is_constant(&self, width: usize, same: impl Fn(&[f32]) -> bool) -> bool {
         let spline = self.interpolation == Interpolation::CubicSpline;
         let first = self.numbers(0, width, 0);
         same(first)

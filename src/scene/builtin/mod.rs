@@ -84,7 +84,7 @@ fn recipe(name: &str) -> Option<Box<dyn FnOnce() -> Scene>> {
     match base {
         "v-groove" => {
             let angle = number(90.0, 1.0, 180.0)?.to_radians();
-            return Some(Box::new(move || analytic::v_groove(angle, 4.0, 12.0, Placement::default())));
+            return Some(Box::new(move || analytic::v_groove(angle, 4.0, 12.0, SceneTransform::default())));
         }
         "grid" => return with(many::grid, between(6, 1, 128)),
         "spheres" => return with(many::spheres, between(1000, 1, 10_000_000)),
@@ -99,10 +99,10 @@ fn recipe(name: &str) -> Option<Box<dyn FnOnce() -> Scene>> {
         "cornell-mirror" => cornell::cornell_mirror,
         "cornell-glass-sphere" => cornell::cornell_glass_sphere,
         "cornell-spheres" => cornell::cornell_spheres,
-        "sphere-over-plane" => || analytic::sphere_over_plane(1.0, 1.25, 60.0, Placement::default()),
-        "closed-box" => || analytic::closed_box(2.0, Placement::default()),
-        "parallel-planes" => || analytic::parallel_planes(8.0, 6.0, 1.0, Placement::default()),
-        "plane" => || analytic::plane(20.0, Placement::default()),
+        "sphere-over-plane" => || analytic::sphere_over_plane(1.0, 1.25, 60.0, SceneTransform::default()),
+        "closed-box" => || analytic::closed_box(2.0, SceneTransform::default()),
+        "parallel-planes" => || analytic::parallel_planes(8.0, 6.0, 1.0, SceneTransform::default()),
+        "plane" => || analytic::plane(20.0, SceneTransform::default()),
         "leaf-cards" => many::leaf_cards,
         "parade" => parade::parade,
         "stairs" => || many::stairs(DVec3::ZERO),
@@ -114,20 +114,20 @@ fn recipe(name: &str) -> Option<Box<dyn FnOnce() -> Scene>> {
 
 /// Where a scene for tests lies: scaled about its own origin, then moved. It goes into the instances' transforms.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Placement {
+pub struct SceneTransform {
     /// Uniform scale.
     pub scale: f64,
     /// World position of the scene's own origin.
     pub offset: DVec3,
 }
 
-impl Default for Placement {
+impl Default for SceneTransform {
     fn default() -> Self {
         Self { scale: 1.0, offset: DVec3::ZERO }
     }
 }
 
-impl Placement {
+impl SceneTransform {
     /// The world point of a point in the scene's own units.
     pub fn point(&self, p: DVec3) -> DVec3 {
         p * self.scale + self.offset

@@ -9,9 +9,9 @@ use std::path::Path;
 use glam::{DAffine3, DQuat, DVec3};
 use serde_json::{Value, json};
 
-use super::{Written, icosphere, material, write_buffered};
+use super::{ExportStats, icosphere, material, write_buffered};
 use crate::error::{Error, Result};
-use crate::scene::animation::Shape;
+use crate::scene::animation::VertexData;
 use crate::scene::{
     Camera, Filter, Geometry, Light, LightKind, Projection, Scene, Sphere, TexelData, Texture, TriangleMesh, Wrap,
 };
@@ -25,7 +25,7 @@ use crate::scene::{
 ///
 /// # Errors
 /// [`Error::Output`], also for another extension or more than 4 GiB.
-pub fn export_gltf(scene: &Scene, path: &Path) -> Result<Written> {
+pub fn export_gltf(scene: &Scene, path: &Path) -> Result<ExportStats> {
     let fail = |message: String| Error::Output { path: path.to_owned(), message };
     let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
     let embed = match extension.to_str() {
@@ -84,7 +84,7 @@ struct Writer {
     accessors: Vec<Value>,
     /// File name and bytes of each image that is not embedded.
     images: Vec<(String, Vec<u8>)>,
-    written: Written,
+    written: ExportStats,
 }
 
 impl Writer {
@@ -110,9 +110,9 @@ impl Writer {
             let deformations = rig.map_or(&[][..], |r| &r.parts().deformations);
             let deformation = deformations.iter().position(|d| d.mesh == m);
             let triangles = match &mesh.geometry {
-                Geometry::Triangles(t) => match deformation.and_then(|d| rig?.modelled(d)) {
+                Geometry::Triangles(t) => match deformation.and_then(|d| rig?.undeformed(d)) {
                     Some(shape) => {
-                        made = modelled(t, shape);
+                        made = undeformed(t, shape);
                         &made
                     }
                     None => t,
@@ -342,9 +342,9 @@ fn sampler(texture: &Texture) -> Value {
     json!({ "magFilter": mag, "minFilter": min, "wrapS": wrap(texture.wrap[0]), "wrapT": wrap(texture.wrap[1]) })
 }
 
-/// A mesh with its vertices as modelled, where those that it has are posed.
-fn modelled(posed: &TriangleMesh, shape: &Shape) -> TriangleMesh {
-    let Shape { positions, normals, tangents } = shape.clone();
+/// A mesh with its undeformed vertices, where those that it has are posed.
+fn undeformed(posed: &TriangleMesh, shape: &VertexData) -> TriangleMesh {
+    let VertexData { positions, normals, tangents } = shape.clone();
     TriangleMesh { positions, normals, tangents, ..posed.clone() }
 }
 

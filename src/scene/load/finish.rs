@@ -9,7 +9,7 @@ use super::{normals, tangents};
 use crate::error::{Error, Result};
 use crate::scene::animation::Deformation;
 use crate::scene::material::MaterialKind;
-use crate::scene::{Geometry, Instance, Material, Mesh, Rig, Scene, TriangleMesh};
+use crate::scene::{AnimationRig, Geometry, Instance, Material, Mesh, Scene, TriangleMesh};
 
 /// Largest coordinate, in object and world space: beyond it the triangle test's products of three lengths overflow single precision,
 /// and rays would miss.
@@ -42,11 +42,11 @@ pub(super) fn finish(scene: &mut Scene, path: &Path) -> Result<()> {
         scene.report.tangents_computed += usize::from(note.tangents);
     }
     if scene.rig.is_some() {
-        Rig::settle(scene);
+        AnimationRig::apply_rest_pose(scene);
         check(scene, path)?;
     }
     drop_empty(scene);
-    if scene.rig.as_ref().is_some_and(Rig::is_idle) {
+    if scene.rig.as_ref().is_some_and(AnimationRig::is_idle) {
         scene.rig = None;
     }
     extent(scene, path)
@@ -124,7 +124,7 @@ fn materials(scene: &mut Scene) {
 
 /// Tracers invert transforms. A mesh that its transform squashes flat gets it applied to its vertices instead; one that is
 /// squashed to a line or a point, which is a way of hiding it, has nothing to show and is not placed. An animated one may grow
-/// again, and a mesh that deforms cannot be baked: both get the least of a thickness instead ([`Rig::settle`]).
+/// again, and a mesh that deforms cannot be baked: both get the least of a thickness instead ([`AnimationRig::apply_rest_pose`]).
 fn bake_singular(scene: &mut Scene) {
     let before = scene.instances.len();
     let moving = scene.rig.as_ref().map(|rig| rig.moving(scene));
@@ -179,7 +179,7 @@ struct Notes {
     tangents: bool,
 }
 
-/// `deformation`: how the mesh deforms, if it does; the mesh is as modelled then.
+/// `deformation`: how the mesh deforms, if it does; the mesh is undeformed then.
 fn repair(mesh: &mut Mesh, material: &Material, deformation: Option<&mut Deformation>) -> Notes {
     let mut notes = Notes::default();
     let Geometry::Triangles(triangles) = &mut mesh.geometry else { return notes };

@@ -11,7 +11,7 @@ const MAX_SIDE: u32 = 16384;
 
 /// A decoded image: rows from the top, RGBA.
 #[derive(Clone, Debug)]
-pub(super) struct Picture {
+pub(super) struct DecodedImage {
     pub width: u32,
     pub height: u32,
     pub texels: TexelData,
@@ -21,7 +21,7 @@ pub(super) struct Picture {
 ///
 /// # Errors
 /// What is wrong, in words.
-pub(super) fn decode(bytes: &[u8], name: &str) -> Result<Picture, String> {
+pub(super) fn decode(bytes: &[u8], name: &str) -> Result<DecodedImage, String> {
     let format = image::guess_format(bytes)
         .or_else(|_| ImageFormat::from_path(name))
         .map_err(|_| "is of a format that skylit does not read (PNG, JPEG, TGA and BMP are)".to_owned())?;
@@ -55,5 +55,5 @@ pub(super) fn decode(bytes: &[u8], name: &str) -> Result<Picture, String> {
         }
         _ => pixels.into_rgba8().into_raw().into(),
     };
-    Ok(Picture { width, height, texels })
+    Ok(DecodedImage { width, height, texels })
 }

@@ -7,8 +7,8 @@ use glam::DMat4;
 use serde_json::{Value, json};
 
 use super::{Writer, node, with_mesh};
-use crate::scene::animation::{Animation, Channel, Deformation, Interpolation, Local, Property, Sampler, Skin};
-use crate::scene::{Rig, Scene};
+use crate::scene::animation::{Animation, Channel, Deformation, Interpolation, LocalTransform, Property, Sampler, Skin};
+use crate::scene::{AnimationRig, Scene};
 
 /// Nodes in the making.
 pub(super) struct Tree {
@@ -20,7 +20,7 @@ pub(super) struct Tree {
 }
 
 /// The nodes of all instances, and of the cameras that the rig carries.
-pub(super) fn tree(scene: &Scene, rig: Option<&Rig>) -> Tree {
+pub(super) fn tree(scene: &Scene, rig: Option<&AnimationRig>) -> Tree {
     let mut tree = Tree { nodes: Vec::new(), roots: Vec::new(), morphing: BTreeMap::new() };
     let Some(rig) = rig else {
         tree.nodes = scene.instances.iter().map(|i| with_mesh(&i.name, i.mesh, &i.object_to_world)).collect();
@@ -72,7 +72,7 @@ pub(super) fn tree(scene: &Scene, rig: Option<&Rig>) -> Tree {
 }
 
 /// The node of the rig that carries a camera.
-pub(super) fn carries_camera(rig: &Rig, camera: usize) -> Option<usize> {
+pub(super) fn carries_camera(rig: &AnimationRig, camera: usize) -> Option<usize> {
     rig.parts().cameras.get(camera).copied().flatten()
 }
 
@@ -136,7 +136,7 @@ impl Writer {
         out
     }
 
-    pub(super) fn animation(&mut self, animation: &Animation, rig: &Rig, tree: &Tree) -> Value {
+    pub(super) fn animation(&mut self, animation: &Animation, rig: &AnimationRig, tree: &Tree) -> Value {
         let (mut samplers, mut channels) = (Vec::new(), Vec::new());
         let mut times: Vec<(Arc<[f32]>, usize)> = Vec::new();
         let mut end = f64::NEG_INFINITY;
@@ -194,11 +194,11 @@ impl Writer {
 }
 
 /// A channel that changes nothing and lasts as long as the animation.
-fn hold(animation: &Animation, rig: &Rig) -> Option<Channel> {
+fn hold(animation: &Animation, rig: &AnimationRig) -> Option<Channel> {
     let taken = |node| animation.channels.iter().any(|c| (c.node, c.property) == (node, Property::Translation));
     rig.parts().nodes.iter().enumerate().filter(|(i, _)| !taken(*i)).find_map(|(node, n)| match n.local {
-        Local::Matrix(_) => None,
-        Local::Parts { translation, .. } => {
+        LocalTransform::Matrix(_) => None,
+        LocalTransform::Trs { translation, .. } => {
             let (times, values) = ([animation.duration as f32].into(), translation.as_vec3().to_array().to_vec());
             let sampler = Sampler { interpolation: Interpolation::Step, times, values };
             Some(Channel { node, property: Property::Translation, sampler })
@@ -206,10 +206,10 @@ fn hold(animation: &Animation, rig: &Rig) -> Option<Channel> {
     })
 }
 
-fn local(name: &str, local: &Local) -> Value {
+fn local(name: &str, local: &LocalTransform) -> Value {
     match local {
-        Local::Matrix(m) => node(name, m),
-        Local::Parts { translation, rotation, scale } => {
+        LocalTransform::Matrix(m) => node(name, m),
+        LocalTransform::Trs { translation, rotation, scale } => {
             let mut out = json!({ "name": name });
             if *translation != glam::DVec3::ZERO {
                 out["translation"] = json!(translation.to_array());

@@ -16,7 +16,7 @@ use parse::Statement;
 use super::{find, finish};
 use crate::error::{Error, Result};
 use crate::scene::material::{Material, MaterialKind, Transmission};
-use crate::scene::{Camera, Geometry, Instance, Mesh, Rig, Scene, Sphere};
+use crate::scene::{AnimationRig, Camera, Geometry, Instance, Mesh, Scene, Sphere};
 
 /// Reads a `.brhan` file and the models that it names.
 pub(super) fn read(path: &Path) -> Result<Scene> {
@@ -137,7 +137,7 @@ impl Loader<'_> {
             let mut model = super::read_model(&key.0)?;
             if model.rig.is_some() {
                 // its nodes are not this scene's
-                Rig::settle(&mut model);
+                AnimationRig::apply_rest_pose(&mut model);
                 model.rig = None;
                 self.scene.report.warnings.push(format!("{file}: animations of models are not played"));
             }

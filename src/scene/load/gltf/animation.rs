@@ -8,7 +8,7 @@ use ::gltf::json::accessor::Type;
 use serde::Deserialize;
 
 use super::accessor::Reader;
-use crate::scene::animation::{self, Channel, Interpolation, Local, Node, Property, Sampler};
+use crate::scene::animation::{self, Channel, Interpolation, LocalTransform, Node, Property, Sampler};
 
 /// An animation in the file. Nothing is required here: what is missing leaves out a channel, and not the whole scene.
 #[derive(Deserialize, Default)]
@@ -95,7 +95,7 @@ fn read_channel(
             return Err(format!("node {target} has no mesh with morph targets"));
         }
         (Property::Weights, _) => nodes[node].weights.len(),
-        (_, Local::Matrix(_)) => return Err(format!("node {target} has a matrix, which cannot be animated")),
+        (_, LocalTransform::Matrix(_)) => return Err(format!("node {target} has a matrix, which cannot be animated")),
         (Property::Rotation, _) => 4,
         _ => 3,
     };

@@ -27,7 +27,7 @@ use ::gltf::json::{Index, Root};
 
 use accessor::Reader;
 use glam::{DAffine3, DVec3};
-use rig::{Stage, Wanted};
+use rig::{MeshVariant, RigBuilder};
 
 use super::compact;
 use crate::error::{Error, Result};
@@ -82,7 +82,7 @@ pub(super) fn read(path: &Path) -> Result<Scene> {
     scene.textures = texture::resolve(&reader, path, &mut scene.materials, &mut |w| warnings.push(w));
 
     let input = |e| Error::input(path, e);
-    let mut stage = Stage::new(&reader, &doubles, &placed, &mut |w| warnings.push(w));
+    let mut stage = RigBuilder::new(&reader, &doubles, &placed, &mut |w| warnings.push(w));
     let mut meshes = Meshes { reader: &reader, path, primitives: BTreeMap::new(), default_material: None };
     for (at, placed) in placed.iter().enumerate().filter(|(_, p)| p.shown) {
         let node = &document.nodes[placed.node];
@@ -145,14 +145,14 @@ struct Meshes<'a> {
     reader: &'a Reader<'a>,
     path: &'a Path,
     /// The scene's meshes of each glTF mesh.
-    primitives: BTreeMap<Wanted, Vec<Made>>,
+    primitives: BTreeMap<MeshVariant, Vec<LoadedMesh>>,
     /// The scene's material for primitives without one.
     default_material: Option<usize>,
 }
 
 /// A mesh of the scene.
 #[derive(Clone, Copy)]
-struct Made {
+struct LoadedMesh {
     mesh: usize,
     /// Where it is placed if it has a skin.
     anchor: Option<DVec3>,
@@ -162,12 +162,12 @@ impl Meshes<'_> {
     /// `at`: the placed node that carries it.
     fn of(
         &mut self,
-        wanted: &Wanted,
+        wanted: &MeshVariant,
         at: usize,
-        stage: &mut Stage,
+        stage: &mut RigBuilder,
         scene: &mut Scene,
         warnings: &mut Vec<String>,
-    ) -> Result<Vec<Made>> {
+    ) -> Result<Vec<LoadedMesh>> {
         if let Some(known) = self.primitives.get(wanted) {
             return Ok(known.clone());
         }
@@ -175,7 +175,7 @@ impl Meshes<'_> {
         let meshes = &self.reader.document.meshes;
         let mesh = meshes.get(index).ok_or_else(|| Error::input(self.path, format!("mesh {index} does not exist")))?;
         let name = text(&mesh.name);
-        let again = self.primitives.range(Wanted::first(index)..).next().is_some_and(|(k, _)| k.mesh == index);
+        let again = self.primitives.range(MeshVariant::first(index)..).next().is_some_and(|(k, _)| k.mesh == index);
         let mut made = Vec::new();
         for (nth, primitive) in mesh.primitives.iter().enumerate() {
             let place = format!("mesh {index} `{name}`, primitive {nth}");
@@ -203,7 +203,7 @@ impl Meshes<'_> {
             }
             let anchor = deformation.and_then(|d| stage.deform(d, wanted, scene.meshes.len(), &mut triangles));
             let name = if mesh.primitives.len() == 1 { name.to_owned() } else { format!("{name}#{nth}") };
-            made.push(Made { mesh: scene.meshes.len(), anchor });
+            made.push(LoadedMesh { mesh: scene.meshes.len(), anchor });
             scene.meshes.push(Mesh { name, geometry: Geometry::Triangles(triangles), material });
         }
         self.primitives.insert(wanted.clone(), made.clone());

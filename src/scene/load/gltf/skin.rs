@@ -9,7 +9,7 @@ use serde::Deserialize;
 
 use super::AccessorIndex;
 use super::accessor::Reader;
-use crate::scene::animation::{self, Influences, Target};
+use crate::scene::animation::{self, Influences, MorphTarget};
 
 /// A skeleton in the file.
 #[derive(Deserialize, Default)]
@@ -105,7 +105,7 @@ pub(super) fn targets(
     vertices: usize,
     normals: bool,
     count: usize,
-) -> Result<Vec<Target>, String> {
+) -> Result<Vec<MorphTarget>, String> {
     let deltas = |accessor: Option<AccessorIndex>, t: usize| -> Result<Vec<Vec3>, String> {
         let Some(accessor) = accessor else { return Ok(Vec::new()) };
         let deltas = reader.floats(same_count(reader, accessor, vertices)?, Type::Vec3, Vec3::from_array)?;
@@ -119,9 +119,12 @@ pub(super) fn targets(
     let all = primitive.targets.as_ref().unwrap_or(&none);
     let mut out = Vec::with_capacity(count);
     for (t, target) in all.iter().take(count).enumerate() {
-        out.push(Target { positions: deltas(target.positions, t)?, normals: deltas(target.normals.filter(|_| normals), t)? });
+        out.push(MorphTarget {
+            positions: deltas(target.positions, t)?,
+            normals: deltas(target.normals.filter(|_| normals), t)?,
+        });
     }
-    out.resize(count, Target::default());
+    out.resize(count, MorphTarget::default());
     Ok(out)
 }
 

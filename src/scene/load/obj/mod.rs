@@ -27,7 +27,7 @@ use crate::scene::{Geometry, Instance, Material, Mesh, Scene, TriangleMesh};
 pub(super) fn read(path: &Path) -> Result<Scene> {
     let mut file = parse::parse(path)?;
     let mut scene = Scene::default();
-    let mut materials = material::Library::default();
+    let mut materials = material::MaterialLibrary::default();
     let mut complete = true;
     for name in std::mem::take(&mut file.libraries) {
         match find::find(&name, &[path]) {

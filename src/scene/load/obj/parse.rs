@@ -7,7 +7,7 @@ use std::str::SplitAsciiWhitespace;
 
 use glam::{Vec2, Vec3, Vec4};
 
-use super::polygon::Cutter;
+use super::polygon::PolygonTriangulator;
 use crate::error::{Error, Result};
 
 /// No such index.
@@ -88,7 +88,7 @@ struct Parser {
     /// Whether name or material changed since the last face.
     changed: bool,
     polygon: Vec<Corner>,
-    cutter: Cutter,
+    cutter: PolygonTriangulator,
 }
 
 impl Parser {

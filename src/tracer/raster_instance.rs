@@ -4,13 +4,13 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use crate::accel::Aabb;
-use crate::accel::flatten::{FlatScene, Group};
+use crate::accel::flatten::{BlasGroup, FlatScene};
 
 /// Primitives that follow each other and are left out or drawn together.
 pub const CHUNK: u32 = 256;
 
 /// Host-side outline of a group.
-pub struct Shape {
+pub struct RasterGeometry {
     /// Spheres or triangles.
     pub spheres: bool,
     /// Triangles or spheres.
@@ -24,28 +24,28 @@ pub struct Shape {
 }
 
 /// An entry of the top level, and the group below it.
-pub struct Drawable<'a> {
+pub struct RasterInstance<'a> {
     /// Number of the entry.
     pub entry: u32,
     /// Group space to world relative to the scene's origin: three rows.
     pub to_world: [[f32; 4]; 3],
     /// The group.
-    pub shape: &'a Shape,
+    pub shape: &'a RasterGeometry,
     /// Address of its vertices, 3 floats each; of a sphere 4.
     pub positions: u64,
     /// Address of its triangles' corners, 3 words each; 0 for spheres.
     pub indices: u64,
 }
 
-impl Shape {
-    pub(super) fn new(flat: &FlatScene, group: &Group) -> Self {
+impl RasterGeometry {
+    pub(super) fn new(flat: &FlatScene, group: &BlasGroup) -> Self {
         let primitives = group.primitive_count;
         let chunk = |k: usize| {
             let first = k * CHUNK as usize;
-            let (mut part, mut bounds) = (flat.part_of(group, first), Aabb::EMPTY);
+            let (mut part, mut bounds) = (flat.submesh_of(group, first), Aabb::EMPTY);
             for primitive in first..primitives.min(first + CHUNK as usize) {
                 if part.end(flat) <= primitive {
-                    part = flat.part_of(group, primitive);
+                    part = flat.submesh_of(group, primitive);
                 }
                 bounds = bounds.union(flat.primitive_bounds(group, part, primitive));
             }

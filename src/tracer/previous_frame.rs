@@ -5,13 +5,13 @@ use std::sync::Arc;
 
 use super::dynamic::group_of;
 use super::gpu_scene::rows;
-use crate::accel::flatten::{FlatScene, Placement};
+use crate::accel::flatten::{FlatScene, TlasInstance};
 use crate::error::Result;
 use crate::gpu::{Buffer, Device, Memory};
 use crate::interface::records::scene::MotionRecord;
 
 /// The scene as it was before the last update.
-pub(super) struct Motion {
+pub(super) struct PreviousFrame {
     records: Vec<MotionRecord>,
     buffer: Buffer,
     /// Of each group that may deform: its vertices.
@@ -21,7 +21,7 @@ pub(super) struct Motion {
     deformed: Vec<usize>,
 }
 
-impl Motion {
+impl PreviousFrame {
     /// Nothing has changed yet. `None` for a scene that never does.
     pub fn new(device: &Arc<Device>, flat: &FlatScene, positions: impl Fn(usize) -> u64) -> Result<Option<Self>> {
         if flat.motion.is_none() {
@@ -33,7 +33,7 @@ impl Motion {
             previous[group] = Some(Buffer::new(device, "previous vertices", positions(group), Memory::Device)?);
         }
         let records: Vec<_> = flat
-            .placements
+            .instances
             .iter()
             .map(|p| MotionRecord {
                 previous_group_to_world: rows(&p.to_world),
@@ -54,7 +54,7 @@ impl Motion {
     /// Before an update that moves these entries and deforms these groups: what is, becomes what was.
     pub fn begin<'a>(
         &mut self,
-        placements: &[Placement],
+        instances: &[TlasInstance],
         positions: impl Fn(usize) -> &'a Buffer,
         moving: Vec<usize>,
         deforming: Vec<usize>,
@@ -62,7 +62,7 @@ impl Motion {
         let (moved, deformed) = (std::mem::replace(&mut self.moved, moving), std::mem::replace(&mut self.deformed, deforming));
         let mut changed = false;
         for &k in moved.iter().chain(&self.moved) {
-            self.records[k].previous_group_to_world = rows(&placements[k].to_world);
+            self.records[k].previous_group_to_world = rows(&instances[k].to_world);
             changed = true;
         }
         if changed {

@@ -17,7 +17,7 @@ const WORTHWHILE: usize = 100_000;
 
 /// A shader and what it is specialised to.
 #[derive(Clone)]
-pub(super) struct Recipe {
+pub(super) struct PipelineSpec {
     pub name: &'static str,
     pub shader: &'static Shader,
     pub specialization: Specialization,
@@ -27,11 +27,11 @@ pub(super) struct Recipe {
 
 /// What was compiled and not yet asked for.
 #[derive(Default)]
-pub(super) struct Prepared {
-    pipelines: Mutex<Vec<(Recipe, ComputePipeline)>>,
+pub(super) struct PrecompiledPipelines {
+    pipelines: Mutex<Vec<(PipelineSpec, ComputePipeline)>>,
 }
 
-impl Prepared {
+impl PrecompiledPipelines {
     /// What the streams' recipes for a scene are taken to be. A recipe that turns out another is compiled when it is asked for, and an
     /// error is found again then.
     pub fn recipes(
@@ -40,13 +40,13 @@ impl Prepared {
         options: ComputeOptions,
         streams: &[&'static StreamShaders],
         primitives: usize,
-    ) -> Vec<Recipe> {
+    ) -> Vec<PipelineSpec> {
         let fast = matches!(options.kernel, Kernel::Auto | Kernel::Wide | Kernel::Packet);
         if !fast || primitives < WORTHWHILE {
             return Vec::new();
         }
         let s = specialization(info, features, options, compute::USUAL_STACK);
-        let mut out: Vec<Recipe> = Vec::new();
+        let mut out: Vec<PipelineSpec> = Vec::new();
         for shaders in streams {
             let recipe = large(info, options.kernel, shaders, &s);
             // streams share the kernel that traces rays one by one
@@ -58,13 +58,13 @@ impl Prepared {
     }
 
     /// Compiles them.
-    pub fn compile(device: &Arc<Device>, recipes: Vec<Recipe>) -> Self {
+    pub fn compile(device: &Arc<Device>, recipes: Vec<PipelineSpec>) -> Self {
         let compiled = recipes.into_iter().filter_map(|r| r.compile(device).ok().map(|p| (r, p)));
         Self { pipelines: Mutex::new(compiled.collect()) }
     }
 
     /// The pipeline, compiled now unless it is there.
-    pub fn take(&self, device: &Arc<Device>, recipe: &Recipe) -> Result<ComputePipeline> {
+    pub fn take(&self, device: &Arc<Device>, recipe: &PipelineSpec) -> Result<ComputePipeline> {
         let there = {
             let mut all = self.pipelines.lock().unwrap_or_else(PoisonError::into_inner);
             all.iter().position(|(r, _)| r.is(recipe)).map(|k| all.swap_remove(k).1)
@@ -73,13 +73,13 @@ impl Prepared {
     }
 }
 
-impl Recipe {
+impl PipelineSpec {
     fn compile(&self, device: &Arc<Device>) -> Result<ComputePipeline> {
         let make = if self.packets { ComputePipeline::with_full_subgroups } else { ComputePipeline::new };
         make(device, self.name, self.shader, &self.specialization)
     }
 
-    fn is(&self, other: &Recipe) -> bool {
+    fn is(&self, other: &PipelineSpec) -> bool {
         std::ptr::eq(self.shader, other.shader) && self.specialization == other.specialization
     }
 }
@@ -108,11 +108,11 @@ pub(super) fn in_packets(info: &DeviceInfo, kernel: Kernel, shaders: &StreamShad
 }
 
 /// The shader of the fast kernels that traces the stream.
-pub(super) fn large(info: &DeviceInfo, kernel: Kernel, shaders: &'static StreamShaders, s: &Specialization) -> Recipe {
+pub(super) fn large(info: &DeviceInfo, kernel: Kernel, shaders: &'static StreamShaders, s: &Specialization) -> PipelineSpec {
     let packet = shaders.variant(Variant::Packet).filter(|_| in_packets(info, kernel, shaders));
     let (name, shader) = match packet {
         Some(shader) => (shaders.name, shader),
         None => ("wide kernel", wide_kernel(shaders.mode, info.int64)),
     };
-    Recipe { name, shader, specialization: s.clone(), packets: packet.is_some() }
+    PipelineSpec { name, shader, specialization: s.clone(), packets: packet.is_some() }
 }
