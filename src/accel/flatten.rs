@@ -1,8 +1,9 @@
-//! From placed meshes to what tracers build structures over.
+//! From the scene's instances to the two levels that tracers build acceleration structures over.
 //!
-//! A mesh that is placed once gains nothing from a level of its own: all such meshes are baked into one *group* of
-//! triangles (and one of spheres) in world space. A mesh that is placed several times is a group of its own with several
-//! entries in the top level. Most files end up as one group with one entry, and the second level is skipped altogether.
+//! A *group* is the geometry of one bottom-level acceleration structure (BLAS). A mesh that has one instance gains nothing from a
+//! BLAS of its own: all such meshes are baked into one group of triangles (and one of spheres) in world space. A mesh that has several
+//! instances is a group of its own with several TLAS instances. Most files become one group with one TLAS instance; then there is no
+//! top level.
 
 use glam::{DAffine3, DVec3, Vec3};
 
@@ -11,12 +12,12 @@ use super::features::{AlphaClass, Blend, alpha_classes};
 use crate::error::Result;
 use crate::scene::{AlphaMode, Geometry, Motion, Scene, Sphere};
 
-/// A mesh within a group.
+/// A mesh within a group; `PartRecord` on the device.
 #[derive(Clone, Debug)]
 pub struct Submesh {
     /// Index into [`Scene::meshes`].
     pub mesh: usize,
-    /// The instance it stands for, when the group is placed once; otherwise the entry of the top level says it.
+    /// Index into [`Scene::instances`], when the group has one TLAS instance; otherwise [`TlasInstance::scene_instance`] has it.
     pub scene_instance: Option<usize>,
     /// Mesh to group space; identity unless baked.
     pub to_group: DAffine3,
@@ -24,9 +25,9 @@ pub struct Submesh {
     pub first_primitive: usize,
     /// The first of its vertices in the group (triangles only).
     pub first_vertex: usize,
-    /// `to_group` turns the winding.
+    /// `to_group` mirrors, so it reverses the winding.
     pub mirrored: bool,
-    /// Its material has to be asked at every hit.
+    /// Its alpha is tested at every hit.
     pub alpha_tested: bool,
 }
 
@@ -37,7 +38,7 @@ impl Submesh {
     }
 }
 
-/// What one bottom-level structure is built over: triangles or spheres, never both.
+/// The geometry of one bottom-level acceleration structure: triangles or spheres, never both.
 #[derive(Clone, Debug)]
 pub struct BlasGroup {
     /// Spheres (true) or triangles.
@@ -52,7 +53,7 @@ pub struct BlasGroup {
     pub opaque_count: usize,
 }
 
-/// An entry of the top level.
+/// A TLAS instance.
 #[derive(Clone, Debug)]
 pub struct TlasInstance {
     /// Index into [`FlatScene::groups`].

@@ -23,22 +23,22 @@ use crate::interface::records::scene::{
 use crate::interface::{BsdfModel, MaterialFeature, ShadingFeatures, TexelFormat, Texels};
 use crate::scene::{AlphaMode, Filter, Geometry, Material, TexelData, TextureSlot, TriangleMesh};
 
-/// What the passes will ask of the scene; the rest is not uploaded.
+/// The parts of a scene that the passes require; the rest is not uploaded.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Needs {
     /// Shading normals.
     pub normals: bool,
-    /// Base colour of every surface, not only of alpha-tested ones.
+    /// Base colours of all surfaces, not only of alpha-tested ones.
     pub albedo: bool,
-    /// Everything that light does to surfaces, and they to it: what paths ask for. Normals and base colours with it.
+    /// Materials and emission, for path tracing. Implies `normals`, and `albedo` unless `white`.
     pub shading: bool,
-    /// With `shading`: every surface is white and nothing else is asked of it.
+    /// With `shading`: white-furnace mode, in which every surface has one constant albedo and no other material data.
     pub white: bool,
-    /// With `shading`: what microfacets of one bounce lose is given back.
+    /// With `shading`: compensation for energy lost to multiple scattering between microfacets.
     pub compensation: bool,
-    /// With `shading`: occlusion that is baked into textures, to be shown.
+    /// With `shading`: baked occlusion textures, for the AOV of that name.
     pub baked_occlusion: bool,
-    /// With `shading`: levels of textures, for paths that know how wide they are ([`crate::integrators::path::TextureFilter::RayCone`]).
+    /// With `shading`: mip levels of textures, for ray cones ([`crate::integrators::path::TextureFilter::RayCone`]).
     pub mip_levels: bool,
 }
 
@@ -48,16 +48,16 @@ pub fn rows(t: &DAffine3) -> [[f32; 4]; 3] {
     std::array::from_fn(|k| [m.x_axis[k] as f32, m.y_axis[k] as f32, m.z_axis[k] as f32, o[k] as f32])
 }
 
-/// Buffers of a group: what its bottom level is built over.
+/// Buffers of a group, over which its BLAS is built.
 pub(super) struct GroupBuffers {
-    /// 3 floats a vertex; 4 a sphere.
+    /// 3 floats per vertex, or 4 per sphere.
     pub positions: Buffer,
-    /// 3 uints a triangle; none for spheres.
+    /// 3 uints per triangle; `None` for spheres.
     pub indices: Option<Buffer>,
     part_of: Option<Buffer>,
 }
 
-/// A scene in device memory, without what it is traced through.
+/// A scene in device memory, without its acceleration structures.
 pub struct GpuScene {
     root: SceneRoot,
     root_buffer: Buffer,
@@ -65,28 +65,28 @@ pub struct GpuScene {
     instance_buffer: Buffer,
     pub(super) groups: Vec<GroupBuffers>,
     shapes: Vec<RasterGeometry>,
-    /// The group of each entry of the top level.
+    /// The group of each TLAS instance.
     group_of: Vec<u32>,
     attributes: Buffer,
-    /// Where in `attributes` the normals of meshes that may deform lie.
+    /// Mesh index and byte offset in `attributes` of the normals of each mesh that may deform.
     normals: Vec<(usize, u64)>,
-    /// Before the last update; `None` where nothing ever changes.
+    /// State before the last update; `None` for a static scene.
     motion: Option<PreviousFrame>,
     others: Vec<Buffer>,
     mips: MipStats,
 }
 
-/// What the levels of textures are.
+/// Number and size of mip levels.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct MipStats {
-    /// Of the texture that has most, level 0 counted; 0: there are none.
+    /// Largest number of levels of a texture, level 0 included; 0 without mip levels.
     pub levels: u32,
-    /// Bytes beside level 0.
+    /// Size of levels 1 and up, in bytes.
     pub bytes: u64,
 }
 
 impl GpuScene {
-    /// Writes what `needs` and the scene itself call for.
+    /// Uploads the data that `needs` and the scene itself require.
     pub fn new(device: &Arc<Device>, flat: &FlatScene, needs: Needs) -> Result<Self> {
         let needs =
             Needs { normals: needs.normals || needs.shading, albedo: needs.albedo || needs.shading && !needs.white, ..needs };
@@ -136,7 +136,7 @@ impl GpuScene {
                 "instance {bad} '{name}' has a transform that cannot be inverted (a scale of zero?)"
             )));
         }
-        // which record and part stand for each instance of the scene
+        // TLAS instance and part record of each instance of the scene
         let mut placements = vec![[0u32; 2]; flat.scene.instances.len()];
         for (k, p) in flat.instances.iter().enumerate() {
             match p.scene_instance {
@@ -187,7 +187,7 @@ impl GpuScene {
                 root.albedo = keep(Buffer::from_slice(device, "albedo tables", &tables)?);
             }
         }
-        // such a mesh is not baked
+        // a deforming mesh is never baked
         let normals = |&mesh: &usize| {
             let address = attributes.addresses.get(&(mesh, None, Attribute::Normals))?;
             Some((mesh, address - attributes.buffer.address()))
@@ -215,7 +215,7 @@ impl GpuScene {
         })
     }
 
-    /// What there is to draw, entry by entry of the top level, as it is now.
+    /// The TLAS instances for rasterization, in their current state.
     pub(super) fn raster_instances(&self) -> impl Iterator<Item = RasterInstance<'_>> {
         (0..).zip(self.instances.iter().zip(&self.group_of)).map(|(entry, (instance, &group))| {
             let buffers = &self.groups[group as usize];
@@ -229,24 +229,24 @@ impl GpuScene {
         })
     }
 
-    /// Where shaders begin.
+    /// Device address of the scene root, from which shaders reach everything.
     pub fn root_address(&self) -> u64 {
         self.root_buffer.address()
     }
 
-    /// Bytes of device memory.
+    /// Size in device memory, in bytes.
     pub fn bytes(&self) -> u64 {
         let groups = self.groups.iter().flat_map(|g| [Some(&g.positions), g.indices.as_ref(), g.part_of.as_ref()]).flatten();
         let others = self.others.iter().chain([&self.attributes, &self.instance_buffer]);
         groups.chain(others).map(Buffer::size).sum::<u64>()
     }
 
-    /// Levels of textures.
+    /// Number and size of mip levels.
     pub(super) fn mips(&self) -> MipStats {
         self.mips
     }
 
-    /// Before an update that moves these entries of the top level, now at `placements`, and deforms these groups.
+    /// Before an update that moves these TLAS instances, now at `placements`, and deforms these groups.
     pub(super) fn begin_update(&mut self, instances: &[TlasInstance], moving: Vec<usize>, deforming: Vec<usize>) -> Result<()> {
         let groups = &self.groups;
         match &mut self.motion {
@@ -269,7 +269,7 @@ impl GpuScene {
         }
     }
 
-    /// Entries of the top level have moved: which, and where to.
+    /// TLAS instances have moved: which, and where to.
     pub(super) fn set_transforms(&mut self, moved: &[(usize, DAffine3)]) -> Result<()> {
         for (k, to_world) in moved {
             let record = &mut self.instances[*k];
@@ -285,7 +285,7 @@ impl GpuScene {
         }
     }
 
-    /// Says where the compute tracer's hierarchy lies.
+    /// Stores the addresses of the compute tracer's hierarchy in the scene root.
     pub(super) fn set_hierarchy(&mut self, h: &Hierarchy) -> Result<()> {
         if self.instances.iter().zip(&h.instance_roots).any(|(record, root)| record.root != *root) {
             for (record, root) in self.instances.iter_mut().zip(&h.instance_roots) {
@@ -304,14 +304,14 @@ impl GpuScene {
         write_all(&mut self.root_buffer, &[self.root])
     }
 
-    /// Says where the hardware's top level lies.
+    /// Stores the address of the hardware tracers' top level in the scene root.
     pub(super) fn set_top_level(&mut self, address: u64) -> Result<()> {
         self.root.top_level = address;
         write_all(&mut self.root_buffer, &[self.root])
     }
 }
 
-/// What materials ask about albedos, if any does.
+/// The albedo tables that the materials require, if any.
 fn albedo_tables(flat: &FlatScene, needs: Needs, indices: &[f32]) -> Option<Vec<f32>> {
     let ShadingFeatures { bsdfs, materials, .. } = shading::features(flat, needs);
     let wanted = albedo::AlbedoTables {
@@ -368,14 +368,14 @@ fn group_buffers(device: &Arc<Device>, flat: &FlatScene, group: &BlasGroup) -> R
     Ok(GroupBuffers { positions, indices: Some(indices), part_of: part_of(device, group)? })
 }
 
-/// The part of each primitive, where there is more than one.
+/// The submesh index of each primitive; `None` for a group of one submesh.
 fn part_of(device: &Arc<Device>, group: &BlasGroup) -> Result<Option<Buffer>> {
     if group.submeshes.len() <= 1 {
         return Ok(None);
     }
     let ends = group.submeshes.iter().skip(1).map(|p| p.first_primitive).chain([group.primitive_count]);
     let sizes: Vec<_> = group.submeshes.iter().zip(ends).map(|(p, end)| end - p.first_primitive).collect();
-    let mut buffer = Buffer::new(device, "part of each primitive", 4 * group.primitive_count as u64, Memory::Device)?;
+    let mut buffer = Buffer::new(device, "submesh of each primitive", 4 * group.primitive_count as u64, Memory::Device)?;
     let mut cursor = Cursor::new(sizes.into_iter());
     buffer.fill(4 * group.primitive_count as u64, 4, |_, bytes| {
         for out in bytes.chunks_exact_mut(4) {
@@ -441,15 +441,15 @@ enum Attribute {
     Colors,
 }
 
-/// Vertex attributes of all parts in one buffer.
+/// Vertex attributes of all submeshes in one buffer.
 struct Attributes {
     buffer: Buffer,
-    // by mesh, whether baked (then by part), and attribute
+    // by mesh, submesh if the attribute is baked, and attribute
     addresses: std::collections::HashMap<(usize, Option<usize>, Attribute), u64>,
 }
 
 impl Attributes {
-    /// Baked normals and tangents differ from part to part; everything else is the mesh's own.
+    /// Baked normals and tangents differ between submeshes of one mesh; all other attributes are shared.
     fn key(part: &Submesh, index: usize, attribute: Attribute) -> (usize, Option<usize>, Attribute) {
         let baked =
             matches!(attribute, Attribute::Normals | Attribute::Tangents) && part.to_group.matrix3 != glam::DMat3::IDENTITY;
@@ -503,7 +503,7 @@ fn attribute_bytes<'a>(t: &'a TriangleMesh, part: &Submesh, attribute: Attribute
         }
         Attribute::Tangents => {
             let m = part.to_group.matrix3;
-            // a mirroring transform turns the bitangent against the cross product
+            // a mirroring transform reverses the bitangent relative to the cross product
             let side = if part.mirrored { -1.0 } else { 1.0 };
             let bake = |t: &Vec4| (m * t.truncate().as_dvec3()).normalize_or_zero().as_vec3().extend(side * t.w);
             Cow::Owned(bytemuck::cast_slice(&t.tangents.iter().map(bake).collect::<Vec<_>>()).to_vec())
@@ -513,7 +513,7 @@ fn attribute_bytes<'a>(t: &'a TriangleMesh, part: &Submesh, attribute: Attribute
     }
 }
 
-/// Textures that something asks for, in one buffer.
+/// The textures that are used, in one buffer.
 struct Textures {
     texels: Buffer,
     records: Vec<TextureRecord>,
@@ -522,32 +522,32 @@ struct Textures {
     mips: Option<Mips>,
 }
 
-/// Levels of textures, in one buffer.
+/// Mip levels of textures, in one buffer.
 struct Mips {
     texels: Buffer,
     records: Vec<MipRecord>,
 }
 
 impl Mips {
-    /// Of the scene's textures that are used, as each is used (by [`Texels`]).
+    /// Makes the levels of the used textures, for each use of a texture (`uses`, by [`Texels`]).
     fn upload(device: &Arc<Device>, flat: &FlatScene, used: &[usize], uses: &[[bool; 3]]) -> Result<Self> {
         let texture = |t: usize| &flat.scene.textures[t];
         let mut records: Vec<_> = used.iter().map(|&t| mipmap::record([texture(t).width, texture(t).height])).collect();
         // textures that share an image share its levels, too
         let mut pyramids: Vec<Cow<[u8]>> = Vec::new();
         let mut pyramid_of = std::collections::HashMap::new();
-        let mut places = Vec::new();
+        let mut destinations = Vec::new();
         for (k, (&t, uses)) in used.iter().zip(uses).enumerate() {
             for texels in Texels::ALL.into_iter().filter(|&texels| uses[texels as usize]) {
                 let pyramid = *pyramid_of.entry((texture(t).texels.as_bytes().as_ptr(), texels)).or_insert_with(|| {
                     pyramids.push(Cow::Owned(mipmap::pyramid(texture(t), texels)));
                     pyramids.len() - 1
                 });
-                places.push((k, texels, pyramid));
+                destinations.push((k, texels, pyramid));
             }
         }
         let (texels, addresses) = concatenate(device, "mip levels", &pyramids)?;
-        for (k, texels, pyramid) in places {
+        for (k, texels, pyramid) in destinations {
             records[k].texels[texels as usize] = addresses[pyramid];
         }
         Ok(Self { texels, records })
@@ -612,7 +612,7 @@ impl Textures {
         Ok(Self { texels, records, record_of, mips })
     }
 
-    /// Of a texture that was uploaded; none: 1 everywhere.
+    /// The record of an uploaded texture's use; without a texture, one that reads 1 everywhere.
     fn slot(&self, slot: Option<TextureSlot>) -> TextureUse {
         match slot {
             Some(s) => TextureUse {

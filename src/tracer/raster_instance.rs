@@ -1,4 +1,4 @@
-//! What a rasteriser has to know of a scene in device memory: what lies where, and what can be left out together.
+//! The geometry of a scene in device memory for a rasterizer: buffer addresses, and bounds for frustum culling.
 
 use glam::Vec3;
 use rayon::prelude::*;
@@ -6,34 +6,34 @@ use rayon::prelude::*;
 use crate::accel::Aabb;
 use crate::accel::flatten::{BlasGroup, FlatScene};
 
-/// Primitives that follow each other and are left out or drawn together.
+/// Number of consecutive primitives that are culled or drawn together.
 pub const CHUNK: u32 = 256;
 
-/// Host-side outline of a group.
+/// Counts and bounds of a group, on the host.
 pub struct RasterGeometry {
-    /// Spheres or triangles.
+    /// Whether the primitives are spheres; otherwise they are triangles.
     pub spheres: bool,
-    /// Triangles or spheres.
+    /// Number of primitives.
     pub primitives: u32,
-    /// Primitives before the first alpha-tested one.
+    /// Number of primitives before the first alpha-tested one.
     pub opaque: u32,
-    /// Of all primitives, group space.
+    /// Bounds of all primitives, in group space.
     pub bounds: Aabb,
-    /// Of each [`CHUNK`] primitives, the last of fewer; none when there is one, or when the vertices may move.
+    /// Bounds of each run of [`CHUNK`] primitives; empty for a single run, and after vertices have moved.
     pub chunks: Vec<Aabb>,
 }
 
-/// An entry of the top level, and the group below it.
+/// A TLAS instance, and the group below it.
 pub struct RasterInstance<'a> {
-    /// Number of the entry.
+    /// Index of the TLAS instance.
     pub entry: u32,
     /// Group space to world relative to the scene's origin: three rows.
     pub to_world: [[f32; 4]; 3],
-    /// The group.
+    /// Its geometry.
     pub shape: &'a RasterGeometry,
-    /// Address of its vertices, 3 floats each; of a sphere 4.
+    /// Device address of its vertices, 3 floats each, or of its spheres, 4 floats each.
     pub positions: u64,
-    /// Address of its triangles' corners, 3 words each; 0 for spheres.
+    /// Device address of its vertex indices, 3 words per triangle; 0 for spheres.
     pub indices: u64,
 }
 
@@ -60,7 +60,7 @@ impl RasterGeometry {
         Self { spheres: group.spheres, primitives: primitives as u32, opaque: group.opaque_count as u32, bounds, chunks }
     }
 
-    /// Its vertices have moved.
+    /// Recomputes the bounds after its vertices have moved.
     pub(super) fn deform(&mut self, positions: &[Vec3]) {
         self.chunks.clear();
         let pieces = positions.par_chunks(1 << 14).map(Aabb::of_points);

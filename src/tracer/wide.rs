@@ -1,5 +1,5 @@
-//! What the compute tracer's fast kernel walks (`shaders/trace/wide.glsl`): a wide hierarchy per group and one over the placed
-//! groups, all in one array of blocks. Here are the leaves: [`TriangleLeaf`], [`SphereLeaf`]
+//! The wide BVHs of the compute tracer's fast kernel (`shaders/trace/wide.glsl`): one per group and one over the
+//! instances, all in one array of blocks. This file makes their leaves: [`TriangleLeaf`], [`SphereLeaf`]
 //! and, in the top level, [`InstanceLeaf`].
 
 use std::sync::Arc;
@@ -10,7 +10,7 @@ use obvhs::bvh2::Bvh2;
 use rayon::prelude::*;
 
 use super::compute::{Hierarchy, instance_boxes, padding, primitive_boxes, unfinished_counter, write_records};
-use super::dynamic_trees::{DynamicTrees, instance_leaf, provide};
+use super::dynamic_trees::{DynamicTrees, instance_leaf, reserve};
 use super::kernel::BuildOptions;
 use super::kernel::Kernel;
 use super::stream::{LAUNCH_RAYS, LaunchMemory};
@@ -30,7 +30,7 @@ use crate::scene::Geometry;
 pub(super) struct Trees {
     pub groups: Vec<Wide>,
     pub top: Option<Wide>,
-    /// What each group took to build; what the top level took.
+    /// Seconds to build each group's BVH, and the top level.
     pub seconds: Vec<f64>,
     pub top_seconds: f64,
 }
@@ -47,19 +47,19 @@ impl Trees {
         let top = (!flat.is_single_level()).then(|| {
             let bounds: Vec<_> = groups.iter().map(|g| g.bounds.unwrap_or(Aabb::EMPTY)).collect();
             tree(instance_boxes(flat, &bounds), options.preset(flat.instances.len()), None, |entry| {
-                // the root is filled in when the groups have their places
+                // upload() fills in the root, once the groups have their ranges in the array
                 bytemuck::cast(instance_leaf(entry, &flat.instances[entry as usize], 0))
             })
         });
         Self { groups, top, seconds, top_seconds: start.elapsed().as_secs_f64() }
     }
 
-    /// The tree of the only group, where there is one and no top level.
+    /// The tree of a scene with a single group and no top level.
     pub fn into_only_group(mut self) -> Option<Wide> {
         if self.top.is_none() { self.groups.pop() } else { None }
     }
 
-    /// Expected blocks that a ray visits, where there is one tree.
+    /// Expected number of blocks that a ray visits; `None` for several trees.
     pub fn sah_cost(&self) -> Option<f64> {
         match (&self.top, self.groups.as_slice()) {
             (None, [group]) => Some(group.sah_cost),
@@ -69,21 +69,23 @@ impl Trees {
 
     pub fn upload(mut self, device: &Arc<Device>, flat: &FlatScene, kernel: Kernel) -> Result<Hierarchy> {
         let bounds = self.top.as_ref().or(self.groups.first()).and_then(|t| t.bounds).unwrap_or(Aabb::EMPTY);
-        let (rooms, depths) = provide(&self, flat);
-        let dynamic = (!flat.motion.is_none()).then(|| Box::new(DynamicTrees::new(&self, flat, &rooms, &depths)));
+        let (capacities, depths) = reserve(&self, flat);
+        let dynamic = (!flat.motion.is_none()).then(|| Box::new(DynamicTrees::new(&self, flat, &capacities, &depths)));
         let group_depth = depths.groups.iter().copied().max().unwrap_or(0);
-        // Every node visit pushes at most one entry. Entering an entry of the top level pushes its siblings and the way back.
+        // Every node visit pushes at most one entry. Entering a TLAS instance pushes its siblings and the return to the top level.
         let stack_entries = self.top.as_ref().map_or(0, |_| depths.top + 2) + group_depth;
         debug_assert!(stack_entries <= 2 * MAX_DEPTH + 2);
         // the top level first: it is visited by every ray
         let mut roots = Vec::new();
-        let mut count = rooms.top;
-        for room in &rooms.groups {
+        let mut count = capacities.top;
+        for capacity in &capacities.groups {
             roots.push(count as u32);
-            count += room;
+            count += capacity;
         }
         if u32::try_from(count).is_err() {
-            return Err(Error::Scene(format!("its hierarchy has {count} blocks; the compute tracer addresses 2^32")));
+            return Err(Error::Scene(format!(
+                "the scene's BVH has {count} blocks, more than the 2^32 that the compute tracer can address"
+            )));
         }
         if let Some(top) = &mut self.top {
             for block in top.blocks.iter_mut().filter(|b| wide::is_leaf(b)) {
@@ -91,18 +93,16 @@ impl Trees {
                 leaf.root = roots[flat.instances[leaf.instance as usize].group];
             }
         }
-        let trees = self
-            .top
-            .iter()
-            .map(|t| (t, 0, rooms.top))
-            .chain(self.groups.iter().zip(roots.iter().copied()).zip(&rooms.groups).map(|((t, by), &room)| (t, by, room)));
-        let in_room = trees.flat_map(|(t, by, room)| {
-            let free = std::iter::repeat_n(Block::default(), room - t.blocks.len());
+        let trees = self.top.iter().map(|t| (t, 0, capacities.top)).chain(
+            self.groups.iter().zip(roots.iter().copied()).zip(&capacities.groups).map(|((t, by), &capacity)| (t, by, capacity)),
+        );
+        let reserved = trees.flat_map(|(t, by, capacity)| {
+            let free = std::iter::repeat_n(Block::default(), capacity - t.blocks.len());
             t.blocks.iter().map(move |b| wide::rebased(*b, by)).chain(free)
         });
         // an empty scene has a node without children
-        let in_room = in_room.chain(std::iter::repeat_n(Block::default(), usize::from(count == 0)));
-        let nodes = write_records(device, "hierarchy", count.max(1) as u64, &mut { in_room })?;
+        let reserved = reserved.chain(std::iter::repeat_n(Block::default(), usize::from(count == 0)));
+        let nodes = write_records(device, "hierarchy", count.max(1) as u64, &mut { reserved })?;
         let launch = |name, bytes| Buffer::new(device, name, bytes * LAUNCH_RAYS as u64, Memory::Device).map(Arc::new);
         Ok(Hierarchy {
             kernel,
@@ -123,7 +123,7 @@ impl Trees {
     }
 }
 
-/// A tree over boxes, not yet padded. `depth`: nodes that may lie on a path, where they are bounded.
+/// A tree over boxes, not yet padded. `depth`: maximum depth in nodes, if bounded.
 pub(super) fn tree(mut boxes: Vec<Aabb>, preset: BuildPreset, depth: Option<u32>, leaf: impl Fn(u32) -> Block + Sync) -> Wide {
     if boxes.is_empty() {
         return Wide::default();
@@ -135,20 +135,21 @@ pub(super) fn tree(mut boxes: Vec<Aabb>, preset: BuildPreset, depth: Option<u32>
     collapse(binary, depth, leaf)
 }
 
-/// With at most `depth` nodes on a path, where they are bounded.
+/// Collapses a binary tree to a wide one of at most `depth` levels of nodes, if bounded.
 fn collapse(binary: Bvh2, depth: Option<u32>, leaf: impl Fn(u32) -> Block + Sync) -> Wide {
     let built = Wide::collapse(&binary, &leaf);
     match depth {
         // a binary tree is never shallower than the wide one that it becomes
-        Some(most) if built.depth > most => Wide::collapse(&build::limit_depth(binary, most), leaf),
+        Some(max) if built.depth > max => Wide::collapse(&build::limit_depth(binary, max), leaf),
         _ => built,
     }
 }
 
-/// Raised whenever the same input gives other blocks: builders, pairs, collapse, the layout of nodes and leaves.
+/// Version of cached BVHs. Raise it with every change that makes other blocks of the same input: in builders, pairs, collapse, or the
+/// layout of nodes and leaves.
 const LAYOUT_VERSION: u32 = 3;
 
-/// What lies next to the blocks of a kept hierarchy.
+/// The header of a cached BVH, beside its blocks.
 #[repr(C)]
 #[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
 struct CachedTree {
@@ -158,7 +159,7 @@ struct CachedTree {
     sah_cost: f64,
 }
 
-/// The hierarchy over what these bytes describe, from the cache if it is there, otherwise built and kept.
+/// The BVH of the geometry that `content` describes: from the cache if available, otherwise built and stored there.
 fn load_or_build(options: &BuildOptions, preset: BuildPreset, content: &[&[u8]], build: impl FnOnce() -> Wide) -> Wide {
     let Some(cache) = &options.cache else { return build() };
     let head = KeyBuilder::default().with(&LAYOUT_VERSION.to_le_bytes()).with(format!("{preset:?}").as_bytes());
@@ -294,7 +295,7 @@ mod tests {
     use crate::scene::builtin;
 
     /// Every leaf lies within the boxes above it and holds what the scene has: each triangle and sphere once, its corners bit for bit
-    /// and in their order, its alpha flag; each entry of the top level its number.
+    /// and in their order, its alpha flag; each TLAS instance its number.
     fn check(name: &str) {
         let scene = builtin::by_name(name).unwrap();
         let flat = FlatScene::new(&scene);

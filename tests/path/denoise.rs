@@ -213,7 +213,7 @@ fn wrong_uses_of_denoisers_are_told() {
     if !cfg!(feature = "oidn") {
         with(&["--denoise", "oidn", "--integrator", "path"], 2, "build with --features oidn, or use --denoise filter");
     } else if skylit::gpu::oidn::Oidn::open().is_err() {
-        with(&["--denoise", "oidn", "--integrator", "path"], 2, "Open Image Denoise: there is no lib");
+        with(&["--denoise", "oidn", "--integrator", "path"], 2, "Open Image Denoise: libOpenImageDenoise");
     }
     assert!(names(dir.path()).is_empty());
 }

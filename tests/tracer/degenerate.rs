@@ -351,9 +351,9 @@ fn coincident(count: u32) {
         let tracer = tracer(&device, kind, &scene);
         let built = start.elapsed();
         let traced = trace(&tracer, &rays, Mode::Closest, 1, &mut NoControl);
-        // Mesa 22.3 leaves loops after 65,535 turns: then the right answer is to say so
+        // Mesa 22.3 leaves loops after 65,535 iterations: then an error is the right answer
         if let Err(Error::Vulkan(message)) = &traced
-            && message.contains("cut the traversal")
+            && message.contains("ended the traversal")
             && count > 65_535
             && kind == TracerKind::Compute
         {
