@@ -110,14 +110,14 @@ fn gpu_constants_stay_and_nothing_crosses_an_edge() {
         assert!(image.iter().all(|v| (v / 7.3 - 1.0).abs() < 1e-5), "{kind}: a constant has changed");
 
         let near = |k: usize| features.centres[k].depth < 3.0;
-        let edge = film(&|k| match features.mix[k] {
+        let edge = film(&|k| match features.content[k] {
             PixelContent::OneSurface => f32::from(u8::from(!near(k))),
             _ => 0.5,
         });
         let (image, _) = filter(&tracer, &flat, &options, &edge);
         let mut mixed = 0;
         for k in 0..pixels {
-            if features.mix[k] == PixelContent::OneSurface {
+            if features.content[k] == PixelContent::OneSurface {
                 let expected = f32::from(u8::from(!near(k)));
                 assert!((image[3 * k] - expected).abs() < 1e-5, "{kind}: pixel {k} is {}, not {expected}", image[3 * k]);
             } else {
