@@ -1,9 +1,9 @@
-//! Is a description of what moves sound, and does it fit its scene?
+//! Validation of a rig against its scene.
 
 use super::{Animation, Channel, Deformation, LocalTransform, Property, RigParts, Skin};
 use crate::scene::{Geometry, Scene};
 
-/// What is wrong, in words, naming the thing.
+/// Fails with a message that names the invalid part.
 pub(super) fn check(scene: &Scene, parts: &RigParts) -> Result<(), String> {
     let nodes = parts.nodes.len();
     for (i, node) in parts.nodes.iter().enumerate() {

@@ -1,5 +1,5 @@
-//! A scene in motion: blocks that slide and turn, a rotor, a column that bends, a ball that changes its shape, and a camera that
-//! swings past. Two seconds, then it starts again without a seam.
+//! An animated scene: blocks that slide and rotate, a rotor, a skinned column, a ball with morph targets, and a moving
+//! camera. It loops seamlessly after two seconds.
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 use std::sync::Arc;
@@ -13,7 +13,7 @@ use crate::scene::animation::{
 };
 use crate::scene::{AnimationRig, Camera, Geometry, Scene, TriangleMesh};
 
-/// Seconds until it starts again.
+/// Duration of the loop in seconds.
 const DURATION: f64 = 2.0;
 
 /// Distance from joint to joint of the column.
@@ -81,7 +81,7 @@ pub fn parade() -> Scene {
     let bends = stage.channels.iter().filter(|c| stage.parts.nodes[c.node].name.starts_with("joint")).cloned().collect();
     let animation = |name: &str, channels| Animation { name: name.to_owned(), duration: DURATION, channels };
     stage.parts.animations = vec![animation("parade", std::mem::take(&mut stage.channels)), animation("bend", bends)];
-    // sound by construction; were it not, the tests would miss the rig
+    // valid by construction; otherwise the scene has no rig, and tests fail
     let _ = AnimationRig::attach(&mut scene, stage.parts);
     scene
 }

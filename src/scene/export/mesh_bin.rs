@@ -90,14 +90,14 @@ pub fn read_mesh_bin(path: &Path) -> Result<Scene> {
     let words = bytes.as_chunks::<4>().0;
     let (nv, nt) = match words {
         [nv, nt, ..] => (u32::from_le_bytes(*nv), u32::from_le_bytes(*nt)),
-        _ => return Err(Error::input(path, "is no MESH.bin: it has no header")),
+        _ => return Err(Error::input(path, "is not a MESH.bin: it has no header")),
     };
     let expected = 8 + 12 * (u64::from(nv) + u64::from(nt));
     if bytes.len() as u64 != expected {
         let have = bytes.len();
         return Err(Error::input(
             path,
-            format!("is no MESH.bin: {nv} vertices and {nt} triangles take {expected} bytes, but it has {have}"),
+            format!("is not a MESH.bin: {nv} vertices and {nt} triangles take {expected} bytes, but it has {have}"),
         ));
     }
     if nt == 0 {

@@ -1,4 +1,4 @@
-//! The tree of nodes, skins, morph targets and animations.
+//! Export of the node hierarchy, skins, morph targets and animations.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -10,12 +10,12 @@ use super::{Writer, node, with_mesh};
 use crate::scene::animation::{Animation, Channel, Deformation, Interpolation, LocalTransform, Property, Sampler, Skin};
 use crate::scene::{AnimationRig, Scene};
 
-/// Nodes in the making.
+/// The node hierarchy that is being written.
 pub(super) struct Tree {
     pub nodes: Vec<Value>,
     /// Nodes without a parent, in an order in which loaders meet the instances in that of the scene.
     pub roots: Vec<usize>,
-    /// For each node of the rig those that carry a mesh whose targets have its weights.
+    /// For each node of the rig, the written nodes whose meshes have morph targets with its weights.
     morphing: BTreeMap<usize, Vec<usize>>,
 }
 
@@ -77,7 +77,7 @@ pub(super) fn carries_camera(rig: &AnimationRig, camera: usize) -> Option<usize>
 }
 
 impl Tree {
-    /// The node that a mesh or camera goes to: `on` itself if it has the name and none yet, else a child of it.
+    /// The node for a mesh or camera: `on` itself if it has the same name and is free, else a new child of it.
     fn carrier(&mut self, on: usize, name: &str, what: &str) -> usize {
         let there = &self.nodes[on];
         if there.get(what).is_none() && there["name"] == name {
@@ -193,7 +193,7 @@ impl Writer {
     }
 }
 
-/// A channel that changes nothing and lasts as long as the animation.
+/// A channel without effect that lasts as long as the animation, so that the duration survives.
 fn hold(animation: &Animation, rig: &AnimationRig) -> Option<Channel> {
     let taken = |node| animation.channels.iter().any(|c| (c.node, c.property) == (node, Property::Translation));
     rig.parts().nodes.iter().enumerate().filter(|(i, _)| !taken(*i)).find_map(|(node, n)| match n.local {

@@ -170,7 +170,7 @@ fn dielectric_priority(material: &json::Material) -> Result<i32, String> {
     let extras = material.extras.as_ref().and_then(|e| serde_json::from_str::<Extras>(e.get()).ok());
     let Some(priority) = extras.and_then(|e| e.priority) else { return Ok(0) };
     let whole = priority.as_i64().and_then(|p| i32::try_from(p).ok());
-    whole.ok_or_else(|| format!("extras.dielectricPriority: {priority} is no whole number of 32 bits"))
+    whole.ok_or_else(|| format!("extras.dielectricPriority: {priority} is not a 32-bit integer"))
 }
 
 fn alpha_mode(material: &json::Material) -> AlphaMode {

@@ -12,8 +12,8 @@ use crate::scene::animation::LocalTransform;
 use crate::scene::camera::rigid;
 use crate::scene::{Camera, Light, LightKind, Projection};
 
-/// The numbers that place things, in double precision: the crate rounds them to single, in which far-away scenes fall apart
-/// and what we write does not come back as it was.
+/// Transforms and cameras in double precision: the crate rounds them to single precision, which is too coarse for far-away scenes
+/// and would not survive a round trip through our exporter.
 #[derive(Deserialize, Default)]
 #[serde(default)]
 pub(super) struct Doubles {
@@ -52,14 +52,14 @@ struct Orthographic {
     ymag: f64,
 }
 
-/// A node of a tree.
+/// A node of the hierarchy with its world transform.
 pub(super) struct PlacedNode {
     pub node: usize,
-    /// Index into the list of them.
+    /// Index into the list of placed nodes.
     pub parent: Option<usize>,
     pub local: LocalTransform,
     pub to_world: DAffine3,
-    /// In the scene that is shown.
+    /// Whether the node belongs to the scene that is loaded.
     pub shown: bool,
 }
 

@@ -1,4 +1,4 @@
-//! What moves in a file, put together: which meshes deform over time and get a rig, and which have one shape only and are posed here.
+//! Construction of the rig: meshes that deform over time become part of it, meshes with a constant pose are posed here.
 
 use std::collections::BTreeMap;
 
@@ -11,7 +11,7 @@ use super::{animation, skin, text};
 use crate::scene::animation::{Animation, Deformation, Node, Property, RigParts, Skin, VertexData, anchor};
 use crate::scene::{AnimationRig, Scene, TriangleMesh};
 
-/// A mesh as a node wants it. Nodes that want the same share it.
+/// A glTF mesh with the skin and morph weights of a node. Nodes with the same variant share the scene's meshes.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct MeshVariant {
     /// Number in the file.
@@ -22,7 +22,7 @@ pub(super) struct MeshVariant {
 }
 
 impl MeshVariant {
-    /// What comes before all other requests for a mesh.
+    /// The smallest variant of a mesh in their order.
     pub fn first(mesh: usize) -> Self {
         Self { mesh, skin: None, weights: Weights::None }
     }
@@ -44,7 +44,7 @@ pub(super) struct RigBuilder<'a> {
     reader: &'a Reader<'a>,
     doubles: &'a Doubles,
     placed: &'a [PlacedNode],
-    /// Place of each node of the file.
+    /// Index among the placed nodes of each node of the file.
     index: Vec<Option<usize>>,
     nodes: Vec<Node>,
     animations: Vec<Animation>,
@@ -53,9 +53,9 @@ pub(super) struct RigBuilder<'a> {
     morphs: Vec<bool>,
     skins: BTreeMap<usize, Skin>,
     deformations: Vec<Deformation>,
-    /// Of each instance of the scene the placed node, unless it has a skin.
+    /// The placed node of each instance of the scene; `None` for skinned meshes.
     pub instances: Vec<Option<usize>>,
-    /// Of each camera the placed node.
+    /// The placed node of each camera.
     pub cameras: Vec<Option<usize>>,
 }
 
@@ -75,7 +75,6 @@ impl<'a> RigBuilder<'a> {
             weights.iter_mut().filter(|w| !w.is_finite()).for_each(|w| *w = 0.0);
             Node { name: text(&node.name).to_owned(), parent: p.parent, local: p.local, weights }
         };
-        // without animations only the weights are asked for, and of few nodes
         let nodes: Vec<Node> = placed.iter().map(node).collect();
         let animations = animation::read(reader, &doubles.animations, &nodes, &index, warn);
         let (mut moves, mut morphs) = (vec![false; nodes.len()], vec![false; nodes.len()]);
@@ -102,12 +101,12 @@ impl<'a> RigBuilder<'a> {
         }
     }
 
-    /// Does some animation move this placed node?
+    /// Whether an animation moves this placed node.
     pub fn moves(&self, at: usize) -> bool {
         self.moves[at]
     }
 
-    /// How placed node `at` wants mesh `mesh`.
+    /// The variant of mesh `mesh` on placed node `at`.
     ///
     /// # Errors
     /// What is wrong with its skin, in words.
@@ -253,7 +252,7 @@ impl<'a> RigBuilder<'a> {
     }
 }
 
-/// Poses a mesh for good.
+/// Replaces a mesh's vertices by their posed ones.
 fn repose(deformation: &Deformation, weights: &[f64], joints: &[DAffine3], mesh: &mut TriangleMesh) {
     let base = VertexData::take(mesh);
     let mut shape = VertexData::default();

@@ -1,4 +1,4 @@
-//! What of a primitive deforms: joints and weights, morph targets; and the skeletons.
+//! Skins, and the joints, weights and morph targets of primitives.
 
 use ::gltf::json::Index;
 use ::gltf::json::accessor::Type;
@@ -90,7 +90,7 @@ pub(super) fn influences(
         sets.push(influence);
     }
     if attribute(Semantic::Joints(2)).is_some() {
-        warn("has more than eight joints a vertex: the first eight pull".to_owned());
+        warn("has more than eight joints per vertex: only the first eight are used".to_owned());
     }
     Ok(sets)
 }
@@ -112,7 +112,7 @@ pub(super) fn targets(
         if let Some(v) = deltas.iter().position(|d| !d.is_finite()) {
             return Err(format!("accessor {accessor}: morph target {t} is not finite at vertex {v}"));
         }
-        // files have such, and they cost time and memory
+        // exporters write all-zero deltas, which cost time and memory
         Ok(if deltas.iter().all(|d| *d == Vec3::ZERO) { Vec::new() } else { deltas })
     };
     let none = Vec::new();
