@@ -12,9 +12,10 @@ use syn::{Attribute, Item, ItemMod, ItemUse, Macro, UseTree};
 /// Rooms of src/ (folders, and files beside lib.rs) from the bottom up. A room uses rooms of lower layers only, none of its own layer.
 const LAYERS: &[&[&str]] = &[
     &["error"],
-    &["colour", "files", "ray"],
+    &["colour", "files"],
     &["settings"],
-    &["interface", "output", "sampling"],
+    &["interface"],
+    &["output", "ray", "sampling"],
     &["scene", "shaders"],
     &["accel", "gpu"],
     &["oracle", "tracer"],

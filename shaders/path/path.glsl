@@ -26,7 +26,9 @@ float power_heuristic(float a, float b) {
     return 1.0 / (1.0 + r * r);
 }
 
-vec3 clamp_radiance(PathParams p, vec3 c, uint depth) {
+// Radiance that counts, of what reaches the camera after so many bounces.
+vec3 counted_radiance(PathParams p, vec3 c, uint depth) {
+    if (WITH_MIN_DEPTH && depth < p.min_depth) return vec3(0.0);
     return WITH_CLAMP && depth > 0u ? min(c, vec3(p.clamp_to)) : c;
 }
 
@@ -111,7 +113,7 @@ void sample_direct_light(BlockParams block, PathParams p, uint k, PathState stat
     }
     c *= transmittance(side > 0.0 ? state.medium : beyond, l.distance);
     uint slot = append_ray(p.shadow, shadow, k);
-    store_quad(p.contributions, slot, vec4(clamp_radiance(p, c, state.depth + 1u), 0.0));
+    store_quad(p.contributions, slot, vec4(counted_radiance(p, c, state.depth + 1u), 0.0));
 }
 
 // Goes on behind a surface as if it were not there.
@@ -152,13 +154,13 @@ vec3 path_vertex(BlockParams block, uint k, PathState state, Ray ray, Hit hit) {
         // as with ambient occlusion, what shows nothing counts nothing
         if ((WITH_CONSTANT_ALBEDO || WITH_VIEW) && state.depth == 0u) return vec3(0.0);
         float light = 0.0;
-        if (WITH_LIGHT_SAMPLES && WITH_ENVIRONMENT && state.depth > 0u) {
-            float of_sky = LightRecords(p.lights).v[p.environment_light].probability;
-            light = of_sky * (WITH_ENVIRONMENT_MAP ? map_pdf(p.map, ray.direction) : Floats(p.environment_pdfs).v[k]);
+        if (WITH_LIGHT_SAMPLES && HAS_ENVIRONMENT_LIGHTS && state.depth > 0u) {
+            if (SKY_PDF_OF_SURFACE) light = Floats(p.sky_pdfs).v[k];
+            else light = LightRecords(p.lights).v[p.environment_light].probability * map_pdf(p.map, ray.direction);
         }
         vec3 c = environment_radiance(p, ray.direction) * emission_weight(p, state, light);
         if (WITH_DISTANT_DISKS) c += disks_met(p, state, ray.direction);
-        return clamp_radiance(p, state.throughput * c, state.depth);
+        return counted_radiance(p, state.throughput * c, state.depth);
     }
     Surface s = surface_at(ray, hit);
     vec3 towards_viewer = -ray.direction;
@@ -183,9 +185,9 @@ vec3 path_vertex(BlockParams block, uint k, PathState state, Ray ray, Hit hit) {
             float before = straight_length(p, k, state);
             Hit seen = hit;
             seen.t += before;
-            light = light_pdf(p, seen, ray.origin - before * ray.direction, ray.direction);
+            light = met_light_pdf(p, seen, ray.origin - before * ray.direction, ray.direction);
         }
-        added = clamp_radiance(p, state.throughput * m.emission * emission_weight(p, state, light), state.depth);
+        added = counted_radiance(p, state.throughput * m.emission * emission_weight(p, state, light), state.depth);
     }
     Boundary boundary;
     boundary.medium = state.medium;
@@ -246,7 +248,7 @@ vec3 path_vertex(BlockParams block, uint k, PathState state, Ray ray, Hit hit) {
         state.eta_scale *= b.eta * b.eta;
         state.depth++;
         if (WITH_CLEAR_WALLS) StoredFloats(p.straight).v[k] = 0.0;
-        if (WITH_LIGHT_SAMPLES && WITH_ENVIRONMENT && !WITH_ENVIRONMENT_MAP) StoredFloats(p.environment_pdfs).v[k] = constant_environment_pdf(m, b.wi);
+        if (WITH_LIGHT_SAMPLES && SKY_PDF_OF_SURFACE) StoredFloats(p.sky_pdfs).v[k] = sky_pdf(p, m, s.position, b.wi);
         if (state.depth >= p.rr_depth) {
             float survival = min(brightest * state.eta_scale, MAX_SURVIVAL);
             if (lobe.y >= survival) return added;

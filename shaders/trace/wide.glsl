@@ -34,12 +34,25 @@ Ray take_ray(uint k) {
     return Ray(vec3(x, y.x), y.y, vec3(z, w.x), w.y);
 }
 
+#ifdef COUNT_VISITS
+// For a compute pass that includes the kernel to count the nodes that rays visit: it defines the ray of an index, and stores their number. A lane has one ray.
+Ray counted_ray(uint k);
+void store_visits(uint k, uint nodes);
+#define NEXT_RAY                                                                                        \
+    index = gl_GlobalInvocationID.x;                                                                    \
+    if (index >= push.count) return;                                                                    \
+    world = counted_ray(push.first + index);                                                            \
+    if (!is_ray(world)) world = no_ray();
+#define VISIT visits++;
+#else
+#define VISIT
 // Fetches the lane's next ray. An invalid ray hits nothing: its interval is empty.
 #define NEXT_RAY                                                                                        \
     index = begin + atomicAdd(LaunchFlags(root.launch_counters).v[part], 1u);                           \
     if (index >= end) return;                                                                           \
     world = take_ray(index);                                                                            \
     if (!is_ray(world)) world = no_ray();
+#endif
 
 // Stores the last hit: primitive `id` at `t`, with the barycentric weights of its second and third vertex in the mesh's order.
 #ifdef STREAM_ANY
@@ -81,6 +94,9 @@ void main() {
     vec2 best_uv = vec2(0.0);
 
     uint turns = 0u;
+#ifdef COUNT_VISITS
+    uint visits = 0u;
+#endif
     while (true) {
         turns++;
         Block8 b = Block8(block_address(blocks, block));
@@ -92,6 +108,7 @@ void main() {
         // the child that the ray enters first, where the order is by distance and not by octant
         uint nearest = INVALID;
         if ((BLOCK_FLAGS & LEAF) == 0u) {
+            VISIT
             vec3 scale = uintBitsToFloat(uvec3(WIDE_NODE_LOWER_X.y >> 24, WIDE_NODE_LOWER_Y.y >> 24, WIDE_NODE_LOWER_Z.y >> 24) << 23) * inverse;
             vec3 corner = (uintBitsToFloat(WIDE_NODE_CORNER(uvec3)) - origin) * inverse;
             uvec2 near_x = negative.x ? WIDE_NODE_UPPER_X : WIDE_NODE_LOWER_X, far_x = negative.x ? WIDE_NODE_LOWER_X : WIDE_NODE_UPPER_X;
@@ -178,6 +195,10 @@ void main() {
                 at_top = ~0u;
             }
             if (depth == 0u) {
+#ifdef COUNT_VISITS
+                store_visits(push.first + index, visits);
+                return;
+#endif
 #ifdef STREAM_ANY
                 store_any(root, index, best_primitive != INVALID);
 #else

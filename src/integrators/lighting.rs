@@ -30,7 +30,8 @@ settings! {
         environment_scale: Option<f64>,
             option(value_name = "X", value_parser = parse_factor, requires = "environment", allow_hyphen_values = true), applies(LIT);
         /// Add a light: point, spot, sun, sphere, rectangle or disk, then key=value: position, direction (in which it emits), radius, size=W,H,
-        /// intensity (cd), irradiance (lux) or radiance, color=R,G,B or temperature=K, and outer, inner, angle in degrees. May be repeated
+        /// intensity (cd), irradiance (lux) or radiance, color=R,G,B or temperature=K, and outer, inner, angle in degrees; or a portal: position, direction,
+        /// size of an opening through which the environment is sampled, which lessens the noise of rooms. May be repeated
         light: Vec<LightSpec>, option(value_name = "SPEC", value_parser = light_spec::parse), applies(LIT);
     }
 }

@@ -279,7 +279,7 @@ mod tests {
         let every = serde_json::json!({
             "ao": { "ao_radius": 1.0, "ao_falloff": 2.0, "ao_normal": "shading" },
             "path": {
-                "max_depth": 1, "rr_depth": 1, "firefly_clamp": 1.0, "sampling": "bsdf", "energy_compensation": true, "sky_albedo": 0.1,
+                "max_depth": 1, "min_depth": 1, "rr_depth": 1, "firefly_clamp": 1.0, "sampling": "bsdf", "energy_compensation": true, "sky_albedo": 0.1,
                 "denoise": "filter", "pixel_filter": "tent", "texture_filter": "ray-cone", "f_number": 1.0, "focus_distance": 1.0
             }
         });

@@ -62,26 +62,6 @@ macro_rules! enumerations {
 }
 
 enumerations! {
-    /// What a light is.
-    LightKind: "light_kind" {
-        /// At a position, the same in all directions.
-        Point = "LIGHT_POINT",
-        /// At a position, in a cone.
-        Spot = "LIGHT_SPOT",
-        /// Parallel, or with an angular diameter: a distant disk.
-        Directional = "LIGHT_DIRECTIONAL",
-        /// A triangle that emits.
-        Triangle = "LIGHT_TRIANGLE",
-        /// A sphere that emits.
-        Sphere = "LIGHT_SPHERE",
-        /// All around.
-        Environment = "LIGHT_ENVIRONMENT",
-        /// All lights that have a position: the tree chooses one of them.
-        Tree = "LIGHT_TREE",
-        /// Two triangles that make a rectangle.
-        Rectangle = "LIGHT_RECTANGLE",
-    }
-
     /// How light goes through a material.
     Walls: "walls" {
         /// It does not.
@@ -231,5 +211,7 @@ choices! {
         Position = "position", "SHOWN_POSITION";
         /// Bent normal, -1 to 1 mapped to 0 to 1
         Bent = "bent", "SHOWN_BENT";
+        /// BVH nodes that camera rays visit, as a heat map; needs `--tracer compute`
+        Nodes = "nodes", "SHOWN_NODES";
     }
 }

@@ -98,6 +98,7 @@ const BSDF_FIRST: u32 = constants::ALL.len() as u32;
 const MATERIAL_FIRST: u32 = BSDF_FIRST + BsdfModels::WORDS as u32;
 const TEXTURE_FIRST: u32 = MATERIAL_FIRST + MaterialFeatures::WORDS as u32;
 const PATH_FIRST: u32 = TEXTURE_FIRST + TextureFeatures::WORDS as u32;
+const LIGHT_FIRST: u32 = PATH_FIRST + PathFeatures::WORDS as u32;
 
 feature_set! {
     /// The reflection models of a scene's materials.
@@ -152,16 +153,9 @@ feature_set! {
 
 feature_set! {
     /// What the lights of a scene and the options of a render require of paths.
-    PathFeatures of /// What lights and options may require of paths. The first are the kinds of lights that are sampled, numbered as [`super::LightKind`].
+    PathFeatures of /// What lights and options may require of paths.
     PathFeature: "path_features", from PATH_FIRST, full false, indexed false, PATH;
-    PointLights = "WITH_POINT_LIGHTS", "point lights";
-    SpotLights = "WITH_SPOT_LIGHTS", "spot lights";
-    DirectionalLights = "WITH_DIRECTIONAL_LIGHTS", "directional lights";
-    TriangleLights = "WITH_TRIANGLE_LIGHTS", "emissive triangles";
-    SphereLights = "WITH_SPHERE_LIGHTS", "emissive spheres";
-    Environment = "WITH_ENVIRONMENT", "environment light";
     LightTree = "WITH_LIGHT_TREE", "light tree";
-    RectangleLights = "WITH_RECTANGLE_LIGHTS", "emissive rectangles";
     LightChoice = "WITH_LIGHT_CHOICE", "a choice among lights";
     EnvironmentMap = "WITH_ENVIRONMENT_MAP", "environment map";
     LightSamples = "WITH_LIGHT_SAMPLES", "light samples";
@@ -171,6 +165,7 @@ feature_set! {
     ConstantAlbedo = "WITH_CONSTANT_ALBEDO", "constant albedo";
     View = "WITH_VIEW", "auxiliary view";
     Clamp = "WITH_CLAMP", "radiance clamp";
+    MinDepth = "WITH_MIN_DEPTH", "least number of bounces";
     Lens = "WITH_LENS", "thin lens";
     PixelFilter = "WITH_PIXEL_FILTER", "pixel filter";
     RayCones = "WITH_RAY_CONES", "ray cones";
@@ -178,6 +173,21 @@ feature_set! {
     Media = "WITH_MEDIA", "volumes that absorb or nest";
     ClearWalls = "WITH_CLEAR_WALLS", "thin walls that light passes straight";
     SpecularOnly = "WITH_SPECULAR_ONLY", "paths of delta lobes alone";
+}
+
+feature_set! {
+    /// The kinds of lights that paths sample.
+    LightKinds of /// A kind of light: `HAS_NAME_LIGHTS` stands for `shaders/lights/name.glsl`, which defines `name_sample` and `name_pdf` (shaders/lights/light.glsl says
+    /// what they do). What calls them is made of this list ([`super::glsl`]). [`LightRecord::kind`](super::records::lights::LightRecord::kind) is its number.
+    LightKind: "light_kinds", from LIGHT_FIRST, full false, indexed false, LIGHTS;
+    Rectangle = "HAS_RECTANGLE_LIGHTS", "emissive rectangles";
+    Triangle = "HAS_TRIANGLE_LIGHTS", "emissive triangles";
+    Sphere = "HAS_SPHERE_LIGHTS", "emissive spheres";
+    Environment = "HAS_ENVIRONMENT_LIGHTS", "environment light";
+    Portal = "HAS_PORTAL_LIGHTS", "portals";
+    Directional = "HAS_DIRECTIONAL_LIGHTS", "directional lights";
+    Point = "HAS_POINT_LIGHTS", "point lights";
+    Spot = "HAS_SPOT_LIGHTS", "spot lights";
 }
 
 /// What of the path tracer's shaders a scene requires.
@@ -192,7 +202,7 @@ pub struct ShadingFeatures {
 }
 
 /// All sets.
-pub(super) const SETS: [&Declaration; 4] = [&BSDF, &MATERIAL, &TEXTURE, &PATH];
+pub(super) const SETS: [&Declaration; 5] = [&BSDF, &MATERIAL, &TEXTURE, &PATH, &LIGHTS];
 
 impl BsdfModel {
     /// As records hold it: 0 is no model, which absorbs everything.
@@ -203,21 +213,20 @@ impl BsdfModel {
 
 #[cfg(test)]
 mod tests {
-    use super::super::LightKind;
     use super::*;
 
     #[test]
     fn sets_hold_what_was_put_in() {
-        let set: PathFeatures = [PathFeature::PointLights, PathFeature::ClearWalls].into_iter().collect();
+        let set: PathFeatures = [PathFeature::LightTree, PathFeature::ClearWalls].into_iter().collect();
         for &feature in PathFeature::ALL {
             assert_eq!(
                 set.contains(feature),
-                matches!(feature, PathFeature::PointLights | PathFeature::ClearWalls),
+                matches!(feature, PathFeature::LightTree | PathFeature::ClearWalls),
                 "{feature:?}"
             );
         }
-        assert_eq!(set.labels()[0], ["point lights", "thin walls that light passes straight"]);
-        assert_eq!(set.constants().map(|c| c.1).collect::<Vec<_>>(), [1 | 1 << 22]);
+        assert_eq!(set.labels()[0], ["light tree", "thin walls that light passes straight"]);
+        assert_eq!(set.constants().map(|c| c.1).collect::<Vec<_>>(), [1 | 1 << PathFeature::ClearWalls as u32]);
     }
 
     /// No two constants have one number: those by name, then the words of each set.
@@ -228,26 +237,7 @@ mod tests {
         ids.extend(MaterialFeatures::default().constants().map(|c| c.0.id));
         ids.extend(TextureFeatures::default().constants().map(|c| c.0.id));
         ids.extend(PathFeatures::default().constants().map(|c| c.0.id));
+        ids.extend(LightKinds::default().constants().map(|c| c.0.id));
         assert!(ids.iter().copied().eq(0..ids.len() as u32), "{ids:?}");
-    }
-
-    #[test]
-    fn kinds_of_lights_are_the_first_features_of_paths() {
-        let kinds = [
-            (LightKind::Point, PathFeature::PointLights),
-            (LightKind::Spot, PathFeature::SpotLights),
-            (LightKind::Directional, PathFeature::DirectionalLights),
-            (LightKind::Triangle, PathFeature::TriangleLights),
-            (LightKind::Sphere, PathFeature::SphereLights),
-            (LightKind::Environment, PathFeature::Environment),
-            (LightKind::Tree, PathFeature::LightTree),
-            (LightKind::Rectangle, PathFeature::RectangleLights),
-        ];
-        assert_eq!(kinds.len(), LightKind::ALL.len());
-        assert!(
-            kinds
-                .iter()
-                .all(|&(kind, feature)| kind as usize == feature as usize && PathFeature::ALL[kind as usize] == feature)
-        );
     }
 }

@@ -10,6 +10,7 @@ pub fn files() -> Vec<(String, String)> {
     let mut files = vec![file("constants", &constants())];
     files.extend(features::SETS.iter().map(|set| file(set.name, &feature_set(set))));
     files.push(file("bsdf_dispatch", &bsdf_dispatch()));
+    files.push(file("light_dispatch", &light_dispatch()));
     files.extend(enumerations::ALL.iter().chain(enumerations::CHOICES).map(|e| file(e.name, &enumeration(e))));
     files.extend(records::FILES.iter().map(|f| {
         let includes: String = f.includes.iter().map(|name| format!("#include \"interface/{name}.glsl\"\n")).collect();
@@ -67,6 +68,12 @@ fn feature_set(set: &features::Declaration) -> String {
             let _ = writeln!(text, "const uint BSDF_{} = {number}u;  // {about}", name.trim_start_matches("HAS_"));
         }
     }
+    if set.name == features::LIGHTS.name {
+        for (number, (name, about)) in set.features.iter().enumerate() {
+            let name = name.trim_start_matches("HAS_").trim_end_matches("_LIGHTS");
+            let _ = writeln!(text, "const uint LIGHT_{name} = {number}u;  // {about}");
+        }
+    }
     let (words, all) = (set.name.to_uppercase(), if set.is_full { "0xffffffffu" } else { "0u" });
     for word in 0..set.features.len().div_ceil(32) {
         let _ = writeln!(text, "layout(constant_id = {}) const uint {words}_{word} = {all};", set.first_id as usize + word);
@@ -103,6 +110,34 @@ fn bsdf_dispatch() -> String {
         "BsdfSample bsdf_sample(Bsdf b, vec3 wo, vec2 u, float v)",
         "return NAME_sample(b, wo, u, v);",
         "return NO_SAMPLE;",
+    );
+    text
+}
+
+/// The functions that choose among kinds of lights. Kinds that no light has are not compiled, and where all lights are of one kind, nothing is compared.
+fn light_dispatch() -> String {
+    let names: Vec<_> = features::LIGHTS
+        .features
+        .iter()
+        .map(|(name, _)| name.trim_start_matches("HAS_").trim_end_matches("_LIGHTS").to_owned())
+        .collect();
+    let mut text: String = names.iter().map(|name| format!("#include \"lights/{}.glsl\"\n", name.to_lowercase())).collect();
+    let mut function = |head: &str, call: &str, otherwise: &str| {
+        let _ = writeln!(text, "{head} {{");
+        for name in &names {
+            let _ = writeln!(text, "    if (is_kind(light, LIGHT_{name})) return {}{call};", name.to_lowercase());
+        }
+        let _ = writeln!(text, "    return {otherwise};\n}}");
+    };
+    function(
+        "LightSample light_sample(PathParams p, LightRecord light, vec3 from, Shading m, vec2 u)",
+        "_sample(p, light, from, m, u)",
+        "NO_LIGHT_SAMPLE",
+    );
+    function(
+        "float light_pdf(LightRecord light, vec3 from, vec3 wi, float distance)",
+        "_pdf(light, from, wi, distance)",
+        "0.0",
     );
     text
 }

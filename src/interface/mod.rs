@@ -13,10 +13,8 @@ pub mod glsl;
 pub mod layout;
 pub mod records;
 
-pub use enumerations::{
-    BudgetStage, LightKind, PixelFilter, Resolution, Sequence, Shown, TexelFormat, Texels, View, Walls, Wrap,
-};
+pub use enumerations::{BudgetStage, PixelFilter, Resolution, Sequence, Shown, TexelFormat, Texels, View, Walls, Wrap};
 pub use features::{
-    BsdfModel, BsdfModels, MaterialFeature, MaterialFeatures, PathFeature, PathFeatures, ShadingFeatures, TextureFeature,
-    TextureFeatures,
+    BsdfModel, BsdfModels, LightKind, LightKinds, MaterialFeature, MaterialFeatures, PathFeature, PathFeatures,
+    ShadingFeatures, TextureFeature, TextureFeatures,
 };

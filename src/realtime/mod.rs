@@ -24,10 +24,12 @@ use crate::raster::Primary;
 use crate::shaders::StreamShaders;
 use crate::tracer::gpu_scene::rows;
 use crate::tracer::{MovedBounds, Tracer};
-use display::Display;
+use display::{Display, Shown};
 use graph::{Frame, Graph, Params};
 use params::{FrameParams, moved_records};
 pub use passes::display;
+use passes::nodes;
+pub use passes::nodes::NodeVisits;
 use resources::{Extent, Resource, SURFACE_BYTES};
 pub use settings::{Budget, Filter, FilterKind, Preset, Resolution, Settings, Technique};
 
@@ -46,6 +48,8 @@ pub struct FrameStats {
     pub occlusion_rays: u64,
     /// Occlusion rays that this many pixels would have taken, and that were left out: nothing is there, or all is known.
     pub skipped_rays: u64,
+    /// BVH nodes that the frame's camera rays visit; `None` unless they are shown ([`Shown::Nodes`]).
+    pub nodes: Option<NodeVisits>,
 }
 
 /// A pixel's surface.
@@ -72,8 +76,8 @@ pub struct Realtime {
     params: Params<FrameParams>,
     /// What frames show; `None`: nothing.
     display: Option<Display>,
-    /// Are the passes that show something there?
-    has_display: bool,
+    /// Whether there is the pass `display`, and the pass `nodes`.
+    has_display: [bool; 2],
     primary_reason: String,
     state: State,
 }
@@ -125,7 +129,7 @@ impl Realtime {
             graph: Graph::new(device, extent, passes::stages(tracer, block, settings, primary, lights)?)?,
             params: Params::new(device, "frame parameters")?,
             display: None,
-            has_display: false,
+            has_display: [false; 2],
             primary_reason,
             state: State::default(),
         })
@@ -200,6 +204,10 @@ impl Realtime {
             primary_rays: if still || self.settings.primary == Some(Primary::Raster) { 0 } else { pixels },
             occlusion_rays,
             skipped_rays: all.saturating_sub(occlusion_rays),
+            nodes: match self.display.is_some_and(|d| d.shown == Shown::Nodes) {
+                true => Some(NodeVisits::read(self.graph.resources(), pixels)?),
+                false => None,
+            },
         })
     }
 
@@ -211,9 +219,14 @@ impl Realtime {
     pub fn display(&mut self, tracer: &Tracer, display: Option<Display>) -> Result<()> {
         if let Some(display) = &display {
             display.shown.check(&self.settings)?;
-            if !self.has_display {
-                self.graph.extend(tracer.device(), vec![display::stage(tracer, self.pixels() as u32)?])?;
-                self.has_display = true;
+            let is_nodes = display.shown == Shown::Nodes;
+            if !self.has_display[usize::from(is_nodes)] {
+                let stage = match is_nodes {
+                    true => nodes::stage(tracer, self.block())?,
+                    false => display::stage(tracer, self.pixels() as u32)?,
+                };
+                self.graph.extend(tracer.device(), vec![stage])?;
+                self.has_display[usize::from(is_nodes)] = true;
             }
         }
         if self.display != display {

@@ -56,6 +56,8 @@ pub enum Resource {
     BentResult,
     /// The frame as it is shown.
     Words,
+    /// BVH nodes that camera rays visit.
+    Nodes,
     /// Budget: deviation of one sample and number of samples, pixels in tiles.
     DesiredSamples,
     /// Budget: `SUMS_*`.
@@ -134,6 +136,7 @@ impl Resource {
             Self::Result => readback("ambient visibility", 4 * pixels),
             Self::BentResult => device("bent normals", VECTOR_BYTES * pixels, Kept),
             Self::Words => device("display", 4 * pixels, Kept),
+            Self::Nodes => readback("visited nodes", 4 * pixels),
             Self::DesiredSamples => device("desired samples", 8 * tiled_pixels, Frame),
             Self::Sums => device("sums of desired samples", 4 * u64::from(SUMS_COUNT), Frame),
             Self::Plan => device("plan of rays", 8 * pixels, Frame),

@@ -427,6 +427,12 @@ impl FramesReport {
             traced + skipped,
             100.0 * skipped as f64 / (traced + skipped).max(1) as f64
         ));
+        if let Some(nodes) = self.frames.last().and_then(|f| f.stats.nodes) {
+            lines.push(format!(
+                "BVH nodes visited per camera ray of the last frame: mean {:.2}, maximum {}",
+                nodes.mean, nodes.max
+            ));
+        }
         lines
     }
 
@@ -446,6 +452,7 @@ impl FramesReport {
                 "primary_rays": f.stats.primary_rays,
                 "occlusion_rays": f.stats.occlusion_rays,
                 "skipped_rays": f.stats.skipped_rays,
+                "nodes": f.stats.nodes,
             })
         };
         let passes = self.passes().into_iter();

@@ -40,6 +40,23 @@ pub struct Light {
     pub range: f64,
 }
 
+/// A rectangle through which the environment lights a room: a window, a door, a skylight. It shows where to look for light, and neither emits nor hides any: images differ
+/// by their noise alone. Light that comes in elsewhere is still found.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Portal {
+    /// World position of a corner.
+    pub corner: DVec3,
+    /// The two edges from there, at right angles; world units.
+    pub edges: [DVec3; 2],
+}
+
+impl Portal {
+    /// World units, squared.
+    pub fn area(&self) -> f64 {
+        self.edges[0].cross(self.edges[1]).length()
+    }
+}
+
 /// What a ray that leaves the scene sees.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub enum Environment {

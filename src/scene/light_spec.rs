@@ -5,7 +5,7 @@ use glam::{DAffine3, DVec3, Vec3};
 use crate::scene::blackbody::blackbody;
 use crate::scene::builtin::shapes;
 use crate::scene::material::MaterialKind;
-use crate::scene::{Geometry, Instance, Light, LightKind, Material, Mesh, Scene};
+use crate::scene::{Geometry, Instance, Light, LightKind, Material, Mesh, Portal, Scene};
 use crate::settings::parse::{parse_number, parse_vector};
 
 /// A light as it is asked for: `KIND key=value ...`. Files hold the text.
@@ -25,6 +25,7 @@ enum Shape {
     Sphere { position: DVec3, radius: f64 },
     Rectangle { position: DVec3, direction: DVec3, size: [f64; 2] },
     Disk { position: DVec3, direction: DVec3, radius: f64 },
+    Portal { position: DVec3, direction: DVec3, size: [f64; 2] },
 }
 
 /// Triangles of a disk. Its corners are where its area is the disk's, so its power is exact.
@@ -45,6 +46,14 @@ impl<'a> Keys<'a> {
     fn needed<T>(&mut self, key: &str, parse: impl Fn(&str) -> Result<T, String>) -> Result<T, String> {
         let text = self.take(key).ok_or_else(|| format!("{} needs {key}=...", self.kind))?;
         parse(text).map_err(|e| format!("{key}={text}: {e}"))
+    }
+
+    /// `spec`, if nothing is left that it does not know.
+    fn end(&self, spec: LightSpec) -> Result<LightSpec, String> {
+        match self.given.first() {
+            Some((key, _)) => Err(format!("{} has no {key}", self.kind)),
+            None => Ok(spec),
+        }
     }
 
     fn or<T>(&mut self, key: &str, default: T, parse: impl Fn(&str) -> Result<T, String>) -> Result<T, String> {
@@ -86,7 +95,7 @@ fn colour(text: &str) -> Result<Vec3, String> {
 /// What is wrong with it, in a line.
 pub fn parse(text: &str) -> Result<LightSpec, String> {
     let mut words = text.split_whitespace();
-    let kind = words.next().ok_or("empty: point, spot, sun, sphere, rectangle or disk, then key=value")?;
+    let kind = words.next().ok_or("empty: point, spot, sun, sphere, rectangle, disk or portal, then key=value")?;
     let given = words.map(|w| w.split_once('=').ok_or_else(|| format!("'{w}' is no key=value"))).collect::<Result<_, _>>()?;
     let mut keys = Keys { kind, given };
     let (shape, unit) = match kind {
@@ -113,7 +122,13 @@ pub fn parse(text: &str) -> Result<LightSpec, String> {
             let (position, direction) = (keys.needed("position", parse_vector)?, keys.needed("direction", direction)?);
             (Shape::Disk { position, direction, radius: keys.needed("radius", positive)? }, "radiance")
         }
-        other => return Err(format!("'{other}' is no light: point, spot, sun, sphere, rectangle or disk")),
+        "portal" => {
+            let (position, direction) = (keys.needed("position", parse_vector)?, keys.needed("direction", direction)?);
+            let shape = Shape::Portal { position, direction, size: keys.needed("size", size)? };
+            // it has no strength: what it lets in is the environment's
+            return keys.end(LightSpec { text: text.to_owned(), shape, power: Vec3::ZERO });
+        }
+        other => return Err(format!("'{other}' is no light: point, spot, sun, sphere, rectangle, disk or portal")),
     };
     let strength = keys.needed(unit, positive)?;
     let tint = match (keys.take("color"), keys.take("temperature")) {
@@ -128,10 +143,7 @@ pub fn parse(text: &str) -> Result<LightSpec, String> {
         }
         (None, None) => Vec3::ONE,
     };
-    match keys.given.first() {
-        Some((key, _)) => Err(format!("{kind} has no {key}")),
-        None => Ok(LightSpec { text: text.to_owned(), shape, power: tint * strength as f32 }),
-    }
+    keys.end(LightSpec { text: text.to_owned(), shape, power: tint * strength as f32 })
 }
 
 impl PartialEq for LightSpec {
@@ -179,6 +191,11 @@ impl LightSpec {
                 (shapes::rectangle(DVec3::ZERO, u * size[0], v * size[1]), position)
             }
             Shape::Disk { position, direction, radius } => (disk(direction, radius), position),
+            Shape::Portal { position, direction, size } => {
+                let (u, v) = across(direction);
+                let edges = [u * size[0], v * size[1]];
+                return scene.portals.push(Portal { corner: position - 0.5 * (edges[0] + edges[1]), edges });
+            }
         };
         let (material, mesh) = (scene.materials.len(), scene.meshes.len());
         scene.materials.push(Material {
@@ -232,10 +249,20 @@ mod tests {
             ("disk position=0,0,0 direction=0,1,0 radius=1 radiance=1 temperature=20", "1000 to 40000"),
             ("sphere position=0,0,0 radius=1 radiance=1 color=1,1,1 temperature=3000", "not both"),
             ("rectangle position=0,0,0 direction=0,1,0 size=1 radiance=1", "WIDTH,HEIGHT"),
+            ("portal position=0,0,0 direction=0,1,0 size=1,1 radiance=1", "portal has no radiance"),
         ] {
             let error = parse(text).unwrap_err();
             assert!(error.contains(says), "{text}: {error}");
         }
+    }
+
+    #[test]
+    fn portals_lie_about_their_position() {
+        let mut scene = Scene::default();
+        parse("portal position=1,2,3 direction=0,-1,0 size=2,3").unwrap().add(&mut scene);
+        let portal = &scene.portals[0];
+        assert!((portal.corner + 0.5 * (portal.edges[0] + portal.edges[1]) - DVec3::new(1.0, 2.0, 3.0)).length() < 1e-12);
+        assert!((portal.area() - 6.0).abs() < 1e-12 && scene.instances.is_empty() && scene.lights.is_empty());
     }
 
     #[test]

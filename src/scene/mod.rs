@@ -22,7 +22,7 @@ pub mod texture;
 pub use animation::AnimationRig;
 pub use camera::{Camera, Projection};
 pub use camera_path::CameraPath;
-pub use light::{Environment, EnvironmentMap, Light, LightKind};
+pub use light::{Environment, EnvironmentMap, Light, LightKind, Portal};
 pub use material::{AlphaMode, Material, TextureSlot};
 pub use mesh::{Geometry, Mesh, Sphere, TriangleMesh};
 pub use motion::Motion;
@@ -85,6 +85,8 @@ pub struct Scene {
     pub textures: Vec<Texture>,
     /// Punctual and spherical lights.
     pub lights: Vec<Light>,
+    /// Openings through which the environment is sampled; none: by itself.
+    pub portals: Vec<Portal>,
     /// Cameras of the file; may be empty.
     pub cameras: Vec<Camera>,
     /// Environment light.

@@ -35,6 +35,7 @@ registry! {
         LARSEN_BLUR = "larsen_blur";
         LARSEN_SUM = "larsen_sum";
         LARSEN_TEMPORAL = "larsen_temporal";
+        NODES = "nodes";
         PATH_RESOLVE = "path_resolve";
         RESOLVE = "resolve";
         TEMPORAL = "temporal";

@@ -41,7 +41,7 @@ use crate::accel::features::SceneFeatures;
 use crate::accel::flatten::FlatScene;
 use crate::error::{Error, Result};
 use crate::gpu::{ComputePipeline, Device, Specialization};
-use crate::shaders::{Mode, StreamShaders};
+use crate::shaders::{ComputeShader, Mode, StreamShaders};
 use gpu_scene::GpuScene;
 use precompiled::{PipelineSpec, PrecompiledPipelines};
 
@@ -299,6 +299,24 @@ impl Tracer {
             }
             Structure::Hardware { .. } if self.kind == TracerKind::Query => Stream::query(&self.device, shaders, &scene()),
             Structure::Hardware { .. } => Stream::pipeline(&self.device, shaders, self.features, &scene()),
+        }
+    }
+
+    /// Compiles a compute pass that traverses the compute tracer's BVH with the code of the `wide` kernel and counts visited nodes
+    /// (`COUNT_VISITS` in shaders/trace/wide.glsl). `user` is the option that needs it, for error messages.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for tracers and traversals that cannot count, and those of the device.
+    pub fn counting_kernel(&self, shader: &ComputeShader, user: &str) -> Result<ComputePipeline> {
+        let options = self.compute_options().ok_or_else(|| {
+            Error::Usage(format!("{user} needs the compute tracer, and '{}' cannot count: add --tracer compute", self.kind))
+        })?;
+        match &self.structure {
+            Structure::Compute(h) if matches!(h.kernel, Kernel::Auto | Kernel::Wide | Kernel::Packet) => {
+                let s = precompiled::specialization(&self.device.info, self.features, options, h.stack_constant());
+                shader.specialized(&self.device, &s)
+            }
+            _ => Err(Error::Usage(format!("{user} needs a BVH of wide nodes: add --traversal {}", Kernel::Wide))),
         }
     }
 

@@ -19,6 +19,7 @@ mod furnace;
 mod materials;
 mod media;
 mod oren_nayar;
+mod portals;
 mod shading_normals;
 mod texture_filter;
 mod transport;

@@ -24,7 +24,34 @@ fn gpu_a_room_of_light() {
             let options = PathOptions { max_depth, rr_depth: 100, ..options.clone() };
             holds(&device, &format!("room, {max_depth} bounces"), &room, &options, part, 2e-2);
         }
+        // and without its first n bounces the rest of the series
+        for min_depth in [1u32, 2] {
+            let rest = f64::from(albedo).powi(min_depth as i32) * expected;
+            let options = PathOptions { min_depth, rr_depth: 100, spp: 64, ..options.clone() };
+            holds(&device, &format!("room, without {min_depth} bounces"), &room, &options, rest, 2e-2);
+        }
     }
+}
+
+/// Direct and indirect light are the whole, pixel by pixel: the same paths are counted in parts.
+#[test]
+fn gpu_parts_of_light_add_up() {
+    let device = device();
+    let scene = by_name("cornell-glass-sphere").unwrap();
+    let flat = FlatScene::for_paths(&scene);
+    let whole = PathOptions { size: [16, 16], spp: 16, seed: 1, ..Default::default() };
+    for kind in tracers(&device) {
+        let tracer = tracer(&device, kind, &flat);
+        let [direct, indirect, all] =
+            [PathOptions { max_depth: 1, ..whole.clone() }, PathOptions { min_depth: 2, ..whole.clone() }, whole.clone()]
+                .map(|options| render(&tracer, &flat, &options).image.film.mean);
+        assert!(indirect.iter().any(|&c| c > 0.01) && indirect != all, "{kind}");
+        for (k, &all) in all.iter().enumerate() {
+            let sum = direct[k] + indirect[k];
+            assert!((sum - all).abs() <= 2e-6 * (1.0 + all), "{kind}: {} + {} is not {all}", direct[k], indirect[k]);
+        }
+    }
+    assert_validation_clean(&device);
 }
 
 /// A sphere's light in a room with roulette from the start, and never.

@@ -1,14 +1,17 @@
 //! What is shown of frames, against what the host makes of the same numbers.
 
-use glam::DVec3;
+use glam::{DVec3, Vec2, Vec3, Vec4};
 use skylit::Error;
+use skylit::accel::flatten::FlatScene;
 use skylit::colour::srgb_byte;
 use skylit::film::camera::CameraRecord;
+use skylit::ray::Ray;
 use skylit::realtime::display::{Display, Shown};
 use skylit::realtime::{FrameStats, Preset, Realtime, Settings};
 use skylit::scene::Camera;
 use skylit::scene::builtin::{SceneTransform, analytic, by_name};
-use skylit::tracer::Tracer;
+use skylit::tracer::visits::VisitCounter;
+use skylit::tracer::{Tracer, TracerKind};
 
 use crate::common::{assert_validation_clean, device, record, tracer, tracers};
 
@@ -123,6 +126,65 @@ fn gpu_displayed_distances() {
         let position = [(x + 0.5 - 0.5 * f64::from(SIZE[0])) * side, 0.0, (y + 0.5 - 0.5 * f64::from(SIZE[1])) * side];
         let expected = position.map(|p| srgb_byte((1.0 - p.abs() / 2.0) as f32));
         assert!((0..3).all(|k| word[k].abs_diff(expected[k]) <= 1), "pixel {at}: {word:?}, not {expected:?}");
+    }
+    assert_validation_clean(&device);
+}
+
+/// Camera rays through the centres of pixels.
+fn centre_rays(camera: &CameraRecord) -> Vec<Ray> {
+    let rows = camera.camera_to_world.map(Vec4::from_array);
+    let pixels = (0..SIZE[1]).flat_map(|y| (0..SIZE[0]).map(move |x| [x, y]));
+    let rays = pixels.map(|[x, y]| {
+        let ndc = (2.0 * Vec2::new(x as f32, y as f32) + 1.0) / Vec2::new(SIZE[0] as f32, SIZE[1] as f32) - 1.0;
+        let d = Vec3::new(ndc.x * camera.view[0], -ndc.y * camera.view[1], -1.0);
+        let direction = Vec3::from_array(rows.map(|r| r.truncate().dot(d))).normalize();
+        Ray { origin: rows.map(|r| r.w), tmin: 0.0, direction: direction.to_array(), tmax: f32::INFINITY }
+    });
+    rays.collect()
+}
+
+/// A plane is found in few nodes, a dense terrain in more. The heat map changes nothing else of a frame, is compiled and timed on request only, and
+/// needs the compute tracer.
+#[test]
+fn gpu_visited_nodes_are_counted_on_request() {
+    let device = device();
+    let means = ["plane", "terrain:20000"].map(|name| {
+        let scene = by_name(name).unwrap();
+        let camera = record(&scene, &scene.cameras[0], SIZE);
+        let tracer = tracer(&device, TracerKind::Compute, &scene);
+        let mut realtime = Realtime::new(&tracer, SIZE, &Preset::Fast.settings(), &[]).unwrap();
+        let mut plain = Realtime::new(&tracer, SIZE, &Preset::Fast.settings(), &[]).unwrap();
+        realtime.display(&tracer, Some(display(Shown::Nodes, 0.0))).unwrap();
+        let mut nodes = None;
+        // camera at rest: the second frame keeps the counts of the first
+        for frame in 0..2 {
+            let (counted, others) =
+                (realtime.frame(&tracer, &camera, &[]).unwrap(), plain.frame(&tracer, &camera, &[]).unwrap());
+            let recorded = |stats: &FrameStats| stats.timings.iter().filter(|t| t.label == "nodes").count();
+            assert_eq!((recorded(&counted), recorded(&others), others.nodes), (1 - frame, 0, None), "{name}");
+            assert!(frame == 0 || counted.nodes == nodes, "{name}: {nodes:?}, then {:?}", counted.nodes);
+            nodes = counted.nodes;
+            assert_eq!(realtime.result().unwrap(), plain.result().unwrap(), "{name}");
+            assert_eq!(realtime.samples().unwrap(), plain.samples().unwrap(), "{name}");
+            assert_eq!(realtime.surfaces().unwrap(), plain.surfaces().unwrap(), "{name}");
+        }
+        let nodes = nodes.unwrap();
+        let shown = words(&realtime);
+        // every ray visits the root, and no colour of the scale is black
+        assert!(shown.iter().all(|w| w[3] == 255 && w[..3].iter().any(|&c| c > 60)), "{name}");
+        assert!(f64::from(nodes.max) >= nodes.mean && nodes.mean >= 1.0, "{name}: {nodes:?}");
+        let on_host = VisitCounter::new(&FlatScene::new(&scene)).unwrap().mean(&centre_rays(&camera), false).nodes;
+        println!("{name}: {nodes:?}, counted on the host {on_host:.3}");
+        // other rounding: a few rays pass a box by
+        assert!((nodes.mean / on_host - 1.0).abs() < 1e-3, "{name}: {nodes:?}, not {on_host}");
+        nodes.mean
+    });
+    assert!(means[0] < 2.0 && means[1] > 2.0 * means[0], "{means:?}");
+    for kind in tracers(&device).into_iter().filter(|k| *k != TracerKind::Compute) {
+        let tracer = tracer(&device, kind, &by_name("plane").unwrap());
+        let mut realtime = Realtime::new(&tracer, SIZE, &Preset::Fast.settings(), &[]).unwrap();
+        let error = realtime.display(&tracer, Some(display(Shown::Nodes, 0.0))).unwrap_err();
+        assert!(error.to_string().contains("--show nodes needs the compute tracer"), "{error}");
     }
     assert_validation_clean(&device);
 }

@@ -1,36 +1,33 @@
 //! What a scene's lights and a render's options require of paths: what they do not is not compiled.
 
 use super::lights::Lights;
-use super::{PathOptions, PixelFilter, Strategy, media};
+use super::{PathOptions, Strategy, media};
 use crate::accel::flatten::FlatScene;
-use crate::interface::{PathFeature, PathFeatures};
+use crate::interface::{LightKinds, PathFeature, PathFeatures};
 use crate::tracer::shading;
 
 /// What is required. `map`: the environment is an image; `cones`: textures are read over ray cones.
-pub(super) fn features(options: &PathOptions, flat: &FlatScene, lights: &Lights, map: bool, cones: bool) -> PathFeatures {
+pub(super) fn features(
+    options: &PathOptions,
+    flat: &FlatScene,
+    lights: &Lights,
+    map: bool,
+    cones: bool,
+) -> (PathFeatures, LightKinds) {
     let plain = options.white_sky.is_some() || options.view.is_some();
     let drawn = options.strategy.samples_lights() && !lights.records.is_empty();
     let features = [
+        (PathFeature::LightTree, drawn && !lights.tree.is_empty()),
         (PathFeature::LightChoice, drawn && lights.choices() > 1),
         (PathFeature::EnvironmentMap, map),
         (PathFeature::LightSamples, drawn),
         (PathFeature::Mis, drawn && options.strategy == Strategy::Mis),
-        (PathFeature::CosineSampling, options.strategy == Strategy::Cosine),
-        (PathFeature::UniformSampling, options.strategy == Strategy::Uniform),
-        (PathFeature::SpecularOnly, options.specular_only),
-        (PathFeature::ConstantAlbedo, options.white_sky.is_some()),
-        (PathFeature::View, options.view.is_some()),
-        (PathFeature::Clamp, options.firefly_clamp.is_finite()),
-        (PathFeature::Lens, options.lens.is_some_and(|l| l.radius > 0.0)),
-        (PathFeature::PixelFilter, options.pixel_filter != PixelFilter::Box),
         (PathFeature::RayCones, cones),
         (PathFeature::DistantDisks, lights.has_disks),
         (PathFeature::Media, !plain && media::matter(flat)),
         (PathFeature::ClearWalls, !plain && flat.scene.materials.iter().any(shading::has_clear_walls)),
     ];
-    let mut all: PathFeatures = features.into_iter().filter_map(|(feature, required)| required.then_some(feature)).collect();
-    if drawn {
-        lights.kinds().for_each(|kind| all.insert(kind));
-    }
-    all
+    let all =
+        features.into_iter().chain(options.features()).filter_map(|(feature, required)| required.then_some(feature)).collect();
+    (all, if drawn { lights.kinds() } else { LightKinds::default() })
 }

@@ -3,15 +3,15 @@
 use std::sync::Arc;
 
 use super::report::{self, environment_text};
-use super::{Lens, MOST_DEPTH, PathOptions, PixelFilter, Strategy, TextureFilter, View, render, streams};
+use super::{PathOptions, PixelFilter, Strategy, TextureFilter, View, render, streams};
 use crate::accel::flatten::FlatScene;
 use crate::colour::srgb_decode;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::film::Control;
 use crate::film::cover::Cover;
 use crate::integrators::{Integrator, IntegratorSettings, PictureOptions, Rendered, Shot};
 use crate::output::{Image, Samples};
-use crate::scene::{Camera, Projection, Scene};
+use crate::scene::Scene;
 use crate::shaders::StreamShaders;
 use crate::tracer::{Needs, Tracer};
 
@@ -43,11 +43,6 @@ pub static DEPTH: Paths = Paths { name: "depth", help: "Distance along camera ra
 pub static BAKED_OCCLUSION: Paths =
     Paths { name: "baked-occlusion", help: "Baked occlusion textures", kind: Kind::View(View::BakedOcclusion) };
 
-/// Grey of `ao-sky`.
-const SKY_ALBEDO: f64 = 0.5;
-/// Height of the sensor that an f-number is about, metres.
-const SENSOR_HEIGHT: f64 = 0.024;
-
 /// What paths gather.
 enum Kind {
     /// Light, up to so many bounces; `None`: as many as settings say.
@@ -72,44 +67,16 @@ impl Paths {
         if let Kind::View(view) = self.kind { Some(view) } else { None }
     }
 
-    fn is_whitted(&self) -> bool {
-        matches!(self.kind, Kind::Whitted)
-    }
-
     fn options(&self, shot: &Shot) -> Result<PathOptions> {
-        let settings = &shot.settings.path;
-        let wanted = settings.max_depth.or(shot.scene.hints.max_depth).unwrap_or(MOST_DEPTH);
-        Ok(PathOptions {
-            size: shot.size,
-            pixel_filter: settings.pixel_filter.unwrap_or_default(),
-            texture_filter: settings.texture_filter.unwrap_or_default(),
-            lens: lens(shot.settings, shot.camera)?,
-            spp: shot.spp,
-            seed: shot.seed,
-            max_depth: if let Kind::Light { max_depth: Some(depth) } = self.kind { depth } else { wanted },
-            rr_depth: settings.rr_depth.unwrap_or(PathOptions::default().rr_depth),
-            firefly_clamp: settings.firefly_clamp.map_or(f32::INFINITY, |c| c as f32),
+        let options = PathOptions::new(shot)?;
+        Ok(match self.kind {
+            Kind::Light { max_depth: Some(max_depth) } => PathOptions { max_depth, ..options },
+            Kind::Light { max_depth: None } => options,
             // nothing but light samples brings light to what scatters it
-            strategy: if self.is_whitted() { Strategy::Light } else { settings.sampling.unwrap_or_default() },
-            specular_only: self.is_whitted(),
-            view: self.view(),
-            white_sky: matches!(self.kind, Kind::WhiteSky).then(|| settings.sky_albedo.unwrap_or(SKY_ALBEDO) as f32),
-            time_limit: shot.time_limit,
-            cover: None,
-            film: shot.film.clone(),
+            Kind::Whitted => PathOptions { strategy: Strategy::Light, specular_only: true, ..options },
+            Kind::WhiteSky => PathOptions { white_sky: Some(shot.settings.path.sky_albedo()), ..options },
+            Kind::View(view) => PathOptions { view: Some(view), ..options },
         })
-    }
-}
-
-/// The lens that is asked for.
-fn lens(settings: &IntegratorSettings, camera: &Camera) -> Result<Option<Lens>> {
-    let (Some(f_number), Some(focus)) = (settings.path.f_number, settings.path.focus_distance) else { return Ok(None) };
-    match camera.projection {
-        Projection::Perspective { fov_y } => {
-            let focal_length = 0.5 * SENSOR_HEIGHT / (0.5 * fov_y).tan();
-            Ok(Some(Lens { radius: (0.5 * focal_length / f_number) as f32, focus: focus as f32 }))
-        }
-        Projection::Orthographic { .. } => Err(Error::Usage("--f-number: the camera is orthographic and has no lens".into())),
     }
 }
 
@@ -175,37 +142,12 @@ impl Integrator for Paths {
     fn identity(&self, shot: &Shot) -> Vec<(&'static str, Option<String>)> {
         // without its lens a camera is refused when the image is rendered
         let Ok(options) = self.options(shot) else { return Vec::new() };
-        // no `..`: a new option has to be put where it belongs
-        let PathOptions {
-            size: _,
-            spp: _,
-            time_limit: _,
-            cover: _,
-            film: _,
-            seed: _,
-            max_depth,
-            rr_depth,
-            firefly_clamp,
-            strategy,
-            white_sky,
-            view: _,
-            specular_only: _,
-            pixel_filter,
-            texture_filter,
-            lens,
-        } = options;
-        vec![
+        let mut identity = vec![
             ("environment", Some(environment_text(shot.scene, &options))),
-            ("max_depth", Some(report::depth_text(max_depth))),
-            ("rr_depth", Some(rr_depth.to_string())),
-            ("sampling", Some(strategy.to_string())),
-            ("firefly_clamp", firefly_clamp.is_finite().then(|| firefly_clamp.to_string())),
-            ("pixel_filter", (pixel_filter != PixelFilter::Box).then(|| pixel_filter.to_string())),
-            ("texture_filter", (texture_filter != TextureFilter::Bilinear).then(|| texture_filter.to_string())),
-            ("lens", lens.map(|lens| format!("radius {}, focus {}", lens.radius, lens.focus))),
             ("energy_compensation", shot.settings.path.energy_compensation.then(|| "on".into())),
-            ("sky_albedo", white_sky.map(|albedo| albedo.to_string())),
-        ]
+        ];
+        identity.extend(options.identity());
+        identity
     }
 
     fn render(

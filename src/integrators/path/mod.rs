@@ -15,147 +15,29 @@ mod params;
 mod report;
 pub mod settings;
 
-use crate::settings::choices;
-use crate::shaders::{self, StreamShaders};
-use std::sync::Arc;
-use std::time::Duration;
-
 use crate::accel::flatten::FlatScene;
 use crate::error::{Error, Result};
 use crate::film::Control;
 use crate::film::accumulate::{Accumulated, Estimator, Plan, accumulate, most_rays};
 use crate::film::block::BlockParams;
 use crate::film::camera::CameraRecord;
-use crate::film::cover::Cover;
-use crate::film::schedule::FilmOptions;
 use crate::gpu::{Buffer, Commands, ComputePipeline, Memory, Specialization, Timing};
-use crate::interface::{MaterialFeature, PathFeature, PathFeatures};
+use crate::interface::{LightKind, LightKinds, MaterialFeature, PathFeature, PathFeatures};
 pub use crate::interface::{PixelFilter, View};
 use crate::scene::Environment;
+use crate::shaders::{self, StreamShaders};
 use crate::tracer::queue::RayQueue;
-
 use crate::tracer::{Push, Stream, Tracer};
 use environment::DeviceEnvironment;
 use lights::Lights;
 use media::Bodies;
-use params::{CONE_BYTES, ENVIRONMENT_PDF_BYTES, INVALID, MEDIA_BYTES, PathParams, QUAD_BYTES, STATE_BYTES, STRAIGHT_BYTES};
+use params::{CONE_BYTES, INVALID, MEDIA_BYTES, PathParams, QUAD_BYTES, SKY_PDF_BYTES, STATE_BYTES, STRAIGHT_BYTES};
+pub use settings::{Lens, MOST_DEPTH, PathOptions, Strategy, TextureFilter};
 
 /// Bounces of a submission; then the host asks how many paths are left.
 const BOUNCES: u32 = 4;
 /// Surfaces that a path goes straight through at most: more of them end it.
 const MAX_STRAIGHT: u32 = 4096;
-/// Longest path: with Russian roulette, which lets no more than 0.95 of paths go on, none gets here.
-pub const MOST_DEPTH: u32 = 4096;
-
-choices! {
-    /// How directions are sampled. All strategies estimate the same image; all but the first are for comparison.
-    pub enum Strategy {
-        /// Multiple importance sampling of BSDF and lights, power heuristic (Veach 1997)
-        Mis = "mis",
-        /// BSDF sampling only
-        Bsdf = "bsdf",
-        /// Light sampling for emitters that it can sample, BSDF sampling for the rest
-        Light = "light",
-        /// Cosine-weighted hemisphere sampling
-        Cosine = "cosine",
-        /// Uniform hemisphere sampling
-        Uniform = "uniform",
-    }
-}
-
-impl Strategy {
-    fn samples_lights(self) -> bool {
-        matches!(self, Strategy::Mis | Strategy::Light)
-    }
-}
-
-choices! {
-    /// How a path reads textures.
-    pub enum TextureFilter {
-        /// Bilinear lookups: the samples of a pixel average them
-        Bilinear = "bilinear",
-        /// Ray cones choose a mip level: less noise at low sample counts, biased
-        RayCone = "ray-cone",
-    }
-}
-
-/// A thin lens.
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
-pub struct Lens {
-    /// World units.
-    pub radius: f32,
-    /// Distance along the view at which the image is sharp, world units.
-    pub focus: f32,
-}
-
-/// What to render.
-#[derive(Clone, Debug)]
-pub struct PathOptions {
-    /// Image size in pixels.
-    pub size: [u32; 2],
-    /// Paths per pixel.
-    pub spp: u32,
-    /// Of the sampler.
-    pub seed: u32,
-    /// Bounces at most: 0 shows what emits, 1 adds direct light. [`MOST_DEPTH`] is the limit, which nobody reaches.
-    pub max_depth: u32,
-    /// Bounces before Russian roulette.
-    pub rr_depth: u32,
-    /// No path vertex but the first adds more than this radiance in any channel; infinite: unbiased.
-    pub firefly_clamp: f32,
-    /// How directions are sampled.
-    pub strategy: Strategy,
-    /// Paths go on by delta lobes alone, so that light samples bring all other light: with [`Strategy::Light`].
-    pub specular_only: bool,
-    /// Every surface is diffuse and of this grey, and nothing shines but a white sky: the rendering equation that ambient occlusion
-    /// approximates.
-    pub white_sky: Option<f32>,
-    /// No light, but what camera rays see. Misses count 0.
-    pub view: Option<View>,
-    /// What a pixel is the mean of.
-    pub pixel_filter: PixelFilter,
-    /// How textures are read; [`TextureFilter::RayCone`] asks for [`crate::tracer::Needs::mip_levels`].
-    pub texture_filter: TextureFilter,
-    /// A perspective camera's; without it a pinhole.
-    pub lens: Option<Lens>,
-    /// Stop after this time with what there is.
-    pub time_limit: Option<Duration>,
-    /// Which tiles of the image show anything; only where the environment is black and [`PathOptions::is_sharp`].
-    pub cover: Option<Arc<Cover>>,
-    /// What the film starts from, and where it stops on its way.
-    pub film: FilmOptions,
-}
-
-impl Default for PathOptions {
-    fn default() -> Self {
-        Self {
-            size: [1280, 720],
-            spp: 16,
-            seed: 0,
-            max_depth: MOST_DEPTH,
-            rr_depth: 5,
-            firefly_clamp: f32::INFINITY,
-            strategy: Strategy::Mis,
-            specular_only: false,
-            white_sky: None,
-            view: None,
-            pixel_filter: PixelFilter::Box,
-            texture_filter: TextureFilter::Bilinear,
-            lens: None,
-            time_limit: None,
-            cover: None,
-            film: FilmOptions::default(),
-        }
-    }
-}
-
-impl PathOptions {
-    /// Does every pixel see nothing but what projects into it?
-    pub fn is_sharp(&self) -> bool {
-        self.pixel_filter == PixelFilter::Box && self.lens.is_none()
-    }
-}
-
 /// An image and how it came about.
 #[derive(Clone, Debug, Default)]
 pub struct PathResult {
@@ -173,6 +55,8 @@ pub struct PathResult {
     pub light_tree: bool,
     /// What of the shaders was compiled.
     pub features: PathFeatures,
+    /// Kinds of lights that light samples were compiled for.
+    pub light_kinds: LightKinds,
 }
 
 /// The streams that [`render`] traces and that nothing but the scene's geometry is needed for.
@@ -251,6 +135,7 @@ impl PathIntegrator {
             lights: paths.lights,
             light_tree: paths.light_tree,
             features: paths.features,
+            light_kinds: paths.light_kinds,
         })
     }
 }
@@ -261,11 +146,6 @@ struct Traced {
     bounce_rays: u64,
     shadow_rays: u64,
     longest_path: u32,
-}
-
-/// Bounces at most.
-fn most_depth(options: &PathOptions) -> u32 {
-    if options.view.is_some() { 0 } else { options.max_depth.min(MOST_DEPTH) }
 }
 
 /// What rays to lights need where thin walls let them through.
@@ -300,6 +180,7 @@ struct Paths {
     lights: u32,
     light_tree: bool,
     features: PathFeatures,
+    light_kinds: LightKinds,
     _buffers: Vec<Buffer>,
     _environment: DeviceEnvironment,
 }
@@ -334,11 +215,12 @@ impl Paths {
             Some(_) => Lights::sky_only(),
             None => Lights::new(flat, environment.mean),
         };
-        let features = features::features(options, flat, &lights, environment.map.texels != 0, cones);
+        let (features, light_kinds) = features::features(options, flat, &lights, environment.map.texels != 0, cones);
         let [has_media, has_clear_walls] = [PathFeature::Media, PathFeature::ClearWalls].map(|f| features.contains(f));
-        let samples_constant_environment =
-            features.contains(PathFeature::LightSamples) && lights.environment.is_some() && environment.map.texels == 0;
-        let constants = Specialization::default().set_all(features.constants());
+        let stores_sky_pdfs = features.contains(PathFeature::LightSamples)
+            && lights.environment.is_some()
+            && (environment.map.texels == 0 || light_kinds.contains(LightKind::Portal));
+        let constants = Specialization::default().set_all(features.constants()).set_all(light_kinds.constants());
         let quads = |name: &str| Buffer::new(device, name, QUAD_BYTES * most as u64, Memory::Device);
         let queues = [RayQueue::new(device, most)?, RayQueue::new(device, most)?];
         let shadow_queue = RayQueue::new(device, most)?;
@@ -373,15 +255,7 @@ impl Paths {
             radiance: keep(radiance),
             contributions: keep(contributions),
             shadow: shadow_queue.record(),
-            max_depth: most_depth(options),
-            view: options.view.map_or(0, |v| v as u32),
-            rr_depth: options.rr_depth,
-            clamp_to: options.firefly_clamp,
-            albedo: options.white_sky.unwrap_or(0.0),
             environment_light: lights.environment.unwrap_or(INVALID),
-            lens_radius: options.lens.map_or(0.0, |l| l.radius),
-            focus: options.lens.map_or(1.0, |l| l.focus),
-            pixel_filter: options.pixel_filter as u32,
             cones: match cones {
                 true => keep(Buffer::new(device, "cones of paths", CONE_BYTES * most as u64, Memory::Device)?),
                 false => 0,
@@ -394,14 +268,12 @@ impl Paths {
                 true => keep(Buffer::new(device, "straight lengths of paths", STRAIGHT_BYTES * most as u64, Memory::Device)?),
                 false => 0,
             },
-            environment_pdfs: match samples_constant_environment {
-                true => {
-                    keep(Buffer::new(device, "environment pdfs of paths", ENVIRONMENT_PDF_BYTES * most as u64, Memory::Device)?)
-                }
+            sky_pdfs: match stores_sky_pdfs {
+                true => keep(Buffer::new(device, "densities of the sky", SKY_PDF_BYTES * most as u64, Memory::Device)?),
                 false => 0,
             },
             camera_media: [INVALID; 4],
-            ..Default::default()
+            ..options.params()
         };
         let states = [keep(states()?), keep(states()?)];
         let samples_lights = options.strategy.samples_lights() && !lights.records.is_empty() && options.view.is_none();
@@ -449,12 +321,13 @@ impl Paths {
             walls,
             bodies: has_media.then(|| Bodies::new(flat)),
             counts: Buffer::new(device, "numbers of rays", 4 * 2 * u64::from(BOUNCES + 1), Memory::Readback)?,
-            max_depth: most_depth(options),
+            max_depth: options.bounces(),
             samples_lights,
             traced: Traced::default(),
             lights: if options.strategy.samples_lights() { lights.count() } else { 0 },
             light_tree: !lights.tree.is_empty(),
             features,
+            light_kinds,
             _buffers: buffers,
             _environment: environment,
         })

@@ -14,5 +14,5 @@ pub(super) const QUAD_BYTES: u64 = 16;
 pub(super) const MEDIA_BYTES: u64 = 16;
 /// Bytes of how far a path has come straight, where there are walls that let it.
 pub(super) const STRAIGHT_BYTES: u64 = 4;
-/// Bytes of the density with which light samples draw a path's direction, where they draw from an environment of one colour.
-pub(super) const ENVIRONMENT_PDF_BYTES: u64 = 4;
+/// Bytes of the density with which light samples find what is outside the scene in a path's direction.
+pub(super) const SKY_PDF_BYTES: u64 = 4;

@@ -1,17 +1,13 @@
 //! What there is to say of a path-traced image.
 
-use serde_json::{Value, json};
+use serde_json::json;
 
-use super::{MOST_DEPTH, PathOptions, PathResult, TextureFilter};
+use super::settings::depth_text;
+use super::{PathOptions, PathResult, TextureFilter};
 use crate::accel::flatten::FlatScene;
 use crate::integrators::{IntegratorReport, Shot};
 use crate::scene::{Environment, Scene};
 use crate::tracer::{BuildStats, Tracer};
-
-/// A limit of bounces in words.
-pub(super) fn depth_text(max_depth: u32) -> String {
-    if max_depth >= MOST_DEPTH { "unlimited".into() } else { max_depth.to_string() }
-}
 
 /// What light comes from all around, in words.
 pub(super) fn environment_text(scene: &Scene, options: &PathOptions) -> String {
@@ -43,17 +39,12 @@ pub(super) fn report(tracer: &Tracer, flat: &FlatScene, shot: &Shot, o: &PathOpt
         result.longest_path,
         depth_text(o.max_depth),
     )];
-    if o.firefly_clamp.is_finite() {
-        lines.push(format!("indirect radiance clamped to {}: biased, too dark", o.firefly_clamp));
-    }
-    if o.texture_filter == TextureFilter::RayCone {
-        lines.push("textures filtered by ray cones: blurred, however many samples (biased)".into());
-    }
+    lines.extend(o.remarks());
     let shading = tracer.features().shading.unwrap_or_default();
     let mut explanations = vec![
         compiled("materials require", joined(shading.bsdfs.labels(), shading.materials.labels())),
         compiled("textures beside base colours:", shading.textures.labels()),
-        compiled("lights and options require", result.features.labels()),
+        compiled("lights and options require", joined(result.light_kinds.labels(), result.features.labels())),
         mip_levels(o, &stats),
     ];
     explanations.push(match result.lights {
@@ -63,15 +54,8 @@ pub(super) fn report(tracer: &Tracer, flat: &FlatScene, shot: &Shot, o: &PathOpt
     });
     let record = json!({
         "environment": environment_text(shot.scene, o),
-        "max_depth": if o.max_depth >= MOST_DEPTH { Value::Null } else { json!(o.max_depth) },
-        "rr_depth": o.rr_depth,
-        "firefly_clamp": if o.firefly_clamp.is_finite() { json!(o.firefly_clamp) } else { Value::Null },
-        "sampling": o.strategy,
-        "view": o.view,
-        "texture_filter": o.texture_filter,
         "mip_levels": stats.mip_levels,
         "mip_bytes": stats.mip_bytes,
-        "sky_albedo": o.white_sky,
         "energy_compensation": shot.settings.path.energy_compensation,
         "not_finite": image.film.not_finite,
         "lights": result.lights,
@@ -84,12 +68,8 @@ pub(super) fn report(tracer: &Tracer, flat: &FlatScene, shot: &Shot, o: &PathOpt
         },
         "longest_path": result.longest_path,
     });
-    IntegratorReport {
-        lines,
-        explanations,
-        record: record.as_object().cloned().unwrap_or_default(),
-        warnings: warnings(flat, o, image.film.not_finite, image.spp),
-    }
+    let record = [record, o.record()].into_iter().filter_map(|part| part.as_object().cloned()).flatten().collect();
+    IntegratorReport { lines, explanations, record, warnings: warnings(flat, o, image.film.not_finite, image.spp) }
 }
 
 fn warnings(flat: &FlatScene, o: &PathOptions, not_finite: u64, spp: u32) -> Vec<String> {

@@ -18,15 +18,15 @@ records! {
 
     /// A light.
     LightRecord: array LightRecords readonly 16 {
-        /// Point, spot: position; triangle, rectangle: a corner; sphere: centre. World space.
+        /// Point, spot: position; triangle, rectangle, portal: a corner; sphere: centre. World space.
         position: vec3,
         /// Sphere: radius; directional: 1 - cosine of half its angular diameter.
         radius: float,
-        /// Spot, directional: direction of its light; triangle, rectangle: first edge.
+        /// Spot, directional: direction of its light; triangle, rectangle, portal: first edge.
         axis: vec3,
         /// Spot: cosine of the angle up to which it is undiminished.
         cos_inner: float,
-        /// Triangle, rectangle: second edge.
+        /// Triangle, rectangle, portal: second edge.
         edge: vec3,
         /// Spot: cosine of the angle beyond which it is dark.
         cos_outer: float,
@@ -40,11 +40,11 @@ records! {
         trail: uint,
         /// To a multiple of 16 bytes.
         reserved: uint,
-        /// One of `LIGHT_*` of light_kind.
+        /// One of `LIGHT_*` of light_kinds.
         kind: uint,
         /// Triangle, rectangle, sphere: index of its instance; else `INVALID`.
         instance: uint,
-        /// Triangle, rectangle, sphere: index in the instance's mesh.
+        /// Triangle, rectangle, sphere: index in the instance's mesh; environment: number of portals, which follow it.
         primitive: uint,
         /// `LIGHT_TWO_SIDED`, `LIGHT_MIRRORED`, `LIGHT_ALPHA`.
         flags: uint,

@@ -86,6 +86,20 @@ records! {
         reserved: float,
     }
 
+    /// Of `nodes`.
+    NodesParams: block readonly 8 {
+        /// `BlockParams`.
+        block: address,
+        /// A `uint` a pixel: BVH nodes that its camera ray visits.
+        nodes: address,
+        /// A `uint` a pixel: colours.
+        words: address,
+        /// `2^exposure`.
+        gain: float,
+        /// Number of nodes that has the colour in the middle of the scale.
+        middle: float,
+    }
+
     /// Of a step of a filter: `filter`, `denoise`.
     FilterParams: block readonly 8 {
         /// `FrameParams`.

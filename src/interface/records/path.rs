@@ -59,6 +59,10 @@ records! {
         albedo: float,
         /// Index of the environment among the lights, or `INVALID`.
         environment_light: uint,
+        /// Paths of fewer bounces add nothing, with `WITH_MIN_DEPTH`.
+        min_depth: uint,
+        /// To a multiple of 16 bytes.
+        reserved: uint[3],
         /// One of `FILTER_*`.
         pixel_filter: uint,
         /// World units; 0: a pinhole.
@@ -89,8 +93,8 @@ records! {
         later: QueueRecord,
         /// As `contributions`.
         later_contributions: address,
-        /// A float a path: density with which light samples at its last bounce sample its direction from a constant environment.
-        environment_pdfs: address,
+        /// A float a path: density with which light samples at its last bounce find what is outside the scene in its direction.
+        sky_pdfs: address,
     }
 
     /// A path between two bounces.

@@ -16,7 +16,7 @@ impl Shown {
     /// What a file without alpha needs for it.
     pub fn colour(self) -> Colour {
         match self {
-            Shown::Normal | Shown::Position | Shown::Bent => Colour::Rgb,
+            Shown::Normal | Shown::Position | Shown::Bent | Shown::Nodes => Colour::Rgb,
             _ => Colour::Grey,
         }
     }
@@ -83,11 +83,13 @@ impl Pass for DisplayPass {
             Shown::Depth => uses.and_reads(&[Guide]),
             Shown::Normal | Shown::Position => uses.and_reads(&[Guide, Surface]),
             Shown::Bent => uses.and_reads(&[Guide, BentResult]),
+            // the pass `nodes` shows them
+            Shown::Nodes => uses,
         }
     }
 
     fn is_enabled(&self, display: Option<&Display>) -> bool {
-        display.is_some()
+        display.is_some_and(|d| d.shown != Shown::Nodes)
     }
 
     fn prepare(&mut self, frame: &Frame, resources: &Resources) -> Result<()> {

@@ -8,6 +8,7 @@ mod gather;
 mod gbuffer;
 mod gtao;
 mod larsen;
+pub mod nodes;
 mod temporal;
 
 use super::graph::{Range, Stage};

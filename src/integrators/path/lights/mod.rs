@@ -1,0 +1,155 @@
+//! The lights of a scene as the path tracer samples them: [`LightRecord`]. Few are chosen by their power; of many, a tree
+//! chooses by what they may do at a point ([`super::light_tree`]).
+
+mod portals;
+mod punctual;
+mod surfaces;
+
+use std::f64::consts::PI;
+use std::ops::Range;
+
+use glam::Vec3;
+
+use super::light_tree::{self, Bounds};
+use super::params::INVALID;
+use crate::accel::flatten::FlatScene;
+use crate::interface::records::lights::{LightNode, LightRecord};
+use crate::interface::{LightKind as Kind, LightKinds};
+use crate::sampling::CumulativeTable;
+use crate::scene::{Light, LightKind};
+
+/// More lights with a position than these are chosen from a tree.
+const MAX_BY_POWER: usize = 256;
+
+/// All lights.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Lights {
+    pub records: Vec<LightRecord>,
+    /// The first of the records that are chosen by power, which are all from there on.
+    pub first: u32,
+    /// [`CumulativeTable::starts`] of the power of those.
+    pub starts: Vec<u32>,
+    /// Over the lights that have a position, where they are many: the tree then is the last that is chosen by power.
+    pub tree: Vec<LightNode>,
+    /// For each instance of the scene, the place further on in this table where the lights of its primitives begin, or [`INVALID`]; then those
+    /// lights, one for each primitive, or [`INVALID`]. Empty where no surface is a light.
+    pub light_of: Vec<u32>,
+    /// Index of the environment.
+    pub environment: Option<u32>,
+    /// Directional lights.
+    pub directional: Range<u32>,
+    /// Some of them have an extent: paths meet them.
+    pub has_disks: bool,
+}
+
+/// How much a light of this radiance (or intensity, or irradiance; linear RGB) counts: the root mean square of its channels. Sampled in proportion to it, the
+/// squared error summed over channels is least. In proportion to luminance, blue lights would be sampled too seldom, and be noise.
+pub(super) fn brightness(c: Vec3) -> f64 {
+    (c.as_dvec3().length_squared() / 3.0).sqrt()
+}
+
+/// Lights that are being gathered: each with its power, and with bounds where it has a position.
+#[derive(Default)]
+struct Gathered {
+    records: Vec<LightRecord>,
+    powers: Vec<f64>,
+    bounds: Vec<Bounds>,
+}
+
+impl Gathered {
+    /// Returns its index. What has no power is not sampled: [`INVALID`].
+    fn push(&mut self, record: LightRecord, power: f64, bounds: Option<Bounds>) -> u32 {
+        debug_assert!(bounds.is_none() || self.bounds.len() == self.records.len(), "lights with a position come first");
+        if power.is_nan() || power <= 0.0 {
+            return INVALID;
+        }
+        self.records.push(record);
+        self.powers.push(power);
+        self.bounds.extend(bounds);
+        self.records.len() as u32 - 1
+    }
+}
+
+impl Lights {
+    /// Nothing but an environment.
+    pub fn sky_only() -> Self {
+        let record = LightRecord { kind: Kind::Environment as u32, instance: INVALID, probability: 1.0, ..Default::default() };
+        Self { records: vec![record], starts: vec![0; 2], environment: Some(0), ..Default::default() }
+    }
+
+    /// The kinds that are sampled.
+    pub fn kinds(&self) -> LightKinds {
+        self.sampled().iter().map(|r| Kind::ALL[r.kind as usize]).collect()
+    }
+
+    /// All but the tree, which stands for those with a position and is chosen last.
+    fn sampled(&self) -> &[LightRecord] {
+        &self.records[..self.records.len() - usize::from(!self.tree.is_empty())]
+    }
+
+    /// How many are chosen by power.
+    pub fn choices(&self) -> u32 {
+        self.records.len() as u32 - self.first
+    }
+
+    /// How many there are.
+    pub fn count(&self) -> u32 {
+        self.sampled().len() as u32
+    }
+
+    /// Those of a scene. `environment`: radiance of what surrounds it, averaged over the sphere.
+    pub fn new(flat: &FlatScene, environment: Vec3) -> Self {
+        let mut all = Gathered::default();
+        let scene = flat.scene;
+        let is_far = |light: &&Light| matches!(light.kind, LightKind::Directional { .. });
+        scene.lights.iter().filter(|l| !is_far(l)).for_each(|l| punctual::add(&mut all, flat, l));
+        let light_of = surfaces::add(&mut all, flat);
+        let first_far = all.records.len() as u32;
+        scene.lights.iter().filter(is_far).for_each(|l| punctual::add(&mut all, flat, l));
+        let directional = first_far..all.records.len() as u32;
+        let has_disks = all.records[first_far as usize..].iter().any(|r| r.radius > 0.0);
+        let mut lights = Self { light_of, directional, has_disks, ..Default::default() };
+        if environment != Vec3::ZERO {
+            // what crosses the disk that the scene fills, from everywhere
+            let power = 4.0 * PI.powi(2) * radius(flat).powi(2) * brightness(environment);
+            lights.environment = portals::add_environment(&mut all, flat, brightness(environment), power);
+        }
+        let placed = all.bounds.len();
+        if placed > MAX_BY_POWER && placed <= light_tree::MAX_LIGHTS {
+            let (nodes, trails) = light_tree::build(&all.bounds);
+            for (record, trail) in all.records.iter_mut().zip(trails) {
+                record.trail = trail;
+            }
+            let power = all.powers[..placed].iter().sum();
+            all.push(LightRecord { kind: INVALID, instance: INVALID, ..Default::default() }, power, None);
+            (lights.tree, lights.first) = (nodes, placed as u32);
+        }
+        lights.records = all.records;
+        let first = lights.first as usize;
+        let table = CumulativeTable::new(&all.powers[first..]);
+        for (record, &probability) in lights.records[first..].iter_mut().zip(&table.probabilities) {
+            record.probability = probability;
+        }
+        lights.starts = table.starts;
+        lights
+    }
+}
+
+/// Of the ball that holds the scene.
+fn radius(flat: &FlatScene) -> f64 {
+    flat.scene.bounds().map_or(1.0, |(lo, hi)| 0.5 * (hi - lo).length()).max(1e-30)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What matters of a light is how much it brings, in whichever channel.
+    #[test]
+    fn colours_count_alike() {
+        let colours = [Vec3::X, Vec3::Y, Vec3::Z, Vec3::ONE];
+        let counts = colours.map(brightness);
+        assert!(counts[0] == counts[1] && counts[1] == counts[2] && (counts[3] - 1.0).abs() < 1e-12, "{counts:?}");
+        assert_eq!(brightness(3.0 * Vec3::Z), 3.0 * counts[2]);
+    }
+}

@@ -1,0 +1,199 @@
+//! Lights that are surfaces: triangles, rectangles and spheres whose material emits.
+
+use std::collections::HashMap;
+use std::f64::consts::PI;
+
+use glam::{DVec3, DVec4, Vec3, Vec4};
+
+use super::super::light_tree::Bounds;
+use super::super::params::INVALID;
+use super::{Gathered, brightness};
+use crate::accel::features::{AlphaClass, alpha_classes};
+use crate::accel::flatten::FlatScene;
+use crate::interface::LightKind as Kind;
+use crate::interface::records::lights::{LIGHT_ALPHA, LIGHT_MIRRORED, LIGHT_TWO_SIDED, LightRecord};
+use crate::scene::{AlphaMode, Geometry, Material, TriangleMesh};
+
+/// Share of its coordinates by which rounding may have moved a point of a light.
+const LIFT: f64 = 8.0 / 16_777_216.0;
+
+/// Every primitive whose material emits; returns [`super::Lights::light_of`]. A sphere that its instance stretches has no closed form: BSDF samples find it.
+pub(super) fn add(all: &mut Gathered, flat: &FlatScene) -> Vec<u32> {
+    let scene = flat.scene;
+    let (mut light_of, mut of_primitives) = (vec![INVALID; scene.instances.len()], Vec::new());
+    let alpha = alpha_classes(scene, flat.blend);
+    let mut means = HashMap::new();
+    for (i, instance) in scene.instances.iter().enumerate() {
+        let mesh = &scene.meshes[instance.mesh];
+        let material = &scene.materials[mesh.material];
+        // an unlit surface lights nothing: it only shows; what no ray meets does neither
+        if material.emissive == Vec3::ZERO || material.unlit || alpha[instance.mesh] == AlphaClass::Absent {
+            continue;
+        }
+        let to_world = instance.object_to_world;
+        let base = LightRecord {
+            intensity: material.emissive.to_array(),
+            instance: i as u32,
+            flags: if material.double_sided { LIGHT_TWO_SIDED } else { 0 },
+            ..Default::default()
+        };
+        let mut mean = |texture: Option<usize>| *means.entry(texture).or_insert_with(|| mean_texture(flat, texture));
+        let mut brightness =
+            brightness(material.emissive * mean(material.emissive_texture.map(|slot| slot.texture)).truncate());
+        let is_tested = alpha[instance.mesh] == AlphaClass::Tested;
+        if is_tested {
+            brightness *= mean_alpha(material, &mesh.geometry, mean(material.base_color_texture.map(|slot| slot.texture)).w);
+        }
+        let first = of_primitives.len();
+        match &mesh.geometry {
+            Geometry::Triangles(t) => {
+                let flags = base.flags
+                    | if to_world.matrix3.determinant() < 0.0 { LIGHT_MIRRORED } else { 0 }
+                    | if is_tested { LIGHT_ALPHA } else { 0 };
+                let plain = material.emissive_texture.is_none() && !is_tested;
+                let point = |k: u32| to_world.transform_point3(t.positions[k as usize].as_dvec3()) - flat.origin;
+                add_triangles(all, t, point, plain, brightness, LightRecord { flags, ..base }, &mut of_primitives);
+            }
+            Geometry::Spheres(spheres) => {
+                let m = to_world.matrix3;
+                let scale = [m.x_axis.length(), m.y_axis.length(), m.z_axis.length()];
+                if scale.iter().any(|s| (s / scale[0] - 1.0).abs() > 1e-6) {
+                    continue;
+                }
+                for (primitive, s) in spheres.iter().enumerate() {
+                    let centre = to_world.transform_point3(s.center.as_dvec3()) - flat.origin;
+                    let radius = f64::from(s.radius) * scale[0];
+                    let record = LightRecord {
+                        kind: Kind::Sphere as u32,
+                        position: centre.as_vec3().to_array(),
+                        radius: radius as f32,
+                        primitive: primitive as u32,
+                        lift: ((centre.abs().max_element() + radius) * LIFT) as f32,
+                        ..base
+                    };
+                    let bounds = Bounds {
+                        lo: centre - radius,
+                        hi: centre + radius,
+                        axis: DVec3::Z,
+                        spread: PI,
+                        falloff: 0.5 * PI,
+                        both_ways: false,
+                        intensity: PI * radius * radius * brightness,
+                    };
+                    of_primitives.push(all.push(record, 4.0 * PI.powi(2) * radius * radius * brightness, Some(bounds)));
+                }
+            }
+        }
+        light_of[i] = (scene.instances.len() + first) as u32;
+    }
+    if light_of.iter().all(|&first| first == INVALID) {
+        return Vec::new();
+    }
+    light_of.extend(of_primitives);
+    light_of
+}
+
+/// The triangles of a mesh: two neighbours that make a rectangle of one radiance (`plain`) are one light.
+fn add_triangles(
+    all: &mut Gathered,
+    mesh: &TriangleMesh,
+    point: impl Fn(u32) -> DVec3,
+    plain: bool,
+    brightness: f64,
+    base: LightRecord,
+    of_primitives: &mut Vec<u32>,
+) {
+    let both_ways = base.flags & LIGHT_TWO_SIDED != 0;
+    // a transform that mirrors turns the winding
+    let turn = if base.flags & LIGHT_MIRRORED != 0 { -1.0 } else { 1.0 };
+    let mut push = |kind: Kind, [a, e1, e2]: [DVec3; 3], primitive: usize, slack: f64| {
+        let normal = turn * e1.cross(e2);
+        let area = if kind == Kind::Rectangle { 1.0 } else { 0.5 } * normal.length();
+        let (b, c) = (a + e1, a + e2);
+        let far = if kind == Kind::Rectangle { a + e1 + e2 } else { a };
+        let extent = a.abs().max(b.abs()).max(c.abs()).max_element() + e1.abs().max(e2.abs()).max_element();
+        // barycentrics follow the corners; a turned winding is a turned normal
+        let record = LightRecord {
+            kind: kind as u32,
+            position: a.as_vec3().to_array(),
+            axis: e1.as_vec3().to_array(),
+            edge: e2.as_vec3().to_array(),
+            primitive: primitive as u32,
+            lift: (extent * LIFT + slack) as f32,
+            ..base
+        };
+        let bounds = Bounds {
+            lo: a.min(b).min(c).min(far),
+            hi: a.max(b).max(c).max(far),
+            axis: normal.normalize_or(DVec3::Z),
+            spread: 0.0,
+            falloff: 0.5 * PI,
+            both_ways,
+            intensity: area * brightness,
+        };
+        all.push(record, if both_ways { 2.0 } else { 1.0 } * PI * area * brightness, Some(bounds))
+    };
+    let mut k = 0;
+    while k < mesh.indices.len() {
+        let corners = mesh.indices[k].map(&point);
+        let next = mesh.indices.get(k + 1).filter(|_| plain).map(|n| n.map(&point));
+        if let Some((rectangle, slack)) = next.and_then(|next| rectangle(corners, next)) {
+            let index = push(Kind::Rectangle, rectangle, k, slack);
+            of_primitives.extend([index; 2]);
+            k += 2;
+            continue;
+        }
+        let [a, b, c] = corners;
+        of_primitives.push(push(Kind::Triangle, [a, b - a, c - a], k, 0.0));
+        k += 1;
+    }
+}
+
+/// The rectangle that two triangles make, as a corner and two edges, and how far a corner is from where it should be; `None` where they make none.
+fn rectangle(first: [DVec3; 3], second: [DVec3; 3]) -> Option<([DVec3; 3], f64)> {
+    let extent = first.iter().chain(&second).fold(0.0f64, |e, p| e.max(p.abs().max_element()));
+    // positions are rounded to single precision, of their own coordinates and of the instance's
+    let slack = 2.0 * extent / 16_777_216.0;
+    for k in 0..3 {
+        let [a, b, c] = [first[k], first[(k + 1) % 3], first[(k + 2) % 3]];
+        let (e1, e2) = (b - a, c - a);
+        let shorter = e1.length().min(e2.length());
+        if shorter.is_nan() || shorter <= 1e4 * slack || e1.dot(e2).abs() > 1e-5 * e1.length() * e2.length() {
+            continue;
+        }
+        // the other has the diagonal, the other way round, and the fourth corner
+        let d = a + e1 + e2;
+        for j in 0..3 {
+            let other = [second[j], second[(j + 1) % 3], second[(j + 2) % 3]];
+            if other[0] == c && other[1] == b && (other[2] - d).length() <= slack {
+                return Some(([a, e1, e2], slack));
+            }
+        }
+    }
+    None
+}
+
+/// Mean of the alpha of an emitter that is not everywhere: only its order of magnitude matters, for how often it is chosen.
+fn mean_alpha(material: &Material, geometry: &Geometry, of_texture: f32) -> f64 {
+    let of_vertices = match geometry {
+        Geometry::Triangles(t) if !t.colors.is_empty() => t.colors.iter().map(|c| c.w).sum::<f32>() / t.colors.len() as f32,
+        _ => 1.0,
+    };
+    let mean = material.base_color.w * of_texture * of_vertices;
+    match material.alpha_mode {
+        // of a mask it says too little: present texels may have any alpha above the cutoff
+        AlphaMode::Mask { .. } => f64::from(mean.clamp(0.25, 1.0)),
+        _ => f64::from(mean.clamp(1e-3, 1.0)),
+    }
+}
+
+/// Mean of a texture of sRGB colours, linear, and of its alpha.
+fn mean_texture(flat: &FlatScene, texture: Option<usize>) -> Vec4 {
+    let Some(texture) = texture else { return Vec4::ONE };
+    let texels = &flat.scene.textures[texture].texels;
+    let mut sum = DVec4::ZERO;
+    for i in 0..texels.len() {
+        sum += Vec4::from_array(texels.decode_srgb(i)).as_dvec4();
+    }
+    (sum / texels.len().max(1) as f64).as_vec4()
+}
