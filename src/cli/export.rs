@@ -1,4 +1,4 @@
-//! `skylit export`: a scene as glTF, or as the plain triangles that other tracers read.
+//! `skylit export`: writes a scene as glTF, or as a triangle soup for other tracers.
 
 use std::path::Path;
 
@@ -9,7 +9,7 @@ use crate::scene::export::{self, ExportStats};
 use crate::scene::{Scene, load};
 use crate::terminal::warnings::{Warnings, warnings_of};
 
-/// Loads and writes.
+/// Loads a scene and writes it.
 pub fn run(args: &ExportArgs) -> Result<()> {
     let console = args.verbosity.console();
     let extension = args.output.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
@@ -18,7 +18,7 @@ pub fn run(args: &ExportArgs) -> Result<()> {
         "glb" | "gltf" => export::export_gltf,
         _ => {
             let path = args.output.display();
-            return Err(Error::Usage(format!("{path}: unknown kind of scene: the name must end in .bin, .glb or .gltf")));
+            return Err(Error::Usage(format!("{path}: unknown format: the file name must end in .bin, .glb or .gltf")));
         }
     };
     files::check_writable(&args.output)?;

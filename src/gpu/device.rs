@@ -44,7 +44,7 @@ pub struct Device {
     /// Properties of the device. `int64` is false with [`Options::no_int64`], even if supported.
     pub info: DeviceInfo,
     validation: Option<Arc<ValidationLog>>,
-    // destroyed last
+    // dropped last
     _instance: Arc<Instance>,
 }
 

@@ -51,7 +51,7 @@ pub struct MovedBounds {
 }
 
 impl Pose {
-    /// The changes for a tracer whose scene was flattened with the animation's [`crate::scene::animation::Rig::motion`].
+    /// The changes for a tracer whose scene was flattened with the animation's [`crate::scene::animation::AnimationRig::motion`].
     pub fn changes(&self) -> Changes<'_> {
         fn mesh(posed: &PosedMesh) -> MeshChange<'_> {
             let shape = &posed.shape;

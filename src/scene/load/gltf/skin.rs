@@ -11,7 +11,7 @@ use super::AccessorIndex;
 use super::accessor::Reader;
 use crate::scene::animation::{self, Influences, MorphTarget};
 
-/// A skeleton in the file.
+/// A skin in the file.
 #[derive(Deserialize, Default)]
 #[serde(default, rename_all = "camelCase")]
 pub(super) struct Skin {
@@ -20,7 +20,7 @@ pub(super) struct Skin {
     inverse_bind_matrices: Option<u32>,
 }
 
-/// Reads a skeleton; `index` has the place of each node of the file.
+/// Reads a skin; `index` has the index of each node of the file.
 ///
 /// # Errors
 /// What is wrong, in words.
