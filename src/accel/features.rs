@@ -132,7 +132,7 @@ impl SceneFeatures {
             lines.push("no spheres: their intersection code is not compiled".to_owned());
         }
         if self.single_level {
-            let n = flat.groups.first().map_or(0, |g| g.parts.len());
+            let n = flat.groups.first().map_or(0, |g| g.submeshes.len());
             lines.push(format!(
                 "one level: {n} mesh{} baked into world space, the top level is skipped",
                 if n == 1 { "" } else { "es" }

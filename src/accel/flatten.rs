@@ -44,7 +44,7 @@ pub struct BlasGroup {
     /// True for spheres, false for triangles.
     pub spheres: bool,
     /// Its submeshes; alpha-tested ones last.
-    pub parts: Vec<Submesh>,
+    pub submeshes: Vec<Submesh>,
     /// Number of triangles or spheres.
     pub primitive_count: usize,
     /// Number of vertices (triangles only).
@@ -115,8 +115,7 @@ impl<'a> FlatScene<'a> {
             changes[mesh] = true;
         }
         let relative = |t: DAffine3| DAffine3 { translation: t.translation - origin, ..t };
-        let mut flat =
-            Self { scene, origin, groups: Vec::new(), instances: Vec::new(), absent_primitives: 0, motion, blend };
+        let mut flat = Self { scene, origin, groups: Vec::new(), instances: Vec::new(), absent_primitives: 0, motion, blend };
         let mut world = [BlasGroup::empty(false), BlasGroup::empty(true)];
         let mut own: Vec<Option<usize>> = vec![None; scene.meshes.len()];
         // opaque meshes first, so that alpha-tested primitives are the tail of every group
@@ -147,11 +146,7 @@ impl<'a> FlatScene<'a> {
             }
         }
         for group in world.into_iter().filter(|g| g.primitive_count > 0) {
-            flat.instances.push(TlasInstance {
-                group: flat.groups.len(),
-                to_world: DAffine3::IDENTITY,
-                scene_instance: None,
-            });
+            flat.instances.push(TlasInstance { group: flat.groups.len(), to_world: DAffine3::IDENTITY, scene_instance: None });
             flat.groups.push(group);
         }
         flat
@@ -170,7 +165,7 @@ impl<'a> FlatScene<'a> {
     /// Does any primitive have stochastic alpha ([`Blend::Stochastic`])?
     pub fn has_stochastic_alpha(&self) -> bool {
         let covers = |p: &Submesh| self.scene.materials[self.scene.meshes[p.mesh].material].alpha_mode == AlphaMode::Blend;
-        self.blend == Blend::Stochastic && self.groups.iter().flat_map(|g| &g.parts).any(|p| p.alpha_tested && covers(p))
+        self.blend == Blend::Stochastic && self.groups.iter().flat_map(|g| &g.submeshes).any(|p| p.alpha_tested && covers(p))
     }
 
     /// Does the scene have analytic spheres?
@@ -217,8 +212,8 @@ impl<'a> FlatScene<'a> {
     }
 
     /// The submesh that contains a group's primitive.
-    pub fn part_of<'g>(&self, group: &'g BlasGroup, primitive: usize) -> &'g Submesh {
-        &group.parts[group.parts.partition_point(|p| p.first_primitive <= primitive) - 1]
+    pub fn submesh_of<'g>(&self, group: &'g BlasGroup, primitive: usize) -> &'g Submesh {
+        &group.submeshes[group.submeshes.partition_point(|p| p.first_primitive <= primitive) - 1]
     }
 
     /// Bounding box of a group's primitive in group space. `primitive` is an index into the group.
@@ -251,7 +246,7 @@ fn is_similarity(t: &DAffine3) -> bool {
 
 impl BlasGroup {
     fn empty(spheres: bool) -> Self {
-        Self { spheres, parts: Vec::new(), primitive_count: 0, vertex_count: 0, opaque_count: 0 }
+        Self { spheres, submeshes: Vec::new(), primitive_count: 0, vertex_count: 0, opaque_count: 0 }
     }
 
     fn push(&mut self, scene: &Scene, mesh: usize, scene_instance: Option<usize>, to_group: DAffine3, alpha_tested: bool) {
@@ -259,7 +254,7 @@ impl BlasGroup {
             Geometry::Triangles(t) => (t.indices.len(), t.positions.len()),
             Geometry::Spheres(s) => (s.len(), 0),
         };
-        self.parts.push(Submesh {
+        self.submeshes.push(Submesh {
             mesh,
             scene_instance,
             to_group,

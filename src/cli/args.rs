@@ -38,7 +38,7 @@ pub struct RaysArgs {
 /// `skylit export`.
 #[derive(Clone, Debug, Args)]
 pub struct ExportArgs {
-    /// Scene, as `render` takes it
+    /// Scene file (.gltf, .glb, .obj, .brhan) or builtin:NAME
     pub scene: String,
     /// File to write: .bin (triangle soup in world space), .glb or .gltf
     #[arg(value_hint = ValueHint::FilePath)]

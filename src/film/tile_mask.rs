@@ -69,7 +69,7 @@ impl TileMask {
         } else {
             for placement in &flat.instances {
                 let group = &flat.groups[placement.group];
-                for part in &group.parts {
+                for part in &group.submeshes {
                     mark_part(flat, placement, group, part, &view, &tiles);
                 }
             }

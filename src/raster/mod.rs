@@ -19,9 +19,9 @@ use crate::film::block::BlockParams;
 use crate::gpu::{Buffer, Cull, Device, GraphicsPipeline, Memory, Recorder, Targets};
 use crate::interface::records::raster::RasterParams;
 use crate::shaders::{self, StreamShaders};
-use crate::tracer::drawable::CHUNK;
+use crate::tracer::raster_instance::CHUNK;
 use crate::tracer::stream;
-use crate::tracer::{Drawable, Push, Stream, Tracer};
+use crate::tracer::{Push, RasterInstance, Stream, Tracer};
 pub use camera_rays::CameraRays;
 pub use frustum::View;
 use frustum::{Frustum, FrustumTest};
@@ -59,7 +59,7 @@ impl Primary {
         if !info.can_rasterise() {
             return (Primary::Traced, format!("the device lacks {}, which rasterising needs", info.missing_raster.join(", ")));
         }
-        let placed: u64 = tracer.drawables().map(|d| d.shape.primitives as u64).sum();
+        let placed: u64 = tracer.raster_instances().map(|d| d.shape.primitives as u64).sum();
         let most = if info.is_cpu() { PRIMITIVES_PER_PIXEL.0 } else { PRIMITIVES_PER_PIXEL.1 };
         let share = placed as f64 / pixels.max(1) as f64;
         let primary = if share > most { Primary::Traced } else { Primary::Raster };
@@ -115,10 +115,10 @@ impl Raster {
         let targets = Targets::new(device, size)?;
         let s = stream::scene_specialization(features);
         let pipeline = |name, vertex, fragment, cull| GraphicsPipeline::new(device, name, vertex, fragment, &s, cull);
-        let alpha = || pipeline("draw alpha-tested", &shaders::DRAW_TRIANGLES, &shaders::DRAW_ALPHA, Cull::Nothing);
+        let alpha = || pipeline("draw alpha-tested", &shaders::DRAW_TRIANGLES, &shaders::DRAW_ALPHA, Cull::None);
         let spheres = || pipeline("draw spheres", &shaders::DRAW_SPHERES, &shaders::DRAW_SPHERE, Cull::Front);
         Ok(Self {
-            triangles: pipeline("draw opaque", &shaders::DRAW_TRIANGLES, &shaders::DRAW_OPAQUE, Cull::Nothing)?,
+            triangles: pipeline("draw opaque", &shaders::DRAW_TRIANGLES, &shaders::DRAW_OPAQUE, Cull::None)?,
             alpha_tested: features.alpha.then(alpha).transpose()?,
             spheres: features.spheres.then(spheres).transpose()?,
             targets,
@@ -203,7 +203,7 @@ impl Raster {
     fn collect(&self, tracer: &Tracer, frustum: &Frustum) -> (Draws, [f64; 2], DrawStats) {
         let (mut draws, mut drawn) = (Draws::default(), DrawStats::default());
         let mut depth = [f64::INFINITY, 0.0f64];
-        for entry in tracer.drawables() {
+        for entry in tracer.raster_instances() {
             drawn.placed += entry.shape.primitives as u64;
             let overlap = frustum.classify(&entry.shape.bounds, &entry.to_world);
             if overlap == FrustumTest::Outside {
@@ -220,7 +220,14 @@ impl Raster {
         (draws, depth, drawn)
     }
 
-    fn collect_entry(&self, tracer: &Tracer, frustum: &Frustum, entry: &Drawable, overlap: FrustumTest, draws: &mut Draws) {
+    fn collect_entry(
+        &self,
+        tracer: &Tracer,
+        frustum: &Frustum,
+        entry: &RasterInstance,
+        overlap: FrustumTest,
+        draws: &mut Draws,
+    ) {
         let push = Push {
             scene: tracer.scene_address(),
             pass: self.params.address(),

@@ -181,7 +181,7 @@ impl Renderer {
         let denoising = denoiser
             .as_ref()
             .zip(path_options.as_ref())
-            .map(|(chosen, options)| Denoising::new(chosen, denoise::Shot { tracer, scene, camera: &record, options }));
+            .map(|(chosen, options)| Denoising::new(chosen, denoise::DenoiseInput { tracer, scene, camera: &record, options }));
         let composer = Composer {
             name: &self.name,
             integrator,

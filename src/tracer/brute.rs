@@ -1,5 +1,5 @@
-//! What the compute tracer reads when it walks no tree (`shaders/trace/brute.glsl`): primitives group by group, and for each
-//! instance which of them are its own.
+//! The compute tracer's data without a BVH (`shaders/trace/brute.glsl`): primitives group by group, and for each
+//! instance the range of its primitives.
 
 use std::sync::Arc;
 
@@ -9,16 +9,16 @@ use crate::accel::flatten::FlatScene;
 use crate::error::{Error, Result};
 use crate::gpu::Device;
 
-/// Fails for a scene of which every ray would have to test too much.
+/// Fails for a scene with more than [`Kernel::MAX_BRUTE_TESTS`] tests per ray.
 pub(super) fn check(flat: &FlatScene) -> Result<()> {
     let tests = Kernel::brute_tests(flat);
-    if tests <= Kernel::BRUTE_MOST {
+    if tests <= Kernel::MAX_BRUTE_TESTS {
         return Ok(());
     }
     Err(Error::Scene(format!(
         "traversal 'brute' tests every primitive of every instance against every ray, at most {}; this scene has {tests}: use \
          another --traversal",
-        Kernel::BRUTE_MOST
+        Kernel::MAX_BRUTE_TESTS
     )))
 }
 

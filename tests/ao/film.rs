@@ -7,7 +7,7 @@ use glam::{DAffine3, DVec3};
 use skylit::accel::flatten::FlatScene;
 use skylit::film::tile_mask::TileMask;
 use skylit::oracle::Oracle;
-use skylit::scene::builtin::{Placement, analytic};
+use skylit::scene::builtin::{SceneTransform, analytic};
 use skylit::scene::{Camera, Projection, Scene};
 use skylit::tracer::{Kernel, Needs, Tracer, TracerKind};
 
@@ -20,7 +20,7 @@ use crate::{AoOptions, differences, oracle_image, render};
 fn gpu_film_keeps_its_digits() {
     let device = device();
     // a small floor: rays start above it by a few ulp of its size, and that much less is met
-    let scene = analytic::sphere_over_plane(1.0, 1.5, 0.25, Placement::default());
+    let scene = analytic::sphere_over_plane(1.0, 1.5, 0.25, SceneTransform::default());
     let camera = Camera::look_at(DVec3::new(1.0, 0.2, 0.0), DVec3::ZERO, DVec3::Y, 0.02);
     let options = AoOptions { size: [3, 2], spp: 20_000, falloff: 1.7, ..Default::default() };
     let oracle = Oracle::new(&scene, scene.origin());
@@ -148,7 +148,7 @@ fn gpu_cover_leaves_out_nothing_that_is_seen() {
             let camera = Camera::look_at(eye, middle + DVec3::X * reach * 0.5, DVec3::Y, 0.6);
             (name, scene, camera)
         })
-        .chain([("spheres", analytic::sphere_over_plane(1.0, 1.5, 0.25, Placement::default()))].map(|(name, scene)| {
+        .chain([("spheres", analytic::sphere_over_plane(1.0, 1.5, 0.25, SceneTransform::default()))].map(|(name, scene)| {
             let camera = Camera::look_at(DVec3::new(40.0, 30.0, 50.0), DVec3::ZERO, DVec3::Y, 0.5);
             (name, scene, camera)
         }))

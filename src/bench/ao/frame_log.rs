@@ -8,7 +8,7 @@ use crate::film::camera::CameraRecord;
 use crate::measure::stats::MedianP95;
 use crate::realtime::{FrameStats, Realtime, Technique};
 use crate::terminal::interrupt;
-use crate::tracer::{Moved, Tracer};
+use crate::tracer::{MovedBounds, Tracer};
 
 /// Frames that were made.
 #[derive(Default)]
@@ -28,7 +28,7 @@ impl FrameLog {
         realtime: &mut Realtime,
         tracer: &Tracer,
         camera: &CameraRecord,
-        moved: &[Moved],
+        moved: &[MovedBounds],
     ) -> Result<&FrameStats> {
         interrupt::check()?;
         let start = Instant::now();

@@ -88,7 +88,7 @@ fn rename(flat: &FlatScene, hit: &mut Hit) {
     if hit.primitive as usize >= group.primitive_count {
         return;
     }
-    let part = flat.part_of(group, hit.primitive as usize);
+    let part = flat.submesh_of(group, hit.primitive as usize);
     hit.primitive -= part.first_primitive as u32;
     if let Some(instance) = entry.scene_instance.or(part.scene_instance) {
         hit.instance = instance as u32;
@@ -103,7 +103,7 @@ fn write_scene(flat: &FlatScene, path: &Path) -> std::io::Result<()> {
     for group in &flat.groups {
         let vertices = if group.spheres { group.primitive_count } else { group.vertex_count };
         words(&[u32::from(group.spheres), vertices as u32, group.primitive_count as u32])?;
-        for part in &group.parts {
+        for part in &group.submeshes {
             match &flat.scene.meshes[part.mesh].geometry {
                 Geometry::Spheres(s) => {
                     for k in 0..s.len() {
@@ -118,7 +118,7 @@ fn write_scene(flat: &FlatScene, path: &Path) -> std::io::Result<()> {
                 }
             }
         }
-        for part in &group.parts {
+        for part in &group.submeshes {
             if let Geometry::Triangles(t) = &flat.scene.meshes[part.mesh].geometry {
                 t.indices.iter().try_for_each(|i| words(&i.map(|k| k + part.first_vertex as u32)))?;
             }
