@@ -1,5 +1,9 @@
 //! The film: sums per pixel on the device, means and variances on the host. [`state`] has the exact sums that are saved to resume a
 //! render.
+//!
+//! A render is a number of *steps* ([`schedule`]): each brings some tiles of the image to a number of samples, and between two of them a render may end or be saved.
+//! A step goes over the image in *blocks* ([`block`]), as many pixels as device buffers hold; a block in batches of samples ([`accumulate`]); a batch in launches of at
+//! most so many rays that each takes about 0.05 s ([`pace`]). The image depends on none of these sizes.
 
 pub mod accumulate;
 pub mod block;

@@ -15,7 +15,7 @@ use std::time::Duration;
 use serde_json::{Map, Value};
 
 use crate::accel::flatten::FlatScene;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::film::Control;
 use crate::film::accumulate::Accumulated;
 use crate::film::camera::CameraRecord;
@@ -232,11 +232,11 @@ impl std::fmt::Debug for IntegratorName {
 }
 
 impl std::str::FromStr for IntegratorName {
-    type Err = String;
+    type Err = Error;
 
-    fn from_str(name: &str) -> Result<Self, String> {
+    fn from_str(name: &str) -> Result<Self> {
         let names = || ALL.iter().map(|i| i.name()).collect::<Vec<_>>().join(", ");
-        Self::find(name).ok_or_else(|| format!("no integrator is called {name}; there are {}", names()))
+        Self::find(name).ok_or_else(|| Error::Usage(format!("no integrator is called {name}; there are {}", names())))
     }
 }
 

@@ -193,7 +193,7 @@ choices! {
         Half = "half", "PATTERN_QUARTER";
     }
 
-    /// What is shown of a frame.
+    /// What is shown of a frame: numbers as grey up to `Depth`, colours from `Normal` on (shaders/display.glsl compares).
     Shown: "shown" {
         /// The filtered result
         Accessibility = "accessibility", "SHOWN_ACCESSIBILITY";

@@ -11,7 +11,7 @@ use crate::tracer::{BuildOptions, ComputeOptions, Kernel, TracerKind, TriangleTe
 choices! {
     /// Which tracer to use.
     pub enum TracerChoice {
-        /// The fastest on the device
+        /// The one that suits the device: compute on CPUs, else pipeline, query or compute, the first that is available
         Auto = "auto",
         /// VK_KHR_ray_tracing_pipeline
         Pipeline = "pipeline",

@@ -79,7 +79,7 @@ settings! {
     }
 }
 
-/// Longest path: with Russian roulette, which lets no more than 0.95 of paths go on, none gets here.
+/// Longest path, bounces. Russian roulette (`MAX_SURVIVAL` in shaders/path/path.glsl) ends paths long before.
 pub const MOST_DEPTH: u32 = 4096;
 
 /// Grey of `ao-sky`.

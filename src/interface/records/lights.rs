@@ -48,7 +48,7 @@ records! {
         primitive: uint,
         /// `LIGHT_TWO_SIDED`, `LIGHT_MIRRORED`, `LIGHT_ALPHA`.
         flags: uint,
-        /// Triangle, rectangle, sphere: how far above itself rounding may have put it, world units.
+        /// Triangle, rectangle, sphere: how far off its surface a light sample ends, scene units: a bound on rounding, so that the shadow ray does not meet the light itself.
         lift: float,
     }
 
