@@ -270,7 +270,7 @@ mod tests {
             assert_eq!(IntegratorName::find(integrator.name()).unwrap().name(), integrator.name());
             assert_eq!(ALL.iter().filter(|i| i.name() == integrator.name()).count(), 1);
         }
-        assert!("ambient".parse::<IntegratorName>().unwrap_err().contains("there are ao, path"));
+        assert!("ambient".parse::<IntegratorName>().unwrap_err().to_string().contains("there are ao, path"));
     }
 
     /// A setting that names an integrator which does not exist would be of no use.
