@@ -6,7 +6,7 @@ use divan::counter::ItemsCount;
 use glam::{DAffine3, DVec3, Vec3};
 use skylit::accel::flatten::FlatScene;
 use skylit::accel::wide::Block;
-use skylit::accel::{Aabb, BuildPreset, RefitPlan, Wide, build};
+use skylit::accel::{Aabb, BuildPreset, RefitPlan, WideBvh, build};
 use skylit::gpu::{Device, Options};
 use skylit::scene::{Geometry, Instance, Mesh, Motion, Scene, TriangleMesh};
 use skylit::tracer::{Changes, MeshChange, Needs, Tracer, TracerKind};
@@ -140,14 +140,14 @@ fn boxes(n: usize) -> Vec<Aabb> {
 fn top_build_host<const DEFAULT: usize>(bencher: Bencher, n: usize) {
     let boxes = boxes(n);
     let preset = [BuildPreset::Fast, BuildPreset::Default][DEFAULT];
-    bencher.counter(ItemsCount::new(n)).bench_local(|| Wide::collapse(&build::tree(&boxes, preset, None), of_item));
+    bencher.counter(ItemsCount::new(n)).bench_local(|| WideBvh::collapse(&build::tree(&boxes, preset, None), of_item));
 }
 
 /// What refitting it takes.
 #[divan::bench(args = INSTANCES, sample_count = 7, sample_size = 2)]
 fn top_refit_host(bencher: Bencher, n: usize) {
     let boxes = boxes(n);
-    let mut tree = Wide::collapse(&build::tree(&boxes, BuildPreset::Fast, None), of_item);
+    let mut tree = WideBvh::collapse(&build::tree(&boxes, BuildPreset::Fast, None), of_item);
     let plan = RefitPlan::new(&tree.blocks, 0);
     bencher.counter(ItemsCount::new(n)).bench_local(|| tree.refit(&plan, 1e-3, |block| boxes[block.body[0] as usize]));
 }

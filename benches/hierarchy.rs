@@ -6,7 +6,7 @@ use divan::Bencher;
 use divan::counter::ItemsCount;
 use glam::Vec3;
 use skylit::accel::wide::Block;
-use skylit::accel::{Aabb, BuildPreset, Bvh2, Wide, build};
+use skylit::accel::{Aabb, BuildPreset, Bvh2, WideBvh, build};
 
 fn main() {
     divan::main();
@@ -52,7 +52,10 @@ fn obvhs_medium(bencher: Bencher, n: usize) {
 fn wide(bencher: Bencher, n: usize) {
     let boxes = surface(n);
     bencher.counter(ItemsCount::new(n)).bench(|| {
-        Wide::collapse(&build::tree(&boxes, BuildPreset::Default, None), |item| Block { body: [item; 15], ..Block::default() })
+        WideBvh::collapse(&build::tree(&boxes, BuildPreset::Default, None), |item| Block {
+            body: [item; 15],
+            ..Block::default()
+        })
     });
 }
 

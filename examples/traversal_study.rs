@@ -189,7 +189,7 @@ fn measure(tracers: &[Tracer], streams: &[RayStream], limits: &[usize], rounds: 
 fn orders(device: &Arc<Device>, flat: &FlatScene, label: &str, streams: &[RayStream; 3], arguments: &Arguments) -> Result<()> {
     let primitives = flat.primitive_count();
     let mut kernels = vec![Kernel::Nearest, Kernel::Direction, Kernel::Wide];
-    if Kernel::brute_tests(flat) <= Kernel::BRUTE_MOST {
+    if Kernel::brute_tests(flat) <= Kernel::MAX_BRUTE_TESTS {
         kernels.push(Kernel::Brute);
     }
     let tracers = kernels
@@ -279,7 +279,7 @@ fn tests(device: &Arc<Device>, flat: &FlatScene, label: &str, streams: &[RayStre
 }
 
 fn leaks(device: &Arc<Device>) -> Result<()> {
-    let cube = builtin::analytic::closed_box(1.0, builtin::Placement { scale: 1.0, offset: DVec3::ZERO });
+    let cube = builtin::analytic::closed_box(1.0, builtin::SceneTransform { scale: 1.0, offset: DVec3::ZERO });
     let sphere = |levels| {
         let mut scene = cube.clone();
         scene.meshes[0].geometry = builtin::shapes::icosphere(1.0, levels);

@@ -53,6 +53,14 @@ run_shared() {
   return "$status"
 }
 
+# run_documentation: the examples in the library's documentation, which nextest knows nothing of
+run_documentation() {
+  local status=0
+  cargo test --locked --doc 2>&1 | tee "$log" || status=$?
+  keep_summary "documentation"
+  return "$status"
+}
+
 ./scripts/setup.sh
 
 if cargo fmt --version >/dev/null 2>&1; then
@@ -75,6 +83,7 @@ if cargo nextest --version >/dev/null 2>&1; then
   others=$(printf ' - binary(%s)' "${shared[@]}")
   run_alone "default driver" -E "all()$others" ${filter:+"$filter"} || status=1
   run_shared "default driver" "${shared[@]}" -- ${filter:+"$filter"} || status=1
+  if [ -z "$filter" ]; then run_documentation || status=1; fi
 else
   cargo test --locked --no-fail-fast -- ${filter:+"$filter"} 2>&1 | tee "$log" || status=1
   keep_summary "default driver"

@@ -1,5 +1,5 @@
-// ao_trace: the occlusion rays of a frame (ao/sample.glsl), from the surface of each pixel that is sampled in this frame. Pixels that show nothing have none, and neither have those that know enough
-// while nothing moves. Built twice: with a falloff the nearest hit counts by its distance, without one any hit will do.
+// ao_trace: the occlusion rays of a frame (ao/sample.glsl), from the surface of each pixel that is sampled in this frame. Background pixels have none, nor have pixels whose history is long enough
+// in a static view. Compiled twice: with a falloff the nearest hit counts by its distance, without one any hit is enough.
 #include "ao/sample.glsl"
 #include "common/occlusion.glsl"
 
@@ -41,7 +41,7 @@ void add_sample(uint index, float accessibility) {
     uvec2 pixel = tile_pixel(f, index);
     if (any(greaterThanEqual(pixel, f.size))) return;
     uint at = image_index(f, pixel);
-    // what is written where nothing is, nobody reads
+    // nothing reads the values of background pixels
     if (!is_sampled(f, pixel) || is_resting(f, at)) return;
     STORE_PAIR(p.current, at, pack_estimate(Estimate(accessibility, 1.0, 0.0)));
     if (!is_null(p.current_bent)) {

@@ -1,4 +1,4 @@
-// aov: one ray through each pixel's centre; writes what it met.
+// aov: one ray through each pixel's centre; writes the AOVs of its hit.
 #include "common/camera.glsl"
 #include "scene/surface.glsl"
 

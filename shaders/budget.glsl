@@ -1,4 +1,4 @@
-// budget: how many occlusion rays each pixel has in a frame that has so many in all.
+// budget: distributes a given number of occlusion rays over the pixels of a frame.
 //
 // The variance of a pixel's mean is v / n: of one sample, by the samples that its history has. Its sum over the image is least when n is
 // in proportion to sqrt(v) (Neyman, "On the Two Different Aspects of the Representative Method", 1934), so a pixel with n samples wants
@@ -16,7 +16,7 @@
 
 layout(local_size_x = LANES) in;
 
-// Samples that the largest variance counts as.
+// Number of samples that the largest variance counts as.
 const float PRIOR_SAMPLES = 16.0;
 const float PRIOR_VARIANCE = 0.25;
 
@@ -24,7 +24,7 @@ shared vec2 tile[LANES];
 shared uint counts[LANES];
 shared uint first_above, list_begin;
 
-// What a pixel's nearest pixel of the previous frame knows, if it shows the same surface.
+// The history of the nearest pixel in the previous frame, if it shows the same surface.
 Estimate nearest_history(FrameParams f, uint at) {
     Estimate none = Estimate(0.0, 0.0, 0.0);
     if (f.has_history == 0u) return none;
@@ -44,7 +44,7 @@ Estimate nearest_history(FrameParams f, uint at) {
     return unpack_estimate(LOAD_PAIR(f.previous_history, tap));
 }
 
-// Deviation of one sample, and samples. The deviation is negative where a pixel is not sampled in this frame, 0 where nothing is.
+// Standard deviation of one sample, and number of samples. The deviation is negative for a pixel that is not sampled in this frame, and 0 for the background.
 vec2 wish_of(FrameParams f, uvec2 pixel) {
     if (any(greaterThanEqual(pixel, f.size))) return vec2(0.0);
     uint at = image_index(f, pixel);
@@ -55,7 +55,7 @@ vec2 wish_of(FrameParams f, uvec2 pixel) {
     return vec2(is_sampled(f, pixel) ? deviation : -deviation, e.samples);
 }
 
-// Rays that a pixel wants at a level.
+// The desired number of rays of a pixel at a level.
 float wanted(BudgetParams p, vec2 wish, float level) {
     if (!(wish.x > 0.0)) return 0.0;
     return clamp(level * wish.x - wish.y, wish.y > 0.0 ? 0.0 : 1.0, float(p.most_rays));
@@ -65,7 +65,7 @@ float coarse_level(float k) {
     return exp2(-4.0 + 22.0 / 63.0 * k);
 }
 
-// The first of 64 sums that is not below the budget; 64: none.
+// The index of the first of 64 sums that is not below the budget; 64 if all are below.
 uint crossing(BudgetSums sums, uint from, uint target, uint lane) {
     if (lane == 0u) first_above = 64u;
     barrier();
@@ -92,7 +92,7 @@ void main() {
         return;
     }
     if (stage == STAGE_COARSE || stage == STAGE_FINE) {
-        // one of sixteen in a row, another in each frame, speaks for all
+        // one pixel of sixteen, another in each frame, represents all
         uint place = BUDGET_SHARE * k + (hash_combine(k, f.frame) & (BUDGET_SHARE - 1u));
         tile[lane] = place < push.count ? uintBitsToFloat(LOAD_PAIR(p.desired_samples, place)) : vec2(0.0);
         barrier();
@@ -128,12 +128,12 @@ void main() {
         float part = above > below ? (float(target) - below) / (above - below) : 1.0;
         level = mix(low, high, (float(fine) + clamp(part, 0.0, 1.0)) / 64.0);
     }
-    // what a history counts at most is shared out likewise
+    // the maximum history length is distributed likewise
     float mean_deviation = float(sums.v[SUMS_DEVIATION]) / (DEVIATION_UNITS * float(max(sums.v[SUMS_PIXELS], 1u)));
     float full = f.most_samples / max(mean_deviation, 1e-3);
     if (f.rest != 0u) level = min(level, full);
     float expected = wanted(p, wish, level);
-    // every pixel rounds up as often as its fraction says, the times far apart
+    // every pixel rounds up as often as its fraction says, at times far apart
     uint phase = hash_combine(hash_combine(hash_combine(f.seed, pixel.x), pixel.y), 0x62756467u) + f.frame * 0x9e3779b9u;
     uint count = uint(expected + float(phase >> 8) * (1.0 / 16777216.0));
     counts[lane] = count;

@@ -4,7 +4,7 @@
 
 layout(local_size_x = LANES) in;
 
-// Mean and number of samples, variance of one sample; in memory a RadianceRecord.
+// Mean and number of samples, and variance of one sample; a RadianceRecord in memory.
 struct RadianceEstimate {
     vec3 mean;
     float samples;
@@ -14,9 +14,9 @@ struct RadianceEstimate {
 #define VALUE vec3
 #define ESTIMATE RadianceEstimate
 
-// One sample says nothing of its variance: then all of what the box differs by is noise.
+// One sample has no variance: then all differences within the box count as noise.
 const float PRIOR_SAMPLES = 4.0;
-// a pixel that is alone on its surface has samples of its own
+// a pixel without neighbours on its surface has samples of its own
 const float LONELY = 0.0;
 
 uint filtered_pixel() { return push.first + gl_GlobalInvocationID.x; }
@@ -26,8 +26,8 @@ RadianceEstimate load_estimate(uvec2 estimates, uint at) {
     return RadianceEstimate(a.xyz, a.w, b.xyz);
 }
 
-// The normals in guides are those of shading here: light on a surface changes with them. The eight bits beside them are the same for
-// what may be averaged.
+// The normals in guides are shading normals here, because lighting depends on them. The eight bits beside them are equal for
+// pixels that may be averaged.
 bool is_neighbour(EdgeTest edge, vec2 offset, uvec2 own_guide, uvec2 guide) {
     vec3 own = unpackSnorm4x8(own_guide.y).xyz;
     return (own_guide.y ^ guide.y) >> 24 == 0u && on_plane(edge, offset, guide) && dot(own, unpackSnorm4x8(guide.y).xyz) >= edge.cosine;

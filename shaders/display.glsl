@@ -1,8 +1,8 @@
-// display: a buffer of the frame as it is shown: a word a pixel, red in the lowest byte, 8-bit sRGB, opaque.
+// display: converts a buffer of the frame to 8-bit sRGB: a word per pixel, red in the lowest byte, opaque.
 //
-// Every buffer becomes a linear colour first, is brightened by the exposure, and is then encoded. The bytes are those of
-// src/colour.rs on any device: a driver's own power function only guesses a byte, and the smallest values that the host encodes as
-// this byte and the next decide.
+// Every buffer becomes a linear colour first, is multiplied by the exposure, and is then encoded. The bytes are those of
+// src/colour.rs on any device: a driver's power function only gives an approximate byte, and the smallest values that the host encodes as
+// this byte and the next one decide.
 #include "common/frame.glsl"
 #include "interface/display.glsl"
 #include "interface/shown.glsl"
@@ -12,11 +12,11 @@ layout(local_size_x = LANES) in;
 
 layout(buffer_reference, std430, buffer_reference_align = 4) writeonly buffer DisplayWords { uint v[]; };
 
-// Variance of samples that are 0 or 1 at most.
+// Maximum variance of samples in [0, 1].
 const float WHITE_VARIANCE = 0.25;
 
 uint srgb_byte(uvec2 thresholds, float linear) {
-    // also what is not a number
+    // also for NaN
     if (!(linear > 0.0)) return 0u;
     if (linear >= 1.0) return 255u;
     float coded = srgb_encode(linear);
@@ -26,7 +26,7 @@ uint srgb_byte(uvec2 thresholds, float linear) {
     return byte < 255u && linear >= smallest.v[byte + 1u] ? byte + 1u : byte;
 }
 
-// In a space that repeats every two units, without a jump.
+// Maps to a space that repeats every two units, without a discontinuity.
 vec3 fold(vec3 v) {
     return abs(2.0 * fract(0.5 * v) - 1.0);
 }

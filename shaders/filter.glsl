@@ -8,7 +8,7 @@ layout(local_size_x = LANES) in;
 #define VALUE float
 #define ESTIMATE Estimate
 
-// Where few samples have told of their variance, it is taken for that of samples that are 0 or 1: the most it can be.
+// With few samples the variance is taken to be that of samples that are 0 or 1: the maximum.
 const float PRIOR_SAMPLES = 4.0;
 const float LONELY = 6.0;
 
@@ -31,7 +31,7 @@ void finish(FilterParams p, FrameParams f, uint at, Estimate e, vec3 bent) {
         STORE_PAIR(p.to, at, pack_estimate(e));
         return;
     }
-    // where nobody knows: as if nothing were in the way
+    // without any information: unoccluded
     FloatImage(p.result).v[at] = e.samples > 0.0 ? e.mean : 1.0;
 }
 
@@ -41,15 +41,15 @@ void finish_nothing(FilterParams p, FrameParams f, uint at) {
     if (BENT_NORMALS) store_vec3(p.bent_to, at, vec3(0.0));
 }
 
-// By the pixels around, whatever they show: for one that is the only one of its surface, before it has had its turn. A guess, but a
-// better one than that nothing is in the way.
+// The mean of the surrounding pixels, whatever they show, for a pixel that is alone on its surface and has no samples yet. A guess, but a
+// better one than no occlusion.
 Estimate guess(FilterParams p, FrameParams f, uvec2 estimates, ivec2 pixel, Estimate own) {
     if (!is_null(p.to)) return own;
     ivec2 lower = max(pixel - 1, ivec2(0)), upper = min(pixel + 1, ivec2(f.size) - 1);
     float sum = 0.0, n = 0.0;
     for (int y = lower.y; y <= upper.y; y++) {
         for (int x = lower.x; x <= upper.x; x++) {
-            // background has no samples
+            // the background has no samples
             Estimate e = unpack_estimate(LOAD_PAIR(estimates, uint(y) * f.size.x + uint(x)));
             sum += e.mean * e.samples;
             n += e.samples;

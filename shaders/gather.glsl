@@ -1,5 +1,5 @@
-// gather: where a pixel has several samples in a frame, their mean and variance, and with bent normals their mean direction; in the
-// order of the samples, so that it depends on nothing else.
+// gather: for pixels with several samples in a frame, their mean and variance, and with bent normals their mean direction; in the
+// order of the samples, so that the result is deterministic.
 #include "common/occlusion.glsl"
 
 layout(local_size_x = LANES) in;
@@ -7,7 +7,7 @@ layout(local_size_x = LANES) in;
 void main() {
     AoTraceParams p = AoTraceParams(push.pass);
     FrameParams f = FrameParams(p.frame);
-    // with a budget all of a frame at once, a place for each pixel's samples
+    // with a budget all samples of a frame at once, with a slot for each
     bool planned = !is_null(p.plan);
     uint n = planned ? 1u : f.rays_per_pixel;
     uint k = gl_GlobalInvocationID.x;

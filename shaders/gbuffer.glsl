@@ -1,4 +1,4 @@
-// gbuffer: one camera ray through each pixel's centre; what it meets is kept for the passes of the frame that follow.
+// gbuffer: one camera ray through each pixel's centre; stores the surface for the following passes of the frame.
 #include "ao/hemisphere.glsl"
 #include "common/frame.glsl"
 #include "scene/motion.glsl"
@@ -17,7 +17,7 @@ void closest(uint index, Hit hit) {
         STORE_PAIR(f.guide, at, uvec2(floatBitsToUint(INFINITY), 0u));
         return;
     }
-    // the point on a triangle follows from its corners; only a sphere asks for the ray again
+    // the point on a triangle follows from its corners; only a sphere needs the ray again
     Surface s = surface_at(HAS_SPHERES ? centre_ray(p, index) : no_ray(), hit);
     vec4 back = f.world_to_camera[2];
     float depth = -(dot(back.xyz, s.position) + back.w);

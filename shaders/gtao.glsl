@@ -1,7 +1,7 @@
-// gtao: ambient occlusion from the depth image alone, for comparison with what is traced: Jimenez, Wu, Pesce, Jarabo, "Practical
+// gtao: ambient occlusion from the depth image alone, for comparison with ray tracing: Jimenez, Wu, Pesce, Jarabo, "Practical
 // Real-Time Strategies for Accurate Indirect Occlusion", SIGGRAPH 2016 courses. In each of a few slices through the view ray the
-// horizons on both sides are searched, and the cosine-weighted arc between them is integrated in closed form. What the image does not
-// show does not occlude.
+// horizons on both sides are searched, and the cosine-weighted arc between them is integrated in closed form. Geometry that is not in the
+// image does not occlude.
 #include "ao/sample.glsl"
 #include "common/frame.glsl"
 #include "common/sequence.glsl"
@@ -10,23 +10,23 @@
 
 layout(local_size_x = LANES) in;
 
-// The first step leaves the pixel itself, pixels.
+// Distance of the first step from the pixel, in pixels.
 const float MIN_STEP = 1.3;
-// Sine of the angle above a surface's plane from which on something stands on it.
+// Sine of the minimum angle above a surface's plane at which geometry counts as an occluder.
 const float MIN_RISE = 1e-3;
 
 float arc(float cos_n, float n, float h) {
     return 0.25 * (cos_n + 2.0 * h * sin(n) - cos(2.0 * h - n));
 }
 
-// How much a hit at a distance counts.
+// Weight of an occluder at a distance.
 float weight(FrameParams f, float d) {
-    // the binary radius is not cut sharply: depth images are too coarse for that
+    // the binary radius gets a soft edge: depth images are too coarse for a sharp one
     float edge = f.reach < INFINITY ? clamp((f.reach - d) / (0.2 * f.reach), 0.0, 1.0) : 1.0;
     return edge * occlusion_at(f.falloff_log2, d);
 }
 
-// How far it is from a point of the image to its border, pixels.
+// Distance from a point of the image to its border, in pixels.
 float to_border(FrameParams f, vec2 from, vec2 direction) {
     vec2 room = mix(from, vec2(f.size) - from, greaterThan(direction, vec2(0.0))) / max(abs(direction), vec2(1e-6));
     return min(room.x, room.y);
@@ -54,9 +54,9 @@ void main() {
     float accessibility = 0.0, open = 0.0;
     for (uint slice = 0u; slice < g.slices; slice++) {
         float phi = PI * (float(slice) + u.x) / float(g.slices);
-        // slices are even about the view ray, which those that are even in the image are not beside its middle
+        // slices are uniform about the view ray; away from the image centre that differs from uniform in the image
         vec3 tangent = cos(phi) * right + sin(phi) * up;
-        // image rows go down, the camera's y goes up
+        // image rows go down, the camera's y axis goes up
         vec2 along = vec2(1.0, -1.0) * normalize(orthographic ? tangent.xy : tangent.xy + plane * tangent.z);
         vec3 axis = cross(tangent, v);
         vec3 projected = normal - axis * dot(normal, axis);
@@ -70,7 +70,7 @@ void main() {
             // the surface itself is the lowest horizon
             float low = cos(clamp(n + sgn * 0.5 * PI, -PI, PI));
             float horizon = low;
-            // what lies beyond the border is not known: all steps are spent within
+            // geometry beyond the border is unknown: all steps are within the image
             float search = min(radius, to_border(f, centre, sgn * along));
             for (uint k = 0u; k < g.steps; k++) {
                 float s = (float(k) + u.y) / float(g.steps);

@@ -1,5 +1,5 @@
-// larsen_blur: a box of 3x3 over the occlusion image, read with bilinear filtering at the full size, without any test for edges; not
-// where it is 0. The colour of everything is white here.
+// larsen_blur: a box filter of 3x3 over the occlusion image, read with bilinear filtering at full size, without edge detection; not
+// where it is 0. All surfaces are white here.
 #include "common/larsen.glsl"
 
 layout(local_size_x = LANES) in;
@@ -27,7 +27,7 @@ void main() {
     vec2 uv = (vec2(at % f.size.x, at / f.size.x) + 0.5) / vec2(f.size);
     vec2 middle = uv * vec2(l.half_size) - 0.5;
     float occlusion = bilinear(l, middle);
-    // without a filter: to see what it does
+    // without the filter, to compare
     if (occlusion != 0.0 && l.blurred != 0u) {
         occlusion = 0.0;
         for (int k = 0; k < 9; k++) occlusion += bilinear(l, middle + vec2(k % 3 - 1, k / 3 - 1)) / 9.0;

@@ -1,4 +1,4 @@
-// larsen_light: how many of the point lights each pixel sees, a shadow ray each.
+// larsen_light: the number of point lights that are visible from each pixel, with a shadow ray each.
 #include "common/larsen.glsl"
 
 Ray ray(uint index) {

@@ -1,4 +1,4 @@
-// larsen_occlusion: 64 rays per pixel of an image of half the size per axis, where no light is visible; nearest hits, whatever the
+// larsen_occlusion: 64 rays per pixel of an image of half the size per axis, where no light is visible; nearest hits, with and without a
 // falloff.
 #include "ao/sample.glsl"
 #include "common/larsen.glsl"
@@ -14,7 +14,7 @@ bool is_traced(LarsenParams l, FrameParams f, uvec2 pixel) {
     return !larsen_nothing(f, at) && Words(l.lit).v[at] == 0u;
 }
 
-// Point k of the table, whose indices are turned about its middle by an angle, rounded and wrapped.
+// Point k of the table, whose indices are rotated about its middle by an angle, rounded and wrapped.
 vec2 table_point(LarsenParams l, uint k, float angle) {
     vec2 centred = vec2(k % 8u, k / 8u) - 3.5;
     float c = cos(angle), s = sin(angle);
@@ -23,7 +23,7 @@ vec2 table_point(LarsenParams l, uint k, float angle) {
     return load_vec2(l.points, wrapped.y * 8u + wrapped.x);
 }
 
-// +z to n by Rodrigues' formula; divides by the square of the sine between them, so it is not a number for n along z.
+// Rotates +z to n by Rodrigues' formula; divides by the square of the sine between them, so it is NaN for n along z.
 vec3 align(vec3 n, vec3 w) {
     vec3 axis = vec3(-n.y, n.x, 0.0);
     float sin2 = dot(axis, axis);
@@ -40,7 +40,7 @@ Ray ray(uint index) {
     float noise = Floats(l.noise).v[(pixel.y % LARSEN_NOISE) * LARSEN_NOISE + pixel.x % LARSEN_NOISE];
     float angle = 6.28318530718 * fract(noise + 1.61803398875 * float(l.frame_parity));
     vec3 w = align(n, cosine_hemisphere(table_point(l, index % LARSEN_RAYS, angle)));
-    // no ray, and so no occlusion, where the direction is not a number
+    // no ray, and so no occlusion, where the direction is NaN
     if (!(dot(w, w) < 2.0)) return no_ray();
     return Ray(p + LARSEN_BIAS * l.unit * n, 0.0, w, LARSEN_REACH * l.unit);
 }

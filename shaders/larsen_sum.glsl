@@ -1,4 +1,4 @@
-// larsen_sum: the mean of a pixel's 64 rays; 0 where nothing is and where a light is visible.
+// larsen_sum: the mean of a pixel's 64 rays; 0 for the background and where a light is visible.
 #include "common/larsen.glsl"
 
 layout(local_size_x = LANES) in;

@@ -1,5 +1,5 @@
-// larsen_temporal: half of the frame before, looked up where the surface's point was in it, and half of this one. Nothing is ever
-// rejected, but for what has no position.
+// larsen_temporal: the mean of this frame and the previous one, reprojected. The history is never
+// rejected, except for pixels without a position.
 #include "common/larsen.glsl"
 
 layout(local_size_x = LANES) in;
@@ -19,7 +19,7 @@ void main() {
         vec3 c = affine(f.previous_world_to_camera, uintBitsToFloat(Quads(f.surface).v[2u * at].xyz));
         vec2 plane = f.previous_orthographic != 0u ? c.xy : c.xy / -c.z;
         vec2 q = image_point(f, f.previous_view, plane) - 0.5;
-        // a texture's edge goes on for ever
+        // clamp to edge
         q = clamp(q, vec2(-1.0), vec2(f.size));
         ivec2 base = ivec2(floor(q));
         vec2 w = q - vec2(base);

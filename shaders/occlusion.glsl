@@ -1,5 +1,5 @@
-// occlusion: the rays that `primary` left in the queue; says what each sample adds to its pixel. Built twice: with a falloff the
-// nearest hit counts by its distance, without one any hit will do.
+// occlusion: traces the rays that `primary` left in the queue, and stores what each sample adds to its pixel. Compiled twice: with a falloff the
+// nearest hit counts by its distance, without one any hit is enough.
 #include "ao/sample.glsl"
 #include "common/camera.glsl"
 
@@ -9,7 +9,7 @@ Ray ray(uint index) {
     return load_ray(push.rays, index - push.first);
 }
 
-// The tag of a ray is its sample's place in the launch.
+// The tag of a ray is the index of its sample in the launch.
 void add_sample(uint index, float occlusion) {
     BlockParams p = BlockParams(push.pass);
     Samples(p.samples).v[Words(p.queue.tags).v[index]] = 1.0 - occlusion;

@@ -1,11 +1,10 @@
 // primary: one camera ray per sample, jittered within its pixel; where it meets the scene, the occlusion ray that leaves from
-// there is appended to the queue (ao/sample.glsl). A sample that meets nothing
-// costs nothing from here on.
+// there is appended to the queue (ao/sample.glsl). A sample without a hit has no further cost.
 #include "ao/hemisphere.glsl"
 #include "ao/sample.glsl"
 #include "common/warp.glsl"
 
-// The index is of the block.
+// The index is that of the block.
 Ray camera_sample(BlockParams p, uint index) {
     uvec2 pixel = block_pixel(p, pixel_index(index));
     if (!in_block(p, pixel)) return no_ray();
@@ -33,7 +32,7 @@ void closest(uint index, Hit hit) {
         dump_ray(p.occlusion_dump, index, no_ray());
         return;
     }
-    // the point on a triangle follows from its corners; only a sphere asks for the ray again
+    // the point on a triangle follows from its corners; only a sphere needs the ray again
     Surface s = surface_at(HAS_SPHERES ? camera_sample(p, index) : no_ray(), hit);
     Ray r = sample_occlusion(p, index, s);
     dump_ray(p.occlusion_dump, index, r);

@@ -1,4 +1,4 @@
-// rays: traces a set of rays from memory; writes a hit record each, or whether the way is blocked.
+// rays: traces a set of rays from memory; writes a hit record for each, or whether it is occluded.
 #include "common/types.glsl"
 #include "interface/ray_set.glsl"
 

@@ -5,7 +5,7 @@
 
 bool add_sample(inout FilmPixel pixel, BlockParams p, uint k) {
     float accessibility = Floats(p.samples).v[k];
-    // met nothing: counts 0
+    // a sample without a hit counts as 0
     if (accessibility < 0.0) return false;
     add_value(pixel, 0u, accessibility);
     pixel.covered++;

@@ -1,23 +1,23 @@
-// temporal: what earlier frames know of a pixel's surface, and this frame's samples added to it.
+// temporal: reprojects the history of a pixel's surface and adds this frame's samples to it.
 //
-// The surface's point is looked up where it was in the previous image; of the four pixels around, those count that show the same
-// surface (distance from its plane, normal, id). A history counts its samples, and a new one weighs by that count, up to a limit
-// (Nehab et al., "Accelerating Real-Time Shading with Reverse Reprojection Caching", 2007). Occlusion is of the world, so a moving
-// camera makes no history wrong; what moves does, near it and by no more than it covers of the hemisphere: so much is taken to be
-// the variance that a frame adds (a Kalman filter's process noise), and where it counts the history is also held to what this frame's
-// samples around say (Karis, "High-Quality Temporal Supersampling", 2014, with the standard error of their mean for a width).
+// The surface point is reprojected to the previous image; of the four pixels around it, those count that show the same
+// surface (distance from its plane, normal, id). A history has a number of samples, by which it is weighted, up to a limit
+// (Nehab et al., "Accelerating Real-Time Shading with Reverse Reprojection Caching", 2007). Occlusion does not depend on the view, so a moving
+// camera invalidates no history. Moving geometry does, near it and by the fraction of the hemisphere that it covers: that is taken for
+// the variance that a frame adds (a Kalman filter's process noise), and there the history is also clamped to this frame's
+// samples nearby (Karis, "High-Quality Temporal Supersampling", 2014, with the standard error of their mean as the width).
 #include "common/frame.glsl"
 #include "interface/passes.glsl"
 
 layout(local_size_x = LANES) in;
 
-// Samples' variance is at least this where it is not known yet: a handful of equal ones say little.
+// Minimum variance of samples while it is not known yet: a few equal samples say little.
 const float MIN_VARIANCE = 0.02;
-// Half side of the neighbourhood that a history is held to, pixels.
+// Radius in pixels of the neighbourhood to which a history is clamped.
 const int CLAMP_RADIUS = 3;
 
-// By how much the accessibility of a point may have changed in this frame: the share of the cosine-weighted hemisphere that balls around what
-// moved cover.
+// Maximum change of a point's ambient visibility in this frame: the fraction of the cosine-weighted hemisphere that is covered by the bounding
+// spheres of what moved.
 float possible_change(TemporalParams p, FrameParams f, vec3 position, vec3 normal) {
     float change = 0.0;
     MovedRecords moved = MovedRecords(p.moved);
@@ -29,7 +29,7 @@ float possible_change(TemporalParams p, FrameParams f, vec3 position, vec3 norma
         vec3 to = 0.5 * (m.lower + m.upper) - position;
         float radius = 0.5 * length(m.upper - m.lower);
         float far2 = dot(to, to);
-        // below the horizon altogether
+        // entirely below the horizon
         if (dot(normal, to) < -radius) continue;
         float cover = min(radius * radius / max(far2, 1e-30), 1.0);
         if (gap2 == 0.0) cover = 1.0;
@@ -38,7 +38,7 @@ float possible_change(TemporalParams p, FrameParams f, vec3 position, vec3 norma
     return min(change, 1.0);
 }
 
-// Mean of this frame's samples over the pixels around that show the same surface; variance: of that mean.
+// Mean of this frame's samples over the surrounding pixels of the same surface; `variance` is that of the mean.
 Estimate surroundings(TemporalParams p, FrameParams f, ivec2 pixel, EdgeTest edge) {
     float sum = 0.0, squares = 0.0, n = 0.0;
     uvec2 current = p.current, guide = f.guide;
@@ -59,18 +59,18 @@ Estimate surroundings(TemporalParams p, FrameParams f, ivec2 pixel, EdgeTest edg
     return Estimate(mean, n, (max(squares / n - mean * mean, 0.0) + MIN_VARIANCE) / n);
 }
 
-// The history of a surface's point; no samples: there is none. `bent`: that of its bent normal.
+// The history of a surface point; zero samples if there is none. `bent`: the history of its bent normal.
 Estimate reprojected(TemporalParams p, FrameParams f, vec3 before, vec3 normal, uint id, inout vec3 bent) {
     Estimate none = Estimate(0.0, 0.0, 0.0);
     vec3 c = affine(f.previous_world_to_camera, before);
     bool orthographic = f.previous_orthographic != 0u;
     if (!orthographic && !(c.z < 0.0)) return none;
     vec2 at = image_point(f, f.previous_view, orthographic ? c.xy : c.xy / -c.z) - 0.5;
-    // also what is not a number
+    // also for NaN
     if (!(all(greaterThan(at, vec2(-1.0))) && all(lessThan(at, vec2(f.size))))) return none;
     ivec2 base = ivec2(floor(at));
     vec2 inside = at - vec2(base);
-    // a pixel that was hit in its middle is taken alone: nothing blurs while nothing moves
+    // a pixel that is hit at its centre is taken alone: a static view is not blurred
     inside = mix(inside, round(inside), lessThan(abs(inside - round(inside)), vec2(1e-3)));
     EdgeTest edge = edge_test(f, f.previous_world_to_camera, f.previous_view, orthographic, before, normal, at + 0.5);
     float weight = 0.0, mean = 0.0, samples = 0.0, variance = 0.0;
@@ -92,7 +92,7 @@ Estimate reprojected(TemporalParams p, FrameParams f, vec3 before, vec3 normal, 
         variance += w * e.variance;
         if (BENT_NORMALS) bents += w * load_vec3(p.previous_bent_history, tap);
     }
-    // less than a hundredth of the footprint was seen
+    // less than a hundredth of the footprint was visible
     if (weight < 0.01) return none;
     if (BENT_NORMALS) bent = bents / weight;
     return Estimate(mean / weight, samples / weight, variance / weight);
@@ -109,7 +109,7 @@ void main() {
         return;
     }
     Estimate now = unpack_estimate(LOAD_PAIR(p.current, at));
-    // what is not a number never enters a history
+    // NaN never enters a history
     if (!(now.mean >= 0.0 && now.mean <= 1.0)) now = Estimate(0.0, 0.0, 0.0);
     Estimate past = Estimate(0.0, 0.0, 0.0);
     vec3 bent = vec3(0.0);
@@ -144,9 +144,9 @@ void main() {
         float share = now.samples / total;
         float difference = now.mean - past.mean;
         e.mean = past.mean + share * difference;
-        // of all samples about their common mean
+        // variance of all samples about their common mean
         e.variance = mix(past.variance, now.variance, share) + share * (1.0 - share) * difference * difference;
-        // without samples there is nothing at its place
+        // a pixel without samples has no value
         if (BENT_NORMALS && now.samples > 0.0) bent = mix(bent, load_vec3(p.current_bent, at), share);
     }
     STORE_PAIR(p.history, at, pack_estimate(e));

@@ -1,6 +1,6 @@
-//! Writing files so that each is there as a whole or not at all, and the folder for what runs keep.
+//! Atomic file output, and the cache folder.
 //!
-//! A file is written beside its target and renamed, so that a run that is broken off leaves no half-written one.
+//! A file is written next to its target and renamed, so that an interrupted run leaves no incomplete file.
 
 use std::fs::{self, File, OpenOptions, Permissions};
 use std::io::{self, Seek};
@@ -8,9 +8,9 @@ use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Result};
 
-/// Where a path leads, and how to write there.
+/// What a path refers to, and how to write it.
 enum Target {
-    /// A regular file, there already or not: write beside it, then rename.
+    /// A regular file, existing or new: write next to it, then rename.
     File { path: PathBuf, permissions: Option<Permissions> },
     /// A device, FIFO or socket: renaming would replace it by a file, so copy into it.
     Stream,
@@ -36,12 +36,12 @@ fn target(path: &Path) -> io::Result<Target> {
     }
 }
 
-/// An empty file in the folder of `path`, removed again unless it is renamed.
+/// Creates an empty temporary file in the folder of `path`, removed on drop unless it is renamed.
 fn temporary_beside(path: &Path) -> io::Result<tempfile::NamedTempFile> {
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let mut builder = tempfile::Builder::new();
     builder.prefix(".skylit-").suffix(".tmp");
-    // what the umask leaves of it: the mode any newly made file would have
+    // subject to the umask: the mode of any newly created file
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
     builder.tempfile_in(folder).map_err(|e| match e.kind() {
@@ -51,8 +51,8 @@ fn temporary_beside(path: &Path) -> io::Result<tempfile::NamedTempFile> {
     })
 }
 
-/// Can `path` be written? Asked before long work starts: its folder must exist and take new files, and what is there
-/// already must be a file that may be overwritten (or a device). Leaves nothing behind.
+/// Checks, before long work starts, that `path` can be written: its folder must exist and accept new files, and an existing
+/// file must be writable (or a device). Leaves no files behind.
 pub fn check_writable(path: &Path) -> Result<()> {
     let check = || match target(path)? {
         Target::File { path, .. } => temporary_beside(&path).map(drop),
@@ -61,38 +61,38 @@ pub fn check_writable(path: &Path) -> Result<()> {
     check().map_err(|e| Error::write(path, &e))
 }
 
-/// A file that is written beside its place and takes it once it is complete. What was there before stays until then; dropped
-/// before, it leaves nothing behind. An existing file keeps its permissions, a symbolic link stays a link; a device or FIFO
-/// receives the bytes once they are all there.
+/// A file that replaces its target once it is complete. An existing file stays until then; dropped without [`AtomicFile::commit`],
+/// it leaves nothing behind. An existing file keeps its permissions, a symbolic link stays a link; a device or FIFO
+/// receives the bytes on commit.
 #[derive(Debug)]
 pub struct AtomicFile {
-    /// As the user named it.
+    /// The path as the user gave it.
     path: PathBuf,
-    place: Place,
+    destination: Destination,
 }
 
 #[derive(Debug)]
-enum Place {
+enum Destination {
     Beside { file: tempfile::NamedTempFile, path: PathBuf, permissions: Option<Permissions> },
     Stream(File),
 }
 
 impl AtomicFile {
-    /// An empty one that is to become `path`.
+    /// Creates an empty file that will become `path`.
     pub fn create(path: &Path) -> Result<Self> {
-        let place = || match target(path)? {
-            Target::File { path, permissions } => Ok(Place::Beside { file: temporary_beside(&path)?, path, permissions }),
-            Target::Stream => Ok(Place::Stream(tempfile::tempfile()?)),
+        let destination = || match target(path)? {
+            Target::File { path, permissions } => Ok(Destination::Beside { file: temporary_beside(&path)?, path, permissions }),
+            Target::Stream => Ok(Destination::Stream(tempfile::tempfile()?)),
         };
-        let place = place().map_err(|e| Error::write(path, &e))?;
-        Ok(Self { path: path.to_owned(), place })
+        let destination = destination().map_err(|e| Error::write(path, &e))?;
+        Ok(Self { path: path.to_owned(), destination })
     }
 
-    /// Where to write.
+    /// The temporary file to write to.
     pub fn file(&mut self) -> &mut File {
-        match &mut self.place {
-            Place::Beside { file, .. } => file.as_file_mut(),
-            Place::Stream(file) => file,
+        match &mut self.destination {
+            Destination::Beside { file, .. } => file.as_file_mut(),
+            Destination::Stream(file) => file,
         }
     }
 
@@ -101,17 +101,17 @@ impl AtomicFile {
         self.file().try_clone().map_err(|e| self.failed(&e))
     }
 
-    /// Puts what was written in its place.
+    /// Replaces the target by what was written.
     pub fn commit(self) -> Result<()> {
-        let Self { path: named, place } = self;
-        let run = || match place {
-            Place::Beside { file, path, permissions } => {
+        let Self { path: named, destination } = self;
+        let run = || match destination {
+            Destination::Beside { file, path, permissions } => {
                 if let Some(permissions) = permissions {
                     file.as_file().set_permissions(permissions)?;
                 }
                 file.persist(&path).map(drop).map_err(|e| e.error)
             }
-            Place::Stream(mut file) => {
+            Destination::Stream(mut file) => {
                 file.rewind()?;
                 io::copy(&mut file, &mut OpenOptions::new().write(true).open(&named)?).map(drop)
             }
@@ -119,20 +119,20 @@ impl AtomicFile {
         run().map_err(|e| Error::write(&named, &e))
     }
 
-    /// What a failed write into it is told as.
+    /// The error of a failed write to this file.
     pub fn failed(&self, error: &io::Error) -> Error {
         Error::write(&self.path, error)
     }
 }
 
-/// Lets `write` fill an [`AtomicFile`]: on failure nothing is left behind, and what was there before stays.
+/// Lets `write` fill an [`AtomicFile`]: on failure nothing is left behind, and an existing file is unchanged.
 pub fn write_atomically(path: &Path, write: impl FnOnce(&mut File) -> io::Result<()>) -> Result<()> {
     let mut file = AtomicFile::create(path)?;
     write(file.file()).map_err(|e| file.failed(&e))?;
     file.commit()
 }
 
-/// The folder for what runs keep for later ones: `$XDG_CACHE_HOME/skylit`, or `~/.cache/skylit`; `None` without either variable.
+/// The cache folder: `$XDG_CACHE_HOME/skylit`, or `~/.cache/skylit`; `None` without either variable.
 pub fn cache_folder() -> Option<PathBuf> {
     let base = std::env::var_os("XDG_CACHE_HOME").map(PathBuf::from).filter(|p| p.is_absolute());
     base.or_else(|| std::env::var_os("HOME").map(|h| PathBuf::from(h).join(".cache"))).map(|p| p.join("skylit"))

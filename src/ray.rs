@@ -1,18 +1,18 @@
-//! Rays and hits as they lie in files and in device memory.
+//! Ray and hit records, with the same layout in files and in device memory.
 
 pub use crate::interface::records::ray::{Hit, Ray};
 
 impl Hit {
-    /// The record of a ray that met nothing.
+    /// The record of a miss.
     pub const MISS: Hit = Hit { t: f32::INFINITY, instance: u32::MAX, primitive: u32::MAX, u: 0.0, v: 0.0 };
 
-    /// Did the ray meet something?
+    /// Is it a hit?
     pub fn is_hit(&self) -> bool {
         self.t < f32::INFINITY
     }
 }
 
-/// Moves rays: between the world of files and the tracers' coordinates, which differ for a scene far from the origin.
+/// Translates ray origins between the world coordinates of files and the tracers' coordinates, which differ for a scene far from the origin.
 pub fn translate(rays: &mut [Ray], by: glam::DVec3) {
     if by != glam::DVec3::ZERO {
         for r in rays {

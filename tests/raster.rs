@@ -16,7 +16,7 @@ use skylit::gpu::{Buffer, Commands, Device, Memory};
 use skylit::integrators::aov::{self, AovPixel};
 use skylit::oracle::Oracle;
 use skylit::oracle::camera::camera_ray;
-use skylit::raster::{Drawn, Primary, Raster, View};
+use skylit::raster::{DrawStats, Primary, Raster, View};
 use skylit::scene::builtin::shapes;
 use skylit::scene::{Camera, Geometry, Instance, Mesh, Motion, Projection, Scene};
 use skylit::tracer::{Changes, MeshChange, Push, Tracer, TracerKind};
@@ -403,7 +403,7 @@ fn gpu_drawn_scenes_follow_updates() {
 }
 
 /// Draws one view and hands out what the auxiliary outputs of its block are, in the block's order.
-fn draw(raster: &Raster, tracer: &Tracer, view: &View, seen: &View) -> (Vec<AovPixel>, Drawn) {
+fn draw(raster: &Raster, tracer: &Tracer, view: &View, seen: &View) -> (Vec<AovPixel>, DrawStats) {
     let device = tracer.device();
     let count = seen.block.rays();
     let target = Buffer::new(device, "outputs", 64 * count as u64, Memory::Readback).unwrap();

@@ -1,4 +1,4 @@
-// The hemisphere over which the occlusion rays of a surface point go: on the side that the viewer sees.
+// The hemisphere of a surface point's occlusion rays: on the side of the viewer.
 #ifndef AO_HEMISPHERE
 #define AO_HEMISPHERE
 #include "common/camera.glsl"

@@ -1,4 +1,4 @@
-// Pixels of a block of the image, and the camera's rays through them.
+// Pixels of a block of the image, and their camera rays.
 #ifndef COMMON_CAMERA
 #define COMMON_CAMERA
 #include "common/types.glsl"
@@ -7,8 +7,8 @@
 #include "common/queue.glsl"
 #include "common/sampler.glsl"
 
-// A ray index counts the samples of a pixel before the pixels of the block, so that neighbouring lanes share a pixel. Pixels are
-// counted in 8x8 tiles, Morton order within: with one sample eight neighbouring lanes are a 4x2 patch.
+// A ray index counts the samples of a pixel before the pixels of the block, so that adjacent lanes share a pixel. Pixels are
+// counted in 8x8 tiles in Morton order: with one sample eight adjacent lanes are a 4x2 patch.
 uint pixel_index(uint ray_index) {
     return ray_index >> push.sample_bits;
 }
@@ -17,7 +17,7 @@ uint sample_index(uint ray_index) {
     return push.sample_index + (ray_index & ((1u << push.sample_bits) - 1u));
 }
 
-// Pixel within the block.
+// The pixel in the block of a ray index.
 uvec2 block_pixel(BlockParams p, uint pixel) {
     uint tile = pixel >> 6;
     if (!is_null(p.tiles)) tile = Words(p.tiles).v[tile];
@@ -42,20 +42,20 @@ Ray camera_ray(BlockParams p, vec2 at) {
     return Ray(eye, 0.0, normalize(vec3(dot(rows[0].xyz, d), dot(rows[1].xyz, d), dot(rows[2].xyz, d))), INFINITY);
 }
 
-// Ray of an index through the centre of its pixel; none for padding.
+// The ray of an index, through the centre of its pixel; an invalid ray for padding.
 Ray centre_ray(BlockParams p, uint ray_index) {
     uvec2 pixel = block_pixel(p, pixel_index(ray_index));
     if (!in_block(p, pixel)) return no_ray();
     return camera_ray(p, vec2(pixel + p.block_origin) + 0.5);
 }
 
-// From the camera towards a point, of any length.
+// Direction from the camera to a point, not normalized.
 vec3 view_direction(BlockParams p, vec3 position) {
     vec4 rows[3] = p.camera_to_world;
     return p.orthographic != 0u ? -vec3(rows[0].z, rows[1].z, rows[2].z) : position - vec3(rows[0].w, rows[1].w, rows[2].w);
 }
 
-// For --dump-rays: what is about to be traced.
+// For --dump-rays: stores the rays before they are traced.
 void dump_ray(uvec2 dump, uint index, Ray ray) {
     if (!is_null(dump)) store_ray(dump, index - push.first, ray);
 }

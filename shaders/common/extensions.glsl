@@ -1,4 +1,4 @@
-// What every shader may use; the rest is asked for where it is used.
+// GLSL extensions that every shader may use; others are enabled where they are used.
 #ifndef COMMON_EXTENSIONS
 #define COMMON_EXTENSIONS
 #extension GL_EXT_buffer_reference : require

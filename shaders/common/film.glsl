@@ -1,7 +1,7 @@
-// The film on the device, and the pass that adds the samples of a launch to it, a thread a pixel, in the order of the samples: sums do not depend on how
-// the samples were cut into launches, nor on which of them was traced first.
+// The film in device memory, and the pass that adds the samples of a launch to it, one thread per pixel, in the order of the samples: sums do not depend on how
+// the samples were divided into launches, nor on the order of tracing.
 //
-// Who includes this defines FilmPixel and Film, which are one of the records below, and `add_sample`. Sums are compensated (Kahan 1965): a million samples keep their digits.
+// The including shader defines FilmPixel and Film, which are one of the records below, and `add_sample`. Sums are compensated (Kahan 1965), so a million samples keep their precision.
 #ifndef COMMON_FILM
 #define COMMON_FILM
 #include "common/camera.glsl"
@@ -9,7 +9,7 @@
 
 layout(local_size_x = LANES) in;
 
-// x: sum, y: what it has too much.
+// x: sum, y: its rounding error.
 vec2 kahan_add(vec2 sum, float x) {
     precise float y = x - sum.y;
     precise float t = sum.x + y;

@@ -1,6 +1,6 @@
-// The mean over a pixel's neighbours on the same surface, each counting by its samples: so what has no sample yet gets its value
-// from what has (joint bilateral upsampling; Kopf, Cohen, Lischinski, Uyttendaele 2007). A box whose radius is just large enough that
-// the mean rests on `filter_samples` samples; or its two sides one after the other; or a small box again and again with holes that
+// The mean over a pixel's neighbours on the same surface, weighted by their samples, so that pixels without samples get their value
+// from neighbours (joint bilateral upsampling; Kopf, Cohen, Lischinski, Uyttendaele 2007). The kernel is a box whose radius is just large enough for
+// the mean to have `filter_samples` samples; or its two axes one after the other; or a small box repeatedly with strides that
 // double (a trous; Dammertz, Sewtz, Hanika, Lensch, "Edge-Avoiding A-Trous Wavelet Transform for fast Global Illumination Filtering",
 // HPG 2010).
 //
@@ -9,19 +9,19 @@
 // 1980), and a little more: a few pixels tell their spread badly (James, Stein, "Estimation with Quadratic Loss", 1961). Weights are 0
 // or a number of samples: nothing crosses an edge, and a constant stays what it is.
 //
-// Who includes this says what is filtered, a VALUE of one channel or of several, and what is known of it: an ESTIMATE, with a mean, the
-// number of samples behind it and the variance of one. Besides:
+// The including shader defines what is filtered, a VALUE of one or several channels, and an ESTIMATE of it, with a mean, the
+// number of samples behind it and the variance of one. Furthermore:
 //   uint filtered_pixel()                          the pixel of this thread
 //   ESTIMATE load_estimate(image, at)
-//   bool is_neighbour(edge, offset, own, guide)    do two pixels show the same surface?
-//   VALUE prior_variance(mean, spread, samples)    what to take for the variance where samples have not told of it: by the mean of a box,
-//                                                  the variance of its pixels and the samples that a pixel has
+//   bool is_neighbour(edge, offset, own, guide)    whether two pixels show the same surface
+//   VALUE prior_variance(mean, spread, samples)    the variance to assume while there are few samples: from the mean of a box,
+//                                                  the variance of its pixels and the samples per pixel
 //   float total(value)                             a sum over channels
-//   ESTIMATE guess(p, f, image, pixel, own)        of a pixel without samples in its box
-//   void finish(p, f, at, estimate, bent)          writes the result; finish_nothing(p, f, at): of a pixel that is not filtered
-//   PRIOR_SAMPLES                                  so many samples count as few
-//   LONELY                                         a pixel whose box holds fewer samples of its surface also takes those of surfaces that are
-//                                                  turned and offset a little more
+//   ESTIMATE guess(p, f, image, pixel, own)        the value of a pixel without samples in its box
+//   void finish(p, f, at, estimate, bent)          writes the result; finish_nothing(p, f, at): for a pixel that is not filtered
+//   PRIOR_SAMPLES                                  weight of the prior variance, in samples
+//   LONELY                                         a pixel whose box has fewer samples of its surface than this also takes those of surfaces whose normals
+//                                                  and planes differ a little more
 #ifndef COMMON_FILTER
 #define COMMON_FILTER
 #include "common/frame.glsl"
@@ -36,7 +36,7 @@ float mean_variance(FilterParams p, float n) {
     return p.evenness > 0.0 ? pow(max(n, 1.0), -p.evenness) : 1.0;
 }
 
-// Pixels to each side.
+// Radius in pixels.
 int box_radius(FilterParams p, float samples) {
     float side = sqrt(p.samples / max(samples, 0.25));
     return int(clamp(ceil(0.5 * (side - 1.0)), 0.0, float(p.radius)));
@@ -60,7 +60,7 @@ void main() {
     ESTIMATE own = load_estimate(estimates, at);
     vec3 own_bent = BENT_NORMALS ? load_bent(p, at) : vec3(0.0);
     int stride = int(p.stride);
-    // a step with holes is of one size; it is left out where there are samples enough
+    // a step with strides has a fixed radius; it is skipped where there are enough samples
     int radius = stride > 1 ? (own.samples < p.samples ? int(p.radius) : 0) : box_radius(p, own.samples);
     if (radius == 0) {
         finish(p, f, at, own, own_bent);

@@ -1,4 +1,4 @@
-// What the passes of a frame share.
+// Functions that the passes of a frame share.
 #ifndef COMMON_FRAME
 #define COMMON_FRAME
 #include "common/types.glsl"
@@ -15,7 +15,7 @@ void store_vec3(uvec2 image, uint at, vec3 value) {
     for (uint k = 0u; k < 3u; k++) target.v[3u * at + k] = value[k];
 }
 
-// Pixel of an index that counts the image's tiles of 8x8.
+// The pixel of an index that counts the image in 8x8 tiles.
 uvec2 tile_pixel(FrameParams f, uint k) {
     return tile_pixel(k >> 6, f.tiles_x, k & 63u);
 }
@@ -29,7 +29,7 @@ uint pack_normal(vec3 n) {
     return packSnorm4x8(vec4(n, 0.0)) & 0xffffffu;
 }
 
-// Eight bits that tell most ids apart.
+// An 8-bit hash of an id.
 uint id_bits(uint id) {
     return (id * 0x9e3779b1u) >> 24;
 }
@@ -54,25 +54,25 @@ float spawn_offset_at(FrameParams f, uint at) {
     return uintBitsToFloat(LOAD_PAIR(f.surface, 4u * at + 1u).y);
 }
 
-// Where on the plane at unit distance (or, with parallel rays, on the plane of the camera) a point of the image is; pixels from the
+// Position on the image plane at unit distance (for an orthographic camera, on the camera's plane) of a point of the image, in pixels from the
 // upper left corner.
 vec2 image_plane(FrameParams f, vec2 view, vec2 at) {
     vec2 ndc = 2.0 * at / vec2(f.size) - 1.0;
     return vec2(ndc.x, -ndc.y) * view;
 }
 
-// The other way.
+// The inverse.
 vec2 image_point(FrameParams f, vec2 view, vec2 plane) {
     vec2 ndc = plane / view;
     return (vec2(ndc.x, -ndc.y) * 0.5 + 0.5) * vec2(f.size);
 }
 
-// A point in camera space from its place on the image plane and its view depth.
+// A point in camera space from its position on the image plane and its view depth.
 vec3 unproject(bool orthographic, vec2 plane, float depth) {
     return orthographic ? vec3(plane, -depth) : vec3(plane * depth, -depth);
 }
 
-// Side of a pixel's footprint at a depth, world units.
+// Side of a pixel's footprint at a depth, in scene units.
 float footprint(FrameParams f, vec2 view, bool orthographic, float depth) {
     float side = 2.0 * view.y / float(f.size.y);
     return orthographic ? side : side * depth;
@@ -86,9 +86,9 @@ vec3 linear(vec4 rows[3], vec3 v) {
     return vec3(dot(rows[0].xyz, v), dot(rows[1].xyz, v), dot(rows[2].xyz, v));
 }
 
-// Tells whether neighbours of a point of the image show the same surface: they lie on its plane, by so much, and their normals are
-// like its own. The distance from the plane of what a pixel shows follows from its depth and an expression that is linear in the
-// pixel's place.
+// Decides whether neighbours of a point of the image show the same surface: they must be within a tolerance of its plane, and have similar
+// normals. The distance of a pixel's surface from the plane follows from its depth and an expression that is linear in the
+// pixel's position.
 struct EdgeTest {
     vec3 normal;        // world
     float cosine;
@@ -99,7 +99,7 @@ struct EdgeTest {
     bool orthographic;
 };
 
-// `centre`: the point's place in the image, pixels; position and normal in world space.
+// `centre`: position of the point in the image, in pixels; position and normal in world space.
 EdgeTest edge_test(FrameParams f, vec4 world_to_camera[3], vec2 view, bool orthographic, vec3 position, vec3 normal, vec2 centre) {
     EdgeTest e;
     vec3 c = affine(world_to_camera, position), n = linear(world_to_camera, normal);
@@ -116,12 +116,12 @@ EdgeTest edge_test(FrameParams f, vec4 world_to_camera[3], vec2 view, bool ortho
     return e;
 }
 
-// `offset`: from the point to the neighbour, pixels.
+// `offset`: from the point to the neighbour, in pixels.
 bool on_plane(EdgeTest e, vec2 offset, uvec2 guide) {
     float depth = uintBitsToFloat(guide.x);
     float s = e.at + offset.x * e.right + offset.y * e.down;
     float off = (e.orthographic ? s + depth * e.by_depth : s * depth) - e.distance;
-    // not so where the depth is infinite
+    // false where the depth is infinite
     return abs(off) <= e.tolerance;
 }
 
@@ -129,7 +129,7 @@ bool same_surface(EdgeTest e, vec2 offset, uvec2 guide) {
     return on_plane(e, offset, guide) && dot(e.normal, unpackSnorm4x8(guide.y).xyz) >= e.cosine;
 }
 
-// A mean over samples: how many there are, and the variance of one.
+// A mean over samples: their number, and the variance of one.
 struct Estimate {
     float mean;
     float samples;
@@ -137,7 +137,7 @@ struct Estimate {
 };
 
 uvec2 pack_estimate(Estimate e) {
-    // sixteenths of a sample: interpolated histories have parts of them
+    // in sixteenths of a sample, because interpolated histories have fractions
     uint samples = uint(clamp(e.samples, 0.0, 4095.0) * 16.0 + 0.5);
     uint variance = uint(clamp(e.variance * (65535.0 / MAX_VARIANCE), 0.0, 65535.0) + 0.5);
     return uvec2(floatBitsToUint(e.mean), samples << 16 | variance);
@@ -149,17 +149,17 @@ Estimate unpack_estimate(uvec2 bits) {
 
 bool is_sampled(FrameParams f, uvec2 pixel) {
     if (f.pattern == PATTERN_CHECKER) return ((pixel.x + pixel.y + f.frame) & 1u) == 0u;
-    // one of each 2x2, opposite corners in turn
+    // one of each 2x2 pixels, opposite corners in turn
     if (f.pattern == PATTERN_QUARTER) return (0x9cu >> (2u * (f.frame & 3u)) & 3u) == ((pixel.x & 1u) | (pixel.y & 1u) << 1);
     return true;
 }
 
-// Has a pixel of a surface all its samples?
+// Whether a pixel of a surface has all its samples.
 bool is_resting(FrameParams f, uint at) {
     return f.rest != 0u && unpack_estimate(LOAD_PAIR(f.previous_history, at)).samples >= f.most_samples;
 }
 
-// Has a pixel rays in this frame?
+// Whether a pixel has rays in this frame.
 bool has_rays(FrameParams f, uvec2 pixel, uint at) {
     return is_sampled(f, pixel) && is_surface(LOAD_PAIR(f.guide, at)) && !is_resting(f, at);
 }

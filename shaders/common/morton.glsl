@@ -1,4 +1,4 @@
-// Morton order, the same as src/sampling/morton.rs: pixels of aligned squares of 2^k follow each other.
+// Morton order, the same as src/sampling/morton.rs: pixels of aligned squares of 2^k are consecutive.
 #ifndef COMMON_MORTON
 #define COMMON_MORTON
 

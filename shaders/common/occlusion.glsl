@@ -1,4 +1,4 @@
-// Where the occlusion rays of a frame go: what traces them and what adds them up agree on it without keeping it in memory.
+// Directions of a frame's occlusion rays: the pass that traces them and the pass that sums them compute the same ones, so they need no memory.
 #ifndef COMMON_OCCLUSION
 #define COMMON_OCCLUSION
 #include "common/frame.glsl"
@@ -7,7 +7,7 @@
 #include "interface/passes.glsl"
 
 vec2 direction_sample(AoTraceParams p, FrameParams f, uvec2 pixel, uint k) {
-    // with a budget a pixel's sequence goes on where it stopped
+    // with a budget a pixel's sequence continues where it stopped
     if (!is_null(p.plan)) return sequence_2d(f.sequence, f.seed, pixel, (LOAD_PAIR(p.plan, image_index(f, pixel)).x >> 8) + k, 0u, 1u);
     // what is ordered over the image counts the pixels that are sampled, what is ordered over time the frames in which they are
     if (f.sequence == SEQUENCE_BLUE) {

@@ -1,6 +1,6 @@
-// A random number of each ray, by which partial coverage is decided (scene/material.glsl). It is in the bits of tmin, which every tracer has at hand where
-// it tests alpha, and so small as a length (below 2^-61) that no hit is lost. It follows from the pixel, the sample and the vertex alone, so it is the
-// same whatever the launches and the tracer.
+// A random number per ray for stochastic alpha (scene/material.glsl). It is stored in the bits of tmin, which every tracer can read where
+// it tests alpha, and which is so small as a length (below 2^-61) that no hit is lost. It depends on the pixel, the sample and the vertex alone, so it is the
+// same for all launches and tracers.
 #ifndef COMMON_RAY_SEED
 #define COMMON_RAY_SEED
 #include "common/sampler.glsl"

@@ -1,4 +1,4 @@
-// Where the directions of occlusion rays come from, frame after frame: the same functions, bit for bit, as src/sampling/sequence.rs,
+// Sample positions of occlusion rays in successive frames: the same functions, bit for bit, as src/sampling/sequence.rs,
 // which cites the papers.
 #ifndef COMMON_SEQUENCE
 #define COMMON_SEQUENCE

@@ -1,4 +1,4 @@
-// Rays, hits and raw memory: what every stream and every tracer speaks.
+// Rays, hits and raw memory access, for all streams and tracers.
 #ifndef COMMON_TYPES
 #define COMMON_TYPES
 #include "interface/constants.glsl"
@@ -58,7 +58,7 @@ Ray load_ray(uvec2 rays, uint k) {
     return Ray(a.xyz, a.w, b.xyz, b.w);
 }
 
-// Rays that this launch has to trace. Everything beyond is to be left alone.
+// The number of rays that this launch traces. Work-groups must not touch anything beyond.
 uint ray_count() {
     if (is_null(push.queued)) return push.count;
     uint queued = Words(push.queued).v[0];

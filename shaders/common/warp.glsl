@@ -1,5 +1,5 @@
-// Unit square to disk, hemisphere and frame: the expressions of src/sampling/warp.rs, which cites the papers. Sine and cosine
-// are polynomials, so that a driver's own (Vulkan allows 2^-11 of error) does not matter.
+// Warps from the unit square to disk and hemisphere, and orthonormal frames: the expressions of src/sampling/warp.rs, which cites the papers. Sine and cosine
+// are polynomials, so that a driver's precision (Vulkan allows errors of 2^-11) does not matter.
 #ifndef COMMON_WARP
 #define COMMON_WARP
 
@@ -62,7 +62,7 @@ float turns_of(float y, float x) {
     return y < 0.0 ? -turns : turns;
 }
 
-// even over the hemisphere about z
+// Uniform over the hemisphere about z.
 vec3 uniform_hemisphere(vec2 u) {
     return vec3(sqrt(max(1.0 - u.x * u.x, 0.0)) * on_circle(u.y), u.x);
 }
@@ -86,7 +86,7 @@ Frame frame_about(vec3 n) {
     return Frame(to_world(n, vec3(1.0, 0.0, 0.0)), to_world(n, vec3(0.0, 1.0, 0.0)), n);
 }
 
-// Its first axis as near to `along` as may be.
+// The frame whose first axis is as near to `along` as possible.
 Frame frame_along(vec3 n, vec3 along) {
     vec3 s = along - n * dot(n, along);
     float s2 = dot(s, s);

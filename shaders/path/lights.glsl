@@ -41,7 +41,7 @@ LightSample sample_light(PathParams p, vec3 from, Shading m, uvec2 bits) {
 
 // Density with which sample_light finds, from a point, the emitter that a ray from there met, per solid angle; 0: it never does.
 float met_light_pdf(PathParams p, Hit hit, vec3 from, vec3 wi) {
-    if (!HAS_TRIANGLE_LIGHTS && !HAS_RECTANGLE_LIGHTS && !HAS_SPHERE_LIGHTS) return 0.0;
+    if (!WITH_SURFACE_LIGHTS) return 0.0;
     uint first = Words(p.light_of).v[hit.instance];
     if (first == INVALID) return 0.0;
     uint k = Words(p.light_of).v[first + hit.primitive];

@@ -4,7 +4,7 @@
 
 layout(location = 0) flat out uint primitive;
 
-// A box around the sphere, a little larger: what hits the sphere leaves the box through a back face, wherever it starts.
+// Scale of a box around the sphere: a ray that hits the sphere leaves the box through a back face, wherever it starts.
 const float MARGIN = 1.001;
 
 float determinant_of(vec4 rows[3]) {
@@ -22,7 +22,7 @@ void main() {
     if (!upper) square = square.yx;
     vec3 p = vec3(square, upper ? 1.0 : -1.0);
     p = axis == 0u ? p.zxy : axis == 1u ? p.yzx : p;
-    // where transforms turn the winding, the box reflected in its centre, which turns it again
+    // where transforms reverse the winding, the box is reflected in its centre, which reverses it again
     float turned = RasterParams(push.pass).turned;
     if (!SINGLE_LEVEL) {
         turned *= determinant_of(InstanceRecords(SceneRoot(push.scene).instances).v[push.first].group_to_world) < 0.0 ? -1.0 : 1.0;

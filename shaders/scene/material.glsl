@@ -1,10 +1,10 @@
-// Base colour and alpha of a point on a part.
+// Base colour and alpha at a point of a part (submesh).
 #ifndef SCENE_MATERIAL
 #define SCENE_MATERIAL
 #include "scene/texture.glsl"
 #include "common/ray_seed.glsl"
 
-// Vertex numbers of a triangle, within the group. `primitive` counts in the group.
+// Vertex indices of a triangle in its group. `primitive` is an index in the group.
 uvec3 triangle_indices(PartRecord part, uint primitive) {
     Words w = Words(part.indices);
     return uvec3(w.v[3u * primitive], w.v[3u * primitive + 1u], w.v[3u * primitive + 2u]);
@@ -25,7 +25,7 @@ vec4 vertex_color(PartRecord part, uvec3 corners, vec2 uv) {
            uintBitsToFloat(q.v[corners.z]) * uv.y;
 }
 
-// Linear base colour with alpha at barycentrics uv of a primitive (counted in the group). Spheres have no coordinates.
+// Linear base colour with alpha at barycentrics uv of a primitive (an index in the group). Spheres have no texture coordinates.
 vec4 base_color(PartRecord part, MaterialRecord material, uint primitive, vec2 uv) {
     vec4 color = material.base_color;
     if (is_null(part.indices)) return color;
@@ -40,14 +40,14 @@ vec4 base_color(PartRecord part, MaterialRecord material, uint primitive, vec2 u
     return color;
 }
 
-// A uniform random number in [0, 1) for a ray and a primitive, however often it is asked for. Rays without a seed are told apart by the bits of where
-// they meet the primitive.
+// A uniform random number in [0, 1) for a ray and a primitive, the same in every call. Rays without a seed are distinguished by the bits of their barycentrics
+// on the primitive.
 float coverage_threshold(uint instance, uint primitive, vec2 uv, float tmin) {
     uvec2 ray = has_seed(tmin) ? uvec2(floatBitsToUint(tmin), 0u) : floatBitsToUint(uv);
     return float(hash_combine(hash_combine(hash_combine(hash(ray.x), ray.y), instance), primitive) >> 8) * (1.0 / 16777216.0);
 }
 
-// Is there a surface at this point of an alpha-tested primitive, for a ray that begins at tmin?
+// Whether an alpha-tested primitive is opaque at this point, for a ray that begins at tmin.
 bool alpha_passes(uint instance, uint primitive, vec2 uv, float tmin) {
     SceneRoot root = SceneRoot(push.scene);
     InstanceRecords instances = InstanceRecords(root.instances);

@@ -1,17 +1,17 @@
-// Levels of textures: each half as wide and high as the one before, rounded down, every texel the mean of what it covers. Level 0 is the texture
-// itself (scene/texture.glsl); the others are linear, 16 bits a channel, or floats where the texture has more than 8 bits itself.
+// Mip levels of textures: each half as wide and high as the one before, rounded down, every texel the mean of the texels that it covers. Level 0 is the texture
+// itself (scene/texture.glsl); the others are linear, 16 bits per channel, or floats for textures of more than 8 bits.
 #ifndef SCENE_MIPMAP
 #define SCENE_MIPMAP
 #include "interface/texels.glsl"
 #include "scene/texture.glsl"
 
-// A texel of the levels from 1 on.
+// A texel of levels 1 and up.
 vec4 mean_texel(TextureRecord texture, uvec2 texels, uint i) {
     if (HAS_DEEP_TEXELS && texture.format != FORMAT_UNORM8) return uintBitsToFloat(Quads(texels).v[i]);
     return unorm16(Pairs(texels).v[i]);
 }
 
-// Linear value of a level at uv, filtered as the texture is; of TEXELS_COVERED times alpha.
+// Linear value of a level at uv, filtered as the texture is; for TEXELS_COVERED premultiplied by alpha.
 vec4 sample_level(uint index, TextureRecord texture, vec2 uv, uint kind, uint level) {
     if (level == 0u) {
         vec4 c = sample_texture(index, uv, kind != TEXELS_LINEAR);
@@ -31,17 +31,17 @@ vec4 sample_level(uint index, TextureRecord texture, vec2 uv, uint kind, uint le
                mix(mean_texel(texture, texels, y.y + x.x), mean_texel(texture, texels, y.y + x.y), f.x), f.y);
 }
 
-// Value at uv over a square of 2^lod texels, linear between levels; at lod 0 and below what sample_texture says, bit for bit.
+// Value at uv over a square of 2^lod texels, with linear interpolation between levels; for lod <= 0 the same as sample_texture, bit for bit.
 vec4 sample_mipmap(uint index, vec2 uv, uint kind, float lod) {
     MipRecords mips = MipRecords(SceneRoot(push.scene).mips);
-    // also where it is no number
+    // also for NaN
     if (!(lod > 0.0) || mips.v[index].last == 0u) return sample_texture(index, uv, kind != TEXELS_LINEAR);
     TextureRecord texture = TextureRecords(SceneRoot(push.scene).textures).v[index];
     float whole = min(lod, float(mips.v[index].last));
     uint level = uint(whole);
     float above = whole - float(level);
     vec4 c = vec4(0.0);
-    // one copy of the code for both
+    // a loop, so that the code exists once for both levels
     [[dont_unroll]] for (uint k = 0u; k < 2u; k++) {
         float weight = k == 0u ? 1.0 - above : above;
         if (weight > 0.0) c += weight * sample_level(index, texture, uv, kind, level + k);

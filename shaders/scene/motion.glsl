@@ -1,9 +1,9 @@
-// Where surfaces were in the previous frame.
+// Surface positions in the previous frame.
 #ifndef SCENE_MOTION
 #define SCENE_MOTION
 #include "scene/surface.glsl"
 
-// World position, in the previous frame, of the point of the surface that `hit` is.
+// World position, in the previous frame, of the surface point of `hit`.
 vec3 previous_position(Hit hit, Surface s) {
     SceneRoot root = SceneRoot(push.scene);
     if (is_null(root.motion)) return s.position;

@@ -6,14 +6,14 @@
 #include "interface/texel_format.glsl"
 #include "interface/wrap.glsl"
 
-// The part of a group's primitive, as an index into SceneRoot.parts.
+// The part (submesh) of a group's primitive, as an index into SceneRoot.parts.
 uint part_index(InstanceRecords instances, uint instance, uint primitive) {
     uvec2 part_of = instances.v[instance].part_of;
     uint first = instances.v[instance].first_part;
     return is_null(part_of) ? first : first + Words(part_of).v[primitive];
 }
 
-// From what a tracer knows (entry of the top level, primitive of its group) to the ids of the scene.
+// Converts a tracer's ids (TLAS instance, primitive in its group) to those of the scene.
 Hit scene_hit(float t, uint instance, uint primitive, vec2 uv) {
     SceneRoot root = SceneRoot(push.scene);
     InstanceRecords instances = InstanceRecords(root.instances);
@@ -21,7 +21,7 @@ Hit scene_hit(float t, uint instance, uint primitive, vec2 uv) {
     uint scene_instance = instances.v[instance].scene_instance;
     PartRecords parts = PartRecords(root.parts);
     if (root.part_count == 1u) {
-        // it begins with the group
+        // the only part begins at the first primitive of the group
         if (scene_instance == INVALID) scene_instance = parts.v[0].scene_instance;
     } else if (scene_instance == INVALID) {
         uint part = part_index(instances, instance, primitive);

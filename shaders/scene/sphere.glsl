@@ -1,8 +1,8 @@
-// Ray against sphere.
+// Ray-sphere intersection.
 #ifndef SCENE_SPHERE
 #define SCENE_SPHERE
 
-// The nearest t in (tmin, tmax), or a value that is not in it. The direction need not be of unit length. Discriminant from
+// The nearest t in (tmin, tmax), or a value outside of it. The direction need not have unit length. Discriminant from
 // the perpendicular distance and stable roots: Haines, Gunther, Akenine-Moeller, "Precision Improvements for Ray/Sphere
 // Intersection", Ray Tracing Gems 2019.
 float intersect_sphere(vec3 origin, vec3 direction, float tmin, float tmax, vec3 center, float radius) {

@@ -1,4 +1,4 @@
-// From a hit to the point on the surface, with an offset for new rays that comes from an error bound.
+// Surface points of hits, with a ray offset from an error bound.
 #ifndef SCENE_SURFACE
 #define SCENE_SURFACE
 #include "scene/material.glsl"
@@ -7,10 +7,10 @@ struct Surface {
     vec3 position;   // world
     vec3 ng;         // unit geometric normal, world, on the front (counter-clockwise) side
     vec3 ns;         // unit shading normal, on the side of ng
-    float offset;    // distance along +-ng at which a new ray cannot meet this surface again
-    uint part;       // PartRecord
-    uint entry;      // InstanceRecord
-    uint primitive;  // in the group
+    float offset;    // distance along +-ng at which a new ray cannot hit this surface again
+    uint part;       // index of the PartRecord
+    uint entry;      // index of the InstanceRecord
+    uint primitive;  // index in the group
     vec2 uv;
 };
 
@@ -34,13 +34,13 @@ float spawn_offset(vec4 group_to_world[3], vec4 world_to_group[3], vec3 p, vec3 
     return dot(error, abs(normal)) * scale + dot(world_error, abs(ng));
 }
 
-// Everything about the point that `ray` met. The triangle's own corners are used, not origin + t * direction, whose error
+// The surface point of a hit. It is computed from the triangle's vertices, not from origin + t * direction, whose error
 // grows with t.
 Surface surface_at(Ray ray, Hit hit) {
     SceneRoot root = SceneRoot(push.scene);
     uvec2 placement = uvec2(0u);
     PartRecord part;
-    // the only part of a scene is the same for all lanes: read once for all, not gathered
+    // a scene of one part: read uniformly, without a gather
     if (root.part_count == 1u) {
         part = PartRecords(root.parts).v[0];
         placement.x = SINGLE_LEVEL ? 0u : Pairs(root.placements).v[hit.instance].x;
@@ -48,14 +48,14 @@ Surface surface_at(Ray ray, Hit hit) {
         placement = Pairs(root.placements).v[hit.instance];
         part = PartRecords(root.parts).v[placement.y];
         if (SINGLE_LEVEL && !HAS_SPHERES) {
-            // parts of one group share its arrays: the same for all lanes, too
+            // parts of one group share its arrays, which are uniform too
             part.indices = PartRecords(root.parts).v[0].indices;
             part.positions = PartRecords(root.parts).v[0].positions;
         }
     }
     InstanceRecord instance;
     if (SINGLE_LEVEL) {
-        // one entry, without a transform
+        // one TLAS instance without a transform
         instance.group_to_world = vec4[3](vec4(1.0, 0.0, 0.0, 0.0), vec4(0.0, 1.0, 0.0, 0.0), vec4(0.0, 0.0, 1.0, 0.0));
         instance.world_to_group = instance.group_to_world;
     } else {
@@ -103,15 +103,15 @@ Surface surface_at(Ray ray, Hit hit) {
     s.offset = spawn_offset(instance.group_to_world, instance.world_to_group, p, s.position, error, normal, s.ng, scale);
     vec3 ns = transform_transposed(instance.world_to_group, shading);
     float ns2 = dot(ns, ns);
-    // a mirroring transform that was baked into the vertices has turned their winding (glTF 2.0, 3.7.4)
+    // a mirroring transform that was baked into the vertices has reversed their winding (glTF 2.0, 3.7.4)
     s.ng *= part.mirrored != 0u ? -1.0 : 1.0;
     s.ns = ns2 > 0.0 ? ns * inversesqrt(ns2) : s.ng;
     s.ns *= dot(s.ns, s.ng) < 0.0 ? -1.0 : 1.0;
     return s;
 }
 
-// Unit tangent (world, not yet orthogonal to the normal) with handedness in w: the bitangent is w cross(normal, tangent) about the normal on the
-// front. w = 0: there is none.
+// Unit tangent (world space, not yet orthogonal to the normal) with handedness in w: the bitangent is w * cross(normal, tangent) about the normal of the
+// front. w = 0 without a tangent.
 vec4 tangent_at(Surface s, PartRecord part) {
     uvec3 corners = triangle_indices(part, s.primitive) - part.first_vertex;
     Quads q = Quads(part.tangents);
@@ -121,7 +121,7 @@ vec4 tangent_at(Surface s, PartRecord part) {
     if (!SINGLE_LEVEL) {
         vec4 rows[3] = InstanceRecords(SceneRoot(push.scene).instances).v[s.entry].group_to_world;
         t = transform_vector(rows, t);
-        // a mirroring transform turns the bitangent against the cross product
+        // a mirroring transform reverses the bitangent relative to the cross product
         if (dot(rows[0].xyz, cross(rows[1].xyz, rows[2].xyz)) < 0.0) w = -w;
     }
     float t2 = dot(t, t);

@@ -19,7 +19,7 @@ uint wrap_texel(int i, uint size, uint mode) {
 
 vec4 unorm16(uvec2 rgba) { return vec4(unpackUnorm2x16(rgba.x), unpackUnorm2x16(rgba.y)); }
 
-// One texel as stored: sRGB is not decoded.
+// One texel as stored, without decoding sRGB.
 vec4 texel(TextureRecord texture, int x, int y) {
     uint i = wrap_texel(y, texture.height, texture.wrap_v) * texture.width + wrap_texel(x, texture.width, texture.wrap_u);
     if (HAS_DEEP_TEXELS) {

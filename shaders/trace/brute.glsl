@@ -1,5 +1,5 @@
-// The compute tracer without a hierarchy: every ray against every primitive of every instance. For tests, which trust it most
-// because there is least that can be wrong, and to show what a hierarchy saves. It supplies main() around the stream's ray(),
+// The compute tracer without a BVH: every ray against every primitive of every instance. For tests, as the simplest implementation,
+// and to show what a BVH saves. It supplies main() around the stream's ray(),
 // closest() or any().
 #ifndef TRACE_BRUTE
 #define TRACE_BRUTE
@@ -8,7 +8,7 @@
 
 layout(local_size_x = LANES) in;
 
-// The host lets no scene in whose loops would have more turns than any driver runs (src/tracer/brute.rs).
+// The host rejects scenes whose loops would have more iterations than any driver runs (src/tracer/brute.rs).
 void main() {
     uint k = ray_of_dispatch();
     if (k >= ray_count()) return;
@@ -20,7 +20,7 @@ void main() {
     uint best_primitive = INVALID;
     vec2 best_uv = vec2(0.0);
 
-    // here the root is the number of instances, and what else are nodes is the range of primitives of each
+    // without a BVH, `root` is the number of instances, and `nodes` has the range of primitives of each
     uint instances = is_ray(world) ? root.root : 0u;
     for (uint instance = 0u; instance < instances; instance++) {
         uvec2 range = LOAD_PAIR(root.nodes, instance);

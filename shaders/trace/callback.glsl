@@ -1,4 +1,4 @@
-// What the tracers say to a stream, whatever it asks.
+// Functions by which tracers deliver hits and occlusion to a stream.
 #ifndef TRACE_CALLBACK
 #define TRACE_CALLBACK
 

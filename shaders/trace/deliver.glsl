@@ -1,4 +1,4 @@
-// Last step of a launch of the fast kernel: what the rays met goes to the stream.
+// Last step of a launch of the fast kernel: delivers the hits to the stream.
 #ifndef TRACE_DELIVER
 #define TRACE_DELIVER
 #include "trace/callback.glsl"

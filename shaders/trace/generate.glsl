@@ -1,4 +1,4 @@
-// First step of a launch of the fast kernel: the stream's rays, all lanes busy.
+// First step of a launch of the fast kernel: generates the stream's rays, with all lanes busy.
 #ifndef TRACE_GENERATE
 #define TRACE_GENERATE
 #include "trace/launch.glsl"
@@ -11,7 +11,7 @@ void main() {
     if (k >= ray_count()) return;
     SceneRoot root = SceneRoot(push.scene);
     Ray r = ray(push.first + k);
-    // a ray that misses the bounds of everything is answered here, where all lanes are busy
+    // a ray that misses the scene's bounds is answered here, where all lanes are busy
     vec3 inverse = safe_inverse(r.direction);
     vec3 t0 = (root.bounds_min.xyz - r.origin) * inverse, t1 = (root.bounds_max.xyz - r.origin) * inverse;
     vec3 n = MIN(t0, t1), f = MAX(t0, t1);

@@ -1,4 +1,4 @@
-// Results of one launch of the compute tracer's fast kernel, in memory between its steps. The rays are at push.rays.
+// Hit buffer of a launch of the compute tracer's fast kernel, between its steps. The rays are at push.rays.
 #ifndef TRACE_LAUNCH
 #define TRACE_LAUNCH
 #include "interface/hierarchy.glsl"
@@ -33,10 +33,10 @@ bool load_any(SceneRoot root, uint k) {
     return LaunchFlags(root.launch_hits).v[k] != 0u;
 }
 
-// The tracer's own ids; scene ids are found when the hit is delivered.
+// The tracer's own ids; they are converted to scene ids on delivery.
 void store_closest(SceneRoot root, uint k, float t, uint instance, uint primitive, vec2 uv) {
     STORE_PAIR(root.launch_hits, LAUNCH_HIT_PAIRS * k, uvec2(floatBitsToUint(t), instance));
-    // of a miss nothing else is read
+    // the other fields of a miss are not read
     if (t == INFINITY) return;
     STORE_PAIR(root.launch_hits, LAUNCH_HIT_PAIRS * k + 1u, uvec2(primitive, floatBitsToUint(uv.x)));
     STORE_PAIR(root.launch_hits, LAUNCH_HIT_PAIRS * k + 2u, uvec2(floatBitsToUint(uv.y), 0u));

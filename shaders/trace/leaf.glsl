@@ -6,19 +6,19 @@
 #include "scene/sphere.glsl"
 #include "trace/triangle.glsl"
 
-// The words of a leaf of primitives, of either kind: their numbers with flags, and the order of triangles' corners.
+// The words of a primitive leaf of either kind: primitive indices with flags, and the order of the triangles' corners.
 #define FIRST_ID TRIANGLE_LEAF_PRIMITIVES.x
 #define SECOND_ID TRIANGLE_LEAF_PRIMITIVES.y
 #define ORDER TRIANGLE_LEAF_ORDER
 
-// The weight of the corner that lies at place `k` of a triangle.
+// The weight of the corner at position `k` of a triangle.
 float pick_weight(vec3 weights, uint k) {
     k &= 3u;
     return k == 0u ? weights.x : k == 1u ? weights.y : weights.z;
 }
 
-// A triangle is met with these weights: `id` is its number with flags, `turn` says at which places its second and third corner
-// lie. Their weights, and whether its alpha lets it be met.
+// Accepts a hit of a triangle: `id` is its index with flags, `turn` has the positions of its second and third vertex
+// among the corners. Computes their barycentric weights and tests alpha.
 bool is_there(uint id, uint turn, uint instance, vec3 weights, float tmin, out vec2 uv) {
     uv = vec2(pick_weight(weights, turn), pick_weight(weights, turn >> 2));
     bool met = true;
@@ -28,7 +28,7 @@ bool is_there(uint id, uint turn, uint instance, vec3 weights, float tmin, out v
     return met;
 }
 
-// One triangle of a pair, whose edges the ray passes between: corners as they lie and as the ray sees them.
+// Intersects one triangle of a pair, after the edge tests: corners in space, and in the ray's frame.
 bool meets_triangle(uint id, uint turn, uint instance, Shear shear, vec3 origin, vec3 direction, vec3 v0, vec3 v1, vec3 v2,
         Corner a, Corner b, Corner c, vec3 edges, float tmin, float tmax, out float t, out vec2 uv) {
     vec3 weights;

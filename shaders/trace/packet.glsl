@@ -1,10 +1,10 @@
-// The compute tracer's kernel for coherent streams: the lanes of a subgroup walk the hierarchy together, each with PACKET_RAYS rays of its
-// own (after Wald, Slusallek, Benthin, Wagner, "Interactive Rendering with Coherent Ray Tracing", EG 2001, and `wide.glsl`, whose
-// blocks these are). A block is fetched once for all and decoded once a lane, and control flow is the same in all lanes; so a visit
-// costs a lane a fraction of what it does in `wide.glsl`, and the packet visits what any of its rays would. The nearest hits are the same.
+// The compute tracer's kernel for coherent streams: the lanes of a subgroup traverse the BVH together, each with PACKET_RAYS rays
+// (after Wald, Slusallek, Benthin, Wagner, "Interactive Rendering with Coherent Ray Tracing", EG 2001, and `wide.glsl`, whose
+// blocks it reads). A block is fetched once for all and decoded once per lane, and control flow is uniform. So a visit
+// costs a lane a fraction of a visit in `wide.glsl`, but the packet visits every block that any of its rays would. The nearest hits are the same.
 //
-// Rays are generated and delivered here, all lanes in step; nothing goes through memory. The host uses this kernel only for streams
-// that say they are coherent, on devices whose subgroups are known to hold eight lanes or more and have broadcasts and arithmetic.
+// Rays are generated and hits delivered here, without ray and hit buffers. The host uses this kernel only for coherent streams,
+// on devices whose subgroups have at least eight lanes, broadcasts and arithmetic.
 #ifndef TRACE_PACKET
 #define TRACE_PACKET
 #include "trace/block.glsl"
@@ -19,15 +19,15 @@ layout(local_size_x = LANES) in;
 layout(buffer_reference, std430, buffer_reference_align = 4) buffer Counter { uint v; };
 layout(buffer_reference, std430, buffer_reference_align = 8) readonly buffer BlockWords { WORD64 v[]; };
 
-// Rays whose directions have the same signs and main axis go together: near and far planes, and the axes of the triangle test,
-// are then the same for all. The rest waits for its turn.
+// Rays whose directions have the same signs and main axis form a class: near and far planes, and the axes of the triangle test,
+// are then the same for all. The other rays wait.
 const uint NO_CLASS = 0xffu;
 
 uint class_of(vec3 inverse, uint axis) {
     return (inverse.x < 0.0 ? 4u : 0u) | (inverse.y < 0.0 ? 2u : 0u) | (inverse.z < 0.0 ? 1u : 0u) | (axis << 3);
 }
 
-// Over all lanes. Constant broadcasts are one instruction on a CPU driver; the built-in reductions, shuffles of more than eight lanes and
+// Reductions over all lanes. Constant broadcasts are one instruction on a CPU driver; the built-in reductions, shuffles of more than eight lanes and
 // quad swaps are loops there.
 #define REDUCE_8(op, k)                                                                                                             \
     r = op(op(op(r, subgroupBroadcast(x, k)), op(subgroupBroadcast(x, k + 1), subgroupBroadcast(x, k + 2))),                        \
@@ -59,7 +59,7 @@ uint all_min(uint x) {
     inverse[j] = safe_inverse(direction[j]);                    \
     shear[j] = make_shear(direction[j], inverse[j]);
 
-// The next class of waiting rays: its rays are `active`, the others have an empty interval.
+// Selects the next class of waiting rays: its rays are `active`, the others have an empty interval.
 #define NEXT_CLASS                                                                      \
     uint least = NO_CLASS;                                                              \
     FOR_RAYS least = min(least, waiting[j] ? class_of(inverse[j], shear[j].axis) : NO_CLASS);  \
@@ -91,14 +91,14 @@ void main() {
     uint lane = gl_SubgroupInvocationID;
     uint first = (part_of_dispatch() * LANES + gl_SubgroupID * SUBGROUP_SIZE) * PACKET_RAYS + lane;
     uint count = ray_count();
-    // the same for all lanes
+    // uniform over the lanes
     if (first - lane >= count) return;
 
     vec3 world_origin[PACKET_RAYS], world_direction[PACKET_RAYS], origin[PACKET_RAYS], direction[PACKET_RAYS], inverse[PACKET_RAYS];
     Shear shear[PACKET_RAYS];
-    // `best`: how far a ray has to look; `limit`: the same for rays of the class in hand, nothing for the others
+    // `best`: maximum distance of a ray; `limit`: the same for rays of the current class, an empty interval for the others
     float tmin[PACKET_RAYS], best[PACKET_RAYS], limit[PACKET_RAYS];
-    // not yet traced, at this level; and what the top level will be left with
+    // rays not yet traced, at this level; and the state of the top level to return to
     bool waiting[PACKET_RAYS], world_waiting[PACKET_RAYS], world_active[PACKET_RAYS];
     uint best_instance[PACKET_RAYS], best_primitive[PACKET_RAYS];
     vec2 best_uv[PACKET_RAYS];
@@ -127,7 +127,7 @@ void main() {
     bool finished = class_ == NO_CLASS;
     // Some CPU drivers leave any loop after 65,535 turns; then `finished` is not set, and the host reports it.
     while (!finished) {
-        // lane k fetches the k-th pair of words, and hands it round
+        // lane k fetches the k-th pair of words, and broadcasts it
         uvec2 own = PAIR(BlockWords(block_address(blocks, block)).v[lane & 7u]);
         uvec2 w0 = uvec2(subgroupBroadcast(own.x, 0), subgroupBroadcast(own.y, 0));
         uvec2 w1 = uvec2(subgroupBroadcast(own.x, 1), subgroupBroadcast(own.y, 1));
@@ -180,11 +180,11 @@ void main() {
                 group = make_group(hits, present, octant);
             }
         } else if (!SINGLE_LEVEL && !in_group) {
-            // an entry of the top level: the transform to its own space, then its root and number
+            // a TLAS instance: the transform to its space, then its root and index
             if (has_siblings(group)) {
                 PUSH(base, group)
             }
-            // the way back
+            // the return to the top level
             PUSH(0u, 0u)
             vec4 rows[3] = vec4[3](uintBitsToFloat(INSTANCE_LEAF_WORLD_TO_GROUP_0(uvec4)), uintBitsToFloat(INSTANCE_LEAF_WORLD_TO_GROUP_1(uvec4)),
                     uintBitsToFloat(INSTANCE_LEAF_WORLD_TO_GROUP_2(uvec4)));
@@ -221,7 +221,7 @@ void main() {
                         Corner a = make_corner(s, o, v0), b = make_corner(s, o, v1), c = make_corner(s, o, v2), d = make_corner(s, o, v3);
                         float ab = edge(b, a), bc = edge(c, b), ca = edge(a, c), cd = edge(d, c), da = edge(a, d);
                         vec3 first = vec3(bc, ca, ab), second = vec3(cd, da, -ca);
-                        // rays of another class see nonsense
+                        // rays of another class compute meaningless values here
                         bool live = limit[j] > tmin[j];
                         if (live && is_inside(first)) {
                             if (meets_triangle(FIRST_ID, ORDER, instance, s, o, r, v0, v1, v2, a, b, c, first, tmin[j], limit[j], t, uv)) { ACCEPT(FIRST_ID) }
@@ -236,7 +236,7 @@ void main() {
                 }
             }
 #ifdef STREAM_ANY
-            // when no ray of the class looks on, the rest of the tree is left
+            // when all rays of the class are done, the rest of the tree is skipped
             if (all_or(found ? 1u : 0u) != 0u) {
                 bool looking = false;
                 FOR_RAYS looking = looking || limit[j] > tmin[j];
@@ -247,7 +247,7 @@ void main() {
             }
 #endif
         }
-        // of a group that is done with: back to the top level, or on with the rays that wait
+        // the instance is done: back to the top level, or on to the waiting rays
         while (!has_siblings(group) && !finished) {
             if (depth == 0u) {
                 // the tree is done for this class of rays

@@ -1,9 +1,9 @@
-// What the shaders of the pipeline tracer hand each other: the tracer's own ids, made scene ids after the trace.
+// Ray payload of the pipeline tracer: the tracer's own ids, which are converted to scene ids after the trace.
 #ifndef TRACE_PAYLOAD
 #define TRACE_PAYLOAD
 
 struct Payload {
-    float t;  // INFINITY: nothing met
+    float t;  // INFINITY for a miss
     uint instance;
     uint primitive;  // in the group
     float u;

@@ -1,4 +1,4 @@
-// The pipeline tracer's ray generation shader: VK_KHR_ray_tracing_pipeline, one invocation a ray.
+// The pipeline tracer's ray generation shader: VK_KHR_ray_tracing_pipeline, one invocation per ray.
 #ifndef TRACE_PIPELINE
 #define TRACE_PIPELINE
 #include "scene/scene.glsl"
@@ -8,7 +8,7 @@
 layout(location = 0) rayPayloadEXT Payload payload;
 
 void main() {
-    // as work-groups take them (trace/spread.glsl), but in one row: of several, GPUs put small tiles together, and the rays of a tile would lie far apart
+    // the ray order of work-groups (trace/spread.glsl), but in one row: with several rows, GPUs combine invocations of small tiles, whose rays would be far apart
     const uint RUN_RAYS = LANES * RUN;
     uint run = gl_LaunchIDEXT.x / RUN_RAYS, rows = gl_LaunchSizeEXT.x / (RUN_RAYS * SPREAD);
     uint k = (run % rows * SPREAD + run / rows) * RUN_RAYS + gl_LaunchIDEXT.x % RUN_RAYS;
@@ -25,7 +25,7 @@ void main() {
     payload.u = 0.0;
     payload.v = 0.0;
 #ifdef STREAM_ANY
-    // the miss shader alone reports
+    // only the miss shader reports that nothing is in the way
     const uint flags = gl_RayFlagsTerminateOnFirstHitEXT | gl_RayFlagsSkipClosestHitShaderEXT;
 #else
     const uint flags = gl_RayFlagsNoneEXT;

@@ -1,4 +1,4 @@
-// The readable kernels' primitives: one record each.
+// Primitive records of the binary and brute-force kernels.
 #ifndef TRACE_PRIMITIVE
 #define TRACE_PRIMITIVE
 #include "interface/hierarchy.glsl"
@@ -8,8 +8,8 @@
 
 #define LOAD_FLOATS(base, i) uintBitsToFloat(LOAD_PAIR(base, i))
 
-// Does the ray meet record `i` within (tmin, tmax)? Its number in the group, where, and the weights of a triangle's second and third
-// corner.
+// Intersects the ray with record `i` within (tmin, tmax). Returns the primitive's index in the group, the distance, and the barycentric weights of a triangle's second and third
+// vertex.
 bool meets_record(uvec2 primitives, uint i, uint instance, Shear shear, vec3 origin, vec3 direction, float tmin, float tmax,
         out uint primitive, out float t, out vec2 uv) {
     vec2 w0 = LOAD_FLOATS(primitives, TRIANGLE_RECORD_PAIRS * i), w1 = LOAD_FLOATS(primitives, TRIANGLE_RECORD_PAIRS * i + 1u);

@@ -1,4 +1,4 @@
-// The query tracer: VK_KHR_ray_query in a compute shader, one thread a ray.
+// The query tracer: VK_KHR_ray_query in a compute shader, one thread per ray.
 #ifndef TRACE_QUERY
 #define TRACE_QUERY
 #include "scene/material.glsl"

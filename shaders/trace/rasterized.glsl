@@ -1,18 +1,18 @@
-// Where a pixel's exact ray meets the primitive that was drawn there.
+// Intersects a pixel's exact ray with the primitive that was rasterized there.
 #ifndef TRACE_DRAWN
 #define TRACE_DRAWN
 #include "scene/material.glsl"
 #include "scene/sphere.glsl"
 #include "trace/triangle.glsl"
 
-// The ray in the space of an entry's group.
+// The ray in the space of a TLAS instance's group.
 Ray to_group(Ray world, uint entry) {
     if (SINGLE_LEVEL) return world;
     vec4 rows[3] = InstanceRecords(SceneRoot(push.scene).instances).v[entry].world_to_group;
     return Ray(transform_point(rows, world.origin), world.tmin, transform_vector(rows, world.direction), world.tmax);
 }
 
-// A rasteriser rounds corners to a fraction of a pixel, so the ray may pass the triangle by so much. Then it meets the nearest
+// A rasterizer rounds vertices to a fraction of a pixel, so the exact ray may miss the triangle by that much. Then the hit is the nearest
 // point of its edge.
 void intersect_rasterized_triangle(Ray r, vec3 v0, vec3 v1, vec3 v2, out float t, out vec2 uv) {
     Shear shear = make_shear(r.direction);
@@ -25,7 +25,7 @@ void intersect_rasterized_triangle(Ray r, vec3 v0, vec3 v1, vec3 v2, out float t
         float side = edges.x + edges.y + edges.z < 0.0 ? -1.0 : 1.0;
         weights = max(side * edges, vec3(0.0));
         float sum = weights.x + weights.y + weights.z;
-        // seen exactly from the side it has no inside
+        // a triangle seen exactly edge-on has no interior
         weights = sum > 1e-37 && sum < 1e37 ? weights / sum : vec3(1.0, 0.0, 0.0);
         t = max(dot(weights, vec3(a.z, b.z, c.z) * shear.s.z), r.tmin);
     }
@@ -35,15 +35,15 @@ void intersect_rasterized_triangle(Ray r, vec3 v0, vec3 v1, vec3 v2, out float t
 void intersect_rasterized_sphere(Ray r, vec4 sphere, out float t, out vec2 uv) {
     uv = vec2(0.0);
     t = intersect_sphere(r.origin, r.direction, r.tmin, r.tmax, sphere.xyz, sphere.w);
-    // it was met when it was drawn; a compiler that rounds otherwise may see it passed by
+    // rasterization found it visible; a compiler that rounds differently may compute a miss
     if (!(t > r.tmin && t < r.tmax)) t = max(dot(sphere.xyz - r.origin, r.direction) / dot(r.direction, r.direction), r.tmin);
 }
 
-// `primitive` counts in the group. Distance along the ray, and the weights of a triangle's second and third corner.
+// `primitive` is an index in the group. Returns the distance along the ray, and the barycentric weights of a triangle's second and third vertex.
 void intersect_rasterized(Ray world, uint entry, uint primitive, out float t, out vec2 uv) {
     SceneRoot root = SceneRoot(push.scene);
     Ray r = to_group(world, entry);
-    // a group's parts share its vertices
+    // the parts (submeshes) of a group share its vertices
     PartRecord part = PartRecords(root.parts).v[root.part_count == 1u ? 0u : InstanceRecords(root.instances).v[entry].first_part];
     if (HAS_SPHERES && is_null(part.indices)) {
         intersect_rasterized_sphere(r, uintBitsToFloat(Quads(part.positions).v[primitive]), t, uv);

@@ -1,8 +1,8 @@
-// The compute tracer's readable reference: a two-level binary hierarchy, one ray per lane. It supplies main() around the
+// The compute tracer's simple kernel: a two-level binary BVH, one ray per lane. It supplies main() around the
 // stream's ray(), closest() or any(). The fast kernel is wide.glsl.
 //
-// Two orders of the children, after Coello's study (2024; docs/traversal.md): the one whose box the ray enters first, or the one
-// that lies first along the sign of the ray's direction on the node's axis. Both prune by the nearest hit so far.
+// Two orders of the children, after Coello's study (2024; docs/traversal.md): first the one whose box the ray enters first, or first the one
+// that comes first along the sign of the ray's direction on the node's axis. Both prune by the nearest hit so far.
 #ifndef TRACE_REFERENCE
 #define TRACE_REFERENCE
 #include "trace/primitive.glsl"
@@ -11,16 +11,16 @@
 
 layout(local_size_x = LANES) in;
 
-// STACK_SIZE is what the scene's trees need at most: every inner node pushes at most one child, so depth of the
+// STACK_SIZE is the maximum that the scene's trees need: every inner node pushes at most one child, so depth of the
 // top level + 1 + depth of the deepest group can never be exceeded. See src/accel/bvh2.rs for the bound on the depth.
 
-// References, beside those of BinaryNode.
+// References, besides those of BinaryNode.
 const uint FINISHED = 0x7fffffffu;
 const uint LEAVE_INSTANCE = 0x7ffffffeu;
 const uint LAST_NODE = 0x7ffffff0u;
 layout(buffer_reference, std430, buffer_reference_align = 4) buffer Counter { uint v; };
 
-// Entry distance of a box, or INFINITY when it is missed.
+// Distance at which the ray enters a box, or INFINITY for a miss.
 float enter_box(vec3 lo, vec3 hi, vec3 origin, vec3 inverse, float tmin, float tmax) {
     vec3 t0 = (lo - origin) * inverse;
     vec3 t1 = (hi - origin) * inverse;
@@ -42,7 +42,7 @@ void main() {
     uvec2 primitives = root.primitives;
     InstanceRecords instances = InstanceRecords(root.instances);
 
-    // Some CPU drivers leave any loop after 65,535 turns. Rays that are not done when the loop ends are counted, and the host
+    // Some CPU drivers leave any loop after 65,535 iterations. Rays that are not done when the loop ends are counted, and the host
     // reports them: their callbacks were not called.
     uint left = (end - next + LANES - 1u) / LANES;
 
@@ -78,7 +78,7 @@ void main() {
             if (BY_DIRECTION) {
                 uint axis = current >> AXIS_SHIFT;
                 float along = axis == 0u ? direction.x : axis == 1u ? direction.y : direction.z;
-                // a child that is missed is never first
+                // a child that is missed never comes first
                 swap = near1 < INFINITY && (along < 0.0 || near0 == INFINITY);
             } else {
                 swap = near1 < near0;
@@ -107,7 +107,7 @@ void main() {
                     best_primitive = primitive;
                     best_uv = uv;
                 }
-                // the next primitive of the leaf: one more, and one fewer to come
+                // the next primitive of the leaf: index plus one, remaining count minus one
                 current = (current & 0x78000000u) == 0u ? NEXT : current + 1u - 0x08000000u;
 #ifdef STREAM_ANY
                 if (met) {
@@ -146,7 +146,7 @@ void main() {
 #ifdef STREAM_ANY
                 current = stack[depth];
 #else
-                // what lies behind the nearest hit so far is not entered
+                // boxes beyond the nearest hit so far are skipped
                 current = stack_near[depth] <= best ? stack[depth] : NEXT;
 #endif
             }

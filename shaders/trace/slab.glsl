@@ -1,4 +1,4 @@
-// What both hierarchies' box tests share.
+// The slab test, shared by both kinds of BVH.
 #ifndef TRACE_SLAB
 #define TRACE_SLAB
 

@@ -1,11 +1,11 @@
-// The fast kernels' stack of groups of siblings: the upper end is in registers, the rest in arrays. A CPU driver writes to an array
-// element by element, about ninety instructions; moving all of the registers takes one each.
+// The fast kernels' stack of sibling groups: the top is in registers, the rest in arrays. A CPU driver writes to an array
+// element by element, about ninety instructions; shifting all of the registers takes one each.
 #ifndef TRACE_STACK
 #define TRACE_STACK
 #include "interface/hierarchy.glsl"
 
-// STACK_SIZE is what the scene's trees need at most beyond those: a node visit pushes at most the rest of one group of
-// children; entering an entry of the top level pushes that and the way back. The host counts it.
+// STACK_SIZE is the maximum that the scene's trees need beyond those: a node visit pushes at most the rest of one sibling
+// group; entering a TLAS instance pushes that and the return to the top level. The host computes it.
 
 #define DECLARE_STACK                                                                         \
     uint top_base[STACK_IN_REGISTERS], top_group[STACK_IN_REGISTERS];                         \

@@ -2,9 +2,9 @@
 #ifndef TRACE_TRIANGLE
 #define TRACE_TRIANGLE
 
-// Where WATERTIGHT is not set it is the test of Möller and Trumbore, for benchmarks: what watertightness costs and what it is worth (docs/traversal.md).
+// Without WATERTIGHT it is the test of Möller and Trumbore, for benchmarks of the cost of watertightness (docs/traversal.md).
 
-// The ray's frame: z is the axis along which the direction is longest, and the shear that makes the ray the z axis.
+// The ray's frame: z is the axis of the largest direction component, and the shear aligns the ray with z.
 struct Shear {
     uint axis;
     vec3 s;
@@ -22,7 +22,7 @@ Shear make_shear(vec3 d) {
     return Shear(axis, vec3(p.xy / p.z, 1.0 / p.z));
 }
 
-// Likewise, where the inverse of the direction is there already. Any shear will do for watertightness, as long as it is the ray's.
+// Likewise, with a given inverse of the direction. Any shear is watertight, as long as it is the same for all triangles.
 Shear make_shear(vec3 d, vec3 inverse) {
     vec3 a = abs(d);
     uint axis = a.x > a.y ? (a.x > a.z ? 0u : 2u) : (a.y > a.z ? 1u : 2u);
@@ -30,7 +30,7 @@ Shear make_shear(vec3 d, vec3 inverse) {
     return Shear(axis, vec3(permute(d, axis).xy * z, z));
 }
 
-// Numbers of twice the digits, as an unevaluated sum hi + lo: Dekker, "A floating-point technique for extending the available
+// Double-word arithmetic, with numbers as unevaluated sums hi + lo: Dekker, "A floating-point technique for extending the available
 // precision" (1971). The product splits its factors, because fma is not fused on every device.
 struct Wide3 {
     vec3 hi;
@@ -69,7 +69,7 @@ vec3 upper_half(vec3 a) {
     return hi;
 }
 
-// What rounding takes from a product.
+// Rounding error of a product.
 vec3 product_rest(vec3 a, vec3 b) {
     precise vec3 p = a * b;
     precise vec3 ah = upper_half(a), bh = upper_half(b);
@@ -96,7 +96,7 @@ float wide_dot(Wide3 a, Wide3 b) {
     return s.hi.x;
 }
 
-// t at which the ray meets the triangle's plane; NaN or infinite when it runs within it.
+// Distance t at which the ray meets the triangle's plane; NaN or infinite for a ray within it.
 float plane_distance(vec3 origin, vec3 direction, vec3 v0, vec3 v1, vec3 v2) {
     Wide3 e1 = two_difference(v1, v0), e2 = two_difference(v2, v0);
     Wide3 normal = wide_sum(
@@ -105,7 +105,7 @@ float plane_distance(vec3 origin, vec3 direction, vec3 v0, vec3 v1, vec3 v2) {
     return wide_dot(two_difference(v0, origin), normal) / wide_dot(Wide3(direction, vec3(0.0)), normal);
 }
 
-// A corner in the ray's frame: where it lies off the ray, and how far along its main axis.
+// A corner in the ray's frame: offset from the ray, and distance along its main axis.
 struct Corner {
     vec2 p;
     float z;
@@ -117,7 +117,7 @@ Corner make_corner(Shear shear, vec3 origin, vec3 vertex) {
     return Corner(p, a.z);
 }
 
-// On which side of the ray the edge from one corner to another passes: positive, negative, or zero. edge(p, q) = -edge(q, p) exactly.
+// Edge function: on which side of the ray the edge between two corners passes. Positive, negative, or zero; edge(p, q) = -edge(q, p) exactly.
 float edge(Corner p, Corner q) {
     precise float a = p.p.x * q.p.y;
     precise float b = p.p.y * q.p.x;
@@ -125,21 +125,21 @@ float edge(Corner p, Corner q) {
     return e;
 }
 
-// What rounding has taken from edge(c, b), edge(a, c), edge(b, a): nearly all of it where that is zero, and then its sign is right.
+// Rounding errors of edge(c, b), edge(a, c), edge(b, a): nearly all of the value where that is zero, and then the sign is right.
 vec3 edge_rests(Corner a, Corner b, Corner c) {
     precise vec3 rest = product_rest(vec3(c.p.x, a.p.x, b.p.x), vec3(b.p.y, c.p.y, a.p.y))
         - product_rest(vec3(c.p.y, a.p.y, b.p.y), vec3(b.p.x, c.p.x, a.p.x));
     return rest;
 }
 
-// Does the ray pass between the edges? Each is opposite a corner, and zero counts as inside.
+// Whether the ray passes between the edges. Each is opposite a corner, and zero counts as inside.
 bool is_inside(vec3 e) {
     return !(any(lessThan(e, vec3(0.0))) && any(greaterThan(e, vec3(0.0))));
 }
 
-// For a ray that passes between the edges of corners a, b, c: where it meets the triangle, if within (tmin, tmax), and the corners'
-// weights. To be called under `if`: most rays do not get here, and a denormal number, made by lanes that hold something
-// else, would cost a CPU a hundred times the cycles of a normal one.
+// For a ray that passes between the edges of corners a, b, c: the distance of the hit, if within (tmin, tmax), and the corners'
+// weights. To be called under `if`: most rays do not get here, and denormal numbers in lanes without a triangle
+// would cost a CPU a hundred times the cycles of normal ones.
 bool meets_between(Shear shear, vec3 origin, vec3 direction, vec3 v0, vec3 v1, vec3 v2, Corner a, Corner b, Corner c, vec3 edges,
         float tmin, float tmax, out float t, out vec3 weights) {
     // Seen from far beside it a small triangle's edges may all be zero but one, which looks like a hit of a corner.

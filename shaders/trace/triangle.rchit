@@ -10,7 +10,7 @@ hitAttributeEXT vec2 attributes;
 void main() {
     payload.t = gl_HitTEXT;
     payload.instance = uint(gl_InstanceCustomIndexEXT);
-    // alpha-tested triangles are the second geometry of their group
+    // alpha-tested triangles are the second geometry of their BLAS
     payload.primitive = uint(gl_PrimitiveID) +
         (gl_GeometryIndexEXT != 0 ? InstanceRecords(SceneRoot(push.scene).instances).v[gl_InstanceCustomIndexEXT].opaque_count : 0u);
     payload.u = attributes.x;

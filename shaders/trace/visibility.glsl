@@ -1,6 +1,6 @@
-// No tracer: what the camera's rays meet was drawn (src/raster). One compute thread a ray; each looks up what its pixel
-// shows and meets that one primitive. For streams of camera rays, one a pixel, whose parameters are BlockParams. At push.rays are two words
-// for each pixel of the block, row by row: the entry of the top level and one, and the primitive of its group; zero for nothing.
+// No tracer: the hits of the camera rays come from rasterization (src/raster). One compute thread per ray looks up the primitive of its pixel
+// and intersects it. For streams of one camera ray per pixel, whose parameters are BlockParams. push.rays is the address of two words
+// for each pixel of the block, row by row: index of the TLAS instance plus one, and index of the primitive in its group; zero for the background.
 #ifndef TRACE_VISIBILITY
 #define TRACE_VISIBILITY
 #include "common/camera.glsl"

@@ -2,9 +2,9 @@
 // quantised boxes (after Ylitie, Karras, Laine, "Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs", HPG 2017)
 // or a leaf.
 //
-// What makes it fast where vectors are wide and gathers dear (CPU drivers): in every turn of the loop a lane fetches one block,
-// a cache line, through the same eight loads, whatever it is; a lane that is done takes its next ray at once; and the upper end of
-// the stack is in registers. Rays and results are in memory (generate.glsl, deliver.glsl), so that the stream's own code runs with all
+// Why it is fast where vectors are wide and gathers expensive (CPU drivers): in every iteration a lane fetches one block,
+// a cache line, through the same eight loads, whether node or leaf; a lane whose ray is done fetches its next ray at once; and the top of
+// the stack is in registers. Ray and hit buffers (generate.glsl, deliver.glsl) separate it from the stream's own code, which runs with all
 // lanes busy.
 #ifndef TRACE_WIDE
 #define TRACE_WIDE
@@ -17,8 +17,8 @@
 
 layout(local_size_x = LANES) in;
 
-// MAX_ITERATIONS is for drivers that leave any loop after 65,535 iterations: with one ray per lane of a work-group each ray is taken nevertheless, because a
-// lane that stops has had one.
+// MAX_ITERATIONS is for drivers that leave any loop after 65,535 iterations. With one ray per lane of a work-group every ray is still traced, because each
+// lane fetches at least one.
 
 #define SET_RAY(o, d)                                                                                          \
     origin = (o);                                                                                              \
@@ -46,7 +46,7 @@ void store_visits(uint k, uint nodes);
 #define VISIT visits++;
 #else
 #define VISIT
-// The lane's next ray. What is no ray meets nothing: no box and no primitive lies before it.
+// Fetches the lane's next ray. An invalid ray hits nothing: its interval is empty.
 #define NEXT_RAY                                                                                        \
     index = begin + atomicAdd(LaunchFlags(root.launch_counters).v[part], 1u);                           \
     if (index >= end) return;                                                                           \
@@ -54,7 +54,7 @@ void store_visits(uint k, uint nodes);
     if (!is_ray(world)) world = no_ray();
 #endif
 
-// What the ray met last: primitive `id` at `t`, with the weights of the second and third corner as the mesh has them.
+// Stores the last hit: primitive `id` at `t`, with the barycentric weights of its second and third vertex in the mesh's order.
 #ifdef STREAM_ANY
 #define ACCEPT(id) best_primitive = (id) & NUMBER;
 #else
@@ -82,12 +82,12 @@ void main() {
     uint octant;
     SET_RAY(world.origin, world.direction)
     uint instance = 0u;
-    // the stack's depth where the ray entered the instance
+    // depth of the stack when the ray entered the instance
     uint entry_depth = 0u;
     // all bits or none: the ray is in the top level
     uint at_top = SINGLE_LEVEL ? 0u : ~0u;
     uint block = root.root;
-    // siblings yet to be visited (block.glsl)
+    // siblings not yet visited (block.glsl)
     uint base = 0u, group = 0u;
     float best = world.tmax;
     uint best_instance = INVALID, best_primitive = INVALID;
@@ -102,10 +102,10 @@ void main() {
         Block8 b = Block8(block_address(blocks, block));
         uvec2 w0 = PAIR(b.q0), w1 = PAIR(b.q1), w2 = PAIR(b.q2), w3 = PAIR(b.q3);
         uvec2 w4 = PAIR(b.q4), w5 = PAIR(b.q5), w6 = PAIR(b.q6), w7 = PAIR(b.q7);
-        // where the ray goes on when it leaves its space
+        // where traversal continues when the ray leaves this space
         bool turns_to = false;
         vec3 next_origin = world.origin, next_direction = world.direction;
-        // the child that lies first along the ray, where distance decides and not the octant
+        // the child that the ray enters first, where the order is by distance and not by octant
         uint nearest = INVALID;
         if ((BLOCK_FLAGS & LEAF) == 0u) {
             VISIT
@@ -123,7 +123,7 @@ void main() {
                 bool hit = near <= far;
                 hits |= hit ? 1u << k : 0u;
 #ifdef STREAM_CLOSEST
-                // the three lowest bits of a distance matter to no order
+                // the three lowest bits of a distance do not matter for the order, so they hold the slot
                 nearest = min(nearest, hit ? (floatBitsToUint(near) & ~7u) | k : INVALID);
 #endif
             }
@@ -138,13 +138,13 @@ void main() {
                 group = make_group(hits, present, octant);
             }
         } else if (!SINGLE_LEVEL && at_top != 0u) {
-            // an entry of the top level: the transform to its own space, then its root and number
+            // a TLAS instance: the transform to its space, then its root and index
             if (has_siblings(group)) {
                 PUSH(base, group)
             }
             entry_depth = depth;
-            // Lanes that hold something else compute this too, on words that are often denormal as floats, which cost a CPU a
-            // hundred times the cycles: theirs are zeroed, by arithmetic that no compiler takes for this branch's condition.
+            // Lanes without an instance compute this too, on words that are often denormal as floats, which cost a CPU a
+            // hundred times the cycles: theirs are zeroed, by arithmetic that no compiler recognizes as this branch's condition.
             uint mine = uint(int(BLOCK_FLAGS) >> 31) & at_top;
             vec4 rows[3] = vec4[3](uintBitsToFloat(INSTANCE_LEAF_WORLD_TO_GROUP_0(uvec4) & mine), uintBitsToFloat(INSTANCE_LEAF_WORLD_TO_GROUP_1(uvec4) & mine),
                     uintBitsToFloat(INSTANCE_LEAF_WORLD_TO_GROUP_2(uvec4) & mine));
@@ -220,7 +220,7 @@ void main() {
                 POP(base, group)
             }
         }
-        // to an instance's space, to the world's, or another ray: one place for the divisions
+        // the ray changes space, to an instance's or back to the world's, or is a new one: its inverse direction is computed here for all cases
         if (!SINGLE_LEVEL && turns_to) { SET_RAY(next_origin, next_direction) }
         // the next block
         uint bit = findMSB(group | 1u);

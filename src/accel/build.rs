@@ -1,7 +1,7 @@
 //! Building binary trees: from the top down by the surface-area heuristic (`sah.rs`) where time matters most; by obvhs's clustering
 //! and reinsertion (Meister and Bittner, "Parallel Locally-Ordered Clustering for Bounding Volume Hierarchy Construction", TVCG 2018)
-//! by default; with spatial splits (`spatial.rs`) and reinsertion (`reinsert.rs`) where time is no matter. docs/traversal.md has the
-//! table behind the choice.
+//! by default; with spatial splits (`spatial.rs`) and reinsertion (`reinsert.rs`) where build time does not matter. docs/traversal.md has the
+//! measurements behind the choice.
 //!
 //! The depth of what comes out is bounded, whatever the input: the builders halve where they would go deeper, and a subtree that
 //! reinsertion made too deep is replaced by a balanced one over the same leaves.
@@ -12,13 +12,13 @@ use obvhs::bvh2::node::Bvh2Node;
 use rayon::prelude::*;
 
 use super::clip::Triangles;
-use super::reinsert::{self, Effort};
+use super::reinsert::{self, ReinsertionOptions};
 use super::{Aabb, sah, spatial};
 
-/// No tree is deeper than this (inner nodes on the longest path). 2^27 primitives in a balanced tree need 27.
+/// Maximum depth of a tree: inner nodes on the longest path. A balanced tree over 2^27 primitives needs 27.
 pub const MAX_DEPTH: u32 = 48;
 
-/// How much time to spend on a tree.
+/// Trade-off between build time and traversal speed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum BuildPreset {
@@ -32,9 +32,9 @@ pub enum BuildPreset {
 }
 
 impl BuildPreset {
-    /// What suits a number of primitives and of rays to be traced through them. On Sponza `Default` traces faster than
-    /// `Fast` for little more building, on the dragon hardly (docs/traversal.md has the table): fewer rays than primitives do not earn that back, and above
-    /// ten million primitives the least of everything is used.
+    /// Chooses a preset for a number of primitives and an expected number of rays. On Sponza `Default` traces faster than
+    /// `Fast` for little more building, on the dragon hardly (docs/traversal.md has the table): with fewer rays than primitives that does not
+    /// pay back, and above ten million primitives the fastest build is used.
     ///
     /// Never `Best`: three times the build time for hardly anything on the dragon, and on Sponza for closest hits alone; any hits are
     /// slower, because a large triangle that is left whole high up in the tree is an occluder that is found early.
@@ -42,11 +42,11 @@ impl BuildPreset {
         if primitives >= 10_000_000 || rays < primitives as u64 { Self::Fast } else { Self::Default }
     }
 
-    fn effort(self) -> Effort {
+    fn reinsertion(self) -> ReinsertionOptions {
         match self {
-            Self::Fast => Effort { share: 0.0, rounds: 0, worthwhile: 1.0 },
-            Self::Default => Effort { share: 0.003, rounds: 16, worthwhile: 0.001 },
-            Self::Best => Effort { share: 0.02, rounds: 16, worthwhile: 0.001 },
+            Self::Fast => ReinsertionOptions { share: 0.0, rounds: 0, worthwhile: 1.0 },
+            Self::Default => ReinsertionOptions { share: 0.003, rounds: 16, worthwhile: 0.001 },
+            Self::Best => ReinsertionOptions { share: 0.02, rounds: 16, worthwhile: 0.001 },
         }
     }
 }
@@ -62,21 +62,21 @@ impl obvhs::Boundable for Aabb {
     }
 }
 
-/// The tree of some boxes: at least one, at most 2^27, none empty or NaN. `collapse`: leaves hold up to so many primitives, where
-/// that lowers the cost; else one each. Primitives are never split: `Best` is the heuristic from the top down with
+/// Builds a tree over 1 to 2^27 boxes, none empty or NaN. With `collapse`, leaves contain up to that many primitives where
+/// that lowers the SAH cost; otherwise one each. Primitives are never split: `Best` is the heuristic from the top down with
 /// thorough reinsertion.
 pub fn tree(boxes: &[Aabb], preset: BuildPreset, collapse: Option<u32>) -> Bvh2 {
     let mut tree = whole(boxes, preset, 0.0);
     if let Some(max_leaf) = collapse {
         obvhs::bvh2::leaf_collapser::collapse(&mut tree, max_leaf, NODE_COST);
-        // what it needed and we do not
+        // needed by obvhs only
         tree.parents = Vec::new();
     }
     tree
 }
 
-/// The tree of primitives with these boxes, each widened by `pad` on all sides. `Best` may split primitives: one may be in several
-/// leaves, the boxes of which together hold it and its surroundings up to `pad`. `triangles` are what the primitives consist of.
+/// Builds a tree over primitives with these boxes, each widened by `pad` on all sides. `Best` may split primitives: one may be referenced
+/// by several leaves, whose boxes together contain it and its surroundings up to `pad`. `triangles` gives the triangles of each primitive.
 pub fn tree_with_splits(boxes: &[Aabb], triangles: &impl Triangles, preset: BuildPreset, pad: f32) -> Bvh2 {
     match preset {
         BuildPreset::Fast | BuildPreset::Default => whole(boxes, preset, pad),
@@ -98,8 +98,8 @@ fn whole(boxes: &[Aabb], preset: BuildPreset, pad: f32) -> Bvh2 {
     finish(nodes, boxes.len(), preset)
 }
 
-/// Is the mean size of some of them, evenly spread, far above the median? So it is in buildings (Sponza: 12), not in scanned surfaces
-/// (dragon: 1.4).
+/// Is the mean surface area of an evenly spaced sample of the boxes more than four times the median? The ratio is high for
+/// architecture (Sponza: 12) and low for scanned surfaces (dragon: 1.4).
 fn are_uneven(boxes: &[Aabb]) -> bool {
     let mut areas: Vec<f32> = boxes.iter().step_by(boxes.len().div_ceil(4096).max(1)).map(Aabb::half_area).collect();
     let mean = areas.iter().map(|&a| f64::from(a)).sum::<f64>() / areas.len() as f64;
@@ -114,12 +114,12 @@ fn clustered(boxes: &[Aabb]) -> Bvh2 {
     let indices = (0..boxes.len() as u32).collect();
     let mut tree = obvhs::ploc::PlocBuilder::with_capacity(boxes.len()).build(distance, boxes, indices, precision, threshold);
     obvhs::bvh2::reinsertion::ReinsertionOptimizer::default().run(&mut tree, config.reinsertion_batch_ratio, None);
-    // what it needed and we do not
+    // needed by obvhs only
     tree.parents = Vec::new();
     tree
 }
 
-/// Are there equal boxes among some of them, evenly spread? What a sample of this size overlooks is too few to matter.
+/// Does an evenly spaced sample of the boxes contain duplicates? Duplicates too rare for the sample are too few to matter.
 fn seems_to_repeat(boxes: &[Aabb]) -> bool {
     // equal as numbers is equal as bits, once -0 is 0
     let bits = |v: Vec3| (v + 0.0).to_array().map(f32::to_bits);
@@ -128,7 +128,7 @@ fn seems_to_repeat(boxes: &[Aabb]) -> bool {
 }
 
 fn finish(mut nodes: Vec<Bvh2Node>, primitives: usize, preset: BuildPreset) -> Bvh2 {
-    reinsert::optimise(&mut nodes, preset.effort());
+    reinsert::optimise(&mut nodes, preset.reinsertion());
     limit_depth(Bvh2 { nodes, primitive_indices: (0..primitives as u32).collect(), ..Default::default() }, MAX_DEPTH)
 }
 
@@ -141,14 +141,16 @@ pub fn cost(tree: &Bvh2) -> f64 {
     all / (node_box(&tree.nodes[0]).half_area() as f64).max(f64::MIN_POSITIVE)
 }
 
-/// Checks a tree against what it was built from: nodes in pairs, each with one parent; every box around what is below it; every
-/// primitive there, whole or (where `triangles` are given) in parts that hold all of it; no deeper than [`MAX_DEPTH`]. The error
-/// says what is wrong.
+/// Checks a tree against what it was built from: nodes in pairs, each with one parent; every box contains its children's; every
+/// primitive is in a leaf, whole or (where `triangles` are given) in parts that cover it; no deeper than [`MAX_DEPTH`].
+///
+/// # Errors
+/// A description of the first defect.
 pub fn validate(tree: &Bvh2, boxes: &[Aabb], triangles: Option<&dyn Triangles>) -> Result<(), String> {
     let mut parts: Vec<Vec<Aabb>> = vec![Vec::new(); boxes.len()];
     let (mut seen, mut work) = (vec![false; tree.nodes.len()], vec![(0usize, None::<Aabb>, 0u32)]);
     while let Some((at, above, depth)) = work.pop() {
-        let node = tree.nodes.get(at).ok_or(format!("node {at} is outside"))?;
+        let node = tree.nodes.get(at).ok_or(format!("node {at} is out of range"))?;
         if std::mem::replace(&mut seen[at], true) {
             return Err(format!("node {at} has two parents"));
         }
@@ -168,25 +170,25 @@ pub fn validate(tree: &Bvh2, boxes: &[Aabb], triangles: Option<&dyn Triangles>) 
             continue;
         }
         for slot in first..first + node.prim_count as usize {
-            let &p = tree.primitive_indices.get(slot).ok_or(format!("slot {slot} is outside"))?;
-            parts.get_mut(p as usize).ok_or(format!("primitive {p} is outside"))?.push(b);
+            let &p = tree.primitive_indices.get(slot).ok_or(format!("slot {slot} is out of range"))?;
+            parts.get_mut(p as usize).ok_or(format!("primitive {p} is out of range"))?.push(b);
         }
     }
     if let Some(at) = seen.iter().position(|s| !s) {
         return Err(format!("node {at} is in no tree"));
     }
     for (p, (whole, parts)) in boxes.iter().zip(&parts).enumerate() {
-        let held = match (parts.as_slice(), triangles) {
+        let contained = match (parts.as_slice(), triangles) {
             ([one], _) if one.contains(whole) => true,
             ([], _) | (_, None) => false,
             (parts, Some(triangles)) => {
-                let mut held = true;
-                triangles.each(p as u32, &mut |t| held &= is_covered(t, parts));
-                held
+                let mut covered = true;
+                triangles.each(p as u32, &mut |t| covered &= is_covered(t, parts));
+                covered
             }
         };
-        if !held {
-            return Err(format!("primitive {p} is in {} leaves, which do not hold it", parts.len()));
+        if !contained {
+            return Err(format!("primitive {p} is in {} leaves, which do not cover it", parts.len()));
         }
     }
     Ok(())
@@ -204,7 +206,7 @@ fn is_covered(t: [Vec3; 3], parts: &[Aabb]) -> bool {
     })
 }
 
-/// The same leaves in a tree that is no deeper than `most` (but ceil(log2 leaves) must fit).
+/// Rebuilds subtrees so that the tree is no deeper than `most`, which must be at least ceil(log2(leaves)). The leaves stay the same.
 pub fn limit_depth(tree: Bvh2, most: u32) -> Bvh2 {
     if depth_of(&tree) <= most {
         return tree;

@@ -1,8 +1,7 @@
-//! The binary hierarchy that `shaders/trace/reference.glsl` walks.
+//! The binary hierarchy that `shaders/trace/reference.glsl` traverses.
 //!
-//! Laid out so that a node holds the boxes of both its children: a visit is one load of 64 bytes, and no box is loaded for
-//! nothing. The traversal's stack cannot overflow: every inner node pushes at most one child, so a tree of depth d needs d
-//! entries, and the shader's stack is specialised to the depth that is there.
+//! A node stores the boxes of both its children: a visit is one load of 64 bytes, and no box is loaded that is not tested. The traversal's stack cannot overflow: every inner node pushes at most one child, so a tree of depth d needs d
+//! entries, and the shader's stack size is specialized to the depth of the tree.
 //!
 //! A reference to an inner node also says along which axis that node's children lie apart, the lower one first. A traversal that
 //! orders children by the sign of the ray's direction thus knows the order without loading anything more, and nodes do not grow.
@@ -14,11 +13,11 @@ use super::{Aabb, BuildPreset, build};
 pub use crate::interface::records::hierarchy::BinaryNode;
 use crate::interface::records::hierarchy::{AXIS_SHIFT, LEAF, NEXT, NODE_NUMBER};
 
-/// Most primitives that a leaf reference can hold.
+/// Maximum number of primitives in a leaf.
 pub const MAX_LEAF: u32 = 16;
-/// Primitives that a reference can number, over all trees of a scene.
+/// Maximum number of primitives over all trees of a scene, bounded by the bits of a reference.
 pub const MAX_PRIMITIVES: usize = 1 << 27;
-/// Reference of a tree without primitives: the traversal goes on with what is on its stack.
+/// Root reference of a tree without primitives: the traversal continues with its stack.
 pub const EMPTY: u32 = NEXT;
 
 /// A binary hierarchy in the layout of the compute tracer.
@@ -26,11 +25,11 @@ pub const EMPTY: u32 = NEXT;
 pub struct Bvh2 {
     /// Inner nodes, parents before their children; references are relative to this tree.
     pub nodes: Vec<BinaryNode>,
-    /// For each slot of the leaves, the number of the primitive that lies there.
+    /// Primitive index of each leaf slot.
     pub primitives: Vec<u32>,
-    /// Where traversal begins: an inner node, a leaf, or [`EMPTY`].
+    /// Reference where traversal begins: an inner node, a leaf, or [`EMPTY`].
     pub root: u32,
-    /// Inner nodes on the longest path from the root: what the traversal's stack must hold.
+    /// Inner nodes on the longest path from the root: the stack entries that traversal needs.
     pub depth: u32,
 }
 
@@ -109,8 +108,11 @@ impl Bvh2 {
         out
     }
 
-    /// Checks the whole structure against the boxes it was built from: every primitive in exactly one leaf, every box holds
-    /// what is below it, children in order along the stated axis, the depth as stated. The error says what is wrong.
+    /// Checks the whole structure against the boxes it was built from: every primitive in exactly one leaf, every box contains
+    /// its children's, children in order along the stated axis, the depth as stated.
+    ///
+    /// # Errors
+    /// A description of the first defect.
     pub fn validate(&self, boxes: &[Aabb]) -> Result<(), String> {
         let mut seen = vec![false; boxes.len()];
         let mut depth = 0;
@@ -122,8 +124,8 @@ impl Bvh2 {
             }
             if let Some((first, count)) = leaf_range(reference) {
                 for slot in first..first + count {
-                    let &p = self.primitives.get(slot as usize).ok_or(format!("slot {slot} is outside"))?;
-                    let seen = seen.get_mut(p as usize).ok_or(format!("primitive {p} is outside"))?;
+                    let &p = self.primitives.get(slot as usize).ok_or(format!("slot {slot} is out of range"))?;
+                    let seen = seen.get_mut(p as usize).ok_or(format!("primitive {p} is out of range"))?;
                     if std::mem::replace(seen, true) {
                         return Err(format!("primitive {p} is in two leaves"));
                     }
@@ -136,7 +138,7 @@ impl Bvh2 {
             depth = depth.max(level + 1);
             let (number, axis) =
                 inner_node(reference).filter(|r| r.1 < 3).ok_or(format!("reference {reference:#x} is broken"))?;
-            let node = self.nodes.get(number as usize).ok_or(format!("node {number} is outside"))?;
+            let node = self.nodes.get(number as usize).ok_or(format!("node {number} is out of range"))?;
             let [a, b] = node.boxes.map(|b| bounds_of(&b));
             if split_axis(&a, &b) != (axis as u32, false) {
                 return Err(format!("children of node {number} are not in order along axis {axis}"));
@@ -154,7 +156,7 @@ impl Bvh2 {
             return Err(format!("primitive {p} is in no leaf"));
         }
         if depth != self.depth || depth > MAX_DEPTH {
-            return Err(format!("depth is {depth}, said to be {}, at most {MAX_DEPTH}", self.depth));
+            return Err(format!("depth is {depth}, recorded as {}, at most {MAX_DEPTH}", self.depth));
         }
         Ok(())
     }

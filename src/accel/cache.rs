@@ -1,11 +1,12 @@
-//! Built hierarchies on disk, by the content that they were built from: named arrays of bytes under a 128-bit key.
+//! On-disk cache of built hierarchies: named byte arrays under a 128-bit hash of everything they were built from.
 //!
-//! Nothing here can fail a command. A file that is not whole (its length and a checksum over all of it are in its head) is ignored
-//! with a warning and written anew; a file that cannot be written (a full disk, a folder that may not be written) is a warning. Files are
-//! written beside and renamed, so several writers may race: each file is whole, and all of one key hold the same.
+//! The cache never fails a command. A damaged file (its header has its length and a checksum) is ignored with a warning and
+//! rewritten; a file that cannot be written (a full disk, a folder that may not be written) is a warning. Files are
+//! written beside and renamed, so several writers may race: each file is complete, and all files of one key are identical.
 //!
 //! XXH3 (`xxhash-rust`) makes keys and checksums: some ten GB a second, where a cryptographic hash would take as long as the
-//! build that it saves. Whoever can write to the folder can put a false hierarchy there: it is to be as trusted as the program.
+//! build that it saves. Anyone who can write to the folder can
+//! replace a hierarchy: the folder must be as trusted as the program.
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -20,19 +21,19 @@ use crate::files;
 const MAGIC: [u8; 8] = *b"skyhier\x01";
 /// Magic, length of the file, checksum of what follows the head.
 const HEAD: usize = 8 + 8 + 16;
-/// A name has up to so many bytes.
-const LONGEST_NAME: usize = 255;
+/// Maximum length of an array's name, bytes.
+const MAX_NAME: usize = 255;
 
-/// What a hierarchy is known by. Feed it everything that the result depends on, the version of the layout included.
+/// Builds the key of a hierarchy. Add everything that the result depends on, the version of the layout included.
 #[derive(Clone, Default)]
 pub struct KeyBuilder(Xxh3);
 
-/// See [`KeyBuilder`].
+/// Key of a cached hierarchy; see [`KeyBuilder`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Key(u128);
 
 impl KeyBuilder {
-    /// Adds bytes; their number is added too, so that parts cannot run into each other.
+    /// Adds bytes and their length, so that consecutive additions cannot be confused.
     pub fn with(mut self, bytes: &[u8]) -> Self {
         self.0.update(&(bytes.len() as u64).to_le_bytes());
         self.0.update(bytes);
@@ -49,15 +50,15 @@ impl KeyBuilder {
 #[derive(Debug, Default)]
 pub struct Entries {
     bytes: Vec<u8>,
-    /// Name and place of each.
-    places: Vec<(String, std::ops::Range<usize>)>,
+    /// Name and byte range of each array.
+    ranges: Vec<(String, std::ops::Range<usize>)>,
 }
 
 impl Entries {
-    /// The array of a name, as values of a type. None if there is none, or if it is no whole number of them.
+    /// The array of a name as values of type `T`. `None` if it does not exist, or if its length is not a multiple of the size of `T`.
     pub fn get<T: bytemuck::AnyBitPattern + bytemuck::NoUninit>(&self, name: &str) -> Option<Vec<T>> {
-        let (_, place) = self.places.iter().find(|(n, _)| n == name)?;
-        let bytes = &self.bytes[place.clone()];
+        let (_, range) = self.ranges.iter().find(|(n, _)| n == name)?;
+        let bytes = &self.bytes[range.clone()];
         let mut out = vec![T::zeroed(); bytes.len() / size_of::<T>()];
         (bytes.len().is_multiple_of(size_of::<T>())).then(|| {
             bytemuck::cast_slice_mut(&mut out).copy_from_slice(bytes);
@@ -70,7 +71,7 @@ impl Entries {
 #[derive(Clone, Debug)]
 pub struct Cache {
     folder: PathBuf,
-    /// What went wrong so far.
+    /// Warnings not yet taken.
     warnings: Arc<Mutex<Vec<String>>>,
 }
 
@@ -80,7 +81,7 @@ impl Cache {
         Self { folder: folder.into(), warnings: Default::default() }
     }
 
-    /// What went wrong since the last time this was asked: one line each.
+    /// Takes the warnings since the last call, one line each.
     pub fn take_warnings(&self) -> Vec<String> {
         std::mem::take(&mut self.warnings.lock().unwrap_or_else(PoisonError::into_inner))
     }
@@ -94,29 +95,29 @@ impl Cache {
         self.folder.join(format!("{:032x}.skyhier", key.0))
     }
 
-    /// What is stored under a key, if it is there and whole.
+    /// Loads the arrays of a key; `None` if it is not cached or the file is damaged.
     pub fn load(&self, key: Key) -> Option<Entries> {
         let path = self.path(key);
         let bytes = match std::fs::read(&path) {
             Ok(b) => b,
             Err(e) if e.kind() == std::io::ErrorKind::NotFound => return None,
             Err(e) => {
-                self.warn(format!("{}: cannot read ({e}); the hierarchy is built anew", path.display()));
+                self.warn(format!("{}: cannot read ({e}); rebuilding the hierarchy", path.display()));
                 return None;
             }
         };
         let entries = parse(bytes);
         if entries.is_none() {
-            self.warn(format!("{}: damaged or of another version; the hierarchy is built anew", path.display()));
+            self.warn(format!("{}: damaged or of another version; rebuilding the hierarchy", path.display()));
         }
         entries
     }
 
-    /// Stores arrays under a key, in place of what is there. Does not fail: says what went wrong.
+    /// Stores arrays under a key, replacing an existing file. A failure becomes a warning.
     pub fn store(&self, key: Key, arrays: &[(&str, &[u8])]) {
         let path = self.path(key);
         if let Err(e) = self.try_store(&path, arrays) {
-            self.warn(format!("the hierarchy is not kept: {e}"));
+            self.warn(format!("the hierarchy was not cached: {e}"));
         }
     }
 
@@ -125,7 +126,7 @@ impl Cache {
         std::fs::create_dir_all(&self.folder).map_err(failed)?;
         let mut table = (arrays.len() as u64).to_le_bytes().to_vec();
         for (name, bytes) in arrays {
-            assert!(name.len() <= LONGEST_NAME, "{name} is too long a name");
+            assert!(name.len() <= MAX_NAME, "{name} is too long a name");
             table.push(name.len() as u8);
             table.extend(name.as_bytes());
             table.extend((bytes.len() as u64).to_le_bytes());
@@ -143,7 +144,7 @@ impl Cache {
     }
 }
 
-/// The arrays of a file, if it is whole.
+/// Parses a cache file; `None` if it is damaged.
 fn parse(bytes: Vec<u8>) -> Option<Entries> {
     let (head, body) = bytes.split_at_checked(HEAD)?;
     let word = |at: usize| u64::from_le_bytes(head[at..at + 8].try_into().expect("eight bytes"));
@@ -170,13 +171,13 @@ fn parse(bytes: Vec<u8>) -> Option<Entries> {
         table.push((name, size));
     }
     let mut at = HEAD + used;
-    let mut places = Vec::new();
+    let mut ranges = Vec::new();
     for (name, size) in table {
         let end = at.checked_add(size).filter(|&e| e <= bytes.len())?;
-        places.push((name, at..end));
+        ranges.push((name, at..end));
         at = end;
     }
-    (at == bytes.len()).then_some(Entries { bytes, places })
+    (at == bytes.len()).then_some(Entries { bytes, ranges })
 }
 
 #[cfg(test)]
@@ -275,7 +276,7 @@ mod tests {
         std::fs::write(&file, b"x").unwrap();
         let cache = Cache::new(&file);
         stored(&cache, key("a"));
-        assert!(matches!(&cache.take_warnings()[..], [one] if one.contains("not kept")));
+        assert!(matches!(&cache.take_warnings()[..], [one] if one.contains("not cached")));
         assert!(cache.load(key("a")).is_none());
         assert_eq!(std::fs::read(&file).unwrap(), b"x");
     }

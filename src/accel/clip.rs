@@ -8,7 +8,7 @@ use super::Aabb;
 
 /// The triangles that a primitive consists of.
 pub trait Triangles: Sync {
-    /// Calls `see` with each triangle of a primitive; with none for a primitive that must not be cut.
+    /// Calls `see` with each triangle of a primitive; with none for a primitive that must not be split.
     fn each(&self, primitive: u32, see: &mut dyn FnMut([Vec3; 3]));
 }
 
@@ -51,7 +51,7 @@ pub fn clip(primitive: u32, cell: Aabb, triangles: &impl Triangles) -> Option<Aa
 struct Polygon {
     points: [DVec3; 12],
     count: usize,
-    /// There was no room for all corners.
+    /// The polygon had more corners than the array.
     overflowed: bool,
 }
 
@@ -66,7 +66,7 @@ impl Polygon {
         &self.points[..self.count]
     }
 
-    /// Keeps what lies on one side of a plane (Sutherland and Hodgman 1974).
+    /// Clips the polygon against a plane and keeps one side (Sutherland and Hodgman 1974).
     fn keep(&mut self, axis: usize, at: f64, sign: f64) {
         let (old, n) = (self.points, self.count);
         self.count = 0;

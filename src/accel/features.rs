@@ -1,21 +1,21 @@
-//! What a scene needs, found once at load: the rest is not compiled into shaders, not recorded and not traced.
+//! Features that a scene uses, found once at load. Unused features are specialized out of the shaders, not recorded and not traced.
 
 use super::flatten::FlatScene;
 use crate::interface::ShadingFeatures;
 use crate::scene::{AlphaMode, Geometry, Material, Scene, TexelData};
 
-/// What alpha means for the visibility of a mesh.
+/// Visibility class of a mesh by its alpha.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum AlphaClass {
-    /// There everywhere: no test.
+    /// Opaque everywhere: no alpha test.
     Opaque,
-    /// There in places: ask at every hit.
+    /// Opaque in some places: alpha is tested at every hit.
     Tested,
-    /// There nowhere: nothing to trace.
+    /// Fully transparent: not traced.
     Absent,
 }
 
-/// Alpha below this is absent. BLEND surfaces count as there from one half on in streams that only know there or not.
+/// Alpha below this counts as transparent; `None` for opaque materials. Streams with binary visibility treat BLEND as MASK with a cutoff of 0.5.
 pub fn alpha_cutoff(material: &Material) -> Option<f32> {
     match material.alpha_mode {
         AlphaMode::Opaque => None,
@@ -24,19 +24,20 @@ pub fn alpha_cutoff(material: &Material) -> Option<f32> {
     }
 }
 
-/// What [`AlphaMode::Blend`] means for rays.
+/// How rays interpret [`AlphaMode::Blend`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Blend {
-    /// There from an alpha of one half on: what streams ask that only know there or not.
+    /// As a mask with a cutoff of 0.5, for streams with binary visibility.
     #[default]
     Masked,
-    /// There with a probability of alpha, drawn anew for each ray: what paths ask. Spheres, which have no coordinates to draw by, are masked.
-    Covered,
+    /// Stochastic alpha, for path tracing: a hit is accepted with a probability of alpha, sampled anew for each ray. Spheres, which have no
+    /// texture coordinates to seed the sample with, are masked.
+    Stochastic,
 }
 
 /// Class of each mesh of the scene, from the range of alpha that its material and vertices can reach.
 pub fn alpha_classes(scene: &Scene, blend: Blend) -> Vec<AlphaClass> {
-    // range of alpha of each texture, looked at once and only where an alpha mode asks
+    // range of alpha of each texture, computed once and only where an alpha mode needs it
     let mut ranges: Vec<Option<(f32, f32)>> = vec![None; scene.textures.len()];
     scene
         .meshes
@@ -57,7 +58,7 @@ pub fn alpha_classes(scene: &Scene, blend: Blend) -> Vec<AlphaClass> {
             }
             // interpolation rounds: a range that just reaches the cutoff is tested
             let margin = 1e-5;
-            let covered = blend == Blend::Covered && material.alpha_mode == AlphaMode::Blend;
+            let covered = blend == Blend::Stochastic && material.alpha_mode == AlphaMode::Blend;
             if covered && matches!(mesh.geometry, Geometry::Triangles(_)) {
                 return match (lo >= 1.0 - margin, hi <= 0.0) {
                     (true, _) => AlphaClass::Opaque,
@@ -70,7 +71,7 @@ pub fn alpha_classes(scene: &Scene, blend: Blend) -> Vec<AlphaClass> {
             } else if hi < cutoff - margin {
                 AlphaClass::Absent
             } else if matches!(mesh.geometry, Geometry::Spheres(_)) {
-                // spheres have no coordinates: their alpha is one number
+                // spheres have no texture coordinates: their alpha is constant
                 if lo >= cutoff { AlphaClass::Opaque } else { AlphaClass::Absent }
             } else if lo == hi && lo >= cutoff {
                 AlphaClass::Opaque
@@ -85,29 +86,29 @@ fn alpha_range(texels: &TexelData) -> (f32, f32) {
     texels.iter().fold((f32::INFINITY, 0.0), |(lo, hi), [_, _, _, alpha]| (alpha.min(lo), alpha.max(hi)))
 }
 
-/// What the scene needs, as the specialisation of shaders.
+/// Features that a scene uses: the specialization of its shaders.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SceneFeatures {
-    /// Some triangles are alpha tested.
+    /// Some triangles need an alpha test.
     pub alpha: bool,
-    /// Some of them are there for a part of the rays ([`Blend::Covered`]).
-    pub coverage: bool,
+    /// Some of them have stochastic alpha ([`Blend::Stochastic`]).
+    pub stochastic_alpha: bool,
     /// Some textures have more than 8 bits a channel.
     pub deep_texels: bool,
-    /// There are analytic spheres.
+    /// The scene has analytic spheres.
     pub spheres: bool,
-    /// One top-level entry with an identity transform.
+    /// A single TLAS instance with an identity transform: the top level is skipped.
     pub single_level: bool,
-    /// What materials require of the path tracer; `None` where nothing is shaded.
+    /// Shading features that the materials require; `None` for tracers that do not shade.
     pub shading: Option<ShadingFeatures>,
 }
 
 impl SceneFeatures {
-    /// Of a flattened scene.
+    /// Finds the features of a flattened scene.
     pub fn of(flat: &FlatScene) -> Self {
         Self {
             alpha: flat.has_alpha(),
-            coverage: flat.has_coverage(),
+            stochastic_alpha: flat.has_stochastic_alpha(),
             deep_texels: flat.scene.textures.iter().any(|t| !matches!(t.texels, TexelData::Unorm8(_))),
             spheres: flat.has_spheres(),
             single_level: flat.is_single_level(),
@@ -115,7 +116,7 @@ impl SceneFeatures {
         }
     }
 
-    /// One line for each thing that is skipped, and what that saves.
+    /// Describes, a line each, which features are specialized out.
     pub fn explain(&self, flat: &FlatScene) -> Vec<String> {
         let mut lines = Vec::new();
         if !self.alpha {
@@ -131,16 +132,20 @@ impl SceneFeatures {
             lines.push("no spheres: their intersection code is not compiled".to_owned());
         }
         if self.single_level {
-            let n = flat.groups.first().map_or(0, |g| g.parts.len());
+            let n = flat.groups.first().map_or(0, |g| g.submeshes.len());
             lines.push(format!(
                 "one level: {n} mesh{} baked into world space, the top level is skipped",
                 if n == 1 { "" } else { "es" }
             ));
         } else {
-            lines.push(format!("two levels: {} groups, {} entries in the top level", flat.groups.len(), flat.placements.len()));
+            lines.push(format!(
+                "two levels: {} bottom-level structures, {} instances in the top level",
+                flat.groups.len(),
+                flat.instances.len()
+            ));
         }
         if flat.absent_primitives > 0 {
-            lines.push(format!("{} primitives are transparent everywhere and left out", flat.absent_primitives));
+            lines.push(format!("dropped {} fully transparent primitives", flat.absent_primitives));
         }
         lines
     }

@@ -1,8 +1,9 @@
-//! From placed meshes to what tracers build structures over.
+//! Arranges a scene's instances into the bottom-level (BLAS) and top-level (TLAS) geometry that tracers build over.
 //!
-//! A mesh that is placed once gains nothing from a level of its own: all such meshes are baked into one *group* of
-//! triangles (and one of spheres) in world space. A mesh that is placed several times is a group of its own with several
-//! entries in the top level. Most files end up as one group with one entry, and the second level is skipped altogether.
+//! A mesh with a single instance gains nothing from a BLAS of its own: all such meshes are baked into one *group* of
+//! triangles (and one of spheres) in world space. A mesh with several instances is a group of its own with several TLAS
+//! instances. A group is the geometry of one BLAS. Most files end up as one group with one TLAS instance, and the top level is
+//! skipped altogether.
 
 use glam::{DAffine3, DVec3, Vec3};
 
@@ -11,92 +12,92 @@ use super::features::{AlphaClass, Blend, alpha_classes};
 use crate::error::Result;
 use crate::scene::{AlphaMode, Geometry, Motion, Scene, Sphere};
 
-/// A mesh within a group.
+/// A submesh: one scene mesh within the geometry of a BLAS (a group).
 #[derive(Clone, Debug)]
-pub struct Part {
+pub struct Submesh {
     /// Index into [`Scene::meshes`].
     pub mesh: usize,
-    /// The instance it stands for, when the group is placed once; otherwise the entry of the top level says it.
+    /// Index into [`Scene::instances`] of the baked instance; `None` where the group has several TLAS instances, which then name it.
     pub scene_instance: Option<usize>,
-    /// Mesh to group space; identity unless baked.
+    /// Transform from mesh space to group space; identity unless baked.
     pub to_group: DAffine3,
-    /// The first of its primitives in the group.
+    /// Index of its first primitive in the group.
     pub first_primitive: usize,
-    /// The first of its vertices in the group (triangles only).
+    /// Index of its first vertex in the group (triangles only).
     pub first_vertex: usize,
-    /// `to_group` turns the winding.
+    /// `to_group` mirrors, which flips the winding order.
     pub mirrored: bool,
-    /// Its material has to be asked at every hit.
+    /// Hits need an alpha test against the material.
     pub alpha_tested: bool,
 }
 
-impl Part {
-    /// The primitive of the group that follows its last.
+impl Submesh {
+    /// Index in the group one past its last primitive.
     pub fn end(&self, flat: &FlatScene) -> usize {
         self.first_primitive + flat.scene.meshes[self.mesh].geometry.primitive_count()
     }
 }
 
-/// What one bottom-level structure is built over: triangles or spheres, never both.
+/// The geometry of one bottom-level acceleration structure (a group): triangles or spheres, never both.
 #[derive(Clone, Debug)]
-pub struct Group {
-    /// Spheres (true) or triangles.
+pub struct BlasGroup {
+    /// True for spheres, false for triangles.
     pub spheres: bool,
-    /// Its meshes; alpha-tested ones last.
-    pub parts: Vec<Part>,
-    /// Triangles or spheres.
+    /// Its submeshes; alpha-tested ones last.
+    pub submeshes: Vec<Submesh>,
+    /// Number of triangles or spheres.
     pub primitive_count: usize,
-    /// Vertices (triangles only).
+    /// Number of vertices (triangles only).
     pub vertex_count: usize,
-    /// Primitives before the first alpha-tested one.
+    /// Number of opaque primitives, which precede the alpha-tested ones.
     pub opaque_count: usize,
 }
 
-/// An entry of the top level.
+/// An instance of a BLAS in the top-level acceleration structure.
 #[derive(Clone, Debug)]
-pub struct Placement {
+pub struct TlasInstance {
     /// Index into [`FlatScene::groups`].
     pub group: usize,
-    /// Group space to world, relative to [`FlatScene::origin`].
+    /// Transform from group space to world space, relative to [`FlatScene::origin`].
     pub to_world: DAffine3,
-    /// The instance of the scene, when the group has one mesh placed several times.
+    /// Index into [`Scene::instances`]; `None` for a baked group, whose submeshes name theirs.
     pub scene_instance: Option<usize>,
 }
 
-/// The scene as tracers take it.
+/// A scene arranged for building acceleration structures.
 #[derive(Clone, Debug)]
 pub struct FlatScene<'a> {
-    /// Where it came from.
+    /// The source scene.
     pub scene: &'a Scene,
-    /// The file's world coordinates of the tracers' origin ([`Scene::origin`]).
+    /// World position of the tracers' coordinate origin ([`Scene::origin`]).
     pub origin: DVec3,
-    /// Bottom-level structures.
-    pub groups: Vec<Group>,
-    /// Top-level entries.
-    pub placements: Vec<Placement>,
-    /// Triangles and spheres left out because their material is nowhere opaque enough to be seen.
+    /// Geometry of each bottom-level structure.
+    pub groups: Vec<BlasGroup>,
+    /// Instances in the top-level structure.
+    pub instances: Vec<TlasInstance>,
+    /// Number of triangles and spheres dropped because their material is fully transparent.
     pub absent_primitives: usize,
-    /// What may change.
+    /// Instances and meshes that may move or deform between frames.
     pub motion: Motion,
-    /// What partial coverage means.
+    /// How alpha blending is interpreted.
     pub blend: Blend,
 }
 
 impl<'a> FlatScene<'a> {
-    /// Groups the meshes of a scene of which nothing changes.
+    /// Arranges a static scene.
     pub fn new(scene: &'a Scene) -> Self {
         Self::group(scene, Motion::default(), Blend::Masked)
     }
 
-    /// As [`FlatScene::new`], for paths: what covers a surface in part is there for a part of the rays.
+    /// As [`FlatScene::new`], for path tracing: blended surfaces are intersected with a probability of their alpha ([`Blend::Stochastic`]).
     pub fn for_paths(scene: &'a Scene) -> Self {
-        Self::group(scene, Motion::default(), Blend::Covered)
+        Self::group(scene, Motion::default(), Blend::Stochastic)
     }
 
-    /// Groups the meshes of a scene; what may change is not baked into anything: its mesh is a group of its own, in object space.
+    /// Arranges a dynamic scene. A mesh that may move or deform is not baked: it is a group of its own, in object space.
     ///
     /// # Errors
-    /// [`crate::Error::Usage`] when `motion` names what is not there, or spheres to deform.
+    /// [`crate::Error::Usage`] when `motion` names an instance or mesh that does not exist, or asks spheres to deform.
     pub fn with_motion(scene: &'a Scene, motion: Motion) -> Result<Self> {
         motion.check(scene)?;
         Ok(Self::group(scene, motion, Blend::Masked))
@@ -114,8 +115,8 @@ impl<'a> FlatScene<'a> {
             changes[mesh] = true;
         }
         let relative = |t: DAffine3| DAffine3 { translation: t.translation - origin, ..t };
-        let mut flat = Self { scene, origin, groups: Vec::new(), placements: Vec::new(), absent_primitives: 0, motion, blend };
-        let mut world = [Group::empty(false), Group::empty(true)];
+        let mut flat = Self { scene, origin, groups: Vec::new(), instances: Vec::new(), absent_primitives: 0, motion, blend };
+        let mut world = [BlasGroup::empty(false), BlasGroup::empty(true)];
         let mut own: Vec<Option<usize>> = vec![None; scene.meshes.len()];
         // opaque meshes first, so that alpha-tested primitives are the tail of every group
         for tested in [false, true] {
@@ -135,92 +136,92 @@ impl<'a> FlatScene<'a> {
                     world[spheres as usize].push(scene, instance.mesh, Some(k), to_world, tested);
                 } else {
                     let group = *own[instance.mesh].get_or_insert_with(|| {
-                        let mut g = Group::empty(spheres);
+                        let mut g = BlasGroup::empty(spheres);
                         g.push(scene, instance.mesh, None, DAffine3::IDENTITY, tested);
                         flat.groups.push(g);
                         flat.groups.len() - 1
                     });
-                    flat.placements.push(Placement { group, to_world, scene_instance: Some(k) });
+                    flat.instances.push(TlasInstance { group, to_world, scene_instance: Some(k) });
                 }
             }
         }
         for group in world.into_iter().filter(|g| g.primitive_count > 0) {
-            flat.placements.push(Placement { group: flat.groups.len(), to_world: DAffine3::IDENTITY, scene_instance: None });
+            flat.instances.push(TlasInstance { group: flat.groups.len(), to_world: DAffine3::IDENTITY, scene_instance: None });
             flat.groups.push(group);
         }
         flat
     }
 
-    /// One entry that needs no transform: the second level can be skipped.
+    /// Is there a single TLAS instance without a transform, so that the top level can be skipped?
     pub fn is_single_level(&self) -> bool {
-        self.motion.instances.is_empty() && matches!(self.placements.as_slice(), [p] if p.to_world == DAffine3::IDENTITY)
+        self.motion.instances.is_empty() && matches!(self.instances.as_slice(), [p] if p.to_world == DAffine3::IDENTITY)
     }
 
-    /// Does any primitive need its material asked at every hit?
+    /// Does any primitive need an alpha test?
     pub fn has_alpha(&self) -> bool {
         self.groups.iter().any(|g| g.opaque_count < g.primitive_count)
     }
 
-    /// Is any of them there for a part of the rays only?
-    pub fn has_coverage(&self) -> bool {
-        let covers = |p: &Part| self.scene.materials[self.scene.meshes[p.mesh].material].alpha_mode == AlphaMode::Blend;
-        self.blend == Blend::Covered && self.groups.iter().flat_map(|g| &g.parts).any(|p| p.alpha_tested && covers(p))
+    /// Does any primitive have stochastic alpha ([`Blend::Stochastic`])?
+    pub fn has_stochastic_alpha(&self) -> bool {
+        let covers = |p: &Submesh| self.scene.materials[self.scene.meshes[p.mesh].material].alpha_mode == AlphaMode::Blend;
+        self.blend == Blend::Stochastic && self.groups.iter().flat_map(|g| &g.submeshes).any(|p| p.alpha_tested && covers(p))
     }
 
-    /// Is there a sphere?
+    /// Does the scene have analytic spheres?
     pub fn has_spheres(&self) -> bool {
         self.groups.iter().any(|g| g.spheres)
     }
 
-    /// Primitives over all groups, each group counted once.
+    /// Number of primitives over all groups, each group counted once however many instances it has.
     pub fn primitive_count(&self) -> usize {
         self.groups.iter().map(|g| g.primitive_count).sum()
     }
 
-    /// World bounds relative to the origin; empty when nothing is placed.
+    /// World bounds relative to the origin; empty for a scene without geometry.
     pub fn bounds(&self) -> Aabb {
         let Some((lo, hi)) = self.scene.bounds() else { return Aabb::EMPTY };
         Aabb { min: (lo - self.origin).as_vec3(), max: (hi - self.origin).as_vec3() }
     }
 
-    /// Position of a part's vertex in group space, exactly as it lies in device memory.
-    pub fn vertex(&self, part: &Part, vertex: usize) -> Vec3 {
+    /// Position of a submesh's vertex in group space, bit for bit as in device memory.
+    pub fn vertex(&self, part: &Submesh, vertex: usize) -> Vec3 {
         match &self.scene.meshes[part.mesh].geometry {
             Geometry::Triangles(t) => place(part, t.positions[vertex]),
             Geometry::Spheres(s) => place(part, s[vertex].center),
         }
     }
 
-    /// Corners of a part's triangle in group space. `triangle` counts in the mesh.
-    pub fn triangle(&self, part: &Part, triangle: usize) -> [Vec3; 3] {
+    /// Corners of a submesh's triangle in group space. `triangle` is an index into the mesh.
+    pub fn triangle(&self, part: &Submesh, triangle: usize) -> [Vec3; 3] {
         match &self.scene.meshes[part.mesh].geometry {
             Geometry::Triangles(t) => t.indices[triangle].map(|i| place(part, t.positions[i as usize])),
-            Geometry::Spheres(_) => unreachable!("triangles are asked of triangle groups only"),
+            Geometry::Spheres(_) => unreachable!("a triangle was requested of a group of spheres"),
         }
     }
 
-    /// A part's sphere in group space.
-    pub fn sphere(&self, part: &Part, sphere: usize) -> Sphere {
+    /// A submesh's sphere in group space. `sphere` is an index into the mesh.
+    pub fn sphere(&self, part: &Submesh, sphere: usize) -> Sphere {
         match &self.scene.meshes[part.mesh].geometry {
             Geometry::Spheres(s) => {
                 let scale = part.to_group.matrix3.x_axis.length();
                 Sphere { center: place(part, s[sphere].center), radius: (s[sphere].radius as f64 * scale) as f32 }
             }
-            Geometry::Triangles(_) => unreachable!("spheres are asked of sphere groups only"),
+            Geometry::Triangles(_) => unreachable!("a sphere was requested of a group of triangles"),
         }
     }
 
-    /// The part that holds a group's primitive.
-    pub fn part_of<'g>(&self, group: &'g Group, primitive: usize) -> &'g Part {
-        &group.parts[group.parts.partition_point(|p| p.first_primitive <= primitive) - 1]
+    /// The submesh that contains a group's primitive.
+    pub fn submesh_of<'g>(&self, group: &'g BlasGroup, primitive: usize) -> &'g Submesh {
+        &group.submeshes[group.submeshes.partition_point(|p| p.first_primitive <= primitive) - 1]
     }
 
-    /// Box of a group's primitive in group space.
-    pub fn primitive_bounds(&self, group: &Group, part: &Part, primitive: usize) -> Aabb {
+    /// Bounding box of a group's primitive in group space. `primitive` is an index into the group.
+    pub fn primitive_bounds(&self, group: &BlasGroup, part: &Submesh, primitive: usize) -> Aabb {
         let k = primitive - part.first_primitive;
         if group.spheres {
             let s = self.sphere(part, k);
-            // the sum is rounded: one step outwards holds the exact sphere
+            // the sum is rounded: one step outwards makes the box contain the exact sphere
             let out = |v: Vec3, f: fn(f32) -> f32| Vec3::new(f(v.x), f(v.y), f(v.z));
             Aabb { min: out(s.center - s.radius, f32::next_down), max: out(s.center + s.radius, f32::next_up) }
         } else {
@@ -229,11 +230,11 @@ impl<'a> FlatScene<'a> {
     }
 }
 
-fn place(part: &Part, p: Vec3) -> Vec3 {
+fn place(part: &Submesh, p: Vec3) -> Vec3 {
     if part.to_group == DAffine3::IDENTITY { p } else { part.to_group.transform_point3(p.as_dvec3()).as_vec3() }
 }
 
-/// Rotation, uniform scale, mirroring, translation: what keeps a sphere a sphere.
+/// Is the transform a similarity (rotation, uniform scale, mirroring, translation), which maps spheres to spheres?
 fn is_similarity(t: &DAffine3) -> bool {
     let m = t.matrix3;
     let (a, b, c) = (m.x_axis.length_squared(), m.y_axis.length_squared(), m.z_axis.length_squared());
@@ -243,9 +244,9 @@ fn is_similarity(t: &DAffine3) -> bool {
     (a - b).abs() <= tolerance && (a - c).abs() <= tolerance && skew <= tolerance
 }
 
-impl Group {
+impl BlasGroup {
     fn empty(spheres: bool) -> Self {
-        Self { spheres, parts: Vec::new(), primitive_count: 0, vertex_count: 0, opaque_count: 0 }
+        Self { spheres, submeshes: Vec::new(), primitive_count: 0, vertex_count: 0, opaque_count: 0 }
     }
 
     fn push(&mut self, scene: &Scene, mesh: usize, scene_instance: Option<usize>, to_group: DAffine3, alpha_tested: bool) {
@@ -253,7 +254,7 @@ impl Group {
             Geometry::Triangles(t) => (t.indices.len(), t.positions.len()),
             Geometry::Spheres(s) => (s.len(), 0),
         };
-        self.parts.push(Part {
+        self.submeshes.push(Submesh {
             mesh,
             scene_instance,
             to_group,

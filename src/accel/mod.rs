@@ -1,4 +1,4 @@
-//! Bounding volume hierarchies on the host. No Vulkan in here.
+//! Bounding volume hierarchies, built on the host. This module does not depend on Vulkan.
 
 pub mod build;
 pub mod bvh2;
@@ -15,8 +15,8 @@ pub mod wide;
 
 pub use build::BuildPreset;
 pub use bvh2::Bvh2;
-pub use refit::{RefitPlan, RefitPolicy, Refitted};
-pub use wide::Wide;
+pub use refit::{RefitPlan, RefitPolicy, RefitResult};
+pub use wide::WideBvh;
 
 /// An axis-aligned box in f32.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -28,7 +28,7 @@ pub struct Aabb {
 }
 
 impl Aabb {
-    /// The box of nothing: the identity of [`Aabb::union`].
+    /// The empty box: the identity of [`Aabb::union`].
     pub const EMPTY: Aabb = Aabb { min: glam::Vec3::INFINITY, max: glam::Vec3::NEG_INFINITY };
 
     /// The smallest box around some points.
@@ -36,12 +36,12 @@ impl Aabb {
         points.iter().fold(Self::EMPTY, |b, &p| Self { min: b.min.min(p), max: b.max.max(p) })
     }
 
-    /// The smallest box around two.
+    /// The smallest box around both boxes.
     pub fn union(self, other: Self) -> Self {
         Self { min: self.min.min(other.min), max: self.max.max(other.max) }
     }
 
-    /// Does this box hold the other?
+    /// Does this box contain the other?
     pub fn contains(&self, other: &Self) -> bool {
         self.min.cmple(other.min).all() && self.max.cmpge(other.max).all()
     }

@@ -11,16 +11,16 @@ pub const NONE: u32 = u32::MAX;
 /// One triangle, or two with a common edge: (0, 1, 2) and (0, 2, 3) of `corners`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Pair {
-    /// Numbers of the triangles; the second may be [`NONE`].
+    /// Triangle indices; the second may be [`NONE`].
     pub triangles: [u32; 2],
 }
 
-/// How two triangles go together: their corners in the order of a pair.
+/// Vertex order of a pair of triangles, as a fan around the shared edge.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Fan {
     /// Vertices; the last repeats the third where there is one triangle only.
     pub corners: [u32; 4],
-    /// Of each triangle, where in (0, 1, 2) and (0, 2, 3) its own second and third corner stand.
+    /// For each triangle, the positions within (0, 1, 2) and (0, 2, 3) of its second and third corner.
     pub second_third: [[u8; 2]; 2],
 }
 
@@ -83,7 +83,7 @@ fn neighbours(triangles: &[[u32; 3]], vertex_count: usize) -> Vec<[u32; 3]> {
     };
     for v in 0..vertex_count {
         let bucket = &mut entries[begin[v] as usize..begin[v + 1] as usize];
-        // of a vertex of very many triangles, those that share an edge are brought together
+        // at a vertex of very many triangles, sorting brings those that share an edge together
         if bucket.len() > CROWDED {
             bucket.sort_unstable();
         }
@@ -103,11 +103,11 @@ fn neighbours(triangles: &[[u32; 3]], vertex_count: usize) -> Vec<[u32; 3]> {
     out
 }
 
-/// Edges at a vertex above which not all are held against all.
+/// Number of edges at a vertex above which not all pairs are compared.
 const CROWDED: usize = 32;
 
-/// Matches triangles with neighbours so that the boxes of the pairs are small: in each round, whoever are each other's best
-/// choice go together. A box of a pair is never larger than `GROWTH` times the two boxes of its triangles.
+/// Matches triangles with neighbours so that the boxes of the pairs are small: in each round, triangles that are each
+/// other's best choice are paired. A box of a pair is never larger than `GROWTH` times the two boxes of its triangles.
 pub fn pair_up(triangles: &[[u32; 3]], boxes: &[Aabb], vertex_count: usize) -> Vec<Pair> {
     const ROUNDS: usize = 4;
     const GROWTH: f32 = 1.2;

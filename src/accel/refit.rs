@@ -1,23 +1,23 @@
-//! Refitting: the boxes of a wide hierarchy are made anew for leaves that have moved, bottom-up, while which block lies below which
+//! Refitting: the boxes of a wide hierarchy are recomputed bottom-up for leaves that have moved, while its topology
 //! stays (Wald, Boulos, Shirley, "Ray Tracing Deformable Scenes Using Dynamic Bounding Volume Hierarchies", TOG 2007). Boxes are
 //! quantised by the same code as at the build, so a refit to unchanged leaves changes no bit.
 //!
-//! [`RefitPolicy`] says when a tree that was refitted again and again has cost more than a new one.
+//! [`RefitPolicy`] decides when a tree that was refitted repeatedly should be rebuilt.
 
 use std::ops::Range;
 
 use rayon::prelude::*;
 
 use super::Aabb;
-use super::wide::{self, Block, WIDTH, Wide};
+use super::wide::{self, Block, WIDTH, WideBvh};
 
-/// Blocks of a part that is refitted by one thread, at least: below that the hand-over costs more than the work.
+/// Minimum number of blocks refitted by one thread: below that, scheduling costs more than the work.
 const TASK_BLOCKS: usize = 2048;
-/// Parts at most, about: a few per thread of any machine.
+/// Approximate maximum number of parallel tasks: a few per thread of any machine.
 const TASKS: usize = 128;
 
 /// How a tree is refitted in parallel: its subtrees whose blocks below the root lie side by side, and what is above them. It stays
-/// valid until the tree is built anew.
+/// valid until the tree is rebuilt.
 #[derive(Clone, Debug)]
 pub struct RefitPlan {
     /// Roots of subtrees, and the blocks below each; in the order of the blocks.
@@ -26,17 +26,17 @@ pub struct RefitPlan {
     rest: Vec<u32>,
 }
 
-/// What a refit found.
+/// Result of a refit.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Refitted {
-    /// Bounds of everything, padded; `None` over nothing.
+pub struct RefitResult {
+    /// Padded bounds of the tree; `None` if it is empty.
     pub bounds: Option<Aabb>,
-    /// As [`Wide::sah_cost`], for the boxes as they are now.
+    /// SAH cost of the refitted tree, as [`WideBvh::sah_cost`].
     pub sah_cost: f64,
 }
 
 impl RefitPlan {
-    /// Of a tree whose first block has number `base` where its nodes count.
+    /// Plans the refit of a tree whose node references count its first block as `base`.
     pub fn new(blocks: &[Block], base: u32) -> Self {
         let below = descendants(blocks, base);
         let most = (blocks.len() / TASKS).max(TASK_BLOCKS) as u32;
@@ -75,15 +75,15 @@ fn descendants(blocks: &[Block], base: u32) -> Vec<[u32; 2]> {
     out
 }
 
-/// Refits a tree where it lies. Its first block has number `base` where its nodes count. `leaf` rewrites a leaf and gives its box; boxes are widened
-/// by `pad`. The plan must be of this tree.
+/// Refits a tree in place. Its node references count its first block as `base`. `leaf` rewrites a leaf and returns its box; boxes are
+/// widened by `pad`. The plan must be that of this tree.
 pub fn refit(
     blocks: &mut [Block],
     base: u32,
     plan: &RefitPlan,
     pad: f32,
     leaf: impl Fn(&mut Block) -> Aabb + Sync,
-) -> Refitted {
+) -> RefitResult {
     let padded = |block: &mut Block| {
         let b = leaf(block);
         Aabb { min: b.min - pad, max: b.max + pad }
@@ -126,11 +126,11 @@ pub fn refit(
     }
     match boxes.first() {
         Some(b) if b.min.cmple(b.max).all() => {
-            // a point or a line has no area, and all is in one place
+            // a point or a line has no area, and every box is visited
             let whole = b.half_area() as f64;
-            Refitted { bounds: Some(*b), sah_cost: if whole > 0.0 { area / whole } else { blocks.len() as f64 } }
+            RefitResult { bounds: Some(*b), sah_cost: if whole > 0.0 { area / whole } else { blocks.len() as f64 } }
         }
-        _ => Refitted { bounds: None, sah_cost: 0.0 },
+        _ => RefitResult { bounds: None, sah_cost: 0.0 },
     }
 }
 
@@ -152,7 +152,7 @@ fn fit(block: &mut Block, leaf: &impl Fn(&mut Block) -> Aabb, box_of: impl Fn(u3
     bounds
 }
 
-impl Wide {
+impl WideBvh {
     /// Refits this tree, for callers that keep it on the host: see [`refit`].
     pub fn refit(&mut self, plan: &RefitPlan, pad: f32, leaf: impl Fn(&mut Block) -> Aabb + Sync) {
         let refitted = refit(&mut self.blocks, 0, plan, pad, leaf);
@@ -160,13 +160,13 @@ impl Wide {
     }
 }
 
-/// When to build a tree anew instead of refitting it once more.
+/// Decides when to rebuild a tree instead of refitting it once more.
 ///
 /// The expected cost of a ray grows with the surface areas of the boxes, so a tree whose SAH cost is `g` times that at its build makes
 /// a trace of `T` seconds take `T (1 - 1/g)` longer than it had to. These losses are added up; once they exceed what a build takes beyond a
-/// refit, the tree is built anew. That is the rule of ski rental (buy when the rent paid equals the price): whatever comes, it costs at most twice what a
-/// schedule known in advance would. Lauterbach, Yoon, Tuft, Manocha, "RT-DEFORM: Interactive Ray Tracing of Dynamic Scenes Using
-/// BVHs", RT 2006, watch areas in the same way and rebuild at a fixed growth; so does this policy while nobody says how long tracing takes.
+/// refit, the tree is rebuilt. That is the ski-rental rule (buy when the rent paid equals the price), which costs at most twice the optimal
+/// schedule. Lauterbach, Yoon, Tuft, Manocha, "RT-DEFORM: Interactive Ray Tracing of Dynamic Scenes Using
+/// BVHs", RT 2006, watch areas in the same way and rebuild at a fixed growth; so does this policy while trace times are unknown.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RefitPolicy {
     built_cost: f64,
@@ -178,21 +178,21 @@ pub struct RefitPolicy {
 }
 
 impl RefitPolicy {
-    /// Growth of the SAH cost at which a tree is built anew while no trace was timed.
+    /// Growth of the SAH cost at which a tree is rebuilt while no trace has been timed.
     pub const GROWTH_UNTIMED: f64 = 1.4;
 
-    /// For a tree that was built in `build_seconds` with this [`Wide::sah_cost`].
+    /// The policy of a tree that was built in `build_seconds` with this [`WideBvh::sah_cost`].
     pub fn new(sah_cost: f64, build_seconds: f64) -> Self {
         Self { built_cost: sah_cost, growth: 1.0, build_seconds, refit_seconds: 0.0, lost_seconds: 0.0, timed: false }
     }
 
-    /// The tree was refitted in `seconds` and has this cost now.
+    /// Records a refit that took `seconds` and resulted in this SAH cost.
     pub fn refitted(&mut self, sah_cost: f64, seconds: f64) {
         self.refit_seconds = seconds;
         self.costs(sah_cost);
     }
 
-    /// The tree has this cost now. Costs that are no positive number say nothing and are left out.
+    /// Records the current SAH cost. Values that are not positive numbers are ignored.
     pub fn costs(&mut self, sah_cost: f64) {
         let growth = sah_cost / self.built_cost;
         if growth.is_finite() && growth > 0.0 {
@@ -200,7 +200,7 @@ impl RefitPolicy {
         }
     }
 
-    /// `seconds` were spent in this tree by tracing since it was fitted last.
+    /// Records seconds spent tracing this tree since the last refit or build.
     pub fn traced(&mut self, seconds: f64) {
         if seconds.is_finite() && seconds >= 0.0 {
             self.timed = true;
@@ -208,7 +208,7 @@ impl RefitPolicy {
         }
     }
 
-    /// Would a new tree have been cheaper by now?
+    /// Have the accumulated losses exceeded the price of a rebuild?
     pub fn should_rebuild(&self) -> bool {
         if self.timed {
             self.lost_seconds > (self.build_seconds - self.refit_seconds).max(0.0)
@@ -217,7 +217,7 @@ impl RefitPolicy {
         }
     }
 
-    /// SAH cost now over that at the build.
+    /// Current SAH cost over that at the build.
     pub fn growth(&self) -> f64 {
         self.growth
     }
@@ -247,12 +247,12 @@ mod tests {
             .collect()
     }
 
-    fn tree(boxes: &[Aabb]) -> Wide {
+    fn tree(boxes: &[Aabb]) -> WideBvh {
         if boxes.is_empty() {
-            return Wide::default();
+            return WideBvh::default();
         }
         let padded: Vec<_> = boxes.iter().map(|b| Aabb { min: b.min - PAD, max: b.max + PAD }).collect();
-        Wide::collapse(&build::tree(&padded, BuildPreset::Default, None), wide::tests::of_item)
+        WideBvh::collapse(&build::tree(&padded, BuildPreset::Default, None), wide::tests::of_item)
     }
 
     const SIZES: [usize; 10] = [0, 1, 2, 7, 8, 50, 1000, 5000, 20_000, 70_000];

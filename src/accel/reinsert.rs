@@ -1,7 +1,7 @@
 //! Makes a binary tree cheaper by moving subtrees to where they cost less: Meister and Bittner, "Parallel Reinsertion for
 //! Bounding Volume Hierarchy Optimization" (EG 2018). The search is parallel, the moves are not.
 //!
-//! It mends what a top-down builder cannot see: a large box that it had to leave in one of two halves.
+//! It corrects a weakness of top-down builders: a large box has to stay in one of two halves.
 
 use glam::Vec4;
 use obvhs::bvh2::node::Bvh2Node;
@@ -36,30 +36,30 @@ fn sibling(node: u32) -> u32 {
 struct Move {
     from: u32,
     to: u32,
-    /// How much area goes away.
+    /// Reduction of the summed surface area.
     gain: f32,
 }
 
-/// Nodes that the search for one place looks at. Where thousands of boxes overlap it would look at all of them in vain.
-const VISITS: u32 = 1 << 12;
+/// Maximum number of nodes that one search visits. Where thousands of boxes overlap, pruning fails and it would visit all of them.
+const MAX_VISITS: u32 = 1 << 12;
 
-/// Nodes that a round looks at in any case: a share of a small tree would be too few to find anything.
-const SMALLEST_BATCH: usize = 512;
+/// Minimum number of nodes that a round considers: a share of a small tree would be too few to find anything.
+const MIN_BATCH: usize = 512;
 
-/// How long to optimise.
+/// When reinsertion stops.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Effort {
-    /// Share of the nodes (0 to 1) that a round looks at, largest first.
+pub struct ReinsertionOptions {
+    /// Share of the nodes that a round considers, largest first, in [0, 1].
     pub share: f32,
-    /// Most rounds.
+    /// Maximum number of rounds.
     pub rounds: u32,
-    /// Ends when a round has saved less than this share of the area of all nodes.
+    /// Stops once a round saves less than this share of the total surface area of all nodes.
     pub worthwhile: f64,
 }
 
 /// Optimises a tree. Afterwards children may have lower numbers than their parents.
-pub fn optimise(nodes: &mut [Bvh2Node], effort: Effort) {
-    if nodes.len() < 7 || effort.rounds == 0 {
+pub fn optimise(nodes: &mut [Bvh2Node], options: ReinsertionOptions) {
+    if nodes.len() < 7 || options.rounds == 0 {
         return;
     }
     let total: f64 = nodes.par_iter().with_min_len(1 << 14).map(|n| area(corners(n)) as f64).sum();
@@ -71,8 +71,8 @@ pub fn optimise(nodes: &mut [Bvh2Node], effort: Effort) {
         }
     }
     let mut touched = vec![0u32; nodes.len()];
-    let batch = ((nodes.len() as f64 * effort.share as f64) as usize).max(SMALLEST_BATCH).min(nodes.len() - 1);
-    for round in 0..effort.rounds {
+    let batch = ((nodes.len() as f64 * options.share as f64) as usize).max(MIN_BATCH).min(nodes.len() - 1);
+    for round in 0..options.rounds {
         let mut saved = 0.0;
         let candidates = largest(nodes, batch);
         let mut moves: Vec<Move> = candidates
@@ -96,13 +96,13 @@ pub fn optimise(nodes: &mut [Bvh2Node], effort: Effort) {
             saved += m.gain as f64;
         }
         // sums that overflowed are no reason to go on
-        if saved <= effort.worthwhile * total || !saved.is_finite() || !total.is_finite() {
+        if saved <= options.worthwhile * total || !saved.is_finite() || !total.is_finite() {
             return;
         }
     }
 }
 
-/// The nodes of largest area but the root: found from the top, as no child is larger than its parent.
+/// The nodes of largest area except the root, found top-down, because no child is larger than its parent.
 fn largest(nodes: &[Bvh2Node], count: usize) -> Vec<u32> {
     // areas are not negative, so their bits are in order
     let key = |k: u32| (area(corners(&nodes[k as usize])).to_bits(), std::cmp::Reverse(k));
@@ -120,7 +120,7 @@ fn largest(nodes: &[Bvh2Node], count: usize) -> Vec<u32> {
     out
 }
 
-/// The best place for a subtree: from its sibling upwards, everything beside the path is searched, and cut off where even a
+/// The best new position for a subtree: from its sibling upwards, everything beside the path is searched, and cut off where even a
 /// box that need not grow would gain too little.
 fn find(nodes: &[Bvh2Node], parents: &[u32], from: u32, stack: &mut Vec<(f32, u32)>) -> Option<Move> {
     let own = corners(&nodes[from as usize]);
@@ -140,7 +140,7 @@ fn find(nodes: &[Bvh2Node], parents: &[u32], from: u32, stack: &mut Vec<(f32, u3
         stack.push((gain, beside));
         while let Some((gain, to)) = stack.pop() {
             visits += 1;
-            if visits > VISITS {
+            if visits > MAX_VISITS {
                 stack.clear();
                 return Some(best).filter(|b| b.gain > 0.0 && b.to != parent);
             }
@@ -193,7 +193,7 @@ fn reinsert(nodes: &mut [Bvh2Node], parents: &mut [u32], from: u32, to: u32) {
     refit(nodes, parents, parent);
 }
 
-/// Boxes of a node and of those above, as far as they change.
+/// Refits a node and its ancestors, as far as their boxes change.
 fn refit(nodes: &mut [Bvh2Node], parents: &[u32], from: u32) {
     let mut at = from;
     loop {
@@ -201,7 +201,7 @@ fn refit(nodes: &mut [Bvh2Node], parents: &[u32], from: u32) {
         if !node.is_leaf() {
             let [a, b] = [0, 1].map(|k| &nodes[node.first_index as usize + k]);
             let (min, max) = (a.min.min(b.min), a.max.max(b.max));
-            // the first is in a new place: that it has the box it had says nothing about those above
+            // the first node has moved: an unchanged box of its own says nothing about its new ancestors
             if at != from && (min, max) == (node.min, node.max) {
                 return;
             }

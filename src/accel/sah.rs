@@ -1,7 +1,7 @@
 //! Binary trees from the top down: at each node the plane of least surface-area cost among equally spaced ones on all three
 //! axes (Wald, "On fast Construction of SAH-based Bounding Volume Hierarchies", RT 2007), few boxes by exhaustive sweep.
 //!
-//! Nodes lie depth first with both children side by side, so a subtree is one range: threads build theirs without a lock, and
+//! Nodes are stored depth first with both children adjacent, so a subtree is one range: threads build theirs without a lock, and
 //! what walks the tree later walks memory forwards. Leaves hold one box each. No path is longer than [`MAX_DEPTH`]: where
 //! the cost would make one, the boxes are halved instead.
 
@@ -12,8 +12,8 @@ use rayon::prelude::*;
 use super::Aabb;
 use super::build::MAX_DEPTH;
 
-/// A box on its way into the tree. The fourth lanes hold the primitive's number, as a normal float: arithmetic on them has to
-/// be harmless and fast.
+/// A primitive's box during the build. The fourth lanes contain the primitive's index as a normal float, so that SIMD arithmetic on
+/// them is fast (no denormals, no NaN).
 #[derive(Clone, Copy)]
 pub struct Item {
     min: Vec4,
@@ -24,7 +24,7 @@ pub struct Item {
 const NORMAL: u32 = 0x4000_0000;
 
 impl Item {
-    /// A box and the number of what lies in it (below 2^27).
+    /// A box and its primitive's index (below 2^27).
     pub fn new(bounds: Aabb, primitive: u32) -> Self {
         let w = f32::from_bits(NORMAL | primitive);
         Self { min: bounds.min.extend(w), max: bounds.max.extend(w) }
@@ -186,7 +186,7 @@ pub(super) fn bounds_of(items: &[Item]) -> (Bounds, Bounds) {
     items.par_chunks(PARALLEL_BINS / 4).map(serial).reduce(none, |a, b| (a.0.union(b.0), a.1.union(b.1)))
 }
 
-/// The tree over some boxes, at least one; they are left in any order.
+/// Builds the tree over at least one box. The items are reordered.
 pub fn tree(items: &mut [Item]) -> Vec<Bvh2Node> {
     let mut nodes = vec![Bvh2Node::default(); 2 * items.len() - 1];
     let (root, below) = nodes.split_first_mut().expect("there is a box");
@@ -227,7 +227,7 @@ fn subtree(items: &mut [Item], root: &mut Bvh2Node, below: &mut [Bvh2Node], firs
     }
 }
 
-/// Boxes left of the cheapest plane first; how many these are. None if no plane separates any.
+/// Partitions the boxes at the cheapest plane and returns the number on its left. `None` if no plane separates them.
 pub(super) fn binned(items: &mut [Item], centres: Bounds) -> Option<usize> {
     let bins = if items.len() > 64 { BINS } else { BINS / 2 };
     let grid = Grid::new(centres, bins);
@@ -250,7 +250,8 @@ pub(super) fn binned(items: &mut [Item], centres: Bounds) -> Option<usize> {
     Some(middle)
 }
 
-/// Those for which `left` holds first. Without a branch on it, which nobody could predict (Lomuto's scheme).
+/// Moves the items for which `left` is true to the front and returns their number. Branchless (Lomuto's scheme): the branch would be
+/// unpredictable.
 #[inline(always)]
 fn partition(items: &mut [Item], left: impl Fn(&Item) -> bool) -> usize {
     let mut middle = 0;

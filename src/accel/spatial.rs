@@ -1,8 +1,8 @@
 //! Binary trees with spatial splits: Stich, Friedrich and Dietrich, "Spatial Splits in Bounding Volume Hierarchies" (HPG 2009).
 //!
 //! Where the halves that the surface-area heuristic would make overlap, a node may be cut by a plane instead, and what
-//! straddles the plane goes to both sides, each with the box of its part. Leaves hold one reference each; a primitive may be in
-//! several leaves, which together hold all of it.
+//! straddles the plane goes to both sides, each with the box of its part. Leaves contain one reference each; a primitive may be in
+//! several leaves, which together cover it.
 
 use glam::Vec3;
 use obvhs::bvh2::node::Bvh2Node;
@@ -36,7 +36,7 @@ pub fn tree(boxes: &[Aabb], triangles: &impl Triangles, budget: f32, pad: f32) -
     Builder { triangles, area, pad }.parallel(items, budget, 0)
 }
 
-/// What a node's references become.
+/// A node's references after a split.
 struct Halves {
     left: Vec<Item>,
     right: Vec<Item>,
@@ -108,7 +108,7 @@ impl<T: Triangles> Builder<'_, T> {
         shared(items, right, budget)
     }
 
-    /// The cheapest plane among equally spaced ones, if it costs less than `cost`: axis, place and both sides' boxes.
+    /// The cheapest plane among equally spaced ones, if it costs less than `cost`: axis, position and both sides' boxes.
     fn plane(&self, items: &[Item], bounds: Bounds, budget: usize, cost: f32) -> Option<Plane> {
         let mut best: Option<(f32, Plane)> = None;
         for axis in 0..3 {
@@ -225,8 +225,8 @@ impl<T: Triangles> Builder<'_, T> {
     }
 }
 
-/// About the box of what lies of a triangle between two planes across an axis: good enough to weigh costs. The corners of that
-/// part lie on the triangle's edges.
+/// Approximate bounding box of a triangle clipped to a slab between two planes across an axis, good enough to compare costs. The
+/// corners of the clipped part lie on the triangle's edges.
 #[inline(always)]
 fn slab(t: &[Vec3; 3], axis: usize, low: f32, high: f32) -> Bounds {
     let mut out = Bounds::EMPTY;
@@ -237,7 +237,7 @@ fn slab(t: &[Vec3; 3], axis: usize, low: f32, high: f32) -> Bounds {
             continue;
         }
         let inverse = 1.0 / (y - x);
-        // an edge along the planes is there as a whole
+        // an edge parallel to the planes is included whole
         let at = |plane: f32| ((plane - x) * inverse).clamp(0.0, 1.0);
         let (u, v) = if x == y { (0.0, 1.0) } else { (at(low), at(high)) };
         let (a, b) = (p + (q - p) * u, p + (q - p) * v);
@@ -246,7 +246,7 @@ fn slab(t: &[Vec3; 3], axis: usize, low: f32, high: f32) -> Bounds {
     out
 }
 
-/// A place to cut at: the boxes of both sides and how many references would lie there.
+/// A candidate split plane: the boxes of both sides and their reference counts.
 struct Plane {
     axis: usize,
     at: f32,

@@ -1,11 +1,11 @@
-//! The hierarchy that `shaders/trace/wide.glsl` walks: up to seven children a node, boxes quantised to eight bits a plane (after
-//! Ylitie, Karras, Laine, "Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs", HPG 2017).
+//! The hierarchy that `shaders/trace/wide.glsl` traverses: up to seven children a node, boxes quantised to eight bits a plane (after
+//! Ylitie, Karras, Laine, "Efficient Incoherent Ray Traversal on GPUs Through Compressed WideBvh BVHs", HPG 2017).
 //!
-//! Nodes and leaves are blocks of 64 bytes, a cache line, in one array; the children of a node lie side by side. So a group of
-//! siblings is one number and a few bits, and one fetch serves whatever is next. Which nodes of the binary tree become wide ones is chosen
+//! Nodes and leaves are blocks of 64 bytes, a cache line, in one array; the children of a node are adjacent. So a group of
+//! siblings is encoded as one index and a few bits, and one fetch serves a node or a leaf alike. Which nodes of the binary tree become wide ones is chosen
 //! by dynamic programming for the least expected number of blocks that a ray visits (the paper's section 3.1 with one kind of leaf).
 //!
-//! [`WideNode`] is a node, and a leaf is the caller's, but for the flag in the last word of its [`Block`].
+//! [`WideNode`] is a node; the layout of a leaf is up to the caller, except for the flag in the last word of its [`Block`].
 //!
 //! The traversal's stack cannot overflow: a node visit pushes at most one entry (the rest of a group of siblings), so a
 //! tree needs as many entries as its longest path has nodes.
@@ -17,21 +17,21 @@ use rayon::prelude::*;
 use super::Aabb;
 pub use crate::interface::records::hierarchy::{Block, LEAF, WideNode};
 
-/// Children of a node at most.
+/// Maximum number of children of a node.
 pub const WIDTH: usize = 7;
 /// Bytes of a block.
 pub const BLOCK_BYTES: u64 = size_of::<Block>() as u64;
-/// Subtrees that are collapsed side by side.
+/// Number of subtrees that are collapsed in parallel.
 const TASKS: usize = 256;
 
 /// A wide hierarchy.
 #[derive(Clone, Debug)]
-pub struct Wide {
-    /// Nodes and leaves; the root node is the first. There is one even over nothing.
+pub struct WideBvh {
+    /// Nodes and leaves; the root node is the first, and exists even in an empty tree.
     pub blocks: Vec<Block>,
     /// Nodes on the longest path from the root.
     pub depth: u32,
-    /// Bounds of everything; `None` over nothing.
+    /// Bounds of the tree; `None` if it is empty.
     pub bounds: Option<Aabb>,
     /// Expected number of blocks that a ray through the bounds visits, by the surface area heuristic.
     pub sah_cost: f64,
@@ -42,19 +42,19 @@ struct Piece {
     blocks: Vec<Block>,
     depth: u32,
     cost: f32,
-    /// Blocks that other pieces begin with: where, and which.
+    /// Where other pieces are attached: block index, piece and level.
     inserts: Vec<(u32, usize, u32)>,
 }
 
-impl Default for Wide {
+impl Default for WideBvh {
     fn default() -> Self {
         Self { blocks: vec![Block::default()], depth: 1, bounds: None, sah_cost: 0.0 }
     }
 }
 
-impl Wide {
+impl WideBvh {
     /// Collapses a binary tree whose leaves hold one item each, and whose boxes are padded by what quantisation and traversal round
-    /// away. `leaf` makes an item's block.
+    /// away. `leaf` returns the block of an item.
     pub fn collapse(tree: &Bvh2, leaf: impl Fn(u32) -> Block + Sync) -> Self {
         if tree.nodes.is_empty() {
             return Self::default();
@@ -110,17 +110,17 @@ impl Wide {
         out
     }
 
-    /// Checks that every leaf is reached once, within the boxes above it, and that the depth is as said. `bounds_of` gives the boxes
-    /// of what a leaf holds.
+    /// Checks that every leaf is reached once, within the boxes above it, and that the depth is as recorded. `bounds_of` returns the
+    /// boxes of a leaf's primitives.
     ///
     /// # Errors
-    /// What is wrong first.
+    /// A description of the first defect.
     pub fn validate(&self, bounds_of: impl Fn(&Block) -> Vec<Aabb>) -> Result<(), String> {
         let mut seen = vec![0u32; self.blocks.len()];
         let mut work = vec![(0usize, 1u32, Vec::<[[f64; 2]; 3]>::new())];
         let mut deepest = 0;
         while let Some((at, level, chain)) = work.pop() {
-            let block = self.blocks.get(at).ok_or_else(|| format!("block {at} is outside"))?;
+            let block = self.blocks.get(at).ok_or_else(|| format!("block {at} is out of range"))?;
             seen[at] += 1;
             if seen[at] > 1 {
                 return Err(format!("block {at} is reached twice"));
@@ -129,7 +129,7 @@ impl Wide {
                 for b in bounds_of(block) {
                     let inside = |c: &[[f64; 2]; 3]| (0..3).all(|a| c[a][0] <= b.min[a] as f64 && c[a][1] >= b.max[a] as f64);
                     if !chain.iter().all(inside) {
-                        return Err(format!("what leaf {at} holds sticks out of a box above it"));
+                        return Err(format!("a primitive of leaf {at} sticks out of a box above it"));
                     }
                 }
                 continue;
@@ -145,13 +145,13 @@ impl Wide {
             return Err(format!("block {at} is never reached"));
         }
         if deepest != self.depth {
-            return Err(format!("depth is {deepest}, said to be {}", self.depth));
+            return Err(format!("depth is {deepest}, recorded as {}", self.depth));
         }
         Ok(())
     }
 }
 
-/// Is it a leaf?
+/// Is the block a leaf?
 pub fn is_leaf(block: &Block) -> bool {
     block.flags & LEAF != 0
 }
@@ -161,7 +161,7 @@ fn as_node(block: &Block) -> &WideNode {
     bytemuck::cast_ref(block)
 }
 
-/// A block of a tree whose blocks begin `by` further on.
+/// A copy of a block whose child references are offset by `by` blocks.
 pub fn rebased(mut block: Block, by: u32) -> Block {
     if !is_leaf(&block) {
         let node: &mut WideNode = bytemuck::cast_mut(&mut block);
@@ -394,12 +394,12 @@ pub(super) mod tests {
         block
     }
 
-    fn tree(boxes: &[Aabb]) -> Wide {
+    fn tree(boxes: &[Aabb]) -> WideBvh {
         if boxes.is_empty() {
-            return Wide::default();
+            return WideBvh::default();
         }
         let binary = build::tree(boxes, BuildPreset::Default, None);
-        Wide::collapse(&binary, of_item)
+        WideBvh::collapse(&binary, of_item)
     }
 
     /// Areas beyond the range of a float, below it, and none at all.
@@ -413,7 +413,7 @@ pub(super) mod tests {
         }
     }
 
-    fn check(tree: &Wide, boxes: &[Aabb]) -> Result<(), String> {
+    fn check(tree: &WideBvh, boxes: &[Aabb]) -> Result<(), String> {
         let mut items: Vec<u32> = tree.blocks.iter().filter(|b| is_leaf(b)).map(|b| b.body[0]).collect();
         items.sort_unstable();
         if items != (0..boxes.len() as u32).collect::<Vec<_>>() {

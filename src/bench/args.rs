@@ -1,4 +1,4 @@
-//! What `skylit bench` takes.
+//! Command-line arguments of `skylit bench`.
 
 use clap::{Args, Subcommand};
 
@@ -9,18 +9,18 @@ use super::rays::BenchRaysArgs;
 /// `skylit bench`.
 #[derive(Clone, Debug, Args)]
 pub struct BenchArgs {
-    /// What is measured
+    /// Benchmark to run
     #[command(subcommand)]
     pub benchmark: Benchmark,
 }
 
-/// What is measured.
+/// The benchmarks.
 #[derive(Clone, Debug, Subcommand)]
 pub enum Benchmark {
-    /// Rays a second of each tracer, kernel and peer, by stream of rays and scene
+    /// Ray tracing: rays per second of each tracer, kernel and peer, by ray stream and scene
     Rays(Box<BenchRaysArgs>),
     /// Real-time ambient occlusion: time, rays and error of each preset, by scene, view and kind of motion
     Ao(Box<BenchAoArgs>),
-    /// Path tracing: error against time of each sampling strategy and peer, by scene
+    /// Path tracing: error over time of each sampling strategy and peer, by scene
     Path(Box<BenchPathArgs>),
 }

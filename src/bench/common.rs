@@ -1,4 +1,4 @@
-//! What every benchmark takes: how long, how thoroughly, on what, and where to say it.
+//! Arguments shared by all benchmarks: time limit, device and outputs.
 
 use std::io::Write;
 use std::path::PathBuf;
@@ -17,25 +17,25 @@ use crate::terminal::console::Console;
 /// Options of `skylit bench` that do not depend on what is measured.
 #[derive(Clone, Debug, Args)]
 pub struct CommonArgs {
-    /// Stop after this time with what there is
+    /// Stop after this time and report the results so far
     #[arg(long, value_name = "SECONDS", value_parser = parse_seconds, allow_hyphen_values = true)]
     pub time_limit: Option<Duration>,
-    /// Little of everything, on small scenes: a check that everything runs
+    /// Run a short version on small scenes, to check that everything works
     #[arg(long)]
     pub quick: bool,
     /// Vulkan device, by index or part of its name (`skylit doctor` lists them)
     #[arg(long, value_name = "INDEX|NAME")]
     pub device: Option<String>,
-    /// Run with the Vulkan validation layer (slower); a message of it fails the run
+    /// Run with the Vulkan validation layer (slower); any message from it fails the run
     #[arg(long)]
     pub validation: bool,
-    /// Print one JSON record on stdout instead of text; with =FILE, write it there besides
+    /// Print one JSON record on stdout instead of text; with =FILE, also write it to that file
     #[arg(long, value_name = "FILE", num_args = 0..=1, require_equals = true, value_hint = ValueHint::FilePath)]
     pub json: Option<Option<PathBuf>>,
-    /// Also write a table, one row a result
+    /// Also write a CSV table, one row per result
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub csv: Option<PathBuf>,
-    /// Also draw what was measured
+    /// Also plot the results
     #[arg(long, value_name = "FILE.png", value_hint = ValueHint::FilePath)]
     pub plot: Option<PathBuf>,
     /// Print nothing but errors
@@ -44,12 +44,12 @@ pub struct CommonArgs {
 }
 
 impl CommonArgs {
-    /// Where to say things.
+    /// The console with these options.
     pub fn console(&self) -> Console {
         Console { json: self.json == Some(None), quiet: self.quiet }
     }
 
-    /// File for the record.
+    /// File for the JSON record.
     pub fn json_file(&self) -> Option<&PathBuf> {
         self.json.as_ref()?.as_ref()
     }
@@ -59,7 +59,7 @@ impl CommonArgs {
         self.json_file().into_iter().chain(&self.csv).chain(&self.plot)
     }
 
-    /// Checks what clap cannot, and that every file can be written.
+    /// Validates the arguments and checks that every output file can be written.
     ///
     /// # Errors
     /// [`Error::Usage`]; those of [`files::check_writable`].
@@ -72,10 +72,10 @@ impl CommonArgs {
         }
     }
 
-    /// Writes the files that were asked for; one that cannot be written does not stop the others.
+    /// Writes the requested files; one that cannot be written does not prevent the others.
     ///
     /// # Errors
-    /// The first that went wrong.
+    /// The first error.
     pub fn write(&self, record: &impl BenchRecord, picture: impl Fn() -> Result<Picture>) -> Result<()> {
         let json = self.json_file().map_or(Ok(()), |path| {
             let text = serde_json::to_string_pretty(record)
@@ -93,7 +93,7 @@ impl CommonArgs {
         json.and(csv).and(plot)
     }
 
-    /// What was `given`, else the default, which is another with `--quick`.
+    /// The `given` value, or the default, or with `--quick` the `quick` default.
     pub fn setting<T>(&self, given: Option<T>, default: T, quick: T) -> T {
         given.unwrap_or(if self.quick { quick } else { default })
     }

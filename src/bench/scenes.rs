@@ -131,7 +131,7 @@ impl WellKnownScene {
 pub struct SceneList {
     /// As on the command line.
     pub sources: Vec<String>,
-    /// What of the default list is not there.
+    /// Scenes of the default list that are unavailable.
     pub notes: Vec<String>,
 }
 
@@ -141,12 +141,12 @@ impl SceneList {
         Self { sources: sources.iter().map(|s| s.as_ref().to_owned()).collect(), notes: Vec::new() }
     }
 
-    /// The well-known ones of `scenes` that are there.
+    /// The well-known scenes of `scenes` whose files exist.
     pub fn well_known(scenes: &[&WellKnownScene]) -> Self {
         let folder = shared_folder();
         let (there, absent): (Vec<PathBuf>, Vec<PathBuf>) =
             scenes.iter().map(|k| folder.join(k.path)).partition(|p| p.is_file());
-        let note = |p: &PathBuf| format!("{}: not here, left out (SKYLIT_SHARED_SCENES names its folder)", p.display());
+        let note = |p: &PathBuf| format!("{}: file not found, skipped (set SKYLIT_SHARED_SCENES to its folder)", p.display());
         Self { sources: there.iter().map(|p| p.display().to_string()).collect(), notes: absent.iter().map(note).collect() }
     }
 

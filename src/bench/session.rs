@@ -1,4 +1,4 @@
-//! A benchmark under way: its device, peers and record, what is left of its time, and what it shows meanwhile.
+//! A running benchmark: its device, peers, record, time limit and progress.
 
 use std::time::Instant;
 
@@ -18,24 +18,24 @@ use crate::terminal::warnings::warnings_of;
 /// Steps of the progress bar for one job.
 const STEPS: u64 = 1000;
 
-/// A benchmark under way, with its arguments and its record.
+/// A running benchmark, with its arguments and its record.
 pub struct Session<'a, A, R> {
     /// Arguments of this benchmark.
     pub args: &'a A,
-    /// What it runs on.
+    /// The device.
     pub device: BenchDevice,
     /// Peers that started.
     pub peers: Vec<Peer>,
-    /// Connects long work to the keyboard and to the progress bar.
+    /// Progress bar and Ctrl-C of long work.
     pub control: ProgressControl,
-    /// What was found until now.
+    /// The results so far.
     pub record: R,
     common: &'a CommonArgs,
     console: Console,
     start: Instant,
     /// Jobs that are done, and all of them.
     jobs: (u64, u64),
-    /// The first that went wrong.
+    /// The first error.
     failure: Option<Error>,
 }
 
@@ -89,7 +89,7 @@ impl<'a, A, R: BenchRecord> Session<'a, A, R> {
         self.jobs = (0, count.max(1) as u64);
     }
 
-    /// Does a job, unless it is too late. What goes wrong is noted, and fails the run in the end; only what ends the run is returned.
+    /// Runs a job unless the time limit has passed. An error is noted and fails the run at the end; only errors that end the run are returned.
     ///
     /// # Errors
     /// [`Error::Interrupted`], [`Error::DeviceLost`].
@@ -155,19 +155,19 @@ impl<'a, A, R: BenchRecord> Session<'a, A, R> {
         advance(&mut self.control.progress, self.jobs, share);
     }
 
-    /// What moves the bar while the session itself is in use otherwise.
+    /// A closure that moves the bar, and the peers, for use while the session is borrowed.
     pub fn advancer(&mut self) -> (impl FnMut(f64), &mut [Peer]) {
         let jobs = self.jobs;
         let progress = &mut self.control.progress;
         (move |share| advance(progress, jobs, share), &mut self.peers)
     }
 
-    /// Is the time limit over?
+    /// Has the time limit passed?
     pub fn is_late(&self) -> bool {
         self.common.time_limit.is_some_and(|limit| self.start.elapsed() >= limit)
     }
 
-    /// Is the time limit over, and was anything measured? A record of nothing says nothing.
+    /// Has the time limit passed with at least one result? The first result is measured in any case.
     pub fn is_over(&self) -> bool {
         self.is_late() && !self.record.is_empty()
     }

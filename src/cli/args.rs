@@ -18,13 +18,13 @@ pub struct RaysArgs {
     /// Rays: f32 origin[3], tmin, direction[3], tmax each
     #[arg(long, value_name = "RAYS.bin", value_hint = ValueHint::FilePath)]
     pub rays: PathBuf,
-    /// What to find
+    /// Query: the closest hit of each ray, or whether there is any hit
     #[arg(long, value_enum, default_value = "closest")]
     pub mode: Mode,
     /// Device and tracer
     #[command(flatten)]
     pub device: DeviceSettings,
-    /// Where to write the hits: f32 t (inf = miss), u32 instance, u32 primitive, f32 u, f32 v each
+    /// Write the hits to this file: f32 t (inf = miss), u32 instance, u32 primitive, f32 u, f32 v each
     #[arg(long, value_name = "HITS.bin", value_hint = ValueHint::FilePath)]
     pub hits: Option<PathBuf>,
     /// Repetitions, after one warm-up
@@ -38,7 +38,7 @@ pub struct RaysArgs {
 /// `skylit export`.
 #[derive(Clone, Debug, Args)]
 pub struct ExportArgs {
-    /// Scene, as `render` takes it
+    /// Scene file (.gltf, .glb, .obj, .brhan) or builtin:NAME
     pub scene: String,
     /// File to write: .bin (triangle soup in world space), .glb or .gltf
     #[arg(value_hint = ValueHint::FilePath)]
@@ -74,7 +74,7 @@ pub struct DiffArgs {
     pub a: PathBuf,
     /// Second image: the reference, for metrics that are not symmetric
     pub b: PathBuf,
-    /// Fail (exit code 1) when the RMSE of a channel is above this
+    /// Fail (exit code 1) if the RMSE of any channel exceeds this
     #[arg(long, value_name = "X", value_parser = parse_limit, allow_hyphen_values = true)]
     pub max_rmse: Option<f64>,
     /// How results are shown

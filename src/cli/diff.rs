@@ -9,12 +9,12 @@ use crate::measure::metrics::ImagePair;
 use crate::output::{self, Channel, Image, Samples};
 use crate::terminal::console::Failure;
 
-/// Difference of two channels, over pixels where both are finite and at least one image has coverage.
+/// ChannelDifference of two channels, over the pixels where both are finite and at least one image has coverage.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 struct ChannelDifference {
     /// Pixels compared.
     pixels: u64,
-    /// Pixels whose values are not the same.
+    /// Pixels whose values differ.
     differing: u64,
     /// Pixels where one image is finite and the other is not, or where they are not finite in different ways.
     broken: u64,
@@ -34,20 +34,20 @@ struct Metrics {
     tanimoto: f64,
 }
 
-/// Perceptual difference of the colours (FLIP), over pixels where all of them are finite and at least one image has coverage.
+/// Perceived difference of the colours (FLIP), over the pixels where all channels are finite and at least one image has coverage.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 struct FlipDifference {
-    /// Channels of the colour: `R`, `G` and `B`, or a grey one.
+    /// Colour channels: `R`, `G` and `B`, or a single grey one.
     channels: Vec<String>,
     /// Pixels compared.
     pixels: u64,
     /// Mean FLIP, 0 to 1.
     mean: f64,
-    /// Assumed resolution of the display, pixels per degree of visual angle.
+    /// Assumed angular resolution of the display, pixels per degree.
     pixels_per_degree: f64,
 }
 
-/// Compares and prints; fails if a limit is given and exceeded.
+/// Compares and prints; fails if the limit is given and exceeded.
 pub fn run(args: &DiffArgs) -> Result<(), Failure> {
     let console = args.verbosity.console();
     let (a, b) = (output::load(&args.a)?, output::load(&args.b)?);
@@ -63,7 +63,7 @@ pub fn run(args: &DiffArgs) -> Result<(), Failure> {
         let d = compare(&x.samples, &y.samples, mask.as_deref())?;
         let mut line = format!("{:12} ", x.name);
         if let Some(n) = &d.metrics {
-            // a pixel that is not finite in one image only exceeds any limit
+            // a pixel that is not finite in one image only always exceeds the limit
             worst = worst.max(if d.broken > 0 { f64::INFINITY } else { n.rmse });
             line += &format!("rmse {:.3e}  bias {:+.3e}  max {:.3e}  psnr {:.1} dB  ", n.rmse, n.bias, n.max, n.psnr);
         }
@@ -95,7 +95,7 @@ pub fn run(args: &DiffArgs) -> Result<(), Failure> {
     console.close(&record, verdict)
 }
 
-/// Pairs channels of the same name and type; a grey channel `Y` also pairs with one called `R`. A film's sums (`state`) are not compared.
+/// Channels of the same name and type; a grey image (`Y`) is also compared with one that names its channel `R`. The film state (`state.*`) is not compared.
 fn pairs<'a>(a: &'a Image, b: &'a Image) -> Vec<(&'a Channel, &'a Channel)> {
     let same_type = |x: &Channel, y: &Channel| std::mem::discriminant(&x.samples) == std::mem::discriminant(&y.samples);
     let find = |image: &'a Image, name: &str| image.channels.iter().find(|c| c.name == name);
@@ -113,7 +113,7 @@ fn pairs<'a>(a: &'a Image, b: &'a Image) -> Vec<(&'a Channel, &'a Channel)> {
     found
 }
 
-/// A mask that is above 0 for pixels that at least one image covers, if both have an alpha channel: background would lower every mean.
+/// 1 for pixels that at least one image covers, if both have an alpha channel: equal background would flatter every mean.
 fn coverage(a: &Image, b: &Image) -> Option<Vec<f32>> {
     let (a, b) = (a.f32("A")?, b.f32("A")?);
     Some(a.iter().zip(b).map(|(x, y)| x.max(*y)).collect())
@@ -177,7 +177,7 @@ fn compare(a: &Samples, b: &Samples, mask: Option<&[f32]>) -> Result<ChannelDiff
         }
         _ => {}
     }
-    // no finite pixel in common, but some broken: the comparison must still fail
+    // no comparable pixel, but some that are not finite in one image: the limit must be exceeded
     if d.metrics.is_none() && d.broken > 0 {
         let nan = f64::NAN;
         d.metrics =

@@ -1,4 +1,4 @@
-//! `skylit doctor`: the Vulkan devices of this machine, and what skylit can use.
+//! `skylit doctor`: the machine's Vulkan devices, and which tracers run on them.
 
 use super::args::DoctorArgs;
 use crate::error::{Error, Result};
@@ -6,7 +6,7 @@ use crate::gpu::{Device, DeviceInfo, Instance, Options, enumerate};
 use crate::terminal::console;
 use crate::tracer::{TracerKind, TracerNeeds};
 
-/// Prints the table and the verdict; fails if no device is usable.
+/// Prints the devices and the verdict; fails when no device can be used.
 pub fn run(args: &DoctorArgs) -> Result<()> {
     let instance = Instance::new(false)?;
     let devices = enumerate(&instance)?;
@@ -41,7 +41,7 @@ pub fn run(args: &DoctorArgs) -> Result<()> {
     }
 }
 
-/// A device's JSON record: its properties, and the requirements of each tracer.
+/// A device's record in JSON: its properties, and the requirements of each tracer.
 #[derive(serde::Serialize)]
 struct DeviceRecord<'a> {
     #[serde(flatten)]
@@ -60,7 +60,7 @@ fn describe(text: &mut String, d: &DeviceInfo, chosen: Option<(usize, TracerKind
         text.push_str(&s);
         text.push('\n');
     };
-    let mark = if chosen.is_some_and(|c| c.0 == d.index) { " (used)" } else { "" };
+    let mark = if chosen.is_some_and(|c| c.0 == d.index) { " (selected)" } else { "" };
     line(format!("device {}: {}, {}{mark}", d.index, d.name, d.kind));
     line(format!("  driver   {}, Vulkan {}", d.driver, d.api_version));
     let l = &d.limits;
@@ -81,15 +81,15 @@ fn describe(text: &mut String, d: &DeviceInfo, chosen: Option<(usize, TracerKind
         ));
     }
     match d.missing_floor.as_slice() {
-        [] => line("  floor    met".into()),
-        missing => line(format!("  floor    NOT met: lacks {}; skylit cannot use this device", missing.join(", "))),
+        [] => line("  required features: all available".into()),
+        missing => line(format!("  required features: lacks {}; skylit cannot use this device", missing.join(", "))),
     }
     let auto = TracerKind::auto(d);
     for t in TracerKind::ALL.map(|kind| kind.needs(d)) {
         let state = if !t.missing.is_empty() {
             format!("no: lacks {}", t.missing.join(", "))
         } else if !d.missing_floor.is_empty() {
-            "no: the device is below the floor".into()
+            "no: the device lacks required features".into()
         } else if t.tracer == auto.0 {
             format!("available, chosen by `auto`: {}", auto.1)
         } else {

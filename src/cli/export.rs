@@ -1,24 +1,24 @@
-//! `skylit export`: writes a scene as glTF, or as a triangle soup for other ray tracers.
+//! `skylit export`: writes a scene as glTF, or as a triangle soup for other tracers.
 
 use std::path::Path;
 
 use super::args::ExportArgs;
 use crate::error::{Error, Result};
 use crate::files;
-use crate::scene::export::{self, Written};
+use crate::scene::export::{self, ExportStats};
 use crate::scene::{Scene, load};
 use crate::terminal::warnings::{Warnings, warnings_of};
 
-/// Loads and writes.
+/// Loads a scene and writes it.
 pub fn run(args: &ExportArgs) -> Result<()> {
     let console = args.verbosity.console();
     let extension = args.output.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
-    let write: fn(&Scene, &Path) -> Result<Written> = match extension.as_str() {
+    let write: fn(&Scene, &Path) -> Result<ExportStats> = match extension.as_str() {
         "bin" => export::write_mesh_bin,
         "glb" | "gltf" => export::export_gltf,
         _ => {
             let path = args.output.display();
-            return Err(Error::Usage(format!("{path}: unknown format: the name must end in .bin, .glb or .gltf")));
+            return Err(Error::Usage(format!("{path}: unknown format: the file name must end in .bin, .glb or .gltf")));
         }
     };
     files::check_writable(&args.output)?;

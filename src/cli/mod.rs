@@ -74,13 +74,13 @@ fn run_from(arguments: Vec<OsString>) -> ExitCode {
         Ok(cli) => dispatch(cli.command, start),
         Err(e) => explain(&e).map_err(Failure::from),
     });
-    let (message, code, told) = match outcome {
+    let (message, code, reported) = match outcome {
         Ok(Ok(())) => return ExitCode::SUCCESS,
-        Ok(Err(Failure { error, told })) => (one_line(&error.to_string()), error.exit_code(), told),
+        Ok(Err(Failure { error, reported })) => (one_line(&error.to_string()), error.exit_code(), reported),
         Err(bug) => (bug, panic::EXIT_CODE, false),
     };
     console::error(&message);
-    if json && !told {
+    if json && !reported {
         // nothing can be done about a stdout that fails now
         let _ = console::json(&serde_json::json!({ "error": message, "exit_code": code }));
     }

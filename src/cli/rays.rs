@@ -1,4 +1,4 @@
-//! `skylit rays`: traces and times a set of rays, in files that other ray tracers can read, too.
+//! `skylit rays`: traces and times a raw file of rays. The file formats are simple, so that other tracers can read the same files.
 
 use std::io::Write;
 use std::path::Path;
@@ -34,7 +34,7 @@ pub fn run(args: &RaysArgs) -> Result<()> {
     translate(&mut set, -flat.origin);
     let device = Device::open(&args.device.options())?;
     let (kind, _, compute) = args.device.choose(&device.info)?;
-    // one more repetition to warm up
+    // the repeats and one warm-up pass
     let build = args.device.build_options(set.len() as u64 * (args.repeats as u64 + 1));
     let tracer = Tracer::with_build(&device, kind, &flat, Needs::default(), compute, &build)?;
     build.take_warnings().iter().for_each(|w| warnings.add(w));
@@ -53,7 +53,7 @@ pub fn run(args: &RaysArgs) -> Result<()> {
     let middle = |seconds: &[f64]| median(seconds).unwrap_or(0.0);
     let (on_device, on_wall) = (rate(middle(&times.device)), rate(middle(&times.wall)));
     console.line(&format!(
-        "{} rays, {hit_count} hit; tracer {kind}{} on {}: {on_device:.2} Mrays/s on the device, {on_wall:.2} by the clock \
+        "{} rays, {hit_count} hit; tracer {kind}{} on {}: {on_device:.2} Mrays/s on the device, {on_wall:.2} by wall clock \
          (median of {}); built in {:.3} s, {:.1} bytes per primitive",
         set.len(),
         tracer.compute_options().map(|o| format!(" ({})", o.kernel)).unwrap_or_default(),
@@ -84,7 +84,7 @@ pub fn run(args: &RaysArgs) -> Result<()> {
     }))
 }
 
-/// Reads a triangle soup (.bin), or any scene.
+/// Reads a triangle soup (.bin) or any scene.
 fn read_mesh(source: &str) -> Result<Scene> {
     let path = Path::new(source);
     let soup = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("bin"));
@@ -96,7 +96,7 @@ fn read_rays(path: &Path) -> Result<Vec<Ray>> {
     let bytes = std::fs::read(path).map_err(|e| Error::read(path, &e))?;
     if bytes.is_empty() || bytes.len() % size_of::<Ray>() != 0 {
         let message =
-            format!("{} bytes: expected a whole number of rays of {} bytes, at least one", bytes.len(), size_of::<Ray>());
+            format!("{} bytes: expected a non-zero multiple of {} bytes, the size of a ray", bytes.len(), size_of::<Ray>());
         return Err(Error::input(path, message));
     }
     Ok(bytemuck::pod_collect_to_vec(&bytes))

@@ -1,11 +1,11 @@
-//! `skylit scenes`: lists the built-in scenes.
+//! `skylit scenes`: the built-in scenes.
 
 use super::args::ScenesArgs;
 use crate::error::Result;
 use crate::scene::builtin;
 use crate::terminal::console;
 
-/// Lists them.
+/// Lists the built-in scenes.
 pub fn run(args: &ScenesArgs) -> Result<()> {
     let scenes = builtin::names();
     if args.json {

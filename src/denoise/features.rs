@@ -1,8 +1,9 @@
-//! What pixels show, and how it mixes in them: auxiliary outputs of each pixel's middle and of a grid of points in it.
+//! Auxiliary feature images for denoising: AOVs of each pixel's centre, and of a grid of points in it, which show whether a pixel
+//! contains several surfaces.
 
 use glam::Vec3;
 
-use super::Shot;
+use super::DenoiseInput;
 use crate::error::Result;
 use crate::film::Control;
 use crate::film::camera::CameraRecord;
@@ -12,49 +13,49 @@ use crate::raster::Primary;
 use crate::realtime::DEPTH_TOLERANCE;
 use crate::scene::material::{Material, MaterialKind};
 
-/// Points of a pixel in x and in y.
+/// Number of points of a pixel along x and along y.
 pub const GRID: u32 = 4;
-/// Of points of one surface: cosine between their normals and that of the pixel's middle.
-const LEAST_COSINE: f32 = 0.95;
+/// Minimum cosine between the shading normals of two points of one surface.
+const MIN_COSINE: f32 = 0.95;
 
-/// How much of a pixel is the surface in its middle.
+/// The surfaces that are visible in a pixel.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Mix {
-    /// All of it.
+pub enum PixelContent {
+    /// Only the surface at its centre.
     #[default]
-    One,
-    /// It may be that others show in it.
-    Several,
-    /// What emits or what surrounds the scene shows in it as well: far brighter, or without noise.
-    Source,
+    OneSurface,
+    /// Possibly several surfaces.
+    SeveralSurfaces,
+    /// Also an emitter or the environment, which is far brighter, or free of noise.
+    Emitter,
 }
 
-/// Images of surfaces, rows from the top.
+/// Feature images, rows from the top.
 #[derive(Clone, Debug, Default)]
 pub struct Features {
-    /// Linear base colours, means over the pixel, channels interleaved; of mirrors and glass what they reflect or transmit, of surfaces under a white
-    /// sky 1, where nothing is 0.
+    /// Linear base colour, averaged over the pixel, channels interleaved. Mirrors and glass have their specular or transmitted colour, all
+    /// surfaces have 1 in white-furnace mode, and the background has 0.
     pub albedo: Vec<f32>,
-    /// Shading normals, world, normal maps left out; likewise. Shorter than 1 where they differ.
+    /// World-space shading normal without normal maps, averaged over the pixel, channels interleaved. Shorter than 1 where normals differ.
     pub normals: Vec<f32>,
-    /// Share of the pixel in which something is.
+    /// Fraction of the pixel that is covered by surfaces, in [0, 1].
     pub coverage: Vec<f32>,
-    /// What shows in the pixel.
-    pub mix: Vec<Mix>,
-    /// What its middle shows.
+    /// The surfaces that are visible in the pixel.
+    pub content: Vec<PixelContent>,
+    /// AOVs of the pixel's centre.
     pub centres: Vec<AovPixel>,
 }
 
-/// The camera's view of points.
-pub(super) struct Look {
+/// The camera as a pinhole, for depths and pixel footprints.
+pub(super) struct PinholeView {
     position: Vec3,
     back: Vec3,
     orthographic: bool,
-    // side of a pixel at unit distance, or of any where rays are parallel
+    // side of a pixel at unit distance; for an orthographic camera, at any distance
     pixel: f32,
 }
 
-impl Look {
+impl PinholeView {
     /// `height` in pixels.
     pub fn new(camera: &CameraRecord, height: u32) -> Self {
         let column = |c: usize| Vec3::from_array(camera.camera_to_world.map(|row| row[c]));
@@ -66,36 +67,36 @@ impl Look {
         }
     }
 
-    /// Depth of a point along the view.
+    /// Depth of a point along the view direction, in scene units.
     pub fn depth(&self, point: [f32; 3]) -> f32 {
         (self.position - Vec3::from(point)).dot(self.back)
     }
 
-    /// Is it a point of the same surface?
+    /// Whether `point` is on the same surface as the pixel's centre.
     fn is_same(&self, centre: &AovPixel, point: &AovPixel) -> bool {
         let footprint = if self.orthographic { self.pixel } else { self.pixel * self.depth(centre.position) };
         let off = (Vec3::from(point.position) - Vec3::from(centre.position)).dot(Vec3::from(centre.ng));
         point.material == centre.material
             && off.abs() <= DEPTH_TOLERANCE * footprint
-            && Vec3::from(point.ns).dot(Vec3::from(centre.ns)) >= LEAST_COSINE
+            && Vec3::from(point.ns).dot(Vec3::from(centre.ns)) >= MIN_COSINE
     }
 }
 
 impl Features {
-    /// Renders them, as a pinhole sees them.
+    /// Renders the feature images with a pinhole camera.
     ///
     /// # Errors
     /// Those of [`aov::render`].
-    pub fn render(shot: &Shot, control: &mut dyn Control) -> Result<Self> {
-        let Shot { tracer, scene, camera, options } = *shot;
+    pub fn render(shot: &DenoiseInput, control: &mut dyn Control) -> Result<Self> {
+        let DenoiseInput { tracer, scene, camera, options } = *shot;
         let [width, height] = options.size;
         let pixels = width as usize * height as usize;
         let centres = aov::render(tracer, camera, options.size, control)?;
         let mut albedo = vec![Vec3::ZERO; pixels];
         let mut normals = vec![Vec3::ZERO; pixels];
         let mut coverage = vec![0.0; pixels];
-        let mut mix = vec![Mix::One; pixels];
-        let look = Look::new(camera, height);
+        let mut content = vec![PixelContent::OneSurface; pixels];
+        let look = PinholeView::new(camera, height);
         let reach = reach(options.pixel_filter);
         let share = 1.0 / (GRID * GRID) as f32;
         let fine = [width * GRID, height * GRID];
@@ -108,8 +109,8 @@ impl Features {
                 normals[at] += Vec3::from(point.ns) * share;
                 coverage[at] += share;
             }
-            let source = material.is_none_or(|m| options.white_sky.is_none() && is_source(m));
-            // every pixel whose filter may take this point in
+            let source = material.is_none_or(|m| options.white_sky.is_none() && is_uniform_emitter(m));
+            // every pixel whose reconstruction filter may include this point
             let range = |p: usize, n: u32| {
                 let grid = GRID as usize;
                 (p.saturating_sub(reach) / grid)..=((p + reach) / grid).min(n as usize - 1)
@@ -119,20 +120,21 @@ impl Features {
                     let k = row * width as usize + column;
                     let centre = &centres[k];
                     let found = match centre.depth < f32::INFINITY && material.is_some() && look.is_same(centre, point) {
-                        true => Mix::One,
-                        false if source => Mix::Source,
-                        false => Mix::Several,
+                        true => PixelContent::OneSurface,
+                        false if source => PixelContent::Emitter,
+                        false => PixelContent::SeveralSurfaces,
                     };
-                    mix[k] = mix[k].max(found);
+                    content[k] = content[k].max(found);
                 }
             }
         })?;
         let planes = |values: Vec<Vec3>| values.iter().flat_map(|v| v.to_array()).collect();
-        Ok(Self { albedo: planes(albedo), normals: planes(normals), coverage, mix, centres })
+        Ok(Self { albedo: planes(albedo), normals: planes(normals), coverage, content, centres })
     }
 }
 
-/// Points of the grid beyond a pixel's border that belong to what may show in it: what lies between its last point and the next is either's.
+/// Number of grid points beyond a pixel's border that may be visible in it: the filter's reach, and one more, because what lies between two
+/// points may belong to either.
 fn reach(filter: PixelFilter) -> usize {
     let beyond = match filter {
         PixelFilter::Box => 0.0,
@@ -142,14 +144,14 @@ fn reach(filter: PixelFilter) -> usize {
     1 + (beyond * GRID as f32) as usize
 }
 
-/// Does a surface of it shine by itself, everywhere alike?
-pub(super) fn is_source(material: &Material) -> bool {
+/// Whether the material emits with one radiance everywhere: unlit, or emissive without a texture.
+pub(super) fn is_uniform_emitter(material: &Material) -> bool {
     material.unlit || material.emissive != Vec3::ZERO && material.emissive_texture.is_none()
 }
 
 fn colour(material: &Material, point: &AovPixel, options: &PathOptions) -> Vec3 {
     match material.kind {
-        // a tracer for it knows no materials, and all are of one grey that radiance is divided by already
+        // in white-furnace mode there are no materials, and radiance is divided by the constant albedo already
         _ if options.white_sky.is_some() => Vec3::ONE,
         MaterialKind::Mirror => material.specular_color,
         MaterialKind::Glass => material.specular_color.max(material.transmittance),

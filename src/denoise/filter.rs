@@ -1,17 +1,17 @@
-//! The filter of frames in real time (shaders/common/filter.glsl) over radiance: what surfaces reflect is divided by their albedo, averaged over
-//! neighbours on the same surface as far as noise explains how they differ, and multiplied again.
+//! The spatial filter of the real-time renderer (shaders/common/filter.glsl) applied to radiance: radiance is divided by albedo, averaged over
+//! neighbours on the same surface as far as noise explains their differences, and multiplied by albedo again.
 //!
-//! Left as they are: mirrors, glass and polished metal, since what is seen in them has edges that nobody knows of; what emits; the
-//! background; and pixels in which some of the latter two shows. Pixels that show several surfaces are averaged among themselves, so that none of
-//! their light gets onto the surfaces beside them.
+//! Some pixels are not filtered: those of mirrors, glass and polished metal, because the features do not show the edges in reflections;
+//! those of emitters and the background; and those that contain one of the latter two. Pixels with several surfaces are averaged among themselves
+//! only, so that their light does not leak onto adjacent surfaces.
 
 use crate::shaders::{self, LANES};
 use std::time::Instant;
 
 use glam::Vec3;
 
-use super::Shot;
-use super::features::{Features, Look, Mix, is_source};
+use super::DenoiseInput;
+use super::features::{Features, PinholeView, PixelContent, is_uniform_emitter};
 use crate::error::Result;
 use crate::film::Control;
 use crate::film::Film;
@@ -27,14 +27,14 @@ use crate::scene::material::{Material, MaterialKind};
 
 use crate::tracer::Push;
 
-/// How it filters.
+/// Settings of the filter.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Settings {
     /// Shape of the neighbourhood.
     pub kind: FilterKind,
-    /// Pixels to each side.
+    /// Radius in pixels.
     pub radius: u32,
-    /// Cosine between shading normals at which an edge begins.
+    /// Minimum cosine between the shading normals of neighbours; below it there is an edge.
     pub cosine: f32,
 }
 
@@ -44,22 +44,22 @@ impl Default for Settings {
     }
 }
 
-/// Radiance is divided by this much at least: what reflects less tells nothing of the light on it.
+/// Minimum albedo by which radiance is divided: darker surfaces carry no information about irradiance.
 const MIN_ALBEDO: f32 = 0.01;
-/// Below this roughness metals count as mirrors.
+/// Roughness below which metals count as mirrors.
 const POLISHED: f32 = 0.25;
-/// Which pixels are averaged, and how they look to the shader.
+/// The shader's inputs per pixel.
 struct Guided {
     surfaces: Vec<SurfaceRecord>,
     guides: Vec<[u32; 2]>,
     estimates: Vec<RadianceRecord>,
-    /// Of each pixel; zero where it is left as it is.
+    /// Albedo by which each pixel is divided; zero for pixels that are not filtered.
     divisors: Vec<Vec3>,
 }
 
 /// See [`super::Denoiser::denoise`].
 pub fn filter(
-    shot: &Shot,
+    shot: &DenoiseInput,
     film: &Film,
     features: &Features,
     settings: &Settings,
@@ -79,8 +79,8 @@ fn rgb(image: &[f32], pixel: usize) -> Vec3 {
     Vec3::from_slice(&image[3 * pixel..][..3])
 }
 
-/// Does it show things that have edges of their own?
-fn shows_others(material: &Material) -> bool {
+/// Whether the material shows sharp reflections or refractions, whose edges the features do not contain.
+fn has_sharp_reflections(material: &Material) -> bool {
     let polished = material.roughness < POLISHED;
     match material.kind {
         MaterialKind::Mirror | MaterialKind::Glass => true,
@@ -90,16 +90,16 @@ fn shows_others(material: &Material) -> bool {
     }
 }
 
-/// What a material reflects at normal incidence whatever its colour.
-fn uncoloured(material: &Material) -> f32 {
+/// Specular reflectance at normal incidence, independent of the base colour.
+fn specular_albedo(material: &Material) -> f32 {
     match material.kind {
         MaterialKind::MetallicRoughness => ((material.ior - 1.0) / (material.ior + 1.0)).powi(2) * material.specular.factor,
         _ => 0.0,
     }
 }
 
-fn guide(shot: &Shot, film: &Film, features: &Features) -> Guided {
-    let Shot { scene, camera, options, .. } = *shot;
+fn guide(shot: &DenoiseInput, film: &Film, features: &Features) -> Guided {
+    let DenoiseInput { scene, camera, options, .. } = *shot;
     let pixels = film.samples.len();
     let mut out = Guided {
         surfaces: vec![SurfaceRecord::default(); pixels],
@@ -107,20 +107,21 @@ fn guide(shot: &Shot, film: &Film, features: &Features) -> Guided {
         estimates: vec![RadianceRecord::default(); pixels],
         divisors: vec![Vec3::ZERO; pixels],
     };
-    let look = Look::new(camera, film.height);
+    let look = PinholeView::new(camera, film.height);
     let white = options.white_sky.is_some();
     for k in 0..pixels {
-        let (centre, samples, mix) = (&features.centres[k], film.samples[k], features.mix[k]);
+        let (centre, samples, content) = (&features.centres[k], film.samples[k], features.content[k]);
         let Some(material) = scene.materials.get(centre.material as usize).filter(|_| centre.depth < f32::INFINITY) else {
             continue;
         };
         let albedo = rgb(&features.albedo, k) / features.coverage[k].max(f32::MIN_POSITIVE);
-        let reflects = if white { albedo } else { albedo + uncoloured(material) };
-        let left = !white && (shows_others(material) || is_source(material) || reflects.max_element() <= MIN_ALBEDO);
-        if samples == 0 || mix == Mix::Source || left {
+        let reflects = if white { albedo } else { albedo + specular_albedo(material) };
+        let is_skipped =
+            !white && (has_sharp_reflections(material) || is_uniform_emitter(material) || reflects.max_element() <= MIN_ALBEDO);
+        if samples == 0 || content == PixelContent::Emitter || is_skipped {
             continue;
         }
-        // a lens blurs what is divided, but not what it is divided by
+        // depth of field blurs radiance but not the albedo, which comes from a pinhole
         let divisor = if options.lens.is_some() { Vec3::ONE } else { reflects.max(Vec3::splat(MIN_ALBEDO)) };
         // the shader wants the mean square about the pixel's own mean
         let variance = rgb(&film.variance, k) * (1.0 - 1.0 / samples as f32) / (divisor * divisor);
@@ -131,8 +132,9 @@ fn guide(shot: &Shot, film: &Film, features: &Features) -> Guided {
             reserved: 0.0,
         };
         out.surfaces[k] = SurfaceRecord { position: centre.position, normal: centre.ng, ..Default::default() };
-        // eight bits: seven of the material, and whether it is the only surface of the pixel
-        let class = (centre.material.wrapping_mul(0x9e37_79b1) >> 25) << 1 | u32::from(mix == Mix::Several);
+        // eight bits: seven of a hash of the material, and one that is set for several surfaces
+        let class =
+            (centre.material.wrapping_mul(0x9e37_79b1) >> 25) << 1 | u32::from(content == PixelContent::SeveralSurfaces);
         out.guides[k] = [look.depth(centre.position).to_bits(), pack_normal(Vec3::from(centre.ns)) | class << 24];
         out.divisors[k] = divisor;
     }
@@ -145,9 +147,9 @@ fn pack_normal(n: Vec3) -> u32 {
     byte(n.x) | byte(n.y) << 8 | byte(n.z) << 16
 }
 
-/// Filters on the device, in launches that are short.
+/// Filters on the device, in several short launches.
 fn run(
-    shot: &Shot,
+    shot: &DenoiseInput,
     size: [u32; 2],
     guided: &Guided,
     settings: &Settings,
@@ -170,7 +172,7 @@ fn run(
         size,
         depth_tolerance: DEPTH_TOLERANCE,
         normal_tolerance: settings.cosine,
-        // every estimate is final: none gets better by itself
+        // estimates are final: no later frame improves them
         most_samples: 1.0,
         surface: surface.address(),
         guide: guide.address(),
@@ -219,7 +221,8 @@ mod tests {
 
     #[test]
     fn what_shows_others_is_left_alone() {
-        let of = |kind, roughness, metallic| shows_others(&Material { kind, roughness, metallic, ..Material::default() });
+        let of =
+            |kind, roughness, metallic| has_sharp_reflections(&Material { kind, roughness, metallic, ..Material::default() });
         assert!(of(MaterialKind::Mirror, 1.0, 0.0) && of(MaterialKind::Glass, 1.0, 0.0));
         assert!(of(MaterialKind::Gold, 0.1, 0.0) && !of(MaterialKind::Gold, 0.5, 0.0) && !of(MaterialKind::Matte, 0.0, 1.0));
         assert!(of(MaterialKind::MetallicRoughness, 0.1, 1.0) && !of(MaterialKind::MetallicRoughness, 0.1, 0.0));

@@ -1,11 +1,11 @@
-//! Films of radiance with less noise, and a bias in its place: `filter` is the filter of frames in real time over radiance, on the device of the
-//! tracer; [`Oidn`] is Intel's Open Image Denoise. Both are told what the pixels show by [`Features`].
+//! Denoising of path-traced films (biased): `filter` applies the spatial filter of the real-time renderer to radiance, on the tracer's
+//! device; [`Oidn`] is Intel's Open Image Denoise. Both are guided by the feature images of [`Features`].
 
 mod features;
 mod filter;
 
 pub use crate::gpu::oidn::Oidn;
-pub use features::{Features, GRID, Mix};
+pub use features::{Features, GRID, PixelContent};
 pub use filter::Settings;
 
 use crate::error::Result;
@@ -16,29 +16,29 @@ use crate::integrators::path::PathOptions;
 use crate::scene::Scene;
 use crate::tracer::Tracer;
 
-/// What films show.
+/// The scene, camera and options with which a film was rendered.
 #[derive(Clone, Copy)]
-pub struct Shot<'a> {
-    /// Made for paths.
+pub struct DenoiseInput<'a> {
+    /// A tracer that was built for path tracing.
     pub tracer: &'a Tracer,
-    /// The tracer's.
+    /// The tracer's scene.
     pub scene: &'a Scene,
-    /// Of the film.
+    /// The film's camera.
     pub camera: &'a CameraRecord,
-    /// How it was rendered.
+    /// The options of the path integrator.
     pub options: &'a PathOptions,
 }
 
-/// What takes the noise away.
+/// A denoiser.
 pub enum Denoiser {
-    /// The project's own.
+    /// skylit's cross-bilateral filter.
     Filter(Settings),
     /// Open Image Denoise.
     Oidn(Oidn),
 }
 
 impl Denoiser {
-    /// As options and files call it.
+    /// Name in options and metadata.
     pub fn name(&self) -> &'static str {
         match self {
             Denoiser::Filter(_) => "filter",
@@ -46,12 +46,18 @@ impl Denoiser {
         }
     }
 
-    /// The film's means without most of their noise: linear radiance, channels interleaved, rows from the top. `features` are
-    /// those of the same shot.
+    /// The denoised means of the film: linear radiance, channels interleaved, rows from the top. `features` must be rendered from
+    /// the same input.
     ///
     /// # Errors
     /// Those of the device, [`crate::Error::Interrupted`] when `control` says so, and those of the library.
-    pub fn denoise(&self, shot: &Shot, film: &Film, features: &Features, control: &mut dyn Control) -> Result<Vec<f32>> {
+    pub fn denoise(
+        &self,
+        shot: &DenoiseInput,
+        film: &Film,
+        features: &Features,
+        control: &mut dyn Control,
+    ) -> Result<Vec<f32>> {
         match self {
             Denoiser::Filter(settings) => filter::filter(shot, film, features, settings, control),
             Denoiser::Oidn(oidn) => oidn.denoise([film.width, film.height], &film.mean, &features.albedo, &features.normals),

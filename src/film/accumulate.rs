@@ -1,5 +1,6 @@
-//! Samples of every pixel, added up on a film: step by step ([`super::schedule`]), in each the image block by block, batch by batch and launch by
-//! launch, with progress, a time limit and a way to stop that leaves whole samples of all pixels. What a sample is, an `Estimator` knows.
+//! Accumulates samples of every pixel on a film: step by step ([`super::schedule`]), and within a step block by block, batch by batch and
+//! launch by launch. Reports progress, respects a time limit, and can be stopped so that every pixel has complete samples. An
+//! `Estimator` evaluates the samples.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -8,114 +9,114 @@ use std::time::{Duration, Instant};
 use super::block::{Block, BlockParams, TILE_PIXELS};
 use super::camera::CameraRecord;
 use super::convergence::{TileCount, TileErrors};
-use super::cover::Cover;
-use super::pace::{MOST, Pace};
+use super::pace::{MAX_RAYS, Pace};
 use super::schedule::{FilmOptions, Step};
 use super::state::{FilmState, tiles};
+use super::tile_mask::TileMask;
 use super::{Film, FilmPixel, MAX_CHANNELS, record_bytes, record_words};
 use crate::error::{Error, Result};
 use crate::film::Control;
 use crate::gpu::{Buffer, Commands, Device, Memory, Timing};
 use crate::tracer::{Push, Tracer};
 
-/// Samples of a pixel in a launch at most, as a power of two: neighbouring rays, which then start and end close together.
+/// Log2 of the maximum number of samples per pixel in a launch. Samples of a pixel are neighbouring rays, which are coherent.
 const MAX_SAMPLE_BITS: u32 = 4;
 
-/// What estimates pixels.
+/// Evaluates samples of pixels on the device: the device side of an integrator.
 pub(crate) trait Estimator {
-    /// Values of a pixel of its film.
+    /// Channels of its film.
     const CHANNELS: usize;
 
-    /// Has to keep what the launches of the first sample of each pixel trace: it then comes alone.
+    /// Must the rays of the first sample of each pixel be kept? Then that sample is a batch of its own.
     fn keeps_first(&self) -> bool {
         false
     }
 
-    /// Before the launches of a batch. `keep`: it is the first sample, and [`Estimator::keeps_first`]. Returns the address of the pass's
-    /// parameters.
+    /// Prepares the launches of a batch and returns the device address of the pass's parameters. `keep`: the batch is the first sample and
+    /// [`Estimator::keeps_first`] is true.
     fn begin(&mut self, params: BlockParams, keep: bool) -> Result<u64>;
 
-    /// Runs launches one after the other, and adds what they find to the film that the parameters name. With `keep` there is one.
+    /// Runs launches in order and adds their results to the film that the parameters address. With `keep` there is exactly one launch.
     fn launch(&mut self, commands: &mut Commands, launches: &[Push], keep: bool) -> Result<Vec<Timing>>;
 }
 
-/// How to accumulate.
+/// Parameters of [`accumulate`].
 pub(crate) struct Plan<'a> {
     /// Image size in pixels.
     pub size: [u32; 2],
     /// Samples per pixel.
     pub spp: u32,
-    /// Of the sampler.
+    /// Seed of the sampler.
     pub seed: u32,
-    /// Stop after this time with what there is.
+    /// Stop after this time and keep the samples taken so far.
     pub time_limit: Option<Duration>,
-    /// Which tiles of the image show anything; without it all are traced.
-    pub cover: Option<&'a Cover>,
-    /// What the film starts from, and where it stops on its way.
+    /// Tiles of the image that can contain geometry; `None` traces all tiles.
+    pub tile_mask: Option<&'a TileMask>,
+    /// Initial state and intermediate stops of the film.
     pub film: &'a FilmOptions,
 }
 
-/// An image and how it came about. Rays and times are those of this run.
+/// An accumulated image and its statistics. Ray counts and times are those of this run.
 #[derive(Clone, Debug, Default)]
 pub struct Accumulated {
     /// The image.
     pub film: Film,
-    /// Its sums, where something needs them ([`FilmOptions`]).
+    /// Its exact sums, if [`FilmOptions::keep_state`] is set.
     pub state: Option<FilmState>,
-    /// Samples that every pixel got.
+    /// Minimum samples per pixel.
     pub spp: u32,
-    /// Samples that any pixel got at most.
-    pub most_spp: u32,
-    /// Stopped before all samples were taken.
+    /// Maximum samples per pixel.
+    pub max_spp: u32,
+    /// Rendering stopped before all samples were taken.
     pub stopped_early: bool,
-    /// Tiles that know enough, where there is a target.
+    /// Converged tiles, if [`FilmOptions::target_rmse`] is set.
     pub converged: Option<TileCount>,
     /// Camera rays traced.
     pub primary_rays: u64,
-    /// Camera rays not traced because nothing is in their tile of the image.
+    /// Camera rays not traced because their tile contains no geometry.
     pub skipped_primary_rays: u64,
-    /// Camera rays that met something.
+    /// Camera rays that hit geometry.
     pub covered: u64,
-    /// Device seconds of each step of each pass, `"PASS STEP"`; of a pass that is one shader, `"PASS"`.
+    /// Device seconds by label: `"PASS STEP"`, or `"PASS"` for a pass of a single shader.
     pub device_seconds: Vec<(&'static str, f64)>,
-    /// Longest launch, device seconds.
+    /// Duration of the longest launch, device seconds.
     pub longest_launch: f64,
-    /// Seconds of the trace loop, compiling included.
+    /// Wall-clock seconds of the trace loop, including shader compilation.
     pub trace_seconds: f64,
 }
 
-/// Rays of a launch at most, for a plan: what an estimator's buffers hold.
-pub(crate) fn most_rays(size: [u32; 2], spp: u32) -> u32 {
-    let most_pixels = Block::cut(size).iter().map(Block::rays).max().unwrap_or(0) as u64;
+/// Maximum number of rays in a launch: the capacity that an estimator's buffers need.
+pub(crate) fn max_rays(size: [u32; 2], spp: u32) -> u32 {
+    let max_pixels = Block::cut(size).iter().map(Block::rays).max().unwrap_or(0) as u64;
     let bits = Batch::next(0, spp.max(1), u32::MAX).bits;
-    (most_pixels << bits).min(MOST as u64) as u32
+    (max_pixels << bits).min(MAX_RAYS as u64) as u32
 }
 
-/// Tiles of a block that have as many samples, and get more together.
-struct Group {
+/// Tiles of a block with the same number of samples, which are sampled together.
+struct TileGroup {
     block: Block,
-    // place of the block among all
+    // index of the block in the image
     number: usize,
-    // samples that they have
+    // samples that each pixel has
     first: u32,
-    // as the block counts them
+    // tile indices within the block
     tiles: Vec<u32>,
-    // of these, those that are traced; none: the block's tiles, all of them
+    // the subset that is traced; `None`: all tiles of the block
     traced: Option<Vec<u32>>,
 }
 
-/// A group's pixels on the device, and their film.
-struct Plot {
+/// Pixels of a tile group on the device, and their film.
+struct PixelBatch {
     params: BlockParams,
     tiles: Option<Vec<u32>>,
     pixels: u32,
     film: Buffer,
-    // the film as it was before a batch that may be given up
+    // backup of the film, restored if a batch is abandoned
     before: Option<Buffer>,
     _tile_buffer: Option<Buffer>,
 }
 
-/// Samples of every pixel that are taken together.
+/// A power of two of samples per pixel that are taken together.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Batch {
     first: u32,
@@ -123,7 +124,7 @@ struct Batch {
 }
 
 impl Batch {
-    /// As many samples as a launch takes and as are left of `wanted`, but no more than `most` (at least one).
+    /// The largest batch that fits a launch, the samples left of `wanted`, and `most` (at least one).
     fn next(first: u32, wanted: u32, most: u32) -> Self {
         let samples = (wanted - first).min(most.max(1));
         Self { first, bits: samples.ilog2().min(MAX_SAMPLE_BITS) }
@@ -134,13 +135,13 @@ impl Batch {
     }
 }
 
-/// Renders. `params`: what the estimator wants in its parameters beside what every block has.
+/// Accumulates the samples of a plan. `params`: the estimator's own block parameters; camera, size and film are filled in.
 ///
-/// When `control` says stop, what is kept are whole samples of all pixels: a film whose pixels have different counts would be a
-/// surprise. A batch that is under way is given up for that, unless there is nothing else yet.
+/// When `control` requests a stop, only complete samples are kept, so that all pixels of a tile have the same count. The batch in
+/// progress is abandoned for that, unless the pixels have no sample yet.
 ///
 /// # Errors
-/// Those of the device, and [`crate::Error::Interrupted`] when `control` says so.
+/// Those of the device and of `control`, usually [`crate::Error::Interrupted`].
 pub(crate) fn accumulate<E: Estimator>(
     tracer: &Tracer,
     camera: &CameraRecord,
@@ -159,7 +160,7 @@ pub(crate) fn accumulate<E: Estimator>(
             Some(s) if s.size() == plan.size && s.channels() == E::CHANNELS => s.clone(),
             Some(s) => {
                 return Err(Error::Usage(format!(
-                    "a film of {}x{} pixels with {} channels does not go on as one of {}x{} with {}",
+                    "a film of {}x{} pixels with {} channels cannot be resumed as one of {}x{} with {}; render with the same size and integrator",
                     s.size()[0],
                     s.size()[1],
                     s.channels(),
@@ -205,7 +206,7 @@ pub(crate) fn accumulate<E: Estimator>(
     Ok(out)
 }
 
-/// An image on its way.
+/// State of an accumulation in progress.
 struct Run<'a, E> {
     launcher: Launcher<'a, E>,
     camera: &'a CameraRecord,
@@ -213,14 +214,14 @@ struct Run<'a, E> {
     params: &'a BlockParams,
     start: Instant,
     blocks: Vec<Block>,
-    // of each block
+    // sampling rate of each block
     rates: Vec<Rate>,
-    // samples that the pixels of each tile of the image have
+    // samples per pixel of each tile of the image
     tile_samples: Vec<u32>,
     out: Accumulated,
 }
 
-/// How long samples take.
+/// Measured time per pixel sample.
 #[derive(Clone, Copy, Default)]
 struct Rate {
     seconds: f64,
@@ -228,7 +229,7 @@ struct Rate {
 }
 
 impl Rate {
-    /// Samples of so many pixels each that fit into a time; at least one, and one while nothing is known.
+    /// Number of samples of `pixels` pixels that fit into `time`: at least one, and one before the first measurement.
     fn fit(&self, time: Duration, pixels: u32) -> u32 {
         let each = self.seconds / self.samples as f64 * f64::from(pixels.max(1));
         if self.samples == 0 { 1 } else { ((time.as_secs_f64() / each.max(1e-9)) as u32).max(1) }
@@ -236,36 +237,36 @@ impl Rate {
 }
 
 impl<E: Estimator> Run<'_, E> {
-    /// Takes the samples of a step; says whether it had to stop before all of the plan's were taken.
+    /// Takes the samples of a step. Returns true if it stopped early, by the time limit or on request.
     fn step(&mut self, step: &Step, control: &mut dyn Control) -> Result<bool> {
-        let groups: Vec<Group> =
+        let groups: Vec<TileGroup> =
             self.blocks.iter().enumerate().flat_map(|(number, block)| self.groups(step, number, block)).collect();
-        let work = |g: &Group| f64::from(step.goal - g.first) * g.tiles.len() as f64;
-        let (mut to_do, mut late, mut asked) = (groups.iter().map(work).sum::<f64>(), false, false);
+        let work = |g: &TileGroup| f64::from(step.goal - g.first) * g.tiles.len() as f64;
+        let (mut to_do, mut late, mut stop_requested) = (groups.iter().map(work).sum::<f64>(), false, false);
         let pixels_of = |tiles: usize| tiles as u64 * u64::from(TILE_PIXELS);
         let total = pixels_of(self.tile_samples.len()) * u64::from(self.plan.spp);
         let mut done = total - (u64::from(TILE_PIXELS) * step.left).min(total);
         for group in groups {
-            // every pixel has something already: nothing more is begun
-            if asked && group.first > 0 {
+            // a stop was requested and these pixels have samples: start nothing more
+            if stop_requested && group.first > 0 {
                 continue;
             }
-            // what is left of the time is shared by what there is to do
+            // the remaining time is divided in proportion to the remaining work
             let share = work(&group) / to_do.max(1.0);
             to_do -= work(&group);
             let deadline = self.plan.time_limit.map(|limit| {
                 let left = limit.saturating_sub(self.start.elapsed());
                 Instant::now() + left.mul_f64(share.min(1.0))
             });
-            let mut plot = self.plot(&group)?;
+            let mut pixel_batch = self.pixel_batch(&group)?;
             let (pixels, mut sample) = (pixels_of(group.tiles.len()), group.first);
             while sample < step.goal {
                 let keep = self.launcher.estimator.keeps_first() && sample == 0;
-                // so many more as there is time for, judged by those that were taken
+                // as many samples as fit the time, by the measured rate
                 let most = match deadline {
                     _ if keep => 1,
                     None => u32::MAX,
-                    Some(d) => self.rates[group.number].fit(d.saturating_duration_since(Instant::now()), plot.pixels),
+                    Some(d) => self.rates[group.number].fit(d.saturating_duration_since(Instant::now()), pixel_batch.pixels),
                 };
                 let batch = Batch::next(sample, step.goal, most);
                 let before = done + pixels * u64::from(sample - group.first);
@@ -274,34 +275,34 @@ impl<E: Estimator> Run<'_, E> {
                     control.progress(before + part, total);
                 };
                 let began = Instant::now();
-                let taken = self.launcher.batch(&mut plot, batch, keep, &mut self.out, control, &mut report)?;
+                let taken = self.launcher.batch(&mut pixel_batch, batch, keep, &mut self.out, control, &mut report)?;
                 let Some(batch) = taken else {
-                    asked = true;
+                    stop_requested = true;
                     break;
                 };
                 sample += batch.samples();
                 let rate = &mut self.rates[group.number];
                 rate.seconds += began.elapsed().as_secs_f64();
-                rate.samples += u64::from(plot.pixels) * u64::from(batch.samples());
+                rate.samples += u64::from(pixel_batch.pixels) * u64::from(batch.samples());
                 control.progress(done + pixels * u64::from(sample - group.first), total);
                 if sample >= self.plan.spp {
                     break;
                 }
                 let too_late = deadline.is_some_and(|d| Instant::now() >= d);
                 late |= too_late;
-                asked |= !too_late && control.should_stop()?;
-                if too_late || asked {
+                stop_requested |= !too_late && control.should_stop()?;
+                if too_late || stop_requested {
                     break;
                 }
             }
             done += pixels * u64::from(step.goal - group.first);
-            self.take(&group, &plot, sample)?;
+            self.take(&group, &pixel_batch, sample)?;
         }
-        Ok(late || asked)
+        Ok(late || stop_requested)
     }
 
-    /// The tiles of a block that a step is about, those with as many samples together.
-    fn groups(&self, step: &Step, number: usize, block: &Block) -> Vec<Group> {
+    /// The tiles of a block that a step samples, grouped by their number of samples.
+    fn groups(&self, step: &Step, number: usize, block: &Block) -> Vec<TileGroup> {
         let width = self.plan.size[0];
         let mut of_samples: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
         for tile in 0..block.tiles() {
@@ -310,7 +311,7 @@ impl<E: Estimator> Run<'_, E> {
                 of_samples.entry(self.tile_samples[at]).or_default().push(tile);
             }
         }
-        let live = self.plan.cover.and_then(|c| c.tiles(block));
+        let live = self.plan.tile_mask.and_then(|c| c.tiles(block));
         let group = |(first, tiles): (u32, Vec<u32>)| {
             let traced = match &live {
                 None if tiles.len() as u32 == block.tiles() => None,
@@ -318,35 +319,35 @@ impl<E: Estimator> Run<'_, E> {
                 // both ascend
                 Some(live) => Some(tiles.iter().copied().filter(|t| live.binary_search(t).is_ok()).collect()),
             };
-            Group { block: *block, number, first, tiles, traced }
+            TileGroup { block: *block, number, first, tiles, traced }
         };
         of_samples.into_iter().map(group).collect()
     }
 
-    /// Puts a group on the device, with what its pixels have.
-    fn plot(&mut self, group: &Group) -> Result<Plot> {
+    /// Uploads a tile group with the current sums of its pixels.
+    fn pixel_batch(&mut self, group: &TileGroup) -> Result<PixelBatch> {
         let device = self.launcher.tracer.device();
-        let mut plot = Plot::new(device, group, self.camera, self.plan, self.params, E::CHANNELS)?;
+        let mut pixel_batch = PixelBatch::new(device, group, self.camera, self.plan, self.params, E::CHANNELS)?;
         let record = record_bytes(E::CHANNELS);
         match &self.out.state {
             Some(state) if group.first > 0 => {
-                let (tiles, width) = (plot.tiles.as_deref(), self.plan.size[0]);
-                plot.film.fill(record * plot.pixels as u64, record, |first, bytes| {
+                let (tiles, width) = (pixel_batch.tiles.as_deref(), self.plan.size[0]);
+                pixel_batch.film.fill(record * pixel_batch.pixels as u64, record, |first, bytes| {
                     for (k, bytes) in bytes.chunks_exact_mut(record as usize).enumerate() {
-                        match group.place(tiles, first as u32 + k as u32, width) {
+                        match group.image_index(tiles, first as u32 + k as u32, width) {
                             Some(at) => bytes.copy_from_slice(bytemuck::cast_slice(state.record(at))),
                             None => bytes.fill(0),
                         }
                     }
                 })?;
             }
-            _ => self.launcher.commands.run(|r| r.clear(&plot.film)).map(drop)?,
+            _ => self.launcher.commands.run(|r| r.clear(&pixel_batch.film)).map(drop)?,
         }
-        Ok(plot)
+        Ok(pixel_batch)
     }
 
-    /// Takes a group's pixels, which have `samples` samples each now, from the device.
-    fn take(&mut self, group: &Group, plot: &Plot, samples: u32) -> Result<()> {
+    /// Reads back a group's pixels, which have `samples` samples each now.
+    fn take(&mut self, group: &TileGroup, pixel_batch: &PixelBatch, samples: u32) -> Result<()> {
         let (width, out) = (self.plan.size[0], &mut self.out);
         let taken = u64::from(samples - group.first);
         let mut inside = 0u64;
@@ -354,16 +355,18 @@ impl<E: Estimator> Run<'_, E> {
             self.tile_samples[group.block.image_tile(tile, width)] = samples;
             for at in (0..TILE_PIXELS).filter_map(|k| group.block.image_index(tile * TILE_PIXELS + k, width)) {
                 inside += 1;
-                // pixels of tiles that show nothing are not on the device
+                // pixels of skipped tiles are not on the device
                 if out.state.is_none() {
                     out.film.set(at, &FilmPixel::default(), samples);
                 }
             }
         }
         let (record, mut traced) = (record_bytes(E::CHANNELS), 0u64);
-        plot.film.read_with(0, record * plot.pixels as u64, record, |first, bytes| {
+        pixel_batch.film.read_with(0, record * pixel_batch.pixels as u64, record, |first, bytes| {
             for (k, bytes) in bytes.chunks_exact(record as usize).enumerate() {
-                let Some(at) = group.place(plot.tiles.as_deref(), first as u32 + k as u32, width) else { continue };
+                let Some(at) = group.image_index(pixel_batch.tiles.as_deref(), first as u32 + k as u32, width) else {
+                    continue;
+                };
                 let mut words = [0u32; record_words(MAX_CHANNELS)];
                 let words = &mut words[..record_words(E::CHANNELS)];
                 bytemuck::cast_slice_mut::<u32, u8>(words).copy_from_slice(bytes);
@@ -385,17 +388,17 @@ impl<E: Estimator> Run<'_, E> {
         Ok(())
     }
 
-    /// What there is to say of the image so far.
+    /// Updates the statistics of the image.
     fn sum_up(&mut self) {
         self.out.spp = self.tile_samples.iter().copied().min().unwrap_or(0);
-        self.out.most_spp = self.tile_samples.iter().copied().max().unwrap_or(0);
+        self.out.max_spp = self.tile_samples.iter().copied().max().unwrap_or(0);
         self.out.converged = self.plan.film.target_rmse.map(|target| TileErrors::of(&self.out.film).count(target));
     }
 }
 
-impl Group {
-    /// Place in an image of the given width of the pixel with this number among those on the device; `None` for padding.
-    fn place(&self, tiles: Option<&[u32]>, index: u32, width: u32) -> Option<usize> {
+impl TileGroup {
+    /// Index in an image of the given width of the pixel with this index on the device; `None` for padding.
+    fn image_index(&self, tiles: Option<&[u32]>, index: u32, width: u32) -> Option<usize> {
         let index = match tiles {
             Some(tiles) => tiles[(index / TILE_PIXELS) as usize] * TILE_PIXELS + index % TILE_PIXELS,
             None => index,
@@ -404,7 +407,7 @@ impl Group {
     }
 }
 
-/// What all launches use.
+/// State shared by all launches.
 struct Launcher<'a, E> {
     tracer: &'a Tracer,
     estimator: &'a mut E,
@@ -413,24 +416,24 @@ struct Launcher<'a, E> {
 }
 
 impl<E: Estimator> Launcher<'_, E> {
-    /// Takes a batch of samples, or of one sample when it has to stop and there is none yet; says which. `None`: it had to stop,
-    /// and the film is as it was. `report` gets the share of the batch that is done.
+    /// Takes a batch of samples and returns it. On a stop request it restores the film and returns `None`, or, if the pixels have no
+    /// sample yet, takes a batch of one sample instead. `report` gets the completed share of the batch, in [0, 1].
     fn batch(
         &mut self,
-        plot: &mut Plot,
+        pixel_batch: &mut PixelBatch,
         mut batch: Batch,
         keep: bool,
         out: &mut Accumulated,
         control: &mut dyn Control,
         report: &mut dyn FnMut(f64, &mut dyn Control),
     ) -> Result<Option<Batch>> {
-        let pass = self.estimator.begin(plot.params, keep)?;
-        plot.save(&mut self.commands, batch)?;
-        let (mut first, mut given_up) = (0u64, false);
-        while first < (plot.pixels as u64) << batch.bits {
-            let all = (plot.pixels as u64) << batch.bits;
-            // pixels are rendered whole
-            let rays = self.pace.rays().min(MOST);
+        let pass = self.estimator.begin(pixel_batch.params, keep)?;
+        pixel_batch.save(&mut self.commands, batch)?;
+        let (mut first, mut restarted) = (0u64, false);
+        while first < (pixel_batch.pixels as u64) << batch.bits {
+            let all = (pixel_batch.pixels as u64) << batch.bits;
+            // launches contain all samples of a pixel
+            let rays = self.pace.rays().min(MAX_RAYS);
             let wanted = if keep { 1 } else { self.pace.launches() };
             let (begin, start) = (first, Instant::now());
             let mut launches = Vec::new();
@@ -452,29 +455,29 @@ impl<E: Estimator> Launcher<'_, E> {
                 self.pace.learn(rays, &timings, start.elapsed().as_secs_f64(), launches.len() as u32);
             }
             out.add_timings(&timings);
-            if !given_up {
+            if !restarted {
                 report(first as f64 / all as f64, control);
             }
             if first < all && control.should_stop()? && (batch.first > 0 || batch.bits > 0) {
-                plot.restore(&mut self.commands, batch)?;
+                pixel_batch.restore(&mut self.commands, batch)?;
                 if batch.first > 0 {
                     return Ok(None);
                 }
-                // there is nothing yet: one sample, which nothing stops
+                // no samples yet: take one, which cannot be stopped
                 batch.bits = 0;
                 first = 0;
-                given_up = true;
+                restarted = true;
             }
         }
         Ok(Some(batch))
     }
 }
 
-impl Plot {
-    /// Room for a group's pixels, its film not yet filled.
+impl PixelBatch {
+    /// Allocates a group's pixels; the film is not yet initialized.
     fn new(
         device: &Arc<Device>,
-        group: &Group,
+        group: &TileGroup,
         camera: &CameraRecord,
         plan: &Plan,
         params: &BlockParams,
@@ -495,7 +498,7 @@ impl Plot {
         Ok(Self { params, tiles, pixels, film, before: None, _tile_buffer: tile_buffer })
     }
 
-    /// Keeps the film, so that a batch can be given up. Before the first it is empty.
+    /// Backs the film up, so that a batch can be abandoned. Before the first batch the film is empty, which needs no backup.
     fn save(&mut self, commands: &mut Commands, batch: Batch) -> Result<()> {
         if batch.first == 0 {
             return Ok(());

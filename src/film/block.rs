@@ -1,17 +1,17 @@
-//! A block of the image: what one set of device buffers holds. Images larger than a block are rendered block by block, so
+//! Blocks of the image: the pixels that one set of device buffers covers. Images larger than a block are rendered block by block, so
 //! that device memory does not grow with the image.
 
 use super::camera::CameraRecord;
 pub use crate::interface::records::block::{BlockParams, TILE};
 use crate::sampling::morton::morton_pixel;
 
-/// Pixels of a block at most (1920x1080 fits).
-const MOST_PIXELS: u64 = 1 << 21;
-/// Pixels of a tile.
+/// Maximum number of pixels of a block (1920x1080 fits).
+const MAX_PIXELS: u64 = 1 << 21;
+/// Number of pixels of a tile.
 pub const TILE_PIXELS: u32 = TILE * TILE;
 
 impl BlockParams {
-    /// The same for a block of an image.
+    /// A copy of these parameters with the camera, seed and geometry of a block.
     pub fn at(&self, block: &Block, image_size: [u32; 2], camera: &CameraRecord, seed: u32) -> Self {
         Self {
             camera_to_world: camera.camera_to_world,
@@ -27,21 +27,21 @@ impl BlockParams {
     }
 }
 
-/// A rectangle of the image whose pixels are numbered in 8x8 tiles, Morton order within.
+/// A rectangle of the image, stored in tiles of 8x8 pixels, in Morton order within a tile.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Block {
-    /// Upper left pixel.
+    /// Coordinates of the upper left pixel in the image.
     pub origin: [u32; 2],
-    /// Pixels.
+    /// Width and height in pixels.
     pub size: [u32; 2],
 }
 
 impl Block {
-    /// Cuts an image into blocks.
+    /// Divides an image into blocks.
     pub fn cut(size: [u32; 2]) -> Vec<Block> {
         let step = |n: u32, most: u64| (n as u64).min(most).max(1) as u32;
-        let width = step(size[0], MOST_PIXELS / TILE as u64);
-        let rows = MOST_PIXELS / (width.next_multiple_of(TILE) as u64) / TILE as u64 * TILE as u64;
+        let width = step(size[0], MAX_PIXELS / TILE as u64);
+        let rows = MAX_PIXELS / (width.next_multiple_of(TILE) as u64) / TILE as u64 * TILE as u64;
         let height = step(size[1], rows.max(TILE as u64));
         let mut blocks = Vec::new();
         for y in (0..size[1]).step_by(height as usize) {
@@ -52,42 +52,42 @@ impl Block {
         blocks
     }
 
-    /// Tiles in a row.
+    /// Number of tiles in a row.
     pub fn tiles_x(&self) -> u32 {
         self.size[0].div_ceil(TILE)
     }
 
-    /// Tiles of it.
+    /// Number of tiles.
     pub fn tiles(&self) -> u32 {
         self.tiles_x() * self.size[1].div_ceil(TILE)
     }
 
-    /// Place of a tile among those of an image of the given width, rows from the top.
+    /// Index of a tile in the tile grid of an image of the given width, rows from the top.
     pub fn image_tile(&self, tile: u32, image_width: u32) -> usize {
         let [x, y] = self.origin.map(|o| o / TILE);
         ((y + tile / self.tiles_x()) * image_width.div_ceil(TILE) + x + tile % self.tiles_x()) as usize
     }
 
-    /// Ray indices: those of whole tiles, so some lie outside.
+    /// Number of ray indices, padding of incomplete tiles included.
     pub fn rays(&self) -> u32 {
         self.tiles() * TILE_PIXELS
     }
 
-    /// Pixel within the block of a ray index; outside of `size` for padding. The shaders' `block_pixel`.
+    /// Pixel coordinates of a ray index within the block; outside `size` for padding. The same as the shaders' `block_pixel`.
     pub fn pixel(&self, index: u32) -> [u32; 2] {
         let (tile, k) = (index >> 6, index & 63);
         let [x, y] = morton_pixel(k);
         [tile % self.tiles_x() * TILE + x, tile / self.tiles_x() * TILE + y]
     }
 
-    /// Place of a pixel's index in an image of the given width, or `None` for padding.
+    /// Index in an image of the given width of the pixel of a ray index; `None` for padding.
     pub fn image_index(&self, index: u32, image_width: u32) -> Option<usize> {
         let [x, y] = self.pixel(index);
         (x < self.size[0] && y < self.size[1])
             .then(|| (self.origin[1] + y) as usize * image_width as usize + (self.origin[0] + x) as usize)
     }
 
-    /// Parameters of its passes, buffers not yet set.
+    /// Parameters of the block's passes; buffer addresses are not yet set.
     pub fn params(&self, image_size: [u32; 2], camera: &CameraRecord, seed: u32) -> BlockParams {
         BlockParams::default().at(self, image_size, camera, seed)
     }
@@ -102,7 +102,7 @@ mod tests {
         for size in [[1, 1], [7, 3], [64, 64], [1280, 720], [3001, 1403], [1, 20000], [20000, 1]] {
             let mut seen = vec![0u8; size[0] as usize * size[1] as usize];
             for b in Block::cut(size) {
-                assert!(b.rays() as u64 <= MOST_PIXELS + 8 * 20000 * 8);
+                assert!(b.rays() as u64 <= MAX_PIXELS + 8 * 20000 * 8);
                 for k in 0..b.rays() {
                     if let Some(i) = b.image_index(k, size[0]) {
                         seen[i] += 1;

@@ -1,25 +1,25 @@
-//! Which camera an image is taken with, and what of it the shaders get.
+//! Choice of the camera, and its parameters as shaders read them.
 
 use glam::{DAffine3, DVec3};
 
 use crate::error::{Error, Result};
 use crate::scene::{Camera, Projection, Scene};
 
-/// How the user chose the camera.
+/// How the camera is chosen.
 #[derive(Clone, Debug, Default)]
 pub enum Choice {
-    /// The first camera of the file; a framing of the whole scene when it has none.
+    /// The scene's first camera, or one that frames the whole scene if it has none.
     #[default]
     Auto,
-    /// By index or name.
+    /// The scene camera with this index or name.
     Named(String),
-    /// Given in numbers. `up` need not be perpendicular; `fov_y` in radians.
+    /// An explicit camera. `up` need not be perpendicular to the view direction.
     LookAt {
         /// Position.
         eye: DVec3,
-        /// Point in the middle of the image.
+        /// Point at the center of the image.
         target: DVec3,
-        /// Up in the image.
+        /// Direction that points up in the image.
         up: DVec3,
         /// Full vertical field of view, radians.
         fov_y: f64,
@@ -34,35 +34,35 @@ pub fn choose(scene: &Scene, choice: &Choice, aspect: f64) -> Result<Camera> {
             let by_index = wanted.parse::<usize>().ok().and_then(|k| scene.cameras.get(k));
             by_index.or_else(|| scene.cameras.iter().find(|c| &c.name == wanted)).cloned().ok_or_else(|| {
                 let names: Vec<_> = scene.cameras.iter().enumerate().map(|(k, c)| format!("{k} '{}'", c.name)).collect();
-                let there = if names.is_empty() {
-                    "the scene has none; use --eye and --target".to_owned()
+                let available = if names.is_empty() {
+                    "the scene has no cameras; use --eye and --target".to_owned()
                 } else {
-                    format!("there is {}", names.join(", "))
+                    format!("available: {}", names.join(", "))
                 };
-                Error::Usage(format!("--camera {wanted}: no such camera; {there}"))
+                Error::Usage(format!("--camera {wanted}: no such camera; {available}"))
             })
         }
         Choice::Auto => match (scene.cameras.first(), scene.bounds()) {
             (Some(camera), _) => Ok(camera.clone()),
             (None, Some((lo, hi))) => Ok(Camera::framing(lo, hi, aspect)),
-            (None, None) => Err(Error::Scene("nothing to look at: the scene has no geometry".into())),
+            (None, None) => Err(Error::Scene("the scene has no geometry to render".into())),
         },
     }
 }
 
-/// A camera as shaders take it.
+/// Camera parameters in single precision, as shaders read them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CameraRecord {
     /// Camera to world relative to the scene's origin, three rows.
     pub camera_to_world: [[f32; 4]; 3],
-    /// Half width and half height of the view: tangents, or world units when orthographic.
+    /// Half width and half height of the view: tangents of the half angles, or scene units if orthographic.
     pub view: [f32; 2],
-    /// Parallel rays.
+    /// Orthographic projection.
     pub orthographic: bool,
 }
 
 impl CameraRecord {
-    /// For an image of `aspect` = width / height; the vertical field of view is the camera's own.
+    /// The record for an image of `aspect` = width / height, relative to `origin`. The vertical field of view is the camera's.
     pub fn new(camera: &Camera, origin: DVec3, aspect: f64) -> Self {
         let t = camera.camera_to_world;
         let relative = DAffine3 { translation: t.translation - origin, ..t };

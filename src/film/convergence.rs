@@ -1,34 +1,34 @@
-//! How well a film knows its image, tile by tile, judged by the variances that it has seen itself.
+//! Convergence of a film, tile by tile, estimated from the sample variances of its pixels.
 //!
-//! Stopping by such an estimate biases the image: a tile whose samples happened to miss what is bright there looks quiet, is stopped, and stays too dark.
-//! That is why nothing is judged before [`FIRST_CHECK`] samples, and why a tile goes on while any of its eight neighbours does not know enough: what
-//! is rare in one tile is likely to have been found in one of nine.
+//! Stopping by such an estimate biases the image: a tile whose samples happened to miss a bright feature has a low variance, is
+//! stopped, and stays too dark. That is why nothing is tested before [`FIRST_CHECK`] samples, and why a tile continues while any of its eight
+//! neighbours has not converged: a feature that is rare in one tile is likely to have been sampled in one of nine.
 
 use super::Film;
 use super::block::TILE;
 use super::state::tiles;
 
-/// Samples of a pixel before its variance is believed.
+/// Minimum number of samples per pixel before convergence is tested.
 pub const FIRST_CHECK: u32 = 64;
 
-/// The standard error of the mean of each tile: the root of the mean square over its pixels and channels.
+/// Standard error of each tile: the root mean square over its pixels and channels of the standard error of the mean.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TileErrors {
     size: [usize; 2],
     errors: Vec<f64>,
 }
 
-/// How many tiles know enough.
+/// Number of converged tiles.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
 pub struct TileCount {
-    /// Those that know enough.
+    /// Converged tiles.
     pub done: usize,
-    /// All.
+    /// All tiles.
     pub all: usize,
 }
 
 impl TileErrors {
-    /// Of a film. Pixels with fewer than two samples know nothing: their error is infinite.
+    /// Estimates the errors of a film. Pixels with fewer than two samples have an infinite error.
     pub fn of(film: &Film) -> Self {
         let size = tiles([film.width, film.height]);
         let mut sums = vec![(0.0, 0u32); size[0] * size[1]];
@@ -43,10 +43,9 @@ impl TileErrors {
         Self { size, errors: sums.into_iter().map(|(sum, n)| (sum / f64::from(n.max(1))).sqrt()).collect() }
     }
 
-    /// The tiles that do not know enough: those whose error, or that of one of their neighbours, is not at most `target`.
-    pub fn open(&self, target: f64) -> Vec<bool> {
+    /// For each tile, true if it has not converged: its error, or that of one of its eight neighbours, exceeds `target` or is NaN.
+    pub fn unconverged(&self, target: f64) -> Vec<bool> {
         let [width, height] = self.size;
-        // what is no number is not
         let enough = |x: usize, y: usize| self.errors[y * width + x] <= target;
         let around = |at: usize, n: usize| at.saturating_sub(1)..(at + 2).min(n);
         (0..width * height)
@@ -57,9 +56,9 @@ impl TileErrors {
             .collect()
     }
 
-    /// How many tiles [`TileErrors::open`] leaves out.
+    /// Number of tiles that have converged to `target`.
     pub fn count(&self, target: f64) -> TileCount {
-        TileCount { done: self.open(target).iter().filter(|open| !**open).count(), all: self.errors.len() }
+        TileCount { done: self.unconverged(target).iter().filter(|open| !**open).count(), all: self.errors.len() }
     }
 }
 
@@ -83,12 +82,12 @@ mod tests {
         let errors = TileErrors::of(&film);
         let expected = ((191.0 * 0.01 + 1.0) / 192.0f64).sqrt();
         assert!((errors.errors[0] - expected).abs() < 1e-6, "{}, expected {expected}", errors.errors[0]);
-        let open = errors.open(0.11);
+        let open = errors.unconverged(0.11);
         assert_eq!((0..15).filter(|&t| open[t]).collect::<Vec<_>>(), [0, 1, 5, 6]);
         // in the middle it would be nine
         film.variance[3 * (38 * 12 + 20)] = 64.0;
         assert_eq!(TileErrors::of(&film).count(0.11).done, 15 - 11);
-        // who knows nothing is not done
+        // pixels with fewer than two samples have not converged
         film.variance.fill(0.0);
         film.samples[0] = 1;
         assert_eq!(TileErrors::of(&film).count(1e9).done, 11);

@@ -1,25 +1,29 @@
-//! The film: sums per pixel on the device, means and variances on the host. What of it is put down and taken up again is in
-//! [`state`].
+//! The film: sums per pixel on the device, means and variances on the host. [`state`] has the exact sums that are saved to resume a
+//! render.
+//!
+//! A render is a number of *steps* ([`schedule`]): each brings some tiles of the image to a number of samples, and between two of them a render may end or be saved.
+//! A step goes over the image in *blocks* ([`block`]), as many pixels as device buffers hold; a block in batches of samples ([`accumulate`]); a batch in launches of at
+//! most so many rays that each takes about 0.05 s ([`pace`]). The image depends on none of these sizes.
 
 pub mod accumulate;
 pub mod block;
 pub mod camera;
 mod control;
 pub mod convergence;
-pub mod cover;
 pub mod pace;
 pub mod schedule;
 pub mod state;
+pub mod tile_mask;
 
 pub use control::{Control, NoControl};
 
 use crate::interface::records::film::{RgbFilmPixel, ScalarFilmPixel};
 
-/// Values of a pixel at most.
+/// Maximum number of channels of a film.
 pub const MAX_CHANNELS: usize = 3;
 
-/// 32-bit words of a pixel's record on the device: of each channel a sum and what it has too much, of each a sum of squares and what it has too
-/// much, then two counts. [`ScalarFilmPixel`] and [`RgbFilmPixel`] of one and of three.
+/// 32-bit words of a pixel's record on the device: for each channel a compensated sum (the sum and its excess, after Kahan), then for each
+/// channel a compensated sum of squares, then two counts. [`ScalarFilmPixel`] has one channel and [`RgbFilmPixel`] three.
 pub const fn record_words(channels: usize) -> usize {
     4 * channels + 2
 }
@@ -31,22 +35,22 @@ pub const fn record_bytes(channels: usize) -> u64 {
     4 * record_words(channels) as u64
 }
 
-/// A pixel's record as the device left it.
+/// A pixel's record, read back from the device.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct FilmPixel {
     /// Sum and sum of squares of each channel.
     sums: [[f64; 2]; MAX_CHANNELS],
-    /// Samples that met the scene.
+    /// Samples that hit geometry.
     pub covered: u32,
-    /// Samples that were left out because they were not finite.
+    /// Samples that were rejected because they were not finite.
     pub not_finite: u32,
 }
 
 impl FilmPixel {
-    /// From [`record_words`] words.
+    /// Decodes a record of [`record_words`] words.
     pub fn of(words: &[u32]) -> Self {
         let channels = (words.len() - 2) / 4;
-        // the compensation is what the sum has too much
+        // the compensation is the excess of the rounded sum
         let total = |k: usize| f64::from(f32::from_bits(words[k])) - f64::from(f32::from_bits(words[k + 1]));
         let mut sums = [[0.0; 2]; MAX_CHANNELS];
         for (c, s) in sums.iter_mut().enumerate().take(channels) {
@@ -69,7 +73,7 @@ impl FilmPixel {
         ((squares - sum * sum / n) / (n - 1.0)).max(0.0)
     }
 
-    /// Share of samples that met the scene.
+    /// Pixel alpha: share of samples that hit geometry, in [0, 1].
     pub fn coverage(&self, samples: u32) -> f64 {
         f64::from(self.covered) / f64::from(samples.max(1))
     }
@@ -78,21 +82,21 @@ impl FilmPixel {
 /// A finished film, rows from the top.
 #[derive(Clone, Debug, Default)]
 pub struct Film {
-    /// Pixels in x.
+    /// Width in pixels.
     pub width: u32,
-    /// Pixels in y.
+    /// Height in pixels.
     pub height: u32,
-    /// Values of a pixel: 1 (accessibility) or 3 (linear RGB radiance).
+    /// Number of channels: 1 (ambient visibility) or 3 (linear RGB radiance).
     pub channels: usize,
     /// Mean over all samples of a pixel, channels interleaved.
     pub mean: Vec<f32>,
-    /// Share of samples that met the scene.
+    /// Pixel alpha: share of samples that hit geometry, in [0, 1].
     pub coverage: Vec<f32>,
     /// Variance of one sample, channels interleaved.
     pub variance: Vec<f32>,
-    /// Samples taken.
+    /// Samples of each pixel that count.
     pub samples: Vec<u32>,
-    /// Samples of all pixels that were left out because they were not finite.
+    /// Samples of all pixels that were rejected because they were not finite.
     pub not_finite: u64,
 }
 
@@ -112,9 +116,9 @@ impl Film {
         }
     }
 
-    /// Puts a pixel of which `samples` were taken in its place.
+    /// Sets the pixel at `index`, of which `samples` were taken.
     pub fn set(&mut self, index: usize, pixel: &FilmPixel, samples: u32) {
-        // those that were left out were not taken
+        // rejected samples do not count
         let counted = samples - pixel.not_finite.min(samples);
         for c in 0..self.channels {
             self.mean[self.channels * index + c] = pixel.mean(c, counted) as f32;
@@ -135,21 +139,21 @@ impl Film {
         self.variance.iter().skip(channel).step_by(self.channels).copied().collect()
     }
 
-    /// Fewest and most samples of a pixel, and their mean.
+    /// Minimum, mean and maximum number of samples of a pixel.
     pub fn samples_range(&self) -> (u32, f64, u32) {
         let sum: u64 = self.samples.iter().map(|&n| u64::from(n)).sum();
         let least = self.samples.iter().copied().min().unwrap_or(0);
         (least, sum as f64 / self.samples.len().max(1) as f64, self.samples.iter().copied().max().unwrap_or(0))
     }
 
-    /// What the pixels' own variances say of the image's error: the root mean square, over pixels and channels, of the standard error of the
+    /// RMSE of the image, estimated from the variances of its pixels: the root mean square, over pixels and channels, of the standard error of the
     /// mean. Stratified sampling makes the true error smaller.
     pub fn estimated_rmse(&self) -> f64 {
         (self.summed_square_errors() / self.mean.len().max(1) as f64).sqrt()
     }
 
     /// Mean over all pixels and channels and its standard error, from the pixels' own variances. Stratified sampling makes the true error
-    /// smaller than that; that channels vary together, larger.
+    /// smaller than that; correlation between channels makes it larger.
     pub fn mean_and_error(&self) -> (f64, f64) {
         let n = self.mean.len().max(1) as f64;
         let mean = self.mean.iter().map(|&x| f64::from(x)).sum::<f64>() / n;

@@ -1,16 +1,16 @@
-//! How much work goes into one launch: no dispatch runs longer than about a tenth of a second, because drivers reset devices
-//! that do not answer and users want to cancel.
+//! Adapts the size of launches: no dispatch should run longer than about a tenth of a second, because drivers reset devices
+//! that do not respond and users want to cancel.
 
 use crate::gpu::Timing;
 
-/// Seconds that a launch should take.
+/// Target duration of a launch, seconds.
 const TARGET: f64 = 0.05;
-/// Rays of the first launch: it also compiles the shaders on drivers that do so late.
+/// Rays of the first launch. It is small because some drivers compile shaders at the first launch.
 const FIRST: u32 = 1 << 13;
-/// Rays of a launch at most: passes address their results from a launch's first ray on, so that the tracer must not divide it.
-pub const MOST: u32 = crate::tracer::stream::LAUNCH_RAYS;
+/// Maximum number of rays in a launch. Passes address results relative to a launch's first ray, so the tracer must not split launches.
+pub const MAX_RAYS: u32 = crate::tracer::stream::LAUNCH_RAYS;
 
-/// Finds the size of launches from the time that earlier ones took.
+/// Chooses the size of launches from the measured time of earlier ones.
 #[derive(Clone, Debug)]
 pub struct Pace {
     rays: u32,
@@ -29,21 +29,21 @@ impl Pace {
         self.rays
     }
 
-    /// Launches of this many rays that fit into one submission, so that the host is asked about ten times a second.
+    /// Number of launches in one submission, so that the host regains control about ten times a second.
     pub fn launches(&self) -> u32 {
         // a launch takes at most TARGET once the pace is found
-        if self.rays < MOST { 2 } else { 4 }
+        if self.rays < MAX_RAYS { 2 } else { 4 }
     }
 
     /// Learns from the longest region of a submission whose launches had at most `rays` rays.
     pub fn learn(&mut self, rays: u32, timings: &[Timing], wall: f64, launches: u32) {
         let longest = timings.iter().map(|t| t.seconds).fold(0.0, f64::max);
-        // without timestamps: all launches of the submission alike
+        // without timestamps, the wall time is divided evenly among the launches
         let seconds = if longest > 0.0 { longest } else { wall / launches.max(1) as f64 };
         let fit = rays as f64 * TARGET / seconds.max(1e-6);
         // the first launch may have compiled the shader: its time is an upper bound that says little
         let growth = if self.seen { 2.0 } else { 4.0 };
-        let next = fit.clamp(self.rays as f64 * 0.25, self.rays as f64 * growth).clamp(64.0 * 16.0, MOST as f64);
+        let next = fit.clamp(self.rays as f64 * 0.25, self.rays as f64 * growth).clamp(64.0 * 16.0, MAX_RAYS as f64);
         self.rays = (next as u32) & !63;
         self.seen = true;
     }
@@ -63,7 +63,7 @@ mod tests {
             }
             let seconds = pace.rays() as f64 / rate;
             assert!(seconds <= 0.06, "{rate}: {seconds}");
-            assert!(pace.rays() == MOST || seconds > 0.03, "{rate}: {seconds}");
+            assert!(pace.rays() == MAX_RAYS || seconds > 0.03, "{rate}: {seconds}");
             assert_eq!(pace.rays() % 64, 0);
         }
     }

@@ -1,5 +1,5 @@
-//! In which steps a film gets its samples: all at once, or with stops at which it is saved or judged. A step follows from the film alone,
-//! so a film that was put down between two steps goes on as it would have.
+//! Schedules the samples of a film: all at once, or in steps between which it is saved or tested for convergence. A step depends on the
+//! film alone, so a render that is saved and resumed between two steps takes the same samples as an uninterrupted one.
 
 use std::sync::Arc;
 
@@ -7,48 +7,48 @@ use super::Film;
 use super::convergence::{FIRST_CHECK, TileErrors};
 use super::state::FilmState;
 
-/// What a film starts from, where it stops on its way, and what is kept of it.
+/// Initial state of a film, its intermediate stops, and whether its sums are kept.
 #[derive(Clone, Debug, Default)]
 pub struct FilmOptions {
-    /// Go on from here, with the samples that come next. Size and channels must be those of the image.
+    /// Resume from this state with the next samples. Its size and channels must be those of the image.
     pub start: Option<Arc<FilmState>>,
-    /// Keep the film's sums.
+    /// Return the film's exact sums.
     pub keep_state: bool,
-    /// Numbers of samples per pixel at which [`crate::film::Control::interval`] gets the image, ascending.
+    /// Samples per pixel at which [`crate::film::Control::interval`] is called, ascending.
     pub intervals: Vec<u32>,
-    /// Take no more samples of tiles whose standard error is at most this (in the image's own units), judged at powers of two of samples from
-    /// [`FIRST_CHECK`] on. The plan's samples are then the most.
+    /// Stop sampling tiles whose standard error is at most this (in units of the image), tested at powers of two of samples from
+    /// [`FIRST_CHECK`] on. The plan's samples are then the maximum.
     pub target_rmse: Option<f64>,
 }
 
-/// What is done next.
+/// The next step of a film.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Step {
-    /// Samples that the tiles have afterwards.
+    /// Samples per pixel of the tiles after the step.
     pub goal: u32,
-    /// The tiles that get samples.
+    /// For each tile, whether it is sampled.
     pub tiles: Vec<bool>,
-    /// Samples to go at most, over all tiles, this step's included.
+    /// Upper bound on the remaining samples per pixel, summed over tiles, this step's included.
     pub left: u64,
 }
 
 impl FilmOptions {
-    /// Must the sums come to the host between steps, or at the end?
+    /// Must the sums be read back between steps or at the end?
     pub(crate) fn needs_state(&self) -> bool {
         self.start.is_some() || self.keep_state || !self.intervals.is_empty() || self.target_rmse.is_some()
     }
 
-    /// The next step, of a film whose tiles have so many samples, up to `spp`. `None`: it is finished.
+    /// The next step towards `spp` samples of a film whose tiles have `tile_samples` each; `None` if it is finished.
     pub(crate) fn next(&self, spp: u32, tile_samples: &[u32], film: &Film) -> Option<Step> {
         let below = |n: u32| n < spp;
         let mut tiles: Vec<bool> = tile_samples.iter().map(|&n| below(n)).collect();
         if let Some(target) = self.target_rmse {
-            // tiles between two checks are on their way: nothing is judged before they get to the next one, and if there are no samples
-            // left for that, nothing at all. So it does not matter where a film was put down meanwhile.
+            // a film saved between two checks first brings its tiles to the next check (or stops at `spp`), so that where it was saved
+            // does not change which tiles are tested
             if tile_samples.iter().any(|&n| !is_check(n)) {
                 tiles.iter_mut().zip(tile_samples).for_each(|(tile, &n)| *tile &= !is_check(n));
             } else if tiles.contains(&true) {
-                let open = TileErrors::of(film).open(target);
+                let open = TileErrors::of(film).unconverged(target);
                 tiles.iter_mut().zip(open).for_each(|(tile, open)| *tile &= open);
             }
         }
@@ -58,13 +58,13 @@ impl FilmOptions {
         let interval = self.intervals.iter().copied().find(|&n| n > least).unwrap_or(spp);
         let check = if self.target_rmse.is_some() { next_check(least) } else { spp };
         let goal = spp.min(interval).min(check);
-        // those that are further wait
+        // tiles with more samples wait
         tiles.iter_mut().zip(tile_samples).for_each(|(tile, &n)| *tile &= n < goal);
         Some(Step { goal, tiles, left })
     }
 }
 
-/// Is a tile with `n` samples judged?
+/// Is a tile with `n` samples tested for convergence?
 fn is_check(n: u32) -> bool {
     n >= FIRST_CHECK && n.is_power_of_two()
 }

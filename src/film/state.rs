@@ -1,26 +1,26 @@
-//! What a film knows, to the last bit: the sums of every pixel as the device keeps them, and how many samples are in them. A film that starts
-//! from it goes on as if it had never stopped.
+//! The exact state of a film: the sums of every pixel as the device stores them, and their sample counts. A render resumed from it is
+//! bit-identical to an uninterrupted one.
 
 use super::block::TILE;
 use super::{Film, FilmPixel, record_words};
 
-/// A film's sums. Samples are taken tile by tile, so all pixels of a tile have as many.
+/// The exact state of a film. Samples are taken tile by tile, so all pixels of a tile have the same number of samples.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FilmState {
     size: [u32; 2],
     channels: usize,
-    /// A record a pixel, rows from the top.
+    /// One record per pixel, rows from the top.
     words: Vec<u32>,
-    /// Samples taken of the pixels of each tile, rows from the top.
+    /// Samples per pixel of each tile, rows from the top.
     tile_samples: Vec<u32>,
 }
 
-/// What one word of every pixel's record is.
+/// Description of one word of a pixel's record.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Word {
-    /// Such as `sum.R`.
+    /// Name, such as `sum.R`.
     pub name: String,
-    /// The bits of a float; otherwise a count.
+    /// True for the bits of an `f32`, false for a count.
     pub float: bool,
 }
 
@@ -39,7 +39,7 @@ pub(crate) fn tiles(size: [u32; 2]) -> [usize; 2] {
 }
 
 impl FilmState {
-    /// Of a film that has nothing on it. `size` in pixels.
+    /// The state of an empty film. `size` in pixels.
     pub fn new(size: [u32; 2], channels: usize) -> Self {
         let [tiles_x, tiles_y] = tiles(size);
         Self {
@@ -51,7 +51,7 @@ impl FilmState {
     }
 
     /// From a plane of each word ([`words`]) and the samples taken of each pixel, rows from the top. `None` where the pixels of a tile have
-    /// different numbers of samples, or more samples were left out than taken: no film leaves that.
+    /// different numbers of samples, or more samples were rejected than taken: no film writes such a state.
     pub fn from_planes(size: [u32; 2], channels: usize, planes: &[Vec<u32>], samples: &[u32]) -> Option<Self> {
         let mut state = Self::new(size, channels);
         let record = record_words(channels);
@@ -67,7 +67,7 @@ impl FilmState {
                 return None;
             }
         }
-        // the first pixel of each tile, then all are held against it
+        // store the count of each tile's first pixel, then compare all pixels with it
         let tile_of = |index: usize| tile_of(size, index);
         for index in (0..pixels).rev() {
             state.tile_samples[tile_of(index)] = samples[index];
@@ -80,7 +80,7 @@ impl FilmState {
         self.size
     }
 
-    /// Values of a pixel.
+    /// Channels of a pixel.
     pub fn channels(&self) -> usize {
         self.channels
     }
@@ -90,19 +90,19 @@ impl FilmState {
         self.words.iter().skip(word).step_by(record_words(self.channels)).copied().collect()
     }
 
-    /// Samples taken of every pixel, those left out included; rows from the top.
+    /// Samples taken of every pixel, rejected ones included; rows from the top.
     pub fn samples_plane(&self) -> Vec<u32> {
         let pixels = self.words.len() / record_words(self.channels);
         (0..pixels).map(|index| self.tile_samples[tile_of(self.size, index)]).collect()
     }
 
-    /// Samples taken of the pixels of each tile, rows from the top.
+    /// Samples per pixel of each tile, rows from the top.
     pub fn tile_samples(&self) -> &[u32] {
         &self.tile_samples
     }
 
-    /// Most samples that any pixel has.
-    pub fn most_samples(&self) -> u32 {
+    /// Maximum number of samples of any pixel.
+    pub fn max_samples(&self) -> u32 {
         self.tile_samples.iter().copied().max().unwrap_or(0)
     }
 

@@ -10,51 +10,51 @@ use super::device::Device;
 use super::result::Context;
 use crate::error::{Error, Result};
 
-/// A structure is copied to its compact size when that saves at least this share.
-const COMPACTION_PAYS: f64 = 0.1;
+/// Minimum saving, as a fraction of the size, for which a structure is compacted.
+const MIN_COMPACTION_SAVING: f64 = 0.1;
 
-/// What a bottom-level structure is built over.
+/// Geometry of a bottom-level structure.
 pub enum BottomLevelInput<'a> {
     /// Indexed triangles: opaque ones first, alpha-tested ones behind them as a second geometry.
     Triangles {
-        /// 3 floats a vertex.
+        /// 3 floats per vertex.
         positions: &'a Buffer,
         /// Number of vertices.
         vertex_count: u32,
-        /// 3 uints a triangle.
+        /// 3 uints per triangle.
         indices: &'a Buffer,
-        /// Triangles that need no any-hit shader.
+        /// Number of opaque triangles, which come first.
         opaque: u32,
-        /// Triangles behind them that do.
+        /// Number of alpha-tested triangles, which follow and need an any-hit shader.
         alpha_tested: u32,
     },
     /// Boxes of 6 floats: procedural geometry, opaque.
     Boxes {
         /// `VkAabbPositionsKHR` each.
         boxes: &'a Buffer,
-        /// Their number.
+        /// Number of boxes.
         count: u32,
     },
 }
 
-/// An entry of the top level.
-pub struct TopLevelEntry {
-    /// Group to world, three rows.
+/// A TLAS instance, as VkAccelerationStructureInstanceKHR.
+pub struct AccelerationStructureInstance {
+    /// Object to world, three rows.
     pub transform: [f32; 12],
-    /// What shaders see as the custom index; below 2^24.
+    /// Custom index (gl_InstanceCustomIndexEXT), below 2^24.
     pub index: u32,
-    /// First hit group.
+    /// Offset of its hit group in the shader binding table.
     pub hit_group: u32,
-    /// Address of the bottom level ([`AccelerationStructure::address`]).
+    /// Device address of its bottom-level structure ([`AccelerationStructure::address`]).
     pub bottom_level: u64,
 }
 
-/// How a structure is brought up to date with inputs that have changed in place.
+/// How a structure is updated after its inputs have changed in place.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Update {
-    /// Its boxes are made anew, its tree stays.
+    /// The bounding boxes are recomputed, the tree is kept.
     Refit,
-    /// All is made anew.
+    /// The structure is built from scratch.
     Rebuild,
 }
 
@@ -84,8 +84,8 @@ impl AccelerationStructure {
         Ok(Self { raw, address, buffer, device: device.clone() })
     }
 
-    /// Builds one bottom level, compacted where that pays (on lavapipe it never does; it is asked there too, so that the
-    /// software driver tests the path).
+    /// Builds a bottom-level structure, and compacts it if that saves memory. On lavapipe it never does, but the query runs there too, so
+    /// that tests cover it.
     pub fn bottom_level(device: &Arc<Device>, commands: &mut Commands, name: &str, input: &BottomLevelInput) -> Result<Self> {
         let (geometries, ranges) = bottom_level_geometry(input);
         let flags = vk::BuildAccelerationStructureFlagsKHR::PREFER_FAST_TRACE
@@ -94,7 +94,8 @@ impl AccelerationStructure {
         inputs.build(device, commands, name)?.compacted(commands, name)
     }
 
-    /// As [`AccelerationStructure::bottom_level`], for inputs that will change: not compacted, so that there is room to build it anew.
+    /// As [`AccelerationStructure::bottom_level`], for inputs that will change: it can be updated, and is not compacted, so that a
+    /// rebuild fits.
     pub fn changing_bottom_level(
         device: &Arc<Device>,
         commands: &mut Commands,
@@ -104,30 +105,30 @@ impl AccelerationStructure {
         Inputs::changing(input).build(device, commands, name)
     }
 
-    /// Brings a structure made by [`AccelerationStructure::changing_bottom_level`] up to date. The input must be the same but
-    /// for where its vertices are. Its address stays.
+    /// Updates a structure made by [`AccelerationStructure::changing_bottom_level`]. Only the vertex positions of the input may
+    /// differ. The address stays valid.
     pub fn update(&self, commands: &mut Commands, input: &BottomLevelInput, update: Update) -> Result<()> {
         Inputs::changing(input).record(self, commands, update)
     }
 
     /// Builds a top level.
-    pub fn top_level(device: &Arc<Device>, commands: &mut Commands, entries: &[TopLevelEntry]) -> Result<Self> {
+    pub fn top_level(device: &Arc<Device>, commands: &mut Commands, entries: &[AccelerationStructureInstance]) -> Result<Self> {
         let records = entry_records(device, entries)?;
         Inputs::top_level(&records, entries.len()).build(device, commands, "top level")
     }
 
-    /// Builds a top level anew, where it lies, for as many entries as before. Its address stays.
-    pub fn rebuild_top_level(&self, commands: &mut Commands, entries: &[TopLevelEntry]) -> Result<()> {
+    /// Rebuilds a top level in place, for as many instances as before. The address stays valid.
+    pub fn rebuild_top_level(&self, commands: &mut Commands, entries: &[AccelerationStructureInstance]) -> Result<()> {
         let records = entry_records(&self.device, entries)?;
         Inputs::top_level(&records, entries.len()).record(self, commands, Update::Rebuild)
     }
 
-    /// What shaders and top-level entries refer to it by.
+    /// Device address, by which shaders and TLAS instances refer to it.
     pub fn address(&self) -> u64 {
         self.address
     }
 
-    /// Bytes it takes.
+    /// Size in bytes.
     pub fn size(&self) -> u64 {
         self.buffer.size()
     }
@@ -159,7 +160,7 @@ impl AccelerationStructure {
             read?;
             size[0]
         };
-        if size == 0 || size as f64 > (1.0 - COMPACTION_PAYS) * self.size() as f64 {
+        if size == 0 || size as f64 > (1.0 - MIN_COMPACTION_SAVING) * self.size() as f64 {
             return Ok(self);
         }
         let compact = Self::allocate(&self.device, name, vk::AccelerationStructureTypeKHR::BOTTOM_LEVEL, size)?;
@@ -222,11 +223,11 @@ fn bottom_level_geometry<'a>(input: &BottomLevelInput) -> (Vec<Geometry<'a>>, Ve
     }
 }
 
-/// The top level's input in memory that the device reads.
-fn entry_records(device: &Arc<Device>, entries: &[TopLevelEntry]) -> Result<Buffer> {
+/// The instances of a top level in a buffer, as VkAccelerationStructureInstanceKHR.
+fn entry_records(device: &Arc<Device>, entries: &[AccelerationStructureInstance]) -> Result<Buffer> {
     if entries.len() >= 1 << 24 {
         return Err(Error::Scene(format!(
-            "{} instances: Vulkan's top level numbers at most 2^24; use --tracer compute",
+            "{} instances are more than the 2^24 of a Vulkan top-level structure; use --tracer compute",
             entries.len()
         )));
     }
@@ -298,7 +299,7 @@ impl<'a> Inputs<'a> {
         Ok(structure)
     }
 
-    /// Builds into `target`, which has the size for it, and waits.
+    /// Builds into `target`, which must be large enough, and waits.
     fn record(&self, target: &AccelerationStructure, commands: &mut Commands, update: Update) -> Result<()> {
         let device = &target.device;
         let functions = functions(device)?;

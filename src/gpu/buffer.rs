@@ -11,10 +11,10 @@ use super::device::Device;
 use super::result::Context;
 use crate::error::{Error, Result};
 
-/// Who reads and writes a buffer.
+/// How host and device access a buffer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Memory {
-    /// The device; the host fills it through [`Buffer::fill`] and changes it through [`Buffer::write`].
+    /// Only the device accesses it; the host uploads through [`Buffer::fill`] and [`Buffer::write`].
     Device,
     /// The host writes, the device reads.
     Upload,
@@ -22,7 +22,7 @@ pub enum Memory {
     Readback,
 }
 
-/// Bytes that go through a staging buffer at a time, where the host cannot write device memory.
+/// Size of the staging buffer in bytes, where the host cannot access device memory.
 const STAGING: u64 = 32 << 20;
 
 /// A buffer that shaders reach by its address.
@@ -117,30 +117,30 @@ impl Buffer {
         Self::new(&self.device, name, self.size, memory)
     }
 
-    /// Where shaders find it.
+    /// Device address.
     pub fn address(&self) -> u64 {
         self.address
     }
 
-    /// Its size in bytes.
+    /// Size in bytes.
     pub fn size(&self) -> u64 {
         self.size
     }
 
-    /// The bytes, where the host can see them (always for [`Memory::Upload`] and [`Memory::Readback`]). The device must not
-    /// be using the buffer: every submission of this layer is waited for, so it is not.
+    /// The contents, if mapped (always for [`Memory::Upload`] and [`Memory::Readback`]). The device is not using the buffer
+    /// meanwhile, because every submission is waited for.
     pub fn bytes(&self) -> Option<&[u8]> {
         self.allocation.as_ref().and_then(|a| a.mapped_slice()).map(|s| &s[..self.size as usize])
     }
 
-    /// The bytes for writing; see [`Buffer::bytes`].
+    /// The contents for writing, if mapped; see [`Buffer::bytes`].
     pub fn bytes_mut(&mut self) -> Option<&mut [u8]> {
         let size = self.size as usize;
         self.allocation.as_mut().and_then(|a| a.mapped_slice_mut()).map(|s| &mut s[..size])
     }
 
-    /// Fills the first `size` bytes with records of `record` bytes: `write(first record, bytes)` is called with consecutive
-    /// pieces, each a whole number of records. Where the host sees the memory there is one piece and no copy.
+    /// Fills the first `size` bytes with records of `record` bytes: `write(index of the first record, bytes)` is called for consecutive
+    /// chunks, each a whole number of records. Mapped memory is one chunk, without a copy.
     pub fn fill(&mut self, size: u64, record: u64, mut write: impl FnMut(u64, &mut [u8])) -> Result<()> {
         debug_assert!(size <= self.size && size.is_multiple_of(record.max(1)));
         if size == 0 {
@@ -164,7 +164,7 @@ impl Buffer {
         Ok(())
     }
 
-    /// Overwrites bytes from `offset` on, through a staging buffer where the host cannot see the memory.
+    /// Overwrites bytes from `offset` on, through a staging buffer if the memory is not mapped.
     pub fn write(&mut self, offset: u64, data: &[u8]) -> Result<()> {
         debug_assert!(offset + data.len() as u64 <= self.size);
         if data.is_empty() {
@@ -184,7 +184,7 @@ impl Buffer {
         Ok(())
     }
 
-    /// Takes the contents of another buffer that is no larger.
+    /// Copies the contents of another buffer, which must not be larger.
     pub fn copy_from(&mut self, other: &Buffer) -> Result<()> {
         let size = other.size;
         if let (Some(from), Some(to)) = (other.bytes(), self.bytes_mut()) {
@@ -195,14 +195,14 @@ impl Buffer {
         Commands::new(&device)?.run(|r| r.copy(other, 0, self, 0, size)).map(drop)
     }
 
-    /// Reads `size` bytes from `offset`, through a staging buffer where the host cannot see the memory.
+    /// Reads `size` bytes from `offset`, through a staging buffer if the memory is not mapped.
     pub fn read(&self, offset: u64, size: u64) -> Result<Vec<u8>> {
         let mut out = Vec::with_capacity(size as usize);
         self.read_with(offset, size, 1, |_, bytes| out.extend_from_slice(bytes))?;
         Ok(out)
     }
 
-    /// As [`Buffer::read`], in pieces of whole records: `take(first record, bytes)`. Without a copy where there is no need.
+    /// As [`Buffer::read`], in chunks of whole records: `take(index of the first record, bytes)`. Mapped memory is not copied.
     pub fn read_with(&self, offset: u64, size: u64, record: u64, mut take: impl FnMut(u64, &[u8])) -> Result<()> {
         if size == 0 {
             return Ok(());

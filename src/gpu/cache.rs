@@ -1,4 +1,4 @@
-//! The pipeline cache on disk: one file per device and driver version, written beside and renamed, ignored when foreign.
+//! The pipeline cache on disk: one file per device and driver version, replaced atomically, and ignored when it is another device's.
 
 use std::io::Write;
 use std::path::PathBuf;
@@ -9,7 +9,7 @@ use crate::files;
 fn file(info: &DeviceInfo) -> Option<PathBuf> {
     let uuid: String = info.pipeline_cache_uuid.iter().map(|b| format!("{b:02x}")).collect();
     files::cache_folder().map(|f| {
-        // the width of a CPU driver's vectors is no part of what Vulkan calls the same device; lanes are that width by 32 bits
+        // Vulkan's device identity does not include a CPU driver's vector width; the subgroup size is that width over 32 bits
         let lanes = info.limits.subgroup_size;
         f.join(format!(
             "pipelines-{:04x}-{:04x}-{:08x}-{lanes}-{uuid}.bin",
@@ -18,7 +18,7 @@ fn file(info: &DeviceInfo) -> Option<PathBuf> {
     })
 }
 
-/// Is this the header that Vulkan prescribes (VkPipelineCacheHeaderVersionOne), for this very device?
+/// Whether the data begins with a VkPipelineCacheHeaderVersionOne of this device.
 fn fits(info: &DeviceInfo, data: &[u8]) -> bool {
     let word = |k: usize| data.get(4 * k..4 * k + 4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
     word(0).is_some_and(|n| n >= 32)
@@ -28,19 +28,19 @@ fn fits(info: &DeviceInfo, data: &[u8]) -> bool {
         && data.get(16..32) == Some(&info.pipeline_cache_uuid[..])
 }
 
-/// What an earlier run stored for this device and driver, or nothing.
+/// The cache data that an earlier run stored for this device and driver; empty if there is none.
 pub fn load(info: &DeviceInfo) -> Vec<u8> {
     file(info).and_then(|f| std::fs::read(f).ok()).filter(|d| fits(info, d)).unwrap_or_default()
 }
 
-/// Stores the cache. Failing costs the next run some time, no more.
+/// Stores the cache. A failure is ignored: it only costs the next run time.
 pub fn store(info: &DeviceInfo, data: &[u8]) {
     let Some(path) = file(info) else { return };
     if !fits(info, data) || std::fs::read(&path).is_ok_and(|old| old == data) {
         return;
     }
     let Some(folder) = path.parent() else { return };
-    // not worth a warning: a folder that cannot be written to is as good as no cache
+    // no warning: without a writable folder there is no cache
     let write = || files::write_atomically(&path, |file| file.write_all(data));
     if std::fs::create_dir_all(folder).is_ok() {
         let _ = write();

@@ -10,22 +10,22 @@ use super::pipeline::{ComputePipeline, RayTracingPipeline};
 use super::result::Context;
 use crate::error::Result;
 
-/// Work-groups along y and z that every device takes (Vulkan 1.3, Required Limits).
+/// Maximum number of work-groups along y and z on every device (Vulkan 1.3, Required Limits).
 const MAX_WORKGROUPS: u32 = 65_535;
 
-/// Timed regions that one submission can hold.
+/// Maximum number of timed regions in one submission.
 const MAX_REGIONS: u32 = 512;
 
-/// Device time of a region.
+/// Device time of a timed region.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Timing {
-    /// What was timed.
+    /// Name of the region.
     pub label: &'static str,
     /// Seconds between its first and last command.
     pub seconds: f64,
 }
 
-/// A command buffer that is recorded, submitted and waited for, again and again.
+/// A command buffer that is recorded, submitted and waited for repeatedly.
 pub struct Commands {
     pool: vk::CommandPool,
     buffer: vk::CommandBuffer,
@@ -132,7 +132,7 @@ pub struct Recorder<'a> {
     pub(super) buffer: vk::CommandBuffer,
     queries: Option<vk::QueryPool>,
     labels: Vec<&'static str>,
-    // something was drawn
+    // a draw was recorded
     pub(super) drew: bool,
 }
 
@@ -148,7 +148,7 @@ impl Recorder<'_> {
         };
         stamp(vk::PipelineStageFlags2::ALL_COMMANDS, 0);
         if self.drew {
-            // once they have drawn, CPU drivers put a stamp off until something makes them wait
+            // after draws, CPU drivers delay a timestamp until a barrier forces them to wait
             self.barrier();
         }
         record(self);
@@ -157,8 +157,8 @@ impl Recorder<'_> {
         unsafe { device.raw.cmd_write_timestamp2(buffer, vk::PipelineStageFlags2::ALL_COMMANDS, queries, 2 * region + 1) };
     }
 
-    /// Everything recorded before is finished, and its writes visible, before anything recorded after. One full barrier
-    /// between passes costs microseconds; a missing one costs days.
+    /// A full memory barrier: commands recorded before it finish, and their writes are visible, before commands recorded after it
+    /// start. It costs microseconds, so passes use it rather than finer barriers.
     pub fn barrier(&mut self) {
         let stages = vk::PipelineStageFlags2::ALL_COMMANDS;
         self.memory_barrier(
@@ -171,7 +171,7 @@ impl Recorder<'_> {
 
     fn final_barrier(&mut self) {
         let all = vk::PipelineStageFlags2::ALL_COMMANDS;
-        // a fence makes writes available; visible they are to whom a barrier names
+        // a fence makes writes available, but only a barrier makes them visible to the host
         self.memory_barrier(
             all,
             vk::AccessFlags2::MEMORY_WRITE,
@@ -204,8 +204,8 @@ impl Recorder<'_> {
         unsafe { self.device.raw.cmd_copy_buffer(self.buffer, from.raw, to.raw, &region) };
     }
 
-    /// Writes a few bytes at the beginning of a buffer when the device gets here: what is recorded later does not change them. Sizes are
-    /// multiples of 4, up to 64 KiB.
+    /// Writes a value to the beginning of a buffer when the device executes this command (vkCmdUpdateBuffer). Its size must be a
+    /// multiple of 4, up to 64 KiB.
     pub fn update<T: bytemuck::NoUninit>(&mut self, buffer: &Buffer, value: &T) {
         let bytes = bytemuck::bytes_of(value);
         assert!(bytes.len().is_multiple_of(4) && bytes.len() <= 1 << 16 && bytes.len() as u64 <= buffer.size());
@@ -218,20 +218,20 @@ impl Recorder<'_> {
         self.fill(buffer, buffer.size(), 0);
     }
 
-    /// Sets the first `size` bytes, a multiple of 4 and not none, to a repeated word.
+    /// Sets the first `size` bytes, a multiple of 4 above 0, to a repeated word.
     pub fn fill(&mut self, buffer: &Buffer, size: u64, word: u32) {
         assert!(size > 0 && size.is_multiple_of(4) && size <= buffer.size());
         // SAFETY: the range lies within the buffer
         unsafe { self.device.raw.cmd_fill_buffer(self.buffer, buffer.raw, 0, size, word) };
     }
 
-    /// Runs a compute pipeline over `groups` work-groups. The addresses within `push` must lead to living buffers of the
-    /// layout that the shader expects.
+    /// Dispatches a compute pipeline over `groups` work-groups. The addresses in `push` must be those of live buffers with the layout
+    /// that the shader expects.
     pub fn dispatch<P: bytemuck::NoUninit>(&mut self, pipeline: &ComputePipeline, push: &P, groups: u32) {
         self.dispatch_3d(pipeline, push, [groups, 1, 1]);
     }
 
-    /// The same over so many work-groups along x, y and z.
+    /// As [`Recorder::dispatch`], over work-groups along x, y and z.
     pub fn dispatch_3d<P: bytemuck::NoUninit>(&mut self, pipeline: &ComputePipeline, push: &P, [x, y, z]: [u32; 3]) {
         assert!(x <= self.device.info.limits.max_workgroups_x && y.max(z) <= MAX_WORKGROUPS);
         // SAFETY: recording state; the push constants have the size that the layout was made with (asserted there)
@@ -242,7 +242,7 @@ impl Recorder<'_> {
         }
     }
 
-    /// Runs a ray-tracing pipeline over `rays` invocations; see [`Recorder::dispatch`] for `push`.
+    /// Traces with a ray-tracing pipeline over `rays` invocations; see [`Recorder::dispatch`] for `push`.
     pub fn trace_rays<P: bytemuck::NoUninit>(&mut self, pipeline: &RayTracingPipeline, push: &P, rays: u32) {
         let (Some(functions), Some(table)) = (&self.device.pipelines, pipeline.table()) else { return };
         // SAFETY: as above; the tables were made for this pipeline

@@ -14,26 +14,26 @@ use super::pipeline::LivePipelines;
 use super::result::Context;
 use crate::error::{Error, Result};
 
-/// How to open a device.
+/// Options to open a device with.
 #[derive(Clone, Debug, Default)]
 pub struct Options {
     /// Index, or part of the name (case does not matter); `None`: the most capable.
     pub device: Option<String>,
-    /// Run with the validation layer.
+    /// Enable the validation layer.
     pub validation: bool,
-    /// Use 32-bit loads even where shaderInt64 is there: to test that path.
+    /// Use 32-bit loads even if shaderInt64 is available, to test them.
     pub no_int64: bool,
-    /// How many of the pipelines that were made last stay compiled though nobody has them any more: for processes that render many scenes with one device,
-    /// which is then never closed. A CPU driver's take megabytes each.
+    /// Number of recently compiled pipelines that are kept though unused: for processes that render many scenes with one device,
+    /// which is then never closed. A CPU driver's pipelines take megabytes each.
     pub keep_pipelines: usize,
 }
 
 /// An open device.
 pub struct Device {
     pub(super) raw: ash::Device,
-    /// Functions of VK_KHR_acceleration_structure, where a tracer can use them.
+    /// Functions of VK_KHR_acceleration_structure, if a hardware tracer is supported.
     pub(super) structures: Option<khr::acceleration_structure::Device>,
-    /// Functions of VK_KHR_ray_tracing_pipeline, likewise.
+    /// Functions of VK_KHR_ray_tracing_pipeline, if supported.
     pub(super) pipelines: Option<khr::ray_tracing_pipeline::Device>,
     debug: Option<ext::debug_utils::Device>,
     allocator: ManuallyDrop<Mutex<Allocator>>,
@@ -41,10 +41,10 @@ pub struct Device {
     pub(super) queue_family: u32,
     pub(super) pipeline_cache: vk::PipelineCache,
     pub(super) live: LivePipelines,
-    /// What the device is and can do. `int64` says what is used, not only what is there.
+    /// Properties of the device. `int64` is false with [`Options::no_int64`], even if supported.
     pub info: DeviceInfo,
     validation: Option<Arc<ValidationLog>>,
-    // destroyed last
+    // dropped last
     _instance: Arc<Instance>,
 }
 
@@ -52,7 +52,7 @@ impl Device {
     /// Opens the device that `options` name, or the most capable one.
     ///
     /// # Errors
-    /// [`Error::Device`] when there is none, it is not found, or it is below the floor; the text names the feature.
+    /// [`Error::Device`] when there is no device, none matches, or it lacks a required feature; the message names it.
     pub fn open(options: &Options) -> Result<Arc<Self>> {
         let instance = Instance::new(options.validation)?;
         let mut info = pick(enumerate(&instance)?, options.device.as_deref())?;
@@ -92,9 +92,9 @@ impl Device {
             create = create.push_next(&mut f_query);
         }
         create = create.enabled_extension_names(&extensions);
-        // SAFETY: the physical device is of this instance; everything enabled was reported as there
+        // SAFETY: the physical device is of this instance; everything enabled was reported as supported
         let raw = unsafe { instance.raw.create_device(info.physical, &create, None) }.context("opening the Vulkan device")?;
-        // SAFETY: the family was asked for above with one queue
+        // SAFETY: the device was created with one queue of this family
         let queue = unsafe { raw.get_device_queue(queue_family, 0) };
         let allocator = Allocator::new(&AllocatorCreateDesc {
             instance: instance.raw.clone(),
@@ -102,7 +102,7 @@ impl Device {
             physical_device: info.physical,
             debug_settings: Default::default(),
             buffer_device_address: true,
-            // buffers above a block get their own allocation: small blocks waste little
+            // larger buffers get an allocation of their own, so small blocks waste little
             allocation_sizes: AllocationSizes::new(16 << 20, 16 << 20),
         })
         .map_err(|e| Error::Vulkan(format!("creating the allocator failed: {e}")))?;
@@ -127,7 +127,7 @@ impl Device {
     }
 
     pub(super) fn allocator(&self) -> MutexGuard<'_, Allocator> {
-        // a poisoned lock means that a thread panicked within the allocator: its state is what it is
+        // a poisoned lock means that a thread panicked within the allocator; there is nothing better to do than go on
         self.allocator.lock().unwrap_or_else(|e| e.into_inner())
     }
 
@@ -147,7 +147,7 @@ impl Device {
         self.validation.as_ref().map(|v| v.take()).unwrap_or_default()
     }
 
-    /// Fails when the validation layer had something to say.
+    /// Fails if the validation layer has reported a message.
     pub fn check_validation(&self) -> Result<()> {
         match self.validation_messages().as_slice() {
             [] => Ok(()),
@@ -155,7 +155,7 @@ impl Device {
         }
     }
 
-    /// Writes the pipeline cache to disk, for the next run. Not being able to costs time only.
+    /// Writes the pipeline cache to disk for the next run. A failure is ignored.
     pub fn save_pipeline_cache(&self) {
         // SAFETY: the cache is of this device
         if let Ok(data) = unsafe { self.raw.get_pipeline_cache_data(self.pipeline_cache) } {
@@ -177,11 +177,11 @@ fn pick(devices: Vec<DeviceInfo>, wanted: Option<&str>) -> Result<DeviceInfo> {
         },
     };
     let Some(info) = found else {
-        return Err(Error::Device(format!("no device '{}' here; there is {}", wanted.unwrap_or_default(), names())));
+        return Err(Error::Device(format!("no device matches '{}'; available: {}", wanted.unwrap_or_default(), names())));
     };
     if !info.missing_floor.is_empty() {
         return Err(Error::Device(format!(
-            "device '{}' lacks {}, which skylit needs; `skylit doctor` lists what is there",
+            "device '{}' lacks {}, which skylit needs; `skylit doctor` lists the devices",
             info.name,
             info.missing_floor.join(", ")
         )));

@@ -1,4 +1,4 @@
-//! Recording of draws.
+//! Recording of draw commands.
 
 use std::ops::Range;
 
@@ -10,12 +10,12 @@ use super::device::Device;
 use super::graphics_pipeline::{DRAW_STAGES, GraphicsPipeline};
 use super::image::{Image, Targets, range};
 
-/// A viewport is larger than the image by at most this factor.
-const MAX_WIDE: f32 = 8.0;
+/// Maximum size of the viewport relative to the image.
+const MAX_VIEWPORT_FACTOR: f32 = 8.0;
 
 impl Device {
-    /// By how much the viewport is larger than an image of `size` pixels, whose centre it shares: its clip space reaches so much farther than
-    /// the image. Drivers that clip at the viewport and not at a guard band, those for CPUs, are slow at it.
+    /// Size of the viewport relative to an image of `size` pixels, with which it shares its centre: clip space extends beyond the image by
+    /// this factor. CPU drivers clip at the viewport, having no guard band, and are slow at it: a larger viewport avoids that.
     pub fn viewport_factor(&self, size: [u32; 2]) -> f32 {
         let limits = &self.info.limits;
         let most = size.map(|n| {
@@ -23,20 +23,20 @@ impl Device {
             let reach = (limits.viewport_range[1] - 0.5 * n).min(0.5 * n - limits.viewport_range[0]);
             (limits.max_viewport_side / n).min(2.0 * reach / n)
         });
-        most[0].min(most[1]).min(MAX_WIDE).floor().max(1.0)
+        most[0].min(most[1]).min(MAX_VIEWPORT_FACTOR).floor().max(1.0)
     }
 }
 
 /// Records draws into targets; made by [`Recorder::draw_into`].
-pub struct Drawing<'r, 'd> {
+pub struct DrawRecorder<'r, 'd> {
     recorder: &'r mut Recorder<'d>,
     bound: Option<vk::PipelineLayout>,
 }
 
 impl<'d> Recorder<'d> {
     /// Clears the upper left `size` pixels of the targets to zero and draws there. Clip space is [`Device::viewport_factor`] times as large
-    /// as the image. What the targets held before is lost.
-    pub fn draw_into(&mut self, targets: &Targets, size: [u32; 2], record: impl FnOnce(&mut Drawing<'_, 'd>)) {
+    /// as the image. The previous contents of the targets are discarded.
+    pub fn draw_into(&mut self, targets: &Targets, size: [u32; 2], record: impl FnOnce(&mut DrawRecorder<'_, 'd>)) {
         assert!(size[0] <= targets.size()[0] && size[1] <= targets.size()[1]);
         self.transition(
             &targets.ids,
@@ -74,13 +74,13 @@ impl<'d> Recorder<'d> {
             raw.cmd_set_viewport(buffer, 0, &[viewport]);
             raw.cmd_set_scissor(buffer, 0, &[area]);
         }
-        record(&mut Drawing { recorder: self, bound: None });
+        record(&mut DrawRecorder { recorder: self, bound: None });
         self.drew = true;
         // SAFETY: begun above
         unsafe { self.device.raw.cmd_end_rendering(self.buffer) };
     }
 
-    /// Copies what was drawn, the upper left `size` pixels, to a buffer: two words a pixel, row by row, nothing between rows.
+    /// Copies the ids of the upper left `size` pixels to a buffer: two words per pixel, rows without padding.
     pub fn copy_ids(&mut self, targets: &Targets, size: [u32; 2], to: &Buffer) {
         assert!(8 * size[0] as u64 * size[1] as u64 <= to.size());
         self.transition(
@@ -101,7 +101,7 @@ impl<'d> Recorder<'d> {
         unsafe { self.device.raw.cmd_copy_image_to_buffer(self.buffer, targets.ids.raw, layout, to.raw, &region) };
     }
 
-    /// As [`Recorder::barrier`], and the image gets another layout.
+    /// As [`Recorder::barrier`], with a layout transition of an image.
     fn transition(&mut self, image: &Image, aspect: vk::ImageAspectFlags, [from, to]: [vk::ImageLayout; 2]) {
         let all = vk::PipelineStageFlags2::ALL_COMMANDS;
         let barrier = [vk::ImageMemoryBarrier2::default()
@@ -115,15 +115,15 @@ impl<'d> Recorder<'d> {
             .dst_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
             .image(image.raw)
             .subresource_range(range(aspect))];
-        // SAFETY: recording state, outside of a rendering
+        // SAFETY: recording state, outside of a render pass instance
         unsafe {
             self.device.raw.cmd_pipeline_barrier2(self.buffer, &vk::DependencyInfo::default().image_memory_barriers(&barrier))
         };
     }
 }
 
-impl Drawing<'_, '_> {
-    /// Says what the next draws are made with.
+impl DrawRecorder<'_, '_> {
+    /// Binds the pipeline of the next draws.
     pub fn bind(&mut self, pipeline: &GraphicsPipeline) {
         let (raw, buffer) = (&self.recorder.device.raw, self.recorder.buffer);
         // SAFETY: recording state; the pipeline was made for these targets
@@ -131,15 +131,15 @@ impl Drawing<'_, '_> {
         self.bound = Some(pipeline.layout);
     }
 
-    /// Sets what the shaders of the next draws see. The addresses within `push` must lead to living buffers of the layout that they
-    /// expect. To be called after [`Drawing::bind`].
+    /// Sets the push constants of the next draws. The addresses in `push` must be those of live buffers with the layout that the shaders
+    /// expect. To be called after [`DrawRecorder::bind`].
     pub fn push<P: bytemuck::NoUninit>(&mut self, push: &P) {
         if let Some(layout) = self.bound {
             self.recorder.push(layout, DRAW_STAGES, push);
         }
     }
 
-    /// Draws triangles from consecutive vertices, once for each of the instances. To be called after [`Drawing::push`].
+    /// Draws triangles from consecutive vertices, once per instance. To be called after [`DrawRecorder::push`].
     pub fn draw(&mut self, vertices: Range<u32>, instances: Range<u32>) {
         if self.bound.is_none() || vertices.is_empty() || instances.is_empty() {
             return;

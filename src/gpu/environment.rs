@@ -1,11 +1,11 @@
-//! What CPU drivers read from the environment, set right before the first of them is loaded.
+//! Environment variables of CPU drivers, set right before the Vulkan loader loads a driver.
 //!
-//! Mesa's lavapipe has vectors of 256 bits unless `LP_NATIVE_VECTOR_WIDTH` says otherwise. With 512, where the CPU has them, the compute tracer is a quarter to
-//! two fifths faster (docs/traversal.md). So whoever opens a device first in a process, be it the program, a test or another program that uses this crate, gets
-//! the CPU's widest vectors; a width that the user has set stays.
+//! Mesa's lavapipe uses vectors of 256 bits unless `LP_NATIVE_VECTOR_WIDTH` sets another width. With 512, where the CPU supports it, the compute tracer is a quarter to
+//! two fifths faster (docs/traversal.md). So the first device that a process opens, in skylit itself, in a test or in another program that uses this crate, sets
+//! the CPU's widest vectors, unless the user has set a width.
 //!
-//! Mesa's cache of compiled shaders does not tell widths apart, and code for one gives wrong results with another. So a width that is not the driver's own choice
-//! has a folder of its own, and the pipeline cache has the width in its files' names (`cache.rs`).
+//! Mesa's shader cache does not distinguish widths, and code for one width gives wrong results with another. So a width other than the driver's default
+//! has its own cache folder, and the file names of the pipeline cache contain the width (`cache.rs`).
 
 use std::ffi::{OsStr, OsString};
 use std::path::PathBuf;
@@ -15,20 +15,19 @@ use std::sync::atomic::{AtomicU32, Ordering};
 const WIDTH: &str = "LP_NATIVE_VECTOR_WIDTH";
 const CACHE: &str = "MESA_SHADER_CACHE_DIR";
 
-/// Bits; 0: the CPU's widest.
+/// Preferred vector width in bits; 0 for the CPU's widest.
 static PREFERRED: AtomicU32 = AtomicU32::new(0);
 
-/// Has lavapipe use vectors of so many bits (128, 256 or 512) in place of the CPU's widest, in this process. Mesa draws with 256 at most. It counts for nothing
-/// where the user has set `LP_NATIVE_VECTOR_WIDTH`, and once a device has been opened or listed: a driver keeps the width with which it was loaded.
+/// Sets the vector width of lavapipe in this process: 128, 256 or 512 bits in place of the CPU's widest. Mesa can rasterize with at most 256. It has no
+/// effect if the user has set `LP_NATIVE_VECTOR_WIDTH`, nor after a device has been opened or listed: a driver keeps the width with which it was loaded.
 pub fn prefer_vector_bits(bits: u32) {
     PREFERRED.store(bits, Ordering::Relaxed);
 }
 
-/// To be called before the Vulkan loader is opened: sets, once in a process, what the drivers that it loads will read.
+/// Sets the variables, once per process. To be called before the Vulkan loader is opened.
 ///
-/// The environment belongs to the process. Rust's own reads and writes of it exclude each other (std has a lock), but C code that calls `getenv` in another
-/// thread meanwhile is not excluded: a program that has such threads opens its first device before they start, or sets both variables itself, and then nothing
-/// is changed here.
+/// std locks the environment for reads and writes by Rust code, but not for `getenv` in C code on another thread. A program that has such threads must open
+/// its first device before they start, or set both variables itself; then nothing is changed here.
 pub(super) fn prepare() {
     static PREPARED: Once = Once::new();
     PREPARED.call_once(|| {
@@ -39,17 +38,17 @@ pub(super) fn prepare() {
         let changes = changes(std::env::var_os(WIDTH), std::env::var_os(CACHE), preferred_bits(), crate::files::cache_folder());
         for (name, value) in changes {
             if name == CACHE {
-                // older versions of Mesa make the last folder of the path only; without it there is no cache, no more
+                // older versions of Mesa create only the last folder of the path; a failure only disables the cache
                 let _ = std::fs::create_dir_all(&value);
             }
-            // SAFETY: std's lock keeps Rust code off the environment meanwhile, no driver runs yet that could read it, and `prepare` says what is asked of
-            // programs with other threads in C
+            // SAFETY: std's lock excludes other Rust code, no driver that could read the environment is loaded yet, and `prepare` documents what programs with
+            // C threads must do
             unsafe { std::env::set_var(name, value) };
         }
     });
 }
 
-/// Width that is to be asked for where the user has set none; `None`: the driver's own choice.
+/// The vector width to request if the user has set none; `None` for the driver's default.
 fn preferred_bits() -> Option<u32> {
     match PREFERRED.load(Ordering::Relaxed) {
         0 => has_512_bits().then_some(512),
@@ -57,7 +56,7 @@ fn preferred_bits() -> Option<u32> {
     }
 }
 
-/// Variables that have to be set. width, cache: as they are; preferred: width where the user has set none; folder: for what runs keep.
+/// The variables to set. `width`, `cache`: current values of the two variables; `preferred`: the width if the user has set none; `folder`: skylit's cache folder.
 fn changes(
     width: Option<OsString>,
     cache: Option<OsString>,
@@ -67,10 +66,10 @@ fn changes(
     let Some(chosen) = width.clone().or_else(|| preferred.map(|bits| bits.to_string().into())) else { return Vec::new() };
     let mut name = OsString::from("mesa-");
     name.push(&chosen);
-    // without a folder of its own the width stays the driver's
+    // without a separate cache folder the driver's default width stays
     let Some(base) = cache.as_ref().map(PathBuf::from).or(folder) else { return Vec::new() };
     let mut changes = Vec::new();
-    // programs that were started by one of us have it already
+    // a child process of skylit inherits the variable
     if base.file_name() != Some(OsStr::new(&name)) {
         changes.push((CACHE, base.join(name).into_os_string()));
     }
@@ -80,7 +79,7 @@ fn changes(
     changes
 }
 
-/// Is lavapipe in this process already?
+/// Whether lavapipe is loaded in this process already.
 fn is_loaded() -> bool {
     std::fs::read_to_string("/proc/self/maps").is_ok_and(|maps| maps.contains("libvulkan_lvp"))
 }

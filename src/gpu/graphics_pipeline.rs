@@ -1,4 +1,4 @@
-//! Pipelines that draw triangles into [`super::Targets`]. Vertices are fetched by address: there are no vertex buffers.
+//! Graphics pipelines that draw triangles into [`super::Targets`]. Vertices are fetched by address: there are no vertex buffers.
 
 use std::sync::Arc;
 
@@ -11,20 +11,20 @@ use super::result::Context;
 use crate::error::Result;
 use crate::shaders::Shader;
 
-/// Stages that see the push constants.
+/// Shader stages that read the push constants.
 pub(super) const DRAW_STAGES: vk::ShaderStageFlags =
     vk::ShaderStageFlags::from_raw(vk::ShaderStageFlags::VERTEX.as_raw() | vk::ShaderStageFlags::FRAGMENT.as_raw());
 
-/// Which triangles are not drawn.
+/// Triangle culling.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Cull {
-    /// None: both sides are seen.
-    Nothing,
-    /// Those whose corners go round counter-clockwise in the image.
+    /// Both faces are drawn.
+    None,
+    /// Triangles with counter-clockwise corners in the image are culled.
     Front,
 }
 
-/// A vertex and a fragment shader.
+/// A pipeline of a vertex and a fragment shader.
 pub struct GraphicsPipeline {
     pub(super) raw: vk::Pipeline,
     pub(super) layout: vk::PipelineLayout,
@@ -32,8 +32,8 @@ pub struct GraphicsPipeline {
 }
 
 impl GraphicsPipeline {
-    /// Compiles two shaders with the entry points `main` and the same specialisation constants. Triangles are drawn where their
-    /// depth is greater than what is there.
+    /// Compiles two shaders with entry point `main` and the same specialization. The depth test passes for greater values
+    /// (reversed depth).
     pub fn new(
         device: &Arc<Device>,
         name: &str,
@@ -50,7 +50,7 @@ impl GraphicsPipeline {
         let rasterization = vk::PipelineRasterizationStateCreateInfo::default()
             .polygon_mode(vk::PolygonMode::FILL)
             .cull_mode(match cull {
-                Cull::Nothing => vk::CullModeFlags::NONE,
+                Cull::None => vk::CullModeFlags::NONE,
                 Cull::Front => vk::CullModeFlags::FRONT,
             })
             .front_face(vk::FrontFace::COUNTER_CLOCKWISE)
@@ -89,7 +89,7 @@ impl GraphicsPipeline {
                 .dynamic_state(&dynamic)
                 .layout(pipeline.layout)
                 .push_next(&mut rendering)];
-            // SAFETY: modules and layout are of this device; all states that a draw needs are there
+            // SAFETY: modules and layout are of this device; all required states are given
             unsafe { device.raw.create_graphics_pipelines(device.pipeline_cache, &info, None) }.map_err(|e| e.1).context(name)
         })?[0];
         device.name(pipeline.raw, name);

@@ -1,4 +1,4 @@
-//! Images that are drawn into.
+//! Render targets.
 
 use std::sync::Arc;
 
@@ -10,9 +10,9 @@ use super::device::Device;
 use super::result::Context;
 use crate::error::{Error, Result};
 
-/// Two unsigned integers a pixel.
+/// Two unsigned integers per pixel.
 pub(super) const IDS: vk::Format = vk::Format::R32G32_UINT;
-/// A float a pixel.
+/// A float per pixel.
 pub(super) const DEPTH: vk::Format = vk::Format::D32_SFLOAT;
 
 /// A two-dimensional image in device memory.
@@ -97,12 +97,12 @@ impl Drop for Image {
     }
 }
 
-/// The whole of an image.
+/// The subresource range of a whole image.
 pub(super) fn range(aspect: vk::ImageAspectFlags) -> vk::ImageSubresourceRange {
     vk::ImageSubresourceRange { aspect_mask: aspect, base_mip_level: 0, level_count: 1, base_array_layer: 0, layer_count: 1 }
 }
 
-/// What is drawn into together: two unsigned integers a pixel, and a depth of which the greater is nearer.
+/// Render targets of the visibility pass: two unsigned integers per pixel, and reversed depth (greater is nearer).
 pub struct Targets {
     pub(super) ids: Image,
     pub(super) depth: Image,
@@ -112,20 +112,20 @@ impl Targets {
     /// Allocates both.
     ///
     /// # Errors
-    /// [`Error::Device`] when the device does not draw or not into images of that size, [`Error::OutOfMemory`].
+    /// [`Error::Device`] when the device cannot rasterize, or not into images of that size; [`Error::OutOfMemory`].
     pub fn new(device: &Arc<Device>, size: [u32; 2]) -> Result<Self> {
         let info = &device.info;
         if !info.can_rasterise() {
             return Err(Error::Device(format!(
-                "rasterising needs {}, which '{}' lacks; use --primary traced",
+                "rasterization needs {}, which '{}' lacks; use --primary traced",
                 info.missing_raster.join(", "),
                 info.name
             )));
         }
-        let most = info.limits.max_image_side;
-        if size[0].max(size[1]) > most || size[0].min(size[1]) == 0 {
+        let max = info.limits.max_image_side;
+        if size[0].max(size[1]) > max || size[0].min(size[1]) == 0 {
             return Err(Error::Device(format!(
-                "'{}' draws images of 1 to {most} pixels a side, not of {}x{}; use --primary traced",
+                "'{}' rasterizes images of 1 to {max} pixels a side, not of {}x{}; use --primary traced",
                 info.name, size[0], size[1]
             )));
         }

@@ -1,4 +1,4 @@
-//! What the devices of a machine are and can do: for picking one, and for `doctor`.
+//! Properties and features of the machine's Vulkan devices, for choosing one and for `doctor`.
 
 use std::ffi::CStr;
 
@@ -9,85 +9,85 @@ use super::instance::Instance;
 use super::result::Context;
 use crate::error::Result;
 
-/// Limits that matter to skylit.
+/// The device limits that skylit depends on.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct Limits {
-    /// Invocations that run in lockstep.
+    /// Number of invocations in a subgroup.
     pub subgroup_size: u32,
-    /// Compute shaders can count lanes (subgroup ballots).
+    /// Compute shaders support subgroup ballots.
     pub subgroup_ballot: bool,
-    /// Compute shaders can hand values round and reduce them over lanes, and a subgroup holds at least eight.
+    /// The packet kernel can run: compute shaders support ballots, subgroup arithmetic and full subgroups of 8 to 64 lanes.
     pub packets: bool,
-    /// Work-groups in x of one dispatch.
+    /// Maximum number of work-groups along x in a dispatch.
     pub max_workgroups_x: u32,
-    /// Pixels of a side of an image that is drawn into.
+    /// Maximum width and height of a render target, in pixels.
     pub max_image_side: u32,
-    /// Pixels of a side of a viewport.
+    /// Maximum width and height of a viewport, in pixels.
     pub max_viewport_side: f32,
-    /// Pixel coordinates that a viewport's corners may have.
+    /// Minimum and maximum coordinate of a viewport's corners, in pixels.
     pub viewport_range: [f32; 2],
-    /// Bytes of one allocation.
+    /// Maximum size of one buffer, in bytes.
     pub max_allocation: u64,
-    /// Bytes of all device-local heaps.
+    /// Size of all device-local heaps, in bytes.
     pub device_memory: u64,
-    /// Bytes of push constants.
+    /// Maximum size of push constants, in bytes.
     pub max_push_constants: u32,
-    /// Nanoseconds per timestamp tick; 0: no timestamps.
+    /// Nanoseconds per timestamp tick; 0 without timestamps.
     pub timestamp_period: f32,
-    /// Alignment of acceleration-structure scratch memory; 0 without ray tracing.
+    /// Alignment of acceleration-structure scratch memory, in bytes; 0 without ray tracing.
     pub scratch_alignment: u32,
-    /// Bytes of a shader group handle; 0 without ray tracing.
+    /// Size of a shader group handle, in bytes; 0 without ray tracing.
     pub shader_group_handle_size: u32,
-    /// Alignment of shader group handles.
+    /// Alignment of shader group handles, in bytes.
     pub shader_group_handle_alignment: u32,
-    /// Alignment of the tables of the shader binding table.
+    /// Alignment of the regions of the shader binding table, in bytes.
     pub shader_group_base_alignment: u32,
 }
 
-/// One physical device.
+/// Properties of a physical device.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct DeviceInfo {
     #[serde(skip)]
     pub(super) physical: vk::PhysicalDevice,
-    /// Place in Vulkan's list: what `--device INDEX` takes.
+    /// Index in Vulkan's list of devices, as `--device INDEX` takes it.
     pub index: usize,
-    /// Name that the driver gives.
+    /// Device name that the driver reports.
     pub name: String,
     /// "discrete", "integrated", "virtual", "cpu" or "other".
     pub kind: &'static str,
-    /// Vulkan version, as "1.3.230".
+    /// Supported Vulkan version, such as "1.3.230".
     pub api_version: String,
-    /// Driver and its version.
+    /// Name and version of the driver.
     pub driver: String,
-    /// Vendor id of PCI or Khronos.
+    /// PCI vendor id, or a Khronos vendor id.
     pub vendor_id: u32,
     /// Device id of the vendor.
     pub device_id: u32,
-    /// The driver's own number.
+    /// Driver version in the vendor's encoding.
     pub driver_version: u32,
     #[serde(skip)]
     pub(super) pipeline_cache_uuid: [u8; 16],
-    /// Features of the floor that it lacks, by name; empty: usable.
+    /// Minimum requirements of skylit that the device lacks, by name; it is usable when empty.
     pub missing_floor: Vec<String>,
     /// shaderInt64.
     pub int64: bool,
-    /// The device reads host memory as fast as its own.
+    /// The device shares the host's memory (a CPU or an integrated GPU).
     pub unified_memory: bool,
     /// bufferDeviceAddress.
     #[serde(skip)]
     pub buffer_device_address: bool,
-    /// Extensions of ray tracing.
+    /// Supported ray-tracing extensions.
     #[serde(skip)]
     pub ray_tracing: RayTracingExtensions,
-    /// What rasterising needs and does not find here; empty: it runs.
+    /// Requirements of rasterization that the device lacks; it can rasterize when empty.
     pub missing_raster: Vec<String>,
-    /// Limits that matter.
+    /// Device limits.
     pub limits: Limits,
     #[serde(skip)]
     pub(super) queue_family: Option<u32>,
 }
 
-/// Which extensions of ray tracing a device has, each with the feature that it brings.
+/// The ray-tracing extensions that a device supports, each with its feature.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct RayTracingExtensions {
     /// VK_KHR_acceleration_structure.
@@ -101,12 +101,12 @@ pub struct RayTracingExtensions {
 }
 
 impl DeviceInfo {
-    /// Is everything here that VK_KHR_ray_tracing_pipeline is used with?
+    /// Whether VK_KHR_ray_tracing_pipeline and everything it requires is available.
     pub(super) fn has_ray_tracing_pipelines(&self) -> bool {
         self.has_acceleration_structures() && self.ray_tracing.ray_tracing_pipeline
     }
 
-    /// Is everything here that VK_KHR_ray_query is used with?
+    /// Whether VK_KHR_ray_query and everything it requires is available.
     pub(super) fn has_ray_queries(&self) -> bool {
         self.has_acceleration_structures() && self.ray_tracing.ray_query
     }
@@ -116,28 +116,28 @@ impl DeviceInfo {
         self.missing_floor.is_empty() && extensions.acceleration_structure && extensions.deferred_host_operations
     }
 
-    /// Can it rasterise? Devices for computing alone cannot.
+    /// Whether the device can rasterize; compute-only devices cannot.
     pub fn can_rasterise(&self) -> bool {
         self.missing_floor.is_empty() && self.missing_raster.is_empty()
     }
 
-    /// Does the driver leave any loop in a shader after 65,535 turns? Mesa's CPU driver did before version 23.
+    /// Whether the driver leaves any loop in a shader after 65,535 iterations, as Mesa's CPU driver did before version 23.
     pub fn cuts_long_loops(&self) -> bool {
         let major = self.driver.split("Mesa ").nth(1).and_then(|v| v.split('.').next()).and_then(|v| v.parse::<u32>().ok());
         self.is_cpu() && major.is_some_and(|m| m < 23)
     }
 
-    /// Can the compute tracer trace the rays of a subgroup together?
+    /// Whether the compute tracer can trace rays in packets.
     pub fn packets(&self) -> bool {
         self.limits.packets && self.int64
     }
 
-    /// Does the device run its shaders on the CPU?
+    /// Whether the device is a CPU.
     pub fn is_cpu(&self) -> bool {
         self.kind == "cpu"
     }
 
-    /// Higher is picked first.
+    /// Rank among devices: the highest is the default.
     pub(super) fn preference(&self) -> u32 {
         match self.kind {
             "discrete" => 4,
@@ -155,14 +155,14 @@ fn text(s: &[std::ffi::c_char]) -> String {
 }
 
 /// With wider vectors Mesa's CPU driver crashes when it compiles a vertex shader (seen with 22.3.6 and 25.0.7).
-const MAX_DRAWING_BITS: u32 = 256;
+const MAX_RASTER_BITS: u32 = 256;
 
-/// Bits of the vectors of Mesa's CPU driver, which are in its name: "llvmpipe (LLVM 15.0.6, 256 bits)".
+/// Vector width of Mesa's CPU driver in bits, from its device name: "llvmpipe (LLVM 15.0.6, 256 bits)".
 fn vector_bits(name: &str) -> Option<u32> {
     name.strip_prefix("llvmpipe")?.strip_suffix(" bits)")?.rsplit(' ').next()?.parse().ok()
 }
 
-/// Can images of this format be drawn into?
+/// Whether images of this format can be render targets.
 fn is_target(raw: &ash::Instance, physical: vk::PhysicalDevice, format: vk::Format, target: vk::FormatFeatureFlags) -> bool {
     // SAFETY: the physical device belongs to the living instance
     let features = unsafe { raw.get_physical_device_format_properties(physical, format) }.optimal_tiling_features;
@@ -220,7 +220,7 @@ fn describe(instance: &Instance, index: usize, physical: vk::PhysicalDevice) -> 
 
     let families = unsafe { raw.get_physical_device_queue_family_properties(physical) };
     let family = |flags| families.iter().position(|f| f.queue_flags.contains(flags)).map(|k| k as u32);
-    // one queue for everything, where there is one
+    // one queue family for graphics and compute, if available
     let graphics_family = family(vk::QueueFlags::COMPUTE | vk::QueueFlags::GRAPHICS);
     let queue_family = graphics_family.or_else(|| family(vk::QueueFlags::COMPUTE));
 
@@ -228,13 +228,13 @@ fn describe(instance: &Instance, index: usize, physical: vk::PhysicalDevice) -> 
     if !vulkan13 {
         missing_floor.push("Vulkan 1.3".to_owned());
     } else {
-        for (there, name) in [
+        for (supported, name) in [
             (f12.buffer_device_address, "bufferDeviceAddress"),
             (f12.host_query_reset, "hostQueryReset"),
             (f13.maintenance4, "maintenance4"),
             (f13.synchronization2, "synchronization2"),
         ] {
-            if there == vk::FALSE {
+            if supported == vk::FALSE {
                 missing_floor.push(name.to_owned());
             }
         }
@@ -243,13 +243,16 @@ fn describe(instance: &Instance, index: usize, physical: vk::PhysicalDevice) -> 
         missing_floor.push("a compute queue".to_owned());
     }
 
-    let narrow = vector_bits(&text(&properties.device_name)).is_none_or(|bits| bits <= MAX_DRAWING_BITS);
+    let narrow = vector_bits(&text(&properties.device_name)).is_none_or(|bits| bits <= MAX_RASTER_BITS);
     let missing_raster = [
         (graphics_family.is_some(), "a queue for graphics and compute"),
         (f13.dynamic_rendering == vk::TRUE, "dynamicRendering"),
         (narrow, "vectors of at most 256 bits (LP_NATIVE_VECTOR_WIDTH=256)"),
-        (is_target(raw, physical, IDS, vk::FormatFeatureFlags::COLOR_ATTACHMENT), "images of two 32-bit integers to draw into"),
-        (is_target(raw, physical, DEPTH, vk::FormatFeatureFlags::DEPTH_STENCIL_ATTACHMENT), "32-bit depth"),
+        (is_target(raw, physical, IDS, vk::FormatFeatureFlags::COLOR_ATTACHMENT), "render targets of format R32G32_UINT"),
+        (
+            is_target(raw, physical, DEPTH, vk::FormatFeatureFlags::DEPTH_STENCIL_ATTACHMENT),
+            "depth images of format D32_SFLOAT",
+        ),
     ];
     let missing_raster = missing_raster.iter().filter(|n| !n.0).map(|n| n.1.to_owned()).collect();
 

@@ -32,18 +32,18 @@ pub struct Instance {
     pub(super) validation: Option<Arc<ValidationLog>>,
     messenger: Option<(ext::debug_utils::Instance, vk::DebugUtilsMessengerEXT)>,
     pub(super) debug_names: bool,
-    // unloads the library when dropped: last
+    // dropped last, because that unloads the library
     _entry: ash::Entry,
 }
 
 impl Instance {
     /// Loads Vulkan. With `validation`, every message of VK_LAYER_KHRONOS_validation is kept and can fail the run.
     ///
-    /// The first in a process sets environment variables that Mesa's CPU driver reads ([`super::environment`]): a program whose other threads call C code that
-    /// reads the environment makes it before they start.
+    /// The first instance of a process sets environment variables that Mesa's CPU driver reads ([`super::environment`]): a program with threads in which C code
+    /// reads the environment must create it before they start.
     ///
     /// # Errors
-    /// [`Error::Device`] without a loader, without a driver for Vulkan 1.3, or without the layer that was asked for.
+    /// [`Error::Device`] without a loader, without a driver for Vulkan 1.3, or without the requested validation layer.
     pub fn new(validation: bool) -> Result<Arc<Self>> {
         super::environment::prepare();
         // SAFETY: the loader's own initialisation code runs, as in every Vulkan program
@@ -54,7 +54,7 @@ impl Instance {
         })?;
         // SAFETY: no preconditions
         let version = unsafe { entry.try_enumerate_instance_version() }
-            .context("asking for the Vulkan version")?
+            .context("querying the Vulkan version")?
             .unwrap_or(vk::API_VERSION_1_0);
         if version < vk::API_VERSION_1_3 {
             return Err(Error::Device(format!(
@@ -67,7 +67,7 @@ impl Instance {
         let layers = unsafe { entry.enumerate_instance_layer_properties() }.context("listing Vulkan layers")?;
         if validation && !layers.iter().any(|l| l.layer_name_as_c_str() == Ok(VALIDATION_LAYER)) {
             return Err(Error::Device(
-                "validation was asked for, but VK_LAYER_KHRONOS_validation is not installed: install vulkan-validationlayers"
+                "--validation needs VK_LAYER_KHRONOS_validation, which is not installed: install vulkan-validationlayers"
                     .into(),
             ));
         }
@@ -88,7 +88,7 @@ impl Instance {
             .enabled_layer_names(&layer_names)
             .enabled_extension_names(&extension_names);
         if let Some(m) = create_messenger.as_mut() {
-            // also hears what happens inside vkCreateInstance and vkDestroyInstance
+            // also reports messages of vkCreateInstance and vkDestroyInstance
             info = info.push_next(m);
         }
         // SAFETY: all pointers in `info` outlive the call

@@ -1,5 +1,5 @@
-//! A thin, safe layer over Vulkan: device, memory, pipelines, submission, timing. Everything here may be called wrongly only
-//! where a comment says so; `unsafe` stays in this folder.
+//! A thin layer over Vulkan: device, memory, pipelines, submission, timing. Its functions are safe, with the preconditions that their
+//! comments state; `unsafe` stays in this folder and in `tracer`.
 
 mod acceleration_structure;
 mod buffer;
@@ -17,11 +17,11 @@ pub mod oidn;
 mod pipeline;
 mod result;
 
-pub use acceleration_structure::{AccelerationStructure, BottomLevelInput, TopLevelEntry, Update};
+pub use acceleration_structure::{AccelerationStructure, AccelerationStructureInstance, BottomLevelInput, Update};
 pub use buffer::{Buffer, Memory};
 pub use commands::{Commands, Recorder, Timing};
 pub use device::{Device, Options};
-pub use drawing::Drawing;
+pub use drawing::DrawRecorder;
 pub use graphics_pipeline::{Cull, GraphicsPipeline};
 pub use image::{Image, Targets};
 pub use info::{DeviceInfo, Limits, RayTracingExtensions, enumerate};

@@ -1,5 +1,5 @@
-//! Intel Open Image Denoise, loaded where it is installed: versions 1.4 to 2 have the same functions but for the names of two. What links it
-//! when it is built would not start without it.
+//! Intel Open Image Denoise, loaded at run time where it is installed, so that skylit starts without it. Versions 1.4 to 2 have the same
+//! functions, except for the names of two.
 
 use std::ffi::{CStr, c_char, c_int, c_void};
 use std::ptr::null;
@@ -25,7 +25,7 @@ const ERROR_OUT_OF_MEMORY: c_int = 4;
 
 type Handle = *mut c_void;
 
-/// What of the library is called, as oidn.h declares it.
+/// The functions of the library that are called, as oidn.h declares them.
 struct Functions {
     new_device: unsafe extern "C" fn(c_int) -> Handle,
     commit_device: unsafe extern "C" fn(Handle),
@@ -40,12 +40,12 @@ struct Functions {
     release_filter: unsafe extern "C" fn(Handle),
 }
 
-/// The library and a device of it: the CPU, because that one reads our memory.
+/// The library and its CPU device, which accesses host memory directly.
 pub struct Oidn {
     functions: Functions,
     device: Handle,
     version: String,
-    // last: what is above is in it
+    // dropped last: the functions above are in it
     _library: Library,
 }
 
@@ -53,46 +53,48 @@ impl Oidn {
     /// Loads the library and starts its device.
     ///
     /// # Errors
-    /// [`Error::Device`] where there is none, or one that does not run here.
+    /// [`Error::Device`] if the library is not installed or does not support this CPU.
     pub fn open() -> Result<Self> {
         let missing = |why: String| Error::Device(format!("Open Image Denoise: {why}; install it, or use --denoise filter"));
         // SAFETY: the library's initialisation has no requirements of its own
         let library = NAMES.iter().find_map(|name| unsafe { Library::new(name) }.ok());
-        let library = library.ok_or_else(|| missing(format!("there is no {}", NAMES[0])))?;
-        let functions = functions(&library).map_err(|e| missing(format!("the library is of another kind ({e})")))?;
+        let library = library.ok_or_else(|| missing(format!("{} was not found", NAMES[0])))?;
+        let functions = functions(&library).map_err(|e| missing(format!("the library lacks a function ({e})")))?;
         // SAFETY: no requirements
         let device = unsafe { (functions.new_device)(DEVICE_TYPE_CPU) };
         if device.is_null() {
             return Err(missing("it does not run on this CPU".into()));
         }
         let mut oidn = Self { functions, device, version: String::new(), _library: library };
-        // SAFETY: the device is there
+        // SAFETY: the device exists
         unsafe { (oidn.functions.commit_device)(device) };
         oidn.check()?;
-        // SAFETY: likewise, and the name ends with 0
+        // SAFETY: the device exists, and the name ends with 0
         let version = unsafe { (oidn.functions.device_int)(device, c"version".as_ptr()) };
         oidn.version = format!("{}.{}.{}", version / 10_000, version / 100 % 100, version % 100);
         Ok(oidn)
     }
 
-    /// Of the library.
+    /// Version of the library, such as "2.3.0".
     pub fn version(&self) -> &str {
         &self.version
     }
 
-    /// An image of `size` pixels without most of its noise. Three floats a pixel, rows from the top, in all planes: `color` is linear radiance, `albedo`
-    /// linear from 0 to 1, `normal` in the world and of length 1 at most. The auxiliary two may be noisy themselves.
+    /// Denoises an image of `size` pixels. All planes have three floats per pixel, rows from the top: `color` is linear radiance, `albedo`
+    /// linear in [0, 1], `normal` a world-space vector of length at most 1. The two auxiliary planes may be noisy.
     ///
     /// # Errors
-    /// [`Error::Usage`] for planes of other sizes, [`Error::OutOfMemory`], and [`Error::Device`] with what the library says.
+    /// [`Error::Usage`] for planes of other sizes, [`Error::OutOfMemory`], and [`Error::Device`] with the library's message.
     pub fn denoise(&self, size: [u32; 2], color: &[f32], albedo: &[f32], normal: &[f32]) -> Result<Vec<f32>> {
         let [width, height] = size.map(|n| n as usize);
         let images = [(c"color", color), (c"albedo", albedo), (c"normal", normal)];
         if images.iter().any(|(_, plane)| plane.len() != 3 * width * height) {
-            return Err(Error::Usage(format!("planes to denoise are not of {width}x{height} pixels")));
+            return Err(Error::Usage(format!(
+                "the image to denoise and its auxiliary images must have {width}x{height} pixels"
+            )));
         }
         let (f, mut out) = (&self.functions, vec![0.0f32; 3 * width * height]);
-        // SAFETY: device and filter are there; names end with 0; every plane has 3 * width * height floats and outlives the filter, and the
+        // SAFETY: device and filter exist; names end with 0; every plane has 3 * width * height floats and outlives the filter, and the
         // library writes to none but the output
         unsafe {
             let filter = (f.new_filter)(self.device, c"RT".as_ptr());
@@ -108,7 +110,7 @@ impl Oidn {
             }
             set(c"output", out.as_mut_ptr());
             (f.set_bool)(filter, c"hdr".as_ptr(), true);
-            // they have the noise of the film's camera rays
+            // albedo and normal have the noise of the camera rays' antialiasing
             (f.set_bool)(filter, c"cleanAux".as_ptr(), false);
             (f.commit_filter)(filter);
             (f.execute_filter)(filter);
@@ -118,17 +120,17 @@ impl Oidn {
         Ok(out)
     }
 
-    /// Fails with the first error since the last time.
+    /// Fails with the first error since the last call.
     fn check(&self) -> Result<()> {
         let mut message = null();
-        // SAFETY: the device is there, and the library writes a pointer
+        // SAFETY: the device exists, and the library writes a pointer
         let code = unsafe { (self.functions.device_error)(self.device, &raw mut message) };
         if code == ERROR_NONE {
             return Ok(());
         }
         let text = match message.is_null() {
             true => format!("error {code}"),
-            // SAFETY: a text of the library's, which stays until its next call
+            // SAFETY: the library's string stays valid until the next call
             false => unsafe { CStr::from_ptr(message) }.to_string_lossy().into_owned(),
         };
         Err(match code {
@@ -145,7 +147,7 @@ impl Drop for Oidn {
     }
 }
 
-/// Finds them all.
+/// Looks up all functions.
 fn functions(library: &Library) -> Result<Functions, libloading::Error> {
     // SAFETY: the types are those of oidn.h, the same in all versions from 1.4 on
     unsafe {

@@ -1,7 +1,7 @@
 //! Compute and ray-tracing pipelines. There are no descriptor sets: everything is reached by address from push constants.
 //!
-//! A pipeline is a handle: the device knows those that are alive, and gives the same one to whoever asks for the same SPIR-V and the same
-//! constants. Whoever wants pipelines to outlive the work that they were compiled for keeps [`Device::live_pipelines`].
+//! A pipeline is a shared handle: the device knows the pipelines in use, and returns the same one for the same SPIR-V and the same
+//! specialization. [`Device::live_pipelines`] keeps pipelines alive beyond the work that they were compiled for.
 
 use std::collections::{HashMap, VecDeque};
 use std::sync::{Arc, Mutex, PoisonError, Weak};
@@ -16,7 +16,7 @@ use crate::interface::constants::Constant;
 use crate::interface::records::ray::Push;
 use crate::shaders::{ComputeShader, Shader};
 
-/// Size of the push-constant block that every stream has.
+/// Size in bytes of the push-constant block, the same for all pipelines.
 pub(super) const PUSH_BYTES: u32 = size_of::<Push>() as u32;
 
 pub(super) const RAY_STAGES: vk::ShaderStageFlags = vk::ShaderStageFlags::from_raw(
@@ -27,26 +27,26 @@ pub(super) const RAY_STAGES: vk::ShaderStageFlags = vk::ShaderStageFlags::from_r
         | vk::ShaderStageFlags::INTERSECTION_KHR.as_raw(),
 );
 
-/// Specialisation constants by id.
+/// Values of specialization constants.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Specialization {
     entries: Vec<(u32, u32)>,
 }
 
 impl Specialization {
-    /// Sets a constant (a bool is 0 or 1).
+    /// Sets a constant; a bool is 0 or 1.
     pub fn set(mut self, constant: Constant, value: impl Into<u32>) -> Self {
         self.entries.push((constant.id, value.into()));
         self
     }
 
-    /// Sets constants with their values.
+    /// Sets several constants.
     pub fn set_all(mut self, constants: impl IntoIterator<Item = (Constant, u32)>) -> Self {
         self.entries.extend(constants.into_iter().map(|(constant, value)| (constant.id, value)));
         self
     }
 
-    /// These, and those of `other`.
+    /// Adds the constants of `other`.
     pub fn and(mut self, other: &Specialization) -> Self {
         self.entries.extend(&other.entries);
         self
@@ -71,7 +71,7 @@ pub(super) struct Module<'a> {
 impl<'a> Module<'a> {
     pub(super) fn new(device: &'a Device, name: &str, shader: &Shader) -> Result<Self> {
         let words = ash::util::read_spv(&mut std::io::Cursor::new(shader.spirv()?))
-            .map_err(|e| Error::Vulkan(format!("shader {name} is no SPIR-V: {e}")))?;
+            .map_err(|e| Error::Vulkan(format!("shader {name} is not SPIR-V: {e}")))?;
         // SAFETY: valid SPIR-V from the build script's compiler
         let raw = unsafe { device.raw.create_shader_module(&vk::ShaderModuleCreateInfo::default().code(&words), None) }
             .context(name)?;
@@ -94,7 +94,7 @@ pub(super) fn layout(device: &Device, stages: vk::ShaderStageFlags) -> Result<vk
         .context("the pipeline layout")
 }
 
-/// What a pipeline is made of: hashes of its shaders' SPIR-V (content, so that shaders which are compiled while the program runs count), their constants, and how it is made.
+/// The identity of a pipeline: hashes of its shaders' SPIR-V (of the contents, because live-compiled shaders change), their specialization, and creation flags.
 #[derive(Clone, PartialEq, Eq, Hash)]
 struct Key {
     shaders: Vec<u128>,
@@ -110,11 +110,11 @@ impl Key {
     }
 }
 
-/// A pipeline and its layout, destroyed when nobody has it any more.
+/// A pipeline and its layout, destroyed with the last handle.
 struct Compiled {
     raw: vk::Pipeline,
     layout: vk::PipelineLayout,
-    /// Of a ray-tracing pipeline.
+    /// The shader binding table of a ray-tracing pipeline.
     table: Option<Table>,
     device: Arc<Device>,
 }
@@ -129,27 +129,27 @@ impl Drop for Compiled {
     }
 }
 
-/// The pipelines of a device that are alive.
+/// The pipelines of a device that are in use.
 pub(super) struct LivePipelines {
     all: Mutex<HashMap<Key, Weak<Compiled>>>,
-    /// Those that were made last, at most `most`: they hold their device, which is then never closed.
+    /// The pipelines compiled last, at most `max_kept`. They hold their device, which is then never closed.
     kept: Mutex<VecDeque<Arc<Compiled>>>,
-    most: usize,
+    max_kept: usize,
 }
 
 impl LivePipelines {
-    /// most: [`super::Options::keep_pipelines`].
-    pub(super) fn new(most: usize) -> Self {
-        Self { all: Mutex::default(), kept: Mutex::default(), most }
+    /// `max_kept`: [`super::Options::keep_pipelines`].
+    pub(super) fn new(max_kept: usize) -> Self {
+        Self { all: Mutex::default(), kept: Mutex::default(), max_kept }
     }
 
-    /// The pipeline that was made of this, or what `make` gives.
+    /// The pipeline with this key, compiled by `make` if there is none.
     fn get(&self, key: Key, make: impl FnOnce() -> Result<Compiled>) -> Result<Arc<Compiled>> {
         let all = || self.all.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(pipeline) = all().get(&key).and_then(Weak::upgrade) {
             return Ok(pipeline);
         }
-        // not under the lock: compiling takes seconds, and several threads do
+        // not under the lock: compiling takes seconds, and several threads compile at once
         let made = Arc::new(make()?);
         let mut all = all();
         all.retain(|_, pipeline| pipeline.strong_count() > 0);
@@ -159,9 +159,9 @@ impl LivePipelines {
     }
 
     fn keep(&self, pipeline: Arc<Compiled>) -> Arc<Compiled> {
-        if self.most > 0 {
+        if self.max_kept > 0 {
             let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
-            if kept.len() == self.most {
+            if kept.len() == self.max_kept {
                 kept.pop_front();
             }
             kept.push_back(pipeline.clone());
@@ -173,12 +173,12 @@ impl LivePipelines {
 /// Keeps pipelines alive ([`Device::live_pipelines`]).
 #[derive(Default)]
 pub struct KeptPipelines {
-    #[expect(dead_code, reason = "held, not looked at")]
+    #[expect(dead_code, reason = "only keeps them alive")]
     pipelines: Vec<Arc<Compiled>>,
 }
 
 impl Device {
-    /// All pipelines that are alive. While this is kept, who asks for one of them again gets it without compiling.
+    /// Handles of all pipelines in use. While they are kept, requesting one of these pipelines again does not compile it.
     pub fn live_pipelines(&self) -> KeptPipelines {
         let all = self.live.all.lock().unwrap_or_else(PoisonError::into_inner);
         KeptPipelines { pipelines: all.values().filter_map(Weak::upgrade).collect() }
@@ -195,8 +195,8 @@ impl ComputePipeline {
         Self::with_flags(device, name, shader, specialization, vk::PipelineShaderStageCreateFlags::empty())
     }
 
-    /// As [`ComputePipeline::new`], for a shader that relies on subgroups of the size that the device reports, without idle lanes
-    /// ([`super::Limits::packets`] says that it can).
+    /// As [`ComputePipeline::new`], for a shader that requires full subgroups of the reported size; the device must have
+    /// [`super::Limits::packets`].
     pub fn with_full_subgroups(device: &Arc<Device>, name: &str, shader: &Shader, s: &Specialization) -> Result<Self> {
         Self::with_flags(device, name, shader, s, vk::PipelineShaderStageCreateFlags::REQUIRE_FULL_SUBGROUPS)
     }
@@ -250,7 +250,7 @@ impl ComputeShader {
         self.specialized(device, &Specialization::default())
     }
 
-    /// Compiles it for a device, with constants that differ from what the shader says.
+    /// Compiles it for a device, with specialization constants.
     ///
     /// # Errors
     /// Those of the device.
@@ -259,20 +259,20 @@ impl ComputeShader {
     }
 }
 
-/// The shaders that all streams of the pipeline tracer share.
+/// The miss and hit shaders, which all streams of the pipeline tracer share.
 pub struct HitShaders<'a> {
-    /// Miss.
+    /// Miss shader.
     pub miss: &'a Shader,
-    /// Closest hit on a triangle.
+    /// Closest-hit shader of triangles.
     pub triangle_closest: &'a Shader,
-    /// Any hit on an alpha-tested triangle; `None` where the scene has none.
+    /// Any-hit shader of alpha-tested triangles; `None` if the scene has none.
     pub triangle_any: Option<&'a Shader>,
-    /// Closest hit on a sphere and its intersection shader; `None` where the scene has none.
+    /// Closest-hit and intersection shaders of spheres; `None` if the scene has none.
     pub sphere: Option<[&'a Shader; 2]>,
 }
 
 /// A ray-tracing pipeline with its shader binding table. Hit groups: 0 opaque triangles, 1 alpha-tested triangles, 2 spheres
-/// (groups that the scene does not need repeat group 0, so that the numbers hold).
+/// (unused groups repeat group 0, so that the indices are always the same).
 #[derive(Clone)]
 pub struct RayTracingPipeline(Arc<Compiled>);
 
@@ -285,7 +285,7 @@ pub(super) struct Table {
 }
 
 impl RayTracingPipeline {
-    /// Compiles a ray generation shader together with the shared ones.
+    /// Compiles a ray generation shader together with the shared shaders.
     pub fn new(
         device: &Arc<Device>,
         name: &str,
@@ -391,7 +391,7 @@ impl RayTracingPipeline {
 }
 
 impl Table {
-    /// Lays the group handles out as the device's own sizes ask: raygen, miss, then the hit groups.
+    /// Writes the group handles with the device's sizes and alignments: raygen, miss, then the hit groups.
     fn new(functions: &ash::khr::ray_tracing_pipeline::Device, pipeline: &Compiled, groups: u32) -> Result<Self> {
         let limits = &pipeline.device.info.limits;
         let size = limits.shader_group_handle_size as usize;

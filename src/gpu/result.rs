@@ -1,10 +1,10 @@
-//! Vulkan's result codes in words.
+//! Conversion of Vulkan's result codes to errors.
 
 use ash::vk;
 
 use crate::error::Error;
 
-/// Turns a failed call into an error that says what was being done.
+/// The error for a failed call; `what` names the operation.
 pub fn explain(what: &str, result: vk::Result) -> Error {
     match result {
         vk::Result::ERROR_OUT_OF_HOST_MEMORY => Error::OutOfMemory(format!("the driver has no host memory left for {what}")),
@@ -21,7 +21,7 @@ pub fn explain(what: &str, result: vk::Result) -> Error {
 
 /// `result.context("what")?` for ash calls.
 pub trait Context<T> {
-    /// Says what was being done.
+    /// Converts the error, naming the operation.
     fn context(self, what: &str) -> Result<T, Error>;
 }
 

@@ -8,7 +8,7 @@ use crate::error::Result;
 use crate::film::Control;
 use crate::film::block::{Block, BlockParams};
 use crate::film::camera::CameraRecord;
-use crate::film::pace::{MOST, Pace};
+use crate::film::pace::{MAX_RAYS, Pace};
 use crate::gpu::{Buffer, Commands, Memory};
 pub use crate::interface::records::aov::AovPixel;
 use crate::output::{Channel, Samples};
@@ -78,7 +78,7 @@ pub fn visit(
     let rays = CameraRays::new(tracer, &shaders::AOV_CLOSEST, primary, blocks.first().map_or([1; 2], |b| b.size))?;
     let mut commands = Commands::new(device)?;
     let record = size_of::<AovPixel>() as u64;
-    let most = blocks.iter().map(Block::rays).max().unwrap_or(0).min(MOST);
+    let most = blocks.iter().map(Block::rays).max().unwrap_or(0).min(MAX_RAYS);
     let target = Buffer::new(device, "auxiliary outputs", record * most as u64, Memory::Readback)?;
     let mut params_buffer = Buffer::new(device, "block parameters", size_of::<BlockParams>() as u64, Memory::Upload)?;
     let mut pace = Pace::default();

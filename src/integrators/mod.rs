@@ -15,12 +15,12 @@ use std::time::Duration;
 use serde_json::{Map, Value};
 
 use crate::accel::flatten::FlatScene;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::film::Control;
 use crate::film::accumulate::Accumulated;
 use crate::film::camera::CameraRecord;
-use crate::film::cover::Cover;
 use crate::film::schedule::FilmOptions;
+use crate::film::tile_mask::TileMask;
 use crate::output::Image;
 use crate::output::tone_map::ToneMap;
 use crate::ray::Ray;
@@ -155,7 +155,7 @@ pub trait Integrator: Sync {
     /// metadata.
     fn identity(&self, job: &RenderJob) -> Vec<(&'static str, Option<String>)>;
 
-    /// Renders. `cover`: the tiles of the image that show geometry; the others are skipped.
+    /// Renders. `tile_mask`: the tiles of the image that show geometry; the others are skipped.
     ///
     /// # Errors
     /// Those of the device; [`crate::Error::Usage`] for settings that do not fit the camera; [`crate::Error::Interrupted`] when `control` says so.
@@ -164,7 +164,7 @@ pub trait Integrator: Sync {
         tracer: &Tracer,
         flat: &FlatScene,
         job: &RenderJob,
-        cover: Option<Arc<Cover>>,
+        tile_mask: Option<Arc<TileMask>>,
         control: &mut dyn Control,
     ) -> Result<Rendered>;
 
@@ -233,11 +233,11 @@ impl std::fmt::Debug for IntegratorName {
 }
 
 impl std::str::FromStr for IntegratorName {
-    type Err = String;
+    type Err = Error;
 
-    fn from_str(name: &str) -> Result<Self, String> {
+    fn from_str(name: &str) -> Result<Self> {
         let names = || ALL.iter().map(|i| i.name()).collect::<Vec<_>>().join(", ");
-        Self::find(name).ok_or_else(|| format!("unknown integrator {name}; choose one of {}", names()))
+        Self::find(name).ok_or_else(|| Error::Usage(format!("unknown integrator {name}; choose one of {}", names())))
     }
 }
 
@@ -271,7 +271,7 @@ mod tests {
             assert_eq!(IntegratorName::find(integrator.name()).unwrap().name(), integrator.name());
             assert_eq!(ALL.iter().filter(|i| i.name() == integrator.name()).count(), 1);
         }
-        assert!("ambient".parse::<IntegratorName>().unwrap_err().contains("choose one of ao, path"));
+        assert!("ambient".parse::<IntegratorName>().unwrap_err().to_string().contains("choose one of ao, path"));
     }
 
     /// A setting that applies only to unknown integrators would have no effect.

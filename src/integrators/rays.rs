@@ -5,7 +5,7 @@ use crate::shaders;
 
 use crate::error::{Error, Result};
 use crate::film::Control;
-use crate::film::pace::{MOST, Pace};
+use crate::film::pace::{MAX_RAYS, Pace};
 use crate::gpu::{Buffer, Commands, Memory};
 use crate::interface::records::ray_set::RaySet;
 use crate::ray::{Hit, Ray};
@@ -120,7 +120,7 @@ impl<'t> PreparedRays<'t> {
         let (n, learning) = (self.count, self.passes == 0);
         let (mut first, mut device_seconds, mut wall_seconds) = (0, 0.0, 0.0);
         while first < n {
-            let rays = self.pace.rays().min(MOST);
+            let rays = self.pace.rays().min(MAX_RAYS);
             let launches = if learning { 1 } else { self.pace.launches() };
             let begin = first;
             let start = std::time::Instant::now();

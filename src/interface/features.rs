@@ -156,6 +156,7 @@ feature_set! {
     PathFeatures of /// A feature that lights and options may require of paths.
     PathFeature: "path_features", from PATH_FIRST, full false, indexed false, PATH;
     LightTree = "WITH_LIGHT_TREE", "light tree";
+    SurfaceLights = "WITH_SURFACE_LIGHTS", "surfaces that light samples find";
     LightChoice = "WITH_LIGHT_CHOICE", "a choice among lights";
     EnvironmentMap = "WITH_ENVIRONMENT_MAP", "environment map";
     LightSamples = "WITH_LIGHT_SAMPLES", "light samples";

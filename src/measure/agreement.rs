@@ -1,8 +1,8 @@
-//! Two tracers' answers to the same rays, held against each other without an oracle over the whole scene.
+//! Compares two tracers' hits of the same rays without an oracle over the whole scene.
 //!
 //! Where the answers differ, a double-precision oracle over only those primitives that either of them names decides: the
-//! difference is a tie when rounding allows both answers ([`super::parity`]), unexplained otherwise. What both miss is not
-//! seen; `tests/tracer/parity.rs` has that. It is what fits a benchmark: scenes of 10^7 triangles, differences of a few rays.
+//! difference is a tie when rounding allows both answers ([`super::parity`]), unexplained otherwise. Hits that both miss are not
+//! detected; `tests/tracer/parity.rs` tests those. This suits benchmarks: scenes of 10^7 triangles with differences in a few rays.
 
 use std::collections::{HashMap, HashSet};
 
@@ -14,11 +14,11 @@ use crate::oracle::{Oracle, OracleRay};
 use crate::ray::{Hit, Ray};
 use crate::scene::{Geometry, Mesh, Scene, TriangleMesh};
 
-/// Same primitive and a parameter within this many units of the last place: agreement that needs no judge. It is well below
-/// what [`Rounding`] allows.
+/// Same primitive and a parameter within this many units of the last place: agreement without consulting the oracle. It is well below
+/// the bound of [`Rounding`].
 const SAME_T_ULPS: f32 = 4.0;
 
-/// Do two closest hits say the same?
+/// Are two closest hits equal within [`SAME_T_ULPS`]?
 fn same(a: &Hit, b: &Hit) -> bool {
     match (a.is_hit(), b.is_hit()) {
         (false, false) => !a.t.is_nan() && !b.t.is_nan(),
@@ -31,7 +31,7 @@ fn same(a: &Hit, b: &Hit) -> bool {
     }
 }
 
-/// What a comparison found.
+/// Result of a comparison.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Agreement {
     /// How many rays agree, and what the others are.

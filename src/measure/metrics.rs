@@ -1,7 +1,5 @@
-//! How far apart two images are.
-//!
-//! Two images in, numbers out: `image` is judged against `reference`, both linear, over the pixels that `coverage` counts. A
-//! metric of a pair that holds a value that is not finite is NaN ([`ImagePair::non_finite`] counts them): a broken pixel must
+//! Image metrics: `image` is compared with `reference`, both linear, over the pixels that `coverage` counts. A
+//! metric of a pair that holds a value that is not finite is NaN ([`ImagePair::non_finite`] counts them): invalid pixels must
 //! not be averaged away. A metric of no pixels is NaN too.
 
 use crate::{Error, Result};
@@ -24,13 +22,13 @@ impl<'a> ImagePair<'a> {
     pub fn new(image: &'a [f32], reference: &'a [f32], channels: usize, coverage: Option<&'a [f32]>) -> Result<Self> {
         let wrong = |what: &str| Err(Error::Usage(format!("cannot compare images: {what}")));
         if channels == 0 || !image.len().is_multiple_of(channels) {
-            return wrong("the number of values is no multiple of the number of channels");
+            return wrong("the number of values is not a multiple of the number of channels");
         }
         if image.len() != reference.len() {
             return wrong(&format!("they differ in size ({} and {} values)", image.len(), reference.len()));
         }
         if coverage.is_some_and(|c| c.len() != image.len() / channels) {
-            return wrong("the coverage is of another size");
+            return wrong("the coverage differs in size");
         }
         Ok(Self { image, reference, channels, coverage })
     }

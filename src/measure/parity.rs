@@ -1,4 +1,4 @@
-//! The per-ray parity judge: does a single-precision tracer answer as the double-precision oracle does?
+//! Per-ray parity: does a single-precision tracer give the same hits as the double-precision oracle?
 //!
 //! Each ray is sorted into one of three classes.
 //!
@@ -8,7 +8,7 @@
 //!   rounding. For a *closest hit*: the primitive it names is possibly hit at that `t`, and nothing is certainly hit before. For
 //!   a *miss* (and "not occluded"): nothing is certainly hit. For "occluded": something is possibly hit. That covers coincident
 //!   surfaces, shared edges and vertices, grazing rays, hits at `tmin` or `tmax`, and alpha at its cutoff.
-//! - **unexplained**: anything else. A defect of a tracer, or of this judge.
+//! - **unexplained**: anything else. A defect of a tracer, or of this test.
 //!
 //! A tie is allowed to miss a closed mesh at a shared edge; [`super::ray_sets::leak_rays`] is the test that is not.
 
@@ -40,9 +40,9 @@ pub struct Example {
     pub ray: Ray,
     /// The answer under judgement; for any-hit streams `t` is 0 for "occluded" and infinite otherwise.
     pub answer: Hit,
-    /// The answer it is held against.
+    /// The answer it is compared with.
     pub reference: OracleHit,
-    /// What no rounding explains.
+    /// Why rounding does not explain the difference.
     pub reason: &'static str,
 }
 
@@ -122,14 +122,14 @@ fn id(instance: u32, primitive: u32) -> String {
     if instance == u32::MAX { "none".to_owned() } else { format!("{instance}/{primitive}") }
 }
 
-/// Is this answer to a closest-hit question one that rounding allows? `Err` says what is not.
+/// Does rounding allow this closest hit? `Err` has the reason why not.
 pub fn is_admissible(oracle: &Oracle, ray: &OracleRay, hit: &Hit, rounding: Rounding) -> Result<(), &'static str> {
     let certain = oracle.certain_before(ray, rounding);
-    // NaN falls here too
+    // NaN is not a hit
     if !hit.is_hit() {
         return match (certain.is_finite(), hit.t.is_nan()) {
             (_, true) => Err("t is not a number"),
-            (true, _) => Err("misses what it certainly meets"),
+            (true, _) => Err("misses a primitive that it certainly hits"),
             _ => Ok(()),
         };
     }
@@ -141,7 +141,7 @@ pub fn is_admissible(oracle: &Oracle, ray: &OracleRay, hit: &Hit, rounding: Roun
     if !named.any(|c| c.lo <= t && t <= c.hi) {
         return Err("names a primitive at a distance where it is not");
     }
-    if certain < t { Err("passes something nearer that it certainly meets") } else { Ok(()) }
+    if certain < t { Err("misses a nearer primitive that it certainly hits") } else { Ok(()) }
 }
 
 /// Judges one closest hit against the true one.
@@ -211,7 +211,7 @@ pub fn judge_any(oracle: &Oracle, rays: &[Ray], occluded: &[bool], truth: &[bool
             } else {
                 match oracle.certain_before(&ray, rounding).is_finite() {
                     false => Verdict::Tie,
-                    true => Verdict::Unexplained("misses what it certainly meets"),
+                    true => Verdict::Unexplained("misses a primitive that it certainly hits"),
                 }
             }
         };

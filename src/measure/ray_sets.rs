@@ -6,7 +6,7 @@ use crate::oracle::{Oracle, OracleHit, OracleRay};
 use crate::ray::Ray;
 use crate::sampling::sobol::hash_combine;
 use crate::sampling::{AO_DIRECTION, CAMERA_FILM, Sampler, to_unit, warp};
-use crate::scene::builtin::{self, Placement};
+use crate::scene::builtin::{self, SceneTransform};
 use crate::scene::{Camera, Scene};
 use glam::DVec3;
 use rayon::prelude::*;
@@ -116,7 +116,7 @@ pub fn mixed_rays(oracle: &Oracle, camera: &Camera, total: usize, seed: u32) -> 
 pub fn leak_scenes() -> Vec<(String, Scene)> {
     let mut out = Vec::new();
     for (scale, offset) in [(1.0, 0.0), (1e-3, 0.0), (1e3, 0.0), (1e6, 0.0), (1.0, 1e6), (1e-3, 1.0), (1e3, -1e6)] {
-        let place = Placement { scale, offset: DVec3::new(offset, offset * 0.37, -offset * 0.71) };
+        let place = SceneTransform { scale, offset: DVec3::new(offset, offset * 0.37, -offset * 0.71) };
         let cube = builtin::analytic::closed_box(1.0, place);
         let mut sphere = cube.clone();
         sphere.meshes[0].geometry = builtin::shapes::icosphere(1.0, 5);

@@ -1,20 +1,20 @@
-//! Numbers about repeated measurements: what a benchmark says of several timings of one thing.
+//! Statistics of repeated measurements.
 
 use serde::Serialize;
 
-/// Median and extremes of some values. The unit is theirs.
+/// Median, minimum and maximum of some values, in their unit.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Summary {
     /// Middle value; the mean of the two in the middle of an even number.
     pub median: f64,
-    /// Least.
+    /// Minimum.
     pub min: f64,
-    /// Greatest.
+    /// Maximum.
     pub max: f64,
 }
 
 impl Summary {
-    /// Of some values; `None` for no values.
+    /// Summarizes values; `None` for no values.
     pub fn of(values: &[f64]) -> Option<Self> {
         let mut sorted = values.to_vec();
         sorted.sort_by(f64::total_cmp);
@@ -23,17 +23,17 @@ impl Summary {
     }
 }
 
-/// Median of some values, and what all but the slowest twentieth stay within. The unit is theirs.
+/// Median and 95th percentile of some values, in their unit.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct Spread {
+pub struct MedianP95 {
     /// Middle value.
     pub median: f64,
     /// The 95th percentile, by nearest rank: a value that occurred.
     pub p95: f64,
 }
 
-impl Spread {
-    /// Of some values; `None` for no values.
+impl MedianP95 {
+    /// Summarizes values; `None` for no values.
     pub fn of(values: &[f64]) -> Option<Self> {
         let mut sorted = values.to_vec();
         sorted.sort_by(f64::total_cmp);
@@ -123,9 +123,9 @@ mod tests {
         assert_eq!(median(&[4.0, 1.0, 2.0, 3.0]), Some(2.5));
         assert_eq!(median(&[7.0]), Some(7.0));
         let hundred: Vec<f64> = (1..=100).rev().map(f64::from).collect();
-        assert_eq!(Spread::of(&hundred), Some(Spread { median: 50.5, p95: 95.0 }));
-        assert_eq!(Spread::of(&[2.0, 1.0]), Some(Spread { median: 1.5, p95: 2.0 }));
-        assert_eq!(Spread::of(&[]), None);
+        assert_eq!(MedianP95::of(&hundred), Some(MedianP95 { median: 50.5, p95: 95.0 }));
+        assert_eq!(MedianP95::of(&[2.0, 1.0]), Some(MedianP95 { median: 1.5, p95: 2.0 }));
+        assert_eq!(MedianP95::of(&[]), None);
         assert_eq!(percentile(&[], 0.95), None);
         assert_eq!(percentile(&[3.0, 1.0, 2.0, 4.0, 5.0], 0.5), Some(3.0));
         assert_eq!(percentile(&[3.0, 1.0, 2.0, 4.0, 5.0], 0.95), Some(4.8));

@@ -1,9 +1,9 @@
-//! What of the past is left in a sequence of images: lag, ghosts, recovery, drift.
+//! Temporal metrics of image sequences: lag, ghosting, recovery and drift.
 //!
 //! An image that reuses its past is, after a change, a blend of what is right and what was right before. Where both are known,
 //! the share of the old is a number that noise does not move: [`residual`]. What follows from it, frame by frame, is said by
 //! [`LagCurve`] and [`Ghosting`]; [`recovery`] and [`Drift`] take numbers a frame. Numbers in, numbers out; NaN wherever a value
-//! that counts is not finite: a broken pixel must not be averaged away.
+//! that counts is not finite: invalid pixels must not be averaged away.
 
 /// How much of a wrong history an image still shows, by least squares.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -63,10 +63,10 @@ pub struct LagCurve {
 }
 
 impl LagCurve {
-    /// What counts as gone.
+    /// Residual below which the old image counts as gone.
     pub const GONE: f64 = 0.05;
 
-    /// Of the residual of each frame.
+    /// A curve of the residual of each frame.
     pub fn new(residuals: Vec<f64>) -> Self {
         Self { residuals }
     }

@@ -3,7 +3,7 @@
 use crate::scene::{AlphaMode, Filter, Geometry, Mesh, Scene, TexelData, Texture, Wrap};
 use glam::{Affine2, DVec2, Vec2};
 
-/// Cutoff of blended materials in occlusion and visibility.
+/// Alpha cutoff of BLEND materials in occlusion and visibility.
 pub const BLEND_CUTOFF: f32 = 0.5;
 
 /// The alpha test of one mesh.
@@ -13,13 +13,13 @@ pub struct AlphaTest {
     base: f64,
     texture: Option<(Texture, Affine2)>,
     indices: Vec<[u32; 3]>,
-    /// Empty without a texture.
+    /// Texture coordinates; empty without a texture.
     texcoords: Vec<Vec2>,
-    /// Empty without vertex colours.
+    /// Alpha of the vertex colours; empty without them.
     vertex_alpha: Vec<f32>,
 }
 
-/// Uncertainty of the place where alpha is looked up.
+/// Uncertainty of an alpha lookup.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct AlphaUncertainty {
     /// Error of the barycentric weights of the three corners.
@@ -31,7 +31,7 @@ pub struct AlphaUncertainty {
 }
 
 impl AlphaTest {
-    /// The test that hits on `mesh` must pass, or `None` when all do.
+    /// The alpha test of `mesh`; `None` for opaque materials.
     pub fn new(scene: &Scene, mesh: &Mesh) -> Option<Self> {
         let material = scene.materials.get(mesh.material)?;
         let cutoff = match material.alpha_mode {
@@ -59,7 +59,7 @@ impl AlphaTest {
         Some(test)
     }
 
-    /// Does the surface exist at this point of the triangle? `barycentrics` weigh the second and third corner.
+    /// Is the surface opaque at this point of the triangle? `barycentrics` weigh the second and third corner.
     pub fn is_present(&self, primitive: u32, barycentrics: [f64; 2]) -> bool {
         self.alpha(primitive, barycentrics) >= self.cutoff
     }
@@ -71,7 +71,7 @@ impl AlphaTest {
         self.base * vertex * texture
     }
 
-    /// Least and greatest result of the test within the uncertainty: `(present for all, present for some)`.
+    /// Result of the test within the uncertainty: `(opaque everywhere, opaque somewhere)`.
     pub fn presence(&self, primitive: u32, barycentrics: [f64; 2], error: &AlphaUncertainty) -> (bool, bool) {
         let (vertex, uv) = self.interpolate(primitive, barycentrics);
         let corners = self.indices.get(primitive as usize).copied().unwrap_or_default();

@@ -1,6 +1,6 @@
-//! Ambient occlusion on the CPU: the reference for images.
+//! Ambient occlusion on the CPU in double precision: the ground truth for images.
 //!
-//! Accessibility is one minus the cosine-weighted occlusion, `A(p) = 1 - 1/pi * integral over the hemisphere of f(d) cos dw`,
+//! Ambient visibility is one minus the cosine-weighted occlusion, `A(p) = 1 - 1/pi * integral over the hemisphere of f(d) cos dw`,
 //! with `d` the distance to the nearest hit and `f(d) = c^-d` (1 for any hit within the radius when `c` is 1), around the
 //! geometric normal on the viewer's side, as in pbrt-v4's `AOIntegrator`. Points come from the same [`Sampler`] as the shaders'.
 
@@ -11,12 +11,12 @@ use crate::scene::Camera;
 use glam::DVec3;
 use rayon::prelude::*;
 
-/// What counts as occlusion.
+/// Parameters of ambient occlusion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AoSettings {
-    /// World units beyond which nothing occludes.
+    /// Distance beyond which nothing occludes, scene units.
     pub radius: f64,
-    /// `c` in `c^-d`, at least 1; `d` in world units. 1 is binary.
+    /// `c` in `c^-d`, at least 1; `d` in scene units. 1 is binary occlusion.
     pub falloff: f64,
 }
 
@@ -33,7 +33,7 @@ impl AoSettings {
     }
 }
 
-/// Occlusion met by one ray from `point` into the unit direction `direction`. It starts 1e-11 of the greatest coordinate above
+/// Occlusion along one ray from `point` into the unit direction `direction`. It starts 1e-11 of the greatest coordinate above
 /// the surface: well above rounding in double precision, far below anything that shows.
 pub fn ray_occlusion(oracle: &Oracle, point: DVec3, normal: DVec3, direction: DVec3, settings: &AoSettings) -> f64 {
     let reach = oracle.bounds().map_or(0.0, |(lo, hi)| (hi - lo).max_element().max(point.abs().max_element()));
@@ -50,9 +50,9 @@ pub struct Estimate {
     pub standard_error: f64,
 }
 
-/// Accessibility of `point` (relative to the oracle's origin) around the unit vector `normal`, from `samples` rays. `pixel`
+/// Ambient visibility of `point` (relative to the oracle's origin) around the unit vector `normal`, from `samples` rays. `pixel`
 /// chooses the point set.
-pub fn accessibility(
+pub fn ambient_visibility(
     oracle: &Oracle,
     point: DVec3,
     normal: DVec3,
@@ -87,15 +87,15 @@ pub fn ao_direction(sampler: Sampler, pixel: [u32; 2], index: u32, normal: DVec3
 pub struct AoImage {
     /// Width and height.
     pub size: [u32; 2],
-    /// Mean accessibility of the samples that met a surface; 0 where none did. Rows from the top.
-    pub accessibility: Vec<f32>,
-    /// Share of the samples that met a surface.
+    /// Mean ambient visibility of the samples that hit a surface; 0 where none did. Rows from the top.
+    pub ambient_visibility: Vec<f32>,
+    /// Share of the samples that hit a surface, in [0, 1].
     pub coverage: Vec<f32>,
     /// Variance of a single covered sample (not of the mean).
     pub variance: Vec<f32>,
 }
 
-/// Renders `spp` samples a pixel: each a jittered camera ray and one occlusion ray from what it meets.
+/// Renders `spp` samples a pixel: each a jittered camera ray and one occlusion ray from its hit.
 pub fn render(oracle: &Oracle, camera: &Camera, size: [u32; 2], spp: u32, seed: u32, settings: &AoSettings) -> AoImage {
     let sampler = Sampler { seed };
     let pixels: Vec<[f32; 3]> = (0..size[0] as usize * size[1] as usize)
@@ -123,7 +123,7 @@ pub fn render(oracle: &Oracle, camera: &Camera, size: [u32; 2], spp: u32, seed: 
         .collect();
     AoImage {
         size,
-        accessibility: pixels.iter().map(|p| p[0]).collect(),
+        ambient_visibility: pixels.iter().map(|p| p[0]).collect(),
         coverage: pixels.iter().map(|p| p[1]).collect(),
         variance: pixels.iter().map(|p| p[2]).collect(),
     }

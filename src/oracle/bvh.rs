@@ -1,4 +1,4 @@
-//! A plain binary BVH in double precision: binned surface area heuristic (Wald 2007), no tricks.
+//! A plain binary BVH in double precision: binned surface area heuristic (Wald 2007).
 
 use super::OracleRay;
 use glam::DVec3;
@@ -41,7 +41,7 @@ fn half_area((lo, hi): Box3) -> f64 {
 }
 
 impl Bvh {
-    /// Boxes that are not finite are left out: nothing can meet what they hold.
+    /// Builds the tree. Boxes that are not finite are skipped, because no ray hits their primitives.
     pub(super) fn build(boxes: &[Box3]) -> Self {
         let finite = |b: &Box3| b.0.is_finite() && b.1.is_finite();
         let order: Vec<u32> = (0u32..).zip(boxes).filter(|(_, b)| finite(b)).map(|(i, _)| i).collect();
@@ -84,7 +84,7 @@ impl Bvh {
     /// parameter beyond which nothing matters any more.
     pub(super) fn visit(&self, ray: &OracleRay, pad: f64, limit: f64, mut visit: impl FnMut(u32) -> ControlFlow<(), f64>) {
         let inverse = ray.direction.recip();
-        // NaN (a zero component on the slab's plane) is passed over by min and max: the slab does not limit the ray
+        // NaN (a zero direction component on the slab's plane) is ignored by min and max: the slab does not limit the ray
         let enter = |n: &Node, limit: f64| -> Option<f64> {
             let (mut near, mut far) = (ray.tmin, limit);
             for k in 0..3 {

@@ -1,19 +1,19 @@
-//! Ambient occlusion that mathematics knows: accessibility (1 - cosine-weighted occlusion) in closed form or by
-//! one-dimensional quadrature.
+//! Analytic ambient visibility (1 - cosine-weighted occlusion) of simple scenes, in closed form or by one-dimensional
+//! quadrature.
 //!
-//! Lengths are in world units, angles in radians. For binary occlusion, cosine-weighted occlusion is the form factor from a
+//! Lengths are in scene units, angles in radians. For binary occlusion, cosine-weighted occlusion is the form factor from a
 //! point to what occludes (Howell, "A Catalog of Radiation Heat Transfer Configuration Factors"). With falloff, `c` is the base
 //! of `c^-d`, at least 1; 1 is binary. Everything is tested against Monte Carlo integration by the oracle.
 
 use glam::DVec3;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
-/// A point of a plane with nothing above it: fully accessible.
+/// Ambient visibility of a point of an unoccluded plane: 1.
 pub fn plane() -> f64 {
     1.0
 }
 
-/// A point inside a closed surface: not accessible at all.
+/// Ambient visibility of a point inside a closed surface: 0.
 pub fn closed_box() -> f64 {
     0.0
 }

@@ -1,10 +1,10 @@
-//! The judge: a CPU tracer in double precision, and the answers that mathematics gives.
+//! The oracle: a CPU tracer in double precision, and closed-form solutions of ambient occlusion.
 //!
-//! [`Oracle`] answers every ray twice, by testing all primitives and by a BVH, with the same result; tests hold both against
-//! each other and every other tracer against them. [`rounding`] says which answers of a single-precision tracer are within
-//! its rounding; [`closed_form`] and [`ao`] judge ambient occlusion itself.
+//! [`Oracle`] answers every ray twice, by testing all primitives and by a BVH, with the same result; tests compare both with
+//! each other and every other tracer with them. [`rounding`] decides which answers of a single-precision tracer are within
+//! its rounding; [`closed_form`] and [`ao`] are references for ambient occlusion itself.
 //!
-//! Nothing here is tuned beyond what tests need, so that it stays easy to believe.
+//! The code is kept simple rather than fast, so that its correctness is easy to verify.
 
 pub mod alpha;
 pub mod ao;
@@ -70,27 +70,27 @@ pub struct OracleHit {
 }
 
 impl OracleHit {
-    /// What a ray that meets nothing gets.
+    /// The record of a miss.
     pub const MISS: OracleHit = OracleHit { t: f64::INFINITY, instance: u32::MAX, primitive: u32::MAX, barycentrics: [0.0; 2] };
 
-    /// Did the ray meet something?
+    /// Is it a hit?
     pub fn is_hit(&self) -> bool {
         self.t < f64::INFINITY
     }
 
-    /// The same in the precision of the tracers.
+    /// The hit in single precision.
     pub fn to_hit(&self) -> Hit {
         let [u, v] = self.barycentrics.map(|x| x as f32);
         Hit { t: self.t as f32, instance: self.instance, primitive: self.primitive, u, v }
     }
 }
 
-/// Where the primitives of an instance lie in the oracle's numbering, and what tracers do to its rays.
+/// Range of an instance's primitives in the oracle's numbering, and the error bounds of its transform.
 #[derive(Clone, Debug)]
 struct OracleInstance {
     first: u32,
     count: u32,
-    /// None where every hit counts.
+    /// Alpha test of its mesh; `None` for opaque materials.
     alpha: Option<Arc<AlphaTest>>,
     /// Bound on how much a round trip to object space amplifies rounding: Frobenius norms of the matrix and its inverse,
     /// scaled to 1 for rotations and uniform scales; infinite for a singular matrix.
@@ -117,7 +117,7 @@ impl Oracle {
     /// Instances with a broken transform or mesh index contribute nothing.
     pub fn new(scene: &Scene, origin: DVec3) -> Self {
         let (mut triangles, mut spheres, mut instances) = (Vec::new(), Vec::new(), Vec::new());
-        // one alpha test a mesh, however often it is placed
+        // one alpha test per mesh, shared by its instances
         let tests: Vec<_> = scene.meshes.iter().map(|mesh| AlphaTest::new(scene, mesh).map(Arc::new)).collect();
         for (id, instance) in (0u32..).zip(&scene.instances) {
             let mut to_world = instance.object_to_world;
@@ -138,7 +138,7 @@ impl Oracle {
                     entry.first = triangles.len() as u32;
                     entry.count = mesh.indices.len() as u32;
                     triangles.extend((0u32..).zip(&mesh.indices).map(|(primitive, corners)| {
-                        // an index that is out of range makes a triangle that nothing meets
+                        // an index that is out of range makes a triangle that no ray hits
                         let v = corners.map(|i| points.get(i as usize).copied().unwrap_or(DVec3::NAN));
                         Triangle { v, instance: id, primitive }
                     }));
@@ -171,7 +171,7 @@ impl Oracle {
         Self { origin, triangles, spheres, instances, bvh, extent }
     }
 
-    /// The world point that is this oracle's zero.
+    /// World position of the oracle's coordinate origin.
     pub fn origin(&self) -> DVec3 {
         self.origin
     }
@@ -255,7 +255,7 @@ impl Oracle {
         if n.dot(ray.direction) > 0.0 { -n } else { n }
     }
 
-    /// The oracle's number of a primitive.
+    /// Index of a primitive in the oracle's numbering.
     fn index_of(&self, instance: u32, primitive: u32) -> Option<u32> {
         let i = self.instances.get(instance as usize)?;
         (primitive < i.count).then(|| i.first + primitive)
@@ -294,7 +294,7 @@ impl Oracle {
         }
     }
 
-    /// How far boxes are widened in traversal: covers [`primitive::RESIDUAL`] and the rounding of the slab test.
+    /// Widening of boxes in traversal, which covers [`primitive::RESIDUAL`] and the rounding of the slab test.
     fn pad(&self, ray: &OracleRay) -> f64 {
         4.0 * primitive::RESIDUAL * (self.extent + ray.origin.abs().max_element())
     }

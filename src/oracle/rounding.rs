@@ -1,4 +1,4 @@
-//! Which answers of a single-precision tracer are within its rounding.
+//! Decides which answers of a single-precision tracer are within its rounding error.
 //!
 //! **Error model.** A tracer in `f32` is taken to answer exactly, but for slightly wrong data (backward error analysis, Higham
 //! 2002): every vertex and the ray's line may be displaced by
@@ -36,7 +36,7 @@ use super::{Oracle, OracleRay};
 use glam::DVec3;
 use std::ops::ControlFlow;
 
-/// The error model's one number.
+/// The parameter of the error model.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rounding {
     /// Units of 2^-23 in `delta`; see the module's text.
@@ -56,7 +56,7 @@ pub struct Candidate {
     pub lo: f64,
     /// Greatest parameter it may report.
     pub hi: f64,
-    /// It must be seen (unless something nearer is).
+    /// A tracer must report it (unless it reports a nearer hit).
     pub certain: bool,
 }
 
@@ -91,7 +91,7 @@ impl Oracle {
         found.into_iter().filter(Candidate::is_possible)
     }
 
-    /// The parameter by which the ray has certainly met something; infinite when it may pass.
+    /// Greatest parameter of the nearest certain hit; infinite if the ray may miss everything.
     pub fn certain_before(&self, ray: &OracleRay, rounding: Rounding) -> f64 {
         let mut best = f64::INFINITY;
         self.bvh.visit(ray, self.pad(ray), ray.tmax, |index| {
@@ -111,7 +111,7 @@ impl Oracle {
         let translation = self.instances.iter().map(|i| i.translation).fold(0.0, f64::max);
         let reach = ray.origin.length() + 2.0 * self.extent + translation;
         let pad = (rounding.ulps * f32::EPSILON as f64 * worst * reach).min(f64::MAX) + self.pad(ray);
-        // before tmin and beyond tmax by as much
+        // extend the range before tmin and beyond tmax accordingly
         let slack = pad / ray.direction.length();
         let wide = OracleRay { tmin: ray.tmin - slack, ..*ray };
         let mut found = false;
@@ -178,7 +178,7 @@ impl Oracle {
         let (first, last) = ((first - delta) / length, (last + delta) / length);
         let (mut lo, mut hi) = ((t_plane - slack).max(first), (t_plane + slack).min(last));
         if lo > hi {
-            // the line passes the triangle outside: whatever it is said to meet is somewhere on it
+            // the line passes the triangle outside: a reported hit can be anywhere on it
             (lo, hi) = (first, last);
         }
         let rounded = 4.0 * f32::EPSILON as f64;

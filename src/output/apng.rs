@@ -1,5 +1,5 @@
-//! APNG: a PNG that moves, 8-bit sRGB, for looking at. It is written frame by frame, runs for ever, and a program that knows no
-//! animations shows its first frame.
+//! APNG: animated PNG, 8-bit sRGB, for previews. It is written frame by frame and loops forever; programs without APNG support show
+//! the first frame.
 
 use std::fs::File;
 use std::io::{self, BufWriter};
@@ -22,7 +22,7 @@ pub struct Delay {
 }
 
 impl Delay {
-    /// For so many frames a second, in [0.001, 1000]: the simplest fraction within a millionth of it, or the nearest there is.
+    /// The delay for a frame rate in frames per second, in [0.001, 1000]: the simplest fraction within a millionth of it, or the nearest representable one.
     pub fn of_rate(frames_per_second: f64) -> Result<Self> {
         if !(0.001..=1000.0).contains(&frames_per_second) {
             return Err(Error::Usage(format!("{frames_per_second} frames a second: must be between 0.001 and 1000")));
@@ -45,16 +45,16 @@ impl Delay {
     }
 }
 
-/// What is known of an animation before its first frame.
+/// Header of an animation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Animation {
-    /// Pixels in x and y, of every frame.
+    /// Width and height of every frame, pixels.
     pub size: [u32; 2],
-    /// Of every frame.
+    /// Colour type of every frame.
     pub colour: Colour,
-    /// How many frames there will be, at least 1.
+    /// Number of frames, at least 1.
     pub frames: u32,
-    /// How long each is shown.
+    /// Duration of each frame.
     pub delay: Delay,
 }
 
@@ -63,9 +63,9 @@ pub fn is_apng(path: &Path) -> bool {
     path.extension().is_some_and(|e| e.eq_ignore_ascii_case("apng"))
 }
 
-/// An animation that is being written. It is in its place after [`ApngWriter::finish`]; dropped before, it leaves nothing behind.
+/// An animation that is being written. The file appears with [`ApngWriter::finish`]; dropped before, it leaves nothing behind.
 pub struct ApngWriter {
-    // before the file: dropped first, while what it ends in is still there
+    // declared before the file, so that it is dropped first and can still flush to it
     encoder: Writer<BufWriter<File>>,
     file: AtomicFile,
     path: PathBuf,
@@ -83,7 +83,8 @@ impl ApngWriter {
         let Animation { size: [width, height], colour, frames, delay } = animation;
         check_size(width, height)?;
         if frames == 0 || delay.denominator == 0 {
-            let what = format!("{}: an animation needs a frame, and a frame a delay", path.display());
+            let what =
+                format!("{}: an animation needs at least one frame, and a delay with a denominator above 0", path.display());
             return Err(Error::Usage(what));
         }
         let mut file = AtomicFile::create(path)?;
@@ -139,13 +140,13 @@ impl ApngWriter {
         self.added
     }
 
-    /// Puts the animation in its place.
+    /// Finishes the animation and moves the file to its path.
     ///
     /// # Errors
     /// [`Error::Usage`] when frames are missing, [`Error::Output`] where it cannot be written; then there is no file.
     pub fn finish(self) -> Result<()> {
         if self.added < self.animation.frames {
-            return Err(self.wrong(&format!("{} of its {} frames are there", self.added, self.animation.frames)));
+            return Err(self.wrong(&format!("{} of {} frames were written", self.added, self.animation.frames)));
         }
         let Self { encoder, file, .. } = self;
         encoder.finish().map_err(|e| file.failed(&reason(e)))?;

@@ -103,7 +103,7 @@ fn sort_attributes(file: &mut File) -> io::Result<()> {
 /// Lets the library read the samples where they lie: a copy of a large image would double its memory.
 struct Borrowed<'a>(&'a Samples);
 
-/// Hands out pieces of rows.
+/// Copies parts of rows to the encoder.
 struct RowWriter<'a> {
     samples: &'a Samples,
     width: usize,
@@ -142,7 +142,7 @@ impl SamplesWriter for RowWriter<'_> {
     }
 }
 
-/// Reads an EXR with all its channels (16-bit floats become 32-bit ones) and its `skylit.` metadata, sorted by key. In a
+/// Reads an EXR with all its channels (16-bit floats are converted to 32-bit ones) and its `skylit.` metadata, sorted by key. In a
 /// file with several parts, a part's name becomes the prefix of its channels' names; all parts must have the same size.
 pub fn read(path: &Path) -> Result<Image> {
     let broken = |e: exr::error::Error| match e {

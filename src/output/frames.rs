@@ -1,11 +1,11 @@
-//! Numbers in names: `out.####.exr` is one file a frame.
+//! Frame numbers in file names: `out.####.exr` is one file per frame.
 
 use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Result};
 
-/// A path whose file name has a place for the number of the frame: a run of `#`, as many as there are digits at least. In the
-/// names of folders `#` means nothing.
+/// A path whose file name contains a placeholder for the frame number: a run of `#`, one per digit at least. In folder names
+/// `#` has no meaning.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FramePattern {
     path: PathBuf,
@@ -15,7 +15,7 @@ pub struct FramePattern {
 }
 
 impl FramePattern {
-    /// The pattern that a path is, or `None` for a path without one.
+    /// The pattern of a path; `None` for a path without a placeholder.
     ///
     /// # Errors
     /// [`Error::Usage`] for more than one run of `#`, or one in a name that is no Unicode.
@@ -29,7 +29,7 @@ impl FramePattern {
         let (before, rest) = name.split_at(start);
         let after = rest.trim_start_matches('#');
         if after.contains('#') {
-            return wrong("more than one place for the frame number; leave one run of #, like out.####.exr");
+            return wrong("more than one placeholder for the frame number; use one run of #, like out.####.exr");
         }
         let digits = rest.len() - after.len();
         Ok(Some(Self { path: path.to_owned(), before: before.to_owned(), digits, after: after.to_owned() }))
@@ -41,7 +41,7 @@ impl FramePattern {
     }
 }
 
-/// Has a path a place for the number of a frame? Errors are those of [`FramePattern::of`].
+/// Does a path contain a frame number placeholder? Errors are those of [`FramePattern::of`].
 pub fn is_pattern(path: &Path) -> Result<bool> {
     Ok(FramePattern::of(path)?.is_some())
 }

@@ -1,5 +1,4 @@
-//! Images in files: EXR with named float channels, PNG for looking, APNG for looking at many, and numbers in names for one file
-//! a frame.
+//! Image files: EXR with named float channels, PNG and APNG for previews, and frame numbers in file names.
 
 pub mod apng;
 pub mod exr;
@@ -12,7 +11,7 @@ use std::path::Path;
 use crate::error::{Error, Result};
 use crate::settings::parse::Parsed;
 
-/// Most pixels an image may have: 16384 x 16384. More would overflow the 32-bit indices of the tracers.
+/// Maximum number of pixels of an image: 16384 x 16384. More would overflow the 32-bit indices of the tracers.
 pub const MAX_PIXELS: u64 = 1 << 28;
 
 /// Samples of one channel, rows from the top, `width * height` of them.
@@ -25,7 +24,7 @@ pub enum Samples {
 }
 
 impl Samples {
-    /// How many samples there are.
+    /// Number of samples.
     pub fn len(&self) -> usize {
         match self {
             Samples::F32(s) => s.len(),
@@ -33,7 +32,7 @@ impl Samples {
         }
     }
 
-    /// Are there none?
+    /// Is it empty?
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
@@ -48,12 +47,12 @@ pub struct Channel {
     pub samples: Samples,
 }
 
-/// An image with named channels, linear values, and text that says how it came to be.
+/// An image with named channels, linear values, and text metadata on how it was rendered.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Image {
-    /// Pixels in x.
+    /// Width in pixels.
     pub width: u32,
-    /// Pixels in y.
+    /// Height in pixels.
     pub height: u32,
     /// Channels; the names are distinct.
     pub channels: Vec<Channel>,
@@ -104,7 +103,7 @@ impl Image {
 pub enum ImageFormat {
     /// OpenEXR: every channel, 32 bits, metadata.
     Exr,
-    /// PNG: 8-bit sRGB of the colour channels, for looking.
+    /// PNG: 8-bit sRGB of the colour channels, for previews.
     Png,
 }
 
@@ -137,7 +136,7 @@ pub fn load(path: &Path) -> Result<Image> {
     }
 }
 
-/// `WxH`, pixels.
+/// Parses an image size `WxH` in pixels.
 pub fn parse_size(text: &str) -> Parsed<[u32; 2]> {
     let side = |s: &str| s.trim().parse::<u32>().map_err(|_| "expected WIDTHxHEIGHT in pixels, like 1280x720".to_owned());
     let (w, h) = text.split_once(['x', 'X']).ok_or("expected WIDTHxHEIGHT in pixels, like 1280x720")?;

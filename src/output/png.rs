@@ -1,6 +1,6 @@
-//! PNG: 8-bit sRGB, for looking at.
+//! PNG: 8-bit sRGB, for previews.
 //!
-//! Which channels: `R`, `G` and `B` give a colour image; `Y`, or `R` alone, a grey one. Other channels (alpha, depth, ids)
+//! Channels `R`, `G` and `B` give a colour image; `Y`, or `R` alone, a grey one. Other channels (alpha, depth, ids)
 //! and the metadata are left out: EXR keeps them.
 
 use std::fs::File;
@@ -16,7 +16,7 @@ use crate::colour::{srgb_byte, srgb_decode};
 use crate::error::{Error, Result};
 use crate::files::write_atomically;
 
-/// What the bytes of a picture mean.
+/// Colour type of 8-bit pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Colour {
     /// One byte a pixel.

@@ -1,4 +1,4 @@
-//! From radiance to what a display can show. Applied when an 8-bit picture is written, and never before: images are kept linear.
+//! Tone mapping from radiance to display range. Applied only when an 8-bit image is written: images are kept linear.
 
 use crate::settings::choices;
 use rayon::prelude::*;
@@ -24,7 +24,7 @@ choices! {
 type Rgb = [f32; 3];
 
 impl ToneMap {
-    /// Of one colour; what is not finite or negative counts as 0.
+    /// Maps one colour; negative and non-finite values count as 0.
     pub fn map(self, colour: Rgb) -> Rgb {
         let c = colour.map(|x| if x.is_finite() { x.max(0.0) } else { 0.0 });
         match self {
@@ -39,7 +39,7 @@ impl ToneMap {
         }
     }
 
-    /// The channels `R`, `G`, `B` of an image, brightened by `exposure` stops and mapped; the others are left out, as are all where one of these is missing.
+    /// The channels `R`, `G`, `B` of an image, brightened by `exposure` stops and mapped; other channels are dropped, and all channels if one of these is missing.
     pub fn apply(self, image: &Image, exposure: f32) -> Image {
         let gain = exposure.exp2();
         let mut out = Image { width: image.width, height: image.height, ..Default::default() };

@@ -1,4 +1,4 @@
-//! One camera ray a pixel, traced or rasterized: who renders need not know which.
+//! One camera ray per pixel, traced or rasterized behind one interface.
 
 use super::{Primary, Raster, View};
 use crate::error::Result;
@@ -6,11 +6,11 @@ use crate::gpu::Recorder;
 use crate::shaders::StreamShaders;
 use crate::tracer::{Push, Stream, Tracer};
 
-/// What finds the hits of a stream of camera rays, one through each pixel.
+/// Finds the hits of a stream of camera rays, one through each pixel.
 pub enum CameraRays {
-    /// A tracer.
+    /// Rays are traced.
     Traced(Box<Stream>),
-    /// Triangles that are drawn first.
+    /// The scene is rasterized first.
     Rasterized(Box<Raster>),
 }
 
@@ -26,12 +26,12 @@ impl CameraRays {
         })
     }
 
-    /// Has [`CameraRays::draw`] something to record?
+    /// Is primary visibility rasterized, so that [`CameraRays::draw`] records commands?
     pub fn is_rasterized(&self) -> bool {
         matches!(self, Self::Rasterized(_))
     }
 
-    /// Records what has to be drawn of a view before its rays, if anything.
+    /// Records the rasterization of a view, if any, before its rays.
     ///
     /// # Errors
     /// Those of [`Raster::draw`].

@@ -1,4 +1,4 @@
-//! From the world to the image as a rasteriser takes it, and what of the scene lies outside of the image.
+//! View and projection transforms for rasterization, and frustum culling.
 
 use glam::{DMat3, DVec3, Vec3};
 
@@ -7,13 +7,13 @@ use crate::error::{Error, Result};
 use crate::film::block::Block;
 use crate::film::camera::CameraRecord;
 
-/// Pixels around the image that are kept: a rasteriser rounds corners to a fraction of one.
+/// Margin around the image, pixels: a rasterizer rounds vertices to a fraction of a pixel.
 const MARGIN: f64 = 1.0;
 /// Relative rounding of clip coordinates: 32 half-ulps.
 const ROUNDING: f64 = 16.0 * f32::EPSILON as f64;
-/// By so much of its size is a box widened: spheres are drawn in boxes that are a little larger than they (shaders/raster/sphere.vert).
+/// Relative widening of a box: spheres are drawn in boxes that are a little larger than they (shaders/raster/sphere.vert).
 const WIDENED: f64 = 2e-3;
-/// The near plane of a perspective view, as a part of the depth of the farthest that is in it. Depth is reversed and floating, so it
+/// Near plane of a perspective view, relative to the farthest depth in it. Depth is reversed and floating, so it
 /// costs no precision; what is nearer, single precision does not tell from the eye.
 const NEAR: f64 = 1e-9;
 
@@ -22,38 +22,38 @@ const NEAR: f64 = 1e-9;
 pub struct View {
     /// The camera.
     pub camera: CameraRecord,
-    /// Of the whole image, pixels.
+    /// Size of the whole image, pixels.
     pub image_size: [u32; 2],
-    /// The part of it.
+    /// The rendered block of the image.
     pub block: Block,
     /// Where in its pixel each ray passes, pixels from the upper left corner; the centre is `[0.5, 0.5]`. The rays of the stream that
     /// uses what is drawn must pass there.
     pub at: [f32; 2],
 }
 
-/// How much of a box is in the view.
+/// Result of a frustum test.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Sight {
-    /// Nothing, for certain.
-    Nothing,
-    /// Some of it, perhaps.
-    Part,
-    /// All.
-    All,
+pub(super) enum FrustumTest {
+    /// The box is certainly outside.
+    Outside,
+    /// The box may intersect the frustum.
+    Intersecting,
+    /// The box is certainly inside.
+    Inside,
 }
 
-/// Where something is: positive inside. In terms of the place relative to the eye.
+/// A plane, positive inside, of positions relative to the eye.
 #[derive(Clone, Copy)]
 struct Plane {
     normal: DVec3,
     offset: f64,
 }
 
-/// A view's volume.
+/// The view frustum.
 pub(super) struct Frustum {
-    /// Where the camera is, relative to the scene's origin.
+    /// Camera position relative to the scene's origin.
     pub eye: Vec3,
-    /// The camera's transform turns the winding.
+    /// The camera's transform flips the winding order.
     pub turned: bool,
     orthographic: bool,
     // clip coordinates x, y, w
@@ -75,7 +75,7 @@ impl Plane {
         normal.extend(offset).as_vec4().to_array()
     }
 
-    /// Least and greatest value over a box of a group, what may be rounded included.
+    /// Conservative range of values over a group's box, rounding included.
     fn range(&self, bounds: &Aabb, to_world: &[[f32; 4]; 3], eye: DVec3) -> [f64; 2] {
         let row = |k: usize| DVec3::from_array([0, 1, 2].map(|j| to_world[k][j] as f64));
         let normal = row(0) * self.normal.x + row(1) * self.normal.y + row(2) * self.normal.z;
@@ -132,20 +132,20 @@ impl Frustum {
         })
     }
 
-    /// How much of a group's box is seen.
-    pub fn sight(&self, bounds: &Aabb, to_world: &[[f32; 4]; 3]) -> Sight {
-        let mut sight = Sight::All;
+    /// Tests a group's box against the frustum.
+    pub fn classify(&self, bounds: &Aabb, to_world: &[[f32; 4]; 3]) -> FrustumTest {
+        let mut result = FrustumTest::Inside;
         for plane in &self.planes {
             let [least, most] = plane.range(bounds, to_world, self.eye.as_dvec3());
             if most < 0.0 {
-                return Sight::Nothing;
+                return FrustumTest::Outside;
             }
             // NaN is no reason to leave anything out, nor to take all for seen
             if least.is_nan() || least < 0.0 {
-                sight = Sight::Part;
+                result = FrustumTest::Intersecting;
             }
         }
-        sight
+        result
     }
 
     /// Least and greatest depth of a group's box.
@@ -153,7 +153,7 @@ impl Frustum {
         self.depth.range(bounds, to_world, self.eye.as_dvec3())
     }
 
-    /// Rows that take a place relative to the eye to clip space. Depth is reversed: it is greatest in front. `depth` is the range of what
+    /// Rows of the matrix from positions relative to the eye to clip space. Depth is reversed: it is greatest in front. `depth` is the range of what
     /// is seen; clip space is `wide` times as large as the image.
     pub fn clip(&self, depth: [f64; 2], wide: f64) -> [[f32; 4]; 4] {
         let z = if self.orthographic {

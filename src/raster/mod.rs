@@ -1,9 +1,9 @@
-//! What camera rays meet, drawn instead of traced: one ray a pixel.
+//! Rasterized primary visibility: hits of camera rays, one ray per pixel.
 //!
-//! Triangles are drawn into an image that says which primitive each pixel shows, and a compute shader meets each ray with that one
-//! primitive and calls the stream back (`shaders/trace/visibility.glsl`). So a pass's shader is the same, and gets the same hits, as
-//! when its rays are traced; only where a ray passes an edge within a fraction of a pixel that hardware rounds corners to may the
-//! neighbour be met.
+//! Geometry is rasterized into a visibility buffer (one primitive id per pixel), and a compute shader intersects each ray with that one
+//! primitive and calls the stream's shader (`shaders/trace/visibility.glsl`). So a pass's shader is the same, and gets the same hits, as
+//! when its rays are traced; only where a ray passes an edge within the sub-pixel precision of the rasterizer may the
+//! neighbouring primitive be hit instead.
 
 mod camera_rays;
 mod frustum;
@@ -19,12 +19,12 @@ use crate::film::block::BlockParams;
 use crate::gpu::{Buffer, Cull, Device, GraphicsPipeline, Memory, Recorder, Targets};
 use crate::interface::records::raster::RasterParams;
 use crate::shaders::{self, StreamShaders};
-use crate::tracer::drawable::CHUNK;
+use crate::tracer::raster_instance::CHUNK;
 use crate::tracer::stream;
-use crate::tracer::{Drawable, Push, Stream, Tracer};
+use crate::tracer::{Push, RasterInstance, Stream, Tracer};
 pub use camera_rays::CameraRays;
 pub use frustum::View;
-use frustum::{Frustum, Sight};
+use frustum::{Frustum, FrustumTest};
 
 /// Vertices of the box around a sphere; shaders/raster/sphere.vert.
 const BOX_VERTICES: u32 = 36;
@@ -38,7 +38,7 @@ struct RasterMemory {
 }
 
 choices! {
-    /// Primary visibility: how it is found what camera rays meet.
+    /// Primary visibility: rasterized or ray traced.
     pub enum Primary {
         /// Ray traced
         Traced = "traced",
@@ -47,38 +47,38 @@ choices! {
     }
 }
 
-/// Placed primitives per pixel up to which drawing costs less than tracing: of CPUs, and of other devices. Mesa's CPU driver takes 90 to
+/// Maximum number of instanced primitives per pixel at which rasterizing costs less than tracing: on CPU devices, and on others. Mesa's CPU driver takes 90 to
 /// 240 ns for a triangle, however small; with 0.43 of them a pixel both cost the same, with 0.28 drawing saves a third
-/// (`examples/primary.rs`). Of GPUs it is not measured.
+/// (`examples/primary.rs`). It was not measured on GPUs.
 const PRIMITIVES_PER_PIXEL: (f64, f64) = (0.4, 8.0);
 
 impl Primary {
-    /// What costs less for images of so many pixels, one sample each, and why.
+    /// The cheaper method for images of `pixels` pixels with one sample each, and the reason.
     pub fn auto(tracer: &Tracer, pixels: u64) -> (Primary, String) {
         let info = &tracer.device().info;
         if !info.can_rasterise() {
             return (Primary::Traced, format!("the device lacks {}, which rasterising needs", info.missing_raster.join(", ")));
         }
-        let placed: u64 = tracer.drawables().map(|d| d.shape.primitives as u64).sum();
+        let placed: u64 = tracer.raster_instances().map(|d| d.shape.primitives as u64).sum();
         let most = if info.is_cpu() { PRIMITIVES_PER_PIXEL.0 } else { PRIMITIVES_PER_PIXEL.1 };
         let share = placed as f64 / pixels.max(1) as f64;
         let primary = if share > most { Primary::Traced } else { Primary::Raster };
-        (primary, format!("{share:.2} primitives a pixel: up to {most} this device draws faster than it traces"))
+        (primary, format!("{share:.2} primitives per pixel; up to {most}, this device rasterizes faster than it traces"))
     }
 }
 
-/// What was drawn.
+/// Statistics of a rasterized view.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Drawn {
-    /// Draw calls.
+pub struct DrawStats {
+    /// Number of draw calls.
     pub draws: usize,
-    /// Primitives in them.
+    /// Number of primitives drawn.
     pub primitives: u64,
-    /// Placed primitives of the scene.
+    /// Number of primitives of the scene over all instances.
     pub placed: u64,
 }
 
-/// Draws a tracer's scene, and finds the hits of a stream of camera rays from it.
+/// Rasterizes a tracer's scene and finds the hits of a stream of camera rays with it.
 pub struct Raster {
     triangles: GraphicsPipeline,
     // only where the scene has any
@@ -90,13 +90,13 @@ pub struct Raster {
     stream: Stream,
 }
 
-/// Consecutive primitives of an entry.
+/// Consecutive primitives of a TLAS instance.
 struct Draw {
     push: Push,
     primitives: Range<u32>,
 }
 
-/// By pipeline.
+/// Draws by pipeline.
 #[derive(Default)]
 struct Draws {
     triangles: Vec<Draw>,
@@ -108,17 +108,17 @@ impl Raster {
     /// Compiles the shaders for a scene and a stream of camera rays, and allocates for blocks of up to `size` pixels.
     ///
     /// # Errors
-    /// [`crate::Error::Device`] when the device does not draw, or not so large; [`crate::Error::Usage`] for a stream whose rays are
+    /// [`crate::Error::Device`] when the device cannot rasterize, or not at this size; [`crate::Error::Usage`] for a stream whose rays are
     /// not the camera's; [`crate::Error::OutOfMemory`].
     pub fn new(tracer: &Tracer, shaders: &'static StreamShaders, size: [u32; 2]) -> Result<Self> {
         let (device, features) = (tracer.device(), tracer.features());
         let targets = Targets::new(device, size)?;
         let s = stream::scene_specialization(features);
         let pipeline = |name, vertex, fragment, cull| GraphicsPipeline::new(device, name, vertex, fragment, &s, cull);
-        let alpha = || pipeline("draw alpha-tested", &shaders::DRAW_TRIANGLES, &shaders::DRAW_ALPHA, Cull::Nothing);
+        let alpha = || pipeline("draw alpha-tested", &shaders::DRAW_TRIANGLES, &shaders::DRAW_ALPHA, Cull::None);
         let spheres = || pipeline("draw spheres", &shaders::DRAW_SPHERES, &shaders::DRAW_SPHERE, Cull::Front);
         Ok(Self {
-            triangles: pipeline("draw opaque", &shaders::DRAW_TRIANGLES, &shaders::DRAW_OPAQUE, Cull::Nothing)?,
+            triangles: pipeline("draw opaque", &shaders::DRAW_TRIANGLES, &shaders::DRAW_OPAQUE, Cull::None)?,
             alpha_tested: features.alpha.then(alpha).transpose()?,
             spheres: features.spheres.then(spheres).transpose()?,
             targets,
@@ -132,7 +132,7 @@ impl Raster {
     ///
     /// # Errors
     /// Those of [`Raster::draw`].
-    pub fn record(&self, recorder: &mut Recorder, tracer: &Tracer, push: &Push, view: &View) -> Result<Drawn> {
+    pub fn record(&self, recorder: &mut Recorder, tracer: &Tracer, push: &Push, view: &View) -> Result<DrawStats> {
         let drawn = self.draw(recorder, tracer, view)?;
         self.trace(recorder, push);
         Ok(drawn)
@@ -142,7 +142,7 @@ impl Raster {
     ///
     /// # Errors
     /// [`crate::Error::Scene`] when the camera's transform is flat.
-    pub fn draw(&self, recorder: &mut Recorder, tracer: &Tracer, view: &View) -> Result<Drawn> {
+    pub fn draw(&self, recorder: &mut Recorder, tracer: &Tracer, view: &View) -> Result<DrawStats> {
         let size = view.block.size;
         let frustum = Frustum::new(view)?;
         let (draws, depth, drawn) = self.collect(tracer, &frustum);
@@ -176,7 +176,7 @@ impl Raster {
                     }
                 };
                 all(&self.triangles, &draws.triangles, &triangles);
-                // the most is hidden by then
+                // opaque triangles first: they hide most of the rest
                 for (pipeline, draws, vertices) in [
                     (&self.spheres, &draws.spheres, &boxes as &dyn Fn(Range<u32>) -> Range<u32>),
                     (&self.alpha_tested, &draws.alpha_tested, &triangles),
@@ -199,19 +199,19 @@ impl Raster {
         self.stream.record(recorder, &Push { rays: self.drawn.address(), ..*push });
     }
 
-    /// What has to be drawn, the range of its depth, and how much that is.
-    fn collect(&self, tracer: &Tracer, frustum: &Frustum) -> (Draws, [f64; 2], Drawn) {
-        let (mut draws, mut drawn) = (Draws::default(), Drawn::default());
+    /// The draws of a view, their depth range and statistics.
+    fn collect(&self, tracer: &Tracer, frustum: &Frustum) -> (Draws, [f64; 2], DrawStats) {
+        let (mut draws, mut drawn) = (Draws::default(), DrawStats::default());
         let mut depth = [f64::INFINITY, 0.0f64];
-        for entry in tracer.drawables() {
+        for entry in tracer.raster_instances() {
             drawn.placed += entry.shape.primitives as u64;
-            let sight = frustum.sight(&entry.shape.bounds, &entry.to_world);
-            if sight == Sight::Nothing {
+            let overlap = frustum.classify(&entry.shape.bounds, &entry.to_world);
+            if overlap == FrustumTest::Outside {
                 continue;
             }
             let [least, most] = frustum.depth(&entry.shape.bounds, &entry.to_world);
             depth = [depth[0].min(least), depth[1].max(most)];
-            self.collect_entry(tracer, frustum, &entry, sight, &mut draws);
+            self.collect_entry(tracer, frustum, &entry, overlap, &mut draws);
         }
         for draw in [&draws.triangles, &draws.alpha_tested, &draws.spheres].into_iter().flatten() {
             drawn.draws += 1;
@@ -220,7 +220,14 @@ impl Raster {
         (draws, depth, drawn)
     }
 
-    fn collect_entry(&self, tracer: &Tracer, frustum: &Frustum, entry: &Drawable, sight: Sight, draws: &mut Draws) {
+    fn collect_entry(
+        &self,
+        tracer: &Tracer,
+        frustum: &Frustum,
+        entry: &RasterInstance,
+        overlap: FrustumTest,
+        draws: &mut Draws,
+    ) {
         let push = Push {
             scene: tracer.scene_address(),
             pass: self.params.address(),
@@ -245,11 +252,11 @@ impl Raster {
                 push_range(&mut draws.alpha_tested, range.start.max(shape.opaque)..range.end);
             }
         };
-        if sight == Sight::All || shape.chunks.is_empty() {
+        if overlap == FrustumTest::Inside || shape.chunks.is_empty() {
             return add(0..shape.primitives);
         }
         for (k, bounds) in (0..).zip(&shape.chunks) {
-            if frustum.sight(bounds, &entry.to_world) != Sight::Nothing {
+            if frustum.classify(bounds, &entry.to_world) != FrustumTest::Outside {
                 add(CHUNK * k..(CHUNK * (k + 1)).min(shape.primitives));
             }
         }

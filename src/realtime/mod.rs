@@ -23,7 +23,7 @@ use crate::interface::records::frame::MAX_VARIANCE;
 use crate::raster::Primary;
 use crate::shaders::StreamShaders;
 use crate::tracer::gpu_scene::rows;
-use crate::tracer::{Moved, Tracer};
+use crate::tracer::{MovedBounds, Tracer};
 use display::{Display, DisplayMode};
 use graph::{Frame, Graph, Params};
 use params::{FrameParams, moved_records};
@@ -166,7 +166,7 @@ impl Realtime {
     ///
     /// # Errors
     /// Those of the device.
-    pub fn frame(&mut self, tracer: &Tracer, camera: &CameraRecord, moved: &[Moved]) -> Result<FrameStats> {
+    pub fn frame(&mut self, tracer: &Tracer, camera: &CameraRecord, moved: &[MovedBounds]) -> Result<FrameStats> {
         let moved = moved_records(moved);
         let is_larsen = self.settings.technique == Technique::Larsen;
         // Larsen's pipeline skips no pass

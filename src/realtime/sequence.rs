@@ -1,7 +1,7 @@
 //! A scene and a camera over time, frame by frame.
 
 use crate::error::{Error, Result};
-use crate::scene::animation::{Playback, Pose, Rig};
+use crate::scene::animation::{AnimationRig, Playback, Pose};
 use crate::scene::camera_path::CameraPath;
 use crate::scene::{Camera, Motion, Orbit, Scene};
 use crate::tracer::{Tracer, UpdateStats};
@@ -21,7 +21,7 @@ pub enum CameraMotion {
 /// An animation that is played.
 #[derive(Debug)]
 struct AnimationPlayback<'a> {
-    rig: &'a Rig,
+    rig: &'a AnimationRig,
     animation: usize,
     pose: Pose,
 }
@@ -42,7 +42,7 @@ pub struct FrameSequence<'a> {
 /// # Errors
 /// [`Error::Usage`] if the scene has no such animation, listing those that it has.
 pub fn find_animation(scene: &Scene, wanted: &str) -> Result<usize> {
-    let all = scene.rig.as_ref().map_or(&[][..], Rig::animations);
+    let all = scene.rig.as_ref().map_or(&[][..], AnimationRig::animations);
     let by_index = wanted.parse::<usize>().ok().filter(|k| *k < all.len());
     by_index.or_else(|| all.iter().position(|a| a.name == wanted)).ok_or_else(|| {
         let names: Vec<_> = all.iter().enumerate().map(|(k, a)| format!("{k} '{}'", a.name)).collect();

@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use serde_json::{Value, json};
 
-use crate::denoise::{Denoiser, Features, GRID, Oidn, Shot};
+use crate::denoise::{DenoiseInput, Denoiser, Features, GRID, Oidn};
 use crate::error::Result;
 use crate::film::Control;
 use crate::film::accumulate::Accumulated;
@@ -54,14 +54,14 @@ pub fn choose(choice: Option<DenoiseChoice>) -> Result<Option<SelectedDenoiser>>
 /// Denoises films of one scene and camera.
 pub struct Denoising<'a> {
     chosen: &'a SelectedDenoiser,
-    shot: Shot<'a>,
-    // rendered for the first film, and reused
+    shot: DenoiseInput<'a>,
+    // those of the first film serve the next
     features: RefCell<Option<Features>>,
     seconds: Cell<f64>,
 }
 
 impl<'a> Denoising<'a> {
-    pub fn new(chosen: &'a SelectedDenoiser, shot: Shot<'a>) -> Self {
+    pub fn new(chosen: &'a SelectedDenoiser, shot: DenoiseInput<'a>) -> Self {
         Self { chosen, shot, features: RefCell::new(None), seconds: Cell::new(0.0) }
     }
 

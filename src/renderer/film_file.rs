@@ -83,11 +83,11 @@ pub fn resume(
     let StoredState::Intact(state) = state else {
         return Err(Error::input(path, "its film state is damaged; render it anew with --resumable"));
     };
-    if state.most_samples() > spp {
+    if state.max_samples() > spp {
         return Err(Error::Usage(format!(
             "--spp {spp}: {} has {} samples per pixel already; give at least as many",
             path.display(),
-            state.most_samples()
+            state.max_samples()
         )));
     }
     let other = maker.iter().find(|(key, ours)| image.metadata(key) != Some(ours.as_str()));

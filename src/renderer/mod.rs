@@ -13,7 +13,7 @@
 //! settings.image.size = Some([16, 16]);
 //! settings.image.spp = Some(4);
 //! let ao = renderer.still(&settings, &mut NoControl)?;
-//! settings.integrator = "path".parse().ok();
+//! settings.integrator = Some("path".parse()?);
 //! let path = renderer.still(&settings, &mut NoControl)?;
 //! println!("{:.3} of the hemisphere is open; radiance {:.3}", ao.report.mean, path.report.mean);
 //! # Ok::<(), skylit::Error>(())

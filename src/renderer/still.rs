@@ -14,8 +14,8 @@ use crate::denoise;
 use crate::error::{Error, Result};
 use crate::film::Control;
 use crate::film::accumulate::Accumulated;
-use crate::film::cover::Cover;
 use crate::film::schedule::FilmOptions;
+use crate::film::tile_mask::TileMask;
 use crate::integrators::aov::{self, Aov, AovPixel};
 use crate::integrators::{Integrator, PictureOptions, RenderJob};
 use crate::output::{self, Channel, Image, ImageFormat, Samples, png};
@@ -142,7 +142,7 @@ impl Renderer {
             .as_ref()
             .map(|path| film_file::resume(path, &self.name, integrator.channels(), size, job.spp, &identity, &maker));
         let resumed = resumed.transpose()?;
-        let samples_before = resumed.as_ref().map(|r| r.state.most_samples());
+        let samples_before = resumed.as_ref().map(|r| r.state.max_samples());
         if let Some(warning) = resumed.as_ref().and_then(|r| r.warning.clone()) {
             control.warning(&warning);
             warnings.push(warning);
@@ -168,8 +168,8 @@ impl Renderer {
         };
         let tracer = &ready.tracer;
         let record = job.camera_record(&flat);
-        let cover = match integrator.skips_empty_tiles(&job) {
-            true => Cover::new(&flat, &record, size, job.spp).map(Arc::new),
+        let tile_mask = match integrator.skips_empty_tiles(&job) {
+            true => TileMask::new(&flat, &record, size, job.spp).map(Arc::new),
             false => None,
         };
 
@@ -184,7 +184,7 @@ impl Renderer {
         let denoising = denoiser
             .as_ref()
             .zip(path_options.as_ref())
-            .map(|(chosen, options)| Denoising::new(chosen, denoise::Shot { tracer, scene, camera: &record, options }));
+            .map(|(chosen, options)| Denoising::new(chosen, denoise::DenoiseInput { tracer, scene, camera: &record, options }));
         let composer = Composer {
             name: &self.name,
             integrator,
@@ -202,10 +202,10 @@ impl Renderer {
             control: &mut *control,
             save: &mut |accumulated, control| {
                 let image = composer.image(accumulated, control)?;
-                save(&IntermediateImage { image: &image, samples: accumulated.most_spp, integrator, picture })
+                save(&IntermediateImage { image: &image, samples: accumulated.max_spp, integrator, picture })
             },
         };
-        let rendered = integrator.render(tracer, &flat, &job, cover, &mut interval_control)?;
+        let rendered = integrator.render(tracer, &flat, &job, tile_mask, &mut interval_control)?;
         device.check_validation()?;
         let image = composer.image(&rendered.image, control)?;
         device.check_validation()?;
@@ -225,7 +225,7 @@ impl Renderer {
             quantity: integrator.quantity(),
             size,
             spp: rendered.image.spp,
-            most_spp: rendered.image.most_spp,
+            most_spp: rendered.image.max_spp,
             requested_spp: job.spp,
             seed: job.seed,
             stopped_early: rendered.image.stopped_early,
@@ -349,7 +349,7 @@ impl Composer<'_> {
 
     /// Text attributes. They are identical for two runs of the same command.
     fn metadata(&self, image: &Accumulated) -> Vec<(String, String)> {
-        let mut out = vec![("scene", self.name.to_owned()), ("spp", spp_text(image.spp, image.most_spp))];
+        let mut out = vec![("scene", self.name.to_owned()), ("spp", spp_text(image.spp, image.max_spp))];
         out.extend(self.maker.iter().cloned());
         out.extend(self.identity.iter().filter_map(|(key, value)| Some((*key, value.clone()?))));
         if let Some(target) = self.target_rmse {

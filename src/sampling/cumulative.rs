@@ -1,8 +1,8 @@
-//! Choosing one of many with given probabilities, by inversion of their cumulative distribution. Unlike an alias table it keeps the order of the
-//! outcomes: neighbouring numbers choose neighbouring outcomes, and what is left of a number once it has chosen is as evenly distributed as
-//! the number was. So one stratified sample can choose an outcome and then a point of it (pbrt-v4, A.1, `SampleDiscrete`).
+//! Sampling of a discrete distribution by inversion of its cumulative distribution. Unlike an alias table it preserves the order of the
+//! outcomes: neighbouring numbers choose neighbouring outcomes, and the remainder of a number is again uniform and stratified. So one
+//! stratified sample can choose an outcome and then a point of it (pbrt-v4, A.1, `SampleDiscrete`).
 
-/// A distribution over outcomes `0..n`, in units of 2^-32: what is drawn is exactly what the probabilities say.
+/// A discrete distribution over outcomes `0..n`, in units of 2^-32: sampling matches the probabilities exactly.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct CumulativeTable {
     /// `n + 1` numbers: outcome `k` is chosen from `starts[k]` up to `starts[k + 1]`. The last is 2^32, which wraps to 0.
@@ -12,7 +12,7 @@ pub struct CumulativeTable {
 }
 
 impl CumulativeTable {
-    /// From weights that are finite and above 0; at most 2^31 of them.
+    /// Builds the distribution of at most 2^31 weights, all finite and above 0.
     pub fn new(weights: &[f64]) -> Self {
         let n = weights.len() as u64;
         debug_assert!(weights.iter().all(|&w| w > 0.0 && w.is_finite()), "weights must be above 0");
@@ -33,7 +33,7 @@ impl CumulativeTable {
         Self { starts: starts.into_iter().map(|s| s as u32).collect(), probabilities }
     }
 
-    /// The outcome of 32 random bits, and what is left of them, in [0, 1].
+    /// The outcome of 32 random bits, and their remainder, rescaled to [0, 1].
     pub fn sample(&self, bits: u32) -> (usize, f32) {
         let n = self.probabilities.len();
         let k = self.starts[..n].partition_point(|&s| s <= bits) - 1;
@@ -49,7 +49,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn draws_as_often_as_asked_and_in_order() {
+    fn samples_match_the_probabilities_in_order() {
         let many: Vec<f64> = (0..1000).map(|k| 1.0 + f64::from(k % 7)).collect();
         for weights in [vec![1.0], vec![1.0, 2.0, 3.0, 4.0], vec![1e-9, 1.0, 1e-30, 5.0, 1e9], many] {
             let table = CumulativeTable::new(&weights);

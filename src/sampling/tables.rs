@@ -1,4 +1,4 @@
-//! Tables of points and noise that are made once: what the pipeline of Larsen (2019) draws from.
+//! Precomputed tables of sample points and noise for the pipeline of Larsen (2019).
 
 use super::sobol::{hash_combine, to_unit};
 
@@ -72,12 +72,12 @@ pub fn blue_noise(side: usize, seed: u32) -> Vec<f32> {
     rank.into_iter().map(|r| r as f32 / n as f32).collect()
 }
 
-/// Pixels that are set, and how crowded each place is.
+/// A binary pattern, and the energy (local density) at each pixel.
 struct Field {
     side: usize,
     set: Vec<bool>,
     energy: Vec<f32>,
-    // of a pixel at the origin, on the torus
+    // energy of a pixel at the origin, on the torus
     kernel: Vec<f32>,
     ones: usize,
 }

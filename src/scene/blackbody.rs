@@ -1,4 +1,4 @@
-//! The colour of what glows: Planck's law seen by the CIE 1931 observer, in linear sRGB.
+//! Colours of black-body emitters: Planck's law with the CIE 1931 observer, in linear sRGB.
 
 use glam::{DMat3, DVec3, Vec3};
 

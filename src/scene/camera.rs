@@ -2,7 +2,7 @@
 
 use glam::{DAffine3, DMat3, DVec3};
 
-/// How directions map to the image plane.
+/// Projection of a camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Projection {
     /// Pinhole.
@@ -12,7 +12,7 @@ pub enum Projection {
     },
     /// Parallel rays.
     Orthographic {
-        /// Half the height of the view in world units.
+        /// Half the height of the view, in scene units.
         half_height: f64,
     },
 }
@@ -26,7 +26,7 @@ pub struct Camera {
     pub camera_to_world: DAffine3,
     /// Projection.
     pub projection: Projection,
-    /// Width over height the file asks for; the image size wins.
+    /// Aspect ratio (width over height) in the file; the image size overrides it.
     pub aspect: Option<f64>,
 }
 
@@ -62,7 +62,7 @@ impl Camera {
                 c.z + (c.x.abs() / (tan * aspect)).max(c.y.abs() / tan)
             })
             .fold(0.0, f64::max);
-        // a little air around it
+        // a margin of 5%
         Self::look_at(centre + direction * (distance * 1.05), centre, DVec3::Y, fov_y)
     }
 }

@@ -1,10 +1,10 @@
-//! A camera over time: keys, and what lies between them.
+//! A camera over time: keyframes and their interpolation.
 
 use glam::DVec3;
 
 use super::Camera;
 
-/// What a camera does between two keys.
+/// Interpolation between two keys.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Interpolation {
@@ -16,14 +16,14 @@ pub enum Interpolation {
     Linear,
 }
 
-/// Where the camera is at one moment.
+/// A keyframe of the camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Key {
-    /// The moment, in frames; it need not be whole.
+    /// Time in frames, which may be fractional.
     pub frame: f64,
-    /// Position, in world units.
+    /// Position, in scene units.
     pub eye: DVec3,
-    /// Point in the middle of the image.
+    /// Point at the centre of the image, in scene units.
     pub target: DVec3,
     /// Up in the image; need not be perpendicular to the view, nor of unit length.
     pub up: DVec3,
@@ -41,12 +41,12 @@ pub struct CameraPath {
     fps: f64,
     interpolation: Interpolation,
     keys: Vec<Key>,
-    /// Change a frame at each key; empty when linear.
+    /// Derivative per frame at each key; empty when linear.
     slopes: Vec<Pose>,
 }
 
 impl CameraPath {
-    /// Through `keys`, one at least, in the order of their frames; `fps` frames are a second, in [0.001, 1000].
+    /// A path through at least one key, in the order of their frames; `fps` is frames per second, in [0.001, 1000].
     ///
     /// # Errors
     /// A line that names the key and says what is wrong with it: frames that do not increase, numbers that are not finite (or
@@ -70,12 +70,12 @@ impl CameraPath {
         &self.keys
     }
 
-    /// Frames a second.
+    /// Frames per second.
     pub fn fps(&self) -> f64 {
         self.fps
     }
 
-    /// What it does between keys.
+    /// Interpolation between keys.
     pub fn interpolation(&self) -> Interpolation {
         self.interpolation
     }
@@ -86,16 +86,16 @@ impl CameraPath {
         (self.keys[0].frame, self.keys[self.keys.len() - 1].frame)
     }
 
-    /// The camera at a frame, which need not be whole; before the first key and after the last it rests.
+    /// The camera at a frame, which may be fractional; before the first key and after the last it does not move.
     pub fn camera_at(&self, frame: f64) -> Camera {
         let Key { eye, target, up, fov_y, .. } = self.key_at(frame);
         Camera::look_at(eye, target, up, fov_y)
     }
 
-    /// As [`CameraPath::camera_at`], in numbers. A key's own frame gives that key exactly.
+    /// The interpolated key at a frame. The frame of a key gives that key exactly.
     pub fn key_at(&self, frame: f64) -> Key {
         let (first, last) = self.range();
-        // no number is the start
+        // NaN counts as the start
         let frame = if frame.is_nan() { first } else { frame.clamp(first, last) };
         let k = self.keys.partition_point(|key| key.frame <= frame).saturating_sub(1);
         let (a, Some(b)) = (&self.keys[k], self.keys.get(k + 1)) else { return self.keys[k] };
@@ -123,11 +123,11 @@ fn key(frame: f64, p: &Pose) -> Key {
     Key { frame, eye: vector(0), target: vector(3), up: vector(6), fov_y: p[9] }
 }
 
-/// Can there be a camera, and does it come after the one before?
+/// Checks that a key defines a camera, and that it comes after the previous key.
 fn check(key: &Key, frame_before: Option<f64>) -> Result<(), String> {
     const BEYOND: f64 = 1e30;
     if !(pose(key).iter().chain([&key.frame]).all(|v| v.abs() <= BEYOND)) {
-        return Err("holds a number that is not finite, or beyond 1e30".into());
+        return Err("contains a number that is not finite, or beyond 1e30".into());
     }
     if let Some(before) = frame_before.filter(|before| *before >= key.frame) {
         return Err(format!("frame {} does not come after frame {before} of the key before; frames must increase", key.frame));

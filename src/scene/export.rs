@@ -1,5 +1,4 @@
-//! [`Scene`](crate::scene::Scene) to files: glTF, which every tool reads, and the plain triangle soup that joins us to
-//! other tracers.
+//! Export of a [`Scene`](crate::scene::Scene): to glTF, which most tools read, and to a plain triangle soup for other tracers.
 
 mod gltf;
 mod icosphere;
@@ -14,16 +13,16 @@ pub use mesh_bin::{mesh_bin, read_mesh_bin, write_mesh_bin};
 
 use crate::error::Result;
 
-/// What a scene has become in a file.
+/// Statistics and warnings of an export.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Written {
-    /// Triangles placed, those that stand for spheres included.
+pub struct ExportStats {
+    /// Number of triangles over all instances, those of tessellated spheres included.
     pub triangles: u64,
-    /// What the file does not hold as the scene does, a sentence each.
+    /// Differences between the file and the scene, one sentence each.
     pub warnings: Vec<String>,
 }
 
-/// Lets `fill` write a file that takes its name once it is complete.
+/// Writes a file with `fill` and gives it its name only when it is complete.
 fn write_buffered(path: &Path, fill: impl FnOnce(&mut dyn Write) -> std::io::Result<()>) -> Result<()> {
     crate::files::write_atomically(path, |file| {
         let mut out = BufWriter::with_capacity(1 << 20, file);

@@ -1,5 +1,5 @@
-//! Numbers that tell one scene from another by what an image of it can depend on, for images that are gone on with later. Names of files,
-//! cameras and render settings are no part of it.
+//! Hashes of everything in a scene on which an image can depend, to check that a resumed render has the same scene. File names,
+//! cameras and render settings are not included.
 
 use std::fmt::{Debug, Write};
 
@@ -7,10 +7,10 @@ use xxhash_rust::xxh3::Xxh3;
 
 use super::{Environment, EnvironmentMap, Geometry, Instance, Mesh, Scene, TexelData, Texture, TriangleMesh};
 
-/// Of geometry, materials, textures and lights, without what surrounds them: 32 hexadecimal digits.
+/// The hash of geometry, materials, textures and lights, without the environment: 32 hexadecimal digits.
 pub fn of_scene(scene: &Scene) -> String {
     let mut hash = Fingerprint(Xxh3::new());
-    // patterns without `..`: whoever gives a mesh more has to say here whether images depend on it
+    // patterns without `..`: a new field must be considered here
     for Mesh { name: _, geometry, material } in &scene.meshes {
         hash.count(*material);
         match geometry {
@@ -40,13 +40,13 @@ pub fn of_scene(scene: &Scene) -> String {
             TexelData::Float(rgba) => hash.slice(rgba),
         }
     }
-    // few, and with many fields: their debug text has all of them, numbers to the last digit
+    // the debug text has all fields, and all digits of numbers
     hash.text(&scene.materials);
     hash.text(&scene.lights);
     hash.finish()
 }
 
-/// Of what surrounds a scene: 32 hexadecimal digits.
+/// The hash of an environment: 32 hexadecimal digits.
 pub fn of_environment(environment: &Environment) -> String {
     let mut hash = Fingerprint(Xxh3::new());
     match environment {
@@ -63,7 +63,7 @@ pub fn of_environment(environment: &Environment) -> String {
 struct Fingerprint(Xxh3);
 
 impl Fingerprint {
-    /// Numbers, and how many there are.
+    /// Hashes the length of a slice and its numbers.
     fn slice<T: bytemuck::NoUninit>(&mut self, numbers: &[T]) {
         self.count(numbers.len());
         self.0.update(bytemuck::cast_slice(numbers));
@@ -74,7 +74,7 @@ impl Fingerprint {
     }
 
     fn text(&mut self, value: &dyn Debug) {
-        // a hash takes all that it is given
+        // writing to a hash cannot fail
         let _ = write!(self, "{value:?};");
     }
 
@@ -142,7 +142,7 @@ mod tests {
     }
 
     #[test]
-    fn surroundings_differ_by_what_they_shine() {
+    fn environments_differ_by_their_radiance() {
         let map = |factor: f32| {
             Environment::Map(EnvironmentMap {
                 name: "map".into(),

@@ -1,24 +1,24 @@
-//! Lights that are no surfaces of a mesh, and what surrounds the scene.
+//! Punctual and directional lights, portals and environment lights.
 
 use std::sync::Arc;
 
 use glam::{DMat3, DVec3, Vec3};
 
-/// Shape and falloff of a light (KHR_lights_punctual). What has an extent is a surface that emits ([`super::Material::emissive`]).
+/// Type of a light (KHR_lights_punctual). Area lights are emissive surfaces ([`super::Material::emissive`]).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum LightKind {
     /// `intensity` in candela.
     Point,
     /// `intensity` in candela along the axis.
     Spot {
-        /// Radians from the axis where the falloff starts.
+        /// Angle from the axis at which the falloff starts, in radians.
         inner_angle: f32,
-        /// Radians from the axis where it ends.
+        /// Angle from the axis at which the falloff ends, in radians.
         outer_angle: f32,
     },
-    /// `intensity` in lux, of a surface that faces it.
+    /// `intensity` in lux, on a surface that faces the light.
     Directional {
-        /// Radians that it fills in the sky, from edge to edge; 0: shadows are sharp. The sun: 0.0093.
+        /// Angular diameter in radians; 0 for sharp shadows. The sun has 0.0093.
         angle: f32,
     },
 }
@@ -28,44 +28,44 @@ pub enum LightKind {
 pub struct Light {
     /// Name in the file; may be empty.
     pub name: String,
-    /// Shape and falloff.
+    /// Type of the light.
     pub kind: LightKind,
     /// Linear colour times intensity; see [`LightKind`] for the unit.
     pub intensity: Vec3,
     /// World position.
     pub position: DVec3,
-    /// World direction in which it shines, of unit length.
+    /// World direction in which it emits, of unit length.
     pub direction: DVec3,
-    /// World units beyond which it has no effect (KHR_lights_punctual range); infinite by default.
+    /// Distance in scene units beyond which it has no effect (KHR_lights_punctual range); infinite by default.
     pub range: f64,
 }
 
-/// A rectangle through which the environment lights a room: a window, a door, a skylight. It shows where to look for light, and neither emits nor hides any: images differ
-/// by their noise alone. Light that comes in elsewhere is still found.
+/// A rectangle through which the environment lights a room: a window, a door, a skylight. It guides the sampling of the environment, and neither emits nor blocks light: images
+/// differ only in noise. Light that enters elsewhere is still found.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Portal {
     /// World position of a corner.
     pub corner: DVec3,
-    /// The two edges from there, at right angles; world units.
+    /// The two edges from that corner, at right angles, in scene units.
     pub edges: [DVec3; 2],
 }
 
 impl Portal {
-    /// World units, squared.
+    /// Area in squared scene units.
     pub fn area(&self) -> f64 {
         self.edges[0].cross(self.edges[1]).length()
     }
 }
 
-/// What a ray that leaves the scene sees.
+/// Environment light, seen by rays that leave the scene.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub enum Environment {
-    /// Nothing.
+    /// No environment light.
     #[default]
     Black,
-    /// The same radiance from everywhere.
+    /// Constant radiance from all directions.
     Uniform(Vec3),
-    /// An image of it.
+    /// An environment map.
     Map(EnvironmentMap),
 }
 

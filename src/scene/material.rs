@@ -15,22 +15,22 @@ pub struct TextureSlot {
     pub transform: Affine2,
 }
 
-/// What the alpha of the base colour means.
+/// Meaning of the base colour's alpha (glTF alphaMode).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum AlphaMode {
     /// Alpha is ignored.
     #[default]
     Opaque,
-    /// Present where alpha >= the cutoff.
+    /// Visible where alpha is at least the cutoff.
     Mask {
         /// Usually 0.5.
         cutoff: f32,
     },
-    /// Coverage: paths draw it, occlusion streams treat it as a mask at 0.5.
+    /// Coverage: the path tracer treats it as stochastic alpha, occlusion streams as a mask with cutoff 0.5.
     Blend,
 }
 
-/// The family of reflection model.
+/// Material model.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum MaterialKind {
     /// glTF 2.0 metallic-roughness and extensions.
@@ -87,7 +87,7 @@ pub struct Sheen {
 /// KHR_materials_transmission and KHR_materials_volume.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Transmission {
-    /// Share of light that is transmitted, 0 to 1.
+    /// Fraction of light that is transmitted, 0 to 1.
     pub factor: f32,
     /// Multiplies `factor` (red).
     pub texture: Option<TextureSlot>,
@@ -95,9 +95,9 @@ pub struct Transmission {
     pub thickness: f32,
     /// Multiplies `thickness` (green).
     pub thickness_texture: Option<TextureSlot>,
-    /// Linear colour that white light takes after `attenuation_distance`.
+    /// Linear colour of white light after travelling `attenuation_distance`.
     pub attenuation_color: Vec3,
-    /// World units; infinite = no absorption.
+    /// In scene units (metres in glTF); infinite without absorption.
     pub attenuation_distance: f32,
 }
 
@@ -149,7 +149,7 @@ pub struct Anisotropy {
 pub struct Material {
     /// Name in the file; may be empty.
     pub name: String,
-    /// Family of reflection model.
+    /// Material model.
     pub kind: MaterialKind,
     /// Linear base colour and alpha; for `.brhan` and MTL the diffuse colour.
     pub base_color: Vec4,
@@ -165,7 +165,7 @@ pub struct Material {
     pub normal_texture: Option<TextureSlot>,
     /// Scale of the normal map's x and y.
     pub normal_scale: f32,
-    /// Baked occlusion (red): shown, never used in transport.
+    /// Baked occlusion (red): for the AOV only, never used in light transport.
     pub occlusion_texture: Option<TextureSlot>,
     /// Linear emitted radiance, KHR_materials_emissive_strength included.
     pub emissive: Vec3,
@@ -173,7 +173,7 @@ pub struct Material {
     pub emissive_texture: Option<TextureSlot>,
     /// Meaning of alpha.
     pub alpha_mode: AlphaMode,
-    /// Both faces are shaded. Visibility never depends on it: rays meet both faces.
+    /// Both faces are shaded. Visibility does not depend on it: rays hit both faces.
     pub double_sided: bool,
     /// Index of refraction (KHR_materials_ior, `Ni`): at least 1. In glTF also 0, for a Fresnel term of 1 that leaves reflection to the specular
     /// colour; such a material does not refract.
@@ -190,20 +190,20 @@ pub struct Material {
     pub sheen: Sheen,
     /// KHR_materials_transmission and KHR_materials_volume.
     pub transmission: Transmission,
-    /// Of volumes that overlap, the one with the highest priority is there; of equal ones, the one that a path entered last (Schmidt, Budge 2002). glTF:
-    /// `extras.dielectricPriority` of the material.
+    /// Priority of nested dielectrics: where volumes overlap, the one with the highest priority applies; of equal ones, the one that the path entered last
+    /// (Schmidt, Budge 2002). glTF: `extras.dielectricPriority` of the material.
     pub dielectric_priority: i32,
     /// KHR_materials_specular.
     pub specular: Specular,
     /// KHR_materials_anisotropy.
     pub anisotropy: Anisotropy,
-    /// Numbers for reflection models that the file's format knows nothing of, by name: numeric `extras` of a glTF material, unknown statements of an MTL file,
-    /// `sigma[]` of `.brhan`. docs/materials.md lists those that have a meaning.
+    /// Parameters by name for BSDFs that the file format does not have: numeric `extras` of a glTF material, unknown statements of an MTL file,
+    /// `sigma[]` of `.brhan`. docs/materials.md lists those that are used.
     pub parameters: BTreeMap<String, f32>,
 }
 
 impl Default for Material {
-    /// glTF's default material, except for roughness-irrelevant extras: white, rough, not metallic.
+    /// White, rough and not metallic.
     fn default() -> Self {
         Self {
             name: String::new(),
@@ -236,7 +236,7 @@ impl Default for Material {
 }
 
 impl Material {
-    /// Every texture slot, filled or not, for changing.
+    /// All texture slots, empty ones included.
     pub fn texture_slots_mut(&mut self) -> [&mut Option<TextureSlot>; 15] {
         [
             &mut self.base_color_texture,
@@ -257,14 +257,14 @@ impl Material {
         ]
     }
 
-    /// The filled texture slots.
+    /// The textures in use.
     pub fn textures(&self) -> impl Iterator<Item = TextureSlot> {
         let mut copy = self.clone();
         let slots = copy.texture_slots_mut().map(|slot| *slot);
         slots.into_iter().flatten()
     }
 
-    /// A number that the file gives by this name.
+    /// The parameter of this name, if the file has it.
     pub fn parameter(&self, name: &str) -> Option<f32> {
         self.parameters.get(name).copied()
     }

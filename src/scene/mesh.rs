@@ -28,7 +28,7 @@ pub struct Sphere {
     pub radius: f32,
 }
 
-/// What a mesh is made of.
+/// Geometry of a mesh.
 #[derive(Clone, Debug)]
 pub enum Geometry {
     /// Indexed triangles.
@@ -66,7 +66,7 @@ impl Geometry {
     }
 }
 
-/// A shape with one material (a glTF primitive is one mesh here).
+/// Geometry with one material (a glTF primitive is one mesh here).
 #[derive(Clone, Debug)]
 pub struct Mesh {
     /// Name in the file; may be empty.

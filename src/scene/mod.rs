@@ -1,6 +1,6 @@
 //! The scene: plain host data, no Vulkan. Loaders make it, [`crate::accel::flatten`] turns it into what tracers consume.
 //!
-//! Conventions, everywhere: right-handed, lengths in world units (metres in glTF), angles in radians, colours linear with
+//! Conventions, everywhere: right-handed, lengths in scene units (metres in glTF), angles in radians, colours linear with
 //! sRGB primaries, triangles counter-clockwise seen from their front.
 
 pub mod animation;
@@ -19,7 +19,7 @@ pub mod motion;
 pub mod orbit;
 pub mod texture;
 
-pub use animation::Rig;
+pub use animation::AnimationRig;
 pub use camera::{Camera, Projection};
 pub use camera_path::CameraPath;
 pub use light::{Environment, EnvironmentMap, Light, LightKind, Portal};
@@ -42,7 +42,7 @@ pub struct Instance {
     pub object_to_world: DAffine3,
 }
 
-/// What a loader noticed on the way: shown by the commands, never fatal.
+/// Warnings and statistics of loading a scene; none of them is fatal.
 #[derive(Clone, Debug, Default)]
 pub struct LoadReport {
     /// One line each: ignored optional extensions, missing textures, ...
@@ -55,29 +55,29 @@ pub struct LoadReport {
     pub tangents_computed: usize,
 }
 
-/// Wishes of a scene file about how to render it (`.brhan` has them); the command line wins.
+/// Render settings in a scene file (`.brhan` has them); options on the command line override them.
 #[derive(Clone, Debug, Default)]
 pub struct RenderHints {
     /// Image size in pixels.
     pub size: Option<[u32; 2]>,
     /// Samples per pixel.
     pub spp: Option<u32>,
-    /// Longest path, in bounces.
+    /// Maximum path depth, in bounces.
     pub max_depth: Option<u32>,
-    /// Samples per pixel at which intermediate images are to be saved.
+    /// Samples per pixel after which intermediate images are saved.
     pub save_intervals: Vec<u32>,
-    /// The file asks for the 1-ray depth image.
+    /// The file requests a depth image of one ray per pixel.
     pub depth_image: bool,
 }
 
-/// Everything that a file, or a built-in scene, describes.
+/// A scene from a file, or a built-in one.
 #[derive(Clone, Debug, Default)]
 pub struct Scene {
     /// File name or name of the built-in scene.
     pub name: String,
-    /// Shapes in their own (object) space.
+    /// Meshes in object space.
     pub meshes: Vec<Mesh>,
-    /// Placed meshes. The order is the order of ids in hits and images.
+    /// Instances of meshes. Their indices are the instance ids in hits and images.
     pub instances: Vec<Instance>,
     /// Materials; [`Mesh::material`] indexes them. Never empty once loaded.
     pub materials: Vec<Material>,
@@ -89,13 +89,13 @@ pub struct Scene {
     pub portals: Vec<Portal>,
     /// Cameras of the file; may be empty.
     pub cameras: Vec<Camera>,
-    /// What surrounds the scene.
+    /// Environment light.
     pub environment: Environment,
-    /// Wishes of the file about how to render it.
+    /// Render settings of the file.
     pub hints: RenderHints,
-    /// What of it moves over time; `None` where nothing does.
-    pub rig: Option<Rig>,
-    /// What the loader noticed.
+    /// Animations of the scene; `None` for a static scene.
+    pub rig: Option<AnimationRig>,
+    /// Warnings and statistics of the loader.
     pub report: LoadReport,
 }
 
@@ -120,7 +120,7 @@ impl Scene {
         self.instances.iter().map(|i| f(&self.meshes[i.mesh].geometry) as u64).sum()
     }
 
-    /// World-space bounds `(min, max)` over all instances, or `None` when nothing is placed.
+    /// World-space bounds `(min, max)` over all instances, or `None` for an empty scene.
     pub fn bounds(&self) -> Option<(DVec3, DVec3)> {
         let local: Vec<_> = self.meshes.iter().map(|m| m.geometry.bounds()).collect();
         let mut world: Option<(DVec3, DVec3)> = None;
@@ -136,7 +136,7 @@ impl Scene {
         world
     }
 
-    /// Whether a ray that leaves the scene may meet light: an environment, or a directional light that has an extent.
+    /// Whether a ray that leaves the scene may see an emitter: an environment, or a directional light with an angular diameter.
     pub fn has_visible_sky(&self) -> bool {
         let is_disk = |l: &Light| matches!(l.kind, LightKind::Directional { angle } if angle > 0.0);
         self.environment != Environment::Black || self.lights.iter().any(is_disk)

@@ -1,9 +1,9 @@
-//! What of a scene may change, said before it is traced.
+//! The declaration of what may change in a scene.
 
 use super::{Geometry, Scene};
 use crate::error::{Error, Result};
 
-/// What of a scene may change while it is traced. Nothing, by default; and then nothing is kept for it.
+/// The instances and meshes of a scene that may change after its upload. The default is a static scene, for which tracers keep no state.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Motion {
     /// Instances that may move, as indices into [`Scene::instances`].
@@ -13,7 +13,7 @@ pub struct Motion {
 }
 
 impl Motion {
-    /// Nothing moves.
+    /// Whether the scene is static.
     pub fn is_none(&self) -> bool {
         self.instances.is_empty() && self.meshes.is_empty()
     }

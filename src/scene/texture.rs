@@ -18,11 +18,11 @@ pub enum Filter {
 /// RGBA of all texels of an image, rows from the top. Shared: two textures may sample one image differently.
 #[derive(Clone, Debug, PartialEq)]
 pub enum TexelData {
-    /// 8 bits a channel, which stand for 0 to 1.
+    /// 8-bit unsigned normalized channels.
     Unorm8(Arc<[u8]>),
-    /// 16 bits a channel, which stand for 0 to 1.
+    /// 16-bit unsigned normalized channels.
     Unorm16(Arc<[u16]>),
-    /// Floats, 0 or more: always linear, also where 8 or 16 bits would be sRGB.
+    /// Non-negative floats: always linear, also for uses in which integers are sRGB.
     Float(Arc<[f32]>),
 }
 
@@ -36,7 +36,7 @@ impl TexelData {
         }
     }
 
-    /// There are no texels.
+    /// Whether there are no texels.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
@@ -78,7 +78,7 @@ impl TexelData {
         (0..self.len()).map(|i| self.get(i))
     }
 
-    /// What is in memory.
+    /// The texels as bytes in memory.
     pub fn as_bytes(&self) -> &[u8] {
         match self {
             Self::Unorm8(v) => v,
@@ -111,8 +111,8 @@ impl From<Vec<f32>> for TexelData {
     }
 }
 
-/// An RGBA image and how to sample it. Whether the RGB of integers is sRGB or linear is said by the use: base colour, emissive and the
-/// like are sRGB, everything else linear; alpha is always linear.
+/// An RGBA image with its sampler. The use decides whether integer RGB is sRGB or linear: base colour, emission, sheen colour and
+/// specular colour are sRGB, everything else is linear; alpha is always linear.
 #[derive(Clone, Debug)]
 pub struct Texture {
     /// File name or image name; may be empty.

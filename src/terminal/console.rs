@@ -1,4 +1,4 @@
-//! What goes to the terminal: results on stdout, everything else on stderr. A reader that went away is no error.
+//! Terminal output: results on stdout, everything else on stderr. A closed pipe is not an error.
 
 use std::io::{self, Write};
 
@@ -6,22 +6,22 @@ use serde::Serialize;
 
 use crate::error::{Error, Result};
 
-/// How a command ends that did not do what it was asked to.
+/// The failure of a command.
 #[derive(Debug)]
 pub struct Failure {
-    /// Why.
+    /// The error.
     pub error: Error,
-    /// The record on stdout says so already.
-    pub told: bool,
+    /// The JSON record on stdout already contains the error.
+    pub reported: bool,
 }
 
 impl From<Error> for Failure {
     fn from(error: Error) -> Self {
-        Self { error, told: false }
+        Self { error, reported: false }
     }
 }
 
-/// How results are shown.
+/// Output options.
 #[derive(Clone, Copy, Debug, clap::Args)]
 pub struct Verbosity {
     /// Print one JSON record on stdout instead of text
@@ -33,34 +33,34 @@ pub struct Verbosity {
 }
 
 impl Verbosity {
-    /// Where to say things.
+    /// The console with these options.
     pub fn console(&self) -> Console {
         Console { json: self.json, quiet: self.quiet }
     }
 }
 
-/// How much a command says.
+/// Prints results and warnings as the output options require.
 #[derive(Clone, Copy, Debug)]
 pub struct Console {
     /// One JSON record on stdout instead of text.
     pub json: bool,
-    /// Only errors.
+    /// Print errors only.
     pub quiet: bool,
 }
 
 impl Console {
-    /// A line of the result, for people.
+    /// Prints a line of the result in text mode.
     pub fn line(&self, text: &str) -> Result<()> {
         if self.json || self.quiet { Ok(()) } else { print(&format!("{text}\n")) }
     }
 
-    /// The result, for programs.
+    /// Prints the result as a record in JSON mode.
     pub fn record(&self, value: &impl Serialize) -> Result<()> {
         if self.json { json(value) } else { Ok(()) }
     }
 
-    /// The result of a command that has one also where it fails. In JSON mode the failure is part of the one record, under
-    /// `error` and `exit_code`. `value` is a map.
+    /// Prints the result of a command that has one even if it fails. In JSON mode the failure is part of the one record, under
+    /// `error` and `exit_code`. `value` must serialize to a map.
     pub fn close(&self, value: &impl Serialize, outcome: Result<()>) -> Result<(), Failure> {
         #[derive(Serialize)]
         struct Failed<'a, T> {
@@ -73,14 +73,14 @@ impl Console {
             Ok(()) => Ok(self.record(value)?),
             Err(error) => {
                 let record = Failed { value, error: one_line(&error.to_string()), exit_code: error.exit_code() };
-                // what failed first counts: a stdout that fails as well is told of nowhere
+                // the first failure counts: a second one, of stdout, is not reported
                 let _ = self.record(&record);
-                Err(Failure { error, told: self.json })
+                Err(Failure { error, reported: self.json })
             }
         }
     }
 
-    /// Something to know that is no failure. In JSON mode it is part of the record instead.
+    /// Prints a warning to stderr. In JSON mode warnings are part of the record instead.
     pub fn warning(&self, text: &str) {
         if !self.json && !self.quiet {
             stderr(&format!("skylit: warning: {text}"));
@@ -88,12 +88,12 @@ impl Console {
     }
 }
 
-/// Text without line breaks.
+/// Replaces line breaks and runs of white space by single spaces.
 pub fn one_line(text: &str) -> String {
     text.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
-/// The line that ends a failed run.
+/// Prints the error that ends a failed run.
 pub fn error(text: &str) {
     stderr(&format!("skylit: error: {text}"));
 }

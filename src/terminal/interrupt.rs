@@ -11,7 +11,7 @@ use crate::terminal::progress::Progress;
 static REQUESTED: AtomicBool = AtomicBool::new(false);
 static INSTALL: Once = Once::new();
 
-/// Starts to listen. Without it signals end the process as usual.
+/// Installs the signal handler. Without it, signals end the process as usual.
 pub fn install() {
     INSTALL.call_once(|| {
         // a failure leaves the system's own behaviour, which is good enough
@@ -28,16 +28,16 @@ pub fn requested() -> bool {
     REQUESTED.load(Ordering::Relaxed)
 }
 
-/// Fails when the user asked to stop.
+/// Returns [`Error::Interrupted`] if the user asked to stop.
 pub fn check() -> Result<()> {
     if requested() { Err(Error::Interrupted) } else { Ok(()) }
 }
 
-/// Connects long work to the keyboard and to the progress bar.
+/// Shows the progress of long work and stops it on Ctrl-C.
 pub struct ProgressControl {
-    /// Where progress is shown.
+    /// The progress bar.
     pub progress: Progress,
-    /// Ctrl-C keeps what there is instead of failing.
+    /// On Ctrl-C, keep the partial result instead of failing.
     pub keep_partial: bool,
 }
 
@@ -51,7 +51,7 @@ impl Control for ProgressControl {
     }
 }
 
-/// Listens to the keyboard, and shows nothing: for work whose own count is not that of the bar.
+/// Stops work on Ctrl-C without showing its progress: for work that is one of many steps of the progress bar.
 pub struct SilentControl;
 
 impl Control for SilentControl {

@@ -1,4 +1,4 @@
-//! What commands share in the terminal they run in: options, text or JSON, warnings, progress bars, Ctrl-C, panics.
+//! Terminal interface shared by the commands: output options, text or JSON, warnings, progress bars, Ctrl-C, panics.
 
 pub mod console;
 pub mod interrupt;

@@ -1,15 +1,15 @@
-//! A bug is reported in one line and with an exit code of its own, never as a stack trace out of nowhere.
+//! Reports a panic, which is a bug, in one line and with an exit code of its own instead of a stack trace.
 
 use std::panic::{AssertUnwindSafe, catch_unwind, set_hook};
 use std::sync::Mutex;
 
-/// Exit code of a process that met a bug in skylit.
+/// Exit code of a process that panicked, which is a bug in skylit.
 pub const EXIT_CODE: u8 = 70;
 
-/// What the first panic said; later ones (of other threads) usually follow from it.
+/// Message of the first panic; later ones (of other threads) usually follow from it.
 static FIRST: Mutex<Option<String>> = Mutex::new(None);
 
-/// Makes panics quiet: [`catch`] tells what happened.
+/// Makes panics quiet: [`catch`] returns the message.
 pub fn install() {
     set_hook(Box::new(|info| {
         let payload = info.payload();
@@ -26,9 +26,9 @@ pub fn install() {
     }));
 }
 
-/// Runs `f`; `Err` is the line to report.
+/// Runs `f` and catches a panic; `Err` is the line to report.
 pub fn catch<T>(f: impl FnOnce() -> T) -> Result<T, String> {
-    // nothing is used after a panic but the message
+    // only the message is used after a panic
     catch_unwind(AssertUnwindSafe(f)).map_err(|_| {
         let first = FIRST.lock().ok().and_then(|mut m| m.take());
         super::console::one_line(&first.unwrap_or_else(|| "internal error; this is a bug in skylit, please report it".into()))

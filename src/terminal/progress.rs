@@ -9,15 +9,15 @@ use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressState, P
 
 use crate::terminal::console::Console;
 
-/// Work shorter than this shows no bar.
+/// Time after which the bar appears.
 const PATIENCE: Duration = Duration::from_secs(1);
 
-/// A bar that appears once the work has lasted for a second, and only where a person can see it.
+/// A progress bar that appears after one second, and only if stderr is a terminal.
 pub struct Progress {
     label: Cow<'static, str>,
     start: Instant,
     visible: bool,
-    // units that are done, and all
+    // completed units, and all units
     at: (u64, u64),
     bar: Option<ProgressBar>,
 }
@@ -42,13 +42,13 @@ impl Progress {
         }
     }
 
-    /// What is done from here on. It is shown at once: it may take long, and nothing else is said meanwhile.
+    /// Sets the label and shows it immediately, because the next update may take long.
     pub fn phase(&mut self, label: impl Into<Cow<'static, str>>) {
         self.label = label.into();
         self.draw();
     }
 
-    /// Runs what writes to the terminal, with the bar out of the way.
+    /// Hides the bar while `write` writes to the terminal.
     pub fn suspend<R>(&self, write: impl FnOnce() -> R) -> R {
         match &self.bar {
             Some(bar) => bar.suspend(write),
@@ -63,7 +63,7 @@ impl Progress {
         let (done, total) = self.at;
         let bar = self.bar.get_or_insert_with(|| {
             let bar = ProgressBar::with_draw_target(Some(total), ProgressDrawTarget::stderr_with_hz(10));
-            // a template that does not parse would be a slip of ours: the plain style does as well
+            // if the template did not parse, the default style would do
             if let Ok(style) = ProgressStyle::with_template("{msg} [{bar:40}] {percent}%{left}") {
                 bar.set_style(style.with_key("left", left).progress_chars("=> "));
             }
@@ -77,10 +77,10 @@ impl Progress {
     }
 }
 
-/// The time that is left, once there is anything to tell it from.
+/// Appends the estimated remaining time, once there is progress to extrapolate.
 fn left(state: &ProgressState, out: &mut dyn Write) {
     if state.pos() > 0 {
-        // into a buffer of the bar's
+        // writing to the bar's buffer does not fail
         let _ = write!(out, " {:#} left", HumanDuration(state.eta()));
     }
 }

@@ -2,20 +2,20 @@
 
 use super::console::{Console, one_line};
 
-/// Warnings: shown to people at once, and kept for the record that programs get.
+/// Warnings: printed at once in text mode, and collected for the JSON record.
 pub struct Warnings {
     console: Console,
-    /// One line each.
+    /// The warnings so far, one line each.
     pub list: Vec<String>,
 }
 
 impl Warnings {
-    /// None yet.
+    /// An empty list of warnings.
     pub fn new(console: Console) -> Self {
         Self { console, list: Vec::new() }
     }
 
-    /// Shows and keeps a warning.
+    /// Prints and collects a warning.
     pub fn add(&mut self, text: &str) {
         let line = one_line(text);
         self.console.warning(&line);
@@ -23,7 +23,7 @@ impl Warnings {
     }
 }
 
-/// What the loader of a scene warns of, a sentence each.
+/// The warnings of a scene's loader, one sentence each.
 pub fn warnings_of(scene: &crate::scene::Scene) -> Vec<String> {
     let report = &scene.report;
     let dropped =

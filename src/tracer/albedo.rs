@@ -1,5 +1,5 @@
-//! Albedos of microfacets and fibres by cosine and roughness: the tables of shaders/bsdf/albedo.glsl, integrated when a scene is loaded whose
-//! materials ask for them.
+//! Directional albedos of microfacet and sheen BSDFs by cosine and roughness: the tables of shaders/bsdf/albedo.glsl, integrated when a
+//! scene is uploaded whose materials require them.
 //!
 //! The integrals are over the visible normals of GGX (Heitz, "Sampling the GGX Distribution of Visible Normals", JCGT 2018), by stratified
 //! points: what is left to sum is a Smith term and Fresnel's, both smooth. Beckmann's and Charlie's are by the midpoint rule.
@@ -14,30 +14,30 @@ use rayon::prelude::*;
 
 use crate::interface::records::albedo::ALBEDO_SIZE;
 
-/// Entries along cosine and along roughness, both from 0 to 1.
+/// Number of table entries along cosine and along roughness, both from 0 to 1.
 const SIZE: usize = ALBEDO_SIZE as usize;
-/// Points along each axis of an integral.
+/// Number of points along each axis of an integral.
 const POINTS: usize = 32;
-/// Points in all of one with a critical angle.
+/// Number of points of an integral with a critical angle.
 const LATTICE: usize = 4096;
 /// Smallest roughness: at 0 the integrals are limits.
 const MIN_ROUGHNESS: f64 = 1e-3;
 /// Smallest cosine, of a direction and stretched.
 const MIN_COSINE: f64 = 1e-7;
 
-/// Which tables are asked for; the others stay 0.
+/// The required tables; the others stay 0.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Wanted {
-    /// Of GGX.
+pub(super) struct AlbedoTables {
+    /// Albedo of GGX microfacets.
     pub ggx: bool,
-    /// Of Charlie's fibres.
+    /// Albedo of the Charlie sheen.
     pub sheen: bool,
-    /// Of Beckmann's microfacets.
+    /// Albedo of Beckmann microfacets.
     pub beckmann: bool,
 }
 
 /// Layers of `SIZE` squared in the order of shaders/bsdf/albedo.glsl, rows by roughness; `glass`: indices of refraction.
-pub(super) fn tables(wanted: Wanted, glass: &[f32]) -> Vec<f32> {
+pub(super) fn tables(wanted: AlbedoTables, glass: &[f32]) -> Vec<f32> {
     let ggx_wanted = wanted.ggx || !glass.is_empty();
     let mut all = table(ggx_wanted, |x, r| [ggx(unstretched(x, r), r)[0]]);
     all.extend(table(ggx_wanted, |x, r| {
@@ -58,7 +58,7 @@ pub(super) fn tables(wanted: Wanted, glass: &[f32]) -> Vec<f32> {
     all
 }
 
-/// Layers of a function of both axes; zeros where nobody wants it.
+/// Layers of a function of cosine and roughness; zeros for a table that is not required.
 fn table<const N: usize>(wanted: bool, f: impl Fn(f64, f64) -> [f64; N] + Sync) -> Vec<f32> {
     let entry = |k: usize| {
         let [x, y] = [k % SIZE, k / SIZE].map(|i| i as f64 / (SIZE - 1) as f64);
@@ -69,12 +69,12 @@ fn table<const N: usize>(wanted: bool, f: impl Fn(f64, f64) -> [f64; N] + Sync) 
     if wanted { (0..N).flat_map(layer).collect() } else { vec![0.0; N * SIZE * SIZE] }
 }
 
-/// The cosine at a place of the axis.
+/// The cosine at a coordinate in [0, 1] of the axis.
 fn cosine(x: f64) -> f64 {
     (x * x).max(MIN_COSINE)
 }
 
-/// The cosine whose stretched one is at a place of the axis: `stretched()` of shaders/bsdf/albedo.glsl, the other way.
+/// The cosine whose stretched cosine is at a coordinate of the axis: the inverse of `stretched()` in shaders/bsdf/albedo.glsl.
 fn unstretched(x: f64, roughness: f64) -> f64 {
     let v2 = cosine(x).powi(2);
     let scaled = v2 * roughness.powi(4);
@@ -99,12 +99,13 @@ fn grid() -> impl Iterator<Item = ((f64, f64), f64)> {
         .map(|(x, y)| spaced(x / POINTS as f64, y / POINTS as f64, POINTS * POINTS))
 }
 
-/// The same of a lattice by the golden ratio, for integrands with an edge: no row of it lies along one.
+/// Points of a golden-ratio lattice and their weights, for integrands with an edge: no row of points lies along the edge.
 fn lattice() -> impl Iterator<Item = ((f64, f64), f64)> {
     (0..LATTICE).map(|k| k as f64 + 0.5).map(|k| spaced(k / LATTICE as f64, (k * 0.618_033_988_749_894_9).fract(), LATTICE))
 }
 
-/// The second coordinate is spaced by its root from 1: where it is that near, normals are nearly flat, and what they reflect leaves the upper side.
+/// Warps the second coordinate so that points are denser near 1, where normals are nearly those of the surface and most reflected
+/// directions are above it.
 fn spaced(x: f64, y: f64, points: usize) -> ((f64, f64), f64) {
     ((x, 1.0 - y * y), 2.0 * y / points as f64)
 }
@@ -132,7 +133,7 @@ fn visible_normal(alpha: f64, wo: [f64; 3], u: (f64, f64)) -> [f64; 3] {
     normalize([alpha * h[0], alpha * h[1], h[2].max(1e-12)])
 }
 
-/// Of GGX that reflects everything, and what of that is weighted by Schlick's term.
+/// Albedo of GGX microfacets with a Fresnel term of 1, and with Schlick's weight (1 - cos)^5 as the Fresnel term.
 fn ggx(cos_o: f64, roughness: f64) -> [f64; 2] {
     let (alpha, wo) = (roughness * roughness, direction(cos_o));
     let hidden = 1.0 + lambda(alpha, cos_o);
@@ -151,8 +152,9 @@ fn ggx(cos_o: f64, roughness: f64) -> [f64; 2] {
     sum
 }
 
-/// Of GGX with a dielectric's Fresnel term F, `DIELECTRIC_*` of shaders/bsdf/albedo.glsl: reflected beyond the critical angle; reflected where there
-/// is refraction; refracted as if F were 0 there; what F takes from that. eta: index beyond over index on wo's side.
+/// Albedos of GGX microfacets with a dielectric's Fresnel term F, `DIELECTRIC_*` of shaders/bsdf/albedo.glsl: total internal reflection;
+/// reflection below the critical angle; transmission with F = 0; the part of it that F removes. `eta`: index of refraction on the far
+/// side over that on the side of wo.
 fn dielectric(cos_o: f64, roughness: f64, eta: f64) -> [f64; 4] {
     let (alpha, wo) = (roughness * roughness, direction(cos_o));
     let hidden = 1.0 + lambda(alpha, cos_o);
@@ -175,7 +177,7 @@ fn dielectric(cos_o: f64, roughness: f64, eta: f64) -> [f64; 4] {
     sum
 }
 
-/// Exact Fresnel term of a dielectric, and the cosine beyond; 0 where all is reflected.
+/// Exact Fresnel term of a dielectric, and the cosine of the refracted direction: 0 for total internal reflection.
 fn fresnel(cos_i: f64, eta: f64) -> (f64, f64) {
     let sin2 = (1.0 - cos_i * cos_i) / (eta * eta);
     if sin2 >= 1.0 {
@@ -187,7 +189,7 @@ fn fresnel(cos_i: f64, eta: f64) -> (f64, f64) {
     (0.5 * (parallel * parallel + perpendicular * perpendicular), cos_t)
 }
 
-/// Of Beckmann's microfacets with the fit of Smith's term that shaders/bsdf/microfacet.glsl uses.
+/// Albedo of Beckmann microfacets with the fit of Smith's term that shaders/bsdf/microfacet.glsl uses.
 fn beckmann(cos_o: f64, roughness: f64) -> f64 {
     let (alpha, wo) = (roughness * roughness, direction(cos_o));
     let lambda = |c: f64| {
@@ -211,7 +213,7 @@ fn beckmann(cos_o: f64, roughness: f64) -> f64 {
         .sum()
 }
 
-/// Of Charlie's fibres (shaders/bsdf/sheen.glsl): more than 1 for smooth ones at grazing angles, which is cut off where it is looked up.
+/// Albedo of the Charlie sheen (shaders/bsdf/sheen.glsl): above 1 for low roughness at grazing angles, where the shader clamps it.
 fn charlie(cos_o: f64, roughness: f64) -> f64 {
     let (alpha, wo) = ((roughness * roughness).max(1e-3), direction(cos_o));
     let mix = |a: f64, b: f64| a + (b - a) * (1.0 - alpha).powi(2);
@@ -219,7 +221,7 @@ fn charlie(cos_o: f64, roughness: f64) -> f64 {
     let (d, e) = (mix(-1.97760, -1.27393), mix(-4.32054, -4.85967));
     let curve = |x: f64| a / (1.0 + b * x.max(1e-9).powf(c)) + d * x + e;
     let lambda = |x: f64| if x < 0.5 { curve(x).exp() } else { (2.0 * curve(0.5) - curve(1.0 - x)).exp() };
-    // fibres shine along the surface: most of the light is where half vectors are near to it, so cosines are spaced by their squares
+    // fibres reflect most at grazing angles, so the points are denser at small cosines
     let n = POINTS;
     let mut sum = 0.0;
     for i in 0..n {
@@ -290,7 +292,7 @@ mod tests {
     /// Tables as the shader reads them, between their entries, against integrals of many points: what compensation is off by.
     #[test]
     fn tables_hold_between_their_entries() {
-        let tables = tables(Wanted { ggx: true, sheen: true, beckmann: true }, &[]);
+        let tables = tables(AlbedoTables { ggx: true, sheen: true, beckmann: true }, &[]);
         let at = |layer: usize, x: f64, y: f64| {
             let (x, y) = (x * (SIZE - 1) as f64, y * (SIZE - 1) as f64);
             let (i, j) = ((x as usize).min(SIZE - 2), (y as usize).min(SIZE - 2));

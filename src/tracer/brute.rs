@@ -1,5 +1,5 @@
-//! What the compute tracer reads when it walks no tree (`shaders/trace/brute.glsl`): primitives group by group, and for each
-//! instance which of them are its own.
+//! The compute tracer's data without a BVH (`shaders/trace/brute.glsl`): primitives group by group, and for each
+//! instance the range of its primitives.
 
 use std::sync::Arc;
 
@@ -9,16 +9,16 @@ use crate::accel::flatten::FlatScene;
 use crate::error::{Error, Result};
 use crate::gpu::Device;
 
-/// Fails for a scene of which every ray would have to test too much.
+/// Fails for a scene with more than [`Kernel::MAX_BRUTE_TESTS`] tests per ray.
 pub(super) fn check(flat: &FlatScene) -> Result<()> {
     let tests = Kernel::brute_tests(flat);
-    if tests <= Kernel::BRUTE_MOST {
+    if tests <= Kernel::MAX_BRUTE_TESTS {
         return Ok(());
     }
     Err(Error::Scene(format!(
         "traversal 'brute' tests every primitive of every instance against every ray, at most {}; this scene has {tests}: use \
          another --traversal",
-        Kernel::BRUTE_MOST
+        Kernel::MAX_BRUTE_TESTS
     )))
 }
 
@@ -35,13 +35,13 @@ pub(super) fn upload(device: &Arc<Device>, flat: &FlatScene) -> Result<Hierarchy
         })
         .collect();
     let mut records = flat.groups.iter().flat_map(|g| (0..g.primitive_count as u32).map(move |p| record(flat, g, p)));
-    let mut entries = flat.placements.iter().map(|p| ranges[p.group]);
+    let mut entries = flat.instances.iter().map(|p| ranges[p.group]);
     Ok(Hierarchy {
         kernel: Kernel::Brute,
-        nodes: write_records(device, "instance ranges", flat.placements.len() as u64, &mut entries)?,
+        nodes: write_records(device, "instance ranges", flat.instances.len() as u64, &mut entries)?,
         primitives: Some(write_records(device, "primitives", u64::from(total), &mut records)?),
-        root: flat.placements.len() as u32,
-        instance_roots: flat.placements.iter().map(|p| ranges[p.group][0]).collect(),
+        root: flat.instances.len() as u32,
+        instance_roots: flat.instances.iter().map(|p| ranges[p.group][0]).collect(),
         stack_entries: 0,
         bounds: flat.bounds(),
         unfinished: unfinished_counter(device)?,

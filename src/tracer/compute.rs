@@ -1,5 +1,5 @@
-//! What the compute tracer walks: a hierarchy per group and one over the placed groups, all in one node array. Here is the fast
-//! kernel's and what all share; the readable kernel's is in `reference.rs`, and `brute.rs` has none.
+//! The compute tracer's hierarchies: a BVH per group and a top level over the instances, all in one node array. This file has what the
+//! kernels share; `wide.rs` has the fast kernel's BVH, `reference.rs` the binary one, and `brute.rs` has none.
 
 use std::sync::Arc;
 
@@ -9,22 +9,23 @@ use super::dynamic_trees::DynamicTrees;
 use super::kernel::{BuildOptions, Kernel};
 use super::stream::LaunchMemory;
 use super::{brute, reference, wide};
-use crate::accel::flatten::{FlatScene, Group, Placement};
+use crate::accel::flatten::{BlasGroup, FlatScene, TlasInstance};
 use crate::accel::{Aabb, bvh2};
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, Device, DeviceInfo, Memory};
 use crate::interface::records::hierarchy::{ALPHA_TESTED, SPHERE, STACK_IN_REGISTERS, SphereRecord, TriangleRecord};
 
-/// Rays that a lane of the fast kernel takes one after the other on a CPU driver, where idle lanes of a vector cost most.
+/// Rays per lane of the fast kernel, traced one after the other, on a CPU driver, where idle lanes of a vector cost most.
 const RAYS_PER_LANE_CPU: u32 = 16;
-/// On a GPU enough rays fill the machine; long loops per lane only lengthen the tail.
+/// Rays per lane on a GPU: the many rays of a launch already fill it, and long loops per lane only lengthen the tail.
 const RAYS_PER_LANE_GPU: u32 = 2;
 
-/// How many rays a lane takes one after the other, and after how many turns of its loop it takes no further one (0: no bound).
+/// The number of rays that a lane traces one after the other, and the number of iterations of its loop after which it fetches no
+/// further ray (0: no bound).
 ///
-/// Where loops are cut, half of the turns are for the last ray; and with one ray per lane of a work-group all are taken, whatever
-/// they cost: a lane that stops has had one. On a CPU lanes still take eight or so each, because the vectors of a work-group run
-/// one after the other and the first takes them all.
+/// Where drivers end loops early, half of the iterations are reserved for the last ray. With one ray per lane of a work-group every ray
+/// is still fetched, because each lane fetches at least one. On a CPU the vectors of a work-group run one after the other, and the first
+/// fetches most rays, so lanes still trace about eight each.
 pub(super) fn lane_budget(device: &DeviceInfo) -> (u32, u32) {
     match (device.cuts_long_loops(), device.is_cpu()) {
         (true, _) => (1, CUT_LOOP_TURNS / 2),
@@ -33,10 +34,10 @@ pub(super) fn lane_budget(device: &DeviceInfo) -> (u32, u32) {
     }
 }
 
-/// Entries of the stack beyond those in registers that most scenes come to, rounded up.
+/// Stack entries beyond those in registers that suffice for most scenes.
 pub(super) const USUAL_STACK: u32 = 16;
 
-/// After so many turns some drivers leave any loop: [`DeviceInfo::cuts_long_loops`].
+/// Number of iterations after which some drivers leave any loop: [`DeviceInfo::cuts_long_loops`].
 const CUT_LOOP_TURNS: u32 = 65_535;
 
 /// Hierarchies on the host.
@@ -50,46 +51,46 @@ pub(super) enum Trees {
 pub(super) struct Hierarchy {
     pub kernel: Kernel,
     pub nodes: Buffer,
-    /// Records of primitives, where they are not in the nodes.
+    /// Records of primitives; `None` where the leaves hold them.
     pub primitives: Option<Buffer>,
-    /// Where a ray begins.
+    /// Reference of the root node.
     pub root: u32,
-    /// Where it begins within each entry of the top level.
+    /// Reference of the root node of each TLAS instance.
     pub instance_roots: Vec<u32>,
     pub stack_entries: u32,
-    /// Of everything, padded.
+    /// World-space bounds of the whole scene, padded.
     pub bounds: Aabb,
-    /// A u32: rays whose traversal the driver cut short.
+    /// A u32: number of rays whose traversal the driver ended early.
     pub unfinished: Buffer,
-    /// Between the steps of a launch (fast kernel only).
+    /// Buffers between the steps of a launch (fast kernel only).
     pub launch: Option<LaunchMemory>,
-    /// What keeps it up to date with a scene that changes (fast kernel only).
+    /// State to update it in a dynamic scene (fast kernel only).
     pub dynamic: Option<Box<DynamicTrees>>,
 }
 
 impl Hierarchy {
-    /// Fails when the driver cut a traversal short.
+    /// Fails when the driver ended a traversal loop early.
     pub fn check_finished(&self) -> Result<()> {
         let mut count = 0u32;
         self.unfinished.read_with(0, 4, 4, |_, bytes| count = bytemuck::pod_read_unaligned(bytes))?;
         let (what, remedy) = match self.kernel {
             Kernel::Packet => ("packets of rays", "--traversal wide, or a newer driver"),
-            _ => ("rays", "a newer driver, or fewer surfaces in one place"),
+            _ => ("rays", "a newer driver, or fewer overlapping surfaces"),
         };
         match count {
             0 => Ok(()),
             n => Err(Error::Vulkan(format!(
-                "the driver cut the traversal of {n} {what} short (Mesa before 23 leaves a loop after 65,535 turns): use {remedy}"
+                "the driver ended the traversal of {n} {what} early (Mesa before 23 leaves a loop after 65,535 iterations): use {remedy}"
             ))),
         }
     }
 
-    /// Between the steps of a launch of the fast kernel.
+    /// Buffers between the steps of a launch of the fast kernel.
     pub fn launch_memory(&self) -> Result<LaunchMemory> {
         self.launch.clone().ok_or_else(|| Error::Vulkan(format!("kernel '{}' has no steps", self.kernel)))
     }
 
-    /// What the kernel's array is specialised to: the fast kernels hold the upper end of the stack in registers, and the rest is
+    /// Value of the specialization constant for the stack's array. The fast kernels hold the top of the stack in registers; the rest is
     /// rounded up, so that scenes share compiled shaders.
     pub fn stack_constant(&self) -> u32 {
         match self.kernel {
@@ -114,17 +115,17 @@ impl Hierarchy {
     }
 
     /// See [`DynamicTrees::place`].
-    pub fn place(&mut self, placements: &[Placement]) -> Result<bool> {
+    pub fn place(&mut self, instances: &[TlasInstance]) -> Result<bool> {
         let Some(dynamic) = &mut self.dynamic else { return Ok(false) };
-        let (rebuilt, bounds) = dynamic.place(&mut self.nodes, placements)?;
+        let (rebuilt, bounds) = dynamic.place(&mut self.nodes, instances)?;
         self.bounds = bounds;
         Ok(rebuilt)
     }
 
     /// See [`DynamicTrees::traced`].
-    pub fn traced(&mut self, seconds: f64, placements: &[Placement]) {
+    pub fn traced(&mut self, seconds: f64, instances: &[TlasInstance]) {
         if let Some(dynamic) = &mut self.dynamic {
-            dynamic.traced(seconds, placements);
+            dynamic.traced(seconds, instances);
         }
     }
 }
@@ -132,18 +133,15 @@ impl Hierarchy {
 impl Trees {
     pub fn build(flat: &FlatScene, kernel: Kernel, options: &BuildOptions) -> Result<Self> {
         let total = flat.primitive_count();
-        if total > bvh2::MAX_PRIMITIVES || flat.placements.len() > bvh2::MAX_PRIMITIVES {
+        if total > bvh2::MAX_PRIMITIVES || flat.instances.len() > bvh2::MAX_PRIMITIVES {
             return Err(Error::Scene(format!(
-                "{total} primitives and {} instances; the compute tracer numbers at most {} of each",
-                flat.placements.len(),
+                "{total} primitives and {} instances are too many: the compute tracer takes at most {} of each",
+                flat.instances.len(),
                 bvh2::MAX_PRIMITIVES
             )));
         }
         if !flat.motion.is_none() && !matches!(kernel, Kernel::Auto | Kernel::Wide | Kernel::Packet) {
-            return Err(Error::Usage(format!(
-                "traversal '{kernel}' is for scenes that do not change; use --traversal {}",
-                Kernel::Wide
-            )));
+            return Err(Error::Usage(format!("traversal '{kernel}' is for static scenes; use --traversal {}", Kernel::Wide)));
         }
         Ok(match kernel {
             Kernel::Auto | Kernel::Wide | Kernel::Packet => Trees::Wide(wide::Trees::build(flat, options), kernel),
@@ -172,7 +170,7 @@ impl Trees {
     }
 }
 
-/// Counts rays that were cut short: see [`Hierarchy::check_finished`].
+/// A counter of rays whose traversal ended early: see [`Hierarchy::check_finished`].
 pub(super) fn unfinished_counter(device: &Arc<Device>) -> Result<Buffer> {
     let mut counter = Buffer::new(device, "unfinished rays", 4, Memory::Readback)?;
     counter.fill(4, 4, |_, bytes| bytes.fill(0))?;
@@ -195,8 +193,8 @@ pub(super) fn write_records<T: bytemuck::NoUninit>(
     Ok(buffer)
 }
 
-/// How far boxes are widened: eight half-ulps of the largest coordinate. It covers what quantisation rounds away; and a ray that
-/// runs within the plane of flat geometry is then strictly inside the box, so that the traversal needs no special case for it.
+/// The distance by which boxes are padded: eight half-ulps of the largest coordinate. It covers the rounding of quantization, and a ray
+/// within the plane of flat geometry is then strictly inside the box, so that traversal needs no special case for it.
 pub(super) fn padding<'a>(boxes: impl Iterator<Item = &'a Aabb>) -> f32 {
     let reach = boxes.fold(0.0f32, |m, b| m.max(b.min.abs().max(b.max.abs()).max_element()));
     reach_padding(reach)
@@ -207,33 +205,33 @@ pub(super) fn reach_padding(reach: f32) -> f32 {
     (4.0 * f32::EPSILON * reach).max(1e-30)
 }
 
-pub(super) fn primitive_boxes(flat: &FlatScene, group: &Group) -> impl Iterator<Item = Aabb> {
-    group.parts.iter().flat_map(move |part| {
+pub(super) fn primitive_boxes(flat: &FlatScene, group: &BlasGroup) -> impl Iterator<Item = Aabb> {
+    group.submeshes.iter().flat_map(move |part| {
         let count = flat.scene.meshes[part.mesh].geometry.primitive_count();
         (part.first_primitive..part.first_primitive + count).map(move |p| flat.primitive_bounds(group, part, p))
     })
 }
 
-/// World boxes of the placed groups from each group's own, widened by what rounding a ray into a group's space may move it.
-pub(super) fn placement_boxes(flat: &FlatScene, bounds: &[Aabb]) -> Vec<Aabb> {
+/// World-space bounds of the instances, from those of their groups, padded by the rounding error of transforming a ray to group space.
+pub(super) fn instance_boxes(flat: &FlatScene, bounds: &[Aabb]) -> Vec<Aabb> {
     let scene = flat.bounds();
-    let pad = placement_padding(scene.min.abs().max(scene.max.abs()).max_element().max(0.0));
-    flat.placements
+    let pad = instance_padding(scene.min.abs().max(scene.max.abs()).max_element().max(0.0));
+    flat.instances
         .iter()
         .map(|p| {
-            let b = placed(&p.to_world, bounds[p.group]);
+            let b = transformed_bounds(&p.to_world, bounds[p.group]);
             Aabb { min: b.min - pad, max: b.max + pad }
         })
         .collect()
 }
 
 /// 16 half-ulps of the largest coordinate: two transforms of three products each, and the inverse's own rounding.
-pub(super) fn placement_padding(reach: f32) -> f32 {
+pub(super) fn instance_padding(reach: f32) -> f32 {
     16.0 * f32::EPSILON * 0.5 * reach
 }
 
-/// Box around a transformed box, rounded but not widened.
-pub(super) fn placed(to_world: &DAffine3, b: Aabb) -> Aabb {
+/// Bounds of a transformed box, rounded but not padded.
+pub(super) fn transformed_bounds(to_world: &DAffine3, b: Aabb) -> Aabb {
     (0..8u32).fold(Aabb::EMPTY, |out, k| {
         let pick = |axis: usize| if k >> axis & 1 == 0 { b.min[axis] } else { b.max[axis] };
         let corner = to_world.transform_point3(Vec3::new(pick(0), pick(1), pick(2)).as_dvec3()).as_vec3();
@@ -241,9 +239,9 @@ pub(super) fn placed(to_world: &DAffine3, b: Aabb) -> Aabb {
     })
 }
 
-/// A primitive of a group as the readable kernels take it: a sphere lies where a triangle might be.
-pub(super) fn record(flat: &FlatScene, group: &Group, primitive: u32) -> TriangleRecord {
-    let part = flat.part_of(group, primitive as usize);
+/// The record of a group's primitive for the binary and brute-force kernels: a triangle, or a sphere in its layout.
+pub(super) fn record(flat: &FlatScene, group: &BlasGroup, primitive: u32) -> TriangleRecord {
+    let part = flat.submesh_of(group, primitive as usize);
     let k = primitive as usize - part.first_primitive;
     if group.spheres {
         let s = flat.sphere(part, k);

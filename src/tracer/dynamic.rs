@@ -1,8 +1,8 @@
-//! Scenes that change while they are traced: instances move, meshes deform, the rest stays where it is.
+//! Dynamic scenes: instances move, meshes deform, the rest is static.
 //!
-//! What may change is said when the scene is flattened ([`crate::scene::Motion`]); [`Tracer::update`] takes what did. The compute tracer refits
-//! its hierarchies on the host or builds them anew (`dynamic_trees.rs`), the hardware tracers have the driver do so (`hardware.rs`). A tracer of
-//! a scene that never changes has nothing of this.
+//! What may change is declared when the scene is flattened ([`crate::scene::Motion`]); [`Tracer::update`] applies the changes. The compute
+//! tracer refits its BVHs on the host or rebuilds them (`dynamic_trees.rs`), the hardware tracers let the driver do so (`hardware.rs`). The
+//! tracer of a static scene has no such state.
 
 use std::collections::HashMap;
 use std::time::Instant;
@@ -10,11 +10,11 @@ use std::time::Instant;
 use glam::{DAffine3, DVec3, Vec3};
 use rayon::prelude::*;
 
-use super::compute::placed;
+use super::compute::transformed_bounds;
 use super::gpu_scene::rows;
 use super::{Structure, Tracer};
 use crate::accel::Aabb;
-use crate::accel::flatten::{FlatScene, Group, Part, Placement};
+use crate::accel::flatten::{BlasGroup, FlatScene, Submesh, TlasInstance};
 use crate::error::{Error, Result};
 use crate::scene::Geometry;
 use crate::scene::animation::{Pose, PosedMesh};
@@ -26,31 +26,32 @@ pub struct MeshChange<'a> {
     pub mesh: usize,
     /// Object-space positions, as many as the mesh has vertices. All finite.
     pub positions: &'a [Vec3],
-    /// Unit shading normals, as many; `None` leaves them as they are. Without effect where the mesh or the tracer has none.
+    /// Unit shading normals, one per vertex; `None` leaves them unchanged. Without effect where the mesh or the tracer has none.
     pub normals: Option<&'a [Vec3]>,
 }
 
-/// What has changed since the last update.
+/// Changes of a scene since the last update.
 #[derive(Clone, Debug, Default)]
 pub struct Changes<'a> {
-    /// Instances (indices into [`crate::scene::Scene::instances`]) and their new object-to-world transforms, in the file's world. Of an instance that
-    /// is named twice the last counts.
+    /// Instances (indices into [`crate::scene::Scene::instances`]) and their new object-to-world transforms, in the file's world space. Of two
+    /// entries for one instance the last counts.
     pub instances: Vec<(usize, DAffine3)>,
     /// Meshes that have deformed.
     pub meshes: Vec<MeshChange<'a>>,
 }
 
-/// Something that moved or changed its shape in an update.
+/// Bounds of an instance that moved or deformed in an update.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Moved {
-    /// Box around where it was and where it is, relative to the scene's origin.
+pub struct MovedBounds {
+    /// World-space bounds of it before and after the update together, relative to the scene's origin.
     pub bounds: Aabb,
-    /// The longest way that a point of it went, by half its diagonal: 1 and more where nothing of it is where it was.
+    /// Largest displacement of one of its points over half the diagonal of its bounds. At 1 and above, the positions before and
+    /// after the update need not overlap.
     pub share: f32,
 }
 
 impl Pose {
-    /// What to tell a tracer whose scene was flattened with the animation's [`crate::scene::animation::Rig::motion`].
+    /// The changes for a tracer whose scene was flattened with the animation's [`crate::scene::animation::AnimationRig::motion`].
     pub fn changes(&self) -> Changes<'_> {
         fn mesh(posed: &PosedMesh) -> MeshChange<'_> {
             let shape = &posed.shape;
@@ -61,38 +62,38 @@ impl Pose {
     }
 }
 
-/// What an update did.
+/// Time and work of an update.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
 pub struct UpdateStats {
-    /// Seconds for deformed meshes: to refit them or build them anew, and to write them.
+    /// Seconds to refit or rebuild the BVHs of deformed meshes, and to upload them.
     pub mesh_seconds: f64,
     /// Seconds for the top level.
     pub top_seconds: f64,
-    /// Meshes that were built anew; the others were refitted.
+    /// Meshes whose BVH was rebuilt, as indices into [`crate::scene::Scene::meshes`]; the others were refitted.
     pub rebuilt: Vec<usize>,
-    /// The top level was built anew.
+    /// The top level was rebuilt.
     pub top_rebuilt: bool,
-    /// Greatest SAH cost of a deformed mesh's tree over that at its build (compute tracer).
+    /// Largest SAH cost of a deformed mesh's BVH relative to its cost when it was built (compute tracer; else 1).
     pub growth: f64,
-    /// What is no longer where it was.
+    /// Bounds of what moved or deformed.
     #[serde(skip)]
-    pub moved: Vec<Moved>,
+    pub moved: Vec<MovedBounds>,
 }
 
 /// A mesh that may deform.
 struct DeformingMesh {
-    /// `None`: it is nowhere to be seen.
+    /// `None` when no instance uses the mesh.
     group: Option<usize>,
-    /// Where its vertices are.
+    /// Its current vertices, in object space.
     positions: Vec<Vec3>,
     normals: usize,
 }
 
-/// What a tracer of a changing scene keeps on the host.
+/// Host-side state of a dynamic scene.
 pub(super) struct Dynamic {
     origin: DVec3,
-    placements: Vec<Placement>,
-    /// Of each group, in its own space.
+    instances: Vec<TlasInstance>,
+    /// Bounds of each group, in group space.
     bounds: Vec<Aabb>,
     /// Entry of the top level for each instance that may move, where it has one.
     entries: HashMap<usize, Option<usize>>,
@@ -100,13 +101,13 @@ pub(super) struct Dynamic {
 }
 
 impl Dynamic {
-    /// `None` for a scene of which nothing changes.
+    /// `None` for a static scene.
     pub fn new(flat: &FlatScene) -> Option<Self> {
         if flat.motion.is_none() {
             return None;
         }
         let placed: HashMap<usize, usize> =
-            flat.placements.iter().enumerate().filter_map(|(k, p)| Some((p.scene_instance?, k))).collect();
+            flat.instances.iter().enumerate().filter_map(|(k, p)| Some((p.scene_instance?, k))).collect();
         let meshes = flat.motion.meshes.iter().filter_map(|&mesh| {
             let Geometry::Triangles(t) = &flat.scene.meshes[mesh].geometry else { return None };
             let group = group_of(flat, mesh);
@@ -114,25 +115,25 @@ impl Dynamic {
         });
         Some(Self {
             origin: flat.origin,
-            placements: flat.placements.clone(),
+            instances: flat.instances.clone(),
             bounds: flat.groups.iter().map(|g| group_bounds(flat, g)).collect(),
             entries: flat.motion.instances.iter().map(|i| (*i, placed.get(i).copied())).collect(),
             meshes: meshes.collect(),
         })
     }
 
-    /// Are these changes such as were announced, and sound? Gives the top level's entries that move.
+    /// Checks that the changes were declared and are valid. Returns the TLAS instances that move, with their new transforms.
     fn check(&self, changes: &Changes) -> Result<Vec<(usize, DAffine3)>> {
         for change in &changes.meshes {
             let m = change.mesh;
             let Some(mesh) = self.meshes.get(&m) else {
-                return Err(Error::Usage(format!("mesh {m} was not said to deform: name it in Motion::meshes")));
+                return Err(Error::Usage(format!("mesh {m} was not declared as deforming: list it in Motion::meshes")));
             };
-            let count = |what: &str, given: usize, there: usize| {
-                if given == there {
+            let count = |what: &str, given: usize, expected: usize| {
+                if given == expected {
                     Ok(())
                 } else {
-                    Err(Error::Scene(format!("mesh {m} has {there} {what}, {given} were given")))
+                    Err(Error::Scene(format!("mesh {m} has {expected} {what}, but {given} were given")))
                 }
             };
             count("vertices", change.positions.len(), mesh.positions.len())?;
@@ -150,7 +151,7 @@ impl Dynamic {
         let mut moved = Vec::with_capacity(changes.instances.len());
         for &(i, object_to_world) in &changes.instances {
             let Some(&entry) = self.entries.get(&i) else {
-                return Err(Error::Usage(format!("instance {i} was not said to move: name it in Motion::instances")));
+                return Err(Error::Usage(format!("instance {i} was not declared as moving: list it in Motion::instances")));
             };
             let to_world = DAffine3 { translation: object_to_world.translation - self.origin, ..object_to_world };
             let finite = |t: &DAffine3| rows(t).iter().flatten().all(|x| x.is_finite());
@@ -165,9 +166,9 @@ impl Dynamic {
     }
 }
 
-/// Box of a group's primitives.
-fn group_bounds(flat: &FlatScene, group: &Group) -> Aabb {
-    let part = |part: &Part| {
+/// Bounds of a group's primitives, in group space.
+fn group_bounds(flat: &FlatScene, group: &BlasGroup) -> Aabb {
+    let part = |part: &Submesh| {
         let count = flat.scene.meshes[part.mesh].geometry.primitive_count();
         (part.first_primitive..part.first_primitive + count)
             .into_par_iter()
@@ -175,18 +176,19 @@ fn group_bounds(flat: &FlatScene, group: &Group) -> Aabb {
             .map(|k| flat.primitive_bounds(group, part, k))
             .reduce(|| Aabb::EMPTY, |a, b| a.union(b))
     };
-    group.parts.iter().map(part).fold(Aabb::EMPTY, |a, b| a.union(b))
+    group.submeshes.iter().map(part).fold(Aabb::EMPTY, |a, b| a.union(b))
 }
 
-/// The group of a mesh that was not baked.
+/// The index of the group that consists of this mesh alone, if it was not baked into a larger one.
 pub(super) fn group_of(flat: &FlatScene, mesh: usize) -> Option<usize> {
-    flat.groups.iter().position(|g| matches!(g.parts.as_slice(), [p] if p.mesh == mesh))
+    flat.groups.iter().position(|g| matches!(g.submeshes.as_slice(), [p] if p.mesh == mesh))
 }
 
 impl Dynamic {
-    /// Takes what has changed, and says where that was and is. Entries whose transform or shape is what it was have not moved.
-    fn advance(&mut self, changes: &Changes, moved: &[(usize, DAffine3)]) -> Vec<Moved> {
-        // of a group's own points, by group
+    /// Applies the changes to the host-side state and returns the bounds of what moved. Instances whose transform and vertices are
+    /// unchanged are left out.
+    fn advance(&mut self, changes: &Changes, moved: &[(usize, DAffine3)]) -> Vec<MovedBounds> {
+        // bounds before the update and largest displacement of the deformed groups, in group space
         let mut ways: HashMap<usize, (Aabb, f32)> = HashMap::new();
         for change in &changes.meshes {
             let Some(mesh) = self.meshes.get_mut(&change.mesh) else { continue };
@@ -204,10 +206,10 @@ impl Dynamic {
                 ways.insert(group, (before, way));
             }
         }
-        // of an entry that is named twice the last counts
+        // of two transforms for one instance the last counts
         let latest: HashMap<usize, DAffine3> = moved.iter().copied().collect();
         let mut out = Vec::new();
-        for (k, p) in self.placements.iter_mut().enumerate() {
+        for (k, p) in self.instances.iter_mut().enumerate() {
             let (old, new) = (p.to_world, latest.get(&k).copied().unwrap_or(p.to_world));
             let deformed = ways.get(&p.group).copied();
             if old == new && deformed.is_none() {
@@ -216,11 +218,11 @@ impl Dynamic {
             p.to_world = new;
             let now = self.bounds[p.group];
             let (before, way) = deformed.unwrap_or((now, 0.0));
-            let (from, to) = (placed(&old, before), placed(&new, now));
+            let (from, to) = (transformed_bounds(&old, before), transformed_bounds(&new, now));
             let scale = new.matrix3.x_axis.length().max(new.matrix3.y_axis.length()).max(new.matrix3.z_axis.length());
             let carried = corners(now).map(|c| old.transform_point3(c).distance(new.transform_point3(c))).fold(0.0, f64::max);
             let half = 0.5 * (to.max - to.min).length().max(f32::MIN_POSITIVE);
-            out.push(Moved { bounds: from.union(to), share: (f64::from(way) * scale + carried) as f32 / half });
+            out.push(MovedBounds { bounds: from.union(to), share: (f64::from(way) * scale + carried) as f32 / half });
         }
         out
     }
@@ -232,22 +234,22 @@ fn corners(b: Aabb) -> impl Iterator<Item = DVec3> {
 }
 
 impl Tracer {
-    /// Brings the tracer up to date with a scene that has changed. Ids in hits, streams and [`Tracer::scene_address`] stay as they are;
-    /// nothing may be tracing meanwhile. The origin stays where it was: a scene that wanders far off loses precision.
+    /// Applies changes of the scene. Ids in hits, streams and [`Tracer::scene_address`] stay valid; no stream may be running
+    /// meanwhile. The origin stays where it was: a scene that moves far away from it loses precision.
     ///
     /// # Errors
-    /// [`Error::Usage`] when something was not announced in [`crate::scene::Motion`]; [`Error::Scene`] for numbers that are not finite,
-    /// wrong counts and transforms that cannot be inverted. After these two nothing has changed. [`Error::OutOfMemory`],
-    /// [`Error::Vulkan`], [`Error::DeviceLost`]: the tracer must not be used any more.
+    /// [`Error::Usage`] when a change was not declared in [`crate::scene::Motion`]; [`Error::Scene`] for numbers that are not finite,
+    /// wrong counts and transforms that cannot be inverted. These two leave the tracer unchanged. After [`Error::OutOfMemory`],
+    /// [`Error::Vulkan`] and [`Error::DeviceLost`] the tracer must not be used any more.
     pub fn update(&mut self, changes: &Changes) -> Result<UpdateStats> {
         let Some(dynamic) = &mut self.dynamic else {
-            return Err(Error::Usage("this tracer's scene was said never to change: use FlatScene::with_motion".into()));
+            return Err(Error::Usage("this tracer's scene is static: use FlatScene::with_motion".into()));
         };
         let moved = dynamic.check(changes)?;
         let mut stats = UpdateStats { growth: 1.0, ..Default::default() };
         let start = Instant::now();
         let deforming = changes.meshes.iter().filter_map(|c| dynamic.meshes.get(&c.mesh)?.group).collect();
-        self.scene.begin_update(&dynamic.placements, moved.iter().map(|m| m.0).collect(), deforming)?;
+        self.scene.begin_update(&dynamic.instances, moved.iter().map(|m| m.0).collect(), deforming)?;
         stats.moved = dynamic.advance(changes, &moved);
         let mut deformed = false;
         for change in &changes.meshes {
@@ -271,11 +273,11 @@ impl Tracer {
             return Ok(stats);
         }
         let start = Instant::now();
-        let latest: Vec<_> = moved.iter().map(|m| (m.0, dynamic.placements[m.0].to_world)).collect();
+        let latest: Vec<_> = moved.iter().map(|m| (m.0, dynamic.instances[m.0].to_world)).collect();
         self.scene.set_transforms(&latest)?;
         match &mut self.structure {
             Structure::Compute(h) => {
-                stats.top_rebuilt = h.place(&dynamic.placements)?;
+                stats.top_rebuilt = h.place(&dynamic.instances)?;
                 self.scene.set_hierarchy(h)?;
             }
             Structure::Hardware { levels } => {
@@ -287,12 +289,12 @@ impl Tracer {
         Ok(stats)
     }
 
-    /// Says how many seconds of device time tracing took since the last update, so that the next one can weigh what refitted trees
-    /// cost against building them anew ([`crate::accel::RefitPolicy`]). Without effect where nothing moves or deforms.
+    /// Reports the device time of tracing since the last update, in seconds, from which the next update decides between refitting and
+    /// rebuilding ([`crate::accel::RefitPolicy`]). Without effect for a static scene.
     pub fn traced(&mut self, seconds: f64) {
         let Some(dynamic) = &self.dynamic else { return };
         match &mut self.structure {
-            Structure::Compute(h) => h.traced(seconds, &dynamic.placements),
+            Structure::Compute(h) => h.traced(seconds, &dynamic.instances),
             Structure::Hardware { levels } => levels.traced(seconds),
         }
     }

@@ -1,8 +1,8 @@
-//! The fast kernel's hierarchies of a scene that changes: kept up to date on the host, where they lie. On a device that shares
-//! the host's memory nothing is copied; on others a copy is kept and the parts that changed are written.
+//! The fast kernel's BVHs of a dynamic scene, refitted and rebuilt on the host. On a device with unified memory they are changed in
+//! place; on others the host keeps a copy and uploads the ranges that changed.
 //!
-//! Trees have room to grow in the array of blocks, and the kernel's stack some more entries than the first trees need: streams are
-//! compiled once. A tree that needs more room moves the array, one that would be deeper is made shallower.
+//! Each tree has spare capacity in the array of blocks, and the kernel's stack has spare entries, so that streams are compiled once. A
+//! tree that outgrows its capacity causes a reallocation of the array; a tree that would be too deep for the stack is made shallower.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -11,47 +11,47 @@ use std::time::Instant;
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::compute::{padding, placed, placement_padding, reach_padding};
+use super::compute::{instance_padding, padding, reach_padding, transformed_bounds};
 use super::dynamic::group_of;
 use super::gpu_scene::rows;
 use super::wide::{Trees, Triangles, tree, triangle_tree_of};
 use crate::accel::build::MAX_DEPTH;
-use crate::accel::flatten::{FlatScene, Placement};
+use crate::accel::flatten::{FlatScene, TlasInstance};
 use crate::accel::refit::{RefitPlan, RefitPolicy, refit};
-use crate::accel::wide::{self, BLOCK_BYTES, Block, LEAF, Wide};
+use crate::accel::wide::{self, BLOCK_BYTES, Block, LEAF, WideBvh};
 use crate::accel::{Aabb, BuildPreset, pairs};
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, Device, Memory};
 use crate::interface::records::hierarchy::{ALPHA_TESTED, InstanceLeaf, TriangleLeaf};
 use crate::scene::Geometry;
 
-/// A top level of so many entries is always built anew: docs/dynamic-scenes.md has the measurement.
-const TOP_BUILD_MOST: usize = 256;
-/// Levels that a tree may grow by when it is built anew.
-const MORE_LEVELS: u32 = 4;
+/// Maximum number of TLAS instances for which the top level is always rebuilt: docs/dynamic-scenes.md has the measurement.
+const MAX_TOP_REBUILD: usize = 256;
+/// Number of levels by which a rebuilt tree may be deeper than the first one.
+const SPARE_LEVELS: u32 = 4;
 
-/// Blocks that trees take in the array, with room to grow.
-pub(super) struct Rooms {
+/// Capacity of each tree in the array of blocks, spare blocks included.
+pub(super) struct TreeCapacities {
     pub top: usize,
     pub groups: Vec<usize>,
 }
 
-/// Nodes that may lie on a path, for the kernel's stack.
-pub(super) struct Depths {
+/// Maximum depth of each tree in nodes, for the kernel's stack.
+pub(super) struct TreeDepths {
     pub top: u32,
     pub groups: Vec<u32>,
 }
 
-/// Where a tree lies.
+/// A tree's range in the array, and its state.
 struct Tree {
     base: usize,
-    room: usize,
+    capacity: usize,
     len: usize,
-    /// Nodes on its longest path at most.
+    /// Maximum depth in nodes.
     depth: u32,
     bounds: Aabb,
     sah_cost: f64,
-    /// `None`: it stays as it is.
+    /// `None` for a static tree.
     changing: Option<Changing>,
 }
 
@@ -60,17 +60,17 @@ struct Changing {
     policy: RefitPolicy,
 }
 
-/// A group that deforms.
+/// The topology of a group that deforms.
 struct Deforming {
     indices: Vec<[u32; 3]>,
-    /// Which vertices triangles use, unless all of them.
+    /// Whether each vertex is used by a triangle; `None` when all are.
     used: Option<Vec<bool>>,
     opaque: u32,
 }
 
-/// The hierarchies of a scene that changes.
+/// The BVHs of a dynamic scene.
 pub(super) struct DynamicTrees {
-    /// What is in device memory, where the host cannot reach it.
+    /// A copy of the array in device memory, where the host cannot access that.
     copy: Option<Vec<Block>>,
     top: Option<Tree>,
     groups: Vec<Tree>,
@@ -81,12 +81,12 @@ fn ceil_log2(n: usize) -> u32 {
     n.next_power_of_two().ilog2()
 }
 
-/// What a tree is given so that it can be built anew.
-fn most_depth(depth: u32, leaves: usize) -> u32 {
-    (depth + MORE_LEVELS).max(ceil_log2(leaves.max(2))).min(MAX_DEPTH)
+/// Maximum depth that is reserved for a tree and its rebuilds.
+fn max_depth(depth: u32, leaves: usize) -> u32 {
+    (depth + SPARE_LEVELS).max(ceil_log2(leaves.max(2))).min(MAX_DEPTH)
 }
 
-fn more_room(blocks: usize) -> usize {
+fn spare_capacity(blocks: usize) -> usize {
     blocks + blocks / 16 + 8
 }
 
@@ -98,32 +98,32 @@ fn may_deform(flat: &FlatScene) -> Vec<bool> {
     out
 }
 
-/// Rooms and depths that a scene's trees get: what they need, and more for those that change.
-pub(super) fn provide(trees: &Trees, flat: &FlatScene) -> (Rooms, Depths) {
+/// Capacities and maximum depths of a scene's trees, with a reserve for those that change.
+pub(super) fn reserve(trees: &Trees, flat: &FlatScene) -> (TreeCapacities, TreeDepths) {
     let deform = may_deform(flat);
-    let rooms = |t: &Wide, more: bool| if more { more_room(t.blocks.len()) } else { t.blocks.len() };
+    let capacity_of = |t: &WideBvh, more: bool| if more { spare_capacity(t.blocks.len()) } else { t.blocks.len() };
     let top = trees.top.as_ref().map_or((0, 0), |t| match flat.motion.is_none() {
         true => (t.blocks.len(), t.depth),
-        // every node but the root has two children at least
-        false => (2 * flat.placements.len() + 1, most_depth(t.depth, flat.placements.len())),
+        // every node but the root has at least two children
+        false => (2 * flat.instances.len() + 1, max_depth(t.depth, flat.instances.len())),
     });
     let groups = trees
         .groups
         .iter()
         .zip(&flat.groups)
         .zip(deform)
-        .map(|((t, g), more)| (rooms(t, more), if more { most_depth(t.depth, g.primitive_count) } else { t.depth }));
-    let (room, depth) = groups.unzip();
-    (Rooms { top: top.0, groups: room }, Depths { top: top.1, groups: depth })
+        .map(|((t, g), more)| (capacity_of(t, more), if more { max_depth(t.depth, g.primitive_count) } else { t.depth }));
+    let (capacities, depths) = groups.unzip();
+    (TreeCapacities { top: top.0, groups: capacities }, TreeDepths { top: top.1, groups: depths })
 }
 
 impl DynamicTrees {
-    /// Of trees that lie in the array with these rooms, the top level first.
-    pub fn new(trees: &Trees, flat: &FlatScene, rooms: &Rooms, depths: &Depths) -> Self {
+    /// The state of trees that lie in the array with these capacities, the top level first.
+    pub fn new(trees: &Trees, flat: &FlatScene, capacities: &TreeCapacities, depths: &TreeDepths) -> Self {
         let deform = may_deform(flat);
-        let describe = |t: &Wide, base, room, depth, seconds, changes: bool| Tree {
+        let describe = |t: &WideBvh, base, capacity, depth, seconds, changes: bool| Tree {
             base,
-            room,
+            capacity,
             len: t.blocks.len(),
             depth,
             bounds: t.bounds.unwrap_or(Aabb::EMPTY),
@@ -131,16 +131,16 @@ impl DynamicTrees {
             changing: changes
                 .then(|| Changing { plan: RefitPlan::new(&t.blocks, 0), policy: RefitPolicy::new(t.sah_cost, seconds) }),
         };
-        let mut at = rooms.top;
+        let mut at = capacities.top;
         let groups = (0..trees.groups.len()).map(|k| {
-            let (base, room) = (at, rooms.groups[k]);
-            at += room;
-            describe(&trees.groups[k], base, room, depths.groups[k], trees.seconds[k], deform[k])
+            let (base, capacity) = (at, capacities.groups[k]);
+            at += capacity;
+            describe(&trees.groups[k], base, capacity, depths.groups[k], trees.seconds[k], deform[k])
         });
         let groups = groups.collect();
-        let top = trees.top.as_ref().map(|t| describe(t, 0, rooms.top, depths.top, trees.top_seconds, true));
+        let top = trees.top.as_ref().map(|t| describe(t, 0, capacities.top, depths.top, trees.top_seconds, true));
         let deforming = flat.groups.iter().zip(&deform).map(|(g, &deform)| {
-            let Geometry::Triangles(t) = &flat.scene.meshes[g.parts[0].mesh].geometry else { return None };
+            let Geometry::Triangles(t) = &flat.scene.meshes[g.submeshes[0].mesh].geometry else { return None };
             deform.then(|| {
                 let mut used = vec![false; t.positions.len()];
                 t.indices.iter().flatten().for_each(|&v| used[v as usize] = true);
@@ -151,7 +151,7 @@ impl DynamicTrees {
         Self { copy: None, top, groups, deforming: deforming.collect() }
     }
 
-    /// Keeps a copy of the array, where the host cannot reach the device's.
+    /// Keeps a copy of the array, where the host cannot access device memory.
     pub fn keep_copy(&mut self, device: &Device, nodes: &Buffer) -> Result<()> {
         if !device.info.unified_memory {
             self.copy = Some(bytemuck::pod_collect_to_vec(&nodes.read(0, nodes.size())?));
@@ -159,8 +159,8 @@ impl DynamicTrees {
         Ok(())
     }
 
-    /// A group's vertices have moved: refits its tree, or builds it anew where the policy says so. Gives whether it did the latter, and the
-    /// growth of the SAH cost.
+    /// Refits the tree of a deformed group, or rebuilds it when the policy decides so. Returns whether it was rebuilt, and its SAH cost
+    /// relative to that at the last build.
     pub fn deform(
         &mut self,
         device: &Arc<Device>,
@@ -169,15 +169,15 @@ impl DynamicTrees {
         positions: &[Vec3],
     ) -> Result<(bool, f64)> {
         let Some(deforming) = &self.deforming[group] else {
-            return Err(Error::Vulkan(format!("group {group} was not said to deform")));
+            return Err(Error::Vulkan(format!("group {group} was not declared as deforming")));
         };
         let start = Instant::now();
         if self.groups[group].should_rebuild() {
             let triangles = Triangles { positions: positions.to_vec(), indices: deforming.indices.clone() };
             let built = triangle_tree_of(&triangles, deforming.opaque, BuildPreset::Default, Some(self.groups[group].depth));
             let seconds = start.elapsed().as_secs_f64();
-            if built.blocks.len() > self.groups[group].room {
-                self.make_room(device, nodes, group, more_room(built.blocks.len()))?;
+            if built.blocks.len() > self.groups[group].capacity {
+                self.grow(device, nodes, group, spare_capacity(built.blocks.len()))?;
             }
             self.groups[group].replace(blocks(&mut self.copy, nodes)?, &built, seconds);
             self.flush(nodes, self.groups[group].range())?;
@@ -194,21 +194,23 @@ impl DynamicTrees {
         Ok((false, self.groups[group].growth()))
     }
 
-    /// Entries or groups have moved: refits the top level or builds it anew. Gives whether it did the latter, and the bounds of everything.
-    pub fn place(&mut self, nodes: &mut Buffer, placements: &[Placement]) -> Result<(bool, Aabb)> {
+    /// Refits or rebuilds the top level after instances have moved or groups have deformed. Returns whether it was rebuilt, and the bounds
+    /// of the scene.
+    pub fn place(&mut self, nodes: &mut Buffer, instances: &[TlasInstance]) -> Result<(bool, Aabb)> {
         let Some(top) = &mut self.top else {
             return Ok((false, self.groups.first().map_or(Aabb::EMPTY, |g| g.bounds)));
         };
         let start = Instant::now();
         let groups = &self.groups;
-        let mut boxes: Vec<Aabb> = placements.par_iter().map(|p| placed(&p.to_world, groups[p.group].bounds)).collect();
-        let pad = placement_padding(boxes.iter().fold(0.0f32, |m, b| m.max(b.min.abs().max(b.max.abs()).max_element())));
+        let mut boxes: Vec<Aabb> =
+            instances.par_iter().map(|p| transformed_bounds(&p.to_world, groups[p.group].bounds)).collect();
+        let pad = instance_padding(boxes.iter().fold(0.0f32, |m, b| m.max(b.min.abs().max(b.max.abs()).max_element())));
         boxes.par_iter_mut().for_each(|b| *b = Aabb { min: b.min - pad, max: b.max + pad });
         let leaf = |entry: u32| {
-            let placement = &placements[entry as usize];
-            instance_leaf(entry, placement, groups[placement.group].base as u32)
+            let instance = &instances[entry as usize];
+            instance_leaf(entry, instance, groups[instance.group].base as u32)
         };
-        let rebuild = placements.len() <= TOP_BUILD_MOST || top.should_rebuild();
+        let rebuild = instances.len() <= MAX_TOP_REBUILD || top.should_rebuild();
         if rebuild {
             let built = tree(boxes, BuildPreset::Fast, Some(top.depth), |entry| bytemuck::cast(leaf(entry)));
             top.replace(blocks(&mut self.copy, nodes)?, &built, start.elapsed().as_secs_f64());
@@ -227,13 +229,14 @@ impl DynamicTrees {
         Ok((rebuild, bounds))
     }
 
-    /// Shares out the time of tracing among the trees, by how many blocks of each a ray is expected to visit.
-    pub fn traced(&mut self, seconds: f64, placements: &[Placement]) {
+    /// Distributes the time of tracing over the trees, by the expected number of blocks of each that a ray visits.
+    pub fn traced(&mut self, seconds: f64, instances: &[TlasInstance]) {
         let mut visits = vec![0.0f64; self.groups.len()];
         let whole = self.top.as_ref().map_or(1.0, |t| t.bounds.half_area() as f64).max(f64::MIN_POSITIVE);
-        for p in placements {
+        for p in instances {
             let g = &self.groups[p.group];
-            let share = if self.top.is_some() { placed(&p.to_world, g.bounds).half_area() as f64 / whole } else { 1.0 };
+            let share =
+                if self.top.is_some() { transformed_bounds(&p.to_world, g.bounds).half_area() as f64 / whole } else { 1.0 };
             visits[p.group] += share * g.sah_cost;
         }
         let top_visits = self.top.as_ref().map_or(0.0, |t| t.sah_cost);
@@ -245,22 +248,24 @@ impl DynamicTrees {
         }
     }
 
-    /// Gives a group more room: the whole array moves.
-    fn make_room(&mut self, device: &Arc<Device>, nodes: &mut Buffer, group: usize, room: usize) -> Result<()> {
+    /// Enlarges the capacity of a group's tree, which reallocates the whole array.
+    fn grow(&mut self, device: &Arc<Device>, nodes: &mut Buffer, group: usize, capacity: usize) -> Result<()> {
         let old: Vec<Block> = blocks(&mut self.copy, nodes)?.to_vec();
         let before: Vec<usize> = self.groups.iter().map(|g| g.base).collect();
-        self.groups[group].room = room;
-        let mut at = self.top.as_ref().map_or(0, |t| t.room);
+        self.groups[group].capacity = capacity;
+        let mut at = self.top.as_ref().map_or(0, |t| t.capacity);
         for g in &mut self.groups {
             g.base = at;
-            at += g.room;
+            at += g.capacity;
         }
         if u32::try_from(at).is_err() {
-            return Err(Error::Scene(format!("its hierarchy has {at} blocks; the compute tracer addresses 2^32")));
+            return Err(Error::Scene(format!(
+                "the scene's BVH has {at} blocks, more than the 2^32 that the compute tracer can address"
+            )));
         }
         let mut new = vec![Block::default(); at];
         if let Some(top) = &self.top {
-            // its entries name the groups' roots; whoever makes room places them anew
+            // its leaves still hold the old roots: the caller rebuilds or refits the top level next
             new[..top.len].copy_from_slice(&old[..top.len]);
         }
         for (g, from) in self.groups.iter().zip(before) {
@@ -283,7 +288,7 @@ impl DynamicTrees {
     }
 }
 
-/// The array, where the host can write.
+/// The array of blocks as the host can write it: the copy, or mapped device memory.
 fn blocks<'a>(copy: &'a mut Option<Vec<Block>>, nodes: &'a mut Buffer) -> Result<&'a mut [Block]> {
     match copy {
         Some(blocks) => Ok(blocks),
@@ -317,8 +322,8 @@ impl Tree {
         changing.policy.refitted(refitted.sah_cost, start.elapsed().as_secs_f64());
     }
 
-    /// Puts a tree in the place of this one. It fits.
-    fn replace(&mut self, array: &mut [Block], built: &Wide, seconds: f64) {
+    /// Replaces this tree by a rebuilt one, which must fit its capacity.
+    fn replace(&mut self, array: &mut [Block], built: &WideBvh, seconds: f64) {
         self.len = built.blocks.len();
         (self.bounds, self.sah_cost) = (built.bounds.unwrap_or(Aabb::EMPTY), built.sah_cost);
         let base = self.base as u32;
@@ -332,26 +337,26 @@ impl Tree {
     }
 }
 
-/// The leaf of an entry of the top level, whose group's root is block `root`.
-pub(super) fn instance_leaf(entry: u32, placement: &Placement, root: u32) -> InstanceLeaf {
-    InstanceLeaf { world_to_group: rows(&placement.to_world.inverse()), root, instance: entry, ..Default::default() }
+/// The top-level leaf of an instance, whose group has its root at block `root`.
+pub(super) fn instance_leaf(entry: u32, instance: &TlasInstance, root: u32) -> InstanceLeaf {
+    InstanceLeaf { world_to_group: rows(&instance.to_world.inverse()), root, instance: entry, ..Default::default() }
 }
 
-/// Moves the corners of a leaf to where its vertices are now, and gives their box. Which vertex is which corner follows from the numbers of the
-/// triangles and the places of their corners, as the shader reads them.
+/// Updates the corners of a leaf to the current vertices and returns their bounds. The vertex of each corner follows from the leaf's
+/// triangle indices and its corner order, as the shader reads them.
 fn rewrite_pair(block: &mut Block, positions: &[Vec3], indices: &[[u32; 3]]) -> Aabb {
     let places = |word: u32| [word as usize & 3, word as usize >> 2 & 3];
     let leaf: &mut TriangleLeaf = bytemuck::cast_mut(block);
     let [second, third] = places(leaf.order);
     let mut corners = [0u32; 4];
     let [a, b, c] = indices[(leaf.primitives[0] & !ALPHA_TESTED) as usize];
-    // the places of a triangle's corners are 0, 1 and 2
+    // `order` has the positions of the triangle's second and third vertex among corners 0, 1 and 2
     corners[3 - second - third] = a;
     corners[second] = b;
     corners[third] = c;
     corners[3] = corners[2];
     if leaf.primitives[1] != pairs::NONE {
-        // places 0, 1, 2 are corners 0, 2, 3 here
+        // for the second triangle, positions 0, 1, 2 are corners 0, 2, 3
         let [second, third] = places(leaf.order >> 4);
         let t = indices[(leaf.primitives[1] & !ALPHA_TESTED) as usize];
         corners[3] = if second == 2 {

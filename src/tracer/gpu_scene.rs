@@ -8,12 +8,12 @@ use glam::{DAffine3, Vec3, Vec4};
 
 use super::albedo;
 use super::compute::Hierarchy;
-use super::drawable::{Drawable, Shape};
 use super::mipmap;
-use super::motion::Motion;
+use super::previous_frame::PreviousFrame;
+use super::raster_instance::{RasterGeometry, RasterInstance};
 use super::shading;
 use crate::accel::features::{Blend, alpha_cutoff};
-use crate::accel::flatten::{FlatScene, Group, Part, Placement};
+use crate::accel::flatten::{BlasGroup, FlatScene, Submesh, TlasInstance};
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, Device, Memory};
 use crate::interface::records::ray::INVALID;
@@ -23,22 +23,22 @@ use crate::interface::records::scene::{
 use crate::interface::{BsdfModel, MaterialFeature, ShadingFeatures, TexelFormat, Texels};
 use crate::scene::{AlphaMode, Filter, Geometry, Material, TexelData, TextureSlot, TriangleMesh};
 
-/// What the passes will ask of the scene; the rest is not uploaded.
+/// The parts of a scene that the passes require; the rest is not uploaded.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Needs {
     /// Shading normals.
     pub normals: bool,
-    /// Base colour of every surface, not only of alpha-tested ones.
+    /// Base colours of all surfaces, not only of alpha-tested ones.
     pub albedo: bool,
-    /// Everything that light does to surfaces, and they to it: what paths ask for. Normals and base colours with it.
+    /// Materials and emission, for path tracing. Implies `normals`, and `albedo` unless `white`.
     pub shading: bool,
-    /// With `shading`: every surface is white and nothing else is asked of it.
+    /// With `shading`: white-furnace mode, in which every surface has one constant albedo and no other material data.
     pub white: bool,
-    /// With `shading`: what microfacets of one bounce lose is given back.
+    /// With `shading`: compensation for energy lost to multiple scattering between microfacets.
     pub compensation: bool,
-    /// With `shading`: occlusion that is baked into textures, to be shown.
+    /// With `shading`: baked occlusion textures, for the AOV of that name.
     pub baked_occlusion: bool,
-    /// With `shading`: levels of textures, for paths that know how wide they are ([`crate::integrators::path::TextureFilter::RayCone`]).
+    /// With `shading`: mip levels of textures, for ray cones ([`crate::integrators::path::TextureFilter::RayCone`]).
     pub mip_levels: bool,
 }
 
@@ -48,45 +48,45 @@ pub fn rows(t: &DAffine3) -> [[f32; 4]; 3] {
     std::array::from_fn(|k| [m.x_axis[k] as f32, m.y_axis[k] as f32, m.z_axis[k] as f32, o[k] as f32])
 }
 
-/// Buffers of a group: what its bottom level is built over.
+/// Buffers of a group, over which its BLAS is built.
 pub(super) struct GroupBuffers {
-    /// 3 floats a vertex; 4 a sphere.
+    /// 3 floats per vertex, or 4 per sphere.
     pub positions: Buffer,
-    /// 3 uints a triangle; none for spheres.
+    /// 3 uints per triangle; `None` for spheres.
     pub indices: Option<Buffer>,
     part_of: Option<Buffer>,
 }
 
-/// A scene in device memory, without what it is traced through.
+/// A scene in device memory, without its acceleration structures.
 pub struct GpuScene {
     root: SceneRoot,
     root_buffer: Buffer,
     instances: Vec<InstanceRecord>,
     instance_buffer: Buffer,
     pub(super) groups: Vec<GroupBuffers>,
-    shapes: Vec<Shape>,
-    /// The group of each entry of the top level.
+    shapes: Vec<RasterGeometry>,
+    /// The group of each TLAS instance.
     group_of: Vec<u32>,
     attributes: Buffer,
-    /// Where in `attributes` the normals of meshes that may deform lie.
+    /// Mesh index and byte offset in `attributes` of the normals of each mesh that may deform.
     normals: Vec<(usize, u64)>,
-    /// Before the last update; `None` where nothing ever changes.
-    motion: Option<Motion>,
+    /// State before the last update; `None` for a static scene.
+    motion: Option<PreviousFrame>,
     others: Vec<Buffer>,
     mips: MipStats,
 }
 
-/// What the levels of textures are.
+/// Number and size of mip levels.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct MipStats {
-    /// Of the texture that has most, level 0 counted; 0: there are none.
+    /// Largest number of levels of a texture, level 0 included; 0 without mip levels.
     pub levels: u32,
-    /// Bytes beside level 0.
+    /// Size of levels 1 and up, in bytes.
     pub bytes: u64,
 }
 
 impl GpuScene {
-    /// Writes what `needs` and the scene itself call for.
+    /// Uploads the data that `needs` and the scene itself require.
     pub fn new(device: &Arc<Device>, flat: &FlatScene, needs: Needs) -> Result<Self> {
         let needs =
             Needs { normals: needs.normals || needs.shading, albedo: needs.albedo || needs.shading && !needs.white, ..needs };
@@ -96,7 +96,7 @@ impl GpuScene {
         let attributes = Attributes::upload(device, flat, needs)?;
         for (group, buffers) in flat.groups.iter().zip(&groups) {
             first_part.push(parts.len() as u32);
-            for (k, part) in group.parts.iter().enumerate() {
+            for (k, part) in group.submeshes.iter().enumerate() {
                 parts.push(PartRecord {
                     indices: buffers.indices.as_ref().map_or(0, Buffer::address),
                     positions: buffers.positions.address(),
@@ -115,7 +115,7 @@ impl GpuScene {
             }
         }
         let instances: Vec<_> = flat
-            .placements
+            .instances
             .iter()
             .map(|p| InstanceRecord {
                 group_to_world: rows(&p.to_world),
@@ -131,18 +131,18 @@ impl GpuScene {
         if let Some(bad) =
             instances.iter().position(|i| !i.group_to_world.iter().chain(&i.world_to_group).flatten().all(|x| x.is_finite()))
         {
-            let name = flat.placements[bad].scene_instance.map_or("", |i| flat.scene.instances[i].name.as_str());
+            let name = flat.instances[bad].scene_instance.map_or("", |i| flat.scene.instances[i].name.as_str());
             return Err(Error::Scene(format!(
                 "instance {bad} '{name}' has a transform that cannot be inverted (a scale of zero?)"
             )));
         }
-        // which record and part stand for each instance of the scene
+        // TLAS instance and part record of each instance of the scene
         let mut placements = vec![[0u32; 2]; flat.scene.instances.len()];
-        for (k, p) in flat.placements.iter().enumerate() {
+        for (k, p) in flat.instances.iter().enumerate() {
             match p.scene_instance {
                 Some(i) => placements[i] = [k as u32, first_part[p.group]],
                 None => {
-                    for (j, part) in flat.groups[p.group].parts.iter().enumerate() {
+                    for (j, part) in flat.groups[p.group].submeshes.iter().enumerate() {
                         if let Some(i) = part.scene_instance {
                             placements[i] = [k as u32, first_part[p.group] + j as u32];
                         }
@@ -187,17 +187,17 @@ impl GpuScene {
                 root.albedo = keep(Buffer::from_slice(device, "albedo tables", &tables)?);
             }
         }
-        // such a mesh is not baked
+        // a deforming mesh is never baked
         let normals = |&mesh: &usize| {
             let address = attributes.addresses.get(&(mesh, None, Attribute::Normals))?;
             Some((mesh, address - attributes.buffer.address()))
         };
         let normals = flat.motion.meshes.iter().filter_map(normals).collect();
-        let motion = Motion::new(device, flat, |group| groups[group].positions.size())?;
-        root.motion = motion.as_ref().map_or(0, Motion::address);
+        let motion = PreviousFrame::new(device, flat, |group| groups[group].positions.size())?;
+        root.motion = motion.as_ref().map_or(0, PreviousFrame::address);
         let root_buffer = Buffer::from_slice(device, "scene root", &[root])?;
-        let shapes = flat.groups.iter().map(|g| Shape::new(flat, g)).collect();
-        let group_of = flat.placements.iter().map(|p| p.group as u32).collect();
+        let shapes = flat.groups.iter().map(|g| RasterGeometry::new(flat, g)).collect();
+        let group_of = flat.instances.iter().map(|p| p.group as u32).collect();
         let attributes = attributes.buffer;
         Ok(Self {
             root,
@@ -215,11 +215,11 @@ impl GpuScene {
         })
     }
 
-    /// What there is to draw, entry by entry of the top level, as it is now.
-    pub(super) fn drawables(&self) -> impl Iterator<Item = Drawable<'_>> {
+    /// The TLAS instances for rasterization, in their current state.
+    pub(super) fn raster_instances(&self) -> impl Iterator<Item = RasterInstance<'_>> {
         (0..).zip(self.instances.iter().zip(&self.group_of)).map(|(entry, (instance, &group))| {
             let buffers = &self.groups[group as usize];
-            Drawable {
+            RasterInstance {
                 entry,
                 to_world: instance.group_to_world,
                 shape: &self.shapes[group as usize],
@@ -229,28 +229,28 @@ impl GpuScene {
         })
     }
 
-    /// Where shaders begin.
+    /// Device address of the scene root, from which shaders reach everything.
     pub fn root_address(&self) -> u64 {
         self.root_buffer.address()
     }
 
-    /// Bytes of device memory.
+    /// Size in device memory, in bytes.
     pub fn bytes(&self) -> u64 {
         let groups = self.groups.iter().flat_map(|g| [Some(&g.positions), g.indices.as_ref(), g.part_of.as_ref()]).flatten();
         let others = self.others.iter().chain([&self.attributes, &self.instance_buffer]);
         groups.chain(others).map(Buffer::size).sum::<u64>()
     }
 
-    /// Levels of textures.
+    /// Number and size of mip levels.
     pub(super) fn mips(&self) -> MipStats {
         self.mips
     }
 
-    /// Before an update that moves these entries of the top level, now at `placements`, and deforms these groups.
-    pub(super) fn begin_update(&mut self, placements: &[Placement], moving: Vec<usize>, deforming: Vec<usize>) -> Result<()> {
+    /// Before an update that moves these TLAS instances, now at `placements`, and deforms these groups.
+    pub(super) fn begin_update(&mut self, instances: &[TlasInstance], moving: Vec<usize>, deforming: Vec<usize>) -> Result<()> {
         let groups = &self.groups;
         match &mut self.motion {
-            Some(motion) => motion.begin(placements, |g| &groups[g].positions, moving, deforming),
+            Some(motion) => motion.begin(instances, |g| &groups[g].positions, moving, deforming),
             None => Ok(()),
         }
     }
@@ -269,7 +269,7 @@ impl GpuScene {
         }
     }
 
-    /// Entries of the top level have moved: which, and where to.
+    /// TLAS instances have moved: which, and where to.
     pub(super) fn set_transforms(&mut self, moved: &[(usize, DAffine3)]) -> Result<()> {
         for (k, to_world) in moved {
             let record = &mut self.instances[*k];
@@ -285,7 +285,7 @@ impl GpuScene {
         }
     }
 
-    /// Says where the compute tracer's hierarchy lies.
+    /// Stores the addresses of the compute tracer's hierarchy in the scene root.
     pub(super) fn set_hierarchy(&mut self, h: &Hierarchy) -> Result<()> {
         if self.instances.iter().zip(&h.instance_roots).any(|(record, root)| record.root != *root) {
             for (record, root) in self.instances.iter_mut().zip(&h.instance_roots) {
@@ -304,17 +304,17 @@ impl GpuScene {
         write_all(&mut self.root_buffer, &[self.root])
     }
 
-    /// Says where the hardware's top level lies.
+    /// Stores the address of the hardware tracers' top level in the scene root.
     pub(super) fn set_top_level(&mut self, address: u64) -> Result<()> {
         self.root.top_level = address;
         write_all(&mut self.root_buffer, &[self.root])
     }
 }
 
-/// What materials ask about albedos, if any does.
+/// The albedo tables that the materials require, if any.
 fn albedo_tables(flat: &FlatScene, needs: Needs, indices: &[f32]) -> Option<Vec<f32>> {
     let ShadingFeatures { bsdfs, materials, .. } = shading::features(flat, needs);
-    let wanted = albedo::Wanted {
+    let wanted = albedo::AlbedoTables {
         ggx: needs.compensation && bsdfs.contains(BsdfModel::Gltf),
         sheen: materials.contains(MaterialFeature::Sheen),
         beckmann: needs.compensation && bsdfs.contains(BsdfModel::Conductor),
@@ -329,38 +329,38 @@ fn write_all<T: Pod>(buffer: &mut Buffer, data: &[T]) -> Result<()> {
     buffer.fill(bytes.len() as u64, 1, |first, chunk| chunk.copy_from_slice(&bytes[first as usize..][..chunk.len()]))
 }
 
-fn group_buffers(device: &Arc<Device>, flat: &FlatScene, group: &Group) -> Result<GroupBuffers> {
+fn group_buffers(device: &Arc<Device>, flat: &FlatScene, group: &BlasGroup) -> Result<GroupBuffers> {
     let n = group.primitive_count as u64;
     if group.spheres {
         let mut positions = Buffer::new(device, "spheres", 16 * n, Memory::Device)?;
         positions.fill(16 * n, 16, |first, bytes| {
             for (k, out) in bytes.chunks_exact_mut(16).enumerate() {
                 let primitive = first as usize + k;
-                let part = flat.part_of(group, primitive);
+                let part = flat.submesh_of(group, primitive);
                 let s = flat.sphere(part, primitive - part.first_primitive);
                 out.copy_from_slice(bytemuck::bytes_of(&[s.center.x, s.center.y, s.center.z, s.radius]));
             }
         })?;
         return Ok(GroupBuffers { positions, indices: None, part_of: part_of(device, group)? });
     }
-    let triangles = |part: &Part| match &flat.scene.meshes[part.mesh].geometry {
+    let triangles = |part: &Submesh| match &flat.scene.meshes[part.mesh].geometry {
         Geometry::Triangles(t) => t,
         Geometry::Spheres(_) => unreachable!("a triangle group holds triangles"),
     };
     let mut positions = Buffer::new(device, "vertices", 12 * group.vertex_count as u64, Memory::Device)?;
-    let mut cursor = Cursor::new(group.parts.iter().map(|p| triangles(p).positions.len()));
+    let mut cursor = Cursor::new(group.submeshes.iter().map(|p| triangles(p).positions.len()));
     positions.fill(12 * group.vertex_count as u64, 12, |_, bytes| {
         for out in bytes.chunks_exact_mut(12) {
             let (part, vertex) = cursor.next();
-            out.copy_from_slice(bytemuck::bytes_of(&flat.vertex(&group.parts[part], vertex).to_array()));
+            out.copy_from_slice(bytemuck::bytes_of(&flat.vertex(&group.submeshes[part], vertex).to_array()));
         }
     })?;
     let mut indices = Buffer::new(device, "indices", 12 * n, Memory::Device)?;
-    let mut cursor = Cursor::new(group.parts.iter().map(|p| triangles(p).indices.len()));
+    let mut cursor = Cursor::new(group.submeshes.iter().map(|p| triangles(p).indices.len()));
     indices.fill(12 * n, 12, |_, bytes| {
         for out in bytes.chunks_exact_mut(12) {
             let (part, triangle) = cursor.next();
-            let part = &group.parts[part];
+            let part = &group.submeshes[part];
             let corners = triangles(part).indices[triangle].map(|i| i + part.first_vertex as u32);
             out.copy_from_slice(bytemuck::bytes_of(&corners));
         }
@@ -368,14 +368,14 @@ fn group_buffers(device: &Arc<Device>, flat: &FlatScene, group: &Group) -> Resul
     Ok(GroupBuffers { positions, indices: Some(indices), part_of: part_of(device, group)? })
 }
 
-/// The part of each primitive, where there is more than one.
-fn part_of(device: &Arc<Device>, group: &Group) -> Result<Option<Buffer>> {
-    if group.parts.len() <= 1 {
+/// The submesh index of each primitive; `None` for a group of one submesh.
+fn part_of(device: &Arc<Device>, group: &BlasGroup) -> Result<Option<Buffer>> {
+    if group.submeshes.len() <= 1 {
         return Ok(None);
     }
-    let ends = group.parts.iter().skip(1).map(|p| p.first_primitive).chain([group.primitive_count]);
-    let sizes: Vec<_> = group.parts.iter().zip(ends).map(|(p, end)| end - p.first_primitive).collect();
-    let mut buffer = Buffer::new(device, "part of each primitive", 4 * group.primitive_count as u64, Memory::Device)?;
+    let ends = group.submeshes.iter().skip(1).map(|p| p.first_primitive).chain([group.primitive_count]);
+    let sizes: Vec<_> = group.submeshes.iter().zip(ends).map(|(p, end)| end - p.first_primitive).collect();
+    let mut buffer = Buffer::new(device, "submesh of each primitive", 4 * group.primitive_count as u64, Memory::Device)?;
     let mut cursor = Cursor::new(sizes.into_iter());
     buffer.fill(4 * group.primitive_count as u64, 4, |_, bytes| {
         for out in bytes.chunks_exact_mut(4) {
@@ -441,16 +441,16 @@ enum Attribute {
     Colors,
 }
 
-/// Vertex attributes of all parts in one buffer.
+/// Vertex attributes of all submeshes in one buffer.
 struct Attributes {
     buffer: Buffer,
-    // by mesh, whether baked (then by part), and attribute
+    // by mesh, submesh if the attribute is baked, and attribute
     addresses: std::collections::HashMap<(usize, Option<usize>, Attribute), u64>,
 }
 
 impl Attributes {
-    /// Baked normals and tangents differ from part to part; everything else is the mesh's own.
-    fn key(part: &Part, index: usize, attribute: Attribute) -> (usize, Option<usize>, Attribute) {
+    /// Baked normals and tangents differ between submeshes of one mesh; all other attributes are shared.
+    fn key(part: &Submesh, index: usize, attribute: Attribute) -> (usize, Option<usize>, Attribute) {
         let baked =
             matches!(attribute, Attribute::Normals | Attribute::Tangents) && part.to_group.matrix3 != glam::DMat3::IDENTITY;
         (part.mesh, baked.then_some(index), attribute)
@@ -459,7 +459,7 @@ impl Attributes {
     fn upload(device: &Arc<Device>, flat: &FlatScene, needs: Needs) -> Result<Self> {
         let (mut keys, mut arrays) = (Vec::new(), Vec::new());
         let mut seen = std::collections::HashSet::new();
-        for (index, part) in flat.groups.iter().flat_map(|g| g.parts.iter().enumerate()) {
+        for (index, part) in flat.groups.iter().flat_map(|g| g.submeshes.iter().enumerate()) {
             let mesh = &flat.scene.meshes[part.mesh];
             let Geometry::Triangles(t) = &mesh.geometry else { continue };
             let color = needs.albedo || part.alpha_tested;
@@ -485,12 +485,12 @@ impl Attributes {
         Ok(Self { buffer, addresses: keys.into_iter().zip(addresses).collect() })
     }
 
-    fn address(&self, part: &Part, index: usize, attribute: Attribute) -> u64 {
+    fn address(&self, part: &Submesh, index: usize, attribute: Attribute) -> u64 {
         self.addresses.get(&Self::key(part, index, attribute)).copied().unwrap_or(0)
     }
 }
 
-fn attribute_bytes<'a>(t: &'a TriangleMesh, part: &Part, attribute: Attribute) -> Cow<'a, [u8]> {
+fn attribute_bytes<'a>(t: &'a TriangleMesh, part: &Submesh, attribute: Attribute) -> Cow<'a, [u8]> {
     match attribute {
         Attribute::Normals if part.to_group.matrix3 == glam::DMat3::IDENTITY => Cow::Borrowed(bytemuck::cast_slice(&t.normals)),
         Attribute::Normals => {
@@ -503,7 +503,7 @@ fn attribute_bytes<'a>(t: &'a TriangleMesh, part: &Part, attribute: Attribute) -
         }
         Attribute::Tangents => {
             let m = part.to_group.matrix3;
-            // a mirroring transform turns the bitangent against the cross product
+            // a mirroring transform reverses the bitangent relative to the cross product
             let side = if part.mirrored { -1.0 } else { 1.0 };
             let bake = |t: &Vec4| (m * t.truncate().as_dvec3()).normalize_or_zero().as_vec3().extend(side * t.w);
             Cow::Owned(bytemuck::cast_slice(&t.tangents.iter().map(bake).collect::<Vec<_>>()).to_vec())
@@ -513,7 +513,7 @@ fn attribute_bytes<'a>(t: &'a TriangleMesh, part: &Part, attribute: Attribute) -
     }
 }
 
-/// Textures that something asks for, in one buffer.
+/// The textures that are used, in one buffer.
 struct Textures {
     texels: Buffer,
     records: Vec<TextureRecord>,
@@ -522,32 +522,32 @@ struct Textures {
     mips: Option<Mips>,
 }
 
-/// Levels of textures, in one buffer.
+/// Mip levels of textures, in one buffer.
 struct Mips {
     texels: Buffer,
     records: Vec<MipRecord>,
 }
 
 impl Mips {
-    /// Of the scene's textures that are used, as each is used (by [`Texels`]).
+    /// Makes the levels of the used textures, for each use of a texture (`uses`, by [`Texels`]).
     fn upload(device: &Arc<Device>, flat: &FlatScene, used: &[usize], uses: &[[bool; 3]]) -> Result<Self> {
         let texture = |t: usize| &flat.scene.textures[t];
         let mut records: Vec<_> = used.iter().map(|&t| mipmap::record([texture(t).width, texture(t).height])).collect();
         // textures that share an image share its levels, too
         let mut pyramids: Vec<Cow<[u8]>> = Vec::new();
         let mut pyramid_of = std::collections::HashMap::new();
-        let mut places = Vec::new();
+        let mut destinations = Vec::new();
         for (k, (&t, uses)) in used.iter().zip(uses).enumerate() {
             for texels in Texels::ALL.into_iter().filter(|&texels| uses[texels as usize]) {
                 let pyramid = *pyramid_of.entry((texture(t).texels.as_bytes().as_ptr(), texels)).or_insert_with(|| {
                     pyramids.push(Cow::Owned(mipmap::pyramid(texture(t), texels)));
                     pyramids.len() - 1
                 });
-                places.push((k, texels, pyramid));
+                destinations.push((k, texels, pyramid));
             }
         }
         let (texels, addresses) = concatenate(device, "mip levels", &pyramids)?;
-        for (k, texels, pyramid) in places {
+        for (k, texels, pyramid) in destinations {
             records[k].texels[texels as usize] = addresses[pyramid];
         }
         Ok(Self { texels, records })
@@ -558,7 +558,7 @@ impl Textures {
     fn upload(device: &Arc<Device>, flat: &FlatScene, needs: Needs) -> Result<Self> {
         let mut record_of = vec![INVALID; flat.scene.textures.len()];
         let (mut used, mut uses) = (Vec::new(), Vec::new());
-        for part in flat.groups.iter().flat_map(|g| &g.parts) {
+        for part in flat.groups.iter().flat_map(|g| &g.submeshes) {
             let material = &flat.scene.materials[flat.scene.meshes[part.mesh].material];
             let base = material.base_color_texture.filter(|_| needs.albedo || part.alpha_tested);
             let base_texels = if alpha_cutoff(material).is_some() { Texels::Covered } else { Texels::Srgb };
@@ -612,7 +612,7 @@ impl Textures {
         Ok(Self { texels, records, record_of, mips })
     }
 
-    /// Of a texture that was uploaded; none: 1 everywhere.
+    /// The record of an uploaded texture's use; without a texture, one that reads 1 everywhere.
     fn slot(&self, slot: Option<TextureSlot>) -> TextureUse {
         match slot {
             Some(s) => TextureUse {
@@ -635,7 +635,7 @@ impl Textures {
             base_color_texture: slot.map_or(INVALID, |s| self.record_of[s.texture]),
             texcoord_set: slot.map_or(0, |s| s.texcoord as u32),
             alpha_cutoff: alpha_cutoff(m).unwrap_or(-1.0),
-            coverage: (blend == Blend::Covered && m.alpha_mode == AlphaMode::Blend).into(),
+            coverage: (blend == Blend::Stochastic && m.alpha_mode == AlphaMode::Blend).into(),
             ..Default::default()
         }
     }

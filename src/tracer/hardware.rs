@@ -1,4 +1,4 @@
-//! What the hardware tracers traverse: one bottom level per group, one top level.
+//! The acceleration structures of the hardware tracers: one bottom level per group, and one top level.
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -8,36 +8,39 @@ use glam::DAffine3;
 use super::dynamic::group_of;
 use super::gpu_scene::{GpuScene, GroupBuffers, rows};
 use crate::accel::RefitPolicy;
-use crate::accel::flatten::{FlatScene, Group};
+use crate::accel::flatten::{BlasGroup, FlatScene};
 use crate::error::{Error, Result};
-use crate::gpu::{AccelerationStructure, BottomLevelInput, Buffer, Commands, Device, Memory, TopLevelEntry, Update};
+use crate::gpu::{
+    AccelerationStructure, AccelerationStructureInstance, BottomLevelInput, Buffer, Commands, Device, Memory, Update,
+};
 
 // hit groups of the pipeline: see gpu::RayTracingPipeline
 const OPAQUE_TRIANGLES: u32 = 0;
 const ALPHA_TRIANGLES: u32 = 1;
 const SPHERES: u32 = 2;
 
-/// All levels of a scene.
+/// The acceleration structures of a scene.
 pub(super) struct Structures {
     bottom: Vec<AccelerationStructure>,
     top: AccelerationStructure,
-    /// What a scene that changes needs besides.
+    /// State of a dynamic scene; `None` for a static one.
     changing: Option<Changing>,
 }
 
-/// What is built anew when something has moved.
+/// Inputs for rebuilding and refitting in a dynamic scene.
 struct Changing {
-    entries: Vec<TopLevelEntry>,
+    entries: Vec<AccelerationStructureInstance>,
     deforming: Vec<Option<Deforming>>,
 }
 
-/// A bottom level whose vertices move.
+/// A bottom level whose mesh deforms.
 struct Deforming {
     vertex_count: u32,
     opaque: u32,
     alpha_tested: u32,
     policy: RefitPolicy,
-    /// Seconds of the first trace after it was built: nobody sees a driver's tree, so later traces are held against this one.
+    /// Seconds of the first trace after it was built. A driver does not report the quality of its BVH, so later traces are compared
+    /// with this one.
     first_trace: Option<f64>,
 }
 
@@ -94,7 +97,7 @@ impl Structures {
             bottom.push(AccelerationStructure::bottom_level(device, &mut commands, "bottom level", &input)?);
         }
         let entries: Vec<_> = flat
-            .placements
+            .instances
             .iter()
             .enumerate()
             .map(|(k, p)| {
@@ -106,7 +109,7 @@ impl Structures {
                 };
                 let mut transform = [0.0; 12];
                 transform.copy_from_slice(rows(&p.to_world).as_flattened());
-                TopLevelEntry { transform, index: k as u32, hit_group, bottom_level: bottom[p.group].address() }
+                AccelerationStructureInstance { transform, index: k as u32, hit_group, bottom_level: bottom[p.group].address() }
             })
             .collect();
         let top = AccelerationStructure::top_level(device, &mut commands, &entries)?;
@@ -114,7 +117,7 @@ impl Structures {
         Ok(Self { bottom, top, changing })
     }
 
-    /// A group's vertices have moved: has its bottom level refitted, or built anew where the policy says so; whether it was the latter.
+    /// Refits the bottom level of a deformed group, or rebuilds it when the policy decides so. Returns whether it was rebuilt.
     pub fn deform(&mut self, device: &Arc<Device>, group: usize, scene: &GpuScene) -> Result<bool> {
         let Some(d) = self.changing.as_mut().and_then(|c| c.deforming[group].as_mut()) else { return Ok(false) };
         let start = Instant::now();
@@ -131,7 +134,7 @@ impl Structures {
         Ok(rebuild)
     }
 
-    /// Entries have moved, or groups below them have deformed: has the top level built anew, where it lies.
+    /// Rebuilds the top level in place, after instances have moved or groups have deformed.
     pub fn place(&mut self, device: &Arc<Device>, moved: &[(usize, DAffine3)]) -> Result<()> {
         let Some(changing) = &mut self.changing else { return Ok(()) };
         for (entry, to_world) in moved {
@@ -140,8 +143,8 @@ impl Structures {
         self.top.rebuild_top_level(&mut Commands::new(device)?, &changing.entries)
     }
 
-    /// Tracing took `seconds` since the last update. That a trace takes longer than the first one did is taken for the trees' age, shared by
-    /// all that deform.
+    /// Records that tracing took `seconds` since the last update. An increase over the first trace is attributed to the loss of quality by
+    /// refitting, in all deforming structures alike.
     pub fn traced(&mut self, seconds: f64) {
         let Some(changing) = &mut self.changing else { return };
         for d in changing.deforming.iter_mut().flatten() {
@@ -160,13 +163,13 @@ impl Structures {
     }
 }
 
-fn sphere_boxes(device: &Arc<Device>, flat: &FlatScene, group: &Group) -> Result<Buffer> {
+fn sphere_boxes(device: &Arc<Device>, flat: &FlatScene, group: &BlasGroup) -> Result<Buffer> {
     let size = 24 * group.primitive_count as u64;
     let mut buffer = Buffer::new(device, "sphere boxes", size, Memory::Device)?;
     buffer.fill(size, 24, |first, bytes| {
         for (k, out) in bytes.chunks_exact_mut(24).enumerate() {
             let primitive = first as usize + k;
-            let b = flat.primitive_bounds(group, flat.part_of(group, primitive), primitive);
+            let b = flat.primitive_bounds(group, flat.submesh_of(group, primitive), primitive);
             out.copy_from_slice(bytemuck::cast_slice(&[b.min.to_array(), b.max.to_array()]));
         }
     })?;

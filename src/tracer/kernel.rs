@@ -8,7 +8,7 @@ use crate::settings::choices;
 use crate::shaders::StreamShaders;
 
 choices! {
-    /// How the compute tracer finds what a ray meets. All give the same hits; docs/traversal.md compares their speed.
+    /// Traversal kernel of the compute tracer. All give the same hits; docs/traversal.md compares their speed.
     pub enum Kernel {
         /// seven-wide nodes; packets for coherent rays, else each ray by itself
         Auto = "auto",
@@ -26,17 +26,17 @@ choices! {
 }
 
 impl Kernel {
-    /// Primitives, each instance's counted, and instances that [`Kernel::Brute`] takes at most together. Mesa before 23 leaves
-    /// a loop after 65,535 turns; and a launch of the fewest rays should not stall a device for long.
-    pub const BRUTE_MOST: usize = 40_000;
+    /// Maximum number of intersection tests per ray for [`Kernel::Brute`] (see [`Kernel::brute_tests`]). Mesa before 23 leaves
+    /// a loop after 65,535 iterations, and even a small launch should not occupy a device for long.
+    pub const MAX_BRUTE_TESTS: usize = 40_000;
 
-    /// What [`Kernel::Brute`] goes through for each ray of a scene: primitives, each instance's counted, and instances.
+    /// Number of tests that [`Kernel::Brute`] does for each ray: the instances, and the primitives of each.
     pub fn brute_tests(flat: &FlatScene) -> usize {
-        flat.placements.iter().map(|p| flat.groups[p.group].primitive_count + 1).sum()
+        flat.instances.iter().map(|p| flat.groups[p.group].primitive_count + 1).sum()
     }
 
-    /// What traces coherent streams on a device. A packet has many more turns than a ray and no bound on them: where drivers cut
-    /// loops it has to be asked for.
+    /// The kernel for coherent streams on a device. A packet's loop has many more iterations than a single ray's, without a bound: on
+    /// drivers that end long loops early, packets run only when requested.
     pub fn for_coherent(self, info: &DeviceInfo) -> Kernel {
         match self {
             Kernel::Auto if info.packets() && !info.cuts_long_loops() => Kernel::Packet,
@@ -57,7 +57,7 @@ choices! {
     }
 }
 
-/// How the compute tracer works; the other tracers have no such choice.
+/// Options of the compute tracer; the hardware tracers have none.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
 pub struct ComputeOptions {
     /// The kernel.
@@ -66,16 +66,16 @@ pub struct ComputeOptions {
     pub triangle_test: TriangleTest,
 }
 
-/// How the compute tracer's hierarchy is built; drivers build those of the other tracers.
+/// Build options of the compute tracer's BVH; drivers build those of the hardware tracers.
 #[derive(Clone, Debug)]
 pub struct BuildOptions {
-    /// How much time to spend; `None`: what suits the numbers of primitives and of rays ([`BuildPreset::auto`]).
+    /// Build quality; `None` chooses by the numbers of primitives and rays ([`BuildPreset::auto`]).
     pub preset: Option<BuildPreset>,
-    /// Rays that will be traced, about.
+    /// Approximate number of rays that will be traced.
     pub rays: u64,
-    /// Where built hierarchies are kept, if anywhere. Only those of the wide kernel are.
+    /// Cache of built hierarchies, used for those of the wide kernel only; `None` caches nothing.
     pub cache: Option<Cache>,
-    /// Streams that [`super::Tracer::stream`] will be asked for: large scenes' are compiled beside the build.
+    /// Streams that will be requested with [`super::Tracer::stream`]; for large scenes they are compiled while the BVH is built.
     pub streams: Vec<&'static StreamShaders>,
 }
 
@@ -86,7 +86,7 @@ impl Default for BuildOptions {
 }
 
 impl BuildOptions {
-    /// What went wrong with the cache: one line each.
+    /// Takes the warnings of the cache, one line each.
     pub fn take_warnings(&self) -> Vec<String> {
         self.cache.as_ref().map(Cache::take_warnings).unwrap_or_default()
     }

@@ -10,7 +10,7 @@ pub enum TracerKind {
     Pipeline,
     /// VK_KHR_ray_query in compute shaders.
     Query,
-    /// Compute shaders over our own hierarchy.
+    /// Compute shaders over a software BVH.
     Compute,
 }
 
@@ -18,7 +18,7 @@ impl TracerKind {
     /// All of them, in the order in which they are listed to users.
     pub const ALL: [TracerKind; 3] = [TracerKind::Pipeline, TracerKind::Query, TracerKind::Compute];
 
-    /// As on the command line.
+    /// Name on the command line.
     pub fn name(self) -> &'static str {
         match self {
             TracerKind::Pipeline => "pipeline",
@@ -27,7 +27,7 @@ impl TracerKind {
         }
     }
 
-    /// What it needs of a device, and what of that the device lacks.
+    /// The extensions and features that it requires, and those that the device lacks.
     pub fn needs(self, info: &DeviceInfo) -> TracerNeeds {
         let extensions = &info.ray_tracing;
         let structures = [
@@ -47,18 +47,15 @@ impl TracerKind {
         }
     }
 
-    /// Can it run on this device?
+    /// Whether it can run on this device.
     pub fn is_supported_by(self, info: &DeviceInfo) -> bool {
         info.missing_floor.is_empty() && self.needs(info).missing.is_empty()
     }
 
-    /// What `auto` means on a device, and why.
+    /// The tracer that `auto` chooses on a device, and the reason.
     pub fn auto(info: &DeviceInfo) -> (TracerKind, String) {
         if info.is_cpu() {
-            (
-                TracerKind::Compute,
-                "the device is a CPU: its ray-tracing extensions, where it has them, are slower than our own hierarchy".into(),
-            )
+            (TracerKind::Compute, "the device is a CPU, where ray-tracing extensions are slower than the software BVH".into())
         } else if TracerKind::Pipeline.is_supported_by(info) {
             (TracerKind::Pipeline, "the device has VK_KHR_ray_tracing_pipeline".into())
         } else if TracerKind::Query.is_supported_by(info) {
@@ -75,13 +72,13 @@ impl std::fmt::Display for TracerKind {
     }
 }
 
-/// What a tracer needs of a device.
+/// Requirements of a tracer on a device.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct TracerNeeds {
     /// Which tracer.
     pub tracer: TracerKind,
-    /// Extensions and features that it needs.
+    /// Required extensions and features.
     pub needs: Vec<String>,
-    /// Those that the device lacks; empty: nothing but the floor can keep the tracer from running.
+    /// Those that the device lacks. When empty, the tracer runs if the device has skylit's minimum requirements.
     pub missing: Vec<String>,
 }

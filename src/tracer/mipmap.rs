@@ -1,4 +1,4 @@
-//! Levels of textures, for footprints wider than a texel: made on the host, only where somebody asks.
+//! Mip levels of textures, for footprints wider than a texel: made on the host, and only when required.
 
 use std::ops::Range;
 
@@ -9,7 +9,7 @@ use crate::interface::Texels;
 use crate::interface::records::scene::{MAX_LEVELS, MipRecord};
 use crate::scene::{TexelData, Texture};
 
-/// Levels of a texture of this size, without addresses.
+/// The mip record of a texture of this size, without addresses.
 pub(super) fn record(size: [u32; 2]) -> MipRecord {
     let mut record = MipRecord::default();
     let mut texels = 0;
@@ -41,7 +41,7 @@ fn unorm16(texel: &Vec4) -> [u16; 4] {
     texel.to_array().map(|c| (c.clamp(0.0, 1.0) * 65535.0).round() as u16)
 }
 
-/// The means of what each texel covers of the level before, of all levels from 1 on.
+/// The texels of all levels from 1 on, each the mean of the texels that it covers in the level before.
 fn means(texture: &Texture, texels: Texels) -> Vec<Vec4> {
     let texel = |i: usize| {
         let c = Vec4::from_array(if texels == Texels::Linear { texture.texels.get(i) } else { texture.texels.decode_srgb(i) });
@@ -76,7 +76,7 @@ fn reduced(from: [u32; 2], to: [u32; 2], texel: impl Fn(usize) -> Vec4 + Sync) -
     out
 }
 
-/// Texels of a row that a texel of a shorter row covers, and how much of it each is.
+/// The texels of a row that a texel of the next level covers, with their weights.
 struct Taps {
     texels: Range<usize>,
     weights: [f32; 3],
@@ -85,11 +85,11 @@ struct Taps {
 impl Taps {
     fn new(i: u32, from: u32, to: u32) -> Self {
         let (i, from, to) = (u64::from(i), u64::from(from), u64::from(to));
-        // in parts of a texel: each of the longer row has `to` of them, of the shorter `from`
+        // in units in which a texel of the longer row has length `to`, of the shorter row `from`
         let (begin, end) = (i * from, (i + 1) * from);
         let texels = begin / to..end.div_ceil(to);
         let mut weights = [0.0; 3];
-        // `from` is at most twice `to` and one more: no texel reaches over four
+        // `from` is at most 2 * to + 1, so a texel covers at most three
         for (weight, x) in weights.iter_mut().zip(texels.clone()) {
             *weight = (end.min((x + 1) * to) - begin.max(x * to)) as f32 / from as f32;
         }

@@ -1,13 +1,13 @@
-//! The seam: a pass describes a stream of rays, a tracer runs it. Nothing outside this folder knows which tracer runs.
+//! The interface between passes and tracers: a pass describes a stream of rays, a tracer traces it. Nothing outside this folder knows
+//! which tracer is used.
 //!
 //! A pass's shader defines `ray(i)` and `closest(i, hit)` or `any(i, occluded)`; the build compiles it once per
-//! tracer ([`stream`]). A [`Tracer`] holds a scene in device memory ([`gpu_scene`]) together with what it is traced through:
-//! a hierarchy of our own (`compute`) or acceleration structures (`hardware`).
+//! tracer ([`stream`]). A [`Tracer`] holds a scene in device memory ([`gpu_scene`]) and its acceleration structures:
+//! a software BVH (`compute`) or those of VK_KHR_acceleration_structure (`hardware`).
 
 mod albedo;
 mod brute;
 mod compute;
-pub mod drawable;
 mod dynamic;
 mod dynamic_trees;
 pub mod gpu_scene;
@@ -15,9 +15,10 @@ mod hardware;
 mod kernel;
 mod kind;
 mod mipmap;
-mod motion;
-mod prepared;
+mod precompiled;
+mod previous_frame;
 pub mod queue;
+pub mod raster_instance;
 mod reference;
 pub mod settings;
 pub(crate) mod shading;
@@ -28,11 +29,11 @@ mod wide;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::time::Instant;
 
-pub use drawable::Drawable;
-pub use dynamic::{Changes, MeshChange, Moved, UpdateStats};
+pub use dynamic::{Changes, MeshChange, MovedBounds, UpdateStats};
 pub use gpu_scene::Needs;
 pub use kernel::{BuildOptions, ComputeOptions, Kernel, TriangleTest};
 pub use kind::{TracerKind, TracerNeeds};
+pub use raster_instance::RasterInstance;
 pub use settings::{BuildChoice, DeviceSettings, TracerChoice};
 pub use stream::{Push, Stream};
 
@@ -42,33 +43,33 @@ use crate::error::{Error, Result};
 use crate::gpu::{ComputePipeline, Device, Specialization};
 use crate::shaders::{ComputeShader, Mode, StreamShaders};
 use gpu_scene::GpuScene;
-use prepared::{Prepared, Recipe};
+use precompiled::{PipelineSpec, PrecompiledPipelines};
 
-/// What making a tracer's structures took.
+/// Time and memory that building a tracer took.
 #[derive(Clone, Copy, Debug, Default, serde::Serialize)]
 pub struct BuildStats {
-    /// Seconds to build the hierarchy or the acceleration structures.
+    /// Seconds to build the BVH or the acceleration structures.
     pub build_seconds: f64,
     /// Seconds to write the scene into device memory.
     pub upload_seconds: f64,
-    /// Bytes that tracing touches: nodes and primitives, or acceleration structures.
+    /// Size of the acceleration structures in bytes: BVH nodes and primitives, or the driver's structures.
     pub structure_bytes: u64,
-    /// Bytes of the scene besides: vertices, indices, attributes, textures, records.
+    /// Size of the rest of the scene in bytes: vertices, indices, attributes, textures, records.
     pub scene_bytes: u64,
-    /// Of these, what levels of textures take beside level 0; 0 where nobody asks for them ([`Needs::mip_levels`]).
+    /// Size of mip levels 1 and up in bytes, included in `scene_bytes`; 0 without [`Needs::mip_levels`].
     pub mip_bytes: u64,
-    /// Levels of the texture that has most, level 0 counted; 0 where nobody asks.
+    /// Largest number of mip levels of a texture, level 0 included; 0 without [`Needs::mip_levels`].
     pub mip_levels: u32,
-    /// Triangles and spheres in the structures (each group once).
+    /// Number of triangles and spheres in the structures (each BLAS counted once).
     pub primitives: u64,
-    /// Entries that the compute tracer's stack holds; 0 for the hardware tracers.
+    /// Capacity of the compute tracer's traversal stack, in entries; 0 for the hardware tracers.
     pub stack_entries: u32,
-    /// Cost of the hierarchy by the surface area heuristic, for the tracers that know theirs.
+    /// Cost of the BVH by the surface area heuristic; `None` for the hardware tracers and for scenes of several trees.
     pub sah_cost: Option<f64>,
 }
 
 impl BuildStats {
-    /// Bytes that tracing touches, per primitive.
+    /// Size of the acceleration structures in bytes per primitive.
     pub fn bytes_per_primitive(&self) -> f64 {
         self.structure_bytes as f64 / self.primitives.max(1) as f64
     }
@@ -76,13 +77,13 @@ impl BuildStats {
 
 enum Structure {
     Compute(Box<compute::Hierarchy>),
-    /// The top level's address in the scene's root leads here.
+    /// The scene root holds the address of its top level.
     Hardware {
         levels: Box<hardware::Structures>,
     },
 }
 
-/// A scene in device memory and what traces it.
+/// A scene in device memory, with its acceleration structures and compiled streams.
 pub struct Tracer {
     kind: TracerKind,
     device: Arc<Device>,
@@ -91,28 +92,28 @@ pub struct Tracer {
     triangle_test: TriangleTest,
     features: SceneFeatures,
     stats: BuildStats,
-    /// `None`: nothing ever changes.
+    /// `None` for a static scene.
     dynamic: Option<Box<dynamic::Dynamic>>,
     // by mode
     kernels: [OnceLock<Arc<ComputePipeline>>; 2],
-    prepared: Prepared,
-    // those that were asked for: who renders twice compiles once
+    prepared: PrecompiledPipelines,
+    // compiled streams, so that rendering twice compiles once
     streams: Mutex<Vec<(Specialization, Stream)>>,
 }
 
 impl Tracer {
-    /// Uploads a scene and builds what `kind` traces. If the scene was flattened with [`crate::scene::Motion`], the tracer
-    /// can be brought up to date ([`Tracer::update`]).
+    /// Uploads a scene and builds the acceleration structures of `kind`. A scene that was flattened with [`crate::scene::Motion`]
+    /// can be updated ([`Tracer::update`]).
     ///
     /// # Errors
     /// [`Error::Device`] when the device lacks what the tracer needs, naming it; [`Error::OutOfMemory`]; [`Error::Scene`] when
-    /// the scene has more primitives than the tracer can number.
+    /// the scene has more primitives than the tracer's indices reach.
     pub fn new(device: &Arc<Device>, kind: TracerKind, flat: &FlatScene, needs: Needs) -> Result<Self> {
         Self::with_options(device, kind, flat, needs, ComputeOptions::default())
     }
 
-    /// As [`Tracer::new`], with a choice of how the compute tracer works: a [`Kernel`] or [`ComputeOptions`]. The hardware
-    /// tracers have no such choice, and disregard it.
+    /// As [`Tracer::new`], with options of the compute tracer: a [`Kernel`] or [`ComputeOptions`]. The hardware
+    /// tracers ignore them.
     pub fn with_options(
         device: &Arc<Device>,
         kind: TracerKind,
@@ -123,7 +124,7 @@ impl Tracer {
         Self::with_build(device, kind, flat, needs, options.into(), &BuildOptions::default())
     }
 
-    /// As [`Tracer::with_options`], with a choice of how the compute tracer's hierarchy is built.
+    /// As [`Tracer::with_options`], with build options of the compute tracer's BVH.
     pub fn with_build(
         device: &Arc<Device>,
         kind: TracerKind,
@@ -142,21 +143,22 @@ impl Tracer {
         let shading = needs.shading.then(|| shading::features(flat, needs));
         let features = SceneFeatures { shading, ..SceneFeatures::of(flat) };
         let mut stats = BuildStats { primitives: flat.primitive_count() as u64, ..Default::default() };
-        // the hierarchy first: its build needs the most host memory, the scene's buffers come after that is freed
+        // the BVH first: its build needs the most host memory, which is freed before the scene's buffers are filled
         let start = Instant::now();
         let (hierarchy, prepared) = match kind {
             TracerKind::Compute => {
-                let recipes = Prepared::recipes(&device.info, features, options, &build.streams, flat.primitive_count());
+                let specs =
+                    PrecompiledPipelines::expected(&device.info, features, options, &build.streams, flat.primitive_count());
                 std::thread::scope(|scope| {
-                    let prepared = (!recipes.is_empty()).then(|| scope.spawn(|| Prepared::compile(device, recipes)));
+                    let prepared = (!specs.is_empty()).then(|| scope.spawn(|| PrecompiledPipelines::compile(device, specs)));
                     let trees = compute::Trees::build(flat, options.kernel, build);
-                    // the driver's work is not the hierarchy's
+                    // compiling pipelines is not counted as building
                     stats.build_seconds = start.elapsed().as_secs_f64();
                     let prepared = prepared.map(|p| p.join().unwrap_or_else(|e| std::panic::resume_unwind(e)));
                     trees.map(|t| (Some(t), prepared.unwrap_or_default()))
                 })?
             }
-            _ => (None, Prepared::default()),
+            _ => (None, PrecompiledPipelines::default()),
         };
         let start = Instant::now();
         let mut scene = GpuScene::new(device, flat, needs)?;
@@ -205,7 +207,7 @@ impl Tracer {
         self.kind
     }
 
-    /// How the compute tracer works; `None` for the others.
+    /// Options of the compute tracer; `None` for the others.
     pub fn compute_options(&self) -> Option<ComputeOptions> {
         match &self.structure {
             Structure::Compute(h) => Some(ComputeOptions { kernel: h.kernel, triangle_test: self.triangle_test }),
@@ -213,22 +215,22 @@ impl Tracer {
         }
     }
 
-    /// The device it runs on.
+    /// The device that holds the scene.
     pub fn device(&self) -> &Arc<Device> {
         &self.device
     }
 
-    /// What the scene needs.
+    /// Features of shaders that the scene requires.
     pub fn features(&self) -> SceneFeatures {
         self.features
     }
 
-    /// May its scene change ([`Tracer::update`])?
+    /// Whether the scene can be updated ([`Tracer::update`]).
     pub fn is_dynamic(&self) -> bool {
         self.dynamic.is_some()
     }
 
-    /// What making it took.
+    /// Time and memory that building it took.
     pub fn stats(&self) -> BuildStats {
         self.stats
     }
@@ -238,10 +240,10 @@ impl Tracer {
         self.scene.root_address()
     }
 
-    /// To be called after streams have run and before their results are used: did every ray get its answer?
+    /// Checks that every ray was traced to its end. Call it after streams have run and before their results are used.
     ///
     /// # Errors
-    /// [`Error::Vulkan`] when the driver cut a traversal short, which no result shows.
+    /// [`Error::Vulkan`] when the driver ended a traversal loop early; the results alone do not show it.
     pub fn check_finished(&self) -> Result<()> {
         match &self.structure {
             Structure::Compute(h) => h.check_finished(),
@@ -249,7 +251,7 @@ impl Tracer {
         }
     }
 
-    /// A stream for this tracer and scene, compiled when it is first asked for.
+    /// A stream for this tracer and scene, compiled on first use.
     ///
     /// # Errors
     /// Those of the device.
@@ -257,7 +259,7 @@ impl Tracer {
         self.specialized(shaders, &Specialization::default())
     }
 
-    /// A stream, as [`Tracer::stream`] gives it, with constants of its pass.
+    /// As [`Tracer::stream`], with specialization constants of its pass.
     ///
     /// # Errors
     /// Those of the device.
@@ -278,19 +280,19 @@ impl Tracer {
             Structure::Compute(h) => {
                 let (info, options) =
                     (&self.device.info, ComputeOptions { kernel: h.kernel, triangle_test: self.triangle_test });
-                let s = prepared::specialization(info, self.features, options, h.stack_constant());
+                let s = precompiled::specialization(info, self.features, options, h.stack_constant());
                 let all = s.clone().and(constants);
                 let (rays_per_lane, _) = compute::lane_budget(info);
                 match h.kernel {
                     Kernel::Nearest | Kernel::Direction => Stream::reference(&self.device, shaders, &all, rays_per_lane),
                     Kernel::Brute => Stream::brute(&self.device, shaders, &all),
                     Kernel::Auto | Kernel::Wide | Kernel::Packet => {
-                        if prepared::in_packets(info, h.kernel, shaders) {
-                            let recipe = prepared::large(info, h.kernel, shaders, &all);
-                            return Ok(Stream::packets(self.prepared.take(&self.device, &recipe)?, shaders));
+                        if precompiled::in_packets(info, h.kernel, shaders) {
+                            let spec = precompiled::large(info, h.kernel, shaders, &all);
+                            return Ok(Stream::packets(self.prepared.take(&self.device, &spec)?, shaders));
                         }
-                        // of the pass it knows nothing: streams share it
-                        let kernel = self.kernel(shaders.mode, &prepared::large(info, h.kernel, shaders, &s))?;
+                        // it does not depend on the pass, so streams share it
+                        let kernel = self.kernel(shaders.mode, &precompiled::large(info, h.kernel, shaders, &s))?;
                         Stream::steps(&self.device, shaders, &all, kernel, rays_per_lane, h.launch_memory()?)
                     }
                 }
@@ -311,30 +313,30 @@ impl Tracer {
         })?;
         match &self.structure {
             Structure::Compute(h) if matches!(h.kernel, Kernel::Auto | Kernel::Wide | Kernel::Packet) => {
-                let s = prepared::specialization(&self.device.info, self.features, options, h.stack_constant());
+                let s = precompiled::specialization(&self.device.info, self.features, options, h.stack_constant());
                 shader.specialized(&self.device, &s)
             }
             _ => Err(Error::Usage(format!("{user} needs a BVH of wide nodes: add --traversal {}", Kernel::Wide))),
         }
     }
 
-    /// Compiles a stream of camera rays for pixels that were drawn ([`crate::raster`]): nothing is traced.
+    /// Compiles a stream of camera rays whose hits come from rasterized pixels ([`crate::raster`]): nothing is traced.
     pub fn rasterized_stream(&self, shaders: &'static StreamShaders) -> Result<Stream> {
         Stream::rasterized(&self.device, shaders, &stream::scene_specialization(self.features))
     }
 
-    /// What there is to draw, entry by entry of the top level, as it is since the last [`Tracer::update`].
-    pub fn drawables(&self) -> impl Iterator<Item = Drawable<'_>> {
-        self.scene.drawables()
+    /// The TLAS instances for rasterization, as they are since the last [`Tracer::update`].
+    pub fn raster_instances(&self) -> impl Iterator<Item = RasterInstance<'_>> {
+        self.scene.raster_instances()
     }
 
     /// The fast kernel, compiled once for all streams of a mode.
-    fn kernel(&self, mode: Mode, recipe: &Recipe) -> Result<Arc<ComputePipeline>> {
+    fn kernel(&self, mode: Mode, spec: &PipelineSpec) -> Result<Arc<ComputePipeline>> {
         let slot = &self.kernels[mode as usize];
         if let Some(kernel) = slot.get() {
             return Ok(kernel.clone());
         }
-        let kernel = Arc::new(self.prepared.take(&self.device, recipe)?);
+        let kernel = Arc::new(self.prepared.take(&self.device, spec)?);
         Ok(slot.get_or_init(|| kernel).clone())
     }
 }

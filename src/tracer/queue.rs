@@ -1,6 +1,6 @@
-//! Queues of rays in device memory: what one pass appends (`append_ray` of shaders/common/queue.glsl), a later stream traces.
-//! How many there are, only the device knows; a stream over a queue gets that number's address ([`Push::queued`]) and its
-//! work-groups beyond it return at once. The order of the rays differs from run to run, so results go to where their tags say.
+//! Queues of rays in device memory: one pass appends rays (`append_ray` of shaders/common/queue.glsl), a later stream traces them.
+//! Their number is known on the device only: a stream over a queue gets its address ([`Push::queued`]), and work-groups
+//! beyond it return at once. The order of the rays differs from run to run, so a result is stored by the tag of its ray.
 
 use std::sync::Arc;
 
@@ -19,7 +19,7 @@ pub struct RayQueue {
 }
 
 impl RayQueue {
-    /// For `capacity` rays at most. It holds nothing in particular until it is cleared.
+    /// A queue for `capacity` rays. Its contents are undefined until it is cleared.
     ///
     /// # Errors
     /// [`crate::Error::OutOfMemory`].
@@ -32,25 +32,25 @@ impl RayQueue {
         })
     }
 
-    /// Where shaders find it.
+    /// The queue's addresses, for shaders.
     pub fn record(&self) -> QueueRecord {
         QueueRecord { rays: self.rays.address(), tags: self.tags.address(), count: self.count.address() }
     }
 
-    /// Empties it; what is recorded before must not use it any more, nor what comes after without a barrier.
+    /// Empties the queue. Commands before and after it need a barrier in between.
     pub fn clear(&self, recorder: &mut Recorder) {
         recorder.fill(&self.count, 4, 0);
     }
 
-    /// A `u32`: how many rays it holds.
+    /// The buffer of a `u32`: the number of rays in the queue.
     pub fn count(&self) -> &Buffer {
         &self.count
     }
 
-    /// `push` for a stream that traces what is queued, `most` rays at most. Whoever fills the queue appends no more than
-    /// `most`, so that there is room.
-    pub fn push(&self, push: Push, most: u32) -> Push {
-        assert!(most <= self.capacity);
-        Push { rays: self.rays.address(), queued: self.count.address(), first: 0, count: most, ..push }
+    /// `push` for a stream that traces the queued rays, at most `max_rays`. The pass that fills the queue must not append more than
+    /// that.
+    pub fn push(&self, push: Push, max_rays: u32) -> Push {
+        assert!(max_rays <= self.capacity);
+        Push { rays: self.rays.address(), queued: self.count.address(), first: 0, count: max_rays, ..push }
     }
 }

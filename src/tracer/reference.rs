@@ -1,9 +1,9 @@
-//! What the compute tracer's readable kernel walks (`shaders/trace/reference.glsl`): binary trees, one per group and one over the
-//! placed groups, in one node array.
+//! The binary BVHs of the compute tracer's simple kernel (`shaders/trace/reference.glsl`): one per group and one over the
+//! instances, in one node array.
 
 use std::sync::Arc;
 
-use super::compute::{Hierarchy, padding, placement_boxes, primitive_boxes, record, unfinished_counter, write_records};
+use super::compute::{Hierarchy, instance_boxes, padding, primitive_boxes, record, unfinished_counter, write_records};
 use super::kernel::BuildOptions;
 use super::kernel::Kernel;
 use crate::accel::build::MAX_DEPTH;
@@ -12,14 +12,14 @@ use crate::accel::{Aabb, Bvh2, bvh2};
 use crate::error::Result;
 use crate::gpu::Device;
 
-/// Primitives of a leaf at most: more cost memory accesses, fewer cost nodes.
+/// Maximum number of primitives in a leaf: more cost memory accesses, fewer cost nodes.
 const MAX_LEAF: u32 = 4;
 
 /// The trees on the host.
 pub(super) struct Trees {
     groups: Vec<Bvh2>,
     top: Option<Bvh2>,
-    /// Of everything, not padded.
+    /// World-space bounds of the scene, not padded.
     bounds: Aabb,
 }
 
@@ -33,8 +33,8 @@ impl Trees {
         }
         let mut top = None;
         if !flat.is_single_level() {
-            bounds = placement_boxes(flat, &bounds);
-            // a leaf of the top level holds one entry: entering it leaves the tree
+            bounds = instance_boxes(flat, &bounds);
+            // a leaf of the top level holds one instance, because traversal continues in the instance's own BVH
             top = Some(Bvh2::build(&bounds, options.preset(bounds.len()), 1));
         }
         Self { groups, top, bounds: bounds.into_iter().fold(Aabb::EMPTY, Aabb::union) }
@@ -42,7 +42,7 @@ impl Trees {
 
     pub fn upload(self, device: &Arc<Device>, flat: &FlatScene, kernel: Kernel) -> Result<Hierarchy> {
         let group_depth = self.groups.iter().map(|g| g.depth).max().unwrap_or(0);
-        // every node visit pushes at most one entry, entering an entry of the top level the way back
+        // every node visit pushes at most one entry, entering a TLAS instance the way back
         let stack_entries = self.top.as_ref().map_or(0, |top| top.depth + 1) + group_depth;
         debug_assert!(stack_entries <= 2 * MAX_DEPTH + 1);
         // the top level first: it is visited by every ray
@@ -72,7 +72,7 @@ impl Trees {
             nodes,
             primitives: Some(primitives),
             root,
-            instance_roots: flat.placements.iter().map(|p| roots[p.group]).collect(),
+            instance_roots: flat.instances.iter().map(|p| roots[p.group]).collect(),
             stack_entries,
             bounds: self.bounds,
             unfinished: unfinished_counter(device)?,
@@ -82,7 +82,7 @@ impl Trees {
     }
 }
 
-/// A leaf of the top level names the entry itself.
+/// The reference of a top-level node, with a leaf referring to its instance directly.
 fn top_reference(top: &Bvh2, reference: u32) -> u32 {
     match bvh2::leaf_range(reference) {
         Some((slot, _)) => reference - slot + top.primitives[slot as usize],

@@ -1,4 +1,4 @@
-//! Settings of where rays are traced, and how: the device, the tracer on it, and how the compute tracer works.
+//! Settings of ray tracing: the device, the tracer, and the options of the compute tracer.
 
 use std::path::PathBuf;
 
@@ -11,7 +11,7 @@ use crate::tracer::{BuildOptions, ComputeOptions, Kernel, TracerKind, TriangleTe
 choices! {
     /// Which tracer to use.
     pub enum TracerChoice {
-        /// The fastest on the device
+        /// The one that suits the device: compute on CPUs, else pipeline, query or compute, the first that is available
         Auto = "auto",
         /// VK_KHR_ray_tracing_pipeline
         Pipeline = "pipeline",
@@ -23,20 +23,20 @@ choices! {
 }
 
 impl TracerChoice {
-    /// The tracer, and why, on a device.
+    /// The tracer on a device, and the reason for it.
     pub fn on(self, info: &crate::gpu::DeviceInfo) -> (TracerKind, String) {
-        let asked = |kind| (kind, "asked for with --tracer".to_owned());
+        let requested = |kind| (kind, "requested with --tracer".to_owned());
         match self {
             Self::Auto => TracerKind::auto(info),
-            Self::Pipeline => asked(TracerKind::Pipeline),
-            Self::Query => asked(TracerKind::Query),
-            Self::Compute => asked(TracerKind::Compute),
+            Self::Pipeline => requested(TracerKind::Pipeline),
+            Self::Query => requested(TracerKind::Query),
+            Self::Compute => requested(TracerKind::Compute),
         }
     }
 }
 
 choices! {
-    /// How much time to spend on a hierarchy.
+    /// BVH build quality.
     pub enum BuildChoice {
         /// Chosen by the number of primitives and rays
         Auto = "auto",
@@ -50,7 +50,7 @@ choices! {
 }
 
 impl BuildChoice {
-    /// `None`: what suits the scene and the rays.
+    /// The build preset; `None` chooses by the numbers of primitives and rays.
     pub fn preset(self) -> Option<BuildPreset> {
         match self {
             BuildChoice::Auto => None,
@@ -62,7 +62,7 @@ impl BuildChoice {
 }
 
 settings! {
-    /// What it runs on.
+    /// Settings of the device and the tracer.
     "Device"
     pub struct DeviceSettings {
         /// How rays are traced [default: auto]
@@ -84,17 +84,17 @@ settings! {
 }
 
 impl DeviceSettings {
-    /// How to open the device.
+    /// Options to open the device with.
     pub fn options(&self) -> crate::gpu::Options {
         crate::gpu::Options { device: self.device.clone(), validation: self.validation, ..Default::default() }
     }
 
-    /// The quality of hierarchies.
+    /// BVH build quality.
     pub fn build(&self) -> BuildChoice {
         self.build.unwrap_or_default()
     }
 
-    /// How the compute tracer's hierarchy is built, when about so many rays will be traced.
+    /// Build options of the compute tracer's BVH, for about `rays` rays.
     pub fn build_options(&self, rays: u64) -> BuildOptions {
         let from_environment = || std::env::var_os("SKYLIT_BVH_CACHE").filter(|v| !v.is_empty()).map(PathBuf::from);
         BuildOptions {
@@ -105,8 +105,8 @@ impl DeviceSettings {
         }
     }
 
-    /// The first option given that is about the compute tracer alone.
-    fn about_compute(&self) -> Option<&'static str> {
+    /// The first option given that applies to the compute tracer only.
+    fn compute_only_option(&self) -> Option<&'static str> {
         let given = [
             (self.traversal.is_some(), "--traversal"),
             (self.triangle_test.is_some(), "--triangle-test"),
@@ -116,14 +116,16 @@ impl DeviceSettings {
         given.into_iter().find_map(|(given, name)| given.then_some(name))
     }
 
-    /// Checks what concerns more than one option: none may be given that would have no effect.
+    /// Checks the combination of options: none may be given that would have no effect.
     ///
     /// # Errors
-    /// [`Error::Usage`] when an option of the compute tracer meets another tracer, or one of its hierarchy a traversal that has
-    /// none or keeps none.
+    /// [`Error::Usage`] for an option of the compute tracer with another tracer, and for a build or cache option with a
+    /// traversal that has no BVH or does not cache it.
     pub fn check(&self) -> Result<()> {
-        if let (Some(TracerChoice::Pipeline | TracerChoice::Query), Some(option)) = (self.tracer, self.about_compute()) {
-            return Err(Error::Usage(format!("{option} is about the compute tracer: leave it out, or say --tracer compute")));
+        if let (Some(TracerChoice::Pipeline | TracerChoice::Query), Some(option)) = (self.tracer, self.compute_only_option()) {
+            return Err(Error::Usage(format!(
+                "{option} applies to the compute tracer only: leave it out, or use --tracer compute"
+            )));
         }
         let option = match self.traversal {
             Some(Kernel::Brute) if self.build() != BuildChoice::Auto => Some("--build"),
@@ -133,21 +135,21 @@ impl DeviceSettings {
         match (option, self.traversal) {
             (Some(option), Some(kernel)) => Err(Error::Usage(format!(
                 "{option} has no effect on --traversal {kernel}, which {}: leave it out, or choose another traversal",
-                if kernel == Kernel::Brute { "has no hierarchy" } else { "keeps none" }
+                if kernel == Kernel::Brute { "has no BVH" } else { "does not cache its BVH" }
             ))),
             _ => Ok(()),
         }
     }
 
-    /// The tracer on a device, why this one, and how the compute tracer works. What concerns the compute tracer alone chooses it
-    /// where `--tracer` leaves the choice.
+    /// The tracer on a device, the reason for it, and the options of the compute tracer. An option that applies to the compute tracer
+    /// only chooses it unless `--tracer` is given.
     ///
     /// # Errors
     /// Those of [`DeviceSettings::check`].
     pub fn choose(&self, info: &crate::gpu::DeviceInfo) -> Result<(TracerKind, String, ComputeOptions)> {
         self.check()?;
-        let (kind, why) = match (self.tracer.unwrap_or_default(), self.about_compute()) {
-            (TracerChoice::Auto, Some(option)) => (TracerKind::Compute, format!("{option} is about this tracer alone")),
+        let (kind, why) = match (self.tracer.unwrap_or_default(), self.compute_only_option()) {
+            (TracerChoice::Auto, Some(option)) => (TracerKind::Compute, format!("{option} applies to this tracer only")),
             (choice, _) => choice.on(info),
         };
         let options = ComputeOptions {
@@ -178,10 +180,10 @@ mod tests {
             })
         };
         for (line, about) in [
-            ("--tracer pipeline --build best", "--build is about the compute tracer"),
-            ("--tracer query --bvh-cache d", "--bvh-cache is about the compute tracer"),
-            ("--tracer pipeline --traversal wide", "--traversal is about"),
-            ("--tracer query --triangle-test watertight", "--triangle-test is about"),
+            ("--tracer pipeline --build best", "--build applies to the compute tracer"),
+            ("--tracer query --bvh-cache d", "--bvh-cache applies to the compute tracer"),
+            ("--tracer pipeline --traversal wide", "--traversal applies to"),
+            ("--tracer query --triangle-test watertight", "--triangle-test applies to"),
             ("--traversal brute --build fast", "--build has no effect on --traversal brute"),
             ("--traversal brute --bvh-cache d", "--bvh-cache has no effect on --traversal brute"),
             ("--traversal nearest --bvh-cache d", "--bvh-cache has no effect on --traversal nearest"),

@@ -1,4 +1,4 @@
-//! What of materials the path tracer gets: [`ShadingRecord`], and which of it the scene requires.
+//! Materials for the path tracer: their [`ShadingRecord`], and the shader features that the scene requires.
 
 use super::gpu_scene::Needs;
 use crate::accel::flatten::FlatScene;
@@ -10,10 +10,10 @@ use crate::interface::{
 use crate::scene::material::MaterialKind;
 use crate::scene::{Geometry, Material, TextureSlot};
 
-/// Textures of a material beside its base colour's, numbered as [`TextureFeature`].
+/// Number of textures of a material beside that of the base colour, in the order of [`TextureFeature`].
 pub(super) const SLOTS: usize = TextureFeature::ALL.len();
 
-/// Complex index of refraction of a metal at the wavelengths of sRGB's primaries: eta and k of the measurements of Palik's handbook (1985) as
+/// Complex index of refraction of a conductor at the wavelengths of sRGB's primaries: eta and k of the measurements of Palik's handbook (1985) as
 /// Mitsuba and pbrt carry them, integrated to linear sRGB.
 fn metal(kind: MaterialKind) -> Option<[[f32; 3]; 2]> {
     match kind {
@@ -23,7 +23,7 @@ fn metal(kind: MaterialKind) -> Option<[[f32; 3]; 2]> {
     }
 }
 
-/// The reflection model of a material; `None`: it is unlit.
+/// The BSDF of a material; `None` for an unlit one.
 fn model(m: &Material) -> Option<BsdfModel> {
     match m.kind {
         _ if m.unlit => None,
@@ -38,7 +38,7 @@ fn model(m: &Material) -> Option<BsdfModel> {
     }
 }
 
-/// What a reflection model takes beside what all have.
+/// Parameters of a BSDF beyond the common ones.
 fn parameters(m: &Material) -> [f32; 2] {
     match model(m) {
         Some(BsdfModel::OrenNayar) => [m.parameter("sigma").unwrap_or(0.0).clamp(0.0, 1.0), 0.0],
@@ -46,7 +46,7 @@ fn parameters(m: &Material) -> [f32; 2] {
     }
 }
 
-/// The textures that paths ask for.
+/// The textures that the path tracer uses.
 pub(super) fn slots(m: &Material, needs: Needs) -> [Option<TextureSlot>; SLOTS] {
     if !needs.shading || needs.white {
         return [None; SLOTS];
@@ -68,49 +68,49 @@ pub(super) fn slots(m: &Material, needs: Needs) -> [Option<TextureSlot>; SLOTS] 
     ]
 }
 
-/// What the texture in a slot holds, as shaders/path/shading.glsl reads it.
+/// The encoding of the texture in a slot, as shaders/path/shading.glsl reads it.
 pub(super) fn texels(slot: usize) -> Texels {
     // emission, colours of sheen and of specular reflection
     if [1, 6, 10].contains(&slot) { Texels::Srgb } else { Texels::Linear }
 }
 
-/// Does light pass through it, and how?
+/// Whether and how the material transmits light: not at all, through a thin wall, or into a volume.
 fn walls(m: &Material) -> Walls {
     match m.kind {
         MaterialKind::MetallicRoughness if !m.unlit && m.transmission.factor > 0.0 => {
-            // an index of 0 has no refraction, and no inside: what it transmits goes straight on
+            // glTF's index of refraction 0 does not refract: such a material transmits straight on, as a thin wall
             if m.transmission.thickness > 0.0 && m.ior != 0.0 { Walls::Volume } else { Walls::Thin }
         }
         _ => Walls::Opaque,
     }
 }
 
-/// Is it what bodies are made of that light goes through?
+/// Whether the material bounds a volume that refracts light.
 pub(crate) fn is_medium(m: &Material) -> bool {
     refracts(m)
 }
 
-/// Does light absorbed in it count?
+/// Whether the volume absorbs light.
 pub(crate) fn absorbs(m: &Material) -> bool {
     absorption(m).iter().any(|&a| a > 0.0)
 }
 
-/// May light go straight through it: walls without thickness that are smooth, or may be where a texture says so?
+/// Whether light may pass straight through: a thin wall that is smooth, or that a roughness texture may make smooth.
 pub(crate) fn has_clear_walls(m: &Material) -> bool {
     walls(m) == Walls::Thin && (m.roughness < 0.1 || m.metallic_roughness_texture.is_some())
 }
 
-/// Attenuation per world unit.
+/// Absorption coefficient per scene unit (metres in glTF).
 fn absorption(m: &Material) -> [f32; 3] {
     if walls(m) != Walls::Volume {
         return [0.0; 3];
     }
-    // what absorbs everything at once has no number: the least that single precision holds is left after its distance
+    // a colour of 0 would need an infinite coefficient: the smallest positive float stands for it
     let per_unit = |c: f32| -c.clamp(f32::MIN_POSITIVE, 1.0).ln() / m.transmission.attenuation_distance;
     m.transmission.attenuation_color.to_array().map(per_unit)
 }
 
-/// Indices of refraction of all materials that refract, each once: rough ones have tables of albedo ([`super::albedo`]).
+/// The distinct indices of refraction of all refracting materials: each has an albedo table ([`super::albedo`]).
 pub(super) fn indices_of_refraction(materials: &[Material]) -> Vec<f32> {
     let mut all: Vec<f32> = materials.iter().filter(|m| refracts(m)).map(|m| m.ior).collect();
     all.sort_by(f32::total_cmp);
@@ -122,16 +122,16 @@ fn refracts(m: &Material) -> bool {
     m.kind == MaterialKind::Glass && !m.unlit || walls(m) == Walls::Volume
 }
 
-/// What the materials of a scene require of paths.
+/// Shader features that the materials of a scene require of the path tracer.
 pub(super) fn features(flat: &FlatScene, needs: Needs) -> ShadingFeatures {
-    // under a white sky surfaces are diffuse, whatever they are made of
+    // in the white-furnace mode every surface is diffuse
     let mut bsdfs: BsdfModels = [BsdfModel::Diffuse].into_iter().collect();
     let mut materials = MaterialFeatures::default();
     let mut textures = TextureFeatures::default();
     materials.insert_if(needs.compensation, MaterialFeature::Compensation);
     materials.insert_if(needs.white, MaterialFeature::White);
     materials.insert_if(needs.mip_levels && !needs.white, MaterialFeature::RayCones);
-    for part in flat.groups.iter().flat_map(|g| &g.parts) {
+    for part in flat.groups.iter().flat_map(|g| &g.submeshes) {
         let mesh = &flat.scene.meshes[part.mesh];
         let m = &flat.scene.materials[mesh.material];
         let has_normals = matches!(&mesh.geometry, Geometry::Triangles(t) if !t.normals.is_empty());
@@ -174,7 +174,7 @@ pub(super) fn record(
     texture: impl Fn(Option<TextureSlot>) -> TextureUse,
 ) -> ShadingRecord {
     let metal = metal(m.kind);
-    // the colour of a metal is in its index of refraction already
+    // the colour of a conductor is in its index of refraction already
     let tint = if metal.is_some() { [1.0; 3] } else { m.specular_color.to_array() };
     let specular_color = if m.kind == MaterialKind::MetallicRoughness { m.specular.color.to_array() } else { tint };
     let (sin, cos) = m.anisotropy.rotation.sin_cos();

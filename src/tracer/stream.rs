@@ -11,7 +11,7 @@ pub use crate::interface::records::ray::Push;
 use crate::ray::Ray;
 use crate::shaders::{self, LANES, Mode, PACKET_RAYS, RUN, Rays, SPREAD, StreamShaders, Variant};
 
-/// Rays that the compute tracer's buffers hold between the steps of a launch.
+/// Maximum number of rays in a launch of the compute tracer: the capacity of its ray and hit buffers.
 pub const LAUNCH_RAYS: u32 = 1 << 19;
 
 #[derive(Clone)]
@@ -23,26 +23,26 @@ enum Pipeline {
     },
     /// Generate, trace, deliver.
     Steps {
-        // none: the rays are in memory
+        // `None`: the rays are in a ray buffer already
         generate: Option<Arc<ComputePipeline>>,
         trace: Arc<ComputePipeline>,
         deliver: Arc<ComputePipeline>,
         rays_per_group: u32,
         memory: LaunchMemory,
-        // bytes of a result
+        // size of a hit record in bytes
         record: u64,
     },
     RayTracing(Arc<RayTracingPipeline>),
-    /// One compute shader over all rays, whose hits are known but for where.
+    /// One compute shader over all rays, whose hit primitives are known from rasterization.
     Rasterized(Arc<ComputePipeline>),
 }
 
-/// Where a launch's rays and results are between its steps.
+/// Ray and hit buffers of a launch, between its steps.
 #[derive(Clone)]
 pub(super) struct LaunchMemory {
     pub rays: Arc<Buffer>,
     pub hits: Arc<Buffer>,
-    /// A u32 per work-group: rays that its lanes have taken.
+    /// A u32 per work-group: number of rays that its lanes have fetched.
     pub counters: Arc<Buffer>,
 }
 
@@ -53,13 +53,13 @@ pub struct Stream {
     shaders: &'static StreamShaders,
 }
 
-/// What a scene does not need is not compiled.
+/// Specialization constants of a scene: code for features that it does not use is compiled out.
 pub(crate) fn scene_specialization(features: SceneFeatures) -> Specialization {
     let s = Specialization::default()
         .set(constants::HAS_ALPHA, features.alpha)
         .set(constants::HAS_SPHERES, features.spheres)
         .set(constants::SINGLE_LEVEL, features.single_level)
-        .set(constants::HAS_COVERAGE, features.coverage)
+        .set(constants::HAS_COVERAGE, features.stochastic_alpha)
         .set(constants::HAS_DEEP_TEXELS, features.deep_texels);
     match features.shading {
         Some(shading) => {
@@ -69,12 +69,12 @@ pub(crate) fn scene_specialization(features: SceneFeatures) -> Specialization {
     }
 }
 
-/// Work-groups along x, y and z that take at least `parts` parts, in runs of `run` (shaders/trace/spread.glsl).
+/// Numbers of work-groups along x, y and z for at least `parts` parts, in runs of `run` (shaders/trace/spread.glsl).
 fn spread(parts: u32, run: u32) -> [u32; 3] {
     [run, parts.div_ceil(run * SPREAD), SPREAD]
 }
 
-/// One of a stream's shaders.
+/// Compiles one of a stream's shaders.
 fn compile(
     device: &Arc<Device>,
     shaders: &'static StreamShaders,
@@ -87,12 +87,12 @@ fn compile(
 }
 
 impl Stream {
-    /// What it was compiled from.
+    /// The shaders from which it was compiled.
     pub(super) fn shaders(&self) -> &'static StreamShaders {
         self.shaders
     }
 
-    /// For the compute tracer's fast kernel, which streams share.
+    /// A stream for the compute tracer's fast kernel, which streams share.
     pub(super) fn steps(
         device: &Arc<Device>,
         shaders: &'static StreamShaders,
@@ -121,12 +121,12 @@ impl Stream {
         Ok(Self { pipeline, shaders })
     }
 
-    /// For the compute tracer's packets.
+    /// A stream for the compute tracer's packet kernel.
     pub(super) fn packets(pipeline: ComputePipeline, shaders: &'static StreamShaders) -> Self {
         Self { pipeline: Pipeline::Single { pipeline: Arc::new(pipeline), rays_per_group: LANES * PACKET_RAYS }, shaders }
     }
 
-    /// For the compute tracer's readable reference.
+    /// A stream for the compute tracer's binary BVH.
     pub(super) fn reference(
         device: &Arc<Device>,
         shaders: &'static StreamShaders,
@@ -137,7 +137,7 @@ impl Stream {
         Ok(Self { pipeline: Pipeline::Single { pipeline, rays_per_group: LANES * rays_per_lane }, shaders })
     }
 
-    /// For the compute tracer without a hierarchy.
+    /// A stream for the compute tracer without a BVH.
     pub(super) fn brute(device: &Arc<Device>, shaders: &'static StreamShaders, s: &Specialization) -> Result<Self> {
         let pipeline = compile(device, shaders, Variant::Brute, s)?;
         Ok(Self { pipeline: Pipeline::Single { pipeline, rays_per_group: LANES }, shaders })
@@ -166,17 +166,18 @@ impl Stream {
         Ok(Self { pipeline: Pipeline::RayTracing(Arc::new(pipeline)), shaders: stream })
     }
 
-    /// For rays whose pixels have been drawn. [`Push::rays`] is then the address of what was drawn ([`crate::raster`]).
+    /// A stream for camera rays whose pixels were rasterized. [`Push::rays`] is then the address of the rasterized ids
+    /// ([`crate::raster`]).
     pub(super) fn rasterized(device: &Arc<Device>, shaders: &'static StreamShaders, s: &Specialization) -> Result<Self> {
         if shaders.variant(Variant::Visibility).is_none() {
-            return Err(Error::Usage(format!("the rays of '{}' are not the camera's: they cannot be drawn", shaders.name)));
+            return Err(Error::Usage(format!("the rays of '{}' are not camera rays: they cannot be rasterized", shaders.name)));
         }
         let pipeline = compile(device, shaders, Variant::Visibility, s)?;
         Ok(Self { pipeline: Pipeline::Rasterized(pipeline), shaders })
     }
 
-    /// Records the tracing of rays `push.first .. push.first + push.count`, timed under the names of the stream's shaders. The
-    /// addresses in `push` must be those of the tracer that made the stream and of parameters of the stream's pass.
+    /// Records the tracing of rays `push.first .. push.first + push.count`, timed under the names of the stream's shaders. `push` must
+    /// hold the scene address of the tracer that made the stream, and the address of parameters of the stream's pass.
     pub fn record(&self, recorder: &mut Recorder, push: &Push) {
         if push.count == 0 {
             return;

@@ -1,4 +1,4 @@
-//! How many blocks of the hierarchy rays visit: the fast kernel's walk on the host, counted. It explains a rate; it traces nothing.
+//! Counts the BVH nodes and leaves that rays visit, by repeating the fast kernel's traversal on the host: an explanation of ray rates.
 
 use glam::Vec3;
 use rayon::prelude::*;
@@ -16,7 +16,7 @@ pub struct VisitCounter {
     blocks: Vec<Block>,
 }
 
-/// Blocks that a ray visits.
+/// Number of nodes and leaves that a ray visits.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Visits {
     /// Nodes.
@@ -26,7 +26,7 @@ pub struct Visits {
 }
 
 impl VisitCounter {
-    /// Builds it as the compute tracer does. `None` for scenes of several levels or without triangles, which are not counted.
+    /// Builds the BVH as the compute tracer does. `None` for unsupported scenes: those of two levels, with spheres or with alpha.
     pub fn new(flat: &FlatScene) -> Option<Self> {
         let countable = flat.is_single_level() && !flat.has_spheres() && !flat.has_alpha();
         countable
@@ -35,15 +35,15 @@ impl VisitCounter {
             .map(|w| Self { blocks: w.blocks })
     }
 
-    /// Means over rays: of their walks to the nearest hit, or to any.
+    /// Means over rays; with `any`, of traversals that stop at the first hit found.
     pub fn mean(&self, rays: &[Ray], any: bool) -> Visits {
         let sum = rays.par_iter().map(|r| self.walk(r, any)).reduce(|| [0u64; 2], |a, b| [a[0] + b[0], a[1] + b[1]]);
         let n = rays.len().max(1) as f64;
         Visits { nodes: sum[0] as f64 / n, leaves: sum[1] as f64 / n }
     }
 
-    /// Nodes and leaves. The order of children is that of shaders/trace/wide.glsl: for the nearest hit, the child that is entered
-    /// first and then along the ray's octant; for any hit, along the octant.
+    /// Visited nodes and leaves of a ray. The order of children is that of shaders/trace/wide.glsl: for the nearest hit, first the child
+    /// that the ray enters first and then the others by octant; for any hit, all by octant.
     fn walk(&self, ray: &Ray, any: bool) -> [u64; 2] {
         let mut visits = [0u64; 2];
         if ray.tmax <= ray.tmin {
@@ -106,14 +106,14 @@ impl VisitCounter {
     }
 }
 
-/// Where the ray meets a leaf's triangles nearest, if within (tmin, tmax).
+/// Distance of the nearest hit in a leaf's triangles, if within (tmin, tmax).
 fn meet(block: &Block, origin: Vec3, direction: Vec3, tmin: f32, tmax: f32) -> Option<f32> {
     let leaf: &TriangleLeaf = bytemuck::cast_ref(block);
     debug_assert!(wide::is_leaf(block) && (leaf.primitives[0] == NONE || leaf.primitives[0] & SPHERE == 0));
     let corners = leaf.corners.map(Vec3::from_array);
     let mut best = tmax;
     for [b, c] in [[1, 2], [2, 3]] {
-        // Moeller and Trumbore: what it loses at edges does not show in a mean
+        // Moeller and Trumbore: not watertight, which does not matter for a mean
         let (e1, e2) = (corners[b] - corners[0], corners[c] - corners[0]);
         let p = direction.cross(e2);
         let inverse = 1.0 / e1.dot(p);

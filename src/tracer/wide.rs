@@ -1,5 +1,5 @@
-//! What the compute tracer's fast kernel walks (`shaders/trace/wide.glsl`): a wide hierarchy per group and one over the placed
-//! groups, all in one array of blocks. Here are the leaves: [`TriangleLeaf`], [`SphereLeaf`]
+//! The wide BVHs of the compute tracer's fast kernel (`shaders/trace/wide.glsl`): one per group and one over the
+//! instances, all in one array of blocks. This file makes their leaves: [`TriangleLeaf`], [`SphereLeaf`]
 //! and, in the top level, [`InstanceLeaf`].
 
 use std::sync::Arc;
@@ -9,16 +9,16 @@ use glam::Vec3;
 use obvhs::bvh2::Bvh2;
 use rayon::prelude::*;
 
-use super::compute::{Hierarchy, padding, placement_boxes, primitive_boxes, unfinished_counter, write_records};
-use super::dynamic_trees::{DynamicTrees, instance_leaf, provide};
+use super::compute::{Hierarchy, instance_boxes, padding, primitive_boxes, unfinished_counter, write_records};
+use super::dynamic_trees::{DynamicTrees, instance_leaf, reserve};
 use super::kernel::BuildOptions;
 use super::kernel::Kernel;
 use super::stream::{LAUNCH_RAYS, LaunchMemory};
 use crate::accel::build::{self, MAX_DEPTH};
 use crate::accel::cache::KeyBuilder;
-use crate::accel::flatten::{FlatScene, Group};
+use crate::accel::flatten::{BlasGroup, FlatScene};
 use crate::accel::pairs::{self, Fan, Pair};
-use crate::accel::wide::{self, Block, Wide};
+use crate::accel::wide::{self, Block, WideBvh};
 use crate::accel::{Aabb, BuildPreset};
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, Device, Memory};
@@ -28,16 +28,16 @@ use crate::scene::Geometry;
 
 /// The hierarchies on the host.
 pub(super) struct Trees {
-    pub groups: Vec<Wide>,
-    pub top: Option<Wide>,
-    /// What each group took to build; what the top level took.
+    pub groups: Vec<WideBvh>,
+    pub top: Option<WideBvh>,
+    /// Seconds to build each group's BVH, and the top level.
     pub seconds: Vec<f64>,
     pub top_seconds: f64,
 }
 
 impl Trees {
     pub fn build(flat: &FlatScene, options: &BuildOptions) -> Self {
-        let timed = |g: &Group| {
+        let timed = |g: &BlasGroup| {
             let start = Instant::now();
             let tree = if g.spheres { sphere_tree(flat, g, options) } else { triangle_tree(flat, g, options) };
             (tree, start.elapsed().as_secs_f64())
@@ -46,20 +46,20 @@ impl Trees {
         let start = Instant::now();
         let top = (!flat.is_single_level()).then(|| {
             let bounds: Vec<_> = groups.iter().map(|g| g.bounds.unwrap_or(Aabb::EMPTY)).collect();
-            tree(placement_boxes(flat, &bounds), options.preset(flat.placements.len()), None, |entry| {
-                // the root is filled in when the groups have their places
-                bytemuck::cast(instance_leaf(entry, &flat.placements[entry as usize], 0))
+            tree(instance_boxes(flat, &bounds), options.preset(flat.instances.len()), None, |entry| {
+                // upload() fills in the root, once the groups have their ranges in the array
+                bytemuck::cast(instance_leaf(entry, &flat.instances[entry as usize], 0))
             })
         });
         Self { groups, top, seconds, top_seconds: start.elapsed().as_secs_f64() }
     }
 
-    /// The tree of the only group, where there is one and no top level.
-    pub fn into_only_group(mut self) -> Option<Wide> {
+    /// The tree of a scene with a single group and no top level.
+    pub fn into_only_group(mut self) -> Option<WideBvh> {
         if self.top.is_none() { self.groups.pop() } else { None }
     }
 
-    /// Expected blocks that a ray visits, where there is one tree.
+    /// Expected number of blocks that a ray visits; `None` for several trees.
     pub fn sah_cost(&self) -> Option<f64> {
         match (&self.top, self.groups.as_slice()) {
             (None, [group]) => Some(group.sah_cost),
@@ -69,40 +69,40 @@ impl Trees {
 
     pub fn upload(mut self, device: &Arc<Device>, flat: &FlatScene, kernel: Kernel) -> Result<Hierarchy> {
         let bounds = self.top.as_ref().or(self.groups.first()).and_then(|t| t.bounds).unwrap_or(Aabb::EMPTY);
-        let (rooms, depths) = provide(&self, flat);
-        let dynamic = (!flat.motion.is_none()).then(|| Box::new(DynamicTrees::new(&self, flat, &rooms, &depths)));
+        let (capacities, depths) = reserve(&self, flat);
+        let dynamic = (!flat.motion.is_none()).then(|| Box::new(DynamicTrees::new(&self, flat, &capacities, &depths)));
         let group_depth = depths.groups.iter().copied().max().unwrap_or(0);
-        // Every node visit pushes at most one entry. Entering an entry of the top level pushes its siblings and the way back.
+        // Every node visit pushes at most one entry. Entering a TLAS instance pushes its siblings and the return to the top level.
         let stack_entries = self.top.as_ref().map_or(0, |_| depths.top + 2) + group_depth;
         debug_assert!(stack_entries <= 2 * MAX_DEPTH + 2);
         // the top level first: it is visited by every ray
         let mut roots = Vec::new();
-        let mut count = rooms.top;
-        for room in &rooms.groups {
+        let mut count = capacities.top;
+        for capacity in &capacities.groups {
             roots.push(count as u32);
-            count += room;
+            count += capacity;
         }
         if u32::try_from(count).is_err() {
-            return Err(Error::Scene(format!("its hierarchy has {count} blocks; the compute tracer addresses 2^32")));
+            return Err(Error::Scene(format!(
+                "the scene's BVH has {count} blocks, more than the 2^32 that the compute tracer can address"
+            )));
         }
         if let Some(top) = &mut self.top {
             for block in top.blocks.iter_mut().filter(|b| wide::is_leaf(b)) {
                 let leaf: &mut InstanceLeaf = bytemuck::cast_mut(block);
-                leaf.root = roots[flat.placements[leaf.instance as usize].group];
+                leaf.root = roots[flat.instances[leaf.instance as usize].group];
             }
         }
-        let trees = self
-            .top
-            .iter()
-            .map(|t| (t, 0, rooms.top))
-            .chain(self.groups.iter().zip(roots.iter().copied()).zip(&rooms.groups).map(|((t, by), &room)| (t, by, room)));
-        let in_room = trees.flat_map(|(t, by, room)| {
-            let free = std::iter::repeat_n(Block::default(), room - t.blocks.len());
+        let trees = self.top.iter().map(|t| (t, 0, capacities.top)).chain(
+            self.groups.iter().zip(roots.iter().copied()).zip(&capacities.groups).map(|((t, by), &capacity)| (t, by, capacity)),
+        );
+        let reserved = trees.flat_map(|(t, by, capacity)| {
+            let free = std::iter::repeat_n(Block::default(), capacity - t.blocks.len());
             t.blocks.iter().map(move |b| wide::rebased(*b, by)).chain(free)
         });
         // an empty scene has a node without children
-        let in_room = in_room.chain(std::iter::repeat_n(Block::default(), usize::from(count == 0)));
-        let nodes = write_records(device, "hierarchy", count.max(1) as u64, &mut { in_room })?;
+        let reserved = reserved.chain(std::iter::repeat_n(Block::default(), usize::from(count == 0)));
+        let nodes = write_records(device, "hierarchy", count.max(1) as u64, &mut { reserved })?;
         let launch = |name, bytes| Buffer::new(device, name, bytes * LAUNCH_RAYS as u64, Memory::Device).map(Arc::new);
         Ok(Hierarchy {
             kernel,
@@ -123,10 +123,15 @@ impl Trees {
     }
 }
 
-/// A tree over boxes, not yet padded. `depth`: nodes that may lie on a path, where they are bounded.
-pub(super) fn tree(mut boxes: Vec<Aabb>, preset: BuildPreset, depth: Option<u32>, leaf: impl Fn(u32) -> Block + Sync) -> Wide {
+/// A tree over boxes, not yet padded. `depth`: maximum depth in nodes, if bounded.
+pub(super) fn tree(
+    mut boxes: Vec<Aabb>,
+    preset: BuildPreset,
+    depth: Option<u32>,
+    leaf: impl Fn(u32) -> Block + Sync,
+) -> WideBvh {
     if boxes.is_empty() {
-        return Wide::default();
+        return WideBvh::default();
     }
     let pad = padding(boxes.iter());
     boxes.par_iter_mut().for_each(|b| *b = Aabb { min: b.min - pad, max: b.max + pad });
@@ -135,38 +140,39 @@ pub(super) fn tree(mut boxes: Vec<Aabb>, preset: BuildPreset, depth: Option<u32>
     collapse(binary, depth, leaf)
 }
 
-/// With at most `depth` nodes on a path, where they are bounded.
-fn collapse(binary: Bvh2, depth: Option<u32>, leaf: impl Fn(u32) -> Block + Sync) -> Wide {
-    let built = Wide::collapse(&binary, &leaf);
+/// Collapses a binary tree to a wide one of at most `depth` levels of nodes, if bounded.
+fn collapse(binary: Bvh2, depth: Option<u32>, leaf: impl Fn(u32) -> Block + Sync) -> WideBvh {
+    let built = WideBvh::collapse(&binary, &leaf);
     match depth {
         // a binary tree is never shallower than the wide one that it becomes
-        Some(most) if built.depth > most => Wide::collapse(&build::limit_depth(binary, most), leaf),
+        Some(max) if built.depth > max => WideBvh::collapse(&build::limit_depth(binary, max), leaf),
         _ => built,
     }
 }
 
-/// Raised whenever the same input gives other blocks: builders, pairs, collapse, the layout of nodes and leaves.
+/// Version of cached BVHs. Raise it with every change that makes other blocks of the same input: in builders, pairs, collapse, or the
+/// layout of nodes and leaves.
 const LAYOUT_VERSION: u32 = 3;
 
-/// What lies next to the blocks of a kept hierarchy.
+/// The header of a cached BVH, beside its blocks.
 #[repr(C)]
 #[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
-struct Kept {
+struct CachedTree {
     bounds: [[f32; 3]; 2],
     depth: u32,
     reserved: u32,
     sah_cost: f64,
 }
 
-/// The hierarchy over what these bytes describe, from the cache if it is there, otherwise built and kept.
-fn kept(options: &BuildOptions, preset: BuildPreset, content: &[&[u8]], build: impl FnOnce() -> Wide) -> Wide {
+/// The BVH of the geometry that `content` describes: from the cache if available, otherwise built and stored there.
+fn load_or_build(options: &BuildOptions, preset: BuildPreset, content: &[&[u8]], build: impl FnOnce() -> WideBvh) -> WideBvh {
     let Some(cache) = &options.cache else { return build() };
     let head = KeyBuilder::default().with(&LAYOUT_VERSION.to_le_bytes()).with(format!("{preset:?}").as_bytes());
     let key = content.iter().fold(head, |k, bytes| k.with(bytes)).finish();
     let loaded = cache.load(key).and_then(|entries| {
-        let kept = *entries.get::<Kept>("tree")?.first()?;
+        let kept = *entries.get::<CachedTree>("tree")?.first()?;
         let [min, max] = kept.bounds.map(Vec3::from);
-        Some(Wide {
+        Some(WideBvh {
             blocks: entries.get("blocks")?,
             depth: kept.depth,
             bounds: Some(Aabb { min, max }),
@@ -179,23 +185,23 @@ fn kept(options: &BuildOptions, preset: BuildPreset, content: &[&[u8]], build: i
     let wide = build();
     if let Some(b) = wide.bounds {
         let bounds = [b.min.to_array(), b.max.to_array()];
-        let kept = Kept { bounds, depth: wide.depth, reserved: 0, sah_cost: wide.sah_cost };
+        let kept = CachedTree { bounds, depth: wide.depth, reserved: 0, sah_cost: wide.sah_cost };
         cache.store(key, &[("tree", bytemuck::bytes_of(&kept)), ("blocks", bytemuck::cast_slice(&wide.blocks))]);
     }
     wide
 }
 
-fn sphere_tree(flat: &FlatScene, group: &Group, options: &BuildOptions) -> Wide {
+fn sphere_tree(flat: &FlatScene, group: &BlasGroup, options: &BuildOptions) -> WideBvh {
     let preset = options.preset(group.primitive_count);
     let spheres: Vec<[f32; 4]> = (0..group.primitive_count)
         .into_par_iter()
         .map(|primitive| {
-            let part = flat.part_of(group, primitive);
+            let part = flat.submesh_of(group, primitive);
             let s = flat.sphere(part, primitive - part.first_primitive);
             [s.center.x, s.center.y, s.center.z, s.radius]
         })
         .collect();
-    kept(options, preset, &[b"spheres", bytemuck::cast_slice(&spheres)], || {
+    load_or_build(options, preset, &[b"spheres", bytemuck::cast_slice(&spheres)], || {
         tree(primitive_boxes(flat, group).collect(), preset, None, |primitive| {
             let [x, y, z, radius] = spheres[primitive as usize];
             let primitives = [primitive | SPHERE, pairs::NONE];
@@ -211,10 +217,10 @@ pub(super) struct Triangles {
 }
 
 impl Triangles {
-    fn of(flat: &FlatScene, group: &Group) -> Self {
+    fn of(flat: &FlatScene, group: &BlasGroup) -> Self {
         let mut out =
             Self { positions: Vec::with_capacity(group.vertex_count), indices: Vec::with_capacity(group.primitive_count) };
-        for part in &group.parts {
+        for part in &group.submeshes {
             let Geometry::Triangles(t) = &flat.scene.meshes[part.mesh].geometry else { continue };
             out.positions.par_extend((0..t.positions.len()).into_par_iter().map(|v| flat.vertex(part, v)));
             out.indices.par_extend(t.indices.par_iter().map(|t| t.map(|v| v + part.first_vertex as u32)));
@@ -227,17 +233,17 @@ impl Triangles {
     }
 }
 
-fn triangle_tree(flat: &FlatScene, group: &Group, options: &BuildOptions) -> Wide {
+fn triangle_tree(flat: &FlatScene, group: &BlasGroup, options: &BuildOptions) -> WideBvh {
     let triangles = Triangles::of(flat, group);
     let preset = options.preset(triangles.indices.len());
     let opaque = group.opaque_count as u32;
     let content: [&[u8]; 3] =
         [&opaque.to_le_bytes(), bytemuck::cast_slice(&triangles.positions), bytemuck::cast_slice(&triangles.indices)];
-    kept(options, preset, &content, || triangle_tree_of(&triangles, opaque, preset, None))
+    load_or_build(options, preset, &content, || triangle_tree_of(&triangles, opaque, preset, None))
 }
 
 /// `opaque`: triangles before the first alpha-tested one; `depth` as in [`tree`].
-pub(super) fn triangle_tree_of(triangles: &Triangles, opaque: u32, preset: BuildPreset, depth: Option<u32>) -> Wide {
+pub(super) fn triangle_tree_of(triangles: &Triangles, opaque: u32, preset: BuildPreset, depth: Option<u32>) -> WideBvh {
     let single: Vec<Aabb> = triangles.indices.par_iter().map(|&t| Aabb::of_points(&triangles.corners(t))).collect();
     let pairs = pairs::pair_up(&triangles.indices, &single, triangles.positions.len());
     let boxes: Vec<Aabb> = pairs
@@ -249,7 +255,7 @@ pub(super) fn triangle_tree_of(triangles: &Triangles, opaque: u32, preset: Build
         .collect();
     drop(single);
     if boxes.is_empty() {
-        return Wide::default();
+        return WideBvh::default();
     }
     let pad = padding(boxes.iter());
     let of_pair = |pair: u32, see: &mut dyn FnMut([Vec3; 3])| {
@@ -294,7 +300,7 @@ mod tests {
     use crate::scene::builtin;
 
     /// Every leaf lies within the boxes above it and holds what the scene has: each triangle and sphere once, its corners bit for bit
-    /// and in their order, its alpha flag; each entry of the top level its number.
+    /// and in their order, its alpha flag; each TLAS instance its number.
     fn check(name: &str) {
         let scene = builtin::by_name(name).unwrap();
         let flat = FlatScene::new(&scene);
@@ -329,7 +335,7 @@ mod tests {
         }
         if let Some(top) = &trees.top {
             let bounds: Vec<_> = trees.groups.iter().map(|g| g.bounds.unwrap_or(Aabb::EMPTY)).collect();
-            let boxes = placement_boxes(&flat, &bounds);
+            let boxes = instance_boxes(&flat, &bounds);
             top.validate(|b| vec![boxes[bytemuck::cast_ref::<Block, InstanceLeaf>(b).instance as usize]])
                 .unwrap_or_else(|e| panic!("{name}: {e}"));
         }

@@ -17,7 +17,7 @@ use skylit::integrators::ao::{self, AoOptions, AoResult};
 use skylit::oracle::camera::camera_ray;
 use skylit::oracle::closed_form as exact;
 use skylit::oracle::{Oracle, OracleRay};
-use skylit::scene::builtin::{self, Placement, analytic, shapes};
+use skylit::scene::builtin::{self, SceneTransform, analytic, shapes};
 use skylit::scene::{Camera, Geometry, Instance, Material, Mesh, Scene, TriangleMesh};
 use skylit::tracer::{Tracer, TracerKind};
 
@@ -135,7 +135,7 @@ fn gpu_ao_v_grooves() {
         let point = up + DVec3::Z * 0.5;
         let eye = point + normal * (0.6 * angle.tan().abs().min(1.0));
         for (name, length, width) in [("finite", 4.0, 6.0), ("nearly infinite", 1e4, 3e4)] {
-            let scene = analytic::v_groove(angle, length, width, Placement::default());
+            let scene = analytic::v_groove(angle, length, width, SceneTransform::default());
             let finite = |p: DVec3| exact::v_groove_finite(angle, p.dot(up), p.z, length, width);
             if length > 50.0 {
                 // constant, wherever on the wall
@@ -188,7 +188,7 @@ fn gpu_ao_falloff_and_radius_in_grooves() {
     let (up, normal) = (DVec3::new(sin, cos, 0.0), DVec3::new(-cos, sin, 0.0));
     let point = up * 0.4;
     // walls longer than any ray reaches
-    let scene = analytic::v_groove(angle, 16.0, 40.0, Placement::default());
+    let scene = analytic::v_groove(angle, 16.0, 40.0, SceneTransform::default());
     for (c, radius) in [(2.0, f64::INFINITY), (8.0, f64::INFINITY), (32.0, f64::INFINITY), (1.0, 0.9), (8.0, 0.7)] {
         let limit = reach(c).min(radius);
         // the closed form is smooth: a table over the distance from the bottom is exact enough, and quick
@@ -220,9 +220,9 @@ fn gpu_ao_sphere_over_plane() {
     let device = device();
     let (radius, height) = (1.0, 1.25);
     for place in [
-        Placement::default(),
-        Placement { scale: 1e-3, offset: DVec3::ZERO },
-        Placement { scale: 1e3, offset: DVec3::new(1e6, -2e6, 3e5) },
+        SceneTransform::default(),
+        SceneTransform { scale: 1e-3, offset: DVec3::ZERO },
+        SceneTransform { scale: 1e3, offset: DVec3::new(1e6, -2e6, 3e5) },
     ] {
         let scene = analytic::sphere_over_plane(radius, height, 60.0, place);
         let local = |p: DVec3| (p - place.offset) / place.scale;
@@ -245,7 +245,7 @@ fn gpu_ao_sphere_over_plane() {
 }
 
 /// The floor's point that a ray meets, if it passes the sphere by at least a twentieth of its radius.
-fn floor_beside_sphere(ray: &OracleRay, place: Placement, radius: f64, height: f64) -> Option<DVec3> {
+fn floor_beside_sphere(ray: &OracleRay, place: SceneTransform, radius: f64, height: f64) -> Option<DVec3> {
     let hit = on_plane(ray, place.offset, DVec3::Y)?;
     let local = (hit - place.offset) / place.scale;
     let from = place.point(DVec3::Y * height) - ray.origin;
@@ -259,7 +259,7 @@ fn floor_beside_sphere(ray: &OracleRay, place: Placement, radius: f64, height: f
 fn gpu_ao_tessellated_sphere_over_plane() {
     let device = device();
     let (radius, height) = (1.0, 1.25);
-    let mut scene = analytic::sphere_over_plane(radius, height, 60.0, Placement::default());
+    let mut scene = analytic::sphere_over_plane(radius, height, 60.0, SceneTransform::default());
     scene.meshes[1].geometry = shapes::icosphere(radius, 2);
     scene.instances[1].object_to_world = DAffine3::from_translation(DVec3::Y * height);
     let oracle = Oracle::new(&scene, DVec3::ZERO);
@@ -280,7 +280,7 @@ fn gpu_ao_tessellated_sphere_over_plane() {
                 scene,
                 camera: scene.cameras[0].clone(),
                 options: options(40, 512, 1.0, f64::INFINITY),
-                surface: &|ray| floor_beside_sphere(ray, Placement::default(), radius, height),
+                surface: &|ray| floor_beside_sphere(ray, SceneTransform::default(), radius, height),
                 expected: &expected,
             },
         );
@@ -299,7 +299,7 @@ fn gpu_ao_tessellated_sphere_over_plane() {
 fn gpu_ao_sphere_with_falloff() {
     let device = device();
     let (radius, height) = (1.0, 1.5);
-    let scene = analytic::sphere_over_plane(radius, height, 60.0, Placement::default());
+    let scene = analytic::sphere_over_plane(radius, height, 60.0, SceneTransform::default());
     for c in [2.0, 8.0, 32.0] {
         let want = exact::sphere_over_plane_falloff(radius, height, c).unwrap();
         // no tangent ray is longer than what is traced
@@ -327,7 +327,7 @@ fn gpu_ao_sphere_with_falloff() {
 fn gpu_ao_parallel_planes() {
     let device = device();
     let gap = 1.0;
-    let scene = analytic::parallel_planes(8.0, 6.0, gap, Placement::default());
+    let scene = analytic::parallel_planes(8.0, 6.0, gap, SceneTransform::default());
     // around a corner and in the middle
     for (x, z) in [(0.0, 0.0), (3.3, 2.4)] {
         let target = DVec3::new(x, 0.0, z);
@@ -345,7 +345,7 @@ fn gpu_ao_parallel_planes() {
     }
     // wider than any ray reaches
     let gap = 0.5;
-    let scene = analytic::parallel_planes(40.0, 40.0, gap, Placement::default());
+    let scene = analytic::parallel_planes(40.0, 40.0, gap, SceneTransform::default());
     for (c, radius) in [(2.0, f64::INFINITY), (8.0, f64::INFINITY), (32.0, f64::INFINITY), (8.0, 1.0), (1.0, 0.8), (1.0, 0.49)]
     {
         let want = exact::parallel_disk(gap, f64::INFINITY, c, reach(c).min(radius));
@@ -388,7 +388,7 @@ fn check_exact(device: &Arc<Device>, what: &str, scene: &Scene, camera: &Camera,
     }
 }
 
-fn places() -> Vec<Placement> {
+fn places() -> Vec<SceneTransform> {
     [
         (1.0, DVec3::ZERO),
         (1e-3, DVec3::ZERO),
@@ -398,7 +398,7 @@ fn places() -> Vec<Placement> {
         (1e-3, DVec3::new(1.0, 0.37, -0.71)),
         (1e3, DVec3::splat(-1e6)),
     ]
-    .map(|(scale, offset)| Placement { scale, offset })
+    .map(|(scale, offset)| SceneTransform { scale, offset })
     .to_vec()
 }
 
@@ -526,7 +526,7 @@ fn gpu_ao_about_shading_normals() {
     use skylit::integrators::ao::Hemisphere;
     let device = device();
     let lean = 40f64.to_radians();
-    let mut scene = analytic::closed_box(2.0, Placement::default());
+    let mut scene = analytic::closed_box(2.0, SceneTransform::default());
     let Geometry::Triangles(mesh) = &mut scene.meshes[0].geometry else { panic!() };
     mesh.normals = vec![Vec3::new(lean.sin() as f32, lean.cos() as f32, 0.0); mesh.positions.len()];
     let camera = Camera::look_at(DVec3::new(0.1, 2.0, 0.2), DVec3::Y, DVec3::X, 0.8);

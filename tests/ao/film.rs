@@ -5,9 +5,9 @@ use std::time::Duration;
 
 use glam::{DAffine3, DVec3};
 use skylit::accel::flatten::FlatScene;
-use skylit::film::cover::Cover;
+use skylit::film::tile_mask::TileMask;
 use skylit::oracle::Oracle;
-use skylit::scene::builtin::{Placement, analytic};
+use skylit::scene::builtin::{SceneTransform, analytic};
 use skylit::scene::{Camera, Projection, Scene};
 use skylit::tracer::{Kernel, Needs, Tracer, TracerKind};
 
@@ -20,7 +20,7 @@ use crate::{AoOptions, differences, oracle_image, render};
 fn gpu_film_keeps_its_digits() {
     let device = device();
     // a small floor: rays start above it by a few ulp of its size, and that much less is met
-    let scene = analytic::sphere_over_plane(1.0, 1.5, 0.25, Placement::default());
+    let scene = analytic::sphere_over_plane(1.0, 1.5, 0.25, SceneTransform::default());
     let camera = Camera::look_at(DVec3::new(1.0, 0.2, 0.0), DVec3::ZERO, DVec3::Y, 0.02);
     let options = AoOptions { size: [3, 2], spp: 20_000, falloff: 1.7, ..Default::default() };
     let oracle = Oracle::new(&scene, scene.origin());
@@ -28,7 +28,7 @@ fn gpu_film_keeps_its_digits() {
     for kind in tracers(&device) {
         let tracer = tracer(&device, kind, &scene);
         let image = render(&tracer, &scene, &camera, &options);
-        let (_, greatest, mean) = differences(&image.image.film.mean, &want.accessibility, 0.0);
+        let (_, greatest, mean) = differences(&image.image.film.mean, &want.ambient_visibility, 0.0);
         let relative: Vec<f64> =
             image.image.film.variance.iter().zip(&want.variance).map(|(a, b)| (*a as f64 / *b as f64 - 1.0).abs()).collect();
         let worst = relative.iter().fold(0.0f64, |a, b| a.max(*b));
@@ -148,7 +148,7 @@ fn gpu_cover_leaves_out_nothing_that_is_seen() {
             let camera = Camera::look_at(eye, middle + DVec3::X * reach * 0.5, DVec3::Y, 0.6);
             (name, scene, camera)
         })
-        .chain([("spheres", analytic::sphere_over_plane(1.0, 1.5, 0.25, Placement::default()))].map(|(name, scene)| {
+        .chain([("spheres", analytic::sphere_over_plane(1.0, 1.5, 0.25, SceneTransform::default()))].map(|(name, scene)| {
             let camera = Camera::look_at(DVec3::new(40.0, 30.0, 50.0), DVec3::ZERO, DVec3::Y, 0.5);
             (name, scene, camera)
         }))
@@ -161,12 +161,12 @@ fn gpu_cover_leaves_out_nothing_that_is_seen() {
                 true => Camera { projection: Projection::Orthographic { half_height: 12.0 }, ..camera.clone() },
             };
             let options = AoOptions { size, spp, ..Default::default() };
-            let cover = Cover::new(&flat, &record(scene, &camera, size), size, spp).map(Arc::new);
-            let (live, all) = cover.as_ref().map_or((1, 1), |c| c.count());
+            let tile_mask = TileMask::new(&flat, &record(scene, &camera, size), size, spp).map(Arc::new);
+            let (live, all) = tile_mask.as_ref().map_or((1, 1), |c| c.count());
             for kind in tracers(&device) {
                 let tracer = tracer(&device, kind, scene);
                 let whole = render(&tracer, scene, &camera, &options);
-                let image = render(&tracer, scene, &camera, &AoOptions { cover: cover.clone(), ..options.clone() });
+                let image = render(&tracer, scene, &camera, &AoOptions { tile_mask: tile_mask.clone(), ..options.clone() });
                 assert_eq!(whole.image.film.mean, image.image.film.mean, "{name} {kind}");
                 assert_eq!(whole.image.film.coverage, image.image.film.coverage, "{name} {kind}");
                 assert_eq!(whole.image.film.samples, image.image.film.samples, "{name} {kind}");
@@ -186,7 +186,7 @@ fn gpu_cover_leaves_out_nothing_that_is_seen() {
         // from within, anything may be seen anywhere
         let (lo, hi) = scene.bounds().unwrap();
         let within = Camera::look_at((lo + hi) * 0.5, hi, DVec3::Y, 0.6);
-        assert!(Cover::new(&flat, &record(scene, &within, [64, 64]), [64, 64], 1).is_none(), "{name}");
+        assert!(TileMask::new(&flat, &record(scene, &within, [64, 64]), [64, 64], 1).is_none(), "{name}");
     }
     assert_validation_clean(&device);
 }

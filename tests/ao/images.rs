@@ -21,7 +21,7 @@ use crate::{AoOptions, differences, oracle_image, render, settings};
 fn compare_with_oracle(device: &Arc<Device>, what: &str, scene: &Scene, camera: &Camera, options: &AoOptions) {
     let oracle = Oracle::new(scene, scene.origin());
     let want = oracle_image(&oracle, camera, options);
-    let pixels = want.accessibility.len();
+    let pixels = want.ambient_visibility.len();
     let allowed = pixels.div_ceil(500);
     // a turned sample moves a pixel by up to 1/spp; rounding alone by far less
     let threshold = 1e-4;
@@ -30,7 +30,7 @@ fn compare_with_oracle(device: &Arc<Device>, what: &str, scene: &Scene, camera: 
         let tracer = tracer(device, kind, scene);
         let image = render(&tracer, scene, camera, options);
         assert!(image.image.film.samples.iter().all(|&s| s == options.spp), "{what} {kind}: samples are missing");
-        let (count, greatest, mean) = differences(&image.image.film.mean, &want.accessibility, threshold);
+        let (count, greatest, mean) = differences(&image.image.film.mean, &want.ambient_visibility, threshold);
         let (covers, ..) = differences(&image.image.film.coverage, &want.coverage, 1e-6);
         println!(
             "{what} {kind} and the oracle: {count} of {pixels} pixels differ (at most {greatest:.1e}), {covers} in coverage; means by {mean:+.1e}"

@@ -124,7 +124,8 @@ fn gpu_peers_that_fail_are_left_out() {
     if !device() {
         return;
     }
-    for (place, says) in [(Place::new("scene", 96), "it says: no such thing"), (Place::new("", 95), "its image has 285 values")]
+    for (place, says) in
+        [(Place::new("scene", 96), "it reports: no such thing"), (Place::new("", 95), "its image has 285 values")]
     {
         let (record, notes) = place.record(&["sphere-diffuse", "--strategies", "mis"]);
         assert!(notes.contains("peer 'fake' left out") && notes.contains(says), "{notes}");

@@ -52,7 +52,7 @@ fn usage_errors() {
     refuses(&render(&["--traversal", "backwards"]), 64, "auto, wide, packet, nearest, direction, brute");
     refuses(&render(&["--triangle-test", "none"]), 64, "watertight, moller-trumbore");
     refuses(&render(&["--tracer", "pipeline", "--build", "best"]), 64, "--tracer compute");
-    refuses(&render(&["--traversal", "brute", "--build", "best"]), 64, "has no hierarchy");
+    refuses(&render(&["--traversal", "brute", "--build", "best"]), 64, "has no BVH");
     refuses(&render(&["--resumable", "--preset", "fast"]), 64, "--resumable is for stills, and --preset selects frames");
     refuses(&render(&["--resume", "a.exr", "--dump-rays", "r"]), 64, "leave --dump-rays out");
     refuses(&render(&["--integrator", "path", "--target-rmse", "0"]), 64, "above 0");
@@ -62,7 +62,11 @@ fn usage_errors() {
         64,
         "--resumable needs an .exr",
     );
-    refuses(&["rays", "--mesh", "a.bin", "--rays", "r.bin", "--traversal", "nearest", "--bvh-cache", "d"], 64, "keeps none");
+    refuses(
+        &["rays", "--mesh", "a.bin", "--rays", "r.bin", "--traversal", "nearest", "--bvh-cache", "d"],
+        64,
+        "does not cache its BVH",
+    );
     refuses(&["diff", "a.exr"], 64, "<B>");
     refuses(&["export", "builtin:plane", "a.txt"], 64, ".bin, .glb or .gltf");
 }
@@ -154,11 +158,11 @@ fn gpu_kept_hierarchies() {
     assert_eq!(std::fs::read(file).unwrap(), whole);
     let (unkept, said) = render("d.png", &file.join("below-a-file"));
     assert_eq!(unkept, built);
-    assert!(said.contains("not kept"), "{said}");
+    assert!(said.contains("not cached"), "{said}");
     let image = dir.path().join("e.png");
     let args = ["render", "builtin:cornell-box", "--size", "64x48", "--spp", "1", "--json", "--bvh-cache"];
     let record = json(&skylit(&args).args([path(&file.join("below-a-file")), "-o", path(&image)]).output().unwrap());
-    assert!(record["warnings"].to_string().contains("not kept"), "{record}");
+    assert!(record["warnings"].to_string().contains("not cached"), "{record}");
 }
 
 /// A command that has a result though it fails prints one record, with both.

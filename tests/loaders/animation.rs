@@ -8,7 +8,7 @@ use skylit::Error;
 use skylit::scene::animation::{Playback, Pose};
 use skylit::scene::builtin::by_name;
 use skylit::scene::export::export_gltf;
-use skylit::scene::{Rig, Scene};
+use skylit::scene::{AnimationRig, Scene};
 
 use crate::build::*;
 
@@ -29,7 +29,7 @@ fn animate<const N: usize>(doc: &mut Doc, node: usize, path: &str, interpolation
     animation["channels"].as_array_mut().unwrap().push(channel);
 }
 
-fn rig(scene: &Scene) -> &Rig {
+fn rig(scene: &Scene) -> &AnimationRig {
     scene.rig.as_ref().unwrap_or_else(|| panic!("no rig: {:?}", scene.report.warnings))
 }
 

@@ -109,7 +109,7 @@ fn errors_name_the_line() {
     assert!(error("Sphere radius[0]").contains("above zero"));
     assert!(error("Sphere radius[1] material[jade]").contains("unknown material `jade`"));
     assert!(error("Model scale[1 1 1]").contains("file[] is missing"));
-    assert!(error("SaveIntervals[a]").contains("`a` is no number"));
+    assert!(error("SaveIntervals[a]").contains("`a` is not a number"));
     assert!(error("GenDepthImage[maybe]").contains("true or false"));
     assert!(error("Model file[m.obj] scale[1 1 one]").contains("line 1"));
     // what is wrong in the model is said of the model

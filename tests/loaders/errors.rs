@@ -171,7 +171,7 @@ fn accessors_out_of_range() {
     doc.first()["indices"] = json!(indices);
     assert!(doc.error().contains("vertex 3, but there are only 3"), "{}", doc.error());
     doc.json["accessors"][indices]["componentType"] = json!(I8);
-    assert!(doc.error().contains("holds no indices"), "{}", doc.error());
+    assert!(doc.error().contains("does not hold indices"), "{}", doc.error());
     let mut doc = Doc::triangle();
     doc.first()["material"] = json!(0);
     assert!(doc.error().contains("material 0"), "{}", doc.error());

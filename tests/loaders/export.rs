@@ -2,7 +2,7 @@
 
 use glam::{Affine2, DAffine3, DQuat, DVec3, Vec2, Vec3, Vec4};
 use skylit::Error;
-use skylit::scene::export::{Written, export_gltf, mesh_bin, read_mesh_bin, write_mesh_bin};
+use skylit::scene::export::{ExportStats, export_gltf, mesh_bin, read_mesh_bin, write_mesh_bin};
 use skylit::scene::material::{Anisotropy, Clearcoat, Sheen, Specular, Transmission};
 use skylit::scene::*;
 
@@ -172,7 +172,7 @@ fn gltf_keeps_textures_of_16_bits() {
     }
     original.textures[0].texels = vec![1.5f32; 4 * 8 * 4].into();
     let error = export_gltf(&original, &folder.path("float.glb")).unwrap_err().to_string();
-    assert!(error.contains("holds floats"), "{error}");
+    assert!(error.contains("floating-point texels"), "{error}");
 }
 
 #[test]
@@ -236,7 +236,7 @@ fn mesh_bin_round_trips() {
         t.indices.push([1, 1, 2]);
     }
     let path = folder.path("a.bin");
-    assert_eq!(write_mesh_bin(&original, &path).unwrap(), Written { triangles: 7, warnings: Vec::new() });
+    assert_eq!(write_mesh_bin(&original, &path).unwrap(), ExportStats { triangles: 7, warnings: Vec::new() });
     assert_eq!(std::fs::metadata(&path).unwrap().len(), 8 + 12 * 12 + 7 * 12);
     let scene = read_mesh_bin(&path).unwrap();
     let m = mesh(&scene, 0);

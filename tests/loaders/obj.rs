@@ -153,7 +153,7 @@ fn errors_name_the_line() {
     assert!(error("v 0 0 0\nv 1 nan 0\n").contains("line 2: the vertex position `1 nan 0` is not finite"));
     assert!(error("v 0 0 inf\n").contains("line 1"));
     assert!(error("v 0 0\n").contains("3 numbers"));
-    assert!(error("v 0 x 0\n").contains("`x` is no number"));
+    assert!(error("v 0 x 0\n").contains("`x` is not a number"));
     assert!(error("v 0 0 0\n\nf 1 2 3\n").contains("line 3: the face refers to vertex 2, but there are 1"));
     assert!(error("v 0 0 0\nf 0 1 1\n").contains("vertex 0"));
     assert!(error("v 0 0 0\nf -2 1 1\n").contains("vertex -2"));
@@ -161,7 +161,7 @@ fn errors_name_the_line() {
     assert!(error("v 0 0 0\nf 1/1 1/1 1/1\n").contains("texture coordinate 1"));
     assert!(error("v 0 0 0\nf 1//1 1 1\n").contains("normal 1"));
     assert!(error("v 0 0 0\nf 1 1\n").contains("three corners"));
-    assert!(error("v 0 0 0\nf a b c\n").contains("`a` is no corner"));
+    assert!(error("v 0 0 0\nf a b c\n").contains("`a` is not a corner"));
 }
 
 #[test]

@@ -79,7 +79,7 @@ mod parity {
     use skylit::oracle::rounding::Rounding;
     use skylit::oracle::{Oracle, OracleHit, OracleRay};
     use skylit::ray::{Hit, Ray};
-    use skylit::scene::builtin::{self, Placement, analytic};
+    use skylit::scene::builtin::{self, SceneTransform, analytic};
     use skylit::scene::{Geometry, Scene};
 
     /// A tracer in single precision, the way a GPU would do it: object-space rays by an f32 inverse, brute force.
@@ -271,7 +271,7 @@ mod parity {
 
     #[test]
     fn each_kind_of_tie() {
-        let s = analytic::parallel_planes(2.0, 2.0, 1.0, Placement::default());
+        let s = analytic::parallel_planes(2.0, 2.0, 1.0, SceneTransform::default());
         let o = Oracle::new(&s, DVec3::ZERO);
         let judge = |ray: Ray, hit: Hit| judge_closest_ray(&o, &ray, &hit, &o.closest(ray), Rounding::default());
         let down = |x: f32, z: f32| Ray { origin: [x, 0.5, z], tmin: 0.0, direction: [0.0, -1.0, 0.0], tmax: f32::INFINITY };
@@ -308,7 +308,7 @@ mod parity {
         }
         // grazing: in the plane of the floor
         let grazing = Ray { origin: [-3.0, 0.0, 0.2], tmin: 0.0, direction: [1.0, 0.0, 0.0], tmax: f32::INFINITY };
-        assert_ne!(judge(grazing, Hit::MISS), Verdict::Unexplained("misses what it certainly meets"));
+        assert_ne!(judge(grazing, Hit::MISS), Verdict::Unexplained("misses a primitive that it certainly hits"));
         assert!(!matches!(judge(grazing, hit(0, 3.0)), Verdict::Unexplained(_)));
         assert!(matches!(judge(grazing, hit(0, 7.0)), Verdict::Unexplained(_)), "beyond the floor's extent");
     }
@@ -345,7 +345,7 @@ mod parity {
     fn far_and_small_and_large() {
         for scale in [1e-3, 1.0, 1e6] {
             for offset in [DVec3::ZERO, DVec3::new(1e6, -2e6, 3e5)] {
-                let s = analytic::closed_box(2.0, Placement { scale, offset });
+                let s = analytic::closed_box(2.0, SceneTransform { scale, offset });
                 let o = Oracle::new(&s, s.origin());
                 let narrow = Narrow::new(&s, s.origin());
                 let mut rays = ray_sets::random_rays(&o, 20_000, 1);

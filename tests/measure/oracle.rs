@@ -4,7 +4,7 @@ use glam::{DAffine3, DQuat, DVec3};
 use skylit::measure::ray_sets;
 use skylit::oracle::{Oracle, OracleHit, OracleRay};
 use skylit::ray::Ray;
-use skylit::scene::builtin::{self, Placement, analytic};
+use skylit::scene::builtin::{self, SceneTransform, analytic};
 use skylit::scene::{Geometry, Scene};
 
 fn scene(name: &str) -> Scene {
@@ -51,7 +51,8 @@ fn bvh_equals_brute_force() {
 #[test]
 fn bvh_equals_brute_force_on_awkward_rays() {
     // along axes, in planes of faces, through vertices, and with origins on surfaces
-    for (name, at) in [("unit", Placement::default()), ("moved", Placement { scale: 1e-3, offset: DVec3::new(1e3, -1e6, 7.0) })]
+    for (name, at) in
+        [("unit", SceneTransform::default()), ("moved", SceneTransform { scale: 1e-3, offset: DVec3::new(1e3, -1e6, 7.0) })]
     {
         let s = analytic::closed_box(2.0, at);
         for origin in [DVec3::ZERO, s.origin()] {
@@ -84,7 +85,7 @@ fn bvh_equals_brute_force_on_awkward_rays() {
 fn closed_meshes_do_not_leak() {
     for scale in [1e-3, 1.0, 1e6] {
         for offset in [DVec3::ZERO, DVec3::new(1e6, 0.3, -1e6), DVec3::splat(1e5 / 3.0)] {
-            let at = Placement { scale, offset };
+            let at = SceneTransform { scale, offset };
             let mut ball = analytic::closed_box(1.0, at);
             ball.meshes[0].geometry = builtin::shapes::icosphere(1.0, 2);
             for s in [analytic::closed_box(2.0, at), ball] {
@@ -127,7 +128,7 @@ fn hits_are_where_they_should_be() {
 
 #[test]
 fn ellipsoids_by_stretched_instances() {
-    let mut s = analytic::sphere_over_plane(1.0, 0.0, 1e-3, Placement::default());
+    let mut s = analytic::sphere_over_plane(1.0, 0.0, 1e-3, SceneTransform::default());
     let turn = DQuat::from_rotation_z(0.5);
     s.instances[1].object_to_world =
         DAffine3::from_scale_rotation_translation(DVec3::new(3.0, 0.5, 1.0), turn, DVec3::new(10.0, 0.0, 0.0));
@@ -144,7 +145,7 @@ fn ellipsoids_by_stretched_instances() {
 #[test]
 fn alpha_masks_cut_holes() {
     use skylit::scene::{AlphaMode, Filter, Texture, TextureSlot, Wrap};
-    let mut s = analytic::plane(2.0, Placement::default());
+    let mut s = analytic::plane(2.0, SceneTransform::default());
     // 2 x 1 texels, transparent and opaque; coordinates follow x over [-1, 1]
     s.textures.push(Texture {
         name: String::new(),
@@ -253,7 +254,7 @@ fn baked_scenes_are_the_same_scenes() {
 
 mod ao {
     use super::*;
-    use skylit::oracle::ao::{AoSettings, accessibility, render};
+    use skylit::oracle::ao::{AoSettings, ambient_visibility, render};
     use skylit::oracle::closed_form as exact;
     use skylit::sampling::Sampler;
 
@@ -274,7 +275,7 @@ mod ao {
         assert!(hit.is_hit(), "{what}: no surface");
         let (point, normal) = (above.at(hit.t), o.facing_normal(&above, &hit));
         for seed in 0..2 {
-            let got = accessibility(&o, point, normal, &settings, SAMPLES, Sampler { seed }, [3, 4]);
+            let got = ambient_visibility(&o, point, normal, &settings, SAMPLES, Sampler { seed }, [3, 4]);
             let difference = (got.mean - want).abs();
             println!("{what}: {:.6} want {want:.6}, difference {difference:.1e}", got.mean);
             assert!(difference <= (3.0 * got.standard_error).clamp(1e-12, 5e-4), "{what}: {got:?}, want {want}");
@@ -287,7 +288,7 @@ mod ao {
     fn planes_and_boxes() {
         let places = [(1.0, DVec3::ZERO), (1e-3, DVec3::new(0.1, 0.2, 0.3)), (1e6, DVec3::ZERO), (1.0, DVec3::splat(1e6))];
         for (scale, offset) in places {
-            let at = Placement { scale, offset };
+            let at = SceneTransform { scale, offset };
             let s = analytic::plane(10.0, at);
             check("plane", &s, at.point(DVec3::new(1.0, 0.0, 2.0)), DVec3::Y, BINARY, exact::plane());
             let s = analytic::closed_box(2.0, at);
@@ -303,12 +304,12 @@ mod ao {
             // on the right wall; its normal points to the left and up
             let on_wall = |d: f64, z: f64| DVec3::new(d * sin, d * cos, z);
             let normal = DVec3::new(-cos, sin, 0.0);
-            let small = analytic::v_groove(angle, 4.0, 6.0, Placement::default());
+            let small = analytic::v_groove(angle, 4.0, 6.0, SceneTransform::default());
             for (d, z) in [(0.5, 0.0), (2.5, 1.5)] {
                 let want = exact::v_groove_finite(angle, d, z, 4.0, 6.0);
                 check(&format!("groove {degrees}, finite, at {d}"), &small, on_wall(d, z), normal, BINARY, want);
             }
-            let large = analytic::v_groove(angle, 1e5, 1e5, Placement::default());
+            let large = analytic::v_groove(angle, 1e5, 1e5, SceneTransform::default());
             check(&format!("groove {degrees}"), &large, on_wall(1.0, 0.0), normal, BINARY, exact::v_groove(angle));
             let falloff = AoSettings { falloff: 8.0, ..BINARY };
             let want = exact::v_groove_falloff(angle, 0.4, 8.0);
@@ -326,12 +327,12 @@ mod ao {
     #[test]
     fn sphere_over_plane() {
         for (height, rho) in [(1.25, 0.0), (1.25, 1.0), (3.0, 4.0), (1.0, 1.5)] {
-            let s = analytic::sphere_over_plane(1.0, height, 100.0, Placement::default());
+            let s = analytic::sphere_over_plane(1.0, height, 100.0, SceneTransform::default());
             let want = exact::sphere_over_plane(1.0, height, rho).unwrap();
             check(&format!("sphere {height} {rho}"), &s, DVec3::new(rho, 0.0, 0.0), DVec3::Y, BINARY, want);
         }
         for c in [1.0, 2.0, 8.0] {
-            let s = analytic::sphere_over_plane(1.0, 1.5, 100.0, Placement::default());
+            let s = analytic::sphere_over_plane(1.0, 1.5, 100.0, SceneTransform::default());
             let want = exact::sphere_over_plane_falloff(1.0, 1.5, c).unwrap();
             check(&format!("sphere, falloff {c}"), &s, DVec3::ZERO, DVec3::Y, AoSettings { falloff: c, ..BINARY }, want);
         }
@@ -342,7 +343,7 @@ mod ao {
 
     #[test]
     fn parallel_planes() {
-        let s = analytic::parallel_planes(8.0, 6.0, 1.5, Placement::default());
+        let s = analytic::parallel_planes(8.0, 6.0, 1.5, SceneTransform::default());
         for (x, z) in [(0.0, 0.0), (3.5, -1.0), (4.0, 3.0)] {
             let want = exact::parallel_rectangle(1.5, [-4.0 - x, 4.0 - x], [-3.0 - z, 3.0 - z]);
             check(&format!("rectangle {x} {z}"), &s, DVec3::new(x, 0.0, z), DVec3::Y, BINARY, want);
@@ -350,7 +351,7 @@ mod ao {
             let lambert = 1.0 - exact::polygon_form_factor(DVec3::new(x, 0.0, z), DVec3::Y, &corners);
             assert!((lambert - want).abs() < 1e-12, "Lambert's formula agrees");
         }
-        let s = analytic::parallel_planes(1e4, 1e4, 0.5, Placement::default());
+        let s = analytic::parallel_planes(1e4, 1e4, 0.5, SceneTransform::default());
         for (c, radius) in [(8.0, f64::INFINITY), (2.0, f64::INFINITY), (8.0, 1.0), (1.0, 0.8), (1.0, 0.4)] {
             let want = exact::parallel_disk(0.5, f64::INFINITY, c, radius);
             check(&format!("planes {c} {radius}"), &s, DVec3::ZERO, DVec3::Y, AoSettings { radius, falloff: c }, want);
@@ -366,11 +367,11 @@ mod ao {
         let s = scene("closed-box");
         let o = Oracle::new(&s, s.origin());
         let image = render(&o, &s.cameras[0], [16, 9], 4, 1, &AoSettings::default());
-        assert!(image.accessibility.iter().all(|a| *a == 0.0) && image.coverage.iter().all(|c| *c == 1.0));
+        assert!(image.ambient_visibility.iter().all(|a| *a == 0.0) && image.coverage.iter().all(|c| *c == 1.0));
         let s = scene("plane");
         let o = Oracle::new(&s, s.origin());
         let image = render(&o, &s.cameras[0], [32, 18], 4, 1, &AoSettings::default());
-        let (a, c) = (&image.accessibility, &image.coverage);
+        let (a, c) = (&image.ambient_visibility, &image.coverage);
         assert!(a.iter().zip(c).all(|(a, c)| *a == (*c > 0.0) as u8 as f32), "1 on the plane, nothing elsewhere");
         assert!(c.contains(&0.0) && c.contains(&1.0));
     }

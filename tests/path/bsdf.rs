@@ -122,9 +122,12 @@ fn cases() -> Vec<Case> {
         ior: 1.5,
         ..Material::default()
     };
+    let rough = |sigma| Material { parameters: [("sigma".to_owned(), sigma)].into(), ..matte(1.0) };
     let ior = |eta: f64, c: Case| Case { eta: Some(eta), ..c };
     vec![
         Case { conserves: Some(0.0), ..case("matte", matte(1.0)) },
+        case("Oren-Nayar 0.3", rough(0.3)),
+        case("Oren-Nayar 1", rough(1.0)),
         case("metallic-roughness 0.3", gltf(0.0, 0.3)),
         case("metallic-roughness 0.7", gltf(0.0, 0.7)),
         case("metallic-roughness 1", gltf(0.0, 1.0)),

@@ -3,7 +3,7 @@
 use super::cli::{bytes, names, render as command};
 use super::*;
 use crate::common::command::{place, refuses, run};
-use skylit::denoise::{Denoiser, Features, Mix, Shot};
+use skylit::denoise::{DenoiseInput, Denoiser, Features, PixelContent};
 use skylit::output::{self, Samples};
 use skylit::scene::builtin::{by_name, shapes};
 
@@ -17,7 +17,7 @@ fn options(spp: u32, seed: u32) -> PathOptions {
 fn filter(tracer: &Tracer, flat: &FlatScene, options: &PathOptions, film: &Film) -> (Vec<f32>, Features) {
     let aspect = f64::from(options.size[0]) / f64::from(options.size[1]);
     let record = CameraRecord::new(&flat.scene.cameras[0], flat.origin, aspect);
-    let shot = Shot { tracer, scene: flat.scene, camera: &record, options };
+    let shot = DenoiseInput { tracer, scene: flat.scene, camera: &record, options };
     let features = Features::render(&shot, &mut NoControl).unwrap();
     let denoiser = Denoiser::Filter(Default::default());
     assert_eq!(denoiser.name(), "filter");
@@ -110,14 +110,14 @@ fn gpu_constants_stay_and_nothing_crosses_an_edge() {
         assert!(image.iter().all(|v| (v / 7.3 - 1.0).abs() < 1e-5), "{kind}: a constant has changed");
 
         let near = |k: usize| features.centres[k].depth < 3.0;
-        let edge = film(&|k| match features.mix[k] {
-            Mix::One => f32::from(u8::from(!near(k))),
+        let edge = film(&|k| match features.content[k] {
+            PixelContent::OneSurface => f32::from(u8::from(!near(k))),
             _ => 0.5,
         });
         let (image, _) = filter(&tracer, &flat, &options, &edge);
         let mut mixed = 0;
         for k in 0..pixels {
-            if features.mix[k] == Mix::One {
+            if features.content[k] == PixelContent::OneSurface {
                 let expected = f32::from(u8::from(!near(k)));
                 assert!((image[3 * k] - expected).abs() < 1e-5, "{kind}: pixel {k} is {}, not {expected}", image[3 * k]);
             } else {
@@ -213,7 +213,7 @@ fn wrong_uses_of_denoisers_are_told() {
     if !cfg!(feature = "oidn") {
         with(&["--denoise", "oidn", "--integrator", "path"], 2, "build with --features oidn, or use --denoise filter");
     } else if skylit::gpu::oidn::Oidn::open().is_err() {
-        with(&["--denoise", "oidn", "--integrator", "path"], 2, "Open Image Denoise: there is no lib");
+        with(&["--denoise", "oidn", "--integrator", "path"], 2, "Open Image Denoise: libOpenImageDenoise");
     }
     assert!(names(dir.path()).is_empty());
 }

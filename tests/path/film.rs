@@ -3,9 +3,9 @@
 use super::*;
 use skylit::film::Control;
 use skylit::film::accumulate::Accumulated;
-use skylit::film::cover::Cover;
 use skylit::film::schedule::FilmOptions;
 use skylit::film::state::FilmState;
+use skylit::film::tile_mask::TileMask;
 use skylit::integrators::ao::{self, AoOptions};
 use skylit::scene::builtin::{by_name, shapes};
 
@@ -31,7 +31,7 @@ fn same(what: &str, a: &Accumulated, b: &Accumulated) {
     let bits = |values: &[f32]| values.iter().map(|v| v.to_bits()).collect::<Vec<_>>();
     assert_eq!(bits(&a.film.mean), bits(&b.film.mean), "{what}: other means");
     assert_eq!(bits(&a.film.variance), bits(&b.film.variance), "{what}: other variances");
-    assert_eq!((&a.film.samples, a.spp, a.most_spp), (&b.film.samples, b.spp, b.most_spp), "{what}: other samples");
+    assert_eq!((&a.film.samples, a.spp, a.max_spp), (&b.film.samples, b.spp, b.max_spp), "{what}: other samples");
 }
 
 /// Wherever the samples are cut, the sums are the same to the last bit.
@@ -47,7 +47,7 @@ fn gpu_a_film_goes_on_as_if_it_had_never_stopped() {
         for kind in tracers(&device).into_iter().filter(|&k| name == "cornell-box" || k == TracerKind::Compute) {
             let tracer = tracer(&device, kind, &flat);
             let whole = render(&tracer, &flat, &up_to(&options, 16, None)).image;
-            assert_eq!((whole.spp, whole.most_spp, whole.stopped_early), (16, 16, false));
+            assert_eq!((whole.spp, whole.max_spp, whole.stopped_early), (16, 16, false));
             // and on that one what is the host's alone
             let alone = kind == TracerKind::Compute;
             let cuts = if alone { &[&[3, 7, 16][..], &[15, 16], &[16, 16]][..] } else { &[&[3, 7, 16][..]] };
@@ -178,10 +178,10 @@ fn gpu_films_of_many_blocks_and_few_tiles() {
     let compute = tracer(&flat);
     let options = PathOptions { size: [80, 60], seed: 6, ..Default::default() };
     let record = CameraRecord::new(&scene.cameras[0], flat.origin, 4.0 / 3.0);
-    let cover = Cover::new(&flat, &record, options.size, 16).map(Arc::new);
-    assert!(cover.is_some(), "nothing is left out");
+    let tile_mask = TileMask::new(&flat, &record, options.size, 16).map(Arc::new);
+    assert!(tile_mask.is_some(), "nothing is left out");
     let whole = render(&compute, &flat, &up_to(&options, 16, None)).image;
-    let covered = PathOptions { cover, ..options };
+    let covered = PathOptions { tile_mask, ..options };
     let begun = render(&compute, &flat, &up_to(&covered, 5, None)).image;
     let gone_on = render(&compute, &flat, &up_to(&covered, 16, begun.state)).image;
     same("few tiles", &gone_on, &whole);
@@ -200,7 +200,7 @@ fn gpu_a_film_of_another_size_is_refused() {
         let options = up_to(&PathOptions { size: [8, 8], ..Default::default() }, 4, Some(other));
         let error = path::render(&tracer, &flat, &record, &options, &mut NoControl).unwrap_err();
         assert_eq!(error.exit_code(), 64);
-        assert!(error.to_string().contains("does not go on as one of 8x8 with 3"), "{error}");
+        assert!(error.to_string().contains("cannot be resumed as one of 8x8 with 3"), "{error}");
     }
 }
 
@@ -249,7 +249,7 @@ fn gpu_a_target_is_reached_where_it_is_dear_and_where_it_is_cheap() {
         assert!(tiles.done == tiles.all && tiles.all == 48 && !image.stopped_early, "{kind}: {tiles:?}");
         assert_eq!((least, least.is_power_of_two(), highest.is_power_of_two()), (64, true, true), "{kind}");
         assert!(highest >= 512 && mean < 0.6 * f64::from(highest), "{kind}: {mean} of {highest}");
-        assert_eq!((image.spp, image.most_spp), (least, highest), "{kind}");
+        assert_eq!((image.spp, image.max_spp), (least, highest), "{kind}");
         // tile by tile, too: those that got least, and those in the middle
         let samples = image.state.as_ref().unwrap().tile_samples().to_vec();
         println!("{kind}: {samples:?}");

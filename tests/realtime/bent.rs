@@ -6,7 +6,7 @@ use glam::DVec3;
 use skylit::Error;
 use skylit::film::camera::CameraRecord;
 use skylit::realtime::{Filter, FilterKind, Preset, Realtime, Settings, Technique};
-use skylit::scene::builtin::{Placement, analytic};
+use skylit::scene::builtin::{SceneTransform, analytic};
 use skylit::scene::{Camera, Scene};
 use skylit::tracer::Tracer;
 
@@ -53,7 +53,7 @@ fn ways() -> [(&'static str, Settings); 6] {
 #[test]
 fn gpu_bent_normals_of_a_plane() {
     let device = device();
-    let scene = analytic::plane(1e4, Placement::default());
+    let scene = analytic::plane(1e4, SceneTransform::default());
     let expected = DVec3::Y * (2.0 / 3.0);
     // the camera moves for a while: histories are reprojected
     let cameras: Vec<_> = (0..20)
@@ -81,7 +81,7 @@ fn gpu_bent_normals_of_grooves() {
     let device = device();
     for degrees in [60.0f64, 90.0, 130.0] {
         let angle = degrees.to_radians();
-        let scene = analytic::v_groove(angle, 1e4, 3e4, Placement::default());
+        let scene = analytic::v_groove(angle, 1e4, 3e4, SceneTransform::default());
         let (s, c) = (angle * 0.5).sin_cos();
         for kind in tracers(&device) {
             let tracer = tracer(&device, kind, &scene);
@@ -108,7 +108,7 @@ fn gpu_bent_normals_of_grooves() {
 #[test]
 fn gpu_bent_normals_of_a_closed_box() {
     let device = device();
-    let scene = analytic::closed_box(2.0, Placement::default());
+    let scene = analytic::closed_box(2.0, SceneTransform::default());
     for kind in tracers(&device) {
         let tracer = tracer(&device, kind, &scene);
         let realtime = settle(&tracer, &scene, &scene.cameras[..1], &settings());

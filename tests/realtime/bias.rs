@@ -5,7 +5,7 @@ use skylit::oracle::closed_form as exact;
 use skylit::realtime::{Filter, FilterKind, Preset, Resolution, Settings};
 use skylit::sampling::Sequence;
 use skylit::scene::Camera;
-use skylit::scene::builtin::{Placement, analytic};
+use skylit::scene::builtin::{SceneTransform, analytic};
 use skylit::tracer::Tracer;
 
 use crate::common::{assert_validation_clean, device, record, scene, tracer, tracers};
@@ -54,7 +54,7 @@ fn gpu_no_sequence_resolution_or_filter_is_biased_in_a_groove() {
     let (sin, cos) = (angle * 0.5).sin_cos();
     let (up, normal) = (DVec3::new(sin, cos, 0.0), DVec3::new(-cos, sin, 0.0));
     // so long that it is the same wherever on the wall
-    let scene = analytic::v_groove(angle, 1e4, 3e4, Placement::default());
+    let scene = analytic::v_groove(angle, 1e4, 3e4, SceneTransform::default());
     let camera = record(&scene, &Camera::look_at(up + normal * 0.5, up, DVec3::Z, 0.6), SIZE);
     let want = vec![exact::v_groove(angle) as f32; (SIZE[0] * SIZE[1]) as usize];
     let base = traced(Preset::Balanced);

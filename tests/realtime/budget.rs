@@ -4,7 +4,7 @@ use glam::DVec3;
 use skylit::Error;
 use skylit::realtime::{Budget, Preset, Realtime, Resolution, Settings, Technique};
 use skylit::sampling::Sequence;
-use skylit::scene::builtin::{Placement, analytic, by_name};
+use skylit::scene::builtin::{SceneTransform, analytic, by_name};
 use skylit::scene::{Camera, Orbit};
 
 use crate::common::{assert_validation_clean, device, record, tracer, tracers};
@@ -61,7 +61,7 @@ fn gpu_budgets_keep_means() {
     let device = device();
     let angle = 90f64.to_radians();
     let (s, c) = (angle * 0.5).sin_cos();
-    let scene = analytic::v_groove(angle, 1e4, 3e4, Placement::default());
+    let scene = analytic::v_groove(angle, 1e4, 3e4, SceneTransform::default());
     let point = DVec3::new(s, c, 0.5);
     let camera = record(&scene, &Camera::look_at(point + DVec3::new(-c, s, 0.0) * 0.6, point, DVec3::Z, 0.6), SIZE);
     for kind in tracers(&device) {

@@ -3,7 +3,7 @@
 use glam::DVec3;
 use skylit::realtime::{Filter, FilterKind, Preset, Settings};
 use skylit::scene::Scene;
-use skylit::scene::builtin::{Placement, analytic};
+use skylit::scene::builtin::{SceneTransform, analytic};
 use skylit::tracer::TracerKind;
 
 use crate::common::{assert_validation_clean, device, tracer, tracers};
@@ -55,7 +55,7 @@ fn check(scene: &Scene, falloff: f64, step: f64, value: f32, allowed: impl Fn(Tr
 
 #[test]
 fn gpu_a_plane_is_one_in_every_frame() {
-    let plane = analytic::plane(20.0, Placement::default());
+    let plane = analytic::plane(20.0, SceneTransform::default());
     check(&plane, 1.0, 0.05, 1.0, |_| 0);
     // nearest hits
     check(&plane, 4.0, 0.05, 1.0, |_| 0);
@@ -66,5 +66,5 @@ fn gpu_a_plane_is_one_in_every_frame() {
 #[test]
 fn gpu_a_closed_box_is_zero_in_every_frame() {
     let spare = |kind| if kind == TracerKind::Compute { 0 } else { 225 };
-    check(&analytic::closed_box(2.0, Placement::default()), 1.0, 0.01, 0.0, spare);
+    check(&analytic::closed_box(2.0, SceneTransform::default()), 1.0, 0.01, 0.0, spare);
 }

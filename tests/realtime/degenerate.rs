@@ -4,7 +4,7 @@ use glam::{DAffine3, DVec3};
 use skylit::film::camera::CameraRecord;
 use skylit::integrators::ao::Hemisphere;
 use skylit::realtime::{Preset, Settings, Technique};
-use skylit::scene::builtin::{Placement, analytic};
+use skylit::scene::builtin::{SceneTransform, analytic};
 use skylit::scene::{Camera, Geometry, Projection, Scene};
 use skylit::tracer::TracerKind;
 
@@ -88,7 +88,7 @@ fn gpu_any_scale_and_place() {
     for (scale, offset) in
         [(1e-3, DVec3::ZERO), (1e6, DVec3::ZERO), (1.0, DVec3::new(1e6, -5e5, 1.5e6)), (1e-3, DVec3::splat(1e3))]
     {
-        let place = Placement { scale, offset };
+        let place = SceneTransform { scale, offset };
         let scene = analytic::sphere_over_plane(1.0, 1.25, 60.0, place);
         let good = record(&scene, &scene.cameras[0], SMALL);
         let mut nearer = scene.cameras[0].clone();

@@ -9,7 +9,7 @@ use skylit::ray::Ray;
 use skylit::realtime::display::{Display, DisplayMode};
 use skylit::realtime::{FrameStats, Preset, Realtime, Settings};
 use skylit::scene::Camera;
-use skylit::scene::builtin::{Placement, analytic, by_name};
+use skylit::scene::builtin::{SceneTransform, analytic, by_name};
 use skylit::tracer::visits::VisitCounter;
 use skylit::tracer::{Tracer, TracerKind};
 
@@ -76,7 +76,7 @@ fn gpu_displayed_accessibility_has_the_bytes_of_a_png() {
 fn gpu_displayed_numbers() {
     let device = device();
     // a square that does not fill the image
-    let scene = analytic::plane(20.0, Placement::default());
+    let scene = analytic::plane(20.0, SceneTransform::default());
     let camera = record(&scene, &scene.cameras[0], SIZE);
     let kind = tracers(&device)[0];
     let tracer = tracer(&device, kind, &scene);
@@ -110,7 +110,7 @@ fn gpu_displayed_numbers() {
 #[test]
 fn gpu_displayed_distances() {
     let device = device();
-    let scene = analytic::plane(1e3, Placement::default());
+    let scene = analytic::plane(1e3, SceneTransform::default());
     // from above, all at one depth; a metre of the floor is as wide as the image is high
     let camera = Camera::look_at(DVec3::Y * 6.0, DVec3::ZERO, DVec3::NEG_Z, 2.0 * (0.5f64 / 6.0).atan());
     let camera = CameraRecord::new(&camera, scene.origin(), f64::from(SIZE[0]) / f64::from(SIZE[1]));

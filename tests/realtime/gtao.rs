@@ -6,7 +6,7 @@ use skylit::oracle::camera::camera_ray;
 use skylit::oracle::{Oracle, OracleRay, ao as oracle_ao, closed_form as exact};
 use skylit::realtime::{Preset, Settings, Technique};
 use skylit::sampling::Sampler;
-use skylit::scene::builtin::{Placement, analytic};
+use skylit::scene::builtin::{SceneTransform, analytic};
 use skylit::scene::{Camera, Projection, Scene};
 use skylit::tracer::Tracer;
 
@@ -44,7 +44,7 @@ fn rolled(camera: &Camera, degrees: f64) -> Camera {
 
 #[test]
 fn gpu_screen_space_a_plane_is_one() {
-    let scene = analytic::plane(20.0, Placement::default());
+    let scene = analytic::plane(20.0, SceneTransform::default());
     with_tracer(&scene, |tracer| {
         let target = DVec3::ZERO;
         for (what, eye, fov) in [
@@ -76,7 +76,7 @@ fn gpu_screen_space_a_groove_is_as_the_closed_form_says() {
     let far = Camera::look_at(DVec3::new(0.6, 9.0, 0.8), DVec3::new(0.0, 0.7, 0.0), DVec3::X, 1.1);
     let near = Camera::look_at(DVec3::new(0.05, 3.7, 0.02), DVec3::ZERO, DVec3::Z, 0.75);
     for (width, camera, turns) in [(8.0, far, &[0.0, 35.0, 90.0, 200.0][..]), (1.5, near, &[0.0, 180.0])] {
-        let scene = analytic::v_groove(angle, length, width, Placement::default());
+        let scene = analytic::v_groove(angle, length, width, SceneTransform::default());
         with_tracer(&scene, |tracer| {
             let oracle = Oracle::new(&scene, DVec3::ZERO);
             for degrees in turns {

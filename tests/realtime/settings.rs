@@ -4,7 +4,7 @@ use glam::DVec3;
 use skylit::Error;
 use skylit::realtime::{Filter, Preset, Realtime, Resolution, Settings, Technique};
 use skylit::sampling::Sequence;
-use skylit::scene::builtin::{Placement, analytic};
+use skylit::scene::builtin::{SceneTransform, analytic};
 use skylit::scene::{Camera, Projection};
 use skylit::tracer::TracerKind;
 
@@ -156,7 +156,7 @@ fn gpu_rays_of_one_frame_or_of_many_are_the_same_rays() {
 #[test]
 fn gpu_a_thousand_rays_a_pixel() {
     let device = device();
-    let scene = analytic::v_groove(1.3, 4.0, 12.0, Placement::default());
+    let scene = analytic::v_groove(1.3, 4.0, 12.0, SceneTransform::default());
     let camera = Camera::look_at(DVec3::new(0.5, 4.0, 0.3), DVec3::Y, DVec3::Z, 0.8);
     // nine launches of 2^19 rays, eight of which are one submission
     let size = [72, 64];

@@ -9,9 +9,11 @@ use skylit::measure::parity::{judge_closest, judge_pair};
 use skylit::measure::ray_sets::random_rays;
 use skylit::oracle::Oracle;
 use skylit::oracle::rounding::Rounding;
-use skylit::scene::animation::{Animation, Channel, Interpolation, Local, Node, Parts, Playback, Pose, Property, Sampler};
+use skylit::scene::animation::{
+    Animation, Channel, Interpolation, LocalTransform, Node, Playback, Pose, Property, RigParts, Sampler,
+};
 use skylit::scene::builtin::by_name;
-use skylit::scene::{Geometry, Rig, Scene};
+use skylit::scene::{AnimationRig, Geometry, Scene};
 use skylit::tracer::{Tracer, TracerKind};
 
 use crate::common::{ALL, assert_validation_clean, closest, device, tracers};
@@ -70,11 +72,11 @@ fn growing() -> Scene {
     let cube = skylit::scene::builtin::shapes::cuboid(DVec3::splat(-0.1 * size), DVec3::splat(0.1 * size));
     assert!(matches!(cube, Geometry::Triangles(_)));
     scene.meshes.push(skylit::scene::Mesh { name: "cube".into(), geometry: cube, material: 0 });
-    let mut parts = Parts { instances: vec![None; scene.instances.len()], ..Parts::default() };
+    let mut parts = RigParts { instances: vec![None; scene.instances.len()], ..RigParts::default() };
     parts.cameras = vec![None; scene.cameras.len()];
     let mut channels = Vec::new();
     for (node, ends) in [[1.0, 0.0], [0.0, 1.0]].into_iter().enumerate() {
-        let local = Local::Parts {
+        let local = LocalTransform::Trs {
             translation: DVec3::new(0.3 * size * (node as f64 - 0.5), 0.4 * size, 0.1 * size),
             rotation: DQuat::from_rotation_x(0.4),
             scale: DVec3::splat(ends[0]),
@@ -88,7 +90,7 @@ fn growing() -> Scene {
         channels.push(Channel { node, property: Property::Scale, sampler });
     }
     parts.animations = vec![Animation { name: "grow".into(), duration: 1.0, channels }];
-    Rig::attach(&mut scene, parts).unwrap();
+    AnimationRig::attach(&mut scene, parts).unwrap();
     scene
 }
 
@@ -107,15 +109,15 @@ fn gpu_what_shrinks_to_nothing_comes_back() {
 fn a_rig_must_fit_its_scene() {
     let mut scene = by_name("parade").unwrap();
     let good = scene.rig.take().unwrap().parts().clone();
-    let refused = |change: &dyn Fn(&mut Parts), says: &str| {
+    let refused = |change: &dyn Fn(&mut RigParts), says: &str| {
         let mut parts = good.clone();
         change(&mut parts);
-        let error = Rig::attach(&mut scene.clone(), parts).unwrap_err();
+        let error = AnimationRig::attach(&mut scene.clone(), parts).unwrap_err();
         let text = error.to_string();
         assert!(text.contains(says) && !text.contains('\n') && error.exit_code() == 3, "{says}: {text}");
     };
     refused(&|p| p.nodes[0].parent = Some(0), "comes before its parent");
-    refused(&|p| p.nodes[0].local = Local::Matrix(DAffine3::from_scale(DVec3::NAN)), "not finite");
+    refused(&|p| p.nodes[0].local = LocalTransform::Matrix(DAffine3::from_scale(DVec3::NAN)), "not finite");
     refused(&|p| p.instances.truncate(1), "instances are on nodes");
     refused(&|p| p.cameras[0] = Some(999), "of only");
     refused(&|p| p.skins[0].joints[1] = 999, "joint node 999 does not exist");

@@ -273,9 +273,9 @@ fn gpu_bad_changes_are_refused_and_change_nothing() {
         // each beside a good change, which must not take place either
         let moved = DAffine3::from_translation(DVec3::X) * place;
         for (instances, meshes, words) in [
-            (vec![(0, place)], vec![], "was not said to move"),
+            (vec![(0, place)], vec![], "was not declared as moving"),
             (vec![(last, moved), (last, flat)], vec![], "cannot be inverted"),
-            (vec![(last, moved)], deform(0, &good), "was not said to deform"),
+            (vec![(last, moved)], deform(0, &good), "was not declared as deforming"),
             (vec![(last, moved)], deform(mesh, &good[1..]), "vertices"),
             (vec![(last, moved)], deform(mesh, &bad), "vertex 5"),
         ] {

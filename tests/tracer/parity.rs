@@ -124,7 +124,7 @@ fn gpu_parity_brute_force() {
 /// What is too much for brute force is refused, with the number.
 #[test]
 fn gpu_brute_force_has_a_limit() {
-    let scene = scene(&format!("spheres:{}", Kernel::BRUTE_MOST + 1));
+    let scene = scene(&format!("spheres:{}", Kernel::MAX_BRUTE_TESTS + 1));
     let flat = FlatScene::new(&scene);
     let result = Tracer::with_options(&device(), TracerKind::Compute, &flat, common::ALL, Kernel::Brute);
     let Err(e) = result else { panic!("{} primitives were taken", flat.primitive_count()) };

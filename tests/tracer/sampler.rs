@@ -4,7 +4,7 @@ use skylit::gpu::{Buffer, Commands, Memory};
 use skylit::interface::records::ray_set::Probe;
 use skylit::sampling::sobol::hash_combine;
 use skylit::sampling::{Sampler, to_unit, warp};
-use skylit::scene::builtin::{Placement, analytic};
+use skylit::scene::builtin::{SceneTransform, analytic};
 use skylit::shaders;
 use skylit::tracer::Push;
 
@@ -33,7 +33,7 @@ fn gpu_sampler_gives_the_hosts_bits() {
             [random(i, 0), random(i, 1) >> 18, random(i, 2) >> 18, sample, random(i, 4) & 15, nx, ny, nz]
         })
         .collect();
-    let scene = analytic::plane(1.0, Placement::default());
+    let scene = analytic::plane(1.0, SceneTransform::default());
     for kind in tracers(&device) {
         let tracer = tracer(&device, kind, &scene);
         let stream = tracer.stream(&shaders::probes::SAMPLER_PROBE_ANY).unwrap();

@@ -1,4 +1,4 @@
-//! What `skylit bench ao` takes.
+//! Command-line arguments of `skylit bench ao`.
 
 use clap::{Args, ValueEnum};
 
@@ -9,79 +9,79 @@ use crate::output::parse_size;
 use crate::tracer::BuildOptions;
 use crate::tracer::settings::{BuildChoice, TracerChoice};
 
-/// Pixels, unless said otherwise.
+/// Default image size, pixels.
 const DEFAULT_SIZE: [u32; 2] = [640, 360];
-/// The same with `--quick`.
+/// The default with `--quick`.
 const QUICK_SIZE: [u32; 2] = [160, 90];
-/// Frames of a run, unless said otherwise.
+/// Default frames of a run.
 const DEFAULT_FRAMES: u32 = 64;
-/// The same with `--quick`.
+/// The default with `--quick`.
 const QUICK_FRAMES: u32 = 16;
-/// Rays a pixel of a reference, unless said otherwise.
+/// Default rays per pixel of a reference.
 const DEFAULT_REFERENCE_RAYS: u32 = 512;
-/// The same with `--quick`.
+/// The default with `--quick`.
 const QUICK_REFERENCE_RAYS: u32 = 64;
-/// Timed updates of each structure, unless said otherwise.
+/// Default timed updates of each acceleration structure.
 const DEFAULT_REPEATS: u32 = 9;
-/// The same with `--quick`.
+/// The default with `--quick`.
 const QUICK_REPEATS: u32 = 3;
-/// Presets that are not measured unless they are named: they are references themselves.
+/// Preset that is measured only if named, because it is the reference itself.
 const LEFT_OUT: &str = "reference";
 
-/// How occlusion fades with distance.
+/// Falloff of occlusion with distance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum FalloffChoice {
-    /// A hit at the scene's reach counts 1/255 of one that is near
+    /// Exponential: a hit at the scene's occlusion radius counts 1/255 of a near one
     Exponential,
-    /// Hits count alike up to the scene's reach, and not at all beyond
+    /// Binary: hits count fully up to the scene's occlusion radius, and not at all beyond
     Binary,
 }
 
 /// A part of the benchmark.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Part {
-    /// A camera that stands still: time, and error after 1, 2, 4, ... frames
+    /// Static camera: time, and error after 1, 2, 4, ... frames
     Still,
-    /// The same, with what is known already left out
+    /// Static camera, with sampling stopped once histories are full
     Rest,
-    /// A camera that goes round
+    /// Orbiting camera
     Moving,
-    /// `balanced` with as many rays as take the time of `larsen`
+    /// Equal-time comparison: `balanced` with as many rays as fit the time of `larsen`
     EqualTime,
-    /// A scene of our own that changes: lag, ghosts, recovery
+    /// Changing scenes: lag, ghosting, recovery
     Changes,
-    /// Keeping acceleration structures up to date
+    /// Updates of acceleration structures
     Structures,
 }
 
-/// A number that is varied.
+/// A parameter sweep.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Series {
-    /// The same landscape of 10^4 to 10^7 triangles, and 2.5*10^7 by instancing
+    /// One terrain of 10^4 to 10^7 triangles, and 2.5*10^7 by instancing
     Triangles,
-    /// 1 to 64 rays a pixel
+    /// 1 to 64 rays per pixel
     Rays,
     /// 320x180 to 1920x1080
     Resolution,
-    /// Every sequence of samples
+    /// Every sample sequence
     Sampling,
 }
 
 /// `skylit bench ao`.
 #[derive(Clone, Debug, Args)]
 pub struct BenchAoArgs {
-    /// Scenes, as `render` takes them [default: the well-known ones that are there, and two large built-in ones]
+    /// Scenes, as `render` takes them [default: the well-known scenes that are available, and two large built-in ones]
     pub scenes: Vec<String>,
-    /// Presets, separated by commas; gtao is balanced from the depth image [default: all but reference]
+    /// Presets, separated by commas; gtao is balanced with GTAO (screen space) instead of rays [default: all but reference]
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = preset_names())]
     pub presets: Vec<String>,
-    /// Parts, separated by commas [default: all; of scenes that are named, those about a view]
+    /// Parts, separated by commas [default: all; for named scenes, those that render a view]
     #[arg(long, value_enum, value_name = "LIST", value_delimiter = ',')]
     pub parts: Vec<Part>,
-    /// Vary one number instead, the others as they are; several separated by commas
+    /// Sweep one parameter instead, the others fixed; several separated by commas
     #[arg(long, value_enum, value_name = "LIST", value_delimiter = ',', conflicts_with_all = ["parts", "structures"])]
     pub series: Vec<Series>,
-    /// Also measure how long structures take to update, where scenes are named
+    /// Also measure updates of acceleration structures if scenes are named
     #[arg(long)]
     pub structures: bool,
     /// Image size in pixels [default: 640x360; 160x90 with --quick]
@@ -90,22 +90,22 @@ pub struct BenchAoArgs {
     /// Frames of a run [default: 64; 16 with --quick]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(4..=10_000))]
     pub frames: Option<u32>,
-    /// Rays a pixel of each reference [default: 512; 64 with --quick]
+    /// Rays per pixel of each reference image [default: 512; 64 with --quick]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=1 << 20))]
     pub reference_rays: Option<u32>,
-    /// Timed updates of each structure [default: 9; 3 with --quick]
+    /// Timed updates of each acceleration structure [default: 9; 3 with --quick]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
     pub repeats: Option<u32>,
-    /// How occlusion fades with distance
+    /// Falloff of occlusion with distance
     #[arg(long, value_enum, default_value = "exponential")]
     pub ao_falloff: FalloffChoice,
-    /// How rays are traced
+    /// Tracer
     #[arg(long, value_enum, default_value = "auto")]
     pub tracer: TracerChoice,
-    /// Time that the compute tracer spends on its hierarchy
+    /// Build quality of the compute tracer's hierarchy
     #[arg(long, value_enum, default_value = "default")]
     pub build: BuildChoice,
-    /// What every benchmark takes
+    /// Options of every benchmark
     #[command(flatten)]
     pub common: CommonArgs,
 }
@@ -115,7 +115,7 @@ fn preset_names() -> clap::builder::PossibleValuesParser {
 }
 
 impl BenchAoArgs {
-    /// Is a part asked for?
+    /// Is a part requested?
     pub fn wants(&self, part: Part) -> bool {
         if !self.series.is_empty() {
             return false;
@@ -123,18 +123,18 @@ impl BenchAoArgs {
         match part {
             Part::Structures if self.structures => true,
             _ if !self.parts.is_empty() => self.parts.contains(&part),
-            // about no scene that is named
+            // these use built-in scenes of their own
             Part::Changes | Part::Structures => self.scenes.is_empty(),
             Part::Still | Part::Rest | Part::Moving | Part::EqualTime => true,
         }
     }
 
-    /// Is anything asked for that is about views of scenes?
+    /// Is any part requested that renders views of scenes?
     pub fn wants_views(&self) -> bool {
         [Part::Still, Part::Rest, Part::Moving, Part::EqualTime].into_iter().any(|p| self.wants(p))
     }
 
-    /// What is compared, in the order in which presets are listed.
+    /// The presets to compare, in the order of [`CANDIDATES`].
     pub fn candidates(&self) -> Vec<&'static Candidate> {
         let wanted = |c: &&Candidate| match self.presets.as_slice() {
             [] => c.name != LEFT_OUT,
@@ -143,7 +143,7 @@ impl BenchAoArgs {
         CANDIDATES.iter().filter(wanted).collect()
     }
 
-    /// How occlusion fades in a scene of such a reach.
+    /// The occlusion settings of a scene with occlusion radius `reach`, scene units.
     ///
     /// # Errors
     /// Those of [`Occlusion::new`].
@@ -151,7 +151,7 @@ impl BenchAoArgs {
         Occlusion::new(reach, self.ao_falloff == FalloffChoice::Binary)
     }
 
-    /// Pixels.
+    /// Image size, pixels.
     pub fn size(&self) -> [u32; 2] {
         self.common.setting(self.size, DEFAULT_SIZE, QUICK_SIZE)
     }
@@ -161,12 +161,12 @@ impl BenchAoArgs {
         self.common.setting(self.frames, DEFAULT_FRAMES, QUICK_FRAMES)
     }
 
-    /// Rays a pixel of a reference.
+    /// Rays per pixel of a reference.
     pub fn reference_rays(&self) -> u32 {
         self.common.setting(self.reference_rays, DEFAULT_REFERENCE_RAYS, QUICK_REFERENCE_RAYS)
     }
 
-    /// Timed updates.
+    /// Timed updates of each acceleration structure.
     pub fn repeats(&self) -> u32 {
         self.common.setting(self.repeats, DEFAULT_REPEATS, QUICK_REPEATS)
     }

@@ -1,23 +1,23 @@
-//! What is compared: presets, all with one and the same occlusion.
+//! The presets that are compared, all with the same occlusion settings.
 
 use crate::error::{Error, Result};
 use crate::raster::Primary;
 use crate::realtime::{Preset, Settings, Technique};
 
-/// Share that a hit at the reach still counts, exponentially: what an 8-bit image just shows.
-const LEAST: f64 = 1.0 / 255.0;
-/// c of the reference work, in units of its own.
+/// Weight of a hit at the occlusion radius with exponential falloff: one step of an 8-bit image.
+const MIN_WEIGHT: f64 = 1.0 / 255.0;
+/// Falloff base c of Larsen (2019), in the units of that paper.
 const THEIR_FALLOFF: f64 = 8.0;
-/// How far its rays go, in the same units.
+/// Ray length of that paper, in the same units.
 const THEIR_REACH: f64 = 100.0;
 
-/// A preset, under the name that it has here.
+/// A preset that is compared.
 #[derive(Debug)]
 pub struct Candidate {
-    /// On the command line and in tables.
+    /// Name on the command line and in tables.
     pub name: &'static str,
     preset: Preset,
-    /// Instead of the preset's own.
+    /// Overrides the preset's technique.
     technique: Option<Technique>,
 }
 
@@ -25,7 +25,7 @@ const fn preset(name: &'static str, preset: Preset) -> Candidate {
     Candidate { name, preset, technique: None }
 }
 
-/// All of them, in the order in which they are shown.
+/// All candidates, in the order of the tables.
 pub const CANDIDATES: [Candidate; 7] = [
     preset("larsen", Preset::Larsen),
     preset("larsen-fixed", Preset::LarsenFixed),
@@ -37,45 +37,45 @@ pub const CANDIDATES: [Candidate; 7] = [
 ];
 
 impl Candidate {
-    /// How its frames are made, with a scene's occlusion.
+    /// Its render settings with a scene's occlusion.
     pub fn settings(&self, occlusion: &Occlusion) -> Settings {
         let settings = self.preset.settings();
         let technique = self.technique.unwrap_or(settings.technique);
-        // the reference work traces its camera rays
+        // the pipeline of Larsen (2019) traces its camera rays
         let primary = if technique == Technique::Larsen { Some(Primary::Traced) } else { settings.primary };
         occlusion.of(Settings { technique, primary, ..settings })
     }
 }
 
-/// How occlusion fades with distance in a scene.
+/// Occlusion settings of a scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Occlusion {
-    /// How far occlusion reaches, scene units.
+    /// Occlusion radius, scene units.
     pub reach: f64,
     falloff: f64,
     binary: bool,
 }
 
 impl Occlusion {
-    /// Up to `reach` scene units, all alike (`binary`) or fading to [`LEAST`] there.
+    /// Up to `reach` scene units, all alike (`binary`) or fading to [`MIN_WEIGHT`] there.
     ///
     /// # Errors
     /// [`Error::Scene`] for a scene so small that the falloff per scene unit is not finite.
     pub fn new(reach: f64, binary: bool) -> Result<Self> {
-        let falloff = if binary { 1.0 } else { LEAST.powf(-1.0 / reach) };
+        let falloff = if binary { 1.0 } else { MIN_WEIGHT.powf(-1.0 / reach) };
         if falloff.is_finite() && reach > 0.0 {
             return Ok(Self { reach, falloff, binary });
         }
         Err(Error::Scene(format!(
-            "occlusion that fades over {reach} scene units is too steep to compute: scale the scene up, or say --ao-falloff binary"
+            "occlusion that fades over {reach} scene units is too steep to compute: scale the scene up, or use --ao-falloff binary"
         )))
     }
 
-    /// Settings with this occlusion. The units of the reference work's pipeline are such that its c, or its reach, means the same.
+    /// Settings with this occlusion. The length unit of the `larsen` pipeline is chosen so that its falloff, or its ray length, matches.
     pub fn of(&self, settings: Settings) -> Settings {
         let (radius, unit) = match self.binary {
             true => (self.reach, self.reach / THEIR_REACH),
-            false => (f64::INFINITY, self.reach * THEIR_FALLOFF.ln() / -LEAST.ln()),
+            false => (f64::INFINITY, self.reach * THEIR_FALLOFF.ln() / -MIN_WEIGHT.ln()),
         };
         Settings { radius, falloff: self.falloff, unit, ..settings }
     }
@@ -89,9 +89,9 @@ mod tests {
     fn both_pipelines_fade_alike() {
         let occlusion = Occlusion::new(60.0, false).unwrap();
         let s = CANDIDATES[0].settings(&occlusion);
-        assert!((s.falloff.powf(-60.0) - LEAST).abs() < 1e-12);
+        assert!((s.falloff.powf(-60.0) - MIN_WEIGHT).abs() < 1e-12);
         // theirs: 8 to the distance in units of its own
-        assert!((THEIR_FALLOFF.powf(-60.0 / s.unit) - LEAST).abs() < 1e-12);
+        assert!((THEIR_FALLOFF.powf(-60.0 / s.unit) - MIN_WEIGHT).abs() < 1e-12);
         assert!(s.technique == Technique::Larsen && (s.unit * 2.66 / 60.0 - 1.0).abs() < 0.01);
         let binary = CANDIDATES[3].settings(&Occlusion::new(2.0, true).unwrap());
         assert_eq!((binary.radius, binary.falloff, binary.unit), (2.0, 1.0, 0.02));

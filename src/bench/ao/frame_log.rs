@@ -5,10 +5,10 @@ use std::time::Instant;
 use crate::bench::record::ao::{FrameCost, PassTime};
 use crate::error::Result;
 use crate::film::camera::CameraRecord;
-use crate::measure::stats::Spread;
+use crate::measure::stats::MedianP95;
 use crate::realtime::{FrameStats, Realtime, Technique};
 use crate::terminal::interrupt;
-use crate::tracer::{Moved, Tracer};
+use crate::tracer::{MovedBounds, Tracer};
 
 /// Frames that were made.
 #[derive(Default)]
@@ -28,7 +28,7 @@ impl FrameLog {
         realtime: &mut Realtime,
         tracer: &Tracer,
         camera: &CameraRecord,
-        moved: &[Moved],
+        moved: &[MovedBounds],
     ) -> Result<&FrameStats> {
         interrupt::check()?;
         let start = Instant::now();
@@ -69,7 +69,7 @@ impl FrameLog {
     pub fn cost(&self, first: usize) -> FrameCost {
         let frames = &self.frames[first.min(self.frames.len())..];
         let ms = |values: &mut dyn Iterator<Item = f64>| {
-            Spread::of(&values.map(|s| s * 1e3).collect::<Vec<_>>()).unwrap_or_default()
+            MedianP95::of(&values.map(|s| s * 1e3).collect::<Vec<_>>()).unwrap_or_default()
         };
         let mean =
             |of: fn(&FrameStats) -> u64| frames.iter().map(|l| of(&l.stats)).sum::<u64>() as f64 / frames.len().max(1) as f64;

@@ -4,7 +4,7 @@ use crate::bench::record::ao::{
     ChangeRecord, ChangeResult, FrameCost, ImageErrors, SeriesRecord, StructureRecord, TechniqueRecord, Verdict, ViewRecord,
 };
 use crate::bench::table::{header, indented, number, optional, thousands};
-use crate::measure::stats::Spread;
+use crate::measure::stats::MedianP95;
 
 /// Top levels of the reference work, by million triangles and meshes: milliseconds on a GPU that it does not name.
 const THEIR_TOPS: &str = "4.9 M in 4 meshes 0.157, 6.7 M in 5 0.160, 8.6 M in 6 0.160, 25.2 M in 15 0.180";
@@ -19,7 +19,7 @@ fn ratio(x: f64) -> String {
     if x.is_infinite() { "inf".to_owned() } else { format!("{x:.3}") }
 }
 
-fn ms(s: Spread) -> String {
+fn ms(s: MedianP95) -> String {
     format!("{}..{}", number(s.median), number(s.p95))
 }
 

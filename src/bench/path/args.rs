@@ -1,4 +1,4 @@
-//! What `skylit bench path` takes.
+//! Command-line arguments of `skylit bench path`.
 
 use std::path::PathBuf;
 use std::time::Duration;
@@ -11,61 +11,61 @@ use crate::output::parse_size;
 use crate::settings::parse::parse_seconds;
 use crate::tracer::settings::{BuildChoice, TracerChoice};
 
-/// Pixels, unless said otherwise.
+/// Default image size, pixels.
 const DEFAULT_SIZE: [u32; 2] = [256, 256];
-/// The same with `--quick`.
+/// The default with `--quick`.
 const QUICK_SIZE: [u32; 2] = [64, 64];
-/// Timed images of each kind, unless said otherwise.
+/// Default timed images of each sample count.
 const DEFAULT_REPEATS: u32 = 5;
-/// The same with `--quick`.
+/// The default with `--quick`.
 const QUICK_REPEATS: u32 = 2;
-/// Seconds that one image may take, unless said otherwise.
+/// Default target seconds of the longest image.
 const DEFAULT_SECONDS: f64 = 4.0;
-/// The same with `--quick`.
+/// The default with `--quick`.
 const QUICK_SECONDS: f64 = 0.3;
-/// References get so many times the longest image.
+/// Time of a reference relative to the longest image.
 const REFERENCE_SHARE: f64 = 15.0;
 
 /// `skylit bench path`.
 #[derive(Clone, Debug, Args)]
 pub struct BenchPathArgs {
-    /// Scenes: as `render` takes them, or cornell (the box, its walls Lambert's), sphere-diffuse, sphere-metal, sphere-mirror, sphere-glass
-    /// [default: cornell, those of FlightHelmet and Sponza that are there, and the first three spheres]
+    /// Scenes: as `render` takes them, or cornell (the box with Lambertian walls), sphere-diffuse, sphere-metal, sphere-mirror, sphere-glass
+    /// [default: cornell, FlightHelmet and Sponza if available, and the first three spheres]
     pub scenes: Vec<String>,
-    /// Sampling strategies of our own, separated by commas [default: all]
+    /// Sampling strategies of skylit, separated by commas [default: all]
     #[arg(long, value_enum, value_name = "LIST", value_delimiter = ',')]
     pub strategies: Vec<Strategy>,
     /// Image size in pixels [default: 256x256; 64x64 with --quick]
     #[arg(long, value_name = "WxH", value_parser = parse_size)]
     pub size: Option<[u32; 2]>,
-    /// Timed images of each sample count, in turn, after one that warms up [default: 5; 2 with --quick]
+    /// Timed images of each sample count, interleaved, after one warm-up [default: 5; 2 with --quick]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
     pub repeats: Option<u32>,
-    /// Sample counts go up by fours until an image takes about so long [default: 4; 0.3 with --quick]
+    /// Multiply the sample count by four until an image takes about this long [default: 4; 0.3 with --quick]
     #[arg(long, value_name = "SECONDS", value_parser = parse_seconds, allow_hyphen_values = true)]
     pub seconds: Option<Duration>,
-    /// Spend so long on the reference of each engine and scene [default: 15 times --seconds]
+    /// Time spent on the reference image of each engine and scene [default: 15 times --seconds]
     #[arg(long, value_name = "SECONDS", value_parser = parse_seconds, allow_hyphen_values = true)]
     pub reference_seconds: Option<Duration>,
-    /// What surrounds scenes that have no light: an equirectangular .hdr or .exr [default: the shared sun map, or one of our own]
+    /// Environment map for scenes without lights, an equirectangular .hdr or .exr [default: the shared sun map if available, or a built-in one]
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub environment: Option<PathBuf>,
-    /// How rays are traced
+    /// Tracer
     #[arg(long, value_enum, default_value = "auto")]
     pub tracer: TracerChoice,
-    /// Time that the compute tracer spends on its hierarchy
+    /// Build quality of the compute tracer's hierarchy
     #[arg(long, value_enum, default_value = "default")]
     pub build: BuildChoice,
-    /// Peers to run beside: a file like benches/peers.toml, or `none` [default: benches/peers.toml, where it is there]
+    /// Peers to compare with: a file like benches/peers.toml, or `none` [default: benches/peers.toml if it exists]
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub peers: Option<String>,
-    /// What every benchmark takes
+    /// Options of every benchmark
     #[command(flatten)]
     pub common: CommonArgs,
 }
 
 impl BenchPathArgs {
-    /// Pixels.
+    /// Image size, pixels.
     pub fn size(&self) -> [u32; 2] {
         self.common.setting(self.size, DEFAULT_SIZE, QUICK_SIZE)
     }
@@ -75,7 +75,7 @@ impl BenchPathArgs {
         self.common.setting(self.repeats, DEFAULT_REPEATS, QUICK_REPEATS)
     }
 
-    /// Seconds that one image may take.
+    /// Target seconds of the longest image.
     pub fn seconds(&self) -> f64 {
         self.common.setting(self.seconds.map(|d| d.as_secs_f64()), DEFAULT_SECONDS, QUICK_SECONDS)
     }
@@ -85,7 +85,7 @@ impl BenchPathArgs {
         self.reference_seconds.map_or(REFERENCE_SHARE * self.seconds(), |d| d.as_secs_f64())
     }
 
-    /// Strategies of our own, in the order in which they are listed.
+    /// Sampling strategies to measure, in the order of the tables.
     pub fn strategies(&self) -> Vec<Strategy> {
         let all = [Strategy::Mis, Strategy::Light, Strategy::Bsdf, Strategy::Cosine, Strategy::Uniform];
         all.into_iter().filter(|s| self.strategies.is_empty() || self.strategies.contains(s)).collect()

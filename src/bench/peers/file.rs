@@ -1,4 +1,4 @@
-//! The file that describes other tracers, and building them. docs/benchmarks.md describes both.
+//! The peers file, which describes other tracers and renderers, and building them. docs/benchmarks.md describes both.
 
 use std::collections::hash_map::DefaultHasher;
 use std::hash::{Hash, Hasher};
@@ -9,7 +9,7 @@ use serde::Deserialize;
 
 use crate::error::{Error, Result};
 
-/// Where peers are described, unless said otherwise.
+/// Default peers file.
 pub const DEFAULT: &str = "benches/peers.toml";
 
 #[derive(Debug, Deserialize)]
@@ -30,16 +30,16 @@ pub enum Measures {
     Paths,
 }
 
-/// One tracer of others.
+/// A peer: a tracer or renderer of another project.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PeerSpec {
     /// In tables.
     pub name: String,
-    /// What it takes part in.
+    /// Benchmark it takes part in.
     #[serde(default)]
     measures: Measures,
-    /// What has to be installed, said where it does not build or start.
+    /// Requirements to install, reported if it does not build or start.
     #[serde(default)]
     needs: String,
     /// Files below the folder of the peers file whose change means building again.
@@ -50,9 +50,9 @@ pub struct PeerSpec {
     build: Vec<String>,
     /// Command that runs it.
     pub run: Vec<String>,
-    /// What it is asked to trace with.
+    /// Kernels to measure.
     pub kernels: Vec<String>,
-    /// Kernels that ratios are given to.
+    /// Kernels that ratios are relative to.
     #[serde(default)]
     pub baselines: Vec<String>,
     /// Kernels whose answers have to agree with ours under `--check`.
@@ -63,15 +63,15 @@ pub struct PeerSpec {
     folder: PathBuf,
 }
 
-/// The peers of a benchmark: of the file that was asked for (`none`: nobody), or of [`DEFAULT`]; or why there are none.
+/// The peers of a benchmark, from the requested file (`none`: no peers) or from [`DEFAULT`]; or the reason why there are none.
 ///
 /// # Errors
 /// Those of [`read`].
-pub fn choose(asked: Option<&str>, measures: Measures) -> Result<Result<Vec<PeerSpec>, String>> {
-    let file = match asked {
+pub fn choose(requested: Option<&str>, measures: Measures) -> Result<Result<Vec<PeerSpec>, String>> {
+    let file = match requested {
         Some("none") => return Ok(Ok(Vec::new())),
         None if !Path::new(DEFAULT).is_file() => {
-            return Ok(Err(format!("no peers: {DEFAULT} is not here (--peers FILE names another)")));
+            return Ok(Err(format!("no peers: {DEFAULT} does not exist (use --peers FILE)")));
         }
         file => file.unwrap_or(DEFAULT),
     };
@@ -121,7 +121,7 @@ impl PeerSpec {
         format!("{} {kernel}", self.name)
     }
 
-    /// What it lacks, as the end of a sentence.
+    /// Message that the peer is unavailable, and what it needs.
     pub fn missing(&self, why: &str) -> String {
         let needs = if self.needs.is_empty() { String::new() } else { format!("; it needs {}", self.needs) };
         format!("peer '{}' is missing: {why}{needs}", self.name)
@@ -163,7 +163,7 @@ impl PeerSpec {
         word.replace("{dir}", &self.folder.display().to_string()).replace("{out}", &out.display().to_string())
     }
 
-    /// Beside and renamed, so that a broken-off build leaves no half program.
+    /// Builds to a temporary file and renames it, so that an interrupted build leaves no incomplete program.
     fn build_to(&self, out: &Path) -> Result<(), String> {
         let folder = out.parent().unwrap_or(Path::new("."));
         let cannot = |e: std::io::Error| format!("{}: {e}", folder.display());

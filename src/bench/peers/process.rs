@@ -14,16 +14,16 @@ use crate::terminal::interrupt;
 
 /// The protocol that we speak.
 const PROTOCOL: u64 = 1;
-/// A peer that says nothing for so long is given up. Building over 10^7 triangles takes seconds.
+/// Timeout of an answer. Building over 10^7 triangles takes seconds.
 const PATIENCE: Duration = Duration::from_secs(600);
-/// To say hello.
+/// Timeout of the greeting.
 const START_PATIENCE: Duration = Duration::from_secs(60);
 
-/// Why a peer did not do what it was asked to.
+/// Failure of a request to a peer.
 pub enum PeerError {
-    /// It failed; a sentence that says how.
+    /// The peer failed, for this reason.
     Failed(String),
-    /// Something of ours failed, or the user pressed Ctrl-C.
+    /// skylit failed, or the user pressed Ctrl-C.
     Ours(Error),
 }
 
@@ -109,15 +109,15 @@ impl Peer {
                 Err(RecvTimeoutError::Timeout) => {
                     interrupt::check()?;
                     if start.elapsed() > patience {
-                        return Err(PeerError::Failed(format!("it said nothing for {} seconds", patience.as_secs())));
+                        return Err(PeerError::Failed(format!("it did not answer for {} seconds", patience.as_secs())));
                     }
                 }
             }
         };
         let value: Value =
-            serde_json::from_str(&line).map_err(|_| PeerError::Failed(format!("it said what is no JSON: {line:.80}")))?;
+            serde_json::from_str(&line).map_err(|_| PeerError::Failed(format!("its answer is not JSON: {line:.80}")))?;
         match value["error"].as_str() {
-            Some(e) => Err(PeerError::Failed(format!("it says: {e}"))),
+            Some(e) => Err(PeerError::Failed(format!("it reports: {e}"))),
             None => Ok(value),
         }
     }

@@ -1,4 +1,4 @@
-//! What `skylit bench rays` takes.
+//! Command-line arguments of `skylit bench rays`.
 
 use clap::{Args, ValueHint};
 
@@ -9,48 +9,48 @@ use crate::settings::parse::parse_radius;
 use crate::tracer::BuildOptions;
 use crate::tracer::settings::BuildChoice;
 
-/// Rays of a set, unless said otherwise: an image of 1280x720.
+/// Default rays of a set: an image of 1280x720.
 const DEFAULT_RAYS: u32 = 1280 * 720;
-/// The same with `--quick`: 320x180.
+/// The default with `--quick`: 320x180.
 const QUICK_RAYS: u32 = 320 * 180;
-/// Timed repeats, unless said otherwise.
+/// Default timed repeats.
 const DEFAULT_REPEATS: u32 = 7;
 const QUICK_REPEATS: u32 = 3;
 
 /// `skylit bench rays`.
 #[derive(Clone, Debug, Args)]
 pub struct BenchRaysArgs {
-    /// Scenes, as `render` takes them [default: the well-known ones that are there, and built-in ones of 10^4 to 2.5*10^7
+    /// Scenes, as `render` takes them [default: the well-known scenes that are available, and built-in ones of 10^4 to 2.5*10^7
     /// triangles]
     pub scenes: Vec<String>,
-    /// Kernels of our own, separated by commas [default: all that the device runs; slow ones on small scenes only]
+    /// Kernels of skylit, separated by commas [default: all that the device supports; slow ones on small scenes only]
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = kernel_names())]
     pub kernels: Vec<String>,
-    /// Streams of rays, separated by commas [default: all]
+    /// Ray streams, separated by commas [default: all]
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = stream_names())]
     pub streams: Vec<String>,
-    /// Timed repeats of each, in turn, after one that warms up [default: 7; 3 with --quick]
+    /// Timed repeats of each contestant, interleaved, after one warm-up [default: 7; 3 with --quick]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
     pub repeats: Option<u32>,
-    /// About this many rays a set: those of an image of 16:9 [default: 921600; 57600 with --quick]
+    /// Approximate number of rays per set, one per pixel of a 16:9 image [default: 921600; 57600 with --quick]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(64..=1 << 26))]
     pub rays: Option<u32>,
-    /// Time that the compute tracer's kernels spend on their hierarchies
+    /// Build quality of the compute tracer's hierarchies
     #[arg(long, value_enum, default_value = "default")]
     pub build: BuildChoice,
-    /// Length of ambient occlusion rays, in scene units [default: what suits the well-known scenes, else no limit]
+    /// Length of ambient occlusion rays, in scene units [default: a suitable length for well-known scenes, else unlimited]
     #[arg(long, value_name = "R", value_parser = parse_radius, allow_hyphen_values = true)]
     pub ao_radius: Option<f64>,
-    /// Also compare all answers with those of the first kernel; one that rounding does not explain fails the run
+    /// Also compare all hits with those of the first kernel; fail on any difference beyond rounding
     #[arg(long)]
     pub check: bool,
-    /// Keep alpha masks; otherwise they count as opaque, for peers do not know them
+    /// Keep alpha masks; otherwise they are treated as opaque, because peers do not support them
     #[arg(long)]
     pub alpha: bool,
-    /// Peers to run beside: a file like benches/peers.toml, or `none` [default: benches/peers.toml, where it is there]
+    /// Peers to compare with: a file like benches/peers.toml, or `none` [default: benches/peers.toml if it exists]
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub peers: Option<String>,
-    /// What every benchmark takes
+    /// Options of every benchmark
     #[command(flatten)]
     pub common: CommonArgs,
 }
@@ -64,7 +64,7 @@ fn stream_names() -> clap::builder::PossibleValuesParser {
 }
 
 impl BenchRaysArgs {
-    /// How our own hierarchies are built.
+    /// Build options of skylit's hierarchies.
     pub fn build_options(&self) -> BuildOptions {
         let [width, height] = self.size();
         // a set of rays is traced once more to warm up
@@ -82,7 +82,7 @@ impl BenchRaysArgs {
         let rays = f64::from(self.common.setting(self.rays, DEFAULT_RAYS, QUICK_RAYS));
         let side = |x: f64| ((x / 8.0).round() as u32).max(1) * 8;
         let width = side((rays * 16.0 / 9.0).sqrt());
-        // exactly as many as asked for where 8 divides them so
+        // exactly the requested number where the factors allow it
         let height = (rays / f64::from(width)).round() as u32;
         [width, height.max(1)]
     }

@@ -20,10 +20,10 @@ pub struct OwnKernel {
     pub tracer: TracerKind,
     /// Which kernel of the compute tracer.
     pub kernel: Kernel,
-    /// On a CPU device: it gets one in so many rays.
+    /// On a CPU device, it traces one in this many rays.
     pub divisor: usize,
-    /// On a CPU device: it is left out of scenes with more stored primitives, unless asked for by name. Without a tree: with more
-    /// to test for each ray.
+    /// On a CPU device, it is skipped on scenes with more stored primitives, unless requested by name. For the kernel without a
+    /// hierarchy: with more primitives to test per ray.
     pub max_primitives: usize,
 }
 
@@ -31,7 +31,7 @@ const fn compute(kernel: Kernel, name: &'static str, divisor: usize, max_primiti
     OwnKernel { name, tracer: TracerKind::Compute, kernel, divisor, max_primitives }
 }
 
-/// All of them; the first that runs makes the rays, and others are checked against it.
+/// All kernels. The first supported one generates the rays, and the others are checked against it.
 pub const KERNELS: [OwnKernel; 7] = [
     compute(Kernel::Wide, "wide", 1, usize::MAX),
     compute(Kernel::Packet, "packet", 1, usize::MAX),
@@ -46,7 +46,7 @@ impl OwnKernel {
     /// Does it take part on this device and scene? `named`: the user asked for it.
     pub fn takes_part(&self, info: &DeviceInfo, flat: &FlatScene, named: bool) -> Result<(), String> {
         if !self.tracer.is_supported_by(info) {
-            return Err("the device does not have what it needs (`skylit doctor`)".into());
+            return Err("the device does not support it; see `skylit doctor`".into());
         }
         if self.kernel == Kernel::Packet && !info.packets() {
             // it would be `wide` under another name
@@ -56,7 +56,7 @@ impl OwnKernel {
         let brute = self.kernel == Kernel::Brute;
         let work = if brute { Kernel::brute_tests(flat) } else { flat.primitive_count() };
         if (brute || info.is_cpu()) && !named && work > self.max_primitives {
-            return Err(format!("slow on so many primitives; --kernels {} asks for it", self.name));
+            return Err(format!("slow on this many primitives; use --kernels {} to measure it anyway", self.name));
         }
         Ok(())
     }
@@ -161,7 +161,7 @@ impl<'a> Contestant<'a> {
         }
     }
 
-    /// What rays meet, outside of any timing.
+    /// Traces rays without timing and returns their hits.
     ///
     /// # Errors
     /// Those of the device or the peer.
@@ -220,7 +220,7 @@ impl PreparedRun<'_> {
         }
     }
 
-    /// Rays of the last repeat that met something.
+    /// Number of rays of the last repeat that hit something.
     ///
     /// # Errors
     /// Those of the device; [`Error::CheckFailed`] when the driver cut a traversal short.

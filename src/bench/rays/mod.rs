@@ -1,5 +1,5 @@
-//! `skylit bench rays`: rates of all contestants, taken in turn, so that a machine that slows down for a while slows all of
-//! them down.
+//! `skylit bench rays`: ray rates of all contestants. Their repeats are interleaved, so that a temporary slowdown of the machine affects
+//! all of them.
 
 mod args;
 mod contestant;
@@ -33,18 +33,18 @@ use crate::tracer::visits::VisitCounter;
 
 /// Share of a scene's progress that checking gets, with `--check`.
 const CHECK_SHARE: f64 = 0.3;
-/// Rays whose visits are counted, of each stream.
+/// Number of rays of each stream whose node visits are counted.
 const VISITED_RAYS: usize = 20_000;
-/// Larger scenes are not built once more for counting.
+/// Maximum number of primitives of scenes whose hierarchy is rebuilt for counting visits.
 const MAX_VISITED_PRIMITIVES: usize = 2_000_000;
 
 /// A run of `skylit bench rays`.
 type RaySession<'a> = Session<'a, BenchRaysArgs, RayBenchmark>;
 
-/// Measures, shows, writes.
+/// Runs the benchmark, prints the results and writes the files.
 ///
 /// # Errors
-/// The first that went wrong; what was measured is written all the same.
+/// The first error; the results measured so far are written nevertheless.
 pub fn run(args: &BenchRaysArgs) -> Result<(), Failure> {
     let scenes = scenes::choose(&args.scenes, args.common.quick);
     // before anything that takes long: a broken peers file, a scene that does not exist
@@ -134,7 +134,9 @@ impl RaySession<'_> {
         let flat = FlatScene::new(&loaded.scene);
         let contestants = self.contestants(source, &flat)?;
         let Some(tracer) = contestants.iter().find_map(Contestant::tracer) else {
-            return Err(Error::Device(format!("{source}: none of the kernels asked for runs here; `skylit doctor` says why")));
+            return Err(Error::Device(format!(
+                "{source}: the device supports none of the requested kernels; see `skylit doctor`"
+            )));
         };
         self.phase(format!("{source}: making rays"));
         let sets = RaySets::make(tracer, &loaded, size, &mut SilentControl)?;
@@ -151,9 +153,9 @@ impl RaySession<'_> {
         };
         // contestants that failed on the way
         let mut failed = vec![false; contestants.len()];
-        let asked: Vec<&StreamKind> = STREAMS.iter().filter(|s| self.wants(s)).collect();
+        let requested: Vec<&StreamKind> = STREAMS.iter().filter(|s| self.wants(s)).collect();
         for set in Set::ALL {
-            if asked.iter().any(|s| s.set == set) {
+            if requested.iter().any(|s| s.set == set) {
                 self.give_rays(&contestants, &mut failed, set, sets.get(set))?;
             }
         }
@@ -161,11 +163,11 @@ impl RaySession<'_> {
         let same = self.args.build == BuildChoice::Default && flat.primitive_count() <= MAX_VISITED_PRIMITIVES;
         let counted = same && contestants.iter().any(|c| c.kernel == Some(Kernel::Wide));
         let counter = if counted { VisitCounter::new(&flat) } else { None };
-        for (k, stream) in asked.iter().enumerate() {
+        for (k, stream) in requested.iter().enumerate() {
             // one stream at least: a record of nothing says nothing
             if self.is_late() && !(record.streams.is_empty() && self.record.scenes.is_empty()) {
                 self.stop_early();
-                self.note(format!("time limit: {source}: {} streams left out", asked.len() - k));
+                self.note(format!("time limit: {source}: {} streams left out", requested.len() - k));
                 break;
             }
             let rays = sets.get(stream.set);
@@ -178,7 +180,7 @@ impl RaySession<'_> {
                 continue;
             }
             let all = if self.args.check { 1.0 - CHECK_SHARE } else { 1.0 };
-            let share = [k, k + 1].map(|k| all * k as f64 / asked.len() as f64);
+            let share = [k, k + 1].map(|k| all * k as f64 / requested.len() as f64);
             self.phase(format!("{source}: {}", stream.name));
             let results = self.stream(&contestants, &mut failed, stream, (rays, counter.as_ref()), share)?;
             record.streams.push(results);
@@ -193,7 +195,7 @@ impl RaySession<'_> {
         self.args.streams.is_empty() || self.args.streams.iter().any(|s| s == stream.name)
     }
 
-    /// All that take part in a scene, built: one of our own at least, which makes the rays.
+    /// Builds the contestants of a scene. At least one is a kernel of skylit, which generates the rays.
     fn contestants<'f>(&mut self, source: &str, flat: &'f FlatScene<'f>) -> Result<Vec<Contestant<'f>>> {
         let mut out = Vec::new();
         let mut refused = None;
@@ -227,7 +229,7 @@ impl RaySession<'_> {
             self.phase(format!("{source}: building for '{}'", spec.name));
             let mut build = || -> Result<Vec<Contestant<'f>>, PeerError> {
                 if masked {
-                    return Err(PeerError::Failed("it knows no alpha masks".into()));
+                    return Err(PeerError::Failed("it does not support alpha masks".into()));
                 }
                 self.peers[index].load_geometry(flat)?;
                 spec.kernels.iter().map(|k| Contestant::peer(&mut self.peers, index, k, flat)).collect()
@@ -259,7 +261,7 @@ impl RaySession<'_> {
         Ok(())
     }
 
-    /// Rounds over one stream: each contestant once a round.
+    /// Measures one stream in rounds: each contestant traces once per round.
     fn stream(
         &mut self,
         contestants: &[Contestant],
@@ -299,7 +301,7 @@ impl RaySession<'_> {
                 break;
             }
         }
-        // a sample says as much as all of them
+        // a sample of the rays is enough
         let some: Vec<Ray> = rays.iter().step_by(rays.len().div_ceil(VISITED_RAYS).max(1)).copied().collect();
         let visits = counter.map(|c| c.mean(&some, stream.mode == Mode::Any));
         let mut results = Vec::new();
@@ -328,7 +330,7 @@ impl RaySession<'_> {
         Ok(StreamRecord { stream: stream.name.to_owned(), rays: rays.len(), results })
     }
 
-    /// All answers against those of the first of our own.
+    /// Compares all hits with those of skylit's first kernel.
     fn check(
         &mut self,
         loaded: &RayScene,

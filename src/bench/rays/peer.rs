@@ -1,4 +1,4 @@
-//! What is said to a peer that traces rays: scenes and rays in files, seconds and hits back. docs/benchmarks.md has the protocol.
+//! Protocol of peers that trace rays: scenes and rays in files, seconds and hits back. docs/benchmarks.md has the protocol.
 
 use std::io::{BufWriter, Write};
 use std::path::Path;
@@ -10,11 +10,11 @@ use crate::integrators::rays::Mode;
 use crate::ray::{Hit, Ray};
 use crate::scene::Geometry;
 
-/// Of peer scenes: "SKYP".
+/// Magic number of peer scene files: "SKYP".
 const SCENE_MAGIC: u32 = 0x5059_4b53;
 
 impl Peer {
-    /// Gives it what rays are traced against; what it had before is forgotten, and all rays.
+    /// Sends the scene's geometry, which replaces the previous scene and all ray sets.
     pub fn load_geometry(&mut self, flat: &FlatScene) -> Result<(), PeerError> {
         let path = self.file("scene.bin");
         write_scene(flat, &path).map_err(|e| Error::write(&path, &e))?;
@@ -30,7 +30,7 @@ impl Peer {
         Ok((Peer::number(&answer, "build_seconds")?, Peer::number(&answer, "bytes")?))
     }
 
-    /// Gives it a set of rays under a name.
+    /// Sends a named set of rays.
     pub fn load_rays(&mut self, name: &str, rays: &[Ray]) -> Result<(), PeerError> {
         let path = self.file(&format!("{name}.rays"));
         std::fs::write(&path, bytemuck::cast_slice(rays)).map_err(|e| Error::write(&path, &e))?;
@@ -39,17 +39,17 @@ impl Peer {
         Ok(())
     }
 
-    /// Traces a set once: seconds by its own clock, and how many rays met something.
+    /// Traces a set once: seconds by its own clock, and the number of hits.
     pub fn trace(&mut self, kernel: &str, mode: Mode, name: &str) -> Result<(f64, u64), PeerError> {
         let answer = self.ask(&format!("trace {kernel} {} {name}", mode_name(mode)))?;
         let (seconds, hits) = (Peer::number(&answer, "seconds")?, Peer::number(&answer, "hits")?);
         if !(seconds > 0.0 && seconds.is_finite()) {
-            return Err(PeerError::Failed(format!("it traced in {seconds} seconds")));
+            return Err(PeerError::Failed(format!("it reported an invalid time of {seconds} seconds")));
         }
         Ok((seconds, hits as u64))
     }
 
-    /// What a set of `count` rays meets, with the scene's ids.
+    /// The hits of a set of `count` rays, with the scene's ids.
     pub fn hits(
         &mut self,
         flat: &FlatScene,
@@ -80,30 +80,30 @@ fn mode_name(mode: Mode) -> &'static str {
     }
 }
 
-/// From placement and primitive of its group to instance and primitive of its mesh. Ids that do not exist stay: nothing is
-/// there under them, and a check will say so.
+/// Maps TLAS instance and group primitive to scene instance and mesh primitive. Invalid ids are unchanged, so that the check reports
+/// them.
 fn rename(flat: &FlatScene, hit: &mut Hit) {
-    let Some(placement) = flat.placements.get(hit.instance as usize) else { return };
-    let group = &flat.groups[placement.group];
+    let Some(entry) = flat.instances.get(hit.instance as usize) else { return };
+    let group = &flat.groups[entry.group];
     if hit.primitive as usize >= group.primitive_count {
         return;
     }
-    let part = flat.part_of(group, hit.primitive as usize);
+    let part = flat.submesh_of(group, hit.primitive as usize);
     hit.primitive -= part.first_primitive as u32;
-    if let Some(instance) = placement.scene_instance.or(part.scene_instance) {
+    if let Some(instance) = entry.scene_instance.or(part.scene_instance) {
         hit.instance = instance as u32;
     }
 }
 
-/// Writes the groups and placements that our tracers build over, vertices as they lie in device memory.
+/// Writes the BLAS geometry and TLAS instances that skylit's tracers build over, with the same vertices as in device memory.
 fn write_scene(flat: &FlatScene, path: &Path) -> std::io::Result<()> {
     let mut out = BufWriter::with_capacity(1 << 20, std::fs::File::create(path)?);
     let mut words = |w: &[u32]| w.iter().try_for_each(|x| out.write_all(&x.to_le_bytes()));
-    words(&[SCENE_MAGIC, 1, flat.groups.len() as u32, flat.placements.len() as u32])?;
+    words(&[SCENE_MAGIC, 1, flat.groups.len() as u32, flat.instances.len() as u32])?;
     for group in &flat.groups {
         let vertices = if group.spheres { group.primitive_count } else { group.vertex_count };
         words(&[u32::from(group.spheres), vertices as u32, group.primitive_count as u32])?;
-        for part in &group.parts {
+        for part in &group.submeshes {
             match &flat.scene.meshes[part.mesh].geometry {
                 Geometry::Spheres(s) => {
                     for k in 0..s.len() {
@@ -118,15 +118,15 @@ fn write_scene(flat: &FlatScene, path: &Path) -> std::io::Result<()> {
                 }
             }
         }
-        for part in &group.parts {
+        for part in &group.submeshes {
             if let Geometry::Triangles(t) = &flat.scene.meshes[part.mesh].geometry {
                 t.indices.iter().try_for_each(|i| words(&i.map(|k| k + part.first_vertex as u32)))?;
             }
         }
     }
-    for placement in &flat.placements {
-        words(&[placement.group as u32])?;
-        for row in crate::tracer::gpu_scene::rows(&placement.to_world) {
+    for entry in &flat.instances {
+        words(&[entry.group as u32])?;
+        for row in crate::tracer::gpu_scene::rows(&entry.to_world) {
             words(&row.map(f32::to_bits))?;
         }
     }

@@ -1,43 +1,43 @@
-//! What a benchmark of real-time ambient occlusion found: records for programs. `ao_rows` writes them a row a result, `ao_verdict`
-//! says what follows from them.
+//! Results of the real-time ambient occlusion benchmark. `ao_rows` writes them as a table, one row per result; `ao_verdict` derives the
+//! comparison with the `larsen` preset.
 //!
 //! Times are milliseconds, errors are of ambient visibility (1 - ambient occlusion, 0 to 1) over the pixels that show a surface.
 
 use serde::Serialize;
 
 use super::{Completeness, HostInfo};
-use crate::measure::stats::Spread;
+use crate::measure::stats::MedianP95;
 
 /// A whole run.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct AoBenchmark {
-    /// What it ran on.
+    /// Host and device.
     #[serde(flatten)]
     pub host: HostInfo,
-    /// What traces rays.
+    /// Name of the tracer.
     pub tracer: String,
-    /// Pixels of the images, but where a series says otherwise.
+    /// Image size, pixels, unless a series varies it.
     pub size: [u32; 2],
     /// Frames of a run.
     pub frames: u32,
-    /// Rays a pixel of a reference, both of its halves.
+    /// Rays per pixel of a reference image, both halves together.
     pub reference_rays: u32,
-    /// How occlusion fades with distance: `exponential` or `binary`.
+    /// Falloff of occlusion with distance: `exponential` or `binary`.
     pub falloff: String,
     /// Each scene, from near and far.
     pub views: Vec<ViewRecord>,
     /// Scenes that change while they are seen.
     pub changes: Vec<ChangeRecord>,
-    /// What keeping structures up to date takes.
+    /// Updates of acceleration structures.
     pub structures: Vec<StructureRecord>,
-    /// One number varied, all others the same.
+    /// Parameter sweeps.
     pub series: Vec<SeriesRecord>,
-    /// What is missing.
+    /// Results that are missing, and why.
     #[serde(flatten)]
     pub completeness: Completeness,
 }
 
-/// One scene from one place.
+/// Results of one view of a scene.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct ViewRecord {
     /// As on the command line.
@@ -48,36 +48,36 @@ pub struct ViewRecord {
     pub primitives: u64,
     /// Distance in scene units beyond which occlusion is less than 1/255 (exponential), or none (binary).
     pub reach: f64,
-    /// The camera's place, world coordinates.
+    /// Camera position, world coordinates.
     pub eye: [f64; 3],
-    /// Where it looks, a unit vector.
+    /// View direction, a unit vector.
     pub towards: [f64; 3],
-    /// Pixels that show something.
+    /// Number of pixels that show a surface.
     pub covered: u64,
     /// Standard error of the reference that errors are measured against.
     pub reference_rmse: f64,
-    /// What was measured, in the order of the command line.
+    /// Results of each preset.
     pub results: Vec<TechniqueRecord>,
-    /// What follows.
+    /// Comparison of `balanced` with `larsen`.
     pub verdict: Verdict,
 }
 
 /// Results of one preset in one view.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct TechniqueRecord {
-    /// Its name.
+    /// Name of the preset.
     pub preset: String,
-    /// Where its occlusion comes from.
+    /// Technique that computes occlusion.
     pub technique: String,
-    /// What finds what the camera sees: `traced` camera rays, or `raster`.
+    /// Primary visibility: `traced` or `raster`.
     pub primary: String,
     /// Rays of a pixel that is sampled in a frame.
     pub rays_per_pixel: u32,
-    /// Under a camera that stands still, all work done in every frame.
+    /// Static camera, all work done in every frame.
     pub still: Option<StillRecord>,
-    /// The same, with what is known already left out.
+    /// Static camera, with sampling stopped once histories are full.
     pub rest: Option<RestRecord>,
-    /// Under a camera that goes round.
+    /// Orbiting camera.
     pub moving: Option<OrbitRecord>,
 }
 
@@ -86,19 +86,19 @@ pub struct TechniqueRecord {
 pub struct PassTime {
     /// Name of the pass.
     pub pass: String,
-    /// On the device, over the frames that count.
-    pub ms: Spread,
+    /// Device time over the timed frames, milliseconds.
+    pub ms: MedianP95,
 }
 
-/// What a frame costs.
+/// Cost of a frame.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct FrameCost {
     /// Each pass.
     pub passes: Vec<PassTime>,
     /// All passes, on the device; 0 where the device has no clock.
-    pub device_ms: Spread,
+    pub device_ms: MedianP95,
     /// By the clock of the process, submission included.
-    pub wall_ms: Spread,
+    pub wall_ms: MedianP95,
     /// Camera rays, the mean of a frame.
     pub camera_rays: f64,
     /// Occlusion rays traced, the mean of a frame.
@@ -137,7 +137,7 @@ pub struct ImageErrors {
 }
 
 impl ImageErrors {
-    /// Number by number; `None` for none.
+    /// Mean of each metric; `None` for an empty slice.
     pub fn mean(of: &[ImageErrors]) -> Option<ImageErrors> {
         let n = of.len() as f64;
         let mean = |f: fn(&ImageErrors) -> f64| of.iter().map(f).sum::<f64>() / n;
@@ -161,18 +161,18 @@ pub struct ErrorPoint {
     pub rays: u64,
     /// Camera rays traced for them.
     pub camera_rays: u64,
-    /// Of the image.
+    /// Errors of the final image.
     pub errors: ImageErrors,
-    /// Of what the filter was given.
+    /// Errors of the filter's input.
     pub unfiltered: Option<ImageErrors>,
 }
 
-/// A camera that stands still, all work done in every frame.
+/// Results with a static camera, all work done in every frame.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct StillRecord {
-    /// A frame's, as it comes: no camera rays where nothing moved.
+    /// Cost of a frame; a static view needs no camera rays.
     pub cost: FrameCost,
-    /// A frame's with all of its camera rays and reprojection: the camera trembles by less than a thousandth of a pixel.
+    /// Cost of a frame with camera rays and reprojection: the camera is jittered by less than a thousandth of a pixel.
     pub moving_cost: FrameCost,
     /// Error after 1, 2, 4, ... frames; the last is the settled one.
     pub curve: Vec<ErrorPoint>,
@@ -189,27 +189,27 @@ impl StillRecord {
     }
 }
 
-/// A camera that stands still, and what that saves.
+/// Results with a static camera after sampling has stopped.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct RestRecord {
     /// Frames until no ray is traced any more; `None`: it never came to rest.
     pub frames: Option<u32>,
-    /// Of a frame at rest.
+    /// Cost of a frame at rest.
     pub cost: FrameCost,
-    /// At rest.
+    /// Errors at rest.
     pub errors: ImageErrors,
 }
 
-/// A camera that goes round.
+/// Results with an orbiting camera.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct OrbitRecord {
-    /// How far it goes in a frame.
+    /// Rotation of the camera per frame, degrees.
     pub degrees_per_frame: f64,
     /// A frame's.
     pub cost: FrameCost,
     /// Frames in which the error was measured.
     pub frames: Vec<u32>,
-    /// The mean of these.
+    /// Mean errors of these frames.
     pub errors: ImageErrors,
     /// The same before the filter.
     pub unfiltered: Option<ImageErrors>,
@@ -220,13 +220,13 @@ pub struct OrbitRecord {
 /// One kind of change of one scene.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct ChangeRecord {
-    /// What changes.
+    /// Name of the scene.
     pub scene: String,
     /// `appear`, `slide`, `sidestep` or `animated`.
     pub change: String,
-    /// Frames after it.
+    /// Number of frames after the change.
     pub frames: u32,
-    /// Pixels that are looked at.
+    /// Number of pixels that are compared.
     pub pixels: u64,
     /// Standard error of the references.
     pub reference_rmse: f64,
@@ -240,7 +240,7 @@ pub struct ChangeRecord {
 pub struct ChangeResult {
     /// Name.
     pub preset: String,
-    /// Where its occlusion comes from.
+    /// Technique that computes occlusion.
     pub technique: String,
     /// Share of the old image in each frame from the change on; of `slide` and `animated`, of the reference of the frame before, in frames
     /// that have a reference. What the preset itself ends at counts as 0.
@@ -274,10 +274,10 @@ pub struct ChangeResult {
     /// A frame's.
     pub cost: Option<FrameCost>,
     /// Milliseconds to bring the tracer up to date.
-    pub update_ms: Option<Spread>,
+    pub update_ms: Option<MedianP95>,
 }
 
-/// Keeping structures up to date.
+/// Updates of acceleration structures.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct StructureRecord {
     /// Scene.
@@ -288,30 +288,30 @@ pub struct StructureRecord {
     pub stored: u64,
     /// Meshes.
     pub meshes: usize,
-    /// Placed meshes.
+    /// Number of instances.
     pub instances: usize,
     /// The first build of everything, milliseconds.
     pub build_ms: f64,
     /// Writing the scene into device memory, milliseconds.
     pub upload_ms: f64,
-    /// The top level, all instances moved.
-    pub top: Option<Spread>,
-    /// It was built anew, not refitted.
+    /// Update of the TLAS after all instances moved, milliseconds.
+    pub top: Option<MedianP95>,
+    /// The TLAS was rebuilt, not refitted.
     pub top_rebuilt: bool,
     /// Triangles of the mesh that deforms.
     pub mesh_triangles: u64,
-    /// Refitting that mesh, its vertices written.
-    pub refit: Option<Spread>,
-    /// Building it anew, its vertices written; `None` where the tracer would not.
-    pub rebuild: Option<Spread>,
+    /// Refit of that mesh's BLAS, vertex upload included, milliseconds.
+    pub refit: Option<MedianP95>,
+    /// Rebuild of that BLAS, vertex upload included, milliseconds; `None` if the tracer does not rebuild.
+    pub rebuild: Option<MedianP95>,
 }
 
-/// One number varied.
+/// A parameter sweep.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct SeriesRecord {
     /// Which: `triangles`, `rays`, `resolution` or `sampling`.
     pub series: String,
-    /// What it was varied in: the scene, or several.
+    /// The scene, or a label for several.
     pub scene: String,
     /// The lines of its plot.
     pub lines: Vec<SeriesLine>,
@@ -343,7 +343,7 @@ pub struct SeriesPoint {
     pub equal_time_rmse: Option<f64>,
 }
 
-/// Of one view. `None` where one of the two was not measured.
+/// Comparison of `balanced` (ours) with `larsen` (theirs) in one view. `None` if one of the two was not measured.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Verdict {
     /// Occlusion rays of a frame of ours over those of theirs.

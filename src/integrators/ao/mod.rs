@@ -19,11 +19,11 @@ use super::{Integrator, IntegratorSettings, PictureOptions, RenderJob, Rendered}
 use crate::accel::flatten::FlatScene;
 use crate::error::Result;
 use crate::film::Control;
-use crate::film::accumulate::{Accumulated, Estimator, Plan, accumulate, most_rays};
+use crate::film::accumulate::{Accumulated, Estimator, Plan, accumulate, max_rays};
 use crate::film::block::BlockParams;
 use crate::film::camera::CameraRecord;
-use crate::film::cover::Cover;
 use crate::film::schedule::FilmOptions;
+use crate::film::tile_mask::TileMask;
 use crate::gpu::{Buffer, Commands, ComputePipeline, Device, Memory, Timing};
 use crate::output::Image;
 use crate::ray::Ray;
@@ -65,7 +65,7 @@ pub struct AoOptions {
     /// Keep the rays of the first sample.
     pub keep_rays: bool,
     /// Tiles of the image that show geometry; `None`: all tiles are traced.
-    pub cover: Option<Arc<Cover>>,
+    pub tile_mask: Option<Arc<TileMask>>,
     /// The film to resume, and when to save it. Rays are kept only if the film starts empty.
     pub film: FilmOptions,
 }
@@ -81,7 +81,7 @@ impl Default for AoOptions {
             hemisphere: Hemisphere::Geometric,
             time_limit: None,
             keep_rays: false,
-            cover: None,
+            tile_mask: None,
             film: FilmOptions::default(),
         }
     }
@@ -109,7 +109,7 @@ impl AmbientOcclusion {
             hemisphere: ao.hemisphere(),
             time_limit: job.time_limit,
             keep_rays: job.keep_rays,
-            cover: None,
+            tile_mask: None,
             film: job.film.clone(),
         }
     }
@@ -161,8 +161,18 @@ impl Integrator for AmbientOcclusion {
 
     fn identity(&self, job: &RenderJob) -> Vec<(&'static str, Option<String>)> {
         // without `..`, so that a new option must be added here
-        let AoOptions { size: _, spp: _, time_limit: _, keep_rays: _, cover: _, film: _, seed: _, radius, falloff, hemisphere } =
-            Self::options(job);
+        let AoOptions {
+            size: _,
+            spp: _,
+            time_limit: _,
+            keep_rays: _,
+            tile_mask: _,
+            film: _,
+            seed: _,
+            radius,
+            falloff,
+            hemisphere,
+        } = Self::options(job);
         vec![
             ("ao.radius", Some(radius.to_string())),
             ("ao.falloff", Some(falloff.to_string())),
@@ -175,10 +185,10 @@ impl Integrator for AmbientOcclusion {
         tracer: &Tracer,
         flat: &FlatScene,
         job: &RenderJob,
-        cover: Option<Arc<Cover>>,
+        tile_mask: Option<Arc<TileMask>>,
         control: &mut dyn Control,
     ) -> Result<Rendered> {
-        let options = AoOptions { cover, ..Self::options(job) };
+        let options = AoOptions { tile_mask, ..Self::options(job) };
         let result = render(tracer, &job.camera_record(flat), &options, control)?;
         let report = report::report(&options, &result);
         Ok(Rendered { image: result.image, report, kept_rays: [result.kept_primary, result.kept_occlusion] })
@@ -230,7 +240,7 @@ pub fn streams(options: &AoOptions) -> [&'static StreamShaders; 2] {
 /// Those of the device, and [`crate::Error::Interrupted`] when `control` says so.
 pub fn render(tracer: &Tracer, camera: &CameraRecord, options: &AoOptions, control: &mut dyn Control) -> Result<AoResult> {
     let device = tracer.device();
-    let most = most_rays(options.size, options.spp);
+    let most = max_rays(options.size, options.spp);
     let [primary, occlusion] = streams(options);
     let mut estimator = AoEstimator {
         primary: tracer.stream(primary)?,
@@ -250,7 +260,7 @@ pub fn render(tracer: &Tracer, camera: &CameraRecord, options: &AoOptions, contr
         spp: options.spp,
         seed: options.seed,
         time_limit: options.time_limit,
-        cover: options.cover.as_deref(),
+        tile_mask: options.tile_mask.as_deref(),
         film: &options.film,
     };
     let params = BlockParams {

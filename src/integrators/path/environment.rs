@@ -8,7 +8,7 @@ use super::lights::brightness;
 use super::params::EnvironmentRecord;
 use crate::error::Result;
 use crate::gpu::{Buffer, Device};
-use crate::sampling::Patches;
+use crate::sampling::BilinearDistribution;
 use crate::scene::{Environment, EnvironmentMap};
 
 /// An environment in device memory.
@@ -36,10 +36,10 @@ impl DeviceEnvironment {
             let mean = mean(map, &weights);
             compensate(&mut weights, mean);
         }
-        let patches = Patches::new(width, height, &weights);
+        let distribution = BilinearDistribution::new(width, height, &weights);
         let texels: Vec<[f32; 4]> = map.radiance.iter().zip(&weights).map(|(c, &l)| c.extend(l as f32).to_array()).collect();
         let texels = Buffer::from_slice(device, "environment", &texels)?;
-        let table = Buffer::from_slice(device, "environment sampling table", &patches.table)?;
+        let table = Buffer::from_slice(device, "environment distribution", &distribution.table)?;
         let m = map.to_map;
         let row = |k: usize| [m.x_axis[k] as f32, m.y_axis[k] as f32, m.z_axis[k] as f32, 0.0];
         let record = EnvironmentRecord {

@@ -18,6 +18,7 @@ pub(super) fn features(
     let drawn = options.strategy.samples_lights() && !lights.records.is_empty();
     let features = [
         (PathFeature::LightTree, drawn && !lights.tree.is_empty()),
+        (PathFeature::SurfaceLights, drawn && !lights.light_of.is_empty()),
         (PathFeature::LightChoice, drawn && lights.choices() > 1),
         (PathFeature::EnvironmentMap, map),
         (PathFeature::LightSamples, drawn),

@@ -8,7 +8,7 @@ use crate::accel::flatten::FlatScene;
 use crate::colour::srgb_decode;
 use crate::error::Result;
 use crate::film::Control;
-use crate::film::cover::Cover;
+use crate::film::tile_mask::TileMask;
 use crate::integrators::{Integrator, IntegratorSettings, PictureOptions, RenderJob, Rendered};
 use crate::output::{Image, Samples};
 use crate::scene::Scene;
@@ -157,10 +157,10 @@ impl Integrator for PathVariant {
         tracer: &Tracer,
         flat: &FlatScene,
         job: &RenderJob,
-        cover: Option<Arc<Cover>>,
+        tile_mask: Option<Arc<TileMask>>,
         control: &mut dyn Control,
     ) -> Result<Rendered> {
-        let options = PathOptions { cover, ..self.options(job)? };
+        let options = PathOptions { tile_mask, ..self.options(job)? };
         let result = render(tracer, flat, &job.camera_record(flat), &options, control)?;
         let report = report::report(tracer, flat, job, &options, &result);
         Ok(Rendered { image: result.image, report, ..Default::default() })

@@ -18,7 +18,7 @@ pub mod settings;
 use crate::accel::flatten::FlatScene;
 use crate::error::{Error, Result};
 use crate::film::Control;
-use crate::film::accumulate::{Accumulated, Estimator, Plan, accumulate, most_rays};
+use crate::film::accumulate::{Accumulated, Estimator, Plan, accumulate, max_rays};
 use crate::film::block::BlockParams;
 use crate::film::camera::CameraRecord;
 use crate::gpu::{Buffer, Commands, ComputePipeline, Memory, Specialization, Timing};
@@ -120,7 +120,7 @@ impl PathIntegrator {
             spp,
             seed,
             time_limit: options.time_limit,
-            cover: options.cover.as_deref(),
+            tile_mask: options.tile_mask.as_deref(),
             film: &options.film,
         };
         paths.traced = PathCounts::default();
@@ -200,7 +200,7 @@ impl PathEstimator {
         if cones && !shading.materials.contains(MaterialFeature::RayCones) {
             return Err(Error::Usage("ray cones need a tracer that was built with Needs::mip_levels".into()));
         }
-        let most = most_rays(options.size, options.spp);
+        let most = max_rays(options.size, options.spp);
         let white = Environment::Uniform(glam::Vec3::ONE);
         let around = match options.view {
             // a view shows surfaces, independent of lights

@@ -9,8 +9,8 @@ use serde_json::{Value, json};
 use super::params::PathParams;
 use super::{PixelFilter, View};
 use crate::error::{Error, Result};
-use crate::film::cover::Cover;
 use crate::film::schedule::FilmOptions;
+use crate::film::tile_mask::TileMask;
 use crate::integrators::RenderJob;
 use crate::interface::PathFeature;
 use crate::scene::Projection;
@@ -162,7 +162,7 @@ pub struct PathOptions {
     /// Stop after this time and keep the image so far.
     pub time_limit: Option<Duration>,
     /// Tiles of the image that show geometry; only if the environment is black and [`PathOptions::is_sharp`].
-    pub cover: Option<Arc<Cover>>,
+    pub tile_mask: Option<Arc<TileMask>>,
     /// The film to resume, and when to save it.
     pub film: FilmOptions,
 }
@@ -185,7 +185,7 @@ impl Default for PathOptions {
             texture_filter: TextureFilter::Bilinear,
             lens: None,
             time_limit: None,
-            cover: None,
+            tile_mask: None,
             film: FilmOptions::default(),
         }
     }
@@ -241,7 +241,7 @@ impl PathOptions {
             size: _,
             spp: _,
             time_limit: _,
-            cover: _,
+            tile_mask: _,
             film: _,
             seed: _,
             max_depth,

@@ -108,7 +108,7 @@ records! {
         index: uint,
         /// Number of bounces in the lower 16 bits; above them the number of surfaces passed straight through, which are no bounces.
         depth_passes: uint,
-        /// Product of the squared relative indices of refraction along the path, by which Russian roulette scales throughput.
+        /// Product of the squared relative indices of refraction so far: Russian roulette divides it out.
         eta_scale: float,
         /// Material of the volume that the path is in, or `INVALID`.
         medium: uint,

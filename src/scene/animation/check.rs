@@ -1,10 +1,10 @@
-//! Is a description of what moves sound, and does it fit its scene?
+//! Validation of a rig against its scene.
 
-use super::{Animation, Channel, Deformation, Local, Parts, Property, Skin};
+use super::{Animation, Channel, Deformation, LocalTransform, Property, RigParts, Skin};
 use crate::scene::{Geometry, Scene};
 
-/// What is wrong, in words, naming the thing.
-pub(super) fn check(scene: &Scene, parts: &Parts) -> Result<(), String> {
+/// Fails with a message that names the invalid part.
+pub(super) fn check(scene: &Scene, parts: &RigParts) -> Result<(), String> {
     let nodes = parts.nodes.len();
     for (i, node) in parts.nodes.iter().enumerate() {
         let name = &node.name;
@@ -60,7 +60,7 @@ fn check_skin(skin: &Skin, nodes: usize) -> Result<(), String> {
     }
 }
 
-fn check_deformation(deformation: &Deformation, scene: &Scene, parts: &Parts) -> Result<(), String> {
+fn check_deformation(deformation: &Deformation, scene: &Scene, parts: &RigParts) -> Result<(), String> {
     let Geometry::Triangles(triangles) = &scene.meshes[deformation.mesh].geometry else {
         return Err("holds spheres, which cannot deform".to_owned());
     };
@@ -107,7 +107,7 @@ fn check_deformation(deformation: &Deformation, scene: &Scene, parts: &Parts) ->
     Ok(())
 }
 
-fn check_animation(animation: &Animation, parts: &Parts) -> Result<(), String> {
+fn check_animation(animation: &Animation, parts: &RigParts) -> Result<(), String> {
     if !(animation.duration.is_finite() && animation.duration >= 0.0) {
         return Err(format!("a duration of {} s", animation.duration));
     }
@@ -117,13 +117,13 @@ fn check_animation(animation: &Animation, parts: &Parts) -> Result<(), String> {
     Ok(())
 }
 
-fn check_channel(channel: &Channel, parts: &Parts) -> Result<(), String> {
+fn check_channel(channel: &Channel, parts: &RigParts) -> Result<(), String> {
     let n = channel.node;
     let node = parts.nodes.get(n).ok_or_else(|| format!("node {n} does not exist"))?;
     match (channel.property, node.local) {
         (Property::Weights, _) if node.weights.is_empty() => return Err(format!("node {n} has no morph targets")),
-        (Property::Weights, _) | (_, Local::Parts { .. }) => {}
-        (_, Local::Matrix(_)) => return Err(format!("node {n} has a matrix, which cannot be animated")),
+        (Property::Weights, _) | (_, LocalTransform::Trs { .. }) => {}
+        (_, LocalTransform::Matrix(_)) => return Err(format!("node {n} has a matrix, which cannot be animated")),
     }
     channel.sampler.check(channel.width(node))
 }

@@ -1,48 +1,48 @@
-//! Meshes that deform: morph targets first, then a skin.
+//! Deformation of meshes: morph targets first, then skinning.
 
 use glam::{DAffine3, DMat3, DVec3, Vec3, Vec4};
 use rayon::prelude::*;
 
 use crate::scene::TriangleMesh;
 
-/// Four joints of each vertex and how much each of them pulls.
+/// Joints and weights: four for each vertex.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Influences {
     /// Indices into [`super::Skin::joints`].
     pub joints: Vec<[u16; 4]>,
-    /// As many, none below zero; they count relative to the sum over all sets.
+    /// Weights of the joints, at least zero; they are normalized by the sum over all sets.
     pub weights: Vec<[f32; 4]>,
 }
 
-/// What a morph target adds to a mesh at a weight of one. Each is empty (zero) or as long as the mesh has vertices.
+/// A morph target: differences to the mesh at weight one. Each array is empty (all zero) or has one element per vertex.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Target {
+pub struct MorphTarget {
     /// Displacements of positions.
     pub positions: Vec<Vec3>,
     /// Differences of normals.
     pub normals: Vec<Vec3>,
 }
 
-/// A mesh that deforms.
+/// The deformation of a mesh.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Deformation {
     /// Index into [`crate::scene::Scene::meshes`].
     pub mesh: usize,
-    /// The node that carries it ([`super::Parts::nodes`]), whose weights its targets take. Its transform does not touch a mesh that
-    /// has a skin.
+    /// Index into [`super::RigParts::nodes`] of the node of the mesh, which has the weights of its morph targets. The node's transform does
+    /// not apply to a skinned mesh.
     pub node: usize,
-    /// Index into [`super::Parts::skins`].
+    /// Index into [`super::RigParts::skins`].
     pub skin: Option<usize>,
-    /// Joints of each vertex, one set or two; empty without a skin.
+    /// Joints and weights, one set or two; empty without a skin.
     pub influences: Vec<Influences>,
     /// Morph targets.
-    pub targets: Vec<Target>,
+    pub targets: Vec<MorphTarget>,
 }
 
-/// Vertices in one shape of a mesh: as modelled, or posed. Normals and tangents may be empty.
+/// Vertices of a mesh, undeformed or posed. Normals and tangents may be empty.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Shape {
-    /// Object space.
+pub struct VertexData {
+    /// Positions in object space.
     pub positions: Vec<Vec3>,
     /// Unit normals.
     pub normals: Vec<Vec3>,
@@ -50,38 +50,38 @@ pub struct Shape {
     pub tangents: Vec<Vec4>,
 }
 
-impl Shape {
-    /// Takes a mesh's vertices out of it.
+impl VertexData {
+    /// Takes the vertices out of a mesh.
     pub(in crate::scene) fn take(mesh: &mut TriangleMesh) -> Self {
         let TriangleMesh { positions, normals, tangents, .. } = mesh;
         let (positions, normals) = (std::mem::take(positions), std::mem::take(normals));
         Self { positions, normals, tangents: std::mem::take(tangents) }
     }
 
-    /// Gives them to a mesh.
+    /// Puts the vertices into a mesh.
     pub(in crate::scene) fn give(self, mesh: &mut TriangleMesh) {
         (mesh.positions, mesh.normals, mesh.tangents) = (self.positions, self.normals, self.tangents);
     }
 }
 
 impl Deformation {
-    /// Do these vertices move alike, whatever the pose?
+    /// Whether two vertices move together in every pose.
     fn alike(&self, a: usize, b: usize) -> bool {
         self.influences.iter().all(|s| s.joints[a] == s.joints[b] && s.weights[a] == s.weights[b])
             && self.targets.iter().all(|t| t.positions.is_empty() || t.positions[a] == t.positions[b])
     }
 
-    /// A triangle without area as modelled: will it stay so in every pose? Only where two of its corners lie in one place and move
-    /// alike, or all three lie on a line and move alike; others may open up.
+    /// Whether a triangle that is degenerate in the undeformed mesh is degenerate in every pose: only if two of its corners coincide and move
+    /// together, or all three lie on a line and move together.
     pub(in crate::scene) fn stays_flat(&self, triangle: [u32; 3], positions: &[Vec3]) -> bool {
         let [a, b, c] = triangle.map(|i| i as usize);
         let one = |a: usize, b: usize| a == b || (positions[a] == positions[b] && self.alike(a, b));
         one(a, b) || one(b, c) || one(c, a) || (self.alike(a, b) && self.alike(b, c))
     }
 
-    /// How large the mesh is as modelled or with one target in full, whichever is most.
-    pub(super) fn extent(&self, base: &Shape) -> f64 {
-        let size = |target: Option<&Target>| {
+    /// Largest extent of the mesh, undeformed or with one morph target at weight one.
+    pub(super) fn extent(&self, base: &VertexData) -> f64 {
+        let size = |target: Option<&MorphTarget>| {
             let points = base.positions.iter().enumerate().map(|(v, p)| {
                 let moved = target.and_then(|t| t.positions.get(v)).copied().unwrap_or_default();
                 p.as_dvec3() + moved.as_dvec3()
@@ -93,7 +93,7 @@ impl Deformation {
         self.targets.iter().map(|t| size(Some(t))).fold(size(None), f64::max)
     }
 
-    /// Follows vertices that were reordered, dropped or copied: vertex `i` was vertex `source[i]`.
+    /// Reorders, drops or copies per-vertex data: the new vertex `i` is the old vertex `source[i]`.
     pub(in crate::scene) fn reorder(&mut self, source: &[u32]) {
         fn pick<T: Copy>(values: &mut Vec<T>, source: &[u32]) {
             if !values.is_empty() {
@@ -110,10 +110,18 @@ impl Deformation {
         }
     }
 
-    /// Poses `base` into `out`, whose buffers are used again. `weights`: of the targets; `joints`: what each joint of the skin does to
-    /// vertices. Tangents are only posed if asked for.
-    pub(in crate::scene) fn pose(&self, base: &Shape, weights: &[f64], joints: &[DAffine3], tangents: bool, out: &mut Shape) {
-        let active: Vec<(&Target, f64)> = self.targets.iter().zip(weights.iter().copied()).filter(|(_, w)| *w != 0.0).collect();
+    /// Poses `base` into `out`, whose buffers are reused. `weights`: weights of the morph targets; `joints`: joint matrices of the skin;
+    /// `tangents`: whether to pose tangents.
+    pub(in crate::scene) fn pose(
+        &self,
+        base: &VertexData,
+        weights: &[f64],
+        joints: &[DAffine3],
+        tangents: bool,
+        out: &mut VertexData,
+    ) {
+        let active: Vec<(&MorphTarget, f64)> =
+            self.targets.iter().zip(weights.iter().copied()).filter(|(_, w)| *w != 0.0).collect();
         let matrix = |v: usize| self.matrix(v, joints);
         let position = |v: usize, m: &DAffine3| {
             let moved = active.iter().filter_map(|(t, w)| Some(t.positions.get(v)?.as_dvec3() * *w));
@@ -122,7 +130,7 @@ impl Deformation {
         let normal = |v: usize, m: &DAffine3| {
             let turned = active.iter().filter_map(|(t, w)| Some(t.normals.get(v)?.as_dvec3() * *w));
             let n = cofactor(&m.matrix3) * (base.normals[v].as_dvec3() + turned.sum::<DVec3>());
-            // what targets or a collapsed joint leave without a direction keeps the one it was modelled with
+            // a normal that targets or a collapsed joint make zero keeps its undeformed direction
             n.try_normalize().map_or(base.normals[v], |n| n.as_vec3())
         };
         let count = base.positions.len();
@@ -150,7 +158,7 @@ impl Deformation {
         }));
     }
 
-    /// What the skin does to a vertex: the mean of its joints' matrices by weight.
+    /// The skinning matrix of a vertex: the weighted mean of its joint matrices.
     fn matrix(&self, vertex: usize, joints: &[DAffine3]) -> DAffine3 {
         if self.skin.is_none() {
             return DAffine3::IDENTITY;
@@ -172,16 +180,16 @@ impl Deformation {
         if total > 0.0 {
             return DAffine3 { matrix3: sum.matrix3 * (1.0 / total), translation: sum.translation / total };
         }
-        // by the specification there is no such vertex; it goes with its first joint
+        // the specification forbids a vertex without weights; it follows its first joint
         let first = self.influences.first().map_or(0, |s| s.joints[vertex][0]);
         joints.get(first as usize).copied().unwrap_or(DAffine3::IDENTITY)
     }
 }
 
-/// Vertices that are worth another thread's while.
+/// Minimum number of vertices per parallel task.
 const BLOCK: usize = 2048;
 
-/// Turns normals as `m` turns the plane that they stand on: the inverse transpose but for a factor above zero, and for every `m`.
+/// The cofactor matrix, which transforms normals: the inverse transpose up to a positive factor, and defined for every `m`.
 fn cofactor(m: &DMat3) -> DMat3 {
     let c = DMat3::from_cols(m.y_axis.cross(m.z_axis), m.z_axis.cross(m.x_axis), m.x_axis.cross(m.y_axis));
     if m.determinant() < 0.0 { c * -1.0 } else { c }

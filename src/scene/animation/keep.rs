@@ -1,10 +1,10 @@
-//! A rig follows its scene while loaders mend it: meshes and instances are dropped, vertices reordered.
+//! Updates of a rig while loaders repair its scene: meshes and instances are dropped, vertices reordered.
 
-use super::{Deformation, Rig};
+use super::{AnimationRig, Deformation};
 use crate::scene::Scene;
 
-impl Rig {
-    /// What each mesh of a scene of `meshes` does, if it deforms.
+impl AnimationRig {
+    /// The deformation of each mesh, for a scene of `meshes` meshes; `None` for those that do not deform.
     pub(in crate::scene) fn deformations_mut(&mut self, meshes: usize) -> Vec<Option<&mut Deformation>> {
         let mut all: Vec<Option<&mut Deformation>> = (0..meshes).map(|_| None).collect();
         for deformation in &mut self.parts.deformations {
@@ -14,7 +14,7 @@ impl Rig {
         all
     }
 
-    /// For each instance of `scene`: does some animation move it?
+    /// For each instance of `scene`, whether an animation moves it.
     pub(in crate::scene) fn moving(&self, scene: &Scene) -> Vec<bool> {
         let mut moving = vec![false; scene.instances.len()];
         for animation in 0..self.parts.animations.len() {
@@ -25,7 +25,7 @@ impl Rig {
         moving
     }
 
-    /// For each mesh of `scene`: does some animation deform it?
+    /// For each mesh of `scene`, whether an animation deforms it.
     pub(in crate::scene) fn deforming(&self, scene: &Scene) -> Vec<bool> {
         let mut deforming = vec![false; scene.meshes.len()];
         for deformation in &self.parts.deformations {
@@ -34,12 +34,12 @@ impl Rig {
         deforming
     }
 
-    /// This instance has got a transform of its own.
+    /// Detaches an instance from its node.
     pub(in crate::scene) fn release(&mut self, instance: usize) {
         self.parts.instances[instance] = None;
     }
 
-    /// Only these instances are kept.
+    /// Removes instances that are not kept.
     pub(in crate::scene) fn keep_instances(&mut self, keep: &[bool]) {
         let mut each = keep.iter();
         self.parts.instances.retain(|_| each.next().copied().unwrap_or(true));
@@ -47,7 +47,7 @@ impl Rig {
         self.floors.retain(|_| each.next().copied().unwrap_or(true));
     }
 
-    /// Only these meshes are kept; `index` says what each is called now.
+    /// Removes meshes that are not kept; `index` has the new index of each old one.
     pub(in crate::scene) fn keep_meshes(&mut self, keep: &[bool], index: &[usize]) {
         let mut each = self.parts.deformations.iter().map(|d| keep[d.mesh]).collect::<Vec<_>>().into_iter();
         if !self.shapes.is_empty() {
@@ -60,7 +60,7 @@ impl Rig {
         }
     }
 
-    /// Does no animation change anything?
+    /// Whether no animation changes anything.
     pub(in crate::scene) fn is_idle(&self) -> bool {
         (0..self.parts.animations.len())
             .all(|a| self.motion(a).is_ok_and(|m| m.is_none()) && self.moving_cameras(a).is_ok_and(|c| c.is_empty()))

@@ -1,9 +1,9 @@
-//! What moves: a tree of nodes, skins, morph targets, and animations that change them over time. Plain data and arithmetic on the
-//! host; nothing here knows a tracer.
+//! Animation: a node hierarchy, skins, morph targets, and channels that change them over time, as in glTF. All of it is computed on the
+//! host, independent of tracers.
 //!
-//! [`Parts`] is the description, [`Rig`] the same once it is known to be sound and tied to a scene. A scene of which nothing can
-//! move has no rig. Playing goes in two steps: [`Rig::motion`] says once what an animation will change, so that tracers keep only
-//! that ready ([`super::Motion`]); [`Rig::pose`] gives the state at a time, as often as wanted.
+//! [`RigParts`] is the description, [`AnimationRig`] the same after validation against a scene. A static scene
+//! has no rig. Playing goes in two steps: [`AnimationRig::motion`] declares once what an animation changes, so that tracers keep state
+//! for that only ([`super::Motion`]); [`AnimationRig::pose`] computes the state at any time.
 //!
 //! Matrices are composed in f64 and vertices are rounded to f32 at the end. A skinned mesh lies in world space, as glTF wants it; its
 //! instance only has a translation, which is zero unless the skeleton stands far from the origin.
@@ -15,7 +15,7 @@ mod pose;
 mod sampler;
 mod transform;
 
-pub use deform::{Deformation, Influences, Shape, Target};
+pub use deform::{Deformation, Influences, MorphTarget, VertexData};
 pub use pose::{Playback, Pose, PosedMesh};
 pub use sampler::{Interpolation, Sampler};
 pub(in crate::scene) use transform::anchor;
@@ -25,33 +25,33 @@ use glam::{DAffine3, DQuat, DVec3};
 use super::Scene;
 use crate::error::{Error, Result};
 
-/// Where a node stands relative to its parent.
+/// Transform of a node relative to its parent.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Local {
-    /// Scaled, then turned, then moved: what animations can change.
-    Parts {
-        /// Moved by.
+pub enum LocalTransform {
+    /// Translation, rotation and scale (applied in reverse order), which animations can change.
+    Trs {
+        /// Translation, in units of the parent.
         translation: DVec3,
-        /// Turned by; unit length.
+        /// Rotation, a unit quaternion.
         rotation: DQuat,
-        /// Scaled by.
+        /// Scale along the node's axes.
         scale: DVec3,
     },
-    /// Any affine transform; no animation changes it.
+    /// An affine matrix, which cannot be animated.
     Matrix(DAffine3),
 }
 
-impl Default for Local {
+impl Default for LocalTransform {
     fn default() -> Self {
-        Self::Parts { translation: DVec3::ZERO, rotation: DQuat::IDENTITY, scale: DVec3::ONE }
+        Self::Trs { translation: DVec3::ZERO, rotation: DQuat::IDENTITY, scale: DVec3::ONE }
     }
 }
 
-impl Local {
-    /// Node to parent.
+impl LocalTransform {
+    /// The transform from node to parent.
     pub fn affine(&self) -> DAffine3 {
         match *self {
-            Self::Parts { translation, rotation, scale } => {
+            Self::Trs { translation, rotation, scale } => {
                 DAffine3::from_scale_rotation_translation(scale, rotation, translation)
             }
             Self::Matrix(m) => m,
@@ -59,52 +59,52 @@ impl Local {
     }
 }
 
-/// A node of the tree, at rest.
+/// A node of the hierarchy, in its rest pose.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Node {
     /// Name in the file; may be empty.
     pub name: String,
-    /// Its parent, which comes before it in [`Parts::nodes`].
+    /// Index of its parent, which comes before it in [`RigParts::nodes`].
     pub parent: Option<usize>,
-    /// Where it stands.
-    pub local: Local,
-    /// Weights of the morph targets of the meshes that it carries; as many as these have targets.
+    /// Transform relative to the parent.
+    pub local: LocalTransform,
+    /// Weights of the morph targets of its meshes, one per target.
     pub weights: Vec<f32>,
 }
 
-/// A skeleton as a mesh is bound to it.
+/// A skin (glTF): joints and inverse bind matrices.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Skin {
     /// Name in the file; may be empty.
     pub name: String,
-    /// Nodes.
+    /// Joints, as indices into [`RigParts::nodes`].
     pub joints: Vec<usize>,
-    /// For each joint, from the mesh as modelled to the joint.
+    /// Inverse bind matrix of each joint: from the undeformed mesh to the joint's space.
     pub inverse_bind: Vec<DAffine3>,
 }
 
-/// What of a node a channel changes.
+/// The property of a node that a channel animates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Property {
-    /// Where it is moved to; three numbers.
+    /// Translation; three numbers.
     Translation,
-    /// How it is turned; a quaternion x, y, z, w.
+    /// Rotation; a quaternion x, y, z, w.
     Rotation,
-    /// How it is scaled; three numbers. Where that would leave less of an instance than 1e-7 of the scene's size in some direction,
-    /// that much is left, since tracers invert transforms.
+    /// Scale; three numbers. It is clamped so that the extent of an instance is at least 1e-7 of the scene's size in every direction,
+    /// because tracers invert transforms.
     Scale,
     /// Weights of morph targets, as many as the node has.
     Weights,
 }
 
-/// Keys for one property of one node.
+/// The keyframes of one property of one node.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Channel {
-    /// Index into [`Parts::nodes`].
+    /// Index into [`RigParts::nodes`].
     pub node: usize,
-    /// What of the node.
+    /// The animated property.
     pub property: Property,
-    /// Over time.
+    /// Its values over time.
     pub sampler: Sampler,
 }
 
@@ -115,58 +115,58 @@ pub struct Animation {
     pub name: String,
     /// Time of the last key in seconds; zero when there is none.
     pub duration: f64,
-    /// What it changes; at most one channel for each property of a node.
+    /// Channels, at most one for each property of a node.
     pub channels: Vec<Channel>,
 }
 
-/// What a [`Rig`] is made of.
+/// The data of an [`AnimationRig`].
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Parts {
-    /// The tree, parents before children.
+pub struct RigParts {
+    /// The node hierarchy, parents before children.
     pub nodes: Vec<Node>,
-    /// Skeletons.
+    /// Skins.
     pub skins: Vec<Skin>,
-    /// Meshes that deform, each named once.
+    /// Meshes that deform, each listed once.
     pub deformations: Vec<Deformation>,
-    /// What can be played.
+    /// Animations that can be played.
     pub animations: Vec<Animation>,
-    /// For each of [`Scene::instances`] the node that places it; `None` for one that stays, and for skinned meshes.
+    /// The node of each of [`Scene::instances`]; `None` for a static instance, and for skinned meshes.
     pub instances: Vec<Option<usize>>,
-    /// For each of [`Scene::cameras`] the node that carries it; `None` for one that stays.
+    /// The node of each of [`Scene::cameras`]; `None` for a static camera.
     pub cameras: Vec<Option<usize>>,
 }
 
-/// A scene's animations and what they act on.
+/// A scene's animations, with the nodes, skins and meshes that they act on.
 #[derive(Clone, Debug)]
-pub struct Rig {
-    parts: Parts,
+pub struct AnimationRig {
+    parts: RigParts,
     /// World transforms of the nodes at rest.
     rest: Vec<DAffine3>,
-    /// For each channel of each animation: it keeps its property as it is at rest.
+    /// For each channel of each animation: whether it keeps its property at the rest value.
     still: Vec<Vec<bool>>,
-    /// For each deformation its mesh as modelled. Empty until [`Rig::settle`].
-    shapes: Vec<Shape>,
-    /// For each instance the least scale, below which nothing could be seen.
+    /// For each deformation its undeformed mesh. Empty until [`AnimationRig::apply_rest_pose`].
+    shapes: Vec<VertexData>,
+    /// For each instance the minimum scale.
     floors: Vec<f64>,
 }
 
-impl Rig {
-    /// Gives a scene made in code its rig. Meshes that deform hold their shape as modelled before, that at rest afterwards; what nodes
-    /// place or carry is put where they are at rest.
+impl AnimationRig {
+    /// Attaches a rig to a scene made in code. Deforming meshes must hold their undeformed vertices, and get those of the rest pose;
+    /// instances and cameras of nodes get the nodes' rest transforms.
     ///
     /// # Errors
     /// [`Error::Scene`] for indices out of range, wrong counts, numbers that are not finite.
-    pub fn attach(scene: &mut Scene, parts: Parts) -> Result<()> {
+    pub fn attach(scene: &mut Scene, parts: RigParts) -> Result<()> {
         scene.rig = Some(Self::new(scene, parts).map_err(|e| Error::Scene(format!("{}: {e}", scene.name)))?);
-        Self::settle(scene);
+        Self::apply_rest_pose(scene);
         Ok(())
     }
 
-    /// The rig of `scene`, whose meshes are as modelled.
+    /// The rig of `scene`, whose meshes are undeformed.
     ///
     /// # Errors
     /// What is wrong, in words.
-    pub(in crate::scene) fn new(scene: &Scene, parts: Parts) -> Result<Self, String> {
+    pub(in crate::scene) fn new(scene: &Scene, parts: RigParts) -> Result<Self, String> {
         check::check(scene, &parts)?;
         let mut rest: Vec<DAffine3> = Vec::with_capacity(parts.nodes.len());
         for node in &parts.nodes {
@@ -176,28 +176,28 @@ impl Rig {
         if let Some(i) = rest.iter().position(|m| !m.is_finite()) {
             return Err(format!("node {i} `{}` has a transform that is not finite", parts.nodes[i].name));
         }
-        let still = parts.animations.iter().map(|a| a.channels.iter().map(|c| c.is_still(&parts.nodes[c.node])).collect());
+        let still = parts.animations.iter().map(|a| a.channels.iter().map(|c| c.is_constant(&parts.nodes[c.node])).collect());
         Ok(Self { still: still.collect(), rest, shapes: Vec::new(), floors: Vec::new(), parts })
     }
 
-    /// What it is made of.
-    pub fn parts(&self) -> &Parts {
+    /// Its nodes, skins, deformations and animations.
+    pub fn parts(&self) -> &RigParts {
         &self.parts
     }
 
-    /// What can be played.
+    /// Animations that can be played.
     pub fn animations(&self) -> &[Animation] {
         &self.parts.animations
     }
 
-    /// A deforming mesh as modelled, before targets and skin. `deformation` is an index into [`Parts::deformations`].
-    pub fn modelled(&self, deformation: usize) -> Option<&Shape> {
+    /// A deforming undeformed mesh, before targets and skin. `deformation` is an index into [`RigParts::deformations`].
+    pub fn undeformed(&self, deformation: usize) -> Option<&VertexData> {
         self.shapes.get(deformation)
     }
 }
 
 impl Channel {
-    /// How many numbers a value has.
+    /// Number of components of a value.
     fn width(&self, node: &Node) -> usize {
         match self.property {
             Property::Translation | Property::Scale => 3,
@@ -206,23 +206,23 @@ impl Channel {
         }
     }
 
-    /// Does it keep the node as it is at rest, but for rounding? Exporters write such channels for all that could be animated.
-    pub(in crate::scene) fn is_still(&self, node: &Node) -> bool {
+    /// Whether it keeps the node at its rest value, up to rounding. Exporters write such channels for everything that could be animated.
+    pub(in crate::scene) fn is_constant(&self, node: &Node) -> bool {
         let close =
             |a: f64, b: f32| (a - f64::from(b)).abs() <= 2.0 * f64::from(f32::EPSILON) * a.abs().max(f64::from(b.abs()));
         let same = |v: &[f32]| match (self.property, node.local) {
             (Property::Weights, _) => v == node.weights,
-            (Property::Translation, Local::Parts { translation: at, .. }) => {
+            (Property::Translation, LocalTransform::Trs { translation: at, .. }) => {
                 at.to_array().iter().zip(v).all(|(a, b)| close(*a, *b))
             }
-            (Property::Scale, Local::Parts { scale, .. }) => scale.to_array().iter().zip(v).all(|(a, b)| close(*a, *b)),
-            (Property::Rotation, Local::Parts { rotation, .. }) => {
+            (Property::Scale, LocalTransform::Trs { scale, .. }) => scale.to_array().iter().zip(v).all(|(a, b)| close(*a, *b)),
+            (Property::Rotation, LocalTransform::Trs { rotation, .. }) => {
                 let q = glam::DVec4::from_array([0, 1, 2, 3].map(|i| v.get(i).map_or(0.0, |&x| f64::from(x))));
                 // within a millionth of a radian
                 sampler::unit(q).dot(rotation).abs() > 1.0 - 1e-13
             }
             _ => false,
         };
-        self.sampler.is_still(self.width(node), same)
+        self.sampler.is_constant(self.width(node), same)
     }
 }

@@ -1,25 +1,25 @@
-//! Playing: what an animation changes, and how things stand at a time.
+//! Playback: what an animation changes, and the pose at a time.
 
 use glam::{DAffine3, DVec3};
 
 use super::transform::{anchor, at_least};
-use super::{Animation, Deformation, Local, Property, Rig, Shape};
+use super::{Animation, AnimationRig, Deformation, LocalTransform, Property, VertexData};
 use crate::error::{Error, Result};
 use crate::scene::camera::rigid;
 use crate::scene::{Geometry, Motion, Scene};
 
-/// What happens beyond an animation's end.
+/// Behaviour after the end of an animation.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Playback {
-    /// It starts again.
+    /// It repeats.
     #[default]
     Loop,
-    /// It stands still, as it does before its beginning.
+    /// It holds its last pose, and its first pose before the beginning.
     Once,
 }
 
 impl Playback {
-    /// Seconds since the beginning of an animation, from seconds since it was started. A time that is not finite is its beginning.
+    /// Maps seconds since the start of playback to seconds in the animation. A time that is not finite maps to its beginning.
     pub fn time(self, seconds: f64, duration: f64) -> f64 {
         match self {
             _ if !seconds.is_finite() || duration <= 0.0 => 0.0,
@@ -29,23 +29,23 @@ impl Playback {
     }
 }
 
-/// A mesh in its pose.
+/// A deformed mesh.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PosedMesh {
     /// Index into [`Scene::meshes`].
     pub mesh: usize,
     /// Its vertices. Normals are empty where the mesh has none; tangents always.
-    pub shape: Shape,
+    pub shape: VertexData,
 }
 
-/// How what an animation changes stands at some time. Its buffers are used again when it is filled again.
+/// The state at one time of everything that an animation changes. Its buffers are reused when it is filled again.
 #[derive(Clone, Debug, Default)]
 pub struct Pose {
-    /// Instances (indices into [`Scene::instances`]) and their object-to-world transforms, all of which can be inverted.
+    /// Moving instances (indices into [`Scene::instances`]) and their object-to-world transforms, all of which can be inverted.
     pub instances: Vec<(usize, DAffine3)>,
     /// Meshes that deform.
     pub meshes: Vec<PosedMesh>,
-    /// Cameras (indices into [`Scene::cameras`]) and their camera-to-world transforms, without scale.
+    /// Moving cameras (indices into [`Scene::cameras`]) and their camera-to-world transforms, without scale.
     pub cameras: Vec<(usize, DAffine3)>,
     scratch: Scratch,
 }
@@ -53,14 +53,14 @@ pub struct Pose {
 #[derive(Clone, Debug, Default)]
 struct Scratch {
     live: Vec<bool>,
-    locals: Vec<Local>,
+    locals: Vec<LocalTransform>,
     world: Vec<DAffine3>,
     joints: Vec<DAffine3>,
     weights: Vec<f64>,
 }
 
 impl Pose {
-    /// Puts the scene that the pose was made for into it.
+    /// Applies the pose to the scene for which it was computed.
     pub fn apply(&self, scene: &mut Scene) {
         for &(i, to_world) in &self.instances {
             if let Some(instance) = scene.instances.get_mut(i) {
@@ -81,9 +81,9 @@ impl Pose {
     }
 }
 
-impl Rig {
-    /// The instances that an animation moves and the meshes that it deforms, and nothing else: keys that leave a node as it is at rest
-    /// move nothing. What it does to cameras concerns no tracer.
+impl AnimationRig {
+    /// The instances that an animation moves and the meshes that it deforms. Channels that keep a node at rest do not count, nor do
+    /// cameras, which tracers do not hold.
     ///
     /// # Errors
     /// [`Error::Usage`] when there is no such animation.
@@ -108,8 +108,8 @@ impl Rig {
         Ok(self.moved(&self.parts.cameras, &live).map(|(i, _)| i).collect())
     }
 
-    /// How everything that an animation changes ([`Rig::motion`]) stands `seconds` after it was started. `pose` may come from any rig
-    /// and time.
+    /// Computes the state of everything that an animation changes ([`AnimationRig::motion`]), `seconds` after the start of playback. `pose`
+    /// is overwritten, whatever it held.
     ///
     /// # Errors
     /// [`Error::Usage`] when there is no such animation.
@@ -120,7 +120,7 @@ impl Rig {
         locals.clear();
         locals.extend(self.parts.nodes.iter().map(|n| n.local));
         for (channel, _) in playing.channels.iter().zip(&self.still[animation]).filter(|(_, still)| !**still) {
-            let Local::Parts { translation, rotation, scale } = &mut locals[channel.node] else { continue };
+            let LocalTransform::Trs { translation, rotation, scale } = &mut locals[channel.node] else { continue };
             match channel.property {
                 Property::Translation => *translation = channel.sampler.vector(seconds),
                 Property::Rotation => *rotation = channel.sampler.rotation(seconds),
@@ -159,7 +159,7 @@ impl Rig {
         Ok(())
     }
 
-    /// Which nodes an animation moves, itself or with a parent.
+    /// Marks the nodes that an animation moves, directly or through a parent.
     fn live(&self, animation: usize, live: &mut Vec<bool>) -> Result<&Animation> {
         let Some(playing) = self.parts.animations.get(animation) else {
             let count = self.parts.animations.len();
@@ -176,7 +176,7 @@ impl Rig {
         Ok(playing)
     }
 
-    /// Of what nodes carry, that which moves, and the node of each.
+    /// The instances or cameras on moving nodes, each with its node.
     fn moved<'a>(&self, carried: &'a [Option<usize>], live: &'a [bool]) -> impl Iterator<Item = (usize, usize)> + use<'a> {
         carried.iter().enumerate().filter_map(|(i, node)| Some((i, (*node)?))).filter(|(_, node)| live[*node])
     }
@@ -188,7 +188,7 @@ impl Rig {
         skinned || (!deformation.targets.is_empty() && channels.any(|(c, still)| !still && morphs(c)))
     }
 
-    /// Weights of a mesh's targets: as animated, or at rest.
+    /// Weights of a mesh's morph targets, animated or at rest.
     fn weights(&self, deformation: &Deformation, playing: Option<(&Animation, f64)>, out: &mut Vec<f64>) {
         out.clear();
         out.extend(self.parts.nodes[deformation.node].weights.iter().map(|&w| f64::from(w)));
@@ -199,7 +199,7 @@ impl Rig {
         }
     }
 
-    /// What each joint of a mesh's skin does to its vertices, given the nodes' world transforms.
+    /// The joint matrices of a mesh's skin, given the nodes' world transforms.
     fn joints(&self, deformation: &Deformation, world: &[DAffine3], out: &mut Vec<DAffine3>) {
         out.clear();
         let Some(skin) = deformation.skin else { return };
@@ -210,7 +210,7 @@ impl Rig {
         }));
     }
 
-    /// Where instances of meshes with this skin stand.
+    /// World position of the instances of meshes with this skin.
     fn anchor(&self, skin: usize) -> DVec3 {
         self.parts.skins[skin].joints.first().map_or(DVec3::ZERO, |&j| anchor(&self.rest[j]))
     }
@@ -219,18 +219,18 @@ impl Rig {
         self.floors.get(instance).copied().unwrap_or(1e-7)
     }
 
-    /// Puts a scene whose meshes are as modelled into its rest pose, and keeps what it takes to pose it otherwise.
-    pub(in crate::scene) fn settle(scene: &mut Scene) {
+    /// Puts a scene whose meshes are undeformed into its rest pose, and keeps the undeformed vertices for other poses.
+    pub(in crate::scene) fn apply_rest_pose(scene: &mut Scene) {
         let Some(mut rig) = scene.rig.take() else { return };
         rig.shapes.clear();
         let (mut weights, mut joints) = (Vec::new(), Vec::new());
         for deformation in &rig.parts.deformations {
             // other geometry was refused when the rig was made
             let Geometry::Triangles(t) = &mut scene.meshes[deformation.mesh].geometry else { continue };
-            let base = Shape::take(t);
+            let base = VertexData::take(t);
             rig.weights(deformation, None, &mut weights);
             rig.joints(deformation, &rig.rest, &mut joints);
-            let mut shape = Shape::default();
+            let mut shape = VertexData::default();
             deformation.pose(&base, &weights, &joints, true, &mut shape);
             shape.give(t);
             rig.shapes.push(base);
@@ -245,7 +245,7 @@ impl Rig {
             for (i, node) in rig.parts.instances.iter().enumerate().filter_map(|(i, n)| Some((i, (*n)?))) {
                 let instance = &mut scene.instances[i];
                 let rest = rig.rest[node];
-                // what stays was seen to by loaders, or is as its author wants it
+                // static instances keep their transform: loaders have checked it
                 let changes = moving[i] || deforming[instance.mesh];
                 instance.object_to_world = if changes { at_least(&rest, rig.floor(i)) } else { rest };
             }
@@ -270,7 +270,7 @@ impl Rig {
     }
 }
 
-/// How large a mesh is, in its own units.
+/// Largest extent of a mesh, in object space.
 fn extent(geometry: &Geometry) -> f64 {
     geometry.bounds().map_or(0.0, |(lo, hi)| (hi - lo).max_element())
 }

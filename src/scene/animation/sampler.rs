@@ -1,42 +1,43 @@
-//! Values between keys, as appendix C of the glTF 2.0 specification has them.
+//! Interpolation between keyframes, as in appendix C of the glTF 2.0 specification.
 
 use std::sync::Arc;
 
 use glam::{DQuat, DVec3, DVec4};
 
-/// How values between two keys come about.
+/// Interpolation between two keys.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Interpolation {
     /// The value of the key before.
     Step,
-    /// In a straight line; rotations turn evenly, the shorter way (slerp).
+    /// Linear; rotations by slerp, the shorter way.
     #[default]
     Linear,
-    /// Cubic Hermite splines, whose tangents lie beside the values; rotations are brought to unit length afterwards.
+    /// Cubic Hermite splines with stored tangents; rotations are normalized afterwards.
     CubicSpline,
 }
 
-/// Keys of one animated property.
+/// Keyframes of one animated property.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sampler {
-    /// How values between keys come about.
+    /// Interpolation between keys.
     pub interpolation: Interpolation,
-    /// Seconds, increasing. Channels of a file often share them.
+    /// Times of the keys in seconds, increasing. Channels of a file often share them.
     pub times: Arc<[f32]>,
     /// The numbers of each key, one key after the other; for splines those of the incoming tangent, the value and the outgoing
     /// tangent (per second).
     pub values: Vec<f32>,
 }
 
-/// Where a time lies: key `key`, `share` of the way (0 to 1) to the next one, which is `seconds` later; 0 when there is none.
-struct Between {
+/// The position of a time between keys: a fraction `share` (0 to 1) of the way from key `key` to the next one, which is `seconds` later (0
+/// without a next key).
+struct KeyInterval {
     key: usize,
     share: f64,
     seconds: f64,
 }
 
 impl Sampler {
-    /// Values of `width` numbers: are there any keys, as many values as keys, times that increase, all finite?
+    /// Checks that there are keys, with increasing times, and a value of `width` numbers for each, all finite.
     ///
     /// # Errors
     /// What is wrong, in words.
@@ -61,7 +62,7 @@ impl Sampler {
         }
     }
 
-    /// Values a key has: splines have tangents.
+    /// Number of values per key: splines have two tangents.
     fn stride(&self) -> usize {
         if self.interpolation == Interpolation::CubicSpline { 3 } else { 1 }
     }
@@ -80,18 +81,18 @@ impl Sampler {
         self.values.get(at * width..(at + 1) * width).unwrap_or_default()
     }
 
-    /// Before the first key and after the last one time stands still.
-    fn locate(&self, seconds: f64) -> Between {
+    /// Finds the keys around a time. Times before the first key and after the last one are clamped.
+    fn locate(&self, seconds: f64) -> KeyInterval {
         let next = self.times.partition_point(|&t| f64::from(t) <= seconds);
         if next == 0 || next == self.times.len() {
-            return Between { key: next.saturating_sub(1), share: 0.0, seconds: 0.0 };
+            return KeyInterval { key: next.saturating_sub(1), share: 0.0, seconds: 0.0 };
         }
         let (from, to) = (f64::from(self.times[next - 1]), f64::from(self.times[next]));
-        Between { key: next - 1, share: (seconds - from) / (to - from), seconds: to - from }
+        KeyInterval { key: next - 1, share: (seconds - from) / (to - from), seconds: to - from }
     }
 
     /// Number `i` of a value of `width` numbers; straight lines for [`Interpolation::Linear`].
-    fn number(&self, b: &Between, width: usize, i: usize) -> f64 {
+    fn number(&self, b: &KeyInterval, width: usize, i: usize) -> f64 {
         let at = |key, part| self.numbers(key, width, part).get(i).map_or(0.0, |&v| f64::from(v));
         let (here, u) = (at(b.key, 0), b.share);
         if b.seconds == 0.0 {
@@ -124,7 +125,7 @@ impl Sampler {
                 let numbers = self.numbers(key, 4, 0);
                 unit(DVec4::from_array([0, 1, 2, 3].map(|i| numbers.get(i).map_or(0.0, |&v| f64::from(v)))))
             });
-            // the shorter way round: glam turns the end where their product is below zero
+            // the shorter way round: glam negates the end where the dot product is negative
             return from.slerp(to, b.share).normalize();
         }
         unit(DVec4::from_array([0, 1, 2, 3].map(|i| self.number(&b, 4, i))))
@@ -139,8 +140,8 @@ impl Sampler {
         }
     }
 
-    /// All keys have one value, and it is the one that `same` recognises: nothing is animated.
-    pub(super) fn is_still(&self, width: usize, same: impl Fn(&[f32]) -> bool) -> bool {
+    /// Whether all keys have one value, and `same` accepts it: nothing is animated.
+    pub(super) fn is_constant(&self, width: usize, same: impl Fn(&[f32]) -> bool) -> bool {
         let spline = self.interpolation == Interpolation::CubicSpline;
         let first = self.numbers(0, width, 0);
         same(first)
@@ -151,7 +152,7 @@ impl Sampler {
     }
 }
 
-/// Unit length; a zero quaternion stands for no rotation, as it does in nodes.
+/// Normalizes a quaternion; a zero quaternion stands for no rotation, as it does in nodes.
 pub(super) fn unit(q: DVec4) -> DQuat {
     q.try_normalize().map_or(DQuat::IDENTITY, DQuat::from_vec4)
 }

@@ -1,16 +1,16 @@
-//! Transforms that tracers can take.
+//! Transforms that are precise and invertible enough for tracers.
 
 use glam::{DAffine3, DVec3};
 
-/// Where the instance of a skinned mesh stands, given its first joint's world transform at rest: near the joint, so that f32 is spent
-/// on the mesh and not on its distance from the origin. Zero for all but far-away skeletons.
+/// World position of the instance of a skinned mesh, given its first joint's world transform at rest. It is near the joint, so that the
+/// mesh keeps its precision in f32 far from the origin; it is zero for skeletons near the origin.
 pub(in crate::scene) fn anchor(joint: &DAffine3) -> DVec3 {
     // so coarse that it is exact in f32
     const STEP: f64 = 1024.0;
     (joint.translation / STEP).round() * STEP
 }
 
-/// `t` with at least the scale `floor` (above zero) in every direction; as it is where it has that.
+/// `t` with at least the scale `floor` (above zero) in every direction; unchanged where it has that.
 pub(super) fn at_least(t: &DAffine3, floor: f64) -> DAffine3 {
     let mut columns = [t.matrix3.x_axis, t.matrix3.y_axis, t.matrix3.z_axis];
     let longest = |columns: &[DVec3; 3], of: &[usize], along: &dyn Fn(DVec3) -> DVec3| {
@@ -32,7 +32,7 @@ pub(super) fn at_least(t: &DAffine3, floor: f64) -> DAffine3 {
         side = direction * floor;
     }
     let c = 3 - a - b;
-    // the handedness that it has, or that of a rotation
+    // keep the handedness; a degenerate transform gets that of a rotation
     let even = (a + 1) % 3 == b;
     let normal = first.cross(side).normalize() * if even { 1.0 } else { -1.0 };
     let height = columns[c].dot(normal);

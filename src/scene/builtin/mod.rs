@@ -1,7 +1,7 @@
-//! Scenes written in code, for tests and for a first picture without any file.
+//! Built-in scenes, for tests and for a first image without any file.
 //!
-//! [`by_name`] makes the scenes as the command line names them; [`analytic`] has those with a known answer, parameterised for
-//! tests; [`shapes`] the meshes they are made of.
+//! [`by_name`] makes the scenes by their names on the command line; [`analytic`] has those with a known ambient occlusion, with parameters for
+//! tests; [`shapes`] has their meshes.
 
 pub mod analytic;
 pub mod cornell;
@@ -18,7 +18,7 @@ use glam::{DAffine3, DVec3, Vec3};
 pub struct BuiltinInfo {
     /// What [`by_name`] takes, before any `:PARAMETER`.
     pub name: &'static str,
-    /// What it shows, and its parameter with default and range, if it has one.
+    /// Contents, and the parameter with default and range, if it has one.
     pub description: &'static str,
 }
 
@@ -37,14 +37,14 @@ const NAMES: &[BuiltinInfo] = &[
     info("closed-box", "the inside of a closed box; AO is 0 everywhere"),
     info("parallel-planes", "a floor and a ceiling; AO has a closed form"),
     info("plane", "a single plane; AO is 1 everywhere"),
-    info("grid", "N x N x N turned and stretched instances of a torus over a floor (grid:N, 1 to 128, default 6)"),
+    info("grid", "N x N x N rotated and scaled instances of a torus over a floor (grid:N, 1 to 128, default 6)"),
     info("spheres", "N random analytic spheres over a floor (spheres:N, 1 to 10000000, default 1000)"),
     info("terrain", "a fractal landscape of N triangles (terrain:N, 2 to 100000000, default 100000)"),
-    info("instances", "15 landscapes placed 125 times, N triangles in all (instances:N, 250 to 500000000, default 1000000)"),
+    info("instances", "125 instances of 15 landscapes, N triangles in all (instances:N, 250 to 500000000, default 1000000)"),
     info("leaf-cards", "bushes of leaves cut from quads by alpha masks, some of them blended"),
     info("stairs", "stairs, a column and a rail: contact detail"),
-    info("parade", "an animation of two seconds: moving blocks, a rotor, a column that bends, a ball that changes its shape"),
-    info("far-away", "the stairs, placed more than a million units from the origin"),
+    info("parade", "an animation of two seconds: moving blocks, a rotor, a skinned column, a ball with morph targets"),
+    info("far-away", "the stairs, more than a million units from the origin"),
 ];
 
 /// All built-in scenes.
@@ -60,12 +60,12 @@ pub fn by_name(name: &str) -> Option<Scene> {
     Some(scene)
 }
 
-/// Would [`by_name`] make a scene of this name? Says so without making it.
+/// Whether [`by_name`] would make a scene of this name; the scene is not made.
 pub fn exists(name: &str) -> bool {
     recipe(name).is_some()
 }
 
-/// How to make a scene.
+/// The function that makes a scene.
 fn recipe(name: &str) -> Option<Box<dyn FnOnce() -> Scene>> {
     let (base, parameter) = match name.split_once(':') {
         Some((base, parameter)) => (base, Some(parameter)),
@@ -84,7 +84,7 @@ fn recipe(name: &str) -> Option<Box<dyn FnOnce() -> Scene>> {
     match base {
         "v-groove" => {
             let angle = number(90.0, 1.0, 180.0)?.to_radians();
-            return Some(Box::new(move || analytic::v_groove(angle, 4.0, 12.0, Placement::default())));
+            return Some(Box::new(move || analytic::v_groove(angle, 4.0, 12.0, SceneTransform::default())));
         }
         "grid" => return with(many::grid, between(6, 1, 128)),
         "spheres" => return with(many::spheres, between(1000, 1, 10_000_000)),
@@ -99,10 +99,10 @@ fn recipe(name: &str) -> Option<Box<dyn FnOnce() -> Scene>> {
         "cornell-mirror" => cornell::cornell_mirror,
         "cornell-glass-sphere" => cornell::cornell_glass_sphere,
         "cornell-spheres" => cornell::cornell_spheres,
-        "sphere-over-plane" => || analytic::sphere_over_plane(1.0, 1.25, 60.0, Placement::default()),
-        "closed-box" => || analytic::closed_box(2.0, Placement::default()),
-        "parallel-planes" => || analytic::parallel_planes(8.0, 6.0, 1.0, Placement::default()),
-        "plane" => || analytic::plane(20.0, Placement::default()),
+        "sphere-over-plane" => || analytic::sphere_over_plane(1.0, 1.25, 60.0, SceneTransform::default()),
+        "closed-box" => || analytic::closed_box(2.0, SceneTransform::default()),
+        "parallel-planes" => || analytic::parallel_planes(8.0, 6.0, 1.0, SceneTransform::default()),
+        "plane" => || analytic::plane(20.0, SceneTransform::default()),
         "leaf-cards" => many::leaf_cards,
         "parade" => parade::parade,
         "stairs" => || many::stairs(DVec3::ZERO),
@@ -112,22 +112,22 @@ fn recipe(name: &str) -> Option<Box<dyn FnOnce() -> Scene>> {
     Some(Box::new(make))
 }
 
-/// Where a scene for tests lies: scaled about its own origin, then moved. It goes into the instances' transforms.
+/// Transform of a test scene: scale about its own origin, then translation. It becomes part of the instances' transforms.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Placement {
+pub struct SceneTransform {
     /// Uniform scale.
     pub scale: f64,
     /// World position of the scene's own origin.
     pub offset: DVec3,
 }
 
-impl Default for Placement {
+impl Default for SceneTransform {
     fn default() -> Self {
         Self { scale: 1.0, offset: DVec3::ZERO }
     }
 }
 
-impl Placement {
+impl SceneTransform {
     /// The world point of a point in the scene's own units.
     pub fn point(&self, p: DVec3) -> DVec3 {
         p * self.scale + self.offset

@@ -1,5 +1,5 @@
-//! A scene in motion: blocks that slide and turn, a rotor, a column that bends, a ball that changes its shape, and a camera that
-//! swings past. Two seconds, then it starts again without a seam.
+//! An animated scene: blocks that slide and rotate, a rotor, a skinned column, a ball with morph targets, and a moving
+//! camera. It loops seamlessly after two seconds.
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 use std::sync::Arc;
@@ -8,11 +8,12 @@ use glam::{DAffine3, DQuat, DVec3, Vec3};
 
 use super::shapes;
 use crate::scene::animation::{
-    Animation, Channel, Deformation, Influences, Interpolation, Local, Node, Parts, Property, Sampler, Skin, Target,
+    Animation, Channel, Deformation, Influences, Interpolation, LocalTransform, MorphTarget, Node, Property, RigParts, Sampler,
+    Skin,
 };
-use crate::scene::{Camera, Geometry, Rig, Scene, TriangleMesh};
+use crate::scene::{AnimationRig, Camera, Geometry, Scene, TriangleMesh};
 
-/// Seconds until it starts again.
+/// Duration of the loop in seconds.
 const DURATION: f64 = 2.0;
 
 /// Distance from joint to joint of the column.
@@ -21,7 +22,7 @@ const BONE: f64 = 0.7;
 /// Animation 0 moves everything, animation 1 only bends the column.
 pub fn parade() -> Scene {
     let mut scene = Scene { name: "parade".to_owned(), ..Scene::default() };
-    let mut stage = Stage::default();
+    let mut stage = RigBuilder::default();
     let [grey, red, blue, yellow] = [
         ("floor", Vec3::new(0.7, 0.7, 0.68)),
         ("block", Vec3::new(0.65, 0.2, 0.15)),
@@ -55,7 +56,7 @@ pub fn parade() -> Scene {
     for k in 0..3 {
         let arm = stage.node("arm", Some(axle), DVec3::ZERO);
         let rotation = DQuat::from_rotation_y(TAU * f64::from(k) / 3.0) * DQuat::from_rotation_x(0.4);
-        stage.parts.nodes[arm].local = Local::Parts { translation: DVec3::ZERO, rotation, scale: DVec3::ONE };
+        stage.parts.nodes[arm].local = LocalTransform::Trs { translation: DVec3::ZERO, rotation, scale: DVec3::ONE };
         stage.place(&mut scene, arm, blade);
     }
 
@@ -71,7 +72,7 @@ pub fn parade() -> Scene {
     let cart = stage.node("swing", None, DVec3::ZERO);
     let seat = |t: f64| swing(t).camera_to_world.to_scale_rotation_translation();
     let (scale, rotation, translation) = seat(0.0);
-    stage.parts.nodes[cart].local = Local::Parts { translation, rotation, scale };
+    stage.parts.nodes[cart].local = LocalTransform::Trs { translation, rotation, scale };
     stage.line(cart, Property::Translation, 17, |t| seat(t).2.to_array().to_vec());
     stage.line(cart, Property::Rotation, 17, |t| seat(t).1.to_array().to_vec());
     scene.cameras.push(Camera { name: "swing".to_owned(), ..swing(0.0) });
@@ -80,8 +81,8 @@ pub fn parade() -> Scene {
     let bends = stage.channels.iter().filter(|c| stage.parts.nodes[c.node].name.starts_with("joint")).cloned().collect();
     let animation = |name: &str, channels| Animation { name: name.to_owned(), duration: DURATION, channels };
     stage.parts.animations = vec![animation("parade", std::mem::take(&mut stage.channels)), animation("bend", bends)];
-    // sound by construction; were it not, the tests would miss the rig
-    let _ = Rig::attach(&mut scene, stage.parts);
+    // valid by construction; otherwise the scene has no rig, and tests fail
+    let _ = AnimationRig::attach(&mut scene, stage.parts);
     scene
 }
 
@@ -91,18 +92,18 @@ fn wave(t: f64) -> f64 {
 }
 
 #[derive(Default)]
-struct Stage {
-    parts: Parts,
+struct RigBuilder {
+    parts: RigParts,
     channels: Vec<Channel>,
 }
 
-impl Stage {
+impl RigBuilder {
     fn node(&mut self, name: &str, parent: Option<usize>, translation: DVec3) -> usize {
         self.node_scaled(name, parent, translation, 1.0)
     }
 
     fn node_scaled(&mut self, name: &str, parent: Option<usize>, translation: DVec3, scale: f64) -> usize {
-        let local = Local::Parts { translation, rotation: DQuat::IDENTITY, scale: DVec3::splat(scale) };
+        let local = LocalTransform::Trs { translation, rotation: DQuat::IDENTITY, scale: DVec3::splat(scale) };
         self.parts.nodes.push(Node { name: name.to_owned(), parent, local, weights: Vec::new() });
         self.parts.nodes.len() - 1
     }
@@ -191,7 +192,10 @@ impl Stage {
             }
             changed.normals = smooth_normals(&changed);
             let delta = |a: &[Vec3], b: &[Vec3]| a.iter().zip(b).map(|(a, b)| *a - *b).collect();
-            Target { positions: delta(&changed.positions, &ball.positions), normals: delta(&changed.normals, &ball.normals) }
+            MorphTarget {
+                positions: delta(&changed.positions, &ball.positions),
+                normals: delta(&changed.normals, &ball.normals),
+            }
         };
         let flat = target(&|p| p * DVec3::new(1.35, 0.55, 1.35));
         let bumps = target(&|p| p * (1.0 + 0.35 * (11.0 * p.x).sin() * (11.0 * p.y).sin() * (11.0 * p.z).sin()));

@@ -11,9 +11,9 @@ use crate::scene::{Geometry, Scene, TriangleMesh};
 use glam::{DAffine3, DVec3, Vec3};
 use rayon::prelude::*;
 
-/// Side of the terrain in world units.
+/// Side of the terrain in scene units.
 const SIDE: f64 = 100.0;
-/// Height of the lowest octave's hills, world units.
+/// Height of the lowest octave's hills in scene units.
 const RELIEF: f64 = 14.0;
 /// Cells of the lowest octave along a side.
 const CELLS: f64 = 5.0;

@@ -9,9 +9,9 @@ use std::path::Path;
 use glam::{DAffine3, DQuat, DVec3};
 use serde_json::{Value, json};
 
-use super::{Written, icosphere, material, write_buffered};
+use super::{ExportStats, icosphere, material, write_buffered};
 use crate::error::{Error, Result};
-use crate::scene::animation::Shape;
+use crate::scene::animation::VertexData;
 use crate::scene::{
     Camera, Filter, Geometry, Light, LightKind, Projection, Scene, Sphere, TexelData, Texture, TriangleMesh, Wrap,
 };
@@ -20,12 +20,12 @@ use crate::scene::{
 /// name beside it. The extension of `path` decides. Each file appears only when it is complete, the `.gltf` last.
 ///
 /// Triangles, transforms, materials (core and KHR_materials extensions), textures, cameras, punctual lights and animations with skins
-/// and morph targets come back from the loader as they were (what has a rig is written at its rest). Spheres are tessellated, and counted in what is returned; what glTF has no words for (the
+/// and morph targets survive a round trip through the loader (animated scenes are written in their rest pose). Spheres are tessellated, with a warning; what glTF cannot express (the
 /// environment, render settings, the `.brhan` kind of a material) is left out.
 ///
 /// # Errors
 /// [`Error::Output`], also for another extension or more than 4 GiB.
-pub fn export_gltf(scene: &Scene, path: &Path) -> Result<Written> {
+pub fn export_gltf(scene: &Scene, path: &Path) -> Result<ExportStats> {
     let fail = |message: String| Error::Output { path: path.to_owned(), message };
     let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
     let embed = match extension.to_str() {
@@ -84,7 +84,7 @@ struct Writer {
     accessors: Vec<Value>,
     /// File name and bytes of each image that is not embedded.
     images: Vec<(String, Vec<u8>)>,
-    written: Written,
+    written: ExportStats,
 }
 
 impl Writer {
@@ -110,9 +110,9 @@ impl Writer {
             let deformations = rig.map_or(&[][..], |r| &r.parts().deformations);
             let deformation = deformations.iter().position(|d| d.mesh == m);
             let triangles = match &mesh.geometry {
-                Geometry::Triangles(t) => match deformation.and_then(|d| rig?.modelled(d)) {
+                Geometry::Triangles(t) => match deformation.and_then(|d| rig?.undeformed(d)) {
                     Some(shape) => {
-                        made = modelled(t, shape);
+                        made = undeformed(t, shape);
                         &made
                     }
                     None => t,
@@ -136,7 +136,9 @@ impl Writer {
         for light in &scene.lights {
             if matches!(light.kind, LightKind::Directional { angle } if angle > 0.0) {
                 let name = &light.name;
-                self.written.warnings.push(format!("light '{name}' becomes a direction: glTF's have no extent"));
+                self.written
+                    .warnings
+                    .push(format!("light '{name}' loses its angular diameter: glTF's directional lights have none"));
             }
             nodes.push(light_node(light, lights.len()));
             lights.push(punctual(light));
@@ -162,7 +164,7 @@ impl Writer {
             "scene": 0,
         });
         let mut put = |key: &str, values: Vec<Value>| {
-            // empty arrays are not allowed
+            // glTF does not allow empty arrays
             if !values.is_empty() {
                 json[key] = Value::Array(values);
             }
@@ -253,7 +255,7 @@ impl Writer {
             attributes["COLOR_0"] = json!(self.floats(mesh.colors.iter().map(|c| c.to_array()), false));
         }
         let corners = mesh.indices.iter().flatten();
-        // 0xffff means something else to some readers
+        // 0xffff is the primitive restart value, which glTF forbids
         let small = mesh.positions.len() <= 0xffff;
         let bytes: Vec<u8> = match small {
             true => corners.flat_map(|&i| (i as u16).to_le_bytes()).collect(),
@@ -317,7 +319,7 @@ fn png(texture: &Texture) -> Result<Vec<u8>, String> {
         TexelData::Unorm16(rgba) => (bytemuck::cast_slice(&opaque(rgba)).to_vec(), Rgb16),
         TexelData::Float(_) => {
             return Err(format!(
-                "the texture `{}` holds floats, which no image of a glTF file does: make it a PNG",
+                "the texture `{}` has floating-point texels, which glTF images cannot store: convert it to PNG",
                 texture.name
             ));
         }
@@ -342,9 +344,9 @@ fn sampler(texture: &Texture) -> Value {
     json!({ "magFilter": mag, "minFilter": min, "wrapS": wrap(texture.wrap[0]), "wrapT": wrap(texture.wrap[1]) })
 }
 
-/// A mesh with its vertices as modelled, where those that it has are posed.
-fn modelled(posed: &TriangleMesh, shape: &Shape) -> TriangleMesh {
-    let Shape { positions, normals, tangents } = shape.clone();
+/// A copy of a posed mesh with its undeformed vertices.
+fn undeformed(posed: &TriangleMesh, shape: &VertexData) -> TriangleMesh {
+    let VertexData { positions, normals, tangents } = shape.clone();
     TriangleMesh { positions, normals, tangents, ..posed.clone() }
 }
 

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use glam::Vec3;
 
-/// Triangles to spend on all spheres of a scene.
+/// Maximum number of triangles for all spheres of a scene.
 const BUDGET: u64 = 4_000_000;
 
 /// An icosahedron whose triangles are split in four `level` times, on the unit sphere: `20 * 4^level` triangles,
@@ -48,7 +48,7 @@ pub(super) fn icosphere(level: u32) -> (Vec<Vec3>, Vec<[u32; 3]>) {
     (positions, triangles)
 }
 
-/// How finely to split each of `spheres` spheres: 20480 triangles for a few, fewer for many.
+/// Subdivision level for a scene of `spheres` spheres: 20480 triangles each for a few, fewer for many.
 pub(super) fn level(spheres: u64) -> u32 {
     (1..=5).rev().find(|l| spheres.saturating_mul(20 << (2 * l)) <= BUDGET).unwrap_or(1)
 }

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use glam::{DAffine3, Vec3};
 
-use super::{Written, icosphere, write_buffered};
+use super::{ExportStats, icosphere, write_buffered};
 use crate::error::{Error, Result};
 use crate::scene::{Geometry, Instance, Material, Mesh, Scene, TriangleMesh};
 
@@ -56,7 +56,7 @@ pub fn mesh_bin(scene: &Scene) -> Result<(Vec<Vec3>, Vec<[u32; 3]>)> {
 ///
 /// # Errors
 /// As [`mesh_bin`], and [`Error::Output`].
-pub fn write_mesh_bin(scene: &Scene, path: &Path) -> Result<Written> {
+pub fn write_mesh_bin(scene: &Scene, path: &Path) -> Result<ExportStats> {
     let (positions, indices) = mesh_bin(scene)?;
     write_buffered(path, |out| {
         for n in [positions.len(), indices.len()] {
@@ -70,7 +70,7 @@ pub fn write_mesh_bin(scene: &Scene, path: &Path) -> Result<Written> {
         }
         Ok(())
     })?;
-    let mut written = Written { triangles: indices.len() as u64, ..Written::default() };
+    let mut written = ExportStats { triangles: indices.len() as u64, ..ExportStats::default() };
     let spheres = scene.sphere_count();
     if spheres > 0 {
         let each = 20u64 << (2 * icosphere::level(spheres));
@@ -90,14 +90,14 @@ pub fn read_mesh_bin(path: &Path) -> Result<Scene> {
     let words = bytes.as_chunks::<4>().0;
     let (nv, nt) = match words {
         [nv, nt, ..] => (u32::from_le_bytes(*nv), u32::from_le_bytes(*nt)),
-        _ => return Err(Error::input(path, "is no MESH.bin: it has no header")),
+        _ => return Err(Error::input(path, "is not a MESH.bin: it has no header")),
     };
     let expected = 8 + 12 * (u64::from(nv) + u64::from(nt));
     if bytes.len() as u64 != expected {
         let have = bytes.len();
         return Err(Error::input(
             path,
-            format!("is no MESH.bin: {nv} vertices and {nt} triangles take {expected} bytes, but it has {have}"),
+            format!("is not a MESH.bin: {nv} vertices and {nt} triangles take {expected} bytes, but it has {have}"),
         ));
     }
     if nt == 0 {

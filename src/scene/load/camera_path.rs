@@ -11,8 +11,8 @@
 //! }
 //! ```
 //!
-//! Lengths are in world units. `interpolation` is `smooth` or `linear`. `keys`, and of a key `frame`, `eye` and `target`, must be
-//! there; the others are as in the first key above when left out. Frames increase and need not be whole.
+//! Lengths are in scene units. `interpolation` is `smooth` or `linear`. `keys`, and of a key `frame`, `eye` and `target`, are
+//! required; the defaults of the others are those of the first key above. Frames increase and may be fractional.
 
 use std::path::Path;
 
@@ -58,7 +58,7 @@ fn default_fov() -> f64 {
     45.0
 }
 
-/// Reads a camera path; the head of this file has the format.
+/// Reads a camera path from JSON, in the format of the module's example.
 ///
 /// # Errors
 /// [`Error::Input`] for a file that is missing or broken, with the number of the key, counted from 1, and what is wrong with it.

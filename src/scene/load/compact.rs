@@ -1,4 +1,4 @@
-//! Vertices that a mesh does not use.
+//! Removal of unused vertices.
 
 use crate::scene::TriangleMesh;
 

@@ -1,8 +1,8 @@
-//! Files named by other files, which were written on other machines, in other folders.
+//! Search for files that are referenced by other files, possibly with paths of another machine.
 
 use std::path::{Path, PathBuf};
 
-/// How far above the naming file's folder to look.
+/// Number of parent folders to search above the referencing file's folder.
 const ANCESTORS: usize = 3;
 
 /// Looks for `name` beside the files in `beside` and in up to three folders above each, with and without a leading

@@ -1,4 +1,4 @@
-//! The promises that every loaded scene keeps, whichever format it came from; [`super::load`] lists them.
+//! Checks and repairs that establish the guarantees of every loaded scene, whatever its format; [`super::load`] lists them.
 
 use std::path::Path;
 
@@ -9,7 +9,7 @@ use super::{normals, tangents};
 use crate::error::{Error, Result};
 use crate::scene::animation::Deformation;
 use crate::scene::material::MaterialKind;
-use crate::scene::{Geometry, Instance, Material, Mesh, Rig, Scene, TriangleMesh};
+use crate::scene::{AnimationRig, Geometry, Instance, Material, Mesh, Scene, TriangleMesh};
 
 /// Largest coordinate, in object and world space: beyond it the triangle test's products of three lengths overflow single precision,
 /// and rays would miss.
@@ -18,7 +18,7 @@ const MAX_COORDINATE: f64 = 1e12;
 /// Largest element of an inverse transform, for the same reason.
 const MAX_INVERSE: f64 = 1e30;
 
-/// Makes `scene` keep the promises, or says why it cannot. `path` is the file it came from.
+/// Checks and repairs `scene`, which was read from `path`.
 pub(super) fn finish(scene: &mut Scene, path: &Path) -> Result<()> {
     check(scene, path)?;
     if scene.materials.is_empty() {
@@ -42,17 +42,17 @@ pub(super) fn finish(scene: &mut Scene, path: &Path) -> Result<()> {
         scene.report.tangents_computed += usize::from(note.tangents);
     }
     if scene.rig.is_some() {
-        Rig::settle(scene);
+        AnimationRig::apply_rest_pose(scene);
         check(scene, path)?;
     }
     drop_empty(scene);
-    if scene.rig.as_ref().is_some_and(Rig::is_idle) {
+    if scene.rig.as_ref().is_some_and(AnimationRig::is_idle) {
         scene.rig = None;
     }
     extent(scene, path)
 }
 
-/// Checks what no repair helps: positions that are not finite, indices out of range.
+/// Checks for errors that cannot be repaired: positions that are not finite, indices out of range.
 pub(super) fn check(scene: &Scene, path: &Path) -> Result<()> {
     for (m, mesh) in scene.meshes.iter().enumerate() {
         check_mesh(mesh).map_err(|e| Error::input(path, format!("mesh {m} `{}`: {e}", mesh.name)))?;
@@ -90,7 +90,7 @@ fn check_mesh(mesh: &Mesh) -> Result<(), String> {
     Ok(())
 }
 
-/// Brings the numbers of materials into the ranges that [`Material`] documents, as far as rendering depends on it.
+/// Clamps material parameters to the ranges that [`Material`] documents, where rendering depends on them.
 fn materials(scene: &mut Scene) {
     for material in &mut scene.materials {
         if !material.base_color.is_finite() || !material.emissive.is_finite() {
@@ -114,17 +114,17 @@ fn materials(scene: &mut Scene) {
         for slot in material.texture_slots_mut().into_iter().flatten().filter(|s| !s.transform.is_finite()) {
             slot.transform = glam::Affine2::IDENTITY;
         }
-        // we keep two sets of texture coordinates; slots that ask for others get the first
+        // two sets of texture coordinates are kept; slots that use others get the first
         for slot in material.texture_slots_mut().into_iter().flatten().filter(|s| s.texcoord > 1) {
             let set = std::mem::take(&mut slot.texcoord);
-            scene.report.warnings.push(format!("texture coordinates {set} are not read (0 and 1 are): 0 taken"));
+            scene.report.warnings.push(format!("texture coordinate set {set} is not supported (0 and 1 are): set 0 is used"));
         }
     }
 }
 
-/// Tracers invert transforms. A mesh that its transform squashes flat gets it applied to its vertices instead; one that is
-/// squashed to a line or a point, which is a way of hiding it, has nothing to show and is not placed. An animated one may grow
-/// again, and a mesh that deforms cannot be baked: both get the least of a thickness instead ([`Rig::settle`]).
+/// Handles singular transforms, because tracers invert transforms. A mesh that is scaled to a plane is baked: the transform is applied to
+/// its vertices. An instance that is scaled to a line or a point, which is a way of hiding it, is dropped. Animated instances may grow
+/// again, and deforming meshes cannot be baked: both get a minimum scale instead ([`AnimationRig::apply_rest_pose`]).
 fn bake_singular(scene: &mut Scene) {
     let before = scene.instances.len();
     let moving = scene.rig.as_ref().map(|rig| rig.moving(scene));
@@ -140,7 +140,7 @@ fn bake_singular(scene: &mut Scene) {
     retain_instances(scene, &keep);
     let hidden = before - scene.instances.len();
     if hidden > 0 {
-        scene.report.warnings.push(format!("{hidden} meshes are scaled to nothing: left out"));
+        scene.report.warnings.push(format!("{hidden} instances are scaled to nothing: left out"));
     }
     let deforming = scene.rig.as_ref().map(|rig| rig.deforming(scene));
     for (i, instance) in scene.instances.iter_mut().enumerate() {
@@ -179,7 +179,7 @@ struct Notes {
     tangents: bool,
 }
 
-/// `deformation`: how the mesh deforms, if it does; the mesh is as modelled then.
+/// `deformation`: how the mesh deforms, if it does; the mesh is undeformed then.
 fn repair(mesh: &mut Mesh, material: &Material, deformation: Option<&mut Deformation>) -> Notes {
     let mut notes = Notes::default();
     let Geometry::Triangles(triangles) = &mut mesh.geometry else { return notes };
@@ -231,7 +231,7 @@ fn repair(mesh: &mut Mesh, material: &Material, deformation: Option<&mut Deforma
     notes
 }
 
-/// Two corners coincide, or all three lie on a line: exactly, in f64.
+/// Whether two corners coincide or all three lie on a line, exactly, in f64.
 fn is_degenerate(t: [u32; 3], positions: &[glam::Vec3]) -> bool {
     if t[0] == t[1] || t[1] == t[2] || t[2] == t[0] {
         return true;
@@ -240,7 +240,7 @@ fn is_degenerate(t: [u32; 3], positions: &[glam::Vec3]) -> bool {
     (b - a).cross(c - a) == DVec3::ZERO
 }
 
-/// Forgets meshes that nothing places.
+/// Removes meshes without an instance.
 fn drop_unplaced(scene: &mut Scene) {
     let mut keep = vec![false; scene.meshes.len()];
     for instance in &scene.instances {
@@ -249,11 +249,11 @@ fn drop_unplaced(scene: &mut Scene) {
     retain_meshes(scene, &keep);
 }
 
-/// Forgets meshes without a triangle or sphere, and where they are placed: acceleration structures must not be empty.
+/// Removes meshes without a triangle or sphere, and their instances: acceleration structures must not be empty.
 fn drop_empty(scene: &mut Scene) {
     let keep: Vec<bool> = scene.meshes.iter().map(|m| m.geometry.primitive_count() > 0).collect();
     for mesh in scene.meshes.iter().zip(&keep).filter(|(_, keep)| !**keep).map(|(m, _)| m) {
-        scene.report.warnings.push(format!("mesh `{}` has nothing to show: left out", mesh.name));
+        scene.report.warnings.push(format!("mesh `{}` has no triangles or spheres: left out", mesh.name));
     }
     let placed: Vec<bool> = scene.instances.iter().map(|i| keep[i.mesh]).collect();
     retain_instances(scene, &placed);
@@ -291,7 +291,7 @@ fn retain_meshes(scene: &mut Scene, keep: &[bool]) {
     scene.meshes.retain(|_| keep.next().copied().unwrap_or(true));
 }
 
-/// The scene must have an extent that single precision can hold.
+/// Fails for an empty scene, and for coordinates beyond [`MAX_COORDINATE`].
 fn extent(scene: &Scene, path: &Path) -> Result<()> {
     let Some((lo, hi)) = scene.bounds() else {
         let dropped = scene.report.degenerate_triangles;

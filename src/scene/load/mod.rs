@@ -1,4 +1,4 @@
-//! Files to [`Scene`]: a reader for each format, then `finish`, which makes the promises that every scene keeps.
+//! Loading of a [`Scene`]: a reader for each format, then `finish`, which establishes the guarantees of every scene.
 
 mod brhan;
 mod camera_path;
@@ -26,10 +26,10 @@ const FORMATS: [&str; 4] = ["gltf", "glb", "obj", "brhan"];
 /// Loads a scene: a built-in one by name (`builtin:NAME`, or `NAME` alone where no such file exists), or a file by its
 /// extension, in either case of letters: `.gltf`, `.glb`, `.obj`, `.brhan`.
 ///
-/// What is loaded keeps these promises: at least one triangle or sphere is placed; at least one material exists; all
+/// A loaded scene has these guarantees: at least one instance has a triangle or sphere; at least one material exists; all
 /// indices are in range; positions, normals, texture coordinates and transforms are finite; transforms can be inverted;
-/// no triangle is degenerate, but for those of meshes that deform which have an area in another pose; normals have unit length; tangents exist where a material needs them. What had to be done
-/// for that, short of an error, is in [`Scene::report`].
+/// no triangle is degenerate, except in deforming meshes if it has an area in another pose; normals have unit length; tangents exist where a material needs them. Repairs that
+/// this took are in [`Scene::report`].
 ///
 /// # Errors
 /// [`Error::Input`] for a file that is missing, broken or needs what skylit does not have; [`Error::Scene`] when nothing

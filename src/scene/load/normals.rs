@@ -1,4 +1,4 @@
-//! Shading normals: unit length, and a direction for those that have none.
+//! Repair of shading normals: unit length, and a direction for zero normals.
 
 use glam::{DVec3, Vec3};
 
@@ -17,7 +17,7 @@ pub(super) fn repair(mesh: &mut TriangleMesh) -> usize {
             bad += 1;
             *n = Vec3::ZERO;
         } else if (squared - 1.0).abs() > 1e-5 {
-            // what is unit but for rounding stays bit by bit as the file has it
+            // normals of unit length up to rounding keep their bits
             *n = (wide / squared.sqrt()).as_vec3();
         }
     }

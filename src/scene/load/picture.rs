@@ -1,4 +1,4 @@
-//! Image files to texels.
+//! Decoding of image files.
 
 use std::io::Cursor;
 
@@ -11,7 +11,7 @@ const MAX_SIDE: u32 = 16384;
 
 /// A decoded image: rows from the top, RGBA.
 #[derive(Clone, Debug)]
-pub(super) struct Picture {
+pub(super) struct DecodedImage {
     pub width: u32,
     pub height: u32,
     pub texels: TexelData,
@@ -21,7 +21,7 @@ pub(super) struct Picture {
 ///
 /// # Errors
 /// What is wrong, in words.
-pub(super) fn decode(bytes: &[u8], name: &str) -> Result<Picture, String> {
+pub(super) fn decode(bytes: &[u8], name: &str) -> Result<DecodedImage, String> {
     let format = image::guess_format(bytes)
         .or_else(|_| ImageFormat::from_path(name))
         .map_err(|_| "is of a format that skylit does not read (PNG, JPEG, TGA and BMP are)".to_owned())?;
@@ -41,13 +41,13 @@ pub(super) fn decode(bytes: &[u8], name: &str) -> Result<Picture, String> {
     let texels = match pixels.color() {
         ColorType::Rgb32F | ColorType::Rgba32F => {
             let mut rgba = pixels.into_rgba32f().into_raw();
-            // what is not finite, or negative, would spoil every texel filtered with it
+            // a texel that is not finite or negative would spoil every filtered value that includes it
             rgba.iter_mut().filter(|v| !(v.is_finite() && **v >= 0.0)).for_each(|v| *v = 0.0);
             rgba.into()
         }
         ColorType::L16 | ColorType::La16 | ColorType::Rgb16 | ColorType::Rgba16 => {
             let rgba = pixels.into_rgba16().into_raw();
-            // eight bits that somebody widened lose nothing by being narrowed again
+            // 8-bit values that were widened to 16 bits are stored in 8 bits again, without loss
             match rgba.iter().all(|v| v % 257 == 0) {
                 true => rgba.iter().map(|v| (v / 257) as u8).collect::<Vec<u8>>().into(),
                 false => rgba.into(),
@@ -55,5 +55,5 @@ pub(super) fn decode(bytes: &[u8], name: &str) -> Result<Picture, String> {
         }
         _ => pixels.into_rgba8().into_raw().into(),
     };
-    Ok(Picture { width, height, texels })
+    Ok(DecodedImage { width, height, texels })
 }

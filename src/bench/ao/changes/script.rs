@@ -4,7 +4,7 @@ use crate::bench::ao::scenes::REACH;
 use crate::error::Result;
 use crate::film::camera::{self, Choice};
 use crate::realtime::sequence::{CameraMotion, FrameSequence};
-use crate::scene::animation::Rig;
+use crate::scene::animation::AnimationRig;
 use crate::scene::{Camera, Motion, Scene};
 use crate::tracer::{Tracer, UpdateStats};
 
@@ -36,7 +36,7 @@ impl<'a> ChangeScript<'a> {
     /// # Errors
     /// Those of [`FrameSequence::new`] and of choosing the camera.
     pub fn animated(name: &str, scene: &'a Scene, aspect: f64) -> Result<Option<Self>> {
-        if scene.rig.as_ref().is_none_or(|rig: &Rig| rig.animations().is_empty()) {
+        if scene.rig.as_ref().is_none_or(|rig: &AnimationRig| rig.animations().is_empty()) {
             return Ok(None);
         }
         let camera = camera::choose(scene, &Choice::Auto, aspect)?;

@@ -1,4 +1,4 @@
-//! The tree of nodes, skins, morph targets and animations.
+//! Export of the node hierarchy, skins, morph targets and animations.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -7,20 +7,20 @@ use glam::DMat4;
 use serde_json::{Value, json};
 
 use super::{Writer, node, with_mesh};
-use crate::scene::animation::{Animation, Channel, Deformation, Interpolation, Local, Property, Sampler, Skin};
-use crate::scene::{Rig, Scene};
+use crate::scene::animation::{Animation, Channel, Deformation, Interpolation, LocalTransform, Property, Sampler, Skin};
+use crate::scene::{AnimationRig, Scene};
 
-/// Nodes in the making.
+/// The node hierarchy that is being written.
 pub(super) struct Tree {
     pub nodes: Vec<Value>,
     /// Nodes without a parent, in an order in which loaders meet the instances in that of the scene.
     pub roots: Vec<usize>,
-    /// For each node of the rig those that carry a mesh whose targets have its weights.
+    /// For each node of the rig, the written nodes whose meshes have morph targets with its weights.
     morphing: BTreeMap<usize, Vec<usize>>,
 }
 
 /// The nodes of all instances, and of the cameras that the rig carries.
-pub(super) fn tree(scene: &Scene, rig: Option<&Rig>) -> Tree {
+pub(super) fn tree(scene: &Scene, rig: Option<&AnimationRig>) -> Tree {
     let mut tree = Tree { nodes: Vec::new(), roots: Vec::new(), morphing: BTreeMap::new() };
     let Some(rig) = rig else {
         tree.nodes = scene.instances.iter().map(|i| with_mesh(&i.name, i.mesh, &i.object_to_world)).collect();
@@ -72,12 +72,12 @@ pub(super) fn tree(scene: &Scene, rig: Option<&Rig>) -> Tree {
 }
 
 /// The node of the rig that carries a camera.
-pub(super) fn carries_camera(rig: &Rig, camera: usize) -> Option<usize> {
+pub(super) fn carries_camera(rig: &AnimationRig, camera: usize) -> Option<usize> {
     rig.parts().cameras.get(camera).copied().flatten()
 }
 
 impl Tree {
-    /// The node that a mesh or camera goes to: `on` itself if it has the name and none yet, else a child of it.
+    /// The node for a mesh or camera: `on` itself if it has the same name and is free, else a new child of it.
     fn carrier(&mut self, on: usize, name: &str, what: &str) -> usize {
         let there = &self.nodes[on];
         if there.get(what).is_none() && there["name"] == name {
@@ -136,7 +136,7 @@ impl Writer {
         out
     }
 
-    pub(super) fn animation(&mut self, animation: &Animation, rig: &Rig, tree: &Tree) -> Value {
+    pub(super) fn animation(&mut self, animation: &Animation, rig: &AnimationRig, tree: &Tree) -> Value {
         let (mut samplers, mut channels) = (Vec::new(), Vec::new());
         let mut times: Vec<(Arc<[f32]>, usize)> = Vec::new();
         let mut end = f64::NEG_INFINITY;
@@ -193,12 +193,12 @@ impl Writer {
     }
 }
 
-/// A channel that changes nothing and lasts as long as the animation.
-fn hold(animation: &Animation, rig: &Rig) -> Option<Channel> {
+/// A channel without effect that lasts as long as the animation, so that the duration survives.
+fn hold(animation: &Animation, rig: &AnimationRig) -> Option<Channel> {
     let taken = |node| animation.channels.iter().any(|c| (c.node, c.property) == (node, Property::Translation));
     rig.parts().nodes.iter().enumerate().filter(|(i, _)| !taken(*i)).find_map(|(node, n)| match n.local {
-        Local::Matrix(_) => None,
-        Local::Parts { translation, .. } => {
+        LocalTransform::Matrix(_) => None,
+        LocalTransform::Trs { translation, .. } => {
             let (times, values) = ([animation.duration as f32].into(), translation.as_vec3().to_array().to_vec());
             let sampler = Sampler { interpolation: Interpolation::Step, times, values };
             Some(Channel { node, property: Property::Translation, sampler })
@@ -206,10 +206,10 @@ fn hold(animation: &Animation, rig: &Rig) -> Option<Channel> {
     })
 }
 
-fn local(name: &str, local: &Local) -> Value {
+fn local(name: &str, local: &LocalTransform) -> Value {
     match local {
-        Local::Matrix(m) => node(name, m),
-        Local::Parts { translation, rotation, scale } => {
+        LocalTransform::Matrix(m) => node(name, m),
+        LocalTransform::Trs { translation, rotation, scale } => {
             let mut out = json!({ "name": name });
             if *translation != glam::DVec3::ZERO {
                 out["translation"] = json!(translation.to_array());

@@ -16,7 +16,7 @@ use parse::Statement;
 use super::{find, finish};
 use crate::error::{Error, Result};
 use crate::scene::material::{Material, MaterialKind, Transmission};
-use crate::scene::{Camera, Geometry, Instance, Mesh, Rig, Scene, Sphere};
+use crate::scene::{AnimationRig, Camera, Geometry, Instance, Mesh, Scene, Sphere};
 
 /// Reads a `.brhan` file and the models that it names.
 pub(super) fn read(path: &Path) -> Result<Scene> {
@@ -34,7 +34,7 @@ pub(super) fn read(path: &Path) -> Result<Scene> {
 struct Loader<'a> {
     path: &'a Path,
     scene: Scene,
-    /// What was made of each model with each material: meshes and their places in the model.
+    /// The instances of each loaded model with each material, relative to the model.
     models: HashMap<(PathBuf, Option<String>), Vec<Instance>>,
 }
 
@@ -86,7 +86,7 @@ impl Loader<'_> {
 
     fn integrator(&mut self, s: &mut Statement) -> Result<(), String> {
         if let Some(other) = s.text("type").filter(|t| *t != "path") {
-            let warning = format!("line {}: the integrator `{other}` is not known: ignored", s.line);
+            let warning = format!("line {}: the integrator `{other}` is unknown: ignored", s.line);
             self.scene.report.warnings.push(warning);
         }
         self.scene.hints.spp = s.count("spp", 1)?;
@@ -131,13 +131,13 @@ impl Loader<'_> {
             let searched = find::list(&searched);
             here(format!("line {}: the model {file} does not exist; searched in {searched}", s.line))
         })?;
-        // a file that is placed twice in one material is read once
+        // a model that is used twice with one material is read once
         let key = (found, material.as_ref().map(|m| format!("{m:?}")));
         if !self.models.contains_key(&key) {
             let mut model = super::read_model(&key.0)?;
             if model.rig.is_some() {
                 // its nodes are not this scene's
-                Rig::settle(&mut model);
+                AnimationRig::apply_rest_pose(&mut model);
                 model.rig = None;
                 self.scene.report.warnings.push(format!("{file}: animations of models are not played"));
             }
@@ -196,7 +196,7 @@ fn transform(s: &mut Statement) -> Result<DAffine3, String> {
     Ok(DAffine3::from_mat3_translation(rotate * DMat3::from_diagonal(scale), translate))
 }
 
-/// The material that a statement asks for, if it does.
+/// The material of a statement, if it has one.
 fn material(s: &mut Statement) -> Result<Option<Material>, String> {
     let line = s.line;
     let name = s.text("material");

@@ -11,7 +11,7 @@ pub(super) struct Statement<'a> {
     /// What stands in brackets right after the key.
     own: Option<&'a str>,
     fields: Vec<(&'a str, &'a str)>,
-    /// Fields that were asked for.
+    /// Fields that the loader has read, to report unknown ones.
     seen: Vec<&'static str>,
 }
 
@@ -70,7 +70,7 @@ impl<'a> Statement<'a> {
         self.fields.iter().find(|(n, _)| *n == name).map(|f| f.1)
     }
 
-    /// The text of a field that must be there.
+    /// The text of a required field.
     pub(super) fn need(&mut self, name: &'static str) -> Result<&'a str, String> {
         self.text(name).filter(|t| !t.is_empty()).ok_or_else(|| self.error(format!("{name}[] is missing")))
     }
@@ -112,7 +112,7 @@ impl<'a> Statement<'a> {
 
     /// The values right after the key as whole numbers above zero.
     pub(super) fn own_counts(&self) -> Result<Vec<u32>, String> {
-        let number = |w: &str| w.parse::<f64>().map_err(|_| format!("`{w}` is no number")).and_then(|x| self.whole(x, 1));
+        let number = |w: &str| w.parse::<f64>().map_err(|_| format!("`{w}` is not a number")).and_then(|x| self.whole(x, 1));
         self.own()?.split_whitespace().map(|w| number(w).map_err(|e| self.error(e))).collect()
     }
 
@@ -123,7 +123,7 @@ impl<'a> Statement<'a> {
         }
     }
 
-    /// Refuses fields that nobody asked for.
+    /// Fails for fields that the loader has not read.
     pub(super) fn done(&self) -> Result<(), String> {
         match self.fields.iter().find(|(n, _)| !self.seen.contains(n)) {
             Some((name, _)) => Err(self.error(format!("unknown field `{name}` ({} are known)", self.seen.join(", ")))),

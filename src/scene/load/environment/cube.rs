@@ -1,4 +1,4 @@
-//! The six faces of a cube, brought into the projection that environments have.
+//! Cube maps of six images, resampled to the equirectangular projection of environment maps.
 
 use std::f64::consts::PI;
 use std::path::{Path, PathBuf};
@@ -10,10 +10,10 @@ use super::{MAX_SIDE, Pixels};
 use crate::error::{Error, Result};
 use crate::scene::load::picture;
 
-/// Names of the faces, without extension: the directions that their middles look at.
+/// File names of the faces, without extension: the axes through their centres.
 const FACES: [&str; 6] = ["px", "nx", "py", "ny", "pz", "nz"];
 const EXTENSIONS: [&str; 5] = ["hdr", "exr", "png", "jpg", "jpeg"];
-/// Points of a texel along each axis whose mean it is.
+/// Number of samples per texel along each axis.
 const POINTS: u32 = 3;
 
 /// Reads the faces that lie in a folder; a texel of the result is about as large as one of theirs.
@@ -25,7 +25,7 @@ pub(super) fn read(folder: &Path) -> Result<Pixels> {
         let (w, h) = (faces[k].width, faces[k].height);
         return Err(Error::input(
             folder,
-            format!("face {} is {w}x{h}, not {side}x{side}: all must be square and alike", FACES[k]),
+            format!("face {} is {w}x{h}, not {side}x{side}: all faces must be square and of one size", FACES[k]),
         ));
     }
     let (width, height) = ((4 * side).min(MAX_SIDE), (2 * side).min(MAX_SIDE / 2));
@@ -42,7 +42,7 @@ fn face(folder: &Path, name: &str) -> Result<Pixels> {
     if path.extension().is_some_and(|e| e == "hdr" || e == "exr") { super::read(path) } else { picture(path) }
 }
 
-/// sRGB.
+/// Reads an sRGB image.
 fn picture(path: &PathBuf) -> Result<Pixels> {
     let bytes = std::fs::read(path).map_err(|e| Error::read(path, &e))?;
     let p = picture::decode(&bytes, &path.to_string_lossy()).map_err(|e| Error::input(path, e))?;
@@ -67,7 +67,7 @@ fn texel(faces: &[Pixels], [width, height]: [u32; 2], k: u32) -> Vec3 {
     sum / (POINTS * POINTS) as f32
 }
 
-/// As OpenGL's cube maps lie (OpenGL 4.6, table 8.19), bilinearly within a face.
+/// Samples the cube map with OpenGL's face orientation (OpenGL 4.6, table 8.19), bilinearly within a face.
 fn look_up(faces: &[Pixels], d: DVec3) -> Vec3 {
     let a = d.abs();
     let (face, s, t, m) = if a.x >= a.y && a.x >= a.z {
@@ -81,12 +81,12 @@ fn look_up(faces: &[Pixels], d: DVec3) -> Vec3 {
     };
     let pixels = &faces[face];
     let last = pixels.width - 1;
-    let place = |x: f64| {
+    let texel = |x: f64| {
         let p = ((x / m + 1.0) * 0.5 * f64::from(pixels.width) - 0.5).clamp(0.0, f64::from(last));
         let low = (p as u32).min(last);
         (low, (low + 1).min(last), (p - f64::from(low)) as f32)
     };
-    let ((x0, x1, fx), (y0, y1, fy)) = (place(s), place(t));
+    let ((x0, x1, fx), (y0, y1, fy)) = (texel(s), texel(t));
     let at = |x: u32, y: u32| pixels.radiance[(y * pixels.width + x) as usize];
     at(x0, y0).lerp(at(x1, y0), fx).lerp(at(x0, y1).lerp(at(x1, y1), fx), fy)
 }

@@ -197,7 +197,7 @@ impl<'a> Reader<'a> {
     fn try_indices(&self, accessor: &Accessor) -> Result<Indices<'a>, String> {
         let component = self.component(accessor)?;
         if valid(accessor.type_) != Some(Type::Scalar) || !component.is_index() {
-            return Err("holds no indices (unsigned scalars)".to_owned());
+            return Err("does not hold indices (unsigned scalars)".to_owned());
         }
         let base = match accessor.buffer_view {
             Some(view) => {

@@ -1,4 +1,4 @@
-//! Animations: channels to keys.
+//! Reading of animations.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -8,7 +8,7 @@ use ::gltf::json::accessor::Type;
 use serde::Deserialize;
 
 use super::accessor::Reader;
-use crate::scene::animation::{self, Channel, Interpolation, Local, Node, Property, Sampler};
+use crate::scene::animation::{self, Channel, Interpolation, LocalTransform, Node, Property, Sampler};
 
 /// An animation in the file. Nothing is required here: what is missing leaves out a channel, and not the whole scene.
 #[derive(Deserialize, Default)]
@@ -41,8 +41,8 @@ struct SamplerJson {
     interpolation: Option<String>,
 }
 
-/// All animations, whose channels name nodes of `nodes`; `index` has the place there of each node of the file. Channels that make no
-/// sense are left out, with a warning each.
+/// All animations, whose channels refer to `nodes`; `index` has the index there of each node of the file. Invalid channels are left out,
+/// with a warning each.
 pub(super) fn read(
     reader: &Reader,
     animations: &[Animation],
@@ -88,14 +88,14 @@ fn read_channel(
         "rotation" => (Property::Rotation, Type::Vec4),
         "scale" => (Property::Scale, Type::Vec3),
         "weights" => (Property::Weights, Type::Scalar),
-        other => return Err(format!("the path `{other}` is not known")),
+        other => return Err(format!("the path `{other}` is unknown")),
     };
     let width = match (property, nodes[node].local) {
         (Property::Weights, _) if nodes[node].weights.is_empty() => {
             return Err(format!("node {target} has no mesh with morph targets"));
         }
         (Property::Weights, _) => nodes[node].weights.len(),
-        (_, Local::Matrix(_)) => return Err(format!("node {target} has a matrix, which cannot be animated")),
+        (_, LocalTransform::Matrix(_)) => return Err(format!("node {target} has a matrix, which cannot be animated")),
         (Property::Rotation, _) => 4,
         _ => 3,
     };
@@ -106,7 +106,7 @@ fn read_channel(
         "STEP" => Interpolation::Step,
         "LINEAR" => Interpolation::Linear,
         "CUBICSPLINE" => Interpolation::CubicSpline,
-        other => return Err(within(format!("the interpolation `{other}` is not known"))),
+        other => return Err(within(format!("the interpolation `{other}` is unknown"))),
     };
     let (Some(input), Some(output)) = (sampler.input, sampler.output) else {
         return Err(within("lacks an accessor".to_owned()));

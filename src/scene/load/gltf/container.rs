@@ -22,7 +22,7 @@ pub(super) fn split<'a>(file: &'a [u8], path: &Path) -> Result<Chunks<'a>> {
     let is_glb = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("glb"));
     if !file.starts_with(b"glTF") {
         return match is_glb {
-            true => Err(Error::input(path, "is no .glb file (it does not begin with `glTF`)")),
+            true => Err(Error::input(path, "is not a .glb file (it does not begin with `glTF`)")),
             false => Ok(Chunks { json: file.into(), bin: None }),
         };
     }
@@ -71,9 +71,9 @@ pub(super) fn document(json: &[u8], path: &Path) -> Result<(Root, Doubles)> {
         Ok(document) => document,
         // glTF 1.0 has another structure: it does not parse, but deserves a better answer than a type error
         Err(e) => match serde_json::from_slice::<AssetOnly>(text).map(|a| a.asset.version) {
-            Ok(version) if version.is_empty() => return Err(Error::input(path, "is no glTF: it names no version")),
+            Ok(version) if version.is_empty() => return Err(Error::input(path, "is not glTF: it has no version")),
             Ok(version) if !version.starts_with("2.") => return Err(other_version(&version, path)),
-            _ => return Err(Error::input(path, format!("is no valid glTF JSON: {e}"))),
+            _ => return Err(Error::input(path, format!("is not valid glTF JSON: {e}"))),
         },
     };
     match (&document.0.asset.version, &document.0.asset.min_version) {

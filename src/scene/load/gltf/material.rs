@@ -13,7 +13,7 @@ use super::{text, valid};
 use crate::scene::material::{AlphaMode, Anisotropy, Clearcoat, Material, Sheen, Specular, TextureSlot, Transmission};
 
 /// The extensions that the crate does not model; their names come with them.
-trait Other: Default + for<'a> Deserialize<'a> {
+trait UnmodelledExtension: Default + for<'a> Deserialize<'a> {
     const NAME: &str;
 
     /// Reads it from the extensions of an object, with its default where it is absent.
@@ -35,7 +35,7 @@ struct ClearcoatJson {
     clearcoat_normal_texture: Option<json::NormalTexture>,
 }
 
-impl Other for ClearcoatJson {
+impl UnmodelledExtension for ClearcoatJson {
     const NAME: &str = "KHR_materials_clearcoat";
 }
 
@@ -48,7 +48,7 @@ struct SheenJson {
     sheen_roughness_texture: Option<Info>,
 }
 
-impl Other for SheenJson {
+impl UnmodelledExtension for SheenJson {
     const NAME: &str = "KHR_materials_sheen";
 }
 
@@ -60,12 +60,12 @@ struct AnisotropyJson {
     anisotropy_texture: Option<Info>,
 }
 
-impl Other for AnisotropyJson {
+impl UnmodelledExtension for AnisotropyJson {
     const NAME: &str = "KHR_materials_anisotropy";
 }
 
 /// The crate models it on textures of its type `Info` only, which those for normals and occlusion are not.
-impl Other for TextureTransform {
+impl UnmodelledExtension for TextureTransform {
     const NAME: &str = "KHR_texture_transform";
 }
 
@@ -170,7 +170,7 @@ fn dielectric_priority(material: &json::Material) -> Result<i32, String> {
     let extras = material.extras.as_ref().and_then(|e| serde_json::from_str::<Extras>(e.get()).ok());
     let Some(priority) = extras.and_then(|e| e.priority) else { return Ok(0) };
     let whole = priority.as_i64().and_then(|p| i32::try_from(p).ok());
-    whole.ok_or_else(|| format!("extras.dielectricPriority: {priority} is no whole number of 32 bits"))
+    whole.ok_or_else(|| format!("extras.dielectricPriority: {priority} is not a 32-bit integer"))
 }
 
 fn alpha_mode(material: &json::Material) -> AlphaMode {

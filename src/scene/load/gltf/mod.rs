@@ -27,13 +27,13 @@ use ::gltf::json::{Index, Root};
 
 use accessor::Reader;
 use glam::{DAffine3, DVec3};
-use rig::{Stage, Wanted};
+use rig::{MeshVariant, RigBuilder};
 
 use super::compact;
 use crate::error::{Error, Result};
 use crate::scene::{Geometry, Instance, Mesh, Scene};
 
-/// Extensions that are read, or that mean nothing to a still image.
+/// Supported extensions.
 const KNOWN: &[&str] = &[
     "KHR_lights_punctual",
     "KHR_materials_anisotropy",
@@ -51,7 +51,7 @@ const KNOWN: &[&str] = &[
 
 type AccessorIndex = Index<Accessor>;
 
-/// What the crate could make sense of.
+/// The value, if the crate found it valid.
 fn valid<T>(checked: Checked<T>) -> Option<T> {
     match checked {
         Checked::Valid(value) => Some(value),
@@ -82,7 +82,7 @@ pub(super) fn read(path: &Path) -> Result<Scene> {
     scene.textures = texture::resolve(&reader, path, &mut scene.materials, &mut |w| warnings.push(w));
 
     let input = |e| Error::input(path, e);
-    let mut stage = Stage::new(&reader, &doubles, &placed, &mut |w| warnings.push(w));
+    let mut stage = RigBuilder::new(&reader, &doubles, &placed, &mut |w| warnings.push(w));
     let mut meshes = Meshes { reader: &reader, path, primitives: BTreeMap::new(), default_material: None };
     for (at, placed) in placed.iter().enumerate().filter(|(_, p)| p.shown) {
         let node = &document.nodes[placed.node];
@@ -90,7 +90,7 @@ pub(super) fn read(path: &Path) -> Result<Scene> {
         if let Some(index) = node.mesh {
             let wanted = stage.wanted(at, index.value()).map_err(input)?;
             for made in meshes.of(&wanted, at, &mut stage, &mut scene, &mut warnings)? {
-                // a skinned mesh stands where its joints are, wherever its node is
+                // the node's transform does not apply to a skinned mesh
                 let object_to_world = made.anchor.map_or(placed.to_world, DAffine3::from_translation);
                 scene.instances.push(Instance { name: name.to_owned(), mesh: made.mesh, object_to_world });
                 stage.instances.push(made.anchor.is_none().then_some(at));
@@ -109,8 +109,10 @@ pub(super) fn read(path: &Path) -> Result<Scene> {
             match node::light(&document, placed, light.light.value()) {
                 Ok(light) => {
                     if stage.moves(at) {
-                        warnings
-                            .push(format!("node {} `{name}` carries a light and is animated: the light stays", placed.node));
+                        warnings.push(format!(
+                            "node {} `{name}` has a light and is animated: the light does not move",
+                            placed.node
+                        ));
                     }
                     scene.lights.push(light);
                 }
@@ -123,7 +125,7 @@ pub(super) fn read(path: &Path) -> Result<Scene> {
     Ok(scene)
 }
 
-/// Refuses files that need what we do not have, and notes what is left out of others.
+/// Fails for unsupported required extensions, and warns about unsupported optional ones.
 fn extensions(document: &Root, path: &Path, scene: &mut Scene) -> Result<()> {
     let unknown = |names: &[String]| names.iter().find(|n| !KNOWN.contains(&n.as_str())).cloned();
     if let Some(name) = unknown(&document.extensions_required) {
@@ -132,7 +134,7 @@ fn extensions(document: &Root, path: &Path, scene: &mut Scene) -> Result<()> {
             "KHR_texture_basisu" | "EXT_texture_webp" => "export the file with PNG or JPEG textures",
             _ => "export the file without it",
         };
-        return Err(Error::input(path, format!("needs the extension {name}, which skylit does not have: {remedy}")));
+        return Err(Error::input(path, format!("requires the extension {name}, which skylit does not support: {remedy}")));
     }
     for name in document.extensions_used.iter().filter(|n| !KNOWN.contains(&n.as_str())) {
         scene.report.warnings.push(format!("the extension {name} is ignored"));
@@ -140,21 +142,21 @@ fn extensions(document: &Root, path: &Path, scene: &mut Scene) -> Result<()> {
     Ok(())
 }
 
-/// Reads each mesh that is placed, once for each way in which it deforms.
+/// Reads each mesh that has an instance, once for each variant.
 struct Meshes<'a> {
     reader: &'a Reader<'a>,
     path: &'a Path,
     /// The scene's meshes of each glTF mesh.
-    primitives: BTreeMap<Wanted, Vec<Made>>,
+    primitives: BTreeMap<MeshVariant, Vec<LoadedMesh>>,
     /// The scene's material for primitives without one.
     default_material: Option<usize>,
 }
 
 /// A mesh of the scene.
 #[derive(Clone, Copy)]
-struct Made {
+struct LoadedMesh {
     mesh: usize,
-    /// Where it is placed if it has a skin.
+    /// World position of its instances if it has a skin.
     anchor: Option<DVec3>,
 }
 
@@ -162,12 +164,12 @@ impl Meshes<'_> {
     /// `at`: the placed node that carries it.
     fn of(
         &mut self,
-        wanted: &Wanted,
+        wanted: &MeshVariant,
         at: usize,
-        stage: &mut Stage,
+        stage: &mut RigBuilder,
         scene: &mut Scene,
         warnings: &mut Vec<String>,
-    ) -> Result<Vec<Made>> {
+    ) -> Result<Vec<LoadedMesh>> {
         if let Some(known) = self.primitives.get(wanted) {
             return Ok(known.clone());
         }
@@ -175,7 +177,7 @@ impl Meshes<'_> {
         let meshes = &self.reader.document.meshes;
         let mesh = meshes.get(index).ok_or_else(|| Error::input(self.path, format!("mesh {index} does not exist")))?;
         let name = text(&mesh.name);
-        let again = self.primitives.range(Wanted::first(index)..).next().is_some_and(|(k, _)| k.mesh == index);
+        let again = self.primitives.range(MeshVariant::first(index)..).next().is_some_and(|(k, _)| k.mesh == index);
         let mut made = Vec::new();
         for (nth, primitive) in mesh.primitives.iter().enumerate() {
             let place = format!("mesh {index} `{name}`, primitive {nth}");
@@ -203,7 +205,7 @@ impl Meshes<'_> {
             }
             let anchor = deformation.and_then(|d| stage.deform(d, wanted, scene.meshes.len(), &mut triangles));
             let name = if mesh.primitives.len() == 1 { name.to_owned() } else { format!("{name}#{nth}") };
-            made.push(Made { mesh: scene.meshes.len(), anchor });
+            made.push(LoadedMesh { mesh: scene.meshes.len(), anchor });
             scene.meshes.push(Mesh { name, geometry: Geometry::Triangles(triangles), material });
         }
         self.primitives.insert(wanted.clone(), made.clone());

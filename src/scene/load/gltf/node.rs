@@ -8,17 +8,17 @@ use glam::{DAffine3, DMat4, DQuat, DVec3};
 use serde::Deserialize;
 
 use super::{text, valid};
-use crate::scene::animation::Local;
+use crate::scene::animation::LocalTransform;
 use crate::scene::camera::rigid;
 use crate::scene::{Camera, Light, LightKind, Projection};
 
-/// The numbers that place things, in double precision: the crate rounds them to single, in which far-away scenes fall apart
-/// and what we write does not come back as it was.
+/// Transforms and cameras in double precision: the crate rounds them to single precision, which is too coarse for far-away scenes
+/// and would not survive a round trip through our exporter.
 #[derive(Deserialize, Default)]
 #[serde(default)]
 pub(super) struct Doubles {
     nodes: Vec<Transform>,
-    cameras: Vec<Lens>,
+    cameras: Vec<CameraJson>,
     /// Read by us because the crate refuses channels without a node (KHR_animation_pointer).
     pub animations: Vec<super::animation::Animation>,
     /// For the same reason: what the crate refuses is read again without them.
@@ -34,7 +34,7 @@ struct Transform {
 }
 
 #[derive(Deserialize)]
-struct Lens {
+struct CameraJson {
     perspective: Option<Perspective>,
     orthographic: Option<Orthographic>,
 }
@@ -52,14 +52,14 @@ struct Orthographic {
     ymag: f64,
 }
 
-/// A node of a tree.
-pub(super) struct Placed {
+/// A node of the hierarchy with its world transform.
+pub(super) struct PlacedNode {
     pub node: usize,
-    /// Index into the list of them.
+    /// Index into the list of placed nodes.
     pub parent: Option<usize>,
-    pub local: Local,
+    pub local: LocalTransform,
     pub to_world: DAffine3,
-    /// In the scene that is shown.
+    /// Whether the node belongs to the scene that is loaded.
     pub shown: bool,
 }
 
@@ -68,7 +68,7 @@ pub(super) struct Placed {
 ///
 /// # Errors
 /// What is wrong, in words: indices out of range, nodes reached twice.
-pub(super) fn place(document: &Root, doubles: &Doubles, all: bool) -> Result<Vec<Placed>, String> {
+pub(super) fn place(document: &Root, doubles: &Doubles, all: bool) -> Result<Vec<PlacedNode>, String> {
     let nodes = &document.nodes;
     let mut parents = vec![0u32; nodes.len()];
     for (i, node) in nodes.iter().enumerate() {
@@ -104,14 +104,14 @@ pub(super) fn place(document: &Root, doubles: &Doubles, all: bool) -> Result<Vec
                 }
                 return Err(format!("node {i} is its own ancestor, or the scene lists it twice"));
             }
-            let local = doubles.nodes.get(i).map_or(Ok(Local::default()), |t| local(t, i))?;
-            let above: Option<&Placed> = parent.and_then(|p| placed.get(p));
+            let local = doubles.nodes.get(i).map_or(Ok(LocalTransform::default()), |t| local(t, i))?;
+            let above: Option<&PlacedNode> = parent.and_then(|p| placed.get(p));
             let to_world = above.map_or(local.affine(), |p| p.to_world * local.affine());
             if !to_world.is_finite() {
                 return Err(format!("node {i} has a transform that is not finite"));
             }
             let index = placed.len();
-            placed.push(Placed { node: i, parent, local, to_world, shown });
+            placed.push(PlacedNode { node: i, parent, local, to_world, shown });
             stack.extend(children(node).rev().map(|c| (c, Some(index))));
         }
     }
@@ -125,18 +125,18 @@ fn children(node: &Node) -> impl DoubleEndedIterator<Item = usize> {
     node.children.iter().flatten().map(Index::value)
 }
 
-fn local(node: &Transform, index: usize) -> Result<Local, String> {
+fn local(node: &Transform, index: usize) -> Result<LocalTransform, String> {
     if let Some(m) = node.matrix {
         let m = DMat4::from_cols_array(&m);
         // affine by the specification; a perspective matrix would silently lose its last row
         if (m.row(3) - glam::DVec4::W).abs().max_element() > 1e-6 {
             return Err(format!("node {index} has a matrix that is not affine"));
         }
-        return Ok(Local::Matrix(DAffine3::from_mat4(m)));
+        return Ok(LocalTransform::Matrix(DAffine3::from_mat4(m)));
     }
     let rotation = node.rotation.map_or(DQuat::IDENTITY, DQuat::from_array);
     let squared = rotation.length_squared();
-    Ok(Local::Parts {
+    Ok(LocalTransform::Trs {
         translation: node.translation.map_or(DVec3::ZERO, DVec3::from_array),
         rotation: match squared {
             // what we wrote comes back bit by bit
@@ -153,7 +153,7 @@ fn local(node: &Transform, index: usize) -> Result<Local, String> {
 ///
 /// # Errors
 /// What is wrong, in words.
-pub(super) fn camera(document: &Root, doubles: &Doubles, placed: &Placed, index: usize) -> Result<Camera, String> {
+pub(super) fn camera(document: &Root, doubles: &Doubles, placed: &PlacedNode, index: usize) -> Result<Camera, String> {
     let (Some(camera), Some(lens)) = (document.cameras.get(index), doubles.cameras.get(index)) else {
         return Err(format!("camera {index} does not exist"));
     };
@@ -179,7 +179,7 @@ pub(super) fn camera(document: &Root, doubles: &Doubles, placed: &Placed, index:
 ///
 /// # Errors
 /// What is wrong, in words.
-pub(super) fn light(document: &Root, placed: &Placed, index: usize) -> Result<Light, String> {
+pub(super) fn light(document: &Root, placed: &PlacedNode, index: usize) -> Result<Light, String> {
     let lights = document.extensions.as_ref().and_then(|e| e.khr_lights_punctual.as_ref()).map_or(&[][..], |l| &l.lights);
     let light = lights.get(index).ok_or_else(|| format!("light {index} does not exist"))?;
     let kind = match valid(light.type_) {

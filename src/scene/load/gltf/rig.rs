@@ -1,4 +1,4 @@
-//! What moves in a file, put together: which meshes deform over time and get a rig, and which have one shape only and are posed here.
+//! Construction of the rig: meshes that deform over time become part of it, meshes with a constant pose are posed here.
 
 use std::collections::BTreeMap;
 
@@ -6,14 +6,14 @@ use ::gltf::json::mesh::Primitive;
 use glam::{DAffine3, DVec3};
 
 use super::accessor::Reader;
-use super::node::{Doubles, Placed};
+use super::node::{Doubles, PlacedNode};
 use super::{animation, skin, text};
-use crate::scene::animation::{Animation, Deformation, Node, Parts, Property, Shape, Skin, anchor};
-use crate::scene::{Rig, Scene, TriangleMesh};
+use crate::scene::animation::{Animation, Deformation, Node, Property, RigParts, Skin, VertexData, anchor};
+use crate::scene::{AnimationRig, Scene, TriangleMesh};
 
-/// A mesh as a node wants it. Nodes that want the same share it.
+/// A glTF mesh with the skin and morph weights of a node. Nodes with the same variant share the scene's meshes.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) struct Wanted {
+pub(super) struct MeshVariant {
     /// Number in the file.
     pub mesh: usize,
     /// Number in the file.
@@ -21,8 +21,8 @@ pub(super) struct Wanted {
     weights: Weights,
 }
 
-impl Wanted {
-    /// What comes before all other requests for a mesh.
+impl MeshVariant {
+    /// The smallest variant of a mesh in their order.
     pub fn first(mesh: usize) -> Self {
         Self { mesh, skin: None, weights: Weights::None }
     }
@@ -40,11 +40,11 @@ enum Weights {
 }
 
 /// The tree and its animations while the scene is read. Nodes are numbered as they are placed, skins as in the file.
-pub(super) struct Stage<'a> {
+pub(super) struct RigBuilder<'a> {
     reader: &'a Reader<'a>,
     doubles: &'a Doubles,
-    placed: &'a [Placed],
-    /// Place of each node of the file.
+    placed: &'a [PlacedNode],
+    /// Index among the placed nodes of each node of the file.
     index: Vec<Option<usize>>,
     nodes: Vec<Node>,
     animations: Vec<Animation>,
@@ -53,20 +53,20 @@ pub(super) struct Stage<'a> {
     morphs: Vec<bool>,
     skins: BTreeMap<usize, Skin>,
     deformations: Vec<Deformation>,
-    /// Of each instance of the scene the placed node, unless it has a skin.
+    /// The placed node of each instance of the scene; `None` for skinned meshes.
     pub instances: Vec<Option<usize>>,
-    /// Of each camera the placed node.
+    /// The placed node of each camera.
     pub cameras: Vec<Option<usize>>,
 }
 
-impl<'a> Stage<'a> {
-    pub fn new(reader: &'a Reader, doubles: &'a Doubles, placed: &'a [Placed], warn: &mut dyn FnMut(String)) -> Self {
+impl<'a> RigBuilder<'a> {
+    pub fn new(reader: &'a Reader, doubles: &'a Doubles, placed: &'a [PlacedNode], warn: &mut dyn FnMut(String)) -> Self {
         let document = reader.document;
         let mut index = vec![None; document.nodes.len()];
         for (at, p) in placed.iter().enumerate() {
             index[p.node] = Some(at);
         }
-        let node = |p: &Placed| {
+        let node = |p: &PlacedNode| {
             let node = &document.nodes[p.node];
             let mesh = node.mesh.and_then(|m| document.meshes.get(m.value()));
             let targets = |m: &::gltf::json::Mesh| m.primitives.iter().filter_map(|p| Some(p.targets.as_ref()?.len())).max();
@@ -75,11 +75,10 @@ impl<'a> Stage<'a> {
             weights.iter_mut().filter(|w| !w.is_finite()).for_each(|w| *w = 0.0);
             Node { name: text(&node.name).to_owned(), parent: p.parent, local: p.local, weights }
         };
-        // without animations only the weights are asked for, and of few nodes
         let nodes: Vec<Node> = placed.iter().map(node).collect();
         let animations = animation::read(reader, &doubles.animations, &nodes, &index, warn);
         let (mut moves, mut morphs) = (vec![false; nodes.len()], vec![false; nodes.len()]);
-        for channel in animations.iter().flat_map(|a| &a.channels).filter(|c| !c.is_still(&nodes[c.node])) {
+        for channel in animations.iter().flat_map(|a| &a.channels).filter(|c| !c.is_constant(&nodes[c.node])) {
             let which = if channel.property == Property::Weights { &mut morphs } else { &mut moves };
             which[channel.node] = true;
         }
@@ -102,16 +101,16 @@ impl<'a> Stage<'a> {
         }
     }
 
-    /// Does some animation move this placed node?
+    /// Whether an animation moves this placed node.
     pub fn moves(&self, at: usize) -> bool {
         self.moves[at]
     }
 
-    /// How placed node `at` wants mesh `mesh`.
+    /// The variant of mesh `mesh` on placed node `at`.
     ///
     /// # Errors
     /// What is wrong with its skin, in words.
-    pub fn wanted(&mut self, at: usize, mesh: usize) -> Result<Wanted, String> {
+    pub fn wanted(&mut self, at: usize, mesh: usize) -> Result<MeshVariant, String> {
         let skin = self.reader.document.nodes[self.placed[at].node].skin.map(|s| s.value());
         if let Some(s) = skin.filter(|s| !self.skins.contains_key(s)) {
             let all = &self.doubles.skins;
@@ -124,7 +123,7 @@ impl<'a> Stage<'a> {
             weights if weights.iter().all(|w| *w == 0.0) => Weights::None,
             weights => Weights::Fixed(weights.iter().map(|w| w.to_bits()).collect()),
         };
-        Ok(Wanted { mesh, skin, weights })
+        Ok(MeshVariant { mesh, skin, weights })
     }
 
     /// How a primitive deforms on placed node `at`, if it does. `triangles`: its vertices, in the file's order.
@@ -133,7 +132,7 @@ impl<'a> Stage<'a> {
     /// What is wrong, in words.
     pub fn deformation(
         &self,
-        wanted: &Wanted,
+        wanted: &MeshVariant,
         primitive: &Primitive,
         triangles: &TriangleMesh,
         at: usize,
@@ -145,7 +144,7 @@ impl<'a> Stage<'a> {
             made.influences = skin::influences(self.reader, primitive, vertices, self.skins[&s].joints.len(), warn)?;
             made.skin = Some(s).filter(|_| !made.influences.is_empty());
             if made.skin.is_none() {
-                warn("has no joints and weights, which its node's skin asks for: shown as it is modelled".to_owned());
+                warn("has no joints and weights, which its node's skin requires: shown undeformed".to_owned());
             }
         }
         if wanted.weights != Weights::None {
@@ -163,7 +162,7 @@ impl<'a> Stage<'a> {
     pub fn deform(
         &mut self,
         mut made: Deformation,
-        wanted: &Wanted,
+        wanted: &MeshVariant,
         mesh: usize,
         triangles: &mut TriangleMesh,
     ) -> Option<DVec3> {
@@ -240,7 +239,7 @@ impl<'a> Stage<'a> {
             });
         }
         let renumber = |carried: Vec<Option<usize>>| carried.into_iter().map(|at| at.map(|at| number[at])).collect();
-        let parts = Parts {
+        let parts = RigParts {
             nodes: self.nodes,
             skins,
             deformations: self.deformations,
@@ -248,15 +247,15 @@ impl<'a> Stage<'a> {
             instances: renumber(self.instances),
             cameras: renumber(self.cameras),
         };
-        scene.rig = Some(Rig::new(scene, parts)?);
+        scene.rig = Some(AnimationRig::new(scene, parts)?);
         Ok(())
     }
 }
 
-/// Poses a mesh for good.
+/// Replaces a mesh's vertices by their posed ones.
 fn repose(deformation: &Deformation, weights: &[f64], joints: &[DAffine3], mesh: &mut TriangleMesh) {
-    let base = Shape::take(mesh);
-    let mut shape = Shape::default();
+    let base = VertexData::take(mesh);
+    let mut shape = VertexData::default();
     deformation.pose(&base, weights, joints, true, &mut shape);
     shape.give(mesh);
 }

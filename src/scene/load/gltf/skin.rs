@@ -1,4 +1,4 @@
-//! What of a primitive deforms: joints and weights, morph targets; and the skeletons.
+//! Skins, and the joints, weights and morph targets of primitives.
 
 use ::gltf::json::Index;
 use ::gltf::json::accessor::Type;
@@ -9,9 +9,9 @@ use serde::Deserialize;
 
 use super::AccessorIndex;
 use super::accessor::Reader;
-use crate::scene::animation::{self, Influences, Target};
+use crate::scene::animation::{self, Influences, MorphTarget};
 
-/// A skeleton in the file.
+/// A skin in the file.
 #[derive(Deserialize, Default)]
 #[serde(default, rename_all = "camelCase")]
 pub(super) struct Skin {
@@ -20,7 +20,7 @@ pub(super) struct Skin {
     inverse_bind_matrices: Option<u32>,
 }
 
-/// Reads a skeleton; `index` has the place of each node of the file.
+/// Reads a skin; `index` has the index of each node of the file.
 ///
 /// # Errors
 /// What is wrong, in words.
@@ -90,7 +90,7 @@ pub(super) fn influences(
         sets.push(influence);
     }
     if attribute(Semantic::Joints(2)).is_some() {
-        warn("has more than eight joints a vertex: the first eight pull".to_owned());
+        warn("has more than eight joints per vertex: only the first eight are used".to_owned());
     }
     Ok(sets)
 }
@@ -105,23 +105,26 @@ pub(super) fn targets(
     vertices: usize,
     normals: bool,
     count: usize,
-) -> Result<Vec<Target>, String> {
+) -> Result<Vec<MorphTarget>, String> {
     let deltas = |accessor: Option<AccessorIndex>, t: usize| -> Result<Vec<Vec3>, String> {
         let Some(accessor) = accessor else { return Ok(Vec::new()) };
         let deltas = reader.floats(same_count(reader, accessor, vertices)?, Type::Vec3, Vec3::from_array)?;
         if let Some(v) = deltas.iter().position(|d| !d.is_finite()) {
             return Err(format!("accessor {accessor}: morph target {t} is not finite at vertex {v}"));
         }
-        // files have such, and they cost time and memory
+        // exporters write all-zero deltas, which cost time and memory
         Ok(if deltas.iter().all(|d| *d == Vec3::ZERO) { Vec::new() } else { deltas })
     };
     let none = Vec::new();
     let all = primitive.targets.as_ref().unwrap_or(&none);
     let mut out = Vec::with_capacity(count);
     for (t, target) in all.iter().take(count).enumerate() {
-        out.push(Target { positions: deltas(target.positions, t)?, normals: deltas(target.normals.filter(|_| normals), t)? });
+        out.push(MorphTarget {
+            positions: deltas(target.positions, t)?,
+            normals: deltas(target.normals.filter(|_| normals), t)?,
+        });
     }
-    out.resize(count, Target::default());
+    out.resize(count, MorphTarget::default());
     Ok(out)
 }
 

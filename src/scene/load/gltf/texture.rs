@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 use super::accessor::Reader;
 use super::{container, text, valid};
-use crate::scene::load::picture::{self, Picture};
+use crate::scene::load::picture::{self, DecodedImage};
 use crate::scene::{Filter, Material, Texture, Wrap};
 
 /// Decodes the images that materials use, and turns the glTF textures in their slots into the scene's.
@@ -30,7 +30,7 @@ pub(super) fn resolve(reader: &Reader, path: &Path, materials: &mut [Material], 
     let mut wanted: Vec<usize> = used.keys().filter_map(|&t| image_of(t)).collect();
     wanted.sort_unstable();
     wanted.dedup();
-    let decoded: BTreeMap<usize, Result<Picture, String>> =
+    let decoded: BTreeMap<usize, Result<DecodedImage, String>> =
         wanted.into_par_iter().map(|i| (i, image(reader, path, i))).collect();
 
     for (i, error) in decoded.iter().filter_map(|(i, r)| Some((i, r.as_ref().err()?))) {
@@ -72,7 +72,7 @@ pub(super) fn resolve(reader: &Reader, path: &Path, materials: &mut [Material], 
     textures
 }
 
-fn image(reader: &Reader, path: &Path, index: usize) -> Result<Picture, String> {
+fn image(reader: &Reader, path: &Path, index: usize) -> Result<DecodedImage, String> {
     let image = reader.document.images.get(index).ok_or("does not exist")?;
     match (&image.uri, image.buffer_view) {
         (_, Some(view)) => picture::decode(reader.view(view)?.0, text(&image.name)),

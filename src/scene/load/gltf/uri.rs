@@ -36,7 +36,7 @@ pub(super) fn parse(uri: &str) -> Result<Uri, String> {
     if let Some((scheme, _)) = uri.split_once("://")
         && scheme != "file"
     {
-        return Err(format!("lies at {scheme}://; skylit reads local files only: download it first"));
+        return Err(format!("is at {scheme}://, but skylit reads local files only: download it first"));
     }
     let path = percent_decode(uri.strip_prefix("file://").unwrap_or(uri));
     let path = String::from_utf8(path).map_err(|_| "has a URI that is not UTF-8")?;

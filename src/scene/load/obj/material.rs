@@ -8,7 +8,7 @@ use glam::{Vec3, Vec4};
 use super::mtl::{self, Map, MtlMaterial};
 use crate::error::{Error, Result};
 use crate::scene::load::find;
-use crate::scene::load::picture::{self, Picture};
+use crate::scene::load::picture::{self, DecodedImage};
 use crate::scene::material::{AlphaMode, Material, MaterialKind, TextureSlot, Transmission};
 use crate::scene::{Filter, Scene, TexelData, Texture, Wrap};
 
@@ -19,14 +19,14 @@ pub(super) fn grey(name: String) -> Material {
 
 /// The materials of all libraries of a file, by name.
 #[derive(Default)]
-pub(super) struct Library {
+pub(super) struct MaterialLibrary {
     /// Indices into [`Scene::materials`].
     pub index: HashMap<String, usize>,
-    pictures: HashMap<PathBuf, Option<Picture>>,
+    pictures: HashMap<PathBuf, Option<DecodedImage>>,
     textures: HashMap<(PathBuf, Option<PathBuf>, bool), usize>,
 }
 
-impl Library {
+impl MaterialLibrary {
     /// Reads the library `mtl` of the model `obj` and appends its materials and textures to `scene`.
     pub(super) fn read(&mut self, mtl: &Path, obj: &Path, scene: &mut Scene) -> Result<()> {
         let bytes = std::fs::read(mtl).map_err(|e| Error::read(mtl, &e))?;
@@ -97,14 +97,14 @@ impl Library {
         };
         let wrap = [if options.clamp { Wrap::Clamp } else { Wrap::Repeat }; 2];
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        let Picture { width, height, texels } = picture;
+        let DecodedImage { width, height, texels } = picture;
         let texture = scene.textures.len();
         scene.textures.push(Texture { name, width, height, texels, wrap, filter: Filter::Linear });
         self.textures.insert(key, texture);
         Some(TextureSlot { texture, texcoord: 0, transform: options.transform })
     }
 
-    fn picture(&mut self, map: &Map, beside: [&Path; 2], warnings: &mut Vec<String>) -> Option<(PathBuf, Picture)> {
+    fn picture(&mut self, map: &Map, beside: [&Path; 2], warnings: &mut Vec<String>) -> Option<(PathBuf, DecodedImage)> {
         let path = match find::find(&map.file, &beside) {
             Ok(path) => path,
             Err(searched) => {
@@ -149,16 +149,16 @@ fn roughness(shininess: Option<f32>, specular: Vec3) -> f32 {
     }
 }
 
-fn has_alpha(picture: &Picture) -> bool {
+fn has_alpha(picture: &DecodedImage) -> bool {
     picture.texels.iter().any(|[_, _, _, alpha]| alpha < 1.0)
 }
 
 /// `color` (or white) with the alpha of `alpha`, or its red where it is opaque; the size is that of the larger one.
-fn with_alpha(color: Option<Picture>, alpha: &Picture) -> Picture {
+fn with_alpha(color: Option<DecodedImage>, alpha: &DecodedImage) -> DecodedImage {
     let channel = if has_alpha(alpha) { 3 } else { 0 };
-    let color = color.unwrap_or_else(|| Picture { width: 1, height: 1, texels: vec![255u8; 4].into() });
+    let color = color.unwrap_or_else(|| DecodedImage { width: 1, height: 1, texels: vec![255u8; 4].into() });
     let (width, height) = (color.width.max(alpha.width), color.height.max(alpha.height));
-    let texel = |p: &Picture, x: u32, y: u32| {
+    let texel = |p: &DecodedImage, x: u32, y: u32| {
         let x = u64::from(x) * u64::from(p.width) / u64::from(width);
         let y = u64::from(y) * u64::from(p.height) / u64::from(height);
         p.texels.get((y * u64::from(p.width) + x) as usize)
@@ -172,5 +172,5 @@ fn with_alpha(color: Option<Picture>, alpha: &Picture) -> Picture {
         (TexelData::Unorm8(_), TexelData::Unorm8(_)) => all.map(|v| (v * 255.0).round() as u8).collect::<Vec<u8>>().into(),
         _ => all.map(|v| (v * 65535.0).round() as u16).collect::<Vec<u16>>().into(),
     };
-    Picture { width, height, texels }
+    DecodedImage { width, height, texels }
 }

@@ -27,7 +27,7 @@ use crate::scene::{Geometry, Instance, Material, Mesh, Scene, TriangleMesh};
 pub(super) fn read(path: &Path) -> Result<Scene> {
     let mut file = parse::parse(path)?;
     let mut scene = Scene::default();
-    let mut materials = material::Library::default();
+    let mut materials = material::MaterialLibrary::default();
     let mut complete = true;
     for name in std::mem::take(&mut file.libraries) {
         match find::find(&name, &[path]) {
@@ -35,7 +35,9 @@ pub(super) fn read(path: &Path) -> Result<Scene> {
             Err(searched) => {
                 complete = false;
                 let searched = find::list(&searched);
-                scene.report.warnings.push(format!("the material library {name} was not found in {searched}: grey instead"));
+                scene.report.warnings.push(format!(
+                    "the material library {name} was not found in {searched}: its materials are replaced by grey"
+                ));
             }
         }
     }
@@ -50,7 +52,7 @@ pub(super) fn read(path: &Path) -> Result<Scene> {
                 None => *unknown.entry(name.clone()).or_insert_with(|| {
                     // a missing library says it all
                     if complete {
-                        scene.report.warnings.push(format!("the material `{name}` is not defined: grey instead"));
+                        scene.report.warnings.push(format!("the material `{name}` is not defined: replaced by grey"));
                     }
                     push(&mut scene, material::grey(name.clone()))
                 }),

@@ -91,7 +91,7 @@ fn number(text: &str) -> Result<f32, String> {
     let word = text.split_ascii_whitespace().next().unwrap_or("");
     match word.parse::<f32>() {
         Ok(x) if x.is_finite() => Ok(x),
-        _ => Err(format!("`{text}` is no number")),
+        _ => Err(format!("`{text}` is not a number")),
     }
 }
 
@@ -101,7 +101,7 @@ fn color(text: &str) -> Result<Vec3, String> {
     match all.as_deref() {
         Some([r, g, b]) if Vec3::new(*r, *g, *b).is_finite() => Ok(Vec3::new(*r, *g, *b)),
         Some([y]) if y.is_finite() => Ok(Vec3::splat(*y)),
-        _ => Err(format!("`{text}` is no colour (three numbers)")),
+        _ => Err(format!("`{text}` is not a colour (three numbers)")),
     }
 }
 

@@ -7,7 +7,7 @@ use std::str::SplitAsciiWhitespace;
 
 use glam::{Vec2, Vec3, Vec4};
 
-use super::polygon::Cutter;
+use super::polygon::PolygonTriangulator;
 use crate::error::{Error, Result};
 
 /// No such index.
@@ -88,7 +88,7 @@ struct Parser {
     /// Whether name or material changed since the last face.
     changed: bool,
     polygon: Vec<Corner>,
-    cutter: Cutter,
+    cutter: PolygonTriangulator,
 }
 
 impl Parser {
@@ -179,7 +179,7 @@ impl Parser {
             if part.is_empty() {
                 return Ok(NONE);
             }
-            let i: i64 = part.parse().map_err(|_| format!("`{word}` is no corner of a face"))?;
+            let i: i64 = part.parse().map_err(|_| format!("`{word}` is not a corner of a face"))?;
             let count = count as i64;
             let resolved = if i < 0 { i.checked_add(count) } else { i.checked_sub(1) };
             match resolved.filter(|r| (0..count).contains(r)).and_then(|r| u32::try_from(r).ok()).filter(|&r| r != NONE) {
@@ -193,7 +193,7 @@ impl Parser {
             normal: index("normal", self.file.normals.len())?,
         };
         if corner.position == NONE {
-            return Err(format!("`{word}` is no corner of a face"));
+            return Err(format!("`{word}` is not a corner of a face"));
         }
         Ok(corner)
     }
@@ -215,7 +215,7 @@ fn floats(words: &mut SplitAsciiWhitespace, needed: usize) -> Result<[f32; 3], S
         match words.clone().next() {
             Some(word) if i < needed || !word.starts_with('#') => {
                 words.next();
-                *value = word.parse().map_err(|_| format!("`{word}` is no number"))?;
+                *value = word.parse().map_err(|_| format!("`{word}` is not a number"))?;
             }
             _ if i < needed => return Err(format!("{needed} numbers are needed, {i} found")),
             _ => break,

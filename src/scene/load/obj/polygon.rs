@@ -4,19 +4,19 @@ use earcut::Earcut;
 use glam::{DVec3, Vec3};
 
 /// Cuts concave polygons; keeps its buffers from one to the next.
-pub(super) struct Cutter {
+pub(super) struct PolygonTriangulator {
     earcut: Earcut<f64>,
     points: Vec<[f64; 2]>,
     triangles: Vec<u32>,
 }
 
-impl Default for Cutter {
+impl Default for PolygonTriangulator {
     fn default() -> Self {
         Self { earcut: Earcut::new(), points: Vec::new(), triangles: Vec::new() }
     }
 }
 
-impl Cutter {
+impl PolygonTriangulator {
     /// The triangles of a polygon of finite corners that no fan from its first corner can fill, as indices of corners and
     /// with the polygon's orientation. `None` where the fan is right, or nothing is: the polygon is a triangle, convex, a
     /// quad whose fan starts at the dent, or has no area.

@@ -1,20 +1,20 @@
-//! Choosing a place in an image of the sphere by how bright it is there: what is interpolated bilinearly between texels, as the shader
-//! does it (shaders/path/map.glsl), after the sampling of piecewise bilinear functions in Mitsuba 3 and pbrt-v4 (A.5).
+//! Importance sampling of an environment map by luminance, interpolated bilinearly between texels as in the shader
+//! (shaders/path/map.glsl), after the sampling of piecewise bilinear functions in Mitsuba 3 and pbrt-v4 (A.5).
 //!
-//! Patches lie between the middles of texels: `width` columns (the last one wraps round) and `height + 1` rows, of which those at the poles
-//! are halves. A row is drawn by its weight, then a patch of the row by its own, both by inversion: what is left of each number
-//! after that places the sample in the patch, by the bilinear function there. Numbers that are spread evenly stay so.
+//! Patches lie between the centers of texels: `width` columns (the last one wraps round) and `height + 1` rows, of which those at the poles
+//! are halves. A row is sampled by its weight, then a patch of the row by its own, both by inversion. The remainder of each number
+//! then samples the bilinear function within the patch, which preserves stratification.
 
-/// Intervals of numbers from 0 to 1 that rows and patches are drawn with.
+/// Cumulative distribution of the rows, and of the patches in each row.
 #[derive(Clone, Debug, Default)]
-pub struct Patches {
-    /// Where each row begins, `height + 1` of them, and 1; then of each row where its patches begin, `width` of them, and 1. What single precision
-    /// rounds to nothing is never drawn: its density is 0.
+pub struct BilinearDistribution {
+    /// Where each row begins, `height + 1` of them, and 1; then of each row where its patches begin, `width` of them, and 1. An interval that
+    /// single precision rounds to zero length is never sampled: its density is 0.
     pub table: Vec<f32>,
 }
 
-impl Patches {
-    /// From values at texels, not negative and finite, rows from the pole at +y.
+impl BilinearDistribution {
+    /// Builds the distribution of texel values, finite and not negative, rows from the pole at +y.
     pub fn new(width: usize, height: usize, values: &[f64]) -> Self {
         let at = |x: usize, y: isize| values[y.clamp(0, height as isize - 1) as usize * width + x % width];
         let mut rows = Vec::with_capacity(height + 1);
@@ -26,7 +26,7 @@ impl Patches {
                     0.25 * (at(x, above) + at(x + 1, above) + at(x, below) + at(x + 1, below))
                 })
                 .collect();
-            // of the solid angle between the middles of two rows of texels
+            // weighted by the solid angle between the centers of two rows of texels
             let cos = |y: f64| (y.clamp(0.0, height as f64) / height as f64 * std::f64::consts::PI).cos();
             rows.push(weights.iter().sum::<f64>() * (cos(row as f64 - 0.5) - cos(row as f64 + 0.5)));
             push_intervals(&mut columns, &weights);
@@ -38,7 +38,7 @@ impl Patches {
     }
 }
 
-/// Where each interval begins, and 1. Without any weight all are alike.
+/// Appends the start of each interval, and 1. Without any weight all intervals are equal.
 fn push_intervals(table: &mut Vec<f32>, weights: &[f64]) {
     let total: f64 = weights.iter().sum();
     let mut sum = 0.0;
@@ -61,7 +61,7 @@ mod tests {
     #[test]
     fn an_even_image_is_even_over_the_sphere() {
         let (w, h) = (8, 4);
-        let patches = Patches::new(w, h, &vec![3.0; w * h]);
+        let patches = BilinearDistribution::new(w, h, &vec![3.0; w * h]);
         assert_eq!(patches.table.len(), h + 2 + (h + 1) * (w + 1));
         let rows = widths(&patches.table[..h + 2]);
         for (row, width) in rows.iter().enumerate() {
@@ -80,7 +80,7 @@ mod tests {
         let (w, h) = (4, 3);
         let mut values = vec![0.0; w * h];
         values[w + 3] = 1.0;
-        let patches = Patches::new(w, h, &values);
+        let patches = BilinearDistribution::new(w, h, &values);
         let rows = widths(&patches.table[..h + 2]);
         // rows of patches above and below the middle one of three rows of texels, and none at the poles
         assert_eq!((rows[0], rows[3]), (0.0, 0.0));
@@ -91,6 +91,6 @@ mod tests {
             assert_eq!(widths(&patches.table[first..first + w + 1]), [0.0, 0.0, 0.5, 0.5]);
         }
         // nothing at all: no interval is broken
-        assert!(Patches::new(2, 1, &[0.0; 2]).table.iter().all(|v| (0.0..=1.0).contains(v)));
+        assert!(BilinearDistribution::new(2, 1, &[0.0; 2]).table.iter().all(|v| (0.0..=1.0).contains(v)));
     }
 }

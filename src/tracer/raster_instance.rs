@@ -1,51 +1,51 @@
-//! What a rasteriser has to know of a scene in device memory: what lies where, and what can be left out together.
+//! The geometry of a scene in device memory for a rasterizer: buffer addresses, and bounds for frustum culling.
 
 use glam::Vec3;
 use rayon::prelude::*;
 
 use crate::accel::Aabb;
-use crate::accel::flatten::{FlatScene, Group};
+use crate::accel::flatten::{BlasGroup, FlatScene};
 
-/// Primitives that follow each other and are left out or drawn together.
+/// Number of consecutive primitives that are culled or drawn together.
 pub const CHUNK: u32 = 256;
 
-/// Host-side outline of a group.
-pub struct Shape {
-    /// Spheres or triangles.
+/// Counts and bounds of a group, on the host.
+pub struct RasterGeometry {
+    /// Whether the primitives are spheres; otherwise they are triangles.
     pub spheres: bool,
-    /// Triangles or spheres.
+    /// Number of primitives.
     pub primitives: u32,
-    /// Primitives before the first alpha-tested one.
+    /// Number of primitives before the first alpha-tested one.
     pub opaque: u32,
-    /// Of all primitives, group space.
+    /// Bounds of all primitives, in group space.
     pub bounds: Aabb,
-    /// Of each [`CHUNK`] primitives, the last of fewer; none when there is one, or when the vertices may move.
+    /// Bounds of each run of [`CHUNK`] primitives; empty for a single run, and after vertices have moved.
     pub chunks: Vec<Aabb>,
 }
 
-/// An entry of the top level, and the group below it.
-pub struct Drawable<'a> {
-    /// Number of the entry.
+/// A TLAS instance, and the group below it.
+pub struct RasterInstance<'a> {
+    /// Index of the TLAS instance.
     pub entry: u32,
     /// Group space to world relative to the scene's origin: three rows.
     pub to_world: [[f32; 4]; 3],
-    /// The group.
-    pub shape: &'a Shape,
-    /// Address of its vertices, 3 floats each; of a sphere 4.
+    /// Its geometry.
+    pub shape: &'a RasterGeometry,
+    /// Device address of its vertices, 3 floats each, or of its spheres, 4 floats each.
     pub positions: u64,
-    /// Address of its triangles' corners, 3 words each; 0 for spheres.
+    /// Device address of its vertex indices, 3 words per triangle; 0 for spheres.
     pub indices: u64,
 }
 
-impl Shape {
-    pub(super) fn new(flat: &FlatScene, group: &Group) -> Self {
+impl RasterGeometry {
+    pub(super) fn new(flat: &FlatScene, group: &BlasGroup) -> Self {
         let primitives = group.primitive_count;
         let chunk = |k: usize| {
             let first = k * CHUNK as usize;
-            let (mut part, mut bounds) = (flat.part_of(group, first), Aabb::EMPTY);
+            let (mut part, mut bounds) = (flat.submesh_of(group, first), Aabb::EMPTY);
             for primitive in first..primitives.min(first + CHUNK as usize) {
                 if part.end(flat) <= primitive {
-                    part = flat.part_of(group, primitive);
+                    part = flat.submesh_of(group, primitive);
                 }
                 bounds = bounds.union(flat.primitive_bounds(group, part, primitive));
             }
@@ -60,7 +60,7 @@ impl Shape {
         Self { spheres: group.spheres, primitives: primitives as u32, opaque: group.opaque_count as u32, bounds, chunks }
     }
 
-    /// Its vertices have moved.
+    /// Recomputes the bounds after its vertices have moved.
     pub(super) fn deform(&mut self, positions: &[Vec3]) {
         self.chunks.clear();
         let pieces = positions.par_chunks(1 << 14).map(Aabb::of_points);

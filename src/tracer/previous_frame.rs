@@ -1,28 +1,28 @@
-//! Where what changes was before the last update, in device memory: surfaces are looked up there in the previous frame.
-//! Scenes that never change have nothing of it.
+//! Transforms and vertices of a dynamic scene before the last update, in device memory: shaders compute motion vectors from them.
+//! Static scenes have none.
 
 use std::sync::Arc;
 
 use super::dynamic::group_of;
 use super::gpu_scene::rows;
-use crate::accel::flatten::{FlatScene, Placement};
+use crate::accel::flatten::{FlatScene, TlasInstance};
 use crate::error::Result;
 use crate::gpu::{Buffer, Device, Memory};
 use crate::interface::records::scene::MotionRecord;
 
-/// The scene as it was before the last update.
-pub(super) struct Motion {
+/// Transforms and vertices before the last update.
+pub(super) struct PreviousFrame {
     records: Vec<MotionRecord>,
     buffer: Buffer,
-    /// Of each group that may deform: its vertices.
+    /// Previous vertices of each group that may deform.
     previous: Vec<Option<Buffer>>,
-    /// Entries and groups that the last update changed.
+    /// TLAS instances that the last update moved, and groups that it deformed.
     moved: Vec<usize>,
     deformed: Vec<usize>,
 }
 
-impl Motion {
-    /// Nothing has changed yet. `None` for a scene that never does.
+impl PreviousFrame {
+    /// The state before any update; `None` for a static scene.
     pub fn new(device: &Arc<Device>, flat: &FlatScene, positions: impl Fn(usize) -> u64) -> Result<Option<Self>> {
         if flat.motion.is_none() {
             return Ok(None);
@@ -33,7 +33,7 @@ impl Motion {
             previous[group] = Some(Buffer::new(device, "previous vertices", positions(group), Memory::Device)?);
         }
         let records: Vec<_> = flat
-            .placements
+            .instances
             .iter()
             .map(|p| MotionRecord {
                 previous_group_to_world: rows(&p.to_world),
@@ -42,19 +42,19 @@ impl Motion {
             })
             .collect();
         let buffer = Buffer::from_slice(device, "motion records", &records)?;
-        // their vertices are not there yet
+        // the first update copies their vertices
         Ok(Some(Self { records, buffer, previous, moved: Vec::new(), deformed: deforming }))
     }
 
-    /// Where shaders find it.
+    /// Device address of the motion records.
     pub fn address(&self) -> u64 {
         self.buffer.address()
     }
 
-    /// Before an update that moves these entries and deforms these groups: what is, becomes what was.
+    /// Makes the current state the previous one. To be called before an update that moves these instances and deforms these groups.
     pub fn begin<'a>(
         &mut self,
-        placements: &[Placement],
+        instances: &[TlasInstance],
         positions: impl Fn(usize) -> &'a Buffer,
         moving: Vec<usize>,
         deforming: Vec<usize>,
@@ -62,7 +62,7 @@ impl Motion {
         let (moved, deformed) = (std::mem::replace(&mut self.moved, moving), std::mem::replace(&mut self.deformed, deforming));
         let mut changed = false;
         for &k in moved.iter().chain(&self.moved) {
-            self.records[k].previous_group_to_world = rows(&placements[k].to_world);
+            self.records[k].previous_group_to_world = rows(&instances[k].to_world);
             changed = true;
         }
         if changed {

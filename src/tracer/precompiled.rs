@@ -1,5 +1,5 @@
-//! The compute tracer's large pipelines, compiled while its hierarchy is built: a driver takes a tenth of a second for them, and half
-//! a second where it has not met them before.
+//! The compute tracer's large pipelines, compiled while its BVH is built: a driver takes a tenth of a second for each, and half
+//! a second without a cached result.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -12,79 +12,79 @@ use crate::gpu::{ComputePipeline, Device, DeviceInfo, Specialization};
 use crate::interface::constants;
 use crate::shaders::{Rays, Shader, StreamShaders, Variant, wide_kernel};
 
-/// Scenes of fewer primitives are built before a pipeline is compiled.
-const WORTHWHILE: usize = 100_000;
+/// Minimum number of primitives for compiling ahead: the BVH of a smaller scene is built sooner than a pipeline is compiled.
+const MIN_PRIMITIVES: usize = 100_000;
 
-/// A shader and what it is specialised to.
+/// A shader and its specialization.
 #[derive(Clone)]
-pub(super) struct Recipe {
+pub(super) struct PipelineSpec {
     pub name: &'static str,
     pub shader: &'static Shader,
     pub specialization: Specialization,
-    /// Its lanes work together.
+    /// It traces packets and needs full subgroups.
     pub packets: bool,
 }
 
-/// What was compiled and not yet asked for.
+/// Compiled pipelines that no stream has taken yet.
 #[derive(Default)]
-pub(super) struct Prepared {
-    pipelines: Mutex<Vec<(Recipe, ComputePipeline)>>,
+pub(super) struct PrecompiledPipelines {
+    pipelines: Mutex<Vec<(PipelineSpec, ComputePipeline)>>,
 }
 
-impl Prepared {
-    /// What the streams' recipes for a scene are taken to be. A recipe that turns out another is compiled when it is asked for, and an
-    /// error is found again then.
-    pub fn recipes(
+impl PrecompiledPipelines {
+    /// The pipelines that the streams of a scene are expected to need. One that differs from its expectation is compiled when it is first
+    /// used; an error in compiling ahead is ignored, since it occurs again then.
+    pub fn expected(
         info: &DeviceInfo,
         features: SceneFeatures,
         options: ComputeOptions,
         streams: &[&'static StreamShaders],
         primitives: usize,
-    ) -> Vec<Recipe> {
+    ) -> Vec<PipelineSpec> {
         let fast = matches!(options.kernel, Kernel::Auto | Kernel::Wide | Kernel::Packet);
-        if !fast || primitives < WORTHWHILE {
+        if !fast || primitives < MIN_PRIMITIVES {
             return Vec::new();
         }
         let s = specialization(info, features, options, compute::USUAL_STACK);
-        let mut out: Vec<Recipe> = Vec::new();
+        let mut out: Vec<PipelineSpec> = Vec::new();
         for shaders in streams {
-            let recipe = large(info, options.kernel, shaders, &s);
+            let spec = large(info, options.kernel, shaders, &s);
             // streams share the kernel that traces rays one by one
-            if !out.iter().any(|r| r.is(&recipe)) {
-                out.push(recipe);
+            if !out.iter().any(|r| r.is(&spec)) {
+                out.push(spec);
             }
         }
         out
     }
 
-    /// Compiles them.
-    pub fn compile(device: &Arc<Device>, recipes: Vec<Recipe>) -> Self {
-        let compiled = recipes.into_iter().filter_map(|r| r.compile(device).ok().map(|p| (r, p)));
+    /// Compiles pipelines; those that fail are left out.
+    pub fn compile(device: &Arc<Device>, specs: Vec<PipelineSpec>) -> Self {
+        let compiled = specs.into_iter().filter_map(|r| r.compile(device).ok().map(|p| (r, p)));
         Self { pipelines: Mutex::new(compiled.collect()) }
     }
 
-    /// The pipeline, compiled now unless it is there.
-    pub fn take(&self, device: &Arc<Device>, recipe: &Recipe) -> Result<ComputePipeline> {
-        let there = {
+    /// Takes the pipeline, compiling it now if that was not done ahead.
+    pub fn take(&self, device: &Arc<Device>, spec: &PipelineSpec) -> Result<ComputePipeline> {
+        let compiled = {
             let mut all = self.pipelines.lock().unwrap_or_else(PoisonError::into_inner);
-            all.iter().position(|(r, _)| r.is(recipe)).map(|k| all.swap_remove(k).1)
+            all.iter().position(|(r, _)| r.is(spec)).map(|k| all.swap_remove(k).1)
         };
-        there.map_or_else(|| recipe.compile(device), Ok)
+        compiled.map_or_else(|| spec.compile(device), Ok)
     }
 }
 
-impl Recipe {
+impl PipelineSpec {
     fn compile(&self, device: &Arc<Device>) -> Result<ComputePipeline> {
         let make = if self.packets { ComputePipeline::with_full_subgroups } else { ComputePipeline::new };
         make(device, self.name, self.shader, &self.specialization)
     }
 
-    fn is(&self, other: &Recipe) -> bool {
+    fn is(&self, other: &PipelineSpec) -> bool {
         std::ptr::eq(self.shader, other.shader) && self.specialization == other.specialization
     }
 }
 
-/// What scenes, devices and options make of the compute tracer's shaders.
+/// Specialization of the compute tracer's shaders for a device, a scene and options.
 pub(super) fn specialization(
     info: &DeviceInfo,
     features: SceneFeatures,
@@ -101,18 +101,18 @@ pub(super) fn specialization(
         .set(constants::MAX_ITERATIONS, max_iterations)
 }
 
-/// Is the stream traced in packets?
+/// Whether the stream is traced in packets.
 pub(super) fn in_packets(info: &DeviceInfo, kernel: Kernel, shaders: &StreamShaders) -> bool {
     let wanted = kernel == Kernel::Packet || shaders.rays == Rays::Camera;
     shaders.variant(Variant::Packet).is_some() && wanted && kernel.for_coherent(info) == Kernel::Packet
 }
 
-/// The shader of the fast kernels that traces the stream.
-pub(super) fn large(info: &DeviceInfo, kernel: Kernel, shaders: &'static StreamShaders, s: &Specialization) -> Recipe {
+/// The pipeline of the fast kernels that traces the stream.
+pub(super) fn large(info: &DeviceInfo, kernel: Kernel, shaders: &'static StreamShaders, s: &Specialization) -> PipelineSpec {
     let packet = shaders.variant(Variant::Packet).filter(|_| in_packets(info, kernel, shaders));
     let (name, shader) = match packet {
         Some(shader) => (shaders.name, shader),
         None => ("wide kernel", wide_kernel(shaders.mode, info.int64)),
     };
-    Recipe { name, shader, specialization: s.clone(), packets: packet.is_some() }
+    PipelineSpec { name, shader, specialization: s.clone(), packets: packet.is_some() }
 }

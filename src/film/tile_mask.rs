@@ -1,7 +1,7 @@
-//! Which tiles of an image the scene can be seen in. Camera rays through the others meet nothing and need not be traced.
+//! The tiles of an image that can contain geometry. Camera rays through the others hit nothing and need not be traced.
 //!
-//! Every primitive is projected and the tiles under its bounding rectangle are marked, a margin around it that covers the rounding
-//! of the rays included: what is left out is certain to be empty.
+//! The screen bounding rectangle of every primitive is marked, with a margin for the rounding of the rays, so the mask is conservative:
+//! unmarked tiles are certain to be empty.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -11,27 +11,27 @@ use rayon::prelude::*;
 use super::block::{Block, TILE};
 use super::camera::CameraRecord;
 use crate::accel::Aabb;
-use crate::accel::flatten::{FlatScene, Group, Part, Placement};
+use crate::accel::flatten::{BlasGroup, FlatScene, Submesh, TlasInstance};
 use crate::scene::Geometry;
 
-/// Placed primitives that are projected one by one at most, per camera ray of the image: beyond, tracing the rays costs less.
+/// Maximum number of instanced primitives per camera ray that are projected one by one: above that, tracing the rays costs less.
 /// A projection takes 10 to 20 ns, a camera ray that misses a good scene's hierarchy about 50 ns.
 const PRIMITIVES_PER_RAY: f64 = 0.5;
 /// Relative rounding of ray origins, directions and transformed vertices: 16 half-ulps.
 const ROUNDING: f64 = 16.0 * f32::EPSILON as f64 * 0.5;
-/// Margin where nothing is rounded, pixels.
+/// Minimum margin, pixels.
 const MIN_MARGIN: f64 = 0.5;
-/// With a larger margin in pixels (a view so narrow that single precision does not resolve it) nothing is left out.
+/// Maximum margin, pixels. With a larger one (a view too narrow for single precision) no tile is skipped.
 const MAX_MARGIN: f64 = 64.0;
 
-/// The tiles of an image in which something may be seen.
+/// The tiles of an image that can contain geometry.
 #[derive(Debug)]
-pub struct Cover {
+pub struct TileMask {
     tiles_x: u32,
     live: Vec<bool>,
 }
 
-/// From world (relative to the origin) to the image.
+/// Projection from world space (relative to the scene's origin) to the image.
 struct View {
     world_to_camera: DAffine3,
     orthographic: bool,
@@ -48,28 +48,28 @@ struct Rectangle {
     max: [f64; 2],
 }
 
-impl Cover {
-    /// The tiles of an image of `size` pixels with `spp` samples each. `None` when nothing can be left out: the camera is in the
-    /// scene's bounds or beside them, or there is nothing.
+impl TileMask {
+    /// The mask of an image of `size` pixels with `spp` samples each. `None` if no tile can be skipped: the camera is inside or
+    /// beside the scene's bounds, or every tile is marked.
     pub fn new(flat: &FlatScene, camera: &CameraRecord, size: [u32; 2], spp: u32) -> Option<Self> {
         let bounds = flat.bounds();
-        let view = View::new(camera, size, bounds, &flat.placements)?;
+        let view = View::new(camera, size, bounds, &flat.instances)?;
         let tiles_x = size[0].div_ceil(TILE);
         let tiles = Marks {
             tiles_x,
             tiles_y: size[1].div_ceil(TILE),
             live: std::iter::repeat_with(AtomicBool::default).take((tiles_x * size[1].div_ceil(TILE)) as usize).collect(),
         };
-        // the whole first: most of a distant scene's image is outside of it
+        // the scene's bounds first: for a distant scene they cover only a small part of the image
         let whole = view.rectangle(bounds, &DAffine3::IDENTITY)?;
-        let placed: f64 = flat.placements.iter().map(|p| flat.groups[p.group].primitive_count as f64).sum();
+        let placed: f64 = flat.instances.iter().map(|p| flat.groups[p.group].primitive_count as f64).sum();
         let rays = whole.clipped_area(size) * spp as f64;
         if placed > PRIMITIVES_PER_RAY * rays {
             tiles.mark(whole, view.margin);
         } else {
-            for placement in &flat.placements {
+            for placement in &flat.instances {
                 let group = &flat.groups[placement.group];
-                for part in &group.parts {
+                for part in &group.submeshes {
                     mark_part(flat, placement, group, part, &view, &tiles);
                 }
             }
@@ -78,20 +78,20 @@ impl Cover {
         live.iter().any(|l| !l).then_some(Self { tiles_x, live })
     }
 
-    /// The tiles of a block, as the block counts them; `None` when all are live.
+    /// Indices within a block of its marked tiles; `None` if all are marked.
     pub fn tiles(&self, block: &Block) -> Option<Vec<u32>> {
         let width = self.tiles_x * TILE;
         let live: Vec<u32> = (0..block.tiles()).filter(|&t| self.live[block.image_tile(t, width)]).collect();
         (live.len() < block.tiles() as usize).then_some(live)
     }
 
-    /// Tiles in which something may be seen, and all tiles.
+    /// Number of marked tiles, and of all tiles.
     pub fn count(&self) -> (usize, usize) {
         (self.live.iter().filter(|l| **l).count(), self.live.len())
     }
 }
 
-fn mark_part(flat: &FlatScene, placement: &Placement, group: &Group, part: &Part, view: &View, tiles: &Marks) {
+fn mark_part(flat: &FlatScene, placement: &TlasInstance, group: &BlasGroup, part: &Submesh, view: &View, tiles: &Marks) {
     let to_world = placement.to_world;
     match &flat.scene.meshes[part.mesh].geometry {
         Geometry::Triangles(mesh) => {
@@ -110,7 +110,7 @@ fn mark_part(flat: &FlatScene, placement: &Placement, group: &Group, part: &Part
             let bounds = flat.primitive_bounds(group, part, part.first_primitive + k);
             match view.rectangle(bounds, &to_world) {
                 Some(r) => tiles.mark(r, view.margin),
-                // its box, unlike the sphere, may reach behind the camera
+                // the sphere's box may extend behind the camera
                 None => tiles.mark(Rectangle { min: [f64::NEG_INFINITY; 2], max: [f64::INFINITY; 2] }, 0.0),
             }
         }),
@@ -118,7 +118,7 @@ fn mark_part(flat: &FlatScene, placement: &Placement, group: &Group, part: &Part
 }
 
 impl View {
-    fn new(camera: &CameraRecord, size: [u32; 2], bounds: Aabb, placements: &[Placement]) -> Option<Self> {
+    fn new(camera: &CameraRecord, size: [u32; 2], bounds: Aabb, instances: &[TlasInstance]) -> Option<Self> {
         let rows = camera.camera_to_world.map(|r| r.map(f64::from));
         let column = |k: usize| DVec3::new(rows[0][k], rows[1][k], rows[2][k]);
         let matrix = DMat3::from_cols(column(0), column(1), column(2));
@@ -135,12 +135,12 @@ impl View {
             middle: image.map(|n| 0.5 * n),
             margin: 0.0,
         };
-        // everything has to lie before the camera
+        // all geometry has to be in front of the camera
         let corners = corners(bounds).map(|c| view.world_to_camera.transform_point3(c));
         let near = corners.iter().map(|c| -c.z).fold(f64::INFINITY, f64::min);
         let reach = corners.iter().map(|c| c.length()).fold(0.0, f64::max);
         // as in oracle/rounding.rs: going to a group's space and back errs by the translation too, and the more the worse conditioned
-        let moved = || placements.iter().map(|p| p.to_world).filter(|t| *t != DAffine3::IDENTITY);
+        let moved = || instances.iter().map(|p| p.to_world).filter(|t| *t != DAffine3::IDENTITY);
         let translation = moved().map(|t| t.translation.length()).fold(0.0, f64::max);
         let condition = moved().map(|t| condition(t.matrix3)).fold(1.0, f64::max);
         let coordinates =
@@ -148,7 +148,7 @@ impl View {
         if !(reach.is_finite() && (view.orthographic || near > 1e-3 * reach)) {
             return None;
         }
-        // of points and of directions, on the plane at unit distance
+        // error of points and directions on the image plane at unit distance
         let error = match view.orthographic {
             true => ROUNDING * (coordinates + half[0] + half[1] + reach),
             false => ROUNDING * (coordinates / near + 1.0) * (1.0 + half[0] * half[0] + half[1] * half[1]),
@@ -157,14 +157,14 @@ impl View {
         (view.margin <= MAX_MARGIN).then_some(view)
     }
 
-    /// Where a point is in the image, pixels from the upper left corner.
+    /// Projects a point to the image, in pixels from the upper left corner.
     fn project(&self, to_world: &DAffine3, point: Vec3) -> [f64; 2] {
         let p = self.world_to_camera.transform_point3(to_world.transform_point3(point.as_dvec3()));
         let depth = if self.orthographic { 1.0 } else { -p.z };
         [self.middle[0] + self.scale[0] * p.x / depth, self.middle[1] - self.scale[1] * p.y / depth]
     }
 
-    /// Around a box; `None` when it reaches behind the camera.
+    /// Bounding rectangle of a projected box; `None` if the box extends behind the camera.
     fn rectangle(&self, bounds: Aabb, to_world: &DAffine3) -> Option<Rectangle> {
         let corners = corners(bounds);
         let before = |c: &DVec3| -self.world_to_camera.transform_point3(to_world.transform_point3(*c)).z > 0.0;
@@ -173,7 +173,7 @@ impl View {
     }
 }
 
-/// By how much a matrix and its inverse together magnify errors: 1 for rotation and uniform scale.
+/// Condition number of a matrix (Frobenius norm), scaled to 1 for rotation and uniform scale.
 fn condition(m: DMat3) -> f64 {
     let norm = |m: DMat3| m.to_cols_array().iter().map(|x| x * x).sum::<f64>().sqrt();
     let k = norm(m) * norm(m.inverse()) / 3.0;
@@ -193,7 +193,7 @@ impl Rectangle {
         })
     }
 
-    /// Pixels of it that are in the image.
+    /// Area of the part inside the image, pixels.
     fn clipped_area(&self, size: [u32; 2]) -> f64 {
         let side = |k: usize| (self.max[k].min(size[k] as f64) - self.min[k].max(0.0)).max(0.0);
         side(0) * side(1)
@@ -214,7 +214,7 @@ impl Marks {
         for y in first(r.min[1])..end(r.max[1], self.tiles_y) {
             for x in first(r.min[0])..end(r.max[0], self.tiles_x) {
                 let tile = &self.live[(y * self.tiles_x + x) as usize];
-                // most are: a read leaves the cache line where it is
+                // most tiles are marked already: a read does not invalidate other cores' cache lines
                 if !tile.load(Ordering::Relaxed) {
                     tile.store(true, Ordering::Relaxed);
                 }
@@ -248,10 +248,10 @@ mod tests {
 
     fn view(scene: &Scene) -> Option<View> {
         let flat = FlatScene::new(scene);
-        assert_eq!(flat.placements.len(), 2, "the mesh is not baked");
+        assert_eq!(flat.instances.len(), 2, "the mesh is not baked");
         let camera = Camera::look_at(DVec3::new(1.0, 0.5, 20.0), DVec3::new(1.0, 0.5, 0.0), DVec3::Y, 0.7);
         let camera = CameraRecord::new(&camera, flat.origin, 1.0);
-        View::new(&camera, [256, 256], flat.bounds(), &flat.placements)
+        View::new(&camera, [256, 256], flat.bounds(), &flat.instances)
     }
 
     #[test]
@@ -262,7 +262,7 @@ mod tests {
         let far = view(&scene).unwrap();
         // a ray's origin, rounded where the vertices are, is off by half an ulp of each coordinate; so its hit may be seen so far beside
         let ulp = (1.0e6f32.next_up() - 1.0e6f32) as f64;
-        let to_world = FlatScene::new(&scene).placements[0].to_world;
+        let to_world = FlatScene::new(&scene).instances[0].to_world;
         let at = |p: DVec3| {
             let p = far.world_to_camera.transform_point3(to_world.transform_point3(p));
             [far.scale[0] * p.x / -p.z, far.scale[1] * p.y / -p.z]
