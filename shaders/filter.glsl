@@ -1,4 +1,4 @@
-// filter: the mean of the accessibility over a pixel's neighbours on the same surface, and of bent normals with the same weights
+// filter: the mean of ambient visibility over a pixel's neighbours on the same surface, and of bent normals with the same weights
 // (common/filter.glsl).
 #include "common/frame.glsl"
 #include "interface/passes.glsl"

@@ -67,7 +67,7 @@ void main() {
         float arcs = 0.0;
         for (int side = 0; side < 2; side++) {
             float sgn = side == 0 ? -1.0 : 1.0;
-            // the surface itself is the lowest horizon
+            // the tangent plane is the lowest horizon
             float low = cos(clamp(n + sgn * 0.5 * PI, -PI, PI));
             float horizon = low;
             // geometry beyond the border is unknown: all steps are within the image

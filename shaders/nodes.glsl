@@ -1,5 +1,5 @@
-// nodes: the number of BVH nodes that the camera ray of each pixel visits with the compute tracer, and a colour for it. A dispatch has no queue of rays:
-// an invocation is a pixel.
+// nodes: the number of BVH nodes that the camera ray of each pixel visits with the compute tracer, and a colour for it. Rays are not queued:
+// one invocation per pixel.
 #define STREAM_CLOSEST
 #define COUNT_VISITS
 #define SPREAD 1u

@@ -1,4 +1,4 @@
-// path_bounce: the rays that `path_camera` or the bounce before left in a queue, and the vertices that they meet (shaders/path/path.glsl).
+// path_bounce: traces the rays that `path_camera` or the previous bounce appended to a queue, and shades their hits (shaders/path/path.glsl).
 #include "path/path.glsl"
 
 Ray ray(uint index) {

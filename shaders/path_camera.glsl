@@ -11,7 +11,7 @@ float blackman_harris_share(float x) {
     return x + (-0.48829 * s1 + 0.5 * 0.14128 * s2 - 0.01168 / 3.0 * s3) / (0.35875 * TURN);
 }
 
-// From the middle of a pixel, as often as the filter weighs it.
+// Offset from the centre of a pixel, distributed as the filter.
 float filter_offset(uint pixel_filter, float u) {
     if (!WITH_PIXEL_FILTER) return u - 0.5;
     if (pixel_filter == FILTER_TENT) return u < 0.5 ? sqrt(2.0 * u) - 1.0 : 1.0 - sqrt(2.0 - 2.0 * u);
@@ -65,7 +65,7 @@ void closest(uint index, Hit hit) {
         return;
     }
     PathParams path = PathParams(p.path);
-    // divided by the albedo, so that what one bounce brings is the accessibility; survival goes by what paths carry without that
+    // divided by the albedo, so that one bounce gives ambient visibility; Russian roulette uses the throughput without this factor
     float scale = WITH_CONSTANT_ALBEDO ? path.albedo : 1.0;
     PathState state = PathState(vec3(1.0 / scale), -1.0, index, 0u, 0u, scale, NO_MEDIUM);
     if (WITH_MEDIA) state.medium = current_medium(path.camera_media);

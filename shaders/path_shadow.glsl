@@ -1,4 +1,4 @@
-// path_shadow: rays from path vertices to lights; where nothing is in the way, the path has what the light brings.
+// path_shadow: shadow rays from path vertices to lights; the contribution of an unoccluded light is added to its path.
 #include "path/params.glsl"
 
 Ray ray(uint index) {

@@ -1,5 +1,5 @@
-// path_shadow_walls: path_shadow where there are thin walls without roughness, which light goes straight through: what is left of the light goes on
-// behind the wall, in a queue of its own.
+// path_shadow_walls: path_shadow for scenes with smooth thin walls, through which light passes straight: the attenuated shadow ray continues
+// behind the wall, in another queue.
 #include "path/path.glsl"
 
 Ray ray(uint index) {

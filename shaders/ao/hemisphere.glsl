@@ -6,7 +6,7 @@
 
 struct Hemisphere {
     vec3 ng;    // geometric normal, towards the viewer
-    vec3 axis;  // the same, or the shading normal on its side
+    vec3 axis;  // axis of the hemisphere: ng, or the shading normal on the side of ng
 };
 
 Hemisphere hemisphere_at(BlockParams p, Surface s) {

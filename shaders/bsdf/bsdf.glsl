@@ -80,7 +80,7 @@ BsdfSample proposed(vec3 wi, float eta) { return BsdfSample(wi, vec3(0.0), 1.0, 
 const BsdfValue NO_VALUE = BsdfValue(vec3(0.0), 0.0);
 const BsdfSample NO_SAMPLE = BsdfSample(vec3(0.0, 0.0, 1.0), vec3(0.0), 0.0, false, 1.0);
 
-// Absorbs everything.
+// A black surface, which absorbs everything.
 Bsdf black_bsdf() {
     Bsdf b;
     b.kind = BSDF_NONE;
@@ -111,7 +111,7 @@ float shadowing(vec3 ng, vec3 n, vec3 wi) {
 
 const vec3 FRAME_NORMAL = vec3(0.0, 0.0, 1.0);
 
-// Is it of this kind? What no material is is not compiled.
+// True if the BSDF is of this kind. Models that no material has are specialized out.
 bool is_bsdf(Bsdf b, uint kind, bool feature) { return feature && b.kind == kind; }
 
 #endif

@@ -4,7 +4,7 @@
 
 float clearcoat_fresnel(float c) { return mix(0.04, 1.0, schlick_weight(c)); }
 
-// What the clearcoat lets through on the way from or to a direction: both ways count, so that they may be exchanged.
+// Transmittance of the clearcoat for light from or to a direction: the product of both ways, so that the BSDF is reciprocal.
 float clearcoat_transmits(Clearcoat clearcoat, vec3 w) {
     return 1.0 - clearcoat.weight * clearcoat_fresnel(abs(dot(clearcoat.normal, w)));
 }

@@ -1,4 +1,4 @@
-// What the materials of the scene require. What they do not is not compiled.
+// Features that the materials of the scene require; all others are specialized out.
 #ifndef BSDF_FEATURES
 #define BSDF_FEATURES
 #include "interface/material_features.glsl"

@@ -30,7 +30,7 @@ vec3 sheen_value(Sheen sheen, vec3 wo, vec3 wi) {
     return sheen.color * (charlie(sheen.alpha, m.z) * g / (4.0 * wo.z));
 }
 
-// What fibres leave to what is below them, by the cosine of the light's or the viewer's direction.
+// Transmittance of the sheen layer to the layers below, by the cosine of the light's or the viewer's direction.
 float sheen_kept(Sheen sheen, float cosine) {
     return 1.0 - highest(sheen.color) * min(albedo(ALBEDO_SHEEN, sqrt(max(cosine, 0.0)), sqrt(sheen.alpha)), 1.0);
 }

@@ -1,4 +1,4 @@
-// What surrounds the scene: a map, or a constant radiance.
+// The environment: a map, or a constant radiance.
 #ifndef LIGHTS_ENVIRONMENT
 #define LIGHTS_ENVIRONMENT
 #include "lights/light.glsl"

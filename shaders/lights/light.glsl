@@ -29,7 +29,7 @@ const LightSample NO_LIGHT_SAMPLE = LightSample(vec3(0.0, 0.0, 1.0), 0.0, vec3(0
 
 float sky_pdf(PathParams p, Shading m, vec3 from, vec3 wi);
 
-// Is it of this kind? What the scene has not is not compiled; and where all lights are of one kind, nothing is compared.
+// True if the light is of this kind. Kinds that the scene lacks are specialized out; if all lights are of one kind, there is no comparison.
 bool is_kind(LightRecord light, uint kind) {
     return (LIGHT_KINDS_0 >> kind & 1u) != 0u && (LIGHT_KINDS_0 == 1u << kind || light.kind == kind);
 }

@@ -8,7 +8,7 @@
 #include "bsdf/bsdf.glsl"
 
 struct Cone {
-    float width;   // world units
+    float width;   // scene units
     float spread;  // what it grows by per unit of length; negative: it narrows
 };
 

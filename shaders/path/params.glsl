@@ -1,4 +1,4 @@
-// Parameters of the path tracer's passes, and what it keeps of each path.
+// Parameters of the path tracer's passes, and the state of each path.
 #ifndef PATH_PARAMS
 #define PATH_PARAMS
 #include "common/camera.glsl"
@@ -10,11 +10,11 @@ const uint NO_MEDIUM = 0xffffffffu;
 // A path between two bounces, in memory a PathRecord.
 struct PathState {
     vec3 throughput;
-    float pdf;       // with which the BSDF proposed its ray; negative: nothing else could have
+    float pdf;       // density of BSDF sampling for the ray's direction; negative: no MIS weight, only BSDF sampling finds it
     uint index;      // of its camera ray
     uint depth;      // bounces so far
     uint passes;     // surfaces that it went straight through: they are no bounces
-    float eta_scale; // refraction changed radiance by 1 / this
+    float eta_scale; // product of squared relative indices of refraction, by which Russian roulette scales throughput
     uint medium;     // material of the volume that it is in, or NO_MEDIUM
 };
 

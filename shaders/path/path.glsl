@@ -32,7 +32,7 @@ vec3 counted_radiance(PathParams p, vec3 c, uint depth) {
     return WITH_CLAMP && depth > 0u ? min(c, vec3(p.clamp_to)) : c;
 }
 
-// Weight of an emitter that a ray met, which light samples draw with density `light`.
+// MIS weight of an emitter that a ray hit, which light sampling samples with density `light`.
 float emission_weight(PathParams p, PathState state, float light) {
     if (state.pdf < 0.0 || !(light > 0.0)) return 1.0;
     if (WITH_MIS) return power_heuristic(state.pdf, light);
@@ -57,7 +57,7 @@ BsdfValue vertex_at(Shading m, vec3 wo, vec3 w) {
     return bsdf_eval(m.bsdf, wo, wi);
 }
 
-// A direction by the strategy that is asked for; in the world.
+// Samples a direction by the selected strategy, in world space.
 BsdfSample sample_direction(Shading m, vec3 wo, vec2 u, float v) {
     Bsdf b = m.bsdf;
     // a delta lobe can be sampled in one way only, and these know reflection only
@@ -84,7 +84,7 @@ BsdfSample sample_direction(Shading m, vec3 wo, vec2 u, float v) {
     return s;
 }
 
-// What a medium leaves of light over a length.
+// Transmittance of a medium over a length.
 vec3 transmittance(uint medium, float length_) {
     if (!HAS_ABSORPTION || medium == NO_MEDIUM) return vec3(1.0);
     vec3 depth = SHADING_OF(medium).absorption;
@@ -92,7 +92,7 @@ vec3 transmittance(uint medium, float length_) {
     return mix(exp(-depth * length_), vec3(1.0), equal(depth, vec3(0.0)));
 }
 
-// Next-event estimation: a ray to a light, and what that brings.
+// Next-event estimation: a shadow ray to a light, and its contribution.
 void sample_direct_light(BlockParams block, PathParams p, uint k, PathState state, Surface s, Shading m, vec3 wo, uint beyond, uvec2 pixel, uint n, uint dimension) {
     dimension += LIGHT_POINT_ON;
     uvec2 bits = WITH_LIGHT_TREE ? sample_choice_bits(block.seed, pixel, n, dimension) : sample_2d_bits(block.seed, pixel, n, dimension);
@@ -116,7 +116,7 @@ void sample_direct_light(BlockParams block, PathParams p, uint k, PathState stat
     store_quad(p.contributions, slot, vec4(counted_radiance(p, c, state.depth + 1u), 0.0));
 }
 
-// Goes on behind a surface as if it were not there.
+// Continues the path behind a surface, unchanged.
 void pass_straight(PathParams p, uint k, PathState state, Surface s, vec3 ng, Ray ray, Cone cone) {
     state.passes++;
     if (WITH_RAY_CONES) store_cone(p, k, cone);
@@ -124,7 +124,7 @@ void pass_straight(PathParams p, uint k, PathState state, Surface s, vec3 ng, Ra
     store_state(p.next_states, slot, state);
 }
 
-// How far a path has come straight since its last bounce.
+// Distance since the last bounce, straight through surfaces.
 float straight_length(PathParams p, uint k, PathState state) {
     return WITH_CLEAR_WALLS && state.passes > 0u ? Floats(p.straight).v[k] : 0.0;
 }
@@ -133,7 +133,7 @@ void add_straight(PathParams p, uint k, PathState state, float length_) {
     StoredFloats(p.straight).v[k] = straight_length(p, k, state) + length_;
 }
 
-// Share of light that goes straight through a surface.
+// Fraction of light that passes straight through a surface.
 vec3 straight_transmittance(Shading m, vec3 towards_viewer) {
     if (m.bsdf.kind != BSDF_GLTF) return vec3(0.0);
     vec3 wo = to_frame(m.frame, towards_viewer);
@@ -141,7 +141,7 @@ vec3 straight_transmittance(Shading m, vec3 towards_viewer) {
     return gltf_straight(m.bsdf, wo);
 }
 
-// Has a sample gone straight through a thin wall?
+// True if a sample passed straight through a thin wall.
 bool is_straight(Bsdf b, BsdfSample s, float side) {
     return s.delta && side < 0.0 && b.kind == BSDF_GLTF && !b.volume;
 }
@@ -229,12 +229,12 @@ vec3 path_vertex(BlockParams block, uint k, PathState state, Ray ray, Hit hit) {
         sample_direct_light(block, p, k, state, s, m, wo, boundary.medium, pixel, n, dimension);
     }
 
-    // after the last bounce only what is met shines
+    // after the last bounce only emission at the hit counts
     vec2 lobe = sample_2d(block.seed, pixel, n, dimension + BSDF_LOBE);
     BsdfSample b = sample_direction(m, wo, sample_2d(block.seed, pixel, n, dimension + BSDF_DIRECTION), lobe.x);
     float side = dot(m.ng, b.wi);
     if (!(b.pdf > 0.0) || side == 0.0) return added;
-    // light samples have brought all other light
+    // light sampling accounts for all other light
     if (WITH_SPECULAR_ONLY && !b.delta) return added;
     state.throughput *= b.weight;
     float brightest = highest(state.throughput);

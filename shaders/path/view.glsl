@@ -1,4 +1,4 @@
-// What a camera ray sees of a surface, where no light is asked for.
+// Surface properties that camera rays return in place of radiance.
 #ifndef PATH_VIEW
 #define PATH_VIEW
 #include "interface/view.glsl"

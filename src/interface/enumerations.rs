@@ -63,7 +63,7 @@ macro_rules! enumerations {
 
 enumerations! {
     /// Transmission mode of a material.
-    Walls: "walls" {
+    TransmissionMode: "walls" {
         /// No transmission.
         Opaque = "WALLS_NONE",
         /// Straight through thin walls, without refraction.
@@ -194,7 +194,7 @@ choices! {
         Half = "half", "PATTERN_QUARTER";
     }
 
-    /// Buffer of a frame that is displayed.
+    /// Buffer of a frame that is displayed: scalars as grey up to `Depth`, colours from `Normal` on (shaders/display.glsl compares).
     DisplayMode: "shown" {
         /// The filtered result
         Accessibility = "accessibility", "SHOWN_ACCESSIBILITY";

@@ -13,7 +13,9 @@ pub mod glsl;
 pub mod layout;
 pub mod records;
 
-pub use enumerations::{BudgetStage, DisplayMode, PixelFilter, Resolution, Sequence, TexelFormat, Texels, View, Walls, Wrap};
+pub use enumerations::{
+    BudgetStage, DisplayMode, PixelFilter, Resolution, Sequence, TexelFormat, Texels, TransmissionMode, View, Wrap,
+};
 pub use features::{
     BsdfModel, BsdfModels, LightKind, LightKinds, MaterialFeature, MaterialFeatures, PathFeature, PathFeatures,
     ShadingFeatures, TextureFeature, TextureFeatures,

@@ -5,7 +5,8 @@ use crate::accel::flatten::FlatScene;
 use crate::interface::records::scene::TextureUse;
 use crate::interface::records::shading::ShadingRecord;
 use crate::interface::{
-    BsdfModel, BsdfModels, MaterialFeature, MaterialFeatures, ShadingFeatures, Texels, TextureFeature, TextureFeatures, Walls,
+    BsdfModel, BsdfModels, MaterialFeature, MaterialFeatures, ShadingFeatures, Texels, TextureFeature, TextureFeatures,
+    TransmissionMode,
 };
 use crate::scene::material::MaterialKind;
 use crate::scene::{Geometry, Material, TextureSlot};
@@ -75,13 +76,13 @@ pub(super) fn texels(slot: usize) -> Texels {
 }
 
 /// Whether and how the material transmits light: not at all, through a thin wall, or into a volume.
-fn walls(m: &Material) -> Walls {
+fn walls(m: &Material) -> TransmissionMode {
     match m.kind {
         MaterialKind::MetallicRoughness if !m.unlit && m.transmission.factor > 0.0 => {
             // glTF's index of refraction 0 does not refract: such a material transmits straight on, as a thin wall
-            if m.transmission.thickness > 0.0 && m.ior != 0.0 { Walls::Volume } else { Walls::Thin }
+            if m.transmission.thickness > 0.0 && m.ior != 0.0 { TransmissionMode::Volume } else { TransmissionMode::Thin }
         }
-        _ => Walls::Opaque,
+        _ => TransmissionMode::Opaque,
     }
 }
 
@@ -97,12 +98,12 @@ pub(crate) fn absorbs(m: &Material) -> bool {
 
 /// Whether light may pass straight through: a thin wall that is smooth, or that a roughness texture may make smooth.
 pub(crate) fn has_clear_walls(m: &Material) -> bool {
-    walls(m) == Walls::Thin && (m.roughness < 0.1 || m.metallic_roughness_texture.is_some())
+    walls(m) == TransmissionMode::Thin && (m.roughness < 0.1 || m.metallic_roughness_texture.is_some())
 }
 
 /// Absorption coefficient per scene unit (metres in glTF).
 fn absorption(m: &Material) -> [f32; 3] {
-    if walls(m) != Walls::Volume {
+    if walls(m) != TransmissionMode::Volume {
         return [0.0; 3];
     }
     // a colour of 0 would need an infinite coefficient: the smallest positive float stands for it
@@ -119,7 +120,7 @@ pub(super) fn indices_of_refraction(materials: &[Material]) -> Vec<f32> {
 }
 
 fn refracts(m: &Material) -> bool {
-    m.kind == MaterialKind::Glass && !m.unlit || walls(m) == Walls::Volume
+    m.kind == MaterialKind::Glass && !m.unlit || walls(m) == TransmissionMode::Volume
 }
 
 /// Shader features that the materials of a scene require of the path tracer.
@@ -152,8 +153,8 @@ pub(super) fn features(flat: &FlatScene, needs: Needs) -> ShadingFeatures {
         for (required, feature) in [
             (gltf && m.clearcoat.factor > 0.0, MaterialFeature::Clearcoat),
             (gltf && m.sheen.color.max_element() > 0.0, MaterialFeature::Sheen),
-            (walls(m) == Walls::Thin, MaterialFeature::ThinWalls),
-            (walls(m) == Walls::Volume, MaterialFeature::Volumes),
+            (walls(m) == TransmissionMode::Thin, MaterialFeature::ThinWalls),
+            (walls(m) == TransmissionMode::Volume, MaterialFeature::Volumes),
             (absorbs(m), MaterialFeature::Absorption),
             (gltf && m.anisotropy.strength > 0.0, MaterialFeature::Anisotropy),
             (normal_maps, MaterialFeature::ShadingNormals),

@@ -79,7 +79,7 @@ settings! {
     }
 }
 
-/// Maximum path length in bounces. Russian roulette continues at most 0.95 of all paths, so that practically none gets here.
+/// Maximum path length, in bounces. Russian roulette (`MAX_SURVIVAL` in shaders/path/path.glsl) ends paths long before.
 pub const MAX_DEPTH: u32 = 4096;
 
 /// Default albedo of `ao-sky`.

@@ -48,7 +48,8 @@ records! {
         primitive: uint,
         /// Flags `LIGHT_TWO_SIDED`, `LIGHT_MIRRORED`, `LIGHT_ALPHA`.
         flags: uint,
-        /// Triangle, rectangle, sphere: bound of the rounding error of its position along its normal, scene units.
+        /// Triangle, rectangle, sphere: distance from its surface at which a light sample ends, scene units: a bound on rounding, so that the shadow ray does not
+        /// hit the light itself.
         lift: float,
     }
 
