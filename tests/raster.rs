@@ -92,8 +92,8 @@ impl Shot<'_> {
         CameraRecord::new(self.camera, self.scene.origin(), self.size[0] as f64 / self.size[1] as f64)
     }
 
-    /// Is what was drawn where the oracle finds it just beside the centre, or what was traced at the same depth? Triangles behind a silhouette may
-    /// be drawn a little before those that hide them: then the oracle finds their neighbour at their depth.
+    /// Is the rasterized surface where the oracle finds it just beside the centre, or what was traced at the same depth? Triangles behind a silhouette may
+    /// be rasterized a little before those that hide them: then the oracle finds their neighbour at their depth.
     fn explains(&self, oracle: &Oracle, traced: &AovPixel, drawn: &AovPixel, at: usize) -> bool {
         let (x, y) = ((at as u32 % self.size[0]) as f64 + 0.5, (at as u32 / self.size[0]) as f64 + 0.5);
         let both = traced.depth.is_finite() && drawn.depth.is_finite();
@@ -170,7 +170,7 @@ fn orthographic(camera: &Camera, half_height: f64) -> Camera {
 }
 
 #[test]
-fn gpu_scenes_drawn_and_traced() {
+fn gpu_rasterized_scenes_equal_traced_ones() {
     let Some(device) = device() else { return };
     for name in [
         "cornell-box",
@@ -194,7 +194,7 @@ fn gpu_scenes_drawn_and_traced() {
 }
 
 #[test]
-fn gpu_every_tracers_scene_can_be_drawn() {
+fn gpu_every_tracers_scene_can_be_rasterized() {
     let Some(device) = device() else { return };
     for name in ["grid:4", "leaf-cards", "spheres:300"] {
         let scene = scene(name);
@@ -204,7 +204,7 @@ fn gpu_every_tracers_scene_can_be_drawn() {
             let tracer = tracer(&device, kind, &scene);
             shot.check(name, &tracer, BOUNDS);
             let drawn = aov::render_with(&tracer, &shot.record(), SIZE, Primary::Raster, &mut NoControl).unwrap();
-            // whatever traces, the same is drawn
+            // whatever the tracer, rasterization is the same
             assert!(*first.get_or_insert(drawn.clone()) == drawn, "{name} {kind}");
         }
     }
@@ -360,7 +360,7 @@ fn gpu_scales_and_distances() {
 }
 
 #[test]
-fn gpu_drawn_scenes_follow_updates() {
+fn gpu_rasterized_scenes_follow_updates() {
     let Some(device) = device() else { return };
     for kind in tracers(&device) {
         let mut scene = scene("grid:3");
@@ -419,7 +419,7 @@ fn draw(raster: &Raster, tracer: &Tracer, view: &View, seen: &View) -> (Vec<AovP
     (out, drawn.unwrap())
 }
 
-/// A place in the pixel moves what is drawn as far as the pixels' own numbers do.
+/// A position in the pixel shifts rasterization as far as the pixels' own numbers do.
 #[test]
 fn gpu_a_pixels_sample_may_lie_anywhere() {
     let Some(device) = device() else { return };
@@ -449,7 +449,7 @@ fn gpu_a_pixels_sample_may_lie_anywhere() {
 }
 
 #[test]
-fn gpu_what_lies_outside_is_not_drawn() {
+fn gpu_geometry_outside_the_view_is_not_rasterized() {
     let Some(device) = device() else { return };
     let scene = scene("terrain:200000");
     let (lo, hi) = scene.bounds().unwrap();
@@ -481,7 +481,7 @@ fn gpu_auto_draws_few_primitives_and_traces_many() {
 }
 
 #[test]
-fn gpu_what_cannot_be_drawn_is_said() {
+fn gpu_unsupported_rasterization_is_reported() {
     let Some(device) = device() else { return };
     let scene = scene("cornell-box");
     let tracer = tracer(&device, TracerKind::Compute, &scene);

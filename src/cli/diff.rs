@@ -205,7 +205,7 @@ mod tests {
     }
 
     #[test]
-    fn looks_are_compared_where_there_is_colour() {
+    fn flip_needs_colour_channels() {
         let channel = |name: &str, values: &[f32]| Channel { name: name.into(), samples: Samples::F32(values.to_vec()) };
         let [black, white, broken] = [[0.0; 4], [1.0; 4], [f32::NAN, 1.0, 1.0, 1.0]].map(|v| channel("Y", &v));
         let of = |x: &Channel, y: &Channel, mask: Option<&[f32]>| flip_difference(&[(x, y)], 2, mask).unwrap();

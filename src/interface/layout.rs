@@ -297,7 +297,7 @@ mod tests {
     }
 
     #[test]
-    fn a_wrong_table_is_named() {
+    fn layout_mismatches_are_named() {
         let fields = &[
             Field { name: "radius", kind: "float", counts: &[], offset: 0, size: 4, doc: &[] },
             Field { name: "center", kind: "vec3", counts: &[], offset: 4, size: 12, doc: &[] },

@@ -151,7 +151,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_differs_is_named() {
+    fn differing_metadata_is_named() {
         let metadata = [("seed", "1"), ("scene", "a.glb"), ("scene.hash", "0123456789abcdef"), ("rr_depth", "5")];
         let image = Image { metadata: metadata.map(|(k, v)| (k.to_owned(), v.to_owned())).to_vec(), ..Default::default() };
         let of = |identity: &[(&'static str, Option<&str>)]| {

@@ -12,7 +12,7 @@ use skylit::scene::{Camera, Filter, Geometry, Instance, Mesh, Projection, Scene,
 
 use crate::common::{assert_validation_clean, device, record, scene, tracer, tracers};
 
-/// A texture's linear colour at coordinates `uv`, by the book: sRGB decoded before filtering.
+/// A texture's linear colour at coordinates `uv`, as the glTF specification says: sRGB decoded before filtering.
 fn texture_color(texture: &Texture, uv: DVec2) -> DVec3 {
     let rgba8 = texture.texels.as_bytes();
     let decode = |c: u8| {

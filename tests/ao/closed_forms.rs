@@ -36,11 +36,11 @@ struct Case<'a> {
     options: AoOptions,
     /// Where a ray meets the surface in question; `None`: the pixel shows something else too and is left out.
     surface: &'a dyn Fn(&OracleRay) -> Option<DVec3>,
-    /// Accessibility there.
+    /// Ambient visibility at that point.
     expected: &'a dyn Fn(DVec3) -> f64,
 }
 
-/// Mean of the expected accessibility over each pixel that shows nothing but the surface.
+/// Mean of the expected ambient visibility over each pixel that shows nothing but the surface.
 fn expectations(case: &Case) -> Vec<Option<f64>> {
     // three-point Gauss-Legendre on [0, 1]
     let r = 0.5 * 0.6f64.sqrt();
@@ -214,7 +214,7 @@ fn gpu_ao_falloff_and_radius_in_grooves() {
     assert_validation_clean(&device);
 }
 
-/// A sphere over a plane, pixel by pixel over the whole floor that is seen, near and far, at several scales and places.
+/// A sphere over a plane, pixel by pixel over the whole floor that is seen, near and far, at several scales and positions.
 #[test]
 fn gpu_ao_sphere_over_plane() {
     let device = device();
@@ -402,7 +402,7 @@ fn places() -> Vec<SceneTransform> {
     .to_vec()
 }
 
-/// A plane never occludes itself: not one ray, at any scale, place or tilt.
+/// A plane never occludes itself: not one ray, at any scale, position or tilt.
 #[test]
 fn gpu_ao_plane_is_one() {
     let device = device();
@@ -499,7 +499,7 @@ fn gpu_ao_uneven_plane_is_one() {
     assert_validation_clean(&device);
 }
 
-/// From inside a closed box nothing is accessible: not one ray gets out through an edge or a corner. The hardware tracers'
+/// From inside a closed box everything is occluded: not one ray gets out through an edge or a corner. The hardware tracers'
 /// watertightness is their driver's affair (lavapipe lets a few rays aimed at edges through): they may lose one in 100 000.
 #[test]
 fn gpu_ao_closed_box_is_zero() {

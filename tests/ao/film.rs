@@ -17,7 +17,7 @@ use crate::{AoOptions, differences, oracle_image, render};
 /// 20 000 samples of a smooth quantity: sums in single precision would be off by some 1e-5 (each addition to a sum of 1e4
 /// rounds to 1e-3), compensated ones are not. The variance is that of single samples, unbiased.
 #[test]
-fn gpu_film_keeps_its_digits() {
+fn gpu_film_sums_are_compensated() {
     let device = device();
     // a small floor: rays start above it by a few ulp of its size, and that much less is met
     let scene = analytic::sphere_over_plane(1.0, 1.5, 0.25, SceneTransform::default());
@@ -104,7 +104,7 @@ fn gpu_film_does_not_depend_on_batches() {
 
 /// Every kernel of the compute tracer stops where the queue of occlusion rays ends: what an earlier launch left there is not traced.
 #[test]
-fn gpu_kernels_heed_the_queues_end() {
+fn gpu_kernels_stop_at_the_end_of_the_queue() {
     let device = device();
     // much background: the queue of one launch is longer than that of the next
     let scene = scene("cornell-box");
@@ -127,7 +127,7 @@ fn gpu_kernels_heed_the_queues_end() {
         let (count, greatest, _) = differences(&wide.image.film.mean, &image.image.film.mean, 1e-6);
         println!("{kernel:?}: {} occlusion rays, {count} pixels differ, by {greatest} at most", image.occlusion_rays);
         assert!(image.occlusion_rays.abs_diff(wide.occlusion_rays) <= 4, "{kernel:?}: {} rays", image.occlusion_rays);
-        // rounding turns a sample here and there
+        // rounding flips a sample here and there
         assert!(count <= 96 * 96 / 500, "{kernel:?}: {count} pixels differ");
     }
     assert_validation_clean(&device);

@@ -16,14 +16,14 @@ use skylit::scene::{Camera, Projection, Scene};
 use crate::common::{assert_validation_clean, device, scene, tracer, tracers};
 use crate::{AoOptions, differences, oracle_image, render, settings};
 
-/// Samples are the same points on both sides, so an image differs from the oracle's only where rounding turns a sample: a ray
+/// Samples are the same points on both sides, so an image differs from the oracle's only where rounding flips a sample: a ray
 /// that passes an edge within rounding. Of a thousand pixels, at most two.
 fn compare_with_oracle(device: &Arc<Device>, what: &str, scene: &Scene, camera: &Camera, options: &AoOptions) {
     let oracle = Oracle::new(scene, scene.origin());
     let want = oracle_image(&oracle, camera, options);
     let pixels = want.ambient_visibility.len();
     let allowed = pixels.div_ceil(500);
-    // a turned sample moves a pixel by up to 1/spp; rounding alone by far less
+    // a flipped sample moves a pixel by up to 1/spp; rounding alone by far less
     let threshold = 1e-4;
     let mut images: Vec<(skylit::tracer::TracerKind, Vec<f32>)> = Vec::new();
     for kind in tracers(device) {

@@ -59,7 +59,7 @@ fn gpu_kept_rays_are_the_images() {
         println!("{kind}: {odd} occlusion rays are not the oracle's");
         assert_eq!(next, occlusion.len(), "{kind}");
         assert!(odd <= next / 1000, "{kind}: {odd} of {next} occlusion rays are not the oracle's");
-        // those of the second sample are not among them, and they are not kept unless asked for
+        // those of the second sample are not among them, and they are not kept unless requested
         let image = render(&tracer, &scene, camera, &AoOptions { keep_rays: false, ..options.clone() });
         assert!(image.kept_primary.is_empty() && image.kept_occlusion.is_empty());
     }

@@ -72,7 +72,7 @@ fn usage_errors() {
 }
 
 #[test]
-fn missing_inputs_and_bad_places() {
+fn missing_inputs_and_unwritable_outputs() {
     let dir = tempfile::tempdir().unwrap();
     let at = |name: &str| path(&dir.path().join(name)).to_owned();
     // before any work is done, so no device is needed

@@ -55,7 +55,7 @@ fn everything() {
         Geometry::Triangles(_) => panic!(),
     };
     assert_eq!(spheres(3), Sphere { center: Vec3::Y, radius: 0.5 });
-    // a light is a sphere that shines, and counted once
+    // a light is a sphere that emits, and counted once
     assert_eq!((spheres(4).radius, material(4).emissive), (2.0, Vec3::new(10.0, 5.0, 1.0)));
     assert!(scene.lights.is_empty());
     assert_eq!((scene.triangle_count(), scene.sphere_count()), (3, 2));

@@ -166,7 +166,7 @@ fn punctual_lights() {
     assert_eq!((lamp.kind, lamp.intensity, lamp.range), (LightKind::Point, Vec3::new(10.0, 5.0, 0.0), 7.0));
     assert_eq!((lamp.position, lamp.name.as_str()), (DVec3::new(1.0, 2.0, 3.0), "lamp"));
     assert_eq!(spot.kind, LightKind::Spot { inner_angle: 0.1, outer_angle: 0.3 });
-    // turned by -90 degrees about x: shines down
+    // turned by -90 degrees about x: emits downwards
     assert!((spot.direction - DVec3::NEG_Y).length() < 1e-12, "{}", spot.direction);
     assert_eq!((sun.kind, sun.direction, sun.range), (LightKind::Directional { angle: 0.0 }, DVec3::NEG_Z, f64::INFINITY));
     assert_eq!(sun.name, "sun");

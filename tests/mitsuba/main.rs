@@ -1,7 +1,7 @@
-//! Path-traced images by every tracer against Mitsuba 3's of the same scenes: an implementation of others as judge.
+//! Path-traced images by every tracer against Mitsuba 3's of the same scenes: an implementation of others as the reference.
 //!
-//! `scripts/mitsuba` writes scenes and the judge's images (`tests/mitsuba`); docs/mitsuba.md says what they cover, where conventions differ, and what
-//! this test can see. Images are noisy on both sides, so what is asked is whether they differ by more than noise explains:
+//! `scripts/mitsuba` writes scenes and the reference images (`tests/mitsuba`); docs/mitsuba.md says what they cover, where conventions differ, and what
+//! this test can see. Images are noisy on both sides, so the test is whether they differ by more than noise explains:
 //!
 //! - **pixels**: a Z-test of every pixel and channel, Sidak-corrected to a level of 1 % for the whole image (Subr, Arvo 2007; Rousselle, Jarosz,
 //!   Novak 2016). 99.75 % of pixels must pass, and what does not pass is capped in sigmas and in radiance: noise with long tails may move a pixel
@@ -62,7 +62,7 @@ const ALPHA: f64 = 0.01;
 const SHARE: f64 = 0.9975;
 /// Largest |z| of a pixel that does not pass, in the threshold that it misses.
 const PIXEL_CAP: f64 = 2.0;
-/// Largest difference of a pixel that does not pass, of the judge's radiance there or, where that is less, of the image's mean.
+/// Largest difference of a pixel that does not pass, of the reference radiance there or, where that is less, of the image's mean.
 const DIFFERENCE_CAP: f64 = 0.5;
 /// Level of the test of all tiles of an image: there is no allowance, and as many images as there are scenes and tracers.
 const TILE_ALPHA: f64 = 1e-4;
@@ -271,7 +271,7 @@ struct Verdict {
     failures: Vec<String>,
 }
 
-/// Holds an image against the judge's.
+/// Holds an image against the reference image.
 fn compare(ours: &Estimate, judge: &Estimate) -> Verdict {
     assert_eq!(ours.size, judge.size);
     let [width, height] = ours.size;
@@ -430,9 +430,9 @@ fn gpu_mitsuba_agrees_compute() {
     agrees(TracerKind::Compute);
 }
 
-/// Every scene is there with the judge's image, and nothing else is.
+/// Every scene exists with a reference image, and there are no others.
 #[test]
-fn judge_is_complete() {
+fn reference_images_are_complete() {
     let entries = entries();
     let listed = |path: PathBuf, extension: &str| -> Vec<String> {
         let files = std::fs::read_dir(path).unwrap().map(|f| f.unwrap().path());
@@ -458,7 +458,7 @@ fn judge_is_complete() {
 
 /// Noise passes; a factor, a channel in place of another, a tile and a single pixel that are wrong do not.
 #[test]
-fn judge_sees_what_is_wrong() {
+fn comparison_detects_wrong_images() {
     // known values: two-sided 1 % at one variable, and 5 sigmas at about 17 500
     assert!((sidak(1, ALPHA) - 2.575_829).abs() < 1e-5, "{}", sidak(1, ALPHA));
     assert!((upper_tail(5.0) / 2.866_515_7e-7 - 1.0).abs() < 1e-6);

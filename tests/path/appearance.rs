@@ -49,7 +49,7 @@ fn mean_brightness(film: &Film, pixels: &[usize]) -> f32 {
 
 #[test]
 fn gpu_colours_bleed_with_the_second_bounce() {
-    // the lamp is white here, so that what is coloured is the walls' doing
+    // the light is white here, so that what is coloured is the walls' doing
     let mut scene = by_name("cornell-empty").unwrap();
     for m in scene.materials.iter_mut() {
         m.kind = MaterialKind::Matte;
@@ -88,7 +88,7 @@ fn gpu_metal_boxes_show_each_other_with_the_third_bounce() {
         let dark = |film: &Film| mirrors.iter().filter(|&&p| brightness(film, p) == 0.0).count();
         let counts: Vec<usize> = films.iter().map(dark).collect();
         println!("{kind}: of {} pixels of mirrors, black with 1 to 4 bounces: {counts:?}", mirrors.len());
-        // one bounce: only the lamp itself could be seen in them
+        // one bounce: only the light itself could be seen in them
         assert!(counts[0] * 20 > mirrors.len() * 19, "{kind}: {counts:?}");
         // two: the room is there, and the other box in it is black, as what lies before the box's open front always is
         assert!(counts[0] - counts[1] > mirrors.len() / 6, "{kind}: {counts:?}");

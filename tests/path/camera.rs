@@ -1,4 +1,4 @@
-//! What a pixel is the mean of: filters by an edge that runs between pixels, lenses by a lamp that is out of focus.
+//! What a pixel is the mean of: filters by an edge that runs between pixels, lenses by a light that is out of focus.
 
 use super::*;
 use skylit::integrators::path::{Lens, PixelFilter};
@@ -52,7 +52,7 @@ fn gpu_filters_weigh_an_edge() {
     assert_validation_clean(&device);
 }
 
-/// A small lamp at twice the distance of focus is a disk as wide as the lens, there: half of it in the plane of focus.
+/// A small area light at twice the distance of focus is a disk as wide as the lens, there: half of it in the plane of focus.
 #[test]
 fn gpu_a_lens_blurs_what_is_not_in_focus() {
     let device = device();
@@ -72,7 +72,7 @@ fn gpu_a_lens_blurs_what_is_not_in_focus() {
             let flat = FlatScene::new(&scene);
             render(&tracer(&device, kind, &flat), &flat, options).image.film
         };
-        // mean square distance from the middle, in pixels, of what shines
+        // mean square distance from the middle, in pixels, of what emits
         let spread = |film: &Film| {
             let (mut sum, mut all) = (0.0, 0.0);
             for k in 0..size * size {

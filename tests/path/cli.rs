@@ -275,7 +275,7 @@ fn options_of_frames_are_refused_by_name() {
     refuses(&sky, 64, "--light has no effect on --integrator ao-sky: leave it out, or use --integrator path or direct");
 }
 
-/// What nobody asks for is not in the shaders, and it is said.
+/// Features that are not required are specialized out, and --explain reports it.
 #[test]
 fn gpu_what_is_compiled_is_told() {
     let dir = tempfile::tempdir().unwrap();

@@ -8,7 +8,7 @@ const RHO: f64 = 0.6;
 
 /// A floor at height 0, its middle seen from above through a view of 2e-3 units.
 fn floor_and(mut parts: Vec<(Geometry, Material)>) -> Scene {
-    // what shines is not in the way: the camera is near
+    // what emits is not in the way: the camera is near
     let camera = Camera::look_at(DVec3::new(0.0, 0.1, 0.0), DVec3::ZERO, DVec3::Z, 0.02);
     parts.insert(0, (shapes::floor(DVec3::ZERO, 10.0), matte(ALBEDO)));
     scene_of(parts, camera)
@@ -58,7 +58,7 @@ fn gpu_points_spots_and_directions() {
     }
     let sun = lit(light(LightKind::Directional { angle: 0.0 }, DVec3::ZERO, DVec3::new(-0.6, -0.8, 0.0), 3.0));
     holds(&device, "directional", &sun, &options(Strategy::Mis, 16), reflected * 3.0 * 0.8, 1e-3);
-    // three lights at once: each is drawn as often as it is strong
+    // three lights at once: each is sampled in proportion to its power
     let mut all = lit(light(LightKind::Point, at, -at, 3.0));
     all.lights.push(light(LightKind::Directional { angle: 0.0 }, DVec3::ZERO, DVec3::new(-0.6, -0.8, 0.0), 3.0));
     all.lights.push(light(spot, DVec3::Y, DVec3::NEG_Y, 5.0));
@@ -82,7 +82,7 @@ fn gpu_a_sphere() {
     }
 }
 
-/// A square lamp over the floor, its form factor from its corners (Lambert 1760).
+/// A square area light over the floor, its form factor from its corners (Lambert 1760).
 #[test]
 fn gpu_a_square() {
     let device = device();
@@ -152,7 +152,7 @@ fn gpu_skies() {
     holds(&device, "large map with a sun", &sun, &options(Strategy::Light, 256), expected, 2e-3);
 }
 
-/// Nothing is left to chance where a sky of one colour lights a diffuse plane and nothing is in the way: light samples are drawn as the plane reflects
+/// Nothing is left to chance where a sky of one colour lights a diffuse plane and nothing is in the way: light sampling is distributed as the plane reflects
 /// them. Rough thin walls are lit from both sides, and the strategies agree on how much.
 #[test]
 fn gpu_uniform_skies_are_sampled_as_surfaces_reflect() {

@@ -64,7 +64,7 @@ fn gpu_a_film_goes_on_as_if_it_had_never_stopped() {
                 assert_eq!((rays, covered), (whole.primary_rays, whole.covered), "{name}, {kind}, cut at {cuts:?}");
             }
             if alone {
-                // what is not asked for is not kept, and changes nothing
+                // state that is not requested is not kept, and changes nothing
                 let plain = render(&tracer, &flat, &options).image;
                 assert!(
                     plain.state.is_none() && plain.film.mean == whole.film.mean && plain.film.variance == whole.film.variance
@@ -137,7 +137,7 @@ fn gpu_intervals_are_images_of_their_own() {
         let (rest, again) = run(&up_to(&options, 12, seen[1].state.clone()));
         assert_eq!(rest.iter().map(|i| i.spp).collect::<Vec<_>>(), [4, 8], "{kind}");
         same(&format!("{kind}, from 2 samples"), &again, &last);
-        // the sums are for whoever asked for them
+        // the sums are saved only if requested
         let (seen, last) = run(&options);
         assert!(last.state.is_none() && seen.len() == 4, "{kind}");
     }
@@ -171,7 +171,7 @@ fn gpu_films_of_many_blocks_and_few_tiles() {
     same("two blocks", &render(&compute, &flat, &up_to(&PathOptions { film, ..tall }, 3, None)).image, &whole);
     assert!(whole.film.variance.iter().any(|&v| v > 0.0), "all samples are alike");
 
-    // a lamp in the dark: most tiles show nothing and are not traced
+    // a light in the dark: most tiles show nothing and are not traced
     let camera = Camera::look_at(DVec3::new(0.0, 0.0, 8.0), DVec3::ZERO, DVec3::Y, 0.8);
     let scene = scene_of(vec![(shapes::sphere(DVec3::new(1.0, 0.5, 0.0), 0.4), emitter(2.0))], camera);
     let flat = FlatScene::new(&scene);
@@ -211,23 +211,23 @@ fn rmse(film: &Film, reference: &Film, of: impl Fn(usize) -> bool) -> f64 {
     (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt()
 }
 
-/// A floor seen from above, a lamp over one of its corners and out of sight: found by chance, which is noisy near it and quiet far away.
-fn lamp_over_a_corner() -> Scene {
+/// A floor seen from above, a light over one of its corners and out of sight: found by chance, which is noisy near it and quiet far away.
+fn light_over_a_corner() -> Scene {
     let mut camera = Camera::look_at(DVec3::new(0.0, 0.5, 0.0), DVec3::ZERO, DVec3::Z, 1.0);
     camera.projection = skylit::scene::Projection::Orthographic { half_height: 3.0 };
     let lamp = shapes::sphere(DVec3::new(2.5, 1.2, 1.5), 0.5);
     scene_of(vec![(shapes::floor(DVec3::ZERO, 20.0), matte(0.6)), (lamp, emitter(4.0))], camera)
 }
 
-/// Tiles are left alone once they are good enough: the image is as good as was asked for, and quiet tiles cost less.
+/// Tiles are left alone once they are good enough: the image is as accurate as requested, and quiet tiles cost less.
 #[test]
 fn gpu_a_target_is_reached_where_it_is_dear_and_where_it_is_cheap() {
     let device = device();
-    let scene = lamp_over_a_corner();
+    let scene = light_over_a_corner();
     let flat = FlatScene::new(&scene);
     let base = PathOptions { size: [64, 48], seed: 11, max_depth: 1, ..Default::default() };
     let compute = tracer(&device, TracerKind::Compute, &flat);
-    // light samples find the lamp at once
+    // light samples find the light at once
     let reference = render(&compute, &flat, &PathOptions { spp: 1024, seed: 12, ..base.clone() }).image.film;
     assert!(reference.estimated_rmse() < 1e-3, "the reference is too noisy");
     let (target, most) = (0.03, 8192);

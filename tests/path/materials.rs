@@ -37,7 +37,7 @@ fn gpu_coverage() {
         ahead(),
     );
     holds(&device, "two sheets", &twice, &many, 0.5 * 0.75 * 5.0, 4e-3);
-    // a lamp behind the camera shines through a sheet that the camera does not look through
+    // a light behind the camera emits through a sheet that the camera does not look through
     let mut lit = scene_of(vec![(sheet(0.0), matte(0.5)), (sheet(3.0), covered(0.6, matte(0.0)))], ahead());
     lit.lights.push(Light {
         name: String::new(),

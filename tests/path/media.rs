@@ -35,12 +35,12 @@ fn block(lo: f64, hi: f64, half: f64) -> Geometry {
     shapes::cuboid(DVec3::new(-half, lo, -half), DVec3::new(half, hi, half))
 }
 
-/// What is seen through surfaces that are met at a right angle, each of which reflects ((a - b) / (a + b))^2 once: no path of one reflection ends at the lamp.
+/// What is seen through surfaces that are met at a right angle, each of which reflects ((a - b) / (a + b))^2 once: no path of one reflection ends at the light.
 fn through(indices: &[f64]) -> f64 {
     indices.windows(2).map(|w| 1.0 - ((w[0] - w[1]) / (w[0] + w[1])).powi(2)).product()
 }
 
-fn lamp_below(parts: Vec<(Geometry, Material)>, camera: Camera) -> Scene {
+fn light_below(parts: Vec<(Geometry, Material)>, camera: Camera) -> Scene {
     let mut all = vec![(shapes::floor(DVec3::new(0.0, -1.0, 0.0), 20.0), emitter(1.0))];
     all.extend(parts);
     scene_of(all, camera)
@@ -63,12 +63,12 @@ fn gpu_volumes_lie_in_each_other() {
     let device = device();
     let outer = |left| (block(0.0, 1.0, 4.0), body(1.5, left, 0));
     let inner = |ior, left| (block(0.3, 0.7, 2.0), body(ior, left, 0));
-    let one = lamp_below(vec![outer(1.0), inner(1.33, 1.0)], down_from(3.0));
+    let one = light_below(vec![outer(1.0), inner(1.33, 1.0)], down_from(3.0));
     direct_on_compute(&device, "glass that holds water", &one, 4, through(&[1.0, 1.5, 1.33, 1.5, 1.0]));
-    let absorbing = lamp_below(vec![outer(0.5), inner(1.5, 0.2)], down_from(3.0));
+    let absorbing = light_below(vec![outer(0.5), inner(1.5, 0.2)], down_from(3.0));
     // nothing is reflected between media of one index
     direct(&device, "absorption on both sides", &absorbing, 4, 0.5f64.powf(0.6) * 0.2f64.powf(0.4) * through(&[1.0, 1.5, 1.0]));
-    let clear = lamp_below(vec![outer(0.5), inner(1.33, 1.0)], down_from(3.0));
+    let clear = light_below(vec![outer(0.5), inner(1.33, 1.0)], down_from(3.0));
     direct_on_compute(&device, "a clear body within", &clear, 4, 0.5f64.powf(0.6) * through(&[1.0, 1.5, 1.33, 1.5, 1.0]));
 }
 
@@ -79,14 +79,14 @@ fn gpu_the_volume_of_higher_priority_is_there() {
     // water from 0.2 to 0.8, glass from 0.6 to 1.4
     let overlapping = |water: i32, glass: i32| {
         let parts = vec![(block(0.2, 0.8, 4.0), body(1.33, 0.3, water)), (block(0.6, 1.4, 3.0), body(1.5, 0.6, glass))];
-        lamp_below(parts, down_from(3.0))
+        light_below(parts, down_from(3.0))
     };
     let indices = through(&[1.0, 1.5, 1.33, 1.0]);
     direct(&device, "glass first", &overlapping(0, 1), 4, 0.6f64.powf(0.8) * 0.3f64.powf(0.4) * indices);
     direct_on_compute(&device, "water first", &overlapping(1, 0), 4, 0.6f64.powf(0.6) * 0.3f64.powf(0.6) * indices);
     // what overlaps with itself is one body
     let parts = vec![(block(0.2, 0.8, 4.0), body(1.33, 0.3, 0)), (block(0.6, 1.4, 3.0), body(1.33, 0.3, 0))];
-    let mut same = lamp_below(parts, down_from(3.0));
+    let mut same = light_below(parts, down_from(3.0));
     same.meshes[2].material = 1;
     direct_on_compute(&device, "one body of two", &same, 4, 0.3f64.powf(1.2) * through(&[1.0, 1.33, 1.0]));
 }
@@ -97,10 +97,10 @@ fn gpu_the_camera_may_be_inside() {
     let device = device();
     // radiance is the square of the index more in water than outside
     let square = 1.33 * 1.33;
-    let water = lamp_below(vec![(block(0.0, 1.0, 4.0), body(1.33, 0.3, 0))], down_from(0.5));
+    let water = light_below(vec![(block(0.0, 1.0, 4.0), body(1.33, 0.3, 0))], down_from(0.5));
     direct_on_compute(&device, "in water", &water, 2, square * 0.3f64.powf(0.5) * through(&[1.33, 1.0]));
     let parts = vec![(block(0.0, 1.0, 4.0), body(1.5, 0.5, 0)), (block(0.3, 0.7, 2.0), body(1.33, 0.2, 0))];
-    let both = lamp_below(parts, down_from(0.5));
+    let both = light_below(parts, down_from(0.5));
     direct(&device, "in water in glass", &both, 4, square * 0.2f64.powf(0.2) * 0.5f64.powf(0.3) * through(&[1.33, 1.5, 1.0]));
     // mirrored and far from the origin: the winding is still what says inside
     let mut moved = both.clone();
@@ -186,7 +186,7 @@ fn gpu_light_goes_straight_through_panes() {
         holds_on_compute(1e-5, &device, "disk", &scene, &direct(256), reflected * 3.0 * pass(1.0), 2e-2);
         let bsdf = PathOptions { strategy: Strategy::Bsdf, ..direct(1 << 14) };
         holds_on_compute(1e-5, &device, "disk", &scene, &bsdf, reflected * 3.0 * pass(1.0), 2e-2);
-        // a lamp behind panes, as strategies see it: the same, whatever share each finds
+        // a light behind panes, as strategies see it: the same, whatever share each finds
         let lamp = shapes::rectangle(DVec3::new(0.2, 0.9, 0.1), DVec3::X * 0.5, DVec3::Z * 0.4);
         let scene = under(panes, Some(lamp));
         let flat = FlatScene::for_paths(&scene);

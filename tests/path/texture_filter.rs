@@ -1,4 +1,4 @@
-//! Textures read over ray cones: what they are for, where they must change nothing, what they must keep; and what is made for them only when somebody asks.
+//! Textures read over ray cones: what they are for, where they must change nothing, what they must keep; and what is made for them only when required.
 
 use super::*;
 use glam::{Affine2, Vec2};
@@ -282,7 +282,7 @@ fn gpu_tracers_agree_on_cones() {
 }
 
 #[test]
-fn gpu_levels_are_there_when_somebody_asks() {
+fn gpu_mip_levels_exist_when_required() {
     let device = device();
     let scene = plane();
     let flat = FlatScene::for_paths(&scene);

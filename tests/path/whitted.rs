@@ -41,7 +41,7 @@ fn gpu_mirrors_show_what_is_lit() {
         direction: DVec3::NEG_Y,
         range: f64::INFINITY,
     });
-    // the lamp straight above; its own image in the mirror lights nothing: that is a caustic
+    // the light straight above; its own image in the mirror lights nothing: that is a caustic
     let expected = 0.75 * 0.6 / std::f64::consts::PI * 9.0 / 9.0;
     for kind in tracers(&device) {
         let flat = FlatScene::for_paths(&scene);

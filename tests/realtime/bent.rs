@@ -117,7 +117,7 @@ fn gpu_bent_normals_of_a_closed_box() {
     assert_validation_clean(&device);
 }
 
-/// What is not asked for costs nothing and changes nothing; what is there is 0 where nothing is.
+/// A feature that is not enabled costs nothing and changes nothing; what is there is 0 where nothing is.
 #[test]
 fn gpu_bent_normals_are_a_choice() {
     let device = device();

@@ -1,4 +1,4 @@
-//! Whatever is rendered, what comes out is an accessibility, and the frames after know nothing of what was wrong.
+//! Whatever is rendered, what comes out is an ambient visibility, and the frames after know nothing of what was wrong.
 
 use glam::{DAffine3, DVec3};
 use skylit::film::camera::CameraRecord;

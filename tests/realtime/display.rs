@@ -48,7 +48,7 @@ fn assert_grey(shown: &[[u8; 4]], linear: &[f32], gain: f32, off: u8) {
 }
 
 #[test]
-fn gpu_displayed_accessibility_has_the_bytes_of_a_png() {
+fn gpu_displayed_visibility_has_the_bytes_of_a_png() {
     let device = device();
     let scene = by_name("stairs").unwrap();
     let camera = record(&scene, &scene.cameras[0], SIZE);
@@ -189,7 +189,7 @@ fn gpu_visited_nodes_are_counted_on_request() {
     assert_validation_clean(&device);
 }
 
-/// It is a part of the frame where it is asked for, and changes nothing else.
+/// It is recorded with the frame if enabled, and changes nothing else.
 #[test]
 fn gpu_display_is_a_choice() {
     let device = device();

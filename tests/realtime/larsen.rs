@@ -1,4 +1,4 @@
-//! The reference work's pipeline as it was: half the size, no occlusion where light is, half of the frame before, two patterns in turn.
+//! Larsen's pipeline (2019) as it was: half the size, no occlusion where light is, half of the frame before, two patterns in turn.
 
 use glam::{DAffine3, DVec3};
 use skylit::accel::flatten::FlatScene;

@@ -48,7 +48,7 @@ fn stepped(scene: &Scene, size: [u32; 2], step: DVec3) -> CameraRecord {
     record(scene, &camera, size)
 }
 
-/// Camera rays are traced: what is drawn has a test of its own.
+/// Camera rays are traced: rasterization has its own test.
 fn traced(preset: Preset) -> Settings {
     Settings { primary: Some(Primary::Traced), ..preset.settings() }
 }

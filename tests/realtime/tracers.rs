@@ -1,4 +1,4 @@
-//! Three tracers, one image; drawn or traced, one image; the same run, the same bits.
+//! Three tracers, one image; rasterized or traced, one image; the same run, the same bits.
 
 use glam::DVec3;
 use skylit::raster::Primary;
@@ -54,10 +54,10 @@ fn gpu_three_tracers_one_image() {
     assert_validation_clean(&device);
 }
 
-/// Edges are drawn within a fraction of a pixel of where rays find them: a pixel of 500 shows another surface, and one of 100 has such a
+/// Edges are rasterized within a fraction of a pixel of where rays find them: a pixel of 500 shows another surface, and one of 100 has such a
 /// pixel in its filter's box.
 #[test]
-fn gpu_drawn_and_traced_are_one_image() {
+fn gpu_rasterized_and_traced_images_agree() {
     skylit::gpu::environment::prefer_vector_bits(256);
     let device = device();
     if !device.info.can_rasterise() {

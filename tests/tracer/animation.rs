@@ -57,7 +57,7 @@ fn gpu_an_animation_is_followed() {
     for kind in tracers(&device) {
         for animation in 0..2 {
             let stale = follow(&device, kind, &scene, animation, &[0.0, 0.3, 0.95, 1.4, 2.0 + 0.3]);
-            // each step moves something, and the judge would see it
+            // each step moves something, which the check would detect
             assert!(stale[1..].iter().all(|s| *s > 1e-3), "{kind}: {stale:?}");
         }
     }

@@ -79,7 +79,7 @@ impl Follower {
         let fresh = Tracer::new(self.tracer.device(), kind, &FlatScene::new(scene), ALL).unwrap();
         let report = judge_pair(&oracle, &rays, &hits, &closest(&fresh, &rays), rounding);
         assert!(report.unexplained_fraction() <= 1e-5, "{kind} step {} against a new tracer: {report}", self.steps);
-        // without the update the judge would have seen it
+        // without the update the check would have detected it
         let report = judge_closest(&oracle, &rays, &stale, &truth, rounding);
         assert!(report.unexplained_fraction() > 1e-3, "{kind} step {}: hardly anything moved", self.steps);
         let (any, _) = trace(&self.tracer, &rays, Mode::Any, 1, &mut NoControl).unwrap();
