@@ -34,7 +34,7 @@ Cone camera_cone(BlockParams p, vec3 direction) {
     return Cone(0.0, side * abs(dot(vec3(rows[0].z, rows[1].z, rows[2].z), direction)));
 }
 
-// Where it is after a length.
+// The cone after a distance.
 Cone cone_after(Cone c, float length_) {
     c.width += c.spread * length_;
     // beyond its narrowest it is as wide as before
@@ -65,8 +65,8 @@ float footprint(Cone c, Surface s, vec3 direction) {
     return SHARPER + log2(c.width) + stretch - 0.5 * log2(area) - log2(largest);
 }
 
-// How fast the interpolated normal turns along the surface, per world unit: the mean over the triangle's edges. Positive: it bulges out at the front.
-// What normal maps do is not in it.
+// Curvature: rotation of the interpolated normal along the surface, per scene unit: the mean over the triangle's edges. Positive: it bulges out at the front.
+// Normal maps are ignored.
 float curvature(Surface s) {
     PartRecord part = PartRecords(SceneRoot(push.scene).parts).v[s.part];
     InstanceRecord instance;

@@ -1,4 +1,4 @@
-// A light for a point out of many: a tree over them, descended towards what may be bright there (Conty Estevez and Kulla, "Importance
+// Light tree: samples one of many lights for a point by descending towards lights of high importance there (Conty Estevez and Kulla, "Importance
 // Sampling of Many Lights with Adaptive Tree Splitting", HPG 2018; the bounds are those of pbrt-v4, 12.6.3).
 #ifndef PATH_LIGHT_TREE
 #define PATH_LIGHT_TREE
@@ -14,11 +14,11 @@ vec2 angle_less(vec2 a, vec2 b) {
     return a.x > b.x ? vec2(1.0, 0.0) : vec2(a.x * b.x + a.y * b.y, a.y * b.x - a.x * b.y);
 }
 
-// Estimate of what a subtree does at a point; 0 only where it does nothing.
+// Importance of a subtree at a point; 0 only if it contributes nothing there.
 float light_importance(LightNode node, vec3 from) {
     vec3 d = from - node.center;
     float d2 = dot(d, d), r2 = node.radius * node.radius;
-    // in the ball anything may be
+    // inside the bounding sphere there is no bound
     if (d2 <= r2) return node.intensity / max(r2, 1e-30);
     float cos_w = dot(node.axis, d) * inversesqrt(d2);
     if ((node.link & LIGHT_BOTH_WAYS) != 0u) cos_w = abs(cos_w);
@@ -57,7 +57,7 @@ float sample_leaf(uvec2 tree, vec3 from, inout float u, out uint light) {
     return probability;
 }
 
-// With which probability sample_leaf draws a light; trail: at each level from the root, is it in the second child?
+// Probability with which sample_leaf samples a light; `trail`: bit k is set if the light is in the second child at level k.
 float leaf_probability(uvec2 tree, vec3 from, uint trail) {
     LightNodes nodes = LightNodes(tree);
     LightNode node = nodes.v[0];

@@ -39,7 +39,7 @@ LightSample sample_light(PathParams p, vec3 from, Shading m, uvec2 bits) {
     return light_sample(p, light, from, m, u);
 }
 
-// Density with which sample_light finds, from a point, the emitter that a ray from there met, per solid angle; 0: it never does.
+// Density per solid angle with which sample_light samples the emitter that a ray from a point hit; 0: it cannot.
 float met_light_pdf(PathParams p, Hit hit, vec3 from, vec3 wi) {
     if (!WITH_SURFACE_LIGHTS) return 0.0;
     uint first = Words(p.light_of).v[hit.instance];

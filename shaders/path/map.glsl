@@ -1,7 +1,7 @@
 // Environments from images: radiance from a direction, and directions by how much light comes from there. Texels are looked up bilinearly.
-// Directions are drawn by weights of texels (src/integrators/path/environment.rs), interpolated likewise: a row of patches between the middles of texels, a
-// patch of it, and a place in the patch (src/sampling/patches.rs has the formulas). The two numbers that a direction is drawn with stay in order, so that those which are
-// spread evenly are directions that are; of an emitter that nothing hides little is left to chance.
+// Directions are sampled by weights of texels (src/integrators/path/environment.rs), interpolated likewise: first a row of patches between texel centres, then a
+// patch of the row, then a position in the patch (src/sampling/patches.rs has the formulas). The mapping preserves the order of the two numbers, so that
+// well stratified numbers give well stratified directions, and unoccluded environments have little noise.
 #ifndef PATH_MAP
 #define PATH_MAP
 #include "common/warp.glsl"
@@ -37,7 +37,7 @@ vec3 map_radiance(EnvironmentRecord map, vec3 w) {
     return map_lookup(map, map_coordinates(map_direction(map, w)));
 }
 
-// The four texels of a patch, and where in it.
+// The four texels of a patch, and a position in it.
 struct Patch {
     vec4 a, b, c, d;  // upper left, upper right, lower left, lower right: radiance, weight
     vec2 at;          // 0 to 1
@@ -71,7 +71,7 @@ float map_pdf(EnvironmentRecord map, vec3 w) {
     vec3 d = map_direction(map, w);
     vec2 p = map_coordinates(d) * vec2(map.width, map.height) - 0.5;
     ivec2 i = ivec2(floor(p));
-    // a patch is named by its right lower texel's row, and by its left column
+    // a patch is indexed by the row of its lower texels and the column of its left ones
     i.y = clamp(i.y + 1, 0, int(map.height));
     Patch q = map_patch(map, i, p - floor(p));
     uint column = uint(i.x < 0 ? i.x + int(map.width) : i.x), row = uint(i.y);
@@ -100,7 +100,7 @@ uint find_interval(EnvironmentRecord map, uint first, uint count, inout float u,
     return low;
 }
 
-// By a density that goes linearly from a to b over [0, 1] (pbrt-v4, A.4.2).
+// Samples a density that is linear from a to b over [0, 1] (pbrt-v4, A.4.2).
 float sample_linear(float u, float a, float b) {
     float sum = a + b;
     if (!(sum > 0.0)) return u;
@@ -124,7 +124,7 @@ MapSample sample_map(EnvironmentRecord map, vec2 u) {
     float s = down.y;
     // half a turn from where the map begins
     vec3 d = vec3(-s * around.y, down.x, s * around.x);
-    // the map's directions are world's, turned: back by the transpose
+    // map to world by the transpose of the rotation
     vec3 wi = map.to_map[0].xyz * d.x + map.to_map[1].xyz * d.y + map.to_map[2].xyz * d.z;
     return MapSample(wi, patch_value(q).rgb, map_density(map, q, row, rows, columns, s));
 }

@@ -1,6 +1,6 @@
 // Volumes within volumes: which of them a path is in, and which two meet at a surface (Schmidt and Budge, "Simple Nested Dielectrics in Ray Traced
 // Images", JGT 2002). A path keeps the volumes whose surfaces it has entered and not left. Of those it is in the one of highest priority, and among
-// equal ones in the one that it entered last. A surface at which that does not change is not there.
+// equal ones in the one that it entered last. A surface at which the active volume does not change is ignored.
 #ifndef PATH_MEDIA
 #define PATH_MEDIA
 #include "path/shading.glsl"
@@ -29,7 +29,7 @@ uint current_medium(MediaStack stack) {
 
 MediaStack entered(MediaStack stack, uint m) { return MediaStack(m, stack.xyz); }
 
-// Without the volume, which is as it was where the volume is not in it.
+// The stack without a volume; unchanged if it does not contain the volume.
 MediaStack left(MediaStack stack, uint m) {
     if (stack.x == m) return MediaStack(stack.yzw, NO_MEDIUM);
     if (stack.y == m) return MediaStack(stack.xzw, NO_MEDIUM);
@@ -37,10 +37,10 @@ MediaStack left(MediaStack stack, uint m) {
     return stack.w == m ? MediaStack(stack.xyz, NO_MEDIUM) : stack;
 }
 
-// Index of refraction; around everything it is 1.
+// Index of refraction; 1 outside of all volumes.
 float medium_ior(uint m) { return m == NO_MEDIUM ? 1.0 : SHADING_OF(m).ior; }
 
-// What lies beyond a surface of a volume.
+// The medium beyond a surface of a volume.
 struct Boundary {
     bool is_there;
     uint medium;       // beyond
@@ -52,7 +52,7 @@ Boundary boundary_at(uint material, bool front, uint here, MediaStack stack) {
     Boundary b;
     b.stack = front ? entered(stack, material) : left(stack, material);
     if (!front && b.stack == stack) {
-        // a path that is inside without having entered: the body is open, or it began there
+        // a path that leaves without having entered: the mesh is not closed, or the path began inside
         b.is_there = true;
         b.medium = here;
         b.eta = medium_ior(here) / medium_ior(material);

@@ -9,7 +9,7 @@
 #include "interface/shading.glsl"
 #include "interface/walls.glsl"
 
-// The record of a material, read where it is asked: what a branch asks for that nobody takes is not fetched.
+// The record of a material, whose fields are loaded on use, so that branches that are not taken load nothing.
 #define SHADING_OF(material) ShadingRecords(SceneRoot(push.scene).shading).v[material]
 
 // Twice the area of a triangle on a texture of one by one, before the use's own transform.
@@ -22,7 +22,7 @@ float texcoord_area(PartRecord part, uvec3 corners, uint set) {
     return abs(edge1.x * edge2.y - edge1.y * edge2.x);
 }
 
-// Value of a texture of a kind (TEXELS_*) at a point of a primitive (counted in the group), 1 where there is none. log_side: footprint().
+// Value of a texture of a kind (TEXELS_*) at a point of a primitive (index in the BLAS), 1 without a texture. log_side: footprint().
 vec4 sample_use(TextureUse use, PartRecord part, uint primitive, vec2 uv, uint kind, float log_side) {
     if (use.texture == INVALID || is_null(part.indices)) return vec4(1.0);
     uvec3 corners = triangle_indices(part, primitive);
@@ -38,7 +38,7 @@ vec4 sample_use(TextureUse use, PartRecord part, uint primitive, vec2 uv, uint k
     return sample_texture(use.texture, st, kind != TEXELS_LINEAR);
 }
 
-// Linear base colour of what is seen at a surface.
+// Linear base colour of a surface.
 vec3 shown_color(Surface s, PartRecord part, MaterialRecord m, float log_side) {
     if (!HAS_BASE_COLORS) return m.base_color.rgb;
     if (!HAS_RAY_CONES) return base_color(part, m, s.primitive, s.uv).rgb;
@@ -46,7 +46,7 @@ vec3 shown_color(Surface s, PartRecord part, MaterialRecord m, float log_side) {
     if (is_null(part.indices)) return color;
     color *= vertex_color(part, triangle_indices(part, s.primitive), s.uv).rgb;
     TextureUse use = TextureUse(m.texcoord_transform, m.texcoord_offset, m.base_color_texture, m.texcoord_set);
-    // where alpha says what there is, colours of what there is not count nothing
+    // with alpha, colours are premultiplied: texels of alpha 0 do not contribute
     return color * sample_use(use, part, s.primitive, s.uv, m.alpha_cutoff < 0.0 ? TEXELS_SRGB : TEXELS_COVERED, log_side).rgb;
 }
 
@@ -56,11 +56,11 @@ vec3 emission_texture(uint instance, uint primitive, vec2 uv) {
     SceneRoot root = SceneRoot(push.scene);
     PartRecord part = PartRecords(root.parts).v[Pairs(root.placements).v[instance].y];
     TextureUse use = SHADING_OF(part.material).uses[USE_EMISSION];
-    // the light is as it is: only what a path sees is filtered
+    // unfiltered: texture filtering applies to hits of paths only
     return sample_use(use, part, primitive + part.first_primitive, uv, TEXELS_SRGB, SHARP).rgb;
 }
 
-// How much of an emitter is there at a point of a primitive of an instance of the scene: what rays that arrive there meet on average.
+// Alpha of an emitter at a point of a primitive of an instance of the scene: the fraction of rays that hit it there.
 float emitter_alpha(uint instance, uint primitive, vec2 uv) {
     SceneRoot root = SceneRoot(push.scene);
     PartRecord part = PartRecords(root.parts).v[Pairs(root.placements).v[instance].y];
@@ -70,7 +70,7 @@ float emitter_alpha(uint instance, uint primitive, vec2 uv) {
     return alpha >= m.alpha_cutoff ? 1.0 : 0.0;
 }
 
-// What a path meets.
+// The surface that a path hits.
 struct Shading {
     Bsdf bsdf;
     Frame frame;    // about the shading normal, which is on the viewer's side
@@ -80,7 +80,7 @@ struct Shading {
     uint material;
 };
 
-// What the material's textures say at a surface, 1 where it has none.
+// Values of the material's textures at a surface, 1 without a texture.
 struct MaterialTextures {
     vec4 at[TEXTURE_FEATURES_COUNT];
 };
@@ -109,18 +109,18 @@ vec3 mapped_normal(vec4 texel_, float scale, vec3 n, vec4 tangent) {
     return m2 > 1e-12 ? mapped * inversesqrt(m2) : n;
 }
 
-// Bent towards the viewer as far as it turns away.
+// Bends the normal towards the viewer as far as it points away.
 vec3 towards(vec3 n, vec3 wo) {
     float c = dot(n, wo);
     return c < LEAST_COSINE ? normalize(n + (LEAST_COSINE - c) * wo) : n;
 }
 
-// First layer of the albedo tables of a material that refracts, as seen from a side.
+// First layer of the albedo tables of a refracting material, as seen from one side.
 uint dielectric_layer(uint m, bool front) {
     return ALBEDO_DIELECTRIC + DIELECTRIC_LAYERS * (2u * SHADING_OF(m).glass_layer + (front ? 0u : 1u));
 }
 
-// What a material's BSDF is made of at a point.
+// Inputs of a material's BSDF at a point.
 struct MaterialPoint {
     uint material;
     vec3 base;    // linear base colour
@@ -132,13 +132,13 @@ struct MaterialPoint {
 
 #include "interface/bsdf_dispatch.glsl"
 
-// A surface that absorbs everything.
+// A black surface, which absorbs everything.
 Shading black_shading(Surface s, vec3 wo) {
     float side = dot(s.ng, wo) > 0.0 ? 1.0 : -1.0;
     return Shading(black_bsdf(), frame_about(towards(s.ns * side, wo)), s.ng * side, vec3(0.0), false, INVALID);
 }
 
-// A diffuse one, whatever the material.
+// A diffuse surface, whatever the material.
 Shading grey_shading(Surface s, vec3 wo, float grey) {
     Shading out_ = black_shading(s, wo);
     out_.bsdf.kind = BSDF_DIFFUSE;
@@ -147,7 +147,7 @@ Shading grey_shading(Surface s, vec3 wo, float grey) {
     return out_;
 }
 
-// What a ray that comes along -wo meets, with textures over a footprint().
+// The surface hit by a ray along -wo, with textures filtered over a footprint().
 Shading shade(Surface s, vec3 wo, float log_side) {
     SceneRoot root = SceneRoot(push.scene);
     PartRecord part = PartRecords(root.parts).v[s.part];
@@ -163,7 +163,7 @@ Shading shade(Surface s, vec3 wo, float log_side) {
     }
     vec3 base = shown_color(s, part, MaterialRecords(root.materials).v[part.material], log_side);
     if (HAS_UNLIT && SHADING_OF(m).model == BSDF_NONE) {
-        // such a material shows its base colour; what it emits is ignored
+        // unlit materials show their base colour, and their emission is ignored
         out_.unlit = true;
         out_.emission = base;
         return out_;

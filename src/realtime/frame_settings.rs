@@ -17,7 +17,7 @@ use crate::settings::{AppliesTo, choices, settings};
 const FRAMES: AppliesTo = AppliesTo { integrators: &["ao"], ..AppliesTo::FRAMES };
 
 choices! {
-    /// Primary visibility, as it is asked for.
+    /// Primary visibility, as requested.
     pub enum PrimaryChoice {
         /// Whichever is faster on the device
         Auto = "auto",
