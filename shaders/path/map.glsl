@@ -1,6 +1,6 @@
 // Environments from images: radiance from a direction, and directions by how much light comes from there. Texels are looked up bilinearly.
 // Directions are sampled by weights of texels (src/integrators/path/environment.rs), interpolated likewise: first a row of patches between texel centres, then a
-// patch of the row, then a position in the patch (src/sampling/patches.rs has the formulas). The mapping preserves the order of the two numbers, so that
+// patch of the row, then a position in the patch (src/sampling/bilinear.rs has the formulas). The mapping preserves the order of the two numbers, so that
 // well stratified numbers give well stratified directions, and unoccluded environments have little noise.
 #ifndef PATH_MAP
 #define PATH_MAP
