@@ -87,7 +87,7 @@ pub enum Variant {
     Deliver64,
     /// Compute tracer: traces the rays of a subgroup together.
     Packet,
-    /// Compute tracer: the `bvh2` kernel over a binary tree, written for readability.
+    /// Compute tracer: the simple kernel over a binary BVH, written for readability.
     Bvh2,
     /// Compute tracer: the `brute` kernel, which tests every primitive of every instance.
     Brute,

@@ -105,7 +105,7 @@ records! {
         reserved: uvec2,
     }
 
-    /// A triangle of the `bvh2` and `brute` kernels.
+    /// A triangle of the binary BVH and `brute` kernels.
     TriangleRecord: words {
         /// Vertices, BLAS space.
         corners: vec3[3],
@@ -113,7 +113,7 @@ records! {
         number: uint,
     }
 
-    /// A sphere of the `bvh2` and `brute` kernels, of the size of a `TriangleRecord`.
+    /// A sphere of the binary BVH and `brute` kernels, of the size of a `TriangleRecord`.
     SphereRecord: words {
         /// Centre, BLAS space.
         center: vec3,

@@ -23,7 +23,7 @@ records! {
         textures: address,
         /// Compute tracer: nodes of the BVH.
         nodes: address,
-        /// Compute tracer, `bvh2` and `brute` kernels: the primitives.
+        /// Compute tracer, binary BVH and `brute` kernels: the primitives.
         primitives: address,
         /// Hardware tracers: the top-level acceleration structure.
         top_level: address,
@@ -69,7 +69,7 @@ records! {
         first_part: uint,
         /// Index of the instance in the scene; `INVALID`: several were baked into one BLAS, and each submesh has its own.
         scene_instance: uint,
-        /// Compute tracer, `bvh2` kernel: root node of the BLAS.
+        /// Compute tracer, binary BVH kernel: root node of the BLAS.
         root: uint,
         /// Hardware tracers: index of the first primitive of the second BLAS geometry, which is alpha tested.
         opaque_count: uint,
