@@ -475,7 +475,7 @@ fn gpu_auto_draws_few_primitives_and_traces_many() {
     for (pixels, want) in [(1 << 20, Primary::Raster), (1000, Primary::Traced)] {
         let (primary, why) = Primary::auto(&tracer, pixels);
         assert_eq!(primary, want, "{why}");
-        assert!(why.contains("primitives a pixel"), "{why}");
+        assert!(why.contains("primitives per pixel"), "{why}");
     }
     assert_validation_clean(&device);
 }

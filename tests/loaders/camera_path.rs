@@ -184,7 +184,7 @@ fn files() {
         (&second(r#""frame": 1, "eye": [0, 0, 1], "target": [0, 0, 0], "fov": 3"#), "key 2: unknown field `fov`"),
         (&second(r#""frame": 1, "eye": [0, 0, null], "target": [0, 0, 0]"#), "key 2: invalid type: null"),
         (&second(r#""frame": 1, "eye": [0, 0, NaN], "target": [0, 0, 0]"#), "not a readable camera path"),
-        (&second(r#""frame": 1, "eye": [0, 0, 1e200], "target": [0, 0, 0]"#), "key 2: holds a number"),
+        (&second(r#""frame": 1, "eye": [0, 0, 1e200], "target": [0, 0, 0]"#), "key 2: contains a number"),
         (&second(r#""frame": 1, "eye": [0, 5, 0], "target": [0, 0, 0]"#), "key 2: up lies along the view"),
         (&second(r#""frame": 1, "eye": [0, 5, 0], "target": [0, 0, 0], "up": [0, 0, 0]"#), "key 2: up has no length"),
         (&second(r#""frame": 1, "eye": [0, 0, 1], "target": [0, 0, 0], "fov_y_degrees": 180"#), "between 0.001 and 179"),

@@ -89,7 +89,7 @@ fn what_is_broken_off_leaves_nothing() {
     drop(dropped);
     let mut short = ApngWriter::create(&path, animation).unwrap();
     short.add_bytes(&[1; 16]).unwrap();
-    assert!(short.finish().unwrap_err().to_string().contains("1 of its 2 frames"));
+    assert!(short.finish().unwrap_err().to_string().contains("1 of 2 frames"));
     assert_eq!((crate::files_in(dir.path()), std::fs::read(&path).unwrap()), (1, b"old".to_vec()));
 
     let mut long = ApngWriter::create(&path, animation).unwrap();
