@@ -12,10 +12,10 @@ use crate::scene::{Environment, Scene, load};
 use crate::settings::parse::parse_vector;
 #[cfg(feature = "cli")]
 use crate::settings::parse::{parse_factor, parse_number};
-use crate::settings::{AppliesTo, settings};
+use crate::settings::{AppliesTo, Capability, settings};
 
 /// Integrators that lights apply to.
-const LIT: AppliesTo = AppliesTo::stills_of(&["path", "direct", "whitted"]);
+const LIT: AppliesTo = AppliesTo::stills_of(Capability::SceneLights);
 
 settings! {
     /// Light besides the scene's.

@@ -25,11 +25,12 @@ use crate::output::Image;
 use crate::output::tone_map::ToneMap;
 use crate::ray::Ray;
 use crate::scene::{Camera, Scene};
+use crate::settings::{self, Capability, GivenSetting};
 use crate::shaders::StreamShaders;
 use crate::tracer::{Needs, Tracer};
 
 /// All integrators, in the order in which they are listed to users.
-pub static ALL: [&dyn Integrator; 9] = [
+pub static ALL: &[&dyn Integrator] = &[
     &ao::AmbientOcclusion,
     &path::kinds::PATH,
     &path::kinds::DIRECT,
@@ -124,6 +125,9 @@ pub trait Integrator: Sync {
     /// Description in one line.
     fn help(&self) -> &'static str;
 
+    /// What it can do: by this settings know whether they apply to it.
+    fn capabilities(&self) -> &'static [Capability];
+
     /// Names of the film's channels: one or three.
     fn channels(&self) -> &'static [&'static str];
 
@@ -214,6 +218,19 @@ impl IntegratorName {
     }
 }
 
+/// Name and capabilities of all integrators.
+fn capabilities() -> Vec<settings::Integrator> {
+    ALL.iter().map(|i| (i.name(), i.capabilities())).collect()
+}
+
+/// Checks that each of these settings has an effect on what an integrator renders: real-time frames if `frames` is the setting that selects them, else a still.
+///
+/// # Errors
+/// [`Error::Usage`] for the first setting without effect.
+pub fn check(given: &[GivenSetting], integrator: IntegratorName, frames: Option<&GivenSetting>) -> Result<()> {
+    settings::check(given, &(integrator.name(), integrator.get().capabilities()), &capabilities(), frames)
+}
+
 impl Default for IntegratorName {
     fn default() -> Self {
         Self(ALL[0])
@@ -274,9 +291,9 @@ mod tests {
         assert!("ambient".parse::<IntegratorName>().unwrap_err().to_string().contains("choose one of ao, path"));
     }
 
-    /// A setting that applies only to unknown integrators would have no effect.
+    /// A setting that applies to no integrator would have no effect.
     #[test]
-    fn settings_name_integrators_that_exist() {
+    fn settings_apply_to_some_integrator() {
         let every = serde_json::json!({
             "ao": { "ao_radius": 1.0, "ao_falloff": 2.0, "ao_normal": "shading" },
             "path": {
@@ -288,9 +305,7 @@ mod tests {
         let given = settings.given();
         assert!(given.len() >= 14);
         for setting in given {
-            for name in setting.applies.integrators {
-                assert!(IntegratorName::find(name).is_some(), "{}: {name}", setting.name);
-            }
+            assert!(capabilities().iter().any(|i| setting.applies.includes(i)), "{}", setting.name);
         }
     }
 }

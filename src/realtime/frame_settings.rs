@@ -11,10 +11,10 @@ use crate::realtime::{Budget, FilterKind, Preset, Resolution, Settings, Techniqu
 use crate::sampling::Sequence;
 #[cfg(feature = "cli")]
 use crate::settings::parse::parse_rate;
-use crate::settings::{AppliesTo, choices, settings};
+use crate::settings::{AppliesTo, Capability, choices, settings};
 
 /// Settings of real-time frames of ambient occlusion.
-const FRAMES: AppliesTo = AppliesTo { integrators: &["ao"], ..AppliesTo::FRAMES };
+const FRAMES: AppliesTo = AppliesTo::frames_of(Capability::AmbientOcclusion);
 
 choices! {
     /// Primary visibility, as requested.

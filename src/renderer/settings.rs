@@ -7,7 +7,7 @@ use crate::error::{Error, Result};
 use crate::film::camera::{self, Choice};
 use crate::integrators::aov::Aov;
 use crate::integrators::lighting::LightingSettings;
-use crate::integrators::{IntegratorName, IntegratorSettings, PictureOptions};
+use crate::integrators::{self, IntegratorName, IntegratorSettings, PictureOptions};
 #[cfg(feature = "cli")]
 use crate::output::parse_size;
 use crate::output::tone_map::ToneMap;
@@ -15,7 +15,7 @@ use crate::realtime::frame_settings::FrameSettings;
 use crate::scene::{Camera, Projection, Scene};
 #[cfg(feature = "cli")]
 use crate::settings::parse::{parse_fov, parse_number, parse_target, parse_time, parse_vector};
-use crate::settings::{self, AppliesTo, GivenSetting, settings};
+use crate::settings::{AppliesTo, Capability, GivenSetting, settings};
 
 /// Samples per pixel when neither the settings nor the scene give them.
 pub const DEFAULT_SPP: u32 = 16;
@@ -25,8 +25,7 @@ pub const DEFAULT_SIZE: [u32; 2] = [1280, 720];
 pub const DEFAULT_FOV_Y: f64 = 45.0;
 
 /// Integrators to whose images tone mapping and exposure apply.
-const TONE_MAPPED: AppliesTo =
-    AppliesTo::stills_of(&["path", "direct", "whitted", "ao-sky", "normals", "albedo", "depth", "baked-occlusion"]);
+const TONE_MAPPED: AppliesTo = AppliesTo::stills_of(Capability::ToneMapping);
 
 settings! {
     /// The image.
@@ -213,7 +212,7 @@ impl RenderSettings {
     /// [`Error::Usage`], naming the setting and what to do about it.
     pub fn check(&self) -> Result<()> {
         let frames = self.realtime_setting();
-        settings::check(&self.given(), self.integrator().name(), frames.as_ref())?;
+        integrators::check(&self.given(), self.integrator(), frames.as_ref())?;
         if frames.is_none() && Aov::Bent.is_in(&self.image.aov) {
             return Err(Error::Usage("--aov bent is for frames in real time: add --preset".into()));
         }

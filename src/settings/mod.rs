@@ -1,16 +1,43 @@
 //! Declares settings: one struct is a part of the command line (with the feature `cli`), of settings files and of the JSON record.
 //!
-//! Each setting declares the integrators that it applies to, and whether it applies to stills, real-time frames, or both: [`check`] rejects settings without effect.
+//! Each setting declares which integrators it applies to, by something that they can do ([`Capability`]), and whether it applies to stills, real-time frames, or both:
+//! [`check`] rejects settings without effect. So an integrator names its capabilities, and no setting names an integrator.
 
 pub mod parse;
 
 use crate::error::{Error, Result};
 
+/// Something that an integrator can do, and that settings are about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Capability {
+    /// It computes ambient occlusion of a radius and falloff.
+    AmbientOcclusion,
+    /// It follows light from surface to surface.
+    LightTransport,
+    /// The length of its paths can be chosen.
+    PathLength,
+    /// Its directions can be sampled by a strategy of choice.
+    SamplingStrategy,
+    /// It sees the environment and the lights of the scene.
+    SceneLights,
+    /// Its only light is a white sky, its surfaces are grey.
+    WhiteSky,
+    /// It reads textures.
+    Textures,
+    /// Its camera has a pixel filter and a lens.
+    CameraModel,
+    /// Its images are tone mapped.
+    ToneMapping,
+}
+
+/// An integrator as settings see it: its name and its capabilities.
+pub type Integrator = (&'static str, &'static [Capability]);
+
 /// The integrators and kinds of output that a setting has an effect on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct AppliesTo {
-    /// Names of integrators; empty: all.
-    pub integrators: &'static [&'static str],
+    /// What an integrator must be capable of; `None`: any integrator will do.
+    pub capability: Option<Capability>,
     /// It applies to stills.
     pub stills: bool,
     /// It applies to real-time frames.
@@ -19,24 +46,30 @@ pub struct AppliesTo {
 
 impl AppliesTo {
     /// Everything.
-    pub const ALL: Self = Self { integrators: &[], stills: true, frames: true };
+    pub const ALL: Self = Self { capability: None, stills: true, frames: true };
     /// Stills of any integrator.
-    pub const STILLS: Self = Self { integrators: &[], stills: true, frames: false };
+    pub const STILLS: Self = Self { capability: None, stills: true, frames: false };
     /// Real-time frames of any integrator.
-    pub const FRAMES: Self = Self { integrators: &[], stills: false, frames: true };
+    pub const FRAMES: Self = Self { capability: None, stills: false, frames: true };
 
-    /// Stills of some integrators.
-    pub const fn stills_of(integrators: &'static [&'static str]) -> Self {
-        Self { integrators, ..Self::STILLS }
+    /// Stills of the integrators that are capable of this.
+    pub const fn stills_of(capability: Capability) -> Self {
+        Self { capability: Some(capability), ..Self::STILLS }
     }
 
-    /// Stills and frames of some integrators.
-    pub const fn of(integrators: &'static [&'static str]) -> Self {
-        Self { integrators, ..Self::ALL }
+    /// Frames of the integrators that are capable of this.
+    pub const fn frames_of(capability: Capability) -> Self {
+        Self { capability: Some(capability), ..Self::FRAMES }
     }
 
-    fn includes(&self, integrator: &str) -> bool {
-        self.integrators.is_empty() || self.integrators.contains(&integrator)
+    /// Stills and frames of the integrators that are capable of this.
+    pub const fn of(capability: Capability) -> Self {
+        Self { capability: Some(capability), ..Self::ALL }
+    }
+
+    /// Returns true if it applies to this integrator.
+    pub fn includes(&self, integrator: &Integrator) -> bool {
+        self.capability.is_none_or(|c| integrator.1.contains(&c))
     }
 }
 
@@ -70,11 +103,12 @@ fn list(names: &[&str]) -> String {
     }
 }
 
-/// Checks that each of these settings has an effect on what `integrator` renders: real-time frames if `frames` is the setting that selects them, else a still.
+/// Checks that each of these settings has an effect on what `integrator` renders: real-time frames if `frames` is the setting that selects them, else a still. `all`: every
+/// integrator, to name those on which a setting would have an effect.
 ///
 /// # Errors
 /// [`Error::Usage`] for the first setting without effect.
-pub fn check(given: &[GivenSetting], integrator: &str, frames: Option<&GivenSetting>) -> Result<()> {
+pub fn check(given: &[GivenSetting], integrator: &Integrator, all: &[Integrator], frames: Option<&GivenSetting>) -> Result<()> {
     let wrong = |text: String| Err(Error::Usage(text));
     for setting in given {
         let (option, applies) = (setting.option(), setting.applies);
@@ -85,9 +119,11 @@ pub fn check(given: &[GivenSetting], integrator: &str, frames: Option<&GivenSett
             ));
         }
         if !applies.includes(integrator) {
-            let others = list(applies.integrators);
+            let others: Vec<_> = all.iter().filter(|i| applies.includes(i)).map(|i| i.0).collect();
             return wrong(format!(
-                "{option} has no effect on --integrator {integrator}: leave it out, or use --integrator {others}"
+                "{option} has no effect on --integrator {}: leave it out, or use --integrator {}",
+                integrator.0,
+                list(&others)
             ));
         }
     }
@@ -213,7 +249,7 @@ mod tests {
         "Test"
         struct Some {
             /// First.
-            max_depth: Option<u32>, option(value_name = "N"), applies(AppliesTo::stills_of(&["path", "direct"]));
+            max_depth: Option<u32>, option(value_name = "N"), applies(AppliesTo::stills_of(Capability::PathLength));
             /// Second.
             fps: Option<f64>, option(value_name = "N"), applies(AppliesTo::FRAMES);
         }
@@ -224,11 +260,13 @@ mod tests {
         let some = Some { max_depth: Option::Some(3), fps: None };
         let [depth] = some.given()[..] else { panic!("one was given") };
         assert_eq!(depth.option(), "--max-depth");
-        assert!(check(&[depth], "path", None).is_ok());
+        let all: [Integrator; 3] = [("ao", &[]), ("path", &[Capability::PathLength]), ("direct", &[Capability::PathLength])];
+        let check = |given: &[GivenSetting], k: usize, frames: Option<&GivenSetting>| check(given, &all[k], &all, frames);
+        assert!(check(&[depth], 1, None).is_ok());
         let text = |r: Result<()>| r.unwrap_err().to_string();
-        assert!(text(check(&[depth], "ao", None)).contains("use --integrator path or direct"));
+        assert!(text(check(&[depth], 0, None)).contains("use --integrator path or direct"));
         let fps = Some { fps: Option::Some(24.0), ..Default::default() }.given()[0];
-        assert!(text(check(&[depth], "path", Option::Some(&fps))).contains("--fps selects frames"));
+        assert!(text(check(&[depth], 1, Option::Some(&fps))).contains("--fps selects frames"));
     }
 
     #[test]

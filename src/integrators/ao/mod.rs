@@ -5,7 +5,7 @@
 //! nothing more, neighbouring occlusion rays belong to one pixel, and sums do not depend on launch sizes.
 
 mod attenuation;
-use crate::settings::choices;
+use crate::settings::{Capability, choices};
 mod report;
 pub mod settings;
 
@@ -122,6 +122,10 @@ impl Integrator for AmbientOcclusion {
 
     fn help(&self) -> &'static str {
         "Ambient occlusion"
+    }
+
+    fn capabilities(&self) -> &'static [Capability] {
+        &[Capability::AmbientOcclusion]
     }
 
     fn channels(&self) -> &'static [&'static str] {

@@ -3,10 +3,10 @@
 use super::Hemisphere;
 #[cfg(feature = "cli")]
 use crate::settings::parse::{parse_falloff, parse_radius};
-use crate::settings::{AppliesTo, settings};
+use crate::settings::{AppliesTo, Capability, settings};
 
 /// Integrators that these settings apply to.
-const AO: AppliesTo = AppliesTo::of(&["ao"]);
+const AO: AppliesTo = AppliesTo::of(Capability::AmbientOcclusion);
 
 settings! {
     /// Ambient occlusion.

@@ -12,38 +12,68 @@ use crate::film::tile_mask::TileMask;
 use crate::integrators::{Integrator, IntegratorSettings, PictureOptions, RenderJob, Rendered};
 use crate::output::{Image, Samples};
 use crate::scene::Scene;
+use crate::settings::Capability::{
+    self, CameraModel, LightTransport, PathLength, SamplingStrategy, SceneLights, Textures, ToneMapping, WhiteSky,
+};
 use crate::shaders::StreamShaders;
 use crate::tracer::{Needs, Tracer};
 
 /// Path tracing.
-pub static PATH: PathVariant =
-    PathVariant { name: "path", help: "Path tracing: global illumination", kind: Kind::Light { max_depth: None } };
+pub static PATH: PathVariant = PathVariant {
+    name: "path",
+    help: "Path tracing: global illumination",
+    kind: Kind::Light { max_depth: None },
+    capabilities: &[LightTransport, PathLength, SamplingStrategy, SceneLights, Textures, CameraModel, ToneMapping],
+};
 /// Paths of one bounce.
-pub static DIRECT: PathVariant =
-    PathVariant { name: "direct", help: "Direct lighting: paths of one bounce", kind: Kind::Light { max_depth: Some(1) } };
+pub static DIRECT: PathVariant = PathVariant {
+    name: "direct",
+    help: "Direct lighting: paths of one bounce",
+    kind: Kind::Light { max_depth: Some(1) },
+    capabilities: &[LightTransport, SamplingStrategy, SceneLights, Textures, CameraModel, ToneMapping],
+};
 /// Specular reflection and refraction, and direct lighting on all other surfaces.
 pub static WHITTED: PathVariant = PathVariant {
     name: "whitted",
     help: "Whitted (1980): chains of mirrors and glass, direct light on everything else",
     kind: Kind::Whitted,
+    capabilities: &[LightTransport, PathLength, SceneLights, Textures, CameraModel, ToneMapping],
 };
 /// The ground truth that ambient occlusion approximates.
 pub static AO_SKY: PathVariant = PathVariant {
     name: "ao-sky",
     help: "Path traced grey diffuse surfaces under a white sky, divided by albedo: the ground truth that AO approximates",
     kind: Kind::WhiteSky,
+    capabilities: &[LightTransport, PathLength, SamplingStrategy, WhiteSky, CameraModel, ToneMapping],
 };
 /// Shading normals.
-pub static NORMALS: PathVariant =
-    PathVariant { name: "normals", help: "Shading normals, in world space", kind: Kind::View(View::Normals) };
+pub static NORMALS: PathVariant = PathVariant {
+    name: "normals",
+    help: "Shading normals, in world space",
+    kind: Kind::View(View::Normals),
+    capabilities: &[Textures, CameraModel, ToneMapping],
+};
 /// Base colours.
-pub static ALBEDO: PathVariant = PathVariant { name: "albedo", help: "Base colours", kind: Kind::View(View::Albedo) };
+pub static ALBEDO: PathVariant = PathVariant {
+    name: "albedo",
+    help: "Base colours",
+    kind: Kind::View(View::Albedo),
+    capabilities: &[Textures, CameraModel, ToneMapping],
+};
 /// Distances.
-pub static DEPTH: PathVariant =
-    PathVariant { name: "depth", help: "Distance along camera rays", kind: Kind::View(View::Depth) };
+pub static DEPTH: PathVariant = PathVariant {
+    name: "depth",
+    help: "Distance along camera rays",
+    kind: Kind::View(View::Depth),
+    capabilities: &[CameraModel, ToneMapping],
+};
 /// Occlusion textures.
-pub static BAKED_OCCLUSION: PathVariant =
-    PathVariant { name: "baked-occlusion", help: "Baked occlusion textures", kind: Kind::View(View::BakedOcclusion) };
+pub static BAKED_OCCLUSION: PathVariant = PathVariant {
+    name: "baked-occlusion",
+    help: "Baked occlusion textures",
+    kind: Kind::View(View::BakedOcclusion),
+    capabilities: &[Textures, CameraModel, ToneMapping],
+};
 
 /// What an integrator computes.
 enum Kind {
@@ -62,6 +92,7 @@ pub struct PathVariant {
     name: &'static str,
     help: &'static str,
     kind: Kind,
+    capabilities: &'static [Capability],
 }
 
 impl PathVariant {
@@ -89,6 +120,10 @@ impl Integrator for PathVariant {
 
     fn help(&self) -> &'static str {
         self.help
+    }
+
+    fn capabilities(&self) -> &'static [Capability] {
+        self.capabilities
     }
 
     fn channels(&self) -> &'static [&'static str] {

@@ -16,21 +16,20 @@ use crate::interface::PathFeature;
 use crate::scene::Projection;
 #[cfg(feature = "cli")]
 use crate::settings::parse::{parse_albedo, parse_positive};
-use crate::settings::{AppliesTo, choices, settings};
+use crate::settings::{AppliesTo, Capability, choices, settings};
 
 /// Integrators that trace light paths.
-const LIGHT: AppliesTo = AppliesTo::stills_of(&["path", "direct", "whitted", "ao-sky"]);
+const LIGHT: AppliesTo = AppliesTo::stills_of(Capability::LightTransport);
 /// Integrators whose path length is configurable.
-const LONG: AppliesTo = AppliesTo::stills_of(&["path", "whitted", "ao-sky"]);
+const LONG: AppliesTo = AppliesTo::stills_of(Capability::PathLength);
 /// Integrators that use a pixel filter and a lens.
-const CAMERA: AppliesTo =
-    AppliesTo::stills_of(&["path", "direct", "whitted", "ao-sky", "normals", "albedo", "depth", "baked-occlusion"]);
+const CAMERA: AppliesTo = AppliesTo::stills_of(Capability::CameraModel);
 /// Integrators that read textures.
-const TEXTURES: AppliesTo = AppliesTo::stills_of(&["path", "direct", "whitted", "normals", "albedo", "baked-occlusion"]);
+const TEXTURES: AppliesTo = AppliesTo::stills_of(Capability::Textures);
 /// Integrators with a choice of sampling strategy.
-const SAMPLED: AppliesTo = AppliesTo::stills_of(&["path", "direct", "ao-sky"]);
+const SAMPLED: AppliesTo = AppliesTo::stills_of(Capability::SamplingStrategy);
 /// The integrator with a white sky.
-const SKY: AppliesTo = AppliesTo::stills_of(&["ao-sky"]);
+const SKY: AppliesTo = AppliesTo::stills_of(Capability::WhiteSky);
 
 choices! {
     /// Denoiser of path-traced images.
