@@ -61,7 +61,7 @@ impl Range {
     }
 }
 
-/// The resources that a pass reads and writes: its inputs to barriers, memory allocation and culling.
+/// The resources that a pass reads and writes: its inputs to barriers, memory allocation and skipping.
 #[derive(Clone, Debug, Default)]
 pub struct ResourceUse {
     /// Resources read.

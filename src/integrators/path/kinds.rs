@@ -51,7 +51,7 @@ pub static NORMALS: PathVariant = PathVariant {
     name: "normals",
     help: "Shading normals, in world space",
     kind: Kind::View(View::Normals),
-    capabilities: &[Textures, CameraModel, ToneMapping],
+    capabilities: &[Textures, CameraModel],
 };
 /// Base colours.
 pub static ALBEDO: PathVariant = PathVariant {
@@ -65,14 +65,14 @@ pub static DEPTH: PathVariant = PathVariant {
     name: "depth",
     help: "Distance along camera rays",
     kind: Kind::View(View::Depth),
-    capabilities: &[CameraModel, ToneMapping],
+    capabilities: &[CameraModel],
 };
 /// Occlusion textures.
 pub static BAKED_OCCLUSION: PathVariant = PathVariant {
     name: "baked-occlusion",
     help: "Baked occlusion textures",
     kind: Kind::View(View::BakedOcclusion),
-    capabilities: &[Textures, CameraModel, ToneMapping],
+    capabilities: &[Textures, CameraModel],
 };
 
 /// What an integrator computes.
@@ -173,7 +173,7 @@ impl Integrator for PathVariant {
     }
 
     fn sees_environment(&self) -> bool {
-        !matches!(self.kind, Kind::WhiteSky)
+        matches!(self.kind, Kind::Light { .. } | Kind::Whitted)
     }
 
     fn identity(&self, job: &RenderJob) -> Vec<(&'static str, Option<String>)> {

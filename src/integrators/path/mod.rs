@@ -36,7 +36,8 @@ pub use settings::{Lens, MAX_DEPTH, PathOptions, Strategy, TextureFilter};
 
 /// Bounces per submission, after which the host reads how many paths are left.
 const BOUNCES: u32 = 4;
-/// Maximum number of surfaces that a path passes straight through; one more ends it.
+/// Launches that are made beyond those of the bounces, for surfaces that paths pass straight through: what is left then ends. A path counts such surfaces in 16 bits
+/// (`PathRecord::depth_passes`).
 const MAX_STRAIGHT: u32 = 4096;
 /// An image and statistics of its rays.
 #[derive(Clone, Debug, Default)]
@@ -49,7 +50,7 @@ pub struct PathResult {
     pub shadow_rays: u64,
     /// Number of bounces of the longest path.
     pub longest_path: u32,
-    /// Number of lights that light sampling chooses from.
+    /// Number of lights that light sampling chooses from, the environment and each portal included; 0 without light sampling.
     pub lights: u32,
     /// A light tree chooses among them.
     pub light_tree: bool,
@@ -93,7 +94,7 @@ impl PathIntegrator {
         Ok(Self { paths: PathEstimator::new(tracer, flat, options)?, options: options.clone() })
     }
 
-    /// Number of lights that light sampling chooses from.
+    /// Number of lights that light sampling chooses from, the environment and each portal included; 0 without light sampling.
     pub fn lights(&self) -> u32 {
         self.paths.lights
     }

@@ -1,5 +1,5 @@
 //! Settings of path tracing and of the integrators based on it: the settings as given ([`PathSettings`]), the resolved options of a render ([`PathOptions`]),
-//! the shader features that they require, and their metadata and JSON record. A new option needs changes in this file only.
+//! the shader features that they require, and their metadata and JSON record. An option is added here; what shaders need of it besides is a line in src/interface.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -318,15 +318,37 @@ impl PathOptions {
 
     /// The options' part of the JSON record.
     pub(super) fn record(&self) -> Value {
+        // no `..`: a new option has to be put where it belongs
+        let Self {
+            size: _,
+            spp: _,
+            time_limit: _,
+            tile_mask: _,
+            film: _,
+            seed: _,
+            max_depth,
+            min_depth,
+            rr_depth,
+            firefly_clamp,
+            strategy,
+            white_sky,
+            view,
+            specular_only: _,
+            pixel_filter,
+            texture_filter,
+            lens,
+        } = self;
         json!({
-            "max_depth": if self.max_depth >= MAX_DEPTH { Value::Null } else { json!(self.max_depth) },
-            "min_depth": self.min_depth,
-            "rr_depth": self.rr_depth,
-            "firefly_clamp": if self.firefly_clamp.is_finite() { json!(self.firefly_clamp) } else { Value::Null },
-            "sampling": self.strategy,
-            "view": self.view,
-            "texture_filter": self.texture_filter,
-            "sky_albedo": self.white_sky,
+            "max_depth": if *max_depth >= MAX_DEPTH { Value::Null } else { json!(max_depth) },
+            "min_depth": min_depth,
+            "rr_depth": rr_depth,
+            "firefly_clamp": if firefly_clamp.is_finite() { json!(firefly_clamp) } else { Value::Null },
+            "sampling": strategy,
+            "view": view,
+            "pixel_filter": pixel_filter,
+            "texture_filter": texture_filter,
+            "lens": lens,
+            "sky_albedo": white_sky,
         })
     }
 

@@ -92,7 +92,7 @@ impl Lights {
         self.records.len() as u32 - self.first
     }
 
-    /// Number of lights.
+    /// Number of lights, the environment and each portal included.
     pub fn count(&self) -> u32 {
         self.sampled().len() as u32
     }
