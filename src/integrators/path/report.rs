@@ -74,7 +74,7 @@ pub(super) fn report(
         },
         "longest_path": result.longest_path,
     });
-    let record = [record, o.record()].into_iter().filter_map(|part| part.as_object().cloned()).flatten().collect();
+    let record = o.record().into_iter().chain(record.as_object().cloned().unwrap_or_default()).collect();
     IntegratorReport { lines, explanations, record, warnings: warnings(flat, o, image.film.not_finite, image.spp) }
 }
 

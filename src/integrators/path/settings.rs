@@ -4,7 +4,7 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 
 use super::params::PathParams;
 use super::{PixelFilter, View};
@@ -233,8 +233,9 @@ impl PathOptions {
         })
     }
 
-    /// Everything that the samples of an image depend on: metadata keys and values. `None`: the key is absent from the metadata.
-    pub(super) fn identity(&self) -> Vec<(&'static str, Option<String>)> {
+    /// The options that the samples of an image depend on, each with its key, its text in an image's metadata (`None`: the key is absent), and its value in the JSON
+    /// record.
+    fn described(&self) -> Vec<(&'static str, Option<String>, Value)> {
         // without `..`, so that a new option must be added here
         let Self {
             size: _,
@@ -249,23 +250,35 @@ impl PathOptions {
             firefly_clamp,
             strategy,
             white_sky,
-            view: _,
+            view,
             specular_only: _,
             pixel_filter,
             texture_filter,
             lens,
         } = self;
+        let clamp = firefly_clamp.is_finite().then_some(firefly_clamp);
+        let depth_limit = (*max_depth < MAX_DEPTH).then_some(max_depth);
+        let filter = (*pixel_filter != PixelFilter::Box).then(|| pixel_filter.to_string());
+        let lookup = (*texture_filter != TextureFilter::Bilinear).then(|| texture_filter.to_string());
+        let aperture = lens.map(|lens| format!("radius {}, focus {}", lens.radius, lens.focus));
         vec![
-            ("max_depth", Some(depth_text(*max_depth))),
-            ("min_depth", (*min_depth > 0).then(|| min_depth.to_string())),
-            ("rr_depth", Some(rr_depth.to_string())),
-            ("sampling", Some(strategy.to_string())),
-            ("firefly_clamp", firefly_clamp.is_finite().then(|| firefly_clamp.to_string())),
-            ("pixel_filter", (*pixel_filter != PixelFilter::Box).then(|| pixel_filter.to_string())),
-            ("texture_filter", (*texture_filter != TextureFilter::Bilinear).then(|| texture_filter.to_string())),
-            ("lens", lens.map(|lens| format!("radius {}, focus {}", lens.radius, lens.focus))),
-            ("sky_albedo", white_sky.map(|albedo| albedo.to_string())),
+            ("max_depth", Some(depth_text(*max_depth)), json!(depth_limit)),
+            ("min_depth", (*min_depth > 0).then(|| min_depth.to_string()), json!(min_depth)),
+            ("rr_depth", Some(rr_depth.to_string()), json!(rr_depth)),
+            ("sampling", Some(strategy.to_string()), json!(strategy)),
+            ("firefly_clamp", clamp.map(f32::to_string), json!(clamp)),
+            ("pixel_filter", filter, json!(pixel_filter)),
+            ("texture_filter", lookup, json!(texture_filter)),
+            ("lens", aperture, json!(lens)),
+            ("sky_albedo", white_sky.map(|albedo| albedo.to_string()), json!(white_sky)),
+            // the name of the integrator says it in metadata
+            ("view", None, json!(view)),
         ]
+    }
+
+    /// Metadata keys and values by which a film is known to be of the same render. `None`: the key is absent.
+    pub(super) fn identity(&self) -> Vec<(&'static str, Option<String>)> {
+        self.described().into_iter().map(|(key, text, _)| (key, text)).collect()
     }
 
     /// Shader features that the options require, whatever the scene.
@@ -317,39 +330,8 @@ impl PathOptions {
     }
 
     /// The options' part of the JSON record.
-    pub(super) fn record(&self) -> Value {
-        // no `..`: a new option has to be put where it belongs
-        let Self {
-            size: _,
-            spp: _,
-            time_limit: _,
-            tile_mask: _,
-            film: _,
-            seed: _,
-            max_depth,
-            min_depth,
-            rr_depth,
-            firefly_clamp,
-            strategy,
-            white_sky,
-            view,
-            specular_only: _,
-            pixel_filter,
-            texture_filter,
-            lens,
-        } = self;
-        json!({
-            "max_depth": if *max_depth >= MAX_DEPTH { Value::Null } else { json!(max_depth) },
-            "min_depth": min_depth,
-            "rr_depth": rr_depth,
-            "firefly_clamp": if firefly_clamp.is_finite() { json!(firefly_clamp) } else { Value::Null },
-            "sampling": strategy,
-            "view": view,
-            "pixel_filter": pixel_filter,
-            "texture_filter": texture_filter,
-            "lens": lens,
-            "sky_albedo": white_sky,
-        })
+    pub(super) fn record(&self) -> Map<String, Value> {
+        self.described().into_iter().map(|(key, _, value)| (key.to_owned(), value)).collect()
     }
 
     /// Returns true if a pixel sees only what projects into its area: no lens and no wide filter.
