@@ -43,6 +43,8 @@ pub fn of_scene(scene: &Scene) -> String {
     // the debug text has all fields, and all digits of numbers
     hash.text(&scene.materials);
     hash.text(&scene.lights);
+    // they decide where light is sampled
+    hash.text(&scene.portals);
     hash.finish()
 }
 
@@ -113,7 +115,7 @@ mod tests {
         assert_eq!(of(&|s| s.cameras.clear()), same);
         assert_eq!(of(&|s| s.hints.spp = Some(7)), same);
         assert_eq!(of(&|s| s.environment = Environment::Uniform(Vec3::ONE)), same);
-        let changes: [&Change; 6] = [
+        let changes: [&Change; 7] = [
             &|s| s.materials[0].roughness += f32::EPSILON,
             &|s| s.instances[0].object_to_world.translation.x += 1e-12,
             &|s| s.instances.swap(0, 1),
@@ -127,6 +129,10 @@ mod tests {
                     direction: glam::DVec3::Y,
                     range: f64::INFINITY,
                 })
+            },
+            &|s| {
+                let edges = [glam::DVec3::X, glam::DVec3::Z];
+                s.portals.push(crate::scene::Portal { corner: glam::DVec3::ZERO, edges });
             },
             &|s| {
                 let mesh = s.meshes.iter_mut().find_map(|m| match &mut m.geometry {
