@@ -5,10 +5,11 @@
 #   ./scripts/test.sh [--full] [FILTER]      FILTER: only tests whose name contains it
 #
 # --full, before a release: every scene of the reference renderer (docs/mitsuba.md) on every tracer and driver and with the validation layer, every device test on
-# the floor driver, and there as many rays as on the default driver.
-# Without it the other tracers and the floor driver render the scenes in which they differ from the compute tracer, without the layer (all other tests have it), and
-# the floor driver leaves out tests of code that knows no driver: how paths are shaded (tests/path), what frames show (tests/realtime, but for those
-# that compare tracers), and the program from outside (tests/cli, but for the program's own device tests).
+# the floor driver, every tracer for every test of paths, with the validation layer, and a million rays a scene in the parity gate.
+# Without it the other tracers and the floor driver render the scenes in which they differ from the compute tracer, and a test of paths takes one tracer. Both do
+# without the layer, which all other tests have, and one that compiles kernels of all features. The parity gate has a quarter of the rays. The floor driver leaves
+# out tests of code that knows no driver: how paths are shaded (tests/path), what frames show (tests/realtime, but for those that compare tracers), and the
+# program from outside (tests/cli, but for the program's own device tests).
 #
 # Tests run a process each, but for those of tracers, stills and paths: they run as threads of a process for each subject, so that they share a device and its
 # pipelines. On a CPU driver compiling pipelines is most of what they cost.
@@ -29,7 +30,7 @@ say() { printf 'test: %s\n' "$*"; }
 
 log=$(mktemp)
 summaries=$(mktemp)
-trap 'rm -f "$log" "$summaries"' EXIT
+trap 'rm -f "$log"* "$summaries"' EXIT
 
 # keep_summary LABEL: what the log says of a run, for the end
 keep_summary() { grep -E '^ *Summary |^test result:' "$log" | sed "s/^ */test: $1: /" >> "$summaries" || true; }
@@ -43,12 +44,24 @@ run_alone() {
   return "$status"
 }
 
-# run_shared LABEL BINARY... -- [NAME...]: tests of these binaries whose names contain one of the NAMEs; all without
+# run_shared LABEL BINARY... -- [NAME...]: tests of these binaries whose names contain one of the NAMEs; all without. The binaries run side by side: tests that
+# share a device wait for each other's submissions. What they print appears when they have ended.
 run_shared() {
-  local label=$1 status=0 binaries=()
+  local label=$1 status=0 binaries=() binary
   shift
-  while [ "$1" != -- ]; do binaries+=("--test=$1") && shift; done
-  cargo test --locked --no-fail-fast "${binaries[@]}" "$@" 2>&1 | tee "$log" || status=$?
+  while [ "$1" != -- ]; do binaries+=("$1") && shift; done
+  cargo test --locked --no-run "${binaries[@]/#/--test=}"
+  say "${binaries[*]}, side by side"
+  for binary in "${binaries[@]}"; do
+    cargo test --locked --test="$binary" "$@" > "$log.$binary" 2>&1 && echo ok > "$log.$binary.ok" &
+  done
+  wait
+  for binary in "${binaries[@]}"; do
+    cat "$log.$binary"
+    if [ ! -f "$log.$binary.ok" ]; then status=1; fi
+  done
+  cat "${binaries[@]/#/$log.}" > "$log"
+  rm -f "$log".*
   keep_summary "$label"
   return "$status"
 }
@@ -76,6 +89,9 @@ if cargo clippy --version >/dev/null 2>&1; then
   done
 fi
 
+# rays of each set of the parity gate; a million otherwise
+if [ -z "$full" ]; then export SKYLIT_PARITY_RAYS=${SKYLIT_PARITY_RAYS-250000}; fi
+
 say "tests on the default driver"
 export SKYLIT_EXPECT_TRACERS=${SKYLIT_EXPECT_TRACERS-pipeline,query,compute}
 status=0
@@ -98,8 +114,8 @@ if [ -f "$floor" ]; then
   elif [ -n "$full" ]; then
     run_shared "floor driver" "${shared[@]}" realtime raster cli renderer -- gpu_ || status=1
   else
-    # rays of each set: rounding is the driver's, and a fifth of them shows what it does
-    export SKYLIT_PARITY_RAYS=200000
+    # rounding is the driver's, and fewer rays show what it does
+    export SKYLIT_PARITY_RAYS=100000
     run_shared "floor driver" tracer ao mitsuba raster -- gpu_ || status=1
     run_shared "floor driver" realtime cli -- tracers:: program::gpu_ || status=1
   fi

@@ -18,11 +18,17 @@ use skylit::scene::builtin::by_name;
 use skylit::scene::{Camera, Scene};
 use skylit::tracer::{Needs, Tracer, TracerKind};
 
+/// Pipelines that the shared device of a process keeps ([`Options::keep_pipelines`]): gigabytes at most.
+pub const KEPT: usize = 256;
+
+/// Is `SKYLIT_FULL` set, as by `./scripts/test.sh --full`? Tests then leave nothing out that would take long.
+pub fn is_full() -> bool {
+    std::env::var_os("SKYLIT_FULL").is_some()
+}
+
 /// The default device with the validation layer; a machine without Vulkan fails the tests: software drivers exist. All tests of a process
 /// have the same one, and compile a pipeline once between them: compiling is most of what small images cost on a CPU driver.
 pub fn device() -> Arc<Device> {
-    // gigabytes at most
-    const KEPT: usize = 256;
     static DEVICE: OnceLock<Arc<Device>> = OnceLock::new();
     DEVICE.get_or_init(|| open(Options { keep_pipelines: KEPT, ..validated() })).clone()
 }

@@ -355,15 +355,14 @@ fn compare(ours: &Estimate, judge: &Estimate) -> Verdict {
 }
 
 /// Renders all scenes with one tracer, or says that the device has none of its kind. A test each: they run side by side.
-/// Whether `./scripts/test.sh --full` asks.
-fn full() -> bool {
-    std::env::var_os("SKYLIT_FULL").is_some()
-}
-
 /// One device for all tracers. The validation layer would take a third of the time, and hear nothing that it does not hear from the tests of paths.
 fn device() -> Arc<Device> {
     static DEVICE: OnceLock<Arc<Device>> = OnceLock::new();
-    let options = || Options { keep_pipelines: 64, validation: full() && common::validated().validation, ..Options::default() };
+    let options = || Options {
+        keep_pipelines: 64,
+        validation: common::is_full() && common::validated().validation,
+        ..Options::default()
+    };
     DEVICE.get_or_init(|| common::open(options())).clone()
 }
 
@@ -378,7 +377,7 @@ fn agrees(kind: TracerKind) {
     println!(
         "scene | judge | tracer | spp | pixels that pass | largest z of a pixel | of a tile (rms) | mean: sigmas | % | +- % | s"
     );
-    let all = kind == TracerKind::Compute && tracers(&device).len() > 1 || full();
+    let all = kind == TracerKind::Compute && tracers(&device).len() > 1 || common::is_full();
     let is_wanted = |name: &str| if wanted.is_empty() { all || EACH.contains(&name) } else { wanted.contains(&name) };
     for entry in entries().iter().filter(|e| is_wanted(&e.name)) {
         if let Some(what) = entry.awaits.as_ref().filter(|_| wanted.is_empty()) {

@@ -92,9 +92,9 @@ impl Probe<'_> {
 }
 
 /// A material, its name, and what is to be known of it.
-struct Case {
-    name: &'static str,
-    material: Material,
+pub(super) struct Case {
+    pub(super) name: &'static str,
+    pub(super) material: Material,
     /// Directions may be exchanged.
     reciprocal: bool,
     /// Reflects everything that comes, or all but so much.
@@ -107,7 +107,7 @@ fn gltf(metallic: f32, roughness: f32) -> Material {
     Material { metallic, roughness, ..Material::default() }
 }
 
-fn cases() -> Vec<Case> {
+pub(super) fn cases() -> Vec<Case> {
     let case = |name, material| Case { name, material, reciprocal: true, conserves: None, eta: None };
     let coat = |factor, roughness| Clearcoat { factor, roughness, ..Default::default() };
     let sheen = |roughness| Sheen { color: Vec3::new(0.9, 0.5, 0.3), roughness, ..Default::default() };
@@ -168,7 +168,7 @@ fn cases() -> Vec<Case> {
 }
 
 /// A triangle of each material, with a tangent along x.
-fn scene(cases: &[Case]) -> Scene {
+pub(super) fn scene(cases: &[Case]) -> Scene {
     let triangle = || {
         Geometry::Triangles(TriangleMesh {
             positions: vec![Vec3::ZERO, Vec3::X, Vec3::Y],

@@ -37,7 +37,7 @@ fn gpu_filters_weigh_an_edge() {
         }
         past / all
     };
-    for kind in tracers(&device) {
+    for kind in picked(&device) {
         let tracer = tracer(&device, kind, &flat);
         for pixel_filter in [PixelFilter::Box, PixelFilter::Tent, PixelFilter::BlackmanHarris] {
             let options = PathOptions { size: [16, 16], spp: 256, max_depth: 0, pixel_filter, ..Default::default() };
@@ -66,7 +66,7 @@ fn gpu_a_lens_blurs_what_is_not_in_focus() {
     };
     let lens = Some(Lens { radius: radius as f32, focus: focus as f32 });
     let options = PathOptions { size: [size as u32; 2], spp: 64, max_depth: 0, lens, ..Default::default() };
-    for kind in tracers(&device) {
+    for kind in picked(&device) {
         let image = |distance: f64, options: &PathOptions| {
             let scene = lamp(distance);
             let flat = FlatScene::new(&scene);

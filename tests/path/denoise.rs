@@ -37,7 +37,7 @@ fn left(name: &str, spp: u32, check: impl Fn(&Film, &[f32], &Features)) -> f64 {
     let flat = FlatScene::for_paths(&scene);
     let mut reference = None;
     let mut worst = 0f64;
-    for kind in tracers(&device) {
+    for kind in picked(&device) {
         let tracer = tracer(&device, kind, &flat);
         let reference = reference.get_or_insert_with(|| render(&tracer, &flat, &options(1024, 9)).image.film.mean);
         let film = render(&tracer, &flat, &options(spp, 1)).image.film;
@@ -104,7 +104,7 @@ fn gpu_constants_stay_and_nothing_crosses_an_edge() {
         film.mean = (0..3 * pixels).map(|k| of(k / 3)).collect();
         film
     };
-    for kind in tracers(&device) {
+    for kind in picked(&device) {
         let tracer = tracer(&device, kind, &flat);
         let (image, features) = filter(&tracer, &flat, &options, &film(&|_| 7.3));
         assert!(image.iter().all(|v| (v / 7.3 - 1.0).abs() < 1e-5), "{kind}: a constant has changed");

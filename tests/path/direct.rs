@@ -52,7 +52,7 @@ fn gpu_points_spots_and_directions() {
     holds(&device, "spot, beside its axis", &beside, &options(Strategy::Mis, 16), reflected * 3.0 * 0.8 * share, 1e-3);
     let away = lit(light(spot, at, at, 3.0));
     let flat = FlatScene::new(&away);
-    for kind in tracers(&device) {
+    for kind in picked(&device) {
         let film = render(&tracer(&device, kind, &flat), &flat, &options(Strategy::Mis, 1)).image.film;
         assert!(film.mean.iter().all(|&m| m == 0.0), "{kind}: a spot that shines away");
     }
@@ -104,7 +104,7 @@ fn gpu_a_square() {
     // its back is dark, unless it has two sides
     let away = floor_and(vec![(lamp(true), emitter(4.0))]);
     let flat = FlatScene::new(&away);
-    for kind in tracers(&device) {
+    for kind in picked(&device) {
         let film = render(&tracer(&device, kind, &flat), &flat, &options(Strategy::Mis, 16)).image.film;
         assert!(film.mean.iter().all(|&m| m == 0.0), "{kind}: light from the back of a lamp");
     }
@@ -159,7 +159,7 @@ fn gpu_uniform_skies_are_sampled_as_surfaces_reflect() {
     let device = device();
     let scene = Scene { environment: Environment::Uniform(Vec3::splat(2.0)), ..floor_and(Vec::new()) };
     let flat = FlatScene::new(&scene);
-    for kind in tracers(&device) {
+    for kind in picked(&device) {
         for strategy in [Strategy::Mis, Strategy::Light] {
             let film = render(&tracer(&device, kind, &flat), &flat, &options(strategy, 1)).image.film;
             let worst = film.mean.iter().map(|&m| (f64::from(m) - RHO * 2.0).abs()).fold(0.0, f64::max);

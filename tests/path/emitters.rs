@@ -69,7 +69,7 @@ fn gpu_emitters_are_there_as_their_alpha_says() {
     for (alpha_mode, alpha) in [(AlphaMode::Blend, 0.0), (AlphaMode::Mask { cutoff: 0.5 }, 0.4)] {
         let scene = lit(alpha_mode, alpha, None);
         let flat = FlatScene::for_paths(&scene);
-        for kind in tracers(&device) {
+        for kind in picked(&device) {
             let result = render(&tracer(&device, kind, &flat), &flat, &options(Strategy::Mis, 4));
             assert!(result.image.film.mean.iter().all(|&m| m == 0.0), "{kind}: light from an emitter that is not there");
             assert_eq!(result.lights, 0, "{kind}");

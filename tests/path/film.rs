@@ -85,7 +85,7 @@ fn gpu_films_of_ambient_occlusion_go_on_too() {
     let flat = FlatScene::new(&scene);
     let size = [40, 30];
     let record = CameraRecord::new(&scene.cameras[0], flat.origin, 4.0 / 3.0);
-    for kind in tracers(&device) {
+    for kind in picked(&device) {
         let tracer = tracer(&device, kind, &flat);
         let image = |spp: u32, start: Option<FilmState>| {
             let film = FilmOptions { start: start.map(Arc::new), keep_state: true, ..Default::default() };
@@ -114,7 +114,7 @@ fn gpu_intervals_are_images_of_their_own() {
     let flat = FlatScene::new(&scene);
     let record = CameraRecord::new(&scene.cameras[0], flat.origin, 1.0);
     let base = PathOptions { size: [24, 24], spp: 12, seed: 9, max_depth: 4, ..Default::default() };
-    for kind in tracers(&device) {
+    for kind in picked(&device) {
         let tracer = tracer(&device, kind, &flat);
         let run = |options: &PathOptions| {
             let mut seen = Intervals::default();
@@ -233,7 +233,7 @@ fn gpu_a_target_is_reached_where_it_is_dear_and_where_it_is_cheap() {
     let (target, most) = (0.03, 8192);
     let film = FilmOptions { target_rmse: Some(target), ..Default::default() };
     let options = PathOptions { film, strategy: Strategy::Uniform, ..base };
-    for kind in tracers(&device) {
+    for kind in picked(&device) {
         let tracer = tracer(&device, kind, &flat);
         let image = render(&tracer, &flat, &up_to(&options, most, None)).image;
         let (least, mean, highest) = image.film.samples_range();
@@ -331,7 +331,7 @@ fn gpu_an_integrator_renders_again() {
     let scene = skylit::scene::builtin::by_name("cornell-box").unwrap();
     let flat = FlatScene::for_paths(&scene);
     let options = PathOptions { size: [16, 16], spp: 8, ..PathOptions::default() };
-    for kind in tracers(&device) {
+    for kind in picked(&device) {
         let tracer = tracer(&device, kind, &flat);
         let record = CameraRecord::new(&scene.cameras[0], flat.origin, 1.0);
         let mut integrator = path::PathIntegrator::new(&tracer, &flat, &options).unwrap();

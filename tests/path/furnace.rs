@@ -185,7 +185,7 @@ fn gpu_compensated_white_disappears() {
         let flat = FlatScene::for_paths(&scene);
         // light that goes round and round in a body: without roulette there is less noise
         let options = PathOptions { rr_depth: 256, max_depth: 256, ..options(spp, Strategy::Mis) };
-        for kind in tracers(&device) {
+        for kind in picked(&device) {
             let tracer = Tracer::new(&device, kind, &flat, needs).unwrap();
             let (mean, error) = mean_of(&render(&tracer, &flat, &options).image.film);
             println!("{what}, {kind}: {mean:.5} +- {error:.5}");

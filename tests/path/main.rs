@@ -23,21 +23,30 @@ mod portals;
 mod shading_normals;
 mod texture_filter;
 mod transport;
+mod validation;
 mod whitted;
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
-use common::{assert_validation_clean, device, tracers};
+use common::{assert_validation_clean, tracers};
 use glam::{DAffine3, DVec3, Vec3};
 use skylit::accel::flatten::FlatScene;
 use skylit::film::Film;
 use skylit::film::NoControl;
 use skylit::film::camera::CameraRecord;
-use skylit::gpu::Device;
+use skylit::gpu::{Device, Options};
 use skylit::integrators::path::{self, PathOptions, PathResult, Strategy};
 use skylit::scene::material::MaterialKind;
 use skylit::scene::{Camera, Environment, Geometry, Instance, Light, LightKind, Material, Mesh, Scene};
 use skylit::tracer::{Needs, Tracer, TracerKind};
+
+/// The device that the tests of this folder share; with the validation layer if `SKYLIT_FULL` is set. Without it the test in validation.rs has the layer, for
+/// all of them.
+fn device() -> Arc<Device> {
+    static DEVICE: OnceLock<Arc<Device>> = OnceLock::new();
+    let validation = common::is_full() && common::validated().validation;
+    DEVICE.get_or_init(|| common::open(Options { keep_pipelines: common::KEPT, validation, ..Options::default() })).clone()
+}
 
 /// A scene of shapes with a material each.
 fn scene_of(parts: Vec<(Geometry, Material)>, camera: Camera) -> Scene {
@@ -82,7 +91,21 @@ fn mean_of(film: &Film) -> (f64, f64) {
     (mean, (variance / n).sqrt())
 }
 
-/// Holds the mean of an image that should be `expected` all over against it, on every tracer; strategies that are for comparison on one:
+/// The tracer of a test, which its name picks. With `SKYLIT_FULL` set, all of them.
+///
+/// Tracers share the code that shades, and the compute tracer renders all scenes of tests/mitsuba. Images here are small, and compiling the kernels of a
+/// scene's features is what they cost on a CPU driver, for each tracer anew. What compares tracers asks for all ([`tracers`]).
+fn picked(device: &Device) -> Vec<TracerKind> {
+    let all = tracers(device);
+    if common::is_full() {
+        return all;
+    }
+    // a test is a thread of its name
+    let name: usize = std::thread::current().name().map_or(0, |n| n.bytes().map(usize::from).sum());
+    vec![all[name % all.len()]]
+}
+
+/// Holds the mean of an image that should be `expected` all over against it, on the test's tracer ([`picked`]); strategies that are for comparison on one:
 /// they are the same code on all. `precision`: the standard error, relative, that the image must reach to say anything.
 fn holds(device: &Arc<Device>, what: &str, scene: &Scene, options: &PathOptions, expected: f64, precision: f64) {
     holds_but_for(2e-6, device, what, scene, options, expected, precision);
@@ -98,8 +121,7 @@ fn holds_but_for(
     expected: f64,
     precision: f64,
 ) {
-    let all = tracers(device).into_iter();
-    let kinds: Vec<_> = all.filter(|&k| options.strategy == Strategy::Mis || k == TracerKind::Compute).collect();
+    let kinds = if options.strategy == Strategy::Mis { picked(device) } else { vec![TracerKind::Compute] };
     holds_with(&kinds, rounding, device, what, scene, options, expected, precision);
 }
 

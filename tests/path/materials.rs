@@ -147,7 +147,7 @@ fn gpu_shading_normals_make_no_light() {
         ..scene_of(vec![(Geometry::Triangles(ball), matte(1.0))], ahead())
     };
     let flat = FlatScene::for_paths(&scene);
-    for kind in tracers(&device) {
+    for kind in picked(&device) {
         let film = render(&tracer(&device, kind, &flat), &flat, &options(256)).image.film;
         let (mean, error) = mean_of(&film);
         println!("coarse ball, {kind}: {mean:.4} +- {error:.4}");
@@ -193,7 +193,7 @@ fn gpu_deep_texels() {
     let mapped = Material { normal_texture: slot, ..Material::default() };
     let straight = with(vec![32768u16, 32768, 65535, 65535].into(), Filter::Linear, mapped);
     let flat = FlatScene::for_paths(&straight);
-    for kind in tracers(&device) {
+    for kind in picked(&device) {
         let view = PathOptions { view: Some(View::Normals), ..options(2) };
         let film = render(&tracer(&device, kind, &flat), &flat, &view).image.film;
         let off = film.mean.chunks(3).map(|p| (Vec3::from_slice(p) - Vec3::Z).length()).fold(0.0, f32::max);
@@ -250,7 +250,7 @@ fn gpu_normal_maps_follow_tangents() {
                 scene.instances.push(Instance { name: String::new(), mesh: 0, object_to_world: far });
             }
             let flat = FlatScene::for_paths(&scene);
-            for kind in tracers(&device) {
+            for kind in picked(&device) {
                 let options = PathOptions { view: Some(View::Normals), size: [4, 4], spp: 2, ..options(1) };
                 let film = render(&tracer(&device, kind, &flat), &flat, &options).image.film;
                 for pixel in film.mean.chunks(3) {
@@ -301,7 +301,7 @@ fn gpu_anisotropy_without_texture_coordinates() {
     let ball = Geometry::Spheres(vec![Sphere { center: Vec3::ZERO, radius: 1.0 }]);
     let mut spheres = scene_of(vec![(ball, file.materials[0].clone())], ahead());
     spheres.lights.push(light);
-    for kind in tracers(&device) {
+    for kind in picked(&device) {
         let film = |scene: &Scene| {
             let flat = FlatScene::for_paths(scene);
             render(&tracer(&device, kind, &flat), &flat, &options(4)).image.film
@@ -323,7 +323,7 @@ fn gpu_views_show_surfaces() {
     let colour = Material { base_color: Vec4::new(0.2, 0.5, 0.8, 1.0), ..Material::default() };
     let scene = scene_of(vec![(sheet(0.0), colour)], ahead());
     let flat = FlatScene::for_paths(&scene);
-    for kind in tracers(&device) {
+    for kind in picked(&device) {
         let tracer = tracer(&device, kind, &flat);
         let of =
             |view| render(&tracer, &flat, &PathOptions { view: Some(view), size: [8, 8], spp: 4, ..options(1) }).image.film;

@@ -78,7 +78,7 @@ fn gpu_levels_of_deep_textures() {
         let image = Texture { texels, ..texture(8, 8, |_, _| grey(0)) };
         let scene = wall(image, 4.0);
         let flat = FlatScene::for_paths(&scene);
-        for kind in tracers(&device) {
+        for kind in picked(&device) {
             let film = render(&with_levels(&device, kind, &flat), &flat, &albedo(4, TextureFilter::RayCone)).image.film;
             for pixel in film.mean.chunks(3) {
                 for (found, expected) in pixel.iter().zip(expected) {
@@ -115,7 +115,7 @@ fn gpu_cones_see_a_checkered_plane_with_less_noise() {
         &flat,
         &sized(PathOptions { seed: 91, ..albedo(4096, TextureFilter::Bilinear) }),
     );
-    for kind in tracers(&device) {
+    for kind in picked(&device) {
         let tracer = with_levels(&device, kind, &flat);
         let of = |spp, filter| render(&tracer, &flat, &sized(albedo(spp, filter))).image.film;
         let [points, cones] = [TextureFilter::Bilinear, TextureFilter::RayCone].map(|f| of(1, f));
@@ -139,7 +139,7 @@ fn gpu_what_is_magnified_or_constant_stays_as_it_was() {
     let constant = wall(texture(64, 64, |_, _| [37, 150, 201, 255]), 2.0);
     for (what, scene, bound) in [("magnified", near, 1e-6), ("constant", constant, 1e-5)] {
         let flat = FlatScene::for_paths(&scene);
-        for kind in tracers(&device) {
+        for kind in picked(&device) {
             let tracer = with_levels(&device, kind, &flat);
             let [points, cones] =
                 [TextureFilter::Bilinear, TextureFilter::RayCone].map(|f| render(&tracer, &flat, &albedo(2, f)).image.film);
@@ -172,7 +172,7 @@ fn gpu_averages_are_those_of_what_texels_mean() {
         ("what is there", masked, View::Albedo, 1.0),
     ] {
         let flat = FlatScene::for_paths(&scene);
-        for kind in tracers(&device) {
+        for kind in picked(&device) {
             let film = render(
                 &with_levels(&device, kind, &flat),
                 &flat,
@@ -207,7 +207,7 @@ fn gpu_mirrors_keep_cones() {
         camera,
     );
     let image = texture(32, 32, |x, y| grey(if (x.min(31 - x) / 4 + y.min(31 - y) / 4).is_multiple_of(2) { 250 } else { 5 }));
-    for kind in tracers(&device) {
+    for kind in picked(&device) {
         let of = |scene: &Scene, filter: TextureFilter| {
             let scene = Scene { textures: vec![image.clone()], ..scene.clone() };
             let flat = FlatScene::for_paths(&scene);
@@ -286,7 +286,7 @@ fn gpu_mip_levels_exist_when_required() {
     let device = device();
     let scene = plane();
     let flat = FlatScene::for_paths(&scene);
-    for kind in tracers(&device) {
+    for kind in picked(&device) {
         let (without, with) = (tracer(&device, kind, &flat), with_levels(&device, kind, &flat));
         let (a, b) = (without.stats(), with.stats());
         assert_eq!((a.mip_levels, a.mip_bytes), (0, 0), "{kind}");

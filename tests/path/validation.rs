@@ -1,0 +1,156 @@
+//! Kernels of all features under the validation layer: it checks the SPIR-V of every kernel with the features that are switched on, which takes longer than
+//! compiling it. The other tests of this folder have the layer with `SKYLIT_FULL` (`./scripts/test.sh --full`).
+
+use super::*;
+use crate::common::new_device;
+use glam::Affine2;
+use skylit::accel::features::SceneFeatures;
+use skylit::integrators::path::{Lens, PixelFilter, TextureFilter, View};
+use skylit::interface::{BsdfModel, LightKind as Kind, MaterialFeature, PathFeature, TextureFeature};
+use skylit::scene::builtin::shapes;
+use skylit::scene::material::{AlphaMode, Anisotropy, Clearcoat, Sheen, Specular, TextureSlot, Transmission};
+use skylit::scene::{EnvironmentMap, Filter, Portal, Sphere, Texture, Wrap};
+
+/// All BSDFs, textures in all slots, alpha of both kinds, and lights of all kinds: so many that a tree chooses among them.
+fn everything() -> Scene {
+    let mut scene = bsdf::scene(&bsdf::cases());
+    let slot = Some(TextureSlot { texture: 0, texcoord: 0, transform: Affine2::IDENTITY });
+    let textured = Material {
+        base_color_texture: slot,
+        metallic_roughness_texture: slot,
+        emissive: Vec3::ONE,
+        emissive_texture: slot,
+        normal_texture: slot,
+        occlusion_texture: slot,
+        clearcoat: Clearcoat {
+            factor: 0.5,
+            texture: slot,
+            roughness_texture: slot,
+            normal_texture: slot,
+            ..Default::default()
+        },
+        sheen: Sheen { color: Vec3::ONE, color_texture: slot, roughness_texture: slot, ..Default::default() },
+        transmission: Transmission { factor: 0.5, texture: slot, ..Default::default() },
+        specular: Specular { texture: slot, color_texture: slot, ..Default::default() },
+        anisotropy: Anisotropy { strength: 0.5, texture: slot, ..Default::default() },
+        alpha_mode: AlphaMode::Blend,
+        ..Material::default()
+    };
+    let body = Transmission {
+        factor: 1.0,
+        thickness: 1.0,
+        attenuation_color: Vec3::splat(0.5),
+        attenuation_distance: 1.0,
+        ..Default::default()
+    };
+    let masked = Material { base_color_texture: slot, alpha_mode: AlphaMode::Mask { cutoff: 0.5 }, ..matte(0.5) };
+    let sphere = Geometry::Spheres(vec![Sphere { center: Vec3::new(0.0, 2.0, -1.0), radius: 0.5 }]);
+    let at = |y: f64| shapes::rectangle(DVec3::new(0.0, y, -0.5), DVec3::X, DVec3::Z);
+    let triangle = scene.meshes[0].geometry.clone();
+    for (geometry, material) in [
+        (triangle.clone(), textured),
+        (triangle.clone(), masked),
+        (triangle.clone(), Material { transmission: body, roughness: 0.3, ..Material::default() }),
+        (triangle.clone(), Material { unlit: true, ..Material::default() }),
+        (triangle, emitter(1.0)),
+        (at(3.0), emitter(1.0)),
+        (sphere, emitter(1.0)),
+    ] {
+        let mesh = scene.meshes.len();
+        scene.materials.push(material);
+        scene.meshes.push(Mesh { name: String::new(), geometry, material: mesh });
+        scene.instances.push(Instance { name: String::new(), mesh, object_to_world: DAffine3::IDENTITY });
+    }
+    // 16 bits a channel, half of it transparent
+    let texels: Vec<u16> = (0..16u16).flat_map(|k| [30000, 30000, 60000, 4000 * k]).collect();
+    scene.textures.push(Texture {
+        name: String::new(),
+        width: 4,
+        height: 4,
+        texels: texels.into(),
+        wrap: [Wrap::Repeat; 2],
+        filter: Filter::Linear,
+    });
+    let light = |kind| Light {
+        name: String::new(),
+        kind,
+        intensity: Vec3::ONE,
+        position: DVec3::Y * 2.0,
+        direction: DVec3::NEG_Y,
+        range: f64::INFINITY,
+    };
+    scene.lights = vec![LightKind::Spot { inner_angle: 0.1, outer_angle: 0.5 }, LightKind::Directional { angle: 0.01 }]
+        .into_iter()
+        .chain(std::iter::repeat_n(LightKind::Point, 300))
+        .map(light)
+        .collect();
+    scene.portals = vec![Portal { corner: DVec3::new(-1.0, 4.0, -1.0), edges: [DVec3::X * 2.0, DVec3::Z * 2.0] }];
+    scene.environment = Environment::Map(EnvironmentMap {
+        name: String::new(),
+        width: 8,
+        height: 4,
+        radiance: vec![Vec3::ONE; 32].into(),
+        factor: Vec3::ONE,
+        to_map: glam::DMat3::IDENTITY,
+    });
+    scene
+}
+
+#[test]
+fn gpu_kernels_of_all_features_are_valid() {
+    let device = new_device();
+    let base = PathOptions { size: [8, 8], spp: 1, max_depth: 3, ..Default::default() };
+    let whole = PathOptions {
+        firefly_clamp: 10.0,
+        min_depth: 1,
+        lens: Some(Lens { radius: 0.01, focus: 1.0 }),
+        pixel_filter: PixelFilter::Tent,
+        texture_filter: TextureFilter::RayCone,
+        ..base.clone()
+    };
+    let all_needs = Needs { shading: true, compensation: true, mip_levels: true, baked_occlusion: true, ..Needs::default() };
+    let white = Needs { white: true, ..all_needs };
+    let mut seen = (Vec::new(), Vec::new(), Vec::new(), Vec::new(), Vec::new());
+    let mut holds = |kinds: &[TracerKind], scene: &Scene, needs: Needs, options: &PathOptions| {
+        let flat = FlatScene::for_paths(scene);
+        for &kind in kinds {
+            let tracer = Tracer::new(&device, kind, &flat, needs).unwrap();
+            let result = render(&tracer, &flat, options);
+            assert_validation_clean(&device);
+            let shading = tracer.features().shading.unwrap();
+            seen.0.extend(BsdfModel::ALL.iter().filter(|&&f| shading.bsdfs.contains(f)));
+            seen.1.extend(MaterialFeature::ALL.iter().filter(|&&f| shading.materials.contains(f)));
+            seen.2.extend(TextureFeature::ALL.iter().filter(|&&f| shading.textures.contains(f)));
+            seen.3.extend(PathFeature::ALL.iter().filter(|&&f| result.features.contains(f)));
+            seen.4.extend(Kind::ALL.iter().filter(|&&f| result.light_kinds.contains(f)));
+        }
+    };
+    let scene = everything();
+    let features = SceneFeatures::of(&FlatScene::for_paths(&scene));
+    assert!(features.alpha && features.stochastic_alpha && features.spheres && features.deep_texels, "{features:?}");
+    holds(&tracers(&device), &scene, all_needs, &whole);
+    // what excludes something of these, with as little else as there can be
+    let little = scene_of(vec![(shapes::floor(DVec3::ZERO, 1.0), matte(0.5))], scene.cameras[0].clone());
+    let little = Scene { environment: Environment::Uniform(Vec3::ONE), ..little };
+    for options in [
+        PathOptions { strategy: Strategy::Light, ..base.clone() },
+        PathOptions { strategy: Strategy::Cosine, ..base.clone() },
+        PathOptions { strategy: Strategy::Uniform, ..base.clone() },
+        PathOptions { specular_only: true, ..base.clone() },
+        PathOptions { view: Some(View::Normals), ..base.clone() },
+    ] {
+        holds(&[TracerKind::Compute], &little, all_needs, &options);
+    }
+    holds(&[TracerKind::Compute], &little, white, &PathOptions { white_sky: Some(0.5), ..base });
+    let all_are_in = |what: &str, missing: Vec<String>| assert!(missing.is_empty(), "{what} of no image: {missing:?}");
+    macro_rules! missing {
+        ($set:expr, $feature:ty) => {
+            <$feature>::ALL.iter().filter(|f| !$set.contains(f)).map(|f| f.label().to_owned()).collect()
+        };
+    }
+    all_are_in("BSDFs", missing!(seen.0, BsdfModel));
+    all_are_in("features of materials", missing!(seen.1, MaterialFeature));
+    all_are_in("textures", missing!(seen.2, TextureFeature));
+    all_are_in("features of paths", missing!(seen.3, PathFeature));
+    all_are_in("kinds of lights", missing!(seen.4, Kind));
+}
