@@ -89,9 +89,11 @@ MaterialTextures look_up(Surface s, PartRecord part, float log_side) {
     MaterialTextures found;
     const uint SRGB = 1u << USE_EMISSION | 1u << USE_SHEEN | 1u << USE_SPECULAR_COLOR;
     uint m = part.material;
+    [[unroll]] for (uint use = 0u; use < TEXTURE_FEATURES_COUNT; use++) found.at[use] = vec4(1.0);
+    // drivers compile a copy of the body below for every texture before they find that no material has it
+    if (TEXTURE_FEATURES_0 == 0u) return found;
     // all places are constants once it is unrolled: CPU drivers write to others lane by lane
     [[unroll]] for (uint use = 0u; use < TEXTURE_FEATURES_COUNT; use++) {
-        found.at[use] = vec4(1.0);
         uint kind = (SRGB >> use & 1u) != 0u ? TEXELS_SRGB : TEXELS_LINEAR;
         if (has_use(use)) found.at[use] = sample_use(SHADING_OF(m).uses[use], part, s.primitive, s.uv, kind, log_side);
     }

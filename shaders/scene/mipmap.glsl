@@ -35,20 +35,23 @@ vec4 sample_level(uint index, TextureRecord texture, vec2 uv, uint kind, uint le
 vec4 sample_mipmap(uint index, vec2 uv, uint kind, float lod) {
     MipRecords mips = MipRecords(SceneRoot(push.scene).mips);
     // also for NaN
-    if (!(lod > 0.0) || mips.v[index].last == 0u) return sample_texture(index, uv, kind != TEXELS_LINEAR);
-    TextureRecord texture = TextureRecords(SceneRoot(push.scene).textures).v[index];
-    float whole = min(lod, float(mips.v[index].last));
-    uint level = uint(whole);
-    float above = whole - float(level);
-    vec4 c = vec4(0.0);
-    // a loop, so that the code exists once for both levels
-    [[dont_unroll]] for (uint k = 0u; k < 2u; k++) {
-        float weight = k == 0u ? 1.0 - above : above;
-        if (weight > 0.0) c += weight * sample_level(index, texture, uv, kind, level + k);
+    bool plain = !(lod > 0.0) || mips.v[index].last == 0u;
+    if (!plain) {
+        TextureRecord texture = TextureRecords(SceneRoot(push.scene).textures).v[index];
+        float whole = min(lod, float(mips.v[index].last));
+        uint level = uint(whole);
+        float above = whole - float(level);
+        vec4 c = vec4(0.0);
+        // a loop, so that the code exists once for both levels
+        [[dont_unroll]] for (uint k = 0u; k < 2u; k++) {
+            float weight = k == 0u ? 1.0 - above : above;
+            if (weight > 0.0) c += weight * sample_level(index, texture, uv, kind, level + k);
+        }
+        if (kind != TEXELS_COVERED) return c;
+        // what is seen here, but not there on average, has a colour of its own: the texture's
+        if (c.a > 0.0) return vec4(c.rgb / c.a, c.a);
     }
-    if (kind != TEXELS_COVERED) return c;
-    // what is seen here, but not there on average, has a colour of its own
-    return c.a > 0.0 ? vec4(c.rgb / c.a, c.a) : sample_texture(index, uv, true);
+    return sample_texture(index, uv, kind != TEXELS_LINEAR);
 }
 
 #endif

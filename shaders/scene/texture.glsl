@@ -8,20 +8,17 @@
 uint wrap_texel(int i, uint size, uint mode) {
     int n = int(size);
     if (mode == WRAP_CLAMP) return uint(clamp(i, 0, n - 1));
-    if (mode == WRAP_MIRROR) {
-        int m = i % (2 * n);
-        m += m < 0 ? 2 * n : 0;
-        return uint(m < n ? m : 2 * n - 1 - m);
-    }
-    int m = i % n;
-    return uint(m < 0 ? m + n : m);
+    int period = mode == WRAP_MIRROR ? 2 * n : n;
+    int m = i % period;
+    m += m < 0 ? period : 0;
+    // in the mirrored half
+    return uint(m < n ? m : 2 * n - 1 - m);
 }
 
 vec4 unorm16(uvec2 rgba) { return vec4(unpackUnorm2x16(rgba.x), unpackUnorm2x16(rgba.y)); }
 
-// One texel as stored, without decoding sRGB.
-vec4 texel(TextureRecord texture, int x, int y) {
-    uint i = wrap_texel(y, texture.height, texture.wrap_v) * texture.width + wrap_texel(x, texture.width, texture.wrap_u);
+// Texel i as stored, without decoding sRGB.
+vec4 texel(TextureRecord texture, uint i) {
     if (HAS_DEEP_TEXELS) {
         if (texture.format == FORMAT_UNORM16) return unorm16(Pairs(texture.texels).v[i]);
         if (texture.format == FORMAT_FLOAT) return uintBitsToFloat(Quads(texture.texels).v[i]);
@@ -29,8 +26,8 @@ vec4 texel(TextureRecord texture, int x, int y) {
     return unpackUnorm4x8(Words(texture.texels).v[i]);
 }
 
-vec4 decoded_texel(TextureRecord texture, int x, int y, bool srgb) {
-    vec4 c = texel(texture, x, y);
+vec4 decoded_texel(TextureRecord texture, uint i, bool srgb) {
+    vec4 c = texel(texture, i);
     bool encoded = srgb && !(HAS_DEEP_TEXELS && texture.format == FORMAT_FLOAT);
     return encoded ? vec4(srgb_decode(c.rgb), c.a) : c;
 }
@@ -45,17 +42,18 @@ vec2 fold(vec2 uv, TextureRecord texture) {
 // Filtered value at uv (v down). sRGB is decoded before filtering.
 vec4 sample_texture(uint index, vec2 uv, bool srgb) {
     TextureRecord texture = TextureRecords(SceneRoot(push.scene).textures).v[index];
+    bool nearest = texture.nearest != 0u;
     vec2 p = fold(uv, texture) * vec2(texture.width, texture.height);
-    if (texture.nearest != 0u) {
-        ivec2 i = ivec2(floor(p));
-        return decoded_texel(texture, i.x, i.y, srgb);
-    }
-    p -= 0.5;
+    if (!nearest) p -= 0.5;
     ivec2 i = ivec2(floor(p));
+    uint x = wrap_texel(i.x, texture.width, texture.wrap_u), y = texture.width * wrap_texel(i.y, texture.height, texture.wrap_v);
+    vec4 first = decoded_texel(texture, y + x, srgb);
+    if (nearest) return first;
+    uint x1 = wrap_texel(i.x + 1, texture.width, texture.wrap_u), y1 = texture.width * wrap_texel(i.y + 1, texture.height, texture.wrap_v);
     vec2 f = p - vec2(i);
     return mix(
-        mix(decoded_texel(texture, i.x, i.y, srgb), decoded_texel(texture, i.x + 1, i.y, srgb), f.x),
-        mix(decoded_texel(texture, i.x, i.y + 1, srgb), decoded_texel(texture, i.x + 1, i.y + 1, srgb), f.x),
+        mix(first, decoded_texel(texture, y + x1, srgb), f.x),
+        mix(decoded_texel(texture, y1 + x, srgb), decoded_texel(texture, y1 + x1, srgb), f.x),
         f.y);
 }
 

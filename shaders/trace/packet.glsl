@@ -294,14 +294,26 @@ void main() {
     }
 
     if (!finished && lane == 0u) atomicAdd(Counter(root.unfinished).v, 1u);
-    FOR_RAYS {
-        uint k = first + uint(j) * SUBGROUP_SIZE;
+    // not unrolled: the stream's code, which may be all of a path's, exists once. Places in arrays stay constants, as CPU drivers keep arrays with others in memory.
+    [[dont_unroll]] for (int ray = 0; ray < PACKET_RAYS; ray++) {
+        uint k = first + uint(ray) * SUBGROUP_SIZE;
         if (k < count) {
+            uint hit_instance = best_instance[0], hit_primitive = best_primitive[0];
+            float hit_t = best[0];
+            vec2 hit_uv = best_uv[0];
+            FOR_RAYS {
+                if (j == ray) {
+                    hit_instance = best_instance[j];
+                    hit_primitive = best_primitive[j];
+                    hit_t = best[j];
+                    hit_uv = best_uv[j];
+                }
+            }
 #ifdef STREAM_ANY
-            any(push.first + k, best_primitive[j] != INVALID);
+            any(push.first + k, hit_primitive != INVALID);
 #else
             Hit hit = miss();
-            if (best_primitive[j] != INVALID) hit = scene_hit(best[j], best_instance[j], best_primitive[j], best_uv[j]);
+            if (hit_primitive != INVALID) hit = scene_hit(hit_t, hit_instance, hit_primitive, hit_uv);
             closest(push.first + k, hit);
 #endif
         }

@@ -1,4 +1,5 @@
-//! The parity gate: one ray set through every tracer and the f64 oracle. Rays per scene: at least a million.
+//! The parity gate: one ray set through every tracer and the f64 oracle. Rays per scene: at least a million with `./scripts/test.sh --full` and by itself, a quarter of
+//! them in continuous integration.
 
 use skylit::accel::BuildPreset;
 use skylit::accel::flatten::FlatScene;
