@@ -30,7 +30,8 @@ say() { printf 'test: %s\n' "$*"; }
 
 log=$(mktemp)
 summaries=$(mktemp)
-trap 'rm -f "$log"* "$summaries"' EXIT
+# jobs in the background do not get Ctrl-C, and their tests are processes of their own
+trap 'for job in $(jobs -p); do kill -- "-$job" 2>/dev/null || true; done; rm -f "$log"* "$summaries"' EXIT
 
 # keep_summary LABEL: what the log says of a run, for the end
 keep_summary() { grep -E '^ *Summary |^test result:' "$log" | sed "s/^ */test: $1: /" >> "$summaries" || true; }
@@ -52,9 +53,12 @@ run_shared() {
   while [ "$1" != -- ]; do binaries+=("$1") && shift; done
   cargo test --locked --no-run "${binaries[@]/#/--test=}"
   say "${binaries[*]}, side by side"
+  # a process group for each, so that all of it can be ended
+  set -m
   for binary in "${binaries[@]}"; do
     cargo test --locked --test="$binary" "$@" > "$log.$binary" 2>&1 && echo ok > "$log.$binary.ok" &
   done
+  set +m
   wait
   for binary in "${binaries[@]}"; do
     cat "$log.$binary"

@@ -355,7 +355,7 @@ fn compare(ours: &Estimate, judge: &Estimate) -> Verdict {
 }
 
 /// Renders all scenes with one tracer, or says that the device has none of its kind. A test each: they run side by side.
-/// One device for all tracers. The validation layer would take a third of the time, and hear nothing that it does not hear from the tests of paths.
+/// One device for all tracers. The validation layer would take a third of the time, and hear nothing that it does not hear in tests/path/validation.rs.
 fn device() -> Arc<Device> {
     static DEVICE: OnceLock<Arc<Device>> = OnceLock::new();
     let options = || Options {
