@@ -67,7 +67,7 @@ fn gpu_rough_surfaces_reflect_as_a_second_implementation_says() {
         assert!((expected - f64::from(albedo)).abs() > 1e-3, "{what}: as smooth as Lambert");
         let (scene, options) = (plane(rough(albedo, sigma), cos_o), options(512, Strategy::Mis));
         // the paper's polynomial for the directional albedo is exact to 0.1 %
-        holds_with(&picked(&device), 1e-3, &device, &what, &scene, &options, expected, 3e-3);
+        holds_with(&tracers(&device), 1e-3, &device, &what, &scene, &options, expected, 3e-3);
     }
 }
 
