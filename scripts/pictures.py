@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
-"""Makes the pictures of the README: one view of the stairs as real-time ambient occlusion, as a path tracer sees it, and how far apart the two are.
+"""Makes the pictures of the README: one view of the stairs as real-time ambient occlusion, as a path tracer sees it, and how far apart the two are; and the viewer.
 
-    python3 scripts/pictures.py [SKYLIT]        # the program, target/release/skylit unless given; about a minute on two cores
+    python3 scripts/pictures.py [SKYLIT]        # the program, target/release/skylit unless given; five minutes on two cores
 
 They go to docs/images. Python's own library is enough. The difference is that of the two PNGs' linear values: orange where ambient occlusion is darker than
 the path-traced image, blue where it is brighter, white where they agree, and full colour at a difference of 0.25."""
@@ -11,12 +11,35 @@ from __future__ import annotations
 import struct
 import subprocess
 import sys
+import tempfile
 import zlib
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 VIEW = ["builtin:stairs", "--size", "360x270", "--eye=-2.2,2.4,6", "--target=-0.3,0.8,0", "--fov-y", "36"]
 FULL = 0.25
+# pictures of the viewer, and the scripts that make them
+VIEWER = {
+    "viewer": (
+        ["scenes/courtyard.gltf", "--size", "1160x640"],
+        """wait picture
+click Comparison with the truth
+key X
+wait settled 300
+screenshot FILE
+""",
+    ),
+    "viewer-path": (
+        ["scenes/courtyard.gltf", "--size", "1160x640", "--integrator", "path", "--environment", "0.9,1.0,1.2", "--light",
+         "sun direction=-0.5,-1,-0.35 irradiance=4", "--tone-map", "agx", "--exposure", "-0.7"],
+        """wait picture
+wait 90
+click Performance
+wait 2
+screenshot FILE
+""",
+    ),
+}
 
 
 def read(path: Path) -> tuple[int, int, list[bytes]]:
@@ -95,6 +118,11 @@ def main() -> None:
             row += bytes(srgb(1 + (v - 1) * weight) for v in full)
         rows.append(bytes(row))
     write(folder / "difference.png", width, height, rows)
+    for name, (options, script) in VIEWER.items():
+        with tempfile.NamedTemporaryFile("w", suffix=".txt") as file:
+            file.write(script.replace("FILE", str(folder / f"{name}.png")))
+            file.flush()
+            subprocess.run([skylit, "view", *options, "--headless-script", file.name, "--quiet"], check=True, cwd=ROOT)
 
 
 if __name__ == "__main__":

@@ -7,6 +7,7 @@
 # On Debian 12 it installs, with apt:
 #   Vulkan loader, validation layer, vulkan-tools    to run and to test
 #   libshaderc-dev, glslang-dev, spirv-tools         the shader compiler that build.rs links
+#   Xvfb, xdotool, libraries of X11                  to open the viewer's window and to test it; nothing else needs a display
 #   Mesa 25.0 lavapipe from bookworm-backports       all three tracers on the CPU
 # and unpacks Debian's own Mesa 22.3.6 lavapipe beside it (target/drivers/mesa-22.3.6), which is the floor that the compute
 # tracer must run on. The mirror is the one the machine's own apt sources name.
@@ -47,6 +48,8 @@ update_once() { [ "$updated" = 1 ] && return 0; say "refreshing the package list
 
 # --- build and run-time packages -------------------------------------------------------------------------------------
 packages=(g++ pkg-config libvulkan1 vulkan-validationlayers vulkan-tools libshaderc-dev glslang-dev spirv-tools)
+# the viewer's window on X11, which is loaded when it opens, and a display without a screen with a hand for its mouse and keys, to test it
+packages+=(libx11-xcb1 libxcursor1 libxi6 libxkbcommon-x11-0 xvfb xauth xdotool)
 missing=()
 for p in "${packages[@]}"; do installed "$p" || missing+=("$p"); done
 if [ ${#missing[@]} -gt 0 ]; then

@@ -54,6 +54,8 @@ pub mod shaders;
 #[cfg(feature = "cli")]
 pub mod terminal;
 pub mod tracer;
+#[cfg(feature = "viewer")]
+pub mod viewer;
 
 pub use error::{Error, Result};
 pub use renderer::Renderer;

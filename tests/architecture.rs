@@ -26,7 +26,7 @@ const LAYERS: &[&[&str]] = &[
     &["denoise"],
     &["renderer"],
     &["terminal"],
-    &["bench"],
+    &["bench", "viewer"],
     &["cli"],
 ];
 

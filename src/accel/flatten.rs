@@ -99,8 +99,16 @@ impl<'a> FlatScene<'a> {
     /// # Errors
     /// [`crate::Error::Usage`] when `motion` names an instance or mesh that does not exist, or asks spheres to deform.
     pub fn with_motion(scene: &'a Scene, motion: Motion) -> Result<Self> {
+        Self::with_motion_and_blend(scene, motion, Blend::Masked)
+    }
+
+    /// As [`FlatScene::with_motion`], with an interpretation of alpha blending.
+    ///
+    /// # Errors
+    /// As [`FlatScene::with_motion`].
+    pub fn with_motion_and_blend(scene: &'a Scene, motion: Motion, blend: Blend) -> Result<Self> {
         motion.check(scene)?;
-        Ok(Self::group(scene, motion, Blend::Masked))
+        Ok(Self::group(scene, motion, blend))
     }
 
     fn group(scene: &'a Scene, motion: Motion, blend: Blend) -> Self {

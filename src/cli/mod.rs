@@ -8,6 +8,8 @@ mod export;
 mod rays;
 mod render;
 mod scenes;
+#[cfg(feature = "viewer")]
+mod view;
 
 use std::ffi::OsString;
 use std::process::ExitCode;
@@ -45,6 +47,9 @@ struct Cli {
 enum Command {
     /// Render the ambient occlusion of a scene: an image, or frames in real time
     Render(Box<render::RenderArgs>),
+    /// Look at a scene in a window while it is traced
+    #[cfg(feature = "viewer")]
+    View(Box<view::ViewArgs>),
     /// Trace a set of rays against a mesh and report the ray throughput
     Rays(args::RaysArgs),
     /// Write a scene as glTF (.glb, .gltf) or as a world-space triangle soup (.bin)
@@ -70,7 +75,7 @@ fn run_from(arguments: Vec<OsString>) -> ExitCode {
     // before parsing: usage errors must be reported as JSON, too
     let json = arguments.iter().any(|a| a == "--json");
     panic::install();
-    let outcome = panic::catch(|| match Cli::try_parse_from(arguments) {
+    let outcome = panic::catch(|| match Cli::try_parse_from(with_view(arguments)) {
         Ok(cli) => dispatch(cli.command, start),
         Err(e) => explain(&e).map_err(Failure::from),
     });
@@ -87,9 +92,29 @@ fn run_from(arguments: Vec<OsString>) -> ExitCode {
     ExitCode::from(code)
 }
 
+/// Adds the command `view` where none is given: `skylit` alone, on a machine with a display, and `skylit SCENE`.
+fn with_view(mut arguments: Vec<OsString>) -> Vec<OsString> {
+    #[cfg(feature = "viewer")]
+    {
+        let has_display = || ["DISPLAY", "WAYLAND_DISPLAY"].iter().any(|v| std::env::var_os(v).is_some_and(|v| !v.is_empty()));
+        let is_view = match arguments.get(1).map(|a| a.to_string_lossy()) {
+            None => has_display(),
+            Some(first) => !first.starts_with('-') && view::is_scene(&first),
+        };
+        if is_view {
+            arguments.insert(1.min(arguments.len()), "view".into());
+        }
+    }
+    #[cfg(not(feature = "viewer"))]
+    let _ = &mut arguments;
+    arguments
+}
+
 fn dispatch(command: Command, start: Instant) -> Result<(), Failure> {
     match command {
         Command::Render(args) => return render::run(&args, start),
+        #[cfg(feature = "viewer")]
+        Command::View(args) => return view::run(&args),
         Command::Rays(args) => rays::run(&args),
         Command::Export(args) => export::run(&args),
         Command::Scenes(args) => scenes::run(&args),
@@ -125,6 +150,20 @@ mod tests {
     #[test]
     fn definitions_are_sound() {
         Cli::command().debug_assert();
+    }
+
+    #[cfg(feature = "viewer")]
+    #[test]
+    fn a_scene_alone_is_looked_at() {
+        let of = |line: &str| -> Vec<String> {
+            let words = line.split(' ').map(OsString::from).collect();
+            with_view(words).into_iter().map(|w| w.to_string_lossy().into_owned()).collect()
+        };
+        assert_eq!(of("skylit builtin:stairs")[1], "view");
+        assert_eq!(of("skylit no/such/file.glb --tracer compute")[1..3], ["view", "no/such/file.glb"]);
+        for line in ["skylit render a.glb", "skylit --help", "skylit stairs", "skylit doctor"] {
+            assert_eq!(of(line).join(" "), line);
+        }
     }
 
     #[test]

@@ -15,7 +15,7 @@ use super::result::Context;
 use crate::error::{Error, Result};
 
 /// Options to open a device with.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Options {
     /// Index, or part of the name (case does not matter); `None`: the most capable.
     pub device: Option<String>,
@@ -167,6 +167,15 @@ impl Device {
             cache::store(&self.info, &data);
         }
     }
+}
+
+/// The device that [`Device::open`] would open with these options.
+///
+/// # Errors
+/// As [`Device::open`].
+pub fn preferred(options: &Options) -> Result<DeviceInfo> {
+    let instance = Instance::new(false)?;
+    pick(enumerate(&instance)?, options.device.as_deref())
 }
 
 fn pick(devices: Vec<DeviceInfo>, wanted: Option<&str>) -> Result<DeviceInfo> {

@@ -1,6 +1,6 @@
 //! The Vulkan loader and instance, with the validation layer as an option.
 
-use std::ffi::{CStr, c_void};
+use std::ffi::{CStr, c_char, c_void};
 use std::sync::{Arc, Mutex};
 
 use ash::{ext, vk};
@@ -33,7 +33,8 @@ pub struct Instance {
     messenger: Option<(ext::debug_utils::Instance, vk::DebugUtilsMessengerEXT)>,
     pub(super) debug_names: bool,
     // dropped last, because that unloads the library
-    _entry: ash::Entry,
+    #[cfg_attr(not(feature = "viewer"), allow(dead_code, reason = "it is kept loaded; only surfaces of windows use it"))]
+    pub(super) entry: ash::Entry,
 }
 
 impl Instance {
@@ -45,6 +46,14 @@ impl Instance {
     /// # Errors
     /// [`Error::Device`] without a loader, without a driver for Vulkan 1.3, or without the requested validation layer.
     pub fn new(validation: bool) -> Result<Arc<Self>> {
+        Self::with_extensions(validation, &[])
+    }
+
+    /// As [`Instance::new`], with extensions, which the loader must have: names that end with NUL and live forever.
+    ///
+    /// # Errors
+    /// As [`Instance::new`].
+    pub(super) fn with_extensions(validation: bool, required: &[*const c_char]) -> Result<Arc<Self>> {
         super::environment::prepare();
         // SAFETY: the loader's own initialisation code runs, as in every Vulkan program
         let entry = unsafe { ash::Entry::load() }.map_err(|e| {
@@ -80,7 +89,10 @@ impl Instance {
             .application_version(vk::make_api_version(0, 0, 1, 0))
             .api_version(vk::API_VERSION_1_3);
         let layer_names = if validation { vec![VALIDATION_LAYER.as_ptr()] } else { vec![] };
-        let extension_names = if debug_names { vec![ext::debug_utils::NAME.as_ptr()] } else { vec![] };
+        let mut extension_names = required.to_vec();
+        if debug_names {
+            extension_names.push(ext::debug_utils::NAME.as_ptr());
+        }
         let log = validation.then(|| Arc::new(ValidationLog::default()));
         let mut create_messenger = log.as_ref().map(messenger_info);
         let mut info = vk::InstanceCreateInfo::default()
@@ -106,7 +118,7 @@ impl Instance {
             }
             None => None,
         };
-        Ok(Arc::new(Self { raw, validation: log, messenger, debug_names, _entry: entry }))
+        Ok(Arc::new(Self { raw, validation: log, messenger, debug_names, entry }))
     }
 }
 

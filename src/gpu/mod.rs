@@ -16,14 +16,18 @@ mod instance;
 pub mod oidn;
 mod pipeline;
 mod result;
+#[cfg(feature = "viewer")]
+mod window;
 
 pub use acceleration_structure::{AccelerationStructure, AccelerationStructureInstance, BottomLevelInput, Update};
 pub use buffer::{Buffer, Memory};
 pub use commands::{Commands, Recorder, Timing};
-pub use device::{Device, Options};
+pub use device::{Device, Options, preferred};
 pub use drawing::DrawRecorder;
 pub use graphics_pipeline::{Cull, GraphicsPipeline};
 pub use image::{Image, Targets};
 pub use info::{DeviceInfo, Limits, RayTracingExtensions, enumerate};
 pub use instance::Instance;
 pub use pipeline::{ComputePipeline, HitShaders, KeptPipelines, RayTracingPipeline, Specialization};
+#[cfg(feature = "viewer")]
+pub use window::{Target, WindowRenderer};

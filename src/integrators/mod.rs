@@ -14,6 +14,7 @@ use std::time::Duration;
 
 use serde_json::{Map, Value};
 
+use crate::accel::features::Blend;
 use crate::accel::flatten::FlatScene;
 use crate::error::{Error, Result};
 use crate::film::Control;
@@ -134,11 +135,8 @@ pub trait Integrator: Sync {
     /// Name of the quantity whose mean is reported: `radiance`.
     fn quantity(&self) -> &'static str;
 
-    /// Flattens the scene for this integrator.
-    ///
-    /// # Errors
-    /// [`crate::Error::Scene`].
-    fn flatten<'s>(&self, scene: &'s Scene) -> Result<FlatScene<'s>>;
+    /// How it interprets alpha blending, for which the scene is flattened.
+    fn blend(&self) -> Blend;
 
     /// Scene data that it needs in device memory.
     fn needs(&self, settings: &IntegratorSettings) -> Needs;

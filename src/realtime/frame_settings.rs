@@ -11,7 +11,7 @@ use crate::realtime::{Budget, FilterKind, Preset, Resolution, Settings, Techniqu
 use crate::sampling::Sequence;
 #[cfg(feature = "cli")]
 use crate::settings::parse::parse_rate;
-use crate::settings::{AppliesTo, Capability, choices, settings};
+use crate::settings::{AppliesTo, Capability, Editable, Value, choices, settings};
 
 /// Settings of real-time frames of ambient occlusion.
 const FRAMES: AppliesTo = AppliesTo::frames_of(Capability::AmbientOcclusion);
@@ -35,6 +35,12 @@ pub struct FrameRange {
     pub first: u32,
     /// One past the last frame.
     pub end: u32,
+}
+
+impl Editable for Option<FrameRange> {
+    fn value(&mut self) -> Value<'_> {
+        Value::Other
+    }
 }
 
 impl serde::Serialize for FrameRange {

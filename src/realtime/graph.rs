@@ -7,7 +7,8 @@ use std::sync::Arc;
 use super::display::Display;
 use super::resources::{Extent, Resource, Resources};
 use super::settings::Settings;
-use crate::error::Result;
+use crate::error::{Error, Result};
+use crate::film::Control;
 use crate::film::block::Block;
 use crate::film::camera::CameraRecord;
 use crate::gpu::{Buffer, Commands, ComputePipeline, Device, Memory, Recorder, Timing};
@@ -54,9 +55,9 @@ impl Range {
         vec![Self { first: 0, count }]
     }
 
-    /// Splits rays into launches of whole groups of `group` rays.
-    pub fn launches(rays: u32, group: u32) -> Vec<Self> {
-        let most = LAUNCH_RAYS / group * group;
+    /// Splits rays into launches of whole groups of `group` rays, at most `most` each (at least a group) and never more than the tracer's maximum.
+    pub fn launches(rays: u32, group: u32, most: u32) -> Vec<Self> {
+        let most = (most.min(LAUNCH_RAYS) / group).max(1) * group;
         (0..rays).step_by(most as usize).map(|first| Self { first, count: most.min(rays - first) }).collect()
     }
 }
@@ -215,11 +216,17 @@ impl Graph {
         recorded
     }
 
-    /// Records, submits and waits for the stages that [`Graph::begin`] chose. Returns the times of passes, in order.
+    /// Forgets which stages have run, after a frame that was not finished: the next frame records all of them.
+    pub fn invalidate(&mut self) {
+        self.stages.iter_mut().for_each(|s| s.versions.clear());
+    }
+
+    /// Records, submits and waits for the stages that [`Graph::begin`] chose. Returns the times of passes, in order. With `control` each launch is a submission
+    /// of its own, and it is asked between them whether to stop.
     ///
     /// # Errors
-    /// Those of the passes and the device.
-    pub fn run(&mut self, frame: &Frame, stages: &[usize]) -> Result<Vec<Timing>> {
+    /// Those of the passes and the device; [`Error::Interrupted`] when `control` says so.
+    pub fn run(&mut self, frame: &Frame, stages: &[usize], control: Option<&mut dyn Control>) -> Result<Vec<Timing>> {
         let display = frame.display.as_ref();
         for &k in stages {
             for pass in self.stages[k].passes.iter_mut().filter(|p| p.is_enabled(display)) {
@@ -231,14 +238,23 @@ impl Graph {
         let (mut timings, resources) = (Vec::new(), &self.resources);
         // a stage of several launches is cut, others go with what is before them
         let mut rest = launches.as_slice();
+        let mut control = control;
         while !rest.is_empty() {
             let mut several = 0;
-            let end = rest.iter().position(|(stage, _)| {
-                several += usize::from(stage.ranges.len() > 1);
-                several > MAX_LAUNCHES
-            });
+            let end = match control {
+                Some(_) => Some(1),
+                None => rest.iter().position(|(stage, _)| {
+                    several += usize::from(stage.ranges.len() > 1);
+                    several > MAX_LAUNCHES
+                }),
+            };
             let (submission, others) = rest.split_at(end.unwrap_or(rest.len()));
             rest = others;
+            if let Some(control) = &mut control
+                && control.should_stop()?
+            {
+                return Err(Error::Interrupted);
+            }
             let mut outcome = Ok(());
             timings.extend(self.commands.run(|r| {
                 let mut hazards = Hazards::default();
@@ -352,9 +368,10 @@ mod tests {
 
     #[test]
     fn launches_are_of_whole_groups() {
-        let ranges = Range::launches(2 * LAUNCH_RAYS, 3);
+        let ranges = Range::launches(2 * LAUNCH_RAYS, 3, LAUNCH_RAYS);
         assert!(ranges.iter().all(|r| r.first % 3 == 0 && r.count <= LAUNCH_RAYS));
         assert_eq!(ranges.iter().map(|r| r.count).sum::<u32>(), 2 * LAUNCH_RAYS);
-        assert_eq!(Range::launches(100, 64), Range::all(100));
+        assert_eq!(Range::launches(100, 64, LAUNCH_RAYS), Range::all(100));
+        assert_eq!(Range::launches(100, 64, 10).len(), 2);
     }
 }

@@ -16,6 +16,7 @@ pub mod settings;
 use glam::{DAffine3, DMat3, DVec3};
 
 use crate::error::{Error, Result};
+use crate::film::Control;
 use crate::film::block::Block;
 use crate::film::camera::CameraRecord;
 use crate::gpu::{Buffer, Timing};
@@ -167,6 +168,35 @@ impl Realtime {
     /// # Errors
     /// Those of the device.
     pub fn frame(&mut self, tracer: &Tracer, camera: &CameraRecord, moved: &[MovedBounds]) -> Result<FrameStats> {
+        self.frame_with(tracer, camera, moved, None)
+    }
+
+    /// As [`Realtime::frame`]; `control` is asked between launches whether to stop. After an error, an interruption included, there is no history.
+    ///
+    /// # Errors
+    /// Those of the device, and [`Error::Interrupted`] when `control` says so.
+    pub fn frame_with(
+        &mut self,
+        tracer: &Tracer,
+        camera: &CameraRecord,
+        moved: &[MovedBounds],
+        control: Option<&mut dyn Control>,
+    ) -> Result<FrameStats> {
+        let stats = self.try_frame(tracer, camera, moved, control);
+        if stats.is_err() {
+            self.graph.invalidate();
+            self.reset();
+        }
+        stats
+    }
+
+    fn try_frame(
+        &mut self,
+        tracer: &Tracer,
+        camera: &CameraRecord,
+        moved: &[MovedBounds],
+        control: Option<&mut dyn Control>,
+    ) -> Result<FrameStats> {
         let moved = moved_records(moved);
         let is_larsen = self.settings.technique == Technique::Larsen;
         // Larsen's pipeline skips no pass
@@ -190,7 +220,7 @@ impl Realtime {
             params: self.params.address(),
             display: self.display,
         };
-        let timings = self.graph.run(&frame, &stages)?;
+        let timings = self.graph.run(&frame, &stages, control)?;
         tracer.check_finished()?;
         let count: Vec<u32> = self.graph.resources().read(Resource::RayCount, 1)?;
         let occlusion_rays = u64::from(count.first().copied().unwrap_or(0));
@@ -258,6 +288,11 @@ impl Realtime {
     /// Number of samples accumulated in each pixel of the last frame.
     pub fn samples(&self) -> Result<Vec<f32>> {
         Ok(self.estimates()?.into_iter().map(|e| e[1]).collect())
+    }
+
+    /// Variance of the mean of each pixel's samples in the last frame, before any spatial filter; 0 for background.
+    pub fn variances(&self) -> Result<Vec<f32>> {
+        Ok(self.estimates()?.into_iter().map(|[_, samples, variance]| variance / samples.max(1.0)).collect())
     }
 
     /// Bent normal of each pixel of the last frame, rows from the top: the mean over the cosine-weighted hemisphere of ambient visibility

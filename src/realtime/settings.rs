@@ -8,6 +8,7 @@ use crate::interface::records::passes::FilterParams;
 use crate::raster::Primary;
 use crate::sampling::Sequence;
 use crate::settings::choices;
+use crate::tracer::stream::LAUNCH_RAYS;
 
 choices! {
     /// How a pixel's ambient visibility is estimated.
@@ -144,6 +145,9 @@ pub struct Settings {
     pub unit: f64,
     /// Also compute bent normals: the mean unoccluded direction.
     pub bent: bool,
+    /// Maximum rays of a launch. Small launches let a frame be interrupted soon ([`super::Realtime::frame_with`]); images do not depend on it.
+    #[serde(skip)]
+    pub launch_rays: u32,
 }
 
 impl Default for Settings {
@@ -251,6 +255,7 @@ impl Preset {
             gtao: [3, 6],
             unit: 1.0,
             bent: false,
+            launch_rays: LAUNCH_RAYS,
         };
         match self {
             // the paper traces closest hits up to 100 units, whatever the falloff

@@ -26,7 +26,7 @@ const DEFAULT_FPS: f64 = 30.0;
 /// Exposure of displayed frames, in stops.
 const EXPOSURE: f32 = 0.0;
 /// Unit of displayed depths and positions, as a fraction of the scene's diagonal.
-const UNIT_OF_SCENE: f32 = 0.25;
+pub(super) const UNIT_OF_SCENE: f32 = 0.25;
 
 /// Real-time frames of a scene, rendered one after another ([`Renderer::frames`]).
 pub struct Frames<'r> {
@@ -89,11 +89,10 @@ impl Renderer {
         let file_camera = scene.cameras.iter().position(|c| *c == camera);
         let sequence = FrameSequence::new(scene, camera.clone(), file_camera, motion, animation, fps)?;
         let flat = FlatScene::with_motion(scene, sequence.motion()?)?;
-        let needs = Needs { normals: how.hemisphere == Hemisphere::Shading, ..Default::default() };
         let warm_up = timeline.warm_up.unwrap_or_else(|| if timeline.frames.is_some() { 0 } else { settling_frames(&how) });
         let frames = u64::from(range.end - range.first) + u64::from(warm_up);
         let request = TracerRequest {
-            needs: aov_needs(needs, &settings.image.aov),
+            needs: frame_needs(&how, &settings.image.aov),
             streams: Realtime::streams(&how).to_vec(),
             rays: frames * u64::from(size[0]) * u64::from(size[1]) * (1 + u64::from(how.rays_per_pixel)),
             control: &mut *control,
@@ -250,8 +249,13 @@ pub fn frame_settings(settings: &RenderSettings) -> Result<Settings> {
     Ok(how)
 }
 
+/// Scene data that frames with these settings need, with these auxiliary outputs.
+pub(super) fn frame_needs(settings: &Settings, aov: &[Aov]) -> Needs {
+    aov_needs(Needs { normals: settings.hemisphere == Hemisphere::Shading, ..Default::default() }, aov)
+}
+
 /// Number of frames of a static view after which the image no longer changes.
-fn settling_frames(settings: &Settings) -> u32 {
+pub(super) fn settling_frames(settings: &Settings) -> u32 {
     match settings.technique {
         Technique::Larsen => 4,
         _ => settings.history.min(Settings::MAX_SAMPLES) * settings.resolution.period() - 1,
@@ -266,7 +270,7 @@ fn covered_mean(values: &[f32], coverage: &[f32]) -> f64 {
 }
 
 /// Diagonal of the scene's bounds, scene units; 1 for an empty scene.
-fn scene_size(scene: &Scene) -> f64 {
+pub(super) fn scene_size(scene: &Scene) -> f64 {
     scene.bounds().map(|(lo, hi)| (hi - lo).length()).filter(|d| *d > 0.0).unwrap_or(1.0)
 }
 
@@ -276,7 +280,7 @@ fn orbit(scene: &Scene, frames: f64) -> Result<Orbit> {
 }
 
 /// Positions of point lights, relative to the tracer's origin.
-fn point_lights(scene: &Scene, flat: &FlatScene) -> Vec<[f32; 3]> {
+pub(super) fn point_lights(scene: &Scene, flat: &FlatScene) -> Vec<[f32; 3]> {
     let point = scene.lights.iter().filter(|l| matches!(l.kind, LightKind::Point));
     point.map(|l| (l.position - flat.origin).as_vec3().to_array()).collect()
 }

@@ -22,6 +22,8 @@
 mod denoising;
 mod film_file;
 pub mod frames;
+mod framing;
+pub mod interactive;
 pub mod report;
 pub mod settings;
 pub mod still;
@@ -40,6 +42,7 @@ use crate::shaders::StreamShaders;
 use crate::tracer::{ComputeOptions, DeviceSettings, Needs, Tracer, TracerKind};
 
 pub use frames::{FrameOutput, Frames};
+pub use interactive::{Interactive, View};
 pub use report::{FramesReport, StillReport};
 pub use settings::RenderSettings;
 pub use still::Still;
@@ -135,6 +138,13 @@ impl Renderer {
     /// The scene, including the lights of the last settings.
     pub fn scene(&self) -> &Scene {
         &self.scene
+    }
+
+    /// The scene without the lights that settings have added; all else goes.
+    pub fn into_scene(mut self) -> Scene {
+        // removing lights cannot fail
+        let _ = self.light(&LightingSettings::default());
+        self.scene
     }
 
     /// The device.

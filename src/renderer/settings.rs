@@ -1,7 +1,7 @@
 //! All settings of a render. The same structs are the command line of `skylit render`, the metadata of images, and settings files.
 
 use glam::DVec3;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Result};
 use crate::film::camera::{self, Choice};
@@ -15,7 +15,7 @@ use crate::realtime::frame_settings::FrameSettings;
 use crate::scene::{Camera, Projection, Scene};
 #[cfg(feature = "cli")]
 use crate::settings::parse::{parse_fov, parse_number, parse_target, parse_time, parse_vector};
-use crate::settings::{AppliesTo, Capability, GivenSetting, settings};
+use crate::settings::{AppliesTo, Capability, GivenSetting, Setting, settings};
 
 /// Samples per pixel when neither the settings nor the scene give them.
 pub const DEFAULT_SPP: u32 = 16;
@@ -71,6 +71,12 @@ impl CameraSettings {
     /// # Errors
     /// [`Error::Usage`].
     pub fn check(&self) -> Result<()> {
+        if self.eye.is_some() != self.target.is_some() {
+            return Err(Error::Usage("--eye and --target belong together: give both".into()));
+        }
+        if self.eye.is_some() && self.camera.is_some() {
+            return Err(Error::Usage("--camera and --eye both choose the camera: leave one of them out".into()));
+        }
         if self.eye.is_some() && self.eye == self.target {
             return Err(Error::Usage("--eye and --target are the same point: move one of them".into()));
         }
@@ -150,6 +156,21 @@ impl FilmSettings {
     }
 }
 
+/// Values of an option of the command line, one for each time that it is given; `None` for an option without a value.
+fn flag_values(name: &str, value: &serde_json::Value) -> Vec<Option<String>> {
+    use serde_json::Value;
+    let text = |v: &Value| v.as_str().map_or_else(|| v.to_string(), str::to_owned);
+    let joined = |all: &[Value], by: &str| Some(all.iter().map(text).collect::<Vec<_>>().join(by));
+    match value {
+        Value::Null | Value::Bool(false) => Vec::new(),
+        Value::Bool(true) => vec![None],
+        Value::Array(all) if name == "size" => vec![joined(all, "x")],
+        Value::Array(all) if name == "light" => all.iter().map(|v| Some(text(v))).collect(),
+        Value::Array(all) => vec![joined(all, ",")],
+        value => vec![Some(text(value))],
+    }
+}
+
 /// All settings of a render.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -182,6 +203,42 @@ pub struct RenderSettings {
 }
 
 impl RenderSettings {
+    /// Reads a file of settings, as the viewer saves it.
+    ///
+    /// # Errors
+    /// [`Error::Input`] for a file that cannot be read, or with a setting that does not exist.
+    pub fn load(path: &Path) -> Result<Self> {
+        let bytes = std::fs::read(path).map_err(|e| Error::read(path, &e))?;
+        serde_json::from_slice(&bytes).map_err(|e| Error::input(path, format!("not a file of settings: {e}")))
+    }
+
+    /// These settings, replaced by those that `other` gives.
+    ///
+    /// # Errors
+    /// None for settings that were checked each for itself.
+    pub fn overridden_by(&self, other: &Self) -> Result<Self> {
+        fn merge(into: &mut serde_json::Value, from: serde_json::Value) {
+            match (into, from) {
+                (serde_json::Value::Object(into), serde_json::Value::Object(from)) => {
+                    for (key, value) in from {
+                        merge(into.entry(key).or_insert(serde_json::Value::Null), value);
+                    }
+                }
+                (_, serde_json::Value::Null) => {}
+                (into, from) => *into = from,
+            }
+        }
+        let mut base = self.clone();
+        if other.camera.camera.is_some() || other.camera.eye.is_some() {
+            // a camera replaces the other one as a whole
+            base.camera = CameraSettings { fov_y: base.camera.fov_y, ..Default::default() };
+        }
+        let wrong = |e: serde_json::Error| Error::Usage(format!("settings cannot be put together: {e}"));
+        let mut merged = serde_json::to_value(&base).map_err(wrong)?;
+        merge(&mut merged, serde_json::to_value(other).map_err(wrong)?);
+        serde_json::from_value(merged).map_err(wrong)
+    }
+
     /// The integrator.
     pub fn integrator(&self) -> IntegratorName {
         self.integrator.unwrap_or_default()
@@ -219,6 +276,57 @@ impl RenderSettings {
         self.camera.check()
     }
 
+    /// All settings but the integrator, for editors.
+    pub fn editable(&mut self) -> Vec<Setting<'_>> {
+        let mut all = self.image.editable();
+        all.extend(self.camera.editable());
+        all.extend(self.integrators.ao.editable());
+        all.extend(self.integrators.path.editable());
+        all.extend(self.lighting.editable());
+        all.extend(self.picture.editable());
+        all.extend(self.film.editable());
+        all.extend(self.frames.editable());
+        all
+    }
+
+    /// Clears settings that would have no effect, as far as editors can ([`crate::settings::Value::Other`] stays).
+    pub fn clear_unused(&mut self) {
+        let name = self.integrator();
+        let integrator = (name.name(), name.get().capabilities());
+        let is_frames = self.realtime_setting().is_some();
+        for mut setting in self.editable() {
+            let applies = if is_frames { setting.applies.frames } else { setting.applies.stills };
+            if !applies || !setting.applies.includes(&integrator) {
+                setting.clear();
+            }
+        }
+    }
+
+    /// The settings as options of `skylit render`: `--integrator`, `path`, ...
+    pub fn flags(&self) -> Vec<String> {
+        let mut flags = Vec::new();
+        if let Some(integrator) = self.integrator {
+            flags.extend(["--integrator".to_owned(), integrator.name().to_owned()]);
+        }
+        // groups of settings, by name
+        let groups = serde_json::to_value(self).unwrap_or_default();
+        let mut groups: Vec<_> = groups.as_object().into_iter().flatten().filter_map(|(_, group)| group.as_object()).collect();
+        while !groups.is_empty() {
+            for (name, value) in std::mem::take(&mut groups).into_iter().flatten() {
+                if let Some(group) = value.as_object() {
+                    groups.push(group);
+                    continue;
+                }
+                let flag = format!("--{}", name.replace('_', "-"));
+                for text in flag_values(name, value) {
+                    flags.push(flag.clone());
+                    flags.extend(text);
+                }
+            }
+        }
+        flags
+    }
+
     /// Image size in pixels, of a scene.
     pub fn size(&self, scene: &Scene) -> [u32; 2] {
         self.image.size.or(scene.hints.size).unwrap_or(DEFAULT_SIZE)
@@ -232,5 +340,44 @@ impl RenderSettings {
     /// Seed of the sampler.
     pub fn seed(&self) -> u32 {
         self.image.seed.unwrap_or_default()
+    }
+}
+
+#[cfg(all(test, feature = "cli"))]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn flags_are_those_of_the_command_line() {
+        #[derive(clap::Parser)]
+        struct Alone {
+            #[command(flatten)]
+            settings: RenderSettings,
+        }
+        let parse = |args: &[String]| {
+            let args = std::iter::once("a".to_owned()).chain(args.iter().cloned());
+            <Alone as clap::Parser>::try_parse_from(args).unwrap().settings
+        };
+        let given = "--integrator path --spp 3 --size 20x10 --aov depth,ids --eye -1,2.5,3e-7 --target 0,0,0 --fov-y 30 --max-depth 4 \
+            --energy-compensation --tone-map agx --exposure -1.5 --environment 1,1,1 --resumable --ao-radius 1.25 --preset fast --frames 2..5 --show depth";
+        let mut given: Vec<String> = given.split_whitespace().map(str::to_owned).collect();
+        for light in ["sphere position=1,2,3 radius=0.5 radiance=4", "sun direction=0,-1,0 irradiance=2"] {
+            given.extend(["--light".to_owned(), light.to_owned()]);
+        }
+        let settings = parse(&given);
+        assert_eq!(parse(&settings.flags()), settings, "{:?}", settings.flags());
+        assert!(RenderSettings::default().flags().is_empty());
+        // a file, and options that replace what it says
+        let words = |line: &str| line.split_whitespace().map(str::to_owned).collect::<Vec<_>>();
+        let other = parse(&words("--camera 1 --spp 9 --integrator direct"));
+        let merged = settings.overridden_by(&other).unwrap();
+        let expected = RenderSettings {
+            integrator: other.integrator,
+            image: ImageSettings { spp: Some(9), ..settings.image.clone() },
+            camera: CameraSettings { camera: Some("1".into()), fov_y: Some(30.0), ..Default::default() },
+            ..settings.clone()
+        };
+        assert_eq!(merged, expected);
+        assert_eq!(settings.overridden_by(&RenderSettings::default()).unwrap(), settings);
     }
 }

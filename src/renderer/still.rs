@@ -10,6 +10,7 @@ use super::denoising::{self, Denoising};
 use super::film_file::{self, Identity, Maker};
 use super::report::{FilmReport, Seconds, Setup, StillReport};
 use super::{ReadyTracer, RenderSettings, Renderer, TracerRequest};
+use crate::accel::flatten::FlatScene;
 use crate::denoise;
 use crate::error::{Error, Result};
 use crate::film::Control;
@@ -20,7 +21,7 @@ use crate::integrators::aov::{self, Aov, AovPixel};
 use crate::integrators::{Integrator, PictureOptions, RenderJob};
 use crate::output::{self, Channel, Image, ImageFormat, Samples, png};
 use crate::ray::Ray;
-use crate::scene::{Camera, Projection, RenderHints, fingerprint};
+use crate::scene::{Camera, Motion, Projection, RenderHints, fingerprint};
 use crate::tracer::Needs;
 
 /// Additional results of a still.
@@ -153,7 +154,7 @@ impl Renderer {
             intervals: intervals(settings, &scene.hints, job.spp),
             target_rmse: settings.film.target_rmse,
         };
-        let flat = integrator.flatten(scene)?;
+        let flat = FlatScene::with_motion_and_blend(scene, Motion::default(), integrator.blend())?;
         let wanted = &settings.image.aov;
         let needs = aov_needs(integrator.needs(&settings.integrators), wanted);
         let ready = match ready.filter(|r| r.blend == flat.blend && r.needs == needs) {

@@ -152,6 +152,12 @@ impl PartialEq for LightSpec {
     }
 }
 
+impl std::fmt::Display for LightSpec {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        f.write_str(&self.text)
+    }
+}
+
 impl serde::Serialize for LightSpec {
     fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.serialize_str(&self.text)

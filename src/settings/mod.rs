@@ -3,7 +3,10 @@
 //! Each setting declares which integrators it applies to, by something that they can do ([`Capability`]), and whether it applies to stills, real-time frames, or both:
 //! [`check`] rejects settings without effect. So an integrator names its capabilities, and no setting names an integrator.
 
+mod edit;
 pub mod parse;
+
+pub use edit::{Choice, ChoiceValue, Editable, Setting, Value};
 
 use crate::error::{Error, Result};
 
@@ -169,6 +172,18 @@ macro_rules! settings {
                 )*
                 out
             }
+
+            /// All settings, for editors.
+            pub fn editable(&mut self) -> Vec<$crate::settings::Setting<'_>> {
+                vec![$(
+                    $crate::settings::Setting {
+                        name: stringify!($field),
+                        help: concat!($($doc),+).trim(),
+                        applies: $applies,
+                        value: $crate::settings::Editable::value(&mut self.$field),
+                    },
+                )*]
+            }
         }
     };
 }
@@ -220,6 +235,18 @@ macro_rules! choices {
             }
         }
 
+        impl $crate::settings::Choice for $type {
+            const ALL: &'static [Self] = &Self::ALL;
+
+            fn name(self) -> &'static str {
+                self.name()
+            }
+
+            fn help(self) -> &'static str {
+                self.help()
+            }
+        }
+
         impl std::fmt::Display for $type {
             fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
                 f.pad(self.name())
@@ -257,7 +284,8 @@ mod tests {
 
     #[test]
     fn settings_know_what_they_are_for() {
-        let some = Some { max_depth: Option::Some(3), fps: None };
+        let mut some = Some { max_depth: Option::Some(3), fps: None };
+        assert_eq!(some.editable().iter().map(|s| s.name).collect::<Vec<_>>(), ["max_depth", "fps"]);
         let [depth] = some.given()[..] else { panic!("one was given") };
         assert_eq!(depth.option(), "--max-depth");
         let all: [Integrator; 3] = [("ao", &[]), ("path", &[Capability::PathLength]), ("direct", &[Capability::PathLength])];

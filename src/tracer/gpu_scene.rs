@@ -42,6 +42,33 @@ pub struct Needs {
     pub mip_levels: bool,
 }
 
+impl Needs {
+    /// What both need together.
+    pub fn union(self, other: Self) -> Self {
+        let Self { normals, albedo, shading, white, compensation, baked_occlusion, mip_levels } = other;
+        Self {
+            normals: self.normals || normals,
+            albedo: self.albedo || albedo,
+            shading: self.shading || shading,
+            white: self.white || white,
+            compensation: self.compensation || compensation,
+            baked_occlusion: self.baked_occlusion || baked_occlusion,
+            mip_levels: self.mip_levels || mip_levels,
+        }
+    }
+
+    /// Returns true if one scene can serve both: materials look the same to both, if both need them.
+    pub fn is_compatible(self, other: Self) -> bool {
+        let materials = |n: Self| (n.white, n.compensation, n.mip_levels, n.baked_occlusion);
+        !self.shading || !other.shading || materials(self) == materials(other)
+    }
+
+    /// Returns true if nothing of `other` is missing.
+    pub fn covers(self, other: Self) -> bool {
+        self.union(other) == self
+    }
+}
+
 /// The three rows of an affine map in single precision, as shaders and Vulkan's instances take it.
 pub fn rows(t: &DAffine3) -> [[f32; 4]; 3] {
     let (m, o) = (t.matrix3, t.translation);

@@ -30,6 +30,9 @@ pub struct RenderArgs {
     /// Print what was skipped because the scene or the options do not need it, and what that saved
     #[arg(long)]
     pub explain: bool,
+    /// Read settings from this file, which `skylit view` or a person has written; options given here replace what it says
+    #[arg(long = "settings", value_name = "FILE.json", value_hint = ValueHint::FilePath)]
+    pub settings_file: Option<PathBuf>,
     /// What is rendered, and how
     #[command(flatten)]
     pub settings: RenderSettings,
@@ -50,6 +53,20 @@ impl RenderArgs {
     /// Returns true if an 8-bit image or animation is written.
     pub fn writes_picture(&self) -> bool {
         self.output.iter().any(|p| apng::is_apng(p) || ImageFormat::of(p).is_ok_and(|f| f == ImageFormat::Png))
+    }
+
+    /// These arguments with the settings of [`RenderArgs::settings_file`] where none were given.
+    ///
+    /// # Errors
+    /// Those of [`RenderSettings::load`].
+    pub fn with_settings_file(&self) -> Result<Self> {
+        match &self.settings_file {
+            Some(path) => {
+                let settings = RenderSettings::load(path)?.overridden_by(&self.settings)?;
+                Ok(Self { settings, settings_file: None, ..self.clone() })
+            }
+            None => Ok(self.clone()),
+        }
     }
 
     /// Checks conditions on more than one option.

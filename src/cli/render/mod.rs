@@ -26,6 +26,7 @@ use crate::terminal::progress::Progress;
 
 /// Loads, renders, writes, reports.
 pub fn run(args: &RenderArgs, start: Instant) -> Result<(), Failure> {
+    let args = &args.with_settings_file()?;
     args.check()?;
     match args.settings.realtime_setting() {
         Some(_) => frames(args, start),

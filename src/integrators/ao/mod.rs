@@ -16,6 +16,7 @@ use std::time::Duration;
 pub use attenuation::Attenuation;
 
 use super::{Integrator, IntegratorSettings, PictureOptions, RenderJob, Rendered};
+use crate::accel::features::Blend;
 use crate::accel::flatten::FlatScene;
 use crate::error::Result;
 use crate::film::Control;
@@ -27,7 +28,6 @@ use crate::film::tile_mask::TileMask;
 use crate::gpu::{Buffer, Commands, ComputePipeline, Device, Memory, Timing};
 use crate::output::Image;
 use crate::ray::Ray;
-use crate::scene::Scene;
 use crate::tracer::queue::RayQueue;
 
 use crate::tracer::{Needs, Push, Stream, Tracer};
@@ -136,8 +136,8 @@ impl Integrator for AmbientOcclusion {
         "ambient visibility"
     }
 
-    fn flatten<'s>(&self, scene: &'s Scene) -> Result<FlatScene<'s>> {
-        Ok(FlatScene::new(scene))
+    fn blend(&self) -> Blend {
+        Blend::Masked
     }
 
     fn needs(&self, settings: &IntegratorSettings) -> Needs {

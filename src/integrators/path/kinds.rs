@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use super::report::{self, environment_text};
 use super::{PathOptions, PixelFilter, Strategy, TextureFilter, View, render, streams};
+use crate::accel::features::Blend;
 use crate::accel::flatten::FlatScene;
 use crate::colour::srgb_decode;
 use crate::error::Result;
@@ -11,7 +12,6 @@ use crate::film::Control;
 use crate::film::tile_mask::TileMask;
 use crate::integrators::{Integrator, IntegratorSettings, PictureOptions, RenderJob, Rendered};
 use crate::output::{Image, Samples};
-use crate::scene::Scene;
 use crate::settings::Capability::{
     self, CameraModel, LightTransport, PathLength, SamplingStrategy, SceneLights, Textures, ToneMapping, WhiteSky,
 };
@@ -137,8 +137,8 @@ impl Integrator for PathVariant {
         }
     }
 
-    fn flatten<'s>(&self, scene: &'s Scene) -> Result<FlatScene<'s>> {
-        Ok(FlatScene::for_paths(scene))
+    fn blend(&self) -> Blend {
+        Blend::Stochastic
     }
 
     fn needs(&self, settings: &IntegratorSettings) -> Needs {

@@ -31,7 +31,7 @@ pub fn stage(tracer: &Tracer, block: Block, settings: &Settings, primary: Primar
         has_axes: settings.hemisphere == Hemisphere::Shading,
         is_dynamic: tracer.is_dynamic(),
     };
-    Ok(Stage::new(vec![Box::new(pass)], Range::launches(block.rays(), 1)))
+    Ok(Stage::new(vec![Box::new(pass)], Range::launches(block.rays(), 1, settings.launch_rays)))
 }
 
 impl Pass for Gbuffer {

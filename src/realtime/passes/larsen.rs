@@ -70,14 +70,14 @@ pub fn stages(tracer: &Tracer, size: [u32; 2], settings: &Settings, lights: &[[f
     let pixels = Range::all(size[0] * size[1]);
     let mut stages = vec![Stage::new(vec![pass(Work::Keep)?], pixels.clone())];
     // without lights the pass runs, too, and clears the number of visible lights
-    let light_ranges = if light_rays > 0 { Range::launches(light_rays, 1) } else { Range::all(0) };
+    let light_ranges = if light_rays > 0 { Range::launches(light_rays, 1, settings.launch_rays) } else { Range::all(0) };
     stages.push(Stage::new(vec![pass(Work::Light(tracer.stream(&shaders::LARSEN_LIGHT_ANY)?))?], light_ranges));
     stages.push(Stage::new(
         vec![
             pass(Work::Occlusion(tracer.stream(&shaders::LARSEN_OCCLUSION_CLOSEST)?))?,
             pass(Work::Sum(shaders::LARSEN_SUM.pipeline(device)?))?,
         ],
-        Range::launches(tiles(half) * LARSEN_RAYS, LARSEN_RAYS),
+        Range::launches(tiles(half) * LARSEN_RAYS, LARSEN_RAYS, settings.launch_rays),
     ));
     stages.push(Stage::new(vec![pass(Work::Blur(shaders::LARSEN_BLUR.pipeline(device)?))?], pixels.clone()));
     stages.push(Stage::new(vec![pass(Work::Temporal(shaders::LARSEN_TEMPORAL.pipeline(device)?))?], pixels));

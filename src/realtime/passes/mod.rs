@@ -38,7 +38,7 @@ pub fn stages(tracer: &Tracer, block: Block, settings: &Settings, primary: Prima
             stages.extend(budget::stages(tracer, block.rays(), settings)?);
             stages.push(Stage::new(
                 vec![Box::new(ao_trace::AoTrace::new(tracer, settings)?)],
-                Range::launches(pixels * settings.most_rays(), 1),
+                Range::launches(pixels * settings.most_rays(), 1, settings.launch_rays),
             ));
             stages.push(Stage::new(vec![Box::new(gather::Gather::new(tracer, settings)?)], Range::all(block.rays())));
         }
@@ -48,7 +48,7 @@ pub fn stages(tracer: &Tracer, block: Block, settings: &Settings, primary: Prima
             if n > 1 {
                 stage.push(Box::new(gather::Gather::new(tracer, settings)?));
             }
-            stages.push(Stage::new(stage, Range::launches(block.rays() * n, n)));
+            stages.push(Stage::new(stage, Range::launches(block.rays() * n, n, settings.launch_rays)));
         }
     }
     stages.push(temporal::stage(tracer, pixels, settings)?);

@@ -11,6 +11,7 @@ use crate::realtime::graph::{Frame, Params, Pass, Range, ResourceUse, Stage};
 use crate::realtime::resources::{Resource, Resources};
 use crate::shaders;
 use crate::tracer::Tracer;
+use crate::tracer::stream::LAUNCH_RAYS;
 
 /// Number of nodes at the middle of the colour scale.
 const MIDDLE: f32 = 16.0;
@@ -41,7 +42,7 @@ pub fn stage(tracer: &Tracer, block: Block) -> Result<Stage> {
         block: Params::new(device, "camera of visited nodes")?,
         params: Params::new(device, "parameters of visited nodes")?,
     };
-    Ok(Stage::new(vec![Box::new(pass)], Range::launches(block.rays(), 1)))
+    Ok(Stage::new(vec![Box::new(pass)], Range::launches(block.rays(), 1, LAUNCH_RAYS)))
 }
 
 impl NodeVisits {

@@ -52,6 +52,11 @@ pub fn load(source: &str) -> Result<Scene> {
     load_file(path)
 }
 
+/// Whether a path has the extension of a scene file; it need not exist.
+pub fn is_scene_file(path: impl AsRef<Path>) -> bool {
+    FORMATS.contains(&extension(path.as_ref()).as_str())
+}
+
 /// Loads a scene file by its extension; see [`load`].
 ///
 /// # Errors

@@ -1,0 +1,105 @@
+//! `skylit view`: a window in which a scene is looked at, or a script that uses it.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueHint};
+
+use crate::error::Result;
+use crate::renderer::RenderSettings;
+use crate::scene::load;
+use crate::settings::parse::parse_rate;
+use crate::terminal::console::{Failure, Verbosity};
+use crate::tracer::DeviceSettings;
+use crate::viewer::{CPU_FRAME_RATE, GPU_FRAME_RATE, Painter, ViewOptions, headless, window};
+
+/// Size of the window, points.
+const DEFAULT_SIZE: [u32; 2] = [1280, 800];
+
+/// `skylit view`.
+#[derive(Clone, Debug, Args)]
+pub struct ViewArgs {
+    /// Scene: a .gltf, .glb, .obj or .brhan file, or builtin:NAME (`skylit scenes` lists them) [default: the viewer asks]
+    #[arg(value_hint = ValueHint::FilePath)]
+    pub scene: Option<String>,
+    /// Read settings from this file, which the viewer or a person has written; options given here replace what it says
+    #[arg(long = "settings", value_name = "FILE.json", value_hint = ValueHint::FilePath)]
+    pub settings_file: Option<PathBuf>,
+    /// Frame rate to hold while something moves, by a lower resolution of the image; 0: full resolution always [default: 10 on CPUs, 30 on GPUs]
+    #[arg(long, value_name = "N", value_parser = parse_frame_rate)]
+    pub frame_rate: Option<f64>,
+    /// Who paints the window [default: Vulkan on GPUs, the CPU on CPU drivers]
+    #[arg(long, value_enum)]
+    pub painter: Option<Painter>,
+    /// Run this script without a window (docs/viewer.md), and end
+    #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
+    pub headless_script: Option<PathBuf>,
+    /// What is shown first, and how; --size is the window's
+    #[command(flatten)]
+    pub settings: RenderSettings,
+    /// Device and tracer
+    #[command(flatten)]
+    pub device: DeviceSettings,
+    /// How the figures of a script are shown
+    #[command(flatten)]
+    pub verbosity: Verbosity,
+}
+
+fn parse_frame_rate(text: &str) -> Result<f64, String> {
+    if text.trim() == "0" { Ok(0.0) } else { parse_rate(text) }
+}
+
+/// Whether the first argument of the program is a scene and no command.
+pub fn is_scene(argument: &str) -> bool {
+    argument.starts_with("builtin:") || load::is_scene_file(argument)
+}
+
+/// Opens the window, or runs the script.
+pub fn run(args: &ViewArgs) -> Result<(), Failure> {
+    args.device.check()?;
+    let settings = match &args.settings_file {
+        Some(path) => RenderSettings::load(path)?.overridden_by(&args.settings)?,
+        None => args.settings.clone(),
+    };
+    settings.camera.check()?;
+    if args.painter == Some(Painter::Vulkan) {
+        // Mesa's CPU driver cannot rasterize with wider vectors; GPUs do not care
+        crate::gpu::environment::prefer_vector_bits(256);
+    }
+    // without a device there is a window all the same: it says what is missing
+    let device = crate::gpu::preferred(&args.device.options()).ok();
+    let is_cpu = device.as_ref().is_none_or(|d| d.is_cpu());
+    let options = ViewOptions {
+        scene: args.scene.clone(),
+        size: settings.image.size.unwrap_or(DEFAULT_SIZE),
+        settings,
+        device: args.device.clone(),
+        frame_rate: match args.frame_rate {
+            Some(rate) => Some(rate).filter(|r| *r > 0.0),
+            None => Some(if is_cpu { CPU_FRAME_RATE } else { GPU_FRAME_RATE }),
+        },
+        painter: args.painter.unwrap_or(if is_cpu { Painter::Cpu } else { Painter::Vulkan }),
+        device_name: device.map(|d| d.name),
+    };
+    let Some(script) = &args.headless_script else {
+        crate::terminal::interrupt::install();
+        return Ok(window::run(&options)?);
+    };
+    let console = args.verbosity.console();
+    for section in headless::run(&options, script)? {
+        let [median, p95, most] = section.ui_frame_ms;
+        let first = section.first_picture_seconds.map_or(String::new(), |s| format!("; first picture after {s:.2} s"));
+        console.line(&format!(
+            "{}: {:.1} s; interface {median:.1} ms (95 %: {p95:.1}, most: {most:.1}); {} pictures, {:.1} ms (95 %: {:.1}), from input to picture {:.1} ms (95 %: {:.1}){first}; {:.0} MiB",
+            section.name,
+            section.seconds,
+            section.pictures,
+            section.picture_ms[0],
+            section.picture_ms[1],
+            section.latency_ms[0],
+            section.latency_ms[1],
+            section.memory_mib,
+        ))?;
+        console.record(&section)?;
+    }
+    Ok(())
+}

@@ -1,0 +1,228 @@
+//! A scene that is looked at: views of it whose camera, time and settings change at any moment, rendered in short steps that can be interrupted.
+//!
+//! [`Interactive`] holds the scene's tracers, [`View`] an image of it in progress. Several views share tracers, pipelines and the pose of the scene.
+
+pub mod pick;
+mod view;
+
+use std::sync::Arc;
+
+use glam::DVec3;
+
+use super::{Renderer, TracerRequest, framing};
+use crate::accel::features::Blend;
+use crate::accel::flatten::FlatScene;
+use crate::error::{Error, Result};
+use crate::film::Control;
+use crate::gpu::Device;
+use crate::integrators::lighting::LightingSettings;
+use crate::scene::animation::{AnimationRig, Playback, Pose};
+use crate::scene::{AlphaMode, Camera, Motion, Scene};
+use crate::shaders::StreamShaders;
+use crate::tracer::{BuildStats, ComputeOptions, DeviceSettings, MovedBounds, Needs, Tracer, TracerKind};
+
+pub use pick::Pick;
+pub use view::{View, ViewPicture, ViewStep, ViewValues, camera_settings, render_flags};
+
+/// A scene with its tracers, for views that change ([`Renderer::interactive`]).
+pub struct Interactive<'r> {
+    device: &'r Arc<Device>,
+    scene: &'r Scene,
+    name: &'r str,
+    kind: TracerKind,
+    compute: ComputeOptions,
+    settings: &'r DeviceSettings,
+    animation: Option<PlayedAnimation<'r>>,
+    worlds: Vec<World<'r>>,
+    /// Number of tracers built so far.
+    built: u32,
+    warnings: Vec<String>,
+}
+
+/// An animation and its current pose.
+struct PlayedAnimation<'r> {
+    rig: &'r AnimationRig,
+    index: usize,
+    pose: Pose,
+    /// Seconds since its start.
+    time: Option<f64>,
+}
+
+/// The scene as a tracer holds it. Integrators that interpret alpha blending differently need tracers of their own, and so does a white sky without materials.
+struct World<'r> {
+    flat: FlatScene<'r>,
+    tracer: Tracer,
+    needs: Needs,
+    /// A number of its own, by which views know whether their tracer is still there.
+    number: u32,
+    /// Number of poses so far.
+    pose: u64,
+    /// What the last change of pose moved.
+    moved: Vec<MovedBounds>,
+}
+
+impl Renderer {
+    /// Prepares views of the scene under these lights, with an animation of it (an index) to be played.
+    ///
+    /// # Errors
+    /// Those of [`LightingSettings::apply`]; [`Error::Usage`] for an animation that the scene does not have.
+    pub fn interactive(&mut self, lighting: &LightingSettings, animation: Option<usize>) -> Result<Interactive<'_>> {
+        self.light(lighting)?;
+        // its scene data may be that of another integrator
+        self.tracer = None;
+        let animation = match animation {
+            None => None,
+            Some(index) => {
+                let none = || Error::Usage("the scene has no animation".into());
+                let rig = self.scene.rig.as_ref().ok_or_else(none)?;
+                rig.motion(index)?;
+                Some(PlayedAnimation { rig, index, pose: Pose::default(), time: None })
+            }
+        };
+        Ok(Interactive {
+            device: &self.device,
+            scene: &self.scene,
+            name: &self.name,
+            kind: self.kind,
+            compute: self.compute,
+            settings: &self.settings,
+            animation,
+            worlds: Vec::new(),
+            built: 0,
+            warnings: Vec::new(),
+        })
+    }
+}
+
+impl<'r> Interactive<'r> {
+    /// The scene.
+    pub fn scene(&self) -> &'r Scene {
+        self.scene
+    }
+
+    /// Name of the scene: a file, or `builtin:NAME`.
+    pub fn name(&self) -> &'r str {
+        self.name
+    }
+
+    /// The device.
+    pub fn device(&self) -> &'r Arc<Device> {
+        self.device
+    }
+
+    /// The tracer in use.
+    pub fn tracer_kind(&self) -> TracerKind {
+        self.kind
+    }
+
+    /// Time and memory that building the tracers took, one entry for each.
+    pub fn build_stats(&self) -> Vec<BuildStats> {
+        self.worlds.iter().map(|w| w.tracer.stats()).collect()
+    }
+
+    /// Takes the warnings since the last call.
+    pub fn take_warnings(&mut self) -> Vec<String> {
+        std::mem::take(&mut self.warnings)
+    }
+
+    /// Moves the scene to a time of its animation, in seconds since its start; animations loop. Returns true if anything moved.
+    ///
+    /// # Errors
+    /// Those of [`Tracer::update`].
+    pub fn set_time(&mut self, seconds: f64) -> Result<bool> {
+        let Some(animation) = &mut self.animation else { return Ok(false) };
+        if animation.time == Some(seconds) {
+            return Ok(false);
+        }
+        animation.time = Some(seconds);
+        animation.rig.pose(animation.index, seconds, Playback::Loop, &mut animation.pose)?;
+        for world in &mut self.worlds {
+            world.update(&animation.pose)?;
+        }
+        Ok(true)
+    }
+
+    /// A camera of the file as the animation has moved it; `None` if it does not move it.
+    pub fn animated_camera(&self, index: usize) -> Option<Camera> {
+        let pose = &self.animation.as_ref()?.pose;
+        let (_, camera_to_world) = pose.cameras.iter().find(|(k, _)| *k == index)?;
+        Some(Camera { camera_to_world: *camera_to_world, ..self.scene.cameras.get(index)?.clone() })
+    }
+
+    /// The camera to start with, for images of `aspect` = width / height: the file's first, or one that was chosen by what it would see ([`framing::choose`]).
+    ///
+    /// # Errors
+    /// Those of the device; [`Error::Scene`] for a scene without geometry.
+    pub fn choose_camera(&mut self, aspect: f64, control: &mut dyn Control) -> Result<Camera> {
+        if let Some(camera) = self.scene.cameras.first() {
+            return Ok(camera.clone());
+        }
+        let bounds = self.scene.bounds().ok_or_else(|| Error::Scene("the scene has no geometry to render".into()))?;
+        if self.worlds.is_empty() {
+            self.world(Blend::Masked, Needs::default(), Vec::new(), control)?;
+        }
+        framing::choose(bounds, aspect, &|rays| self.look(rays))
+    }
+
+    /// Whether a place is inside a room: there are walls around it.
+    ///
+    /// # Errors
+    /// Those of the device.
+    pub fn is_enclosed(&mut self, eye: DVec3, control: &mut dyn Control) -> Result<bool> {
+        if self.worlds.is_empty() {
+            self.world(Blend::Masked, Needs::default(), Vec::new(), control)?;
+        }
+        framing::is_enclosed(eye, &|rays| self.look(rays))
+    }
+
+    /// Finds or builds the tracer for an integrator, and returns its index. A tracer that lacks scene data is replaced by one that has all that was needed so far.
+    fn world(
+        &mut self,
+        blend: Blend,
+        needs: Needs,
+        streams: Vec<&'static StreamShaders>,
+        control: &mut dyn Control,
+    ) -> Result<usize> {
+        // without blended materials all see the same scene
+        let has_blended = self.scene.materials.iter().any(|m| m.alpha_mode == AlphaMode::Blend);
+        let blend = if has_blended { blend } else { Blend::Masked };
+        let found = self.worlds.iter().position(|w| w.flat.blend == blend && w.needs.is_compatible(needs));
+        let needs = match found {
+            Some(k) if self.worlds[k].needs.covers(needs) => return Ok(k),
+            Some(k) => self.worlds[k].needs.union(needs),
+            None => needs,
+        };
+        let flat = match found {
+            // the old tracer goes before the new one is built: both may not fit into memory
+            Some(k) => self.worlds.swap_remove(k).flat,
+            None => {
+                let motion = match &self.animation {
+                    Some(a) => a.rig.motion(a.index)?,
+                    None => Motion::default(),
+                };
+                FlatScene::with_motion_and_blend(self.scene, motion, blend)?
+            }
+        };
+        // a session: the best build is worth its time for small scenes only, which the number of rays of a good still decides as well
+        const RAYS: u64 = 1 << 28;
+        let request = TracerRequest { needs, streams, rays: RAYS, control, warnings: &mut self.warnings };
+        let tracer = request.build(self.device, self.kind, &flat, self.compute, self.settings)?;
+        self.built += 1;
+        let mut world = World { flat, tracer, needs, number: self.built, pose: 0, moved: Vec::new() };
+        if let Some(animation) = self.animation.as_ref().filter(|a| a.time.is_some()) {
+            world.update(&animation.pose)?;
+        }
+        self.worlds.push(world);
+        Ok(self.worlds.len() - 1)
+    }
+}
+
+impl World<'_> {
+    fn update(&mut self, pose: &Pose) -> Result<()> {
+        if self.tracer.is_dynamic() {
+            self.moved = self.tracer.update(&pose.changes())?.moved;
+            self.pose += 1;
+        }
+        Ok(())
+    }
+}

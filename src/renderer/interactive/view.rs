@@ -1,0 +1,429 @@
+//! A view: one image of the scene in progress, of frames in real time or of a still that converges.
+
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Duration;
+
+use super::{Interactive, World};
+use crate::error::{Error, Result};
+use crate::film::camera::CameraRecord;
+use crate::film::schedule::FilmOptions;
+use crate::film::state::FilmState;
+use crate::film::tile_mask::TileMask;
+use crate::film::{Control, Film};
+use crate::gpu::Timing;
+use crate::integrators::aov::Aov;
+use crate::integrators::{Integrator, RenderJob};
+use crate::output::{self, Channel, Image, Samples, png};
+use crate::realtime::display::{Display, DisplayMode};
+use crate::realtime::{FrameStats, Realtime, Technique};
+use crate::renderer::RenderSettings;
+use crate::renderer::frames::{UNIT_OF_SCENE, frame_needs, frame_settings, point_lights, scene_size, settling_frames};
+use crate::renderer::settings::CameraSettings;
+use crate::scene::{Camera, Projection};
+
+/// Rays of a launch of frames that may be interrupted, on CPU drivers: some hundredths of a second on two cores.
+const CPU_LAUNCH_RAYS: u32 = 1 << 17;
+/// Samples per pixel at which a still counts as finished.
+const MAX_SPP: u32 = 1 << 20;
+
+/// An image of the scene in progress.
+pub struct View {
+    settings: RenderSettings,
+    size: [u32; 2],
+    camera: Option<Camera>,
+    /// Number of the tracer's world, by which it is found again, and of the pose that the image shows.
+    world: u32,
+    pose: u64,
+    kind: Kind,
+}
+
+enum Kind {
+    Frames(Box<FramesView>),
+    Still(Box<StillView>),
+}
+
+/// Frames in real time.
+struct FramesView {
+    realtime: Realtime,
+    shown: DisplayMode,
+    /// Frames since camera and scene last moved.
+    resting: u32,
+    /// Number of those after which the image no longer changes.
+    settling: u32,
+}
+
+/// A still that converges.
+struct StillView {
+    integrator: &'static dyn Integrator,
+    tile_mask: Option<Option<Arc<TileMask>>>,
+    state: Option<Arc<FilmState>>,
+    film: Film,
+}
+
+/// What a step of a view did.
+#[derive(Clone, Debug, Default)]
+pub struct ViewStep {
+    /// Device seconds of passes, in order.
+    pub timings: Vec<Timing>,
+    /// Rays traced: camera rays, and all others as far as they are known.
+    pub rays: [u64; 2],
+    /// Samples per pixel so far: the minimum of a still, the number of frames at rest of frames in real time.
+    pub samples: u32,
+    /// More steps do not change the image.
+    pub is_settled: bool,
+    /// Mean and maximum of BVH nodes visited per camera ray, if they are shown.
+    pub nodes: Option<(f64, u32)>,
+}
+
+/// An image to show: 8-bit sRGB, RGBA with alpha 255, rows from the top.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ViewPicture {
+    /// Width and height in pixels.
+    pub size: [u32; 2],
+    /// Four bytes per pixel.
+    pub rgba: Vec<u8>,
+}
+
+/// The linear values of a view, to be compared with those of another one.
+#[derive(Clone, Debug, Default)]
+pub struct ViewValues {
+    /// Width and height in pixels.
+    pub size: [u32; 2],
+    /// 1 (ambient visibility) or 3 (linear RGB).
+    pub channels: usize,
+    /// Values, channels interleaved, rows from the top.
+    pub values: Vec<f32>,
+    /// 1 where a pixel shows the scene, 0 for background.
+    pub coverage: Vec<f32>,
+    /// Variance of each value, estimated from the samples; `None` where a filter has mixed pixels.
+    pub variance: Option<Vec<f32>>,
+}
+
+impl View {
+    /// Creates a view: frames in real time if the settings select them, else a still. The size is in pixels, whatever the settings say.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for settings that have no effect together; those of the device and of `control`.
+    pub fn new(
+        session: &mut Interactive,
+        settings: &RenderSettings,
+        size: [u32; 2],
+        control: &mut dyn Control,
+    ) -> Result<Self> {
+        settings.check()?;
+        output::check_size(size[0], size[1])?;
+        let is_frames = settings.realtime_setting().is_some();
+        let (world, kind) =
+            if is_frames { Self::frames(session, settings, size, control)? } else { Self::still(session, settings, control)? };
+        Ok(Self { settings: settings.clone(), size, camera: None, world, pose: 0, kind })
+    }
+
+    fn frames(
+        session: &mut Interactive,
+        settings: &RenderSettings,
+        size: [u32; 2],
+        control: &mut dyn Control,
+    ) -> Result<(u32, Kind)> {
+        let mut how = frame_settings(settings)?;
+        if session.device.info.is_cpu() {
+            how.launch_rays = CPU_LAUNCH_RAYS;
+        }
+        let shown = settings.frames.show.unwrap_or_default();
+        let needs = frame_needs(&how, &settings.image.aov);
+        let world = session.world(crate::accel::features::Blend::Masked, needs, Realtime::streams(&how).to_vec(), control)?;
+        let world = &session.worlds[world];
+        let mut realtime = Realtime::new(&world.tracer, size, &how, &point_lights(session.scene, &world.flat))?;
+        let exposure = settings.picture.exposure.unwrap_or(0.0) as f32;
+        let display = Display { shown, exposure, unit: UNIT_OF_SCENE * scene_size(session.scene) as f32 };
+        realtime.display(&world.tracer, Some(display))?;
+        let view = FramesView { realtime, shown, resting: 0, settling: settling_frames(&how) };
+        Ok((world.number, Kind::Frames(Box::new(view))))
+    }
+
+    fn still(session: &mut Interactive, settings: &RenderSettings, control: &mut dyn Control) -> Result<(u32, Kind)> {
+        let integrator = settings.integrator().get();
+        let how = &settings.integrators;
+        let world = session.world(integrator.blend(), integrator.needs(how), integrator.streams(how), control)?;
+        let view = StillView { integrator, tile_mask: None, state: None, film: Film::default() };
+        Ok((session.worlds[world].number, Kind::Still(Box::new(view))))
+    }
+
+    /// Width and height in pixels.
+    pub fn size(&self) -> [u32; 2] {
+        self.size
+    }
+
+    /// Samples per pixel so far: the minimum of a still, or of frames in real time those of the longest history.
+    pub fn samples(&self) -> u32 {
+        match &self.kind {
+            Kind::Frames(view) => {
+                ((view.resting + 1).min(view.realtime.settings().history)) * view.realtime.settings().rays_per_pixel
+            }
+            Kind::Still(view) => view.film.samples.iter().copied().min().unwrap_or(0),
+        }
+    }
+
+    /// The settings that it was created with.
+    pub fn settings(&self) -> &RenderSettings {
+        &self.settings
+    }
+
+    /// Returns true for frames in real time, which keep what they know while the camera moves; a still starts anew.
+    pub fn is_realtime(&self) -> bool {
+        matches!(self.kind, Kind::Frames(_))
+    }
+
+    /// Returns true if the session has replaced its tracer: it must be created anew.
+    pub fn is_stale(&self, session: &Interactive) -> bool {
+        !session.worlds.iter().any(|w| w.number == self.world)
+    }
+
+    /// Discards what it knows of earlier frames.
+    pub fn reset(&mut self) {
+        match &mut self.kind {
+            Kind::Frames(view) => {
+                view.realtime.rewind();
+                view.resting = 0;
+            }
+            Kind::Still(view) => view.restart(),
+        }
+    }
+
+    /// Renders the next step: a frame, or samples of a still for about `time`, at least one of each pixel. `control` may interrupt it, after which the
+    /// view starts anew.
+    ///
+    /// # Errors
+    /// Those of the device and of `control`, usually [`Error::Interrupted`].
+    pub fn step(
+        &mut self,
+        session: &Interactive,
+        camera: &Camera,
+        time: Duration,
+        control: &mut dyn Control,
+    ) -> Result<ViewStep> {
+        let gone = || Error::Usage("the view's scene is no longer loaded".into());
+        let world = session.worlds.iter().find(|w| w.number == self.world).ok_or_else(gone)?;
+        let has_moved = self.pose != world.pose;
+        let rests = self.camera.as_ref() == Some(camera) && !has_moved;
+        self.camera = Some(camera.clone());
+        self.pose = world.pose;
+        match &mut self.kind {
+            Kind::Frames(view) => {
+                let aspect = f64::from(self.size[0]) / f64::from(self.size[1]);
+                let record = CameraRecord::new(camera, world.flat.origin, aspect);
+                let moved = if has_moved { &world.moved[..] } else { &[] };
+                view.resting = if rests { view.resting.saturating_add(1) } else { 0 };
+                view.step(world, &record, moved, control)
+            }
+            Kind::Still(view) => {
+                if !rests {
+                    view.restart();
+                }
+                let job = RenderJob {
+                    scene: session.scene,
+                    camera,
+                    size: self.size,
+                    spp: MAX_SPP,
+                    seed: self.settings.seed(),
+                    settings: &self.settings.integrators,
+                    time_limit: Some(time),
+                    keep_rays: false,
+                    film: FilmOptions { start: view.state.clone(), keep_state: true, ..Default::default() },
+                };
+                view.step(world, &job, control)
+            }
+        }
+    }
+
+    /// The image as it is after the last step; `None` before the first.
+    ///
+    /// # Errors
+    /// Those of the device.
+    pub fn picture(&self) -> Result<Option<ViewPicture>> {
+        if self.camera.is_none() {
+            return Ok(None);
+        }
+        let [width, height] = self.size;
+        let rgba = match &self.kind {
+            Kind::Frames(view) => match view.realtime.displayed() {
+                Some(buffer) => buffer.read(0, 4 * u64::from(width) * u64::from(height))?,
+                None => return Ok(None),
+            },
+            Kind::Still(view) if view.state.is_none() => return Ok(None),
+            Kind::Still(view) => {
+                let image = view.image(self.size);
+                let shown = view.integrator.picture(&image, &self.settings.picture.options());
+                let (bytes, colour) = png::bytes_of(&shown, 0.0, Path::new("view"))?;
+                match colour {
+                    png::Colour::Grey => bytes.iter().flat_map(|&g| [g, g, g, 255]).collect(),
+                    png::Colour::Rgb => bytes.chunks_exact(3).flat_map(|p| [p[0], p[1], p[2], 255]).collect(),
+                }
+            }
+        };
+        Ok(Some(ViewPicture { size: self.size, rgba }))
+    }
+
+    /// The values of the image after the last step.
+    ///
+    /// # Errors
+    /// Those of the device.
+    pub fn values(&self) -> Result<ViewValues> {
+        let size = self.size;
+        Ok(match &self.kind {
+            Kind::Frames(view) => {
+                let realtime = &view.realtime;
+                let is_filtered = realtime.settings().filter.kind != crate::realtime::FilterKind::None
+                    || realtime.settings().technique != Technique::Traced;
+                ViewValues {
+                    size,
+                    channels: 1,
+                    values: realtime.result()?,
+                    coverage: realtime.coverage()?,
+                    variance: if is_filtered { None } else { Some(realtime.variances()?) },
+                }
+            }
+            Kind::Still(view) => {
+                let film = &view.film;
+                let channels = film.channels.max(1);
+                let of = |(k, v): (usize, &f32)| v / film.samples[k / channels].max(1) as f32;
+                ViewValues {
+                    size,
+                    channels,
+                    values: film.mean.clone(),
+                    coverage: film.coverage.iter().map(|c| if *c > 0.0 { 1.0 } else { 0.0 }).collect(),
+                    variance: Some(film.variance.iter().enumerate().map(of).collect()),
+                }
+            }
+        })
+    }
+
+    /// The image with all channels, as files hold it.
+    ///
+    /// # Errors
+    /// Those of the device and of `control`.
+    pub fn image(&self, session: &Interactive, control: &mut dyn Control) -> Result<Image> {
+        let f32s = |name: &str, samples| Channel { name: name.into(), samples: Samples::F32(samples) };
+        let mut image = match &self.kind {
+            Kind::Frames(view) => {
+                let realtime = &view.realtime;
+                let channels =
+                    vec![f32s("Y", realtime.result()?), f32s("A", realtime.coverage()?), f32s("samples", realtime.samples()?)];
+                Image { width: self.size[0], height: self.size[1], channels, metadata: Vec::new() }
+            }
+            Kind::Still(view) => view.image(self.size),
+        };
+        let world = session.worlds.iter().find(|w| w.number == self.world);
+        if let (Some(world), Some(camera)) = (world, &self.camera) {
+            let aspect = f64::from(self.size[0]) / f64::from(self.size[1]);
+            let record = CameraRecord::new(camera, world.flat.origin, aspect);
+            let wanted = [Aov::Depth, Aov::Position, Aov::Ng, Aov::Ids];
+            let pixels = crate::integrators::aov::render(&world.tracer, &record, self.size, control)?;
+            image.channels.extend(crate::integrators::aov::channels(&wanted, &pixels, world.flat.origin));
+            let flags = render_flags(session.name, &self.settings, &session.scene.cameras, camera, self.size);
+            image.metadata = vec![
+                ("camera".into(), crate::renderer::still::camera_text(camera)),
+                ("command".into(), flags),
+                ("scene".into(), session.name.to_owned()),
+                ("version".into(), env!("CARGO_PKG_VERSION").into()),
+            ];
+        }
+        Ok(image)
+    }
+}
+
+impl FramesView {
+    fn step(
+        &mut self,
+        world: &World,
+        camera: &CameraRecord,
+        moved: &[crate::tracer::MovedBounds],
+        control: &mut dyn Control,
+    ) -> Result<ViewStep> {
+        let FrameStats { timings, primary_rays, occlusion_rays, nodes, .. } =
+            self.realtime.frame_with(&world.tracer, camera, moved, Some(control))?;
+        Ok(ViewStep {
+            timings,
+            rays: [primary_rays, occlusion_rays],
+            samples: self.resting + 1,
+            is_settled: self.resting >= self.settling,
+            nodes: nodes.filter(|_| self.shown == DisplayMode::Nodes).map(|n| (n.mean, n.max)),
+        })
+    }
+}
+
+impl StillView {
+    fn restart(&mut self) {
+        (self.state, self.tile_mask) = (None, None);
+    }
+
+    fn step(&mut self, world: &World, job: &RenderJob, control: &mut dyn Control) -> Result<ViewStep> {
+        let skips = self.integrator.skips_empty_tiles(job);
+        let record = job.camera_record(&world.flat);
+        let make = || if skips { TileMask::new(&world.flat, &record, job.size, job.spp).map(Arc::new) } else { None };
+        let tile_mask = self.tile_mask.get_or_insert_with(make).clone();
+        let rendered = match self.integrator.render(&world.tracer, &world.flat, job, tile_mask, control) {
+            Ok(rendered) => rendered.image,
+            Err(e) => {
+                self.restart();
+                return Err(e);
+            }
+        };
+        (self.film, self.state) = (rendered.film, rendered.state.map(Arc::new));
+        Ok(ViewStep {
+            timings: rendered.device_seconds.iter().map(|&(label, seconds)| Timing { label, seconds }).collect(),
+            rays: [rendered.primary_rays, 0],
+            samples: rendered.spp,
+            is_settled: rendered.spp >= MAX_SPP,
+            nodes: None,
+        })
+    }
+
+    fn image(&self, size: [u32; 2]) -> Image {
+        let names = self.integrator.channels();
+        let f32s = |name: &str, samples| Channel { name: name.into(), samples: Samples::F32(samples) };
+        let mut channels: Vec<_> = names.iter().enumerate().map(|(c, name)| f32s(name, self.film.plane(c))).collect();
+        channels.push(f32s("A", self.film.coverage.clone()));
+        Image { width: size[0], height: size[1], channels, metadata: Vec::new() }
+    }
+}
+
+/// The command that renders what a view shows: `skylit render SCENE ...`, quoted for a shell.
+pub fn render_flags(name: &str, settings: &RenderSettings, cameras: &[Camera], camera: &Camera, size: [u32; 2]) -> String {
+    let mut settings = settings.clone();
+    settings.image.size = Some(size);
+    settings.camera = camera_settings(cameras, camera);
+    let is_frames = settings.realtime_setting().is_some();
+    let output = if is_frames || settings.integrator().name() == "ao" { "ao" } else { settings.integrator().name() };
+    let words = ["skylit".into(), "render".into(), name.to_owned(), "-o".into(), format!("{output}.png")];
+    words.into_iter().chain(settings.flags()).map(|w| quoted(&w)).collect::<Vec<_>>().join(" ")
+}
+
+/// The settings that choose this camera: the name of one of the file's, or position, target, up vector and field of view. The place of an orthographic camera that is
+/// not one of the file's cannot be said.
+pub fn camera_settings(cameras: &[Camera], camera: &Camera) -> CameraSettings {
+    if let Some(index) = cameras.iter().position(|c| c == camera) {
+        return CameraSettings { camera: Some(index.to_string()), ..Default::default() };
+    }
+    let to_world = &camera.camera_to_world;
+    let fov_y = match camera.projection {
+        Projection::Perspective { fov_y } => Some(fov_y.to_degrees()),
+        Projection::Orthographic { .. } => None,
+    };
+    let (eye, forward) = (to_world.translation, -to_world.matrix3.z_axis);
+    // far enough for the direction to survive the sum
+    let distance = eye.abs().max_element().max(1.0);
+    CameraSettings {
+        camera: None,
+        eye: Some(eye),
+        target: Some(eye + forward * distance),
+        up: Some(to_world.matrix3.y_axis),
+        fov_y,
+    }
+}
+
+/// A word as a POSIX shell takes it.
+fn quoted(word: &str) -> String {
+    let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_./,:=+@%".contains(c);
+    if !word.is_empty() && word.chars().all(is_plain) { word.to_owned() } else { format!("'{}'", word.replace('\'', "'\\''")) }
+}

@@ -1,0 +1,116 @@
+//! Images beneath the user interface: where they are on the screen, and how a CPU puts them there.
+
+use std::sync::Arc;
+
+use crate::renderer::interactive::ViewPicture;
+
+/// Background where there is no image, `0x00RRGGBB`.
+pub const BACKGROUND: u32 = 0x0010_1010;
+
+/// An image on the screen, beneath the user interface.
+#[derive(Clone, Debug)]
+pub struct Layer {
+    /// The image.
+    pub picture: Arc<ViewPicture>,
+    /// Left, top, right and bottom of where all of it would be, in physical pixels.
+    pub area: [i32; 4],
+    /// What of that is visible.
+    pub clip: [i32; 4],
+}
+
+/// A frame buffer: `0x00RRGGBB` words, rows from the top.
+pub struct FrameBuffer<'a> {
+    /// Width and height in pixels.
+    pub size: [usize; 2],
+    /// Its pixels.
+    pub words: &'a mut [u32],
+}
+
+impl Layer {
+    /// Copies the image into a frame buffer, scaled: bilinear where it is enlarged, exact where sizes are equal.
+    pub fn draw(&self, to: &mut FrameBuffer) {
+        let [width, height] = self.picture.size.map(|n| n as usize);
+        let [left, top, right, bottom] = self.area;
+        if width == 0 || height == 0 || right <= left || bottom <= top || self.picture.rgba.len() < 4 * width * height {
+            return;
+        }
+        let clip =
+            |at: i32, k: usize, most: usize| (at.max(self.area[k % 2]).min(self.area[k % 2 + 2]).max(0) as usize).min(most);
+        let [x0, x1] = [self.clip[0], self.clip[2]].map(|x| clip(x, 0, to.size[0]));
+        let [y0, y1] = [self.clip[1], self.clip[3]].map(|y| clip(y, 1, to.size[1]));
+        let source: &[u8] = &self.picture.rgba;
+        let is_same = [right - left, bottom - top] == self.picture.size.map(|n| n as i32);
+        // positions of pixel centres in the image, in 1/256 pixel from the centre of its first
+        let along = |at: usize, start: i32, end: i32, n: usize| -> (usize, usize, u32) {
+            let position = ((at as i64 - i64::from(start)) * 2 + 1) * 128 * n as i64 / i64::from(end - start) - 128;
+            let position = position.clamp(0, (n as i64 - 1) * 256);
+            let k = (position / 256) as usize;
+            (k, (k + 1).min(n - 1), (position % 256) as u32)
+        };
+        let columns: Vec<_> = (x0..x1).map(|x| along(x, left, right, width)).collect();
+        for y in y0..y1 {
+            let row = &mut to.words[y * to.size[0]..][x0..x1];
+            if is_same {
+                let first = 4 * ((y as i32 - top) as usize * width + (x0 as i32 - left) as usize);
+                for (word, p) in row.iter_mut().zip(source[first..].chunks_exact(4)) {
+                    *word = u32::from(p[0]) << 16 | u32::from(p[1]) << 8 | u32::from(p[2]);
+                }
+                continue;
+            }
+            let (above, below, v) = along(y, top, bottom, height);
+            let [above, below] = [above, below].map(|k| &source[4 * k * width..][..4 * width]);
+            for (word, &(a, b, u)) in row.iter_mut().zip(&columns) {
+                // two channels at a time
+                let pair = |row: &[u8], k: usize, c: usize| u32::from(row[4 * k + c]);
+                let mix = |c: usize| {
+                    let of = |row: &[u8]| pair(row, a, c) * (256 - u) + pair(row, b, c) * u;
+                    (of(above) * (256 - v) + of(below) * v + (1 << 15)) >> 16
+                };
+                *word = mix(0) << 16 | mix(1) << 8 | mix(2);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn picture(size: [u32; 2], of: impl Fn(u32, u32) -> u8) -> Arc<ViewPicture> {
+        let pixels = (0..size[1]).flat_map(|y| (0..size[0]).map(move |x| (x, y)));
+        Arc::new(ViewPicture { size, rgba: pixels.flat_map(|(x, y)| [of(x, y), 0, 7, 255]).collect() })
+    }
+
+    fn drawn(layer: &Layer, size: [usize; 2]) -> Vec<u32> {
+        let mut words = vec![0x0055_0000; size[0] * size[1]];
+        layer.draw(&mut FrameBuffer { size, words: &mut words });
+        words
+    }
+
+    #[test]
+    fn equal_sizes_are_copied_within_the_clip() {
+        let layer = Layer { picture: picture([4, 3], |x, y| (10 * y + x) as u8), area: [1, 1, 5, 4], clip: [2, 0, 9, 3] };
+        let words = drawn(&layer, [6, 5]);
+        for y in 0..5 {
+            for x in 0..6 {
+                let inside = (2..5).contains(&x) && (1..3).contains(&y);
+                let expected = if inside { ((10 * (y - 1) + x - 1) as u32) << 16 | 7 } else { 0x0055_0000 };
+                assert_eq!(words[y * 6 + x], expected, "{x} {y}");
+            }
+        }
+    }
+
+    #[test]
+    fn enlarged_images_are_smooth_and_keep_constants() {
+        let flat = Layer { picture: picture([3, 2], |_, _| 200), area: [0, 0, 31, 17], clip: [0, 0, 31, 17] };
+        assert!(drawn(&flat, [31, 17]).iter().all(|w| *w == 200 << 16 | 7));
+        let ramp = Layer { picture: picture([2, 1], |x, _| 100 * x as u8), area: [0, 0, 8, 1], clip: [0, 0, 8, 1] };
+        let reds: Vec<u32> = drawn(&ramp, [8, 1]).iter().map(|w| w >> 16).collect();
+        assert_eq!(reds, [0, 0, 13, 38, 63, 88, 100, 100]);
+        // beyond the frame buffer, turned over, empty
+        for (area, clip) in [([-5, -5, 90, 90], [-9, -9, 99, 99]), ([5, 5, 1, 1], [0, 0, 8, 8]), ([0, 0, 8, 8], [7, 7, 2, 2])] {
+            drawn(&Layer { picture: picture([2, 2], |_, _| 1), area, clip }, [8, 8]);
+        }
+        drawn(&Layer { picture: Arc::default(), area: [0, 0, 8, 8], clip: [0, 0, 8, 8] }, [8, 8]);
+    }
+}

@@ -1,0 +1,130 @@
+//! Windows over the image: files, help.
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use egui::{Align2, Context, Key, Ui};
+
+use crate::error::Result;
+use crate::renderer::RenderSettings;
+use crate::viewer::app::{App, Dialog};
+use crate::viewer::request::Task;
+
+/// Keys and mouse, for the help window and docs/viewer.md.
+pub const CONTROLS: &[(&str, &str)] = &[
+    ("Drag", "orbit around the pivot"),
+    ("Shift + drag, middle drag", "move sideways and up"),
+    ("Right drag", "look around"),
+    ("Wheel, pinch", "come closer, go back"),
+    ("W A S D, Q E", "fly forward, left, back, right, down and up (Shift: faster)"),
+    ("Arrow keys", "orbit"),
+    ("Click", "describe what is under the pointer"),
+    ("Double click", "come closer to what is under the pointer, and orbit it"),
+    ("F", "frame the whole scene"),
+    ("B", "keep the camera"),
+    ("U", "turntable"),
+    ("1 to 5", "fast, balanced, quality, path, converged AO"),
+    ("X", "split: two images side by side; drag the line between them"),
+    ("Space", "flicker: show the other image"),
+    ("T", "compare with the truth"),
+    ("P", "play or stop the animation"),
+    ("N", "show or hide the panel"),
+    ("F5", "pause rendering"),
+    ("Ctrl+C", "copy the command that renders this view"),
+    ("Ctrl+O, Ctrl+S, Ctrl+R, Ctrl+Q", "open, save, reload, quit"),
+    ("Ctrl + plus, Ctrl + minus", "size of the text"),
+    ("Tab, Enter", "go through all controls, use them"),
+    ("?, Escape", "this help, close a window"),
+];
+
+/// Shows what is open.
+pub fn show(app: &mut App, context: &Context) {
+    if context.input(|i| i.key_pressed(Key::Escape)) {
+        (app.dialog, app.shows_help) = (None, false);
+    }
+    let mut open = app.shows_help;
+    egui::Window::new("Keys and mouse").open(&mut open).collapsible(false).anchor(Align2::CENTER_CENTER, [0.0, 0.0]).show(
+        context,
+        |ui| {
+            egui::ScrollArea::vertical().max_height(500.0).show(ui, |ui| {
+                egui::Grid::new("controls").num_columns(2).striped(true).show(ui, |ui| {
+                    for (input, effect) in CONTROLS {
+                        ui.strong(*input);
+                        ui.label(*effect);
+                        ui.end_row();
+                    }
+                });
+            });
+        },
+    );
+    app.shows_help = open;
+    if let Some(dialog) = app.dialog.clone() {
+        show_dialog(app, context, dialog);
+    }
+}
+
+fn show_dialog(app: &mut App, context: &Context, mut dialog: Dialog) {
+    let (title, label, action, text) = match &mut dialog {
+        Dialog::Open(text) => ("Open a scene", "A file (.gltf, .glb, .obj, .brhan) or builtin:NAME", "Open", text),
+        Dialog::Save(text) => ("Save the image", "A file: .png as shown, .exr with all channels", "Save", text),
+        Dialog::LoadSettings(text) => ("Load settings", "A file of settings (.json)", "Load", text),
+        Dialog::SaveSettings(text) => ("Save settings", "A file of settings (.json)", "Save", text),
+        Dialog::Render(text, _) => ("Render this view", "A file: .png, .exr, .apng or frames.####.png", "Render", text),
+    };
+    let (mut open, mut done, before) = (true, false, app.dialog.clone());
+    egui::Window::new(title)
+        .open(&mut open)
+        .collapsible(false)
+        .resizable(false)
+        .anchor(Align2::CENTER_CENTER, [0.0, 0.0])
+        .show(context, |ui: &mut Ui| {
+            let heading = ui.label(label);
+            let edit = ui.add(egui::TextEdit::singleline(text).desired_width(420.0)).labelled_by(heading.id);
+            if !edit.has_focus() && !edit.lost_focus() && ui.memory(|m| m.focused().is_none()) {
+                edit.request_focus();
+            }
+            done = edit.lost_focus() && ui.input(|i| i.key_pressed(Key::Enter));
+            done |= ui.button(action).clicked();
+        });
+    if !open {
+        app.dialog = None;
+    } else if done {
+        app.dialog = None;
+        act(app, dialog);
+    } else if app.dialog == before {
+        app.dialog = Some(dialog);
+    }
+}
+
+fn act(app: &mut App, dialog: Dialog) {
+    match dialog {
+        Dialog::Open(text) if text.trim().is_empty() => {}
+        Dialog::Open(text) => app.open(text.trim()),
+        Dialog::Save(text) => app.task(Task::Save { pane: usize::from(app.shows_second), path: PathBuf::from(text.trim()) }),
+        Dialog::Render(text, options) => app.render(text.trim(), &options),
+        Dialog::LoadSettings(text) => match RenderSettings::load(Path::new(text.trim())) {
+            Ok(settings) => {
+                app.lighting = settings.lighting.clone();
+                app.settings = settings;
+                app.say(format!("loaded {}", text.trim()), false);
+            }
+            Err(e) => app.say(e.to_string(), true),
+        },
+        Dialog::SaveSettings(text) => match save_settings(app, Path::new(text.trim())) {
+            Ok(()) => app.say(format!("saved {}", text.trim()), false),
+            Err(e) => app.say(e.to_string(), true),
+        },
+    }
+}
+
+fn save_settings(app: &App, path: &Path) -> Result<()> {
+    let mut settings = app.shown_settings();
+    if let (Some(scene), Some(control)) = (&app.scene, &app.control) {
+        settings.camera = crate::renderer::interactive::camera_settings(&scene.cameras, control.camera());
+    }
+    crate::files::write_atomically(path, |file| {
+        let mut text = serde_json::to_vec_pretty(&settings)?;
+        text.push(b'\n');
+        file.write_all(&text)
+    })
+}

@@ -1,0 +1,235 @@
+//! The menu.
+
+use egui::{Button, KeyboardShortcut, Ui};
+
+use crate::scene::builtin;
+use crate::viewer::app::{App, Arrangement, Dialog};
+
+/// Keys of the commands in menus.
+pub mod shortcuts {
+    use egui::{Key, KeyboardShortcut, Modifiers};
+
+    /// Opens a scene.
+    pub const OPEN: KeyboardShortcut = KeyboardShortcut::new(Modifiers::COMMAND, Key::O);
+    /// Loads the scene anew.
+    pub const RELOAD: KeyboardShortcut = KeyboardShortcut::new(Modifiers::COMMAND, Key::R);
+    /// Saves the image.
+    pub const SAVE: KeyboardShortcut = KeyboardShortcut::new(Modifiers::COMMAND, Key::S);
+    /// Closes the window.
+    pub const QUIT: KeyboardShortcut = KeyboardShortcut::new(Modifiers::COMMAND, Key::Q);
+}
+
+fn item(ui: &mut Ui, text: &str, shortcut: Option<&KeyboardShortcut>, key: &str) -> bool {
+    let mut button = Button::new(text);
+    let text = shortcut.map_or_else(|| key.to_owned(), |s| ui.ctx().format_shortcut(s));
+    if !text.is_empty() {
+        button = button.shortcut_text(text);
+    }
+    let clicked = ui.add(button).clicked();
+    if clicked {
+        ui.close();
+    }
+    clicked
+}
+
+/// Base name for files of the scene.
+pub fn stem(app: &App) -> String {
+    let source = app.scene.as_ref().map_or("image", |s| s.source.as_str());
+    let name = source.trim_start_matches("builtin:").replace(':', "-");
+    std::path::Path::new(&name).file_stem().map_or_else(|| "image".into(), |s| s.to_string_lossy().into_owned())
+}
+
+/// Shows the menu.
+pub fn show(app: &mut App, ui: &mut Ui) {
+    egui::MenuBar::new().ui(ui, |ui| {
+        ui.menu_button("File", |ui| file(app, ui));
+        ui.menu_button("View", |ui| view(app, ui));
+        ui.menu_button("Camera", |ui| camera(app, ui));
+        ui.menu_button("Help", |ui| {
+            if item(ui, "Keys and mouse", None, "?") {
+                app.shows_help = true;
+            }
+        });
+    });
+}
+
+fn file(app: &mut App, ui: &mut Ui) {
+    if item(ui, "Open…", Some(&shortcuts::OPEN), "") {
+        app.dialog = Some(Dialog::Open(String::new()));
+    }
+    let mut opened = None;
+    ui.menu_button("Open recent", |ui| {
+        for source in &app.recent {
+            if item(ui, source, None, "") {
+                opened = Some(source.clone());
+            }
+        }
+    });
+    ui.menu_button("Built-in scenes", |ui| {
+        egui::ScrollArea::vertical().max_height(400.0).show(ui, |ui| {
+            for info in builtin::names() {
+                if item(ui, info.name, None, "") {
+                    opened = Some(format!("builtin:{}", info.name));
+                }
+            }
+        });
+    });
+    if let Some(source) = opened {
+        app.open(&source);
+    }
+    if item(ui, "Reload", Some(&shortcuts::RELOAD), "") {
+        app.reload();
+    }
+    ui.separator();
+    if item(ui, "Save image…", Some(&shortcuts::SAVE), "") {
+        app.dialog = Some(Dialog::Save(format!("{}.png", stem(app))));
+    }
+    if item(ui, "Render this view…", None, "") {
+        app.dialog = Some(Dialog::Render(format!("{}.exr", stem(app)), Vec::new()));
+    }
+    ui.add_enabled_ui(app.shown_settings().realtime_setting().is_some(), |ui| {
+        if item(ui, "Render a turntable…", None, "") {
+            let options = ["--orbit", "120", "--frames", "0..120"].map(str::to_owned).to_vec();
+            app.dialog = Some(Dialog::Render(format!("{}.turntable.apng", stem(app)), options));
+        }
+        let animation = app.playback.animation.and_then(|k| Some((k, app.scene.as_ref()?.animations.get(k)?.1)));
+        ui.add_enabled_ui(animation.is_some(), |ui| {
+            if item(ui, "Render the animation…", None, "") {
+                let (k, duration) = animation.unwrap_or_default();
+                let frames = (30.0 * duration).ceil().max(1.0) as u32;
+                let options = ["--animate".into(), k.to_string(), "--frames".into(), format!("0..{frames}")].to_vec();
+                app.dialog = Some(Dialog::Render(format!("{}.apng", stem(app)), options));
+            }
+        });
+    });
+    if item(ui, "Copy the command that renders this view", None, "Ctrl+C") {
+        copy_command(app);
+    }
+    ui.separator();
+    if item(ui, "Load settings…", None, "") {
+        app.dialog = Some(Dialog::LoadSettings("settings.json".into()));
+    }
+    if item(ui, "Save settings…", None, "") {
+        app.dialog = Some(Dialog::SaveSettings("settings.json".into()));
+    }
+    ui.separator();
+    if item(ui, "Quit", Some(&shortcuts::QUIT), "") {
+        app.closes = true;
+    }
+}
+
+/// Puts the command that renders what is shown on the clipboard.
+pub fn copy_command(app: &mut App) {
+    if let Some(command) = app.command() {
+        app.say(format!("copied: {command}"), false);
+        app.copied = Some(command);
+    }
+}
+
+/// Switches between one image and two.
+pub fn toggle_split(app: &mut App) {
+    app.arrangement = match app.arrangement {
+        Arrangement::Single => Arrangement::Split(0.5),
+        Arrangement::Split(_) => Arrangement::Single,
+    };
+    app.shows_second = false;
+}
+
+fn view(app: &mut App, ui: &mut Ui) {
+    if item(ui, "Split: one image or two", None, "X") {
+        toggle_split(app);
+    }
+    if item(ui, "Flicker: show the other image", None, "Space") {
+        app.shows_second = !app.shows_second;
+    }
+    if item(ui, "Compare with the truth", None, "T") {
+        app.compares = !app.compares;
+    }
+    if item(ui, "Pause rendering", None, "F5") {
+        app.is_paused = !app.is_paused;
+    }
+    ui.separator();
+    if item(ui, "Panel at the side", None, "N") {
+        app.shows_panel = !app.shows_panel;
+    }
+    ui.menu_button("Theme", |ui| {
+        let mut theme = ui.ctx().options(|o| o.theme_preference);
+        let before = theme;
+        for (choice, name) in [
+            (egui::ThemePreference::System, "As the system"),
+            (egui::ThemePreference::Dark, "Dark"),
+            (egui::ThemePreference::Light, "Light"),
+        ] {
+            ui.radio_value(&mut theme, choice, name);
+        }
+        if theme != before {
+            ui.ctx().set_theme(theme);
+        }
+    });
+    ui.menu_button("Size of text", |ui| {
+        for percent in [100u16, 125, 150, 200] {
+            let factor = f32::from(percent) / 100.0;
+            if ui.radio(ui.ctx().zoom_factor() == factor, format!("{percent} %")).clicked() {
+                ui.ctx().set_zoom_factor(factor);
+            }
+        }
+    });
+}
+
+fn camera(app: &mut App, ui: &mut Ui) {
+    let Some(scene) = app.scene.clone() else {
+        ui.label("no scene is loaded");
+        return;
+    };
+    if item(ui, "Frame the whole scene", None, "F") {
+        frame_all(app);
+    }
+    if item(ui, "Turntable", None, "U") {
+        app.turntable = if app.turntable == 0.0 { 0.5 } else { 0.0 };
+    }
+    if !scene.cameras.is_empty() {
+        ui.separator();
+        for (k, camera) in scene.cameras.iter().enumerate() {
+            let name = if camera.name.is_empty() { format!("Camera {k}") } else { camera.name.clone() };
+            if item(ui, &name, None, "") {
+                set_camera(app, camera.clone(), Some(k));
+            }
+        }
+    }
+    ui.separator();
+    if item(ui, "Keep this camera", None, "B") {
+        keep_camera(app);
+    }
+    for (name, camera) in app.bookmarks.clone() {
+        if item(ui, &name, None, "") {
+            set_camera(app, camera, None);
+        }
+    }
+}
+
+/// Keeps the camera as a bookmark.
+pub fn keep_camera(app: &mut App) {
+    if let Some(control) = &app.control {
+        let name = format!("Kept camera {}", app.bookmarks.len() + 1);
+        app.bookmarks.push((name.clone(), control.camera().clone()));
+        app.say(format!("{name}: in the menu Camera"), false);
+    }
+}
+
+/// Moves the camera to another one.
+pub fn set_camera(app: &mut App, camera: crate::scene::Camera, followed: Option<usize>) {
+    let centre = app.scene.as_ref().map(|s| (s.bounds.0 + s.bounds.1) * 0.5).unwrap_or_default();
+    if let Some(control) = &mut app.control {
+        control.set_camera(camera, centre);
+        app.followed = followed;
+    }
+}
+
+/// Moves the camera to where it sees the whole scene from outside.
+pub fn frame_all(app: &mut App) {
+    let [width, height] = app.size();
+    if let Some(scene) = &app.scene {
+        let (lo, hi) = scene.bounds;
+        set_camera(app, crate::scene::Camera::framing(lo, hi, f64::from(width.max(1)) / f64::from(height.max(1))), None);
+    }
+}

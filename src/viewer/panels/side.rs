@@ -1,0 +1,392 @@
+//! The panel at the side: techniques, settings, light, animation, device, performance, selection.
+
+use egui::{CollapsingHeader, ComboBox, Slider, Ui};
+
+use super::{editor, performance, round};
+use crate::integrators::Integrator;
+use crate::settings::{Capability, Setting};
+use crate::tracer::TracerChoice;
+use crate::viewer::app::{App, Second};
+use crate::viewer::technique::{GROUPS, Technique};
+
+/// Shows all sections.
+pub fn show(app: &mut App, ui: &mut Ui) {
+    section(ui, "Images", true, |ui| images(app, ui));
+    section(ui, "Ambient occlusion", true, |ui| occlusion(app, ui));
+    section(ui, "Comparison with the truth", false, |ui| truth(app, ui));
+    section(ui, "Real-time frames", false, |ui| frames(app, ui));
+    section(ui, "Paths", false, |ui| paths(app, ui));
+    section(ui, "Picture", false, |ui| {
+        editor::edit(ui, app.settings.picture.editable(), &serde_json::json!({ "tone_map": "linear", "exposure": 0.0 }));
+    });
+    section(ui, "Light", false, |ui| light(app, ui));
+    section(ui, "Camera", false, |ui| camera(app, ui));
+    section(ui, "Animation", false, |ui| animation(app, ui));
+    section(ui, "Device", false, |ui| device(app, ui));
+    section(ui, "Performance", false, |ui| performance::show(app, ui));
+    section(ui, "Selection", true, |ui| selection(app, ui));
+    section(ui, "Messages", false, |ui| {
+        for (_, text, is_error) in &app.messages {
+            let text = egui::RichText::new(text);
+            ui.label(if *is_error { text.color(ui.visuals().warn_fg_color) } else { text });
+        }
+    });
+}
+
+fn section(ui: &mut Ui, title: &str, is_open: bool, content: impl FnOnce(&mut Ui)) {
+    CollapsingHeader::new(title).default_open(is_open).show(ui, content);
+}
+
+/// A list of techniques. Returns the one that was chosen.
+fn choose_technique(
+    ui: &mut Ui,
+    label: &str,
+    shown: &str,
+    current: Option<Technique>,
+    holds: &dyn Fn(Technique) -> bool,
+) -> Option<Technique> {
+    let mut chosen = None;
+    ui.horizontal(|ui| {
+        let heading = ui.label(label);
+        let combo = ComboBox::from_id_salt(label).selected_text(shown).width(170.0).height(420.0);
+        let response = combo.show_ui(ui, |ui| {
+            let all = Technique::all();
+            for (k, title) in GROUPS.iter().enumerate() {
+                let of_group: Vec<Technique> =
+                    all.iter().filter(|(group, t)| *group == k && holds(*t)).map(|(_, t)| *t).collect();
+                if !of_group.is_empty() {
+                    ui.weak(*title);
+                }
+                for technique in of_group {
+                    let item = ui.selectable_label(current == Some(technique), technique.label());
+                    if item.on_hover_text(technique.help()).clicked() {
+                        chosen = Some(technique);
+                    }
+                }
+            }
+        });
+        response.response.labelled_by(heading.id);
+    });
+    chosen
+}
+
+fn images(app: &mut App, ui: &mut Ui) {
+    let shown = app.first.label();
+    if let Some(technique) = choose_technique(ui, "First image", &shown, Some(app.first), &|_| true) {
+        app.first = technique;
+    }
+    let shown = app.title(true);
+    let current = if let Second::Technique(t) = app.second { Some(t) } else { None };
+    if let Some(technique) = choose_technique(ui, "Second image", &shown, current, &|_| true) {
+        app.second = Second::Technique(technique);
+    }
+    ui.horizontal(|ui| {
+        ui.selectable_value(&mut app.second, Second::Truth, "Truth")
+            .on_hover_text("The second image is the truth of the first");
+        ui.selectable_value(&mut app.second, Second::HeatMap, "Heat map")
+            .on_hover_text("The second image is FLIP of the first against the truth");
+        let mut split = app.arrangement != crate::viewer::app::Arrangement::Single;
+        if ui.checkbox(&mut split, "Split").on_hover_text("Both images side by side (X)").changed() {
+            super::menu::toggle_split(app);
+        }
+    });
+    ui.horizontal(|ui| {
+        let mut holds = app.frame_rate.is_some();
+        let response = ui.checkbox(&mut holds, "Hold a frame rate").on_hover_text(
+            "While something moves, the resolution of the image is reduced so that frames come at this rate. At rest it is full. The controls are always sharp",
+        );
+        if response.changed() {
+            app.frame_rate = holds.then_some(app.default_frame_rate());
+        }
+        if let Some(rate) = &mut app.frame_rate {
+            let drag = egui::DragValue::new(rate).range(1.0..=240.0).speed(0.5).suffix(" frames/s");
+            ui.add(drag).labelled_by(response.id);
+        }
+    });
+}
+
+fn occlusion(app: &mut App, ui: &mut Ui) {
+    let size = app.control.as_ref().map_or(1.0, |c| c.scene_size());
+    let ao = &mut app.settings.integrators.ao;
+    ui.horizontal(|ui| {
+        let mut is_limited = ao.ao_radius.is_some();
+        let check = ui.checkbox(&mut is_limited, "Radius").on_hover_text(
+            "AO radius in scene units: hits beyond do not occlude. Without it, rays go on to infinity\n--ao-radius",
+        );
+        if check.changed() {
+            // a tenth of the scene: corners are dark, rooms are not
+            ao.ao_radius = is_limited.then(|| round(0.1 * size));
+        }
+        if let Some(radius) = &mut ao.ao_radius {
+            let slider = Slider::new(radius, round(1e-3 * size)..=round(2.0 * size)).logarithmic(true).suffix(" units");
+            ui.add(slider).labelled_by(check.id);
+        }
+    });
+    ui.horizontal(|ui| {
+        let mut falls_off = ao.ao_falloff.is_some();
+        let check = ui
+            .checkbox(&mut falls_off, "Falloff")
+            .on_hover_text("A hit at distance d occludes by C^-d instead of wholly; 1 is binary, the cheapest\n--ao-falloff");
+        if check.changed() {
+            // halved over a twentieth of the scene
+            ao.ao_falloff = falls_off.then(|| 2f64.powf((20.0 / size).min(30.0)));
+        }
+        if let Some(falloff) = &mut ao.ao_falloff {
+            let most = 2f64.powf((1000.0 / size).min(40.0)).max(2.0);
+            ui.add(Slider::new(falloff, 1.0..=most).logarithmic(true)).labelled_by(check.id);
+        }
+    });
+    let rest = ao.editable().into_iter().filter(|s| s.name == "ao_normal").collect();
+    editor::edit(ui, rest, &serde_json::json!({ "ao_normal": "geometric" }));
+}
+
+fn truth(app: &mut App, ui: &mut Ui) {
+    ui.checkbox(&mut app.compares, "Compare (T)").on_hover_text(
+        "While the camera rests, the truth converges beside the first image, in half of the time, and the difference is measured",
+    );
+    let shown = app.truth.label();
+    let is_truth = |t: Technique| matches!(t, Technique::Converged | Technique::Still(_));
+    if let Some(technique) = choose_technique(ui, "Truth", &shown, Some(app.truth), &is_truth) {
+        app.truth = technique;
+    }
+    if !app.compares_now() {
+        return;
+    }
+    let Some(c) = &app.comparison else {
+        ui.label("the truth is on its way …");
+        return;
+    };
+    egui::Grid::new("comparison").num_columns(2).striped(true).show(ui, |ui| {
+        let mut row = |name: &str, text: String, help: &str| {
+            ui.label(name).on_hover_text(help);
+            ui.label(text).on_hover_text(help);
+            ui.end_row();
+        };
+        row("RMSE", format!("{:.5}", c.rmse), "Root of the mean squared difference, over pixels that show the scene");
+        row("Bias", format!("{:+.5}", c.bias), "Mean difference: negative where the image is darker than the truth");
+        row("FLIP", format!("{:.5}", c.flip), "How different the two look to someone who flickers between them, 0 to 1");
+        let error = c.truth_error.map_or("unknown".into(), |e| format!("{e:.5}"));
+        let help = "Standard error of a pixel of the truth, estimated from the variance of its samples. They are stratified, so that it is less: an upper bound";
+        row("Truth's own error, at most", error, help);
+        row("Samples of the truth", c.truth_samples.to_string(), "Samples per pixel of the truth so far");
+    });
+    if !app.first.is_occlusion() && app.truth.is_occlusion() {
+        ui.label("The first image is not ambient occlusion: its luminance is compared.");
+    }
+}
+
+/// Settings that apply to frames, by the name of an integrator's capability.
+fn applicable<'a>(settings: Vec<Setting<'a>>, integrator: &dyn Integrator, hidden: &[&str]) -> Vec<Setting<'a>> {
+    let of = (integrator.name(), integrator.capabilities());
+    settings.into_iter().filter(|s| s.applies.includes(&of) && !hidden.contains(&s.name)).collect()
+}
+
+fn frames(app: &mut App, ui: &mut Ui) {
+    let settings = app.first.settings(&app.settings);
+    if settings.realtime_setting().is_none() {
+        ui.label("The first image is a still; these settings are for frames in real time.");
+    }
+    let effective = crate::renderer::frames::frame_settings(&settings).map(|s| {
+        let mut values = serde_json::json!(s);
+        values["filter_radius"] = values["filter"]["radius"].take();
+        values["filter"] = values["filter"]["kind"].take();
+        values
+    });
+    const HIDDEN: [&str; 9] = ["preset", "frames", "fps", "animate", "camera_path", "orbit", "warm_up", "technique", "show"];
+    let all = applicable(app.settings.frames.editable(), &crate::integrators::ao::AmbientOcclusion, &HIDDEN);
+    editor::edit(ui, all, &effective.unwrap_or_default());
+}
+
+fn paths(app: &mut App, ui: &mut Ui) {
+    let integrator = match app.first {
+        Technique::Still(integrator) if integrator.name() != "ao" => integrator.get(),
+        _ => {
+            ui.label("For path, direct, whitted and ao-sky.");
+            &crate::integrators::path::kinds::PATH as &dyn Integrator
+        }
+    };
+    let effective = serde_json::json!({
+        "rr_depth": 5, "min_depth": 0, "sampling": "mis", "pixel_filter": "box", "texture_filter": "bilinear", "sky_albedo": 0.5,
+    });
+    let all = applicable(app.settings.integrators.path.editable(), integrator, &["denoise"]);
+    editor::edit(ui, all, &effective);
+}
+
+fn light(app: &mut App, ui: &mut Ui) {
+    if !matches!(app.first, Technique::Still(i) if i.get().capabilities().contains(&Capability::SceneLights)) {
+        ui.label("Light has an effect on path, direct and whitted.");
+    }
+    let heading =
+        ui.label("Environment: a map (.hdr, .exr) or R,G,B").on_hover_text("Enter applies it; empty: the scene's own");
+    let id = ui.make_persistent_id("environment text");
+    let current = app.lighting.environment.clone().unwrap_or_default();
+    let mut text = ui.data_mut(|d| d.get_temp::<String>(id)).unwrap_or_else(|| current.clone());
+    let edit = ui.text_edit_singleline(&mut text).labelled_by(heading.id);
+    if edit.lost_focus() {
+        let trimmed = text.trim();
+        app.lighting.environment = (!trimmed.is_empty()).then(|| trimmed.to_owned());
+        if app.lighting.environment.is_none() {
+            (app.lighting.environment_turn, app.lighting.environment_scale) = (None, None);
+        }
+    }
+    ui.data_mut(|d| d.insert_temp(id, text));
+    ui.add_enabled_ui(app.lighting.environment.is_some(), |ui| {
+        editor::edit(ui, app.lighting.editable(), &serde_json::json!({ "environment_turn": 0.0, "environment_scale": 1.0 }));
+    });
+    ui.separator();
+    let heading = ui
+        .label("Add a light")
+        .on_hover_text("As --light takes it: sun, point, spot, sphere, rectangle, disk or portal, then key=value");
+    let id = ui.make_persistent_id("light text");
+    let mut text = ui.data_mut(|d| d.get_temp::<String>(id)).unwrap_or_else(|| "sun direction=-1,-2,-1 irradiance=3".into());
+    ui.horizontal(|ui| {
+        ui.add(egui::TextEdit::singleline(&mut text).desired_width(200.0)).labelled_by(heading.id);
+        if ui.button("Add").clicked() {
+            match crate::scene::light_spec::parse(text.trim()) {
+                Ok(light) => app.lighting.light.push(light),
+                Err(e) => app.say(e, true),
+            }
+        }
+    });
+    ui.data_mut(|d| d.insert_temp(id, text));
+    let mut removed = None;
+    for (k, light) in app.lighting.light.iter().enumerate() {
+        ui.horizontal(|ui| {
+            if ui.small_button("✖").on_hover_text("Remove this light").clicked() {
+                removed = Some(k);
+            }
+            ui.label(light.to_string());
+        });
+    }
+    if let Some(k) = removed {
+        app.lighting.light.remove(k);
+    }
+}
+
+fn camera(app: &mut App, ui: &mut Ui) {
+    let Some(control) = &mut app.control else { return };
+    let to_world = control.camera().camera_to_world;
+    ui.label(format!("Eye {:.3}, {:.3}, {:.3}", to_world.translation.x, to_world.translation.y, to_world.translation.z));
+    if let crate::scene::Projection::Perspective { fov_y } = control.camera().projection {
+        let mut degrees = fov_y.to_degrees();
+        ui.horizontal(|ui| {
+            let heading = ui.label("Field of view");
+            if ui.add(Slider::new(&mut degrees, 5.0..=120.0).suffix("°")).labelled_by(heading.id).changed() {
+                control.set_fov_y(degrees.to_radians());
+                app.followed = None;
+            }
+        });
+    }
+    ui.horizontal(|ui| {
+        let heading = ui.label("Speed of flight");
+        ui.add(Slider::new(&mut control.speed, 0.01..=10.0).logarithmic(true)).labelled_by(heading.id);
+    });
+    ui.horizontal(|ui| {
+        let heading = ui.label("Turntable");
+        ui.add(Slider::new(&mut app.turntable, -2.0..=2.0).suffix(" rad/s")).labelled_by(heading.id);
+    });
+    if ui.button("Copy the camera").on_hover_text("Copies the options of skylit render that choose this camera").clicked()
+        && let (Some(scene), Some(control)) = (&app.scene, &app.control)
+    {
+        let camera = crate::renderer::interactive::camera_settings(&scene.cameras, control.camera());
+        let settings = crate::renderer::RenderSettings { camera, ..Default::default() };
+        app.copied = Some(settings.flags().join(" "));
+        app.say("copied the camera", false);
+    }
+}
+
+fn animation(app: &mut App, ui: &mut Ui) {
+    let animations = app.scene.as_ref().map(|s| s.animations.clone()).unwrap_or_default();
+    if animations.is_empty() {
+        ui.label("The scene has no animation.");
+        return;
+    }
+    let playback = &mut app.playback;
+    let name = |k: Option<usize>| k.and_then(|k| animations.get(k)).map_or("none", |a| a.0.as_str());
+    ui.horizontal(|ui| {
+        let heading = ui.label("Animation");
+        let combo = ComboBox::from_id_salt("animation").selected_text(name(playback.animation));
+        let response = combo.show_ui(ui, |ui| {
+            ui.selectable_value(&mut playback.animation, None, "none");
+            for (k, (name, seconds)) in animations.iter().enumerate() {
+                ui.selectable_value(&mut playback.animation, Some(k), format!("{name} ({seconds:.2} s)"));
+            }
+        });
+        response.response.labelled_by(heading.id);
+    });
+    let Some(duration) = playback.animation.and_then(|k| animations.get(k)).map(|a| a.1) else { return };
+    ui.horizontal(|ui| {
+        if ui.button(if playback.runs { "Stop" } else { "Play" }).on_hover_text("P").clicked() {
+            playback.runs = !playback.runs;
+        }
+        ui.checkbox(&mut playback.repeats, "Loop");
+    });
+    ui.horizontal(|ui| {
+        let heading = ui.label("Time");
+        ui.add(Slider::new(&mut playback.time, 0.0..=duration.max(1e-3)).suffix(" s")).labelled_by(heading.id);
+    });
+    ui.horizontal(|ui| {
+        let heading = ui.label("Speed");
+        ui.add(Slider::new(&mut playback.speed, 0.05..=4.0).logarithmic(true)).labelled_by(heading.id);
+    });
+}
+
+fn device(app: &mut App, ui: &mut Ui) {
+    ui.label(&app.device.name);
+    let (tracer, reason) = app.device.tracer.clone();
+    ui.label(format!("Tracer {tracer}: {reason}"));
+    ui.horizontal(|ui| {
+        let heading = ui.label("Tracer");
+        let current = app.device_settings.tracer.unwrap_or_default();
+        let combo = ComboBox::from_id_salt("tracer").selected_text(current.name());
+        let response = combo.show_ui(ui, |ui| {
+            for choice in TracerChoice::ALL {
+                let lacks = app.device.unavailable.iter().find(|(name, _)| name == choice.name());
+                let item = ui.add_enabled(lacks.is_none(), egui::Button::selectable(current == choice, choice.name()));
+                let item = match lacks {
+                    Some((_, missing)) => item.on_disabled_hover_text(format!("the device lacks {missing}")),
+                    None => item.on_hover_text(choice.help()),
+                };
+                if item.clicked() {
+                    app.device_settings.tracer = Some(choice);
+                    if matches!(choice, TracerChoice::Pipeline | TracerChoice::Query) {
+                        // options of the compute tracer
+                        let d = &mut app.device_settings;
+                        (d.traversal, d.triangle_test, d.build, d.bvh_cache) = (None, None, None, None);
+                    }
+                }
+            }
+        });
+        response.response.labelled_by(heading.id);
+    });
+    let is_compute = app.device.tracer.0 == "compute";
+    let hidden = ["tracer", "device", "validation"];
+    let rest: Vec<Setting> = app.device_settings.editable().into_iter().filter(|s| !hidden.contains(&s.name)).collect();
+    ui.add_enabled_ui(is_compute, |ui| editor::edit(ui, rest, &serde_json::json!({})));
+}
+
+fn selection(app: &App, ui: &mut Ui) {
+    let Some(pick) = &app.pick else {
+        ui.label("Click into the image.");
+        return;
+    };
+    let name = |(index, name): &(usize, String)| if name.is_empty() { format!("{index}") } else { format!("{index} '{name}'") };
+    let textures = app.scene.as_ref().map(|s| s.textures.as_slice()).unwrap_or_default();
+    let textures: Vec<_> = pick.textures.iter().filter_map(|&t| textures.get(t).map(|n| format!("{t} '{n}'"))).collect();
+    egui::Grid::new("selection").num_columns(2).striped(true).show(ui, |ui| {
+        let rows = [
+            ("Position", format!("{:.4}, {:.4}, {:.4}", pick.position.x, pick.position.y, pick.position.z)),
+            ("Distance", format!("{:.4}", pick.distance)),
+            ("Instance", name(&pick.instance)),
+            ("Mesh", name(&pick.mesh)),
+            ("Primitive", format!("{} of {}", pick.primitive.0, pick.primitive.1)),
+            ("Material", name(&pick.material)),
+            ("Textures", if textures.is_empty() { "none".into() } else { textures.join(", ") }),
+        ];
+        for (title, text) in rows {
+            ui.label(title);
+            ui.label(text);
+            ui.end_row();
+        }
+    });
+}

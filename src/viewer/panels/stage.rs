@@ -1,0 +1,286 @@
+//! The images, and the mouse and keys that move the camera.
+
+use egui::{
+    Align2, Color32, Context, CornerRadius, CursorIcon, FontId, Key, Modifiers, PointerButton, Pos2, Rect, Sense, Stroke, Ui,
+    Vec2,
+};
+
+use super::menu::{self, shortcuts};
+use crate::realtime::Preset;
+use crate::viewer::app::{App, Arrangement, Dialog, Second};
+use crate::viewer::layer::Layer;
+use crate::viewer::request::{PickPurpose, Task};
+use crate::viewer::technique::Technique;
+
+/// Width of the line between two images that can be dragged, points.
+const HANDLE: f32 = 10.0;
+/// Smallest share of the width that an image has beside another.
+const LEAST_SHARE: f32 = 0.05;
+
+/// Commands of single keys, and of keys with Ctrl.
+pub fn keys(app: &mut App, context: &Context) {
+    for (shortcut, act) in [
+        (shortcuts::OPEN, (|app: &mut App| app.dialog = Some(Dialog::Open(String::new()))) as fn(&mut App)),
+        (shortcuts::RELOAD, |app| app.reload()),
+        (shortcuts::SAVE, |app| app.dialog = Some(Dialog::Save(format!("{}.png", menu::stem(app))))),
+        (shortcuts::QUIT, |app| app.closes = true),
+    ] {
+        if context.input_mut(|i| i.consume_shortcut(&shortcut)) {
+            act(app);
+        }
+    }
+    if context.wants_keyboard_input() || app.dialog.is_some() {
+        return;
+    }
+    if context.input(|i| i.events.iter().any(|e| matches!(e, egui::Event::Copy))) {
+        menu::copy_command(app);
+    }
+    // a widget that has the focus takes Space and arrows
+    let is_free = context.memory(|m| m.focused().is_none());
+    let pressed = |key| context.input(|i| i.key_pressed(key) && i.modifiers.matches_logically(Modifiers::NONE));
+    let still = |name: &str| name.parse().ok().map(Technique::Still);
+    let techniques = [
+        (Key::Num1, Some(Technique::Preset(Preset::Fast))),
+        (Key::Num2, Some(Technique::Preset(Preset::Balanced))),
+        (Key::Num3, Some(Technique::Preset(Preset::Quality))),
+        (Key::Num4, still("path")),
+        (Key::Num5, Some(Technique::Converged)),
+    ];
+    for (key, technique) in techniques {
+        if let (true, Some(technique)) = (pressed(key), technique) {
+            app.first = technique;
+        }
+    }
+    if pressed(Key::X) {
+        menu::toggle_split(app);
+    }
+    if is_free && pressed(Key::Space) {
+        app.shows_second = !app.shows_second;
+    }
+    if pressed(Key::T) {
+        app.compares = !app.compares;
+    }
+    if pressed(Key::N) {
+        app.shows_panel = !app.shows_panel;
+    }
+    if pressed(Key::F) {
+        menu::frame_all(app);
+    }
+    if pressed(Key::B) {
+        menu::keep_camera(app);
+    }
+    if pressed(Key::U) {
+        app.turntable = if app.turntable == 0.0 { 0.5 } else { 0.0 };
+    }
+    if pressed(Key::F5) {
+        app.is_paused = !app.is_paused;
+    }
+    if pressed(Key::P) {
+        if app.playback.animation.is_none() && app.scene.as_ref().is_some_and(|s| !s.animations.is_empty()) {
+            app.playback.animation = Some(0);
+        }
+        app.playback.runs = app.playback.animation.is_some() && !app.playback.runs;
+    }
+    if context.input(|i| i.key_pressed(Key::Questionmark) || i.key_pressed(Key::F1)) {
+        app.shows_help = !app.shows_help;
+    }
+    fly(app, context, is_free);
+}
+
+/// Keys that are held move the camera.
+fn fly(app: &mut App, context: &Context, is_free: bool) {
+    let Some(control) = &mut app.control else { return };
+    let (held, turned, seconds, faster) = context.input(|i| {
+        let axis = |up: Key, down: Key| f64::from(i8::from(i.key_down(up)) - i8::from(i.key_down(down)));
+        let free = !i.modifiers.command && !i.modifiers.alt;
+        let held = [axis(Key::D, Key::A), axis(Key::E, Key::Q), axis(Key::W, Key::S)].map(|a| if free { a } else { 0.0 });
+        let turned = [axis(Key::ArrowRight, Key::ArrowLeft), axis(Key::ArrowUp, Key::ArrowDown)];
+        (held, turned, f64::from(i.stable_dt.min(0.1)), i.modifiers.shift)
+    });
+    if held != [0.0; 3] {
+        control.fly(held, seconds * if faster { 4.0 } else { 1.0 });
+        app.followed = None;
+        context.request_repaint();
+    }
+    if is_free && turned != [0.0; 2] {
+        control.orbit(turned[0] * 300.0 * seconds, -turned[1] * 300.0 * seconds);
+        app.followed = None;
+        context.request_repaint();
+    }
+}
+
+/// Shows the images and handles the mouse.
+pub fn show(app: &mut App, ui: &mut Ui) {
+    let rect = ui.available_rect_before_wrap();
+    let scale = ui.ctx().pixels_per_point();
+    let pixel = |x: f32| (x * scale).round() as i32;
+    let area = [pixel(rect.left()), pixel(rect.top()), pixel(rect.right()), pixel(rect.bottom())];
+    let size = [area[2] - area[0], area[3] - area[1]].map(|n| n.max(0) as u32);
+    // a window that is minimised has no size: what was there stays
+    if size[0] > 0 && size[1] > 0 {
+        app.set_size(size);
+    }
+    let response = ui.interact(rect, ui.id().with("stage"), Sense::click_and_drag());
+    response.widget_info(|| egui::WidgetInfo::labeled(egui::WidgetType::Other, true, "Image"));
+    mouse(app, ui, &response);
+    let split = match app.arrangement {
+        Arrangement::Split(share) => Some(divider(app, ui, rect, share)),
+        Arrangement::Single => None,
+    };
+    let middle = split.map(pixel);
+    let layer = |app: &mut App, is_second: bool, clip: [i32; 4]| {
+        if let Some(picture) = app.picture(is_second) {
+            app.add_layer(Layer { picture, area, clip });
+        }
+    };
+    match middle {
+        Some(x) => {
+            layer(app, false, [area[0], area[1], x, area[3]]);
+            layer(app, true, [x, area[1], area[2], area[3]]);
+        }
+        None => layer(app, app.shows_second, area),
+    }
+    titles(app, ui, rect, split);
+    notices(app, ui, rect);
+}
+
+/// The line between two images; returns its position.
+fn divider(app: &mut App, ui: &mut Ui, rect: Rect, share: f32) -> f32 {
+    let x = rect.left() + share * rect.width();
+    let handle = Rect::from_center_size(Pos2::new(x, rect.center().y), Vec2::new(HANDLE, rect.height()));
+    let response = ui.interact(handle, ui.id().with("divider"), Sense::drag()).on_hover_cursor(CursorIcon::ResizeHorizontal);
+    response.widget_info(|| egui::WidgetInfo::labeled(egui::WidgetType::Other, true, "Line between the images"));
+    let mut share = share;
+    if let (true, Some(pointer)) = (response.dragged(), response.interact_pointer_pos()) {
+        share = ((pointer.x - rect.left()) / rect.width().max(1.0)).clamp(LEAST_SHARE, 1.0 - LEAST_SHARE);
+        app.arrangement = Arrangement::Split(share);
+    }
+    let x = rect.left() + share * rect.width();
+    let width = if response.hovered() || response.dragged() { 3.0 } else { 1.0 };
+    ui.painter()
+        .line_segment([Pos2::new(x, rect.top()), Pos2::new(x, rect.bottom())], Stroke::new(width, Color32::from_gray(230)));
+    x
+}
+
+fn mouse(app: &mut App, ui: &Ui, response: &egui::Response) {
+    let Some(control) = &mut app.control else { return };
+    let delta = response.drag_delta();
+    let (dx, dy) = (f64::from(delta.x), f64::from(delta.y));
+    let shift = ui.input(|i| i.modifiers.shift);
+    let mut moved = false;
+    if delta != Vec2::ZERO {
+        moved = true;
+        match () {
+            () if response.dragged_by(PointerButton::Middle) || shift && response.dragged_by(PointerButton::Primary) => {
+                control.pan(dx, dy, f64::from(response.rect.height()));
+            }
+            () if response.dragged_by(PointerButton::Secondary) => control.look(dx, dy),
+            () if response.dragged_by(PointerButton::Primary) => control.orbit(-dx, dy),
+            () => moved = false,
+        }
+    }
+    if response.hovered() {
+        let (scroll, pinch) = ui.input(|i| (f64::from(i.smooth_scroll_delta.y), f64::from(i.zoom_delta())));
+        if scroll != 0.0 || pinch != 1.0 {
+            control.zoom((-0.003 * scroll).exp() / pinch);
+            moved = true;
+        }
+    }
+    if moved {
+        app.followed = None;
+    }
+    let at = response.interact_pointer_pos().map(|p| {
+        let p = (p - response.rect.min) / response.rect.size();
+        [f64::from(p.x), f64::from(p.y)]
+    });
+    if let Some(at) = at {
+        if response.double_clicked() {
+            app.task(Task::Pick { at, purpose: PickPurpose::Focus });
+        } else if response.clicked() {
+            app.task(Task::Pick { at, purpose: PickPurpose::Describe });
+        }
+    }
+}
+
+/// Names of the images, in their corners.
+fn titles(app: &App, ui: &Ui, rect: Rect, split: Option<f32>) {
+    let painter = ui.painter();
+    let text = |at: Pos2, align: Align2, text: String| {
+        let galley = painter.layout_no_wrap(text, FontId::proportional(13.0), Color32::WHITE);
+        let place = align.anchor_size(at, galley.size());
+        painter.rect_filled(place.expand(3.0), CornerRadius::same(3), Color32::from_black_alpha(150));
+        painter.galley(place.min, galley, Color32::WHITE);
+    };
+    let margin = Vec2::splat(10.0);
+    let second_error = |app: &App| match app.second {
+        Second::Truth | Second::Technique(_) | Second::HeatMap => {
+            app.comparison.as_ref().map(|c| format!("RMSE {:.4}, bias {:+.4}", c.rmse, c.bias))
+        }
+    };
+    match split {
+        Some(x) => {
+            text(rect.left_top() + margin, Align2::LEFT_TOP, app.title(false));
+            text(Pos2::new(x, rect.top()) + margin, Align2::LEFT_TOP, app.title(true));
+            if let Some(error) = second_error(app) {
+                text(rect.left_bottom() + Vec2::new(10.0, -10.0), Align2::LEFT_BOTTOM, error);
+            }
+        }
+        None => text(rect.left_top() + margin, Align2::LEFT_TOP, app.title(app.shows_second)),
+    }
+}
+
+/// What there is to say over the images: loading, errors, new messages.
+fn notices(app: &mut App, ui: &mut Ui, rect: Rect) {
+    let mut lines: Vec<(String, bool)> = Vec::new();
+    let is_loading = app.loading.is_some() || app.control.is_none() && app.source.is_some() && app.failure.is_none();
+    if let Some(text) = &app.loading {
+        lines.push((format!("{text} …"), false));
+    } else if is_loading {
+        lines.push(("building acceleration structures and shaders …".into(), false));
+    } else if app.source.is_some()
+        && app.failure.is_none()
+        && app.picture(app.shows_second).is_none()
+        && app.error(app.shows_second).is_none()
+    {
+        lines.push(("rendering …".into(), false));
+    }
+    if app.source.is_none() {
+        lines.push(("Open a scene (Ctrl+O), drop a file here, or choose a built-in one in the menu File.".into(), false));
+    }
+    lines.extend(app.failure.iter().map(|t| (t.clone(), true)));
+    lines.extend(app.error(app.shows_second).map(|t| (t.clone(), true)));
+    if app.failure.is_none() {
+        lines.extend(app.new_message().filter(|m| m.2).map(|m| (m.1.clone(), true)));
+    }
+    if lines.is_empty() {
+        return;
+    }
+    if is_loading {
+        ui.ctx().request_repaint_after(std::time::Duration::from_millis(100));
+    }
+    let width = (rect.width() - 40.0).clamp(120.0, 620.0);
+    let mut dialog_opened = false;
+    egui::Area::new("notices".into()).pivot(Align2::CENTER_BOTTOM).fixed_pos(rect.center_bottom() - Vec2::new(0.0, 30.0)).show(
+        ui.ctx(),
+        |ui| {
+            egui::Frame::popup(ui.style()).show(ui, |ui| {
+                ui.set_max_width(width);
+                for (text, is_error) in lines {
+                    ui.horizontal_wrapped(|ui| {
+                        if is_loading && !is_error {
+                            ui.spinner();
+                        }
+                        let text = egui::RichText::new(text);
+                        ui.label(if is_error { text.color(ui.visuals().error_fg_color) } else { text });
+                    });
+                }
+                if app.source.is_none() {
+                    dialog_opened = ui.button("Open…").clicked();
+                }
+            });
+        },
+    );
+    if dialog_opened {
+        app.dialog = Some(Dialog::Open(String::new()));
+    }
+}

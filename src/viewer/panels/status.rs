@@ -1,0 +1,49 @@
+//! The line at the bottom: what is rendered, how fast, and the last message.
+
+use egui::Ui;
+
+use crate::viewer::app::App;
+
+/// Shows the line.
+pub fn show(app: &mut App, ui: &mut Ui) {
+    ui.horizontal(|ui| {
+        if let Some(progress) = &app.panes[0].progress {
+            let [w, h] = progress.picture.size;
+            let full = app.size();
+            let scale = if [w, h] == full { String::new() } else { format!(" of {}x{}", full[0], full[1]) };
+            ui.label(format!("{w}x{h}{scale}"))
+                .on_hover_text("Resolution of the image: reduced while something moves, to hold the frame rate");
+            ui.separator();
+            let state = if progress.step.is_settled { "settled" } else { "converging" };
+            ui.label(format!("{} samples, {state}", progress.step.samples))
+                .on_hover_text("Frames since the camera came to rest, or samples per pixel of a still");
+            ui.separator();
+        }
+        if let Some(figures) = app.figures() {
+            ui.label(format!("{:.0} ms (95 %: {:.0})", figures.median, figures.p95))
+                .on_hover_text("Time of a frame: median and 95th percentile");
+            ui.separator();
+            ui.label(format!("{:.1} Mrays/s", figures.rays_per_second * 1e-6))
+                .on_hover_text("Rays per second of the first image");
+            ui.separator();
+        }
+        if let Some(comparison) = &app.comparison {
+            ui.label(format!("RMSE {:.4}, FLIP {:.4}", comparison.rmse, comparison.flip))
+                .on_hover_text("Error against the truth");
+            ui.separator();
+        }
+        if app.is_paused {
+            ui.strong("paused");
+            ui.separator();
+        }
+        for output in app.renders() {
+            ui.spinner();
+            ui.label(format!("rendering {output}"));
+        }
+        if let Some((_, text, is_error)) = app.messages.front() {
+            let text = egui::RichText::new(text);
+            let text = if *is_error { text.color(ui.visuals().warn_fg_color) } else { text };
+            ui.add(egui::Label::new(text).truncate());
+        }
+    });
+}

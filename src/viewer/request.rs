@@ -1,0 +1,268 @@
+//! What the window and the thread that renders tell each other: requests, of which the latest counts, and events.
+
+use std::path::PathBuf;
+use std::sync::mpsc::Sender;
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+use glam::DVec3;
+
+use crate::integrators::lighting::LightingSettings;
+use crate::renderer::RenderSettings;
+use crate::renderer::interactive::{Pick, ViewPicture, ViewStep};
+use crate::renderer::settings::CameraSettings;
+use crate::scene::Camera;
+use crate::tracer::DeviceSettings;
+
+/// Index of an image among [`Request::panes`].
+pub type Pane = usize;
+
+/// What is to be rendered.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Request {
+    /// The scene, a file or `builtin:NAME`; none before one is opened.
+    pub scene: Option<String>,
+    /// Incremented to load the scene anew.
+    pub load: u64,
+    /// Device and tracer.
+    pub device: DeviceSettings,
+    /// Lights beside the scene's.
+    pub lighting: LightingSettings,
+    /// The animation to play, an index.
+    pub animation: Option<usize>,
+    /// Time of the animation, seconds.
+    pub time: f64,
+    /// The camera; `None` until the scene has been loaded.
+    pub camera: Option<Camera>,
+    /// Settings of the camera to start with.
+    pub first_camera: CameraSettings,
+    /// Index of the file's camera that the animation moves, if the view follows it.
+    pub followed_camera: Option<usize>,
+    /// Images to render: those on the screen, then the truth.
+    pub panes: Vec<RenderSettings>,
+    /// Number of images on the screen, which are rendered while something moves.
+    pub shown: usize,
+    /// Width and height of the view, in pixels.
+    pub size: [u32; 2],
+    /// Frame rate to hold while something moves, frames per second; `None`: full resolution always.
+    pub frame_rate: Option<f64>,
+    /// Compare the first image with the last.
+    pub compares: bool,
+    /// Render nothing.
+    pub is_paused: bool,
+    /// Work to be done once.
+    pub tasks: Vec<Task>,
+    /// End the thread.
+    pub quits: bool,
+}
+
+/// Work to be done once.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Task {
+    /// Find what is at a point of the view, from (0, 0) at the top left to (1, 1).
+    Pick {
+        /// The point.
+        at: [f64; 2],
+        /// What it is for.
+        purpose: PickPurpose,
+    },
+    /// Save an image with all its channels.
+    Save {
+        /// The image.
+        pane: Pane,
+        /// A file, .png or .exr.
+        path: PathBuf,
+    },
+}
+
+/// What a point was picked for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PickPurpose {
+    /// To describe it.
+    Describe,
+    /// To look at it.
+    Focus,
+}
+
+/// What the renderer has done.
+#[derive(Debug)]
+pub enum Event {
+    /// A scene is being loaded: what is being done.
+    Loading(String),
+    /// A scene was loaded.
+    Loaded(Box<SceneSummary>),
+    /// The camera to start with was chosen, and whether it is inside a room.
+    Camera(Box<Camera>, bool),
+    /// A scene could not be loaded; the previous one stays.
+    LoadFailed(String),
+    /// A tracer was built or replaced.
+    Device(DeviceSummary),
+    /// A step of an image.
+    Picture(Box<Progress>),
+    /// An image cannot be rendered, or can again.
+    PaneError(Pane, Option<String>),
+    /// The first image was compared with the last.
+    Compared(Box<Comparison>),
+    /// A point was picked.
+    Picked(PickPurpose, Box<Option<Pick>>),
+    /// A file was written, or an error.
+    Saved(Result<PathBuf, String>),
+    /// A message for the user.
+    Warning(String),
+    /// No further images: the reason.
+    Failed(String),
+}
+
+/// What the window shows of a scene.
+#[derive(Clone, Debug, Default)]
+pub struct SceneSummary {
+    /// The file, or `builtin:NAME`.
+    pub source: String,
+    /// Its bounds in world space, scene units.
+    pub bounds: (DVec3, DVec3),
+    /// Its cameras.
+    pub cameras: Vec<Camera>,
+    /// Names and durations, in seconds, of its animations.
+    pub animations: Vec<(String, f64)>,
+    /// Names of textures.
+    pub textures: Vec<String>,
+    /// Number of triangles and spheres over all instances.
+    pub primitives: u64,
+    /// Number of instances, meshes, materials and lights.
+    pub counts: [usize; 4],
+    /// Seconds that loading took.
+    pub seconds: f64,
+}
+
+/// What the window shows of the device.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct DeviceSummary {
+    /// Name of the device and its driver.
+    pub name: String,
+    /// The tracer, and why it was chosen.
+    pub tracer: (String, String),
+    /// Tracers that the device lacks something for, and what.
+    pub unavailable: Vec<(String, String)>,
+    /// Bytes of scene and structures in device memory.
+    pub bytes: u64,
+    /// Seconds of building structures.
+    pub build_seconds: f64,
+}
+
+/// A step of an image.
+#[derive(Clone, Debug, Default)]
+pub struct Progress {
+    /// The image.
+    pub pane: Pane,
+    /// What to show.
+    pub picture: Arc<ViewPicture>,
+    /// The step's work.
+    pub step: ViewStep,
+    /// Wall-clock time of the step.
+    pub time: Duration,
+    /// Time from the request that the image answers to the image.
+    pub latency: Duration,
+    /// Number of that request.
+    pub request: u64,
+}
+
+/// An image compared with the truth.
+#[derive(Clone, Debug, Default)]
+pub struct Comparison {
+    /// Root of the mean squared difference over pixels that show the scene.
+    pub rmse: f64,
+    /// Mean difference.
+    pub bias: f64,
+    /// Mean FLIP, 0 (looks the same) to 1.
+    pub flip: f64,
+    /// Standard error of the truth per value, root mean square; `None` if it is not known.
+    pub truth_error: Option<f64>,
+    /// Samples per pixel of the truth.
+    pub truth_samples: u32,
+    /// FLIP of each pixel as a heat map.
+    pub heat_map: Arc<ViewPicture>,
+}
+
+struct Latest {
+    request: Request,
+    number: u64,
+    changed: std::time::Instant,
+}
+
+/// The latest request, shared between threads.
+pub struct Mailbox {
+    latest: Mutex<Latest>,
+    arrived: Condvar,
+}
+
+impl Default for Mailbox {
+    fn default() -> Self {
+        let latest = Latest { request: Request::default(), number: 0, changed: std::time::Instant::now() };
+        Self { latest: Mutex::new(latest), arrived: Condvar::new() }
+    }
+}
+
+impl Mailbox {
+    fn lock(&self) -> MutexGuard<'_, Latest> {
+        self.latest.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Changes the request and wakes who waits for it. Returns its number.
+    pub fn change(&self, change: impl FnOnce(&mut Request)) -> u64 {
+        let mut latest = self.lock();
+        change(&mut latest.request);
+        latest.number += 1;
+        latest.changed = std::time::Instant::now();
+        self.arrived.notify_all();
+        latest.number
+    }
+
+    /// The latest request.
+    pub fn peek(&self) -> Request {
+        self.lock().request.clone()
+    }
+
+    /// The latest request, its number and when it arrived. Its tasks are taken out.
+    pub fn take(&self) -> (Request, u64, std::time::Instant) {
+        let mut latest = self.lock();
+        let request = latest.request.clone();
+        latest.request.tasks.clear();
+        (request, latest.number, latest.changed)
+    }
+
+    /// Number of the latest request.
+    pub fn number(&self) -> u64 {
+        self.lock().number
+    }
+
+    /// Returns true if this holds of the latest request.
+    pub fn is(&self, holds: impl FnOnce(&Request) -> bool) -> bool {
+        holds(&self.lock().request)
+    }
+
+    /// Waits for a request after `number`, at most so long.
+    pub fn wait(&self, number: u64, most: Duration) {
+        let latest = self.lock();
+        let _unused = self.arrived.wait_timeout_while(latest, most, |l| l.number <= number);
+    }
+}
+
+/// Sends events and wakes the window.
+#[derive(Clone)]
+pub struct EventSender {
+    sender: Sender<Event>,
+    wake: Arc<dyn Fn() + Send + Sync>,
+}
+
+impl EventSender {
+    /// A sender; `wake` is called after every event.
+    pub fn new(sender: Sender<Event>, wake: Arc<dyn Fn() + Send + Sync>) -> Self {
+        Self { sender, wake }
+    }
+
+    /// Sends an event. A window that is gone is no error.
+    pub fn send(&self, event: Event) {
+        let _ = self.sender.send(event);
+        (self.wake)();
+    }
+}

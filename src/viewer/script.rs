@@ -1,0 +1,569 @@
+//! Scripts that use the viewer as a person would: they move the mouse, press keys, click on controls by their names, wait, and take screenshots.
+
+use std::collections::VecDeque;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+use egui::accesskit::{self, NodeId, Role};
+use egui::{Event, Key, Modifiers, MouseWheelUnit, PointerButton, Pos2, RawInput, Vec2};
+
+use super::app::App;
+use crate::error::{Error, Result};
+
+/// Longest wait for something that a script does not limit.
+const PATIENCE: Duration = Duration::from_secs(120);
+
+/// The commands, for help and docs/viewer.md.
+pub const COMMANDS: &[(&str, &str)] = &[
+    ("wait SECONDS", "let time pass"),
+    ("wait picture|settled [SECONDS]", "until the first image has a picture, or all have settled; at most so long [120]"),
+    ("wait compared [SECONDS]", "until there is a comparison with the truth"),
+    ("wait TEXT:text [SECONDS]", "until a control or label contains the text"),
+    ("key [Ctrl+|Shift+]NAME [SECONDS]", "press a key, and hold it"),
+    ("type TEXT", "type into what has the focus"),
+    ("click LABEL", "click on the control of this name"),
+    ("set LABEL = VALUE", "set the slider or number of this name"),
+    ("press X Y [left|right|middle] [2]", "click at a place, in points; 2: double click"),
+    ("drag X Y TO_X TO_Y [SECONDS] [left|right|middle|shift]", "drag, in points"),
+    ("drag-control LABEL DX DY [SECONDS]", "drag a control, by so many points"),
+    ("wheel X Y LINES", "turn the wheel at a place"),
+    ("resize WIDTH HEIGHT", "change the size of the window, in points (without a window)"),
+    ("drop FILE", "drop a file on the window"),
+    ("screenshot FILE.png", "save what the window shows"),
+    ("mark NAME", "begin a new section of the report"),
+    ("expect LABEL", "fail unless there is a control or label that contains the text"),
+    ("expect-no-errors", "fail if an error or warning has been shown"),
+];
+
+/// A command of a script.
+#[derive(Clone, Debug, PartialEq)]
+enum Command {
+    Wait(Duration),
+    WaitFor(Condition, Duration),
+    Key(Modifiers, Key, Duration),
+    Type(String),
+    Click(String),
+    Set(String, f64),
+    Press(Pos2, PointerButton, u32),
+    Drag(Pos2, Pos2, Duration, PointerButton, Modifiers),
+    DragControl(String, Vec2, Duration),
+    Wheel(Pos2, f32),
+    Resize([u32; 2]),
+    Drop(PathBuf),
+    Screenshot(PathBuf),
+    Mark(String),
+    Expect(String),
+    ExpectNoErrors,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+enum Condition {
+    Picture,
+    Settled,
+    Compared,
+    Text(String),
+}
+
+/// What a script wants of its host.
+#[derive(Clone, Debug, Default)]
+pub struct Wishes {
+    /// Save what the window shows.
+    pub screenshot: Option<PathBuf>,
+    /// Change the window's size, points.
+    pub resize: Option<[u32; 2]>,
+}
+
+/// Figures of a section of a script.
+#[derive(Clone, Debug, Default, serde::Serialize)]
+pub struct Section {
+    /// Its name.
+    pub name: String,
+    /// Wall-clock seconds.
+    pub seconds: f64,
+    /// Seconds from its beginning to the first picture of the first image.
+    pub first_picture_seconds: Option<f64>,
+    /// Frames of the user interface.
+    pub ui_frames: u32,
+    /// Milliseconds of frames of the user interface, input to image: median, 95th percentile, maximum.
+    pub ui_frame_ms: [f64; 3],
+    /// Steps of the first image.
+    pub pictures: usize,
+    /// Milliseconds of steps of the first image: median, 95th percentile.
+    pub picture_ms: [f64; 2],
+    /// Milliseconds from a request to the first picture that answers it: median, 95th percentile.
+    pub latency_ms: [f64; 2],
+    /// The last comparison with the truth: RMSE, FLIP, standard error of the truth.
+    pub error: Option<(f64, f64, Option<f64>)>,
+    /// Resident memory of the process at its end, MiB.
+    pub memory_mib: f64,
+}
+
+/// A script that is being run.
+pub struct Script {
+    commands: VecDeque<(usize, Command)>,
+    path: PathBuf,
+    current: Option<Current>,
+    pointer: Pos2,
+    section: Measured,
+    sections: Vec<Section>,
+    tree: Vec<(NodeId, accesskit::Node)>,
+    messages_seen: usize,
+    errors: Vec<String>,
+}
+
+struct Current {
+    line: usize,
+    command: Command,
+    start: Instant,
+    step: u32,
+}
+
+struct Measured {
+    name: String,
+    start: Instant,
+    first_picture: Option<f64>,
+    ui_ms: Vec<f64>,
+    picture_ms: Vec<f64>,
+    latency_ms: Vec<f64>,
+    last_request: u64,
+    last_picture: Option<std::sync::Arc<super::request::Progress>>,
+}
+
+impl Measured {
+    fn new(name: &str) -> Self {
+        Self {
+            name: name.to_owned(),
+            start: Instant::now(),
+            first_picture: None,
+            ui_ms: Vec::new(),
+            picture_ms: Vec::new(),
+            latency_ms: Vec::new(),
+            last_request: 0,
+            last_picture: None,
+        }
+    }
+
+    fn end(&self, app: &App) -> Section {
+        let of = |values: &[f64], share: f64| crate::measure::stats::percentile(values, share).unwrap_or(0.0);
+        Section {
+            name: self.name.clone(),
+            seconds: self.start.elapsed().as_secs_f64(),
+            first_picture_seconds: self.first_picture,
+            ui_frames: self.ui_ms.len() as u32,
+            ui_frame_ms: [of(&self.ui_ms, 0.5), of(&self.ui_ms, 0.95), of(&self.ui_ms, 1.0)],
+            pictures: self.picture_ms.len(),
+            picture_ms: [of(&self.picture_ms, 0.5), of(&self.picture_ms, 0.95)],
+            latency_ms: [of(&self.latency_ms, 0.5), of(&self.latency_ms, 0.95)],
+            error: app.comparison.as_ref().map(|c| (c.rmse, c.flip, c.truth_error)),
+            memory_mib: resident_mib(),
+        }
+    }
+}
+
+/// Resident memory of the process in MiB; 0 where the system does not say.
+fn resident_mib() -> f64 {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let kib =
+        status.lines().find_map(|l| l.strip_prefix("VmRSS:")).and_then(|l| l.split_whitespace().next()?.parse::<f64>().ok());
+    kib.unwrap_or(0.0) / 1024.0
+}
+
+impl Script {
+    /// Reads a script.
+    ///
+    /// # Errors
+    /// [`Error::Input`], naming the line that is no command.
+    pub fn load(path: &Path) -> Result<Self> {
+        let text = std::fs::read_to_string(path).map_err(|e| Error::read(path, &e))?;
+        Self::parse(&text, path)
+    }
+
+    fn parse(text: &str, path: &Path) -> Result<Self> {
+        let mut commands = VecDeque::new();
+        for (k, line) in text.lines().enumerate() {
+            let line = line.trim();
+            if line.is_empty() || line.starts_with('#') {
+                continue;
+            }
+            let command = parse(line).ok_or_else(|| Error::input(path, format!("line {}: not a command: {line}", k + 1)))?;
+            commands.push_back((k + 1, command));
+        }
+        Ok(Self {
+            commands,
+            path: path.to_owned(),
+            current: None,
+            pointer: Pos2::ZERO,
+            section: Measured::new("start"),
+            sections: Vec::new(),
+            tree: Vec::new(),
+            messages_seen: 0,
+            errors: Vec::new(),
+        })
+    }
+
+    /// Notes what a frame of the user interface has shown.
+    pub fn observe(&mut self, output: &egui::FullOutput, app: &App) {
+        if let Some(update) = &output.platform_output.accesskit_update {
+            self.tree.clone_from(&update.nodes);
+        }
+        let s = &mut self.section;
+        if let Some(progress) = &app.panes[0].progress
+            && !s.last_picture.as_ref().is_some_and(|p| std::sync::Arc::ptr_eq(p, progress))
+        {
+            s.picture_ms.push(1e3 * progress.time.as_secs_f64());
+            if progress.request != s.last_request {
+                s.latency_ms.push(1e3 * progress.latency.as_secs_f64());
+                s.last_request = progress.request;
+            }
+            s.first_picture.get_or_insert(s.start.elapsed().as_secs_f64());
+            s.last_picture = Some(progress.clone());
+        }
+        // the newest messages come first
+        let new = app.messages.len().saturating_sub(self.messages_seen);
+        for (_, text, is_error) in app.messages.iter().take(new) {
+            if *is_error {
+                self.errors.push(text.clone());
+            }
+        }
+        self.messages_seen = app.messages.len();
+        self.errors
+            .extend(app.panes.iter().filter_map(|p| p.error.clone()).filter(|e| !self.errors.contains(e)).collect::<Vec<_>>());
+    }
+
+    /// Notes how long a frame of the user interface took, painting included.
+    pub fn observe_time(&mut self, time: Duration) {
+        self.section.ui_ms.push(1e3 * time.as_secs_f64());
+    }
+
+    /// Adds the input of the next frame. Returns what the host is to do besides; `None`: the script has ended.
+    ///
+    /// # Errors
+    /// [`Error::CheckFailed`] for what was expected and is not so, naming the line.
+    pub fn input(&mut self, input: &mut RawInput, app: &App) -> Result<Option<Wishes>> {
+        let mut wishes = Wishes::default();
+        let mut current = match self.current.take() {
+            Some(current) => current,
+            None => match self.commands.pop_front() {
+                Some((line, command)) => Current { line, command, start: Instant::now(), step: 0 },
+                None => {
+                    self.sections.push(self.section.end(app));
+                    return Ok(None);
+                }
+            },
+        };
+        let is_done = self
+            .step(&mut current, input, app, &mut wishes)
+            .map_err(|text| Error::CheckFailed(format!("{}, line {}: {text}", self.path.display(), current.line)))?;
+        current.step += 1;
+        if !is_done {
+            self.current = Some(current);
+        }
+        Ok(Some(wishes))
+    }
+
+    /// Figures of all sections.
+    pub fn sections(&self) -> &[Section] {
+        &self.sections
+    }
+
+    fn step(&mut self, current: &mut Current, input: &mut RawInput, app: &App, wishes: &mut Wishes) -> Result<bool, String> {
+        let elapsed = current.start.elapsed();
+        let step = current.step;
+        match &current.command {
+            Command::Wait(time) => Ok(elapsed >= *time),
+            Command::WaitFor(condition, most) => {
+                let holds = match condition {
+                    Condition::Picture => app.panes[0].progress.is_some(),
+                    Condition::Settled => app.is_settled(),
+                    Condition::Compared => app.comparison.is_some(),
+                    Condition::Text(text) => self.contains(text),
+                };
+                match (holds, elapsed > *most) {
+                    (false, true) => Err(format!("waited {most:?} for {condition:?}{}", self.shown_errors(app))),
+                    // a frame at least, so that what was done before is requested
+                    (holds, _) => Ok(holds && step > 1),
+                }
+            }
+            Command::Key(modifiers, key, time) => {
+                let event =
+                    |pressed| Event::Key { key: *key, physical_key: None, pressed, repeat: false, modifiers: *modifiers };
+                input.modifiers = *modifiers;
+                if step == 0 {
+                    input.events.push(event(true));
+                    if modifiers.command && *key == Key::C {
+                        input.events.push(Event::Copy);
+                    }
+                    // a question mark is text on keyboards
+                }
+                let ends = step > 0 && elapsed >= *time;
+                if ends {
+                    input.events.push(event(false));
+                }
+                Ok(ends)
+            }
+            Command::Type(text) => {
+                input.events.push(Event::Text(text.clone()));
+                Ok(true)
+            }
+            Command::Click(label) => {
+                let place = self.place_of(label)?;
+                Ok(self.click(input, place, PointerButton::Primary, step, 1))
+            }
+            Command::Set(label, value) => {
+                let id = self.find(label, true)?.0;
+                let data = Some(accesskit::ActionData::NumericValue(*value));
+                let request = accesskit::ActionRequest { action: accesskit::Action::SetValue, target: id, data };
+                input.events.push(Event::AccessKitActionRequest(request));
+                Ok(true)
+            }
+            Command::Press(at, button, times) => Ok(self.click(input, *at, *button, step, *times)),
+            Command::Drag(from, to, time, button, modifiers) => {
+                Ok(self.drag(input, [*from, *to], *time, *button, *modifiers, step, elapsed))
+            }
+            Command::DragControl(label, by, time) => {
+                // where it was when the drag began
+                let from = if step == 0 { self.place_of(label)? } else { self.pointer };
+                if step == 0 {
+                    current.command = Command::Drag(from, from + *by, *time, PointerButton::Primary, Modifiers::NONE);
+                }
+                Ok(false)
+            }
+            Command::Wheel(at, lines) => {
+                self.move_to(input, *at);
+                input.events.push(Event::MouseWheel {
+                    unit: MouseWheelUnit::Line,
+                    delta: Vec2::new(0.0, *lines),
+                    modifiers: Modifiers::NONE,
+                });
+                Ok(true)
+            }
+            Command::Resize(size) => {
+                wishes.resize = Some(*size);
+                Ok(true)
+            }
+            Command::Drop(path) => {
+                input.dropped_files.push(egui::DroppedFile { path: Some(path.clone()), ..Default::default() });
+                Ok(true)
+            }
+            Command::Screenshot(path) => {
+                wishes.screenshot = Some(path.clone());
+                Ok(true)
+            }
+            Command::Mark(name) => {
+                self.sections.push(self.section.end(app));
+                self.section = Measured::new(name);
+                // what is on the screen already is none of its pictures
+                self.section.last_picture = app.panes[0].progress.clone();
+                Ok(true)
+            }
+            Command::Expect(text) if self.contains(text) => Ok(true),
+            Command::Expect(text) => Err(format!("nothing on the screen contains \"{text}\"{}", self.shown_errors(app))),
+            Command::ExpectNoErrors => match self.errors.first() {
+                None => Ok(true),
+                Some(error) => Err(format!("an error was shown: {error}")),
+            },
+        }
+    }
+
+    fn shown_errors(&self, app: &App) -> String {
+        let errors: Vec<_> = app.failure.iter().chain(&self.errors).take(3).cloned().collect();
+        if errors.is_empty() { String::new() } else { format!(" ({})", errors.join("; ")) }
+    }
+
+    fn move_to(&mut self, input: &mut RawInput, at: Pos2) {
+        self.pointer = at;
+        input.events.push(Event::PointerMoved(at));
+    }
+
+    /// A click over several frames: move, press, release. Returns true at its end.
+    fn click(&mut self, input: &mut RawInput, at: Pos2, button: PointerButton, step: u32, times: u32) -> bool {
+        if step == 0 {
+            self.move_to(input, at);
+            return false;
+        }
+        let pressed = step % 2 == 1;
+        input.events.push(Event::PointerButton { pos: at, button, pressed, modifiers: Modifiers::NONE });
+        step >= 2 * times
+    }
+
+    #[allow(clippy::too_many_arguments, reason = "what a drag consists of")]
+    fn drag(
+        &mut self,
+        input: &mut RawInput,
+        [from, to]: [Pos2; 2],
+        time: Duration,
+        button: PointerButton,
+        modifiers: Modifiers,
+        step: u32,
+        elapsed: Duration,
+    ) -> bool {
+        input.modifiers = modifiers;
+        let share = (elapsed.as_secs_f32() / time.as_secs_f32().max(1e-3)).min(1.0);
+        let at = from + (to - from) * share;
+        let event = |pos, pressed| Event::PointerButton { pos, button, pressed, modifiers };
+        match step {
+            0 => self.move_to(input, from),
+            1 => input.events.push(event(from, true)),
+            _ => self.move_to(input, at),
+        }
+        let ends = step > 1 && share >= 1.0;
+        if ends {
+            input.events.push(event(to, false));
+        }
+        ends
+    }
+
+    fn name_of(&self, node: &accesskit::Node) -> String {
+        let own = node.label().or(if node.role() == Role::Label { node.value() } else { None });
+        if let Some(own) = own.filter(|o| !o.is_empty()) {
+            return own.to_owned();
+        }
+        let of = |id: &NodeId| self.tree.iter().find(|(k, _)| k == id).map(|(_, n)| n);
+        let labels = node.labelled_by().iter().filter_map(of).filter_map(|n| n.label().or(n.value()));
+        labels.collect::<Vec<_>>().join(" ")
+    }
+
+    /// Finds a control by its name: exactly, or as the beginning of it. `is_number`: only what has a numeric value.
+    fn find(&self, label: &str, is_number: bool) -> Result<(NodeId, &accesskit::Node), String> {
+        let fits = |n: &accesskit::Node| {
+            let is_text = n.role() == Role::Label && !is_number;
+            !n.is_disabled()
+                && n.bounds().is_some()
+                && (!is_number || n.numeric_value().is_some() || n.role() == Role::SpinButton)
+                && !is_text
+        };
+        let all: Vec<_> = self.tree.iter().filter(|(_, n)| fits(n)).map(|(id, n)| (*id, n, self.name_of(n))).collect();
+        let found = all.iter().find(|a| a.2 == label).or_else(|| all.iter().find(|a| a.2.starts_with(label)));
+        found.map(|f| (f.0, f.1)).ok_or_else(|| {
+            let names: Vec<_> = all.iter().map(|a| a.2.as_str()).filter(|n| !n.is_empty()).collect();
+            format!("no control is called \"{label}\"; there are: {}", names.join(", "))
+        })
+    }
+
+    fn place_of(&self, label: &str) -> Result<Pos2, String> {
+        let bounds = self.find(label, false)?.1.bounds().unwrap_or_default();
+        Ok(Pos2::new((0.5 * (bounds.x0 + bounds.x1)) as f32, (0.5 * (bounds.y0 + bounds.y1)) as f32))
+    }
+
+    fn contains(&self, text: &str) -> bool {
+        self.tree.iter().any(|(_, n)| self.name_of(n).contains(text) || n.value().is_some_and(|v| v.contains(text)))
+    }
+}
+
+fn parse(line: &str) -> Option<Command> {
+    let (name, rest) = line.split_once(char::is_whitespace).unwrap_or((line, ""));
+    let rest = rest.trim();
+    let words: Vec<&str> = rest.split_whitespace().collect();
+    let number = |k: usize| words.get(k)?.parse::<f32>().ok().filter(|x| x.is_finite());
+    let at = |k: usize| Some(Pos2::new(number(k)?, number(k + 1)?));
+    let seconds = |k: usize, default: f32| {
+        Some(Duration::from_secs_f32(words.get(k).map_or(Some(default), |_| number(k))?.clamp(0.0, 1e6)))
+    };
+    let patience = |k: usize| seconds(k, PATIENCE.as_secs_f32());
+    let button = |word: &str| match word {
+        "left" | "shift" => Some(PointerButton::Primary),
+        "right" => Some(PointerButton::Secondary),
+        "middle" => Some(PointerButton::Middle),
+        _ => None,
+    };
+    Some(match name {
+        "wait" => match *words.first()? {
+            "picture" => Command::WaitFor(Condition::Picture, patience(1)?),
+            "settled" => Command::WaitFor(Condition::Settled, patience(1)?),
+            "compared" => Command::WaitFor(Condition::Compared, patience(1)?),
+            text if text.starts_with("text:") => {
+                let text = rest.strip_prefix("text:")?;
+                Command::WaitFor(Condition::Text(text.to_owned()), PATIENCE)
+            }
+            _ => Command::Wait(seconds(0, 0.0)?),
+        },
+        "key" => {
+            let mut modifiers = Modifiers::NONE;
+            let mut key = *words.first()?;
+            while let Some((modifier, left)) = key.split_once('+').filter(|(_, left)| !left.is_empty()) {
+                modifiers = match modifier {
+                    "Ctrl" => modifiers | Modifiers::COMMAND | Modifiers::CTRL,
+                    "Shift" => modifiers | Modifiers::SHIFT,
+                    "Alt" => modifiers | Modifiers::ALT,
+                    _ => return None,
+                };
+                key = left;
+            }
+            Command::Key(modifiers, Key::from_name(key)?, seconds(1, 0.0)?)
+        }
+        "type" if !rest.is_empty() => Command::Type(rest.to_owned()),
+        "click" if !rest.is_empty() => Command::Click(rest.to_owned()),
+        "set" => {
+            let (label, value) = rest.rsplit_once('=')?;
+            Command::Set(label.trim().to_owned(), value.trim().parse().ok()?)
+        }
+        "press" => {
+            let word = words.get(2).copied().unwrap_or("left");
+            Command::Press(at(0)?, button(word)?, if words.get(3) == Some(&"2") { 2 } else { 1 })
+        }
+        "drag" => {
+            let word = words.get(5).copied().unwrap_or("left");
+            let modifiers = if word == "shift" { Modifiers::SHIFT } else { Modifiers::NONE };
+            Command::Drag(at(0)?, at(2)?, seconds(4, 0.5)?, button(word)?, modifiers)
+        }
+        "drag-control" => {
+            // the label may have spaces: numbers are at the end
+            let numbers = words.iter().rev().take_while(|w| w.parse::<f32>().is_ok()).count();
+            let first = words.len() - numbers;
+            let label = words[..first].join(" ");
+            (numbers >= 2 && !label.is_empty()).then_some(())?;
+            Command::DragControl(label, Vec2::new(number(first)?, number(first + 1)?), seconds(first + 2, 0.5)?)
+        }
+        "wheel" => Command::Wheel(at(0)?, number(2)?),
+        "resize" => Command::Resize([words.first()?.parse().ok()?, words.get(1)?.parse().ok()?]),
+        "drop" if !rest.is_empty() => Command::Drop(rest.into()),
+        "screenshot" if !rest.is_empty() => Command::Screenshot(rest.into()),
+        "mark" if !rest.is_empty() => Command::Mark(rest.to_owned()),
+        "expect" if !rest.is_empty() => Command::Expect(rest.to_owned()),
+        "expect-no-errors" => Command::ExpectNoErrors,
+        _ => return None,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn commands_are_read() {
+        let of = |line: &str| parse(line);
+        assert_eq!(of("wait 0.5"), Some(Command::Wait(Duration::from_millis(500))));
+        assert_eq!(of("wait settled 7"), Some(Command::WaitFor(Condition::Settled, Duration::from_secs(7))));
+        assert_eq!(of("wait text:Open a scene"), Some(Command::WaitFor(Condition::Text("Open a scene".into()), PATIENCE)));
+        assert_eq!(of("key Ctrl+S"), Some(Command::Key(Modifiers::COMMAND | Modifiers::CTRL, Key::S, Duration::ZERO)));
+        assert_eq!(of("set AO radius = 0.5"), Some(Command::Set("AO radius".into(), 0.5)));
+        let drag = Command::Drag(
+            Pos2::new(1.0, 2.0),
+            Pos2::new(3.0, 4.0),
+            Duration::from_millis(500),
+            PointerButton::Primary,
+            Modifiers::SHIFT,
+        );
+        assert_eq!(of("drag 1 2 3 4 0.5 shift"), Some(drag));
+        let control = Command::DragControl("Line between".into(), Vec2::new(-50.0, 0.0), Duration::from_secs(1));
+        assert_eq!(of("drag-control Line between -50 0 1"), Some(control));
+        assert_eq!(of("press 5 6 right"), Some(Command::Press(Pos2::new(5.0, 6.0), PointerButton::Secondary, 1)));
+        for bad in [
+            "",
+            "wait",
+            "wait long",
+            "key",
+            "key Ctrl+Nothing",
+            "drag 1 2 3",
+            "click",
+            "set Radius",
+            "dance",
+            "wheel 1 2",
+            "resize 5",
+        ] {
+            assert_eq!(of(bad), None, "{bad}");
+        }
+        let script = Script::parse("# nothing\n\n wait 1\nfly", Path::new("a.txt"));
+        assert!(script.err().unwrap().to_string().contains("line 4"));
+    }
+}

@@ -1,0 +1,162 @@
+//! What a view can show: presets of real-time ambient occlusion and their buffers, integrators of stills, and the truth of what is beside it.
+
+use crate::integrators::{self, IntegratorName};
+use crate::realtime::display::DisplayMode;
+use crate::realtime::frame_settings::FrameSettings;
+use crate::realtime::{FilterKind, Preset, Technique as AoTechnique};
+use crate::renderer::RenderSettings;
+use crate::sampling::Sequence;
+
+/// What a view shows.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Technique {
+    /// Ambient occlusion in real time.
+    Preset(Preset),
+    /// Screen-space ambient occlusion in real time.
+    Gtao,
+    /// A still, which converges while the camera rests.
+    Still(IntegratorName),
+    /// A buffer of real-time ambient occlusion.
+    Buffer(DisplayMode),
+    /// Ambient occlusion at pixel centres without filter, which converges while the camera rests: the truth of the real-time techniques.
+    Converged,
+}
+
+/// Headings of the list of techniques.
+pub const GROUPS: [&str; 3] = ["Ambient occlusion in real time", "Converging images", "Buffers"];
+
+impl Technique {
+    /// All of them, by [`GROUPS`].
+    pub fn all() -> Vec<(usize, Self)> {
+        let presets = [Preset::Fast, Preset::Balanced, Preset::Quality, Preset::Larsen, Preset::LarsenFixed];
+        let stills = integrators::ALL.iter().filter_map(|i| IntegratorName::find(i.name()));
+        let buffers = DisplayMode::ALL.into_iter().filter(|m| *m != DisplayMode::Accessibility);
+        let realtime = presets.into_iter().map(Self::Preset).chain([Self::Gtao]).map(|t| (0, t));
+        let converging = [Self::Converged].into_iter().chain(stills.map(Self::Still)).map(|t| (1, t));
+        realtime.chain(converging).chain(buffers.map(|m| (2, Self::Buffer(m)))).collect()
+    }
+
+    /// Name in lists.
+    pub fn label(self) -> String {
+        let word = |text: &str| text.replace('-', " ");
+        match self {
+            Self::Preset(preset) => format!("AO {}", word(preset.name())),
+            Self::Gtao => "GTAO (screen space)".into(),
+            Self::Still(integrator) => match integrator.name() {
+                "ao" => "AO still".into(),
+                "ao-sky" => "AO truth (ao-sky)".into(),
+                name => word(name),
+            },
+            Self::Buffer(mode) => word(mode.name()),
+            Self::Converged => "AO converged".into(),
+        }
+    }
+
+    /// Description in one line.
+    pub fn help(self) -> &'static str {
+        match self {
+            Self::Preset(preset) => preset.help(),
+            Self::Gtao => AoTechnique::Gtao.help(),
+            Self::Still(integrator) => integrator.get().help(),
+            Self::Buffer(mode) => mode.help(),
+            Self::Converged => {
+                "Every ray counts, no filter: what the real-time techniques approximate, with their radius and falloff"
+            }
+        }
+    }
+
+    /// Returns true for images of ambient occlusion or of another quantity from 0 to 1 of the same meaning.
+    pub fn is_occlusion(self) -> bool {
+        match self {
+            Self::Preset(_) | Self::Gtao | Self::Converged => true,
+            Self::Still(integrator) => ["ao", "ao-sky"].contains(&integrator.name()),
+            Self::Buffer(mode) => mode == DisplayMode::Unfiltered,
+        }
+    }
+
+    /// Settings of an image of it: those of `base` that apply to it.
+    pub fn settings(self, base: &RenderSettings) -> RenderSettings {
+        let mut settings = RenderSettings {
+            camera: Default::default(),
+            lighting: Default::default(),
+            film: Default::default(),
+            ..base.clone()
+        };
+        (settings.image.size, settings.image.spp, settings.image.time_limit) = (None, None, None);
+        settings.integrator = None;
+        // what moves is the viewer's affair
+        let own = FrameSettings {
+            frames: None,
+            fps: None,
+            animate: None,
+            camera_path: None,
+            orbit: None,
+            warm_up: None,
+            show: None,
+            ..base.frames.clone()
+        };
+        settings.frames = match self {
+            Self::Preset(preset @ Preset::Larsen) => {
+                FrameSettings { preset: Some(preset), primary: own.primary, ..Default::default() }
+            }
+            Self::Preset(preset) => FrameSettings { preset: Some(preset), technique: None, ..own },
+            Self::Gtao => {
+                let preset = own.preset.filter(|p| *p != Preset::Larsen).unwrap_or_default();
+                FrameSettings { preset: Some(preset), technique: Some(AoTechnique::Gtao), budget: None, ..own }
+            }
+            Self::Buffer(mode) => {
+                let preset = own.preset.filter(|p| *p != Preset::Larsen).unwrap_or_default();
+                FrameSettings { preset: Some(preset), technique: None, show: Some(mode), ..own }
+            }
+            Self::Converged => FrameSettings {
+                preset: Some(Preset::Balanced),
+                primary: own.primary,
+                rays_per_pixel: Some(4),
+                history: Some(512),
+                filter: Some(FilterKind::None),
+                sequence: Some(Sequence::Sobol),
+                ..Default::default()
+            },
+            Self::Still(integrator) => {
+                settings.integrator = Some(integrator);
+                FrameSettings::default()
+            }
+        };
+        settings.clear_unused();
+        settings
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_technique_can_be_rendered_whatever_is_set() {
+        let mut base = RenderSettings::default();
+        base.integrators.ao.ao_radius = Some(2.0);
+        base.integrators.path.max_depth = Some(3);
+        base.integrators.path.sky_albedo = Some(0.3);
+        base.picture.exposure = Some(1.0);
+        base.frames.rays_per_pixel = Some(2);
+        base.frames.history = Some(16);
+        base.frames.preset = Some(Preset::Larsen);
+        let mut labels = Vec::new();
+        for (group, technique) in Technique::all() {
+            assert!(group < GROUPS.len());
+            let settings = technique.settings(&base);
+            settings.check().unwrap_or_else(|e| panic!("{technique:?}: {e}"));
+            if settings.realtime_setting().is_some() {
+                crate::renderer::frames::frame_settings(&settings).unwrap_or_else(|e| panic!("{technique:?}: {e}"));
+            }
+            labels.push(technique.label());
+        }
+        let n = labels.len();
+        labels.sort();
+        labels.dedup();
+        assert_eq!(labels.len(), n, "each has a name of its own");
+        assert_eq!(Technique::Preset(Preset::Fast).settings(&base).integrators.ao.ao_radius, Some(2.0));
+        let path = Technique::Still("path".parse().unwrap()).settings(&base);
+        assert_eq!((path.integrators.ao.ao_radius, path.integrators.path.max_depth), (None, Some(3)));
+    }
+}

@@ -1,0 +1,265 @@
+//! The viewer in a window.
+
+mod cpu;
+mod vulkan;
+
+use std::sync::Arc;
+use std::time::Instant;
+
+use egui_winit::winit::application::ApplicationHandler;
+use egui_winit::winit::dpi::LogicalSize;
+use egui_winit::winit::event::{StartCause, WindowEvent};
+use egui_winit::winit::event_loop::{ActiveEventLoop, ControlFlow, EventLoop, EventLoopProxy};
+use egui_winit::winit::window::{Window, WindowId};
+
+use super::app::App;
+use super::layer::Layer;
+use super::painter::Painted;
+use super::request::{EventSender, Mailbox};
+use super::{Painter, ViewOptions, worker};
+use crate::error::{Error, Result};
+
+/// Smallest size of the window, points.
+const LEAST_SIZE: [f64; 2] = [320.0, 240.0];
+
+/// Brings frames to the screen.
+trait Presenter {
+    /// Shows a frame: layers, and the user interface over them, in a window of `size` physical pixels, none of which is 0.
+    ///
+    /// # Errors
+    /// Those of the window system, after which [`Presenter::recover`] is called.
+    fn present(&mut self, size: [u32; 2], layers: &[Layer], context: &egui::Context, painted: &mut Painted) -> Result<()>;
+
+    /// Creates the window's surface anew, after an error.
+    ///
+    /// # Errors
+    /// Those of the window system.
+    fn recover(&mut self, window: Arc<Window>, context: &egui::Context) -> Result<()>;
+
+    /// Takes messages of the validation layer.
+    fn check(&self) -> Vec<String> {
+        Vec::new()
+    }
+}
+
+/// What wakes the window.
+#[derive(Debug)]
+enum Wake {
+    /// Something is to be shown at this time.
+    At(Instant),
+    /// An assistive technology asks for something.
+    Access(egui_winit::accesskit_winit::Event),
+}
+
+impl From<egui_winit::accesskit_winit::Event> for Wake {
+    fn from(event: egui_winit::accesskit_winit::Event) -> Self {
+        Self::Access(event)
+    }
+}
+
+/// Opens the window and returns when it is closed.
+///
+/// # Errors
+/// [`Error::Device`] without a display; those of starting the thread that renders.
+pub fn run(options: &ViewOptions) -> Result<()> {
+    let no_display = |e: &dyn std::fmt::Display| {
+        let reason = crate::terminal::console::one_line(&e.to_string());
+        Error::Device(format!(
+            "no window can be opened here ({reason}): set DISPLAY or WAYLAND_DISPLAY, or use `skylit render`"
+        ))
+    };
+    let event_loop = EventLoop::<Wake>::with_user_event().build().map_err(|e| no_display(&e))?;
+    let proxy = event_loop.create_proxy();
+    let mailbox = Arc::new(Mailbox::default());
+    let (sender, events) = std::sync::mpsc::channel();
+    let wake = {
+        let proxy = proxy.clone();
+        // a window that is closed needs no waking
+        Arc::new(move || drop(proxy.send_event(Wake::At(Instant::now()))))
+    };
+    let thread = worker::spawn(mailbox.clone(), EventSender::new(sender, wake))?;
+    let context = egui::Context::default();
+    {
+        let proxy = proxy.clone();
+        context.set_request_repaint_callback(move |info| {
+            if let Some(at) = Instant::now().checked_add(info.delay) {
+                let _ = proxy.send_event(Wake::At(at));
+            }
+        });
+    }
+    let app = App::new(options, mailbox, events);
+    let options = options.clone();
+    let mut viewer = Viewer { app, context, proxy, options, open: None, redraw: None, failed: None, presenter_failures: 0 };
+    let outcome = event_loop.run_app(&mut viewer).map_err(|e| no_display(&e));
+    viewer.app.quit();
+    let joined = thread.join();
+    viewer.failed.map_or(outcome, Err)?;
+    joined.map_err(|_| Error::CheckFailed("the thread that renders has panicked".into()))
+}
+
+struct Viewer {
+    app: App,
+    context: egui::Context,
+    proxy: EventLoopProxy<Wake>,
+    options: ViewOptions,
+    open: Option<OpenWindow>,
+    /// When the window is to be drawn next.
+    redraw: Option<Instant>,
+    failed: Option<Error>,
+    presenter_failures: u32,
+}
+
+struct OpenWindow {
+    presenter: Box<dyn Presenter>,
+    input: egui_winit::State,
+    painted: Painted,
+    title: String,
+    window: Arc<Window>,
+}
+
+impl Viewer {
+    fn open(&self, event_loop: &ActiveEventLoop) -> Result<OpenWindow> {
+        let attributes = Window::default_attributes()
+            .with_title("skylit")
+            .with_inner_size(LogicalSize::new(self.options.size[0], self.options.size[1]))
+            .with_min_inner_size(LogicalSize::new(LEAST_SIZE[0], LEAST_SIZE[1]))
+            // AccessKit wants to be there before it is seen
+            .with_visible(false);
+        let window =
+            event_loop.create_window(attributes).map_err(|e| Error::Device(format!("the window cannot be opened: {e}")))?;
+        let window = Arc::new(window);
+        let scale = window.scale_factor() as f32;
+        let mut input =
+            egui_winit::State::new(self.context.clone(), egui::ViewportId::ROOT, &window, Some(scale), window.theme(), None);
+        input.init_accesskit(event_loop, &window, self.proxy.clone());
+        let presenter: Box<dyn Presenter> = match self.options.painter {
+            Painter::Cpu => Box::new(cpu::CpuPresenter::new(window.clone())?),
+            Painter::Vulkan => {
+                let device = self.options.device_name.clone();
+                Box::new(vulkan::VulkanPresenter::new(window.clone(), device, self.options.device.validation)?)
+            }
+        };
+        window.set_visible(true);
+        Ok(OpenWindow { presenter, input, painted: Painted::default(), title: String::new(), window })
+    }
+
+    fn fail(&mut self, event_loop: &ActiveEventLoop, error: Error) {
+        self.failed = Some(error);
+        event_loop.exit();
+    }
+
+    /// Draws a frame.
+    fn draw(&mut self, event_loop: &ActiveEventLoop) {
+        let Some(open) = &mut self.open else { return };
+        self.redraw = None;
+        let input = open.input.take_egui_input(&open.window);
+        super::drop_files(&mut self.app, &input.dropped_files);
+        let app = &mut self.app;
+        let mut output = self.context.run(input, |context| app.frame(context));
+        open.input.handle_platform_output(&open.window, std::mem::take(&mut output.platform_output));
+        open.painted.take(&mut output);
+        if let Some(viewport) = output.viewport_output.get(&egui::ViewportId::ROOT) {
+            self.redraw = Instant::now().checked_add(viewport.repaint_delay);
+        }
+        let title = self.app.scene.as_ref().map_or("skylit".to_owned(), |s| format!("{} - skylit", s.source));
+        if title != open.title {
+            open.window.set_title(&title);
+            open.title = title;
+        }
+        if self.app.closes {
+            event_loop.exit();
+            return;
+        }
+        let size: [u32; 2] = open.window.inner_size().into();
+        // a window that is minimised has no pixels
+        if size[0] == 0 || size[1] == 0 {
+            return;
+        }
+        match open.presenter.present(size, self.app.layers(), &self.context, &mut open.painted) {
+            Ok(()) => {
+                self.presenter_failures = 0;
+                let messages = open.presenter.check();
+                messages.into_iter().for_each(|m| self.app.say(format!("validation: {m}"), true));
+            }
+            Err(e) if self.presenter_failures > 10 => self.fail(event_loop, e),
+            Err(_) => {
+                // monitors come and go: the window gets another surface
+                self.presenter_failures += 1;
+                match open.presenter.recover(open.window.clone(), &self.context) {
+                    Ok(()) => self.redraw = Some(Instant::now()),
+                    Err(e) => self.fail(event_loop, e),
+                }
+            }
+        }
+    }
+}
+
+impl ApplicationHandler<Wake> for Viewer {
+    fn resumed(&mut self, event_loop: &ActiveEventLoop) {
+        if self.open.is_none() {
+            match self.open(event_loop) {
+                Ok(open) => {
+                    open.window.request_redraw();
+                    self.open = Some(open);
+                }
+                Err(e) => self.fail(event_loop, e),
+            }
+        }
+    }
+
+    fn suspended(&mut self, _: &ActiveEventLoop) {
+        self.open = None;
+    }
+
+    fn new_events(&mut self, event_loop: &ActiveEventLoop, cause: StartCause) {
+        if crate::terminal::interrupt::requested() {
+            self.fail(event_loop, Error::Interrupted);
+        } else if matches!(cause, StartCause::ResumeTimeReached { .. })
+            && let Some(open) = &self.open
+        {
+            open.window.request_redraw();
+        }
+    }
+
+    fn user_event(&mut self, _: &ActiveEventLoop, wake: Wake) {
+        let at = match wake {
+            Wake::At(at) => at,
+            Wake::Access(event) => {
+                use egui_winit::accesskit_winit::WindowEvent as Access;
+                match (event.window_event, &mut self.open) {
+                    (Access::InitialTreeRequested, _) => self.context.enable_accesskit(),
+                    (Access::ActionRequested(request), Some(open)) => open.input.on_accesskit_action_request(request),
+                    (Access::AccessibilityDeactivated, _) => self.context.disable_accesskit(),
+                    (Access::ActionRequested(_), None) => {}
+                }
+                Instant::now()
+            }
+        };
+        self.redraw = Some(self.redraw.map_or(at, |r| r.min(at)));
+    }
+
+    fn window_event(&mut self, event_loop: &ActiveEventLoop, _: WindowId, event: WindowEvent) {
+        let Some(open) = &mut self.open else { return };
+        let response = open.input.on_window_event(&open.window, &event);
+        match event {
+            WindowEvent::CloseRequested | WindowEvent::Destroyed => event_loop.exit(),
+            WindowEvent::RedrawRequested => self.draw(event_loop),
+            WindowEvent::Resized(_) | WindowEvent::ScaleFactorChanged { .. } => open.window.request_redraw(),
+            _ if response.repaint => open.window.request_redraw(),
+            _ => {}
+        }
+    }
+
+    fn about_to_wait(&mut self, event_loop: &ActiveEventLoop) {
+        match self.redraw {
+            Some(at) if at <= Instant::now() => {
+                if let Some(open) = &self.open {
+                    open.window.request_redraw();
+                }
+                event_loop.set_control_flow(ControlFlow::Wait);
+            }
+            Some(at) => event_loop.set_control_flow(ControlFlow::WaitUntil(at)),
+            None => event_loop.set_control_flow(ControlFlow::Wait),
+        }
+    }
+}

@@ -1,0 +1,471 @@
+//! The thread that loads scenes and renders what the window requests.
+
+mod compare;
+mod pane;
+
+use std::path::Path;
+use std::sync::Arc;
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+pub use compare::heat;
+use pane::{Pacing, Pane};
+
+use super::request::{Comparison, DeviceSummary, Event, EventSender, Mailbox, Progress, Request, SceneSummary, Task};
+use crate::error::{Error, Result};
+use crate::film::{Control, NoControl};
+use crate::gpu::Device;
+use crate::output::{self, ImageFormat, png};
+use crate::renderer::{Interactive, Renderer};
+use crate::scene::{Camera, Scene, load};
+use crate::tracer::{DeviceSettings, TracerKind};
+
+/// Time without motion after which the view rests.
+const REST: Duration = Duration::from_millis(150);
+/// Share of a frame's time, at the frame rate to hold, in which it is to be rendered: an input waits for half of the previous frame on average, and the
+/// window takes its part.
+const SHARE: f64 = 0.6;
+/// Least time between two comparisons.
+const COMPARISON: Duration = Duration::from_millis(700);
+/// A comparison may take this share of the time.
+const COMPARISON_SHARE: u32 = 5;
+
+/// Starts the thread.
+///
+/// # Errors
+/// [`Error::OutOfMemory`] when there can be no further thread.
+pub fn spawn(mailbox: Arc<Mailbox>, events: EventSender) -> Result<JoinHandle<()>> {
+    let run = move || Worker { mailbox, events, open: None, device_losses: 0 }.run();
+    std::thread::Builder::new()
+        .name("renderer".into())
+        .spawn(run)
+        .map_err(|e| Error::OutOfMemory(format!("the thread that renders cannot be started: {e}")))
+}
+
+struct Worker {
+    mailbox: Arc<Mailbox>,
+    events: EventSender,
+    open: Option<OpenScene>,
+    device_losses: u32,
+}
+
+/// A loaded scene on a device.
+struct OpenScene {
+    renderer: Renderer,
+    load: u64,
+    device: DeviceSettings,
+}
+
+impl Worker {
+    fn run(mut self) {
+        loop {
+            let number = self.mailbox.number();
+            let request = self.mailbox.peek();
+            if request.quits {
+                return;
+            }
+            let outcome = match self.prepare(&request) {
+                Ok(false) => {
+                    self.mailbox.wait(number, Duration::from_secs(60));
+                    continue;
+                }
+                Ok(true) => self.session(&request),
+                Err(e) => Err(e),
+            };
+            match outcome {
+                Ok(()) | Err(Error::Interrupted) => self.device_losses = 0,
+                Err(Error::DeviceLost(text)) if self.device_losses < 3 => {
+                    self.device_losses += 1;
+                    self.events.send(Event::Warning(format!("the Vulkan device was lost ({text}): started again")));
+                    self.open = None;
+                }
+                Err(e) => {
+                    self.events.send(Event::Failed(crate::terminal::console::one_line(&e.to_string())));
+                    // what failed is tried again only if something else is requested
+                    self.mailbox.wait(number, Duration::from_secs(3600));
+                }
+            }
+        }
+    }
+
+    /// Loads the requested scene and opens the device, unless both are there. Returns false if there is nothing to render.
+    fn prepare(&mut self, request: &Request) -> Result<bool> {
+        let Some(source) = &request.scene else { return Ok(false) };
+        if self.open.as_ref().is_some_and(|open| open.load == request.load) {
+            return self.set_device(&request.device).map(|()| true);
+        }
+        self.events.send(Event::Loading(format!("loading {source}")));
+        let start = Instant::now();
+        let kept = self.open.as_ref().filter(|o| o.device == request.device).map(|o| o.renderer.device().clone());
+        match self.load(source, request, kept) {
+            Ok((device, scene)) => {
+                let seconds = start.elapsed().as_secs_f64();
+                for warning in &scene.report.warnings {
+                    self.events.send(Event::Warning(warning.clone()));
+                }
+                let summary = summary(source, &scene, seconds);
+                // before the new one is uploaded: memory
+                self.open = None;
+                let renderer = Renderer::new(device, scene, &request.device)?;
+                self.open = Some(OpenScene { renderer, load: request.load, device: request.device.clone() });
+                self.events.send(Event::Loaded(Box::new(summary)));
+                Ok(true)
+            }
+            Err(Error::Interrupted) => Err(Error::Interrupted),
+            Err(e) => {
+                self.events.send(Event::LoadFailed(crate::terminal::console::one_line(&e.to_string())));
+                let Some(open) = &mut self.open else {
+                    // nothing to go back to
+                    self.wait_for(|r| r.load != request.load || r.quits || r.device != request.device);
+                    return Err(Error::Interrupted);
+                };
+                // the old scene answers this request
+                open.load = request.load;
+                Ok(true)
+            }
+        }
+    }
+
+    /// Loads a scene on a thread of its own while the device opens; [`Error::Interrupted`] if another one is requested meanwhile.
+    fn load(&self, source: &str, request: &Request, device: Option<Arc<Device>>) -> Result<(Arc<Device>, Scene)> {
+        let name = source.to_owned();
+        let loader = std::thread::spawn(move || load::load(&name));
+        let device = match device {
+            Some(device) => Ok(device),
+            None => Device::open(&request.device.options()),
+        };
+        while !loader.is_finished() {
+            if self.mailbox.is(|r| r.load != request.load || r.quits) {
+                return Err(Error::Interrupted);
+            }
+            std::thread::sleep(Duration::from_millis(10));
+        }
+        let scene = loader.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))?;
+        Ok((device?, scene))
+    }
+
+    /// Changes the tracer, or the device. Settings that the device does not support leave both as they were.
+    fn set_device(&mut self, settings: &DeviceSettings) -> Result<()> {
+        let Some(OpenScene { renderer, load, device: before }) = self.open.take() else { return Ok(()) };
+        if before == *settings {
+            self.open = Some(OpenScene { renderer, load, device: before });
+            return Ok(());
+        }
+        let device = renderer.device().clone();
+        let scene = renderer.into_scene();
+        let opened =
+            if before.options() == settings.options() { Ok(device.clone()) } else { Device::open(&settings.options()) };
+        let chosen = opened.and_then(|device| settings.choose(&device.info).map(|(kind, _, _)| (device, kind)));
+        let chosen = chosen.and_then(|(device, kind)| match kind.is_supported_by(&device.info) {
+            true => Ok(device),
+            false => Err(Error::Device(format!("tracer '{kind}' is not available on {}", device.info.name))),
+        });
+        let renderer = match chosen {
+            Ok(chosen) => Renderer::new(chosen, scene, settings)?,
+            Err(e) => {
+                self.events.send(Event::Warning(e.to_string()));
+                Renderer::new(device, scene, &before)?
+            }
+        };
+        self.open = Some(OpenScene { renderer, load, device: settings.clone() });
+        Ok(())
+    }
+
+    fn wait_for(&self, holds: impl Fn(&Request) -> bool) {
+        loop {
+            let number = self.mailbox.number();
+            if self.mailbox.is(&holds) {
+                return;
+            }
+            self.mailbox.wait(number, Duration::from_secs(60));
+        }
+    }
+
+    /// Renders until something is requested for which the session must be prepared anew.
+    fn session(&mut self, first: &Request) -> Result<()> {
+        let Some(open) = &mut self.open else { return Ok(()) };
+        let tracer_reason = open.renderer.tracer_kind().1.to_owned();
+        let (mailbox, events) = (&self.mailbox, &self.events);
+        let interactive = match open.renderer.interactive(&first.lighting, first.animation) {
+            Ok(interactive) => interactive,
+            Err(e @ (Error::Usage(_) | Error::Input { .. })) => {
+                events.send(Event::Warning(e.to_string()));
+                open.renderer.interactive(&Default::default(), None)?
+            }
+            Err(e) => return Err(e),
+        };
+        let mut session = Session {
+            mailbox,
+            events,
+            interactive,
+            tracer_reason,
+            panes: Vec::new(),
+            camera: None,
+            time: 0.0,
+            last_motion: Instant::now() - REST,
+            compared: None,
+            device: DeviceSummary::default(),
+            chose_camera: false,
+            first: first.clone(),
+        };
+        session.run()
+    }
+}
+
+/// Views of a scene, until another scene, device, light or animation is requested.
+struct Session<'a> {
+    mailbox: &'a Mailbox,
+    events: &'a EventSender,
+    interactive: Interactive<'a>,
+    tracer_reason: String,
+    panes: Vec<Pane>,
+    camera: Option<Camera>,
+    time: f64,
+    last_motion: Instant,
+    /// When images were last compared, how long it took, and how many steps they had.
+    compared: Option<(Instant, Duration, u64)>,
+    device: DeviceSummary,
+    /// The camera to start with was sent.
+    chose_camera: bool,
+    first: Request,
+}
+
+impl Session<'_> {
+    fn run(&mut self) -> Result<()> {
+        loop {
+            let (request, number, changed) = self.mailbox.take();
+            if request.quits || !self.serves(&request) {
+                return Ok(());
+            }
+            self.move_to(&request)?;
+            self.match_panes(&request);
+            let Some(camera) = self.camera.clone().filter(|_| request.size != [0; 2]) else {
+                self.choose_camera(&request)?;
+                self.mailbox.wait(number, Duration::from_millis(50));
+                continue;
+            };
+            for task in &request.tasks {
+                self.perform(task, &camera, request.size)?;
+            }
+            let moves = self.last_motion.elapsed() < REST;
+            match self.next_pane(moves, &request) {
+                Some(k) => self.step(k, &request, number, changed, &camera, moves)?,
+                // what was moving comes to rest
+                None if moves => self.mailbox.wait(number, REST),
+                None => {
+                    self.compare(&request, true)?;
+                    self.mailbox.wait(number, Duration::from_secs(60));
+                }
+            }
+            self.compare(&request, false)?;
+        }
+    }
+
+    /// Returns true if this session can do what is requested.
+    fn serves(&self, request: &Request) -> bool {
+        let of = |r: &Request| (r.scene.clone(), r.load, r.device.clone(), r.lighting.clone(), r.animation);
+        of(request) == of(&self.first)
+    }
+
+    /// Moves the scene and the camera to where they are requested to be.
+    fn move_to(&mut self, request: &Request) -> Result<()> {
+        let has_moved = request.time != self.time && self.interactive.set_time(request.time)?;
+        self.time = request.time;
+        let followed = request.followed_camera.and_then(|k| self.interactive.animated_camera(k));
+        let camera = followed.or_else(|| request.camera.clone());
+        if has_moved || camera != self.camera {
+            if self.camera.is_some() {
+                self.last_motion = Instant::now();
+            }
+            self.panes.iter_mut().for_each(Pane::unsettle);
+            self.compared = None;
+        }
+        self.camera = camera;
+        Ok(())
+    }
+
+    /// Creates the panes that are requested and keeps those that are there.
+    fn match_panes(&mut self, request: &Request) {
+        let size = request.size;
+        for (k, settings) in request.panes.iter().enumerate() {
+            match self.panes.get_mut(k) {
+                Some(pane) if pane.is_of(settings, size) => {}
+                Some(pane) => {
+                    let mut new = Pane::new(settings, size);
+                    new.succeed(pane);
+                    *pane = new;
+                    self.compared = None;
+                }
+                None => self.panes.push(Pane::new(settings, size)),
+            }
+        }
+        self.panes.truncate(request.panes.len());
+    }
+
+    /// The pane to step next: while something moves those on the screen in turn, else the one that was given the least time.
+    fn next_pane(&self, moves: bool, request: &Request) -> Option<usize> {
+        let due = self.panes.iter().enumerate().filter(|(_, p)| !p.has_failed() && !request.is_paused);
+        match moves {
+            true => due.filter(|(k, _)| *k < request.shown).min_by_key(|(_, p)| p.steps()).map(|(k, _)| k),
+            false => due.filter(|(_, p)| !p.is_idle()).min_by_key(|(_, p)| p.spent()).map(|(k, _)| k),
+        }
+    }
+
+    fn step(&mut self, k: usize, request: &Request, number: u64, changed: Instant, camera: &Camera, moves: bool) -> Result<()> {
+        let frame_time = request.frame_rate.map(|rate| Duration::from_secs_f64(SHARE / rate.max(0.1)));
+        let mut control = StopOnChange { mailbox: self.mailbox, request, moves };
+        let pane = &mut self.panes[k];
+        let pacing = Pacing { moves, frame_time };
+        match pane.step(&mut self.interactive, camera, &pacing, &mut control) {
+            Ok((step, time)) => {
+                let Some(picture) = pane.shown().map(|v| v.picture()).transpose()?.flatten() else { return Ok(()) };
+                let progress =
+                    Progress { pane: k, picture: Arc::new(picture), step, time, latency: changed.elapsed(), request: number };
+                self.events.send(Event::Picture(Box::new(progress)));
+                if self.panes[k].steps() == 1 {
+                    self.events.send(Event::PaneError(k, None));
+                    self.interactive.device().save_pipeline_cache();
+                }
+            }
+            Err(Error::Interrupted) => {}
+            Err(e @ (Error::DeviceLost(_) | Error::OutOfMemory(_))) => return Err(e),
+            Err(e) => {
+                pane.fail();
+                self.events.send(Event::PaneError(k, Some(crate::terminal::console::one_line(&e.to_string()))));
+            }
+        }
+        for warning in self.interactive.take_warnings() {
+            self.events.send(Event::Warning(warning));
+        }
+        self.describe_device();
+        Ok(())
+    }
+
+    fn describe_device(&mut self) {
+        let info = &self.interactive.device().info;
+        let stats = self.interactive.build_stats();
+        let lacks = |kind: &TracerKind| {
+            (!kind.is_supported_by(info)).then(|| (kind.name().to_owned(), kind.needs(info).missing.join(", ")))
+        };
+        let summary = DeviceSummary {
+            name: format!("{} ({})", info.name, info.driver),
+            tracer: (self.interactive.tracer_kind().name().to_owned(), self.tracer_reason.clone()),
+            unavailable: TracerKind::ALL.iter().filter_map(lacks).collect(),
+            bytes: stats.iter().map(|s| s.structure_bytes + s.scene_bytes).sum(),
+            build_seconds: stats.iter().map(|s| s.build_seconds + s.upload_seconds).sum(),
+        };
+        if summary != self.device {
+            self.device = summary.clone();
+            self.events.send(Event::Device(summary));
+        }
+    }
+
+    /// Chooses the camera to start with, by what it would see.
+    fn choose_camera(&mut self, request: &Request) -> Result<()> {
+        if self.chose_camera || request.camera.is_some() || request.size == [0; 2] {
+            return Ok(());
+        }
+        let aspect = f64::from(request.size[0]) / f64::from(request.size[1]);
+        let given = &request.first_camera;
+        let chosen =
+            match (given.camera.is_some() || given.eye.is_some()).then(|| given.choose(self.interactive.scene(), aspect)) {
+                Some(Err(e)) => {
+                    self.events.send(Event::Warning(e.to_string()));
+                    None
+                }
+                given => given.transpose()?,
+            };
+        let camera = match chosen {
+            Some(camera) => camera,
+            None => self.interactive.choose_camera(aspect, &mut NoControl)?,
+        };
+        self.chose_camera = true;
+        let is_inside = self.interactive.is_enclosed(camera.camera_to_world.translation, &mut NoControl)?;
+        self.events.send(Event::Camera(Box::new(camera), is_inside));
+        Ok(())
+    }
+
+    fn perform(&mut self, task: &Task, camera: &Camera, size: [u32; 2]) -> Result<()> {
+        match task {
+            Task::Pick { at, purpose } => {
+                let pick = self.interactive.pick(camera, *at, f64::from(size[0]) / f64::from(size[1]))?;
+                self.events.send(Event::Picked(*purpose, Box::new(pick)));
+            }
+            Task::Save { pane, path } => {
+                let saved = match self.save(*pane, path) {
+                    Err(e @ Error::DeviceLost(_)) => return Err(e),
+                    saved => saved.map(|()| path.clone()).map_err(|e| e.to_string()),
+                };
+                self.events.send(Event::Saved(saved));
+            }
+        }
+        Ok(())
+    }
+
+    fn save(&self, pane: usize, path: &Path) -> Result<()> {
+        let none = || Error::Usage("there is no image to save yet".into());
+        let view = self.panes.get(pane).and_then(Pane::shown).ok_or_else(none)?;
+        match ImageFormat::of(path)? {
+            ImageFormat::Exr => output::save(&view.image(&self.interactive, &mut NoControl)?, path),
+            ImageFormat::Png => {
+                let picture = view.picture()?.ok_or_else(none)?;
+                let rgb: Vec<u8> = picture.rgba.chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]]).collect();
+                png::write_rgb(path, &rgb, picture.size[0], picture.size[1])
+            }
+        }
+    }
+
+    /// Compares the first image with the last, if that is requested and both have changed; not too often unless it is the `last` time.
+    fn compare(&mut self, request: &Request, last: bool) -> Result<()> {
+        if !request.compares || self.panes.len() < 2 || self.last_motion.elapsed() < REST {
+            return Ok(());
+        }
+        let (Some(image), Some(truth)) = (self.panes[0].rest(), self.panes[self.panes.len() - 1].rest()) else { return Ok(()) };
+        let steps = self.panes[0].steps() + self.panes[self.panes.len() - 1].steps();
+        let is_due = match self.compared {
+            None => true,
+            Some((_, _, before)) if before == steps => false,
+            Some((at, took, _)) => last || at.elapsed() > COMPARISON.max(took * COMPARISON_SHARE),
+        };
+        if !is_due || image.size() != truth.size() {
+            return Ok(());
+        }
+        let start = Instant::now();
+        let comparison: Comparison = compare::compare(&image.values()?, &truth.values()?, truth.samples())?;
+        self.events.send(Event::Compared(Box::new(comparison)));
+        self.compared = Some((Instant::now(), start.elapsed(), steps));
+        Ok(())
+    }
+}
+
+/// Stops a step when it would be of no use any more. While something moves frames are short and are finished: else a fast motion would show none.
+struct StopOnChange<'a> {
+    mailbox: &'a Mailbox,
+    request: &'a Request,
+    moves: bool,
+}
+
+impl Control for StopOnChange<'_> {
+    fn should_stop(&mut self) -> Result<bool> {
+        let of = |r: &Request| (r.load, r.size, r.quits);
+        let moved = |r: &Request| r.camera != self.request.camera || r.time != self.request.time;
+        let other = |r: &Request| of(r) != of(self.request) || r.device != self.request.device || r.panes != self.request.panes;
+        let is_useless = self.mailbox.is(|r| other(r) || !self.moves && moved(r));
+        if is_useless { Err(Error::Interrupted) } else { Ok(false) }
+    }
+}
+
+fn summary(source: &str, scene: &Scene, seconds: f64) -> SceneSummary {
+    let animations = scene.rig.as_ref().map_or(&[][..], |rig| rig.animations());
+    let name = |k: usize, name: &str| if name.is_empty() { format!("{k}") } else { name.to_owned() };
+    SceneSummary {
+        source: source.to_owned(),
+        bounds: scene.bounds().unwrap_or_default(),
+        cameras: scene.cameras.clone(),
+        animations: animations.iter().enumerate().map(|(k, a)| (name(k, &a.name), a.duration)).collect(),
+        textures: scene.textures.iter().enumerate().map(|(k, t)| name(k, &t.name)).collect(),
+        primitives: scene.triangle_count() + scene.sphere_count(),
+        counts: [scene.instances.len(), scene.meshes.len(), scene.materials.len(), scene.lights.len()],
+        seconds,
+    }
+}

@@ -1,0 +1,8 @@
+//! The viewer: views that change, its panels, and the whole of it used by scripts without a window.
+
+#[path = "../common/mod.rs"]
+mod common;
+
+mod panels;
+mod script;
+mod views;

@@ -1,0 +1,186 @@
+//! The panels, used through their accessibility tree.
+
+use std::sync::Arc;
+
+use egui_kittest::Harness;
+use egui_kittest::kittest::{NodeT, Queryable};
+use skylit::renderer::RenderSettings;
+use skylit::viewer::ViewOptions;
+use skylit::viewer::app::{App, Arrangement, Second};
+use skylit::viewer::request::{Event, EventSender, Mailbox, SceneSummary};
+
+/// The viewer without a renderer: what it requests goes to a mailbox, what it is told comes from the sender.
+struct Alone {
+    harness: Harness<'static, App>,
+    mailbox: Arc<Mailbox>,
+    events: EventSender,
+}
+
+fn alone(scene: Option<&str>) -> Alone {
+    let mailbox = Arc::new(Mailbox::default());
+    let (sender, events) = std::sync::mpsc::channel();
+    let options = ViewOptions {
+        scene: scene.map(str::to_owned),
+        settings: RenderSettings::default(),
+        device: Default::default(),
+        size: [1000, 700],
+        frame_rate: Some(10.0),
+        painter: Default::default(),
+        device_name: None,
+    };
+    let app = App::new(&options, mailbox.clone(), events);
+    let harness =
+        Harness::builder().with_size(egui::vec2(1000.0, 700.0)).build_state(|context, app: &mut App| app.frame(context), app);
+    Alone { harness, mailbox, events: EventSender::new(sender, Arc::new(|| {})) }
+}
+
+fn loaded() -> Alone {
+    let mut alone = alone(Some("builtin:stairs"));
+    let scene = skylit::scene::builtin::by_name("stairs").unwrap();
+    alone.events.send(Event::Loaded(Box::new(SceneSummary {
+        source: "builtin:stairs".into(),
+        bounds: scene.bounds().unwrap(),
+        cameras: scene.cameras.clone(),
+        ..Default::default()
+    })));
+    alone.events.send(Event::Camera(Box::new(scene.cameras[0].clone()), false));
+    alone.harness.run_steps(3);
+    alone
+}
+
+impl Alone {
+    fn click(&mut self, label: &str) {
+        self.harness.get_by_label(label).click();
+        self.harness.run_steps(3);
+    }
+
+    fn press(&mut self, key: egui::Key) {
+        self.harness.key_press(key);
+        self.harness.run_steps(3);
+    }
+}
+
+#[test]
+fn without_a_scene_it_says_what_to_do() {
+    let mut alone = alone(None);
+    alone.harness.run_steps(3);
+    assert!(alone.harness.query_by_label_contains("drop a file here").is_some());
+    assert_eq!(alone.mailbox.peek().scene, None);
+    alone.click("Open…");
+    assert!(alone.harness.query_by_label_contains("builtin:NAME").is_some());
+    alone.harness.event(egui::Event::Text("builtin:cornell-box".into()));
+    alone.harness.run_steps(2);
+    alone.press(egui::Key::Enter);
+    assert_eq!(alone.mailbox.peek().scene.as_deref(), Some("builtin:cornell-box"));
+}
+
+#[test]
+fn every_control_has_a_name() {
+    let mut alone = loaded();
+    for section in ["Comparison with the truth", "Real-time frames", "Paths", "Picture", "Light", "Camera", "Device"] {
+        // "Camera" is a menu, too
+        alone.harness.get_all_by_label(section).last().unwrap().click();
+        alone.harness.run_steps(3);
+    }
+    use egui::accesskit::Role;
+    let names = |role: Role| {
+        alone.harness.query_all_by_role(role).map(|n| (n.accesskit_node().label().unwrap_or_default(), format!("{n:?}")))
+    };
+    for role in
+        [Role::Button, Role::CheckBox, Role::Slider, Role::SpinButton, Role::ComboBox, Role::TextInput, Role::RadioButton]
+    {
+        for (name, node) in names(role) {
+            assert!(!name.trim().is_empty(), "{role:?} without a name: {node}");
+        }
+    }
+    assert!(names(Role::ComboBox).count() >= 6 && names(Role::Button).count() >= 6);
+}
+
+#[test]
+fn controls_change_what_is_requested() {
+    let mut alone = loaded();
+    let request = alone.mailbox.peek();
+    assert!(request.camera.is_some() && request.panes.len() == 1 && request.size[0] > 500, "{request:?}");
+    assert_eq!(request.panes[0].frames.preset, Some(skylit::realtime::Preset::Balanced));
+
+    alone.click("Radius");
+    let radius = alone.mailbox.peek().panes[0].integrators.ao.ao_radius.unwrap();
+    let size = skylit::scene::builtin::by_name("stairs").unwrap().bounds().map(|(lo, hi)| (hi - lo).length()).unwrap();
+    assert!((0.05 * size..0.2 * size).contains(&radius), "{radius} of {size}");
+
+    alone.click("Split");
+    assert_eq!(alone.harness.state().arrangement, Arrangement::Split(0.5));
+    let request = alone.mailbox.peek();
+    // the truth is a view of its own, with the same radius
+    assert!(request.panes.len() == 2 && request.shown == 1 && request.compares);
+    assert_eq!(request.panes[1].integrators.ao.ao_radius, Some(radius));
+    assert_eq!(request.panes[1].frames.filter, Some(skylit::realtime::FilterKind::None));
+    alone.press(egui::Key::X);
+    assert_eq!(alone.mailbox.peek().panes.len(), 1);
+
+    alone.press(egui::Key::Num4);
+    assert_eq!(alone.mailbox.peek().panes[0].integrator().name(), "path");
+    assert_eq!(alone.mailbox.peek().panes[0].integrators.ao.ao_radius, None, "paths have no AO radius");
+    alone.press(egui::Key::Num1);
+    alone.press(egui::Key::T);
+    assert!(alone.mailbox.peek().compares && alone.harness.state().second == Second::Truth);
+}
+
+#[test]
+fn the_mouse_and_keys_move_the_camera() {
+    let mut alone = loaded();
+    let camera = |alone: &Alone| alone.mailbox.peek().camera.unwrap();
+    let before = camera(&alone);
+    let at = |x: f32, y: f32| egui::pos2(x, y);
+    for (button, modifiers) in [
+        (egui::PointerButton::Primary, egui::Modifiers::NONE),
+        (egui::PointerButton::Primary, egui::Modifiers::SHIFT),
+        (egui::PointerButton::Middle, egui::Modifiers::NONE),
+        (egui::PointerButton::Secondary, egui::Modifiers::NONE),
+    ] {
+        let start = camera(&alone);
+        alone.harness.event(egui::Event::PointerMoved(at(300.0, 300.0)));
+        alone.harness.run_steps(1);
+        let press = |pressed, pos| egui::Event::PointerButton { pos, button, pressed, modifiers };
+        alone.harness.event_modifiers(press(true, at(300.0, 300.0)), modifiers);
+        alone.harness.run_steps(1);
+        alone.harness.event_modifiers(egui::Event::PointerMoved(at(360.0, 330.0)), modifiers);
+        alone.harness.run_steps(1);
+        alone.harness.event_modifiers(press(false, at(360.0, 330.0)), modifiers);
+        alone.harness.run_steps(2);
+        assert_ne!(camera(&alone), start, "{button:?} {modifiers:?}");
+    }
+    for key in [egui::Key::W, egui::Key::Q, egui::Key::ArrowLeft] {
+        let start = camera(&alone);
+        alone.harness.key_down(key);
+        alone.harness.run_steps(3);
+        alone.harness.key_up(key);
+        alone.harness.run_steps(1);
+        assert_ne!(camera(&alone), start, "{key:?}");
+    }
+    alone.press(egui::Key::B);
+    assert_eq!(alone.harness.state().bookmarks.len(), 1);
+    alone.press(egui::Key::F);
+    let framed = camera(&alone);
+    assert_ne!(framed, before);
+    // at rest nothing is requested
+    let number = alone.mailbox.number();
+    alone.harness.run_steps(5);
+    assert_eq!(alone.mailbox.number(), number);
+}
+
+#[test]
+fn errors_are_shown_as_the_command_line_says_them() {
+    let mut alone = alone(Some("missing.glb"));
+    alone.events.send(Event::LoadFailed("missing.glb: no such file".into()));
+    alone.harness.run_steps(3);
+    assert!(alone.harness.query_all_by_label_contains("missing.glb: no such file").count() >= 1);
+    let mut alone = loaded();
+    alone.events.send(Event::PaneError(0, Some("the settings do not fit".into())));
+    alone.harness.run_steps(3);
+    assert!(alone.harness.query_all_by_label_contains("the settings do not fit").count() >= 1);
+    alone.press(egui::Key::F1);
+    assert!(alone.harness.query_by_label_contains("orbit around the pivot").is_some());
+    alone.press(egui::Key::Escape);
+    assert!(alone.harness.query_by_label_contains("orbit around the pivot").is_none());
+}

@@ -1,0 +1,114 @@
+//! The whole viewer, used by scripts without a window.
+
+use std::path::Path;
+
+use skylit::Error;
+use skylit::renderer::RenderSettings;
+use skylit::tracer::DeviceSettings;
+use skylit::viewer::{ViewOptions, headless};
+
+fn options(scene: Option<&str>) -> ViewOptions {
+    ViewOptions {
+        scene: scene.map(str::to_owned),
+        settings: RenderSettings::default(),
+        device: DeviceSettings::default(),
+        size: [760, 520],
+        frame_rate: Some(10.0),
+        painter: Default::default(),
+        device_name: None,
+    }
+}
+
+fn run(scene: Option<&str>, folder: &Path, text: &str) -> skylit::Result<Vec<skylit::viewer::script::Section>> {
+    let script = folder.join("script.txt");
+    std::fs::write(&script, text.replace("FOLDER", &folder.to_string_lossy())).unwrap();
+    headless::run(&options(scene), &script)
+}
+
+#[test]
+fn gpu_a_session() {
+    let folder = tempfile::tempdir().unwrap();
+    let sections = run(
+        Some("builtin:stairs"),
+        folder.path(),
+        "wait picture 90
+screenshot FOLDER/first.png
+mark orbit
+drag 200 200 320 240 1
+wheel 200 200 3
+key W 0.3
+screenshot FOLDER/moved.png
+mark settings
+click Radius
+set Radius = 0.6
+key 1
+key 3
+expect AO quality
+key X
+wait compared 90
+expect RMSE
+drag-control Line between the images -80 0 0.3
+key Space
+key X
+resize 500 400
+wait 0.3
+resize 760 520
+press 200 250
+wait text:Instance
+key Ctrl+S
+wait text:Save the image
+key Ctrl+A
+type FOLDER/saved.exr
+key Enter
+wait text:saved
+drop builtin:no-such-scene
+wait text:no built-in scene
+expect stairs
+key Ctrl+Q
+wait 1",
+    );
+    let sections = sections.unwrap();
+    assert!(sections.is_empty(), "Ctrl+Q ends the script: {sections:?}");
+    let read = |name: &str| std::fs::read(folder.path().join(name)).unwrap();
+    assert_ne!(read("first.png"), read("moved.png"));
+    let saved = skylit::output::load(&folder.path().join("saved.exr")).unwrap();
+    assert!(saved.f32("Y").is_some() && saved.f32("depth.Z").is_some() && saved.metadata("command").is_some());
+}
+
+#[test]
+fn gpu_tracers_are_switched_while_it_runs() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = "wait picture 90
+click Device
+click Tracer
+click pipeline
+wait text:Tracer pipeline
+wait settled 90
+click Tracer
+click query
+wait text:Tracer query
+click Tracer
+click compute
+wait text:Tracer compute
+wait settled 90
+expect-no-errors";
+    let available = crate::common::tracers(&crate::common::device());
+    let text: Vec<&str> = text.lines().collect();
+    let text = if available.len() == 3 { text.join("\n") } else { "wait picture 90\nexpect-no-errors".into() };
+    let sections = run(Some("builtin:cornell-box"), folder.path(), &text).unwrap();
+    assert!(sections.len() == 1 && sections[0].pictures > 0 && sections[0].first_picture_seconds.is_some(), "{sections:?}");
+}
+
+#[test]
+fn gpu_scripts_fail_where_they_should() {
+    let folder = tempfile::tempdir().unwrap();
+    for (text, expected) in [
+        ("wait 0.1\nexpect no such text", "line 2: nothing on the screen"),
+        ("wait 0.1\nclick No such button", "line 2: no control is called"),
+        ("drop no/such/file.glb\nwait picture 2", "no/such/file.glb"),
+    ] {
+        let error = run(None, folder.path(), text).unwrap_err();
+        assert!(matches!(error, Error::CheckFailed(_)) && error.to_string().contains(expected), "{error}");
+    }
+    assert!(matches!(headless::run(&options(None), Path::new("no such script")), Err(Error::Input { .. })));
+}
