@@ -3,10 +3,12 @@
 use std::f64::consts::TAU;
 
 use glam::DVec3;
+use rayon::prelude::*;
 
-use super::interactive::pick::camera_ray;
-use crate::error::Result;
-use crate::scene::Camera;
+use super::interactive::pick::{camera_ray, seen};
+use crate::error::{Error, Result};
+use crate::oracle::{Oracle, OracleRay};
+use crate::scene::{Camera, Geometry, Scene};
 
 /// What a ray sees.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -33,6 +35,8 @@ const HEIGHTS: [f64; 2] = [0.2, 0.35];
 const HEADINGS: usize = 12;
 /// Rays of a view that is compared, along its width and height.
 const VIEW: [usize; 2] = [12, 8];
+/// Scenes with more triangles and spheres than this are seen from outside where no device traces the rays: the host's hierarchy of them would take too long.
+const MAX_HOST_PRIMITIVES: u64 = 5_000_000;
 /// Vertical field of view inside, radians.
 const INSIDE_FOV_Y: f64 = 1.05;
 
@@ -92,6 +96,69 @@ pub fn choose((lo, hi): (DVec3, DVec3), aspect: f64, trace: &Trace) -> Result<Ca
     Ok(best.and_then(|(k, _)| cameras.into_iter().nth(k)).unwrap_or(outside))
 }
 
+/// The camera of a scene that has none, as [`choose`] finds it by rays that are traced on the host. For what is no room that costs a few rays.
+///
+/// # Errors
+/// [`Error::Scene`] for a scene without geometry.
+pub fn of_scene(scene: &Scene, aspect: f64) -> Result<Camera> {
+    let bounds = scene.bounds().ok_or_else(|| Error::Scene("the scene has no geometry to render".into()))?;
+    let (lo, hi) = bounds;
+    let middle = lo + (hi - lo) * DVec3::new(0.5, HEIGHTS[0], 0.5);
+    if scene.triangle_count() + scene.sphere_count() > MAX_HOST_PRIMITIVES || !may_be_room(scene, middle) {
+        return Ok(Camera::framing(lo, hi, aspect));
+    }
+    let origin = scene.origin();
+    let oracle = Oracle::new(scene, origin);
+    choose(bounds, aspect, &|rays| {
+        let closest = |&(from, direction): &(DVec3, DVec3)| {
+            let ray = OracleRay { origin: from - origin, tmin: 0.0, direction, tmax: f64::INFINITY };
+            let hit = oracle.closest(ray);
+            hit.is_hit().then(|| hit.to_hit())
+        };
+        Ok(seen(scene, rays, rays.par_iter().map(closest).collect()))
+    })
+}
+
+/// Whether a few rays from a point all see the front of a triangle: else it is in no room. No hierarchy is built for them.
+fn may_be_room(scene: &Scene, eye: DVec3) -> bool {
+    const RAYS: usize = 6;
+    let directions: Vec<DVec3> = (0..RAYS)
+        .map(|k| {
+            let angle = TAU * (k as f64 + 0.3) / RAYS as f64;
+            DVec3::new(angle.sin(), 0.03, angle.cos()).normalize()
+        })
+        .collect();
+    // of each ray the nearest distance, and whether a front is there
+    let nearest = scene.instances.par_iter().map(|instance| {
+        let mut nearest = [(f64::INFINITY, false); RAYS];
+        let Geometry::Triangles(mesh) = &scene.meshes[instance.mesh].geometry else { return nearest };
+        let points: Vec<DVec3> =
+            mesh.positions.iter().map(|p| instance.object_to_world.transform_point3(p.as_dvec3()) - eye).collect();
+        let turned = instance.object_to_world.matrix3.determinant().signum();
+        for triangle in &mesh.indices {
+            let [a, b, c] = triangle.map(|i| points[i as usize]);
+            let normal = (b - a).cross(c - a) * turned;
+            for (direction, nearest) in directions.iter().zip(&mut nearest) {
+                let facing = normal.dot(*direction);
+                let t = normal.dot(a) / facing;
+                if !(t > 0.0 && t < nearest.0) {
+                    continue;
+                }
+                // on the inner side of all three edges
+                let p = *direction * t;
+                let side = |u: DVec3, v: DVec3| (v - u).cross(p - u).dot(normal) * turned >= 0.0;
+                if side(a, b) && side(b, c) && side(c, a) {
+                    *nearest = (t, facing < 0.0);
+                }
+            }
+        }
+        nearest
+    });
+    let none = || [(f64::INFINITY, false); RAYS];
+    let nearest = nearest.reduce(none, |a, b| std::array::from_fn(|k| if b[k].0 < a[k].0 { b[k] } else { a[k] }));
+    nearest.iter().all(|(_, is_front)| *is_front)
+}
+
 /// Whether there are walls around a point, seen from their fronts.
 ///
 /// # Errors
@@ -144,6 +211,23 @@ mod tests {
         assert!(is_inside(&camera) && forward.x.abs() > 0.8, "{camera:?}");
         // a courtyard is open above
         assert!(is_inside(&choose(BOUNDS, 1.5, &|rays| inside(rays, |d| d.y > 0.5)).unwrap()));
+    }
+
+    #[test]
+    fn scenes_are_looked_at_by_the_host() {
+        for (name, inside) in
+            [("closed-box", true), ("stairs", false), ("cornell-box", false), ("terrain:2000", false), ("spheres:50", false)]
+        {
+            let mut scene = crate::scene::builtin::by_name(name).unwrap();
+            if let (true, Geometry::Triangles(mesh)) = (inside, &mut scene.meshes[0].geometry) {
+                // walls that face the room
+                mesh.indices.iter_mut().for_each(|t| t.swap(1, 2));
+            }
+            let (lo, hi) = scene.bounds().unwrap();
+            let eye = of_scene(&scene, 1.5).unwrap().camera_to_world.translation;
+            assert_eq!(eye.cmpgt(lo).all() && eye.cmplt(hi).all(), inside, "{name}: {eye}");
+        }
+        assert!(of_scene(&Scene::default(), 1.0).is_err());
     }
 
     #[test]

@@ -3,6 +3,7 @@
 use glam::DVec3;
 use std::path::{Path, PathBuf};
 
+use super::framing;
 use crate::error::{Error, Result};
 use crate::film::camera::{self, Choice};
 use crate::integrators::aov::Aov;
@@ -101,7 +102,10 @@ impl CameraSettings {
             (_, _, Some(name)) => Choice::Named(name.clone()),
             _ => Choice::Auto,
         };
-        let mut camera = camera::choose(scene, &choice, aspect)?;
+        let mut camera = match choice {
+            Choice::Auto if scene.cameras.is_empty() => framing::of_scene(scene, aspect)?,
+            choice => camera::choose(scene, &choice, aspect)?,
+        };
         if let Some(degrees) = self.fov_y {
             match &mut camera.projection {
                 Projection::Perspective { fov_y } => *fov_y = degrees.to_radians(),

@@ -80,6 +80,7 @@ fn drive(context: &egui::Context, app: &mut App, script: &mut Script, size: [u32
         let delay = output.viewport_output.get(&egui::ViewportId::ROOT).map(|v| v.repaint_delay);
         redraw = delay.and_then(|delay| frame_start.checked_add(delay));
         if app.closes {
+            script.end(app);
             return Ok(());
         }
         std::thread::sleep(FRAME.saturating_sub(frame_start.elapsed()));

@@ -13,6 +13,9 @@ use crate::error::{Error, Result};
 /// Longest wait for something that a script does not limit.
 const PATIENCE: Duration = Duration::from_secs(120);
 
+/// Time that a control may take to appear.
+const OPENING: Duration = Duration::from_secs(2);
+
 /// The commands, for help and docs/viewer.md.
 pub const COMMANDS: &[(&str, &str)] = &[
     ("wait SECONDS", "let time pass"),
@@ -246,7 +249,7 @@ impl Script {
             None => match self.commands.pop_front() {
                 Some((line, command)) => Current { line, command, start: Instant::now(), step: 0 },
                 None => {
-                    self.sections.push(self.section.end(app));
+                    self.end(app);
                     return Ok(None);
                 }
             },
@@ -254,11 +257,15 @@ impl Script {
         let is_done = self
             .step(&mut current, input, app, &mut wishes)
             .map_err(|text| Error::CheckFailed(format!("{}, line {}: {text}", self.path.display(), current.line)))?;
-        current.step += 1;
         if !is_done {
             self.current = Some(current);
         }
         Ok(Some(wishes))
+    }
+
+    /// Ends the last section.
+    pub fn end(&mut self, app: &App) {
+        self.sections.push(self.section.end(app));
     }
 
     /// Figures of all sections.
@@ -266,9 +273,11 @@ impl Script {
         &self.sections
     }
 
+    /// A step of a command, once a frame; returns true at its end.
     fn step(&mut self, current: &mut Current, input: &mut RawInput, app: &App, wishes: &mut Wishes) -> Result<bool, String> {
         let elapsed = current.start.elapsed();
         let step = current.step;
+        current.step += 1;
         match &current.command {
             Command::Wait(time) => Ok(elapsed >= *time),
             Command::WaitFor(condition, most) => {
@@ -305,12 +314,21 @@ impl Script {
                 input.events.push(Event::Text(text.clone()));
                 Ok(true)
             }
-            Command::Click(label) => {
-                let place = self.place_of(label)?;
-                Ok(self.click(input, place, PointerButton::Primary, step, 1))
-            }
+            Command::Click(label) => match self.place_of(label) {
+                Ok(place) => {
+                    (current.command, current.step) = (Command::Press(place, PointerButton::Primary, 1), 0);
+                    Ok(false)
+                }
+                // a menu or a list opens with the next frame
+                Err(_) if elapsed < OPENING => Ok(false),
+                Err(e) => Err(e),
+            },
             Command::Set(label, value) => {
-                let id = self.find(label, true)?.0;
+                let id = match self.find(label, true) {
+                    Ok((id, _)) => id,
+                    Err(_) if elapsed < OPENING => return Ok(false),
+                    Err(e) => return Err(e),
+                };
                 let data = Some(accesskit::ActionData::NumericValue(*value));
                 let request = accesskit::ActionRequest { action: accesskit::Action::SetValue, target: id, data };
                 input.events.push(Event::AccessKitActionRequest(request));
@@ -321,11 +339,9 @@ impl Script {
                 Ok(self.drag(input, [*from, *to], *time, *button, *modifiers, step, elapsed))
             }
             Command::DragControl(label, by, time) => {
-                // where it was when the drag began
-                let from = if step == 0 { self.place_of(label)? } else { self.pointer };
-                if step == 0 {
-                    current.command = Command::Drag(from, from + *by, *time, PointerButton::Primary, Modifiers::NONE);
-                }
+                let from = self.place_of(label)?;
+                let drag = Command::Drag(from, from + *by, *time, PointerButton::Primary, Modifiers::NONE);
+                (current.command, current.step, current.start) = (drag, 0, Instant::now());
                 Ok(false)
             }
             Command::Wheel(at, lines) => {

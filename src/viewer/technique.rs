@@ -6,6 +6,7 @@ use crate::realtime::frame_settings::FrameSettings;
 use crate::realtime::{FilterKind, Preset, Technique as AoTechnique};
 use crate::renderer::RenderSettings;
 use crate::sampling::Sequence;
+use crate::settings::Capability;
 
 /// What a view shows.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -45,7 +46,9 @@ impl Technique {
             Self::Still(integrator) => match integrator.name() {
                 "ao" => "AO still".into(),
                 "ao-sky" => "AO truth (ao-sky)".into(),
-                name => word(name),
+                name if integrator.get().capabilities().contains(&Capability::LightTransport) => word(name),
+                // views of surfaces, of which there are buffers, too
+                name => format!("{}, antialiased", word(name)),
             },
             Self::Buffer(mode) => word(mode.name()),
             Self::Converged => "AO converged".into(),
