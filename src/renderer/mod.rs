@@ -135,6 +135,17 @@ impl Renderer {
         })
     }
 
+    /// The same renderer with this name of its scene, a file or `builtin:NAME`, in metadata and messages.
+    pub fn with_name(mut self, name: &str) -> Self {
+        name.clone_into(&mut self.name);
+        self
+    }
+
+    /// Name of the scene: a file, or `builtin:NAME`.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
     /// The scene, including the lights of the last settings.
     pub fn scene(&self) -> &Scene {
         &self.scene

@@ -106,7 +106,7 @@ impl Worker {
                 let summary = summary(source, &scene, seconds);
                 // before the new one is uploaded: memory
                 self.open = None;
-                let renderer = Renderer::new(device, scene, &request.device)?;
+                let renderer = Renderer::new(device, scene, &request.device)?.with_name(source);
                 self.open = Some(OpenScene { renderer, load: request.load, device: request.device.clone() });
                 self.events.send(Event::Loaded(Box::new(summary)));
                 Ok(true)
@@ -152,6 +152,7 @@ impl Worker {
             return Ok(());
         }
         let device = renderer.device().clone();
+        let name = renderer.name().to_owned();
         let scene = renderer.into_scene();
         let opened =
             if before.options() == settings.options() { Ok(device.clone()) } else { Device::open(&settings.options()) };
@@ -167,7 +168,7 @@ impl Worker {
                 Renderer::new(device, scene, &before)?
             }
         };
-        self.open = Some(OpenScene { renderer, load, device: settings.clone() });
+        self.open = Some(OpenScene { renderer: renderer.with_name(&name), load, device: settings.clone() });
         Ok(())
     }
 
