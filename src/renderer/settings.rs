@@ -50,7 +50,7 @@ settings! {
     /// The camera.
     "Camera"
     pub struct CameraSettings {
-        /// Camera of the scene, by index or name [default: the first one, or one that sees the whole scene]
+        /// Camera of the scene, by index or name [default: the first one, or one that sees the whole scene, or a room from inside]
         camera: Option<String>, option(value_name = "INDEX|NAME", conflicts_with = "eye"), applies(AppliesTo::ALL);
         /// Camera position
         eye: Option<DVec3>,

@@ -335,7 +335,8 @@ impl Session<'_> {
                 self.events.send(Event::PaneError(k, Some(crate::terminal::console::one_line(&e.to_string()))));
             }
         }
-        for warning in self.interactive.take_warnings() {
+        let messages = self.interactive.device().validation_messages().into_iter().map(|m| format!("validation: {m}"));
+        for warning in self.interactive.take_warnings().into_iter().chain(messages) {
             self.events.send(Event::Warning(warning));
         }
         self.describe_device();

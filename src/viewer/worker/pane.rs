@@ -18,7 +18,7 @@ const HEADROOM: f64 = 0.8;
 /// Frames whose times count. The least of them is taken: drivers compile at the first use of a shader, and other programs run, too.
 const REMEMBERED: usize = 3;
 /// Frames after which a finer scale is tried again though it was too slow.
-const FORGET: u32 = 40;
+const FORGET: u32 = 20;
 /// Wall-clock time of a step of a still at rest: the first, and later ones.
 const STILL_STEPS: [Duration; 2] = [Duration::from_millis(150), Duration::from_millis(600)];
 
