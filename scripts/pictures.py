@@ -25,7 +25,7 @@ VIEWER = {
         """wait picture
 click Comparison with the truth
 key X
-wait settled 300
+wait 60
 screenshot FILE
 """,
     ),
