@@ -4,8 +4,10 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueHint};
 
-use crate::error::Result;
+use crate::error::{Error, Result};
+use crate::realtime::frame_settings::FrameSettings;
 use crate::renderer::RenderSettings;
+use crate::renderer::settings::ImageSettings;
 use crate::scene::load;
 use crate::settings::parse::parse_rate;
 use crate::terminal::console::{Failure, Verbosity};
@@ -53,14 +55,34 @@ pub fn is_scene(argument: &str) -> bool {
     argument.starts_with("builtin:") || load::is_scene_file(argument)
 }
 
+/// Refuses settings that have no effect on what is looked at.
+fn check_has_effect(settings: &RenderSettings) -> Result<()> {
+    let s = &settings.frames;
+    let frames = FrameSettings {
+        frames: s.frames,
+        fps: s.fps,
+        animate: s.animate.clone(),
+        camera_path: s.camera_path.clone(),
+        orbit: s.orbit,
+        warm_up: s.warm_up,
+        ..Default::default()
+    };
+    let image = ImageSettings { time_limit: settings.image.time_limit, aov: settings.image.aov.clone(), ..Default::default() };
+    match [image.given(), settings.film.given(), frames.given()].concat().first() {
+        Some(setting) => Err(Error::Usage(format!(
+            "{} has no effect on `skylit view`: leave it out, or use `skylit render`",
+            setting.option()
+        ))),
+        None => Ok(()),
+    }
+}
+
 /// Opens the window, or runs the script.
 pub fn run(args: &ViewArgs) -> Result<(), Failure> {
     args.device.check()?;
-    let settings = match &args.settings_file {
-        Some(path) => RenderSettings::load(path)?.overridden_by(&args.settings)?,
-        None => args.settings.clone(),
-    };
+    let settings = args.settings.over_file(args.settings_file.as_deref())?;
     settings.camera.check()?;
+    check_has_effect(&settings)?;
     if args.painter == Some(Painter::Vulkan) {
         // Mesa's CPU driver cannot rasterize with wider vectors; GPUs do not care
         crate::gpu::environment::prefer_vector_bits(256);
@@ -85,7 +107,8 @@ pub fn run(args: &ViewArgs) -> Result<(), Failure> {
         return Ok(window::run(&options)?);
     };
     let console = args.verbosity.console();
-    for section in headless::run(&options, script)? {
+    let sections = headless::run(&options, script)?;
+    for section in &sections {
         let [median, p95, most] = section.ui_frame_ms;
         let first = section.first_picture_seconds.map_or(String::new(), |s| format!("; first picture after {s:.2} s"));
         console.line(&format!(
@@ -99,7 +122,33 @@ pub fn run(args: &ViewArgs) -> Result<(), Failure> {
             section.latency_ms[1],
             section.memory_mib,
         ))?;
-        console.record(&section)?;
     }
-    Ok(())
+    Ok(console.record(&serde_json::json!({ "sections": sections }))?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn settings_without_effect_are_refused() {
+        #[derive(clap::Parser)]
+        struct Alone {
+            #[command(flatten)]
+            settings: RenderSettings,
+        }
+        let check = |line: &str| {
+            let args = ["a"].into_iter().chain(line.split_whitespace());
+            check_has_effect(&<Alone as clap::Parser>::try_parse_from(args).unwrap().settings)
+        };
+        for line in
+            ["--time-limit 3", "--aov depth", "--resume a.exr", "--resumable", "--frames 0..3", "--orbit", "--warm-up 2"]
+        {
+            let error = check(line).unwrap_err();
+            assert!(error.to_string().starts_with(line.split(' ').next().unwrap()) && error.exit_code() == 64, "{error}");
+        }
+        for line in ["", "--size 800x600 --preset fast --show depth", "--integrator path --max-depth 3 --environment 1,1,1"] {
+            check(line).unwrap();
+        }
+    }
 }

@@ -216,6 +216,14 @@ impl RenderSettings {
         serde_json::from_slice(&bytes).map_err(|e| Error::input(path, format!("not a file of settings: {e}")))
     }
 
+    /// These settings over those of a file, if one is given.
+    ///
+    /// # Errors
+    /// Those of [`RenderSettings::load`].
+    pub fn over_file(&self, path: Option<&Path>) -> Result<Self> {
+        path.map_or_else(|| Ok(self.clone()), |path| Self::load(path)?.overridden_by(self))
+    }
+
     /// These settings, replaced by those that `other` gives.
     ///
     /// # Errors

@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 
 use super::camera::CameraControl;
 use super::layer::Layer;
-use super::request::{Comparison, DeviceSummary, Event, Mailbox, PickPurpose, Progress, Request, SceneSummary, Task};
+use super::request::{Comparison, DeviceSummary, Event, Mailbox, PickPurpose, Progress, Request, SceneSummary, TRUTH, Task};
 use super::technique::Technique;
 use super::{ViewOptions, panels};
 use crate::integrators::lighting::LightingSettings;
@@ -92,6 +92,9 @@ pub struct App {
     mailbox: Arc<Mailbox>,
     events: Receiver<Event>,
     sent: Request,
+    /// Number of the last request, and of the last one for which nothing is left to do.
+    sent_number: u64,
+    idle: u64,
     load: u64,
     /// The scene that is requested.
     pub source: Option<String>,
@@ -177,6 +180,8 @@ impl App {
             mailbox,
             events,
             sent: Request::default(),
+            sent_number: 1,
+            idle: 0,
             load: 0,
             source: None,
             recent: super::recent::load(),
@@ -268,30 +273,14 @@ impl App {
         &self.layers
     }
 
-    /// The renderer has nothing left to do: the scene is loaded and all images have settled.
+    /// The renderer has nothing left to do for what was requested last, or cannot do it.
     pub fn is_settled(&self) -> bool {
-        let settled = |p: &PaneState| p.error.is_some() || p.progress.as_ref().is_some_and(|p| p.step.is_settled);
-        self.failure.is_some()
-            || self.loading.is_none()
-                && self.control.is_some()
-                && (0..self.sent.panes.len()).all(|k| settled(&self.panes[self.slot(k)]))
-    }
-
-    /// Where the renderer's image `k` belongs among [`App::panes`].
-    fn slot(&self, k: usize) -> usize {
-        if self.compares_now() && k + 1 == self.sent.panes.len() { 2 } else { k }
+        self.failure.is_some() || self.idle >= self.sent_number
     }
 
     /// Whether the truth is being rendered.
     pub fn compares_now(&self) -> bool {
-        self.compares || self.needs_second() && self.second != self.second_technique()
-    }
-
-    fn second_technique(&self) -> Second {
-        match self.second {
-            Second::Technique(_) => self.second,
-            _ => Second::Technique(self.truth),
-        }
+        self.compares || self.needs_second() && matches!(self.second, Second::Truth | Second::HeatMap)
     }
 
     fn needs_second(&self) -> bool {
@@ -326,20 +315,19 @@ impl App {
                 Event::Device(device) => self.device = device,
                 Event::Picture(progress) => {
                     self.failure = None;
-                    let slot = self.slot(progress.pane);
-                    let progress = Arc::new(*progress);
-                    if slot == 0 {
+                    let (pane, progress) = (progress.pane, Arc::new(*progress));
+                    if pane == 0 {
                         self.frames.push_back(progress.clone());
                         while self.frames.len() > KEPT_FRAMES {
                             self.frames.pop_front();
                         }
                     }
-                    self.panes[slot] = PaneState { progress: Some(progress), error: None };
+                    self.panes[pane] = PaneState { progress: Some(progress), error: None };
                 }
                 Event::PaneError(pane, error) => {
-                    let slot = self.slot(pane);
-                    self.panes[slot].error = error;
+                    self.panes[pane].error = error;
                 }
+                Event::Idle(number) => self.idle = number,
                 Event::Compared(comparison) => self.comparison = Some(comparison),
                 Event::Picked(purpose, pick) => self.picked(purpose, *pick),
                 Event::Saved(Ok(path)) => self.say(format!("saved {}", path.display()), false),
@@ -466,7 +454,7 @@ impl App {
         }
         let tasks = std::mem::take(&mut self.tasks);
         self.sent = request.clone();
-        self.mailbox.change(|r| {
+        self.sent_number = self.mailbox.change(|r| {
             let before = std::mem::take(&mut r.tasks);
             *r = request;
             r.tasks = before.into_iter().chain(tasks).collect();
@@ -475,11 +463,8 @@ impl App {
 
     /// Ends the thread that renders.
     pub fn quit(&mut self) {
+        // renders that the user has started go on
         self.mailbox.change(|r| r.quits = true);
-        for (_, child) in &mut self.renders {
-            // renders that the user started go on
-            let _ = child.try_wait();
-        }
     }
 
     /// Adds work for the renderer.
@@ -508,7 +493,7 @@ impl App {
         match (is_second, self.second) {
             (false, _) => of(0),
             (true, Second::Technique(_)) => of(1),
-            (true, Second::Truth) => of(2),
+            (true, Second::Truth) => of(TRUTH),
             (true, Second::HeatMap) => self.comparison.as_ref().map(|c| c.heat_map.clone()),
         }
     }
@@ -528,7 +513,7 @@ impl App {
         let slot = match (is_second, self.second) {
             (false, _) => 0,
             (true, Second::Technique(_)) => 1,
-            (true, _) => 2,
+            (true, _) => TRUTH,
         };
         self.panes[slot].error.as_ref()
     }

@@ -14,8 +14,11 @@ use crate::renderer::settings::CameraSettings;
 use crate::scene::Camera;
 use crate::tracer::DeviceSettings;
 
-/// Index of an image among [`Request::panes`].
+/// Index of an image: the first, the second or the truth ([`TRUTH`]).
 pub type Pane = usize;
+
+/// Index of the truth.
+pub const TRUTH: Pane = 2;
 
 /// What is to be rendered.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -54,6 +57,13 @@ pub struct Request {
     pub tasks: Vec<Task>,
     /// End the thread.
     pub quits: bool,
+}
+
+impl Request {
+    /// Which image the entry `k` of [`Request::panes`] is.
+    pub fn pane(&self, k: usize) -> Pane {
+        if k < self.shown { k } else { TRUTH }
+    }
 }
 
 /// Work to be done once.
@@ -103,6 +113,8 @@ pub enum Event {
     PaneError(Pane, Option<String>),
     /// The first image was compared with the last.
     Compared(Box<Comparison>),
+    /// Nothing is left to do for the request of this number.
+    Idle(u64),
     /// A point was picked.
     Picked(PickPurpose, Box<Option<Pick>>),
     /// A file was written, or an error.

@@ -60,13 +60,7 @@ impl RenderArgs {
     /// # Errors
     /// Those of [`RenderSettings::load`].
     pub fn with_settings_file(&self) -> Result<Self> {
-        match &self.settings_file {
-            Some(path) => {
-                let settings = RenderSettings::load(path)?.overridden_by(&self.settings)?;
-                Ok(Self { settings, settings_file: None, ..self.clone() })
-            }
-            None => Ok(self.clone()),
-        }
+        Ok(Self { settings: self.settings.over_file(self.settings_file.as_deref())?, ..self.clone() })
     }
 
     /// Checks conditions on more than one option.

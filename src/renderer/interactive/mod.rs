@@ -68,7 +68,7 @@ impl Renderer {
     /// Those of [`LightingSettings::apply`]; [`Error::Usage`] for an animation that the scene does not have.
     pub fn interactive(&mut self, lighting: &LightingSettings, animation: Option<usize>) -> Result<Interactive<'_>> {
         self.light(lighting)?;
-        // its scene data may be that of another integrator
+        // views build their own, and memory may not hold both
         self.tracer = None;
         let animation = match animation {
             None => None,
@@ -203,7 +203,7 @@ impl<'r> Interactive<'r> {
                 FlatScene::with_motion_and_blend(self.scene, motion, blend)?
             }
         };
-        // a session: the best build is worth its time for small scenes only, which the number of rays of a good still decides as well
+        // about what a good still traces: the quality of the BVH follows from it
         const RAYS: u64 = 1 << 28;
         let request = TracerRequest { needs, streams, rays: RAYS, control, warnings: &mut self.warnings };
         let tracer = request.build(self.device, self.kind, &flat, self.compute, self.settings)?;

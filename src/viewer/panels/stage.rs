@@ -7,7 +7,7 @@ use egui::{
 
 use super::menu::{self, shortcuts};
 use crate::realtime::Preset;
-use crate::viewer::app::{App, Arrangement, Dialog, Second};
+use crate::viewer::app::{App, Arrangement, Dialog};
 use crate::viewer::layer::Layer;
 use crate::viewer::request::{PickPurpose, Task};
 use crate::viewer::technique::Technique;
@@ -212,16 +212,12 @@ fn titles(app: &App, ui: &Ui, rect: Rect, split: Option<f32>) {
         painter.galley(place.min, galley, Color32::WHITE);
     };
     let margin = Vec2::splat(10.0);
-    let second_error = |app: &App| match app.second {
-        Second::Truth | Second::Technique(_) | Second::HeatMap => {
-            app.comparison.as_ref().map(|c| format!("RMSE {:.4}, bias {:+.4}", c.rmse, c.bias))
-        }
-    };
     match split {
         Some(x) => {
             text(rect.left_top() + margin, Align2::LEFT_TOP, app.title(false));
             text(Pos2::new(x, rect.top()) + margin, Align2::LEFT_TOP, app.title(true));
-            if let Some(error) = second_error(app) {
+            if let Some(c) = &app.comparison {
+                let error = format!("RMSE {:.4}, bias {:+.4}", c.rmse, c.bias);
                 text(rect.left_bottom() + Vec2::new(10.0, -10.0), Align2::LEFT_BOTTOM, error);
             }
         }

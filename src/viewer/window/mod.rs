@@ -4,7 +4,7 @@ mod cpu;
 mod vulkan;
 
 use std::sync::Arc;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use egui_winit::winit::application::ApplicationHandler;
 use egui_winit::winit::dpi::LogicalSize;
@@ -19,6 +19,8 @@ use super::request::{EventSender, Mailbox};
 use super::{Painter, ViewOptions, worker};
 use crate::error::{Error, Result};
 
+/// Time after which it is noticed at the latest that the user has interrupted the program.
+const INTERRUPT_INTERVAL: Duration = Duration::from_millis(300);
 /// Smallest size of the window, points.
 const LEAST_SIZE: [f64; 2] = [320.0, 240.0];
 
@@ -63,7 +65,10 @@ impl From<egui_winit::accesskit_winit::Event> for Wake {
 /// [`Error::Device`] without a display; those of starting the thread that renders.
 pub fn run(options: &ViewOptions) -> Result<()> {
     let no_display = |e: &dyn std::fmt::Display| {
-        let reason = crate::terminal::console::one_line(&e.to_string());
+        let text = crate::terminal::console::one_line(&e.to_string());
+        // winit's errors begin with the line of its source that they come from
+        let reason = text.split_once(".rs:").and_then(|(_, rest)| rest.split_once(": ")).map_or(text.as_str(), |r| r.1);
+        let reason = reason.trim_end_matches(['.', ')']);
         Error::Device(format!(
             "no window can be opened here ({reason}): set DISPLAY or WAYLAND_DISPLAY, or use `skylit render`"
         ))
@@ -92,9 +97,9 @@ pub fn run(options: &ViewOptions) -> Result<()> {
     let mut viewer = Viewer { app, context, proxy, options, open: None, redraw: None, failed: None, presenter_failures: 0 };
     let outcome = event_loop.run_app(&mut viewer).map_err(|e| no_display(&e));
     viewer.app.quit();
-    let joined = thread.join();
-    viewer.failed.map_or(outcome, Err)?;
-    joined.map_err(|_| Error::CheckFailed("the thread that renders has panicked".into()))
+    // a panic of it was an event, which the window has shown
+    let _ = thread.join();
+    viewer.failed.map_or(outcome, Err)
 }
 
 struct Viewer {
@@ -215,6 +220,7 @@ impl ApplicationHandler<Wake> for Viewer {
         if crate::terminal::interrupt::requested() {
             self.fail(event_loop, Error::Interrupted);
         } else if matches!(cause, StartCause::ResumeTimeReached { .. })
+            && self.redraw.is_some_and(|at| at <= Instant::now())
             && let Some(open) = &self.open
         {
             open.window.request_redraw();
@@ -258,8 +264,11 @@ impl ApplicationHandler<Wake> for Viewer {
                 }
                 event_loop.set_control_flow(ControlFlow::Wait);
             }
-            Some(at) => event_loop.set_control_flow(ControlFlow::WaitUntil(at)),
-            None => event_loop.set_control_flow(ControlFlow::Wait),
+            // Ctrl-C in the terminal is no event of the window
+            at => {
+                let next = Instant::now() + INTERRUPT_INTERVAL;
+                event_loop.set_control_flow(ControlFlow::WaitUntil(at.map_or(next, |at| at.min(next))));
+            }
         }
     }
 }

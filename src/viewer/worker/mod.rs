@@ -18,6 +18,7 @@ use crate::gpu::Device;
 use crate::output::{self, ImageFormat, png};
 use crate::renderer::{Interactive, Renderer};
 use crate::scene::{Camera, Scene, load};
+use crate::terminal::panic;
 use crate::tracer::{DeviceSettings, TracerKind};
 
 /// Time without motion after which the view rests.
@@ -35,7 +36,14 @@ const COMPARISON_SHARE: u32 = 5;
 /// # Errors
 /// [`Error::OutOfMemory`] when there can be no further thread.
 pub fn spawn(mailbox: Arc<Mailbox>, events: EventSender) -> Result<JoinHandle<()>> {
-    let run = move || Worker { mailbox, events, open: None, device_losses: 0 }.run();
+    let run = move || {
+        let reporter = events.clone();
+        let worker = Worker { mailbox, events, open: None, device_losses: 0 };
+        // the window stays open and says so
+        if let Err(bug) = panic::catch(move || worker.run()) {
+            reporter.send(Event::Failed(bug));
+        }
+    };
     std::thread::Builder::new()
         .name("renderer".into())
         .spawn(run)
@@ -255,6 +263,7 @@ impl Session<'_> {
                 None if moves => self.mailbox.wait(number, REST),
                 None => {
                     self.compare(&request, true)?;
+                    self.events.send(Event::Idle(number));
                     self.mailbox.wait(number, Duration::from_secs(60));
                 }
             }
@@ -320,11 +329,17 @@ impl Session<'_> {
         match pane.step(&mut self.interactive, camera, &pacing, &mut control) {
             Ok((step, time)) => {
                 let Some(picture) = pane.shown().map(|v| v.picture()).transpose()?.flatten() else { return Ok(()) };
-                let progress =
-                    Progress { pane: k, picture: Arc::new(picture), step, time, latency: changed.elapsed(), request: number };
+                let progress = Progress {
+                    pane: request.pane(k),
+                    picture: Arc::new(picture),
+                    step,
+                    time,
+                    latency: changed.elapsed(),
+                    request: number,
+                };
                 self.events.send(Event::Picture(Box::new(progress)));
                 if self.panes[k].steps() == 1 {
-                    self.events.send(Event::PaneError(k, None));
+                    self.events.send(Event::PaneError(request.pane(k), None));
                     self.interactive.device().save_pipeline_cache();
                 }
             }
@@ -332,7 +347,7 @@ impl Session<'_> {
             Err(e @ (Error::DeviceLost(_) | Error::OutOfMemory(_))) => return Err(e),
             Err(e) => {
                 pane.fail();
-                self.events.send(Event::PaneError(k, Some(crate::terminal::console::one_line(&e.to_string()))));
+                self.events.send(Event::PaneError(request.pane(k), Some(crate::terminal::console::one_line(&e.to_string()))));
             }
         }
         let messages = self.interactive.device().validation_messages().into_iter().map(|m| format!("validation: {m}"));
