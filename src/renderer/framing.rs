@@ -5,14 +5,14 @@ use std::f64::consts::TAU;
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::interactive::pick::{camera_ray, seen};
+use super::interactive::pick::{camera_ray, visible_surfaces};
 use crate::error::{Error, Result};
 use crate::oracle::{Oracle, OracleRay};
 use crate::scene::{Camera, Geometry, Scene};
 
 /// What a ray sees.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Seen {
+pub struct VisibleSurface {
     /// Distance, scene units.
     pub distance: f64,
     /// Whether it is the front of the surface.
@@ -20,7 +20,7 @@ pub struct Seen {
 }
 
 /// Finds what rays see, which are given as origins and unit directions.
-pub type Trace<'a> = dyn Fn(&[(DVec3, DVec3)]) -> Result<Vec<Option<Seen>>> + 'a;
+pub type Trace<'a> = dyn Fn(&[(DVec3, DVec3)]) -> Result<Vec<Option<VisibleSurface>>> + 'a;
 
 /// Directions, close to the horizontal, in which it is tested whether there are walls.
 const PROBES: usize = 96;
@@ -82,7 +82,7 @@ pub fn choose((lo, hi): (DVec3, DVec3), aspect: f64, trace: &Trace) -> Result<Ca
     let rays: Vec<(DVec3, DVec3)> = cameras.iter().flat_map(rays_of).collect();
     let hits = trace(&rays)?;
     let size = extent.length();
-    let score = |seen: &[Option<Seen>]| {
+    let score = |seen: &[Option<VisibleSurface>]| {
         if seen.iter().flatten().any(|s| !s.is_front) {
             return 0.0;
         }
@@ -115,7 +115,7 @@ pub fn of_scene(scene: &Scene, aspect: f64) -> Result<Camera> {
             let hit = oracle.closest(ray);
             hit.is_hit().then(|| hit.to_hit())
         };
-        Ok(seen(scene, rays, rays.par_iter().map(closest).collect()))
+        Ok(visible_surfaces(scene, rays, rays.par_iter().map(closest).collect()))
     })
 }
 
@@ -186,12 +186,12 @@ mod tests {
 
     const BOUNDS: (DVec3, DVec3) = (DVec3::new(-4.0, 0.0, -2.0), DVec3::new(4.0, 3.0, 2.0));
 
-    fn hit(distance: f64) -> Option<Seen> {
-        Some(Seen { distance, is_front: true })
+    fn hit(distance: f64) -> Option<VisibleSurface> {
+        Some(VisibleSurface { distance, is_front: true })
     }
 
     /// Rays inside a box end on its sides, but for those that `open` lets pass.
-    fn inside(rays: &[(DVec3, DVec3)], open: impl Fn(DVec3) -> bool) -> Result<Vec<Option<Seen>>> {
+    fn inside(rays: &[(DVec3, DVec3)], open: impl Fn(DVec3) -> bool) -> Result<Vec<Option<VisibleSurface>>> {
         let (lo, hi) = BOUNDS;
         let is_inside = |p: DVec3| p.cmpge(lo).all() && p.cmple(hi).all();
         let distance = |(from, d): &(DVec3, DVec3)| ((DVec3::select(d.cmpgt(DVec3::ZERO), hi, lo) - *from) / *d).min_element();
@@ -235,7 +235,7 @@ mod tests {
         // one side is missing
         assert!(!is_inside(&choose(BOUNDS, 1.5, &|rays| inside(rays, |d| d.z > d.x.abs())).unwrap()));
         // a solid object around the middle, seen from inside
-        let back = |rays: &[(DVec3, DVec3)]| Ok(vec![Some(Seen { distance: 2.0, is_front: false }); rays.len()]);
+        let back = |rays: &[(DVec3, DVec3)]| Ok(vec![Some(VisibleSurface { distance: 2.0, is_front: false }); rays.len()]);
         assert!(!is_inside(&choose(BOUNDS, 1.5, &back).unwrap()));
         // something close around it
         assert!(!is_inside(&choose(BOUNDS, 1.5, &|rays| Ok(vec![hit(0.1); rays.len()])).unwrap()));

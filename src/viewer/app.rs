@@ -244,7 +244,7 @@ impl App {
     }
 
     /// A message for the user.
-    pub fn say(&mut self, text: impl Into<String>, is_error: bool) {
+    pub fn report(&mut self, text: impl Into<String>, is_error: bool) {
         self.messages.push_front((Instant::now(), text.into(), is_error));
         self.messages.truncate(KEPT_MESSAGES);
     }
@@ -294,7 +294,7 @@ impl App {
                 Event::Loaded(summary) => self.loaded(*summary),
                 Event::LoadFailed(text) => {
                     self.loading = None;
-                    self.say(text.clone(), true);
+                    self.report(text.clone(), true);
                     if self.scene.is_none() {
                         self.failure = Some(text);
                     }
@@ -307,7 +307,7 @@ impl App {
                             // in a closed room every ray hits something: without a radius it would be black
                             let radius = panels::round(INSIDE_RADIUS * control.scene_size());
                             ao.ao_radius = Some(radius);
-                            self.say(format!("the camera is in a room: AO radius {radius}"), false);
+                            self.report(format!("the camera is in a room: AO radius {radius}"), false);
                         }
                         self.control = Some(control);
                     }
@@ -330,11 +330,11 @@ impl App {
                 Event::Idle(number) => self.idle = number,
                 Event::Compared(comparison) => self.comparison = Some(comparison),
                 Event::Picked(purpose, pick) => self.picked(purpose, *pick),
-                Event::Saved(Ok(path)) => self.say(format!("saved {}", path.display()), false),
-                Event::Saved(Err(text)) => self.say(text, true),
-                Event::Warning(text) => self.say(text, true),
+                Event::Saved(Ok(path)) => self.report(format!("saved {}", path.display()), false),
+                Event::Saved(Err(text)) => self.report(text, true),
+                Event::Warning(text) => self.report(text, true),
                 Event::Failed(text) => {
-                    self.say(text.clone(), true);
+                    self.report(text.clone(), true);
                     (self.loading, self.failure) = (None, Some(text));
                 }
             }
@@ -344,7 +344,7 @@ impl App {
 
     fn loaded(&mut self, summary: SceneSummary) {
         let is_same = self.scene.as_ref().is_some_and(|s| s.source == summary.source);
-        self.say(format!("loaded {}: {} primitives in {:.2} s", summary.source, summary.primitives, summary.seconds), false);
+        self.report(format!("loaded {}: {} primitives in {:.2} s", summary.source, summary.primitives, summary.seconds), false);
         super::recent::add(&mut self.recent, &summary.source);
         self.loading = None;
         self.panes.iter_mut().for_each(|p| p.error = None);
@@ -566,10 +566,10 @@ impl App {
             .spawn();
         match child {
             Ok(child) => {
-                self.say(format!("rendering {output}"), false);
+                self.report(format!("rendering {output}"), false);
                 self.renders.push((output.to_owned(), child));
             }
-            Err(e) => self.say(format!("cannot start skylit render: {e}"), true),
+            Err(e) => self.report(format!("cannot start skylit render: {e}"), true),
         }
     }
 
@@ -596,7 +596,7 @@ impl App {
             }
         }
         self.renders = running;
-        messages.into_iter().for_each(|(text, is_error)| self.say(text, is_error));
+        messages.into_iter().for_each(|(text, is_error)| self.report(text, is_error));
         if !self.renders.is_empty() {
             context.request_repaint_after(Duration::from_millis(200));
         }

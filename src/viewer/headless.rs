@@ -52,11 +52,11 @@ fn drive(context: &egui::Context, app: &mut App, script: &mut Script, size: [u32
         let frame_start = Instant::now();
         let screen = Rect::from_min_size(Pos2::ZERO, Vec2::new(size[0] as f32, size[1] as f32));
         let mut input = RawInput { screen_rect: Some(screen), time: Some(start.elapsed().as_secs_f64()), ..Default::default() };
-        let Some(wishes) = script.input(&mut input, app)? else { return Ok(()) };
-        let has_input = !input.events.is_empty() || !input.dropped_files.is_empty() || wishes.screenshot.is_some();
+        let Some(requests) = script.input(&mut input, app)? else { return Ok(()) };
+        let has_input = !input.events.is_empty() || !input.dropped_files.is_empty() || requests.screenshot.is_some();
         let is_due = redraw.is_some_and(|at| at <= frame_start);
         let is_woken = woken.swap(false, Ordering::Relaxed);
-        if !has_input && !is_due && !is_woken && wishes.resize.is_none() {
+        if !has_input && !is_due && !is_woken && requests.resize.is_none() {
             std::thread::sleep(FRAME);
             continue;
         }
@@ -68,11 +68,11 @@ fn drive(context: &egui::Context, app: &mut App, script: &mut Script, size: [u32
         words.resize(pixels[0] * pixels[1], 0);
         painter.paint(&mut FrameBuffer { size: pixels, words: &mut words }, BACKGROUND, app.layers(), context, &mut painted);
         script.observe_time(frame_start.elapsed());
-        if let Some(path) = wishes.screenshot {
+        if let Some(path) = requests.screenshot {
             let rgb: Vec<u8> = words.iter().flat_map(|w| [(w >> 16) as u8, (w >> 8) as u8, *w as u8]).collect();
             png::write_rgb(&path, &rgb, size[0], size[1])?;
         }
-        if let Some(wanted) = wishes.resize {
+        if let Some(wanted) = requests.resize {
             size = wanted.map(|n| n.clamp(1, 16384));
             woken.store(true, Ordering::Relaxed);
         }

@@ -67,9 +67,9 @@ enum Condition {
     Text(String),
 }
 
-/// What a script wants of its host.
+/// What a script requests of its host.
 #[derive(Clone, Debug, Default)]
-pub struct Wishes {
+pub struct HostRequests {
     /// Save what the window shows.
     pub screenshot: Option<PathBuf>,
     /// Change the window's size, points.
@@ -242,8 +242,8 @@ impl Script {
     ///
     /// # Errors
     /// [`Error::CheckFailed`] for what was expected and is not so, naming the line.
-    pub fn input(&mut self, input: &mut RawInput, app: &App) -> Result<Option<Wishes>> {
-        let mut wishes = Wishes::default();
+    pub fn input(&mut self, input: &mut RawInput, app: &App) -> Result<Option<HostRequests>> {
+        let mut requests = HostRequests::default();
         let mut current = match self.current.take() {
             Some(current) => current,
             None => match self.commands.pop_front() {
@@ -255,12 +255,12 @@ impl Script {
             },
         };
         let is_done = self
-            .step(&mut current, input, app, &mut wishes)
+            .step(&mut current, input, app, &mut requests)
             .map_err(|text| Error::CheckFailed(format!("{}, line {}: {text}", self.path.display(), current.line)))?;
         if !is_done {
             self.current = Some(current);
         }
-        Ok(Some(wishes))
+        Ok(Some(requests))
     }
 
     /// Ends the last section.
@@ -274,7 +274,13 @@ impl Script {
     }
 
     /// A step of a command, once a frame; returns true at its end.
-    fn step(&mut self, current: &mut Current, input: &mut RawInput, app: &App, wishes: &mut Wishes) -> Result<bool, String> {
+    fn step(
+        &mut self,
+        current: &mut Current,
+        input: &mut RawInput,
+        app: &App,
+        requests: &mut HostRequests,
+    ) -> Result<bool, String> {
         let elapsed = current.start.elapsed();
         let step = current.step;
         current.step += 1;
@@ -354,7 +360,7 @@ impl Script {
                 Ok(true)
             }
             Command::Resize(size) => {
-                wishes.resize = Some(*size);
+                requests.resize = Some(*size);
                 Ok(true)
             }
             Command::Drop(path) => {
@@ -362,7 +368,7 @@ impl Script {
                 Ok(true)
             }
             Command::Screenshot(path) => {
-                wishes.screenshot = Some(path.clone());
+                requests.screenshot = Some(path.clone());
                 Ok(true)
             }
             Command::Mark(name) => {

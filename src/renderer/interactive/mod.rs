@@ -33,7 +33,7 @@ pub struct Interactive<'r> {
     compute: ComputeOptions,
     settings: &'r DeviceSettings,
     animation: Option<PlayedAnimation<'r>>,
-    worlds: Vec<World<'r>>,
+    traced: Vec<TracedScene<'r>>,
     /// Number of tracers built so far.
     built: u32,
     warnings: Vec<String>,
@@ -49,7 +49,7 @@ struct PlayedAnimation<'r> {
 }
 
 /// The scene as a tracer holds it. Integrators that interpret alpha blending differently need tracers of their own, and so does a white sky without materials.
-struct World<'r> {
+struct TracedScene<'r> {
     flat: FlatScene<'r>,
     tracer: Tracer,
     needs: Needs,
@@ -87,7 +87,7 @@ impl Renderer {
             compute: self.compute,
             settings: &self.settings,
             animation,
-            worlds: Vec::new(),
+            traced: Vec::new(),
             built: 0,
             warnings: Vec::new(),
         })
@@ -117,7 +117,7 @@ impl<'r> Interactive<'r> {
 
     /// Time and memory that building the tracers took, one entry for each.
     pub fn build_stats(&self) -> Vec<BuildStats> {
-        self.worlds.iter().map(|w| w.tracer.stats()).collect()
+        self.traced.iter().map(|w| w.tracer.stats()).collect()
     }
 
     /// Takes the warnings since the last call.
@@ -136,7 +136,7 @@ impl<'r> Interactive<'r> {
         }
         animation.time = Some(seconds);
         animation.rig.pose(animation.index, seconds, Playback::Loop, &mut animation.pose)?;
-        for world in &mut self.worlds {
+        for world in &mut self.traced {
             world.update(&animation.pose)?;
         }
         Ok(true)
@@ -158,10 +158,10 @@ impl<'r> Interactive<'r> {
             return Ok(camera.clone());
         }
         let bounds = self.scene.bounds().ok_or_else(|| Error::Scene("the scene has no geometry to render".into()))?;
-        if self.worlds.is_empty() {
-            self.world(Blend::Masked, Needs::default(), Vec::new(), control)?;
+        if self.traced.is_empty() {
+            self.traced_scene(Blend::Masked, Needs::default(), Vec::new(), control)?;
         }
-        framing::choose(bounds, aspect, &|rays| self.look(rays))
+        framing::choose(bounds, aspect, &|rays| self.visible_surfaces(rays))
     }
 
     /// Whether a place is inside a room: there are walls around it.
@@ -169,14 +169,14 @@ impl<'r> Interactive<'r> {
     /// # Errors
     /// Those of the device.
     pub fn is_enclosed(&mut self, eye: DVec3, control: &mut dyn Control) -> Result<bool> {
-        if self.worlds.is_empty() {
-            self.world(Blend::Masked, Needs::default(), Vec::new(), control)?;
+        if self.traced.is_empty() {
+            self.traced_scene(Blend::Masked, Needs::default(), Vec::new(), control)?;
         }
-        framing::is_enclosed(eye, &|rays| self.look(rays))
+        framing::is_enclosed(eye, &|rays| self.visible_surfaces(rays))
     }
 
     /// Finds or builds the tracer for an integrator, and returns its index. A tracer that lacks scene data is replaced by one that has all that was needed so far.
-    fn world(
+    fn traced_scene(
         &mut self,
         blend: Blend,
         needs: Needs,
@@ -186,15 +186,15 @@ impl<'r> Interactive<'r> {
         // without blended materials all see the same scene
         let has_blended = self.scene.materials.iter().any(|m| m.alpha_mode == AlphaMode::Blend);
         let blend = if has_blended { blend } else { Blend::Masked };
-        let found = self.worlds.iter().position(|w| w.flat.blend == blend && w.needs.is_compatible(needs));
+        let found = self.traced.iter().position(|w| w.flat.blend == blend && w.needs.is_compatible(needs));
         let needs = match found {
-            Some(k) if self.worlds[k].needs.covers(needs) => return Ok(k),
-            Some(k) => self.worlds[k].needs.union(needs),
+            Some(k) if self.traced[k].needs.covers(needs) => return Ok(k),
+            Some(k) => self.traced[k].needs.union(needs),
             None => needs,
         };
         let flat = match found {
             // the old tracer goes before the new one is built: both may not fit into memory
-            Some(k) => self.worlds.swap_remove(k).flat,
+            Some(k) => self.traced.swap_remove(k).flat,
             None => {
                 let motion = match &self.animation {
                     Some(a) => a.rig.motion(a.index)?,
@@ -208,16 +208,16 @@ impl<'r> Interactive<'r> {
         let request = TracerRequest { needs, streams, rays: RAYS, control, warnings: &mut self.warnings };
         let tracer = request.build(self.device, self.kind, &flat, self.compute, self.settings)?;
         self.built += 1;
-        let mut world = World { flat, tracer, needs, number: self.built, pose: 0, moved: Vec::new() };
+        let mut world = TracedScene { flat, tracer, needs, number: self.built, pose: 0, moved: Vec::new() };
         if let Some(animation) = self.animation.as_ref().filter(|a| a.time.is_some()) {
             world.update(&animation.pose)?;
         }
-        self.worlds.push(world);
-        Ok(self.worlds.len() - 1)
+        self.traced.push(world);
+        Ok(self.traced.len() - 1)
     }
 }
 
-impl World<'_> {
+impl TracedScene<'_> {
     fn update(&mut self, pose: &Pose) -> Result<()> {
         if self.tracer.is_dynamic() {
             self.moved = self.tracer.update(&pose.changes())?.moved;

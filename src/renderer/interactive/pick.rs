@@ -5,7 +5,7 @@ use crate::error::Result;
 use crate::film::NoControl;
 use crate::integrators::rays::{self, Mode};
 use crate::ray::{Hit, Ray};
-use crate::renderer::framing::Seen;
+use crate::renderer::framing::VisibleSurface;
 use crate::scene::{Camera, Geometry, Projection, Scene};
 use crate::tracer::Tracer;
 use glam::DVec3;
@@ -66,7 +66,7 @@ pub fn closest_hits(tracer: &Tracer, origin: DVec3, rays: &[(DVec3, DVec3)]) -> 
 }
 
 /// What rays see by their hits.
-pub fn seen(scene: &Scene, rays: &[(DVec3, DVec3)], hits: Vec<Option<Hit>>) -> Vec<Option<Seen>> {
+pub fn visible_surfaces(scene: &Scene, rays: &[(DVec3, DVec3)], hits: Vec<Option<Hit>>) -> Vec<Option<VisibleSurface>> {
     let of = |(hit, (_, direction)): (Option<Hit>, &(DVec3, DVec3))| {
         let hit = hit?;
         let instance = scene.instances.get(hit.instance as usize)?;
@@ -79,7 +79,7 @@ pub fn seen(scene: &Scene, rays: &[(DVec3, DVec3)], hits: Vec<Option<Hit>>) -> V
             }
             Geometry::Spheres(_) => true,
         };
-        Some(Seen { distance: f64::from(hit.t), is_front })
+        Some(VisibleSurface { distance: f64::from(hit.t), is_front })
     };
     hits.into_iter().zip(rays).map(of).collect()
 }
@@ -99,15 +99,15 @@ impl Interactive<'_> {
     /// # Errors
     /// Those of the device.
     pub(super) fn closest_hits(&self, rays: &[(DVec3, DVec3)]) -> Result<Vec<Option<Hit>>> {
-        match self.worlds.first() {
+        match self.traced.first() {
             Some(world) => closest_hits(&world.tracer, world.flat.origin, rays),
             None => Ok(vec![None; rays.len()]),
         }
     }
 
     /// What rays see, to choose a camera.
-    pub(super) fn look(&self, rays: &[(DVec3, DVec3)]) -> Result<Vec<Option<Seen>>> {
-        Ok(seen(self.scene, rays, self.closest_hits(rays)?))
+    pub(super) fn visible_surfaces(&self, rays: &[(DVec3, DVec3)]) -> Result<Vec<Option<VisibleSurface>>> {
+        Ok(visible_surfaces(self.scene, rays, self.closest_hits(rays)?))
     }
 
     fn describe(&self, eye: DVec3, position: DVec3, hit: &Hit) -> Pick {

@@ -4,7 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 
-use super::{Interactive, World};
+use super::{Interactive, TracedScene};
 use crate::error::{Error, Result};
 use crate::film::camera::CameraRecord;
 use crate::film::schedule::FilmOptions;
@@ -131,8 +131,9 @@ impl View {
         }
         let shown = settings.frames.show.unwrap_or_default();
         let needs = frame_needs(&how, &settings.image.aov);
-        let world = session.world(crate::accel::features::Blend::Masked, needs, Realtime::streams(&how).to_vec(), control)?;
-        let world = &session.worlds[world];
+        let world =
+            session.traced_scene(crate::accel::features::Blend::Masked, needs, Realtime::streams(&how).to_vec(), control)?;
+        let world = &session.traced[world];
         let mut realtime = Realtime::new(&world.tracer, size, &how, &point_lights(session.scene, &world.flat))?;
         let exposure = settings.picture.exposure.unwrap_or(0.0) as f32;
         let display = Display { shown, exposure, unit: UNIT_OF_SCENE * scene_size(session.scene) as f32 };
@@ -144,9 +145,9 @@ impl View {
     fn still(session: &mut Interactive, settings: &RenderSettings, control: &mut dyn Control) -> Result<(u32, Kind)> {
         let integrator = settings.integrator().get();
         let how = &settings.integrators;
-        let world = session.world(integrator.blend(), integrator.needs(how), integrator.streams(how), control)?;
+        let world = session.traced_scene(integrator.blend(), integrator.needs(how), integrator.streams(how), control)?;
         let view = StillView { integrator, tile_mask: None, state: None, film: Film::default() };
-        Ok((session.worlds[world].number, Kind::Still(Box::new(view))))
+        Ok((session.traced[world].number, Kind::Still(Box::new(view))))
     }
 
     /// Width and height in pixels.
@@ -176,7 +177,7 @@ impl View {
 
     /// Returns true if the session has replaced its tracer: it must be created anew.
     pub fn is_stale(&self, session: &Interactive) -> bool {
-        !session.worlds.iter().any(|w| w.number == self.world)
+        !session.traced.iter().any(|w| w.number == self.world)
     }
 
     /// Discards what it knows of earlier frames.
@@ -203,7 +204,7 @@ impl View {
         control: &mut dyn Control,
     ) -> Result<ViewStep> {
         let gone = || Error::Usage("the view's scene is no longer loaded".into());
-        let world = session.worlds.iter().find(|w| w.number == self.world).ok_or_else(gone)?;
+        let world = session.traced.iter().find(|w| w.number == self.world).ok_or_else(gone)?;
         let has_moved = self.pose != world.pose;
         let rests = self.camera.as_ref() == Some(camera) && !has_moved;
         self.camera = Some(camera.clone());
@@ -313,7 +314,7 @@ impl View {
             }
             Kind::Still(view) => view.image(self.size),
         };
-        let world = session.worlds.iter().find(|w| w.number == self.world);
+        let world = session.traced.iter().find(|w| w.number == self.world);
         if let (Some(world), Some(camera)) = (world, &self.camera) {
             let aspect = f64::from(self.size[0]) / f64::from(self.size[1]);
             let record = CameraRecord::new(camera, world.flat.origin, aspect);
@@ -335,7 +336,7 @@ impl View {
 impl FramesView {
     fn step(
         &mut self,
-        world: &World,
+        world: &TracedScene,
         camera: &CameraRecord,
         moved: &[crate::tracer::MovedBounds],
         control: &mut dyn Control,
@@ -357,7 +358,7 @@ impl StillView {
         (self.state, self.tile_mask) = (None, None);
     }
 
-    fn step(&mut self, world: &World, job: &RenderJob, control: &mut dyn Control) -> Result<ViewStep> {
+    fn step(&mut self, world: &TracedScene, job: &RenderJob, control: &mut dyn Control) -> Result<ViewStep> {
         let skips = self.integrator.skips_empty_tiles(job);
         let record = job.camera_record(&world.flat);
         let make = || if skips { TileMask::new(&world.flat, &record, job.size, job.spp).map(Arc::new) } else { None };

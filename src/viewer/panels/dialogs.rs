@@ -106,13 +106,13 @@ fn act(app: &mut App, dialog: Dialog) {
             Ok(settings) => {
                 app.lighting = settings.lighting.clone();
                 app.settings = settings;
-                app.say(format!("loaded {}", text.trim()), false);
+                app.report(format!("loaded {}", text.trim()), false);
             }
-            Err(e) => app.say(e.to_string(), true),
+            Err(e) => app.report(e.to_string(), true),
         },
         Dialog::SaveSettings(text) => match save_settings(app, Path::new(text.trim())) {
-            Ok(()) => app.say(format!("saved {}", text.trim()), false),
-            Err(e) => app.say(e.to_string(), true),
+            Ok(()) => app.report(format!("saved {}", text.trim()), false),
+            Err(e) => app.report(e.to_string(), true),
         },
     }
 }

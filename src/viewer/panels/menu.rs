@@ -121,7 +121,7 @@ fn file(app: &mut App, ui: &mut Ui) {
 /// Puts the command that renders what is shown on the clipboard.
 pub fn copy_command(app: &mut App) {
     if let Some(command) = app.command() {
-        app.say(format!("copied: {command}"), false);
+        app.report(format!("copied: {command}"), false);
         app.copied = Some(command);
     }
 }
@@ -212,7 +212,7 @@ pub fn keep_camera(app: &mut App) {
     if let Some(control) = &app.control {
         let name = format!("Kept camera {}", app.bookmarks.len() + 1);
         app.bookmarks.push((name.clone(), control.camera().clone()));
-        app.say(format!("{name}: in the menu Camera"), false);
+        app.report(format!("{name}: in the menu Camera"), false);
     }
 }
 

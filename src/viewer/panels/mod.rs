@@ -5,8 +5,8 @@ mod editor;
 mod menu;
 mod performance;
 mod side;
-mod stage;
 mod status;
+mod viewport;
 
 use super::app::App;
 
@@ -21,7 +21,7 @@ pub fn round(x: f64) -> f64 {
 
 /// Shows everything, in the order in which it claims space.
 pub fn show(app: &mut App, context: &egui::Context) {
-    stage::keys(app, context);
+    viewport::keys(app, context);
     egui::TopBottomPanel::top("menu").show(context, |ui| menu::show(app, ui));
     egui::TopBottomPanel::bottom("status").show(context, |ui| status::show(app, ui));
     if app.shows_panel {
@@ -29,7 +29,7 @@ pub fn show(app: &mut App, context: &egui::Context) {
             egui::ScrollArea::vertical().auto_shrink(false).show(ui, |ui| side::show(app, ui));
         });
     }
-    egui::CentralPanel::default().frame(egui::Frame::NONE).show(context, |ui| stage::show(app, ui));
+    egui::CentralPanel::default().frame(egui::Frame::NONE).show(context, |ui| viewport::show(app, ui));
     dialogs::show(app, context);
 }
 

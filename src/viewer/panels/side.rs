@@ -244,7 +244,7 @@ fn light(app: &mut App, ui: &mut Ui) {
         if ui.button("Add").clicked() {
             match crate::scene::light_spec::parse(text.trim()) {
                 Ok(light) => app.lighting.light.push(light),
-                Err(e) => app.say(e, true),
+                Err(e) => app.report(e, true),
             }
         }
     });
@@ -291,7 +291,7 @@ fn camera(app: &mut App, ui: &mut Ui) {
         let camera = crate::renderer::interactive::camera_settings(&scene.cameras, control.camera());
         let settings = crate::renderer::RenderSettings { camera, ..Default::default() };
         app.copied = Some(settings.flags().join(" "));
-        app.say("copied the camera", false);
+        app.report("copied the camera", false);
     }
 }
 

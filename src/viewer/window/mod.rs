@@ -184,7 +184,7 @@ impl Viewer {
             Ok(()) => {
                 self.presenter_failures = 0;
                 let messages = open.presenter.check();
-                messages.into_iter().for_each(|m| self.app.say(format!("validation: {m}"), true));
+                messages.into_iter().for_each(|m| self.app.report(format!("validation: {m}"), true));
             }
             Err(e) if self.presenter_failures > 10 => self.fail(event_loop, e),
             Err(_) => {

@@ -287,7 +287,7 @@ impl Session<'_> {
             if self.camera.is_some() {
                 self.last_motion = Instant::now();
             }
-            self.panes.iter_mut().for_each(Pane::unsettle);
+            self.panes.iter_mut().for_each(Pane::restart);
             self.compared = None;
         }
         self.camera = camera;
@@ -302,7 +302,7 @@ impl Session<'_> {
                 Some(pane) if pane.is_of(settings, size) => {}
                 Some(pane) => {
                     let mut new = Pane::new(settings, size);
-                    new.succeed(pane);
+                    new.inherit_pace(pane);
                     *pane = new;
                     self.compared = None;
                 }

@@ -80,7 +80,7 @@ impl Pane {
     }
 
     /// Keeps what was measured for a pane of other settings or another size.
-    pub fn succeed(&mut self, before: &Self) {
+    pub fn inherit_pace(&mut self, before: &Self) {
         if self.settings.integrator == before.settings.integrator {
             (self.scale, self.times) = (before.scale, before.times.clone());
         }
@@ -102,7 +102,7 @@ impl Pane {
     }
 
     /// The scene or the camera has moved.
-    pub fn unsettle(&mut self) {
+    pub fn restart(&mut self) {
         (self.is_settled, self.is_fresh, self.spent) = (false, true, Duration::ZERO);
     }
 

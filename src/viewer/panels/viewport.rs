@@ -120,7 +120,7 @@ pub fn show(app: &mut App, ui: &mut Ui) {
     if size[0] > 0 && size[1] > 0 {
         app.set_size(size);
     }
-    let response = ui.interact(rect, ui.id().with("stage"), Sense::click_and_drag());
+    let response = ui.interact(rect, ui.id().with("viewport"), Sense::click_and_drag());
     response.widget_info(|| egui::WidgetInfo::labeled(egui::WidgetType::Other, true, "Image"));
     mouse(app, ui, &response);
     let split = match app.arrangement {
