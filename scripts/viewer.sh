@@ -24,8 +24,13 @@ read -r -t 30 number < "$folder/number" || die "Xvfb does not start: $(cat "$fol
 rm -f "$folder/number"
 export DISPLAY=:$number
 unset WAYLAND_DISPLAY
+# a stand-in for the system's file dialog, which chooses what it is told
+mkdir -p "$folder/bin"
+printf '#!/bin/sh\ncat "%s"\n' "$folder/chosen" > "$folder/bin/zenity"
+chmod +x "$folder/bin/zenity"
+export PATH=$folder/bin:$PATH DBUS_SESSION_BUS_ADDRESS=unix:path=/nonexistent
 
-# run_in_viewer SCENE OPTION...: starts the viewer and waits for its window
+# open_viewer SCENE OPTION...: starts the viewer and waits for its window
 open_viewer() {
   "$program" view "$@" > "$folder/log" 2>&1 &
   viewer=$!
@@ -101,6 +106,11 @@ wait_for 60 "the other scene" titled parade
 sleep 1
 key p && sleep 1.5 && key p
 save parade.exr
+say "a scene, by the dialog of the system"
+echo "$PWD/scenes/courtyard.gltf" > "$folder/chosen"
+key ctrl+o
+key Tab && key Tab && key Return
+wait_for 60 "the scene from the dialog" titled courtyard
 say "the end"
 xdotool key --clearmodifiers ctrl+q
 for _ in $(seq 100); do kill -0 "$viewer" 2>/dev/null || break; sleep 0.1; done

@@ -194,7 +194,7 @@ choices! {
         Half = "half", "PATTERN_QUARTER";
     }
 
-    /// Buffer of a frame that is displayed: scalars as grey up to `Depth`, colours from `Normal` on (shaders/display.glsl compares).
+    /// Buffer of a frame that is displayed: scalars as grey up to `Rays`, colours from `Normal` on (shaders/display.glsl compares).
     DisplayMode: "shown" {
         /// The filtered result
         Accessibility = "accessibility", "SHOWN_ACCESSIBILITY";
@@ -206,12 +206,18 @@ choices! {
         Variance = "variance", "SHOWN_VARIANCE";
         /// Depth along the view; white is near
         Depth = "depth", "SHOWN_DEPTH";
+        /// Occlusion rays traced in this frame; white: the most that a pixel can have
+        Rays = "rays", "SHOWN_RAYS";
         /// Geometric normal, -1 to 1 mapped to 0 to 1
         Normal = "normal", "SHOWN_NORMAL";
         /// World position, repeating every quarter of the scene
         Position = "position", "SHOWN_POSITION";
         /// Bent normal, -1 to 1 mapped to 0 to 1
         Bent = "bent", "SHOWN_BENT";
+        /// A colour for each instance
+        Ids = "ids", "SHOWN_IDS";
+        /// Motion vectors since the previous frame, grey where nothing moves: more red to the right, more green downwards, 8 pixels halfway
+        Motion = "motion", "SHOWN_MOTION";
         /// BVH nodes that camera rays visit, as a heat map; needs `--tracer compute`
         Nodes = "nodes", "SHOWN_NODES";
     }

@@ -169,11 +169,22 @@ impl Graph {
         Ok(Self { stages, resources, commands: Commands::new(device)? })
     }
 
-    /// Adds stages after all others.
-    pub fn extend(&mut self, device: &Arc<Device>, stages: Vec<Stage>) -> Result<()> {
-        self.resources.allocate(device, &stages)?;
+    /// Adds stages after all others. Returns false if that discarded the contents of all resources: stages that read transient ones have them allocated anew,
+    /// because their memory is another's by then.
+    pub fn extend(&mut self, device: &Arc<Device>, stages: Vec<Stage>) -> Result<bool> {
+        let keeps = !stages.iter().flat_map(Stage::uses).any(|u| u.reads.iter().any(|r| r.is_transient()));
+        if keeps {
+            self.resources.allocate(device, &stages)?;
+            self.stages.extend(stages);
+            return Ok(true);
+        }
         self.stages.extend(stages);
-        Ok(())
+        // the old memory first
+        let extent = self.resources.extent();
+        self.resources = Resources::new(extent);
+        self.resources.allocate(device, &self.stages)?;
+        self.invalidate();
+        Ok(false)
     }
 
     /// The memory of the passes.

@@ -77,10 +77,28 @@ pub struct Realtime {
     params: Params<FrameParams>,
     /// The buffer to display, if any.
     display: Option<Display>,
-    /// Whether the passes `display` and `nodes` exist.
-    has_display: [bool; 2],
+    /// Passes of the display that exist.
+    displays: Vec<DisplayPassKind>,
     primary_reason: String,
     state: State,
+}
+
+/// Which pass writes the displayed image.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum DisplayPassKind {
+    Buffer,
+    Nodes,
+    Rays,
+}
+
+impl DisplayPassKind {
+    fn of(shown: DisplayMode) -> Self {
+        match shown {
+            DisplayMode::Nodes => Self::Nodes,
+            DisplayMode::Rays => Self::Rays,
+            _ => Self::Buffer,
+        }
+    }
 }
 
 /// State that the next frame depends on.
@@ -130,7 +148,7 @@ impl Realtime {
             graph: Graph::new(device, extent, passes::stages(tracer, block, settings, primary, lights)?)?,
             params: Params::new(device, "frame parameters")?,
             display: None,
-            has_display: [false; 2],
+            displays: Vec::new(),
             primary_reason,
             state: State::default(),
         })
@@ -242,21 +260,23 @@ impl Realtime {
     }
 
     /// Sets the buffer that the next frames write to [`Realtime::displayed`], in the same submission; `None`: none, at no cost. It may change
-    /// before every frame: the first call compiles the pass, later ones write its parameters.
+    /// before every frame: the first call compiles the pass, later ones write its parameters. The first one with [`DisplayMode::Rays`] discards the history.
     ///
     /// # Errors
     /// [`Error::Usage`] for a buffer that these settings do not produce, and those of compiling the shader.
     pub fn display(&mut self, tracer: &Tracer, display: Option<Display>) -> Result<()> {
         if let Some(display) = &display {
             display.shown.check(&self.settings)?;
-            let is_nodes = display.shown == DisplayMode::Nodes;
-            if !self.has_display[usize::from(is_nodes)] {
-                let stage = match is_nodes {
-                    true => nodes::stage(tracer, self.block())?,
-                    false => display::stage(tracer, self.pixels() as u32)?,
+            let kind = DisplayPassKind::of(display.shown);
+            if !self.displays.contains(&kind) {
+                let stage = match kind {
+                    DisplayPassKind::Nodes => nodes::stage(tracer, self.block())?,
+                    kind => display::stage(tracer, self.pixels() as u32, kind == DisplayPassKind::Rays)?,
                 };
-                self.graph.extend(tracer.device(), vec![stage])?;
-                self.has_display[usize::from(is_nodes)] = true;
+                if !self.graph.extend(tracer.device(), vec![stage])? {
+                    self.reset();
+                }
+                self.displays.push(kind);
             }
         }
         if self.display != display {

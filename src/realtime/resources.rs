@@ -179,6 +179,11 @@ impl Resources {
         Self { extent, buffers: Vec::new(), entries: Vec::new(), host: Vec::new() }
     }
 
+    /// The quantities from which sizes follow.
+    pub fn extent(&self) -> Extent {
+        self.extent
+    }
+
     /// Allocates buffers of resources that these stages write and that have none yet. A resource that no pass writes has no buffer, and the address 0.
     pub fn allocate(&mut self, device: &Arc<Device>, stages: &[Stage]) -> Result<()> {
         // for each resource the first and the last stage that uses it, in the order in which they are first written

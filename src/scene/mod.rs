@@ -29,6 +29,8 @@ pub use motion::Motion;
 pub use orbit::Orbit;
 pub use texture::{Filter, TexelData, Texture, Wrap};
 
+use std::path::PathBuf;
+
 use glam::{DAffine3, DVec3};
 
 /// A mesh placed in the world.
@@ -47,6 +49,10 @@ pub struct Instance {
 pub struct LoadReport {
     /// One line each: ignored optional extensions, missing textures, ...
     pub warnings: Vec<String>,
+    /// Files that it was read from: models, materials, buffers and images, also those that could not be read.
+    pub files: Vec<PathBuf>,
+    /// Images that were not decoded because [`load::LoadOptions::textures`] said so.
+    pub skipped_images: usize,
     /// Triangles dropped because two of their corners coincide or their area is zero.
     pub degenerate_triangles: usize,
     /// Meshes whose normals were computed because the file had none.

@@ -7,6 +7,7 @@ use std::sync::Arc;
 use std::sync::mpsc::Receiver;
 use std::time::{Duration, Instant};
 
+use super::browse::Browsing;
 use super::camera::CameraControl;
 use super::layer::Layer;
 use super::request::{Comparison, DeviceSummary, Event, Mailbox, PickPurpose, Progress, Request, SceneSummary, TRUTH, Task};
@@ -72,6 +73,30 @@ pub enum Dialog {
     Render(String, Vec<String>),
 }
 
+impl Dialog {
+    /// What is typed into it.
+    pub fn text(&self) -> &str {
+        match self {
+            Self::Open(text)
+            | Self::Save(text)
+            | Self::LoadSettings(text)
+            | Self::SaveSettings(text)
+            | Self::Render(text, _) => text,
+        }
+    }
+
+    /// The same, to be changed.
+    pub fn text_mut(&mut self) -> &mut String {
+        match self {
+            Self::Open(text)
+            | Self::Save(text)
+            | Self::LoadSettings(text)
+            | Self::SaveSettings(text)
+            | Self::Render(text, _) => text,
+        }
+    }
+}
+
 /// Playback of an animation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Playback {
@@ -96,11 +121,14 @@ pub struct App {
     sent_number: u64,
     idle: u64,
     load: u64,
+    /// The load of the scene that is shown.
+    loaded: u64,
     /// The scene that is requested.
     pub source: Option<String>,
     /// Scenes that were opened before, the last one first.
     pub recent: Vec<String>,
-    modified: Option<(Instant, Option<std::time::SystemTime>)>,
+    /// When the scene's files were looked at, and when they were last modified then.
+    modified: Option<(Instant, Vec<Option<std::time::SystemTime>>)>,
     /// What is known of the scene.
     pub scene: Option<SceneSummary>,
     /// What is known of the device.
@@ -144,13 +172,17 @@ pub struct App {
     /// What was clicked on.
     pub pick: Option<Pick>,
     /// What is being loaded.
-    pub loading: Option<String>,
+    pub loading: Option<(String, Option<f32>)>,
+    /// Names of the Vulkan devices, by index.
+    pub devices: Vec<String>,
     /// Why there are no images.
     pub failure: Option<String>,
     /// Messages, the last one first.
     pub messages: VecDeque<(Instant, String, bool)>,
     /// The open dialog.
     pub dialog: Option<Dialog>,
+    /// The system's file dialog, while it is open.
+    pub browsing: Option<Browsing>,
     /// Whether help is shown.
     pub shows_help: bool,
     /// Whether the panel at the side is shown.
@@ -162,6 +194,7 @@ pub struct App {
     /// The window is to be closed.
     pub closes: bool,
     default_frame_rate: f64,
+    last_load: u64,
     tasks: Vec<Task>,
     size: [u32; 2],
     layers: Vec<Layer>,
@@ -183,6 +216,8 @@ impl App {
             sent_number: 1,
             idle: 0,
             load: 0,
+            loaded: 0,
+            last_load: 0,
             source: None,
             recent: super::recent::load(),
             modified: None,
@@ -208,9 +243,11 @@ impl App {
             playback: Playback { animation: None, runs: false, time: 0.0, speed: 1.0, repeats: true },
             pick: None,
             loading: None,
+            devices: Vec::new(),
             failure: None,
             messages: VecDeque::new(),
             dialog: None,
+            browsing: None,
             shows_help: false,
             shows_panel: true,
             frames: VecDeque::new(),
@@ -230,16 +267,34 @@ impl App {
 
     /// Opens a scene.
     pub fn open(&mut self, source: &str) {
-        self.load += 1;
+        self.last_load += 1;
+        self.load = self.last_load;
         self.source = Some(source.to_owned());
         (self.modified, self.failure) = (None, None);
-        self.loading = Some(format!("loading {source}"));
+        self.loading = Some((format!("loading {source}"), None));
+    }
+
+    /// Stops loading: the scene before stays.
+    pub fn cancel_loading(&mut self) {
+        self.loading = None;
+        self.load = self.loaded;
+        self.source = self.scene.as_ref().map(|s| s.source.clone());
+        self.modified = None;
+        self.report("loading was cancelled", false);
+    }
+
+    /// Returns true if a scene is being loaded that can be cancelled: not the images of one that is shown.
+    pub fn can_cancel_loading(&self) -> bool {
+        self.loading.is_some() && self.load != self.loaded
     }
 
     /// Loads the scene anew; the camera stays.
     pub fn reload(&mut self) {
         if let Some(source) = self.source.clone() {
+            // what changes while it is being loaded is noticed
+            let modified = self.modified.take();
             self.open(&source);
+            self.modified = modified;
         }
     }
 
@@ -257,7 +312,7 @@ impl App {
     /// A frame of the user interface, and what it requests of the renderer.
     pub fn frame(&mut self, context: &egui::Context) {
         self.receive(context);
-        self.watch_file(context);
+        self.watch_files(context);
         self.watch_renders(context);
         self.advance(context);
         self.layers.clear();
@@ -275,7 +330,7 @@ impl App {
 
     /// The renderer has nothing left to do for what was requested last, or cannot do it.
     pub fn is_settled(&self) -> bool {
-        self.failure.is_some() || self.idle >= self.sent_number
+        self.failure.is_some() || self.loading.is_none() && self.idle >= self.sent_number
     }
 
     /// Whether the truth is being rendered.
@@ -290,10 +345,13 @@ impl App {
     fn receive(&mut self, context: &egui::Context) {
         while let Ok(event) = self.events.try_recv() {
             match event {
-                Event::Loading(text) => self.loading = Some(text),
+                // what was cancelled may still report
+                Event::Loading(text, share) => self.loading = self.loading.is_some().then_some((text, share)),
+                Event::Loaded(summary) if summary.load != self.load => {}
                 Event::Loaded(summary) => self.loaded(*summary),
-                Event::LoadFailed(text) => {
-                    self.loading = None;
+                Event::LoadFailed(load, _) if load != self.load => {}
+                Event::LoadFailed(load, text) => {
+                    (self.loading, self.loaded) = (None, load);
                     self.report(text.clone(), true);
                     if self.scene.is_none() {
                         self.failure = Some(text);
@@ -313,6 +371,7 @@ impl App {
                     }
                 }
                 Event::Device(device) => self.device = device,
+                Event::Devices(names) => self.devices = names,
                 Event::Picture(progress) => {
                     self.failure = None;
                     let (pane, progress) = (progress.pane, Arc::new(*progress));
@@ -344,9 +403,14 @@ impl App {
 
     fn loaded(&mut self, summary: SceneSummary) {
         let is_same = self.scene.as_ref().is_some_and(|s| s.source == summary.source);
-        self.report(format!("loaded {}: {} primitives in {:.2} s", summary.source, summary.primitives, summary.seconds), false);
+        let what = match (summary.is_complete, self.loaded == summary.load) {
+            (true, true) => format!("loaded the images of {}", summary.source),
+            (_, _) => format!("loaded {}: {} primitives in {:.2} s", summary.source, summary.primitives, summary.seconds),
+        };
+        self.report(what, false);
         super::recent::add(&mut self.recent, &summary.source);
-        self.loading = None;
+        self.loaded = summary.load;
+        self.loading = (!summary.is_complete).then(|| ("loading images".to_owned(), None));
         self.panes.iter_mut().for_each(|p| p.error = None);
         if !is_same {
             (self.control, self.followed, self.pick, self.comparison) = (None, None, None, None);
@@ -372,23 +436,20 @@ impl App {
         }
     }
 
-    /// Loads the scene anew when its file has changed.
-    fn watch_file(&mut self, context: &egui::Context) {
+    /// Loads the scene anew when a file has changed that it was read from.
+    fn watch_files(&mut self, context: &egui::Context) {
         const INTERVAL: Duration = Duration::from_secs(1);
-        let Some(source) = self.source.as_ref().filter(|s| !s.starts_with("builtin:")) else { return };
+        let Some(scene) = self.scene.as_ref().filter(|s| !s.files.is_empty() && self.loading.is_none()) else { return };
         context.request_repaint_after(INTERVAL);
-        let now = || std::fs::metadata(source).and_then(|m| m.modified()).ok();
-        match self.modified {
-            None => self.modified = Some((Instant::now(), now())),
-            Some((at, _)) if at.elapsed() < INTERVAL => {}
-            Some((_, before)) => {
-                let now = now();
-                self.modified = Some((Instant::now(), now));
-                // a file that is being replaced is gone for a moment
-                if now.is_some() && now != before {
-                    self.reload();
-                }
-            }
+        if self.modified.as_ref().is_some_and(|m| m.0.elapsed() < INTERVAL) {
+            return;
+        }
+        let modified = |path: &PathBuf| std::fs::metadata(path).and_then(|m| m.modified()).ok();
+        let now: Vec<_> = scene.files.iter().map(modified).collect();
+        let before = self.modified.replace((Instant::now(), now.clone())).map(|m| m.1);
+        // a file that is being replaced is gone for a moment
+        if before.is_some_and(|before| before.iter().zip(&now).any(|(before, now)| now.is_some() && now != before)) {
+            self.reload();
         }
     }
 

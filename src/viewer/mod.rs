@@ -4,6 +4,7 @@
 //! one; [`headless`] runs a [`script`] without one.
 
 pub mod app;
+pub mod browse;
 pub mod camera;
 pub mod headless;
 pub mod layer;

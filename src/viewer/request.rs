@@ -97,14 +97,16 @@ pub enum PickPurpose {
 /// What the renderer has done.
 #[derive(Debug)]
 pub enum Event {
-    /// A scene is being loaded: what is being done.
-    Loading(String),
+    /// A scene is being loaded: what is being done, and the share that is done, if that is known.
+    Loading(String, Option<f32>),
     /// A scene was loaded.
     Loaded(Box<SceneSummary>),
     /// The camera to start with was chosen, and whether it is inside a room.
     Camera(Box<Camera>, bool),
-    /// A scene could not be loaded; the previous one stays.
-    LoadFailed(String),
+    /// The scene of this [`Request::load`] could not be loaded; the previous one stays.
+    LoadFailed(u64, String),
+    /// Names of the Vulkan devices, by index.
+    Devices(Vec<String>),
     /// A tracer was built or replaced.
     Device(DeviceSummary),
     /// A step of an image.
@@ -128,8 +130,14 @@ pub enum Event {
 /// What the window shows of a scene.
 #[derive(Clone, Debug, Default)]
 pub struct SceneSummary {
+    /// [`Request::load`] that it answers.
+    pub load: u64,
+    /// Its images are there, too; else they follow.
+    pub is_complete: bool,
     /// The file, or `builtin:NAME`.
     pub source: String,
+    /// The files that it was read from.
+    pub files: Vec<PathBuf>,
     /// Its bounds in world space, scene units.
     pub bounds: (DVec3, DVec3),
     /// Its cameras.
@@ -151,6 +159,8 @@ pub struct SceneSummary {
 pub struct DeviceSummary {
     /// Name of the device and its driver.
     pub name: String,
+    /// Its index among the devices.
+    pub index: usize,
     /// The tracer, and why it was chosen.
     pub tracer: (String, String),
     /// Tracers that the device lacks something for, and what.

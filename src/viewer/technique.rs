@@ -30,11 +30,13 @@ impl Technique {
     /// All of them, by [`GROUPS`].
     pub fn all() -> Vec<(usize, Self)> {
         let presets = [Preset::Fast, Preset::Balanced, Preset::Quality, Preset::Larsen, Preset::LarsenFixed];
-        let stills = integrators::ALL.iter().filter_map(|i| IntegratorName::find(i.name()));
+        let stills = || integrators::ALL.iter().filter_map(|i| IntegratorName::find(i.name())).map(Self::Still);
         let buffers = DisplayMode::ALL.into_iter().filter(|m| *m != DisplayMode::Accessibility);
         let realtime = presets.into_iter().map(Self::Preset).chain([Self::Gtao]).map(|t| (0, t));
-        let converging = [Self::Converged].into_iter().chain(stills.map(Self::Still)).map(|t| (1, t));
-        realtime.chain(converging).chain(buffers.map(|m| (2, Self::Buffer(m)))).collect()
+        let converging = [Self::Converged].into_iter().chain(stills().filter(|t| !t.is_view_of_surfaces())).map(|t| (1, t));
+        // what frames have, and what only stills have: colours of materials
+        let buffers = buffers.map(Self::Buffer).chain(stills().filter(|t| t.is_view_of_surfaces())).map(|t| (2, t));
+        realtime.chain(converging).chain(buffers).collect()
     }
 
     /// Name in lists.
@@ -46,9 +48,9 @@ impl Technique {
             Self::Still(integrator) => match integrator.name() {
                 "ao" => "AO still".into(),
                 "ao-sky" => "AO truth (ao-sky)".into(),
-                name if integrator.get().capabilities().contains(&Capability::LightTransport) => word(name),
-                // views of surfaces, of which there are buffers, too
-                name => format!("{}, antialiased", word(name)),
+                // of the others there are buffers, too
+                name if self.is_view_of_surfaces() && name != "albedo" => format!("{}, antialiased", word(name)),
+                name => word(name),
             },
             Self::Buffer(mode) => word(mode.name()),
             Self::Converged => "AO converged".into(),
@@ -66,6 +68,12 @@ impl Technique {
                 "Every ray counts, no filter: what the real-time techniques approximate, with their radius and falloff"
             }
         }
+    }
+
+    /// Returns true for stills that show a property of surfaces rather than light or occlusion.
+    fn is_view_of_surfaces(self) -> bool {
+        let Self::Still(integrator) = self else { return false };
+        !["ao", "ao-sky"].contains(&integrator.name()) && !integrator.get().capabilities().contains(&Capability::LightTransport)
     }
 
     /// Returns true for images of ambient occlusion or of another quantity from 0 to 1 of the same meaning.

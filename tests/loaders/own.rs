@@ -52,3 +52,28 @@ fn files_are_small() {
         assert!(file.metadata().unwrap().len() < 200_000, "{:?}", file.path());
     }
 }
+
+/// Geometry alone, and how far the images are.
+#[test]
+fn images_can_be_left_out() {
+    use std::sync::Mutex;
+
+    use skylit::scene::load::{ImagesDecoded, LoadOptions, load_with};
+
+    let source = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/courtyard.gltf");
+    let whole = own("courtyard.gltf");
+    let counted = Mutex::new(Vec::new());
+    let progress = |images: ImagesDecoded| counted.lock().unwrap().push(images);
+    let again = load_with(source, &LoadOptions { textures: true, progress: &progress }).unwrap();
+    let n = counted.lock().unwrap().len();
+    assert!(n > 0 && again.textures.len() == whole.textures.len() && again.report.skipped_images == 0);
+    assert!(counted.lock().unwrap().contains(&ImagesDecoded { done: n, of: Some(n) }), "{counted:?}");
+    let geometry = load_with(source, &LoadOptions { textures: false, ..Default::default() }).unwrap();
+    assert_eq!((geometry.textures.len(), geometry.report.skipped_images), (0, n));
+    assert!(geometry.materials.iter().all(|m| m.base_color_texture.is_none()));
+    assert_eq!(geometry.triangle_count(), whole.triangle_count());
+    assert_eq!((geometry.materials.len(), geometry.cameras.len()), (whole.materials.len(), whole.cameras.len()));
+    let mut files: Vec<_> = whole.report.files.iter().map(|f| f.file_name().unwrap().to_string_lossy()).collect();
+    files.sort();
+    assert_eq!(files, ["courtyard.bin", "courtyard.gltf", "courtyard_0.png"]);
+}

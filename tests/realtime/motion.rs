@@ -1,15 +1,18 @@
 //! Histories while the camera moves, while things move, and while they change their shape.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use glam::{DAffine3, DQuat, DVec3};
+use glam::{DAffine3, DQuat, DVec3, Mat4, Vec2, Vec3, Vec4};
 use skylit::accel::flatten::FlatScene;
+use skylit::colour::srgb_byte;
 use skylit::film::NoControl;
 use skylit::film::camera::CameraRecord;
 use skylit::gpu::Device;
 use skylit::integrators::aov;
 use skylit::measure::temporal::{Residual, recovery};
 use skylit::oracle::{Oracle, OracleRay};
+use skylit::realtime::display::{Display, DisplayMode};
 use skylit::realtime::{Preset, Realtime, Settings};
 use skylit::sampling::Sequence;
 use skylit::scene::animation::{Playback, Pose};
@@ -147,6 +150,75 @@ fn at(place: DAffine3) -> Changes<'static> {
 
 fn instances(tracer: &Tracer, camera: &CameraRecord) -> Vec<u32> {
     aov::render(tracer, camera, SIZE, &mut NoControl).unwrap().iter().map(|p| p.instance).collect()
+}
+
+/// Motion vectors against what surface points say of themselves, and instances against a ray's hit.
+#[test]
+fn gpu_displayed_motion_and_ids() {
+    let device = device();
+    let scene = block_on_a_floor();
+    let [camera, shifted] = [0.0, 0.11].map(|x| stepped(&scene, SIZE, DVec3::new(x, 0.0, -0.5 * x)));
+    let display = |shown| Some(Display { shown, exposure: 0.0, unit: 1.0 });
+    let grey = srgb_byte(0.5);
+    for kind in one_tracer(&device) {
+        let mut tracer = moving(&device, kind, &scene, vec![1]);
+        let mut realtime = realtime(&tracer, SIZE, &traced(Preset::Fast));
+        let words = |realtime: &Realtime| -> Vec<[u8; 3]> {
+            let bytes = realtime.displayed().unwrap().read(0, 4 * u64::from(SIZE[0] * SIZE[1])).unwrap();
+            bytes.chunks_exact(4).map(|w| [w[0], w[1], w[2]]).collect()
+        };
+        realtime.display(&tracer, display(DisplayMode::Ids)).unwrap();
+        frames(&mut realtime, &tracer, &camera, 1);
+        let colours: BTreeSet<_> = words(&realtime).into_iter().zip(instances(&tracer, &camera)).collect();
+        let ids: BTreeSet<u32> = colours.iter().map(|c| c.1).collect();
+        assert!(
+            colours.len() == 3 && ids.len() == 3,
+            "{kind}: a colour for the floor, the block and the background: {colours:?}"
+        );
+        realtime.display(&tracer, display(DisplayMode::Motion)).unwrap();
+        frames(&mut realtime, &tracer, &camera, 1);
+        assert!(words(&realtime).iter().all(|w| *w == [grey; 3] || *w == [0; 3]), "{kind}: nothing has moved");
+        // the block alone, the camera alone, both
+        let mut previous = camera;
+        for (block, now) in [(0.09, camera), (0.09, shifted), (-0.04, camera)] {
+            let moved = tracer.update(&at(DAffine3::from_translation(DVec3::X * block))).unwrap().moved;
+            realtime.frame(&tracer, &now, &moved).unwrap();
+            let shown = words(&realtime);
+            let mut fastest = 0f32;
+            for (k, surface) in realtime.surfaces().unwrap().into_iter().enumerate() {
+                let Some(surface) = surface else { continue };
+                let pixel = Vec2::new((k as u32 % SIZE[0]) as f32, (k as u32 / SIZE[0]) as f32) + 0.5;
+                let motion = pixel - pixel_of(&previous, Vec3::from_array(surface.before));
+                fastest = fastest.max(motion.length());
+                let colour = |m: f32| srgb_byte(0.5 + 0.5 * m / (m.abs() + 8.0));
+                let want = [colour(motion.x), colour(motion.y), grey];
+                assert!(
+                    (0..3).all(|c| shown[k][c].abs_diff(want[c]) <= 2),
+                    "{kind}: {:?} for {motion}, not {want:?}",
+                    shown[k]
+                );
+            }
+            assert!(fastest > 1.0, "{kind}: at most {fastest} pixels");
+            frames(&mut realtime, &tracer, &now, 1);
+            assert!(words(&realtime).iter().all(|w| *w == [grey; 3] || *w == [0; 3]), "{kind}: it rests again");
+            previous = now;
+        }
+    }
+    assert_validation_clean(&device);
+}
+
+/// Where a point lies in the image of a perspective camera, in pixels from the upper left corner.
+fn pixel_of(camera: &CameraRecord, point: Vec3) -> Vec2 {
+    let rows = camera.camera_to_world.map(Vec4::from_array);
+    let to_world = Mat4::from_cols(
+        Vec4::new(rows[0].x, rows[1].x, rows[2].x, 0.0),
+        Vec4::new(rows[0].y, rows[1].y, rows[2].y, 0.0),
+        Vec4::new(rows[0].z, rows[1].z, rows[2].z, 0.0),
+        Vec4::new(rows[0].w, rows[1].w, rows[2].w, 1.0),
+    );
+    let p = to_world.inverse().transform_point3(point);
+    let ndc = Vec2::new(p.x / -p.z / camera.view[0], p.y / p.z / camera.view[1]);
+    (0.5 * ndc + 0.5) * Vec2::new(SIZE[0] as f32, SIZE[1] as f32)
 }
 
 #[test]

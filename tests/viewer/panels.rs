@@ -7,7 +7,7 @@ use egui_kittest::kittest::{NodeT, Queryable};
 use skylit::renderer::RenderSettings;
 use skylit::viewer::ViewOptions;
 use skylit::viewer::app::{App, Arrangement, Second};
-use skylit::viewer::request::{Event, EventSender, Mailbox, SceneSummary};
+use skylit::viewer::request::{DeviceSummary, Event, EventSender, Mailbox, SceneSummary};
 
 /// The viewer without a renderer: what it requests goes to a mailbox, what it is told comes from the sender.
 struct Alone {
@@ -38,6 +38,8 @@ fn loaded() -> Alone {
     let mut alone = alone(Some("builtin:stairs"));
     let scene = skylit::scene::builtin::by_name("stairs").unwrap();
     alone.events.send(Event::Loaded(Box::new(SceneSummary {
+        load: 1,
+        is_complete: true,
         source: "builtin:stairs".into(),
         bounds: scene.bounds().unwrap(),
         cameras: scene.cameras.clone(),
@@ -72,6 +74,58 @@ fn without_a_scene_it_says_what_to_do() {
     alone.harness.run_steps(2);
     alone.press(egui::Key::Enter);
     assert_eq!(alone.mailbox.peek().scene.as_deref(), Some("builtin:cornell-box"));
+}
+
+/// A scene is shown before its images are there; loading can be cancelled; what was cancelled changes nothing any more.
+#[test]
+fn loading_shows_how_far_it_is_and_can_be_cancelled() {
+    let mut alone = loaded();
+    alone.harness.state_mut().open("large.glb");
+    alone.harness.run_steps(2);
+    assert_eq!(alone.mailbox.peek().load, 2);
+    let geometry = |load: u64| SceneSummary { load, source: "large.glb".into(), ..Default::default() };
+    alone.click("Cancel loading");
+    let request = alone.mailbox.peek();
+    assert_eq!((request.load, request.scene.as_deref()), (1, Some("builtin:stairs")));
+    alone.events.send(Event::Loaded(Box::new(geometry(2))));
+    alone.events.send(Event::LoadFailed(2, "broken".into()));
+    alone.harness.run_steps(2);
+    assert_eq!(alone.harness.state().scene.as_ref().unwrap().source, "builtin:stairs");
+    assert!(alone.harness.query_by_label_contains("broken").is_none());
+
+    alone.harness.state_mut().open("large.glb");
+    alone.events.send(Event::Loading("loading large.glb: 1 of 4 images".into(), Some(0.25)));
+    alone.harness.run_steps(2);
+    assert_eq!(alone.mailbox.peek().load, 3, "a number of its own");
+    assert!(alone.harness.query_by_label_contains("1 of 4 images").is_some());
+    // a spinner is one, too
+    let bars = alone.harness.query_all_by_role(egui::accesskit::Role::ProgressIndicator);
+    assert_eq!(bars.filter_map(|b| b.accesskit_node().numeric_value()).collect::<Vec<_>>(), [25.0]);
+    alone.events.send(Event::Loaded(Box::new(geometry(3))));
+    alone.events.send(Event::Loading("loading large.glb: 2 of 4 images".into(), Some(0.5)));
+    alone.harness.run_steps(2);
+    assert_eq!(alone.harness.state().scene.as_ref().unwrap().source, "large.glb");
+    assert!(alone.harness.query_by_label_contains("2 of 4 images").is_some());
+    assert!(alone.harness.query_by_label("Cancel loading").is_none(), "the scene is there");
+    assert!(!alone.harness.state().is_settled());
+    alone.events.send(Event::Loaded(Box::new(SceneSummary { is_complete: true, ..geometry(3) })));
+    alone.harness.run_steps(2);
+    assert!(alone.harness.query_by_label_contains("of 4 images").is_none());
+    assert!(alone.harness.query_by_label_contains("loaded the images of large.glb").is_some());
+}
+
+#[test]
+fn the_device_is_chosen_among_those_there_are() {
+    let mut alone = loaded();
+    alone.click("Device");
+    assert!(alone.harness.query_by_label("Vulkan device").is_none(), "there is no choice");
+    alone.events.send(Event::Devices(vec!["first (a driver)".into(), "second (another)".into()]));
+    alone.events.send(Event::Device(DeviceSummary { name: "second (another)".into(), index: 1, ..Default::default() }));
+    alone.harness.run_steps(2);
+    assert_eq!(alone.mailbox.peek().device.device, None);
+    alone.click("Vulkan device");
+    alone.click("first (a driver)");
+    assert_eq!(alone.mailbox.peek().device.device.as_deref(), Some("0"));
 }
 
 #[test]
@@ -172,7 +226,7 @@ fn the_mouse_and_keys_move_the_camera() {
 #[test]
 fn errors_are_shown_as_the_command_line_says_them() {
     let mut alone = alone(Some("missing.glb"));
-    alone.events.send(Event::LoadFailed("missing.glb: no such file".into()));
+    alone.events.send(Event::LoadFailed(1, "missing.glb: no such file".into()));
     alone.harness.run_steps(3);
     assert!(alone.harness.query_all_by_label_contains("missing.glb: no such file").count() >= 1);
     let mut alone = loaded();

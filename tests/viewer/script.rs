@@ -1,6 +1,7 @@
 //! The whole viewer, used by scripts without a window.
 
 use std::path::Path;
+use std::time::{Duration, Instant};
 
 use skylit::Error;
 use skylit::renderer::RenderSettings;
@@ -100,6 +101,48 @@ expect-no-errors";
     let text = if available.len() == 3 { text.join("\n") } else { "wait picture 90\nexpect-no-errors".into() };
     let sections = run(Some("builtin:cornell-box"), folder.path(), &text).unwrap();
     assert!(sections.len() == 1 && sections[0].pictures > 0 && sections[0].first_picture_seconds.is_some(), "{sections:?}");
+}
+
+/// A scene whose image does not arrive before it is seen without it: a pipe. When the image is replaced on disk the scene is loaded anew.
+#[test]
+fn gpu_images_follow_the_geometry_and_are_watched() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let own = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");
+    for name in ["courtyard.gltf", "courtyard.bin"] {
+        std::fs::copy(own.join(name), at(name)).unwrap();
+    }
+    let image = std::fs::read(own.join("courtyard_0.png")).unwrap();
+    assert!(std::process::Command::new("mkfifo").arg(at("courtyard_0.png")).status().unwrap().success());
+    let wait_for = |name: &str| {
+        let start = Instant::now();
+        while !at(name).exists() && start.elapsed().as_secs() < 100 {
+            std::thread::sleep(Duration::from_millis(50));
+        }
+    };
+    let script = "wait text:primitives in
+wait picture 90
+screenshot FOLDER/geometry.png
+wait text:loaded the images
+screenshot FOLDER/images.png
+mark changed
+wait text:primitives in
+wait settled 90
+expect-no-errors";
+    let sections = std::thread::scope(|scope| {
+        scope.spawn(|| {
+            wait_for("geometry.png");
+            std::fs::write(at("courtyard_0.png"), &image).unwrap();
+            wait_for("images.png");
+            // files are looked at once a second
+            std::thread::sleep(Duration::from_millis(1500));
+            std::fs::write(at("new.png"), &image).unwrap();
+            std::fs::rename(at("new.png"), at("courtyard_0.png")).unwrap();
+        });
+        run(Some(&at("courtyard.gltf").to_string_lossy()), folder.path(), script)
+    });
+    let sections = sections.unwrap();
+    assert!(sections.len() == 2 && sections.iter().all(|s| s.pictures > 0), "{sections:?}");
 }
 
 #[test]

@@ -15,6 +15,8 @@ records! {
         result: address,
         /// Accumulated estimates, 8 bytes per pixel.
         history: address,
+        /// Estimates of this frame's samples alone, 8 bytes per pixel, or 0.
+        current: address,
         /// Filtered bent normals, 3 floats per pixel, or 0.
         bent: address,
         /// One of `SHOWN_*`: the buffer that is displayed.
@@ -25,5 +27,8 @@ records! {
         unit: float,
         /// 0: the technique has no history, only a result.
         has_history: uint,
+        /// Maximum occlusion rays of a pixel and frame.
+        most_rays: float,
+        reserved: uint,
     }
 }

@@ -16,8 +16,13 @@ impl DisplayMode {
     /// Colour type of files without alpha that store it.
     pub fn colour(self) -> Colour {
         match self {
-            DisplayMode::Normal | DisplayMode::Position | DisplayMode::Bent | DisplayMode::Nodes => Colour::Rgb,
-            _ => Colour::Grey,
+            DisplayMode::Accessibility
+            | DisplayMode::Unfiltered
+            | DisplayMode::Samples
+            | DisplayMode::Variance
+            | DisplayMode::Depth
+            | DisplayMode::Rays => Colour::Grey,
+            _ => Colour::Rgb,
         }
     }
 
@@ -32,6 +37,9 @@ impl DisplayMode {
             DisplayMode::Samples | DisplayMode::Variance if settings.technique == Technique::Larsen => {
                 wrong("--preset larsen counts no samples: choose another --show")
             }
+            DisplayMode::Rays if settings.technique != Technique::Traced => wrong(
+                "--show rays shows how many rays each pixel gets, which --preset larsen and --technique gtao do not distribute",
+            ),
             _ => Ok(()),
         }
     }
@@ -54,15 +62,18 @@ pub struct Display {
 }
 
 struct DisplayPass {
+    shows_rays: bool,
     pipeline: ComputePipeline,
     params: Params<DisplayParams>,
     thresholds: Buffer,
 }
 
-/// The pass over all pixels, after all others.
-pub fn stage(tracer: &Tracer, pixels: u32) -> Result<Stage> {
+/// The pass over all pixels, after all others. `shows_rays`: for [`DisplayMode::Rays`] alone, whose input keeps its memory until this pass; else for all
+/// buffers but that and [`DisplayMode::Nodes`].
+pub fn stage(tracer: &Tracer, pixels: u32, shows_rays: bool) -> Result<Stage> {
     let device = tracer.device();
     let pass = DisplayPass {
+        shows_rays,
         pipeline: shaders::DISPLAY.pipeline(device)?,
         params: Params::new(device, "parameters of the display")?,
         thresholds: Buffer::from_slice(device, "thresholds of sRGB", &thresholds())?,
@@ -72,24 +83,32 @@ pub fn stage(tracer: &Tracer, pixels: u32) -> Result<Stage> {
 
 impl Pass for DisplayPass {
     fn uses(&self, display: Option<&Display>) -> ResourceUse {
-        use Resource::{BentResult, DisplayImage, DisplaySettings, Guide, History, Result, Surface};
+        use Resource::{
+            BentResult, Camera, Current, DisplayImage, DisplaySettings, FrameNumber, Guide, History, PreviousPosition, Result,
+            Surface,
+        };
         let uses = ResourceUse::new(&[DisplaySettings], &[DisplayImage]);
+        if self.shows_rays {
+            return uses.and_reads(&[Guide, Current]);
+        }
         let Some(display) = display else { return uses };
         match display.shown {
             DisplayMode::Accessibility => uses.and_reads(&[Result]),
             // without a history the result is read in its place
             DisplayMode::Unfiltered => uses.and_reads(&[Guide, History, Result]),
             DisplayMode::Samples | DisplayMode::Variance => uses.and_reads(&[Guide, History]),
-            DisplayMode::Depth => uses.and_reads(&[Guide]),
+            DisplayMode::Depth | DisplayMode::Ids => uses.and_reads(&[Guide]),
+            // what moved in the previous frame rests in this one
+            DisplayMode::Motion => uses.and_reads(&[Camera, FrameNumber, Guide, Surface, PreviousPosition]),
             DisplayMode::Normal | DisplayMode::Position => uses.and_reads(&[Guide, Surface]),
             DisplayMode::Bent => uses.and_reads(&[Guide, BentResult]),
-            // the pass `nodes` writes the image
-            DisplayMode::Nodes => uses,
+            // another pass writes the image
+            DisplayMode::Nodes | DisplayMode::Rays => uses,
         }
     }
 
     fn is_enabled(&self, display: Option<&Display>) -> bool {
-        display.is_some_and(|d| d.shown != DisplayMode::Nodes)
+        display.is_some_and(|d| d.shown != DisplayMode::Nodes && (d.shown == DisplayMode::Rays) == self.shows_rays)
     }
 
     fn prepare(&mut self, frame: &Frame, resources: &Resources) -> Result<()> {
@@ -100,11 +119,14 @@ impl Pass for DisplayPass {
             words: resources.address(Resource::DisplayImage),
             result: resources.address(Resource::Result),
             history: resources.address(Resource::History),
+            current: if self.shows_rays { resources.address(Resource::Current) } else { 0 },
             bent: resources.address(Resource::BentResult),
             shown: display.shown as u32,
             gain: display.exposure.exp2(),
             unit: display.unit,
             has_history: (frame.settings.technique != Technique::Larsen).into(),
+            most_rays: frame.settings.most_rays().max(frame.settings.rays_per_pixel) as f32,
+            reserved: 0,
         })
     }
 

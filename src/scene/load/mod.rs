@@ -20,6 +20,30 @@ pub use environment::load_environment;
 use crate::error::{Error, Result};
 use crate::scene::{Scene, builtin};
 
+/// How a scene is loaded.
+#[derive(Clone, Copy)]
+pub struct LoadOptions<'a> {
+    /// Whether images are decoded. Without them materials have no textures, and [`crate::scene::LoadReport::skipped_images`] says what was left out.
+    pub textures: bool,
+    /// Called after each image that was decoded, from several threads.
+    pub progress: &'a (dyn Fn(ImagesDecoded) + Sync),
+}
+
+/// Images decoded so far.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ImagesDecoded {
+    /// How many.
+    pub done: usize,
+    /// Of how many; of an .obj that is not known before.
+    pub of: Option<usize>,
+}
+
+impl Default for LoadOptions<'_> {
+    fn default() -> Self {
+        Self { textures: true, progress: &|_| () }
+    }
+}
+
 /// Extensions of scene files.
 const FORMATS: [&str; 4] = ["gltf", "glb", "obj", "brhan"];
 
@@ -35,6 +59,14 @@ const FORMATS: [&str; 4] = ["gltf", "glb", "obj", "brhan"];
 /// [`Error::Input`] for a file that is missing, broken or needs what skylit does not have; [`Error::Scene`] when nothing
 /// is left to render; [`Error::Usage`] for a built-in scene that does not exist.
 pub fn load(source: &str) -> Result<Scene> {
+    load_with(source, &LoadOptions::default())
+}
+
+/// As [`load`], with options.
+///
+/// # Errors
+/// As [`load`].
+pub fn load_with(source: &str, options: &LoadOptions) -> Result<Scene> {
     if let Some(name) = source.strip_prefix("builtin:") {
         return builtin::by_name(name)
             .ok_or_else(|| Error::Usage(format!("no built-in scene is called `{name}`; `skylit scenes` lists them")));
@@ -49,7 +81,7 @@ pub fn load(source: &str) -> Result<Scene> {
             return Err(Error::input(path, "no such file, and no built-in scene of that name (`skylit scenes` lists them)"));
         }
     }
-    load_file(path)
+    load_file_with(path, options)
 }
 
 /// Whether a path has the extension of a scene file; it need not exist.
@@ -62,25 +94,30 @@ pub fn is_scene_file(path: impl AsRef<Path>) -> bool {
 /// # Errors
 /// As [`load`].
 pub fn load_file(path: &Path) -> Result<Scene> {
-    let mut scene = read(path)?;
+    load_file_with(path, &LoadOptions::default())
+}
+
+fn load_file_with(path: &Path, options: &LoadOptions) -> Result<Scene> {
+    let mut scene = read(path, options)?;
+    scene.report.files.insert(0, path.to_owned());
     scene.name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     finish::finish(&mut scene, path)?;
     Ok(scene)
 }
 
 /// Reads any format, without [`finish`].
-fn read(path: &Path) -> Result<Scene> {
+fn read(path: &Path, options: &LoadOptions) -> Result<Scene> {
     match extension(path).as_str() {
-        "brhan" => brhan::read(path),
-        _ => read_model(path),
+        "brhan" => brhan::read(path, options),
+        _ => read_model(path, options),
     }
 }
 
 /// Reads the formats that hold models and may be named by another file, without [`finish`].
-fn read_model(path: &Path) -> Result<Scene> {
+fn read_model(path: &Path, options: &LoadOptions) -> Result<Scene> {
     match extension(path).as_str() {
-        "gltf" | "glb" => gltf::read(path),
-        "obj" => obj::read(path),
+        "gltf" | "glb" => gltf::read(path, options),
+        "obj" => obj::read(path, options),
         "brhan" => Err(Error::input(path, "is a whole scene, not a model")),
         "" => Err(Error::input(path, "has no extension; skylit reads .gltf, .glb, .obj and .brhan")),
         other => Err(Error::input(path, format!("cannot read .{other} files; skylit reads .gltf, .glb, .obj and .brhan"))),

@@ -2,12 +2,14 @@
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
+use std::task::Poll;
 
 use egui::{Align2, Context, Key, Ui};
 
 use crate::error::Result;
 use crate::renderer::RenderSettings;
 use crate::viewer::app::{App, Dialog};
+use crate::viewer::browse::Browsing;
 use crate::viewer::request::Task;
 
 /// Keys and mouse, for the help window and docs/viewer.md.
@@ -58,20 +60,27 @@ pub fn show(app: &mut App, context: &Context) {
         },
     );
     app.shows_help = open;
+    if let Some(Poll::Ready(chosen)) = app.browsing.as_ref().map(Browsing::poll) {
+        app.browsing = None;
+        if let Some(dialog) = chosen {
+            app.dialog = None;
+            act(app, dialog);
+        }
+    }
     if let Some(dialog) = app.dialog.clone() {
         show_dialog(app, context, dialog);
     }
 }
 
 fn show_dialog(app: &mut App, context: &Context, mut dialog: Dialog) {
-    let (title, label, action, text) = match &mut dialog {
-        Dialog::Open(text) => ("Open a scene", "A file (.gltf, .glb, .obj, .brhan) or builtin:NAME", "Open", text),
-        Dialog::Save(text) => ("Save the image", "A file: .png as shown, .exr with all channels", "Save", text),
-        Dialog::LoadSettings(text) => ("Load settings", "A file of settings (.json)", "Load", text),
-        Dialog::SaveSettings(text) => ("Save settings", "A file of settings (.json)", "Save", text),
-        Dialog::Render(text, _) => ("Render this view", "A file: .png, .exr, .apng or frames.####.png", "Render", text),
+    let (title, label, action) = match &dialog {
+        Dialog::Open(_) => ("Open a scene", "A file (.gltf, .glb, .obj, .brhan) or builtin:NAME", "Open"),
+        Dialog::Save(_) => ("Save the image", "A file: .png as shown, .exr with all channels", "Save"),
+        Dialog::LoadSettings(_) => ("Load settings", "A file of settings (.json)", "Load"),
+        Dialog::SaveSettings(_) => ("Save settings", "A file of settings (.json)", "Save"),
+        Dialog::Render(..) => ("Render this view", "A file: .png, .exr, .apng or frames.####.png", "Render"),
     };
-    let (mut open, mut done, before) = (true, false, app.dialog.clone());
+    let (mut open, mut done, mut browses, before) = (true, false, false, app.dialog.clone());
     egui::Window::new(title)
         .open(&mut open)
         .collapsible(false)
@@ -79,13 +88,23 @@ fn show_dialog(app: &mut App, context: &Context, mut dialog: Dialog) {
         .anchor(Align2::CENTER_CENTER, [0.0, 0.0])
         .show(context, |ui: &mut Ui| {
             let heading = ui.label(label);
-            let edit = ui.add(egui::TextEdit::singleline(text).desired_width(420.0)).labelled_by(heading.id);
+            let edit = ui.add(egui::TextEdit::singleline(dialog.text_mut()).desired_width(420.0)).labelled_by(heading.id);
             if !edit.has_focus() && !edit.lost_focus() && ui.memory(|m| m.focused().is_none()) {
                 edit.request_focus();
             }
             done = edit.lost_focus() && ui.input(|i| i.key_pressed(Key::Enter));
-            done |= ui.button(action).clicked();
+            ui.horizontal(|ui| {
+                done |= ui.button(action).clicked();
+                ui.add_enabled_ui(app.browsing.is_none(), |ui| browses = ui.button("Browse…").clicked());
+                if app.browsing.is_some() {
+                    ui.label("choose in the window of the system");
+                }
+            });
         });
+    if browses {
+        let context = context.clone();
+        app.browsing = Some(Browsing::start(dialog.clone(), move || context.request_repaint()));
+    }
     if !open {
         app.dialog = None;
     } else if done {

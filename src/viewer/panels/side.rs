@@ -332,7 +332,25 @@ fn animation(app: &mut App, ui: &mut Ui) {
 }
 
 fn device(app: &mut App, ui: &mut Ui) {
-    ui.label(&app.device.name);
+    if app.devices.len() > 1 {
+        ui.horizontal(|ui| {
+            let label = ui.label("Vulkan device");
+            let chosen = app.device.index;
+            let mut choice = chosen;
+            let combo = ComboBox::from_id_salt("device").selected_text(app.devices.get(chosen).map_or("", String::as_str));
+            let combo = combo.show_ui(ui, |ui| {
+                for (k, name) in app.devices.iter().enumerate() {
+                    ui.selectable_value(&mut choice, k, name);
+                }
+            });
+            combo.response.labelled_by(label.id);
+            if choice != chosen {
+                app.device_settings.device = Some(choice.to_string());
+            }
+        });
+    } else {
+        ui.label(&app.device.name);
+    }
     let (tracer, reason) = app.device.tracer.clone();
     ui.label(format!("Tracer {tracer}: {reason}"));
     ui.horizontal(|ui| {

@@ -229,8 +229,10 @@ fn titles(app: &App, ui: &Ui, rect: Rect, split: Option<f32>) {
 fn notices(app: &mut App, ui: &mut Ui, rect: Rect) {
     let mut lines: Vec<(String, bool)> = Vec::new();
     let is_loading = app.loading.is_some() || app.control.is_none() && app.source.is_some() && app.failure.is_none();
-    if let Some(text) = &app.loading {
+    let mut share = None;
+    if let Some((text, part)) = &app.loading {
         lines.push((format!("{text} …"), false));
+        share = *part;
     } else if is_loading {
         lines.push(("building acceleration structures and shaders …".into(), false));
     } else if app.source.is_some()
@@ -255,7 +257,7 @@ fn notices(app: &mut App, ui: &mut Ui, rect: Rect) {
         ui.ctx().request_repaint_after(std::time::Duration::from_millis(100));
     }
     let width = (rect.width() - 40.0).clamp(120.0, 620.0);
-    let mut dialog_opened = false;
+    let (mut dialog_opened, mut cancelled) = (false, false);
     egui::Area::new("notices".into()).pivot(Align2::CENTER_BOTTOM).fixed_pos(rect.center_bottom() - Vec2::new(0.0, 30.0)).show(
         ui.ctx(),
         |ui| {
@@ -270,12 +272,21 @@ fn notices(app: &mut App, ui: &mut Ui, rect: Rect) {
                         ui.label(if is_error { text.color(ui.visuals().error_fg_color) } else { text });
                     });
                 }
+                if let Some(share) = share {
+                    ui.add(egui::ProgressBar::new(share).desired_width(width.min(300.0)));
+                }
+                if app.can_cancel_loading() {
+                    cancelled = ui.button("Cancel loading").clicked();
+                }
                 if app.source.is_none() {
                     dialog_opened = ui.button("Open…").clicked();
                 }
             });
         },
     );
+    if cancelled {
+        app.cancel_loading();
+    }
     if dialog_opened {
         app.dialog = Some(Dialog::Open(String::new()));
     }

@@ -1,6 +1,7 @@
 //! The thread that loads scenes and renders what the window requests.
 
 mod compare;
+mod loader;
 mod pane;
 
 use std::path::Path;
@@ -9,15 +10,16 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 pub use compare::heat;
+use loader::{Loaded, Loader};
 use pane::{Pacing, Pane};
 
 use super::request::{Comparison, DeviceSummary, Event, EventSender, Mailbox, Progress, Request, SceneSummary, Task};
 use crate::error::{Error, Result};
 use crate::film::{Control, NoControl};
-use crate::gpu::Device;
+use crate::gpu::{self, Device};
 use crate::output::{self, ImageFormat, png};
 use crate::renderer::{Interactive, Renderer};
-use crate::scene::{Camera, Scene, load};
+use crate::scene::{Camera, Scene};
 use crate::terminal::panic;
 use crate::tracer::{DeviceSettings, TracerKind};
 
@@ -28,6 +30,8 @@ const REST: Duration = Duration::from_millis(150);
 const SHARE: f64 = 0.6;
 /// Least time between two comparisons.
 const COMPARISON: Duration = Duration::from_millis(700);
+/// Time after which geometry is shown whose images are still being loaded.
+const PATIENCE: Duration = Duration::from_millis(500);
 /// A comparison may take this share of the time.
 const COMPARISON_SHARE: u32 = 5;
 
@@ -38,7 +42,7 @@ const COMPARISON_SHARE: u32 = 5;
 pub fn spawn(mailbox: Arc<Mailbox>, events: EventSender) -> Result<JoinHandle<()>> {
     let run = move || {
         let reporter = events.clone();
-        let worker = Worker { mailbox, events, open: None, device_losses: 0 };
+        let worker = Worker { mailbox, events, open: None, device_losses: 0, listed_devices: false };
         // the window stays open and says so
         if let Err(bug) = panic::catch(move || worker.run()) {
             reporter.send(Event::Failed(bug));
@@ -55,6 +59,7 @@ struct Worker {
     events: EventSender,
     open: Option<OpenScene>,
     device_losses: u32,
+    listed_devices: bool,
 }
 
 /// A loaded scene on a device.
@@ -62,6 +67,8 @@ struct OpenScene {
     renderer: Renderer,
     load: u64,
     device: DeviceSettings,
+    /// What loads its images, if they are still missing.
+    loader: Option<Loader>,
 }
 
 impl Worker {
@@ -100,28 +107,30 @@ impl Worker {
     fn prepare(&mut self, request: &Request) -> Result<bool> {
         let Some(source) = &request.scene else { return Ok(false) };
         if self.open.as_ref().is_some_and(|open| open.load == request.load) {
+            self.take_images(source)?;
             return self.set_device(&request.device).map(|()| true);
         }
-        self.events.send(Event::Loading(format!("loading {source}")));
+        self.events.send(Event::Loading(format!("loading {source}"), None));
         let start = Instant::now();
         let kept = self.open.as_ref().filter(|o| o.device == request.device).map(|o| o.renderer.device().clone());
         match self.load(source, request, kept) {
-            Ok((device, scene)) => {
-                let seconds = start.elapsed().as_secs_f64();
-                for warning in &scene.report.warnings {
+            Ok((device, scene, loader)) => {
+                let summary = SceneSummary { load: request.load, ..summary(source, &scene, start.elapsed()) };
+                // they come again with the images
+                for warning in scene.report.warnings.iter().filter(|_| loader.is_none()) {
                     self.events.send(Event::Warning(warning.clone()));
                 }
-                let summary = summary(source, &scene, seconds);
                 // before the new one is uploaded: memory
                 self.open = None;
                 let renderer = Renderer::new(device, scene, &request.device)?.with_name(source);
-                self.open = Some(OpenScene { renderer, load: request.load, device: request.device.clone() });
+                self.open = Some(OpenScene { renderer, load: request.load, device: request.device.clone(), loader });
                 self.events.send(Event::Loaded(Box::new(summary)));
+                self.list_devices();
                 Ok(true)
             }
             Err(Error::Interrupted) => Err(Error::Interrupted),
             Err(e) => {
-                self.events.send(Event::LoadFailed(crate::terminal::console::one_line(&e.to_string())));
+                self.events.send(Event::LoadFailed(request.load, crate::terminal::console::one_line(&e.to_string())));
                 let Some(open) = &mut self.open else {
                     // nothing to go back to
                     self.wait_for(|r| r.load != request.load || r.quits || r.device != request.device);
@@ -134,31 +143,82 @@ impl Worker {
         }
     }
 
-    /// Loads a scene on a thread of its own while the device opens; [`Error::Interrupted`] if another one is requested meanwhile.
-    fn load(&self, source: &str, request: &Request, device: Option<Arc<Device>>) -> Result<(Arc<Device>, Scene)> {
-        let name = source.to_owned();
-        let loader = std::thread::spawn(move || load::load(&name));
+    /// Loads a scene while the device opens; without its images, if they take long: then what loads them is returned, too. [`Error::Interrupted`] if another
+    /// one is requested meanwhile.
+    fn load(
+        &self,
+        source: &str,
+        request: &Request,
+        device: Option<Arc<Device>>,
+    ) -> Result<(Arc<Device>, Scene, Option<Loader>)> {
+        let mut loader = Loader::start(source, &self.mailbox, &self.events)?;
         let device = match device {
             Some(device) => Ok(device),
             None => Device::open(&request.device.options()),
         };
-        while !loader.is_finished() {
-            if self.mailbox.is(|r| r.load != request.load || r.quits) {
+        let mut geometry: Option<(Instant, Scene)> = None;
+        loop {
+            if self.mailbox.is(|r| r.load != request.load || r.scene != request.scene || r.quits) || loader.has_ended() {
                 return Err(Error::Interrupted);
             }
-            std::thread::sleep(Duration::from_millis(10));
+            match loader.next(Duration::from_millis(10)).transpose()? {
+                Some(Loaded::Scene(scene)) => return Ok((device?, scene, None)),
+                Some(Loaded::Geometry(scene)) => geometry = Some((Instant::now(), scene)),
+                None => {}
+            }
+            geometry = match geometry {
+                Some((since, scene)) if since.elapsed() > PATIENCE => return Ok((device?, scene, Some(loader))),
+                geometry => geometry,
+            };
         }
-        let scene = loader.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))?;
-        Ok((device?, scene))
+    }
+
+    /// Puts the scene with its images in place of its geometry alone, if they have been loaded.
+    fn take_images(&mut self, source: &str) -> Result<()> {
+        let Some(OpenScene { renderer, load, device, loader: Some(mut loader) }) = self.open.take_if(|o| o.loader.is_some())
+        else {
+            return Ok(());
+        };
+        let start = Instant::now();
+        match loader.next(Duration::ZERO) {
+            Some(Ok(Loaded::Scene(scene))) => {
+                let summary = SceneSummary { load, ..summary(source, &scene, start.elapsed()) };
+                for warning in &scene.report.warnings {
+                    self.events.send(Event::Warning(warning.clone()));
+                }
+                let open = renderer.device().clone();
+                drop(renderer);
+                let renderer = Renderer::new(open, scene, &device)?.with_name(source);
+                self.open = Some(OpenScene { renderer, load, device, loader: None });
+                self.events.send(Event::Loaded(Box::new(summary)));
+                return Ok(());
+            }
+            Some(Err(e)) => {
+                let text = crate::terminal::console::one_line(&e.to_string());
+                self.events.send(Event::LoadFailed(load, format!("images: {text}")));
+                self.open = Some(OpenScene { renderer, load, device, loader: None });
+                return Ok(());
+            }
+            Some(Ok(Loaded::Geometry(_))) | None => {}
+        }
+        let loader = (!loader.has_ended()).then_some(loader);
+        self.open = Some(OpenScene { renderer, load, device, loader });
+        Ok(())
+    }
+
+    /// Tells the window which devices there are, once.
+    fn list_devices(&mut self) {
+        if !std::mem::replace(&mut self.listed_devices, true) {
+            let devices = gpu::Instance::new(false).and_then(|instance| gpu::enumerate(&instance)).unwrap_or_default();
+            self.events.send(Event::Devices(devices.into_iter().map(|d| format!("{} ({})", d.name, d.driver)).collect()));
+        }
     }
 
     /// Changes the tracer, or the device. Settings that the device does not support leave both as they were.
     fn set_device(&mut self, settings: &DeviceSettings) -> Result<()> {
-        let Some(OpenScene { renderer, load, device: before }) = self.open.take() else { return Ok(()) };
-        if before == *settings {
-            self.open = Some(OpenScene { renderer, load, device: before });
+        let Some(OpenScene { renderer, load, device: before, loader }) = self.open.take_if(|o| o.device != *settings) else {
             return Ok(());
-        }
+        };
         let device = renderer.device().clone();
         let name = renderer.name().to_owned();
         let scene = renderer.into_scene();
@@ -176,7 +236,7 @@ impl Worker {
                 Renderer::new(device, scene, &before)?
             }
         };
-        self.open = Some(OpenScene { renderer: renderer.with_name(&name), load, device: settings.clone() });
+        self.open = Some(OpenScene { renderer: renderer.with_name(&name), load, device: settings.clone(), loader });
         Ok(())
     }
 
@@ -194,6 +254,7 @@ impl Worker {
     fn session(&mut self, first: &Request) -> Result<()> {
         let Some(open) = &mut self.open else { return Ok(()) };
         let tracer_reason = open.renderer.tracer_kind().1.to_owned();
+        let loader = open.loader.as_ref();
         let (mailbox, events) = (&self.mailbox, &self.events);
         let interactive = match open.renderer.interactive(&first.lighting, first.animation) {
             Ok(interactive) => interactive,
@@ -208,6 +269,7 @@ impl Worker {
             events,
             interactive,
             tracer_reason,
+            loader,
             panes: Vec::new(),
             camera: None,
             time: 0.0,
@@ -227,6 +289,7 @@ struct Session<'a> {
     events: &'a EventSender,
     interactive: Interactive<'a>,
     tracer_reason: String,
+    loader: Option<&'a Loader>,
     panes: Vec<Pane>,
     camera: Option<Camera>,
     time: f64,
@@ -243,7 +306,7 @@ impl Session<'_> {
     fn run(&mut self) -> Result<()> {
         loop {
             let (request, number, changed) = self.mailbox.take();
-            if request.quits || !self.serves(&request) {
+            if request.quits || !self.serves(&request) || self.loader.is_some_and(Loader::is_ready) {
                 return Ok(());
             }
             self.move_to(&request)?;
@@ -366,6 +429,7 @@ impl Session<'_> {
         };
         let summary = DeviceSummary {
             name: format!("{} ({})", info.name, info.driver),
+            index: info.index,
             tracer: (self.interactive.tracer_kind().name().to_owned(), self.tracer_reason.clone()),
             unavailable: TracerKind::ALL.iter().filter_map(lacks).collect(),
             bytes: stats.iter().map(|s| s.structure_bytes + s.scene_bytes).sum(),
@@ -472,17 +536,20 @@ impl Control for StopOnChange<'_> {
     }
 }
 
-fn summary(source: &str, scene: &Scene, seconds: f64) -> SceneSummary {
+fn summary(source: &str, scene: &Scene, time: Duration) -> SceneSummary {
     let animations = scene.rig.as_ref().map_or(&[][..], |rig| rig.animations());
     let name = |k: usize, name: &str| if name.is_empty() { format!("{k}") } else { name.to_owned() };
     SceneSummary {
+        load: 0,
+        is_complete: scene.report.skipped_images == 0,
         source: source.to_owned(),
+        files: scene.report.files.clone(),
         bounds: scene.bounds().unwrap_or_default(),
         cameras: scene.cameras.clone(),
         animations: animations.iter().enumerate().map(|(k, a)| (name(k, &a.name), a.duration)).collect(),
         textures: scene.textures.iter().enumerate().map(|(k, t)| name(k, &t.name)).collect(),
         primitives: scene.triangle_count() + scene.sphere_count(),
         counts: [scene.instances.len(), scene.meshes.len(), scene.materials.len(), scene.lights.len()],
-        seconds,
+        seconds: time.as_secs_f64(),
     }
 }

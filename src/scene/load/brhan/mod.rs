@@ -13,17 +13,17 @@ use glam::{DAffine3, DMat3, DVec3, Vec3};
 
 use parse::Statement;
 
-use super::{find, finish};
+use super::{LoadOptions, find, finish};
 use crate::error::{Error, Result};
 use crate::scene::material::{Material, MaterialKind, Transmission};
 use crate::scene::{AnimationRig, Camera, Geometry, Instance, Mesh, Scene, Sphere};
 
 /// Reads a `.brhan` file and the models that it names.
-pub(super) fn read(path: &Path) -> Result<Scene> {
+pub(super) fn read(path: &Path, options: &LoadOptions) -> Result<Scene> {
     let bytes = std::fs::read(path).map_err(|e| Error::read(path, &e))?;
     let text = String::from_utf8_lossy(&bytes);
     let statements = parse::statements(&text).map_err(|e| Error::input(path, e))?;
-    let mut loader = Loader { path, scene: Scene::default(), models: HashMap::new() };
+    let mut loader = Loader { path, options, scene: Scene::default(), models: HashMap::new() };
     for mut statement in statements {
         loader.statement(&mut statement)?;
         statement.done().map_err(|e| Error::input(path, e))?;
@@ -33,6 +33,7 @@ pub(super) fn read(path: &Path) -> Result<Scene> {
 
 struct Loader<'a> {
     path: &'a Path,
+    options: &'a LoadOptions<'a>,
     scene: Scene,
     /// The instances of each loaded model with each material, relative to the model.
     models: HashMap<(PathBuf, Option<String>), Vec<Instance>>,
@@ -134,7 +135,7 @@ impl Loader<'_> {
         // a model that is used twice with one material is read once
         let key = (found, material.as_ref().map(|m| format!("{m:?}")));
         if !self.models.contains_key(&key) {
-            let mut model = super::read_model(&key.0)?;
+            let mut model = super::read_model(&key.0, self.options)?;
             if model.rig.is_some() {
                 // its nodes are not this scene's
                 AnimationRig::apply_rest_pose(&mut model);
@@ -148,6 +149,7 @@ impl Loader<'_> {
                 }
                 (model.materials, model.textures) = (vec![material], Vec::new());
             }
+            self.scene.report.files.push(key.0.clone());
             let placed = append(&mut self.scene, model);
             self.models.insert(key.clone(), placed);
         }
@@ -171,6 +173,8 @@ fn append(scene: &mut Scene, model: Scene) -> Vec<Instance> {
     }));
     scene.meshes.extend(model.meshes.into_iter().map(|mesh| Mesh { material: mesh.material + materials, ..mesh }));
     scene.report.warnings.extend(model.report.warnings);
+    scene.report.skipped_images += model.report.skipped_images;
+    scene.report.files.extend(model.report.files);
     model.instances.into_iter().map(|i| Instance { mesh: i.mesh + meshes, ..i }).collect()
 }
 

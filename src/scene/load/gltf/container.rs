@@ -1,7 +1,7 @@
 //! From files to the JSON document and its buffers.
 
 use std::borrow::Cow;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use ::gltf::binary::{self, Glb};
 use ::gltf::json::{Buffer, Root};
@@ -118,6 +118,19 @@ pub(super) fn read_uri(uri: &str, gltf: &Path) -> Result<Vec<u8>, String> {
             })
         }
     }
+}
+
+/// The files beside the glTF file that its buffers and images are in.
+pub(super) fn files(document: &Root, gltf: &Path) -> Vec<PathBuf> {
+    let uris = document.buffers.iter().map(|b| &b.uri).chain(document.images.iter().map(|i| &i.uri)).flatten();
+    let mut files: Vec<_> = uris
+        .filter_map(|uri| match uri::parse(uri) {
+            Ok(Uri::Path(relative)) => Some(gltf.parent().unwrap_or(Path::new("")).join(relative)),
+            _ => None,
+        })
+        .collect();
+    files.dedup();
+    files
 }
 
 /// The bytes of every buffer, each as long as it declares.

@@ -29,7 +29,7 @@ use accessor::Reader;
 use glam::{DAffine3, DVec3};
 use rig::{MeshVariant, RigBuilder};
 
-use super::compact;
+use super::{LoadOptions, compact};
 use crate::error::{Error, Result};
 use crate::scene::{Geometry, Instance, Mesh, Scene};
 
@@ -65,7 +65,7 @@ fn text(name: &Option<String>) -> &str {
 }
 
 /// Reads a `.gltf` or `.glb` file.
-pub(super) fn read(path: &Path) -> Result<Scene> {
+pub(super) fn read(path: &Path, options: &LoadOptions) -> Result<Scene> {
     let file = std::fs::read(path).map_err(|e| Error::read(path, &e))?;
     let chunks = container::split(&file, path)?;
     let (document, doubles) = container::document(&chunks.json, path)?;
@@ -74,12 +74,14 @@ pub(super) fn read(path: &Path) -> Result<Scene> {
 
     let mut scene = Scene::default();
     extensions(&document, path, &mut scene)?;
+    scene.report.files = container::files(&document, path);
     let placed = node::place(&document, &doubles, !doubles.skins.is_empty()).map_err(|e| Error::input(path, e))?;
 
     let mut warnings = Vec::new();
     let material = |(i, m)| material::convert(m).map_err(|e| Error::input(path, format!("material {i}: {e}")));
     scene.materials = document.materials.iter().enumerate().map(material).collect::<Result<_>>()?;
-    scene.textures = texture::resolve(&reader, path, &mut scene.materials, &mut |w| warnings.push(w));
+    (scene.textures, scene.report.skipped_images) =
+        texture::resolve(&reader, path, &mut scene.materials, options, &mut |w| warnings.push(w));
 
     let input = |e| Error::input(path, e);
     let mut stage = RigBuilder::new(&reader, &doubles, &placed, &mut |w| warnings.push(w));

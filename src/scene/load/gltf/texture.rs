@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::path::Path;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use ::gltf::json::texture::{MagFilter, MinFilter, Sampler, WrappingMode};
 use ::gltf::json::validation::Checked;
@@ -11,13 +12,20 @@ use rayon::prelude::*;
 use super::accessor::Reader;
 use super::{container, text, valid};
 use crate::scene::load::picture::{self, DecodedImage};
+use crate::scene::load::{ImagesDecoded, LoadOptions};
 use crate::scene::{Filter, Material, Texture, Wrap};
 
 /// Decodes the images that materials use, and turns the glTF textures in their slots into the scene's.
 ///
 /// A texture whose image is missing or broken leaves its slot, with a warning: for every slot that is the same as a
-/// texture that changes nothing.
-pub(super) fn resolve(reader: &Reader, path: &Path, materials: &mut [Material], warn: &mut dyn FnMut(String)) -> Vec<Texture> {
+/// texture that changes nothing. So does every image if the options leave them out; their number is returned, too.
+pub(super) fn resolve(
+    reader: &Reader,
+    path: &Path,
+    materials: &mut [Material],
+    options: &LoadOptions,
+    warn: &mut dyn FnMut(String),
+) -> (Vec<Texture>, usize) {
     let document = reader.document;
     let mut used: BTreeMap<usize, Option<usize>> = BTreeMap::new();
     for slot in materials.iter_mut().flat_map(Material::texture_slots_mut).flatten() {
@@ -30,8 +38,17 @@ pub(super) fn resolve(reader: &Reader, path: &Path, materials: &mut [Material], 
     let mut wanted: Vec<usize> = used.keys().filter_map(|&t| image_of(t)).collect();
     wanted.sort_unstable();
     wanted.dedup();
-    let decoded: BTreeMap<usize, Result<DecodedImage, String>> =
-        wanted.into_par_iter().map(|i| (i, image(reader, path, i))).collect();
+    let (count, done) = (wanted.len(), AtomicUsize::new(0));
+    let decode = |i: usize| {
+        let decoded = image(reader, path, i);
+        (options.progress)(ImagesDecoded { done: 1 + done.fetch_add(1, Ordering::Relaxed), of: Some(count) });
+        (i, decoded)
+    };
+    let decoded: BTreeMap<usize, Result<DecodedImage, String>> = match options.textures {
+        true => wanted.into_par_iter().map(decode).collect(),
+        false => BTreeMap::new(),
+    };
+    let skipped = if options.textures { 0 } else { count };
 
     for (i, error) in decoded.iter().filter_map(|(i, r)| Some((i, r.as_ref().err()?))) {
         warn(format!("image {i} {error}: shown without it"));
@@ -69,7 +86,7 @@ pub(super) fn resolve(reader: &Reader, path: &Path, materials: &mut [Material], 
             }
         }
     }
-    textures
+    (textures, skipped)
 }
 
 fn image(reader: &Reader, path: &Path, index: usize) -> Result<DecodedImage, String> {

@@ -9,8 +9,9 @@ use super::mtl::{self, Map, MtlMaterial};
 use crate::error::{Error, Result};
 use crate::scene::load::find;
 use crate::scene::load::picture::{self, DecodedImage};
+use crate::scene::load::{ImagesDecoded, LoadOptions};
 use crate::scene::material::{AlphaMode, Material, MaterialKind, TextureSlot, Transmission};
-use crate::scene::{Filter, Scene, TexelData, Texture, Wrap};
+use crate::scene::{Filter, LoadReport, Scene, TexelData, Texture, Wrap};
 
 /// What faces without a (known) material look like: matte, a little darker than white.
 pub(super) fn grey(name: String) -> Material {
@@ -18,15 +19,20 @@ pub(super) fn grey(name: String) -> Material {
 }
 
 /// The materials of all libraries of a file, by name.
-#[derive(Default)]
-pub(super) struct MaterialLibrary {
+pub(super) struct MaterialLibrary<'a> {
+    options: LoadOptions<'a>,
     /// Indices into [`Scene::materials`].
     pub index: HashMap<String, usize>,
     pictures: HashMap<PathBuf, Option<DecodedImage>>,
     textures: HashMap<(PathBuf, Option<PathBuf>, bool), usize>,
 }
 
-impl MaterialLibrary {
+impl<'a> MaterialLibrary<'a> {
+    /// No material yet.
+    pub(super) fn new(options: LoadOptions<'a>) -> Self {
+        Self { options, index: HashMap::new(), pictures: HashMap::new(), textures: HashMap::new() }
+    }
+
     /// Reads the library `mtl` of the model `obj` and appends its materials and textures to `scene`.
     pub(super) fn read(&mut self, mtl: &Path, obj: &Path, scene: &mut Scene) -> Result<()> {
         let bytes = std::fs::read(mtl).map_err(|e| Error::read(mtl, &e))?;
@@ -82,7 +88,7 @@ impl MaterialLibrary {
     /// The texture of `color`, with its alpha from `alpha`. `None`, with a warning, if it cannot be read.
     fn slot(&mut self, color: Option<&Map>, alpha: Option<&Map>, beside: [&Path; 2], scene: &mut Scene) -> Option<TextureSlot> {
         let options = color.or(alpha)?;
-        let mut get = |map: Option<&Map>| map.and_then(|m| self.picture(m, beside, &mut scene.report.warnings));
+        let mut get = |map: Option<&Map>| map.and_then(|m| self.picture(m, beside, &mut scene.report));
         let (color, alpha) = (get(color), get(alpha));
         let path = color.as_ref().or(alpha.as_ref())?.0.clone();
         let key = (path.clone(), alpha.as_ref().map(|a| a.0.clone()), options.clamp);
@@ -104,7 +110,8 @@ impl MaterialLibrary {
         Some(TextureSlot { texture, texcoord: 0, transform: options.transform })
     }
 
-    fn picture(&mut self, map: &Map, beside: [&Path; 2], warnings: &mut Vec<String>) -> Option<(PathBuf, DecodedImage)> {
+    fn picture(&mut self, map: &Map, beside: [&Path; 2], report: &mut LoadReport) -> Option<(PathBuf, DecodedImage)> {
+        let warnings = &mut report.warnings;
         let path = match find::find(&map.file, &beside) {
             Ok(path) => path,
             Err(searched) => {
@@ -115,10 +122,17 @@ impl MaterialLibrary {
                 return None;
             }
         };
+        let (options, done) = (self.options, self.pictures.len() + 1);
         let picture = self.pictures.entry(path.clone()).or_insert_with(|| {
+            report.files.push(path.clone());
+            if !options.textures {
+                report.skipped_images += 1;
+                return None;
+            }
             let bytes = std::fs::read(&path).map_err(|e| Error::read(&path, &e).to_string());
             let name = path.to_string_lossy();
             let decoded = bytes.and_then(|b| picture::decode(&b, &name).map_err(|e| format!("{name} {e}")));
+            (options.progress)(ImagesDecoded { done, of: None });
             decoded.map_err(|e| warnings.push(format!("{e}: shown without it"))).ok()
         });
         picture.clone().map(|p| (path, p))

@@ -19,19 +19,22 @@ use glam::{DAffine3, Vec2, Vec3, Vec4};
 
 use parse::{Corner, Group, NONE, ObjFile};
 
-use super::find;
+use super::{LoadOptions, find};
 use crate::error::Result;
 use crate::scene::{Geometry, Instance, Material, Mesh, Scene, TriangleMesh};
 
 /// Reads an `.obj` file and the material libraries that it names.
-pub(super) fn read(path: &Path) -> Result<Scene> {
+pub(super) fn read(path: &Path, options: &LoadOptions) -> Result<Scene> {
     let mut file = parse::parse(path)?;
     let mut scene = Scene::default();
-    let mut materials = material::MaterialLibrary::default();
+    let mut materials = material::MaterialLibrary::new(*options);
     let mut complete = true;
     for name in std::mem::take(&mut file.libraries) {
         match find::find(&name, &[path]) {
-            Ok(mtl) => materials.read(&mtl, path, &mut scene)?,
+            Ok(mtl) => {
+                materials.read(&mtl, path, &mut scene)?;
+                scene.report.files.push(mtl);
+            }
             Err(searched) => {
                 complete = false;
                 let searched = find::list(&searched);
