@@ -86,11 +86,10 @@ if cargo fmt --version >/dev/null 2>&1; then
 fi
 if cargo clippy --version >/dev/null 2>&1; then
   say "lints"
-  # the program as it is released, the library alone, and the program without benchmarks
-  for features in "" "--no-default-features" "--no-default-features --features cli"; do
-    # shellcheck disable=SC2086 # words, or none
-    cargo clippy --locked $features --all-targets -- -D warnings
-  done
+  # the program as it is released with its tests, which are the same for all; the library alone; and the program without benchmarks and viewer
+  cargo clippy --locked --all-targets -- -D warnings
+  cargo clippy --locked --no-default-features --lib -- -D warnings
+  cargo clippy --locked --no-default-features --features cli --lib --bins -- -D warnings
 fi
 
 # rays of each set of the parity gate; a million otherwise
