@@ -5,9 +5,10 @@ use std::sync::Arc;
 use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT, Queryable};
 use skylit::renderer::RenderSettings;
+use skylit::renderer::interactive::Pick;
 use skylit::viewer::ViewOptions;
 use skylit::viewer::app::{App, Arrangement, Second};
-use skylit::viewer::request::{DeviceSummary, Event, EventSender, Mailbox, SceneSummary};
+use skylit::viewer::request::{DeviceSummary, Event, EventSender, Mailbox, PickPurpose, SceneSummary};
 
 /// The viewer without a renderer: what it requests goes to a mailbox, what it is told comes from the sender.
 struct Alone {
@@ -112,6 +113,28 @@ fn loading_shows_how_far_it_is_and_can_be_cancelled() {
     alone.harness.run_steps(2);
     assert!(alone.harness.query_by_label_contains("of 4 images").is_none());
     assert!(alone.harness.query_by_label_contains("loaded the images of large.glb").is_some());
+}
+
+#[test]
+fn long_names_leave_the_image_its_place() {
+    let mut alone = loaded();
+    let size = alone.mailbox.peek().size;
+    let long = "a_name_without_any_space_as_exporters_make_them_".repeat(4);
+    alone.click("Selection");
+    let pick = Pick {
+        position: glam::DVec3::ONE,
+        distance: 1.0,
+        instance: (0, long.clone()),
+        mesh: (0, long.clone()),
+        primitive: (0, 1),
+        material: (0, long.clone()),
+        textures: Vec::new(),
+    };
+    alone.events.send(Event::Picked(PickPurpose::Describe, Box::new(Some(pick))));
+    alone.events.send(Event::Warning(long.clone()));
+    alone.events.send(Event::Device(DeviceSummary { name: long, ..Default::default() }));
+    alone.harness.run_steps(5);
+    assert_eq!(alone.mailbox.peek().size, size);
 }
 
 #[test]

@@ -25,7 +25,8 @@ pub fn show(app: &mut App, context: &egui::Context) {
     egui::TopBottomPanel::top("menu").show(context, |ui| menu::show(app, ui));
     egui::TopBottomPanel::bottom("status").show(context, |ui| status::show(app, ui));
     if app.shows_panel {
-        egui::SidePanel::right("settings").default_width(300.0).min_width(240.0).show(context, |ui| {
+        let most = (0.6 * context.content_rect().width()).max(240.0);
+        egui::SidePanel::right("settings").default_width(300.0).min_width(240.0).max_width(most).show(context, |ui| {
             egui::ScrollArea::vertical().auto_shrink(false).show(ui, |ui| side::show(app, ui));
         });
     }

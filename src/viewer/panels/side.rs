@@ -391,7 +391,9 @@ fn selection(app: &App, ui: &mut Ui) {
     let name = |(index, name): &(usize, String)| if name.is_empty() { format!("{index}") } else { format!("{index} '{name}'") };
     let textures = app.scene.as_ref().map(|s| s.textures.as_slice()).unwrap_or_default();
     let textures: Vec<_> = pick.textures.iter().filter_map(|&t| textures.get(t).map(|n| format!("{t} '{n}'"))).collect();
-    egui::Grid::new("selection").num_columns(2).striped(true).show(ui, |ui| {
+    // names may be long: they are broken, and do not make the panel wider
+    let width = (ui.available_width() - 90.0).max(60.0);
+    egui::Grid::new("selection").num_columns(2).striped(true).max_col_width(width).show(ui, |ui| {
         let rows = [
             ("Position", format!("{:.4}, {:.4}, {:.4}", pick.position.x, pick.position.y, pick.position.z)),
             ("Distance", format!("{:.4}", pick.distance)),
@@ -403,7 +405,7 @@ fn selection(app: &App, ui: &mut Ui) {
         ];
         for (title, text) in rows {
             ui.label(title);
-            ui.label(text);
+            ui.add(egui::Label::new(text).wrap());
             ui.end_row();
         }
     });

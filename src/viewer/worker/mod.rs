@@ -255,8 +255,11 @@ impl Worker {
         let Some(open) = &mut self.open else { return Ok(()) };
         let tracer_reason = open.renderer.tracer_kind().1.to_owned();
         let loader = open.loader.as_ref();
+        // an animation of the scene before, until the window knows of this one
+        let animations = open.renderer.scene().rig.as_ref().map_or(0, |rig| rig.animations().len());
+        let animation = first.animation.filter(|k| *k < animations);
         let (mailbox, events) = (&self.mailbox, &self.events);
-        let interactive = match open.renderer.interactive(&first.lighting, first.animation) {
+        let interactive = match open.renderer.interactive(&first.lighting, animation) {
             Ok(interactive) => interactive,
             Err(e @ (Error::Usage(_) | Error::Input { .. })) => {
                 events.send(Event::Warning(e.to_string()));
