@@ -120,7 +120,6 @@ fn long_names_leave_the_image_its_place() {
     let mut alone = loaded();
     let size = alone.mailbox.peek().size;
     let long = "a_name_without_any_space_as_exporters_make_them_".repeat(4);
-    alone.click("Selection");
     let pick = Pick {
         position: glam::DVec3::ONE,
         distance: 1.0,
@@ -132,8 +131,9 @@ fn long_names_leave_the_image_its_place() {
     };
     alone.events.send(Event::Picked(PickPurpose::Describe, Box::new(Some(pick))));
     alone.events.send(Event::Warning(long.clone()));
-    alone.events.send(Event::Device(DeviceSummary { name: long, ..Default::default() }));
+    alone.events.send(Event::Device(DeviceSummary { name: long.clone(), ..Default::default() }));
     alone.harness.run_steps(5);
+    assert!(alone.harness.query_all_by_label_contains(&long).count() >= 3, "it is shown");
     assert_eq!(alone.mailbox.peek().size, size);
 }
 
