@@ -75,17 +75,6 @@ pub enum Dialog {
 
 impl Dialog {
     /// What is typed into it.
-    pub fn text(&self) -> &str {
-        match self {
-            Self::Open(text)
-            | Self::Save(text)
-            | Self::LoadSettings(text)
-            | Self::SaveSettings(text)
-            | Self::Render(text, _) => text,
-        }
-    }
-
-    /// The same, to be changed.
     pub fn text_mut(&mut self) -> &mut String {
         match self {
             Self::Open(text)

@@ -14,7 +14,7 @@ pub struct Browsing {
 
 impl Browsing {
     /// Opens the system's dialog for what `dialog` asks for. `wake` is called when it closes.
-    pub fn start(dialog: Dialog, wake: impl FnOnce() + Send + 'static) -> Self {
+    pub fn start(mut dialog: Dialog, wake: impl FnOnce() + Send + 'static) -> Self {
         let (title, kinds): (_, &[(&str, &[&str])]) = match &dialog {
             Dialog::Open(_) => ("Open a scene", &[("Scenes", &["gltf", "glb", "obj", "brhan"])]),
             Dialog::Save(_) => ("Save the image", &[("Image as shown", &["png"]), ("All channels", &["exr"])]),
@@ -22,7 +22,7 @@ impl Browsing {
             Dialog::SaveSettings(_) => ("Save settings", &[("Settings", &["json"])]),
             Dialog::Render(..) => ("Render this view", &[("Images", &["png", "exr", "apng"])]),
         };
-        let name = dialog.text().to_owned();
+        let name = dialog.text_mut().clone();
         let saves = matches!(dialog, Dialog::Save(_) | Dialog::SaveSettings(_) | Dialog::Render(..));
         let (sender, chosen) = channel();
         std::thread::spawn(move || {

@@ -62,9 +62,13 @@ pub fn show(app: &mut App, context: &Context) {
     app.shows_help = open;
     if let Some(Poll::Ready(chosen)) = app.browsing.as_ref().map(Browsing::poll) {
         app.browsing = None;
-        if let Some(dialog) = chosen {
-            app.dialog = None;
-            act(app, dialog);
+        match chosen {
+            Some(dialog) => {
+                app.dialog = None;
+                act(app, dialog);
+            }
+            // also where there is neither a portal nor zenity
+            None => app.report("no file was chosen; a path can be typed", false),
         }
     }
     if let Some(dialog) = app.dialog.clone() {
