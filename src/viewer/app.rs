@@ -392,9 +392,10 @@ impl App {
 
     fn loaded(&mut self, summary: SceneSummary) {
         let is_same = self.scene.as_ref().is_some_and(|s| s.source == summary.source);
-        let what = match (summary.is_complete, self.loaded == summary.load) {
-            (true, true) => format!("loaded the images of {}", summary.source),
-            (_, _) => format!("loaded {}: {} primitives in {:.2} s", summary.source, summary.primitives, summary.seconds),
+        let lacked_images = self.scene.as_ref().is_some_and(|s| s.load == summary.load && !s.is_complete);
+        let what = match lacked_images && summary.is_complete {
+            true => format!("loaded the images of {}", summary.source),
+            false => format!("loaded {}: {} primitives in {:.2} s", summary.source, summary.primitives, summary.seconds),
         };
         self.report(what, false);
         super::recent::add(&mut self.recent, &summary.source);
