@@ -5,14 +5,15 @@
 #   ./scripts/test.sh [--full] [FILTER]      FILTER: only tests whose name contains it
 #
 # --full, before a release: every scene of the reference renderer (docs/mitsuba.md) on every tracer and driver and with the validation layer, every device test on
-# the floor driver, every tracer for every test of paths, with the validation layer, and a million rays a scene in the parity gate.
+# the floor driver, every tracer for every test of paths, with the validation layer, a million rays a scene in the parity gate, and reports in a browser (scripts/report.sh installs one).
 # Without it the other tracers and the floor driver render the scenes in which they differ from the compute tracer, and a test of paths takes one tracer. Both do
 # without the layer, which all other tests have, and one that compiles kernels of all features. The parity gate has a quarter of the rays. The floor driver leaves
 # out tests of code that knows no driver: how paths are shaded (tests/path), what frames show (tests/realtime, but for those that compare tracers), and the
-# program from outside (tests/cli, but for the program's own device tests).
+# program from outside (tests/cli, but for the program's own device tests). Reference frames (tests/frames, docs/ci.md) are rendered on both drivers.
 #
-# Tests run a process each, but for those of tracers, stills and paths: they run as threads of a process for each subject, so that they share a device and its
-# pipelines. On a CPU driver compiling pipelines is most of what they cost.
+# Tests run a process each, but for those of tracers, stills and paths, and all on the floor driver: they run as threads of a process for each subject, so that they
+# share a device and its pipelines. On a CPU driver compiling pipelines is most of what they cost. Those processes run side by side, one more than there are
+# cores, the longest first: tests that share a device wait for each other.
 #
 # SKYLIT_EXPECT_TRACERS  tracers that must run; a missing one fails instead of being skipped. Set here for lavapipe; set it
 #                        yourself for another device, or to nothing to skip what it lacks.
@@ -23,8 +24,8 @@ if [ "${1:-}" = --full ]; then full=1 && shift; fi
 filter=${1:-}
 # read by tests/mitsuba
 if [ -n "$full" ]; then export SKYLIT_FULL=1; fi
-# binaries whose tests share a device
-shared=(tracer ao path mitsuba)
+# binaries whose tests share a device, longest first
+shared=(path tracer mitsuba ao)
 
 say() { printf 'test: %s\n' "$*"; }
 
@@ -45,28 +46,65 @@ run_alone() {
   return "$status"
 }
 
-# run_shared LABEL BINARY... -- [NAME...]: tests of these binaries whose names contain one of the NAMEs; all without. The binaries run side by side: tests that
-# share a device wait for each other's submissions. What they print appears when they have ended.
-run_shared() {
-  local label=$1 status=0 binaries=() binary
-  shift
-  while [ "$1" != -- ]; do binaries+=("$1") && shift; done
-  cargo test --locked --no-run "${binaries[@]/#/--test=}"
-  say "${binaries[*]}, side by side"
-  # a process group for each, so that all of it can be ended
-  set -m
-  for binary in "${binaries[@]}"; do
-    cargo test --locked --test="$binary" "$@" > "$log.$binary" 2>&1 && echo ok > "$log.$binary.ok" &
+# The processes that run_queue runs: the driver and the binary of each, and the names of its tests, separated by spaces (none: all tests).
+queue=()
+# enqueue DRIVER BINARY [NAME...]: DRIVER is default or floor
+enqueue() { queue+=("$*"); }
+
+# run_entry DRIVER BINARY [NAME...]: one process, whose tests have one of the NAMEs in theirs
+run_entry() {
+  local driver=$1 binary=$2
+  shift 2
+  if [ "$driver" = floor ]; then
+    export VK_DRIVER_FILES=$floor VK_ICD_FILENAMES=$floor SKYLIT_EXPECT_TRACERS=compute SKYLIT_REQUIRE_DRIVER=22.3.6
+    # rounding is the driver's, and fewer rays show what it does
+    if [ -z "$full" ]; then export SKYLIT_PARITY_RAYS=100000; fi
+  fi
+  cargo test --locked --test="$binary" -- "$@"
+}
+
+# run_queue: what was enqueued. What a process prints appears when all have ended.
+run_queue() {
+  local entry driver binary names status=0 k=0 binaries=()
+  for entry in "${queue[@]}"; do
+    read -r driver binary names <<< "$entry"
+    binaries+=("--test=$binary")
   done
-  set +m
+  cargo test --locked --no-run "${binaries[@]}"
+  for entry in "${queue[@]}"; do
+    # processes end in any order
+    while [ "$(jobs -pr | wc -l)" -gt "$(nproc)" ]; do wait -n || true; done
+    read -r driver binary names <<< "$entry"
+    say "$binary, $driver driver"
+    # a process group for each, so that all of it can be ended
+    set -m
+    # the names are words
+    # shellcheck disable=SC2086
+    { run_entry "$driver" "$binary" $names > "$log.$k" 2>&1 && echo ok > "$log.$k.ok"; } &
+    set +m
+    k=$((k + 1))
+  done
   wait
-  for binary in "${binaries[@]}"; do
-    cat "$log.$binary"
-    if [ ! -f "$log.$binary.ok" ]; then status=1; fi
+  k=0
+  for entry in "${queue[@]}"; do
+    read -r driver binary names <<< "$entry"
+    cat "$log.$k"
+    if [ ! -f "$log.$k.ok" ]; then status=1; fi
+    cp "$log.$k" "$log"
+    keep_summary "$driver driver, $binary"
+    k=$((k + 1))
   done
-  cat "${binaries[@]/#/$log.}" > "$log"
   rm -f "$log".*
-  keep_summary "$label"
+  return "$status"
+}
+
+# run_frames DRIVER [VARIABLE=VALUE...]: the project's own reference frames
+run_frames() {
+  local driver=$1 status=0
+  shift
+  say "reference frames, $driver driver"
+  env "$@" "${CARGO_TARGET_DIR:-target}/debug/skylit" verify tests/frames 2>&1 | tee "$log" || status=$?
+  grep -E '^[0-9]+ renders?:' "$log" | sed "s/^/test: $driver driver, frames: /" >> "$summaries" || true
   return "$status"
 }
 
@@ -95,35 +133,52 @@ fi
 # rays of each set of the parity gate; a million otherwise
 if [ -z "$full" ]; then export SKYLIT_PARITY_RAYS=${SKYLIT_PARITY_RAYS-250000}; fi
 
-say "tests on the default driver"
+floor=${SKYLIT_DRIVERS_DIR:-$PWD/target/drivers}/mesa-22.3.6/lvp_icd.json
+if [ ! -f "$floor" ]; then
+  say "no floor driver here (setup.sh unpacks it on Debian 12): its tests are left out"
+  floor=
+fi
+
 export SKYLIT_EXPECT_TRACERS=${SKYLIT_EXPECT_TRACERS-pipeline,query,compute}
 status=0
 if cargo nextest --version >/dev/null 2>&1; then
+  say "tests that run alone"
   others=$(printf ' - binary(%s)' "${shared[@]}")
   run_alone "default driver" -E "all()$others" ${filter:+"$filter"} || status=1
-  run_shared "default driver" "${shared[@]}" -- ${filter:+"$filter"} || status=1
-  if [ -z "$filter" ]; then run_documentation || status=1; fi
+  # their floor driver's part is as long as that of the default driver: enqueued next to each other
+  for binary in "${shared[@]}"; do
+    # shellcheck disable=SC2086
+    enqueue default "$binary" $filter
+    if [ -n "$floor" ] && { [ "$binary" != path ] || [ -n "$full$filter" ]; }; then enqueue floor "$binary" "${filter:-gpu_}"; fi
+  done
 else
+  say "tests on the default driver"
   cargo test --locked --no-fail-fast -- ${filter:+"$filter"} 2>&1 | tee "$log" || status=1
   keep_summary "default driver"
+  for binary in "${shared[@]}"; do if [ -n "$floor" ]; then enqueue floor "$binary" "${filter:-gpu_}"; fi; done
+fi
+if [ -n "$floor" ]; then
+  enqueue floor raster "${filter:-gpu_}"
+  if [ -n "$filter$full" ]; then
+    for binary in realtime cli renderer; do enqueue floor "$binary" "${filter:-gpu_}"; done
+  else
+    enqueue floor realtime tracers:: program::gpu_
+    enqueue floor cli tracers:: program::gpu_
+  fi
+fi
+say "tests that share a device"
+if [ "${#queue[@]}" -gt 0 ]; then run_queue || status=1; fi
+if [ -z "$filter" ]; then
+  cargo build --locked --features probes
+  run_frames default || status=1
+  if [ -n "$floor" ]; then run_frames floor "VK_DRIVER_FILES=$floor" "VK_ICD_FILENAMES=$floor" || status=1; fi
+  run_documentation || status=1
 fi
 
-floor=${SKYLIT_DRIVERS_DIR:-$PWD/target/drivers}/mesa-22.3.6/lvp_icd.json
-if [ -f "$floor" ]; then
-  say "device tests on the floor driver, $floor"
-  export VK_DRIVER_FILES=$floor VK_ICD_FILENAMES=$floor SKYLIT_EXPECT_TRACERS=compute SKYLIT_REQUIRE_DRIVER=22.3.6
-  if [ -n "$filter" ]; then
-    run_shared "floor driver" "${shared[@]}" realtime raster cli -- "$filter" || status=1
-  elif [ -n "$full" ]; then
-    run_shared "floor driver" "${shared[@]}" realtime raster cli renderer -- gpu_ || status=1
-  else
-    # rounding is the driver's, and fewer rays show what it does
-    export SKYLIT_PARITY_RAYS=100000
-    run_shared "floor driver" tracer ao mitsuba raster -- gpu_ || status=1
-    run_shared "floor driver" realtime cli -- tracers:: program::gpu_ || status=1
-  fi
-else
-  say "no floor driver here (setup.sh unpacks it on Debian 12): its tests are left out"
+if [ -n "$full" ] && [ -z "$filter" ]; then
+  say "reports in a browser"
+  cargo build --locked
+  ./scripts/report.sh "${CARGO_TARGET_DIR:-target}/debug/skylit" || status=1
 fi
 
 cat "$summaries"

@@ -19,10 +19,13 @@ float arc(float cos_n, float n, float h) {
     return 0.25 * (cos_n + 2.0 * h * sin(n) - cos(2.0 * h - n));
 }
 
-// Weight of an occluder at a distance.
-float weight(FrameParams f, float d) {
+// Weight of an occluder. delta: from the pixel's point, camera space.
+float weight(FrameParams f, GtaoParams g, vec3 delta) {
+    // the depth image shows the fronts of occluders, of which nobody knows how far they reach behind (the thin-occluder heuristic of XeGTAO)
+    delta.z *= 1.0 + g.thinness;
+    float d = length(delta) / g.radius_scale;
     // the binary radius gets a soft edge: depth images are too coarse for a sharp one
-    float edge = f.reach < INFINITY ? clamp((f.reach - d) / (0.2 * f.reach), 0.0, 1.0) : 1.0;
+    float edge = f.reach < INFINITY ? clamp((f.reach - d) / (g.fade * f.reach), 0.0, 1.0) : 1.0;
     return edge * occlusion_at(f.falloff_log2, d);
 }
 
@@ -49,7 +52,7 @@ void main() {
     vec3 normal = linear(f.world_to_camera, uintBitsToFloat(Quads(f.surface).v[2u * at + 1u].xyz));
     // perpendicular to the view ray
     vec3 right = normalize(vec3(v.z, 0.0, -v.x)), up = cross(v, right);
-    float radius = f.reach / footprint(f, f.view, orthographic, depth);
+    float radius = g.radius_scale * f.reach / footprint(f, f.view, orthographic, depth);
     vec2 u = sequence_2d(f.sequence, f.seed, pixel, f.frame, 0u, 1u);
     float accessibility = 0.0, open = 0.0;
     for (uint slice = 0u; slice < g.slices; slice++) {
@@ -74,7 +77,7 @@ void main() {
             float search = min(radius, to_border(f, centre, sgn * along));
             for (uint k = 0u; k < g.steps; k++) {
                 float s = (float(k) + u.y) / float(g.steps);
-                vec2 q = centre + sgn * along * max(s * s * search, MIN_STEP + float(k));
+                vec2 q = centre + sgn * along * max(pow(s, g.step_exponent) * search, MIN_STEP + float(k));
                 if (any(lessThan(q, vec2(0.0))) || any(greaterThanEqual(q, vec2(f.size)))) break;
                 uvec2 tap = uvec2(q);
                 float there = uintBitsToFloat(Pairs(f.guide).v[image_index(f, tap)].x);
@@ -83,7 +86,7 @@ void main() {
                 float d = length(delta);
                 // what lies in the surface's own plane is no horizon: a pixel's middle is beside the slice, where a slanting plane is higher
                 if (dot(delta, normal) <= MIN_RISE * d) continue;
-                horizon = max(horizon, mix(low, dot(delta, v) / d, weight(f, d)));
+                horizon = max(horizon, mix(low, dot(delta, v) / d, weight(f, g, delta)));
             }
             float h = sgn * acos(clamp(horizon, -1.0, 1.0));
             // not below the surface
@@ -94,6 +97,6 @@ void main() {
         open += size * (cos_n + n * sin(n));
     }
     // of what these slices would be without anything in them, which a few are not evenly
-    accessibility = open > 0.0 ? clamp(accessibility / open, 0.0, 1.0) : 1.0;
+    accessibility = open > 0.0 ? pow(clamp(accessibility / open, 0.0, 1.0), g.visibility_exponent) : 1.0;
     STORE_PAIR(g.current, at, pack_estimate(Estimate(accessibility, 1.0, 0.0)));
 }

@@ -1,32 +1,6 @@
 // path_camera: one camera ray per sample, and the first vertex of each path (shaders/path/path.glsl).
-#include "interface/pixel_filter.glsl"
+#include "common/pixel_filter.glsl"
 #include "path/path.glsl"
-
-const float BLACKMAN_HARRIS_RADIUS = 1.5;
-
-// Share of Blackman and Harris' window (four terms) below x, which goes over it from 0 to 1.
-float blackman_harris_share(float x) {
-    const float TURN = 6.28318530718;
-    float s1 = on_circle(x).y, s2 = on_circle(fract(2.0 * x)).y, s3 = on_circle(fract(3.0 * x)).y;
-    return x + (-0.48829 * s1 + 0.5 * 0.14128 * s2 - 0.01168 / 3.0 * s3) / (0.35875 * TURN);
-}
-
-// Offset from the centre of a pixel, distributed as the filter.
-float filter_offset(uint pixel_filter, float u) {
-    if (!WITH_PIXEL_FILTER) return u - 0.5;
-    if (pixel_filter == FILTER_TENT) return u < 0.5 ? sqrt(2.0 * u) - 1.0 : 1.0 - sqrt(2.0 - 2.0 * u);
-    if (pixel_filter == FILTER_BLACKMAN_HARRIS) {
-        // the share grows with x: halve to the last bit that matters
-        float low = 0.0, high = 1.0;
-        for (int k = 0; k < 20; k++) {
-            float middle = 0.5 * (low + high);
-            if (blackman_harris_share(middle) < u) low = middle;
-            else high = middle;
-        }
-        return (low + high - 1.0) * BLACKMAN_HARRIS_RADIUS;
-    }
-    return u - 0.5;
-}
 
 // Where a ray through a lens starts, and where it goes: to the point that the ray through the lens' middle meets in the plane of focus.
 Ray lens_ray(BlockParams p, Ray r, vec2 u) {
@@ -44,9 +18,8 @@ Ray camera_sample(BlockParams p, uint index) {
     uvec2 pixel = block_pixel(p, pixel_index(index));
     if (!in_block(p, pixel)) return no_ray();
     pixel += p.block_origin;
-    PathParams path = PathParams(p.path);
     vec2 u = sample_2d(p.seed, pixel, sample_index(index), CAMERA_FILM);
-    Ray r = camera_ray(p, vec2(pixel) + 0.5 + vec2(filter_offset(path.pixel_filter, u.x), filter_offset(path.pixel_filter, u.y)));
+    Ray r = camera_ray(p, vec2(pixel) + 0.5 + (WITH_PIXEL_FILTER ? filter_offset(p.pixel_filter, u) : u - 0.5));
     if (HAS_COVERAGE) r.tmin = tmin_of_seed(ray_seed(p.seed, pixel, sample_index(index), 0u));
     if (WITH_LENS) return lens_ray(p, r, sample_2d(p.seed, pixel, sample_index(index), CAMERA_LENS));
     return r;

@@ -2,6 +2,7 @@
 // there is appended to the queue (ao/sample.glsl). A sample without a hit has no further cost.
 #include "ao/hemisphere.glsl"
 #include "ao/sample.glsl"
+#include "common/pixel_filter.glsl"
 #include "common/warp.glsl"
 
 // The index is that of the block.
@@ -9,7 +10,9 @@ Ray camera_sample(BlockParams p, uint index) {
     uvec2 pixel = block_pixel(p, pixel_index(index));
     if (!in_block(p, pixel)) return no_ray();
     pixel += p.block_origin;
-    return camera_ray(p, vec2(pixel) + sample_2d(p.seed, pixel, sample_index(index), CAMERA_FILM));
+    vec2 u = sample_2d(p.seed, pixel, sample_index(index), CAMERA_FILM);
+    if (p.pixel_filter != FILTER_BOX) u = 0.5 + filter_offset(p.pixel_filter, u);
+    return camera_ray(p, vec2(pixel) + u);
 }
 
 Ray ray(uint index) {

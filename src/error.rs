@@ -47,6 +47,10 @@ pub enum Error {
     #[error("the Vulkan device was lost: {0}")]
     DeviceLost(String),
 
+    /// A check that skylit was asked to make could not be made (`skylit verify` without a manifest, a frame that could not be rendered).
+    #[error("{0}")]
+    NotVerified(String),
+
     /// Any other Vulkan call that failed; `validation` messages end here too.
     #[error("Vulkan: {0}")]
     Vulkan(String),
@@ -65,7 +69,7 @@ impl Error {
     pub fn exit_code(&self) -> u8 {
         match self {
             Error::CheckFailed(_) | Error::Vulkan(_) => 1,
-            Error::Device(_) => 2,
+            Error::Device(_) | Error::NotVerified(_) => 2,
             Error::Input { .. } | Error::Scene(_) => 3,
             Error::Output { .. } => 4,
             Error::OutOfMemory(_) => 5,

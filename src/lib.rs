@@ -32,6 +32,8 @@ pub mod bench;
 #[cfg(feature = "cli")]
 pub mod cli;
 pub mod colour;
+#[cfg(feature = "compare")]
+pub mod compare;
 pub mod denoise;
 pub mod error;
 pub mod files;
@@ -47,6 +49,8 @@ pub mod raster;
 pub mod ray;
 pub mod realtime;
 pub mod renderer;
+#[cfg(feature = "report")]
+pub mod report;
 pub mod sampling;
 pub mod scene;
 pub mod settings;
@@ -54,6 +58,8 @@ pub mod shaders;
 #[cfg(feature = "cli")]
 pub mod terminal;
 pub mod tracer;
+#[cfg(feature = "verify")]
+pub mod verify;
 #[cfg(feature = "viewer")]
 pub mod viewer;
 

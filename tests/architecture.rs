@@ -26,7 +26,8 @@ const LAYERS: &[&[&str]] = &[
     &["denoise"],
     &["renderer"],
     &["terminal"],
-    &["bench", "viewer"],
+    &["report"],
+    &["bench", "compare", "verify", "viewer"],
     &["cli"],
 ];
 
@@ -56,7 +57,6 @@ fn files(folder: &str, extensions: &[&str]) -> Vec<PathBuf> {
 /// A path from the crate's root that a file names outside of documentation and of what only tests compile.
 struct Import {
     file: PathBuf,
-    line: usize,
     /// Of the module that names it: `["scene", "load"]`.
     from: Vec<String>,
     to: Vec<String>,
@@ -87,7 +87,7 @@ struct Imports<'a> {
 
 impl Imports<'_> {
     /// A path as written; kept if it starts with `crate` or `super`.
-    fn add(&mut self, line: usize, path: &[String]) {
+    fn add(&mut self, path: &[String]) {
         let up = path.iter().take_while(|n| *n == "super").count();
         let to = match path.first().map(String::as_str) {
             Some("crate") => path[1..].to_vec(),
@@ -97,7 +97,7 @@ impl Imports<'_> {
             }
             _ => return,
         };
-        self.found.push(Import { file: self.file.to_owned(), line, from: self.module.clone(), to });
+        self.found.push(Import { file: self.file.to_owned(), from: self.module.clone(), to });
     }
 
     fn add_tree(&mut self, tree: &UseTree, path: &mut Vec<String>) {
@@ -105,7 +105,7 @@ impl Imports<'_> {
             path.push(name.to_string());
             match below {
                 Some(below) => this.add_tree(below, path),
-                None => this.add(name.span().start().line, path),
+                None => this.add(path),
             }
             path.pop();
         };
@@ -113,23 +113,22 @@ impl Imports<'_> {
             UseTree::Path(p) => end(self, &p.ident, Some(&p.tree)),
             UseTree::Name(n) => end(self, &n.ident, None),
             UseTree::Rename(r) => end(self, &r.ident, None),
-            UseTree::Glob(g) => self.add(g.star_token.spans[0].start().line, path),
+            UseTree::Glob(_) => self.add(path),
             UseTree::Group(g) => g.items.iter().for_each(|t| self.add_tree(t, path)),
         }
     }
 
     /// Paths in the text that a macro is given.
     fn add_tokens(&mut self, tokens: TokenStream) {
-        let (mut path, mut line): (Vec<String>, usize) = (Vec::new(), 0);
+        let mut path: Vec<String> = Vec::new();
         // `a::b`: names that follow each other but for two colons
         let mut colons = 0;
         for token in tokens {
             match token {
                 TokenTree::Ident(name) => {
                     if colons != 2 {
-                        self.add(line, &path);
+                        self.add(&path);
                         path.clear();
-                        line = name.span().start().line;
                     }
                     path.push(name.to_string());
                     colons = 0;
@@ -142,7 +141,7 @@ impl Imports<'_> {
                 _ => colons = 0,
             }
         }
-        self.add(line, &path);
+        self.add(&path);
     }
 }
 
@@ -172,7 +171,7 @@ impl<'ast> Visit<'ast> for Imports<'_> {
 
     fn visit_path(&mut self, path: &'ast syn::Path) {
         let names: Vec<String> = path.segments.iter().map(|s| s.ident.to_string()).collect();
-        self.add(path.segments[0].ident.span().start().line, &names);
+        self.add(&names);
         visit::visit_path(self, path);
     }
 
@@ -224,7 +223,8 @@ fn imports_point_downwards() {
         uses.entry((layer(from), from)).or_default().insert(to);
         if layer(to) >= layer(from) {
             let file = import.file.strip_prefix(root()).unwrap().display();
-            wrong.push(format!("{file}:{}: `{from}` uses `{to}`, which does not stand below it", import.line));
+            let name = import.to.join("::");
+            wrong.push(format!("{file}: `{from}` uses `{to}`, which does not stand below it: crate::{name}"));
         }
     }
     for ((_, room), used) in uses.iter().rev() {
@@ -267,7 +267,8 @@ fn folders_have_no_circles() {
         let [from, to] = [folder_of(&import.from), folder_of(&import.to)];
         let common = from.iter().zip(&to).take_while(|(a, b)| a == b).count();
         if common < from.len() && common < to.len() {
-            let place = format!("{}:{}", import.file.strip_prefix(root()).unwrap().display(), import.line);
+            let file = import.file.strip_prefix(root()).unwrap().display();
+            let place = format!("{file}: crate::{}", import.to.join("::"));
             edges.entry(from[..=common].to_vec()).or_default().entry(to[..=common].to_vec()).or_insert(place);
         }
     }
@@ -317,7 +318,6 @@ fn imports_are_found() {
         mod tests { use crate::n; }
     ";
     let found = imports_of(&root().join("src/x/y.rs"), text);
-    let found: Vec<(usize, String)> = found.into_iter().map(|i| (i.line, i.to.join("::"))).collect();
-    let expected = [(3, "b::c"), (3, "d::self"), (3, "d::E"), (5, "h::i"), (5, "j::K"), (5, "l::m")];
-    assert_eq!(found, expected.map(|(line, path)| (line, path.to_owned())));
+    let found: Vec<String> = found.into_iter().map(|i| i.to.join("::")).collect();
+    assert_eq!(found, ["b::c", "d::self", "d::E", "h::i", "j::K", "l::m"]);
 }

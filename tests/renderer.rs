@@ -6,6 +6,7 @@ use std::time::Instant;
 
 use common::{assert_validation_clean, device, tracers};
 use skylit::film::NoControl;
+use skylit::measure::comparison::{CompareOptions, compare};
 use skylit::output::{Image, Samples};
 use skylit::renderer::{RenderSettings, Renderer};
 use skylit::scene::builtin;
@@ -50,6 +51,27 @@ fn gpu_one_renderer_makes_the_images_of_many() {
             assert!(bits(&image) == bits(&alone.unwrap().image), "{kind}: {integrator}");
             assert_eq!(image.metadata("integrator"), Some(integrator));
         }
+    }
+    assert_validation_clean(&device);
+}
+
+/// Frames in real time have their samples at the centres of pixels, stills all over them: one filter makes them comparable.
+#[test]
+fn gpu_a_still_of_pixel_centres_is_the_image_that_frames_approach() {
+    let device = device();
+    for kind in tracers(&device) {
+        let mut renderer = Renderer::new(device.clone(), builtin::by_name("stairs").unwrap(), &choice(kind)).unwrap();
+        let mut image = |json: serde_json::Value| renderer.image(&settings(json), &mut NoControl).unwrap();
+        let frame = image(serde_json::json!({ "image": { "size": [64, 48] }, "frames": { "preset": "reference" } }));
+        let mut rmse = |filter: &str| {
+            let still = image(serde_json::json!({ "image": { "size": [64, 48], "spp": 256, "pixel_filter": filter } }));
+            assert_eq!(still.metadata("pixel_filter"), Some(filter));
+            compare(&frame, &still, &CompareOptions::default()).unwrap().rmse
+        };
+        let (centre, wide) = (rmse("centre"), rmse("box"));
+        println!("{kind}: RMSE of a frame against a still of pixel centres {centre:.5}, of a box filter {wide:.5}");
+        assert_eq!(frame.metadata("pixel_filter"), Some("centre"));
+        assert!(centre < 0.015 && wide > 2.0 * centre, "{kind}: {centre} {wide}");
     }
     assert_validation_clean(&device);
 }

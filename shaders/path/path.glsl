@@ -7,6 +7,7 @@
 #include "path/lights.glsl"
 #include "path/media.glsl"
 #include "path/view.glsl"
+#include "path/ambient.glsl"
 
 // Dimensions of the sampler (src/sampling/sobol.rs), in pairs: vertex n begins at PATH_FIRST + n * PATH_STRIDE.
 const uint BSDF_DIRECTION = 0u;
@@ -92,6 +93,14 @@ vec3 transmittance(uint medium, float length_) {
     return mix(exp(-depth * length_), vec3(1.0), equal(depth, vec3(0.0)));
 }
 
+// Ambient light at the first surface of a path: the ray whose length is the distance up to which this sample counts hits, and its contribution.
+void add_ambient_light(BlockParams block, PathParams p, uint k, PathState state, Surface s, Shading m, float log_side, uvec2 pixel, uint n) {
+    vec3 c = state.throughput * p.ambient_color * ambient_reflectance(s, m, log_side);
+    if (!(highest(c) > 0.0)) return;
+    uint slot = append_ray(p.ambient, ambient_ray(block, s, m.ng, pixel, n), k);
+    store_quad(p.ambient_contributions, slot, vec4(counted_radiance(p, c, state.depth + 1u), 0.0));
+}
+
 // Next-event estimation: a shadow ray to a light, and its contribution.
 void sample_direct_light(BlockParams block, PathParams p, uint k, PathState state, Surface s, Shading m, vec3 wo, uint beyond, uvec2 pixel, uint n, uint dimension) {
     dimension += LIGHT_POINT_ON;
@@ -159,6 +168,7 @@ vec3 path_vertex(BlockParams block, uint k, PathState state, Ray ray, Hit hit) {
             else light = LightRecords(p.lights).v[p.environment_light].probability * map_pdf(p.map, ray.direction);
         }
         vec3 c = environment_radiance(p, ray.direction) * emission_weight(p, state, light);
+        if (WITH_BACKGROUND_ONLY && state.depth > 0u) c = vec3(0.0);
         if (WITH_DISTANT_DISKS) c += disks_met(p, state, ray.direction);
         return counted_radiance(p, state.throughput * c, state.depth);
     }
@@ -209,6 +219,9 @@ vec3 path_vertex(BlockParams block, uint k, PathState state, Ray ray, Hit hit) {
         if (abs(boundary.eta - 1.0) < MIN_REFRACTION) m.bsdf.facets.alpha = vec2(0.0);
     }
     if (m.bsdf.kind == BSDF_NONE) return added;
+    uvec2 pixel = block_pixel(block, pixel_index(state.index)) + block.block_origin;
+    uint n = sample_index(state.index), dimension = PATH_FIRST + (state.depth + state.passes) * PATH_STRIDE;
+    if (WITH_AMBIENT && state.depth == 0u) add_ambient_light(block, p, k, state, s, m, log_side, pixel, n);
     if (state.depth >= p.max_depth) {
         // walls that light goes straight through are no bounces
         if (WITH_CLEAR_WALLS) {
@@ -223,8 +236,6 @@ vec3 path_vertex(BlockParams block, uint k, PathState state, Ray ray, Hit hit) {
 
     vec3 wo = to_frame(m.frame, towards_viewer);
     wo.z = max(wo.z, LEAST_COSINE);
-    uvec2 pixel = block_pixel(block, pixel_index(state.index)) + block.block_origin;
-    uint n = sample_index(state.index), dimension = PATH_FIRST + (state.depth + state.passes) * PATH_STRIDE;
     if (WITH_LIGHT_SAMPLES && has_rough_part(m.bsdf)) {
         sample_direct_light(block, p, k, state, s, m, wo, boundary.medium, pixel, n, dimension);
     }

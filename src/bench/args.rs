@@ -5,6 +5,7 @@ use clap::{Args, Subcommand};
 use super::ao::BenchAoArgs;
 use super::path::BenchPathArgs;
 use super::rays::BenchRaysArgs;
+use super::report::BenchReportArgs;
 
 /// `skylit bench`.
 #[derive(Clone, Debug, Args)]
@@ -23,4 +24,6 @@ pub enum Benchmark {
     Ao(Box<BenchAoArgs>),
     /// Path tracing: error over time of each sampling strategy and peer, by scene
     Path(Box<BenchPathArgs>),
+    /// Show, plot and compare saved JSON records of the benchmarks without measuring anything
+    Report(BenchReportArgs),
 }

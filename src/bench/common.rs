@@ -1,18 +1,23 @@
 //! Arguments shared by all benchmarks: time limit, device and outputs.
 
 use std::io::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use clap::{Args, ValueHint};
+use serde::Serialize;
 
-use super::plot::chart::Picture;
-use super::record::BenchRecord;
+use super::baseline::BaselineReport;
+use super::page;
+use super::plot;
+use super::plot::picture::{self, PlotFormat};
+use super::record::{BenchKind, BenchRecord};
+use super::report::ReportedRecord;
 use crate::error::{Error, Result};
 use crate::files;
-use crate::output;
+use crate::report;
 use crate::settings::parse::parse_seconds;
-use crate::terminal::console::Console;
+use crate::terminal::console::{Console, command_line};
 
 /// Options of `skylit bench` that do not depend on what is measured.
 #[derive(Clone, Debug, Args)]
@@ -29,21 +34,35 @@ pub struct CommonArgs {
     /// Run with the Vulkan validation layer (slower); any message from it fails the run
     #[arg(long)]
     pub validation: bool,
-    /// Print one JSON record on stdout instead of text; with =FILE, also write it to that file
-    #[arg(long, value_name = "FILE", num_args = 0..=1, require_equals = true, value_hint = ValueHint::FilePath)]
-    pub json: Option<Option<PathBuf>>,
+    /// Compare with an earlier JSON record of this benchmark; anything that is worse beyond noise is named and fails the run
+    #[arg(long, value_name = "FILE.json", value_hint = ValueHint::FilePath)]
+    pub baseline: Option<PathBuf>,
     /// Also write a CSV table, one row per result
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub csv: Option<PathBuf>,
+    /// Outputs that saved records have as well
+    #[command(flatten)]
+    pub outputs: OutputArgs,
+}
+
+/// Outputs of a benchmark, and of `skylit bench report`.
+#[derive(Clone, Debug, Args)]
+pub struct OutputArgs {
+    /// Print one JSON record on stdout instead of text; with a FILE, which ends in .json or follows an =, write it there instead
+    #[arg(long, value_name = "FILE", num_args = 0..=1, require_equals = true, value_hint = ValueHint::FilePath)]
+    pub json: Option<Option<PathBuf>>,
     /// Also plot the results
-    #[arg(long, value_name = "FILE.png", value_hint = ValueHint::FilePath)]
+    #[arg(long, value_name = "FILE.png|.svg", value_hint = ValueHint::FilePath)]
     pub plot: Option<PathBuf>,
+    /// Write a report into this folder: a page that needs no network, with charts, tables, host and notes
+    #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath)]
+    pub html: Option<PathBuf>,
     /// Print nothing but errors
     #[arg(long, short)]
     pub quiet: bool,
 }
 
-impl CommonArgs {
+impl OutputArgs {
     /// The console with these options.
     pub fn console(&self) -> Console {
         Console { json: self.json == Some(None), quiet: self.quiet }
@@ -54,43 +73,80 @@ impl CommonArgs {
         self.json.as_ref()?.as_ref()
     }
 
-    /// Every file that will be written.
-    pub fn outputs(&self) -> impl Iterator<Item = &PathBuf> {
-        self.json_file().into_iter().chain(&self.csv).chain(&self.plot)
-    }
-
-    /// Validates the arguments and checks that every output file can be written.
+    /// Checks that every output file can be written, before anything that takes long.
     ///
     /// # Errors
-    /// [`Error::Usage`]; those of [`files::check_writable`].
+    /// [`Error::Usage`] for a format of plots that there is not; those of [`files::check_writable`].
     pub fn check(&self) -> Result<()> {
-        match &self.plot {
-            Some(p) if p.extension().is_none_or(|e| !e.eq_ignore_ascii_case("png")) => {
-                Err(Error::Usage(format!("--plot {}: the name must end in .png", p.display())))
-            }
-            _ => self.outputs().try_for_each(|path| files::check_writable(path)),
-        }
+        self.plot.as_ref().map_or(Ok(()), |path| PlotFormat::of(path).map(drop))?;
+        self.html.as_ref().map_or(Ok(()), |dir| std::fs::create_dir_all(dir).map_err(|e| Error::write(dir, &e)))?;
+        self.json_file().into_iter().chain(&self.plot).try_for_each(|path| files::check_writable(path))
     }
 
-    /// Writes the requested files; one that cannot be written does not prevent the others.
+    /// Writes the JSON record, if a file is given for it.
+    ///
+    /// # Errors
+    /// [`Error::Output`].
+    pub fn write_json(&self, value: &impl Serialize) -> Result<()> {
+        let Some(path) = self.json_file() else { return Ok(()) };
+        let text = serde_json::to_string_pretty(value)
+            .map_err(|e| Error::CheckFailed(format!("cannot express the result as JSON: {e}")))?;
+        files::write_atomically(path, |f| f.write_all(text.as_bytes()).and_then(|()| f.write_all(b"\n")))
+    }
+
+    /// Writes the plot and the page of records, if they are asked for; a plot that cannot be written does not prevent the page. Returns the address of the page.
+    ///
+    /// # Errors
+    /// Those of [`picture::write`] and of [`report::write`], the first of them.
+    pub fn write_pictures(&self, records: &[ReportedRecord]) -> Result<Option<String>> {
+        let plot = self.plot.as_ref().map_or(Ok(()), |path| picture::write(path, &plot::of_all(records)));
+        let write =
+            |dir: &PathBuf| report::write(dir, &page::page(records, &command_line())).map(|index| report::address(&index));
+        let address = self.html.as_ref().map(write).transpose();
+        plot.and(address)
+    }
+}
+
+/// A record as JSON: with the benchmark that it is of, and how it compares with its baseline.
+#[derive(Serialize)]
+pub struct JsonRecord<'a, R> {
+    /// Which benchmark.
+    pub benchmark: BenchKind,
+    /// What was measured.
+    #[serde(flatten)]
+    pub record: &'a R,
+    /// The comparison with an earlier record.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub baseline: Option<&'a BaselineReport>,
+    /// Address of the page.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub report: Option<String>,
+}
+
+impl CommonArgs {
+    /// The console with these options.
+    pub fn console(&self) -> Console {
+        self.outputs.console()
+    }
+
+    /// Checks the arguments before anything that takes long.
+    ///
+    /// # Errors
+    /// Those of [`OutputArgs::check`], for the CSV table too.
+    pub fn check(&self) -> Result<()> {
+        self.outputs.check()?;
+        self.csv.as_deref().map_or(Ok(()), files::check_writable)
+    }
+
+    /// Writes the JSON record and the CSV table, if they are asked for; one that cannot be written does not prevent the other.
     ///
     /// # Errors
     /// The first error.
-    pub fn write(&self, record: &impl BenchRecord, picture: impl Fn() -> Result<Picture>) -> Result<()> {
-        let json = self.json_file().map_or(Ok(()), |path| {
-            let text = serde_json::to_string_pretty(record)
-                .map_err(|e| Error::CheckFailed(format!("cannot express the result as JSON: {e}")))?;
-            files::write_atomically(path, |f| f.write_all(text.as_bytes()).and_then(|()| f.write_all(b"\n")))
-        });
-        let csv = self
-            .csv
-            .as_ref()
-            .map_or(Ok(()), |path| files::write_atomically(path, |f| record.write_csv(f).map_err(std::io::Error::other)));
-        let plot = self.plot.as_ref().map_or(Ok(()), |path| {
-            let picture = picture()?;
-            output::png::write_rgb(path, &picture.rgb, picture.width, picture.height)
-        });
-        json.and(csv).and(plot)
+    pub fn write_tables<R: BenchRecord>(&self, json: &JsonRecord<R>) -> Result<()> {
+        let write_csv =
+            |path: &Path| files::write_atomically(path, |f| json.record.write_csv(f).map_err(std::io::Error::other));
+        let csv = self.csv.as_deref().map_or(Ok(()), write_csv);
+        self.outputs.write_json(json).and(csv)
     }
 
     /// The `given` value, or the default, or with `--quick` the `quick` default.

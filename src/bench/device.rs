@@ -7,6 +7,7 @@ use super::record::HostInfo;
 use crate::accel::flatten::FlatScene;
 use crate::error::Result;
 use crate::gpu::{Device, DeviceInfo, Options};
+use crate::terminal::console::one_line;
 use crate::tracer::{BuildOptions, ComputeOptions, Needs, Tracer, TracerKind};
 
 /// An open device.
@@ -35,6 +36,7 @@ impl BenchDevice {
             version: env!("CARGO_PKG_VERSION").to_owned(),
             device: self.device.info.name.clone(),
             driver: self.device.info.driver.clone(),
+            cpu: cpu_name(),
             threads: std::thread::available_parallelism().map_or(1, usize::from),
         }
     }
@@ -65,4 +67,13 @@ impl BenchDevice {
         }
         valid
     }
+}
+
+/// Name of the host's processor, as the kernel says it; empty where it does not.
+fn cpu_name() -> String {
+    let text = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+    // "model name" on x86; boards with other processors say "Hardware" or "Model" at best
+    let value =
+        |key: &str| text.lines().filter_map(|l| l.split_once(':')).find(|(k, _)| k.trim() == key).map(|(_, v)| one_line(v));
+    ["model name", "Hardware", "Model", "cpu model"].into_iter().find_map(value).unwrap_or_default()
 }

@@ -1,20 +1,23 @@
 //! `skylit bench`: how fast skylit's tracers are, beside each other and beside those of others; and how fast and how good its
 //! real-time ambient occlusion and its path tracing are.
 //!
-//! Each benchmark is a folder: `rays`, `ao`, `path`. What they share is beside them: `record` holds what they find, `plot` and `table`
-//! show it, `peers` runs the programs of others, `scenes` knows the well-known scenes, `session` is a run
-//! under way, and `device` alone opens the device and builds tracers.
+//! Each benchmark is a folder: `rays`, `ao`, `path`. What they share is beside them: `record` holds what they find, `table`, `plot` and `page` show it, `baseline`
+//! compares it with an earlier run, `report` does so with records that were saved, `peers` runs the programs of others, `scenes` knows the well-known scenes,
+//! `session` is a run under way, and `device` alone opens the device and builds tracers.
 
 mod ao;
 mod args;
+mod baseline;
 mod common;
 mod device;
+mod page;
 mod path;
 mod peers;
-mod plot;
+pub(crate) mod plot;
 mod rays;
 mod record;
 mod reference;
+mod report;
 mod scenes;
 mod session;
 mod table;
@@ -23,7 +26,7 @@ pub use args::BenchArgs;
 
 use crate::terminal::console::Failure;
 
-/// Runs a benchmark.
+/// Runs a benchmark, or reports what was measured.
 ///
 /// # Errors
 /// Those of the benchmark; what was measured before is written all the same.
@@ -32,5 +35,6 @@ pub fn run(args: &BenchArgs) -> Result<(), Failure> {
         args::Benchmark::Rays(args) => rays::run(args),
         args::Benchmark::Ao(args) => ao::run(args),
         args::Benchmark::Path(args) => path::run(args),
+        args::Benchmark::Report(args) => report::run(args),
     }
 }

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use glam::DVec3;
 
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::film::camera::Choice;
 use crate::scene::{Camera, builtin, load};
 
@@ -161,8 +161,11 @@ impl SceneList {
 /// Fails for a scene that is not there, or that no built-in scene becomes with its parameter, without loading those that are.
 ///
 /// # Errors
-/// Those of [`load::load`].
+/// Those of [`load::load`]; [`Error::Usage`] for a JSON file, which is no scene: whoever names one wants the record there.
 pub fn check_exists(source: &str) -> Result<()> {
+    if Path::new(source).extension().is_some_and(|e| e.eq_ignore_ascii_case("json")) {
+        return Err(Error::Usage(format!("{source}: a JSON file is no scene; to write the record there, use --json={source}")));
+    }
     let made = builtin::exists(source.strip_prefix("builtin:").unwrap_or(source));
     if made || (Path::new(source).exists() && !source.starts_with("builtin:")) {
         return Ok(());

@@ -2,12 +2,14 @@
 
 use std::time::Instant;
 
-use super::common::CommonArgs;
+use super::baseline::{Baseline, BaselineReport};
+use super::common::{CommonArgs, JsonRecord};
 use super::device::BenchDevice;
 use super::peers::file::PeerSpec;
 use super::peers::process::{Peer, PeerError};
-use super::plot::chart::Picture;
 use super::record::BenchRecord;
+use super::report::{ReportedRecord, show_address};
+use super::table::{self, Block};
 use crate::error::{Error, Result};
 use crate::scene::Scene;
 use crate::terminal::console::{Console, Failure, one_line};
@@ -32,6 +34,7 @@ pub struct Session<'a, A, R> {
     pub record: R,
     common: &'a CommonArgs,
     console: Console,
+    baseline: Option<Baseline>,
     start: Instant,
     /// Jobs that are done, and all of them.
     jobs: (u64, u64),
@@ -40,19 +43,33 @@ pub struct Session<'a, A, R> {
 }
 
 impl<'a, A, R: BenchRecord> Session<'a, A, R> {
-    /// Opens the device. `record` makes the record that is filled.
+    /// Opens the device. `record` makes the record that is filled: it has the settings already, which have to be those of the baseline.
     ///
     /// # Errors
-    /// Those of [`CommonArgs::check`] and of [`BenchDevice::open`].
+    /// Those of [`CommonArgs::check`], of [`Baseline::read`] and [`Baseline::check`], and of [`BenchDevice::open`].
     pub fn start(args: &'a A, common: &'a CommonArgs, record: impl FnOnce(&BenchDevice) -> R) -> Result<Self> {
         let start = Instant::now();
         common.check()?;
+        let baseline = common.baseline.as_deref().map(Baseline::read).transpose()?;
         interrupt::install();
         let console = common.console();
         let device = BenchDevice::open(common)?;
         let control = ProgressControl { progress: Progress::new("measuring", &console), keep_partial: false };
         let record = record(&device);
-        Ok(Self { args, device, peers: Vec::new(), control, record, common, console, start, jobs: (0, 1), failure: None })
+        baseline.as_ref().map_or(Ok(()), |b| b.check(&record.snapshot()))?;
+        Ok(Self {
+            args,
+            device,
+            peers: Vec::new(),
+            control,
+            record,
+            common,
+            console,
+            baseline,
+            start,
+            jobs: (0, 1),
+            failure: None,
+        })
     }
 
     /// Starts peers; those that do not start are left out with a note, and so are all where `specs` says why there are none.
@@ -137,12 +154,12 @@ impl<'a, A, R: BenchRecord> Session<'a, A, R> {
         self.record.completeness().stopped_early = true;
     }
 
-    /// Shows lines of the result.
+    /// Shows a part of the result.
     ///
     /// # Errors
     /// When stdout cannot be written.
-    pub fn lines(&self, lines: &[String]) -> Result<()> {
-        self.control.progress.suspend(|| lines.iter().try_for_each(|line| self.console.line(line)))
+    pub fn show(&self, blocks: &[Block]) -> Result<()> {
+        self.control.progress.suspend(|| table::lines(blocks).iter().try_for_each(|line| self.console.line(line)))
     }
 
     /// Says what is done from here on.
@@ -172,23 +189,23 @@ impl<'a, A, R: BenchRecord> Session<'a, A, R> {
         self.is_late() && !self.record.is_empty()
     }
 
-    /// Writes and prints what was measured, whatever went wrong. `scenes_named`: a scene that failed fails the run even if another one did
+    /// Writes and prints what was measured, whatever went wrong, and compares it with the baseline. `scenes_named`: a scene that failed fails the run even if another one did
     /// not; `checked`: what follows from the record itself.
     ///
     /// # Errors
     /// The first that went wrong.
-    pub fn finish(
-        self,
-        measured: Result<()>,
-        scenes_named: bool,
-        checked: Result<()>,
-        draw: impl Fn(&R) -> Result<Picture>,
-    ) -> Result<(), Failure> {
-        let Self { mut record, device, common, console, failure, control, peers, .. } = self;
+    pub fn finish(self, measured: Result<()>, scenes_named: bool, checked: Result<()>) -> Result<(), Failure> {
+        let Self { mut record, device, common, console, failure, control, peers, baseline, .. } = self;
         // before anything is printed
         drop((control, peers));
         let valid = device.close(measured.is_ok());
-        let written = if record.is_empty() { Ok(()) } else { common.write(&record, || draw(&record)) };
+        let compared = baseline.filter(|_| !record.is_empty()).map(|b| b.compare(&record.snapshot()));
+        let shown = compared
+            .as_ref()
+            .map_or(Ok(()), |report| table::lines(&report.blocks()).iter().try_for_each(|line| console.line(line)));
+        if let Some(report) = &compared {
+            report.warnings.iter().for_each(|w| console.warning(w));
+        }
         let complete = match failure {
             Some(e) if record.is_empty() || scenes_named => Err(e),
             _ if record.is_empty() => {
@@ -197,7 +214,18 @@ impl<'a, A, R: BenchRecord> Session<'a, A, R> {
             }
             _ => Ok(()),
         };
-        console.close(&record, measured.and(valid).and(written).and(complete).and(checked))
+        let saved = record.saved();
+        let kind = saved.kind();
+        let file = common.outputs.json_file().cloned().unwrap_or_else(|| "this run".into());
+        let reported = ReportedRecord { file, record: saved, baseline: compared };
+        let pictures =
+            if record.is_empty() { Ok(None) } else { common.outputs.write_pictures(std::slice::from_ref(&reported)) };
+        let (report, drawn) = show_address(pictures, console);
+        let baseline = reported.baseline.as_ref();
+        let json = JsonRecord { benchmark: kind, record: &record, baseline, report };
+        let written = if record.is_empty() { Ok(()) } else { common.write_tables(&json).and(drawn) };
+        let holds = baseline.map_or(Ok(()), BaselineReport::verdict);
+        console.close(&json, measured.and(valid).and(written).and(complete).and(checked).and(shown).and(holds))
     }
 }
 

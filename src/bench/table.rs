@@ -1,7 +1,44 @@
-//! Tables in plain text.
+//! Tables, for the terminal and for pages.
+
+/// A part of what a benchmark says.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Block {
+    /// A line of its own; an empty one is a gap in the terminal.
+    Line(String),
+    /// A table whose first row has the titles, with so many columns to the left and the others to the right.
+    Table {
+        /// What it shows; pages have it above the table, the terminal does not.
+        title: &'static str,
+        /// All rows.
+        rows: Vec<Vec<String>>,
+        /// Columns to the left.
+        left: usize,
+    },
+}
+
+impl Block {
+    /// A line.
+    pub fn line(text: impl Into<String>) -> Self {
+        Self::Line(text.into())
+    }
+
+    /// A gap.
+    pub fn gap() -> Self {
+        Self::Line(String::new())
+    }
+}
+
+/// Blocks as lines of text.
+pub fn lines(blocks: &[Block]) -> Vec<String> {
+    let of = |block: &Block| match block {
+        Block::Line(text) => vec![text.clone()],
+        Block::Table { rows, left, .. } => indented(rows, *left).collect(),
+    };
+    blocks.iter().flat_map(of).collect()
+}
 
 /// Lines of a table: the first `left` columns to the left, the others to the right.
-pub fn align(rows: &[Vec<String>], left: usize) -> Vec<String> {
+fn align(rows: &[Vec<String>], left: usize) -> Vec<String> {
     let columns = rows.iter().map(Vec::len).max().unwrap_or(0);
     let width: Vec<usize> =
         (0..columns).map(|c| rows.iter().filter_map(|r| r.get(c)).map(|t| t.chars().count()).max().unwrap_or(0)).collect();
@@ -13,7 +50,7 @@ pub fn align(rows: &[Vec<String>], left: usize) -> Vec<String> {
 }
 
 /// The same, two spaces to the right.
-pub fn indented(rows: &[Vec<String>], left: usize) -> impl Iterator<Item = String> {
+fn indented(rows: &[Vec<String>], left: usize) -> impl Iterator<Item = String> {
     align(rows, left).into_iter().map(|line| format!("  {line}"))
 }
 

@@ -2,16 +2,23 @@
 //! an exit code of [`EXIT_CODES`].
 
 mod args;
+#[cfg(feature = "compare")]
+mod compare;
+#[cfg(feature = "compare")]
+mod compare_ao;
 mod diff;
 mod doctor;
 mod export;
 mod rays;
 mod render;
 mod scenes;
+#[cfg(feature = "verify")]
+mod verify;
 #[cfg(feature = "viewer")]
 mod view;
 
 use std::ffi::OsString;
+use std::path::Path;
 use std::process::ExitCode;
 use std::time::Instant;
 
@@ -19,6 +26,7 @@ use clap::Parser;
 use clap::error::ErrorKind;
 
 use crate::error::{Error, Result};
+use crate::settings::parse::usage_message;
 use crate::terminal::console::{Failure, one_line};
 use crate::terminal::{console, panic};
 
@@ -27,7 +35,8 @@ pub const EXIT_CODES: &str = "\
 Exit codes:
   0    done
   1    a check did not hold (images differ, validation messages), or a Vulkan call failed
-  2    no Vulkan loader, no device, or one that lacks a requirement (see `skylit doctor`); no Open Image Denoise
+  2    no Vulkan loader, no device, or one that lacks a requirement (see `skylit doctor`); no Open Image Denoise;
+       `verify` could not render or judge a frame
   3    an input file is missing or broken, or the scene cannot be rendered
   4    an output file cannot be written; nothing half-written is left
   5    out of memory
@@ -58,8 +67,14 @@ enum Command {
     Scenes(args::ScenesArgs),
     /// Show the Vulkan devices, what each tracer requires and supports, and which one `auto` chooses
     Doctor(args::DoctorArgs),
-    /// Compare two images by error metrics
+    /// Check whether two images agree
     Diff(args::DiffArgs),
+    /// Compare images, or renders made on the spot, with a reference: metrics, difference pictures, an HTML report
+    #[cfg(feature = "compare")]
+    Compare(Box<compare::CompareArgs>),
+    /// Render the frames of a manifest and compare each with its golden image: for continuous integration
+    #[cfg(feature = "verify")]
+    Verify(Box<verify::VerifyArgs>),
     /// Benchmark ray throughput against other ray tracers, and cost and quality of real-time ambient occlusion
     #[cfg(feature = "bench")]
     Bench(crate::bench::BenchArgs),
@@ -73,6 +88,7 @@ pub fn run() -> ExitCode {
 fn run_from(arguments: Vec<OsString>) -> ExitCode {
     let start = Instant::now();
     // before parsing: usage errors must be reported as JSON, too
+    let arguments = with_json_file(arguments);
     let json = arguments.iter().any(|a| a == "--json");
     panic::install();
     let outcome = panic::catch(|| match Cli::try_parse_from(with_view(arguments)) {
@@ -110,6 +126,21 @@ fn with_view(mut arguments: Vec<OsString>) -> Vec<OsString> {
     arguments
 }
 
+/// `skylit bench ... --json FILE.json` means `--json=FILE.json`: elsewhere what follows `--json` is a scene, but no scene's name ends in .json. Those of records
+/// do: `skylit bench report` reads them.
+fn with_json_file(mut arguments: Vec<OsString>) -> Vec<OsString> {
+    if arguments.get(1).is_some_and(|a| a == "bench") && arguments.get(2).is_none_or(|a| a != "report") {
+        let is_file = |name: &OsString| Path::new(name).extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
+        let end = arguments.iter().position(|a| a == "--").unwrap_or(arguments.len());
+        if let Some(k) = (2..end.saturating_sub(1)).find(|&k| arguments[k] == "--json" && is_file(&arguments[k + 1])) {
+            let file = arguments.remove(k + 1);
+            arguments[k].push("=");
+            arguments[k].push(file);
+        }
+    }
+    arguments
+}
+
 fn dispatch(command: Command, start: Instant) -> Result<(), Failure> {
     match command {
         Command::Render(args) => return render::run(&args, start),
@@ -120,6 +151,10 @@ fn dispatch(command: Command, start: Instant) -> Result<(), Failure> {
         Command::Scenes(args) => scenes::run(&args),
         Command::Doctor(args) => doctor::run(&args),
         Command::Diff(args) => return diff::run(&args),
+        #[cfg(feature = "compare")]
+        Command::Compare(args) => return compare::run(&args, start),
+        #[cfg(feature = "verify")]
+        Command::Verify(args) => return verify::run(&args),
         #[cfg(feature = "bench")]
         Command::Bench(args) => return crate::bench::run(&args),
     }
@@ -133,12 +168,7 @@ fn explain(error: &clap::Error) -> Result<()> {
         ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand => {
             Err(Error::Usage("no command given; `skylit --help` lists the commands".into()))
         }
-        _ => {
-            let text = error.render().to_string();
-            let lines = text.lines().map(str::trim).take_while(|l| !l.starts_with("Usage:") && !l.starts_with("For more"));
-            let words = lines.filter(|l| !l.is_empty()).collect::<Vec<_>>().join(" ");
-            Err(Error::Usage(words.trim_start_matches("error: ").to_owned()))
-        }
+        _ => Err(Error::Usage(usage_message(error))),
     }
 }
 
@@ -163,6 +193,25 @@ mod tests {
         assert_eq!(of("skylit no/such/file.glb --tracer compute")[1..3], ["view", "no/such/file.glb"]);
         for line in ["skylit render a.glb", "skylit --help", "skylit stairs", "skylit doctor"] {
             assert_eq!(of(line).join(" "), line);
+        }
+    }
+
+    #[test]
+    fn a_json_file_needs_no_equals_sign() {
+        let of = |line: &str| -> String {
+            let words = line.split(' ').map(OsString::from).collect();
+            with_json_file(words).iter().map(|w| w.to_string_lossy()).collect::<Vec<_>>().join(" ")
+        };
+        assert_eq!(of("skylit bench ao --json a.json scene.glb"), "skylit bench ao --json=a.json scene.glb");
+        assert_eq!(of("skylit bench rays --json dir/A.JSON"), "skylit bench rays --json=dir/A.JSON");
+        let same = [
+            "skylit bench ao --json scene.glb",
+            "skylit bench ao a.json",
+            "skylit bench ao --json",
+            "skylit diff --json a.json b.png",
+        ];
+        for line in same {
+            assert_eq!(of(line), line);
         }
     }
 

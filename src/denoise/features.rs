@@ -137,7 +137,7 @@ impl Features {
 /// points may belong to either.
 fn reach(filter: PixelFilter) -> usize {
     let beyond = match filter {
-        PixelFilter::Box => 0.0,
+        PixelFilter::Box | PixelFilter::Centre => 0.0,
         PixelFilter::Tent => 0.5,
         PixelFilter::BlackmanHarris => 1.0,
     };

@@ -20,7 +20,7 @@ use crate::gpu::{Buffer, Commands, Device, Memory, Timing};
 use crate::tracer::{Push, Tracer};
 
 /// Log2 of the maximum number of samples per pixel in a launch. Samples of a pixel are neighbouring rays, which are coherent.
-const MAX_SAMPLE_BITS: u32 = 4;
+pub(crate) const MAX_SAMPLE_BITS: u32 = 4;
 
 /// Evaluates samples of pixels on the device: the device side of an integrator.
 pub(crate) trait Estimator {

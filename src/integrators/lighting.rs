@@ -19,7 +19,7 @@ const LIT: AppliesTo = AppliesTo::stills_of(Capability::SceneLights);
 
 settings! {
     /// Light besides the scene's.
-    "Light (--integrator path, direct, whitted)"
+    "Light (--integrator path, direct, lit, whitted)"
     pub struct LightingSettings {
         /// Environment light: an equirectangular map (.hdr, .exr), or a constant radiance R,G,B [default: the scene's]
         environment: Option<String>, option(value_name = "FILE|R,G,B"), applies(LIT);

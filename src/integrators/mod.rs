@@ -22,6 +22,7 @@ use crate::film::accumulate::Accumulated;
 use crate::film::camera::CameraRecord;
 use crate::film::schedule::FilmOptions;
 use crate::film::tile_mask::TileMask;
+use crate::interface::PixelFilter;
 use crate::output::Image;
 use crate::output::tone_map::ToneMap;
 use crate::ray::Ray;
@@ -35,6 +36,7 @@ pub static ALL: &[&dyn Integrator] = &[
     &ao::AmbientOcclusion,
     &path::kinds::PATH,
     &path::kinds::DIRECT,
+    &path::kinds::LIT,
     &path::kinds::WHITTED,
     &path::kinds::AO_SKY,
     &path::kinds::NORMALS,
@@ -75,6 +77,8 @@ pub struct RenderJob<'a> {
     pub spp: u32,
     /// Seed of the sampler.
     pub seed: u32,
+    /// Pixel reconstruction filter.
+    pub pixel_filter: PixelFilter,
     /// Settings of integrators.
     pub settings: &'a IntegratorSettings,
     /// Stop after this time and keep the image so far.
@@ -296,12 +300,12 @@ mod tests {
             "ao": { "ao_radius": 1.0, "ao_falloff": 2.0, "ao_normal": "shading" },
             "path": {
                 "max_depth": 1, "min_depth": 1, "rr_depth": 1, "firefly_clamp": 1.0, "sampling": "bsdf", "energy_compensation": true, "sky_albedo": 0.1,
-                "denoise": "filter", "pixel_filter": "tent", "texture_filter": "ray-cone", "f_number": 1.0, "focus_distance": 1.0
+                "ambient": [1.0, 1.0, 1.0], "environment_light": "ambient", "denoise": "filter", "texture_filter": "ray-cone", "f_number": 1.0, "focus_distance": 1.0
             }
         });
         let settings: IntegratorSettings = serde_json::from_value(every).unwrap();
         let given = settings.given();
-        assert!(given.len() >= 14);
+        assert!(given.len() >= 15);
         for setting in given {
             assert!(capabilities().iter().any(|i| setting.applies.includes(i)), "{}", setting.name);
         }

@@ -162,6 +162,8 @@ choices! {
         Tent = "tent", "FILTER_TENT";
         /// Blackman-Harris filter of radius 1.5
         BlackmanHarris = "blackman-harris", "FILTER_BLACKMAN_HARRIS";
+        /// No filter: every sample at the centre of the pixel, as of frames in real time
+        Centre = "centre", "FILTER_CENTRE";
     }
 
     /// Sampler of ray directions: a sequence of points in the unit square for each pixel, continued from frame to frame.
@@ -220,5 +222,12 @@ choices! {
         Motion = "motion", "SHOWN_MOTION";
         /// BVH nodes that camera rays visit, as a heat map; needs `--tracer compute`
         Nodes = "nodes", "SHOWN_NODES";
+    }
+}
+
+impl PixelFilter {
+    /// Returns true if samples lie within their pixel, so that it sees only what projects into its area.
+    pub fn is_within_pixel(self) -> bool {
+        matches!(self, Self::Box | Self::Centre)
     }
 }

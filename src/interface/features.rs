@@ -174,6 +174,8 @@ feature_set! {
     Media = "WITH_MEDIA", "volumes that absorb or nest";
     ClearWalls = "WITH_CLEAR_WALLS", "thin walls that light passes straight";
     SpecularOnly = "WITH_SPECULAR_ONLY", "paths of delta lobes only";
+    Ambient = "WITH_AMBIENT", "ambient light";
+    BackgroundOnly = "WITH_BACKGROUND_ONLY", "an environment that lights no surface";
 }
 
 feature_set! {

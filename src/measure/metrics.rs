@@ -34,7 +34,7 @@ impl<'a> ImagePair<'a> {
     }
 
     /// All counted pairs of values.
-    fn values(&self) -> impl Iterator<Item = (f64, f64)> + '_ {
+    pub(super) fn values(&self) -> impl Iterator<Item = (f64, f64)> + '_ {
         let counts = move |i: usize| self.coverage.is_none_or(|c| c[i / self.channels] > 0.0);
         let pairs = self.image.iter().zip(self.reference).enumerate();
         pairs.filter(move |(i, _)| counts(*i)).map(|(_, (a, b))| (*a as f64, *b as f64))
@@ -73,6 +73,41 @@ impl<'a> ImagePair<'a> {
     /// Mean of image - reference.
     pub fn bias(&self) -> f64 {
         self.guarded(self.mean(|a, b| a - b))
+    }
+
+    /// Mean of the absolute difference.
+    pub fn mae(&self) -> f64 {
+        self.guarded(self.mean(|a, b| (a - b).abs()))
+    }
+
+    /// Standard error of [`ImagePair::bias`], were pixels independent: the standard deviation of the pixels' mean differences over the root of their number. NaN for
+    /// fewer than two pixels.
+    pub fn bias_standard_error(&self) -> f64 {
+        let counts = |i: &usize| self.coverage.is_none_or(|c| c[*i] > 0.0);
+        let pixel = |values: &[f32], i: usize| {
+            let values = &values[i * self.channels..(i + 1) * self.channels];
+            values.iter().map(|v| f64::from(*v)).sum::<f64>() / self.channels as f64
+        };
+        let differences =
+            || (0..self.image.len() / self.channels).filter(counts).map(|i| pixel(self.image, i) - pixel(self.reference, i));
+        let n = differences().count() as f64;
+        let mean = differences().sum::<f64>() / n;
+        let squares: f64 = differences().map(|d| (d - mean).powi(2)).sum();
+        self.guarded((squares / (n - 1.0) / n).sqrt())
+    }
+
+    /// Percentiles of the absolute difference, by linear interpolation between ranks, of `shares` from 0 to 1; NaN for no pixels.
+    pub fn percentiles<const N: usize>(&self, shares: [f64; N]) -> [f64; N] {
+        let mut differences: Vec<f64> = self.values().map(|(a, b)| (a - b).abs()).collect();
+        differences.sort_by(f64::total_cmp);
+        shares.map(|share| self.guarded(super::stats::percentile_of_sorted(&differences, share).unwrap_or(f64::NAN)))
+    }
+
+    /// Mean of one value a pixel over the pixels that count; NaN for none.
+    pub fn mean_of(&self, map: &[f32]) -> f64 {
+        let counted = map.iter().enumerate().filter(|(i, _)| self.coverage.is_none_or(|c| c[*i] > 0.0));
+        let (sum, count) = counted.fold((0.0, 0u64), |(sum, n), (_, &e)| (sum + f64::from(e), n + 1));
+        sum / count as f64
     }
 
     /// Greatest absolute difference; 0 for no pixels.

@@ -1,11 +1,16 @@
-//! Images or hits in, numbers out: [`metrics`] of two images, [`flip`] for how different they look, [`temporal`] for what of the past is
-//! left in a sequence of them, [`parity`] of two tracers over [`ray_sets`], [`agreement`] of the answers of two; and [`stats`] of what
+//! Images or hits in, numbers out: [`comparison`] of two images by all metrics: those of pairs of values ([`metrics`]), [`ssim`], [`flip`] for how different they look, over the pixels of a [`mask`]; [`temporal`] for what of the past is
+//! left in a sequence of them, [`z_test`] for whether noise explains the difference, [`parity`] of two tracers over [`ray_sets`], [`agreement`] of the answers of two; and [`stats`] of what
 //! was measured several times.
 
 pub mod agreement;
+pub mod comparison;
+pub mod distributions;
 pub mod flip;
+pub mod mask;
 pub mod metrics;
 pub mod parity;
 pub mod ray_sets;
+pub mod ssim;
 pub mod stats;
 pub mod temporal;
+pub mod z_test;

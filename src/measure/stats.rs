@@ -1,15 +1,35 @@
 //! Statistics of repeated measurements.
 
-use serde::Serialize;
+use serde::{Deserialize, Deserializer, Serialize};
+
+/// For serde: a number, or NaN for null. JSON has no numbers that are not finite, and writes them as null.
+///
+/// # Errors
+/// Those of the format.
+pub fn number_or_nan<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
+    Ok(Option::deserialize(deserializer)?.unwrap_or(f64::NAN))
+}
+
+/// The same for a list of numbers.
+///
+/// # Errors
+/// Those of the format.
+pub fn numbers_or_nan<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<f64>, D::Error> {
+    let values: Vec<Option<f64>> = Vec::deserialize(deserializer)?;
+    Ok(values.into_iter().map(|v| v.unwrap_or(f64::NAN)).collect())
+}
 
 /// Median, minimum and maximum of some values, in their unit.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Summary {
     /// Middle value; the mean of the two in the middle of an even number.
+    #[serde(deserialize_with = "number_or_nan")]
     pub median: f64,
     /// Minimum.
+    #[serde(deserialize_with = "number_or_nan")]
     pub min: f64,
     /// Maximum.
+    #[serde(deserialize_with = "number_or_nan")]
     pub max: f64,
 }
 
@@ -23,22 +43,43 @@ impl Summary {
     }
 }
 
-/// Median and 95th percentile of some values, in their unit.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct MedianP95 {
-    /// Middle value.
+/// Median and percentiles of repeated measurements, in their unit. Percentiles are by nearest rank: values that occurred.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Percentiles {
+    /// Middle value; the mean of the two in the middle of an even number.
     pub median: f64,
-    /// The 95th percentile, by nearest rank: a value that occurred.
+    /// The 95th percentile.
     pub p95: f64,
+    /// The 5th percentile.
+    #[serde(default)]
+    pub p5: f64,
+    /// The 25th percentile.
+    #[serde(default)]
+    pub p25: f64,
+    /// The 75th percentile.
+    #[serde(default)]
+    pub p75: f64,
+    /// Number of values; 0 where it is unknown.
+    #[serde(default)]
+    pub count: usize,
 }
 
-impl MedianP95 {
+impl Percentiles {
     /// Summarizes values; `None` for no values.
     pub fn of(values: &[f64]) -> Option<Self> {
         let mut sorted = values.to_vec();
         sorted.sort_by(f64::total_cmp);
-        let rank = (sorted.len() * 19).div_ceil(20).checked_sub(1)?;
-        Some(Self { median: middle(&sorted), p95: sorted[rank] })
+        let n = sorted.len();
+        let rank = |percent: usize| Some(sorted[(n * percent).div_ceil(100).checked_sub(1)?]);
+        Some(Self { p5: rank(5)?, p25: rank(25)?, median: middle(&sorted), p75: rank(75)?, p95: rank(95)?, count: n })
+    }
+
+    /// Standard error of the median of independent values, estimated from the quartiles, which values far out do not move: for normally distributed
+    /// values the interquartile range is 1.349 standard deviations, and the median's standard error sqrt(pi / 2) times that of the mean. `None` for fewer
+    /// than two values, which tell nothing of it.
+    pub fn standard_error(&self) -> Option<f64> {
+        let deviation = (self.p75 - self.p25) / 1.349;
+        (self.count > 1).then(|| std::f64::consts::FRAC_PI_2.sqrt() * deviation / (self.count as f64).sqrt())
     }
 }
 
@@ -51,6 +92,11 @@ pub fn median(values: &[f64]) -> Option<f64> {
 pub fn percentile(values: &[f64], share: f64) -> Option<f64> {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
+    percentile_of_sorted(&sorted, share)
+}
+
+/// As [`percentile`], of values in ascending order.
+pub fn percentile_of_sorted(sorted: &[f64], share: f64) -> Option<f64> {
     let at = share.clamp(0.0, 1.0) * sorted.len().checked_sub(1)? as f64;
     let (low, high) = (sorted[at.floor() as usize], sorted[at.ceil() as usize]);
     Some(low + (high - low) * at.fract())
@@ -74,7 +120,7 @@ pub fn paired_ratio(seconds: &[f64], work: f64, baseline: &[f64], baseline_work:
 ///
 /// A tracer that visits a constant number of nodes a level has rate proportional to 1 / log n. From points (n, rate), in any
 /// order, it takes `rate(n) * ln(n)`, relative to that of the smallest `n`: at least 1 where the rate falls no faster.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LogScaling {
     /// The least of these relative products.
     pub worst: f64,
@@ -123,12 +169,23 @@ mod tests {
         assert_eq!(median(&[4.0, 1.0, 2.0, 3.0]), Some(2.5));
         assert_eq!(median(&[7.0]), Some(7.0));
         let hundred: Vec<f64> = (1..=100).rev().map(f64::from).collect();
-        assert_eq!(MedianP95::of(&hundred), Some(MedianP95 { median: 50.5, p95: 95.0 }));
-        assert_eq!(MedianP95::of(&[2.0, 1.0]), Some(MedianP95 { median: 1.5, p95: 2.0 }));
-        assert_eq!(MedianP95::of(&[]), None);
+        let of_hundred = Percentiles { median: 50.5, p95: 95.0, p5: 5.0, p25: 25.0, p75: 75.0, count: 100 };
+        assert_eq!(Percentiles::of(&hundred), Some(of_hundred));
+        let of_two = Percentiles { median: 1.5, p95: 2.0, p5: 1.0, p25: 1.0, p75: 2.0, count: 2 };
+        assert_eq!(Percentiles::of(&[2.0, 1.0]), Some(of_two));
+        assert_eq!(Percentiles::of(&[]), None);
         assert_eq!(percentile(&[], 0.95), None);
         assert_eq!(percentile(&[3.0, 1.0, 2.0, 4.0, 5.0], 0.5), Some(3.0));
         assert_eq!(percentile(&[3.0, 1.0, 2.0, 4.0, 5.0], 0.95), Some(4.8));
+    }
+
+    #[test]
+    fn the_error_of_a_median() {
+        // normal quantiles: the standard deviation is 2
+        let normal = Percentiles { median: 5.0, p25: 5.0 - 1.349, p75: 5.0 + 1.349, count: 100, ..Percentiles::default() };
+        assert!((normal.standard_error().unwrap() - 1.2533 * 2.0 / 10.0).abs() < 1e-4);
+        assert_eq!(Percentiles::of(&[3.0]).unwrap().standard_error(), None);
+        assert_eq!(Percentiles::of(&[3.0, 3.0]).unwrap().standard_error(), Some(0.0));
     }
 
     #[test]

@@ -3,7 +3,9 @@
 pub mod apng;
 pub mod exr;
 pub mod frames;
+pub mod palette;
 pub mod png;
+pub mod png_text;
 pub mod tone_map;
 
 use std::path::Path;

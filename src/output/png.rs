@@ -16,6 +16,9 @@ use crate::colour::{srgb_byte, srgb_decode};
 use crate::error::{Error, Result};
 use crate::files::write_atomically;
 
+/// Metadata of images that were not read as linear values: how they were encoded.
+pub const ENCODING: &str = "encoding";
+
 /// Colour type of 8-bit pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Colour {
@@ -141,5 +144,6 @@ pub fn read(path: &Path) -> Result<Image> {
         let pixels = decoded.into_luma16().into_raw();
         vec![channel("Y", pixels.par_iter().map(|&v| srgb_decode(f32::from(v) / 65535.0)).collect())]
     };
-    Ok(Image { width, height, channels, metadata: Vec::new() })
+    let metadata = vec![(ENCODING.to_owned(), "8-bit sRGB".to_owned())];
+    Ok(Image { width, height, channels, metadata })
 }

@@ -14,7 +14,7 @@ use crate::settings::parse::parse_rate;
 use crate::settings::{AppliesTo, Capability, Editable, Value, choices, settings};
 
 /// Settings of real-time frames of ambient occlusion.
-const FRAMES: AppliesTo = AppliesTo::frames_of(Capability::AmbientOcclusion);
+const FRAMES: AppliesTo = AppliesTo::frames_of(Capability::RealTimeFrames);
 
 choices! {
     /// Primary visibility, as requested.

@@ -32,7 +32,7 @@ pub use passes::display;
 use passes::nodes;
 pub use passes::nodes::NodeVisits;
 use resources::{Extent, Resource, SURFACE_BYTES};
-pub use settings::{Budget, Filter, FilterKind, Preset, Resolution, Settings, Technique};
+pub use settings::{Budget, Filter, FilterKind, GtaoConstants, Preset, Resolution, Settings, Technique};
 
 /// Distance from a pixel's tangent plane, in pixel footprints, from which a neighbour counts as another surface.
 pub(super) const DEPTH_TOLERANCE: f32 = 1.5;

@@ -105,6 +105,29 @@ impl Filter {
     }
 }
 
+/// Constants of the screen-space technique, as XeGTAO (Intel 2021) has them. They make up for what a depth image and a few steps cannot know.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct GtaoConstants {
+    /// Factor of the distances at which geometry occludes, above 0.
+    pub radius_scale: f32,
+    /// Share of the radius over which occlusion fades out before it, above 0, at most 1.
+    pub fade: f32,
+    /// Exponent of the distances of steps: 1 spaces them evenly, more brings them closer to the pixel.
+    pub step_exponent: f32,
+    /// Factor of distances along the view beyond 1, at least 0: what lies far behind or before the pixel occludes less, as if it was thin.
+    pub thinness: f32,
+    /// Exponent of the ambient visibility.
+    pub visibility_exponent: f32,
+}
+
+impl GtaoConstants {
+    /// The formula of Jimenez et al. (2016) as it stands: right where the image shows all occluders and steps are many.
+    pub const FORMULA: Self =
+        Self { radius_scale: 1.0, fade: 0.2, step_exponent: 2.0, thinness: 0.0, visibility_exponent: 1.0 };
+    /// Those of the presets.
+    pub const PRESETS: Self = Self::FORMULA;
+}
+
 /// Settings of the real-time pipeline.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Settings {
@@ -141,6 +164,8 @@ pub struct Settings {
     pub filter: Filter,
     /// Screen-space technique: number of slices through the view ray, and of steps on each side of a slice.
     pub gtao: [u32; 2],
+    /// Screen-space technique: its constants.
+    pub gtao_constants: GtaoConstants,
     /// Larsen's pipeline: scene units per unit of length in the paper.
     pub unit: f64,
     /// Also compute bent normals: the mean unoccluded direction.
@@ -253,6 +278,7 @@ impl Preset {
             moved_weight: 4.0,
             filter: Filter { kind: FilterKind::Box, radius: 3, samples: 256.0 },
             gtao: [3, 6],
+            gtao_constants: GtaoConstants::PRESETS,
             unit: 1.0,
             bent: false,
             launch_rays: LAUNCH_RAYS,

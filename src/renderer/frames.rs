@@ -12,6 +12,7 @@ use crate::film::camera::CameraRecord;
 use crate::gpu::{Buffer, Device};
 use crate::integrators::ao::Hemisphere;
 use crate::integrators::aov::{self, Aov};
+use crate::integrators::path::PixelFilter;
 use crate::output::{self, Channel, Image, Samples};
 use crate::realtime::display::{Display, DisplayMode};
 use crate::realtime::frame_settings::FrameRange;
@@ -116,6 +117,7 @@ impl Renderer {
             ("device", format!("{} ({})", setup.device, setup.driver)),
             ("history", how.history.to_string()),
             ("integrator", "ao".into()),
+            ("pixel_filter", PixelFilter::Centre.to_string()),
             ("preset", preset.to_string()),
             ("primary", primary.to_string()),
             ("rays_per_pixel", how.rays_per_pixel.to_string()),

@@ -19,6 +19,7 @@
 //! # Ok::<(), skylit::Error>(())
 //! ```
 
+mod ambient;
 mod denoising;
 mod film_file;
 pub mod frames;
@@ -33,10 +34,11 @@ use std::time::Instant;
 
 use crate::accel::features::Blend;
 use crate::accel::flatten::FlatScene;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::film::Control;
 use crate::gpu::{Device, KeptPipelines};
 use crate::integrators::lighting::LightingSettings;
+use crate::output::Image;
 use crate::scene::{Environment, Scene, load};
 use crate::shaders::StreamShaders;
 use crate::tracer::{ComputeOptions, DeviceSettings, Needs, Tracer, TracerKind};
@@ -168,6 +170,26 @@ impl Renderer {
         (self.kind, &self.kind_reason)
     }
 
+    /// Renders an image: a still, or the last of the real-time frames, whichever the settings describe.
+    ///
+    /// # Errors
+    /// Those of [`Renderer::still`] and [`Renderer::frames`].
+    pub fn image(&mut self, settings: &RenderSettings, control: &mut dyn Control) -> Result<Image> {
+        if settings.realtime_setting().is_none() {
+            return Ok(self.still(settings, control)?.image);
+        }
+        let mut frames = self.frames(settings, false, control)?;
+        let (mut done, all) = (0, u64::from(frames.count()));
+        while frames.advance()?.is_some() {
+            done += 1;
+            control.progress(done, all);
+            if control.should_stop()? {
+                return Err(Error::Interrupted);
+            }
+        }
+        frames.image(control)
+    }
+
     /// Keeps all live pipelines, and saves the driver's pipeline cache to disk.
     fn keep_pipelines(&mut self) {
         self.pipelines = self.device.live_pipelines();
@@ -210,6 +232,23 @@ struct TracerRequest<'a> {
 }
 
 impl TracerRequest<'_> {
+    /// The tracer at hand, if it was built for the same scene data, or else a new one.
+    fn reuse_or_build(
+        self,
+        ready: Option<ReadyTracer>,
+        device: &Arc<Device>,
+        kind: TracerKind,
+        flat: &FlatScene,
+        compute: ComputeOptions,
+        settings: &DeviceSettings,
+    ) -> Result<ReadyTracer> {
+        let (blend, needs) = (flat.blend, self.needs);
+        match ready.filter(|r| r.blend == blend && r.needs == needs) {
+            Some(ready) => Ok(ready),
+            None => Ok(ReadyTracer { tracer: self.build(device, kind, flat, compute, settings)?, blend, needs }),
+        }
+    }
+
     fn build(
         self,
         device: &Arc<Device>,

@@ -2,20 +2,25 @@
 
 use glam::DVec3;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use super::framing;
 use crate::error::{Error, Result};
 use crate::film::camera::{self, Choice};
+use crate::film::schedule::FilmOptions;
 use crate::integrators::aov::Aov;
 use crate::integrators::lighting::LightingSettings;
-use crate::integrators::{self, IntegratorName, IntegratorSettings, PictureOptions};
+use crate::integrators::path::PixelFilter;
+use crate::integrators::{self, IntegratorName, IntegratorSettings, PictureOptions, RenderJob};
 #[cfg(feature = "cli")]
 use crate::output::parse_size;
 use crate::output::tone_map::ToneMap;
+#[cfg(feature = "cli")]
+use crate::realtime::Preset;
 use crate::realtime::frame_settings::FrameSettings;
 use crate::scene::{Camera, Projection, Scene};
 #[cfg(feature = "cli")]
-use crate::settings::parse::{parse_fov, parse_number, parse_target, parse_time, parse_vector};
+use crate::settings::parse::{parse_fov, parse_number, parse_target, parse_time, parse_vector, usage_message};
 use crate::settings::{AppliesTo, Capability, GivenSetting, Setting, settings};
 
 /// Samples per pixel when neither the settings nor the scene give them.
@@ -41,6 +46,8 @@ settings! {
         /// Stop after this time and keep the image so far (at least one sample per pixel)
         time_limit: Option<f64>,
             option(value_name = "SECONDS", value_parser = parse_time, allow_hyphen_values = true), applies(AppliesTo::STILLS);
+        /// Pixel reconstruction filter, by importance sampling; frames in real time have the samples of `centre` [default: box]
+        pixel_filter: Option<PixelFilter>, option(value_enum), applies(AppliesTo::STILLS);
         /// Auxiliary outputs to add to the .exr, separated by commas
         aov: Vec<Aov>, option(value_name = "LIST", value_enum, value_delimiter = ','), applies(AppliesTo::ALL);
     }
@@ -216,6 +223,38 @@ impl RenderSettings {
         serde_json::from_slice(&bytes).map_err(|e| Error::input(path, format!("not a file of settings: {e}")))
     }
 
+    /// Reads what a person writes in a line: the name of an integrator or of a preset of frames in real time, then options of `skylit render`, with `'` or `"` around
+    /// what has spaces: `ao --ao-radius 2 --spp 64`, `balanced --frames 8`. `--settings FILE` reads a file, too.
+    ///
+    /// # Errors
+    /// [`Error::Usage`], naming the line, and those of [`RenderSettings::load`].
+    #[cfg(feature = "cli")]
+    pub fn from_words(line: &str) -> Result<Self> {
+        #[derive(clap::Parser)]
+        #[command(no_binary_name = true, disable_help_flag = true, disable_version_flag = true)]
+        struct Words {
+            #[arg(long = "settings")]
+            file: Option<PathBuf>,
+            #[command(flatten)]
+            settings: RenderSettings,
+        }
+        let wrong = |what: String| Error::Usage(format!("\"{line}\": {what}"));
+        let mut words = shlex::split(line).ok_or_else(|| wrong("a quotation mark is not closed".into()))?;
+        if let Some(name) = words.first().filter(|w| !w.starts_with('-')).cloned() {
+            let option = match (name.parse::<IntegratorName>(), <Preset as clap::ValueEnum>::from_str(&name, false)) {
+                (Ok(_), _) => "--integrator",
+                (_, Ok(_)) => "--preset",
+                (Err(e), _) => {
+                    let presets = <Preset as clap::ValueEnum>::value_variants().iter().map(Preset::to_string);
+                    return Err(wrong(format!("{e}, or of the presets {}", presets.collect::<Vec<_>>().join(", "))));
+                }
+            };
+            words.insert(0, option.to_owned());
+        }
+        let words = <Words as clap::Parser>::try_parse_from(words).map_err(|e| wrong(usage_message(&e)))?;
+        words.settings.over_file(words.file.as_deref())
+    }
+
     /// These settings over those of a file, if one is given.
     ///
     /// # Errors
@@ -349,15 +388,60 @@ impl RenderSettings {
         self.image.spp.or(scene.hints.spp).unwrap_or(DEFAULT_SPP).max(1)
     }
 
+    /// Pixel reconstruction filter.
+    pub fn pixel_filter(&self) -> PixelFilter {
+        self.image.pixel_filter.unwrap_or_default()
+    }
+
     /// Seed of the sampler.
     pub fn seed(&self) -> u32 {
         self.image.seed.unwrap_or_default()
+    }
+
+    /// What a still of these settings is: all of its samples in one go.
+    pub(super) fn job<'a>(&'a self, scene: &'a Scene, camera: &'a Camera) -> RenderJob<'a> {
+        RenderJob {
+            scene,
+            camera,
+            size: self.size(scene),
+            spp: self.spp(scene),
+            seed: self.seed(),
+            pixel_filter: self.pixel_filter(),
+            settings: &self.integrators,
+            time_limit: self.image.time_limit.map(Duration::from_secs_f64),
+            keep_rays: false,
+            film: FilmOptions::default(),
+        }
     }
 }
 
 #[cfg(all(test, feature = "cli"))]
 mod tests {
     use super::*;
+
+    #[test]
+    fn lines_of_words() {
+        let of = |line: &str| RenderSettings::from_words(line).unwrap();
+        let ao = of("ao --ao-radius 2 --spp 64");
+        assert_eq!((ao.integrator().name(), ao.integrators.ao.ao_radius, ao.image.spp), ("ao", Some(2.0), Some(64)));
+        let frames = of("balanced --frames 8");
+        assert_eq!(frames.frames.preset, Some(Preset::Balanced));
+        let lit = of("path --light 'sun direction=0,-1,0 irradiance=2'");
+        assert_eq!(lit, of("--integrator path --light \"sun direction=0,-1,0 irradiance=2\""));
+        assert_eq!(of(""), RenderSettings::default());
+        for (line, part) in [
+            ("oa --spp 3", "choose one of ao"),
+            ("oa --spp 3", "balanced"),
+            ("ao --ssp 3", "--ssp"),
+            ("ao --spp", "--spp"),
+            ("path --light 'sun", "quotation mark"),
+            ("ao --help", "--help"),
+            ("ao --settings /no/such/file.json", "/no/such/file.json"),
+        ] {
+            let error = RenderSettings::from_words(line).unwrap_err().to_string();
+            assert!(error.contains(part) && !error.contains('\n'), "{line}: {error}");
+        }
+    }
 
     #[test]
     fn flags_are_those_of_the_command_line() {

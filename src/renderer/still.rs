@@ -2,14 +2,14 @@
 
 use std::path::Path;
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use glam::DVec3;
 
 use super::denoising::{self, Denoising};
 use super::film_file::{self, Identity, Maker};
 use super::report::{FilmReport, Seconds, Setup, StillReport};
-use super::{ReadyTracer, RenderSettings, Renderer, TracerRequest};
+use super::{RenderSettings, Renderer, TracerRequest};
 use crate::accel::flatten::FlatScene;
 use crate::denoise;
 use crate::error::{Error, Result};
@@ -122,17 +122,7 @@ impl Renderer {
         let scene = &self.scene;
         let mut warnings = scene_warnings(scene);
         warnings.iter().for_each(|w| control.warning(w));
-        let mut job = RenderJob {
-            scene,
-            camera: &camera,
-            size,
-            spp: settings.spp(scene),
-            seed: settings.seed(),
-            settings: &settings.integrators,
-            time_limit: settings.image.time_limit.map(Duration::from_secs_f64),
-            keep_rays: extras.keep_rays,
-            film: FilmOptions::default(),
-        };
+        let mut job = RenderJob { keep_rays: extras.keep_rays, ..settings.job(scene, &camera) };
         let prints = settings.film.keeps_state().then(|| fingerprint::of_scene(scene));
         let identity = identity(integrator, &job, prints);
         let maker: Maker =
@@ -157,16 +147,10 @@ impl Renderer {
         let flat = FlatScene::with_motion_and_blend(scene, Motion::default(), integrator.blend())?;
         let wanted = &settings.image.aov;
         let needs = aov_needs(integrator.needs(&settings.integrators), wanted);
-        let ready = match ready.filter(|r| r.blend == flat.blend && r.needs == needs) {
-            Some(ready) => ready,
-            None => {
-                let rays = integrator.rays_per_sample() * u64::from(job.spp) * u64::from(size[0]) * u64::from(size[1]);
-                let streams = integrator.streams(&settings.integrators);
-                let request = TracerRequest { needs, streams, rays, control: &mut *control, warnings: &mut warnings };
-                let tracer = request.build(&device, kind, &flat, compute, &self.settings)?;
-                ReadyTracer { tracer, blend: flat.blend, needs }
-            }
-        };
+        let rays = integrator.rays_per_sample() * u64::from(job.spp) * u64::from(size[0]) * u64::from(size[1]);
+        let streams = integrator.streams(&settings.integrators);
+        let request = TracerRequest { needs, streams, rays, control: &mut *control, warnings: &mut warnings };
+        let ready = request.reuse_or_build(ready, &device, kind, &flat, compute, &self.settings)?;
         let tracer = &ready.tracer;
         let record = job.camera_record(&flat);
         let tile_mask = match integrator.skips_empty_tiles(&job) {

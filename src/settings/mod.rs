@@ -15,6 +15,10 @@ use crate::error::{Error, Result};
 pub enum Capability {
     /// It computes ambient occlusion of a radius and falloff.
     AmbientOcclusion,
+    /// It renders frames in real time.
+    RealTimeFrames,
+    /// It adds ambient light.
+    AmbientLight,
     /// It follows light from surface to surface.
     LightTransport,
     /// The length of its paths can be chosen.

@@ -7,6 +7,15 @@ use glam::DVec3;
 /// A value, or a description of what is expected.
 pub type Parsed<T> = std::result::Result<T, String>;
 
+/// What the parser of the command line says of wrong arguments, in one line.
+#[cfg(feature = "cli")]
+pub fn usage_message(error: &clap::Error) -> String {
+    let text = error.render().to_string();
+    let lines = text.lines().map(str::trim).take_while(|l| !l.starts_with("Usage:") && !l.starts_with("For more"));
+    let words = lines.filter(|l| !l.is_empty()).collect::<Vec<_>>().join(" ");
+    words.trim_start_matches("error: ").to_owned()
+}
+
 /// Any number that is not NaN.
 pub fn parse_number(text: &str) -> Parsed<f64> {
     text.trim().parse::<f64>().ok().filter(|v| !v.is_nan()).ok_or_else(|| "expected a number".to_owned())
@@ -19,6 +28,14 @@ pub fn parse_vector(text: &str) -> Parsed<DVec3> {
         [x, y, z] if parts.iter().all(|v| v.is_finite()) => Ok(DVec3::new(x, y, z)),
         _ => Err("expected three finite numbers X,Y,Z".into()),
     }
+}
+
+/// A radiance `R,G,B`: finite, not negative.
+pub fn parse_radiance(text: &str) -> Parsed<DVec3> {
+    parse_vector(text)
+        .ok()
+        .filter(|c| c.min_element() >= 0.0)
+        .ok_or_else(|| "expected three finite numbers R,G,B that are not negative".into())
 }
 
 /// Parses a number for which `holds` is true; `rule` is the error message.
@@ -92,6 +109,7 @@ mod tests {
         for bad in ["1,2", "1,2,3,4", "a,b,c", "nan,0,0", "inf,0,0", ""] {
             assert!(parse_vector(bad).is_err(), "{bad}");
         }
+        assert!(parse_radiance("0,0.5,2").is_ok() && parse_radiance("1,-1,1").is_err() && parse_radiance("1,1").is_err());
         assert!(parse_fov("nan").is_err() && parse_fov("0").is_err() && parse_fov("180").is_err() && parse_fov("45").is_ok());
         assert!(parse_falloff("0.9").is_err() && parse_falloff("inf").is_err() && parse_falloff("1").is_ok());
         assert!(parse_radius("-1").is_err() && parse_radius("0").is_err() && parse_radius("inf").is_ok());

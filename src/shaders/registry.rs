@@ -19,6 +19,7 @@ registry! {
         OCCLUSION_CLOSEST = "occlusion", closest, queue;
         PATH_BOUNCE_CLOSEST = "path_bounce", closest, queue;
         PATH_CAMERA_CLOSEST = "path_camera", closest, camera;
+        PATH_DISTANCE_CLOSEST = "path_distance", closest, queue;
         PATH_SHADOW_ANY = "path_shadow", any, queue;
         PATH_SHADOW_WALLS_CLOSEST = "path_shadow_walls", closest, queue;
         PRIMARY_CLOSEST = "primary", closest, camera;

@@ -1,5 +1,6 @@
 //! Terminal output: results on stdout, everything else on stderr. A closed pipe is not an error.
 
+use std::borrow::Cow;
 use std::io::{self, Write};
 
 use serde::Serialize;
@@ -91,6 +92,13 @@ impl Console {
 /// Replaces line breaks and runs of white space by single spaces.
 pub fn one_line(text: &str) -> String {
     text.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+/// The command line of this process, quoted as a shell needs it.
+pub fn command_line() -> String {
+    let words: Vec<String> = std::env::args_os().skip(1).map(|w| w.to_string_lossy().into_owned()).collect();
+    let quoted = words.iter().map(|w| shlex::try_quote(w).unwrap_or(Cow::Borrowed(w)));
+    std::iter::once(Cow::Borrowed("skylit")).chain(quoted).collect::<Vec<_>>().join(" ")
 }
 
 /// Prints the error that ends a failed run.

@@ -24,7 +24,7 @@ pub struct Progress {
 
 impl Progress {
     /// Progress of the work that starts now.
-    pub fn new(label: &'static str, console: &Console) -> Self {
+    pub fn new(label: impl Into<Cow<'static, str>>, console: &Console) -> Self {
         Self {
             label: label.into(),
             start: Instant::now(),

@@ -14,6 +14,7 @@ use super::request::{Comparison, DeviceSummary, Event, Mailbox, PickPurpose, Pro
 use super::technique::Technique;
 use super::{ViewOptions, panels};
 use crate::integrators::lighting::LightingSettings;
+use crate::interface::PixelFilter;
 use crate::realtime::Preset;
 use crate::renderer::RenderSettings;
 use crate::renderer::interactive::{Pick, ViewPicture, render_flags};
@@ -472,7 +473,12 @@ impl App {
         }
         let shown = panes.len();
         if self.compares_now() {
-            panes.push(self.truth.settings(&self.settings));
+            let mut truth = self.truth.settings(&self.settings);
+            if panes[0].realtime_setting().is_some() && truth.realtime_setting().is_none() {
+                // what differs shall not be the samples' place in the pixel
+                truth.image.pixel_filter = Some(PixelFilter::Centre);
+            }
+            panes.push(truth);
         }
         let request = Request {
             scene: self.source.clone(),

@@ -29,7 +29,8 @@ fn wrong_usage() {
     fails(&run(&["--frames", "1"]), 64, &["--frames"]);
     fails(&run(&["--reference-rays", "1"]), 64, &["--reference-rays"]);
     fails(&run(&["--size", "big"]), 64, &["--size"]);
-    fails(&run(&["--plot", "a.pdf"]), 64, &[".png"]);
+    fails(&run(&["--plot", "a.pdf"]), 64, &[".png", ".svg"]);
+    fails(&run(&["--baseline", "/nonexistent.json"]), 3, &["/nonexistent.json", "no such file"]);
     fails(&run(&["--csv", "/nonexistent/a.csv"]), 4, &["folder does not exist"]);
     fails(&run(&["builtin:nothing"]), 64, &["nothing"]);
     fails(&run(&["no-such-scene.glb"]), 3, &["no such file"]);
@@ -43,8 +44,8 @@ fn gpu_views_of_a_scene() {
     }
     let dir = tempfile::tempdir().unwrap();
     let at = |name: &str| dir.path().join(name);
-    let (csv, plot, json) = (at("a.csv"), at("a.png"), format!("--json={}", at("a.json").display()));
-    let files = ["--csv", csv.to_str().unwrap(), "--plot", plot.to_str().unwrap(), &json];
+    let (csv, plot, json) = (at("a.csv"), at("a.png"), at("a.json"));
+    let files = ["--csv", csv.to_str().unwrap(), "--plot", plot.to_str().unwrap(), "--json", json.to_str().unwrap()];
     let out = run(&[&["builtin:stairs", "--presets", "larsen,balanced,gtao"], &TINY[..7], &files].concat());
     assert!(out.status.success(), "{}", stderr(&out));
     let text = String::from_utf8(out.stdout).unwrap();
@@ -92,8 +93,36 @@ fn gpu_views_of_a_scene() {
     assert_eq!([count("still"), count("still, camera rays"), count("moving"), count("rest")], [24, 6, 6, 2]);
     let image = skylit::output::load(&plot).unwrap();
     assert!(image.width > 500 && image.height > 300);
+    assert_eq!(record["benchmark"], "ao");
     let left: Vec<_> = std::fs::read_dir(dir.path()).unwrap().map(|e| e.unwrap().file_name()).collect();
     assert!(left.len() == 3, "{left:?}");
+}
+
+/// The same run again: times have noise, but errors are the same, and exit code and record agree on what is worse.
+#[test]
+fn gpu_a_baseline() {
+    if !device() {
+        return;
+    }
+    let dir = tempfile::tempdir().unwrap();
+    let before = dir.path().join("before.json");
+    let args = [&["builtin:stairs", "--presets", "fast", "--parts", "still,moving"], &TINY[..]].concat();
+    assert!(run(&[&args[..], &["--json", before.to_str().unwrap()]].concat()).status.success());
+    let compared = [&args[..], &["--json", "--baseline", before.to_str().unwrap()]].concat();
+    let out = run(&compared);
+    let record: Value = serde_json::from_slice(&out.stdout).unwrap();
+    let baseline = &record["baseline"];
+    // two views: three times and two errors each
+    assert_eq!(
+        (baseline["compared"].as_u64(), baseline["missing"].as_array().map(Vec::len)),
+        (Some(10), Some(0)),
+        "{baseline}"
+    );
+    let regressions = baseline["regressions"].as_array().unwrap();
+    assert!(regressions.iter().all(|r| r["quantity"].as_str().unwrap().starts_with("ms")), "{regressions:?}");
+    assert_eq!(out.status.code(), Some(i32::from(!regressions.is_empty())), "{}", stderr(&out));
+    // with other settings nothing is measured
+    fails(&run(&[&compared[..], &["--ao-falloff", "binary"]].concat()), 64, &["its falloff is exponential, not binary"]);
 }
 
 /// The plain blend forgets half in a frame, whatever else is wrong with it.

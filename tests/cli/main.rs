@@ -9,4 +9,7 @@ mod bench_ao;
 mod bench_path;
 #[cfg(unix)]
 mod bench_rays;
+mod bench_report;
+mod compare;
+mod compare_ao;
 mod program;

@@ -185,6 +185,36 @@ fn one_record_for_a_check_that_fails() {
     assert!(json(&run(&["diff", path(&a), path(&a), "--max-rmse", "0.1", "--json"]))["error"].is_null());
 }
 
+/// `diff` judges colour, or the channels that are named, and refuses images without any in common.
+#[test]
+fn diff_judges_colour() {
+    use skylit::output::{Channel, Image, Samples, save};
+    let dir = tempfile::tempdir().unwrap();
+    let write = |name: &str, height: u32, channels: &[(&str, f32)]| {
+        let plane = |v: f32| Samples::F32(vec![v; 16 * height as usize]);
+        let channels = channels.iter().map(|(name, v)| Channel { name: (*name).into(), samples: plane(*v) }).collect();
+        let file = dir.path().join(name);
+        save(&Image { width: 16, height, channels, metadata: Vec::new() }, &file).unwrap();
+        path(&file).to_owned()
+    };
+    let short = write("short.exr", 16, &[("Y", 0.5), ("A", 1.0), ("samples", 8.0)]);
+    let long = write("long.exr", 16, &[("Y", 0.51), ("A", 1.0), ("samples", 64.0)]);
+    let colour = write("colour.exr", 16, &[("R", 0.5), ("G", 0.6), ("B", 0.5), ("A", 1.0)]);
+    let depth = write("depth.exr", 16, &[("depth.Z", 0.5)]);
+    let flat = write("flat.exr", 8, &[("Y", 0.5)]);
+    // histories of different length
+    assert!(run(&["diff", &short, &long, "--max-rmse", "0.05"]).status.success());
+    refuses(&["diff", &short, &long, "--max-rmse", "0.001", "--quiet"], 1, "RMSE of 1.000e-2");
+    refuses(&["diff", &short, &long, "--channels", "samples", "--max-rmse", "1", "--quiet"], 1, "RMSE of 5.600e1");
+    // grey against colour: more than coverage in common
+    refuses(&["diff", &short, &colour, "--max-rmse", "0.0001", "--quiet"], 1, "RMSE of 1.000e-1");
+    refuses(&["diff", &short, &depth], 64, "no colour");
+    assert!(run(&["diff", &depth, &depth, "--channels", "depth.Z", "--max-rmse", "0"]).status.success());
+    refuses(&["diff", &short, &flat], 1, "16x16 and 16x8");
+    let record = json(&run(&["diff", &short, &long, "--json"]));
+    assert!((record["compared"]["bias"].as_f64().unwrap() + 0.01).abs() < 1e-6 && record["covered_pixels_only"] == true);
+}
+
 /// What people are warned of is in the record for programs.
 #[test]
 fn warnings_are_in_the_record() {

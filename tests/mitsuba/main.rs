@@ -28,6 +28,8 @@ use skylit::film::NoControl;
 use skylit::film::camera::CameraRecord;
 use skylit::gpu::{Device, Options};
 use skylit::integrators::path::{Lens, MAX_DEPTH, PathIntegrator, PathOptions};
+use skylit::measure::distributions::critical_value;
+use skylit::measure::z_test::{Estimate, Region, pixel_scores, score};
 use skylit::output::exr;
 use skylit::scene::builtin::shapes;
 use skylit::scene::light_spec;
@@ -136,18 +138,14 @@ fn entries() -> Vec<Entry> {
     serde_json::from_str(&text).unwrap()
 }
 
-/// An image with the noise that is in it; channels interleaved.
-struct Estimate {
-    size: [usize; 2],
-    mean: Vec<f64>,
-    /// Variance of the mean, from that of single samples where there are such: stratified samples do better than it says.
-    variance: Vec<f64>,
-    /// Variance of the mean from blocks with seeds of their own: true on average, but from few numbers.
+/// An image with two estimates of its noise.
+struct Noisy {
+    /// Variances from single samples: stratified samples do better than they say.
+    estimate: Estimate,
+    /// Variance of each mean from blocks with seeds of their own: true on average, but from few numbers.
     by_blocks: Vec<f64>,
     /// How many numbers each of `by_blocks` is from, less one.
     freedom: f64,
-    /// Samples a pixel.
-    spp: f64,
 }
 
 impl Entry {
@@ -169,25 +167,27 @@ impl Entry {
         scene
     }
 
-    fn judged(&self) -> Estimate {
+    fn judged(&self) -> Noisy {
         let image = exr::read(&folder().join(format!("{}.exr", self.name))).unwrap();
         assert_eq!([image.width, image.height], self.size, "{}: the judge's image has another size", self.name);
         let planes = |names: [&str; 3]| -> Vec<f64> {
             let planes = names.map(|n| image.f32(n).unwrap_or_else(|| panic!("{}: no channel {n}", self.name)));
             (0..3 * image.pixel_count()).map(|k| f64::from(planes[k % 3][k / 3])).collect()
         };
+        // of the means
         let variance = planes(["variance.R", "variance.G", "variance.B"]);
-        Estimate {
+        let spp: f64 = image.metadata("spp").and_then(|s| s.parse().ok()).expect("the judge's samples per pixel");
+        let estimate = Estimate {
             size: self.size.map(|n| n as usize),
+            channels: 3,
             mean: planes(["R", "G", "B"]),
-            by_blocks: variance.clone(),
-            freedom: f64::INFINITY,
-            variance,
-            spp: image.metadata("spp").and_then(|s| s.parse().ok()).expect("the judge's samples per pixel"),
-        }
+            variance: variance.iter().map(|v| v * spp).collect(),
+            samples: vec![spp; image.pixel_count()],
+        };
+        Noisy { estimate, by_blocks: variance, freedom: f64::INFINITY }
     }
 
-    fn ours(&self, device: &Arc<Device>, kind: TracerKind, flat: &FlatScene) -> Estimate {
+    fn ours(&self, device: &Arc<Device>, kind: TracerKind, flat: &FlatScene) -> Noisy {
         let needs = Needs { shading: true, compensation: self.compensation, ..Default::default() };
         let tracer = Tracer::new(device, kind, flat, needs).unwrap_or_else(|e| panic!("{kind}: {e}"));
         let aspect = f64::from(self.size[0]) / f64::from(self.size[1]);
@@ -219,40 +219,19 @@ impl Entry {
         }
         let b = f64::from(BLOCKS);
         let mean: Vec<f64> = sums.iter().map(|s| s / b).collect();
-        let variance: Vec<f64> = variances.iter().map(|v| v / b / f64::from(self.spp)).collect();
         let by_blocks = |k: usize| (squares[k] / b - mean[k] * mean[k]).max(0.0) / (b - 1.0);
-        Estimate {
-            size: self.size.map(|n| n as usize),
+        Noisy {
             by_blocks: (0..n).map(by_blocks).collect(),
             freedom: b - 1.0,
-            variance,
-            mean,
-            spp: f64::from(self.spp),
+            estimate: Estimate {
+                size: self.size.map(|n| n as usize),
+                channels: 3,
+                variance: variances.iter().map(|v| v / b).collect(),
+                samples: vec![f64::from(self.spp); n / 3],
+                mean,
+            },
         }
     }
-}
-
-/// The probability that a normal variable is beyond z, for z > 1: the density times Mills' ratio as a continued fraction.
-fn upper_tail(z: f64) -> f64 {
-    let ratio = (1..=100).rev().fold(z, |f, k| z + f64::from(k) / f);
-    (-0.5 * z * z).exp() / (2.0 * std::f64::consts::PI).sqrt() / ratio
-}
-
-/// The |z| that all of `n` independent normal variables stay below with probability 1 - `alpha` (Sidak 1967).
-fn sidak(n: usize, alpha: f64) -> f64 {
-    let tail = -0.5 * ((1.0 - alpha).ln() / n as f64).exp_m1();
-    let (mut lo, mut hi) = (1.0, 40.0);
-    for _ in 0..100 {
-        let middle = 0.5 * (lo + hi);
-        if upper_tail(middle) > tail { lo = middle } else { hi = middle }
-    }
-    lo
-}
-
-/// The bound that a variable has whose variance is estimated from `freedom` numbers, where a normal one has z: Student's, to the first order of
-/// Cornish and Fisher's series.
-fn student(z: f64, freedom: f64) -> f64 {
-    z + (z * z * z + z) / (4.0 * freedom)
 }
 
 /// What came of a comparison.
@@ -271,26 +250,39 @@ struct Verdict {
     failures: Vec<String>,
 }
 
+/// Differences of means over regions, a region's channels together: each in standard errors, and itself, and its standard error.
+fn over(ours: &Noisy, judge: &Noisy, regions: &[Region], rounding: &[f64]) -> Vec<[f64; 3]> {
+    let of = |values: &[f64]| judge.estimate.means_over(values, regions);
+    let between = |a: &[f64], b: &[f64], sign: f64| a.iter().zip(b).map(|(a, b)| a + sign * b).collect::<Vec<_>>();
+    let differences = of(&between(&ours.estimate.mean, &judge.estimate.mean, -1.0));
+    let (variances, rounding) = (of(&between(&ours.by_blocks, &judge.by_blocks, 1.0)), of(rounding));
+    let scored = |k: usize| {
+        let variance = variances[k] / regions[k / 3].count() as f64;
+        let error = (variance + rounding[k].powi(2)).sqrt();
+        [score(differences[k], variance, rounding[k]), differences[k], error]
+    };
+    (0..differences.len()).map(scored).collect()
+}
+
 /// Holds an image against the reference image.
-fn compare(ours: &Estimate, judge: &Estimate) -> Verdict {
-    assert_eq!(ours.size, judge.size);
-    let [width, height] = ours.size;
+fn compare(ours: &Noisy, judge: &Noisy) -> Verdict {
+    let known = &judge.estimate;
+    let [width, height] = known.size;
     let pixels = width * height;
     let mut v = Verdict::default();
-    let average = |c: usize| (0..pixels).map(|p| judge.mean[3 * p + c]).sum::<f64>() / pixels as f64;
-    let averages = [0, 1, 2].map(average);
-    let rounding = |k: usize| (ROUNDING * judge.mean[k].abs().max(averages[k % 3])).powi(2);
+    let averages = known.averages();
+    let rounding = known.rounding(ROUNDING);
 
-    let threshold = sidak(3 * pixels, ALPHA);
+    let threshold = critical_value(ALPHA, 3.0 * pixels as f64, f64::INFINITY);
+    // A pixel that sees little of something bright may have met none of it, and then knows no noise: the judge knows it
+    let scores = pixel_scores(&ours.estimate, known, &rounding).unwrap();
     let mut bad = 0;
     for p in 0..pixels {
         let (mut z, mut relative) = (0.0f64, 0.0f64);
-        for (k, average) in (3 * p..3 * p + 3).zip(averages) {
-            // A pixel that sees little of something bright may have met none of it, and then knows no noise: the judge knows it
-            let known = judge.variance[k] * judge.spp / ours.spp;
-            let difference = ours.mean[k] - judge.mean[k];
-            z = z.max(difference.abs() / (ours.variance[k].max(known) + judge.variance[k] + rounding(k)).sqrt().max(1e-12));
-            relative = relative.max(difference.abs() / judge.mean[k].max(average).max(1e-12));
+        for (k, average) in (3 * p..3 * p + 3).zip(&averages) {
+            z = z.max(scores[k].abs());
+            let difference = ours.estimate.mean[k] - known.mean[k];
+            relative = relative.max(difference.abs() / known.mean[k].max(*average).max(1e-12));
         }
         v.pixel_z = v.pixel_z.max(z);
         if z > threshold {
@@ -306,39 +298,23 @@ fn compare(ours: &Estimate, judge: &Estimate) -> Verdict {
         v.failures.push(format!("{bad} of {pixels} pixels beyond {threshold:.2} sigmas"));
     }
 
-    // difference and its variance, of the mean over some pixels
-    let over = |which: &dyn Fn(usize) -> bool, c: usize| {
-        let (mut n, mut difference, mut variance, mut slack) = (0.0, 0.0, 0.0, 0.0);
-        for k in (0..pixels).filter(|&p| which(p)).map(|p| 3 * p + c) {
-            n += 1.0;
-            difference += ours.mean[k] - judge.mean[k];
-            variance += ours.by_blocks[k] + judge.by_blocks[k];
-            slack += rounding(k).sqrt();
-        }
-        (difference / n, (variance / (n * n) + (slack / n).powi(2)).sqrt())
-    };
-    let across = [width.div_ceil(TILE), height.div_ceil(TILE)];
+    let tiles = Region::tiles(known.size, TILE);
     let freedom = (TILE * TILE) as f64 * ours.freedom;
-    let threshold = student(sidak(3 * across[0] * across[1], TILE_ALPHA), freedom);
+    let threshold = critical_value(TILE_ALPHA, 3.0 * tiles.len() as f64, freedom);
     let mut squares = 0.0;
-    for t in 0..across[0] * across[1] {
-        let tile = [t % across[0], t / across[0]];
-        for (c, average) in averages.iter().enumerate() {
-            let (difference, error) = over(&|p| [p % width / TILE, p / width / TILE] == tile, c);
-            let z = difference / error.max(1e-12);
-            v.tile_z = v.tile_z.max(z.abs());
-            squares += z * z;
-            if z.abs() > threshold {
-                let percent = 100.0 * difference / average.max(1e-12);
-                v.failures.push(format!("tile {tile:?}, channel {c}: {z:.1} sigmas, {percent:.2} % of the image's mean"));
-            }
+    for (k, [z, difference, _]) in over(ours, judge, &tiles, &rounding).into_iter().enumerate() {
+        v.tile_z = v.tile_z.max(z.abs());
+        squares += z * z;
+        if z.abs() > threshold {
+            let (at, channel) = (tiles[k / 3].first, k % 3);
+            let percent = 100.0 * difference / averages[channel].max(1e-12);
+            v.failures.push(format!("tile at {at:?}, channel {channel}: {z:.1} sigmas, {percent:.2} % of the image's mean"));
         }
     }
-    v.tile_rms = (squares / (3 * across[0] * across[1]) as f64).sqrt();
+    v.tile_rms = (squares / (3 * tiles.len()) as f64).sqrt();
 
-    for (c, average) in averages.into_iter().enumerate() {
-        let (difference, error) = over(&|_| true, c);
-        let (z, precision) = (difference / error.max(1e-12), error / average);
+    for (c, [z, difference, error]) in over(ours, judge, &[Region::whole(known.size)], &rounding).into_iter().enumerate() {
+        let (precision, average) = (error / averages[c], averages[c]);
         if z.abs() >= v.mean_z.abs() {
             (v.mean_z, v.difference) = (z, difference / average);
         }
@@ -458,10 +434,6 @@ fn reference_images_are_complete() {
 /// Noise passes; a factor, a channel in place of another, a tile and a single pixel that are wrong do not.
 #[test]
 fn comparison_detects_wrong_images() {
-    // known values: two-sided 1 % at one variable, and 5 sigmas at about 17 500
-    assert!((sidak(1, ALPHA) - 2.575_829).abs() < 1e-5, "{}", sidak(1, ALPHA));
-    assert!((upper_tail(5.0) / 2.866_515_7e-7 - 1.0).abs() < 1e-6);
-
     let n = 32 * 32;
     let (spp, judge_spp) = (128.0, 8192.0);
     let mut state = 1u64;
@@ -475,7 +447,10 @@ fn comparison_detects_wrong_images() {
         let sd = |k: usize| 0.7 * truth[k] / spp.sqrt();
         let variance: Vec<f64> = (0..3 * n).map(|k| sd(k).powi(2)).collect();
         let mean = (0..3 * n).map(|k| wrong(k) + sd(k) * normal()).collect();
-        Estimate { size: [32, 32], mean, by_blocks: variance.clone(), freedom: 64.0, variance, spp }
+        let samples = vec![spp; n];
+        let estimate =
+            Estimate { size: [32, 32], channels: 3, mean, variance: variance.iter().map(|v| v * spp).collect(), samples };
+        Noisy { estimate, by_blocks: variance, freedom: 64.0 }
     };
     let judge = image(judge_spp, &|k| truth[k]);
     for _ in 0..20 {

@@ -1,15 +1,16 @@
 //! What a pixel is the mean of: filters by an edge that runs between pixels, lenses by a light that is out of focus.
 
 use super::*;
+use skylit::integrators::ao::{self, AoOptions};
 use skylit::integrators::path::{Lens, PixelFilter};
 use skylit::scene::Projection;
 use skylit::scene::builtin::shapes;
 
-/// An emissive square from x = 0 to the right, seen in parallel, 16 pixels to 16 units: pixels' middles lie half a unit from the edge and on.
+/// An emissive square from x = 1/4 to the right, seen in parallel, 16 pixels to 16 units: the edge is a quarter of a pixel from the centre of one.
 fn edge() -> Scene {
     let mut camera = Camera::look_at(DVec3::new(0.0, 0.0, 5.0), DVec3::ZERO, DVec3::Y, 1.0);
     camera.projection = Projection::Orthographic { half_height: 8.0 };
-    let right = shapes::rectangle(DVec3::new(20.0, 0.0, 0.0), DVec3::X * 40.0, DVec3::Y * 80.0);
+    let right = shapes::rectangle(DVec3::new(20.25, 0.0, 0.0), DVec3::X * 40.0, DVec3::Y * 80.0);
     scene_of(vec![(right, Material { double_sided: true, ..emitter(1.0) })], camera)
 }
 
@@ -27,6 +28,7 @@ fn gpu_filters_weigh_an_edge() {
                 let t = std::f64::consts::TAU * (x / 3.0 + 0.5);
                 0.35875 - 0.48829 * t.cos() + 0.14128 * (2.0 * t).cos() - 0.01168 * (3.0 * t).cos()
             }),
+            PixelFilter::Centre => (1e-6, &|_| 1.0),
         };
         let n = 30_000;
         let at = |k: i32| (f64::from(k) + 0.5) / f64::from(n) * 2.0 * radius - radius;
@@ -39,13 +41,21 @@ fn gpu_filters_weigh_an_edge() {
     };
     for kind in picked(&device) {
         let tracer = tracer(&device, kind, &flat);
-        for pixel_filter in [PixelFilter::Box, PixelFilter::Tent, PixelFilter::BlackmanHarris] {
+        for pixel_filter in [PixelFilter::Box, PixelFilter::Tent, PixelFilter::BlackmanHarris, PixelFilter::Centre] {
             let options = PathOptions { size: [16, 16], spp: 256, max_depth: 0, pixel_filter, ..Default::default() };
             let film = render(&tracer, &flat, &options).image.film;
+            let options = AoOptions { size: [16, 16], spp: 256, pixel_filter, ..Default::default() };
+            let record = CameraRecord::new(&scene.cameras[0], flat.origin, 1.0);
+            let coverage = ao::render(&tracer, &record, &options, &mut NoControl).unwrap().image.film.coverage;
             for x in 0..16 {
-                let column: f64 = (0..16).map(|y| f64::from(film.mean[3 * (y * 16 + x)])).sum::<f64>() / 16.0;
-                let expected = beyond(pixel_filter, 7.5 - x as f64);
-                assert!((column - expected).abs() < 2e-3, "{kind} {pixel_filter:?}, column {x}: {column}, expected {expected}");
+                let column = |value: &dyn Fn(usize) -> f32| (0..16).map(|y| f64::from(value(y * 16 + x))).sum::<f64>() / 16.0;
+                let expected = beyond(pixel_filter, 7.75 - x as f64);
+                for (what, found) in [("radiance", column(&|i| film.mean[3 * i])), ("coverage", column(&|i| coverage[i]))] {
+                    assert!(
+                        (found - expected).abs() < 2e-3,
+                        "{kind} {pixel_filter:?}, {what} of column {x}: {found}, expected {expected}"
+                    );
+                }
             }
         }
     }

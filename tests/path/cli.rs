@@ -105,7 +105,7 @@ fn gpu_a_film_goes_on_only_as_it_was_begun() {
     differs(&["--rr-depth", "2"], "its rr depth is 5, this run's is 2");
     differs(&["--sampling", "bsdf"], "its sampling is mis, this run's is bsdf");
     differs(&["--firefly-clamp", "2"], "its firefly clamp is none, this run's is 2");
-    differs(&["--pixel-filter", "tent"], "its pixel filter is none, this run's is tent");
+    differs(&["--pixel-filter", "tent"], "its pixel filter is box, this run's is tent");
     differs(&["--f-number", "8", "--focus-distance", "3"], "its lens is none, this run's is radius");
     differs(&["--eye", "0,1,5", "--target", "0,1,0"], "its camera is");
     differs(&["--fov-y", "33"], "its camera is");
@@ -277,7 +277,7 @@ fn options_of_frames_are_refused_by_name() {
     refuses(
         &sky,
         64,
-        "--light has no effect on --integrator ao-sky: leave it out, or use --integrator path, direct or whitted",
+        "--light has no effect on --integrator ao-sky: leave it out, or use --integrator path, direct, lit or whitted",
     );
 }
 

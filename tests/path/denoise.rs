@@ -206,7 +206,7 @@ fn wrong_uses_of_denoisers_are_told() {
     with(
         &["--denoise", "filter"],
         64,
-        "--denoise has no effect on --integrator ao: leave it out, or use --integrator path, direct, whitted or ao-sky",
+        "--denoise has no effect on --integrator ao: leave it out, or use --integrator path, direct, lit, whitted or ao-sky",
     );
     with(&["--denoise", "filter", "--integrator", "albedo"], 64, "--denoise has no effect on --integrator albedo");
     with(&["--denoise", "filter", "--preset", "fast"], 64, "--denoise is for stills, and --preset selects frames");

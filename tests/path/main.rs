@@ -16,6 +16,7 @@ mod direct;
 mod emitters;
 mod film;
 mod furnace;
+mod lit;
 mod materials;
 mod media;
 mod oren_nayar;

@@ -5,6 +5,8 @@ use super::*;
 use crate::common::new_device;
 use glam::Affine2;
 use skylit::accel::features::SceneFeatures;
+use skylit::integrators::ao::{Attenuation, Hemisphere};
+use skylit::integrators::path::ambient::Ambient;
 use skylit::integrators::path::{Lens, PixelFilter, TextureFilter, View};
 use skylit::interface::{BsdfModel, LightKind as Kind, MaterialFeature, PathFeature, TextureFeature};
 use skylit::scene::builtin::shapes;
@@ -106,6 +108,11 @@ fn gpu_kernels_of_all_features_are_valid() {
         lens: Some(Lens { radius: 0.01, focus: 1.0 }),
         pixel_filter: PixelFilter::Tent,
         texture_filter: TextureFilter::RayCone,
+        ambient: Some(Ambient {
+            color: Vec3::ONE,
+            attenuation: Attenuation { radius: 1.0, falloff: 2.0 },
+            hemisphere: Hemisphere::Shading,
+        }),
         ..base.clone()
     };
     let all_needs = Needs { shading: true, compensation: true, mip_levels: true, baked_occlusion: true, ..Needs::default() };
@@ -137,6 +144,7 @@ fn gpu_kernels_of_all_features_are_valid() {
         PathOptions { strategy: Strategy::Cosine, ..base.clone() },
         PathOptions { strategy: Strategy::Uniform, ..base.clone() },
         PathOptions { specular_only: true, ..base.clone() },
+        PathOptions { background_only: true, ..base.clone() },
         PathOptions { view: Some(View::Normals), ..base.clone() },
     ] {
         holds(&[TracerKind::Compute], &little, all_needs, &options);

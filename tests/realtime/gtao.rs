@@ -4,7 +4,7 @@ use glam::{DAffine3, DVec3};
 use skylit::film::camera::CameraRecord;
 use skylit::oracle::camera::camera_ray;
 use skylit::oracle::{Oracle, OracleRay, ao as oracle_ao, closed_form as exact};
-use skylit::realtime::{Preset, Settings, Technique};
+use skylit::realtime::{GtaoConstants, Preset, Settings, Technique};
 use skylit::sampling::Sampler;
 use skylit::scene::builtin::{SceneTransform, analytic};
 use skylit::scene::{Camera, Projection, Scene};
@@ -15,7 +15,14 @@ use crate::{NO_FILTER, SIZE, frames, mean, one_tracer, realtime, reference, trac
 
 /// With steps and slices as many; the presets have few.
 fn dense() -> Settings {
-    Settings { gtao: [4, 32], technique: Technique::Gtao, filter: NO_FILTER, history: 16, ..traced(Preset::Balanced) }
+    Settings {
+        gtao: [4, 32],
+        gtao_constants: GtaoConstants::FORMULA,
+        technique: Technique::Gtao,
+        filter: NO_FILTER,
+        history: 16,
+        ..traced(Preset::Balanced)
+    }
 }
 
 fn sparse() -> Settings {

@@ -5,7 +5,7 @@ use std::time::Instant;
 use crate::bench::record::ao::{FrameCost, PassTime};
 use crate::error::Result;
 use crate::film::camera::CameraRecord;
-use crate::measure::stats::MedianP95;
+use crate::measure::stats::Percentiles;
 use crate::realtime::{FrameStats, Realtime, Technique};
 use crate::terminal::interrupt;
 use crate::tracer::{MovedBounds, Tracer};
@@ -69,7 +69,7 @@ impl FrameLog {
     pub fn cost(&self, first: usize) -> FrameCost {
         let frames = &self.frames[first.min(self.frames.len())..];
         let ms = |values: &mut dyn Iterator<Item = f64>| {
-            MedianP95::of(&values.map(|s| s * 1e3).collect::<Vec<_>>()).unwrap_or_default()
+            Percentiles::of(&values.map(|s| s * 1e3).collect::<Vec<_>>()).unwrap_or_default()
         };
         let mean =
             |of: fn(&FrameStats) -> u64| frames.iter().map(|l| of(&l.stats)).sum::<u64>() as f64 / frames.len().max(1) as f64;

@@ -12,7 +12,7 @@ mod scenes;
 mod series;
 mod session;
 mod structures;
-mod table;
+pub mod table;
 mod view_renderer;
 mod views;
 
@@ -20,10 +20,10 @@ pub use args::BenchAoArgs;
 use args::{FalloffChoice, Part};
 use session::AoSession;
 
-use super::plot;
 use super::record::ao::AoBenchmark;
 use super::scenes::check_exists;
 use super::session::Session;
+use super::table::Block;
 use crate::error::Result;
 use crate::terminal::console::Failure;
 
@@ -46,23 +46,13 @@ pub fn run(args: &BenchAoArgs) -> Result<(), Failure> {
     })?;
     scenes.notes.into_iter().for_each(|n| session.note(n));
     let measured = measure(&mut session, &scenes.sources);
-    session.finish(measured, !args.scenes.is_empty(), Ok(()), plot::ao::draw)
+    session.finish(measured, !args.scenes.is_empty(), Ok(()))
 }
 
 /// All jobs. One that fails does not stop the others.
 fn measure(session: &mut AoSession, scenes: &[String]) -> Result<()> {
-    let record = &session.record;
-    let title = format!(
-        "{} ({}), tracer {}, {}x{}, {} frames, references of {} rays a pixel",
-        record.host.device,
-        record.host.driver,
-        record.tracer,
-        record.size[0],
-        record.size[1],
-        record.frames,
-        record.reference_rays
-    );
-    session.lines(&[title])?;
+    let title = table::title(&session.record);
+    session.show(&[Block::Line(title)])?;
     let (args, views) = (session.args, session.args.wants_views());
     let (changes, structures) = (args.wants(Part::Changes), args.wants(Part::Structures));
     let count = |wanted: bool, n: usize| if wanted { n } else { 0 };

@@ -3,6 +3,7 @@
 
 use super::candidates::Occlusion;
 use crate::bench::record::ao::ImageErrors;
+use crate::bench::record::without_reference;
 use crate::bench::reference::ReferenceHalves;
 use crate::error::Result;
 use crate::film::camera::CameraRecord;
@@ -97,29 +98,11 @@ impl AoReference {
         let rmse = pair.rmse();
         Ok(ImageErrors {
             rmse,
-            rmse_corrected: corrected(rmse, self.rmse),
+            rmse_corrected: without_reference(rmse, self.rmse),
             bias: pair.bias(),
             flip: flip(&pair, self.width, PIXELS_PER_DEGREE)?.mean,
             tanimoto: pair.tanimoto(),
             minimum_ratio: pair.minimum_ratio(),
         })
-    }
-}
-
-/// An error without that of what it was measured against; NaN stays what it is.
-fn corrected(rmse: f64, reference: f64) -> f64 {
-    let squares = rmse * rmse - reference * reference;
-    if squares < 0.0 { 0.0 } else { squares.sqrt() }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_references_own_error_is_taken_off() {
-        assert!((corrected(0.5, 0.3) - 0.4).abs() < 1e-12);
-        assert_eq!(corrected(0.1, 0.2), 0.0);
-        assert!(corrected(f64::NAN, 0.1).is_nan());
     }
 }

@@ -52,7 +52,7 @@ pub fn measure(session: &mut AoSession, series: Series, scenes: &[String]) -> Re
 }
 
 fn finish(session: &mut AoSession, record: SeriesRecord) -> Result<()> {
-    session.lines(&table::series(&record))?;
+    session.show(&table::series(&record))?;
     if record.lines.iter().any(|l| !l.points.is_empty()) {
         session.record.series.push(record);
     }

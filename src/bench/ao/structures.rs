@@ -8,7 +8,7 @@ use super::table;
 use crate::accel::flatten::FlatScene;
 use crate::bench::record::ao::StructureRecord;
 use crate::error::{Error, Result};
-use crate::measure::stats::MedianP95;
+use crate::measure::stats::Percentiles;
 use crate::scene::{Geometry, Motion, load};
 use crate::terminal::interrupt;
 use crate::tracer::{Changes, MeshChange, Tracer};
@@ -37,7 +37,7 @@ pub fn measure(session: &mut AoSession) -> Result<()> {
         let record = one(session, source)?;
         session.record.structures.push(record);
     }
-    session.lines(&table::structures(&session.record.structures[first..]))
+    session.show(&table::structures(&session.record.structures[first..]))
 }
 
 fn one(session: &mut AoSession, source: &str) -> Result<StructureRecord> {
@@ -74,14 +74,14 @@ fn one(session: &mut AoSession, source: &str) -> Result<StructureRecord> {
             tops.push(1e3 * stats.top_seconds);
         }
     }
-    record.top = MedianP95::of(&tops);
+    record.top = Percentiles::of(&tops);
     let poses = poses(&mesh.positions);
     let [refits, rebuilds] = [false, true].map(|rebuild| deform(&mut tracer, &poses, repeats, rebuild));
     let [refits, rebuilds] = [refits?, rebuilds?];
     if rebuilds.is_empty() {
         session.note(format!("{source}: the tracer refits its mesh whatever that costs; building it anew was not timed"));
     }
-    (record.refit, record.rebuild) = (MedianP95::of(&refits), MedianP95::of(&rebuilds));
+    (record.refit, record.rebuild) = (Percentiles::of(&refits), Percentiles::of(&rebuilds));
     Ok(record)
 }
 

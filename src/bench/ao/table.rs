@@ -1,10 +1,11 @@
 //! The tables of `skylit bench ao`.
 
 use crate::bench::record::ao::{
-    ChangeRecord, ChangeResult, FrameCost, ImageErrors, SeriesRecord, StructureRecord, TechniqueRecord, Verdict, ViewRecord,
+    AoBenchmark, ChangeRecord, ChangeResult, FrameCost, ImageErrors, SeriesRecord, StructureRecord, TechniqueRecord, Verdict,
+    ViewRecord,
 };
-use crate::bench::table::{header, indented, number, optional, thousands};
-use crate::measure::stats::MedianP95;
+use crate::bench::table::{Block, header, number, optional, thousands};
+use crate::measure::stats::Percentiles;
 
 /// Top levels of the reference work, by million triangles and meshes: milliseconds on a GPU that it does not name.
 const THEIR_TOPS: &str = "4.9 M in 4 meshes 0.157, 6.7 M in 5 0.160, 8.6 M in 6 0.160, 25.2 M in 15 0.180";
@@ -19,7 +20,7 @@ fn ratio(x: f64) -> String {
     if x.is_infinite() { "inf".to_owned() } else { format!("{x:.3}") }
 }
 
-fn ms(s: MedianP95) -> String {
+fn ms(s: Percentiles) -> String {
     format!("{}..{}", number(s.median), number(s.p95))
 }
 
@@ -27,11 +28,33 @@ fn passes(cost: &FrameCost) -> String {
     cost.passes.iter().map(|p| format!("{} {}", p.pass, number(p.ms.median))).collect::<Vec<_>>().join(", ")
 }
 
+/// All tables of a record.
+pub fn blocks(record: &AoBenchmark) -> Vec<Block> {
+    let tables = record.views.iter().map(view).chain(record.changes.iter().map(change));
+    let structures = if record.structures.is_empty() { Vec::new() } else { structures(&record.structures) };
+    let series = record.series.iter().map(series);
+    [Block::Line(title(record))].into_iter().chain(tables.flatten()).chain(structures).chain(series.flatten()).collect()
+}
+
+/// Device and settings.
+pub fn title(record: &AoBenchmark) -> String {
+    format!(
+        "{} ({}), tracer {}, {}x{}, {} frames, references of {} rays a pixel",
+        record.host.device,
+        record.host.driver,
+        record.tracer,
+        record.size[0],
+        record.size[1],
+        record.frames,
+        record.reference_rays
+    )
+}
+
 /// One view's results.
-pub fn view(record: &ViewRecord) -> Vec<String> {
-    let mut lines = vec![
-        String::new(),
-        format!(
+pub fn view(record: &ViewRecord) -> Vec<Block> {
+    let mut blocks = vec![
+        Block::gap(),
+        Block::line(format!(
             "{}, {}: {} primitives, reach {:.4}; {} pixels show something; reference good to {:.5}",
             record.scene,
             record.view,
@@ -39,19 +62,19 @@ pub fn view(record: &ViewRecord) -> Vec<String> {
             record.reach,
             thousands(record.covered),
             record.reference_rmse
-        ),
+        )),
+        Block::Table { title: "Times, ms a frame", rows: times(&record.results), left: 1 },
+        Block::gap(),
+        Block::Table { title: "Errors", rows: errors(&record.results), left: 1 },
+        Block::gap(),
     ];
-    lines.extend(indented(&times(&record.results), 1));
-    lines.push(String::new());
-    lines.extend(indented(&errors(&record.results), 1));
-    lines.push(String::new());
     for r in &record.results {
         if let Some(s) = &r.still {
-            lines.push(format!("  {}, camera rays {}: {} ms", r.preset, r.primary, passes(&s.moving_cost)));
+            blocks.push(Block::line(format!("  {}, camera rays {}: {} ms", r.preset, r.primary, passes(&s.moving_cost))));
         }
     }
-    lines.extend(verdict(&record.verdict));
-    lines
+    blocks.extend(verdict(&record.verdict).into_iter().map(Block::Line));
+    blocks
 }
 
 fn times(results: &[TechniqueRecord]) -> Vec<Vec<String>> {
@@ -162,18 +185,15 @@ fn verdict(v: &Verdict) -> Vec<String> {
 }
 
 /// What a change left behind.
-pub fn change(record: &ChangeRecord) -> Vec<String> {
-    let mut lines = vec![
-        String::new(),
-        format!(
-            "{}, {}: {} pixels looked at, {} frames; reference good to {:.5}",
-            record.scene,
-            record.change,
-            thousands(record.pixels),
-            record.frames,
-            record.reference_rmse
-        ),
-    ];
+pub fn change(record: &ChangeRecord) -> Vec<Block> {
+    let title = format!(
+        "{}, {}: {} pixels looked at, {} frames; reference good to {:.5}",
+        record.scene,
+        record.change,
+        thousands(record.pixels),
+        record.frames,
+        record.reference_rmse
+    );
     type Column = (&'static str, fn(&ChangeResult) -> Option<String>);
     let columns: [Column; 14] = [
         ("left 1", |r| r.residuals.first().map(|g| format!("{g:.3}"))),
@@ -198,12 +218,11 @@ pub fn change(record: &ChangeRecord) -> Vec<String> {
         let cells = used.iter().map(|(_, of)| of(r).unwrap_or_else(|| "-".to_owned()));
         std::iter::once(r.preset.clone()).chain(cells).collect()
     }));
-    lines.extend(indented(&rows, 1));
-    lines
+    vec![Block::gap(), Block::Line(title), Block::Table { title: "What is left of the past", rows, left: 1 }]
 }
 
 /// What keeping structures up to date took.
-pub fn structures(records: &[StructureRecord]) -> Vec<String> {
+pub fn structures(records: &[StructureRecord]) -> Vec<Block> {
     let columns = ["structures, ms", "stored", "placed", "first build", "top level..p95", "mesh", "refit..p95", "rebuild..p95"];
     let mut rows = vec![header(&columns)];
     for r in records {
@@ -219,11 +238,11 @@ pub fn structures(records: &[StructureRecord]) -> Vec<String> {
         ]);
     }
     let theirs = [format!("  Larsen, top level, ms: {THEIR_TOPS}"), format!("  Larsen: {THEIR_BUILDS}")];
-    std::iter::once(String::new()).chain(indented(&rows, 1)).chain(theirs).collect()
+    [Block::gap(), Block::Table { title: "Updates, ms", rows, left: 1 }].into_iter().chain(theirs.map(Block::Line)).collect()
 }
 
 /// One number varied.
-pub fn series(record: &SeriesRecord) -> Vec<String> {
+pub fn series(record: &SeriesRecord) -> Vec<Block> {
     let columns = ["", "x", "ms..p95", "frames/s", "RMSE", "unfiltered", "at equal time", "passes, ms"];
     let mut rows = vec![header(&columns)];
     rows[0][0].clone_from(&record.series);
@@ -241,5 +260,5 @@ pub fn series(record: &SeriesRecord) -> Vec<String> {
             ]);
         }
     }
-    std::iter::once(String::new()).chain(indented(&rows, 1)).collect()
+    vec![Block::gap(), Block::Table { title: "All points", rows, left: 1 }]
 }

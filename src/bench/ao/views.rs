@@ -40,7 +40,7 @@ pub fn measure(session: &mut AoSession, source: &str) -> Result<()> {
         let outcome = from_there(session, source, (&loaded, view), &renderer, &mut record, share);
         // what there is, also where it failed
         if !record.results.is_empty() {
-            session.lines(&table::view(&record))?;
+            session.show(&table::view(&record))?;
             session.record.views.push(record);
         }
         outcome?;

@@ -3,6 +3,7 @@
 use super::engine::{Engine, PathReference};
 use crate::bench::peers::process::{Peer, PeerError};
 use crate::bench::record::path::{ContestantRecord, ErrorPoint, SceneRecord};
+use crate::bench::record::without_reference;
 use crate::measure::metrics::{ImagePair, bad_pixels};
 use crate::measure::stats::Summary;
 
@@ -81,10 +82,15 @@ impl<'a> Contestant<'a> {
             .map(|l| {
                 let squares = mean(&l.squares);
                 let unsure = squares < 4.0 * reference_mse;
+                let reference_rmse = references[self.reference].rmse;
+                let error =
+                    |squares: f64| if unsure { squares.sqrt() } else { without_reference(squares.sqrt(), reference_rmse) };
                 ErrorPoint {
                     spp: l.spp,
                     seconds: Summary::of(&l.seconds),
-                    rmse: if unsure { squares } else { squares - reference_mse }.sqrt(),
+                    repeats: l.seconds.clone(),
+                    rmse: error(squares),
+                    rmse_repeats: l.squares.iter().map(|s| error(*s)).collect(),
                     unsure,
                     bad_pixels: mean(&l.bad),
                 }

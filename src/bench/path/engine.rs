@@ -11,8 +11,6 @@ use crate::integrators::path::{PathIntegrator, PathOptions};
 use crate::terminal::interrupt::SilentControl;
 use crate::tracer::Tracer;
 
-/// Name of our own engine in records.
-pub const OWN: &str = "skylit";
 /// Seeds of references: no timed image has them.
 const REFERENCE_SEED: u32 = 0x7e0_0000;
 /// Seconds that one image of a reference should take.

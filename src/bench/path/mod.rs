@@ -6,18 +6,18 @@ mod contestant;
 mod engine;
 mod peer;
 mod scenes;
-mod table;
+pub mod table;
 
 pub use args::BenchPathArgs;
 use contestant::Contestant;
-use engine::{Engine, OWN, PathReference, STEP, render_reference};
+use engine::{Engine, PathReference, STEP, render_reference};
 use scenes::PathScene;
 
 use super::peers::file::{self, Measures, PeerSpec};
 use super::peers::process::PeerError;
-use super::plot;
-use super::record::path::{PathBenchmark, ReferenceDifference, ReferenceRecord, SceneRecord};
+use super::record::path::{OWN, PathBenchmark, ReferenceDifference, ReferenceRecord, SceneRecord};
 use super::session::Session;
+use super::table::Block;
 use crate::accel::flatten::FlatScene;
 use crate::error::Result;
 use crate::film::camera::CameraRecord;
@@ -52,16 +52,15 @@ pub fn run(args: &BenchPathArgs) -> Result<(), Failure> {
     })?;
     scenes.notes.into_iter().for_each(|n| session.note(n));
     let measured = measure(&mut session, &scenes.sources, specs);
-    session.finish(measured, !args.scenes.is_empty(), Ok(()), plot::path::draw)
+    session.finish(measured, !args.scenes.is_empty(), Ok(()))
 }
 
 /// All scenes. One that fails does not stop the others.
 fn measure(session: &mut PathSession, scenes: &[String], specs: Result<Vec<PeerSpec>, String>) -> Result<()> {
     session.start_peers(specs)?;
     session.record.peers = session.peer_titles();
-    let record = &session.record;
-    let title = format!("{} ({}), tracer {}", record.host.device, record.host.driver, record.tracer);
-    session.lines(&[title])?;
+    let title = table::title(&session.record);
+    session.show(&[Block::Line(title)])?;
     session.expect_jobs(scenes.len());
     scenes.iter().try_for_each(|source| session.job(source, |session| session.scene(source)))
 }
@@ -124,7 +123,7 @@ impl PathSession<'_> {
         if let Some(baseline) = baseline {
             record.set_target(&baseline);
         }
-        self.lines(&table::scene(&record))?;
+        self.show(&table::scene(&record))?;
         self.record.scenes.push(record);
         Ok(())
     }

@@ -1,32 +1,42 @@
 //! The tables of `skylit bench path`.
 
-use crate::bench::record::path::{ContestantRecord, SceneRecord, TimeEstimate};
-use crate::bench::table::{header, indented, number, thousands};
+use crate::bench::record::path::{ContestantRecord, PathBenchmark, SceneRecord, TimeEstimate};
+use crate::bench::table::{Block, header, number, thousands};
+
+/// All tables of a record.
+pub fn blocks(record: &PathBenchmark) -> Vec<Block> {
+    [Block::Line(title(record))].into_iter().chain(record.scenes.iter().flat_map(scene)).collect()
+}
+
+/// Device and tracer.
+pub fn title(record: &PathBenchmark) -> String {
+    format!("{} ({}), tracer {}", record.host.device, record.host.driver, record.tracer)
+}
 
 /// One scene's results.
-pub fn scene(record: &SceneRecord) -> Vec<String> {
+pub fn scene(record: &SceneRecord) -> Vec<Block> {
     let mut what = vec![format!("{}x{}", record.size[0], record.size[1]), format!("{} triangles", thousands(record.triangles))];
     if record.spheres > 0 {
         what.push(format!("{} spheres", thousands(record.spheres)));
     }
     what.push(format!("{} lights", record.lights));
     what.push(format!("environment {}", record.environment));
-    let mut lines = vec![String::new(), format!("{}: {}", record.scene, what.join(", "))];
+    let mut blocks = vec![Block::gap(), Block::line(format!("{}: {}", record.scene, what.join(", ")))];
     for r in &record.references {
-        lines.push(format!(
+        blocks.push(Block::line(format!(
             "  reference of {}: {} paths a pixel in {:.0} s, known to {:.2e}, mean {:.4}",
             r.engine,
             thousands(r.spp),
             r.seconds,
             r.rmse,
             r.mean
-        ));
+        )));
     }
     for d in &record.differences {
-        lines.push(format!(
+        blocks.push(Block::line(format!(
             "  {} beside ours: mean {:.4} times, RMSE {:.2e}, of which {:.2e} is noise",
             d.engine, d.mean_ratio, d.rmse, d.explained
-        ));
+        )));
     }
     let target = record.target.as_ref().map(|t| t.rmse);
     let mut rows = vec![header(&["contestant", "spp", "seconds", "RMSE", "bad pixels", "Mpaths/s", "Mrays/s", "1/(MSE s)"])];
@@ -35,9 +45,8 @@ pub fn scene(record: &SceneRecord) -> Vec<String> {
     }
     let base = record.target.as_ref().and_then(|t| record.results.iter().find(|r| r.name == t.set_by)).and_then(seconds);
     rows.extend(record.results.iter().map(|r| row(r, base)));
-    lines.push(String::new());
-    lines.extend(indented(&rows, 1));
-    lines
+    blocks.extend([Block::gap(), Block::Table { title: "Greatest sample counts", rows, left: 1 }]);
+    blocks
 }
 
 fn seconds(r: &ContestantRecord) -> Option<f64> {

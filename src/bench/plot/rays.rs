@@ -1,115 +1,85 @@
-//! Rates against the number of triangles, drawn: one panel a stream, both axes logarithmic.
-//!
-//! What it shares with other pictures is in [`super::chart`].
+//! A benchmark of ray tracing as a plot: rates against the number of triangles, a panel a stream.
 
-use plotters::prelude::*;
-
-use super::chart::{Area, Chart, Picture, axes, color, draw_sheet, failed};
+use super::host_line;
+use super::panel::{Mark, Panel, Plot, Point, Series};
 use crate::bench::record::rays::{RayBenchmark, family};
-use crate::error::Result;
 use crate::measure::stats::Summary;
 
-/// Draws all results. Scenes of a family (`terrain:N`) are joined by lines: circles for the first family, triangles for the
-/// second, crosses for others; scenes without a family are hollow circles. The dashed line falls as
-/// 1 / log n from the first point of the first contestant.
-///
-/// # Errors
-/// [`crate::Error::Usage`] when there is no result to draw.
-pub fn draw(benchmark: &RayBenchmark) -> Result<Picture> {
+/// Name of the dashed line.
+const LOG_LAW: &str = "as 1 / log n";
+/// Points of the dashed line.
+const LOG_LAW_POINTS: u32 = 64;
+
+/// All results. Scenes of a family (`terrain:N`) are joined by lines: discs for the first family, triangles for the second, crosses for others; scenes without
+/// a family are circles. The dashed line falls as 1 / log n from the first point of the first contestant.
+pub fn plot(benchmark: &RayBenchmark) -> Plot {
     let mut streams: Vec<&str> = Vec::new();
-    let mut contestants: Vec<&str> = Vec::new();
-    for (_, stream, run) in benchmark.rows() {
+    for (_, stream, _) in benchmark.rows() {
         if !streams.contains(&stream.stream.as_str()) {
             streams.push(&stream.stream);
         }
-        if !contestants.contains(&run.contestant.as_str()) {
-            contestants.push(&run.contestant);
-        }
     }
-    let subtitle = format!("{} ({}), {} threads", benchmark.host.device, benchmark.host.driver, benchmark.host.threads);
-    let titles = ["Mrays/s against triangles and spheres", subtitle.as_str()];
-    draw_sheet(titles, &contestants, streams.len(), |k, area| draw_panel(benchmark, streams[k], &contestants, area))
+    Plot {
+        title: "Ray tracing: rate against scene size".into(),
+        subtitle: host_line(&benchmark.host),
+        groups: streams.into_iter().map(|s| vec![stream(benchmark, s)]).collect(),
+    }
 }
 
-/// One result: size, and median, least and greatest rate.
-#[derive(Clone, Copy)]
-struct Mark {
-    size: f64,
-    rate: f64,
-    min: f64,
-    max: f64,
-}
-
-fn draw_panel(benchmark: &RayBenchmark, stream: &str, contestants: &[&str], area: &Area) -> Result<()> {
-    let here = || benchmark.rows().filter(|(_, t, r)| t.stream == stream && r.device.median > 0.0);
-    let x = here().map(|(s, _, _)| (s.primitives() as f64).max(1.0));
-    let y = here().flat_map(|(_, _, r)| [r.device.min, r.device.max]).filter(|v| *v > 0.0);
-    let Some(mut chart) = axes(area, [stream, "triangles and spheres", "Mrays/s"], x, y)? else { return Ok(()) };
-    // families in the order of the scenes: each has its mark
+/// One stream of rays.
+pub fn stream(benchmark: &RayBenchmark, stream: &str) -> Panel {
+    let here = || benchmark.rows().filter(|(_, t, _)| t.stream == stream);
+    // in the order of the scenes: each has its mark
     let mut families: Vec<&str> = Vec::new();
     for name in benchmark.scenes.iter().filter_map(|s| family(&s.scene)) {
         if !families.contains(&name) {
             families.push(name);
         }
     }
-    for (k, name) in contestants.iter().enumerate() {
-        let mut groups: Vec<(Option<&str>, Vec<Mark>)> = Vec::new();
-        for (scene, _, run) in here().filter(|(_, _, r)| r.contestant == *name) {
-            let Summary { median: rate, min, max } = run.device;
-            let point = Mark { size: scene.primitives().max(1) as f64, rate, min, max };
-            let of = family(&scene.scene);
-            match groups.iter_mut().find(|g| g.0.is_some() && g.0 == of) {
-                Some(g) => g.1.push(point),
-                None => groups.push((of, vec![point])),
+    let mut series: Vec<(Option<&str>, Series)> = Vec::new();
+    for (scene, _, run) in here() {
+        let of = family(&scene.scene);
+        let Summary { median, min, max } = run.device;
+        // from the slowest repeat to the fastest
+        let y_bar = Some([min, max]).filter(|_| min > 0.0 && max > min && max.is_finite());
+        let point = Point { y_bar, ..Point::from((scene.primitives().max(1) as f64, median)) };
+        match series.iter_mut().find(|(f, s)| *f == of && s.name == run.contestant) {
+            Some((_, s)) => s.points.push(point),
+            None => {
+                let mark = match of.and_then(|f| families.iter().position(|g| *g == f)) {
+                    None => Mark::Circles,
+                    Some(0) => Mark::Discs,
+                    Some(1) => Mark::Triangles,
+                    Some(_) => Mark::Crosses,
+                };
+                series.push((of, Series { name: run.contestant.clone(), mark, points: vec![point] }));
             }
         }
-        for (of, mut points) in groups {
-            points.sort_by(|a, b| a.size.total_cmp(&b.size));
-            let index = of.and_then(|f| families.iter().position(|g| *g == f));
-            draw_points(&mut chart, &points, color(k), index)?;
-            if k == 0 && points.len() > 1 {
-                draw_log_law(&mut chart, points[0], points[points.len() - 1].size)?;
-            }
-        }
     }
-    Ok(())
+    series.iter_mut().for_each(|(_, s)| s.points.sort_by(|a, b| a.x.total_cmp(&b.x)));
+    let first = here().next().map(|(_, _, run)| run.contestant.clone()).unwrap_or_default();
+    let laws: Vec<Series> =
+        series.iter().filter(|(f, s)| f.is_some() && s.name == first).filter_map(|(_, s)| log_law(s)).collect();
+    Panel {
+        title: stream.to_owned(),
+        caption: "Rate by the number of triangles and spheres; scenes of a family are joined.".into(),
+        x: "triangles and spheres".into(),
+        y: "Mrays/s".into(),
+        series: laws.into_iter().chain(series.into_iter().map(|(_, s)| s)).collect(),
+    }
 }
 
-fn draw_points(chart: &mut Chart, points: &[Mark], color: RGBColor, family: Option<usize>) -> Result<()> {
-    if points.len() > 1 {
-        let line = points.iter().map(|p| (p.size, p.rate));
-        chart.draw_series(LineSeries::new(line, color.stroke_width(2))).map_err(failed)?;
-    }
-    // from the slowest repeat to the fastest
-    let spread = |p: &Mark| PathElement::new(vec![(p.size, p.min), (p.size, p.max)], color.stroke_width(1));
-    chart.draw_series(points.iter().filter(|p| p.min > 0.0).map(spread)).map_err(failed)?;
-    let at = |p: &Mark| (p.size, p.rate);
-    match family {
-        None => chart.draw_series(points.iter().map(|p| Circle::new(at(p), 4, color.stroke_width(2)))).map(drop),
-        Some(0) => chart.draw_series(points.iter().map(|p| Circle::new(at(p), 4, color.filled()))).map(drop),
-        Some(1) => chart.draw_series(points.iter().map(|p| TriangleMarker::new(at(p), 6, color.filled()))).map(drop),
-        Some(_) => chart.draw_series(points.iter().map(|p| Cross::new(at(p), 5, color.stroke_width(2)))).map(drop),
-    }
-    .map_err(failed)?;
-    Ok(())
-}
-
-/// What falls as 1 / log n through a point.
-fn draw_log_law(chart: &mut Chart, from: Mark, to: f64) -> Result<()> {
-    if from.size < 2.0 {
-        return Ok(());
-    }
-    let at = |k: u32| from.size * (to / from.size).powf(f64::from(k) / 64.0);
-    let curve = (0..=64).map(|k| (at(k), from.rate * from.size.ln() / at(k).ln()));
-    chart.draw_series(DashedLineSeries::new(curve, 6, 5, RGBColor(90, 90, 90).stroke_width(1))).map_err(failed)?;
-    Ok(())
+/// What falls as 1 / log n through the first of several points.
+fn log_law(series: &Series) -> Option<Series> {
+    let (from, to) = (series.placed().next()?, series.placed().last()?.x);
+    let at = |k: u32| from.x * (to / from.x).powf(f64::from(k) / f64::from(LOG_LAW_POINTS));
+    let points = (0..=LOG_LAW_POINTS).map(|k| (at(k), from.y * from.x.ln() / at(k).ln()));
+    (from.x >= 2.0 && to > from.x).then(|| Series::guide(LOG_LAW, points))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::bench::plot::chart::{HEAD, PANEL};
-    use crate::bench::record::HostInfo;
     use crate::bench::record::rays::{RunRecord, SceneRecord, StreamRecord};
 
     fn benchmark(rates: &[(&str, u64, f64)]) -> RayBenchmark {
@@ -130,39 +100,28 @@ mod tests {
             streams: vec![StreamRecord { stream: "primary".into(), rays: 1, results: vec![run(rate)] }],
             ..Default::default()
         });
-        RayBenchmark {
-            host: HostInfo { device: "a device".into(), ..Default::default() },
-            scenes: scenes.collect(),
-            ..Default::default()
-        }
-    }
-
-    /// Pixels of the first contestant's colour in a picture of the given results.
-    fn colored(rates: &[(&str, u64, f64)]) -> usize {
-        let p = draw(&benchmark(rates)).unwrap();
-        assert_eq!(p.rgb.len(), 3 * (p.width * p.height) as usize);
-        let panel = &p.rgb[3 * (HEAD * p.width) as usize..3 * ((HEAD + PANEL[1]) * p.width) as usize];
-        panel.chunks(3).filter(|c| *c == [color(0).0, color(0).1, color(0).2]).count()
+        RayBenchmark { scenes: scenes.collect(), ..Default::default() }
     }
 
     #[test]
     fn lines_join_families_only() {
-        let family = colored(&[("a:10", 10, 5.0), ("a:1000", 1000, 3.0)]);
-        let single = colored(&[("a.glb", 10, 5.0), ("b.glb", 1000, 3.0)]);
-        assert!(single > 20 && family > single + 300, "{family} {single}");
-        // one point is no reason to fail
-        assert!(colored(&[("a:10", 10, 5.0)]) > 20);
+        let marks = |rates: &[(&str, u64, f64)]| -> Vec<(Mark, usize)> {
+            let plot = plot(&benchmark(rates));
+            plot.panels().flat_map(|p| &p.series).map(|s| (s.mark, s.points.len())).collect()
+        };
+        let law = (Mark::Guide, 65);
+        assert_eq!(marks(&[("a:1000", 1000, 3.0), ("a:10", 10, 5.0)]), [law, (Mark::Discs, 2)]);
+        assert_eq!(marks(&[("a.glb", 10, 5.0), ("b.glb", 1000, 3.0)]), [(Mark::Circles, 2)]);
+        assert_eq!(marks(&[("a:10", 10, 5.0), ("b:10", 10, 4.0)]), [(Mark::Discs, 1), (Mark::Triangles, 1)]);
+        assert!(marks(&[]).is_empty());
     }
 
     #[test]
-    fn text_is_drawn() {
-        let p = draw(&benchmark(&[("a:10", 10, 5.0)])).unwrap();
-        let dark = p.rgb[..3 * (HEAD * p.width) as usize].chunks(3).filter(|c| c[0] < 100).count();
-        assert!(dark > 300, "{dark} dark pixels in the title");
-    }
-
-    #[test]
-    fn nothing_to_draw_is_an_error() {
-        assert_eq!(draw(&RayBenchmark::default()).map(|_| ()).unwrap_err().exit_code(), 64);
+    fn points_are_in_the_order_of_size_with_their_noise() {
+        let series = plot(&benchmark(&[("a:1000", 1000, 3.0), ("a:10", 10, 5.0)])).groups.remove(0).remove(0).series;
+        assert_eq!(series[1].points.iter().map(|p| p.x).collect::<Vec<_>>(), [10.0, 1000.0]);
+        assert_eq!(series[1].points[0].y_bar, Some([4.5, 5.5]));
+        // the law through the first of them: at n^3 a third of the rate
+        assert!((series[0].points[64].y - 5.0 / 3.0).abs() < 1e-9);
     }
 }

@@ -6,7 +6,7 @@ mod contestant;
 mod peer;
 mod scenes;
 mod streams;
-mod table;
+pub mod table;
 
 pub use args::BenchRaysArgs;
 use contestant::{Contestant, KERNELS, PreparedRun, RepeatTime};
@@ -15,10 +15,10 @@ use streams::{RaySets, STREAMS, Set, StreamKind};
 
 use super::peers::file::{self, Measures, PeerSpec};
 use super::peers::process::PeerError;
-use super::plot;
 use super::record::rays::{CheckRecord, Ratio, RayBenchmark, RunRecord, SceneRecord, StreamRecord};
 use super::scenes::check_exists;
 use super::session::Session;
+use super::table::Block;
 use crate::accel::flatten::FlatScene;
 use crate::error::{Error, Result};
 use crate::integrators::rays::Mode;
@@ -53,15 +53,16 @@ pub fn run(args: &BenchRaysArgs) -> Result<(), Failure> {
     let mut session = Session::start(args, &args.common, |device| RayBenchmark {
         host: device.host_info(),
         repeats: args.repeats(),
+        size: args.size(),
         build: args.build.name().to_owned(),
         ..Default::default()
     })?;
     scenes.notes.into_iter().for_each(|n| session.note(n));
     let measured = measure(&mut session, &scenes.sources, specs);
     session.record.find_scaling();
-    let shown = session.lines(&table::scaling(&session.record));
+    let shown = session.show(&table::scaling(&session.record));
     let agreed = check_agreement(args, &session.record);
-    session.finish(measured, !args.scenes.is_empty(), shown.and(agreed), plot::rays::draw)
+    session.finish(measured, !args.scenes.is_empty(), shown.and(agreed))
 }
 
 /// With `--check`: an answer that rounding does not explain is a failure, if it is ours or of a peer that has to agree. The
@@ -94,16 +95,8 @@ fn measure(session: &mut RaySession, scenes: &[String], specs: Result<Vec<PeerSp
     let specs = session.peers.iter().map(|p| &p.spec);
     session.record.baselines = specs.flat_map(|s| s.baselines.iter().map(|k| s.title_of(k))).collect();
     session.record.peers = session.peer_titles();
-    let record = &session.record;
-    let title = format!(
-        "{} ({}), {} threads; medians of {} repeats, in turn{}",
-        record.host.device,
-        record.host.driver,
-        record.host.threads,
-        record.repeats,
-        record.peers.iter().map(|p| format!("; beside {p}")).collect::<String>()
-    );
-    session.lines(&[title])?;
+    let title = table::title(&session.record);
+    session.show(&[Block::Line(title)])?;
     session.expect_jobs(scenes.len());
     for source in scenes {
         session.job(source, |session| {
@@ -111,7 +104,7 @@ fn measure(session: &mut RaySession, scenes: &[String], specs: Result<Vec<PeerSp
             let outcome = session.scene(source, &mut record);
             // what there is, also where it failed
             if !record.streams.is_empty() {
-                session.lines(&table::scene(&record, &session.record.baselines))?;
+                session.show(&table::scene(&record, &session.record.baselines))?;
                 session.record.scenes.push(record);
             }
             outcome

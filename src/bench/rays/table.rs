@@ -1,10 +1,28 @@
 //! The tables of `skylit bench rays`.
 
 use crate::bench::record::rays::{RayBenchmark, SceneRecord};
-use crate::bench::table::{align, header, indented, number, optional, thousands};
+use crate::bench::table::{Block, header, number, optional, thousands};
+
+/// All tables of a record.
+pub fn blocks(record: &RayBenchmark) -> Vec<Block> {
+    let scenes = record.scenes.iter().flat_map(|s| scene(s, &record.baselines));
+    [Block::Line(title(record))].into_iter().chain(scenes).chain(scaling(record)).collect()
+}
+
+/// Device and settings.
+pub fn title(record: &RayBenchmark) -> String {
+    format!(
+        "{} ({}), {} threads; medians of {} repeats, in turn{}",
+        record.host.device,
+        record.host.driver,
+        record.host.threads,
+        record.repeats,
+        record.peers.iter().map(|p| format!("; beside {p}")).collect::<String>()
+    )
+}
 
 /// One scene's results.
-pub fn scene(record: &SceneRecord, baselines: &[String]) -> Vec<String> {
+pub fn scene(record: &SceneRecord, baselines: &[String]) -> Vec<Block> {
     let mut what = vec![format!("{} triangles", thousands(record.triangles))];
     if record.spheres > 0 {
         what.push(format!("{} spheres", thousands(record.spheres)));
@@ -12,7 +30,7 @@ pub fn scene(record: &SceneRecord, baselines: &[String]) -> Vec<String> {
     if record.stored_primitives != record.primitives() {
         what.push(format!("{} stored, {} instances", thousands(record.stored_primitives), thousands(record.instances as u64)));
     }
-    let mut lines = vec![String::new(), format!("{}: {}", record.scene, what.join(", "))];
+    let mut blocks = vec![Block::gap(), Block::line(format!("{}: {}", record.scene, what.join(", ")))];
     let mut builds = vec![header(&["built", "seconds", "bytes/primitive"])];
     let sah = record.builds.iter().any(|b| b.sah_cost.is_some());
     if sah {
@@ -25,19 +43,17 @@ pub fn scene(record: &SceneRecord, baselines: &[String]) -> Vec<String> {
         }
         builds.push(row);
     }
-    lines.extend(indented(&builds, 1));
-    lines.push(String::new());
-    lines.extend(indented(&results(record, baselines), 2));
+    blocks.extend([Block::Table { title: "Building", rows: builds, left: 1 }, Block::gap()]);
+    blocks.push(Block::Table { title: "Tracing", rows: results(record, baselines), left: 2 });
     if !record.checks.is_empty() {
         let mut rows = vec![header(&["checked", "stream", "rays", "agree", "ties", "unexplained"])];
         rows.extend(record.checks.iter().map(|c| {
             let counts = [c.rays, c.agree, c.ties, c.unexplained].map(thousands);
             [vec![c.contestant.clone(), c.stream.clone()], counts.to_vec()].concat()
         }));
-        lines.push(String::new());
-        lines.extend(indented(&rows, 2));
+        blocks.extend([Block::gap(), Block::Table { title: "Answers compared with the first kernel's", rows, left: 2 }]);
     }
-    lines
+    blocks
 }
 
 fn results(record: &SceneRecord, baselines: &[String]) -> Vec<Vec<String>> {
@@ -79,7 +95,7 @@ fn results(record: &SceneRecord, baselines: &[String]) -> Vec<Vec<String>> {
 }
 
 /// How rates fall with size.
-pub fn scaling(benchmark: &RayBenchmark) -> Vec<String> {
+pub fn scaling(benchmark: &RayBenchmark) -> Vec<Block> {
     if benchmark.scaling.is_empty() {
         return Vec::new();
     }
@@ -97,5 +113,5 @@ pub fn scaling(benchmark: &RayBenchmark) -> Vec<String> {
             if s.holds { "yes" } else { "no" }.to_owned(),
         ]);
     }
-    [vec![String::new()], align(&rows, 3)].concat()
+    vec![Block::gap(), Block::Table { title: "How rates fall with size", rows, left: 3 }]
 }

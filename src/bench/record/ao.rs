@@ -3,13 +3,14 @@
 //!
 //! Times are milliseconds, errors are of ambient visibility (1 - ambient occlusion, 0 to 1) over the pixels that show a surface.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::{Completeness, HostInfo};
-use crate::measure::stats::MedianP95;
+use crate::measure::stats::{Percentiles, number_or_nan, numbers_or_nan};
 
 /// A whole run.
-#[derive(Clone, Debug, Default, Serialize)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[serde(default)]
 pub struct AoBenchmark {
     /// Host and device.
     #[serde(flatten)]
@@ -38,7 +39,8 @@ pub struct AoBenchmark {
 }
 
 /// Results of one view of a scene.
-#[derive(Clone, Debug, Default, Serialize)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[serde(default)]
 pub struct ViewRecord {
     /// As on the command line.
     pub scene: String,
@@ -47,6 +49,7 @@ pub struct ViewRecord {
     /// Triangles and spheres over all instances.
     pub primitives: u64,
     /// Distance in scene units beyond which occlusion is less than 1/255 (exponential), or none (binary).
+    #[serde(deserialize_with = "number_or_nan")]
     pub reach: f64,
     /// Camera position, world coordinates.
     pub eye: [f64; 3],
@@ -55,6 +58,7 @@ pub struct ViewRecord {
     /// Number of pixels that show a surface.
     pub covered: u64,
     /// Standard error of the reference that errors are measured against.
+    #[serde(deserialize_with = "number_or_nan")]
     pub reference_rmse: f64,
     /// Results of each preset.
     pub results: Vec<TechniqueRecord>,
@@ -63,7 +67,8 @@ pub struct ViewRecord {
 }
 
 /// Results of one preset in one view.
-#[derive(Clone, Debug, Default, Serialize)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[serde(default)]
 pub struct TechniqueRecord {
     /// Name of the preset.
     pub preset: String,
@@ -82,23 +87,24 @@ pub struct TechniqueRecord {
 }
 
 /// Times of a pass, or of one step of several launches of it.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PassTime {
     /// Name of the pass.
     pub pass: String,
     /// Device time over the timed frames, milliseconds.
-    pub ms: MedianP95,
+    pub ms: Percentiles,
 }
 
 /// Cost of a frame.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
 pub struct FrameCost {
     /// Each pass.
     pub passes: Vec<PassTime>,
     /// All passes, on the device; 0 where the device has no clock.
-    pub device_ms: MedianP95,
+    pub device_ms: Percentiles,
     /// By the clock of the process, submission included.
-    pub wall_ms: MedianP95,
+    pub wall_ms: Percentiles,
     /// Camera rays, the mean of a frame.
     pub camera_rays: f64,
     /// Occlusion rays traced, the mean of a frame.
@@ -108,9 +114,14 @@ pub struct FrameCost {
 }
 
 impl FrameCost {
+    /// Time on the device, or by the clock where the device has none, milliseconds.
+    pub fn time(&self) -> Percentiles {
+        if self.device_ms.median > 0.0 { self.device_ms } else { self.wall_ms }
+    }
+
     /// Median on the device, or by the clock where the device has none.
     pub fn ms(&self) -> f64 {
-        if self.device_ms.median > 0.0 { self.device_ms.median } else { self.wall_ms.median }
+        self.time().median
     }
 
     /// Rays of a frame, those of the camera included.
@@ -120,19 +131,26 @@ impl FrameCost {
 }
 
 /// How far an image is from the reference.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
 pub struct ImageErrors {
     /// Root of the mean squared error, as measured: the reference's own error is in it.
+    #[serde(deserialize_with = "number_or_nan")]
     pub rmse: f64,
     /// Without the reference's: `sqrt(max(0, rmse^2 - reference^2))`.
+    #[serde(deserialize_with = "number_or_nan")]
     pub rmse_corrected: f64,
     /// Mean of image - reference.
+    #[serde(deserialize_with = "number_or_nan")]
     pub bias: f64,
     /// How different they look, 0 to 1.
+    #[serde(deserialize_with = "number_or_nan")]
     pub flip: f64,
     /// Larsen's similarity of the images as vectors.
+    #[serde(deserialize_with = "number_or_nan")]
     pub tanimoto: f64,
     /// Larsen's similarity pixel by pixel.
+    #[serde(deserialize_with = "number_or_nan")]
     pub minimum_ratio: f64,
 }
 
@@ -153,7 +171,8 @@ impl ImageErrors {
 }
 
 /// The error after some frames.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
 pub struct ErrorPoint {
     /// Frames made.
     pub frame: u32,
@@ -168,7 +187,8 @@ pub struct ErrorPoint {
 }
 
 /// Results with a static camera, all work done in every frame.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
 pub struct StillRecord {
     /// Cost of a frame; a static view needs no camera rays.
     pub cost: FrameCost,
@@ -177,12 +197,18 @@ pub struct StillRecord {
     /// Error after 1, 2, 4, ... frames; the last is the settled one.
     pub curve: Vec<ErrorPoint>,
     /// RMSE after each frame.
+    #[serde(deserialize_with = "numbers_or_nan")]
     pub rmse: Vec<f64>,
     /// Occlusion rays traced until each frame is done.
     pub rays: Vec<u64>,
 }
 
 impl StillRecord {
+    /// RMSE after each of the frames over which the time is taken: the second half.
+    pub fn timed_rmse(&self) -> &[f64] {
+        &self.rmse[self.rmse.len() / 2..]
+    }
+
     /// The error that it settles at: that of the last frame.
     pub fn settled(&self) -> Option<&ErrorPoint> {
         self.curve.last()
@@ -190,7 +216,8 @@ impl StillRecord {
 }
 
 /// Results with a static camera after sampling has stopped.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
 pub struct RestRecord {
     /// Frames until no ray is traced any more; `None`: it never came to rest.
     pub frames: Option<u32>,
@@ -201,7 +228,8 @@ pub struct RestRecord {
 }
 
 /// Results with an orbiting camera.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
 pub struct OrbitRecord {
     /// Rotation of the camera per frame, degrees.
     pub degrees_per_frame: f64,
@@ -214,11 +242,13 @@ pub struct OrbitRecord {
     /// The same before the filter.
     pub unfiltered: Option<ImageErrors>,
     /// Standard error of the references, the mean.
+    #[serde(deserialize_with = "number_or_nan")]
     pub reference_rmse: f64,
 }
 
 /// One kind of change of one scene.
-#[derive(Clone, Debug, Default, Serialize)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[serde(default)]
 pub struct ChangeRecord {
     /// Name of the scene.
     pub scene: String,
@@ -229,6 +259,7 @@ pub struct ChangeRecord {
     /// Number of pixels that are compared.
     pub pixels: u64,
     /// Standard error of the references.
+    #[serde(deserialize_with = "number_or_nan")]
     pub reference_rmse: f64,
     /// One for each preset.
     pub results: Vec<ChangeResult>,
@@ -236,7 +267,8 @@ pub struct ChangeRecord {
 
 /// What of the past a preset shows after a change. What does not apply to the kind of change is `None`; numbers that are not finite are
 /// null in JSON (a half-life is infinite where nothing is forgotten).
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
 pub struct ChangeResult {
     /// Name.
     pub preset: String,
@@ -244,8 +276,10 @@ pub struct ChangeResult {
     pub technique: String,
     /// Share of the old image in each frame from the change on; of `slide` and `animated`, of the reference of the frame before, in frames
     /// that have a reference. What the preset itself ends at counts as 0.
+    #[serde(deserialize_with = "numbers_or_nan")]
     pub residuals: Vec<f64>,
     /// The same beside frames of the same age without a past, which are as blurred and as noisy: what is remembered, and no more.
+    #[serde(deserialize_with = "numbers_or_nan")]
     pub memory: Vec<f64>,
     /// Frames in which half of that is forgotten.
     pub memory_half_life: Option<f64>,
@@ -260,6 +294,7 @@ pub struct ChangeResult {
     /// The larsen preset's half-life of memory over this one's.
     pub times_as_quick: Option<f64>,
     /// Error of each frame over the pixels that are looked at.
+    #[serde(deserialize_with = "numbers_or_nan")]
     pub rmse: Vec<f64>,
     /// Frames until that error stays within a tenth of where it ends.
     pub recovery: Option<usize>,
@@ -274,11 +309,12 @@ pub struct ChangeResult {
     /// A frame's.
     pub cost: Option<FrameCost>,
     /// Milliseconds to bring the tracer up to date.
-    pub update_ms: Option<MedianP95>,
+    pub update_ms: Option<Percentiles>,
 }
 
 /// Updates of acceleration structures.
-#[derive(Clone, Debug, Default, Serialize)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[serde(default)]
 pub struct StructureRecord {
     /// Scene.
     pub scene: String,
@@ -295,19 +331,20 @@ pub struct StructureRecord {
     /// Writing the scene into device memory, milliseconds.
     pub upload_ms: f64,
     /// Update of the TLAS after all instances moved, milliseconds.
-    pub top: Option<MedianP95>,
+    pub top: Option<Percentiles>,
     /// The TLAS was rebuilt, not refitted.
     pub top_rebuilt: bool,
     /// Triangles of the mesh that deforms.
     pub mesh_triangles: u64,
     /// Refit of that mesh's BLAS, vertex upload included, milliseconds.
-    pub refit: Option<MedianP95>,
+    pub refit: Option<Percentiles>,
     /// Rebuild of that BLAS, vertex upload included, milliseconds; `None` if the tracer does not rebuild.
-    pub rebuild: Option<MedianP95>,
+    pub rebuild: Option<Percentiles>,
 }
 
 /// A parameter sweep.
-#[derive(Clone, Debug, Default, Serialize)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[serde(default)]
 pub struct SeriesRecord {
     /// Which: `triangles`, `rays`, `resolution` or `sampling`.
     pub series: String,
@@ -318,7 +355,8 @@ pub struct SeriesRecord {
 }
 
 /// One line of a series.
-#[derive(Clone, Debug, Default, Serialize)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[serde(default)]
 pub struct SeriesLine {
     /// A preset, or a sequence.
     pub name: String,
@@ -327,7 +365,8 @@ pub struct SeriesLine {
 }
 
 /// One measurement of a series.
-#[derive(Clone, Debug, Default, Serialize)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[serde(default)]
 pub struct SeriesPoint {
     /// Scene.
     pub scene: String,
@@ -344,7 +383,8 @@ pub struct SeriesPoint {
 }
 
 /// Comparison of `balanced` (ours) with `larsen` (theirs) in one view. `None` if one of the two was not measured.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
 pub struct Verdict {
     /// Occlusion rays of a frame of ours over those of theirs.
     pub rays_ratio: Option<f64>,
@@ -369,7 +409,7 @@ pub struct Verdict {
 }
 
 /// The preset `balanced`, with so many rays a pixel that a frame takes no longer than one of theirs.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct EqualTime {
     /// Rays a pixel.
     pub rays_per_pixel: u32,
@@ -378,7 +418,9 @@ pub struct EqualTime {
     /// A frame of theirs.
     pub their_ms: f64,
     /// Its settled error.
+    #[serde(deserialize_with = "number_or_nan")]
     pub rmse: f64,
     /// That over theirs.
+    #[serde(deserialize_with = "number_or_nan")]
     pub rmse_ratio: f64,
 }

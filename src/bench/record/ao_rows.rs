@@ -3,8 +3,9 @@
 use std::io::Write;
 
 use super::ao::{AoBenchmark, ChangeResult, FrameCost, ImageErrors, SeriesPoint, StillRecord};
+use super::saved::SavedRecord;
 use super::{BenchRecord, Completeness};
-use crate::measure::stats::MedianP95;
+use crate::measure::stats::Percentiles;
 
 const COLUMNS: [&str; 40] = [
     "part",
@@ -70,7 +71,7 @@ impl Row {
         self.text(column, &text.unwrap_or_default())
     }
 
-    fn spread(self, column: &str, value: Option<MedianP95>) -> Self {
+    fn spread(self, column: &str, value: Option<Percentiles>) -> Self {
         self.number(column, value.map(|s| s.median)).number(&format!("{column} p95"), value.map(|s| s.p95))
     }
 
@@ -93,6 +94,10 @@ impl Row {
 }
 
 impl BenchRecord for AoBenchmark {
+    fn saved(&self) -> SavedRecord {
+        SavedRecord::Ao(Box::new(self.clone()))
+    }
+
     fn completeness(&mut self) -> &mut Completeness {
         &mut self.completeness
     }
@@ -123,11 +128,11 @@ impl AoBenchmark {
             }
         }
         for s in &self.structures {
-            let row = |what: &str, ms: Option<MedianP95>| {
+            let row = |what: &str, ms: Option<Percentiles>| {
                 let row = Row::new("structures", &s.scene).text("pass", what).number("primitives", s.primitives as f64);
                 row.spread("update ms", ms)
             };
-            let once = |ms: f64| Some(MedianP95 { median: ms, p95: ms });
+            let once = |ms: f64| Percentiles::of(&[ms]);
             rows.push(row("first build", once(s.build_ms)));
             rows.push(row("top level", s.top));
             rows.push(row("mesh refit", s.refit).number("primitives", s.mesh_triangles as f64));
@@ -216,7 +221,7 @@ mod tests {
 
     #[test]
     fn a_row_a_result() {
-        let ms = MedianP95 { median: 2.0, p95: 3.5 };
+        let ms = Percentiles { median: 2.0, p95: 3.5, ..Default::default() };
         let cost = FrameCost { passes: vec![PassTime { pass: "gbuffer".into(), ms }], device_ms: ms, ..Default::default() };
         let point = |frame| ErrorPoint { frame, ..Default::default() };
         let still =

@@ -6,13 +6,18 @@
 
 use std::io::Write;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
+use super::saved::SavedRecord;
 use super::{BenchRecord, Completeness, HostInfo};
-use crate::measure::stats::Summary;
+use crate::measure::stats::{Summary, number_or_nan, numbers_or_nan};
+
+/// Name of our own engine.
+pub const OWN: &str = "skylit";
 
 /// A whole run.
-#[derive(Clone, Debug, Default, Serialize)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[serde(default)]
 pub struct PathBenchmark {
     /// What it ran on.
     #[serde(flatten)]
@@ -31,7 +36,8 @@ pub struct PathBenchmark {
 }
 
 /// One scene.
-#[derive(Clone, Debug, Default, Serialize)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[serde(default)]
 pub struct SceneRecord {
     /// As on the command line.
     pub scene: String,
@@ -56,7 +62,8 @@ pub struct SceneRecord {
 }
 
 /// A reference image by one engine.
-#[derive(Clone, Debug, Default, Serialize)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[serde(default)]
 pub struct ReferenceRecord {
     /// `skylit`, or the name of a peer.
     pub engine: String,
@@ -65,50 +72,68 @@ pub struct ReferenceRecord {
     /// Seconds spent on it.
     pub seconds: f64,
     /// Its own error, from two independent halves.
+    #[serde(deserialize_with = "number_or_nan")]
     pub rmse: f64,
     /// Mean radiance of all pixels and channels.
+    #[serde(deserialize_with = "number_or_nan")]
     pub mean: f64,
 }
 
 /// Two references beside each other.
-#[derive(Clone, Debug, Default, Serialize)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[serde(default)]
 pub struct ReferenceDifference {
     /// The peer.
     pub engine: String,
     /// Its mean over ours.
+    #[serde(deserialize_with = "number_or_nan")]
     pub mean_ratio: f64,
     /// Between the images.
+    #[serde(deserialize_with = "number_or_nan")]
     pub rmse: f64,
     /// What the references' own errors explain of it.
+    #[serde(deserialize_with = "number_or_nan")]
     pub explained: f64,
 }
 
 /// An error, and the contestant that set it.
-#[derive(Clone, Debug, Default, Serialize)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[serde(default)]
 pub struct ErrorTarget {
     /// Root mean square.
+    #[serde(deserialize_with = "number_or_nan")]
     pub rmse: f64,
     /// Contestant whose last point it is.
     pub set_by: String,
 }
 
 /// Images of one sample count.
-#[derive(Clone, Debug, Default, Serialize)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[serde(default)]
 pub struct ErrorPoint {
     /// Paths a pixel.
     pub spp: u32,
     /// Wall seconds of an image.
     pub seconds: Option<Summary>,
+    /// Wall seconds of each timed image, in the order of the rounds.
+    #[serde(deserialize_with = "numbers_or_nan")]
+    pub repeats: Vec<f64>,
     /// Error, over all repeats, the reference's own taken off; unless `unsure`.
+    #[serde(deserialize_with = "number_or_nan")]
     pub rmse: f64,
+    /// The same of each image, those of the warming round included.
+    #[serde(deserialize_with = "numbers_or_nan")]
+    pub rmse_repeats: Vec<f64>,
     /// The reference's own error is more than half of what was measured: `rmse` is all of that, and the error is less.
     pub unsure: bool,
     /// Share of pixels that are wrong to the eye: off by more than a tenth of white in any channel after 1 - exp(-radiance).
+    #[serde(deserialize_with = "number_or_nan")]
     pub bad_pixels: f64,
 }
 
 /// What one contestant did.
-#[derive(Clone, Debug, Default, Serialize)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[serde(default)]
 pub struct ContestantRecord {
     /// In tables.
     pub name: String,
@@ -119,10 +144,12 @@ pub struct ContestantRecord {
     /// Of all images: mean of image - reference, in standard errors of the repeats' means; `None` with fewer than three.
     pub bias_sigmas: Option<f64>,
     /// 10^6 paths a second at the greatest sample count.
+    #[serde(deserialize_with = "number_or_nan")]
     pub mpaths: f64,
     /// 10^6 rays a second there, where they are counted.
     pub mrays: Option<f64>,
     /// 1 / (mean squared error * seconds) there (Veach 1997).
+    #[serde(deserialize_with = "number_or_nan")]
     pub efficiency: f64,
     /// Longest launch on the device, seconds, where it is known.
     pub longest_launch: Option<f64>,
@@ -131,7 +158,7 @@ pub struct ContestantRecord {
 }
 
 /// Time at which an error is reached.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TimeToError {
     /// Wall seconds of one image.
     pub seconds: f64,
@@ -140,7 +167,7 @@ pub struct TimeToError {
 }
 
 /// How a time was found.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum TimeEstimate {
     /// Interpolated between two measured images.
@@ -186,6 +213,10 @@ impl SceneRecord {
 }
 
 impl BenchRecord for PathBenchmark {
+    fn saved(&self) -> SavedRecord {
+        SavedRecord::Path(Box::new(self.clone()))
+    }
+
     fn completeness(&mut self) -> &mut Completeness {
         &mut self.completeness
     }

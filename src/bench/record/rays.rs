@@ -4,20 +4,24 @@
 
 use std::io::Write;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
+use super::saved::SavedRecord;
 use super::{BenchRecord, Completeness, HostInfo};
 use crate::measure::agreement::Agreement;
-use crate::measure::stats::{LogScaling, Summary};
+use crate::measure::stats::{LogScaling, Summary, number_or_nan};
 
 /// A whole run.
-#[derive(Clone, Debug, Default, Serialize)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[serde(default)]
 pub struct RayBenchmark {
     /// What it ran on.
     #[serde(flatten)]
     pub host: HostInfo,
     /// Timed repeats that were asked for, after one that warms up.
     pub repeats: u32,
+    /// Image whose pixels the camera rays of a set go through; 0x0 in records of earlier versions.
+    pub size: [u32; 2],
     /// How long our own hierarchies were built: a preset, or `auto`.
     pub build: String,
     /// Peers that ran, as they introduce themselves.
@@ -34,7 +38,8 @@ pub struct RayBenchmark {
 }
 
 /// One scene.
-#[derive(Clone, Debug, Default, Serialize)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[serde(default)]
 pub struct SceneRecord {
     /// As on the command line.
     pub scene: String,
@@ -66,7 +71,7 @@ impl SceneRecord {
 }
 
 /// Building for one contestant.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct BuildRecord {
     /// Name of the contestant.
     pub contestant: String,
@@ -81,7 +86,7 @@ pub struct BuildRecord {
 }
 
 /// One stream of rays.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct StreamRecord {
     /// Name.
     pub stream: String,
@@ -92,13 +97,14 @@ pub struct StreamRecord {
 }
 
 /// One contestant on one stream.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct RunRecord {
     /// Name of the contestant.
     pub contestant: String,
     /// Rays of a repeat; fewer than the set's for slow tracers, which get a sample of it.
     pub rays: usize,
     /// Share of these that met something.
+    #[serde(deserialize_with = "number_or_nan")]
     pub hit_share: f64,
     /// Mrays/s by the time on the device; a peer has its own clock, which leaves out what lies between it and us.
     pub device: Summary,
@@ -115,16 +121,17 @@ pub struct RunRecord {
 }
 
 /// How many times as fast as a baseline.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Ratio {
     /// The baseline.
     pub to: String,
     /// Rate over its rate.
+    #[serde(deserialize_with = "number_or_nan")]
     pub ratio: f64,
 }
 
 /// One contestant's answers against the first one's.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct CheckRecord {
     /// Name of the contestant.
     pub contestant: String,
@@ -175,7 +182,7 @@ impl CheckRecord {
 }
 
 /// How one contestant's rate on one stream falls over a family of scenes.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct ScalingRecord {
     /// What the scenes have in common: the name before the number.
     pub family: String,
@@ -230,6 +237,10 @@ impl RayBenchmark {
 }
 
 impl BenchRecord for RayBenchmark {
+    fn saved(&self) -> SavedRecord {
+        SavedRecord::Rays(Box::new(self.clone()))
+    }
+
     fn completeness(&mut self) -> &mut Completeness {
         &mut self.completeness
     }

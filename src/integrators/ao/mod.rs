@@ -26,6 +26,7 @@ use crate::film::camera::CameraRecord;
 use crate::film::schedule::FilmOptions;
 use crate::film::tile_mask::TileMask;
 use crate::gpu::{Buffer, Commands, ComputePipeline, Device, Memory, Timing};
+use crate::interface::PixelFilter;
 use crate::output::Image;
 use crate::ray::Ray;
 use crate::tracer::queue::RayQueue;
@@ -60,6 +61,8 @@ pub struct AoOptions {
     pub falloff: f64,
     /// Axis of the hemisphere.
     pub hemisphere: Hemisphere,
+    /// Pixel reconstruction filter.
+    pub pixel_filter: PixelFilter,
     /// Stop after this time and keep the image so far.
     pub time_limit: Option<Duration>,
     /// Keep the rays of the first sample.
@@ -79,6 +82,7 @@ impl Default for AoOptions {
             radius: f64::INFINITY,
             falloff: 1.0,
             hemisphere: Hemisphere::Geometric,
+            pixel_filter: PixelFilter::Box,
             time_limit: None,
             keep_rays: false,
             tile_mask: None,
@@ -107,6 +111,7 @@ impl AmbientOcclusion {
             radius: ao.radius(),
             falloff: ao.ao_falloff.unwrap_or(1.0),
             hemisphere: ao.hemisphere(),
+            pixel_filter: job.pixel_filter,
             time_limit: job.time_limit,
             keep_rays: job.keep_rays,
             tile_mask: None,
@@ -125,7 +130,7 @@ impl Integrator for AmbientOcclusion {
     }
 
     fn capabilities(&self) -> &'static [Capability] {
-        &[Capability::AmbientOcclusion]
+        &[Capability::AmbientOcclusion, Capability::RealTimeFrames]
     }
 
     fn channels(&self) -> &'static [&'static str] {
@@ -154,9 +159,9 @@ impl Integrator for AmbientOcclusion {
         2
     }
 
-    /// Not if rays are dumped: a dump must hold the rays of all pixels.
+    /// Not if rays are dumped: a dump must hold the rays of all pixels. Not if pixels see beyond their area.
     fn skips_empty_tiles(&self, job: &RenderJob) -> bool {
-        !job.keep_rays
+        !job.keep_rays && job.pixel_filter.is_within_pixel()
     }
 
     fn sees_environment(&self) -> bool {
@@ -176,11 +181,13 @@ impl Integrator for AmbientOcclusion {
             radius,
             falloff,
             hemisphere,
+            pixel_filter,
         } = Self::options(job);
         vec![
             ("ao.radius", Some(radius.to_string())),
             ("ao.falloff", Some(falloff.to_string())),
             ("ao.normal", Some(hemisphere.to_string())),
+            ("pixel_filter", Some(pixel_filter.to_string())),
         ]
     }
 
@@ -271,6 +278,7 @@ pub fn render(tracer: &Tracer, camera: &CameraRecord, options: &AoOptions, contr
         hemisphere: (options.hemisphere == Hemisphere::Shading) as u32,
         falloff_log2: options.attenuation().falloff_log2() as f32,
         radius: options.attenuation().reach() as f32,
+        pixel_filter: options.pixel_filter as u32,
         samples: estimator.samples.address(),
         queue: estimator.queue.record(),
         ..Default::default()

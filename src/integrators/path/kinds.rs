@@ -2,8 +2,9 @@
 
 use std::sync::Arc;
 
+use super::ambient::{Ambient, EnvironmentLight};
 use super::report::{self, environment_text};
-use super::{PathOptions, PixelFilter, Strategy, TextureFilter, View, render, streams};
+use super::{PathOptions, Strategy, TextureFilter, View, render, streams};
 use crate::accel::features::Blend;
 use crate::accel::flatten::FlatScene;
 use crate::colour::srgb_decode;
@@ -13,7 +14,8 @@ use crate::film::tile_mask::TileMask;
 use crate::integrators::{Integrator, IntegratorSettings, PictureOptions, RenderJob, Rendered};
 use crate::output::{Image, Samples};
 use crate::settings::Capability::{
-    self, CameraModel, LightTransport, PathLength, SamplingStrategy, SceneLights, Textures, ToneMapping, WhiteSky,
+    self, AmbientLight, AmbientOcclusion, CameraModel, LightTransport, PathLength, SamplingStrategy, SceneLights, Textures,
+    ToneMapping, WhiteSky,
 };
 use crate::shaders::StreamShaders;
 use crate::tracer::{Needs, Tracer};
@@ -31,6 +33,22 @@ pub static DIRECT: PathVariant = PathVariant {
     help: "Direct lighting: paths of one bounce",
     kind: Kind::Light { max_depth: Some(1) },
     capabilities: &[LightTransport, SamplingStrategy, SceneLights, Textures, CameraModel, ToneMapping],
+};
+/// Direct light, and ambient light where ambient occlusion lets it through.
+pub static LIT: PathVariant = PathVariant {
+    name: "lit",
+    help: "Direct lighting plus ambient light times ambient occlusion: what real-time renderers make of AO",
+    kind: Kind::Lit,
+    capabilities: &[
+        LightTransport,
+        SamplingStrategy,
+        SceneLights,
+        AmbientLight,
+        AmbientOcclusion,
+        Textures,
+        CameraModel,
+        ToneMapping,
+    ],
 };
 /// Specular reflection and refraction, and direct lighting on all other surfaces.
 pub static WHITTED: PathVariant = PathVariant {
@@ -79,6 +97,8 @@ pub static BAKED_OCCLUSION: PathVariant = PathVariant {
 enum Kind {
     /// Light, up to so many bounces; `None`: as many as settings say.
     Light { max_depth: Option<u32> },
+    /// Light of one bounce, and ambient light.
+    Lit,
     /// Radiance by delta lobes and light sampling only.
     Whitted,
     /// Radiance of grey surfaces under a white sky.
@@ -105,6 +125,12 @@ impl PathVariant {
         Ok(match self.kind {
             Kind::Light { max_depth: Some(max_depth) } => PathOptions { max_depth, ..options },
             Kind::Light { max_depth: None } => options,
+            Kind::Lit => PathOptions {
+                max_depth: 1,
+                ambient: Some(Ambient::new(job.settings)),
+                background_only: job.settings.path.environment_light == Some(EnvironmentLight::Ambient),
+                ..options
+            },
             // only light sampling finds light on surfaces that scatter it
             Kind::Whitted => PathOptions { strategy: Strategy::Light, specular_only: true, ..options },
             Kind::WhiteSky => PathOptions { white_sky: Some(job.settings.path.sky_albedo()), ..options },
@@ -133,7 +159,7 @@ impl Integrator for PathVariant {
     fn quantity(&self) -> &'static str {
         match self.kind {
             Kind::View(_) => "value",
-            Kind::Light { .. } | Kind::Whitted | Kind::WhiteSky => "radiance",
+            Kind::Light { .. } | Kind::Lit | Kind::Whitted | Kind::WhiteSky => "radiance",
         }
     }
 
@@ -165,15 +191,15 @@ impl Integrator for PathVariant {
         let black = match self.kind {
             Kind::View(_) => true,
             Kind::WhiteSky => false,
-            Kind::Light { .. } | Kind::Whitted => !job.scene.has_visible_sky(),
+            Kind::Light { .. } | Kind::Lit | Kind::Whitted => !job.scene.has_visible_sky(),
         };
         let settings = &job.settings.path;
         let is_pinhole = settings.f_number.is_none() || settings.focus_distance.is_none();
-        black && is_pinhole && settings.pixel_filter.unwrap_or_default() == PixelFilter::Box
+        black && is_pinhole && job.pixel_filter.is_within_pixel()
     }
 
     fn sees_environment(&self) -> bool {
-        matches!(self.kind, Kind::Light { .. } | Kind::Whitted)
+        matches!(self.kind, Kind::Light { .. } | Kind::Lit | Kind::Whitted)
     }
 
     fn identity(&self, job: &RenderJob) -> Vec<(&'static str, Option<String>)> {

@@ -5,6 +5,7 @@
 //! queue and rays of the next bounce to another; `path_shadow` traces the first, `path_bounce` the second, until a queue is empty.
 //! Every path writes to its own memory only, so images do not depend on the order in which rays are processed.
 
+pub mod ambient;
 mod environment;
 mod features;
 pub mod kinds;
@@ -48,6 +49,8 @@ pub struct PathResult {
     pub bounce_rays: u64,
     /// Shadow rays.
     pub shadow_rays: u64,
+    /// Occlusion rays of ambient light.
+    pub ambient_rays: u64,
     /// Number of bounces of the longest path.
     pub longest_path: u32,
     /// Number of lights that light sampling chooses from, the environment and each portal included; 0 without light sampling.
@@ -125,12 +128,17 @@ impl PathIntegrator {
             film: &options.film,
         };
         paths.traced = PathCounts::default();
-        let image = accumulate(tracer, camera, &plan, &BlockParams::default(), paths, control)?;
-        let PathCounts { bounce_rays, shadow_rays, longest_path } = paths.traced;
+        let params = BlockParams {
+            pixel_filter: options.pixel_filter as u32,
+            ..options.ambient.map(|a| a.block_params()).unwrap_or_default()
+        };
+        let image = accumulate(tracer, camera, &plan, &params, paths, control)?;
+        let PathCounts { bounce_rays, shadow_rays, ambient_rays, longest_path } = paths.traced;
         Ok(PathResult {
             image,
             bounce_rays,
             shadow_rays,
+            ambient_rays,
             longest_path,
             lights: paths.lights,
             light_tree: paths.light_tree,
@@ -145,7 +153,19 @@ impl PathIntegrator {
 struct PathCounts {
     bounce_rays: u64,
     shadow_rays: u64,
+    ambient_rays: u64,
     longest_path: u32,
+}
+
+/// Words of [`PathEstimator::counts`] for each vertex: numbers of rays, of shadow rays, and of rays of ambient light.
+const COUNTS: u32 = 3;
+
+/// Resources of the occlusion rays of ambient light. They are traced as shadow rays are, from a queue of their own: two rays that add to a path at the same time
+/// would depend on their order.
+struct AmbientRays {
+    queue: RayQueue,
+    /// Index of the parameters with which they are traced.
+    params: usize,
 }
 
 /// Resources of shadow rays that pass straight through thin walls.
@@ -170,6 +190,7 @@ struct PathEstimator {
     path_params: Vec<Buffer>,
     records: Vec<PathParams>,
     walls: Option<TransmittedShadowRays>,
+    ambient: Option<AmbientRays>,
     /// The volumes that paths may be in, if they must be tracked.
     volumes: Option<ClosedVolumes>,
     /// Numbers of rays traced at each bounce, and of its shadow rays.
@@ -181,6 +202,8 @@ struct PathEstimator {
     light_tree: bool,
     features: PathFeatures,
     light_kinds: LightKinds,
+    /// Radiance of each path of a launch.
+    radiance: Buffer,
     _buffers: Vec<Buffer>,
     _environment: DeviceEnvironment,
 }
@@ -213,6 +236,7 @@ impl PathEstimator {
         let lights = match options.white_sky {
             _ if options.view.is_some() => Lights::default(),
             Some(_) => Lights::environment_only(),
+            None if options.background_only => Lights::new(flat, glam::Vec3::ZERO),
             None => Lights::new(flat, environment.mean),
         };
         let (features, light_kinds) = features::features(options, flat, &lights, environment.map.texels != 0, cones);
@@ -225,6 +249,7 @@ impl PathEstimator {
         let queues = [RayQueue::new(device, most)?, RayQueue::new(device, most)?];
         let shadow_queue = RayQueue::new(device, most)?;
         let (radiance, contributions) = (quads("radiance of paths")?, quads("shadow ray contributions")?);
+        let ambient_queue = options.ambient.map(|_| RayQueue::new(device, most)).transpose()?;
         let states = || Buffer::new(device, "paths", STATE_BYTES * most as u64, Memory::Device);
         let mut buffers = Vec::new();
         let mut keep = |buffer: Buffer| {
@@ -252,7 +277,7 @@ impl PathEstimator {
             },
             first_disk: lights.directional.start,
             disk_count: lights.directional.end - lights.directional.start,
-            radiance: keep(radiance),
+            radiance: radiance.address(),
             contributions: keep(contributions),
             shadow: shadow_queue.record(),
             environment_light: lights.environment.unwrap_or(INVALID),
@@ -273,6 +298,11 @@ impl PathEstimator {
                 false => 0,
             },
             camera_media: [INVALID; 4],
+            ambient: ambient_queue.as_ref().map(RayQueue::record).unwrap_or_default(),
+            ambient_contributions: match &ambient_queue {
+                Some(_) => keep(quads("contributions of ambient light")?),
+                None => 0,
+            },
             ..options.params()
         };
         let states = [keep(states()?), keep(states()?)];
@@ -300,6 +330,10 @@ impl PathEstimator {
             let (later, later_contributions) = (base.shadow, base.contributions);
             records.push(PathParams { shadow, contributions, later, later_contributions, ..base });
         }
+        let ambient = ambient_queue.map(|queue| {
+            records.push(PathParams { shadow: base.ambient, contributions: base.ambient_contributions, ..base });
+            AmbientRays { queue, params: records.len() - 1 }
+        });
         let path_params = records
             .iter()
             .map(|record| Buffer::from_slice(device, "path parameters", &[*record]))
@@ -319,8 +353,9 @@ impl PathEstimator {
             path_params,
             records,
             walls,
+            ambient,
             volumes: has_media.then(|| ClosedVolumes::new(flat)),
-            counts: Buffer::new(device, "ray counts", 4 * 2 * u64::from(BOUNCES + 1), Memory::Readback)?,
+            counts: Buffer::new(device, "ray counts", 4 * u64::from(COUNTS * (BOUNCES + 1)), Memory::Readback)?,
             max_depth: options.bounces(),
             samples_lights,
             traced: PathCounts::default(),
@@ -328,6 +363,7 @@ impl PathEstimator {
             light_tree: !lights.tree.is_empty(),
             features,
             light_kinds,
+            radiance,
             _buffers: buffers,
             _environment: environment,
         })
@@ -363,7 +399,25 @@ impl PathEstimator {
             }
         }
         r.barrier();
-        r.copy(self.shadow_queue.count(), 0, &self.counts, 8 * u64::from(slot) + 4, 4);
+        r.copy(self.shadow_queue.count(), 0, &self.counts, 4 * u64::from(COUNTS * slot + 1), 4);
+    }
+
+    /// Records the rays of ambient light that a vertex generated; their number is read back from `slot`.
+    fn record_ambient(&self, r: &mut crate::gpu::Recorder, push: Push, most: u32, slot: u32) {
+        let Some(ambient) = &self.ambient else { return };
+        r.barrier();
+        let push = Push { pass: self.block_params[ambient.params].address(), ..push };
+        self.shadow.record(r, &ambient.queue.push(push, most));
+        r.barrier();
+        r.copy(ambient.queue.count(), 0, &self.counts, 4 * u64::from(COUNTS * slot + 2), 4);
+    }
+
+    /// Empties the queues of the rays that a vertex leaves for lights.
+    fn clear_light_queues(&self, r: &mut crate::gpu::Recorder) {
+        self.shadow_queue.clear(r);
+        if let Some(ambient) = &self.ambient {
+            ambient.queue.clear(r);
+        }
     }
 
     /// Traces shadow rays that have passed a thin wall, wall after wall, until none is left.
@@ -408,38 +462,45 @@ impl PathEstimator {
                 r.fill(&self.counts, self.counts.size(), 0);
                 if !started {
                     self.queues[0].clear(r);
-                    self.shadow_queue.clear(r);
+                    self.clear_light_queues(r);
                     r.barrier();
                     self.camera.record(r, &push(0));
                     self.record_shadow(r, push(0), left, BOUNCES);
+                    self.record_ambient(r, push(0), left, BOUNCES);
                 }
                 while depth < last.min(max_launches) {
                     depth += 1;
                     let (fills, traced) = (depth as usize % 2, (depth as usize + 1) % 2);
                     r.barrier();
                     self.queues[fills].clear(r);
-                    self.shadow_queue.clear(r);
+                    self.clear_light_queues(r);
                     r.barrier();
                     self.bounce.record(r, &self.queues[traced].push(push(fills), left));
-                    r.copy(self.queues[traced].count(), 0, &self.counts, 8 * u64::from((depth - 1) % BOUNCES), 4);
+                    r.copy(self.queues[traced].count(), 0, &self.counts, 4 * u64::from(COUNTS * ((depth - 1) % BOUNCES)), 4);
                     self.record_shadow(r, push(fills), left, (depth - 1) % BOUNCES);
+                    // what lies behind surfaces that paths pass straight through is a first surface, too
+                    if straight {
+                        self.record_ambient(r, push(fills), left, (depth - 1) % BOUNCES);
+                    }
                 }
                 r.barrier();
                 // number of rays that are left for the next submission
-                r.copy(self.queues[depth as usize % 2].count(), 0, &self.counts, 8 * u64::from(BOUNCES), 4);
+                r.copy(self.queues[depth as usize % 2].count(), 0, &self.counts, 4 * u64::from(COUNTS * BOUNCES), 4);
             })?);
             started = true;
             timings.extend(self.trace_behind_walls(commands, push(0))?);
             let counts: Vec<u32> = bytemuck::pod_collect_to_vec(&self.counts.read(0, self.counts.size())?);
             for k in begin..depth {
-                let rays = counts[2 * ((k % BOUNCES) as usize)];
+                let rays = counts[(COUNTS * (k % BOUNCES)) as usize];
                 self.traced.bounce_rays += u64::from(rays);
                 if rays > 0 {
                     self.traced.longest_path = self.traced.longest_path.max(k + 1);
                 }
             }
-            self.traced.shadow_rays += counts.iter().skip(1).step_by(2).map(|&n| u64::from(n)).sum::<u64>();
-            left = counts[2 * BOUNCES as usize];
+            let sum = |of: usize| counts.iter().skip(of).step_by(COUNTS as usize).map(|&n| u64::from(n)).sum::<u64>();
+            self.traced.shadow_rays += sum(1);
+            self.traced.ambient_rays += sum(2);
+            left = counts[(COUNTS * BOUNCES) as usize];
             if left == 0 || depth >= max_launches {
                 break;
             }

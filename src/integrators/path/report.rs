@@ -34,7 +34,8 @@ pub(super) fn report(
     result: &PathResult,
 ) -> IntegratorReport {
     let (image, stats) = (&result.image, tracer.stats());
-    let (paths, rays) = (image.primary_rays, image.primary_rays + result.bounce_rays + result.shadow_rays);
+    let (paths, rays) =
+        (image.primary_rays, image.primary_rays + result.bounce_rays + result.shadow_rays + result.ambient_rays);
     let per_second = |n: u64| n as f64 / image.trace_seconds.max(1e-9) / 1e6;
     let mut lines = vec![format!(
         "{:.2} Mpaths/s, {:.2} Mrays/s; {:.2} rays per path, {:.2} of them shadow rays; longest path {} bounces (limit {})",
@@ -71,6 +72,7 @@ pub(super) fn report(
             "skipped_primary": image.skipped_primary_rays,
             "bounce": result.bounce_rays,
             "shadow": result.shadow_rays,
+            "ambient": result.ambient_rays,
         },
         "longest_path": result.longest_path,
     });
@@ -88,7 +90,8 @@ fn warnings(flat: &FlatScene, o: &PathOptions, not_finite: u64, spp: u32) -> Vec
     }
     let scene = flat.scene;
     let dark = scene.environment == Environment::Black && scene.lights.is_empty() && !emits(flat);
-    if o.view.is_none() && o.white_sky.is_none() && dark {
+    let ambient = o.ambient.is_some_and(|a| a.color != glam::Vec3::ZERO);
+    if o.view.is_none() && o.white_sky.is_none() && !ambient && dark {
         warnings.push("the scene has no light, and the image is black: give --environment FILE or R,G,B".into());
     }
     warnings

@@ -4,8 +4,10 @@
 use std::sync::Arc;
 use std::time::Duration;
 
+use glam::DVec3;
 use serde_json::{Map, Value, json};
 
+use super::ambient::{Ambient, EnvironmentLight};
 use super::params::PathParams;
 use super::{PixelFilter, View};
 use crate::error::{Error, Result};
@@ -15,7 +17,7 @@ use crate::integrators::RenderJob;
 use crate::interface::PathFeature;
 use crate::scene::Projection;
 #[cfg(feature = "cli")]
-use crate::settings::parse::{parse_albedo, parse_positive};
+use crate::settings::parse::{parse_albedo, parse_positive, parse_radiance};
 use crate::settings::{AppliesTo, Capability, choices, settings};
 
 /// Integrators that trace light paths.
@@ -30,6 +32,8 @@ const TEXTURES: AppliesTo = AppliesTo::stills_of(Capability::Textures);
 const SAMPLED: AppliesTo = AppliesTo::stills_of(Capability::SamplingStrategy);
 /// The integrator with a white sky.
 const SKY: AppliesTo = AppliesTo::stills_of(Capability::WhiteSky);
+/// The integrator with ambient light.
+const AMBIENT: AppliesTo = AppliesTo::stills_of(Capability::AmbientLight);
 
 choices! {
     /// Denoiser of path-traced images.
@@ -45,7 +49,7 @@ choices! {
 
 settings! {
     /// Paths.
-    "Path tracing (--integrator path, direct, whitted, ao-sky; views)"
+    "Path tracing (--integrator path, direct, lit, whitted, ao-sky; views)"
     pub struct PathSettings {
         /// Maximum path length in bounces: 0 is emitted light, 1 adds direct light [default: the scene's, or no limit]
         max_depth: Option<u32>, option(value_name = "N"), applies(LONG);
@@ -61,12 +65,14 @@ settings! {
         energy_compensation: bool, option(), applies(LIGHT);
         /// Albedo of all surfaces with --integrator ao-sky [default: 0.5]
         sky_albedo: Option<f64>, option(value_name = "X", value_parser = parse_albedo, allow_hyphen_values = true), applies(SKY);
+        /// Ambient radiance of --integrator lit, linear RGB [default: 1,1,1]
+        ambient: Option<DVec3>, option(value_name = "R,G,B", value_parser = parse_radiance, allow_hyphen_values = true), applies(AMBIENT);
+        /// How the environment lights surfaces with --integrator lit [default: traced]
+        environment_light: Option<EnvironmentLight>, option(value_enum), applies(AMBIENT);
         /// Denoise the final image (biased): oidn, filter, or auto (oidn if it is installed). An .exr keeps the noisy image as noisy.R, noisy.G, noisy.B
         /// [default: off; without METHOD: auto]
         denoise: Option<DenoiseChoice>,
             option(value_name = "METHOD", value_enum, num_args = 0..=1, require_equals = false, default_missing_value = "auto"), applies(LIGHT);
-        /// Pixel reconstruction filter, by importance sampling [default: box]
-        pixel_filter: Option<PixelFilter>, option(value_enum), applies(CAMERA);
         /// Texture filter of paths [default: bilinear]
         texture_filter: Option<TextureFilter>, option(value_enum), applies(TEXTURES);
         /// f-number of a thin lens with a 36x24 mm sensor; scene units are taken as metres [default: a pinhole]
@@ -150,6 +156,10 @@ pub struct PathOptions {
     pub specular_only: bool,
     /// Albedo of all surfaces, which are diffuse, under a white sky as the only emitter: the rendering equation that ambient occlusion approximates.
     pub white_sky: Option<f32>,
+    /// Ambient light at the first surface of each path.
+    pub ambient: Option<Ambient>,
+    /// The environment is seen by the camera and lights no surface.
+    pub background_only: bool,
     /// Surface property that is rendered in place of radiance; 0 where camera rays miss.
     pub view: Option<View>,
     /// Pixel reconstruction filter.
@@ -179,6 +189,8 @@ impl Default for PathOptions {
             strategy: Strategy::Mis,
             specular_only: false,
             white_sky: None,
+            ambient: None,
+            background_only: false,
             view: None,
             pixel_filter: PixelFilter::Box,
             texture_filter: TextureFilter::Bilinear,
@@ -224,7 +236,7 @@ impl PathOptions {
             rr_depth: settings.rr_depth.unwrap_or(default.rr_depth),
             firefly_clamp: settings.firefly_clamp.map_or(f32::INFINITY, |c| c as f32),
             strategy: settings.sampling.unwrap_or_default(),
-            pixel_filter: settings.pixel_filter.unwrap_or_default(),
+            pixel_filter: job.pixel_filter,
             texture_filter: settings.texture_filter.unwrap_or_default(),
             lens: settings.lens(job.camera.projection)?,
             time_limit: job.time_limit,
@@ -250,6 +262,8 @@ impl PathOptions {
             firefly_clamp,
             strategy,
             white_sky,
+            ambient,
+            background_only,
             view,
             specular_only: _,
             pixel_filter,
@@ -258,8 +272,8 @@ impl PathOptions {
         } = self;
         let clamp = firefly_clamp.is_finite().then_some(firefly_clamp);
         let depth_limit = (*max_depth < MAX_DEPTH).then_some(max_depth);
-        let filter = (*pixel_filter != PixelFilter::Box).then(|| pixel_filter.to_string());
         let lookup = (*texture_filter != TextureFilter::Bilinear).then(|| texture_filter.to_string());
+        let light = if *background_only { EnvironmentLight::Ambient } else { EnvironmentLight::Traced };
         let aperture = lens.map(|lens| format!("radius {}, focus {}", lens.radius, lens.focus));
         vec![
             ("max_depth", Some(depth_text(*max_depth)), json!(depth_limit)),
@@ -267,10 +281,12 @@ impl PathOptions {
             ("rr_depth", Some(rr_depth.to_string()), json!(rr_depth)),
             ("sampling", Some(strategy.to_string()), json!(strategy)),
             ("firefly_clamp", clamp.map(f32::to_string), json!(clamp)),
-            ("pixel_filter", filter, json!(pixel_filter)),
+            ("pixel_filter", Some(pixel_filter.to_string()), json!(pixel_filter)),
             ("texture_filter", lookup, json!(texture_filter)),
             ("lens", aperture, json!(lens)),
             ("sky_albedo", white_sky.map(|albedo| albedo.to_string()), json!(white_sky)),
+            ("ambient", ambient.map(|a| a.to_string()), json!(ambient)),
+            ("environment_light", background_only.then(|| EnvironmentLight::Ambient.to_string()), json!(light)),
             // the name of the integrator says it in metadata
             ("view", None, json!(view)),
         ]
@@ -288,6 +304,8 @@ impl PathOptions {
             (PathFeature::UniformSampling, self.strategy == Strategy::Uniform),
             (PathFeature::SpecularOnly, self.specular_only),
             (PathFeature::ConstantAlbedo, self.white_sky.is_some()),
+            (PathFeature::Ambient, self.ambient.is_some()),
+            (PathFeature::BackgroundOnly, self.background_only),
             (PathFeature::View, self.view.is_some()),
             (PathFeature::MinDepth, self.min_depth > 0),
             (PathFeature::Clamp, self.firefly_clamp.is_finite()),
@@ -310,9 +328,9 @@ impl PathOptions {
             rr_depth: self.rr_depth,
             clamp_to: self.firefly_clamp,
             albedo: self.white_sky.unwrap_or(0.0),
+            ambient_color: self.ambient.map_or([0.0; 3], |a| a.color.to_array()),
             lens_radius: self.lens.map_or(0.0, |l| l.radius),
             focus: self.lens.map_or(1.0, |l| l.focus),
-            pixel_filter: self.pixel_filter as u32,
             ..Default::default()
         }
     }
@@ -336,7 +354,7 @@ impl PathOptions {
 
     /// Returns true if a pixel sees only what projects into its area: no lens and no wide filter.
     pub fn is_sharp(&self) -> bool {
-        self.pixel_filter == PixelFilter::Box && self.lens.is_none()
+        self.pixel_filter.is_within_pixel() && self.lens.is_none()
     }
 }
 

@@ -50,5 +50,9 @@ records! {
         frame: address,
         /// Address of the `PathParams`, or 0.
         path: address,
+        /// One of `FILTER_*`: the reconstruction filter.
+        pixel_filter: uint,
+        /// Padding to a multiple of 8 bytes.
+        reserved: uint,
     }
 }

@@ -36,6 +36,18 @@ records! {
         slices: uint,
         /// Number of steps on each side of a slice.
         steps: uint,
+        /// Factor of the distances at which geometry occludes.
+        radius_scale: float,
+        /// Share of the radius over which occlusion fades out before it.
+        fade: float,
+        /// Exponent of the distances of steps: 1 spaces them evenly, more brings them closer to the pixel.
+        step_exponent: float,
+        /// Factor of distances along the view beyond 1: what lies far behind or before the pixel occludes less, as if it was thin.
+        thinness: float,
+        /// Exponent of the ambient visibility.
+        visibility_exponent: float,
+        /// Padding to a multiple of 8 bytes.
+        reserved: uint,
     }
 
     /// Parameters of `budget`.

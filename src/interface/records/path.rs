@@ -62,10 +62,6 @@ records! {
         environment_light: uint,
         /// Paths of fewer bounces add nothing, with `WITH_MIN_DEPTH`.
         min_depth: uint,
-        /// Padding to a multiple of 16 bytes.
-        reserved: uint[3],
-        /// One of `FILTER_*`: the reconstruction filter.
-        pixel_filter: uint,
         /// Radius of the thin lens, scene units; 0: a pinhole.
         lens_radius: float,
         /// Focus distance along the view, scene units.
@@ -90,12 +86,20 @@ records! {
         straight: address,
         /// Stack of the volumes that the camera is in.
         camera_media: uvec4,
+        /// Ambient radiance, linear RGB, with `WITH_AMBIENT`.
+        ambient_color: vec3,
+        /// Padding to a multiple of 16 bytes.
+        reserved: uint,
         /// The queue of shadow rays that continue behind a thin wall.
         later: QueueRecord,
         /// `contributions` of the queue `later`.
         later_contributions: address,
         /// A float per path: probability density of light sampling at its last bounce for the environment in its direction.
         sky_pdfs: address,
+        /// The queue of rays of ambient light, with `WITH_AMBIENT`.
+        ambient: QueueRecord,
+        /// A `vec4` per ray of ambient light: the radiance that it adds if it is unoccluded.
+        ambient_contributions: address,
     }
 
     /// The state of a path between two bounces.

@@ -10,6 +10,12 @@ const RGB_TO_XYZ: [[f64; 3]; 3] = [
     [1_425_312.0 / 73_733_382.0, 8_788_810.0 / 73_733_382.0, 70_074_185.0 / 73_733_382.0],
 ];
 
+/// Luminance (CIE Y) of linear sRGB.
+pub fn luminance(red: f32, green: f32, blue: f32) -> f32 {
+    let [r, g, b] = RGB_TO_XYZ[1].map(|w| w as f32);
+    r * red + g * green + b * blue
+}
+
 /// The way between linear sRGB and XYZ over the white of the display, there and back.
 #[derive(Clone, Copy, Debug)]
 pub struct Space {

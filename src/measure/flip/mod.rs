@@ -2,11 +2,12 @@
 //!
 //! After Andersson, Nilsson, Akenine-Möller, Oskarsson, Åström and Fairchild, "FLIP: A Difference Evaluator for Alternating
 //! Images" (HPG 2020), the variant for images that a display shows as they are: linear RGB in [0, 1], what lies beyond is
-//! clamped. Written from the paper. Colours are blurred as the eye blurs them, told apart in a perceptually even space, and
+//! clamped; [`flip_hdr`] is the one for any values. Written from the papers. Colours are blurred as the eye blurs them, told apart in a perceptually even space, and
 //! the result is raised where one image has an edge or a point that the other lacks.
 
 mod colour;
 mod filters;
+mod hdr;
 
 use std::ops::Range;
 
@@ -17,6 +18,8 @@ use self::colour::{Space, hyab, lightness};
 use self::filters::{Filters, Plane};
 use super::metrics::ImagePair;
 use crate::{Error, Result};
+
+pub use self::hdr::{HdrFlip, flip_hdr};
 
 /// The paper's viewing conditions: a display of 3840 pixels over 0.7 m, seen from 0.7 m; about 67 pixels a degree.
 pub const PIXELS_PER_DEGREE: f64 = 3840.0 * std::f64::consts::PI / 180.0;
@@ -78,9 +81,8 @@ pub fn flip(pair: &ImagePair, width: usize, pixels_per_degree: f64) -> Result<Fl
             *error = if whole { combined(a.difference(&b, i), a.feature_difference(&b, i), greatest) } else { f32::NAN };
         }
     });
-    let counted = map.iter().enumerate().filter(|(i, _)| pair.coverage.is_none_or(|c| c[*i] > 0.0));
-    let (sum, count) = counted.fold((0.0, 0u64), |(sum, n), (_, &e)| (sum + f64::from(e), n + 1));
-    Ok(Flip { map, mean: sum / count as f64 })
+    let mean = pair.mean_of(&map);
+    Ok(Flip { map, mean })
 }
 
 /// Section 4.3 of the paper: the error of a pixel from the HyAB distance and the difference of its features.

@@ -29,7 +29,19 @@ impl Pass for Gtao {
 
     fn prepare(&mut self, frame: &Frame, resources: &Resources) -> Result<()> {
         let [slices, steps] = frame.settings.gtao;
-        self.params.write(&GtaoParams { frame: frame.params, current: resources.address(Resource::Current), slices, steps })
+        let constants = frame.settings.gtao_constants;
+        self.params.write(&GtaoParams {
+            frame: frame.params,
+            current: resources.address(Resource::Current),
+            slices,
+            steps,
+            radius_scale: constants.radius_scale,
+            fade: constants.fade,
+            step_exponent: constants.step_exponent,
+            thinness: constants.thinness,
+            visibility_exponent: constants.visibility_exponent,
+            reserved: 0,
+        })
     }
 
     fn record(&self, r: &mut Recorder, frame: &Frame, _: &Resources, range: Range) -> Result<()> {

@@ -222,15 +222,11 @@ impl View {
                     view.restart();
                 }
                 let job = RenderJob {
-                    scene: session.scene,
-                    camera,
                     size: self.size,
                     spp: MAX_SPP,
-                    seed: self.settings.seed(),
-                    settings: &self.settings.integrators,
                     time_limit: Some(time),
-                    keep_rays: false,
                     film: FilmOptions { start: view.state.clone(), keep_state: true, ..Default::default() },
+                    ..self.settings.job(session.scene, camera)
                 };
                 view.step(world, &job, control)
             }

@@ -4,6 +4,7 @@
 //! tests; [`shapes`] has their meshes.
 
 pub mod analytic;
+pub mod atrium;
 pub mod cornell;
 pub mod many;
 pub mod parade;
@@ -42,6 +43,7 @@ const NAMES: &[BuiltinInfo] = &[
     info("terrain", "a fractal landscape of N triangles (terrain:N, 2 to 100000000, default 100000)"),
     info("instances", "125 instances of 15 landscapes, N triangles in all (instances:N, 250 to 500000000, default 1000000)"),
     info("leaf-cards", "bushes of leaves cut from quads by alpha masks, some of them blended"),
+    info("atrium", "an arcaded courtyard of two storeys, open to the sky: about as many triangles as Sponza"),
     info("stairs", "stairs, a column and a rail: contact detail"),
     info("parade", "an animation of two seconds: moving blocks, a rotor, a skinned column, a ball with morph targets"),
     info("far-away", "the stairs, more than a million units from the origin"),
@@ -105,6 +107,7 @@ fn recipe(name: &str) -> Option<Box<dyn FnOnce() -> Scene>> {
         "plane" => || analytic::plane(20.0, SceneTransform::default()),
         "leaf-cards" => many::leaf_cards,
         "parade" => parade::parade,
+        "atrium" => atrium::atrium,
         "stairs" => || many::stairs(DVec3::ZERO),
         "far-away" => || many::stairs(DVec3::new(1.0e6, -5.0e5, 1.5e6)),
         _ => return None,

@@ -206,7 +206,7 @@ fn paths(app: &mut App, ui: &mut Ui) {
         }
     };
     let effective = serde_json::json!({
-        "rr_depth": 5, "min_depth": 0, "sampling": "mis", "pixel_filter": "box", "texture_filter": "bilinear", "sky_albedo": 0.5,
+        "rr_depth": 5, "min_depth": 0, "sampling": "mis", "texture_filter": "bilinear", "sky_albedo": 0.5,
     });
     let all = applicable(app.settings.integrators.path.editable(), integrator, &["denoise"]);
     editor::edit(ui, all, &effective);

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use crate::error::Result;
 use crate::measure::flip::{PIXELS_PER_DEGREE, flip};
 use crate::measure::metrics::ImagePair;
+use crate::output::palette::heat;
 use crate::renderer::interactive::{ViewPicture, ViewValues};
 use crate::viewer::request::Comparison;
 
@@ -25,7 +26,8 @@ pub fn compare(image: &ViewValues, truth: &ViewValues, truth_samples: u32) -> Re
         let (sum, n) = counted.fold((0.0, 0u64), |(sum, n), (_, v)| (sum + f64::from(*v), n + 1));
         (sum / n.max(1) as f64).sqrt()
     });
-    let pixels = flip.map.iter().flat_map(|&e| heat(e)).collect();
+    let opaque = |[r, g, b]: [u8; 3]| [r, g, b, 255];
+    let pixels = flip.map.iter().flat_map(|&e| opaque(heat(e))).collect();
     Ok(Comparison {
         rmse: pair.rmse(),
         bias: pair.bias(),
@@ -41,31 +43,6 @@ fn luminances(values: &[f32], channels: usize) -> Vec<f32> {
         3 => values.chunks_exact(3).map(|c| 0.2126 * c[0] + 0.7152 * c[1] + 0.0722 * c[2]).collect(),
         _ => values.to_vec(),
     }
-}
-
-/// Colours of a heat map from 0 to 1, evenly spaced, sRGB: those of matplotlib's magma.
-const HEAT: [[f32; 3]; 9] = [
-    [0.0, 0.0, 4.0],
-    [28.0, 16.0, 68.0],
-    [79.0, 18.0, 123.0],
-    [129.0, 37.0, 129.0],
-    [181.0, 54.0, 122.0],
-    [229.0, 80.0, 100.0],
-    [251.0, 135.0, 97.0],
-    [254.0, 194.0, 135.0],
-    [252.0, 253.0, 191.0],
-];
-
-/// The colour of an error from 0 to 1, 8-bit RGBA; white for one that is not a number.
-pub fn heat(error: f32) -> [u8; 4] {
-    if error.is_nan() {
-        return [255; 4];
-    }
-    let at = error.clamp(0.0, 1.0) * (HEAT.len() - 1) as f32;
-    let k = (at as usize).min(HEAT.len() - 2);
-    let t = at - k as f32;
-    let mix = |c: usize| (HEAT[k][c] + (HEAT[k + 1][c] - HEAT[k][c]) * t).round() as u8;
-    [mix(0), mix(1), mix(2), 255]
 }
 
 #[cfg(test)]
@@ -92,8 +69,5 @@ mod tests {
         let a = values(1, vec![0.5; 4], 0.0);
         let b = values(3, [[0.5; 3]; 4].concat(), 0.0);
         assert!(compare(&a, &b, 1).unwrap().rmse < 1e-6);
-        assert_eq!(heat(0.0), [0, 0, 4, 255]);
-        assert_eq!(heat(2.0), [252, 253, 191, 255]);
-        assert_eq!(heat(f32::NAN), [255; 4]);
     }
 }

@@ -9,7 +9,6 @@ use std::sync::Arc;
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-pub use compare::heat;
 use loader::{Loaded, Loader};
 use pane::{Pacing, Pane};
 

@@ -8,7 +8,7 @@ use crate::bench::ao::reference::AoReference;
 use crate::bench::ao::session::AoSession;
 use crate::bench::record::ao::{ChangeRecord, ChangeResult};
 use crate::error::Result;
-use crate::measure::stats::MedianP95;
+use crate::measure::stats::Percentiles;
 use crate::measure::temporal::Ghosting;
 use crate::realtime::Realtime;
 
@@ -56,7 +56,7 @@ pub fn play(
         }
         let mut result = result_of(candidate, stage);
         let update = script.to(stage.tracer, 1)?;
-        result.update_ms = MedianP95::of(&[1e3 * (update.mesh_seconds + update.top_seconds)]);
+        result.update_ms = Percentiles::of(&[1e3 * (update.mesh_seconds + update.top_seconds)]);
         let old = realtime.result()?;
         let mut images = Vec::new();
         for frame in 0..frames {

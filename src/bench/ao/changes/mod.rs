@@ -68,7 +68,7 @@ fn one(session: &mut AoSession, change: &str, mut script: ChangeScript, play: Pl
     let outcome = play(session, &mut script, &mut stage, &mut record);
     compare(&mut record);
     if !record.results.is_empty() {
-        session.lines(&table::change(&record))?;
+        session.show(&table::change(&record))?;
         session.record.changes.push(record);
     }
     outcome

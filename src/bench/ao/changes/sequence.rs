@@ -10,7 +10,7 @@ use crate::bench::ao::session::AoSession;
 use crate::bench::ao::view_renderer::first_timed;
 use crate::bench::record::ao::{ChangeRecord, ImageErrors};
 use crate::error::Result;
-use crate::measure::stats::MedianP95;
+use crate::measure::stats::Percentiles;
 use crate::measure::temporal::Ghosting;
 
 /// References of a frame and of the one before, and the pixels in which both show the same surface at rest.
@@ -83,7 +83,7 @@ pub fn play(
         result.ghosting = Some(ghosting.energy());
         result.errors = ImageErrors::mean(&errors);
         result.cost = Some(log.cost(first_timed(frames)));
-        result.update_ms = MedianP95::of(&updates);
+        result.update_ms = Percentiles::of(&updates);
         record.results.push(result);
     }
     Ok(())

@@ -1,0 +1,24 @@
+// Ambient light: radiance that is the same from everywhere, which ambient occlusion keeps from a surface, as real-time renderers have it.
+#ifndef PATH_AMBIENT
+#define PATH_AMBIENT
+#include "ao/sample.glsl"
+#include "path/view.glsl"
+
+// Share of ambient light that a surface reflects: its albedo, less the share that it transmits. What reflects and transmits by delta lobes alone shows single
+// directions, of which ambient occlusion says nothing: 0.
+vec3 ambient_reflectance(Surface s, Shading m, float log_side) {
+    if (!has_rough_part(m.bsdf)) return vec3(0.0);
+    return max(surface_albedo(s, log_side) - m.bsdf.transmitted, vec3(0.0));
+}
+
+// The occlusion ray of a sample (ao/sample.glsl). With falloff c its length is random, longer than d with probability c^-d: a hit at distance d then occludes by
+// c^-d on average, and any hit will do.
+Ray ambient_ray(BlockParams block, Surface s, vec3 ng, uvec2 pixel, uint n) {
+    vec3 axis = block.hemisphere == 0u ? ng : dot(s.ng, ng) < 0.0 ? -s.ns : s.ns;
+    vec3 w = to_world(axis, cosine_hemisphere(sample_2d(block.seed, pixel, n, AO_DIRECTION)));
+    float reach = block.radius;
+    if (block.falloff_log2 > 0.0) reach = min(reach, -log2(1.0 - sample_2d(block.seed, pixel, n, AO_LENGTH).x) / block.falloff_log2);
+    return occlusion_ray(s.position, s.offset, ng, w, reach);
+}
+
+#endif

@@ -1,0 +1,150 @@
+//! Records that were saved as JSON, read again.
+
+use std::path::Path;
+
+use serde_json::Value;
+
+use super::ao::AoBenchmark;
+use super::path::PathBenchmark;
+use super::rays::RayBenchmark;
+use super::snapshot::{Comparable, Snapshot};
+use super::{BenchKind, Completeness, HostInfo};
+use crate::error::{Error, Result};
+
+/// A record of one of the benchmarks.
+#[derive(Clone, Debug)]
+pub enum SavedRecord {
+    /// Of `skylit bench rays`.
+    Rays(Box<RayBenchmark>),
+    /// Of `skylit bench ao`.
+    Ao(Box<AoBenchmark>),
+    /// Of `skylit bench path`.
+    Path(Box<PathBenchmark>),
+}
+
+impl SavedRecord {
+    /// Reads a record.
+    ///
+    /// # Errors
+    /// [`Error::Input`] for a file that is missing or that no benchmark wrote.
+    pub fn read(path: &Path) -> Result<Self> {
+        let text = std::fs::read_to_string(path).map_err(|e| Error::read(path, &e))?;
+        let broken = |why: String| Error::input(path, format!("is no record of `skylit bench`: {why}"));
+        let value: Value = serde_json::from_str(&text).map_err(|e| broken(e.to_string()))?;
+        let kind = kind_of(&value).ok_or_else(|| broken("it does not say which benchmark it is of".into()))?;
+        let record = match kind {
+            BenchKind::Rays => serde_json::from_value(value).map(Self::Rays),
+            BenchKind::Ao => serde_json::from_value(value).map(Self::Ao),
+            BenchKind::Path => serde_json::from_value(value).map(Self::Path),
+        };
+        record.map_err(|e| broken(e.to_string()))
+    }
+
+    /// Which benchmark it is of.
+    pub fn kind(&self) -> BenchKind {
+        match self {
+            Self::Rays(_) => BenchKind::Rays,
+            Self::Ao(_) => BenchKind::Ao,
+            Self::Path(_) => BenchKind::Path,
+        }
+    }
+
+    /// What it was measured on.
+    pub fn host(&self) -> &HostInfo {
+        match self {
+            Self::Rays(r) => &r.host,
+            Self::Ao(r) => &r.host,
+            Self::Path(r) => &r.host,
+        }
+    }
+
+    /// What is missing.
+    pub fn completeness(&self) -> &Completeness {
+        match self {
+            Self::Rays(r) => &r.completeness,
+            Self::Ao(r) => &r.completeness,
+            Self::Path(r) => &r.completeness,
+        }
+    }
+
+    /// What is compared between records.
+    pub fn snapshot(&self) -> Snapshot {
+        match self {
+            Self::Rays(r) => r.snapshot(),
+            Self::Ao(r) => r.snapshot(),
+            Self::Path(r) => r.snapshot(),
+        }
+    }
+}
+
+/// Records say which benchmark they are of; those of skylit before it had `--baseline` are known by their keys.
+fn kind_of(value: &Value) -> Option<BenchKind> {
+    let record = value.as_object()?;
+    if let Some(kind) = record.get("benchmark") {
+        return serde_json::from_value(kind.clone()).ok();
+    }
+    let has = |keys: &[&str]| keys.iter().all(|k| record.contains_key(*k));
+    match () {
+        () if has(&["views", "reference_rays"]) => Some(BenchKind::Ao),
+        () if has(&["scenes", "scaling"]) => Some(BenchKind::Rays),
+        () if has(&["scenes", "tracer", "peers"]) => Some(BenchKind::Path),
+        () => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bench::record::ao::{
+        ChangeRecord, ChangeResult, ErrorPoint, ImageErrors, StillRecord, TechniqueRecord, ViewRecord,
+    };
+    use crate::measure::stats::Percentiles;
+
+    fn read(text: &str) -> Result<SavedRecord> {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.json");
+        std::fs::write(&path, text).unwrap();
+        SavedRecord::read(&path)
+    }
+
+    #[test]
+    fn a_record_is_read_as_it_was_written() {
+        let errors = ImageErrors { rmse: f64::NAN, bias: -0.25, ..ImageErrors::default() };
+        let still = StillRecord {
+            curve: vec![ErrorPoint { frame: 3, errors, ..ErrorPoint::default() }],
+            rmse: vec![0.5, f64::NAN],
+            ..StillRecord::default()
+        };
+        let results = vec![TechniqueRecord { preset: "fast".into(), still: Some(still), ..TechniqueRecord::default() }];
+        let result =
+            ChangeResult { half_life: Some(f64::INFINITY), update_ms: Percentiles::of(&[1.0, 2.0]), ..ChangeResult::default() };
+        let record = AoBenchmark {
+            host: HostInfo { cpu: "a processor".into(), threads: 2, ..HostInfo::default() },
+            views: vec![ViewRecord { results, ..ViewRecord::default() }],
+            changes: vec![ChangeRecord { results: vec![result], ..ChangeRecord::default() }],
+            ..AoBenchmark::default()
+        };
+        let SavedRecord::Ao(read) = read(&serde_json::to_string(&record).unwrap()).unwrap() else { panic!("no record of ao") };
+        assert_eq!(read.host, record.host);
+        let still = read.views[0].results[0].still.as_ref().unwrap();
+        assert!(still.curve[0].errors.rmse.is_nan() && still.curve[0].errors.bias == -0.25 && still.rmse[1].is_nan());
+        // infinite is null, and null is unknown
+        assert_eq!(read.changes[0].results[0].half_life, None);
+        assert_eq!(read.changes[0].results[0].update_ms, Percentiles::of(&[1.0, 2.0]));
+    }
+
+    #[test]
+    fn records_are_told_apart() {
+        let kind = |text: &str| read(text).map(|r| r.kind());
+        assert_eq!(kind(&serde_json::to_string(&RayBenchmark::default()).unwrap()).unwrap(), BenchKind::Rays);
+        assert_eq!(kind(&serde_json::to_string(&PathBenchmark::default()).unwrap()).unwrap(), BenchKind::Path);
+        assert_eq!(kind(r#"{"benchmark":"ao"}"#).unwrap(), BenchKind::Ao);
+        for broken in ["", "[]", "{}", r#"{"benchmark":"time"}"#, r#"{"benchmark":"ao","views":3}"#] {
+            let error = read(broken).unwrap_err();
+            assert!(
+                error.exit_code() == 3 && error.to_string().contains("is no record of `skylit bench`"),
+                "{broken}: {error}"
+            );
+        }
+    }
+}

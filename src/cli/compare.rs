@@ -1,0 +1,332 @@
+//! `skylit compare`: images, or renders made on the spot, against a reference.
+
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use clap::{Args, ValueEnum, ValueHint};
+use serde_json::json;
+
+use super::compare_ao::{self, AoVsPathArgs};
+use crate::compare::picture::{self, PictureKind};
+use crate::compare::{Entry, ImageSet, check_count, letter, page, parse_letter, render, short_names};
+use crate::error::{Error, Result};
+use crate::files;
+use crate::film::Control;
+use crate::integrators::lighting::LightingSettings;
+use crate::measure::comparison::CompareOptions;
+use crate::measure::mask::MaskOptions;
+use crate::output;
+use crate::renderer::settings::{CameraSettings, ImageSettings};
+use crate::renderer::{RenderSettings, Renderer};
+use crate::report;
+use crate::settings::parse::Parsed;
+use crate::terminal::console::{Console, Failure, Verbosity, command_line, one_line};
+use crate::terminal::interrupt::{self, ProgressControl};
+use crate::terminal::progress::Progress;
+use crate::terminal::warnings::Warnings;
+use crate::tracer::DeviceSettings;
+
+/// Which pixels are compared.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Mask {
+    /// Those that at least one of the two images covers, where both have the channel A
+    Covered,
+    /// All
+    All,
+}
+
+const EXAMPLES: &str = "\
+Examples:
+  skylit compare ao.exr path.exr
+  skylit compare --scene scene.glb --a \"ao --spp 16\" --b \"ao-sky --spp 256\" --size 640x360 --html report
+  skylit compare ao-vs-path scene.glb
+  skylit compare golden.exr --scene scene.glb --a balanced --flip flip.png";
+
+/// Comparisons that are not of images by letters.
+#[derive(Clone, Debug, clap::Subcommand)]
+pub enum OtherComparison {
+    /// Find the radius, falloff and ambient colour with which ambient occlusion is closest to path tracing, and how far it still is
+    AoVsPath(Box<AoVsPathArgs>),
+}
+
+/// `skylit compare`.
+#[derive(Clone, Debug, Args)]
+#[command(after_help = EXAMPLES, args_conflicts_with_subcommands = true)]
+pub struct CompareArgs {
+    /// Another kind of comparison.
+    #[command(subcommand)]
+    pub comparison: Option<OtherComparison>,
+    /// Images (.exr, .png): A, which is judged; B, the reference; C and more, which are judged, too. Those of --a, --b and --c take their letters first
+    #[arg(value_name = "IMAGE", value_hint = ValueHint::FilePath)]
+    pub images: Vec<PathBuf>,
+    /// Scene to render: a .gltf, .glb, .obj or .brhan file, or builtin:NAME. Options of the groups Image, Camera and Light apply to each render that they have an effect on
+    #[arg(long, value_name = "SCENE")]
+    pub scene: Option<String>,
+    /// Render image A of --scene: an integrator or a preset of frames in real time, then options of `skylit render`, like "ao --ao-radius 2" or "balanced --frames 8"
+    #[arg(long, value_name = "RENDER", requires = "scene", allow_hyphen_values = true)]
+    pub a: Option<String>,
+    /// Render image B, like --a
+    #[arg(long, value_name = "RENDER", requires = "scene", allow_hyphen_values = true)]
+    pub b: Option<String>,
+    /// Render another image, C and so on, like --a; may be repeated
+    #[arg(long, value_name = "RENDER", requires = "scene", allow_hyphen_values = true)]
+    pub c: Vec<String>,
+    /// The image that the others are compared with, by its letter
+    #[arg(long, value_name = "LETTER", value_parser = parse_letter_argument, default_value = "B")]
+    pub reference: usize,
+    /// Pixels to compare
+    #[arg(long, value_enum, default_value = "covered")]
+    pub mask: Mask,
+    /// Compare only pixels of this rectangle: left, top, width and height in pixels
+    #[arg(long, value_name = "X,Y,W,H", value_parser = parse_rectangle)]
+    pub rectangle: Option<[u32; 4]>,
+    /// Compare only pixels that show this instance (channel id.instance of the reference, or of the image; renders get it)
+    #[arg(long, value_name = "N")]
+    pub instance: Option<u32>,
+    /// Channels to compare, separated by commas: depth.Z,Ng.X [default: the colour channels]
+    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    pub channels: Vec<String>,
+    /// Write the signed difference from the reference as a picture with a legend; of several images NAME.a.png, NAME.c.png
+    #[arg(long, value_name = "FILE.png", value_hint = ValueHint::FilePath)]
+    pub difference: Option<PathBuf>,
+    /// Write the FLIP map as a picture with a legend, named as those of --difference
+    #[arg(long, value_name = "FILE.png", value_hint = ValueHint::FilePath)]
+    pub flip: Option<PathBuf>,
+    /// Write a report into this folder: a page that needs no network, with all images, differences and numbers
+    #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath)]
+    pub html: Option<PathBuf>,
+    /// Save the renders into this folder, as a.exr, b.exr, ...
+    #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath, requires = "scene")]
+    pub save: Option<PathBuf>,
+    /// The image.
+    #[command(flatten)]
+    pub image: ImageSettings,
+    /// The camera.
+    #[command(flatten)]
+    pub camera: CameraSettings,
+    /// Light besides the scene's.
+    #[command(flatten)]
+    pub lighting: LightingSettings,
+    /// Device and tracer
+    #[command(flatten)]
+    pub device: DeviceSettings,
+    /// How results are shown
+    #[command(flatten)]
+    pub verbosity: Verbosity,
+}
+
+fn parse_letter_argument(text: &str) -> Parsed<usize> {
+    parse_letter(text)
+}
+
+fn parse_rectangle(text: &str) -> Parsed<[u32; 4]> {
+    let expected = || "expected X,Y,WIDTH,HEIGHT in pixels, like 10,20,64,48".to_owned();
+    let numbers = text.split(',').map(|n| n.trim().parse().map_err(|_| expected())).collect::<Result<Vec<u32>, _>>()?;
+    let rectangle: [u32; 4] = numbers.try_into().map_err(|_| expected())?;
+    if rectangle[2] == 0 || rectangle[3] == 0 { Err("a rectangle has at least one pixel".into()) } else { Ok(rectangle) }
+}
+
+/// Where an image comes from.
+#[derive(Clone, Debug, PartialEq, Eq)]
+enum Source {
+    File(PathBuf),
+    /// Words that say what is rendered.
+    Render(String),
+}
+
+impl CompareArgs {
+    /// The images in order: A and B, which `--a` and `--b` or the first files are, then the other files, then those of `--c`.
+    fn sources(&self) -> Vec<Source> {
+        let mut files = self.images.iter().cloned().map(Source::File);
+        let first = [&self.a, &self.b].map(|words| words.clone().map(Source::Render).or_else(|| files.next()));
+        first.into_iter().flatten().chain(files).chain(self.c.iter().cloned().map(Source::Render)).collect()
+    }
+
+    fn options(&self) -> CompareOptions {
+        let mask = MaskOptions { covered: self.mask == Mask::Covered, rectangle: self.rectangle, instance: self.instance };
+        CompareOptions { channels: self.channels.clone(), mask }
+    }
+
+    /// The settings that renders share.
+    fn shared(&self) -> RenderSettings {
+        RenderSettings {
+            image: self.image.clone(),
+            camera: self.camera.clone(),
+            lighting: self.lighting.clone(),
+            ..RenderSettings::default()
+        }
+    }
+
+    /// Checks what can be checked before anything is loaded or rendered, and returns the settings of the renders.
+    fn check(&self, sources: &[Source]) -> Result<Vec<RenderSettings>> {
+        // `--c` or `--b` alone would otherwise move up
+        if self.b.is_some() && sources.len() == 1 {
+            return Err(Error::Usage("--b: image A is missing: name a file, or render it with --a".into()));
+        }
+        check_count(sources.len(), self.reference)?;
+        let words: Vec<&str> =
+            sources.iter().filter_map(|s| if let Source::Render(w) = s { Some(&**w) } else { None }).collect();
+        if words.is_empty() && self.scene.is_some() {
+            return Err(Error::Usage("--scene: nothing is rendered: say what with --a, --b or --c".into()));
+        }
+        let shared = self.shared();
+        if let (true, Some(setting)) = (words.is_empty(), shared.given().first()) {
+            return Err(Error::Usage(format!("{} is for renders, and all images are files: leave it out", setting.option())));
+        }
+        self.device.check()?;
+        for path in self.difference.iter().chain(&self.flip) {
+            picture::paths(sources.len(), self.reference, path)?.iter().try_for_each(|p| files::check_writable(p))?;
+        }
+        for folder in self.html.iter().chain(&self.save) {
+            std::fs::create_dir_all(folder).map_err(|e| Error::write(folder, &e))?;
+        }
+        let mut settings = render::settings(&words, &shared)?;
+        if self.instance.is_some() {
+            settings.iter_mut().for_each(render::add_ids);
+        }
+        Ok(settings)
+    }
+}
+
+/// Loads and renders, compares, prints, writes.
+pub fn run(args: &CompareArgs, start: Instant) -> Result<(), Failure> {
+    if let Some(OtherComparison::AoVsPath(args)) = &args.comparison {
+        return Ok(compare_ao::run(args, start)?);
+    }
+    let sources = args.sources();
+    let settings = args.check(&sources)?;
+    let console = args.verbosity.console();
+    let mut warnings = Warnings::new(console);
+    let entries = entries(args, &sources, settings, console, &mut warnings)?;
+    let mut set = ImageSet::new(entries, args.reference, &args.options())?;
+    set.warnings.iter().for_each(|w| warnings.add(w));
+    set.warnings.clone_from(&warnings.list);
+    for line in set.lines() {
+        console.line(&line)?;
+    }
+    let mut pictures = Vec::new();
+    for (kind, path) in [(PictureKind::Difference, &args.difference), (PictureKind::Flip, &args.flip)] {
+        if let Some(path) = path {
+            pictures.extend(picture::write(&set, kind, path)?);
+        }
+    }
+    let index = args.html.as_ref().map(|dir| report::write(dir, &page::page(&set, &command_line())?)).transpose()?;
+    if let Some(index) = &index {
+        console.line(&format!("report: {}", report::address(index)))?;
+    }
+    let mut record = set.record();
+    record["pictures"] = json!(pictures);
+    record["report"] = json!(index);
+    record["warnings"] = json!(warnings.list);
+    console.close(&record, Ok(()))
+}
+
+/// Loads or renders all images.
+fn entries(
+    args: &CompareArgs,
+    sources: &[Source],
+    settings: Vec<RenderSettings>,
+    console: Console,
+    warnings: &mut Warnings,
+) -> Result<Vec<Entry>> {
+    let files: Vec<&Path> = sources.iter().filter_map(|s| if let Source::File(p) = s { Some(&**p) } else { None }).collect();
+    // a file that is missing is noticed before anything is rendered
+    let loaded = files.iter().map(|p| output::load(p)).collect::<Result<Vec<_>>>()?;
+    let mut loaded = loaded.into_iter().zip(files.iter().zip(short_names(&files)));
+    let mut renderer = match (&args.scene, settings.is_empty()) {
+        (Some(scene), false) => {
+            interrupt::install();
+            Some(Renderer::open(scene, &args.device)?)
+        }
+        _ => None,
+    };
+    let mut settings = settings.into_iter();
+    let mut entries = Vec::new();
+    for (k, source) in sources.iter().enumerate() {
+        entries.push(match (source, &mut renderer) {
+            (Source::Render(words), Some(renderer)) => {
+                let settings = settings.next().unwrap_or_default();
+                let label = format!("rendering {} ({words})", letter(k));
+                let mut control = RenderControl {
+                    progress: ProgressControl { progress: Progress::new(label, &console), keep_partial: false },
+                    warnings,
+                };
+                let image = renderer.image(&settings, &mut control)?;
+                drop(control);
+                if let Some(folder) = &args.save {
+                    output::save(&image, &folder.join(format!("{}.exr", letter(k).to_ascii_lowercase())))?;
+                }
+                Entry { name: words.clone(), description: renderer.name().to_owned(), image }
+            }
+            _ => {
+                let Some((image, (path, name))) = loaded.next() else { continue };
+                let description = path.display().to_string();
+                Entry { description: if description == name { String::new() } else { description }, name, image }
+            }
+        });
+    }
+    Ok(entries)
+}
+
+/// Progress bar and interruption by Ctrl-C of a render; warnings are printed once.
+struct RenderControl<'a> {
+    progress: ProgressControl,
+    warnings: &'a mut Warnings,
+}
+
+impl Control for RenderControl<'_> {
+    fn progress(&mut self, done: u64, total: u64) {
+        self.progress.progress(done, total);
+    }
+
+    fn warning(&mut self, text: &str) {
+        // all renders are of one scene, which has the same to say each time
+        if !self.warnings.list.contains(&one_line(text)) {
+            let Self { progress, warnings } = self;
+            progress.progress.suspend(|| warnings.add(text));
+        }
+    }
+
+    fn should_stop(&mut self) -> Result<bool> {
+        self.progress.should_stop()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[derive(clap::Parser)]
+    struct Alone {
+        #[command(flatten)]
+        args: CompareArgs,
+    }
+
+    fn parse(line: &str) -> CompareArgs {
+        <Alone as clap::Parser>::try_parse_from(line.split(' ')).unwrap().args
+    }
+
+    #[test]
+    fn renders_take_their_letters_and_files_the_others() {
+        let of = |line: &str| -> Vec<String> {
+            let name = |s| match s {
+                Source::File(path) => path.display().to_string(),
+                Source::Render(words) => format!("<{words}>"),
+            };
+            parse(line).sources().into_iter().map(name).collect()
+        };
+        assert_eq!(of("compare x.exr y.exr z.exr"), ["x.exr", "y.exr", "z.exr"]);
+        assert_eq!(of("compare --scene s --b path --a ao"), ["<ao>", "<path>"]);
+        assert_eq!(of("compare x.exr --scene s --a ao"), ["<ao>", "x.exr"]);
+        assert_eq!(of("compare x.exr y.exr --scene s --b path --c ao --c lit"), ["x.exr", "<path>", "y.exr", "<ao>", "<lit>"]);
+    }
+
+    #[test]
+    fn rectangles() {
+        assert_eq!(parse_rectangle("1, 2,3,4"), Ok([1, 2, 3, 4]));
+        for bad in ["1,2,3", "1,2,3,4,5", "a,b,c,d", "-1,0,2,2", "0,0,0,4"] {
+            assert!(parse_rectangle(bad).is_err(), "{bad}");
+        }
+        assert_eq!(parse("compare x.exr y.exr --reference a").reference, 0);
+    }
+}

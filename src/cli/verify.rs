@@ -1,0 +1,192 @@
+//! `skylit verify`: reference frames in continuous integration.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueHint};
+use serde_json::json;
+
+use crate::error::{Error, Result};
+use crate::files;
+use crate::film::Control;
+use crate::report;
+use crate::terminal::console::{Console, Failure, Verbosity, command_line, one_line};
+use crate::terminal::interrupt;
+use crate::terminal::progress::Progress;
+use crate::tracer::DeviceSettings;
+use crate::verify::bless::Change;
+use crate::verify::manifest::{Manifest, Tracers, parse_tracers};
+use crate::verify::selection::{Selection, Shard};
+use crate::verify::{Action, FrameResult, Observer, Options, Outcome, Summary, html, junit, plural};
+
+/// Ends `--help` of the command.
+const AFTER_HELP: &str = "\
+Exit codes:
+  0    all frames hold
+  1    a frame differs from its golden image
+  2    a frame, or all of them, could not be rendered or judged
+
+docs/ci.md describes the manifest, frames.toml, and what makes images differ between machines.";
+
+/// `skylit verify`.
+#[derive(Clone, Debug, Args)]
+#[command(after_help = AFTER_HELP)]
+pub struct VerifyArgs {
+    /// Folder with the manifest, frames.toml, and the golden images
+    #[arg(value_hint = ValueHint::DirPath)]
+    pub folder: PathBuf,
+    /// Only frames whose name contains this; may be given more than once
+    #[arg(long, value_name = "TEXT")]
+    pub filter: Vec<String>,
+    /// Only the I-th of N parts of the frames, for machines that share the work
+    #[arg(long, value_name = "I/N")]
+    pub shard: Option<Shard>,
+    /// Render with these tracers, which the device must have, in place of those that the manifest names: auto, all, or some of pipeline, query, compute, separated by commas
+    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    pub tracers: Vec<String>,
+    /// Seed of frames that have a Z-test alone: their verdict must not depend on it
+    #[arg(long, value_name = "N")]
+    pub seed: Option<u32>,
+    /// Make the golden images anew and say what changed; only on a driver that the manifest pins
+    #[arg(long)]
+    pub bless: bool,
+    /// Make the golden images that are missing; only on a driver that the manifest pins
+    #[arg(long, conflicts_with = "bless")]
+    pub update_missing: bool,
+    /// Make golden images on whatever driver there is
+    #[arg(long)]
+    pub force: bool,
+    /// Write the results as JUnit XML
+    #[arg(long, value_name = "FILE.xml", value_hint = ValueHint::FilePath)]
+    pub junit: Option<PathBuf>,
+    /// Write a report, an HTML page that needs no network, into this folder: frames that differ beside their golden images
+    #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath)]
+    pub html: Option<PathBuf>,
+    /// Device
+    #[command(flatten)]
+    pub device: DeviceSettings,
+    /// How results are shown
+    #[command(flatten)]
+    pub verbosity: Verbosity,
+}
+
+impl VerifyArgs {
+    fn action(&self) -> Result<Action> {
+        if self.force && !(self.bless || self.update_missing) {
+            return Err(Error::Usage("--force is for --bless and --update-missing: leave it out".into()));
+        }
+        let makes = self.bless || self.update_missing;
+        if makes && self.seed.is_some() {
+            return Err(Error::Usage("--seed has no effect on golden images: leave it out".into()));
+        }
+        if makes && !self.tracers.is_empty() {
+            return Err(Error::Usage("--tracers has no effect on golden images: leave it out".into()));
+        }
+        if self.device.tracer.is_some() {
+            return Err(Error::Usage("--tracer is for one image: use --tracers".into()));
+        }
+        Ok(if makes { Action::Bless { missing: self.update_missing, force: self.force } } else { Action::Verify })
+    }
+
+    fn options(&self) -> Result<Options> {
+        let tracers: Option<Tracers> = match self.tracers.is_empty() {
+            true => None,
+            false => Some(parse_tracers(&self.tracers).map_err(|e| Error::Usage(format!("--tracers: {e}")))?),
+        };
+        let selection = Selection { filters: self.filter.clone(), shard: self.shard };
+        Ok(Options { selection, action: self.action()?, tracers, seed: self.seed, keep_images: self.html.is_some() })
+    }
+}
+
+/// Renders, compares or blesses, and reports.
+pub fn run(args: &VerifyArgs) -> Result<(), Failure> {
+    let options = args.options()?;
+    run_with(args, &options).map_err(|failure| match failure.error {
+        // whatever keeps frames from being judged is one code for scripts
+        Error::Usage(_) | Error::CheckFailed(_) | Error::NotVerified(_) | Error::Interrupted => failure,
+        error => Failure { error: Error::NotVerified(error.to_string()), ..failure },
+    })
+}
+
+fn run_with(args: &VerifyArgs, options: &Options) -> Result<(), Failure> {
+    let manifest = Manifest::load(&args.folder)?;
+    if let Some(path) = &args.junit {
+        files::check_writable(path)?;
+    }
+    if let Some(folder) = &args.html {
+        std::fs::create_dir_all(folder).map_err(|e| Error::write(folder, &e))?;
+    }
+    interrupt::install();
+    let console = args.verbosity.console();
+    for orphan in manifest.orphans() {
+        console.warning(&format!("{}: an image of no frame; remove it", orphan.display()));
+    }
+    let mut observer = Lines { console, progress: Progress::new("verifying", &console) };
+    let summary = crate::verify::run(&manifest, options, &args.device, &mut observer)?;
+    drop(observer);
+    if let Some(path) = &args.junit {
+        junit::write(&summary, &args.folder.display().to_string(), path)?;
+    }
+    console.line(&total(&summary))?;
+    let report = args.html.as_ref().map(|dir| html::write(&summary, &manifest, &command_line(), dir)).transpose()?;
+    if let Some(index) = &report {
+        console.line(&format!("report: {}", report::address(index)))?;
+    }
+    let verdict = summary.verdict();
+    let mut record = json!(summary);
+    record["folder"] = json!(args.folder);
+    record["report"] = json!(report);
+    console.close(&record, verdict)
+}
+
+/// Prints a line for each frame, and shows the progress of all.
+struct Lines {
+    console: Console,
+    progress: Progress,
+}
+
+impl Control for Lines {
+    fn should_stop(&mut self) -> Result<bool> {
+        interrupt::check().map(|()| false)
+    }
+}
+
+impl Observer for Lines {
+    fn result(&mut self, result: &FrameResult, done: usize, total: usize) -> Result<()> {
+        let printed = self.progress.suspend(|| self.console.line(&line(result)));
+        self.progress.set(done as u64, total as u64);
+        printed?;
+        interrupt::check()
+    }
+}
+
+/// A frame's result in a line.
+fn line(result: &FrameResult) -> String {
+    let (word, text) = match &result.outcome {
+        Outcome::Holds(judgement) => ("holds", judgement.text()),
+        Outcome::Differs(judgement) => ("DIFFERS", judgement.text()),
+        Outcome::Skipped(why) => ("skipped", why.clone()),
+        Outcome::Failed(why) => ("FAILED", why.clone()),
+        Outcome::Blessed(Change::New) => ("blessed", "new".to_owned()),
+        Outcome::Blessed(Change::Unchanged) => ("blessed", "unchanged".to_owned()),
+        Outcome::Blessed(Change::Changed { text }) => ("blessed", text.clone()),
+    };
+    let tracer = result.tracer.map(|t| t.name()).unwrap_or_default();
+    let line = format!("{word:8} {:28} {tracer:8} {:6.2} s  {}", result.frame, result.seconds, one_line(&text));
+    line.trim_end().to_owned()
+}
+
+/// All results in a line.
+fn total(summary: &Summary) -> String {
+    let count = |is: fn(&Outcome) -> bool| summary.count(is);
+    let parts = [
+        (count(|o| matches!(o, Outcome::Holds(_))), "hold"),
+        (count(|o| matches!(o, Outcome::Differs(_))), "differ"),
+        (count(|o| matches!(o, Outcome::Failed(_))), "failed"),
+        (count(|o| matches!(o, Outcome::Skipped(_))), "skipped"),
+        (count(|o| matches!(o, Outcome::Blessed(_))), "blessed"),
+    ];
+    let parts: Vec<_> = parts.iter().filter(|p| p.0 > 0).map(|(n, what)| format!("{n} {what}")).collect();
+    let parts = if parts.is_empty() { "nothing to do".to_owned() } else { parts.join(", ") };
+    let renders = plural(summary.frames.len(), "render", "renders");
+    format!("{renders}: {parts} (on {}, {}, {:.1} s)", summary.device, summary.driver, summary.seconds)
+}

@@ -1,0 +1,151 @@
+//! The comparison as a page of a report.
+
+use super::report::significant;
+use super::{AoVersusPath, ChoiceRecord, FitRecord, Report};
+use crate::compare::{Entry, ImageSet};
+use crate::error::Result;
+use crate::integrators::path::ambient::EnvironmentLight;
+use crate::measure::comparison::CompareOptions;
+use crate::output::{Channel, Image};
+use crate::report::comparison::{self, NamedImage};
+use crate::report::{Axis, Cell, Chart, Mark, Page, Part, Point, Row, Section, Series, Table};
+
+/// A page with the best image beside direct light and path tracing, and what each approximation leaves. `command`: the command line that asked for it.
+///
+/// # Errors
+/// Those of [`ImageSet::new`].
+pub fn page(found: &AoVersusPath, command: &str, warnings: &[String]) -> Result<Page> {
+    let report = &found.report;
+    let mut sections = vec![images(&found.image)?];
+    sections.extend(report.path.iter().chain(&report.sky).map(section));
+    Ok(Page {
+        title: format!("{}: ambient occlusion against path tracing", report.scene),
+        summary: summary(report),
+        command: command.to_owned(),
+        facts: facts(report),
+        warnings: warnings.to_vec(),
+        sections,
+    })
+}
+
+/// What a fit is against, in words.
+pub fn title(fit: &FitRecord) -> &'static str {
+    match fit.environment_light {
+        Some(EnvironmentLight::Ambient) => "Against path tracing, ambient light in place of the environment and of bounces",
+        Some(EnvironmentLight::Traced) => "Against path tracing, ambient light in place of bounces",
+        None => "Ambient visibility against ao-sky",
+    }
+}
+
+/// A layer of the image as an image of its own.
+fn layer(image: &Image, prefix: &str) -> Image {
+    let of = |name: &str| {
+        let full = format!("{prefix}{name}");
+        image.channels.iter().find(|c| c.name == full).map(|c| Channel { name: name.to_owned(), samples: c.samples.clone() })
+    };
+    let alpha = image.channels.iter().find(|c| c.name == "A").cloned();
+    Image { channels: ["R", "G", "B"].into_iter().filter_map(of).chain(alpha).collect(), ..image.clone() }
+}
+
+fn images(image: &Image) -> Result<Section> {
+    let entry = |name: &str, prefix: &str| Entry { name: name.into(), description: String::new(), image: layer(image, prefix) };
+    let entries = vec![entry("lit, best fit", ""), entry("direct light", "direct."), entry("path tracing", "path.")];
+    let set = ImageSet::new(entries, 2, &CompareOptions::default())?;
+    let images: Vec<NamedImage> = (set.entries.iter().zip(&set.comparisons))
+        .map(|(e, c)| NamedImage { name: &e.name, description: &e.description, image: &e.image, comparison: c.as_ref() })
+        .collect();
+    comparison::section("Images", &images, 2)
+}
+
+fn percent(x: f64) -> String {
+    format!("{:.0} %", 100.0 * x)
+}
+
+fn explained(fit: &FitRecord, name: &str) -> f64 {
+    fit.rows.iter().find(|r| r.name == name).map_or(0.0, |r| r.explained)
+}
+
+fn summary(report: &Report) -> String {
+    let Some(fit) = report.path.first() else { return String::new() };
+    let best = 1.0 - (fit.best.rmse / fit.target_rms.max(f64::MIN_POSITIVE)).powi(2);
+    let flat = explained(fit, "ambient light without occlusion");
+    format!(
+        "{} of the light comes after two bounces or more. Ambient light with {} accounts for {} of what it stands for, by its mean square; without occlusion it is {}.",
+        percent(report.light.bounces),
+        choice(&fit.best),
+        percent(best),
+        percent(flat)
+    )
+}
+
+/// A choice in words.
+fn choice(choice: &ChoiceRecord) -> String {
+    let radius = choice.radius.map(|r| format!("an AO radius of {}", significant(r)));
+    let half = choice.half_distance.map(|h| format!("occlusion that halves every {}", significant(h)));
+    match (radius, half) {
+        (Some(radius), Some(half)) => format!("{radius} and {half}"),
+        (Some(text), None) | (None, Some(text)) => text,
+        (None, None) => "AO without radius or falloff".into(),
+    }
+}
+
+fn facts(report: &Report) -> Vec<(String, String)> {
+    let fact = |name: &str, value: String| (name.to_owned(), value);
+    vec![
+        fact("size", format!("{}x{} pixels", report.size[0], report.size[1])),
+        fact("paths per pixel", report.spp.to_string()),
+        fact("occlusion rays per pixel", report.ao_samples.to_string()),
+        fact("mean radiance", significant(report.light.mean)),
+        fact("lights and emitters", percent(report.light.lights)),
+        fact("environment, directly", percent(report.light.environment)),
+        fact("two bounces or more", percent(report.light.bounces)),
+        fact("diagonal", format!("{} scene units", significant(report.diagonal))),
+    ]
+}
+
+fn section(fit: &FitRecord) -> Section {
+    let mut parts = vec![Part::Text(format!(
+        "Best: {}, ambient radiance {}. The target has a root mean square of {}, and is known to a standard error of {}.",
+        choice(&fit.best),
+        fit.best.color(),
+        significant(fit.target_rms),
+        significant(fit.target_standard_error)
+    ))];
+    let mut table = Table::new(&["Approximation", "RMSE", "Explained", "Ambient radiance"]).titled("Approximations");
+    for row in &fit.rows {
+        let ambient = row.ambient.iter().map(|c| significant(*c)).collect::<Vec<_>>().join(", ");
+        table = table.row(Row::new([
+            Cell::from(row.name),
+            Cell::number(row.rmse, significant(row.rmse)),
+            Cell::number(row.explained, format!("{:.1} %", 100.0 * row.explained)),
+            Cell::from(ambient),
+        ]));
+    }
+    parts.push(Part::Table(table));
+    if let Some(p) = &fit.parts {
+        let all = (p.transport + p.occlusion + p.cross).max(f64::MIN_POSITIVE);
+        parts.push(Part::Text(format!(
+            "Of the mean squared error of the best, {} is left with ao-sky in place of AO: light that no ambient radiance describes. {} is the difference of AO from ao-sky, and {} both together, where they add up or compensate each other.",
+            percent(p.transport / all),
+            percent(p.occlusion / all),
+            percent(p.cross / all)
+        )));
+    }
+    parts.push(Part::Chart(chart(fit)));
+    Section::new(title(fit), parts)
+}
+
+fn chart(fit: &FitRecord) -> Chart {
+    let series = fit.curves.iter().map(|curve| Series {
+        name: curve.half_distance.map_or_else(|| "binary".into(), |half| format!("halves every {}", significant(half))),
+        mark: Mark::Line,
+        points: curve.radii.iter().zip(&curve.rmse).filter_map(|(r, e)| Some(Point::from(((*r)?, *e)))).collect(),
+    });
+    Chart {
+        title: "Error over radius".into(),
+        caption: "Root mean squared error with the best ambient radiance for each radius and falloff.".into(),
+        x: Axis::logarithmic("AO radius, scene units"),
+        y: Axis::linear("RMSE"),
+        series: series.collect(),
+    }
+}

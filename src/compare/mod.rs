@@ -1,0 +1,174 @@
+//! Images against a reference: files, or a scene rendered on the spot. [`ImageSet`] has the numbers, [`page`] makes a report of them, [`picture`] pictures of the
+//! differences.
+
+mod agreement;
+pub mod ao_versus_path;
+pub mod page;
+pub mod picture;
+pub mod render;
+pub mod text;
+
+use std::path::Path;
+
+use crate::error::{Error, Result};
+use crate::measure::comparison::{self, CompareOptions, Comparison};
+use crate::output::Image;
+
+pub use agreement::{DifferingEntry, differing_metadata};
+
+/// Most images that are compared at once: as many as there are letters.
+pub const MAX_IMAGES: usize = 26;
+
+/// An image that takes part in a comparison.
+#[derive(Clone, Debug, Default)]
+pub struct Entry {
+    /// Its name, short: a file's name, or what was rendered.
+    pub name: String,
+    /// More about it, a line: the path of its file, or the scene.
+    pub description: String,
+    /// The image.
+    pub image: Image,
+}
+
+/// Images, and how each of them differs from the one that is the reference.
+#[derive(Clone, Debug)]
+pub struct ImageSet {
+    /// The images: A, B, C, ...
+    pub entries: Vec<Entry>,
+    /// Index of the reference.
+    pub reference: usize,
+    /// How each differs from the reference; `None` for the reference itself.
+    pub comparisons: Vec<Option<Comparison>>,
+    /// What makes images differ that are otherwise alike, a sentence each.
+    pub warnings: Vec<String>,
+}
+
+/// A, B, C, ...
+pub fn letter(index: usize) -> char {
+    // more than 26 are refused
+    char::from(b'A' + index.min(MAX_IMAGES - 1) as u8)
+}
+
+/// Index of an image by its letter.
+///
+/// # Errors
+/// What is expected instead.
+pub fn parse_letter(text: &str) -> Result<usize, String> {
+    match text.as_bytes() {
+        [letter] if letter.is_ascii_alphabetic() => Ok(usize::from(letter.to_ascii_uppercase() - b'A')),
+        _ => Err("expected the letter of an image: A is the first, B the second".into()),
+    }
+}
+
+impl ImageSet {
+    /// Compares all images with number `reference` of them.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for fewer than two images, more than [`MAX_IMAGES`], or a reference that is none of them; those of [`comparison::compare`], which then name the
+    /// two images.
+    pub fn new(entries: Vec<Entry>, reference: usize, options: &CompareOptions) -> Result<Self> {
+        check_count(entries.len(), reference)?;
+        let comparisons = entries.iter().enumerate().map(|(k, entry)| match k {
+            k if k == reference => Ok(None),
+            _ => comparison::compare(&entry.image, &entries[reference].image, options)
+                .map(Some)
+                .map_err(|e| named(e, &title(&entries, k), &title(&entries, reference))),
+        });
+        let comparisons = comparisons.collect::<Result<Vec<_>>>()?;
+        let mut set = Self { entries, reference, comparisons, warnings: Vec::new() };
+        set.warnings = agreement::warnings(&set);
+        Ok(set)
+    }
+
+    /// Letter and name of an image: `A (ao.exr)`.
+    pub fn title(&self, index: usize) -> String {
+        title(&self.entries, index)
+    }
+
+    /// The images that were compared with the reference, and how they differ from it.
+    pub fn judged(&self) -> impl Iterator<Item = (usize, &Entry, &Comparison)> {
+        let pairs = self.entries.iter().zip(&self.comparisons).enumerate();
+        pairs.filter_map(|(k, (entry, comparison))| Some((k, entry, comparison.as_ref()?)))
+    }
+}
+
+/// Checks, before anything is loaded or rendered, that there are images to compare.
+///
+/// # Errors
+/// [`Error::Usage`] for fewer than two images, more than [`MAX_IMAGES`], or a reference that is none of them.
+pub fn check_count(count: usize, reference: usize) -> Result<()> {
+    let wrong = |text: String| Err(Error::Usage(text));
+    match count {
+        0 | 1 => wrong("two images are needed: name two files, or a --scene with --a and --b, which render it".into()),
+        n if n > MAX_IMAGES => wrong(format!("{n} images are too many: up to {MAX_IMAGES} can be compared at once")),
+        n if reference >= n => {
+            wrong(format!("--reference {}: there are {n} images, A to {}", letter(reference), letter(n - 1)))
+        }
+        _ => Ok(()),
+    }
+}
+
+fn title(entries: &[Entry], index: usize) -> String {
+    format!("{} ({})", letter(index), entries[index].name)
+}
+
+/// The same error, with the images that it is about.
+fn named(error: Error, image: &str, reference: &str) -> Error {
+    let names = format!("{image} against {reference}");
+    match error {
+        Error::Usage(text) => Error::Usage(format!("{names}: {text}")),
+        Error::CheckFailed(text) => Error::CheckFailed(format!("{names}: {text}")),
+        other => other,
+    }
+}
+
+/// Names of files, short but different: the file's name where no other file has it, else the path.
+pub fn short_names(paths: &[impl AsRef<Path>]) -> Vec<String> {
+    let name = |p: &Path| p.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+    let names: Vec<String> = paths.iter().map(|p| name(p.as_ref())).collect();
+    let is_unique = |k: usize| names.iter().filter(|n| **n == names[k]).count() == 1;
+    let short = |(k, p): (usize, &Path)| if is_unique(k) { names[k].clone() } else { p.display().to_string() };
+    paths.iter().map(AsRef::as_ref).enumerate().map(short).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::output::{Channel, Samples};
+
+    fn entry(name: &str, width: u32, value: f32) -> Entry {
+        let samples = Samples::F32(vec![value; 2 * width as usize]);
+        let image = Image { width, height: 2, channels: vec![Channel { name: "Y".into(), samples }], metadata: Vec::new() };
+        Entry { name: name.into(), description: String::new(), image }
+    }
+
+    #[test]
+    fn all_are_compared_with_the_reference() {
+        let entries = || vec![entry("a", 2, 0.5), entry("b", 2, 0.25), entry("c", 2, 0.75)];
+        let biases = |reference| -> Vec<Option<f64>> {
+            let set = ImageSet::new(entries(), reference, &CompareOptions::default()).unwrap();
+            set.comparisons.iter().map(|c| c.as_ref().map(|c| c.bias)).collect()
+        };
+        assert_eq!(biases(1), [Some(0.25), None, Some(0.5)]);
+        assert_eq!(biases(2), [Some(-0.25), Some(-0.5), None]);
+    }
+
+    #[test]
+    fn errors_name_the_images() {
+        let error = |entries: Vec<Entry>, reference| {
+            ImageSet::new(entries, reference, &CompareOptions::default()).map(|_| ()).unwrap_err().to_string()
+        };
+        let text = error(vec![entry("a.exr", 2, 0.5), entry("b.exr", 3, 0.5)], 1);
+        assert!(text.contains("A (a.exr) against B (b.exr)") && text.contains("2x2 and 3x2"), "{text}");
+        assert!(error(vec![entry("a", 2, 0.5)], 0).contains("two images"));
+        assert!(error(vec![entry("a", 2, 0.5), entry("b", 2, 0.5)], 2).contains("--reference C: there are 2 images, A to B"));
+    }
+
+    #[test]
+    fn names_are_short_but_different() {
+        assert_eq!(short_names(&["x/a.exr", "x/b.exr"]), ["a.exr", "b.exr"]);
+        assert_eq!(short_names(&["x/a.exr", "y/a.exr", "b.exr"]), ["x/a.exr", "y/a.exr", "b.exr"]);
+        assert_eq!([parse_letter("A"), parse_letter("c")], [Ok(0), Ok(2)]);
+        assert!(["", "1", "AB", "é"].iter().all(|t| parse_letter(t).is_err()));
+    }
+}

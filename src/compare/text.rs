@@ -1,0 +1,92 @@
+//! The comparison as lines of text and as a JSON record.
+
+use serde_json::{Value, json};
+
+use super::{ImageSet, letter};
+use crate::report::comparison::metrics;
+
+/// Characters between two columns.
+const GAP: usize = 2;
+
+impl ImageSet {
+    /// The images, then a table: a row for each metric, a column for each image that was compared.
+    pub fn lines(&self) -> Vec<String> {
+        let mut lines: Vec<String> = Vec::new();
+        for (k, entry) in self.entries.iter().enumerate() {
+            let role = if k == self.reference { " (reference)" } else { "" };
+            let description = if entry.description.is_empty() { String::new() } else { format!(", {}", entry.description) };
+            lines.push(format!("{}{role}: {}{description}", letter(k), entry.name));
+        }
+        let judged: Vec<_> = self.judged().map(|(k, _, c)| (k, c, metrics(c))).collect();
+        if let Some((_, c, _)) = judged.first() {
+            let [width, height] = [self.entries[0].image.width, self.entries[0].image.height];
+            let mask = c.mask.as_deref().unwrap_or("all pixels");
+            lines.push(format!("channels {} of {width}x{height} pixels, over {mask}", c.channels.join(" ")));
+        }
+        let widest = |texts: &mut dyn Iterator<Item = &str>| texts.map(|t| t.chars().count()).max().unwrap_or(0) + GAP;
+        let all = || judged.iter().flat_map(|(.., m)| m);
+        let (first, column) = (widest(&mut all().map(|m| m.name)), widest(&mut all().map(|m| &*m.text)));
+        let padded = |text: &str, width: usize| format!("{text}{}", " ".repeat(width.saturating_sub(text.chars().count())));
+        let mut head = padded("", first);
+        judged.iter().for_each(|(k, ..)| head += &padded(&letter(*k).to_string(), column));
+        lines.push(head.trim_end().to_owned());
+        for row in 0..judged.first().map_or(0, |(.., m)| m.len()) {
+            // what no image has is not worth a line
+            if judged.iter().all(|(.., m)| m[row].value.is_none()) {
+                continue;
+            }
+            let mut line = padded(judged[0].2[row].name, first);
+            judged.iter().for_each(|(.., m)| line += &padded(&m[row].text, column));
+            lines.push(line.trim_end().to_owned());
+        }
+        lines
+    }
+
+    /// The images and all metrics, as a JSON object.
+    pub fn record(&self) -> Value {
+        let images = self.entries.iter().zip(&self.comparisons).enumerate().map(|(k, (entry, comparison))| {
+            json!({
+                "letter": letter(k).to_string(),
+                "name": entry.name,
+                "description": entry.description,
+                "is_reference": k == self.reference,
+                "metrics": comparison,
+            })
+        });
+        let size = [self.entries[0].image.width, self.entries[0].image.height];
+        json!({ "size": size, "reference": letter(self.reference).to_string(), "images": images.collect::<Vec<_>>() })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Entry;
+    use super::*;
+    use crate::measure::comparison::CompareOptions;
+    use crate::output::{Channel, Image, Samples};
+
+    #[test]
+    fn a_column_for_each_image_but_the_reference() {
+        let entry = |name: &str, value: f32| {
+            let channels = vec![Channel { name: "Y".into(), samples: Samples::F32(vec![value; 4]) }];
+            let image = Image { width: 2, height: 2, channels, metadata: Vec::new() };
+            Entry { name: name.into(), description: "d".into(), image }
+        };
+        let entries = vec![entry("a.exr", 0.5), entry("b.exr", 0.25), entry("c.exr", 0.0)];
+        let set = ImageSet::new(entries, 1, &CompareOptions::default()).unwrap();
+        let lines = set.lines();
+        assert_eq!(
+            lines[..4],
+            ["A: a.exr, d", "B (reference): b.exr, d", "C: c.exr, d", "channels Y of 2x2 pixels, over all pixels"]
+        );
+        assert_eq!(lines[4].split_whitespace().collect::<Vec<_>>(), ["A", "C"]);
+        let rmse: Vec<_> = lines.iter().find(|l| l.starts_with("RMSE")).unwrap().split_whitespace().collect();
+        assert_eq!(rmse, ["RMSE", "0.2500", "0.2500"]);
+        // images without variances have no outliers
+        assert!(!lines.iter().any(|l| l.starts_with("Outliers") || l.starts_with("Error of the reference")));
+        let record = set.record();
+        assert_eq!(record["images"][2]["metrics"]["rmse"], 0.25);
+        assert!(record["images"][1]["metrics"].is_null() && record["images"][0]["metrics"]["maps"].is_null());
+        assert_eq!((record["reference"].as_str(), record["size"][0].as_u64()), (Some("B"), Some(2)));
+    }
+}

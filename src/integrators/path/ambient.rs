@@ -1,0 +1,204 @@
+//! Ambient light, as real-time renderers have it: the same radiance from everywhere, kept from surfaces by ambient occlusion.
+//!
+//! Radiance towards the camera is then L = direct light + ambient * V * albedo, V the ambient visibility of a radius and falloff. [`trace`] traces the occlusion
+//! rays of an image once and returns the distances of their hits, by which V is known for every radius and falloff.
+
+use glam::Vec3;
+
+use super::{PathEstimator, PathOptions, Strategy};
+use crate::accel::flatten::FlatScene;
+use crate::error::Result;
+use crate::film::Control;
+use crate::film::accumulate::{Estimator, MAX_SAMPLE_BITS, Plan, accumulate};
+use crate::film::block::{Block, BlockParams};
+use crate::film::camera::CameraRecord;
+use crate::gpu::{Commands, Timing};
+use crate::integrators::IntegratorSettings;
+use crate::integrators::ao::{Attenuation, Hemisphere};
+use crate::settings::choices;
+use crate::shaders;
+use crate::tracer::{Push, Stream, Tracer};
+
+choices! {
+    /// How the environment lights surfaces.
+    pub enum EnvironmentLight {
+        /// As a light: shadow rays find what of it a surface sees
+        Traced = "traced",
+        /// As part of the ambient light; it is visible behind the scene only
+        Ambient = "ambient",
+    }
+}
+
+/// Ambient light, and what keeps it from surfaces.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ambient {
+    /// Radiance, linear RGB.
+    pub color: Vec3,
+    /// Radius and falloff of ambient occlusion.
+    pub attenuation: Attenuation,
+    /// Axis of the hemisphere of occlusion rays.
+    pub hemisphere: Hemisphere,
+}
+
+impl Ambient {
+    /// As settings say.
+    pub(super) fn new(settings: &IntegratorSettings) -> Self {
+        let ao = &settings.ao;
+        Self {
+            color: settings.path.ambient.map_or(Vec3::ONE, |c| c.as_vec3()),
+            attenuation: Attenuation { radius: ao.radius(), falloff: ao.ao_falloff.unwrap_or(1.0) },
+            hemisphere: ao.hemisphere(),
+        }
+    }
+
+    /// The parameters of occlusion rays.
+    pub(super) fn block_params(&self) -> BlockParams {
+        BlockParams {
+            hemisphere: (self.hemisphere == Hemisphere::Shading) as u32,
+            falloff_log2: self.attenuation.falloff_log2() as f32,
+            radius: self.attenuation.reach() as f32,
+            ..Default::default()
+        }
+    }
+}
+
+impl std::fmt::Display for Ambient {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        let Attenuation { radius, falloff } = self.attenuation;
+        let [r, g, b] = self.color.to_array();
+        write!(f, "{r}, {g}, {b}; AO radius {radius}, falloff {falloff}, {} normal", self.hemisphere)
+    }
+}
+
+impl serde::Serialize for Ambient {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> std::result::Result<S::Ok, S::Error> {
+        let Attenuation { radius, falloff } = self.attenuation;
+        serde_json::json!({
+            "color": self.color.to_array(),
+            "radius": radius.is_finite().then_some(radius),
+            "falloff": falloff,
+            "normal": self.hemisphere,
+        })
+        .serialize(serializer)
+    }
+}
+
+/// A sample of a pixel, as far as ambient light is concerned.
+#[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub struct AmbientSample {
+    /// Share of ambient light that the surface reflects towards the camera, linear RGB; 0 where the camera ray missed, and on surfaces that reflect no ambient
+    /// light.
+    pub reflectance: [f32; 3],
+    /// Distance of the occlusion ray's hit, scene units; infinite for a miss. Without a ray: 1 if the camera ray hit a surface, else 0.
+    pub distance: f32,
+}
+
+/// Receives the samples of a pixel that were taken together: index of the pixel (rows from the top), and samples.
+pub type TakeSamples<'a> = dyn FnMut(usize, &[AmbientSample]) + 'a;
+
+/// Traces the occlusion rays of an image, to their nearest hits without a limit, and hands their distances to `take`: `options.spp` samples of each pixel in all. Camera, seed and
+/// hemisphere are those of `options`; the samples are those of an image of the integrator `lit` with the same seed. The tracer must have been built from `flat` with
+/// [`crate::tracer::Needs::shading`].
+///
+/// # Errors
+/// Those of the device, and [`crate::Error::Interrupted`] when `control` says so.
+pub fn trace(
+    tracer: &Tracer,
+    flat: &FlatScene,
+    camera: &CameraRecord,
+    options: &PathOptions,
+    control: &mut dyn Control,
+    take: &mut TakeSamples,
+) -> Result<()> {
+    let unlimited = Attenuation { radius: f64::INFINITY, falloff: 1.0 };
+    let hemisphere = options.ambient.map(|a| a.hemisphere).unwrap_or_default();
+    let ambient = Ambient { color: Vec3::ONE, attenuation: unlimited, hemisphere };
+    // the first surface alone, and no light but the ambient one
+    let options = PathOptions {
+        max_depth: 0,
+        min_depth: 1,
+        strategy: Strategy::Bsdf,
+        ambient: Some(ambient),
+        background_only: true,
+        ..options.clone()
+    };
+    let mut paths = PathEstimator::new(tracer, flat, &options)?;
+    paths.find_camera_media(camera)?;
+    let distance = tracer.stream(&shaders::PATH_DISTANCE_CLOSEST)?;
+    let mut estimator = DistanceEstimator { paths, distance, block: None, width: options.size[0], take };
+    let plan = Plan {
+        size: options.size,
+        spp: options.spp,
+        seed: options.seed,
+        time_limit: None,
+        tile_mask: None,
+        film: &Default::default(),
+    };
+    let params = BlockParams { pixel_filter: options.pixel_filter as u32, ..ambient.block_params() };
+    accumulate(tracer, camera, &plan, &params, &mut estimator, control).map(drop)
+}
+
+struct DistanceEstimator<'a, 't> {
+    paths: PathEstimator,
+    distance: Stream,
+    block: Option<Block>,
+    /// Width of the image in pixels.
+    width: u32,
+    take: &'a mut TakeSamples<'t>,
+}
+
+impl Estimator for DistanceEstimator<'_, '_> {
+    const CHANNELS: usize = 3;
+
+    fn begin(&mut self, params: BlockParams, keep: bool) -> Result<u64> {
+        self.block = Some(Block { origin: params.block_origin, size: params.block_size });
+        self.paths.begin(params, keep)
+    }
+
+    fn launch(&mut self, commands: &mut Commands, launches: &[Push], _: bool) -> Result<Vec<Timing>> {
+        let (block, width, take) = (self.block, self.width, &mut self.take);
+        let mut timings = Vec::new();
+        for push in launches {
+            timings.extend(self.paths.launch_distances(commands, *push, &self.distance)?);
+            let samples = 1usize << push.sample_bits;
+            self.paths.read_samples(push.count, |first, all: &[AmbientSample]| {
+                for (k, of_pixel) in all.chunks_exact(samples).enumerate() {
+                    let index = (push.first >> push.sample_bits) + first / samples as u32 + k as u32;
+                    if let Some(at) = block.and_then(|b| b.image_index(index, width)) {
+                        take(at, of_pixel);
+                    }
+                }
+            })?;
+        }
+        Ok(timings)
+    }
+}
+
+impl PathEstimator {
+    /// Traces camera rays, then the distances of the rays of ambient light that they leave.
+    fn launch_distances(&self, commands: &mut Commands, push: Push, distance: &Stream) -> Result<Vec<Timing>> {
+        let Some(ambient) = &self.ambient else { return Ok(Vec::new()) };
+        let [camera, occlusion] = [0, ambient.params].map(|k| Push { pass: self.block_params[k].address(), ..push });
+        commands.run(|r| {
+            self.queues[0].clear(r);
+            self.clear_light_queues(r);
+            r.barrier();
+            self.camera.record(r, &camera);
+            r.barrier();
+            distance.record(r, &ambient.queue.push(occlusion, push.count));
+            r.barrier();
+        })
+    }
+
+    /// Reads what the samples of the last launch have left; `take` also receives the index of its first sample.
+    fn read_samples(&self, count: u32, mut take: impl FnMut(u32, &[AmbientSample])) -> Result<()> {
+        let size = size_of::<AmbientSample>() as u64;
+        // all samples of a pixel at once
+        let record = size << MAX_SAMPLE_BITS;
+        self.radiance.read_with(0, size * u64::from(count), record, |first, bytes| {
+            let samples: Vec<AmbientSample> = bytemuck::pod_collect_to_vec(bytes);
+            take((first << MAX_SAMPLE_BITS) as u32, &samples);
+        })
+    }
+}

@@ -1,0 +1,54 @@
+//! Samples of ambient light: what of an image changes with the radius and falloff of ambient occlusion, and with the ambient colour.
+
+use super::still::scene_warnings;
+use super::{RenderSettings, Renderer, TracerRequest};
+use crate::accel::flatten::FlatScene;
+use crate::error::Result;
+use crate::film::Control;
+use crate::integrators::RenderJob;
+use crate::integrators::path::ambient::{self, TakeSamples};
+use crate::output;
+use crate::scene::Motion;
+
+impl Renderer {
+    /// Traces the occlusion rays of an image of the integrator `lit`, which `settings` must name, to their nearest hits, and hands the distances to `take`: by them the image is known
+    /// for every radius, falloff and ambient colour.
+    ///
+    /// # Errors
+    /// As [`Renderer::still`].
+    pub fn ambient_samples(
+        &mut self,
+        settings: &RenderSettings,
+        control: &mut dyn Control,
+        take: &mut TakeSamples,
+    ) -> Result<()> {
+        settings.check()?;
+        self.light(&settings.lighting)?;
+        let integrator = settings.integrator().get();
+        let size = settings.size(&self.scene);
+        output::check_size(size[0], size[1])?;
+        let camera = settings.camera.choose(&self.scene, f64::from(size[0]) / f64::from(size[1]))?;
+        let (device, kind, compute) = (self.device.clone(), self.kind, self.compute);
+        let ready = self.tracer.take();
+        let scene = &self.scene;
+        let mut warnings = scene_warnings(scene);
+        let job = RenderJob { time_limit: None, ..settings.job(scene, &camera) };
+        let flat = FlatScene::with_motion_and_blend(scene, Motion::default(), integrator.blend())?;
+        let rays = integrator.rays_per_sample() * u64::from(job.spp) * u64::from(size[0]) * u64::from(size[1]);
+        let request = TracerRequest {
+            needs: integrator.needs(&settings.integrators),
+            streams: integrator.streams(&settings.integrators),
+            rays,
+            control: &mut *control,
+            warnings: &mut warnings,
+        };
+        let ready = request.reuse_or_build(ready, &device, kind, &flat, compute, &self.settings)?;
+        if let Some(options) = integrator.path_options(&job)? {
+            ambient::trace(&ready.tracer, &flat, &job.camera_record(&flat), &options, control, take)?;
+        }
+        device.check_validation()?;
+        self.tracer = Some(ready);
+        self.keep_pipelines();
+        Ok(())
+    }
+}

@@ -1,0 +1,81 @@
+//! HTML reports: a page of sections, which hold text, tables, charts and images to compare.
+//!
+//! [`write`] makes a folder of it that needs no network and no server: `index.html`, with styles and scripts inside, and the pixels of images in
+//! `data/*.js`, which the page loads when they come into view. It is opened from disk.
+//!
+//! ```no_run
+//! use skylit::report::{self, Page, Part, Row, Section, Table};
+//!
+//! let table = Table::new(&["frame", "RMSE"]).row(Row::new([("stairs").into(), 0.0123.into()]));
+//! let page = Page {
+//!     title: "Frames".into(),
+//!     sections: vec![Section::new("All frames", vec![Part::Text("One frame was rendered.".into()), Part::Table(table)])],
+//!     ..Page::default()
+//! };
+//! let index = report::write("report".as_ref(), &page)?;
+//! println!("{}", report::address(&index));
+//! # Ok::<(), skylit::Error>(())
+//! ```
+
+mod chart;
+pub mod comparison;
+mod images;
+pub mod labels;
+mod layout;
+mod page;
+mod table;
+
+pub use chart::{Axis, Chart, Mark, Point, Scale, Series};
+pub use images::{ComparedImage, ImageComparison};
+pub use page::{address, write};
+pub use table::{Cell, Column, Row, Status, Table, format_number};
+
+/// A page of a report.
+#[derive(Clone, Debug, Default)]
+pub struct Page {
+    /// Its title.
+    pub title: String,
+    /// What the page says, in a sentence or two; shown under the title.
+    pub summary: String,
+    /// The command that made it, as it was typed; may be empty.
+    pub command: String,
+    /// Facts about all of it, name and value: device, driver, version.
+    pub facts: Vec<(String, String)>,
+    /// What must not be overlooked, a sentence each.
+    pub warnings: Vec<String>,
+    /// Its sections, in order. The page begins with a list of them where there are more than two.
+    pub sections: Vec<Section>,
+}
+
+/// A section of a page.
+#[derive(Clone, Debug, Default)]
+pub struct Section {
+    /// Its title.
+    pub title: String,
+    /// The outcome of a check that the section is about, shown beside the title.
+    pub status: Option<Status>,
+    /// What it holds, in order.
+    pub parts: Vec<Part>,
+    /// Shows only the title until the reader opens it.
+    pub folded: bool,
+}
+
+impl Section {
+    /// A section that is open.
+    pub fn new(title: impl Into<String>, parts: Vec<Part>) -> Self {
+        Self { title: title.into(), parts, ..Self::default() }
+    }
+}
+
+/// A part of a section.
+#[derive(Clone, Debug)]
+pub enum Part {
+    /// A paragraph of plain text.
+    Text(String),
+    /// A table.
+    Table(Table),
+    /// A chart.
+    Chart(Chart),
+    /// Images side by side, with their differences.
+    Images(ImageComparison),
+}

@@ -1,0 +1,157 @@
+//! Tables of a report.
+
+use serde::Serialize;
+
+/// A table. A reader sorts it by clicking on the title of a column.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Table {
+    /// What it shows, in a few words; may be empty.
+    pub title: String,
+    /// The columns.
+    pub columns: Vec<Column>,
+    /// The rows, each with a cell for every column.
+    pub rows: Vec<Row>,
+}
+
+/// A column of a [`Table`].
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Column {
+    /// Its title.
+    pub title: String,
+    /// What its numbers mean and their unit, shown when a pointer rests on the title; may be empty.
+    pub help: String,
+}
+
+/// A row of a [`Table`].
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Row {
+    /// Its cells.
+    pub cells: Vec<Cell>,
+    /// The part of the section's images that the row is about, in pixels: x, y, width, height. A button shows it there.
+    pub region: Option<[u32; 4]>,
+}
+
+/// A cell of a [`Table`].
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Cell {
+    /// What it says.
+    pub text: String,
+    /// What it is sorted by, if it is a number. Numbers are set to the right.
+    pub value: Option<f64>,
+    /// The outcome of a check.
+    pub status: Option<Status>,
+    /// Index of the section of the page to which the cell leads.
+    pub section: Option<usize>,
+    /// Explains the cell when a pointer rests on it; may be empty.
+    pub help: String,
+}
+
+/// The outcome of a check.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Status {
+    /// It holds.
+    Good,
+    /// It holds, but something is to be looked at.
+    Warning,
+    /// It does not hold.
+    Bad,
+}
+
+impl Table {
+    /// An empty table with columns of these titles.
+    pub fn new(columns: &[&str]) -> Self {
+        let columns = columns.iter().map(|c| Column { title: (*c).to_owned(), help: String::new() }).collect();
+        Self { columns, ..Self::default() }
+    }
+
+    /// The table with another row.
+    pub fn row(mut self, row: Row) -> Self {
+        self.rows.push(row);
+        self
+    }
+
+    /// The table with this title.
+    pub fn titled(mut self, title: impl Into<String>) -> Self {
+        self.title = title.into();
+        self
+    }
+}
+
+impl Row {
+    /// A row of these cells.
+    pub fn new(cells: impl IntoIterator<Item = Cell>) -> Self {
+        Self { cells: cells.into_iter().collect(), region: None }
+    }
+
+    /// The row with the part of the images that it is about.
+    pub fn of_region(mut self, region: [u32; 4]) -> Self {
+        self.region = Some(region);
+        self
+    }
+}
+
+impl Cell {
+    /// A number that is shown as `text`.
+    pub fn number(value: f64, text: impl Into<String>) -> Self {
+        Self { text: text.into(), value: Some(value), ..Self::default() }
+    }
+
+    /// The cell with the outcome of a check.
+    pub fn with_status(mut self, status: Status) -> Self {
+        self.status = Some(status);
+        self
+    }
+
+    /// The cell as a link to a section of the page, by its index.
+    pub fn to_section(mut self, section: usize) -> Self {
+        self.section = Some(section);
+        self
+    }
+}
+
+impl From<&str> for Cell {
+    fn from(text: &str) -> Self {
+        text.to_owned().into()
+    }
+}
+
+impl From<String> for Cell {
+    fn from(text: String) -> Self {
+        Self { text, ..Self::default() }
+    }
+}
+
+impl From<f64> for Cell {
+    fn from(value: f64) -> Self {
+        Self::number(value, format_number(value))
+    }
+}
+
+/// A number with four significant digits: `0.01234`, `12.34`, `1.234e-7`, `12345`; `inf` and `NaN` as they are.
+pub fn format_number(value: f64) -> String {
+    if value == 0.0 || !value.is_finite() {
+        return if value == 0.0 { "0".to_owned() } else { value.to_string() };
+    }
+    let scientific = format!("{value:.3e}");
+    // of the rounded number: 0.09999999 has the digits of 0.1
+    let exponent = scientific.split_once('e').and_then(|(_, e)| e.parse::<i32>().ok()).unwrap_or(0);
+    match exponent {
+        -4..=3 => format!("{value:.*}", (3 - exponent) as usize),
+        4..=8 => format!("{value:.0}"),
+        _ => scientific,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_have_four_digits() {
+        let of = |v: f64| format_number(v);
+        assert_eq!([0.0, 1.0, 0.012344, -12.3456].map(of), ["0", "1.000", "0.01234", "-12.35"]);
+        assert_eq!([123456.4, 1.2344e-7, 3e12, f64::INFINITY].map(of), ["123456", "1.234e-7", "3.000e12", "inf"]);
+        assert_eq!([of(f64::NAN), of(0.099_999_99), of(-9999.96)], ["NaN", "0.1000", "-10000"]);
+    }
+}

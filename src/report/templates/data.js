@@ -1,0 +1,1 @@
+skylitReport.receive({{ key|tojson }}, {{ pixels|tojson }});

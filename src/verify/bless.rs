@@ -1,0 +1,168 @@
+//! Makes golden images, and says what changed.
+
+use super::golden::{FIRST_SEED, Golden, Maker, REPLICATES};
+use super::manifest::{Frame, Manifest, names_driver};
+use super::session::Session;
+use crate::error::{Error, Result};
+use crate::film::Control;
+use crate::gpu::DeviceInfo;
+use crate::measure::comparison::{CompareOptions, compare};
+use crate::measure::z_test::{Estimate, ZTest};
+use crate::output::Samples;
+use crate::tracer::TracerKind;
+
+/// What became of a golden image.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+#[serde(rename_all = "lowercase", tag = "change")]
+pub enum Change {
+    /// There was none.
+    New,
+    /// It is as it was.
+    Unchanged,
+    /// It is another now.
+    Changed {
+        /// What changed, in a line.
+        text: String,
+    },
+}
+
+/// Refuses drivers on which golden images are not to be made.
+///
+/// # Errors
+/// [`Error::Usage`], with the line to add to the manifest.
+pub fn check_driver(manifest: &Manifest, info: &DeviceInfo) -> Result<()> {
+    let remedy =
+        format!("add it to [drivers] pinned in {}, or use --force", manifest.folder.join(super::manifest::NAME).display());
+    let refuse = |why: String| Err(Error::Usage(format!("golden images are not made on {why}: {remedy}")));
+    // a driver without a version cannot be told from the next one
+    if !info.driver.contains(|c: char| c.is_ascii_digit()) {
+        return refuse(format!("{:?}, a driver that does not say its version", info.driver));
+    }
+    if manifest.pinned.is_empty() {
+        return refuse(format!("{:?}, because no driver is pinned", info.driver));
+    }
+    if !names_driver(&manifest.pinned, &info.driver) {
+        return refuse(format!("{:?}, which is not pinned (pinned: {})", info.driver, manifest.pinned.join(", ")));
+    }
+    Ok(())
+}
+
+/// The tracer that a frame's golden image is made with: the device's own choice, if the frame is rendered with it.
+pub fn tracer(session: &Session, frame: &Frame) -> Result<TracerKind> {
+    let kinds: Vec<_> = session.tracers(&frame.tracers).into_iter().filter(|k| k.1).map(|k| k.0).collect();
+    let (auto, _) = TracerKind::auto(session.info());
+    let chosen = kinds.iter().copied().find(|k| *k == auto).or(kinds.first().copied());
+    chosen.ok_or_else(|| Error::Device(format!("{} has none of the frame's tracers", session.info().name)))
+}
+
+/// Renders a frame's golden image.
+///
+/// # Errors
+/// Those of the renderer; [`Error::CheckFailed`] for an image that is too noisy for the bias that it is to show.
+pub fn render(
+    session: &mut Session,
+    manifest: &Manifest,
+    frame: &Frame,
+    kind: TracerKind,
+    control: &mut dyn Control,
+) -> Result<Golden> {
+    let (path, maker) = (manifest.golden(frame), Maker::new(session.info(), kind));
+    let Some(limit) = &frame.tolerance.z_test else {
+        return Golden::of_image(&path, frame, session.render(frame, kind, None, control)?, &maker);
+    };
+    let seeds = FIRST_SEED..FIRST_SEED + REPLICATES;
+    let images = seeds.map(|seed| session.render(frame, kind, Some(seed), control)).collect::<Result<Vec<_>>>()?;
+    let golden = Golden::of_replicates(&path, frame, &images, &maker)?;
+    if let (Some(bias), Some(reference)) = (limit.bias, &golden.reference) {
+        let verdict = ZTest { false_alarms: limit.false_alarms }.compare(&Estimate::of(&images[0])?, reference)?;
+        let found = verdict.detectable_bias;
+        if found > bias {
+            let [found, bias] = [found, bias].map(|b| 100.0 * b);
+            return Err(Error::CheckFailed(format!(
+                "too noisy to find a bias of {bias} % of the mean: the least that is found is {found:.2} %; raise --spp or --size"
+            )));
+        }
+    }
+    Ok(golden)
+}
+
+/// Writes a golden image where it is another than before.
+///
+/// # Errors
+/// [`Error::Output`]; those of comparing.
+pub fn update(golden: &Golden) -> Result<Change> {
+    if !golden.path.exists() {
+        golden.save()?;
+        return Ok(Change::New);
+    }
+    let before = Golden::load(&golden.path);
+    let after = as_read(golden)?;
+    let text = match &before {
+        Ok(before) if Contents::of(before) == Contents::of(&after) => return Ok(Change::Unchanged),
+        Ok(before) => changes(before, &after)?,
+        Err(e) => format!("the golden image before could not be read ({e})"),
+    };
+    golden.save()?;
+    Ok(Change::Changed { text })
+}
+
+/// A golden image as its file will say it: a PNG rounds.
+fn as_read(golden: &Golden) -> Result<Golden> {
+    let dir = tempfile::tempdir().map_err(|e| Error::write(&golden.path, &e))?;
+    let path = dir.path().join(golden.path.file_name().unwrap_or_default());
+    Golden { path: path.clone(), ..golden.clone() }.save()?;
+    Golden::load(&path)
+}
+
+/// Everything that makes two golden images the same.
+#[derive(PartialEq)]
+struct Contents {
+    /// Names and bits of channels, by name.
+    channels: Vec<(String, Vec<u32>)>,
+    metadata: Vec<(String, String)>,
+}
+
+impl Contents {
+    fn of(golden: &Golden) -> Self {
+        let bits = |samples: &Samples| match samples {
+            Samples::F32(s) => s.iter().map(|v| v.to_bits()).collect(),
+            Samples::U32(s) => s.clone(),
+        };
+        let mut channels: Vec<_> = golden.image.channels.iter().map(|c| (c.name.clone(), bits(&c.samples))).collect();
+        channels.sort();
+        let mut metadata = golden.image.metadata.clone();
+        metadata.sort();
+        Self { channels, metadata }
+    }
+}
+
+/// What is different, in a line.
+fn changes(before: &Golden, after: &Golden) -> Result<String> {
+    let mut parts = Vec::new();
+    let [old, new] = [before, after].map(|g| [g.image.width, g.image.height]);
+    let colours = |g: &Golden| ["R", "G", "B", "Y"].map(|n| g.image.f32(n).is_some());
+    if old != new {
+        parts.push(format!("{}x{} pixels in place of {}x{}", new[0], new[1], old[0], old[1]));
+    } else if colours(before) != colours(after) {
+        parts.push("other channels of colour".to_owned());
+    } else {
+        let c = compare(&after.image, &before.image, &CompareOptions::default())?;
+        match c.max == 0.0 {
+            true => parts.push("the same colours".to_owned()),
+            false => {
+                let flip = c.flip.map(|f| format!(", FLIP {f:.4}")).unwrap_or_default();
+                let text = format!("rmse {:.3e}, bias {:+.3e}, largest difference {:.3e}{flip}", c.rmse, c.bias, c.max);
+                parts.push(text);
+            }
+        }
+    }
+    let driver = |g: &Golden| g.driver().unwrap_or("an unknown driver").to_owned();
+    if driver(before) != driver(after) {
+        parts.push(format!("{} in place of {}", driver(after), driver(before)));
+    }
+    let entries = |g: &Golden| g.image.metadata("verify.render").unwrap_or("other settings").to_owned();
+    if entries(before) != entries(after) {
+        parts.push(format!("{:?} in place of {:?}", entries(after), entries(before)));
+    }
+    Ok(parts.join("; "))
+}

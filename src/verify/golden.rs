@@ -1,0 +1,263 @@
+//! Golden images: what a frame is compared with, and what is known of how it was made.
+
+use std::path::{Path, PathBuf};
+
+use super::manifest::{Frame, GoldenFormat};
+use super::plural;
+use crate::error::{Error, Result};
+use crate::gpu::DeviceInfo;
+use crate::measure::z_test::{Estimate, MIN_REPLICATES, Reference, Region, TILE, channels_with_variance};
+use crate::output::{self, Channel, Image, Samples, png_text};
+use crate::tracer::TracerKind;
+
+/// Renders with seeds of their own that the golden image of a Z-test is the mean of.
+pub const REPLICATES: u32 = 32;
+/// Seed of the first of them, the others follow: far from those that people choose.
+pub const FIRST_SEED: u32 = 0x5EED_0000;
+/// Bits of the mantissa that means are stored with: their error is a tenth of what counts as rounding.
+const MEAN_BITS: u32 = 15;
+/// Bits of the mantissa that variances are stored with.
+const VARIANCE_BITS: u32 = 7;
+/// Prefix of the channels with variances of tiles.
+const TILE_PREFIX: &str = "tile_variance.";
+
+/// Keys of the metadata.
+mod key {
+    pub const DEVICE: &str = "verify.device";
+    pub const DRIVER: &str = "verify.driver";
+    pub const RENDER: &str = "verify.render";
+    pub const REPLICATES: &str = "verify.replicates";
+    pub const SCENE: &str = "verify.scene";
+    pub const TRACER: &str = "verify.tracer";
+    pub const VERSION: &str = "verify.version";
+    pub const WHOLE: &str = "verify.mean_variance";
+}
+
+/// A golden image.
+#[derive(Clone, Debug)]
+pub struct Golden {
+    /// The file.
+    pub path: PathBuf,
+    /// Its channels and metadata; of a PNG, linear values.
+    pub image: Image,
+    /// What a Z-test compares with, of golden images that were made for one.
+    pub reference: Option<Reference>,
+}
+
+/// What a golden image is made on.
+#[derive(Clone, Debug)]
+pub struct Maker {
+    /// Device name.
+    pub device: String,
+    /// Driver and its version.
+    pub driver: String,
+    /// The tracer.
+    pub tracer: TracerKind,
+}
+
+impl Maker {
+    /// A device and a tracer.
+    pub fn new(info: &DeviceInfo, tracer: TracerKind) -> Self {
+        Self { device: info.name.clone(), driver: info.driver.clone(), tracer }
+    }
+}
+
+impl Golden {
+    /// Reads a golden image.
+    ///
+    /// # Errors
+    /// [`Error::Input`] for a file that cannot be read.
+    pub fn load(path: &Path) -> Result<Self> {
+        let mut image = output::load(path)?;
+        if output::ImageFormat::of(path)? == output::ImageFormat::Png {
+            image.metadata.extend(png_text::read_metadata(path)?);
+        }
+        let reference = read_reference(&image).map_err(|message| Error::input(path, message))?;
+        Ok(Self { path: path.to_owned(), image, reference })
+    }
+
+    /// A golden image from a single render.
+    pub fn of_image(path: &Path, frame: &Frame, image: Image, maker: &Maker) -> Result<Self> {
+        check_finite(&image)?;
+        let mut image = match frame.format {
+            GoldenFormat::Exr => image,
+            GoldenFormat::Png => Image { metadata: image.metadata.clone(), ..shown_image(frame, &image) },
+        };
+        if !frame.tolerance.exact {
+            // noise that nothing is compared with would fill most of the file
+            image.channels.retain(|c| !c.name.starts_with("variance") && c.name != "samples");
+        }
+        sign(&mut image, frame, maker);
+        Ok(Self { path: path.to_owned(), image, reference: None })
+    }
+
+    /// A golden image for a Z-test, from renders that differ by their seeds alone.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for images without variances.
+    pub fn of_replicates(path: &Path, frame: &Frame, images: &[Image], maker: &Maker) -> Result<Self> {
+        images.iter().try_for_each(check_finite)?;
+        let renders = images.iter().map(Estimate::of).collect::<Result<Vec<_>>>()?;
+        let reference = Reference::new(&renders)?;
+        let Some(first) = images.first() else {
+            return Err(Error::Usage("a golden image needs renders".into()));
+        };
+        let mut image = Image { channels: channels_of(first, images, &reference), ..first.clone() };
+        // of one of the renders
+        image.metadata.retain(|(k, _)| k != "seed");
+        let whole = reference.whole.iter().map(f64::to_string).collect::<Vec<_>>().join(",");
+        image.metadata.push((key::WHOLE.into(), whole));
+        image.metadata.push((key::REPLICATES.into(), reference.replicates.to_string()));
+        sign(&mut image, frame, maker);
+        // as a file will have it: rounded
+        let reference = read_reference(&image).map_err(Error::Usage)?;
+        Ok(Self { path: path.to_owned(), image, reference })
+    }
+
+    /// Writes the file.
+    ///
+    /// # Errors
+    /// [`Error::Output`].
+    pub fn save(&self) -> Result<()> {
+        match output::ImageFormat::of(&self.path)? {
+            output::ImageFormat::Exr => output::save(&self.image, &self.path),
+            output::ImageFormat::Png => png_text::write(&self.image, &self.path),
+        }
+    }
+
+    /// The driver that it was made on, if it says so.
+    pub fn driver(&self) -> Option<&str> {
+        self.image.metadata(key::DRIVER)
+    }
+
+    /// Why it is not what this frame is to be compared with, in a sentence; `None` if it is.
+    pub fn misfit(&self, frame: &Frame) -> Option<String> {
+        let expected = [(key::SCENE, frame.scene.clone()), (key::RENDER, frame.render_text())];
+        for (key, now) in expected {
+            match self.image.metadata(key) {
+                Some(then) if then == now => {}
+                Some(then) => return Some(format!("its golden image was made of {then:?}, and the manifest says {now:?}")),
+                None => return Some(format!("its golden image does not say how it was made (no {key})")),
+            }
+        }
+        (frame.tolerance.z_test.is_some() && self.reference.is_none())
+            .then(|| "its golden image was not made for a Z-test".to_owned())
+    }
+}
+
+/// The picture of an image as the frame's settings show it, with linear values.
+pub fn shown_image(frame: &Frame, image: &Image) -> Image {
+    let settings = &frame.settings;
+    match settings.realtime_setting() {
+        // ambient visibility is shown as it is
+        Some(_) => Image { channels: image.channels.iter().filter(|c| c.name == "Y").cloned().collect(), ..image.clone() },
+        None => settings.integrator().get().picture(image, &settings.picture.options()),
+    }
+}
+
+/// Refuses images with colours that are not finite: nothing could be compared with them.
+fn check_finite(image: &Image) -> Result<()> {
+    let is_colour = |c: &&Channel| ["R", "G", "B", "Y"].contains(&c.name.as_str());
+    let broken = |c: &Channel| match &c.samples {
+        Samples::F32(values) => values.iter().filter(|v| !v.is_finite()).count(),
+        Samples::U32(_) => 0,
+    };
+    match image.channels.iter().filter(is_colour).map(broken).max() {
+        Some(count) if count > 0 => Err(Error::CheckFailed(format!(
+            "{} of the render are not finite: no golden image was made",
+            plural(count, "value", "values")
+        ))),
+        _ => Ok(()),
+    }
+}
+
+fn sign(image: &mut Image, frame: &Frame, maker: &Maker) {
+    let entries = [
+        (key::DEVICE, maker.device.clone()),
+        (key::DRIVER, maker.driver.clone()),
+        (key::RENDER, frame.render_text()),
+        (key::SCENE, frame.scene.clone()),
+        (key::TRACER, maker.tracer.name().to_owned()),
+        (key::VERSION, env!("CARGO_PKG_VERSION").to_owned()),
+    ];
+    image.metadata.extend(entries.map(|(k, v)| (k.to_owned(), v)));
+    image.metadata.sort();
+}
+
+/// The channels of a golden image for a Z-test: means, coverage, variances of a sample, samples, and variances of tiles at each of their pixels.
+fn channels_of(first: &Image, images: &[Image], reference: &Reference) -> Vec<Channel> {
+    let known = &reference.estimate;
+    let names = channels_with_variance(first);
+    let plane = |name: &str, bits: u32, value: &dyn Fn(usize) -> f64| Channel {
+        name: name.to_owned(),
+        samples: Samples::F32((0..first.pixel_count()).map(|p| shortened(value(p), bits)).collect()),
+    };
+    let tiles = Region::tiles(known.size, TILE);
+    let mut tile_of = vec![0; first.pixel_count()];
+    for (t, tile) in tiles.iter().enumerate() {
+        tile.pixels(known.size[0]).for_each(|p| tile_of[p] = t);
+    }
+    let mut channels = Vec::new();
+    for (c, (name, variance)) in names.iter().enumerate() {
+        let at = |p: usize| known.channels * p + c;
+        channels.push(plane(name, MEAN_BITS, &|p| known.mean[at(p)]));
+        channels.push(plane(variance, VARIANCE_BITS, &|p| known.variance[at(p)]));
+        channels.push(plane(&format!("{TILE_PREFIX}{name}"), VARIANCE_BITS, &|p| reference.tiles[at(tile_of[p])]));
+    }
+    let alpha: Vec<&[f32]> = images.iter().filter_map(|i| i.f32("A")).collect();
+    let count = alpha.len().max(1) as f64;
+    channels.push(plane("A", VARIANCE_BITS, &|p| alpha.iter().map(|a| f64::from(a[p])).sum::<f64>() / count));
+    let samples = known.samples.iter().map(|n| *n as u32).collect();
+    channels.push(Channel { name: "samples".into(), samples: Samples::U32(samples) });
+    channels
+}
+
+/// A number with this many bits of its mantissa: what is left out would not compress.
+fn shortened(value: f64, bits: u32) -> f32 {
+    let value = value as f32;
+    if !value.is_finite() {
+        return value;
+    }
+    let dropped = f32::MANTISSA_DIGITS - 1 - bits;
+    let rounded = value.to_bits().wrapping_add(1 << (dropped - 1)) & !((1 << dropped) - 1);
+    f32::from_bits(rounded)
+}
+
+/// What a Z-test compares with, if the image holds it; a sentence if it is broken.
+fn read_reference(image: &Image) -> std::result::Result<Option<Reference>, String> {
+    let Some(replicates) = image.metadata(key::REPLICATES) else { return Ok(None) };
+    let wrong = |what: &str| format!("{what}: not a golden image of this version; make it again with --bless");
+    let replicates: u32 = replicates.parse().map_err(|_| wrong("verify.replicates is no number"))?;
+    let estimate = Estimate::of(image).map_err(|_| wrong("it has no variances"))?;
+    let whole: Vec<f64> = image.metadata(key::WHOLE).unwrap_or_default().split(',').filter_map(|v| v.parse().ok()).collect();
+    let planes: Option<Vec<&[f32]>> =
+        channels_with_variance(image).iter().map(|(name, _)| image.f32(&format!("{TILE_PREFIX}{name}"))).collect();
+    let planes = planes.ok_or_else(|| wrong("it has no variances of tiles"))?;
+    if whole.len() != estimate.channels || replicates < MIN_REPLICATES {
+        return Err(wrong("its variances are incomplete"));
+    }
+    let first = |tile: &Region| tile.first[1] * estimate.size[0] + tile.first[0];
+    let of_tile = |tile: &Region| planes.iter().map(|p| f64::from(p[first(tile)])).collect::<Vec<_>>();
+    let tiles = Region::tiles(estimate.size, TILE).iter().flat_map(of_tile).collect();
+    Ok(Some(Reference { estimate, replicates, tiles, whole }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shortened_numbers_are_close() {
+        for value in [0.0, 1.0, 0.3, 1e-9, 123_456.7, -2.5] {
+            for bits in [MEAN_BITS, VARIANCE_BITS] {
+                let short = shortened(value, bits);
+                assert!(
+                    (f64::from(short) - value).abs() <= value.abs() * 0.5f64.powi(bits as i32 + 1),
+                    "{value} {bits}: {short}"
+                );
+                assert_eq!(shortened(f64::from(short), bits), short);
+            }
+        }
+        assert!(shortened(f64::NAN, 7).is_nan());
+    }
+}

@@ -1,0 +1,346 @@
+//! `frames.toml`: which frames there are, how they are rendered, and what may differ.
+
+use std::collections::BTreeSet;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+use serde::Deserialize;
+use toml::Spanned;
+
+use super::tolerance::Tolerance;
+use crate::error::{Error, Result};
+use crate::renderer::RenderSettings;
+use crate::scene::builtin;
+use crate::tracer::TracerKind;
+
+/// Name of the manifest in its folder.
+pub const NAME: &str = "frames.toml";
+/// What names of scenes that are no files begin with.
+const BUILTIN: &str = "builtin:";
+
+/// The manifest of a folder of frames.
+#[derive(Clone, Debug)]
+pub struct Manifest {
+    /// The folder: golden images lie there.
+    pub folder: PathBuf,
+    /// Drivers on which golden images are made: beginnings of `DRIVER` as `skylit doctor` prints it.
+    pub pinned: Vec<String>,
+    /// The frames, in the order of the file.
+    pub frames: Vec<Frame>,
+}
+
+/// A frame to be rendered.
+#[derive(Clone, Debug)]
+pub struct Frame {
+    /// Its name: that of its golden image without the extension.
+    pub name: String,
+    /// The scene: `builtin:NAME`, or a path from the folder.
+    pub scene: String,
+    /// How it is rendered; files that it names are paths from the folder. [`Manifest::settings`] has them as they are.
+    pub settings: RenderSettings,
+    /// The tracers that render it.
+    pub tracers: Tracers,
+    /// What may differ.
+    pub tolerance: Tolerance,
+    /// Format of its golden image.
+    pub format: GoldenFormat,
+    /// Drivers on which it is rendered, as in [`Manifest::pinned`]; all if empty.
+    pub drivers: Vec<String>,
+    /// Line of the manifest at which it begins.
+    pub line: usize,
+}
+
+/// Which tracers render a frame.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Tracers {
+    /// The one that suits the device.
+    Auto,
+    /// All that the device supports.
+    All,
+    /// These, as far as the device supports them.
+    Some(Vec<TracerKind>),
+}
+
+/// Format of a golden image.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum GoldenFormat {
+    /// OpenEXR: linear values, and what a Z-test needs to know of noise.
+    #[default]
+    Exr,
+    /// PNG: the picture, tone mapped, 8 bits.
+    Png,
+}
+
+impl GoldenFormat {
+    /// The extension of its files.
+    pub fn extension(self) -> &'static str {
+        match self {
+            Self::Exr => "exr",
+            Self::Png => "png",
+        }
+    }
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct File {
+    #[serde(default)]
+    drivers: Drivers,
+    #[serde(default)]
+    defaults: Defaults,
+    #[serde(default)]
+    frame: Vec<Spanned<Entry>>,
+}
+
+#[derive(Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Drivers {
+    #[serde(default)]
+    pinned: Vec<String>,
+}
+
+#[derive(Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Defaults {
+    render: Option<Spanned<String>>,
+    tracers: Option<Spanned<Vec<String>>>,
+    tolerance: Option<Tolerance>,
+    golden: Option<GoldenFormat>,
+    drivers: Option<Vec<String>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Entry {
+    name: Spanned<String>,
+    scene: Spanned<String>,
+    render: Option<Spanned<String>>,
+    settings: Option<Spanned<PathBuf>>,
+    tracers: Option<Spanned<Vec<String>>>,
+    tolerance: Option<Tolerance>,
+    golden: Option<GoldenFormat>,
+    drivers: Option<Vec<String>>,
+}
+
+/// A manifest's text and where it is, for messages that name a line.
+struct Source<'a> {
+    path: &'a Path,
+    text: &'a str,
+}
+
+impl Source<'_> {
+    fn line(&self, at: usize) -> usize {
+        1 + self.text.as_bytes().iter().take(at).filter(|b| **b == b'\n').count()
+    }
+
+    fn error(&self, span: Range<usize>, message: impl std::fmt::Display) -> Error {
+        Error::input(self.path, format!("line {}: {message}", self.line(span.start)))
+    }
+}
+
+impl Manifest {
+    /// Reads the manifest of a folder.
+    ///
+    /// # Errors
+    /// [`Error::Input`], naming the line, for a file that cannot be read or does not make sense.
+    pub fn load(folder: &Path) -> Result<Self> {
+        let path = folder.join(NAME);
+        let text = std::fs::read_to_string(&path).map_err(|e| Error::read(&path, &e))?;
+        let source = Source { path: &path, text: &text };
+        let file: File = toml::from_str(&text).map_err(|e| match e.span() {
+            Some(span) => source.error(span, e.message()),
+            None => Error::input(&path, e.message()),
+        })?;
+        let defaults = &file.defaults;
+        let frames = file.frame.iter().map(|entry| frame(&source, folder, defaults, entry)).collect::<Result<Vec<_>>>()?;
+        if frames.is_empty() {
+            return Err(Error::input(&path, "it has no frames: add a [[frame]] with name, scene, render and tolerance"));
+        }
+        let mut names = BTreeSet::new();
+        for (frame, entry) in frames.iter().zip(&file.frame) {
+            // file systems that ignore case keep one of two such images
+            if !names.insert(frame.name.to_lowercase()) {
+                let span = entry.get_ref().name.span();
+                return Err(source.error(span, format!("two frames are called {}", frame.name)));
+            }
+        }
+        Ok(Self { folder: folder.to_owned(), pinned: file.drivers.pinned, frames })
+    }
+
+    /// The file of a frame's golden image.
+    pub fn golden(&self, frame: &Frame) -> PathBuf {
+        self.folder.join(format!("{}.{}", frame.name, frame.format.extension()))
+    }
+
+    /// The scene of a frame, as [`crate::Renderer::open`] takes it.
+    pub fn scene(&self, frame: &Frame) -> String {
+        match frame.scene.starts_with(BUILTIN) {
+            true => frame.scene.clone(),
+            false => self.folder.join(&frame.scene).to_string_lossy().into_owned(),
+        }
+    }
+
+    /// The settings of a frame, with files that it names found from the folder.
+    pub fn settings(&self, frame: &Frame) -> RenderSettings {
+        let mut settings = frame.settings.clone();
+        if let Some(environment) = &mut settings.lighting.environment {
+            let path = self.folder.join(&*environment);
+            // a colour is no file
+            if path.exists() {
+                *environment = path.to_string_lossy().into_owned();
+            }
+        }
+        if let Some(path) = &mut settings.frames.camera_path {
+            *path = self.folder.join(&*path);
+        }
+        settings
+    }
+
+    /// Images in the folder that are no frame's.
+    pub fn orphans(&self) -> Vec<PathBuf> {
+        let known: BTreeSet<PathBuf> = self.frames.iter().map(|f| self.golden(f)).collect();
+        let is_image = |p: &PathBuf| p.extension().is_some_and(|e| e == "exr" || e == "png");
+        let files = std::fs::read_dir(&self.folder).into_iter().flatten().flatten().map(|f| f.path());
+        let mut orphans: Vec<_> = files.filter(|p| is_image(p) && !known.contains(p)).collect();
+        orphans.sort();
+        orphans
+    }
+}
+
+impl Frame {
+    /// The settings as options of `skylit render`; the seed is left out where any will do.
+    pub fn render_text(&self) -> String {
+        let mut settings = self.settings.clone();
+        if self.tolerance.allows_other_seeds() {
+            settings.image.seed = None;
+        }
+        settings.flags().join(" ")
+    }
+
+    /// Whether it is rendered on this driver.
+    pub fn is_for(&self, driver: &str) -> bool {
+        self.drivers.is_empty() || names_driver(&self.drivers, driver)
+    }
+}
+
+/// Does one of these beginnings name the driver? `llvmpipe Mesa 25.0` names `llvmpipe Mesa 25.0.7`, and not `llvmpipe Mesa 25.01`.
+pub fn names_driver(beginnings: &[String], driver: &str) -> bool {
+    let names = |beginning: &String| {
+        driver.strip_prefix(beginning.as_str()).is_some_and(|rest| !rest.starts_with(|c: char| c.is_ascii_alphanumeric()))
+    };
+    beginnings.iter().any(names)
+}
+
+fn frame(source: &Source, folder: &Path, defaults: &Defaults, entry: &Spanned<Entry>) -> Result<Frame> {
+    let (span, entry) = (entry.span(), entry.get_ref());
+    let name = entry.name.get_ref().clone();
+    let is_plain = |c: char| c.is_ascii_alphanumeric() || matches!(c, '-' | '_' | '.');
+    if name.is_empty() || name.len() > 100 || name.starts_with('.') || !name.chars().all(is_plain) {
+        let message = format!("the name {name:?} is no file name: use up to 100 letters, digits, - and _");
+        return Err(source.error(entry.name.span(), message));
+    }
+    check_scene(source, folder, &entry.scene)?;
+    let settings = settings(source, folder, defaults, entry)?;
+    let tracers = entry.tracers.as_ref().or(defaults.tracers.as_ref());
+    let tracers = tracers.map_or(Ok(Tracers::Auto), |t| parse_tracers(t.get_ref()).map_err(|e| source.error(t.span(), e)))?;
+    let Some(tolerance) = entry.tolerance.or(defaults.tolerance) else {
+        let message = format!("{name} has no tolerance: add one, such as tolerance = \"z_test\", to it or to [defaults]");
+        return Err(source.error(span, message));
+    };
+    let frame = Frame {
+        name,
+        scene: entry.scene.get_ref().clone(),
+        settings,
+        tracers,
+        tolerance,
+        format: entry.golden.or(defaults.golden).unwrap_or_default(),
+        drivers: entry.drivers.clone().or_else(|| defaults.drivers.clone()).unwrap_or_default(),
+        line: source.line(span.start),
+    };
+    check(&frame).map_err(|message| source.error(span, format!("{}: {message}", frame.name)))?;
+    Ok(frame)
+}
+
+fn check_scene(source: &Source, folder: &Path, name: &Spanned<String>) -> Result<()> {
+    if let Some(builtin) = name.get_ref().strip_prefix(BUILTIN) {
+        return match builtin::exists(builtin) {
+            true => Ok(()),
+            false => Err(source.error(name.span(), format!("no built-in scene {builtin} (`skylit scenes` lists them)"))),
+        };
+    }
+    let path = folder.join(name.get_ref());
+    match path.is_file() {
+        true => Ok(()),
+        false => Err(source.error(name.span(), format!("no scene {}: paths begin at the manifest's folder", path.display()))),
+    }
+}
+
+/// The settings of a frame: a file's, if one is named, replaced by the words of `[defaults]`, and those by the frame's.
+fn settings(source: &Source, folder: &Path, defaults: &Defaults, entry: &Entry) -> Result<RenderSettings> {
+    let mut settings = RenderSettings::default();
+    if let Some(file) = &entry.settings {
+        let load = RenderSettings::load(&folder.join(file.get_ref()));
+        settings = load.map_err(|e| source.error(file.span(), e))?;
+    }
+    for words in [&defaults.render, &entry.render].into_iter().flatten() {
+        let parsed = RenderSettings::from_words(words.get_ref()).map_err(|e| source.error(words.span(), e))?;
+        settings = settings.overridden_by(&parsed)?;
+    }
+    let span = entry.render.as_ref().map_or(entry.name.span(), Spanned::span);
+    settings.check().map_err(|e| source.error(span, e))?;
+    Ok(settings)
+}
+
+/// Parses names of tracers: `auto`, `all`, or some of them.
+///
+/// # Errors
+/// A sentence for a name that is none.
+pub fn parse_tracers<T: AsRef<str>>(names: &[T]) -> std::result::Result<Tracers, String> {
+    let names: Vec<&str> = names.iter().map(AsRef::as_ref).collect();
+    match names[..] {
+        ["auto"] => return Ok(Tracers::Auto),
+        ["all"] => return Ok(Tracers::All),
+        [] => return Err("no tracer: choose auto, all, or some of pipeline, query, compute".into()),
+        _ => {}
+    }
+    let kind = |name: &&str| TracerKind::ALL.into_iter().find(|k| k.name() == *name).ok_or_else(|| (*name).to_owned());
+    let kinds = names.iter().map(kind).collect::<std::result::Result<Vec<_>, _>>();
+    kinds
+        .map(Tracers::Some)
+        .map_err(|name| format!("unknown tracer {name}: choose auto, all, or some of pipeline, query, compute"))
+}
+
+/// Conditions on more than one key.
+fn check(frame: &Frame) -> std::result::Result<(), String> {
+    let (tolerance, settings) = (&frame.tolerance, &frame.settings);
+    let wrong = |text: &str| Err(text.to_owned());
+    if settings.image.time_limit.is_some() {
+        return wrong("--time-limit makes a different image on each machine: use --spp");
+    }
+    if settings.film.resume.is_some() || settings.film.keeps_state() {
+        return wrong("--resume, --resumable and --intervals are for long renders: leave them out");
+    }
+    if settings.frames.show.is_some() {
+        return wrong("--show has no effect here: a frame's ambient visibility is compared");
+    }
+    if tolerance.z_test.is_none() {
+        return Ok(());
+    }
+    if frame.format == GoldenFormat::Png {
+        return wrong("a PNG has no variances, which a Z-test needs: leave golden = \"png\" out, or use flip");
+    }
+    if let Some(setting) = settings.realtime_setting() {
+        return Err(format!(
+            "{} selects frames in real time, which have no variances for a Z-test: use flip",
+            setting.option()
+        ));
+    }
+    if settings.integrators.path.denoise.is_some() {
+        return wrong("the noise of a denoised image is unknown to a Z-test: use flip");
+    }
+    if settings.image.spp.is_some_and(|n| n < 2) {
+        return wrong("a Z-test needs at least 2 samples per pixel, to know their variance");
+    }
+    Ok(())
+}

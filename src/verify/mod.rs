@@ -1,0 +1,283 @@
+//! `skylit verify`: renders the frames of a manifest and compares each with its golden image.
+//!
+//! [`manifest`] reads `frames.toml`, [`selection`] chooses among its frames, [`session`] renders them, [`judge`] compares by a [`tolerance`], [`golden`] holds
+//! golden images, which [`bless`] makes; [`junit`] writes results for CI servers, [`html`] for people. docs/ci.md is for users.
+
+pub mod bless;
+pub mod golden;
+pub mod html;
+pub mod judge;
+pub mod junit;
+pub mod manifest;
+pub mod selection;
+pub mod session;
+pub mod tolerance;
+
+use std::time::Instant;
+
+use bless::Change;
+use golden::Golden;
+use judge::Judgement;
+use manifest::{Frame, Manifest, Tracers};
+use selection::Selection;
+use session::Session;
+
+use crate::error::{Error, Result};
+use crate::film::Control;
+use crate::output::Image;
+use crate::tracer::{DeviceSettings, TracerKind};
+
+/// What is done with frames.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Action {
+    /// They are compared with their golden images.
+    #[default]
+    Verify,
+    /// Golden images are made.
+    Bless {
+        /// Only those that are missing.
+        missing: bool,
+        /// On whatever driver.
+        force: bool,
+    },
+}
+
+/// What is looked at, and how.
+#[derive(Clone, Debug, Default)]
+pub struct Options {
+    /// Which frames.
+    pub selection: Selection,
+    /// What is done with them.
+    pub action: Action,
+    /// Tracers in place of those that the manifest names; one that the device lacks is then a failure.
+    pub tracers: Option<Tracers>,
+    /// Seed of frames whose verdict does not depend on it ([`tolerance::Tolerance::allows_other_seeds`]).
+    pub seed: Option<u32>,
+    /// Keep the images of frames that differ.
+    pub keep_images: bool,
+}
+
+/// What became of a frame.
+#[derive(Clone, Debug, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Outcome {
+    /// It is that of its golden image.
+    Holds(Judgement),
+    /// It is another.
+    Differs(Judgement),
+    /// It is not for this device; why.
+    Skipped(String),
+    /// It could not be rendered or judged; why.
+    Failed(String),
+    /// Its golden image was made.
+    Blessed(Change),
+}
+
+/// The result of a frame with one tracer.
+#[derive(Clone, Debug, serde::Serialize)]
+pub struct FrameResult {
+    /// Name of the frame.
+    pub frame: String,
+    /// The tracer; `None` if it did not come to that.
+    pub tracer: Option<TracerKind>,
+    /// What became of it.
+    pub outcome: Outcome,
+    /// Seconds that it took.
+    pub seconds: f64,
+    /// The image of a frame that differs, and its golden image, if they are kept.
+    #[serde(skip)]
+    pub images: Option<Box<(Image, Golden)>>,
+}
+
+/// What all frames were rendered on, and their results.
+#[derive(Clone, Debug, serde::Serialize)]
+pub struct Summary {
+    /// Device name.
+    pub device: String,
+    /// Driver and its version.
+    pub driver: String,
+    /// Results in the order in which frames were rendered.
+    pub frames: Vec<FrameResult>,
+    /// Seconds that all took.
+    pub seconds: f64,
+}
+
+/// Follows a run.
+pub trait Observer: Control {
+    /// A frame is done; `done` of `total` are.
+    ///
+    /// # Errors
+    /// An error ends the run.
+    fn result(&mut self, result: &FrameResult, done: usize, total: usize) -> Result<()>;
+}
+
+impl Summary {
+    /// Number of results for which `is` is true.
+    pub fn count(&self, is: impl Fn(&Outcome) -> bool) -> usize {
+        self.frames.iter().filter(|f| is(&f.outcome)).count()
+    }
+
+    /// The verdict on all frames.
+    ///
+    /// # Errors
+    /// [`Error::CheckFailed`] if a frame differs, else [`Error::NotVerified`] if one could not be judged.
+    pub fn verdict(&self) -> Result<()> {
+        let differ = self.count(|o| matches!(o, Outcome::Differs(_)));
+        let failed = self.count(|o| matches!(o, Outcome::Failed(_)));
+        let names = |is: fn(&Outcome) -> bool| {
+            let mut names: Vec<&str> = Vec::new();
+            for frame in self.frames.iter().filter(|f| is(&f.outcome)) {
+                // one that several tracers rendered is named once
+                if !names.contains(&frame.frame.as_str()) {
+                    names.push(&frame.frame);
+                }
+            }
+            let more = names.len().saturating_sub(5);
+            let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+            names[..names.len().min(5)].join(", ") + &more
+        };
+        if differ > 0 {
+            let names = names(|o| matches!(o, Outcome::Differs(_)));
+            return Err(Error::CheckFailed(format!(
+                "{} from golden images: {names}",
+                plural(differ, "frame differs", "frames differ")
+            )));
+        }
+        if failed > 0 {
+            let names = names(|o| matches!(o, Outcome::Failed(_)));
+            return Err(Error::NotVerified(format!("{} could not be judged: {names}", plural(failed, "frame", "frames"))));
+        }
+        if !self.frames.is_empty() && self.count(|o| matches!(o, Outcome::Skipped(_))) == self.frames.len() {
+            return Err(Error::NotVerified("no frame is for this device: nothing was compared".into()));
+        }
+        Ok(())
+    }
+}
+
+/// `1 frame`, `2 frames`.
+pub fn plural(count: usize, one: &str, many: &str) -> String {
+    format!("{count} {}", if count == 1 { one } else { many })
+}
+
+/// Does what the options say with the frames of a manifest.
+///
+/// # Errors
+/// [`Error::Usage`] for a selection without frames, or a driver on which golden images are not to be made; those of opening the device; interruption. What goes
+/// wrong with one frame is its outcome.
+pub fn run(manifest: &Manifest, options: &Options, device: &DeviceSettings, observer: &mut dyn Observer) -> Result<Summary> {
+    let start = Instant::now();
+    let mut frames = options.selection.frames(manifest)?;
+    let mut session = Session::open(manifest, device)?;
+    if let Action::Bless { missing, force } = options.action {
+        if missing {
+            frames.retain(|f| !manifest.golden(f).exists());
+        }
+        if !force && !frames.is_empty() {
+            bless::check_driver(manifest, session.info())?;
+        }
+    }
+    let jobs = jobs(&session, &frames, options);
+    let mut results = Vec::new();
+    for (k, (frame, job)) in jobs.iter().enumerate() {
+        let begin = Instant::now();
+        let (tracer, outcome, images) = match job {
+            Job::Skip(kind, why) => (*kind, Outcome::Skipped(why.clone()), None),
+            Job::Fail(kind, why) => (*kind, Outcome::Failed(why.clone()), None),
+            Job::Do(kind) => {
+                let (outcome, images) = match one(&mut session, manifest, frame, *kind, options, observer) {
+                    Ok(done) => done,
+                    // nothing else can be done either
+                    Err(e @ (Error::Interrupted | Error::DeviceLost(_) | Error::Output { .. })) => return Err(e),
+                    Err(e) => (Outcome::Failed(e.to_string()), None),
+                };
+                (Some(*kind), outcome, images)
+            }
+        };
+        let seconds = begin.elapsed().as_secs_f64();
+        let result = FrameResult { frame: frame.name.clone(), tracer, outcome, seconds, images };
+        observer.result(&result, k + 1, jobs.len())?;
+        results.push(result);
+    }
+    let info = session.info();
+    Ok(Summary {
+        device: info.name.clone(),
+        driver: info.driver.clone(),
+        frames: results,
+        seconds: start.elapsed().as_secs_f64(),
+    })
+}
+
+/// A frame to be rendered with a tracer, or why it is not.
+enum Job {
+    Do(TracerKind),
+    Skip(Option<TracerKind>, String),
+    Fail(Option<TracerKind>, String),
+}
+
+/// All frames with their tracers; those of one scene with one tracer follow one another.
+fn jobs<'m>(session: &Session, frames: &[&'m Frame], options: &Options) -> Vec<(&'m Frame, Job)> {
+    let driver = &session.info().driver;
+    let mut jobs = Vec::new();
+    for group in frames.chunk_by(|a, b| a.scene == b.scene) {
+        let mut of_scene = Vec::new();
+        for frame in group {
+            if !frame.is_for(driver) {
+                let why = format!("it is for {}, and this is {driver}", frame.drivers.join(" and "));
+                of_scene.push((None, *frame, Job::Skip(None, why)));
+                continue;
+            }
+            if let Action::Bless { .. } = options.action {
+                let job = bless::tracer(session, frame).map_or_else(|e| Job::Skip(None, e.to_string()), Job::Do);
+                of_scene.push((None, *frame, job));
+                continue;
+            }
+            for (kind, supported) in session.tracers(options.tracers.as_ref().unwrap_or(&frame.tracers)) {
+                let why = || format!("{driver} has no tracer {} (`skylit doctor` says what is missing)", kind.name());
+                let job = match (supported, options.tracers.is_some()) {
+                    (true, _) => Job::Do(kind),
+                    (false, true) => Job::Fail(Some(kind), why()),
+                    (false, false) => Job::Skip(Some(kind), why()),
+                };
+                of_scene.push((Some(kind.name()), *frame, job));
+            }
+        }
+        of_scene.sort_by_key(|j| j.0);
+        jobs.extend(of_scene.into_iter().map(|(_, frame, job)| (frame, job)));
+    }
+    jobs
+}
+
+type Images = Option<Box<(Image, Golden)>>;
+
+fn one(
+    session: &mut Session,
+    manifest: &Manifest,
+    frame: &Frame,
+    kind: TracerKind,
+    options: &Options,
+    observer: &mut dyn Observer,
+) -> Result<(Outcome, Images)> {
+    if let Action::Bless { .. } = options.action {
+        let golden = bless::render(session, manifest, frame, kind, observer)?;
+        session.check_validation()?;
+        return Ok((Outcome::Blessed(bless::update(&golden)?), None));
+    }
+    let path = manifest.golden(frame);
+    if !path.exists() {
+        let file = path.display();
+        return Ok((Outcome::Failed(format!("{file}: no golden image yet; make it with --update-missing")), None));
+    }
+    let golden = Golden::load(&path)?;
+    if let Some(misfit) = golden.misfit(frame) {
+        return Ok((Outcome::Failed(format!("{misfit}; make it again with --bless --filter {}", frame.name)), None));
+    }
+    let seed = options.seed.filter(|_| frame.tolerance.allows_other_seeds());
+    let image = session.render(frame, kind, seed, observer)?;
+    session.check_validation()?;
+    let judgement = judge::judge(frame, &image, &golden)?;
+    if judgement.holds() {
+        return Ok((Outcome::Holds(judgement), None));
+    }
+    let images = options.keep_images.then(|| Box::new((image, golden)));
+    Ok((Outcome::Differs(judgement), images))
+}

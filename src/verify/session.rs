@@ -1,0 +1,101 @@
+//! The device that frames are rendered on, and the renderer of the last one.
+
+use std::sync::Arc;
+
+use super::manifest::{Frame, Manifest, Tracers};
+use crate::error::{Error, Result};
+use crate::film::Control;
+use crate::gpu::{Device, DeviceInfo, Options};
+use crate::output::Image;
+use crate::renderer::Renderer;
+use crate::scene::load;
+use crate::tracer::{DeviceSettings, TracerChoice, TracerKind};
+
+/// Compiled pipelines that are kept from scene to scene: compiling is most of what small images cost on a CPU driver.
+const KEPT_PIPELINES: usize = 64;
+
+/// An open device, and the renderer of the last frame, which the next one reuses.
+pub struct Session<'m> {
+    manifest: &'m Manifest,
+    device: Arc<Device>,
+    settings: DeviceSettings,
+    open: Option<OpenRenderer>,
+}
+
+struct OpenRenderer {
+    scene: String,
+    kind: TracerKind,
+    renderer: Renderer,
+}
+
+impl<'m> Session<'m> {
+    /// Opens the device.
+    ///
+    /// # Errors
+    /// Those of [`Device::open`].
+    pub fn open(manifest: &'m Manifest, settings: &DeviceSettings) -> Result<Self> {
+        settings.check()?;
+        let device = Device::open(&Options { keep_pipelines: KEPT_PIPELINES, ..settings.options() })?;
+        Ok(Self { manifest, device, settings: settings.clone(), open: None })
+    }
+
+    /// What is rendered on.
+    pub fn info(&self) -> &DeviceInfo {
+        &self.device.info
+    }
+
+    /// The tracers for a frame, each with whether the device supports it.
+    pub fn tracers(&self, tracers: &Tracers) -> Vec<(TracerKind, bool)> {
+        let supports = |kind: TracerKind| kind.is_supported_by(&self.device.info);
+        match tracers {
+            Tracers::Auto => vec![(TracerKind::auto(&self.device.info).0, true)],
+            Tracers::All => TracerKind::ALL.into_iter().filter(|k| supports(*k)).map(|k| (k, true)).collect(),
+            Tracers::Some(kinds) => kinds.iter().map(|&k| (k, supports(k))).collect(),
+        }
+    }
+
+    /// Renders a frame: a still, or the last of its frames in real time. `seed`: one in place of its own.
+    ///
+    /// # Errors
+    /// Those of the renderer.
+    pub fn render(&mut self, frame: &Frame, kind: TracerKind, seed: Option<u32>, control: &mut dyn Control) -> Result<Image> {
+        let mut settings = self.manifest.settings(frame);
+        settings.image.seed = seed.or(settings.image.seed);
+        let image = self.renderer(frame, kind)?.image(&settings, control);
+        if image.is_err() {
+            // what it left half-made is not used again
+            self.open = None;
+        }
+        image
+    }
+
+    fn renderer(&mut self, frame: &Frame, kind: TracerKind) -> Result<&mut Renderer> {
+        let choice = match kind {
+            TracerKind::Pipeline => TracerChoice::Pipeline,
+            TracerKind::Query => TracerChoice::Query,
+            TracerKind::Compute => TracerChoice::Compute,
+        };
+        let open = match self.open.take() {
+            Some(open) if open.scene == frame.scene && open.kind == kind => open,
+            before => {
+                let scene = match before {
+                    Some(open) if open.scene == frame.scene => open.renderer.into_scene(),
+                    _ => load::load(&self.manifest.scene(frame))?,
+                };
+                let settings = DeviceSettings { tracer: Some(choice), ..self.settings.clone() };
+                // the name that the manifest has: a golden image is the same whichever folder it was made in
+                let renderer = Renderer::new(self.device.clone(), scene, &settings)?.with_name(&frame.scene);
+                OpenRenderer { scene: frame.scene.clone(), kind, renderer }
+            }
+        };
+        Ok(&mut self.open.insert(open).renderer)
+    }
+
+    /// Fails if the validation layer, where it is on, has reported anything.
+    ///
+    /// # Errors
+    /// [`Error::Vulkan`].
+    pub fn check_validation(&self) -> Result<(), Error> {
+        self.device.check_validation()
+    }
+}

@@ -1,0 +1,162 @@
+//! What of a frame may differ from its golden image.
+
+use serde::de::value::MapAccessDeserializer;
+use serde::de::{Deserialize, Deserializer, Error as _, MapAccess, Visitor};
+
+/// The default rate of false alarms of a Z-test.
+pub const FALSE_ALARMS: f64 = 1e-4;
+
+/// What of a frame may differ from its golden image. Every condition that is given has to hold, and no value may be infinite or not a number where the golden
+/// image's is finite.
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
+pub struct Tolerance {
+    /// Nothing may differ: every channel of the golden image, bit for bit.
+    pub exact: bool,
+    /// How different the images may look.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub flip: Option<FlipLimit>,
+    /// The images may differ by noise.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub z_test: Option<ZTestLimit>,
+    /// Pixels that may be wrong.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub bad_pixels: Option<u64>,
+}
+
+/// A percentile of FLIP, which is computed of the images as they are shown.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FlipLimit {
+    /// The percentile over all pixels, 0 to 100; 100 is the largest.
+    #[serde(default = "default_percentile")]
+    pub percentile: f64,
+    /// The most that it may be, 0 to 1.
+    pub max: f64,
+}
+
+fn default_percentile() -> f64 {
+    99.0
+}
+
+/// A Z-test ([`crate::measure::z_test`]).
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ZTestLimit {
+    /// The probability that an image is called different though only its seed is, above 0 and below 1.
+    #[serde(default = "default_false_alarms")]
+    pub false_alarms: f64,
+    /// The bias of the image's mean, as a share of it, that has to be found: a golden image that is too noisy for it is not made.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub bias: Option<f64>,
+}
+
+fn default_false_alarms() -> f64 {
+    FALSE_ALARMS
+}
+
+impl Default for ZTestLimit {
+    fn default() -> Self {
+        Self { false_alarms: FALSE_ALARMS, bias: None }
+    }
+}
+
+/// The conditions as a table.
+#[derive(serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Table {
+    flip: Option<FlipLimit>,
+    z_test: Option<ZTestLimit>,
+    bad_pixels: Option<u64>,
+}
+
+impl Tolerance {
+    /// Returns true if nothing but noise may differ, so that the verdict does not depend on the seed.
+    pub fn allows_other_seeds(&self) -> bool {
+        self.z_test.is_some() && !self.exact && self.flip.is_none() && self.bad_pixels.is_none()
+    }
+
+    fn check(self) -> Result<Self, String> {
+        if self == Self::default() {
+            return Err("a tolerance needs a condition: \"exact\", flip, z_test or bad_pixels".into());
+        }
+        if self.flip.is_some_and(|f| !(0.0..=100.0).contains(&f.percentile) || !(0.0..=1.0).contains(&f.max)) {
+            return Err("flip: percentile is 0 to 100, and max 0 to 1".into());
+        }
+        if let Some(z) = &self.z_test {
+            if !(z.false_alarms > 0.0 && z.false_alarms < 1.0) {
+                return Err("z_test: false_alarms is a probability, above 0 and below 1".into());
+            }
+            if z.bias.is_some_and(|b| !(b > 0.0 && b.is_finite())) {
+                return Err("z_test: bias is a share of the mean, above 0, such as 0.005".into());
+            }
+        }
+        Ok(self)
+    }
+}
+
+impl<'de> Deserialize<'de> for Tolerance {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Conditions;
+        impl<'de> Visitor<'de> for Conditions {
+            type Value = Tolerance;
+
+            fn expecting(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+                f.write_str("\"exact\", \"z_test\", or a table with flip, z_test, bad_pixels")
+            }
+
+            fn visit_str<E: serde::de::Error>(self, name: &str) -> Result<Tolerance, E> {
+                match name {
+                    "exact" => Ok(Tolerance { exact: true, ..Default::default() }),
+                    "z_test" => Ok(Tolerance { z_test: Some(ZTestLimit::default()), ..Default::default() }),
+                    other => Err(E::invalid_value(serde::de::Unexpected::Str(other), &self)),
+                }
+            }
+
+            fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<Tolerance, A::Error> {
+                let Table { flip, z_test, bad_pixels } = Table::deserialize(MapAccessDeserializer::new(map))?;
+                Tolerance { exact: false, flip, z_test, bad_pixels }.check().map_err(A::Error::custom)
+            }
+        }
+        deserializer.deserialize_any(Conditions)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn of(text: &str) -> Result<Tolerance, String> {
+        #[derive(serde::Deserialize)]
+        struct File {
+            tolerance: Tolerance,
+        }
+        toml::from_str::<File>(&format!("tolerance = {text}")).map(|f| f.tolerance).map_err(|e| e.message().to_owned())
+    }
+
+    #[test]
+    fn conditions() {
+        assert!(of("\"exact\"").unwrap().exact);
+        let z = of("\"z_test\"").unwrap();
+        assert_eq!(z.z_test, Some(ZTestLimit { false_alarms: FALSE_ALARMS, bias: None }));
+        assert_eq!(of("{ z_test = {} }").unwrap(), z);
+        assert!(z.allows_other_seeds() && !of("\"exact\"").unwrap().allows_other_seeds());
+        let both = of("{ flip = { max = 0.05 }, bad_pixels = 3 }").unwrap();
+        assert_eq!(both.flip, Some(FlipLimit { percentile: 99.0, max: 0.05 }));
+        assert_eq!((both.bad_pixels, both.exact, both.z_test), (Some(3), false, None));
+        for (text, says) in [
+            ("\"roughly\"", "roughly"),
+            ("{}", "needs a condition"),
+            ("{ flip = { max = 2 } }", "max 0 to 1"),
+            ("{ flip = { percentile = 101, max = 0.1 } }", "percentile is 0 to 100"),
+            ("{ flip = { percentle = 99, max = 0.1 } }", "percentle"),
+            ("{ z_test = { false_alarms = 0 } }", "above 0"),
+            ("{ z_test = { bias = -1 } }", "bias is a share"),
+            ("{ zzz = 1 }", "zzz"),
+            ("{ bad_pixels = -1 }", "-1"),
+            ("3", "expected"),
+        ] {
+            let error = of(text).unwrap_err();
+            assert!(error.contains(says), "{text}: {error}");
+        }
+    }
+}

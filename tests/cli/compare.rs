@@ -1,0 +1,175 @@
+//! `skylit compare`: files and renders, numbers, pictures, the report.
+
+use std::path::Path;
+
+use serde_json::Value;
+use skylit::output::{self, Channel, Image, Samples};
+
+use crate::common::command::{device, fails, json, place, refuses, run, stderr};
+
+/// Writes an image of 8 x 4 pixels whose channels have these values.
+fn write(dir: &tempfile::TempDir, name: &str, channels: &[(&str, &dyn Fn(usize) -> f32)], metadata: &[(&str, &str)]) -> String {
+    let samples = |value: &dyn Fn(usize) -> f32| Samples::F32((0..32).map(value).collect());
+    let channels = channels.iter().map(|(name, value)| Channel { name: (*name).into(), samples: samples(value) }).collect();
+    let metadata = metadata.iter().map(|(k, v)| ((*k).to_owned(), (*v).to_owned())).collect();
+    let path = place(dir, name);
+    output::save(&Image { width: 8, height: 4, channels, metadata }, path.as_ref()).unwrap();
+    path
+}
+
+#[test]
+fn numbers_of_files() {
+    let dir = tempfile::tempdir().unwrap();
+    let a = write(&dir, "a.exr", &[("Y", &|k| if k < 8 { 0.7 } else { 0.5 })], &[("camera", "1")]);
+    let b = write(&dir, "b.exr", &[("Y", &|_| 0.5)], &[("camera", "2")]);
+    let c = write(&dir, "c.exr", &[("Y", &|_| 0.25)], &[]);
+    let out = run(&["compare", &a, &b, &c]);
+    assert!(out.status.success(), "{}", stderr(&out));
+    assert!(stderr(&out).contains("A and B differ in their camera (1; 2)"), "{}", stderr(&out));
+    let text = String::from_utf8(out.stdout).unwrap();
+    let row = |name: &str| text.lines().find(|l| l.starts_with(name)).unwrap_or_else(|| panic!("{text}")).to_owned();
+    assert!(row("B (reference)").contains("b.exr"));
+    assert_eq!(row("RMSE").split_whitespace().collect::<Vec<_>>(), ["RMSE", "0.1000", "0.2500"]);
+    assert!(row("Bias").contains("+0.0500") && row("Bias").contains("-0.2500"), "{text}");
+
+    let record = json(&run(&["compare", &a, &b, &c, "--json", "--reference", "c", "--rectangle", "0,0,8,1"]));
+    let metrics = |k: usize| &record["images"][k]["metrics"];
+    assert!((metrics(0)["rmse"].as_f64().unwrap() - 0.45).abs() < 1e-6 && metrics(2).is_null(), "{record}");
+    assert_eq!((metrics(1)["pixels"].as_u64(), record["reference"].as_str()), (Some(8), Some("C")));
+    // C has no camera to disagree with
+    assert_eq!(record["warnings"].as_array().map(Vec::len), Some(0));
+    assert!(run(&["compare", &a, &b, "--quiet"]).stdout.is_empty());
+}
+
+#[test]
+fn only_pixels_of_the_mask() {
+    let dir = tempfile::tempdir().unwrap();
+    let covered = |k: usize| f32::from(u8::from(k >= 16));
+    let a = write(&dir, "a.exr", &[("Y", &|k| if k < 24 { 0.6 } else { 0.5 }), ("A", &covered)], &[]);
+    let b = write(&dir, "b.exr", &[("Y", &|_| 0.5), ("A", &covered)], &[]);
+    let of = |options: &[&str]| {
+        let record = json(&run(&[&["compare", &a, &b, "--json"], options].concat()));
+        let metrics = record["images"][0]["metrics"].clone();
+        (metrics["pixels"].as_u64().unwrap(), (metrics["bias"].as_f64().unwrap() * 1e4).round() as i64)
+    };
+    assert_eq!([of(&[]), of(&["--mask", "all"])], [(16, 500), (32, 750)]);
+    assert_eq!(of(&["--rectangle", "0,0,4,3"]), (4, 1000));
+    assert_eq!(of(&["--channels", "A", "--mask", "all"]), (32, 0));
+    refuses(&["compare", &a, &b, "--instance", "1"], 64, "--aov ids");
+    refuses(&["compare", &a, &b, "--rectangle", "6,0,4,4"], 64, "not inside the image of 8x4");
+}
+
+#[test]
+fn pictures_and_the_report() {
+    let dir = tempfile::tempdir().unwrap();
+    let of = |shift: f32| move |k: usize| 0.3 + 0.02 * k as f32 + shift;
+    let rgb = |name: &str, shift: f32| {
+        write(&dir, name, &[("R", &of(shift)), ("G", &of(0.0)), ("B", &of(-shift))], &[("scene", "<script>")])
+    };
+    let (a, b) = (rgb("a.exr", 0.1), rgb("b <1>.exr", 0.0));
+    let [difference, flip, report] = ["d.png", "f.png", "report"].map(|n| place(&dir, n));
+    let out = run(&["compare", &a, &b, "--difference", &difference, "--flip", &flip, "--html", &report]);
+    assert!(out.status.success(), "{}", stderr(&out));
+    let text = String::from_utf8(out.stdout).unwrap();
+    let address = text.lines().last().unwrap().strip_prefix("report: file:///").unwrap();
+    assert!(address.ends_with("/report/index.html"), "{address}");
+    for picture in [&difference, &flip] {
+        let picture = output::load(picture.as_ref()).unwrap();
+        // the image, and a legend that needs more room
+        assert!(picture.width > 8 && picture.height > 4);
+    }
+    let page = std::fs::read_to_string(Path::new(&report).join("index.html")).unwrap();
+    assert!(page.contains("b &lt;1&gt;.exr") && !page.contains("<script>\"") && page.contains("&lt;script&gt;"));
+    assert!(!page.contains("http://") && !page.contains("https://") && page.contains("data/images-1.js"));
+    assert!(Path::new(&report).join("data/images-1.js").is_file());
+
+    let c = rgb("c.exr", -0.1);
+    let out = run(&["compare", &a, &b, &c, "--difference", &difference, "--json"]);
+    let pictures: Vec<String> = serde_json::from_value(json(&out)["pictures"].clone()).unwrap();
+    assert_eq!(pictures, [place(&dir, "d.a.png"), place(&dir, "d.c.png")]);
+    assert!(pictures.iter().all(|p| Path::new(p).is_file()));
+}
+
+#[test]
+fn images_that_do_not_fit_are_named() {
+    let dir = tempfile::tempdir().unwrap();
+    let a = write(&dir, "a.exr", &[("Y", &|_| 0.5)], &[]);
+    let hdr = write(&dir, "hdr.exr", &[("Y", &|_| 3.0)], &[]);
+    let depth = write(&dir, "depth.exr", &[("depth.Z", &|_| 3.0)], &[]);
+    let png = place(&dir, "a.png");
+    output::png::write_grey(png.as_ref(), &[128; 32], 8, 4).unwrap();
+    let small = place(&dir, "small.png");
+    output::png::write_grey(small.as_ref(), &[128; 16], 4, 4).unwrap();
+    fails(&run(&["compare", &a, &small]), 1, &["A (a.exr) against B (small.png)", "8x4 and 4x4"]);
+    fails(&run(&["compare", &png, &hdr]), 64, &["differ in encoding", "8-bit sRGB", "up to 3"]);
+    fails(&run(&["compare", &a, &depth]), 64, &["no colour", "depth.Z", "--channels"]);
+    fails(&run(&["compare", &a, &depth, "--channels", "depth.Z"]), 64, &["A (a.exr)", "no channel depth.Z"]);
+    // FLIP is for colours
+    let flip = place(&dir, "f.png");
+    fails(&run(&["compare", &depth, &depth, "--channels", "depth.Z", "--flip", &flip]), 64, &["FLIP is for colours"]);
+    assert!(!Path::new(&flip).exists());
+    refuses(&["compare", &a, &place(&dir, "none.exr")], 3, "no such file");
+}
+
+#[test]
+fn wrong_usage() {
+    refuses(&["compare"], 64, "two images are needed");
+    refuses(&["compare", "a.exr"], 64, "two images are needed");
+    refuses(&["compare", "a.exr", "b.exr", "--reference", "C"], 64, "there are 2 images, A to B");
+    refuses(&["compare", "a.exr", "b.exr", "--reference", "7"], 64, "letter of an image");
+    refuses(&["compare", "a.exr", "b.exr", "--rectangle", "1,2,3"], 64, "X,Y,WIDTH,HEIGHT");
+    refuses(&["compare", "a.exr", "b.exr", "--difference", "d.exr"], 64, ".png");
+    refuses(&["compare", "a.exr", "b.exr", "--spp", "4"], 64, "--spp is for renders");
+    refuses(&["compare", "a.exr", "b.exr", "--scene", "builtin:plane"], 64, "nothing is rendered");
+    refuses(&["compare", "a.exr", "--a", "ao"], 64, "--scene");
+    refuses(&["compare", "--scene", "builtin:plane", "--b", "ao"], 64, "image A is missing");
+    refuses(&["compare", "--scene", "builtin:plane", "--a", "ao", "--b", "oa"], 64, "oa");
+    refuses(&["compare", "--scene", "builtin:plane", "--a", "ao", "--b", "ao --max-depth 2"], 64, "--max-depth has no effect");
+    refuses(
+        &["compare", "--scene", "builtin:plane", "--a", "ao", "--b", "ao", "--environment", "1,1,1"],
+        64,
+        "on any of the renders",
+    );
+    refuses(&["compare", "a.exr", "b.exr", "--html", "/dev/null/report"], 4, "/dev/null/report");
+}
+
+/// Renders on the spot are the images that `render` makes, and files take the letters that are left.
+#[test]
+fn gpu_renders() {
+    if !device() {
+        return;
+    }
+    let dir = tempfile::tempdir().unwrap();
+    let [file, saved, report] = ["ao.exr", "saved", "report"].map(|n| place(&dir, n));
+    let scene = ["--scene", "builtin:stairs", "--size", "48x27"];
+    let out = run(&["render", "builtin:stairs", "--size", "48x27", "--spp", "4", "-o", &file]);
+    assert!(out.status.success(), "{}", stderr(&out));
+    let words = [
+        "compare",
+        &file,
+        "--b",
+        "ao --spp 4",
+        "--c",
+        "path --spp 4 --environment 1,1,1",
+        "--c",
+        "fast --frames 2",
+        "--instance",
+        "0",
+    ];
+    let record = json(&run(&[&words[..], &scene, &["--save", &saved, "--html", &report, "--json"]].concat()));
+    let metric = |k: usize, name: &str| record["images"][k]["metrics"][name].as_f64();
+    assert_eq!((metric(0, "rmse"), metric(0, "differing")), (Some(0.0), Some(0.0)), "{record}");
+    assert!(metric(2, "rmse").unwrap() > 0.01 && metric(3, "pixels").unwrap() > 0.0, "{record}");
+    // outliers are told by the variance that stills have
+    assert!(record["images"][0]["metrics"]["reference_standard_error"].is_f64(), "{record}");
+    let warnings = record["warnings"].to_string();
+    assert!(warnings.contains("D and B differ in their pixel filter (centre; box)"), "{warnings}");
+    let names: Vec<Value> = record["images"].as_array().unwrap().iter().map(|i| i["name"].clone()).collect();
+    assert_eq!(names, ["ao.exr", "ao --spp 4", "path --spp 4 --environment 1,1,1", "fast --frames 2"]);
+    let of = |name: &str| output::load(&Path::new(&saved).join(name)).unwrap();
+    let (ours, theirs) = (of("b.exr"), output::load(file.as_ref()).unwrap());
+    assert!(ours.f32("Y") == theirs.f32("Y") && ours.metadata("spp") == Some("4"));
+    assert!(of("c.exr").f32("G").is_some() && of("d.exr").metadata("preset") == Some("fast"));
+    assert!(!Path::new(&saved).join("a.exr").exists());
+    assert!(std::fs::read_to_string(Path::new(&report).join("index.html")).unwrap().contains("pixel filter"));
+}

@@ -1,0 +1,168 @@
+//! `skylit verify` from outside: manifests that are wrong, exit codes, what it prints and writes.
+
+use std::path::Path;
+
+use crate::common::command::{device, fails, json, run, stderr};
+
+const TWO: &str = r#"
+[defaults]
+render = "ao --size 24x16 --spp 8"
+tolerance = "z_test"
+
+[[frame]]
+name = "plane"
+scene = "builtin:plane"
+tolerance = "exact"
+
+[[frame]]
+name = "stairs"
+scene = "builtin:stairs"
+render = "ao --ao-radius 2"
+"#;
+
+fn folder(manifest: &str) -> tempfile::TempDir {
+    let dir = tempfile::tempdir().unwrap();
+    std::fs::write(dir.path().join("frames.toml"), manifest).unwrap();
+    dir
+}
+
+fn text(path: &Path) -> &str {
+    path.to_str().unwrap()
+}
+
+#[test]
+fn manifests_that_are_wrong_name_the_line() {
+    let frame = |lines: &str| format!("[[frame]]\nname = \"a\"\nscene = \"builtin:plane\"\n{lines}\n");
+    let good = "render = \"ao\"\ntolerance = \"exact\"";
+    let cases = [
+        ("".to_owned(), "it has no frames"),
+        ("frames = 3".to_owned(), "line 1: unknown field `frames`"),
+        (frame("render = \"ao\"\ntolerence = \"exact\""), "line 5: unknown field `tolerence`"),
+        (frame("render = \"ao\""), "line 1: a has no tolerance"),
+        (frame("render = \"ao\"\ntolerance = { flip = { mx = 1 } }"), "line 5: unknown field `mx`"),
+        (frame("render = \"ao\"\ntolerance = \"roughly\""), "line 5: invalid value: string \"roughly\""),
+        (frame("render = \"oa --spp 3\"\ntolerance = \"exact\""), "line 4: \"oa --spp 3\": unknown integrator oa"),
+        (frame("render = \"ao --spp many\"\ntolerance = \"exact\""), "line 4: \"ao --spp many\""),
+        (frame("render = \"ao --max-depth 3\"\ntolerance = \"exact\""), "line 4: --max-depth has no effect"),
+        (frame("render = \"ao --time-limit 3\"\ntolerance = \"exact\""), "line 1: a: --time-limit"),
+        (frame("render = \"fast\"\ntolerance = \"z_test\""), "line 1: a: --preset selects frames in real time"),
+        (frame("render = \"ao\"\ngolden = \"png\"\ntolerance = \"z_test\""), "a PNG has no variances"),
+        (frame("render = \"ao\"\ngolden = \"jpg\"\ntolerance = \"exact\""), "line 5: unknown variant `jpg`"),
+        (frame("render = \"path --denoise filter\"\ntolerance = \"z_test\""), "denoised"),
+        (frame(&format!("{good}\ntracers = [\"magic\"]")), "line 6: unknown tracer magic"),
+        (frame(&format!("{good}\nsettings = \"none.json\"")), "line 6: "),
+        (frame(good) + &frame(good), "line 7: two frames are called a"),
+        (frame(good).replace("\"a\"", "\"a/b\""), "line 2: the name \"a/b\""),
+        (frame(good).replace("plane", "plain"), "line 3: no built-in scene plain"),
+        (frame(good).replace("builtin:plane", "no.glb"), "line 3: no scene "),
+        ("[[frame]]\nname = \"a\"\n".to_owned(), "line 1: missing field `scene`"),
+        ("name = \"".to_owned(), "line 1: "),
+    ];
+    for (manifest, says) in cases {
+        let dir = folder(&manifest);
+        fails(&run(&["verify", text(dir.path())]), 2, &["frames.toml", says]);
+    }
+    let dir = tempfile::tempdir().unwrap();
+    fails(&run(&["verify", text(dir.path())]), 2, &["frames.toml: no such file"]);
+    let json = run(&["verify", text(dir.path()), "--json"]);
+    let record: serde_json::Value = serde_json::from_slice(&json.stdout).unwrap();
+    assert_eq!(record["exit_code"], 2);
+}
+
+#[test]
+fn options_that_have_no_effect() {
+    let dir = folder(TWO);
+    let refuse = |options: &[&str], says: &str| fails(&run(&[&["verify", text(dir.path())], options].concat()), 64, &[says]);
+    refuse(&["--force"], "--force is for --bless");
+    refuse(&["--bless", "--update-missing"], "--update-missing");
+    refuse(&["--bless", "--seed", "3"], "--seed has no effect");
+    refuse(&["--bless", "--tracers", "all"], "--tracers has no effect");
+    refuse(&["--tracers", "magic"], "unknown tracer magic");
+    refuse(&["--tracer", "compute"], "use --tracers");
+    refuse(&["--shard", "3/2"], "I/N");
+    refuse(&["--filter", "nothing"], "no frame has such a name");
+}
+
+#[test]
+fn gpu_golden_images_are_made_and_compared() {
+    if !device() {
+        return;
+    }
+    let dir = folder(TWO);
+    let path = dir.path();
+    let verify = |options: &[&str]| run(&[&["verify", text(path)], options].concat());
+    let junit = path.join("out.xml");
+
+    // none are there
+    fails(&verify(&["--junit", text(&junit)]), 2, &["2 frames could not be judged: plane, stairs"]);
+    let xml = std::fs::read_to_string(&junit).unwrap();
+    assert!(xml.contains("errors=\"2\"") && xml.contains("--update-missing"), "{xml}");
+
+    // nothing is pinned; nothing of this name
+    fails(&verify(&["--bless"]), 64, &["no driver is pinned", "--force"]);
+    let pin =
+        |driver: &str| std::fs::write(path.join("frames.toml"), format!("[drivers]\npinned = [{driver:?}]\n{TWO}")).unwrap();
+    pin("a driver of the past");
+    fails(&verify(&["--update-missing"]), 64, &["which is not pinned", "a driver of the past"]);
+    assert!(!path.join("plane.exr").exists());
+
+    // the driver here, without the last part of its version
+    let record = json(&run(&["doctor", "--json"]));
+    let driver = record["devices"][record["device"].as_u64().unwrap() as usize]["driver"].as_str().unwrap().to_owned();
+    pin(driver.rsplit_once(['.', ' ', '-']).unwrap().0);
+    let made = json(&verify(&["--update-missing", "--filter", "plane", "--json"]));
+    assert_eq!(made["frames"][0]["outcome"]["blessed"]["change"], "new");
+    assert!(path.join("plane.exr").exists() && !path.join("stairs.exr").exists());
+    let made = json(&verify(&["--update-missing", "--json"]));
+    assert_eq!(made["frames"].as_array().unwrap().len(), 1, "{made}");
+
+    // they hold, in one go and in parts, with another seed where noise may differ
+    let all = json(&verify(&["--json", "--junit", text(&junit)]));
+    let outcomes = all["frames"].as_array().unwrap();
+    assert!(outcomes.len() == 2 && outcomes.iter().all(|f| f["outcome"]["holds"].is_array()), "{all}");
+    let xml = std::fs::read_to_string(&junit).unwrap();
+    assert!(xml.contains("tests=\"2\"") && xml.contains("failures=\"0\"") && xml.contains("stairs ("), "{xml}");
+    let part = |i: usize| json(&verify(&["--json", "--seed", "9", "--shard", &format!("{i}/2")]))["frames"][0]["frame"].clone();
+    assert_eq!([part(1), part(2)], ["plane", "stairs"]);
+    let out = verify(&[]);
+    assert!(out.status.success(), "{}", stderr(&out));
+    let lines = String::from_utf8(out.stdout).unwrap();
+    assert!(lines.starts_with("holds    plane") && lines.contains("2 renders: 2 hold (on "), "{lines}");
+
+    // the same again is the same; other settings are not
+    let again = json(&verify(&["--bless", "--json"]));
+    assert!(again["frames"].as_array().unwrap().iter().all(|f| f["outcome"]["blessed"]["change"] == "unchanged"), "{again}");
+    let manifest = std::fs::read_to_string(path.join("frames.toml")).unwrap();
+    std::fs::write(path.join("frames.toml"), manifest.replace("radius 2", "radius 0.2")).unwrap();
+    fails(&verify(&["--junit", text(&junit)]), 2, &["1 frame could not be judged: stairs"]);
+    assert!(std::fs::read_to_string(&junit).unwrap().contains("--ao-radius 2"));
+    let blessed = json(&verify(&["--bless", "--filter", "stairs", "--json"]));
+    let change = blessed["frames"][0]["outcome"]["blessed"]["text"].as_str().unwrap().to_owned();
+    assert!(change.contains("rmse") && change.contains("FLIP") && change.contains("--ao-radius 0.2"), "{change}");
+
+    // a golden image of something else; one of no frame
+    std::fs::copy(path.join("stairs.exr"), path.join("other.exr")).unwrap();
+    let image = skylit::output::load(&path.join("stairs.exr")).unwrap();
+    let mut wrong = image.clone();
+    for channel in wrong.channels.iter_mut().filter(|c| c.name == "Y") {
+        let skylit::output::Samples::F32(values) = &mut channel.samples else { panic!("floats") };
+        values.iter_mut().for_each(|v| *v *= 0.5);
+    }
+    skylit::output::save(&wrong, &path.join("stairs.exr")).unwrap();
+    let report = path.join("report");
+    let out = verify(&["--junit", text(&junit), "--html", text(&report)]);
+    assert_eq!(out.status.code(), Some(1));
+    assert!(stderr(&out).contains("other.exr: an image of no frame"), "{}", stderr(&out));
+    let lines = String::from_utf8(out.stdout).unwrap();
+    assert!(
+        lines.contains("DIFFERS  stairs") && lines.contains("standard errors") && lines.contains("1 hold, 1 differ"),
+        "{lines}"
+    );
+    assert!(std::fs::read_to_string(&junit).unwrap().contains("failures=\"1\""));
+    let page = std::fs::read_to_string(report.join("index.html")).unwrap();
+    assert!(
+        page.contains("stairs (") && page.contains("standard errors") && page.contains("1 differs from golden images"),
+        "{page}"
+    );
+    assert!(report.join("data/images-1.js").exists() && lines.contains("report: file://"));
+}
