@@ -214,7 +214,49 @@ impl<'m> Layout<'m> {
     }
 }
 
+/// What `skylit --version` says of the build, as variables that the program reads while it is compiled: its features, and its commit.
+///
+/// Only builds with optimization (`--release`) know their commit. To follow it, cargo has to run this program and compile everything after it again with
+/// each commit, which is right for what is installed and too slow for whoever works on skylit.
+fn describe_build() {
+    let features = std::env::vars().filter_map(|(name, _)| {
+        let name = name.strip_prefix("CARGO_FEATURE_")?.to_lowercase().replace('_', "-");
+        (name != "default").then_some(name)
+    });
+    let features: Vec<_> = features.collect::<BTreeSet<_>>().into_iter().collect();
+    println!("cargo:rustc-env=SKYLIT_BUILD_FEATURES={}", features.join(", "));
+    println!("cargo:rerun-if-env-changed=SKYLIT_COMMIT");
+    let given = std::env::var("SKYLIT_COMMIT").ok().filter(|c| !c.is_empty());
+    let is_release = std::env::var("PROFILE").is_ok_and(|p| p == "release");
+    let commit = match given {
+        Some(commit) => commit,
+        None if is_release => commit().unwrap_or_else(|| "unknown: built without git".into()),
+        None => "not recorded in builds of the profile dev".into(),
+    };
+    println!("cargo:rustc-env=SKYLIT_BUILD_COMMIT={commit}");
+}
+
+/// The commit that is checked out, and its day; `None` without git, or if this folder is not the root of a repository.
+fn commit() -> Option<String> {
+    let git = |arguments: &[&str]| {
+        let out = std::process::Command::new("git").args(arguments).output().ok().filter(|o| o.status.success())?;
+        Some(String::from_utf8(out.stdout).ok()?.trim().to_owned())
+    };
+    if !git(&["rev-parse", "--show-prefix"])?.is_empty() {
+        return None;
+    }
+    // both change with each commit and checkout; one that is missing would have cargo build anew every time
+    for name in ["HEAD", "logs/HEAD"] {
+        let path = git(&["rev-parse", "--git-path", name])?;
+        if Path::new(&path).exists() {
+            println!("cargo:rerun-if-changed={path}");
+        }
+    }
+    git(&["log", "-1", "--format=%h (%cs)", "--abbrev=12"])
+}
+
 fn main() {
+    describe_build();
     for file in ["build.rs", "src/interface", "src/shaders/compiler.rs", "src/shaders/source.rs", "src/shaders/registry.rs"] {
         println!("cargo:rerun-if-changed={file}");
     }

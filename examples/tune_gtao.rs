@@ -14,6 +14,7 @@ use skylit::output::parse_size;
 use skylit::raster::Primary;
 use skylit::realtime::{GtaoConstants, Preset, Realtime, Settings, Technique};
 use skylit::renderer::settings::CameraSettings;
+use skylit::renderer::survey::Survey;
 use skylit::scene::{Orbit, Scene, load};
 use skylit::tracer::{Needs, Tracer, TracerKind};
 use skylit::{Error, Result};
@@ -109,7 +110,7 @@ impl Tuner {
         let (lo, hi) = scene.bounds().ok_or_else(|| Error::Scene(format!("{}: no geometry", scene.name)))?;
         let diagonal = (hi - lo).length();
         let orbit = Orbit::vertical(0.5 * (lo + hi), 360.0)?;
-        let camera = CameraSettings::default().choose(scene, aspect)?;
+        let camera = CameraSettings::default().choose(&Survey::new(scene), aspect)?;
         for turn in 0..arguments.views {
             // a few degrees: the camera of a room stays inside
             let camera = CameraRecord::new(&orbit.camera_at(&camera, 15.0 * f64::from(turn)), scene.origin(), aspect);

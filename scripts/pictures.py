@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 """Makes the pictures of the README: one view of the stairs as real-time ambient occlusion, as a path tracer sees it, and how far apart the two are; and the viewer.
+Makes those of docs/radius.md, too: one view over AO radius and falloff.
 
     python3 scripts/pictures.py [SKYLIT]        # the program, target/release/skylit unless given; five minutes on two cores
 
@@ -18,6 +19,10 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 VIEW = ["builtin:stairs", "--size", "360x270", "--eye=-2.2,2.4,6", "--target=-0.3,0.8,0", "--fov-y", "36"]
 FULL = 0.25
+# AO radii and falloffs of docs/radius.md, columns and rows
+RADII = ["1%", "3%", "10%", "30%", "inf"]
+FALLOFFS = ["1", "2", "10"]
+ROOM = ["builtin:atrium", "--size", "240x160", "--spp", "256", "--pixel-filter", "centre"]
 # pictures of the viewer, and the scripts that make them
 VIEWER = {
     "viewer": (
@@ -98,6 +103,25 @@ def srgb(value: float) -> int:
     return max(0, min(255, round(v * 255)))
 
 
+def radii(skylit: Path, folder: Path) -> None:
+    """The room at each radius (columns) and falloff (rows), with white lines between."""
+    line, rows = 4, []
+    for falloff in FALLOFFS:
+        images = []
+        for radius in RADII:
+            with tempfile.TemporaryDirectory() as temporary:
+                image = Path(temporary) / "ao.png"
+                options = ["--ao-radius", radius, "--ao-falloff", falloff, "-o", image, "--quiet"]
+                subprocess.run([skylit, "render", *ROOM, *options], check=True, cwd=ROOT)
+                images.append(read(image))
+        width, height = images[0][0], images[0][1]
+        between = bytes([255] * (3 * line))
+        if rows:
+            rows += [bytes([255] * len(rows[0]))] * line
+        rows += [between.join(image[2][y] for image in images) for y in range(height)]
+    write(folder / "radius.png", len(rows[0]) // 3, len(rows), rows)
+
+
 def main() -> None:
     skylit = sys.argv[1] if len(sys.argv) > 1 else ROOT / "target/release/skylit"
     folder = ROOT / "docs/images"
@@ -118,6 +142,7 @@ def main() -> None:
             row += bytes(srgb(1 + (v - 1) * weight) for v in full)
         rows.append(bytes(row))
     write(folder / "difference.png", width, height, rows)
+    radii(skylit, folder)
     for name, (options, script) in VIEWER.items():
         with tempfile.NamedTemporaryFile("w", suffix=".txt") as file:
             file.write(script.replace("FILE", str(folder / f"{name}.png")))

@@ -132,8 +132,39 @@ pub fn write_atomically(path: &Path, write: impl FnOnce(&mut File) -> io::Result
     file.commit()
 }
 
+/// The name of a file as metadata of images have it, which may leave this machine: relative to the working directory if it is below it, else without its folders if it is an
+/// absolute path. Other names, such as `builtin:NAME`, stay.
+pub fn portable_name(name: &str) -> String {
+    let path = Path::new(name);
+    if !path.is_absolute() {
+        return name.to_owned();
+    }
+    let folder = std::env::current_dir().unwrap_or_default();
+    let below = |path: &Path, folder: &Path| path.strip_prefix(folder).ok().map(Path::to_owned);
+    let real = || below(&fs::canonicalize(path).ok()?, &fs::canonicalize(&folder).ok()?);
+    let relative = below(path, &folder).or_else(real).or_else(|| path.file_name().map(PathBuf::from));
+    relative.map_or_else(String::new, |p| p.to_string_lossy().into_owned())
+}
+
 /// The cache folder: `$XDG_CACHE_HOME/skylit`, or `~/.cache/skylit`; `None` without either variable.
 pub fn cache_folder() -> Option<PathBuf> {
     let base = std::env::var_os("XDG_CACHE_HOME").map(PathBuf::from).filter(|p| p.is_absolute());
     base.or_else(|| std::env::var_os("HOME").map(|h| PathBuf::from(h).join(".cache"))).map(|p| p.join("skylit"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_without_the_folders_of_a_machine() {
+        let here = std::env::current_dir().unwrap();
+        let absolute = |path: &Path| portable_name(path.to_str().unwrap());
+        assert_eq!(absolute(&here.join("scenes/a b.glb")), Path::new("scenes").join("a b.glb").to_string_lossy());
+        let elsewhere = tempfile::tempdir().unwrap();
+        assert_eq!(absolute(&elsewhere.path().join("x.glb")), "x.glb");
+        for stays in ["builtin:plane", "../x.glb", "a/x.glb", ""] {
+            assert_eq!(portable_name(stays), stays);
+        }
+    }
 }

@@ -13,6 +13,7 @@ use skylit::renderer::RenderSettings;
 use skylit::scene::builtin::{self, SceneTransform, analytic};
 use skylit::scene::material::MaterialKind;
 use skylit::scene::{Environment, Scene};
+use skylit::settings::Length;
 use skylit::tracer::DeviceSettings;
 
 fn renderer(scene: Scene) -> Renderer {
@@ -83,7 +84,8 @@ fn gpu_figures_fit_together() {
     assert!(report.light.bounces > 0.1 && (report.light.lights + report.light.bounces - 1.0).abs() < 1e-9);
     let mut lit = RenderSettings { integrator: Some("lit".parse().unwrap()), ..Default::default() };
     (lit.image.size, lit.image.spp, lit.image.seed) = (Some([64, 64]), Some(128), Some(77));
-    (lit.integrators.ao.ao_radius, lit.integrators.ao.ao_falloff) = (fit.best.radius, Some(fit.best.falloff));
+    (lit.integrators.ao.ao_radius, lit.integrators.ao.ao_falloff) =
+        (Some(Length::Units(fit.best.radius.unwrap_or(f64::INFINITY))), Some(fit.best.falloff));
     lit.integrators.path.ambient = Some(DVec3::from_slice(&fit.best.ambient));
     let rendered = renderer.still(&lit, &mut NoControl).unwrap().image;
     for name in ["R", "G", "B"] {
@@ -114,7 +116,7 @@ fn dense_search(renderer: &mut Renderer, compared: &AoVersusPathSettings, radii:
         move |s: &mut RenderSettings| {
             s.integrators.path.ambient = Some(DVec3::splat(ambient));
             s.integrators.path.environment_light = Some(EnvironmentLight::Ambient);
-            s.integrators.ao.ao_radius = Some(radius);
+            s.integrators.ao.ao_radius = Some(Length::Units(radius));
         }
     };
     let target = [0, 1].map(|half| {

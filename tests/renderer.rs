@@ -160,3 +160,106 @@ fn settings_are_files() {
     let text = refused.check().unwrap_err().to_string();
     assert!(text.contains("--max-depth has no effect on --integrator direct"), "{text}");
 }
+
+/// The mean of the pixels that show surfaces, and what was chosen.
+fn still(renderer: &mut Renderer, json: serde_json::Value) -> (f64, String, String, Image) {
+    let still = renderer.still(&settings(json), &mut NoControl).unwrap();
+    let mean = still.report.surface_mean.unwrap();
+    (mean, still.report.setup.choices.join("\n"), still.report.setup.warnings.join("\n"), still.image)
+}
+
+#[test]
+fn gpu_the_scene_decides_what_settings_leave_open() {
+    let device = device();
+    let image = || serde_json::json!({ "size": [40, 30], "spp": 8 });
+    let open = |name: &str| Renderer::new(device.clone(), builtin::by_name(name).unwrap(), &DeviceSettings::default()).unwrap();
+
+    // a closed room has a radius by itself, and is black without
+    let mut room = open("closed-box");
+    let (mean, choices, warnings, chosen) = still(&mut room, serde_json::json!({ "image": image() }));
+    assert!(
+        (0.45..0.75).contains(&mean) && choices.contains("60 % open") && warnings.is_empty(),
+        "{mean} {choices} {warnings}"
+    );
+    let radius: f64 = chosen.metadata("ao.radius").unwrap().parse().unwrap();
+    assert!(choices.contains(&format!("AO radius: {radius} ")), "{choices}");
+    let ao =
+        |radius: serde_json::Value| serde_json::json!({ "image": image(), "integrators": { "ao": { "ao_radius": radius } } });
+    let (mean, choices, warnings, _) = still(&mut room, ao("inf".into()));
+    assert!(mean == 0.0 && choices.is_empty() && warnings.contains("--ao-radius auto"), "{mean} {choices} {warnings}");
+    let (_, _, _, same) = still(&mut room, ao(radius.into()));
+    assert!(bits(&same) == bits(&chosen));
+    let (lo, hi) = room.scene().bounds().unwrap();
+    let (_, choices, _, fifth) = still(&mut room, ao("20%".into()));
+    let of_diagonal: f64 = fifth.metadata("ao.radius").unwrap().parse().unwrap();
+    assert!(
+        (of_diagonal / (0.2 * (hi - lo).length()) - 1.0).abs() < 1e-12 && choices.contains("20%"),
+        "{of_diagonal} {choices}"
+    );
+
+    // an open one has none
+    let mut stairs = open("stairs");
+    let (mean, choices, warnings, _) = still(&mut stairs, serde_json::json!({ "image": image() }));
+    assert!(mean > 0.3 && choices.is_empty() && warnings.is_empty(), "{mean} {choices} {warnings}");
+
+    // where nothing emits there is light, which goes when it is not asked for
+    let lit = |integrator: &str, environment: Option<&str>| {
+        let mut all = serde_json::json!({ "integrator": integrator, "image": image() });
+        if let Some(environment) = environment {
+            all["lighting"] = serde_json::json!({ "environment": environment });
+        }
+        all
+    };
+    let (mean, choices, warnings, path) = still(&mut stairs, lit("path", None));
+    assert!((0.05..0.95).contains(&mean) && choices.contains("--environment 0.5,0.5,0.5"), "{mean} {choices}");
+    assert_eq!(warnings, "");
+    let (mean, _, warnings, _) = still(&mut stairs, lit("path", Some("none")));
+    assert!(mean == 0.0 && warnings.contains("no light"), "{mean} {warnings}");
+    for integrator in ["lit", "ao-sky", "albedo", "path"] {
+        let (_, _, _, shared) = still(&mut stairs, lit(integrator, None));
+        let (_, _, _, alone) = still(&mut open("stairs"), lit(integrator, None));
+        assert!(bits(&shared) == bits(&alone), "{integrator}");
+    }
+    let (mean, choices, _, _) = still(&mut room, lit("path", None));
+    assert!((0.05..0.95).contains(&mean) && choices.contains("lamp"), "{mean} {choices}");
+
+    // views that have a name
+    let top = serde_json::json!({ "image": image(), "camera": { "view": "top" } });
+    let (_, _, _, top) = still(&mut stairs, top);
+    assert!(top.metadata("camera").unwrap().starts_with("\"top\""), "{:?}", top.metadata("camera"));
+    assert!(bits(&top) != bits(&path));
+    assert_validation_clean(&device);
+}
+
+/// The filter of ambient occlusion takes noise away, on every tracer, and leaves the noisy image beside.
+#[test]
+fn gpu_ambient_occlusion_is_denoised() {
+    let device = device();
+    for kind in tracers(&device) {
+        let mut renderer = Renderer::new(device.clone(), builtin::by_name("stairs").unwrap(), &choice(kind)).unwrap();
+        let ao = |spp: u32, denoise: Option<&str>| {
+            let mut all = serde_json::json!({ "image": { "size": [96, 72], "spp": spp, "seed": spp } });
+            if let Some(denoise) = denoise {
+                all["image"]["denoise"] = denoise.into();
+            }
+            settings(all)
+        };
+        let y = |image: &Image, name: &str| match &image.channels.iter().find(|c| c.name == name).unwrap().samples {
+            Samples::F32(values) => values.clone(),
+            Samples::U32(_) => panic!("{name} has floats"),
+        };
+        let reference = y(&renderer.still(&ao(1024, None), &mut NoControl).unwrap().image, "Y");
+        let denoised = renderer.still(&ao(16, Some("filter")), &mut NoControl).unwrap();
+        let (after, before) = (y(&denoised.image, "Y"), y(&denoised.image, "noisy.Y"));
+        let error = |image: &[f32]| {
+            let sum: f64 = image.iter().zip(&reference).map(|(a, b)| f64::from(a - b).powi(2)).sum();
+            (sum / image.len() as f64).sqrt()
+        };
+        println!("{kind}: {:.4} before, {:.4} after", error(&before), error(&after));
+        assert!(error(&after) < 0.7 * error(&before), "{kind}: {} of {}", error(&after), error(&before));
+        assert!(before == y(&renderer.still(&ao(16, None), &mut NoControl).unwrap().image, "Y"), "{kind}");
+        assert_eq!(denoised.image.metadata("denoise"), Some("filter"));
+        assert!(denoised.report.denoise.is_some());
+    }
+    assert_validation_clean(&device);
+}

@@ -23,7 +23,8 @@ class Exr:
         return struct.unpack_from("<f", self.channels[channel][y], 4 * x)[0]
 
     def colours(self) -> list[str]:
-        return ["R", "G", "B"] if "G" in self.channels else ["Y"]
+        # a grey image has copies of Y as R, G and B
+        return ["Y"] if "Y" in self.channels else ["R", "G", "B"]
 
 
 def text(data: bytes, at: int) -> tuple[str, int]:

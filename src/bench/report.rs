@@ -18,6 +18,9 @@ use crate::terminal::console::{Console, Failure};
 
 /// `skylit bench report`.
 #[derive(Clone, Debug, Args)]
+#[command(
+    before_help = "Examples:\n  skylit bench report rays.json ao.json --html report\n  skylit bench report ao.json --baseline before.json"
+)]
 pub struct BenchReportArgs {
     /// JSON records of benchmarks, in any order
     #[arg(required = true, value_name = "RECORD.json", value_hint = ValueHint::FilePath)]

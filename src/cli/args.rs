@@ -9,8 +9,14 @@ use crate::settings::parse::parse_limit;
 use crate::terminal::console::Verbosity;
 use crate::tracer::DeviceSettings;
 
+const RAYS_EXAMPLES: &str = "\
+Examples:
+  skylit render scene.glb -o ao.png --dump-rays set      # writes set.primary.bin and set.ao.bin
+  skylit rays --mesh scene.glb --rays set.ao.bin --mode any --repeats 9";
+
 /// `skylit rays`.
 #[derive(Clone, Debug, Args)]
+#[command(before_help = RAYS_EXAMPLES)]
 pub struct RaysArgs {
     /// Mesh: .bin (u32 vertices, u32 triangles, f32 xyz[], u32 abc[]) or any scene that `render` takes
     #[arg(long, value_name = "MESH", value_hint = ValueHint::FilePath)]
@@ -35,10 +41,18 @@ pub struct RaysArgs {
     pub verbosity: Verbosity,
 }
 
+const EXPORT_EXAMPLES: &str = "\
+Examples:
+  skylit export scene.obj scene.glb
+  skylit export builtin:atrium atrium.gltf
+  skylit export scene.glb triangles.bin";
+
 /// `skylit export`.
 #[derive(Clone, Debug, Args)]
+#[command(before_help = EXPORT_EXAMPLES)]
 pub struct ExportArgs {
     /// Scene file (.gltf, .glb, .obj, .brhan) or builtin:NAME
+    #[arg(value_hint = ValueHint::FilePath)]
     pub scene: String,
     /// File to write: .bin (triangle soup in world space), .glb or .gltf
     #[arg(value_hint = ValueHint::FilePath)]
@@ -50,6 +64,9 @@ pub struct ExportArgs {
 
 /// `skylit scenes`.
 #[derive(Clone, Debug, Args)]
+#[command(
+    before_help = "Examples:\n  skylit scenes\n  skylit builtin:atrium                   # look at one\n  skylit render builtin:grid:20 -o a.png  # some have a parameter"
+)]
 pub struct ScenesArgs {
     /// Print one JSON record on stdout instead of text
     #[arg(long)]
@@ -58,6 +75,7 @@ pub struct ScenesArgs {
 
 /// `skylit doctor`.
 #[derive(Clone, Debug, Args)]
+#[command(before_help = "Examples:\n  skylit doctor\n  skylit doctor --device 1 --json")]
 pub struct DoctorArgs {
     /// Device to examine, by index or part of its name [default: the most capable]
     #[arg(long, value_name = "INDEX|NAME")]
@@ -67,10 +85,16 @@ pub struct DoctorArgs {
     pub json: bool,
 }
 
+const DIFF_EXAMPLES: &str = "\
+Examples:
+  skylit diff new.exr reference.exr                      # prints the metrics
+  skylit diff new.exr reference.exr --max-rmse 0.01      # exit code 1 if they are further apart";
+
 /// `skylit diff`.
 #[derive(Clone, Debug, Args)]
+#[command(before_help = DIFF_EXAMPLES)]
 pub struct DiffArgs {
-    /// First image, .exr or .png
+    /// First image: .exr, .png, .jpg or .webp
     pub a: PathBuf,
     /// Second image: the reference, for metrics that are not symmetric
     pub b: PathBuf,

@@ -51,7 +51,7 @@ pub enum OtherComparison {
 
 /// `skylit compare`.
 #[derive(Clone, Debug, Args)]
-#[command(after_help = EXAMPLES, args_conflicts_with_subcommands = true)]
+#[command(before_help = EXAMPLES, args_conflicts_with_subcommands = true)]
 pub struct CompareArgs {
     /// Another kind of comparison.
     #[command(subcommand)]
@@ -60,7 +60,7 @@ pub struct CompareArgs {
     #[arg(value_name = "IMAGE", value_hint = ValueHint::FilePath)]
     pub images: Vec<PathBuf>,
     /// Scene to render: a .gltf, .glb, .obj or .brhan file, or builtin:NAME. Options of the groups Image, Camera and Light apply to each render that they have an effect on
-    #[arg(long, value_name = "SCENE")]
+    #[arg(long, value_name = "SCENE", value_hint = ValueHint::FilePath)]
     pub scene: Option<String>,
     /// Render image A of --scene: an integrator or a preset of frames in real time, then options of `skylit render`, like "ao --ao-radius 2" or "balanced --frames 8"
     #[arg(long, value_name = "RENDER", requires = "scene", allow_hyphen_values = true)]
@@ -75,13 +75,13 @@ pub struct CompareArgs {
     #[arg(long, value_name = "LETTER", value_parser = parse_letter_argument, default_value = "B")]
     pub reference: usize,
     /// Pixels to compare
-    #[arg(long, value_enum, default_value = "covered")]
+    #[arg(long, value_enum, hide_short_help = true, default_value = "covered")]
     pub mask: Mask,
     /// Compare only pixels of this rectangle: left, top, width and height in pixels
-    #[arg(long, value_name = "X,Y,W,H", value_parser = parse_rectangle)]
+    #[arg(long, value_name = "X,Y,W,H", hide_short_help = true, value_parser = parse_rectangle)]
     pub rectangle: Option<[u32; 4]>,
     /// Compare only pixels that show this instance (channel id.instance of the reference, or of the image; renders get it)
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", hide_short_help = true)]
     pub instance: Option<u32>,
     /// Channels to compare, separated by commas: depth.Z,Ng.X [default: the colour channels]
     #[arg(long, value_name = "LIST", value_delimiter = ',')]

@@ -15,7 +15,6 @@ use crate::output::{self, ImageFormat, parse_size};
 use crate::renderer::Renderer;
 use crate::renderer::settings::CameraSettings;
 use crate::report;
-use crate::scene::{Environment, Scene};
 use crate::settings::parse::{parse_albedo, parse_positive};
 use crate::terminal::console::{Verbosity, command_line};
 use crate::terminal::interrupt::{self, ProgressControl};
@@ -23,10 +22,17 @@ use crate::terminal::progress::Progress;
 use crate::terminal::warnings::Warnings;
 use crate::tracer::DeviceSettings;
 
+const EXAMPLES: &str = "\
+Examples:
+  skylit compare ao-vs-path scene.glb
+  skylit compare ao-vs-path scene.glb --spp 128 --ao-samples 256 --html report --output best.exr";
+
 /// `skylit compare ao-vs-path`.
 #[derive(Clone, Debug, Args)]
+#[command(before_help = EXAMPLES)]
 pub struct AoVsPathArgs {
     /// Scene: a .gltf, .glb, .obj or .brhan file, or builtin:NAME (`skylit scenes` lists them)
+    #[arg(value_hint = ValueHint::FilePath)]
     scene: String,
     /// Image size in pixels
     #[arg(long, value_name = "WxH", value_parser = parse_size, default_value = "640x360")]
@@ -84,7 +90,7 @@ pub fn run(args: &AoVsPathArgs, start: Instant) -> Result<()> {
         warnings: Warnings::new(console),
     };
     let mut settings = args.settings();
-    if is_dark(renderer.scene()) && settings.lighting == LightingSettings::default() {
+    if renderer.scene().is_dark() && settings.lighting == LightingSettings::default() {
         settings.lighting = ao_versus_path::default_light(&mut renderer, &settings, &mut control)?;
         control.warning(match settings.lighting.environment {
             Some(_) => {
@@ -157,11 +163,6 @@ impl AoVsPathArgs {
             ao_normal: self.ao_normal,
         }
     }
-}
-
-fn is_dark(scene: &Scene) -> bool {
-    let emits = scene.meshes.iter().any(|m| scene.materials[m.material].emissive.max_element() > 0.0);
-    scene.environment == Environment::Black && scene.lights.is_empty() && !emits
 }
 
 /// Progress, Ctrl-C and warnings.

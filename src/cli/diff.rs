@@ -50,10 +50,7 @@ pub fn run(args: &DiffArgs) -> Result<(), Failure> {
     let mut records = Vec::new();
     for (x, y) in &pairs(&a, &b) {
         let d = compare(&x.samples, &y.samples, &mask)?;
-        let metrics =
-            d.metrics.map(|n| format!("rmse {:.3e}  bias {:+.3e}  max {:.3e}  psnr {:.1} dB  ", n.rmse, n.bias, n.max, n.psnr));
-        let metrics = metrics.unwrap_or_default();
-        console.line(&format!("{:12} {metrics}differing {} of {}, broken {}", x.name, d.differing, d.pixels, d.broken))?;
+        console.line(&format!("{:12} {}", x.name, difference_text(&d)))?;
         let mut record = json!(d);
         record["channel"] = json!(x.name);
         records.push(record);
@@ -88,9 +85,27 @@ fn judge(compared: &Comparison, limit: f64) -> Result<()> {
     }
 }
 
+/// How far a channel is from the reference's, in a line.
+fn difference_text(d: &ChannelDifference) -> String {
+    let mut text = match (d.metrics, d.differing) {
+        _ if d.pixels == 0 => "no pixel to compare".into(),
+        (_, 0) => format!("equal in all {} pixels", d.pixels),
+        (None, n) => format!("differs in {n} of {} pixels", d.pixels),
+        (Some(m), n) => format!(
+            "rmse {:.3e}  bias {:+.3e}  max {:.3e}  psnr {:.1} dB  differs in {n} of {} pixels",
+            m.rmse, m.bias, m.max, m.psnr, d.pixels
+        ),
+    };
+    if d.broken > 0 {
+        text += &format!("; NaN or infinite in one of the images: {} pixels", d.broken);
+    }
+    text
+}
+
 /// What was compared, in a line.
 fn summary(c: &Comparison) -> String {
-    let mut parts = vec![format!("rmse {:.3e}", c.rmse), format!("bias {:+.3e} +- {:.1e}", c.bias, c.bias_standard_error)];
+    let error = if c.bias_standard_error > 0.0 { format!(" +- {:.1e}", c.bias_standard_error) } else { String::new() };
+    let mut parts = vec![format!("rmse {:.3e}", c.rmse), format!("bias {:+.3e}{error}", c.bias)];
     parts.extend(c.ssim.map(|v| format!("ssim {v:.4}")));
     parts.extend(c.flip.map(|v| format!("flip {v:.4}")));
     parts.extend(c.flip_hdr.map(|v| format!("flip over exposures {v:.4}")));
@@ -158,6 +173,11 @@ mod tests {
         assert_eq!((masked.pixels, masked.differing, masked.broken), (1, 0, 0));
         let ids = compare(&Samples::U32(vec![1, 2]), &Samples::U32(vec![1, 3]), &[1.0; 2]).unwrap();
         assert_eq!((ids.pixels, ids.differing, ids.metrics), (2, 1, None));
+        assert_eq!(difference_text(&ids), "differs in 1 of 2 pixels");
+        assert_eq!(difference_text(&masked), "equal in all 1 pixels");
+        assert!(difference_text(&d).ends_with("differs in 1 of 2 pixels; NaN or infinite in one of the images: 1 pixels"));
+        let none = compare(&a, &b, &[0.0; 5]).unwrap();
+        assert_eq!(difference_text(&none), "no pixel to compare");
     }
 
     #[test]

@@ -6,14 +6,20 @@ mod args;
 mod compare;
 #[cfg(feature = "compare")]
 mod compare_ao;
+mod completions;
+mod config;
 mod diff;
 mod doctor;
 mod export;
+mod help;
+mod info;
+mod man;
 mod rays;
 mod render;
 mod scenes;
 #[cfg(feature = "verify")]
 mod verify;
+mod version;
 #[cfg(feature = "viewer")]
 mod view;
 
@@ -22,8 +28,8 @@ use std::path::Path;
 use std::process::ExitCode;
 use std::time::Instant;
 
-use clap::Parser;
 use clap::error::ErrorKind;
+use clap::{FromArgMatches, Parser};
 
 use crate::error::{Error, Result};
 use crate::settings::parse::usage_message;
@@ -35,8 +41,8 @@ pub const EXIT_CODES: &str = "\
 Exit codes:
   0    done
   1    a check did not hold (images differ, validation messages), or a Vulkan call failed
-  2    no Vulkan loader, no device, or one that lacks a requirement (see `skylit doctor`); no Open Image Denoise;
-       `verify` could not render or judge a frame
+  2    no Vulkan loader, no device, or one that lacks a requirement (see `skylit doctor`);
+       no Open Image Denoise; `verify` could not render or judge a frame
   3    an input file is missing or broken, or the scene cannot be rendered
   4    an output file cannot be written; nothing half-written is left
   5    out of memory
@@ -45,8 +51,19 @@ Exit codes:
   70   a bug in skylit
   130  interrupted (Ctrl-C)";
 
+/// Examples by task; `skylit help COMMAND` has more of each.
+const EXAMPLES: &str = "\
+Examples:
+  skylit scene.glb                                        look at a scene
+  skylit render scene.glb -o ao.png                       render its ambient occlusion
+  skylit render scene.glb -o path.png --integrator path   path-trace it
+  skylit render scene.glb -o a.apng --preset balanced --orbit --frames 0..240     in real time
+  skylit compare ao.exr path.exr --html report            measure how far apart two images are
+  skylit verify tests/frames                              check reference frames in CI
+  skylit doctor                                           find out whether this machine can do it";
+
 #[derive(Debug, Parser)]
-#[command(name = "skylit", version, about, after_help = EXIT_CODES, disable_help_subcommand = true)]
+#[command(name = "skylit", version, about, before_help = EXAMPLES, after_help = EXIT_CODES)]
 struct Cli {
     #[command(subcommand)]
     command: Command,
@@ -54,19 +71,17 @@ struct Cli {
 
 #[derive(Debug, clap::Subcommand)]
 enum Command {
-    /// Render the ambient occlusion of a scene: an image, or frames in real time
+    /// Render a scene: ambient occlusion, path tracing, or frames in real time
     Render(Box<render::RenderArgs>),
     /// Look at a scene in a window while it is traced
     #[cfg(feature = "viewer")]
     View(Box<view::ViewArgs>),
-    /// Trace a set of rays against a mesh and report the ray throughput
-    Rays(args::RaysArgs),
-    /// Write a scene as glTF (.glb, .gltf) or as a world-space triangle soup (.bin)
-    Export(args::ExportArgs),
+    /// Describe a scene: geometry, materials, textures, lights, a camera and an AO radius that fit, memory and time on this device
+    Info(info::InfoArgs),
     /// List the built-in scenes
     Scenes(args::ScenesArgs),
-    /// Show the Vulkan devices, what each tracer requires and supports, and which one `auto` chooses
-    Doctor(args::DoctorArgs),
+    /// Write a scene as glTF (.glb, .gltf) or as a world-space triangle soup (.bin)
+    Export(args::ExportArgs),
     /// Check whether two images agree
     Diff(args::DiffArgs),
     /// Compare images, or renders made on the spot, with a reference: metrics, difference pictures, an HTML report
@@ -78,6 +93,22 @@ enum Command {
     /// Benchmark ray throughput against other ray tracers, and cost and quality of real-time ambient occlusion
     #[cfg(feature = "bench")]
     Bench(crate::bench::BenchArgs),
+    /// Trace a set of rays against a mesh and report the ray throughput
+    Rays(args::RaysArgs),
+    /// Show the Vulkan devices, what each tracer requires and supports, and which one `auto` chooses
+    Doctor(args::DoctorArgs),
+    /// Print a script by which a shell completes commands, options and names of built-in scenes
+    Completions(completions::CompletionsArgs),
+    /// Write manual pages, a file for each command
+    #[command(hide = true)]
+    Man(man::ManArgs),
+}
+
+impl Cli {
+    fn parse_from(arguments: Vec<OsString>) -> clap::error::Result<Self> {
+        let matches = help::definition().try_get_matches_from(arguments)?;
+        Self::from_arg_matches(&matches)
+    }
 }
 
 /// Runs the command that the process' arguments name.
@@ -91,9 +122,16 @@ fn run_from(arguments: Vec<OsString>) -> ExitCode {
     let arguments = with_json_file(arguments);
     let json = arguments.iter().any(|a| a == "--json");
     panic::install();
-    let outcome = panic::catch(|| match Cli::try_parse_from(with_view(arguments)) {
-        Ok(cli) => dispatch(cli.command, start),
-        Err(e) => explain(&e).map_err(Failure::from),
+    let outcome = panic::catch(|| {
+        if let Some(text) = help::all(&arguments) {
+            return console::print(&text).map_err(Failure::from);
+        }
+        let is_long_version = arguments.get(1).is_some_and(|a| a == "--version");
+        match Cli::parse_from(with_view(arguments)) {
+            Ok(cli) => dispatch(cli.command, start),
+            Err(e) if e.kind() == ErrorKind::DisplayVersion && is_long_version => Ok(console::print(&version::long())?),
+            Err(e) => explain(&e).map_err(Failure::from),
+        }
     });
     let (message, code, reported) = match outcome {
         Ok(Ok(())) => return ExitCode::SUCCESS,
@@ -146,10 +184,13 @@ fn dispatch(command: Command, start: Instant) -> Result<(), Failure> {
         Command::Render(args) => return render::run(&args, start),
         #[cfg(feature = "viewer")]
         Command::View(args) => return view::run(&args),
-        Command::Rays(args) => rays::run(&args),
-        Command::Export(args) => export::run(&args),
+        Command::Info(args) => return info::run(&args),
         Command::Scenes(args) => scenes::run(&args),
+        Command::Export(args) => export::run(&args),
+        Command::Rays(args) => rays::run(&args),
         Command::Doctor(args) => doctor::run(&args),
+        Command::Completions(args) => completions::run(&args),
+        Command::Man(args) => man::run(&args),
         Command::Diff(args) => return diff::run(&args),
         #[cfg(feature = "compare")]
         Command::Compare(args) => return compare::run(&args, start),
@@ -175,11 +216,11 @@ fn explain(error: &clap::Error) -> Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use clap::CommandFactory;
 
     #[test]
     fn definitions_are_sound() {
-        Cli::command().debug_assert();
+        help::definition().debug_assert();
+        help::complete_definition().debug_assert();
     }
 
     #[cfg(feature = "viewer")]
@@ -217,7 +258,7 @@ mod tests {
 
     #[test]
     fn help_lists_every_exit_code() {
-        let help = Cli::command().render_help().to_string();
+        let help = help::definition().render_help().to_string();
         for code in [0, 1, 2, 3, 4, 5, 6, 64, 70, 130] {
             assert!(help.contains(&format!("\n  {code:<4} ")), "{code}");
         }

@@ -25,11 +25,18 @@ Exit codes:
   1    a frame differs from its golden image
   2    a frame, or all of them, could not be rendered or judged
 
-docs/ci.md describes the manifest, frames.toml, and what makes images differ between machines.";
+docs/ci.md describes the manifest, frames.toml, and what makes images differ between machines.
+Files of defaults (skylit.toml) are not read: golden images do not depend on them.";
+
+const EXAMPLES: &str = "\
+Examples:
+  skylit verify tests/frames                                 # render all frames and judge them
+  skylit verify tests/frames --filter atrium --html report   # some of them, with a report of those that differ
+  skylit verify tests/frames --update-missing                # make golden images for new frames";
 
 /// `skylit verify`.
 #[derive(Clone, Debug, Args)]
-#[command(after_help = AFTER_HELP)]
+#[command(before_help = EXAMPLES, after_help = AFTER_HELP)]
 pub struct VerifyArgs {
     /// Folder with the manifest, frames.toml, and the golden images
     #[arg(value_hint = ValueHint::DirPath)]

@@ -4,9 +4,11 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueHint};
 
+use super::config::{self, ConfigArgs};
 use crate::error::{Error, Result};
 use crate::realtime::frame_settings::FrameSettings;
 use crate::renderer::RenderSettings;
+use crate::renderer::defaults;
 use crate::renderer::settings::ImageSettings;
 use crate::scene::load;
 use crate::settings::parse::parse_rate;
@@ -17,23 +19,33 @@ use crate::viewer::{CPU_FRAME_RATE, GPU_FRAME_RATE, Painter, ViewOptions, headle
 /// Size of the window, points.
 const DEFAULT_SIZE: [u32; 2] = [1280, 800];
 
+const EXAMPLES: &str = "\
+Examples:
+  skylit scene.glb                                       # `view` may be left out
+  skylit view scene.glb --integrator path
+  skylit view scene.glb --preset quality --ao-radius 2";
+
 /// `skylit view`.
 #[derive(Clone, Debug, Args)]
+#[command(before_help = EXAMPLES)]
 pub struct ViewArgs {
     /// Scene: a .gltf, .glb, .obj or .brhan file, or builtin:NAME (`skylit scenes` lists them) [default: the viewer asks]
     #[arg(value_hint = ValueHint::FilePath)]
     pub scene: Option<String>,
-    /// Read settings from this file, which the viewer or a person has written; options given here replace what it says
-    #[arg(long = "settings", value_name = "FILE.json", value_hint = ValueHint::FilePath)]
+    /// Read settings from this file, .json or .toml, which the viewer or a person has written; options given here replace what it says
+    #[arg(long = "settings", value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub settings_file: Option<PathBuf>,
+    /// Files of defaults.
+    #[command(flatten)]
+    pub config: ConfigArgs,
     /// Frame rate to hold while something moves, by a lower resolution of the image; 0: full resolution always [default: 10 on CPUs, 30 on GPUs]
     #[arg(long, value_name = "N", value_parser = parse_frame_rate)]
     pub frame_rate: Option<f64>,
     /// Who paints the window [default: Vulkan on GPUs, the CPU on CPU drivers]
-    #[arg(long, value_enum)]
+    #[arg(long, value_enum, hide_short_help = true)]
     pub painter: Option<Painter>,
     /// Run this script without a window (docs/viewer.md), and end
-    #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
+    #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath, hide_short_help = true)]
     pub headless_script: Option<PathBuf>,
     /// What is shown first, and how; --size is the window's
     #[command(flatten)]
@@ -77,24 +89,39 @@ fn check_has_effect(settings: &RenderSettings) -> Result<()> {
     }
 }
 
+/// Whether settings with defaults are as good as those `given`: they have an effect on what is looked at, and neither change the size of the window, which --size is
+/// here, nor put frames in real time in the place of an integrator.
+fn is_shown(settings: &RenderSettings, given: &RenderSettings) -> bool {
+    let is_frames = |s: &RenderSettings| s.realtime_setting().is_some();
+    let keeps_integrator = settings.integrator.is_none() || is_frames(settings) == is_frames(given);
+    keeps_integrator
+        && settings.image.size == given.image.size
+        && settings.camera.check().is_ok()
+        && check_has_effect(settings).is_ok()
+}
+
 /// Opens the window, or runs the script.
 pub fn run(args: &ViewArgs) -> Result<(), Failure> {
-    args.device.check()?;
-    let settings = args.settings.over_file(args.settings_file.as_deref())?;
-    settings.camera.check()?;
-    check_has_effect(&settings)?;
+    let given = args.settings.over_file(args.settings_file.as_deref())?;
+    given.camera.check()?;
+    check_has_effect(&given)?;
+    let files = args.config.files(args.scene.as_deref())?;
+    let resolved = defaults::resolve(&files, &given, &args.device, &|settings| is_shown(settings, &given));
+    let (settings, device_settings) = (resolved.settings, resolved.device);
+    device_settings.check()?;
+    config::report(args.verbosity.console(), &resolved.reports);
     if args.painter == Some(Painter::Vulkan) {
         // Mesa's CPU driver cannot rasterize with wider vectors; GPUs do not care
         crate::gpu::environment::prefer_vector_bits(256);
     }
     // without a device there is a window all the same: it says what is missing
-    let device = crate::gpu::preferred(&args.device.options()).ok();
+    let device = crate::gpu::preferred(&device_settings.options()).ok();
     let is_cpu = device.as_ref().is_none_or(|d| d.is_cpu());
     let options = ViewOptions {
         scene: args.scene.clone(),
         size: settings.image.size.unwrap_or(DEFAULT_SIZE),
         settings,
-        device: args.device.clone(),
+        device: device_settings,
         frame_rate: match args.frame_rate {
             Some(rate) => Some(rate).filter(|r| *r > 0.0),
             None => Some(if is_cpu { CPU_FRAME_RATE } else { GPU_FRAME_RATE }),

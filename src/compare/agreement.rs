@@ -37,18 +37,41 @@ const VIEW: [(&str, &str, &str); 3] = [
 /// A warning for each entry of the view in which an image and the reference differ.
 pub(super) fn warnings(set: &ImageSet) -> Vec<String> {
     let reference = set.reference;
-    let of = |image: &Image, key: &str| image.metadata(key).map(str::to_owned);
+    // earlier versions wrote absolute paths
+    let of = |image: &Image, key: &str| image.metadata(key).map(crate::files::portable_name);
     let mut warnings = Vec::new();
     for (key, name, remedy) in VIEW {
         let Some(its) = of(&set.entries[reference].image, key) else { continue };
         for (k, entry, _) in set.judged() {
             if let Some(ours) = of(&entry.image, key).filter(|v| *v != its) {
                 let letters = [letter(k), letter(reference)];
-                warnings.push(format!("{} and {} differ in their {name} ({ours}; {its}): {remedy}", letters[0], letters[1]));
+                let values = match [readable(&ours), readable(&its)] {
+                    [a, b] if a == b => format!("{ours}; {its}"),
+                    [a, b] => format!("{a}; {b}"),
+                };
+                warnings.push(format!("{} and {} differ in their {name} ({values}): {remedy}", letters[0], letters[1]));
             }
         }
     }
     warnings
+}
+
+/// The text with its numbers rounded to four digits: cameras have all seventeen.
+fn readable(text: &str) -> String {
+    let is_number = |c: char| c.is_ascii_digit() || "+-.e".contains(c);
+    let (mut out, mut rest) = (String::new(), text);
+    while let Some(first) = rest.chars().next() {
+        let length = rest.find(|c| is_number(c) != is_number(first)).unwrap_or(rest.len());
+        let (word, after) = rest.split_at(length);
+        out += &match word.parse::<f64>() {
+            Ok(number) if word.len() > 6 && word.contains('.') => {
+                format!("{}", format!("{number:.3e}").parse().unwrap_or(number))
+            }
+            _ => word.to_owned(),
+        };
+        rest = after;
+    }
+    out
 }
 
 #[cfg(test)]
@@ -57,6 +80,14 @@ mod tests {
     use super::*;
     use crate::measure::comparison::CompareOptions;
     use crate::output::{Channel, Samples};
+
+    #[test]
+    fn numbers_of_cameras_are_readable() {
+        let camera =
+            "\"main\" eye [2.7800000000000002, 2.73, -8], forward [0.9737024961747475, -0, 1]; fov_y 59.99999999999999 degrees";
+        assert_eq!(readable(camera), "\"main\" eye [2.78, 2.73, -8], forward [0.9737, -0, 1]; fov_y 60 degrees");
+        assert_eq!(readable("scene.glb; builtin:grid:1000000"), "scene.glb; builtin:grid:1000000");
+    }
 
     #[test]
     fn what_differs_is_named() {

@@ -25,7 +25,7 @@ pub fn settings(words: &[&str], shared: &RenderSettings) -> Result<Vec<RenderSet
                 (!applies).then_some(setting.name)
             })
             .collect();
-        let merged = without(shared, &unused)?.overridden_by(settings)?;
+        let merged = without(shared, &unused)?.overridden_by(settings);
         merged.check().map_err(|e| Error::Usage(format!("\"{words}\": {e}")))?;
         all.push(merged);
     }

@@ -1,4 +1,4 @@
-//! Denoising of path-traced films (biased): `filter` applies the spatial filter of the real-time renderer to radiance, on the tracer's
+//! Denoising of films (biased): `filter` applies the spatial filter of the real-time renderer to radiance or ambient visibility, on the tracer's
 //! device; [`Oidn`] is Intel's Open Image Denoise. Both are guided by the feature images of [`Features`].
 
 mod features;
@@ -14,7 +14,20 @@ use crate::film::Film;
 use crate::film::camera::CameraRecord;
 use crate::integrators::path::PathOptions;
 use crate::scene::Scene;
+use crate::settings::choices;
 use crate::tracer::Tracer;
+
+choices! {
+    /// Denoiser of stills.
+    pub enum DenoiseChoice {
+        /// Open Image Denoise if it is installed, else the filter
+        Auto = "auto",
+        /// Intel Open Image Denoise: a neural network, on the CPU
+        Oidn = "oidn",
+        /// The filter of real-time ambient occlusion
+        Filter = "filter",
+    }
+}
 
 /// The scene, camera and options with which a film was rendered.
 #[derive(Clone, Copy)]
@@ -25,7 +38,7 @@ pub struct DenoiseInput<'a> {
     pub scene: &'a Scene,
     /// The film's camera.
     pub camera: &'a CameraRecord,
-    /// The options of the path integrator.
+    /// The options of the path integrator; of ambient occlusion those of a white sky, whose surfaces have no materials either.
     pub options: &'a PathOptions,
 }
 
@@ -46,7 +59,7 @@ impl Denoiser {
         }
     }
 
-    /// The denoised means of the film: linear radiance, channels interleaved, rows from the top. `features` must be rendered from
+    /// The denoised means of the film: linear radiance or ambient visibility, its channels interleaved, rows from the top. `features` must be rendered from
     /// the same input.
     ///
     /// # Errors
@@ -58,6 +71,11 @@ impl Denoiser {
         features: &Features,
         control: &mut dyn Control,
     ) -> Result<Vec<f32>> {
+        if film.channels == 1 {
+            // three equal channels
+            let grey = film.as_grey();
+            return Ok(self.denoise(shot, &grey, features, control)?.into_iter().step_by(3).collect());
+        }
         match self {
             Denoiser::Filter(settings) => filter::filter(shot, film, features, settings, control),
             Denoiser::Oidn(oidn) => oidn.denoise([film.width, film.height], &film.mean, &features.albedo, &features.normals),

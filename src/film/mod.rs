@@ -134,6 +134,12 @@ impl Film {
         self.mean.iter().skip(channel).step_by(self.channels).copied().collect()
     }
 
+    /// The film of one channel as one of three that are equal.
+    pub fn as_grey(&self) -> Self {
+        let three = |values: &[f32]| values.iter().flat_map(|v| [*v; 3]).collect();
+        Self { channels: 3, mean: three(&self.mean), variance: three(&self.variance), ..self.clone() }
+    }
+
     /// One channel of the variances.
     pub fn variance_plane(&self, channel: usize) -> Vec<f32> {
         self.variance.iter().skip(channel).step_by(self.channels).copied().collect()

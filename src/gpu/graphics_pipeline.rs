@@ -6,7 +6,7 @@ use ash::vk;
 
 use super::device::Device;
 use super::image::{DEPTH, IDS};
-use super::pipeline::{Module, Specialization, layout};
+use super::pipeline::{CompileTimer, Module, Specialization, layout};
 use super::result::Context;
 use crate::error::Result;
 use crate::shaders::Shader;
@@ -42,6 +42,7 @@ impl GraphicsPipeline {
         specialization: &Specialization,
         cull: Cull,
     ) -> Result<Self> {
+        let _timer = CompileTimer::start();
         let modules = [Module::new(device, name, vertex)?, Module::new(device, name, fragment)?];
         let mut pipeline = Self { raw: vk::Pipeline::null(), layout: layout(device, DRAW_STAGES)?, device: device.clone() };
         let vertex_input = vk::PipelineVertexInputStateCreateInfo::default();

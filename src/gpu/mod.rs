@@ -28,6 +28,6 @@ pub use graphics_pipeline::{Cull, GraphicsPipeline};
 pub use image::{Image, Targets};
 pub use info::{DeviceInfo, Limits, RayTracingExtensions, enumerate};
 pub use instance::Instance;
-pub use pipeline::{ComputePipeline, HitShaders, KeptPipelines, RayTracingPipeline, Specialization};
+pub use pipeline::{ComputePipeline, HitShaders, KeptPipelines, RayTracingPipeline, Specialization, compile_seconds};
 #[cfg(feature = "viewer")]
 pub use window::{Target, WindowRenderer};

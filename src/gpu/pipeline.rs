@@ -3,8 +3,10 @@
 //! A pipeline is a shared handle: the device knows the pipelines in use, and returns the same one for the same SPIR-V and the same
 //! specialization. [`Device::live_pipelines`] keeps pipelines alive beyond the work that they were compiled for.
 
+use std::cell::Cell;
 use std::collections::{HashMap, VecDeque};
 use std::sync::{Arc, Mutex, PoisonError, Weak};
+use std::time::Instant;
 
 use ash::vk;
 
@@ -129,6 +131,30 @@ impl Drop for Compiled {
     }
 }
 
+thread_local! {
+    static COMPILE_SECONDS: Cell<f64> = const { Cell::new(0.0) };
+}
+
+/// Seconds that this thread has waited for pipelines to be compiled.
+pub fn compile_seconds() -> f64 {
+    COMPILE_SECONDS.get()
+}
+
+/// Adds the time until it is dropped to [`compile_seconds`].
+pub(super) struct CompileTimer(Instant);
+
+impl CompileTimer {
+    pub(super) fn start() -> Self {
+        Self(Instant::now())
+    }
+}
+
+impl Drop for CompileTimer {
+    fn drop(&mut self) {
+        COMPILE_SECONDS.set(COMPILE_SECONDS.get() + self.0.elapsed().as_secs_f64());
+    }
+}
+
 /// The pipelines of a device that are in use.
 pub(super) struct LivePipelines {
     all: Mutex<HashMap<Key, Weak<Compiled>>>,
@@ -208,6 +234,7 @@ impl ComputePipeline {
         specialization: &Specialization,
         flags: vk::PipelineShaderStageCreateFlags,
     ) -> Result<Self> {
+        let _timer = CompileTimer::start();
         let key = Key::new([shader], specialization, flags.as_raw())?;
         let make = || {
             let module = Module::new(device, name, shader)?;
@@ -293,6 +320,7 @@ impl RayTracingPipeline {
         shared: &HitShaders,
         specialization: &Specialization,
     ) -> Result<Self> {
+        let _timer = CompileTimer::start();
         let functions =
             device.pipelines.as_ref().ok_or_else(|| Error::Device("the device has no VK_KHR_ray_tracing_pipeline".into()))?;
         let optional = shared.triangle_any.into_iter().chain(shared.sphere.into_iter().flatten());

@@ -21,18 +21,22 @@ settings! {
     /// Light besides the scene's.
     "Light (--integrator path, direct, lit, whitted)"
     pub struct LightingSettings {
-        /// Environment light: an equirectangular map (.hdr, .exr), or a constant radiance R,G,B [default: the scene's]
-        environment: Option<String>, option(value_name = "FILE|R,G,B"), applies(LIT);
+        /// Environment light: an equirectangular map (.hdr, .exr), a constant radiance R,G,B, or `none` [default: the scene's]
+        ///
+        /// A scene without any light gets a grey sky and a soft sun, or a lamp if the camera is in a closed room; `none` leaves it dark.
+        environment: Option<String>, option(value_name = "FILE|R,G,B|none"), applies(LIT), basic;
         /// Rotate the environment map about the vertical axis by this angle, counter-clockwise from above
         environment_turn: Option<f64>,
             option(value_name = "DEG", value_parser = parse_number, requires = "environment", allow_hyphen_values = true), applies(LIT);
         /// Factor of the environment's radiance
         environment_scale: Option<f64>,
             option(value_name = "X", value_parser = parse_factor, requires = "environment", allow_hyphen_values = true), applies(LIT);
-        /// Add a light: point, spot, sun, sphere, rectangle or disk, then key=value: position, direction (in which it emits), radius, size=W,H,
-        /// intensity (cd), irradiance (lux) or radiance, color=R,G,B or temperature=K, and outer, inner, angle in degrees; or a portal: position, direction,
-        /// size of an opening through which the environment is sampled, which lessens the noise of rooms. May be repeated
-        light: Vec<LightSpec>, option(value_name = "SPEC", value_parser = light_spec::parse), applies(LIT);
+        /// Add a light: point, spot, sun, sphere, rectangle, disk or portal, then key=value, like "sun direction=0,-1,0 irradiance=3"; may be repeated
+        ///
+        /// Keys: position, direction (in which it emits), radius, size=W,H, intensity (cd), irradiance (lux) or radiance, color=R,G,B or temperature=K,
+        /// and outer, inner, angle in degrees. A portal has position, direction and size of an opening through which the environment is sampled, which
+        /// lessens the noise of rooms.
+        light: Vec<LightSpec>, option(value_name = "SPEC", value_parser = light_spec::parse), applies(LIT), basic;
     }
 }
 
@@ -51,6 +55,9 @@ impl LightingSettings {
 
     fn environment(&self) -> Result<Option<Environment>> {
         let Some(text) = &self.environment else { return Ok(None) };
+        if text == "none" {
+            return Ok(Some(Environment::Black));
+        }
         let scale = self.environment_scale.unwrap_or(1.0) as f32;
         if let Ok(colour) = parse_vector(text) {
             if colour.min_element() < 0.0 {

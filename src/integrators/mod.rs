@@ -157,6 +157,12 @@ pub trait Integrator: Sync {
     /// Returns true if the image depends on the scene's environment.
     fn sees_environment(&self) -> bool;
 
+    /// Returns true if the image shows the environment, or a light infinitely far away, where there is no surface.
+    fn shows_environment(&self, scene: &Scene) -> bool {
+        let _ = scene;
+        false
+    }
+
     /// Everything that the samples of an image depend on besides scene, camera, size and seed: metadata keys and values. `None`: the key is absent from the
     /// metadata.
     fn identity(&self, job: &RenderJob) -> Vec<(&'static str, Option<String>)>;
@@ -177,13 +183,25 @@ pub trait Integrator: Sync {
     /// Converts the image to what an 8-bit file shows.
     fn picture(&self, image: &Image, options: &PictureOptions) -> Image;
 
-    /// Options of path tracing, if it traces paths, as denoisers need them.
+    /// Options of path tracing, if it traces paths.
     ///
     /// # Errors
     /// Those of [`Integrator::render`] that settings have.
     fn path_options(&self, job: &RenderJob) -> Result<Option<path::PathOptions>> {
         let _ = job;
         Ok(None)
+    }
+
+    /// Options of path tracing as denoisers need them, if its images can be denoised.
+    ///
+    /// # Errors
+    /// Those of [`Integrator::render`] that settings have.
+    fn denoise_options(&self, job: &RenderJob) -> Result<Option<path::PathOptions>> {
+        let path = self.path_options(job)?;
+        // ambient occlusion is like the light of a white sky: its noise does not depend on materials
+        let grey =
+            || path::PathOptions { size: job.size, pixel_filter: job.pixel_filter, white_sky: Some(1.0), ..Default::default() };
+        Ok(path.or_else(|| self.capabilities().contains(&Capability::Denoising).then(grey)))
     }
 }
 
@@ -300,12 +318,12 @@ mod tests {
             "ao": { "ao_radius": 1.0, "ao_falloff": 2.0, "ao_normal": "shading" },
             "path": {
                 "max_depth": 1, "min_depth": 1, "rr_depth": 1, "firefly_clamp": 1.0, "sampling": "bsdf", "energy_compensation": true, "sky_albedo": 0.1,
-                "ambient": [1.0, 1.0, 1.0], "environment_light": "ambient", "denoise": "filter", "texture_filter": "ray-cone", "f_number": 1.0, "focus_distance": 1.0
+                "ambient": [1.0, 1.0, 1.0], "environment_light": "ambient", "texture_filter": "ray-cone", "f_number": 1.0, "focus_distance": 1.0
             }
         });
         let settings: IntegratorSettings = serde_json::from_value(every).unwrap();
         let given = settings.given();
-        assert!(given.len() >= 15);
+        assert!(given.len() >= 14);
         for setting in given {
             assert!(capabilities().iter().any(|i| setting.applies.includes(i)), "{}", setting.name);
         }

@@ -5,9 +5,10 @@ use std::fs::File;
 use std::io::{self, BufWriter};
 use std::path::{Path, PathBuf};
 
-use ::png::{BitDepth, ColorType, Compression, Encoder, EncodingError, SrgbRenderingIntent, Writer};
+use ::png::{BitDepth, Compression, Encoder, EncodingError, Writer};
 
-use super::png::{Colour, bytes_of};
+use super::png::{self, Colour, bytes_of};
+use super::settings::PngEncoding;
 use super::{Image, check_size};
 use crate::error::{Error, Result};
 use crate::files::AtomicFile;
@@ -91,12 +92,9 @@ impl ApngWriter {
         let out = BufWriter::with_capacity(1 << 16, file.handle()?);
         let start = || {
             let mut encoder = Encoder::new(out, width, height);
-            encoder.set_color(match colour {
-                Colour::Grey => ColorType::Grayscale,
-                Colour::Rgb => ColorType::Rgb,
-            });
+            encoder.set_color(colour.png());
             encoder.set_depth(BitDepth::Eight);
-            encoder.set_source_srgb(SrgbRenderingIntent::Perceptual);
+            png::set_encoding(&mut encoder, PngEncoding::Srgb);
             encoder.set_compression(Compression::Fast);
             const FOR_EVER: u32 = 0;
             encoder.set_animated(frames, FOR_EVER)?;
@@ -121,7 +119,7 @@ impl ApngWriter {
         self.add_bytes(&bytes)
     }
 
-    /// Adds 8-bit sRGB values as they are as the next frame: 1 or 3 a pixel, rows from the top. Errors as [`ApngWriter::add`].
+    /// Adds 8-bit sRGB values as they are as the next frame: as many a pixel as the colour type has, rows from the top. Errors as [`ApngWriter::add`].
     pub fn add_bytes(&mut self, bytes: &[u8]) -> Result<()> {
         let Animation { size: [width, height], colour, frames, .. } = self.animation;
         if bytes.len() as u64 != u64::from(width) * u64::from(height) * colour.channels() as u64 {

@@ -1,7 +1,8 @@
-//! OpenEXR: one part, all channels with 32 bits, lossless.
+//! OpenEXR: one part, all channels with 32 bits and lossless unless [`ExrOptions`] say otherwise.
 //!
 //! A layer is the prefix of a channel's name (`depth.Z`, `position.X`), as the format has it. Metadata entries are text
-//! attributes called `skylit.KEY`. The same image gives the same bytes.
+//! attributes called `skylit.KEY`, but [`WORLD_TO_CAMERA`] and [`WORLD_TO_NDC`], which are the standard's matrices. A grey image has its channel `Y` also as `R`,
+//! `G` and `B`, for programs that look for these alone; [`read`] drops the copies. The same image gives the same bytes.
 
 use std::fs::File;
 use std::io::{self, BufReader, BufWriter, Read, Seek, SeekFrom, Write};
@@ -10,22 +11,100 @@ use std::path::Path;
 use exr::block::lines::LineRefMut;
 use exr::image::write::samples::{SamplesWriter, WritableSamples};
 use exr::math::{RoundingMode, Vec2};
-use exr::meta::attribute::{AttributeValue, LevelMode, LineOrder, SampleType, Text};
+use exr::meta::attribute::{AttributeValue, Chromaticities, LevelMode, LineOrder, Matrix4x4, SampleType, Text};
 use exr::meta::{MetaData, header::Header};
 use exr::prelude::{
     AnyChannel, AnyChannels, Blocks, Compression, Encoding, FlatSamples, Layer, LayerAttributes, ReadChannels, ReadLayers,
-    WritableImage,
+    WritableImage, f16,
 };
 
+use super::settings::{ExrCompression, FileSettings};
 use super::{Channel, Image, Samples, check_size};
 use crate::error::{Error, Result};
 use crate::files::write_atomically;
 
 /// Prefix of the attributes that hold metadata.
 const PREFIX: &str = "skylit.";
+/// Metadata key of the matrix from world space to camera space (x right, y up, looking along -z): 16 numbers as [`matrix_text`] writes them.
+pub const WORLD_TO_CAMERA: &str = "worldToCamera";
+/// Metadata key of the matrix from world space to normalized device coordinates: x and y are -1 to 1 inside of the image, y up, after a division by w.
+pub const WORLD_TO_NDC: &str = "worldToNDC";
+/// Samples of each pixel; unsigned integers in files of earlier versions.
+const SAMPLES: &str = "samples";
+
+/// How an EXR file is written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ExrOptions {
+    /// Colours, alpha, normals and albedo have 16 bits ([`is_half`]). Finite values beyond 65504 become 65504.
+    pub half: bool,
+    /// Compression.
+    pub compression: ExrCompression,
+    /// A grey image has its channel `Y` as `R`, `G` and `B`, too.
+    pub grey_as_rgb: bool,
+}
+
+impl Default for ExrOptions {
+    fn default() -> Self {
+        Self { half: false, compression: ExrCompression::default(), grey_as_rgb: true }
+    }
+}
+
+impl From<&FileSettings> for ExrOptions {
+    fn from(settings: &FileSettings) -> Self {
+        Self { half: settings.exr_half, compression: settings.exr_compression.unwrap_or_default(), ..Self::default() }
+    }
+}
+
+impl From<ExrCompression> for Compression {
+    fn from(compression: ExrCompression) -> Self {
+        match compression {
+            ExrCompression::None => Self::Uncompressed,
+            ExrCompression::Rle => Self::RLE,
+            ExrCompression::Zips => Self::ZIP1,
+            ExrCompression::Zip => Self::ZIP16,
+            ExrCompression::Piz => Self::PIZ,
+            ExrCompression::Pxr24 => Self::PXR24,
+            ExrCompression::B44 => Self::B44,
+            ExrCompression::B44a => Self::B44A,
+        }
+    }
+}
+
+/// Does a channel have 16 bits where [`ExrOptions::half`] is set? Colours, alpha, albedo, and directions do; depths, positions, ids, counts, variances and the film's state need
+/// all bits that they have.
+pub fn is_half(channel: &str) -> bool {
+    let layer = channel.split_once('.').map(|(layer, _)| layer);
+    match layer {
+        None => matches!(channel, "R" | "G" | "B" | "A" | "Y"),
+        Some(layer) => matches!(layer, "albedo" | "bent" | "Ng" | "noisy" | "Ns"),
+    }
+}
+
+/// The text of a matrix in metadata: 16 numbers separated by commas, in the order of EXR files, whose matrices are multiplied from the right with rows (a translation is in the
+/// last four).
+pub fn matrix_text(matrix: &Matrix4x4) -> String {
+    matrix.map(|v| v.to_string()).join(",")
+}
+
+/// Reads [`matrix_text`].
+fn matrix_of(text: &str) -> Option<Matrix4x4> {
+    let values = text.split(',').map(|v| v.trim().parse().ok()).collect::<Option<Vec<f32>>>()?;
+    values.try_into().ok()
+}
+
+/// Writes an image with all its channels and metadata, 32 bits and lossless.
+///
+/// # Errors
+/// Those of [`write_with`].
+pub fn write(image: &Image, path: &Path) -> Result<()> {
+    write_with(image, path, &ExrOptions::default())
+}
 
 /// Writes an image with all its channels and metadata.
-pub fn write(image: &Image, path: &Path) -> Result<()> {
+///
+/// # Errors
+/// [`Error::Usage`] for an image that contradicts itself or a metadata entry that the format cannot have, [`Error::Output`].
+pub fn write_with(image: &Image, path: &Path, options: &ExrOptions) -> Result<()> {
     image.check()?;
     check_size(image.width, image.height)?;
     if let Some((key, _)) =
@@ -34,23 +113,42 @@ pub fn write(image: &Image, path: &Path) -> Result<()> {
         return Err(Error::Usage(format!("metadata key {key:?} is empty, too long or holds a zero byte")));
     }
     write_atomically(path, |file| {
-        encode(image, file)?;
+        encode(image, file, options)?;
         sort_attributes(file)
     })
 }
 
-fn encode(image: &Image, file: &mut File) -> io::Result<()> {
-    let channels = image.channels.iter().map(|c| AnyChannel::new(text(&c.name), Borrowed(&c.samples))).collect();
+fn encode(image: &Image, file: &mut File, options: &ExrOptions) -> io::Result<()> {
+    let stored = |name: &str, samples| AnyChannel::new(text(name), Borrowed { samples, half: options.half && is_half(name) });
+    let mut channels: exr::prelude::SmallVec<_> = image.channels.iter().map(|c| stored(&c.name, &c.samples)).collect();
+    let is_free = |name: &&str| image.channels.iter().all(|c| c.name != **name);
+    let rgb = ["R", "G", "B"];
+    if let (true, Some(grey)) = (options.grey_as_rgb && rgb.iter().all(is_free), image.channels.iter().find(|c| c.name == "Y"))
+    {
+        channels.extend(rgb.iter().map(|name| stored(name, &grey.samples)));
+    }
     let software = text(concat!("skylit ", env!("CARGO_PKG_VERSION")));
     let mut attributes = LayerAttributes { software_name: Some(software), ..Default::default() };
     for (key, value) in &image.metadata {
-        attributes.other.insert(text(&format!("{PREFIX}{key}")), AttributeValue::Text(text(value)));
+        match (key.as_str(), matrix_of(value)) {
+            (WORLD_TO_CAMERA, Some(matrix)) => attributes.world_to_camera = Some(matrix),
+            (WORLD_TO_NDC, Some(matrix)) => attributes.world_to_normalized_device = Some(matrix),
+            _ => drop(attributes.other.insert(text(&format!("{PREFIX}{key}")), AttributeValue::Text(text(value)))),
+        }
     }
     // Blocks in order of their rows whichever thread finishes first: the same image gives the same bytes.
-    let encoding = Encoding { compression: Compression::ZIP16, blocks: Blocks::ScanLines, line_order: LineOrder::Increasing };
+    let encoding =
+        Encoding { compression: options.compression.into(), blocks: Blocks::ScanLines, line_order: LineOrder::Increasing };
     let size = (image.width as usize, image.height as usize);
     let layer = Layer::new(size, attributes, encoding, AnyChannels::sort(channels));
-    let file_image = exr::image::Image::from_layer(layer);
+    let mut file_image = exr::image::Image::from_layer(layer);
+    // sRGB's, which are also those that a file without the attribute has
+    file_image.attributes.chromaticities = Some(Chromaticities {
+        red: Vec2(0.64, 0.33),
+        green: Vec2(0.3, 0.6),
+        blue: Vec2(0.15, 0.06),
+        white: Vec2(0.3127, 0.329),
+    });
     let mut out = BufWriter::with_capacity(1 << 18, file);
     file_image.write().to_buffered(&mut out).map_err(|e| match e {
         exr::error::Error::Io(e) => e,
@@ -101,19 +199,31 @@ fn sort_attributes(file: &mut File) -> io::Result<()> {
 }
 
 /// Lets the library read the samples where they lie: a copy of a large image would double its memory.
-struct Borrowed<'a>(&'a Samples);
+struct Borrowed<'a> {
+    samples: &'a Samples,
+    /// Floats have 16 bits.
+    half: bool,
+}
 
 /// Copies parts of rows to the encoder.
 struct RowWriter<'a> {
     samples: &'a Samples,
+    half: bool,
     width: usize,
+}
+
+/// The nearest half float; the largest one for finite values beyond it, so that they do not become infinite.
+fn half(value: f32) -> f16 {
+    let largest = f16::MAX.to_f32();
+    f16::from_f32(if value.is_finite() { value.clamp(-largest, largest) } else { value })
 }
 
 impl<'s, 'a: 's> WritableSamples<'s> for Borrowed<'a> {
     type Writer = RowWriter<'s>;
 
     fn sample_type(&self) -> SampleType {
-        match self.0 {
+        match self.samples {
+            Samples::F32(_) if self.half => SampleType::F16,
             Samples::F32(_) => SampleType::F32,
             Samples::U32(_) => SampleType::U32,
         }
@@ -124,7 +234,7 @@ impl<'s, 'a: 's> WritableSamples<'s> for Borrowed<'a> {
     }
 
     fn create_samples_writer(&'s self, header: &Header) -> RowWriter<'s> {
-        RowWriter { samples: self.0, width: header.layer_size.width() }
+        RowWriter { samples: self.samples, half: self.half, width: header.layer_size.width() }
     }
 }
 
@@ -134,16 +244,24 @@ impl SamplesWriter for RowWriter<'_> {
         let start = y * self.width + x;
         let range = start..start + line.location.sample_count;
         // native byte order: the library converts
-        let bytes: &[u8] = match self.samples {
-            Samples::F32(s) => bytemuck::cast_slice(&s[range]),
-            Samples::U32(s) => bytemuck::cast_slice(&s[range]),
-        };
-        line.value.copy_from_slice(bytes);
+        match self.samples {
+            Samples::F32(s) if self.half => {
+                let pairs = line.value.chunks_exact_mut(2).zip(&s[range]);
+                pairs.for_each(|(bytes, v)| bytes.copy_from_slice(&half(*v).to_ne_bytes()));
+            }
+            Samples::F32(s) => line.value.copy_from_slice(bytemuck::cast_slice(&s[range])),
+            Samples::U32(s) => line.value.copy_from_slice(bytemuck::cast_slice(&s[range])),
+        }
     }
 }
 
 /// Reads an EXR with all its channels (16-bit floats are converted to 32-bit ones) and its `skylit.` metadata, sorted by key. In a
 /// file with several parts, a part's name becomes the prefix of its channels' names; all parts must have the same size.
+///
+/// Of images of skylit the copies of a grey image's channel are left out, and `samples` are floats whatever version wrote them.
+///
+/// # Errors
+/// [`Error::Input`].
 pub fn read(path: &Path) -> Result<Image> {
     let broken = |e: exr::error::Error| match e {
         exr::error::Error::Io(e) => Error::read(path, &e),
@@ -170,6 +288,8 @@ pub fn read(path: &Path) -> Result<Image> {
 
     let mut image = Image::default();
     let parts = file.layer_data.len();
+    let is_ours = |a: &LayerAttributes| a.software_name.as_ref().is_some_and(|s| s.as_slice().starts_with(b"skylit "));
+    let ours = file.layer_data.iter().all(|layer| is_ours(&layer.attributes));
     for (i, layer) in file.layer_data.into_iter().enumerate() {
         let size = (layer.size.0 as u32, layer.size.1 as u32);
         if i == 0 {
@@ -186,6 +306,10 @@ pub fn read(path: &Path) -> Result<Image> {
             };
             image.channels.push(Channel { name: prefix.clone() + &string(&channel.name), samples });
         }
+        let matrices =
+            [(WORLD_TO_CAMERA, layer.attributes.world_to_camera), (WORLD_TO_NDC, layer.attributes.world_to_normalized_device)];
+        let matrices = matrices.iter().filter_map(|(key, matrix)| Some(((*key).to_owned(), matrix_text(matrix.as_ref()?))));
+        image.metadata.extend(matrices);
         for (key, value) in layer.attributes.other.iter().chain(&file.attributes.other) {
             if let (Some(key), AttributeValue::Text(value)) = (string(key).strip_prefix(PREFIX), value) {
                 image.metadata.push((key.to_owned(), string(value)));
@@ -194,6 +318,23 @@ pub fn read(path: &Path) -> Result<Image> {
     }
     image.metadata.sort();
     image.metadata.dedup();
+    if parts == 1 && ours {
+        normalize(&mut image);
+    }
     image.check().map_err(|e| Error::input(path, e.to_string()))?;
     Ok(image)
+}
+
+/// An image of skylit, whatever version wrote it and for whichever other programs.
+fn normalize(image: &mut Image) {
+    for channel in image.channels.iter_mut().filter(|c| c.name == SAMPLES) {
+        if let Samples::U32(counts) = &channel.samples {
+            channel.samples = Samples::F32(counts.iter().map(|n| *n as f32).collect());
+        }
+    }
+    let bits = |name: &str| image.f32(name).map(bytemuck::cast_slice::<f32, u32>);
+    let is_grey = bits("Y").is_some_and(|grey| ["R", "G", "B"].iter().all(|name| bits(name) == Some(grey)));
+    if is_grey {
+        image.channels.retain(|c| !matches!(c.name.as_str(), "R" | "G" | "B"));
+    }
 }

@@ -1,17 +1,21 @@
-//! Image files: EXR with named float channels, PNG and APNG for previews, and frame numbers in file names.
+//! Image files: EXR with named float channels, pictures (PNG, JPEG, WebP, APNG), and frame numbers in file names.
 
 pub mod apng;
 pub mod exr;
 pub mod frames;
 pub mod palette;
+pub mod picture;
 pub mod png;
 pub mod png_text;
+pub mod settings;
 pub mod tone_map;
 
 use std::path::Path;
 
 use crate::error::{Error, Result};
 use crate::settings::parse::Parsed;
+pub use picture::Picture;
+pub use settings::FileSettings;
 
 /// Maximum number of pixels of an image: 16384 x 16384. More would overflow the 32-bit indices of the tracers.
 pub const MAX_PIXELS: u64 = 1 << 28;
@@ -103,38 +107,62 @@ impl Image {
 /// A kind of image file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ImageFormat {
-    /// OpenEXR: every channel, 32 bits, metadata.
+    /// OpenEXR: every channel, metadata.
     Exr,
-    /// PNG: 8-bit sRGB of the colour channels, for previews.
+    /// PNG: the colour channels, 8 or 16 bits.
     Png,
+    /// JPEG: the colour channels, 8-bit sRGB, lossy.
+    Jpeg,
+    /// WebP: the colour channels, 8-bit sRGB, lossless.
+    WebP,
 }
 
 impl ImageFormat {
     /// The kind that the extension of `path` names.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for an extension of another kind.
     pub fn of(path: &Path) -> Result<Self> {
         let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
         match extension.as_deref() {
             Some("exr") => Ok(Self::Exr),
             Some("png") => Ok(Self::Png),
-            _ => Err(Error::Usage(format!("{}: unknown kind of image: the name must end in .exr or .png", path.display()))),
+            Some("jpg" | "jpeg") => Ok(Self::Jpeg),
+            Some("webp") => Ok(Self::WebP),
+            _ => Err(Error::Usage(format!(
+                "{}: unknown kind of image: the name must end in .exr, .png, .jpg or .webp",
+                path.display()
+            ))),
         }
     }
-}
 
-/// Writes an image, as the extension of the path says: `.exr` (everything) or `.png` (colour, 8-bit sRGB). On failure
-/// nothing is left behind, and a file that was there before is unchanged.
-pub fn save(image: &Image, path: &Path) -> Result<()> {
-    match ImageFormat::of(path)? {
-        ImageFormat::Exr => exr::write(image, path),
-        ImageFormat::Png => png::write(image, path, 0.0),
+    /// Does it hold integers of what a display shows, and nothing else?
+    pub fn is_picture(self) -> bool {
+        self != Self::Exr
     }
 }
 
-/// Reads an image that [`save`] or another program wrote. PNG values become linear.
+/// Writes an image, as the extension of the path says: `.exr` (everything), or a picture of the colour channels on black, 8-bit sRGB. On failure
+/// nothing is left behind, and a file that was there before is unchanged.
+///
+/// # Errors
+/// [`Error::Usage`] for an unknown extension or an image that the format cannot have, [`Error::Output`].
+pub fn save(image: &Image, path: &Path) -> Result<()> {
+    let settings = FileSettings::default();
+    match ImageFormat::of(path)? {
+        ImageFormat::Exr => exr::write(image, path),
+        _ => Picture::new(image, None, &settings, path)?.save(path, settings.jpeg_quality()),
+    }
+}
+
+/// Reads an image that [`save`] or another program wrote. Values of pictures become linear.
+///
+/// # Errors
+/// [`Error::Usage`] for an unknown extension, [`Error::Input`].
 pub fn load(path: &Path) -> Result<Image> {
     match ImageFormat::of(path)? {
         ImageFormat::Exr => exr::read(path),
-        ImageFormat::Png => png::read(path),
+        _ => png::read(path),
     }
 }
 

@@ -1,41 +1,96 @@
-//! PNG: 8-bit sRGB, for previews.
+//! PNG: 8-bit sRGB of images and bytes, and what PNG, JPEG and WebP files have in common when they are read. [`super::picture`] has other bits, encodings and
+//! alpha.
 //!
 //! Channels `R`, `G` and `B` give a colour image; `Y`, or `R` alone, a grey one. Other channels (alpha, depth, ids)
 //! and the metadata are left out: EXR keeps them.
 
 use std::fs::File;
-use std::io::{self, BufReader, BufWriter, Write};
+use std::io::{BufReader, Write};
 use std::path::Path;
 
-use image::codecs::png::{CompressionType, FilterType, PngEncoder};
-use image::{ExtendedColorType, ImageEncoder};
+use image::ImageReader;
 use rayon::prelude::*;
 
-use super::{Channel, Image, Samples, check_size};
+use super::picture::Picture;
+use super::settings::PngEncoding;
+use super::{Channel, Image, ImageFormat, Samples, check_size};
 use crate::colour::{srgb_byte, srgb_decode};
 use crate::error::{Error, Result};
-use crate::files::write_atomically;
 
 /// Metadata of images that were not read as linear values: how they were encoded.
 pub const ENCODING: &str = "encoding";
 
-/// Colour type of 8-bit pixels.
+/// Colour type of pixels. Alpha is not premultiplied.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Colour {
-    /// One byte a pixel.
+    /// One value a pixel.
     Grey,
+    /// Grey and alpha.
+    GreyAlpha,
     /// Red, green and blue.
     Rgb,
+    /// Red, green, blue and alpha.
+    Rgba,
 }
 
 impl Colour {
-    /// Bytes a pixel.
+    /// Values a pixel.
     pub fn channels(self) -> usize {
         match self {
             Self::Grey => 1,
+            Self::GreyAlpha => 2,
             Self::Rgb => 3,
+            Self::Rgba => 4,
         }
     }
+
+    /// The same colours with alpha.
+    pub fn with_alpha(self) -> Self {
+        match self {
+            Self::Grey | Self::GreyAlpha => Self::GreyAlpha,
+            Self::Rgb | Self::Rgba => Self::Rgba,
+        }
+    }
+
+    /// Is alpha among the values?
+    pub fn has_alpha(self) -> bool {
+        matches!(self, Self::GreyAlpha | Self::Rgba)
+    }
+
+    /// The colour type of PNG files.
+    pub(super) fn png(self) -> ::png::ColorType {
+        match self {
+            Self::Grey => ::png::ColorType::Grayscale,
+            Self::GreyAlpha => ::png::ColorType::GrayscaleAlpha,
+            Self::Rgb => ::png::ColorType::Rgb,
+            Self::Rgba => ::png::ColorType::Rgba,
+        }
+    }
+}
+
+/// Primaries and white of sRGB, times 100000: white, red, green, blue.
+const CHROMATICITIES: [(u32, u32); 4] = [(31270, 32900), (64000, 33000), (30000, 60000), (15000, 6000)];
+
+/// Names the transfer function and the primaries: chunks sRGB, gAMA and cHRM, without sRGB for linear values.
+pub(super) fn set_encoding<W: Write>(encoder: &mut ::png::Encoder<W>, encoding: PngEncoding) {
+    let [white, red, green, blue] =
+        CHROMATICITIES.map(|(x, y)| (::png::ScaledFloat::from_scaled(x), ::png::ScaledFloat::from_scaled(y)));
+    encoder.set_source_chromaticities(::png::SourceChromaticities { white, red, green, blue });
+    match encoding {
+        PngEncoding::Srgb => {
+            encoder.set_source_gamma(::png::ScaledFloat::from_scaled(45455));
+            encoder.set_source_srgb(::png::SrgbRenderingIntent::Perceptual);
+        }
+        PngEncoding::Linear => encoder.set_source_gamma(::png::ScaledFloat::from_scaled(100_000)),
+    }
+}
+
+/// The error that an image has no colour.
+pub(super) fn no_colour(path: &Path) -> Error {
+    Error::Usage(format!(
+        "{}: the image has no colour to show as PNG (channels R, G, B or Y); write it as .exr",
+        path.display()
+    ))
 }
 
 /// The colour channels of an image as 8-bit sRGB, brightened by `exposure` stops (0 = as they are, 1 = twice as bright).
@@ -55,58 +110,34 @@ pub fn bytes_of(image: &Image, exposure: f32, path: &Path) -> Result<(Vec<u8>, C
     } else if let Some(y) = image.f32("Y").or_else(|| image.f32("R")) {
         Ok((y.par_iter().with_min_len(1024).map(|v| srgb_byte(v * gain)).collect(), Colour::Grey))
     } else {
-        Err(Error::Usage(format!(
-            "{}: the image has no colour to show as PNG (channels R, G, B or Y); write it as .exr",
-            path.display()
-        )))
+        Err(no_colour(path))
     }
 }
 
 /// Writes the colour channels of an image; `exposure` as in [`bytes_of`].
 pub fn write(image: &Image, path: &Path, exposure: f32) -> Result<()> {
     let (bytes, colour) = bytes_of(image, exposure, path)?;
-    write_bytes(path, &bytes, image.width, image.height, colour)
+    write_bytes(path, bytes, image.width, image.height, colour)
 }
 
 /// Writes 8-bit grey values as they are, `width * height` of them.
 pub fn write_grey(path: &Path, grey: &[u8], width: u32, height: u32) -> Result<()> {
-    check_size(width, height)?;
-    if grey.len() as u64 != u64::from(width) * u64::from(height) {
-        return Err(Error::Usage(format!("{} grey values for {width}x{height} pixels", grey.len())));
-    }
-    write_bytes(path, grey, width, height, Colour::Grey)
+    write_bytes(path, grey.to_vec(), width, height, Colour::Grey)
 }
 
 /// Writes 8-bit sRGB values as they are, three for each of `width * height` pixels.
 pub fn write_rgb(path: &Path, rgb: &[u8], width: u32, height: u32) -> Result<()> {
-    check_size(width, height)?;
-    if rgb.len() as u64 != 3 * u64::from(width) * u64::from(height) {
-        return Err(Error::Usage(format!("{} colour values for {width}x{height} pixels", rgb.len())));
-    }
-    write_bytes(path, rgb, width, height, Colour::Rgb)
+    write_bytes(path, rgb.to_vec(), width, height, Colour::Rgb)
 }
 
-fn write_bytes(path: &Path, bytes: &[u8], width: u32, height: u32, colour: Colour) -> Result<()> {
-    let colour = match colour {
-        Colour::Grey => ExtendedColorType::L8,
-        Colour::Rgb => ExtendedColorType::Rgb8,
-    };
-    write_atomically(path, |file| {
-        let mut out = BufWriter::with_capacity(1 << 16, file);
-        PngEncoder::new_with_quality(&mut out, CompressionType::Fast, FilterType::Adaptive)
-            .write_image(bytes, width, height, colour)
-            .map_err(|e| match e {
-                image::ImageError::IoError(e) => e,
-                e => io::Error::other(e.to_string()),
-            })?;
-        out.flush()
-    })
+fn write_bytes(path: &Path, bytes: Vec<u8>, width: u32, height: u32, colour: Colour) -> Result<()> {
+    Picture::of_bytes(bytes, [width, height], colour)?.save_png(path)
 }
 
-/// The 1-ray depth image: distances along the view to 8-bit grey, nearest = white, farthest = black, linear in between over
+/// The 1-ray depth image: distances along the view to grey from 0 to 1, nearest = white, farthest = black, linear in between over
 /// the range that occurs. Background (a distance that is not finite, or not above 0) is black. A single distance
 /// everywhere is white. No transfer function: the grey is a number to read off, not light.
-pub fn depth_to_grey(depth: &[f32]) -> Vec<u8> {
+pub fn depth_to_unit(depth: &[f32]) -> Vec<f32> {
     let seen = |d: &f32| d.is_finite() && *d > 0.0;
     let (near, far) = depth
         .par_iter()
@@ -115,35 +146,67 @@ pub fn depth_to_grey(depth: &[f32]) -> Vec<u8> {
         .fold(|| (f32::INFINITY, 0f32), |(n, f), d| (n.min(d), f.max(d)))
         .reduce(|| (f32::INFINITY, 0f32), |a, b| (a.0.min(b.0), a.1.max(b.1)));
     let range = far - near;
-    let grey = |d: f32| if range > 0.0 { ((far - d) / range * 255.0).round() as u8 } else { 255 };
-    depth.par_iter().map(|d| if seen(d) { grey(*d) } else { 0 }).collect()
+    let grey = |d: f32| if range > 0.0 { (far - d) / range } else { 1.0 };
+    depth.par_iter().map(|d| if seen(d) { grey(*d) } else { 0.0 }).collect()
 }
 
-/// Reads a PNG as linear light: channels `R`, `G`, `B` of a colour image, `Y` of a grey one; alpha is dropped.
+/// [`depth_to_unit`] in 8 bits.
+pub fn depth_to_grey(depth: &[f32]) -> Vec<u8> {
+    depth_to_unit(depth).into_par_iter().map(|grey| (grey * 255.0).round() as u8).collect()
+}
+
+/// Does the header of a PNG name no transfer function but 1? The crate image does not tell.
+fn is_linear(file: BufReader<File>) -> bool {
+    let reader = ::png::Decoder::new(file).read_info();
+    reader.is_ok_and(|r| r.info().gamma().is_some_and(|gamma| gamma.into_scaled().abs_diff(100_000) < 100))
+}
+
+/// Reads a PNG, JPEG or WebP file as linear light: channels `R`, `G`, `B` of a colour image, `Y` of a grey one. Values have the transfer function of sRGB, but those of a PNG that
+/// says that it is linear (gAMA 1). Alpha becomes the channel `A`, and the colours are associated with it, as those of EXR files are.
+///
+/// # Errors
+/// [`Error::Input`], and [`Error::Usage`] for the name of another kind of file.
 pub fn read(path: &Path) -> Result<Image> {
-    let file = File::open(path).map_err(|e| Error::read(path, &e))?;
+    let (name, format) = match ImageFormat::of(path)? {
+        ImageFormat::Png => ("PNG", image::ImageFormat::Png),
+        ImageFormat::Jpeg => ("JPEG", image::ImageFormat::Jpeg),
+        ImageFormat::WebP => ("WebP", image::ImageFormat::WebP),
+        ImageFormat::Exr => return Err(Error::Usage(format!("{}: not a picture", path.display()))),
+    };
+    let open = || File::open(path).map(BufReader::new).map_err(|e| Error::read(path, &e));
     let broken = |e: image::ImageError| match e {
         image::ImageError::IoError(e) => Error::read(path, &e),
-        e => Error::input(path, format!("not a readable PNG: {e}")),
+        e => Error::input(path, format!("not a readable {name}: {e}")),
     };
-    let mut reader = image::ImageReader::with_format(BufReader::new(file), image::ImageFormat::Png);
     let mut limits = image::Limits::default();
     (limits.max_image_width, limits.max_image_height) = (Some(1 << 20), Some(1 << 20));
     limits.max_alloc = Some(super::MAX_PIXELS * 8);
+    let mut reader = ImageReader::with_format(open()?, format);
     reader.limits(limits);
     let decoded = reader.decode().map_err(broken)?;
+    let is_linear = format == image::ImageFormat::Png && is_linear(open()?);
     let (width, height) = (decoded.width(), decoded.height());
     check_size(width, height).map_err(|e| Error::input(path, e.to_string()))?;
-    let channel = |name: &str, samples: Vec<f32>| Channel { name: name.to_owned(), samples: Samples::F32(samples) };
-    let channels = if decoded.color().has_color() {
+    let bits = 8 * usize::from(decoded.color().bytes_per_pixel()) / usize::from(decoded.color().channel_count());
+    let encoding = if is_linear { "linear" } else { "sRGB" };
+    let metadata = vec![(ENCODING.to_owned(), format!("{bits}-bit {encoding}"))];
+    let linear = |coded: f32| if is_linear { coded } else { srgb_decode(coded) };
+    let alpha: Option<Vec<f32>> = decoded.color().has_alpha().then(|| decoded.to_rgba32f().pixels().map(|p| p.0[3]).collect());
+    let channel = |name: &str, mut samples: Vec<f32>| {
+        if let Some(alpha) = &alpha {
+            samples.par_iter_mut().zip(alpha).for_each(|(v, a)| *v *= *a);
+        }
+        Channel { name: name.to_owned(), samples: Samples::F32(samples) }
+    };
+    let mut channels = if decoded.color().has_color() {
         let pixels = decoded.into_rgb32f().into_raw();
-        let plane = |k: usize| pixels.par_chunks(3).map(|p| srgb_decode(p[k])).collect::<Vec<_>>();
+        let plane = |k: usize| pixels.par_chunks(3).map(|p| linear(p[k])).collect::<Vec<_>>();
         vec![channel("R", plane(0)), channel("G", plane(1)), channel("B", plane(2))]
     } else {
         // not into_luma32f(): it may weight what is grey already
         let pixels = decoded.into_luma16().into_raw();
-        vec![channel("Y", pixels.par_iter().map(|&v| srgb_decode(f32::from(v) / 65535.0)).collect())]
+        vec![channel("Y", pixels.par_iter().map(|&v| linear(f32::from(v) / 65535.0)).collect())]
     };
-    let metadata = vec![(ENCODING.to_owned(), "8-bit sRGB".to_owned())];
+    channels.extend(alpha.map(|alpha| Channel { name: "A".into(), samples: Samples::F32(alpha) }));
     Ok(Image { width, height, channels, metadata })
 }

@@ -5,7 +5,7 @@ use std::io::{self, BufReader, BufWriter, Write};
 use std::path::Path;
 
 use super::Image;
-use super::png::{Colour, bytes_of};
+use super::png::bytes_of;
 use crate::error::{Error, Result};
 use crate::files::write_atomically;
 
@@ -26,10 +26,7 @@ pub fn write(image: &Image, path: &Path) -> Result<()> {
     write_atomically(path, |file| {
         let mut out = BufWriter::new(file);
         let mut encoder = png::Encoder::new(&mut out, image.width, image.height);
-        encoder.set_color(match colour {
-            Colour::Grey => png::ColorType::Grayscale,
-            Colour::Rgb => png::ColorType::Rgb,
-        });
+        encoder.set_color(colour.png());
         encoder.set_depth(png::BitDepth::Eight);
         encoder.set_compression(png::Compression::High);
         for (key, value) in &image.metadata {

@@ -73,9 +73,9 @@ settings! {
     "Frames in real time"
     pub struct FrameSettings {
         /// Render with the real-time pipeline and these settings
-        preset: Option<Preset>, option(value_enum), applies(FRAMES);
+        preset: Option<Preset>, option(value_enum), applies(FRAMES), basic;
         /// Render frames A to B - 1 [default: one frame, after warm-up]
-        frames: Option<FrameRange>, option(value_name = "A..B", value_parser = parse_frames), applies(FRAMES);
+        frames: Option<FrameRange>, option(value_name = "A..B", value_parser = parse_frames), applies(FRAMES), basic;
         /// Frames per second [default: the camera path's, or 30]
         fps: Option<f64>, option(value_name = "N", value_parser = parse_rate), applies(FRAMES);
         /// Play an animation of the scene, by index or name [default: the first]
@@ -87,28 +87,28 @@ settings! {
         /// Orbit the camera around the centre of the scene, one revolution in this many frames
         orbit: Option<u32>,
             option(value_name = "FRAMES", num_args = 0..=1, default_missing_value = "240", value_parser = clap::value_parser!(u32).range(1..)),
-            applies(FRAMES);
+            applies(FRAMES), basic;
         /// Warm-up frames, identical to the first, that are rendered and discarded [default: 0; for a single frame, the history length]
         warm_up: Option<u32>, option(value_name = "N"), applies(FRAMES);
         /// AO technique [default: the preset's]
         technique: Option<Technique>, option(value_enum), applies(FRAMES);
         /// Primary visibility: rasterized or ray traced [default: auto]
-        primary: Option<PrimaryChoice>, option(value_enum), applies(FRAMES);
+        primary: Option<PrimaryChoice>, option(value_enum), applies(FRAMES), research;
         /// Occlusion rays per pixel and frame [default: the preset's]
         rays_per_pixel: Option<u32>,
             option(value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(Settings::MAX_RAYS))), applies(FRAMES);
         /// How rays are distributed over pixels (docs/realtime.md) [default: uniform]
-        budget: Option<Budget>, option(value_enum), applies(FRAMES);
+        budget: Option<Budget>, option(value_enum), applies(FRAMES), research;
         /// Resolution of ray tracing per frame [default: the preset's]
         resolution: Option<Resolution>, option(value_enum), applies(FRAMES);
         /// Sampler of ray directions [default: the preset's]
-        sequence: Option<Sequence>, option(value_enum), applies(FRAMES);
+        sequence: Option<Sequence>, option(value_enum), applies(FRAMES), research;
         /// Maximum history length in frames; 1 disables temporal accumulation [default: the preset's]
         history: Option<u32>, option(value_name = "N", value_parser = clap::value_parser!(u32).range(1..)), applies(FRAMES);
         /// Spatial filter [default: the preset's]
         filter: Option<FilterKind>, option(value_enum), applies(FRAMES);
         /// Maximum filter radius in pixels [default: the preset's]
-        filter_radius: Option<u32>, option(value_name = "PIXELS", value_parser = clap::value_parser!(u32).range(0..=16)), applies(FRAMES);
+        filter_radius: Option<u32>, option(value_name = "PIXELS", value_parser = clap::value_parser!(u32).range(0..=16)), applies(FRAMES), research;
         /// What .png and .apng outputs show [default: accessibility]
         show: Option<DisplayMode>, option(value_name = "NAME", value_enum), applies(FRAMES);
     }

@@ -1,5 +1,6 @@
 //! Samples of ambient light: what of an image changes with the radius and falloff of ambient occlusion, and with the ambient colour.
 
+use super::complete::Completed;
 use super::still::scene_warnings;
 use super::{RenderSettings, Renderer, TracerRequest};
 use crate::accel::flatten::FlatScene;
@@ -7,7 +8,6 @@ use crate::error::Result;
 use crate::film::Control;
 use crate::integrators::RenderJob;
 use crate::integrators::path::ambient::{self, TakeSamples};
-use crate::output;
 use crate::scene::Motion;
 
 impl Renderer {
@@ -23,11 +23,9 @@ impl Renderer {
         take: &mut TakeSamples,
     ) -> Result<()> {
         settings.check()?;
-        self.light(&settings.lighting)?;
+        let Completed { camera, settings, .. } = self.complete(settings, None)?;
         let integrator = settings.integrator().get();
         let size = settings.size(&self.scene);
-        output::check_size(size[0], size[1])?;
-        let camera = settings.camera.choose(&self.scene, f64::from(size[0]) / f64::from(size[1]))?;
         let (device, kind, compute) = (self.device.clone(), self.kind, self.compute);
         let ready = self.tracer.take();
         let scene = &self.scene;

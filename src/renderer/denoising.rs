@@ -5,15 +5,11 @@ use std::time::Instant;
 
 use serde_json::{Value, json};
 
-use crate::denoise::{DenoiseInput, Denoiser, Features, GRID, Oidn};
+use crate::denoise::{DenoiseChoice, DenoiseInput, Denoiser, Features, GRID, Oidn};
 use crate::error::Result;
 use crate::film::Control;
 use crate::film::accumulate::Accumulated;
-use crate::integrators::path::settings::DenoiseChoice;
 use crate::output::{Channel, Samples};
-
-/// Names of the channels that are denoised.
-const CHANNELS: [&str; 3] = ["R", "G", "B"];
 
 /// A control that ignores a request to keep the image so far: denoising runs to its end. If the request is an error, it is returned.
 struct UninterruptedControl<'a>(&'a mut dyn Control);
@@ -55,14 +51,16 @@ pub fn choose(choice: Option<DenoiseChoice>) -> Result<Option<SelectedDenoiser>>
 pub struct Denoising<'a> {
     chosen: &'a SelectedDenoiser,
     shot: DenoiseInput<'a>,
+    /// Names of the channels that are denoised.
+    names: &'static [&'static str],
     // those of the first film serve the next
     features: RefCell<Option<Features>>,
     seconds: Cell<f64>,
 }
 
 impl<'a> Denoising<'a> {
-    pub fn new(chosen: &'a SelectedDenoiser, shot: DenoiseInput<'a>) -> Self {
-        Self { chosen, shot, features: RefCell::new(None), seconds: Cell::new(0.0) }
+    pub fn new(chosen: &'a SelectedDenoiser, shot: DenoiseInput<'a>, names: &'static [&'static str]) -> Self {
+        Self { chosen, shot, names, features: RefCell::new(None), seconds: Cell::new(0.0) }
     }
 
     /// Name of the denoiser in the image's metadata.
@@ -70,7 +68,7 @@ impl<'a> Denoising<'a> {
         self.chosen.denoiser.name()
     }
 
-    /// Replaces the means of a film's channels by denoised ones, and adds the means as `noisy.R`, `noisy.G`, `noisy.B`. An interruption ends it, unless `control`
+    /// Replaces the means of a film's channels by denoised ones, and adds the means as `noisy.R`, `noisy.G`, `noisy.B`, or `noisy.Y`. An interruption ends it, unless `control`
     /// keeps the image so far, which is then denoised, too.
     pub fn channels(
         &self,
@@ -87,9 +85,9 @@ impl<'a> Denoising<'a> {
         let denoised = self.chosen.denoiser.denoise(&self.shot, &accumulated.film, &features, &mut stop)?;
         self.features.replace(Some(features));
         let mut noisy = Vec::new();
-        for (c, name) in CHANNELS.iter().enumerate() {
+        for (c, name) in self.names.iter().enumerate() {
             let Some(channel) = channels.iter_mut().find(|channel| channel.name == *name) else { continue };
-            let plane = denoised.iter().skip(c).step_by(CHANNELS.len()).copied().collect();
+            let plane = denoised.iter().skip(c).step_by(self.names.len()).copied().collect();
             let mean = std::mem::replace(&mut channel.samples, Samples::F32(plane));
             noisy.push(Channel { name: format!("noisy.{name}"), samples: mean });
         }
@@ -103,7 +101,8 @@ impl<'a> Denoising<'a> {
         let (name, why, seconds) = (self.name(), &self.chosen.why, self.seconds.get());
         DenoiseReport {
             line: format!(
-                "denoised by {name} ({why}) in {seconds:.3} s: the image is biased; an .exr keeps the noisy image as noisy.R, noisy.G and noisy.B"
+                "denoised by {name} ({why}) in {seconds:.3} s: the image is biased; an .exr keeps the noisy image as {}",
+                self.names.iter().map(|n| format!("noisy.{n}")).collect::<Vec<_>>().join(", ")
             ),
             explanation: format!(
                 "denoiser {name}: {why}; feature images with {} camera rays per pixel{}",

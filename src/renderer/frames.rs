@@ -2,24 +2,29 @@
 
 use std::time::Instant;
 
+use super::brightness;
+use super::complete::Completed;
+use super::laps::Laps;
 use super::report::{FrameReport, FramesReport, Seconds, Setup};
-use super::still::{aov_needs, camera_text, scene_warnings};
-use super::{RenderSettings, Renderer, TracerRequest};
+use super::still::{aov_needs, camera_text, scene_warnings, spp_text};
+use super::{RenderSettings, Renderer, TracerRequest, camera_numbers};
 use crate::accel::flatten::FlatScene;
 use crate::error::{Error, Result};
+use crate::files;
 use crate::film::Control;
 use crate::film::camera::CameraRecord;
 use crate::gpu::{Buffer, Device};
 use crate::integrators::ao::Hemisphere;
 use crate::integrators::aov::{self, Aov};
 use crate::integrators::path::PixelFilter;
-use crate::output::{self, Channel, Image, Samples};
+use crate::output::{Channel, Image, Samples};
 use crate::realtime::display::{Display, DisplayMode};
 use crate::realtime::frame_settings::FrameRange;
 use crate::realtime::sequence::{self, CameraMotion, FrameSequence};
 use crate::realtime::{Realtime, Settings, Technique};
 use crate::scene::load::load_camera_path;
-use crate::scene::{LightKind, Orbit, Scene};
+use crate::scene::{Camera, LightKind, Orbit, Scene};
+use crate::settings::Capability;
 use crate::tracer::{Needs, Tracer};
 
 /// Default frame rate, frames per second.
@@ -42,9 +47,10 @@ pub struct Frames<'r> {
     range: FrameRange,
     warm_up: u32,
     done: u32,
-    last_camera: CameraRecord,
+    last_camera: Camera,
     report: FramesReport,
     metadata: Vec<(&'static str, String)>,
+    laps: Laps,
 }
 
 /// A rendered frame.
@@ -63,23 +69,21 @@ impl Renderer {
     /// [`Error::Usage`] for settings that have no effect together or do not fit the scene; those of the device.
     pub fn frames(&mut self, settings: &RenderSettings, displays: bool, control: &mut dyn Control) -> Result<Frames<'_>> {
         settings.check()?;
+        let mut laps = Laps::after_open(self.open_seconds.wall);
         let timeline = &settings.frames;
-        let how = frame_settings(settings)?;
+        // before anything is looked at
+        frame_settings(settings)?;
         let shown = timeline.show.unwrap_or_default();
-        self.light(&settings.lighting)?;
+        let range = timeline.range();
+        let path = timeline.camera_path.as_deref().map(load_camera_path).transpose()?;
+        let first_of_path = path.as_ref().map(|path| path.camera_at(f64::from(range.first)));
+        let Completed { camera, settings, choices } = self.complete(settings, first_of_path)?;
+        let how = frame_settings(&settings)?;
         let scene = &self.scene;
         let mut warnings = scene_warnings(scene);
         warnings.iter().for_each(|w| control.warning(w));
 
-        let range = timeline.range();
         let size = settings.size(scene);
-        output::check_size(size[0], size[1])?;
-        let aspect = f64::from(size[0]) / f64::from(size[1]);
-        let path = timeline.camera_path.as_deref().map(load_camera_path).transpose()?;
-        let camera = match &path {
-            Some(path) => path.camera_at(f64::from(range.first)),
-            None => settings.camera.choose(scene, aspect)?,
-        };
         let fps = timeline.fps.or(path.as_ref().map(|p| p.fps())).unwrap_or(DEFAULT_FPS);
         let motion = match (path, timeline.orbit) {
             (Some(path), _) => CameraMotion::Path(path),
@@ -99,13 +103,15 @@ impl Renderer {
             control: &mut *control,
             warnings: &mut warnings,
         };
+        laps.lap("prepare");
         let tracer = request.build(&self.device, self.kind, &flat, self.compute, &self.settings)?;
+        laps.lap("build");
         let mut realtime = Realtime::new(&tracer, size, &how, &point_lights(scene, &flat))?;
         if displays {
             let display = Display { shown, exposure: EXPOSURE, unit: UNIT_OF_SCENE * scene_size(scene) as f32 };
             realtime.display(&tracer, Some(display))?;
         }
-        let setup = Setup::new(self, &tracer, &flat, camera_text(&camera), warnings);
+        let setup = Setup::new(self, &tracer, &flat, &camera, choices, warnings);
         let primary = realtime.settings().primary.unwrap_or_default();
         let preset = timeline.preset.unwrap_or_default();
         let metadata = vec![
@@ -113,7 +119,6 @@ impl Renderer {
             ("ao.radius", how.radius.to_string()),
             ("ao.normal", how.hemisphere.to_string()),
             ("budget", how.budget.to_string()),
-            ("camera", setup.camera.clone()),
             ("device", format!("{} ({})", setup.device, setup.driver)),
             ("history", how.history.to_string()),
             ("integrator", "ao".into()),
@@ -122,7 +127,7 @@ impl Renderer {
             ("primary", primary.to_string()),
             ("rays_per_pixel", how.rays_per_pixel.to_string()),
             ("resolution", how.resolution.to_string()),
-            ("scene", setup.scene.clone()),
+            ("scene", files::portable_name(&setup.scene)),
             ("seed", how.seed.to_string()),
             ("sequence", how.sequence.to_string()),
             ("technique", how.technique.to_string()),
@@ -137,13 +142,16 @@ impl Renderer {
             primary_reason: realtime.primary_reason().to_owned(),
             frames: Vec::new(),
             mean: 0.0,
+            brightness: None,
             seconds: Seconds::default(),
         };
         // pipelines that later calls reuse
         self.pipelines = self.device.live_pipelines();
+        laps.lap("prepare");
         Ok(Frames {
+            laps,
             device: &self.device,
-            last_camera: CameraRecord::new(&camera, flat.origin, aspect),
+            last_camera: camera,
             origin: flat.origin,
             sequence,
             tracer,
@@ -188,16 +196,20 @@ impl Frames<'_> {
         let kept = self.done >= self.warm_up;
         let start = Instant::now();
         let (camera, update) = self.sequence.frame(f64::from(number), &mut self.tracer)?;
-        self.last_camera = CameraRecord::new(&camera, self.origin, f64::from(self.size[0]) / f64::from(self.size[1]));
-        let stats = self.realtime.frame(&self.tracer, &self.last_camera, &update.moved)?;
+        self.last_camera = camera;
+        let stats = self.realtime.frame(&self.tracer, &self.camera_record(), &update.moved)?;
         self.tracer.traced(stats.tracing_seconds());
         let (seconds, update_seconds) = (start.elapsed().as_secs_f64(), update.mesh_seconds + update.top_seconds);
         self.report.frames.push(FrameReport { number, kept, seconds, update_seconds, stats });
         self.done += 1;
         if self.done == self.count() {
+            let start = Instant::now();
             self.report.mean = covered_mean(&self.realtime.result()?, &self.realtime.coverage()?);
+            self.report.brightness = brightness::warning(self.report.mean, &[Capability::AmbientOcclusion], 0.0);
+            self.report.setup.warnings.extend(self.report.brightness.clone());
             self.device.check_validation()?;
             self.device.save_pipeline_cache();
+            self.laps.add("film", start.elapsed().as_secs_f64());
         }
         Ok(Some(FrameOutput { number, kept }))
     }
@@ -209,10 +221,16 @@ impl Frames<'_> {
     pub fn image(&self, control: &mut dyn Control) -> Result<Image> {
         let f32s = |name: &str, samples| Channel { name: name.into(), samples: Samples::F32(samples) };
         let realtime = &self.realtime;
-        let mut channels =
-            vec![f32s("Y", realtime.result()?), f32s("A", realtime.coverage()?), f32s("samples", realtime.samples()?)];
+        let (coverage, samples) = (realtime.coverage()?, realtime.samples()?);
+        let counts = || samples.iter().zip(&coverage).filter(|(_, c)| **c > 0.0).map(|(n, _)| n.ceil() as u32);
+        let spp = match (counts().min(), counts().max()) {
+            (Some(least), Some(most @ 1..)) => spp_text(least, most),
+            // Larsen's pipeline counts none
+            _ => self.report.settings.rays_per_pixel.to_string(),
+        };
+        let mut channels = vec![f32s("Y", realtime.result()?), f32s("A", coverage), f32s("samples", samples)];
         if self.aov.iter().any(|a| *a != Aov::Bent) {
-            let pixels = aov::render(&self.tracer, &self.last_camera, self.size, control)?;
+            let pixels = aov::render(&self.tracer, &self.camera_record(), self.size, control)?;
             channels.extend(aov::channels(&self.aov, &pixels, self.origin));
         }
         if Aov::Bent.is_in(&self.aov) {
@@ -221,10 +239,30 @@ impl Frames<'_> {
             channels.extend(["bent.X", "bent.Y", "bent.Z"].iter().enumerate().map(|(k, name)| f32s(name, axis(k))));
         }
         let number = self.report.frames.last().map_or(self.range.first, |f| f.number);
-        let mut metadata: Vec<_> = self.metadata.iter().map(|(k, v)| ((*k).to_owned(), v.clone())).collect();
-        metadata.push(("frame".into(), number.to_string()));
+        let of_frame = [("camera", camera_text(&self.last_camera)), ("frame", number.to_string()), ("spp", spp)];
+        let entries =
+            self.metadata.iter().cloned().chain(of_frame).chain(camera_numbers::metadata(&self.last_camera, self.aspect()));
+        let mut metadata: Vec<_> = entries.map(|(k, v)| (k.to_owned(), v)).collect();
         metadata.sort();
         Ok(Image { width: self.size[0], height: self.size[1], channels, metadata })
+    }
+
+    /// Coverage of the last frame: 1 where a pixel's centre shows the scene, else 0; rows from the top.
+    ///
+    /// # Errors
+    /// Those of the device.
+    pub fn coverage(&self) -> Result<Vec<f32>> {
+        self.realtime.coverage()
+    }
+
+    /// Width over height.
+    fn aspect(&self) -> f64 {
+        f64::from(self.size[0]) / f64::from(self.size[1])
+    }
+
+    /// The camera of the last frame, as shaders read it.
+    fn camera_record(&self) -> CameraRecord {
+        CameraRecord::new(&self.last_camera, self.origin, self.aspect())
     }
 
     /// The last frame in device memory, 8-bit RGBA, rows from the top; `None` if it is not displayed.
@@ -234,7 +272,12 @@ impl Frames<'_> {
 
     /// The report of the frames.
     pub fn report(self) -> FramesReport {
-        self.report
+        let (mut report, mut laps) = (self.report, self.laps);
+        let sum = |kept: bool| report.frames.iter().filter(|f| f.kept == kept).map(|f| f.seconds).sum();
+        laps.add("warm-up", sum(false));
+        laps.add("frames", sum(true));
+        report.seconds.parts = laps.into_parts();
+        report
     }
 }
 

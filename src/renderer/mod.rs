@@ -20,14 +20,20 @@
 //! ```
 
 mod ambient;
+mod brightness;
+pub mod camera_numbers;
+mod complete;
+#[cfg(feature = "cli")]
+pub mod defaults;
 mod denoising;
 mod film_file;
 pub mod frames;
-mod framing;
 pub mod interactive;
+mod laps;
 pub mod report;
 pub mod settings;
 pub mod still;
+pub mod survey;
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -43,6 +49,7 @@ use crate::scene::{Environment, Scene, load};
 use crate::shaders::StreamShaders;
 use crate::tracer::{ComputeOptions, DeviceSettings, Needs, Tracer, TracerKind};
 
+pub use complete::Completed;
 pub use frames::{FrameOutput, Frames};
 pub use interactive::{Interactive, View};
 pub use report::{FramesReport, StillReport};
@@ -72,6 +79,8 @@ pub struct OpenSeconds {
     pub load: f64,
     /// Starting the device.
     pub device: f64,
+    /// Both, by the clock.
+    pub wall: f64,
 }
 
 /// A tracer, and the requirements that it was built for.
@@ -88,6 +97,8 @@ struct Lighting {
     /// Lengths of the scene's own lists before: lights, materials, meshes and instances.
     own: [usize; 4],
     environment: Option<Environment>,
+    /// It was chosen because the scene has none.
+    is_automatic: bool,
 }
 
 impl Renderer {
@@ -97,6 +108,7 @@ impl Renderer {
     /// Those of [`load::load`] and [`Device::open`].
     pub fn open(scene: &str, settings: &DeviceSettings) -> Result<Self> {
         let timed = |start: Instant| start.elapsed().as_secs_f64();
+        let open = Instant::now();
         let (loaded, opened, seconds) = std::thread::scope(|scope| {
             let device = scope.spawn(|| {
                 let start = Instant::now();
@@ -109,10 +121,10 @@ impl Renderer {
                 Ok(done) => done,
                 Err(panic) => std::panic::resume_unwind(panic),
             };
-            (loaded, opened, OpenSeconds { load, device })
+            (loaded, opened, OpenSeconds { load, device, wall: 0.0 })
         });
         let mut renderer = Self::new(opened?, loaded?, settings)?;
-        (renderer.name, renderer.open_seconds) = (scene.to_owned(), seconds);
+        (renderer.name, renderer.open_seconds) = (scene.to_owned(), OpenSeconds { wall: timed(open), ..seconds });
         Ok(renderer)
     }
 
@@ -190,6 +202,15 @@ impl Renderer {
         frames.image(control)
     }
 
+    /// Returns true if images of these settings show an environment, or a light infinitely far away, where no surface is: then they have no background of their own.
+    ///
+    /// # Errors
+    /// Those of lights and environments that cannot be read.
+    pub fn shows_environment(&mut self, settings: &RenderSettings) -> Result<bool> {
+        self.light(&settings.lighting)?;
+        Ok(settings.integrator().get().shows_environment(&self.scene))
+    }
+
     /// Keeps all live pipelines, and saves the driver's pipeline cache to disk.
     fn keep_pipelines(&mut self) {
         self.pipelines = self.device.live_pipelines();
@@ -216,7 +237,7 @@ impl Renderer {
         let own = [s.lights.len(), s.materials.len(), s.meshes.len(), s.instances.len()];
         let environment = Some(s.environment.clone());
         settings.apply(s)?;
-        self.lighting = Lighting { settings: settings.clone(), own, environment };
+        self.lighting = Lighting { settings: settings.clone(), own, environment, is_automatic: false };
         Ok(())
     }
 }

@@ -4,10 +4,10 @@ use std::collections::BTreeMap;
 
 use serde_json::{Map, Value, json};
 
-use super::Renderer;
 use super::denoising::DenoiseReport;
 use super::settings::FilmSettings;
-use super::still::spp_text;
+use super::still::{camera_text, spp_text};
+use super::{Renderer, camera_numbers};
 use crate::accel::flatten::FlatScene;
 use crate::film::accumulate::Accumulated;
 use crate::gpu::Timing;
@@ -15,17 +15,17 @@ use crate::integrators::IntegratorReport;
 use crate::measure::stats::{Summary, percentile};
 use crate::raster::Primary;
 use crate::realtime::{FrameStats, Preset, Settings};
-use crate::scene::RenderHints;
+use crate::scene::{Camera, RenderHints};
 use crate::tracer::{BuildStats, ComputeOptions, Kernel, Tracer, TracerKind};
 
-/// Seconds of each part of a run. Loading and starting the device overlap.
-#[derive(Clone, Copy, Debug, Default, serde::Serialize)]
+/// Seconds of a run. Those of its parts add up to the total; the others lie within them, and loading and starting the device overlap.
+#[derive(Clone, Debug, Default, serde::Serialize)]
 pub struct Seconds {
     /// Loading the scene.
     pub load: f64,
     /// Starting the device.
     pub device: f64,
-    /// Tracing, including shader compilation.
+    /// Tracing.
     pub trace: f64,
     /// Auxiliary outputs.
     pub aov: f64,
@@ -35,6 +35,23 @@ pub struct Seconds {
     pub write: f64,
     /// The whole run.
     pub total: f64,
+    /// The parts of the run, one after another.
+    #[serde(serialize_with = "as_map")]
+    pub parts: Vec<(&'static str, f64)>,
+}
+
+fn as_map<S: serde::Serializer>(parts: &[(&'static str, f64)], serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_map(parts.iter().copied())
+}
+
+impl Seconds {
+    /// Ends the run: `write` seconds of writing files were its last part, and `total` is the time of all. What no part accounts for is the part `other`.
+    pub fn finish(&mut self, write: f64, total: f64) {
+        (self.write, self.total) = (write, total);
+        self.parts.push(("write", write));
+        let named: f64 = self.parts.iter().map(|p| p.1).sum();
+        self.parts.push(("other", (total - named).max(0.0)));
+    }
 }
 
 /// The scene, device and tracer of an image.
@@ -50,6 +67,10 @@ pub struct Setup {
     pub degenerate_triangles: usize,
     /// The camera in words.
     pub camera: String,
+    /// What settings left open and the scene decided, a sentence each.
+    pub choices: Vec<String>,
+    /// The camera in numbers ([`camera_numbers::pose`]).
+    pub camera_pose: Value,
     /// Name of the device.
     pub device: String,
     /// Name of the driver.
@@ -71,14 +92,23 @@ pub struct Setup {
 }
 
 impl Setup {
-    pub(super) fn new(renderer: &Renderer, tracer: &Tracer, flat: &FlatScene, camera: String, warnings: Vec<String>) -> Self {
+    pub(super) fn new(
+        renderer: &Renderer,
+        tracer: &Tracer,
+        flat: &FlatScene,
+        camera: &Camera,
+        choices: Vec<String>,
+        warnings: Vec<String>,
+    ) -> Self {
         let (scene, info) = (flat.scene, &renderer.device.info);
         Self {
             scene: renderer.name.clone(),
             triangles: scene.triangle_count(),
             spheres: scene.sphere_count(),
             degenerate_triangles: scene.report.degenerate_triangles,
-            camera,
+            camera: camera_text(camera),
+            camera_pose: camera_numbers::pose(camera),
+            choices,
             device: info.name.clone(),
             driver: info.driver.clone(),
             tracer: renderer.kind,
@@ -98,6 +128,8 @@ impl Setup {
             "spheres": self.spheres,
             "degenerate_triangles": self.degenerate_triangles,
             "camera": self.camera,
+            "choices": self.choices,
+            "camera_pose": self.camera_pose,
             "device": self.device,
             "driver": self.driver,
             "tracer": self.tracer,
@@ -118,15 +150,13 @@ impl Setup {
         record.as_object().cloned().unwrap_or_default()
     }
 
-    fn seconds_line(&self, parts: &[(&str, f64)]) -> String {
-        let of = [
-            ("load", self.open.load),
-            ("device", self.open.device),
-            ("build", self.stats.build_seconds),
-            ("upload", self.stats.upload_seconds),
-        ];
-        let parts: Vec<_> = of.iter().chain(parts).map(|(name, s)| format!("{name} {s:.3}")).collect();
-        format!("seconds (load and device at the same time): {}", parts.join(", "))
+    /// The parts of the run that took half a millisecond or more.
+    fn seconds_line(&self, seconds: &Seconds) -> String {
+        let parts = seconds.parts.iter().filter(|p| p.1 >= 0.000_5).map(|&(name, s)| match name {
+            "open" => format!("open {s:.3} (load {:.3} while the device starts in {:.3})", self.open.load, self.open.device),
+            _ => format!("{name} {s:.3}"),
+        });
+        format!("{:.3} seconds: {}", seconds.total, parts.collect::<Vec<_>>().join(", "))
     }
 }
 
@@ -167,6 +197,15 @@ impl FilmReport {
     }
 }
 
+/// A standard error behind its value; nothing where there is no estimate, as with one sample per pixel.
+fn error_text(error: f64) -> String {
+    match error {
+        e if e >= 0.000_1 => format!(" +- {e:.5}"),
+        e if e > 0.0 => format!(" +- {e:.0e}"),
+        _ => String::new(),
+    }
+}
+
 /// The report of a still.
 #[derive(Clone, Debug)]
 pub struct StillReport {
@@ -192,6 +231,8 @@ pub struct StillReport {
     pub mean: f64,
     /// Standard error of the mean, from the variances of pixels.
     pub mean_standard_error: f64,
+    /// Mean of the pixels that show nothing but surfaces, luminance for colours; `None` if there are none.
+    pub surface_mean: Option<f64>,
     /// Report of the film.
     pub film: FilmReport,
     /// Options of the compute tracer, if it was used.
@@ -217,19 +258,20 @@ pub struct StillReport {
 impl StillReport {
     /// Lines for people. `outputs`: names of the image files; `explain`: add lines about skipped work.
     pub fn lines(&self, outputs: &str, explain: bool) -> Vec<String> {
-        let ([width, height], s) = (self.size, &self.seconds);
+        let [width, height] = self.size;
         let mut lines = vec![format!(
-            "{outputs}: {width}x{height}, {} spp, {}, tracer {} on {}; mean {} {:.5} +- {:.5}",
+            "{outputs}: {width}x{height}, {} spp, {}, tracer {} on {}; mean {} {:.5}{}",
             spp_text(self.spp, self.most_spp),
             self.integrator,
             self.setup.tracer,
             self.setup.device,
             self.quantity,
             self.mean,
-            self.mean_standard_error,
+            error_text(self.mean_standard_error),
         )];
+        lines.extend(self.setup.choices.iter().cloned());
         lines.extend(self.details.lines.iter().cloned());
-        lines.push(self.setup.seconds_line(&[("trace", s.trace), ("aov", s.aov), ("write", s.write), ("total", s.total)]));
+        lines.push(self.setup.seconds_line(&self.seconds));
         lines.extend(self.denoise.iter().map(|d| d.line.clone()));
         lines.extend(self.film.lines.iter().cloned());
         if self.stopped_early {
@@ -279,6 +321,7 @@ impl StillReport {
             "traversal": self.compute.map(|o| o.kernel),
             "triangle_test": self.compute.map(|o| o.triangle_test),
             "mean": self.mean,
+            "surface_mean": self.surface_mean,
             "mean_standard_error": self.mean_standard_error,
             "film": self.film.record,
             "device_seconds": passes,
@@ -330,6 +373,8 @@ pub struct FramesReport {
     pub frames: Vec<FrameReport>,
     /// Mean ambient visibility of the last frame, over covered pixels.
     pub mean: f64,
+    /// A warning about a last frame that is all but black or white; it is one of the warnings, too.
+    pub brightness: Option<String>,
     /// Seconds of each part of the run.
     pub seconds: Seconds,
 }
@@ -360,7 +405,7 @@ impl FramesReport {
     }
 
     /// Median and 95th percentile of the milliseconds per frame.
-    fn frame_ms(&self) -> (f64, f64) {
+    pub fn frame_ms(&self) -> (f64, f64) {
         let from = usize::from(self.frames.len() > 1);
         let ms: Vec<f64> = self.frames[from..].iter().map(|f| 1e3 * f.seconds).collect();
         (Summary::of(&ms).map_or(0.0, |s| s.median), percentile(&ms, 0.95).unwrap_or(0.0))
@@ -395,9 +440,10 @@ impl FramesReport {
                 skipped / all.max(1) as u64
             ),
         ];
+        lines.extend(self.setup.choices.iter().cloned());
         let passes: Vec<_> = self.passes().iter().map(|(l, m, p)| format!("{l} {m:.2} ({p:.2})")).collect();
         lines.push(format!("device ms by pass, median (95 %): {}", passes.join(", ")));
-        lines.push(self.setup.seconds_line(&[("write", self.seconds.write), ("total", self.seconds.total)]));
+        lines.push(self.setup.seconds_line(&self.seconds));
         if explain {
             lines.extend(self.explanations().into_iter().map(|l| format!("explain: {l}")));
         }

@@ -4,7 +4,10 @@ use glam::DVec3;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use super::framing;
+use super::interactive::view::quoted;
+use super::survey::Survey;
+use super::survey::framing::{self, ViewName};
+use crate::denoise::DenoiseChoice;
 use crate::error::{Error, Result};
 use crate::film::camera::{self, Choice};
 use crate::film::schedule::FilmOptions;
@@ -30,6 +33,8 @@ pub const DEFAULT_SIZE: [u32; 2] = [1280, 720];
 /// Vertical field of view of cameras given by --eye, degrees.
 pub const DEFAULT_FOV_Y: f64 = 45.0;
 
+/// Integrators whose images can be denoised.
+const DENOISED: AppliesTo = AppliesTo::stills_of(Capability::Denoising);
 /// Integrators to whose images tone mapping and exposure apply.
 const TONE_MAPPED: AppliesTo = AppliesTo::stills_of(Capability::ToneMapping);
 
@@ -38,9 +43,9 @@ settings! {
     "Image"
     pub struct ImageSettings {
         /// Samples per pixel [default: the scene's, or 16]
-        spp: Option<u32>, option(value_parser = clap::value_parser!(u32).range(1..=1 << 24)), applies(AppliesTo::STILLS);
+        spp: Option<u32>, option(value_parser = clap::value_parser!(u32).range(1..=1 << 24)), applies(AppliesTo::STILLS), basic;
         /// Image size in pixels [default: the scene's, or 1280x720]
-        size: Option<[u32; 2]>, option(value_name = "WxH", value_parser = parse_size), applies(AppliesTo::ALL);
+        size: Option<[u32; 2]>, option(value_name = "WxH", value_parser = parse_size), applies(AppliesTo::ALL), basic;
         /// Seed of the sampler [default: 0]
         seed: Option<u32>, option(value_name = "N"), applies(AppliesTo::ALL);
         /// Stop after this time and keep the image so far (at least one sample per pixel)
@@ -48,6 +53,11 @@ settings! {
             option(value_name = "SECONDS", value_parser = parse_time, allow_hyphen_values = true), applies(AppliesTo::STILLS);
         /// Pixel reconstruction filter, by importance sampling; frames in real time have the samples of `centre` [default: box]
         pixel_filter: Option<PixelFilter>, option(value_enum), applies(AppliesTo::STILLS);
+        /// Denoise the final image (biased) [default: off; without METHOD: auto]
+        ///
+        /// An .exr keeps the noisy image as noisy.Y, or noisy.R, noisy.G, noisy.B.
+        denoise: Option<DenoiseChoice>,
+            option(value_name = "METHOD", value_enum, num_args = 0..=1, require_equals = false, default_missing_value = "auto"), applies(DENOISED), basic;
         /// Auxiliary outputs to add to the .exr, separated by commas
         aov: Vec<Aov>, option(value_name = "LIST", value_enum, value_delimiter = ','), applies(AppliesTo::ALL);
     }
@@ -57,23 +67,30 @@ settings! {
     /// The camera.
     "Camera"
     pub struct CameraSettings {
-        /// Camera of the scene, by index or name [default: the first one, or one that sees the whole scene, or a room from inside]
-        camera: Option<String>, option(value_name = "INDEX|NAME", conflicts_with = "eye"), applies(AppliesTo::ALL);
+        /// Camera of the scene, by index or name [default: the first one, or one that shows most of the scene, or of a room from inside]
+        camera: Option<String>, option(value_name = "INDEX|NAME", conflicts_with = "eye"), applies(AppliesTo::ALL), basic;
+        /// Look at the whole scene from one side, or at a room from inside, whatever cameras the scene has
+        view: Option<ViewName>, option(value_enum, conflicts_with_all = ["eye", "camera"]), applies(AppliesTo::ALL), basic;
         /// Camera position
         eye: Option<DVec3>,
-            option(value_name = "X,Y,Z", value_parser = parse_vector, requires = "target", allow_hyphen_values = true), applies(AppliesTo::ALL);
+            option(value_name = "X,Y,Z", value_parser = parse_vector, requires = "target", allow_hyphen_values = true), applies(AppliesTo::ALL), basic;
         /// Point that the camera looks at
         target: Option<DVec3>,
-            option(value_name = "X,Y,Z", value_parser = parse_vector, requires = "eye", allow_hyphen_values = true), applies(AppliesTo::ALL);
+            option(value_name = "X,Y,Z", value_parser = parse_vector, requires = "eye", allow_hyphen_values = true), applies(AppliesTo::ALL), basic;
         /// Up vector [default: 0,1,0]
         up: Option<DVec3>,
             option(value_name = "X,Y,Z", value_parser = parse_vector, requires = "eye", allow_hyphen_values = true), applies(AppliesTo::ALL);
         /// Vertical field of view in degrees [default: the camera's, or 45]
-        fov_y: Option<f64>, option(value_name = "DEG", value_parser = parse_fov, allow_hyphen_values = true), applies(AppliesTo::ALL);
+        fov_y: Option<f64>, option(value_name = "DEG", value_parser = parse_fov, allow_hyphen_values = true), applies(AppliesTo::ALL), basic;
     }
 }
 
 impl CameraSettings {
+    /// Whether they say which camera: without, the scene's first one, or an automatic one.
+    pub fn chooses(&self) -> bool {
+        self.camera.is_some() || self.eye.is_some() || self.view.is_some()
+    }
+
     /// Checks conditions on more than one setting.
     ///
     /// # Errors
@@ -85,6 +102,10 @@ impl CameraSettings {
         if self.eye.is_some() && self.camera.is_some() {
             return Err(Error::Usage("--camera and --eye both choose the camera: leave one of them out".into()));
         }
+        if self.view.is_some() && (self.eye.is_some() || self.camera.is_some()) {
+            let other = if self.eye.is_some() { "--eye" } else { "--camera" };
+            return Err(Error::Usage(format!("--view and {other} both choose the camera: leave one of them out")));
+        }
         if self.eye.is_some() && self.eye == self.target {
             return Err(Error::Usage("--eye and --target are the same point: move one of them".into()));
         }
@@ -94,11 +115,20 @@ impl CameraSettings {
         Ok(())
     }
 
-    /// Chooses the camera for images of `aspect` = width / height.
+    /// Chooses the camera for images of `aspect` = width / height, by what it would see where the settings and the scene leave it open.
     ///
     /// # Errors
     /// [`Error::Usage`] for a camera that the scene does not have, [`Error::Scene`] if the scene has neither a camera nor geometry.
-    pub fn choose(&self, scene: &Scene, aspect: f64) -> Result<Camera> {
+    pub fn choose(&self, survey: &Survey, aspect: f64) -> Result<Camera> {
+        let scene = survey.scene();
+        let fov_y = self.fov_y.map(f64::to_radians);
+        let is_automatic = self.eye.is_none() && self.camera.is_none() && scene.cameras.is_empty();
+        if let Some(name) = self.view {
+            return framing::named(survey, name, aspect, fov_y);
+        }
+        if is_automatic {
+            return framing::of_scene(survey, aspect, fov_y);
+        }
         let choice = match (self.eye, self.target, &self.camera) {
             (Some(eye), Some(target), _) => Choice::LookAt {
                 eye,
@@ -109,13 +139,10 @@ impl CameraSettings {
             (_, _, Some(name)) => Choice::Named(name.clone()),
             _ => Choice::Auto,
         };
-        let mut camera = match choice {
-            Choice::Auto if scene.cameras.is_empty() => framing::of_scene(scene, aspect)?,
-            choice => camera::choose(scene, &choice, aspect)?,
-        };
-        if let Some(degrees) = self.fov_y {
+        let mut camera = camera::choose(scene, &choice, aspect)?;
+        if let Some(angle) = fov_y {
             match &mut camera.projection {
-                Projection::Perspective { fov_y } => *fov_y = degrees.to_radians(),
+                Projection::Perspective { fov_y } => *fov_y = angle,
                 Projection::Orthographic { .. } => {
                     return Err(Error::Usage("--fov-y: the camera is orthographic and has no field of view".into()));
                 }
@@ -130,7 +157,7 @@ settings! {
     "Pictures"
     pub struct PictureSettings {
         /// Tone mapping operator of .png outputs [default: linear]
-        tone_map: Option<ToneMap>, option(value_enum), applies(TONE_MAPPED);
+        tone_map: Option<ToneMap>, option(value_enum), applies(TONE_MAPPED), basic;
         /// Exposure of .png outputs, in stops [default: 0]
         exposure: Option<f64>, option(value_name = "EV", value_parser = parse_number, allow_hyphen_values = true), applies(TONE_MAPPED);
     }
@@ -167,6 +194,12 @@ impl FilmSettings {
     }
 }
 
+/// Lights as options of `skylit render`, quoted as a shell needs them.
+pub(super) fn light_options(lighting: &LightingSettings) -> String {
+    let flags = RenderSettings { lighting: lighting.clone(), ..Default::default() }.flags();
+    flags.iter().map(|flag| quoted(flag)).collect::<Vec<_>>().join(" ")
+}
+
 /// Values of an option of the command line, one for each time that it is given; `None` for an option without a value.
 fn flag_values(name: &str, value: &serde_json::Value) -> Vec<Option<String>> {
     use serde_json::Value;
@@ -188,7 +221,7 @@ fn flag_values(name: &str, value: &serde_json::Value) -> Vec<Option<String>> {
 #[cfg_attr(feature = "cli", derive(clap::Args))]
 pub struct RenderSettings {
     /// What to render [default: ao]
-    #[cfg_attr(feature = "cli", arg(long, value_name = "NAME", value_parser = crate::integrators::parser()))]
+    #[cfg_attr(feature = "cli", arg(long, value_name = "NAME", help_heading = "Image", value_parser = crate::integrators::parser()))]
     pub integrator: Option<IntegratorName>,
     /// The image.
     #[cfg_attr(feature = "cli", command(flatten))]
@@ -214,12 +247,16 @@ pub struct RenderSettings {
 }
 
 impl RenderSettings {
-    /// Reads a file of settings, as the viewer saves it.
+    /// Reads a file of settings: JSON, as the viewer saves it, or .toml.
     ///
     /// # Errors
     /// [`Error::Input`] for a file that cannot be read, or with a setting that does not exist.
     pub fn load(path: &Path) -> Result<Self> {
         let bytes = std::fs::read(path).map_err(|e| Error::read(path, &e))?;
+        #[cfg(feature = "cli")]
+        if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml")) {
+            return super::defaults::parse_settings(path, &String::from_utf8_lossy(&bytes));
+        }
         serde_json::from_slice(&bytes).map_err(|e| Error::input(path, format!("not a file of settings: {e}")))
     }
 
@@ -260,34 +297,58 @@ impl RenderSettings {
     /// # Errors
     /// Those of [`RenderSettings::load`].
     pub fn over_file(&self, path: Option<&Path>) -> Result<Self> {
-        path.map_or_else(|| Ok(self.clone()), |path| Self::load(path)?.overridden_by(self))
+        path.map_or_else(|| Ok(self.clone()), |path| Ok(Self::load(path)?.overridden_by(self)))
     }
 
     /// These settings, replaced by those that `other` gives.
-    ///
-    /// # Errors
-    /// None for settings that were checked each for itself.
-    pub fn overridden_by(&self, other: &Self) -> Result<Self> {
-        fn merge(into: &mut serde_json::Value, from: serde_json::Value) {
-            match (into, from) {
-                (serde_json::Value::Object(into), serde_json::Value::Object(from)) => {
-                    for (key, value) in from {
-                        merge(into.entry(key).or_insert(serde_json::Value::Null), value);
-                    }
-                }
-                (_, serde_json::Value::Null) => {}
-                (into, from) => *into = from,
-            }
+    pub fn overridden_by(&self, other: &Self) -> Self {
+        let mut out = self.without_replaced(other);
+        out.integrator = other.integrator.or(out.integrator);
+        out.image.override_with(&other.image);
+        out.camera.override_with(&other.camera);
+        out.integrators.ao.override_with(&other.integrators.ao);
+        out.integrators.path.override_with(&other.integrators.path);
+        out.lighting.override_with(&other.lighting);
+        out.picture.override_with(&other.picture);
+        out.film.override_with(&other.film);
+        out.frames.override_with(&other.frames);
+        out
+    }
+
+    /// These settings without those that `other` replaces by giving others: a camera, its motion and an environment are replaced as a whole.
+    pub(super) fn without_replaced(&self, other: &Self) -> Self {
+        let mut out = self.clone();
+        let (camera, motion) = (&other.camera, &other.frames);
+        if camera.chooses() {
+            out.camera = CameraSettings { fov_y: out.camera.fov_y, ..Default::default() };
         }
-        let mut base = self.clone();
-        if other.camera.camera.is_some() || other.camera.eye.is_some() {
-            // a camera replaces the other one as a whole
-            base.camera = CameraSettings { fov_y: base.camera.fov_y, ..Default::default() };
+        if camera.chooses() || camera.fov_y.is_some() {
+            out.frames.camera_path = None;
         }
-        let wrong = |e: serde_json::Error| Error::Usage(format!("settings cannot be put together: {e}"));
-        let mut merged = serde_json::to_value(&base).map_err(wrong)?;
-        merge(&mut merged, serde_json::to_value(other).map_err(wrong)?);
-        serde_json::from_value(merged).map_err(wrong)
+        if motion.camera_path.is_some() {
+            out.camera = CameraSettings::default();
+        }
+        if motion.camera_path.is_some() || motion.orbit.is_some() {
+            (out.frames.camera_path, out.frames.orbit) = (None, None);
+        }
+        if other.lighting.environment.is_some() {
+            (out.lighting.environment_turn, out.lighting.environment_scale) = (None, None);
+        }
+        out
+    }
+
+    /// Removes the settings whose names `keeps` returns false for; the integrator stays.
+    #[cfg(feature = "cli")]
+    pub(super) fn retain(&mut self, keeps: &dyn Fn(&str) -> bool) {
+        let keeps = |name: &str, _: AppliesTo| keeps(name);
+        self.image.retain(&keeps);
+        self.camera.retain(&keeps);
+        self.integrators.ao.retain(&keeps);
+        self.integrators.path.retain(&keeps);
+        self.lighting.retain(&keeps);
+        self.picture.retain(&keeps);
+        self.film.retain(&keeps);
+        self.frames.retain(&keeps);
     }
 
     /// The integrator.
@@ -423,7 +484,7 @@ mod tests {
     fn lines_of_words() {
         let of = |line: &str| RenderSettings::from_words(line).unwrap();
         let ao = of("ao --ao-radius 2 --spp 64");
-        assert_eq!((ao.integrator().name(), ao.integrators.ao.ao_radius, ao.image.spp), ("ao", Some(2.0), Some(64)));
+        assert_eq!((ao.integrator().name(), ao.integrators.ao.radius(), ao.image.spp), ("ao", 2.0, Some(64)));
         let frames = of("balanced --frames 8");
         assert_eq!(frames.frames.preset, Some(Preset::Balanced));
         let lit = of("path --light 'sun direction=0,-1,0 irradiance=2'");
@@ -466,7 +527,7 @@ mod tests {
         // a file, and options that replace what it says
         let words = |line: &str| line.split_whitespace().map(str::to_owned).collect::<Vec<_>>();
         let other = parse(&words("--camera 1 --spp 9 --integrator direct"));
-        let merged = settings.overridden_by(&other).unwrap();
+        let merged = settings.overridden_by(&other);
         let expected = RenderSettings {
             integrator: other.integrator,
             image: ImageSettings { spp: Some(9), ..settings.image.clone() },
@@ -474,6 +535,6 @@ mod tests {
             ..settings.clone()
         };
         assert_eq!(merged, expected);
-        assert_eq!(settings.overridden_by(&RenderSettings::default()).unwrap(), settings);
+        assert_eq!(settings.overridden_by(&RenderSettings::default()), settings);
     }
 }

@@ -6,20 +6,24 @@ use std::time::Instant;
 
 use glam::DVec3;
 
+use super::brightness;
+use super::complete::Completed;
 use super::denoising::{self, Denoising};
 use super::film_file::{self, Identity, Maker};
+use super::laps::Laps;
 use super::report::{FilmReport, Seconds, Setup, StillReport};
-use super::{RenderSettings, Renderer, TracerRequest};
+use super::{RenderSettings, Renderer, TracerRequest, camera_numbers};
 use crate::accel::flatten::FlatScene;
 use crate::denoise;
 use crate::error::{Error, Result};
+use crate::files;
 use crate::film::Control;
 use crate::film::accumulate::Accumulated;
 use crate::film::schedule::FilmOptions;
 use crate::film::tile_mask::TileMask;
 use crate::integrators::aov::{self, Aov, AovPixel};
 use crate::integrators::{Integrator, PictureOptions, RenderJob};
-use crate::output::{self, Channel, Image, ImageFormat, Samples, png};
+use crate::output::{self, Channel, FileSettings, Image, ImageFormat, Picture, Samples, picture};
 use crate::ray::Ray;
 use crate::scene::{Camera, Motion, Projection, RenderHints, fingerprint};
 use crate::tracer::Needs;
@@ -31,6 +35,8 @@ pub struct StillExtras {
     pub keep_rays: bool,
     /// Render auxiliary outputs even if settings name none, for a depth image.
     pub aov: bool,
+    /// Make intermediate images at every power of two of samples even if settings do not select them, for viewers.
+    pub intermediate: bool,
 }
 
 /// A finished still image.
@@ -51,15 +57,24 @@ impl Still {
     /// Writes the image in the format of the file name's extension.
     ///
     /// # Errors
-    /// [`Error::Usage`] for an unknown format, [`Error::Output`].
+    /// Those of [`Still::save_with`].
     pub fn save(&self, path: &Path) -> Result<()> {
-        save(&self.image, self.integrator, &self.picture, path)
+        self.save_with(path, &FileSettings::default())
+    }
+
+    /// As [`Still::save`], with settings of the file; those of other formats are ignored.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for an unknown format, or one that cannot have what the settings say; [`Error::Output`].
+    pub fn save_with(&self, path: &Path, files: &FileSettings) -> Result<()> {
+        save(&self.image, self.integrator, &self.picture, files, path)
     }
 }
 
 /// An image of a render that is still running ([`Renderer::still_with`]).
 pub struct IntermediateImage<'a> {
-    image: &'a Image,
+    /// All channels and the metadata.
+    pub image: &'a Image,
     /// Maximum number of samples of a pixel.
     pub samples: u32,
     integrator: &'static dyn Integrator,
@@ -67,20 +82,31 @@ pub struct IntermediateImage<'a> {
 }
 
 impl IntermediateImage<'_> {
-    /// Writes the image as [`Still::save`] does.
+    /// Writes the image as [`Still::save_with`] does.
     ///
     /// # Errors
-    /// Those of [`Still::save`].
-    pub fn save(&self, path: &Path) -> Result<()> {
-        save(self.image, self.integrator, &self.picture, path)
+    /// Those of [`Still::save_with`].
+    pub fn save_with(&self, path: &Path, files: &FileSettings) -> Result<()> {
+        save(self.image, self.integrator, &self.picture, files, path)
     }
 }
 
-fn save(image: &Image, integrator: &dyn Integrator, picture: &PictureOptions, path: &Path) -> Result<()> {
-    match ImageFormat::of(path)? {
-        ImageFormat::Png => png::write(&integrator.picture(image, picture), path, 0.0),
-        ImageFormat::Exr => output::save(image, path),
+fn save(image: &Image, integrator: &dyn Integrator, options: &PictureOptions, files: &FileSettings, path: &Path) -> Result<()> {
+    let format = ImageFormat::of(path)?;
+    if format == ImageFormat::Exr {
+        return output::exr::write_with(image, path, &files.into());
     }
+    let mut shown = match files.background {
+        // the scene on black, as it is in the image
+        None => integrator.picture(image, options),
+        // the scene alone: what a display shows of a colour is not in proportion to it, so that alpha comes afterwards
+        Some(_) => integrator.picture(&picture::unassociated(image), options),
+    };
+    let alpha = image.channels.iter().find(|c| c.name == "A").filter(|_| shown.f32("A").is_none());
+    shown.channels.extend(alpha.cloned());
+    let of_png = FileSettings { background: files.background, ..FileSettings::default() };
+    let settings = if format == ImageFormat::Png { files } else { &of_png };
+    Picture::new(&shown, files.background, settings, path)?.save(path, files.jpeg_quality())
 }
 
 impl Renderer {
@@ -110,13 +136,12 @@ impl Renderer {
                 frames.option()
             )));
         }
-        let start = Instant::now();
-        let denoiser = denoising::choose(settings.integrators.path.denoise)?;
-        self.light(&settings.lighting)?;
+        let (start, mut laps) = (Instant::now(), Laps::after_open(self.open_seconds.wall));
+        let denoiser = denoising::choose(settings.image.denoise)?;
+        let Completed { camera, settings, choices } = self.complete(settings, None)?;
+        let settings = &settings;
         let integrator = settings.integrator().get();
         let size = settings.size(&self.scene);
-        output::check_size(size[0], size[1])?;
-        let camera = settings.camera.choose(&self.scene, f64::from(size[0]) / f64::from(size[1]))?;
         let (device, kind, compute) = (self.device.clone(), self.kind, self.compute);
         let ready = self.tracer.take();
         let scene = &self.scene;
@@ -141,16 +166,20 @@ impl Renderer {
         job.film = FilmOptions {
             start: resumed.map(|r| r.state.into()),
             keep_state: settings.film.keeps_state(),
-            intervals: intervals(settings, &scene.hints, job.spp),
+            intervals: stops(settings, extras, &scene.hints, job.spp),
             target_rmse: settings.film.target_rmse,
         };
         let flat = FlatScene::with_motion_and_blend(scene, Motion::default(), integrator.blend())?;
         let wanted = &settings.image.aov;
         let needs = aov_needs(integrator.needs(&settings.integrators), wanted);
+        // the normals that tell surfaces apart
+        let needs = Needs { normals: needs.normals || denoiser.is_some(), ..needs };
         let rays = integrator.rays_per_sample() * u64::from(job.spp) * u64::from(size[0]) * u64::from(size[1]);
         let streams = integrator.streams(&settings.integrators);
         let request = TracerRequest { needs, streams, rays, control: &mut *control, warnings: &mut warnings };
+        laps.lap("prepare");
         let ready = request.reuse_or_build(ready, &device, kind, &flat, compute, &self.settings)?;
+        laps.lap("build");
         let tracer = &ready.tracer;
         let record = job.camera_record(&flat);
         let tile_mask = match integrator.skips_empty_tiles(&job) {
@@ -158,6 +187,7 @@ impl Renderer {
             false => None,
         };
 
+        laps.lap("prepare");
         // first, because intermediate images contain them, too
         let aov_start = Instant::now();
         let pixels = match wanted.is_empty() && !extras.aov {
@@ -165,13 +195,14 @@ impl Renderer {
             false => aov::render(tracer, &record, size, control)?,
         };
         let aov_seconds = aov_start.elapsed().as_secs_f64();
-        let path_options = integrator.path_options(&job)?;
-        let denoising = denoiser
-            .as_ref()
-            .zip(path_options.as_ref())
-            .map(|(chosen, options)| Denoising::new(chosen, denoise::DenoiseInput { tracer, scene, camera: &record, options }));
+        laps.lap("aov");
+        let denoise_options = integrator.denoise_options(&job)?;
+        let denoising = denoiser.as_ref().zip(denoise_options.as_ref()).map(|(chosen, options)| {
+            Denoising::new(chosen, denoise::DenoiseInput { tracer, scene, camera: &record, options }, integrator.channels())
+        });
         let composer = Composer {
-            name: &self.name,
+            name: files::portable_name(&self.name),
+            camera: &camera,
             integrator,
             size,
             pixels: &pixels,
@@ -192,20 +223,25 @@ impl Renderer {
         };
         let rendered = integrator.render(tracer, &flat, &job, tile_mask, &mut interval_control)?;
         device.check_validation()?;
+        laps.lap("trace");
         let image = composer.image(&rendered.image, control)?;
+        laps.lap(if denoising.is_some() { "denoise" } else { "film" });
         device.check_validation()?;
         let mut rays = rendered.kept_rays;
         for rays in &mut rays {
             // to world space, as exported meshes are
             crate::ray::translate(rays, flat.origin);
         }
-        for warning in &rendered.report.warnings {
+        let surface_mean = brightness::of_surfaces(&rendered.image, integrator.channels().len());
+        let brightness =
+            surface_mean.and_then(|mean| brightness::warning(mean, integrator.capabilities(), f64::from(picture.exposure)));
+        for warning in rendered.report.warnings.iter().chain(&brightness) {
             control.warning(warning);
             warnings.push(warning.clone());
         }
         let (mean, mean_standard_error) = rendered.image.film.mean_and_error();
-        let report = StillReport {
-            setup: Setup::new(self, tracer, &flat, camera_text(&camera), warnings),
+        let mut report = StillReport {
+            setup: Setup::new(self, tracer, &flat, &camera, choices, warnings),
             integrator: integrator.name(),
             quantity: integrator.quantity(),
             size,
@@ -216,6 +252,7 @@ impl Renderer {
             stopped_early: rendered.image.stopped_early,
             mean,
             mean_standard_error,
+            surface_mean,
             film: FilmReport::new(&settings.film, &scene.hints, &rendered.image, samples_before, job.spp),
             compute: tracer.compute_options(),
             coherent_kernel: tracer.compute_options().map(|o| o.kernel.for_coherent(&device.info)),
@@ -235,6 +272,8 @@ impl Renderer {
         drop(denoising);
         self.tracer = Some(ready);
         self.keep_pipelines();
+        laps.lap("film");
+        report.seconds.parts = laps.into_parts();
         Ok(Still { image, aov: pixels, rays, report, integrator, picture })
     }
 }
@@ -277,13 +316,29 @@ fn identity(integrator: &dyn Integrator, job: &RenderJob, print: Option<String>)
 /// Numbers of samples at which intermediate images are saved: powers of two, and those that the scene names.
 pub fn intervals(settings: &RenderSettings, hints: &RenderHints, spp: u32) -> Vec<u32> {
     let mut intervals: Vec<u32> = match settings.film.intervals {
-        true => (0..u32::BITS).map(|k| 1 << k).chain(hints.save_intervals.iter().copied()).collect(),
+        true => powers_of_two(spp).chain(hints.save_intervals.iter().copied()).collect(),
         false => Vec::new(),
     };
     intervals.retain(|&n| n > 0 && n < spp);
     intervals.sort_unstable();
     intervals.dedup();
     intervals
+}
+
+/// Numbers of samples at which intermediate images are made: to be saved, and for viewers.
+fn stops(settings: &RenderSettings, extras: StillExtras, hints: &RenderHints, spp: u32) -> Vec<u32> {
+    let mut stops = intervals(settings, hints, spp);
+    if extras.intermediate {
+        stops.extend(powers_of_two(spp));
+        stops.sort_unstable();
+        stops.dedup();
+    }
+    stops
+}
+
+/// Powers of two below `spp`.
+fn powers_of_two(spp: u32) -> impl Iterator<Item = u32> {
+    (0..u32::BITS).map(|k| 1 << k).take_while(move |n| *n < spp)
 }
 
 /// Text of a range of samples per pixel.
@@ -293,7 +348,8 @@ pub(super) fn spp_text(least: u32, most: u32) -> String {
 
 /// Composes images from films.
 struct Composer<'a> {
-    name: &'a str,
+    name: String,
+    camera: &'a Camera,
     integrator: &'static dyn Integrator,
     size: [u32; 2],
     pixels: &'a [AovPixel],
@@ -327,14 +383,17 @@ impl Composer<'_> {
             let name = if names.len() == 1 { "variance".into() } else { format!("variance.{name}") };
             out.push(f32s(name, film.variance_plane(c)));
         }
-        out.push(Channel { name: "samples".into(), samples: Samples::U32(film.samples.clone()) });
+        // exact: there are at most 2^24; floats, because frames in real time have fractions of samples
+        out.push(f32s("samples".into(), film.samples.iter().map(|n| *n as f32).collect()));
         out.extend(image.state.iter().flat_map(|s| film_file::state_channels(s, names)));
         out
     }
 
     /// Text attributes. They are identical for two runs of the same command.
     fn metadata(&self, image: &Accumulated) -> Vec<(String, String)> {
-        let mut out = vec![("scene", self.name.to_owned()), ("spp", spp_text(image.spp, image.max_spp))];
+        let mut out = vec![("scene", self.name.clone()), ("spp", spp_text(image.spp, image.max_spp))];
+        let aspect = f64::from(self.size[0]) / f64::from(self.size[1]);
+        out.extend(camera_numbers::metadata(self.camera, aspect));
         out.extend(self.maker.iter().cloned());
         out.extend(self.identity.iter().filter_map(|(key, value)| Some((*key, value.clone()?))));
         if let Some(target) = self.target_rmse {

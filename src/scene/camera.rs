@@ -65,6 +65,42 @@ impl Camera {
         // a margin of 5%
         Self::look_at(centre + direction * (distance * 1.05), centre, DVec3::Y, fov_y)
     }
+
+    /// A perspective camera that looks against `from` (a direction, from the scene to the camera) and sees all of these spheres (centres and radii; 0 for points) as large as
+    /// fits, with a margin of 5 %. `fov_y` in radians, `aspect` is width over height. `None` without spheres.
+    pub fn enclosing(spheres: &[(DVec3, f64)], from: DVec3, up: DVec3, fov_y: f64, aspect: f64) -> Option<Self> {
+        let basis = Self::look_at(from, DVec3::ZERO, up, fov_y).camera_to_world.matrix3;
+        let (right, up, back) = (basis.x_axis, basis.y_axis, basis.z_axis);
+        let tan_y = (fov_y * 0.5).tan() / 1.05;
+        let tans = [tan_y * aspect, tan_y];
+        let slants = tans.map(|t| (1.0 + t * t).sqrt());
+        // Seen by a camera at (x, y, z) of its own axes, a point p lies within the planes at the right and left if +-(p.x - x) <= tan (z - p.z). So
+        // tan z +- x is no less than the greatest tan p.z +- p.x of all points; the same holds above and below. A sphere of radius r adds r / cos.
+        let (mut most, mut nearest) = ([[f64::NEG_INFINITY; 2]; 2], f64::NEG_INFINITY);
+        for &(centre, radius) in spheres {
+            let (along, z) = ([centre.dot(right), centre.dot(up)], centre.dot(back));
+            nearest = nearest.max(z + radius);
+            for axis in 0..2 {
+                let reach = tans[axis] * z + radius * slants[axis];
+                most[axis] = [most[axis][0].max(reach + along[axis]), most[axis][1].max(reach - along[axis])];
+            }
+        }
+        if !nearest.is_finite() {
+            return None;
+        }
+        let distance = |axis: usize| (most[axis][0] + most[axis][1]) / (2.0 * tans[axis]);
+        // not within what it looks at
+        let size = distance(0).max(distance(1)) - nearest;
+        let z = distance(0).max(distance(1)).max(nearest + (1e-3 * size).max(1e-6 * nearest.abs()).max(1e-30));
+        let middle = |axis: usize| 0.5 * (most[axis][0] - most[axis][1]);
+        let eye = right * middle(0) + up * middle(1) + back * z;
+        Some(Self {
+            name: String::new(),
+            camera_to_world: DAffine3::from_mat3_translation(basis, eye),
+            projection: Projection::Perspective { fov_y },
+            aspect: None,
+        })
+    }
 }
 
 /// Position and orientation of `to_world` without its scale, shear and mirroring. Keeps -z and as much of +y as it can.
@@ -77,6 +113,38 @@ pub(in crate::scene) fn rigid(to_world: &DAffine3) -> DAffine3 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn enclosing_touches_what_it_holds() {
+        let mut points: Vec<(DVec3, f64)> = (0..200)
+            .map(|k| (DVec3::new((k as f64).sin() * 3.0, (1.7 * k as f64).cos(), (0.3 * k as f64).sin() + 20.0), 0.0))
+            .collect();
+        points.push((DVec3::new(4.0, 0.5, 20.0), 0.75));
+        for (aspect, from) in [(0.3, DVec3::new(0.35, 0.3, 1.0)), (1.0, DVec3::Y), (2.5, DVec3::new(-1.0, 0.2, 0.0))] {
+            let fov_y = 0.8f64;
+            let camera = Camera::enclosing(&points, from, DVec3::Y, fov_y, aspect).unwrap();
+            let world_to_camera = camera.camera_to_world.inverse();
+            let tan = (fov_y / 2.0).tan();
+            // how far out the outermost point of each sphere lies on each side, 1 at the border of the image
+            let mut sides = [f64::NEG_INFINITY; 4];
+            for (centre, radius) in &points {
+                let p = world_to_camera.transform_point3(*centre);
+                for (side, value, tan) in [(0, p.x, tan * aspect), (1, -p.x, tan * aspect), (2, p.y, tan), (3, -p.y, tan)] {
+                    // the sphere's distance from the plane through the eye at this side
+                    let angle = value.atan2(-p.z) + (radius / (value.hypot(p.z))).asin();
+                    sides[side] = sides[side].max(angle.tan() / tan);
+                }
+            }
+            let most = sides.into_iter().fold(0.0, f64::max);
+            assert!((0.94..=0.9525).contains(&most), "{aspect}: {sides:?}");
+            // in the middle along both axes
+            assert!((sides[0] - sides[1]).abs() < 0.08 && (sides[2] - sides[3]).abs() < 0.08, "{aspect}: {sides:?}");
+        }
+        assert!(Camera::enclosing(&[], DVec3::Z, DVec3::Y, 1.0, 1.0).is_none());
+        // one point is before the camera
+        let camera = Camera::enclosing(&[(DVec3::ONE, 0.0)], DVec3::Z, DVec3::Y, 1.0, 1.0).unwrap();
+        assert!(camera.camera_to_world.translation.z > 1.0);
+    }
 
     #[test]
     fn framing_holds_every_corner_and_wastes_little() {

@@ -10,6 +10,7 @@ pub mod camera;
 pub mod camera_path;
 pub mod export;
 pub mod fingerprint;
+pub mod inventory;
 pub mod light;
 pub mod light_spec;
 pub mod load;
@@ -51,6 +52,8 @@ pub struct LoadReport {
     pub warnings: Vec<String>,
     /// Files that it was read from: models, materials, buffers and images, also those that could not be read.
     pub files: Vec<PathBuf>,
+    /// Extensions that a glTF file names.
+    pub extensions: Vec<FileExtension>,
     /// Images that were not decoded because [`load::LoadOptions::textures`] said so.
     pub skipped_images: usize,
     /// Triangles dropped because two of their corners coincide or their area is zero.
@@ -59,6 +62,17 @@ pub struct LoadReport {
     pub normals_computed: usize,
     /// Meshes whose tangents were computed (MikkTSpace) because a normal map needs them and the file had none.
     pub tangents_computed: usize,
+}
+
+/// An extension that a glTF file names.
+#[derive(Clone, Debug, PartialEq, Eq, serde::Serialize)]
+pub struct FileExtension {
+    /// Name, such as `KHR_materials_sheen`.
+    pub name: String,
+    /// The file cannot be read without it.
+    pub required: bool,
+    /// It is ignored.
+    pub ignored: bool,
 }
 
 /// Render settings in a scene file (`.brhan` has them); options on the command line override them.
@@ -124,6 +138,15 @@ impl Scene {
 
     fn count(&self, f: impl Fn(&Geometry) -> usize) -> u64 {
         self.instances.iter().map(|i| f(&self.meshes[i.mesh].geometry) as u64).sum()
+    }
+
+    /// Whether nothing in it emits light: it has no environment, no lights, and no surface that emits or shows its colour unlit.
+    pub fn is_dark(&self) -> bool {
+        let shines = |i: &Instance| {
+            let material = &self.materials[self.meshes[i.mesh].material];
+            material.unlit || material.emissive.max_element() > 0.0
+        };
+        self.environment == Environment::Black && self.lights.is_empty() && !self.instances.iter().any(shines)
     }
 
     /// World-space bounds `(min, max)` over all instances, or `None` for an empty scene.

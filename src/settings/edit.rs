@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use glam::DVec3;
 
-use super::AppliesTo;
+use super::{AppliesTo, Length};
 
 /// A setting and its current value.
 pub struct Setting<'a> {
@@ -26,6 +26,8 @@ pub enum Value<'a> {
     Count(&'a mut Option<u32>),
     /// A number.
     Number(&'a mut Option<f64>),
+    /// A length of the scene.
+    Length(&'a mut Option<Length>),
     /// One of several named values.
     Choice(&'a mut dyn ChoiceValue),
     /// A value that has an editor of its own, or none.
@@ -39,6 +41,7 @@ impl Setting<'_> {
             Value::Flag(flag) => **flag,
             Value::Count(count) => count.is_some(),
             Value::Number(number) => number.is_some(),
+            Value::Length(length) => length.is_some(),
             Value::Choice(choice) => choice.selected().is_some(),
             Value::Other => false,
         }
@@ -50,6 +53,7 @@ impl Setting<'_> {
             Value::Flag(flag) => **flag = false,
             Value::Count(count) => **count = None,
             Value::Number(number) => **number = None,
+            Value::Length(length) => **length = None,
             Value::Choice(choice) => choice.select(None),
             Value::Other => {}
         }
@@ -115,6 +119,12 @@ impl Editable for Option<u32> {
 impl Editable for Option<f64> {
     fn value(&mut self) -> Value<'_> {
         Value::Number(self)
+    }
+}
+
+impl Editable for Option<Length> {
+    fn value(&mut self) -> Value<'_> {
+        Value::Length(self)
     }
 }
 
@@ -195,6 +205,10 @@ mod tests {
         }
         assert_eq!(some, Some { colour: Option::Some(Colour::Green), many: Option::Some(3), on: true, name: None });
         assert_eq!(some.given().len(), 3);
+        let mut one = Some::default();
+        one.override_with(&some);
+        one.retain(&|name, _| name == "on");
+        assert_eq!(one, Some { on: true, ..Default::default() });
         some.editable().iter_mut().for_each(Setting::clear);
         assert_eq!(some, Some::default());
     }

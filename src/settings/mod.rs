@@ -4,9 +4,11 @@
 //! [`check`] rejects settings without effect. So an integrator names its capabilities, and no setting names an integrator.
 
 mod edit;
+mod length;
 pub mod parse;
 
 pub use edit::{Choice, ChoiceValue, Editable, Setting, Value};
+pub use length::Length;
 
 use crate::error::{Error, Result};
 
@@ -35,6 +37,8 @@ pub enum Capability {
     CameraModel,
     /// Its images are tone mapped.
     ToneMapping,
+    /// Its images can be denoised.
+    Denoising,
 }
 
 /// An integrator as settings see it: its name and its capabilities.
@@ -79,6 +83,45 @@ impl AppliesTo {
         self.capability.is_none_or(|c| integrator.1.contains(&c))
     }
 }
+
+/// Who needs a setting, and so which help lists it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Level {
+    /// Most people need it: `-h` lists it, too.
+    Basic,
+    /// Some people need it: from `--help` on.
+    Advanced,
+    /// It is for research and for comparisons: `--help-all` alone lists it.
+    Research,
+}
+
+impl Level {
+    /// Returns true if `-h` does not list it.
+    pub const fn is_hidden_from_short_help(self) -> bool {
+        !matches!(self, Self::Basic)
+    }
+
+    /// Returns true if `--help` does not list it.
+    pub const fn is_hidden_from_long_help(self) -> bool {
+        matches!(self, Self::Research)
+    }
+}
+
+/// The level that [`settings!`] names: advanced where it names none.
+#[cfg(feature = "cli")]
+macro_rules! level {
+    () => {
+        crate::settings::Level::Advanced
+    };
+    (basic) => {
+        crate::settings::Level::Basic
+    };
+    (research) => {
+        crate::settings::Level::Research
+    };
+}
+#[cfg(feature = "cli")]
+pub(crate) use level;
 
 /// A setting that the user has given.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -137,7 +180,8 @@ pub fn check(given: &[GivenSetting], integrator: &Integrator, all: &[Integrator]
     Ok(())
 }
 
-/// Declares settings: `name: type, option(arguments of clap), applies(AppliesTo);`, each with its documentation, which is its help text.
+/// Declares settings: `name: type, option(arguments of clap), applies(AppliesTo), level;`, each with its documentation, which is its help text. The level is `basic`
+/// or `research`, or left out ([`Level`]).
 ///
 /// A setting is an `Option`, a `bool` or a `Vec`; the default value means that it was not given.
 macro_rules! settings {
@@ -147,7 +191,7 @@ macro_rules! settings {
         $vis:vis struct $name:ident {
             $(
                 $(#[doc = $doc:literal])+
-                $field:ident: $type:ty, option($($option:tt)*), applies($applies:expr);
+                $field:ident: $type:ty, option($($option:tt)*), applies($applies:expr) $(, $level:ident)?;
             )*
         }
     ) => {
@@ -160,7 +204,12 @@ macro_rules! settings {
             $(
                 $(#[doc = $doc])+
                 #[serde(skip_serializing_if = "crate::settings::is_default")]
-                #[cfg_attr(feature = "cli", arg(long, $($option)*))]
+                #[cfg_attr(feature = "cli", arg(
+                    long,
+                    hide_short_help = crate::settings::level!($($level)?).is_hidden_from_short_help(),
+                    hide_long_help = crate::settings::level!($($level)?).is_hidden_from_long_help(),
+                    $($option)*
+                ))]
                 pub $field: $type,
             )*
         }
@@ -175,6 +224,24 @@ macro_rules! settings {
                     }
                 )*
                 out
+            }
+
+            /// Removes the settings that `keeps` returns false for, so that their defaults hold.
+            pub fn retain(&mut self, keeps: &dyn Fn(&str, $crate::settings::AppliesTo) -> bool) {
+                $(
+                    if !keeps(stringify!($field), $applies) {
+                        self.$field = Default::default();
+                    }
+                )*
+            }
+
+            /// Takes the settings that `other` gives.
+            pub fn override_with(&mut self, other: &Self) {
+                $(
+                    if !$crate::settings::is_default(&other.$field) {
+                        self.$field = other.$field.clone();
+                    }
+                )*
             }
 
             /// All settings, for editors.
@@ -282,7 +349,7 @@ mod tests {
             /// First.
             max_depth: Option<u32>, option(value_name = "N"), applies(AppliesTo::stills_of(Capability::PathLength));
             /// Second.
-            fps: Option<f64>, option(value_name = "N"), applies(AppliesTo::FRAMES);
+            fps: Option<f64>, option(value_name = "N"), applies(AppliesTo::FRAMES), research;
         }
     }
 
@@ -308,5 +375,14 @@ mod tests {
         assert_eq!(text, r#"{"max_depth":3}"#);
         assert_eq!(serde_json::from_str::<Some>(&text).unwrap(), some);
         assert!(serde_json::from_str::<Some>(r#"{"max_deptth":3}"#).is_err());
+    }
+
+    #[test]
+    fn settings_are_merged_and_removed_by_name() {
+        let mut some = Some { max_depth: Option::Some(3), fps: Option::Some(24.0) };
+        some.override_with(&Some { max_depth: None, fps: Option::Some(f64::INFINITY) });
+        assert_eq!(some, Some { max_depth: Option::Some(3), fps: Option::Some(f64::INFINITY) });
+        some.retain(&|name, applies| name == "fps" && applies == AppliesTo::FRAMES);
+        assert_eq!(some, Some { max_depth: None, fps: Option::Some(f64::INFINITY) });
     }
 }

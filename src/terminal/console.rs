@@ -3,6 +3,7 @@
 use std::borrow::Cow;
 use std::io::{self, Write};
 
+use clap::builder::Resettable;
 use serde::Serialize;
 
 use crate::error::{Error, Result};
@@ -26,10 +27,10 @@ impl From<Error> for Failure {
 #[derive(Clone, Copy, Debug, clap::Args)]
 pub struct Verbosity {
     /// Print one JSON record on stdout instead of text
-    #[arg(long)]
+    #[arg(long, help_heading = Resettable::Reset)]
     pub json: bool,
     /// Print nothing but errors
-    #[arg(long, short)]
+    #[arg(long, short, help_heading = Resettable::Reset)]
     pub quiet: bool,
 }
 
@@ -81,6 +82,13 @@ impl Console {
         }
     }
 
+    /// Prints a remark to stderr, also in JSON mode, whose record on stdout it does not touch.
+    pub fn note(&self, text: &str) {
+        if !self.quiet {
+            note(text);
+        }
+    }
+
     /// Prints a warning to stderr. In JSON mode warnings are part of the record instead.
     pub fn warning(&self, text: &str) {
         if !self.json && !self.quiet {
@@ -104,6 +112,11 @@ pub fn command_line() -> String {
 /// Prints the error that ends a failed run.
 pub fn error(text: &str) {
     stderr(&format!("skylit: error: {text}"));
+}
+
+/// Prints a remark to stderr.
+pub fn note(text: &str) {
+    stderr(&format!("skylit: {text}"));
 }
 
 fn stderr(line: &str) {

@@ -68,16 +68,16 @@ settings! {
         /// How rays are traced [default: auto]
         tracer: Option<TracerChoice>, option(value_enum), applies(AppliesTo::ALL);
         /// Traversal kernel of the compute tracer [default: auto]
-        traversal: Option<Kernel>, option(value_enum), applies(AppliesTo::ALL);
+        traversal: Option<Kernel>, option(value_enum), applies(AppliesTo::ALL), research;
         /// Ray-triangle intersection test of the compute tracer [default: watertight]
-        triangle_test: Option<TriangleTest>, option(value_enum), applies(AppliesTo::ALL);
+        triangle_test: Option<TriangleTest>, option(value_enum), applies(AppliesTo::ALL), research;
         /// BVH build quality of the compute tracer [default: auto]
-        build: Option<BuildChoice>, option(value_enum), applies(AppliesTo::ALL);
+        build: Option<BuildChoice>, option(value_enum), applies(AppliesTo::ALL), research;
         /// Cache the compute tracer's BVHs in this folder, and reuse them for the same geometry
         /// [env: SKYLIT_BVH_CACHE]
         bvh_cache: Option<PathBuf>, option(value_name = "DIR", value_hint = clap::ValueHint::DirPath), applies(AppliesTo::ALL);
         /// Vulkan device, by index or part of its name (`skylit doctor` lists them)
-        device: Option<String>, option(value_name = "INDEX|NAME"), applies(AppliesTo::ALL);
+        device: Option<String>, option(value_name = "INDEX|NAME"), applies(AppliesTo::ALL), basic;
         /// Enable the Vulkan validation layer; any message fails the run
         validation: bool, option(), applies(AppliesTo::ALL);
     }
@@ -105,8 +105,13 @@ impl DeviceSettings {
         }
     }
 
+    /// Returns true if the compute tracer is requested.
+    pub fn is_compute(&self) -> bool {
+        self.tracer == Some(TracerChoice::Compute)
+    }
+
     /// The first option given that applies to the compute tracer only.
-    fn compute_only_option(&self) -> Option<&'static str> {
+    pub fn compute_only_option(&self) -> Option<&'static str> {
         let given = [
             (self.traversal.is_some(), "--traversal"),
             (self.triangle_test.is_some(), "--triangle-test"),

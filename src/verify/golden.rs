@@ -7,6 +7,7 @@ use super::plural;
 use crate::error::{Error, Result};
 use crate::gpu::DeviceInfo;
 use crate::measure::z_test::{Estimate, MIN_REPLICATES, Reference, Region, TILE, channels_with_variance};
+use crate::output::exr::ExrOptions;
 use crate::output::{self, Channel, Image, Samples, png_text};
 use crate::tracer::TracerKind;
 
@@ -120,8 +121,11 @@ impl Golden {
     /// [`Error::Output`].
     pub fn save(&self) -> Result<()> {
         match output::ImageFormat::of(&self.path)? {
-            output::ImageFormat::Exr => output::save(&self.image, &self.path),
-            output::ImageFormat::Png => png_text::write(&self.image, &self.path),
+            // what it is read for, and nothing for other programs
+            output::ImageFormat::Exr => {
+                output::exr::write_with(&self.image, &self.path, &ExrOptions { grey_as_rgb: false, ..Default::default() })
+            }
+            _ => png_text::write(&self.image, &self.path),
         }
     }
 
@@ -207,8 +211,8 @@ fn channels_of(first: &Image, images: &[Image], reference: &Reference) -> Vec<Ch
     let alpha: Vec<&[f32]> = images.iter().filter_map(|i| i.f32("A")).collect();
     let count = alpha.len().max(1) as f64;
     channels.push(plane("A", VARIANCE_BITS, &|p| alpha.iter().map(|a| f64::from(a[p])).sum::<f64>() / count));
-    let samples = known.samples.iter().map(|n| *n as u32).collect();
-    channels.push(Channel { name: "samples".into(), samples: Samples::U32(samples) });
+    let samples = known.samples.iter().map(|n| *n as f32).collect();
+    channels.push(Channel { name: "samples".into(), samples: Samples::F32(samples) });
     channels
 }
 

@@ -121,8 +121,9 @@ fn broken_pixels(frame: &Frame, image: &Image, golden: &Golden) -> u64 {
     }
     // all pixels of a still get the same samples, but where they stop once they are good enough
     let samples = image.channels.iter().find(|c| c.name == "samples").map(|c| &c.samples);
-    if let (Some(Samples::U32(samples)), None) = (samples, frame.settings.film.target_rmse) {
-        let most = samples.iter().copied().max().unwrap_or(0);
+    let is_still = frame.settings.realtime_setting().is_none();
+    if let (Some(Samples::F32(samples)), None, true) = (samples, frame.settings.film.target_rmse, is_still) {
+        let most = samples.iter().copied().fold(0.0, f32::max);
         samples.iter().zip(&mut broken).for_each(|(n, broken)| *broken |= *n < most);
     }
     broken.iter().filter(|b| **b).count() as u64

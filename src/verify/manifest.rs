@@ -285,7 +285,7 @@ fn settings(source: &Source, folder: &Path, defaults: &Defaults, entry: &Entry) 
     }
     for words in [&defaults.render, &entry.render].into_iter().flatten() {
         let parsed = RenderSettings::from_words(words.get_ref()).map_err(|e| source.error(words.span(), e))?;
-        settings = settings.overridden_by(&parsed)?;
+        settings = settings.overridden_by(&parsed);
     }
     let span = entry.render.as_ref().map_or(entry.name.span(), Spanned::span);
     settings.check().map_err(|e| source.error(span, e))?;
@@ -336,7 +336,7 @@ fn check(frame: &Frame) -> std::result::Result<(), String> {
             setting.option()
         ));
     }
-    if settings.integrators.path.denoise.is_some() {
+    if settings.image.denoise.is_some() {
         return wrong("the noise of a denoised image is unknown to a Z-test: use flip");
     }
     if settings.image.spp.is_some_and(|n| n < 2) {

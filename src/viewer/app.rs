@@ -19,14 +19,13 @@ use crate::realtime::Preset;
 use crate::renderer::RenderSettings;
 use crate::renderer::interactive::{Pick, ViewPicture, render_flags};
 use crate::scene::Camera;
+use crate::settings::Length;
 use crate::tracer::DeviceSettings;
 
 /// Frames whose times are kept for the plot and the figures.
 const KEPT_FRAMES: usize = 120;
 /// Messages that are kept.
 const KEPT_MESSAGES: usize = 100;
-/// AO radius to start with where the camera is in a room, as a share of the scene's diagonal.
-const INSIDE_RADIUS: f64 = 0.05;
 /// Time for which a new message is shown over the image.
 const MESSAGE_TIME: Duration = Duration::from_secs(8);
 
@@ -347,15 +346,20 @@ impl App {
                         self.failure = Some(text);
                     }
                 }
-                Event::Camera(camera, is_inside) => {
+                Event::Camera(camera, openness) => {
                     if let (None, Some(scene)) = (&self.control, self.scene.clone()) {
                         let control = CameraControl::new(*camera, scene.bounds);
                         let ao = &mut self.settings.integrators.ao;
-                        if is_inside && ao.ao_radius.is_none() {
+                        let radius = match ao.ao_radius {
+                            Some(Length::Units(units)) => Some(units),
+                            Some(share @ Length::OfDiagonal(_)) => share.units(control.scene_size()).map(panels::round),
                             // in a closed room every ray hits something: without a radius it would be black
-                            let radius = panels::round(INSIDE_RADIUS * control.scene_size());
-                            ao.ao_radius = Some(radius);
-                            self.report(format!("the camera is in a room: AO radius {radius}"), false);
+                            chosen => openness.and_then(|o| o.limit(chosen.is_some())),
+                        };
+                        let is_chosen = !matches!(ao.ao_radius, Some(Length::Units(_)));
+                        ao.ao_radius = radius.map(Length::Units);
+                        if let (true, Some(radius)) = (is_chosen, radius) {
+                            self.report(format!("AO radius {radius}, by what the camera sees"), false);
                         }
                         self.control = Some(control);
                     }
@@ -615,7 +619,8 @@ impl App {
         let child = std::process::Command::new(program)
             .arg("render")
             .arg(&scene.source)
-            .args(["--quiet", "-o", output])
+            // defaults are among the settings already
+            .args(["--quiet", "--no-config", "-o", output])
             .args(settings.flags())
             .args(options)
             .stdin(std::process::Stdio::null())

@@ -17,10 +17,10 @@ impl Browsing {
     pub fn start(mut dialog: Dialog, wake: impl FnOnce() + Send + 'static) -> Self {
         let (title, kinds): (_, &[(&str, &[&str])]) = match &dialog {
             Dialog::Open(_) => ("Open a scene", &[("Scenes", &["gltf", "glb", "obj", "brhan"])]),
-            Dialog::Save(_) => ("Save the image", &[("Image as shown", &["png"]), ("All channels", &["exr"])]),
+            Dialog::Save(_) => ("Save the image", &[("Image as shown", &["png", "jpg", "webp"]), ("All channels", &["exr"])]),
             Dialog::LoadSettings(_) => ("Load settings", &[("Settings", &["json"])]),
             Dialog::SaveSettings(_) => ("Save settings", &[("Settings", &["json"])]),
-            Dialog::Render(..) => ("Render this view", &[("Images", &["png", "exr", "apng"])]),
+            Dialog::Render(..) => ("Render this view", &[("Images", &["png", "exr", "jpg", "webp", "apng"])]),
         };
         let name = dialog.text_mut().clone();
         let saves = matches!(dialog, Dialog::Save(_) | Dialog::SaveSettings(_) | Dialog::Render(..));

@@ -11,6 +11,7 @@ use crate::integrators::lighting::LightingSettings;
 use crate::renderer::RenderSettings;
 use crate::renderer::interactive::{Pick, ViewPicture, ViewStep};
 use crate::renderer::settings::CameraSettings;
+use crate::renderer::survey::radius::Openness;
 use crate::scene::Camera;
 use crate::tracer::DeviceSettings;
 
@@ -80,7 +81,7 @@ pub enum Task {
     Save {
         /// The image.
         pane: Pane,
-        /// A file, .png or .exr.
+        /// A file of one of the kinds of [`crate::output::ImageFormat`].
         path: PathBuf,
     },
 }
@@ -102,7 +103,7 @@ pub enum Event {
     /// A scene was loaded.
     Loaded(Box<SceneSummary>),
     /// The camera to start with was chosen, and whether it is inside a room.
-    Camera(Box<Camera>, bool),
+    Camera(Box<Camera>, Option<Openness>),
     /// The scene of this [`Request::load`] could not be loaded; the previous one stays.
     LoadFailed(u64, String),
     /// Names of the Vulkan devices, by index.

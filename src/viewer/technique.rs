@@ -141,11 +141,12 @@ impl Technique {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::settings::Length;
 
     #[test]
     fn every_technique_can_be_rendered_whatever_is_set() {
         let mut base = RenderSettings::default();
-        base.integrators.ao.ao_radius = Some(2.0);
+        base.integrators.ao.ao_radius = Some(Length::Units(2.0));
         base.integrators.path.max_depth = Some(3);
         base.integrators.path.sky_albedo = Some(0.3);
         base.picture.exposure = Some(1.0);
@@ -166,7 +167,7 @@ mod tests {
         labels.sort();
         labels.dedup();
         assert_eq!(labels.len(), n, "each has a name of its own");
-        assert_eq!(Technique::Preset(Preset::Fast).settings(&base).integrators.ao.ao_radius, Some(2.0));
+        assert_eq!(Technique::Preset(Preset::Fast).settings(&base).integrators.ao.radius(), 2.0);
         let path = Technique::Still("path".parse().unwrap()).settings(&base);
         assert_eq!((path.integrators.ao.ao_radius, path.integrators.path.max_depth), (None, Some(3)));
     }

@@ -331,7 +331,7 @@ fn gpu_a_stream_without_contestants_is_named() {
     fails(&out, 64, &["nothing was measured", "ao-any: no contestant takes part"]);
     let record = json(&place.run(&[&args[..], &["ao-any,primary", "--check", "--json"]].concat()));
     assert_eq!(record["scenes"][0]["streams"].as_array().unwrap().len(), 1);
-    assert!(record["notes"].to_string().contains("nothing to compare with 'packet'"), "{}", record["notes"]);
+    assert!(record["notes"].to_string().contains("hits not checked: only 'packet' traces these rays"), "{}", record["notes"]);
 }
 
 /// The real peer, where it can be built: it loads triangles, instances and spheres, and agrees with us.

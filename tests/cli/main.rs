@@ -12,4 +12,8 @@ mod bench_rays;
 mod bench_report;
 mod compare;
 mod compare_ao;
+mod config;
+mod info;
+mod manners;
+mod outputs;
 mod program;

@@ -28,10 +28,10 @@ fn usage_errors() {
     refuses(&[], 64, "no command");
     refuses(&["fly"], 64, "fly");
     refuses(&["render", "builtin:plane"], 64, "--output");
-    refuses(&["render", "builtin:plane", "-o", "a.jpg"], 64, ".exr or .png");
+    refuses(&["render", "builtin:plane", "-o", "a.bmp"], 64, ".exr, .png, .jpg or .webp");
     refuses(&["render", "builtin:plane", "-o", "a.png", "--aov", "depth"], 64, "--aov needs an .exr");
     refuses(&render(&["--aov", "bent"]), 64, "--aov bent is for frames in real time");
-    refuses(&render(&["--preset", "fast", "--show", "normal"]), 64, "--show is for .png and .apng");
+    refuses(&render(&["--preset", "fast", "--show", "normal"]), 64, "--show is for pictures");
     refuses(&["render", "builtin:plane", "-o", "a.png", "--preset", "larsen", "--show", "samples"], 64, "counts no samples");
     refuses(&["render", "builtin:plane", "-o", "a.png", "--technique", "gtao", "--show", "bent"], 64, "technique traced");
     refuses(&render(&["--preset", "larsen-fixed", "--budget", "variance"]), 64, "1 to 4 rays per pixel");
@@ -92,7 +92,7 @@ fn missing_inputs_and_unwritable_outputs() {
 
 #[test]
 fn failures_as_json() {
-    let args = ["render", "builtin:plane", "-o", "a.jpg", "--json"];
+    let args = ["render", "builtin:plane", "-o", "a.bmp", "--json"];
     let out = run(&args);
     assert_refusal(&out, 64, ".exr", &args);
     let record: Value = serde_json::from_slice(&out.stdout).unwrap();

@@ -5,10 +5,10 @@ use std::process::{Command, Output, Stdio};
 
 use serde_json::Value;
 
-/// The program with these arguments, ready to run.
+/// The program with these arguments, ready to run. It reads no defaults of whoever runs the tests.
 pub fn skylit(args: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_skylit"));
-    command.args(args).env_remove("RUST_BACKTRACE").stdin(Stdio::null());
+    command.args(args).env("XDG_CONFIG_HOME", "/nonexistent").env_remove("RUST_BACKTRACE").stdin(Stdio::null());
     command
 }
 

@@ -1,7 +1,9 @@
 //! Files that are written: images and animations come back as they were, and a failed write leaves nothing behind.
 
 mod animations;
+mod exr_files;
 mod images;
+mod pictures;
 
 /// How many files a folder has.
 fn files_in(folder: &std::path::Path) -> usize {

@@ -150,7 +150,7 @@ fn what_does_not_go_together_is_refused() {
         (&["--preset", "larsen", "--rays-per-pixel", "4", "-o", &png], "--rays-per-pixel"),
         (&["--preset", "fast", "--spp", "4", "-o", &png], "--spp"),
         (&["--preset", "fast", "--orbit", "--camera-path", "keys.toml", "-o", &png], "--camera-path"),
-        (&["--preset", "fast", "-o", "x.jpg"], ".exr"),
+        (&["--preset", "fast", "-o", "x.bmp"], ".exr"),
     ] {
         let args = render(extra);
         refuses(&args.iter().map(String::as_str).collect::<Vec<_>>(), 64, says);

@@ -46,7 +46,7 @@ fn loaded() -> Alone {
         cameras: scene.cameras.clone(),
         ..Default::default()
     })));
-    alone.events.send(Event::Camera(Box::new(scene.cameras[0].clone()), false));
+    alone.events.send(Event::Camera(Box::new(scene.cameras[0].clone()), None));
     alone.harness.run_steps(3);
     alone
 }
@@ -181,7 +181,7 @@ fn controls_change_what_is_requested() {
     assert_eq!(request.panes[0].frames.preset, Some(skylit::realtime::Preset::Balanced));
 
     alone.click("Radius");
-    let radius = alone.mailbox.peek().panes[0].integrators.ao.ao_radius.unwrap();
+    let radius = alone.mailbox.peek().panes[0].integrators.ao.radius();
     let size = skylit::scene::builtin::by_name("stairs").unwrap().bounds().map(|(lo, hi)| (hi - lo).length()).unwrap();
     assert!((0.05 * size..0.2 * size).contains(&radius), "{radius} of {size}");
 
@@ -190,7 +190,7 @@ fn controls_change_what_is_requested() {
     let request = alone.mailbox.peek();
     // the truth is a view of its own, with the same radius
     assert!(request.panes.len() == 2 && request.shown == 1 && request.compares);
-    assert_eq!(request.panes[1].integrators.ao.ao_radius, Some(radius));
+    assert_eq!(request.panes[1].integrators.ao.radius(), radius);
     assert_eq!(request.panes[1].frames.filter, Some(skylit::realtime::FilterKind::None));
     alone.press(egui::Key::X);
     assert_eq!(alone.mailbox.peek().panes.len(), 1);

@@ -67,8 +67,15 @@ pub enum Series {
     Sampling,
 }
 
+const EXAMPLES: &str = "\
+Examples:
+  skylit bench ao --quick                                # does everything work?
+  skylit bench ao scene.glb --presets fast,balanced --html report
+  skylit bench ao --baseline ao.json                     # is anything worse than then?";
+
 /// `skylit bench ao`.
 #[derive(Clone, Debug, Args)]
+#[command(before_help = EXAMPLES)]
 pub struct BenchAoArgs {
     /// Scenes, as `render` takes them [default: the well-known scenes that are available, and two large built-in ones]
     pub scenes: Vec<String>,

@@ -39,7 +39,7 @@ pub fn blocks(record: &AoBenchmark) -> Vec<Block> {
 /// Device and settings.
 pub fn title(record: &AoBenchmark) -> String {
     format!(
-        "{} ({}), tracer {}, {}x{}, {} frames, references of {} rays a pixel",
+        "{} ({}), tracer {}, {}x{}, {} frames, references of {} rays a pixel; docs/bench-ao.md explains the columns",
         record.host.device,
         record.host.driver,
         record.tracer,

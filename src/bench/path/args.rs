@@ -26,8 +26,14 @@ const QUICK_SECONDS: f64 = 0.3;
 /// Time of a reference relative to the longest image.
 const REFERENCE_SHARE: f64 = 15.0;
 
+const EXAMPLES: &str = "\
+Examples:
+  skylit bench path --quick                              # does everything work?
+  skylit bench path cornell --strategies mis,bsdf --plot path.svg";
+
 /// `skylit bench path`.
 #[derive(Clone, Debug, Args)]
+#[command(before_help = EXAMPLES)]
 pub struct BenchPathArgs {
     /// Scenes: as `render` takes them, or cornell (the box with Lambertian walls), sphere-diffuse, sphere-metal, sphere-mirror, sphere-glass
     /// [default: cornell, FlightHelmet and Sponza if available, and the first three spheres]

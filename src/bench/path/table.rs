@@ -10,7 +10,10 @@ pub fn blocks(record: &PathBenchmark) -> Vec<Block> {
 
 /// Device and tracer.
 pub fn title(record: &PathBenchmark) -> String {
-    format!("{} ({}), tracer {}", record.host.device, record.host.driver, record.tracer)
+    format!(
+        "{} ({}), tracer {}; docs/bench-path.md explains the columns",
+        record.host.device, record.host.driver, record.tracer
+    )
 }
 
 /// One scene's results.

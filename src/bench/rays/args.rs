@@ -17,8 +17,15 @@ const QUICK_RAYS: u32 = 320 * 180;
 const DEFAULT_REPEATS: u32 = 7;
 const QUICK_REPEATS: u32 = 3;
 
+const EXAMPLES: &str = "\
+Examples:
+  skylit bench rays --quick                              # does everything work?
+  skylit bench rays scene.glb --plot rays.svg --json rays.json
+  skylit bench rays --baseline rays.json                 # is anything slower than then?";
+
 /// `skylit bench rays`.
 #[derive(Clone, Debug, Args)]
+#[command(before_help = EXAMPLES)]
 pub struct BenchRaysArgs {
     /// Scenes, as `render` takes them [default: the well-known scenes that are available, and built-in ones of 10^4 to 2.5*10^7
     /// triangles]

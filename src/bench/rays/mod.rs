@@ -346,7 +346,10 @@ impl RaySession<'_> {
                 return Ok(());
             }
             if !(0..contestants.len()).any(|k| k != first && !failed[k] && contestants[k].is_for(stream.set)) {
-                self.note(format!("{source}: {}: nothing to compare with '{}'", stream.name, reference.name));
+                self.note(format!(
+                    "{source}: {}: hits not checked: only '{}' traces these rays, so there is no second result",
+                    stream.name, reference.name
+                ));
                 continue;
             }
             let rays = sets.get(stream.set);

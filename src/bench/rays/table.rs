@@ -12,7 +12,7 @@ pub fn blocks(record: &RayBenchmark) -> Vec<Block> {
 /// Device and settings.
 pub fn title(record: &RayBenchmark) -> String {
     format!(
-        "{} ({}), {} threads; medians of {} repeats, in turn{}",
+        "{} ({}), {} threads; medians of {} repeats, in turn{}; docs/bench-rays.md explains the columns",
         record.host.device,
         record.host.driver,
         record.host.threads,

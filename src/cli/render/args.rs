@@ -4,35 +4,61 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueHint};
 
+use super::tev::TevAddress;
+use crate::cli::config::ConfigArgs;
 use crate::error::{Error, Result};
-use crate::output::{ImageFormat, apng};
+use crate::output::settings::ExrCompression;
+use crate::output::{FileSettings, ImageFormat, apng};
+use crate::realtime::display::DisplayMode;
 use crate::renderer::RenderSettings;
+use crate::renderer::defaults::{self, DefaultsReport};
+use crate::renderer::frames::frame_settings;
 use crate::terminal::console::Verbosity;
 use crate::tracer::DeviceSettings;
 
+const EXAMPLES: &str = "\
+Examples:
+  skylit render scene.glb -o ao.png                                 ambient occlusion
+  skylit render room.glb -o ao.png --ao-radius 0.5                  of a room: hits within half a metre
+  skylit render scene.glb -o path.exr --integrator path --spp 256   path tracing
+  skylit render scene.glb -o path.png --integrator path --denoise   path tracing, denoised
+  skylit render scene.glb -o ao.png --eye 3,2,5 --target 0,1,0      from here
+  skylit render scene.glb -o turn.apng --preset balanced --orbit --frames 0..240     in real time";
+
 /// `skylit render`.
 #[derive(Clone, Debug, Args)]
+#[command(before_help = EXAMPLES)]
 pub struct RenderArgs {
     /// Scene: a .gltf, .glb, .obj or .brhan file, or builtin:NAME (`skylit scenes` lists them)
+    #[arg(value_hint = ValueHint::FilePath)]
     pub scene: String,
-    /// Image to write: .exr (all channels, metadata) or .png (8-bit sRGB); may be given more than once
+    /// Image to write: .exr (all channels, metadata), or a picture: .png, .jpg, .webp (lossless), .apng (frames in real time); may be given more than once
     #[arg(long, short, value_name = "FILE", value_hint = ValueHint::FilePath, required = true)]
     pub output: Vec<PathBuf>,
     /// Write the image so far on Ctrl-C, too (the exit code is still 130)
-    #[arg(long)]
+    #[arg(long, hide_short_help = true)]
     pub keep_partial: bool,
     /// Also write a depth image of one ray per pixel: .png (near is white, far and background black) or .exr (depth.Z)
-    #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
+    #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath, hide_short_help = true)]
     pub depth_image: Option<PathBuf>,
     /// Also write the rays of the first sample to PREFIX.primary.bin and PREFIX.ao.bin
-    #[arg(long, value_name = "PREFIX")]
+    #[arg(long, value_name = "PREFIX", hide_short_help = true, hide_long_help = true)]
     pub dump_rays: Option<PathBuf>,
     /// Print what was skipped because the scene or the options do not need it, and what that saved
-    #[arg(long)]
+    #[arg(long, hide_short_help = true)]
     pub explain: bool,
-    /// Read settings from this file, which `skylit view` or a person has written; options given here replace what it says
-    #[arg(long = "settings", value_name = "FILE.json", value_hint = ValueHint::FilePath)]
+    /// Read settings from this file, .json or .toml, which `skylit view` or a person has written; options given here replace what it says
+    #[arg(long = "settings", value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub settings_file: Option<PathBuf>,
+    /// Send the image to the viewer tev while it renders, at every power of two of samples; frames in real time one after another [default port: 14158]
+    #[arg(long, value_name = "HOST[:PORT]", hide_short_help = true)]
+    pub tev: Option<TevAddress>,
+    /// How files are written
+    #[command(flatten)]
+    pub files: FileSettings,
+    /// Files of defaults.
+    #[command(flatten)]
+    pub config: ConfigArgs,
     /// What is rendered, and how
     #[command(flatten)]
     pub settings: RenderSettings,
@@ -50,17 +76,32 @@ impl RenderArgs {
         self.output.iter().any(|p| ImageFormat::of(p).is_ok_and(|f| f == ImageFormat::Exr))
     }
 
-    /// Returns true if an 8-bit image or animation is written.
+    /// Returns true if a picture or an animation is written.
     pub fn writes_picture(&self) -> bool {
-        self.output.iter().any(|p| apng::is_apng(p) || ImageFormat::of(p).is_ok_and(|f| f == ImageFormat::Png))
+        self.output.iter().any(|p| apng::is_apng(p) || ImageFormat::of(p).is_ok_and(ImageFormat::is_picture))
     }
 
-    /// These arguments with the settings of [`RenderArgs::settings_file`] where none were given.
+    /// Returns true if channels of frames in real time are needed, not only what they display.
+    pub fn needs_channels(&self) -> bool {
+        self.writes_exr() || self.files.has_deep_png() || self.tev.is_some()
+    }
+
+    /// These arguments with the settings of [`RenderArgs::settings_file`] where none were given, and with defaults where neither gives any.
     ///
     /// # Errors
-    /// Those of [`RenderSettings::load`].
-    pub fn with_settings_file(&self) -> Result<Self> {
-        Ok(Self { settings: self.settings.over_file(self.settings_file.as_deref())?, ..self.clone() })
+    /// Those of [`RenderSettings::load`] and [`ConfigArgs::files`].
+    pub fn with_files(&self) -> Result<(Self, Vec<DefaultsReport>)> {
+        let settings = self.settings.over_file(self.settings_file.as_deref())?;
+        let files = self.config.files(Some(&self.scene))?;
+        let is_frames = settings.realtime_setting().is_some();
+        let holds = |settings: &RenderSettings| {
+            let is_same_kind = settings.realtime_setting().is_some() == is_frames;
+            is_same_kind
+                && Self { settings: settings.clone(), ..self.clone() }.check().is_ok()
+                && (!is_frames || frame_settings(settings).is_ok())
+        };
+        let resolved = defaults::resolve(&files, &settings, &self.device, &holds);
+        Ok((Self { settings: resolved.settings, device: resolved.device, ..self.clone() }, resolved.reports))
     }
 
     /// Checks conditions on more than one option.
@@ -69,7 +110,7 @@ impl RenderArgs {
         self.settings.check()?;
         let wrong = |text: String| Err(Error::Usage(text));
         if self.settings.frames.show.is_some() && !self.writes_picture() {
-            return wrong("--show is for .png and .apng outputs: for an .exr use --aov".into());
+            return wrong("--show is for pictures (.png, .jpg, .webp, .apng): for an .exr use --aov".into());
         }
         let frames = self.settings.realtime_setting();
         let images = self.output.iter().filter(|p| frames.is_none() || !apng::is_apng(p));
@@ -87,12 +128,32 @@ impl RenderArgs {
             return wrong(format!("--dump-rays has no effect on --integrator {name}: leave it out, or use --integrator ao"));
         }
         if !self.settings.image.aov.is_empty() && !formats.contains(&ImageFormat::Exr) {
-            return wrong("--aov needs an .exr output: PNG holds colour only".into());
+            return wrong("--aov needs an .exr output: pictures hold colour only".into());
         }
-        if let Some(path) = &self.depth_image {
-            ImageFormat::of(path)?;
+        if let Some(path) = &self.depth_image
+            && !matches!(ImageFormat::of(path)?, ImageFormat::Png | ImageFormat::Exr)
+        {
+            return wrong(format!("--depth-image {}: the name must end in .png or .exr", path.display()));
         }
+        self.check_files()?;
         self.check_film()
+    }
+
+    fn check_files(&self) -> Result<()> {
+        let (files, film) = (&self.files, &self.settings.film);
+        files.check(&self.output, self.depth_image.as_deref())?;
+        let shown = self.settings.frames.show.unwrap_or_default();
+        if self.settings.realtime_setting().is_some() && files.has_deep_png() && shown != DisplayMode::Accessibility {
+            return Err(Error::Usage(format!(
+                "--show {shown} is converted to 8-bit sRGB by the device: leave --png-bits 16 and --png-encoding linear out, or write --aov to an .exr"
+            )));
+        }
+        if files.exr_compression == Some(ExrCompression::Pxr24) && film.keeps_state() {
+            return Err(Error::Usage(
+                "--exr-compression pxr24 rounds 32-bit floats, and the film's state needs all bits to be resumed: choose zip or piz".into(),
+            ));
+        }
+        Ok(())
     }
 
     fn check_film(&self) -> Result<()> {
@@ -102,7 +163,7 @@ impl RenderArgs {
             return wrong("--resume: the rays of the first sample are not traced again; leave --dump-rays out".into());
         }
         if film.resumable && !self.writes_exr() {
-            return wrong("--resumable needs an .exr output: PNG holds colour only".into());
+            return wrong("--resumable needs an .exr output: pictures hold colour only".into());
         }
         match &film.resume {
             Some(path) if ImageFormat::of(path).ok() != Some(ImageFormat::Exr) => {

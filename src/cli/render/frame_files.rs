@@ -5,8 +5,9 @@ use std::path::PathBuf;
 use crate::error::Result;
 use crate::gpu::Buffer;
 use crate::output::apng::{self, Animation, ApngWriter, Delay};
-use crate::output::png::{self, Colour};
-use crate::output::{self, Image, ImageFormat, frames};
+use crate::output::png::Colour;
+use crate::output::settings::Background;
+use crate::output::{FileSettings, Image, ImageFormat, Picture, exr, frames, picture};
 
 /// The files that frames are written to.
 pub struct FrameFiles {
@@ -14,50 +15,87 @@ pub struct FrameFiles {
     pictures: Vec<PathBuf>,
     animations: Vec<ApngWriter>,
     colour: Colour,
+    settings: FileSettings,
+}
+
+/// What is written of a frame. What no file needs is `None`.
+pub struct FrameContents<'a> {
+    /// Its channels.
+    pub image: Option<&'a Image>,
+    /// Its display ([`crate::renderer::Frames::displayed`]).
+    pub shown: Option<&'a Buffer>,
+    /// Its coverage.
+    pub coverage: Option<Vec<f32>>,
 }
 
 impl FrameFiles {
-    /// Starts the animations, which appear when [`FrameFiles::finish`] is called. `colour`: colour type of 8-bit files.
-    pub fn create(outputs: &[PathBuf], size: [u32; 2], frames: u32, fps: f64, colour: Colour) -> Result<Self> {
+    /// Starts the animations, which appear when [`FrameFiles::finish`] is called. `colour`: colour type of what is displayed.
+    pub fn create(
+        outputs: &[PathBuf],
+        size: [u32; 2],
+        frames: u32,
+        fps: f64,
+        colour: Colour,
+        settings: &FileSettings,
+    ) -> Result<Self> {
         let (animations, files): (Vec<_>, Vec<_>) = outputs.iter().cloned().partition(|p| apng::is_apng(p));
         let (mut images, mut pictures) = (Vec::new(), Vec::new());
         for path in files {
-            if ImageFormat::of(&path)? == ImageFormat::Png { pictures.push(path) } else { images.push(path) }
+            if ImageFormat::of(&path)?.is_picture() { pictures.push(path) } else { images.push(path) }
         }
         let delay = Delay::of_rate(fps)?;
-        let start = |p: &PathBuf| ApngWriter::create(p, Animation { size, colour, frames, delay });
-        Ok(Self { images, pictures, animations: animations.iter().map(start).collect::<Result<_>>()?, colour })
+        let animation = Animation { size, colour: on_background(colour, settings.background), frames, delay };
+        let start = |p: &PathBuf| ApngWriter::create(p, animation);
+        let animations = animations.iter().map(start).collect::<Result<_>>()?;
+        Ok(Self { images, pictures, animations, colour, settings: settings.clone() })
     }
 
-    /// Writes a frame: its channels to .exr files, and its display ([`crate::renderer::Frames::displayed`]) to 8-bit files and animations.
-    pub fn add(&mut self, number: u32, [width, height]: [u32; 2], image: Option<&Image>, shown: Option<&Buffer>) -> Result<()> {
-        if let Some(image) = image {
+    /// Writes a frame: its channels to .exr files and to .png files that 8 bits do not suffice for, and its display to other files and animations.
+    pub fn add(&mut self, number: u32, size: [u32; 2], contents: &FrameContents) -> Result<()> {
+        let number = u64::from(number);
+        if let Some(image) = contents.image {
             for path in &self.images {
-                output::save(image, &frames::numbered(path, u64::from(number))?)?;
+                exr::write_with(image, &frames::numbered(path, number)?, &(&self.settings).into())?;
             }
         }
-        if let Some(shown) = shown {
-            let mut bytes = Vec::new();
-            let channels = self.colour.channels();
-            shown.read_with(0, 4 * u64::from(width) * u64::from(height), 4, |_, words| {
-                bytes.extend(words.chunks_exact(4).flat_map(|word| &word[..channels]));
-            })?;
-            for path in &self.pictures {
-                let path = frames::numbered(path, u64::from(number))?;
-                match self.colour {
-                    Colour::Grey => png::write_grey(&path, &bytes, width, height)?,
-                    Colour::Rgb => png::write_rgb(&path, &bytes, width, height)?,
+        let Some(shown) = contents.shown else { return Ok(()) };
+        let mut bytes = Vec::new();
+        let channels = self.colour.channels();
+        shown.read_with(0, 4 * u64::from(size[0]) * u64::from(size[1]), 4, |_, words| {
+            bytes.extend(words.chunks_exact(4).flat_map(|word| &word[..channels]));
+        })?;
+        let mut displayed = Picture::of_bytes(bytes, size, self.colour)?;
+        if let (Some(background), Some(coverage)) = (self.settings.background, &contents.coverage) {
+            displayed = displayed.on(background, coverage)?;
+        }
+        for path in &self.pictures {
+            let path = frames::numbered(path, number)?;
+            let deep = contents
+                .image
+                .filter(|_| self.settings.has_deep_png() && ImageFormat::of(&path).is_ok_and(|f| f == ImageFormat::Png));
+            match deep {
+                Some(image) => {
+                    let image = if self.settings.background.is_some() { &picture::unassociated(image) } else { image };
+                    Picture::new(image, self.settings.background, &self.settings, &path)?
+                        .save(&path, self.settings.jpeg_quality())?;
                 }
-            }
-            for animation in &mut self.animations {
-                animation.add_bytes(&bytes)?;
+                None => displayed.save(&path, self.settings.jpeg_quality())?,
             }
         }
-        Ok(())
+        self.animations.iter_mut().try_for_each(|animation| animation.add_bytes(&displayed.bytes))
     }
 
     /// Finishes the animations.
     pub fn finish(self) -> Result<()> {
         self.animations.into_iter().try_for_each(ApngWriter::finish)
+    }
+}
+
+/// The colour type of a picture once it is on a background, as [`Picture::on`] makes it.
+fn on_background(colour: Colour, background: Option<Background>) -> Colour {
+    match background {
+        Some(Background::Transparent) => colour.with_alpha(),
+        Some(Background::Colour([r, g, b])) if r != g || g != b => Colour::Rgb,
+        _ => colour,
     }
 }

@@ -2,6 +2,7 @@
 
 mod args;
 mod frame_files;
+mod tev;
 
 use std::ffi::OsString;
 use std::io::Write;
@@ -9,55 +10,75 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 pub use args::RenderArgs;
-use frame_files::FrameFiles;
+use frame_files::{FrameContents, FrameFiles};
+use tev::TevViewer;
 
+use super::config;
 use crate::error::{Error, Result};
 use crate::files;
 use crate::film::Control;
 use crate::integrators::aov::AovPixel;
-use crate::output::{self, Channel, Image, ImageFormat, Samples, png};
+use crate::output::settings::PngEncoding;
+use crate::output::{self, Channel, FileSettings, Image, ImageFormat, Picture, Samples, picture, png};
 use crate::ray::Ray;
 use crate::renderer::Renderer;
+use crate::renderer::defaults::DefaultsReport;
 use crate::renderer::still::StillExtras;
-use crate::scene::RenderHints;
 use crate::terminal::console::{Console, Failure};
 use crate::terminal::interrupt::{self, ProgressControl, SilentControl};
 use crate::terminal::progress::Progress;
 
 /// Loads, renders, writes, reports.
 pub fn run(args: &RenderArgs, start: Instant) -> Result<(), Failure> {
-    let args = &args.with_settings_file()?;
+    let (args, defaults) = &args.with_files()?;
     args.check()?;
+    config::report(args.verbosity.console(), defaults);
     match args.settings.realtime_setting() {
-        Some(_) => frames(args, start),
-        None => still(args, start),
+        Some(_) => frames(args, defaults, start),
+        None => still(args, defaults, start),
     }
 }
 
-fn still(args: &RenderArgs, start: Instant) -> Result<(), Failure> {
+fn still(args: &RenderArgs, defaults: &[DefaultsReport], start: Instant) -> Result<(), Failure> {
     for path in args.outputs() {
         files::check_writable(&path)?;
     }
     interrupt::install();
     let console = args.verbosity.console();
+    let mut viewer = Viewer::connect(args, console)?;
     let mut renderer = Renderer::open(&args.scene, &args.device)?;
     interrupt::check()?;
-    check_intervals(args, &renderer.scene().hints, args.settings.spp(renderer.scene()))?;
+    if args.files.background.is_some() && renderer.shows_environment(&args.settings)? {
+        let what = "--background has no effect: the environment is behind the scene, in its colours; leave --background out, or render without an environment";
+        return Err(Error::Usage(what.into()).into());
+    }
+    let intervals =
+        crate::renderer::still::intervals(&args.settings, &renderer.scene().hints, args.settings.spp(renderer.scene()));
+    check_intervals(args, &intervals)?;
     let mut control = CliControl::new(args, console);
-    let extras = StillExtras { keep_rays: args.dump_rays.is_some(), aov: args.depth_image.is_some() };
+    let extras = StillExtras {
+        keep_rays: args.dump_rays.is_some(),
+        aov: args.depth_image.is_some(),
+        intermediate: viewer.tev.is_some(),
+    };
     let still = renderer.still_with(&args.settings, extras, &mut control, &mut |on_way| {
-        args.output.iter().try_for_each(|path| on_way.save(&interval_path(path, on_way.samples)))
+        viewer.show(on_way.image);
+        if !intervals.contains(&on_way.samples) {
+            return Ok(());
+        }
+        args.output.iter().try_for_each(|path| on_way.save_with(&interval_path(path, on_way.samples), &args.files))
     })?;
     drop(control);
     let write_start = Instant::now();
     write_rays(args, &still.rays)?;
     if let Some(path) = &args.depth_image {
-        write_depth(path, &still.aov, still.report.size)?;
+        write_depth(path, &still.aov, still.report.size, &args.files)?;
     }
-    args.output.iter().try_for_each(|path| still.save(path))?;
+    args.output.iter().try_for_each(|path| still.save_with(path, &args.files))?;
+    viewer.show(&still.image);
     let mut report = still.report;
-    report.seconds.write = write_start.elapsed().as_secs_f64();
-    report.seconds.total = start.elapsed().as_secs_f64();
+    report.setup.warnings.extend(viewer.warning);
+    report.seconds.finish(write_start.elapsed().as_secs_f64(), start.elapsed().as_secs_f64());
     for line in report.lines(&names(args), args.explain) {
         console.line(&line)?;
     }
@@ -66,11 +87,12 @@ fn still(args: &RenderArgs, start: Instant) -> Result<(), Failure> {
     }
     let mut record = report.record(args.explain);
     record["output"] = serde_json::json!(args.output);
+    record["defaults"] = serde_json::json!(defaults);
     let interrupted = args.keep_partial && interrupt::requested();
     console.close(&record, if interrupted { Err(Error::Interrupted) } else { Ok(()) })
 }
 
-fn frames(args: &RenderArgs, start: Instant) -> Result<(), Failure> {
+fn frames(args: &RenderArgs, defaults: &[DefaultsReport], start: Instant) -> Result<(), Failure> {
     let timeline = &args.settings.frames;
     // report invalid settings before anything is loaded
     crate::renderer::frames::frame_settings(&args.settings)?;
@@ -81,18 +103,23 @@ fn frames(args: &RenderArgs, start: Instant) -> Result<(), Failure> {
     }
     interrupt::install();
     let console = args.verbosity.console();
+    let mut viewer = Viewer::connect(args, console)?;
     let mut renderer = Renderer::open(&args.scene, &args.device)?;
     interrupt::check()?;
     let mut control = CliControl::new(args, console);
     let mut frames = renderer.frames(&args.settings, args.writes_picture(), &mut control)?;
     let colour = timeline.show.unwrap_or_default().colour();
-    let mut files = FrameFiles::create(&args.output, frames.size(), range.end - range.first, frames.fps(), colour)?;
+    let mut files =
+        FrameFiles::create(&args.output, frames.size(), range.end - range.first, frames.fps(), colour, &args.files)?;
     let (mut done, all, mut write_seconds) = (0, u64::from(frames.count()), 0.0);
     while let Some(frame) = frames.advance()? {
         if frame.kept {
             let write_start = Instant::now();
-            let image = if args.writes_exr() { Some(frames.image(&mut SilentControl)?) } else { None };
-            files.add(frame.number, frames.size(), image.as_ref(), frames.displayed())?;
+            let image = if args.needs_channels() { Some(frames.image(&mut SilentControl)?) } else { None };
+            let coverage = if args.files.background.is_some() { Some(frames.coverage()?) } else { None };
+            let contents = FrameContents { image: image.as_ref(), shown: frames.displayed(), coverage };
+            files.add(frame.number, frames.size(), &contents)?;
+            image.iter().for_each(|image| viewer.show(image));
             write_seconds += write_start.elapsed().as_secs_f64();
         }
         done += 1;
@@ -102,14 +129,42 @@ fn frames(args: &RenderArgs, start: Instant) -> Result<(), Failure> {
     files.finish()?;
     drop(control);
     let mut report = frames.report();
-    report.seconds.write = write_seconds;
-    report.seconds.total = start.elapsed().as_secs_f64();
+    report.setup.warnings.extend(viewer.warning);
+    if let Some(warning) = &report.brightness {
+        console.warning(warning);
+    }
+    report.seconds.finish(write_seconds, start.elapsed().as_secs_f64());
     for line in report.lines(&names(args), args.explain) {
         console.line(&line)?;
     }
     let mut record = report.record(args.explain);
     record["output"] = serde_json::json!(args.output);
+    record["defaults"] = serde_json::json!(defaults);
     console.close(&record, Ok(()))
+}
+
+/// The viewer tev, if it is to show images. A connection that ends is a warning: the render goes on without it.
+struct Viewer {
+    tev: Option<TevViewer>,
+    console: Console,
+    warning: Option<String>,
+}
+
+impl Viewer {
+    fn connect(args: &RenderArgs, console: Console) -> Result<Self> {
+        let output = args.output.first().map_or(Path::new("skylit"), PathBuf::as_path);
+        let tev = args.tev.as_ref().map(|address| TevViewer::connect(address, output)).transpose()?;
+        Ok(Self { tev, console, warning: None })
+    }
+
+    fn show(&mut self, image: &Image) {
+        let Some(tev) = &mut self.tev else { return };
+        if let Err(e) = tev.send(image) {
+            let warning = format!("--tev: the connection has ended ({e}); the image is not shown any more");
+            self.console.warning(&warning);
+            (self.tev, self.warning) = (None, Some(warning));
+        }
+    }
 }
 
 /// Progress bar and interruption by Ctrl-C; warnings are printed at once.
@@ -145,8 +200,7 @@ fn names(args: &RenderArgs) -> String {
 }
 
 /// Checks before rendering starts that intermediate images can be written.
-fn check_intervals(args: &RenderArgs, hints: &RenderHints, spp: u32) -> Result<()> {
-    let intervals = crate::renderer::still::intervals(&args.settings, hints, spp);
+fn check_intervals(args: &RenderArgs, intervals: &[u32]) -> Result<()> {
     let check = |path: &PathBuf| intervals.iter().try_for_each(|&n| files::check_writable(&interval_path(path, n)));
     args.output.iter().try_for_each(check)
 }
@@ -162,15 +216,17 @@ fn interval_path(path: &Path, samples: u32) -> PathBuf {
     path.with_file_name(name)
 }
 
-fn write_depth(path: &Path, pixels: &[AovPixel], size: [u32; 2]) -> Result<()> {
+fn write_depth(path: &Path, pixels: &[AovPixel], size: [u32; 2], files: &FileSettings) -> Result<()> {
     let depth: Vec<f32> = pixels.iter().map(|p| p.depth).collect();
-    match ImageFormat::of(path)? {
-        ImageFormat::Png => png::write_grey(path, &png::depth_to_grey(&depth), size[0], size[1]),
-        ImageFormat::Exr => {
-            let channels = vec![Channel { name: "depth.Z".into(), samples: Samples::F32(depth) }];
-            output::save(&Image { width: size[0], height: size[1], channels, metadata: Vec::new() }, path)
-        }
+    if ImageFormat::of(path)? == ImageFormat::Exr {
+        let channels = vec![Channel { name: "depth.Z".into(), samples: Samples::F32(depth) }];
+        return output::save(&Image { width: size[0], height: size[1], channels, metadata: Vec::new() }, path);
     }
+    // numbers as they are: no transfer function
+    let settings =
+        FileSettings { png_bits: files.png_bits, png_encoding: Some(PngEncoding::Linear), ..FileSettings::default() };
+    let picture = Picture::new(&picture::grey_image(png::depth_to_unit(&depth), size), None, &settings, path)?;
+    Picture { encoding: PngEncoding::Srgb, ..picture }.save(path, files.jpeg_quality())
 }
 
 fn write_rays(args: &RenderArgs, rays: &[Vec<Ray>; 2]) -> Result<()> {

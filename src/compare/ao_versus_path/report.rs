@@ -184,7 +184,7 @@ impl ChoiceRecord {
 
     /// The choice as options of `skylit render --integrator lit` or `ao`.
     pub fn options(&self) -> String {
-        let radius = self.radius.map(|r| format!("--ao-radius {}", significant(r)));
+        let radius = Some(format!("--ao-radius {}", self.radius.map_or_else(|| "inf".to_owned(), significant)));
         let falloff = (self.falloff > 1.0).then(|| format!("--ao-falloff {}", significant_falloff(self.falloff)));
         [radius, falloff].into_iter().flatten().collect::<Vec<_>>().join(" ")
     }

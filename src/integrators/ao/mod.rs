@@ -130,7 +130,7 @@ impl Integrator for AmbientOcclusion {
     }
 
     fn capabilities(&self) -> &'static [Capability] {
-        &[Capability::AmbientOcclusion, Capability::RealTimeFrames]
+        &[Capability::AmbientOcclusion, Capability::RealTimeFrames, Capability::Denoising]
     }
 
     fn channels(&self) -> &'static [&'static str] {

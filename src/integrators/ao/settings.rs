@@ -2,8 +2,8 @@
 
 use super::Hemisphere;
 #[cfg(feature = "cli")]
-use crate::settings::parse::{parse_falloff, parse_radius};
-use crate::settings::{AppliesTo, Capability, settings};
+use crate::settings::parse::parse_falloff;
+use crate::settings::{AppliesTo, Capability, Length, settings};
 
 /// Integrators that these settings apply to.
 const AO: AppliesTo = AppliesTo::of(Capability::AmbientOcclusion);
@@ -12,19 +12,25 @@ settings! {
     /// Ambient occlusion.
     "Ambient occlusion"
     pub struct AoSettings {
-        /// AO radius in scene units: hits beyond do not occlude [default: inf]
-        ao_radius: Option<f64>, option(value_name = "R", value_parser = parse_radius, allow_hyphen_values = true), applies(AO);
+        /// AO radius: hits beyond do not occlude [default: inf, or auto where hardly a ray would get out]
+        ///
+        /// In scene units; as a share of the scene's diagonal, such as 5%; `inf` for no limit; or `auto`, at which surfaces in view are 60 % open on average.
+        ao_radius: Option<Length>,
+            option(value_name = "R|PERCENT%|auto", value_parser = str::parse::<Length>, allow_hyphen_values = true), applies(AO), basic;
         /// AO falloff: a hit at distance d occludes by C^-d; 1 is binary [default: 1; 8 with --preset larsen]
         ao_falloff: Option<f64>, option(value_name = "C", value_parser = parse_falloff, allow_hyphen_values = true), applies(AO);
         /// Normal of the hemisphere that AO samples [default: geometric]
-        ao_normal: Option<Hemisphere>, option(value_enum), applies(AO);
+        ao_normal: Option<Hemisphere>, option(value_enum), applies(AO), research;
     }
 }
 
 impl AoSettings {
-    /// AO radius in scene units; infinite for no limit.
+    /// AO radius in scene units; infinite for no limit, and as long as the scene has not been asked ([`crate::renderer::Renderer`] does).
     pub fn radius(&self) -> f64 {
-        self.ao_radius.unwrap_or(f64::INFINITY)
+        match self.ao_radius {
+            Some(Length::Units(units)) => units,
+            _ => f64::INFINITY,
+        }
     }
 
     /// Axis of the hemisphere.

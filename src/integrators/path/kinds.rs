@@ -13,9 +13,10 @@ use crate::film::Control;
 use crate::film::tile_mask::TileMask;
 use crate::integrators::{Integrator, IntegratorSettings, PictureOptions, RenderJob, Rendered};
 use crate::output::{Image, Samples};
+use crate::scene::Scene;
 use crate::settings::Capability::{
-    self, AmbientLight, AmbientOcclusion, CameraModel, LightTransport, PathLength, SamplingStrategy, SceneLights, Textures,
-    ToneMapping, WhiteSky,
+    self, AmbientLight, AmbientOcclusion, CameraModel, Denoising, LightTransport, PathLength, SamplingStrategy, SceneLights,
+    Textures, ToneMapping, WhiteSky,
 };
 use crate::shaders::StreamShaders;
 use crate::tracer::{Needs, Tracer};
@@ -25,14 +26,14 @@ pub static PATH: PathVariant = PathVariant {
     name: "path",
     help: "Path tracing: global illumination",
     kind: Kind::Light { max_depth: None },
-    capabilities: &[LightTransport, PathLength, SamplingStrategy, SceneLights, Textures, CameraModel, ToneMapping],
+    capabilities: &[LightTransport, PathLength, SamplingStrategy, SceneLights, Textures, CameraModel, ToneMapping, Denoising],
 };
 /// Paths of one bounce.
 pub static DIRECT: PathVariant = PathVariant {
     name: "direct",
     help: "Direct lighting: paths of one bounce",
     kind: Kind::Light { max_depth: Some(1) },
-    capabilities: &[LightTransport, SamplingStrategy, SceneLights, Textures, CameraModel, ToneMapping],
+    capabilities: &[LightTransport, SamplingStrategy, SceneLights, Textures, CameraModel, ToneMapping, Denoising],
 };
 /// Direct light, and ambient light where ambient occlusion lets it through.
 pub static LIT: PathVariant = PathVariant {
@@ -48,6 +49,7 @@ pub static LIT: PathVariant = PathVariant {
         Textures,
         CameraModel,
         ToneMapping,
+        Denoising,
     ],
 };
 /// Specular reflection and refraction, and direct lighting on all other surfaces.
@@ -55,14 +57,14 @@ pub static WHITTED: PathVariant = PathVariant {
     name: "whitted",
     help: "Whitted (1980): chains of mirrors and glass, direct light on everything else",
     kind: Kind::Whitted,
-    capabilities: &[LightTransport, PathLength, SceneLights, Textures, CameraModel, ToneMapping],
+    capabilities: &[LightTransport, PathLength, SceneLights, Textures, CameraModel, ToneMapping, Denoising],
 };
 /// The ground truth that ambient occlusion approximates.
 pub static AO_SKY: PathVariant = PathVariant {
     name: "ao-sky",
     help: "Path traced grey diffuse surfaces under a white sky, divided by albedo: the ground truth that AO approximates",
     kind: Kind::WhiteSky,
-    capabilities: &[LightTransport, PathLength, SamplingStrategy, WhiteSky, CameraModel, ToneMapping],
+    capabilities: &[LightTransport, PathLength, SamplingStrategy, WhiteSky, CameraModel, ToneMapping, Denoising],
 };
 /// Shading normals.
 pub static NORMALS: PathVariant = PathVariant {
@@ -188,14 +190,18 @@ impl Integrator for PathVariant {
 
     /// Only if the environment is black, and no lens or wide filter makes a pixel see beyond its area.
     fn skips_empty_tiles(&self, job: &RenderJob) -> bool {
-        let black = match self.kind {
-            Kind::View(_) => true,
-            Kind::WhiteSky => false,
-            Kind::Light { .. } | Kind::Lit | Kind::Whitted => !job.scene.has_visible_sky(),
-        };
+        let black = !self.shows_environment(job.scene);
         let settings = &job.settings.path;
         let is_pinhole = settings.f_number.is_none() || settings.focus_distance.is_none();
         black && is_pinhole && job.pixel_filter.is_within_pixel()
+    }
+
+    fn shows_environment(&self, scene: &Scene) -> bool {
+        match self.kind {
+            Kind::View(_) => false,
+            Kind::WhiteSky => true,
+            Kind::Light { .. } | Kind::Lit | Kind::Whitted => scene.has_visible_sky(),
+        }
     }
 
     fn sees_environment(&self) -> bool {

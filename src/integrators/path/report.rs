@@ -2,7 +2,7 @@
 
 use serde_json::json;
 
-use super::settings::depth_text;
+use super::settings::MAX_DEPTH;
 use super::{PathOptions, PathResult, TextureFilter};
 use crate::accel::flatten::FlatScene;
 use crate::integrators::{IntegratorReport, RenderJob};
@@ -38,13 +38,13 @@ pub(super) fn report(
         (image.primary_rays, image.primary_rays + result.bounce_rays + result.shadow_rays + result.ambient_rays);
     let per_second = |n: u64| n as f64 / image.trace_seconds.max(1e-9) / 1e6;
     let mut lines = vec![format!(
-        "{:.2} Mpaths/s, {:.2} Mrays/s; {:.2} rays per path, {:.2} of them shadow rays; longest path {} bounces (limit {})",
+        "{:.2} Mpaths/s, {:.2} Mrays/s; {:.2} rays per path, {:.2} of them shadow rays; longest path {} bounces ({})",
         per_second(paths),
         per_second(rays),
         rays as f64 / paths.max(1) as f64,
         result.shadow_rays as f64 / paths.max(1) as f64,
         result.longest_path,
-        depth_text(o.max_depth),
+        if o.max_depth >= MAX_DEPTH { "no limit".to_owned() } else { format!("limit {}", o.max_depth) },
     )];
     lines.extend(o.remarks());
     let shading = tracer.features().shading.unwrap_or_default();

@@ -35,18 +35,6 @@ const SKY: AppliesTo = AppliesTo::stills_of(Capability::WhiteSky);
 /// The integrator with ambient light.
 const AMBIENT: AppliesTo = AppliesTo::stills_of(Capability::AmbientLight);
 
-choices! {
-    /// Denoiser of path-traced images.
-    pub enum DenoiseChoice {
-        /// Open Image Denoise if it is installed, else the filter
-        Auto = "auto",
-        /// Intel Open Image Denoise: a neural network, on the CPU
-        Oidn = "oidn",
-        /// The filter of real-time ambient occlusion, over radiance
-        Filter = "filter",
-    }
-}
-
 settings! {
     /// Paths.
     "Path tracing (--integrator path, direct, lit, whitted, ao-sky; views)"
@@ -54,27 +42,23 @@ settings! {
         /// Maximum path length in bounces: 0 is emitted light, 1 adds direct light [default: the scene's, or no limit]
         max_depth: Option<u32>, option(value_name = "N"), applies(LONG);
         /// Leave out paths of fewer bounces: 1 hides emitters and the environment behind the scene, 2 leaves indirect light alone [default: 0]
-        min_depth: Option<u32>, option(value_name = "N"), applies(LIGHT);
+        min_depth: Option<u32>, option(value_name = "N"), applies(LIGHT), research;
         /// Bounces before Russian roulette may end a path [default: 5]
-        rr_depth: Option<u32>, option(value_name = "N"), applies(LIGHT);
+        rr_depth: Option<u32>, option(value_name = "N"), applies(LIGHT), research;
         /// Clamp indirect radiance to X (reduces fireflies; biased) [default: off]
         firefly_clamp: Option<f64>, option(value_name = "X", value_parser = parse_positive, allow_hyphen_values = true), applies(LIGHT);
         /// Sampling strategy; all but the default are for comparison [default: mis]
-        sampling: Option<Strategy>, option(value_enum), applies(SAMPLED);
+        sampling: Option<Strategy>, option(value_enum), applies(SAMPLED), research;
         /// Compensate for energy lost to multiple scattering between microfacets (Turquin 2019)
         energy_compensation: bool, option(), applies(LIGHT);
         /// Albedo of all surfaces with --integrator ao-sky [default: 0.5]
-        sky_albedo: Option<f64>, option(value_name = "X", value_parser = parse_albedo, allow_hyphen_values = true), applies(SKY);
+        sky_albedo: Option<f64>, option(value_name = "X", value_parser = parse_albedo, allow_hyphen_values = true), applies(SKY), research;
         /// Ambient radiance of --integrator lit, linear RGB [default: 1,1,1]
         ambient: Option<DVec3>, option(value_name = "R,G,B", value_parser = parse_radiance, allow_hyphen_values = true), applies(AMBIENT);
         /// How the environment lights surfaces with --integrator lit [default: traced]
         environment_light: Option<EnvironmentLight>, option(value_enum), applies(AMBIENT);
-        /// Denoise the final image (biased): oidn, filter, or auto (oidn if it is installed). An .exr keeps the noisy image as noisy.R, noisy.G, noisy.B
-        /// [default: off; without METHOD: auto]
-        denoise: Option<DenoiseChoice>,
-            option(value_name = "METHOD", value_enum, num_args = 0..=1, require_equals = false, default_missing_value = "auto"), applies(LIGHT);
         /// Texture filter of paths [default: bilinear]
-        texture_filter: Option<TextureFilter>, option(value_enum), applies(TEXTURES);
+        texture_filter: Option<TextureFilter>, option(value_enum), applies(TEXTURES), research;
         /// f-number of a thin lens with a 36x24 mm sensor; scene units are taken as metres [default: a pinhole]
         f_number: Option<f64>,
             option(value_name = "N", value_parser = parse_positive, requires = "focus_distance", allow_hyphen_values = true), applies(CAMERA);

@@ -3,13 +3,13 @@
 //! [`Interactive`] holds the scene's tracers, [`View`] an image of it in progress. Several views share tracers, pipelines and the pose of the scene.
 
 pub mod pick;
-mod view;
+pub(super) mod view;
 
 use std::sync::Arc;
 
-use glam::DVec3;
-
-use super::{Renderer, TracerRequest, framing};
+use super::survey::framing;
+use super::survey::radius::{self, Openness};
+use super::{Renderer, TracerRequest};
 use crate::accel::features::Blend;
 use crate::accel::flatten::FlatScene;
 use crate::error::{Error, Result};
@@ -67,7 +67,7 @@ impl Renderer {
     /// # Errors
     /// Those of [`LightingSettings::apply`]; [`Error::Usage`] for an animation that the scene does not have.
     pub fn interactive(&mut self, lighting: &LightingSettings, animation: Option<usize>) -> Result<Interactive<'_>> {
-        self.light(lighting)?;
+        self.light_or_choose(lighting)?;
         // views build their own, and memory may not hold both
         self.tracer = None;
         let animation = match animation {
@@ -157,22 +157,22 @@ impl<'r> Interactive<'r> {
         if let Some(camera) = self.scene.cameras.first() {
             return Ok(camera.clone());
         }
-        let bounds = self.scene.bounds().ok_or_else(|| Error::Scene("the scene has no geometry to render".into()))?;
         if self.traced.is_empty() {
             self.traced_scene(Blend::Masked, Needs::default(), Vec::new(), control)?;
         }
-        framing::choose(bounds, aspect, &|rays| self.visible_surfaces(rays))
+        framing::choose(self.scene, aspect, None, &|rays| self.visible_surfaces(rays))
     }
 
-    /// Whether a place is inside a room: there are walls around it.
+    /// How open the surfaces are that a camera sees, by which an AO radius is chosen; `None` if it sees none.
     ///
     /// # Errors
     /// Those of the device.
-    pub fn is_enclosed(&mut self, eye: DVec3, control: &mut dyn Control) -> Result<bool> {
+    pub fn openness(&mut self, camera: &Camera, aspect: f64, control: &mut dyn Control) -> Result<Option<Openness>> {
         if self.traced.is_empty() {
             self.traced_scene(Blend::Masked, Needs::default(), Vec::new(), control)?;
         }
-        framing::is_enclosed(eye, &|rays| self.visible_surfaces(rays))
+        let size = self.scene.bounds().map_or(0.0, |(lo, hi)| (hi - lo).length());
+        radius::measure(camera, aspect, size, &|rays| self.visible_surfaces(rays))
     }
 
     /// Finds or builds the tracer for an integrator, and returns its index. A tracer that lacks scene data is replaced by one that has all that was needed so far.

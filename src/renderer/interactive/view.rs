@@ -254,7 +254,7 @@ impl View {
                 let (bytes, colour) = png::bytes_of(&shown, 0.0, Path::new("view"))?;
                 match colour {
                     png::Colour::Grey => bytes.iter().flat_map(|&g| [g, g, g, 255]).collect(),
-                    png::Colour::Rgb => bytes.chunks_exact(3).flat_map(|p| [p[0], p[1], p[2], 255]).collect(),
+                    _ => bytes.chunks_exact(3).flat_map(|p| [p[0], p[1], p[2], 255]).collect(),
                 }
             }
         };
@@ -317,13 +317,20 @@ impl View {
             let wanted = [Aov::Depth, Aov::Position, Aov::Ng, Aov::Ids];
             let pixels = crate::integrators::aov::render(&world.tracer, &record, self.size, control)?;
             image.channels.extend(crate::integrators::aov::channels(&wanted, &pixels, world.flat.origin));
-            let flags = render_flags(session.name, &self.settings, &session.scene.cameras, camera, self.size);
-            image.metadata = vec![
+            let flags = render_flags(
+                &crate::files::portable_name(session.name),
+                &self.settings,
+                &session.scene.cameras,
+                camera,
+                self.size,
+            );
+            image.metadata = crate::renderer::camera_numbers::metadata(camera, aspect).map(|(k, v)| (k.to_owned(), v)).to_vec();
+            image.metadata.extend([
                 ("camera".into(), crate::renderer::still::camera_text(camera)),
                 ("command".into(), flags),
-                ("scene".into(), session.name.to_owned()),
+                ("scene".into(), crate::files::portable_name(session.name)),
                 ("version".into(), env!("CARGO_PKG_VERSION").into()),
-            ];
+            ]);
         }
         Ok(image)
     }
@@ -412,6 +419,7 @@ pub fn camera_settings(cameras: &[Camera], camera: &Camera) -> CameraSettings {
     let distance = eye.abs().max_element().max(1.0);
     CameraSettings {
         camera: None,
+        view: None,
         eye: Some(eye),
         target: Some(eye + forward * distance),
         up: Some(to_world.matrix3.y_axis),
@@ -420,7 +428,7 @@ pub fn camera_settings(cameras: &[Camera], camera: &Camera) -> CameraSettings {
 }
 
 /// A word as a POSIX shell takes it.
-fn quoted(word: &str) -> String {
+pub(in crate::renderer) fn quoted(word: &str) -> String {
     let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_./,:=+@%".contains(c);
     if !word.is_empty() && word.chars().all(is_plain) { word.to_owned() } else { format!("'{}'", word.replace('\'', "'\\''")) }
 }

@@ -79,10 +79,10 @@ pub fn show(app: &mut App, context: &Context) {
 fn show_dialog(app: &mut App, context: &Context, mut dialog: Dialog) {
     let (title, label, action) = match &dialog {
         Dialog::Open(_) => ("Open a scene", "A file (.gltf, .glb, .obj, .brhan) or builtin:NAME", "Open"),
-        Dialog::Save(_) => ("Save the image", "A file: .png as shown, .exr with all channels", "Save"),
+        Dialog::Save(_) => ("Save the image", "A file: .png, .jpg or .webp as shown, .exr with all channels", "Save"),
         Dialog::LoadSettings(_) => ("Load settings", "A file of settings (.json)", "Load"),
         Dialog::SaveSettings(_) => ("Save settings", "A file of settings (.json)", "Save"),
-        Dialog::Render(..) => ("Render this view", "A file: .png, .exr, .apng or frames.####.png", "Render"),
+        Dialog::Render(..) => ("Render this view", "A file: .png, .exr, .jpg, .webp, .apng or frames.####.png", "Render"),
     };
     let (mut open, mut done, mut browses, before) = (true, false, false, app.dialog.clone());
     egui::Window::new(title)

@@ -65,7 +65,8 @@ pub fn edit(ui: &mut Ui, settings: Vec<Setting>, effective: &serde_json::Value) 
                         });
                         response.response
                     }
-                    Value::Flag(_) | Value::Other => return,
+                    // it has a control of its own
+                    Value::Length(_) | Value::Flag(_) | Value::Other => return,
                 };
                 changed |= response.labelled_by(label.id).on_hover_text(&help).changed();
             });

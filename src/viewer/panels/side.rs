@@ -4,7 +4,7 @@ use egui::{CollapsingHeader, ComboBox, Slider, Ui};
 
 use super::{editor, performance, round};
 use crate::integrators::Integrator;
-use crate::settings::{Capability, Setting};
+use crate::settings::{Capability, Length, Setting};
 use crate::tracer::TracerChoice;
 use crate::viewer::app::{App, Second};
 use crate::viewer::technique::{GROUPS, Technique};
@@ -109,15 +109,15 @@ fn occlusion(app: &mut App, ui: &mut Ui) {
     let size = app.control.as_ref().map_or(1.0, |c| c.scene_size());
     let ao = &mut app.settings.integrators.ao;
     ui.horizontal(|ui| {
-        let mut is_limited = ao.ao_radius.is_some();
+        let mut is_limited = ao.radius().is_finite();
         let check = ui.checkbox(&mut is_limited, "Radius").on_hover_text(
             "AO radius in scene units: hits beyond do not occlude. Without it, rays go on to infinity\n--ao-radius",
         );
         if check.changed() {
             // a tenth of the scene: corners are dark, rooms are not
-            ao.ao_radius = is_limited.then(|| round(0.1 * size));
+            ao.ao_radius = is_limited.then(|| Length::Units(round(0.1 * size)));
         }
-        if let Some(radius) = &mut ao.ao_radius {
+        if let (true, Some(Length::Units(radius))) = (is_limited, &mut ao.ao_radius) {
             let slider = Slider::new(radius, round(1e-3 * size)..=round(2.0 * size)).logarithmic(true).suffix(" units");
             ui.add(slider).labelled_by(check.id);
         }
@@ -208,7 +208,7 @@ fn paths(app: &mut App, ui: &mut Ui) {
     let effective = serde_json::json!({
         "rr_depth": 5, "min_depth": 0, "sampling": "mis", "texture_filter": "bilinear", "sky_albedo": 0.5,
     });
-    let all = applicable(app.settings.integrators.path.editable(), integrator, &["denoise"]);
+    let all = applicable(app.settings.integrators.path.editable(), integrator, &[]);
     editor::edit(ui, all, &effective);
 }
 

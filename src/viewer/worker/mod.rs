@@ -16,7 +16,8 @@ use super::request::{Comparison, DeviceSummary, Event, EventSender, Mailbox, Pro
 use crate::error::{Error, Result};
 use crate::film::{Control, NoControl};
 use crate::gpu::{self, Device};
-use crate::output::{self, ImageFormat, png};
+use crate::output::{self, FileSettings, ImageFormat, Picture, png};
+use crate::renderer::survey::Survey;
 use crate::renderer::{Interactive, Renderer};
 use crate::scene::{Camera, Scene};
 use crate::terminal::panic;
@@ -450,21 +451,20 @@ impl Session<'_> {
         }
         let aspect = f64::from(request.size[0]) / f64::from(request.size[1]);
         let given = &request.first_camera;
-        let chosen =
-            match (given.camera.is_some() || given.eye.is_some()).then(|| given.choose(self.interactive.scene(), aspect)) {
-                Some(Err(e)) => {
-                    self.events.send(Event::Warning(e.to_string()));
-                    None
-                }
-                given => given.transpose()?,
-            };
+        let chosen = match given.chooses().then(|| given.choose(&Survey::new(self.interactive.scene()), aspect)) {
+            Some(Err(e)) => {
+                self.events.send(Event::Warning(e.to_string()));
+                None
+            }
+            given => given.transpose()?,
+        };
         let camera = match chosen {
             Some(camera) => camera,
             None => self.interactive.choose_camera(aspect, &mut NoControl)?,
         };
         self.chose_camera = true;
-        let is_inside = self.interactive.is_enclosed(camera.camera_to_world.translation, &mut NoControl)?;
-        self.events.send(Event::Camera(Box::new(camera), is_inside));
+        let openness = self.interactive.openness(&camera, aspect, &mut NoControl)?;
+        self.events.send(Event::Camera(Box::new(camera), openness));
         Ok(())
     }
 
@@ -490,10 +490,11 @@ impl Session<'_> {
         let view = self.panes.get(pane).and_then(Pane::shown).ok_or_else(none)?;
         match ImageFormat::of(path)? {
             ImageFormat::Exr => output::save(&view.image(&self.interactive, &mut NoControl)?, path),
-            ImageFormat::Png => {
+            _ => {
                 let picture = view.picture()?.ok_or_else(none)?;
                 let rgb: Vec<u8> = picture.rgba.chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]]).collect();
-                png::write_rgb(path, &rgb, picture.size[0], picture.size[1])
+                let settings = FileSettings::default();
+                Picture::of_bytes(rgb, picture.size, png::Colour::Rgb)?.save(path, settings.jpeg_quality())
             }
         }
     }

@@ -31,7 +31,7 @@ use rig::{MeshVariant, RigBuilder};
 
 use super::{LoadOptions, compact};
 use crate::error::{Error, Result};
-use crate::scene::{Geometry, Instance, Mesh, Scene};
+use crate::scene::{FileExtension, Geometry, Instance, Mesh, Scene};
 
 /// Supported extensions.
 const KNOWN: &[&str] = &[
@@ -138,6 +138,11 @@ fn extensions(document: &Root, path: &Path, scene: &mut Scene) -> Result<()> {
         };
         return Err(Error::input(path, format!("requires the extension {name}, which skylit does not support: {remedy}")));
     }
+    scene.report.extensions.extend(document.extensions_used.iter().map(|name| FileExtension {
+        name: name.clone(),
+        required: document.extensions_required.contains(name),
+        ignored: !KNOWN.contains(&name.as_str()),
+    }));
     for name in document.extensions_used.iter().filter(|n| !KNOWN.contains(&n.as_str())) {
         scene.report.warnings.push(format!("the extension {name} is ignored"));
     }

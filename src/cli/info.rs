@@ -1,0 +1,366 @@
+//! `skylit info`: what a scene is made of, and how to begin with it.
+
+use clap::{Args, ValueHint};
+use glam::DVec3;
+use serde_json::json;
+
+use crate::error::{Error, Result};
+use crate::film::{Control, NoControl};
+use crate::renderer::interactive::camera_settings;
+use crate::renderer::settings::CameraSettings;
+use crate::renderer::{RenderSettings, Renderer};
+use crate::scene::inventory::Inventory;
+use crate::scene::{Camera, Scene, load};
+use crate::settings::Length;
+use crate::terminal::console::Failure;
+use crate::terminal::interrupt::{self, SilentControl};
+use crate::terminal::progress::Progress;
+use crate::terminal::warnings::{Warnings, warnings_of};
+use crate::tracer::DeviceSettings;
+
+/// Frames by which the time of a frame is estimated, and their size.
+const FRAMES: u32 = 4;
+const FRAME_SIZE: [u32; 2] = [1280, 720];
+/// Size and samples per pixel of the images by which brightness is estimated.
+const SKETCH_SIZE: [u32; 2] = [96, 54];
+const SKETCH_SPP: u32 = 8;
+/// Mean radiance of surfaces in a well exposed image.
+const MIDDLE_GREY: f64 = 0.2;
+
+/// `skylit info`.
+#[derive(Clone, Debug, Args)]
+#[command(before_help = "Examples:\n  skylit info scene.glb\n  skylit info scene.glb --no-device --json")]
+pub struct InfoArgs {
+    /// Scene file (.gltf, .glb, .obj, .brhan) or builtin:NAME
+    #[arg(value_hint = ValueHint::FilePath)]
+    pub scene: String,
+    /// Describe the file alone: no device is opened, and nothing is rendered
+    #[arg(long)]
+    pub no_device: bool,
+    /// Device and tracer
+    #[command(flatten)]
+    pub device: DeviceSettings,
+    /// Print one JSON record on stdout instead of text
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// How to begin with a scene.
+#[derive(Clone, Debug, serde::Serialize)]
+struct Suggestions {
+    /// Options of `skylit render` that choose the camera that it chooses by itself.
+    camera: String,
+    /// Share of occlusion rays of surfaces in view that get out of the scene.
+    ao_mean: Option<f64>,
+    /// What `--ao-radius auto` is, scene units; absent for no limit.
+    ao_radius: Option<f64>,
+    /// Exposure of path-traced images, stops.
+    exposure: Option<f64>,
+    /// What `skylit render` chooses where options leave it open, a sentence each.
+    choices: Vec<String>,
+}
+
+/// The scene on a device.
+#[derive(Clone, Debug, serde::Serialize)]
+struct OnDevice {
+    device: String,
+    tracer: String,
+    /// Bytes of the acceleration structures, and of the rest of the scene.
+    structure_bytes: u64,
+    scene_bytes: u64,
+    /// Median time of a frame of the preset `balanced` at 1280x720, milliseconds.
+    frame_ms: f64,
+}
+
+/// Loads a scene and describes it.
+pub fn run(args: &InfoArgs) -> Result<(), Failure> {
+    interrupt::install();
+    let console = crate::terminal::console::Console { json: args.json, quiet: false };
+    let scene = load::load(&args.scene)?;
+    let mut warnings = Warnings::new(console);
+    warnings_of(&scene).iter().for_each(|w| warnings.add(w));
+    let inventory = Inventory::of(&scene);
+    let format = format_of(&args.scene);
+    let extensions = scene.report.extensions.clone();
+    describe(&inventory, &scene, format).iter().try_for_each(|line| console.line(line))?;
+    let mut record = json!({
+        "scene": args.scene,
+        "format": format,
+        "unit": unit(format),
+        "extensions": extensions,
+        "files": scene.report.files,
+        "normals_computed": scene.report.normals_computed,
+        "tangents_computed": scene.report.tangents_computed,
+        "inventory": inventory,
+    });
+    if !args.no_device {
+        let mut progress = Progress::new("looking at the scene", &console);
+        match on_device(args, scene, &mut progress) {
+            Ok((suggestions, on_device)) => {
+                suggestions.lines(&args.scene).iter().chain(&on_device.lines()).try_for_each(|line| console.line(line))?;
+                record["suggestions"] = json!(suggestions);
+                record["device"] = json!(on_device);
+            }
+            // the file has been described, which needs none
+            Err(e @ Error::Device(_)) => {
+                warnings.add(&format!("no camera, memory and time are suggested: {e}"));
+            }
+            Err(e) => return Err(e.into()),
+        }
+    }
+    record["warnings"] = json!(warnings.list);
+    Ok(console.record(&record)?)
+}
+
+fn format_of(source: &str) -> &'static str {
+    if source.starts_with("builtin:") {
+        return "built-in";
+    }
+    let lower = source.to_ascii_lowercase();
+    match lower.rsplit('.').next() {
+        Some("glb") => "glTF 2.0, binary",
+        Some("gltf") => "glTF 2.0",
+        Some("obj") => "Wavefront OBJ",
+        Some("brhan") => "brhan",
+        _ => "built-in",
+    }
+}
+
+/// Unit of lengths.
+fn unit(format: &str) -> &'static str {
+    if format.starts_with("glTF") { "metre" } else { "not said by the file" }
+}
+
+fn describe(i: &Inventory, scene: &Scene, format: &str) -> Vec<String> {
+    let mut lines = Vec::new();
+    let mut add = |name: &str, text: String| lines.push(format!("{name:<12}{text}"));
+    add("scene", format!("{}, {format}; unit of lengths: {}", scene.name, unit(format)));
+    if let Some([lo, hi]) = i.bounds {
+        let corner = |c: [f64; 3]| c.map(significant).join(", ");
+        add("bounds", format!("{} to {}, diagonal {}", corner(lo), corner(hi), significant(i.diagonal)));
+    }
+    let instanced =
+        if i.triangles == i.unique_triangles { String::new() } else { format!(" ({} unique)", grouped(i.unique_triangles)) };
+    let spheres = if i.spheres > 0 { format!(", {}", counted(i.spheres, "sphere", "spheres")) } else { String::new() };
+    add(
+        "geometry",
+        format!(
+            "{}{instanced}{spheres}; {} of {}",
+            counted(i.triangles, "triangle", "triangles"),
+            counted(i.instances as u64, "instance", "instances"),
+            counted(i.meshes as u64, "mesh", "meshes")
+        ),
+    );
+    let edges = if i.open_edges > 0 {
+        format!(
+            "{}; {} of {} meshes are closed",
+            counted(i.open_edges, "open edge, where a surface ends", "open edges, where surfaces end"),
+            i.closed_meshes,
+            i.meshes
+        )
+    } else {
+        "no open edges".to_owned()
+    };
+    let dropped = if i.degenerate_triangles > 0 {
+        format!("; {} dropped", counted(i.degenerate_triangles as u64, "degenerate triangle was", "degenerate triangles were"))
+    } else {
+        String::new()
+    };
+    add("surfaces", format!("{edges}{dropped}"));
+    let joined = |all: &mut dyn Iterator<Item = (String, usize)>| {
+        all.map(|(name, n)| format!("{n} {name}")).collect::<Vec<_>>().join(", ")
+    };
+    add("materials", joined(&mut i.materials.iter().map(|(k, n)| (k.clone(), *n))));
+    if i.textures.count > 0 {
+        let t = &i.textures;
+        add(
+            "textures",
+            format!(
+                "{} of {} images, {:.1} MiB decoded, the largest {}x{}",
+                t.count,
+                t.images,
+                mib(t.bytes),
+                t.largest[0],
+                t.largest[1]
+            ),
+        );
+    }
+    let named = |name: &String| if name.is_empty() { "without a name".to_owned() } else { name.clone() };
+    add(
+        "cameras",
+        if i.cameras.is_empty() { "none".into() } else { i.cameras.iter().map(named).collect::<Vec<_>>().join(", ") },
+    );
+    let lights = joined(&mut i.lights.iter().map(|(k, n)| ((*k).to_owned(), *n)));
+    add("lights", format!("{}; environment: {}", if lights.is_empty() { "none" } else { &lights }, i.environment));
+    if !i.animations.is_empty() || !i.skins.is_empty() {
+        let animation = |(name, seconds): &(String, f64)| format!("{} ({seconds:.2} s)", named(name));
+        let animations = i.animations.iter().map(animation).collect::<Vec<_>>().join(", ");
+        let skins = i.skins.iter().map(|joints| format!("{joints} joints")).collect::<Vec<_>>().join(", ");
+        let skins = if skins.is_empty() { String::new() } else { format!("; skins: {skins}") };
+        let targets = if i.morph_targets > 0 { format!("; {} morph targets", i.morph_targets) } else { String::new() };
+        add("animations", format!("{}{skins}{targets}", if animations.is_empty() { "none" } else { &animations }));
+    }
+    let extensions = &scene.report.extensions;
+    if !extensions.is_empty() {
+        let of = |e: &crate::scene::FileExtension| {
+            let notes: Vec<&str> =
+                [(e.required, "required"), (e.ignored, "ignored")].into_iter().filter(|n| n.0).map(|n| n.1).collect();
+            if notes.is_empty() { e.name.clone() } else { format!("{} ({})", e.name, notes.join(", ")) }
+        };
+        add("extensions", extensions.iter().map(of).collect::<Vec<_>>().join(", "));
+    }
+    lines
+}
+
+fn on_device(args: &InfoArgs, scene: Scene, progress: &mut Progress) -> Result<(Suggestions, OnDevice)> {
+    let device = crate::gpu::Device::open(&args.device.options())?;
+    let mut renderer = Renderer::new(device, scene, &args.device)?.with_name(&args.scene);
+    let mut control = SilentControl;
+    let mut settings = RenderSettings::default();
+    settings.image.size = Some(SKETCH_SIZE);
+    settings.image.spp = Some(SKETCH_SPP);
+
+    let by_itself = renderer.complete(&settings, None)?;
+    settings.camera = camera_settings(&renderer.scene().cameras, &by_itself.camera);
+    let camera = camera_text(&settings.camera, &by_itself.camera);
+    progress.set(1, 4);
+    let mut open = settings.clone();
+    open.integrators.ao.ao_radius = Some(Length::Units(f64::INFINITY));
+    let ao_mean = renderer.still(&open, &mut Quiet(&mut control))?.report.surface_mean;
+    let mut auto = settings.clone();
+    auto.integrators.ao.ao_radius = Some(Length::Auto);
+    let auto_radius = renderer.complete(&auto, None)?.settings.integrators.ao.radius();
+    progress.set(2, 4);
+    let mut path = settings.clone();
+    path.integrator = Some("path".parse()?);
+    let path = renderer.still(&path, &mut Quiet(&mut control))?.report;
+    // less than two stops are a matter of taste
+    let stops = |mean: f64| Some((MIDDLE_GREY / mean).log2().round() + 0.0).filter(|s: &f64| s.abs() >= 2.0).unwrap_or(0.0);
+    let exposure = path.surface_mean.filter(|m| *m > 0.0).map(stops);
+    let choices = by_itself.choices.into_iter().chain(path.setup.choices).collect();
+
+    progress.set(3, 4);
+    let mut frames = RenderSettings { camera: settings.camera.clone(), ..Default::default() };
+    frames.image.size = Some(FRAME_SIZE);
+    frames.frames.preset = Some(crate::realtime::Preset::Balanced);
+    frames.frames.warm_up = Some(1);
+    frames.frames.frames = Some(crate::realtime::frame_settings::FrameRange { first: 0, end: FRAMES });
+    let mut frames = renderer.frames(&frames, false, &mut NoControl)?;
+    while frames.advance()?.is_some() {
+        control.should_stop()?;
+    }
+    let report = frames.report();
+    let on_device = OnDevice {
+        device: report.setup.device.clone(),
+        tracer: report.setup.tracer.to_string(),
+        structure_bytes: report.setup.stats.structure_bytes,
+        scene_bytes: path.setup.stats.scene_bytes,
+        frame_ms: report.frame_ms().0,
+    };
+    let ao_radius = Some(auto_radius).filter(|r| r.is_finite());
+    Ok((Suggestions { camera, ao_mean, ao_radius, exposure, choices }, on_device))
+}
+
+/// Interruption without progress and warnings: what is rendered here is not the user's image.
+struct Quiet<'a>(&'a mut SilentControl);
+
+impl Control for Quiet<'_> {
+    fn should_stop(&mut self) -> Result<bool> {
+        self.0.should_stop()
+    }
+}
+
+impl Suggestions {
+    fn lines(&self, scene: &str) -> Vec<String> {
+        let mut lines = vec![format!("{:<12}{}", "camera", self.camera)];
+        let radius = match self.ao_radius {
+            Some(radius) => format!("--ao-radius {radius}"),
+            None => "no AO radius is needed".into(),
+        };
+        if let Some(mean) = self.ao_mean {
+            lines.push(format!(
+                "{:<12}{radius}; without a radius surfaces in view are {:.0} % open",
+                "occlusion",
+                100.0 * mean
+            ));
+        }
+        match self.exposure {
+            Some(0.0) => lines.push(format!("{:<12}path-traced images need none", "exposure")),
+            Some(stops) => lines.push(format!("{:<12}--exposure {stops} for path tracing", "exposure")),
+            None => lines.push(format!("{:<12}path-traced images are black: no light reaches what is in view", "exposure")),
+        }
+        lines.extend(self.choices.iter().map(|c| format!("{:<12}{c}", "by itself")));
+        lines.push(format!("{:<12}skylit render {scene} -o ao.png --preset balanced", "try"));
+        lines
+    }
+}
+
+impl OnDevice {
+    fn lines(&self) -> Vec<String> {
+        vec![
+            format!("{:<12}{}, tracer {}", "device", self.device, self.tracer),
+            format!(
+                "{:<12}{:.1} MiB: acceleration structures {:.1}, the rest of the scene {:.1} (with materials and textures)",
+                "memory",
+                mib(self.structure_bytes + self.scene_bytes),
+                mib(self.structure_bytes),
+                mib(self.scene_bytes)
+            ),
+            format!("{:<12}{:.0} ms a frame of the preset balanced at 1280x720", "time", self.frame_ms),
+        ]
+    }
+}
+
+fn mib(bytes: u64) -> f64 {
+    bytes as f64 / (1u64 << 20) as f64
+}
+
+/// A number with four significant digits, without noise.
+fn significant(value: f64) -> String {
+    let rounded: f64 = format!("{value:.3e}").parse().unwrap_or(value);
+    // no negative zero
+    (rounded + 0.0).to_string()
+}
+
+/// Options that choose a camera.
+fn camera_text(settings: &CameraSettings, camera: &Camera) -> String {
+    if let Some(name) = &settings.camera {
+        return format!("--camera {name}");
+    }
+    let (eye, forward) = (camera.camera_to_world.translation, -camera.camera_to_world.matrix3.z_axis);
+    let vector = |v: DVec3| v.to_array().map(significant).join(",");
+    // as far away as directions need to survive the rounding
+    let target = eye + forward * eye.abs().max_element().max(1.0);
+    let fov_y = settings.fov_y.map_or_else(String::new, |f| format!(" --fov-y {}", significant(f)));
+    format!("--eye={} --target={}{fov_y}", vector(eye), vector(target))
+}
+
+/// One, or several of something.
+fn counted(count: u64, one: &str, several: &str) -> String {
+    format!("{} {}", grouped(count), if count == 1 { one } else { several })
+}
+
+/// 1,234,567.
+fn grouped(value: u64) -> String {
+    let digits = value.to_string();
+    let of = |(k, c): (usize, char)| {
+        let comma = k > 0 && (digits.len() - k).is_multiple_of(3);
+        comma.then_some(',').into_iter().chain([c])
+    };
+    digits.chars().enumerate().flat_map(of).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_readable() {
+        assert_eq!([0, 12, 1234, 1_234_567].map(grouped), ["0", "12", "1,234", "1,234,567"]);
+        assert_eq!([0.123456, -0.0, 12345.678, -1e-9].map(significant), ["0.1235", "0", "12350", "-0.000000001"]);
+        assert_eq!(
+            ["a/b.GLB", "x.gltf", "builtin:stairs", "stairs"].map(format_of)[..3],
+            ["glTF 2.0, binary", "glTF 2.0", "built-in"]
+        );
+    }
+}

@@ -1,0 +1,82 @@
+//! Whether an image shows anything: its mean over the pixels that show surfaces, and what to do about one that is all but black or white.
+
+use crate::film::accumulate::Accumulated;
+use crate::settings::Capability;
+
+/// Images whose mean is outside of this range are warned about.
+const RANGE: [f64; 2] = [0.02, 0.98];
+/// Share of a pixel that surfaces must cover to count.
+const COVERED: f32 = 0.99;
+/// Luminance of linear sRGB.
+const LUMINANCE: [f64; 3] = [0.2126, 0.7152, 0.0722];
+
+/// The mean of the pixels that show nothing but surfaces: of one channel, or the luminance of three. `None` if there are no such pixels.
+pub fn of_surfaces(image: &Accumulated, channels: usize) -> Option<f64> {
+    let film = &image.film;
+    let weights: &[f64] = if channels == 3 { &LUMINANCE } else { &[1.0] };
+    let count = film.coverage.iter().filter(|a| **a >= COVERED).count();
+    let sum = |c: usize| -> f64 {
+        film.plane(c).iter().zip(&film.coverage).filter(|(_, a)| **a >= COVERED).map(|(v, _)| f64::from(*v)).sum()
+    };
+    (count > 0).then(|| weights.iter().enumerate().map(|(c, w)| w * sum(c)).sum::<f64>() / count as f64)
+}
+
+/// What is wrong with an image of this mean, and what to do about it; `None` if nothing is. `capabilities`: of its integrator, `exposure` in stops.
+pub fn warning(mean: f64, capabilities: &[Capability], exposure: f64) -> Option<String> {
+    use Capability::{AmbientOcclusion, SceneLights, WhiteSky};
+    let [least, most] = RANGE;
+    let can = |c| capabilities.contains(&c);
+    if can(SceneLights) {
+        let shown = mean * exposure.exp2();
+        // a surface of middle grey
+        let stops = (0.2 / mean.max(1e-30)).log2().round();
+        return match shown {
+            // nothing makes it brighter
+            _ if mean <= 0.0 => None,
+            v if v < least => Some(format!(
+                "the image is all but black: surfaces have a mean radiance of {mean:.2e}; --exposure {stops} shows them"
+            )),
+            v if v > most => Some(format!(
+                "the image is all but white: surfaces have a mean radiance of {mean:.3}; --exposure {stops} or --tone-map agx shows them"
+            )),
+            _ => None,
+        };
+    }
+    if !can(AmbientOcclusion) && !can(WhiteSky) {
+        return None;
+    }
+    let darker = if can(AmbientOcclusion) {
+        "--ao-radius auto (or a number, or 5%) limits how far occluders reach"
+    } else {
+        "the sky does not reach what the camera sees; --view chooses another camera"
+    };
+    match mean {
+        v if v < least => Some(format!("the image is all but black: surfaces in view are {:.1} % open; {darker}", 100.0 * v)),
+        v if v > most => Some(format!(
+            "the image is all but white: surfaces in view are {:.1} % open; --view inside, --eye and --target look at another place{}",
+            100.0 * v,
+            if can(AmbientOcclusion) { ", a larger --ao-radius finds occluders farther away" } else { "" }
+        )),
+        _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_shows_nothing_is_warned_about() {
+        use Capability::{AmbientLight, AmbientOcclusion, SceneLights, WhiteSky};
+        let of = |mean: f64, capabilities: &[Capability]| warning(mean, capabilities, 0.0).unwrap_or_default();
+        assert!(of(0.001, &[AmbientOcclusion]).contains("--ao-radius auto"));
+        assert!(of(0.999, &[AmbientOcclusion]).contains("--view inside"));
+        assert!(of(0.001, &[WhiteSky]).contains("--view"));
+        assert!(of(0.002, &[SceneLights]).contains("--exposure 7 "));
+        assert!(of(3.2, &[SceneLights, AmbientOcclusion, AmbientLight]).contains("--exposure -4 "));
+        for fine in [of(0.5, &[AmbientOcclusion]), of(0.0, &[SceneLights]), of(0.0, &[]), of(0.3, &[SceneLights])] {
+            assert_eq!(fine, "");
+        }
+        assert!(warning(0.002, &[SceneLights], 7.0).is_none());
+    }
+}

@@ -1,0 +1,94 @@
+//! A camera as numbers, for metadata and reports: position and direction as settings have them, and the matrices of the OpenEXR standard.
+
+use glam::DMat4;
+use serde_json::{Value, json};
+
+use crate::output::exr::{WORLD_TO_CAMERA, WORLD_TO_NDC, matrix_text};
+use crate::scene::{Camera, Projection};
+
+/// Metadata key of [`pose`].
+pub const POSE: &str = "camera_pose";
+
+/// Position (`eye`), a point in the middle of the image (`target`), up vector (`up`), scene units; and vertical field of view in degrees (`fov_y`), or half of the height of the image in
+/// scene units (`half_height`) if the camera is orthographic. As `--eye`, `--target`, `--up` and `--fov-y` they give the same camera.
+pub fn pose(camera: &Camera) -> Value {
+    let m = &camera.camera_to_world;
+    // far enough for the direction to survive the sum
+    let target = m.translation - m.matrix3.z_axis * m.translation.abs().max_element().max(1.0);
+    let mut pose = json!({
+        "eye": m.translation.to_array(),
+        "target": target.to_array(),
+        "up": m.matrix3.y_axis.to_array(),
+    });
+    match camera.projection {
+        Projection::Perspective { fov_y } => pose["fov_y"] = json!(fov_y.to_degrees()),
+        Projection::Orthographic { half_height } => pose["half_height"] = json!(half_height),
+    }
+    pose
+}
+
+/// The matrices from world space to camera space, and to normalized device coordinates of an image of `aspect` = width / height. They multiply columns; z / w is 1 - 1 / distance in
+/// scene units along the view direction if the camera is a perspective one, else this distance.
+pub fn matrices(camera: &Camera, aspect: f64) -> [DMat4; 2] {
+    let to_camera = DMat4::from(camera.camera_to_world.inverse());
+    let columns = |half: f64, z: [f64; 2], w: [f64; 2]| {
+        DMat4::from_cols_array(
+            &[
+                [1.0 / (half * aspect), 0.0, 0.0, 0.0],
+                [0.0, 1.0 / half, 0.0, 0.0],
+                [0.0, 0.0, z[0], w[0]],
+                [0.0, 0.0, z[1], w[1]],
+            ]
+            .as_flattened()
+            .try_into()
+            .unwrap_or([0.0; 16]),
+        )
+    };
+    let projection = match camera.projection {
+        Projection::Perspective { fov_y } => columns((fov_y * 0.5).tan(), [-1.0, -1.0], [-1.0, 0.0]),
+        Projection::Orthographic { half_height } => columns(half_height, [-1.0, 0.0], [0.0, 1.0]),
+    };
+    [to_camera, projection * to_camera]
+}
+
+/// Metadata of a camera: its pose as JSON, and its matrices.
+pub fn metadata(camera: &Camera, aspect: f64) -> [(&'static str, String); 3] {
+    // no -0; columns of a matrix that multiplies columns are rows of one that multiplies rows, as EXR files have it
+    let [to_camera, to_ndc] = matrices(camera, aspect).map(|m| matrix_text(&m.to_cols_array().map(|v| v as f32 + 0.0)));
+    [(POSE, pose(camera).to_string()), (WORLD_TO_CAMERA, to_camera), (WORLD_TO_NDC, to_ndc)]
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::{DVec3, DVec4};
+
+    use super::*;
+
+    #[test]
+    fn matrices_project_points() {
+        let (eye, target) = (DVec3::new(1.0, 2.0, 3.0), DVec3::new(-4.0, 0.5, -2.0));
+        let (fov_y, aspect) = (0.7f64, 1.5);
+        let mut camera = Camera::look_at(eye, target, DVec3::Y, fov_y);
+        let m = camera.camera_to_world;
+        let half = (fov_y * 0.5).tan();
+        // a point at the right and a quarter above the middle of the image, four units away
+        let point = eye + 4.0 * (-m.matrix3.z_axis + m.matrix3.x_axis * half * aspect + m.matrix3.y_axis * half * 0.5);
+        let near = |a: DVec4, b: [f64; 4]| assert!((a - DVec4::from_array(b)).abs().max_element() < 1e-12, "{a} {b:?}");
+        let [to_camera, to_ndc] = matrices(&camera, aspect);
+        near(to_camera * point.extend(1.0), [4.0 * half * aspect, 2.0 * half, -4.0, 1.0]);
+        let projected = to_ndc * point.extend(1.0);
+        near(projected / projected.w, [1.0, 0.5, 0.75, 1.0]);
+        camera.projection = Projection::Orthographic { half_height: 3.0 };
+        let point = eye + m.matrix3 * DVec3::new(-4.5, 1.5, -7.0);
+        near(matrices(&camera, aspect)[1] * point.extend(1.0), [-1.0, 0.5, 7.0, 1.0]);
+        // rows of the standard: the translation is at the end
+        let [(_, pose), (_, text), _] = metadata(&Camera::look_at(DVec3::Z, DVec3::ZERO, DVec3::Y, 1.0), 1.0);
+        assert_eq!(text, "1,0,0,0,0,1,0,0,0,0,1,0,0,0,-1,1");
+        let pose: Value = serde_json::from_str(&pose).unwrap();
+        assert_eq!(
+            (&pose["eye"], &pose["target"], &pose["up"]),
+            (&json!([0.0, 0.0, 1.0]), &json!([0.0, 0.0, 0.0]), &json!([0.0, 1.0, 0.0]))
+        );
+        assert!((pose["fov_y"].as_f64().unwrap() - 1f64.to_degrees()).abs() < 1e-12);
+    }
+}

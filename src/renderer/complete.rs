@@ -1,0 +1,138 @@
+//! What settings leave open, completed by the scene: the camera, the AO radius, and light where there is none.
+
+use super::survey::radius::{CLOSED, TARGET};
+use super::survey::{Survey, framing, light, radius};
+use super::{RenderSettings, Renderer};
+use crate::error::Result;
+use crate::integrators::lighting::LightingSettings;
+use crate::scene::Camera;
+use crate::settings::{Capability, Length};
+
+/// AO radius of scenes that are too large to be looked at, as a share of the diagonal.
+const LARGE_SCENE_RADIUS: f64 = 0.05;
+
+/// Width over height of a window whose size is not known yet.
+const ASPECT: f64 = 16.0 / 9.0;
+
+/// Settings with nothing left open.
+pub struct Completed {
+    /// The camera.
+    pub camera: Camera,
+    /// The settings, whose AO radius is a number of scene units.
+    pub settings: RenderSettings,
+    /// What was chosen, and how to choose otherwise, a sentence each.
+    pub choices: Vec<String>,
+}
+
+impl Renderer {
+    /// Lights the scene as settings say and completes them. `camera`: instead of that of the settings.
+    ///
+    /// # Errors
+    /// Those of the settings that do not fit the scene.
+    pub fn complete(&mut self, settings: &RenderSettings, camera: Option<Camera>) -> Result<Completed> {
+        let is_default = settings.lighting == LightingSettings::default();
+        let integrator = settings.integrator().get();
+        let capabilities = integrator.capabilities();
+        // what has ambient light is not black without another
+        let needs_light = capabilities.contains(&Capability::SceneLights) && !capabilities.contains(&Capability::AmbientLight);
+        // the light that was chosen for a dark scene stays as long as it makes no difference: nothing is built again
+        let stays = self.lighting.is_automatic && is_default && (needs_light || !integrator.sees_environment());
+        if !stays {
+            self.light(&settings.lighting)?;
+        }
+        let size = settings.size(&self.scene);
+        crate::output::check_size(size[0], size[1])?;
+        let aspect = f64::from(size[0]) / f64::from(size[1]);
+        let survey = Survey::new(&self.scene);
+        let camera = match camera {
+            Some(camera) => camera,
+            None => settings.camera.choose(&survey, aspect)?,
+        };
+        let mut choices = Vec::new();
+        let mut settings = settings.clone();
+        if capabilities.contains(&Capability::AmbientOcclusion) {
+            let chosen = ao_radius(settings.integrators.ao.ao_radius, &survey, &camera, aspect)?;
+            settings.integrators.ao.ao_radius = chosen.units.map(Length::Units);
+            choices.extend(chosen.sentence);
+        }
+        if is_default && needs_light && (self.lighting.is_automatic || self.scene.is_dark()) {
+            let (lighting, words) = light::choose(&survey, &camera, aspect)?;
+            let options = super::settings::light_options(&lighting);
+            choices.push(format!("light: the scene has none and gets {words} ({options}); --environment none leaves it dark"));
+            self.light(&lighting)?;
+            self.lighting.is_automatic = true;
+        }
+        Ok(Completed { camera, settings, choices })
+    }
+
+    /// Light for a dark scene that is looked at from many places, by integrators of which some need it.
+    ///
+    /// # Errors
+    /// Those of [`LightingSettings::apply`].
+    pub(super) fn light_or_choose(&mut self, lighting: &LightingSettings) -> Result<()> {
+        self.light(lighting)?;
+        if *lighting == LightingSettings::default() && self.scene.is_dark() {
+            let survey = Survey::new(&self.scene);
+            let Ok((lo, hi)) = survey.bounds() else { return Ok(()) };
+            let camera = match self.scene.cameras.first() {
+                Some(camera) => camera.clone(),
+                // from the middle of a scene it is found out whether it is a closed room, without a hierarchy
+                None if survey.is_small() && survey.walls((lo + hi) * 0.5).is_some() => {
+                    framing::of_scene(&survey, ASPECT, None)?
+                }
+                None => Camera::framing(lo, hi, ASPECT),
+            };
+            let (lighting, _) = light::choose(&survey, &camera, ASPECT)?;
+            self.light(&lighting)?;
+            self.lighting.is_automatic = true;
+        }
+        Ok(())
+    }
+}
+
+/// An AO radius, and what there is to say about it.
+struct ChosenRadius {
+    /// Scene units; `None` for no limit that anyone asked for.
+    units: Option<f64>,
+    sentence: Option<String>,
+}
+
+fn ao_radius(wanted: Option<Length>, survey: &Survey, camera: &Camera, aspect: f64) -> Result<ChosenRadius> {
+    let say = |units: f64, sentence: String| Ok(ChosenRadius { units: Some(units), sentence: Some(sentence) });
+    let unlimited = || Ok(ChosenRadius { units: None, sentence: None });
+    let diagonal = survey.diagonal();
+    match wanted {
+        Some(Length::Units(units)) => return Ok(ChosenRadius { units: Some(units), sentence: None }),
+        Some(length @ Length::OfDiagonal(share)) => {
+            let units = share * diagonal;
+            return say(units, format!("AO radius: {units} scene units, {length} of the scene's diagonal"));
+        }
+        None if !survey.is_small() || survey.walls(camera.camera_to_world.translation).is_none() => return unlimited(),
+        Some(Length::Auto) if !survey.is_small() => {
+            let units = LARGE_SCENE_RADIUS * diagonal;
+            return say(
+                units,
+                format!(
+                    "AO radius: {units} scene units, 5% of the scene's diagonal, for the scene is too large to be looked at"
+                ),
+            );
+        }
+        Some(Length::Auto) | None => {}
+    }
+    let Some(seen) = radius::measure(camera, aspect, diagonal, &|rays| survey.trace(rays))? else { return unlimited() };
+    if wanted.is_none() && seen.open >= CLOSED {
+        return unlimited();
+    }
+    let target = 100.0 * TARGET;
+    let open = format!("{:.0} % of occlusion rays get out of the scene", 100.0 * seen.open);
+    match seen.radius.is_finite() {
+        true => say(
+            seen.radius,
+            format!(
+                "AO radius: {} scene units, at which surfaces in view are {target} % open on average; without a radius {open} (--ao-radius inf)",
+                seen.radius
+            ),
+        ),
+        false => say(f64::INFINITY, format!("AO radius: no limit, for {open}")),
+    }
+}

@@ -1,0 +1,398 @@
+//! The camera of a scene that has none: chosen by what cameras inside and outside would see, or named.
+
+use std::f64::consts::TAU;
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use super::rays::camera_ray;
+use super::{Survey, Trace, VisibleSurface};
+use crate::error::{Error, Result};
+use crate::scene::{Camera, Geometry, Scene};
+use crate::settings::choices;
+
+choices! {
+    /// Cameras that look at the whole scene, or at a room from inside. Models face +z, +y is up (glTF).
+    pub enum ViewName {
+        /// From +z
+        Front = "front",
+        /// From -z
+        Back = "back",
+        /// From -x, which is on the left of the view from the front
+        Left = "left",
+        /// From +x
+        Right = "right",
+        /// From above; the front is below
+        Top = "top",
+        /// From the front, right and above, at equal angles with all three axes
+        Iso = "iso",
+        /// From the place inside with the longest view
+        Inside = "inside",
+    }
+}
+
+impl ViewName {
+    /// Direction from the scene to the camera, and up; `None` from inside.
+    fn direction(self) -> Option<(DVec3, DVec3)> {
+        Some(match self {
+            Self::Front => (DVec3::Z, DVec3::Y),
+            Self::Back => (DVec3::NEG_Z, DVec3::Y),
+            Self::Left => (DVec3::NEG_X, DVec3::Y),
+            Self::Right => (DVec3::X, DVec3::Y),
+            Self::Top => (DVec3::Y, DVec3::NEG_Z),
+            Self::Iso => (DVec3::ONE, DVec3::Y),
+            Self::Inside => return None,
+        })
+    }
+}
+
+/// Directions, close to the horizontal, in which it is tested whether there are walls.
+const PROBES: usize = 96;
+/// Share of them that must see the front of something for a place to be inside a room: from inside an object they see backs.
+const ENCLOSED: f64 = 0.93;
+/// Nine in ten of them see nothing nearer than this share of the scene's diagonal: rooms are empty in the middle, vehicles are not.
+const CLEARANCE: f64 = 0.04;
+/// Places inside a room that are compared, along each axis of its floor, and their heights as shares of the scene's.
+const PLACES: usize = 5;
+const HEIGHTS: [f64; 2] = [0.2, 0.35];
+/// Directions that are compared at each place.
+const HEADINGS: usize = 12;
+/// Rays of a view that is compared, along its width and height.
+const VIEW: [usize; 2] = [12, 8];
+/// Vertical field of view inside, and outside, radians.
+const INSIDE_FOV_Y: f64 = 1.05;
+const OUTSIDE_FOV_Y: f64 = std::f64::consts::FRAC_PI_4;
+/// Cameras outside that are compared: degrees from the front to the right and upwards, and how much they are preferred. The first is what most models are made for;
+/// another must show clearly more.
+const OUTSIDE: [([f64; 2], f64); 12] = [
+    ([19.0, 16.0], 1.15),
+    ([-19.0, 16.0], 1.05),
+    ([19.0, 35.0], 1.05),
+    ([-19.0, 35.0], 1.0),
+    ([60.0, 16.0], 0.9),
+    ([-60.0, 16.0], 0.9),
+    ([60.0, 35.0], 0.9),
+    ([-60.0, 35.0], 0.9),
+    ([120.0, 20.0], 0.85),
+    ([-120.0, 20.0], 0.85),
+    ([161.0, 16.0], 0.85),
+    ([-161.0, 35.0], 0.85),
+];
+/// Above this number of points, the corners of each instance's box stand for its vertices.
+const MAX_POINTS: u64 = 8_000_000;
+
+/// Chooses a camera for images of `aspect` = width / height, with this vertical field of view in radians, if one is given. Inside means: from the middle of the scene there is something in
+/// nearly all horizontal directions, seen from its front, and none of it close. Then it is the place and direction with the longest view; else the camera sees
+/// the whole scene, from the side that shows most fronts and most directions of surfaces.
+///
+/// # Errors
+/// Those of `trace`; [`Error::Scene`] for a scene without geometry.
+pub fn choose(scene: &Scene, aspect: f64, fov_y: Option<f64>, trace: &Trace) -> Result<Camera> {
+    let bounds = scene.bounds().ok_or_else(no_geometry)?;
+    if !is_room(bounds, trace)? {
+        let (outside, score) = outside(scene, aspect, fov_y, trace)?;
+        if score >= 0.0 {
+            return Ok(outside);
+        }
+        // from all sides it shows backs more than fronts: walls that face what is between them
+        let (inside, score) = inside(bounds, aspect, fov_y, trace)?;
+        return Ok(if score > 0.0 { inside } else { outside });
+    }
+    Ok(inside(bounds, aspect, fov_y, trace)?.0)
+}
+
+/// The camera with this name, for images of `aspect` = width / height.
+///
+/// # Errors
+/// [`Error::Scene`] for a scene without geometry, or too large to be looked at from inside.
+pub fn named(survey: &Survey, name: ViewName, aspect: f64, fov_y: Option<f64>) -> Result<Camera> {
+    let camera = match name.direction() {
+        Some((from, up)) => enclosing(survey.scene, from, up, aspect, fov_y)?,
+        None if !survey.is_small() => {
+            return Err(Error::Scene(
+                "--view inside: the scene has too many triangles to look for a place; give --eye and --target".into(),
+            ));
+        }
+        None => inside(survey.bounds()?, aspect, fov_y, &|rays| survey.trace(rays))?.0,
+    };
+    Ok(Camera { name: name.to_string(), ..camera })
+}
+
+/// The camera of a scene that has none, as [`choose`] finds it by rays that are traced on the host.
+///
+/// # Errors
+/// [`Error::Scene`] for a scene without geometry.
+pub fn of_scene(survey: &Survey, aspect: f64, fov_y: Option<f64>) -> Result<Camera> {
+    if survey.is_small() {
+        return choose(survey.scene, aspect, fov_y, &|rays| survey.trace(rays));
+    }
+    let (from, _) = OUTSIDE[0];
+    enclosing(survey.scene, direction(from), DVec3::Y, aspect, fov_y)
+}
+
+fn no_geometry() -> Error {
+    Error::Scene("the scene has no geometry to render".into())
+}
+
+/// Direction of degrees from the front to the right and upwards.
+fn direction([azimuth, elevation]: [f64; 2]) -> DVec3 {
+    let ((sin_a, cos_a), (sin_e, cos_e)) = (azimuth.to_radians().sin_cos(), elevation.to_radians().sin_cos());
+    DVec3::new(sin_a * cos_e, sin_e, cos_a * cos_e)
+}
+
+/// A camera that sees the whole scene, as large as fits.
+fn enclosing(scene: &Scene, from: DVec3, up: DVec3, aspect: f64, fov_y: Option<f64>) -> Result<Camera> {
+    Camera::enclosing(&hull(scene), from, up, fov_y.unwrap_or(OUTSIDE_FOV_Y), aspect).ok_or_else(no_geometry)
+}
+
+/// What a camera has to hold: vertices and spheres in world space.
+fn hull(scene: &Scene) -> Vec<(DVec3, f64)> {
+    let count = |i: &crate::scene::Instance| match &scene.meshes[i.mesh].geometry {
+        Geometry::Triangles(t) => t.positions.len() as u64,
+        Geometry::Spheres(s) => s.len() as u64,
+    };
+    let exact = scene.instances.iter().map(count).sum::<u64>() <= MAX_POINTS;
+    scene
+        .instances
+        .par_iter()
+        .flat_map_iter(|instance| {
+            let to_world = &instance.object_to_world;
+            let place = |p: DVec3| to_world.transform_point3(p);
+            let geometry = &scene.meshes[instance.mesh].geometry;
+            let points: Vec<(DVec3, f64)> = match geometry {
+                Geometry::Triangles(t) if exact => t.positions.iter().map(|p| (place(p.as_dvec3()), 0.0)).collect(),
+                Geometry::Spheres(spheres) if exact => {
+                    let m = &to_world.matrix3;
+                    let scale = m.x_axis.length().max(m.y_axis.length()).max(m.z_axis.length());
+                    spheres.iter().map(|s| (place(s.center.as_dvec3()), scale * f64::from(s.radius))).collect()
+                }
+                _ => geometry.bounds().map_or_else(Vec::new, |(lo, hi)| {
+                    let corner = |k: u32| DVec3::from_array([0, 1, 2].map(|a| if k >> a & 1 == 0 { lo[a] } else { hi[a] }));
+                    (0..8).map(|k| (place(corner(k)), 0.0)).collect()
+                }),
+            };
+            points
+        })
+        .collect()
+}
+
+/// Whether the middle of a scene is in a room.
+fn is_room((lo, hi): (DVec3, DVec3), trace: &Trace) -> Result<bool> {
+    let extent = hi - lo;
+    if extent.min_element() <= 0.0 {
+        return Ok(false);
+    }
+    for height in HEIGHTS {
+        let distances = distances(lo + extent * DVec3::new(0.5, height, 0.5), trace)?;
+        let is_room = distances.len() as f64 >= ENCLOSED * PROBES as f64
+            && distances[distances.len() / 10] >= CLEARANCE * extent.length();
+        if !is_room {
+            return Ok(false);
+        }
+    }
+    Ok(true)
+}
+
+/// What the rays of a view see.
+fn seen(cameras: &[Camera], aspect: f64, trace: &Trace) -> Result<Vec<Vec<Option<VisibleSurface>>>> {
+    let [columns, rows] = VIEW;
+    let at = |k: usize| [((k % columns) as f64 + 0.5) / columns as f64, ((k / columns) as f64 + 0.5) / rows as f64];
+    let rays_of =
+        |camera: &Camera| -> Vec<(DVec3, DVec3)> { (0..columns * rows).map(|k| camera_ray(camera, at(k), aspect)).collect() };
+    let rays: Vec<(DVec3, DVec3)> = cameras.iter().flat_map(rays_of).collect();
+    Ok(trace(&rays)?.chunks_exact(columns * rows).map(<[_]>::to_vec).collect())
+}
+
+/// The camera with the highest score, and the score; of equal ones the first.
+fn best(cameras: Vec<Camera>, scores: impl Iterator<Item = f64>) -> Result<(Camera, f64)> {
+    let best = scores.enumerate().reduce(|a, b| if b.1 > a.1 { b } else { a });
+    best.and_then(|(k, score)| Some((cameras.into_iter().nth(k)?, score))).ok_or_else(no_geometry)
+}
+
+/// The camera inside with the longest view.
+fn inside((lo, hi): (DVec3, DVec3), aspect: f64, fov_y: Option<f64>, trace: &Trace) -> Result<(Camera, f64)> {
+    let extent = hi - lo;
+    let along = |k: usize| (k as f64 + 1.0) / (PLACES as f64 + 1.0);
+    let mut cameras = Vec::new();
+    for (place, height) in (0..PLACES * PLACES).flat_map(|p| HEIGHTS.map(|h| (p, h))) {
+        let eye = lo + extent * DVec3::new(along(place % PLACES), height, along(place / PLACES));
+        for heading in 0..HEADINGS {
+            let angle = TAU * heading as f64 / HEADINGS as f64;
+            let forward = DVec3::new(angle.sin(), 0.05, -angle.cos());
+            cameras.push(Camera::look_at(eye, eye + forward, DVec3::Y, fov_y.unwrap_or(INSIDE_FOV_Y)));
+        }
+    }
+    let size = extent.length();
+    let score = |seen: Vec<Option<VisibleSurface>>| {
+        // a back is seen from within a body
+        if seen.iter().flatten().any(|s| !s.is_front) {
+            return 0.0;
+        }
+        let distances: Vec<f64> = seen.iter().flatten().map(|s| s.distance / size).collect();
+        let nearest = distances.iter().copied().fold(f64::INFINITY, f64::min);
+        // long views of much, with nothing right before the camera; the sky is no view
+        let sum: f64 = distances.iter().map(|d| d.sqrt()).sum();
+        if nearest < 0.02 { 0.2 * sum } else { sum }
+    };
+    let scores = seen(&cameras, aspect, trace)?.into_iter().map(score);
+    let (camera, score) = best(cameras, scores)?;
+    Ok((Camera { name: ViewName::Inside.to_string(), ..camera }, score))
+}
+
+/// The camera outside that shows most.
+fn outside(scene: &Scene, aspect: f64, fov_y: Option<f64>, trace: &Trace) -> Result<(Camera, f64)> {
+    let hull = hull(scene);
+    let fov_y = fov_y.unwrap_or(OUTSIDE_FOV_Y);
+    let camera = |(from, _): &([f64; 2], f64)| Camera::enclosing(&hull, direction(*from), DVec3::Y, fov_y, aspect);
+    let cameras: Vec<Camera> = OUTSIDE.par_iter().filter_map(camera).collect();
+    let score = |seen: Vec<Option<VisibleSurface>>, preference: f64| {
+        let fronts = seen.iter().flatten().filter(|s| s.is_front).count() as f64;
+        let backs = seen.iter().flatten().filter(|s| !s.is_front).count() as f64;
+        let mean = seen.iter().flatten().map(|s| s.normal).sum::<DVec3>() / (fronts + backs).max(1.0);
+        // A wall seen head on has one normal, whose length is 1; three sides of a box have a mean of 0.58, a sphere of 0.67
+        let variety = 1.0 - mean.length();
+        preference * (fronts - backs) / (fronts + backs).max(1.0) * (0.5 + variety)
+    };
+    let preferences = OUTSIDE.iter().map(|o| o.1);
+    let scores = seen(&cameras, aspect, trace)?.into_iter().zip(preferences).map(|(seen, preference)| score(seen, preference));
+    best(cameras, scores)
+}
+
+/// Distances of what is seen from its front around a point, ascending.
+fn distances(eye: DVec3, trace: &Trace) -> Result<Vec<f64>> {
+    let direction = |k: usize| {
+        let angle = TAU * (k as f64 + 0.5) / PROBES as f64;
+        DVec3::new(angle.sin(), [-0.1, 0.05, 0.2][k % 3], angle.cos()).normalize()
+    };
+    let rays: Vec<(DVec3, DVec3)> = (0..PROBES).map(|k| (eye, direction(k))).collect();
+    let seen = trace(&rays)?;
+    let mut distances: Vec<f64> = seen.iter().flatten().filter(|s| s.is_front).map(|s| s.distance).collect();
+    distances.sort_by(f64::total_cmp);
+    Ok(distances)
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DAffine3;
+
+    use super::*;
+    use crate::scene::builtin::{self, shapes};
+    use crate::scene::{Instance, Material, Mesh};
+
+    const BOUNDS: (DVec3, DVec3) = (DVec3::new(-4.0, 0.0, -2.0), DVec3::new(4.0, 3.0, 2.0));
+
+    /// A scene of these bounds: a floor and a ceiling.
+    fn scene() -> Scene {
+        let (lo, hi) = BOUNDS;
+        let (middle, size) = ((lo + hi) * 0.5, hi - lo);
+        let at = |y: f64| shapes::rectangle(DVec3::new(middle.x, y, middle.z), DVec3::X * size.x, DVec3::Z * size.z);
+        let mesh = |y| Mesh { name: String::new(), geometry: at(y), material: 0 };
+        let instance = |mesh| Instance { name: String::new(), mesh, object_to_world: DAffine3::IDENTITY };
+        Scene {
+            materials: vec![Material::default()],
+            meshes: vec![mesh(lo.y), mesh(hi.y)],
+            instances: vec![instance(0), instance(1)],
+            ..Scene::default()
+        }
+    }
+
+    fn chosen(trace: &Trace) -> Camera {
+        choose(&scene(), 1.5, None, trace).unwrap()
+    }
+
+    fn hit(distance: f64) -> Option<VisibleSurface> {
+        Some(VisibleSurface { distance, is_front: true, normal: DVec3::Y, material: 0 })
+    }
+
+    /// Rays inside a box end on its sides, but for those that `open` lets pass.
+    fn inside(rays: &[(DVec3, DVec3)], open: impl Fn(DVec3) -> bool) -> Result<Vec<Option<VisibleSurface>>> {
+        let (lo, hi) = BOUNDS;
+        let is_inside = |p: DVec3| p.cmpge(lo).all() && p.cmple(hi).all();
+        let distance = |(from, d): &(DVec3, DVec3)| ((DVec3::select(d.cmpgt(DVec3::ZERO), hi, lo) - *from) / *d).min_element();
+        Ok(rays.iter().map(|ray| if is_inside(ray.0) && !open(ray.1) { hit(distance(ray)) } else { None }).collect())
+    }
+
+    fn is_inside(camera: &Camera) -> bool {
+        let eye = camera.camera_to_world.translation;
+        eye.cmpgt(BOUNDS.0).all() && eye.cmplt(BOUNDS.1).all()
+    }
+
+    #[test]
+    fn rooms_are_seen_from_inside() {
+        let camera = chosen(&|rays| inside(rays, |_| false));
+        // along the room, from its end
+        let forward = -camera.camera_to_world.matrix3.z_axis;
+        assert!(is_inside(&camera) && forward.x.abs() > 0.8, "{camera:?}");
+        // a courtyard is open above
+        assert!(is_inside(&chosen(&|rays| inside(rays, |d| d.y > 0.5))));
+    }
+
+    #[test]
+    fn scenes_are_looked_at_by_the_host() {
+        for (name, inside) in
+            [("closed-box", true), ("stairs", false), ("cornell-box", false), ("terrain:2000", false), ("spheres:50", false)]
+        {
+            let mut scene = builtin::by_name(name).unwrap();
+            if let (true, Geometry::Triangles(mesh)) = (inside, &mut scene.meshes[0].geometry) {
+                // walls that face the room
+                mesh.indices.iter_mut().for_each(|t| t.swap(1, 2));
+            }
+            let (lo, hi) = scene.bounds().unwrap();
+            let eye = of_scene(&Survey::new(&scene), 1.5, None).unwrap().camera_to_world.translation;
+            assert_eq!(eye.cmpgt(lo).all() && eye.cmplt(hi).all(), inside, "{name}: {eye}");
+        }
+    }
+
+    #[test]
+    fn objects_and_open_boxes_are_seen_from_outside() {
+        // one side is missing
+        assert!(!is_inside(&chosen(&|rays| inside(rays, |d| d.z > d.x.abs()))));
+        // a solid object around the middle, seen from inside
+        let back = |rays: &[(DVec3, DVec3)]| {
+            Ok(vec![Some(VisibleSurface { distance: 2.0, is_front: false, normal: DVec3::Y, material: 0 }); rays.len()])
+        };
+        assert!(!is_inside(&chosen(&back)));
+        // something close around it
+        assert!(!is_inside(&chosen(&|rays| Ok(vec![hit(0.1); rays.len()]))));
+        assert!(!is_inside(&chosen(&|rays| Ok(vec![None; rays.len()]))));
+    }
+
+    #[test]
+    fn the_side_that_shows_fronts_is_chosen() {
+        // a wall whose front is at -x, and a floor
+        let wall = shapes::rectangle(DVec3::new(0.0, 0.0, -1.0), DVec3::Z * 2.0, DVec3::Y * 2.0);
+        for (flip, left) in [(false, true), (true, false)] {
+            let mut scene = scene();
+            scene.meshes.truncate(1);
+            scene.instances.truncate(1);
+            scene.meshes[0].geometry = wall.clone();
+            let Geometry::Triangles(mesh) = &mut scene.meshes[0].geometry else { panic!("it has triangles") };
+            if flip {
+                mesh.indices.iter_mut().for_each(|t| t.swap(1, 2));
+            }
+            let camera = of_scene(&Survey::new(&scene), 1.0, None).unwrap();
+            assert_eq!(camera.camera_to_world.translation.x < 0.0, left, "{camera:?}");
+        }
+    }
+
+    #[test]
+    fn names_are_directions() {
+        let mut scene = builtin::by_name("stairs").unwrap();
+        scene.cameras.clear();
+        let survey = Survey::new(&scene);
+        let eye = |name| {
+            let camera = named(&survey, name, 1.5, None).unwrap();
+            assert_eq!(camera.name, name.name());
+            camera.camera_to_world.translation
+        };
+        let (lo, hi) = survey.bounds().unwrap();
+        use ViewName::{Back, Front, Inside, Iso, Left, Right, Top};
+        assert!(eye(Front).z > hi.z && eye(Back).z < lo.z && eye(Left).x < lo.x && eye(Right).x > hi.x && eye(Top).y > hi.y);
+        assert!(eye(Iso).cmpgt((lo + hi) * 0.5).all());
+        let inside = eye(Inside);
+        assert!(inside.cmpgt(lo).all() && inside.cmplt(hi).all());
+        // a narrow field of view sees the same from farther away
+        let far = named(&survey, Front, 1.5, Some(0.1)).unwrap().camera_to_world.translation;
+        assert!(far.z > 3.0 * eye(Front).z);
+    }
+}

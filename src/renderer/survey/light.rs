@@ -1,0 +1,81 @@
+//! Light for scenes that have none.
+
+use glam::DVec3;
+
+use super::Survey;
+use super::rays::camera_ray;
+use crate::error::{Error, Result};
+use crate::integrators::lighting::LightingSettings;
+use crate::scene::{Camera, Material, light_spec};
+
+/// Radiance of the sky: neutral, so that colours are those of the surfaces.
+const SKY: &str = "0.5,0.5,0.5";
+/// The sun: from above, the left and before a scene that is seen from its front. Its disk is ten times as wide as the real one, for soft shadows. Together with
+/// the sky a white floor reflects a radiance of 0.9, just below white.
+const SUN: &str = "sun direction=0.45,-1,-0.7 irradiance=1.65 angle=5";
+/// Median irradiance of what is in view in a closed room, bounces included, over pi: the radiance of white diffuse surfaces.
+const LAMP: f64 = 0.5;
+/// Rays through the image, along its width and height, that find what is in view.
+const VIEW: [usize; 2] = [24, 16];
+
+/// Light for a scene that has none, and what it is in words: a sky and a sun, or a lamp where the camera is in a closed room.
+///
+/// # Errors
+/// None.
+pub fn choose(survey: &Survey, camera: &Camera, aspect: f64) -> Result<(LightingSettings, String)> {
+    let eye = camera.camera_to_world.translation;
+    let parse = |text: &str| light_spec::parse(text).map_err(Error::Usage);
+    let Some(walls) = survey.walls(eye) else {
+        let light = LightingSettings { environment: Some(SKY.into()), light: vec![parse(SUN)?], ..Default::default() };
+        return Ok((light, "a grey sky and a soft sun".into()));
+    };
+    // above the camera, so that there are shadows; the first direction is upwards
+    let lamp = eye + DVec3::Y * (0.5 * walls[0]);
+    let [columns, rows] = VIEW;
+    let at = |k: usize| [((k % columns) as f64 + 0.5) / columns as f64, ((k / columns) as f64 + 0.5) / rows as f64];
+    let views: Vec<(DVec3, DVec3)> = (0..columns * rows).map(|k| camera_ray(camera, at(k), aspect)).collect();
+    // Of each surface: irradiance by a lamp of one candela, without shadows (next to the camera it has few that are seen), and about how much it reflects.
+    let mut lit: Vec<(f64, f64)> = views
+        .iter()
+        .zip(survey.trace(&views)?)
+        .filter_map(|((from, direction), seen)| {
+            let seen = seen?;
+            let to_lamp = lamp - (*from + *direction * seen.distance);
+            let distance = to_lamp.length().max(1e-30);
+            let irradiance = seen.normal.dot(to_lamp / distance).max(0.0) / (distance * distance);
+            (irradiance > 0.0).then(|| (irradiance, reflectance(&survey.scene().materials[seen.material])))
+        })
+        .collect();
+    lit.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let median = lit.get(lit.len() / 2).map_or(1.0 / (walls[0] * walls[0]), |l| l.0);
+    let reflectance = lit.iter().map(|l| l.1).sum::<f64>() / lit.len().max(1) as f64;
+    // light that walls reflect onto each other adds up to 1 + r + r^2 + ... times the lamp's
+    let intensity = LAMP * std::f64::consts::PI / median * (1.0 - reflectance);
+    let text = format!("point position={},{},{} intensity={intensity:.4}", lamp.x as f32, lamp.y as f32, lamp.z as f32);
+    Ok((LightingSettings { light: vec![parse(&text)?], ..Default::default() }, "a lamp above the camera".into()))
+}
+
+/// About how much light a material reflects, at most 0.9. Nobody looks into its texture: half of its colour.
+fn reflectance(material: &Material) -> f64 {
+    let colour = material.base_color.truncate().dot(glam::Vec3::new(0.2126, 0.7152, 0.0722));
+    let texture = if material.base_color_texture.is_some() { 0.5 } else { 1.0 };
+    f64::from(colour * texture).clamp(0.0, 0.9)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rooms_have_a_lamp_and_the_rest_a_sky() {
+        for (name, closed) in [("closed-box", true), ("stairs", false)] {
+            let scene = crate::scene::builtin::by_name(name).unwrap();
+            let survey = Survey::new(&scene);
+            let (light, words) = choose(&survey, &scene.cameras[0], 1.5).unwrap();
+            assert_eq!((light.environment.is_none(), light.light.len()), (closed, 1), "{name}: {words}");
+            let mut lit = scene.clone();
+            light.apply(&mut lit).unwrap();
+            assert!(scene.is_dark() && !lit.is_dark());
+        }
+    }
+}
