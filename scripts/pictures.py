@@ -21,7 +21,7 @@ VIEW = ["builtin:stairs", "--size", "360x270", "--eye=-2.2,2.4,6", "--target=-0.
 FULL = 0.25
 # AO radii and falloffs of docs/radius.md, columns and rows
 RADII = ["1%", "3%", "10%", "30%", "inf"]
-FALLOFFS = ["1", "2", "10"]
+FALLOFFS = ["1", "1.15", "1.5"]
 ROOM = ["builtin:atrium", "--size", "240x160", "--spp", "256", "--pixel-filter", "centre"]
 # pictures of the viewer, and the scripts that make them
 VIEWER = {
