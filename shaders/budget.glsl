@@ -40,7 +40,7 @@ Estimate nearest_history(FrameParams f, uint at) {
     uvec2 q = uvec2(place);
     uint tap = image_index(f, q);
     uvec2 guide = LOAD_PAIR(f.previous_guide, tap);
-    if (guide.y >> 24 != LOAD_PAIR(f.guide, at).y >> 24 || !same_surface(edge, vec2(q) + 0.5 - place, guide)) return none;
+    if (guide.y >> 24 != LOAD_PAIR(f.guide, at).y >> 24 || !same_surface(edge, vec2(q) + 0.5 + f.previous_offset - place, guide)) return none;
     return unpack_estimate(LOAD_PAIR(f.previous_history, tap));
 }
 

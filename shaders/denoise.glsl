@@ -4,12 +4,7 @@
 
 layout(local_size_x = LANES) in;
 
-// Mean and number of samples, and variance of one sample; a RadianceRecord in memory.
-struct RadianceEstimate {
-    vec3 mean;
-    float samples;
-    vec3 variance;
-};
+#include "common/radiance.glsl"
 
 #define VALUE vec3
 #define ESTIMATE RadianceEstimate
@@ -21,10 +16,11 @@ const float LONELY = 0.0;
 
 uint filtered_pixel() { return push.first + gl_GlobalInvocationID.x; }
 
-RadianceEstimate load_estimate(uvec2 estimates, uint at) {
-    vec4 a = uintBitsToFloat(Quads(estimates).v[2u * at]), b = uintBitsToFloat(Quads(estimates).v[2u * at + 1u]);
-    return RadianceEstimate(a.xyz, a.w, b.xyz);
-}
+RadianceEstimate load_estimate(uvec2 estimates, uint at) { return load_radiance(estimates, at); }
+
+RadianceEstimate estimate_of(RadianceEstimate own, vec3 mean, float n, vec3 variance) { return RadianceEstimate(mean, n, variance, own.narrowed); }
+
+int limited(int radius, FilterParams p, RadianceEstimate own) { return min(radius, int(ceil((1.0 - own.narrowed) * float(p.radius)))); }
 
 // The normals in guides are shading normals here, because lighting depends on them. The eight bits beside them are equal for
 // pixels that may be averaged.
@@ -38,12 +34,10 @@ vec3 prior_variance(vec3 mean, vec3 spread, float samples) { return spread * sam
 float total(vec3 value) { return value.r + value.g + value.b; }
 
 void finish(FilterParams p, FrameParams f, uint at, RadianceEstimate e, vec3 bent) {
-    QuadImage to = QuadImage(p.to);
-    to.v[2u * at] = floatBitsToUint(vec4(e.mean, e.samples));
-    to.v[2u * at + 1u] = floatBitsToUint(vec4(e.variance, 0.0));
+    store_radiance(p.to, at, e);
 }
 
-void finish_nothing(FilterParams p, FrameParams f, uint at) { finish(p, f, at, RadianceEstimate(vec3(0.0), 0.0, vec3(0.0)), vec3(0.0)); }
+void finish_nothing(FilterParams p, FrameParams f, uint at) { finish(p, f, at, NO_RADIANCE, vec3(0.0)); }
 
 RadianceEstimate guess(FilterParams p, FrameParams f, uvec2 estimates, ivec2 pixel, RadianceEstimate own) { return own; }
 

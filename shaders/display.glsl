@@ -7,6 +7,7 @@
 #include "interface/display.glsl"
 #include "interface/shown.glsl"
 #include "common/srgb.glsl"
+#include "common/tone_map.glsl"
 
 layout(local_size_x = LANES) in;
 
@@ -47,11 +48,12 @@ vec2 motion(FrameParams f, uint at) {
     bool orthographic = f.previous_orthographic != 0u;
     // behind the previous camera
     if (!orthographic && !(c.z < 0.0)) return vec2(0.0);
-    vec2 now = vec2(at % f.size.x, at / f.size.x) + 0.5;
+    vec2 now = sample_place(f, vec2(at % f.size.x, at / f.size.x));
     return now - image_point(f, f.previous_view, orthographic ? c.xy : c.xy / -c.z);
 }
 
 vec3 colour(DisplayParams d, FrameParams f, uint at) {
+    if (d.shown == SHOWN_ACCESSIBILITY && !is_null(d.resolved)) return uintBitsToFloat(Quads(d.resolved).v[at].xyz);
     if (d.shown == SHOWN_ACCESSIBILITY || d.shown == SHOWN_UNFILTERED && d.has_history == 0u) return vec3(FloatImage(d.result).v[at]);
     uvec2 guide = LOAD_PAIR(f.guide, at);
     if (!is_surface(guide)) return vec3(0.0);
@@ -75,8 +77,10 @@ void main() {
     if (gl_GlobalInvocationID.x >= push.count) return;
     DisplayParams d = DisplayParams(push.pass);
     vec3 linear = colour(d, FrameParams(d.frame), at) * d.gain;
+    bool is_radiance = (d.flags & DISPLAY_RADIANCE) != 0u && d.shown == SHOWN_ACCESSIBILITY;
+    if (is_radiance) linear = tone_mapped(d.tone_map, linear);
     uint red = srgb_byte(d.thresholds, linear.r);
     uint word = 0xff000000u | red * 0x010101u;
-    if (d.shown >= SHOWN_NORMAL) word = 0xff000000u | red | srgb_byte(d.thresholds, linear.g) << 8 | srgb_byte(d.thresholds, linear.b) << 16;
+    if (is_radiance || d.shown >= SHOWN_NORMAL) word = 0xff000000u | red | srgb_byte(d.thresholds, linear.g) << 8 | srgb_byte(d.thresholds, linear.b) << 16;
     DisplayWords(d.words).v[at] = word;
 }

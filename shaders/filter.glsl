@@ -22,6 +22,10 @@ float prior_variance(float mean, float spread, float samples) { return mean * (1
 
 float total(float value) { return value; }
 
+Estimate estimate_of(Estimate own, float mean, float n, float variance) { return Estimate(mean, n, variance); }
+
+int limited(int radius, FilterParams p, Estimate own) { return radius; }
+
 void finish(FilterParams p, FrameParams f, uint at, Estimate e, vec3 bent) {
     if (BENT_NORMALS) {
         bool open = is_null(p.to) && e.samples == 0.0;

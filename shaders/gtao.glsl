@@ -45,7 +45,7 @@ void main() {
     bool orthographic = f.orthographic != 0u;
     uvec2 pixel = uvec2(at % f.size.x, at / f.size.x);
     float depth = uintBitsToFloat(guide.x);
-    vec2 centre = vec2(pixel) + 0.5;
+    vec2 centre = sample_place(f, vec2(pixel));
     vec2 plane = image_plane(f, f.view, centre);
     vec3 p = unproject(orthographic, plane, depth);
     vec3 v = orthographic ? vec3(0.0, 0.0, 1.0) : normalize(-p);
@@ -82,7 +82,7 @@ void main() {
                 uvec2 tap = uvec2(q);
                 float there = uintBitsToFloat(Pairs(f.guide).v[image_index(f, tap)].x);
                 if (!(there < INFINITY)) continue;
-                vec3 delta = unproject(orthographic, image_plane(f, f.view, vec2(tap) + 0.5), there) - p;
+                vec3 delta = unproject(orthographic, image_plane(f, f.view, sample_place(f, vec2(tap))), there) - p;
                 float d = length(delta);
                 // what lies in the surface's own plane is no horizon: a pixel's middle is beside the slice, where a slanting plane is higher
                 if (dot(delta, normal) <= MIN_RISE * d) continue;

@@ -14,7 +14,10 @@ void closest(uint index, Hit hit) {
         uvec2 pixel = block_pixel(block, pixel_index(state.index)) + block.block_origin;
         next_ray_seed = ray_seed(block.seed, pixel, sample_index(state.index), state.depth + state.passes + 1u);
     }
+    vec3 share = vec3(0.0);
+    if (WITH_SIGNAL) share = arrived_share(p, k, hit);
     vec3 added = path_vertex(block, k, state, load_ray(push.rays, index - push.first), hit);
+    if (WITH_SIGNAL && added * share != vec3(0.0)) add_diffuse(p, k, added * share);
     // most vertices add nothing
     if (added != vec3(0.0)) store_quad(p.radiance, k, load_quad(p.radiance, k) + vec4(added, 0.0));
 }

@@ -1,6 +1,7 @@
 // path_camera: one camera ray per sample, and the first vertex of each path (shaders/path/path.glsl).
 #include "common/pixel_filter.glsl"
 #include "path/path.glsl"
+#include "common/frame.glsl"
 
 // Where a ray through a lens starts, and where it goes: to the point that the ray through the lens' middle meets in the plane of focus.
 Ray lens_ray(BlockParams p, Ray r, vec2 u) {
@@ -18,8 +19,11 @@ Ray camera_sample(BlockParams p, uint index) {
     uvec2 pixel = block_pixel(p, pixel_index(index));
     if (!in_block(p, pixel)) return no_ray();
     pixel += p.block_origin;
+    if (WITH_SIGNAL && !is_sampled(FrameParams(p.frame), pixel)) return no_ray();
     vec2 u = sample_2d(p.seed, pixel, sample_index(index), CAMERA_FILM);
-    Ray r = camera_ray(p, vec2(pixel) + 0.5 + (WITH_PIXEL_FILTER ? filter_offset(p.pixel_filter, u) : u - 0.5));
+    // all pixels of a frame have their samples at the same place, where its G-buffer has them
+    vec2 offset = WITH_SIGNAL ? p.centre_offset : WITH_PIXEL_FILTER ? filter_offset(p.pixel_filter, u) : u - 0.5;
+    Ray r = camera_ray(p, vec2(pixel) + 0.5 + offset);
     if (HAS_COVERAGE) r.tmin = tmin_of_seed(ray_seed(p.seed, pixel, sample_index(index), 0u));
     if (WITH_LENS) return lens_ray(p, r, sample_2d(p.seed, pixel, sample_index(index), CAMERA_LENS));
     return r;
@@ -38,10 +42,17 @@ void closest(uint index, Hit hit) {
         return;
     }
     PathParams path = PathParams(p.path);
+    if (WITH_SIGNAL) clear_signal(path, k);
     // divided by the albedo, so that one bounce gives ambient visibility; Russian roulette uses the throughput without this factor
     float scale = WITH_CONSTANT_ALBEDO ? path.albedo : 1.0;
     PathState state = PathState(vec3(1.0 / scale), -1.0, index, 0u, 0u, scale, NO_MEDIUM);
     if (WITH_MEDIA) state.medium = current_medium(path.camera_media);
     if (HAS_COVERAGE) next_ray_seed = ray_seed(p.seed, block_pixel(p, pixel_index(index)) + p.block_origin, sample_index(index), 1u);
-    store_quad(path.radiance, k, vec4(path_vertex(p, k, state, r, hit), is_hit(hit) ? 1.0 : 0.0));
+    vec3 seen = path_vertex(p, k, state, r, hit);
+    float covered = is_hit(hit) ? 1.0 : 0.0;
+    if (WITH_SIGNAL) {
+        store_quad(path.signals, SIGNAL_QUADS * k + SIGNAL_DIRECT, vec4(seen, covered));
+        seen = vec3(0.0);
+    }
+    store_quad(path.radiance, k, vec4(seen, covered));
 }

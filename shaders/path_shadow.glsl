@@ -10,4 +10,5 @@ void any(uint index, bool occluded) {
     PathParams p = PathParams(BlockParams(push.pass).path);
     uint k = Words(p.shadow.tags).v[index];
     store_quad(p.radiance, k, load_quad(p.radiance, k) + load_quad(p.contributions, index));
+    if (!is_null(p.diffuse_contributions)) add_diffuse(p, k, load_quad(p.diffuse_contributions, index).rgb);
 }

@@ -12,12 +12,14 @@ void closest(uint index, Hit hit) {
     vec4 c = load_quad(p.contributions, index);
     if (!is_hit(hit)) {
         store_quad(p.radiance, k, load_quad(p.radiance, k) + c);
+        if (WITH_SIGNAL) add_diffuse(p, k, load_quad(p.diffuse_contributions, index).rgb);
         return;
     }
     Ray r = load_ray(push.rays, index - push.first);
     Surface s = surface_at(r, hit);
     Shading m = shade(s, -r.direction, SHARP);
-    c.rgb *= straight_transmittance(m, -r.direction);
+    vec3 through = straight_transmittance(m, -r.direction);
+    c.rgb *= through;
     if (!(highest(c.rgb) > 0.0)) return;
     Ray behind = Ray(s.position - m.ng * s.offset, 0.0, r.direction, INFINITY);
     if (r.tmax < INFINITY) {
@@ -32,4 +34,5 @@ void closest(uint index, Hit hit) {
     if (HAS_COVERAGE) next_ray_seed = hash(floatBitsToUint(r.tmin));
     uint slot = append_ray(p.later, behind, k);
     store_quad(p.later_contributions, slot, c);
+    if (WITH_SIGNAL) store_quad(p.later_diffuse_contributions, slot, load_quad(p.diffuse_contributions, index) * vec4(through, 0.0));
 }

@@ -6,8 +6,7 @@
 // camera invalidates no history. Moving geometry does, near it and by the fraction of the hemisphere that it covers: that is taken for
 // the variance that a frame adds (a Kalman filter's process noise), and there the history is also clamped to this frame's
 // samples nearby (Karis, "High-Quality Temporal Supersampling", 2014, with the standard error of their mean as the width).
-#include "common/frame.glsl"
-#include "interface/passes.glsl"
+#include "common/reprojection.glsl"
 
 layout(local_size_x = LANES) in;
 
@@ -15,28 +14,6 @@ layout(local_size_x = LANES) in;
 const float MIN_VARIANCE = 0.02;
 // Radius in pixels of the neighbourhood to which a history is clamped.
 const int CLAMP_RADIUS = 3;
-
-// Maximum change of a point's ambient visibility in this frame: the fraction of the cosine-weighted hemisphere that is covered by the bounding
-// spheres of what moved.
-float possible_change(TemporalParams p, FrameParams f, vec3 position, vec3 normal) {
-    float change = 0.0;
-    MovedRecords moved = MovedRecords(p.moved);
-    for (uint k = 0u; k < p.moved_count; k++) {
-        MovedRecord m = moved.v[k];
-        vec3 nearest = clamp(position, m.lower, m.upper) - position;
-        float gap2 = dot(nearest, nearest);
-        if (gap2 > f.reach * f.reach) continue;
-        vec3 to = 0.5 * (m.lower + m.upper) - position;
-        float radius = 0.5 * length(m.upper - m.lower);
-        float far2 = dot(to, to);
-        // entirely below the horizon
-        if (dot(normal, to) < -radius) continue;
-        float cover = min(radius * radius / max(far2, 1e-30), 1.0);
-        if (gap2 == 0.0) cover = 1.0;
-        change += m.share * cover * exp2(-sqrt(gap2) * f.falloff_log2);
-    }
-    return min(change, 1.0);
-}
 
 // Mean of this frame's samples over the surrounding pixels of the same surface; `variance` is that of the mean.
 Estimate surroundings(TemporalParams p, FrameParams f, ivec2 pixel, EdgeTest edge) {
@@ -62,35 +39,21 @@ Estimate surroundings(TemporalParams p, FrameParams f, ivec2 pixel, EdgeTest edg
 // The history of a surface point; zero samples if there is none. `bent`: the history of its bent normal.
 Estimate reprojected(TemporalParams p, FrameParams f, vec3 before, vec3 normal, uint id, inout vec3 bent) {
     Estimate none = Estimate(0.0, 0.0, 0.0);
-    vec3 c = affine(f.previous_world_to_camera, before);
-    bool orthographic = f.previous_orthographic != 0u;
-    if (!orthographic && !(c.z < 0.0)) return none;
-    vec2 at = image_point(f, f.previous_view, orthographic ? c.xy : c.xy / -c.z) - 0.5;
-    // also for NaN
-    if (!(all(greaterThan(at, vec2(-1.0))) && all(lessThan(at, vec2(f.size))))) return none;
-    ivec2 base = ivec2(floor(at));
-    vec2 inside = at - vec2(base);
-    // a pixel that is hit at its centre is taken alone: a static view is not blurred
-    inside = mix(inside, round(inside), lessThan(abs(inside - round(inside)), vec2(1e-3)));
-    EdgeTest edge = edge_test(f, f.previous_world_to_camera, f.previous_view, orthographic, before, normal, at + 0.5);
+    vec2 at;
+    if (!previous_place(f, before, at)) return none;
+    Taps taps = taps_around(f, at, at, previous_edge(f, before, normal, at), id);
     float weight = 0.0, mean = 0.0, samples = 0.0, variance = 0.0;
     vec3 bents = vec3(0.0);
-    for (int k = 0; k < 4; k++) {
-        ivec2 corner = ivec2(k & 1, k >> 1);
-        ivec2 q = base + corner;
-        vec2 w2 = mix(1.0 - inside, inside, vec2(corner));
-        float w = w2.x * w2.y;
-        if (w == 0.0 || any(lessThan(q, ivec2(0))) || any(greaterThanEqual(q, ivec2(f.size)))) continue;
-        uint tap = image_index(f, uvec2(q));
-        uvec2 guide = LOAD_PAIR(f.previous_guide, tap);
-        if (guide.y >> 24 != id || !same_surface(edge, vec2(q) - at, guide)) continue;
-        Estimate e = unpack_estimate(LOAD_PAIR(f.previous_history, tap));
+    [[unroll]] for (int k = 0; k < 4; k++) {
+        float w = taps.weight[k];
+        if (w == 0.0) continue;
+        Estimate e = unpack_estimate(LOAD_PAIR(f.previous_history, taps.at[k]));
         if (!(e.samples > 0.0)) continue;
         weight += w;
         mean += w * e.mean;
         samples += w * e.samples;
         variance += w * e.variance;
-        if (BENT_NORMALS) bents += w * load_vec3(p.previous_bent_history, tap);
+        if (BENT_NORMALS) bents += w * load_vec3(p.previous_bent_history, taps.at[k]);
     }
     // less than a hundredth of the footprint was visible
     if (weight < 0.01) return none;
@@ -105,7 +68,9 @@ void main() {
     FrameParams f = FrameParams(p.frame);
     uvec2 guide = LOAD_PAIR(f.guide, at);
     if (!is_surface(guide)) {
-        STORE_PAIR(p.history, at, uvec2(0u));
+        // the next sample of the same pixel may show a surface again
+        bool rests = f.has_history != 0u && f.still != 0u;
+        STORE_PAIR(p.history, at, rests ? LOAD_PAIR(f.previous_history, at) : uvec2(0u));
         return;
     }
     Estimate now = unpack_estimate(LOAD_PAIR(p.current, at));
@@ -121,12 +86,12 @@ void main() {
             vec3 position = surface_position(f, at), normal = surface_normal(f, at);
             vec3 before = is_null(f.previous_position) ? position : load_vec3(f.previous_position, at);
             past = reprojected(p, f, before, normal, guide.y >> 24, bent);
-            float change = p.moved_count > 0u && past.samples > 0.0 ? p.moved_weight * possible_change(p, f, position, normal) : 0.0;
+            float change = p.moved_count > 0u && past.samples > 0.0 ? p.moved_weight * possible_change(p.moved, p.moved_count, f, position, normal) : 0.0;
             if (change > 0.0) {
-                past.samples /= 1.0 + past.samples * change * change / max(past.variance, MIN_VARIANCE);
+                past.samples = samples_after(past.samples, change, max(past.variance, MIN_VARIANCE));
                 if (p.clamp_width > 0.0) {
                     uvec2 pixel = uvec2(at % f.size.x, at / f.size.x);
-                    EdgeTest edge = edge_test(f, f.world_to_camera, f.view, f.orthographic != 0u, position, normal, vec2(pixel) + 0.5);
+                    EdgeTest edge = edge_test(f, f.world_to_camera, f.view, f.orthographic != 0u, position, normal, sample_place(f, vec2(pixel)));
                     Estimate around = surroundings(p, f, ivec2(pixel), edge);
                     if (around.samples > 0.0) {
                         float width = p.clamp_width * sqrt(around.variance);

@@ -2,6 +2,7 @@
 //
 //     BsdfValue bsdf_eval(Bsdf, wo, wi)         value times |cos wi|, and the density with which bsdf_sample proposes wi, per solid angle; both
 //                                             without the delta lobes
+//     vec3 bsdf_diffuse(Bsdf, wo, wi)         the diffuse reflection's part of that value, divided by Bsdf::diffuse
 //     BsdfSample bsdf_sample(Bsdf, wo, u, v)  a direction, and of a delta lobe weight and probability; of the others bsdf_eval knows them
 //
 //     has_rough_part(Bsdf), has_smooth_part(Bsdf)   is there anything that light samples could find, or that only samples of the BSDF can

@@ -27,6 +27,8 @@ BsdfValue conductor_eval(Bsdf b, vec3 wo, vec3 wi) {
     return BsdfValue(f * shadowing(b.ng, FRAME_NORMAL, wi), reflected_pdf(b.facets, wo, m));
 }
 
+vec3 conductor_diffuse(Bsdf b, vec3 wo, vec3 wi) { return vec3(0.0); }
+
 BsdfSample conductor_sample(Bsdf b, vec3 wo, vec2 u, float v) {
     if (is_smooth(b.facets)) return BsdfSample(vec3(-wo.xy, wo.z), b.tint * fresnel_conductor(wo.z, b.f0, b.k), 1.0, true, 1.0);
     vec3 m = sample_microfacet(b.facets, wo, u);

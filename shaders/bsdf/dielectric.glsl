@@ -38,6 +38,8 @@ BsdfValue dielectric_eval(Bsdf b, vec3 wo, vec3 wi) {
                      (1.0 - f) * refracted_pdf(b.facets, b.eta, wo, m, im));
 }
 
+vec3 dielectric_diffuse(Bsdf b, vec3 wo, vec3 wi) { return vec3(0.0); }
+
 BsdfSample dielectric_sample(Bsdf b, vec3 wo, vec2 u, float v) {
     bool smooth_surface = is_smooth(b.facets);
     vec3 m = smooth_surface ? vec3(0.0, 0.0, 1.0) : sample_microfacet(b.facets, wo, u);

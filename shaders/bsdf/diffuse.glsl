@@ -13,6 +13,8 @@ BsdfValue diffuse_eval(Bsdf b, vec3 wo, vec3 wi) {
     return BsdfValue(b.diffuse * pdf * shadowing(b.ng, FRAME_NORMAL, wi), pdf);
 }
 
+vec3 diffuse_diffuse(Bsdf b, vec3 wo, vec3 wi) { return vec3(max(wi.z, 0.0) / PI * shadowing(b.ng, FRAME_NORMAL, wi)); }
+
 BsdfSample diffuse_sample(Bsdf b, vec3 wo, vec2 u, float v) { return proposed(cosine_hemisphere(u), 1.0); }
 
 #endif

@@ -159,6 +159,15 @@ BsdfValue gltf_eval(Bsdf b, vec3 wo, vec3 wi) {
     return value;
 }
 
+vec3 gltf_diffuse(Bsdf b, vec3 wo, vec3 wi) {
+    if (!(wi.z > 0.0)) return vec3(0.0);
+    float value = interface_fresnel(b, dot(wo, normalize(wo + wi))).diffuse * wi.z / PI;
+    if (HAS_SHEEN && b.sheen.kept < 1.0) value *= min(b.sheen.kept, sheen_kept(b.sheen, wi.z));
+    value *= shadowing(b.ng, FRAME_NORMAL, wi);
+    if (HAS_CLEARCOAT && b.clearcoat.weight > 0.0) value *= clearcoat_transmits(b.clearcoat, wo) * clearcoat_transmits(b.clearcoat, wi);
+    return vec3(value);
+}
+
 // What layers over a delta lobe of the base leave of it.
 float layers_transmit(Bsdf b, vec3 wo, vec3 wi) {
     float left = 1.0;

@@ -23,16 +23,19 @@ float fon_albedo(float mu, float r) {
     return (1.0 + r * g) / (1.0 + FON_1 * r);
 }
 
-BsdfValue oren_nayar_eval(Bsdf b, vec3 wo, vec3 wi) {
-    if (!(wi.z > 0.0)) return NO_VALUE;
+vec3 oren_nayar_diffuse(Bsdf b, vec3 wo, vec3 wi) {
+    if (!(wi.z > 0.0)) return vec3(0.0);
     float r = b.facets.alpha.x, s = dot(wi, wo) - wi.z * wo.z;
     float a = 1.0 / (1.0 + FON_1 * r);
     float single = a * (1.0 + r * (s > 0.0 ? s / max(wi.z, wo.z) : s));
     float mean = a * (1.0 + FON_2 * r);
     float lost = max(1.0 - fon_albedo(wo.z, r), 1e-7) * max(1.0 - fon_albedo(wi.z, r), 1e-7) / max(1.0 - mean, 1e-7);
-    vec3 rho = b.diffuse, several = rho * rho * mean / (1.0 - rho * (1.0 - mean));
-    float pdf = wi.z / PI;
-    return BsdfValue((rho * single + several * lost) * (pdf * shadowing(b.ng, FRAME_NORMAL, wi)), pdf);
+    vec3 rho = b.diffuse, several = rho * mean / (1.0 - rho * (1.0 - mean));
+    return (single + several * lost) * (wi.z / PI * shadowing(b.ng, FRAME_NORMAL, wi));
+}
+
+BsdfValue oren_nayar_eval(Bsdf b, vec3 wo, vec3 wi) {
+    return BsdfValue(b.diffuse * oren_nayar_diffuse(b, wo, wi), max(wi.z, 0.0) / PI);
 }
 
 BsdfSample oren_nayar_sample(Bsdf b, vec3 wo, vec2 u, float v) { return proposed(cosine_hemisphere(u), 1.0); }

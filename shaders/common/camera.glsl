@@ -42,11 +42,11 @@ Ray camera_ray(BlockParams p, vec2 at) {
     return Ray(eye, 0.0, normalize(vec3(dot(rows[0].xyz, d), dot(rows[1].xyz, d), dot(rows[2].xyz, d))), INFINITY);
 }
 
-// The ray of an index, through the centre of its pixel; an invalid ray for padding.
+// The ray of an index, through the centre of its pixel or at an offset from it that all pixels share; an invalid ray for padding.
 Ray centre_ray(BlockParams p, uint ray_index) {
     uvec2 pixel = block_pixel(p, pixel_index(ray_index));
     if (!in_block(p, pixel)) return no_ray();
-    return camera_ray(p, vec2(pixel + p.block_origin) + 0.5);
+    return camera_ray(p, vec2(pixel + p.block_origin) + 0.5 + p.centre_offset);
 }
 
 // Direction from the camera to a point, not normalized.

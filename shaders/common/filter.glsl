@@ -13,9 +13,11 @@
 // number of samples behind it and the variance of one. Furthermore:
 //   uint filtered_pixel()                          the pixel of this thread
 //   ESTIMATE load_estimate(image, at)
+//   ESTIMATE estimate_of(own, mean, n, variance)   a pixel's estimate with another mean, number of samples and variance
 //   bool is_neighbour(edge, offset, own, guide)    whether two pixels show the same surface
 //   VALUE prior_variance(mean, spread, samples)    the variance to assume while there are few samples: from the mean of a box,
 //                                                  the variance of its pixels and the samples per pixel
+//   int limited(radius, p, own)                    the radius, or a smaller one for this pixel
 //   float total(value)                             a sum over channels
 //   ESTIMATE guess(p, f, image, pixel, own)        the value of a pixel without samples in its box
 //   void finish(p, f, at, estimate, bent)          writes the result; finish_nothing(p, f, at): for a pixel that is not filtered
@@ -61,14 +63,14 @@ void main() {
     vec3 own_bent = BENT_NORMALS ? load_bent(p, at) : vec3(0.0);
     int stride = int(p.stride);
     // a step with strides has a fixed radius; it is skipped where there are enough samples
-    int radius = stride > 1 ? (own.samples < p.samples ? int(p.radius) : 0) : box_radius(p, own.samples);
+    int radius = limited(stride > 1 ? (own.samples < p.samples ? int(p.radius) : 0) : box_radius(p, own.samples), p, own);
     if (radius == 0) {
         finish(p, f, at, own, own_bent);
         return;
     }
     uint width = f.size.x;
     ivec2 pixel = ivec2(at % width, at / width);
-    EdgeTest edge = edge_test(f, f.world_to_camera, f.view, f.orthographic != 0u, surface_position(f, at), surface_normal(f, at), vec2(pixel) + 0.5);
+    EdgeTest edge = edge_test(f, f.world_to_camera, f.view, f.orthographic != 0u, surface_position(f, at), surface_normal(f, at), sample_place(f, vec2(pixel)));
     ivec2 reach = radius * ivec2(p.sides & STEP_HORIZONTAL, (p.sides & STEP_VERTICAL) >> 1);
     // taps within the image
     ivec2 lower = max(-reach, -(pixel / stride)), upper = min(reach, (ivec2(f.size) - 1 - pixel) / stride);
@@ -118,7 +120,7 @@ void main() {
         float careful = 1.0 + 2.0 * min(own.samples / f.most_samples, 1.0);
         keep = unlike > 0.0 ? clamp(1.0 - max(count - careful, 0.0) / count * own_noise / unlike, 0.0, 1.0) : 0.0;
     }
-    finish(p, f, at, ESTIMATE(mix(mean, own.mean, keep), mix(n, own.samples, keep), variance), mix(bent / n, own_bent, keep));
+    finish(p, f, at, estimate_of(own, mix(mean, own.mean, keep), mix(n, own.samples, keep), variance), mix(bent / n, own_bent, keep));
 }
 
 #endif

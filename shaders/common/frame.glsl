@@ -54,6 +54,11 @@ float spawn_offset_at(FrameParams f, uint at) {
     return uintBitsToFloat(LOAD_PAIR(f.surface, 4u * at + 1u).y);
 }
 
+// Where in the image a pixel's sample lies in this frame.
+vec2 sample_place(FrameParams f, vec2 pixel) {
+    return pixel + 0.5 + f.offset;
+}
+
 // Position on the image plane at unit distance (for an orthographic camera, on the camera's plane) of a point of the image, in pixels from the
 // upper left corner.
 vec2 image_plane(FrameParams f, vec2 view, vec2 at) {

@@ -42,4 +42,32 @@ void store_quad(uvec2 base, uint k, vec4 q) {
     STORE_PAIR(base, 2u * k + 1u, floatBitsToUint(q.zw));
 }
 
+// Ambient visibility of a path's first surface, if that darkens all of its light; `radiance` counts in its fourth number the camera ray's hit, and the occlusion ray that met
+// nothing.
+float occluded_share(PathParams p, vec4 radiance) {
+    return p.occludes_all != 0u && radiance.a == 1.0 ? 0.0 : 1.0;
+}
+
+// The parts of a SignalRecord, a vector each.
+const uint SIGNAL_QUADS = SIGNAL_RECORD_PAIRS / 2u;
+const uint SIGNAL_DIRECT = 0u;    // and coverage
+const uint SIGNAL_DIFFUSE = 1u;   // and the distance of what is reflected
+const uint SIGNAL_ALBEDO = 2u;    // and the phase
+const uint SIGNAL_SHARE = 3u;
+
+vec4 load_signal(PathParams p, uint k, uint part) { return load_quad(p.signals, SIGNAL_QUADS * k + part); }
+
+void store_signal(PathParams p, uint k, uint part, vec4 value) { store_quad(p.signals, SIGNAL_QUADS * k + part, value); }
+
+void clear_signal(PathParams p, uint k) {
+    store_signal(p, k, SIGNAL_DIRECT, vec4(0.0));
+    store_signal(p, k, SIGNAL_DIFFUSE, vec4(vec3(0.0), SIGNAL_UNKNOWN));
+    store_signal(p, k, SIGNAL_ALBEDO, vec4(vec3(0.0), SIGNAL_SEEN));
+    store_signal(p, k, SIGNAL_SHARE, vec4(0.0));
+}
+
+void add_diffuse(PathParams p, uint k, vec3 c) {
+    store_signal(p, k, SIGNAL_DIFFUSE, load_signal(p, k, SIGNAL_DIFFUSE) + vec4(c, 0.0));
+}
+
 #endif

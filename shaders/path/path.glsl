@@ -8,6 +8,7 @@
 #include "path/media.glsl"
 #include "path/view.glsl"
 #include "path/ambient.glsl"
+#include "path/signal.glsl"
 
 // Dimensions of the sampler (src/sampling/sobol.rs), in pairs: vertex n begins at PATH_FIRST + n * PATH_STRIDE.
 const uint BSDF_DIRECTION = 0u;
@@ -94,15 +95,26 @@ vec3 transmittance(uint medium, float length_) {
 }
 
 // Ambient light at the first surface of a path: the ray whose length is the distance up to which this sample counts hits, and its contribution.
-void add_ambient_light(BlockParams block, PathParams p, uint k, PathState state, Surface s, Shading m, float log_side, uvec2 pixel, uint n) {
+void add_ambient_light(BlockParams block, PathParams p, uint k, PathState state, SignalVertex v, Surface s, Shading m, float log_side, uvec2 pixel, uint n) {
     vec3 c = state.throughput * p.ambient_color * ambient_reflectance(s, m, log_side);
-    if (!(highest(c) > 0.0)) return;
-    uint slot = append_ray(p.ambient, ambient_ray(block, s, m.ng, pixel, n), k);
-    store_quad(p.ambient_contributions, slot, vec4(counted_radiance(p, c, state.depth + 1u), 0.0));
+    bool is_needed = highest(c) > 0.0;
+    if (!is_needed && !WITH_OCCLUDED_LIGHT) return;
+    // where nothing is to be darkened, as on mirrors, a ray that meets nothing
+    bool is_darkened = is_needed || has_rough_part(m.bsdf);
+    Ray r = no_ray();
+    if (is_darkened) r = ambient_ray(block, s, m.ng, pixel, n);
+    uint slot = append_ray(p.ambient, r, k);
+    c = counted_radiance(p, c, state.depth + 1u);
+    // the ray is counted where all light is darkened by what it meets (occluded_share)
+    store_quad(p.ambient_contributions, slot, vec4(c, WITH_OCCLUDED_LIGHT ? 1.0 : 0.0));
+    if (WITH_SIGNAL) {
+        vec3 albedo = v.is_apart ? m.bsdf.diffuse : vec3(0.0);
+        store_quad(p.ambient_diffuse_contributions, slot, vec4(mix(c / albedo, vec3(0.0), equal(albedo, vec3(0.0))), 0.0));
+    }
 }
 
 // Next-event estimation: a shadow ray to a light, and its contribution.
-void sample_direct_light(BlockParams block, PathParams p, uint k, PathState state, Surface s, Shading m, vec3 wo, uint beyond, uvec2 pixel, uint n, uint dimension) {
+void sample_direct_light(BlockParams block, PathParams p, uint k, PathState state, SignalVertex v, Surface s, Shading m, vec3 wo, uint beyond, uvec2 pixel, uint n, uint dimension) {
     dimension += LIGHT_POINT_ON;
     uvec2 bits = WITH_LIGHT_TREE ? sample_choice_bits(block.seed, pixel, n, dimension) : sample_2d_bits(block.seed, pixel, n, dimension);
     LightSample l = sample_light(p, s.position, m, bits);
@@ -122,7 +134,12 @@ void sample_direct_light(BlockParams block, PathParams p, uint k, PathState stat
     }
     c *= transmittance(side > 0.0 ? state.medium : beyond, l.distance);
     uint slot = append_ray(p.shadow, shadow, k);
-    store_quad(p.contributions, slot, vec4(counted_radiance(p, c, state.depth + 1u), 0.0));
+    c = counted_radiance(p, c, state.depth + 1u);
+    store_quad(p.contributions, slot, vec4(c, 0.0));
+    if (WITH_SIGNAL) {
+        vec3 share = v.is_apart ? diffuse_share(m, wo, l.wi, value.f) : v.share;
+        store_quad(p.diffuse_contributions, slot, vec4(c * share, 0.0));
+    }
 }
 
 // Continues the path behind a surface, unchanged.
@@ -221,7 +238,9 @@ vec3 path_vertex(BlockParams block, uint k, PathState state, Ray ray, Hit hit) {
     if (m.bsdf.kind == BSDF_NONE) return added;
     uvec2 pixel = block_pixel(block, pixel_index(state.index)) + block.block_origin;
     uint n = sample_index(state.index), dimension = PATH_FIRST + (state.depth + state.passes) * PATH_STRIDE;
-    if (WITH_AMBIENT && state.depth == 0u) add_ambient_light(block, p, k, state, s, m, log_side, pixel, n);
+    SignalVertex v = SignalVertex(SIGNAL_SEEN, false, vec3(0.0));
+    if (WITH_SIGNAL) v = signal_vertex(p, k, state.depth + state.passes == 0u, m);
+    if (WITH_AMBIENT && state.depth == 0u) add_ambient_light(block, p, k, state, v, s, m, log_side, pixel, n);
     if (state.depth >= p.max_depth) {
         // walls that light goes straight through are no bounces
         if (WITH_CLEAR_WALLS) {
@@ -237,7 +256,7 @@ vec3 path_vertex(BlockParams block, uint k, PathState state, Ray ray, Hit hit) {
     vec3 wo = to_frame(m.frame, towards_viewer);
     wo.z = max(wo.z, LEAST_COSINE);
     if (WITH_LIGHT_SAMPLES && has_rough_part(m.bsdf)) {
-        sample_direct_light(block, p, k, state, s, m, wo, boundary.medium, pixel, n, dimension);
+        sample_direct_light(block, p, k, state, v, s, m, wo, boundary.medium, pixel, n, dimension);
     }
 
     // after the last bounce only emission at the hit counts
@@ -250,6 +269,7 @@ vec3 path_vertex(BlockParams block, uint k, PathState state, Ray ray, Hit hit) {
     state.throughput *= b.weight;
     float brightest = highest(state.throughput);
     if (!(brightest > 0.0)) return added;
+    if (WITH_SIGNAL) signal_sampled(p, k, v, m, wo, b, side);
     if (WITH_CLEAR_WALLS && is_straight(m.bsdf, b, side)) {
         // light samples pass here, too: the density with which they compete is still that of the last bounce
         add_straight(p, k, state, hit.t);

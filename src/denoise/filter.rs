@@ -129,7 +129,7 @@ fn guide(shot: &DenoiseInput, film: &Film, features: &Features) -> Guided {
             mean: (rgb(&film.mean, k) / divisor).to_array(),
             samples: samples as f32,
             variance: variance.to_array(),
-            reserved: 0.0,
+            narrowed: 0.0,
         };
         out.surfaces[k] = SurfaceRecord { position: centre.position, normal: centre.ng, ..Default::default() };
         // eight bits: seven of a hash of the material, and one that is set for several surfaces

@@ -196,6 +196,20 @@ choices! {
         Half = "half", "PATTERN_QUARTER";
     }
 
+    /// Tone mapping operator. Values are linear with sRGB primaries, before and after.
+    ToneMap: "tone_map" default Linear {
+        /// Clamp at 1
+        Linear = "linear", "TONE_MAP_LINEAR";
+        /// Exponential, 1 - e^-x per channel
+        Exponential = "exp", "TONE_MAP_EXPONENTIAL";
+        /// Reinhard et al. (2002), by luminance
+        Reinhard = "reinhard", "TONE_MAP_REINHARD";
+        /// Khronos PBR Neutral (2024)
+        Neutral = "neutral", "TONE_MAP_NEUTRAL";
+        /// AgX (Sobotka 2022, curve by Wrensch 2023)
+        Agx = "agx", "TONE_MAP_AGX";
+    }
+
     /// Buffer of a frame that is displayed: scalars as grey up to `Rays`, colours from `Normal` on (shaders/display.glsl compares).
     DisplayMode: "shown" {
         /// The filtered result

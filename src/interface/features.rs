@@ -102,8 +102,8 @@ const LIGHT_FIRST: u32 = PATH_FIRST + PathFeatures::WORDS as u32;
 
 feature_set! {
     /// The reflection models of a scene's materials.
-    BsdfModels of /// A reflection model: `HAS_NAME` stands for `shaders/bsdf/name.glsl`, which defines `name_setup`, `name_eval`, `name_sample`, `name_has_smooth_part` and
-    /// `name_has_rough_part` (shaders/bsdf/bsdf.glsl says what they do). The functions that dispatch to them are generated from this list ([`super::glsl`]).
+    BsdfModels of /// A reflection model: `HAS_NAME` stands for `shaders/bsdf/name.glsl`, which defines `name_setup`, `name_eval`, `name_diffuse`, `name_sample`,
+    /// `name_has_smooth_part` and `name_has_rough_part` (shaders/bsdf/bsdf.glsl says what they do). The functions that dispatch to them are generated from this list ([`super::glsl`]).
     BsdfModel: "bsdf_models", from BSDF_FIRST, full true, indexed false, BSDF;
     Gltf = "HAS_GLTF", "metallic-roughness";
     Diffuse = "HAS_DIFFUSE", "Lambert";
@@ -176,6 +176,8 @@ feature_set! {
     SpecularOnly = "WITH_SPECULAR_ONLY", "paths of delta lobes only";
     Ambient = "WITH_AMBIENT", "ambient light";
     BackgroundOnly = "WITH_BACKGROUND_ONLY", "an environment that lights no surface";
+    OccludedLight = "WITH_OCCLUDED_LIGHT", "direct light darkened by ambient occlusion";
+    Signal = "WITH_SIGNAL", "diffuse reflection apart from the rest, for frames in real time";
 }
 
 feature_set! {

@@ -105,6 +105,7 @@ fn bsdf_dispatch() -> String {
     function("bool has_smooth_part(Bsdf b)", "return NAME_has_smooth_part(b);", "return false;");
     function("bool has_rough_part(Bsdf b)", "return NAME_has_rough_part(b);", "return false;");
     function("BsdfValue bsdf_eval(Bsdf b, vec3 wo, vec3 wi)", "return NAME_eval(b, wo, wi);", "return NO_VALUE;");
+    function("vec3 bsdf_diffuse(Bsdf b, vec3 wo, vec3 wi)", "return NAME_diffuse(b, wo, wi);", "return vec3(0.0);");
     function(
         "BsdfSample bsdf_sample(Bsdf b, vec3 wo, vec2 u, float v)",
         "return NAME_sample(b, wo, u, v);",

@@ -14,7 +14,7 @@ pub mod layout;
 pub mod records;
 
 pub use enumerations::{
-    BudgetStage, DisplayMode, PixelFilter, Resolution, Sequence, TexelFormat, Texels, TransmissionMode, View, Wrap,
+    BudgetStage, DisplayMode, PixelFilter, Resolution, Sequence, TexelFormat, Texels, ToneMap, TransmissionMode, View, Wrap,
 };
 pub use features::{
     BsdfModel, BsdfModels, LightKind, LightKinds, MaterialFeature, MaterialFeatures, PathFeature, PathFeatures,

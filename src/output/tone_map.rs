@@ -1,25 +1,10 @@
 //! Tone mapping from radiance to display range. Applied only when an 8-bit image is written: images are kept linear.
 
-use crate::settings::choices;
 use rayon::prelude::*;
 
 use super::{Channel, Image, Samples};
 
-choices! {
-    /// Tone mapping operator. Values are linear with sRGB primaries, before and after.
-    pub enum ToneMap {
-        /// Clamp at 1
-        Linear = "linear",
-        /// Exponential, 1 - e^-x per channel
-        Exponential = "exp",
-        /// Reinhard et al. (2002), by luminance
-        Reinhard = "reinhard",
-        /// Khronos PBR Neutral (2024)
-        Neutral = "neutral",
-        /// AgX (Sobotka 2022, curve by Wrensch 2023)
-        Agx = "agx",
-    }
-}
+pub use crate::interface::ToneMap;
 
 type Rgb = [f32; 3];
 

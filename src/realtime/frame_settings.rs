@@ -13,8 +13,11 @@ use crate::sampling::Sequence;
 use crate::settings::parse::parse_rate;
 use crate::settings::{AppliesTo, Capability, Editable, Value, choices, settings};
 
-/// Settings of real-time frames of ambient occlusion.
+/// Settings of real-time frames.
 const FRAMES: AppliesTo = AppliesTo::frames_of(Capability::RealTimeFrames);
+
+/// Settings of a time line, of frames in real time or of stills.
+const TIMELINE: AppliesTo = AppliesTo::ALL;
 
 choices! {
     /// Primary visibility, as requested.
@@ -25,6 +28,26 @@ choices! {
         Traced = "traced",
         /// Rasterized
         Raster = "raster",
+    }
+}
+
+choices! {
+    /// Antialiasing in time.
+    pub enum Antialias {
+        /// Samples move within their pixels
+        On = "on",
+        /// Samples stay at the centres of pixels
+        Off = "off",
+    }
+}
+
+choices! {
+    /// What an image does at rest.
+    pub enum AtRest {
+        /// It converges to the still of the same integrator
+        Converge = "converge",
+        /// It keeps what the history holds
+        Hold = "hold",
     }
 }
 
@@ -74,27 +97,27 @@ settings! {
     pub struct FrameSettings {
         /// Render with the real-time pipeline and these settings
         preset: Option<Preset>, option(value_enum), applies(FRAMES), basic;
-        /// Render frames A to B - 1 [default: one frame, after warm-up]
-        frames: Option<FrameRange>, option(value_name = "A..B", value_parser = parse_frames), applies(FRAMES), basic;
+        /// Render frames A to B - 1; with --spp a still each [default: one frame, after warm-up]
+        frames: Option<FrameRange>, option(value_name = "A..B", value_parser = parse_frames), applies(TIMELINE), basic;
         /// Frames per second [default: the camera path's, or 30]
-        fps: Option<f64>, option(value_name = "N", value_parser = parse_rate), applies(FRAMES);
+        fps: Option<f64>, option(value_name = "N", value_parser = parse_rate), applies(TIMELINE);
         /// Play an animation of the scene, by index or name [default: the first]
-        animate: Option<String>, option(value_name = "INDEX|NAME", num_args = 0..=1, default_missing_value = "0"), applies(FRAMES);
+        animate: Option<String>, option(value_name = "INDEX|NAME", num_args = 0..=1, default_missing_value = "0"), applies(TIMELINE);
         /// Animate the camera along the key frames of a file (docs/sequences.md)
         camera_path: Option<PathBuf>,
             option(value_name = "FILE", value_hint = clap::ValueHint::FilePath, conflicts_with_all = ["orbit", "eye", "camera", "fov_y"]),
-            applies(FRAMES);
+            applies(TIMELINE);
         /// Orbit the camera around the centre of the scene, one revolution in this many frames
         orbit: Option<u32>,
             option(value_name = "FRAMES", num_args = 0..=1, default_missing_value = "240", value_parser = clap::value_parser!(u32).range(1..)),
-            applies(FRAMES), basic;
+            applies(TIMELINE), basic;
         /// Warm-up frames, identical to the first, that are rendered and discarded [default: 0; for a single frame, the history length]
         warm_up: Option<u32>, option(value_name = "N"), applies(FRAMES);
         /// AO technique [default: the preset's]
         technique: Option<Technique>, option(value_enum), applies(FRAMES);
         /// Primary visibility: rasterized or ray traced [default: auto]
         primary: Option<PrimaryChoice>, option(value_enum), applies(FRAMES), research;
-        /// Occlusion rays per pixel and frame [default: the preset's]
+        /// Occlusion rays, or paths, per pixel and frame [default: the preset's]
         rays_per_pixel: Option<u32>,
             option(value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(Settings::MAX_RAYS))), applies(FRAMES);
         /// How rays are distributed over pixels (docs/realtime.md) [default: uniform]
@@ -109,6 +132,10 @@ settings! {
         filter: Option<FilterKind>, option(value_enum), applies(FRAMES);
         /// Maximum filter radius in pixels [default: the preset's]
         filter_radius: Option<u32>, option(value_name = "PIXELS", value_parser = clap::value_parser!(u32).range(0..=16)), applies(FRAMES), research;
+        /// Antialias edges by samples at different places within the pixels from frame to frame [default: the preset's]
+        antialias: Option<Antialias>, option(value_enum), applies(FRAMES);
+        /// What the image does while neither the camera nor the scene moves [default: the preset's]
+        at_rest: Option<AtRest>, option(value_enum), applies(FRAMES);
         /// What .png and .apng outputs show [default: accessibility]
         show: Option<DisplayMode>, option(value_name = "NAME", value_enum), applies(FRAMES);
     }
@@ -160,6 +187,8 @@ impl FrameSettings {
         s.history = self.history.unwrap_or(s.history);
         s.filter.kind = self.filter.unwrap_or(s.filter.kind);
         s.filter.radius = self.filter_radius.unwrap_or(s.filter.radius);
+        s.antialias = self.antialias.map_or(s.antialias, |a| a == Antialias::On);
+        s.converge = self.at_rest.map_or(s.converge, |r| r == AtRest::Converge);
         s.radius = ao.radius();
         s.falloff = ao.ao_falloff.unwrap_or(s.falloff);
         s.hemisphere = ao.hemisphere();

@@ -34,6 +34,14 @@ pub struct Frame<'a> {
     pub moved: &'a [MovedRecord],
     /// Frame index.
     pub number: u32,
+    /// Where samples lie in their pixels: offset from the centre, pixels.
+    pub offset: [f32; 2],
+    /// There is a resolved image of the previous frame.
+    pub has_resolved: bool,
+    /// The image has not rested before: samples at rest start anew.
+    pub rest_starts: bool,
+    /// Maximum samples of histories of radiance before this frame's.
+    pub most_past: f32,
     /// Address of the frame's `FrameParams`.
     pub params: u64,
     /// The buffer to display, if any.
@@ -132,6 +140,27 @@ pub trait Pass {
     /// # Errors
     /// Those of what it draws.
     fn record(&self, recorder: &mut Recorder, frame: &Frame, resources: &Resources, range: Range) -> Result<()>;
+
+    /// Returns true if the pass submits its work itself, because the host decides in between what comes next: then [`Pass::run`] is called in place of
+    /// [`Pass::record`]. Such a pass is the only one of its stage, and clears its resources itself.
+    fn is_run_by_host(&self) -> bool {
+        false
+    }
+
+    /// Number of rays of its last frame, if the host knows it.
+    fn rays(&self) -> u64 {
+        0
+    }
+
+    /// Runs the pass over a range in submissions of its own, and waits for them. Returns their times.
+    ///
+    /// # Errors
+    /// Those of the device.
+    fn run(&mut self, commands: &mut Commands, frame: &Frame, resources: &Resources, range: Range) -> Result<Vec<Timing>> {
+        let mut outcome = Ok(());
+        let timings = commands.run(|r| outcome = self.record(r, frame, resources, range))?;
+        outcome.map(|()| timings)
+    }
 }
 
 /// Passes that are recorded one after another for each of several ranges; mostly one pass and one range.
@@ -146,6 +175,10 @@ impl Stage {
     /// Creates a stage of passes that hand results on within a range.
     pub fn new(passes: Vec<Box<dyn Pass>>, ranges: Vec<Range>) -> Self {
         Self { passes, ranges, versions: Vec::new() }
+    }
+
+    fn is_run_by_host(&self) -> bool {
+        self.passes.iter().any(|p| p.is_run_by_host())
     }
 
     /// The resources that its passes read and write without a display.
@@ -185,6 +218,11 @@ impl Graph {
         self.resources.allocate(device, &self.stages)?;
         self.invalidate();
         Ok(false)
+    }
+
+    /// Rays of the last frame, of passes whose number of rays the host knows.
+    pub fn rays(&self) -> u64 {
+        self.stages.iter().flat_map(|s| &s.passes).map(|p| p.rays()).sum()
     }
 
     /// The memory of the passes.
@@ -244,19 +282,21 @@ impl Graph {
                 pass.prepare(frame, &self.resources)?;
             }
         }
-        let launches: Vec<(&Stage, usize)> =
-            stages.iter().map(|&k| &self.stages[k]).flat_map(|s| (0..s.ranges.len()).map(move |k| (s, k))).collect();
+        let launches: Vec<(usize, usize)> =
+            stages.iter().flat_map(|&s| (0..self.stages[s].ranges.len()).map(move |k| (s, k))).collect();
         let (mut timings, resources) = (Vec::new(), &self.resources);
         // a stage of several launches is cut, others go with what is before them
         let mut rest = launches.as_slice();
         let mut control = control;
         while !rest.is_empty() {
+            let by_host = |stage: usize| self.stages[stage].is_run_by_host();
             let mut several = 0;
             let end = match control {
                 Some(_) => Some(1),
-                None => rest.iter().position(|(stage, _)| {
-                    several += usize::from(stage.ranges.len() > 1);
-                    several > MAX_LAUNCHES
+                None if by_host(rest[0].0) => Some(1),
+                None => rest.iter().position(|&(stage, _)| {
+                    several += usize::from(self.stages[stage].ranges.len() > 1);
+                    several > MAX_LAUNCHES || by_host(stage)
                 }),
             };
             let (submission, others) = rest.split_at(end.unwrap_or(rest.len()));
@@ -266,11 +306,21 @@ impl Graph {
             {
                 return Err(Error::Interrupted);
             }
+            if let &[(stage, k)] = submission
+                && by_host(stage)
+            {
+                let Stage { passes, ranges, .. } = &mut self.stages[stage];
+                for pass in passes.iter_mut().filter(|p| p.is_enabled(display)) {
+                    timings.extend(pass.run(&mut self.commands, frame, resources, ranges[k])?);
+                }
+                continue;
+            }
             let mut outcome = Ok(());
             timings.extend(self.commands.run(|r| {
                 let mut hazards = Hazards::default();
-                outcome =
-                    submission.iter().try_for_each(|(stage, k)| record_range(r, frame, resources, &mut hazards, stage, *k));
+                outcome = submission
+                    .iter()
+                    .try_for_each(|&(stage, k)| record_range(r, frame, resources, &mut hazards, &self.stages[stage], k));
             })?);
             outcome?;
         }

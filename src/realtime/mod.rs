@@ -15,11 +15,14 @@ pub mod settings;
 
 use glam::{DAffine3, DMat3, DVec3};
 
+use crate::accel::flatten::FlatScene;
 use crate::error::{Error, Result};
 use crate::film::Control;
 use crate::film::block::Block;
 use crate::film::camera::CameraRecord;
 use crate::gpu::{Buffer, Timing};
+use crate::integrators::path::PathOptions;
+use crate::interface::records::denoise::RadianceRecord;
 use crate::interface::records::frame::MAX_VARIANCE;
 use crate::raster::Primary;
 use crate::shaders::StreamShaders;
@@ -77,10 +80,13 @@ pub struct Realtime {
     params: Params<FrameParams>,
     /// The buffer to display, if any.
     display: Option<Display>,
+    /// The buffer that the last frame displayed.
+    shown: Option<Option<Display>>,
     /// Passes of the display that exist.
     displays: Vec<DisplayPassKind>,
     primary_reason: String,
     state: State,
+    is_radiance: bool,
 }
 
 /// Which pass writes the displayed image.
@@ -107,7 +113,17 @@ struct State {
     frame: u32,
     camera: Option<CameraRecord>,
     has_history: bool,
+    has_resolved: bool,
+    /// Where samples lay in their pixels.
+    offset: [f32; 2],
+    /// Frames since camera and scene last changed, this one included.
+    resting: u32,
+    /// Lights or materials have changed: histories of radiance count little.
+    has_new_light: bool,
 }
+
+/// Samples for which a history of radiance counts after lights or materials have changed, per ray of a frame.
+const PAST_AFTER_NEW_LIGHT: f32 = 2.0;
 
 impl Realtime {
     /// The streams that it traces.
@@ -148,10 +164,63 @@ impl Realtime {
             graph: Graph::new(device, extent, passes::stages(tracer, block, settings, primary, lights)?)?,
             params: Params::new(device, "frame parameters")?,
             display: None,
+            shown: None,
             displays: Vec::new(),
             primary_reason,
             state: State::default(),
+            is_radiance: false,
         })
+    }
+
+    /// Creates the pipeline for frames of radiance. The tracer must have been built from `flat` with [`crate::tracer::Needs::shading`]; `options` are those of
+    /// paths, whose number per pixel is [`Settings::rays_per_pixel`].
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for settings out of range or without effect on radiance, [`Error::OutOfMemory`], and those of compiling shaders.
+    pub fn radiance(
+        tracer: &Tracer,
+        flat: &FlatScene,
+        size: [u32; 2],
+        settings: &Settings,
+        options: &PathOptions,
+    ) -> Result<Self> {
+        settings.check()?;
+        settings.check_radiance()?;
+        let block = Block { origin: [0, 0], size };
+        let pixels = u64::from(size[0]) * u64::from(size[1]);
+        let extent =
+            Extent { pixels, tiled_pixels: block.rays().into(), half_pixels: pixels.div_ceil(4), ..Default::default() };
+        let device = tracer.device();
+        Ok(Self {
+            size,
+            settings: Settings { primary: Some(Primary::Traced), ..*settings },
+            graph: Graph::new(device, extent, passes::radiance_stages(tracer, flat, block, settings, options)?)?,
+            params: Params::new(device, "frame parameters")?,
+            display: None,
+            shown: None,
+            displays: Vec::new(),
+            primary_reason: "paths begin with a camera ray".into(),
+            state: State::default(),
+            is_radiance: true,
+        })
+    }
+
+    /// Returns true for frames of radiance.
+    pub fn is_radiance(&self) -> bool {
+        self.is_radiance
+    }
+
+    /// Number of values per pixel of [`Realtime::result`]: 1 of ambient visibility, 3 of radiance.
+    pub fn channels(&self) -> usize {
+        if self.is_radiance { 3 } else { 1 }
+    }
+
+    /// Lights or materials have changed since the last frame: histories of radiance count little in the next one. Those of ambient visibility do not depend on them.
+    pub fn change_light(&mut self) {
+        if self.is_radiance {
+            self.state.has_new_light = true;
+            self.state.resting = 0;
+        }
     }
 
     /// Image size in pixels.
@@ -172,6 +241,7 @@ impl Realtime {
     /// Discards the history.
     pub fn reset(&mut self) {
         self.state.has_history = false;
+        self.state.has_resolved = false;
         self.state.camera = None;
     }
 
@@ -218,16 +288,29 @@ impl Realtime {
         let moved = moved_records(moved);
         let is_larsen = self.settings.technique == Technique::Larsen;
         // Larsen's pipeline skips no pass
-        let still = moved.is_empty() && self.state.camera == Some(*camera) && !is_larsen;
-        for (resource, changed) in
-            [(Resource::FrameNumber, true), (Resource::Camera, !still), (Resource::Scene, !moved.is_empty())]
-        {
+        let still = moved.is_empty() && self.state.camera == Some(*camera) && !is_larsen && !self.state.has_new_light;
+        let resting = if still { self.state.resting.saturating_add(1) } else { 0 };
+        let is_converged = self.settings.converges() && resting >= self.settings.frames_to_converge();
+        if is_converged && self.shown == Some(self.display) {
+            return Ok(FrameStats {
+                skipped_rays: self.pixels() * u64::from(self.settings.rays_per_pixel),
+                ..Default::default()
+            });
+        }
+        let offset = if self.settings.antialias { sample_offset(self.state.frame) } else { [0.0; 2] };
+        // camera rays start elsewhere
+        let has_moved_samples = offset != self.state.offset;
+        for (resource, changed) in [
+            (Resource::FrameNumber, true),
+            (Resource::Camera, !still || has_moved_samples),
+            (Resource::Scene, !moved.is_empty()),
+        ] {
             if changed {
                 self.graph.touch(resource);
             }
         }
         let stages = self.graph.begin(self.display.as_ref());
-        self.params.write(&self.frame_params(camera, still))?;
+        self.params.write(&self.frame_params(camera, still, offset))?;
         let frame = Frame {
             tracer,
             settings: &self.settings,
@@ -235,21 +318,39 @@ impl Realtime {
             camera: *camera,
             moved: &moved,
             number: self.state.frame,
+            offset,
+            has_resolved: self.state.has_resolved,
+            rest_starts: resting == 0 || !self.state.has_resolved,
+            most_past: match self.state.has_new_light {
+                true => PAST_AFTER_NEW_LIGHT * self.settings.rays_per_pixel as f32,
+                false => f32::MAX,
+            },
             params: self.params.address(),
             display: self.display,
         };
         let timings = self.graph.run(&frame, &stages, control)?;
         tracer.check_finished()?;
         let count: Vec<u32> = self.graph.resources().read(Resource::RayCount, 1)?;
-        let occlusion_rays = u64::from(count.first().copied().unwrap_or(0));
+        let occlusion_rays = count.first().map_or(self.graph.rays(), |&n| u64::from(n));
         let pixels = self.pixels();
         let all = pixels * u64::from(self.settings.rays_per_pixel) / u64::from(self.settings.resolution.period());
         self.state.frame = self.state.frame.wrapping_add(1);
         self.state.camera = Some(*camera);
         self.state.has_history = self.settings.history > 1 || is_larsen;
+        self.state.has_resolved = true;
+        self.state.resting = resting;
+        self.state.offset = offset;
+        self.state.has_new_light = false;
+        self.shown = Some(self.display);
         Ok(FrameStats {
             timings,
-            primary_rays: if still || self.settings.primary == Some(Primary::Raster) { 0 } else { pixels },
+            primary_rays: match self.settings.primary {
+                Some(Primary::Raster) => 0,
+                // for the G-buffer, and of each path
+                _ if self.is_radiance => pixels * (1 + u64::from(self.settings.rays_per_pixel)),
+                _ if still && !has_moved_samples => 0,
+                _ => pixels,
+            },
             occlusion_rays,
             skipped_rays: all.saturating_sub(occlusion_rays),
             nodes: match self.display.is_some_and(|d| d.shown == DisplayMode::Nodes) {
@@ -267,6 +368,9 @@ impl Realtime {
     pub fn display(&mut self, tracer: &Tracer, display: Option<Display>) -> Result<()> {
         if let Some(display) = &display {
             display.shown.check(&self.settings)?;
+            if self.is_radiance {
+                display.shown.check_radiance()?;
+            }
             let kind = DisplayPassKind::of(display.shown);
             if !self.displays.contains(&kind) {
                 let stage = match kind {
@@ -292,12 +396,23 @@ impl Realtime {
         self.graph.resources().buffer(Resource::DisplayImage)
     }
 
-    /// Ambient visibility of each pixel of the last frame, rows from the top; 0 for background.
+    /// The last frame, rows from the top: ambient visibility of each pixel, or linear radiance, red, green and blue. Ambient visibility is 0 for background; of a
+    /// pixel that shows some, it is the mean over the pixel.
     pub fn result(&self) -> Result<Vec<f32>> {
-        self.read(Resource::Result)
+        let channels = self.channels();
+        match self.resolved()? {
+            Some(resolved) => Ok(resolved.iter().flat_map(|q| &q[..channels]).copied().collect()),
+            None => self.read(Resource::Result),
+        }
     }
 
-    /// Input of the last frame's spatial filter, rows from the top; 0 for background and for pixels without a sample yet. With Larsen's pipeline: the result.
+    /// The final image with coverage, if there is one besides that of the filter.
+    fn resolved(&self) -> Result<Option<Vec<[f32; 4]>>> {
+        let resolved: Vec<[f32; 4]> = self.read(Resource::Resolved)?;
+        Ok((!resolved.is_empty()).then_some(resolved))
+    }
+
+    /// Input of the last frame's spatial filter (of radiance: diffuse reflection divided by the albedo, the mean of its channels), rows from the top; 0 for background and for pixels without a sample yet. With Larsen's pipeline: the result.
     pub fn unfiltered(&self) -> Result<Vec<f32>> {
         match self.settings.technique {
             Technique::Larsen => self.result(),
@@ -335,6 +450,11 @@ impl Realtime {
 
     /// Mean, number of samples and variance of one sample of each pixel.
     fn estimates(&self) -> Result<Vec<[f32; 3]>> {
+        if self.is_radiance {
+            let history: Vec<RadianceRecord> = self.read(Resource::DiffuseHistory)?;
+            let mean = |c: [f32; 3]| c.iter().sum::<f32>() / 3.0;
+            return Ok(history.iter().map(|h| [mean(h.mean), h.samples, mean(h.variance)]).collect());
+        }
         let mut history: Vec<[u32; 2]> = self.read(Resource::History)?;
         // Larsen's pipeline has none
         history.resize(self.pixels() as usize, [0; 2]);
@@ -345,8 +465,16 @@ impl Realtime {
             .collect())
     }
 
-    /// Coverage of the last frame: 1 where a pixel's centre shows the scene, else 0; rows from the top.
+    /// Coverage of the last frame, rows from the top: the fraction of each pixel that shows the scene. Without antialiasing: 1 where its centre does, else 0.
     pub fn coverage(&self) -> Result<Vec<f32>> {
+        match self.resolved()? {
+            Some(resolved) => Ok(resolved.iter().map(|q| q[3]).collect()),
+            None => self.sampled(),
+        }
+    }
+
+    /// 1 where the sample of a pixel shows the scene in the last frame, else 0; rows from the top.
+    fn sampled(&self) -> Result<Vec<f32>> {
         let guide: Vec<[f32; 2]> = self.read(Resource::Guide)?;
         Ok(guide.iter().map(|g| if g[0] < f32::INFINITY { 1.0 } else { 0.0 }).collect())
     }
@@ -356,7 +484,7 @@ impl Realtime {
         const WORDS: usize = SURFACE_BYTES as usize / 4;
         let now: Vec<[f32; WORDS]> = self.read(Resource::Surface)?;
         let before: Vec<[f32; 3]> = self.read(Resource::PreviousPosition)?;
-        let covered = self.coverage()?;
+        let covered = self.sampled()?;
         let surface = |(k, covered): (usize, &f32)| {
             let position = [now[k][0], now[k][1], now[k][2]];
             let before = before.get(k).copied().unwrap_or(position);
@@ -374,7 +502,7 @@ impl Realtime {
     }
 
     /// Parameters that all passes share.
-    fn frame_params(&self, camera: &CameraRecord, still: bool) -> FrameParams {
+    fn frame_params(&self, camera: &CameraRecord, still: bool, offset: [f32; 2]) -> FrameParams {
         let (s, resources) = (&self.settings, self.graph.resources());
         let previous = self.state.camera.unwrap_or(*camera);
         FrameParams {
@@ -386,6 +514,8 @@ impl Realtime {
             orthographic: camera.orthographic.into(),
             previous_orthographic: previous.orthographic.into(),
             size: self.size,
+            offset,
+            previous_offset: self.state.offset,
             tiles_x: self.block().tiles_x(),
             frame: self.state.frame,
             seed: s.seed,
@@ -399,7 +529,7 @@ impl Realtime {
             normal_tolerance: NORMAL_TOLERANCE,
             still: still.into(),
             has_history: self.state.has_history.into(),
-            rest: (s.rest && still && self.state.has_history).into(),
+            rest: (s.rest && still && self.state.has_history && !s.converges()).into(),
             surface: resources.address(Resource::Surface),
             axes: resources.address(Resource::Axes),
             guide: resources.address(Resource::Guide),
@@ -408,6 +538,13 @@ impl Realtime {
             previous_position: resources.address(Resource::PreviousPosition),
         }
     }
+}
+
+/// Where the samples of a frame lie in their pixels: offset from the centre, pixels; evenly distributed over any number of consecutive frames (Roberts, "The
+/// Unreasonable Effectiveness of Quasirandom Sequences", 2018).
+fn sample_offset(frame: u32) -> [f32; 2] {
+    // powers of the inverse of the plastic number
+    [0.754_877_666_246_693, 0.569_840_290_998_053].map(|step: f64| ((0.5 + f64::from(frame) * step).fract() - 0.5) as f32)
 }
 
 /// World to camera, from camera to world.

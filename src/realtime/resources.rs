@@ -5,6 +5,7 @@ use std::sync::Arc;
 use super::graph::Stage;
 use crate::error::Result;
 use crate::gpu::{Buffer, Device, Memory};
+use crate::interface::records::denoise::RadianceRecord;
 use crate::interface::records::frame::{SUMS_COUNT, SurfaceRecord};
 use crate::tracer::stream::LAUNCH_RAYS;
 
@@ -12,6 +13,10 @@ use crate::tracer::stream::LAUNCH_RAYS;
 pub const SURFACE_BYTES: u64 = size_of::<SurfaceRecord>() as u64;
 /// Bytes of three floats.
 pub const VECTOR_BYTES: u64 = 12;
+/// Bytes of four floats.
+pub const QUAD_BYTES: u64 = 16;
+/// Bytes of a `RadianceRecord`.
+pub const RADIANCE_BYTES: u64 = size_of::<RadianceRecord>() as u64;
 /// Bytes of a guide or an estimate (src/interface/records/frame.rs).
 pub const PAIR_BYTES: u64 = 8;
 
@@ -68,6 +73,30 @@ pub enum Resource {
     RayPixels,
     /// Budget: rays traced for each pixel in all frames.
     TotalRays,
+    /// Radiance: diffuse albedo and roughness of each pixel's surface.
+    Materials,
+    /// Radiance: emission and background seen directly.
+    Direct,
+    /// Radiance: this frame's samples of diffuse reflection, divided by the albedo.
+    CurrentDiffuse,
+    /// Radiance: this frame's samples of the rest.
+    CurrentSpecular,
+    /// Radiance: distance of what each pixel reflects.
+    ReflectedDistance,
+    /// Radiance: accumulated diffuse reflection.
+    DiffuseHistory,
+    /// Radiance: accumulated rest.
+    SpecularHistory,
+    /// Radiance: estimates between the steps of a filter, two buffers used alternately for diffuse reflection, and two for the rest.
+    FilteredRadiance(usize),
+    /// Radiance: the filtered image.
+    Composed,
+    /// Samples since the image came to rest.
+    Rest,
+    /// The mean over frames whose samples lie at different places within the pixels.
+    ResolvedHistory,
+    /// The final image: value and coverage.
+    Resolved,
     /// Larsen: number of point lights visible from each pixel.
     VisibleLights,
     /// Larsen: occlusion at half resolution.
@@ -142,6 +171,18 @@ impl Resource {
             Self::Plan => device("plan of rays", 8 * pixels, Frame),
             Self::RayPixels => device("list of rays", 4 * most_rays * pixels, Frame),
             Self::TotalRays => device("rays taken", 4 * pixels, Kept),
+            Self::Materials => device("materials of surfaces", QUAD_BYTES * pixels, Kept),
+            Self::Direct => device("direct view", QUAD_BYTES * pixels, Kept),
+            Self::CurrentDiffuse => device("diffuse samples of the frame", RADIANCE_BYTES * pixels, Frame),
+            Self::CurrentSpecular => device("other samples of the frame", RADIANCE_BYTES * pixels, Frame),
+            Self::ReflectedDistance => device("reflected distances", 4 * pixels, Frame),
+            Self::DiffuseHistory => device("diffuse history", RADIANCE_BYTES * pixels, Pair),
+            Self::SpecularHistory => device("other history", RADIANCE_BYTES * pixels, Pair),
+            Self::FilteredRadiance(_) => device("filtered radiance", RADIANCE_BYTES * pixels, Frame),
+            Self::Composed => device("composed image", QUAD_BYTES * pixels, Frame),
+            Self::Rest => device("samples at rest", RADIANCE_BYTES * pixels, Kept),
+            Self::ResolvedHistory => device("resolved history", RADIANCE_BYTES * pixels, Pair),
+            Self::Resolved => readback("resolved image", QUAD_BYTES * pixels),
             Self::VisibleLights => device("visible lights", 4 * pixels, Frame),
             Self::Occlusion => device("occlusion", 4 * half_pixels, Frame),
             Self::Combined => device("combined", 4 * pixels, Frame),

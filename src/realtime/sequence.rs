@@ -18,6 +18,17 @@ pub enum CameraMotion {
     Orbit(Orbit),
 }
 
+impl CameraMotion {
+    /// The camera in a frame, if it was `camera` without this motion.
+    pub fn camera_at(&self, camera: Camera, frame: f64) -> Camera {
+        match self {
+            Self::Still => camera,
+            Self::Path(path) => path.camera_at(frame),
+            Self::Orbit(orbit) => orbit.camera_at(&camera, frame),
+        }
+    }
+}
+
 /// An animation that is played.
 #[derive(Debug)]
 struct AnimationPlayback<'a> {
@@ -100,12 +111,7 @@ impl<'a> FrameSequence<'a> {
                 stats = tracer.update(&p.pose.changes())?;
             }
         }
-        let camera = match &self.motion {
-            CameraMotion::Still => camera,
-            CameraMotion::Path(path) => path.camera_at(frame),
-            CameraMotion::Orbit(orbit) => orbit.camera_at(&camera, frame),
-        };
-        Ok((camera, stats))
+        Ok((self.motion.camera_at(camera, frame), stats))
     }
 
     /// Returns true if the camera or the scene changes from frame to frame.

@@ -168,6 +168,10 @@ pub struct Settings {
     pub gtao_constants: GtaoConstants,
     /// Larsen's pipeline: scene units per unit of length in the paper.
     pub unit: f64,
+    /// Samples lie at different places within the pixels from frame to frame, and the image is averaged over frames: edges are antialiased.
+    pub antialias: bool,
+    /// At rest the image converges to the still: the mean of all samples since then takes over. Else it stays as the filter leaves it.
+    pub converge: bool,
     /// Also compute bent normals: the mean unoccluded direction.
     pub bent: bool,
     /// Maximum rays of a launch. Small launches let a frame be interrupted soon ([`super::Realtime::frame_with`]); images do not depend on it.
@@ -190,6 +194,19 @@ impl Settings {
     const MAX_BUDGET: u32 = 4;
     /// Maximum history length in samples: the largest number up to which half floats represent all integers.
     pub const MAX_SAMPLES: u32 = 2048;
+
+    /// Samples per pixel at rest after which the image counts as converged, and no more are taken.
+    pub const REST_SAMPLES: u32 = 4096;
+
+    /// Returns true if the image converges at rest.
+    pub fn converges(&self) -> bool {
+        self.converge && self.history > 1 && self.technique == Technique::Traced && self.budget == Budget::Uniform
+    }
+
+    /// Number of frames at rest after which the image no longer changes, with [`Settings::converges`].
+    pub fn frames_to_converge(&self) -> u32 {
+        Self::REST_SAMPLES.div_ceil(self.rays_per_pixel) * self.resolution.period()
+    }
 
     /// Attenuation of occlusion with distance.
     pub fn attenuation(&self) -> Attenuation {
@@ -233,10 +250,32 @@ impl Settings {
         if !(self.clamp >= 0.0 && self.moved_weight >= 0.0 && self.filter.samples >= 0.0) {
             return wrong("clamp, moved weight and filter samples must not be negative");
         }
+        if self.antialias && self.technique == Technique::Larsen {
+            return wrong("--preset larsen has one sample place in a pixel: leave antialiasing out, or choose another preset");
+        }
         if self.bent && self.technique != Technique::Traced {
             return wrong("bent normals need traced directions: choose --technique traced");
         }
         Ok(())
+    }
+}
+
+impl Settings {
+    /// Checks that the settings fit frames of radiance.
+    ///
+    /// # Errors
+    /// [`Error::Usage`], naming the first that does not.
+    pub fn check_radiance(&self) -> Result<()> {
+        let wrong =
+            |what: &str| Err(Error::Usage(format!("{what} is for ambient occlusion: leave it out, or use --integrator ao")));
+        match self {
+            Settings { technique: Technique::Gtao, .. } => wrong("--technique gtao"),
+            Settings { technique: Technique::Larsen, .. } => wrong("--preset larsen"),
+            Settings { budget: Budget::Variance, .. } => wrong("--budget variance"),
+            Settings { primary: Some(Primary::Raster), .. } => wrong("--primary raster"),
+            Settings { bent: true, .. } => wrong("the bent normal"),
+            _ => Ok(()),
+        }
     }
 }
 
@@ -280,6 +319,8 @@ impl Preset {
             gtao: [3, 6],
             gtao_constants: GtaoConstants::PRESETS,
             unit: 1.0,
+            antialias: false,
+            converge: false,
             bent: false,
             launch_rays: LAUNCH_RAYS,
         };

@@ -8,6 +8,7 @@ use super::laps::Laps;
 use super::report::{FrameReport, FramesReport, Seconds, Setup};
 use super::still::{aov_needs, camera_text, scene_warnings, spp_text};
 use super::{RenderSettings, Renderer, TracerRequest, camera_numbers};
+use crate::accel::features::Blend;
 use crate::accel::flatten::FlatScene;
 use crate::error::{Error, Result};
 use crate::files;
@@ -16,21 +17,23 @@ use crate::film::camera::CameraRecord;
 use crate::gpu::{Buffer, Device};
 use crate::integrators::ao::Hemisphere;
 use crate::integrators::aov::{self, Aov};
-use crate::integrators::path::PixelFilter;
+use crate::integrators::path::{PathOptions, PixelFilter};
+use crate::integrators::{IntegratorName, PictureOptions, RenderJob};
+use crate::output::png::Colour;
 use crate::output::{Channel, Image, Samples};
 use crate::realtime::display::{Display, DisplayMode};
 use crate::realtime::frame_settings::FrameRange;
 use crate::realtime::sequence::{self, CameraMotion, FrameSequence};
 use crate::realtime::{Realtime, Settings, Technique};
+use crate::scene::camera_path::CameraPath;
 use crate::scene::load::load_camera_path;
 use crate::scene::{Camera, LightKind, Orbit, Scene};
 use crate::settings::Capability;
+use crate::shaders::StreamShaders;
 use crate::tracer::{Needs, Tracer};
 
 /// Default frame rate, frames per second.
-const DEFAULT_FPS: f64 = 30.0;
-/// Exposure of displayed frames, in stops.
-const EXPOSURE: f32 = 0.0;
+pub(super) const DEFAULT_FPS: f64 = 30.0;
 /// Unit of displayed depths and positions, as a fraction of the scene's diagonal.
 pub(super) const UNIT_OF_SCENE: f32 = 0.25;
 
@@ -43,6 +46,10 @@ pub struct Frames<'r> {
     size: [u32; 2],
     origin: glam::DVec3,
     aov: Vec<Aov>,
+    /// What the integrator can do, and the exposure of pictures in stops.
+    capabilities: &'static [Capability],
+    exposure: f32,
+    shown: DisplayMode,
     fps: f64,
     range: FrameRange,
     warm_up: u32,
@@ -73,7 +80,6 @@ impl Renderer {
         let timeline = &settings.frames;
         // before anything is looked at
         frame_settings(settings)?;
-        let shown = timeline.show.unwrap_or_default();
         let range = timeline.range();
         let path = timeline.camera_path.as_deref().map(load_camera_path).transpose()?;
         let first_of_path = path.as_ref().map(|path| path.camera_at(f64::from(range.first)));
@@ -85,56 +91,78 @@ impl Renderer {
 
         let size = settings.size(scene);
         let fps = timeline.fps.or(path.as_ref().map(|p| p.fps())).unwrap_or(DEFAULT_FPS);
-        let motion = match (path, timeline.orbit) {
-            (Some(path), _) => CameraMotion::Path(path),
-            (None, Some(frames)) => CameraMotion::Orbit(orbit(scene, f64::from(frames))?),
-            (None, None) => CameraMotion::Still,
-        };
+        let motion = camera_motion(scene, path, timeline.orbit)?;
         let animation = timeline.animate.as_deref().map(|a| sequence::find_animation(scene, a)).transpose()?;
         let file_camera = scene.cameras.iter().position(|c| *c == camera);
         let sequence = FrameSequence::new(scene, camera.clone(), file_camera, motion, animation, fps)?;
-        let flat = FlatScene::with_motion(scene, sequence.motion()?)?;
-        let warm_up = timeline.warm_up.unwrap_or_else(|| if timeline.frames.is_some() { 0 } else { settling_frames(&how) });
+        let integrator = settings.integrator();
+        let is_radiance = !is_ambient_occlusion(integrator);
+        let blend = if is_radiance { integrator.get().blend() } else { Blend::Masked };
+        let flat = FlatScene::with_motion_and_blend(scene, sequence.motion()?, blend)?;
+        // a single frame is one of a history that is full, and not what it converges to
+        let settling = || settling_frames(&Settings { converge: false, ..how });
+        let warm_up = timeline.warm_up.unwrap_or_else(|| if timeline.frames.is_some() { 0 } else { settling() });
         let frames = u64::from(range.end - range.first) + u64::from(warm_up);
         let request = TracerRequest {
-            needs: frame_needs(&how, &settings.image.aov),
-            streams: Realtime::streams(&how).to_vec(),
-            rays: frames * u64::from(size[0]) * u64::from(size[1]) * (1 + u64::from(how.rays_per_pixel)),
+            needs: frame_needs(&settings, &how),
+            streams: frame_streams(&settings, &how),
+            rays: frames
+                * u64::from(size[0])
+                * u64::from(size[1])
+                * (1 + u64::from(how.rays_per_pixel) * if is_radiance { integrator.get().rays_per_sample() } else { 1 }),
             control: &mut *control,
             warnings: &mut warnings,
         };
         laps.lap("prepare");
+        if is_radiance && moves_lights(&flat) {
+            return Err(Error::Usage(
+                "the animation moves surfaces that emit light, which frames in real time cannot follow: render stills, one per frame, with --spp N in place of --preset"
+                    .into(),
+            ));
+        }
         let tracer = request.build(&self.device, self.kind, &flat, self.compute, &self.settings)?;
         laps.lap("build");
-        let mut realtime = Realtime::new(&tracer, size, &how, &point_lights(scene, &flat))?;
+        let options = frame_path_options(&settings, scene, &camera, size, &how)?;
+        let mut realtime = pipeline(&tracer, &flat, size, &how, options.as_ref())?;
         if displays {
-            let display = Display { shown, exposure: EXPOSURE, unit: UNIT_OF_SCENE * scene_size(scene) as f32 };
-            realtime.display(&tracer, Some(display))?;
+            realtime.display(&tracer, Some(frame_display(&settings, scene)))?;
         }
         let setup = Setup::new(self, &tracer, &flat, &camera, choices, warnings);
         let primary = realtime.settings().primary.unwrap_or_default();
         let preset = timeline.preset.unwrap_or_default();
-        let metadata = vec![
-            ("ao.falloff", how.falloff.to_string()),
-            ("ao.radius", how.radius.to_string()),
-            ("ao.normal", how.hemisphere.to_string()),
-            ("budget", how.budget.to_string()),
+        let mut metadata = match &options {
+            Some(options) => {
+                let text = |(key, text): (&'static str, Option<String>)| text.map(|text| (key, text));
+                // samples lie where the frames have them
+                options.identity().into_iter().filter_map(text).filter(|m| m.0 != "pixel_filter").collect()
+            }
+            None => vec![
+                ("ao.falloff", how.falloff.to_string()),
+                ("ao.radius", how.radius.to_string()),
+                ("ao.normal", how.hemisphere.to_string()),
+                ("budget", how.budget.to_string()),
+                ("sequence", how.sequence.to_string()),
+                ("technique", how.technique.to_string()),
+            ],
+        };
+        let filter = if how.antialias { PixelFilter::Box } else { PixelFilter::Centre };
+        metadata.extend([
             ("device", format!("{} ({})", setup.device, setup.driver)),
             ("history", how.history.to_string()),
-            ("integrator", "ao".into()),
-            ("pixel_filter", PixelFilter::Centre.to_string()),
+            ("integrator", integrator.name().into()),
+            ("pixel_filter", filter.to_string()),
             ("preset", preset.to_string()),
             ("primary", primary.to_string()),
             ("rays_per_pixel", how.rays_per_pixel.to_string()),
             ("resolution", how.resolution.to_string()),
             ("scene", files::portable_name(&setup.scene)),
             ("seed", how.seed.to_string()),
-            ("sequence", how.sequence.to_string()),
-            ("technique", how.technique.to_string()),
             ("tracer", setup.tracer.to_string()),
             ("version", env!("CARGO_PKG_VERSION").into()),
-        ];
+        ]);
         let report = FramesReport {
+            integrator: integrator.name(),
+            quantity: if is_radiance { integrator.get().quantity() } else { "ambient visibility" },
             setup,
             preset,
             settings: how,
@@ -158,6 +186,9 @@ impl Renderer {
             realtime,
             size,
             aov: settings.image.aov.clone(),
+            capabilities: integrator.get().capabilities(),
+            exposure: settings.picture.options().exposure,
+            shown: timeline.show.unwrap_or_default(),
             fps,
             range,
             warm_up,
@@ -177,6 +208,14 @@ impl Frames<'_> {
     /// Frame rate, frames per second.
     pub fn fps(&self) -> f64 {
         self.fps
+    }
+
+    /// Colour type of files without alpha that store what is displayed.
+    pub fn colour(&self) -> Colour {
+        match self.shown {
+            DisplayMode::Accessibility if self.realtime.is_radiance() => Colour::Rgb,
+            shown => shown.colour(),
+        }
     }
 
     /// Image size in pixels.
@@ -204,8 +243,8 @@ impl Frames<'_> {
         self.done += 1;
         if self.done == self.count() {
             let start = Instant::now();
-            self.report.mean = covered_mean(&self.realtime.result()?, &self.realtime.coverage()?);
-            self.report.brightness = brightness::warning(self.report.mean, &[Capability::AmbientOcclusion], 0.0);
+            self.report.mean = covered_mean(&self.realtime.result()?, self.realtime.channels(), &self.realtime.coverage()?);
+            self.report.brightness = brightness::warning(self.report.mean, self.capabilities, f64::from(self.exposure));
             self.report.setup.warnings.extend(self.report.brightness.clone());
             self.device.check_validation()?;
             self.device.save_pipeline_cache();
@@ -214,7 +253,7 @@ impl Frames<'_> {
         Ok(Some(FrameOutput { number, kept }))
     }
 
-    /// The last frame as an image: `Y` ambient visibility, `A` coverage, `samples` accumulated in each pixel, and auxiliary outputs.
+    /// The last frame as an image: `Y` ambient visibility, or `R`, `G`, `B` linear radiance, `A` coverage, `samples` accumulated in each pixel, and auxiliary outputs.
     ///
     /// # Errors
     /// Those of the device.
@@ -228,7 +267,8 @@ impl Frames<'_> {
             // Larsen's pipeline counts none
             _ => self.report.settings.rays_per_pixel.to_string(),
         };
-        let mut channels = vec![f32s("Y", realtime.result()?), f32s("A", coverage), f32s("samples", samples)];
+        let mut channels = colour_channels(realtime)?;
+        channels.extend([f32s("A", coverage), f32s("samples", samples)]);
         if self.aov.iter().any(|a| *a != Aov::Bent) {
             let pixels = aov::render(&self.tracer, &self.camera_record(), self.size, control)?;
             channels.extend(aov::channels(&self.aov, &pixels, self.origin));
@@ -288,30 +328,113 @@ impl Frames<'_> {
 pub fn frame_settings(settings: &RenderSettings) -> Result<Settings> {
     let mut how = settings.frames.settings(&settings.integrators.ao, settings.seed())?;
     let shown = settings.frames.show.unwrap_or_default();
+    if !is_ambient_occlusion(settings.integrator()) {
+        how.check_radiance()?;
+        let has_history = how.history > 1;
+        how.antialias = settings.frames.antialias.map_or(has_history, |_| how.antialias);
+        how.converge = settings.frames.at_rest.map_or(true, |_| how.converge);
+    }
     how.bent = Aov::Bent.is_in(&settings.image.aov) || shown == DisplayMode::Bent;
     how.check()?;
     shown.check(&how)?;
+    if !is_ambient_occlusion(settings.integrator()) {
+        shown.check_radiance()?;
+    }
     Ok(how)
 }
 
-/// Scene data that frames with these settings need, with these auxiliary outputs.
-pub(super) fn frame_needs(settings: &Settings, aov: &[Aov]) -> Needs {
-    aov_needs(Needs { normals: settings.hemisphere == Hemisphere::Shading, ..Default::default() }, aov)
+/// The channels of a frame's value: `Y`, or `R`, `G` and `B`.
+///
+/// # Errors
+/// Those of the device.
+pub(super) fn colour_channels(realtime: &Realtime) -> Result<Vec<Channel>> {
+    let (values, n) = (realtime.result()?, realtime.channels());
+    let names: &[&str] = if n == 1 { &["Y"] } else { &["R", "G", "B"] };
+    let plane = |c: usize| Samples::F32(values.iter().skip(c).step_by(n).copied().collect());
+    Ok(names.iter().enumerate().map(|(c, name)| Channel { name: (*name).into(), samples: plane(c) }).collect())
+}
+
+/// Returns true if frames of the integrator are ambient occlusion, and not radiance.
+pub(super) fn is_ambient_occlusion(integrator: IntegratorName) -> bool {
+    integrator == IntegratorName::default()
+}
+
+/// Scene data that frames with these settings need.
+pub(super) fn frame_needs(settings: &RenderSettings, how: &Settings) -> Needs {
+    let integrator = settings.integrator();
+    let needs = match is_ambient_occlusion(integrator) {
+        true => Needs { normals: how.hemisphere == Hemisphere::Shading, ..Default::default() },
+        false => integrator.get().needs(&settings.integrators),
+    };
+    aov_needs(needs, &settings.image.aov)
+}
+
+/// Streams that frames with these settings trace, as far as they are known before the scene is looked at.
+pub(super) fn frame_streams(settings: &RenderSettings, how: &Settings) -> Vec<&'static StreamShaders> {
+    match is_ambient_occlusion(settings.integrator()) {
+        true => Realtime::streams(how).to_vec(),
+        false => settings.integrator().get().streams(&settings.integrators),
+    }
+}
+
+/// Options of the paths of frames of radiance; `None` for ambient occlusion.
+///
+/// # Errors
+/// [`Error::Usage`] for settings that do not fit the camera.
+pub(super) fn frame_path_options(
+    settings: &RenderSettings,
+    scene: &Scene,
+    camera: &Camera,
+    size: [u32; 2],
+    how: &Settings,
+) -> Result<Option<PathOptions>> {
+    if is_ambient_occlusion(settings.integrator()) {
+        return Ok(None);
+    }
+    let job = RenderJob { size, spp: how.rays_per_pixel, ..settings.job(scene, camera) };
+    settings.integrator().get().path_options(&job)
+}
+
+/// The pipeline of frames. `paths`: options of the paths of frames of radiance.
+///
+/// # Errors
+/// Those of [`Realtime::new`] and [`Realtime::radiance`].
+pub(super) fn pipeline(
+    tracer: &Tracer,
+    flat: &FlatScene,
+    size: [u32; 2],
+    how: &Settings,
+    paths: Option<&PathOptions>,
+) -> Result<Realtime> {
+    match paths {
+        Some(paths) => Realtime::radiance(tracer, flat, size, how, paths),
+        None => Realtime::new(tracer, size, how, &point_lights(flat.scene, flat)),
+    }
+}
+
+/// What frames with these settings display.
+pub(super) fn frame_display(settings: &RenderSettings, scene: &Scene) -> Display {
+    let PictureOptions { tone_map, exposure } = settings.picture.options();
+    let shown = settings.frames.show.unwrap_or_default();
+    Display { shown, exposure, unit: UNIT_OF_SCENE * scene_size(scene) as f32, tone_map }
 }
 
 /// Number of frames of a static view after which the image no longer changes.
 pub(super) fn settling_frames(settings: &Settings) -> u32 {
     match settings.technique {
+        _ if settings.converges() => settings.frames_to_converge(),
         Technique::Larsen => 4,
         _ => settings.history.min(Settings::MAX_SAMPLES) * settings.resolution.period() - 1,
     }
 }
 
-/// Mean over covered pixels.
-fn covered_mean(values: &[f32], coverage: &[f32]) -> f64 {
-    let sum = |v: &[f32]| v.iter().map(|&x| f64::from(x)).sum::<f64>();
-    let covered = sum(coverage);
-    if covered > 0.0 { sum(values) / covered } else { 0.0 }
+/// Mean over covered pixels and `channels` channels, which are interleaved.
+fn covered_mean(values: &[f32], channels: usize, coverage: &[f32]) -> f64 {
+    let covered: f64 = coverage.iter().map(|&x| f64::from(x)).sum();
+    let shows = |pixel: usize| coverage[pixel] > 0.0;
+    let values = values.iter().enumerate().filter(|(k, _)| shows(k / channels));
+    let sum: f64 = values.map(|(_, &x)| f64::from(x)).sum();
+    if covered > 0.0 { sum / (covered * channels as f64) } else { 0.0 }
 }
 
 /// Diagonal of the scene's bounds, scene units; 1 for an empty scene.
@@ -319,9 +442,30 @@ pub(super) fn scene_size(scene: &Scene) -> f64 {
     scene.bounds().map(|(lo, hi)| (hi - lo).length()).filter(|d| *d > 0.0).unwrap_or(1.0)
 }
 
+/// The motion of a camera along a path, or around the scene in so many frames.
+///
+/// # Errors
+/// [`Error::Scene`] for an orbit around a scene without geometry.
+pub(super) fn camera_motion(scene: &Scene, path: Option<CameraPath>, orbit_frames: Option<u32>) -> Result<CameraMotion> {
+    Ok(match (path, orbit_frames) {
+        (Some(path), _) => CameraMotion::Path(path),
+        (None, Some(frames)) => CameraMotion::Orbit(orbit(scene, f64::from(frames))?),
+        (None, None) => CameraMotion::Still,
+    })
+}
+
 fn orbit(scene: &Scene, frames: f64) -> Result<Orbit> {
     let (lo, hi) = scene.bounds().ok_or_else(|| Error::Scene("--orbit: the scene has no geometry to orbit around".into()))?;
     Orbit::vertical((lo + hi) * 0.5, frames)
+}
+
+/// Returns true if a surface that emits light moves or deforms.
+fn moves_lights(flat: &FlatScene) -> bool {
+    let scene = flat.scene;
+    let moves = |k: usize| flat.motion.instances.contains(&k) || flat.motion.meshes.contains(&scene.instances[k].mesh);
+    let material = |k: usize| scene.materials.get(scene.meshes[scene.instances[k].mesh].material);
+    let emits = |k: usize| material(k).is_some_and(|m| m.emissive != glam::Vec3::ZERO && !m.unlit);
+    (0..scene.instances.len()).any(|k| moves(k) && emits(k))
 }
 
 /// Positions of point lights, relative to the tracer's origin.

@@ -33,6 +33,7 @@ mod laps;
 pub mod report;
 pub mod settings;
 pub mod still;
+pub mod still_sequence;
 pub mod survey;
 
 use std::sync::Arc;
@@ -187,6 +188,11 @@ impl Renderer {
     /// # Errors
     /// Those of [`Renderer::still`] and [`Renderer::frames`].
     pub fn image(&mut self, settings: &RenderSettings, control: &mut dyn Control) -> Result<Image> {
+        if settings.is_still_sequence() {
+            let mut stills = self.still_sequence(settings)?;
+            let last = stills.range().end - 1;
+            return Ok(stills.render(last, control)?.image);
+        }
         if settings.realtime_setting().is_none() {
             return Ok(self.still(settings, control)?.image);
         }

@@ -361,6 +361,10 @@ pub struct FrameReport {
 pub struct FramesReport {
     /// Scene, device and tracer.
     pub setup: Setup,
+    /// Name of the integrator.
+    pub integrator: &'static str,
+    /// Name of the quantity of [`FramesReport::mean`].
+    pub quantity: &'static str,
     /// The preset.
     pub preset: Preset,
     /// Settings of the pipeline.
@@ -371,7 +375,7 @@ pub struct FramesReport {
     pub primary_reason: String,
     /// Reports of all frames, including those of the warm-up.
     pub frames: Vec<FrameReport>,
-    /// Mean ambient visibility of the last frame, over covered pixels.
+    /// Mean of the last frame, over covered pixels and channels.
     pub mean: f64,
     /// A warning about a last frame that is all but black or white; it is one of the warnings, too.
     pub brightness: Option<String>,
@@ -423,20 +427,22 @@ impl FramesReport {
         let [primary, occlusion, skipped] = self.rays();
         let mut lines = vec![
             format!(
-                "{outputs}: {kept} frame{} (warm-up: {}), {}, technique {}, tracer {} on {}; mean ambient visibility {:.5} over the scene's pixels",
+                "{outputs}: {kept} frame{} of {} (warm-up: {}), {}, tracer {} on {}; mean {} {:.5} over the scene's pixels",
                 if kept == 1 { "" } else { "s" },
+                self.technique_text(),
                 all - kept,
                 self.preset,
-                self.settings.technique,
                 self.setup.tracer,
                 self.setup.device,
+                self.quantity,
                 self.mean,
             ),
             format!("frame time: {median:.1} ms (95 %: {p95:.1}), {:.1} frames per second", 1e3 / median.max(1e-6)),
             format!(
-                "rays per frame: {} camera, {} occlusion, {} not traced",
+                "rays per frame: {} camera, {} {}, {} not traced",
                 primary / all.max(1) as u64,
                 occlusion / all.max(1) as u64,
+                if self.is_radiance() { "of bounces and to lights" } else { "occlusion" },
                 skipped / all.max(1) as u64
             ),
         ];
@@ -450,6 +456,18 @@ impl FramesReport {
         lines
     }
 
+    fn is_radiance(&self) -> bool {
+        self.integrator != "ao"
+    }
+
+    /// The integrator, with the technique of ambient occlusion.
+    fn technique_text(&self) -> String {
+        match self.is_radiance() {
+            true => self.integrator.to_owned(),
+            false => format!("{} ({})", self.integrator, self.settings.technique),
+        }
+    }
+
     /// What was skipped, and what that saved.
     fn explanations(&self) -> Vec<String> {
         let mut lines = self.setup.features.clone();
@@ -457,6 +475,9 @@ impl FramesReport {
         let visibility = if self.primary == Primary::Raster { "rasterized" } else { "ray traced" };
         lines.push(format!("primary visibility {visibility}: {}", self.primary_reason));
         let s = &self.settings;
+        if self.is_radiance() {
+            return lines;
+        }
         lines.push(match (s.attenuation().is_binary(), s.attenuation().reach()) {
             (true, r) if r.is_finite() => format!("binary occlusion: any hit within {r} ends a ray"),
             (true, _) => "binary occlusion: any hit ends a ray".into(),
@@ -505,7 +526,7 @@ impl FramesReport {
         let passes: Map<_, _> =
             passes.map(|(label, median, p95)| (label.to_owned(), json!({ "median_ms": median, "p95_ms": p95 }))).collect();
         let own = json!({
-            "integrator": "ao",
+            "integrator": self.integrator,
             "preset": self.preset,
             "settings": settings,
             "primary": self.primary,

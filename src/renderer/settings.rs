@@ -36,7 +36,7 @@ pub const DEFAULT_FOV_Y: f64 = 45.0;
 /// Integrators whose images can be denoised.
 const DENOISED: AppliesTo = AppliesTo::stills_of(Capability::Denoising);
 /// Integrators to whose images tone mapping and exposure apply.
-const TONE_MAPPED: AppliesTo = AppliesTo::stills_of(Capability::ToneMapping);
+const TONE_MAPPED: AppliesTo = AppliesTo::of(Capability::ToneMapping);
 
 settings! {
     /// The image.
@@ -372,7 +372,16 @@ impl RenderSettings {
 
     /// The first setting given that only real-time frames have, if any: its presence selects real-time frames.
     pub fn realtime_setting(&self) -> Option<GivenSetting> {
-        self.frames.given().into_iter().next()
+        match self.is_still_sequence() {
+            true => None,
+            false => self.frames.given().into_iter().next(),
+        }
+    }
+
+    /// Returns true if they describe stills, one for each frame of a time line: samples per pixel, and no setting that only frames in real time have.
+    pub fn is_still_sequence(&self) -> bool {
+        let given = self.frames.given();
+        self.image.spp.is_some() && !given.is_empty() && given.iter().all(|s| s.applies.stills)
     }
 
     /// Checks conditions on more than one setting: none may be given that would have no effect.
@@ -382,6 +391,14 @@ impl RenderSettings {
     pub fn check(&self) -> Result<()> {
         let frames = self.realtime_setting();
         integrators::check(&self.given(), self.integrator(), frames.as_ref())?;
+        if let Some(setting) = frames.filter(|_| !self.integrator().get().capabilities().contains(&Capability::RealTimeFrames))
+        {
+            return Err(Error::Usage(format!(
+                "--integrator {} has no frames in real time: add --spp N for stills, one per frame, or leave {} out",
+                self.integrator().name(),
+                setting.option()
+            )));
+        }
         if frames.is_none() && Aov::Bent.is_in(&self.image.aov) {
             return Err(Error::Usage("--aov bent is for frames in real time: add --preset".into()));
         }

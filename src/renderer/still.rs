@@ -130,16 +130,26 @@ impl Renderer {
         save: &mut dyn FnMut(&IntermediateImage) -> Result<()>,
     ) -> Result<Still> {
         settings.check()?;
-        if let Some(frames) = settings.realtime_setting() {
-            return Err(Error::Usage(format!(
-                "{} is for frames in real time, and a still is rendered: leave it out",
-                frames.option()
-            )));
+        if let Some(frames) = settings.frames.given().first() {
+            return Err(Error::Usage(format!("{} is for frames, and a still is rendered: leave it out", frames.option())));
         }
-        let (start, mut laps) = (Instant::now(), Laps::after_open(self.open_seconds.wall));
+        let start = Instant::now();
+        let completed = self.complete(settings, None)?;
+        self.still_of(&completed, extras, start, control, save)
+    }
+
+    /// Renders a still of completed settings. `start`: when work on it began.
+    pub(super) fn still_of(
+        &mut self,
+        completed: &Completed,
+        extras: StillExtras,
+        start: Instant,
+        control: &mut dyn Control,
+        save: &mut dyn FnMut(&IntermediateImage) -> Result<()>,
+    ) -> Result<Still> {
+        let Completed { camera, settings, choices } = completed;
+        let mut laps = Laps::after_open(self.open_seconds.wall);
         let denoiser = denoising::choose(settings.image.denoise)?;
-        let Completed { camera, settings, choices } = self.complete(settings, None)?;
-        let settings = &settings;
         let integrator = settings.integrator().get();
         let size = settings.size(&self.scene);
         let (device, kind, compute) = (self.device.clone(), self.kind, self.compute);
@@ -147,7 +157,7 @@ impl Renderer {
         let scene = &self.scene;
         let mut warnings = scene_warnings(scene);
         warnings.iter().for_each(|w| control.warning(w));
-        let mut job = RenderJob { keep_rays: extras.keep_rays, ..settings.job(scene, &camera) };
+        let mut job = RenderJob { keep_rays: extras.keep_rays, ..settings.job(scene, camera) };
         let prints = settings.film.keeps_state().then(|| fingerprint::of_scene(scene));
         let identity = identity(integrator, &job, prints);
         let maker: Maker =
@@ -202,7 +212,7 @@ impl Renderer {
         });
         let composer = Composer {
             name: files::portable_name(&self.name),
-            camera: &camera,
+            camera,
             integrator,
             size,
             pixels: &pixels,
@@ -241,7 +251,7 @@ impl Renderer {
         }
         let (mean, mean_standard_error) = rendered.image.film.mean_and_error();
         let mut report = StillReport {
-            setup: Setup::new(self, tracer, &flat, &camera, choices, warnings),
+            setup: Setup::new(self, tracer, &flat, camera, choices.clone(), warnings),
             integrator: integrator.name(),
             quantity: integrator.quantity(),
             size,
@@ -298,7 +308,7 @@ pub fn camera_text(camera: &Camera) -> String {
 
 /// Everything that must agree for a render to be resumed: all that its samples depend on, except its size. `print`: the scene's fingerprint, if the film's state
 /// is kept.
-fn identity(integrator: &dyn Integrator, job: &RenderJob, print: Option<String>) -> Identity {
+pub(super) fn identity(integrator: &dyn Integrator, job: &RenderJob, print: Option<String>) -> Identity {
     let environment = || fingerprint::of_environment(&job.scene.environment);
     let around = print.as_ref().filter(|_| integrator.sees_environment()).map(|_| environment());
     let mut out = vec![

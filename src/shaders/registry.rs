@@ -20,14 +20,18 @@ registry! {
         PATH_BOUNCE_CLOSEST = "path_bounce", closest, queue;
         PATH_CAMERA_CLOSEST = "path_camera", closest, camera;
         PATH_DISTANCE_CLOSEST = "path_distance", closest, queue;
+        PATH_REFLECTION_CLOSEST = "path_reflection", closest, queue;
         PATH_SHADOW_ANY = "path_shadow", any, queue;
         PATH_SHADOW_WALLS_CLOSEST = "path_shadow_walls", closest, queue;
+        PATH_SURFACE_CLOSEST = "path_surface", closest, camera;
         PRIMARY_CLOSEST = "primary", closest, camera;
         RAYS_ANY = "rays", any, generated;
         RAYS_CLOSEST = "rays", closest, generated;
     }
     compute {
+        ANTIALIAS = "antialias";
         BUDGET = "budget";
+        COMPOSE = "compose";
         DENOISE = "denoise";
         DISPLAY = "display";
         FILTER = "filter";
@@ -37,8 +41,11 @@ registry! {
         LARSEN_SUM = "larsen_sum";
         LARSEN_TEMPORAL = "larsen_temporal";
         NODES = "nodes";
+        PATH_GATHER = "path_gather";
         PATH_RESOLVE = "path_resolve";
+        RADIANCE_TEMPORAL = "radiance_temporal";
         RESOLVE = "resolve";
+        REST = "rest";
         TEMPORAL = "temporal";
     }
     stages {

@@ -13,6 +13,7 @@ use super::layer::Layer;
 use super::request::{Comparison, DeviceSummary, Event, Mailbox, PickPurpose, Progress, Request, SceneSummary, TRUTH, Task};
 use super::technique::Technique;
 use super::{ViewOptions, panels};
+use crate::integrators::IntegratorName;
 use crate::integrators::lighting::LightingSettings;
 use crate::interface::PixelFilter;
 use crate::realtime::Preset;
@@ -196,6 +197,9 @@ impl App {
         let preset = options.settings.frames.preset.unwrap_or(Preset::Balanced);
         let first = match options.settings.integrator {
             Some(integrator) if options.settings.realtime_setting().is_none() => Technique::Still(integrator),
+            Some(integrator) if integrator != IntegratorName::default() && options.settings.frames.show.is_none() => {
+                Technique::Frames(integrator)
+            }
             _ => options.settings.frames.show.map_or(Technique::Preset(preset), Technique::Buffer),
         };
         let mut app = Self {
@@ -478,7 +482,8 @@ impl App {
         let shown = panes.len();
         if self.compares_now() {
             let mut truth = self.truth.settings(&self.settings);
-            if panes[0].realtime_setting().is_some() && truth.realtime_setting().is_none() {
+            let is_antialiased = matches!(self.first, Technique::Frames(_));
+            if panes[0].realtime_setting().is_some() && truth.realtime_setting().is_none() && !is_antialiased {
                 // what differs shall not be the samples' place in the pixel
                 truth.image.pixel_filter = Some(PixelFilter::Centre);
             }
@@ -589,7 +594,7 @@ impl App {
         let mut settings = technique.settings(&self.settings);
         settings.lighting = self.lighting.clone();
         let lit = settings.integrator().get().capabilities().contains(&crate::settings::Capability::SceneLights);
-        if !lit || settings.realtime_setting().is_some() {
+        if !lit {
             settings.lighting = LightingSettings::default();
         }
         settings

@@ -15,6 +15,8 @@ pub enum Technique {
     Preset(Preset),
     /// Screen-space ambient occlusion in real time.
     Gtao,
+    /// Light in real time.
+    Frames(IntegratorName),
     /// A still, which converges while the camera rests.
     Still(IntegratorName),
     /// A buffer of real-time ambient occlusion.
@@ -24,7 +26,7 @@ pub enum Technique {
 }
 
 /// Headings of the list of techniques.
-pub const GROUPS: [&str; 3] = ["Ambient occlusion in real time", "Converging images", "Buffers"];
+pub const GROUPS: [&str; 4] = ["Ambient occlusion in real time", "Light in real time", "Converging images", "Buffers"];
 
 impl Technique {
     /// All of them, by [`GROUPS`].
@@ -33,10 +35,14 @@ impl Technique {
         let stills = || integrators::ALL.iter().filter_map(|i| IntegratorName::find(i.name())).map(Self::Still);
         let buffers = DisplayMode::ALL.into_iter().filter(|m| *m != DisplayMode::Accessibility);
         let realtime = presets.into_iter().map(Self::Preset).chain([Self::Gtao]).map(|t| (0, t));
-        let converging = [Self::Converged].into_iter().chain(stills().filter(|t| !t.is_view_of_surfaces())).map(|t| (1, t));
+        let converging = [Self::Converged].into_iter().chain(stills().filter(|t| !t.is_view_of_surfaces())).map(|t| (2, t));
+        let light = stills().filter(|t| t.has_frames()).filter_map(|t| match t {
+            Self::Still(integrator) => Some((1, Self::Frames(integrator))),
+            _ => None,
+        });
         // what frames have, and what only stills have: colours of materials
-        let buffers = buffers.map(Self::Buffer).chain(stills().filter(|t| t.is_view_of_surfaces())).map(|t| (2, t));
-        realtime.chain(converging).chain(buffers).collect()
+        let buffers = buffers.map(Self::Buffer).chain(stills().filter(|t| t.is_view_of_surfaces())).map(|t| (3, t));
+        realtime.chain(light).chain(converging).chain(buffers).collect()
     }
 
     /// Name in lists.
@@ -45,6 +51,7 @@ impl Technique {
         match self {
             Self::Preset(preset) => format!("AO {}", word(preset.name())),
             Self::Gtao => "GTAO (screen space)".into(),
+            Self::Frames(integrator) => format!("{}, real time", word(integrator.name())),
             Self::Still(integrator) => match integrator.name() {
                 "ao" => "AO still".into(),
                 "ao-sky" => "AO truth (ao-sky)".into(),
@@ -62,7 +69,7 @@ impl Technique {
         match self {
             Self::Preset(preset) => preset.help(),
             Self::Gtao => AoTechnique::Gtao.help(),
-            Self::Still(integrator) => integrator.get().help(),
+            Self::Still(integrator) | Self::Frames(integrator) => integrator.get().help(),
             Self::Buffer(mode) => mode.help(),
             Self::Converged => {
                 "Every ray counts, no filter: what the real-time techniques approximate, with their radius and falloff"
@@ -76,11 +83,18 @@ impl Technique {
         !["ao", "ao-sky"].contains(&integrator.name()) && !integrator.get().capabilities().contains(&Capability::LightTransport)
     }
 
+    /// Returns true for stills of light that can be frames in real time, too.
+    fn has_frames(self) -> bool {
+        let Self::Still(integrator) = self else { return false };
+        let capabilities = integrator.get().capabilities();
+        capabilities.contains(&Capability::LightTransport) && capabilities.contains(&Capability::RealTimeFrames)
+    }
+
     /// Returns true for images of ambient occlusion or of another quantity from 0 to 1 of the same meaning.
     pub fn is_occlusion(self) -> bool {
         match self {
             Self::Preset(_) | Self::Gtao | Self::Converged => true,
-            Self::Still(integrator) => ["ao", "ao-sky"].contains(&integrator.name()),
+            Self::Still(integrator) | Self::Frames(integrator) => ["ao", "ao-sky"].contains(&integrator.name()),
             Self::Buffer(mode) => mode == DisplayMode::Unfiltered,
         }
     }
@@ -128,6 +142,11 @@ impl Technique {
                 sequence: Some(Sequence::Sobol),
                 ..Default::default()
             },
+            Self::Frames(integrator) => {
+                settings.integrator = Some(integrator);
+                let preset = own.preset.filter(|p| !matches!(p, Preset::Larsen | Preset::Reference)).unwrap_or_default();
+                FrameSettings { preset: Some(preset), technique: None, primary: None, budget: None, ..own }
+            }
             Self::Still(integrator) => {
                 settings.integrator = Some(integrator);
                 FrameSettings::default()

@@ -17,3 +17,4 @@ mod info;
 mod manners;
 mod outputs;
 mod program;
+mod sequences;

@@ -2,14 +2,19 @@
 
 use super::*;
 use skylit::integrators::ao::{self, AoOptions, Attenuation, Hemisphere};
-use skylit::integrators::path::ambient::{self, Ambient, AmbientSample};
+use skylit::integrators::path::ambient::{self, Ambient, AmbientSample, OccludedLight};
 use skylit::scene::builtin::{self, SceneTransform, analytic, shapes};
 use skylit::scene::material::Transmission;
 
 const SIZE: [u32; 2] = [32, 24];
 
 fn ambient(color: Vec3, radius: f64, falloff: f64) -> Ambient {
-    Ambient { color, attenuation: Attenuation { radius, falloff }, hemisphere: Hemisphere::Geometric }
+    Ambient {
+        color,
+        attenuation: Attenuation { radius, falloff },
+        hemisphere: Hemisphere::Geometric,
+        occluded: OccludedLight::Ambient,
+    }
 }
 
 /// What the integrator makes of these settings.
@@ -58,6 +63,36 @@ fn gpu_lit_without_ambient_light_is_direct_light() {
         let direct = PathOptions { ambient: None, ..options.clone() };
         let [ours, theirs] = [options, direct].map(|o| render(tracer, flat, &o).image.film.mean);
         assert!(ours == theirs, "{kind}");
+    });
+}
+
+/// Larsen's (2019) shading times (1 - AO): direct light, darkened by the ambient visibility of the same point.
+#[test]
+fn gpu_lit_occlusion_can_darken_all_light() {
+    on_all_tracers(&builtin::by_name("cornell-box").unwrap(), |kind, tracer, flat| {
+        let dark = ambient(Vec3::ZERO, 0.3, 1.0);
+        // at pixel centres both are constant over a pixel, and samples of both are independent
+        let options = PathOptions { pixel_filter: path::PixelFilter::Centre, ..lit(1024, dark) };
+        let all = PathOptions { ambient: Some(Ambient { occluded: OccludedLight::All, ..dark }), ..options.clone() };
+        let [all, direct] = [all, options].map(|o| render(tracer, flat, &o).image.film.mean);
+        let record = CameraRecord::new(&flat.scene.cameras[0], flat.origin, f64::from(SIZE[0]) / f64::from(SIZE[1]));
+        let ao = AoOptions {
+            size: SIZE,
+            spp: 1024,
+            seed: 6,
+            radius: 0.3,
+            pixel_filter: path::PixelFilter::Centre,
+            ..Default::default()
+        };
+        let visible = ao::render(tracer, &record, &ao, &mut NoControl).unwrap().image.film.mean;
+        let (mut darkened, mut sum) = (0, 0.0);
+        for (k, (all, direct)) in all.iter().zip(&direct).enumerate() {
+            let v = visible[k / 3];
+            assert!((all - v * direct).abs() <= 0.08 * direct + 1e-4, "{kind}: value {k} is {all}, not {v} of {direct}");
+            darkened += usize::from(v < 0.9 && *direct > 0.0);
+            sum += f64::from(all - v * direct);
+        }
+        assert!(darkened > 100 && sum.abs() < 0.1, "{kind}: {darkened} values darkened, {sum}");
     });
 }
 

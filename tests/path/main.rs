@@ -15,6 +15,7 @@ mod denoise;
 mod direct;
 mod emitters;
 mod film;
+mod frames;
 mod furnace;
 mod lit;
 mod materials;

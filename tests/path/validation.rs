@@ -6,9 +6,10 @@ use crate::common::new_device;
 use glam::Affine2;
 use skylit::accel::features::SceneFeatures;
 use skylit::integrators::ao::{Attenuation, Hemisphere};
-use skylit::integrators::path::ambient::Ambient;
+use skylit::integrators::path::ambient::{Ambient, OccludedLight};
 use skylit::integrators::path::{Lens, PixelFilter, TextureFilter, View};
 use skylit::interface::{BsdfModel, LightKind as Kind, MaterialFeature, PathFeature, TextureFeature};
+use skylit::realtime::{Preset, Realtime, Settings};
 use skylit::scene::builtin::shapes;
 use skylit::scene::material::{AlphaMode, Anisotropy, Clearcoat, Sheen, Specular, TextureSlot, Transmission};
 use skylit::scene::{EnvironmentMap, Filter, Portal, Sphere, Texture, Wrap};
@@ -112,6 +113,7 @@ fn gpu_kernels_of_all_features_are_valid() {
             color: Vec3::ONE,
             attenuation: Attenuation { radius: 1.0, falloff: 2.0 },
             hemisphere: Hemisphere::Shading,
+            occluded: OccludedLight::All,
         }),
         ..base.clone()
     };
@@ -129,6 +131,18 @@ fn gpu_kernels_of_all_features_are_valid() {
             seen.1.extend(MaterialFeature::ALL.iter().filter(|&&f| shading.materials.contains(f)));
             seen.2.extend(TextureFeature::ALL.iter().filter(|&&f| shading.textures.contains(f)));
             seen.3.extend(PathFeature::ALL.iter().filter(|&&f| result.features.contains(f)));
+            // frames in real time trace the same paths, and more
+            if kind == TracerKind::Compute && options.ambient.is_some() {
+                let settings = Settings { antialias: true, converge: true, ..Preset::Balanced.settings() };
+                let mut frames = Realtime::radiance(&tracer, &flat, options.size, &settings, options).unwrap();
+                let aspect = f64::from(options.size[0]) / f64::from(options.size[1]);
+                let camera = CameraRecord::new(&scene.cameras[0], flat.origin, aspect);
+                for _ in 0..2 {
+                    frames.frame(&tracer, &camera, &[]).unwrap();
+                }
+                assert_validation_clean(&device);
+                seen.3.push(&PathFeature::Signal);
+            }
             seen.4.extend(Kind::ALL.iter().filter(|&&f| result.light_kinds.contains(f)));
         }
     };

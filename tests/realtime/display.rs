@@ -5,6 +5,7 @@ use skylit::Error;
 use skylit::accel::flatten::FlatScene;
 use skylit::colour::srgb_byte;
 use skylit::film::camera::CameraRecord;
+use skylit::output::tone_map::ToneMap;
 use skylit::ray::Ray;
 use skylit::realtime::display::{Display, DisplayMode};
 use skylit::realtime::{Budget, FrameStats, Preset, Realtime, Resolution, Settings};
@@ -18,7 +19,7 @@ use crate::common::{assert_validation_clean, device, record, tracer, tracers};
 const SIZE: [u32; 2] = [93, 50];
 
 fn display(shown: DisplayMode, exposure: f32) -> Display {
-    Display { shown, exposure, unit: 2.0 }
+    Display { shown, exposure, unit: 2.0, tone_map: ToneMap::Linear }
 }
 
 /// A frame as it is shown, after `frames` before it.

@@ -12,6 +12,7 @@ use skylit::gpu::Device;
 use skylit::integrators::aov;
 use skylit::measure::temporal::{Residual, recovery};
 use skylit::oracle::{Oracle, OracleRay};
+use skylit::output::tone_map::ToneMap;
 use skylit::realtime::display::{Display, DisplayMode};
 use skylit::realtime::{Preset, Realtime, Settings};
 use skylit::sampling::Sequence;
@@ -158,7 +159,7 @@ fn gpu_displayed_motion_and_ids() {
     let device = device();
     let scene = block_on_a_floor();
     let [camera, shifted] = [0.0, 0.11].map(|x| stepped(&scene, SIZE, DVec3::new(x, 0.0, -0.5 * x)));
-    let display = |shown| Some(Display { shown, exposure: 0.0, unit: 1.0 });
+    let display = |shown| Some(Display { shown, exposure: 0.0, unit: 1.0, tone_map: ToneMap::Linear });
     let grey = srgb_byte(0.5);
     for kind in one_tracer(&device) {
         let mut tracer = moving(&device, kind, &scene, vec![1]);

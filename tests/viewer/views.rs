@@ -113,7 +113,8 @@ fn gpu_every_technique_has_a_picture() {
         let mut session = renderer.interactive(&Default::default(), None).unwrap();
         for (_, technique) in Technique::all() {
             // compiling the kernels of paths takes most of the time: tests/path has them on all tracers
-            let is_path = matches!(technique, Technique::Still(i) if i.name() != "ao" && i.name() != "ao-sky");
+            let is_path =
+                matches!(technique, Technique::Still(i) | Technique::Frames(i) if i.name() != "ao" && i.name() != "ao-sky");
             if is_path && kind != tracers(&device())[0] {
                 continue;
             }

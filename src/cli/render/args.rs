@@ -57,6 +57,9 @@ pub struct RenderArgs {
     #[command(flatten)]
     pub files: FileSettings,
     /// Files of defaults.
+    /// With --frames and --spp: leave out frames that an earlier run has finished, by what their files say of themselves
+    #[arg(long = "continue", hide_short_help = true)]
+    pub continues: bool,
     #[command(flatten)]
     pub config: ConfigArgs,
     /// What is rendered, and how
@@ -111,6 +114,16 @@ impl RenderArgs {
         let wrong = |text: String| Err(Error::Usage(text));
         if self.settings.frames.show.is_some() && !self.writes_picture() {
             return wrong("--show is for pictures (.png, .jpg, .webp, .apng): for an .exr use --aov".into());
+        }
+        if self.settings.is_still_sequence() {
+            if let Some(path) = self.output.iter().find(|p| apng::is_apng(p)) {
+                let path = path.display();
+                return wrong(format!(
+                    "{path}: an animation is of frames in real time; stills need numbered files, like out.####.png"
+                ));
+            }
+        } else if self.continues {
+            return wrong("--continue is for stills of several frames: add --frames A..B and --spp N, or leave it out".into());
         }
         let frames = self.settings.realtime_setting();
         let images = self.output.iter().filter(|p| frames.is_none() || !apng::is_apng(p));

@@ -35,8 +35,64 @@ pub fn run(args: &RenderArgs, start: Instant) -> Result<(), Failure> {
     config::report(args.verbosity.console(), defaults);
     match args.settings.realtime_setting() {
         Some(_) => frames(args, defaults, start),
+        None if args.settings.is_still_sequence() => stills(args, defaults, start),
         None => still(args, defaults, start),
     }
+}
+
+/// A still for each frame. A frame's files are written when it is finished, so a run that was ended goes on with `--continue`.
+fn stills(args: &RenderArgs, defaults: &[DefaultsReport], start: Instant) -> Result<(), Failure> {
+    let timeline = &args.settings.frames;
+    timeline.check_outputs(&args.output)?;
+    let range = timeline.range();
+    let files_of =
+        |number: u32| args.output.iter().map(|p| output::frames::numbered(p, u64::from(number))).collect::<Result<Vec<_>>>();
+    files_of(range.first)?.iter().try_for_each(|path| files::check_writable(path))?;
+    interrupt::install();
+    let console = args.verbosity.console();
+    let mut renderer = Renderer::open(&args.scene, &args.device)?;
+    let mut stills = renderer.still_sequence(&args.settings)?;
+    let mut progress = Progress::new("rendering frames", &console);
+    let (mut records, mut finished) = (Vec::new(), 0);
+    for number in range.first..range.end {
+        interrupt::check()?;
+        progress.set(u64::from(number - range.first), u64::from(range.end - range.first));
+        let paths = files_of(number)?;
+        if args.continues
+            && paths.iter().all(|p| p.exists())
+            && let Some(path) = paths.first()
+            && output::load(path).is_ok_and(|image| stills.is_finished(number, &image).unwrap_or(false))
+        {
+            finished += 1;
+            continue;
+        }
+        let still = stills.render(number, &mut SilentControl)?;
+        paths.iter().try_for_each(|path| still.save_with(path, &args.files))?;
+        let mut record = still.report.record(args.explain);
+        record["frame"] = serde_json::json!(number);
+        for warning in &still.report.setup.warnings {
+            progress.suspend(|| console.warning(warning));
+        }
+        records.push(record);
+    }
+    drop(progress);
+    let seconds = start.elapsed().as_secs_f64();
+    let skipped = if finished > 0 { format!(", {finished} finished before") } else { String::new() };
+    console.line(&format!(
+        "{}: {} stills{skipped}, {}, {} spp, in {seconds:.1} s",
+        names(args),
+        records.len(),
+        args.settings.integrator().name(),
+        args.settings.image.spp.unwrap_or(0)
+    ))?;
+    let record = serde_json::json!({
+        "stills": records,
+        "finished_before": finished,
+        "seconds": seconds,
+        "output": args.output,
+        "defaults": defaults,
+    });
+    console.close(&record, Ok(()))
 }
 
 fn still(args: &RenderArgs, defaults: &[DefaultsReport], start: Instant) -> Result<(), Failure> {
@@ -108,7 +164,7 @@ fn frames(args: &RenderArgs, defaults: &[DefaultsReport], start: Instant) -> Res
     interrupt::check()?;
     let mut control = CliControl::new(args, console);
     let mut frames = renderer.frames(&args.settings, args.writes_picture(), &mut control)?;
-    let colour = timeline.show.unwrap_or_default().colour();
+    let colour = frames.colour();
     let mut files =
         FrameFiles::create(&args.output, frames.size(), range.end - range.first, frames.fps(), colour, &args.files)?;
     let (mut done, all, mut write_seconds) = (0, u64::from(frames.count()), 0.0);

@@ -9,7 +9,7 @@ use super::{PathEstimator, PathOptions, Strategy};
 use crate::accel::flatten::FlatScene;
 use crate::error::Result;
 use crate::film::Control;
-use crate::film::accumulate::{Estimator, MAX_SAMPLE_BITS, Plan, accumulate};
+use crate::film::accumulate::{Estimator, MAX_SAMPLE_BITS, Plan, accumulate, max_rays};
 use crate::film::block::{Block, BlockParams};
 use crate::film::camera::CameraRecord;
 use crate::gpu::{Commands, Timing};
@@ -29,6 +29,16 @@ choices! {
     }
 }
 
+choices! {
+    /// Which light ambient occlusion darkens.
+    pub enum OccludedLight {
+        /// Ambient light: what is physically meant
+        Ambient = "ambient",
+        /// All light of a surface, direct light too: shading times (1 - AO), as Larsen (2019) has it
+        All = "all",
+    }
+}
+
 /// Ambient light, and what keeps it from surfaces.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ambient {
@@ -38,6 +48,8 @@ pub struct Ambient {
     pub attenuation: Attenuation,
     /// Axis of the hemisphere of occlusion rays.
     pub hemisphere: Hemisphere,
+    /// Which light ambient occlusion darkens.
+    pub occluded: OccludedLight,
 }
 
 impl Ambient {
@@ -48,6 +60,7 @@ impl Ambient {
             color: settings.path.ambient.map_or(Vec3::ONE, |c| c.as_vec3()),
             attenuation: Attenuation { radius: ao.radius(), falloff: ao.ao_falloff.unwrap_or(1.0) },
             hemisphere: ao.hemisphere(),
+            occluded: settings.path.occluded_light.unwrap_or_default(),
         }
     }
 
@@ -66,7 +79,11 @@ impl std::fmt::Display for Ambient {
     fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
         let Attenuation { radius, falloff } = self.attenuation;
         let [r, g, b] = self.color.to_array();
-        write!(f, "{r}, {g}, {b}; AO radius {radius}, falloff {falloff}, {} normal", self.hemisphere)
+        write!(f, "{r}, {g}, {b}; AO radius {radius}, falloff {falloff}, {} normal", self.hemisphere)?;
+        match self.occluded {
+            OccludedLight::Ambient => Ok(()),
+            OccludedLight::All => f.write_str(", of all light"),
+        }
     }
 }
 
@@ -77,6 +94,7 @@ impl serde::Serialize for Ambient {
             "color": self.color.to_array(),
             "radius": radius.is_finite().then_some(radius),
             "falloff": falloff,
+            "occluded_light": self.occluded,
             "normal": self.hemisphere,
         })
         .serialize(serializer)
@@ -113,7 +131,7 @@ pub fn trace(
 ) -> Result<()> {
     let unlimited = Attenuation { radius: f64::INFINITY, falloff: 1.0 };
     let hemisphere = options.ambient.map(|a| a.hemisphere).unwrap_or_default();
-    let ambient = Ambient { color: Vec3::ONE, attenuation: unlimited, hemisphere };
+    let ambient = Ambient { color: Vec3::ONE, attenuation: unlimited, hemisphere, occluded: OccludedLight::Ambient };
     // the first surface alone, and no light but the ambient one
     let options = PathOptions {
         max_depth: 0,
@@ -123,7 +141,7 @@ pub fn trace(
         background_only: true,
         ..options.clone()
     };
-    let mut paths = PathEstimator::new(tracer, flat, &options)?;
+    let mut paths = PathEstimator::new(tracer, flat, &options, max_rays(options.size, options.spp), false)?;
     paths.find_camera_media(camera)?;
     let distance = tracer.stream(&shaders::PATH_DISTANCE_CLOSEST)?;
     let mut estimator = DistanceEstimator { paths, distance, block: None, width: options.size[0], take };

@@ -15,8 +15,8 @@ use crate::integrators::{Integrator, IntegratorSettings, PictureOptions, RenderJ
 use crate::output::{Image, Samples};
 use crate::scene::Scene;
 use crate::settings::Capability::{
-    self, AmbientLight, AmbientOcclusion, CameraModel, Denoising, LightTransport, PathLength, SamplingStrategy, SceneLights,
-    Textures, ToneMapping, WhiteSky,
+    self, AmbientLight, AmbientOcclusion, CameraModel, Denoising, LightTransport, PathLength, RealTimeFrames, SamplingStrategy,
+    SceneLights, Textures, ToneMapping, WhiteSky,
 };
 use crate::shaders::StreamShaders;
 use crate::tracer::{Needs, Tracer};
@@ -26,14 +26,33 @@ pub static PATH: PathVariant = PathVariant {
     name: "path",
     help: "Path tracing: global illumination",
     kind: Kind::Light { max_depth: None },
-    capabilities: &[LightTransport, PathLength, SamplingStrategy, SceneLights, Textures, CameraModel, ToneMapping, Denoising],
+    capabilities: &[
+        LightTransport,
+        PathLength,
+        SamplingStrategy,
+        SceneLights,
+        Textures,
+        CameraModel,
+        ToneMapping,
+        Denoising,
+        RealTimeFrames,
+    ],
 };
 /// Paths of one bounce.
 pub static DIRECT: PathVariant = PathVariant {
     name: "direct",
     help: "Direct lighting: paths of one bounce",
     kind: Kind::Light { max_depth: Some(1) },
-    capabilities: &[LightTransport, SamplingStrategy, SceneLights, Textures, CameraModel, ToneMapping, Denoising],
+    capabilities: &[
+        LightTransport,
+        SamplingStrategy,
+        SceneLights,
+        Textures,
+        CameraModel,
+        ToneMapping,
+        Denoising,
+        RealTimeFrames,
+    ],
 };
 /// Direct light, and ambient light where ambient occlusion lets it through.
 pub static LIT: PathVariant = PathVariant {
@@ -50,6 +69,7 @@ pub static LIT: PathVariant = PathVariant {
         CameraModel,
         ToneMapping,
         Denoising,
+        RealTimeFrames,
     ],
 };
 /// Specular reflection and refraction, and direct lighting on all other surfaces.
@@ -57,14 +77,23 @@ pub static WHITTED: PathVariant = PathVariant {
     name: "whitted",
     help: "Whitted (1980): chains of mirrors and glass, direct light on everything else",
     kind: Kind::Whitted,
-    capabilities: &[LightTransport, PathLength, SceneLights, Textures, CameraModel, ToneMapping, Denoising],
+    capabilities: &[LightTransport, PathLength, SceneLights, Textures, CameraModel, ToneMapping, Denoising, RealTimeFrames],
 };
 /// The ground truth that ambient occlusion approximates.
 pub static AO_SKY: PathVariant = PathVariant {
     name: "ao-sky",
     help: "Path traced grey diffuse surfaces under a white sky, divided by albedo: the ground truth that AO approximates",
     kind: Kind::WhiteSky,
-    capabilities: &[LightTransport, PathLength, SamplingStrategy, WhiteSky, CameraModel, ToneMapping, Denoising],
+    capabilities: &[
+        LightTransport,
+        PathLength,
+        SamplingStrategy,
+        WhiteSky,
+        CameraModel,
+        ToneMapping,
+        Denoising,
+        RealTimeFrames,
+    ],
 };
 /// Shading normals.
 pub static NORMALS: PathVariant = PathVariant {

@@ -15,6 +15,7 @@ mod media;
 mod params;
 mod report;
 pub mod settings;
+pub mod signal;
 
 use crate::accel::flatten::FlatScene;
 use crate::error::{Error, Result};
@@ -23,6 +24,7 @@ use crate::film::accumulate::{Accumulated, Estimator, Plan, accumulate, max_rays
 use crate::film::block::BlockParams;
 use crate::film::camera::CameraRecord;
 use crate::gpu::{Buffer, Commands, ComputePipeline, Memory, Specialization, Timing};
+use crate::interface::records::path::SignalRecord;
 use crate::interface::{LightKind, LightKinds, MaterialFeature, PathFeature, PathFeatures};
 pub use crate::interface::{PixelFilter, View};
 use crate::scene::Environment;
@@ -94,7 +96,8 @@ impl PathIntegrator {
     /// # Errors
     /// Those of the device; [`Error::Usage`] for a tracer that was built without the data that paths need.
     pub fn new(tracer: &Tracer, flat: &FlatScene, options: &PathOptions) -> Result<Self> {
-        Ok(Self { paths: PathEstimator::new(tracer, flat, options)?, options: options.clone() })
+        let capacity = max_rays(options.size, options.spp);
+        Ok(Self { paths: PathEstimator::new(tracer, flat, options, capacity, false)?, options: options.clone() })
     }
 
     /// Number of lights that light sampling chooses from, the environment and each portal included; 0 without light sampling.
@@ -209,7 +212,8 @@ struct PathEstimator {
 }
 
 impl PathEstimator {
-    fn new(tracer: &Tracer, flat: &FlatScene, options: &PathOptions) -> Result<Self> {
+    /// For launches of at most `most` paths. With `has_signal` the diffuse part of radiance is kept apart ([`signal`]).
+    fn new(tracer: &Tracer, flat: &FlatScene, options: &PathOptions, most: u32, has_signal: bool) -> Result<Self> {
         let device = tracer.device();
         // without this data the image would be wrong without any error
         let Some(shading) = tracer.features().shading else {
@@ -224,7 +228,6 @@ impl PathEstimator {
         if cones && !shading.materials.contains(MaterialFeature::RayCones) {
             return Err(Error::Usage("ray cones need a tracer that was built with Needs::mip_levels".into()));
         }
-        let most = max_rays(options.size, options.spp);
         let white = Environment::Uniform(glam::Vec3::ONE);
         let around = match options.view {
             // a view shows surfaces, independent of lights
@@ -239,7 +242,8 @@ impl PathEstimator {
             None if options.background_only => Lights::new(flat, glam::Vec3::ZERO),
             None => Lights::new(flat, environment.mean),
         };
-        let (features, light_kinds) = features::features(options, flat, &lights, environment.map.texels != 0, cones);
+        let (mut features, light_kinds) = features::features(options, flat, &lights, environment.map.texels != 0, cones);
+        features.insert_if(has_signal, PathFeature::Signal);
         let [has_media, has_clear_walls] = [PathFeature::Media, PathFeature::ClearWalls].map(|f| features.contains(f));
         let stores_sky_pdfs = features.contains(PathFeature::LightSamples)
             && lights.environment.is_some()
@@ -257,6 +261,14 @@ impl PathEstimator {
             buffers.push(buffer);
             address
         };
+        let mut diffuse_part = |is_needed: bool| match has_signal && is_needed {
+            true => quads("diffuse part of contributions").map(&mut keep),
+            false => Ok(0),
+        };
+        let diffuse_contributions = diffuse_part(true)?;
+        let later_diffuse_contributions = diffuse_part(has_clear_walls)?;
+        let ambient_diffuse_contributions = diffuse_part(options.ambient.is_some())?;
+        let signal_bytes = size_of::<SignalRecord>() as u64 * u64::from(most);
         let base = PathParams {
             map: environment.map,
             environment: environment.factor.to_array(),
@@ -303,6 +315,13 @@ impl PathEstimator {
                 Some(_) => keep(quads("contributions of ambient light")?),
                 None => 0,
             },
+            signals: match has_signal {
+                true => keep(Buffer::new(device, "signals of paths", signal_bytes, Memory::Device)?),
+                false => 0,
+            },
+            diffuse_contributions,
+            later_diffuse_contributions,
+            ambient_diffuse_contributions,
             ..options.params()
         };
         let states = [keep(states()?), keep(states()?)];
@@ -326,12 +345,23 @@ impl PathEstimator {
         if let Some(w) = &walls {
             let (later, later_contributions) = (w.later.record(), w.contributions.address());
             records.push(PathParams { later, later_contributions, ..base });
-            let (shadow, contributions) = (later, later_contributions);
-            let (later, later_contributions) = (base.shadow, base.contributions);
-            records.push(PathParams { shadow, contributions, later, later_contributions, ..base });
+            records.push(PathParams {
+                shadow: later,
+                contributions: later_contributions,
+                diffuse_contributions: base.later_diffuse_contributions,
+                later: base.shadow,
+                later_contributions: base.contributions,
+                later_diffuse_contributions: base.diffuse_contributions,
+                ..base
+            });
         }
         let ambient = ambient_queue.map(|queue| {
-            records.push(PathParams { shadow: base.ambient, contributions: base.ambient_contributions, ..base });
+            records.push(PathParams {
+                shadow: base.ambient,
+                contributions: base.ambient_contributions,
+                diffuse_contributions: base.ambient_diffuse_contributions,
+                ..base
+            });
             AmbientRays { queue, params: records.len() - 1 }
         });
         let path_params = records
@@ -445,8 +475,17 @@ impl PathEstimator {
         }
     }
 
-    /// Traces all bounces of a launch, `BOUNCES` per submission; with thin walls that transmit, one.
+    /// Traces all bounces of a launch, and adds the paths to the film.
     fn launch_one(&mut self, commands: &mut Commands, push: Push) -> Result<Vec<Timing>> {
+        let mut timings = self.trace(commands, push)?;
+        let push = Push { pass: self.block_params[0].address(), ..push };
+        let groups = (push.count >> push.sample_bits).div_ceil(shaders::LANES);
+        timings.extend(commands.run(|r| r.timed("path_resolve", |r| r.dispatch(&self.resolve, &push, groups)))?);
+        Ok(timings)
+    }
+
+    /// Traces all bounces of a launch, `BOUNCES` per submission; with thin walls that transmit, one.
+    fn trace(&mut self, commands: &mut Commands, push: Push) -> Result<Vec<Timing>> {
         let passes = [0, 1].map(|k| self.block_params[k].address());
         let push = |fills: usize| Push { pass: passes[fills], ..push };
         // a surface that a path passes straight through is no bounce, but needs a launch
@@ -502,12 +541,9 @@ impl PathEstimator {
             self.traced.ambient_rays += sum(2);
             left = counts[(COUNTS * BOUNCES) as usize];
             if left == 0 || depth >= max_launches {
-                break;
+                return Ok(timings);
             }
         }
-        let groups = (push(0).count >> push(0).sample_bits).div_ceil(shaders::LANES);
-        timings.extend(commands.run(|r| r.timed("path_resolve", |r| r.dispatch(&self.resolve, &push(0), groups)))?);
-        Ok(timings)
     }
 }
 

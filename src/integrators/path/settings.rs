@@ -7,7 +7,7 @@ use std::time::Duration;
 use glam::DVec3;
 use serde_json::{Map, Value, json};
 
-use super::ambient::{Ambient, EnvironmentLight};
+use super::ambient::{Ambient, EnvironmentLight, OccludedLight};
 use super::params::PathParams;
 use super::{PixelFilter, View};
 use crate::error::{Error, Result};
@@ -21,19 +21,19 @@ use crate::settings::parse::{parse_albedo, parse_positive, parse_radiance};
 use crate::settings::{AppliesTo, Capability, choices, settings};
 
 /// Integrators that trace light paths.
-const LIGHT: AppliesTo = AppliesTo::stills_of(Capability::LightTransport);
+const LIGHT: AppliesTo = AppliesTo::of(Capability::LightTransport);
 /// Integrators whose path length is configurable.
-const LONG: AppliesTo = AppliesTo::stills_of(Capability::PathLength);
+const LONG: AppliesTo = AppliesTo::of(Capability::PathLength);
 /// Integrators that use a pixel filter and a lens.
 const CAMERA: AppliesTo = AppliesTo::stills_of(Capability::CameraModel);
 /// Integrators that read textures.
-const TEXTURES: AppliesTo = AppliesTo::stills_of(Capability::Textures);
+const TEXTURES: AppliesTo = AppliesTo::of(Capability::Textures);
 /// Integrators with a choice of sampling strategy.
-const SAMPLED: AppliesTo = AppliesTo::stills_of(Capability::SamplingStrategy);
+const SAMPLED: AppliesTo = AppliesTo::of(Capability::SamplingStrategy);
 /// The integrator with a white sky.
-const SKY: AppliesTo = AppliesTo::stills_of(Capability::WhiteSky);
+const SKY: AppliesTo = AppliesTo::of(Capability::WhiteSky);
 /// The integrator with ambient light.
-const AMBIENT: AppliesTo = AppliesTo::stills_of(Capability::AmbientLight);
+const AMBIENT: AppliesTo = AppliesTo::of(Capability::AmbientLight);
 
 settings! {
     /// Paths.
@@ -57,6 +57,8 @@ settings! {
         ambient: Option<DVec3>, option(value_name = "R,G,B", value_parser = parse_radiance, allow_hyphen_values = true), applies(AMBIENT);
         /// How the environment lights surfaces with --integrator lit [default: traced]
         environment_light: Option<EnvironmentLight>, option(value_enum), applies(AMBIENT);
+        /// Which light ambient occlusion darkens with --integrator lit [default: ambient]
+        occluded_light: Option<OccludedLight>, option(value_enum), applies(AMBIENT);
         /// Texture filter of paths [default: bilinear]
         texture_filter: Option<TextureFilter>, option(value_enum), applies(TEXTURES), research;
         /// f-number of a thin lens with a 36x24 mm sensor; scene units are taken as metres [default: a pinhole]
@@ -277,7 +279,7 @@ impl PathOptions {
     }
 
     /// Metadata keys and values by which a film is known to be of the same render. `None`: the key is absent.
-    pub(super) fn identity(&self) -> Vec<(&'static str, Option<String>)> {
+    pub fn identity(&self) -> Vec<(&'static str, Option<String>)> {
         self.described().into_iter().map(|(key, text, _)| (key, text)).collect()
     }
 
@@ -289,6 +291,7 @@ impl PathOptions {
             (PathFeature::SpecularOnly, self.specular_only),
             (PathFeature::ConstantAlbedo, self.white_sky.is_some()),
             (PathFeature::Ambient, self.ambient.is_some()),
+            (PathFeature::OccludedLight, self.occludes_all()),
             (PathFeature::BackgroundOnly, self.background_only),
             (PathFeature::View, self.view.is_some()),
             (PathFeature::MinDepth, self.min_depth > 0),
@@ -296,6 +299,11 @@ impl PathOptions {
             (PathFeature::Lens, self.lens.is_some_and(|l| l.radius > 0.0)),
             (PathFeature::PixelFilter, self.pixel_filter != PixelFilter::Box),
         ]
+    }
+
+    /// Returns true if ambient occlusion darkens all light of a surface.
+    pub(super) fn occludes_all(&self) -> bool {
+        self.ambient.is_some_and(|a| a.occluded == OccludedLight::All)
     }
 
     /// Maximum number of bounces.
@@ -313,6 +321,7 @@ impl PathOptions {
             clamp_to: self.firefly_clamp,
             albedo: self.white_sky.unwrap_or(0.0),
             ambient_color: self.ambient.map_or([0.0; 3], |a| a.color.to_array()),
+            occludes_all: self.occludes_all().into(),
             lens_radius: self.lens.map_or(0.0, |l| l.radius),
             focus: self.lens.map_or(1.0, |l| l.focus),
             ..Default::default()

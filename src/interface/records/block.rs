@@ -54,5 +54,9 @@ records! {
         pixel_filter: uint,
         /// Padding to a multiple of 8 bytes.
         reserved: uint,
+        /// Address of the `SurfacesParams`, or 0.
+        surfaces: address,
+        /// Offset of rays through the centres of pixels from there, pixels.
+        centre_offset: vec2,
     }
 }

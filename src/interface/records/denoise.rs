@@ -1,4 +1,4 @@
-//! The input of the denoiser's filter.
+//! Estimates of radiance: input and output of the denoiser's filter, and the signals of frames in real time.
 
 records! {
     "denoise";
@@ -11,7 +11,7 @@ records! {
         samples: float,
         /// Variance of one sample, by channel.
         variance: vec3,
-        /// Padding to a multiple of 16 bytes.
-        reserved: float,
+        /// By how much the filter's box is narrowed here: 0 not at all, 1 to the pixel itself.
+        narrowed: float,
     }
 }

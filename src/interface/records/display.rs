@@ -1,7 +1,10 @@
 //! Parameters of the pass that displays a buffer of a frame.
 
 records! {
-    "display";
+    "display" values {
+        /// Flag: the image is radiance, in colour.
+        DISPLAY_RADIANCE: uint = 1;
+    };
 
     /// Parameters of the pass `display`.
     DisplayParams: block readonly 8 {
@@ -13,6 +16,8 @@ records! {
         words: address,
         /// Ambient visibility, a float per pixel.
         result: address,
+        /// Final image, a `vec4` per pixel: value and coverage; 0: `result` is it.
+        resolved: address,
         /// Accumulated estimates, 8 bytes per pixel.
         history: address,
         /// Estimates of this frame's samples alone, 8 bytes per pixel, or 0.
@@ -29,6 +34,11 @@ records! {
         has_history: uint,
         /// Maximum occlusion rays of a pixel and frame.
         most_rays: float,
+        /// Bits `DISPLAY_*`.
+        flags: uint,
+        /// One of `TONE_MAP_*`, for radiance.
+        tone_map: uint,
+        /// Padding to a multiple of 8 bytes.
         reserved: uint,
     }
 }

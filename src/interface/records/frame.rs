@@ -53,6 +53,10 @@ records! {
         previous_orthographic: uint,
         /// Image size, pixels.
         size: uvec2,
+        /// Where a pixel's sample lies in this frame: offset from the pixel's centre, pixels, each coordinate at least -0.5 and below 0.5.
+        offset: vec2,
+        /// `offset` of the previous frame.
+        previous_offset: vec2,
         /// Number of 8x8 tiles in a row of the image.
         tiles_x: uint,
         /// Frame index, from which the sampler's points follow.

@@ -13,6 +13,7 @@ pub mod lights;
 pub mod passes;
 pub mod path;
 pub mod queue;
+pub mod radiance;
 pub mod raster;
 pub mod ray;
 pub mod ray_set;
@@ -23,7 +24,7 @@ pub mod shading;
 use super::layout::File;
 
 /// All files; each after those that it includes.
-pub const FILES: [&File; 19] = [
+pub const FILES: [&File; 20] = [
     &ray::FILE,
     &queue::FILE,
     &scene::FILE,
@@ -34,6 +35,7 @@ pub const FILES: [&File; 19] = [
     &lights::FILE,
     &frame::FILE,
     &passes::FILE,
+    &radiance::FILE,
     &larsen::FILE,
     &display::FILE,
     &denoise::FILE,

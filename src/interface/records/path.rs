@@ -3,7 +3,18 @@
 use super::queue::QueueRecord;
 
 records! {
-    "path" includes "queue";
+    "path" includes "queue" values {
+        /// Phase of a path: what it has met so far are mirrors and glass, where it went on as the G-buffer's rays do.
+        SIGNAL_SEEN: float = 0.0;
+        /// Phase of a path: as before, but it went another way.
+        SIGNAL_ASIDE: float = 1.0;
+        /// Phase of a path: it has met a surface that scatters light.
+        SIGNAL_SCATTERED: float = 2.0;
+        /// No distance.
+        SIGNAL_UNKNOWN: float = -1.0;
+        /// No distance yet.
+        SIGNAL_PENDING: float = -2.0;
+    };
 
     /// An environment map in equirectangular projection.
     EnvironmentRecord: structure {
@@ -88,8 +99,8 @@ records! {
         camera_media: uvec4,
         /// Ambient radiance, linear RGB, with `WITH_AMBIENT`.
         ambient_color: vec3,
-        /// Padding to a multiple of 16 bytes.
-        reserved: uint,
+        /// 1: ambient occlusion darkens all light of a path's first surface, with `WITH_OCCLUDED_LIGHT`.
+        occludes_all: uint,
         /// The queue of shadow rays that continue behind a thin wall.
         later: QueueRecord,
         /// `contributions` of the queue `later`.
@@ -100,6 +111,35 @@ records! {
         ambient: QueueRecord,
         /// A `vec4` per ray of ambient light: the radiance that it adds if it is unoccluded.
         ambient_contributions: address,
+        /// A `SignalRecord` per path, with `WITH_SIGNAL`.
+        signals: address,
+        /// With `WITH_SIGNAL` a `vec4` per shadow ray: what it adds to the diffuse part, divided by the albedo, if it is unoccluded; else 0.
+        diffuse_contributions: address,
+        /// `diffuse_contributions` of the queue `later`.
+        later_diffuse_contributions: address,
+        /// `diffuse_contributions` of the queue `ambient`.
+        ambient_diffuse_contributions: address,
+    }
+
+    /// What a path of a frame in real time brings, beside its radiance, of which the part that is seen directly is left out. The vertex in question is the first
+    /// one whose surface scatters light, which is seen directly or by mirrors and glass.
+    SignalRecord: words {
+        /// Emission and background seen directly, linear RGB.
+        direct: vec3,
+        /// 1 if the camera ray hit the scene.
+        covered: float,
+        /// The part of the path's radiance that this vertex reflects diffusely, divided by its diffuse albedo.
+        diffuse: vec3,
+        /// Distance from the vertex to the next one, scene units, infinite if there is none; `SIGNAL_UNKNOWN` if that direction tells nothing about reflections.
+        reflected_distance: float,
+        /// Its diffuse albedo; 0 where the diffuse part is not kept apart.
+        albedo: vec3,
+        /// One of `SIGNAL_*`: how far the path is.
+        phase: float,
+        /// Of what comes from the sampled direction: the diffuse part, divided by the albedo, over all of it.
+        share: vec3,
+        /// Padding to a multiple of 16 bytes.
+        reserved: float,
     }
 
     /// The state of a path between two bounces.

@@ -4,7 +4,8 @@ use crate::colour::srgb_byte;
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, ComputePipeline, Recorder};
 pub use crate::interface::DisplayMode;
-use crate::interface::records::display::DisplayParams;
+use crate::interface::ToneMap;
+use crate::interface::records::display::{DISPLAY_RADIANCE, DisplayParams};
 use crate::output::png::Colour;
 use crate::realtime::graph::{Frame, Params, Pass, Range, ResourceUse, Stage};
 use crate::realtime::resources::{Resource, Resources};
@@ -24,6 +25,20 @@ impl DisplayMode {
             | DisplayMode::Rays => Colour::Grey,
             _ => Colour::Rgb,
         }
+    }
+
+    /// Checks that frames of radiance have the buffer.
+    ///
+    /// # Errors
+    /// [`Error::Usage`], naming those that they have.
+    pub fn check_radiance(self) -> Result<()> {
+        use DisplayMode::{Accessibility, Depth, Ids, Motion, Nodes, Normal, Position};
+        let all = [Accessibility, Depth, Normal, Position, Ids, Motion, Nodes];
+        if all.contains(&self) {
+            return Ok(());
+        }
+        let names = all.map(|m| m.to_string()).join(", ");
+        Err(Error::Usage(format!("--show {self} is for ambient occlusion; frames of radiance have {names}")))
     }
 
     /// Checks that the buffer exists with these settings.
@@ -59,6 +74,8 @@ pub struct Display {
     pub exposure: f32,
     /// Length by which depths and positions are divided, scene units.
     pub unit: f32,
+    /// Tone mapping operator of radiance.
+    pub tone_map: ToneMap,
 }
 
 struct DisplayPass {
@@ -84,8 +101,8 @@ pub fn stage(tracer: &Tracer, pixels: u32, shows_rays: bool) -> Result<Stage> {
 impl Pass for DisplayPass {
     fn uses(&self, display: Option<&Display>) -> ResourceUse {
         use Resource::{
-            BentResult, Camera, Current, DisplayImage, DisplaySettings, FrameNumber, Guide, History, PreviousPosition, Result,
-            Surface,
+            BentResult, Camera, Current, DisplayImage, DisplaySettings, FrameNumber, Guide, History, PreviousPosition,
+            Resolved, Result, Surface,
         };
         let uses = ResourceUse::new(&[DisplaySettings], &[DisplayImage]);
         if self.shows_rays {
@@ -93,7 +110,7 @@ impl Pass for DisplayPass {
         }
         let Some(display) = display else { return uses };
         match display.shown {
-            DisplayMode::Accessibility => uses.and_reads(&[Result]),
+            DisplayMode::Accessibility => uses.and_reads(&[Result, Resolved]),
             // without a history the result is read in its place
             DisplayMode::Unfiltered => uses.and_reads(&[Guide, History, Result]),
             DisplayMode::Samples | DisplayMode::Variance => uses.and_reads(&[Guide, History]),
@@ -118,6 +135,7 @@ impl Pass for DisplayPass {
             thresholds: self.thresholds.address(),
             words: resources.address(Resource::DisplayImage),
             result: resources.address(Resource::Result),
+            resolved: resources.address(Resource::Resolved),
             history: resources.address(Resource::History),
             current: if self.shows_rays { resources.address(Resource::Current) } else { 0 },
             bent: resources.address(Resource::BentResult),
@@ -126,6 +144,8 @@ impl Pass for DisplayPass {
             unit: display.unit,
             has_history: (frame.settings.technique != Technique::Larsen).into(),
             most_rays: frame.settings.most_rays().max(frame.settings.rays_per_pixel) as f32,
+            flags: if resources.buffer(Resource::Composed).is_some() { DISPLAY_RADIANCE } else { 0 },
+            tone_map: display.tone_map as u32,
             reserved: 0,
         })
     }

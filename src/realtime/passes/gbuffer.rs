@@ -46,13 +46,19 @@ impl Pass for Gbuffer {
         self.params.write(&BlockParams {
             hemisphere: self.has_axes.into(),
             frame: frame.params,
+            centre_offset: frame.offset,
             ..frame.block.params(frame.block.size, &frame.camera, frame.settings.seed)
         })
     }
 
     fn record(&self, r: &mut Recorder, frame: &Frame, _: &Resources, range: Range) -> Result<()> {
         if range.first == 0 {
-            let view = View { camera: frame.camera, image_size: frame.block.size, block: frame.block, at: [0.5; 2] };
+            let view = View {
+                camera: frame.camera,
+                image_size: frame.block.size,
+                block: frame.block,
+                at: frame.offset.map(|x| 0.5 + x),
+            };
             self.rays.draw(r, frame.tracer, &view)?;
         }
         self.rays.record(r, &self.params.push(frame, range));

@@ -1,7 +1,9 @@
 //! The passes of a frame, one file each: the resources that a pass reads and writes, its parameters, and how it is recorded.
 
+mod antialias;
 mod ao_trace;
 mod budget;
+mod compose;
 pub mod display;
 mod filter;
 mod gather;
@@ -9,15 +11,27 @@ mod gbuffer;
 mod gtao;
 mod larsen;
 pub mod nodes;
+mod paths;
+mod radiance_filter;
+mod radiance_temporal;
+mod rest;
+mod surfaces;
 mod temporal;
 
 use super::graph::{Range, Stage};
+use super::resources::Resource;
 use super::settings::{Budget, Settings, Technique};
+use crate::accel::flatten::FlatScene;
 use crate::error::Result;
-use crate::film::block::Block;
+use crate::film::block::{Block, TILE_PIXELS};
+use crate::integrators::path::PathOptions;
+use crate::integrators::path::signal::SignalPaths;
 use crate::raster::Primary;
+use crate::scene::material::MaterialKind;
 use crate::shaders::StreamShaders;
 use crate::tracer::Tracer;
+use crate::tracer::stream::LAUNCH_RAYS;
+use paths::MAX_SAMPLES;
 
 /// The streams that frames with these settings trace.
 pub fn streams(settings: &Settings) -> [&'static StreamShaders; 2] {
@@ -53,5 +67,38 @@ pub fn stages(tracer: &Tracer, block: Block, settings: &Settings, primary: Prima
     }
     stages.push(temporal::stage(tracer, pixels, settings)?);
     stages.extend(filter::stages(tracer, pixels, settings)?);
+    let has_rest = settings.converges();
+    if has_rest {
+        stages.push(rest::stage(tracer, pixels)?);
+    }
+    if has_rest || settings.antialias {
+        stages.push(antialias::stage(tracer, pixels, Resource::Result, has_rest)?);
+    }
+    Ok(stages)
+}
+
+/// The stages of a frame of radiance, in order. The tracer must have been built from `flat` with [`crate::tracer::Needs::shading`].
+pub fn radiance_stages(
+    tracer: &Tracer,
+    flat: &FlatScene,
+    block: Block,
+    settings: &Settings,
+    options: &PathOptions,
+) -> Result<Vec<Stage>> {
+    let pixels = block.size[0] * block.size[1];
+    let most = settings.launch_rays.clamp(MAX_SAMPLES * TILE_PIXELS, LAUNCH_RAYS);
+    let paths = block.rays().saturating_mul(settings.rays_per_pixel.min(MAX_SAMPLES).next_power_of_two()).min(most);
+    let paths = SignalPaths::new(tracer, flat, options, paths)?;
+    let has_rest = settings.converges();
+    let mut stages = vec![
+        surfaces::stage(tracer, flat.scene, &paths, block, settings.launch_rays)?,
+        paths::stage(tracer, paths, block, settings.rays_per_pixel, has_rest)?,
+        radiance_temporal::stage(tracer, pixels)?,
+    ];
+    let is_diffuse = options.white_sky.is_some() || flat.scene.materials.iter().all(|m| m.kind == MaterialKind::Matte);
+    let (filters, filtered) = radiance_filter::stages(tracer, pixels, settings, !is_diffuse)?;
+    stages.extend(filters);
+    stages.push(compose::stage(tracer, pixels, filtered)?);
+    stages.push(antialias::stage(tracer, pixels, Resource::Composed, has_rest)?);
     Ok(stages)
 }

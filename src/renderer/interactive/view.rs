@@ -4,7 +4,10 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 
+use glam::DVec3;
+
 use super::{Interactive, TracedScene};
+use crate::accel::features::Blend;
 use crate::error::{Error, Result};
 use crate::film::camera::CameraRecord;
 use crate::film::schedule::FilmOptions;
@@ -15,10 +18,13 @@ use crate::gpu::Timing;
 use crate::integrators::aov::Aov;
 use crate::integrators::{Integrator, RenderJob};
 use crate::output::{self, Channel, Image, Samples, png};
-use crate::realtime::display::{Display, DisplayMode};
+use crate::realtime::display::DisplayMode;
 use crate::realtime::{FrameStats, Realtime, Technique};
 use crate::renderer::RenderSettings;
-use crate::renderer::frames::{UNIT_OF_SCENE, frame_needs, frame_settings, point_lights, scene_size, settling_frames};
+use crate::renderer::frames::{
+    colour_channels, frame_display, frame_needs, frame_path_options, frame_settings, frame_streams, is_ambient_occlusion,
+    pipeline, settling_frames,
+};
 use crate::renderer::settings::CameraSettings;
 use crate::scene::{Camera, Projection};
 
@@ -129,14 +135,17 @@ impl View {
         if session.device.info.is_cpu() {
             how.launch_rays = CPU_LAUNCH_RAYS;
         }
-        let shown = settings.frames.show.unwrap_or_default();
-        let needs = frame_needs(&how, &settings.image.aov);
-        let world =
-            session.traced_scene(crate::accel::features::Blend::Masked, needs, Realtime::streams(&how).to_vec(), control)?;
+        let integrator = settings.integrator();
+        let blend = if is_ambient_occlusion(integrator) { Blend::Masked } else { integrator.get().blend() };
+        let streams = frame_streams(settings, &how);
+        let world = session.traced_scene(blend, frame_needs(settings, &how), streams, control)?;
         let world = &session.traced[world];
-        let mut realtime = Realtime::new(&world.tracer, size, &how, &point_lights(session.scene, &world.flat))?;
-        let exposure = settings.picture.exposure.unwrap_or(0.0) as f32;
-        let display = Display { shown, exposure, unit: UNIT_OF_SCENE * scene_size(session.scene) as f32 };
+        // which one makes no difference: lenses are for stills
+        let any_camera = Camera::framing(DVec3::NEG_ONE, DVec3::ONE, 1.0);
+        let options = frame_path_options(settings, session.scene, &any_camera, size, &how)?;
+        let mut realtime = pipeline(&world.tracer, &world.flat, size, &how, options.as_ref())?;
+        let display = frame_display(settings, session.scene);
+        let shown = display.shown;
         realtime.display(&world.tracer, Some(display))?;
         let view = FramesView { realtime, shown, resting: 0, settling: settling_frames(&how) };
         Ok((world.number, Kind::Frames(Box::new(view))))
@@ -271,10 +280,11 @@ impl View {
             Kind::Frames(view) => {
                 let realtime = &view.realtime;
                 let is_filtered = realtime.settings().filter.kind != crate::realtime::FilterKind::None
-                    || realtime.settings().technique != Technique::Traced;
+                    || realtime.settings().technique != Technique::Traced
+                    || realtime.is_radiance();
                 ViewValues {
                     size,
-                    channels: 1,
+                    channels: realtime.channels(),
                     values: realtime.result()?,
                     coverage: realtime.coverage()?,
                     variance: if is_filtered { None } else { Some(realtime.variances()?) },
@@ -304,8 +314,8 @@ impl View {
         let mut image = match &self.kind {
             Kind::Frames(view) => {
                 let realtime = &view.realtime;
-                let channels =
-                    vec![f32s("Y", realtime.result()?), f32s("A", realtime.coverage()?), f32s("samples", realtime.samples()?)];
+                let mut channels = colour_channels(realtime)?;
+                channels.extend([f32s("A", realtime.coverage()?), f32s("samples", realtime.samples()?)]);
                 Image { width: self.size[0], height: self.size[1], channels, metadata: Vec::new() }
             }
             Kind::Still(view) => view.image(self.size),

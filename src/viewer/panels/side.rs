@@ -3,7 +3,7 @@
 use egui::{CollapsingHeader, ComboBox, Slider, Ui};
 
 use super::{editor, performance, round};
-use crate::integrators::Integrator;
+use crate::integrators::{Integrator, IntegratorName};
 use crate::settings::{Capability, Length, Setting};
 use crate::tracer::TracerChoice;
 use crate::viewer::app::{App, Second};
@@ -199,9 +199,9 @@ fn frames(app: &mut App, ui: &mut Ui) {
 
 fn paths(app: &mut App, ui: &mut Ui) {
     let integrator = match app.first {
-        Technique::Still(integrator) if integrator.name() != "ao" => integrator.get(),
+        Technique::Still(integrator) | Technique::Frames(integrator) if integrator.name() != "ao" => integrator.get(),
         _ => {
-            ui.label("For path, direct, whitted and ao-sky.");
+            ui.label("For path, direct, lit, whitted and ao-sky.");
             &crate::integrators::path::kinds::PATH as &dyn Integrator
         }
     };
@@ -213,8 +213,9 @@ fn paths(app: &mut App, ui: &mut Ui) {
 }
 
 fn light(app: &mut App, ui: &mut Ui) {
-    if !matches!(app.first, Technique::Still(i) if i.get().capabilities().contains(&Capability::SceneLights)) {
-        ui.label("Light has an effect on path, direct and whitted.");
+    let is_lit = |i: IntegratorName| i.get().capabilities().contains(&Capability::SceneLights);
+    if !matches!(app.first, Technique::Still(i) | Technique::Frames(i) if is_lit(i)) {
+        ui.label("Light has an effect on path, direct, lit and whitted.");
     }
     let heading =
         ui.label("Environment: a map (.hdr, .exr) or R,G,B").on_hover_text("Enter applies it; empty: the scene's own");

@@ -38,12 +38,12 @@ pub fn keys(app: &mut App, context: &Context) {
     // a widget that has the focus takes Space and arrows
     let is_free = context.memory(|m| m.focused().is_none());
     let pressed = |key| context.input(|i| i.key_pressed(key) && i.modifiers.matches_logically(Modifiers::NONE));
-    let still = |name: &str| name.parse().ok().map(Technique::Still);
+    let light = |name: &str| name.parse().ok().map(Technique::Frames);
     let techniques = [
         (Key::Num1, Some(Technique::Preset(Preset::Fast))),
         (Key::Num2, Some(Technique::Preset(Preset::Balanced))),
         (Key::Num3, Some(Technique::Preset(Preset::Quality))),
-        (Key::Num4, still("path")),
+        (Key::Num4, light("path")),
         (Key::Num5, Some(Technique::Converged)),
     ];
     for (key, technique) in techniques {

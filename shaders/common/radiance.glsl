@@ -1,0 +1,39 @@
+// Estimates of radiance: RadianceRecords in memory.
+#ifndef COMMON_RADIANCE
+#define COMMON_RADIANCE
+#include "common/frame.glsl"
+
+struct RadianceEstimate {
+    vec3 mean;
+    float samples;
+    vec3 variance;    // of one sample
+    float narrowed;   // by how much the filter's box is narrowed here, 0 to 1
+};
+
+const RadianceEstimate NO_RADIANCE = RadianceEstimate(vec3(0.0), 0.0, vec3(0.0), 0.0);
+
+RadianceEstimate load_radiance(uvec2 image, uint at) {
+    vec4 a = uintBitsToFloat(Quads(image).v[2u * at]), b = uintBitsToFloat(Quads(image).v[2u * at + 1u]);
+    return RadianceEstimate(a.xyz, a.w, b.xyz, b.w);
+}
+
+void store_radiance(uvec2 image, uint at, RadianceEstimate e) {
+    QuadImage to = QuadImage(image);
+    to.v[2u * at] = floatBitsToUint(vec4(e.mean, e.samples));
+    to.v[2u * at + 1u] = floatBitsToUint(vec4(e.variance, e.narrowed));
+}
+
+// Also false for NaN.
+bool is_finite(vec3 c) { return max(abs(c.r), max(abs(c.g), abs(c.b))) < 1e30; }
+
+// The samples of both (Chan, Golub, LeVeque, "Algorithms for Computing the Sample Variance", 1983).
+RadianceEstimate all_samples(RadianceEstimate a, RadianceEstimate b) {
+    float n = a.samples + b.samples;
+    if (!(n > 0.0)) return b;
+    float share = b.samples / n;
+    vec3 difference = b.mean - a.mean;
+    // variance of all samples about their common mean
+    return RadianceEstimate(a.mean + share * difference, n, mix(a.variance, b.variance, share) + share * (1.0 - share) * difference * difference, b.narrowed);
+}
+
+#endif

@@ -1,0 +1,45 @@
+// The mean of all samples since an image came to rest, without reprojection, filter or clamp: what it converges to.
+#ifndef COMMON_REST
+#define COMMON_REST
+#include "common/frame.glsl"
+
+// Background counts as 0 for ambient visibility, as on the film of a still.
+struct Rest {
+    vec3 mean;
+    float samples;
+    float variance;   // of the mean of a frame's samples, summed over channels
+    float frames;
+    float coverage;
+};
+
+const Rest NO_REST = Rest(vec3(0.0), 0.0, 0.0, 0.0, 0.0);
+
+Rest load_rest(uvec2 image, uint at) {
+    vec4 a = uintBitsToFloat(Quads(image).v[2u * at]), b = uintBitsToFloat(Quads(image).v[2u * at + 1u]);
+    return Rest(a.xyz, a.w, b.x, b.y, b.z);
+}
+
+void store_rest(uvec2 image, uint at, Rest r) {
+    QuadImage to = QuadImage(image);
+    to.v[2u * at] = floatBitsToUint(vec4(r.mean, r.samples));
+    to.v[2u * at + 1u] = floatBitsToUint(vec4(r.variance, r.frames, r.coverage, 0.0));
+}
+
+// Adds samples of a frame with this mean and coverage.
+Rest add_rest(Rest r, vec3 mean, float samples, float coverage) {
+    if (!(samples > 0.0)) return r;
+    r.samples += samples;
+    r.frames += 1.0;
+    float share = samples / r.samples;
+    vec3 difference = mean - r.mean;
+    r.mean += share * difference;
+    r.coverage += share * (coverage - r.coverage);
+    // of frames about their common mean
+    r.variance += (dot(difference, mean - r.mean) - r.variance) / r.frames;
+    return r;
+}
+
+// Variance of the mean, summed over channels; of few frames it is not known.
+float rest_error(Rest r) { return r.variance / max(r.frames - 1.0, 1.0); }
+
+#endif

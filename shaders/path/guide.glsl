@@ -1,0 +1,123 @@
+// The G-buffer of frames of radiance: the first surface behind each pixel that scatters light, seen directly or by mirrors and glass.
+//
+// What a flat mirror shows is a rigid copy of the scene behind it. The G-buffer has the surface where it seems to be, so that reprojection and edge tests work on
+// it as on surfaces seen directly. Glass is looked through, and refraction moves nothing: an approximation, which costs history, not truth.
+#ifndef PATH_GUIDE
+#define PATH_GUIDE
+#include "common/frame.glsl"
+#include "interface/radiance.glsl"
+#include "path/path.glsl"
+#include "scene/motion.glsl"
+
+// A ray of the G-buffer on its way.
+struct GuideRay {
+    vec3 mirrored[3];  // rows of the product of reflections so far, which takes directions from where things are to where they seem to be
+    float far;         // distance from the camera, scene units
+    uint bounces;
+};
+
+const GuideRay GUIDE_START = GuideRay(vec3[3](vec3(1.0, 0.0, 0.0), vec3(0.0, 1.0, 0.0), vec3(0.0, 0.0, 1.0)), 0.0, 0u);
+// Mirrors and glass that are followed.
+const uint MAX_GUIDE_BOUNCES = 8u;
+// A number of evenly distributed ones that selects transmission where there is any.
+const float TRANSMITTED = 0.99999994;
+
+vec3 where_it_seems(GuideRay g, vec3 v) { return vec3(dot(g.mirrored[0], v), dot(g.mirrored[1], v), dot(g.mirrored[2], v)); }
+
+GuideRay load_guide_ray(SurfacesParams q, uint k) {
+    GuideRay g;
+    vec4 rows[3];
+    [[unroll]] for (uint row = 0u; row < 3u; row++) {
+        rows[row] = load_quad(q.states, 3u * k + row);
+        g.mirrored[row] = rows[row].xyz;
+    }
+    g.far = rows[0].w;
+    g.bounces = floatBitsToUint(rows[1].w);
+    return g;
+}
+
+void store_guide_ray(SurfacesParams q, uint k, GuideRay g) {
+    store_quad(q.next_states, 3u * k, vec4(g.mirrored[0], g.far));
+    store_quad(q.next_states, 3u * k + 1u, vec4(g.mirrored[1], uintBitsToFloat(g.bounces)));
+    store_quad(q.next_states, 3u * k + 2u, vec4(g.mirrored[2], 0.0));
+}
+
+// Roughness by which reflections are judged: 0 for mirrors, 1 for surfaces that reflect diffusely only.
+float reflection_roughness(Bsdf b) {
+    if (b.kind == BSDF_DIFFUSE || b.kind == BSDF_OREN_NAYAR || b.kind == BSDF_NONE) return 1.0;
+    float alpha = max(b.facets.alpha.x, b.facets.alpha.y);
+    if (HAS_CLEARCOAT && b.clearcoat.weight > 0.0) alpha = min(alpha, max(b.clearcoat.facets.alpha.x, b.clearcoat.facets.alpha.y));
+    return sqrt(clamp(alpha, 0.0, 1.0));
+}
+
+// What a camera ray sees that meets no surface.
+vec3 background(PathParams p, vec3 w) {
+    if (WITH_CONSTANT_ALBEDO) return vec3(0.0);
+    vec3 c = environment_radiance(p, w);
+    PathState start = PathState(vec3(1.0), -1.0, 0u, 0u, 0u, 1.0, NO_MEDIUM);
+    if (WITH_DISTANT_DISKS) c += disks_met(p, start, w);
+    return counted_radiance(p, c, 0u);
+}
+
+// One vertex of a pixel's ray: writes the G-buffer, or continues.
+void guide_vertex(BlockParams block, uint at, GuideRay g, Ray ray, Hit hit) {
+    FrameParams f = FrameParams(block.frame);
+    SurfacesParams q = SurfacesParams(block.surfaces);
+    PathParams p = PathParams(block.path);
+    if (!is_hit(hit)) {
+        // behind mirrors the last one is what the pixel shows
+        if (g.bounces > 0u) return;
+        STORE_PAIR(f.guide, at, uvec2(floatBitsToUint(INFINITY), 0u));
+        store_quad(q.direct, at, vec4(background(p, ray.direction), 0.0));
+        return;
+    }
+    Surface s = surface_at(ray, hit);
+    vec3 towards_viewer = -ray.direction;
+    Shading m;
+    if (WITH_CONSTANT_ALBEDO) m = grey_shading(s, towards_viewer, p.albedo);
+    else m = shade(s, towards_viewer, SHARP);
+    g.far += hit.t * length(ray.direction);
+    if (g.bounces == 0u) store_quad(q.direct, at, vec4(counted_radiance(p, m.emission, 0u), 1.0));
+    bool scatters = m.bsdf.kind == BSDF_NONE || has_rough_part(m.bsdf);
+
+    // the point where it seems to be, now and in the previous frame
+    vec3 position = s.position, before = previous_position(hit, s) - s.position;
+    if (g.bounces > 0u) {
+        uvec2 pixel = uvec2(at % f.size.x, at / f.size.x);
+        Ray first = camera_ray(block, vec2(pixel) + 0.5 + block.centre_offset);
+        position = first.origin + first.direction * g.far;
+        before = where_it_seems(g, before);
+    }
+    vec4 back = f.world_to_camera[2];
+    float depth = -(dot(back.xyz, position) + back.w);
+    vec3 normal = where_it_seems(g, m.frame.n);
+    STORE_PAIR(f.guide, at, make_guide(depth, normal, hit.instance + 0x10001u * g.bounces));
+    STORE_PAIR(f.surface, 4u * at, floatBitsToUint(position.xy));
+    STORE_PAIR(f.surface, 4u * at + 1u, floatBitsToUint(vec2(position.z, s.offset)));
+    vec3 ng = where_it_seems(g, m.ng);
+    STORE_PAIR(f.surface, 4u * at + 2u, floatBitsToUint(ng.xy));
+    STORE_PAIR(f.surface, 4u * at + 3u, floatBitsToUint(vec2(ng.z, 0.0)));
+    if (!is_null(f.previous_position)) {
+        FloatImage previous = FloatImage(f.previous_position);
+        for (uint k = 0u; k < 3u; k++) previous.v[3u * at + k] = position[k] + before[k];
+    }
+    store_quad(q.materials, at, vec4(m.bsdf.diffuse, scatters ? reflection_roughness(m.bsdf) : 0.0));
+    if (scatters || g.bounces >= MAX_GUIDE_BOUNCES || is_null(q.states)) return;
+
+    vec3 wo = to_frame(m.frame, towards_viewer);
+    wo.z = max(wo.z, LEAST_COSINE);
+    BsdfSample b = bsdf_sample(m.bsdf, wo, vec2(0.5), TRANSMITTED);
+    if (!(b.pdf > 0.0)) return;
+    vec3 w = normalize(from_frame(m.frame, b.wi));
+    float side = dot(m.ng, w);
+    if (side == 0.0) return;
+    if (side > 0.0) {
+        vec3 n = m.frame.n;
+        [[unroll]] for (uint row = 0u; row < 3u; row++) g.mirrored[row] -= 2.0 * dot(g.mirrored[row], n) * n;
+    }
+    g.bounces++;
+    uint slot = append_ray(q.next, Ray(s.position + m.ng * (sign(side) * s.offset), 0.0, w, INFINITY), at);
+    store_guide_ray(q, slot, g);
+}
+
+#endif

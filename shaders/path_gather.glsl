@@ -1,0 +1,77 @@
+// path_gather: the means and variances of a launch's paths for each pixel, of the diffuse part and of the rest, and the sum of all since the image came to rest.
+#include "common/camera.glsl"
+#include "common/radiance.glsl"
+#include "common/rest.glsl"
+#include "interface/path.glsl"
+#include "interface/radiance.glsl"
+
+layout(local_size_x = LANES) in;
+
+const uint QUADS = SIGNAL_RECORD_PAIRS / 2u;
+
+// A mean over samples, added one after the other (Welford 1962); `variance` is a sum of squares until `finished`.
+void add_sample(inout RadianceEstimate e, vec3 c) {
+    e.samples += 1.0;
+    vec3 difference = c - e.mean;
+    e.mean += difference / e.samples;
+    e.variance += difference * (c - e.mean);
+}
+
+RadianceEstimate finished(RadianceEstimate e) {
+    e.variance /= max(e.samples - 1.0, 1.0);
+    return e;
+}
+
+vec4 quad(uvec2 image, uint k) { return uintBitsToFloat(Quads(image).v[k]); }
+
+void main() {
+    uint k = gl_GlobalInvocationID.x, n = 1u << push.sample_bits;
+    if (k >= push.count >> push.sample_bits) return;
+    GatherParams p = GatherParams(push.pass);
+    FrameParams f = FrameParams(p.frame);
+    uvec2 pixel = tile_pixel(f, (push.first >> push.sample_bits) + k);
+    if (any(greaterThanEqual(pixel, f.size))) return;
+    uint at = image_index(f, pixel);
+    bool is_first = p.earlier == 0u;
+    if (!is_sampled(f, pixel)) {
+        if (is_first) {
+            store_radiance(p.diffuse, at, NO_RADIANCE);
+            store_radiance(p.specular, at, NO_RADIANCE);
+            FloatImage(p.distances).v[at] = SIGNAL_UNKNOWN;
+            if (!is_null(p.rest) && p.starts != 0u) store_rest(p.rest, at, NO_REST);
+        }
+        return;
+    }
+    RadianceEstimate diffuse = NO_RADIANCE, specular = NO_RADIANCE, whole = NO_RADIANCE;
+    float covered = 0.0, distance_ = 0.0, distances = 0.0;
+    for (uint s = 0u; s < n; s++) {
+        uint i = k * n + s;
+        vec4 direct = quad(p.signals, QUADS * i), d = quad(p.signals, QUADS * i + 1u), albedo = quad(p.signals, QUADS * i + 2u);
+        vec4 radiance = quad(p.radiance, i);
+        float share = p.occludes_all != 0u && radiance.a == 1.0 ? 0.0 : 1.0;
+        vec3 c = share * radiance.rgb;
+        d.rgb *= share;
+        if (!is_finite(c) || !is_finite(d.rgb) || !is_finite(direct.rgb)) continue;
+        add_sample(diffuse, d.rgb);
+        // rounding may leave less than nothing
+        add_sample(specular, max(c - d.rgb * albedo.rgb, vec3(0.0)));
+        add_sample(whole, c + direct.rgb);
+        covered += direct.a;
+        if (d.a >= 0.0) {
+            distance_ += min(d.a, 1e30);
+            distances += 1.0;
+        }
+    }
+    diffuse = finished(diffuse);
+    specular = finished(specular);
+    if (!is_first) {
+        diffuse = all_samples(load_radiance(p.diffuse, at), diffuse);
+        specular = all_samples(load_radiance(p.specular, at), specular);
+    }
+    store_radiance(p.diffuse, at, diffuse);
+    store_radiance(p.specular, at, specular);
+    if (is_first) FloatImage(p.distances).v[at] = distances > 0.0 ? distance_ / distances : SIGNAL_UNKNOWN;
+    if (is_null(p.rest)) return;
+    Rest rest = p.starts != 0u && is_first ? NO_REST : load_rest(p.rest, at);
+    store_rest(p.rest, at, add_rest(rest, whole.mean, whole.samples, covered / max(whole.samples, 1.0)));
+}

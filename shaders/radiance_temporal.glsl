@@ -1,0 +1,138 @@
+// radiance_temporal: reprojects the histories of a pixel's diffuse reflection and of the rest, and adds this frame's samples to them (temporal.glsl is the same for
+// ambient visibility).
+//
+// Diffuse reflection does not depend on the view and moves with its surface. What smooth surfaces reflect moves as if it was behind them, at its distance (Zimmer et al., "Path-space Motion
+// Estimation and Decomposition for Robust Animation Filtering", EGSR 2015; here for flat mirrors). The rest depends on the view, so its history is clamped to
+// this frame's samples nearby whenever the camera moves; both where objects have moved.
+#include "common/radiance.glsl"
+#include "common/reprojection.glsl"
+#include "interface/path.glsl"
+#include "interface/radiance.glsl"
+
+layout(local_size_x = LANES) in;
+
+// Minimum relative variance of samples while it is not known yet: a few equal samples say little.
+const float MIN_RELATIVE_VARIANCE = 0.02;
+// Radius in pixels of the neighbourhood to which a history is clamped.
+const int CLAMP_RADIUS = 2;
+// Roughness below which reflections move as what they show does, and not as their surface.
+const float MIRROR_ROUGHNESS = 0.35;
+// Roughness from which the filter's box is not narrowed.
+const float WIDE_ROUGHNESS = 0.5;
+// A mirror is not filtered at all.
+const float SHARP_ROUGHNESS = 0.04;
+
+float brightness(vec3 c) { return c.r + c.g + c.b; }
+
+RadianceEstimate history_at(uvec2 image, Taps taps) {
+    RadianceEstimate e = NO_RADIANCE;
+    float weight = 0.0;
+    [[unroll]] for (int k = 0; k < 4; k++) {
+        float w = taps.weight[k];
+        if (w == 0.0) continue;
+        RadianceEstimate tap = load_radiance(image, taps.at[k]);
+        if (!(tap.samples > 0.0)) continue;
+        weight += w;
+        e.mean += w * tap.mean;
+        e.samples += w * tap.samples;
+        e.variance += w * tap.variance;
+    }
+    if (weight < 0.01) return NO_RADIANCE;
+    return RadianceEstimate(e.mean / weight, e.samples / weight, e.variance / weight, 0.0);
+}
+
+// A history, clamped to the mean of this frame's samples nearby, give or take their standard deviations.
+vec3 clamped(RadianceTemporalParams p, FrameParams f, uvec2 image, uvec2 pixel, EdgeTest edge, vec3 history) {
+    vec3 sum = vec3(0.0), squares = vec3(0.0);
+    float n = 0.0;
+    ivec2 lower = max(ivec2(pixel) - CLAMP_RADIUS, ivec2(0)), upper = min(ivec2(pixel) + CLAMP_RADIUS, ivec2(f.size) - 1);
+    for (int y = lower.y; y <= upper.y; y++) {
+        for (int x = lower.x; x <= upper.x; x++) {
+            uint tap = image_index(f, uvec2(x, y));
+            RadianceEstimate e = load_radiance(image, tap);
+            if (e.samples == 0.0 || !same_surface(edge, vec2(ivec2(x, y) - ivec2(pixel)), LOAD_PAIR(f.guide, tap))) continue;
+            sum += e.mean;
+            squares += e.mean * e.mean;
+            n += 1.0;
+        }
+    }
+    if (n == 0.0) return history;
+    vec3 mean = sum / n, width = p.clamp_width * sqrt(max(squares / n - mean * mean, vec3(0.0)));
+    return clamp(history, mean - width, mean + width);
+}
+
+// The guide's normals are shading normals, by which lighting differs; planes are those of the true surface.
+EdgeTest with_normal(EdgeTest edge, uvec2 guide) {
+    edge.normal = unpackSnorm4x8(guide.y).xyz;
+    return edge;
+}
+
+RadianceEstimate added(FrameParams f, RadianceEstimate past, RadianceEstimate now, float most_past) {
+    past.samples = min(past.samples, min(most_past, max(f.most_samples - now.samples, 0.0)));
+    if (!(now.samples > 0.0)) return past;
+    if (!(past.samples > 0.0)) return now;
+    return all_samples(past, now);
+}
+
+void main() {
+    uint at = push.first + gl_GlobalInvocationID.x;
+    if (gl_GlobalInvocationID.x >= push.count) return;
+    RadianceTemporalParams p = RadianceTemporalParams(push.pass);
+    FrameParams f = FrameParams(p.frame);
+    uvec2 guide = LOAD_PAIR(f.guide, at);
+    if (!is_surface(guide)) {
+        // the next sample of the same pixel may show a surface again
+        bool rests = f.has_history != 0u && f.still != 0u;
+        store_radiance(p.diffuse_history, at, rests ? load_radiance(p.previous_diffuse, at) : NO_RADIANCE);
+        store_radiance(p.specular_history, at, rests ? load_radiance(p.previous_specular, at) : NO_RADIANCE);
+        return;
+    }
+    float roughness = uintBitsToFloat(Quads(p.materials).v[at].w);
+    RadianceEstimate diffuse = NO_RADIANCE, specular = NO_RADIANCE;
+    if (f.has_history != 0u && f.still != 0u) {
+        diffuse = load_radiance(p.previous_diffuse, at);
+        specular = load_radiance(p.previous_specular, at);
+    } else if (f.has_history != 0u) {
+        uvec2 pixel = uvec2(at % f.size.x, at / f.size.x);
+        vec3 position = surface_position(f, at), normal = surface_normal(f, at);
+        vec3 before = is_null(f.previous_position) ? position : load_vec3(f.previous_position, at);
+        uint id = guide.y >> 24;
+        vec2 place;
+        if (previous_place(f, before, place)) {
+            EdgeTest edge = with_normal(previous_edge(f, before, normal, place), guide);
+            Taps taps = taps_around(f, place, place, edge, id);
+            diffuse = history_at(p.previous_diffuse, taps);
+            float reflected = FloatImage(p.distances).v[at];
+            if (roughness < MIRROR_ROUGHNESS && reflected >= 0.0) {
+                vec3 eye = vec3(f.camera_to_world[0].w, f.camera_to_world[1].w, f.camera_to_world[2].w);
+                vec3 back = vec3(f.camera_to_world[0].z, f.camera_to_world[1].z, f.camera_to_world[2].z);
+                vec3 w = f.orthographic != 0u ? -back : normalize(position - eye);
+                vec2 there;
+                if (previous_place(f, before + w * reflected, there)) taps = taps_around(f, there, place, edge, id);
+                else taps = NO_TAPS;
+            }
+            specular = history_at(p.previous_specular, taps);
+        }
+        EdgeTest edge = with_normal(edge_test(f, f.world_to_camera, f.view, f.orthographic != 0u, position, normal, sample_place(f, vec2(pixel))), guide);
+        float change = p.moved_count > 0u ? p.moved_weight * possible_change(p.moved, p.moved_count, f, position, normal) : 0.0;
+        if (change > 0.0 && diffuse.samples > 0.0) {
+            // as ambient visibility: relative to the signal
+            float m = max(brightness(diffuse.mean), 1e-20);
+            diffuse.samples = samples_after(diffuse.samples, change, max(brightness(diffuse.variance) / (m * m), MIN_RELATIVE_VARIANCE));
+            if (p.clamp_width > 0.0) diffuse.mean = clamped(p, f, p.diffuse, pixel, edge, diffuse.mean);
+        }
+        if (specular.samples > 0.0) {
+            if (change > 0.0) {
+                float m = max(brightness(specular.mean), 1e-20);
+                specular.samples = samples_after(specular.samples, change, max(brightness(specular.variance) / (m * m), MIN_RELATIVE_VARIANCE));
+            }
+            if (p.clamp_width > 0.0) specular.mean = clamped(p, f, p.specular, pixel, edge, specular.mean);
+        }
+    }
+    diffuse = added(f, diffuse, load_radiance(p.diffuse, at), p.most_past);
+    specular = added(f, specular, load_radiance(p.specular, at), p.most_past);
+    diffuse.narrowed = 0.0;
+    specular.narrowed = roughness <= SHARP_ROUGHNESS ? 1.0 : 1.0 - clamp(roughness / WIDE_ROUGHNESS, 0.0, 1.0);
+    store_radiance(p.diffuse_history, at, diffuse);
+    store_radiance(p.specular_history, at, specular);
+}

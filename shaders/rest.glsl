@@ -1,0 +1,24 @@
+// rest: adds this frame's samples of ambient visibility to those since the image came to rest (common/rest.glsl).
+#include "common/rest.glsl"
+#include "interface/radiance.glsl"
+
+layout(local_size_x = LANES) in;
+
+void main() {
+    uint at = push.first + gl_GlobalInvocationID.x;
+    if (gl_GlobalInvocationID.x >= push.count) return;
+    RestParams p = RestParams(push.pass);
+    FrameParams f = FrameParams(p.frame);
+    Rest rest = NO_REST;
+    if (p.starts == 0u) rest = load_rest(p.rest, at);
+    uvec2 pixel = uvec2(at % f.size.x, at / f.size.x);
+    if (is_sampled(f, pixel)) {
+        if (is_surface(LOAD_PAIR(f.guide, at))) {
+            Estimate e = unpack_estimate(LOAD_PAIR(p.current, at));
+            rest = add_rest(rest, vec3(e.mean), e.samples, 1.0);
+        } else {
+            rest = add_rest(rest, vec3(0.0), float(f.rays_per_pixel), 0.0);
+        }
+    }
+    store_rest(p.rest, at, rest);
+}

@@ -1,0 +1,211 @@
+//! Paths for frames in real time: their diffuse reflection is kept apart from the rest, so that both can be filtered, and what they are reprojected and filtered by
+//! is found by rays of its own ([`SignalPaths::surfaces`]).
+
+use super::{PathEstimator, PathOptions};
+use crate::accel::flatten::FlatScene;
+use crate::error::Result;
+use crate::film::block::BlockParams;
+use crate::film::camera::CameraRecord;
+use crate::gpu::{Buffer, Commands, ComputePipeline, Memory, Recorder, Specialization, Timing};
+use crate::interface::records::radiance::SurfacesParams;
+use crate::scene::material::MaterialKind;
+use crate::scene::{Material, Scene};
+use crate::shaders::{self, LANES};
+use crate::tracer::queue::RayQueue;
+use crate::tracer::{Push, Stream, Tracer};
+
+/// Maximum number of mirrors and panes of glass that the G-buffer's rays follow (`MAX_GUIDE_BOUNCES` in shaders/path/guide.glsl).
+const MAX_BOUNCES: usize = 8;
+/// Bytes of the state of a ray of the G-buffer.
+const GUIDE_RAY_BYTES: u64 = 48;
+
+/// Traces the paths of frames in real time, some for each pixel.
+pub struct SignalPaths {
+    paths: PathEstimator,
+    gather: ComputePipeline,
+    capacity: u32,
+    /// Parameters of ambient light; all other fields are 0.
+    ambient: BlockParams,
+}
+
+/// Finds the surface behind each pixel that scatters light, seen directly or by mirrors and glass.
+pub struct GuideRays {
+    camera: Stream,
+    behind: Option<RaysBehind>,
+    params: [Buffer; 2],
+    blocks: [Buffer; 2],
+}
+
+/// Rays behind mirrors and glass, in two queues: one is traced while the other is filled.
+struct RaysBehind {
+    stream: Stream,
+    queues: [RayQueue; 2],
+    states: [Buffer; 2],
+}
+
+/// Numbers of rays of a frame.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct SignalCounts {
+    /// Rays of all bounces but camera rays.
+    pub bounce_rays: u64,
+    /// Shadow rays, and occlusion rays of ambient light.
+    pub shadow_rays: u64,
+}
+
+impl SignalPaths {
+    /// Creates it for launches of at most `capacity` paths. The tracer must have been built from `flat` with [`crate::tracer::Needs::shading`].
+    ///
+    /// # Errors
+    /// Those of [`super::PathIntegrator::new`].
+    pub fn new(tracer: &Tracer, flat: &FlatScene, options: &PathOptions, capacity: u32) -> Result<Self> {
+        Ok(Self {
+            paths: PathEstimator::new(tracer, flat, options, capacity, true)?,
+            gather: shaders::PATH_GATHER.pipeline(tracer.device())?,
+            capacity,
+            ambient: options.ambient.map(|a| a.block_params()).unwrap_or_default(),
+        })
+    }
+
+    /// Returns true if ambient occlusion darkens all light of the first surface.
+    pub fn occludes_all(&self) -> bool {
+        self.paths.records[0].occludes_all != 0
+    }
+
+    /// Maximum number of paths of a launch.
+    pub fn capacity(&self) -> u32 {
+        self.capacity
+    }
+
+    /// Creates what finds the surfaces of images, for launches of at most so many pixels.
+    ///
+    /// # Errors
+    /// Those of the device.
+    pub fn surfaces(&self, tracer: &Tracer, scene: &Scene, pixels: u32) -> Result<GuideRays> {
+        let device = tracer.device();
+        let PathEstimator { features, light_kinds, .. } = &self.paths;
+        let constants = Specialization::default().set_all(features.constants()).set_all(light_kinds.constants());
+        let params = |name, bytes: usize| Buffer::new(device, name, bytes as u64, Memory::Upload);
+        let two = |name, bytes| Ok::<_, crate::Error>([params(name, bytes)?, params(name, bytes)?]);
+        let behind = match scene.materials.iter().any(may_be_smooth) {
+            false => None,
+            true => {
+                let states =
+                    || Buffer::new(device, "rays of the G-buffer", GUIDE_RAY_BYTES * u64::from(pixels), Memory::Device);
+                Some(RaysBehind {
+                    stream: tracer.specialized(&shaders::PATH_REFLECTION_CLOSEST, &constants)?,
+                    queues: [RayQueue::new(device, pixels)?, RayQueue::new(device, pixels)?],
+                    states: [states()?, states()?],
+                })
+            }
+        };
+        Ok(GuideRays {
+            camera: tracer.specialized(&shaders::PATH_SURFACE_CLOSEST, &constants)?,
+            behind,
+            params: two("parameters of surfaces", size_of::<SurfacesParams>())?,
+            blocks: two("block of surfaces", size_of::<BlockParams>())?,
+        })
+    }
+
+    /// Device address of the parameters of paths, for other shaders.
+    pub fn params_address(&self) -> u64 {
+        self.paths.path_params[0].address()
+    }
+
+    /// Device addresses of what the paths of a launch leave: a `SignalRecord` each, and the radiance.
+    pub fn results(&self) -> [u64; 2] {
+        [self.paths.records[0].signals, self.paths.radiance.address()]
+    }
+
+    /// Begins a frame: the camera and its block, with [`BlockParams::frame`] and [`BlockParams::centre_offset`].
+    ///
+    /// # Errors
+    /// Those of the device.
+    pub fn begin(&mut self, camera: &CameraRecord, params: &BlockParams) -> Result<()> {
+        self.paths.find_camera_media(camera)?;
+        self.paths.traced = super::PathCounts::default();
+        let BlockParams { hemisphere, falloff_log2, radius, .. } = self.ambient;
+        let params = BlockParams { hemisphere, falloff_log2, radius, ..*params };
+        for (buffer, path) in self.paths.block_params.iter_mut().zip(&self.paths.path_params) {
+            buffer.write(0, bytemuck::bytes_of(&BlockParams { path: path.address(), ..params }))?;
+        }
+        Ok(())
+    }
+
+    /// Traces the paths of a launch; then `path_gather` with the parameters at address `gather` adds them to the images of the frame.
+    ///
+    /// # Errors
+    /// Those of the device.
+    pub fn launch(&mut self, commands: &mut Commands, push: Push, gather: u64) -> Result<Vec<Timing>> {
+        let mut timings = self.paths.trace(commands, push)?;
+        let push = Push { pass: gather, ..push };
+        let groups = (push.count >> push.sample_bits).div_ceil(LANES);
+        timings.extend(commands.run(|r| r.timed("path_gather", |r| r.dispatch(&self.gather, &push, groups)))?);
+        Ok(timings)
+    }
+
+    /// Numbers of rays since [`SignalPaths::begin`].
+    pub fn counts(&self) -> SignalCounts {
+        let counts = &self.paths.traced;
+        SignalCounts { bounce_rays: counts.bounce_rays, shadow_rays: counts.shadow_rays + counts.ambient_rays }
+    }
+}
+
+impl GuideRays {
+    /// Writes the parameters of a frame. `params`: those of the block, with [`BlockParams::frame`], [`BlockParams::path`] and [`BlockParams::centre_offset`].
+    ///
+    /// # Errors
+    /// Those of the device.
+    pub fn prepare(&mut self, params: &BlockParams, materials: u64, direct: u64) -> Result<()> {
+        for k in 0..2 {
+            // parameters k fill queue k, and read the states of the other
+            let surfaces = match &self.behind {
+                None => SurfacesParams { materials, direct, ..Default::default() },
+                Some(behind) => SurfacesParams {
+                    next: behind.queues[k].record(),
+                    states: behind.states[k ^ 1].address(),
+                    next_states: behind.states[k].address(),
+                    tags: behind.queues[k ^ 1].record().tags,
+                    materials,
+                    direct,
+                },
+            };
+            self.params[k].write(0, bytemuck::bytes_of(&surfaces))?;
+            let block = BlockParams { surfaces: self.params[k].address(), ..*params };
+            self.blocks[k].write(0, bytemuck::bytes_of(&block))?;
+        }
+        Ok(())
+    }
+
+    /// Records the rays of a launch of pixels.
+    pub fn record(&self, r: &mut Recorder, push: &Push) {
+        let push = |fills: usize| Push { pass: self.blocks[fills].address(), ..*push };
+        let Some(behind) = &self.behind else {
+            self.camera.record(r, &push(0));
+            return;
+        };
+        behind.queues[0].clear(r);
+        r.barrier();
+        self.camera.record(r, &push(0));
+        for bounce in 0..MAX_BOUNCES {
+            let (traced, fills) = (bounce % 2, (bounce + 1) % 2);
+            r.barrier();
+            behind.queues[fills].clear(r);
+            r.barrier();
+            behind.stream.record(r, &behind.queues[traced].push(push(fills), push(fills).count));
+        }
+    }
+}
+
+/// Returns true if a surface of the material may consist of delta lobes alone, so that it shows others.
+fn may_be_smooth(material: &Material) -> bool {
+    match material.kind {
+        MaterialKind::Mirror | MaterialKind::Glass => true,
+        MaterialKind::MetallicRoughness => {
+            let is_smooth = material.roughness < 0.05 || material.metallic_roughness_texture.is_some();
+            is_smooth && (material.metallic > 0.0 || material.transmission.factor > 0.0)
+        }
+        MaterialKind::Matte => false,
+        // conductors
+        _ => material.roughness == 0.0,
+    }
+}

@@ -1,0 +1,137 @@
+//! Parameters of the passes of a real-time frame of radiance, and of those that resolve any frame, one record per pass.
+
+use super::queue::QueueRecord;
+
+records! {
+    "radiance" includes "queue";
+
+    /// Parameters of `path_surface` and `path_reflection`, beside those of the block.
+    SurfacesParams: block readonly 8 {
+        /// The queue of rays behind mirrors and glass.
+        next: QueueRecord,
+        /// Three `vec4` per ray of the queue that is traced: its `GuideRay`; 0: no ray goes on.
+        states: address,
+        /// The same of the queue that is filled.
+        next_states: address,
+        /// A `uint` per ray of the queue that is traced: its pixel.
+        tags: address,
+        /// Output, a `vec4` per pixel: diffuse albedo, linear, and roughness of reflections, 0 to 1.
+        materials: address,
+        /// Output, a `vec4` per pixel: emission and background seen directly, linear, and coverage.
+        direct: address,
+    }
+
+    /// Parameters of `path_gather`.
+    GatherParams: block readonly 8 {
+        /// Address of the `FrameParams`.
+        frame: address,
+        /// A `SignalRecord` per path.
+        signals: address,
+        /// A `vec4` per path: radiance, less what is seen directly.
+        radiance: address,
+        /// Output, a `RadianceRecord` per pixel: diffuse reflection divided by the albedo.
+        diffuse: address,
+        /// Output, a `RadianceRecord` per pixel: the rest.
+        specular: address,
+        /// Output, a float per pixel: distance of what is reflected, scene units; `SIGNAL_UNKNOWN` if it is not known.
+        distances: address,
+        /// Output, two `vec4` per pixel: samples of the whole signal since the image came to rest; 0: not kept.
+        rest: address,
+        /// 1: it has not rested before.
+        starts: uint,
+        /// Samples per pixel of earlier launches of this frame.
+        earlier: uint,
+        /// `PathParams::occludes_all`.
+        occludes_all: uint,
+        /// Padding to a multiple of 8 bytes.
+        reserved: uint,
+    }
+
+    /// Parameters of `radiance_temporal`.
+    RadianceTemporalParams: block readonly 8 {
+        /// Address of the `FrameParams`.
+        frame: address,
+        /// This frame's samples, a `RadianceRecord` per pixel: diffuse reflection divided by the albedo.
+        diffuse: address,
+        /// The same of the rest.
+        specular: address,
+        /// Histories of the previous frame.
+        previous_diffuse: address,
+        /// Of the rest.
+        previous_specular: address,
+        /// Output: histories of this frame.
+        diffuse_history: address,
+        /// Of the rest.
+        specular_history: address,
+        /// Distance of what is reflected, a float per pixel.
+        distances: address,
+        /// A `vec4` per pixel: albedo, and roughness of reflections.
+        materials: address,
+        /// `MovedRecord`s of this frame.
+        moved: address,
+        /// Number of `MovedRecord`s.
+        moved_count: uint,
+        /// Strength with which moving objects shorten histories; 0: none.
+        moved_weight: float,
+        /// Half width of history clamping, in standard deviations of the neighbourhood; 0: no clamping.
+        clamp_width: float,
+        /// Maximum samples of a history before this frame's: fewer than usual after lights have changed.
+        most_past: float,
+    }
+
+    /// Parameters of `compose`.
+    ComposeParams: block readonly 8 {
+        /// Address of the `FrameParams`.
+        frame: address,
+        /// Diffuse reflection divided by the albedo, a `RadianceRecord` per pixel.
+        diffuse: address,
+        /// The rest.
+        specular: address,
+        /// A `vec4` per pixel: albedo, and roughness of reflections.
+        materials: address,
+        /// A `vec4` per pixel: what is seen directly, and coverage.
+        direct: address,
+        /// Output, a `vec4` per pixel: radiance, and coverage.
+        composed: address,
+    }
+
+    /// Parameters of `antialias`.
+    AntialiasParams: block readonly 8 {
+        /// Address of the `FrameParams`.
+        frame: address,
+        /// Radiance and coverage, a `vec4` per pixel; 0: `visibility` is the input.
+        composed: address,
+        /// Ambient visibility, a float per pixel.
+        visibility: address,
+        /// Output, two `vec4` per pixel: value, number of frames, and coverage.
+        history: address,
+        /// The same of the previous frame.
+        previous_history: address,
+        /// Samples since the image came to rest (`GatherParams`); 0: none.
+        rest: address,
+        /// Output, a `vec4` per pixel: value, and coverage.
+        resolved: address,
+        /// 1: there is a history.
+        has_history: uint,
+        /// Maximum number of frames of a history in motion.
+        most_frames: float,
+        /// Half width of the clamp of a history in motion, in standard deviations of the neighbourhood.
+        clamp_width: float,
+        /// Padding to a multiple of 8 bytes.
+        reserved: uint,
+    }
+
+    /// Parameters of `rest`.
+    RestParams: block readonly 8 {
+        /// Address of the `FrameParams`.
+        frame: address,
+        /// Estimates of this frame, 8 bytes per pixel.
+        current: address,
+        /// In and out, two `vec4` per pixel: samples since the image came to rest.
+        rest: address,
+        /// 1: it has not rested before.
+        starts: uint,
+        /// Padding to a multiple of 8 bytes.
+        reserved: uint,
+    }
+}

@@ -1,0 +1,68 @@
+//! `antialias`: the mean over frames whose samples lie at different places within the pixels, and at rest what the image converges to.
+
+use crate::error::Result;
+use crate::gpu::{ComputePipeline, Recorder};
+use crate::interface::records::radiance::AntialiasParams;
+use crate::realtime::display::Display;
+use crate::realtime::graph::{Frame, Params, Pass, Range, ResourceUse, Stage};
+use crate::realtime::resources::{Resource, Resources};
+use crate::shaders;
+use crate::tracer::Tracer;
+
+/// Maximum number of frames that the image is averaged over in motion.
+const MOST_FRAMES: f32 = 8.0;
+/// Half width of the clamp of the history in motion, in standard deviations of the pixels around.
+const CLAMP_WIDTH: f32 = 1.25;
+
+struct Antialias {
+    pipeline: ComputePipeline,
+    params: Params<AntialiasParams>,
+    /// `Composed`, or `Result` of ambient visibility.
+    input: Resource,
+    has_rest: bool,
+}
+
+/// The pass over all pixels. `input`: [`Resource::Composed`] or [`Resource::Result`].
+pub fn stage(tracer: &Tracer, pixels: u32, input: Resource, has_rest: bool) -> Result<Stage> {
+    let device = tracer.device();
+    let pass = Antialias {
+        pipeline: shaders::ANTIALIAS.pipeline(device)?,
+        params: Params::new(device, "parameters of antialiasing")?,
+        input,
+        has_rest,
+    };
+    Ok(Stage::new(vec![Box::new(pass)], Range::all(pixels)))
+}
+
+impl Pass for Antialias {
+    fn uses(&self, _: Option<&Display>) -> ResourceUse {
+        use Resource::{FrameNumber, Guide, PreviousPosition, Resolved, ResolvedHistory, Rest, Surface};
+        let rest: &[Resource] = if self.has_rest { &[Rest] } else { &[] };
+        ResourceUse::new(&[FrameNumber, Guide, Surface, PreviousPosition, self.input], &[ResolvedHistory, Resolved])
+            .previous(&[ResolvedHistory])
+            .and_reads(rest)
+    }
+
+    fn prepare(&mut self, frame: &Frame, resources: &Resources) -> Result<()> {
+        let input = resources.address(self.input);
+        let is_composed = self.input == Resource::Composed;
+        self.params.write(&AntialiasParams {
+            frame: frame.params,
+            composed: if is_composed { input } else { 0 },
+            visibility: if is_composed { 0 } else { input },
+            history: resources.address(Resource::ResolvedHistory),
+            previous_history: resources.previous_address(Resource::ResolvedHistory),
+            rest: if self.has_rest { resources.address(Resource::Rest) } else { 0 },
+            resolved: resources.address(Resource::Resolved),
+            has_history: frame.has_resolved.into(),
+            most_frames: if frame.settings.antialias { MOST_FRAMES } else { 1.0 },
+            clamp_width: CLAMP_WIDTH,
+            reserved: 0,
+        })
+    }
+
+    fn record(&self, r: &mut Recorder, frame: &Frame, _: &Resources, range: Range) -> Result<()> {
+        self.params.dispatch(r, "antialias", &self.pipeline, frame, range);
+        Ok(())
+    }
+}

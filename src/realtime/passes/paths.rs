@@ -1,0 +1,116 @@
+//! `paths`: the paths of the pixels that are sampled in this frame, and the means of their parts. The host reads after some bounces how many paths are left.
+
+use crate::error::Result;
+use crate::film::block::{Block, TILE_PIXELS};
+use crate::gpu::{Commands, Recorder, Timing};
+use crate::integrators::path::signal::SignalPaths;
+use crate::interface::records::radiance::GatherParams;
+use crate::realtime::display::Display;
+use crate::realtime::graph::{Frame, Params, Pass, Range, ResourceUse, Stage};
+use crate::realtime::resources::{Resource, Resources};
+use crate::tracer::{Push, Tracer};
+
+/// Log2 of the maximum number of samples per pixel in a launch.
+const MAX_SAMPLE_BITS: u32 = 4;
+/// Maximum number of samples per pixel in a launch.
+pub const MAX_SAMPLES: u32 = 1 << MAX_SAMPLE_BITS;
+
+struct Paths {
+    paths: SignalPaths,
+    gather: Params<GatherParams>,
+    has_rest: bool,
+}
+
+/// The pass over all pixels of an image, `spp` paths for each.
+pub fn stage(tracer: &Tracer, paths: SignalPaths, block: Block, spp: u32, has_rest: bool) -> Result<Stage> {
+    // a range is a launch, or several of the same pixels
+    let pixels = paths.capacity() / spp.min(MAX_SAMPLES).next_power_of_two();
+    let ranges = Range::launches(block.rays(), TILE_PIXELS, pixels);
+    let pass = Paths { paths, gather: Params::new(tracer.device(), "parameters of gathering")?, has_rest };
+    Ok(Stage::new(vec![Box::new(pass)], ranges))
+}
+
+/// Parts of `n` samples per pixel that launches take: powers of two.
+fn sample_batches(n: u32) -> impl Iterator<Item = (u32, u32)> {
+    let mut done = 0;
+    std::iter::from_fn(move || {
+        let bits = (n - done).checked_ilog2()?.min(MAX_SAMPLE_BITS);
+        let batch = (done, bits);
+        done += 1 << bits;
+        Some(batch)
+    })
+}
+
+impl Pass for Paths {
+    fn uses(&self, _: Option<&Display>) -> ResourceUse {
+        use Resource::{CurrentDiffuse, CurrentSpecular, FrameNumber, Guide, ReflectedDistance, Rest, Scene};
+        ResourceUse::new(&[FrameNumber, Scene, Guide], &[CurrentDiffuse, CurrentSpecular, ReflectedDistance])
+            .and_writes(self.has_rest, &[Rest])
+    }
+
+    fn prepare(&mut self, frame: &Frame, _: &Resources) -> Result<()> {
+        self.paths.begin(&frame.camera, &super::surfaces::block_params(frame))
+    }
+
+    fn record(&self, _: &mut Recorder, _: &Frame, _: &Resources, _: Range) -> Result<()> {
+        Ok(())
+    }
+
+    fn is_run_by_host(&self) -> bool {
+        true
+    }
+
+    fn run(&mut self, commands: &mut Commands, frame: &Frame, resources: &Resources, range: Range) -> Result<Vec<Timing>> {
+        let spp = frame.settings.rays_per_pixel;
+        let [signals, radiance] = self.paths.results();
+        let mut timings = Vec::new();
+        for (earlier, sample_bits) in sample_batches(spp) {
+            self.gather.write(&GatherParams {
+                frame: frame.params,
+                signals,
+                radiance,
+                diffuse: resources.address(Resource::CurrentDiffuse),
+                specular: resources.address(Resource::CurrentSpecular),
+                distances: resources.address(Resource::ReflectedDistance),
+                rest: resources.address(Resource::Rest),
+                starts: frame.rest_starts.into(),
+                earlier,
+                occludes_all: self.paths.occludes_all().into(),
+                reserved: 0,
+            })?;
+            let push = Push {
+                scene: frame.tracer.scene_address(),
+                first: range.first << sample_bits,
+                count: range.count << sample_bits,
+                sample_index: frame.number.wrapping_mul(spp).wrapping_add(earlier),
+                sample_bits,
+                ..Default::default()
+            };
+            timings.extend(self.paths.launch(commands, push, self.gather.address())?);
+        }
+        Ok(timings)
+    }
+
+    fn rays(&self) -> u64 {
+        let counts = self.paths.counts();
+        counts.bounce_rays + counts.shadow_rays
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn batches_take_every_sample_once() {
+        for n in 1..100 {
+            let mut next = 0;
+            for (done, bits) in sample_batches(n) {
+                assert_eq!(done, next);
+                assert!(bits <= MAX_SAMPLE_BITS);
+                next += 1 << bits;
+            }
+            assert_eq!(next, n);
+        }
+    }
+}

@@ -1,0 +1,62 @@
+//! `radiance_filter`: averages diffuse reflection, and then the rest, over neighbours on the same surface (the shader `denoise`, with which stills are denoised).
+
+use std::sync::Arc;
+
+use crate::error::Result;
+use crate::gpu::{ComputePipeline, Recorder};
+use crate::interface::records::passes::FilterParams;
+use crate::realtime::display::Display;
+use crate::realtime::graph::{Frame, Params, Pass, Range, ResourceUse, Stage};
+use crate::realtime::resources::{Resource, Resources};
+use crate::realtime::settings::{FilterStep, Settings};
+use crate::shaders;
+use crate::tracer::Tracer;
+
+/// One step of the filter of one part.
+struct RadianceFilter {
+    pipeline: Arc<ComputePipeline>,
+    params: Params<FilterParams>,
+    step: FilterStep,
+    from: Resource,
+    to: Resource,
+}
+
+/// The steps of the filter over all pixels (`has_specular`: of both parts, else the rest is black and is left alone), and the images that hold the results: diffuse reflection and the rest.
+pub fn stages(tracer: &Tracer, pixels: u32, settings: &Settings, has_specular: bool) -> Result<(Vec<Stage>, [Resource; 2])> {
+    let device = tracer.device();
+    let pipeline = Arc::new(shaders::DENOISE.pipeline(device)?);
+    let steps = settings.filter.steps();
+    let mut stages = Vec::new();
+    let mut filtered = [Resource::DiffuseHistory, Resource::SpecularHistory];
+    for (part, from) in filtered.iter_mut().enumerate().take(if has_specular { 2 } else { 1 }) {
+        for (k, step) in steps.iter().enumerate() {
+            let to = Resource::FilteredRadiance(2 * part + k % 2);
+            let params = Params::new(device, "parameters of the filter")?;
+            let pass = RadianceFilter { pipeline: pipeline.clone(), params, step: *step, from: *from, to };
+            stages.push(Stage::new(vec![Box::new(pass)], Range::all(pixels)));
+            *from = to;
+        }
+    }
+    Ok((stages, filtered))
+}
+
+impl Pass for RadianceFilter {
+    fn uses(&self, _: Option<&Display>) -> ResourceUse {
+        ResourceUse::new(&[Resource::Camera, Resource::Guide, Resource::Surface, self.from], &[self.to])
+    }
+
+    fn prepare(&mut self, frame: &Frame, resources: &Resources) -> Result<()> {
+        self.params.write(&FilterParams {
+            frame: frame.params,
+            from: resources.address(self.from),
+            to: resources.address(self.to),
+            samples: frame.settings.filter.samples,
+            ..self.step.params()
+        })
+    }
+
+    fn record(&self, r: &mut Recorder, frame: &Frame, _: &Resources, range: Range) -> Result<()> {
+        self.params.dispatch(r, "filter", &self.pipeline, frame, range);
+        Ok(())
+    }
+}

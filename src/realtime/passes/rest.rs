@@ -1,0 +1,44 @@
+//! `rest`: adds this frame's samples of ambient visibility to those since the image came to rest. (The samples of radiance are added by `paths`.)
+
+use crate::error::Result;
+use crate::gpu::{ComputePipeline, Recorder};
+use crate::interface::records::radiance::RestParams;
+use crate::realtime::display::Display;
+use crate::realtime::graph::{Frame, Params, Pass, Range, ResourceUse, Stage};
+use crate::realtime::resources::{Resource, Resources};
+use crate::shaders;
+use crate::tracer::Tracer;
+
+struct Rest {
+    pipeline: ComputePipeline,
+    params: Params<RestParams>,
+}
+
+/// The pass over all pixels.
+pub fn stage(tracer: &Tracer, pixels: u32) -> Result<Stage> {
+    let device = tracer.device();
+    let pass =
+        Rest { pipeline: shaders::REST.pipeline(device)?, params: Params::new(device, "parameters of samples at rest")? };
+    Ok(Stage::new(vec![Box::new(pass)], Range::all(pixels)))
+}
+
+impl Pass for Rest {
+    fn uses(&self, _: Option<&Display>) -> ResourceUse {
+        ResourceUse::new(&[Resource::FrameNumber, Resource::Guide, Resource::Current], &[Resource::Rest])
+    }
+
+    fn prepare(&mut self, frame: &Frame, resources: &Resources) -> Result<()> {
+        self.params.write(&RestParams {
+            frame: frame.params,
+            current: resources.address(Resource::Current),
+            rest: resources.address(Resource::Rest),
+            starts: frame.rest_starts.into(),
+            reserved: 0,
+        })
+    }
+
+    fn record(&self, r: &mut Recorder, frame: &Frame, _: &Resources, range: Range) -> Result<()> {
+        self.params.dispatch(r, "rest", &self.pipeline, frame, range);
+        Ok(())
+    }
+}

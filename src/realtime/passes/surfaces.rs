@@ -1,0 +1,59 @@
+//! `surfaces`: the G-buffer of frames of radiance: the surface behind each pixel that scatters light, seen directly or by mirrors and glass, its material, and what is seen
+//! directly.
+
+use crate::error::Result;
+use crate::film::block::{Block, BlockParams};
+use crate::gpu::Recorder;
+use crate::integrators::path::signal::{GuideRays, SignalPaths};
+use crate::realtime::display::Display;
+use crate::realtime::graph::{Frame, Pass, Range, ResourceUse, Stage};
+use crate::realtime::resources::{Resource, Resources};
+use crate::scene::Scene;
+use crate::tracer::{Push, Tracer};
+
+struct Surfaces {
+    rays: GuideRays,
+    path: u64,
+    is_dynamic: bool,
+}
+
+/// The pass over all pixels of an image.
+pub fn stage(tracer: &Tracer, scene: &Scene, paths: &SignalPaths, block: Block, launch_rays: u32) -> Result<Stage> {
+    let ranges = Range::launches(block.rays(), 1, launch_rays);
+    let pass = Surfaces {
+        rays: paths.surfaces(tracer, scene, ranges.iter().map(|r| r.count).max().unwrap_or(0))?,
+        path: paths.params_address(),
+        is_dynamic: tracer.is_dynamic(),
+    };
+    Ok(Stage::new(vec![Box::new(pass)], ranges))
+}
+
+/// Parameters of a frame's block that camera rays read.
+pub(super) fn block_params(frame: &Frame) -> BlockParams {
+    BlockParams {
+        frame: frame.params,
+        centre_offset: frame.offset,
+        ..frame.block.params(frame.block.size, &frame.camera, frame.settings.seed)
+    }
+}
+
+impl Pass for Surfaces {
+    fn uses(&self, _: Option<&Display>) -> ResourceUse {
+        use Resource::{Camera, Direct, Guide, Materials, PreviousPosition, Scene, Surface};
+        ResourceUse::new(&[Camera, Scene], &[Guide, Surface, Materials, Direct])
+            .and_writes(self.is_dynamic, &[PreviousPosition])
+            .clears(Guide, f32::INFINITY.to_bits())
+    }
+
+    fn prepare(&mut self, frame: &Frame, resources: &Resources) -> Result<()> {
+        let [materials, direct] = [Resource::Materials, Resource::Direct].map(|r| resources.address(r));
+        self.rays.prepare(&BlockParams { path: self.path, ..block_params(frame) }, materials, direct)
+    }
+
+    fn record(&self, r: &mut Recorder, frame: &Frame, _: &Resources, range: Range) -> Result<()> {
+        let Range { first, count } = range;
+        let sample_index = frame.number.wrapping_mul(frame.settings.rays_per_pixel);
+        self.rays.record(r, &Push { scene: frame.tracer.scene_address(), first, count, sample_index, ..Default::default() });
+        Ok(())
+    }
+}

@@ -1,0 +1,233 @@
+//! Frames of radiance in real time, against stills of the same paths.
+
+use super::*;
+use skylit::colour::srgb_byte;
+use skylit::integrators::ao::{Attenuation, Hemisphere};
+use skylit::integrators::path::ambient::{Ambient, OccludedLight};
+use skylit::integrators::path::{PathIntegrator, PixelFilter};
+use skylit::output::tone_map::ToneMap;
+use skylit::realtime::display::{Display, DisplayMode};
+use skylit::realtime::{Filter, FilterKind, Preset, Realtime, Settings};
+use skylit::scene::builtin;
+
+const SIZE: [u32; 2] = [32, 18];
+
+fn scene(name: &str) -> Scene {
+    builtin::by_name(name).unwrap()
+}
+
+fn record(scene: &Scene, camera: &Camera) -> CameraRecord {
+    CameraRecord::new(camera, scene.origin(), f64::from(SIZE[0]) / f64::from(SIZE[1]))
+}
+
+/// A frame is what its samples say: neither history, filter nor antialiasing.
+fn plain(spp: u32) -> Settings {
+    let filter = Filter { kind: FilterKind::None, radius: 0, samples: 0.0 };
+    Settings { rays_per_pixel: spp, history: 1, filter, seed: 5, ..Preset::Balanced.settings() }
+}
+
+/// With all of it, and what the image converges to at rest.
+fn converging() -> Settings {
+    Settings { antialias: true, converge: true, ..Preset::Balanced.settings() }
+}
+
+fn options(spp: u32) -> PathOptions {
+    PathOptions { size: SIZE, spp, seed: 5, pixel_filter: PixelFilter::Centre, ..Default::default() }
+}
+
+fn frames(tracer: &Tracer, flat: &FlatScene, settings: &Settings, options: &PathOptions) -> Realtime {
+    Realtime::radiance(tracer, flat, SIZE, settings, options).unwrap_or_else(|e| panic!("{}: {e}", tracer.kind()))
+}
+
+fn rmse(a: &[f32], b: &[f32]) -> f64 {
+    let sum: f64 = a.iter().zip(b).map(|(a, b)| f64::from(a - b).powi(2)).sum();
+    (sum / a.len() as f64).sqrt()
+}
+
+/// Mirrors, glass, textures of light: the parts that are filtered apart add up to the same paths' radiance, pixel by pixel.
+#[test]
+fn gpu_frames_the_parts_of_radiance_add_up() {
+    let device = device();
+    let lit = Ambient {
+        color: Vec3::new(1.0, 0.5, 0.25),
+        attenuation: Attenuation { radius: 1.0, falloff: 1.0 },
+        hemisphere: Hemisphere::Geometric,
+        occluded: OccludedLight::Ambient,
+    };
+    let variants = [
+        ("cornell-spheres", options(6)),
+        ("cornell-box", PathOptions { max_depth: 1, ambient: Some(lit), ..options(4) }),
+        (
+            "cornell-box",
+            PathOptions { max_depth: 1, ambient: Some(Ambient { occluded: OccludedLight::All, ..lit }), ..options(4) },
+        ),
+        ("stairs", PathOptions { white_sky: Some(0.5), ..options(4) }),
+    ];
+    for (name, options) in variants {
+        let scene = scene(name);
+        let flat = FlatScene::for_paths(&scene);
+        let camera = record(&scene, &scene.cameras[0]);
+        for kind in tracers(&device) {
+            let tracer = tracer(&device, kind, &flat);
+            let still = render(&tracer, &flat, &options).image.film.mean;
+            let mut frames = frames(&tracer, &flat, &plain(options.spp), &options);
+            frames.frame(&tracer, &camera, &[]).unwrap();
+            let got = frames.result().unwrap();
+            assert_eq!(got.len(), still.len());
+            assert!(still.iter().sum::<f32>() > 1.0, "{name}: dark");
+            for (k, (got, want)) in got.iter().zip(&still).enumerate() {
+                assert!(
+                    (got - want).abs() <= 2e-5 * want.abs().max(0.01),
+                    "{kind}, {name}: value {k} is {got}, of a still {want}"
+                );
+            }
+        }
+    }
+    assert_validation_clean(&device);
+}
+
+/// After the camera has stopped, the filtered image gives way to the mean of all samples: the error falls to that of a still of as many samples, and is no bias.
+#[test]
+fn gpu_frames_at_rest_become_the_still() {
+    let device = device();
+    const FRAMES: [usize; 4] = [8, 64, 250, 1000];
+    for name in ["cornell-box", "stairs", "leaf-cards", "cornell-spheres"] {
+        let mut scene = scene(name);
+        if scene.lights.is_empty() && scene.materials.iter().all(|m| m.emissive == Vec3::ZERO) {
+            scene.environment = Environment::Uniform(Vec3::new(0.5, 0.7, 1.0));
+        }
+        let flat = FlatScene::for_paths(&scene);
+        let tracer = tracer(&device, TracerKind::Compute, &flat);
+        // without the noise of caustics, which no number of samples here ends
+        let paths = PathOptions { firefly_clamp: 1.0, pixel_filter: PixelFilter::Box, ..options(8192) };
+        let camera = record(&scene, &scene.cameras[0]);
+        let mut integrator = PathIntegrator::new(&tracer, &flat, &paths).unwrap();
+        let mut still = |spp, seed| integrator.render(&tracer, &camera, spp, seed, &mut NoControl).unwrap().image.film.mean;
+        let truth = still(8192, 1);
+        let expected = rmse(&still(1024, 2), &truth);
+        let mut frames = frames(&tracer, &flat, &converging(), &paths);
+        let mut errors = Vec::new();
+        for k in 1..=FRAMES[3] {
+            frames.frame(&tracer, &camera, &[]).unwrap();
+            if FRAMES.contains(&k) {
+                errors.push(rmse(&frames.result().unwrap(), &truth));
+            }
+        }
+        let result = frames.result().unwrap();
+        let bias = result.iter().zip(&truth).map(|(a, b)| f64::from(a - b)).sum::<f64>() / truth.len() as f64;
+        println!(
+            "{name}: error after {FRAMES:?} frames {errors:.5?}; of a still of 1024 samples {expected:.5}; bias {bias:+.6}"
+        );
+        assert!(errors.windows(2).all(|e| e[1] < 1.02 * e[0]), "{name}: the error grows: {errors:?}");
+        assert!(errors[3] < 1.6 * expected, "{name}: {errors:?}, of a still {expected}");
+        assert!(errors[3] < 0.5 * errors[0], "{name}: {errors:?}");
+        // pixels are independent
+        assert!(bias.abs() < 4.0 * expected / (truth.len() as f64 / 3.0).sqrt() + 1e-5, "{name}: bias {bias}");
+    }
+    assert_validation_clean(&device);
+}
+
+/// While the camera moves: far less noise than the paths of one frame have, and no light that lags behind.
+#[test]
+fn gpu_frames_in_motion_are_clean_and_do_not_lag() {
+    let device = device();
+    let scene = scene("cornell-box");
+    let flat = FlatScene::for_paths(&scene);
+    let tracer = tracer(&device, TracerKind::Compute, &flat);
+    let at = |frame: u32| {
+        let mut camera = scene.cameras[0].clone();
+        camera.camera_to_world *= DAffine3::from_translation(DVec3::new(0.004 * f64::from(frame), 0.0, 0.0));
+        record(&scene, &camera)
+    };
+    let paths = options(1);
+    let mut moving = frames(&tracer, &flat, &Settings { converge: false, ..converging() }, &paths);
+    let mut noisy = frames(&tracer, &flat, &plain(1), &paths);
+    for k in 0..24 {
+        moving.frame(&tracer, &at(k), &[]).unwrap();
+    }
+    noisy.frame(&tracer, &at(23), &[]).unwrap();
+    let truth = PathOptions { pixel_filter: PixelFilter::Box, ..options(512) };
+    let truth = PathIntegrator::new(&tracer, &flat, &truth).unwrap().render(&tracer, &at(23), 512, 9, &mut NoControl).unwrap();
+    // the lamp's edge, at fifty times the radiance of the walls, is another matter
+    let dark = |values: &[f32]| -> Vec<f32> { values.iter().map(|v| v.min(0.5)).collect() };
+    let truth = dark(&truth.image.film.mean);
+    let [clean, noise] = [moving, noisy].map(|f| rmse(&dark(&f.result().unwrap()), &truth));
+    println!("RMSE in motion {clean:.4}, of the samples of a frame {noise:.4}");
+    assert!(clean < 0.55 * noise, "{clean} of {noise}");
+    assert_validation_clean(&device);
+}
+
+/// New light shortens histories of radiance to a few samples; a jump of the camera alone ends those that show other surfaces.
+#[test]
+fn gpu_frames_forget_what_has_changed_and_no_more() {
+    let device = device();
+    let scene = scene("cornell-box");
+    let flat = FlatScene::for_paths(&scene);
+    let tracer = tracer(&device, TracerKind::Compute, &flat);
+    let camera = record(&scene, &scene.cameras[0]);
+    let settings = Settings { converge: false, antialias: false, ..converging() };
+    let mut frames = frames(&tracer, &flat, &settings, &options(1));
+    for _ in 0..32 {
+        frames.frame(&tracer, &camera, &[]).unwrap();
+    }
+    let most = |f: &Realtime| f.samples().unwrap().into_iter().fold(0.0, f32::max);
+    assert_eq!(most(&frames), 32.0);
+    frames.change_light();
+    frames.frame(&tracer, &camera, &[]).unwrap();
+    assert_eq!(most(&frames), 3.0, "two of before, and one");
+    for _ in 0..20 {
+        frames.frame(&tracer, &camera, &[]).unwrap();
+    }
+    assert_eq!(most(&frames), 23.0);
+    // a jump to the side: most of the room is in both images
+    let mut jumped = scene.cameras[0].clone();
+    jumped.camera_to_world *= DAffine3::from_translation(DVec3::new(1.0, 0.0, 0.0));
+    frames.frame(&tracer, &record(&scene, &jumped), &[]).unwrap();
+    let (samples, covered) = (frames.samples().unwrap(), frames.coverage().unwrap());
+    let seen = |test: &dyn Fn(f32) -> bool| samples.iter().zip(&covered).filter(|(n, c)| **c > 0.0 && test(**n)).count();
+    let (kept, new) = (seen(&|n| n > 10.0), seen(&|n| n == 1.0));
+    println!("{kept} pixels kept their history, {new} show another surface");
+    assert!(kept > 20 * new && new > 0, "{kept} kept, {new} new");
+    assert_validation_clean(&device);
+}
+
+#[test]
+fn gpu_frames_are_tone_mapped_as_pictures_are() {
+    let device = device();
+    let scene = scene("cornell-spheres");
+    let flat = FlatScene::for_paths(&scene);
+    let tracer = tracer(&device, TracerKind::Compute, &flat);
+    let camera = record(&scene, &scene.cameras[0]);
+    let mut frames = frames(&tracer, &flat, &plain(4), &options(4));
+    for tone_map in ToneMap::ALL {
+        let display = Display { shown: DisplayMode::Accessibility, exposure: 1.0, unit: 1.0, tone_map };
+        frames.display(&tracer, Some(display)).unwrap();
+        frames.frame(&tracer, &camera, &[]).unwrap();
+        let bytes = frames.displayed().unwrap().read(0, 4 * u64::from(SIZE[0] * SIZE[1])).unwrap();
+        for (k, pixel) in frames.result().unwrap().chunks(3).enumerate() {
+            let want = tone_map.map([2.0 * pixel[0], 2.0 * pixel[1], 2.0 * pixel[2]]).map(srgb_byte);
+            let got = &bytes[4 * k..4 * k + 3];
+            assert!((0..3).all(|c| got[c].abs_diff(want[c]) <= 1), "{tone_map}, pixel {k}: {got:?}, not {want:?}");
+        }
+    }
+    let rays = Display { shown: DisplayMode::Rays, exposure: 0.0, unit: 1.0, tone_map: ToneMap::Linear };
+    let error = frames.display(&tracer, Some(rays)).unwrap_err();
+    assert_eq!(error.exit_code(), 64, "{error}");
+    assert_validation_clean(&device);
+}
+
+/// What only ambient occlusion has is an error that says so.
+#[test]
+fn gpu_frames_of_radiance_refuse_settings_of_occlusion() {
+    let device = device();
+    let scene = scene("cornell-box");
+    let flat = FlatScene::for_paths(&scene);
+    let tracer = tracer(&device, TracerKind::Compute, &flat);
+    let wrong = |settings: Settings, what: &str| {
+        let error = Realtime::radiance(&tracer, &flat, SIZE, &settings, &options(1)).err().unwrap();
+        assert!(error.exit_code() == 64 && error.to_string().contains(what), "{error}");
+    };
+    wrong(Preset::Larsen.settings(), "--preset larsen");
+    wrong(Settings { technique: skylit::realtime::Technique::Gtao, ..plain(1) }, "--technique gtao");
+    wrong(Settings { budget: skylit::realtime::Budget::Variance, history: 8, ..plain(1) }, "--budget variance");
+}
