@@ -1,9 +1,10 @@
 #!/usr/bin/env python3
 """Makes the tables of docs/ao-versus-path.md: skylit compare ao-vs-path of many scenes.
 
-    python3 scripts/ao_versus_path.py [--program target/release/skylit] [--scenes FOLDER] [--size WxH] [--json FILE] [NAME...]
+    python3 scripts/ao_versus_path.py [--program target/release/skylit] [--scenes FOLDER] [--size WxH] [--json FILE] [--saved FILE] [NAME...]
 
-FOLDER has the scenes of others (sponza, flight_helmet, brhan); what is missing is left out. --json keeps all records.
+FOLDER has the scenes of others (sponza, flight_helmet, brhan); what is missing is left out. --json keeps all records;
+--saved prints the tables of records that were kept, without measuring.
 """
 
 import argparse
@@ -37,6 +38,12 @@ SCENES = [
     ("parallel planes, sky", "builtin:parallel-planes", [SKY]),
 ]
 FLAT, UNLIMITED, EXACT = "ambient light without occlusion", "AO without radius or falloff", "ao-sky in place of AO"
+SKY_FLAT, RADIUS, FALLOFF = "the same everywhere", "AO with the best radius", "AO with the best falloff"
+# points of what is explained, below which a radius or falloff is called none
+LEAST_GAIN = 0.1
+HEAD = "| scene and light | bounces | none | AO, no limit | best radius | best falloff | `ao-sky` | radius | halves | ambient radiance |"
+SKY_HEAD = "| scene | the same everywhere | AO, no limit, as it is | AO, no limit, scaled | best radius | best falloff | radius | halves | scale |"
+SIMILARITY_HEAD = "| | Tanimoto | minimum ratio |"
 
 
 def expand(folder):
@@ -64,44 +71,54 @@ def number(x):
     return "0" if x == 0 else f"{x:.3g}"
 
 
-def choice(c):
-    parts = []
-    if c["radius"] is not None:
-        parts.append(number(c["radius"]))
-    if c["half_distance"] is not None:
-        parts.append("halves every " + number(c["half_distance"]))
-    return ", ".join(parts) or "no limit"
-
-
 def explained(fit, name):
     return next(100 * r["explained"] for r in fit["rows"] if r["name"] == name)
 
 
-def best(fit):
-    return 100 * (1 - (fit["best"]["rmse"] / fit["target_rms"]) ** 2)
+def distance(fit, choice, key, name, flat, end):
+    """The best radius or half distance with its standard error; none where it explains hardly more than ambient light without occlusion."""
+    value, error = fit[choice][key], fit[choice]["standard_error"]
+    if explained(fit, name) - explained(fit, flat) < LEAST_GAIN:
+        return "none"
+    if value is None:
+        return "no limit"
+    if value > 0.99 * end:
+        return f"{number(value)} or more"
+    return number(value) + (f" ± {100 * error:.2g} %" if error else "")
 
 
 def row(name, record, fit):
-    m, diagonal = fit["metrics"], record["diagonal"]
-    radius = fit["best"]["radius"] or fit["best"]["half_distance"]
-    share = f"{100 * radius / diagonal:.2g} %" if radius else "-"
-    cells = [
-        name,
-        f"{100 * record['light']['bounces']:.0f} %",
-        *(f"{explained(fit, n):.1f}" for n in (FLAT, UNLIMITED)),
-        f"{best(fit):.1f}",
-        f"{explained(fit, EXACT):.1f}",
-        choice(fit["best"]),
-        share,
-        ", ".join(number(c) for c in fit["best"]["ambient"]),
-        f"{m['flip']:.3f}",
-        f"{m['tanimoto']:.4f}",
-        f"{m['minimum_ratio']:.4f}",
+    is_sky = fit["environment_light"] is None
+    flat, unlimited = (SKY_FLAT, UNLIMITED) if is_sky else (FLAT, UNLIMITED)
+    columns = [flat, *([UNLIMITED + ", as it is"] if is_sky else []), unlimited, RADIUS, FALLOFF]
+    values = [f"{explained(fit, n):.1f}" for n in columns]
+    best = max(values, key=float)
+    values = [f"**{v}**" if v == best else v for v in values]
+    diagonal = record["diagonal"]
+    limits = [
+        distance(fit, "binary", "radius", RADIUS, flat, diagonal),
+        distance(fit, "falloff", "half_distance", FALLOFF, flat, 2 * diagonal),
     ]
+    if is_sky:
+        cells = [name, *values, *limits, f"{fit['best']['ambient'][0]:.2f}"]
+    else:
+        bounces = f"{100 * record['light']['bounces']:.0f}"
+        cells = [name, bounces, *values, f"{explained(fit, EXACT):.1f}", *limits, ", ".join(number(c) for c in fit["best"]["ambient"])]
     return "| " + " | ".join(cells) + " |"
 
 
-HEAD = "| scene | bounces | flat | AO, no limit | AO, best | ao-sky | best radius or falloff | of the diagonal | ambient | FLIP | Tanimoto | minimum ratio |"
+def similarity(name, fit):
+    return f"| ours, {name} | {fit['metrics']['tanimoto']:.4f} | {fit['metrics']['minimum_ratio']:.4f} |"
+
+
+def measure(arguments):
+    for name, scene, options in expand(arguments.scenes):
+        if arguments.names and not any(n in name for n in arguments.names):
+            continue
+        record = run(arguments.program, scene, options, arguments.size)
+        if record is not None:
+            print(f"{name}: {record['seconds']:.0f} s", file=sys.stderr)
+            yield {"name": name, **record}
 
 
 def main():
@@ -110,38 +127,32 @@ def main():
     parser.add_argument("--scenes", type=pathlib.Path, default=pathlib.Path("../shared/scenes"))
     parser.add_argument("--size", default="640x360")
     parser.add_argument("--json", type=pathlib.Path)
+    parser.add_argument("--saved", type=pathlib.Path)
     parser.add_argument("names", nargs="*")
     arguments = parser.parse_args()
-    tables = {"ambient": [], "traced": [], None: []}
-    records = []
-    for name, scene, options in expand(arguments.scenes):
-        if arguments.names and not any(n in name for n in arguments.names):
-            continue
-        record = run(arguments.program, scene, options, arguments.size)
-        if record is None:
-            continue
-        records.append({"name": name, **record})
-        print(f"{name}: {record['seconds']:.0f} s", file=sys.stderr)
-        for fit in record["path"]:
-            tables[fit["environment_light"]].append(row(name, record, fit))
-        fit = record["sky"]
-        if fit:
-            cells = [
-                name,
-                *(f"{explained(fit, n):.1f}" for n in ("the same everywhere", UNLIMITED + ", as it is", UNLIMITED)),
-                f"{best(fit):.1f}",
-                choice(fit["best"]),
-                number(fit["best"]["ambient"][0]),
-                number(fit["best"]["rmse"]),
-            ]
-            tables[None].append("| " + " | ".join(cells) + " |")
+    if arguments.saved:
+        records = json.loads(arguments.saved.read_text())
+    else:
+        records = list(measure(arguments))
     if arguments.json:
         arguments.json.write_text(json.dumps(records, indent=1) + "\n")
-    sky_head = "| scene | the same everywhere | AO, no limit | AO, no limit, scaled | AO, best | best radius or falloff | scale | RMSE |"
-    heads = {"ambient": HEAD, "traced": HEAD, None: sky_head}
-    titles = {"ambient": "ambient light in place of environment and bounces", "traced": "ambient light in place of bounces", None: "ao-sky"}
-    for key, rows in tables.items():
-        print(f"\n{titles[key]}\n\n{heads[key]}\n|" + "---|" * (heads[key].count("|") - 1))
+    ambient, traced, sky, similar, seen = [], [], [], [], set()
+    for record in records:
+        for fit in record["path"]:
+            (ambient if fit["environment_light"] == "ambient" else traced).append(row(record["name"], record, fit))
+        # by itself ambient visibility knows of no sun: each scene once
+        fit, name = record["sky"], record["name"].replace(", sun and sky", "").replace(", sky", "")
+        if fit and record["scene"] not in seen:
+            seen.add(record["scene"])
+            sky.append(row(name, record, fit))
+            similar.append(similarity(name, fit))
+    for title, head, rows in [
+        ("Ambient light in place of environment and bounces", HEAD, ambient),
+        ("Ambient light in place of bounces", HEAD, traced),
+        ("Ambient visibility by itself, against ao-sky", SKY_HEAD, sky),
+        ("The same beside Larsen's figures", SIMILARITY_HEAD, similar),
+    ]:
+        print(f"\n{title}\n\n{head}\n|" + "---|" * (head.count("|") - 1))
         print("\n".join(rows))
 
 
