@@ -46,9 +46,9 @@ pub struct Frames<'r> {
     size: [u32; 2],
     origin: glam::DVec3,
     aov: Vec<Aov>,
-    /// What the integrator can do, and the exposure of pictures in stops.
+    /// What the integrator can do, and how pictures show it.
     capabilities: &'static [Capability],
-    exposure: f32,
+    options: PictureOptions,
     shown: DisplayMode,
     fps: f64,
     range: FrameRange,
@@ -187,7 +187,7 @@ impl Renderer {
             size,
             aov: settings.image.aov.clone(),
             capabilities: integrator.get().capabilities(),
-            exposure: settings.picture.options().exposure,
+            options: settings.picture.options(),
             shown: timeline.show.unwrap_or_default(),
             fps,
             range,
@@ -244,7 +244,7 @@ impl Frames<'_> {
         if self.done == self.count() {
             let start = Instant::now();
             self.report.mean = covered_mean(&self.realtime.result()?, self.realtime.channels(), &self.realtime.coverage()?);
-            self.report.brightness = brightness::warning(self.report.mean, self.capabilities, f64::from(self.exposure));
+            self.report.brightness = brightness::warning(self.report.mean, self.capabilities, f64::from(self.options.exposure));
             self.report.setup.warnings.extend(self.report.brightness.clone());
             self.device.check_validation()?;
             self.device.save_pipeline_cache();
@@ -285,6 +285,16 @@ impl Frames<'_> {
         let mut metadata: Vec<_> = entries.map(|(k, v)| (k.to_owned(), v)).collect();
         metadata.sort();
         Ok(Image { width: self.size[0], height: self.size[1], channels, metadata })
+    }
+
+    /// What pictures show of an image of [`Frames::image`], linear: radiance is tone mapped.
+    pub fn picture(&self, image: &Image) -> Image {
+        if !self.realtime.is_radiance() {
+            return image.clone();
+        }
+        let mut shown = self.options.tone_map.apply(image, self.options.exposure);
+        shown.channels.extend(image.channels.iter().find(|c| c.name == "A").cloned());
+        shown
     }
 
     /// Coverage of the last frame: 1 where a pixel's centre shows the scene, else 0; rows from the top.

@@ -22,6 +22,8 @@ pub struct FrameFiles {
 pub struct FrameContents<'a> {
     /// Its channels.
     pub image: Option<&'a Image>,
+    /// Its values as pictures show them, linear: for pictures of more than 8 bits.
+    pub deep: Option<Image>,
     /// Its display ([`crate::renderer::Frames::displayed`]).
     pub shown: Option<&'a Buffer>,
     /// Its coverage.
@@ -71,7 +73,8 @@ impl FrameFiles {
         for path in &self.pictures {
             let path = frames::numbered(path, number)?;
             let deep = contents
-                .image
+                .deep
+                .as_ref()
                 .filter(|_| self.settings.has_deep_png() && ImageFormat::of(&path).is_ok_and(|f| f == ImageFormat::Png));
             match deep {
                 Some(image) => {

@@ -173,7 +173,8 @@ fn frames(args: &RenderArgs, defaults: &[DefaultsReport], start: Instant) -> Res
             let write_start = Instant::now();
             let image = if args.needs_channels() { Some(frames.image(&mut SilentControl)?) } else { None };
             let coverage = if args.files.background.is_some() { Some(frames.coverage()?) } else { None };
-            let contents = FrameContents { image: image.as_ref(), shown: frames.displayed(), coverage };
+            let deep = image.as_ref().filter(|_| args.files.has_deep_png()).map(|image| frames.picture(image));
+            let contents = FrameContents { image: image.as_ref(), deep, shown: frames.displayed(), coverage };
             files.add(frame.number, frames.size(), &contents)?;
             image.iter().for_each(|image| viewer.show(image));
             write_seconds += write_start.elapsed().as_secs_f64();
