@@ -59,7 +59,7 @@ def expand(folder):
 
 
 def run(program, scene, options, size):
-    command = [program, "compare", "ao-vs-path", scene, "--size", size, "--json", *options]
+    command = [program, "compare", "ao-vs-path", scene, "--size", size, "--spp", "32", "--ao-samples", "64", "--json", *options]
     done = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, check=False)
     if done.returncode != 0:
         print(f"{scene}: {done.stderr.strip().splitlines()[-1]}", file=sys.stderr)

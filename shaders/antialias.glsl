@@ -31,7 +31,7 @@ vec4 value_at(AntialiasParams p, FrameParams f, uint at) {
 vec4 resolved_at(AntialiasParams p, FrameParams f, vec2 at, out float frames) {
     vec2 base = floor(at), t = at - base;
     vec2 w0 = t * (-0.5 + t * (1.0 - 0.5 * t)), w1 = 1.0 + t * t * (-2.5 + 1.5 * t), w2 = t * (0.5 + t * (2.0 - 1.5 * t)), w3 = t * t * (-0.5 + 0.5 * t);
-    vec4 sum = vec4(0.0);
+    vec4 sum = vec4(0.0), least = vec4(INFINITY), most = vec4(-INFINITY);
     float weight = 0.0;
     [[unroll]] for (int y = 0; y < 4; y++) {
         float wy = y == 0 ? w0.y : y == 1 ? w1.y : y == 2 ? w2.y : w3.y;
@@ -41,13 +41,21 @@ vec4 resolved_at(AntialiasParams p, FrameParams f, vec2 at, out float frames) {
             uvec2 q = uvec2(clamp(ivec2(base) + ivec2(x - 1, y - 1), ivec2(0), ivec2(f.size) - 1));
             uint tap = image_index(f, q);
             vec4 a = uintBitsToFloat(Quads(p.previous_history).v[2u * tap]), b = uintBitsToFloat(Quads(p.previous_history).v[2u * tap + 1u]);
-            sum += w * vec4(a.rgb, b.x);
+            vec4 value = vec4(a.rgb, b.x);
+            sum += w * value;
             weight += w;
+            if (x == 1 || x == 2) {
+                if (y == 1 || y == 2) {
+                    least = min(least, value);
+                    most = max(most, value);
+                }
+            }
         }
     }
     uint nearest = image_index(f, uvec2(clamp(ivec2(round(at)), ivec2(0), ivec2(f.size) - 1)));
     frames = uintBitsToFloat(Quads(p.previous_history).v[2u * nearest].w);
-    return sum / weight;
+    // a cubic swings beyond what it passes through: beside a lamp below black
+    return clamp(sum / weight, least, most);
 }
 
 // Where the pixel's centre was in the previous image, in pixels from the centre of the one in the upper left corner.
@@ -127,7 +135,7 @@ void main() {
             }
             vec4 mean = sum / n, width = p.clamp_width * sqrt(max(squares / n - mean * mean, vec4(0.0)));
             float past;
-            vec4 history = clipped(resolved_at(p, f, before, past), mean, width);
+            vec4 history = max(clipped(resolved_at(p, f, before, past), mean, width), vec4(0.0));
             frames = min(past + 1.0, p.most_frames);
             resolved = mix(history, now, 1.0 / frames);
         }

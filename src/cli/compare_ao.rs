@@ -38,10 +38,10 @@ pub struct AoVsPathArgs {
     #[arg(long, value_name = "WxH", value_parser = parse_size, default_value = "640x360")]
     size: [u32; 2],
     /// Paths per pixel of the references; their noise does not count as an error, but makes the result uncertain
-    #[arg(long, value_name = "N", default_value_t = 32, value_parser = clap::value_parser!(u32).range(2..=1 << 20))]
+    #[arg(long, value_name = "N", default_value_t = 16, value_parser = clap::value_parser!(u32).range(2..=1 << 20))]
     spp: u32,
     /// Occlusion rays per pixel
-    #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u32).range(2..=1 << 12))]
+    #[arg(long, value_name = "N", default_value_t = 32, value_parser = clap::value_parser!(u32).range(2..=1 << 12))]
     ao_samples: u32,
     /// Seed of the sampler
     #[arg(long, value_name = "N", default_value_t = 0)]

@@ -308,9 +308,10 @@ mod tests {
             r.reports[1].line().unwrap(),
             "defaults from /s/skylit.toml: image.spp = 8, lighting.environment = \"/s/sky.hdr\"; without effect here: frames.history"
         );
-        // frames are ambient occlusion
+        // frames are of the same integrator, and have no samples per pixel
         let r = resolved(&files, "fast");
-        assert_eq!(r.settings, words("fast --ao-radius 2 --history 8 --seed 2 --size 64x48"));
+        let expected = words("fast --integrator path --history 8 --seed 2 --size 64x48 --environment /s/sky.hdr");
+        assert_eq!(r.settings, expected);
         // a default of another integrator does not decide which it is
         let radius = file("/s/skylit.toml", "[integrators.ao]\nao_radius = 1");
         let r = resolved(&[files[0].clone(), radius], "");

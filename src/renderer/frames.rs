@@ -340,9 +340,11 @@ pub fn frame_settings(settings: &RenderSettings) -> Result<Settings> {
     let shown = settings.frames.show.unwrap_or_default();
     if !is_ambient_occlusion(settings.integrator()) {
         how.check_radiance()?;
-        let has_history = how.history > 1;
-        how.antialias = settings.frames.antialias.map_or(has_history, |_| how.antialias);
-        how.converge = settings.frames.at_rest.map_or(true, |_| how.converge);
+        // defaults of their own: without antialiasing edges of bright surfaces flicker, and there is no image of before that differs
+        if settings.frames.antialias.is_none() {
+            how.antialias = how.history > 1;
+        }
+        how.converge |= settings.frames.at_rest.is_none();
     }
     how.bent = Aov::Bent.is_in(&settings.image.aov) || shown == DisplayMode::Bent;
     how.check()?;

@@ -50,7 +50,7 @@ fn compare_ao_refuses_what_makes_no_sense() {
     refuses(&["compare", "ao-vs-path", "builtin:plane", "--plot", "a.pdf"], 64, ".png");
     refuses(&["compare", "ao-vs-path", "builtin:plane", "--spp", "1"], 64, "--spp");
     refuses(&["compare", "ao-vs-path", "builtin:plane", "--sky-albedo", "0"], 64, "--sky-albedo");
-    refuses(&["render", "builtin:plane", "-o", "a.png", "--integrator", "lit", "--preset", "fast"], 64, "--preset");
+    refuses(&["render", "builtin:plane", "-o", "a.png", "--integrator", "depth", "--preset", "fast"], 64, "--preset");
     refuses(&["render", "builtin:plane", "-o", "a.png", "--ambient", "1,1,1"], 64, "--integrator lit");
     if !device() {
         return;

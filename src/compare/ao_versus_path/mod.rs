@@ -63,8 +63,9 @@ impl Default for AoVersusPathSettings {
     fn default() -> Self {
         Self {
             size: [640, 360],
-            spp: 32,
-            ao_samples: 64,
+            // less than a minute for Sponza on two cores, and as good a radius as twice as many give (docs/ao-versus-path.md)
+            spp: 16,
+            ao_samples: 32,
             seed: 0,
             camera: CameraSettings::default(),
             lighting: LightingSettings::default(),
