@@ -265,9 +265,11 @@ fn gpu_a_run_that_is_broken_off_leaves_whole_files() {
 fn options_of_frames_are_refused_by_name() {
     let dir = tempfile::tempdir().unwrap();
     let image = place(&dir, "a.exr");
-    for (option, value) in [("--animate", "0"), ("--fps", "25"), ("--frames", "0..2"), ("--preset", "fast"), ("--orbit", "9")] {
-        let says = format!("{option} has no effect on --integrator path: leave it out, or use --integrator ao");
-        refuses(&[&BASE[..], &["-o", &image, option, value]].concat(), 64, &says);
+    for (option, value) in [("--preset", "fast"), ("--history", "8"), ("--antialias", "on"), ("--at-rest", "hold")] {
+        let says = format!(
+            "{option} has no effect on --integrator normals: leave it out, or use --integrator ao, path, direct, lit, whitted or ao-sky"
+        );
+        refuses(&["render", BASE[1], "--integrator", "normals", "-o", &image, option, value], 64, &says);
     }
     for (option, value) in [("--ao-radius", "1"), ("--ao-falloff", "2"), ("--dump-rays", "x")] {
         let says = format!("{option} has no effect on --integrator path: leave it out, or use --integrator ao");
