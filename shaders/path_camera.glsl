@@ -51,7 +51,7 @@ void closest(uint index, Hit hit) {
     vec3 seen = path_vertex(p, k, state, r, hit);
     float covered = is_hit(hit) ? 1.0 : 0.0;
     if (WITH_SIGNAL) {
-        store_quad(path.signals, SIGNAL_QUADS * k + SIGNAL_DIRECT, vec4(seen, covered));
+        store_signal(path, k, SIGNAL_DIRECT, vec4(seen, covered));
         seen = vec3(0.0);
     }
     store_quad(path.radiance, k, vec4(seen, covered));

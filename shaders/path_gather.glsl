@@ -1,13 +1,10 @@
 // path_gather: the means and variances of a launch's paths for each pixel, of the diffuse part and of the rest, and the sum of all since the image came to rest.
-#include "common/camera.glsl"
+#include "path/params.glsl"
 #include "common/radiance.glsl"
 #include "common/rest.glsl"
-#include "interface/path.glsl"
 #include "interface/radiance.glsl"
 
 layout(local_size_x = LANES) in;
-
-const uint QUADS = SIGNAL_RECORD_PAIRS / 2u;
 
 // A mean over samples, added one after the other (Welford 1962); `variance` is a sum of squares until `finished`.
 void add_sample(inout RadianceEstimate e, vec3 c) {
@@ -22,13 +19,12 @@ RadianceEstimate finished(RadianceEstimate e) {
     return e;
 }
 
-vec4 quad(uvec2 image, uint k) { return uintBitsToFloat(Quads(image).v[k]); }
-
 void main() {
     uint k = gl_GlobalInvocationID.x, n = 1u << push.sample_bits;
     if (k >= push.count >> push.sample_bits) return;
     GatherParams p = GatherParams(push.pass);
     FrameParams f = FrameParams(p.frame);
+    PathParams path = PathParams(p.path);
     uvec2 pixel = tile_pixel(f, (push.first >> push.sample_bits) + k);
     if (any(greaterThanEqual(pixel, f.size))) return;
     uint at = image_index(f, pixel);
@@ -46,9 +42,9 @@ void main() {
     float covered = 0.0, distance_ = 0.0, distances = 0.0;
     for (uint s = 0u; s < n; s++) {
         uint i = k * n + s;
-        vec4 direct = quad(p.signals, QUADS * i), d = quad(p.signals, QUADS * i + 1u), albedo = quad(p.signals, QUADS * i + 2u);
-        vec4 radiance = quad(p.radiance, i);
-        float share = p.occludes_all != 0u && radiance.a == 1.0 ? 0.0 : 1.0;
+        vec4 direct = load_signal(path, i, SIGNAL_DIRECT), d = load_signal(path, i, SIGNAL_DIFFUSE), albedo = load_signal(path, i, SIGNAL_ALBEDO);
+        vec4 radiance = load_quad(path.radiance, i);
+        float share = occluded_share(path, radiance);
         vec3 c = share * radiance.rgb;
         d.rgb *= share;
         if (!is_finite(c) || !is_finite(d.rgb) || !is_finite(direct.rgb)) continue;

@@ -17,8 +17,7 @@ struct GuideRay {
 };
 
 const GuideRay GUIDE_START = GuideRay(vec3[3](vec3(1.0, 0.0, 0.0), vec3(0.0, 1.0, 0.0), vec3(0.0, 0.0, 1.0)), 0.0, 0u);
-// Mirrors and glass that are followed.
-const uint MAX_GUIDE_BOUNCES = 8u;
+const uint GUIDE_QUADS = GUIDE_RAY_RECORD_PAIRS / 2u;
 // A number of evenly distributed ones that selects transmission where there is any.
 const float TRANSMITTED = 0.99999994;
 
@@ -28,7 +27,7 @@ GuideRay load_guide_ray(SurfacesParams q, uint k) {
     GuideRay g;
     vec4 rows[3];
     [[unroll]] for (uint row = 0u; row < 3u; row++) {
-        rows[row] = load_quad(q.states, 3u * k + row);
+        rows[row] = load_quad(q.states, GUIDE_QUADS * k + row);
         g.mirrored[row] = rows[row].xyz;
     }
     g.far = rows[0].w;
@@ -37,9 +36,9 @@ GuideRay load_guide_ray(SurfacesParams q, uint k) {
 }
 
 void store_guide_ray(SurfacesParams q, uint k, GuideRay g) {
-    store_quad(q.next_states, 3u * k, vec4(g.mirrored[0], g.far));
-    store_quad(q.next_states, 3u * k + 1u, vec4(g.mirrored[1], uintBitsToFloat(g.bounces)));
-    store_quad(q.next_states, 3u * k + 2u, vec4(g.mirrored[2], 0.0));
+    store_quad(q.next_states, GUIDE_QUADS * k, vec4(g.mirrored[0], g.far));
+    store_quad(q.next_states, GUIDE_QUADS * k + 1u, vec4(g.mirrored[1], uintBitsToFloat(g.bounces)));
+    store_quad(q.next_states, GUIDE_QUADS * k + 2u, vec4(g.mirrored[2], 0.0));
 }
 
 // Roughness by which reflections are judged: 0 for mirrors, 1 for surfaces that reflect diffusely only.

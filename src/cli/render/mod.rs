@@ -53,7 +53,7 @@ fn stills(args: &RenderArgs, defaults: &[DefaultsReport], start: Instant) -> Res
     let mut renderer = Renderer::open(&args.scene, &args.device)?;
     let mut stills = renderer.still_sequence(&args.settings)?;
     let mut progress = Progress::new("rendering frames", &console);
-    let (mut records, mut finished) = (Vec::new(), 0);
+    let (mut records, mut warnings, mut finished) = (Vec::new(), Vec::new(), 0);
     for number in range.first..range.end {
         interrupt::check()?;
         progress.set(u64::from(number - range.first), u64::from(range.end - range.first));
@@ -70,8 +70,12 @@ fn stills(args: &RenderArgs, defaults: &[DefaultsReport], start: Instant) -> Res
         paths.iter().try_for_each(|path| still.save_with(path, &args.files))?;
         let mut record = still.report.record(args.explain);
         record["frame"] = serde_json::json!(number);
+        // each once, and not for every frame
         for warning in &still.report.setup.warnings {
-            progress.suspend(|| console.warning(warning));
+            if !warnings.contains(warning) {
+                progress.suspend(|| console.warning(warning));
+                warnings.push(warning.clone());
+            }
         }
         records.push(record);
     }
@@ -88,6 +92,7 @@ fn stills(args: &RenderArgs, defaults: &[DefaultsReport], start: Instant) -> Res
     let record = serde_json::json!({
         "stills": records,
         "finished_before": finished,
+        "warnings": warnings,
         "seconds": seconds,
         "output": args.output,
         "defaults": defaults,

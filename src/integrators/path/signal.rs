@@ -7,17 +7,12 @@ use crate::error::Result;
 use crate::film::block::BlockParams;
 use crate::film::camera::CameraRecord;
 use crate::gpu::{Buffer, Commands, ComputePipeline, Memory, Recorder, Specialization, Timing};
-use crate::interface::records::radiance::SurfacesParams;
+use crate::interface::records::radiance::{GuideRayRecord, MAX_GUIDE_BOUNCES, SurfacesParams};
 use crate::scene::material::MaterialKind;
 use crate::scene::{Material, Scene};
 use crate::shaders::{self, LANES};
 use crate::tracer::queue::RayQueue;
 use crate::tracer::{Push, Stream, Tracer};
-
-/// Maximum number of mirrors and panes of glass that the G-buffer's rays follow (`MAX_GUIDE_BOUNCES` in shaders/path/guide.glsl).
-const MAX_BOUNCES: usize = 8;
-/// Bytes of the state of a ray of the G-buffer.
-const GUIDE_RAY_BYTES: u64 = 48;
 
 /// Traces the paths of frames in real time, some for each pixel.
 pub struct SignalPaths {
@@ -43,15 +38,6 @@ struct RaysBehind {
     states: [Buffer; 2],
 }
 
-/// Numbers of rays of a frame.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct SignalCounts {
-    /// Rays of all bounces but camera rays.
-    pub bounce_rays: u64,
-    /// Shadow rays, and occlusion rays of ambient light.
-    pub shadow_rays: u64,
-}
-
 impl SignalPaths {
     /// Creates it for launches of at most `capacity` paths. The tracer must have been built from `flat` with [`crate::tracer::Needs::shading`].
     ///
@@ -64,11 +50,6 @@ impl SignalPaths {
             capacity,
             ambient: options.ambient.map(|a| a.block_params()).unwrap_or_default(),
         })
-    }
-
-    /// Returns true if ambient occlusion darkens all light of the first surface.
-    pub fn occludes_all(&self) -> bool {
-        self.paths.records[0].occludes_all != 0
     }
 
     /// Maximum number of paths of a launch.
@@ -89,8 +70,14 @@ impl SignalPaths {
         let behind = match scene.materials.iter().any(may_be_smooth) {
             false => None,
             true => {
-                let states =
-                    || Buffer::new(device, "rays of the G-buffer", GUIDE_RAY_BYTES * u64::from(pixels), Memory::Device);
+                let states = || {
+                    Buffer::new(
+                        device,
+                        "rays of the G-buffer",
+                        size_of::<GuideRayRecord>() as u64 * u64::from(pixels),
+                        Memory::Device,
+                    )
+                };
                 Some(RaysBehind {
                     stream: tracer.specialized(&shaders::PATH_REFLECTION_CLOSEST, &constants)?,
                     queues: [RayQueue::new(device, pixels)?, RayQueue::new(device, pixels)?],
@@ -109,11 +96,6 @@ impl SignalPaths {
     /// Device address of the parameters of paths, for other shaders.
     pub fn params_address(&self) -> u64 {
         self.paths.path_params[0].address()
-    }
-
-    /// Device addresses of what the paths of a launch leave: a `SignalRecord` each, and the radiance.
-    pub fn results(&self) -> [u64; 2] {
-        [self.paths.records[0].signals, self.paths.radiance.address()]
     }
 
     /// Begins a frame: the camera and its block, with [`BlockParams::frame`] and [`BlockParams::centre_offset`].
@@ -143,10 +125,10 @@ impl SignalPaths {
         Ok(timings)
     }
 
-    /// Numbers of rays since [`SignalPaths::begin`].
-    pub fn counts(&self) -> SignalCounts {
+    /// Number of rays since [`SignalPaths::begin`], but for camera rays.
+    pub fn rays(&self) -> u64 {
         let counts = &self.paths.traced;
-        SignalCounts { bounce_rays: counts.bounce_rays, shadow_rays: counts.shadow_rays + counts.ambient_rays }
+        counts.bounce_rays + counts.shadow_rays + counts.ambient_rays
     }
 }
 
@@ -186,7 +168,7 @@ impl GuideRays {
         behind.queues[0].clear(r);
         r.barrier();
         self.camera.record(r, &push(0));
-        for bounce in 0..MAX_BOUNCES {
+        for bounce in 0..MAX_GUIDE_BOUNCES as usize {
             let (traced, fills) = (bounce % 2, (bounce + 1) % 2);
             r.barrier();
             behind.queues[fills].clear(r);

@@ -3,13 +3,23 @@
 use super::queue::QueueRecord;
 
 records! {
-    "radiance" includes "queue";
+    "radiance" includes "queue" values {
+        /// Mirrors and panes of glass that the G-buffer's rays follow.
+        MAX_GUIDE_BOUNCES: uint = 8;
+    };
+
+    /// A ray of the G-buffer on its way behind mirrors and glass.
+    GuideRayRecord: words {
+        /// Rows of the product of reflections so far, each with a number besides: the distance from the camera in scene units, the number of bounces (bits of a
+        /// `uint`), and padding.
+        rows: vec4[3],
+    }
 
     /// Parameters of `path_surface` and `path_reflection`, beside those of the block.
     SurfacesParams: block readonly 8 {
         /// The queue of rays behind mirrors and glass.
         next: QueueRecord,
-        /// Three `vec4` per ray of the queue that is traced: its `GuideRay`; 0: no ray goes on.
+        /// A `GuideRayRecord` per ray of the queue that is traced; 0: no ray goes on.
         states: address,
         /// The same of the queue that is filled.
         next_states: address,
@@ -25,10 +35,8 @@ records! {
     GatherParams: block readonly 8 {
         /// Address of the `FrameParams`.
         frame: address,
-        /// A `SignalRecord` per path.
-        signals: address,
-        /// A `vec4` per path: radiance, less what is seen directly.
-        radiance: address,
+        /// Address of the `PathParams`, with what the paths of the launch left.
+        path: address,
         /// Output, a `RadianceRecord` per pixel: diffuse reflection divided by the albedo.
         diffuse: address,
         /// Output, a `RadianceRecord` per pixel: the rest.
@@ -41,10 +49,6 @@ records! {
         starts: uint,
         /// Samples per pixel of earlier launches of this frame.
         earlier: uint,
-        /// `PathParams::occludes_all`.
-        occludes_all: uint,
-        /// Padding to a multiple of 8 bytes.
-        reserved: uint,
     }
 
     /// Parameters of `radiance_temporal`.

@@ -62,21 +62,17 @@ impl Pass for Paths {
 
     fn run(&mut self, commands: &mut Commands, frame: &Frame, resources: &Resources, range: Range) -> Result<Vec<Timing>> {
         let spp = frame.settings.rays_per_pixel;
-        let [signals, radiance] = self.paths.results();
         let mut timings = Vec::new();
         for (earlier, sample_bits) in sample_batches(spp) {
             self.gather.write(&GatherParams {
                 frame: frame.params,
-                signals,
-                radiance,
+                path: self.paths.params_address(),
                 diffuse: resources.address(Resource::CurrentDiffuse),
                 specular: resources.address(Resource::CurrentSpecular),
                 distances: resources.address(Resource::ReflectedDistance),
                 rest: resources.address(Resource::Rest),
                 starts: frame.rest_starts.into(),
                 earlier,
-                occludes_all: self.paths.occludes_all().into(),
-                reserved: 0,
             })?;
             let push = Push {
                 scene: frame.tracer.scene_address(),
@@ -92,8 +88,7 @@ impl Pass for Paths {
     }
 
     fn rays(&self) -> u64 {
-        let counts = self.paths.counts();
-        counts.bounce_rays + counts.shadow_rays
+        self.paths.rays()
     }
 }
 
