@@ -29,13 +29,13 @@ mkdir -p "$out"
 for scene in "${scenes[@]}"; do
   for tracer in "${tracers[@]}"; do
     say "$scene, tracer $tracer"
-    "$skylit" render "builtin:$scene" --tracer "$tracer" --spp "$spp" --size "$size" \
+    "$skylit" render "builtin:$scene" --no-config --tracer "$tracer" --spp "$spp" --size "$size" \
       -o "$out/$scene-$tracer.exr" -o "$out/$scene-$tracer.png"
   done
 done
 
 say "a scene in motion, frame after frame"
-"$skylit" render scenes/parade.glb --preset balanced --animate --frames 0..30 --size 480x270 -o "$out/parade.apng"
+"$skylit" render scenes/parade.glb --no-config --preset balanced --animate --frames 0..30 --size 480x270 -o "$out/parade.apng"
 
 report=$out/report.md
 {
@@ -64,4 +64,4 @@ grep -E '^(## |- )' "$report"
 say "look at $out/*.png (the same values as floats are in $out/*.exr), side by side in $report"
 
 say "ambient occlusion and the light of a white sky, which it stands in for"
-"$skylit" compare --scene builtin:atrium --size "$size" --pixel-filter centre --a "ao --spp $spp" --b "ao-sky --spp $((2 * spp))" --c "balanced --frames 8" --html "$out/compare"
+"$skylit" compare --scene builtin:atrium --size "$size" --a "ao --spp $spp" --b "ao-sky --spp $((2 * spp))" --c balanced --html "$out/compare"

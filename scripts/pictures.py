@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 """Makes the pictures of the README: one view of the stairs as real-time ambient occlusion, as a path tracer sees it, and how far apart the two are; and the viewer.
-Makes those of docs/radius.md, too: one view over AO radius and falloff.
+Makes those of docs/radius.md, too: one view over AO radius and falloff; and that of docs/realtime.md: what the passes of a frame leave.
 
     python3 scripts/pictures.py [SKYLIT]        # the program, target/release/skylit unless given; five minutes on two cores
 
@@ -23,6 +23,18 @@ FULL = 0.25
 RADII = ["1%", "3%", "10%", "30%", "inf"]
 FALLOFFS = ["1", "1.15", "1.5"]
 ROOM = ["builtin:atrium", "--size", "240x160", "--spp", "256", "--pixel-filter", "centre"]
+# a frame of docs/realtime.md in motion, after each of its passes; rows and columns
+STAGES_VIEW = ["builtin:cornell-spheres", "--size", "240x180", "--orbit", "360", "--frames", "0..17"]
+STAGES_ROWS = [["--preset", "balanced"], ["--preset", "balanced", "--integrator", "path"]]
+ALONE = ["--antialias", "off", "--at-rest", "hold"]
+STAGES = [
+    ["--show", "depth"],
+    ["--show", "normal"],
+    [*ALONE, "--history", "1", "--filter", "none"],
+    [*ALONE, "--filter", "none"],
+    ALONE,
+    [],
+]
 # pictures of the viewer, and the scripts that make them
 VIEWER = {
     "viewer": (
@@ -103,23 +115,32 @@ def srgb(value: float) -> int:
     return max(0, min(255, round(v * 255)))
 
 
-def radii(skylit: Path, folder: Path) -> None:
-    """The room at each radius (columns) and falloff (rows), with white lines between."""
+def sheet(file: Path, renders: list[list[list[str]]], skylit: Path) -> None:
+    """Renders with these options, as rows and columns with white lines between. Of frames the last one."""
     line, rows = 4, []
-    for falloff in FALLOFFS:
+    for of_row in renders:
         images = []
-        for radius in RADII:
+        for options in of_row:
             with tempfile.TemporaryDirectory() as temporary:
-                image = Path(temporary) / "ao.png"
-                options = ["--ao-radius", radius, "--ao-falloff", falloff, "-o", image, "--quiet"]
-                subprocess.run([skylit, "render", *ROOM, *options], check=True, cwd=ROOT)
-                images.append(read(image))
-        width, height = images[0][0], images[0][1]
+                image = Path(temporary) / ("##.png" if "--frames" in options else "image.png")
+                subprocess.run([skylit, "render", "--no-config", *options, "-o", image, "--quiet"], check=True, cwd=ROOT)
+                images.append(read(max(Path(temporary).iterdir())))
         between = bytes([255] * (3 * line))
         if rows:
             rows += [bytes([255] * len(rows[0]))] * line
-        rows += [between.join(image[2][y] for image in images) for y in range(height)]
-    write(folder / "radius.png", len(rows[0]) // 3, len(rows), rows)
+        rows += [between.join(image[2][y] for image in images) for y in range(images[0][1])]
+    write(file, len(rows[0]) // 3, len(rows), rows)
+
+
+def radii(skylit: Path, folder: Path) -> None:
+    """The room at each radius (columns) and falloff (rows)."""
+    renders = [[[*ROOM, "--ao-radius", r, "--ao-falloff", f] for r in RADII] for f in FALLOFFS]
+    sheet(folder / "radius.png", renders, skylit)
+
+
+def stages(skylit: Path, folder: Path) -> None:
+    """What the passes of a frame leave, of ambient occlusion and of light."""
+    sheet(folder / "stages.png", [[[*STAGES_VIEW, *row, *stage] for stage in STAGES] for row in STAGES_ROWS], skylit)
 
 
 def main() -> None:
@@ -128,7 +149,7 @@ def main() -> None:
     folder.mkdir(exist_ok=True)
     names = {"ao": ["--preset", "balanced"], "path": ["--integrator", "ao-sky", "--spp", "256"]}
     for name, options in names.items():
-        subprocess.run([skylit, "render", *VIEW, *options, "-o", folder / f"{name}.png", "--quiet"], check=True, cwd=ROOT)
+        subprocess.run([skylit, "render", "--no-config", *VIEW, *options, "-o", folder / f"{name}.png", "--quiet"], check=True, cwd=ROOT)
     width, height, a = read(folder / "ao.png")
     _, _, b = read(folder / "path.png")
     table = [linear(i) for i in range(256)]
@@ -143,6 +164,7 @@ def main() -> None:
         rows.append(bytes(row))
     write(folder / "difference.png", width, height, rows)
     radii(skylit, folder)
+    stages(skylit, folder)
     for name, (options, script) in VIEWER.items():
         with tempfile.NamedTemporaryFile("w", suffix=".txt") as file:
             file.write(script.replace("FILE", str(folder / f"{name}.png")))

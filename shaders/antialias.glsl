@@ -17,14 +17,28 @@ layout(local_size_x = LANES) in;
 const int BIAS_RADIUS = 2;
 // Frames at rest of which nothing is taken yet.
 const float FEW_FRAMES = 8.0;
+// Where values nearby differ by less than this share of their mean, the clipped history is no different from this frame.
+const float FLAT = 1.0 / 512.0;
 // Samples at rest from which their mean counts at least as much as the filtered image.
 const float TAKE_OVER_SAMPLES = 1024.0;
 
-// This frame's value and coverage.
-vec4 value_at(AntialiasParams p, FrameParams f, uint at) {
+// This frame's value and coverage. `guide`: of the pixel.
+vec4 value_at(AntialiasParams p, uvec2 guide, uint at) {
     if (!is_null(p.composed)) return uintBitsToFloat(Quads(p.composed).v[at]);
     // coverage is that of the sample
-    return vec4(vec3(FloatImage(p.visibility).v[at]), is_surface(LOAD_PAIR(f.guide, at)) ? 1.0 : 0.0);
+    return vec4(vec3(FloatImage(p.visibility).v[at]), is_surface(guide) ? 1.0 : 0.0);
+}
+
+// The resolved image and its coverage, which has 16 bits, as has the number of frames.
+vec4 load_resolved(AntialiasParams p, uint at, out float frames) {
+    uvec4 q = Quads(p.previous_history).v[at];
+    frames = float(q.w & 0xffffu);
+    return vec4(uintBitsToFloat(q.xyz), float(q.w >> 16) / 65535.0);
+}
+
+void store_resolved(AntialiasParams p, uint at, vec4 value, float frames) {
+    uint w = uint(clamp(value.a, 0.0, 1.0) * 65535.0 + 0.5) << 16 | uint(min(frames, 65535.0));
+    QuadImage(p.history).v[at] = uvec4(floatBitsToUint(value.rgb), w);
 }
 
 // The resolved image at a place, in pixels from the centre of the one in the upper left corner; interpolated by a cubic without its corners. `frames`: of the nearest pixel.
@@ -39,9 +53,8 @@ vec4 resolved_at(AntialiasParams p, FrameParams f, vec2 at, out float frames) {
             if ((x == 0 || x == 3) && (y == 0 || y == 3)) continue;
             float w = wy * (x == 0 ? w0.x : x == 1 ? w1.x : x == 2 ? w2.x : w3.x);
             uvec2 q = uvec2(clamp(ivec2(base) + ivec2(x - 1, y - 1), ivec2(0), ivec2(f.size) - 1));
-            uint tap = image_index(f, q);
-            vec4 a = uintBitsToFloat(Quads(p.previous_history).v[2u * tap]), b = uintBitsToFloat(Quads(p.previous_history).v[2u * tap + 1u]);
-            vec4 value = vec4(a.rgb, b.x);
+            float of_tap;
+            vec4 value = load_resolved(p, image_index(f, q), of_tap);
             sum += w * value;
             weight += w;
             if (x == 1 || x == 2) {
@@ -52,30 +65,50 @@ vec4 resolved_at(AntialiasParams p, FrameParams f, vec2 at, out float frames) {
             }
         }
     }
-    uint nearest = image_index(f, uvec2(clamp(ivec2(round(at)), ivec2(0), ivec2(f.size) - 1)));
-    frames = uintBitsToFloat(Quads(p.previous_history).v[2u * nearest].w);
+    load_resolved(p, image_index(f, uvec2(clamp(ivec2(round(at)), ivec2(0), ivec2(f.size) - 1))), frames);
     // a cubic swings beyond what it passes through: beside a lamp below black
     return clamp(sum / weight, least, most);
 }
 
-// Where the pixel's centre was in the previous image, in pixels from the centre of the one in the upper left corner.
-bool previous_pixel(FrameParams f, ivec2 pixel, out vec2 at) {
-    // of the nearest surface around it, so that edges move as a whole
-    uint nearest = image_index(f, uvec2(pixel));
-    float depth = INFINITY;
+// This frame's values around a pixel.
+struct Neighbourhood {
+    vec4 mean;
+    vec4 deviation;
+    uint nearest;   // the pixel of the nearest surface
+    float depth;    // its distance; INFINITY: there is none
+};
+
+Neighbourhood neighbourhood(AntialiasParams p, FrameParams f, ivec2 pixel) {
+    vec4 sum = vec4(0.0), squares = vec4(0.0);
+    float n = 0.0;
+    Neighbourhood around = Neighbourhood(vec4(0.0), vec4(0.0), image_index(f, uvec2(pixel)), INFINITY);
     for (int k = 0; k < 9; k++) {
         ivec2 q = pixel + ivec2(k % 3, k / 3) - 1;
         if (any(lessThan(q, ivec2(0))) || any(greaterThanEqual(q, ivec2(f.size)))) continue;
         uint tap = image_index(f, uvec2(q));
-        float d = uintBitsToFloat(LOAD_PAIR(f.guide, tap).x);
-        if (d < depth) {
-            depth = d;
-            nearest = tap;
+        uvec2 guide = LOAD_PAIR(f.guide, tap);
+        float d = uintBitsToFloat(guide.x);
+        if (d < around.depth) {
+            around.depth = d;
+            around.nearest = tap;
         }
+        vec4 v = value_at(p, guide, tap);
+        sum += v;
+        squares += v * v;
+        n += 1.0;
     }
+    around.mean = sum / n;
+    around.deviation = sqrt(max(squares / n - around.mean * around.mean, vec4(0.0)));
+    return around;
+}
+
+// Where the pixel's centre was in the previous image, in pixels from the centre of the one in the upper left corner: it moved as the nearest surface around it, so that
+// edges move as a whole.
+bool previous_pixel(FrameParams f, ivec2 pixel, Neighbourhood around, out vec2 at) {
+    uint nearest = around.nearest;
     vec3 before;
     vec2 now;
-    if (depth < INFINITY) {
+    if (around.depth < INFINITY) {
         before = is_null(f.previous_position) ? surface_position(f, nearest) : load_vec3(f.previous_position, nearest);
         now = sample_place(f, vec2(nearest % f.size.x, nearest / f.size.x));
     } else {
@@ -114,35 +147,26 @@ void main() {
     AntialiasParams p = AntialiasParams(push.pass);
     FrameParams f = FrameParams(p.frame);
     ivec2 pixel = ivec2(at % f.size.x, at / f.size.x);
-    vec4 now = value_at(p, f, at), resolved = now;
+    vec4 now = value_at(p, LOAD_PAIR(f.guide, at), at), resolved = now;
     float frames = 1.0;
     if (p.has_history != 0u && p.most_frames > 1.0 && f.still != 0u) {
-        vec4 a = uintBitsToFloat(Quads(p.previous_history).v[2u * at]), b = uintBitsToFloat(Quads(p.previous_history).v[2u * at + 1u]);
-        frames = a.w + 1.0;
-        resolved = mix(vec4(a.rgb, b.x), now, 2.0 / (frames + 1.0));
+        vec4 history = load_resolved(p, at, frames);
+        frames += 1.0;
+        resolved = mix(history, now, 2.0 / (frames + 1.0));
     } else if (p.has_history != 0u && p.most_frames > 1.0) {
+        Neighbourhood around = neighbourhood(p, f, pixel);
+        vec4 width = p.clamp_width * around.deviation;
         vec2 before;
-        if (previous_pixel(f, pixel, before)) {
-            vec4 sum = vec4(0.0), squares = vec4(0.0);
-            float n = 0.0;
-            for (int k = 0; k < 9; k++) {
-                ivec2 q = pixel + ivec2(k % 3, k / 3) - 1;
-                if (any(lessThan(q, ivec2(0))) || any(greaterThanEqual(q, ivec2(f.size)))) continue;
-                vec4 v = value_at(p, f, image_index(f, uvec2(q)));
-                sum += v;
-                squares += v * v;
-                n += 1.0;
-            }
-            vec4 mean = sum / n, width = p.clamp_width * sqrt(max(squares / n - mean * mean, vec4(0.0)));
+        if (all(lessThanEqual(width, FLAT * around.mean))) {
+            frames = p.most_frames;
+        } else if (previous_pixel(f, pixel, around, before)) {
             float past;
-            vec4 history = max(clipped(resolved_at(p, f, before, past), mean, width), vec4(0.0));
+            vec4 history = max(clipped(resolved_at(p, f, before, past), around.mean, width), vec4(0.0));
             frames = min(past + 1.0, p.most_frames);
             resolved = mix(history, now, 1.0 / frames);
         }
     }
-    QuadImage to = QuadImage(p.history);
-    to.v[2u * at] = floatBitsToUint(vec4(resolved.rgb, frames));
-    to.v[2u * at + 1u] = floatBitsToUint(vec4(resolved.a, 0.0, 0.0, 0.0));
+    store_resolved(p, at, resolved, frames);
 
     if (!is_null(p.rest)) {
         Rest own = load_rest(p.rest, at);
@@ -153,7 +177,7 @@ void main() {
                 uint tap = image_index(f, uvec2(x, y));
                 Rest r = load_rest(p.rest, tap);
                 if (r.frames < 2.0) continue;
-                vec3 d = value_at(p, f, tap).rgb - r.mean;
+                vec3 d = value_at(p, LOAD_PAIR(f.guide, tap), tap).rgb - r.mean;
                 differences += dot(d, d);
                 error += rest_error(r);
                 n += 1.0;

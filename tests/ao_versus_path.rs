@@ -64,7 +64,7 @@ fn gpu_ambient_occlusion_of_dark_surfaces_is_the_truth() {
 fn gpu_figures_fit_together() {
     let mut renderer = renderer(builtin::by_name("cornell-box").unwrap());
     let settings = AoVersusPathSettings { size: [64, 64], spp: 64, ao_samples: 128, ..Default::default() };
-    let AoVersusPath { report, image } = compare(&mut renderer, &settings);
+    let AoVersusPath { report, image, .. } = compare(&mut renderer, &settings);
     assert_eq!(report.path.len(), 1, "there is no environment");
     for fit in report.path.iter().chain(&report.sky) {
         println!("{:?}: {:#?}\n{:?}", fit.environment_light, fit.rows, fit.best);

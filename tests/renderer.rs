@@ -88,10 +88,11 @@ fn gpu_pipelines_are_compiled_once() {
         start.elapsed().as_secs_f64()
     };
     let first = [seconds("path"), seconds("ao")];
-    let again = [seconds("path"), seconds("ao")];
+    // the quickest of some: others may use the machine, too
+    let again = (0..5).map(|_| [seconds("path"), seconds("ao")][0]).fold(f64::INFINITY, f64::min);
     drop(renderer);
-    // compiling takes a hundred times as long as tracing these images; a tenth leaves room for a busy machine
-    assert!(again[0] < 0.3 * first[0], "{first:?} {again:?}");
+    // compiling takes a hundred times as long as tracing these images
+    assert!(again < 0.3 * first[0], "{first:?} {again}");
     assert_validation_clean(&device);
 }
 
@@ -115,6 +116,47 @@ fn gpu_lights_of_settings_come_and_go() {
     assert_validation_clean(&device);
 }
 
+/// Antialiasing in time brings frames nearer to antialiased stills, at rest and in motion; presets have it unless settings say otherwise.
+#[test]
+fn gpu_frames_are_antialiased() {
+    let device = device();
+    let timelines = [
+        serde_json::json!({ "frames": "0..1", "warm_up": 63, "orbit": 720 }),
+        serde_json::json!({ "frames": "16..17", "warm_up": 0, "orbit": 720 }),
+    ];
+    for kind in tracers(&device) {
+        let mut renderer = Renderer::new(device.clone(), builtin::by_name("stairs").unwrap(), &choice(kind)).unwrap();
+        for (at, timeline) in timelines.iter().enumerate() {
+            let mut image = |frames: serde_json::Value, spp: Option<u32>| {
+                let mut all = timeline.clone();
+                all.as_object_mut().unwrap().extend(frames.as_object().unwrap().clone());
+                if spp.is_some() {
+                    all.as_object_mut().unwrap().remove("warm_up");
+                }
+                let mut wanted = settings(serde_json::json!({ "image": { "size": [96, 54] }, "frames": all }));
+                wanted.image.spp = spp;
+                if spp.is_none() && at == 1 {
+                    // the way there
+                    wanted.frames.frames = Some(skylit::realtime::frame_settings::FrameRange { first: 0, end: 17 });
+                }
+                renderer.image(&wanted, &mut NoControl).unwrap()
+            };
+            let truth = image(serde_json::json!({}), Some(64));
+            let [off, on, default] = [Some("off"), Some("on"), None].map(|antialias| {
+                let frames = serde_json::json!({ "preset": "balanced", "antialias": antialias });
+                let image = image(frames, None);
+                let error: f64 = std::iter::zip(image.f32("Y").unwrap(), truth.f32("Y").unwrap())
+                    .map(|(a, b)| f64::from(a - b).powi(2))
+                    .sum();
+                (error / (96.0 * 54.0)).sqrt()
+            });
+            // measured at 320x180: 0.64 and 0.81 (docs/realtime.md)
+            assert!(on < 0.9 * off && on == default, "{kind}, {timeline}: RMSE {off} without, {on} with, {default} by default");
+        }
+    }
+    assert_validation_clean(&device);
+}
+
 /// Frames and stills of one renderer, in turn.
 #[test]
 fn gpu_frames_and_stills_take_turns() {
@@ -134,7 +176,8 @@ fn gpu_frames_and_stills_take_turns() {
     let image = frames.image(&mut NoControl).unwrap();
     assert_eq!(image.metadata("frame"), Some("5"));
     let report = frames.report();
-    assert!(report.mean > 0.0 && report.mean <= 1.0, "{}", report.mean);
+    // the coverage of antialiased frames has 16 bits
+    assert!(report.mean > 0.0 && report.mean <= 1.0 + 1e-5, "{}", report.mean);
     assert!(renderer.still(&timeline, &mut NoControl).is_err_and(|e| e.to_string().contains("--preset is for frames")));
     assert!(renderer.still(&small("ao"), &mut NoControl).is_ok());
     assert_validation_clean(&device);

@@ -62,7 +62,7 @@ pub struct CompareArgs {
     /// Scene to render: a .gltf, .glb, .obj or .brhan file, or builtin:NAME. Options of the groups Image, Camera and Light apply to each render that they have an effect on
     #[arg(long, value_name = "SCENE", value_hint = ValueHint::FilePath)]
     pub scene: Option<String>,
-    /// Render image A of --scene: an integrator or a preset of frames in real time, then options of `skylit render`, like "ao --ao-radius 2" or "balanced --frames 8"
+    /// Render image A of --scene: an integrator or a preset of frames in real time, then options of `skylit render`, like "ao --ao-radius 2" or "balanced --history 16"
     #[arg(long, value_name = "RENDER", requires = "scene", allow_hyphen_values = true)]
     pub a: Option<String>,
     /// Render image B, like --a

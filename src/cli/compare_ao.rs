@@ -295,7 +295,7 @@ fn interval([low, high]: [Option<f64>; 2]) -> String {
 mod plot {
     use std::path::Path;
 
-    use super::{EnvironmentLight, FitRecord, Report, Result, significant};
+    use super::{EnvironmentLight, FitRecord, Report, Result, page, significant};
     use crate::bench::plot::panel::{Panel, Plot, Point, Series};
     use crate::bench::plot::picture::{self, PlotFormat};
 
@@ -308,7 +308,7 @@ mod plot {
     /// Draws a panel per fit.
     pub fn write(path: &Path, report: &Report) -> Result<()> {
         let plot = Plot {
-            title: format!("{}: ambient occlusion against path tracing", name(&report.scene)),
+            title: format!("{}: ambient occlusion against path tracing", page::scene_name(&report.scene)),
             subtitle: format!(
                 "{}x{}, {} paths and {} occlusion rays per pixel; the ambient colour is the best one everywhere",
                 report.size[0], report.size[1], report.spp, report.ao_samples
@@ -316,11 +316,6 @@ mod plot {
             groups: report.path.iter().chain(&report.sky).map(|fit| vec![panel(fit)]).collect(),
         };
         picture::write(path, &plot)
-    }
-
-    /// A scene's name without its folder.
-    fn name(scene: &str) -> String {
-        Path::new(scene).file_name().map_or_else(|| scene.to_owned(), |n| n.to_string_lossy().into_owned())
     }
 
     fn panel(fit: &FitRecord) -> Panel {

@@ -30,7 +30,7 @@ const VIEW: [(&str, &str, &str); 3] = [
     (
         "pixel_filter",
         "pixel filter",
-        "edges differ by the filter alone; render stills that are compared with frames in real time with --pixel-filter centre",
+        "edges differ by the filter alone; frames have box with --antialias on and centre with --antialias off, stills what --pixel-filter says",
     ),
 ];
 

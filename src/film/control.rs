@@ -24,6 +24,11 @@ pub trait Control {
         let _ = text;
     }
 
+    /// Reports that the finished image is all but black or white, one line. A warning, unless the image is only measured.
+    fn brightness(&mut self, text: &str) {
+        self.warning(text);
+    }
+
     /// Called between submissions. `Ok(true)`: stop and keep the result so far; an error (usually
     /// [`crate::Error::Interrupted`]): stop and keep nothing.
     fn should_stop(&mut self) -> Result<bool> {

@@ -13,7 +13,7 @@ use rayon::prelude::*;
 use super::png::{self, Colour};
 use super::settings::{Background, FileSettings, PngBits, PngEncoding};
 use super::{Channel, Image, ImageFormat, Samples, check_size};
-use crate::colour::srgb_encode;
+use crate::colour::{srgb_byte, srgb_decode, srgb_encode};
 use crate::error::{Error, Result};
 use crate::files::write_atomically;
 
@@ -49,6 +49,11 @@ pub fn unassociated(image: &Image) -> Image {
     out
 }
 
+/// A value between 0 and 1. NaN is black, so that it can be seen on a bright image.
+fn clamped(value: f32) -> f32 {
+    if value.is_nan() { 0.0 } else { value.clamp(0.0, 1.0) }
+}
+
 impl Picture {
     /// The colours of an image, which are not associated with its alpha, on a background or with alpha. Without a `background` alpha is ignored; an image
     /// without a channel `A` is opaque. Colours are clamped to 0 to 1 first. `path` is what an error names.
@@ -75,8 +80,6 @@ impl Picture {
             (_, 1) => Colour::Grey,
             _ => Colour::Rgb,
         };
-        // NaN is black, so that it can be seen on a bright image
-        let clamped = |v: f32| if v.is_nan() { 0.0 } else { v.clamp(0.0, 1.0) };
         let value = |c: usize, p: usize| -> f32 {
             let linear = || clamped(planes[c][p]);
             let coded = |v: f32| if encoding == PngEncoding::Srgb { srgb_encode(v) } else { v };
@@ -114,7 +117,7 @@ impl Picture {
         Ok(Self { width, height, colour, bits: PngBits::Eight, encoding: PngEncoding::Srgb, bytes })
     }
 
-    /// This opaque picture of 8-bit sRGB on a background: pixels of which `coverage` is 0 show it, all others do not.
+    /// This opaque picture of 8-bit sRGB, which shows a scene on black, on a background. `coverage`: the share of each pixel that shows the scene, 0 to 1.
     ///
     /// # Errors
     /// [`Error::Usage`] for coverage of another number of pixels.
@@ -125,8 +128,8 @@ impl Picture {
         }
         let own = self.colour.channels();
         let behind = match background {
-            Background::Transparent => [0; 3],
-            Background::Colour(colour) => colour.map(crate::colour::srgb_byte),
+            Background::Transparent => [0.0; 3],
+            Background::Colour(colour) => colour,
         };
         let is_grey = own == 1 && behind[0] == behind[1] && behind[1] == behind[2];
         let is_transparent = background == Background::Transparent;
@@ -137,10 +140,25 @@ impl Picture {
             (false, false) => Colour::Rgb,
         };
         let mut bytes = Vec::with_capacity(pixels * colour.channels());
-        for (pixel, covered) in self.bytes.chunks_exact(own).zip(coverage.iter().map(|c| *c > 0.0)) {
-            let colours = if is_grey { 1 } else { 3 };
-            bytes.extend((0..colours).map(|c| if covered { pixel[c.min(own - 1)] } else { behind[c] }));
-            bytes.extend(is_transparent.then_some(if covered { 255 } else { 0 }));
+        for (pixel, &covered) in self.bytes.chunks_exact(own).zip(coverage) {
+            let covered = clamped(covered);
+            let value = |c: usize| -> u8 {
+                let byte = pixel[c.min(own - 1)];
+                // as it is: decoding could round it to another one
+                if covered >= 1.0 {
+                    return byte;
+                }
+                let on_black = srgb_decode(f32::from(byte) / 255.0);
+                if !is_transparent {
+                    srgb_byte(on_black.min(covered) + behind[c] * (1.0 - covered))
+                } else if covered > 0.0 {
+                    srgb_byte((on_black / covered).min(1.0))
+                } else {
+                    0
+                }
+            };
+            bytes.extend((0..if is_grey { 1 } else { 3 }).map(value));
+            bytes.extend(is_transparent.then_some((255.0 * covered).round() as u8));
         }
         Ok(Self { colour, bytes, ..self })
     }

@@ -290,8 +290,8 @@ impl Realtime {
         // Larsen's pipeline skips no pass
         let still = moved.is_empty() && self.state.camera == Some(*camera) && !is_larsen && !self.state.has_new_light;
         let resting = if still { self.state.resting.saturating_add(1) } else { 0 };
-        let is_converged = self.settings.converges() && resting >= self.settings.frames_to_converge();
-        if is_converged && self.shown == Some(self.display) {
+        let has_come_to_rest = self.settings.frames_to_rest().is_some_and(|frames| resting >= frames);
+        if has_come_to_rest && self.shown == Some(self.display) {
             return Ok(FrameStats {
                 skipped_rays: self.pixels() * u64::from(self.settings.rays_per_pixel),
                 ..Default::default()

@@ -181,7 +181,7 @@ impl Resource {
             Self::FilteredRadiance(_) => device("filtered radiance", RADIANCE_BYTES * pixels, Frame),
             Self::Composed => device("composed image", QUAD_BYTES * pixels, Frame),
             Self::Rest => device("samples at rest", RADIANCE_BYTES * pixels, Kept),
-            Self::ResolvedHistory => device("resolved history", RADIANCE_BYTES * pixels, Pair),
+            Self::ResolvedHistory => device("resolved history", QUAD_BYTES * pixels, Pair),
             Self::Resolved => readback("resolved image", QUAD_BYTES * pixels),
             Self::VisibleLights => device("visible lights", 4 * pixels, Frame),
             Self::Occlusion => device("occlusion", 4 * half_pixels, Frame),

@@ -204,9 +204,19 @@ impl Settings {
         self.converge && self.history > 1 && self.technique == Technique::Traced && self.budget == Budget::Uniform
     }
 
-    /// Number of frames at rest after which the image no longer changes, with [`Settings::converges`].
-    pub fn frames_to_converge(&self) -> u32 {
-        Self::REST_SAMPLES.div_ceil(self.rays_per_pixel) * self.resolution.period()
+    /// Frames at rest that antialiasing averages after histories are full: as many places within a pixel.
+    const PLACES: u32 = 64;
+
+    /// Number of frames at rest after which the image no longer changes; `None`: with every frame, or it is pixels that come to rest, each on its own.
+    pub fn frames_to_rest(&self) -> Option<u32> {
+        let period = self.resolution.period();
+        if self.converges() {
+            Some(Self::REST_SAMPLES.div_ceil(self.rays_per_pixel) * period)
+        } else if self.antialias && self.rest && self.history > 1 {
+            Some(self.history.min(Self::MAX_SAMPLES) * period + Self::PLACES)
+        } else {
+            None
+        }
     }
 
     /// Attenuation of occlusion with distance.
@@ -299,6 +309,12 @@ choices! {
 }
 
 impl Preset {
+    /// Whether frames of a renderer are antialiased unless their settings say otherwise. The error against antialiased images is lower then, at rest and in motion
+    /// (docs/realtime.md). [`Preset::settings`] samples pixel centres: what the pipeline alone is measured by.
+    pub fn antialiases(self) -> bool {
+        matches!(self, Self::Fast | Self::Balanced | Self::Quality)
+    }
+
     /// The settings of the preset.
     pub fn settings(self) -> Settings {
         let common = Settings {

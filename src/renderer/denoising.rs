@@ -23,7 +23,10 @@ impl Control for UninterruptedControl<'_> {
 /// A denoiser, and the reason why it was chosen.
 pub struct SelectedDenoiser {
     denoiser: Denoiser,
+    /// In full.
     why: String,
+    /// The same in a few words.
+    summary: String,
 }
 
 /// Chooses the denoiser that is requested, if any.
@@ -35,14 +38,18 @@ pub fn choose(choice: Option<DenoiseChoice>) -> Result<Option<SelectedDenoiser>>
     let filter = || Denoiser::Filter(Default::default());
     let oidn = |oidn: Oidn| {
         let why = format!("Open Image Denoise {}", oidn.version());
-        SelectedDenoiser { denoiser: Denoiser::Oidn(oidn), why }
+        SelectedDenoiser { denoiser: Denoiser::Oidn(oidn), summary: why.clone(), why }
     };
     Ok(Some(match choice {
-        DenoiseChoice::Filter => SelectedDenoiser { denoiser: filter(), why: "requested".into() },
+        DenoiseChoice::Filter => SelectedDenoiser { denoiser: filter(), why: "requested".into(), summary: "requested".into() },
         DenoiseChoice::Oidn => oidn(Oidn::open()?),
         DenoiseChoice::Auto => match Oidn::open() {
             Ok(library) => oidn(library),
-            Err(e) => SelectedDenoiser { denoiser: filter(), why: e.to_string() },
+            // why not, and what to do about it, is for `--explain`: this is no fault of the image
+            Err(e) => {
+                let summary = "without Open Image Denoise".into();
+                SelectedDenoiser { denoiser: filter(), why: e.to_string(), summary }
+            }
         },
     }))
 }
@@ -101,7 +108,8 @@ impl<'a> Denoising<'a> {
         let (name, why, seconds) = (self.name(), &self.chosen.why, self.seconds.get());
         DenoiseReport {
             line: format!(
-                "denoised by {name} ({why}) in {seconds:.3} s: the image is biased; an .exr keeps the noisy image as {}",
+                "denoised by {name} ({}) in {seconds:.3} s: the image is biased; an .exr keeps the noisy image as {}",
+                self.chosen.summary,
                 self.names.iter().map(|n| format!("noisy.{n}")).collect::<Vec<_>>().join(", ")
             ),
             explanation: format!(

@@ -100,8 +100,8 @@ impl Renderer {
         let blend = if is_radiance { integrator.get().blend() } else { Blend::Masked };
         let flat = FlatScene::with_motion_and_blend(scene, sequence.motion()?, blend)?;
         // a single frame is one of a history that is full, and not what it converges to
-        let settling = || settling_frames(&Settings { converge: false, ..how });
-        let warm_up = timeline.warm_up.unwrap_or_else(|| if timeline.frames.is_some() { 0 } else { settling() });
+        let settling = || frames_of_history(&how);
+        let warm_up = timeline.warm_up.unwrap_or_else(|| if range.end - range.first > 1 { 0 } else { settling() });
         let frames = u64::from(range.end - range.first) + u64::from(warm_up);
         let request = TracerRequest {
             needs: frame_needs(&settings, &how),
@@ -297,7 +297,7 @@ impl Frames<'_> {
         shown
     }
 
-    /// Coverage of the last frame: 1 where a pixel's centre shows the scene, else 0; rows from the top.
+    /// Coverage of the last frame: the fraction of each pixel that shows the scene, rows from the top; without antialiasing 1 where its centre does, else 0.
     ///
     /// # Errors
     /// Those of the device.
@@ -338,12 +338,17 @@ impl Frames<'_> {
 pub fn frame_settings(settings: &RenderSettings) -> Result<Settings> {
     let mut how = settings.frames.settings(&settings.integrators.ao, settings.seed())?;
     let shown = settings.frames.show.unwrap_or_default();
+    // buffers of surfaces are looked at with one place in each pixel; bent normals are not averaged over places
+    let shows_buffers = shown != DisplayMode::Accessibility || Aov::Bent.is_in(&settings.image.aov);
+    if settings.frames.antialias.is_none() {
+        // without it edges of bright surfaces flicker
+        let is_radiance = !is_ambient_occlusion(settings.integrator());
+        how.antialias =
+            how.history > 1 && !shows_buffers && (is_radiance || settings.frames.preset.unwrap_or_default().antialiases());
+    }
     if !is_ambient_occlusion(settings.integrator()) {
         how.check_radiance()?;
-        // defaults of their own: without antialiasing edges of bright surfaces flicker, and there is no image of before that differs
-        if settings.frames.antialias.is_none() {
-            how.antialias = how.history > 1;
-        }
+        // there is no image of before that differs
         how.converge |= settings.frames.at_rest.is_none();
     }
     how.bent = Aov::Bent.is_in(&settings.image.aov) || shown == DisplayMode::Bent;
@@ -433,8 +438,12 @@ pub(super) fn frame_display(settings: &RenderSettings, scene: &Scene) -> Display
 
 /// Number of frames of a static view after which the image no longer changes.
 pub(super) fn settling_frames(settings: &Settings) -> u32 {
+    settings.frames_to_rest().unwrap_or_else(|| frames_of_history(settings))
+}
+
+/// Number of frames after which the histories of a static view are full.
+fn frames_of_history(settings: &Settings) -> u32 {
     match settings.technique {
-        _ if settings.converges() => settings.frames_to_converge(),
         Technique::Larsen => 4,
         _ => settings.history.min(Settings::MAX_SAMPLES) * settings.resolution.period() - 1,
     }

@@ -245,10 +245,9 @@ impl Renderer {
         let surface_mean = brightness::of_surfaces(&rendered.image, integrator.channels().len());
         let brightness =
             surface_mean.and_then(|mean| brightness::warning(mean, integrator.capabilities(), f64::from(picture.exposure)));
-        for warning in rendered.report.warnings.iter().chain(&brightness) {
-            control.warning(warning);
-            warnings.push(warning.clone());
-        }
+        rendered.report.warnings.iter().for_each(|w| control.warning(w));
+        brightness.iter().for_each(|w| control.brightness(w));
+        warnings.extend(rendered.report.warnings.iter().chain(&brightness).cloned());
         let (mean, mean_standard_error) = rendered.image.film.mean_and_error();
         let mut report = StillReport {
             setup: Setup::new(self, tracer, &flat, camera, choices.clone(), warnings),

@@ -2,6 +2,8 @@
 
 use std::time::Duration;
 
+#[cfg(feature = "cli")]
+use clap::error::{ContextKind, ContextValue, ErrorKind};
 use glam::DVec3;
 
 /// A value, or a description of what is expected.
@@ -13,7 +15,13 @@ pub fn usage_message(error: &clap::Error) -> String {
     let text = error.render().to_string();
     let lines = text.lines().map(str::trim).take_while(|l| !l.starts_with("Usage:") && !l.starts_with("For more"));
     let words = lines.filter(|l| !l.is_empty()).collect::<Vec<_>>().join(" ");
-    words.trim_start_matches("error: ").to_owned()
+    let about_json = matches!(error.get(ContextKind::InvalidArg), Some(ContextValue::String(name)) if name == "--json");
+    let remedy = if about_json && error.kind() == ErrorKind::TooManyValues {
+        ": this command prints its record on stdout, so write `--json > FILE`"
+    } else {
+        ""
+    };
+    words.trim_start_matches("error: ").to_owned() + remedy
 }
 
 /// Any number that is not NaN.

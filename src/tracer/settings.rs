@@ -25,7 +25,7 @@ choices! {
 impl TracerChoice {
     /// The tracer on a device, and the reason for it.
     pub fn on(self, info: &crate::gpu::DeviceInfo) -> (TracerKind, String) {
-        let requested = |kind| (kind, "requested with --tracer".to_owned());
+        let requested = |kind| (kind, "requested".to_owned());
         match self {
             Self::Auto => TracerKind::auto(info),
             Self::Pipeline => requested(TracerKind::Pipeline),

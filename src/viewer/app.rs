@@ -17,7 +17,9 @@ use crate::integrators::IntegratorName;
 use crate::integrators::lighting::LightingSettings;
 use crate::interface::PixelFilter;
 use crate::realtime::Preset;
+use crate::realtime::frame_settings::Antialias;
 use crate::renderer::RenderSettings;
+use crate::renderer::frames::frame_settings;
 use crate::renderer::interactive::{Pick, ViewPicture, render_flags};
 use crate::scene::Camera;
 use crate::settings::Length;
@@ -482,10 +484,14 @@ impl App {
         let shown = panes.len();
         if self.compares_now() {
             let mut truth = self.truth.settings(&self.settings);
-            let is_antialiased = matches!(self.first, Technique::Frames(_));
-            if panes[0].realtime_setting().is_some() && truth.realtime_setting().is_none() && !is_antialiased {
+            if panes[0].realtime_setting().is_some() {
                 // what differs shall not be the samples' place in the pixel
-                truth.image.pixel_filter = Some(PixelFilter::Centre);
+                let is_antialiased = frame_settings(&panes[0]).is_ok_and(|s| s.antialias);
+                if truth.realtime_setting().is_some() {
+                    truth.frames.antialias = Some(if is_antialiased { Antialias::On } else { Antialias::Off });
+                } else if !is_antialiased {
+                    truth.image.pixel_filter = Some(PixelFilter::Centre);
+                }
             }
             panes.push(truth);
         }

@@ -21,7 +21,7 @@ pub const COMMANDS: &[(&str, &str)] = &[
     ("wait SECONDS", "let time pass"),
     ("wait picture|settled [SECONDS]", "until the first image has a picture, or all have settled; at most so long [120]"),
     ("wait compared [SECONDS]", "until there is a comparison with the truth"),
-    ("wait TEXT:text [SECONDS]", "until a control or label contains the text"),
+    ("wait text:TEXT", "until a control or label contains the text; at most 120 seconds"),
     ("key [Ctrl+|Shift+]NAME [SECONDS]", "press a key, and hold it"),
     ("type TEXT", "type into what has the focus"),
     ("click LABEL", "click on the control of this name"),

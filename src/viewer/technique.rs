@@ -21,7 +21,7 @@ pub enum Technique {
     Still(IntegratorName),
     /// A buffer of real-time ambient occlusion.
     Buffer(DisplayMode),
-    /// Ambient occlusion at pixel centres without filter, which converges while the camera rests: the truth of the real-time techniques.
+    /// Ambient occlusion without filter, which converges while the camera rests: the truth of the real-time techniques.
     Converged,
 }
 

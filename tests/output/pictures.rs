@@ -246,5 +246,13 @@ fn bytes_on_a_background() {
     assert_eq!(on(&rgb, Colour::Rgb, half), (Colour::Rgb, vec![1, 2, 3, 188, 188, 188]));
     assert_eq!(on(&rgb, Colour::Rgb, Background::Transparent), (Colour::Rgba, vec![1, 2, 3, 255, 0, 0, 0, 0]));
     assert!(of(&[1, 2], Colour::Grey).on(half, &[1.0]).is_err());
+    // edges: white that covers half of a pixel is 188 on black
+    let edge = |background| {
+        let picture = of(&[188, 0], Colour::Grey).on(background, &[0.5, 0.25]).unwrap();
+        picture.bytes
+    };
+    assert_eq!(edge(Background::Transparent), [255, 128, 0, 64]);
+    assert_eq!(edge(Background::Colour([1.0; 3])), [255, 225]);
+    assert_eq!(edge(Background::Colour([0.0; 3])), [188, 0]);
     assert!(Picture::of_bytes(vec![0; 3], [2, 1], Colour::Grey).is_err());
 }

@@ -10,6 +10,38 @@ fn covered(realtime: &skylit::realtime::Realtime) -> u64 {
     realtime.coverage().unwrap().iter().filter(|c| **c > 0.0).count() as u64
 }
 
+/// Samples that move within their pixels come to rest, too: after the histories are full and their places have been averaged.
+#[test]
+fn gpu_an_antialiased_image_comes_to_rest() {
+    let device = device();
+    let scene = scene("stairs");
+    let pixels = u64::from(SIZE[0] * SIZE[1]);
+    let still = stepped(&scene, SIZE, DVec3::ZERO);
+    let moved = stepped(&scene, SIZE, DVec3::X * 0.01);
+    for kind in tracers(&device) {
+        let tracer = tracer(&device, kind, &scene);
+        let settings = Settings { history: 8, antialias: true, ..traced(Preset::Fast) };
+        let mut realtime = realtime(&tracer, SIZE, &settings);
+        let all = settings.frames_to_rest().unwrap();
+        let stats = frames(&mut realtime, &tracer, &still, all);
+        // camera rays start elsewhere in each frame; full histories take no more samples
+        assert!(stats.iter().all(|s| s.primary_rays == pixels), "{kind}");
+        assert!(stats[0].occlusion_rays > pixels / 4, "{kind}");
+        let share = stats[all as usize - 1].occlusion_rays as f64 / stats[0].occlusion_rays as f64;
+        assert!(share < 0.02, "{kind}: {share} of the rays are traced when histories are full");
+        let partly = realtime.coverage().unwrap().iter().filter(|c| **c > 0.01 && **c < 0.99).count();
+        assert!(partly > 20, "{kind}: {partly} pixels at edges");
+        let before = bits(&realtime.result().unwrap());
+        for s in frames(&mut realtime, &tracer, &still, 3) {
+            assert_eq!((s.primary_rays, s.occlusion_rays), (0, 0), "{kind}");
+        }
+        assert!(before == bits(&realtime.result().unwrap()), "{kind}: an image at rest changes");
+        let s = realtime.frame(&tracer, &moved, &[]).unwrap();
+        assert!(s.primary_rays == pixels && s.occlusion_rays > pixels / 4, "{kind}");
+    }
+    assert_validation_clean(&device);
+}
+
 #[test]
 fn gpu_what_has_not_moved_is_not_traced_again() {
     let device = device();

@@ -106,6 +106,9 @@ impl Control for Steps<'_> {
         self.control.warning(text);
     }
 
+    // what a reference has of the light may well be black: a closed room's sky
+    fn brightness(&mut self, _: &str) {}
+
     fn should_stop(&mut self) -> Result<bool> {
         self.control.should_stop()
     }
@@ -117,6 +120,8 @@ pub struct AoVersusPath {
     pub report: Report,
     /// The best `lit` image (R, G, B, and A: 1 where a surface is visible), the path-traced one and direct light (`path`, `direct`), the ambient visibility of the best fit (`ao.Y`) and `ao-sky` (`sky.Y`).
     pub image: Image,
+    /// 1 for each pixel that shows nothing but surfaces that reflect ambient light, 0 for the others: what metrics of the image count.
+    pub counted: Vec<f32>,
 }
 
 /// Compares ambient light with path tracing.
@@ -163,14 +168,16 @@ pub fn run(renderer: &mut Renderer, settings: &AoVersusPathSettings, control: &m
         )));
     };
     let diffuse = references.samples.diffuse();
-    let sky = Target { channels: 1, halves: references.sky.clone(), pixels: diffuse, width };
+    let sky = Target { channels: 1, halves: references.sky.clone(), pixels: diffuse.clone(), width };
     let sky_fit = (!sky.pixels.is_empty() && sky.energy() > 0.0).then(|| {
         let found = search(&references.samples, &sky, diagonal);
         report::sky_record(&references.samples, &sky, &found)
     });
     let direct = references.lights.as_ref().filter(|_| light == EnvironmentLight::Ambient).unwrap_or(&references.direct);
     let image = picture(settings.size, &references, &path, direct, choice.attenuation, choice.ambient);
-    let shares = LightShares::new(&references, &references.samples.diffuse());
+    let shares = LightShares::new(&references, &diffuse);
+    let mut counted = vec![0.0; references.samples.pixels()];
+    diffuse.iter().for_each(|&p| counted[p] = 1.0);
     let report = Report {
         scene: renderer.name().to_owned(),
         size: settings.size,
@@ -185,7 +192,7 @@ pub fn run(renderer: &mut Renderer, settings: &AoVersusPathSettings, control: &m
         render_seconds,
         fit_seconds: fit_start.elapsed().as_secs_f64(),
     };
-    Ok(AoVersusPath { report, image })
+    Ok(AoVersusPath { report, image, counted })
 }
 
 /// What is known of a fit against path tracing.

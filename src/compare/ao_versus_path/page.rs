@@ -1,12 +1,15 @@
 //! The comparison as a page of a report.
 
+use std::borrow::Cow;
+use std::path::Path;
+
 use super::report::significant;
 use super::{AoVersusPath, ChoiceRecord, FitRecord, Report};
 use crate::compare::{Entry, ImageSet};
 use crate::error::Result;
 use crate::integrators::path::ambient::EnvironmentLight;
 use crate::measure::comparison::CompareOptions;
-use crate::output::{Channel, Image};
+use crate::output::{Channel, Image, Samples};
 use crate::report::comparison::{self, NamedImage};
 use crate::report::{Axis, Cell, Chart, Mark, Page, Part, Point, Row, Section, Series, Table};
 
@@ -16,10 +19,10 @@ use crate::report::{Axis, Cell, Chart, Mark, Page, Part, Point, Row, Section, Se
 /// Those of [`ImageSet::new`].
 pub fn page(found: &AoVersusPath, command: &str, warnings: &[String]) -> Result<Page> {
     let report = &found.report;
-    let mut sections = vec![images(&found.image)?];
+    let mut sections = vec![images(found)?];
     sections.extend(report.path.iter().chain(&report.sky).map(section));
     Ok(Page {
-        title: format!("{}: ambient occlusion against path tracing", report.scene),
+        title: format!("{}: ambient occlusion against path tracing", scene_name(&report.scene)),
         summary: summary(report),
         command: command.to_owned(),
         facts: facts(report),
@@ -37,24 +40,35 @@ pub fn title(fit: &FitRecord) -> &'static str {
     }
 }
 
-/// A layer of the image as an image of its own.
-fn layer(image: &Image, prefix: &str) -> Image {
+/// A scene's name without its folder.
+pub fn scene_name(scene: &str) -> Cow<'_, str> {
+    Path::new(scene).file_name().map_or(scene.into(), |n| n.to_string_lossy())
+}
+
+/// A layer of the image as an image of its own; `counted`: which pixels metrics count.
+fn layer(image: &Image, prefix: &str, counted: &[f32]) -> Image {
     let of = |name: &str| {
         let full = format!("{prefix}{name}");
         image.channels.iter().find(|c| c.name == full).map(|c| Channel { name: name.to_owned(), samples: c.samples.clone() })
     };
-    let alpha = image.channels.iter().find(|c| c.name == "A").cloned();
-    Image { channels: ["R", "G", "B"].into_iter().filter_map(of).chain(alpha).collect(), ..image.clone() }
+    let alpha = Channel { name: "A".into(), samples: Samples::F32(counted.to_vec()) };
+    Image { channels: ["R", "G", "B"].into_iter().filter_map(of).chain([alpha]).collect(), ..image.clone() }
 }
 
-fn images(image: &Image) -> Result<Section> {
-    let entry = |name: &str, prefix: &str| Entry { name: name.into(), description: String::new(), image: layer(image, prefix) };
+fn images(found: &AoVersusPath) -> Result<Section> {
+    let entry = |name: &str, prefix: &str| Entry {
+        name: name.into(),
+        description: String::new(),
+        image: layer(&found.image, prefix, &found.counted),
+    };
     let entries = vec![entry("lit, best fit", ""), entry("direct light", "direct."), entry("path tracing", "path.")];
     let set = ImageSet::new(entries, 2, &CompareOptions::default())?;
     let images: Vec<NamedImage> = (set.entries.iter().zip(&set.comparisons))
         .map(|(e, c)| NamedImage { name: &e.name, description: &e.description, image: &e.image, comparison: c.as_ref() })
         .collect();
-    comparison::section("Images", &images, 2)
+    let mut section = comparison::section("Images", &images, 2)?;
+    section.parts.push(Part::Text("Metrics count the pixels that show nothing but surfaces that reflect ambient light: visible lamps would outweigh all else.".into()));
+    Ok(section)
 }
 
 fn percent(x: f64) -> String {
