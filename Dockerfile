@@ -8,6 +8,8 @@
 FROM debian:bookworm-slim AS build
 WORKDIR /skylit
 COPY . .
+# what `skylit --version` says of the build, which has no .git: --build-arg SKYLIT_COMMIT="$(git log -1 --format='%h (%cs)')"
+ARG SKYLIT_COMMIT=
 RUN ./scripts/container/build.sh /opt/skylit
 
 FROM debian:bookworm-slim
@@ -17,7 +19,8 @@ RUN /tmp/runtime.sh "$MESA" && rm /tmp/runtime.sh
 COPY --from=build /opt/skylit/skylit /usr/local/bin/skylit
 # compiled shaders and BVHs; mount a volume here to keep them from run to run
 ENV XDG_CACHE_HOME=/cache
-RUN mkdir /cache && chmod 1777 /cache && skylit doctor
+# anyone's, as with `docker run --user`: what the check leaves there is root's
+RUN skylit doctor && rm -rf /cache && mkdir -m 1777 /cache
 WORKDIR /work
 ENTRYPOINT ["skylit"]
 CMD ["--help"]

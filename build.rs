@@ -41,21 +41,6 @@ use rspirv::dr::{Instruction, Operand};
 use rspirv::spirv::{Decoration, Op};
 use source::{Mode, Rays, Source, Stage, Variant, mode, rays};
 
-// Debian's libshaderc_combined.a leaves glslang and SPIRV-Tools out; their order is that of their dependencies.
-macro_rules! libraries {
-    ($($name:literal)*) => {
-        $(
-            #[cfg(not(feature = "build-shaderc"))]
-            #[link(name = $name)]
-            unsafe extern "C" {}
-        )*
-        /// For programs that compile shaders themselves.
-        const LIBRARIES: &[&str] = &[$($name),*];
-    };
-}
-
-libraries!("glslang" "SPIRV" "MachineIndependent" "GenericCodeGen" "OSDependent" "OGLCompiler" "HLSL" "SPIRV-Tools-opt" "SPIRV-Tools" "stdc++");
-
 /// A shader that is to be compiled: its file's name in OUT_DIR, and what it is compiled from; nothing where no such shader applies.
 type Job = (String, Option<Source>);
 
@@ -264,9 +249,6 @@ fn main() {
         fail(&mismatches);
     }
     if cfg!(feature = "live-shaders") {
-        if cfg!(not(feature = "build-shaderc")) {
-            LIBRARIES.iter().for_each(|library| println!("cargo:rustc-link-lib={library}"));
-        }
         return;
     }
     let manifest = PathBuf::from(std::env::var_os("CARGO_MANIFEST_DIR").expect("cargo sets it"));

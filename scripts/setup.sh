@@ -6,7 +6,7 @@
 #
 # On Debian 12 it installs, with apt:
 #   Vulkan loader, validation layer, vulkan-tools    to run and to test
-#   libshaderc-dev, glslang-dev, spirv-tools         the shader compiler that build.rs links
+#   libshaderc-dev, glslang-dev, spirv-tools         the shader compiler that build.rs uses
 #   Xvfb, xdotool, libraries of X11                  to open the viewer's window and to test it; nothing else needs a display
 #   Mesa 25.0 lavapipe from bookworm-backports       all three tracers on the CPU
 # and unpacks Debian's own Mesa 22.3.6 lavapipe beside it (target/drivers/mesa-22.3.6), which is the floor that the compute

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Builds skylit in a clean Debian 12 or Ubuntu 24.04, as root: installs a compiler, Rust and shaderc, then the program.
+# Builds skylit in a clean Debian 12 or 13 or Ubuntu 24.04, as root: installs a compiler, Rust and shaderc, then the program.
 #
 #   ./scripts/container/build.sh FOLDER      where the program goes, such as /usr/local/bin
 #
@@ -14,8 +14,10 @@ say() { printf 'container: %s\n' "$*"; }
 export DEBIAN_FRONTEND=noninteractive
 say "installing a compiler and shaderc"
 apt-get -qq update
-# what build.rs links: shaderc with its static library, glslang and SPIRV-Tools
+# what shaderc-libraries links: shaderc with its static library, glslang and SPIRV-Tools
 apt-get -qq install -y --no-install-recommends ca-certificates curl g++ pkg-config libshaderc-dev glslang-dev spirv-tools > /dev/null
+# .cargo/config.toml knows one architecture
+export SHADERC_LIB_DIR=${SHADERC_LIB_DIR:-/usr/lib/$(uname -m)-linux-gnu}
 
 if ! command -v cargo > /dev/null; then
   say "installing Rust"
@@ -28,4 +30,6 @@ say "compiling (profile $profile)"
 cargo build --locked --profile "$profile" --no-default-features --features cli,verify --bin skylit
 case $profile in dev) built=debug ;; *) built=$profile ;; esac
 install -D -m 755 "${CARGO_TARGET_DIR:-target}/$built/skylit" "$folder/skylit"
-say "$("$folder/skylit" --version) in $folder"
+# of 124 MB, 89 are for debuggers
+strip --strip-unneeded "$folder/skylit"
+say "$("$folder/skylit" -V) in $folder"

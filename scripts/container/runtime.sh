@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Installs what skylit needs to run on a CPU in a clean Debian 12 or Ubuntu 24.04, as root: the Vulkan loader and Mesa's lavapipe.
+# Installs what skylit needs to run on a CPU in a clean Debian 12 or 13 or Ubuntu 24.04, as root: the Vulkan loader and Mesa's lavapipe.
 #
 #   ./scripts/container/runtime.sh [VERSION]      VERSION: a version of mesa-vulkan-drivers as apt names it, to pin the driver
 #

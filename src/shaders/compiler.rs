@@ -11,6 +11,8 @@ use std::process::Command;
 use shaderc::{
     CompileOptions, EnvVersion, IncludeType, OptimizationLevel, ResolvedInclude, ShaderKind, SpirvVersion, TargetEnv,
 };
+// what the linker needs besides
+use shaderc_libraries as _;
 
 use super::source::{Source, Stage};
 

@@ -35,7 +35,7 @@ pub fn write(summary: &Summary, manifest: &Manifest, command: &str, dir: &Path) 
     sections[0] = Section::new("All frames", vec![Part::Table(table)]);
     let differ = summary.count(|o| matches!(o, Outcome::Differs(_)));
     let failed = summary.count(|o| matches!(o, Outcome::Failed(_)));
-    let all = plural(summary.frames.len(), "frame", "frames");
+    let all = plural(summary.frames.len(), "render", "renders");
     let page = Page {
         title: format!("Reference frames of {}", manifest.folder.display()),
         summary: match (differ, failed) {

@@ -122,29 +122,27 @@ impl Summary {
     /// # Errors
     /// [`Error::CheckFailed`] if a frame differs, else [`Error::NotVerified`] if one could not be judged.
     pub fn verdict(&self) -> Result<()> {
-        let differ = self.count(|o| matches!(o, Outcome::Differs(_)));
-        let failed = self.count(|o| matches!(o, Outcome::Failed(_)));
-        let names = |is: fn(&Outcome) -> bool| {
+        // how many frames, and their names; one that several tracers rendered is one
+        let frames = |is: fn(&Outcome) -> bool| {
             let mut names: Vec<&str> = Vec::new();
             for frame in self.frames.iter().filter(|f| is(&f.outcome)) {
-                // one that several tracers rendered is named once
                 if !names.contains(&frame.frame.as_str()) {
                     names.push(&frame.frame);
                 }
             }
             let more = names.len().saturating_sub(5);
             let more = if more > 0 { format!(" and {more} more") } else { String::new() };
-            names[..names.len().min(5)].join(", ") + &more
+            (names.len(), names[..names.len().min(5)].join(", ") + &more)
         };
+        let (differ, names) = frames(|o| matches!(o, Outcome::Differs(_)));
         if differ > 0 {
-            let names = names(|o| matches!(o, Outcome::Differs(_)));
             return Err(Error::CheckFailed(format!(
                 "{} from golden images: {names}",
                 plural(differ, "frame differs", "frames differ")
             )));
         }
+        let (failed, names) = frames(|o| matches!(o, Outcome::Failed(_)));
         if failed > 0 {
-            let names = names(|o| matches!(o, Outcome::Failed(_)));
             return Err(Error::NotVerified(format!("{} could not be judged: {names}", plural(failed, "frame", "frames"))));
         }
         if !self.frames.is_empty() && self.count(|o| matches!(o, Outcome::Skipped(_))) == self.frames.len() {

@@ -97,6 +97,8 @@ fn gpu_golden_images_are_made_and_compared() {
     fails(&verify(&["--junit", text(&junit)]), 2, &["2 frames could not be judged: plane, stairs"]);
     let xml = std::fs::read_to_string(&junit).unwrap();
     assert!(xml.contains("errors=\"2\"") && xml.contains("--update-missing"), "{xml}");
+    // what several tracers could not render is one frame
+    fails(&verify(&["--tracers", "pipeline,query,compute"]), 2, &["2 frames could not be judged: plane, stairs"]);
 
     // nothing is pinned; nothing of this name
     fails(&verify(&["--bless"]), 64, &["no driver is pinned", "--force"]);
