@@ -10,6 +10,10 @@ mod args;
 mod baseline;
 mod common;
 mod device;
+mod frame_log;
+mod frames;
+mod lag;
+mod masks;
 mod page;
 mod path;
 mod peers;
@@ -35,6 +39,7 @@ pub fn run(args: &BenchArgs) -> Result<(), Failure> {
         args::Benchmark::Rays(args) => rays::run(args),
         args::Benchmark::Ao(args) => ao::run(args),
         args::Benchmark::Path(args) => path::run(args),
+        args::Benchmark::Frames(args) => frames::run(args),
         args::Benchmark::Report(args) => report::run(args),
     }
 }
