@@ -1,7 +1,7 @@
 //! `skylit bench`: how fast skylit's tracers are, beside each other and beside those of others; and how fast and how good its
-//! real-time ambient occlusion and its path tracing are.
+//! real-time frames and its path tracing are.
 //!
-//! Each benchmark is a folder: `rays`, `ao`, `path`. What they share is beside them: `record` holds what they find, `table`, `plot` and `page` show it, `baseline`
+//! Each benchmark is a folder: `rays`, `ao`, `frames`, `path`. What they share is beside them: `record` holds what they find, `table`, `plot` and `page` show it, `baseline`
 //! compares it with an earlier run, `report` does so with records that were saved, `peers` runs the programs of others, `scenes` knows the well-known scenes,
 //! `session` is a run under way, and `device` alone opens the device and builds tracers.
 

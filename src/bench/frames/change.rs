@@ -5,10 +5,12 @@ use glam::DVec3;
 use super::FramesSession;
 use super::displayed::{Displayed, FrameReference};
 use super::scenes::FramesScene;
-use super::stage::{PLAIN_SEED, Stage, turned};
+use super::signal::{EqualTime, PlainClock};
+use super::stage::{PLAIN_SEED, Stage, is_plain_timed, turned};
 use crate::bench::frame_log::FrameLog;
 use crate::bench::lag::add_ghost;
 use crate::bench::masks;
+use crate::bench::record::cost::FrameCost;
 use crate::bench::record::frames::{ChangedFrames, FramesChange, PlainPoint};
 use crate::error::Result;
 use crate::film::camera::CameraRecord;
@@ -94,9 +96,10 @@ fn turn(session: &mut FramesSession, name: &str, stage: &mut Stage, map: &Enviro
         let all = share(&old, &mut Ghosting::default());
         let mut ghosting = Ghosting::default();
         let lag = LagCurve::new(run.images.iter().map(|image| share(image, &mut ghosting) / all).collect());
+        let time = stage.equal_time(preset, &run.cost, &run.clock)?;
         Ok(ChangedFrames {
             preset: preset.to_string(),
-            plain: plain(stage, &camera, run.ms, frames, (&reference, None))?,
+            plain: plain(stage, &camera, &time, frames, (&reference, None))?,
             rmse: run.rmse,
             half_life: Some(lag.fitted_half_life()),
             gone: lag.gone(),
@@ -141,9 +144,10 @@ fn sidestep(session: &mut FramesSession, loaded: &FramesScene, stage: &mut Stage
         }
         let run = run(&mut realtime, stage, &camera, frames, (&reference, Some(&mask)))?;
         let settled = run.rmse.last().copied().unwrap_or(f64::NAN);
+        let time = stage.equal_time(preset, &run.cost, &run.clock)?;
         Ok(ChangedFrames {
             preset: preset.to_string(),
-            plain: plain(stage, &camera, run.ms, frames, (&reference, Some(&mask)))?,
+            plain: plain(stage, &camera, &time, frames, (&reference, Some(&mask)))?,
             recovery: recovery(&run.rmse, settled, RECOVERED),
             rmse: run.rmse,
             ..ChangedFrames::default()
@@ -161,38 +165,42 @@ fn frames_after(session: &FramesSession) -> u32 {
 struct Run {
     rmse: Vec<f64>,
     images: Vec<Displayed>,
-    /// Median time of a frame.
-    ms: f64,
+    cost: FrameCost,
+    clock: PlainClock,
 }
 
 fn run(
     realtime: &mut Realtime,
-    stage: &Stage,
+    stage: &mut Stage,
     camera: &CameraRecord,
     frames: u32,
     (reference, mask): (&FrameReference, Option<&[f32]>),
 ) -> Result<Run> {
     let (mut log, mut rmse, mut images) = (FrameLog::default(), Vec::new(), Vec::new());
-    for _ in 0..frames {
+    let mut clock = PlainClock::default();
+    for frame in 0..frames {
         log.frame(realtime, &stage.tracer, camera, &[])?;
+        if is_plain_timed(frame, 0, frames) {
+            stage.time_plain(camera, &mut clock)?;
+        }
         let image = Displayed::new(&realtime.result()?, stage.channels());
         rmse.push(reference.rmse_over(&image, mask)?);
         images.push(image);
     }
-    Ok(Run { rmse, images, ms: log.cost(0).wall_ms.median })
+    Ok(Run { rmse, images, cost: log.cost(0), clock })
 }
 
 /// Errors of plain accumulation that starts with the change, after 1, 2, 4, ... frames.
 fn plain(
     stage: &mut Stage,
     camera: &CameraRecord,
-    ms: f64,
+    time: &EqualTime,
     frames: u32,
     (reference, mask): (&FrameReference, Option<&[f32]>),
 ) -> Result<Vec<PlainPoint>> {
     let mut points = Vec::new();
     for frame in (0..).map(|k| 1 << k).take_while(|f| *f <= frames) {
-        let image = stage.plain(camera, stage.plain_time.paths_in(ms * f64::from(frame)), PLAIN_SEED)?;
+        let image = stage.plain(camera, time.paths(frame), PLAIN_SEED)?;
         points.push(PlainPoint { frame, rmse: reference.rmse_over(&Displayed::new(&image, stage.channels()), mask)? });
     }
     Ok(points)

@@ -2,7 +2,8 @@
 
 use super::FramesSession;
 use super::displayed::FrameReference;
-use super::stage::{Motion, PLAIN_SEED, Stage};
+use super::signal::PlainClock;
+use super::stage::{Motion, PLAIN_SEED, Stage, is_plain_timed};
 use crate::bench::frame_log::{FrameLog, first_timed, measured};
 use crate::bench::record::frames::{DenoisedImage, FrameErrors, MotionRecord, MovingFrames, PlainImage};
 use crate::error::Result;
@@ -37,6 +38,7 @@ pub fn measure(session: &mut FramesSession, name: &str, stage: &mut Stage, mut m
     }
     // what comes after begins where everything was
     stage.go(&mut motion, 0)?;
+    stage.rest()?;
     Ok(record)
 }
 
@@ -50,6 +52,7 @@ fn one(
     let frames = session.args.frames();
     let mut realtime = stage.realtime(preset)?;
     let (mut log, mut errors) = (FrameLog::default(), Vec::new());
+    let mut clock = PlainClock::default();
     for frame in 0..frames {
         let inputs = stage.go(motion, frame)?;
         inputs.to_map.into_iter().for_each(|to_map| realtime.turn_environment(to_map));
@@ -58,17 +61,20 @@ fn one(
         log.frame(&mut realtime, &stage.tracer, &inputs.camera, moved)?;
         // so that structures are built anew where that pays
         stage.tracer.traced(log.seconds().last().copied().unwrap_or_default());
+        if is_plain_timed(frame, first_timed(frames), frames) {
+            stage.time_plain(&inputs.camera, &mut clock)?;
+        }
         if let Some((_, reference)) = references.iter().find(|r| r.0 == frame) {
             errors.push(reference.errors_of(&realtime.result()?)?);
         }
     }
     let cost = log.cost(first_timed(frames));
-    let ms = cost.wall_ms.median;
+    let time = stage.equal_time(preset, &cost, &clock)?;
     let (mut plain, mut denoised) = (Vec::new(), Vec::new());
     for (frame, reference) in references {
         let camera = stage.go(motion, *frame)?.camera;
-        plain.push(stage.plain_in(&camera, ms, reference, PLAIN_SEED + frame)?);
-        denoised.extend(stage.denoised(&camera, (ms, 1, true), reference, PLAIN_SEED + frame)?);
+        plain.push(stage.plain_image(&camera, time.paths(1), reference, PLAIN_SEED + frame)?);
+        denoised.extend(stage.denoised(&camera, (&time, 1, true), reference, PLAIN_SEED + frame)?);
     }
     let mean = |of: Vec<FrameErrors>| FrameErrors::mean(&of).unwrap_or_default();
     let denoised = denoised.first().map(|first: &DenoisedImage| DenoisedImage {
@@ -80,7 +86,7 @@ fn one(
         preset: preset.to_string(),
         cost,
         errors: mean(errors),
-        plain: PlainImage { paths: stage.plain_time.paths_in(ms), errors: mean(plain.iter().map(|p| p.errors).collect()) },
+        plain: PlainImage { paths: time.paths(1), errors: mean(plain.iter().map(|p| p.errors).collect()) },
         denoised,
     })
 }

@@ -6,6 +6,7 @@ use glam::DMat3;
 
 use super::args::BenchFramesArgs;
 use crate::accel::flatten::FlatScene;
+use crate::bench::record::cost::FrameCost;
 use crate::error::Result;
 use crate::film::camera::CameraRecord;
 use crate::integrators::path::{PathIntegrator, PathOptions};
@@ -24,9 +25,7 @@ const MAX_PATHS: u32 = 1 << 16;
 /// Occlusion rays of a pixel in one launch at most.
 const MAX_RAYS: u32 = 256;
 /// Paths of a pixel in the images whose times are taken: what an image costs besides its paths is told by two numbers of them.
-const TIMED_PATHS: [u32; 2] = [1, 17];
-/// Images whose time is taken.
-const TIMED_IMAGES: u32 = 5;
+const TIMED_PATHS: [u32; 2] = [1, 9];
 
 /// What frames of one scene show.
 pub struct Signal {
@@ -178,20 +177,29 @@ impl Sampler {
         }
     }
 
-    /// Finds out what images cost.
+    /// Takes the times of an image of few and one of many paths.
     ///
     /// # Errors
     /// Those of [`Sampler::render`].
-    pub fn time(&mut self, tracer: &Tracer, camera: &CameraRecord) -> Result<PlainTime> {
-        let mut seconds = [Vec::new(), Vec::new()];
-        // the first of each compiles
-        for k in 0..=TIMED_IMAGES {
-            for (seconds, paths) in seconds.iter_mut().zip(TIMED_PATHS) {
-                seconds.push(self.render(tracer, camera, paths, k)?.1);
-            }
+    pub fn time(&mut self, tracer: &Tracer, camera: &CameraRecord, clock: &mut PlainClock) -> Result<()> {
+        for (seconds, paths) in clock.seconds.iter_mut().zip(TIMED_PATHS) {
+            seconds.push(self.render(tracer, camera, paths, 0)?.1);
         }
-        let ms = seconds.map(|s| 1e3 * median(&s[1..]).unwrap_or(f64::NAN));
-        Ok(PlainTime::through(TIMED_PATHS, ms))
+        Ok(())
+    }
+}
+
+/// Times of images of independent samples. They are taken between the frames that they are compared with: a machine that slows down for a while slows both down.
+#[derive(Clone, Debug, Default)]
+pub struct PlainClock {
+    seconds: [Vec<f64>; 2],
+}
+
+impl PlainClock {
+    /// By the medians of all times.
+    pub fn time(&self) -> PlainTime {
+        let ms = [0, 1].map(|k| 1e3 * median(&self.seconds[k]).unwrap_or(f64::NAN));
+        PlainTime::through(TIMED_PATHS, ms)
     }
 }
 
@@ -219,17 +227,62 @@ impl PlainTime {
     }
 }
 
+/// The time of a preset's frames, in paths of plain accumulation.
+#[derive(Clone, Copy, Debug)]
+pub struct EqualTime {
+    /// Median time of a frame.
+    pub ms: f64,
+    plain: PlainTime,
+    /// Paths per pixel of a frame whose passes do nothing but trace: the preset's own, in the time of all of its passes.
+    paths_per_frame: f64,
+}
+
+impl EqualTime {
+    /// Of frames of `rays_per_pixel` paths each that cost this.
+    pub fn new(plain: PlainTime, cost: &FrameCost, rays_per_pixel: u32) -> Self {
+        let paths_per_frame = f64::from(rays_per_pixel) / cost.sampling_share().unwrap_or(1.0);
+        // plain accumulation is timed by the clock, too
+        Self { ms: cost.wall_ms.median, plain, paths_per_frame }
+    }
+
+    /// Time of plain accumulation.
+    pub fn plain(&self) -> PlainTime {
+        self.plain
+    }
+
+    /// As many paths as fit into the time of so many frames, in an image as stills have it or in these frames, whichever are more: images cost more than their paths,
+    /// and many paths at once cost less.
+    pub fn paths(&self, frames: u32) -> u32 {
+        let frames = f64::from(frames);
+        self.plain.paths_in(self.ms * frames).max((frames * self.paths_per_frame) as u32)
+    }
+
+    /// As many as fit into one frame beside what takes so many milliseconds.
+    pub fn paths_beside(&self, ms: f64) -> u32 {
+        self.plain.paths_in(self.ms - ms).max((self.paths_per_frame * (1.0 - ms / self.ms)) as u32)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::bench::record::cost::PassTime;
+    use crate::measure::stats::Percentiles;
 
     #[test]
     fn paths_that_fit_a_time() {
-        let time = PlainTime::through([1, 17], [5.0, 37.0]);
+        let time = PlainTime::through([1, 9], [5.0, 21.0]);
         assert_eq!(time, PlainTime { per_image: 3.0, per_path: 2.0 });
         assert_eq!([1.0, 5.0, 10.9, 23.0].map(|ms| time.paths_in(ms)), [1, 1, 3, 10]);
+        let of = |ms: f64| Percentiles::of(&[ms]).unwrap();
+        let passes = [("path_bounce", 4.0), ("filter", 4.0)].map(|(pass, ms)| PassTime { pass: pass.into(), ms: of(ms) });
+        let cost = FrameCost { passes: passes.into(), wall_ms: of(10.0), ..FrameCost::default() };
+        let equal = EqualTime::new(time, &cost, 4);
+        // (10 - 3) / 2 of images; 4 * 8 / 4 of frames
+        assert_eq!([equal.paths(1), equal.paths_beside(5.0), equal.paths_beside(50.0)], [8, 4, 1]);
+        assert_eq!(EqualTime::new(time, &cost, 1).paths(10), 48);
         // noise alone
-        let odd = PlainTime::through([1, 17], [5.0, 4.0]);
+        let odd = PlainTime::through([1, 9], [5.0, 4.0]);
         assert!(odd.per_path > 0.0 && odd.per_image >= 0.0);
     }
 }

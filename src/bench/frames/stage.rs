@@ -7,8 +7,9 @@ use glam::DMat3;
 use super::FramesSession;
 use super::displayed::FrameReference;
 use super::scenes::FramesScene;
-use super::signal::{PlainTime, Sampler, Signal};
+use super::signal::{EqualTime, PlainClock, PlainTime, Sampler, Signal};
 use crate::accel::flatten::FlatScene;
+use crate::bench::record::cost::FrameCost;
 use crate::bench::record::frames::{DenoisedImage, PlainImage};
 use crate::denoise::{DenoiseInput, Features, Oidn};
 use crate::error::Result;
@@ -17,12 +18,16 @@ use crate::realtime::sequence::FrameSequence;
 use crate::realtime::{Preset, Realtime};
 use crate::scene::{Camera, Environment, EnvironmentMap, Orbit};
 use crate::terminal::interrupt::SilentControl;
-use crate::tracer::{BuildOptions, ComputeOptions, MovedBounds, Tracer};
+use crate::tracer::{BuildOptions, Changes, ComputeOptions, MovedBounds, Tracer};
 
 /// Seeds of the halves of a reference; no preset has them.
 const REFERENCE_SEEDS: [u32; 2] = [0x5eed_000a, 0x5eed_000b];
 /// Seed of plain accumulation.
 pub const PLAIN_SEED: u32 = 0x5eed_0100;
+/// Images of plain accumulation whose time is taken before anything else.
+const TIMED_IMAGES: u32 = 3;
+/// Times of plain accumulation that are taken between frames.
+const TIMES_BETWEEN: usize = 4;
 /// How far the environment map turns in a frame, degrees: as far as the camera on its orbit.
 pub const DEGREES_PER_FRAME: f64 = 0.5;
 
@@ -33,7 +38,7 @@ pub enum Motion<'a> {
     /// The environment map turns.
     Sun(&'a EnvironmentMap),
     /// The scene's first animation plays.
-    Animation(FrameSequence<'a>),
+    Animation(Box<FrameSequence<'a>>),
 }
 
 impl Motion<'_> {
@@ -72,7 +77,7 @@ pub struct Stage<'a> {
     pub camera: &'a Camera,
     /// Pixels.
     pub size: [u32; 2],
-    /// Time of plain accumulation.
+    /// Time of plain accumulation, before anything else is measured.
     pub plain_time: PlainTime,
     signal: Signal,
     sampler: Sampler,
@@ -99,9 +104,19 @@ impl<'a> Stage<'a> {
         let (kind, _) = args.tracer.on(session.device.info());
         let tracer = session.device.tracer(flat, kind, signal.needs()?, ComputeOptions::default(), &build)?;
         let mut sampler = signal.sampler(&tracer, flat, camera)?;
-        let plain_time = sampler.time(&tracer, &camera_record(camera, flat, size))?;
+        let record = camera_record(camera, flat, size);
+        // the first images compile
+        sampler.time(&tracer, &record, &mut PlainClock::default())?;
+        let mut clock = PlainClock::default();
+        for _ in 0..TIMED_IMAGES {
+            sampler.time(&tracer, &record, &mut clock)?;
+        }
+        let plain_time = clock.time();
         let oidn = oidn.filter(|_| signal.channels() == 3);
-        Ok(Self { tracer, flat, camera, size, plain_time, signal, sampler, oidn })
+        let mut stage = Self { tracer, flat, camera, size, plain_time, signal, sampler, oidn };
+        // before the first update there are no vertices of before
+        stage.rest()?;
+        Ok(stage)
     }
 
     /// Values per pixel.
@@ -133,6 +148,9 @@ impl<'a> Stage<'a> {
     /// Those of updating the tracer.
     pub fn go(&mut self, motion: &mut Motion, frame: u32) -> Result<FrameInputs> {
         let camera = self.still_camera();
+        if !matches!(motion, Motion::Animation(_)) {
+            self.rest()?;
+        }
         let inputs = |camera, moved, to_map| FrameInputs { camera, moved, to_map };
         Ok(match motion {
             Motion::Orbit(orbit) => {
@@ -148,6 +166,17 @@ impl<'a> Stage<'a> {
                 inputs(camera, update.moved, None)
             }
         })
+    }
+
+    /// Tells a dynamic scene that it stands still in the next frame: motion vectors are those since its last update.
+    ///
+    /// # Errors
+    /// Those of [`Tracer::update`].
+    pub fn rest(&mut self) -> Result<()> {
+        if self.tracer.is_dynamic() {
+            self.tracer.update(&Changes::default())?;
+        }
+        Ok(())
     }
 
     /// Turns the environment map of plain and of converged images.
@@ -192,16 +221,37 @@ impl<'a> Stage<'a> {
         Ok(self.sampler.render(&self.tracer, camera, paths, seed)?.0)
     }
 
-    /// Plain accumulation in so many milliseconds, and its errors.
+    /// Takes the time of plain accumulation.
     ///
     /// # Errors
     /// Those of the device; Ctrl-C.
-    pub fn plain_in(&mut self, camera: &CameraRecord, ms: f64, reference: &FrameReference, seed: u32) -> Result<PlainImage> {
-        let paths = self.plain_time.paths_in(ms);
+    pub fn time_plain(&mut self, camera: &CameraRecord, clock: &mut PlainClock) -> Result<()> {
+        self.sampler.time(&self.tracer, camera, clock)
+    }
+
+    /// The time of a preset's frames, in paths of plain accumulation.
+    ///
+    /// # Errors
+    /// Those of settings.
+    pub fn equal_time(&self, preset: Preset, cost: &FrameCost, clock: &PlainClock) -> Result<EqualTime> {
+        Ok(EqualTime::new(clock.time(), cost, self.rays_per_pixel(preset)?))
+    }
+
+    /// Plain accumulation of so many paths, and its errors.
+    ///
+    /// # Errors
+    /// Those of the device; Ctrl-C.
+    pub fn plain_image(
+        &mut self,
+        camera: &CameraRecord,
+        paths: u32,
+        reference: &FrameReference,
+        seed: u32,
+    ) -> Result<PlainImage> {
         Ok(PlainImage { paths, errors: reference.errors_of(&self.plain(camera, paths, seed)?)? })
     }
 
-    /// Plain accumulation over `frames` frames of `ms` milliseconds, every one of them denoised, and the errors of the last. Feature images count where the camera
+    /// Plain accumulation over `frames` frames in the time of a preset's, every one of them denoised, and the errors of the last. Feature images count where the camera
     /// moves (`is_moving`): of one that stands still they are rendered once. `None` where Open Image Denoise is not there.
     ///
     /// # Errors
@@ -209,7 +259,7 @@ impl<'a> Stage<'a> {
     pub fn denoised(
         &mut self,
         camera: &CameraRecord,
-        (ms, frames, is_moving): (f64, u32, bool),
+        (time, frames, is_moving): (&EqualTime, u32, bool),
         reference: &FrameReference,
         seed: u32,
     ) -> Result<Option<DenoisedImage>> {
@@ -226,15 +276,34 @@ impl<'a> Stage<'a> {
         // what the denoiser takes does not depend on the image
         denoiser_ms += denoise(&vec![0.5; features.albedo.len()])?.1;
         // an image a frame
-        let paths = frames * self.plain_time.paths_in(ms - denoiser_ms);
+        let paths = frames * time.paths_beside(denoiser_ms);
         let image = self.sampler.render(&self.tracer, camera, paths, seed)?.0;
         let errors = reference.errors_of(&denoise(&image)?.0)?;
-        let PlainTime { per_image, per_path } = self.plain_time;
+        let PlainTime { per_image, per_path } = time.plain();
         let ms = denoiser_ms + per_image + f64::from(paths / frames) * per_path;
         Ok(Some(DenoisedImage { paths, ms, errors }))
     }
 }
 
+/// Is the time of plain accumulation taken after a frame, counted from 0, of so many whose time counts from `first` on?
+pub fn is_plain_timed(frame: u32, first: usize, frames: u32) -> bool {
+    let step = (frames as usize - first).div_ceil(TIMES_BETWEEN);
+    (frame as usize).checked_sub(first).is_some_and(|n| n.is_multiple_of(step.max(1)))
+}
+
 fn camera_record(camera: &Camera, flat: &FlatScene, size: [u32; 2]) -> CameraRecord {
     CameraRecord::new(camera, flat.origin, f64::from(size[0]) / f64::from(size[1]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn plain_accumulation_is_timed_between_late_frames() {
+        let at = |frames: u32, first: usize| (0..frames).filter(|f| is_plain_timed(*f, first, frames)).collect::<Vec<_>>();
+        assert_eq!(at(96, 48), [48, 60, 72, 84]);
+        assert_eq!(at(8, 0), [0, 2, 4, 6]);
+        assert_eq!(at(4, 2), [2, 3]);
+    }
 }

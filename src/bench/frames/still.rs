@@ -2,7 +2,8 @@
 
 use super::FramesSession;
 use super::displayed::{Displayed, FlickerMeter, FrameReference};
-use super::stage::{PLAIN_SEED, Stage};
+use super::signal::PlainClock;
+use super::stage::{PLAIN_SEED, Stage, is_plain_timed};
 use crate::bench::frame_log::{FrameLog, first_timed};
 use crate::bench::record::frames::{FramePoint, StillFrames};
 use crate::error::Result;
@@ -17,19 +18,22 @@ pub fn measure(session: &FramesSession, stage: &mut Stage, preset: Preset, refer
     let camera = stage.still_camera();
     let mut realtime = stage.realtime(preset)?;
     let (mut log, mut flicker, mut curve) = (FrameLog::default(), FlickerMeter::new(frames), Vec::new());
+    let mut clock = PlainClock::default();
     for frame in 1..=frames {
         log.frame(&mut realtime, &stage.tracer, &camera, &[])?;
         let image = realtime.result()?;
         flicker.add(&Displayed::new(&image, stage.channels()))?;
+        if is_plain_timed(frame - 1, first_timed(frames), frames) {
+            stage.time_plain(&camera, &mut clock)?;
+        }
         if frame.is_power_of_two() || frame == frames {
             curve.push(FramePoint { frame, errors: reference.errors_of(&image)?, ..FramePoint::default() });
         }
     }
     let cost = log.cost(first_timed(frames));
-    // plain accumulation is timed by the clock, too
-    let ms = cost.wall_ms.median;
+    let time = stage.equal_time(preset, &cost, &clock)?;
     for p in &mut curve {
-        p.plain = stage.plain_in(&camera, ms * f64::from(p.frame), reference, PLAIN_SEED)?;
+        p.plain = stage.plain_image(&camera, time.paths(p.frame), reference, PLAIN_SEED)?;
     }
     Ok(StillFrames {
         preset: preset.to_string(),
@@ -37,6 +41,6 @@ pub fn measure(session: &FramesSession, stage: &mut Stage, preset: Preset, refer
         cost,
         curve,
         flicker: flicker.result(),
-        denoised: stage.denoised(&camera, (ms, frames, false), reference, PLAIN_SEED)?,
+        denoised: stage.denoised(&camera, (&time, frames, false), reference, PLAIN_SEED)?,
     })
 }

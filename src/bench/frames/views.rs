@@ -79,7 +79,7 @@ fn fill<'a>(
         motions.push(Motion::Orbit(Orbit::vertical(loaded.middle, FRAMES_PER_TURN)?));
     }
     motions.extend(stage.map().filter(|_| args.wants(Part::Sun)).map(Motion::Sun));
-    motions.extend(sequence.map(Motion::Animation));
+    motions.extend(sequence.map(|s| Motion::Animation(Box::new(s))));
     // the still camera, each motion, the changes
     let steps = motions.len() as f64 + 2.0;
     if args.wants(Part::Still) {
