@@ -23,6 +23,8 @@ const BUILTIN: [&str; 5] =
 const QUICK: [&str; 2] = ["builtin:cornell-box", "builtin:parade"];
 /// Well-known scenes of the default list.
 const FILES: [&WellKnownScene; 2] = [&SPONZA, &FLIGHT_HELMET];
+/// Material of the surface that covers Sponza's court: it is left out, so that the sun gets in.
+const COVER: &str = "None";
 /// How far ahead of a camera inside of its scene the point is that it goes round, diagonals of the scene's bounds: it is to stay clear of walls.
 const AHEAD: f64 = 0.05;
 
@@ -71,6 +73,10 @@ pub fn load(source: &str, args: &BenchFramesArgs) -> Result<FramesScene> {
     let mut scene = load::load(if is_interior { "builtin:atrium" } else { source })?;
     let known = WellKnownScene::find(&WELL_KNOWN, source);
     let (lo, hi) = scene.bounds().ok_or_else(|| Error::Scene(format!("{source}: nothing to look at: no geometry")))?;
+    if known.is_some_and(|k| k.path == SPONZA.path) {
+        let Scene { instances, meshes, materials, .. } = &mut scene;
+        instances.retain(|i| materials[meshes[i.mesh].material].name != COVER);
+    }
     let light = light(&mut scene, is_interior, args)?;
     let choice = known.map_or(Choice::Auto, |k| k.near.choice());
     let camera = camera::choose(&scene, &choice, args.aspect())?;

@@ -78,7 +78,7 @@ pub struct FrameErrors {
     /// Mean of (image - reference)^2 / (reference^2 + 0.01) of linear values.
     #[serde(deserialize_with = "number_or_nan")]
     pub rel_mse: f64,
-    /// Mean of image - reference over the mean of the reference, of linear values.
+    /// Mean of image - reference over the mean of the reference, of linear values as displayed: from 0 to 1.
     #[serde(deserialize_with = "number_or_nan")]
     pub bias: f64,
     /// How different they look, 0 to 1.
