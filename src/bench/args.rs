@@ -3,6 +3,7 @@
 use clap::{Args, Subcommand};
 
 use super::ao::BenchAoArgs;
+use super::frames::BenchFramesArgs;
 use super::path::BenchPathArgs;
 use super::rays::BenchRaysArgs;
 use super::report::BenchReportArgs;
@@ -22,6 +23,8 @@ pub enum Benchmark {
     Rays(Box<BenchRaysArgs>),
     /// Real-time ambient occlusion: time, rays and error of each preset, by scene, view and kind of motion
     Ao(Box<BenchAoArgs>),
+    /// Frames in real time of any integrator: time and error of each preset beside plain accumulation at equal time, by scene and kind of motion
+    Frames(Box<BenchFramesArgs>),
     /// Path tracing: error over time of each sampling strategy and peer, by scene
     Path(Box<BenchPathArgs>),
     /// Show, plot and compare saved JSON records of the benchmarks without measuring anything

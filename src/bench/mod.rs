@@ -1,7 +1,7 @@
 //! `skylit bench`: how fast skylit's tracers are, beside each other and beside those of others; and how fast and how good its
-//! real-time ambient occlusion and its path tracing are.
+//! real-time frames and its path tracing are.
 //!
-//! Each benchmark is a folder: `rays`, `ao`, `path`. What they share is beside them: `record` holds what they find, `table`, `plot` and `page` show it, `baseline`
+//! Each benchmark is a folder: `rays`, `ao`, `frames`, `path`. What they share is beside them: `record` holds what they find, `table`, `plot` and `page` show it, `baseline`
 //! compares it with an earlier run, `report` does so with records that were saved, `peers` runs the programs of others, `scenes` knows the well-known scenes,
 //! `session` is a run under way, and `device` alone opens the device and builds tracers.
 
@@ -10,6 +10,10 @@ mod args;
 mod baseline;
 mod common;
 mod device;
+mod frame_log;
+mod frames;
+mod lag;
+mod masks;
 mod page;
 mod path;
 mod peers;
@@ -35,6 +39,7 @@ pub fn run(args: &BenchArgs) -> Result<(), Failure> {
         args::Benchmark::Rays(args) => rays::run(args),
         args::Benchmark::Ao(args) => ao::run(args),
         args::Benchmark::Path(args) => path::run(args),
+        args::Benchmark::Frames(args) => frames::run(args),
         args::Benchmark::Report(args) => report::run(args),
     }
 }

@@ -5,13 +5,14 @@ use super::plot::axis::LogAxis;
 use super::plot::panel::{Mark, Panel, Point, Series};
 use super::plot::{self};
 use super::record::ao::AoBenchmark;
+use super::record::frames::FramesBenchmark;
 use super::record::path::PathBenchmark;
 use super::record::rays::RayBenchmark;
 use super::record::saved::SavedRecord;
 use super::record::{BenchKind, HostInfo};
 use super::report::ReportedRecord;
 use super::table::Block;
-use super::{ao, path, rays};
+use super::{ao, frames, path, rays};
 use crate::report::{self, Axis, Cell, Chart, Page, Part, Row, Scale, Section, Status, Table};
 
 /// A page of records. `command`: the command line that asked for it.
@@ -26,6 +27,7 @@ pub fn page(reported: &[ReportedRecord], command: &str) -> Page {
         own.extend(match &r.record {
             SavedRecord::Ao(record) => ao_sections(record),
             SavedRecord::Path(record) => path_sections(record),
+            SavedRecord::Frames(record) => frames_sections(record),
             SavedRecord::Rays(record) => rays_sections(record),
         });
         own.extend(notes(&r.record));
@@ -52,6 +54,7 @@ fn title(kind: BenchKind) -> &'static str {
         BenchKind::Rays => "Ray tracing",
         BenchKind::Ao => "Real-time ambient occlusion",
         BenchKind::Path => "Path tracing",
+        BenchKind::Frames => "Frames in real time",
     }
 }
 
@@ -61,6 +64,9 @@ fn summary(reported: &[ReportedRecord]) -> String {
         BenchKind::Rays => "How many rays a second each tracer traces.",
         BenchKind::Ao => "What a frame of each preset costs, and how far it is from the ground truth.",
         BenchKind::Path => "How the error of path-traced images falls with time.",
+        BenchKind::Frames => {
+            "What a frame of each preset costs, and how far it is from converged images, beside plain accumulation at equal time."
+        }
     };
     let judged = reported.iter().filter_map(|r| r.baseline.as_ref()).map(|b| match b.regressions.len() {
         0 => format!("Nothing is worse than in {} beyond noise.", b.file),
@@ -121,6 +127,18 @@ fn path_sections(record: &PathBenchmark) -> Vec<Section> {
         with_charts(&charts, &path::table::scene(scene))
     };
     record.scenes.iter().map(|s| Section::new(s.scene.clone(), section(s))).collect()
+}
+
+fn frames_sections(record: &FramesBenchmark) -> Vec<Section> {
+    let views = record.views.iter().map(|view| {
+        let charts = plot::frames::view(view, record.frames);
+        Section::new(view.scene.clone(), with_charts(&charts, &frames::table::view(view)))
+    });
+    let bounces = (!record.bounces.is_empty()).then(|| {
+        let charts: Vec<Panel> = plot::frames::bounces(&record.bounces).into_iter().collect();
+        Section::new("Bounces and time", with_charts(&charts, &frames::table::bounces(&record.bounces)))
+    });
+    views.chain(bounces).collect()
 }
 
 fn rays_sections(record: &RayBenchmark) -> Vec<Section> {

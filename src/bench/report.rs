@@ -8,6 +8,7 @@ use serde::Serialize;
 use super::ao;
 use super::baseline::{Baseline, BaselineReport};
 use super::common::OutputArgs;
+use super::frames;
 use super::path;
 use super::rays;
 use super::record::saved::SavedRecord;
@@ -129,6 +130,7 @@ fn blocks(record: &SavedRecord) -> Vec<Block> {
         SavedRecord::Rays(r) => rays::table::blocks(r),
         SavedRecord::Ao(r) => ao::table::blocks(r),
         SavedRecord::Path(r) => path::table::blocks(r),
+        SavedRecord::Frames(r) => frames::table::blocks(r),
     };
     let Completeness { stopped_early, notes } = record.completeness();
     blocks.extend(stopped_early.then(|| Block::line("the time limit ended it early")));

@@ -4,6 +4,8 @@
 use std::marker::PhantomData;
 use std::sync::Arc;
 
+use glam::DMat3;
+
 use super::display::Display;
 use super::resources::{Extent, Resource, Resources};
 use super::settings::Settings;
@@ -42,6 +44,8 @@ pub struct Frame<'a> {
     pub rest_starts: bool,
     /// Maximum samples of histories of radiance before this frame's.
     pub most_past: f32,
+    /// The environment map has been turned: its new rotation from world directions to the map's.
+    pub environment_turn: Option<DMat3>,
     /// Address of the frame's `FrameParams`.
     pub params: u64,
     /// The buffer to display, if any.

@@ -120,6 +120,8 @@ struct State {
     resting: u32,
     /// Lights or materials have changed: histories of radiance count little.
     has_new_light: bool,
+    /// The rotation to the environment map, if it is not yet on the device.
+    environment_turn: Option<DMat3>,
 }
 
 /// Samples for which a history of radiance counts after lights or materials have changed, per ray of a frame.
@@ -220,6 +222,15 @@ impl Realtime {
         if self.is_radiance {
             self.state.has_new_light = true;
             self.state.resting = 0;
+        }
+    }
+
+    /// Turns the environment map from the next frame on, and calls [`Realtime::change_light`]: `to_map` is the rotation from world directions to the map's
+    /// ([`crate::scene::EnvironmentMap::to_map`]). No other environment has a direction, and ambient visibility depends on none.
+    pub fn turn_environment(&mut self, to_map: DMat3) {
+        if self.is_radiance {
+            self.state.environment_turn = Some(to_map);
+            self.change_light();
         }
     }
 
@@ -325,6 +336,7 @@ impl Realtime {
                 true => PAST_AFTER_NEW_LIGHT * self.settings.rays_per_pixel as f32,
                 false => f32::MAX,
             },
+            environment_turn: self.state.environment_turn,
             params: self.params.address(),
             display: self.display,
         };
@@ -341,6 +353,7 @@ impl Realtime {
         self.state.resting = resting;
         self.state.offset = offset;
         self.state.has_new_light = false;
+        self.state.environment_turn = None;
         self.shown = Some(self.display);
         Ok(FrameStats {
             timings,

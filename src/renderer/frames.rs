@@ -372,12 +372,12 @@ pub(super) fn colour_channels(realtime: &Realtime) -> Result<Vec<Channel>> {
 }
 
 /// Returns true if frames of the integrator are ambient occlusion, and not radiance.
-pub(super) fn is_ambient_occlusion(integrator: IntegratorName) -> bool {
+pub fn is_ambient_occlusion(integrator: IntegratorName) -> bool {
     integrator == IntegratorName::default()
 }
 
 /// Scene data that frames with these settings need.
-pub(super) fn frame_needs(settings: &RenderSettings, how: &Settings) -> Needs {
+pub fn frame_needs(settings: &RenderSettings, how: &Settings) -> Needs {
     let integrator = settings.integrator();
     let needs = match is_ambient_occlusion(integrator) {
         true => Needs { normals: how.hemisphere == Hemisphere::Shading, ..Default::default() },
@@ -387,7 +387,7 @@ pub(super) fn frame_needs(settings: &RenderSettings, how: &Settings) -> Needs {
 }
 
 /// Streams that frames with these settings trace, as far as they are known before the scene is looked at.
-pub(super) fn frame_streams(settings: &RenderSettings, how: &Settings) -> Vec<&'static StreamShaders> {
+pub fn frame_streams(settings: &RenderSettings, how: &Settings) -> Vec<&'static StreamShaders> {
     match is_ambient_occlusion(settings.integrator()) {
         true => Realtime::streams(how).to_vec(),
         false => settings.integrator().get().streams(&settings.integrators),
@@ -398,7 +398,7 @@ pub(super) fn frame_streams(settings: &RenderSettings, how: &Settings) -> Vec<&'
 ///
 /// # Errors
 /// [`Error::Usage`] for settings that do not fit the camera.
-pub(super) fn frame_path_options(
+pub fn frame_path_options(
     settings: &RenderSettings,
     scene: &Scene,
     camera: &Camera,
@@ -416,7 +416,7 @@ pub(super) fn frame_path_options(
 ///
 /// # Errors
 /// Those of [`Realtime::new`] and [`Realtime::radiance`].
-pub(super) fn pipeline(
+pub fn pipeline(
     tracer: &Tracer,
     flat: &FlatScene,
     size: [u32; 2],
@@ -481,7 +481,7 @@ fn orbit(scene: &Scene, frames: f64) -> Result<Orbit> {
 }
 
 /// Returns true if a surface that emits light moves or deforms.
-fn moves_lights(flat: &FlatScene) -> bool {
+pub fn moves_lights(flat: &FlatScene) -> bool {
     let scene = flat.scene;
     let moves = |k: usize| flat.motion.instances.contains(&k) || flat.motion.meshes.contains(&scene.instances[k].mesh);
     let material = |k: usize| scene.materials.get(scene.meshes[scene.instances[k].mesh].material);

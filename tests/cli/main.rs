@@ -5,6 +5,7 @@ mod common;
 
 #[cfg(unix)]
 mod bench_ao;
+mod bench_frames;
 #[cfg(unix)]
 mod bench_path;
 #[cfg(unix)]

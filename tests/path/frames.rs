@@ -8,7 +8,7 @@ use skylit::integrators::path::{PathIntegrator, PixelFilter};
 use skylit::output::tone_map::ToneMap;
 use skylit::realtime::display::{Display, DisplayMode};
 use skylit::realtime::{Filter, FilterKind, Preset, Realtime, Settings};
-use skylit::scene::builtin;
+use skylit::scene::{EnvironmentMap, builtin};
 
 const SIZE: [u32; 2] = [32, 18];
 
@@ -188,6 +188,44 @@ fn gpu_frames_forget_what_has_changed_and_no_more() {
     let (kept, new) = (seen(&|n| n > 10.0), seen(&|n| n == 1.0));
     println!("{kept} pixels kept their history, {new} show another surface");
     assert!(kept > 20 * new && new > 0, "{kept} kept, {new} new");
+    assert_validation_clean(&device);
+}
+
+/// A map that is turned on the device lights frames and stills as one that was turned before.
+#[test]
+fn gpu_frames_under_a_map_that_turns() {
+    let device = device();
+    let lit = |to_map| {
+        let mut scene = scene("stairs");
+        let radiance = (0..32).map(|k| if k == 11 { Vec3::splat(40.0) } else { Vec3::new(0.2, 0.3, 0.5) }).collect();
+        let map = EnvironmentMap { name: "map".into(), width: 8, height: 4, radiance, factor: Vec3::ONE, to_map };
+        scene.environment = Environment::Map(map);
+        scene
+    };
+    let after = DMat3::from_rotation_y(1.0);
+    let [before, turned] = [DMat3::IDENTITY, after].map(lit);
+    let [flat, turned] = [&before, &turned].map(FlatScene::for_paths);
+    let [before, wanted] = [&flat, &turned].map(|flat| {
+        let tracer = tracer(&device, TracerKind::Compute, flat);
+        render(&tracer, flat, &options(4)).image.film.mean
+    });
+    assert!(rmse(&before, &wanted) > 0.05, "the map looks alike from all sides");
+    let tracer = tracer(&device, TracerKind::Compute, &flat);
+    let camera = record(flat.scene, &flat.scene.cameras[0]);
+    let mut frames = frames(&tracer, &flat, &plain(4), &options(4));
+    frames.frame(&tracer, &camera, &[]).unwrap();
+    let first = frames.result().unwrap();
+    // the same samples again
+    frames.turn_environment(after);
+    frames.rewind();
+    frames.frame(&tracer, &camera, &[]).unwrap();
+    let mut integrator = PathIntegrator::new(&tracer, &flat, &options(4)).unwrap();
+    integrator.turn_environment(&after).unwrap();
+    let still = integrator.render(&tracer, &camera, 4, 5, &mut NoControl).unwrap().image.film.mean;
+    for (got, wanted) in [(&first, &before), (&frames.result().unwrap(), &wanted), (&still, &wanted)] {
+        let close = |(a, b): (&f32, &f32)| (a - b).abs() <= 2e-5 * b.abs().max(0.01);
+        assert!(got.iter().zip(wanted).all(close), "RMSE {}", rmse(got, wanted));
+    }
     assert_validation_clean(&device);
 }
 

@@ -31,7 +31,7 @@ mod whitted;
 use std::sync::{Arc, OnceLock};
 
 use common::{assert_validation_clean, tracers};
-use glam::{DAffine3, DVec3, Vec3};
+use glam::{DAffine3, DMat3, DVec3, Vec3};
 use skylit::accel::flatten::FlatScene;
 use skylit::film::Film;
 use skylit::film::NoControl;

@@ -1,9 +1,9 @@
 //! How good the preset `balanced` is when it may take as long as the pipeline of the reference work.
 
 use super::candidates::CANDIDATES;
-use super::frame_log::FrameLog;
 use super::reference::AoReference;
-use super::view_renderer::{ViewRenderer, first_timed};
+use super::view_renderer::ViewRenderer;
+use crate::bench::frame_log::{FrameLog, first_timed};
 use crate::bench::record::ao::{EqualTime, ViewRecord};
 use crate::bench::record::ao_verdict::{OURS, THEIRS};
 use crate::error::Result;

@@ -5,7 +5,6 @@ mod args;
 mod candidates;
 mod changes;
 mod equal_time;
-mod frame_log;
 mod orbit;
 mod reference;
 mod scenes;

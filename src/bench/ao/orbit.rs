@@ -1,27 +1,14 @@
 //! A camera on an orbit, and reference images along it.
 
 use super::candidates::Candidate;
-use super::frame_log::FrameLog;
 use super::reference::{AoReference, ReferenceRenderer};
-use super::view_renderer::{ViewRenderer, first_timed};
+use super::view_renderer::ViewRenderer;
+use crate::bench::frame_log::{FRAMES_PER_TURN, FrameLog, first_timed, measured};
 use crate::bench::record::ao::{ImageErrors, OrbitRecord};
 use crate::error::Result;
 use crate::film::camera::CameraRecord;
 use crate::realtime::Technique;
 use crate::scene::{Camera, Orbit};
-
-/// Frames in which it would be back.
-const FRAMES_PER_TURN: f64 = 720.0;
-/// Frames with a reference.
-const REFERENCES: u32 = 4;
-
-/// Frames of a sequence in which its error is measured, counted from 0: in its second half, the last included.
-pub fn measured(frames: u32) -> Vec<u32> {
-    let half = frames / 2;
-    let mut at: Vec<u32> = (1..=REFERENCES).map(|k| frames - half + half * k / REFERENCES).map(|end| end.max(1) - 1).collect();
-    at.dedup();
-    at
-}
 
 /// Cameras of an orbit, a frame each, and the references of some frames.
 pub struct OrbitRun {
@@ -70,17 +57,5 @@ impl OrbitRun {
             unfiltered: ImageErrors::mean(&unfiltered),
             reference_rmse: self.references.iter().map(|t| t.1.rmse).sum::<f64>() / references,
         })
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn errors_are_measured_late() {
-        assert_eq!(measured(64), [39, 47, 55, 63]);
-        assert_eq!(measured(16), [9, 11, 13, 15]);
-        assert_eq!(measured(4), [1, 2, 3]);
     }
 }

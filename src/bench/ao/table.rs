@@ -1,9 +1,9 @@
 //! The tables of `skylit bench ao`.
 
 use crate::bench::record::ao::{
-    AoBenchmark, ChangeRecord, ChangeResult, FrameCost, ImageErrors, SeriesRecord, StructureRecord, TechniqueRecord, Verdict,
-    ViewRecord,
+    AoBenchmark, ChangeRecord, ChangeResult, ImageErrors, SeriesRecord, StructureRecord, TechniqueRecord, Verdict, ViewRecord,
 };
+use crate::bench::record::cost::FrameCost;
 use crate::bench::table::{Block, header, number, optional, thousands};
 use crate::measure::stats::Percentiles;
 

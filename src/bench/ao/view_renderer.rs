@@ -1,8 +1,8 @@
 //! Runs of frames of one view of a scene.
 
 use super::candidates::{Candidate, Occlusion};
-use super::frame_log::FrameLog;
 use super::reference::AoReference;
+use crate::bench::frame_log::{FrameLog, first_timed};
 use crate::bench::record::ao::{ErrorPoint, ImageErrors, RestRecord, StillRecord};
 use crate::error::Result;
 use crate::film::camera::CameraRecord;
@@ -42,11 +42,6 @@ pub fn trembling(camera: &CameraRecord, frame: u32) -> CameraRecord {
 /// Frames of a run of `settings` out of `frames`.
 pub fn run_length(settings: &Settings, frames: u32) -> u32 {
     if settings.history == 1 && settings.technique == Technique::Traced { frames.min(WITHOUT_HISTORY) } else { frames }
-}
-
-/// The first of so many frames whose time counts: half of them compile, fill caches and histories.
-pub fn first_timed(frames: u32) -> usize {
-    frames as usize / 2
 }
 
 impl ViewRenderer<'_> {

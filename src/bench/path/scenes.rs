@@ -1,23 +1,17 @@
 //! Which scenes are measured, what lights them, and from where they are seen.
 
 use std::path::Path;
-use std::sync::Arc;
 
-use glam::{DAffine3, DMat3, DVec3, Vec3};
+use glam::{DAffine3, DVec3, Vec3};
 
 use super::args::BenchPathArgs;
-use crate::bench::scenes::{FLIGHT_HELMET, SPONZA, SceneList, WellKnownScene, check_exists, shared_folder};
+use crate::bench::scenes::{FLIGHT_HELMET, SPONZA, SceneList, WellKnownScene, check_exists, sun_map};
 use crate::error::Result;
 use crate::film::camera::{self, Choice};
 use crate::scene::builtin::shapes;
 use crate::scene::light_spec;
 use crate::scene::material::MaterialKind;
-use crate::scene::{Camera, Environment, EnvironmentMap, Instance, Material, Mesh, Scene, load};
-
-/// The map with a sun in it, below the folder of shared scenes.
-const SUN_MAP: &str = "env/spruit_sunrise_1k.hdr";
-/// Pixels of our own map: a texel is 0.7 degrees, about the sun.
-const OWN_MAP: [u32; 2] = [512, 256];
+use crate::scene::{Camera, Environment, Instance, Material, Mesh, Scene, load};
 
 /// Well-known scenes that are measured.
 const FILES: [&WellKnownScene; 2] = [&FLIGHT_HELMET, &SPONZA];
@@ -89,7 +83,7 @@ pub fn load(source: &str, args: &BenchPathArgs, aspect: f64) -> Result<PathScene
     let is_emissive = |m: &Mesh| scene.materials[m.material].emissive != Vec3::ZERO;
     let dark = scene.environment == Environment::Black && scene.lights.is_empty() && !scene.meshes.iter().any(is_emissive);
     if dark || args.environment.is_some() {
-        scene.environment = Environment::Map(map(args)?);
+        scene.environment = Environment::Map(sun_map(args.environment.as_deref(), args.common.quick)?);
     }
     if let Some(Ok(light)) = known.and_then(|k| k.area_light).map(light_spec::parse) {
         light.add(&mut scene);
@@ -102,32 +96,6 @@ pub fn load(source: &str, args: &BenchPathArgs, aspect: f64) -> Result<PathScene
         Environment::Map(map) => format!("{} ({}x{})", map.name, map.width, map.height),
     };
     Ok(PathScene { scene, camera, environment })
-}
-
-/// The environment that is asked for, the shared one, or our own.
-fn map(args: &BenchPathArgs) -> Result<EnvironmentMap> {
-    let shared = shared_folder().join(SUN_MAP);
-    match &args.environment {
-        Some(path) => load::load_environment(path),
-        None if shared.is_file() && !args.common.quick => load::load_environment(&shared),
-        None => Ok(own_map()),
-    }
-}
-
-/// A sky of our own: blue above, brown below, and a sun that is 10^4 times as bright as both.
-fn own_map() -> EnvironmentMap {
-    let [width, height] = OWN_MAP;
-    let sun = DVec3::new(0.5, 0.6, 0.62).normalize();
-    let texel = |k: u32| {
-        let (x, y) = (f64::from(k % width) + 0.5, f64::from(k / width) + 0.5);
-        let (phi, theta) = (std::f64::consts::TAU * (x / f64::from(width) - 0.5), std::f64::consts::PI * y / f64::from(height));
-        let d = DVec3::new(theta.sin() * phi.sin(), theta.cos(), -theta.sin() * phi.cos());
-        let sky = if d.y > 0.0 { Vec3::new(0.5, 0.7, 1.0) } else { Vec3::new(0.3, 0.25, 0.2) };
-        // half a degree across, and no less than a texel
-        if d.dot(sun) > 0.4f64.to_radians().cos() { Vec3::new(1.0e4, 9.0e3, 7.0e3) } else { sky }
-    };
-    let radiance: Arc<[Vec3]> = (0..width * height).map(texel).collect();
-    EnvironmentMap { name: "own sun map".into(), width, height, radiance, factor: Vec3::ONE, to_map: DMat3::IDENTITY }
 }
 
 fn ball_scene(ball: &Ball) -> Scene {
@@ -160,16 +128,6 @@ pub fn name(source: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn our_own_map_has_one_sun() {
-        let map = own_map();
-        let bright = map.radiance.iter().filter(|r| r.x > 100.0).count();
-        assert!((1..=4).contains(&bright), "{bright} texels of sun");
-        // seen upwards
-        let at = map.radiance.iter().position(|r| r.x > 100.0).unwrap();
-        assert!(at / (OWN_MAP[0] as usize) < OWN_MAP[1] as usize / 2);
-    }
 
     #[test]
     fn lights_of_known_scenes_are_lights() {

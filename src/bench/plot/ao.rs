@@ -4,8 +4,9 @@
 use super::host_line;
 use super::panel::{Panel, Plot, Point, Series};
 use crate::bench::record::ao::{
-    AoBenchmark, ChangeRecord, FrameCost, SeriesLine, SeriesPoint, SeriesRecord, StillRecord, TechniqueRecord, ViewRecord,
+    AoBenchmark, ChangeRecord, SeriesLine, SeriesPoint, SeriesRecord, StillRecord, TechniqueRecord, ViewRecord,
 };
+use crate::bench::record::cost::FrameCost;
 use crate::bench::record::without_reference;
 use crate::measure::stats::Percentiles;
 

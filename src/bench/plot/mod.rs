@@ -1,11 +1,12 @@
 //! Benchmarks as plots: a series a contestant, a panel a scene, a stream of rays, or a number that is varied.
 //!
-//! `ao`, `path` and `rays` say what is shown of a record, as data (`panel`); `picture` draws it as PNG or SVG, on logarithmic axes (`axis`), with labels that
+//! `ao`, `frames`, `path` and `rays` say what is shown of a record, as data (`panel`); `picture` draws it as PNG or SVG, on logarithmic axes (`axis`), with labels that
 //! keep clear of each other (`report::labels`). What is quicker and more exact than others is found by `pareto`.
 
 pub mod ao;
 pub mod axis;
 mod draw;
+pub mod frames;
 mod layout;
 pub mod panel;
 mod pareto;
@@ -24,6 +25,7 @@ fn of(record: &SavedRecord) -> Plot {
         SavedRecord::Rays(r) => rays::plot(r),
         SavedRecord::Ao(r) => ao::plot(r),
         SavedRecord::Path(r) => path::plot(r),
+        SavedRecord::Frames(r) => frames::plot(r),
     }
 }
 

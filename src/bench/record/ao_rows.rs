@@ -2,7 +2,8 @@
 
 use std::io::Write;
 
-use super::ao::{AoBenchmark, ChangeResult, FrameCost, ImageErrors, SeriesPoint, StillRecord};
+use super::ao::{AoBenchmark, ChangeResult, ImageErrors, SeriesPoint, StillRecord};
+use super::cost::FrameCost;
 use super::saved::SavedRecord;
 use super::{BenchRecord, Completeness};
 use crate::measure::stats::Percentiles;
@@ -217,7 +218,8 @@ fn series_rows(series: &str, line: &str, p: &SeriesPoint) -> Vec<Row> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::bench::record::ao::{ErrorPoint, PassTime, TechniqueRecord, ViewRecord};
+    use crate::bench::record::ao::{ErrorPoint, TechniqueRecord, ViewRecord};
+    use crate::bench::record::cost::PassTime;
 
     #[test]
     fn a_row_a_result() {

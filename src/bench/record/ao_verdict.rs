@@ -52,7 +52,8 @@ fn raises(r: &TechniqueRecord) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::bench::record::ao::{ErrorPoint, FrameCost, ImageErrors};
+    use crate::bench::record::ao::{ErrorPoint, ImageErrors};
+    use crate::bench::record::cost::FrameCost;
 
     fn result(preset: &str, rays: f64, camera_rays: f64, rmse: &[f64], unfiltered: f64) -> TechniqueRecord {
         let cost = |camera_rays| FrameCost { rays, camera_rays, ..Default::default() };

@@ -3,6 +3,8 @@
 pub mod ao;
 mod ao_rows;
 pub mod ao_verdict;
+pub mod cost;
+pub mod frames;
 pub mod path;
 pub mod rays;
 pub mod saved;
@@ -25,6 +27,8 @@ pub enum BenchKind {
     Ao,
     /// Path tracing.
     Path,
+    /// Frames in real time, of any integrator.
+    Frames,
 }
 
 impl BenchKind {
@@ -34,6 +38,7 @@ impl BenchKind {
             Self::Rays => "rays",
             Self::Ao => "ao",
             Self::Path => "path",
+            Self::Frames => "frames",
         }
     }
 }

@@ -5,6 +5,7 @@ use std::path::Path;
 use serde_json::Value;
 
 use super::ao::AoBenchmark;
+use super::frames::FramesBenchmark;
 use super::path::PathBenchmark;
 use super::rays::RayBenchmark;
 use super::snapshot::{Comparable, Snapshot};
@@ -20,6 +21,8 @@ pub enum SavedRecord {
     Ao(Box<AoBenchmark>),
     /// Of `skylit bench path`.
     Path(Box<PathBenchmark>),
+    /// Of `skylit bench frames`.
+    Frames(Box<FramesBenchmark>),
 }
 
 impl SavedRecord {
@@ -36,6 +39,7 @@ impl SavedRecord {
             BenchKind::Rays => serde_json::from_value(value).map(Self::Rays),
             BenchKind::Ao => serde_json::from_value(value).map(Self::Ao),
             BenchKind::Path => serde_json::from_value(value).map(Self::Path),
+            BenchKind::Frames => serde_json::from_value(value).map(Self::Frames),
         };
         record.map_err(|e| broken(e.to_string()))
     }
@@ -46,6 +50,7 @@ impl SavedRecord {
             Self::Rays(_) => BenchKind::Rays,
             Self::Ao(_) => BenchKind::Ao,
             Self::Path(_) => BenchKind::Path,
+            Self::Frames(_) => BenchKind::Frames,
         }
     }
 
@@ -55,6 +60,7 @@ impl SavedRecord {
             Self::Rays(r) => &r.host,
             Self::Ao(r) => &r.host,
             Self::Path(r) => &r.host,
+            Self::Frames(r) => &r.host,
         }
     }
 
@@ -64,6 +70,7 @@ impl SavedRecord {
             Self::Rays(r) => &r.completeness,
             Self::Ao(r) => &r.completeness,
             Self::Path(r) => &r.completeness,
+            Self::Frames(r) => &r.completeness,
         }
     }
 
@@ -73,6 +80,7 @@ impl SavedRecord {
             Self::Rays(r) => r.snapshot(),
             Self::Ao(r) => r.snapshot(),
             Self::Path(r) => r.snapshot(),
+            Self::Frames(r) => r.snapshot(),
         }
     }
 }
@@ -138,6 +146,7 @@ mod tests {
         let kind = |text: &str| read(text).map(|r| r.kind());
         assert_eq!(kind(&serde_json::to_string(&RayBenchmark::default()).unwrap()).unwrap(), BenchKind::Rays);
         assert_eq!(kind(&serde_json::to_string(&PathBenchmark::default()).unwrap()).unwrap(), BenchKind::Path);
+        assert_eq!(kind(r#"{"benchmark":"frames"}"#).unwrap(), BenchKind::Frames);
         assert_eq!(kind(r#"{"benchmark":"ao"}"#).unwrap(), BenchKind::Ao);
         for broken in ["", "[]", "{}", r#"{"benchmark":"time"}"#, r#"{"benchmark":"ao","views":3}"#] {
             let error = read(broken).unwrap_err();

@@ -1,6 +1,8 @@
 //! What is compared between two records of a benchmark: its settings, and its results one by one.
 
-use super::ao::{AoBenchmark, FrameCost, StillRecord};
+use super::ao::{AoBenchmark, StillRecord};
+use super::cost::FrameCost;
+use super::frames::FramesBenchmark;
 use super::path::{OWN, PathBenchmark};
 use super::rays::RayBenchmark;
 use super::{BenchKind, HostInfo};
@@ -200,5 +202,47 @@ impl Comparable for PathBenchmark {
         }
         let settings = vec![("tracer", self.tracer.clone())];
         Snapshot { kind: BenchKind::Path, host: self.host.clone(), settings, results }
+    }
+}
+
+impl Comparable for FramesBenchmark {
+    /// Times of frames, and errors and flicker of the presets. Seeds are those of every run, so these have no noise; those of plain accumulation depend on times.
+    fn snapshot(&self) -> Snapshot {
+        let mut results = Vec::new();
+        for view in &self.views {
+            for r in &view.still {
+                let mut row = Row::new(&mut results, format!("{}, still, {}", view.scene, r.preset));
+                row.cost("ms a frame", Some(&r.cost));
+                row.exact("RMSE", r.curve.last().map(|p| p.errors.rmse));
+                row.exact("flicker", r.flicker.map(|f| f.rms));
+            }
+            for m in &view.motions {
+                for r in &m.results {
+                    let mut row = Row::new(&mut results, format!("{}, {}, {}", view.scene, m.motion, r.preset));
+                    row.cost("ms a frame", Some(&r.cost));
+                    row.exact("RMSE", Some(r.errors.rmse));
+                }
+            }
+            for c in &view.changes {
+                for r in &c.results {
+                    let mut row = Row::new(&mut results, format!("{}, {}, {}", view.scene, c.change, r.preset));
+                    row.exact("RMSE of the first frame", r.rmse.first().copied());
+                }
+            }
+        }
+        for b in &self.bounces {
+            for p in &b.points {
+                let mut row = Row::new(&mut results, format!("{}, {} bounces, {}", b.scene, p.bounces, b.preset));
+                row.cost("ms a frame", Some(&p.cost));
+            }
+        }
+        let settings = vec![
+            ("tracer", self.tracer.clone()),
+            ("integrator", self.integrator.clone()),
+            ("size", format!("{}x{}", self.size[0], self.size[1])),
+            ("frames", self.frames.to_string()),
+            ("reference paths", self.reference_paths.to_string()),
+        ];
+        Snapshot { kind: BenchKind::Frames, host: self.host.clone(), settings, results }
     }
 }

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use glam::Vec3;
+use glam::{DMat3, Vec3};
 
 use super::lights::brightness;
 use super::params::EnvironmentRecord;
@@ -40,18 +40,21 @@ impl DeviceEnvironment {
         let texels: Vec<[f32; 4]> = map.radiance.iter().zip(&weights).map(|(c, &l)| c.extend(l as f32).to_array()).collect();
         let texels = Buffer::from_slice(device, "environment", &texels)?;
         let table = Buffer::from_slice(device, "environment distribution", &distribution.table)?;
-        let m = map.to_map;
-        let row = |k: usize| [m.x_axis[k] as f32, m.y_axis[k] as f32, m.z_axis[k] as f32, 0.0];
         let record = EnvironmentRecord {
             texels: texels.address(),
             table: table.address(),
             width: map.width,
             height: map.height,
-            to_map: [row(0), row(1), row(2)],
+            to_map: rows(&map.to_map),
             ..Default::default()
         };
         Ok(Self { map: record, factor: map.factor, mean: mean_radiance(map) * map.factor, _buffers: vec![texels, table] })
     }
+}
+
+/// A rotation as shaders read it.
+pub(super) fn rows(m: &DMat3) -> [[f32; 4]; 3] {
+    [0, 1, 2].map(|k| [m.x_axis[k] as f32, m.y_axis[k] as f32, m.z_axis[k] as f32, 0.0])
 }
 
 /// Subtracts the mean over the sphere from the weights and clamps at 0: "MIS compensation" (Karlik, Sik, Vevoda, Skrivan, Krivanek, SIGGRAPH Asia 2019, section

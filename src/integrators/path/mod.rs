@@ -17,6 +17,8 @@ mod report;
 pub mod settings;
 pub mod signal;
 
+use glam::DMat3;
+
 use crate::accel::flatten::FlatScene;
 use crate::error::{Error, Result};
 use crate::film::Control;
@@ -103,6 +105,14 @@ impl PathIntegrator {
     /// Number of lights that light sampling chooses from, the environment and each portal included; 0 without light sampling.
     pub fn lights(&self) -> u32 {
         self.paths.lights
+    }
+
+    /// Turns the environment map: `to_map` is the rotation from world directions to the map's. Other environments look the same from all sides.
+    ///
+    /// # Errors
+    /// Those of the device.
+    pub fn turn_environment(&mut self, to_map: &DMat3) -> Result<()> {
+        self.paths.turn_environment(to_map)
     }
 
     /// Renders `spp` paths per pixel. `tracer` must be the one that the integrator was created with.
@@ -404,8 +414,18 @@ impl PathEstimator {
         let Some(volumes) = &self.volumes else { return Ok(()) };
         let eye = glam::DVec3::from_array([0, 1, 2].map(|row| f64::from(camera.camera_to_world[row][3])));
         let camera_media = volumes.around(eye);
+        self.change_records(|record| record.camera_media = camera_media)
+    }
+
+    /// Turns the environment map.
+    fn turn_environment(&mut self, to_map: &DMat3) -> Result<()> {
+        let rows = environment::rows(to_map);
+        self.change_records(|record| record.map.to_map = rows)
+    }
+
+    fn change_records(&mut self, change: impl Fn(&mut PathParams)) -> Result<()> {
         for (record, buffer) in self.records.iter_mut().zip(&mut self.path_params) {
-            record.camera_media = camera_media;
+            change(record);
             buffer.write(0, bytemuck::bytes_of(record))?;
         }
         Ok(())

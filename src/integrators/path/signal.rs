@@ -1,6 +1,8 @@
 //! Paths for frames in real time: their diffuse reflection is kept apart from the rest, so that both can be filtered, and what they are reprojected and filtered by
 //! is found by rays of its own ([`SignalPaths::surfaces`]).
 
+use glam::DMat3;
+
 use super::{PathEstimator, PathOptions};
 use crate::accel::flatten::FlatScene;
 use crate::error::Result;
@@ -96,6 +98,14 @@ impl SignalPaths {
     /// Device address of the parameters of paths, for other shaders.
     pub fn params_address(&self) -> u64 {
         self.paths.path_params[0].address()
+    }
+
+    /// Turns the environment map: `to_map` is the rotation from world directions to the map's.
+    ///
+    /// # Errors
+    /// Those of the device.
+    pub fn turn_environment(&mut self, to_map: &DMat3) -> Result<()> {
+        self.paths.turn_environment(to_map)
     }
 
     /// Begins a frame: the camera and its block, with [`BlockParams::frame`] and [`BlockParams::centre_offset`].

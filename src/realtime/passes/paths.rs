@@ -49,6 +49,9 @@ impl Pass for Paths {
     }
 
     fn prepare(&mut self, frame: &Frame, _: &Resources) -> Result<()> {
+        if let Some(to_map) = &frame.environment_turn {
+            self.paths.turn_environment(to_map)?;
+        }
         self.paths.begin(&frame.camera, &super::surfaces::block_params(frame))
     }
 

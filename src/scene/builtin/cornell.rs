@@ -6,7 +6,7 @@
 
 use super::shapes;
 use crate::scene::material::{MaterialKind, Transmission};
-use crate::scene::{Geometry, Material, Scene};
+use crate::scene::{Environment, Geometry, Material, Scene};
 use glam::{DAffine3, DVec3, Vec3};
 
 /// Data in millimetres.
@@ -30,6 +30,16 @@ fn block((base, height): ([[f64; 2]; 4], f64)) -> Geometry {
     let at = |k: usize, y: f64| mm(base[k % 4][0], y, base[k % 4][1]);
     let mut faces = vec![[at(0, height), at(1, height), at(2, height), at(3, height)]];
     faces.extend((0..4).map(|k| [at(k, 0.0), at(k + 1, 0.0), at(k + 1, height), at(k, height)]));
+    shapes::quads(&faces)
+}
+
+/// A block with its bottom, a millimetre above the floor.
+fn closed_block((base, height): ([[f64; 2]; 4], f64)) -> Geometry {
+    let at = |k: usize, y: f64| mm(base[k % 4][0], y, base[k % 4][1]);
+    let [top, bottom] = [height, 1.0];
+    let mut faces =
+        vec![[at(0, top), at(1, top), at(2, top), at(3, top)], [at(3, bottom), at(2, bottom), at(1, bottom), at(0, bottom)]];
+    faces.extend((0..4).map(|k| [at(k, bottom), at(k + 1, bottom), at(k + 1, top), at(k, top)]));
     shapes::quads(&faces)
 }
 
@@ -100,6 +110,34 @@ pub fn cornell_box() -> Scene {
     let mut scene = walls("cornell-box");
     scene.add_object("short block", block(SHORT), 0, DAffine3::IDENTITY);
     scene.add_object("tall block", block(TALL), 0, DAffine3::IDENTITY);
+    scene
+}
+
+/// The boxes of Coello (2024), open to the camera, under a white sky: (1) empty and matte; (2) matte, its tall block of metal; (3) glossy, its back wall of metal.
+pub fn coello(number: u32) -> Scene {
+    let mut scene = walls("coello");
+    scene.environment = Environment::Uniform(Vec3::ONE);
+    // the sky is the only light
+    scene.instances.retain(|i| i.name != "light");
+    let kind = if number == 3 { MaterialKind::MetallicRoughness } else { MaterialKind::Matte };
+    scene.materials.iter_mut().for_each(|m| (m.kind, m.roughness, m.emissive) = (kind, 0.3, Vec3::ZERO));
+    let metal = scene.add_material(Material {
+        name: "metal".to_owned(),
+        kind: MaterialKind::MetallicRoughness,
+        base_color: Vec3::new(0.91, 0.92, 0.92).extend(1.0),
+        metallic: 1.0,
+        roughness: 0.2,
+        ..Material::default()
+    });
+    if number == 3 {
+        let back = scene.instances.iter().find(|i| i.name == "back").map(|i| i.mesh);
+        back.into_iter().for_each(|mesh| scene.meshes[mesh].material = metal);
+    }
+    if number > 1 {
+        scene.add_object("short block", closed_block(SHORT), 0, DAffine3::IDENTITY);
+        let tall = if number == 2 { metal } else { 0 };
+        scene.add_object("tall block", closed_block(TALL), tall, DAffine3::IDENTITY);
+    }
     scene
 }
 

@@ -33,6 +33,10 @@ const NAMES: &[BuiltinInfo] = &[
     info("cornell-mirror", "the Cornell box, its tall block a mirror"),
     info("cornell-glass-sphere", "the Cornell box with a tall block and an analytic sphere of glass"),
     info("cornell-spheres", "the Cornell box with analytic spheres: mirror, glass and matte"),
+    info(
+        "coello",
+        "the Cornell boxes of Coello (2024) under a white sky: matte, with a box of metal, glossy (coello:N, 1 to 3, default 1)",
+    ),
     info("sphere-over-plane", "an analytic sphere that floats over a plane; AO has a closed form"),
     info("v-groove", "two walls that meet at ANGLE degrees (v-groove:ANGLE, 1 to 180, default 90); AO is (1 - cos ANGLE) / 2"),
     info("closed-box", "the inside of a closed box; AO is 0 everywhere"),
@@ -88,6 +92,7 @@ fn recipe(name: &str) -> Option<Box<dyn FnOnce() -> Scene>> {
             let angle = number(90.0, 1.0, 180.0)?.to_radians();
             return Some(Box::new(move || analytic::v_groove(angle, 4.0, 12.0, SceneTransform::default())));
         }
+        "coello" => return with(cornell::coello, between(1, 1, 3)),
         "grid" => return with(many::grid, between(6, 1, 128)),
         "spheres" => return with(many::spheres, between(1000, 1, 10_000_000)),
         "terrain" => return with(terrain::terrain, between(100_000, 2, 100_000_000)),

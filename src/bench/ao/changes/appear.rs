@@ -1,11 +1,11 @@
 //! Something appears under a camera that stands still: how long the image without it stays.
 
-use super::masks;
 use super::script::ChangeScript;
 use super::stage::{ChangeStage, afresh, candidates, ghost, lag, result_of, settled};
-use crate::bench::ao::frame_log::FrameLog;
 use crate::bench::ao::reference::AoReference;
 use crate::bench::ao::session::AoSession;
+use crate::bench::frame_log::FrameLog;
+use crate::bench::masks;
 use crate::bench::record::ao::{ChangeRecord, ChangeResult};
 use crate::error::Result;
 use crate::measure::stats::Percentiles;

@@ -1,7 +1,6 @@
 //! Scenes that change while they are seen: something appears, something slides, the camera steps aside.
 
 mod appear;
-mod masks;
 mod room;
 mod script;
 mod sequence;

@@ -1,13 +1,11 @@
 //! Something moves in every frame: errors, ghosts, and what keeping up costs.
 
-use super::masks;
 use super::script::ChangeScript;
 use super::stage::{ChangeStage, candidates, ghost, result_of, settled};
-use crate::bench::ao::frame_log::FrameLog;
-use crate::bench::ao::orbit::measured;
 use crate::bench::ao::reference::AoReference;
 use crate::bench::ao::session::AoSession;
-use crate::bench::ao::view_renderer::first_timed;
+use crate::bench::frame_log::{FrameLog, first_timed, measured};
+use crate::bench::masks;
 use crate::bench::record::ao::{ChangeRecord, ImageErrors};
 use crate::error::Result;
 use crate::measure::stats::Percentiles;

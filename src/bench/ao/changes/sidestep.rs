@@ -2,11 +2,11 @@
 
 use glam::DVec3;
 
-use super::masks;
 use super::script::ChangeScript;
 use super::stage::{ChangeStage, RECOVERED, candidates, result_of};
-use crate::bench::ao::frame_log::FrameLog;
 use crate::bench::ao::session::AoSession;
+use crate::bench::frame_log::FrameLog;
+use crate::bench::masks;
 use crate::bench::record::ao::ChangeRecord;
 use crate::error::Result;
 use crate::film::camera::CameraRecord;

@@ -1,10 +1,11 @@
 //! What all changes share: where they are played, and what their frames are held against.
 
 use crate::bench::ao::candidates::{Candidate, Occlusion};
-use crate::bench::ao::frame_log::FrameLog;
 use crate::bench::ao::reference::{AoReference, ReferenceRenderer};
 use crate::bench::ao::session::AoSession;
 use crate::bench::ao::view_renderer::ViewRenderer;
+use crate::bench::frame_log::FrameLog;
+use crate::bench::lag;
 use crate::bench::record::ao::ChangeResult;
 use crate::error::Result;
 use crate::film::camera::CameraRecord;
@@ -62,9 +63,7 @@ pub fn ghost(
     (reference, wrong): (&AoReference, &AoReference),
     mask: &[f32],
 ) -> Option<Residual> {
-    // as if it settled at the reference
-    let shifted: Vec<f32> = image.iter().zip(settled).zip(&reference.image).map(|((v, s), t)| v - s + t).collect();
-    ghosting.add(&shifted, &reference.image, &wrong.image, Some(mask))
+    lag::add_ghost(ghosting, (image, settled), (&reference.image, &wrong.image), Some(mask))
 }
 
 /// What a preset shows of a scene that does not change, in each of `frames` frames from now on, without any past.

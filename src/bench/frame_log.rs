@@ -2,13 +2,31 @@
 
 use std::time::Instant;
 
-use crate::bench::record::ao::{FrameCost, PassTime};
+use super::record::cost::{FrameCost, PassTime};
 use crate::error::Result;
 use crate::film::camera::CameraRecord;
 use crate::measure::stats::Percentiles;
 use crate::realtime::{FrameStats, Realtime, Technique};
 use crate::terminal::interrupt;
 use crate::tracer::{MovedBounds, Tracer};
+
+/// Frames in which a camera on an orbit is back.
+pub const FRAMES_PER_TURN: f64 = 720.0;
+/// Frames of a sequence with a reference.
+const REFERENCES: u32 = 4;
+
+/// The first of so many frames whose time counts: half of them compile, fill caches and histories.
+pub fn first_timed(frames: u32) -> usize {
+    frames as usize / 2
+}
+
+/// Frames of a sequence in which its error is measured, counted from 0: in its second half, the last included.
+pub fn measured(frames: u32) -> Vec<u32> {
+    let half = frames / 2;
+    let mut at: Vec<u32> = (1..=REFERENCES).map(|k| frames - half + half * k / REFERENCES).map(|end| end.max(1) - 1).collect();
+    at.dedup();
+    at
+}
 
 /// Frames that were made.
 #[derive(Default)]
@@ -107,6 +125,13 @@ fn pass(label: &str) -> &str {
 mod tests {
     use super::*;
     use crate::gpu::Timing;
+
+    #[test]
+    fn errors_are_measured_late() {
+        assert_eq!(measured(64), [39, 47, 55, 63]);
+        assert_eq!(measured(16), [9, 11, 13, 15]);
+        assert_eq!(measured(4), [1, 2, 3]);
+    }
 
     #[test]
     fn steps_of_a_pass_are_added() {

@@ -1,0 +1,288 @@
+//! The signal that frames carry, radiance or ambient visibility: who makes frames of it, and who makes images of independent samples, plain and converged.
+
+use std::time::Instant;
+
+use glam::DMat3;
+
+use super::args::BenchFramesArgs;
+use crate::accel::flatten::FlatScene;
+use crate::bench::record::cost::FrameCost;
+use crate::error::Result;
+use crate::film::camera::CameraRecord;
+use crate::integrators::path::{PathIntegrator, PathOptions};
+use crate::measure::stats::median;
+use crate::realtime::{Filter, FilterKind, Preset, Realtime, Settings};
+use crate::renderer::RenderSettings;
+use crate::renderer::frames::{frame_needs, frame_path_options, frame_settings, frame_streams, is_ambient_occlusion, pipeline};
+use crate::scene::Camera;
+use crate::settings::{Capability, Length};
+use crate::shaders::StreamShaders;
+use crate::terminal::interrupt::{self, SilentControl};
+use crate::tracer::{Needs, Tracer};
+
+/// Paths of a pixel in one image at most.
+const MAX_PATHS: u32 = 1 << 16;
+/// Occlusion rays of a pixel in one launch at most.
+const MAX_RAYS: u32 = 256;
+/// Paths of a pixel in the images whose times are taken: what an image costs besides its paths is told by two numbers of them.
+const TIMED_PATHS: [u32; 2] = [1, 9];
+
+/// What frames of one scene show.
+pub struct Signal {
+    settings: RenderSettings,
+    size: [u32; 2],
+}
+
+impl Signal {
+    /// What the arguments ask for; ambient occlusion up to `reach` scene units, paths of at most `bounces` (`None`: the integrator's).
+    pub fn new(args: &BenchFramesArgs, reach: f64, bounces: Option<u32>) -> Self {
+        let mut settings = RenderSettings { integrator: Some(args.integrator), ..RenderSettings::default() };
+        settings.image.size = Some(args.size());
+        settings.integrators.path.max_depth = bounces;
+        if args.integrator.get().capabilities().contains(&Capability::AmbientOcclusion) {
+            settings.integrators.ao.ao_radius = Some(Length::Units(reach));
+        }
+        Self { settings, size: args.size() }
+    }
+
+    /// Number of values per pixel.
+    pub fn channels(&self) -> usize {
+        if is_ambient_occlusion(self.settings.integrator()) { 1 } else { 3 }
+    }
+
+    fn of(&self, preset: Preset) -> RenderSettings {
+        let mut settings = self.settings.clone();
+        settings.frames.preset = Some(preset);
+        settings
+    }
+
+    /// Settings of a preset's frames, as `render` has them; all work is done in every frame.
+    ///
+    /// # Errors
+    /// Those of [`frame_settings`].
+    pub fn frame_settings(&self, preset: Preset) -> Result<Settings> {
+        Ok(Settings { rest: false, ..frame_settings(&self.of(preset))? })
+    }
+
+    /// Scene data that a tracer needs for all of this.
+    ///
+    /// # Errors
+    /// Those of [`frame_settings`].
+    pub fn needs(&self) -> Result<Needs> {
+        Ok(frame_needs(&self.settings, &self.frame_settings(Preset::Balanced)?))
+    }
+
+    /// Streams that are traced.
+    ///
+    /// # Errors
+    /// Those of [`frame_settings`].
+    pub fn streams(&self) -> Result<Vec<&'static StreamShaders>> {
+        Ok(frame_streams(&self.settings, &self.frame_settings(Preset::Balanced)?))
+    }
+
+    /// Makes frames of a preset.
+    ///
+    /// # Errors
+    /// Those of the device.
+    pub fn realtime(&self, tracer: &Tracer, flat: &FlatScene, camera: &Camera, preset: Preset) -> Result<Realtime> {
+        let (settings, how) = (self.of(preset), self.frame_settings(preset)?);
+        let options = frame_path_options(&settings, flat.scene, camera, self.size, &how)?;
+        pipeline(tracer, flat, self.size, &how, options.as_ref())
+    }
+
+    /// Makes images of independent samples.
+    ///
+    /// # Errors
+    /// Those of the device.
+    pub fn sampler(&self, tracer: &Tracer, flat: &FlatScene, camera: &Camera) -> Result<Sampler> {
+        let how = self.frame_settings(Preset::Balanced)?;
+        Ok(match frame_path_options(&self.settings, flat.scene, camera, self.size, &how)? {
+            Some(options) => {
+                let options = PathOptions { spp: MAX_PATHS, ..options };
+                Sampler::Paths { integrator: Box::new(PathIntegrator::new(tracer, flat, &options)?), options }
+            }
+            None => {
+                let filter = Filter { kind: FilterKind::None, ..how.filter };
+                Sampler::Rays { settings: Settings { history: 1, filter, ..how }, size: self.size }
+            }
+        })
+    }
+}
+
+/// Makes images of independent samples: paths as stills have them, or occlusion rays of frames without history and filter.
+pub enum Sampler {
+    /// Radiance.
+    Paths {
+        /// What traces them.
+        integrator: Box<PathIntegrator>,
+        /// Its options.
+        options: PathOptions,
+    },
+    /// Ambient visibility.
+    Rays {
+        /// Settings of a frame, but for the number of rays.
+        settings: Settings,
+        /// Pixels.
+        size: [u32; 2],
+    },
+}
+
+impl Sampler {
+    /// Options of paths, if it traces any.
+    pub fn options(&self) -> Option<&PathOptions> {
+        match self {
+            Self::Paths { options, .. } => Some(options),
+            Self::Rays { .. } => None,
+        }
+    }
+
+    /// Turns the environment map.
+    ///
+    /// # Errors
+    /// Those of the device.
+    pub fn turn_environment(&mut self, to_map: &DMat3) -> Result<()> {
+        match self {
+            Self::Paths { integrator, .. } => integrator.turn_environment(to_map),
+            Self::Rays { .. } => Ok(()),
+        }
+    }
+
+    /// An image of `paths` samples per pixel, and the seconds that it took.
+    ///
+    /// # Errors
+    /// Those of the device; Ctrl-C.
+    pub fn render(&mut self, tracer: &Tracer, camera: &CameraRecord, paths: u32, seed: u32) -> Result<(Vec<f32>, f64)> {
+        match self {
+            Self::Paths { integrator, .. } => {
+                let start = Instant::now();
+                let result = integrator.render(tracer, camera, paths.min(MAX_PATHS), seed, &mut SilentControl)?;
+                Ok((result.image.film.mean, start.elapsed().as_secs_f64()))
+            }
+            Self::Rays { settings, size } => {
+                let launches = paths.div_ceil(MAX_RAYS);
+                let rays_per_pixel = paths.div_ceil(launches);
+                let mut realtime = Realtime::new(tracer, *size, &Settings { rays_per_pixel, seed, ..*settings }, &[])?;
+                let (mut sums, mut seconds) = (Vec::new(), 0.0);
+                for _ in 0..launches {
+                    interrupt::check()?;
+                    let start = Instant::now();
+                    realtime.frame(tracer, camera, &[])?;
+                    seconds += start.elapsed().as_secs_f64();
+                    let image = realtime.result()?;
+                    sums.resize(image.len(), 0f64);
+                    sums.iter_mut().zip(&image).for_each(|(sum, v)| *sum += f64::from(*v));
+                }
+                Ok((sums.into_iter().map(|s| (s / f64::from(launches)) as f32).collect(), seconds))
+            }
+        }
+    }
+
+    /// Takes the times of an image of few and one of many paths.
+    ///
+    /// # Errors
+    /// Those of [`Sampler::render`].
+    pub fn time(&mut self, tracer: &Tracer, camera: &CameraRecord, clock: &mut PlainClock) -> Result<()> {
+        for (seconds, paths) in clock.seconds.iter_mut().zip(TIMED_PATHS) {
+            seconds.push(self.render(tracer, camera, paths, 0)?.1);
+        }
+        Ok(())
+    }
+}
+
+/// Times of images of independent samples. They are taken between the frames that they are compared with: a machine that slows down for a while slows both down.
+#[derive(Clone, Debug, Default)]
+pub struct PlainClock {
+    seconds: [Vec<f64>; 2],
+}
+
+impl PlainClock {
+    /// By the medians of all times.
+    pub fn time(&self) -> PlainTime {
+        let ms = [0, 1].map(|k| 1e3 * median(&self.seconds[k]).unwrap_or(f64::NAN));
+        PlainTime::through(TIMED_PATHS, ms)
+    }
+}
+
+/// Time of images of independent samples, milliseconds.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PlainTime {
+    /// Of an image, besides its paths.
+    pub per_image: f64,
+    /// Of each path per pixel.
+    pub per_path: f64,
+}
+
+impl PlainTime {
+    /// Of images that took `ms` for so many paths: a line through two points, neither part of which is negative.
+    fn through([few, many]: [u32; 2], [least, most]: [f64; 2]) -> Self {
+        let per_path = ((most - least) / f64::from(many - few)).clamp(0.0, most / f64::from(many));
+        // times have noise: paths are not free
+        let per_path = per_path.max(0.1 * most / f64::from(many));
+        Self { per_image: (least - f64::from(few) * per_path).max(0.0), per_path }
+    }
+
+    /// As many paths as an image of so many milliseconds can have: at least one.
+    pub fn paths_in(&self, ms: f64) -> u32 {
+        (((ms - self.per_image) / self.per_path) as u32).max(1)
+    }
+}
+
+/// The time of a preset's frames, in paths of plain accumulation.
+#[derive(Clone, Copy, Debug)]
+pub struct EqualTime {
+    /// Median time of a frame.
+    pub ms: f64,
+    plain: PlainTime,
+    /// Paths per pixel of a frame whose passes do nothing but trace: the preset's own, in the time of all of its passes.
+    paths_per_frame: f64,
+}
+
+impl EqualTime {
+    /// Of frames of `rays_per_pixel` paths each that cost this.
+    pub fn new(plain: PlainTime, cost: &FrameCost, rays_per_pixel: u32) -> Self {
+        let paths_per_frame = f64::from(rays_per_pixel) / cost.sampling_share().unwrap_or(1.0);
+        // plain accumulation is timed by the clock, too
+        Self { ms: cost.wall_ms.median, plain, paths_per_frame }
+    }
+
+    /// Time of plain accumulation.
+    pub fn plain(&self) -> PlainTime {
+        self.plain
+    }
+
+    /// As many paths as fit into the time of so many frames, in an image as stills have it or in these frames, whichever are more: images cost more than their paths,
+    /// and many paths at once cost less.
+    pub fn paths(&self, frames: u32) -> u32 {
+        let frames = f64::from(frames);
+        self.plain.paths_in(self.ms * frames).max((frames * self.paths_per_frame) as u32)
+    }
+
+    /// As many as fit into one frame beside what takes so many milliseconds.
+    pub fn paths_beside(&self, ms: f64) -> u32 {
+        self.plain.paths_in(self.ms - ms).max((self.paths_per_frame * (1.0 - ms / self.ms)) as u32)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bench::record::cost::PassTime;
+    use crate::measure::stats::Percentiles;
+
+    #[test]
+    fn paths_that_fit_a_time() {
+        let time = PlainTime::through([1, 9], [5.0, 21.0]);
+        assert_eq!(time, PlainTime { per_image: 3.0, per_path: 2.0 });
+        assert_eq!([1.0, 5.0, 10.9, 23.0].map(|ms| time.paths_in(ms)), [1, 1, 3, 10]);
+        let of = |ms: f64| Percentiles::of(&[ms]).unwrap();
+        let passes = [("path_bounce", 4.0), ("filter", 4.0)].map(|(pass, ms)| PassTime { pass: pass.into(), ms: of(ms) });
+        let cost = FrameCost { passes: passes.into(), wall_ms: of(10.0), ..FrameCost::default() };
+        let equal = EqualTime::new(time, &cost, 4);
+        // (10 - 3) / 2 of images; 4 * 8 / 4 of frames
+        assert_eq!([equal.paths(1), equal.paths_beside(5.0), equal.paths_beside(50.0)], [8, 4, 1]);
+        assert_eq!(EqualTime::new(time, &cost, 1).paths(10), 48);
+        // noise alone
+        let odd = PlainTime::through([1, 9], [5.0, 4.0]);
+        assert!(odd.per_path > 0.0 && odd.per_image >= 0.0);
+    }
+}
