@@ -104,8 +104,8 @@ if [ "$codename" = bookworm ]; then
     mkdir -p "$floor"
     cp "$tmp"/root/usr/lib/*/libvulkan_lvp.so "$floor/libvulkan_lvp.so"
     api=$(sed -n 's/.*"api_version": *"\([^"]*\)".*/\1/p' "$tmp"/root/usr/share/vulkan/icd.d/lvp_icd.*.json)
-    # write beside, then rename: a broken-off run leaves no half-made driver
-    printf '{"file_format_version":"1.0.0","ICD":{"library_path":"%s","api_version":"%s"}}\n' "$floor/libvulkan_lvp.so" "${api:-1.3.230}" > "$floor/lvp_icd.json.new"
+    # relative to the file itself, so that the folder can be moved; write beside, then rename: a broken-off run leaves no half-made driver
+    printf '{"file_format_version":"1.0.0","ICD":{"library_path":"%s","api_version":"%s"}}\n' ./libvulkan_lvp.so "${api:-1.3.230}" > "$floor/lvp_icd.json.new"
     mv "$floor/lvp_icd.json.new" "$floor/lvp_icd.json"
   fi
   say "floor driver: $floor/lvp_icd.json"
