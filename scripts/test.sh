@@ -7,7 +7,7 @@
 # --full, before a release: every scene of the reference renderer (docs/mitsuba.md) on every tracer and driver and with the validation layer, every device test on
 # the floor driver, every tracer for every test of paths, with the validation layer, a million rays a scene in the parity gate, and reports in a browser (scripts/report.sh installs one).
 # Without it the other tracers and the floor driver render the scenes in which they differ from the compute tracer, and a test of paths takes one tracer. Both do
-# without the layer, which all other tests have, and one that compiles kernels of all features. The parity gate has a quarter of the rays. The floor driver leaves
+# without the layer, which all other tests have, and one that compiles kernels of all features. The parity gate has a tenth of the rays, and frames at rest are followed in two of four scenes. The floor driver leaves
 # out tests of code that knows no driver: how paths are shaded (tests/path), what frames show (tests/realtime, but for those that compare tracers), and the
 # program from outside (tests/cli, but for the program's own device tests). Reference frames (tests/frames, docs/ci.md) are rendered on both drivers.
 #
@@ -58,7 +58,7 @@ run_entry() {
   if [ "$driver" = floor ]; then
     export VK_DRIVER_FILES=$floor VK_ICD_FILENAMES=$floor SKYLIT_EXPECT_TRACERS=compute SKYLIT_REQUIRE_DRIVER=22.3.6
     # rounding is the driver's, and fewer rays show what it does
-    if [ -z "$full" ]; then export SKYLIT_PARITY_RAYS=100000; fi
+    if [ -z "$full" ]; then export SKYLIT_PARITY_RAYS=30000; fi
   fi
   cargo test --locked --test="$binary" -- "$@"
 }
@@ -131,7 +131,7 @@ if cargo clippy --version >/dev/null 2>&1; then
 fi
 
 # rays of each set of the parity gate; a million otherwise
-if [ -z "$full" ]; then export SKYLIT_PARITY_RAYS=${SKYLIT_PARITY_RAYS-250000}; fi
+if [ -z "$full" ]; then export SKYLIT_PARITY_RAYS=${SKYLIT_PARITY_RAYS-100000}; fi
 
 floor=${SKYLIT_DRIVERS_DIR:-$PWD/target/drivers}/mesa-22.3.6/lvp_icd.json
 if [ ! -f "$floor" ]; then
