@@ -27,7 +27,8 @@ if [ -n "$full" ]; then export SKYLIT_FULL=1; fi
 # binaries whose tests share a device, longest first
 shared=(path tracer mitsuba ao)
 
-say() { printf 'test: %s\n' "$*"; }
+# with the seconds since the start, so that a log tells what takes long
+say() { printf 'test: %4d s: %s\n' "$SECONDS" "$*"; }
 
 log=$(mktemp)
 summaries=$(mktemp)
@@ -41,7 +42,7 @@ keep_summary() { grep -E '^ *Summary |^test result:' "$log" | sed "s/^ */test: $
 run_alone() {
   local label=$1 status=0
   shift
-  cargo nextest run --locked --no-tests=pass --no-fail-fast "$@" 2>&1 | tee "$log" || status=$?
+  cargo nextest run --locked --lib --bins --tests --no-tests=pass --no-fail-fast "$@" 2>&1 | tee "$log" || status=$?
   keep_summary "$label"
   return "$status"
 }
