@@ -99,6 +99,13 @@ for size in "1280 760" "640 400" "1000 640"; do
 done
 save resized.png
 picture resized
+say "minimised, and back; larger text"
+xdotool windowunmap --sync "$window" && sleep 1 && alive "a window that is gone"
+xdotool windowmap --sync "$window" && xdotool windowfocus --sync "$window" && sleep 0.5
+for _ in 1 2 3 4 5; do key ctrl+plus; done
+save large-text.png
+picture large-text
+key ctrl+0
 say "another scene, by its name"
 key ctrl+o
 xdotool type --clearmodifiers --delay 30 "builtin:parade" && key Return
@@ -116,5 +123,24 @@ xdotool key --clearmodifiers ctrl+q
 for _ in $(seq 100); do kill -0 "$viewer" 2>/dev/null || break; sleep 0.1; done
 kill -0 "$viewer" 2>/dev/null && die "Ctrl+Q does not end it"
 wait "$viewer" || die "the viewer has failed"
+[ -s "$folder/log" ] && die "the viewer has printed something"
+
+say "drawn by Vulkan at twice the pixels a point: a swapchain for each size of the window"
+WINIT_X11_SCALE_FACTOR=2 open_viewer builtin:cornell-box --size 400x300 --painter vulkan
+wait_for 60 "the scene" titled cornell-box
+sleep 2
+for size in "900 700" "640 400" "1000 640"; do
+  # shellcheck disable=SC2086 # two numbers
+  xdotool windowsize --sync "$window" $size && sleep 0.5 && alive "size $size, drawn by Vulkan"
+done
+xdotool windowunmap --sync "$window" && sleep 1 && alive "a window that is gone, drawn by Vulkan"
+xdotool windowmap --sync "$window" && xdotool windowfocus --sync "$window" && sleep 0.5
+drag 1 300 300 400 330
+save vulkan.png
+picture vulkan
+xdotool key --clearmodifiers ctrl+q
+for _ in $(seq 100); do kill -0 "$viewer" 2>/dev/null || break; sleep 0.1; done
+kill -0 "$viewer" 2>/dev/null && die "Ctrl+Q does not end it, drawn by Vulkan"
+wait "$viewer" || die "the viewer has failed, drawn by Vulkan"
 [ -s "$folder/log" ] && die "the viewer has printed something"
 say "done: $folder"

@@ -3,8 +3,10 @@
 
     python3 scripts/viewer_soak.py PROGRAM [--minutes 30] [--seed 1] [--validation] [SCENE...]
 
-Opens each scene in turn, again and again: orbits, flies, resizes, changes techniques, tracers and settings, splits, compares, saves. Fails if the viewer fails or shows an error,
-if the Vulkan validation layer has a message (--validation), or if a scene takes more memory the last time than the second time it is open.
+Opens each scene in turn, again and again: orbits, flies, drags sliders, numbers and dividers, plays and scrubs animations, resizes, drops files, goes through all techniques and
+tracers, splits, compares, saves, writes settings. Prints the memory of each visit and times of the interface's frames, and a verdict. Exit code 1 if the viewer fails or shows an
+error, if the Vulkan validation layer has a message (--validation), or if a scene takes more memory the last time than the second time it is open. Three minutes are one scene,
+visited three times.
 """
 
 import argparse
@@ -16,56 +18,76 @@ import tempfile
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-SCENES = ["builtin:stairs", "builtin:cornell-box", str(ROOT / "scenes/parade.glb"), "builtin:cornell-spheres", "builtin:atrium"]
+PARADE = str(ROOT / "scenes/parade.glb")
+SCENES = [PARADE, "builtin:stairs", "builtin:cornell-box", "builtin:cornell-spheres", "builtin:atrium"]
 TECHNIQUES = [
     "AO fast", "AO balanced", "AO quality", "AO larsen", "AO larsen fixed", "GTAO (screen space)", "path, real time", "direct, real time", "lit, real time",
-    "whitted, real time", "AO converged", "AO still", "AO truth (ao-sky)", "path", "direct", "lit", "depth", "normals", "motion", "rays", "history", "variance", "albedo",
+    "whitted, real time", "ao sky, real time", "AO converged", "AO still", "AO truth (ao-sky)", "path", "direct", "lit", "whitted", "depth", "normal", "ids", "motion", "rays",
+    "samples", "variance", "unfiltered", "albedo",
 ]  # fmt: skip
 TRACERS = ["compute", "query", "pipeline"]
-# what a visit may take more than the second one, MiB: caches of the driver fill for some time
+# what the last visit may take more than the second one, MiB: caches of the driver fill for some time
 GROWTH = 200
-# seconds of script a scene, on two cores
-VISIT = 75
+# seconds of script a visit, on two cores
+VISIT = 60
+# visits of a scene: the first fills caches, the second is compared with the last
+VISITS = 3
 
 
-def visit(rng: random.Random, folder: Path, number: int) -> list[str]:
+class Deck:
+    """Hands out items in random order, and each as often as every other."""
+
+    def __init__(self, rng: random.Random, items: list[str]):
+        self.rng, self.items, self.rest = rng, items, []
+
+    def next(self) -> str:
+        if not self.rest:
+            self.rest = self.rng.sample(self.items, len(self.items))
+        return self.rest.pop()
+
+
+def visit(rng: random.Random, techniques: Deck, tracers: Deck, folder: Path, number: int, has_animation: bool, shown: int) -> list[str]:
     """Commands while a scene is open."""
     x, y = lambda: rng.randint(120, 420), lambda: rng.randint(120, 400)
-    button = lambda: rng.choice(["left", "right", "middle", "shift"])  # noqa: E731
-    lines = []
-    for _ in range(rng.randint(18, 26)):
-        lines += rng.choice([
-            lambda: [f"drag {x()} {y()} {x()} {y()} {rng.uniform(0.3, 1.5):.2f} {button()}"],
-            lambda: [f"drag {x()} {y()} {x()} {y()} {rng.uniform(0.3, 1.5):.2f} left"],
-            lambda: [f"wheel {x()} {y()} {rng.randint(-4, 4)}"],
-            lambda: [f"key {rng.choice('WASDQE')} {rng.uniform(0.2, 1):.2f}"],
-            lambda: [f"key {rng.choice('12345')}", "wait 1.5"],
-            lambda: ["click First image", f"click {rng.choice(TECHNIQUES)}", "wait 2"],
-            lambda: ["click Second image", f"click {rng.choice(TECHNIQUES)}", "wait 2"],
-            lambda: ["key X", "wait 1"],
-            lambda: ["key T", "wait 4"],
-            lambda: ["key Space"],
-            lambda: ["key F"],
-            lambda: ["key B"],
-            lambda: ["key P", "wait 1.5"],
-            lambda: ["key U", "wait 1", "key U"],
-            lambda: [f"press {x()} {y()}"],
-            lambda: [f"press {x()} {y()} left 2", "wait 1"],
-            lambda: [f"resize {rng.randint(500, 1300)} {rng.randint(420, 900)}", "wait 0.5"],
-            lambda: ["key Ctrl+S", "wait text:Save the image", "key Ctrl+A", f"type {folder}/{number}.{rng.choice(['png', 'exr'])}", "key Enter", "wait text:saved"],
-        ])()  # fmt: skip
-    if rng.random() < 0.7:
-        lines += ["resize 1000 700", "click Device", "click Tracer", f"click {rng.choice(TRACERS)}", "wait 4", "wait picture 120", "click Device"]
-    return ["resize 1000 700", *lines, "resize 1000 700"]
+    slide = lambda label: [f"drag-control {label} {rng.choice([-50, -20, 20, 50])} 0 0.3", "wait 0.5"]  # noqa: E731
+    drag = lambda button: [f"drag {x()} {y()} {x()} {y()} {rng.uniform(0.3, 1.2):.2f} {button}"]  # noqa: E731
+    path = lambda: f"{folder}/{number}.{rng.choice(['png', 'exr'])}"  # noqa: E731
+    parts = [
+        *(drag(button) for button in ["left", "left", "left", "right", "middle", "shift"]),
+        [f"wheel {x()} {y()} {rng.randint(-4, 4)}", f"key {rng.choice('WASDQE')} {rng.uniform(0.2, 1):.2f}"],
+        [f"press {x()} {y()}", "key F", "key B", f"press {x()} {y()} left 2", "wait 1"],
+        ["key U", "wait 1", "key U"],
+        # the panel
+        ["click Radius", "wait 1", *slide("Radius"), "set Radius = 0.7", "wait 1", "click Radius"],
+        ["click Picture", *slide("Exposure"), "click Picture"],
+        ["key X", "wait 1", "drag-control Line between the images -60 0 0.3", "wait 0.5", "key X"],
+        ["key T", "wait 5", "key Space", "wait 0.5", "key Space", "key T"],
+        [f"resize {rng.randint(500, 1300)} {rng.randint(420, 900)}", "wait 0.5", "resize 1000 700"],
+        ["key Ctrl+S", "wait text:Save the image", "key Ctrl+A", f"type {path()}", "key Enter", "wait text:saved"],
+        ["key ?", "wait 0.3", "key Escape", "key N", "wait 0.3", "key N"],
+        *(["click First image", f"click {techniques.next()}", "wait 1.5"] for _ in range(shown)),
+        ["key X", "click Second image", f"click {techniques.next()}", "wait 2", "key X"],
+    ]
+    if has_animation:
+        parts.append(["click Animation", "key P", "wait 1.5", "key P", *slide("Time"), "wait 0.5", *slide("Speed"), "click Animation"])
+    rng.shuffle(parts)
+    tracer = ["resize 1000 700", "click Device", "click Tracer", f"click {tracers.next()}", "wait 2", "wait picture 120", "click Device"]
+    return ["resize 1000 700", *(line for part in parts for line in part), *tracer]
 
 
 def script(seed: int, minutes: float, scenes: list[str], folder: Path) -> str:
     rng = random.Random(seed)
-    lines, number = ["wait picture 120"], 0
-    while number * VISIT < 60 * minutes or number < 3 * len(scenes):
+    visits = max(VISITS, round(60 * minutes / VISIT))
+    scenes = scenes[: max(1, visits // VISITS)]
+    visits -= visits % len(scenes)
+    techniques, tracers = Deck(rng, TECHNIQUES), Deck(rng, TRACERS)
+    # all of them, however short it is
+    shown = max(3, -(-len(TECHNIQUES) // visits) - 1)
+    lines = ["wait picture 120"]
+    for number in range(visits):
         scene = scenes[number % len(scenes)]
-        lines += [f"mark {number} {scene}", f"drop {scene}", "wait 3", "wait picture 120", *visit(rng, folder, number)]
-        number += 1
+        lines += [f"mark {number} {scene}", f"drop {scene}", "wait 3", "wait picture 120"]
+        lines += visit(rng, techniques, tracers, folder, number, scene == PARADE, shown)
     return "\n".join([*lines, "expect-no-errors", ""])
 
 
@@ -76,7 +98,7 @@ def main() -> int:
     parser.add_argument("--minutes", type=float, default=30)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--validation", action="store_true", help="run with Vulkan's validation layer")
-    args = parser.parse_args()
+    args = parser.parse_intermixed_args()
     scenes = args.scenes or SCENES
     with tempfile.TemporaryDirectory() as temporary:
         file = Path(temporary) / "script.txt"
@@ -88,17 +110,26 @@ def main() -> int:
             print(run.stdout[-2000:], file=sys.stderr)
             shown = file.read_text().splitlines()
             print("the script:", *(f"{k + 1}: {line}" for k, line in enumerate(shown)), sep="\n", file=sys.stderr)
+            print("verdict: FAILED, the message is above", file=sys.stderr)
             return 1
     record = json.loads(run.stdout)
     visits: dict[str, list[float]] = {}
+    elapsed = 0.0
     for section in record["sections"]:
         name = section["name"].partition(" ")[2] or section["name"]
         visits.setdefault(name, []).append(section["memory_mib"])
-        print(f"{section['name']:<40} {section['seconds']:7.1f} s {section['pictures']:6} pictures {section['memory_mib']:8.0f} MiB")
-    seconds = sum(s["seconds"] for s in record["sections"])
-    grown = {name: of[-1] - of[1] for name, of in visits.items() if len(of) > 2}
-    print(f"{seconds / 60:.1f} minutes; growth from the second visit to the last, MiB: {', '.join(f'{n} {g:+.0f}' for n, g in grown.items())}")
-    return int(any(g > GROWTH for g in grown.values()))
+        elapsed += section["seconds"]
+        median, p95, _ = section["ui_frame_ms"]
+        print(
+            f"{elapsed / 60:6.1f} min  {Path(section['name']).name if '/' in name else section['name']:<32} {section['pictures']:6} pictures  "
+            f"interface {median:5.1f} ms (95 %: {p95:.1f})  memory {section['memory_mib']:6.0f} MiB"
+        )
+    grown = {name: of[-1] - of[1] for name, of in visits.items() if len(of) >= VISITS}
+    print(f"growth from the second visit to the last, MiB: {', '.join(f'{Path(n).name} {g:+.0f}' for n, g in grown.items())}")
+    too_much = [name for name, g in grown.items() if g > GROWTH]
+    layer = "no validation message" if args.validation else "the validation layer was off"
+    print(f"verdict: {'FAILED, memory grows: ' + ', '.join(too_much) if too_much else 'passed'}; no error, {layer}, {elapsed / 60:.1f} minutes")
+    return int(bool(too_much))
 
 
 if __name__ == "__main__":

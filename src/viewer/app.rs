@@ -527,7 +527,8 @@ impl App {
         let tasks = std::mem::take(&mut self.tasks);
         self.sent = request.clone();
         self.sent_number = self.mailbox.change(|r| {
-            let before = std::mem::take(&mut r.tasks);
+            // what was to be done with another scene is not done with this one
+            let before = if r.load == request.load { std::mem::take(&mut r.tasks) } else { Vec::new() };
             *r = request;
             r.tasks = before.into_iter().chain(tasks).collect();
         });

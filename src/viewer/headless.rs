@@ -50,7 +50,8 @@ fn drive(context: &egui::Context, app: &mut App, script: &mut Script, size: [u32
     let (mut painter, mut painted, mut words) = (CpuPainter::default(), Painted::default(), Vec::new());
     loop {
         let frame_start = Instant::now();
-        let screen = Rect::from_min_size(Pos2::ZERO, Vec2::new(size[0] as f32, size[1] as f32));
+        // the size of the window in points, which are larger when the text is
+        let screen = Rect::from_min_size(Pos2::ZERO, Vec2::new(size[0] as f32, size[1] as f32) / context.zoom_factor());
         let mut input = RawInput { screen_rect: Some(screen), time: Some(start.elapsed().as_secs_f64()), ..Default::default() };
         let Some(requests) = script.input(&mut input, app)? else { return Ok(()) };
         let has_input = !input.events.is_empty() || !input.dropped_files.is_empty() || requests.screenshot.is_some();

@@ -245,12 +245,18 @@ impl Mailbox {
         self.lock().request.clone()
     }
 
-    /// The latest request, its number and when it arrived. Its tasks are taken out.
-    pub fn take(&self) -> (Request, u64, std::time::Instant) {
-        let mut latest = self.lock();
-        let request = latest.request.clone();
-        latest.request.tasks.clear();
-        (request, latest.number, latest.changed)
+    /// The latest request, its number and when it arrived.
+    pub fn latest(&self) -> (Request, u64, std::time::Instant) {
+        let latest = self.lock();
+        (latest.request.clone(), latest.number, latest.changed)
+    }
+
+    /// Takes out a task that is done. Others stay, whatever is requested besides, until they are.
+    pub fn done(&self, task: &Task) {
+        let tasks = &mut self.lock().request.tasks;
+        if let Some(k) = tasks.iter().position(|t| t == task) {
+            tasks.remove(k);
+        }
     }
 
     /// Number of the latest request.

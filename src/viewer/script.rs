@@ -16,6 +16,9 @@ const PATIENCE: Duration = Duration::from_secs(120);
 /// Time that a control may take to appear.
 const OPENING: Duration = Duration::from_secs(2);
 
+/// Time in which a control comes into view that a list or the panel has scrolled away.
+const SCROLLING: Duration = Duration::from_millis(200);
+
 /// The commands, for help and docs/viewer.md.
 pub const COMMANDS: &[(&str, &str)] = &[
     ("wait SECONDS", "let time pass"),
@@ -119,6 +122,8 @@ struct Current {
     command: Command,
     start: Instant,
     step: u32,
+    /// When its control was asked to scroll into view.
+    seen: Option<Instant>,
 }
 
 struct Measured {
@@ -247,7 +252,7 @@ impl Script {
         let mut current = match self.current.take() {
             Some(current) => current,
             None => match self.commands.pop_front() {
-                Some((line, command)) => Current { line, command, start: Instant::now(), step: 0 },
+                Some((line, command)) => Current { line, command, start: Instant::now(), step: 0, seen: None },
                 None => {
                     self.end(app);
                     return Ok(None);
@@ -320,8 +325,14 @@ impl Script {
                 input.events.push(Event::Text(text.clone()));
                 Ok(true)
             }
-            Command::Click(label) => match self.place_of(label) {
-                Ok(place) => {
+            Command::Click(label) => match self.bring_into_view(label, current.seen, input) {
+                Ok(seen) if seen.elapsed() < SCROLLING => {
+                    current.seen = Some(seen);
+                    self.move_to(input, self.pointer);
+                    Ok(false)
+                }
+                Ok(_) => {
+                    let place = self.place_of(label)?;
                     (current.command, current.step) = (Command::Press(place, PointerButton::Primary, 1), 0);
                     Ok(false)
                 }
@@ -345,7 +356,17 @@ impl Script {
                 Ok(self.drag(input, [*from, *to], *time, *button, *modifiers, step, elapsed))
             }
             Command::DragControl(label, by, time) => {
-                let from = self.place_of(label)?;
+                let from = match self.bring_into_view(label, current.seen, input) {
+                    Ok(seen) if seen.elapsed() < SCROLLING => {
+                        current.seen = Some(seen);
+                        // a frame shows it where it is now
+                        self.move_to(input, self.pointer);
+                        return Ok(false);
+                    }
+                    Ok(_) => self.place_of(label)?,
+                    Err(_) if elapsed < OPENING => return Ok(false),
+                    Err(e) => return Err(e),
+                };
                 let drag = Command::Drag(from, from + *by, *time, PointerButton::Primary, Modifiers::NONE);
                 (current.command, current.step, current.start) = (drag, 0, Instant::now());
                 Ok(false)
@@ -460,6 +481,16 @@ impl Script {
             let names: Vec<_> = all.iter().map(|a| a.2.as_str()).filter(|n| !n.is_empty()).collect();
             format!("no control is called \"{label}\"; there are: {}", names.join(", "))
         })
+    }
+
+    /// Has a control scrolled into view, unless that was requested before (`seen`). Returns when.
+    fn bring_into_view(&self, label: &str, seen: Option<Instant>, input: &mut RawInput) -> Result<Instant, String> {
+        let target = self.find(label, false)?.0;
+        Ok(seen.unwrap_or_else(|| {
+            let request = accesskit::ActionRequest { action: accesskit::Action::ScrollIntoView, target, data: None };
+            input.events.push(Event::AccessKitActionRequest(request));
+            Instant::now()
+        }))
     }
 
     fn place_of(&self, label: &str) -> Result<Pos2, String> {

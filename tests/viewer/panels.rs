@@ -5,10 +5,10 @@ use std::sync::Arc;
 use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT, Queryable};
 use skylit::renderer::RenderSettings;
-use skylit::renderer::interactive::Pick;
+use skylit::renderer::interactive::{Pick, ViewPicture};
 use skylit::viewer::ViewOptions;
 use skylit::viewer::app::{App, Arrangement, Second};
-use skylit::viewer::request::{DeviceSummary, Event, EventSender, Mailbox, PickPurpose, SceneSummary};
+use skylit::viewer::request::{Comparison, DeviceSummary, Event, EventSender, Mailbox, PickPurpose, SceneSummary, Task};
 
 /// The viewer without a renderer: what it requests goes to a mailbox, what it is told comes from the sender.
 struct Alone {
@@ -260,4 +260,58 @@ fn errors_are_shown_as_the_command_line_says_them() {
     assert!(alone.harness.query_by_label_contains("orbit around the pivot").is_some());
     alone.press(egui::Key::Escape);
     assert!(alone.harness.query_by_label_contains("orbit around the pivot").is_none());
+}
+
+#[test]
+fn a_tracer_that_is_not_there_yet_is_told() {
+    let mut alone = loaded();
+    let device = |tracer: &str| DeviceSummary { tracer: (tracer.into(), "a reason".into()), ..Default::default() };
+    alone.events.send(Event::Device(device("compute")));
+    alone.click("Device");
+    assert!(alone.harness.query_by_label("Tracer compute: a reason").is_some());
+    alone.click("Tracer");
+    alone.click("query");
+    assert!(alone.harness.query_by_label("Changing to query…").is_some());
+    alone.events.send(Event::Device(device("query")));
+    alone.harness.run_steps(2);
+    assert!(alone.harness.query_by_label("Tracer query: a reason").is_some());
+}
+
+/// What is to be saved is requested until it is done, whatever else is requested, but not of another scene; the heat map is saved as it is shown.
+#[test]
+fn saving_waits_but_not_for_another_scene() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut alone = loaded();
+    let save = |alone: &mut Alone, name: &str| {
+        alone.harness.key_press_modifiers(egui::Modifiers::COMMAND, egui::Key::S);
+        alone.harness.run_steps(3);
+        let path = folder.path().join(name);
+        *alone.harness.state_mut().dialog.as_mut().unwrap().text_mut() = path.to_string_lossy().into_owned();
+        alone.press(egui::Key::Enter);
+        path
+    };
+    let path = save(&mut alone, "image.png");
+    let task = Task::Save { pane: 0, path };
+    alone.press(egui::Key::Num3);
+    assert_eq!(alone.mailbox.latest().0.tasks, std::slice::from_ref(&task), "another technique changes nothing");
+    alone.mailbox.done(&task);
+    assert!(alone.mailbox.latest().0.tasks.is_empty());
+    save(&mut alone, "image.png");
+    assert_eq!(alone.mailbox.latest().0.tasks, [task]);
+    alone.harness.state_mut().open("builtin:cornell-box");
+    alone.harness.run_steps(2);
+    assert!(alone.mailbox.latest().0.tasks.is_empty());
+
+    let mut alone = loaded();
+    let app = alone.harness.state_mut();
+    (app.second, app.shows_second) = (Second::HeatMap, true);
+    let path = save(&mut alone, "heat.png");
+    assert!(alone.harness.query_all_by_label_contains("there is no comparison").count() > 0);
+    let heat_map = Arc::new(ViewPicture { size: [2, 1], rgba: vec![9, 8, 7, 255, 1, 2, 3, 255] });
+    alone.events.send(Event::Compared(Box::new(Comparison { heat_map, ..Default::default() })));
+    alone.harness.run_steps(2);
+    save(&mut alone, "heat.png");
+    let image = skylit::output::load(&path).unwrap();
+    assert_eq!((image.width, image.height), (2, 1));
+    assert!(alone.mailbox.latest().0.tasks.is_empty());
 }

@@ -88,9 +88,18 @@ click Tracer
 click pipeline
 wait text:Tracer pipeline
 wait settled 90
+key X
+wait compared 90
 click Tracer
 click query
-wait text:Tracer query
+key Ctrl+S
+wait text:Save the image
+key Ctrl+A
+type FOLDER/query.png
+key Enter
+wait text:saved
+expect Tracer query: requested
+key X
 click Tracer
 click compute
 wait text:Tracer compute
@@ -101,6 +110,7 @@ expect-no-errors";
     let text = if available.len() == 3 { text.join("\n") } else { "wait picture 90\nexpect-no-errors".into() };
     let sections = run(Some("builtin:cornell-box"), folder.path(), &text).unwrap();
     assert!(sections.len() == 1 && sections[0].pictures > 0 && sections[0].first_picture_seconds.is_some(), "{sections:?}");
+    assert_eq!(folder.path().join("query.png").exists(), available.len() == 3, "what is to be saved waits for an image");
 }
 
 /// A scene whose image does not arrive before it is seen without it: a pipe. When the image is replaced on disk the scene is loaded anew.

@@ -17,7 +17,7 @@ use crate::film::{Control, Film};
 use crate::gpu::Timing;
 use crate::integrators::aov::Aov;
 use crate::integrators::{Integrator, RenderJob};
-use crate::output::{self, Channel, Image, Samples, png};
+use crate::output::{self, Channel, FileSettings, Image, Picture, Samples, png};
 use crate::realtime::display::DisplayMode;
 use crate::realtime::{FrameStats, Realtime, Technique};
 use crate::renderer::RenderSettings;
@@ -89,6 +89,17 @@ pub struct ViewPicture {
     pub size: [u32; 2],
     /// Four bytes per pixel.
     pub rgba: Vec<u8>,
+}
+
+impl ViewPicture {
+    /// Writes a picture file, in the format of its extension.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for a format that is no picture, [`Error::Output`].
+    pub fn save(&self, path: &Path) -> Result<()> {
+        let rgb: Vec<u8> = self.rgba.chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]]).collect();
+        Picture::of_bytes(rgb, self.size, png::Colour::Rgb)?.save(path, FileSettings::default().jpeg_quality())
+    }
 }
 
 /// The linear values of a view, to be compared with those of another one.

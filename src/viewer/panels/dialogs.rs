@@ -6,9 +6,9 @@ use std::task::Poll;
 
 use egui::{Align2, Context, Key, Ui};
 
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::renderer::RenderSettings;
-use crate::viewer::app::{App, Dialog};
+use crate::viewer::app::{App, Dialog, Second};
 use crate::viewer::browse::Browsing;
 use crate::viewer::request::Task;
 
@@ -48,7 +48,9 @@ pub fn show(app: &mut App, context: &Context) {
     egui::Window::new("Keys and mouse").open(&mut open).collapsible(false).anchor(Align2::CENTER_CENTER, [0.0, 0.0]).show(
         context,
         |ui| {
-            egui::ScrollArea::vertical().max_height(500.0).show(ui, |ui| {
+            // with large text the window is low
+            let height = (context.content_rect().height() - 80.0).clamp(100.0, 500.0);
+            egui::ScrollArea::vertical().max_height(height).show(ui, |ui| {
                 egui::Grid::new("controls").num_columns(2).striped(true).show(ui, |ui| {
                     for (input, effect) in CONTROLS {
                         ui.strong(*input);
@@ -123,6 +125,7 @@ fn act(app: &mut App, dialog: Dialog) {
     match dialog {
         Dialog::Open(text) if text.trim().is_empty() => {}
         Dialog::Open(text) => app.open(text.trim()),
+        Dialog::Save(text) if app.shows_second && app.second == Second::HeatMap => save_heat_map(app, Path::new(text.trim())),
         Dialog::Save(text) => app.task(Task::Save { pane: usize::from(app.shows_second), path: PathBuf::from(text.trim()) }),
         Dialog::Render(text, options) => app.render(text.trim(), &options),
         Dialog::LoadSettings(text) => match RenderSettings::load(Path::new(text.trim())) {
@@ -137,6 +140,15 @@ fn act(app: &mut App, dialog: Dialog) {
             Ok(()) => app.report(format!("saved {}", text.trim()), false),
             Err(e) => app.report(e.to_string(), true),
         },
+    }
+}
+
+/// The heat map is made of a comparison: the renderer has no image of it.
+fn save_heat_map(app: &mut App, path: &Path) {
+    let none = || Error::Usage("there is no comparison to save yet".into());
+    match app.picture(true).ok_or_else(none).and_then(|picture| picture.save(path)) {
+        Ok(()) => app.report(format!("saved {}", path.display()), false),
+        Err(e) => app.report(e.to_string(), true),
     }
 }
 

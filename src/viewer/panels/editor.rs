@@ -10,6 +10,9 @@ pub fn title(name: &str) -> String {
     if let Some(first) = words.get_mut(0..1) {
         first.make_ascii_uppercase();
     }
+    if let Some(rest) = words.strip_prefix("Ao ") {
+        return format!("AO {rest}");
+    }
     words
 }
 

@@ -48,7 +48,9 @@ fn choose_technique(
     let mut chosen = None;
     ui.horizontal(|ui| {
         let heading = ui.label(label);
-        let combo = ComboBox::from_id_salt(label).selected_text(shown).width(170.0).height(420.0);
+        // all of it within the window, also with large text
+        let height = (0.6 * ui.ctx().content_rect().height()).min(420.0);
+        let combo = ComboBox::from_id_salt(label).selected_text(shown).width(170.0).height(height);
         let response = combo.show_ui(ui, |ui| {
             let all = Technique::all();
             for (k, title) in GROUPS.iter().enumerate() {
@@ -141,9 +143,17 @@ fn occlusion(app: &mut App, ui: &mut Ui) {
 }
 
 fn truth(app: &mut App, ui: &mut Ui) {
-    ui.checkbox(&mut app.compares, "Compare (T)").on_hover_text(
+    // an image of the truth on the screen is compared, whatever is ticked
+    let is_shown = !app.compares && app.compares_now();
+    let mut compares = app.compares || is_shown;
+    let check = ui.add_enabled(!is_shown, egui::Checkbox::new(&mut compares, "Compare (T)"));
+    let check = check.on_disabled_hover_text("The second image is the truth: both are compared while it is shown");
+    check.on_hover_text(
         "While the camera rests, the truth converges beside the first image, in half of the time, and the difference is measured",
     );
+    if !is_shown {
+        app.compares = compares;
+    }
     let shown = app.truth.label();
     let is_truth = |t: Technique| matches!(t, Technique::Converged | Technique::Still(_));
     if let Some(technique) = choose_technique(ui, "Truth", &shown, Some(app.truth), &is_truth) {
@@ -353,7 +363,10 @@ fn device(app: &mut App, ui: &mut Ui) {
         ui.label(&app.device.name);
     }
     let (tracer, reason) = app.device.tracer.clone();
-    ui.label(format!("Tracer {tracer}: {reason}"));
+    let chosen = app.device_settings.tracer.unwrap_or_default();
+    // its pipelines take seconds to compile
+    let changes = chosen != TracerChoice::Auto && chosen.name() != tracer && !tracer.is_empty() && !app.is_settled();
+    ui.label(if changes { format!("Changing to {}…", chosen.name()) } else { format!("Tracer {tracer}: {reason}") });
     ui.horizontal(|ui| {
         let heading = ui.label("Tracer");
         let current = app.device_settings.tracer.unwrap_or_default();

@@ -157,8 +157,11 @@ fn divider(app: &mut App, ui: &mut Ui, rect: Rect, share: f32) -> f32 {
     }
     let x = rect.left() + share * rect.width();
     let width = if response.hovered() || response.dragged() { 3.0 } else { 1.0 };
-    ui.painter()
-        .line_segment([Pos2::new(x, rect.top()), Pos2::new(x, rect.bottom())], Stroke::new(width, Color32::from_gray(230)));
+    // seen on white and on black
+    for (width, grey) in [(width + 2.0, 40), (width, 230)] {
+        let line = [Pos2::new(x, rect.top()), Pos2::new(x, rect.bottom())];
+        ui.painter().line_segment(line, Stroke::new(width, Color32::from_gray(grey)));
+    }
     x
 }
 

@@ -16,7 +16,7 @@ use super::request::{Comparison, DeviceSummary, Event, EventSender, Mailbox, Pro
 use crate::error::{Error, Result};
 use crate::film::{Control, NoControl};
 use crate::gpu::{self, Device};
-use crate::output::{self, FileSettings, ImageFormat, Picture, png};
+use crate::output::{self, ImageFormat};
 use crate::renderer::survey::Survey;
 use crate::renderer::{Interactive, Renderer};
 use crate::scene::{Camera, Scene};
@@ -308,7 +308,7 @@ struct Session<'a> {
 impl Session<'_> {
     fn run(&mut self) -> Result<()> {
         loop {
-            let (request, number, changed) = self.mailbox.take();
+            let (request, number, changed) = self.mailbox.latest();
             if request.quits || !self.serves(&request) || self.loader.is_some_and(Loader::is_ready) {
                 return Ok(());
             }
@@ -320,7 +320,11 @@ impl Session<'_> {
                 continue;
             };
             for task in &request.tasks {
-                self.perform(task, &camera, request.size)?;
+                let outcome = self.perform(task, &camera, &request);
+                if !matches!(outcome, Ok(false) | Err(Error::DeviceLost(_))) {
+                    self.mailbox.done(task);
+                }
+                outcome?;
             }
             let moves = self.last_motion.elapsed() < REST;
             match self.next_pane(moves, &request) {
@@ -468,11 +472,17 @@ impl Session<'_> {
         Ok(())
     }
 
-    fn perform(&mut self, task: &Task, camera: &Camera, size: [u32; 2]) -> Result<()> {
+    /// Performs a task, unless it has to wait for an image: then it returns false.
+    fn perform(&mut self, task: &Task, camera: &Camera, request: &Request) -> Result<bool> {
+        let size = request.size;
         match task {
             Task::Pick { at, purpose } => {
                 let pick = self.interactive.pick(camera, *at, f64::from(size[0]) / f64::from(size[1]))?;
                 self.events.send(Event::Picked(*purpose, Box::new(pick)));
+            }
+            // of a new tracer, say
+            Task::Save { pane, .. } if !request.is_paused && self.panes.get(*pane).is_some_and(Pane::is_to_come) => {
+                return Ok(false);
             }
             Task::Save { pane, path } => {
                 let saved = match self.save(*pane, path) {
@@ -482,7 +492,7 @@ impl Session<'_> {
                 self.events.send(Event::Saved(saved));
             }
         }
-        Ok(())
+        Ok(true)
     }
 
     fn save(&self, pane: usize, path: &Path) -> Result<()> {
@@ -490,12 +500,7 @@ impl Session<'_> {
         let view = self.panes.get(pane).and_then(Pane::shown).ok_or_else(none)?;
         match ImageFormat::of(path)? {
             ImageFormat::Exr => output::save(&view.image(&self.interactive, &mut NoControl)?, path),
-            _ => {
-                let picture = view.picture()?.ok_or_else(none)?;
-                let rgb: Vec<u8> = picture.rgba.chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]]).collect();
-                let settings = FileSettings::default();
-                Picture::of_bytes(rgb, picture.size, png::Colour::Rgb)?.save(path, settings.jpeg_quality())
-            }
+            _ => view.picture()?.ok_or_else(none)?.save(path),
         }
     }
 

@@ -121,6 +121,11 @@ impl Pane {
         self.resting.as_ref().filter(|_| self.shows_rest)
     }
 
+    /// There is no image yet, but there will be one.
+    pub fn is_to_come(&self) -> bool {
+        self.shown().is_none() && !self.failed
+    }
+
     /// The view that was rendered last.
     pub fn shown(&self) -> Option<&View> {
         if self.shows_rest { self.resting.as_ref() } else { self.moving.as_ref() }
