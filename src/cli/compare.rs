@@ -56,7 +56,7 @@ pub struct CompareArgs {
     /// Another kind of comparison.
     #[command(subcommand)]
     pub comparison: Option<OtherComparison>,
-    /// Images (.exr, .png): A, which is judged; B, the reference; C and more, which are judged, too. Those of --a, --b and --c take their letters first
+    /// Images (.exr, .png, .jpg, .webp): A, which is judged; B, the reference; C and more, which are judged, too. Those of --a, --b and --c take their letters first
     #[arg(value_name = "IMAGE", value_hint = ValueHint::FilePath)]
     pub images: Vec<PathBuf>,
     /// Scene to render: a .gltf, .glb, .obj or .brhan file, or builtin:NAME. Options of the groups Image, Camera and Light apply to each render that they have an effect on

@@ -90,7 +90,7 @@ enum Command {
     /// Render the frames of a manifest and compare each with its golden image: for continuous integration
     #[cfg(feature = "verify")]
     Verify(Box<verify::VerifyArgs>),
-    /// Benchmark ray throughput against other ray tracers, and cost and quality of real-time ambient occlusion
+    /// Benchmark ray throughput, frames in real time and path tracing: time against error, beside other programs
     #[cfg(feature = "bench")]
     Bench(crate::bench::BenchArgs),
     /// Trace a set of rays against a mesh and report the ray throughput

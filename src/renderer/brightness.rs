@@ -46,7 +46,7 @@ pub fn warning(mean: f64, capabilities: &[Capability], exposure: f64) -> Option<
         return None;
     }
     let darker = if can(AmbientOcclusion) {
-        "--ao-radius auto (or a number, or 5%) limits how far occluders reach"
+        "in a closed room every ray hits something: --ao-radius auto (or a number, or 5%) limits how far occluders reach"
     } else {
         "the sky does not reach what the camera sees; --view chooses another camera"
     };

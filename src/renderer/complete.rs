@@ -97,6 +97,11 @@ struct ChosenRadius {
     sentence: Option<String>,
 }
 
+/// A length with four significant digits.
+fn shown(length: f64) -> f64 {
+    format!("{length:.3e}").parse().unwrap_or(length)
+}
+
 fn ao_radius(wanted: Option<Length>, survey: &Survey, camera: &Camera, aspect: f64) -> Result<ChosenRadius> {
     let say = |units: f64, sentence: String| Ok(ChosenRadius { units: Some(units), sentence: Some(sentence) });
     let unlimited = || Ok(ChosenRadius { units: None, sentence: None });
@@ -105,7 +110,7 @@ fn ao_radius(wanted: Option<Length>, survey: &Survey, camera: &Camera, aspect: f
         Some(Length::Units(units)) => return Ok(ChosenRadius { units: Some(units), sentence: None }),
         Some(length @ Length::OfDiagonal(share)) => {
             let units = share * diagonal;
-            return say(units, format!("AO radius: {units} scene units, {length} of the scene's diagonal"));
+            return say(units, format!("AO radius: {} scene units, {length} of the scene's diagonal", shown(units)));
         }
         None if !survey.is_small() || survey.walls(camera.camera_to_world.translation).is_none() => return unlimited(),
         Some(Length::Auto) if !survey.is_small() => {
@@ -113,7 +118,8 @@ fn ao_radius(wanted: Option<Length>, survey: &Survey, camera: &Camera, aspect: f
             return say(
                 units,
                 format!(
-                    "AO radius: {units} scene units, 5% of the scene's diagonal, for the scene is too large to be looked at"
+                    "AO radius: {} scene units, 5% of the scene's diagonal, for the scene is too large to be looked at",
+                    shown(units)
                 ),
             );
         }

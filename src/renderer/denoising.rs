@@ -108,7 +108,7 @@ impl<'a> Denoising<'a> {
         let (name, why, seconds) = (self.name(), &self.chosen.why, self.seconds.get());
         DenoiseReport {
             line: format!(
-                "denoised by {name} ({}) in {seconds:.3} s: the image is biased; an .exr keeps the noisy image as {}",
+                "denoised by {name} ({}): the image is biased; an .exr keeps the noisy image as {}",
                 self.chosen.summary,
                 self.names.iter().map(|n| format!("noisy.{n}")).collect::<Vec<_>>().join(", ")
             ),

@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use super::brightness;
 use super::complete::Completed;
-use super::laps::Laps;
+use super::laps::{self, Laps};
 use super::report::{FrameReport, FramesReport, Seconds, Setup};
 use super::still::{aov_needs, camera_text, scene_warnings, spp_text};
 use super::{RenderSettings, Renderer, TracerRequest, camera_numbers};
@@ -84,6 +84,7 @@ impl Renderer {
         let path = timeline.camera_path.as_deref().map(load_camera_path).transpose()?;
         let first_of_path = path.as_ref().map(|path| path.camera_at(f64::from(range.first)));
         let Completed { camera, settings, choices } = self.complete(settings, first_of_path)?;
+        laps.lap(laps::SURVEY);
         let how = frame_settings(&settings)?;
         let scene = &self.scene;
         let mut warnings = scene_warnings(scene);

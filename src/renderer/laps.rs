@@ -6,6 +6,8 @@ use crate::gpu;
 
 /// Name of the part that is compiling pipelines.
 const COMPILE: &str = "compile";
+/// Name of the part in which settings are completed: what a scene looks like to a few thousand rays, by which its camera, AO radius and light are chosen.
+pub(super) const SURVEY: &str = "survey";
 
 /// A stopwatch whose laps are the parts of a run. What the driver takes to compile pipelines is a part of its own, whichever lap it is in.
 #[derive(Clone, Debug)]

@@ -51,7 +51,7 @@ settings! {
         /// Stop after this time and keep the image so far (at least one sample per pixel)
         time_limit: Option<f64>,
             option(value_name = "SECONDS", value_parser = parse_time, allow_hyphen_values = true), applies(AppliesTo::STILLS);
-        /// Pixel reconstruction filter, by importance sampling; frames in real time have the samples of `centre` [default: box]
+        /// Pixel reconstruction filter, by importance sampling; frames in real time have `box`, or `centre` with --antialias off [default: box]
         pixel_filter: Option<PixelFilter>, option(value_enum), applies(AppliesTo::STILLS);
         /// Denoise the final image (biased) [default: off; without METHOD: auto]
         ///

@@ -10,7 +10,7 @@ use super::brightness;
 use super::complete::Completed;
 use super::denoising::{self, Denoising};
 use super::film_file::{self, Identity, Maker};
-use super::laps::Laps;
+use super::laps::{self, Laps};
 use super::report::{FilmReport, Seconds, Setup, StillReport};
 use super::{RenderSettings, Renderer, TracerRequest, camera_numbers};
 use crate::accel::flatten::FlatScene;
@@ -134,21 +134,23 @@ impl Renderer {
             return Err(Error::Usage(format!("{} is for frames, and a still is rendered: leave it out", frames.option())));
         }
         let start = Instant::now();
+        let mut laps = Laps::after_open(self.open_seconds.wall);
         let completed = self.complete(settings, None)?;
-        self.still_of(&completed, extras, start, control, save)
+        laps.lap(laps::SURVEY);
+        self.still_of(&completed, extras, (start, laps), control, save)
     }
 
-    /// Renders a still of completed settings. `start`: when work on it began.
+    /// Renders a still of completed settings. `begun`: when work on it began, and the parts of its time so far.
     pub(super) fn still_of(
         &mut self,
         completed: &Completed,
         extras: StillExtras,
-        start: Instant,
+        begun: (Instant, Laps),
         control: &mut dyn Control,
         save: &mut dyn FnMut(&IntermediateImage) -> Result<()>,
     ) -> Result<Still> {
         let Completed { camera, settings, choices } = completed;
-        let mut laps = Laps::after_open(self.open_seconds.wall);
+        let (start, mut laps) = begun;
         let denoiser = denoising::choose(settings.image.denoise)?;
         let integrator = settings.integrator().get();
         let size = settings.size(&self.scene);

@@ -4,6 +4,7 @@ use std::time::Instant;
 
 use super::complete::Completed;
 use super::frames::{DEFAULT_FPS, camera_motion};
+use super::laps::Laps;
 use super::still::{Still, StillExtras, identity};
 use super::{RenderSettings, Renderer};
 use crate::error::{Error, Result};
@@ -110,9 +111,9 @@ impl StillSequence<'_> {
     /// # Errors
     /// Those of [`Renderer::still`].
     pub fn render(&mut self, number: u32, control: &mut dyn Control) -> Result<Still> {
-        let start = Instant::now();
+        let begun = (Instant::now(), Laps::after_open(self.renderer.open_seconds.wall));
         self.completed.camera = self.pose(number)?;
-        let mut still = self.renderer.still_of(&self.completed, StillExtras::default(), start, control, &mut |_| Ok(()))?;
+        let mut still = self.renderer.still_of(&self.completed, StillExtras::default(), begun, control, &mut |_| Ok(()))?;
         still.image.metadata.push(("frame".into(), number.to_string()));
         still.image.metadata.sort();
         Ok(still)

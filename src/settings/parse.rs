@@ -15,12 +15,13 @@ pub fn usage_message(error: &clap::Error) -> String {
     let text = error.render().to_string();
     let lines = text.lines().map(str::trim).take_while(|l| !l.starts_with("Usage:") && !l.starts_with("For more"));
     let words = lines.filter(|l| !l.is_empty()).collect::<Vec<_>>().join(" ");
-    let about_json = matches!(error.get(ContextKind::InvalidArg), Some(ContextValue::String(name)) if name == "--json");
-    let remedy = if about_json && error.kind() == ErrorKind::TooManyValues {
-        ": this command prints its record on stdout, so write `--json > FILE`"
-    } else {
-        ""
+    // --json=FILE and --json FILE, as `skylit bench` has them
+    let about_json = match (error.kind(), error.get(ContextKind::InvalidArg)) {
+        (ErrorKind::TooManyValues, Some(ContextValue::String(name))) => name == "--json",
+        (ErrorKind::UnknownArgument, Some(ContextValue::String(name))) => name.ends_with(".json"),
+        _ => false,
     };
+    let remedy = if about_json { ": this command prints its record on stdout, so write `--json > FILE`" } else { "" };
     words.trim_start_matches("error: ").to_owned() + remedy
 }
 

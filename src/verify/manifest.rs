@@ -1,6 +1,7 @@
 //! `frames.toml`: which frames there are, how they are rendered, and what may differ.
 
 use std::collections::BTreeSet;
+use std::io::ErrorKind;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
@@ -15,6 +16,9 @@ use crate::tracer::TracerKind;
 
 /// Name of the manifest in its folder.
 pub const NAME: &str = "frames.toml";
+/// A manifest of one frame, in a line.
+const EXAMPLE: &str =
+    r#"frame = [{ name = "hall", scene = "hall.glb", render = "ao --size 96x64 --spp 64", tolerance = "z_test" }]"#;
 /// What names of scenes that are no files begin with.
 const BUILTIN: &str = "builtin:";
 
@@ -146,7 +150,12 @@ impl Manifest {
     /// [`Error::Input`], naming the line, for a file that cannot be read or does not make sense.
     pub fn load(folder: &Path) -> Result<Self> {
         let path = folder.join(NAME);
-        let text = std::fs::read_to_string(&path).map_err(|e| Error::read(&path, &e))?;
+        let text = std::fs::read_to_string(&path).map_err(|e| match e.kind() {
+            ErrorKind::NotFound => {
+                Error::input(&path, format!("no such file: it lists the frames, such as {EXAMPLE} (docs/ci.md)"))
+            }
+            _ => Error::read(&path, &e),
+        })?;
         let source = Source { path: &path, text: &text };
         let file: File = toml::from_str(&text).map_err(|e| match e.span() {
             Some(span) => source.error(span, e.message()),
@@ -343,4 +352,19 @@ fn check(frame: &Frame) -> std::result::Result<(), String> {
         return wrong("a Z-test needs at least 2 samples per pixel, to know their variance");
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_example_is_a_manifest() {
+        let dir = tempfile::tempdir().unwrap();
+        let error = Manifest::load(dir.path()).map(drop).unwrap_err().to_string();
+        assert!(error.contains(EXAMPLE), "{error}");
+        std::fs::write(dir.path().join(NAME), EXAMPLE.replace("hall.glb", "builtin:plane")).unwrap();
+        let frames = Manifest::load(dir.path()).unwrap().frames;
+        assert!(frames.len() == 1 && frames[0].tolerance.z_test.is_some(), "{frames:?}");
+    }
 }

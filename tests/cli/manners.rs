@@ -165,8 +165,10 @@ fn gpu_times_add_up() {
     let still = ["render", "builtin:cornell-box", "--size", "96x64", "--spp", "2", "--integrator", "path", "-o", &exr];
     let frames = ["render", "builtin:cornell-box", "--size", "96x64", "--preset", "fast", "-o", &png];
     let (ao, path): (&[&str], &[&str]) =
-        (&["open", "frames", "warm-up", "write"], &["open", "trace", "compile", "write", "denoise"]);
-    for (args, expected) in [(&[&still[..], &["--denoise", "filter"]].concat(), path), (&frames.to_vec(), ao)] {
+        (&["open", "survey", "frames", "warm-up", "write"], &["open", "survey", "trace", "compile", "write", "denoise"]);
+    // a view that is found by looking at the scene, which is the part `survey`
+    let denoised = [&still[..], &["--denoise", "filter", "--view", "iso"]].concat();
+    for (args, expected) in [(&denoised, path), (&frames.to_vec(), ao)] {
         let record = json(&run(&[&args[..], &["--json"]].concat()));
         let seconds = &record["seconds"];
         let parts = seconds["parts"].as_object().unwrap();

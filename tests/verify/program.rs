@@ -63,7 +63,11 @@ fn manifests_that_are_wrong_name_the_line() {
         fails(&run(&["verify", text(dir.path())]), 2, &["frames.toml", says]);
     }
     let dir = tempfile::tempdir().unwrap();
-    fails(&run(&["verify", text(dir.path())]), 2, &["frames.toml: no such file"]);
+    fails(
+        &run(&["verify", text(dir.path())]),
+        2,
+        &["frames.toml: no such file: it lists the frames", "tolerance = \"z_test\""],
+    );
     let json = run(&["verify", text(dir.path()), "--json"]);
     let record: serde_json::Value = serde_json::from_slice(&json.stdout).unwrap();
     assert_eq!(record["exit_code"], 2);

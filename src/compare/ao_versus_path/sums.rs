@@ -2,7 +2,8 @@
 //!
 //! The ambient radiance A of a channel minimizes the mean of (A x - g)^2, x the light that surfaces reflect of an ambient radiance of 1 and g the light that is to be
 //! approximated: A = sum(x g) / sum(x x). Both are known with noise, in two independent halves a and b. Products of different halves have
-//! the expected value that products of the converged images have, so errors are those of converged images: noise adds nothing to them.
+//! the expected value that products of the converged images have, so errors are those of converged images: noise adds nothing to them. A signal that is hardly there (a radius
+//! that nothing is nearer than) has a sum of squares that is nothing but noise, of either sign, and would explain anything: such sums explain nothing ([`CERTAIN`]).
 
 use std::ops::{AddAssign, Sub};
 
@@ -17,6 +18,8 @@ pub const GROUPS: usize = 8;
 const TILES: usize = 20;
 /// Maximum number of channels.
 const CHANNELS: usize = 3;
+/// Standard errors by which the sum of squares of a signal must exceed 0 to be one.
+const CERTAIN: f64 = 4.0;
 
 /// What ambient light should look like: an image in two halves, and the pixels that count.
 pub struct Target {
@@ -37,6 +40,8 @@ pub struct Sums {
     pub xg: [f64; CHANNELS],
     /// Sum of x^2.
     pub xx: [f64; CHANNELS],
+    /// Variance of that sum by the noise of x.
+    pub xx_variance: [f64; CHANNELS],
 }
 
 impl Sums {
@@ -44,11 +49,14 @@ impl Sums {
     fn add(&mut self, channel: usize, [xa, xb]: [f32; 2], [ga, gb]: [f32; 2]) {
         self.xg[channel] += 0.5 * (f64::from(xa) * f64::from(gb) + f64::from(xb) * f64::from(ga));
         self.xx[channel] += f64::from(xa) * f64::from(xb);
+        // mean times difference of the halves: its square has the variance of their product as its expected value
+        self.xx_variance[channel] += (0.5 * (f64::from(xa) * f64::from(xa) - f64::from(xb) * f64::from(xb))).powi(2);
     }
 
-    /// The ambient radiance with the smallest error, not negative.
+    /// The ambient radiance with the smallest error, not negative; 0 where the signal is no more than noise.
     pub fn ambient(&self) -> [f64; CHANNELS] {
-        [0, 1, 2].map(|c| if self.xx[c] > 0.0 { (self.xg[c] / self.xx[c]).max(0.0) } else { 0.0 })
+        let is_certain = |c: usize| self.xx[c] > CERTAIN * self.xx_variance[c].sqrt();
+        [0, 1, 2].map(|c| if is_certain(c) { (self.xg[c] / self.xx[c]).max(0.0) } else { 0.0 })
     }
 
     /// What the best ambient radiance takes from the sum of squares of the target.
@@ -63,6 +71,7 @@ impl AddAssign for Sums {
         for c in 0..CHANNELS {
             self.xg[c] += other.xg[c];
             self.xx[c] += other.xx[c];
+            self.xx_variance[c] += other.xx_variance[c];
         }
     }
 }
@@ -72,7 +81,11 @@ impl Sub for Sums {
 
     fn sub(self, other: Self) -> Self {
         let minus = |a: [f64; CHANNELS], b: [f64; CHANNELS]| [0, 1, 2].map(|c| a[c] - b[c]);
-        Self { xg: minus(self.xg, other.xg), xx: minus(self.xx, other.xx) }
+        Self {
+            xg: minus(self.xg, other.xg),
+            xx: minus(self.xx, other.xx),
+            xx_variance: minus(self.xx_variance, other.xx_variance),
+        }
     }
 }
 
@@ -217,34 +230,41 @@ impl PixelSums {
             1 => [scale, 0.0, 0.0],
             _ => s.reflectance.map(|c| c * scale),
         };
-        let mut open = [[0.0f32; CHANNELS]; 2];
+        // light of samples that no radius reaches: from it, radii are added up from the largest down, so that what is left where hits occlude all is 0 and no rounding
+        let mut unhit = [[0.0f32; CHANNELS]; 2];
         for (h, samples) in halves.iter().enumerate() {
             for (k, s) in samples.iter().enumerate() {
-                let w = weights(s);
-                (0..CHANNELS).for_each(|c| open[h][c] += w[c]);
                 self.first[h][k] = match reflects(s) && s.distance.is_finite() {
                     true => self.radii.partition_point(|r| *r <= s.distance),
                     false => self.radii.len(),
                 };
+                if self.first[h][k] == self.radii.len() {
+                    let w = weights(s);
+                    (0..CHANNELS).for_each(|c| unhit[h][c] += w[c]);
+                }
             }
         }
         for (f, falloff) in self.falloffs.iter().enumerate() {
+            let mut left = unhit;
             for (h, samples) in halves.iter().enumerate() {
                 self.taken[h].fill([0.0; CHANNELS]);
                 for (s, &first) in samples.iter().zip(&self.first[h]) {
                     if first < self.radii.len() {
                         let (w, occlusion) = (weights(s), falloff.occlusion(s.distance));
-                        (0..CHANNELS).for_each(|c| self.taken[h][first][c] += w[c] * occlusion);
+                        (0..CHANNELS).for_each(|c| {
+                            self.taken[h][first][c] += w[c] * occlusion;
+                            left[h][c] += w[c] * (1.0 - occlusion);
+                        });
                     }
                 }
             }
-            let mut left = open;
             let row = table.index(group, f, 0);
-            for r in 0..self.radii.len() {
+            for r in (0..self.radii.len()).rev() {
                 let sums = &mut table.sums[row + r];
                 (0..target.channels).for_each(|c| {
-                    (0..2).for_each(|h| left[h][c] -= self.taken[h][r][c]);
                     sums.add(c, [left[0][c], left[1][c]], target.value(pixel, c));
+                    // a smaller radius lets through what hits at this one take away
+                    (0..2).for_each(|h| left[h][c] += self.taken[h][r][c]);
                 });
             }
         }
@@ -300,6 +320,41 @@ mod tests {
         let mut sum = Sums::default();
         (0..GROUPS).for_each(|g| sum += table.sums(0, 0, None) - table.sums(0, 0, Some(g)));
         assert!((sum.xg[0] - table.sums(0, 0, None).xg[0]).abs() < 1e-9 * sum.xg[0]);
+    }
+
+    /// Where every ray is occluded nothing is left, not even rounding.
+    #[test]
+    fn what_is_occluded_is_black() {
+        let samples = scattered(300, 7);
+        let image = [0, 1].map(|half| {
+            let hits = |p: usize| samples.of(half, p).iter().filter(|s| s.distance.is_finite()).copied().collect::<Vec<_>>();
+            (0..300).map(hits).collect::<Vec<_>>()
+        });
+        let most = image.iter().flatten().map(Vec::len).max().unwrap();
+        let mut occluded = Samples::new(300, most as u32).unwrap();
+        for (half, pixels) in image.iter().enumerate() {
+            pixels.iter().enumerate().for_each(|(p, hits)| occluded.add(half, p, hits));
+        }
+        let ones = [0, 1].map(|_| vec![1.0; 900]);
+        let target = Target { channels: 3, halves: ones, pixels: (0..300).collect(), width: 100 };
+        let table = Table::evaluate(&occluded, &target, &[0.0], &[1.0, 10.0, 20.0, f64::INFINITY]);
+        assert!(table.sums(0, 0, None).explained() > 0.0);
+        (1..4).for_each(|r| assert_eq!(table.sums(0, r, None), Sums::default(), "{r}"));
+    }
+
+    /// Two halves that hardly ever meet: by their one common pixel they would explain more than there is.
+    #[test]
+    fn a_signal_that_is_noise_explains_nothing() {
+        let n = 10_000;
+        let half = |h: usize| (0..n).map(|k| f32::from(u8::from(k % 100 == h || k == 5))).collect::<Vec<f32>>();
+        let ones = [0, 1].map(|_| vec![1.0; n]);
+        let target = Target { channels: 1, halves: ones, pixels: (0..n).collect(), width: 100 };
+        let sums = target.sums(&[half(0), half(1)]);
+        assert!(sums.xx[0] == 1.0 && sums.xg[0].powi(2) / sums.xx[0] > target.energy(), "{sums:?}");
+        assert_eq!((sums.ambient(), sums.explained()), ([0.0; 3], 0.0));
+        // a tenth of the pixels, in both halves: that is no noise
+        let tenth = [0, 1].map(|_| (0..n).map(|k| f32::from(u8::from(k % 10 == 0))).collect::<Vec<f32>>());
+        assert!((target.sums(&tenth).explained() / target.energy() - 0.1).abs() < 1e-9);
     }
 
     /// Noise of the target does not change the error on average.

@@ -6,9 +6,6 @@ use super::{AoOptions, AoResult};
 use crate::film::Film;
 use crate::integrators::IntegratorReport;
 
-/// Mean ambient visibility below which an image is as good as black.
-const NEARLY_BLACK: f64 = 0.02;
-
 /// Composes the report of an ambient occlusion image.
 pub(super) fn report(options: &AoOptions, result: &AoResult) -> IntegratorReport {
     let image = &result.image;
@@ -52,16 +49,8 @@ pub(super) fn report(options: &AoOptions, result: &AoResult) -> IntegratorReport
         lines: vec![format!("mean over the scene's pixels {covered_mean:.5}; {mrays_s:.1} Mrays/s")],
         explanations,
         record: record.as_object().cloned().unwrap_or_default(),
-        warnings: warning(options, covered_mean, result.occlusion_rays).into_iter().collect(),
+        warnings: Vec::new(),
     }
-}
-
-/// What to do about an image that is all black: in a closed room every ray hits something.
-fn warning(options: &AoOptions, mean: f64, rays: u64) -> Option<String> {
-    let is_black = mean < NEARLY_BLACK && rays > 0 && options.radius.is_infinite() && options.falloff == 1.0;
-    is_black.then(|| {
-        format!("the scene's pixels are nearly black (mean {mean:.4}): in a closed room every ray hits something; limit the rays with --ao-radius")
-    })
 }
 
 /// Mean over the samples that hit the scene.
