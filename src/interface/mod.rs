@@ -11,6 +11,7 @@ pub mod features;
 pub mod glsl;
 #[macro_use]
 pub mod layout;
+pub mod path_options;
 pub mod records;
 
 pub use enumerations::{
