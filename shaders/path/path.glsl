@@ -31,6 +31,7 @@ float power_heuristic(float a, float b) {
 // Radiance that counts, of what reaches the camera after so many bounces.
 vec3 counted_radiance(PathParams p, vec3 c, uint depth) {
     if (WITH_MIN_DEPTH && depth < p.options.min_depth) return vec3(0.0);
+    if (WITH_INDIRECT_SCALE && depth > 1u) c *= p.options.indirect_scale;
     return WITH_CLAMP && depth > 0u ? min(c, vec3(p.options.firefly_clamp)) : c;
 }
 

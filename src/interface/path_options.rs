@@ -27,6 +27,11 @@ macro_rules! path_options {
                 setting(option(value_name = "X", value_parser = parse_positive, allow_hyphen_values = true), applies(LIGHT)),
                 feature(Clamp = "WITH_CLAMP", "radiance clamp"),
                 remark("indirect radiance clamped to {}: biased, too dark");
+            /// Scale factor of indirect light, of two bounces or more; biased but for 1 [default: 1]
+            indirect_scale: f64 as float = 1.0,
+                setting(option(value_name = "X", value_parser = parse_positive, allow_hyphen_values = true), applies(LIGHT), research),
+                feature(IndirectScale = "WITH_INDIRECT_SCALE", "scaled indirect light"),
+                remark("indirect light scaled by {}: biased");
         }
     };
 }
