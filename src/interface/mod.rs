@@ -6,6 +6,7 @@
 //! `shared_choice` (src/lib.rs) add derives to these types; those of build.rs derive nothing.
 
 pub mod constants;
+pub mod debug_views;
 pub mod enumerations;
 pub mod features;
 pub mod glsl;
