@@ -8,6 +8,8 @@ macro_rules! debug_views {
         $callback! {
             /// BVH nodes that camera rays visit, as a heat map; needs `--tracer compute`
             Nodes = "nodes", "SHOWN_NODES", mod nodes, shader NODES;
+            /// Why pixels have no history: blue was off screen, red another instance, green another depth, yellow another normal; grey has one
+            Rejected = "rejected", "SHOWN_REJECTED", mod rejected, shader REJECTED;
         }
     };
 }
