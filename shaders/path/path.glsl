@@ -164,7 +164,7 @@ void add_straight(PathParams p, uint k, PathState state, float length_) {
 vec3 straight_transmittance(Shading m, vec3 towards_viewer) {
     if (m.bsdf.kind != BSDF_GLTF) return vec3(0.0);
     vec3 wo = to_frame(m.frame, towards_viewer);
-    wo.z = max(wo.z, LEAST_COSINE);
+    wo.z = max(wo.z, MIN_COSINE);
     return gltf_straight(m.bsdf, wo);
 }
 
@@ -255,7 +255,7 @@ vec3 path_vertex(BlockParams block, uint k, PathState state, Ray ray, Hit hit) {
     }
 
     vec3 wo = to_frame(m.frame, towards_viewer);
-    wo.z = max(wo.z, LEAST_COSINE);
+    wo.z = max(wo.z, MIN_COSINE);
     if (WITH_LIGHT_SAMPLES && has_rough_part(m.bsdf)) {
         sample_direct_light(block, p, k, state, v, s, m, wo, boundary.medium, pixel, n, dimension);
     }

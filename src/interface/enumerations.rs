@@ -222,8 +222,8 @@ macro_rules! display_mode {
 
             /// Buffer of a frame that is displayed: scalars as grey up to `Rays`, colours from `Normal` on (shaders/display.glsl compares).
             DisplayMode: "shown" {
-                /// The filtered result
-                Accessibility = "accessibility", "SHOWN_ACCESSIBILITY";
+                /// The final image: ambient visibility, or radiance
+                Result = "result", "SHOWN_RESULT";
                 /// The input of the spatial filter
                 Unfiltered = "unfiltered", "SHOWN_UNFILTERED";
                 /// Accumulated samples; white: maximum history length

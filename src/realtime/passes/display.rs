@@ -18,7 +18,7 @@ impl DisplayMode {
     /// Colour type of files without alpha that store it.
     pub fn colour(self) -> Colour {
         match self {
-            DisplayMode::Accessibility
+            DisplayMode::Result
             | DisplayMode::Unfiltered
             | DisplayMode::Samples
             | DisplayMode::Variance
@@ -33,9 +33,9 @@ impl DisplayMode {
     /// # Errors
     /// [`Error::Usage`], naming those that they have.
     pub fn check_radiance(self) -> Result<()> {
-        use DisplayMode::{Accessibility, Depth, Ids, Motion, Normal, Position};
+        use DisplayMode::{Depth, Ids, Motion, Normal, Position};
         let is_there =
-            |m: &DisplayMode| debug_view(*m).is_some() || [Accessibility, Depth, Normal, Position, Ids, Motion].contains(m);
+            |m: &DisplayMode| debug_view(*m).is_some() || [Self::Result, Depth, Normal, Position, Ids, Motion].contains(m);
         if is_there(&self) {
             return Ok(());
         }
@@ -112,7 +112,7 @@ impl Pass for DisplayPass {
         }
         let Some(display) = display else { return uses };
         match display.shown {
-            DisplayMode::Accessibility => uses.and_reads(&[Result, Resolved]),
+            DisplayMode::Result => uses.and_reads(&[Result, Resolved]),
             // without a history the result is read in its place
             DisplayMode::Unfiltered => uses.and_reads(&[Guide, History, Result]),
             DisplayMode::Samples | DisplayMode::Variance => uses.and_reads(&[Guide, History]),
