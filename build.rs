@@ -44,6 +44,17 @@ use source::{Mode, Rays, Source, Stage, Variant, mode, rays};
 /// A shader that is to be compiled: its file's name in OUT_DIR, and what it is compiled from; nothing where no such shader applies.
 type Job = (String, Option<Source>);
 
+/// The two variants of a pass that traces no rays.
+fn compute_jobs(pass: &'static str) -> [Job; 2] {
+    [(false, 32), (true, 64)].map(|(int64, bits)| (format!("{pass}_{bits}.spv"), Some(Source::Compute { pass, int64 })))
+}
+
+macro_rules! debug_view_jobs {
+    ($($(#[doc = $doc:literal])+ $view:ident = $name:literal, $glsl:literal, mod $module:ident, shader $shader:ident;)*) => {
+        [$(compute_jobs($name)),*].concat()
+    };
+}
+
 macro_rules! registry {
     (
         streams { $($stream:ident = $pass:literal, $mode:ident, $rays:ident;)* }
@@ -59,11 +70,7 @@ macro_rules! registry {
                     jobs.push((file, variant.applies_to(rays!($rays)).then_some(source)));
                 }
             )*
-            $(
-                for (int64, bits) in [(false, 32), (true, 64)] {
-                    jobs.push((format!("{}_{bits}.spv", $name), Some(Source::Compute { pass: $name, int64 })));
-                }
-            )*
+            $(jobs.extend(compute_jobs($name));)*
             $(jobs.push((concat!(stringify!($stage), ".spv").to_owned(), Some(Source::File { path: $path, stage: Stage::$kind })));)*
             jobs
         }
@@ -82,6 +89,7 @@ mod probes {
 /// Everything that is to be compiled.
 fn all_jobs() -> Vec<Job> {
     let mut all = jobs();
+    all.extend(interface::debug_views::debug_views!(debug_view_jobs));
     #[cfg(feature = "probes")]
     all.extend(probes::jobs());
     for (int64, bits) in [(false, 32), (true, 64)] {

@@ -26,16 +26,16 @@ Ray ray(uint index) {
     return occlusion_ray(surface_position(f, at), spawn_offset_at(f, at), ng, w, f.reach);
 }
 
-void add_sample(uint index, float accessibility) {
+void add_sample(uint index, float visibility) {
     AoTraceParams p = AoTraceParams(push.pass);
     FrameParams f = FrameParams(p.frame);
     if (!is_null(p.list)) {
         uint entry = Words(p.list).v[index];
-        FloatImage(p.samples).v[(entry >> 4) * p.most_rays + (entry & 15u)] = accessibility;
+        FloatImage(p.samples).v[(entry >> 4) * p.most_rays + (entry & 15u)] = visibility;
         return;
     }
     if (f.rays_per_pixel > 1u) {
-        FloatImage(p.samples).v[index - push.first] = accessibility;
+        FloatImage(p.samples).v[index - push.first] = visibility;
         return;
     }
     uvec2 pixel = tile_pixel(f, index);
@@ -43,9 +43,9 @@ void add_sample(uint index, float accessibility) {
     uint at = image_index(f, pixel);
     // nothing reads the values of background pixels
     if (!is_sampled(f, pixel) || is_resting(f, at)) return;
-    STORE_PAIR(p.current, at, pack_estimate(Estimate(accessibility, 1.0, 0.0)));
+    STORE_PAIR(p.current, at, pack_estimate(Estimate(visibility, 1.0, 0.0)));
     if (!is_null(p.current_bent)) {
-        store_vec3(p.current_bent, at, accessibility * occlusion_direction(p, f, pixel, at, surface_normal(f, at), 0u));
+        store_vec3(p.current_bent, at, visibility * occlusion_direction(p, f, pixel, at, surface_normal(f, at), 0u));
     }
 }
 

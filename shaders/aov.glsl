@@ -20,9 +20,9 @@ void closest(uint index, Hit hit) {
     }
     Surface s = surface_at(centre_ray(p, index), hit);
     SceneRoot root = SceneRoot(push.scene);
-    PartRecord part = PartRecords(root.parts).v[s.part];
-    vec4 color = base_color(part, MaterialRecords(root.materials).v[part.material], s.primitive, s.uv);
-    aov.v[at] = uvec4(floatBitsToUint(hit.t), hit.instance, hit.primitive, part.material);
+    SubmeshRecord submesh = SubmeshRecords(root.submeshes).v[s.submesh];
+    vec4 color = base_color(submesh, MaterialRecords(root.materials).v[submesh.material], s.primitive, s.uv);
+    aov.v[at] = uvec4(floatBitsToUint(hit.t), hit.instance, hit.primitive, submesh.material);
     aov.v[at + 1u] = uvec4(floatBitsToUint(s.position), floatBitsToUint(color.r));
     aov.v[at + 2u] = uvec4(floatBitsToUint(s.ng), floatBitsToUint(color.g));
     aov.v[at + 3u] = uvec4(floatBitsToUint(s.ns), floatBitsToUint(color.b));

@@ -53,8 +53,8 @@ vec2 motion(FrameParams f, uint at) {
 }
 
 vec3 colour(DisplayParams d, FrameParams f, uint at) {
-    if (d.shown == SHOWN_ACCESSIBILITY && !is_null(d.resolved)) return uintBitsToFloat(Quads(d.resolved).v[at].xyz);
-    if (d.shown == SHOWN_ACCESSIBILITY || d.shown == SHOWN_UNFILTERED && d.has_history == 0u) return vec3(FloatImage(d.result).v[at]);
+    if (d.shown == SHOWN_RESULT && !is_null(d.resolved)) return uintBitsToFloat(Quads(d.resolved).v[at].xyz);
+    if (d.shown == SHOWN_RESULT || d.shown == SHOWN_UNFILTERED && d.has_history == 0u) return vec3(FloatImage(d.result).v[at]);
     uvec2 guide = LOAD_PAIR(f.guide, at);
     if (!is_surface(guide)) return vec3(0.0);
     if (d.shown == SHOWN_DEPTH) return vec3(d.unit / (d.unit + uintBitsToFloat(guide.x)));
@@ -77,7 +77,7 @@ void main() {
     if (gl_GlobalInvocationID.x >= push.count) return;
     DisplayParams d = DisplayParams(push.pass);
     vec3 linear = colour(d, FrameParams(d.frame), at) * d.gain;
-    bool is_radiance = (d.flags & DISPLAY_RADIANCE) != 0u && d.shown == SHOWN_ACCESSIBILITY;
+    bool is_radiance = (d.flags & DISPLAY_RADIANCE) != 0u && d.shown == SHOWN_RESULT;
     if (is_radiance) linear = tone_mapped(d.tone_map, linear);
     uint red = srgb_byte(d.thresholds, linear.r);
     uint word = 0xff000000u | red * 0x010101u;

@@ -54,7 +54,7 @@ void main() {
     vec3 right = normalize(vec3(v.z, 0.0, -v.x)), up = cross(v, right);
     float radius = g.radius_scale * f.reach / footprint(f, f.view, orthographic, depth);
     vec2 u = sequence_2d(f.sequence, f.seed, pixel, f.frame, 0u, 1u);
-    float accessibility = 0.0, open = 0.0;
+    float visibility = 0.0, open = 0.0;
     for (uint slice = 0u; slice < g.slices; slice++) {
         float phi = PI * (float(slice) + u.x) / float(g.slices);
         // slices are uniform about the view ray; away from the image centre that differs from uniform in the image
@@ -93,10 +93,10 @@ void main() {
             h = n + clamp(h - n, -0.5 * PI, 0.5 * PI);
             arcs += arc(cos_n, n, h);
         }
-        accessibility += size * arcs;
+        visibility += size * arcs;
         open += size * (cos_n + n * sin(n));
     }
     // of what these slices would be without anything in them, which a few are not evenly
-    accessibility = open > 0.0 ? pow(clamp(accessibility / open, 0.0, 1.0), g.visibility_exponent) : 1.0;
-    STORE_PAIR(g.current, at, pack_estimate(Estimate(accessibility, 1.0, 0.0)));
+    visibility = open > 0.0 ? pow(clamp(visibility / open, 0.0, 1.0), g.visibility_exponent) : 1.0;
+    STORE_PAIR(g.current, at, pack_estimate(Estimate(visibility, 1.0, 0.0)));
 }

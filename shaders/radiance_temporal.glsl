@@ -37,7 +37,7 @@ RadianceEstimate history_at(uvec2 image, Taps taps) {
         e.samples += w * tap.samples;
         e.variance += w * tap.variance;
     }
-    if (weight < 0.01) return NO_RADIANCE;
+    if (weight < MIN_TAP_WEIGHT) return NO_RADIANCE;
     return RadianceEstimate(e.mean / weight, e.samples / weight, e.variance / weight, 0.0);
 }
 

@@ -4,10 +4,10 @@
 #include "common/film.glsl"
 
 bool add_sample(inout FilmPixel pixel, BlockParams p, uint k) {
-    float accessibility = Floats(p.samples).v[k];
+    float visibility = Floats(p.samples).v[k];
     // a sample without a hit counts as 0
-    if (accessibility < 0.0) return false;
-    add_value(pixel, 0u, accessibility);
+    if (visibility < 0.0) return false;
+    add_value(pixel, 0u, visibility);
     pixel.covered++;
     return true;
 }

@@ -55,8 +55,7 @@ Estimate reprojected(TemporalParams p, FrameParams f, vec3 before, vec3 normal, 
         variance += w * e.variance;
         if (BENT_NORMALS) bents += w * load_vec3(p.previous_bent_history, taps.at[k]);
     }
-    // less than a hundredth of the footprint was visible
-    if (weight < 0.01) return none;
+    if (weight < MIN_TAP_WEIGHT) return none;
     if (BENT_NORMALS) bent = bents / weight;
     return Estimate(mean / weight, samples / weight, variance / weight);
 }

@@ -21,7 +21,7 @@ vec3 about(vec3 n, vec3 w) {
 BsdfValue clearcoat_at(Clearcoat clearcoat, vec3 wo, vec3 wi) {
     vec3 n = clearcoat_normal(clearcoat, wo);
     vec3 o = about(n, wo), i = about(n, wi);
-    o.z = max(o.z, LEAST_COSINE);
+    o.z = max(o.z, MIN_COSINE);
     if (!(i.z > 0.0)) return NO_VALUE;
     vec3 m = normalize(o + i);
     float f = clearcoat.weight * clearcoat_fresnel(dot(o, m));

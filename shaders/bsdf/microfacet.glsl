@@ -12,7 +12,7 @@
 const float MIN_ALPHA = 1e-5;
 
 // Directions nearer to the surface count as this near.
-const float LEAST_COSINE = 1e-4;
+const float MIN_COSINE = 1e-4;
 
 struct Microfacets {
     vec2 alpha;     // along x and y of the frame

@@ -10,6 +10,9 @@ struct Taps {
     float weight[4];
 };
 
+// Sum of the weights of taps below which there is no history: less than a hundredth of the footprint was visible.
+const float MIN_TAP_WEIGHT = 0.01;
+
 const Taps NO_TAPS = Taps(uint[4](0u, 0u, 0u, 0u), float[4](0.0, 0.0, 0.0, 0.0));
 
 // The place of a point in the previous image, in pixels from the sample of the pixel in the upper left corner; false if it was not there.

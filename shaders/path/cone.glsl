@@ -44,14 +44,14 @@ Cone cone_after(Cone c, float length_) {
 // log2 of the footprint's side on the triangle, over the root of the triangle's doubled area; SHARP where there is nothing to look up. On a texture,
 // of which the triangle covers some doubled area in texels, that is a level plus a constant of the triangle.
 float footprint(Cone c, Surface s, vec3 direction) {
-    PartRecord part = PartRecords(SceneRoot(push.scene).parts).v[s.part];
-    if (HAS_SPHERES && is_null(part.indices)) return SHARP;
-    uvec3 corners = triangle_indices(part, s.primitive);
-    vec3 v0 = load_vec3(part.positions, corners.x);
-    vec3 edge1 = load_vec3(part.positions, corners.y) - v0;
-    vec3 edge2 = load_vec3(part.positions, corners.z) - v0;
+    SubmeshRecord submesh = SubmeshRecords(SceneRoot(push.scene).submeshes).v[s.submesh];
+    if (HAS_SPHERES && is_null(submesh.indices)) return SHARP;
+    uvec3 corners = triangle_indices(submesh, s.primitive);
+    vec3 v0 = load_vec3(submesh.positions, corners.x);
+    vec3 edge1 = load_vec3(submesh.positions, corners.y) - v0;
+    vec3 edge2 = load_vec3(submesh.positions, corners.z) - v0;
     if (!SINGLE_LEVEL) {
-        vec4 rows[3] = InstanceRecords(SceneRoot(push.scene).instances).v[s.entry].group_to_world;
+        vec4 rows[3] = InstanceRecords(SceneRoot(push.scene).instances).v[s.tlas_instance].group_to_world;
         edge1 = transform_vector(rows, edge1);
         edge2 = transform_vector(rows, edge2);
     }
@@ -68,23 +68,23 @@ float footprint(Cone c, Surface s, vec3 direction) {
 // Curvature: rotation of the interpolated normal along the surface, per scene unit: the mean over the triangle's edges. Positive: it bulges out at the front.
 // Normal maps are ignored.
 float curvature(Surface s) {
-    PartRecord part = PartRecords(SceneRoot(push.scene).parts).v[s.part];
+    SubmeshRecord submesh = SubmeshRecords(SceneRoot(push.scene).submeshes).v[s.submesh];
     InstanceRecord instance;
-    if (!SINGLE_LEVEL) instance = InstanceRecords(SceneRoot(push.scene).instances).v[s.entry];
-    if (HAS_SPHERES && is_null(part.indices)) {
-        float radius = uintBitsToFloat(Quads(part.positions).v[s.primitive].w);
+    if (!SINGLE_LEVEL) instance = InstanceRecords(SceneRoot(push.scene).instances).v[s.tlas_instance];
+    if (HAS_SPHERES && is_null(submesh.indices)) {
+        float radius = uintBitsToFloat(Quads(submesh.positions).v[s.primitive].w);
         if (!SINGLE_LEVEL) {
             vec4 rows[3] = instance.group_to_world;
             radius *= pow(abs(dot(rows[0].xyz, cross(rows[1].xyz, rows[2].xyz))), 1.0 / 3.0);
         }
         return 1.0 / radius;
     }
-    if (is_null(part.normals)) return 0.0;
-    uvec3 corners = triangle_indices(part, s.primitive);
+    if (is_null(submesh.normals)) return 0.0;
+    uvec3 corners = triangle_indices(submesh, s.primitive);
     vec3 p[3], n[3];
     for (uint k = 0u; k < 3u; k++) {
-        p[k] = load_vec3(part.positions, corners[k]);
-        n[k] = load_vec3(part.normals, corners[k] - part.first_vertex);
+        p[k] = load_vec3(submesh.positions, corners[k]);
+        n[k] = load_vec3(submesh.normals, corners[k] - submesh.first_vertex);
         if (!SINGLE_LEVEL) {
             p[k] = transform_vector(instance.group_to_world, p[k]);
             n[k] = transform_transposed(instance.world_to_group, n[k]);

@@ -104,7 +104,7 @@ void guide_vertex(BlockParams block, uint at, GuideRay g, Ray ray, Hit hit) {
     if (scatters || g.bounces >= MAX_GUIDE_BOUNCES || is_null(q.states)) return;
 
     vec3 wo = to_frame(m.frame, towards_viewer);
-    wo.z = max(wo.z, LEAST_COSINE);
+    wo.z = max(wo.z, MIN_COSINE);
     BsdfSample b = bsdf_sample(m.bsdf, wo, vec2(0.5), TRANSMITTED);
     if (!(b.pdf > 0.0)) return;
     vec3 w = normalize(from_frame(m.frame, b.wi));

@@ -30,8 +30,9 @@ float power_heuristic(float a, float b) {
 
 // Radiance that counts, of what reaches the camera after so many bounces.
 vec3 counted_radiance(PathParams p, vec3 c, uint depth) {
-    if (WITH_MIN_DEPTH && depth < p.min_depth) return vec3(0.0);
-    return WITH_CLAMP && depth > 0u ? min(c, vec3(p.clamp_to)) : c;
+    if (WITH_MIN_DEPTH && depth < p.options.min_depth) return vec3(0.0);
+    if (WITH_INDIRECT_SCALE && depth > 1u) c *= p.options.indirect_scale;
+    return WITH_CLAMP && depth > 0u ? min(c, vec3(p.options.firefly_clamp)) : c;
 }
 
 // MIS weight of an emitter that a ray hit, which light sampling samples with density `light`.
@@ -163,7 +164,7 @@ void add_straight(PathParams p, uint k, PathState state, float length_) {
 vec3 straight_transmittance(Shading m, vec3 towards_viewer) {
     if (m.bsdf.kind != BSDF_GLTF) return vec3(0.0);
     vec3 wo = to_frame(m.frame, towards_viewer);
-    wo.z = max(wo.z, LEAST_COSINE);
+    wo.z = max(wo.z, MIN_COSINE);
     return gltf_straight(m.bsdf, wo);
 }
 
@@ -254,7 +255,7 @@ vec3 path_vertex(BlockParams block, uint k, PathState state, Ray ray, Hit hit) {
     }
 
     vec3 wo = to_frame(m.frame, towards_viewer);
-    wo.z = max(wo.z, LEAST_COSINE);
+    wo.z = max(wo.z, MIN_COSINE);
     if (WITH_LIGHT_SAMPLES && has_rough_part(m.bsdf)) {
         sample_direct_light(block, p, k, state, v, s, m, wo, boundary.medium, pixel, n, dimension);
     }
@@ -280,7 +281,7 @@ vec3 path_vertex(BlockParams block, uint k, PathState state, Ray ray, Hit hit) {
         state.depth++;
         if (WITH_CLEAR_WALLS) StoredFloats(p.straight).v[k] = 0.0;
         if (WITH_LIGHT_SAMPLES && SKY_PDF_OF_SURFACE) StoredFloats(p.sky_pdfs).v[k] = sky_pdf(p, m, s.position, b.wi);
-        if (state.depth >= p.rr_depth) {
+        if (state.depth >= p.options.rr_depth) {
             float survival = min(brightest * state.eta_scale, MAX_SURVIVAL);
             if (lobe.y >= survival) return added;
             state.throughput /= survival;

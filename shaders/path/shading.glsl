@@ -13,24 +13,24 @@
 #define SHADING_OF(material) ShadingRecords(SceneRoot(push.scene).shading).v[material]
 
 // Twice the area of a triangle on a texture of one by one, before the use's own transform.
-float texcoord_area(PartRecord part, uvec3 corners, uint set) {
-    uvec2 base = set == 1u ? part.texcoords1 : part.texcoords0;
+float texcoord_area(SubmeshRecord submesh, uvec3 corners, uint set) {
+    uvec2 base = set == 1u ? submesh.texcoords1 : submesh.texcoords0;
     if (is_null(base)) return 0.0;
-    corners -= part.first_vertex;
+    corners -= submesh.first_vertex;
     vec2 a = load_vec2(base, corners.x);
     vec2 edge1 = load_vec2(base, corners.y) - a, edge2 = load_vec2(base, corners.z) - a;
     return abs(edge1.x * edge2.y - edge1.y * edge2.x);
 }
 
 // Value of a texture of a kind (TEXELS_*) at a point of a primitive (index in the BLAS), 1 without a texture. log_side: footprint().
-vec4 sample_use(TextureUse use, PartRecord part, uint primitive, vec2 uv, uint kind, float log_side) {
-    if (use.texture == INVALID || is_null(part.indices)) return vec4(1.0);
-    uvec3 corners = triangle_indices(part, primitive);
-    vec2 st = texcoord_at(part, corners, uv, use.set);
+vec4 sample_use(TextureUse use, SubmeshRecord submesh, uint primitive, vec2 uv, uint kind, float log_side) {
+    if (use.texture == INVALID || is_null(submesh.indices)) return vec4(1.0);
+    uvec3 corners = triangle_indices(submesh, primitive);
+    vec2 st = texcoord_at(submesh, corners, uv, use.set);
     st = vec2(use.transform.x * st.x + use.transform.z * st.y, use.transform.y * st.x + use.transform.w * st.y) + use.offset;
     if (HAS_RAY_CONES && log_side > SHARP) {
         TextureRecords records = TextureRecords(SceneRoot(push.scene).textures);
-        float area = texcoord_area(part, corners, use.set) * abs(use.transform.x * use.transform.w - use.transform.y * use.transform.z);
+        float area = texcoord_area(submesh, corners, use.set) * abs(use.transform.x * use.transform.w - use.transform.y * use.transform.z);
         area *= float(records.v[use.texture].width) * float(records.v[use.texture].height);
         // coordinates that do not change show one point of the texture
         if (area > 0.0) return sample_mipmap(use.texture, st, kind, log_side + 0.5 * log2(area));
@@ -39,33 +39,33 @@ vec4 sample_use(TextureUse use, PartRecord part, uint primitive, vec2 uv, uint k
 }
 
 // Linear base colour of a surface.
-vec3 shown_color(Surface s, PartRecord part, MaterialRecord m, float log_side) {
+vec3 shown_color(Surface s, SubmeshRecord submesh, MaterialRecord m, float log_side) {
     if (!HAS_BASE_COLORS) return m.base_color.rgb;
-    if (!HAS_RAY_CONES) return base_color(part, m, s.primitive, s.uv).rgb;
+    if (!HAS_RAY_CONES) return base_color(submesh, m, s.primitive, s.uv).rgb;
     vec3 color = m.base_color.rgb;
-    if (is_null(part.indices)) return color;
-    color *= vertex_color(part, triangle_indices(part, s.primitive), s.uv).rgb;
+    if (is_null(submesh.indices)) return color;
+    color *= vertex_color(submesh, triangle_indices(submesh, s.primitive), s.uv).rgb;
     TextureUse use = TextureUse(m.texcoord_transform, m.texcoord_offset, m.base_color_texture, m.texcoord_set);
     // with alpha, colours are premultiplied: texels of alpha 0 do not contribute
-    return color * sample_use(use, part, s.primitive, s.uv, m.alpha_cutoff < 0.0 ? TEXELS_SRGB : TEXELS_COVERED, log_side).rgb;
+    return color * sample_use(use, submesh, s.primitive, s.uv, m.alpha_cutoff < 0.0 ? TEXELS_SRGB : TEXELS_COVERED, log_side).rgb;
 }
 
 // Factor of a light's radiance at a point of a primitive of an instance of the scene.
 vec3 emission_texture(uint instance, uint primitive, vec2 uv) {
     if (!has_use(USE_EMISSION)) return vec3(1.0);
     SceneRoot root = SceneRoot(push.scene);
-    PartRecord part = PartRecords(root.parts).v[Pairs(root.placements).v[instance].y];
-    TextureUse use = SHADING_OF(part.material).uses[USE_EMISSION];
+    SubmeshRecord submesh = SubmeshRecords(root.submeshes).v[Pairs(root.scene_instances).v[instance].y];
+    TextureUse use = SHADING_OF(submesh.material).uses[USE_EMISSION];
     // unfiltered: texture filtering applies to hits of paths only
-    return sample_use(use, part, primitive + part.first_primitive, uv, TEXELS_SRGB, SHARP).rgb;
+    return sample_use(use, submesh, primitive + submesh.first_primitive, uv, TEXELS_SRGB, SHARP).rgb;
 }
 
 // Alpha of an emitter at a point of a primitive of an instance of the scene: the fraction of rays that hit it there.
 float emitter_alpha(uint instance, uint primitive, vec2 uv) {
     SceneRoot root = SceneRoot(push.scene);
-    PartRecord part = PartRecords(root.parts).v[Pairs(root.placements).v[instance].y];
-    MaterialRecord m = MaterialRecords(root.materials).v[part.material];
-    float alpha = base_color(part, m, primitive + part.first_primitive, uv).a;
+    SubmeshRecord submesh = SubmeshRecords(root.submeshes).v[Pairs(root.scene_instances).v[instance].y];
+    MaterialRecord m = MaterialRecords(root.materials).v[submesh.material];
+    float alpha = base_color(submesh, m, primitive + submesh.first_primitive, uv).a;
     if (HAS_COVERAGE && m.coverage != 0u) return clamp(alpha, 0.0, 1.0);
     return alpha >= m.alpha_cutoff ? 1.0 : 0.0;
 }
@@ -85,17 +85,17 @@ struct MaterialTextures {
     vec4 at[TEXTURE_FEATURES_COUNT];
 };
 
-MaterialTextures look_up(Surface s, PartRecord part, float log_side) {
+MaterialTextures look_up(Surface s, SubmeshRecord submesh, float log_side) {
     MaterialTextures found;
     const uint SRGB = 1u << USE_EMISSION | 1u << USE_SHEEN | 1u << USE_SPECULAR_COLOR;
-    uint m = part.material;
+    uint m = submesh.material;
     [[unroll]] for (uint use = 0u; use < TEXTURE_FEATURES_COUNT; use++) found.at[use] = vec4(1.0);
     // drivers compile a copy of the body below for every texture before they find that no material has it
     if (TEXTURE_FEATURES_0 == 0u) return found;
     // all places are constants once it is unrolled: CPU drivers write to others lane by lane
     [[unroll]] for (uint use = 0u; use < TEXTURE_FEATURES_COUNT; use++) {
         uint kind = (SRGB >> use & 1u) != 0u ? TEXELS_SRGB : TEXELS_LINEAR;
-        if (has_use(use)) found.at[use] = sample_use(SHADING_OF(m).uses[use], part, s.primitive, s.uv, kind, log_side);
+        if (has_use(use)) found.at[use] = sample_use(SHADING_OF(m).uses[use], submesh, s.primitive, s.uv, kind, log_side);
     }
     return found;
 }
@@ -114,7 +114,7 @@ vec3 mapped_normal(vec4 texel_, float scale, vec3 n, vec4 tangent) {
 // Bends the normal towards the viewer as far as it points away.
 vec3 towards(vec3 n, vec3 wo) {
     float c = dot(n, wo);
-    return c < LEAST_COSINE ? normalize(n + (LEAST_COSINE - c) * wo) : n;
+    return c < MIN_COSINE ? normalize(n + (MIN_COSINE - c) * wo) : n;
 }
 
 // First layer of the albedo tables of a refracting material, as seen from one side.
@@ -152,18 +152,18 @@ Shading grey_shading(Surface s, vec3 wo, float grey) {
 // The surface hit by a ray along -wo, with textures filtered over a footprint().
 Shading shade(Surface s, vec3 wo, float log_side) {
     SceneRoot root = SceneRoot(push.scene);
-    PartRecord part = PartRecords(root.parts).v[s.part];
-    uint m = part.material;
+    SubmeshRecord submesh = SubmeshRecords(root.submeshes).v[s.submesh];
+    uint m = submesh.material;
     bool front = dot(s.ng, wo) > 0.0;
     float side = front ? 1.0 : -1.0;
     Shading out_ = black_shading(s, wo);
-    out_.material = part.material;
+    out_.material = submesh.material;
     vec3 n = out_.frame.n;
-    MaterialTextures textures = look_up(s, part, log_side);
+    MaterialTextures textures = look_up(s, submesh, log_side);
     if (HAS_EMISSION && SHADING_OF(m).emission != vec3(0.0) && (front || SHADING_OF(m).emits_back != 0u)) {
         out_.emission = SHADING_OF(m).emission * textures.at[USE_EMISSION].rgb;
     }
-    vec3 base = shown_color(s, part, MaterialRecords(root.materials).v[part.material], log_side);
+    vec3 base = shown_color(s, submesh, MaterialRecords(root.materials).v[submesh.material], log_side);
     if (HAS_UNLIT && SHADING_OF(m).model == BSDF_NONE) {
         // unlit materials show their base colour, and their emission is ignored
         out_.unlit = true;
@@ -172,12 +172,12 @@ Shading shade(Surface s, vec3 wo, float log_side) {
     }
     vec4 tangent = vec4(0.0);
     bool mapped = has_map(m, USE_NORMAL), clearcoat_mapped = HAS_CLEARCOAT && has_map(m, USE_CLEARCOAT_NORMAL);
-    if ((mapped || clearcoat_mapped || HAS_ANISOTROPY) && !is_null(part.tangents)) tangent = tangent_at(s, part);
+    if ((mapped || clearcoat_mapped || HAS_ANISOTROPY) && !is_null(submesh.tangents)) tangent = tangent_at(s, submesh);
     if (mapped && tangent.w != 0.0) {
         n = towards(mapped_normal(textures.at[USE_NORMAL], SHADING_OF(m).normal_scale, s.ns, tangent) * side, wo);
         out_.frame = frame_about(n);
     }
-    float cos_o = max(dot(n, wo), LEAST_COSINE);
+    float cos_o = max(dot(n, wo), MIN_COSINE);
     MaterialPoint point = MaterialPoint(m, base, front, cos_o, textures, vec2(1.0, 0.0));
     out_.bsdf.kind = SHADING_OF(m).model;
     bsdf_setup(out_.bsdf, point);

@@ -6,10 +6,10 @@
 
 // Base colour, linear; of mirrors, glass and conductors the reflectance at normal incidence.
 vec3 surface_albedo(Surface s, float log_side) {
-    PartRecord part = PartRecords(SceneRoot(push.scene).parts).v[s.part];
-    ShadingRecord m = SHADING_OF(part.material);
+    SubmeshRecord submesh = SubmeshRecords(SceneRoot(push.scene).submeshes).v[s.submesh];
+    ShadingRecord m = SHADING_OF(submesh.material);
     bool coloured = m.model == BSDF_MIRROR || m.model == BSDF_DIELECTRIC || m.model == BSDF_CONDUCTOR;
-    vec3 base = shown_color(s, part, MaterialRecords(SceneRoot(push.scene).materials).v[part.material], log_side);
+    vec3 base = shown_color(s, submesh, MaterialRecords(SceneRoot(push.scene).materials).v[submesh.material], log_side);
     if (!coloured) return base;
     return m.model == BSDF_CONDUCTOR ? m.specular_color * fresnel_conductor(1.0, m.eta, m.k) : m.specular_color;
 }
@@ -17,7 +17,7 @@ vec3 surface_albedo(Surface s, float log_side) {
 vec3 view_value(uint view, Surface s, Shading shown, float distance_, float log_side) {
     if (view == VIEW_DEPTH) return vec3(distance_);
     if (view == VIEW_NORMALS) return shown.frame.n;
-    if (view == VIEW_BAKED_OCCLUSION) return vec3(look_up(s, PartRecords(SceneRoot(push.scene).parts).v[s.part], log_side).at[USE_OCCLUSION].r);
+    if (view == VIEW_BAKED_OCCLUSION) return vec3(look_up(s, SubmeshRecords(SceneRoot(push.scene).submeshes).v[s.submesh], log_side).at[USE_OCCLUSION].r);
     return surface_albedo(s, log_side);
 }
 

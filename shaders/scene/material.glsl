@@ -1,38 +1,38 @@
-// Base colour and alpha at a point of a part (submesh).
+// Base colour and alpha at a point of a submesh.
 #ifndef SCENE_MATERIAL
 #define SCENE_MATERIAL
 #include "scene/texture.glsl"
 #include "common/ray_seed.glsl"
 
 // Vertex indices of a triangle in its group. `primitive` is an index in the group.
-uvec3 triangle_indices(PartRecord part, uint primitive) {
-    Words w = Words(part.indices);
+uvec3 triangle_indices(SubmeshRecord submesh, uint primitive) {
+    Words w = Words(submesh.indices);
     return uvec3(w.v[3u * primitive], w.v[3u * primitive + 1u], w.v[3u * primitive + 2u]);
 }
 
-vec2 texcoord_at(PartRecord part, uvec3 corners, vec2 uv, uint set) {
-    uvec2 base = set == 1u ? part.texcoords1 : part.texcoords0;
+vec2 texcoord_at(SubmeshRecord submesh, uvec3 corners, vec2 uv, uint set) {
+    uvec2 base = set == 1u ? submesh.texcoords1 : submesh.texcoords0;
     if (is_null(base)) return vec2(0.0);
-    corners -= part.first_vertex;
+    corners -= submesh.first_vertex;
     return load_vec2(base, corners.x) * (1.0 - uv.x - uv.y) + load_vec2(base, corners.y) * uv.x + load_vec2(base, corners.z) * uv.y;
 }
 
-vec4 vertex_color(PartRecord part, uvec3 corners, vec2 uv) {
-    if (is_null(part.colors)) return vec4(1.0);
-    corners -= part.first_vertex;
-    Quads q = Quads(part.colors);
+vec4 vertex_color(SubmeshRecord submesh, uvec3 corners, vec2 uv) {
+    if (is_null(submesh.colors)) return vec4(1.0);
+    corners -= submesh.first_vertex;
+    Quads q = Quads(submesh.colors);
     return uintBitsToFloat(q.v[corners.x]) * (1.0 - uv.x - uv.y) + uintBitsToFloat(q.v[corners.y]) * uv.x +
            uintBitsToFloat(q.v[corners.z]) * uv.y;
 }
 
 // Linear base colour with alpha at barycentrics uv of a primitive (an index in the group). Spheres have no texture coordinates.
-vec4 base_color(PartRecord part, MaterialRecord material, uint primitive, vec2 uv) {
+vec4 base_color(SubmeshRecord submesh, MaterialRecord material, uint primitive, vec2 uv) {
     vec4 color = material.base_color;
-    if (is_null(part.indices)) return color;
-    uvec3 corners = triangle_indices(part, primitive);
-    color *= vertex_color(part, corners, uv);
+    if (is_null(submesh.indices)) return color;
+    uvec3 corners = triangle_indices(submesh, primitive);
+    color *= vertex_color(submesh, corners, uv);
     if (material.base_color_texture != INVALID) {
-        vec2 st = texcoord_at(part, corners, uv, material.texcoord_set);
+        vec2 st = texcoord_at(submesh, corners, uv, material.texcoord_set);
         vec4 m = material.texcoord_transform;
         st = vec2(m.x * st.x + m.z * st.y, m.y * st.x + m.w * st.y) + material.texcoord_offset;
         color *= sample_texture(material.base_color_texture, st, true);
@@ -51,9 +51,9 @@ float coverage_threshold(uint instance, uint primitive, vec2 uv, float tmin) {
 bool alpha_passes(uint instance, uint primitive, vec2 uv, float tmin) {
     SceneRoot root = SceneRoot(push.scene);
     InstanceRecords instances = InstanceRecords(root.instances);
-    PartRecord part = PartRecords(root.parts).v[part_index(instances, instance, primitive)];
-    MaterialRecord material = MaterialRecords(root.materials).v[part.material];
-    float alpha = base_color(part, material, primitive, uv).a;
+    SubmeshRecord submesh = SubmeshRecords(root.submeshes).v[submesh_index(instances, instance, primitive)];
+    MaterialRecord material = MaterialRecords(root.materials).v[submesh.material];
+    float alpha = base_color(submesh, material, primitive, uv).a;
     if (HAS_COVERAGE && material.coverage != 0u) return alpha > coverage_threshold(instance, primitive, uv, tmin);
     return alpha >= material.alpha_cutoff;
 }

@@ -7,14 +7,14 @@
 vec3 previous_position(Hit hit, Surface s) {
     SceneRoot root = SceneRoot(push.scene);
     if (is_null(root.motion)) return s.position;
-    uvec2 placement = Pairs(root.placements).v[hit.instance];
-    InstanceRecord instance = InstanceRecords(root.instances).v[placement.x];
-    MotionRecord motion = MotionRecords(root.motion).v[placement.x];
+    uvec2 records = Pairs(root.scene_instances).v[hit.instance];
+    InstanceRecord instance = InstanceRecords(root.instances).v[records.x];
+    MotionRecord motion = MotionRecords(root.motion).v[records.x];
     vec3 p;
     if (is_null(motion.previous_positions)) {
         p = transform_point(instance.world_to_group, s.position);
     } else {
-        uvec3 corners = triangle_indices(PartRecords(root.parts).v[placement.y], s.primitive);
+        uvec3 corners = triangle_indices(SubmeshRecords(root.submeshes).v[records.y], s.primitive);
         vec3 v0 = load_vec3(motion.previous_positions, corners.x);
         vec3 v1 = load_vec3(motion.previous_positions, corners.y);
         vec3 v2 = load_vec3(motion.previous_positions, corners.z);

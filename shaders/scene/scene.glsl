@@ -6,11 +6,11 @@
 #include "interface/texel_format.glsl"
 #include "interface/wrap.glsl"
 
-// The part (submesh) of a group's primitive, as an index into SceneRoot.parts.
-uint part_index(InstanceRecords instances, uint instance, uint primitive) {
-    uvec2 part_of = instances.v[instance].part_of;
-    uint first = instances.v[instance].first_part;
-    return is_null(part_of) ? first : first + Words(part_of).v[primitive];
+// The submesh of a group's primitive, as an index into SceneRoot.submeshes.
+uint submesh_index(InstanceRecords instances, uint instance, uint primitive) {
+    uvec2 submesh_of = instances.v[instance].submesh_of;
+    uint first = instances.v[instance].first_submesh;
+    return is_null(submesh_of) ? first : first + Words(submesh_of).v[primitive];
 }
 
 // Converts a tracer's ids (TLAS instance, primitive in its group) to those of the scene.
@@ -19,14 +19,14 @@ Hit scene_hit(float t, uint instance, uint primitive, vec2 uv) {
     InstanceRecords instances = InstanceRecords(root.instances);
     if (SINGLE_LEVEL) instance = 0u;
     uint scene_instance = instances.v[instance].scene_instance;
-    PartRecords parts = PartRecords(root.parts);
-    if (root.part_count == 1u) {
-        // the only part begins at the first primitive of the group
-        if (scene_instance == INVALID) scene_instance = parts.v[0].scene_instance;
+    SubmeshRecords submeshes = SubmeshRecords(root.submeshes);
+    if (root.submesh_count == 1u) {
+        // the only submesh begins at the first primitive of the group
+        if (scene_instance == INVALID) scene_instance = submeshes.v[0].scene_instance;
     } else if (scene_instance == INVALID) {
-        uint part = part_index(instances, instance, primitive);
-        scene_instance = parts.v[part].scene_instance;
-        primitive -= parts.v[part].first_primitive;
+        uint submesh = submesh_index(instances, instance, primitive);
+        scene_instance = submeshes.v[submesh].scene_instance;
+        primitive -= submeshes.v[submesh].first_primitive;
     }
     return Hit(t, scene_instance, primitive, uv.x, uv.y);
 }

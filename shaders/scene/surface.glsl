@@ -8,8 +8,8 @@ struct Surface {
     vec3 ng;         // unit geometric normal, world, on the front (counter-clockwise) side
     vec3 ns;         // unit shading normal, on the side of ng
     float offset;    // distance along +-ng at which a new ray cannot hit this surface again
-    uint part;       // index of the PartRecord
-    uint entry;      // index of the InstanceRecord
+    uint submesh;    // index of the SubmeshRecord
+    uint tlas_instance;  // index of the InstanceRecord
     uint primitive;  // index in the group
     vec2 uv;
 };
@@ -38,19 +38,19 @@ float spawn_offset(vec4 group_to_world[3], vec4 world_to_group[3], vec3 p, vec3 
 // grows with t.
 Surface surface_at(Ray ray, Hit hit) {
     SceneRoot root = SceneRoot(push.scene);
-    uvec2 placement = uvec2(0u);
-    PartRecord part;
-    // a scene of one part: read uniformly, without a gather
-    if (root.part_count == 1u) {
-        part = PartRecords(root.parts).v[0];
-        placement.x = SINGLE_LEVEL ? 0u : Pairs(root.placements).v[hit.instance].x;
+    uvec2 records = uvec2(0u);
+    SubmeshRecord submesh;
+    // a scene of one submesh: read uniformly, without a gather
+    if (root.submesh_count == 1u) {
+        submesh = SubmeshRecords(root.submeshes).v[0];
+        records.x = SINGLE_LEVEL ? 0u : Pairs(root.scene_instances).v[hit.instance].x;
     } else {
-        placement = Pairs(root.placements).v[hit.instance];
-        part = PartRecords(root.parts).v[placement.y];
+        records = Pairs(root.scene_instances).v[hit.instance];
+        submesh = SubmeshRecords(root.submeshes).v[records.y];
         if (SINGLE_LEVEL && !HAS_SPHERES) {
-            // parts of one group share its arrays, which are uniform too
-            part.indices = PartRecords(root.parts).v[0].indices;
-            part.positions = PartRecords(root.parts).v[0].positions;
+            // submeshes of one group share its arrays, which are uniform too
+            submesh.indices = SubmeshRecords(root.submeshes).v[0].indices;
+            submesh.positions = SubmeshRecords(root.submeshes).v[0].positions;
         }
     }
     InstanceRecord instance;
@@ -59,38 +59,38 @@ Surface surface_at(Ray ray, Hit hit) {
         instance.group_to_world = vec4[3](vec4(1.0, 0.0, 0.0, 0.0), vec4(0.0, 1.0, 0.0, 0.0), vec4(0.0, 0.0, 1.0, 0.0));
         instance.world_to_group = instance.group_to_world;
     } else {
-        instance = InstanceRecords(root.instances).v[placement.x];
+        instance = InstanceRecords(root.instances).v[records.x];
     }
     Surface s;
-    s.part = placement.y;
-    s.entry = SINGLE_LEVEL ? 0u : placement.x;
-    s.primitive = hit.primitive + part.first_primitive;
+    s.submesh = records.y;
+    s.tlas_instance = SINGLE_LEVEL ? 0u : records.x;
+    s.primitive = hit.primitive + submesh.first_primitive;
     s.uv = vec2(hit.u, hit.v);
 
     vec3 p, normal, error;
     vec3 shading = vec3(0.0);
-    if (HAS_SPHERES && is_null(part.indices)) {
-        vec4 sphere = uintBitsToFloat(Quads(part.positions).v[s.primitive]);
+    if (HAS_SPHERES && is_null(submesh.indices)) {
+        vec4 sphere = uintBitsToFloat(Quads(submesh.positions).v[s.primitive]);
         vec3 at = transform_point(instance.world_to_group, ray.origin) + hit.t * transform_vector(instance.world_to_group, ray.direction);
         normal = normalize(at - sphere.xyz);
         p = sphere.xyz + sphere.w * normal;
         // pbrt-v4 6.8.5 for the reprojected point, and the rounding of the centre's sum
         error = 5.0 * C0 * (abs(p) + vec3(sphere.w)) + 4.0 * C0 * abs(sphere.xyz);
     } else {
-        uvec3 corners = triangle_indices(part, s.primitive);
-        vec3 v0 = load_vec3(part.positions, corners.x);
-        vec3 edge1 = load_vec3(part.positions, corners.y) - v0;
-        vec3 edge2 = load_vec3(part.positions, corners.z) - v0;
+        uvec3 corners = triangle_indices(submesh, s.primitive);
+        vec3 v0 = load_vec3(submesh.positions, corners.x);
+        vec3 edge1 = load_vec3(submesh.positions, corners.y) - v0;
+        vec3 edge2 = load_vec3(submesh.positions, corners.z) - v0;
         // the base corner last: its rounding is the smallest that way
         p = v0 + (s.uv.x * edge1 + s.uv.y * edge2);
         normal = cross(edge1, edge2);
         vec3 extents = abs(edge1) + abs(edge2) + abs(abs(edge1) - abs(edge2));
         float extent = max(max(extents.x, extents.y), extents.z);
         error = C0 * abs(v0) + vec3(C1 * extent);
-        if (!is_null(part.normals)) {
-            corners -= part.first_vertex;
-            shading = load_vec3(part.normals, corners.x) * (1.0 - s.uv.x - s.uv.y) + load_vec3(part.normals, corners.y) * s.uv.x +
-                      load_vec3(part.normals, corners.z) * s.uv.y;
+        if (!is_null(submesh.normals)) {
+            corners -= submesh.first_vertex;
+            shading = load_vec3(submesh.normals, corners.x) * (1.0 - s.uv.x - s.uv.y) + load_vec3(submesh.normals, corners.y) * s.uv.x +
+                      load_vec3(submesh.normals, corners.z) * s.uv.y;
         }
         // a tiny triangle's cross product underflows: normalise before the transform
         float largest = max(max(abs(normal.x), abs(normal.y)), abs(normal.z));
@@ -104,7 +104,7 @@ Surface surface_at(Ray ray, Hit hit) {
     vec3 ns = transform_transposed(instance.world_to_group, shading);
     float ns2 = dot(ns, ns);
     // a mirroring transform that was baked into the vertices has reversed their winding (glTF 2.0, 3.7.4)
-    s.ng *= part.mirrored != 0u ? -1.0 : 1.0;
+    s.ng *= submesh.mirrored != 0u ? -1.0 : 1.0;
     s.ns = ns2 > 0.0 ? ns * inversesqrt(ns2) : s.ng;
     s.ns *= dot(s.ns, s.ng) < 0.0 ? -1.0 : 1.0;
     return s;
@@ -112,14 +112,14 @@ Surface surface_at(Ray ray, Hit hit) {
 
 // Unit tangent (world space, not yet orthogonal to the normal) with handedness in w: the bitangent is w * cross(normal, tangent) about the normal of the
 // front. w = 0 without a tangent.
-vec4 tangent_at(Surface s, PartRecord part) {
-    uvec3 corners = triangle_indices(part, s.primitive) - part.first_vertex;
-    Quads q = Quads(part.tangents);
+vec4 tangent_at(Surface s, SubmeshRecord submesh) {
+    uvec3 corners = triangle_indices(submesh, s.primitive) - submesh.first_vertex;
+    Quads q = Quads(submesh.tangents);
     vec4 a = uintBitsToFloat(q.v[corners.x]);
     vec3 t = a.xyz * (1.0 - s.uv.x - s.uv.y) + uintBitsToFloat(q.v[corners.y]).xyz * s.uv.x + uintBitsToFloat(q.v[corners.z]).xyz * s.uv.y;
     float w = a.w;
     if (!SINGLE_LEVEL) {
-        vec4 rows[3] = InstanceRecords(SceneRoot(push.scene).instances).v[s.entry].group_to_world;
+        vec4 rows[3] = InstanceRecords(SceneRoot(push.scene).instances).v[s.tlas_instance].group_to_world;
         t = transform_vector(rows, t);
         // a mirroring transform reverses the bitangent relative to the cross product
         if (dot(rows[0].xyz, cross(rows[1].xyz, rows[2].xyz)) < 0.0) w = -w;

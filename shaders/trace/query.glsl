@@ -36,8 +36,8 @@ void main() {
             if (HAS_ALPHA && alpha_passes(instance, instances.v[instance].opaque_count + primitive, uv, world.tmin))
                 rayQueryConfirmIntersectionEXT(query);
         } else if (HAS_SPHERES) {
-            PartRecords parts = PartRecords(root.parts);
-            vec4 sphere = uintBitsToFloat(Quads(parts.v[instances.v[instance].first_part].positions).v[primitive]);
+            SubmeshRecords submeshes = SubmeshRecords(root.submeshes);
+            vec4 sphere = uintBitsToFloat(Quads(submeshes.v[instances.v[instance].first_submesh].positions).v[primitive]);
             float far = rayQueryGetIntersectionTypeEXT(query, true) == gl_RayQueryCommittedIntersectionNoneEXT
                 ? world.tmax : rayQueryGetIntersectionTEXT(query, true);
             float t = intersect_sphere(rayQueryGetIntersectionObjectRayOriginEXT(query, false),

@@ -6,9 +6,9 @@
 #include "trace/triangle.glsl"
 
 // The ray in the space of a TLAS instance's group.
-Ray to_group(Ray world, uint entry) {
+Ray to_group(Ray world, uint tlas_instance) {
     if (SINGLE_LEVEL) return world;
-    vec4 rows[3] = InstanceRecords(SceneRoot(push.scene).instances).v[entry].world_to_group;
+    vec4 rows[3] = InstanceRecords(SceneRoot(push.scene).instances).v[tlas_instance].world_to_group;
     return Ray(transform_point(rows, world.origin), world.tmin, transform_vector(rows, world.direction), world.tmax);
 }
 
@@ -40,17 +40,17 @@ void intersect_rasterized_sphere(Ray r, vec4 sphere, out float t, out vec2 uv) {
 }
 
 // `primitive` is an index in the group. Returns the distance along the ray, and the barycentric weights of a triangle's second and third vertex.
-void intersect_rasterized(Ray world, uint entry, uint primitive, out float t, out vec2 uv) {
+void intersect_rasterized(Ray world, uint tlas_instance, uint primitive, out float t, out vec2 uv) {
     SceneRoot root = SceneRoot(push.scene);
-    Ray r = to_group(world, entry);
-    // the parts (submeshes) of a group share its vertices
-    PartRecord part = PartRecords(root.parts).v[root.part_count == 1u ? 0u : InstanceRecords(root.instances).v[entry].first_part];
-    if (HAS_SPHERES && is_null(part.indices)) {
-        intersect_rasterized_sphere(r, uintBitsToFloat(Quads(part.positions).v[primitive]), t, uv);
+    Ray r = to_group(world, tlas_instance);
+    // the submeshes of a group share its vertices
+    SubmeshRecord submesh = SubmeshRecords(root.submeshes).v[root.submesh_count == 1u ? 0u : InstanceRecords(root.instances).v[tlas_instance].first_submesh];
+    if (HAS_SPHERES && is_null(submesh.indices)) {
+        intersect_rasterized_sphere(r, uintBitsToFloat(Quads(submesh.positions).v[primitive]), t, uv);
     } else {
-        uvec3 corners = triangle_indices(part, primitive);
-        intersect_rasterized_triangle(r, load_vec3(part.positions, corners.x), load_vec3(part.positions, corners.y),
-            load_vec3(part.positions, corners.z), t, uv);
+        uvec3 corners = triangle_indices(submesh, primitive);
+        intersect_rasterized_triangle(r, load_vec3(submesh.positions, corners.x), load_vec3(submesh.positions, corners.y),
+            load_vec3(submesh.positions, corners.z), t, uv);
     }
 }
 

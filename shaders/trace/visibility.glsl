@@ -19,16 +19,16 @@ void main() {
     }
     BlockParams p = BlockParams(push.pass);
     uvec2 pixel = block_pixel(p, pixel_index(index));
-    uvec2 drawn = Pairs(push.rays).v[pixel.y * p.block_size.x + pixel.x];
-    if (drawn.x == 0u) {
+    uvec2 rasterized = Pairs(push.rays).v[pixel.y * p.block_size.x + pixel.x];
+    if (rasterized.x == 0u) {
         deliver_miss(index);
         return;
     }
-    uint entry = drawn.x - 1u;
+    uint tlas_instance = rasterized.x - 1u;
     float t;
     vec2 uv;
-    intersect_rasterized(world, entry, drawn.y, t, uv);
-    closest(index, scene_hit(t, entry, drawn.y, uv));
+    intersect_rasterized(world, tlas_instance, rasterized.y, t, uv);
+    closest(index, scene_hit(t, tlas_instance, rasterized.y, uv));
 }
 
 #endif

@@ -1,5 +1,7 @@
 //! Enumerations whose numbers records hold.
 
+use super::debug_views::debug_views;
+
 /// An enumeration, as its GLSL constants are generated from it.
 pub(super) struct Declaration {
     /// Its file in interface/.
@@ -128,9 +130,9 @@ enumerations! {
     }
 }
 
-/// Declares enumerations that are also settings: each variant has a name on the command line and a name in shaders.
+/// Declares enumerations that are also settings, and the table of them: each variant has a name on the command line and a name in shaders.
 macro_rules! choices {
-    ($(
+    ($table:ident; $(
         $(#[doc = $doc:literal])*
         $name:ident: $file:literal $(default $default:ident)? {
             $($(#[doc = $variant_doc:literal])+ $variant:ident = $setting:literal, $glsl:literal;)+
@@ -145,7 +147,7 @@ macro_rules! choices {
                 }
             }
         )*
-        pub(super) const CHOICES: &[Declaration] = &[$(Declaration {
+        pub(super) const $table: &[Declaration] = &[$(Declaration {
             name: $file,
             variants: &[$(($glsl, $name::$variant as u32, concat!($($variant_doc),*)),)*],
         },)*];
@@ -153,6 +155,8 @@ macro_rules! choices {
 }
 
 choices! {
+    CHOICES;
+
     /// Reconstruction filter of pixels, by importance sampling: positions are sampled in proportion to the filter, and samples have equal weights (Ernst,
     /// Stamminger, Greiner, "Filter Importance Sampling", 2006).
     PixelFilter: "pixel_filter" {
@@ -209,35 +213,43 @@ choices! {
         /// AgX (Sobotka 2022, curve by Wrensch 2023)
         Agx = "agx", "TONE_MAP_AGX";
     }
-
-    /// Buffer of a frame that is displayed: scalars as grey up to `Rays`, colours from `Normal` on (shaders/display.glsl compares).
-    DisplayMode: "shown" {
-        /// The filtered result
-        Accessibility = "accessibility", "SHOWN_ACCESSIBILITY";
-        /// The input of the spatial filter
-        Unfiltered = "unfiltered", "SHOWN_UNFILTERED";
-        /// Accumulated samples; white: maximum history length
-        Samples = "samples", "SHOWN_SAMPLES";
-        /// Variance of one sample; white: 0.25
-        Variance = "variance", "SHOWN_VARIANCE";
-        /// Depth along the view; white is near
-        Depth = "depth", "SHOWN_DEPTH";
-        /// Occlusion rays traced in this frame; white: the most that a pixel can have
-        Rays = "rays", "SHOWN_RAYS";
-        /// Geometric normal, -1 to 1 mapped to 0 to 1
-        Normal = "normal", "SHOWN_NORMAL";
-        /// World position, repeating every quarter of the scene
-        Position = "position", "SHOWN_POSITION";
-        /// Bent normal, -1 to 1 mapped to 0 to 1
-        Bent = "bent", "SHOWN_BENT";
-        /// A colour for each instance
-        Ids = "ids", "SHOWN_IDS";
-        /// Motion vectors since the previous frame, grey where nothing moves: more red to the right, more green downwards, 8 pixels halfway
-        Motion = "motion", "SHOWN_MOTION";
-        /// BVH nodes that camera rays visit, as a heat map; needs `--tracer compute`
-        Nodes = "nodes", "SHOWN_NODES";
-    }
 }
+
+macro_rules! display_mode {
+    ($($(#[doc = $doc:literal])+ $view:ident = $name:literal, $glsl:literal, mod $module:ident, shader $shader:ident;)*) => {
+        choices! {
+            DISPLAY_MODES;
+
+            /// Buffer of a frame that is displayed: scalars as grey up to `Rays`, colours from `Normal` on (shaders/display.glsl compares).
+            DisplayMode: "shown" {
+                /// The final image: ambient visibility, or radiance
+                Result = "result", "SHOWN_RESULT";
+                /// The input of the spatial filter
+                Unfiltered = "unfiltered", "SHOWN_UNFILTERED";
+                /// Accumulated samples; white: maximum history length
+                Samples = "samples", "SHOWN_SAMPLES";
+                /// Variance of one sample; white: 0.25
+                Variance = "variance", "SHOWN_VARIANCE";
+                /// Depth along the view; white is near
+                Depth = "depth", "SHOWN_DEPTH";
+                /// Occlusion rays traced in this frame; white: the most that a pixel can have
+                Rays = "rays", "SHOWN_RAYS";
+                /// Geometric normal, -1 to 1 mapped to 0 to 1
+                Normal = "normal", "SHOWN_NORMAL";
+                /// World position, repeating every quarter of the scene
+                Position = "position", "SHOWN_POSITION";
+                /// Bent normal, -1 to 1 mapped to 0 to 1
+                Bent = "bent", "SHOWN_BENT";
+                /// A colour for each instance
+                Ids = "ids", "SHOWN_IDS";
+                /// Motion vectors since the previous frame, grey where nothing moves: more red to the right, more green downwards, 8 pixels halfway
+                Motion = "motion", "SHOWN_MOTION";
+                $($(#[doc = $doc])+ $view = $name, $glsl;)*
+            }
+        }
+    };
+}
+debug_views!(display_mode);
 
 impl PixelFilter {
     /// Returns true if samples lie within their pixel, so that it sees only what projects into its area.

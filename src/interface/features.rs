@@ -2,6 +2,7 @@
 //! stored in as many 32-bit specialization constants as it needs, and a feature is a `bool` in the shaders.
 
 use super::constants::{self, Constant};
+use super::path_options::path_options;
 
 /// A set, as its GLSL constants are generated from it.
 pub(super) struct Declaration {
@@ -151,34 +152,42 @@ feature_set! {
     Occlusion = "USE_OCCLUSION", "occlusion";
 }
 
-feature_set! {
-    /// Features that the lights of a scene and the options of a render require of paths.
-    PathFeatures of /// A feature that lights and options may require of paths.
-    PathFeature: "path_features", from PATH_FIRST, full false, indexed false, PATH;
-    LightTree = "WITH_LIGHT_TREE", "light tree";
-    SurfaceLights = "WITH_SURFACE_LIGHTS", "surfaces that light samples find";
-    LightChoice = "WITH_LIGHT_CHOICE", "a choice among lights";
-    EnvironmentMap = "WITH_ENVIRONMENT_MAP", "environment map";
-    LightSamples = "WITH_LIGHT_SAMPLES", "light samples";
-    Mis = "WITH_MIS", "multiple importance sampling";
-    CosineSampling = "WITH_COSINE_SAMPLING", "cosine hemisphere sampling";
-    UniformSampling = "WITH_UNIFORM_SAMPLING", "uniform hemisphere sampling";
-    ConstantAlbedo = "WITH_CONSTANT_ALBEDO", "constant albedo";
-    View = "WITH_VIEW", "auxiliary view";
-    Clamp = "WITH_CLAMP", "radiance clamp";
-    MinDepth = "WITH_MIN_DEPTH", "minimum depth";
-    Lens = "WITH_LENS", "thin lens";
-    PixelFilter = "WITH_PIXEL_FILTER", "pixel filter";
-    RayCones = "WITH_RAY_CONES", "ray cones";
-    DistantDisks = "WITH_DISTANT_DISKS", "directional lights of angular diameter above 0";
-    Media = "WITH_MEDIA", "volumes that absorb or nest";
-    ClearWalls = "WITH_CLEAR_WALLS", "thin walls that light passes straight";
-    SpecularOnly = "WITH_SPECULAR_ONLY", "paths of delta lobes only";
-    Ambient = "WITH_AMBIENT", "ambient light";
-    BackgroundOnly = "WITH_BACKGROUND_ONLY", "an environment that lights no surface";
-    OccludedLight = "WITH_OCCLUDED_LIGHT", "direct light darkened by ambient occlusion";
-    Signal = "WITH_SIGNAL", "diffuse reflection apart from the rest, for frames in real time";
+macro_rules! path_features {
+    ($(
+        $(#[doc = $doc:literal])+
+        $field:ident: $type:ident as $kind:ident = $default:expr, setting($($setting:tt)*)
+        $(, feature($feature:ident = $constant:literal, $label:literal))? $(, remark($remark:literal))?;
+    )*) => {
+        feature_set! {
+            /// Features that the lights of a scene and the options of a render require of paths.
+            PathFeatures of /// A feature that lights and options may require of paths.
+            PathFeature: "path_features", from PATH_FIRST, full false, indexed false, PATH;
+            LightTree = "WITH_LIGHT_TREE", "light tree";
+            SurfaceLights = "WITH_SURFACE_LIGHTS", "surfaces that light samples find";
+            LightChoice = "WITH_LIGHT_CHOICE", "a choice among lights";
+            EnvironmentMap = "WITH_ENVIRONMENT_MAP", "environment map";
+            LightSamples = "WITH_LIGHT_SAMPLES", "light samples";
+            Mis = "WITH_MIS", "multiple importance sampling";
+            CosineSampling = "WITH_COSINE_SAMPLING", "cosine hemisphere sampling";
+            UniformSampling = "WITH_UNIFORM_SAMPLING", "uniform hemisphere sampling";
+            ConstantAlbedo = "WITH_CONSTANT_ALBEDO", "constant albedo";
+            View = "WITH_VIEW", "auxiliary view";
+            Lens = "WITH_LENS", "thin lens";
+            PixelFilter = "WITH_PIXEL_FILTER", "pixel filter";
+            RayCones = "WITH_RAY_CONES", "ray cones";
+            DistantDisks = "WITH_DISTANT_DISKS", "directional lights of angular diameter above 0";
+            Media = "WITH_MEDIA", "volumes that absorb or nest";
+            ClearWalls = "WITH_CLEAR_WALLS", "thin walls that light passes straight";
+            SpecularOnly = "WITH_SPECULAR_ONLY", "paths of delta lobes only";
+            Ambient = "WITH_AMBIENT", "ambient light";
+            BackgroundOnly = "WITH_BACKGROUND_ONLY", "an environment that lights no surface";
+            OccludedLight = "WITH_OCCLUDED_LIGHT", "direct light darkened by ambient occlusion";
+            Signal = "WITH_SIGNAL", "diffuse reflection apart from the rest, for frames in real time";
+            $($($feature = $constant, $label;)?)*
+        }
+    };
 }
+path_options!(path_features);
 
 feature_set! {
     /// The kinds of lights that paths sample.

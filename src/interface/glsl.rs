@@ -11,7 +11,13 @@ pub fn files() -> Vec<(String, String)> {
     files.extend(features::SETS.iter().map(|set| file(set.name, &feature_set(set))));
     files.push(file("bsdf_dispatch", &bsdf_dispatch()));
     files.push(file("light_dispatch", &light_dispatch()));
-    files.extend(enumerations::ALL.iter().chain(enumerations::CHOICES).map(|e| file(e.name, &enumeration(e))));
+    files.extend(
+        enumerations::ALL
+            .iter()
+            .chain(enumerations::CHOICES)
+            .chain(enumerations::DISPLAY_MODES)
+            .map(|e| file(e.name, &enumeration(e))),
+    );
     files.extend(records::FILES.iter().map(|f| {
         let includes: String = f.includes.iter().map(|name| format!("#include \"interface/{name}.glsl\"\n")).collect();
         file(f.name, &(includes + &record_file(f)))

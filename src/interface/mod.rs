@@ -6,11 +6,13 @@
 //! `shared_choice` (src/lib.rs) add derives to these types; those of build.rs derive nothing.
 
 pub mod constants;
+pub mod debug_views;
 pub mod enumerations;
 pub mod features;
 pub mod glsl;
 #[macro_use]
 pub mod layout;
+pub mod path_options;
 pub mod records;
 
 pub use enumerations::{

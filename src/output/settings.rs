@@ -106,9 +106,9 @@ settings! {
     /// How image files are written.
     "Files"
     pub struct FileSettings {
-        /// Bits per channel of .png outputs; of frames in real time, 16 are for --show accessibility [default: 8]
+        /// Bits per channel of .png outputs; of frames in real time, 16 are for --show result [default: 8]
         png_bits: Option<PngBits>, option(value_enum), applies(AppliesTo::ALL);
-        /// Transfer function of .png outputs, linear with --png-bits 16 or there will be bands; of frames in real time, linear is for --show accessibility
+        /// Transfer function of .png outputs, linear with --png-bits 16 or there will be bands; of frames in real time, linear is for --show result
         /// [default: srgb]
         png_encoding: Option<PngEncoding>, option(value_enum), applies(AppliesTo::ALL);
         /// Background of .png, .webp, .jpg and .apng outputs: a linear colour from 0 to 1, or `transparent`, which keeps alpha (not in .jpg) [default: 0,0,0]

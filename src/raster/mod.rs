@@ -85,7 +85,7 @@ pub struct Raster {
     alpha_tested: Option<GraphicsPipeline>,
     spheres: Option<GraphicsPipeline>,
     targets: Targets,
-    drawn: Buffer,
+    ids: Buffer,
     params: Buffer,
     stream: Stream,
 }
@@ -122,7 +122,7 @@ impl Raster {
             alpha_tested: features.alpha.then(alpha).transpose()?,
             spheres: features.spheres.then(spheres).transpose()?,
             targets,
-            drawn: buffer(device, "drawn primitives", 8 * size[0] as u64 * size[1] as u64)?,
+            ids: buffer(device, "rasterized ids", 8 * size[0] as u64 * size[1] as u64)?,
             params: buffer(device, "raster parameters", size_of::<RasterMemory>() as u64)?,
             stream: tracer.rasterized_stream(shaders)?,
         })
@@ -133,9 +133,9 @@ impl Raster {
     /// # Errors
     /// Those of [`Raster::draw`].
     pub fn record(&self, recorder: &mut Recorder, tracer: &Tracer, push: &Push, view: &View) -> Result<DrawStats> {
-        let drawn = self.draw(recorder, tracer, view)?;
+        let stats = self.draw(recorder, tracer, view)?;
         self.trace(recorder, push);
-        Ok(drawn)
+        Ok(stats)
     }
 
     /// Records the drawing of a view of the scene as it is now, timed as "raster draw". What was drawn before is replaced.
@@ -145,7 +145,7 @@ impl Raster {
     pub fn draw(&self, recorder: &mut Recorder, tracer: &Tracer, view: &View) -> Result<DrawStats> {
         let size = view.block.size;
         let frustum = Frustum::new(view)?;
-        let (draws, depth, drawn) = self.collect(tracer, &frustum);
+        let (draws, depth, stats) = self.collect(tracer, &frustum);
         let params = RasterMemory {
             raster: RasterParams {
                 clip: frustum.clip(depth, tracer.device().viewport_factor(size) as f64),
@@ -186,25 +186,25 @@ impl Raster {
                     }
                 }
             });
-            r.copy_ids(&self.targets, size, &self.drawn);
+            r.copy_ids(&self.targets, size, &self.ids);
         });
         recorder.barrier();
-        Ok(drawn)
+        Ok(stats)
     }
 
     /// Records the stream's rays `push.first .. push.first + push.count` through the pixels of the block that was drawn last, timed under
     /// the name of their pass. The stream's parameters must be [`BlockParams`] of the same block and camera, and `push.sample_bits` 0.
     pub fn trace(&self, recorder: &mut Recorder, push: &Push) {
         debug_assert!(push.sample_bits == 0, "one ray a pixel");
-        self.stream.record(recorder, &Push { rays: self.drawn.address(), ..*push });
+        self.stream.record(recorder, &Push { rays: self.ids.address(), ..*push });
     }
 
     /// The draws of a view, their depth range and statistics.
     fn collect(&self, tracer: &Tracer, frustum: &Frustum) -> (Draws, [f64; 2], DrawStats) {
-        let (mut draws, mut drawn) = (Draws::default(), DrawStats::default());
+        let (mut draws, mut stats) = (Draws::default(), DrawStats::default());
         let mut depth = [f64::INFINITY, 0.0f64];
         for entry in tracer.raster_instances() {
-            drawn.placed += entry.shape.primitives as u64;
+            stats.placed += entry.shape.primitives as u64;
             let overlap = frustum.classify(&entry.shape.bounds, &entry.to_world);
             if overlap == FrustumTest::Outside {
                 continue;
@@ -214,10 +214,10 @@ impl Raster {
             self.collect_entry(tracer, frustum, &entry, overlap, &mut draws);
         }
         for draw in [&draws.triangles, &draws.alpha_tested, &draws.spheres].into_iter().flatten() {
-            drawn.draws += 1;
-            drawn.primitives += draw.primitives.len() as u64;
+            stats.draws += 1;
+            stats.primitives += draw.primitives.len() as u64;
         }
-        (draws, depth, drawn)
+        (draws, depth, stats)
     }
 
     fn collect_entry(

@@ -136,7 +136,7 @@ settings! {
         antialias: Option<Antialias>, option(value_enum), applies(FRAMES);
         /// What the image does while neither the camera nor the scene moves [default: the preset's]
         at_rest: Option<AtRest>, option(value_enum), applies(FRAMES);
-        /// What .png and .apng outputs show [default: accessibility]
+        /// What .png and .apng outputs show [default: result]
         show: Option<DisplayMode>, option(value_name = "NAME", value_enum), applies(FRAMES);
     }
 }

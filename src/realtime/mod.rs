@@ -32,8 +32,8 @@ use display::{Display, DisplayMode};
 use graph::{Frame, Graph, Params};
 use params::{FrameParams, moved_records};
 pub use passes::display;
-use passes::nodes;
 pub use passes::nodes::NodeVisits;
+use passes::{debug, debug_view};
 use resources::{Extent, Resource, SURFACE_BYTES};
 pub use settings::{Budget, Filter, FilterKind, GtaoConstants, Preset, Resolution, Settings, Technique};
 
@@ -93,15 +93,15 @@ pub struct Realtime {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum DisplayPassKind {
     Buffer,
-    Nodes,
     Rays,
+    View(DisplayMode),
 }
 
 impl DisplayPassKind {
     fn of(shown: DisplayMode) -> Self {
         match shown {
-            DisplayMode::Nodes => Self::Nodes,
             DisplayMode::Rays => Self::Rays,
+            shown if debug_view(shown).is_some() => Self::View(shown),
             _ => Self::Buffer,
         }
     }
@@ -384,11 +384,12 @@ impl Realtime {
             if self.is_radiance {
                 display.shown.check_radiance()?;
             }
+            let view = debug_view(display.shown);
             let kind = DisplayPassKind::of(display.shown);
             if !self.displays.contains(&kind) {
-                let stage = match kind {
-                    DisplayPassKind::Nodes => nodes::stage(tracer, self.block())?,
-                    kind => display::stage(tracer, self.pixels() as u32, kind == DisplayPassKind::Rays)?,
+                let stage = match view {
+                    Some((view, shader)) => debug::stage(tracer, self.block(), display.shown, view, shader)?,
+                    None => display::stage(tracer, self.pixels() as u32, kind == DisplayPassKind::Rays)?,
                 };
                 if !self.graph.extend(tracer.device(), vec![stage])? {
                     self.reset();

@@ -61,8 +61,8 @@ pub enum Resource {
     BentResult,
     /// The displayed image, 8-bit RGBA.
     DisplayImage,
-    /// BVH nodes visited by camera rays.
-    Nodes,
+    /// What a debug view counts.
+    DebugCounts,
     /// Budget: standard deviation of one sample and number of samples, pixels in tile order.
     DesiredSamples,
     /// Budget: sums, indexed by `SUMS_*`.
@@ -165,7 +165,7 @@ impl Resource {
             Self::Result => readback("ambient visibility", 4 * pixels),
             Self::BentResult => device("bent normals", VECTOR_BYTES * pixels, Kept),
             Self::DisplayImage => device("display", 4 * pixels, Kept),
-            Self::Nodes => readback("visited nodes", 4 * pixels),
+            Self::DebugCounts => readback("counts of a debug view", 4 * pixels),
             Self::DesiredSamples => device("desired samples", 8 * tiled_pixels, Frame),
             Self::Sums => device("sums of desired samples", 4 * u64::from(SUMS_COUNT), Frame),
             Self::Plan => device("plan of rays", 8 * pixels, Frame),

@@ -214,7 +214,7 @@ impl Frames<'_> {
     /// Colour type of files without alpha that store what is displayed.
     pub fn colour(&self) -> Colour {
         match self.shown {
-            DisplayMode::Accessibility if self.realtime.is_radiance() => Colour::Rgb,
+            DisplayMode::Result if self.realtime.is_radiance() => Colour::Rgb,
             shown => shown.colour(),
         }
     }
@@ -340,7 +340,7 @@ pub fn frame_settings(settings: &RenderSettings) -> Result<Settings> {
     let mut how = settings.frames.settings(&settings.integrators.ao, settings.seed())?;
     let shown = settings.frames.show.unwrap_or_default();
     // buffers of surfaces are looked at with one place in each pixel; bent normals are not averaged over places
-    let shows_buffers = shown != DisplayMode::Accessibility || Aov::Bent.is_in(&settings.image.aov);
+    let shows_buffers = shown != DisplayMode::Result || Aov::Bent.is_in(&settings.image.aov);
     if settings.frames.antialias.is_none() {
         // without it edges of bright surfaces flicker
         let is_radiance = !is_ambient_occlusion(settings.integrator());

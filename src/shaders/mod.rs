@@ -14,6 +14,7 @@ pub use source::{LANES, Mode, PACKET_RAYS, RUN, Rays, SPREAD, Source, Stage, Var
 use source::{mode, rays};
 
 use crate::error::Result;
+use crate::interface::debug_views::debug_views;
 
 /// A shader as SPIR-V.
 #[derive(Debug)]
@@ -164,6 +165,17 @@ macro_rules! variant {
     };
 }
 
+macro_rules! compute {
+    ($constant:ident = $name:literal) => {
+        #[doc = concat!("`shaders/", $name, ".glsl`, which traces no rays.")]
+        pub static $constant: ComputeShader = ComputeShader {
+            name: $name,
+            plain: shader!(Source::Compute { pass: $name, int64: false }, $name, "_32"),
+            int64: shader!(Source::Compute { pass: $name, int64: true }, $name, "_64"),
+        };
+    };
+}
+
 macro_rules! registry {
     (
         streams { $($stream:ident = $pass:literal, $mode:ident, $rays:ident;)* }
@@ -192,14 +204,7 @@ macro_rules! registry {
                 ],
             };
         )*
-        $(
-            #[doc = concat!("`shaders/", $name, ".glsl`, which traces no rays.")]
-            pub static $compute: ComputeShader = ComputeShader {
-                name: $name,
-                plain: shader!(Source::Compute { pass: $name, int64: false }, $name, "_32"),
-                int64: shader!(Source::Compute { pass: $name, int64: true }, $name, "_64"),
-            };
-        )*
+        $(compute!($compute = $name);)*
         $(
             #[doc = concat!("`shaders/", $path, "`.")]
             pub static $stage: Shader = shader!(Source::File { path: $path, stage: Stage::$kind }, stringify!($stage));
@@ -213,6 +218,13 @@ static WIDE_CLOSEST_32: Shader = shader!(Source::Kernel { mode: Mode::Closest, i
 static WIDE_CLOSEST_64: Shader = shader!(Source::Kernel { mode: Mode::Closest, int64: true }, "wide_closest_64");
 
 include!("registry.rs");
+
+macro_rules! debug_view_shaders {
+    ($($(#[doc = $doc:literal])+ $view:ident = $name:literal, $glsl:literal, mod $module:ident, shader $shader:ident;)*) => {
+        $(compute!($shader = $name);)*
+    };
+}
+debug_views!(debug_view_shaders);
 
 /// Shaders that only tests use: tests/shaders.
 #[cfg(feature = "probes")]

@@ -5,7 +5,7 @@
 //     generated   the pass generates them
 //     camera      the pass generates coherent rays: neighbours are traced as packets, and primary visibility can be rasterized instead
 //     queue       they are in memory before the pass begins
-// compute: passes that trace no rays.
+// compute: passes that trace no rays; those of debug views are in src/interface/debug_views.rs.
 // stages: shaders that streams of the pipeline tracer share, and shaders of rasterization.
 registry! {
     streams {
@@ -40,7 +40,6 @@ registry! {
         LARSEN_BLUR = "larsen_blur";
         LARSEN_SUM = "larsen_sum";
         LARSEN_TEMPORAL = "larsen_temporal";
-        NODES = "nodes";
         PATH_GATHER = "path_gather";
         PATH_RESOLVE = "path_resolve";
         RADIANCE_TEMPORAL = "radiance_temporal";

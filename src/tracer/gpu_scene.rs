@@ -18,7 +18,7 @@ use crate::error::{Error, Result};
 use crate::gpu::{Buffer, Device, Memory};
 use crate::interface::records::ray::INVALID;
 use crate::interface::records::scene::{
-    InstanceRecord, MaterialRecord, MipRecord, PartRecord, SceneRoot, TextureRecord, TextureUse,
+    InstanceRecord, MaterialRecord, MipRecord, SceneRoot, SubmeshRecord, TextureRecord, TextureUse,
 };
 use crate::interface::{BsdfModel, MaterialFeature, ShadingFeatures, TexelFormat, Texels};
 use crate::scene::{AlphaMode, Filter, Geometry, Material, TexelData, TextureSlot, TriangleMesh};
@@ -81,7 +81,7 @@ pub(super) struct GroupBuffers {
     pub positions: Buffer,
     /// 3 uints per triangle; `None` for spheres.
     pub indices: Option<Buffer>,
-    part_of: Option<Buffer>,
+    submesh_of: Option<Buffer>,
 }
 
 /// A scene in device memory, without its acceleration structures.
@@ -118,13 +118,13 @@ impl GpuScene {
         let needs =
             Needs { normals: needs.normals || needs.shading, albedo: needs.albedo || needs.shading && !needs.white, ..needs };
         let groups = flat.groups.iter().map(|g| group_buffers(device, flat, g)).collect::<Result<Vec<_>>>()?;
-        let (mut parts, mut first_part) = (Vec::new(), Vec::new());
+        let (mut submeshes, mut first_submesh) = (Vec::new(), Vec::new());
         let mut others = Vec::new();
         let attributes = Attributes::upload(device, flat, needs)?;
         for (group, buffers) in flat.groups.iter().zip(&groups) {
-            first_part.push(parts.len() as u32);
+            first_submesh.push(submeshes.len() as u32);
             for (k, part) in group.submeshes.iter().enumerate() {
-                parts.push(PartRecord {
+                submeshes.push(SubmeshRecord {
                     indices: buffers.indices.as_ref().map_or(0, Buffer::address),
                     positions: buffers.positions.address(),
                     normals: attributes.address(part, k, Attribute::Normals),
@@ -147,8 +147,8 @@ impl GpuScene {
             .map(|p| InstanceRecord {
                 group_to_world: rows(&p.to_world),
                 world_to_group: rows(&p.to_world.inverse()),
-                part_of: groups[p.group].part_of.as_ref().map_or(0, Buffer::address),
-                first_part: first_part[p.group],
+                submesh_of: groups[p.group].submesh_of.as_ref().map_or(0, Buffer::address),
+                first_submesh: first_submesh[p.group],
                 scene_instance: p.scene_instance.map_or(INVALID, |i| i as u32),
                 root: 0,
                 opaque_count: flat.groups[p.group].opaque_count as u32,
@@ -163,15 +163,15 @@ impl GpuScene {
                 "instance {bad} '{name}' has a transform that cannot be inverted (a scale of zero?)"
             )));
         }
-        // TLAS instance and part record of each instance of the scene
-        let mut placements = vec![[0u32; 2]; flat.scene.instances.len()];
+        // TLAS instance and submesh record of each instance of the scene
+        let mut scene_instances = vec![[0u32; 2]; flat.scene.instances.len()];
         for (k, p) in flat.instances.iter().enumerate() {
             match p.scene_instance {
-                Some(i) => placements[i] = [k as u32, first_part[p.group]],
+                Some(i) => scene_instances[i] = [k as u32, first_submesh[p.group]],
                 None => {
                     for (j, part) in flat.groups[p.group].submeshes.iter().enumerate() {
                         if let Some(i) = part.scene_instance {
-                            placements[i] = [k as u32, first_part[p.group] + j as u32];
+                            scene_instances[i] = [k as u32, first_submesh[p.group] + j as u32];
                         }
                     }
                 }
@@ -194,9 +194,9 @@ impl GpuScene {
             address
         };
         let mut root = SceneRoot { instances: instance_buffer.address(), ..Default::default() };
-        root.part_count = parts.len() as u32;
-        root.parts = keep(Buffer::from_slice(device, "part records", &parts)?);
-        root.placements = keep(Buffer::from_slice(device, "placements", &placements)?);
+        root.submesh_count = submeshes.len() as u32;
+        root.submeshes = keep(Buffer::from_slice(device, "submesh records", &submeshes)?);
+        root.scene_instances = keep(Buffer::from_slice(device, "records of scene instances", &scene_instances)?);
         root.materials = keep(Buffer::from_slice(device, "material records", &materials)?);
         root.textures = keep(Buffer::from_slice(device, "texture records", &textures.records)?);
         keep(textures.texels);
@@ -263,7 +263,7 @@ impl GpuScene {
 
     /// Size in device memory, in bytes.
     pub fn bytes(&self) -> u64 {
-        let groups = self.groups.iter().flat_map(|g| [Some(&g.positions), g.indices.as_ref(), g.part_of.as_ref()]).flatten();
+        let groups = self.groups.iter().flat_map(|g| [Some(&g.positions), g.indices.as_ref(), g.submesh_of.as_ref()]).flatten();
         let others = self.others.iter().chain([&self.attributes, &self.instance_buffer]);
         groups.chain(others).map(Buffer::size).sum::<u64>()
     }
@@ -368,7 +368,7 @@ fn group_buffers(device: &Arc<Device>, flat: &FlatScene, group: &BlasGroup) -> R
                 out.copy_from_slice(bytemuck::bytes_of(&[s.center.x, s.center.y, s.center.z, s.radius]));
             }
         })?;
-        return Ok(GroupBuffers { positions, indices: None, part_of: part_of(device, group)? });
+        return Ok(GroupBuffers { positions, indices: None, submesh_of: submesh_of(device, group)? });
     }
     let triangles = |part: &Submesh| match &flat.scene.meshes[part.mesh].geometry {
         Geometry::Triangles(t) => t,
@@ -392,11 +392,11 @@ fn group_buffers(device: &Arc<Device>, flat: &FlatScene, group: &BlasGroup) -> R
             out.copy_from_slice(bytemuck::bytes_of(&corners));
         }
     })?;
-    Ok(GroupBuffers { positions, indices: Some(indices), part_of: part_of(device, group)? })
+    Ok(GroupBuffers { positions, indices: Some(indices), submesh_of: submesh_of(device, group)? })
 }
 
 /// The submesh index of each primitive; `None` for a group of one submesh.
-fn part_of(device: &Arc<Device>, group: &BlasGroup) -> Result<Option<Buffer>> {
+fn submesh_of(device: &Arc<Device>, group: &BlasGroup) -> Result<Option<Buffer>> {
     if group.submeshes.len() <= 1 {
         return Ok(None);
     }

@@ -33,7 +33,7 @@ impl Technique {
     pub fn all() -> Vec<(usize, Self)> {
         let presets = [Preset::Fast, Preset::Balanced, Preset::Quality, Preset::Larsen, Preset::LarsenFixed];
         let stills = || integrators::ALL.iter().filter_map(|i| IntegratorName::find(i.name())).map(Self::Still);
-        let buffers = DisplayMode::ALL.into_iter().filter(|m| *m != DisplayMode::Accessibility);
+        let buffers = DisplayMode::ALL.into_iter().filter(|m| *m != DisplayMode::Result);
         let realtime = presets.into_iter().map(Self::Preset).chain([Self::Gtao]).map(|t| (0, t));
         let converging = [Self::Converged].into_iter().chain(stills().filter(|t| !t.is_view_of_surfaces())).map(|t| (2, t));
         let light = stills().filter(|t| t.has_frames()).filter_map(|t| match t {

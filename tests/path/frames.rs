@@ -239,7 +239,7 @@ fn gpu_frames_are_tone_mapped_as_pictures_are() {
     let camera = record(&scene, &scene.cameras[0]);
     let mut frames = frames(&tracer, &flat, &plain(4), &options(4));
     for tone_map in ToneMap::ALL {
-        let display = Display { shown: DisplayMode::Accessibility, exposure: 1.0, unit: 1.0, tone_map };
+        let display = Display { shown: DisplayMode::Result, exposure: 1.0, unit: 1.0, tone_map };
         frames.display(&tracer, Some(display)).unwrap();
         frames.frame(&tracer, &camera, &[]).unwrap();
         let bytes = frames.displayed().unwrap().read(0, 4 * u64::from(SIZE[0] * SIZE[1])).unwrap();

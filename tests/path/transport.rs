@@ -30,6 +30,13 @@ fn gpu_a_room_of_light() {
             let options = PathOptions { min_depth, rr_depth: 100, spp: 64, ..options.clone() };
             holds(&device, &format!("room, without {min_depth} bounces"), &room, &options, rest, 2e-2);
         }
+        // or with the rest of the series scaled, from the second bounce on
+        for indirect_scale in [0.25, 3.0] {
+            let direct = 1.0 + f64::from(albedo);
+            let scaled = direct + f64::from(indirect_scale) * (expected - direct);
+            let options = PathOptions { indirect_scale, rr_depth: 100, spp: 64, ..options.clone() };
+            holds(&device, &format!("room, indirect light by {indirect_scale}"), &room, &options, scaled, 2e-2);
+        }
     }
 }
 

@@ -61,7 +61,7 @@ fn gpu_displayed_visibility_has_the_bytes_of_a_png() {
             let mut realtime = Realtime::new(&tracer, SIZE, &settings, &[]).unwrap();
             let mut bytes = std::collections::BTreeSet::new();
             for exposure in [0.0, 0.7, -1.6, -3.3f32] {
-                let shown = show(&tracer, &mut realtime, &camera, 1, display(DisplayMode::Accessibility, exposure));
+                let shown = show(&tracer, &mut realtime, &camera, 1, display(DisplayMode::Result, exposure));
                 assert_grey(&shown, &realtime.result().unwrap(), exposure.exp2(), 0);
                 bytes.extend(shown.iter().map(|w| w[0]));
             }
@@ -222,7 +222,7 @@ fn gpu_displayed_rays_are_those_of_the_frame() {
             let different = if settings.budget == Budget::Variance { 4 } else { 2 };
             assert!(counts.len() >= different && counts.contains_key(&0), "{kind}: {counts:?}");
             // another buffer, and back: the rays have a pass of their own
-            let shown = show(&tracer, &mut realtime, &camera, 0, display(DisplayMode::Accessibility, 0.0));
+            let shown = show(&tracer, &mut realtime, &camera, 0, display(DisplayMode::Result, 0.0));
             assert_grey(&shown, &realtime.result().unwrap(), 1.0, 0);
             let stats = {
                 realtime.display(&tracer, Some(display(DisplayMode::Rays, 0.0))).unwrap();
@@ -247,7 +247,7 @@ fn gpu_display_is_a_choice() {
     let recorded = |stats: &FrameStats| stats.timings.iter().filter(|t| t.label == "display").count();
     assert!(realtime.displayed().is_none());
     let mut last = Vec::new();
-    for (frame, shown) in [None, Some(DisplayMode::Accessibility), Some(DisplayMode::Depth), None].into_iter().enumerate() {
+    for (frame, shown) in [None, Some(DisplayMode::Result), Some(DisplayMode::Depth), None].into_iter().enumerate() {
         realtime.display(&tracer, shown.map(|s| display(s, 0.0))).unwrap();
         let stats = realtime.frame(&tracer, &camera, &[]).unwrap();
         assert_eq!(recorded(&stats), usize::from(shown.is_some()), "frame {frame}");

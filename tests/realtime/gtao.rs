@@ -29,7 +29,7 @@ fn sparse() -> Settings {
     Settings { gtao: Preset::Balanced.settings().gtao, ..dense() }
 }
 
-/// Accessibility over sixteen frames, and where something is.
+/// Ambient visibility over sixteen frames, and where something is.
 fn image(tracer: &Tracer, settings: &Settings, camera: &CameraRecord) -> (Vec<f32>, Vec<f32>) {
     let mut realtime = realtime(tracer, SIZE, settings);
     frames(&mut realtime, tracer, camera, 16);

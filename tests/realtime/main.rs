@@ -97,7 +97,7 @@ fn rmse(a: &[f32], b: &[f32], mask: &[f32]) -> f64 {
 fn assert_sound(what: &str, realtime: &Realtime) {
     for (name, image) in [("result", realtime.result().unwrap()), ("history", realtime.unfiltered().unwrap())] {
         let bad = image.iter().filter(|v| !(0.0..=1.0).contains(*v)).count();
-        assert_eq!(bad, 0, "{what}: {bad} pixels of {} in the {name} are no accessibility", image.len());
+        assert_eq!(bad, 0, "{what}: {bad} pixels of {} in the {name} are no ambient visibility", image.len());
     }
     assert!(realtime.samples().unwrap().iter().all(|n| (0.0..=4096.0).contains(n)), "{what}");
 }

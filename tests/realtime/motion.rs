@@ -14,7 +14,7 @@ use skylit::measure::temporal::{Residual, recovery};
 use skylit::oracle::{Oracle, OracleRay};
 use skylit::output::tone_map::ToneMap;
 use skylit::realtime::display::{Display, DisplayMode};
-use skylit::realtime::{Preset, Realtime, Settings};
+use skylit::realtime::{Preset, Realtime, Resolution, Settings};
 use skylit::sampling::Sequence;
 use skylit::scene::animation::{Playback, Pose};
 use skylit::scene::builtin::shapes;
@@ -151,6 +151,78 @@ fn at(place: DAffine3) -> Changes<'static> {
 
 fn instances(tracer: &Tracer, camera: &CameraRecord) -> Vec<u32> {
     aov::render(tracer, camera, SIZE, &mut NoControl).unwrap().iter().map(|p| p.instance).collect()
+}
+
+/// Why pixels have no history, against where their surfaces were in the frame before: all of them in the first frame, the floor that a moving block uncovers,
+/// and what a step of the camera brings into the image.
+#[test]
+fn gpu_displayed_reasons_of_rejected_histories() {
+    const BACKGROUND: [u8; 3] = [0; 3];
+    const KEPT: [u8; 3] = [0x40; 3];
+    const NO_PAST: [u8; 3] = [255; 3];
+    const OFF_SCREEN: [u8; 3] = [0x30, 0x60, 0xff];
+    const INSTANCE: [u8; 3] = [0xe0, 0x30, 0x30];
+    let device = device();
+    let scene = block_on_a_floor();
+    let [camera, shifted] = [0.0, 0.6].map(|x| stepped(&scene, SIZE, DVec3::new(x, 0.0, 0.0)));
+    let display = Display { shown: DisplayMode::Rejected, exposure: 0.0, unit: 1.0, tone_map: ToneMap::Linear };
+    let settings = Settings { antialias: false, resolution: Resolution::Full, ..traced(Preset::Fast) };
+    for kind in tracers(&device) {
+        let mut tracer = moving(&device, kind, &scene, vec![1]);
+        let [mut realtime, mut plain] = [(); 2].map(|()| realtime(&tracer, SIZE, &settings));
+        realtime.display(&tracer, Some(display)).unwrap();
+        let words = |realtime: &Realtime| -> Vec<[u8; 3]> {
+            let bytes = realtime.displayed().unwrap().read(0, 4 * u64::from(SIZE[0] * SIZE[1])).unwrap();
+            bytes.chunks_exact(4).map(|w| [w[0], w[1], w[2]]).collect()
+        };
+        let before = instances(&tracer, &camera);
+        for colour in [NO_PAST, KEPT] {
+            frames(&mut realtime, &tracer, &camera, 1);
+            frames(&mut plain, &tracer, &camera, 1);
+            let surfaces = realtime.surfaces().unwrap();
+            for (word, surface) in words(&realtime).into_iter().zip(&surfaces) {
+                assert_eq!(word, if surface.is_some() { colour } else { BACKGROUND }, "{kind}");
+            }
+        }
+        // the floor is where it was: pixels that show it have a history, or showed the block
+        let moved = tracer.update(&at(DAffine3::from_translation(DVec3::X * 0.3))).unwrap().moved;
+        realtime.frame(&tracer, &camera, &moved).unwrap();
+        plain.frame(&tracer, &camera, &moved).unwrap();
+        assert_eq!(realtime.result().unwrap(), plain.result().unwrap(), "{kind}: what is shown changes nothing else");
+        let (shown, now) = (words(&realtime), instances(&tracer, &camera));
+        let (mut uncovered, mut covered, mut kept) = (0, 0, 0);
+        for k in 0..now.len() {
+            match (before[k], now[k]) {
+                (0, 0) => assert_eq!(shown[k], KEPT, "{kind}: pixel {k}"),
+                (1, 0) => {
+                    assert_eq!(shown[k], INSTANCE, "{kind}: pixel {k}");
+                    uncovered += 1;
+                }
+                (_, 1) => {
+                    covered += 1;
+                    kept += u32::from(shown[k] == KEPT);
+                }
+                _ => {}
+            }
+        }
+        // the block moves with its history; one face of it comes into view, and edges are lost
+        assert!(uncovered > 20 && kept * 4 > covered * 3, "{kind}: {uncovered} uncovered, {kept} of {covered} kept");
+        let moved = tracer.update(&at(DAffine3::from_translation(DVec3::X * 0.3))).unwrap().moved;
+        realtime.frame(&tracer, &shifted, &moved).unwrap();
+        let shown = words(&realtime);
+        let mut outside = 0;
+        for (k, surface) in realtime.surfaces().unwrap().into_iter().enumerate() {
+            let Some(surface) = surface else { continue };
+            // in pixels beyond the image, negative inside
+            let x = pixel_of(&camera, Vec3::from_array(surface.before)).x;
+            let beyond = (-x).max(x - SIZE[0] as f32);
+            outside += u32::from(beyond > 1.0);
+            let expected = beyond > 1.0;
+            assert!(beyond.abs() <= 1.0 || (shown[k] == OFF_SCREEN) == expected, "{kind}: {:?}, {beyond} outside", shown[k]);
+        }
+        assert!(outside > 50, "{kind}: {outside}");
+    }
+    assert_validation_clean(&device);
 }
 
 /// Motion vectors against what surface points say of themselves, and instances against a ray's hit.

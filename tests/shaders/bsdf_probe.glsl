@@ -1,9 +1,9 @@
-// bsdf_probe: traces nothing; writes what the BSDF of a part's material makes of given directions, so that a test can hold density, samples and
+// bsdf_probe: traces nothing; writes what the BSDF of a submesh's material makes of given directions, so that a test can hold density, samples and
 // values to each other on every tracer and driver.
 #include "path/path.glsl"
 #include "interface/ray_set.glsl"
 
-// inputs: three quads each: towards the viewer, and the part; wi, or where to sample and which lobe; shading normal, and 1 to sample
+// inputs: three quads each: towards the viewer, and the submesh; wi, or where to sample and which lobe; shading normal, and 1 to sample
 // outputs: three quads each: value times |cos|, density; wi, 1 for a delta lobe; weight, eta
 
 Ray ray(uint index) { return no_ray(); }
@@ -18,9 +18,9 @@ void any(uint index, bool occluded) {
     s.ng = vec3(0.0, 0.0, 1.0);
     s.ns = uintBitsToFloat(c.xyz);
     s.offset = 0.0;
-    s.part = a.w;
-    s.entry = 0u;
-    s.primitive = PartRecords(SceneRoot(push.scene).parts).v[a.w].first_primitive;
+    s.submesh = a.w;
+    s.tlas_instance = 0u;
+    s.primitive = SubmeshRecords(SceneRoot(push.scene).submeshes).v[a.w].first_primitive;
     s.uv = vec2(1.0 / 3.0);
     Shading m = shade(s, viewer, SHARP);
     vec3 wo = to_frame(m.frame, viewer);

@@ -156,7 +156,7 @@ impl RenderArgs {
         let (files, film) = (&self.files, &self.settings.film);
         files.check(&self.output, self.depth_image.as_deref())?;
         let shown = self.settings.frames.show.unwrap_or_default();
-        if self.settings.realtime_setting().is_some() && files.has_deep_png() && shown != DisplayMode::Accessibility {
+        if self.settings.realtime_setting().is_some() && files.has_deep_png() && shown != DisplayMode::Result {
             return Err(Error::Usage(format!(
                 "--show {shown} is converted to 8-bit sRGB by the device: leave --png-bits 16 and --png-encoding linear out, or write --aov to an .exr"
             )));

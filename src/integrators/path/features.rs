@@ -15,14 +15,14 @@ pub(super) fn features(
     cones: bool,
 ) -> (PathFeatures, LightKinds) {
     let plain = options.white_sky.is_some() || options.view.is_some();
-    let drawn = options.strategy.samples_lights() && !lights.records.is_empty();
+    let samples_lights = options.strategy.samples_lights() && !lights.records.is_empty();
     let features = [
-        (PathFeature::LightTree, drawn && !lights.tree.is_empty()),
-        (PathFeature::SurfaceLights, drawn && !lights.light_of.is_empty()),
-        (PathFeature::LightChoice, drawn && lights.choices() > 1),
+        (PathFeature::LightTree, samples_lights && !lights.tree.is_empty()),
+        (PathFeature::SurfaceLights, samples_lights && !lights.light_of.is_empty()),
+        (PathFeature::LightChoice, samples_lights && lights.choices() > 1),
         (PathFeature::EnvironmentMap, map),
-        (PathFeature::LightSamples, drawn),
-        (PathFeature::Mis, drawn && options.strategy == Strategy::Mis),
+        (PathFeature::LightSamples, samples_lights),
+        (PathFeature::Mis, samples_lights && options.strategy == Strategy::Mis),
         (PathFeature::RayCones, cones),
         (PathFeature::DistantDisks, lights.has_disks),
         (PathFeature::Media, !plain && media::need_tracking(flat)),
@@ -30,5 +30,5 @@ pub(super) fn features(
     ];
     let all =
         features.into_iter().chain(options.features()).filter_map(|(feature, required)| required.then_some(feature)).collect();
-    (all, if drawn { lights.kinds() } else { LightKinds::default() })
+    (all, if samples_lights { lights.kinds() } else { LightKinds::default() })
 }

@@ -1,5 +1,6 @@
 //! Settings of path tracing and of the integrators based on it: the settings as given ([`PathSettings`]), the resolved options of a render ([`PathOptions`]),
-//! the shader features that they require, and their metadata and JSON record. An option is added here; what shaders need of it besides is a line in src/interface.
+//! the shader features that they require, and their metadata and JSON record. An option that is a number which shaders read is added to the list in
+//! src/interface/path_options.rs; any other here.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -15,6 +16,8 @@ use crate::film::schedule::FilmOptions;
 use crate::film::tile_mask::TileMask;
 use crate::integrators::RenderJob;
 use crate::interface::PathFeature;
+use crate::interface::path_options::path_options;
+use crate::interface::records::path_options::PathOptionsRecord;
 use crate::scene::Projection;
 #[cfg(feature = "cli")]
 use crate::settings::parse::{parse_albedo, parse_positive, parse_radiance};
@@ -34,41 +37,6 @@ const SAMPLED: AppliesTo = AppliesTo::of(Capability::SamplingStrategy);
 const SKY: AppliesTo = AppliesTo::of(Capability::WhiteSky);
 /// The integrator with ambient light.
 const AMBIENT: AppliesTo = AppliesTo::of(Capability::AmbientLight);
-
-settings! {
-    /// Paths.
-    "Path tracing (--integrator path, direct, lit, whitted, ao-sky; views)"
-    pub struct PathSettings {
-        /// Maximum path length in bounces: 0 is emitted light, 1 adds direct light [default: the scene's, or no limit]
-        max_depth: Option<u32>, option(value_name = "N"), applies(LONG);
-        /// Leave out paths of fewer bounces: 1 hides emitters and the environment behind the scene, 2 leaves indirect light alone [default: 0]
-        min_depth: Option<u32>, option(value_name = "N"), applies(LIGHT), research;
-        /// Bounces before Russian roulette may end a path [default: 5]
-        rr_depth: Option<u32>, option(value_name = "N"), applies(LIGHT), research;
-        /// Clamp indirect radiance to X (reduces fireflies; biased) [default: off]
-        firefly_clamp: Option<f64>, option(value_name = "X", value_parser = parse_positive, allow_hyphen_values = true), applies(LIGHT);
-        /// Sampling strategy; all but the default are for comparison [default: mis]
-        sampling: Option<Strategy>, option(value_enum), applies(SAMPLED), research;
-        /// Compensate for energy lost to multiple scattering between microfacets (Turquin 2019)
-        energy_compensation: bool, option(), applies(LIGHT);
-        /// Albedo of all surfaces with --integrator ao-sky [default: 0.5]
-        sky_albedo: Option<f64>, option(value_name = "X", value_parser = parse_albedo, allow_hyphen_values = true), applies(SKY), research;
-        /// Ambient radiance of --integrator lit, linear RGB [default: 1,1,1]
-        ambient: Option<DVec3>, option(value_name = "R,G,B", value_parser = parse_radiance, allow_hyphen_values = true), applies(AMBIENT);
-        /// How the environment lights surfaces with --integrator lit [default: traced]
-        environment_light: Option<EnvironmentLight>, option(value_enum), applies(AMBIENT);
-        /// Which light ambient occlusion darkens with --integrator lit [default: ambient]
-        occluded_light: Option<OccludedLight>, option(value_enum), applies(AMBIENT);
-        /// Texture filter of paths [default: bilinear]
-        texture_filter: Option<TextureFilter>, option(value_enum), applies(TEXTURES), research;
-        /// f-number of a thin lens with a 36x24 mm sensor; scene units are taken as metres [default: a pinhole]
-        f_number: Option<f64>,
-            option(value_name = "N", value_parser = parse_positive, requires = "focus_distance", allow_hyphen_values = true), applies(CAMERA);
-        /// Focus distance along the view, in scene units
-        focus_distance: Option<f64>,
-            option(value_name = "D", value_parser = parse_positive, requires = "f_number", allow_hyphen_values = true), applies(CAMERA);
-    }
-}
 
 /// Maximum path length, in bounces. Russian roulette (`MAX_SURVIVAL` in shaders/path/path.glsl) ends paths long before.
 pub const MAX_DEPTH: u32 = 4096;
@@ -119,73 +87,209 @@ pub struct Lens {
     pub focus: f32,
 }
 
-/// Options of a path-traced image.
-#[derive(Clone, Debug)]
-pub struct PathOptions {
-    /// Image size in pixels.
-    pub size: [u32; 2],
-    /// Paths per pixel.
-    pub spp: u32,
-    /// Seed of the sampler.
-    pub seed: u32,
-    /// Maximum path length in bounces: 0 is emitted light, 1 adds direct light; at most [`MAX_DEPTH`].
-    pub max_depth: u32,
-    /// Paths of fewer bounces add nothing: 1 leaves out emitted light, 2 direct light as well.
-    pub min_depth: u32,
-    /// Bounces before Russian roulette may end a path.
-    pub rr_depth: u32,
-    /// Maximum radiance that a path vertex other than the first adds, in any channel; infinite: unbiased.
-    pub firefly_clamp: f32,
-    /// Sampling strategy.
-    pub strategy: Strategy,
-    /// Continue paths by delta lobes only, so that light sampling accounts for all other light: with [`Strategy::Light`].
-    pub specular_only: bool,
-    /// Albedo of all surfaces, which are diffuse, under a white sky as the only emitter: the rendering equation that ambient occlusion approximates.
-    pub white_sky: Option<f32>,
-    /// Ambient light at the first surface of each path.
-    pub ambient: Option<Ambient>,
-    /// The environment is seen by the camera and lights no surface.
-    pub background_only: bool,
-    /// Surface property that is rendered in place of radiance; 0 where camera rays miss.
-    pub view: Option<View>,
-    /// Pixel reconstruction filter.
-    pub pixel_filter: PixelFilter,
-    /// Texture filter; [`TextureFilter::RayCone`] requires [`crate::tracer::Needs::mip_levels`].
-    pub texture_filter: TextureFilter,
-    /// Thin lens of a perspective camera; `None`: a pinhole.
-    pub lens: Option<Lens>,
-    /// Stop after this time and keep the image so far.
-    pub time_limit: Option<Duration>,
-    /// Tiles of the image that show geometry; only if the environment is black and [`PathOptions::is_sharp`].
-    pub tile_mask: Option<Arc<TileMask>>,
-    /// The film to resume, and when to save it.
-    pub film: FilmOptions,
+/// The Rust type of a number in shaders.
+macro_rules! number {
+    (uint) => {
+        u32
+    };
+    (float) => {
+        f32
+    };
 }
 
-impl Default for PathOptions {
-    fn default() -> Self {
-        Self {
-            size: [1280, 720],
-            spp: 16,
-            seed: 0,
-            max_depth: MAX_DEPTH,
-            min_depth: 0,
-            rr_depth: 5,
-            firefly_clamp: f32::INFINITY,
-            strategy: Strategy::Mis,
-            specular_only: false,
-            white_sky: None,
-            ambient: None,
-            background_only: false,
-            view: None,
-            pixel_filter: PixelFilter::Box,
-            texture_filter: TextureFilter::Bilinear,
-            lens: None,
-            time_limit: None,
-            tile_mask: None,
-            film: FilmOptions::default(),
+/// Declares all that has an item for each option in the list of src/interface/path_options.rs.
+macro_rules! declare_options {
+    ($(
+        $(#[doc = $doc:literal])+
+        $field:ident: $type:ident as $kind:ident = $default:expr, setting($($setting:tt)*)
+        $(, feature($feature:ident = $constant:literal, $label:literal))? $(, remark($remark:literal))?;
+    )*) => {
+        settings! {
+            /// Paths.
+            "Path tracing (--integrator path, direct, lit, whitted, ao-sky; views)"
+            pub struct PathSettings {
+                /// Maximum path length in bounces: 0 is emitted light, 1 adds direct light [default: the scene's, or no limit]
+                max_depth: Option<u32>, option(value_name = "N"), applies(LONG);
+                $(
+                    $(#[doc = $doc])+
+                    $field: Option<$type>, $($setting)*;
+                )*
+                /// Sampling strategy; all but the default are for comparison [default: mis]
+                sampling: Option<Strategy>, option(value_enum), applies(SAMPLED), research;
+                /// Compensate for energy lost to multiple scattering between microfacets (Turquin 2019)
+                energy_compensation: bool, option(), applies(LIGHT);
+                /// Albedo of all surfaces with --integrator ao-sky [default: 0.5]
+                sky_albedo: Option<f64>, option(value_name = "X", value_parser = parse_albedo, allow_hyphen_values = true), applies(SKY), research;
+                /// Ambient radiance of --integrator lit, linear RGB [default: 1,1,1]
+                ambient: Option<DVec3>, option(value_name = "R,G,B", value_parser = parse_radiance, allow_hyphen_values = true), applies(AMBIENT);
+                /// How the environment lights surfaces with --integrator lit [default: traced]
+                environment_light: Option<EnvironmentLight>, option(value_enum), applies(AMBIENT);
+                /// Which light ambient occlusion darkens with --integrator lit [default: ambient]
+                occluded_light: Option<OccludedLight>, option(value_enum), applies(AMBIENT);
+                /// Texture filter of paths [default: bilinear]
+                texture_filter: Option<TextureFilter>, option(value_enum), applies(TEXTURES), research;
+                /// f-number of a thin lens with a 36x24 mm sensor; scene units are taken as metres [default: a pinhole]
+                f_number: Option<f64>,
+                    option(value_name = "N", value_parser = parse_positive, requires = "focus_distance", allow_hyphen_values = true), applies(CAMERA);
+                /// Focus distance along the view, in scene units
+                focus_distance: Option<f64>,
+                    option(value_name = "D", value_parser = parse_positive, requires = "f_number", allow_hyphen_values = true), applies(CAMERA);
+            }
         }
-    }
+
+        /// Options of a path-traced image.
+        #[derive(Clone, Debug)]
+        pub struct PathOptions {
+            /// Image size in pixels.
+            pub size: [u32; 2],
+            /// Paths per pixel.
+            pub spp: u32,
+            /// Seed of the sampler.
+            pub seed: u32,
+            /// Maximum path length in bounces: 0 is emitted light, 1 adds direct light; at most [`MAX_DEPTH`].
+            pub max_depth: u32,
+            /// Sampling strategy.
+            pub strategy: Strategy,
+            /// Continue paths by delta lobes only, so that light sampling accounts for all other light: with [`Strategy::Light`].
+            pub specular_only: bool,
+            /// Albedo of all surfaces, which are diffuse, under a white sky as the only emitter: the rendering equation that ambient occlusion approximates.
+            pub white_sky: Option<f32>,
+            /// Ambient light at the first surface of each path.
+            pub ambient: Option<Ambient>,
+            /// The environment is seen by the camera and lights no surface.
+            pub background_only: bool,
+            /// Surface property that is rendered in place of radiance; 0 where camera rays miss.
+            pub view: Option<View>,
+            /// Pixel reconstruction filter.
+            pub pixel_filter: PixelFilter,
+            /// Texture filter; [`TextureFilter::RayCone`] requires [`crate::tracer::Needs::mip_levels`].
+            pub texture_filter: TextureFilter,
+            /// Thin lens of a perspective camera; `None`: a pinhole.
+            pub lens: Option<Lens>,
+            /// Stop after this time and keep the image so far.
+            pub time_limit: Option<Duration>,
+            /// Tiles of the image that show geometry; only if the environment is black and [`PathOptions::is_sharp`].
+            pub tile_mask: Option<Arc<TileMask>>,
+            /// The film to resume, and when to save it.
+            pub film: FilmOptions,
+            $(
+                $(#[doc = $doc])+
+                pub $field: number!($kind),
+            )*
+        }
+
+        impl Default for PathOptions {
+            fn default() -> Self {
+                Self {
+                    size: [1280, 720],
+                    spp: 16,
+                    seed: 0,
+                    max_depth: MAX_DEPTH,
+                    strategy: Strategy::Mis,
+                    specular_only: false,
+                    white_sky: None,
+                    ambient: None,
+                    background_only: false,
+                    view: None,
+                    pixel_filter: PixelFilter::Box,
+                    texture_filter: TextureFilter::Bilinear,
+                    lens: None,
+                    time_limit: None,
+                    tile_mask: None,
+                    film: FilmOptions::default(),
+                    $($field: $default,)*
+                }
+            }
+        }
+
+        impl PathSettings {
+            /// The values of settings that are not given, by name.
+            pub fn defaults() -> Map<String, Value> {
+                let numbers = [$((stringify!($field), json!($default)),)*];
+                let others = [
+                    ("sampling", json!(Strategy::default())),
+                    ("texture_filter", json!(TextureFilter::default())),
+                    ("sky_albedo", json!(SKY_ALBEDO)),
+                ];
+                numbers.into_iter().chain(others).filter(|(_, v)| !v.is_null()).map(|(k, v)| (k.to_owned(), v)).collect()
+            }
+        }
+
+        impl PathOptions {
+            /// The options that the samples of an image depend on, each with its key, its text in an image's metadata (`None`: the key is absent), and its value in the JSON
+            /// record.
+            fn described(&self) -> Vec<(&'static str, Option<String>, Value)> {
+                // without `..`, so that a new option must be added here
+                let Self {
+                    size: _,
+                    spp: _,
+                    time_limit: _,
+                    tile_mask: _,
+                    film: _,
+                    seed: _,
+                    max_depth,
+                    $($field,)*
+                    strategy,
+                    white_sky,
+                    ambient,
+                    background_only,
+                    view,
+                    specular_only: _,
+                    pixel_filter,
+                    texture_filter,
+                    lens,
+                } = self;
+                let depth_limit = (*max_depth < MAX_DEPTH).then_some(max_depth);
+                let lookup = (*texture_filter != TextureFilter::Bilinear).then(|| texture_filter.to_string());
+                let light = if *background_only { EnvironmentLight::Ambient } else { EnvironmentLight::Traced };
+                let aperture = lens.map(|lens| format!("radius {}, focus {}", lens.radius, lens.focus));
+                vec![
+                    ("max_depth", Some(depth_text(*max_depth)), json!(depth_limit)),
+                    ("sampling", Some(strategy.to_string()), json!(strategy)),
+                    $((stringify!($field), text_of_number($field, &$default, <[&str]>::is_empty(&[$($label)?])), json!($field)),)*
+                    ("pixel_filter", Some(pixel_filter.to_string()), json!(pixel_filter)),
+                    ("texture_filter", lookup, json!(texture_filter)),
+                    ("lens", aperture, json!(lens)),
+                    ("sky_albedo", white_sky.map(|albedo| albedo.to_string()), json!(white_sky)),
+                    ("ambient", ambient.map(|a| a.to_string()), json!(ambient)),
+                    ("environment_light", background_only.then(|| EnvironmentLight::Ambient.to_string()), json!(light)),
+                    // the name of the integrator says it in metadata
+                    ("view", None, json!(view)),
+                ]
+            }
+
+            /// Replaces the numbers for which there is a setting.
+            fn set_numbers(&mut self, settings: &PathSettings) {
+                $(
+                    if let Some(value) = settings.$field {
+                        self.$field = value as number!($kind);
+                    }
+                )*
+            }
+
+            /// The numbers as shaders read them.
+            fn numbers(&self) -> PathOptionsRecord {
+                PathOptionsRecord { $($field: self.$field,)* ..Default::default() }
+            }
+
+            /// Shader features that the numbers require.
+            fn number_features(&self) -> Vec<(PathFeature, bool)> {
+                vec![$($((PathFeature::$feature, self.$field != $default),)?)*]
+            }
+
+            /// Remarks for the user about bias that numbers bring into the image.
+            fn number_remarks(&self) -> Vec<String> {
+                let remarks: Vec<Option<String>> = vec![$($((self.$field != $default).then(|| format!($remark, self.$field)),)?)*];
+                remarks.into_iter().flatten().collect()
+            }
+        }
+    };
+}
+path_options!(declare_options);
+
+/// An option's text in metadata: none where it is the default, except for an option that shaders read in any case.
+fn text_of_number<T: PartialEq + ToString>(number: &T, default: &T, is_always_read: bool) -> Option<String> {
+    (is_always_read || number != default).then(|| number.to_string())
 }
 
 impl PathSettings {
@@ -212,70 +316,22 @@ impl PathSettings {
 impl PathOptions {
     /// The options of a job for rendering light with all strategies.
     pub(super) fn new(job: &RenderJob) -> Result<Self> {
-        let (settings, default) = (&job.settings.path, Self::default());
-        Ok(Self {
+        let settings = &job.settings.path;
+        let mut options = Self {
             size: job.size,
             spp: job.spp,
             seed: job.seed,
             max_depth: settings.max_depth.or(job.scene.hints.max_depth).unwrap_or(MAX_DEPTH),
-            min_depth: settings.min_depth.unwrap_or(default.min_depth),
-            rr_depth: settings.rr_depth.unwrap_or(default.rr_depth),
-            firefly_clamp: settings.firefly_clamp.map_or(f32::INFINITY, |c| c as f32),
             strategy: settings.sampling.unwrap_or_default(),
             pixel_filter: job.pixel_filter,
             texture_filter: settings.texture_filter.unwrap_or_default(),
             lens: settings.lens(job.camera.projection)?,
             time_limit: job.time_limit,
             film: job.film.clone(),
-            ..default
-        })
-    }
-
-    /// The options that the samples of an image depend on, each with its key, its text in an image's metadata (`None`: the key is absent), and its value in the JSON
-    /// record.
-    fn described(&self) -> Vec<(&'static str, Option<String>, Value)> {
-        // without `..`, so that a new option must be added here
-        let Self {
-            size: _,
-            spp: _,
-            time_limit: _,
-            tile_mask: _,
-            film: _,
-            seed: _,
-            max_depth,
-            min_depth,
-            rr_depth,
-            firefly_clamp,
-            strategy,
-            white_sky,
-            ambient,
-            background_only,
-            view,
-            specular_only: _,
-            pixel_filter,
-            texture_filter,
-            lens,
-        } = self;
-        let clamp = firefly_clamp.is_finite().then_some(firefly_clamp);
-        let depth_limit = (*max_depth < MAX_DEPTH).then_some(max_depth);
-        let lookup = (*texture_filter != TextureFilter::Bilinear).then(|| texture_filter.to_string());
-        let light = if *background_only { EnvironmentLight::Ambient } else { EnvironmentLight::Traced };
-        let aperture = lens.map(|lens| format!("radius {}, focus {}", lens.radius, lens.focus));
-        vec![
-            ("max_depth", Some(depth_text(*max_depth)), json!(depth_limit)),
-            ("min_depth", (*min_depth > 0).then(|| min_depth.to_string()), json!(min_depth)),
-            ("rr_depth", Some(rr_depth.to_string()), json!(rr_depth)),
-            ("sampling", Some(strategy.to_string()), json!(strategy)),
-            ("firefly_clamp", clamp.map(f32::to_string), json!(clamp)),
-            ("pixel_filter", Some(pixel_filter.to_string()), json!(pixel_filter)),
-            ("texture_filter", lookup, json!(texture_filter)),
-            ("lens", aperture, json!(lens)),
-            ("sky_albedo", white_sky.map(|albedo| albedo.to_string()), json!(white_sky)),
-            ("ambient", ambient.map(|a| a.to_string()), json!(ambient)),
-            ("environment_light", background_only.then(|| EnvironmentLight::Ambient.to_string()), json!(light)),
-            // the name of the integrator says it in metadata
-            ("view", None, json!(view)),
-        ]
+            ..Self::default()
+        };
+        options.set_numbers(settings);
+        Ok(options)
     }
 
     /// Metadata keys and values by which a film is known to be of the same render. `None`: the key is absent.
@@ -285,7 +341,8 @@ impl PathOptions {
 
     /// Shader features that the options require, whatever the scene.
     pub(super) fn features(&self) -> Vec<(PathFeature, bool)> {
-        vec![
+        let mut features = self.number_features();
+        features.extend([
             (PathFeature::CosineSampling, self.strategy == Strategy::Cosine),
             (PathFeature::UniformSampling, self.strategy == Strategy::Uniform),
             (PathFeature::SpecularOnly, self.specular_only),
@@ -294,11 +351,10 @@ impl PathOptions {
             (PathFeature::OccludedLight, self.occludes_all()),
             (PathFeature::BackgroundOnly, self.background_only),
             (PathFeature::View, self.view.is_some()),
-            (PathFeature::MinDepth, self.min_depth > 0),
-            (PathFeature::Clamp, self.firefly_clamp.is_finite()),
             (PathFeature::Lens, self.lens.is_some_and(|l| l.radius > 0.0)),
             (PathFeature::PixelFilter, self.pixel_filter != PixelFilter::Box),
-        ]
+        ]);
+        features
     }
 
     /// Returns true if ambient occlusion darkens all light of a surface.
@@ -316,9 +372,7 @@ impl PathOptions {
         PathParams {
             max_depth: self.bounces(),
             view: self.view.map_or(0, |v| v as u32),
-            min_depth: self.min_depth,
-            rr_depth: self.rr_depth,
-            clamp_to: self.firefly_clamp,
+            options: self.numbers(),
             albedo: self.white_sky.unwrap_or(0.0),
             ambient_color: self.ambient.map_or([0.0; 3], |a| a.color.to_array()),
             occludes_all: self.occludes_all().into(),
@@ -330,10 +384,7 @@ impl PathOptions {
 
     /// Remarks for the user about bias in the image.
     pub(super) fn remarks(&self) -> Vec<String> {
-        let mut remarks = Vec::new();
-        if self.firefly_clamp.is_finite() {
-            remarks.push(format!("indirect radiance clamped to {}: biased, too dark", self.firefly_clamp));
-        }
+        let mut remarks = self.number_remarks();
         if self.texture_filter == TextureFilter::RayCone {
             remarks.push("textures filtered by ray cones: blurred, however many samples (biased)".into());
         }

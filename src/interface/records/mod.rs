@@ -12,6 +12,7 @@ pub mod larsen;
 pub mod lights;
 pub mod passes;
 pub mod path;
+pub mod path_options;
 pub mod queue;
 pub mod radiance;
 pub mod raster;
@@ -24,13 +25,14 @@ pub mod shading;
 use super::layout::File;
 
 /// All files; each after those that it includes.
-pub const FILES: [&File; 20] = [
+pub const FILES: [&File; 21] = [
     &ray::FILE,
     &queue::FILE,
     &scene::FILE,
     &shading::FILE,
     &block::FILE,
     &film::FILE,
+    &path_options::FILE,
     &path::FILE,
     &lights::FILE,
     &frame::FILE,

@@ -98,17 +98,19 @@ records! {
         reserved: float,
     }
 
-    /// Parameters of `nodes`.
-    NodesParams: block readonly 8 {
-        /// Address of the `BlockParams`.
+    /// Parameters of debug views.
+    DebugParams: block readonly 8 {
+        /// Address of the `FrameParams`.
+        frame: address,
+        /// Address of the `BlockParams` of the whole image.
         block: address,
-        /// Output, a `uint` per pixel: BVH nodes visited by its camera ray.
-        nodes: address,
+        /// Output of views that count something, a `uint` per pixel; else 0.
+        counts: address,
         /// Output, a `uint` per pixel: colour, 8-bit RGBA.
         words: address,
         /// `2^exposure`.
         gain: float,
-        /// Number of nodes at the middle of the colour scale.
+        /// Value at the middle of the colour scale.
         middle: float,
     }
 

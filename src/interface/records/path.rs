@@ -1,9 +1,10 @@
 //! Parameters of the path tracer's passes, and the state of each path.
 
+use super::path_options::PathOptionsRecord;
 use super::queue::QueueRecord;
 
 records! {
-    "path" includes "queue" values {
+    "path" includes "queue" "path_options" values {
         /// Phase of a path: what it has met so far are mirrors and glass, where it went on as the G-buffer's rays do.
         SIGNAL_SEEN: float = 0.0;
         /// Phase of a path: as before, but it went another way.
@@ -63,24 +64,16 @@ records! {
         shadow: QueueRecord,
         /// Maximum number of bounces.
         max_depth: uint,
-        /// Bounces before Russian roulette.
-        rr_depth: uint,
-        /// Maximum radiance that an indirect vertex adds, in any channel; infinite: unclamped.
-        clamp_to: float,
         /// Albedo of all surfaces, with `WITH_CONSTANT_ALBEDO`.
         albedo: float,
         /// Index of the environment among the lights, or `INVALID`.
         environment_light: uint,
-        /// Paths of fewer bounces add nothing, with `WITH_MIN_DEPTH`.
-        min_depth: uint,
         /// Radius of the thin lens, scene units; 0: a pinhole.
         lens_radius: float,
         /// Focus distance along the view, scene units.
         focus: float,
         /// One of `VIEW_*`: the surface property that is rendered in place of radiance; 0: radiance.
         view: uint,
-        /// Index of the first light that is chosen by power.
-        light_first: uint,
         /// `LightNode`s of the tree over the lights before `light_first`.
         light_tree: address,
         /// A `vec2` per path: width and spread of its ray cone (path/cone.glsl).
@@ -119,6 +112,12 @@ records! {
         later_diffuse_contributions: address,
         /// `diffuse_contributions` of the queue `ambient`.
         ambient_diffuse_contributions: address,
+        /// The options that are numbers.
+        options: PathOptionsRecord,
+        /// Index of the first light that is chosen by power.
+        light_first: uint,
+        /// Padding to a multiple of 8 bytes.
+        reserved: uint,
     }
 
     /// What a path of a frame in real time brings, beside its radiance, of which the part that is seen directly is left out. The vertex in question is the first

@@ -1,5 +1,5 @@
 //! The scene in device memory, reached from one root by device address. Matrices are the three rows of an affine map. A group is a
-//! bottom-level acceleration structure (BLAS), a part is a submesh of it; BLAS space is the space of its vertices.
+//! bottom-level acceleration structure (BLAS), and consists of submeshes; BLAS space is the space of its vertices.
 
 use super::super::enumerations::Texels;
 
@@ -13,10 +13,10 @@ records! {
     SceneRoot: block readonly 16 {
         /// `InstanceRecord` of each TLAS instance.
         instances: address,
-        /// `PartRecord` of each submesh of a BLAS.
-        parts: address,
-        /// A `uvec2` per instance of the scene: its `InstanceRecord` and its `PartRecord`.
-        placements: address,
+        /// `SubmeshRecord` of each submesh of a BLAS.
+        submeshes: address,
+        /// A `uvec2` per instance of the scene: its `InstanceRecord` and its `SubmeshRecord`.
+        scene_instances: address,
         /// `MaterialRecord`s.
         materials: address,
         /// `TextureRecord`s.
@@ -27,8 +27,8 @@ records! {
         primitives: address,
         /// Hardware tracers: the top-level acceleration structure.
         top_level: address,
-        /// Number of records in `parts`.
-        part_count: uint,
+        /// Number of records in `submeshes`.
+        submesh_count: uint,
         /// Padding to a multiple of 8 bytes.
         reserved0: uint,
         /// Compute tracer: the hits of a launch.
@@ -63,10 +63,10 @@ records! {
         group_to_world: vec4[3],
         /// World to BLAS space, three rows.
         world_to_group: vec4[3],
-        /// A `uint` per primitive of the BLAS: its submesh, counted from `first_part`; 0 when there is only one.
-        part_of: address,
-        /// Index into `SceneRoot.parts`.
-        first_part: uint,
+        /// A `uint` per primitive of the BLAS: its submesh, counted from `first_submesh`; 0 when there is only one.
+        submesh_of: address,
+        /// Index into `SceneRoot.submeshes`.
+        first_submesh: uint,
         /// Index of the instance in the scene; `INVALID`: several were baked into one BLAS, and each submesh has its own.
         scene_instance: uint,
         /// Compute tracer, binary BVH kernel: root node of the BLAS.
@@ -80,7 +80,7 @@ records! {
     }
 
     /// A submesh of a BLAS.
-    PartRecord: array PartRecords readonly 16 {
+    SubmeshRecord: array SubmeshRecords readonly 16 {
         /// 3 uints per triangle of the BLAS; 0 for spheres.
         indices: address,
         /// 3 floats per vertex of the BLAS; 4 per sphere: centre and radius.

@@ -13,7 +13,7 @@ use crate::measure::metrics::ImagePair;
 /// Tone-mapped luminance that the brightest pixel and the median one have at the first and the last exposure.
 const TARGET: f64 = 0.85;
 /// The least median luminance: that of a mostly black image would ask for endless exposures.
-const LEAST_MEDIAN: f64 = f32::EPSILON as f64;
+const MIN_MEDIAN: f64 = f32::EPSILON as f64;
 /// Numerator and denominator of the tone mapping operator (Narkowicz's fit of ACES, with the pre-exposure of 0.6 that the paper takes out):
 /// (c0 x^2 + c1 x) / (d0 x^2 + d1 x + d2).
 const NUMERATOR: [f64; 2] = [0.6 * 0.6 * 2.51, 0.6 * 0.03];
@@ -66,7 +66,7 @@ fn exposure_range(pair: &ImagePair) -> Option<[f64; 2]> {
     let middle = luminances.len() / 2;
     let median = *luminances.select_nth_unstable_by(middle, f32::total_cmp).1;
     let stops = |l: f64| (brought_to(TARGET) / l).log2();
-    let range = [stops(f64::from(greatest)), stops(f64::from(median).max(LEAST_MEDIAN))];
+    let range = [stops(f64::from(greatest)), stops(f64::from(median).max(MIN_MEDIAN))];
     // of an image darker than the least median the greatest would come last
     Some([range[0].min(range[1]), range[1]])
 }

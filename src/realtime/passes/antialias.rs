@@ -10,7 +10,7 @@ use crate::shaders;
 use crate::tracer::Tracer;
 
 /// Maximum number of frames that the image is averaged over in motion.
-const MOST_FRAMES: f32 = 8.0;
+const MAX_FRAMES: f32 = 8.0;
 /// Half width of the clamp of the history in motion, in standard deviations of the pixels around.
 const CLAMP_WIDTH: f32 = 1.25;
 
@@ -55,7 +55,7 @@ impl Pass for Antialias {
             rest: if self.has_rest { resources.address(Resource::Rest) } else { 0 },
             resolved: resources.address(Resource::Resolved),
             has_history: frame.has_resolved.into(),
-            most_frames: if frame.settings.antialias { MOST_FRAMES } else { 1.0 },
+            most_frames: if frame.settings.antialias { MAX_FRAMES } else { 1.0 },
             clamp_width: CLAMP_WIDTH,
             reserved: 0,
         })

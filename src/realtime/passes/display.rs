@@ -1,5 +1,6 @@
 //! `display`: converts a buffer of the frame to 8-bit RGBA in device memory, for windows, and without alpha for files.
 
+use super::debug_view;
 use crate::colour::srgb_byte;
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, ComputePipeline, Recorder};
@@ -17,7 +18,7 @@ impl DisplayMode {
     /// Colour type of files without alpha that store it.
     pub fn colour(self) -> Colour {
         match self {
-            DisplayMode::Accessibility
+            DisplayMode::Result
             | DisplayMode::Unfiltered
             | DisplayMode::Samples
             | DisplayMode::Variance
@@ -32,12 +33,13 @@ impl DisplayMode {
     /// # Errors
     /// [`Error::Usage`], naming those that they have.
     pub fn check_radiance(self) -> Result<()> {
-        use DisplayMode::{Accessibility, Depth, Ids, Motion, Nodes, Normal, Position};
-        let all = [Accessibility, Depth, Normal, Position, Ids, Motion, Nodes];
-        if all.contains(&self) {
+        use DisplayMode::{Depth, Ids, Motion, Normal, Position};
+        let is_there =
+            |m: &DisplayMode| debug_view(*m).is_some() || [Self::Result, Depth, Normal, Position, Ids, Motion].contains(m);
+        if is_there(&self) {
             return Ok(());
         }
-        let names = all.map(|m| m.to_string()).join(", ");
+        let names = DisplayMode::ALL.into_iter().filter(is_there).map(DisplayMode::name).collect::<Vec<_>>().join(", ");
         Err(Error::Usage(format!("--show {self} is for ambient occlusion; frames of radiance have {names}")))
     }
 
@@ -55,7 +57,7 @@ impl DisplayMode {
             DisplayMode::Rays if settings.technique != Technique::Traced => wrong(
                 "--show rays shows how many rays each pixel gets, which --preset larsen and --technique gtao do not distribute",
             ),
-            _ => Ok(()),
+            _ => debug_view(self).map_or(Ok(()), |(view, _)| (view.check)(settings)),
         }
     }
 }
@@ -86,7 +88,7 @@ struct DisplayPass {
 }
 
 /// The pass over all pixels, after all others. `shows_rays`: for [`DisplayMode::Rays`] alone, whose input keeps its memory until this pass; else for all
-/// buffers but that and [`DisplayMode::Nodes`].
+/// other buffers.
 pub fn stage(tracer: &Tracer, pixels: u32, shows_rays: bool) -> Result<Stage> {
     let device = tracer.device();
     let pass = DisplayPass {
@@ -110,7 +112,7 @@ impl Pass for DisplayPass {
         }
         let Some(display) = display else { return uses };
         match display.shown {
-            DisplayMode::Accessibility => uses.and_reads(&[Result, Resolved]),
+            DisplayMode::Result => uses.and_reads(&[Result, Resolved]),
             // without a history the result is read in its place
             DisplayMode::Unfiltered => uses.and_reads(&[Guide, History, Result]),
             DisplayMode::Samples | DisplayMode::Variance => uses.and_reads(&[Guide, History]),
@@ -120,12 +122,12 @@ impl Pass for DisplayPass {
             DisplayMode::Normal | DisplayMode::Position => uses.and_reads(&[Guide, Surface]),
             DisplayMode::Bent => uses.and_reads(&[Guide, BentResult]),
             // another pass writes the image
-            DisplayMode::Nodes | DisplayMode::Rays => uses,
+            _ => uses,
         }
     }
 
     fn is_enabled(&self, display: Option<&Display>) -> bool {
-        display.is_some_and(|d| d.shown != DisplayMode::Nodes && (d.shown == DisplayMode::Rays) == self.shows_rays)
+        display.is_some_and(|d| debug_view(d.shown).is_none() && (d.shown == DisplayMode::Rays) == self.shows_rays)
     }
 
     fn prepare(&mut self, frame: &Frame, resources: &Resources) -> Result<()> {

@@ -4,13 +4,13 @@ mod antialias;
 mod ao_trace;
 mod budget;
 mod compose;
+pub mod debug;
 pub mod display;
 mod filter;
 mod gather;
 mod gbuffer;
 mod gtao;
 mod larsen;
-pub mod nodes;
 mod paths;
 mod radiance_filter;
 mod radiance_temporal;
@@ -26,12 +26,30 @@ use crate::error::Result;
 use crate::film::block::{Block, TILE_PIXELS};
 use crate::integrators::path::PathOptions;
 use crate::integrators::path::signal::SignalPaths;
+use crate::interface::DisplayMode;
+use crate::interface::debug_views::debug_views;
 use crate::raster::Primary;
 use crate::scene::material::MaterialKind;
-use crate::shaders::StreamShaders;
+use crate::shaders::{self, ComputeShader, StreamShaders};
 use crate::tracer::Tracer;
 use crate::tracer::stream::LAUNCH_RAYS;
+use debug::DebugView;
 use paths::MAX_SAMPLES;
+
+macro_rules! debug_view_modules {
+    ($($(#[doc = $doc:literal])+ $view:ident = $name:literal, $glsl:literal, mod $module:ident, shader $shader:ident;)*) => {
+        $(pub mod $module;)*
+
+        /// The debug view that a display mode selects, and its shader; `None` for buffers.
+        pub fn debug_view(mode: DisplayMode) -> Option<(&'static DebugView, &'static ComputeShader)> {
+            match mode {
+                $(DisplayMode::$view => Some((&$module::VIEW, &shaders::$shader)),)*
+                _ => None,
+            }
+        }
+    };
+}
+debug_views!(debug_view_modules);
 
 /// The streams that frames with these settings trace.
 pub fn streams(settings: &Settings) -> [&'static StreamShaders; 2] {

@@ -215,9 +215,7 @@ fn paths(app: &mut App, ui: &mut Ui) {
             &crate::integrators::path::kinds::PATH as &dyn Integrator
         }
     };
-    let effective = serde_json::json!({
-        "rr_depth": 5, "min_depth": 0, "sampling": "mis", "texture_filter": "bilinear", "sky_albedo": 0.5,
-    });
+    let effective = crate::integrators::path::settings::PathSettings::defaults().into();
     let all = applicable(app.settings.integrators.path.editable(), integrator, &[]);
     editor::edit(ui, all, &effective);
 }

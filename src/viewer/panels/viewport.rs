@@ -15,7 +15,7 @@ use crate::viewer::technique::Technique;
 /// Width of the line between two images that can be dragged, points.
 const HANDLE: f32 = 10.0;
 /// Smallest share of the width that an image has beside another.
-const LEAST_SHARE: f32 = 0.05;
+const MIN_SHARE: f32 = 0.05;
 
 /// Commands of single keys, and of keys with Ctrl.
 pub fn keys(app: &mut App, context: &Context) {
@@ -152,7 +152,7 @@ fn divider(app: &mut App, ui: &mut Ui, rect: Rect, share: f32) -> f32 {
     response.widget_info(|| egui::WidgetInfo::labeled(egui::WidgetType::Other, true, "Line between the images"));
     let mut share = share;
     if let (true, Some(pointer)) = (response.dragged(), response.interact_pointer_pos()) {
-        share = ((pointer.x - rect.left()) / rect.width().max(1.0)).clamp(LEAST_SHARE, 1.0 - LEAST_SHARE);
+        share = ((pointer.x - rect.left()) / rect.width().max(1.0)).clamp(MIN_SHARE, 1.0 - MIN_SHARE);
         app.arrangement = Arrangement::Split(share);
     }
     let x = rect.left() + share * rect.width();

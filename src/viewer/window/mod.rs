@@ -22,7 +22,7 @@ use crate::error::{Error, Result};
 /// Time after which it is noticed at the latest that the user has interrupted the program.
 const INTERRUPT_INTERVAL: Duration = Duration::from_millis(300);
 /// Smallest size of the window, points.
-const LEAST_SIZE: [f64; 2] = [320.0, 240.0];
+const MIN_SIZE: [f64; 2] = [320.0, 240.0];
 
 /// Brings frames to the screen.
 trait Presenter {
@@ -127,7 +127,7 @@ impl Viewer {
         let attributes = Window::default_attributes()
             .with_title("skylit")
             .with_inner_size(LogicalSize::new(self.options.size[0], self.options.size[1]))
-            .with_min_inner_size(LogicalSize::new(LEAST_SIZE[0], LEAST_SIZE[1]))
+            .with_min_inner_size(LogicalSize::new(MIN_SIZE[0], MIN_SIZE[1]))
             // AccessKit wants to be there before it is seen
             .with_visible(false);
         let window =
