@@ -20,7 +20,7 @@ const float FEW_FRAMES = 8.0;
 // Where values nearby differ by less than this share of their mean, the clipped history is no different from this frame.
 const float FLAT = 1.0 / 512.0;
 // Squares of radiance below this count as this much.
-const float LEAST_SQUARE = 1e-8;
+const float MIN_SQUARE = 1e-8;
 // Samples at rest from which their mean counts at least as much as the filtered image.
 const float TAKE_OVER_SAMPLES = 1024.0;
 
@@ -182,7 +182,7 @@ void main() {
                 if (r.frames < 2.0) continue;
                 vec3 value = value_at(p, LOAD_PAIR(f.guide, tap), tap).rgb, d = value - r.mean;
                 // radiance counts relative to its brightness, or a highlight would speak for all pixels around it
-                float weight = is_null(p.composed) ? 1.0 : 1.0 / max(max(dot(r.mean, r.mean), dot(value, value)), LEAST_SQUARE);
+                float weight = is_null(p.composed) ? 1.0 : 1.0 / max(max(dot(r.mean, r.mean), dot(value, value)), MIN_SQUARE);
                 differences += weight * dot(d, d);
                 error += weight * rest_error(r);
                 n += 1.0;

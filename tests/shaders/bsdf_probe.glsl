@@ -24,7 +24,7 @@ void any(uint index, bool occluded) {
     s.uv = vec2(1.0 / 3.0);
     Shading m = shade(s, viewer, SHARP);
     vec3 wo = to_frame(m.frame, viewer);
-    wo.z = max(wo.z, LEAST_COSINE);
+    wo.z = max(wo.z, MIN_COSINE);
     BsdfSample sampled = BsdfSample(given, vec3(0.0), 0.0, false, 1.0);
     if (c.w != 0u) sampled = sample_direction(m, wo, given.xy, given.z);
     BsdfValue value = vertex_at(m, wo, sampled.wi);
