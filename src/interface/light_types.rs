@@ -24,6 +24,12 @@ macro_rules! light_types {
                 outer_angle: f32,
             } = mod spot, "HAS_SPOT_LIGHTS", "spot lights",
                 help(" spot: position, direction, intensity (cd), outer, inner (degrees from the axis);");
+            /// `intensity` in candela along the axis; beside it falls off as a power of the cosine, to nothing at 90 degrees.
+            Led {
+                /// Angle from the axis at which the intensity is half of that, in radians, 1 to 89 degrees.
+                half_angle: f32,
+            } = mod led, "HAS_LED_LIGHTS", "LEDs",
+                help(" led: position, direction, intensity (cd), half_angle (degrees from the axis where it is half);");
         }
     };
 }

@@ -82,11 +82,15 @@ fn everything() -> Scene {
         direction: DVec3::NEG_Y,
         range: f64::INFINITY,
     };
-    scene.lights = vec![LightKind::Spot { inner_angle: 0.1, outer_angle: 0.5 }, LightKind::Directional { angle: 0.01 }]
-        .into_iter()
-        .chain(std::iter::repeat_n(LightKind::Point, 300))
-        .map(light)
-        .collect();
+    scene.lights = [
+        LightKind::Spot { inner_angle: 0.1, outer_angle: 0.5 },
+        LightKind::Directional { angle: 0.01 },
+        LightKind::Led { half_angle: 0.5 },
+    ]
+    .into_iter()
+    .chain(std::iter::repeat_n(LightKind::Point, 300))
+    .map(light)
+    .collect();
     scene.portals = vec![Portal { corner: DVec3::new(-1.0, 4.0, -1.0), edges: [DVec3::X * 2.0, DVec3::Z * 2.0] }];
     scene.environment = Environment::Map(EnvironmentMap {
         name: String::new(),
