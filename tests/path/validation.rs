@@ -110,6 +110,7 @@ fn gpu_kernels_of_all_features_are_valid() {
     let whole = PathOptions {
         firefly_clamp: 10.0,
         min_depth: 1,
+        indirect_scale: 2.0,
         lens: Some(Lens { radius: 0.01, focus: 1.0 }),
         pixel_filter: PixelFilter::Tent,
         texture_filter: TextureFilter::RayCone,
