@@ -7,7 +7,7 @@
 //     float sky_pdf(PathParams, Shading, from, wi)    density with which light_sample finds what is outside the scene in a direction, but for distant disks
 //
 // The integrator knows no more than this: a kind is a file in this folder that defines both with its name before them (`spot_sample`, `spot_pdf`), and a line in
-// src/interface/features.rs (`LightKinds`), of which the functions above are made. Both densities are multiplied by the probability of choosing the light,
+// src/interface/light_types.rs, or features.rs (`LightKinds`) for surfaces, of which the functions above are made. Both densities are multiplied by the probability of choosing the light,
 // LightRecord.probability.
 #ifndef LIGHTS_LIGHT
 #define LIGHTS_LIGHT

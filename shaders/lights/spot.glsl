@@ -9,7 +9,7 @@ LightSample spot_sample(PathParams p, LightRecord light, vec3 from, Shading m, v
     float d2 = dot(to, to);
     if (!(d2 > 0.0)) return NO_LIGHT_SAMPLE;
     vec3 wi = to / sqrt(d2);
-    float x = clamp((dot(-wi, light.axis) - light.cos_outer) / max(light.cos_inner - light.cos_outer, 1e-4), 0.0, 1.0);
+    float x = clamp((dot(-wi, light.axis) - light.parameter_1) / max(light.parameter_0 - light.parameter_1, 1e-4), 0.0, 1.0);
     return position_sample(light, wi, d2, x * x);
 }
 

@@ -2,6 +2,7 @@
 //! stored in as many 32-bit specialization constants as it needs, and a feature is a `bool` in the shaders.
 
 use super::constants::{self, Constant};
+use super::light_types::light_types;
 use super::path_options::path_options;
 
 /// A set, as its GLSL constants are generated from it.
@@ -189,20 +190,26 @@ macro_rules! path_features {
 }
 path_options!(path_features);
 
-feature_set! {
-    /// The kinds of lights that paths sample.
-    LightKinds of /// A kind of light: `HAS_NAME_LIGHTS` stands for `shaders/lights/name.glsl`, which defines `name_sample` and `name_pdf` (shaders/lights/light.glsl says
-    /// what they do). What calls them is made of this list ([`super::glsl`]). [`LightRecord::kind`](super::records::lights::LightRecord::kind) is its number.
-    LightKind: "light_kinds", from LIGHT_FIRST, full false, indexed false, LIGHTS;
-    Rectangle = "HAS_RECTANGLE_LIGHTS", "emissive rectangles";
-    Triangle = "HAS_TRIANGLE_LIGHTS", "emissive triangles";
-    Sphere = "HAS_SPHERE_LIGHTS", "emissive spheres";
-    Environment = "HAS_ENVIRONMENT_LIGHTS", "environment light";
-    Portal = "HAS_PORTAL_LIGHTS", "portals";
-    Directional = "HAS_DIRECTIONAL_LIGHTS", "directional lights";
-    Point = "HAS_POINT_LIGHTS", "point lights";
-    Spot = "HAS_SPOT_LIGHTS", "spot lights";
+macro_rules! light_kinds {
+    ($(
+        $(#[doc = $doc:literal])+
+        $variant:ident $({ $($(#[doc = $about:literal])+ $field:ident: $type:ty,)+ })? = mod $module:ident, $flag:literal, $label:literal, help($help:literal);
+    )*) => {
+        feature_set! {
+            /// The kinds of lights that paths sample.
+            LightKinds of /// A kind of light: `HAS_NAME_LIGHTS` stands for `shaders/lights/name.glsl`, which defines `name_sample` and `name_pdf` (shaders/lights/light.glsl says
+            /// what they do). What calls them is made of this list ([`super::glsl`]). Those that no surface emits are in src/interface/light_types.rs. [`LightRecord::kind`](super::records::lights::LightRecord::kind) is its number.
+            LightKind: "light_kinds", from LIGHT_FIRST, full false, indexed false, LIGHTS;
+            Rectangle = "HAS_RECTANGLE_LIGHTS", "emissive rectangles";
+            Triangle = "HAS_TRIANGLE_LIGHTS", "emissive triangles";
+            Sphere = "HAS_SPHERE_LIGHTS", "emissive spheres";
+            Environment = "HAS_ENVIRONMENT_LIGHTS", "environment light";
+            Portal = "HAS_PORTAL_LIGHTS", "portals";
+            $($variant = $flag, $label;)*
+        }
+    };
 }
+light_types!(light_kinds);
 
 /// The features of the path tracer's shaders that a scene's materials require.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]

@@ -12,6 +12,7 @@ pub mod features;
 pub mod glsl;
 #[macro_use]
 pub mod layout;
+pub mod light_types;
 pub mod path_options;
 pub mod records;
 

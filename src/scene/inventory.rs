@@ -6,7 +6,7 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::material::MaterialKind;
-use super::{AlphaMode, Environment, Geometry, LightKind, Material, Scene, TriangleMesh};
+use super::{AlphaMode, Environment, Geometry, Material, Scene, TriangleMesh};
 
 /// Counts of a scene.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
@@ -180,11 +180,7 @@ fn lights(scene: &Scene) -> BTreeMap<&'static str, usize> {
     let mut lights = BTreeMap::new();
     let mut add = |kind| *lights.entry(kind).or_default() += 1;
     for light in &scene.lights {
-        add(match light.kind {
-            LightKind::Point => "point",
-            LightKind::Spot { .. } => "spot",
-            LightKind::Directional { .. } => "directional",
-        });
+        add(light.kind.about().name);
     }
     for instance in &scene.instances {
         if scene.materials[scene.meshes[instance.mesh].material].emissive.max_element() > 0.0 {

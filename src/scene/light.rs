@@ -1,27 +1,10 @@
-//! Punctual and directional lights, portals and environment lights.
+//! Lights that no surface emits, portals and environment lights.
 
 use std::sync::Arc;
 
 use glam::{DMat3, DVec3, Vec3};
 
-/// Type of a light (KHR_lights_punctual). Area lights are emissive surfaces ([`super::Material::emissive`]).
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum LightKind {
-    /// `intensity` in candela.
-    Point,
-    /// `intensity` in candela along the axis.
-    Spot {
-        /// Angle from the axis at which the falloff starts, in radians.
-        inner_angle: f32,
-        /// Angle from the axis at which the falloff ends, in radians.
-        outer_angle: f32,
-    },
-    /// `intensity` in lux, on a surface that faces the light.
-    Directional {
-        /// Angular diameter in radians; 0 for sharp shadows. The sun has 0.0093.
-        angle: f32,
-    },
-}
+use super::LightKind;
 
 /// One light.
 #[derive(Clone, Debug, PartialEq)]

@@ -4,9 +4,10 @@ use glam::{DAffine3, DVec3, Vec3};
 
 use crate::scene::blackbody::blackbody;
 use crate::scene::builtin::shapes;
+use crate::scene::lights::PlacedLight;
+use crate::scene::lights::keys::{Keys, colour, direction, position, positive, size};
 use crate::scene::material::MaterialKind;
 use crate::scene::{Geometry, Instance, Light, LightKind, Material, Mesh, Portal, Scene};
-use crate::settings::parse::{parse_number, parse_vector};
 
 /// A light as it is asked for: `KIND key=value ...`. Files hold the text.
 #[derive(Clone, Debug)]
@@ -17,11 +18,10 @@ pub struct LightSpec {
     power: Vec3,
 }
 
+/// What emits.
 #[derive(Clone, Debug)]
 enum Shape {
-    Point { position: DVec3 },
-    Spot { position: DVec3, direction: DVec3, inner: f32, outer: f32 },
-    Sun { direction: DVec3, angle: f32 },
+    Punctual(PlacedLight),
     Sphere { position: DVec3, radius: f64 },
     Rectangle { position: DVec3, direction: DVec3, size: [f64; 2] },
     Disk { position: DVec3, direction: DVec3, radius: f64 },
@@ -31,62 +31,12 @@ enum Shape {
 /// Triangles of a disk. Its corners are where its area is the disk's, so its power is exact.
 const DISK_CORNERS: u32 = 128;
 
-/// Values by key, each asked for once.
-struct Keys<'a> {
-    kind: &'a str,
-    given: Vec<(&'a str, &'a str)>,
-}
+/// Words of the kinds that are not in [`LightKind::TYPES`].
+const OTHER_KINDS: &str = "sphere, rectangle, disk or portal";
 
-impl<'a> Keys<'a> {
-    fn take(&mut self, key: &str) -> Option<&'a str> {
-        let at = self.given.iter().position(|(k, _)| *k == key)?;
-        Some(self.given.remove(at).1)
-    }
-
-    fn needed<T>(&mut self, key: &str, parse: impl Fn(&str) -> Result<T, String>) -> Result<T, String> {
-        let text = self.take(key).ok_or_else(|| format!("{} needs {key}=...", self.kind))?;
-        parse(text).map_err(|e| format!("{key}={text}: {e}"))
-    }
-
-    /// `spec`, if nothing is left that it does not know.
-    fn end(&self, spec: LightSpec) -> Result<LightSpec, String> {
-        match self.given.first() {
-            Some((key, _)) => Err(format!("{} has no {key}", self.kind)),
-            None => Ok(spec),
-        }
-    }
-
-    fn or<T>(&mut self, key: &str, default: T, parse: impl Fn(&str) -> Result<T, String>) -> Result<T, String> {
-        match self.take(key) {
-            Some(text) => parse(text).map_err(|e| format!("{key}={text}: {e}")),
-            None => Ok(default),
-        }
-    }
-}
-
-fn positive(text: &str) -> Result<f64, String> {
-    parse_number(text).and_then(|v| if v > 0.0 && v.is_finite() { Ok(v) } else { Err("must be above 0".into()) })
-}
-
-fn direction(text: &str) -> Result<DVec3, String> {
-    parse_vector(text)?.try_normalize().ok_or_else(|| "has no direction".into())
-}
-
-fn degrees(most: f64) -> impl Fn(&str) -> Result<f64, String> {
-    move |text| {
-        let v = parse_number(text)?;
-        if (0.0..=most).contains(&v) { Ok(v.to_radians()) } else { Err(format!("must be 0 to {most} degrees")) }
-    }
-}
-
-fn size(text: &str) -> Result<[f64; 2], String> {
-    let (w, h) = text.split_once(',').ok_or("expected WIDTH,HEIGHT")?;
-    Ok([positive(w)?, positive(h)?])
-}
-
-fn colour(text: &str) -> Result<Vec3, String> {
-    let c = parse_vector(text)?;
-    if c.min_element() < 0.0 { Err("light is not negative".into()) } else { Ok(c.as_vec3()) }
+/// Words of all kinds, for messages: `sun, point, ... or portal`.
+pub fn kinds() -> String {
+    LightKind::TYPES.iter().map(|t| format!("{}, ", t.word)).collect::<String>() + OTHER_KINDS
 }
 
 /// Reads a light's description.
@@ -95,40 +45,31 @@ fn colour(text: &str) -> Result<Vec3, String> {
 /// What is wrong with it, in a line.
 pub fn parse(text: &str) -> Result<LightSpec, String> {
     let mut words = text.split_whitespace();
-    let kind = words.next().ok_or("empty: point, spot, sun, sphere, rectangle, disk or portal, then key=value")?;
+    let kind = words.next().ok_or_else(|| format!("empty: {}, then key=value", kinds()))?;
     let given = words.map(|w| w.split_once('=').ok_or_else(|| format!("'{w}' is no key=value"))).collect::<Result<_, _>>()?;
-    let mut keys = Keys { kind, given };
-    let (shape, unit) = match kind {
-        "point" => (Shape::Point { position: keys.needed("position", parse_vector)? }, "intensity"),
-        "spot" => {
-            let outer = keys.or("outer", 45f64.to_radians(), degrees(90.0))?;
-            let inner = keys.or("inner", 0.0, degrees(90.0))?.min(outer);
-            let (position, direction) = (keys.needed("position", parse_vector)?, keys.needed("direction", direction)?);
-            (Shape::Spot { position, direction, inner: inner as f32, outer: outer as f32 }, "intensity")
-        }
-        "sun" => {
-            let angle = keys.or("angle", 0.0, degrees(180.0))? as f32;
-            (Shape::Sun { direction: keys.needed("direction", direction)?, angle }, "irradiance")
-        }
-        "sphere" => {
-            let (position, radius) = (keys.needed("position", parse_vector)?, keys.needed("radius", positive)?);
+    let mut keys = Keys::new(kind, given);
+    let punctual = LightKind::TYPES.iter().find(|t| t.word == kind);
+    let (shape, unit) = match (punctual, kind) {
+        (Some(light), _) => (Shape::Punctual((light.read)(&mut keys)?), light.strength),
+        (None, "sphere") => {
+            let (position, radius) = (keys.needed("position", position)?, keys.needed("radius", positive)?);
             (Shape::Sphere { position, radius }, "radiance")
         }
-        "rectangle" => {
-            let (position, direction) = (keys.needed("position", parse_vector)?, keys.needed("direction", direction)?);
+        (None, "rectangle") => {
+            let (position, direction) = (keys.needed("position", position)?, keys.needed("direction", direction)?);
             (Shape::Rectangle { position, direction, size: keys.needed("size", size)? }, "radiance")
         }
-        "disk" => {
-            let (position, direction) = (keys.needed("position", parse_vector)?, keys.needed("direction", direction)?);
+        (None, "disk") => {
+            let (position, direction) = (keys.needed("position", position)?, keys.needed("direction", direction)?);
             (Shape::Disk { position, direction, radius: keys.needed("radius", positive)? }, "radiance")
         }
-        "portal" => {
-            let (position, direction) = (keys.needed("position", parse_vector)?, keys.needed("direction", direction)?);
+        (None, "portal") => {
+            let (position, direction) = (keys.needed("position", position)?, keys.needed("direction", direction)?);
             let shape = Shape::Portal { position, direction, size: keys.needed("size", size)? };
             // it has no strength: what it lets in is the environment's
             return keys.end(LightSpec { text: text.to_owned(), shape, power: Vec3::ZERO });
         }
-        other => return Err(format!("'{other}' is no light: point, spot, sun, sphere, rectangle, disk or portal")),
+        (None, other) => return Err(format!("'{other}' is no light: {}", kinds())),
     };
     let strength = keys.needed(unit, positive)?;
     let tint = match (keys.take("color"), keys.take("temperature")) {
@@ -174,22 +115,10 @@ impl<'de> serde::Deserialize<'de> for LightSpec {
 impl LightSpec {
     /// Puts it into a scene, in the file's world coordinates: what has an extent as a surface that emits from its front, reflects nothing, is seen and casts shadows.
     pub fn add(&self, scene: &mut Scene) {
-        let light = |kind, position, direction| Light {
-            name: "--light".into(),
-            kind,
-            intensity: self.power,
-            position,
-            direction,
-            range: f64::INFINITY,
-        };
         let (geometry, position) = match self.shape {
-            Shape::Point { position } => return scene.lights.push(light(LightKind::Point, position, DVec3::NEG_Z)),
-            Shape::Spot { position, direction, inner, outer } => {
-                let kind = LightKind::Spot { inner_angle: inner, outer_angle: outer };
-                return scene.lights.push(light(kind, position, direction));
-            }
-            Shape::Sun { direction, angle } => {
-                return scene.lights.push(light(LightKind::Directional { angle }, DVec3::ZERO, direction));
+            Shape::Punctual(PlacedLight { kind, position, direction }) => {
+                let (name, range) = ("--light".into(), f64::INFINITY);
+                return scene.lights.push(Light { name, kind, intensity: self.power, position, direction, range });
             }
             Shape::Sphere { position, radius } => (shapes::sphere(DVec3::ZERO, radius), position),
             Shape::Rectangle { position, direction, size } => {

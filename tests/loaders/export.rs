@@ -196,6 +196,20 @@ fn gltf_round_trips() {
     assert_eq!(names.len(), 2 + 2 * 3, "{names:?}");
 }
 
+/// glTF has no LEDs: the others stay, and it is said.
+#[test]
+fn gltf_leaves_out_leds() {
+    let folder = Folder::new();
+    let mut original = scene();
+    let led = Light { name: "ceiling".into(), kind: LightKind::Led { half_angle: 0.5 }, ..original.lights[0].clone() };
+    original.lights.insert(1, led);
+    let path = folder.path("a.glb");
+    let written = export_gltf(&original, &path).unwrap();
+    assert_eq!(written.warnings, ["light 'ceiling' is left out: glTF has no LED lights"]);
+    original.lights.remove(1);
+    same(&original, &load(&path).unwrap());
+}
+
 #[test]
 fn spheres_are_tessellated() {
     let folder = Folder::new();

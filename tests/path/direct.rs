@@ -65,6 +65,46 @@ fn gpu_points_spots_and_directions() {
     holds(&device, "three lights", &all, &options(Strategy::Mis, 1024), reflected * (3.0 * 0.8 * 2.0 + 5.0), 1e-2);
 }
 
+/// LEDs, whose intensity is a power of the cosine: half at their half angle, that power elsewhere, nothing behind them.
+#[test]
+fn gpu_leds() {
+    let device = device();
+    let at = DVec3::new(0.6, 0.8, 0.0);
+    let reflected = RHO / std::f64::consts::PI;
+    let expected = reflected * 3.0 * 0.8;
+    let lit = |half_angle: f32, beside: f64| {
+        let mut scene = floor_and(Vec::new());
+        let angle = 0.6f64.asin() + beside;
+        scene.lights.push(light(LightKind::Led { half_angle }, at, DVec3::new(-angle.sin(), -angle.cos(), 0.0), 3.0));
+        scene
+    };
+    let options = options(Strategy::Mis, 16);
+    for half_angle in [0.3f32, 1.2] {
+        let half = f64::from(half_angle);
+        holds(&device, "on its axis", &lit(half_angle, 0.0), &options, expected, 1e-3);
+        holds(&device, "at its half angle", &lit(half_angle, half), &options, 0.5 * expected, 1e-3);
+        let share = 0.5f64.powf(0.5f64.cos().ln() / half.cos().ln());
+        holds(&device, "beside its axis", &lit(half_angle, 0.5), &options, share * expected, 1e-3);
+        let away = lit(half_angle, 2.0);
+        let flat = FlatScene::new(&away);
+        for kind in picked(&device) {
+            let film = render(&tracer(&device, kind, &flat), &flat, &options).image.film;
+            assert!(film.mean.iter().all(|&m| m == 0.0), "{kind}: an LED that shines away");
+        }
+    }
+    // chosen by the light tree: 300 at one place, in turn along two directions, and as many that shine away
+    let mut many = lit(0.7, 0.0);
+    let one = many.lights.pop().unwrap();
+    let turned = DVec3::new(-(0.6f64.asin() + 0.5).sin(), -(0.6f64.asin() + 0.5).cos(), 0.0);
+    for k in 0..600 {
+        let direction = [one.direction, -one.direction, turned, -turned][k % 4];
+        many.lights.push(light(one.kind, at, direction, 3.0 / 300.0));
+    }
+    let share = 0.5f64.powf(0.5f64.cos().ln() / 0.7f64.cos().ln());
+    let expected = expected * 0.5 * (1.0 + share);
+    holds(&device, "many", &many, &PathOptions { spp: 1024, ..options }, expected, 1e-2);
+}
+
 /// A sphere seen under a half angle a from a point, its centre at angle t from the normal and all of it above the horizon: pi L sin^2 a cos t.
 #[test]
 fn gpu_a_sphere() {

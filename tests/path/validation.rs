@@ -82,11 +82,15 @@ fn everything() -> Scene {
         direction: DVec3::NEG_Y,
         range: f64::INFINITY,
     };
-    scene.lights = vec![LightKind::Spot { inner_angle: 0.1, outer_angle: 0.5 }, LightKind::Directional { angle: 0.01 }]
-        .into_iter()
-        .chain(std::iter::repeat_n(LightKind::Point, 300))
-        .map(light)
-        .collect();
+    scene.lights = [
+        LightKind::Spot { inner_angle: 0.1, outer_angle: 0.5 },
+        LightKind::Directional { angle: 0.01 },
+        LightKind::Led { half_angle: 0.5 },
+    ]
+    .into_iter()
+    .chain(std::iter::repeat_n(LightKind::Point, 300))
+    .map(light)
+    .collect();
     scene.portals = vec![Portal { corner: DVec3::new(-1.0, 4.0, -1.0), edges: [DVec3::X * 2.0, DVec3::Z * 2.0] }];
     scene.environment = Environment::Map(EnvironmentMap {
         name: String::new(),
@@ -106,6 +110,7 @@ fn gpu_kernels_of_all_features_are_valid() {
     let whole = PathOptions {
         firefly_clamp: 10.0,
         min_depth: 1,
+        indirect_scale: 2.0,
         lens: Some(Lens { radius: 0.01, focus: 1.0 }),
         pixel_filter: PixelFilter::Tent,
         texture_filter: TextureFilter::RayCone,

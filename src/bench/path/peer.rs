@@ -127,16 +127,19 @@ fn write_scene(scene: &Scene, camera: &Camera, size: [u32; 2], folder: &PathBuf)
         .lights
         .iter()
         .map(|l| {
-            let (kind, inner, outer) = match l.kind {
-                LightKind::Point => ("point", 0.0, 0.0),
-                LightKind::Spot { inner_angle, outer_angle } => ("spot", inner_angle, outer_angle),
-                LightKind::Directional { angle } => ("directional", angle, 0.0),
+            let about = l.kind.about();
+            let missing = || Error::Scene(format!("light '{}': peers have no {} lights; leave it out", l.name, about.name));
+            let kind = about.gltf.ok_or_else(missing)?;
+            let (inner, outer) = match l.kind {
+                LightKind::Spot { inner_angle, outer_angle } => (inner_angle, outer_angle),
+                LightKind::Directional { angle } => (angle, 0.0),
+                _ => (0.0, 0.0),
             };
             let range = l.range.is_finite().then_some(l.range);
-            json!({"kind": kind, "intensity": l.intensity.to_array(), "position": l.position.to_array(),
-                   "direction": l.direction.to_array(), "inner": inner, "outer": outer, "range": range})
+            Ok(json!({"kind": kind, "intensity": l.intensity.to_array(), "position": l.position.to_array(),
+                      "direction": l.direction.to_array(), "inner": inner, "outer": outer, "range": range}))
         })
-        .collect();
+        .collect::<Result<_>>()?;
     let (fov_y, half_height) = match camera.projection {
         Projection::Perspective { fov_y } => (Some(fov_y), None),
         Projection::Orthographic { half_height } => (None, Some(half_height)),

@@ -18,21 +18,21 @@ records! {
 
     /// A light of the scene.
     LightRecord: array LightRecords readonly 16 {
-        /// Point, spot: position; triangle, rectangle, portal: a corner; sphere: centre. World space.
+        /// Lights from a position: that; triangle, rectangle, portal: a corner; sphere: centre. World space.
         position: vec3,
         /// Sphere: radius; directional: 1 - cosine of half its angular diameter.
         radius: float,
-        /// Spot, directional: direction of emission; triangle, rectangle, portal: first edge.
+        /// Lights from a position, directional: direction of emission; triangle, rectangle, portal: first edge.
         axis: vec3,
-        /// Spot: cosine of the inner cone angle.
-        cos_inner: float,
+        /// First number that src/scene/lights/NAME.rs gives to the light's shader; spot: cosine of the inner cone angle.
+        parameter_0: float,
         /// Triangle, rectangle, portal: second edge.
         edge: vec3,
-        /// Spot: cosine of the outer cone angle.
-        cos_outer: float,
-        /// Point, spot: radiant intensity; directional: irradiance; other kinds: radiance, before any texture. Linear RGB.
+        /// Second one; spot: cosine of the outer cone angle.
+        parameter_1: float,
+        /// Lights from a position: radiant intensity; directional: irradiance; other kinds: radiance, before any texture. Linear RGB.
         intensity: vec3,
-        /// Point, spot: range beyond which the light has no effect, scene units.
+        /// Lights from a position: range beyond which the light has no effect, scene units.
         range: float,
         /// Probability of being chosen by power.
         probability: float,

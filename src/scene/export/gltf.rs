@@ -140,8 +140,13 @@ impl Writer {
                     .warnings
                     .push(format!("light '{name}' loses its angular diameter: glTF's directional lights have none"));
             }
+            let Some(written) = punctual(light) else {
+                let (name, kind) = (&light.name, light.kind.about().name);
+                self.written.warnings.push(format!("light '{name}' is left out: glTF has no {kind} lights"));
+                continue;
+            };
             nodes.push(light_node(light, lights.len()));
-            lights.push(punctual(light));
+            lights.push(written);
         }
         let cameras: Vec<Value> = scene.cameras.iter().map(camera).collect();
         nodes.extend(scene.cameras.iter().enumerate().filter_map(|(i, c)| {
@@ -402,21 +407,18 @@ fn light_node(light: &Light, index: usize) -> Value {
     node
 }
 
-fn punctual(light: &Light) -> Value {
+/// A light of KHR_lights_punctual; `None` if that has no such type.
+fn punctual(light: &Light) -> Option<Value> {
+    let kind = light.kind.about().gltf?;
     let (color, intensity) = material::split(light.intensity);
-    let mut out = json!({ "name": light.name, "color": color.to_array(), "intensity": intensity });
+    let mut out = json!({ "name": light.name, "type": kind, "color": color.to_array(), "intensity": intensity });
     if light.range.is_finite() {
         out["range"] = json!(light.range);
     }
-    match light.kind {
-        LightKind::Directional { .. } => out["type"] = json!("directional"),
-        LightKind::Spot { inner_angle, outer_angle } => {
-            out["type"] = json!("spot");
-            out["spot"] = json!({ "innerConeAngle": inner_angle, "outerConeAngle": outer_angle });
-        }
-        LightKind::Point => out["type"] = json!("point"),
+    if let LightKind::Spot { inner_angle, outer_angle } = light.kind {
+        out["spot"] = json!({ "innerConeAngle": inner_angle, "outerConeAngle": outer_angle });
     }
-    out
+    Some(out)
 }
 
 /// A file name as a URI.

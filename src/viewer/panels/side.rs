@@ -245,7 +245,7 @@ fn light(app: &mut App, ui: &mut Ui) {
     ui.separator();
     let heading = ui
         .label("Add a light")
-        .on_hover_text("As --light takes it: sun, point, spot, sphere, rectangle, disk or portal, then key=value");
+        .on_hover_text(format!("As --light takes it: {}, then key=value", crate::scene::light_spec::kinds()));
     let id = ui.make_persistent_id("light text");
     let mut text = ui.data_mut(|d| d.get_temp::<String>(id)).unwrap_or_else(|| "sun direction=-1,-2,-1 irradiance=3".into());
     ui.horizontal(|ui| {

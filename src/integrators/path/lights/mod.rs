@@ -16,7 +16,8 @@ use crate::accel::flatten::FlatScene;
 use crate::interface::records::lights::{LightNode, LightRecord};
 use crate::interface::{LightKind as Kind, LightKinds};
 use crate::sampling::CumulativeTable;
-use crate::scene::{Light, LightKind};
+use crate::scene::Light;
+use crate::scene::lights::Emission;
 
 /// With more positional lights than this, a light tree chooses among them.
 const MAX_BY_POWER: usize = 256;
@@ -101,7 +102,7 @@ impl Lights {
     pub fn new(flat: &FlatScene, environment: Vec3) -> Self {
         let mut all = LightCollector::default();
         let scene = flat.scene;
-        let is_far = |light: &&Light| matches!(light.kind, LightKind::Directional { .. });
+        let is_far = |light: &&Light| matches!(light.kind.emission(), Emission::Distant { .. });
         scene.lights.iter().filter(|l| !is_far(l)).for_each(|l| punctual::add(&mut all, flat, l));
         let light_of = surfaces::add(&mut all, flat);
         let first_far = all.records.len() as u32;

@@ -1,4 +1,4 @@
-//! Lights without a surface: point, spot and directional lights.
+//! Lights that no surface emits: those of src/scene/lights.
 
 use std::f64::consts::PI;
 
@@ -8,15 +8,16 @@ use super::super::light_tree::Bounds;
 use super::super::params::INVALID;
 use super::{LightCollector, brightness, radius};
 use crate::accel::flatten::FlatScene;
-use crate::interface::LightKind as Kind;
 use crate::interface::records::lights::LightRecord;
-use crate::scene::{Light, LightKind};
+use crate::scene::Light;
+use crate::scene::lights::Emission;
 
-/// Adds a punctual light (KHR_lights_punctual).
+/// Adds a light.
 pub(super) fn add(all: &mut LightCollector, flat: &FlatScene, light: &Light) {
     let position = light.position - flat.origin;
     let brightness = brightness(light.intensity);
     let base = LightRecord {
+        kind: light.kind.number() as u32,
         position: position.as_vec3().to_array(),
         axis: light.direction.as_vec3().to_array(),
         intensity: light.intensity.to_array(),
@@ -24,40 +25,24 @@ pub(super) fn add(all: &mut LightCollector, flat: &FlatScene, light: &Light) {
         instance: INVALID,
         ..Default::default()
     };
-    let place = |axis, spread, falloff| Bounds {
-        lo: position,
-        hi: position,
-        axis,
-        spread,
-        falloff,
-        two_sided: false,
-        intensity: brightness,
-    };
-    match light.kind {
-        LightKind::Point => {
-            all.push(
-                LightRecord { kind: Kind::Point as u32, ..base },
-                4.0 * PI * brightness,
-                Some(place(DVec3::Z, PI, 0.5 * PI)),
-            );
+    match light.kind.emission() {
+        Emission::Placed { solid_angle, spread, falloff, parameters: [parameter_0, parameter_1] } => {
+            let bounds = Bounds {
+                lo: position,
+                hi: position,
+                // what emits everywhere has none
+                axis: if spread < PI { light.direction.normalize_or(DVec3::NEG_Z) } else { DVec3::Z },
+                spread,
+                falloff,
+                two_sided: false,
+                intensity: brightness,
+            };
+            all.push(LightRecord { parameter_0, parameter_1, ..base }, solid_angle * brightness, Some(bounds));
         }
-        LightKind::Spot { inner_angle, outer_angle } => {
-            let (inner, outer) = (inner_angle.cos(), outer_angle.cos());
-            // approximates the falloff by a step half-way between the inner and the outer angle
-            let solid = 2.0 * PI * (1.0 - 0.5 * f64::from(inner + outer));
-            let record = LightRecord { kind: Kind::Spot as u32, cos_inner: inner, cos_outer: outer, ..base };
-            let (spread, reach) = (f64::from(inner_angle), f64::from(outer_angle));
-            all.push(
-                record,
-                solid * brightness,
-                Some(place(light.direction.normalize_or(DVec3::NEG_Z), spread, reach - spread)),
-            );
-        }
-        LightKind::Directional { angle } => {
+        Emission::Distant { angle } => {
             // 1 - cos, without cancellation
             let one_minus_cos = 2.0 * (0.25 * f64::from(angle)).sin().powi(2);
-            let record = LightRecord { kind: Kind::Directional as u32, radius: one_minus_cos as f32, ..base };
-            all.push(record, PI * radius(flat).powi(2) * brightness, None);
+            all.push(LightRecord { radius: one_minus_cos as f32, ..base }, PI * radius(flat).powi(2) * brightness, None);
         }
     }
 }
