@@ -7,11 +7,12 @@
 #
 # SKYLIT_PROFILE   profile to build with, release unless given
 # SKYLIT_FEATURES  cargo features to build with besides
+# SKYLIT_DEMO_SIZE  size of images, 640x360 unless given
 set -euo pipefail
 cd "$(dirname "$0")/.."
 spp=${1:-${SKYLIT_DEMO_SPP:-64}}
 out=${SKYLIT_DEMO_DIR:-target/demo}
-size=640x360
+size=${SKYLIT_DEMO_SIZE:-640x360}
 scenes=(cornell-box stairs leaf-cards)
 tracers=(pipeline query compute)
 

@@ -5,7 +5,7 @@
 #   ./scripts/test.sh [--full] [FILTER]      FILTER: only tests whose name contains it
 #
 # --full, before a release: every scene of the reference renderer (docs/mitsuba.md) on every tracer and driver and with the validation layer, every device test on
-# the floor driver, every tracer for every test of paths, with the validation layer, a million rays a scene in the parity gate, and reports in a browser (scripts/report.sh installs one).
+# the floor driver, every tracer for every test of paths, with the validation layer, a million rays a scene in the parity gate, and reports in a browser (scripts/report.sh installs one), lints of the program without benchmarks and viewer.
 # Without it the other tracers and the floor driver render the scenes in which they differ from the compute tracer, and a test of paths takes one tracer. Both do
 # without the layer, which all other tests have, and one that compiles kernels of all features. The parity gate has a tenth of the rays, and frames at rest are followed in two of four scenes. The floor driver leaves
 # out tests of code that knows no driver: how paths are shaded (tests/path), what frames show (tests/realtime, but for those that compare tracers), and the
@@ -125,10 +125,10 @@ if cargo fmt --version >/dev/null 2>&1; then
 fi
 if cargo clippy --version >/dev/null 2>&1; then
   say "lints"
-  # the program as it is released with its tests, which are the same for all; the library alone; and the program without benchmarks and viewer
+  # the program as it is released with its tests, which are the same for all; the library alone; and before a release the program without benchmarks and viewer
   cargo clippy --locked --all-targets -- -D warnings
   cargo clippy --locked --no-default-features --lib -- -D warnings
-  cargo clippy --locked --no-default-features --features cli --lib --bins -- -D warnings
+  if [ -n "$full" ]; then cargo clippy --locked --no-default-features --features cli --lib --bins -- -D warnings; fi
 fi
 
 # rays of each set of the parity gate; a million otherwise
