@@ -19,29 +19,26 @@ const int BIAS_RADIUS = 2;
 const float FEW_FRAMES = 8.0;
 // Where values nearby differ by less than this share of their mean, the clipped history is no different from this frame.
 const float FLAT = 1.0 / 512.0;
-// Squares of radiance below this count as this much.
-const float MIN_SQUARE = 1e-8;
 // Samples at rest from which their mean counts at least as much as the filtered image.
 const float TAKE_OVER_SAMPLES = 1024.0;
 
 // This frame's value and coverage. `guide`: of the pixel.
 vec4 value_at(AntialiasParams p, uvec2 guide, uint at) {
-    if (!is_null(p.composed)) return load_quad(p.composed, at);
+    if (!is_null(p.composed)) return uintBitsToFloat(Quads(p.composed).v[at]);
     // coverage is that of the sample
     return vec4(vec3(FloatImage(p.visibility).v[at]), is_surface(guide) ? 1.0 : 0.0);
 }
 
 // The resolved image and its coverage, which has 16 bits, as has the number of frames.
 vec4 load_resolved(AntialiasParams p, uint at, out float frames) {
-    uvec4 q = LOAD_QUAD(p.previous_history, at);
+    uvec4 q = Quads(p.previous_history).v[at];
     frames = float(q.w & 0xffffu);
     return vec4(uintBitsToFloat(q.xyz), float(q.w >> 16) / 65535.0);
 }
 
 void store_resolved(AntialiasParams p, uint at, vec4 value, float frames) {
     uint w = uint(clamp(value.a, 0.0, 1.0) * 65535.0 + 0.5) << 16 | uint(min(frames, 65535.0));
-    STORE_PAIR(p.history, 2u * at, floatBitsToUint(value.rg));
-    STORE_PAIR(p.history, 2u * at + 1u, uvec2(floatBitsToUint(value.b), w));
+    QuadImage(p.history).v[at] = uvec4(floatBitsToUint(value.rgb), w);
 }
 
 // The resolved image at a place, in pixels from the centre of the one in the upper left corner; interpolated by a cubic without its corners. `frames`: of the nearest pixel.
@@ -180,11 +177,9 @@ void main() {
                 uint tap = image_index(f, uvec2(x, y));
                 Rest r = load_rest(p.rest, tap);
                 if (r.frames < 2.0) continue;
-                vec3 value = value_at(p, LOAD_PAIR(f.guide, tap), tap).rgb, d = value - r.mean;
-                // radiance counts relative to its brightness, or a highlight would speak for all pixels around it
-                float weight = is_null(p.composed) ? 1.0 : 1.0 / max(max(dot(r.mean, r.mean), dot(value, value)), MIN_SQUARE);
-                differences += weight * dot(d, d);
-                error += weight * rest_error(r);
+                vec3 d = value_at(p, LOAD_PAIR(f.guide, tap), tap).rgb - r.mean;
+                differences += dot(d, d);
+                error += rest_error(r);
                 n += 1.0;
             }
         }
@@ -196,5 +191,5 @@ void main() {
             resolved = mix(resolved, vec4(own.mean, own.coverage), share);
         }
     }
-    store_quad(p.resolved, at, resolved);
+    QuadImage(p.resolved).v[at] = floatBitsToUint(resolved);
 }

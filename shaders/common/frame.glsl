@@ -8,6 +8,7 @@
 #include "interface/pattern.glsl"
 
 layout(buffer_reference, std430, buffer_reference_align = 4) buffer FloatImage { float v[]; };
+layout(buffer_reference, std430, buffer_reference_align = 16) buffer QuadImage { uvec4 v[]; };
 
 void store_vec3(uvec2 image, uint at, vec3 value) {
     FloatImage target = FloatImage(image);
@@ -129,14 +130,9 @@ bool on_plane(EdgeTest e, vec2 offset, uvec2 guide) {
     return abs(off) <= e.tolerance;
 }
 
-// The normal in a guide, to be computed once for many tests.
-vec3 guide_normal(uvec2 guide) { return unpackSnorm4x8(guide.y).xyz; }
-
-bool same_surface(EdgeTest e, vec2 offset, uvec2 guide, vec3 normal) {
-    return on_plane(e, offset, guide) && dot(e.normal, normal) >= e.cosine;
+bool same_surface(EdgeTest e, vec2 offset, uvec2 guide) {
+    return on_plane(e, offset, guide) && dot(e.normal, unpackSnorm4x8(guide.y).xyz) >= e.cosine;
 }
-
-bool same_surface(EdgeTest e, vec2 offset, uvec2 guide) { return same_surface(e, offset, guide, guide_normal(guide)); }
 
 // A mean over samples: their number, and the variance of one.
 struct Estimate {
