@@ -122,6 +122,8 @@ run_documentation() {
 if cargo fmt --version >/dev/null 2>&1; then
   say "formatting"
   cargo fmt --check
+  # modules that macros declare: cargo fmt does not visit them
+  rustfmt --edition 2024 --check src/scene/lights/*.rs src/realtime/passes/*.rs
 fi
 if cargo clippy --version >/dev/null 2>&1; then
   say "lints"
