@@ -125,10 +125,11 @@ if cargo fmt --version >/dev/null 2>&1; then
   # modules that macros declare: cargo fmt does not visit them
   rustfmt --edition 2024 --check src/scene/lights/*.rs src/realtime/passes/*.rs
 fi
+. scripts/linting-compiler.sh
+say "lints of benchmarks, examples and the library"
+cargo build --locked --benches --examples
 if cargo clippy --version >/dev/null 2>&1; then
-  say "lints"
-  # the program as it is released with its tests, which are the same for all; the library alone; and before a release the program without benchmarks and viewer
-  cargo clippy --locked --all-targets -- -D warnings
+  # the library alone; and before a release the program without benchmarks and viewer
   cargo clippy --locked --no-default-features --lib -- -D warnings
   if [ -n "$full" ]; then cargo clippy --locked --no-default-features --features cli --lib --bins -- -D warnings; fi
 fi

@@ -4,16 +4,11 @@ use earcut::Earcut;
 use glam::{DVec3, Vec3};
 
 /// Cuts concave polygons; keeps its buffers from one to the next.
+#[derive(Default)]
 pub(super) struct PolygonTriangulator {
     earcut: Earcut<f64>,
     points: Vec<[f64; 2]>,
     triangles: Vec<u32>,
-}
-
-impl Default for PolygonTriangulator {
-    fn default() -> Self {
-        Self { earcut: Earcut::new(), points: Vec::new(), triangles: Vec::new() }
-    }
 }
 
 impl PolygonTriangulator {
