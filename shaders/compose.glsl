@@ -9,10 +9,10 @@ void main() {
     if (gl_GlobalInvocationID.x >= push.count) return;
     ComposeParams p = ComposeParams(push.pass);
     FrameParams f = FrameParams(p.frame);
-    vec4 c = uintBitsToFloat(Quads(p.direct).v[at]);
+    vec4 c = load_quad(p.direct, at);
     if (is_surface(LOAD_PAIR(f.guide, at))) {
-        vec3 albedo = uintBitsToFloat(Quads(p.materials).v[at].xyz);
+        vec3 albedo = load_quad(p.materials, at).rgb;
         c.rgb += albedo * load_radiance(p.diffuse, at).mean + load_radiance(p.specular, at).mean;
     }
-    QuadImage(p.composed).v[at] = floatBitsToUint(c);
+    store_quad(p.composed, at, c);
 }

@@ -14,7 +14,7 @@ const float PRIOR_SAMPLES = 4.0;
 // a pixel without neighbours on its surface has samples of its own
 const float LONELY = 0.0;
 
-uint filtered_pixel() { return push.first + gl_GlobalInvocationID.x; }
+uint first_pixel() { return push.first + FILTER_STRIP * gl_GlobalInvocationID.x; }
 
 RadianceEstimate load_estimate(uvec2 estimates, uint at) { return load_radiance(estimates, at); }
 
@@ -24,9 +24,8 @@ int limited(int radius, FilterParams p, RadianceEstimate own) { return min(radiu
 
 // The normals in guides are shading normals here, because lighting depends on them. The eight bits beside them are equal for
 // pixels that may be averaged.
-bool is_neighbour(EdgeTest edge, vec2 offset, uvec2 own_guide, uvec2 guide) {
-    vec3 own = unpackSnorm4x8(own_guide.y).xyz;
-    return (own_guide.y ^ guide.y) >> 24 == 0u && on_plane(edge, offset, guide) && dot(own, unpackSnorm4x8(guide.y).xyz) >= edge.cosine;
+bool is_neighbour(EdgeTest edge, vec2 offset, uvec2 own_guide, uvec2 guide, vec3 normal) {
+    return (own_guide.y ^ guide.y) >> 24 == 0u && on_plane(edge, offset, guide) && dot(guide_normal(own_guide), normal) >= edge.cosine;
 }
 
 vec3 prior_variance(vec3 mean, vec3 spread, float samples) { return spread * samples; }

@@ -12,11 +12,11 @@ layout(local_size_x = LANES) in;
 const float PRIOR_SAMPLES = 4.0;
 const float LONELY = 6.0;
 
-uint filtered_pixel() { return gl_GlobalInvocationID.x; }
+uint first_pixel() { return FILTER_STRIP * gl_GlobalInvocationID.x; }
 
 Estimate load_estimate(uvec2 estimates, uint at) { return unpack_estimate(LOAD_PAIR(estimates, at)); }
 
-bool is_neighbour(EdgeTest edge, vec2 offset, uvec2 own_guide, uvec2 guide) { return same_surface(edge, offset, guide); }
+bool is_neighbour(EdgeTest edge, vec2 offset, uvec2 own_guide, uvec2 guide, vec3 normal) { return same_surface(edge, offset, guide, normal); }
 
 float prior_variance(float mean, float spread, float samples) { return mean * (1.0 - mean); }
 

@@ -11,10 +11,10 @@
 //
 // The including shader defines what is filtered, a VALUE of one or several channels, and an ESTIMATE of it, with a mean, the
 // number of samples behind it and the variance of one. Furthermore:
-//   uint filtered_pixel()                          the pixel of this thread
+//   uint first_pixel()                             the first of the FILTER_STRIP pixels of this thread
 //   ESTIMATE load_estimate(image, at)
 //   ESTIMATE estimate_of(own, mean, n, variance)   a pixel's estimate with another mean, number of samples and variance
-//   bool is_neighbour(edge, offset, own, guide)    whether two pixels show the same surface
+//   bool is_neighbour(edge, offset, own, guide, normal)   whether two pixels show the same surface; `normal`: guide_normal() of the second's
 //   VALUE prior_variance(mean, spread, samples)    the variance to assume while there are few samples: from the mean of a box,
 //                                                  the variance of its pixels and the samples per pixel
 //   int limited(radius, p, own)                    the radius, or a smaller one for this pixel
@@ -48,79 +48,132 @@ vec3 load_bent(FilterParams p, uint at) {
     return load_vec3(p.bent_from, at);
 }
 
-void main() {
-    uint at = filtered_pixel();
-    if (at >= push.count) return;
-    FilterParams p = FilterParams(push.pass);
-    FrameParams f = FrameParams(p.frame);
-    uvec2 own_guide = LOAD_PAIR(f.guide, at);
-    if (!is_surface(own_guide)) {
-        finish_nothing(p, f, at);
-        return;
-    }
-    uvec2 guides = f.guide, estimates = p.from;
-    ESTIMATE own = load_estimate(estimates, at);
-    vec3 own_bent = BENT_NORMALS ? load_bent(p, at) : vec3(0.0);
-    int stride = int(p.stride);
-    // a step with strides has a fixed radius; it is skipped where there are enough samples
-    int radius = limited(stride > 1 ? (own.samples < p.samples ? int(p.radius) : 0) : box_radius(p, own.samples), p, own);
-    if (radius == 0) {
-        finish(p, f, at, own, own_bent);
-        return;
-    }
-    uint width = f.size.x;
-    ivec2 pixel = ivec2(at % width, at / width);
-    EdgeTest edge = edge_test(f, f.world_to_camera, f.view, f.orthographic != 0u, surface_position(f, at), surface_normal(f, at), sample_place(f, vec2(pixel)));
-    ivec2 reach = radius * ivec2(p.sides & STEP_HORIZONTAL, (p.sides & STEP_VERTICAL) >> 1);
-    // taps within the image
-    ivec2 lower = max(-reach, -(pixel / stride)), upper = min(reach, (ivec2(f.size) - 1 - pixel) / stride);
+// A pixel, and what its box adds up to.
+struct Filtered {
+    ivec2 lower, upper;   // taps within its box and the image; lower.x > upper.x: none, or no more
+    EdgeTest edge;
     VALUE sum, squares, variances;
-    float n, count, noise;
     vec3 bent;
-    for (int attempt = 0; attempt < 2; attempt++) {
-        sum = squares = variances = VALUE(0.0);
-        n = count = noise = 0.0;
-        bent = vec3(0.0);
-        for (int y = lower.y; y <= upper.y; y++) {
-            for (int x = lower.x; x <= upper.x; x++) {
-                ivec2 offset = stride * ivec2(x, y);
-                uint tap = uint(int(at) + offset.y * int(width) + offset.x);
-                if (!is_neighbour(edge, vec2(offset), own_guide, LOAD_PAIR(guides, tap))) continue;
-                ESTIMATE e = load_estimate(estimates, tap);
-                sum += e.mean * e.samples;
-                squares += e.mean * e.mean * e.samples;
-                variances += e.variance * e.samples;
-                if (BENT_NORMALS) bent += load_bent(p, tap) * e.samples;
-                n += e.samples;
-                count += e.samples > 0.0 ? 1.0 : 0.0;
-                // its samples times the variance of their mean
-                noise += e.samples > 0.0 ? mean_variance(p, e.samples) : 0.0;
-            }
-        }
-        if (n >= LONELY) break;
-        // geometry as fine as pixels: neighbours that are nearly so, rather than next to nothing
-        edge.cosine = LONELY_COSINE;
-        edge.tolerance *= LONELY_TOLERANCE;
-    }
-    if (n == 0.0) {
+    float n, count, noise;
+};
+
+bool is_active(Filtered e) { return e.lower.x <= e.upper.x; }
+
+void stop(inout Filtered e) {
+    e.lower = ivec2(1);
+    e.upper = ivec2(0);
+}
+
+// The result of a pixel from what its box adds up to.
+void finish_box(FilterParams p, FrameParams f, uvec2 estimates, uint at, ESTIMATE own, Filtered e) {
+    vec3 own_bent = BENT_NORMALS ? load_bent(p, at) : vec3(0.0);
+    if (e.n == 0.0) {
+        ivec2 pixel = ivec2(at % f.size.x, at / f.size.x);
         finish(p, f, at, guess(p, f, estimates, pixel, own), own_bent);
         return;
     }
-    VALUE mean = sum / n;
-    VALUE spread = max(squares / n - mean * mean, VALUE(0.0));
+    VALUE mean = e.sum / e.n;
+    VALUE spread = max(e.squares / e.n - mean * mean, VALUE(0.0));
     // about their own pixels' means, so that each pixel has one less to tell
-    VALUE variance = (variances + prior_variance(mean, spread, n / max(count, 1.0)) * PRIOR_SAMPLES) / (max(n - count, 0.0) + PRIOR_SAMPLES);
+    VALUE variance = (e.variances + prior_variance(mean, spread, e.n / max(e.count, 1.0)) * PRIOR_SAMPLES) / (max(e.n - e.count, 0.0) + PRIOR_SAMPLES);
     float keep = 0.0;
     if (own.samples > 0.0) {
         float own_noise = total(variance) * mean_variance(p, own.samples) / own.samples;
         // of the pixel about the box: detail, which is what noise does not explain of the spread, and its own noise
-        float unlike = total(spread) * count / max(count - 1.0, 1.0) - total(variance) * noise / n + own_noise;
+        float unlike = total(spread) * e.count / max(e.count - 1.0, 1.0) - total(variance) * e.noise / e.n + own_noise;
         // with 3 of `count` pixels taken off, the sum of squared errors of what is kept is never above that of the pixels as they are;
         // so it is for histories that are as long as they get. For short ones it is too careful, and 1 does better.
         float careful = 1.0 + 2.0 * min(own.samples / f.most_samples, 1.0);
-        keep = unlike > 0.0 ? clamp(1.0 - max(count - careful, 0.0) / count * own_noise / unlike, 0.0, 1.0) : 0.0;
+        keep = unlike > 0.0 ? clamp(1.0 - max(e.count - careful, 0.0) / e.count * own_noise / unlike, 0.0, 1.0) : 0.0;
     }
-    finish(p, f, at, estimate_of(own, mix(mean, own.mean, keep), mix(n, own.samples, keep), variance), mix(bent / n, own_bent, keep));
+    finish(p, f, at, estimate_of(own, mix(mean, own.mean, keep), mix(e.n, own.samples, keep), variance), mix(e.bent / e.n, own_bent, keep));
+}
+
+// Each thread filters FILTER_STRIP pixels that follow one another, whose boxes overlap: a tap is loaded once for all of them. On a CPU driver loads are most of the time.
+void main() {
+    uint first = first_pixel();
+    if (first >= push.count) return;
+    FilterParams p = FilterParams(push.pass);
+    FrameParams f = FrameParams(p.frame);
+    uvec2 guides = f.guide, estimates = p.from;
+    int width = int(f.size.x), stride = int(p.stride), pixels = width * int(f.size.y);
+    Filtered strip[FILTER_STRIP];
+    uvec2 own_guides[FILTER_STRIP];
+    [[unroll]] for (int k = 0; k < FILTER_STRIP; k++) {
+        uint at = first + uint(k);
+        stop(strip[k]);
+        if (at >= push.count) continue;
+        own_guides[k] = LOAD_PAIR(guides, at);
+        if (!is_surface(own_guides[k])) {
+            finish_nothing(p, f, at);
+            continue;
+        }
+        ESTIMATE own = load_estimate(estimates, at);
+        // a step with strides has a fixed radius; it is skipped where there are enough samples
+        int radius = limited(stride > 1 ? (own.samples < p.samples ? int(p.radius) : 0) : box_radius(p, own.samples), p, own);
+        if (radius == 0) {
+            finish(p, f, at, own, BENT_NORMALS ? load_bent(p, at) : vec3(0.0));
+            continue;
+        }
+        ivec2 pixel = ivec2(int(at) % width, int(at) / width);
+        strip[k].edge = edge_test(f, f.world_to_camera, f.view, f.orthographic != 0u, surface_position(f, at), surface_normal(f, at), sample_place(f, vec2(pixel)));
+        ivec2 reach = radius * ivec2(p.sides & STEP_HORIZONTAL, (p.sides & STEP_VERTICAL) >> 1);
+        strip[k].lower = max(-reach, -(pixel / stride));
+        strip[k].upper = min(reach, (ivec2(f.size) - 1 - pixel) / stride);
+    }
+    for (int attempt = 0; attempt < 2; attempt++) {
+        // taps of all, x in pixels from the first one, y in strides
+        ivec2 lower = ivec2(1 << 20), upper = ivec2(-(1 << 20));
+        [[unroll]] for (int k = 0; k < FILTER_STRIP; k++) {
+            if (!is_active(strip[k])) continue;
+            lower = min(lower, ivec2(stride * strip[k].lower.x + k, strip[k].lower.y));
+            upper = max(upper, ivec2(stride * strip[k].upper.x + k, strip[k].upper.y));
+            strip[k].sum = strip[k].squares = strip[k].variances = VALUE(0.0);
+            strip[k].n = strip[k].count = strip[k].noise = 0.0;
+            strip[k].bent = vec3(0.0);
+        }
+        for (int y = lower.y; y <= upper.y; y++) {
+            for (int x = lower.x; x <= upper.x; x++) {
+                // where a strip goes on in the next row, boxes of its pixels together may leave the image
+                int tap = int(first) + y * stride * width + x;
+                if (tap < 0 || tap >= pixels) continue;
+                uvec2 guide = LOAD_PAIR(guides, uint(tap));
+                ESTIMATE e = load_estimate(estimates, uint(tap));
+                vec3 normal = guide_normal(guide), bent = BENT_NORMALS ? load_bent(p, uint(tap)) * e.samples : vec3(0.0);
+                VALUE sum = e.mean * e.samples, squares = e.mean * e.mean * e.samples, variances = e.variance * e.samples;
+                float count = e.samples > 0.0 ? 1.0 : 0.0;
+                // its samples times the variance of their mean
+                float noise = e.samples > 0.0 ? mean_variance(p, e.samples) : 0.0;
+                [[unroll]] for (int k = 0; k < FILTER_STRIP; k++) {
+                    int dx = x - k;
+                    bool is_inside = dx >= stride * strip[k].lower.x && dx <= stride * strip[k].upper.x && (dx & stride - 1) == 0 && y >= strip[k].lower.y && y <= strip[k].upper.y;
+                    if (!is_inside || !is_neighbour(strip[k].edge, vec2(dx, y * stride), own_guides[k], guide, normal)) continue;
+                    strip[k].sum += sum;
+                    strip[k].squares += squares;
+                    strip[k].variances += variances;
+                    if (BENT_NORMALS) strip[k].bent += bent;
+                    strip[k].n += e.samples;
+                    strip[k].count += count;
+                    strip[k].noise += noise;
+                }
+            }
+        }
+        bool is_done = true;
+        [[unroll]] for (int k = 0; k < FILTER_STRIP; k++) {
+            if (!is_active(strip[k])) continue;
+            if (attempt > 0 || strip[k].n >= LONELY) {
+                uint at = first + uint(k);
+                finish_box(p, f, estimates, at, load_estimate(estimates, at), strip[k]);
+                stop(strip[k]);
+                continue;
+            }
+            // geometry as fine as pixels: neighbours that are nearly so, rather than next to nothing
+            strip[k].edge.cosine = LONELY_COSINE;
+            strip[k].edge.tolerance *= LONELY_TOLERANCE;
+            is_done = false;
+        }
+        if (is_done) break;
+    }
 }
 
 #endif

@@ -130,9 +130,14 @@ bool on_plane(EdgeTest e, vec2 offset, uvec2 guide) {
     return abs(off) <= e.tolerance;
 }
 
-bool same_surface(EdgeTest e, vec2 offset, uvec2 guide) {
-    return on_plane(e, offset, guide) && dot(e.normal, unpackSnorm4x8(guide.y).xyz) >= e.cosine;
+// The normal in a guide, to be computed once for many tests.
+vec3 guide_normal(uvec2 guide) { return unpackSnorm4x8(guide.y).xyz; }
+
+bool same_surface(EdgeTest e, vec2 offset, uvec2 guide, vec3 normal) {
+    return on_plane(e, offset, guide) && dot(e.normal, normal) >= e.cosine;
 }
+
+bool same_surface(EdgeTest e, vec2 offset, uvec2 guide) { return same_surface(e, offset, guide, guide_normal(guide)); }
 
 // A mean over samples: their number, and the variance of one.
 struct Estimate {

@@ -13,14 +13,13 @@ struct RadianceEstimate {
 const RadianceEstimate NO_RADIANCE = RadianceEstimate(vec3(0.0), 0.0, vec3(0.0), 0.0);
 
 RadianceEstimate load_radiance(uvec2 image, uint at) {
-    vec4 a = uintBitsToFloat(Quads(image).v[2u * at]), b = uintBitsToFloat(Quads(image).v[2u * at + 1u]);
+    vec4 a = load_quad(image, 2u * at), b = load_quad(image, 2u * at + 1u);
     return RadianceEstimate(a.xyz, a.w, b.xyz, b.w);
 }
 
 void store_radiance(uvec2 image, uint at, RadianceEstimate e) {
-    QuadImage to = QuadImage(image);
-    to.v[2u * at] = floatBitsToUint(vec4(e.mean, e.samples));
-    to.v[2u * at + 1u] = floatBitsToUint(vec4(e.variance, e.narrowed));
+    store_quad(image, 2u * at, vec4(e.mean, e.samples));
+    store_quad(image, 2u * at + 1u, vec4(e.variance, e.narrowed));
 }
 
 // Also false for NaN.

@@ -15,14 +15,13 @@ struct Rest {
 const Rest NO_REST = Rest(vec3(0.0), 0.0, 0.0, 0.0, 0.0);
 
 Rest load_rest(uvec2 image, uint at) {
-    vec4 a = uintBitsToFloat(Quads(image).v[2u * at]), b = uintBitsToFloat(Quads(image).v[2u * at + 1u]);
+    vec4 a = load_quad(image, 2u * at), b = load_quad(image, 2u * at + 1u);
     return Rest(a.xyz, a.w, b.x, b.y, b.z);
 }
 
 void store_rest(uvec2 image, uint at, Rest r) {
-    QuadImage to = QuadImage(image);
-    to.v[2u * at] = floatBitsToUint(vec4(r.mean, r.samples));
-    to.v[2u * at + 1u] = floatBitsToUint(vec4(r.variance, r.frames, r.coverage, 0.0));
+    store_quad(image, 2u * at, vec4(r.mean, r.samples));
+    store_quad(image, 2u * at + 1u, vec4(r.variance, r.frames, r.coverage, 0.0));
 }
 
 // Adds samples of a frame with this mean and coverage.

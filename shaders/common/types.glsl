@@ -25,6 +25,13 @@ layout(buffer_reference, std430, buffer_reference_align = 8) readonly buffer Wor
 #define LOAD_PAIR(base, i) Pairs(base).v[i]
 #endif
 
+// Four words at once.
+#ifdef LOAD64
+#define LOAD_QUAD(base, i) uvec4(LOAD_PAIR(base, 2u * (i)), LOAD_PAIR(base, 2u * (i) + 1u))
+#else
+#define LOAD_QUAD(base, i) Quads(base).v[i]
+#endif
+
 bool is_null(uvec2 address) { return (address.x | address.y) == 0u; }
 
 vec3 load_vec3(uvec2 base, uint index) {
@@ -45,6 +52,13 @@ layout(buffer_reference, std430, buffer_reference_align = 8) writeonly buffer St
 #define STORE_PAIR(base, i, pair) StoredPairs(base).v[i] = (pair)
 #endif
 
+void store_quad(uvec2 base, uint k, vec4 q) {
+    STORE_PAIR(base, 2u * k, floatBitsToUint(q.xy));
+    STORE_PAIR(base, 2u * k + 1u, floatBitsToUint(q.zw));
+}
+
+vec4 load_quad(uvec2 base, uint k) { return uintBitsToFloat(LOAD_QUAD(base, k)); }
+
 // A ray in memory is 32 bytes: origin, tmin, direction, tmax.
 void store_ray(uvec2 rays, uint k, Ray r) {
     STORE_PAIR(rays, 4u * k, floatBitsToUint(r.origin.xy));
@@ -54,7 +68,7 @@ void store_ray(uvec2 rays, uint k, Ray r) {
 }
 
 Ray load_ray(uvec2 rays, uint k) {
-    vec4 a = uintBitsToFloat(Quads(rays).v[2u * k]), b = uintBitsToFloat(Quads(rays).v[2u * k + 1u]);
+    vec4 a = load_quad(rays, 2u * k), b = load_quad(rays, 2u * k + 1u);
     return Ray(a.xyz, a.w, b.xyz, b.w);
 }
 

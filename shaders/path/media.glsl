@@ -64,7 +64,7 @@ Boundary boundary_at(uint material, bool front, uint here, MediaStack stack) {
     return b;
 }
 
-MediaStack load_media(PathParams p, uint k) { return Quads(p.media).v[k]; }
+MediaStack load_media(PathParams p, uint k) { return LOAD_QUAD(p.media, k); }
 
 void store_media(PathParams p, uint k, MediaStack stack) { store_quad(p.media, k, uintBitsToFloat(stack)); }
 

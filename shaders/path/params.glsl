@@ -20,7 +20,7 @@ struct PathState {
 
 // What a bounce reads and writes lies in the order of its queue, one vector of paths after the other: fetched ahead, where by path each would be a wait.
 PathState load_state(uvec2 states, uint k) {
-    uvec4 a = Quads(states).v[2u * k], b = Quads(states).v[2u * k + 1u];
+    uvec4 a = LOAD_QUAD(states, 2u * k), b = LOAD_QUAD(states, 2u * k + 1u);
     return PathState(uintBitsToFloat(a.xyz), uintBitsToFloat(a.w), b.x, b.y & 0xffffu, b.y >> 16, uintBitsToFloat(b.z), b.w);
 }
 
@@ -32,15 +32,6 @@ void store_state(uvec2 states, uint k, PathState s) {
 }
 
 layout(buffer_reference, std430, buffer_reference_align = 4) writeonly buffer StoredFloats { float v[]; };
-
-vec4 load_quad(uvec2 base, uint k) {
-    return uintBitsToFloat(Quads(base).v[k]);
-}
-
-void store_quad(uvec2 base, uint k, vec4 q) {
-    STORE_PAIR(base, 2u * k, floatBitsToUint(q.xy));
-    STORE_PAIR(base, 2u * k + 1u, floatBitsToUint(q.zw));
-}
 
 // Ambient visibility of a path's first surface, if that darkens all of its light; `radiance` counts in its fourth number the camera ray's hit, and the occlusion ray that met
 // nothing.

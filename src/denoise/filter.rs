@@ -19,7 +19,7 @@ use crate::film::pace::Pace;
 use crate::gpu::{Buffer, Commands, Memory};
 use crate::interface::records::denoise::RadianceRecord;
 use crate::interface::records::frame::SurfaceRecord;
-use crate::interface::records::passes::FilterParams;
+use crate::interface::records::passes::{FILTER_STRIP, FilterParams};
 use crate::realtime::params::FrameParams;
 use crate::realtime::settings::FilterStep;
 use crate::realtime::{DEPTH_TOLERANCE, Filter, FilterKind, inverse};
@@ -197,7 +197,8 @@ fn run(
             let n = pace.rays().min(pixels - first);
             let push = Push { pass: step.address(), first, count: first + n, ..Default::default() };
             let start = Instant::now();
-            let timings = commands.run(|r| r.timed("denoise", |r| r.dispatch(&pipeline, &push, n.div_ceil(LANES))))?;
+            let timings =
+                commands.run(|r| r.timed("denoise", |r| r.dispatch(&pipeline, &push, n.div_ceil(FILTER_STRIP * LANES))))?;
             if n == pace.rays() {
                 pace.learn(n, &timings, start.elapsed().as_secs_f64(), 1);
             }

@@ -415,8 +415,21 @@ impl<T: bytemuck::NoUninit> Params<T> {
 
     /// Records a compute pipeline with one invocation per element of `range`.
     pub fn dispatch(&self, r: &mut Recorder, label: &'static str, pipeline: &ComputePipeline, frame: &Frame, range: Range) {
+        self.dispatch_strips(r, label, pipeline, frame, range, 1);
+    }
+
+    /// Records a compute pipeline each invocation of which takes `strip` elements of `range`.
+    pub fn dispatch_strips(
+        &self,
+        r: &mut Recorder,
+        label: &'static str,
+        pipeline: &ComputePipeline,
+        frame: &Frame,
+        range: Range,
+        strip: u32,
+    ) {
         let push = self.push(frame, range);
-        r.timed(label, |r| r.dispatch(pipeline, &push, range.count.div_ceil(LANES)));
+        r.timed(label, |r| r.dispatch(pipeline, &push, range.count.div_ceil(strip * LANES)));
     }
 }
 

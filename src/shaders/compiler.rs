@@ -28,8 +28,13 @@ struct Cache {
 const MAX_ENTRIES: usize = 1500;
 
 /// Optimization takes three quarters of the compile time. Live shaders are not optimized here, for short edit cycles: the driver optimizes, too.
-const OPTIMIZATION: OptimizationLevel =
-    if cfg!(feature = "live-shaders") { OptimizationLevel::Zero } else { OptimizationLevel::Performance };
+fn optimization(source: &Source) -> OptimizationLevel {
+    if cfg!(feature = "live-shaders") || !source.is_optimized() {
+        OptimizationLevel::Zero
+    } else {
+        OptimizationLevel::Performance
+    }
+}
 
 /// Compiles the shaders of one folder.
 pub struct Compiler {
@@ -72,7 +77,7 @@ impl Compiler {
     pub fn compile(&self, source: &Source) -> Result<Compiled, String> {
         let text = source.text(&self.shaders)?;
         // `None` if an included file cannot be read: the compiler reports the error
-        let (key, included) = self.key(&text, source.stage()).unzip();
+        let (key, included) = self.key(&text, source).unzip();
         let path = self.cache.as_ref().zip(key).map(|(cache, key)| cache.path(&key));
         if let (Some(path), Some(included)) = (&path, included)
             && let Ok(spirv) = std::fs::read(path)
@@ -87,13 +92,13 @@ impl Compiler {
         Ok(compiled)
     }
 
-    /// A key of a text with all its includes and of the kind of shader; and the included files.
-    fn key(&self, text: &str, stage: Stage) -> Option<(String, BTreeSet<PathBuf>)> {
+    /// A key of a text with all its includes, of the kind of shader and how it is compiled; and the included files.
+    fn key(&self, text: &str, source: &Source) -> Option<(String, BTreeSet<PathBuf>)> {
         // two hashes of 64 bits
         let mut hashes = [DefaultHasher::new(), DefaultHasher::new()];
         hashes[1].write_u8(1);
         let mut add = |text: &str| hashes.iter_mut().for_each(|h| text.hash(h));
-        add(&format!("{stage:?} {OPTIMIZATION:?}"));
+        add(&format!("{:?} {:?}", source.stage(), optimization(source)));
         let (mut names, mut paths, mut texts) = (BTreeSet::new(), BTreeSet::new(), vec![text.to_owned()]);
         while let Some(text) = texts.pop() {
             add(&text);
@@ -116,7 +121,7 @@ impl Compiler {
         let mut options = CompileOptions::new().map_err(|e| format!("cannot start shaderc: {e}"))?;
         options.set_target_env(TargetEnv::Vulkan, EnvVersion::Vulkan1_3 as u32);
         options.set_target_spirv(SpirvVersion::V1_5);
-        options.set_optimization_level(OPTIMIZATION);
+        options.set_optimization_level(optimization(source));
         options.set_warnings_as_errors();
         options.set_include_callback(|requested, _: IncludeType, from, _| {
             let (content, path) = self.read(requested)?;

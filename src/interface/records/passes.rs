@@ -1,7 +1,10 @@
 //! Parameters of the passes of a real-time frame, one record per pass. Each holds the address of the `FrameParams` that all share.
 
 records! {
-    "passes";
+    "passes" values {
+        /// Pixels of a thread of the filters `filter` and `denoise`.
+        FILTER_STRIP: uint = 4;
+    };
 
     /// Parameters of `ao_trace`, and of `gather`, which averages its results.
     AoTraceParams: block readonly 8 {

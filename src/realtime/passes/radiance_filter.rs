@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use crate::error::Result;
 use crate::gpu::{ComputePipeline, Recorder};
-use crate::interface::records::passes::FilterParams;
+use crate::interface::records::passes::{FILTER_STRIP, FilterParams};
 use crate::realtime::display::Display;
 use crate::realtime::graph::{Frame, Params, Pass, Range, ResourceUse, Stage};
 use crate::realtime::resources::{Resource, Resources};
@@ -56,7 +56,7 @@ impl Pass for RadianceFilter {
     }
 
     fn record(&self, r: &mut Recorder, frame: &Frame, _: &Resources, range: Range) -> Result<()> {
-        self.params.dispatch(r, "filter", &self.pipeline, frame, range);
+        self.params.dispatch_strips(r, "filter", &self.pipeline, frame, range, FILTER_STRIP);
         Ok(())
     }
 }
