@@ -79,9 +79,14 @@ impl Error {
         }
     }
 
-    /// An input file that is wrong in the way `message` says.
+    /// An input file that is wrong in the way `message` says. Control characters, which names in a file may have, become spaces: the error is one line, and tells a terminal
+    /// nothing.
     pub fn input(path: impl AsRef<Path>, message: impl Into<String>) -> Self {
-        Error::Input { path: path.as_ref().to_owned(), message: message.into() }
+        let mut message = message.into();
+        if message.contains(char::is_control) {
+            message = message.replace(char::is_control, " ");
+        }
+        Error::Input { path: path.as_ref().to_owned(), message }
     }
 
     /// A file that could not be read, with the system's reason in plain words.

@@ -1,7 +1,9 @@
 //! Atomic file output, and the cache folder.
 //!
-//! A file is written next to its target and renamed, so that an interrupted run leaves no incomplete file.
+//! A file is written without a name in the folder of its target, where the system has such files (Linux: `O_TMPFILE`), and gets its name once it is complete: whatever ends
+//! the process, no incomplete file and no temporary file stays. Elsewhere it is written under a name of its own next to its target, and renamed.
 
+use std::borrow::Cow;
 use std::fs::{self, File, OpenOptions, Permissions};
 use std::io::{self, Seek};
 use std::path::{Path, PathBuf};
@@ -36,15 +38,105 @@ fn target(path: &Path) -> io::Result<Target> {
     }
 }
 
-/// Creates an empty temporary file in the folder of `path`, removed on drop unless it is renamed.
-fn temporary_beside(path: &Path) -> io::Result<tempfile::NamedTempFile> {
-    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+/// The folder of a file.
+fn folder_of(path: &Path) -> &Path {
+    path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
+/// Names of temporary files.
+fn temporary_name() -> tempfile::Builder<'static, 'static> {
     let mut builder = tempfile::Builder::new();
     builder.prefix(".skylit-").suffix(".tmp");
     // subject to the umask: the mode of any newly created file
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    builder.tempfile_in(folder).map_err(|e| match e.kind() {
+    builder
+}
+
+/// A file that is not yet at its place.
+#[derive(Debug)]
+enum Temporary {
+    /// It has no name, and is gone when it is closed.
+    #[cfg(target_os = "linux")]
+    Unnamed(File),
+    /// It has one, and is removed on drop.
+    Named(tempfile::NamedTempFile),
+}
+
+impl Temporary {
+    /// Creates an empty file in the folder of `path`.
+    fn beside(path: &Path) -> io::Result<Self> {
+        #[cfg(target_os = "linux")]
+        {
+            use std::os::unix::fs::OpenOptionsExt;
+            let unnamed = i32::try_from(rustix::fs::OFlags::TMPFILE.bits()).unwrap_or_default();
+            let opened = OpenOptions::new().read(true).write(true).custom_flags(unnamed).mode(0o666).open(folder_of(path));
+            // whatever keeps it from being created, a file with a name fails for the same reason, or the file system has only those
+            if let Ok(file) = opened {
+                return Ok(Self::Unnamed(file));
+            }
+        }
+        named_beside(path).map(Self::Named)
+    }
+
+    fn file(&self) -> &File {
+        match self {
+            #[cfg(target_os = "linux")]
+            Self::Unnamed(file) => file,
+            Self::Named(file) => file.as_file(),
+        }
+    }
+
+    fn file_mut(&mut self) -> &mut File {
+        match self {
+            #[cfg(target_os = "linux")]
+            Self::Unnamed(file) => file,
+            Self::Named(file) => file.as_file_mut(),
+        }
+    }
+
+    /// Puts it in the place of `path`, which lies in the folder that it was created for.
+    fn persist(self, path: &Path) -> io::Result<()> {
+        match self {
+            #[cfg(target_os = "linux")]
+            Self::Unnamed(mut file) => match link(&file, path) {
+                Ok(()) => Ok(()),
+                // without /proc a file gets no name later
+                Err(_) => {
+                    let mut named = named_beside(path)?;
+                    file.rewind()?;
+                    io::copy(&mut file, named.as_file_mut())?;
+                    named.as_file().set_permissions(file.metadata()?.permissions())?;
+                    Self::Named(named).persist(path)
+                }
+            },
+            Self::Named(file) => file.persist(path).map(drop).map_err(|e| e.error),
+        }
+    }
+}
+
+/// Gives a file without a name the name `path`, in place of a file that has it.
+#[cfg(target_os = "linux")]
+fn link(file: &File, path: &Path) -> io::Result<()> {
+    use std::os::fd::AsRawFd;
+    let source = format!("/proc/self/fd/{}", file.as_raw_fd());
+    let link = |name: &Path| {
+        rustix::fs::linkat(rustix::fs::CWD, &source, rustix::fs::CWD, name, rustix::fs::AtFlags::SYMLINK_FOLLOW)
+            .map_err(io::Error::from)
+    };
+    match link(path) {
+        // a link replaces nothing: under a name of its own first, then renamed
+        Err(e) if e.kind() == io::ErrorKind::AlreadyExists => {
+            let named = temporary_name().make_in(folder_of(path), link)?;
+            named.into_temp_path().persist(path).map_err(|e| e.error)
+        }
+        done => done,
+    }
+}
+
+/// Creates an empty temporary file in the folder of `path`, removed on drop unless it is renamed.
+fn named_beside(path: &Path) -> io::Result<tempfile::NamedTempFile> {
+    temporary_name().tempfile_in(folder_of(path)).map_err(|e| match e.kind() {
         // the folder is a file
         io::ErrorKind::NotADirectory => io::ErrorKind::NotFound.into(),
         kind => kind.into(), // without the name of the temporary file, which says nothing to the user
@@ -55,7 +147,7 @@ fn temporary_beside(path: &Path) -> io::Result<tempfile::NamedTempFile> {
 /// file must be writable (or a device). Leaves no files behind.
 pub fn check_writable(path: &Path) -> Result<()> {
     let check = || match target(path)? {
-        Target::File { path, .. } => temporary_beside(&path).map(drop),
+        Target::File { path, .. } => Temporary::beside(&path).map(drop),
         Target::Stream => Ok(()),
     };
     check().map_err(|e| Error::write(path, &e))
@@ -73,7 +165,7 @@ pub struct AtomicFile {
 
 #[derive(Debug)]
 enum Destination {
-    Beside { file: tempfile::NamedTempFile, path: PathBuf, permissions: Option<Permissions> },
+    Beside { file: Temporary, path: PathBuf, permissions: Option<Permissions> },
     Stream(File),
 }
 
@@ -81,7 +173,9 @@ impl AtomicFile {
     /// Creates an empty file that will become `path`.
     pub fn create(path: &Path) -> Result<Self> {
         let destination = || match target(path)? {
-            Target::File { path, permissions } => Ok(Destination::Beside { file: temporary_beside(&path)?, path, permissions }),
+            Target::File { path, permissions } => {
+                Ok(Destination::Beside { file: Temporary::beside(&path)?, path, permissions })
+            }
             Target::Stream => Ok(Destination::Stream(tempfile::tempfile()?)),
         };
         let destination = destination().map_err(|e| Error::write(path, &e))?;
@@ -91,7 +185,7 @@ impl AtomicFile {
     /// The temporary file to write to.
     pub fn file(&mut self) -> &mut File {
         match &mut self.destination {
-            Destination::Beside { file, .. } => file.as_file_mut(),
+            Destination::Beside { file, .. } => file.file_mut(),
             Destination::Stream(file) => file,
         }
     }
@@ -107,9 +201,9 @@ impl AtomicFile {
         let run = || match destination {
             Destination::Beside { file, path, permissions } => {
                 if let Some(permissions) = permissions {
-                    file.as_file().set_permissions(permissions)?;
+                    file.file().set_permissions(permissions)?;
                 }
-                file.persist(&path).map(drop).map_err(|e| e.error)
+                file.persist(&path)
             }
             Destination::Stream(mut file) => {
                 file.rewind()?;
@@ -130,6 +224,19 @@ pub fn write_atomically(path: &Path, write: impl FnOnce(&mut File) -> io::Result
     let mut file = AtomicFile::create(path)?;
     write(file.file()).map_err(|e| file.failed(&e))?;
     file.commit()
+}
+
+/// Names of files for records in JSON, which is Unicode: bytes of a name that are none are replaced (U+FFFD).
+pub fn lossy(paths: &[PathBuf]) -> Vec<Cow<'_, str>> {
+    paths.iter().map(|path| path.to_string_lossy()).collect()
+}
+
+/// Serializes a path as [`lossy`] shows it.
+///
+/// # Errors
+/// Those of the serializer.
+pub fn serialize_lossy<S: serde::Serializer>(path: &Path, serializer: S) -> std::result::Result<S::Ok, S::Error> {
+    serializer.serialize_str(&path.to_string_lossy())
 }
 
 /// The name of a file as metadata of images have it, which may leave this machine: relative to the working directory if it is below it, else without its folders if it is an

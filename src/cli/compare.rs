@@ -215,8 +215,8 @@ pub fn run(args: &CompareArgs, start: Instant) -> Result<(), Failure> {
         console.line(&format!("report: {}", report::address(index)))?;
     }
     let mut record = set.record();
-    record["pictures"] = json!(pictures);
-    record["report"] = json!(index);
+    record["pictures"] = json!(files::lossy(&pictures));
+    record["report"] = json!(index.as_ref().map(|path| path.to_string_lossy()));
     record["warnings"] = json!(warnings.list);
     console.close(&record, Ok(()))
 }

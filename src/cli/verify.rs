@@ -140,8 +140,8 @@ fn run_with(args: &VerifyArgs, options: &Options) -> Result<(), Failure> {
     }
     let verdict = summary.verdict();
     let mut record = json!(summary);
-    record["folder"] = json!(args.folder);
-    record["report"] = json!(report);
+    record["folder"] = json!(args.folder.to_string_lossy());
+    record["report"] = json!(report.as_ref().map(|path| path.to_string_lossy()));
     console.close(&record, verdict)
 }
 

@@ -81,7 +81,6 @@ impl Buffer {
             Memory::Readback => MemoryLocation::GpuToCpu,
         };
         let allocation = device
-            .allocator()
             .allocate(&AllocationCreateDesc {
                 name,
                 requirements,

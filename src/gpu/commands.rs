@@ -81,6 +81,7 @@ impl Commands {
             raw.end_command_buffer(self.buffer).context("recording commands")?;
             let buffers = [self.buffer];
             let submit = [vk::SubmitInfo::default().command_buffers(&buffers)];
+            super::faults::submission(&self.device.is_lost).context("submitting work")?;
             let mut queue = Some(self.device.queue.lock().unwrap_or_else(|e| e.into_inner()));
             if let Some(queue) = &queue {
                 raw.queue_submit(**queue, &submit, self.fence).context("submitting work")?;

@@ -1,11 +1,12 @@
 //! The logical device: one queue, one allocator, one pipeline cache.
 
 use std::mem::ManuallyDrop;
+use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex, MutexGuard};
 
 use ash::{ext, khr, vk};
-use gpu_allocator::AllocationSizes;
-use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
+use gpu_allocator::vulkan::{Allocation, AllocationCreateDesc, Allocator, AllocatorCreateDesc};
+use gpu_allocator::{AllocationError, AllocationSizes};
 
 use super::cache;
 use super::info::{DeviceInfo, enumerate};
@@ -39,6 +40,8 @@ pub struct Device {
     allocator: ManuallyDrop<Mutex<Allocator>>,
     pub(super) queue: Mutex<vk::Queue>,
     pub(super) queue_family: u32,
+    /// A fault that a test asked for has lost it.
+    pub(super) is_lost: AtomicBool,
     pub(super) pipeline_cache: vk::PipelineCache,
     pub(super) live: LivePipelines,
     /// Properties of the device. `int64` is false with [`Options::no_int64`], even if supported.
@@ -117,6 +120,7 @@ impl Device {
             allocator: ManuallyDrop::new(Mutex::new(allocator)),
             queue: Mutex::new(queue),
             queue_family,
+            is_lost: AtomicBool::new(false),
             pipeline_cache,
             live: LivePipelines::new(options.keep_pipelines),
             info,
@@ -129,6 +133,16 @@ impl Device {
     pub(super) fn allocator(&self) -> MutexGuard<'_, Allocator> {
         // a poisoned lock means that a thread panicked within the allocator; there is nothing better to do than go on
         self.allocator.lock().unwrap_or_else(|e| e.into_inner())
+    }
+
+    /// Allocates memory.
+    pub(super) fn allocate(&self, request: &AllocationCreateDesc) -> Result<Allocation, AllocationError> {
+        let mut allocator = self.allocator();
+        let used = || allocator.generate_report().total_allocated_bytes;
+        if super::faults::is_out_of_memory(used, request.requirements.size) {
+            return Err(AllocationError::OutOfMemory);
+        }
+        allocator.allocate(request)
     }
 
     /// Names an object for validation messages and debuggers.

@@ -14,6 +14,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 const WIDTH: &str = "LP_NATIVE_VECTOR_WIDTH";
 const CACHE: &str = "MESA_SHADER_CACHE_DIR";
+const NO_CACHE: &str = "MESA_SHADER_CACHE_DISABLE";
 
 /// Preferred vector width in bits; 0 for the CPU's widest.
 static PREFERRED: AtomicU32 = AtomicU32::new(0);
@@ -36,10 +37,16 @@ pub(super) fn prepare() {
             return;
         }
         let changes = changes(std::env::var_os(WIDTH), std::env::var_os(CACHE), preferred_bits(), crate::files::cache_folder());
-        for (name, value) in changes {
+        for (mut name, mut value) in changes {
             if name == CACHE {
-                // older versions of Mesa create only the last folder of the path; a failure only disables the cache
-                let _ = std::fs::create_dir_all(&value);
+                // older versions of Mesa create only the last folder of the path
+                let folder = PathBuf::from(&value);
+                let is_writable =
+                    std::fs::create_dir_all(&folder).is_ok() && crate::files::check_writable(&folder.join("any")).is_ok();
+                if !is_writable {
+                    // Mesa would print a line and do the same
+                    (name, value) = (NO_CACHE, "true".into());
+                }
             }
             // SAFETY: std's lock excludes other Rust code, no driver that could read the environment is loaded yet, and `prepare` documents what programs with
             // C threads must do

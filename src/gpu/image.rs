@@ -51,7 +51,6 @@ impl Image {
         let requirements = unsafe { device.raw.get_image_memory_requirements(raw) };
         let mib = requirements.size.div_ceil(1 << 20);
         let allocation = device
-            .allocator()
             .allocate(&AllocationCreateDesc {
                 name,
                 requirements,

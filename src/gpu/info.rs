@@ -4,10 +4,11 @@ use std::ffi::CStr;
 
 use ash::{khr, vk};
 
+use super::faults;
 use super::image::{DEPTH, IDS};
 use super::instance::Instance;
 use super::result::Context;
-use crate::error::Result;
+use crate::error::{Error, Result};
 
 /// The device limits that skylit depends on.
 #[derive(Clone, Debug, serde::Serialize)]
@@ -172,7 +173,13 @@ fn is_target(raw: &ash::Instance, physical: vk::PhysicalDevice, format: vk::Form
 /// All devices of the machine, usable or not.
 pub fn enumerate(instance: &Instance) -> Result<Vec<DeviceInfo>> {
     // SAFETY: the instance lives
-    let devices = unsafe { instance.raw.enumerate_physical_devices() }.context("listing Vulkan devices")?;
+    let devices = unsafe { instance.raw.enumerate_physical_devices() }.map_err(|e| match e {
+        // what the loader says where no driver's library could be loaded
+        vk::Result::ERROR_INITIALIZATION_FAILED => Error::Device(
+            "no Vulkan driver of this machine could be started: too little memory for it, or a broken installation (VK_LOADER_DEBUG=error tells why)".into(),
+        ),
+        e => super::result::explain("listing Vulkan devices", e),
+    })?;
     devices.into_iter().enumerate().map(|(index, d)| describe(instance, index, d)).collect()
 }
 
@@ -180,7 +187,9 @@ fn describe(instance: &Instance, index: usize, physical: vk::PhysicalDevice) -> 
     let raw = &instance.raw;
     // SAFETY (all queries below): the physical device belongs to the living instance
     let extensions = unsafe { raw.enumerate_device_extension_properties(physical) }.context("listing device extensions")?;
-    let has = |name: &CStr| extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(name));
+    let has = |name: &CStr| {
+        extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(name)) && !name.to_str().is_ok_and(faults::lacks)
+    };
 
     let mut driver = vk::PhysicalDeviceDriverProperties::default();
     let mut v11 = vk::PhysicalDeviceVulkan11Properties::default();
@@ -216,7 +225,7 @@ fn describe(instance: &Instance, index: usize, physical: vk::PhysicalDevice) -> 
         features2 = features2.push_next(&mut f_query);
     }
     unsafe { raw.get_physical_device_features2(physical, &mut features2) };
-    let int64 = features2.features.shader_int64 == vk::TRUE;
+    let int64 = features2.features.shader_int64 == vk::TRUE && !faults::lacks("shaderInt64");
 
     let families = unsafe { raw.get_physical_device_queue_family_properties(physical) };
     let family = |flags| families.iter().position(|f| f.queue_flags.contains(flags)).map(|k| k as u32);
@@ -225,7 +234,7 @@ fn describe(instance: &Instance, index: usize, physical: vk::PhysicalDevice) -> 
     let queue_family = graphics_family.or_else(|| family(vk::QueueFlags::COMPUTE));
 
     let mut missing_floor = Vec::new();
-    if !vulkan13 {
+    if !vulkan13 || faults::lacks("Vulkan 1.3") {
         missing_floor.push("Vulkan 1.3".to_owned());
     } else {
         for (supported, name) in [
@@ -234,7 +243,7 @@ fn describe(instance: &Instance, index: usize, physical: vk::PhysicalDevice) -> 
             (f13.maintenance4, "maintenance4"),
             (f13.synchronization2, "synchronization2"),
         ] {
-            if supported == vk::FALSE {
+            if supported == vk::FALSE || faults::lacks(name) {
                 missing_floor.push(name.to_owned());
             }
         }

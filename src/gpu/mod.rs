@@ -8,7 +8,10 @@ mod commands;
 mod device;
 mod drawing;
 pub mod environment;
+#[cfg_attr(not(feature = "probes"), path = "no_faults.rs")]
+mod faults;
 mod graphics_pipeline;
+pub mod host_memory;
 mod image;
 mod info;
 mod instance;

@@ -156,7 +156,7 @@ impl ApngWriter {
     }
 }
 
-fn reason(error: EncodingError) -> io::Error {
+pub(super) fn reason(error: EncodingError) -> io::Error {
     match error {
         EncodingError::IoError(e) => e,
         e => io::Error::other(e.to_string()),

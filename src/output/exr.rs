@@ -263,6 +263,11 @@ impl SamplesWriter for RowWriter<'_> {
 /// # Errors
 /// [`Error::Input`].
 pub fn read(path: &Path) -> Result<Image> {
+    // the decoder panics at some files that are damaged
+    std::panic::catch_unwind(|| decode(path)).unwrap_or_else(|_| Err(Error::input(path, "not a readable EXR: it is damaged")))
+}
+
+fn decode(path: &Path) -> Result<Image> {
     let broken = |e: exr::error::Error| match e {
         exr::error::Error::Io(e) => Error::read(path, &e),
         exr::error::Error::NotSupported(m) => Error::input(path, format!("an EXR of a kind that is not supported: {m}")),
@@ -277,14 +282,13 @@ pub fn read(path: &Path) -> Result<Image> {
             return Err(Error::input(path, format!("an image of {} x {} pixels", header.layer_size.0, header.layer_size.1)));
         }
     }
-    let file = exr::prelude::read()
-        .no_deep_data()
-        .largest_resolution_level()
-        .all_channels()
-        .all_layers()
-        .all_attributes()
-        .from_unbuffered(open()?)
-        .map_err(broken)?;
+    let reader = exr::prelude::read().no_deep_data().largest_resolution_level().all_channels().all_layers().all_attributes();
+    // a panic in one of the decoder's threads would end the process: what decoders of these methods do to damaged blocks is not checked
+    let is_simple = |h: &Header| {
+        matches!(h.compression, Compression::Uncompressed | Compression::RLE | Compression::ZIP1 | Compression::ZIP16)
+    };
+    let reader = if meta.headers.iter().all(is_simple) { reader } else { reader.non_parallel() };
+    let file = reader.from_unbuffered(open()?).map_err(broken)?;
 
     let mut image = Image::default();
     let parts = file.layer_data.len();

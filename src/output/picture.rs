@@ -224,9 +224,9 @@ impl Picture {
             });
             png::set_encoding(&mut encoder, self.encoding);
             encoder.set_compression(::png::Compression::Fast);
-            let mut writer = encoder.write_header().map_err(io::Error::from)?;
-            writer.write_image_data(&self.bytes).map_err(io::Error::from)?;
-            writer.finish().map_err(io::Error::from)?;
+            let mut writer = encoder.write_header().map_err(super::apng::reason)?;
+            writer.write_image_data(&self.bytes).map_err(super::apng::reason)?;
+            writer.finish().map_err(super::apng::reason)?;
             out.flush()
         })
     }

@@ -33,6 +33,7 @@ pub struct DefaultsFile {
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct DefaultsReport {
     /// The file.
+    #[serde(serialize_with = "crate::files::serialize_lossy")]
     pub file: PathBuf,
     /// The settings that hold, by their keys: `image.spp`.
     pub settings: BTreeMap<String, Value>,

@@ -26,7 +26,7 @@ mod complete;
 #[cfg(feature = "cli")]
 pub mod defaults;
 mod denoising;
-mod film_file;
+pub mod film_file;
 pub mod frames;
 pub mod interactive;
 mod laps;

@@ -190,7 +190,7 @@ impl FilmReport {
             "estimated_rmse": estimated,
             "target_rmse": options.target_rmse,
             "tiles": image.converged,
-            "resumed": options.resume,
+            "resumed": options.resume.as_ref().map(|path| path.to_string_lossy()),
             "samples_before": before,
         });
         Self { lines, record }

@@ -92,14 +92,14 @@ impl Console {
     /// Prints a warning to stderr. In JSON mode warnings are part of the record instead.
     pub fn warning(&self, text: &str) {
         if !self.json && !self.quiet {
-            stderr(&format!("skylit: warning: {text}"));
+            stderr(&format!("skylit: warning: {}", one_line(text)));
         }
     }
 }
 
-/// Replaces line breaks and runs of white space by single spaces.
+/// Replaces line breaks, other control characters and runs of white space by single spaces.
 pub fn one_line(text: &str) -> String {
-    text.split_whitespace().collect::<Vec<_>>().join(" ")
+    text.split(|c: char| c.is_whitespace() || c.is_control()).filter(|word| !word.is_empty()).collect::<Vec<_>>().join(" ")
 }
 
 /// The command line of this process, quoted as a shell needs it.

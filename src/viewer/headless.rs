@@ -45,19 +45,22 @@ pub fn run(options: &ViewOptions, script: &Path) -> Result<Vec<Section>> {
 
 /// Frames are made as a window makes them: when there is input, when the renderer has news, and when the user interface asks for one.
 fn drive(context: &egui::Context, app: &mut App, script: &mut Script, size: [u32; 2], woken: &AtomicBool) -> Result<()> {
-    let (mut size, start) = (size, Instant::now());
+    // in pixels; and the display's scale
+    let (mut size, mut scale, start) = (size, 1.0, Instant::now());
     let mut redraw = Some(start);
     let (mut painter, mut painted, mut words) = (CpuPainter::default(), Painted::default(), Vec::new());
     loop {
         let frame_start = Instant::now();
         // the size of the window in points, which are larger when the text is
-        let screen = Rect::from_min_size(Pos2::ZERO, Vec2::new(size[0] as f32, size[1] as f32) / context.zoom_factor());
+        let pixels_per_point = scale * context.zoom_factor();
+        let screen = Rect::from_min_size(Pos2::ZERO, Vec2::new(size[0] as f32, size[1] as f32) / pixels_per_point);
         let mut input = RawInput { screen_rect: Some(screen), time: Some(start.elapsed().as_secs_f64()), ..Default::default() };
+        input.viewports.entry(egui::ViewportId::ROOT).or_default().native_pixels_per_point = Some(scale);
         let Some(requests) = script.input(&mut input, app)? else { return Ok(()) };
         let has_input = !input.events.is_empty() || !input.dropped_files.is_empty() || requests.screenshot.is_some();
         let is_due = redraw.is_some_and(|at| at <= frame_start);
         let is_woken = woken.swap(false, Ordering::Relaxed);
-        if !has_input && !is_due && !is_woken && requests.resize.is_none() {
+        if !has_input && !is_due && !is_woken && requests.resize.is_none() && requests.scale.is_none() {
             std::thread::sleep(FRAME);
             continue;
         }
@@ -74,7 +77,12 @@ fn drive(context: &egui::Context, app: &mut App, script: &mut Script, size: [u32
             png::write_rgb(&path, &rgb, size[0], size[1])?;
         }
         if let Some(wanted) = requests.resize {
-            size = wanted.map(|n| n.clamp(1, 16384));
+            size = wanted.map(|n| ((n as f32 * scale).round() as u32).clamp(1, 16384));
+            woken.store(true, Ordering::Relaxed);
+        }
+        if let Some(wanted) = requests.scale {
+            size = size.map(|n| ((n as f32 * wanted / scale).round() as u32).clamp(1, 16384));
+            scale = wanted;
             woken.store(true, Ordering::Relaxed);
         }
         let delay = output.viewport_output.get(&egui::ViewportId::ROOT).map(|v| v.repaint_delay);

@@ -34,6 +34,10 @@ pub const COMMANDS: &[(&str, &str)] = &[
     ("drag-control LABEL DX DY [SECONDS]", "drag a control, by so many points"),
     ("wheel X Y LINES", "turn the wheel at a place"),
     ("resize WIDTH HEIGHT", "change the size of the window, in points (without a window)"),
+    (
+        "scale FACTOR",
+        "move the window to a display whose scale is FACTOR, 0.25 to 4: it keeps its size in points (without a window)",
+    ),
     ("drop FILE", "drop a file on the window"),
     ("screenshot FILE.png", "save what the window shows"),
     ("mark NAME", "begin a new section of the report"),
@@ -55,6 +59,7 @@ enum Command {
     DragControl(String, Vec2, Duration),
     Wheel(Pos2, f32),
     Resize([u32; 2]),
+    Scale(f32),
     Drop(PathBuf),
     Screenshot(PathBuf),
     Mark(String),
@@ -77,6 +82,8 @@ pub struct HostRequests {
     pub screenshot: Option<PathBuf>,
     /// Change the window's size, points.
     pub resize: Option<[u32; 2]>,
+    /// Change the display's scale: pixels per point, before the zoom of the user interface.
+    pub scale: Option<f32>,
 }
 
 /// Figures of a section of a script.
@@ -384,6 +391,10 @@ impl Script {
                 requests.resize = Some(*size);
                 Ok(true)
             }
+            Command::Scale(scale) => {
+                requests.scale = Some(*scale);
+                Ok(true)
+            }
             Command::Drop(path) => {
                 input.dropped_files.push(egui::DroppedFile { path: Some(path.clone()), ..Default::default() });
                 Ok(true)
@@ -569,6 +580,7 @@ fn parse(line: &str) -> Option<Command> {
         }
         "wheel" => Command::Wheel(at(0)?, number(2)?),
         "resize" => Command::Resize([words.first()?.parse().ok()?, words.get(1)?.parse().ok()?]),
+        "scale" => Command::Scale(number(0).filter(|scale| (0.25..=4.0).contains(scale))?),
         "drop" if !rest.is_empty() => Command::Drop(rest.into()),
         "screenshot" if !rest.is_empty() => Command::Screenshot(rest.into()),
         "mark" if !rest.is_empty() => Command::Mark(rest.to_owned()),
@@ -613,6 +625,8 @@ mod tests {
             "dance",
             "wheel 1 2",
             "resize 5",
+            "scale 0",
+            "scale",
         ] {
             assert_eq!(of(bad), None, "{bad}");
         }

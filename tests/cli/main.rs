@@ -4,6 +4,8 @@
 mod common;
 
 #[cfg(unix)]
+mod abuse;
+#[cfg(unix)]
 mod bench_ao;
 mod bench_frames;
 #[cfg(unix)]

@@ -103,6 +103,11 @@ fn bad_json_and_versions() {
     let one = r#"{ "asset": { "version": "1.0" }, "meshes": { "a": {} } }"#;
     assert!(message(folder.load("a.gltf", one)).contains("glTF 1.0"));
     let mut doc = Doc::triangle();
+    let number = r#"{ "asset": { "version": 1 }, "meshes": { "a": {} } }"#;
+    assert!(message(folder.load("a.gltf", number)).contains("is glTF 1; skylit reads glTF 2.0: convert it"));
+    // what a name in a file has for a terminal does not reach it
+    let escape = r#"{ "asset": { "version": "2.0" }, "\u001b[2J\u000a": 1, "meshes": [{ "primitives": [{ "attributes": { "\u001b[2J": 0, "POSITION": 7 } }] }] }"#;
+    assert!(!message(folder.load("a.gltf", escape)).contains(char::is_control));
     doc.json["asset"] = json!({ "version": "2.1" });
     assert!(doc.try_load().is_ok());
     doc.json["asset"]["minVersion"] = json!("2.1");

@@ -1,10 +1,19 @@
 //! Broken files: an error or a scene, never a panic, never absurd memory.
 
+use std::path::PathBuf;
+
 use serde_json::json;
-use skylit::scene::Scene;
-use skylit::scene::animation::{Playback, Pose};
+use skylit::film::state::FilmState;
+use skylit::output::exr::ExrOptions;
+use skylit::output::settings::ExrCompression as Compression;
+use skylit::output::{Channel, Image, Samples};
+use skylit::renderer::film_file;
 
 use crate::build::*;
+
+/// What the fuzzers of `fuzz/` run.
+#[path = "../../fuzz/src/targets.rs"]
+mod targets;
 
 /// A small generator; the cases are the same on every run.
 struct Random(u64);
@@ -99,77 +108,168 @@ fn mutate(original: &[u8], random: &mut Random) -> Vec<u8> {
     data
 }
 
-/// Whatever was loaded can be played.
-fn play(scene: &Scene) {
-    let Some(rig) = &scene.rig else { return };
-    let mut pose = Pose::default();
-    for animation in 0..rig.animations().len() {
-        let motion = rig.motion(animation).unwrap();
-        for seconds in [0.0, 0.4, 1e9] {
-            rig.pose(animation, seconds, Playback::Once, &mut pose).unwrap();
-            assert_eq!((pose.instances.len(), pose.meshes.len()), (motion.instances.len(), motion.meshes.len()));
-        }
+/// Runs a target over mutants of its seeds. Some must be refused, and all in one line.
+fn survive(name: &str, cases: usize) {
+    let target = targets::TARGETS.iter().find(|(n, _)| *n == name).unwrap().1;
+    let folder = tempfile::tempdir().unwrap();
+    let seeds = seeds(name);
+    for (k, seed) in seeds.iter().enumerate() {
+        assert!(target(folder.path(), seed), "seed {k} of {name} is refused");
     }
-}
-
-fn survive(name: &str, data: &[u8], cases: u32) {
-    let folder = Folder::new();
-    let mut random = Random(0x5eed);
+    // SKYLIT_FUZZ_CASES=N: so many times as many, and others
+    let factor: Option<usize> = std::env::var("SKYLIT_FUZZ_CASES").ok().map(|n| n.parse().unwrap());
+    let cases = cases * factor.unwrap_or(1);
+    let mut random = Random(0x5eed + factor.unwrap_or(0) as u64);
     let (mut good, mut bad) = (0, 0);
-    for _ in 0..cases {
-        match folder.load(name, mutate(data, &mut random)) {
-            Ok(scene) => {
-                good += 1;
-                play(&scene);
-            }
-            Err(e) => {
-                bad += 1;
-                assert!(!e.to_string().contains('\n'), "{e}");
-            }
+    for case in 0..cases {
+        match target(folder.path(), &mutate(&seeds[case % seeds.len()], &mut random)) {
+            true => good += 1,
+            false => bad += 1,
         }
     }
-    println!("{name}: {good} loaded, {bad} refused");
+    println!("{name}: {good} read, {bad} refused");
     assert!(bad > 0);
 }
 
-#[test]
-fn glb() {
-    assert!(rich().try_load().is_ok_and(|s| s.rig.is_some_and(|r| !r.motion(0).unwrap().meshes.is_empty())));
-    survive("a.glb", &rich().glb(), 6000);
+/// An image in an EXR file with this compression.
+fn exr(channels: Vec<Channel>, [width, height]: [u32; 2], metadata: &[(&str, &str)], options: &ExrOptions) -> Vec<u8> {
+    let metadata = metadata.iter().map(|(k, v)| ((*k).to_owned(), (*v).to_owned())).collect();
+    let file = tempfile::Builder::new().suffix(".exr").tempfile().unwrap();
+    skylit::output::exr::write_with(&Image { width, height, channels, metadata }, file.path(), options).unwrap();
+    std::fs::read(file.path()).unwrap()
 }
 
-#[test]
-fn gltf() {
-    survive("a.gltf", &rich().gltf(), 6000);
+fn ramp(name: &str, count: usize) -> Channel {
+    Channel { name: name.into(), samples: Samples::F32((0..count).map(|k| k as f32 / count as f32).collect()) }
 }
 
-#[test]
-fn obj() {
-    let text = "mtllib a.mtl\no a\nv 0 0 0\nv 1 0 0 1 1 1\nv 0 1 0\nv 1 1 0\nvt 0 0\nvt 1 1\nvn 0 0 1\nusemtl m\n\
-                f 1/1/1 2/2/1 3/1/1 4/2/1\nf -1 -2 -3\nf 1//1 2//1 3//1\n";
-    survive("a.obj", text.as_bytes(), 6000);
+/// The film of an image of 8x8 pixels with some samples.
+fn film() -> Vec<u8> {
+    let names = ["Y"];
+    let words = skylit::film::state::words(&names);
+    let planes: Vec<Vec<u32>> = words.iter().map(|w| vec![if w.float { 1.5f32.to_bits() } else { 0 }; 64]).collect();
+    let state = FilmState::from_planes([8, 8], 1, &planes, &[4; 64]).unwrap();
+    let mut channels = vec![ramp("Y", 64)];
+    channels.extend(film_file::state_channels(&state, &names));
+    exr(channels, [8, 8], &[("tracer", "compute"), ("device", "a device")], &ExrOptions::default())
 }
 
+fn png_of(colour: png::ColorType, depth: png::BitDepth, bytes: &[u8]) -> Vec<u8> {
+    let mut out = Vec::new();
+    let mut encoder = png::Encoder::new(&mut out, 4, 4);
+    encoder.set_color(colour);
+    encoder.set_depth(depth);
+    encoder.add_text_chunk("scene".into(), "a.glb".into()).unwrap();
+    encoder.write_header().unwrap().write_image_data(bytes).unwrap();
+    out
+}
+
+/// Files of each format that are read as they are. `write_seeds` puts them into a folder for fuzzers.
+fn seeds(target: &str) -> Vec<Vec<u8>> {
+    let texts = |texts: &[&str]| texts.iter().map(|t| t.as_bytes().to_vec()).collect();
+    match target {
+        "gltf" => vec![rich().gltf(), Doc::triangle().gltf()],
+        "glb" => vec![rich().glb(), Doc::triangle().glb()],
+        "obj" => texts(&["mtllib a.mtl\no a\nv 0 0 0\nv 1 0 0 1 1 1\nv 0 1 0\nv 1 1 0\nvt 0 0\nvt 1 1\nvn 0 0 1\nusemtl m\n\
+            f 1/1/1 2/2/1 3/1/1 4/2/1\nf -1 -2 -3\nf 1//1 2//1 3//1\n"]),
+        "mtl" => texts(&[
+            "newmtl m\nKd 1 1 1\nKs 0 0 0\nNs 10\nd 0.5\nillum 2\nmap_Kd -s 1 2 -o 1 -clamp on t.png\nmap_d t.png\n",
+            "newmtl m\nKd 0.5 0.5 0.5\nKe 1 1 1\nPr 0.5\nPm 1\nNi 1.5\nTf 1 1 1\n",
+        ]),
+        "brhan" => texts(&["Camera position[0 1 2] view_direction[0 0 -1] vertical_fov[45] width[64] height[64]\n\
+            Integrator type[path] spp[4] max_depth[4]\nSphere center[0 0 0] radius[1] material[glass]\n\
+            SphericalLight center[0 9 0] radius[1] emittance[1 1 1]\nSaveIntervals[4 8]\nGenDepthImage[true]\n"]),
+        "hdr" => {
+            let encode = |width: usize, height: usize| {
+                let mut out = Vec::new();
+                let pixels: Vec<_> = (0..width * height).map(|k| image::Rgb([k as f32, 0.5, 1e-3])).collect();
+                image::codecs::hdr::HdrEncoder::new(&mut out).encode(&pixels, width, height).unwrap();
+                out
+            };
+            // runs of equal bytes from 8 pixels on
+            vec![encode(16, 8), encode(4, 2)]
+        }
+        "exr" => {
+            let of = |channels: Vec<Channel>, compression, half| {
+                exr(channels, [8, 4], &[("scene", "a.glb")], &ExrOptions { compression, half, grey_as_rgb: false })
+            };
+            let rgb = || ["R", "G", "B"].map(|name| ramp(name, 32)).to_vec();
+            [Compression::None, Compression::Rle, Compression::Zips, Compression::Zip, Compression::Piz, Compression::Pxr24]
+                .map(|c| of(rgb(), c, false))
+                .into_iter()
+                .chain([Compression::B44, Compression::B44a].map(|c| of(rgb(), c, true)))
+                .collect()
+        }
+        "png" => vec![
+            png_of(png::ColorType::Rgba, png::BitDepth::Eight, &[90; 64]),
+            png_of(png::ColorType::Grayscale, png::BitDepth::Sixteen, &[7; 32]),
+            png_of(png::ColorType::Rgb, png::BitDepth::Eight, &[200; 48]),
+        ],
+        "camera_path" => texts(&[r#"{ "fps": 30, "interpolation": "smooth", "keys": [
+            { "frame": 0, "eye": [0, 1.6, 4], "target": [0, 1, 0], "up": [0, 1, 0], "fov_y_degrees": 45 },
+            { "frame": 9.5, "eye": [3, 1.6, 2], "target": [0, 1, 0] }, { "frame": 60, "eye": [1, 2, 2], "target": [0, 1, 0] }] }"#]),
+        "manifest" => texts(&["[drivers]\npinned = [\"llvmpipe Mesa 25.0\"]\n[defaults]\ntracers = [\"compute\"]\n\
+            tolerance = { z_test = { bias = 0.005 } }\n[[frame]]\nname = \"a\"\nscene = \"builtin:stairs\"\n\
+            render = \"ao --size 80x60 --spp 128 --ao-radius 2\"\ntracers = [\"all\"]\n"]),
+        "film" => vec![film()],
+        "settings" => texts(&[
+            r#"{"image":{"size":[64,48],"spp":16,"seed":7},"integrator":"path","integrators":{"ao":{"ao_radius":0.5}}}"#,
+            "[image]\nsize = [64, 48]\nspp = 16\n",
+            "path --size 64x48 --spp 16 --max-depth 4 --exposure 1.5",
+        ]),
+        _ => panic!("no seeds for {target}"),
+    }
+}
+
+/// Every target of the fuzzers, with its seeds: a test each, so that they run side by side.
+macro_rules! survives {
+    ($($name:ident $cases:literal,)*) => {
+        mod mutants {
+            $(#[test]
+            fn $name() {
+                super::survive(stringify!($name), $cases);
+            })*
+        }
+
+        #[test]
+        fn every_target_is_run() {
+            let names: Vec<&str> = targets::TARGETS.iter().map(|(name, _)| *name).collect();
+            assert_eq!(names, [$(stringify!($name)),*]);
+        }
+    };
+}
+
+survives! {
+    gltf 6000,
+    glb 6000,
+    obj 6000,
+    mtl 3000,
+    brhan 6000,
+    hdr 3000,
+    exr 4000,
+    png 3000,
+    camera_path 6000,
+    manifest 3000,
+    film 1000,
+    settings 3000,
+}
+
+/// Writes the seeds into folders of the targets' names: `SKYLIT_FUZZ_SEEDS=DIR cargo test --test loaders write_seeds -- --ignored`.
 #[test]
-fn mtl() {
-    let folder = Folder::new();
-    folder.write("t.png", png(4, 4, [1, 2, 3, 4]));
-    folder.write("a.obj", "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl m\nf 1 2 3\n");
-    let text = "newmtl m\nKd 1 1 1\nKs 0 0 0\nNs 10\nd 0.5\nillum 2\nmap_Kd -s 1 2 -o 1 -clamp on t.png\nmap_d t.png\n";
-    let mut random = Random(7);
-    for _ in 0..3000 {
-        folder.write("a.mtl", mutate(text.as_bytes(), &mut random));
-        // a broken library never hides the model
-        assert_eq!(load(&folder.path("a.obj")).unwrap().triangle_count(), 1);
+#[ignore = "writes files, for fuzzers"]
+fn write_seeds() {
+    let folder = PathBuf::from(std::env::var_os("SKYLIT_FUZZ_SEEDS").expect("SKYLIT_FUZZ_SEEDS names the folder"));
+    for (name, _) in targets::TARGETS {
+        std::fs::create_dir_all(folder.join(name)).unwrap();
+        for (k, seed) in seeds(name).iter().enumerate() {
+            std::fs::write(folder.join(name).join(format!("seed-{k}")), seed).unwrap();
+        }
     }
 }
 
 #[test]
-fn brhan() {
-    let text = "Camera position[0 1 2] view_direction[0 0 -1] vertical_fov[45] width[64] height[64]\n\
-                Integrator type[path] spp[4] max_depth[4]\nSphere center[0 0 0] radius[1] material[glass]\n\
-                SphericalLight center[0 9 0] radius[1] emittance[1 1 1]\nSaveIntervals[4 8]\nGenDepthImage[true]\n";
-    survive("a.brhan", text.as_bytes(), 6000);
+fn the_seed_with_everything_moves() {
+    assert!(rich().try_load().is_ok_and(|s| s.rig.is_some_and(|r| !r.motion(0).unwrap().meshes.is_empty())));
 }
 
 #[test]

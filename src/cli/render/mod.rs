@@ -147,7 +147,7 @@ fn still(args: &RenderArgs, defaults: &[DefaultsReport], start: Instant) -> Resu
         console.line("the scene requests a depth image: add --depth-image FILE")?;
     }
     let mut record = report.record(args.explain);
-    record["output"] = serde_json::json!(args.output);
+    record["output"] = serde_json::json!(files::lossy(&args.output));
     record["defaults"] = serde_json::json!(defaults);
     let interrupted = args.keep_partial && interrupt::requested();
     console.close(&record, if interrupted { Err(Error::Interrupted) } else { Ok(()) })
@@ -200,7 +200,7 @@ fn frames(args: &RenderArgs, defaults: &[DefaultsReport], start: Instant) -> Res
         console.line(&line)?;
     }
     let mut record = report.record(args.explain);
-    record["output"] = serde_json::json!(args.output);
+    record["output"] = serde_json::json!(files::lossy(&args.output));
     record["defaults"] = serde_json::json!(defaults);
     console.close(&record, Ok(()))
 }

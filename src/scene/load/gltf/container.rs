@@ -61,8 +61,9 @@ pub(super) fn document(json: &[u8], path: &Path) -> Result<(Root, Doubles)> {
     }
     #[derive(serde::Deserialize, Default)]
     struct Version {
+        // glTF 1.0 of some exporters has a number
         #[serde(default)]
-        version: String,
+        version: serde_json::Value,
     }
     // the crate leaves a byte order mark to us
     let text = json.strip_prefix(b"\xef\xbb\xbf").unwrap_or(json);
@@ -71,8 +72,11 @@ pub(super) fn document(json: &[u8], path: &Path) -> Result<(Root, Doubles)> {
         Ok(document) => document,
         // glTF 1.0 has another structure: it does not parse, but deserves a better answer than a type error
         Err(e) => match serde_json::from_slice::<AssetOnly>(text).map(|a| a.asset.version) {
-            Ok(version) if version.is_empty() => return Err(Error::input(path, "is not glTF: it has no version")),
-            Ok(version) if !version.starts_with("2.") => return Err(other_version(&version, path)),
+            Ok(serde_json::Value::Number(version)) => return Err(other_version(&version.to_string(), path)),
+            Ok(version) if version.as_str().is_none_or(str::is_empty) => {
+                return Err(Error::input(path, "is not glTF: it has no version"));
+            }
+            Ok(serde_json::Value::String(version)) if !version.starts_with("2.") => return Err(other_version(&version, path)),
             _ => return Err(Error::input(path, format!("is not valid glTF JSON: {e}"))),
         },
     };
@@ -84,7 +88,7 @@ pub(super) fn document(json: &[u8], path: &Path) -> Result<(Root, Doubles)> {
 }
 
 fn other_version(version: &str, path: &Path) -> Error {
-    let remedy = if version.starts_with("1.") { ": convert it" } else { "" };
+    let remedy = if version.starts_with('1') { ": convert it" } else { "" };
     Error::input(path, format!("is glTF {version}; skylit reads glTF 2.0{remedy}"))
 }
 

@@ -27,6 +27,9 @@ use crate::scene::{Geometry, Instance, Material, Mesh, Scene, TriangleMesh};
 pub(super) fn read(path: &Path, options: &LoadOptions) -> Result<Scene> {
     let mut file = parse::parse(path)?;
     let mut scene = Scene::default();
+    if file.open_faces > 0 {
+        scene.report.warnings.push(format!("{} faces with fewer than three corners: left out", file.open_faces));
+    }
     let mut materials = material::MaterialLibrary::new(*options);
     let mut complete = true;
     for name in std::mem::take(&mut file.libraries) {

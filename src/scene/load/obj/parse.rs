@@ -40,6 +40,8 @@ pub(super) struct ObjFile {
     pub normals: Vec<Vec3>,
     pub libraries: Vec<String>,
     pub groups: Vec<Group>,
+    /// Faces of fewer than three corners, which are left out.
+    pub open_faces: usize,
 }
 
 /// Parses a file; errors name the line.
@@ -48,7 +50,10 @@ pub(super) fn parse(path: &Path) -> Result<ObjFile> {
     let mut lines = Lines { reader: BufReader::with_capacity(1 << 18, file), number: 0, buffer: Vec::new() };
     let mut parser = Parser::default();
     while lines.next().map_err(|e| Error::read(path, &e))? {
-        // other encodings than UTF-8 occur in names only, and there they do not matter
+        if lines.number == 1 && matches!(lines.buffer.get(..2), Some([0xfe, 0xff] | [0xff, 0xfe])) {
+            return Err(Error::input(path, "is UTF-16 text; save it as UTF-8"));
+        }
+        // other encodings occur in names only, and there they do not matter
         let line = String::from_utf8_lossy(&lines.buffer);
         parser.line(&line).map_err(|e| Error::input(path, format!("line {}: {e}", lines.number)))?;
     }
@@ -152,7 +157,9 @@ impl Parser {
             self.polygon.push(corner);
         }
         let [first, _, _, ..] = self.polygon[..] else {
-            return Err("a face needs three corners".to_owned());
+            // lines and points that a converter left over: they have no area
+            self.file.open_faces += 1;
+            return Ok(());
         };
         if self.changed || self.file.groups.is_empty() {
             self.changed = false;

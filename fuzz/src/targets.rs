@@ -1,0 +1,179 @@
+//! What fuzzers feed: a function for each format that others can give us. Each takes the bytes of a file and has it read as the program reads it: an error of one line or a
+//! result, never a panic. `fuzz_targets` hands them to libFuzzer, and `tests/loaders/fuzz.rs` runs the same functions over the same seeds with a mutator of its own.
+
+use std::path::{Path, PathBuf};
+
+use skylit::renderer::RenderSettings;
+use skylit::renderer::film_file;
+use skylit::scene::Scene;
+use skylit::scene::animation::{Playback, Pose};
+use skylit::scene::load::{load_camera_path, load_environment, load_file};
+use skylit::{Result, output};
+
+/// A target: reads these bytes in a folder of its own, and returns whether they were accepted.
+pub type Target = fn(&Path, &[u8]) -> bool;
+
+/// All targets by name.
+pub const TARGETS: &[(&str, Target)] = &[
+    ("gltf", gltf),
+    ("glb", glb),
+    ("obj", obj),
+    ("mtl", mtl),
+    ("brhan", brhan),
+    ("hdr", hdr),
+    ("exr", exr),
+    ("png", png),
+    ("camera_path", camera_path),
+    #[cfg(feature = "verify")]
+    ("manifest", manifest),
+    ("film", film),
+    ("settings", settings),
+];
+
+/// A file of this name with these bytes.
+fn write(folder: &Path, name: &str, data: &[u8]) -> PathBuf {
+    let path = folder.join(name);
+    std::fs::write(&path, data).unwrap();
+    path
+}
+
+/// Whether it was accepted; what is refused is refused in one line.
+fn accepted<T>(result: Result<T>, check: impl FnOnce(T)) -> bool {
+    match result {
+        Ok(value) => {
+            check(value);
+            true
+        }
+        Err(e) => {
+            assert!(!e.to_string().contains('\n'), "{e}");
+            false
+        }
+    }
+}
+
+/// Whatever was loaded has finite bounds, and can be played.
+fn play(scene: Scene) {
+    assert!(scene.bounds().is_some_and(|(low, high)| low.is_finite() && high.is_finite()));
+    let Some(rig) = &scene.rig else { return };
+    let mut pose = Pose::default();
+    for animation in 0..rig.animations().len().min(3) {
+        let motion = rig.motion(animation).unwrap();
+        for seconds in [0.0, 0.4, 1e9] {
+            rig.pose(animation, seconds, Playback::Once, &mut pose).unwrap();
+            assert_eq!((pose.instances.len(), pose.meshes.len()), (motion.instances.len(), motion.meshes.len()));
+        }
+    }
+}
+
+fn scene(folder: &Path, name: &str, data: &[u8]) -> bool {
+    accepted(load_file(&write(folder, name, data)), play)
+}
+
+/// A glTF file as text, with its buffers and images in it.
+pub fn gltf(folder: &Path, data: &[u8]) -> bool {
+    scene(folder, "a.gltf", data)
+}
+
+/// A binary glTF file.
+pub fn glb(folder: &Path, data: &[u8]) -> bool {
+    scene(folder, "a.glb", data)
+}
+
+/// Wavefront OBJ.
+pub fn obj(folder: &Path, data: &[u8]) -> bool {
+    scene(folder, "a.obj", data)
+}
+
+/// A library of materials, which never hides the model.
+pub fn mtl(folder: &Path, data: &[u8]) -> bool {
+    write(folder, "a.mtl", data);
+    let path =
+        write(folder, "b.obj", b"mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nusemtl m\nf 1/1 2/2 3/3\n");
+    let scene = load_file(&path).unwrap();
+    assert_eq!(scene.triangle_count(), 1);
+    // the texture that seeds name is not there
+    scene.report.warnings.iter().all(|w| w.contains("t.png"))
+}
+
+/// A scene of the brhan renderer.
+pub fn brhan(folder: &Path, data: &[u8]) -> bool {
+    scene(folder, "a.brhan", data)
+}
+
+/// A Radiance HDR image as environment.
+pub fn hdr(folder: &Path, data: &[u8]) -> bool {
+    accepted(load_environment(&write(folder, "a.hdr", data)), |map| {
+        assert_eq!(map.radiance.len(), map.width as usize * map.height as usize);
+        assert!(map.radiance.iter().all(|c| c.is_finite() && c.min_element() >= 0.0));
+    })
+}
+
+/// An EXR image, as images are compared and as environment.
+pub fn exr(folder: &Path, data: &[u8]) -> bool {
+    let path = write(folder, "a.exr", data);
+    let environment = accepted(load_environment(&path), drop);
+    accepted(output::load(&path), whole) | environment
+}
+
+/// A PNG image, as images are compared and as texture.
+pub fn png(folder: &Path, data: &[u8]) -> bool {
+    let path = write(folder, "t.png", data);
+    write(folder, "t.mtl", b"newmtl m\nKd 1 1 1\nmap_Kd t.png\nmap_Bump t.png\n");
+    let model = b"mtllib t.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nusemtl m\nf 1/1 2/2 3/3\n";
+    assert_eq!(load_file(&write(folder, "t.obj", model)).unwrap().triangle_count(), 1);
+    accepted(output::load(&path), whole)
+}
+
+/// All channels have as many values as the image has pixels.
+fn whole(image: output::Image) {
+    assert!(image.channels.iter().all(|c| c.samples.len() == image.pixel_count()));
+}
+
+/// Keys of a camera.
+pub fn camera_path(folder: &Path, data: &[u8]) -> bool {
+    accepted(load_camera_path(&write(folder, "a.json", data)), |path| {
+        let (first, last) = path.range();
+        for frame in [first - 1.0, first, first.midpoint(last), last, last + 1e9] {
+            let camera = path.camera_at(frame);
+            assert!(camera.camera_to_world.is_finite(), "frame {frame}: {camera:?}");
+        }
+    })
+}
+
+/// The frames of `skylit verify`.
+#[cfg(feature = "verify")]
+pub fn manifest(folder: &Path, data: &[u8]) -> bool {
+    write(folder, "frames.toml", data);
+    accepted(skylit::verify::manifest::Manifest::load(folder), |manifest| {
+        for frame in &manifest.frames {
+            let _ = (manifest.golden(frame), manifest.scene(frame), manifest.settings(frame));
+        }
+    })
+}
+
+/// An image with a film's sums, which a render resumes.
+pub fn film(folder: &Path, data: &[u8]) -> bool {
+    let maker = [("tracer", "compute".to_owned()), ("device", "a device".to_owned())];
+    let path = write(folder, "a.exr", data);
+    accepted(film_file::resume(&path, "a.glb", &["Y"], [8, 8], u32::MAX, &Vec::new(), &maker), |resumed| {
+        assert_eq!(resumed.state.size(), [8, 8]);
+        let _ = resumed.state.film();
+    })
+}
+
+/// Settings of a render: JSON as the viewer saves them, TOML as people write them, and words in a line.
+pub fn settings(folder: &Path, data: &[u8]) -> bool {
+    let check = |settings: RenderSettings| {
+        let _ = settings.check().map_err(|e| assert!(!e.to_string().contains('\n'), "{e}"));
+    };
+    let json = accepted(RenderSettings::load(&write(folder, "a.json", data)), check);
+    let toml = accepted(RenderSettings::load(&write(folder, "a.toml", data)), check);
+    #[cfg(feature = "verify")]
+    let words = std::str::from_utf8(data).is_ok_and(|line| {
+        let line = line.trim_end();
+        !line.contains(char::is_control) && accepted(RenderSettings::from_words(line), check)
+    });
+    #[cfg(not(feature = "verify"))]
+    let words = false;
+    json | toml | words
+}

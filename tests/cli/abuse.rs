@@ -1,0 +1,630 @@
+//! A machine that does not do as it should: files that cannot be named in Unicode, disks that are full or read-only, memory that runs out, devices that are lost, signals, other
+//! processes, clocks. Each ends with one line and its exit code, with nothing half-written and no temporary file left (docs/robustness.md).
+
+use std::ffi::OsString;
+use std::os::unix::ffi::{OsStrExt, OsStringExt};
+use std::os::unix::process::ExitStatusExt;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Output, Stdio};
+use std::time::{Duration, Instant, SystemTime};
+
+use crate::common::command::{assert_refusal, count, device, fails, json, place, run, skylit, stderr};
+
+/// A still of a built-in scene that takes a moment: 16 samples in three parts.
+const STILL: [&str; 6] = ["render", "builtin:cornell-box", "--size", "64x48", "--spp", "16"];
+
+/// Names of the files in a folder, sorted.
+fn names(folder: &Path) -> Vec<OsString> {
+    let mut names: Vec<_> = std::fs::read_dir(folder).unwrap().map(|f| f.unwrap().file_name()).collect();
+    names.sort();
+    names
+}
+
+/// It failed with this code; its last line is its error and says this.
+fn ends(out: &Output, code: i32, says: &str) {
+    fails(out, code, &[says]);
+}
+
+#[test]
+fn gpu_names_that_are_not_unicode() {
+    if !device() {
+        return;
+    }
+    let dir = tempfile::tempdir().unwrap();
+    // a folder, too, with defaults in it
+    let folder = dir.path().join(OsString::from_vec(b"folder \xff".to_vec()));
+    std::fs::create_dir_all(folder.join("skylit")).unwrap();
+    std::fs::write(folder.join("skylit/skylit.toml"), "[image]\nsize = [24, 16]\n").unwrap();
+    let at = |name: &[u8]| folder.join(OsString::from_vec(name.to_vec()));
+    let render = |options: &[&str], output: &Path| {
+        let mut command = skylit(&["render", "builtin:cornell-box", "--json"]);
+        command.args(options).arg("-o").arg(output).current_dir(&folder).env("XDG_CONFIG_HOME", &folder);
+        command
+    };
+    let [exr, png, frames] = [&b"\xe4.exr"[..], b"\xe4.png", b"\xe4.##.png"].map(at);
+    let mut still = render(&["--spp", "2", "--resumable"], &exr);
+    let mut depth = OsString::from("--depth-image=");
+    depth.push(at(b"depth\xff.exr"));
+    let mut rays = OsString::from("--dump-rays=");
+    rays.push(at(b"rays\xff"));
+    let record = json(&still.arg("-o").arg(&png).args([depth, rays]).output().unwrap());
+    assert!(record["output"][0].as_str().unwrap().ends_with("\u{fffd}.exr"), "{record}");
+    assert!(record["defaults"].to_string().contains("skylit.toml"), "{record}");
+    // numbers are put into names of frames, which have to be Unicode for it
+    for options in [["--preset", "fast"], ["--spp", "2"]] {
+        let out = render(&[&options[..], &["--frames", "0..2"]].concat(), &frames).output().unwrap();
+        ends(&out, 64, "a name with a frame number (#) must be Unicode; rename it");
+    }
+    let mut resume = OsString::from("--resume=");
+    resume.push(&exr);
+    json(&render(&["--spp", "4"], &exr).arg(resume).output().unwrap());
+    let difference = at(b"difference\xff.png");
+    let mut compare = skylit(&["compare", "--json"]);
+    let record = json(&compare.args([&exr, &png]).arg("--difference").arg(&difference).output().unwrap());
+    assert!(record["pictures"].to_string().contains('\u{fffd}') && difference.exists(), "{record}");
+    assert!(at(b"rays\xff.primary.bin").exists());
+    // scenes and names of formats are text: one line says so
+    for argument in [&b"sc\xffene.glb"[..], b"\xff"] {
+        let out = skylit(&["render"]).arg(OsString::from_vec(argument.to_vec())).args(["-o", "a.png"]).output().unwrap();
+        assert_refusal(&out, 64, "UTF-8", &["render"]);
+    }
+}
+
+/// The file that [`STILL`] writes.
+fn reference(dir: &Path) -> Vec<u8> {
+    let exr = dir.join("reference.exr");
+    json(&run(&[&STILL[..], &["--resumable", "--json", "-o", exr.to_str().unwrap()]].concat()));
+    let bytes = std::fs::read(&exr).unwrap();
+    std::fs::remove_file(exr).unwrap();
+    bytes
+}
+
+#[test]
+fn gpu_a_device_that_is_lost() {
+    if !device() {
+        return;
+    }
+    let dir = tempfile::tempdir().unwrap();
+    let whole = reference(dir.path());
+    let (exr, png) = (place(&dir, "a.exr"), place(&dir, "a.png"));
+    std::fs::write(&png, "an older image").unwrap();
+    let args = [&STILL[..], &["--resumable", "--intervals", "-o", &exr, "-o", &png]].concat();
+    let (mut lost, mut resumed) = (0, 0);
+    for submission in 1..200 {
+        let out = skylit(&args).env("SKYLIT_FAULT_DEVICE_LOST", submission.to_string()).output().unwrap();
+        if out.status.success() {
+            break;
+        }
+        ends(&out, 6, "the Vulkan device was lost");
+        lost += 1;
+        assert_eq!(std::fs::read(&png).unwrap(), b"an older image");
+        // intermediate images are whole, and the render goes on from the last of them
+        let files = names(dir.path());
+        assert!(files.iter().all(|f| f.to_str().unwrap().starts_with("a.")) && !Path::new(&exr).exists(), "{files:?}");
+        let last = files.iter().rfind(|f| f.to_str().unwrap().ends_with(".exr"));
+        if let Some(last) = last.map(|f| dir.path().join(f)).filter(|_| resumed < 3) {
+            json(&run(&[&STILL[..], &["--json", "-o", &exr, "--resume", last.to_str().unwrap()]].concat()));
+            assert_eq!(std::fs::read(&exr).unwrap(), whole);
+            resumed += 1;
+        }
+        for file in files.iter().filter(|f| *f != "a.png") {
+            std::fs::remove_file(dir.path().join(file)).unwrap();
+        }
+        let _ = std::fs::remove_file(&exr);
+    }
+    assert!((4..199).contains(&lost) && resumed > 0, "{lost} {resumed}");
+    assert_eq!(std::fs::read(&exr).unwrap(), whole);
+}
+
+#[test]
+fn gpu_frames_of_a_device_that_is_lost() {
+    if !device() {
+        return;
+    }
+    let dir = tempfile::tempdir().unwrap();
+    let (png, apng) = (place(&dir, "a.##.png"), place(&dir, "a.apng"));
+    let args = ["render", "builtin:stairs", "--size", "48x32", "--preset", "fast", "--frames", "0..12", "--orbit"];
+    let all = run(&[&args[..], &["-o", &png]].concat());
+    assert!(all.status.success() && count(dir.path()) == 12, "{}", stderr(&all));
+    let before: Vec<_> = names(dir.path()).iter().map(|f| std::fs::read(dir.path().join(f)).unwrap()).collect();
+    names(dir.path()).iter().for_each(|f| std::fs::remove_file(dir.path().join(f)).unwrap());
+    let lose = |submission: u32| {
+        let out =
+            skylit(&args).args(["-o", &png, "-o", &apng]).env("SKYLIT_FAULT_DEVICE_LOST", submission.to_string()).output();
+        out.unwrap()
+    };
+    // the submission that ends somewhere in the middle
+    let middle = (10..400).step_by(5).find(|&n| {
+        let out = lose(n);
+        ends(&out, 6, "the Vulkan device was lost");
+        (3..11).contains(&count(dir.path()))
+    });
+    assert!(middle.is_some(), "{} frames", count(dir.path()));
+    // those that are there are whole; an animation that is not has no file
+    for (name, frame) in names(dir.path()).iter().zip(&before) {
+        assert_eq!(&std::fs::read(dir.path().join(name)).unwrap(), frame, "{name:?}");
+    }
+    assert!(!Path::new(&apng).exists());
+}
+
+/// The viewer opens the device again, and everything is as it was.
+#[cfg(feature = "viewer")]
+#[test]
+fn gpu_the_viewer_goes_on_after_a_device_was_lost() {
+    if !device() {
+        return;
+    }
+    let dir = tempfile::tempdir().unwrap();
+    let at = |name: &str| place(&dir, name);
+    let save = |name: &str| {
+        format!("key Ctrl+S\nwait text:Save the image\nkey Ctrl+A\ntype {}\nkey Enter\nwait text:saved\n", at(name))
+    };
+    let view = |script: &str, fault: &str| {
+        std::fs::write(at("script"), script).unwrap();
+        let args = ["view", "builtin:stairs", "--size", "760x520", "--headless-script", &at("script")];
+        skylit(&args).env("SKYLIT_FAULT_DEVICE_LOST", fault).output().unwrap()
+    };
+    // the device is lost once there is the screenshot
+    let script = format!(
+        "wait picture\ndrag 300 200 380 240 0.5\nclick Radius\nset Radius = 0.6\nwait settled\n{}screenshot {}\nset Radius = 0.5\n\
+         set Radius = 0.6\nwait text:started again\nwait settled\n{}",
+        save("kept.exr"),
+        at("lost.png"),
+        save("lost.exr")
+    );
+    let out = view(&script, &at("lost.png"));
+    assert!(out.status.success(), "{}", stderr(&out));
+    let [kept, lost] = ["kept.exr", "lost.exr"].map(|name| skylit::output::load(at(name).as_ref()).unwrap());
+    for key in ["command", "camera_pose", "scene"] {
+        assert!(kept.metadata(key).is_some() && kept.metadata(key) == lost.metadata(key), "{key}: {:?}", lost.metadata(key));
+    }
+    assert!(lost.metadata("command").unwrap().contains("--ao-radius 0.6"), "{:?}", lost.metadata("command"));
+    // one that is lost again and again is no endless loop
+    let out = view("wait text:was lost\nwait text:failed; the driver has reset it or crashed\nexpect-no-errors\n", "1+");
+    ends(&out, 1, "lost");
+}
+
+/// A window that moves to a display of another scale shows the same, with as many more pixels.
+#[cfg(feature = "viewer")]
+#[test]
+fn gpu_a_display_with_another_scale() {
+    if !device() {
+        return;
+    }
+    let dir = tempfile::tempdir().unwrap();
+    let at = |name: &str| place(&dir, name);
+    let script = format!(
+        "wait picture\nclick Radius\nset Radius = 0.6\nwait settled\nscreenshot {}\nscale 2\nwait 0.5\nwait settled\nscreenshot {}\n\
+         scale 1.25\nwait settled\nscale 1\nwait 0.5\nwait settled\nscreenshot {}\nexpect-no-errors\n",
+        at("one.png"),
+        at("two.png"),
+        at("back.png")
+    );
+    std::fs::write(at("script"), script).unwrap();
+    let out = run(&["view", "builtin:stairs", "--size", "400x300", "--headless-script", &at("script")]);
+    assert!(out.status.success(), "{}", stderr(&out));
+    let load = |name: &str| skylit::output::load(at(name).as_ref()).unwrap();
+    let [one, two, back] = ["one.png", "two.png", "back.png"].map(load);
+    assert_eq!([one.width, one.height, two.width, two.height, back.width, back.height], [400, 300, 800, 600, 400, 300]);
+    // the same picture, to what fonts and edges are at another size: means of 8x8 points
+    let means = |image: &skylit::output::Image, scale: usize| -> Vec<f32> {
+        let (plane, width) = (image.f32("G").or(image.f32("Y")).unwrap(), image.width as usize);
+        let side = 20 * scale;
+        let block = |bx: usize, by: usize| {
+            let sum: f32 = (0..side * side).map(|k| plane[(by * side + k / side) * width + bx * side + k % side]).sum();
+            sum / (side * side) as f32
+        };
+        (0..15).flat_map(|y| (0..20).map(move |x| (x, y))).map(|(x, y)| block(x, y)).collect()
+    };
+    let difference = |a: &[f32], b: &[f32]| a.iter().zip(b).map(|(a, b)| (a - b).abs()).sum::<f32>() / a.len() as f32;
+    let (first, double, last) = (means(&one, 1), means(&two, 2), means(&back, 1));
+    assert!(difference(&first, &double) < 0.02, "{}", difference(&first, &double));
+    assert!(difference(&first, &last) < 0.02, "{}", difference(&first, &last));
+}
+
+#[test]
+fn gpu_device_memory_that_runs_out() {
+    if !device() {
+        return;
+    }
+    let dir = tempfile::tempdir().unwrap();
+    let exr = place(&dir, "a.exr");
+    let frames = ["render", "builtin:stairs", "--size", "640x480", "--preset", "balanced"];
+    let still = ["render", "builtin:spheres:3000", "--size", "640x480", "--spp", "4"];
+    for args in [&frames[..], &still] {
+        let mut codes = Vec::new();
+        for mib in ["0", "1", "2", "4", "8", "16", "32", "4000"] {
+            let out = skylit(args).args(["-o", &exr]).env("SKYLIT_FAULT_DEVICE_MEMORY", mib).output().unwrap();
+            codes.push(out.status.code());
+            if !out.status.success() {
+                ends(&out, 5, "out of memory: no device memory left for ");
+                assert!(stderr(&out).contains("use a smaller image") && count(dir.path()) == 0, "{}", stderr(&out));
+            }
+        }
+        assert!(codes[0] == Some(5) && codes[1] == Some(5) && codes[7] == Some(0), "{codes:?}");
+        std::fs::remove_file(&exr).unwrap();
+    }
+}
+
+/// The program under a limit of its address space, in KiB.
+#[cfg(target_os = "linux")]
+fn limited(kib: u64, args: &[&str]) -> Output {
+    let mut command = skylit(&[]);
+    let program = command.get_program().to_owned();
+    command = Command::new("sh");
+    command.args(["-c", &format!("ulimit -c 0; ulimit -v {kib}; exec \"$@\""), "sh"]).arg(program).args(args);
+    command.env("XDG_CONFIG_HOME", "/nonexistent").env_remove("RUST_BACKTRACE").stdin(Stdio::null()).output().unwrap()
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn host_memory_that_runs_out() {
+    let dir = tempfile::tempdir().unwrap();
+    let file = place(&dir, "a.glb");
+    let export = ["export", "builtin:terrain:2000000", &file];
+    for kib in [60_000, 100_000, 140_000] {
+        let out = limited(kib, &export);
+        ends(&out, 5, "out of memory: the system has no ");
+        assert_eq!((count(dir.path()), stderr(&out).lines().count()), (0, 1), "{}", stderr(&out));
+    }
+    assert!(limited(4_000_000, &export).status.success() && count(dir.path()) == 1);
+}
+
+#[test]
+fn gpu_a_driver_without_a_feature() {
+    if !device() {
+        return;
+    }
+    let dir = tempfile::tempdir().unwrap();
+    let (whole, exr) = (reference(dir.path()), place(&dir, "a.exr"));
+    let render = |without: &str, extra: &[&str]| {
+        let args = [&STILL[..], &["--resumable", "-o", &exr], extra].concat();
+        skylit(&args).env("SKYLIT_FAULT_WITHOUT", without).output().unwrap()
+    };
+    for feature in ["Vulkan 1.3", "bufferDeviceAddress", "hostQueryReset", "maintenance4", "synchronization2"] {
+        let out = render(feature, &[]);
+        ends(&out, 2, &format!("lacks {feature}, which skylit needs"));
+        assert_eq!(count(dir.path()), 0);
+        let out = skylit(&["doctor"]).env("SKYLIT_FAULT_WITHOUT", feature).output().unwrap();
+        assert_eq!(out.status.code(), Some(2), "{}", stderr(&out));
+    }
+    ends(&render("bufferDeviceAddress,maintenance4", &[]), 2, "lacks bufferDeviceAddress, maintenance4");
+    // what is not needed is not missed: the same bits without 64-bit integers, and without ray tracing
+    let ray_tracing = "VK_KHR_acceleration_structure,VK_KHR_ray_query,VK_KHR_ray_tracing_pipeline";
+    for (without, extra) in [("shaderInt64", &["--tracer", "compute"][..]), (ray_tracing, &["--tracer", "compute"])] {
+        let out = render(without, extra);
+        assert!(out.status.success(), "{without}: {}", stderr(&out));
+        assert!(std::fs::read(&exr).unwrap() == whole, "{without}: other bits");
+    }
+    std::fs::remove_file(&exr).unwrap();
+    for tracer in ["query", "pipeline"] {
+        ends(&render(ray_tracing, &["--tracer", tracer]), 2, tracer);
+    }
+    assert_eq!(count(dir.path()), 0);
+}
+
+/// Runs a shell script in which `$1` is a folder of this size, in a name space of its own; `None` where the system does not let.
+#[cfg(target_os = "linux")]
+fn with_mount(options: &str, script: &str, args: &[&str]) -> Option<Output> {
+    let dir = tempfile::tempdir().unwrap();
+    let unshare = |script: &str| {
+        let mut command = Command::new("unshare");
+        command.args(["--user", "--map-root-user", "--mount", "sh", "-c", script, "sh"]).arg(dir.path());
+        command.arg(env!("CARGO_BIN_EXE_skylit")).args(args);
+        command.env("XDG_CONFIG_HOME", "/nonexistent").env_remove("RUST_BACKTRACE").stdin(Stdio::null()).output()
+    };
+    let mount = format!("mount -t tmpfs -o {options} tmpfs \"$1\"");
+    if !unshare(&mount).is_ok_and(|out| out.status.success()) {
+        println!("skipped: no file systems can be mounted here");
+        return None;
+    }
+    Some(unshare(&format!("{mount} && export F=\"$1\" S=\"$2\" && shift 2 && {script}")).unwrap())
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn gpu_disks_that_are_full() {
+    if !device() {
+        return;
+    }
+    // an older file stays, and what does not fit leaves nothing
+    let script = "echo older > $F/a.exr && $S \"$@\" -o $F/a.exr; code=$?; cat $F/a.exr; ls -A $F; exit $code";
+    let large = ["render", "builtin:cornell-box", "--size", "320x240", "--spp", "1", "--quiet"];
+    for extra in [&["--exr-compression", "none"][..], &["--resumable"]] {
+        let Some(out) = with_mount("size=128k", script, &[&large[..], extra].concat()) else { return };
+        ends(&out, 4, "a.exr: cannot write: the disk is full");
+        assert_eq!(out.stdout, b"older\na.exr\n", "{}", String::from_utf8_lossy(&out.stdout));
+    }
+    for name in ["a.png", "a.webp", "a.jpg", "a.apng"] {
+        let script = format!("$S \"$@\" -o $F/{name}; code=$?; ls -A $F; exit $code");
+        let frames = ["render", "builtin:spheres:3000", "--size", "640x480", "--preset", "fast", "--quiet"];
+        let out = with_mount("size=4k", &script, &frames).unwrap();
+        ends(&out, 4, &format!("{name}: cannot write: the disk is full"));
+        assert!(out.stdout.is_empty(), "{name}: {}", String::from_utf8_lossy(&out.stdout));
+    }
+    // a still whose intermediate images do not fit any more: those before are whole, and the render goes on from them
+    let script = "$S \"$@\" -o $F/a.exr; code=$?; ls -A $F; exit $code";
+    let stills = [&large[..4], &["--spp", "4", "--frames", "0..8", "--orbit", "--quiet"]].concat();
+    let out = with_mount("size=400k", &script.replace("a.exr", "a.#.exr"), &stills).unwrap();
+    ends(&out, 4, "the disk is full");
+    let written = String::from_utf8(out.stdout).unwrap();
+    assert!((1..8).contains(&written.lines().count()) && written.lines().all(|l| l.ends_with(".exr")), "{written}");
+    // a cache that is full costs time, and nothing else
+    let script = "XDG_CACHE_HOME=$F $S \"$@\" && find $F -name '*.tmp'";
+    let png = tempfile::tempdir().unwrap();
+    let file = place(&png, "a.png");
+    let out = with_mount("size=8k", script, &[&large[..], &["-o", &file]].concat()).unwrap();
+    assert!(out.status.success() && out.stdout.is_empty() && out.stderr.is_empty(), "{}", stderr(&out));
+    // a device that takes nothing
+    let link = place(&png, "full.png");
+    std::os::unix::fs::symlink("/dev/full", &link).unwrap();
+    ends(&run(&[&large[..], &["-o", &link]].concat()), 4, "full.png: cannot write: the disk is full");
+    assert_eq!(names(png.path()), ["a.png", "full.png"]);
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn gpu_folders_that_are_read_only() {
+    if !device() {
+        return;
+    }
+    let dir = tempfile::tempdir().unwrap();
+    let file = place(&dir, "a.png");
+    let small = ["render", "builtin:cornell-box", "--size", "32x24", "--spp", "1", "--quiet"];
+    let script = "mount -o remount,ro $F && $S \"$@\" -o $F/a.png";
+    let Some(out) = with_mount("size=1m", script, &small) else { return };
+    ends(&out, 4, "a.png: cannot write: the file system is read-only");
+    // no cache, and no word about it
+    let script = "mkdir $F/skylit && mount -o remount,ro $F && XDG_CACHE_HOME=$F HOME=$F $S \"$@\"";
+    let out = with_mount("size=1m", script, &[&small[..], &["-o", &file]].concat()).unwrap();
+    assert!(out.status.success() && out.stderr.is_empty(), "{}", stderr(&out));
+    // hierarchies that are to be kept are a warning
+    let script = "mount -o remount,ro $F && $S \"$@\" --build best --bvh-cache $F/kept";
+    let arguments = ["render", "builtin:cornell-box", "--tracer", "compute", "--size", "32x24", "--spp", "1", "-o", &file];
+    let out = with_mount("size=1m", script, &arguments).unwrap();
+    assert!(out.status.success() && stderr(&out).contains("not cached"), "{}", stderr(&out));
+    // neither a home nor a cache
+    let out = skylit(&small).args(["-o", &file]).env_remove("HOME").env_remove("XDG_CACHE_HOME").output().unwrap();
+    assert!(out.status.success() && out.stderr.is_empty(), "{}", stderr(&out));
+    assert_eq!(names(dir.path()), ["a.png"]);
+}
+
+fn signal(child: &Child, name: &str) {
+    // it may have ended already
+    let _ = Command::new("kill").args([&format!("-{name}"), &child.id().to_string()]).stderr(Stdio::null()).status();
+}
+
+/// Starts the program, sends a signal after a time, and waits for it.
+fn signalled(args: &[&str], name: &str, after: Duration) -> (Output, Duration) {
+    let child = skylit(args).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    std::thread::sleep(after);
+    signal(&child, name);
+    let start = Instant::now();
+    (child.wait_with_output().unwrap(), start.elapsed())
+}
+
+/// Whenever a signal comes, the output is whole or there is none, and no file besides.
+#[test]
+fn gpu_signals_at_any_time() {
+    if !device() {
+        return;
+    }
+    let dir = tempfile::tempdir().unwrap();
+    let exr = place(&dir, "a.exr");
+    let still = ["render", "builtin:terrain:300000", "--size", "320x200", "--spp", "24", "--resumable", "-o", &exr, "--quiet"];
+    let start = Instant::now();
+    assert!(run(&still).status.success());
+    let whole_time = start.elapsed();
+    let whole = std::fs::read(&exr).unwrap();
+    std::fs::remove_file(&exr).unwrap();
+    let mut interrupted = 0;
+    for (k, name) in ["INT", "TERM", "INT", "TERM", "KILL", "INT", "TERM", "KILL", "INT", "TERM"].iter().enumerate() {
+        let (out, after) = signalled(&still, name, whole_time.mul_f64(k as f64 / 10.0));
+        let text = stderr(&out);
+        match (out.status.code(), out.status.signal()) {
+            (Some(130), _) => {
+                interrupted += 1;
+                assert!(text.lines().last() == Some("skylit: error: interrupted"), "{text}");
+                assert!(after < Duration::from_secs(20), "{after:?}");
+            }
+            // before the program could say what it does with it
+            (None, Some(2 | 15)) if k == 0 => {}
+            (None, Some(9)) if *name == "KILL" => {}
+            (Some(0), _) => {}
+            other => panic!("{name} after {k} tenths: {other:?} {text}"),
+        }
+        if out.status.success() {
+            assert_eq!(std::fs::read(&exr).unwrap(), whole);
+            std::fs::remove_file(&exr).unwrap();
+        }
+        assert_eq!(names(dir.path()), Vec::<OsString>::new(), "{name} after {k} tenths");
+    }
+    assert!(interrupted > 2, "{interrupted}");
+}
+
+/// Waits until a condition holds.
+fn until(what: &str, mut holds: impl FnMut() -> bool) {
+    let start = Instant::now();
+    while !holds() {
+        assert!(start.elapsed() < Duration::from_secs(120), "{what}");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+}
+
+#[test]
+fn gpu_what_was_interrupted_goes_on() {
+    if !device() {
+        return;
+    }
+    let dir = tempfile::tempdir().unwrap();
+    let folder = |name: &str| {
+        let folder = dir.path().join(name);
+        std::fs::create_dir(&folder).unwrap();
+        folder
+    };
+    // stills of a time line: those that were written are whole, and --continue makes the others
+    let [all, part] = ["all", "part"].map(folder);
+    let stills = |folder: &Path, extra: &[&str]| {
+        let output = folder.join("a.#.exr").to_str().unwrap().to_owned();
+        let base = ["render", "builtin:parade", "--integrator", "direct", "--size", "64x36", "--frames", "0..6", "--animate"];
+        let rest = ["--fps", "10", "--spp", "4", "--quiet", "-o", &output];
+        let mut command = skylit(&[&base[..], &rest, extra].concat());
+        command.stdout(Stdio::piped()).stderr(Stdio::piped());
+        command
+    };
+    assert!(stills(&all, &[]).output().unwrap().status.success());
+    let child = stills(&part, &[]).spawn().unwrap();
+    until("no still", || count(&part) > 1);
+    signal(&child, "TERM");
+    let out = child.wait_with_output().unwrap();
+    ends(&out, 130, "interrupted");
+    let written = names(&part);
+    assert!((2..6).contains(&written.len()) && written.iter().all(|f| f.as_bytes().ends_with(b".exr")), "{written:?}");
+    assert!(stills(&part, &["--continue"]).output().unwrap().status.success());
+    let read = |folder: &Path| names(folder).iter().map(|f| std::fs::read(folder.join(f)).unwrap()).collect::<Vec<_>>();
+    assert!(names(&part) == names(&all) && read(&part) == read(&all));
+    // a still that keeps what it has, and is resumed: the same bits as in one go
+    let [a, b] = ["a.exr", "b.exr"].map(|name| place(&dir, name));
+    let base = ["render", "builtin:stairs", "--size", "320x200", "--quiet", "--spp"];
+    let child = skylit(&[&base[..], &["100000", "--resumable", "--keep-partial", "-o", &a]].concat());
+    let mut child = { child }.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    std::thread::sleep(Duration::from_millis(1500));
+    signal(&child, "INT");
+    assert_eq!(child.wait().unwrap().code(), Some(130));
+    let image = skylit::output::load(a.as_ref()).unwrap();
+    let samples = image.metadata("spp").unwrap().to_owned();
+    let more = (samples.parse::<u32>().unwrap() + 5).to_string();
+    assert!(run(&[&base[..], &[&more, "--resume", &a, "-o", &a]].concat()).status.success());
+    assert!(run(&[&base[..], &[&more, "--resumable", "-o", &b]].concat()).status.success());
+    assert_eq!(std::fs::read(a).unwrap(), std::fs::read(b).unwrap());
+}
+
+/// The second signal ends the program at once, whatever it does.
+#[test]
+fn gpu_a_second_signal_ends_at_once() {
+    if !device() {
+        return;
+    }
+    let dir = tempfile::tempdir().unwrap();
+    let exr = place(&dir, "a.exr");
+    let args = ["render", "builtin:terrain:2000000", "--size", "320x200", "--spp", "64", "-o", &exr];
+    let child = skylit(&args).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    std::thread::sleep(Duration::from_millis(400));
+    signal(&child, "INT");
+    std::thread::sleep(Duration::from_millis(50));
+    signal(&child, "INT");
+    let start = Instant::now();
+    let out = child.wait_with_output().unwrap();
+    assert_eq!(out.status.code(), Some(130), "{}", stderr(&out));
+    assert!(start.elapsed() < Duration::from_secs(3) && count(dir.path()) == 0, "{:?}", start.elapsed());
+}
+
+/// Several processes write one output and fill one cache: the output is that of one of them, and the cache is whole.
+#[test]
+fn gpu_processes_side_by_side() {
+    if !device() {
+        return;
+    }
+    let dir = tempfile::tempdir().unwrap();
+    let (exr, cache, kept) = (place(&dir, "a.exr"), place(&dir, "cache"), place(&dir, "kept"));
+    let seeds = ["1", "2", "3"];
+    let command = |seed: &str, output: &str| {
+        let args = [&STILL[..], &["--tracer", "compute", "--build", "best", "--seed", seed, "--quiet", "-o", output]].concat();
+        let mut command = skylit(&args);
+        command.args(["--bvh-cache", &kept]).env("XDG_CACHE_HOME", &cache);
+        command.stdout(Stdio::piped()).stderr(Stdio::piped());
+        command
+    };
+    let children: Vec<Child> = seeds.iter().map(|seed| command(seed, &exr).spawn().unwrap()).collect();
+    for child in children {
+        let out = child.wait_with_output().unwrap();
+        assert!(out.status.success() && out.stderr.is_empty(), "{}", stderr(&out));
+    }
+    let written = std::fs::read(&exr).unwrap();
+    let alone = seeds.map(|seed| {
+        let file = place(&dir, &format!("{seed}.exr"));
+        let out = command(seed, &file).output().unwrap();
+        // a hierarchy that is damaged would be a warning
+        assert!(out.status.success() && out.stderr.is_empty(), "{}", stderr(&out));
+        std::fs::read(file).unwrap()
+    });
+    assert!(alone.contains(&written) && alone[0] != alone[1]);
+    let temporary = |folder: &str| names(folder.as_ref()).iter().any(|f| f.as_bytes().ends_with(b".tmp"));
+    assert!(!temporary(&kept) && !temporary(&place(&dir, "cache/skylit")) && count(kept.as_ref()) == 1);
+    assert_eq!(names(dir.path()), ["1.exr", "2.exr", "3.exr", "a.exr", "cache", "kept"]);
+}
+
+/// Numbers have points, whatever the locale writes.
+#[cfg(target_os = "linux")]
+#[test]
+fn gpu_a_locale_with_decimal_commas() {
+    if !device() {
+        return;
+    }
+    let dir = tempfile::tempdir().unwrap();
+    let locales = place(&dir, "locales");
+    std::fs::create_dir(&locales).unwrap();
+    let made = Command::new("localedef").args(["-i", "de_DE", "-f", "UTF-8", &format!("{locales}/de_DE.UTF-8")]).output();
+    if !made.is_ok_and(|out| out.status.success()) {
+        println!("without a German locale: its name alone is set");
+    }
+    let render = |name: &str, locale: &str| {
+        let exr = place(&dir, name);
+        let args = [&STILL[..], &["--ao-radius", "0.75", "--fov-y", "41.5", "--json", "-o", &exr]].concat();
+        let mut command = skylit(&args);
+        let out = command.env("LC_ALL", locale).env("LANG", locale).env("LOCPATH", &locales).output().unwrap();
+        let record = json(&out);
+        (std::fs::read(exr).unwrap(), record["mean"].as_f64().unwrap())
+    };
+    assert_eq!(render("a.exr", "C"), render("b.exr", "de_DE.UTF-8"));
+    let out = skylit(&[&STILL[..], &["--ao-radius", "0,75", "-o", "a.png"]].concat()).env("LC_ALL", "de_DE.UTF-8").output();
+    assert_refusal(&out.unwrap(), 64, "0,75", &STILL);
+}
+
+/// Times of files mean nothing to caches and resumed renders, and time limits do not follow the clock.
+#[test]
+fn gpu_clocks_that_jump() {
+    if !device() {
+        return;
+    }
+    let dir = tempfile::tempdir().unwrap();
+    let (cache, kept) = (place(&dir, "cache"), place(&dir, "kept"));
+    let render = |name: &str, extra: &[&str], wrapper: &[&str]| {
+        let args = [&STILL[..], &["--tracer", "compute", "--resumable", "--quiet", "-o", name], extra].concat();
+        let program = env!("CARGO_BIN_EXE_skylit");
+        let words = [wrapper, &[program], &args].concat();
+        let mut command = Command::new(words[0]);
+        command.args(&words[1..]).env("XDG_CONFIG_HOME", "/nonexistent").env("XDG_CACHE_HOME", &cache);
+        let out = command.args(["--build", "best", "--bvh-cache", &kept]).output().unwrap();
+        assert!(out.status.success() && out.stderr.is_empty(), "{}", stderr(&out));
+        std::fs::read(name).unwrap()
+    };
+    let exr = |name: &str| place(&dir, name);
+    let first = render(&exr("a.exr"), &[], &[]);
+    let set = |folder: &Path, time: SystemTime| {
+        let mut folders = vec![folder.to_owned()];
+        while let Some(folder) = folders.pop() {
+            for path in std::fs::read_dir(folder).unwrap().map(|f| f.unwrap().path()) {
+                std::fs::File::open(&path).unwrap().set_modified(time).unwrap();
+                if path.is_dir() {
+                    folders.push(path);
+                }
+            }
+        }
+    };
+    for time in [SystemTime::UNIX_EPOCH, SystemTime::now() + Duration::from_secs(3_000_000_000)] {
+        set(dir.path(), time);
+        assert_eq!(render(&exr("b.exr"), &["--resume", &exr("a.exr")], &[]), first);
+    }
+    // with libfaketime: a clock that starts in another year and runs a hundred times as fast
+    let has_faketime = Command::new("faketime").arg("--version").output().is_ok_and(|out| out.status.success());
+    for start in ["@1971-01-01 00:00:00", "@2100-01-01 00:00:00 x100"] {
+        if has_faketime {
+            assert_eq!(render(&exr("b.exr"), &[], &["faketime", "-f", start]), first);
+        } else {
+            println!("skipped: no faketime");
+        }
+    }
+    let path: PathBuf = exr("b.exr").into();
+    assert!(path.exists());
+}
