@@ -55,6 +55,7 @@ pub mod sampling;
 pub mod scene;
 pub mod settings;
 pub mod shaders;
+pub mod stress;
 #[cfg(feature = "cli")]
 pub mod terminal;
 pub mod tracer;

@@ -27,7 +27,7 @@ const LAYERS: &[&[&str]] = &[
     &["renderer"],
     &["terminal"],
     &["report"],
-    &["bench", "compare", "verify", "viewer"],
+    &["bench", "compare", "stress", "verify", "viewer"],
     &["cli"],
 ];
 

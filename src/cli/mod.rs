@@ -17,6 +17,7 @@ mod man;
 mod rays;
 mod render;
 mod scenes;
+mod stress;
 #[cfg(feature = "verify")]
 mod verify;
 mod version;
@@ -40,7 +41,8 @@ use crate::terminal::{console, panic};
 pub const EXIT_CODES: &str = "\
 Exit codes:
   0    done
-  1    a check did not hold (images differ, validation messages), or a Vulkan call failed
+  1    a check did not hold (images differ, a check of `stress` fails, validation messages), or a
+       Vulkan call failed
   2    no Vulkan loader, no device, or one that lacks a requirement (see `skylit doctor`);
        no Open Image Denoise; `verify` could not render or judge a frame
   3    an input file is missing or broken, or the scene cannot be rendered
@@ -95,6 +97,8 @@ enum Command {
     Bench(crate::bench::BenchArgs),
     /// Trace a set of rays against a mesh and report the ray throughput
     Rays(args::RaysArgs),
+    /// Try to break numerics: checks of tracers, sampling, films and filters with figures and bounds, or of a scene of yours
+    Stress(Box<stress::StressArgs>),
     /// Show the Vulkan devices, what each tracer requires and supports, and which one `auto` chooses
     Doctor(args::DoctorArgs),
     /// Print a script by which a shell completes commands, options and names of built-in scenes
@@ -192,6 +196,7 @@ fn dispatch(command: Command, start: Instant) -> Result<(), Failure> {
         Command::Completions(args) => completions::run(&args),
         Command::Man(args) => man::run(&args),
         Command::Diff(args) => return diff::run(&args),
+        Command::Stress(args) => return stress::run(&args),
         #[cfg(feature = "compare")]
         Command::Compare(args) => return compare::run(&args, start),
         #[cfg(feature = "verify")]

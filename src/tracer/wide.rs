@@ -152,7 +152,7 @@ fn collapse(binary: Bvh2, depth: Option<u32>, leaf: impl Fn(u32) -> Block + Sync
 
 /// Version of cached BVHs. Raise it with every change that makes other blocks of the same input: in builders, pairs, collapse, or the
 /// layout of nodes and leaves.
-const LAYOUT_VERSION: u32 = 3;
+const LAYOUT_VERSION: u32 = 4;
 
 /// The header of a cached BVH, beside its blocks.
 #[repr(C)]
@@ -239,7 +239,49 @@ fn triangle_tree(flat: &FlatScene, group: &BlasGroup, options: &BuildOptions) ->
     let opaque = group.opaque_count as u32;
     let content: [&[u8]; 3] =
         [&opaque.to_le_bytes(), bytemuck::cast_slice(&triangles.positions), bytemuck::cast_slice(&triangles.indices)];
-    load_or_build(options, preset, &content, || triangle_tree_of(&triangles, opaque, preset, None))
+    load_or_build(options, preset, &content, || match flat.motion.is_none() {
+        true => unique_triangle_tree(&triangles, opaque, preset),
+        false => triangle_tree_of(&triangles, opaque, preset, None),
+    })
+}
+
+/// A tree that has opaque triangles of the same three vertices once, the first of them: a ray that meets one meets all of them at the same point, and nothing tells them
+/// apart. Very many would make a traversal that some drivers do not finish.
+fn unique_triangle_tree(triangles: &Triangles, opaque: u32, preset: BuildPreset) -> WideBvh {
+    let all = &triangles.indices;
+    // a look at some of them: duplicates too rare for it are too few to matter
+    let stride = all.len().div_ceil(SAMPLED_TRIANGLES).max(1);
+    let mut some: Vec<[u32; 3]> = all[..opaque as usize].iter().step_by(stride).map(same_from_first).collect();
+    some.sort_unstable();
+    if !some.windows(2).any(|w| w[0] == w[1]) {
+        return triangle_tree_of(triangles, opaque, preset, None);
+    }
+    let mut order: Vec<(u32, [u32; 3])> = (0..opaque).map(|k| (k, same_from_first(&all[k as usize]))).collect();
+    order.par_sort_unstable_by_key(|(k, t)| (*t, *k));
+    order.dedup_by_key(|(_, t)| *t);
+    let mut numbers: Vec<u32> = order.into_iter().map(|(k, _)| k).collect();
+    numbers.sort_unstable();
+    let kept = numbers.len() as u32;
+    numbers.extend(opaque..all.len() as u32);
+    let indices = numbers.iter().map(|&k| all[k as usize]).collect();
+    let few = Triangles { positions: triangles.positions.clone(), indices };
+    let mut tree = triangle_tree_of(&few, kept, preset, None);
+    for block in tree.blocks.iter_mut().filter(|b| wide::is_leaf(b)) {
+        let leaf: &mut TriangleLeaf = bytemuck::cast_mut(block);
+        for id in leaf.primitives.iter_mut().filter(|id| **id != pairs::NONE) {
+            *id = numbers[(*id & !ALPHA_TESTED) as usize] | (*id & ALPHA_TESTED);
+        }
+    }
+    tree
+}
+
+/// Triangles that are looked at for duplicates.
+const SAMPLED_TRIANGLES: usize = 4096;
+
+/// The triangle's vertices in their order, the smallest first.
+fn same_from_first(t: &[u32; 3]) -> [u32; 3] {
+    let k = (0..3).min_by_key(|k| t[*k]).unwrap_or(0);
+    [t[k], t[(k + 1) % 3], t[(k + 2) % 3]]
 }
 
 /// `opaque`: triangles before the first alpha-tested one; `depth` as in [`tree`].
@@ -339,6 +381,24 @@ mod tests {
             top.validate(|b| vec![boxes[bytemuck::cast_ref::<Block, InstanceLeaf>(b).instance as usize]])
                 .unwrap_or_else(|e| panic!("{name}: {e}"));
         }
+    }
+
+    /// Of triangles with the same vertices in the same order the first is held, and the others are not; one that is turned over is another.
+    #[test]
+    fn the_same_triangle_is_held_once() {
+        let positions = vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z];
+        let mut indices = vec![[3, 1, 2]];
+        indices.extend((0..3000).map(|k| [[0, 1, 2], [1, 2, 0], [2, 1, 0]][k % 3]));
+        let opaque = indices.len() as u32;
+        // those that are tested are kept, each
+        indices.extend([[0, 1, 2]; 5]);
+        let triangles = Triangles { positions, indices };
+        let tree = unique_triangle_tree(&triangles, opaque, BuildPreset::Default);
+        let leaves = tree.blocks.iter().filter(|b| wide::is_leaf(b)).map(|b| *bytemuck::cast_ref::<Block, TriangleLeaf>(b));
+        let mut held: Vec<u32> = leaves.flat_map(|l| l.primitives).filter(|id| *id != pairs::NONE).collect();
+        held.sort_unstable_by_key(|id| id & !ALPHA_TESTED);
+        let tested = (opaque..opaque + 5).map(|k| k | ALPHA_TESTED);
+        assert_eq!(held, [0, 1, 3].into_iter().chain(tested).collect::<Vec<_>>());
     }
 
     #[test]

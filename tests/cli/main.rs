@@ -21,3 +21,4 @@ mod manners;
 mod outputs;
 mod program;
 mod sequences;
+mod stress;

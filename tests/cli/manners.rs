@@ -45,9 +45,20 @@ fn three_helps() {
     assert_eq!(stdout(&["help", "compare", "ao-vs-path"]), stdout(&["compare", "ao-vs-path", "--help"]));
     assert_eq!(stdout(&["help"]), stdout(&["--help"]));
     refuses(&["help", "fly"], 64, "fly");
-    for command in
-        ["view", "compare", "verify", "bench rays", "bench report", "rays", "export", "diff", "scenes", "doctor", "completions"]
-    {
+    for command in [
+        "view",
+        "compare",
+        "verify",
+        "bench rays",
+        "bench report",
+        "rays",
+        "stress",
+        "export",
+        "diff",
+        "scenes",
+        "doctor",
+        "completions",
+    ] {
         let words: Vec<&str> = command.split(' ').chain(["--help"]).collect();
         assert!(stdout(&words).contains("Examples:\n  "), "{command}");
     }

@@ -40,6 +40,7 @@ use skylit::gpu::{Device, Options};
 use skylit::integrators::path::{self, PathOptions, PathResult, Strategy};
 use skylit::scene::material::MaterialKind;
 use skylit::scene::{Camera, Environment, Geometry, Instance, Light, LightKind, Material, Mesh, Scene};
+use skylit::stress::sampling::{emitter, matte, mean_of, scene_of};
 use skylit::tracer::{Needs, Tracer, TracerKind};
 
 /// The device that the tests of this folder share; with the validation layer if `SKYLIT_FULL` is set. Without it the test in validation.rs has the layer, for
@@ -48,26 +49,6 @@ fn device() -> Arc<Device> {
     static DEVICE: OnceLock<Arc<Device>> = OnceLock::new();
     let validation = common::is_full() && common::validated().validation;
     DEVICE.get_or_init(|| common::open(Options { keep_pipelines: common::KEPT, validation, ..Options::default() })).clone()
-}
-
-/// A scene of shapes with a material each.
-fn scene_of(parts: Vec<(Geometry, Material)>, camera: Camera) -> Scene {
-    let mut scene = Scene { cameras: vec![camera], ..Scene::default() };
-    for (k, (geometry, material)) in parts.into_iter().enumerate() {
-        scene.materials.push(material);
-        scene.meshes.push(Mesh { name: format!("mesh {k}"), geometry, material: k });
-        scene.instances.push(Instance { name: format!("mesh {k}"), mesh: k, object_to_world: DAffine3::IDENTITY });
-    }
-    scene
-}
-
-fn matte(albedo: f32) -> Material {
-    Material { kind: MaterialKind::Matte, base_color: Vec3::splat(albedo).extend(1.0), ..Material::default() }
-}
-
-/// Emits, and reflects nothing.
-fn emitter(radiance: f32) -> Material {
-    Material { emissive: Vec3::splat(radiance), ..matte(0.0) }
 }
 
 fn tracer(device: &Arc<Device>, kind: TracerKind, flat: &FlatScene) -> Tracer {
@@ -82,15 +63,6 @@ fn render(tracer: &Tracer, flat: &FlatScene, options: &PathOptions) -> PathResul
         path::render(tracer, flat, &record, options, &mut NoControl).unwrap_or_else(|e| panic!("{}: {e}", tracer.kind()));
     assert_eq!(result.image.film.not_finite, 0, "{}: samples that are no numbers", tracer.kind());
     result
-}
-
-/// Mean over all pixels and channels, and its true standard error: pixels draw their samples independently of each other.
-fn mean_of(film: &Film) -> (f64, f64) {
-    let means: Vec<f64> = film.mean.chunks(3).map(|p| p.iter().map(|&c| f64::from(c)).sum::<f64>() / 3.0).collect();
-    let n = means.len() as f64;
-    let mean = means.iter().sum::<f64>() / n;
-    let variance = means.iter().map(|m| (m - mean).powi(2)).sum::<f64>() / (n - 1.0);
-    (mean, (variance / n).sqrt())
 }
 
 /// The tracer of a test, which its name picks. With `SKYLIT_FULL` set, all of them.

@@ -4,74 +4,33 @@
 use std::sync::Arc;
 
 use glam::{DAffine3, DVec3, Vec3};
-use rayon::prelude::*;
-use skylit::Error;
 use skylit::accel::flatten::FlatScene;
 use skylit::film::NoControl;
-use skylit::film::camera::CameraRecord;
 use skylit::gpu::Device;
-use skylit::integrators::ao::{self, AoOptions};
-use skylit::integrators::aov;
-use skylit::integrators::rays::{Mode, trace};
-use skylit::measure::parity::{judge_any, judge_closest};
-use skylit::measure::ray_sets::{leak_rays, random_rays};
+use skylit::integrators::rays::Mode;
+use skylit::measure::parity::judge_closest;
+use skylit::measure::ray_sets::random_rays;
+use skylit::oracle::Oracle;
 use skylit::oracle::rounding::Rounding;
-use skylit::oracle::{Oracle, OracleHit};
 use skylit::ray::{Hit, Ray};
-use skylit::sampling::sobol::hash_combine;
-use skylit::sampling::to_unit;
-use skylit::scene::{Camera, Geometry, Instance, Material, Mesh, Scene, Sphere, TriangleMesh};
+use skylit::scene::{Geometry, Scene, Sphere, TriangleMesh};
+use skylit::stress::degenerate::{self, random, random_point, rays_at_edges, scene_of as scene, triangles};
 use skylit::tracer::{Kernel, Tracer, TracerKind};
 
 use crate::common;
 use crate::common::{assert_validation_clean, device, hits, tracer, tracers};
 
-fn scene(parts: Vec<(Geometry, Vec<DAffine3>)>) -> Scene {
-    let mut scene = Scene { materials: vec![Material::default()], ..Scene::default() };
-    for (geometry, places) in parts {
-        scene.meshes.push(Mesh { name: String::new(), geometry, material: 0 });
-        let mesh = scene.meshes.len() - 1;
-        scene.instances.extend(places.into_iter().map(|object_to_world| Instance {
-            name: String::new(),
-            mesh,
-            object_to_world,
-        }));
-    }
-    scene
-}
-
 const HERE: DAffine3 = DAffine3::IDENTITY;
-
-fn triangles(corners: impl IntoIterator<Item = [DVec3; 3]>) -> Geometry {
-    let mut mesh = TriangleMesh::default();
-    for corner in corners {
-        let first = mesh.positions.len() as u32;
-        mesh.positions.extend(corner.map(|p| p.as_vec3()));
-        mesh.indices.push([first, first + 1, first + 2]);
-    }
-    Geometry::Triangles(mesh)
-}
-
-/// Uniform in [0, 1): number `k` of `i`.
-fn random(i: u32, k: u32) -> f64 {
-    to_unit(hash_combine(hash_combine(42, i), k)) as f64
-}
-
-fn random_point(i: u32, k: u32) -> DVec3 {
-    DVec3::new(random(i, k), random(i, k + 1), random(i, k + 2)) * 2.0 - 1.0
-}
 
 /// Every tracer against the oracle without its tree; also makes a small image and its outputs, which must be numbers.
 fn judge(device: &Arc<Device>, what: &str, scene: &Scene, rays: &[Ray]) {
     let oracle = Oracle::new(scene, scene.origin());
-    let truth: Vec<OracleHit> = rays.par_iter().map(|r| oracle.brute_force_closest(r)).collect();
-    let occluded: Vec<bool> = truth.iter().map(OracleHit::is_hit).collect();
+    let truth = degenerate::truth(&oracle, rays);
     let judged = |what: &str, tracer: &Tracer| {
-        let closest = judge_closest(&oracle, rays, &hits(tracer, rays, Mode::Closest), &truth, Rounding::default());
+        let [closest, any] =
+            degenerate::judge(tracer, &oracle, rays, &truth, &mut NoControl).unwrap_or_else(|e| panic!("{what}: {e}"));
         println!("{what}: {closest}; stack of {}", tracer.stats().stack_entries);
         assert_eq!(closest.unexplained, 0, "{what}: {closest}");
-        let any: Vec<bool> = hits(tracer, rays, Mode::Any).iter().map(Hit::is_hit).collect();
-        let any = judge_any(&oracle, rays, &any, &occluded, Rounding::default());
         assert_eq!(any.unexplained, 0, "{what} any: {any}");
     };
     for kernel in [Kernel::Nearest, Kernel::Brute] {
@@ -90,18 +49,8 @@ fn judge(device: &Arc<Device>, what: &str, scene: &Scene, rays: &[Ray]) {
 }
 
 fn picture(tracer: &Tracer, scene: &Scene, what: &dyn std::fmt::Display) {
-    let (lo, hi) = scene.bounds().unwrap_or((DVec3::ZERO, DVec3::ONE));
-    let camera = CameraRecord::new(&Camera::framing(lo, hi, 1.0), scene.origin(), 1.0);
-    for falloff in [1.0, 4.0] {
-        let options = AoOptions { size: [16, 16], spp: 2, falloff, ..Default::default() };
-        let image = ao::render(tracer, &camera, &options, &mut NoControl).unwrap();
-        let all = image.image.film.mean.iter().chain(&image.image.film.variance);
-        assert!(all.clone().all(|x| (0.0..=1.0).contains(x)), "{what} {}: {all:?}", tracer.kind());
-    }
-    for pixel in aov::render(tracer, &camera, [16, 16], &mut NoControl).unwrap() {
-        let numbers = [pixel.position, pixel.ng, pixel.ns, [pixel.red, pixel.green, pixel.blue]];
-        assert!(numbers.as_flattened().iter().all(|x| x.is_finite()) && !pixel.depth.is_nan(), "{what}: {pixel:?}");
-    }
+    let bad = degenerate::unsound_values(tracer, scene, &mut NoControl).unwrap();
+    assert_eq!(bad, 0, "{what} {}: values that are no numbers or out of range", tracer.kind());
 }
 
 #[test]
@@ -177,43 +126,15 @@ fn gpu_degenerate_empty_scenes() {
     assert_validation_clean(&device);
 }
 
-/// Rays at corners of the triangles, at points of their edges, and along their edges.
-fn rays_at_edges(oracle: &Oracle) -> Vec<Ray> {
-    let mut rays = Vec::new();
-    for (i, t) in (0u32..).zip(oracle.triangles()) {
-        let from = random_point(i, 20) * 2.0;
-        for target in [t.v[0], t.v[0].lerp(t.v[1], random(i, 30))] {
-            rays.push(ray(from, target - from));
-        }
-        if t.v[0] != t.v[1] {
-            rays.push(ray(t.v[0] * 2.0 - t.v[1], t.v[1] - t.v[0]));
-        }
-    }
-    rays
-}
-
 /// Triangles without area, kept on purpose: points, segments, repeated corners; slivers and sound triangles among them.
 #[test]
 fn gpu_degenerate_triangles_without_area() {
     let device = device();
-    let corners = (0..4000).map(|i| {
-        let [a, b, c] = [random_point(i, 0), random_point(i, 3), random_point(i, 6)];
-        match i % 6 {
-            0 => [a, a, a],
-            1 => [a, a, b],
-            2 => [a, b, a],
-            3 => [a, b, a.lerp(b, 0.6) + c * 2e-2],
-            _ => [a, a + b * 0.1, a + c * 0.1],
-        }
-    });
-    let scene = scene(vec![(triangles(corners), vec![HERE])]);
-    let oracle = Oracle::new(&scene, scene.origin());
-    let mut rays = random_rays(&oracle, 20_000, 2);
-    rays.extend(rays_at_edges(&oracle));
+    let (scene, rays) = degenerate::without_area(4000, 20_000);
     judge(&device, "triangles without area", &scene, &rays);
     // nothing but those: bounds are there, hits are not
     let flat = (0..100).map(|i| [random_point(i, 0), random_point(i, 0), random_point(i, 3)]);
-    let scene = self::scene(vec![(triangles(flat), vec![HERE])]);
+    let scene = degenerate::scene_of(vec![(triangles(flat), vec![HERE])]);
     judge(&device, "segments only", &scene, &rays);
     assert_validation_clean(&device);
 }
@@ -272,32 +193,11 @@ fn gpu_degenerate_needles() {
     assert_validation_clean(&device);
 }
 
-fn ray(origin: DVec3, direction: DVec3) -> Ray {
-    Ray { origin: origin.as_vec3().to_array(), tmin: 0.0, direction: direction.as_vec3().to_array(), tmax: f32::INFINITY }
-}
-
 /// Triangles from 1e-6 to 1e6 in one mesh, around points that are as far apart.
 #[test]
 fn gpu_degenerate_scales_together() {
     let device = device();
-    let corners: Vec<[DVec3; 3]> = (0..3000)
-        .map(|i| {
-            let at = random_point(i, 0) * 10f64.powf(random(i, 3) * 12.0 - 6.0);
-            let size = 10f64.powf(random(i, 4) * 12.0 - 6.0);
-            [at, at + random_point(i, 5) * size, at + random_point(i, 8) * size]
-        })
-        .collect();
-    let scene = scene(vec![(triangles(corners), vec![HERE])]);
-    let oracle = Oracle::new(&scene, scene.origin());
-    let mut rays = random_rays(&oracle, 10_000, 3);
-    for (i, t) in oracle.triangles().iter().enumerate() {
-        // at its middle, from as far as it is large, and from as far as the scene is large
-        let (i, middle) = (i as u32, (t.v[0] + t.v[1] + t.v[2]) / 3.0);
-        for reach in [(t.v[1] - t.v[0]).length(), 1e6] {
-            let from = middle + random_point(i, 20) * reach;
-            rays.push(ray(from, (middle - from) / reach));
-        }
-    }
+    let (scene, rays) = degenerate::scales_together(3000, 10_000);
     judge(&device, "scales from 1e-6 to 1e6", &scene, &rays);
     assert_validation_clean(&device);
 }
@@ -306,20 +206,7 @@ fn gpu_degenerate_scales_together() {
 #[test]
 fn gpu_degenerate_largest_coordinates() {
     let device = device();
-    let corners: Vec<[DVec3; 3]> = (0..2000)
-        .map(|i| {
-            let at = random_point(i, 0) * 0.9e12;
-            [at, at + random_point(i, 3) * 1e11, at + random_point(i, 6) * 1e11]
-        })
-        .collect();
-    let scene = scene(vec![(triangles(corners), vec![HERE])]);
-    let oracle = Oracle::new(&scene, scene.origin());
-    let mut rays = random_rays(&oracle, 5000, 3);
-    for (i, t) in oracle.triangles().iter().enumerate() {
-        let middle = (t.v[0] + t.v[1] + t.v[2]) / 3.0;
-        let along = [DVec3::X, DVec3::Y, DVec3::Z][i % 3] * if i % 2 == 0 { 1.0 } else { -1.0 };
-        rays.push(ray(middle - along * 4e12, along));
-    }
+    let (scene, rays) = degenerate::largest_coordinates(2000, 5000);
     judge(&device, "the largest coordinates", &scene, &rays);
     assert_validation_clean(&device);
 }
@@ -337,11 +224,7 @@ fn gpu_degenerate_very_many_coincident_triangles() {
 
 fn coincident(count: u32) {
     let device = device();
-    let corners = [DVec3::new(-1.0, -0.5, 0.1), DVec3::new(1.0, -0.4, -0.2), DVec3::new(0.1, 1.0, 0.3)];
-    let mut mesh = TriangleMesh { positions: corners.map(|p| p.as_vec3()).to_vec(), ..Default::default() };
-    mesh.indices = vec![[0, 1, 2]; count as usize];
-    let scene = scene(vec![(Geometry::Triangles(mesh), vec![HERE])]);
-    let one = self::scene(vec![(triangles([corners]), vec![HERE])]);
+    let [scene, one] = degenerate::coincident(count);
     let oracle = Oracle::new(&one, DVec3::ZERO);
     // few: a ray that meets one meets them all
     let rays = random_rays(&oracle, 2000, 4);
@@ -350,18 +233,8 @@ fn coincident(count: u32) {
         let start = std::time::Instant::now();
         let tracer = tracer(&device, kind, &scene);
         let built = start.elapsed();
-        let traced = trace(&tracer, &rays, Mode::Closest, 1, &mut NoControl);
-        // Mesa 22.3 leaves loops after 65,535 iterations: then an error is the right answer
-        if let Err(Error::Vulkan(message)) = &traced
-            && message.contains("ended the traversal")
-            && count > 65_535
-            && kind == TracerKind::Compute
-        {
-            println!("{count} coincident triangles {kind}: {message}");
-            continue;
-        }
         // which of them is met is not said: as if all had the first's number
-        let mut got = traced.unwrap_or_else(|e| panic!("{kind}: {e}")).0;
+        let mut got = hits(&tracer, &rays, Mode::Closest);
         for hit in got.iter_mut().filter(|h| h.is_hit()) {
             assert!(hit.primitive < count, "{kind}: {hit:?}");
             hit.primitive = 0;
@@ -385,29 +258,10 @@ fn coincident(count: u32) {
 #[test]
 fn gpu_degenerate_nested_triangles() {
     let device = device();
-    let shape = [DVec3::new(-1.0, -0.6, 0.0), DVec3::new(1.0, -0.6, 0.2), DVec3::new(0.0, 1.0, -0.1)];
-    // apart in z by more than rounding, so that there is one answer
-    let chain = (0..200).map(|k| {
-        let size = 0.5f64.powf(k as f64 * 0.25);
-        shape.map(|p| p * size + DVec3::Z * (0.6 * size))
-    });
-    // a second one whose sizes fall by 2^-1 per level, to the end of the exponent's range where products underflow
-    let steep = (0..60).map(|k| shape.map(|p| p * 0.5f64.powi(k) + DVec3::X * 3.0 + DVec3::Z * (0.6 * 0.5f64.powi(k))));
-    for (what, geometry) in [
-        ("nested triangles", triangles(chain.clone())),
-        ("nested steeply", triangles(steep.clone())),
-        ("nested, both", triangles(chain.chain(steep))),
-    ] {
-        let scene = scene(vec![(geometry, vec![HERE])]);
-        let oracle = Oracle::new(&scene, scene.origin());
-        let mut rays = random_rays(&oracle, 20_000, 5);
-        for i in 0..4000 {
-            // at a point near the common one, nearer by many scales
-            let center = if i % 2 == 0 { DVec3::ZERO } else { DVec3::X * 3.0 };
-            let target = center + random_point(i, 0) * 0.5f64.powf(50.0 * random(i, 3));
-            let from = center + random_point(i, 4) + DVec3::Z * if i % 4 < 2 { 3.0 } else { -3.0 };
-            rays.push(ray(from, target - from));
-        }
+    for (what, gentle, steep) in
+        [("nested triangles", true, false), ("nested steeply", false, true), ("nested, both", true, true)]
+    {
+        let (scene, rays) = degenerate::nested(gentle, steep, 20_000);
         judge(&device, what, &scene, &rays);
     }
     assert_validation_clean(&device);
@@ -417,20 +271,7 @@ fn gpu_degenerate_nested_triangles() {
 #[test]
 fn gpu_degenerate_spheres() {
     let device = device();
-    let balls = (0..500)
-        .map(|k| Sphere { center: Vec3::new(0.1, 0.2, 0.3), radius: if k < 300 { 0.97f32.powi(k) } else { 0.5 } })
-        .chain(
-            (0..100).map(|i| Sphere { center: random_point(i, 0).as_vec3() * 2.0, radius: 1e-5 + 1e-3 * random(i, 3) as f32 }),
-        );
-    let scene = scene(vec![(Geometry::Spheres(balls.collect()), vec![HERE])]);
-    let oracle = Oracle::new(&scene, scene.origin());
-    let mut rays = random_rays(&oracle, 20_000, 6);
-    for (i, s) in oracle.spheres().iter().enumerate() {
-        let from = random_point(i as u32, 20) * 3.0;
-        rays.push(ray(from, s.center - from));
-        // from inside
-        rays.push(ray(s.center, random_point(i as u32, 24)));
-    }
+    let (scene, rays) = degenerate::nested_spheres(20_000);
     judge(&device, "nested and coincident spheres", &scene, &rays);
     assert_validation_clean(&device);
 }
@@ -440,35 +281,14 @@ fn gpu_degenerate_spheres() {
 #[test]
 fn gpu_degenerate_slivers_do_not_meet_themselves() {
     let device = device();
-    for (what, geometry) in [
-        ("a thin cylinder", skylit::scene::builtin::shapes::cylinder(0.035, 4.0, 20)),
-        ("a thick cylinder of many faces", skylit::scene::builtin::shapes::cylinder(0.4, 4.0, 500)),
-    ] {
-        for turn in [0.0, 0.4, 1.2] {
-            let place = DAffine3::from_rotation_z(turn) * DAffine3::from_translation(DVec3::new(0.7, 0.3, 0.2));
-            let scene = scene(vec![(geometry.clone(), vec![place])]);
-            let (lo, hi) = scene.bounds().unwrap();
-            let middle = (lo + hi) * 0.5;
-            let camera = Camera::look_at(middle + DVec3::new(0.5, 0.3, 2.0), middle, DVec3::Y, 1.5);
-            for kind in tracers(&device) {
-                let tracer = tracer(&device, kind, &scene);
-                let options = AoOptions { size: [128, 128], spp: 32, ..Default::default() };
-                let image =
-                    ao::render(&tracer, &CameraRecord::new(&camera, scene.origin(), 1.0), &options, &mut NoControl).unwrap();
-                // a convex body does not occlude itself
-                let covered: f64 = image.image.film.coverage.iter().map(|&c| c as f64 * 32.0).sum();
-                let off: f64 = image
-                    .image
-                    .film
-                    .mean
-                    .iter()
-                    .zip(&image.image.film.coverage)
-                    .map(|(m, c)| ((c - m) as f64 * 32.0).round())
-                    .sum();
-                println!("{what}, turned {turn}, {kind}: {off} of {covered} rays meet the body they leave");
-                assert!(covered > 1000.0, "{what} {kind}: {covered} covered");
-                assert!(off == 0.0, "{what}, turned {turn}, {kind}: {off} of {covered} rays meet the body they leave");
-            }
+    for (what, scene) in degenerate::needle_bodies() {
+        for kind in tracers(&device) {
+            // a convex body does not occlude itself
+            let (covered, off) =
+                degenerate::self_occluded(&tracer(&device, kind, &scene), &scene, 128, 32, &mut NoControl).unwrap();
+            println!("{what}, {kind}: {off} of {covered} rays meet the body they leave");
+            assert!(covered > 1000.0, "{what} {kind}: {covered} covered");
+            assert!(off == 0.0, "{what}, {kind}: {off} of {covered} rays meet the body they leave");
         }
     }
     assert_validation_clean(&device);
@@ -478,16 +298,8 @@ fn gpu_degenerate_slivers_do_not_meet_themselves() {
 #[test]
 fn gpu_degenerate_coarse_coordinates() {
     let device = device();
-    let place = skylit::scene::builtin::SceneTransform { scale: 100.0, offset: DVec3::new(1e6, -2e6, 3e6) };
-    // baked, then hidden from rebasing by a triangle near the origin
-    let mut scene = skylit::scene::builtin::bake(&skylit::scene::builtin::analytic::closed_box(1.0, place));
-    let far = self::scene(vec![(triangles([[DVec3::ZERO, DVec3::X, DVec3::Y]]), vec![HERE])]);
-    scene.meshes.push(far.meshes.into_iter().next().unwrap());
-    scene.instances.push(Instance { name: String::new(), mesh: 1, object_to_world: HERE });
+    let (scene, rays) = degenerate::coarse_coordinates(20_000);
     assert_eq!(scene.origin(), DVec3::ZERO);
-    let oracle = Oracle::new(&scene, scene.origin());
-    let mut rays = leak_rays(&oracle, 20_000, 7);
-    rays.extend(random_rays(&oracle, 5000, 8));
     judge(&device, "coarse coordinates", &scene, &rays);
     assert_validation_clean(&device);
 }

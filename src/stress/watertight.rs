@@ -1,0 +1,135 @@
+//! Section 2, watertightness: rays at shared edges and vertices of closed meshes, and rays with zero and negative-zero components.
+
+use glam::DVec3;
+
+use super::{Check, Section, Session};
+use crate::error::Result;
+use crate::film::Control;
+use crate::integrators::rays::{Mode, trace};
+use crate::measure::ray_sets::{leak_rays, leak_scenes};
+use crate::oracle::Oracle;
+use crate::ray::{Hit, Ray};
+use crate::scene::builtin::{self, SceneTransform, analytic, shapes};
+use crate::scene::{Geometry, Scene};
+use crate::tracer::{Tracer, TracerKind};
+
+/// See the module's text.
+pub const SECTION: Section = Section {
+    name: "watertight",
+    title: "Watertightness",
+    about: "rays at shared edges and vertices of closed meshes; the compute tracer lets none through",
+    of_scene: false,
+    run,
+};
+
+/// Closed convex meshes beside [`leak_scenes`]: many triangles, needles (`segments` of them around a point), and nearly flat ones.
+pub fn hard_scenes(levels: u32, segments: u32) -> Vec<(String, Scene)> {
+    let body = |geometry: Geometry| {
+        let mut scene = analytic::closed_box(1.0, SceneTransform::default());
+        scene.meshes[0].geometry = geometry;
+        scene
+    };
+    let mut flat = shapes::icosphere(1.0, 4);
+    if let Geometry::Triangles(mesh) = &mut flat {
+        mesh.positions.iter_mut().for_each(|p| p.y *= 1e-4);
+        mesh.normals.clear();
+    }
+    let round = shapes::icosphere(1.0, levels);
+    let name = format!("round body of {} triangles", round.primitive_count());
+    vec![
+        (name, body(round)),
+        ("cylinder of needles".into(), body(shapes::cylinder(0.02, 4.0, 60))),
+        ("disk of needle fans".into(), body(shapes::cylinder(1.0, 0.01, segments))),
+        ("nearly flat ellipsoid".into(), body(flat)),
+    ]
+}
+
+/// Rays along the axes, from the middle of a closed body that is its own mirror image in each axis out through each of its vertices: two components of each direction are
+/// zero or negative zero, and every plane between triangles is met exactly.
+pub fn axis_rays(oracle: &Oracle) -> Vec<Ray> {
+    let mut rays = Vec::new();
+    for (i, corner) in oracle.triangles().iter().flat_map(|t| t.v).enumerate() {
+        let axis = corner.abs().max_position();
+        let mut origin = corner;
+        origin[axis] = 0.0;
+        let mut direction = if i % 2 == 0 { [0.0f32; 3] } else { [-0.0f32; 3] };
+        direction[axis] = if corner[axis] > 0.0 { 1.0 } else { -1.0 };
+        rays.push(Ray { origin: origin.as_vec3().to_array(), tmin: 0.0, direction, tmax: f32::INFINITY });
+    }
+    rays
+}
+
+/// Rays of a set that meet nothing, asked for any hit and for the closest.
+///
+/// # Errors
+/// Those of tracing.
+pub fn leaks(tracer: &Tracer, rays: &[Ray], control: &mut dyn Control) -> Result<[usize; 2]> {
+    let missed = |hits: Vec<Hit>| hits.iter().filter(|h| !h.is_hit()).count();
+    let any = missed(trace(tracer, rays, Mode::Any, 1, control)?.0);
+    Ok([any, missed(trace(tracer, rays, Mode::Closest, 1, control)?.0)])
+}
+
+/// The check of a closed scene: not one of `rays` may leave it through the compute tracer. What the hardware tracers let through is their driver's affair, and reported.
+///
+/// # Errors
+/// Those of tracing.
+pub fn check(tracer: &Tracer, name: &str, rays: &[Ray], control: &mut dyn Control) -> Result<Check> {
+    let [any, closest] = leaks(tracer, rays, control)?;
+    let sentence = format!("of {}; {any} asked for any hit, {closest} for the closest", rays.len());
+    Ok(Check::none_of(name, any.max(closest) as u64, "leaks", tracer.kind() == TracerKind::Compute).says(sentence))
+}
+
+fn run(session: &mut Session) -> Result<()> {
+    let effort = session.setup().effort();
+    let mut scenes = leak_scenes();
+    // the ends of the range, which its middle does not reach
+    for (scale, offset) in [(1e-6, 0.0), (1.0, 1e7)] {
+        let place = SceneTransform { scale, offset: DVec3::splat(offset) };
+        scenes.push((format!("box, placed, scale {scale:e}, offset {offset:e}"), analytic::closed_box(1.0, place)));
+    }
+    scenes.extend(hard_scenes(effort.pick(6, 8), effort.pick(200, 5000)));
+    // drivers' own tracers are slower on CPUs, and their leaks are theirs
+    let count =
+        |kind| if kind == TracerKind::Compute { effort.pick(1_000_000, 100_000_000) } else { effort.pick(150_000, 10_000_000) };
+    let kinds = session.setup().tracers();
+    let mut sums = vec![(0u64, 0u64); kinds.len()];
+    for (what, scene) in &scenes {
+        let name = format!("edges and vertices: {what}");
+        let oracle = Oracle::new(scene, scene.origin());
+        for (kind, sum) in kinds.iter().zip(&mut sums) {
+            session.measure(&name, Some(*kind), |s, w| {
+                let (tracer, each) = (s.tracer(*kind, scene)?, count(*kind) / scenes.len());
+                let mut total: Option<Check> = None;
+                // in parts, which fit into memory
+                for part in 0..each.div_ceil(PART) {
+                    let rays = leak_rays(&oracle, PART.min(each - part * PART), 7 + part as u32);
+                    let check = check(&tracer, &name, &rays, w)?;
+                    *sum = (sum.0 + check.value as u64, sum.1 + rays.len() as u64);
+                    let before = total.as_ref().map_or(0.0, |t| t.value);
+                    let count = (before + check.value) as u64;
+                    let is_ours = *kind == TracerKind::Compute;
+                    total = Some(Check::none_of(name.as_str(), count, "leaks", is_ours).says(check.sentence));
+                }
+                total.map_or_else(|| Ok(Check::not_applicable(name.as_str(), "no rays")), Ok)
+            })?;
+        }
+    }
+    for (kind, (leaks, rays)) in kinds.iter().zip(sums) {
+        let name = "edges and vertices: all";
+        session.measure(name, Some(*kind), |_, _| {
+            let is_ours = *kind == TracerKind::Compute;
+            Ok(Check::none_of(name, leaks, "leaks", is_ours).says(format!("of {rays} rays")))
+        })?;
+    }
+    let name = "zero and negative-zero components";
+    let mut axes = analytic::closed_box(1.0, SceneTransform::default());
+    axes.meshes[0].geometry = shapes::icosphere(1.0, 5);
+    let body = builtin::bake(&axes);
+    session.measure_each(name, &kinds, |s, kind, w| {
+        let rays = axis_rays(&Oracle::new(&body, body.origin()));
+        check(&s.tracer(kind, &body)?, name, &rays, w)
+    })
+}
+
+/// Rays in one go.
+const PART: usize = 1_000_000;

@@ -1,0 +1,286 @@
+//! The numerical stress suite (`skylit stress`): its cheap sections hold on every tracer of the device, and a defect planted in each section is caught.
+
+#[path = "common/mod.rs"]
+mod common;
+
+use common::{assert_validation_clean, device};
+use glam::{DVec3, Vec3};
+use skylit::film::{Film, NoControl};
+use skylit::measure::ray_sets::{leak_rays, random_rays};
+use skylit::oracle::Oracle;
+use skylit::scene::builtin::{SceneTransform, analytic, by_name, shapes};
+use skylit::scene::{Geometry, Scene, TriangleMesh};
+use skylit::stress::{
+    Check, Quiet, SECTIONS, Session, Setup, Verdict, Watch, contact, degenerate, determinism, display, long_runs, sampling,
+    scale, scene, transparency, watertight,
+};
+use skylit::tracer::TracerKind;
+
+fn setup() -> Setup {
+    Setup::new(device())
+}
+
+/// Runs a section; all of its checks must hold.
+fn holds(name: &str, setup: Setup) -> Vec<Check> {
+    let section = SECTIONS.iter().find(|s| s.name == name).unwrap();
+    let mut quiet = Quiet;
+    let mut session = Session::new(setup, &mut quiet);
+    let checks = session.run(section).unwrap();
+    for check in &checks {
+        println!("{:?} {} {}: {}; {}", check.verdict, check.tracer_name(), check.name, check.figure(), check.sentence);
+        assert_ne!(check.verdict, Verdict::Fails, "{check:?}");
+    }
+    assert!(checks.iter().any(|c| c.verdict == Verdict::Holds), "{name}: nothing was held");
+    assert_validation_clean(&device());
+    checks
+}
+
+fn fails(check: &Check) {
+    assert_eq!(check.verdict, Verdict::Fails, "the defect was not caught: {check:?}");
+}
+
+fn triangles(geometry: &mut Geometry) -> &mut TriangleMesh {
+    match geometry {
+        Geometry::Triangles(mesh) => mesh,
+        Geometry::Spheres(_) => panic!("spheres"),
+    }
+}
+
+#[test]
+fn gpu_stress_scale_holds() {
+    // on one tracer: tests/ao has the others
+    let checks = holds("scale", setup().with_tracer(TracerKind::Compute));
+    assert!(checks.len() > 80, "{}", checks.len());
+}
+
+#[test]
+fn gpu_stress_contact_holds() {
+    holds("contact", setup());
+}
+
+#[test]
+fn gpu_stress_display_holds() {
+    holds("display", setup());
+}
+
+#[test]
+fn gpu_stress_scenes_hold() {
+    for name in ["stairs", "leaf-cards", "far-away"] {
+        let checks = holds("scene", setup().with_scene(by_name(name).unwrap()));
+        let edges = checks.iter().filter(|c| c.name == "rays at shared edges").count();
+        assert_eq!(edges, common::tracers(&device()).len(), "{name}");
+    }
+}
+
+/// A ray that meets one of 100,000 coincident triangles meets them all: that is more turns of a loop than some drivers make.
+#[test]
+fn gpu_stress_coincident_triangles_hold() {
+    let mut quiet = Quiet;
+    let check = degenerate::check_coincident(&setup(), TracerKind::Compute, "coincident", 100_000, &mut Watch::new(&mut quiet))
+        .unwrap();
+    assert_eq!(check.verdict, Verdict::Holds, "{check:?}");
+}
+
+/// Section 1: a sheet over a plane that should not occlude itself, a groove that is narrower than its closed form, and detail that positions do not hold.
+#[test]
+fn gpu_stress_catches_a_wrong_scale() {
+    let (setup, mut quiet) = (setup(), Quiet);
+    let mut watch = Watch::new(&mut quiet);
+    let mut plane = analytic::plane(10.0, SceneTransform::default());
+    let mut sheet = plane.instances[0].clone();
+    sheet.object_to_world.translation.y = 5.0;
+    plane.instances.push(sheet);
+    fails(&scale::check_exact(&setup, TracerKind::Compute, "sheet", &plane, 1.0, &mut watch).unwrap());
+    let mut forms = scale::closed_forms_at(SceneTransform::default());
+    let groove = &mut forms[0];
+    groove.scene.instances[0].object_to_world = glam::DAffine3::from_rotation_z(-0.03);
+    fails(&scale::check_form(&setup, TracerKind::Compute, "narrow", groove, 256, &mut watch).unwrap());
+    let coarse = scale::georeferenced_scene(true).unwrap();
+    let step = scale::traced_step(&setup.tracer(TracerKind::Compute, &coarse).unwrap(), &coarse, &mut watch).unwrap();
+    assert!((step - 1e-3).abs() > 5e-4, "{step}");
+}
+
+/// Section 2: a body with a hole that is called closed.
+#[test]
+fn gpu_stress_catches_a_hole() {
+    let mut body = analytic::closed_box(1.0, SceneTransform::default());
+    body.meshes[0].geometry = shapes::icosphere(1.0, 3);
+    let rays = leak_rays(&Oracle::new(&body, DVec3::ZERO), 20_000, 7);
+    let (setup, mut quiet) = (setup(), Quiet);
+    let mut watch = Watch::new(&mut quiet);
+    let check = |scene: &Scene, watch: &mut Watch| {
+        watertight::check(&setup.tracer(TracerKind::Compute, scene).unwrap(), "hole", &rays, watch).unwrap()
+    };
+    assert_eq!(check(&body, &mut watch).verdict, Verdict::Holds);
+    triangles(&mut body.meshes[0].geometry).indices.pop();
+    fails(&check(&body, &mut watch));
+}
+
+/// Section 3: one triangle of many lies elsewhere than the oracle has it, and a file is accepted that should not be.
+#[test]
+fn gpu_stress_catches_a_wrong_triangle() {
+    let (setup, mut quiet) = (setup(), Quiet);
+    let mut watch = Watch::new(&mut quiet);
+    let (scene, _) = degenerate::without_area(60, 0);
+    let oracle = Oracle::new(&scene, DVec3::ZERO);
+    let rays = random_rays(&oracle, 20_000, 3);
+    let truth = degenerate::truth(&oracle, &rays);
+    let mut judge = |scene: &Scene| {
+        let tracer = setup.tracer(TracerKind::Compute, scene).unwrap();
+        degenerate::parity_check("moved", &degenerate::judge(&tracer, &oracle, &rays, &truth, &mut watch).unwrap())
+    };
+    assert_eq!(judge(&scene).verdict, Verdict::Holds);
+    let mut moved = scene.clone();
+    let mesh = triangles(&mut moved.meshes[0].geometry);
+    let sound = mesh.indices[5];
+    sound.into_iter().for_each(|i| mesh.positions[i as usize] += Vec3::splat(0.02));
+    fails(&judge(&moved));
+    let file = degenerate::triangle_file(["0 0 0", "1 0 0", "0 1 0"]);
+    fails(&degenerate::check_file(&setup, TracerKind::Compute, "file", file, true, &mut watch).unwrap());
+}
+
+/// Section 4: rays that start on the surface, or almost there, and sheets that single precision cannot tell apart.
+#[test]
+fn gpu_stress_catches_a_wrong_spawn_offset() {
+    let setup = setup();
+    let (_, scene, normal, point) = contact::slack_planes().into_iter().find(|p| p.0 == "tilted plane, scale 1e0").unwrap();
+    let tracer = setup.tracer(TracerKind::Compute, &scene).unwrap();
+    let slack = |by: f64| contact::slack(&tracer, &scene, normal, point, by, &mut NoControl).unwrap();
+    let (right, wrong) = (slack(1.0), slack(0.0));
+    println!("{right:?} {wrong:?}");
+    assert!(right.self_hits == 0 && right.factor >= 1.0, "{right:?}");
+    assert!(wrong.self_hits > 0, "{wrong:?}");
+    let sheets = setup.tracer(TracerKind::Compute, &contact::sheets(1e-9)).unwrap();
+    assert!(contact::wrong_sides(&sheets, 2000, &mut NoControl).unwrap() > 0);
+}
+
+/// Section 5: a layer too few, and an alpha on the wrong side of its cutoff.
+#[test]
+fn gpu_stress_catches_wrong_layers() {
+    let (setup, mut quiet) = (setup(), Quiet);
+    let mut watch = Watch::new(&mut quiet);
+    let options = skylit::integrators::path::PathOptions { size: [16, 16], spp: 512, seed: 3, ..Default::default() };
+    let (scene, _) = transparency::layers(60, 0.02);
+    let (_, expected) = transparency::layers(64, 0.02);
+    fails(&sampling::check_mean(&setup, TracerKind::Compute, "layers", &scene, &options, expected, 1e-5, &mut watch).unwrap());
+    let hits = |alpha: f32| {
+        transparency::cutout_hits(&setup.tracer(TracerKind::Compute, &transparency::cutout(alpha)).unwrap(), &mut NoControl)
+            .unwrap()
+    };
+    assert_eq!((hits(0.5), hits(0.5f32.next_down())), (100, 0));
+}
+
+/// Section 6: a film with a sample that is not finite, and one with a mean that is off.
+#[test]
+fn stress_catches_a_bad_film() {
+    let film = |mean: f32, not_finite: u64| {
+        let values = (0..16 * 16).flat_map(|k| [mean + 1e-3 * ((k * 37 % 16) as f32 - 7.5); 3]).collect();
+        Film { mean: values, not_finite, ..Film::new(16, 16, 3) }
+    };
+    assert_eq!(sampling::held_mean("good", &film(1.0, 0), 1.0, 0.0).verdict, Verdict::Holds);
+    fails(&sampling::held_mean("off", &film(1.01, 0), 1.0, 0.0));
+    fails(&sampling::held_mean("not finite", &film(1.0, 1), 1.0, 0.0));
+    let mut bad = film(1.0, 0);
+    bad.mean[7] = f32::NAN;
+    assert_eq!(sampling::not_finite(&bad), 1);
+    fails(&sampling::held_mean("not a number", &bad, 1.0, 0.0));
+}
+
+/// Section 7: a film that has drifted, and one whose sums differ in a bit.
+#[test]
+fn stress_catches_drift() {
+    use skylit::film::accumulate::Accumulated;
+    use skylit::film::state::FilmState;
+    let seen = |factor: f32| {
+        let mean = (0..4).flat_map(|_| [0.1 * factor, 0.7 * factor, 3.3 * factor]).collect();
+        let film = Film { mean, ..Film::new(2, 2, 3) };
+        long_runs::drift(&Accumulated { film, spp: 1, ..Default::default() }).0
+    };
+    assert!(seen(1.0) < 1e-6 && seen(1.0 + 3e-6) > 1e-6, "{} {}", seen(1.0), seen(1.0 + 3e-6));
+    let state = FilmState::new([8, 8], 1);
+    let words = skylit::film::record_words(1);
+    let mut planes: Vec<Vec<u32>> = (0..words).map(|k| state.plane(k)).collect();
+    planes[0][3] ^= 1;
+    let other = FilmState::from_planes([8, 8], 1, &planes, &state.samples_plane()).unwrap();
+    assert_eq!((long_runs::different_words(&state, &state), long_runs::different_words(&state, &other)), (0, 1));
+}
+
+/// Section 8: curves that fall, or let NaN through, and a filter that darkens.
+#[test]
+fn gpu_stress_catches_a_bad_display() {
+    assert_eq!(display::falls(f32::sqrt, 0.0), 0);
+    assert!(display::falls(|x| (3.0 * x).sin(), 1e-6) > 0);
+    assert!(display::bad_colours(|c| c) > 0);
+    let plane = analytic::plane(20.0, SceneTransform::default());
+    let device = device();
+    let tracer = common::tracer(&device, TracerKind::Compute, &plane);
+    let settings = display::filters()[0].1;
+    let off = |value: f32| long_runs::frames_off(&tracer, &plane, &settings, 2, DVec3::ZERO, value).unwrap();
+    let (right, wrong) = (off(1.0), off(1.0f32.next_down()));
+    assert!(right.0 == 0 && right.1 > 0 && wrong.0 == wrong.1, "{right:?} {wrong:?}");
+}
+
+/// Section 9: an image that is off by one bit, or shifted by a pixel.
+#[test]
+fn stress_catches_what_is_not_determined() {
+    let image: Vec<f32> = (0..100).map(|k| (k * 7 % 13) as f32 / 13.0).collect();
+    let mut other = image.clone();
+    assert_eq!(determinism::different_bits(&image, &other), 0);
+    other[40] = other[40].next_up();
+    assert_eq!(determinism::different_bits(&image, &other), 1);
+    other.rotate_right(1);
+    assert!(determinism::difference(&image, &other).0 > 0.5);
+    assert_eq!(determinism::different_bits(&image, &other[1..]), 100);
+}
+
+/// A scene with everything that the suite looks for, each found as often as it is there.
+#[test]
+fn stress_finds_what_a_scene_has() {
+    let mut flawed = analytic::plane(10.0, SceneTransform { scale: 1.0, offset: DVec3::ZERO });
+    let mesh = triangles(&mut flawed.meshes[0].geometry);
+    // two triangles of a square of positions that say where it is, at 4e6
+    mesh.positions.iter_mut().for_each(|p| p.x += 4e6);
+    mesh.indices.extend([mesh.indices[0], mesh.indices[0]]);
+    let first = mesh.positions.len() as u32;
+    mesh.positions.extend([Vec3::new(4e6, 1.0, 0.0), Vec3::new(4e6, 1.0, 5.0), Vec3::new(4e6, 1.0001, 2.0)]);
+    mesh.indices.push([first, first + 1, first + 2]);
+    mesh.indices.push([first, first, first + 1]);
+    mesh.normals = vec![Vec3::NEG_Y; mesh.positions.len()];
+    mesh.normals[first as usize] = Vec3::ZERO;
+    flawed.instances.push(flawed.instances[0].clone());
+    let anatomy = scene::Anatomy::of(&flawed);
+    assert_eq!(anatomy.step.0, 0.25);
+    assert_eq!((anatomy.coincident, anatomy.coincident_instances, anatomy.degenerate), (3, 2, 1));
+    assert!(anatomy.worst_aspect > 1e4 && anatomy.aspects[4..].iter().sum::<u64>() == 1, "{anatomy:?}");
+    assert!(anatomy.normals.1 >= 4 && anatomy.bad_normals == 1, "{anatomy:?}");
+    let checks = scene::data(&flawed);
+    let of = |name: &str| checks.iter().find(|c| c.name == name).unwrap();
+    assert!(
+        of("precision of positions").sentence.contains("of 24 bits at 4.00e6")
+            || of("precision of positions").sentence.contains("of 24 bits"),
+        "{:?}",
+        of("precision of positions")
+    );
+    assert!(of("open edges").sentence.contains("AO leaks there by construction"));
+    assert!(checks.iter().all(|c| c.verdict != Verdict::Fails), "what a file holds does not fail");
+}
+
+/// A leak of the user's own mesh, and rays that meet the triangle they left.
+#[test]
+fn gpu_stress_catches_a_leak_of_a_scene() {
+    let whole = by_name("stairs").unwrap();
+    let oracle = Oracle::new(&whole, whole.origin());
+    let rays = scene::edge_rays(&whole, &oracle, 5000, 7);
+    assert_eq!(rays.len(), 5000);
+    let setup = setup();
+    let leaks =
+        |scene: &Scene| scene::leaks(&setup.tracer(TracerKind::Compute, scene).unwrap(), &rays, &mut NoControl).unwrap();
+    let mut holed = whole.clone();
+    for mesh in &mut holed.meshes {
+        if let Geometry::Triangles(mesh) = &mut mesh.geometry {
+            mesh.indices.pop();
+        }
+    }
+    let (right, wrong) = (leaks(&whole), leaks(&holed));
+    assert!(right == 0 && wrong > 0, "{right} {wrong}");
+}
