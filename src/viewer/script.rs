@@ -429,15 +429,17 @@ impl Script {
         input.events.push(Event::PointerMoved(at));
     }
 
-    /// A click over several frames: move, press, release. Returns true at its end.
+    /// A click over several frames: move, then press and release. Both in one frame: where frames are slow, what is released in a later one is no click, but a long press.
+    /// Returns true at its end.
     fn click(&mut self, input: &mut RawInput, at: Pos2, button: PointerButton, step: u32, times: u32) -> bool {
         if step == 0 {
             self.move_to(input, at);
             return false;
         }
-        let pressed = step % 2 == 1;
-        input.events.push(Event::PointerButton { pos: at, button, pressed, modifiers: Modifiers::NONE });
-        step >= 2 * times
+        for pressed in [true, false] {
+            input.events.push(Event::PointerButton { pos: at, button, pressed, modifiers: Modifiers::NONE });
+        }
+        step >= times
     }
 
     #[allow(clippy::too_many_arguments, reason = "what a drag consists of")]
