@@ -85,7 +85,8 @@ fn what_is_broken_off_leaves_nothing() {
     std::fs::write(&path, "old").unwrap();
     let mut dropped = ApngWriter::create(&path, animation).unwrap();
     dropped.add_bytes(&[1; 16]).unwrap();
-    assert_eq!(crate::files_in(dir.path()), 2);
+    // the new one has no name, or another one, until it is whole
+    assert_eq!(std::fs::read(&path).unwrap(), b"old");
     drop(dropped);
     let mut short = ApngWriter::create(&path, animation).unwrap();
     short.add_bytes(&[1; 16]).unwrap();
