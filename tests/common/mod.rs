@@ -16,7 +16,7 @@ use skylit::integrators::rays::{Mode, trace};
 use skylit::ray::{Hit, Ray};
 use skylit::scene::builtin::by_name;
 use skylit::scene::{Camera, Scene};
-use skylit::tracer::{Needs, Tracer, TracerKind};
+use skylit::tracer::{Tracer, TracerKind};
 
 /// Pipelines that the shared device of a process keeps ([`Options::keep_pipelines`]): gigabytes at most.
 pub const KEPT: usize = 256;
@@ -71,16 +71,8 @@ pub fn tracers(device: &Device) -> Vec<TracerKind> {
     there
 }
 
-/// Everything that a pass may ask for.
-pub const ALL: Needs = Needs {
-    normals: true,
-    albedo: true,
-    shading: false,
-    white: false,
-    compensation: false,
-    baked_occlusion: false,
-    mip_levels: false,
-};
+/// What tracers of tests are asked for: normals and albedo.
+pub use skylit::stress::degenerate::NEEDS as ALL;
 
 pub fn tracer(device: &Arc<Device>, kind: TracerKind, scene: &Scene) -> Tracer {
     let flat = FlatScene::new(scene);
