@@ -27,7 +27,10 @@ if [ -n "$full" ]; then export SKYLIT_FULL=1; fi
 # binaries whose tests share a device, longest first
 shared=(path tracer mitsuba ao)
 
-# with the seconds since the start, so that a log tells what takes long
+# what `time` prints: for a log that tells what takes long
+TIMEFORMAT='test: took %0R s, %0U s of processor time'
+
+# with the seconds since the start, for the same reason
 say() { printf 'test: %4d s: %s\n' "$SECONDS" "$*"; }
 
 log=$(mktemp)
@@ -42,7 +45,7 @@ keep_summary() { grep -E '^ *Summary |^test result:' "$log" | sed "s/^ */test: $
 run_alone() {
   local label=$1 status=0
   shift
-  cargo nextest run --locked --lib --bins --tests --no-tests=pass --no-fail-fast "$@" 2>&1 | tee "$log" || status=$?
+  time cargo nextest run --locked --lib --bins --tests --no-tests=pass --no-fail-fast "$@" 2>&1 | tee "$log" || status=$?
   keep_summary "$label"
   return "$status"
 }
@@ -61,7 +64,7 @@ run_entry() {
     # rounding is the driver's, and fewer rays show what it does
     if [ -z "$full" ]; then export SKYLIT_PARITY_RAYS=30000; fi
   fi
-  cargo test --locked --test="$binary" -- "$@"
+  time cargo test --locked --test="$binary" -- "$@"
 }
 
 # run_queue: what was enqueued. What a process prints appears when all have ended.
@@ -104,7 +107,7 @@ run_frames() {
   local driver=$1 status=0
   shift
   say "reference frames, $driver driver"
-  env "$@" "${CARGO_TARGET_DIR:-target}/debug/skylit" verify tests/frames 2>&1 | tee "$log" || status=$?
+  time env "$@" "${CARGO_TARGET_DIR:-target}/debug/skylit" verify tests/frames 2>&1 | tee "$log" || status=$?
   grep -E '^[0-9]+ renders?:' "$log" | sed "s/^/test: $driver driver, frames: /" >> "$summaries" || true
   return "$status"
 }
@@ -112,7 +115,7 @@ run_frames() {
 # run_documentation: the examples in the library's documentation, which nextest knows nothing of
 run_documentation() {
   local status=0
-  cargo test --locked --doc 2>&1 | tee "$log" || status=$?
+  time cargo test --locked --doc 2>&1 | tee "$log" || status=$?
   keep_summary "documentation"
   return "$status"
 }
