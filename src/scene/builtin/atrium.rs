@@ -1,11 +1,11 @@
 //! An arcaded courtyard of two storeys, open to the sky: the kind of scene that Sponza is, of about as many triangles, and made in code.
 
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::PI;
 
 use glam::{DAffine3, DQuat, DVec3, Vec3};
 
 use super::{Rng, shapes};
-use crate::scene::{Geometry, Scene, TriangleMesh};
+use crate::scene::{Geometry, Scene};
 
 /// Half of the court's sides along x and z, metres: between the axes of the columns.
 const COURT: [f64; 2] = [12.0, 4.5];
@@ -81,11 +81,11 @@ fn add_shell(scene: &mut Scene, plaster: usize, tile: usize) {
 
 /// Columns, arches, cornices and balustrades of both storeys around the court.
 fn add_arcades(scene: &mut Scene, stone: usize) {
-    let baluster = scene.add_mesh("baluster", lathe(&BALUSTER, 16, 0), stone);
+    let baluster = scene.add_mesh("baluster", shapes::lathe(&BALUSTER, 16), stone);
     for storey in 0..2 {
         let (floor, ceiling) = (LEVELS[storey], LEVELS[storey + 1] - SLAB);
         let spring = floor + 0.62 * (ceiling - floor);
-        let column = scene.add_mesh("column", lathe(&column_profile(spring - floor), 72, 18), stone);
+        let column = scene.add_mesh("column", shapes::fluted_lathe(&column_profile(spring - floor), 72, 18), stone);
         for side in 0..4u32 {
             let (along, across) = ((side % 2) as usize, 1 - (side % 2) as usize);
             let turn = DAffine3::from_rotation_y(f64::from(side) * PI / 2.0);
@@ -128,12 +128,12 @@ fn add_arcades(scene: &mut Scene, stone: usize) {
 /// Curtains in some arches, and pots with shrubs.
 fn add_furniture(scene: &mut Scene, [stone, cloth, leaf]: [usize; 3]) {
     let width = 2.0 * COURT[0] / f64::from(BAYS[0]);
-    let curtain = scene.add_mesh("curtain", curtain(width * 0.72, 3.0), cloth);
+    let curtain = scene.add_mesh("curtain", shapes::curtain(width * 0.72, 3.0, 96, 24), cloth);
     for (bay, side) in [(1.5, 1.0), (3.5, 1.0), (6.5, 1.0), (2.5, -1.0), (4.5, -1.0), (5.5, -1.0)] {
         let at = DVec3::new(bay * width - COURT[0], LEVELS[1] + 0.9, side * (COURT[1] + 0.42));
         scene.add_instance("curtain", curtain, DAffine3::from_translation(at));
     }
-    let pot = scene.add_mesh("pot", lathe(&POT, 40, 0), stone);
+    let pot = scene.add_mesh("pot", shapes::lathe(&POT, 40), stone);
     let shrub = scene.add_mesh("shrub", shapes::icosphere(0.34, 2), leaf);
     let mut rng = Rng::new(0x5b4b);
     for (x, z) in [(-7.5, 2.7), (-1.5, -2.9), (4.5, 2.8), (9.0, -2.6)] {
@@ -189,34 +189,6 @@ fn column_profile(height: f64) -> Vec<[f64; 2]> {
     profile
 }
 
-/// The profile rotated about the y axis, closed at both ends; with `flutes` of them along points 7 to 17.
-fn lathe(profile: &[[f64; 2]], segments: u32, flutes: u32) -> Geometry {
-    let mut mesh = TriangleMesh::default();
-    for (k, [radius, y]) in profile.iter().enumerate() {
-        for i in 0..segments {
-            let angle = TAU * f64::from(i) / f64::from(segments);
-            let is_fluted = flutes > 0 && (8..17).contains(&k);
-            let depth = if is_fluted { 0.07 * (0.5 - 0.5 * (angle * f64::from(flutes)).cos()) } else { 0.0 };
-            let r = radius * (1.0 - depth);
-            mesh.positions.push(DVec3::new(r * angle.cos(), *y, -r * angle.sin()).as_vec3());
-        }
-    }
-    let rings = profile.len() as u32;
-    for (k, i) in (0..rings - 1).flat_map(|k| (0..segments).map(move |i| (k, i))) {
-        let (a, b) = (k * segments + i, k * segments + (i + 1) % segments);
-        mesh.indices.extend([[a, b, b + segments], [a, b + segments, a + segments]]);
-    }
-    for (ring, is_top) in [(0, false), (rings - 1, true)] {
-        let middle = mesh.positions.len() as u32;
-        mesh.positions.push(Vec3::Y * profile[ring as usize][1] as f32);
-        for i in 0..segments {
-            let (a, b) = (ring * segments + i, ring * segments + (i + 1) % segments);
-            mesh.indices.push(if is_top { [middle, a, b] } else { [middle, b, a] });
-        }
-    }
-    Geometry::Triangles(mesh)
-}
-
 /// A wall of the given width around x = 0 from y = 0 to `height`, with a round opening whose crown is below its top.
 fn arch(width: f64, height: f64) -> Geometry {
     let pier = 0.3;
@@ -254,25 +226,6 @@ fn vault(length: f64, width: f64, rise: f64) -> Geometry {
         [p(-1.0, y0, z0), p(1.0, y0, z0), p(1.0, y1, z1), p(-1.0, y1, z1)]
     };
     shapes::quads(&(0..segments).map(face).collect::<Vec<_>>())
-}
-
-/// A curtain of folds around x = 0, hanging from y = `height` to 0; seen from both sides.
-fn curtain(width: f64, height: f64) -> Geometry {
-    let (columns, rows) = (96u32, 24u32);
-    let mut mesh = TriangleMesh::default();
-    for (k, i) in (0..=rows).flat_map(|k| (0..=columns).map(move |i| (k, i))) {
-        let (u, v) = (f64::from(i) / f64::from(columns), f64::from(k) / f64::from(rows));
-        // folds grow deeper towards the hem, and the cloth is gathered in the middle of its height
-        let gather = 1.0 - 0.25 * (PI * v).sin();
-        let z = 0.07 * (0.4 + 0.6 * (1.0 - v)) * (TAU * 9.0 * u + 1.3 * v).sin();
-        mesh.positions.push(DVec3::new((u - 0.5) * width * gather, v * height, z).as_vec3());
-    }
-    for (k, i) in (0..rows).flat_map(|k| (0..columns).map(move |i| (k, i))) {
-        let a = k * (columns + 1) + i;
-        let (b, c, d) = (a + 1, a + columns + 2, a + columns + 1);
-        mesh.indices.extend([[a, b, c], [a, c, d]]);
-    }
-    Geometry::Triangles(mesh)
 }
 
 #[cfg(test)]

@@ -8,6 +8,7 @@ pub mod atrium;
 pub mod cornell;
 pub mod many;
 pub mod parade;
+pub mod room;
 pub mod shapes;
 pub mod terrain;
 
@@ -48,6 +49,7 @@ const NAMES: &[BuiltinInfo] = &[
     info("instances", "125 instances of 15 landscapes, N triangles in all (instances:N, 250 to 500000000, default 1000000)"),
     info("leaf-cards", "bushes of leaves cut from quads by alpha masks, some of them blended"),
     info("atrium", "an arcaded courtyard of two storeys, open to the sky: about as many triangles as Sponza"),
+    info("room", "a furnished room of about N triangles, closed but for a window (room:N, 10000 to 5000000, default 40000)"),
     info("stairs", "stairs, a column and a rail: contact detail"),
     info("parade", "an animation of two seconds: moving blocks, a rotor, a skinned column, a ball with morph targets"),
     info("far-away", "the stairs, more than a million units from the origin"),
@@ -94,6 +96,7 @@ fn recipe(name: &str) -> Option<Box<dyn FnOnce() -> Scene>> {
         }
         "coello" => return with(cornell::coello, between(1, 1, 3)),
         "grid" => return with(many::grid, between(6, 1, 128)),
+        "room" => return with(room::room, between(40_000, 10_000, 5_000_000)),
         "spheres" => return with(many::spheres, between(1000, 1, 10_000_000)),
         "terrain" => return with(terrain::terrain, between(100_000, 2, 100_000_000)),
         "instances" => return with(terrain::instances, between(1_000_000, 250, 500_000_000)),

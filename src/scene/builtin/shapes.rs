@@ -3,7 +3,7 @@
 use crate::scene::{Geometry, Sphere, TriangleMesh};
 use glam::{DVec3, Vec3};
 use std::collections::HashMap;
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 
 /// One analytic sphere.
 pub fn sphere(center: DVec3, radius: f64) -> Geometry {
@@ -138,6 +138,57 @@ pub fn cylinder(radius: f64, height: f64, segments: u32) -> Geometry {
         let j = (i + 1) % segments;
         let (a, b, c, d) = (2 + 2 * i, 2 + 2 * j, 3 + 2 * j, 3 + 2 * i);
         mesh.indices.extend([[a, b, c], [a, c, d], [0, b, a], [1, d, c]]);
+    }
+    Geometry::Triangles(mesh)
+}
+
+/// A profile of radii and heights rotated about the y axis, closed at both ends.
+pub fn lathe(profile: &[[f64; 2]], segments: u32) -> Geometry {
+    fluted_lathe(profile, segments, 0)
+}
+
+/// The same with `flutes` of them along points 7 to 17.
+pub fn fluted_lathe(profile: &[[f64; 2]], segments: u32, flutes: u32) -> Geometry {
+    let mut mesh = TriangleMesh::default();
+    for (k, [radius, y]) in profile.iter().enumerate() {
+        for i in 0..segments {
+            let angle = TAU * f64::from(i) / f64::from(segments);
+            let is_fluted = flutes > 0 && (8..17).contains(&k);
+            let depth = if is_fluted { 0.07 * (0.5 - 0.5 * (angle * f64::from(flutes)).cos()) } else { 0.0 };
+            let r = radius * (1.0 - depth);
+            mesh.positions.push(DVec3::new(r * angle.cos(), *y, -r * angle.sin()).as_vec3());
+        }
+    }
+    let rings = profile.len() as u32;
+    for (k, i) in (0..rings - 1).flat_map(|k| (0..segments).map(move |i| (k, i))) {
+        let (a, b) = (k * segments + i, k * segments + (i + 1) % segments);
+        mesh.indices.extend([[a, b, b + segments], [a, b + segments, a + segments]]);
+    }
+    for (ring, is_top) in [(0, false), (rings - 1, true)] {
+        let middle = mesh.positions.len() as u32;
+        mesh.positions.push(Vec3::Y * profile[ring as usize][1] as f32);
+        for i in 0..segments {
+            let (a, b) = (ring * segments + i, ring * segments + (i + 1) % segments);
+            mesh.indices.push(if is_top { [middle, a, b] } else { [middle, b, a] });
+        }
+    }
+    Geometry::Triangles(mesh)
+}
+
+/// A curtain of folds around x = 0, hanging from y = `height` to 0; seen from both sides. It is a grid of `columns` by `rows` quads.
+pub fn curtain(width: f64, height: f64, columns: u32, rows: u32) -> Geometry {
+    let mut mesh = TriangleMesh::default();
+    for (k, i) in (0..=rows).flat_map(|k| (0..=columns).map(move |i| (k, i))) {
+        let (u, v) = (f64::from(i) / f64::from(columns), f64::from(k) / f64::from(rows));
+        // folds grow deeper towards the hem, and the cloth is gathered in the middle of its height
+        let gather = 1.0 - 0.25 * (PI * v).sin();
+        let z = 0.07 * (0.4 + 0.6 * (1.0 - v)) * (TAU * 9.0 * u + 1.3 * v).sin();
+        mesh.positions.push(DVec3::new((u - 0.5) * width * gather, v * height, z).as_vec3());
+    }
+    for (k, i) in (0..rows).flat_map(|k| (0..columns).map(move |i| (k, i))) {
+        let a = k * (columns + 1) + i;
+        let (b, c, d) = (a + 1, a + columns + 2, a + columns + 1);
+        mesh.indices.extend([[a, b, c], [a, c, d]]);
     }
     Geometry::Triangles(mesh)
 }
