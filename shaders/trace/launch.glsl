@@ -25,8 +25,9 @@ bool is_finished(SceneRoot root, uint k) {
     return finished;
 }
 
-void store_any(SceneRoot root, uint k, bool occluded) {
-    LaunchFlags(root.launch_hits).v[k] = occluded ? 1u : 0u;
+// `results`: SceneRoot.launch_hits, which a loop reads once.
+void store_any(uvec2 results, uint k, bool occluded) {
+    LaunchFlags(results).v[k] = occluded ? 1u : 0u;
 }
 
 bool load_any(SceneRoot root, uint k) {
@@ -34,12 +35,12 @@ bool load_any(SceneRoot root, uint k) {
 }
 
 // The tracer's own ids; they are converted to scene ids on delivery.
-void store_closest(SceneRoot root, uint k, float t, uint instance, uint primitive, vec2 uv) {
-    STORE_PAIR(root.launch_hits, LAUNCH_HIT_PAIRS * k, uvec2(floatBitsToUint(t), instance));
+void store_closest(uvec2 results, uint k, float t, uint instance, uint primitive, vec2 uv) {
+    STORE_PAIR(results, LAUNCH_HIT_PAIRS * k, uvec2(floatBitsToUint(t), instance));
     // the other fields of a miss are not read
     if (t == INFINITY) return;
-    STORE_PAIR(root.launch_hits, LAUNCH_HIT_PAIRS * k + 1u, uvec2(primitive, floatBitsToUint(uv.x)));
-    STORE_PAIR(root.launch_hits, LAUNCH_HIT_PAIRS * k + 2u, uvec2(floatBitsToUint(uv.y), 0u));
+    STORE_PAIR(results, LAUNCH_HIT_PAIRS * k + 1u, uvec2(primitive, floatBitsToUint(uv.x)));
+    STORE_PAIR(results, LAUNCH_HIT_PAIRS * k + 2u, uvec2(floatBitsToUint(uv.y), 0u));
 }
 
 Hit load_closest(SceneRoot root, uint k) {

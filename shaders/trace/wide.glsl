@@ -3,7 +3,7 @@
 // or a leaf.
 //
 // Why it is fast where vectors are wide and gathers expensive (CPU drivers): in every iteration a lane fetches one block,
-// a cache line, through the same eight loads, whether node or leaf; a lane whose ray is done fetches its next ray at once; and the top of
+// a cache line, through the same eight loads, whether node or leaf; lanes whose rays are done take their next ones together; and the top of
 // the stack is in registers. Ray and hit buffers (generate.glsl, deliver.glsl) separate it from the stream's own code, which runs with all
 // lanes busy.
 #ifndef TRACE_WIDE
@@ -19,6 +19,10 @@ layout(local_size_x = LANES) in;
 
 // MAX_ITERATIONS is for drivers that leave any loop after 65,535 iterations. With one ray per lane of a work-group every ray is still traced, because each
 // lane fetches at least one.
+
+// Storing a hit and taking the next ray cost a vector of lanes the same whether one lane does it or all. So a lane whose ray is done waits until the number of
+// iterations is a multiple of this. A power of two; 4 measured best on CPUs (docs/traversal.md).
+const uint REFILL_INTERVAL = 4u;
 
 #define SET_RAY(o, d)                                                                                          \
     origin = (o);                                                                                              \
@@ -48,11 +52,23 @@ void store_visits(uint k, uint nodes);
 #define VISIT
 // Fetches the lane's next ray. An invalid ray hits nothing: its interval is empty.
 #define NEXT_RAY                                                                                        \
-    index = begin + atomicAdd(LaunchFlags(root.launch_counters).v[part], 1u);                           \
+    index = begin + atomicAdd(LaunchFlags(counters).v[part], 1u);                                       \
     if (index >= end) return;                                                                           \
     world = take_ray(index);                                                                            \
     if (!is_ray(world)) world = no_ray();
 #endif
+
+// Fetches the lane's next ray, and starts it at the root; if there is none, the lane ends.
+#define TAKE_RAY                                   \
+    NEXT_RAY                                       \
+    SET_RAY(world.origin, world.direction)         \
+    block = top;                                   \
+    base = 0u;                                     \
+    group = 0u;                                    \
+    best = world.tmax;                             \
+    best_instance = INVALID;                       \
+    best_primitive = INVALID;                      \
+    instance = 0u;
 
 // Stores the last hit: primitive `id` at `t`, with the barycentric weights of its second and third vertex in the mesh's order.
 #ifdef STREAM_ANY
@@ -69,170 +85,169 @@ void main() {
     uint part = part_of_dispatch(), begin = part * (LANES * RAYS_PER_LANE);
     uint end = min(begin + LANES * RAYS_PER_LANE, ray_count());
     SceneRoot root = SceneRoot(push.scene);
+    // read once: in the loop each would be a gather of its own
+    uvec2 blocks = root.nodes, counters = root.launch_counters, results = root.launch_hits;
+    uint top = root.root;
     uint index;
-    uvec2 blocks = root.nodes;
 
     DECLARE_STACK
 
     Ray world;
-    NEXT_RAY
     vec3 origin, direction, inverse;
     Shear shear;
     bvec3 negative;
     uint octant;
-    SET_RAY(world.origin, world.direction)
-    uint instance = 0u;
+    uint instance;
     // depth of the stack when the ray entered the instance
     uint entry_depth = 0u;
     // all bits or none: the ray is in the top level
     uint at_top = SINGLE_LEVEL ? 0u : ~0u;
-    uint block = root.root;
     // siblings not yet visited (block.glsl)
-    uint base = 0u, group = 0u;
-    float best = world.tmax;
-    uint best_instance = INVALID, best_primitive = INVALID;
+    uint block, base, group;
+    float best;
+    uint best_instance, best_primitive;
     vec2 best_uv = vec2(0.0);
+    TAKE_RAY
 
     uint turns = 0u;
+    bool has_ray = true;
 #ifdef COUNT_VISITS
     uint visits = 0u;
 #endif
     while (true) {
         turns++;
-        Block8 b = Block8(block_address(blocks, block));
-        uvec2 w0 = PAIR(b.q0), w1 = PAIR(b.q1), w2 = PAIR(b.q2), w3 = PAIR(b.q3);
-        uvec2 w4 = PAIR(b.q4), w5 = PAIR(b.q5), w6 = PAIR(b.q6), w7 = PAIR(b.q7);
-        // where traversal continues when the ray leaves this space
-        bool turns_to = false;
-        vec3 next_origin = world.origin, next_direction = world.direction;
-        // the child that the ray enters first, where the order is by distance and not by octant
-        uint nearest = INVALID;
-        if ((BLOCK_FLAGS & LEAF) == 0u) {
-            VISIT
-            vec3 scale = uintBitsToFloat(uvec3(WIDE_NODE_LOWER_X.y >> 24, WIDE_NODE_LOWER_Y.y >> 24, WIDE_NODE_LOWER_Z.y >> 24) << 23) * inverse;
-            vec3 corner = (uintBitsToFloat(WIDE_NODE_CORNER(uvec3)) - origin) * inverse;
-            uvec2 near_x = negative.x ? WIDE_NODE_UPPER_X : WIDE_NODE_LOWER_X, far_x = negative.x ? WIDE_NODE_LOWER_X : WIDE_NODE_UPPER_X;
-            uvec2 near_y = negative.y ? WIDE_NODE_UPPER_Y : WIDE_NODE_LOWER_Y, far_y = negative.y ? WIDE_NODE_LOWER_Y : WIDE_NODE_UPPER_Y;
-            uvec2 near_z = negative.z ? WIDE_NODE_UPPER_Z : WIDE_NODE_LOWER_Z, far_z = negative.z ? WIDE_NODE_LOWER_Z : WIDE_NODE_UPPER_Z;
-            uint hits = 0u;
-            [[unroll]] for (int k = 0; k < 7; k++) {
-                vec3 n = vec3(BYTE(near_x, k), BYTE(near_y, k), BYTE(near_z, k)) * scale + corner;
-                vec3 f = vec3(BYTE(far_x, k), BYTE(far_y, k), BYTE(far_z, k)) * scale + corner;
-                float near = MAX(MAX(n.x, n.y), MAX(n.z, world.tmin));
-                float far = MIN(MIN(MIN(f.x, f.y), f.z) * SLAB_SCALE, best);
-                bool hit = near <= far;
-                hits |= hit ? 1u << k : 0u;
-#ifdef STREAM_CLOSEST
-                // the three lowest bits of a distance do not matter for the order, so they hold the slot
-                nearest = min(nearest, hit ? (floatBitsToUint(near) & ~7u) | k : INVALID);
+#ifndef COUNT_VISITS
+        if (!has_ray && (MAX_ITERATIONS > 0u || turns % REFILL_INTERVAL == 0u)) {
+#ifdef STREAM_ANY
+            store_any(results, index, best_primitive != INVALID);
+#else
+            store_closest(results, index, best_primitive != INVALID ? best : INFINITY, best_instance, best_primitive, best_uv);
 #endif
-            }
-            uint present = WIDE_NODE_UPPER_Y.y >> 24;
-            hits &= present;
-            if ((present >> (nearest & 7u) & 1u) == 0u) nearest = INVALID;
-            if (hits != 0u) {
+            if (MAX_ITERATIONS > 0u && turns > MAX_ITERATIONS) return;
+            TAKE_RAY
+            has_ray = true;
+        }
+#endif
+        if (has_ray) {
+            Block8 b = Block8(block_address(blocks, block));
+            uvec2 w0 = PAIR(b.q0), w1 = PAIR(b.q1), w2 = PAIR(b.q2), w3 = PAIR(b.q3);
+            uvec2 w4 = PAIR(b.q4), w5 = PAIR(b.q5), w6 = PAIR(b.q6), w7 = PAIR(b.q7);
+            // where traversal continues when the ray leaves this space
+            bool turns_to = false;
+            vec3 next_origin = world.origin, next_direction = world.direction;
+            // the child that the ray enters first, where the order is by distance and not by octant
+            uint nearest = INVALID;
+            if ((BLOCK_FLAGS & LEAF) == 0u) {
+                VISIT
+                vec3 scale = uintBitsToFloat(uvec3(WIDE_NODE_LOWER_X.y >> 24, WIDE_NODE_LOWER_Y.y >> 24, WIDE_NODE_LOWER_Z.y >> 24) << 23) * inverse;
+                vec3 corner = (uintBitsToFloat(WIDE_NODE_CORNER(uvec3)) - origin) * inverse;
+                uvec2 near_x = negative.x ? WIDE_NODE_UPPER_X : WIDE_NODE_LOWER_X, far_x = negative.x ? WIDE_NODE_LOWER_X : WIDE_NODE_UPPER_X;
+                uvec2 near_y = negative.y ? WIDE_NODE_UPPER_Y : WIDE_NODE_LOWER_Y, far_y = negative.y ? WIDE_NODE_LOWER_Y : WIDE_NODE_UPPER_Y;
+                uvec2 near_z = negative.z ? WIDE_NODE_UPPER_Z : WIDE_NODE_LOWER_Z, far_z = negative.z ? WIDE_NODE_LOWER_Z : WIDE_NODE_UPPER_Z;
+                uint hits = 0u;
+                [[unroll]] for (int k = 0; k < 7; k++) {
+                    vec3 n = vec3(BYTE(near_x, k), BYTE(near_y, k), BYTE(near_z, k)) * scale + corner;
+                    vec3 f = vec3(BYTE(far_x, k), BYTE(far_y, k), BYTE(far_z, k)) * scale + corner;
+                    float near = MAX(MAX(n.x, n.y), MAX(n.z, world.tmin));
+                    float far = MIN(MIN(MIN(f.x, f.y), f.z) * SLAB_SCALE, best);
+                    bool hit = near <= far;
+                    hits |= hit ? 1u << k : 0u;
+#ifdef STREAM_CLOSEST
+                    // the three lowest bits of a distance do not matter for the order, so they hold the slot
+                    nearest = min(nearest, hit ? (floatBitsToUint(near) & ~7u) | k : INVALID);
+#endif
+                }
+                uint present = WIDE_NODE_UPPER_Y.y >> 24;
+                hits &= present;
+                if ((present >> (nearest & 7u) & 1u) == 0u) nearest = INVALID;
+                if (hits != 0u) {
+                    if (has_siblings(group)) {
+                        PUSH(base, group)
+                    }
+                    base = WIDE_NODE_FIRST_CHILD;
+                    group = make_group(hits, present, octant);
+                }
+            } else if (!SINGLE_LEVEL && at_top != 0u) {
+                // a TLAS instance: the transform to its space, then its root and index
                 if (has_siblings(group)) {
                     PUSH(base, group)
                 }
-                base = WIDE_NODE_FIRST_CHILD;
-                group = make_group(hits, present, octant);
-            }
-        } else if (!SINGLE_LEVEL && at_top != 0u) {
-            // a TLAS instance: the transform to its space, then its root and index
-            if (has_siblings(group)) {
-                PUSH(base, group)
-            }
-            entry_depth = depth;
-            // Lanes without an instance compute this too, on words that are often denormal as floats, which cost a CPU a
-            // hundred times the cycles: theirs are zeroed, by arithmetic that no compiler recognizes as this branch's condition.
-            uint mine = uint(int(BLOCK_FLAGS) >> 31) & at_top;
-            vec4 rows[3] = vec4[3](uintBitsToFloat(INSTANCE_LEAF_WORLD_TO_GROUP_0(uvec4) & mine), uintBitsToFloat(INSTANCE_LEAF_WORLD_TO_GROUP_1(uvec4) & mine),
-                    uintBitsToFloat(INSTANCE_LEAF_WORLD_TO_GROUP_2(uvec4) & mine));
-            next_origin = transform_point(rows, world.origin);
-            next_direction = transform_vector(rows, world.direction);
-            turns_to = true;
-            at_top = 0u;
-            instance = INSTANCE_LEAF_INSTANCE;
-            base = INSTANCE_LEAF_ROOT;
-            group = ROOT_GROUP;
-        } else {
-            float t;
-            vec2 uv;
-            if (HAS_SPHERES && (FIRST_ID & SPHERE) != 0u) {
-                vec3 center = uintBitsToFloat(SPHERE_LEAF_CENTER(uvec3));
-                if (meets_sphere(origin, direction, center, uintBitsToFloat(SPHERE_LEAF_RADIUS), world.tmin, best, t, uv)) { ACCEPT(FIRST_ID) }
+                entry_depth = depth;
+                // Lanes without an instance compute this too, on words that are often denormal as floats, which cost a CPU a
+                // hundred times the cycles: theirs are zeroed, by arithmetic that no compiler recognizes as this branch's condition.
+                uint mine = uint(int(BLOCK_FLAGS) >> 31) & at_top;
+                vec4 rows[3] = vec4[3](uintBitsToFloat(INSTANCE_LEAF_WORLD_TO_GROUP_0(uvec4) & mine), uintBitsToFloat(INSTANCE_LEAF_WORLD_TO_GROUP_1(uvec4) & mine),
+                        uintBitsToFloat(INSTANCE_LEAF_WORLD_TO_GROUP_2(uvec4) & mine));
+                next_origin = transform_point(rows, world.origin);
+                next_direction = transform_vector(rows, world.direction);
+                turns_to = true;
+                at_top = 0u;
+                instance = INSTANCE_LEAF_INSTANCE;
+                base = INSTANCE_LEAF_ROOT;
+                group = ROOT_GROUP;
             } else {
-                vec3 v0 = uintBitsToFloat(TRIANGLE_LEAF_CORNERS_0(uvec3)), v1 = uintBitsToFloat(TRIANGLE_LEAF_CORNERS_1(uvec3));
-                vec3 v2 = uintBitsToFloat(TRIANGLE_LEAF_CORNERS_2(uvec3)), v3 = uintBitsToFloat(TRIANGLE_LEAF_CORNERS_3(uvec3));
-                if (WATERTIGHT) {
-                    Corner a = make_corner(shear, origin, v0), b = make_corner(shear, origin, v1);
-                    Corner c = make_corner(shear, origin, v2), d = make_corner(shear, origin, v3);
-                    float ab = edge(b, a), bc = edge(c, b), ca = edge(a, c), cd = edge(d, c), da = edge(a, d);
-                    vec3 first = vec3(bc, ca, ab), second = vec3(cd, da, -ca);
-                    if (is_inside(first)) {
-                        if (meets_triangle(FIRST_ID, ORDER, instance, shear, origin, direction, v0, v1, v2, a, b, c, first, world.tmin, best, t, uv)) { ACCEPT(FIRST_ID) }
-                    }
-                    if (is_inside(second) && SECOND_ID != INVALID) {
-                        if (meets_triangle(SECOND_ID, ORDER >> 4, instance, shear, origin, direction, v0, v2, v3, a, c, d, second, world.tmin, best, t, uv)) { ACCEPT(SECOND_ID) }
-                    }
+                float t;
+                vec2 uv;
+                if (HAS_SPHERES && (FIRST_ID & SPHERE) != 0u) {
+                    vec3 center = uintBitsToFloat(SPHERE_LEAF_CENTER(uvec3));
+                    if (meets_sphere(origin, direction, center, uintBitsToFloat(SPHERE_LEAF_RADIUS), world.tmin, best, t, uv)) { ACCEPT(FIRST_ID) }
                 } else {
-                    if (meets_moller_trumbore(FIRST_ID, ORDER, instance, origin, direction, v0, v1, v2, world.tmin, best, t, uv)) { ACCEPT(FIRST_ID) }
-                    if (meets_moller_trumbore(SECOND_ID, ORDER >> 4, instance, origin, direction, v0, v2, v3, world.tmin, best, t, uv)) { ACCEPT(SECOND_ID) }
+                    vec3 v0 = uintBitsToFloat(TRIANGLE_LEAF_CORNERS_0(uvec3)), v1 = uintBitsToFloat(TRIANGLE_LEAF_CORNERS_1(uvec3));
+                    vec3 v2 = uintBitsToFloat(TRIANGLE_LEAF_CORNERS_2(uvec3)), v3 = uintBitsToFloat(TRIANGLE_LEAF_CORNERS_3(uvec3));
+                    if (WATERTIGHT) {
+                        Corner a = make_corner(shear, origin, v0), b = make_corner(shear, origin, v1);
+                        Corner c = make_corner(shear, origin, v2), d = make_corner(shear, origin, v3);
+                        float ab = edge(b, a), bc = edge(c, b), ca = edge(a, c), cd = edge(d, c), da = edge(a, d);
+                        vec3 first = vec3(bc, ca, ab), second = vec3(cd, da, -ca);
+                        if (is_inside(first)) {
+                            if (meets_triangle(FIRST_ID, ORDER, instance, shear, origin, direction, v0, v1, v2, a, b, c, first, world.tmin, best, t, uv)) { ACCEPT(FIRST_ID) }
+                        }
+                        if (is_inside(second) && SECOND_ID != INVALID) {
+                            if (meets_triangle(SECOND_ID, ORDER >> 4, instance, shear, origin, direction, v0, v2, v3, a, c, d, second, world.tmin, best, t, uv)) { ACCEPT(SECOND_ID) }
+                        }
+                    } else {
+                        if (meets_moller_trumbore(FIRST_ID, ORDER, instance, origin, direction, v0, v1, v2, world.tmin, best, t, uv)) { ACCEPT(FIRST_ID) }
+                        if (meets_moller_trumbore(SECOND_ID, ORDER >> 4, instance, origin, direction, v0, v2, v3, world.tmin, best, t, uv)) { ACCEPT(SECOND_ID) }
+                    }
+                }
+#ifdef STREAM_ANY
+                if (best_primitive != INVALID) {
+                    group = 0u;
+                    depth = 0u;
+                    entry_depth = 0u;
+                }
+#endif
+            }
+            if (!has_siblings(group)) {
+                if (!SINGLE_LEVEL && at_top == 0u && depth == entry_depth) {
+                    // back to the top level
+                    turns_to = true;
+                    at_top = ~0u;
+                }
+                if (depth == 0u) {
+#ifdef COUNT_VISITS
+                    store_visits(push.first + index, visits);
+                    return;
+#endif
+                    has_ray = false;
+                } else {
+                    POP(base, group)
                 }
             }
-#ifdef STREAM_ANY
-            if (best_primitive != INVALID) {
-                group = 0u;
-                depth = 0u;
-                entry_depth = 0u;
-            }
-#endif
-        }
-        if (!has_siblings(group)) {
-            if (!SINGLE_LEVEL && at_top == 0u && depth == entry_depth) {
-                // back to the top level
-                turns_to = true;
-                at_top = ~0u;
-            }
-            if (depth == 0u) {
-#ifdef COUNT_VISITS
-                store_visits(push.first + index, visits);
-                return;
-#endif
-#ifdef STREAM_ANY
-                store_any(root, index, best_primitive != INVALID);
-#else
-                store_closest(root, index, best_primitive != INVALID ? best : INFINITY, best_instance, best_primitive, best_uv);
-#endif
-                if (MAX_ITERATIONS > 0u && turns > MAX_ITERATIONS) return;
-                NEXT_RAY
-                if (SINGLE_LEVEL) { SET_RAY(world.origin, world.direction) }
-                next_origin = world.origin;
-                next_direction = world.direction;
-                turns_to = true;
-                instance = 0u;
-                base = root.root;
-                group = ROOT_GROUP;
-                best = world.tmax;
-                best_primitive = INVALID;
-                best_instance = INVALID;
-            } else {
-                POP(base, group)
-            }
-        }
-        // the ray changes space, to an instance's or back to the world's, or is a new one: its inverse direction is computed here for all cases
-        if (!SINGLE_LEVEL && turns_to) { SET_RAY(next_origin, next_direction) }
-        // the next block
-        uint bit = findMSB(group | 1u);
-        uint slot = (bit - 24u) ^ octant;
+            // the ray changes space, to an instance's or back to the world's: its inverse direction is computed here for both cases
+            if (!SINGLE_LEVEL && turns_to) { SET_RAY(next_origin, next_direction) }
+            // the next block
+            uint bit = findMSB(group | 1u);
+            uint slot = (bit - 24u) ^ octant;
 #ifdef STREAM_CLOSEST
-        if (nearest != INVALID) {
-            slot = nearest & 7u;
-            bit = (slot ^ octant) + 24u;
-        }
+            if (nearest != INVALID) {
+                slot = nearest & 7u;
+                bit = (slot ^ octant) + 24u;
+            }
 #endif
-        group &= ~(1u << bit);
-        block = base + bitCount((group >> 16) & 0xffu & ((1u << (slot & 31u)) - 1u));
+            group &= ~(1u << bit);
+            block = base + bitCount((group >> 16) & 0xffu & ((1u << (slot & 31u)) - 1u));
+        }
     }
 }
 
