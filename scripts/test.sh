@@ -45,7 +45,8 @@ keep_summary() { grep -E '^ *Summary |^test result:' "$log" | sed "s/^ */test: $
 run_alone() {
   local label=$1 status=0
   shift
-  time cargo nextest run --locked --lib --bins --tests --no-tests=pass --no-fail-fast "$@" 2>&1 | tee "$log" || status=$?
+  # one more than cores: some wait, for a window or a signal
+  time cargo nextest run --locked --lib --bins --tests --no-tests=pass --no-fail-fast --test-threads $(($(nproc) + 1)) "$@" 2>&1 | tee "$log" || status=$?
   keep_summary "$label"
   return "$status"
 }

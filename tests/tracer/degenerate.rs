@@ -22,6 +22,11 @@ use crate::common::{assert_validation_clean, device, hits, tracer, tracers};
 
 const HERE: DAffine3 = DAffine3::IDENTITY;
 
+/// So many rays with `./scripts/test.sh --full`, else a quarter: each goes through every tracer and an oracle without a tree.
+fn rays_or_quarter(full: usize) -> usize {
+    if common::is_full() { full } else { full / 4 }
+}
+
 /// Every tracer against the oracle without its tree; also makes a small image and its outputs, which must be numbers.
 fn judge(device: &Arc<Device>, what: &str, scene: &Scene, rays: &[Ray]) {
     let oracle = Oracle::new(scene, scene.origin());
@@ -85,7 +90,7 @@ fn gpu_degenerate_single_primitives() {
         ("a mesh that is placed nowhere", scene(vec![(ball(), vec![]), (triangle(), vec![HERE])])),
     ] {
         let oracle = Oracle::new(&scene, scene.origin());
-        judge(&device, what, &scene, &random_rays(&oracle, 20_000, 1));
+        judge(&device, what, &scene, &random_rays(&oracle, rays_or_quarter(20_000), 1));
     }
     assert_validation_clean(&device);
 }
@@ -130,7 +135,7 @@ fn gpu_degenerate_empty_scenes() {
 #[test]
 fn gpu_degenerate_triangles_without_area() {
     let device = device();
-    let (scene, rays) = degenerate::without_area(4000, 20_000);
+    let (scene, rays) = degenerate::without_area(4000, rays_or_quarter(20_000));
     judge(&device, "triangles without area", &scene, &rays);
     // nothing but those: bounds are there, hits are not
     let flat = (0..100).map(|i| [random_point(i, 0), random_point(i, 0), random_point(i, 3)]);
@@ -197,7 +202,7 @@ fn gpu_degenerate_needles() {
 #[test]
 fn gpu_degenerate_scales_together() {
     let device = device();
-    let (scene, rays) = degenerate::scales_together(3000, 10_000);
+    let (scene, rays) = degenerate::scales_together(3000, rays_or_quarter(10_000));
     judge(&device, "scales from 1e-6 to 1e6", &scene, &rays);
     assert_validation_clean(&device);
 }
@@ -206,7 +211,7 @@ fn gpu_degenerate_scales_together() {
 #[test]
 fn gpu_degenerate_largest_coordinates() {
     let device = device();
-    let (scene, rays) = degenerate::largest_coordinates(2000, 5000);
+    let (scene, rays) = degenerate::largest_coordinates(2000, rays_or_quarter(5000));
     judge(&device, "the largest coordinates", &scene, &rays);
     assert_validation_clean(&device);
 }
@@ -227,7 +232,7 @@ fn coincident(count: u32) {
     let [scene, one] = degenerate::coincident(count);
     let oracle = Oracle::new(&one, DVec3::ZERO);
     // few: a ray that meets one meets them all
-    let rays = random_rays(&oracle, 2000, 4);
+    let rays = random_rays(&oracle, rays_or_quarter(2000), 4);
     let truth = oracle.trace_closest(&rays);
     for kind in tracers(&device) {
         let start = std::time::Instant::now();
@@ -246,7 +251,7 @@ fn coincident(count: u32) {
             start.elapsed()
         );
         assert_eq!(report.unexplained, 0, "{kind}: {report}");
-        assert!(report.hits > 200, "{kind}: {report}");
+        assert!(report.hits > rays.len() as u64 / 10, "{kind}: {report}");
         let any = hits(&tracer, &rays, Mode::Any);
         assert_eq!(any.iter().filter(|h| h.is_hit()).count(), got.iter().filter(|h| h.is_hit()).count(), "{kind}");
     }
@@ -261,7 +266,7 @@ fn gpu_degenerate_nested_triangles() {
     for (what, gentle, steep) in
         [("nested triangles", true, false), ("nested steeply", false, true), ("nested, both", true, true)]
     {
-        let (scene, rays) = degenerate::nested(gentle, steep, 20_000);
+        let (scene, rays) = degenerate::nested(gentle, steep, rays_or_quarter(20_000));
         judge(&device, what, &scene, &rays);
     }
     assert_validation_clean(&device);
@@ -271,7 +276,7 @@ fn gpu_degenerate_nested_triangles() {
 #[test]
 fn gpu_degenerate_spheres() {
     let device = device();
-    let (scene, rays) = degenerate::nested_spheres(20_000);
+    let (scene, rays) = degenerate::nested_spheres(rays_or_quarter(20_000));
     judge(&device, "nested and coincident spheres", &scene, &rays);
     assert_validation_clean(&device);
 }
@@ -298,7 +303,7 @@ fn gpu_degenerate_slivers_do_not_meet_themselves() {
 #[test]
 fn gpu_degenerate_coarse_coordinates() {
     let device = device();
-    let (scene, rays) = degenerate::coarse_coordinates(20_000);
+    let (scene, rays) = degenerate::coarse_coordinates(rays_or_quarter(20_000));
     assert_eq!(scene.origin(), DVec3::ZERO);
     judge(&device, "coarse coordinates", &scene, &rays);
     assert_validation_clean(&device);

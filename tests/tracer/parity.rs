@@ -117,9 +117,9 @@ fn gpu_parity_brute_force() {
     let device = device();
     let kernels = Kernel::ALL.map(|kernel| (TracerKind::Compute, kernel));
     for (name, rays) in [("cornell-box", 60_000), ("cornell-spheres", 60_000), ("spheres:100", 40_000), ("grid:2", 30_000)] {
-        gate_of(&device, name, &scene(name), rays, &kernels);
+        gate_of(&device, name, &scene(name), rays.min(ray_count() / 3), &kernels);
     }
-    gate_of(&device, "leaf-cards", &scene("leaf-cards"), 30_000, &kernels);
+    gate_of(&device, "leaf-cards", &scene("leaf-cards"), 30_000.min(ray_count() / 3), &kernels);
 }
 
 /// What is too much for brute force is refused, with the number.
