@@ -22,28 +22,41 @@ const float FLAT = 1.0 / 512.0;
 // Samples at rest from which their mean counts at least as much as the filtered image.
 const float TAKE_OVER_SAMPLES = 1024.0;
 
+// What taps read, fetched once: each use of a field of a record is a load.
+struct Images {
+    ivec2 size;
+    uvec2 guide;
+    // null for visibility, which has no colour
+    uvec2 composed;
+    uvec2 visibility;
+    uvec2 history;
+};
+
+uint image_index(Images m, ivec2 pixel) { return uint(pixel.y * m.size.x + pixel.x); }
+
 // This frame's value and coverage. `guide`: of the pixel.
-vec4 value_at(AntialiasParams p, uvec2 guide, uint at) {
-    if (!is_null(p.composed)) return uintBitsToFloat(Quads(p.composed).v[at]);
+vec4 value_at(Images m, uvec2 guide, uint at) {
+    if (!is_null(m.composed)) return load_quad(m.composed, at);
     // coverage is that of the sample
-    return vec4(vec3(FloatImage(p.visibility).v[at]), is_surface(guide) ? 1.0 : 0.0);
+    return vec4(vec3(FloatImage(m.visibility).v[at]), is_surface(guide) ? 1.0 : 0.0);
 }
 
 // The resolved image and its coverage, which has 16 bits, as has the number of frames.
-vec4 load_resolved(AntialiasParams p, uint at, out float frames) {
-    uvec4 q = Quads(p.previous_history).v[at];
+vec4 load_resolved(uvec2 history, uint at, out float frames) {
+    uvec4 q = LOAD_QUAD(history, at);
     frames = float(q.w & 0xffffu);
     return vec4(uintBitsToFloat(q.xyz), float(q.w >> 16) / 65535.0);
 }
 
 void store_resolved(AntialiasParams p, uint at, vec4 value, float frames) {
-    uint w = uint(clamp(value.a, 0.0, 1.0) * 65535.0 + 0.5) << 16 | uint(min(frames, 65535.0));
-    QuadImage(p.history).v[at] = uvec4(floatBitsToUint(value.rgb), w);
+    uint w = uint(to_int(floor(clamp(value.a, 0.0, 1.0) * 65535.0 + 0.5))) << 16 | uint(to_int(floor(min(frames, 65535.0))));
+    store_quad(p.history, at, vec4(value.rgb, uintBitsToFloat(w)));
 }
 
 // The resolved image at a place, in pixels from the centre of the one in the upper left corner; interpolated by a cubic without its corners. `frames`: of the nearest pixel.
-vec4 resolved_at(AntialiasParams p, FrameParams f, vec2 at, out float frames) {
+vec4 resolved_at(Images m, vec2 at, out float frames) {
     vec2 base = floor(at), t = at - base;
+    ivec2 corner = to_int(base);
     vec2 w0 = t * (-0.5 + t * (1.0 - 0.5 * t)), w1 = 1.0 + t * t * (-2.5 + 1.5 * t), w2 = t * (0.5 + t * (2.0 - 1.5 * t)), w3 = t * t * (-0.5 + 0.5 * t);
     vec4 sum = vec4(0.0), least = vec4(INFINITY), most = vec4(-INFINITY);
     float weight = 0.0;
@@ -52,9 +65,9 @@ vec4 resolved_at(AntialiasParams p, FrameParams f, vec2 at, out float frames) {
         [[unroll]] for (int x = 0; x < 4; x++) {
             if ((x == 0 || x == 3) && (y == 0 || y == 3)) continue;
             float w = wy * (x == 0 ? w0.x : x == 1 ? w1.x : x == 2 ? w2.x : w3.x);
-            uvec2 q = uvec2(clamp(ivec2(base) + ivec2(x - 1, y - 1), ivec2(0), ivec2(f.size) - 1));
+            ivec2 q = clamp(corner + ivec2(x - 1, y - 1), ivec2(0), m.size - 1);
             float of_tap;
-            vec4 value = load_resolved(p, image_index(f, q), of_tap);
+            vec4 value = load_resolved(m.history, image_index(m, q), of_tap);
             sum += w * value;
             weight += w;
             if (x == 1 || x == 2) {
@@ -65,7 +78,7 @@ vec4 resolved_at(AntialiasParams p, FrameParams f, vec2 at, out float frames) {
             }
         }
     }
-    load_resolved(p, image_index(f, uvec2(clamp(ivec2(round(at)), ivec2(0), ivec2(f.size) - 1))), frames);
+    load_resolved(m.history, image_index(m, clamp(to_int(round(at)), ivec2(0), m.size - 1)), frames);
     // a cubic swings beyond what it passes through: beside a lamp below black
     return clamp(sum / weight, least, most);
 }
@@ -78,21 +91,21 @@ struct Neighbourhood {
     float depth;    // its distance; INFINITY: there is none
 };
 
-Neighbourhood neighbourhood(AntialiasParams p, FrameParams f, ivec2 pixel) {
+Neighbourhood neighbourhood(Images m, ivec2 pixel) {
     vec4 sum = vec4(0.0), squares = vec4(0.0);
     float n = 0.0;
-    Neighbourhood around = Neighbourhood(vec4(0.0), vec4(0.0), image_index(f, uvec2(pixel)), INFINITY);
+    Neighbourhood around = Neighbourhood(vec4(0.0), vec4(0.0), image_index(m, pixel), INFINITY);
     for (int k = 0; k < 9; k++) {
         ivec2 q = pixel + ivec2(k % 3, k / 3) - 1;
-        if (any(lessThan(q, ivec2(0))) || any(greaterThanEqual(q, ivec2(f.size)))) continue;
-        uint tap = image_index(f, uvec2(q));
-        uvec2 guide = LOAD_PAIR(f.guide, tap);
+        if (any(lessThan(q, ivec2(0))) || any(greaterThanEqual(q, m.size))) continue;
+        uint tap = image_index(m, q);
+        uvec2 guide = LOAD_PAIR(m.guide, tap);
         float d = uintBitsToFloat(guide.x);
         if (d < around.depth) {
             around.depth = d;
             around.nearest = tap;
         }
-        vec4 v = value_at(p, guide, tap);
+        vec4 v = value_at(m, guide, tap);
         sum += v;
         squares += v * v;
         n += 1.0;
@@ -110,7 +123,7 @@ bool previous_pixel(FrameParams f, ivec2 pixel, Neighbourhood around, out vec2 a
     vec2 now;
     if (around.depth < INFINITY) {
         before = is_null(f.previous_position) ? surface_position(f, nearest) : load_vec3(f.previous_position, nearest);
-        now = sample_place(f, vec2(nearest % f.size.x, nearest / f.size.x));
+        now = sample_place(f, vec2(image_pixel(f, nearest)));
     } else {
         // infinitely far away
         now = vec2(pixel) + 0.5;
@@ -146,22 +159,23 @@ void main() {
     if (gl_GlobalInvocationID.x >= push.count) return;
     AntialiasParams p = AntialiasParams(push.pass);
     FrameParams f = FrameParams(p.frame);
-    ivec2 pixel = ivec2(at % f.size.x, at / f.size.x);
-    vec4 now = value_at(p, LOAD_PAIR(f.guide, at), at), resolved = now;
+    ivec2 pixel = ivec2(image_pixel(f, at));
+    Images m = Images(ivec2(f.size), f.guide, p.composed, p.visibility, p.previous_history);
+    vec4 now = value_at(m, LOAD_PAIR(m.guide, at), at), resolved = now;
     float frames = 1.0;
     if (p.has_history != 0u && p.most_frames > 1.0 && f.still != 0u) {
-        vec4 history = load_resolved(p, at, frames);
+        vec4 history = load_resolved(m.history, at, frames);
         frames += 1.0;
         resolved = mix(history, now, 2.0 / (frames + 1.0));
     } else if (p.has_history != 0u && p.most_frames > 1.0) {
-        Neighbourhood around = neighbourhood(p, f, pixel);
+        Neighbourhood around = neighbourhood(m, pixel);
         vec4 width = p.clamp_width * around.deviation;
         vec2 before;
         if (all(lessThanEqual(width, FLAT * around.mean))) {
             frames = p.most_frames;
         } else if (previous_pixel(f, pixel, around, before)) {
             float past;
-            vec4 history = max(clipped(resolved_at(p, f, before, past), around.mean, width), vec4(0.0));
+            vec4 history = max(clipped(resolved_at(m, before, past), around.mean, width), vec4(0.0));
             frames = min(past + 1.0, p.most_frames);
             resolved = mix(history, now, 1.0 / frames);
         }
@@ -171,13 +185,14 @@ void main() {
     if (!is_null(p.rest)) {
         Rest own = load_rest(p.rest, at);
         float differences = 0.0, error = 0.0, n = 0.0;
-        ivec2 lower = max(pixel - BIAS_RADIUS, ivec2(0)), upper = min(pixel + BIAS_RADIUS, ivec2(f.size) - 1);
+        ivec2 lower = max(pixel - BIAS_RADIUS, ivec2(0)), upper = min(pixel + BIAS_RADIUS, m.size - 1);
+        uvec2 rests = p.rest;
         for (int y = lower.y; y <= upper.y; y++) {
             for (int x = lower.x; x <= upper.x; x++) {
-                uint tap = image_index(f, uvec2(x, y));
-                Rest r = load_rest(p.rest, tap);
+                uint tap = image_index(m, ivec2(x, y));
+                Rest r = load_rest(rests, tap);
                 if (r.frames < 2.0) continue;
-                vec3 d = value_at(p, LOAD_PAIR(f.guide, tap), tap).rgb - r.mean;
+                vec3 d = value_at(m, LOAD_PAIR(m.guide, tap), tap).rgb - r.mean;
                 differences += dot(d, d);
                 error += rest_error(r);
                 n += 1.0;
@@ -191,5 +206,5 @@ void main() {
             resolved = mix(resolved, vec4(own.mean, own.coverage), share);
         }
     }
-    QuadImage(p.resolved).v[at] = floatBitsToUint(resolved);
+    store_quad(p.resolved, at, resolved);
 }

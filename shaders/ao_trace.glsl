@@ -9,8 +9,14 @@ Ray ray(uint index) {
     uvec2 pixel;
     uint at, k;
     if (is_null(p.list)) {
-        pixel = tile_pixel(f, index / f.rays_per_pixel);
-        k = index % f.rays_per_pixel;
+        uint place = index;
+        k = 0u;
+        // CPUs divide one lane at a time
+        if (f.rays_per_pixel > 1u) {
+            place = index / f.rays_per_pixel;
+            k = index - place * f.rays_per_pixel;
+        }
+        pixel = tile_pixel(f, place);
         if (any(greaterThanEqual(pixel, f.size))) return no_ray();
         at = image_index(f, pixel);
         if (!has_rays(f, pixel, at)) return no_ray();
@@ -18,7 +24,7 @@ Ray ray(uint index) {
         uint entry = Words(p.list).v[index];
         at = entry >> 4;
         k = entry & 15u;
-        pixel = uvec2(at % f.size.x, at / f.size.x);
+        pixel = image_pixel(f, at);
     }
     claim(p.ray_count);
     vec3 ng = surface_normal(f, at);

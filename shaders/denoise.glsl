@@ -20,7 +20,7 @@ RadianceEstimate load_estimate(uvec2 estimates, uint at) { return load_radiance(
 
 RadianceEstimate estimate_of(RadianceEstimate own, vec3 mean, float n, vec3 variance) { return RadianceEstimate(mean, n, variance, own.narrowed); }
 
-int limited(int radius, FilterParams p, RadianceEstimate own) { return min(radius, int(ceil((1.0 - own.narrowed) * float(p.radius)))); }
+int limited(int radius, FilterParams p, RadianceEstimate own) { return min(radius, to_int(ceil((1.0 - own.narrowed) * float(p.radius)))); }
 
 // The normals in guides are shading normals here, because lighting depends on them. The eight bits beside them are equal for
 // pixels that may be averaged.

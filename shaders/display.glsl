@@ -48,7 +48,7 @@ vec2 motion(FrameParams f, uint at) {
     bool orthographic = f.previous_orthographic != 0u;
     // behind the previous camera
     if (!orthographic && !(c.z < 0.0)) return vec2(0.0);
-    vec2 now = sample_place(f, vec2(at % f.size.x, at / f.size.x));
+    vec2 now = sample_place(f, vec2(image_pixel(f, at)));
     return now - image_point(f, f.previous_view, orthographic ? c.xy : c.xy / -c.z);
 }
 

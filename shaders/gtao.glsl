@@ -43,7 +43,7 @@ void main() {
     uvec2 guide = LOAD_PAIR(f.guide, at);
     if (!is_surface(guide)) return;
     bool orthographic = f.orthographic != 0u;
-    uvec2 pixel = uvec2(at % f.size.x, at / f.size.x);
+    uvec2 pixel = image_pixel(f, at);
     float depth = uintBitsToFloat(guide.x);
     vec2 centre = sample_place(f, vec2(pixel));
     vec2 plane = image_plane(f, f.view, centre);

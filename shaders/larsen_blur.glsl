@@ -24,7 +24,7 @@ void main() {
         FloatImage(l.combined).v[at] = 0.0;
         return;
     }
-    vec2 uv = (vec2(at % f.size.x, at / f.size.x) + 0.5) / vec2(f.size);
+    vec2 uv = (vec2(image_pixel(f, at)) + 0.5) / vec2(f.size);
     vec2 middle = uv * vec2(l.half_size) - 0.5;
     float occlusion = bilinear(l, middle);
     // without the filter, to compare

@@ -93,7 +93,7 @@ void main() {
         diffuse = load_radiance(p.previous_diffuse, at);
         specular = load_radiance(p.previous_specular, at);
     } else if (f.has_history != 0u) {
-        uvec2 pixel = uvec2(at % f.size.x, at / f.size.x);
+        uvec2 pixel = image_pixel(f, at);
         vec3 position = surface_position(f, at), normal = surface_normal(f, at);
         vec3 before = is_null(f.previous_position) ? position : load_vec3(f.previous_position, at);
         uint id = guide.y >> 24;

@@ -11,7 +11,7 @@ void main() {
     FrameParams f = FrameParams(p.frame);
     Rest rest = NO_REST;
     if (p.starts == 0u) rest = load_rest(p.rest, at);
-    uvec2 pixel = uvec2(at % f.size.x, at / f.size.x);
+    uvec2 pixel = image_pixel(f, at);
     if (is_sampled(f, pixel)) {
         if (is_surface(LOAD_PAIR(f.guide, at))) {
             Estimate e = unpack_estimate(LOAD_PAIR(p.current, at));

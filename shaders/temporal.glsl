@@ -89,7 +89,7 @@ void main() {
             if (change > 0.0) {
                 past.samples = samples_after(past.samples, change, max(past.variance, MIN_VARIANCE));
                 if (p.clamp_width > 0.0) {
-                    uvec2 pixel = uvec2(at % f.size.x, at / f.size.x);
+                    uvec2 pixel = image_pixel(f, at);
                     EdgeTest edge = edge_test(f, f.world_to_camera, f.view, f.orthographic != 0u, position, normal, sample_place(f, vec2(pixel)));
                     Estimate around = surroundings(p, f, ivec2(pixel), edge);
                     if (around.samples > 0.0) {

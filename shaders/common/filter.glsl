@@ -41,7 +41,7 @@ float mean_variance(FilterParams p, float n) {
 // Radius in pixels.
 int box_radius(FilterParams p, float samples) {
     float side = sqrt(p.samples / max(samples, 0.25));
-    return int(clamp(ceil(0.5 * (side - 1.0)), 0.0, float(p.radius)));
+    return to_int(clamp(ceil(0.5 * (side - 1.0)), 0.0, float(p.radius)));
 }
 
 vec3 load_bent(FilterParams p, uint at) {
@@ -68,7 +68,7 @@ void stop(inout Filtered e) {
 void finish_box(FilterParams p, FrameParams f, uvec2 estimates, uint at, ESTIMATE own, Filtered e) {
     vec3 own_bent = BENT_NORMALS ? load_bent(p, at) : vec3(0.0);
     if (e.n == 0.0) {
-        ivec2 pixel = ivec2(at % f.size.x, at / f.size.x);
+        ivec2 pixel = ivec2(image_pixel(f, at));
         finish(p, f, at, guess(p, f, estimates, pixel, own), own_bent);
         return;
     }
@@ -115,7 +115,7 @@ void main() {
             finish(p, f, at, own, BENT_NORMALS ? load_bent(p, at) : vec3(0.0));
             continue;
         }
-        ivec2 pixel = ivec2(int(at) % width, int(at) / width);
+        ivec2 pixel = ivec2(image_pixel(f, at));
         strip[k].edge = edge_test(f, f.world_to_camera, f.view, f.orthographic != 0u, surface_position(f, at), surface_normal(f, at), sample_place(f, vec2(pixel)));
         ivec2 reach = radius * ivec2(p.sides & STEP_HORIZONTAL, (p.sides & STEP_VERTICAL) >> 1);
         strip[k].lower = max(-reach, -(pixel / stride));

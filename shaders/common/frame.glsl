@@ -8,7 +8,6 @@
 #include "interface/pattern.glsl"
 
 layout(buffer_reference, std430, buffer_reference_align = 4) buffer FloatImage { float v[]; };
-layout(buffer_reference, std430, buffer_reference_align = 16) buffer QuadImage { uvec4 v[]; };
 
 void store_vec3(uvec2 image, uint at, vec3 value) {
     FloatImage target = FloatImage(image);
@@ -18,6 +17,11 @@ void store_vec3(uvec2 image, uint at, vec3 value) {
 // The pixel of an index that counts the image in 8x8 tiles.
 uvec2 tile_pixel(FrameParams f, uint k) {
     return tile_pixel(k >> 6, f.tiles_x, k & 63u);
+}
+
+// The pixel whose image_index this is.
+uvec2 image_pixel(FrameParams f, uint index) {
+    return divide(index, f.size.x);
 }
 
 uint image_index(FrameParams f, uvec2 pixel) {
@@ -148,8 +152,8 @@ struct Estimate {
 
 uvec2 pack_estimate(Estimate e) {
     // in sixteenths of a sample, because interpolated histories have fractions
-    uint samples = uint(clamp(e.samples, 0.0, 4095.0) * 16.0 + 0.5);
-    uint variance = uint(clamp(e.variance * (65535.0 / MAX_VARIANCE), 0.0, 65535.0) + 0.5);
+    uint samples = uint(to_int(floor(clamp(e.samples, 0.0, 4095.0) * 16.0 + 0.5)));
+    uint variance = uint(to_int(floor(clamp(e.variance * (65535.0 / MAX_VARIANCE), 0.0, 65535.0) + 0.5)));
     return uvec2(floatBitsToUint(e.mean), samples << 16 | variance);
 }
 

@@ -1,6 +1,7 @@
 // Morton order, the same as src/sampling/morton.rs: pixels of aligned squares of 2^k are consecutive.
 #ifndef COMMON_MORTON
 #define COMMON_MORTON
+#include "common/integers.glsl"
 
 uint spread_bits(uint x) {
     x &= 0xffffu;
@@ -21,7 +22,7 @@ uvec2 morton_pixel(uint k) {
 
 // Pixel k, Morton order within the tile, of a tile of 8x8 of an image with `tiles_x` of them in a row.
 uvec2 tile_pixel(uint tile, uint tiles_x, uint k) {
-    return uvec2(tile % tiles_x, tile / tiles_x) * 8u + morton_pixel(k);
+    return divide(tile, tiles_x) * 8u + morton_pixel(k);
 }
 
 #endif

@@ -34,7 +34,8 @@ EdgeTest previous_edge(FrameParams f, vec3 before, vec3 normal, vec2 at) {
 // The pixels around `at` that show the surface which `edge` tells, and which was at `surface_at`.
 Taps taps_around(FrameParams f, vec2 at, vec2 surface_at, EdgeTest edge, uint id) {
     Taps taps = NO_TAPS;
-    ivec2 base = ivec2(floor(at));
+    // far outside stays outside
+    ivec2 base = to_int(clamp(floor(at), -1e6, 1e6));
     vec2 inside = at - vec2(base);
     // a pixel that is hit at its centre is taken alone: a static view is not blurred
     inside = mix(inside, round(inside), lessThan(abs(inside - round(inside)), vec2(1e-3)));

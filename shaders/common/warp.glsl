@@ -2,6 +2,7 @@
 // are polynomials, so that a driver's precision (Vulkan allows errors of 2^-11) does not matter.
 #ifndef COMMON_WARP
 #define COMMON_WARP
+#include "common/integers.glsl"
 
 const float PI = 3.14159265358979;
 
@@ -40,7 +41,7 @@ vec2 on_circle(float turns) {
     float quarter = floor(4.0 * turns + 0.5);
     float x = (4.0 * turns - quarter) * 1.57079632679;
     float c = cos_quarter(x), s = sin_quarter(x);
-    uint q = uint(quarter) & 3u;
+    uint q = uint(to_int(quarter)) & 3u;
     vec2 v = (q & 1u) == 0u ? vec2(c, s) : vec2(-s, c);
     return q < 2u ? v : -v;
 }

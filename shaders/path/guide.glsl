@@ -82,7 +82,7 @@ void guide_vertex(BlockParams block, uint at, GuideRay g, Ray ray, Hit hit) {
     // the point where it seems to be, now and in the previous frame
     vec3 position = s.position, before = previous_position(hit, s) - s.position;
     if (g.bounces > 0u) {
-        uvec2 pixel = uvec2(at % f.size.x, at / f.size.x);
+        uvec2 pixel = image_pixel(f, at);
         Ray first = camera_ray(block, vec2(pixel) + 0.5 + block.centre_offset);
         position = first.origin + first.direction * g.far;
         before = where_it_seems(g, before);

@@ -25,7 +25,7 @@ vec4 map_texel(EnvironmentRecord map, int x, int y) {
 
 vec3 map_lookup(EnvironmentRecord map, vec2 uv) {
     vec2 p = uv * vec2(map.width, map.height) - 0.5;
-    ivec2 i = ivec2(floor(p));
+    ivec2 i = to_int(floor(p));
     vec2 f = p - vec2(i);
     return mix(
         mix(map_texel(map, i.x, i.y).rgb, map_texel(map, i.x + 1, i.y).rgb, f.x),
@@ -70,7 +70,7 @@ float map_density(EnvironmentRecord map, Patch q, uint row, vec2 rows, vec2 colu
 float map_pdf(EnvironmentRecord map, vec3 w) {
     vec3 d = map_direction(map, w);
     vec2 p = map_coordinates(d) * vec2(map.width, map.height) - 0.5;
-    ivec2 i = ivec2(floor(p));
+    ivec2 i = to_int(floor(p));
     // a patch is indexed by the row of its lower texels and the column of its left ones
     i.y = clamp(i.y + 1, 0, int(map.height));
     Patch q = map_patch(map, i, p - floor(p));

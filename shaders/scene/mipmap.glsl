@@ -23,7 +23,7 @@ vec4 sample_level(uint index, TextureRecord texture, vec2 uv, uint kind, uint le
     uvec2 size = max(uvec2(texture.width, texture.height) >> level, uvec2(1u));
     vec2 p = fold(uv, texture) * vec2(size);
     if (texture.nearest == 0u) p -= 0.5;
-    ivec2 i = ivec2(floor(p));
+    ivec2 i = to_int(floor(p));
     vec2 f = texture.nearest == 0u ? p - vec2(i) : vec2(0.0);
     uvec2 x = uvec2(wrap_texel(i.x, size.x, texture.wrap_u), wrap_texel(i.x + 1, size.x, texture.wrap_u));
     uvec2 y = first + size.x * uvec2(wrap_texel(i.y, size.y, texture.wrap_v), wrap_texel(i.y + 1, size.y, texture.wrap_v));
@@ -39,7 +39,7 @@ vec4 sample_mipmap(uint index, vec2 uv, uint kind, float lod) {
     if (!plain) {
         TextureRecord texture = TextureRecords(SceneRoot(push.scene).textures).v[index];
         float whole = min(lod, float(mips.v[index].last));
-        uint level = uint(whole);
+        uint level = uint(to_int(floor(whole)));
         float above = whole - float(level);
         vec4 c = vec4(0.0);
         // a loop, so that the code exists once for both levels

@@ -2,17 +2,24 @@
 // every driver (the oracle computes it too).
 #ifndef SCENE_TEXTURE
 #define SCENE_TEXTURE
+#include "common/integers.glsl"
 #include "common/srgb.glsl"
 #include "scene/scene.glsl"
 
+// For i from -1 to 2 * size + 1, as folded coordinates have them; always a texel.
 uint wrap_texel(int i, uint size, uint mode) {
     int n = int(size);
-    if (mode == WRAP_CLAMP) return uint(clamp(i, 0, n - 1));
-    int period = mode == WRAP_MIRROR ? 2 * n : n;
-    int m = i % period;
-    m += m < 0 ? period : 0;
-    // in the mirrored half
-    return uint(m < n ? m : 2 * n - 1 - m);
+    if (mode != WRAP_CLAMP) {
+        int period = mode == WRAP_MIRROR ? 2 * n : n;
+        i += i < 0 ? period : 0;
+        // three times if a texture has one texel
+        i -= i >= period ? period : 0;
+        i -= i >= period ? period : 0;
+        i -= i >= period ? period : 0;
+        // in the mirrored half
+        i = i < n ? i : 2 * n - 1 - i;
+    }
+    return uint(clamp(i, 0, n - 1));
 }
 
 vec4 unorm16(uvec2 rgba) { return vec4(unpackUnorm2x16(rgba.x), unpackUnorm2x16(rgba.y)); }
@@ -45,7 +52,7 @@ vec4 sample_texture(uint index, vec2 uv, bool srgb) {
     bool nearest = texture.nearest != 0u;
     vec2 p = fold(uv, texture) * vec2(texture.width, texture.height);
     if (!nearest) p -= 0.5;
-    ivec2 i = ivec2(floor(p));
+    ivec2 i = to_int(floor(p));
     uint x = wrap_texel(i.x, texture.width, texture.wrap_u), y = texture.width * wrap_texel(i.y, texture.height, texture.wrap_v);
     vec4 first = decoded_texel(texture, y + x, srgb);
     if (nearest) return first;
