@@ -15,6 +15,7 @@ mod degenerate;
 mod display;
 mod edges;
 mod gtao;
+mod integers;
 mod larsen;
 mod long_run;
 mod motion;

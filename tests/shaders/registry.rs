@@ -5,6 +5,7 @@ registry! {
         SAMPLER_PROBE_ANY = "sampler_probe", any, generated;
     }
     compute {
+        INTEGERS_PROBE = "integers_probe";
         SEQUENCE_PROBE = "sequence_probe";
     }
     stages {}
