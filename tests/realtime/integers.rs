@@ -1,13 +1,11 @@
 //! Whole numbers on the device: quotients, conversions and texels without what CPU drivers do lane by lane, against the host's.
 
-use skylit::gpu::{Buffer, Commands, Memory};
 use skylit::interface::Wrap;
-use skylit::interface::records::ray_set::Probe;
 use skylit::sampling::sobol::hash_combine;
 use skylit::shaders;
-use skylit::tracer::Push;
 
 use crate::common::{assert_validation_clean, device};
+use crate::probe;
 
 const MODES: [Wrap; 3] = [Wrap::Repeat, Wrap::Mirror, Wrap::Clamp];
 
@@ -59,14 +57,7 @@ fn gpu_whole_numbers_are_the_hosts() {
             [dividend, divisor, whole.to_bits(), 0, texel as u32, size, MODES[random(i, 8) as usize % 3] as u32, 0]
         })
         .collect();
-    let source = Buffer::from_slice(&device, "probe inputs", &inputs).unwrap();
-    let results = Buffer::new(&device, "probe outputs", 16 * u64::from(count), Memory::Readback).unwrap();
-    let probe =
-        Buffer::from_slice(&device, "probe", &[Probe { inputs: source.address(), outputs: results.address() }]).unwrap();
-    let pipeline = shaders::probes::INTEGERS_PROBE.pipeline(&device).unwrap();
-    let push = Push { pass: probe.address(), count, ..Default::default() };
-    Commands::new(&device).unwrap().run(|r| r.dispatch(&pipeline, &push, count.div_ceil(shaders::LANES))).unwrap();
-    let got: Vec<[u32; 4]> = bytemuck::pod_collect_to_vec(&results.read(0, 16 * u64::from(count)).unwrap());
+    let got = probe(&device, &shaders::probes::INTEGERS_PROBE, &inputs);
     for (input, got) in inputs.iter().zip(&got) {
         let &[dividend, divisor, whole, _, texel, size, mode, _] = input;
         let x = f32::from_bits(whole);

@@ -27,16 +27,31 @@ mod tracers;
 use common::record;
 use glam::{DAffine3, DVec3};
 use skylit::film::camera::CameraRecord;
-use skylit::gpu::Device;
+use skylit::gpu::{Buffer, Commands, Device, Memory};
+use skylit::interface::records::ray_set::Probe;
 use skylit::raster::Primary;
 use skylit::realtime::{Filter, FilterKind, FrameStats, Preset, Realtime, Settings};
 use skylit::scene::{Camera, Geometry, Instance, Material, Mesh, Scene, TriangleMesh};
-use skylit::tracer::{Tracer, TracerKind};
+use skylit::shaders::{self, ComputeShader};
+use skylit::tracer::{Push, Tracer, TracerKind};
+use std::sync::Arc;
 
 /// The floor's: for what comes after tracing, which no tracer changes.
 fn one_tracer(device: &Device) -> Vec<TracerKind> {
     let kinds = common::tracers(device);
     kinds.into_iter().filter(|k| *k == TracerKind::Compute).collect()
+}
+
+/// What a shader of tests/shaders makes of `inputs`: two uvec4 each, of which it makes one.
+fn probe(device: &Arc<Device>, shader: &ComputeShader, inputs: &[[u32; 8]]) -> Vec<[u32; 4]> {
+    let (count, bytes) = (inputs.len() as u32, 16 * inputs.len() as u64);
+    let source = Buffer::from_slice(device, "probe inputs", inputs).unwrap();
+    let results = Buffer::new(device, "probe outputs", bytes, Memory::Readback).unwrap();
+    let probe = Buffer::from_slice(device, "probe", &[Probe { inputs: source.address(), outputs: results.address() }]).unwrap();
+    let pipeline = shader.pipeline(device).unwrap();
+    let push = Push { pass: probe.address(), count, ..Default::default() };
+    Commands::new(device).unwrap().run(|r| r.dispatch(&pipeline, &push, count.div_ceil(shaders::LANES))).unwrap();
+    bytemuck::pod_collect_to_vec(&results.read(0, bytes).unwrap())
 }
 
 /// Of most images here.

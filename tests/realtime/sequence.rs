@@ -1,13 +1,11 @@
 //! Sequences on the device.
 
-use skylit::gpu::{Buffer, Commands, Memory};
-use skylit::interface::records::ray_set::Probe;
 use skylit::sampling::Sequence;
 use skylit::sampling::sobol::hash_combine;
 use skylit::shaders;
-use skylit::tracer::Push;
 
 use crate::common::{assert_validation_clean, device};
+use crate::probe;
 
 #[test]
 fn gpu_sequences_are_the_hosts_bit_for_bit() {
@@ -29,15 +27,7 @@ fn gpu_sequences_are_the_hosts_bit_for_bit() {
             inputs.push([s as u32, seed, x, y, frame, index, count, 0]);
         }
     }
-    let count = inputs.len() as u32;
-    let source = Buffer::from_slice(&device, "probe inputs", &inputs).unwrap();
-    let results = Buffer::new(&device, "probe outputs", 16 * u64::from(count), Memory::Readback).unwrap();
-    let probe =
-        Buffer::from_slice(&device, "probe", &[Probe { inputs: source.address(), outputs: results.address() }]).unwrap();
-    let pipeline = shaders::probes::SEQUENCE_PROBE.pipeline(&device).unwrap();
-    let push = Push { pass: probe.address(), count, ..Default::default() };
-    Commands::new(&device).unwrap().run(|r| r.dispatch(&pipeline, &push, count.div_ceil(shaders::LANES))).unwrap();
-    let got: Vec<[u32; 4]> = bytemuck::pod_collect_to_vec(&results.read(0, 16 * u64::from(count)).unwrap());
+    let got = probe(&device, &shaders::probes::SEQUENCE_PROBE, &inputs);
     for (input, got) in inputs.iter().zip(&got) {
         let &[s, seed, x, y, frame, index, count, _] = input;
         let s = Sequence::ALL[s as usize];

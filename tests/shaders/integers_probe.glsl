@@ -2,11 +2,11 @@
 #include "common/integers.glsl"
 #include "common/types.glsl"
 #include "interface/ray_set.glsl"
+#include "probe.glsl"
 #include "scene/texture.glsl"
 
 // inputs: two uvec4 each: dividend, divisor, bits of a float, not used; texel, size and mode of a texture, not used
 // outputs: a uvec4 each: remainder, quotient, the float as an integer, wrapped texel
-layout(buffer_reference, std430, buffer_reference_align = 16) writeonly buffer ProbeOutputs { uvec4 v[]; };
 
 layout(local_size_x = LANES) in;
 

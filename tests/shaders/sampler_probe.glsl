@@ -4,10 +4,10 @@
 #include "common/sampler.glsl"
 #include "common/warp.glsl"
 #include "interface/ray_set.glsl"
+#include "probe.glsl"
 
 // inputs: two uvec4 each: seed, pixel, sample index; dimension, normal
 // outputs: three uvec4 each
-layout(buffer_reference, std430, buffer_reference_align = 16) writeonly buffer ProbeOutputs { uvec4 v[]; };
 
 Ray ray(uint index) { return no_ray(); }
 

@@ -2,10 +2,10 @@
 #include "common/types.glsl"
 #include "common/sequence.glsl"
 #include "interface/ray_set.glsl"
+#include "probe.glsl"
 
 // inputs: two uvec4 each: sequence, seed, pixel; frame, index, count
 // outputs: a uvec4 each: the bits, and as fractions
-layout(buffer_reference, std430, buffer_reference_align = 16) writeonly buffer ProbeOutputs { uvec4 v[]; };
 
 layout(local_size_x = LANES) in;
 

@@ -85,7 +85,7 @@ fn add_arcades(scene: &mut Scene, stone: usize) {
     for storey in 0..2 {
         let (floor, ceiling) = (LEVELS[storey], LEVELS[storey + 1] - SLAB);
         let spring = floor + 0.62 * (ceiling - floor);
-        let column = scene.add_mesh("column", shapes::fluted_lathe(&column_profile(spring - floor), 72, 18), stone);
+        let column = scene.add_mesh("column", shapes::fluted_lathe(&column_profile(spring - floor), 72, 18, FLUTED), stone);
         for side in 0..4u32 {
             let (along, across) = ((side % 2) as usize, 1 - (side % 2) as usize);
             let turn = DAffine3::from_rotation_y(f64::from(side) * PI / 2.0);
@@ -169,6 +169,9 @@ const BALUSTER: [[f64; 2]; 11] = [
 /// Radius and height of points of a pot.
 const POT: [[f64; 2]; 9] =
     [[0.3, -0.02], [0.3, 0.08], [0.22, 0.12], [0.3, 0.3], [0.44, 0.62], [0.46, 0.8], [0.52, 0.84], [0.52, 0.9], [0.4, 0.88]];
+
+/// Points of a column's profile around which it has grooves: the shaft without its ends.
+const FLUTED: std::ops::Range<usize> = 8..17;
 
 /// Radius and height of points of a column: base, a shaft that tapers, capital. Points 7 to 17 are the shaft.
 fn column_profile(height: f64) -> Vec<[f64; 2]> {

@@ -20,7 +20,7 @@ const BOARD: [f64; 2] = [0.36, 0.02];
 /// Where the bookcases stand along x, at the wall at -z.
 const CASES: [f64; 3] = [-2.7, -0.4, 1.9];
 
-/// A room of about `triangles` triangles. Two fifths are in books, the rest in furniture, whose round parts have more segments where there are more triangles.
+/// A room of about `triangles` triangles, 10,000 at least. Round parts of furniture have more segments where there are more triangles; what is left is in books: three fifths of 40,000.
 pub fn room(triangles: u32) -> Scene {
     let mut scene = Scene { name: "room".to_owned(), ..Scene::default() };
     let [plaster, wood, metal, cloth, paper, leaf] = [
@@ -32,7 +32,7 @@ pub fn room(triangles: u32) -> Scene {
         ("leaf", Vec3::new(0.16, 0.32, 0.1)),
     ]
     .map(|(name, color)| scene.add_matte(name, color));
-    // furniture has 230 triangles for each segment of its round parts, and grids of segments squared
+    // parts are grids of segments squared, so furniture keeps its share
     let finest = (f64::from(triangles) / 400.0).sqrt();
     let segments = (finest.round() as u32).max(4);
     add_walls(&mut scene, plaster, wood);

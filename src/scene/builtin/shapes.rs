@@ -4,6 +4,7 @@ use crate::scene::{Geometry, Sphere, TriangleMesh};
 use glam::{DVec3, Vec3};
 use std::collections::HashMap;
 use std::f64::consts::{PI, TAU};
+use std::ops::Range;
 
 /// One analytic sphere.
 pub fn sphere(center: DVec3, radius: f64) -> Geometry {
@@ -144,17 +145,16 @@ pub fn cylinder(radius: f64, height: f64, segments: u32) -> Geometry {
 
 /// A profile of radii and heights rotated about the y axis, closed at both ends.
 pub fn lathe(profile: &[[f64; 2]], segments: u32) -> Geometry {
-    fluted_lathe(profile, segments, 0)
+    fluted_lathe(profile, segments, 0, 0..0)
 }
 
-/// The same with `flutes` of them along points 7 to 17.
-pub fn fluted_lathe(profile: &[[f64; 2]], segments: u32, flutes: u32) -> Geometry {
+/// The same with as many grooves as `flutes` around the points of the profile that `fluted` counts.
+pub fn fluted_lathe(profile: &[[f64; 2]], segments: u32, flutes: u32, fluted: Range<usize>) -> Geometry {
     let mut mesh = TriangleMesh::default();
     for (k, [radius, y]) in profile.iter().enumerate() {
         for i in 0..segments {
             let angle = TAU * f64::from(i) / f64::from(segments);
-            let is_fluted = flutes > 0 && (8..17).contains(&k);
-            let depth = if is_fluted { 0.07 * (0.5 - 0.5 * (angle * f64::from(flutes)).cos()) } else { 0.0 };
+            let depth = if fluted.contains(&k) { 0.07 * (0.5 - 0.5 * (angle * f64::from(flutes)).cos()) } else { 0.0 };
             let r = radius * (1.0 - depth);
             mesh.positions.push(DVec3::new(r * angle.cos(), *y, -r * angle.sin()).as_vec3());
         }
