@@ -28,11 +28,11 @@ float power_heuristic(float a, float b) {
     return 1.0 / (1.0 + r * r);
 }
 
-// Radiance that counts, of what reaches the camera after so many bounces.
+// Radiance that counts, of what reaches the camera after so many bounces: 1 is direct light, which no clamp touches.
 vec3 counted_radiance(PathParams p, vec3 c, uint depth) {
     if (WITH_MIN_DEPTH && depth < p.options.min_depth) return vec3(0.0);
     if (WITH_INDIRECT_SCALE && depth > 1u) c *= p.options.indirect_scale;
-    return WITH_CLAMP && depth > 0u ? min(c, vec3(p.options.firefly_clamp)) : c;
+    return WITH_CLAMP && depth > 1u ? min(c, vec3(p.options.firefly_clamp)) : c;
 }
 
 // MIS weight of an emitter that a ray hit, which light sampling samples with density `light`.

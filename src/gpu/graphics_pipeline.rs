@@ -43,7 +43,8 @@ impl GraphicsPipeline {
         cull: Cull,
     ) -> Result<Self> {
         let _timer = CompileTimer::start();
-        let modules = [Module::new(device, name, vertex)?, Module::new(device, name, fragment)?];
+        let module = |shader| Module::new(device, name, shader, specialization);
+        let modules = [module(vertex)?, module(fragment)?];
         let mut pipeline = Self { raw: vk::Pipeline::null(), layout: layout(device, DRAW_STAGES)?, device: device.clone() };
         let vertex_input = vk::PipelineVertexInputStateCreateInfo::default();
         let assembly = vk::PipelineInputAssemblyStateCreateInfo::default().topology(vk::PrimitiveTopology::TRIANGLE_LIST);
@@ -69,30 +70,25 @@ impl GraphicsPipeline {
         let formats = [IDS];
         let mut rendering =
             vk::PipelineRenderingCreateInfo::default().color_attachment_formats(&formats).depth_attachment_format(DEPTH);
-        pipeline.raw = specialization.with(|s| {
-            let stage = |k: usize, stage| {
-                vk::PipelineShaderStageCreateInfo::default()
-                    .stage(stage)
-                    .module(modules[k].raw)
-                    .name(c"main")
-                    .specialization_info(s)
-            };
-            let stages = [stage(0, vk::ShaderStageFlags::VERTEX), stage(1, vk::ShaderStageFlags::FRAGMENT)];
-            let info = [vk::GraphicsPipelineCreateInfo::default()
-                .stages(&stages)
-                .vertex_input_state(&vertex_input)
-                .input_assembly_state(&assembly)
-                .viewport_state(&viewport)
-                .rasterization_state(&rasterization)
-                .multisample_state(&multisample)
-                .depth_stencil_state(&depth)
-                .color_blend_state(&blend)
-                .dynamic_state(&dynamic)
-                .layout(pipeline.layout)
-                .push_next(&mut rendering)];
-            // SAFETY: modules and layout are of this device; all required states are given
-            unsafe { device.raw.create_graphics_pipelines(device.pipeline_cache, &info, None) }.map_err(|e| e.1).context(name)
-        })?[0];
+        let stage =
+            |k: usize, stage| vk::PipelineShaderStageCreateInfo::default().stage(stage).module(modules[k].raw).name(c"main");
+        let stages = [stage(0, vk::ShaderStageFlags::VERTEX), stage(1, vk::ShaderStageFlags::FRAGMENT)];
+        let info = [vk::GraphicsPipelineCreateInfo::default()
+            .stages(&stages)
+            .vertex_input_state(&vertex_input)
+            .input_assembly_state(&assembly)
+            .viewport_state(&viewport)
+            .rasterization_state(&rasterization)
+            .multisample_state(&multisample)
+            .depth_stencil_state(&depth)
+            .color_blend_state(&blend)
+            .dynamic_state(&dynamic)
+            .layout(pipeline.layout)
+            .push_next(&mut rendering)];
+        // SAFETY: modules and layout are of this device; all required states are given
+        pipeline.raw = unsafe { device.raw.create_graphics_pipelines(device.pipeline_cache, &info, None) }
+            .map_err(|e| e.1)
+            .context(name)?[0];
         device.name(pipeline.raw, name);
         Ok(pipeline)
     }

@@ -16,7 +16,7 @@ use super::result::Context;
 use crate::error::{Error, Result};
 use crate::interface::constants::Constant;
 use crate::interface::records::ray::Push;
-use crate::shaders::{ComputeShader, Shader};
+use crate::shaders::{ComputeShader, Shader, specialize};
 
 /// Size in bytes of the push-constant block, the same for all pipelines.
 pub(super) const PUSH_BYTES: u32 = size_of::<Push>() as u32;
@@ -53,15 +53,6 @@ impl Specialization {
         self.entries.extend(&other.entries);
         self
     }
-
-    pub(super) fn with<R>(&self, f: impl FnOnce(&vk::SpecializationInfo) -> R) -> R {
-        let map: Vec<_> = (0..)
-            .zip(&self.entries)
-            .map(|(k, (id, _))| vk::SpecializationMapEntry { constant_id: *id, offset: 4 * k, size: 4 })
-            .collect();
-        let data: Vec<u32> = self.entries.iter().map(|e| e.1).collect();
-        f(&vk::SpecializationInfo::default().map_entries(&map).data(bytemuck::cast_slice(&data)))
-    }
 }
 
 /// A shader module that lives while pipelines are made from it.
@@ -71,15 +62,21 @@ pub(super) struct Module<'a> {
 }
 
 impl<'a> Module<'a> {
-    pub(super) fn new(device: &'a Device, name: &str, shader: &Shader) -> Result<Self> {
-        let words = ash::util::read_spv(&mut std::io::Cursor::new(shader.spirv()?))
+    /// With its specialization constants set: pipelines need not set them.
+    pub(super) fn new(device: &'a Device, name: &str, shader: &Shader, specialization: &Specialization) -> Result<Self> {
+        let words = specialize(&words(&shader.spirv()?), &specialization.entries)
             .map_err(|e| Error::Vulkan(format!("shader {name} is not SPIR-V: {e}")))?;
-        // SAFETY: valid SPIR-V from the build script's compiler
+        // SAFETY: SPIR-V from the build script's compiler, and valid after specialization: the validation layer looks at it in tests
         let raw = unsafe { device.raw.create_shader_module(&vk::ShaderModuleCreateInfo::default().code(&words), None) }
             .context(name)?;
         device.name(raw, name);
         Ok(Self { raw, device })
     }
+}
+
+/// SPIR-V as words, in this machine's order of bytes.
+fn words(spirv: &[u8]) -> Vec<u32> {
+    spirv.chunks_exact(4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect()
 }
 
 impl Drop for Module<'_> {
@@ -237,22 +234,19 @@ impl ComputePipeline {
         let _timer = CompileTimer::start();
         let key = Key::new([shader], specialization, flags.as_raw())?;
         let make = || {
-            let module = Module::new(device, name, shader)?;
+            let module = Module::new(device, name, shader, specialization)?;
             let layout = layout(device, vk::ShaderStageFlags::COMPUTE)?;
             let mut pipeline = Compiled { raw: vk::Pipeline::null(), layout, table: None, device: device.clone() };
-            pipeline.raw = specialization.with(|s| {
-                let stage = vk::PipelineShaderStageCreateInfo::default()
-                    .stage(vk::ShaderStageFlags::COMPUTE)
-                    .flags(flags)
-                    .module(module.raw)
-                    .name(c"main")
-                    .specialization_info(s);
-                let info = [vk::ComputePipelineCreateInfo::default().stage(stage).layout(layout)];
-                // SAFETY: module and layout are of this device
-                unsafe { device.raw.create_compute_pipelines(device.pipeline_cache, &info, None) }
-                    .map_err(|e| e.1)
-                    .context(name)
-            })?[0];
+            let stage = vk::PipelineShaderStageCreateInfo::default()
+                .stage(vk::ShaderStageFlags::COMPUTE)
+                .flags(flags)
+                .module(module.raw)
+                .name(c"main");
+            let info = [vk::ComputePipelineCreateInfo::default().stage(stage).layout(layout)];
+            // SAFETY: module and layout are of this device
+            pipeline.raw = unsafe { device.raw.create_compute_pipelines(device.pipeline_cache, &info, None) }
+                .map_err(|e| e.1)
+                .context(name)?[0];
             device.name(pipeline.raw, name);
             Ok(pipeline)
         };
@@ -337,10 +331,11 @@ impl RayTracingPipeline {
         shared: &HitShaders,
         specialization: &Specialization,
     ) -> Result<Compiled> {
+        let module = |name, shader| Module::new(device, name, shader, specialization);
         let mut modules = vec![
-            (Module::new(device, name, raygen)?, vk::ShaderStageFlags::RAYGEN_KHR),
-            (Module::new(device, "miss", shared.miss)?, vk::ShaderStageFlags::MISS_KHR),
-            (Module::new(device, "triangle closest hit", shared.triangle_closest)?, vk::ShaderStageFlags::CLOSEST_HIT_KHR),
+            (module(name, raygen)?, vk::ShaderStageFlags::RAYGEN_KHR),
+            (module("miss", shared.miss)?, vk::ShaderStageFlags::MISS_KHR),
+            (module("triangle closest hit", shared.triangle_closest)?, vk::ShaderStageFlags::CLOSEST_HIT_KHR),
         ];
         let unused = vk::SHADER_UNUSED_KHR;
         let general = |index| {
@@ -362,7 +357,7 @@ impl RayTracingPipeline {
         let mut groups = vec![general(0), general(1), triangles(unused), triangles(unused), triangles(unused)];
         if let Some(any) = shared.triangle_any {
             groups[3] = triangles(modules.len() as u32);
-            modules.push((Module::new(device, "triangle any hit", any)?, vk::ShaderStageFlags::ANY_HIT_KHR));
+            modules.push((module("triangle any hit", any)?, vk::ShaderStageFlags::ANY_HIT_KHR));
         }
         if let Some([closest, intersection]) = shared.sphere {
             let first = modules.len() as u32;
@@ -372,34 +367,26 @@ impl RayTracingPipeline {
                 .closest_hit_shader(first)
                 .any_hit_shader(unused)
                 .intersection_shader(first + 1);
-            modules.push((Module::new(device, "sphere closest hit", closest)?, vk::ShaderStageFlags::CLOSEST_HIT_KHR));
-            modules.push((Module::new(device, "sphere intersection", intersection)?, vk::ShaderStageFlags::INTERSECTION_KHR));
+            modules.push((module("sphere closest hit", closest)?, vk::ShaderStageFlags::CLOSEST_HIT_KHR));
+            modules.push((module("sphere intersection", intersection)?, vk::ShaderStageFlags::INTERSECTION_KHR));
         }
         let layout = layout(device, RAY_STAGES)?;
         let mut pipeline = Compiled { raw: vk::Pipeline::null(), layout, table: None, device: device.clone() };
-        pipeline.raw = specialization.with(|s| {
-            let stages: Vec<_> = modules
-                .iter()
-                .map(|(m, stage)| {
-                    vk::PipelineShaderStageCreateInfo::default()
-                        .stage(*stage)
-                        .module(m.raw)
-                        .name(c"main")
-                        .specialization_info(s)
-                })
-                .collect();
-            let info = [vk::RayTracingPipelineCreateInfoKHR::default()
-                .stages(&stages)
-                .groups(&groups)
-                .max_pipeline_ray_recursion_depth(1)
-                .layout(pipeline.layout)];
-            // SAFETY: modules and layout are of this device
-            unsafe {
-                functions.create_ray_tracing_pipelines(vk::DeferredOperationKHR::null(), device.pipeline_cache, &info, None)
-            }
-            .map_err(|e| e.1)
-            .context(name)
-        })?[0];
+        let stages: Vec<_> = modules
+            .iter()
+            .map(|(m, stage)| vk::PipelineShaderStageCreateInfo::default().stage(*stage).module(m.raw).name(c"main"))
+            .collect();
+        let info = [vk::RayTracingPipelineCreateInfoKHR::default()
+            .stages(&stages)
+            .groups(&groups)
+            .max_pipeline_ray_recursion_depth(1)
+            .layout(pipeline.layout)];
+        // SAFETY: modules and layout are of this device
+        pipeline.raw = unsafe {
+            functions.create_ray_tracing_pipelines(vk::DeferredOperationKHR::null(), device.pipeline_cache, &info, None)
+        }
+        .map_err(|e| e.1)
+        .context(name)?[0];
         device.name(pipeline.raw, name);
         pipeline.table = Some(Table::new(functions, &pipeline, groups.len() as u32)?);
         Ok(pipeline)

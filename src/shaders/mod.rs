@@ -7,11 +7,13 @@
 #[cfg(feature = "live-shaders")]
 mod compiler;
 mod source;
+mod specialize;
 
 use std::borrow::Cow;
 
 pub use source::{LANES, Mode, PACKET_RAYS, RUN, Rays, SPREAD, Source, Stage, Variant};
 use source::{mode, rays};
+pub(crate) use specialize::specialize;
 
 use crate::error::Result;
 use crate::interface::debug_views::debug_views;

@@ -8,7 +8,9 @@
 //! where the cosine is alpha, and the stretched cosine as an axis holds it in place. What follows the cosine itself, as Fresnel's term does, is
 //! divided by that and has a table of its own. Both axes are square roots, for the sake of grazing angles.
 
+use std::collections::HashMap;
 use std::f64::consts::PI;
+use std::sync::{LazyLock, Mutex, PoisonError};
 
 use rayon::prelude::*;
 
@@ -36,37 +38,80 @@ pub(super) struct AlbedoTables {
     pub beckmann: bool,
 }
 
+/// A table, or several of one integral.
+#[derive(Clone, Copy, PartialEq, Eq, Hash)]
+enum Table {
+    Ggx,
+    Schlick,
+    Sheen,
+    Beckmann,
+    /// By the bits of the index of refraction, of both sides.
+    Glass(u32),
+}
+
+impl Table {
+    /// Its layers.
+    fn compute(self) -> Vec<f32> {
+        match self {
+            Self::Ggx => layers(|x, r| [ggx(unstretched(x, r), r)[0]]),
+            Self::Schlick => layers(|x, r| {
+                let [whole, weighted] = ggx(cosine(x), r);
+                [weighted / whole]
+            }),
+            Self::Sheen => layers(|x, r| [charlie(cosine(x), r)]),
+            Self::Beckmann => layers(|x, r| [beckmann(unstretched(x, r), r)]),
+            Self::Glass(bits) => {
+                let ior = f64::from(f32::from_bits(bits));
+                let of = |eta| {
+                    layers(|x, r| {
+                        let [total, reflected, open, closed] = dielectric(cosine(x), r, eta);
+                        let whole = ggx(cosine(x), r)[0];
+                        [total / whole, reflected / whole, open, closed]
+                    })
+                };
+                [of(ior), of(1.0 / ior)].concat()
+            }
+        }
+    }
+
+    /// Its layers, from memory if this process has computed them before: a table of glass takes a second.
+    fn layers(self) -> Vec<f32> {
+        static KNOWN: LazyLock<Mutex<HashMap<Table, Vec<f32>>>> = LazyLock::new(Mutex::default);
+        let known = || KNOWN.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(layers) = known().get(&self) {
+            return layers.clone();
+        }
+        // not under the lock: it is computed on several threads, which may come here too
+        let layers = self.compute();
+        known().insert(self, layers.clone());
+        layers
+    }
+}
+
 /// Layers of `SIZE` squared in the order of shaders/bsdf/albedo.glsl, rows by roughness; `glass`: indices of refraction.
 pub(super) fn tables(wanted: AlbedoTables, glass: &[f32]) -> Vec<f32> {
     let ggx_wanted = wanted.ggx || !glass.is_empty();
-    let mut all = table(ggx_wanted, |x, r| [ggx(unstretched(x, r), r)[0]]);
-    all.extend(table(ggx_wanted, |x, r| {
-        let [whole, weighted] = ggx(cosine(x), r);
-        [weighted / whole]
-    }));
-    all.extend(table(wanted.sheen, |x, r| [charlie(cosine(x), r)]));
-    all.extend(table(wanted.beckmann, |x, r| [beckmann(unstretched(x, r), r)]));
-    for &ior in glass {
-        for eta in [f64::from(ior), 1.0 / f64::from(ior)] {
-            all.extend(table(true, |x, r| {
-                let [total, reflected, open, closed] = dielectric(cosine(x), r, eta);
-                let whole = ggx(cosine(x), r)[0];
-                [total / whole, reflected / whole, open, closed]
-            }));
-        }
-    }
+    let tables = [
+        (ggx_wanted, Table::Ggx),
+        (ggx_wanted, Table::Schlick),
+        (wanted.sheen, Table::Sheen),
+        (wanted.beckmann, Table::Beckmann),
+    ];
+    // zeros for a table that is not required
+    let layers = |(wanted, table): (bool, Table)| if wanted { table.layers() } else { vec![0.0; SIZE * SIZE] };
+    let mut all: Vec<f32> = tables.into_iter().flat_map(layers).collect();
+    all.extend(glass.iter().flat_map(|ior| Table::Glass(ior.to_bits()).layers()));
     all
 }
 
-/// Layers of a function of cosine and roughness; zeros for a table that is not required.
-fn table<const N: usize>(wanted: bool, f: impl Fn(f64, f64) -> [f64; N] + Sync) -> Vec<f32> {
+/// Layers of a function of cosine and roughness.
+fn layers<const N: usize>(f: impl Fn(f64, f64) -> [f64; N] + Sync) -> Vec<f32> {
     let entry = |k: usize| {
         let [x, y] = [k % SIZE, k / SIZE].map(|i| i as f64 / (SIZE - 1) as f64);
         f(x, y.max(MIN_ROUGHNESS))
     };
-    let entries: Vec<[f64; N]> = if wanted { (0..SIZE * SIZE).into_par_iter().map(entry).collect() } else { Vec::new() };
-    let layer = |k: usize| entries.iter().map(move |values| values[k] as f32);
-    if wanted { (0..N).flat_map(layer).collect() } else { vec![0.0; N * SIZE * SIZE] }
+    let entries: Vec<[f64; N]> = (0..SIZE * SIZE).into_par_iter().map(entry).collect();
+    (0..N).flat_map(|k| entries.iter().map(move |values| values[k] as f32)).collect()
 }
 
 /// The cosine at a coordinate in [0, 1] of the axis.
@@ -92,23 +137,36 @@ fn lambda(alpha: f64, cosine: f64) -> f64 {
     0.5 * ((1.0 + alpha * alpha * tan2).sqrt() - 1.0)
 }
 
-/// Midpoints of a grid over the unit square, and the weight of each.
-fn grid() -> impl Iterator<Item = ((f64, f64), f64)> {
-    (0..POINTS * POINTS)
-        .map(|k| ((k % POINTS) as f64 + 0.5, (k / POINTS) as f64 + 0.5))
-        .map(|(x, y)| spaced(x / POINTS as f64, y / POINTS as f64, POINTS * POINTS))
+/// A point of an integral over normals on one side of the plane of wo: the other side is its mirror image.
+struct Point {
+    /// Cosine and sine of the azimuth.
+    azimuth: [f64; 2],
+    /// The second coordinate.
+    v: f64,
+    /// Weight.
+    share: f64,
 }
 
-/// Points of a golden-ratio lattice and their weights, for integrands with an edge: no row of points lies along the edge.
-fn lattice() -> impl Iterator<Item = ((f64, f64), f64)> {
-    (0..LATTICE).map(|k| k as f64 + 0.5).map(|k| spaced(k / LATTICE as f64, (k * 0.618_033_988_749_894_9).fract(), LATTICE))
+impl Point {
+    /// Warps the second coordinate so that points are denser near 1, where normals are nearly those of the surface and most reflected
+    /// directions are above it.
+    fn spaced(x: f64, y: f64, points: usize) -> Self {
+        let phi = PI * x;
+        Self { azimuth: [phi.cos(), phi.sin()], v: 1.0 - y * y, share: 2.0 * y / points as f64 }
+    }
 }
 
-/// Warps the second coordinate so that points are denser near 1, where normals are nearly those of the surface and most reflected
-/// directions are above it.
-fn spaced(x: f64, y: f64, points: usize) -> ((f64, f64), f64) {
-    ((x, 1.0 - y * y), 2.0 * y / points as f64)
-}
+/// Midpoints of a grid over the unit square.
+static GRID: LazyLock<Vec<Point>> = LazyLock::new(|| {
+    let at = |k: usize| (k as f64 + 0.5) / POINTS as f64;
+    (0..POINTS * POINTS).map(|k| Point::spaced(at(k % POINTS), at(k / POINTS), POINTS * POINTS)).collect()
+});
+
+/// Points of a golden-ratio lattice, for integrands with an edge: no row of points lies along the edge.
+static LATTICE_POINTS: LazyLock<Vec<Point>> = LazyLock::new(|| {
+    let at = |k: f64| Point::spaced(k / LATTICE as f64, (k * 0.618_033_988_749_894_9).fract(), LATTICE);
+    (0..LATTICE).map(|k| at(k as f64 + 0.5)).collect()
+});
 
 fn direction(cosine: f64) -> [f64; 3] {
     [(1.0 - cosine * cosine).sqrt(), 0.0, cosine]
@@ -123,31 +181,48 @@ fn normalize(v: [f64; 3]) -> [f64; 3] {
     v.map(|x| x / length)
 }
 
-/// A normal of GGX that is visible from wo, on one side of the plane of wo: the other side is its mirror image.
-fn visible_normal(alpha: f64, wo: [f64; 3], u: (f64, f64)) -> [f64; 3] {
-    let v = normalize([alpha * wo[0], alpha * wo[1], wo[2]]);
-    let phi = PI * u.0;
-    let z = (1.0 - u.1) * (1.0 + v[2]) - v[2];
-    let s = (1.0 - z * z).max(0.0).sqrt();
-    let h = [s * phi.cos() + v[0], s * phi.sin() + v[1], z + v[2]];
-    normalize([alpha * h[0], alpha * h[1], h[2].max(1e-12)])
+/// GGX microfacets as seen from a direction wo.
+struct Visible {
+    alpha: f64,
+    wo: [f64; 3],
+    /// wo, stretched until the roughness is 1.
+    stretched: [f64; 3],
+    /// 1 plus Smith's Lambda of wo.
+    hidden: f64,
+}
+
+impl Visible {
+    fn new(cos_o: f64, roughness: f64) -> Self {
+        let (alpha, wo) = (roughness * roughness, direction(cos_o));
+        let stretched = normalize([alpha * wo[0], alpha * wo[1], wo[2]]);
+        Self { alpha, wo, stretched, hidden: 1.0 + lambda(alpha, cos_o) }
+    }
+
+    /// Cosine of a visible normal to the surface, and to wo.
+    fn normal(&self, point: &Point) -> (f64, f64) {
+        let (alpha, v) = (self.alpha, self.stretched);
+        let z = (1.0 - point.v) * (1.0 + v[2]) - v[2];
+        let s = (1.0 - z * z).max(0.0).sqrt();
+        let h = [s * point.azimuth[0] + v[0], s * point.azimuth[1] + v[1], z + v[2]];
+        let m = normalize([alpha * h[0], alpha * h[1], h[2].max(1e-12)]);
+        (m[2], dot(self.wo, m))
+    }
+
+    /// G2 over G1 for a direction on either side, weighted; 0 for one on the wrong side.
+    fn unhidden(&self, cos_i: f64, point: &Point) -> f64 {
+        if cos_i > 0.0 { point.share * self.hidden / (self.hidden + lambda(self.alpha, cos_i)) } else { 0.0 }
+    }
 }
 
 /// Albedo of GGX microfacets with a Fresnel term of 1, and with Schlick's weight (1 - cos)^5 as the Fresnel term.
 fn ggx(cos_o: f64, roughness: f64) -> [f64; 2] {
-    let (alpha, wo) = (roughness * roughness, direction(cos_o));
-    let hidden = 1.0 + lambda(alpha, cos_o);
+    let visible = Visible::new(cos_o, roughness);
     let mut sum = [0.0; 2];
-    for (u, share) in grid() {
-        let m = visible_normal(alpha, wo, u);
-        let om = dot(wo, m);
-        let cos_i = 2.0 * om * m[2] - wo[2];
-        if cos_i > 0.0 {
-            // G2 over G1
-            let g = share * hidden / (hidden + lambda(alpha, cos_i));
-            sum[0] += g;
-            sum[1] += g * weight(om);
-        }
+    for point in GRID.iter() {
+        let (cos_m, om) = visible.normal(point);
+        let g = visible.unhidden(2.0 * om * cos_m - cos_o, point);
+        sum[0] += g;
+        sum[1] += g * weight(om);
     }
     sum
 }
@@ -156,17 +231,14 @@ fn ggx(cos_o: f64, roughness: f64) -> [f64; 2] {
 /// reflection below the critical angle; transmission with F = 0; the part of it that F removes. `eta`: index of refraction on the far
 /// side over that on the side of wo.
 fn dielectric(cos_o: f64, roughness: f64, eta: f64) -> [f64; 4] {
-    let (alpha, wo) = (roughness * roughness, direction(cos_o));
-    let hidden = 1.0 + lambda(alpha, cos_o);
+    let visible = Visible::new(cos_o, roughness);
     let mut sum = [0.0; 4];
-    for (u, share) in lattice() {
-        let m = visible_normal(alpha, wo, u);
-        let om = dot(wo, m);
+    for point in LATTICE_POINTS.iter() {
+        let (cos_m, om) = visible.normal(point);
         let (f, cos_t) = fresnel(om, eta);
-        let g = |cos_i: f64| if cos_i > 0.0 { share * hidden / (hidden + lambda(alpha, cos_i)) } else { 0.0 };
-        let reflected = g(2.0 * om * m[2] - wo[2]);
+        let reflected = visible.unhidden(2.0 * om * cos_m - cos_o, point);
         if cos_t > 0.0 {
-            let refracted = g(wo[2] / eta - (om / eta - cos_t) * m[2]);
+            let refracted = visible.unhidden(cos_o / eta - (om / eta - cos_t) * cos_m, point);
             sum[1] += f * reflected;
             sum[2] += refracted;
             sum[3] += f * refracted;
@@ -197,18 +269,18 @@ fn beckmann(cos_o: f64, roughness: f64) -> f64 {
         let a = 1.0 / (alpha * tan).max(1e-15);
         if a < 1.6 { (1.0 + a * (-1.259 + 0.396 * a)) / (a * (3.535 + 2.181 * a)) } else { 0.0 }
     };
-    grid()
-        .map(|(u, share)| {
-            let (tan2, phi) = (-alpha * alpha * (1.0 - u.1).ln(), PI * u.0);
+    GRID.iter()
+        .map(|point| {
+            let tan2 = -alpha * alpha * (1.0 - point.v).ln();
             let cos_m = 1.0 / (1.0 + tan2).sqrt();
             let s = (1.0 - cos_m * cos_m).max(0.0).sqrt();
-            let m = [s * phi.cos(), s * phi.sin(), cos_m];
+            let m = [s * point.azimuth[0], s * point.azimuth[1], cos_m];
             let om = dot(wo, m);
             let cos_i = 2.0 * om * cos_m - wo[2];
             if om <= 0.0 || cos_i <= 0.0 {
                 return 0.0;
             }
-            share * om / (cos_o * cos_m * (1.0 + lambda(cos_o) + lambda(cos_i)))
+            point.share * om / (cos_o * cos_m * (1.0 + lambda(cos_o) + lambda(cos_i)))
         })
         .sum()
 }

@@ -37,6 +37,12 @@ fn gpu_a_room_of_light() {
             let options = PathOptions { indirect_scale, rr_depth: 100, spp: 64, ..options.clone() };
             holds(&device, &format!("room, indirect light by {indirect_scale}"), &room, &options, scaled, 2e-2);
         }
+        // or with each term from the second bounce on clamped: sampled by the BSDF, a path adds the terms themselves
+        let clamp = 0.25f32;
+        let terms = (0..100).map(|k| (k, f64::from(albedo).powi(k)));
+        let clamped: f64 = terms.map(|(k, term)| if k < 2 { term } else { term.min(f64::from(clamp)) }).sum();
+        let options = PathOptions { firefly_clamp: clamp, strategy: Strategy::Bsdf, rr_depth: 100, spp: 64, ..options.clone() };
+        holds(&device, "room, indirect light clamped", &room, &options, clamped, 2e-2);
     }
 }
 

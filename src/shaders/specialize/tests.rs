@@ -1,0 +1,114 @@
+use rspirv::dr::{Block, Function};
+
+use super::*;
+use crate::interface::constants;
+use crate::shaders;
+
+fn words(shader: &shaders::Shader) -> Vec<u32> {
+    shader.spirv().unwrap().chunks_exact(4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect()
+}
+
+/// Shaders of every kind: large and small, with loops, switches, calls, and of every stage.
+fn shaders() -> Vec<&'static shaders::Shader> {
+    use shaders::*;
+    let streams = [&AO_TRACE_ANY, &PATH_BOUNCE_CLOSEST, &PATH_CAMERA_CLOSEST, &RAYS_ANY, &RAYS_CLOSEST];
+    let of_streams = streams.into_iter().flat_map(|s| Variant::ALL.into_iter().filter_map(|v| s.variant(v)));
+    let compute = [&ANTIALIAS, &FILTER, &GTAO, &PATH_RESOLVE, &TEMPORAL, &RADIANCE_TEMPORAL].map(|c| c.variant(true));
+    let stages = [&MISS, &TRIANGLE_CLOSEST, &TRIANGLE_ANY, &SPHERE_INTERSECTION, &DRAW_TRIANGLES, &DRAW_ALPHA, &DRAW_SPHERE];
+    let kernels = [wide_kernel(Mode::Any, true), wide_kernel(Mode::Closest, false)];
+    of_streams.chain(compute).chain(stages).chain(kernels).collect()
+}
+
+/// All constants that a shader declares, set to the same value.
+fn all(value: u32) -> Vec<(u32, u32)> {
+    (0..64).map(|id| (id, value)).collect()
+}
+
+fn ids(i: &Instruction) -> impl Iterator<Item = u32> + '_ {
+    i.operands.iter().filter_map(Operand::id_ref_any).chain(i.result_type)
+}
+
+fn blocks(module: &Module) -> impl Iterator<Item = (&Function, &Block)> {
+    module.functions.iter().flat_map(|f| f.blocks.iter().map(move |b| (f, b)))
+}
+
+/// What the specification asks of a module, as far as specialization could break it.
+fn assert_valid(words: &[u32], what: &str) {
+    let module = rspirv::dr::load_words(words).unwrap_or_else(|e| panic!("{what}: {e}"));
+    let bound = module.header.as_ref().unwrap().bound;
+    let mut defined = std::collections::HashSet::new();
+    for id in module.all_inst_iter().filter_map(|i| i.result_id) {
+        assert!(id < bound && defined.insert(id), "{what}: id {id} is defined twice or beyond the bound {bound}");
+    }
+    for i in module.all_inst_iter() {
+        assert!(ids(i).all(|id| defined.contains(&id)), "{what}: {:?} names what is not there", i.class.opcode);
+    }
+    let mut merges = std::collections::HashSet::new();
+    for (function, block) in blocks(&module) {
+        let label = flow::label(block);
+        let before = function.blocks.iter().filter(|b| flow::targets(b.instructions.last().unwrap()).any(|t| t == label));
+        let mut before: Vec<u32> = before.map(flow::label).collect();
+        before.sort_unstable();
+        for phi in block.instructions.iter().filter(|i| i.class.opcode == Op::Phi) {
+            let mut from: Vec<u32> = flow::incoming(phi).map(|(_, from)| from).collect();
+            from.sort_unstable();
+            assert_eq!(from, before, "{what}: a phi has other blocks before it");
+        }
+        let n = block.instructions.len();
+        let merge = block.instructions[..n - 1].last().filter(|i| matches!(i.class.opcode, Op::SelectionMerge | Op::LoopMerge));
+        if let Some(merge) = merge {
+            let target = merge.operands[0].id_ref_any().unwrap();
+            assert!(merges.insert(target), "{what}: two constructs have one merge block");
+            let branch = block.instructions[n - 1].class.opcode;
+            assert!(merge.class.opcode == Op::LoopMerge || branch != Op::Branch, "{what}: a selection without a choice");
+        }
+        assert!(block.instructions[..n - 1].iter().all(|i| !flow::is_selection(i) && i.class.opcode != Op::Branch), "{what}");
+    }
+}
+
+#[test]
+fn every_value_of_the_constants_leaves_valid_modules() {
+    for shader in shaders() {
+        let words = words(shader);
+        for value in [0, 1, 8, u32::MAX] {
+            let what = format!("{:?} with {value}", shader.source());
+            let specialized = specialize(&words, &all(value)).unwrap();
+            assert_valid(&specialized, &what);
+            let module = rspirv::dr::load_words(&specialized).unwrap();
+            let is_open =
+                |i: &&Instruction| matches!(i.class.opcode, Op::SpecConstant | Op::SpecConstantTrue | Op::SpecConstantFalse);
+            assert_eq!(module.all_inst_iter().filter(is_open).count(), 0, "{what}");
+            // there is nothing left to do
+            let again = specialize(&specialized, &[]).unwrap();
+            assert!(again.len() <= specialized.len(), "{what}");
+        }
+    }
+}
+
+#[test]
+fn features_that_are_off_are_gone() {
+    let shader = shaders::PATH_CAMERA_CLOSEST.variant(shaders::Variant::Deliver64).unwrap();
+    let all_words = words(shader);
+    let off = specialize(&all_words, &all(0)).unwrap().len();
+    assert!(5 * off < all_words.len(), "{off} words of {}", all_words.len());
+}
+
+#[test]
+fn a_constant_that_is_not_set_has_its_default() {
+    let shader = shaders::wide_kernel(shaders::Mode::Any, true);
+    let default = specialize(&words(shader), &[]).unwrap();
+    let set = specialize(&words(shader), &[(constants::WATERTIGHT.id, 1), (constants::SINGLE_LEVEL.id, 0)]).unwrap();
+    assert_eq!(default, set);
+    let other = specialize(&words(shader), &[(constants::WATERTIGHT.id, 0)]).unwrap();
+    assert!(other.len() < default.len());
+    // what is set last holds
+    let twice = specialize(&words(shader), &[(constants::WATERTIGHT.id, 1), (constants::WATERTIGHT.id, 0)]).unwrap();
+    assert_eq!(twice, other);
+}
+
+#[test]
+fn what_is_no_spirv_is_refused() {
+    for words in [&[][..], &[0], &[0x0723_0203, 0x0001_0600, 0, 8, 0, 0xffff_ffff]] {
+        assert!(specialize(words, &[]).is_err(), "{words:x?}");
+    }
+}
