@@ -28,8 +28,8 @@ from typing import Any
 
 import numpy as np
 
-JUDGE = Path(__file__).resolve().parents[2] / "scripts" / "judge"
-sys.path.insert(0, str(JUDGE))
+MITSUBA = Path(__file__).resolve().parents[2] / "scripts" / "mitsuba"
+sys.path.insert(0, str(MITSUBA))
 
 import render  # noqa: E402  (sets Mitsuba's variant)
 import scenes  # noqa: E402

@@ -15,7 +15,7 @@ import numpy as np
 
 from gltf import Array, Mesh, Writer, unit
 
-TESTS = Path(__file__).resolve().parents[2] / "tests" / "judge"
+TESTS = Path(__file__).resolve().parents[2] / "tests" / "mitsuba"
 ENVIRONMENT = "sun.exr"
 
 
