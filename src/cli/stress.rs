@@ -6,11 +6,10 @@ use clap::{Args, ValueHint};
 use serde_json::json;
 
 use crate::error::{Error, Result};
-use crate::film::Control;
 use crate::stress::{self, Check, Effort, Observer, Options, SECTIONS, Section, Summary, Verdict};
-use crate::terminal::console::{Console, Failure, Verbosity, one_line};
+use crate::terminal::console::{Failure, Verbosity, one_line};
 use crate::terminal::interrupt;
-use crate::terminal::progress::Progress;
+use crate::terminal::lines::Lines;
 use crate::tracer::DeviceSettings;
 
 const EXAMPLES: &str = "\
@@ -88,7 +87,7 @@ pub fn run(args: &StressArgs) -> Result<(), Failure> {
     }
     interrupt::install();
     let console = args.verbosity.console();
-    let mut observer = Lines { console, progress: Progress::new("stress", &console) };
+    let mut observer = Lines::new("stress", console);
     let summary = stress::run(&options, &args.device, &mut observer)?;
     drop(observer);
     summary.warnings.iter().for_each(|w| console.warning(w));
@@ -104,27 +103,14 @@ pub fn run(args: &StressArgs) -> Result<(), Failure> {
     console.close(&record, summary.verdict())
 }
 
-/// Prints a line for each check, and shows the progress of all sections.
-struct Lines {
-    console: Console,
-    progress: Progress,
-}
-
-impl Control for Lines {
-    fn should_stop(&mut self) -> Result<bool> {
-        interrupt::check().map(|()| false)
-    }
-}
-
 impl Observer for Lines {
     fn check(&mut self, check: &Check) -> Result<()> {
-        self.progress.suspend(|| self.console.line(&line(check)))?;
-        interrupt::check()
+        self.print(&line(check))
     }
 
     fn section(&mut self, section: &'static Section, done: usize, total: usize) {
-        self.progress.phase(section.name);
-        self.progress.set(done as u64, total as u64);
+        self.phase(section.name);
+        self.set(done, total);
     }
 }
 

@@ -7,11 +7,10 @@ use serde_json::json;
 
 use crate::error::{Error, Result};
 use crate::files;
-use crate::film::Control;
 use crate::report;
-use crate::terminal::console::{Console, Failure, Verbosity, command_line, one_line};
+use crate::terminal::console::{Failure, Verbosity, command_line, one_line};
 use crate::terminal::interrupt;
-use crate::terminal::progress::Progress;
+use crate::terminal::lines::Lines;
 use crate::tracer::DeviceSettings;
 use crate::verify::bless::Change;
 use crate::verify::manifest::{Manifest, Tracers, parse_tracers};
@@ -127,7 +126,7 @@ fn run_with(args: &VerifyArgs, options: &Options) -> Result<(), Failure> {
     for orphan in manifest.orphans() {
         console.warning(&format!("{}: an image of no frame; remove it", orphan.display()));
     }
-    let mut observer = Lines { console, progress: Progress::new("verifying", &console) };
+    let mut observer = Lines::new("verifying", console);
     let summary = crate::verify::run(&manifest, options, &args.device, &mut observer)?;
     drop(observer);
     if let Some(path) = &args.junit {
@@ -145,24 +144,10 @@ fn run_with(args: &VerifyArgs, options: &Options) -> Result<(), Failure> {
     console.close(&record, verdict)
 }
 
-/// Prints a line for each frame, and shows the progress of all.
-struct Lines {
-    console: Console,
-    progress: Progress,
-}
-
-impl Control for Lines {
-    fn should_stop(&mut self) -> Result<bool> {
-        interrupt::check().map(|()| false)
-    }
-}
-
 impl Observer for Lines {
     fn result(&mut self, result: &FrameResult, done: usize, total: usize) -> Result<()> {
-        let printed = self.progress.suspend(|| self.console.line(&line(result)));
-        self.progress.set(done as u64, total as u64);
-        printed?;
-        interrupt::check()
+        self.set(done, total);
+        self.print(&line(result))
     }
 }
 

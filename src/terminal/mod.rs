@@ -2,6 +2,7 @@
 
 pub mod console;
 pub mod interrupt;
+pub mod lines;
 pub mod panic;
 pub mod progress;
 pub mod warnings;
