@@ -64,7 +64,7 @@ pub(super) struct Module<'a> {
 impl<'a> Module<'a> {
     /// With its specialization constants set: pipelines need not set them.
     pub(super) fn new(device: &'a Device, name: &str, shader: &Shader, specialization: &Specialization) -> Result<Self> {
-        let words = specialize(&words(&shader.spirv()?), &specialization.entries)
+        let words = specialize(&shader.spirv()?, &specialization.entries)
             .map_err(|e| Error::Vulkan(format!("shader {name} is not SPIR-V: {e}")))?;
         // SAFETY: SPIR-V from the build script's compiler, and valid after specialization: the validation layer looks at it in tests
         let raw = unsafe { device.raw.create_shader_module(&vk::ShaderModuleCreateInfo::default().code(&words), None) }
@@ -72,11 +72,6 @@ impl<'a> Module<'a> {
         device.name(raw, name);
         Ok(Self { raw, device })
     }
-}
-
-/// SPIR-V as words, in this machine's order of bytes.
-fn words(spirv: &[u8]) -> Vec<u32> {
-    spirv.chunks_exact(4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect()
 }
 
 impl Drop for Module<'_> {

@@ -31,7 +31,7 @@ impl Lines {
     /// Prints a line.
     ///
     /// # Errors
-    /// [`crate::Error::Io`] if it cannot be printed, [`crate::Error::Interrupted`] after Ctrl-C.
+    /// [`crate::Error::Output`] if it cannot be printed, [`crate::Error::Interrupted`] after Ctrl-C.
     pub fn print(&mut self, line: &str) -> Result<()> {
         self.progress.suspend(|| self.console.line(line))?;
         interrupt::check()

@@ -74,7 +74,7 @@ impl Table {
         }
     }
 
-    /// Its layers, from memory if this process has computed them before: a table of glass takes a second.
+    /// Its layers, from memory if this process has computed them before.
     fn layers(self) -> Vec<f32> {
         static KNOWN: LazyLock<Mutex<HashMap<Table, Vec<f32>>>> = LazyLock::new(Mutex::default);
         let known = || KNOWN.lock().unwrap_or_else(PoisonError::into_inner);
@@ -187,15 +187,15 @@ struct Visible {
     wo: [f64; 3],
     /// wo, stretched until the roughness is 1.
     stretched: [f64; 3],
-    /// 1 plus Smith's Lambda of wo.
-    hidden: f64,
+    /// The inverse of Smith's masking term G1 of wo.
+    inverse_g1: f64,
 }
 
 impl Visible {
     fn new(cos_o: f64, roughness: f64) -> Self {
         let (alpha, wo) = (roughness * roughness, direction(cos_o));
         let stretched = normalize([alpha * wo[0], alpha * wo[1], wo[2]]);
-        Self { alpha, wo, stretched, hidden: 1.0 + lambda(alpha, cos_o) }
+        Self { alpha, wo, stretched, inverse_g1: 1.0 + lambda(alpha, cos_o) }
     }
 
     /// Cosine of a visible normal to the surface, and to wo.
@@ -209,8 +209,8 @@ impl Visible {
     }
 
     /// G2 over G1 for a direction on either side, weighted; 0 for one on the wrong side.
-    fn unhidden(&self, cos_i: f64, point: &Point) -> f64 {
-        if cos_i > 0.0 { point.share * self.hidden / (self.hidden + lambda(self.alpha, cos_i)) } else { 0.0 }
+    fn shadowing(&self, cos_i: f64, point: &Point) -> f64 {
+        if cos_i > 0.0 { point.share * self.inverse_g1 / (self.inverse_g1 + lambda(self.alpha, cos_i)) } else { 0.0 }
     }
 }
 
@@ -220,7 +220,7 @@ fn ggx(cos_o: f64, roughness: f64) -> [f64; 2] {
     let mut sum = [0.0; 2];
     for point in GRID.iter() {
         let (cos_m, om) = visible.normal(point);
-        let g = visible.unhidden(2.0 * om * cos_m - cos_o, point);
+        let g = visible.shadowing(2.0 * om * cos_m - cos_o, point);
         sum[0] += g;
         sum[1] += g * weight(om);
     }
@@ -236,9 +236,9 @@ fn dielectric(cos_o: f64, roughness: f64, eta: f64) -> [f64; 4] {
     for point in LATTICE_POINTS.iter() {
         let (cos_m, om) = visible.normal(point);
         let (f, cos_t) = fresnel(om, eta);
-        let reflected = visible.unhidden(2.0 * om * cos_m - cos_o, point);
+        let reflected = visible.shadowing(2.0 * om * cos_m - cos_o, point);
         if cos_t > 0.0 {
-            let refracted = visible.unhidden(cos_o / eta - (om / eta - cos_t) * cos_m, point);
+            let refracted = visible.shadowing(cos_o / eta - (om / eta - cos_t) * cos_m, point);
             sum[1] += f * reflected;
             sum[2] += refracted;
             sum[3] += f * refracted;

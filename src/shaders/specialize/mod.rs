@@ -22,12 +22,13 @@ use flow::Flow;
 
 /// Specializes a module.
 ///
-/// `words`: the module; `values`: ids of specialization constants and what they are set to, a bool as 0 or 1; a constant without one takes its default.
+/// `spirv`: the module; `values`: ids of specialization constants and what they are set to, a bool as 0 or 1; a constant without one takes its default.
+/// Returns words.
 ///
 /// # Errors
 /// A message, if it is no SPIR-V.
-pub fn specialize(words: &[u32], values: &[(u32, u32)]) -> Result<Vec<u32>, String> {
-    let mut module = rspirv::dr::load_words(words).map_err(|e| e.to_string())?;
+pub fn specialize(spirv: &[u8], values: &[(u32, u32)]) -> Result<Vec<u32>, String> {
+    let mut module = rspirv::dr::load_bytes(spirv).map_err(|e| e.to_string())?;
     let bound = module.header.as_ref().ok_or("it has no header")?.bound;
     freeze(&mut module, values);
     let mut constants = Constants::new(&module, bound);

@@ -4,10 +4,6 @@ use super::*;
 use crate::interface::constants;
 use crate::shaders;
 
-fn words(shader: &shaders::Shader) -> Vec<u32> {
-    shader.spirv().unwrap().chunks_exact(4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect()
-}
-
 /// Shaders of every kind: large and small, with loops, switches, calls, and of every stage.
 fn shaders() -> Vec<&'static shaders::Shader> {
     use shaders::*;
@@ -69,17 +65,17 @@ fn assert_valid(words: &[u32], what: &str) {
 #[test]
 fn every_value_of_the_constants_leaves_valid_modules() {
     for shader in shaders() {
-        let words = words(shader);
+        let spirv = shader.spirv().unwrap();
         for value in [0, 1, 8, u32::MAX] {
             let what = format!("{:?} with {value}", shader.source());
-            let specialized = specialize(&words, &all(value)).unwrap();
+            let specialized = specialize(&spirv, &all(value)).unwrap();
             assert_valid(&specialized, &what);
             let module = rspirv::dr::load_words(&specialized).unwrap();
             let is_open =
                 |i: &&Instruction| matches!(i.class.opcode, Op::SpecConstant | Op::SpecConstantTrue | Op::SpecConstantFalse);
             assert_eq!(module.all_inst_iter().filter(is_open).count(), 0, "{what}");
             // there is nothing left to do
-            let again = specialize(&specialized, &[]).unwrap();
+            let again = specialize(bytemuck::cast_slice(&specialized), &[]).unwrap();
             assert!(again.len() <= specialized.len(), "{what}");
         }
     }
@@ -88,27 +84,29 @@ fn every_value_of_the_constants_leaves_valid_modules() {
 #[test]
 fn features_that_are_off_are_gone() {
     let shader = shaders::PATH_CAMERA_CLOSEST.variant(shaders::Variant::Deliver64).unwrap();
-    let all_words = words(shader);
-    let off = specialize(&all_words, &all(0)).unwrap().len();
-    assert!(5 * off < all_words.len(), "{off} words of {}", all_words.len());
+    let spirv = shader.spirv().unwrap();
+    let off = 4 * specialize(&spirv, &all(0)).unwrap().len();
+    assert!(5 * off < spirv.len(), "{off} bytes of {}", spirv.len());
 }
 
 #[test]
 fn a_constant_that_is_not_set_has_its_default() {
     let shader = shaders::wide_kernel(shaders::Mode::Any, true);
-    let default = specialize(&words(shader), &[]).unwrap();
-    let set = specialize(&words(shader), &[(constants::WATERTIGHT.id, 1), (constants::SINGLE_LEVEL.id, 0)]).unwrap();
+    let spirv = shader.spirv().unwrap();
+    let default = specialize(&spirv, &[]).unwrap();
+    let set = specialize(&spirv, &[(constants::WATERTIGHT.id, 1), (constants::SINGLE_LEVEL.id, 0)]).unwrap();
     assert_eq!(default, set);
-    let other = specialize(&words(shader), &[(constants::WATERTIGHT.id, 0)]).unwrap();
+    let other = specialize(&spirv, &[(constants::WATERTIGHT.id, 0)]).unwrap();
     assert!(other.len() < default.len());
     // what is set last holds
-    let twice = specialize(&words(shader), &[(constants::WATERTIGHT.id, 1), (constants::WATERTIGHT.id, 0)]).unwrap();
+    let twice = specialize(&spirv, &[(constants::WATERTIGHT.id, 1), (constants::WATERTIGHT.id, 0)]).unwrap();
     assert_eq!(twice, other);
 }
 
 #[test]
 fn what_is_no_spirv_is_refused() {
-    for words in [&[][..], &[0], &[0x0723_0203, 0x0001_0600, 0, 8, 0, 0xffff_ffff]] {
-        assert!(specialize(words, &[]).is_err(), "{words:x?}");
+    let damaged: [&[u32]; 3] = [&[], &[0], &[0x0723_0203, 0x0001_0600, 0, 8, 0, 0xffff_ffff]];
+    for words in damaged {
+        assert!(specialize(bytemuck::cast_slice(words), &[]).is_err(), "{words:x?}");
     }
 }
