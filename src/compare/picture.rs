@@ -47,7 +47,7 @@ pub fn write(set: &ImageSet, kind: PictureKind, path: &Path) -> Result<Vec<PathB
     Ok(paths)
 }
 
-/// The files that [`write`] makes for so many images.
+/// The files that [`write()`] makes for so many images.
 ///
 /// # Errors
 /// [`Error::Usage`] for a name that does not end in .png.

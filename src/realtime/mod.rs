@@ -1,9 +1,9 @@
-//! Ambient occlusion frame after frame, in passes ([`passes`]) over the images of a frame ([`resources`]).
+//! Ambient occlusion frame after frame, in passes (`passes`) over the images of a frame (`resources`).
 //!
 //! `gbuffer` finds the surface at each pixel's centre; `ao_trace` traces occlusion rays of the pixels that are sampled in this
 //! frame; `gather` averages the samples of a pixel if there are several; `temporal` adds them to the
 //! history of the same surface, reprojected from the previous frame; `filter` averages over neighbours. Passes whose inputs have not changed
-//! are skipped ([`graph`]): while neither the camera nor the scene moves no camera rays are traced, nor occlusion rays of pixels with a full history.
+//! are skipped (`graph`): while neither the camera nor the scene moves no camera rays are traced, nor occlusion rays of pixels with a full history.
 
 pub mod frame_settings;
 mod graph;

@@ -1,6 +1,6 @@
 //! HTML reports: a page of sections, which hold text, tables, charts and images to compare.
 //!
-//! [`write`] makes a folder of it that needs no network and no server: `index.html`, with styles and scripts inside, and the pixels of images in
+//! [`write()`] makes a folder of it that needs no network and no server: `index.html`, with styles and scripts inside, and the pixels of images in
 //! `data/*.js`, which the page loads when they come into view. It is opened from disk.
 //!
 //! ```no_run

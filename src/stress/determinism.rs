@@ -35,7 +35,7 @@ pub fn different_bits(a: &[f32], b: &[f32]) -> usize {
     }
 }
 
-/// Share of the values of two images that differ by more than [`STEP`], and the difference of their means.
+/// Share of the values of two images that differ by more than `STEP`, and the difference of their means.
 pub fn difference(a: &[f32], b: &[f32]) -> (f64, f64) {
     let n = a.len().min(b.len()).max(1) as f64;
     let differ = a.iter().zip(b).filter(|(a, b)| (*a - *b).is_nan() || (*a - *b).abs() > STEP).count() as f64;

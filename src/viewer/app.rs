@@ -1,4 +1,4 @@
-//! The state of the viewer, and how events of the renderer and input of the user change it. [`super::panels`] show it.
+//! The state of the viewer, and how events of the renderer and input of the user change it. `panels/` show it.
 
 use std::collections::VecDeque;
 use std::path::PathBuf;

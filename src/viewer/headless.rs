@@ -22,7 +22,7 @@ const FRAME: Duration = Duration::from_micros(16_667);
 /// Runs a script to its end and returns the figures of its sections.
 ///
 /// # Errors
-/// [`Error::CheckFailed`] for what the script expects and is not so; those of reading it, and of writing screenshots.
+/// [`crate::Error::CheckFailed`] for what the script expects and is not so; those of reading it, and of writing screenshots.
 pub fn run(options: &ViewOptions, script: &Path) -> Result<Vec<Section>> {
     let mut script = Script::load(script)?;
     let mailbox = Arc::new(Mailbox::default());

@@ -3,7 +3,7 @@
 //!
 //! `lit` is D + A V albedo: direct light, and an ambient radiance A that reaches surfaces by their ambient visibility V of a radius and falloff. Path tracing is T. The ambient
 //! light is to be g = T - D, so the search minimizes the mean of (A V albedo - g)^2 over the pixels that show surfaces and over linear RGB. All occlusion rays
-//! are traced once, to their nearest hits ([`samples`]), and every radius and falloff is evaluated from these distances ([`sums`], [`search`]).
+//! are traced once, to their nearest hits (`samples`), and every radius and falloff is evaluated from these distances (`sums`, `search`).
 //!
 //! Where the scene has an environment there are two questions: ambient light in place of bounces, with the environment traced as direct light; and in place of environment and bounces,
 //! which is what renderers do that cannot trace the environment. A third compares V itself with `ao-sky`, grey surfaces under a white sky.
