@@ -29,7 +29,7 @@ TRACERS = ["compute", "query", "pipeline"]
 # what the last visit may take more than the second one, MiB: caches of the driver fill for some time
 GROWTH = 200
 # seconds of script a visit, on two cores
-VISIT = 60
+VISIT = 38
 # visits of a scene: the first fills caches, the second is compared with the last
 VISITS = 3
 

@@ -11,7 +11,7 @@ void closest(uint index, Hit hit) {
     uint k = Words(p.tags).v[index];
     PathState state = load_state(p.states, index);
     if (HAS_COVERAGE) {
-        uvec2 pixel = block_pixel(block, pixel_index(state.index)) + block.block_origin;
+        uvec2 pixel = path_pixel(block, state.index);
         next_ray_seed = ray_seed(block.seed, pixel, sample_index(state.index), state.depth + state.passes + 1u);
     }
     vec3 share = vec3(0.0);

@@ -25,19 +25,23 @@ void main() {
     GatherParams p = GatherParams(push.pass);
     FrameParams f = FrameParams(p.frame);
     PathParams path = PathParams(p.path);
-    uvec2 pixel = tile_pixel(f, (push.first >> push.sample_bits) + k);
-    if (any(greaterThanEqual(pixel, f.size))) return;
-    uint at = image_index(f, pixel);
+    uvec2 cell = tile_pixel((push.first >> push.sample_bits) + k >> 6, p.tiles_x, k & 63u), size = pattern_cell(f);
     bool is_first = p.earlier == 0u;
-    if (!is_sampled(f, pixel)) {
-        if (is_first) {
+    uvec2 pixel = sampled_pixel(f, cell);
+    // the others of its cell have no samples in this frame
+    if (is_first && f.pattern != PATTERN_FULL) {
+        for (uint other = 0u; other < size.x * size.y; other++) {
+            uvec2 q = size * cell + uvec2(other & 1u, other >> 1);
+            if (q == pixel || any(greaterThanEqual(q, f.size))) continue;
+            uint at = image_index(f, q);
             store_radiance(p.diffuse, at, NO_RADIANCE);
             store_radiance(p.specular, at, NO_RADIANCE);
             FloatImage(p.distances).v[at] = SIGNAL_UNKNOWN;
             if (!is_null(p.rest) && p.starts != 0u) store_rest(p.rest, at, NO_REST);
         }
-        return;
     }
+    if (any(greaterThanEqual(pixel, f.size))) return;
+    uint at = image_index(f, pixel);
     RadianceEstimate diffuse = NO_RADIANCE, specular = NO_RADIANCE, whole = NO_RADIANCE;
     float covered = 0.0, distance_ = 0.0, distances = 0.0;
     for (uint s = 0u; s < n; s++) {

@@ -161,11 +161,26 @@ Estimate unpack_estimate(uvec2 bits) {
     return Estimate(uintBitsToFloat(bits.x), float(bits.y >> 16) * 0.0625, float(bits.y & 0xffffu) * (MAX_VARIANCE / 65535.0));
 }
 
+// Of each 2x2 pixels the one that is sampled in this frame: opposite corners in turn. Bit 0 is its column, bit 1 its row.
+uint sampled_corner(FrameParams f) { return 0x9cu >> (2u * (f.frame & 3u)) & 3u; }
+
 bool is_sampled(FrameParams f, uvec2 pixel) {
     if (f.pattern == PATTERN_CHECKER) return ((pixel.x + pixel.y + f.frame) & 1u) == 0u;
-    // one of each 2x2 pixels, opposite corners in turn
-    if (f.pattern == PATTERN_QUARTER) return (0x9cu >> (2u * (f.frame & 3u)) & 3u) == ((pixel.x & 1u) | (pixel.y & 1u) << 1);
+    if (f.pattern == PATTERN_QUARTER) return sampled_corner(f) == ((pixel.x & 1u) | (pixel.y & 1u) << 1);
     return true;
+}
+
+// Pixels of a cell of the pattern, of which one is sampled.
+uvec2 pattern_cell(FrameParams f) { return uvec2(f.pattern == PATTERN_FULL ? 1u : 2u, f.pattern == PATTERN_QUARTER ? 2u : 1u); }
+
+// The pixel of a cell that is sampled in this frame; outside the image where the cell reaches beyond it.
+uvec2 sampled_pixel(FrameParams f, uvec2 cell) {
+    if (f.pattern == PATTERN_CHECKER) return uvec2(2u * cell.x + (cell.y + f.frame & 1u), cell.y);
+    if (f.pattern == PATTERN_QUARTER) {
+        uint corner = sampled_corner(f);
+        return 2u * cell + uvec2(corner & 1u, corner >> 1);
+    }
+    return cell;
 }
 
 // Whether a pixel of a surface has all its samples.

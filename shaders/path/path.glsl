@@ -237,7 +237,7 @@ vec3 path_vertex(BlockParams block, uint k, PathState state, Ray ray, Hit hit) {
         if (abs(boundary.eta - 1.0) < MIN_REFRACTION) m.bsdf.facets.alpha = vec2(0.0);
     }
     if (m.bsdf.kind == BSDF_NONE) return added;
-    uvec2 pixel = block_pixel(block, pixel_index(state.index)) + block.block_origin;
+    uvec2 pixel = path_pixel(block, state.index);
     uint n = sample_index(state.index), dimension = PATH_FIRST + (state.depth + state.passes) * PATH_STRIDE;
     SignalVertex v = SignalVertex(SIGNAL_SEEN, false, vec3(0.0));
     if (WITH_SIGNAL) v = signal_vertex(p, k, state.depth + state.passes == 0u, m);

@@ -6,6 +6,7 @@
 #ifndef PATH_SIGNAL
 #define PATH_SIGNAL
 #include "path/shading.glsl"
+#include "common/frame.glsl"
 
 // What a vertex is to its path.
 struct SignalVertex {
@@ -13,6 +14,12 @@ struct SignalVertex {
     bool is_apart;   // its diffuse part is kept apart
     vec3 share;      // of light that comes from here: the diffuse part of the surface where it was apart, divided by the albedo
 };
+
+// The pixel of the image that a path belongs to. Frames in real time count the pixels that are sampled in a frame alone, so that neighbouring rays are of pixels that are close to each other.
+uvec2 path_pixel(BlockParams p, uint ray_index) {
+    uvec2 pixel = block_pixel(p, pixel_index(ray_index)) + p.block_origin;
+    return WITH_SIGNAL ? sampled_pixel(FrameParams(p.frame), pixel) : pixel;
+}
 
 // Of light reflected by the BSDF's value f: the diffuse part divided by the albedo. w: its direction in the world.
 vec3 diffuse_share(Shading m, vec3 wo, vec3 w, vec3 f) {

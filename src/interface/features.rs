@@ -70,6 +70,11 @@ macro_rules! feature_set {
                 }
             }
 
+            /// Returns true if all of it is in `other`, too.
+            pub fn is_subset(self, other: Self) -> bool {
+                self.words.iter().zip(other.words).all(|(own, other)| own & !other == 0)
+            }
+
             /// The specialization constants of the set, with their values.
             pub fn constants(self) -> impl Iterator<Item = (Constant, u32)> {
                 self.words.into_iter().zip($first..).map(|(word, id)| (Constant { id }, word))

@@ -15,6 +15,7 @@ use crate::film::block::Block;
 use crate::film::camera::CameraRecord;
 use crate::gpu::{Buffer, Commands, ComputePipeline, Device, Memory, Recorder, Timing};
 use crate::interface::records::frame::MovedRecord;
+use crate::scene::Scene;
 use crate::shaders::LANES;
 use crate::tracer::stream::LAUNCH_RAYS;
 use crate::tracer::{Push, Tracer};
@@ -151,6 +152,14 @@ pub trait Pass {
         false
     }
 
+    /// Moves the lights that it samples to where they are in `scene`, which is that of the tracer in another pose. Returns true if they have moved.
+    ///
+    /// # Errors
+    /// Those of the device; [`Error::Scene`] for lights that need other shaders.
+    fn move_lights(&mut self, _tracer: &Tracer, _scene: &Scene) -> Result<bool> {
+        Ok(false)
+    }
+
     /// Number of rays of its last frame, if the host knows it.
     fn rays(&self) -> u64 {
         0
@@ -227,6 +236,15 @@ impl Graph {
     /// Rays of the last frame, of passes whose number of rays the host knows.
     pub fn rays(&self) -> u64 {
         self.stages.iter().flat_map(|s| &s.passes).map(|p| p.rays()).sum()
+    }
+
+    /// Moves the lights to where they are in `scene`. Returns true if any pass has lights that moved.
+    ///
+    /// # Errors
+    /// Those of the passes ([`Pass::move_lights`]).
+    pub fn move_lights(&mut self, tracer: &Tracer, scene: &Scene) -> Result<bool> {
+        let mut passes = self.stages.iter_mut().flat_map(|s| &mut s.passes);
+        passes.try_fold(false, |moved, pass| Ok(pass.move_lights(tracer, scene)? || moved))
     }
 
     /// The memory of the passes.

@@ -25,6 +25,7 @@ use crate::integrators::path::PathOptions;
 use crate::interface::records::denoise::RadianceRecord;
 use crate::interface::records::frame::MAX_VARIANCE;
 use crate::raster::Primary;
+use crate::scene::Scene;
 use crate::shaders::StreamShaders;
 use crate::tracer::gpu_scene::rows;
 use crate::tracer::{MovedBounds, Tracer};
@@ -232,6 +233,18 @@ impl Realtime {
             self.state.environment_turn = Some(to_map);
             self.change_light();
         }
+    }
+
+    /// Moves lights, and surfaces that emit light, to where they are in `scene` from the next frame on, and calls [`Realtime::change_light`] if any has moved. `scene` is the
+    /// tracer's in the pose to which that was updated. Ambient visibility depends on no light.
+    ///
+    /// # Errors
+    /// Those of the device; [`Error::Scene`] where lights were switched on or off, which needs other shaders.
+    pub fn move_lights(&mut self, tracer: &Tracer, scene: &Scene) -> Result<()> {
+        if self.graph.move_lights(tracer, scene)? {
+            self.change_light();
+        }
+        Ok(())
     }
 
     /// Image size in pixels.

@@ -1,5 +1,9 @@
 //! A scene and a camera over time, frame by frame.
 
+use std::sync::Arc;
+
+use glam::Vec3;
+
 use crate::error::{Error, Result};
 use crate::scene::animation::{AnimationRig, Playback, Pose};
 use crate::scene::camera_path::CameraPath;
@@ -35,6 +39,8 @@ struct AnimationPlayback<'a> {
     rig: &'a AnimationRig,
     animation: usize,
     pose: Pose,
+    /// The scene in the pose, if lights move.
+    posed: Option<Arc<Scene>>,
 }
 
 /// A scene and a camera over a sequence of frames.
@@ -62,6 +68,19 @@ pub fn find_animation(scene: &Scene, wanted: &str) -> Result<usize> {
     })
 }
 
+/// Returns true if an animation moves lights, or surfaces that emit light.
+///
+/// # Errors
+/// [`Error::Usage`] when the scene has no such animation.
+pub fn moves_lights(scene: &Scene, rig: &AnimationRig, animation: usize) -> Result<bool> {
+    let motion = rig.motion(animation)?;
+    let moves = |k: usize, mesh: usize| motion.instances.contains(&k) || motion.meshes.contains(&mesh);
+    let emits =
+        |mesh: usize| scene.materials.get(scene.meshes[mesh].material).is_some_and(|m| m.emissive != Vec3::ZERO && !m.unlit);
+    let moves_emitter = scene.instances.iter().enumerate().any(|(k, i)| moves(k, i.mesh) && emits(i.mesh));
+    Ok(moves_emitter || !rig.moving_lights(animation)?.is_empty())
+}
+
 impl<'a> FrameSequence<'a> {
     /// `file_camera`: the index of `camera` in the scene, so that an animation that moves it is followed. `animation`: an index
     /// ([`find_animation`]).
@@ -80,7 +99,8 @@ impl<'a> FrameSequence<'a> {
             None => None,
             Some(animation) => {
                 let rig = scene.rig.as_ref().ok_or_else(|| Error::Usage("the scene has no animations".into()))?;
-                Some(AnimationPlayback { rig, animation, pose: Pose::default() })
+                let posed = moves_lights(scene, rig, animation)?.then(|| Arc::new(scene.clone()));
+                Some(AnimationPlayback { rig, animation, pose: Pose::default(), posed })
             }
         };
         Ok(Self { camera, file_camera, motion, played, frames_per_second })
@@ -110,8 +130,16 @@ impl<'a> FrameSequence<'a> {
             if tracer.is_dynamic() {
                 stats = tracer.update(&p.pose.changes())?;
             }
+            if let Some(posed) = &mut p.posed {
+                p.pose.apply(Arc::make_mut(posed));
+            }
         }
         Ok((self.motion.camera_at(camera, frame), stats))
+    }
+
+    /// The scene as it is in the last frame, if the animation moves lights or surfaces that emit light.
+    pub fn posed_lights(&self) -> Option<&Arc<Scene>> {
+        self.played.as_ref()?.posed.as_ref()
     }
 
     /// Returns true if the camera or the scene changes from frame to frame.

@@ -2,6 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::integrators::ao::{Attenuation, Hemisphere};
+use crate::integrators::path::PathOptions;
 pub use crate::interface::Resolution;
 use crate::interface::records::frame::{STEP_HORIZONTAL, STEP_VERTICAL};
 use crate::interface::records::passes::FilterParams;
@@ -26,6 +27,16 @@ impl Resolution {
     /// Number of frames after which every pixel has been sampled once.
     pub fn period(self) -> u32 {
         1 << self as u32
+    }
+
+    /// Width and height of the image that the pixels sampled in a frame make, for an image of `size`: of cells of which one pixel is sampled.
+    pub fn sampled_size(self, size: [u32; 2]) -> [u32; 2] {
+        let cell = match self {
+            Self::Full => [1, 1],
+            Self::Checkerboard => [2, 1],
+            Self::Half => [2, 2],
+        };
+        [0, 1].map(|k| size[k].div_ceil(cell[k]))
     }
 }
 
@@ -313,6 +324,22 @@ impl Preset {
     /// (docs/realtime.md). [`Preset::settings`] samples pixel centres: what the pipeline alone is measured by.
     pub fn antialiases(self) -> bool {
         matches!(self, Self::Fast | Self::Balanced | Self::Quality)
+    }
+
+    /// The settings of the preset for frames of radiance. A path costs many rays, so `fast` traces one for every fourth pixel, and filters as widely as `balanced`.
+    pub fn radiance_settings(self) -> Settings {
+        match self {
+            Self::Fast => {
+                Settings { resolution: Resolution::Half, filter: Self::Balanced.settings().filter, ..self.settings() }
+            }
+            _ => self.settings(),
+        }
+    }
+
+    /// Bounces before Russian roulette may end a path of the preset, unless the settings of paths say so. With `fast` it may end at the first: that halves the time of rays, and the filter takes
+    /// away more noise than it adds.
+    pub fn rr_depth(self) -> u32 {
+        if self == Self::Fast { 1 } else { PathOptions::default().rr_depth }
     }
 
     /// The settings of the preset.

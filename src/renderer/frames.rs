@@ -115,12 +115,6 @@ impl Renderer {
             warnings: &mut warnings,
         };
         laps.lap("prepare");
-        if is_radiance && moves_lights(&flat) {
-            return Err(Error::Usage(
-                "the animation moves surfaces that emit light, which frames in real time cannot follow: render stills, one per frame, with --spp N in place of --preset"
-                    .into(),
-            ));
-        }
         let tracer = request.build(&self.device, self.kind, &flat, self.compute, &self.settings)?;
         laps.lap("build");
         let options = frame_path_options(&settings, scene, &camera, size, &how)?;
@@ -237,6 +231,9 @@ impl Frames<'_> {
         let start = Instant::now();
         let (camera, update) = self.sequence.frame(f64::from(number), &mut self.tracer)?;
         self.last_camera = camera;
+        if let Some(posed) = self.sequence.posed_lights() {
+            self.realtime.move_lights(&self.tracer, posed)?;
+        }
         let stats = self.realtime.frame(&self.tracer, &self.camera_record(), &update.moved)?;
         self.tracer.traced(stats.tracing_seconds());
         let (seconds, update_seconds) = (start.elapsed().as_secs_f64(), update.mesh_seconds + update.top_seconds);
@@ -337,17 +334,17 @@ impl Frames<'_> {
 /// # Errors
 /// [`Error::Usage`] for settings that have no effect together.
 pub fn frame_settings(settings: &RenderSettings) -> Result<Settings> {
-    let mut how = settings.frames.settings(&settings.integrators.ao, settings.seed())?;
+    let is_radiance = !is_ambient_occlusion(settings.integrator());
+    let mut how = settings.frames.settings(is_radiance, &settings.integrators.ao, settings.seed())?;
     let shown = settings.frames.show.unwrap_or_default();
     // buffers of surfaces are looked at with one place in each pixel; bent normals are not averaged over places
     let shows_buffers = shown != DisplayMode::Result || Aov::Bent.is_in(&settings.image.aov);
     if settings.frames.antialias.is_none() {
         // without it edges of bright surfaces flicker
-        let is_radiance = !is_ambient_occlusion(settings.integrator());
         how.antialias =
             how.history > 1 && !shows_buffers && (is_radiance || settings.frames.preset.unwrap_or_default().antialiases());
     }
-    if !is_ambient_occlusion(settings.integrator()) {
+    if is_radiance {
         how.check_radiance()?;
         // there is no image of before that differs
         how.converge |= settings.frames.at_rest.is_none();
@@ -355,7 +352,7 @@ pub fn frame_settings(settings: &RenderSettings) -> Result<Settings> {
     how.bent = Aov::Bent.is_in(&settings.image.aov) || shown == DisplayMode::Bent;
     how.check()?;
     shown.check(&how)?;
-    if !is_ambient_occlusion(settings.integrator()) {
+    if is_radiance {
         shown.check_radiance()?;
     }
     Ok(how)
@@ -410,7 +407,9 @@ pub fn frame_path_options(
         return Ok(None);
     }
     let job = RenderJob { size, spp: how.rays_per_pixel, ..settings.job(scene, camera) };
-    settings.integrator().get().path_options(&job)
+    let options = settings.integrator().get().path_options(&job)?;
+    let rr_depth = settings.integrators.path.rr_depth.unwrap_or(settings.frames.preset.unwrap_or_default().rr_depth());
+    Ok(options.map(|options| PathOptions { rr_depth, ..options }))
 }
 
 /// The pipeline of frames. `paths`: options of the paths of frames of radiance.
@@ -479,15 +478,6 @@ pub(super) fn camera_motion(scene: &Scene, path: Option<CameraPath>, orbit_frame
 fn orbit(scene: &Scene, frames: f64) -> Result<Orbit> {
     let (lo, hi) = scene.bounds().ok_or_else(|| Error::Scene("--orbit: the scene has no geometry to orbit around".into()))?;
     Orbit::vertical((lo + hi) * 0.5, frames)
-}
-
-/// Returns true if a surface that emits light moves or deforms.
-pub fn moves_lights(flat: &FlatScene) -> bool {
-    let scene = flat.scene;
-    let moves = |k: usize| flat.motion.instances.contains(&k) || flat.motion.meshes.contains(&scene.instances[k].mesh);
-    let material = |k: usize| scene.materials.get(scene.meshes[scene.instances[k].mesh].material);
-    let emits = |k: usize| material(k).is_some_and(|m| m.emissive != glam::Vec3::ZERO && !m.unlit);
-    (0..scene.instances.len()).any(|k| moves(k) && emits(k))
 }
 
 /// Positions of point lights, relative to the tracer's origin.

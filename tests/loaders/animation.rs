@@ -628,6 +628,50 @@ fn animations_round_trip() {
     }
 }
 
+/// A light on a node moves and turns with it and what is above it, and with nothing else; exporters keep it there.
+#[test]
+fn lights_on_animated_nodes() {
+    let folder = Folder::new();
+    let mut doc = Doc::triangle();
+    doc.json["extensions"] = json!({ "KHR_lights_punctual": { "lights": [
+        { "name": "lamp", "type": "spot", "intensity": 3, "spot": { "innerConeAngle": 0.1, "outerConeAngle": 0.5 } },
+        { "name": "fixed", "type": "point", "intensity": 2 },
+    ] } });
+    doc.push("nodes", json!({ "name": "arm", "children": [2], "translation": [1, 2, 3] }));
+    doc.push(
+        "nodes",
+        json!({ "name": "lamp", "translation": [0, 1, 0], "extensions": { "KHR_lights_punctual": { "light": 0 } } }),
+    );
+    doc.push(
+        "nodes",
+        json!({ "name": "fixed", "translation": [5, 5, 5], "extensions": { "KHR_lights_punctual": { "light": 1 } } }),
+    );
+    doc.json["scenes"][0]["nodes"] = json!([0, 1, 3]);
+    animate(&mut doc, 1, "rotation", "LINEAR", &[0.0, 1.0], &[NO_TURN, quarter(1.0, 0.0, 0.0)]);
+    let mut scene = doc.load();
+    for round in 0..3 {
+        assert!(scene.report.warnings.is_empty(), "{:?}", scene.report.warnings);
+        assert_eq!(scene.lights.len(), 2);
+        let lamp = scene.lights.iter().position(|l| l.name == "lamp").unwrap();
+        assert_eq!(rig(&scene).moving_lights(0).unwrap(), [lamp]);
+        for (seconds, position, direction) in [
+            (0.0, DVec3::new(1.0, 3.0, 3.0), DVec3::NEG_Z),
+            // the arm has turned by a quarter about x
+            (1.0, DVec3::new(1.0, 2.0, 4.0), DVec3::Y),
+        ] {
+            let mut posed = scene.clone();
+            pose(&scene, seconds).apply(&mut posed);
+            let light = &posed.lights[lamp];
+            assert!(light.position.abs_diff_eq(position, 1e-6), "{round}: {}", light.position);
+            assert!(light.direction.abs_diff_eq(direction, 1e-6), "{round}: {}", light.direction);
+            assert_eq!(posed.lights[1 - lamp], scene.lights[1 - lamp]);
+        }
+        let path = folder.path(&format!("{round}.gltf"));
+        export_gltf(&scene, &path).unwrap();
+        scene = load(&path).unwrap();
+    }
+}
+
 /// The built-in parade and the file agree, but for the rounding of angles and inverse bind matrices.
 #[test]
 fn the_parade_in_its_file() {

@@ -1,6 +1,8 @@
 //! Frames of radiance in real time, against stills of the same paths.
 
 use super::*;
+use glam::DQuat;
+use skylit::accel::features::Blend;
 use skylit::colour::srgb_byte;
 use skylit::integrators::ao::{Attenuation, Hemisphere};
 use skylit::integrators::path::ambient::{Ambient, OccludedLight};
@@ -8,7 +10,10 @@ use skylit::integrators::path::{PathIntegrator, PixelFilter};
 use skylit::output::tone_map::ToneMap;
 use skylit::realtime::display::{Display, DisplayMode};
 use skylit::realtime::{Filter, FilterKind, Preset, Realtime, Settings};
-use skylit::scene::{EnvironmentMap, builtin};
+use skylit::scene::animation::{
+    Animation, Channel, Interpolation, LocalTransform, Node, Playback, Pose, Property, RigParts, Sampler,
+};
+use skylit::scene::{AnimationRig, EnvironmentMap, builtin};
 
 const SIZE: [u32; 2] = [32, 18];
 
@@ -269,4 +274,91 @@ fn gpu_frames_of_radiance_refuse_settings_of_occlusion() {
     wrong(Preset::Larsen.settings(), "--preset larsen");
     wrong(Settings { technique: skylit::realtime::Technique::Gtao, ..plain(1) }, "--technique gtao");
     wrong(Settings { budget: skylit::realtime::Budget::Variance, history: 8, ..plain(1) }, "--budget variance");
+}
+
+/// The Cornell box, whose lamp moves and turns, as do a point light and a spot.
+fn moving_lights() -> Scene {
+    let mut scene = scene("cornell-box");
+    let place = |kind, intensity| Light {
+        name: String::new(),
+        kind,
+        intensity,
+        position: DVec3::ZERO,
+        direction: DVec3::NEG_Z,
+        range: f64::INFINITY,
+    };
+    scene.lights.push(place(LightKind::Point, Vec3::new(0.2, 0.1, 0.05)));
+    scene.lights.push(place(LightKind::Spot { inner_angle: 0.2, outer_angle: 0.7 }, Vec3::splat(0.4)));
+    let (lo, hi) = scene.bounds().unwrap();
+    let (middle, size) = ((lo + hi) * 0.5, (hi - lo).max_element());
+    let emits = |scene: &Scene, mesh: usize| scene.materials[scene.meshes[mesh].material].emissive != Vec3::ZERO;
+    let lamp = scene.instances.iter().position(|i| emits(&scene, i.mesh)).unwrap();
+    let mut parts = RigParts {
+        instances: vec![None; scene.instances.len()],
+        cameras: vec![None; scene.cameras.len()],
+        lights: vec![Some(1), Some(2)],
+        ..RigParts::default()
+    };
+    parts.instances[lamp] = Some(0);
+    let mut channels = Vec::new();
+    for (node, (from, to)) in [
+        (DVec3::ZERO, DVec3::new(0.2, -0.1, 0.1) * size),
+        (middle, middle + DVec3::new(-0.2, 0.1, 0.2) * size),
+        (middle + DVec3::Y * 0.3 * size, middle),
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        let turn = DQuat::from_rotation_x(if node == 2 { -1.4 } else { 0.0 });
+        let local = LocalTransform::Trs { translation: from, rotation: turn, scale: DVec3::ONE };
+        parts.nodes.push(Node { local, ..Node::default() });
+        let values = [from, to].map(|v| v.as_vec3().to_array()).as_flattened().to_vec();
+        let sampler = Sampler { interpolation: Interpolation::Linear, times: [0.0, 1.0].into(), values };
+        channels.push(Channel { node, property: Property::Translation, sampler });
+    }
+    parts.animations = vec![Animation { name: "lights".into(), duration: 1.0, channels }];
+    AnimationRig::attach(&mut scene, parts).unwrap();
+    scene
+}
+
+/// What lights is where the animation has it: frames are those of the posed scene.
+#[test]
+fn gpu_frames_lights_move() {
+    let device = device();
+    let scene = moving_lights();
+    let rig = scene.rig.as_ref().unwrap();
+    let motion = || rig.motion(0).unwrap();
+    let options = options(4);
+    let camera = record(&scene, &scene.cameras[0]);
+    for kind in tracers(&device) {
+        let flat = FlatScene::with_motion_and_blend(&scene, motion(), Blend::Stochastic).unwrap();
+        let mut moving = tracer(&device, kind, &flat);
+        let mut frames = frames(&moving, &flat, &plain(options.spp), &options);
+        frames.frame(&moving, &camera, &[]).unwrap();
+        let first = frames.result().unwrap();
+        for time in [0.5, 0.9] {
+            let mut pose = Pose::default();
+            rig.pose(0, time, Playback::Once, &mut pose).unwrap();
+            let mut posed = scene.clone();
+            pose.apply(&mut posed);
+            let update = moving.update(&pose.changes()).unwrap();
+            frames.move_lights(&moving, &posed).unwrap();
+            frames.rewind();
+            frames.frame(&moving, &camera, &update.moved).unwrap();
+            let got = frames.result().unwrap();
+            // a tracer that never knew another pose; the origin is that of the scene at rest
+            let flat = FlatScene::with_motion_and_blend(&posed, motion(), Blend::Stochastic).unwrap();
+            let still = render(&tracer(&device, kind, &flat), &flat, &options).image.film.mean;
+            assert!(rmse(&first, &still) > 0.05, "{kind}: the lights stand still");
+            let differs = |(got, want): &(&f32, &f32)| (*got - *want).abs() > 2e-5 * want.abs().max(0.01);
+            // where a ray meets an edge, rounding decides
+            let wrong = got.iter().zip(&still).filter(differs).count();
+            assert!(
+                wrong * 200 <= got.len(),
+                "{kind}, at {time} s: {wrong} of {} values differ from the posed scene's",
+                got.len()
+            );
+        }
+    }
+    assert_validation_clean(&device);
 }

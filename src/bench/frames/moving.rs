@@ -55,7 +55,7 @@ fn one(
     let mut clock = PlainClock::default();
     for frame in 0..frames {
         let inputs = stage.go(motion, frame)?;
-        inputs.to_map.into_iter().for_each(|to_map| realtime.turn_environment(to_map));
+        inputs.light(&mut realtime, &stage.tracer)?;
         // what the scene was before the first frame is nobody's history
         let moved = if frame == 0 { &[][..] } else { &inputs.moved };
         log.frame(&mut realtime, &stage.tracer, &inputs.camera, moved)?;

@@ -14,7 +14,7 @@ use crate::measure::stats::median;
 use crate::realtime::{Filter, FilterKind, Preset, Realtime, Settings};
 use crate::renderer::RenderSettings;
 use crate::renderer::frames::{frame_needs, frame_path_options, frame_settings, frame_streams, is_ambient_occlusion, pipeline};
-use crate::scene::Camera;
+use crate::scene::{Camera, Scene};
 use crate::settings::{Capability, Length};
 use crate::shaders::StreamShaders;
 use crate::terminal::interrupt::{self, SilentControl};
@@ -143,6 +143,17 @@ impl Sampler {
     pub fn turn_environment(&mut self, to_map: &DMat3) -> Result<()> {
         match self {
             Self::Paths { integrator, .. } => integrator.turn_environment(to_map),
+            Self::Rays { .. } => Ok(()),
+        }
+    }
+
+    /// Moves the lights to where they are in `scene`, which is that of the tracer in another pose.
+    ///
+    /// # Errors
+    /// Those of [`PathIntegrator::move_lights`].
+    pub fn move_lights(&mut self, tracer: &Tracer, scene: &Scene) -> Result<()> {
+        match self {
+            Self::Paths { integrator, .. } => integrator.move_lights(tracer, scene),
             Self::Rays { .. } => Ok(()),
         }
     }

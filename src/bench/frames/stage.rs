@@ -1,5 +1,6 @@
 //! A scene on the device, with all that makes images of it: frames of presets, plain accumulation, converged images.
 
+use std::sync::Arc;
 use std::time::Instant;
 
 use glam::DMat3;
@@ -16,7 +17,7 @@ use crate::error::Result;
 use crate::film::camera::CameraRecord;
 use crate::realtime::sequence::FrameSequence;
 use crate::realtime::{Preset, Realtime};
-use crate::scene::{Camera, Environment, EnvironmentMap, Orbit};
+use crate::scene::{Camera, Environment, EnvironmentMap, Orbit, Scene};
 use crate::terminal::interrupt::SilentControl;
 use crate::tracer::{BuildOptions, Changes, ComputeOptions, MovedBounds, Tracer};
 
@@ -65,6 +66,21 @@ pub struct FrameInputs {
     pub moved: Vec<MovedBounds>,
     /// The rotation to the environment map, if it has turned.
     pub to_map: Option<DMat3>,
+    /// The scene in its pose, if that moves lights.
+    pub posed: Option<Arc<Scene>>,
+}
+
+impl FrameInputs {
+    /// Changes the light of a frame to what is new in it.
+    ///
+    /// # Errors
+    /// Those of [`Realtime::move_lights`].
+    pub fn light(&self, realtime: &mut Realtime, tracer: &Tracer) -> Result<()> {
+        if let Some(to_map) = self.to_map {
+            realtime.turn_environment(to_map);
+        }
+        self.posed.as_ref().map_or(Ok(()), |posed| realtime.move_lights(tracer, posed))
+    }
 }
 
 /// A scene on the device.
@@ -151,7 +167,7 @@ impl<'a> Stage<'a> {
         if !matches!(motion, Motion::Animation(_)) {
             self.rest()?;
         }
-        let inputs = |camera, moved, to_map| FrameInputs { camera, moved, to_map };
+        let inputs = |camera, moved, to_map| FrameInputs { camera, moved, to_map, posed: None };
         Ok(match motion {
             Motion::Orbit(orbit) => {
                 inputs(self.camera_record(&orbit.camera_at(self.camera, f64::from(frame))), Vec::new(), None)
@@ -163,7 +179,11 @@ impl<'a> Stage<'a> {
             }
             Motion::Animation(sequence) => {
                 let (_, update) = sequence.frame(f64::from(frame), &mut self.tracer)?;
-                inputs(camera, update.moved, None)
+                let posed = sequence.posed_lights().cloned();
+                if let Some(posed) = &posed {
+                    self.sampler.move_lights(&self.tracer, posed)?;
+                }
+                FrameInputs { posed, ..inputs(camera, update.moved, None) }
             }
         })
     }

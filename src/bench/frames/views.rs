@@ -8,9 +8,8 @@ use crate::accel::flatten::FlatScene;
 use crate::bench::frame_log::FRAMES_PER_TURN;
 use crate::bench::record::frames::FramesView;
 use crate::denoise::Oidn;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::realtime::sequence::{CameraMotion, FrameSequence};
-use crate::renderer::frames::moves_lights;
 use crate::scene::{AnimationRig, Orbit};
 
 /// Of an animation.
@@ -42,11 +41,6 @@ pub fn measure(session: &mut FramesSession, source: &str, oidn: Option<&Oidn>) -
     let camera = loaded.camera.clone();
     let sequence = FrameSequence::new(scene, camera, None, CameraMotion::Still, animation, FRAMES_PER_SECOND)?;
     let flat = FlatScene::with_motion_and_blend(scene, sequence.motion()?, args.integrator.get().blend())?;
-    if animation.is_some() && moves_lights(&flat) {
-        return Err(Error::Usage(format!(
-            "{source}: the animation moves surfaces that emit light, which frames in real time cannot follow: leave out --parts animation"
-        )));
-    }
     session.phase(format!("{}: building", loaded.name));
     let mut stage = Stage::new(session, &loaded, &flat, None, oidn)?;
     let mut record = FramesView {

@@ -17,6 +17,8 @@ mod report;
 pub mod settings;
 pub mod signal;
 
+use std::sync::Arc;
+
 use glam::DMat3;
 
 use crate::accel::flatten::FlatScene;
@@ -25,16 +27,17 @@ use crate::film::Control;
 use crate::film::accumulate::{Accumulated, Estimator, Plan, accumulate, max_rays};
 use crate::film::block::BlockParams;
 use crate::film::camera::CameraRecord;
-use crate::gpu::{Buffer, Commands, ComputePipeline, Memory, Specialization, Timing};
+use crate::gpu::{Buffer, Commands, ComputePipeline, Device, Memory, Specialization, Timing};
 use crate::interface::records::path::SignalRecord;
 use crate::interface::{LightKind, LightKinds, MaterialFeature, PathFeature, PathFeatures};
 pub use crate::interface::{PixelFilter, View};
-use crate::scene::Environment;
+use crate::scene::{Environment, Scene};
 use crate::shaders::{self, StreamShaders};
 use crate::tracer::queue::RayQueue;
 use crate::tracer::{Push, Stream, Tracer};
 use environment::DeviceEnvironment;
-use lights::Lights;
+use lights::device::DeviceLights;
+use lights::{LightBuilder, Lights};
 use media::ClosedVolumes;
 use params::{CONE_BYTES, INVALID, MEDIA_BYTES, PathParams, QUAD_BYTES, SKY_PDF_BYTES, STATE_BYTES, STRAIGHT_BYTES};
 pub use settings::{Lens, MAX_DEPTH, PathOptions, Strategy, TextureFilter};
@@ -104,7 +107,7 @@ impl PathIntegrator {
 
     /// Number of lights that light sampling chooses from, the environment and each portal included; 0 without light sampling.
     pub fn lights(&self) -> u32 {
-        self.paths.lights
+        self.paths.light_count()
     }
 
     /// Turns the environment map: `to_map` is the rotation from world directions to the map's. Other environments look the same from all sides.
@@ -113,6 +116,14 @@ impl PathIntegrator {
     /// Those of the device.
     pub fn turn_environment(&mut self, to_map: &DMat3) -> Result<()> {
         self.paths.turn_environment(to_map)
+    }
+
+    /// Moves lights, and surfaces that emit light, to where they are in `scene`, which is that of the tracer in another pose.
+    ///
+    /// # Errors
+    /// Those of the device; [`Error::Scene`] where lights were switched on or off, which needs other shaders.
+    pub fn move_lights(&mut self, tracer: &Tracer, scene: &Scene) -> Result<()> {
+        self.paths.move_lights(tracer.device(), scene).map(drop)
     }
 
     /// Renders `spp` paths per pixel. `tracer` must be the one that the integrator was created with.
@@ -153,8 +164,8 @@ impl PathIntegrator {
             shadow_rays,
             ambient_rays,
             longest_path,
-            lights: paths.lights,
-            light_tree: paths.light_tree,
+            lights: paths.light_count(),
+            light_tree: paths.features.contains(PathFeature::LightTree),
             features: paths.features,
             light_kinds: paths.light_kinds,
         })
@@ -211,8 +222,9 @@ struct PathEstimator {
     max_depth: u32,
     samples_lights: bool,
     traced: PathCounts,
-    lights: u32,
-    light_tree: bool,
+    lights: DeviceLights,
+    /// Makes the lights again where they move; `None` where they do not depend on the scene.
+    light_builder: Option<LightBuilder>,
     features: PathFeatures,
     light_kinds: LightKinds,
     /// Radiance of each path of a launch.
@@ -246,13 +258,19 @@ impl PathEstimator {
             None => &flat.scene.environment,
         };
         let environment = DeviceEnvironment::new(device, around, options.strategy == Strategy::Mis)?;
+        let mut builder = None;
         let lights = match options.white_sky {
             _ if options.view.is_some() => Lights::default(),
             Some(_) => Lights::environment_only(),
-            None if options.background_only => Lights::new(flat, glam::Vec3::ZERO),
-            None => Lights::new(flat, environment.mean),
+            None => {
+                let around = if options.background_only { glam::Vec3::ZERO } else { environment.mean };
+                builder.insert(LightBuilder::new(flat, around)).lights(flat.scene)
+            }
         };
-        let (mut features, light_kinds) = features::features(options, flat, &lights, environment.map.texels != 0, cones);
+        let (mut features, mut light_kinds) = features::features(options, flat, &lights, environment.map.texels != 0, cones);
+        if let Some(builder) = builder.as_ref().filter(|_| features.contains(PathFeature::LightSamples)) {
+            builder.moving_kinds(flat.scene).for_each(|kind| light_kinds.insert(kind));
+        }
         features.insert_if(has_signal, PathFeature::Signal);
         let [has_media, has_clear_walls] = [PathFeature::Media, PathFeature::ClearWalls].map(|f| features.contains(f));
         let stores_sky_pdfs = features.contains(PathFeature::LightSamples)
@@ -279,30 +297,13 @@ impl PathEstimator {
         let later_diffuse_contributions = diffuse_part(has_clear_walls)?;
         let ambient_diffuse_contributions = diffuse_part(options.ambient.is_some())?;
         let signal_bytes = size_of::<SignalRecord>() as u64 * u64::from(most);
+        let lights = DeviceLights::new(device, lights)?;
         let base = PathParams {
             map: environment.map,
             environment: environment.factor.to_array(),
-            light_count: lights.choices(),
-            light_first: lights.first,
-            light_tree: match lights.tree.is_empty() {
-                true => 0,
-                false => keep(Buffer::from_slice(device, "light tree", &lights.tree)?),
-            },
-            lights: if lights.records.is_empty() { 0 } else { keep(Buffer::from_slice(device, "lights", &lights.records)?) },
-            light_of: match lights.light_of.is_empty() {
-                true => 0,
-                false => keep(Buffer::from_slice(device, "light indices", &lights.light_of)?),
-            },
-            light_starts: match lights.starts.is_empty() {
-                true => 0,
-                false => keep(Buffer::from_slice(device, "light distribution", &lights.starts)?),
-            },
-            first_disk: lights.directional.start,
-            disk_count: lights.directional.end - lights.directional.start,
             radiance: radiance.address(),
             contributions: keep(contributions),
             shadow: shadow_queue.record(),
-            environment_light: lights.environment.unwrap_or(INVALID),
             cones: match cones {
                 true => keep(Buffer::new(device, "ray cones", CONE_BYTES * most as u64, Memory::Device)?),
                 false => 0,
@@ -332,10 +333,10 @@ impl PathEstimator {
             diffuse_contributions,
             later_diffuse_contributions,
             ambient_diffuse_contributions,
-            ..options.params()
+            ..lights.params(options.params())
         };
         let states = [keep(states()?), keep(states()?)];
-        let samples_lights = options.strategy.samples_lights() && !lights.records.is_empty() && options.view.is_none();
+        let samples_lights = features.contains(PathFeature::LightSamples) && options.view.is_none();
         let walls = match has_clear_walls && samples_lights {
             true => Some(TransmittedShadowRays {
                 stream: tracer.specialized(&shaders::PATH_SHADOW_WALLS_CLOSEST, &constants)?,
@@ -399,8 +400,8 @@ impl PathEstimator {
             max_depth: options.bounces(),
             samples_lights,
             traced: PathCounts::default(),
-            lights: if options.strategy.samples_lights() { lights.count() } else { 0 },
-            light_tree: !lights.tree.is_empty(),
+            lights,
+            light_builder: builder,
             features,
             light_kinds,
             radiance,
@@ -421,6 +422,30 @@ impl PathEstimator {
     fn turn_environment(&mut self, to_map: &DMat3) -> Result<()> {
         let rows = environment::rows(to_map);
         self.change_records(|record| record.map.to_map = rows)
+    }
+
+    /// Number of lights that light sampling chooses from.
+    fn light_count(&self) -> u32 {
+        if self.features.contains(PathFeature::LightSamples) { self.lights.count() } else { 0 }
+    }
+
+    /// Moves the lights to where they are in `scene`, which is that of the tracer in another pose. Returns true if they have moved.
+    ///
+    /// # Errors
+    /// Those of the device; [`Error::Scene`] if the lights are so different that they need other shaders.
+    fn move_lights(&mut self, device: &Arc<Device>, scene: &Scene) -> Result<bool> {
+        let Some(builder) = &mut self.light_builder else { return Ok(false) };
+        let lights = builder.lights(scene);
+        if self.lights.are(&lights) {
+            return Ok(false);
+        }
+        self.lights.check_fits(&lights, self.features, self.light_kinds)?;
+        self.lights = DeviceLights::new(device, lights)?;
+        for (record, buffer) in self.records.iter_mut().zip(&mut self.path_params) {
+            *record = self.lights.params(*record);
+            buffer.write(0, bytemuck::bytes_of(record))?;
+        }
+        Ok(true)
     }
 
     fn change_records(&mut self, change: impl Fn(&mut PathParams)) -> Result<()> {

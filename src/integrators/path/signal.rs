@@ -108,6 +108,14 @@ impl SignalPaths {
         self.paths.turn_environment(to_map)
     }
 
+    /// Moves the lights to where they are in `scene`, which is that of the tracer in another pose. Returns true if they have moved.
+    ///
+    /// # Errors
+    /// Those of the device; [`crate::Error::Scene`] if the lights are so different that they need other shaders.
+    pub fn move_lights(&mut self, tracer: &Tracer, scene: &Scene) -> Result<bool> {
+        self.paths.move_lights(tracer.device(), scene)
+    }
+
     /// Begins a frame: the camera and its block, with [`BlockParams::frame`] and [`BlockParams::centre_offset`].
     ///
     /// # Errors

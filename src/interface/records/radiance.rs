@@ -49,6 +49,10 @@ records! {
         starts: uint,
         /// Samples per pixel of earlier launches of this frame.
         earlier: uint,
+        /// Tiles in a row of the pixels that are sampled in a frame.
+        tiles_x: uint,
+        /// Padding.
+        reserved: uint,
     }
 
     /// Parameters of `radiance_temporal`.

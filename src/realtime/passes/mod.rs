@@ -105,12 +105,13 @@ pub fn radiance_stages(
 ) -> Result<Vec<Stage>> {
     let pixels = block.size[0] * block.size[1];
     let most = settings.launch_rays.clamp(MAX_SAMPLES * TILE_PIXELS, LAUNCH_RAYS);
-    let paths = block.rays().saturating_mul(settings.rays_per_pixel.min(MAX_SAMPLES).next_power_of_two()).min(most);
+    let sampled = Block { size: settings.resolution.sampled_size(block.size), ..block };
+    let paths = sampled.rays().saturating_mul(settings.rays_per_pixel.min(MAX_SAMPLES).next_power_of_two()).min(most);
     let paths = SignalPaths::new(tracer, flat, options, paths)?;
     let has_rest = settings.converges();
     let mut stages = vec![
         surfaces::stage(tracer, flat.scene, &paths, block, settings.launch_rays)?,
-        paths::stage(tracer, paths, block, settings.rays_per_pixel, has_rest)?,
+        paths::stage(tracer, paths, sampled, settings.rays_per_pixel, has_rest)?,
         radiance_temporal::stage(tracer, pixels)?,
     ];
     let is_diffuse = options.white_sky.is_some() || flat.scene.materials.iter().all(|m| m.kind == MaterialKind::Matte);

@@ -8,6 +8,7 @@ use crate::interface::records::radiance::GatherParams;
 use crate::realtime::display::Display;
 use crate::realtime::graph::{Frame, Params, Pass, Range, ResourceUse, Stage};
 use crate::realtime::resources::{Resource, Resources};
+use crate::scene::Scene;
 use crate::tracer::{Push, Tracer};
 
 /// Log2 of the maximum number of samples per pixel in a launch.
@@ -17,16 +18,18 @@ pub const MAX_SAMPLES: u32 = 1 << MAX_SAMPLE_BITS;
 
 struct Paths {
     paths: SignalPaths,
+    /// The pixels that are sampled in a frame, close together.
+    sampled: Block,
     gather: Params<GatherParams>,
     has_rest: bool,
 }
 
-/// The pass over all pixels of an image, `spp` paths for each.
-pub fn stage(tracer: &Tracer, paths: SignalPaths, block: Block, spp: u32, has_rest: bool) -> Result<Stage> {
+/// The pass over the pixels that are sampled in a frame ([`Resolution::sampled_size`](crate::realtime::Resolution::sampled_size)), `spp` paths for each.
+pub fn stage(tracer: &Tracer, paths: SignalPaths, sampled: Block, spp: u32, has_rest: bool) -> Result<Stage> {
     // a range is a launch, or several of the same pixels
     let pixels = paths.capacity() / spp.min(MAX_SAMPLES).next_power_of_two();
-    let ranges = Range::launches(block.rays(), TILE_PIXELS, pixels);
-    let pass = Paths { paths, gather: Params::new(tracer.device(), "parameters of gathering")?, has_rest };
+    let ranges = Range::launches(sampled.rays(), TILE_PIXELS, pixels);
+    let pass = Paths { paths, sampled, gather: Params::new(tracer.device(), "parameters of gathering")?, has_rest };
     Ok(Stage::new(vec![Box::new(pass)], ranges))
 }
 
@@ -52,11 +55,15 @@ impl Pass for Paths {
         if let Some(to_map) = &frame.environment_turn {
             self.paths.turn_environment(to_map)?;
         }
-        self.paths.begin(&frame.camera, &super::surfaces::block_params(frame))
+        self.paths.begin(&frame.camera, &super::surfaces::block_params(frame, self.sampled))
     }
 
     fn record(&self, _: &mut Recorder, _: &Frame, _: &Resources, _: Range) -> Result<()> {
         Ok(())
+    }
+
+    fn move_lights(&mut self, tracer: &Tracer, scene: &Scene) -> Result<bool> {
+        self.paths.move_lights(tracer, scene)
     }
 
     fn is_run_by_host(&self) -> bool {
@@ -76,12 +83,14 @@ impl Pass for Paths {
                 rest: resources.address(Resource::Rest),
                 starts: frame.rest_starts.into(),
                 earlier,
+                tiles_x: self.sampled.tiles_x(),
+                reserved: 0,
             })?;
             let push = Push {
                 scene: frame.tracer.scene_address(),
                 first: range.first << sample_bits,
                 count: range.count << sample_bits,
-                sample_index: frame.number.wrapping_mul(spp).wrapping_add(earlier),
+                sample_index: super::surfaces::first_sample(frame).wrapping_add(earlier),
                 sample_bits,
                 ..Default::default()
             };

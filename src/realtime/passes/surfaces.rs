@@ -28,13 +28,19 @@ pub fn stage(tracer: &Tracer, scene: &Scene, paths: &SignalPaths, block: Block, 
     Ok(Stage::new(vec![Box::new(pass)], ranges))
 }
 
-/// Parameters of a frame's block that camera rays read.
-pub(super) fn block_params(frame: &Frame) -> BlockParams {
+/// Parameters of a block of pixels that camera rays of a frame read.
+pub(super) fn block_params(frame: &Frame, block: Block) -> BlockParams {
     BlockParams {
         frame: frame.params,
         centre_offset: frame.offset,
-        ..frame.block.params(frame.block.size, &frame.camera, frame.settings.seed)
+        ..block.params(frame.block.size, &frame.camera, frame.settings.seed)
     }
+}
+
+/// Index of the first sample of a frame in a pixel that is sampled in it. A pixel takes the samples of its sequence one after the other, also where it is sampled in every second or fourth
+/// frame only: all samples of a sequence are more even than every fourth of them.
+pub(super) fn first_sample(frame: &Frame) -> u32 {
+    (frame.number / frame.settings.resolution.period()).wrapping_mul(frame.settings.rays_per_pixel)
 }
 
 impl Pass for Surfaces {
@@ -47,13 +53,14 @@ impl Pass for Surfaces {
 
     fn prepare(&mut self, frame: &Frame, resources: &Resources) -> Result<()> {
         let [materials, direct] = [Resource::Materials, Resource::Direct].map(|r| resources.address(r));
-        self.rays.prepare(&BlockParams { path: self.path, ..block_params(frame) }, materials, direct)
+        self.rays.prepare(&BlockParams { path: self.path, ..block_params(frame, frame.block) }, materials, direct)
     }
 
     fn record(&self, r: &mut Recorder, frame: &Frame, _: &Resources, range: Range) -> Result<()> {
         let Range { first, count } = range;
-        let sample_index = frame.number.wrapping_mul(frame.settings.rays_per_pixel);
-        self.rays.record(r, &Push { scene: frame.tracer.scene_address(), first, count, sample_index, ..Default::default() });
+        let push =
+            Push { scene: frame.tracer.scene_address(), first, count, sample_index: first_sample(frame), ..Default::default() };
+        self.rays.record(r, &push);
         Ok(())
     }
 }

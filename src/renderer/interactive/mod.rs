@@ -16,6 +16,7 @@ use crate::error::{Error, Result};
 use crate::film::Control;
 use crate::gpu::Device;
 use crate::integrators::lighting::LightingSettings;
+use crate::realtime::sequence;
 use crate::scene::animation::{AnimationRig, Playback, Pose};
 use crate::scene::{AlphaMode, Camera, Motion, Scene};
 use crate::shaders::StreamShaders;
@@ -59,6 +60,8 @@ struct TracedScene<'r> {
     pose: u64,
     /// What the last change of pose moved.
     moved: Vec<MovedBounds>,
+    /// The scene in its pose, if the animation moves lights or surfaces that emit light.
+    posed: Option<Box<Scene>>,
 }
 
 impl Renderer {
@@ -208,7 +211,12 @@ impl<'r> Interactive<'r> {
         let request = TracerRequest { needs, streams, rays: RAYS, control, warnings: &mut self.warnings };
         let tracer = request.build(self.device, self.kind, &flat, self.compute, self.settings)?;
         self.built += 1;
-        let mut world = TracedScene { flat, tracer, needs, number: self.built, pose: 0, moved: Vec::new() };
+        let moves_lights = match &self.animation {
+            Some(a) => sequence::moves_lights(self.scene, a.rig, a.index)?,
+            None => false,
+        };
+        let posed = moves_lights.then(|| Box::new(self.scene.clone()));
+        let mut world = TracedScene { flat, tracer, needs, number: self.built, pose: 0, moved: Vec::new(), posed };
         if let Some(animation) = self.animation.as_ref().filter(|a| a.time.is_some()) {
             world.update(&animation.pose)?;
         }
@@ -221,8 +229,21 @@ impl TracedScene<'_> {
     fn update(&mut self, pose: &Pose) -> Result<()> {
         if self.tracer.is_dynamic() {
             self.moved = self.tracer.update(&pose.changes())?.moved;
+        }
+        if let Some(posed) = &mut self.posed {
+            pose.apply(posed);
+        }
+        if self.tracer.is_dynamic() || self.posed.is_some() {
             self.pose += 1;
         }
         Ok(())
+    }
+
+    /// The scene as its tracer holds it, with lights where they are in its pose.
+    fn posed(&self) -> FlatScene<'_> {
+        match &self.posed {
+            Some(posed) => FlatScene { scene: posed, ..self.flat.clone() },
+            None => self.flat.clone(),
+        }
     }
 }

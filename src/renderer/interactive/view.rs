@@ -365,6 +365,9 @@ impl FramesView {
         moved: &[crate::tracer::MovedBounds],
         control: &mut dyn Control,
     ) -> Result<ViewStep> {
+        if let Some(posed) = &world.posed {
+            self.realtime.move_lights(&world.tracer, posed)?;
+        }
         let FrameStats { timings, primary_rays, occlusion_rays, nodes, .. } =
             self.realtime.frame_with(&world.tracer, camera, moved, Some(control))?;
         Ok(ViewStep {
@@ -387,7 +390,7 @@ impl StillView {
         let record = job.camera_record(&world.flat);
         let make = || if skips { TileMask::new(&world.flat, &record, job.size, job.spp).map(Arc::new) } else { None };
         let tile_mask = self.tile_mask.get_or_insert_with(make).clone();
-        let rendered = match self.integrator.render(&world.tracer, &world.flat, job, tile_mask, control) {
+        let rendered = match self.integrator.render(&world.tracer, &world.posed(), job, tile_mask, control) {
             Ok(rendered) => rendered.image,
             Err(e) => {
                 self.restart();

@@ -35,7 +35,8 @@ pub(super) fn check(scene: &Scene, parts: &RigParts) -> Result<(), String> {
         check_animation(animation, parts).map_err(|e| format!("animation {i} `{}`, {e}", animation.name))?;
     }
     let on = |what: &str, carried: &[Option<usize>], there: usize| {
-        if carried.len() != there {
+        // lights are added to scenes that have a rig
+        if carried.len() != there && (what != "lights" || carried.len() > there) {
             return Err(format!("{} {what} are on nodes, the scene has {there}", carried.len()));
         }
         match carried.iter().flatten().find(|&&n| n >= nodes) {
@@ -44,7 +45,8 @@ pub(super) fn check(scene: &Scene, parts: &RigParts) -> Result<(), String> {
         }
     };
     on("instances", &parts.instances, scene.instances.len())?;
-    on("cameras", &parts.cameras, scene.cameras.len())
+    on("cameras", &parts.cameras, scene.cameras.len())?;
+    on("lights", &parts.lights, scene.lights.len())
 }
 
 fn check_skin(skin: &Skin, nodes: usize) -> Result<(), String> {

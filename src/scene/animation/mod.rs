@@ -134,6 +134,8 @@ pub struct RigParts {
     pub instances: Vec<Option<usize>>,
     /// The node of each of [`Scene::cameras`]; `None` for a static camera.
     pub cameras: Vec<Option<usize>>,
+    /// The node of each of the first of [`Scene::lights`]; `None` for a static light, as are those beyond.
+    pub lights: Vec<Option<usize>>,
 }
 
 /// A scene's animations, with the nodes, skins and meshes that they act on.

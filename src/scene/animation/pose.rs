@@ -47,6 +47,8 @@ pub struct Pose {
     pub meshes: Vec<PosedMesh>,
     /// Moving cameras (indices into [`Scene::cameras`]) and their camera-to-world transforms, without scale.
     pub cameras: Vec<(usize, DAffine3)>,
+    /// Moving lights (indices into [`Scene::lights`]) and the transforms of their nodes to world space, without scale.
+    pub lights: Vec<(usize, DAffine3)>,
     scratch: Scratch,
 }
 
@@ -78,6 +80,11 @@ impl Pose {
                 camera.camera_to_world = to_world;
             }
         }
+        for &(i, to_world) in &self.lights {
+            if let Some(light) = scene.lights.get_mut(i) {
+                light.place(&to_world);
+            }
+        }
     }
 }
 
@@ -106,6 +113,16 @@ impl AnimationRig {
         let mut live = Vec::new();
         self.live(animation, &mut live)?;
         Ok(self.moved(&self.parts.cameras, &live).map(|(i, _)| i).collect())
+    }
+
+    /// The lights that an animation moves and no surface emits, as indices into [`Scene::lights`].
+    ///
+    /// # Errors
+    /// [`Error::Usage`] when there is no such animation.
+    pub fn moving_lights(&self, animation: usize) -> Result<Vec<usize>> {
+        let mut live = Vec::new();
+        self.live(animation, &mut live)?;
+        Ok(self.moved(&self.parts.lights, &live).map(|(i, _)| i).collect())
     }
 
     /// Computes the state of everything that an animation changes ([`AnimationRig::motion`]), `seconds` after the start of playback. `pose`
@@ -139,6 +156,8 @@ impl AnimationRig {
         pose.instances.extend(placed.map(|(i, node)| (i, at_least(&world[node], self.floor(i)))));
         pose.cameras.clear();
         pose.cameras.extend(self.moved(&self.parts.cameras, live).map(|(i, node)| (i, rigid(&world[node]))));
+        pose.lights.clear();
+        pose.lights.extend(self.moved(&self.parts.lights, live).map(|(i, node)| (i, rigid(&world[node]))));
 
         let mut count = 0;
         for (d, deformation) in self.parts.deformations.iter().enumerate() {
@@ -176,7 +195,7 @@ impl AnimationRig {
         Ok(playing)
     }
 
-    /// The instances or cameras on moving nodes, each with its node.
+    /// The instances, cameras or lights on moving nodes, each with its node.
     fn moved<'a>(&self, carried: &'a [Option<usize>], live: &'a [bool]) -> impl Iterator<Item = (usize, usize)> + use<'a> {
         carried.iter().enumerate().filter_map(|(i, node)| Some((i, (*node)?))).filter(|(_, node)| live[*node])
     }
@@ -264,6 +283,11 @@ impl AnimationRig {
         for (camera, node) in scene.cameras.iter_mut().zip(&rig.parts.cameras) {
             if let Some(node) = *node {
                 camera.camera_to_world = rigid(&rig.rest[node]);
+            }
+        }
+        for (light, node) in scene.lights.iter_mut().zip(&rig.parts.lights) {
+            if let Some(node) = *node {
+                light.place(&rigid(&rig.rest[node]));
             }
         }
         scene.rig = Some(rig);

@@ -8,6 +8,7 @@ pub mod atrium;
 pub mod cornell;
 pub mod many;
 pub mod parade;
+pub mod pendulum;
 pub mod room;
 pub mod shapes;
 pub mod terrain;
@@ -52,6 +53,7 @@ const NAMES: &[BuiltinInfo] = &[
     info("room", "a furnished room of about N triangles, closed but for a window (room:N, 10000 to 5000000, default 40000)"),
     info("stairs", "stairs, a column and a rail: contact detail"),
     info("parade", "an animation of two seconds: moving blocks, a rotor, a skinned column, a ball with morph targets"),
+    info("pendulum", "an animation of two seconds: the Cornell box, whose lamp swings on a rod"),
     info("far-away", "the stairs, more than a million units from the origin"),
 ];
 
@@ -115,6 +117,7 @@ fn recipe(name: &str) -> Option<Box<dyn FnOnce() -> Scene>> {
         "plane" => || analytic::plane(20.0, SceneTransform::default()),
         "leaf-cards" => many::leaf_cards,
         "parade" => parade::parade,
+        "pendulum" => pendulum::pendulum,
         "atrium" => atrium::atrium,
         "stairs" => || many::stairs(DVec3::ZERO),
         "far-away" => || many::stairs(DVec3::new(1.0e6, -5.0e5, 1.5e6)),

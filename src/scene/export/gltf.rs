@@ -133,7 +133,7 @@ impl Writer {
         let mut roots = std::mem::take(&mut tree.roots);
         let free = nodes.len();
         let mut lights = Vec::new();
-        for light in &scene.lights {
+        for (k, light) in scene.lights.iter().enumerate() {
             if matches!(light.kind, LightKind::Directional { angle } if angle > 0.0) {
                 let name = &light.name;
                 self.written
@@ -145,7 +145,10 @@ impl Writer {
                 self.written.warnings.push(format!("light '{name}' is left out: glTF has no {kind} lights"));
                 continue;
             };
-            nodes.push(light_node(light, lights.len()));
+            match tree.lights.get(&k) {
+                Some(&carrier) => put_light(&mut nodes[carrier], lights.len()),
+                None => nodes.push(light_node(light, lights.len())),
+            }
             lights.push(written);
         }
         let cameras: Vec<Value> = scene.cameras.iter().map(camera).collect();
@@ -403,8 +406,12 @@ fn camera(camera: &Camera) -> Value {
 fn light_node(light: &Light, index: usize) -> Value {
     let turn = DQuat::from_rotation_arc(DVec3::NEG_Z, light.direction.try_normalize().unwrap_or(DVec3::NEG_Z));
     let mut node = node(&light.name, &DAffine3::from_rotation_translation(turn, light.position));
-    node["extensions"] = json!({ "KHR_lights_punctual": { "light": index } });
+    put_light(&mut node, index);
     node
+}
+
+fn put_light(node: &mut Value, index: usize) {
+    node["extensions"] = json!({ "KHR_lights_punctual": { "light": index } });
 }
 
 /// A light of KHR_lights_punctual; `None` if that has no such type.

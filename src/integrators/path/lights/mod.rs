@@ -1,23 +1,26 @@
 //! The lights of a scene as the path tracer samples them: [`LightRecord`]. Few lights are chosen by power; among many, a tree
 //! chooses by a bound of their contribution at a point ([`super::light_tree`]).
 
+pub(super) mod device;
 mod portals;
 mod punctual;
 mod surfaces;
 
+use std::collections::HashMap;
 use std::f64::consts::PI;
 use std::ops::Range;
 
-use glam::Vec3;
+use glam::{DVec3, Vec3, Vec4};
 
 use super::light_tree::{self, Bounds};
 use super::params::INVALID;
+use crate::accel::features::{AlphaClass, alpha_classes};
 use crate::accel::flatten::FlatScene;
 use crate::interface::records::lights::{LightNode, LightRecord};
 use crate::interface::{LightKind as Kind, LightKinds};
 use crate::sampling::CumulativeTable;
-use crate::scene::Light;
 use crate::scene::lights::Emission;
+use crate::scene::{Geometry, Light, Scene};
 
 /// With more positional lights than this, a light tree chooses among them.
 const MAX_BY_POWER: usize = 256;
@@ -47,6 +50,20 @@ pub(super) struct Lights {
 /// the squared error summed over channels; in proportion to luminance, blue lights would be undersampled and noisy.
 pub(super) fn brightness(c: Vec3) -> f64 {
     (c.as_dvec3().length_squared() / 3.0).sqrt()
+}
+
+/// Makes the lights of a scene, again and again if they move: what does not depend on where they are is found once.
+pub(super) struct LightBuilder {
+    origin: DVec3,
+    /// Of the scene's bounding sphere.
+    radius: f64,
+    /// Radiance of what surrounds the scene, averaged over the sphere.
+    environment: Vec3,
+    alpha: Vec<AlphaClass>,
+    /// For each instance: it moves or deforms.
+    moves: Vec<bool>,
+    /// Means of the textures of emitters, by index.
+    means: HashMap<Option<usize>, Vec4>,
 }
 
 /// Collects lights, with the power of each, and bounds of positional ones.
@@ -97,23 +114,46 @@ impl Lights {
     pub fn count(&self) -> u32 {
         self.sampled().len() as u32
     }
+}
 
-    /// Those of a scene. `environment`: radiance of what surrounds it, averaged over the sphere.
+impl LightBuilder {
+    /// For lights of `flat`. `environment`: radiance of what surrounds it, averaged over the sphere.
     pub fn new(flat: &FlatScene, environment: Vec3) -> Self {
-        let mut all = LightCollector::default();
         let scene = flat.scene;
+        let moves = |(k, mesh): (usize, usize)| flat.motion.instances.contains(&k) || flat.motion.meshes.contains(&mesh);
+        Self {
+            origin: flat.origin,
+            radius: radius(scene),
+            environment,
+            alpha: alpha_classes(scene, flat.blend),
+            moves: scene.instances.iter().map(|i| i.mesh).enumerate().map(moves).collect(),
+            means: HashMap::new(),
+        }
+    }
+
+    /// Kinds of lights that moving surfaces may become: a sphere whose scale is not uniform is none at times.
+    pub fn moving_kinds(&self, scene: &Scene) -> impl Iterator<Item = Kind> {
+        let is_sphere = |mesh: usize| matches!(scene.meshes[mesh].geometry, Geometry::Spheres(_));
+        let emits = |mesh: usize| scene.materials[scene.meshes[mesh].material].emissive != Vec3::ZERO;
+        let moving = scene.instances.iter().zip(&self.moves).filter(|(_, moves)| **moves).map(|(i, _)| i.mesh);
+        moving.filter(move |&mesh| is_sphere(mesh) && emits(mesh)).map(|_| Kind::Sphere)
+    }
+
+    /// The lights of the scene, or of the same scene in another pose.
+    pub fn lights(&mut self, scene: &Scene) -> Lights {
+        let mut all = LightCollector::default();
         let is_far = |light: &&Light| matches!(light.kind.emission(), Emission::Distant { .. });
-        scene.lights.iter().filter(|l| !is_far(l)).for_each(|l| punctual::add(&mut all, flat, l));
-        let light_of = surfaces::add(&mut all, flat);
+        scene.lights.iter().filter(|l| !is_far(l)).for_each(|l| punctual::add(&mut all, self, l));
+        let light_of = surfaces::add(&mut all, self, scene);
         let first_far = all.records.len() as u32;
-        scene.lights.iter().filter(is_far).for_each(|l| punctual::add(&mut all, flat, l));
+        scene.lights.iter().filter(is_far).for_each(|l| punctual::add(&mut all, self, l));
         let directional = first_far..all.records.len() as u32;
         let has_disks = all.records[first_far as usize..].iter().any(|r| r.radius > 0.0);
-        let mut lights = Self { light_of, directional, has_disks, ..Default::default() };
-        if environment != Vec3::ZERO {
+        let mut lights = Lights { light_of, directional, has_disks, ..Default::default() };
+        if self.environment != Vec3::ZERO {
             // the power that crosses the scene's bounding disk, from all directions
-            let power = 4.0 * PI.powi(2) * radius(flat).powi(2) * brightness(environment);
-            lights.environment = portals::add_environment(&mut all, flat, brightness(environment), power);
+            let power = 4.0 * PI.powi(2) * self.radius.powi(2) * brightness(self.environment);
+            lights.environment = portals::add_environment(&mut all, self, scene, power);
         }
         let placed = all.bounds.len();
         if placed > MAX_BY_POWER && placed <= light_tree::MAX_LIGHTS {
@@ -137,8 +177,8 @@ impl Lights {
 }
 
 /// Radius of the bounding sphere of the scene.
-fn radius(flat: &FlatScene) -> f64 {
-    flat.scene.bounds().map_or(1.0, |(lo, hi)| 0.5 * (hi - lo).length()).max(1e-30)
+fn radius(scene: &Scene) -> f64 {
+    scene.bounds().map_or(1.0, |(lo, hi)| 0.5 * (hi - lo).length()).max(1e-30)
 }
 
 #[cfg(test)]

@@ -3,18 +3,19 @@
 use std::f64::consts::PI;
 
 use super::super::params::INVALID;
-use super::LightCollector;
-use crate::accel::flatten::FlatScene;
+use super::{LightBuilder, LightCollector, brightness};
 use crate::interface::LightKind as Kind;
 use crate::interface::records::lights::LightRecord;
+use crate::scene::Scene;
 
 /// Fraction of the environment's samples that do not use portals, because light may enter elsewhere.
 const ENVIRONMENT_SHARE: f64 = 0.2;
 
-/// Adds the environment, of this mean brightness and power, followed by the scene's portals; returns its index. With portals its power is that of the light
+/// Adds the environment, of this power, followed by the scene's portals; returns its index. With portals its power is that of the light
 /// which enters through them, as if they were area lights: with the power of the whole environment, the other lights of a room would get too few samples.
-pub(super) fn add_environment(all: &mut LightCollector, flat: &FlatScene, brightness: f64, power: f64) -> Option<u32> {
-    let portals: Vec<_> = flat.scene.portals.iter().filter(|p| p.area() > 0.0).collect();
+pub(super) fn add_environment(all: &mut LightCollector, builder: &LightBuilder, scene: &Scene, power: f64) -> Option<u32> {
+    let brightness = brightness(builder.environment);
+    let portals: Vec<_> = scene.portals.iter().filter(|p| p.area() > 0.0).collect();
     let through = |area: f64| PI * area * brightness;
     let of_portals: f64 = portals.iter().map(|p| through(p.area())).sum();
     let own = if portals.is_empty() { power } else { of_portals * ENVIRONMENT_SHARE / (1.0 - ENVIRONMENT_SHARE) };
@@ -32,7 +33,7 @@ pub(super) fn add_environment(all: &mut LightCollector, flat: &FlatScene, bright
         let record = LightRecord {
             kind: Kind::Portal as u32,
             instance: INVALID,
-            position: (portal.corner - flat.origin).as_vec3().to_array(),
+            position: (portal.corner - builder.origin).as_vec3().to_array(),
             axis: portal.edges[0].as_vec3().to_array(),
             edge: portal.edges[1].as_vec3().to_array(),
             ..Default::default()

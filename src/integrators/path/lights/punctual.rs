@@ -6,15 +6,14 @@ use glam::DVec3;
 
 use super::super::light_tree::Bounds;
 use super::super::params::INVALID;
-use super::{LightCollector, brightness, radius};
-use crate::accel::flatten::FlatScene;
+use super::{LightBuilder, LightCollector, brightness};
 use crate::interface::records::lights::LightRecord;
 use crate::scene::Light;
 use crate::scene::lights::Emission;
 
 /// Adds a light.
-pub(super) fn add(all: &mut LightCollector, flat: &FlatScene, light: &Light) {
-    let position = light.position - flat.origin;
+pub(super) fn add(all: &mut LightCollector, builder: &LightBuilder, light: &Light) {
+    let position = light.position - builder.origin;
     let brightness = brightness(light.intensity);
     let base = LightRecord {
         kind: light.kind.number() as u32,
@@ -42,7 +41,7 @@ pub(super) fn add(all: &mut LightCollector, flat: &FlatScene, light: &Light) {
         Emission::Distant { angle } => {
             // 1 - cos, without cancellation
             let one_minus_cos = 2.0 * (0.25 * f64::from(angle)).sin().powi(2);
-            all.push(LightRecord { radius: one_minus_cos as f32, ..base }, PI * radius(flat).powi(2) * brightness, None);
+            all.push(LightRecord { radius: one_minus_cos as f32, ..base }, PI * builder.radius.powi(2) * brightness, None);
         }
     }
 }

@@ -1,29 +1,25 @@
 //! Area lights: triangles, rectangles and spheres whose material emits.
 
-use std::collections::HashMap;
 use std::f64::consts::PI;
 
 use glam::{DVec3, DVec4, Vec3, Vec4};
 
 use super::super::light_tree::Bounds;
 use super::super::params::INVALID;
-use super::{LightCollector, brightness};
-use crate::accel::features::{AlphaClass, alpha_classes};
-use crate::accel::flatten::FlatScene;
+use super::{LightBuilder, LightCollector, brightness};
+use crate::accel::features::AlphaClass;
 use crate::interface::LightKind as Kind;
 use crate::interface::records::lights::{LIGHT_ALPHA, LIGHT_MIRRORED, LIGHT_TWO_SIDED, LightRecord};
-use crate::scene::{AlphaMode, Geometry, Material, TriangleMesh};
+use crate::scene::{AlphaMode, Geometry, Material, Scene, TriangleMesh};
 
 /// Bound of the rounding error of a point on a light, as a fraction of its coordinates.
 const ROUNDING_BOUND: f64 = 8.0 / 16_777_216.0;
 
 /// Adds all primitives whose material emits; returns [`super::Lights::light_of`]. A sphere under a non-uniform scale has no closed form: only BSDF sampling finds
 /// it.
-pub(super) fn add(all: &mut LightCollector, flat: &FlatScene) -> Vec<u32> {
-    let scene = flat.scene;
+pub(super) fn add(all: &mut LightCollector, builder: &mut LightBuilder, scene: &Scene) -> Vec<u32> {
+    let LightBuilder { origin, alpha, moves, means, .. } = builder;
     let (mut light_of, mut of_primitives) = (vec![INVALID; scene.instances.len()], Vec::new());
-    let alpha = alpha_classes(scene, flat.blend);
-    let mut means = HashMap::new();
     for (i, instance) in scene.instances.iter().enumerate() {
         let mesh = &scene.meshes[instance.mesh];
         let material = &scene.materials[mesh.material];
@@ -38,7 +34,7 @@ pub(super) fn add(all: &mut LightCollector, flat: &FlatScene) -> Vec<u32> {
             flags: if material.double_sided { LIGHT_TWO_SIDED } else { 0 },
             ..Default::default()
         };
-        let mut mean = |texture: Option<usize>| *means.entry(texture).or_insert_with(|| mean_texture(flat, texture));
+        let mut mean = |texture: Option<usize>| *means.entry(texture).or_insert_with(|| mean_texture(scene, texture));
         let mut brightness =
             brightness(material.emissive * mean(material.emissive_texture.map(|slot| slot.texture)).truncate());
         let is_tested = alpha[instance.mesh] == AlphaClass::Tested;
@@ -51,8 +47,9 @@ pub(super) fn add(all: &mut LightCollector, flat: &FlatScene) -> Vec<u32> {
                 let flags = base.flags
                     | if to_world.matrix3.determinant() < 0.0 { LIGHT_MIRRORED } else { 0 }
                     | if is_tested { LIGHT_ALPHA } else { 0 };
-                let plain = material.emissive_texture.is_none() && !is_tested;
-                let point = |k: u32| to_world.transform_point3(t.positions[k as usize].as_dvec3()) - flat.origin;
+                // what moves may be a rectangle at times, but its lights are of one kind
+                let plain = material.emissive_texture.is_none() && !is_tested && !moves[i];
+                let point = |k: u32| to_world.transform_point3(t.positions[k as usize].as_dvec3()) - *origin;
                 add_triangles(all, t, point, plain, brightness, LightRecord { flags, ..base }, &mut of_primitives);
             }
             Geometry::Spheres(spheres) => {
@@ -62,7 +59,7 @@ pub(super) fn add(all: &mut LightCollector, flat: &FlatScene) -> Vec<u32> {
                     continue;
                 }
                 for (primitive, s) in spheres.iter().enumerate() {
-                    let centre = to_world.transform_point3(s.center.as_dvec3()) - flat.origin;
+                    let centre = to_world.transform_point3(s.center.as_dvec3()) - *origin;
                     let radius = f64::from(s.radius) * scale[0];
                     let record = LightRecord {
                         kind: Kind::Sphere as u32,
@@ -189,9 +186,9 @@ fn mean_alpha(material: &Material, geometry: &Geometry, of_texture: f32) -> f64 
 }
 
 /// Mean of an sRGB texture, linear, and of its alpha.
-fn mean_texture(flat: &FlatScene, texture: Option<usize>) -> Vec4 {
+fn mean_texture(scene: &Scene, texture: Option<usize>) -> Vec4 {
     let Some(texture) = texture else { return Vec4::ONE };
-    let texels = &flat.scene.textures[texture].texels;
+    let texels = &scene.textures[texture].texels;
     let mut sum = DVec4::ZERO;
     for i in 0..texels.len() {
         sum += Vec4::from_array(texels.decode_srgb(i)).as_dvec4();

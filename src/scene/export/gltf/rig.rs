@@ -17,11 +17,13 @@ pub(super) struct Tree {
     pub roots: Vec<usize>,
     /// For each node of the rig, the written nodes whose meshes have morph targets with its weights.
     morphing: BTreeMap<usize, Vec<usize>>,
+    /// The written nodes of the lights that the rig carries.
+    pub lights: BTreeMap<usize, usize>,
 }
 
-/// The nodes of all instances, and of the cameras that the rig carries.
+/// The nodes of all instances, and of the cameras and lights that the rig carries.
 pub(super) fn tree(scene: &Scene, rig: Option<&AnimationRig>) -> Tree {
-    let mut tree = Tree { nodes: Vec::new(), roots: Vec::new(), morphing: BTreeMap::new() };
+    let mut tree = Tree { nodes: Vec::new(), roots: Vec::new(), morphing: BTreeMap::new(), lights: BTreeMap::new() };
     let Some(rig) = rig else {
         tree.nodes = scene.instances.iter().map(|i| with_mesh(&i.name, i.mesh, &i.object_to_world)).collect();
         tree.roots = (0..tree.nodes.len()).collect();
@@ -68,6 +70,16 @@ pub(super) fn tree(scene: &Scene, rig: Option<&AnimationRig>) -> Tree {
             tree.nodes[at]["camera"] = json!(c);
         }
     }
+    for (l, light) in scene.lights.iter().enumerate() {
+        // others are not written
+        let carried = parts.lights.get(l).copied().flatten().filter(|_| light.kind.about().gltf.is_some());
+        if let Some(on) = carried {
+            let at = tree.carrier(on, &light.name, "extensions");
+            // taken, until the light is written
+            tree.nodes[at]["extensions"] = json!({});
+            tree.lights.insert(l, at);
+        }
+    }
     tree
 }
 
@@ -77,7 +89,7 @@ pub(super) fn carries_camera(rig: &AnimationRig, camera: usize) -> Option<usize>
 }
 
 impl Tree {
-    /// The node for a mesh or camera: `on` itself if it has the same name and is free, else a new child of it.
+    /// The node for a mesh, camera or light: `on` itself if it has the same name and is free, else a new child of it.
     fn carrier(&mut self, on: usize, name: &str, what: &str) -> usize {
         let there = &self.nodes[on];
         if there.get(what).is_none() && there["name"] == name {

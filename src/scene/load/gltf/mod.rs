@@ -110,13 +110,8 @@ pub(super) fn read(path: &Path, options: &LoadOptions) -> Result<Scene> {
         if let Some(light) = node.extensions.as_ref().and_then(|e| e.khr_lights_punctual.as_ref()) {
             match node::light(&document, placed, light.light.value()) {
                 Ok(light) => {
-                    if stage.moves(at) {
-                        warnings.push(format!(
-                            "node {} `{name}` has a light and is animated: the light does not move",
-                            placed.node
-                        ));
-                    }
                     scene.lights.push(light);
+                    stage.lights.push(Some(at));
                 }
                 Err(e) => warnings.push(format!("{e}: ignored")),
             }

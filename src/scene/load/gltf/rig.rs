@@ -57,6 +57,8 @@ pub(super) struct RigBuilder<'a> {
     pub instances: Vec<Option<usize>>,
     /// The placed node of each camera.
     pub cameras: Vec<Option<usize>>,
+    /// The placed node of each light.
+    pub lights: Vec<Option<usize>>,
 }
 
 impl<'a> RigBuilder<'a> {
@@ -98,12 +100,8 @@ impl<'a> RigBuilder<'a> {
             deformations: Vec::new(),
             instances: Vec::new(),
             cameras: Vec::new(),
+            lights: Vec::new(),
         }
-    }
-
-    /// Whether an animation moves this placed node.
-    pub fn moves(&self, at: usize) -> bool {
-        self.moves[at]
     }
 
     /// The variant of mesh `mesh` on placed node `at`.
@@ -199,7 +197,7 @@ impl<'a> RigBuilder<'a> {
         // only what carries something, with all above it
         let mut keep = vec![false; self.nodes.len()];
         let joints = self.deformations.iter().filter_map(|d| d.skin).flat_map(|s| &self.skins[&s].joints).copied();
-        let carried = self.instances.iter().chain(&self.cameras).flatten().copied();
+        let carried = self.instances.iter().chain(&self.cameras).chain(&self.lights).flatten().copied();
         for at in carried.chain(joints).chain(self.deformations.iter().map(|d| d.node)) {
             keep[at] = true;
         }
@@ -246,6 +244,7 @@ impl<'a> RigBuilder<'a> {
             animations: self.animations,
             instances: renumber(self.instances),
             cameras: renumber(self.cameras),
+            lights: renumber(self.lights),
         };
         scene.rig = Some(AnimationRig::new(scene, parts)?);
         Ok(())
