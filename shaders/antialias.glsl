@@ -166,7 +166,7 @@ void main() {
     if (p.has_history != 0u && p.most_frames > 1.0 && f.still != 0u) {
         vec4 history = load_resolved(m.history, at, frames);
         frames += 1.0;
-        resolved = mix(history, now, 2.0 / (frames + 1.0));
+        resolved = mix(history, now, max(2.0 / (frames + 1.0), p.least_weight));
     } else if (p.has_history != 0u && p.most_frames > 1.0) {
         Neighbourhood around = neighbourhood(m, pixel);
         vec4 width = p.clamp_width * around.deviation;

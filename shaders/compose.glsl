@@ -1,5 +1,5 @@
 // compose: the radiance of each pixel, of the filtered parts and of what is seen directly.
-#include "common/radiance.glsl"
+#include "common/rest_parts.glsl"
 #include "interface/radiance.glsl"
 
 layout(local_size_x = LANES) in;
@@ -10,7 +10,14 @@ void main() {
     ComposeParams p = ComposeParams(push.pass);
     FrameParams f = FrameParams(p.frame);
     vec4 c = load_quad(p.direct, at);
-    if (is_surface(LOAD_PAIR(f.guide, at))) {
+    bool is_filtered = is_surface(LOAD_PAIR(f.guide, at));
+    Rest rest = is_null(p.rest) ? NO_REST : load_rest(p.rest, at);
+    if (rest.frames > 0.0) {
+        // albedo and what is seen directly are means over all samples, too; where this frame's sample shows background, nothing has been filtered
+        RestParts parts = load_parts(p.rest_parts, at);
+        c = vec4(rest.mean, rest.coverage);
+        if (is_filtered) c.rgb = parts.direct + parts.albedo * load_radiance(p.diffuse, at).mean + rest.coverage * load_radiance(p.specular, at).mean;
+    } else if (is_filtered) {
         vec3 albedo = load_quad(p.materials, at).rgb;
         c.rgb += albedo * load_radiance(p.diffuse, at).mean + load_radiance(p.specular, at).mean;
     }

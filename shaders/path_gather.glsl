@@ -1,7 +1,7 @@
 // path_gather: the means and variances of a launch's paths for each pixel, of the diffuse part and of the rest, and the sum of all since the image came to rest.
 #include "path/params.glsl"
 #include "common/radiance.glsl"
-#include "common/rest.glsl"
+#include "common/rest_parts.glsl"
 #include "interface/radiance.glsl"
 
 layout(local_size_x = LANES) in;
@@ -37,12 +37,16 @@ void main() {
             store_radiance(p.diffuse, at, NO_RADIANCE);
             store_radiance(p.specular, at, NO_RADIANCE);
             FloatImage(p.distances).v[at] = SIGNAL_UNKNOWN;
-            if (!is_null(p.rest) && p.starts != 0u) store_rest(p.rest, at, NO_REST);
+            if (!is_null(p.rest) && p.starts != 0u) {
+                store_rest(p.rest, at, NO_REST);
+                store_parts(p.rest_parts, at, NO_PARTS);
+            }
         }
     }
     if (any(greaterThanEqual(pixel, f.size))) return;
     uint at = image_index(f, pixel);
     RadianceEstimate diffuse = NO_RADIANCE, specular = NO_RADIANCE, whole = NO_RADIANCE;
+    RestParts parts = NO_PARTS;
     float covered = 0.0, distance_ = 0.0, distances = 0.0;
     for (uint s = 0u; s < n; s++) {
         uint i = k * n + s;
@@ -56,6 +60,9 @@ void main() {
         // rounding may leave less than nothing
         add_sample(specular, max(c - d.rgb * albedo.rgb, vec3(0.0)));
         add_sample(whole, c + direct.rgb);
+        parts.diffuse += d.rgb * albedo.rgb;
+        parts.albedo += albedo.rgb;
+        parts.direct += direct.rgb;
         covered += direct.a;
         if (d.a >= 0.0) {
             distance_ += min(d.a, 1e30);
@@ -72,6 +79,12 @@ void main() {
     store_radiance(p.specular, at, specular);
     if (is_first) FloatImage(p.distances).v[at] = distances > 0.0 ? distance_ / distances : SIGNAL_UNKNOWN;
     if (is_null(p.rest)) return;
-    Rest rest = p.starts != 0u && is_first ? NO_REST : load_rest(p.rest, at);
-    store_rest(p.rest, at, add_rest(rest, whole.mean, whole.samples, covered / max(whole.samples, 1.0)));
+    bool begins = p.starts != 0u && is_first;
+    Rest before = begins ? NO_REST : load_rest(p.rest, at);
+    RestParts past = begins ? NO_PARTS : load_parts(p.rest_parts, at);
+    float samples = max(whole.samples, 1.0);
+    parts = RestParts(parts.diffuse / samples, 0.0, parts.albedo / samples, 0.0, parts.direct / samples);
+    Rest after = add_rest(before, whole.mean, whole.samples, covered / samples);
+    store_rest(p.rest, at, after);
+    store_parts(p.rest_parts, at, add_parts(past, before, after, parts, whole.mean - parts.direct - parts.diffuse, covered / samples));
 }

@@ -6,6 +6,7 @@
 // this frame's samples nearby whenever the camera moves; both where objects have moved.
 #include "common/radiance.glsl"
 #include "common/reprojection.glsl"
+#include "common/rest_parts.glsl"
 #include "interface/path.glsl"
 #include "interface/radiance.glsl"
 
@@ -21,8 +22,29 @@ const float MIRROR_ROUGHNESS = 0.35;
 const float WIDE_ROUGHNESS = 0.5;
 // A mirror is not filtered at all.
 const float SHARP_ROUGHNESS = 0.04;
+// By how many frames more a history of one frame is shortened where interpolation has blurred it by one square pixel.
+const float BLUR_WEIGHT = 0.1;
+// Strength with which a change of view shortens histories of what is not reflected diffusely: change of the signal, relative to it, where the view turns by the width of the lobe.
+const float TURN_WEIGHT = 8.0;
+// Pixels between the taps by which histories are compared with samples at rest.
+const int AGREEMENT_STRIDE = 2;
+// Share of older samples from which they are compared.
+const float LEAST_OLD_SHARE = 1.0 / 64.0;
 
 float brightness(vec3 c) { return c.r + c.g + c.b; }
+
+// The direction in the world of what is at `c` in camera space, from the camera.
+vec3 view_direction(vec4 world_to_camera[3], bool orthographic, vec3 c) {
+    if (orthographic) c = vec3(0.0, 0.0, -1.0);
+    return normalize(world_to_camera[0].xyz * c.x + world_to_camera[1].xyz * c.y + world_to_camera[2].xyz * c.z);
+}
+
+// By how much the direction to a point from the camera has turned, radians.
+float view_change(FrameParams f, vec3 position, vec3 before) {
+    vec3 now = view_direction(f.world_to_camera, f.orthographic != 0u, affine(f.world_to_camera, position));
+    vec3 then = view_direction(f.previous_world_to_camera, f.previous_orthographic != 0u, affine(f.previous_world_to_camera, before));
+    return length(now - then);
+}
 
 RadianceEstimate history_at(uvec2 image, Taps taps) {
     RadianceEstimate e = NO_RADIANCE;
@@ -39,6 +61,13 @@ RadianceEstimate history_at(uvec2 image, Taps taps) {
     }
     if (weight < MIN_TAP_WEIGHT) return NO_RADIANCE;
     return RadianceEstimate(e.mean / weight, e.samples / weight, e.variance / weight, 0.0);
+}
+
+// A history between pixels is blurred by the interpolation, in every frame anew.
+RadianceEstimate less_blurred(FrameParams f, RadianceEstimate e, vec2 place) {
+    vec2 t = fract(place), blur = t * (1.0 - t);
+    e.samples /= 1.0 + BLUR_WEIGHT * (blur.x + blur.y) * e.samples / float(f.rays_per_pixel);
+    return e;
 }
 
 // A history, clamped to the mean of this frame's samples nearby, give or take their standard deviations.
@@ -67,8 +96,48 @@ EdgeTest with_normal(EdgeTest edge, uvec2 guide) {
     return edge;
 }
 
-RadianceEstimate added(FrameParams f, RadianceEstimate past, RadianceEstimate now, float most_past) {
-    past.samples = min(past.samples, min(most_past, max(f.most_samples - now.samples, 0.0)));
+// The share of a history that is older than the samples at rest.
+float old_share(RadianceEstimate history, Rest rest) { return clamp(1.0 - rest.samples / max(history.samples, 1e-6), 0.0, 1.0); }
+
+// How far a tap's history is from the samples at rest, relative to both, and how far their noise alone puts it. Squares.
+vec2 difference(RadianceEstimate history, RadianceEstimate rest) {
+    if (!(history.samples > 0.0) || !(rest.samples > 0.0)) return vec2(0.0);
+    vec3 d = history.mean - rest.mean;
+    float m = brightness(history.mean) + brightness(rest.mean);
+    return vec2(dot(d, d), brightness(rest.variance) / rest.samples) / max(m * m, 1e-20);
+}
+
+// By how much less the older samples count, because they differ from those at rest by more than noise explains. With a share k of older samples, whose bias is b, a history differs by
+// k^2 (b^2 + v / older + v / n) from the mean of n samples at rest, and the best weight of the older ones is (v / n) / (b^2 + v / older + v / n).
+vec2 agreement(RadianceTemporalParams p, FrameParams f, uint at, vec2 share) {
+    if (max(share.x, share.y) < LEAST_OLD_SHARE) return vec2(0.0);
+    ivec2 pixel = ivec2(image_pixel(f, at));
+    vec2 diffuse = vec2(0.0), specular = vec2(0.0);
+    for (int k = 0; k < 9; k++) {
+        ivec2 q = pixel + AGREEMENT_STRIDE * (ivec2(k % 3, k / 3) - 1);
+        if (any(lessThan(q, ivec2(0))) || any(greaterThanEqual(q, ivec2(f.size)))) continue;
+        uint tap = image_index(f, uvec2(q));
+        Rest rest = load_rest(p.rest, tap);
+        if (rest.frames < 2.0) continue;
+        RestParts parts = load_parts(p.rest_parts, tap);
+        diffuse += difference(load_radiance(p.previous_diffuse, tap), diffuse_at_rest(rest, parts));
+        specular += difference(load_radiance(p.previous_specular, tap), specular_at_rest(rest, parts));
+    }
+    return clamp(share * vec2(diffuse.y, specular.y) / max(vec2(diffuse.x, specular.x), vec2(1e-20)), vec2(0.0), vec2(1.0));
+}
+
+// Samples at rest, and as much of older ones as `share` says.
+RadianceEstimate rested(RadianceEstimate history, RadianceEstimate rest, float share) {
+    if (!(rest.samples > 0.0) || !(history.samples > 0.0)) return rest;
+    // of the history: it has older samples besides those at rest
+    float k = clamp(share / max(1.0 - rest.samples / history.samples, 1e-6), 0.0, 1.0);
+    return RadianceEstimate(mix(rest.mean, history.mean, k), rest.samples / max(1.0 - share, 1e-3), mix(rest.variance, history.variance, k), 0.0);
+}
+
+// At rest there is no limit to samples.
+RadianceEstimate added(FrameParams f, RadianceEstimate past, RadianceEstimate now, float most_past, bool rests) {
+    past.samples = min(past.samples, most_past);
+    if (!rests) past.samples = min(past.samples, max(f.most_samples - now.samples, 0.0));
     if (!(now.samples > 0.0)) return past;
     if (!(past.samples > 0.0)) return now;
     return all_samples(past, now);
@@ -100,18 +169,20 @@ void main() {
         vec2 place;
         if (previous_place(f, before, place)) {
             EdgeTest edge = with_normal(previous_edge(f, before, normal, place), guide);
-            Taps taps = taps_around(f, place, place, edge, id);
-            diffuse = history_at(p.previous_diffuse, taps);
+            vec2 shift = f.previous_offset - f.offset;
+            Taps taps = taps_around(f, place + shift, place, edge, id);
+            diffuse = less_blurred(f, history_at(p.previous_diffuse, taps), place + shift);
             float reflected = FloatImage(p.distances).v[at];
             if (roughness < MIRROR_ROUGHNESS && reflected >= 0.0) {
                 vec3 eye = vec3(f.camera_to_world[0].w, f.camera_to_world[1].w, f.camera_to_world[2].w);
                 vec3 back = vec3(f.camera_to_world[0].z, f.camera_to_world[1].z, f.camera_to_world[2].z);
                 vec3 w = f.orthographic != 0u ? -back : normalize(position - eye);
                 vec2 there;
-                if (previous_place(f, before + w * reflected, there)) taps = taps_around(f, there, place, edge, id);
+                if (previous_place(f, before + w * reflected, there)) taps = taps_around(f, there + shift, place, edge, id);
                 else taps = NO_TAPS;
+                place = there;
             }
-            specular = history_at(p.previous_specular, taps);
+            specular = less_blurred(f, history_at(p.previous_specular, taps), place + shift);
         }
         EdgeTest edge = with_normal(edge_test(f, f.world_to_camera, f.view, f.orthographic != 0u, position, normal, sample_place(f, vec2(pixel))), guide);
         float change = p.moved_count > 0u ? p.moved_weight * possible_change(p.moved, p.moved_count, f, position, normal) : 0.0;
@@ -122,15 +193,29 @@ void main() {
             if (p.clamp_width > 0.0) diffuse.mean = clamped(p, f, p.diffuse, pixel, edge, diffuse.mean);
         }
         if (specular.samples > 0.0) {
-            if (change > 0.0) {
+            // of the width of the lobe; highlights move over curved surfaces in a way that neither kind of reprojection follows
+            float turned = TURN_WEIGHT * view_change(f, position, before) / max(2.0 * roughness * roughness, 1e-3);
+            float seen = length(vec2(change, turned));
+            if (seen > 0.0) {
                 float m = max(brightness(specular.mean), 1e-20);
-                specular.samples = samples_after(specular.samples, change, max(brightness(specular.variance) / (m * m), MIN_RELATIVE_VARIANCE));
+                specular.samples = samples_after(specular.samples, seen, max(brightness(specular.variance) / (m * m), MIN_RELATIVE_VARIANCE));
             }
             if (p.clamp_width > 0.0) specular.mean = clamped(p, f, p.specular, pixel, edge, specular.mean);
         }
     }
-    diffuse = added(f, diffuse, load_radiance(p.diffuse, at), p.most_past);
-    specular = added(f, specular, load_radiance(p.specular, at), p.most_past);
+    bool rests = f.has_history != 0u && f.still != 0u && !is_null(p.rest);
+    diffuse = added(f, diffuse, load_radiance(p.diffuse, at), p.most_past, rests);
+    specular = added(f, specular, load_radiance(p.specular, at), p.most_past, rests);
+    if (rests) {
+        Rest rest = load_rest(p.rest, at);
+        if (rest.frames >= 2.0) {
+            RestParts parts = load_parts(p.rest_parts, at);
+            vec2 share = vec2(old_share(diffuse, rest), old_share(specular, rest));
+            share *= agreement(p, f, at, share);
+            diffuse = rested(diffuse, diffuse_at_rest(rest, parts), share.x);
+            specular = rested(specular, specular_at_rest(rest, parts), share.y);
+        }
+    }
     diffuse.narrowed = 0.0;
     specular.narrowed = roughness <= SHARP_ROUGHNESS ? 1.0 : 1.0 - clamp(roughness / WIDE_ROUGHNESS, 0.0, 1.0);
     store_radiance(p.diffuse_history, at, diffuse);

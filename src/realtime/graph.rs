@@ -43,6 +43,8 @@ pub struct Frame<'a> {
     pub has_resolved: bool,
     /// The image has not rested before: samples at rest start anew.
     pub rest_starts: bool,
+    /// Frames since the image came to rest, this one included; 0: it does not rest.
+    pub resting: u32,
     /// Maximum samples of histories of radiance before this frame's.
     pub most_past: f32,
     /// The environment map has been turned: its new rotation from world directions to the map's.
@@ -51,6 +53,13 @@ pub struct Frame<'a> {
     pub params: u64,
     /// The buffer to display, if any.
     pub display: Option<Display>,
+}
+
+impl Frame<'_> {
+    /// Lights or materials have changed.
+    pub fn has_new_light(&self) -> bool {
+        self.most_past < f32::MAX
+    }
 }
 
 /// A range of invocations or rays of a pass: `first .. first + count`.

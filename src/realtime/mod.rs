@@ -345,6 +345,7 @@ impl Realtime {
             offset,
             has_resolved: self.state.has_resolved,
             rest_starts: resting == 0 || !self.state.has_resolved,
+            resting,
             most_past: match self.state.has_new_light {
                 true => PAST_AFTER_NEW_LIGHT * self.settings.rays_per_pixel as f32,
                 false => f32::MAX,

@@ -17,6 +17,8 @@ pub const VECTOR_BYTES: u64 = 12;
 pub const QUAD_BYTES: u64 = 16;
 /// Bytes of a `RadianceRecord`.
 pub const RADIANCE_BYTES: u64 = size_of::<RadianceRecord>() as u64;
+/// Bytes of the parts of a pixel's samples at rest: three times four floats.
+pub const REST_PARTS_BYTES: u64 = 48;
 /// Bytes of a guide or an estimate (src/interface/records/frame.rs).
 pub const PAIR_BYTES: u64 = 8;
 
@@ -93,6 +95,8 @@ pub enum Resource {
     Composed,
     /// Samples since the image came to rest.
     Rest,
+    /// Radiance: the parts of which those samples consist.
+    RestParts,
     /// The mean over frames whose samples lie at different places within the pixels.
     ResolvedHistory,
     /// The final image: value and coverage.
@@ -181,6 +185,7 @@ impl Resource {
             Self::FilteredRadiance(_) => device("filtered radiance", RADIANCE_BYTES * pixels, Frame),
             Self::Composed => device("composed image", QUAD_BYTES * pixels, Frame),
             Self::Rest => device("samples at rest", RADIANCE_BYTES * pixels, Kept),
+            Self::RestParts => device("parts at rest", REST_PARTS_BYTES * pixels, Kept),
             Self::ResolvedHistory => device("resolved history", QUAD_BYTES * pixels, Pair),
             Self::Resolved => readback("resolved image", QUAD_BYTES * pixels),
             Self::VisibleLights => device("visible lights", 4 * pixels, Frame),

@@ -45,6 +45,8 @@ records! {
         distances: address,
         /// Output, two `vec4` per pixel: samples of the whole signal since the image came to rest; 0: not kept.
         rest: address,
+        /// Output, three `vec4` per pixel: the parts of which the samples at rest consist; 0: not kept.
+        rest_parts: address,
         /// 1: it has not rested before.
         starts: uint,
         /// Samples per pixel of earlier launches of this frame.
@@ -75,6 +77,10 @@ records! {
         distances: address,
         /// A `vec4` per pixel: albedo, and roughness of reflections.
         materials: address,
+        /// Samples since the image came to rest (`GatherParams`); 0: none.
+        rest: address,
+        /// The parts of which they consist.
+        rest_parts: address,
         /// `MovedRecord`s of this frame.
         moved: address,
         /// Number of `MovedRecord`s.
@@ -99,6 +105,10 @@ records! {
         materials: address,
         /// A `vec4` per pixel: what is seen directly, and coverage.
         direct: address,
+        /// Samples since the image came to rest (`GatherParams`); 0: none.
+        rest: address,
+        /// The parts of which they consist.
+        rest_parts: address,
         /// Output, a `vec4` per pixel: radiance, and coverage.
         composed: address,
     }
@@ -125,8 +135,8 @@ records! {
         most_frames: float,
         /// Half width of the clamp of a history in motion, in standard deviations of the neighbourhood.
         clamp_width: float,
-        /// Padding to a multiple of 8 bytes.
-        reserved: uint,
+        /// Minimum weight of a frame at rest.
+        least_weight: float,
     }
 
     /// Parameters of `rest`.

@@ -9,8 +9,14 @@ use crate::realtime::resources::{Resource, Resources};
 use crate::shaders;
 use crate::tracer::Tracer;
 
-/// Maximum number of frames that the image is averaged over in motion.
+/// Maximum number of frames that ambient visibility is averaged over in motion.
 const MAX_FRAMES: f32 = 8.0;
+/// The same of radiance, which has reflections that move otherwise than their surfaces.
+const RADIANCE_FRAMES: f32 = 4.0;
+/// The same after lights or materials have changed.
+const NEW_LIGHT_FRAMES: f32 = 2.0;
+/// Minimum weight of a frame of radiance at rest: each is of all samples since then, and differs from the one before by the edges that its filter sees.
+const LEAST_WEIGHT: f32 = 0.25;
 /// Half width of the clamp of the history in motion, in standard deviations of the pixels around.
 const CLAMP_WIDTH: f32 = 1.25;
 
@@ -52,12 +58,17 @@ impl Pass for Antialias {
             visibility: if is_composed { 0 } else { input },
             history: resources.address(Resource::ResolvedHistory),
             previous_history: resources.previous_address(Resource::ResolvedHistory),
-            rest: if self.has_rest { resources.address(Resource::Rest) } else { 0 },
+            rest: if self.has_rest && !is_composed { resources.address(Resource::Rest) } else { 0 },
             resolved: resources.address(Resource::Resolved),
             has_history: frame.has_resolved.into(),
-            most_frames: if frame.settings.antialias { MAX_FRAMES } else { 1.0 },
+            most_frames: match frame.settings.antialias {
+                true if frame.has_new_light() => NEW_LIGHT_FRAMES,
+                true if is_composed => RADIANCE_FRAMES,
+                true => MAX_FRAMES,
+                false => 1.0,
+            },
             clamp_width: CLAMP_WIDTH,
-            reserved: 0,
+            least_weight: if is_composed && self.has_rest { LEAST_WEIGHT } else { 0.0 },
         })
     }
 

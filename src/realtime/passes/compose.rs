@@ -14,15 +14,17 @@ struct Compose {
     params: Params<ComposeParams>,
     /// Diffuse reflection and the rest.
     parts: [Resource; 2],
+    has_rest: bool,
 }
 
 /// The pass over all pixels. `parts`: images of diffuse reflection and of the rest.
-pub fn stage(tracer: &Tracer, pixels: u32, parts: [Resource; 2]) -> Result<Stage> {
+pub fn stage(tracer: &Tracer, pixels: u32, parts: [Resource; 2], has_rest: bool) -> Result<Stage> {
     let device = tracer.device();
     let pass = Compose {
         pipeline: shaders::COMPOSE.pipeline(device)?,
         params: Params::new(device, "parameters of composition")?,
         parts,
+        has_rest,
     };
     Ok(Stage::new(vec![Box::new(pass)], Range::all(pixels)))
 }
@@ -31,6 +33,7 @@ impl Pass for Compose {
     fn uses(&self, _: Option<&Display>) -> ResourceUse {
         ResourceUse::new(&[Resource::Guide, Resource::Materials, Resource::Direct], &[Resource::Composed])
             .and_reads(&self.parts)
+            .and_reads(if self.has_rest { &[Resource::Rest, Resource::RestParts] } else { &[] })
     }
 
     fn prepare(&mut self, frame: &Frame, resources: &Resources) -> Result<()> {
@@ -41,6 +44,8 @@ impl Pass for Compose {
             specular,
             materials: resources.address(Resource::Materials),
             direct: resources.address(Resource::Direct),
+            rest: resources.address(Resource::Rest),
+            rest_parts: resources.address(Resource::RestParts),
             composed: resources.address(Resource::Composed),
         })
     }

@@ -112,12 +112,12 @@ pub fn radiance_stages(
     let mut stages = vec![
         surfaces::stage(tracer, flat.scene, &paths, block, settings.launch_rays)?,
         paths::stage(tracer, paths, sampled, settings.rays_per_pixel, has_rest)?,
-        radiance_temporal::stage(tracer, pixels)?,
+        radiance_temporal::stage(tracer, pixels, has_rest)?,
     ];
     let is_diffuse = options.white_sky.is_some() || flat.scene.materials.iter().all(|m| m.kind == MaterialKind::Matte);
     let (filters, filtered) = radiance_filter::stages(tracer, pixels, settings, !is_diffuse)?;
     stages.extend(filters);
-    stages.push(compose::stage(tracer, pixels, filtered)?);
+    stages.push(compose::stage(tracer, pixels, filtered, has_rest)?);
     stages.push(antialias::stage(tracer, pixels, Resource::Composed, has_rest)?);
     Ok(stages)
 }

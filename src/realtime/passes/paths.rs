@@ -46,9 +46,9 @@ fn sample_batches(n: u32) -> impl Iterator<Item = (u32, u32)> {
 
 impl Pass for Paths {
     fn uses(&self, _: Option<&Display>) -> ResourceUse {
-        use Resource::{CurrentDiffuse, CurrentSpecular, FrameNumber, Guide, ReflectedDistance, Rest, Scene};
+        use Resource::{CurrentDiffuse, CurrentSpecular, FrameNumber, Guide, ReflectedDistance, Rest, RestParts, Scene};
         ResourceUse::new(&[FrameNumber, Scene, Guide], &[CurrentDiffuse, CurrentSpecular, ReflectedDistance])
-            .and_writes(self.has_rest, &[Rest])
+            .and_writes(self.has_rest, &[Rest, RestParts])
     }
 
     fn prepare(&mut self, frame: &Frame, _: &Resources) -> Result<()> {
@@ -81,6 +81,7 @@ impl Pass for Paths {
                 specular: resources.address(Resource::CurrentSpecular),
                 distances: resources.address(Resource::ReflectedDistance),
                 rest: resources.address(Resource::Rest),
+                rest_parts: resources.address(Resource::RestParts),
                 starts: frame.rest_starts.into(),
                 earlier,
                 tiles_x: self.sampled.tiles_x(),

@@ -12,6 +12,9 @@ use crate::realtime::settings::{FilterStep, Settings};
 use crate::shaders;
 use crate::tracer::Tracer;
 
+/// At rest the box has so many pixels at least, however many samples they have: what detail is, and what noise, is told by them.
+const LEAST_PIXELS: f32 = 9.0;
+
 /// One step of the filter of one part.
 struct RadianceFilter {
     pipeline: Arc<ComputePipeline>,
@@ -50,7 +53,7 @@ impl Pass for RadianceFilter {
             frame: frame.params,
             from: resources.address(self.from),
             to: resources.address(self.to),
-            samples: frame.settings.filter.samples,
+            samples: frame.settings.filter.samples.max(LEAST_PIXELS * (frame.resting * frame.settings.rays_per_pixel) as f32),
             ..self.step.params()
         })
     }

@@ -17,16 +17,18 @@ struct RadianceTemporal {
     pipeline: ComputePipeline,
     params: Params<RadianceTemporalParams>,
     moved: Buffer,
+    has_rest: bool,
 }
 
 /// The pass over all pixels.
-pub fn stage(tracer: &Tracer, pixels: u32) -> Result<Stage> {
+pub fn stage(tracer: &Tracer, pixels: u32, has_rest: bool) -> Result<Stage> {
     let device = tracer.device();
     let moved_bytes = (MAX_MOVED * size_of::<MovedRecord>()) as u64;
     let pass = RadianceTemporal {
         pipeline: shaders::RADIANCE_TEMPORAL.pipeline(device)?,
         params: Params::new(device, "parameters of temporal accumulation")?,
         moved: Buffer::new(device, "moved objects", moved_bytes, Memory::Upload)?,
+        has_rest,
     };
     Ok(Stage::new(vec![Box::new(pass)], Range::all(pixels)))
 }
@@ -49,7 +51,11 @@ impl Pass for RadianceTemporal {
             ReflectedDistance,
         ];
         let histories = [DiffuseHistory, SpecularHistory];
-        ResourceUse::new(&reads, &histories).previous(&[Guide]).previous(&histories)
+        ResourceUse::new(&reads, &histories).previous(&[Guide]).previous(&histories).and_reads(if self.has_rest {
+            &[Resource::Rest, Resource::RestParts]
+        } else {
+            &[]
+        })
     }
 
     fn prepare(&mut self, frame: &Frame, resources: &Resources) -> Result<()> {
@@ -65,6 +71,8 @@ impl Pass for RadianceTemporal {
             specular_history: now(resources, Resource::SpecularHistory),
             distances: now(resources, Resource::ReflectedDistance),
             materials: now(resources, Resource::Materials),
+            rest: now(resources, Resource::Rest),
+            rest_parts: now(resources, Resource::RestParts),
             moved: self.moved.address(),
             moved_count: frame.moved.len() as u32,
             moved_weight: frame.settings.moved_weight,
