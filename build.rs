@@ -92,9 +92,9 @@ fn all_jobs() -> Vec<Job> {
     all.extend(interface::debug_views::debug_views!(debug_view_jobs));
     #[cfg(feature = "probes")]
     all.extend(probes::jobs());
-    for (int64, bits) in [(false, 32), (true, 64)] {
+    for (ballot, bits) in [(false, 32), (true, 64)] {
         for (mode, name) in [(Mode::Any, "any"), (Mode::Closest, "closest")] {
-            all.push((format!("wide_{name}_{bits}.spv"), Some(Source::Kernel { mode, int64 })));
+            all.push((format!("wide_{name}_{bits}.spv"), Some(Source::Kernel { mode, ballot })));
         }
     }
     all

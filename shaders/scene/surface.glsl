@@ -1,6 +1,7 @@
 // Surface points of hits, with a ray offset from an error bound.
 #ifndef SCENE_SURFACE
 #define SCENE_SURFACE
+#include "scene/corners.glsl"
 #include "scene/material.glsl"
 
 struct Surface {
@@ -77,10 +78,8 @@ Surface surface_at(Ray ray, Hit hit) {
         // pbrt-v4 6.8.5 for the reprojected point, and the rounding of the centre's sum
         error = 5.0 * C0 * (abs(p) + vec3(sphere.w)) + 4.0 * C0 * abs(sphere.xyz);
     } else {
-        uvec3 corners = triangle_indices(submesh, s.primitive);
-        vec3 v0 = load_vec3(submesh.positions, corners.x);
-        vec3 edge1 = load_vec3(submesh.positions, corners.y) - v0;
-        vec3 edge2 = load_vec3(submesh.positions, corners.z) - v0;
+        Corners c = corners_of_hit(submesh, s.primitive);
+        vec3 v0 = c.p[0], edge1 = c.p[1] - v0, edge2 = c.p[2] - v0;
         // the base corner last: its rounding is the smallest that way
         p = v0 + (s.uv.x * edge1 + s.uv.y * edge2);
         normal = cross(edge1, edge2);
@@ -88,7 +87,7 @@ Surface surface_at(Ray ray, Hit hit) {
         float extent = max(max(extents.x, extents.y), extents.z);
         error = C0 * abs(v0) + vec3(C1 * extent);
         if (!is_null(submesh.normals)) {
-            corners -= submesh.first_vertex;
+            uvec3 corners = triangle_indices(submesh, s.primitive) - submesh.first_vertex;
             shading = load_vec3(submesh.normals, corners.x) * (1.0 - s.uv.x - s.uv.y) + load_vec3(submesh.normals, corners.y) * s.uv.x +
                       load_vec3(submesh.normals, corners.z) * s.uv.y;
         }

@@ -7,9 +7,11 @@
 // on devices whose subgroups have at least eight lanes, broadcasts and arithmetic.
 #ifndef TRACE_PACKET
 #define TRACE_PACKET
+#include "scene/corners.glsl"
 #include "trace/block.glsl"
 #include "trace/callback.glsl"
 #include "trace/leaf.glsl"
+#include "trace/reduce.glsl"
 #include "trace/slab.glsl"
 #include "trace/spread.glsl"
 #include "trace/stack.glsl"
@@ -27,29 +29,8 @@ uint class_of(vec3 inverse, uint axis) {
     return (inverse.x < 0.0 ? 4u : 0u) | (inverse.y < 0.0 ? 2u : 0u) | (inverse.z < 0.0 ? 1u : 0u) | (axis << 3);
 }
 
-// Reductions over all lanes. Constant broadcasts are one instruction on a CPU driver; the built-in reductions, shuffles of more than eight lanes and
-// quad swaps are loops there.
-#define REDUCE_8(op, k)                                                                                                             \
-    r = op(op(op(r, subgroupBroadcast(x, k)), op(subgroupBroadcast(x, k + 1), subgroupBroadcast(x, k + 2))),                        \
-            op(op(subgroupBroadcast(x, k + 3), subgroupBroadcast(x, k + 4)),                                                        \
-                    op(subgroupBroadcast(x, k + 5), op(subgroupBroadcast(x, k + 6), subgroupBroadcast(x, k + 7)))));
-#define REDUCE(op)                          \
-    uint r = x;                             \
-    REDUCE_8(op, 0)                         \
-    if (SUBGROUP_SIZE > 8u) { REDUCE_8(op, 8) }  \
-    return r;
-
-uint bitwise_or(uint a, uint b) { return a | b; }
-
-uint all_or(uint x) {
-    if (SUBGROUP_SIZE > 16u) return subgroupOr(x);
-    REDUCE(bitwise_or)
-}
-
-uint all_min(uint x) {
-    if (SUBGROUP_SIZE > 16u) return subgroupMin(x);
-    REDUCE(min)
-}
+uint all_or(uint x) { return SUBGROUP_SIZE > 16u ? subgroupOr(x) : or_over_lanes(x); }
+uint all_min(uint x) { return SUBGROUP_SIZE > 16u ? subgroupMin(x) : min_over_lanes(x); }
 
 #define FOR_RAYS [[unroll]] for (int j = 0; j < PACKET_RAYS; j++)
 
@@ -76,7 +57,15 @@ uint all_min(uint x) {
     limit[j] = -1.0;                  \
     best_primitive[j] = (id) & NUMBER;  \
     found = true;
+#define ACCEPT_TRIANGLE(id, turn, p0, p1, p2) ACCEPT(id)
 #else
+// With the corners of a triangle in the mesh's order: `turn` has the positions of the second and third.
+#define ACCEPT_TRIANGLE(id, turn, p0, p1, p2)                                   \
+    ACCEPT(id)                                                                  \
+    uint second = (turn) & 3u, third = (turn) >> 2 & 3u;                        \
+    best_corners[j].p[0] = pick_corner(p0, p1, p2, 3u - second - third);        \
+    best_corners[j].p[1] = pick_corner(p0, p1, p2, second);                     \
+    best_corners[j].p[2] = pick_corner(p0, p1, p2, third);
 #define ACCEPT(id)                    \
     best[j] = t;                      \
     limit[j] = t;                     \
@@ -84,6 +73,10 @@ uint all_min(uint x) {
     best_instance[j] = instance;      \
     best_primitive[j] = (id) & NUMBER;
 #endif
+
+vec3 pick_corner(vec3 p0, vec3 p1, vec3 p2, uint k) {
+    return k == 0u ? p0 : k == 1u ? p1 : p2;
+}
 
 void main() {
     SceneRoot root = SceneRoot(push.scene);
@@ -102,6 +95,7 @@ void main() {
     bool waiting[PACKET_RAYS], world_waiting[PACKET_RAYS], world_active[PACKET_RAYS];
     uint best_instance[PACKET_RAYS], best_primitive[PACKET_RAYS];
     vec2 best_uv[PACKET_RAYS];
+    Corners best_corners[PACKET_RAYS];
     FOR_RAYS {
         uint k = first + uint(j) * SUBGROUP_SIZE;
         Ray r = no_ray();
@@ -115,6 +109,7 @@ void main() {
         best_instance[j] = INVALID;
         best_primitive[j] = INVALID;
         best_uv[j] = vec2(0.0);
+        best_corners[j] = Corners(vec3[3](vec3(0.0), vec3(0.0), vec3(0.0)));
     }
 
     DECLARE_STACK
@@ -224,14 +219,14 @@ void main() {
                         // rays of another class compute meaningless values here
                         bool live = limit[j] > tmin[j];
                         if (live && is_inside(first)) {
-                            if (meets_triangle(FIRST_ID, ORDER, instance, s, o, r, v0, v1, v2, a, b, c, first, tmin[j], limit[j], t, uv)) { ACCEPT(FIRST_ID) }
+                            if (meets_triangle(FIRST_ID, ORDER, instance, s, o, r, v0, v1, v2, a, b, c, first, tmin[j], limit[j], t, uv)) { ACCEPT_TRIANGLE(FIRST_ID, ORDER, v0, v1, v2) }
                         }
                         if (live && is_inside(second) && SECOND_ID != INVALID) {
-                            if (meets_triangle(SECOND_ID, ORDER >> 4, instance, s, o, r, v0, v2, v3, a, c, d, second, tmin[j], limit[j], t, uv)) { ACCEPT(SECOND_ID) }
+                            if (meets_triangle(SECOND_ID, ORDER >> 4, instance, s, o, r, v0, v2, v3, a, c, d, second, tmin[j], limit[j], t, uv)) { ACCEPT_TRIANGLE(SECOND_ID, ORDER >> 4, v0, v2, v3) }
                         }
                     } else {
-                        if (meets_moller_trumbore(FIRST_ID, ORDER, instance, o, r, v0, v1, v2, tmin[j], limit[j], t, uv)) { ACCEPT(FIRST_ID) }
-                        if (meets_moller_trumbore(SECOND_ID, ORDER >> 4, instance, o, r, v0, v2, v3, tmin[j], limit[j], t, uv)) { ACCEPT(SECOND_ID) }
+                        if (meets_moller_trumbore(FIRST_ID, ORDER, instance, o, r, v0, v1, v2, tmin[j], limit[j], t, uv)) { ACCEPT_TRIANGLE(FIRST_ID, ORDER, v0, v1, v2) }
+                        if (meets_moller_trumbore(SECOND_ID, ORDER >> 4, instance, o, r, v0, v2, v3, tmin[j], limit[j], t, uv)) { ACCEPT_TRIANGLE(SECOND_ID, ORDER >> 4, v0, v2, v3) }
                     }
                 }
             }
@@ -301,12 +296,14 @@ void main() {
             uint hit_instance = best_instance[0], hit_primitive = best_primitive[0];
             float hit_t = best[0];
             vec2 hit_uv = best_uv[0];
+            hit_corners = best_corners[0];
             FOR_RAYS {
                 if (j == ray) {
                     hit_instance = best_instance[j];
                     hit_primitive = best_primitive[j];
                     hit_t = best[j];
                     hit_uv = best_uv[j];
+                    hit_corners = best_corners[j];
                 }
             }
 #ifdef STREAM_ANY

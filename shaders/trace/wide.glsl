@@ -14,6 +14,9 @@
 #include "trace/slab.glsl"
 #include "trace/spread.glsl"
 #include "trace/stack.glsl"
+#ifdef BALLOT
+#include "trace/reduce.glsl"
+#endif
 
 layout(local_size_x = LANES) in;
 
@@ -23,6 +26,16 @@ layout(local_size_x = LANES) in;
 // Storing a hit and taking the next ray cost a vector of lanes the same whether one lane does it or all. So a lane whose ray is done waits until the number of
 // iterations is a multiple of this. A power of two; 4 measured best on CPUs (docs/traversal.md).
 const uint REFILL_INTERVAL = 4u;
+
+// On CPUs, where a lane has many rays (lane_budget in src/tracer/compute.rs), the first subgroup of a work-group traces all of its rays, and counts them in a register. A counter
+// in memory is changed lane by lane, and the other subgroups, which run after the first, would find nothing left.
+bool traces_in_subgroup() {
+#ifdef BALLOT
+    return MAX_ITERATIONS == 0u && RAYS_PER_LANE > 2u && (SUBGROUP_SIZE == 8u || SUBGROUP_SIZE == 16u);
+#else
+    return false;
+#endif
+}
 
 #define SET_RAY(o, d)                                                                                          \
     origin = (o);                                                                                              \
@@ -52,9 +65,9 @@ void store_visits(uint k, uint nodes);
 #define VISIT
 // Fetches the lane's next ray. An invalid ray hits nothing: its interval is empty.
 #define NEXT_RAY                                                                                        \
-    index = begin + atomicAdd(LaunchFlags(counters).v[part], 1u);                                       \
-    if (index >= end) return;                                                                           \
-    world = take_ray(index);                                                                            \
+    if (!in_subgroup) index = begin + atomicAdd(LaunchFlags(counters).v[part], 1u);                     \
+    if (!in_subgroup && index >= end) return;                                                           \
+    world = index < end ? take_ray(index) : no_ray();                                                                            \
     if (!is_ray(world)) world = no_ray();
 #endif
 
@@ -81,7 +94,14 @@ void store_visits(uint k, uint nodes);
     best_primitive = (id) & NUMBER;
 #endif
 
+#ifdef STREAM_ANY
+#define STORE_HIT store_any(results, index, best_primitive != INVALID);
+#else
+#define STORE_HIT store_closest(results, index, best_primitive != INVALID ? best : INFINITY, best_instance, best_primitive, best_uv);
+#endif
+
 void main() {
+    bool in_subgroup = traces_in_subgroup();
     uint part = part_of_dispatch(), begin = part * (LANES * RAYS_PER_LANE);
     uint end = min(begin + LANES * RAYS_PER_LANE, ray_count());
     SceneRoot root = SceneRoot(push.scene);
@@ -107,22 +127,39 @@ void main() {
     float best;
     uint best_instance, best_primitive;
     vec2 best_uv = vec2(0.0);
+#ifdef BALLOT
+    // the next ray that no lane has taken
+    uint lane = gl_SubgroupInvocationID, next = begin + SUBGROUP_SIZE;
+    if (in_subgroup && gl_SubgroupID != 0u) return;
+    index = begin + lane;
+#endif
     TAKE_RAY
 
     uint turns = 0u;
-    bool has_ray = true;
+    bool has_ray = !in_subgroup || index < end;
 #ifdef COUNT_VISITS
     uint visits = 0u;
 #endif
     while (true) {
         turns++;
-#ifndef COUNT_VISITS
-        if (!has_ray && (MAX_ITERATIONS > 0u || turns % REFILL_INTERVAL == 0u)) {
-#ifdef STREAM_ANY
-            store_any(results, index, best_primitive != INVALID);
-#else
-            store_closest(results, index, best_primitive != INVALID ? best : INFINITY, best_instance, best_primitive, best_uv);
+#ifdef BALLOT
+        if (in_subgroup && turns % REFILL_INTERVAL == 0u) {
+            uint waiting = or_over_lanes(has_ray ? 0u : 1u << lane);
+            if (waiting != 0u) {
+                if (!has_ray && index < end) { STORE_HIT }
+                if (next >= end && waiting == (1u << SUBGROUP_SIZE) - 1u) return;
+                index = has_ray ? index : next + bitCount(waiting & ((1u << lane) - 1u));
+                next += bitCount(waiting);
+                if (!has_ray && index < end) {
+                    TAKE_RAY
+                    has_ray = true;
+                }
+            }
+        }
 #endif
+#ifndef COUNT_VISITS
+        if (!in_subgroup && !has_ray && (MAX_ITERATIONS > 0u || turns % REFILL_INTERVAL == 0u)) {
+            STORE_HIT
             if (MAX_ITERATIONS > 0u && turns > MAX_ITERATIONS) return;
             TAKE_RAY
             has_ray = true;

@@ -19,13 +19,15 @@ use crate::film::Control;
 use crate::gpu::{Buffer, Commands, Device, Memory, Timing};
 use crate::tracer::{Push, Tracer};
 
-/// Log2 of the maximum number of samples per pixel in a launch. Samples of a pixel are neighbouring rays, which are coherent.
+/// Log2 of the maximum number of samples per pixel in a launch, unless an estimator takes more. Samples of a pixel are neighbouring rays, which are coherent.
 pub(crate) const MAX_SAMPLE_BITS: u32 = 4;
 
 /// Evaluates samples of pixels on the device: the device side of an integrator.
 pub(crate) trait Estimator {
     /// Channels of its film.
     const CHANNELS: usize;
+    /// Log2 of the maximum number of samples per pixel in a launch.
+    const SAMPLE_BITS: u32 = MAX_SAMPLE_BITS;
 
     /// Must the rays of the first sample of each pixel be kept? Then that sample is a batch of its own.
     fn keeps_first(&self) -> bool {
@@ -85,10 +87,10 @@ pub struct Accumulated {
     pub trace_seconds: f64,
 }
 
-/// Maximum number of rays in a launch: the capacity that an estimator's buffers need.
-pub(crate) fn max_rays(size: [u32; 2], spp: u32) -> u32 {
+/// Maximum number of rays in a launch: the capacity that an estimator's buffers need. `sample_bits`: [`Estimator::SAMPLE_BITS`].
+pub(crate) fn max_rays(size: [u32; 2], spp: u32, sample_bits: u32) -> u32 {
     let max_pixels = Block::cut(size).iter().map(Block::rays).max().unwrap_or(0) as u64;
-    let bits = Batch::next(0, spp.max(1), u32::MAX).bits;
+    let bits = spp.max(1).ilog2().min(sample_bits);
     (max_pixels << bits).min(MAX_RAYS as u64) as u32
 }
 
@@ -124,10 +126,12 @@ struct Batch {
 }
 
 impl Batch {
-    /// The largest batch that fits a launch, the samples left of `wanted`, and `most` (at least one).
-    fn next(first: u32, wanted: u32, most: u32) -> Self {
+    /// The largest batch that fits a launch of `sample_bits`, the samples left of `wanted`, and `most` (at least one). One of more than 2^[`MAX_SAMPLE_BITS`] is no larger than
+    /// all before it together, so that whoever stops a render loses at most half of it with the batch in progress.
+    fn next(first: u32, wanted: u32, most: u32, sample_bits: u32) -> Self {
         let samples = (wanted - first).min(most.max(1));
-        Self { first, bits: samples.ilog2().min(MAX_SAMPLE_BITS) }
+        let before = first.checked_ilog2().unwrap_or(0).max(MAX_SAMPLE_BITS);
+        Self { first, bits: samples.ilog2().min(sample_bits).min(before) }
     }
 
     fn samples(&self) -> u32 {
@@ -268,7 +272,7 @@ impl<E: Estimator> Run<'_, E> {
                     None => u32::MAX,
                     Some(d) => self.rates[group.number].fit(d.saturating_duration_since(Instant::now()), pixel_batch.pixels),
                 };
-                let batch = Batch::next(sample, step.goal, most);
+                let batch = Batch::next(sample, step.goal, most, E::SAMPLE_BITS);
                 let before = done + pixels * u64::from(sample - group.first);
                 let mut report = |share: f64, control: &mut dyn Control| {
                     let part = (share * (pixels * u64::from(batch.samples())) as f64) as u64;
@@ -540,18 +544,22 @@ mod tests {
 
     #[test]
     fn batches_take_every_sample_once() {
-        for (spp, most, want) in [
-            (1, u32::MAX, vec![1]),
-            (16, u32::MAX, vec![16]),
-            (23, u32::MAX, vec![16, 4, 2, 1]),
-            (40, u32::MAX, vec![16, 16, 8]),
-            (5, 0, vec![1; 5]),
-            (9, 3, vec![2, 2, 2, 2, 1]),
+        for (spp, most, bits, want) in [
+            (1, u32::MAX, 4, vec![1]),
+            (16, u32::MAX, 4, vec![16]),
+            (23, u32::MAX, 4, vec![16, 4, 2, 1]),
+            (40, u32::MAX, 4, vec![16, 16, 8]),
+            (5, 0, 4, vec![1; 5]),
+            (9, 3, 4, vec![2, 2, 2, 2, 1]),
+            (64, u32::MAX, 4, vec![16; 4]),
+            (64, u32::MAX, 6, vec![16, 16, 32]),
+            (300, u32::MAX, 6, vec![16, 16, 32, 64, 64, 64, 32, 8, 4]),
         ] {
             let (mut got, mut first) = (Vec::new(), 0);
             while first < spp {
-                let b = Batch::next(first, spp, most);
+                let b = Batch::next(first, spp, most, bits);
                 assert_eq!(b.first, first);
+                assert!(b.samples() <= max_rays([1, 1], spp, bits), "{spp}");
                 got.push(b.samples());
                 first += b.samples();
             }

@@ -130,9 +130,9 @@ impl ComputeShader {
     }
 }
 
-/// The compute tracer's wide kernel, which all streams of a mode share.
-pub fn wide_kernel(mode: Mode, int64: bool) -> &'static Shader {
-    match (mode, int64) {
+/// The compute tracer's wide kernel, which all streams of a mode share. `ballot`: for devices with 64-bit integers and subgroup ballots.
+pub fn wide_kernel(mode: Mode, ballot: bool) -> &'static Shader {
+    match (mode, ballot) {
         (Mode::Any, true) => &WIDE_ANY_64,
         (Mode::Any, false) => &WIDE_ANY_32,
         (Mode::Closest, true) => &WIDE_CLOSEST_64,
@@ -214,10 +214,10 @@ macro_rules! registry {
     };
 }
 
-static WIDE_ANY_32: Shader = shader!(Source::Kernel { mode: Mode::Any, int64: false }, "wide_any_32");
-static WIDE_ANY_64: Shader = shader!(Source::Kernel { mode: Mode::Any, int64: true }, "wide_any_64");
-static WIDE_CLOSEST_32: Shader = shader!(Source::Kernel { mode: Mode::Closest, int64: false }, "wide_closest_32");
-static WIDE_CLOSEST_64: Shader = shader!(Source::Kernel { mode: Mode::Closest, int64: true }, "wide_closest_64");
+static WIDE_ANY_32: Shader = shader!(Source::Kernel { mode: Mode::Any, ballot: false }, "wide_any_32");
+static WIDE_ANY_64: Shader = shader!(Source::Kernel { mode: Mode::Any, ballot: true }, "wide_any_64");
+static WIDE_CLOSEST_32: Shader = shader!(Source::Kernel { mode: Mode::Closest, ballot: false }, "wide_closest_32");
+static WIDE_CLOSEST_64: Shader = shader!(Source::Kernel { mode: Mode::Closest, ballot: true }, "wide_closest_64");
 
 include!("registry.rs");
 
@@ -256,9 +256,9 @@ mod tests {
     fn every_shader_is_spirv() {
         let spirv = |shader: &Shader| shader.spirv().unwrap()[..4] == 0x0723_0203u32.to_le_bytes();
         assert!(spirv(&MISS) && spirv(&DRAW_SPHERE) && spirv(RESOLVE.variant(true)) && spirv(RESOLVE.variant(false)));
-        for (mode, int64) in [(Mode::Any, true), (Mode::Any, false), (Mode::Closest, true), (Mode::Closest, false)] {
-            let shader = wide_kernel(mode, int64);
-            assert!(spirv(shader) && *shader.source() == Source::Kernel { mode, int64 });
+        for (mode, ballot) in [(Mode::Any, true), (Mode::Any, false), (Mode::Closest, true), (Mode::Closest, false)] {
+            let shader = wide_kernel(mode, ballot);
+            assert!(spirv(shader) && *shader.source() == Source::Kernel { mode, ballot });
         }
     }
 }

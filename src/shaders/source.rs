@@ -21,7 +21,7 @@ const EXTENSIONS: &str = "#extension GL_EXT_buffer_reference : require\n#extensi
 /// Enables loads and stores of 64 bits, for devices with 64-bit integers.
 const HEAD_64: &str = "#extension GL_EXT_shader_explicit_arithmetic_types_int64 : require\n#define LOAD64\n";
 
-/// Enables subgroup ballots: one atomic operation for all invocations that append to a queue.
+/// Enables subgroup ballots and broadcasts: one atomic operation for all invocations that append to a queue, or none.
 const HEAD_BALLOT: &str = "#extension GL_KHR_shader_subgroup_ballot : require\n#define BALLOT\n";
 
 /// What a stream finds for its rays.
@@ -140,7 +140,7 @@ impl Variant {
         match self {
             Self::Generate64 | Self::Deliver64 => format!("{HEAD_64}{HEAD_BALLOT}"),
             Self::Packet => format!(
-                "{HEAD_64}{HEAD_BALLOT}#extension GL_KHR_shader_subgroup_arithmetic : require\n#define PACKET_RAYS {PACKET_RAYS}\n"
+                "#define KEEPS_CORNERS\n{HEAD_64}{HEAD_BALLOT}#extension GL_KHR_shader_subgroup_arithmetic : require\n#define PACKET_RAYS {PACKET_RAYS}\n"
             ),
             Self::Query => "#extension GL_EXT_ray_query : require\n".into(),
             Self::Raygen => "#extension GL_EXT_ray_tracing : require\n".into(),
@@ -193,8 +193,8 @@ pub enum Source {
     Kernel {
         /// What rays ask for.
         mode: Mode,
-        /// For devices with 64-bit integers.
-        int64: bool,
+        /// For devices with 64-bit integers and subgroup ballots.
+        ballot: bool,
     },
     /// A whole file.
     File {
@@ -239,9 +239,9 @@ impl Source {
             Self::Compute { pass, int64 } => {
                 format!("#version 460\n{EXTENSIONS}{}{lanes}#include \"{pass}.glsl\"\n", head_64(*int64))
             }
-            Self::Kernel { mode, int64 } => format!(
+            Self::Kernel { mode, ballot } => format!(
                 "#version 460\n{EXTENSIONS}{}{lanes}{spread}{}#include \"trace/wide.glsl\"\n",
-                head_64(*int64),
+                if *ballot { format!("{HEAD_64}{HEAD_BALLOT}") } else { String::new() },
                 mode.define()
             ),
             Self::File { path, .. } => {
@@ -258,7 +258,7 @@ impl fmt::Display for Source {
         match self {
             Self::Stream { pass, mode, variant } => write!(f, "{pass}.glsl as {} ({})", variant.template(), mode.name()),
             Self::Compute { pass, int64 } => write!(f, "{pass}.glsl ({}-bit loads)", bits(int64)),
-            Self::Kernel { mode, int64 } => write!(f, "trace/wide.glsl ({}, {}-bit loads)", mode.name(), bits(int64)),
+            Self::Kernel { mode, ballot } => write!(f, "trace/wide.glsl ({}, {}-bit loads)", mode.name(), bits(ballot)),
             Self::File { path, .. } => f.write_str(path),
         }
     }

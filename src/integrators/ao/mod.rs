@@ -251,7 +251,7 @@ pub fn streams(options: &AoOptions) -> [&'static StreamShaders; 2] {
 /// Those of the device, and [`crate::Error::Interrupted`] when `control` says so.
 pub fn render(tracer: &Tracer, camera: &CameraRecord, options: &AoOptions, control: &mut dyn Control) -> Result<AoResult> {
     let device = tracer.device();
-    let most = max_rays(options.size, options.spp);
+    let most = max_rays(options.size, options.spp, AoEstimator::SAMPLE_BITS);
     let [primary, occlusion] = streams(options);
     let mut estimator = AoEstimator {
         primary: tracer.stream(primary)?,
@@ -296,6 +296,8 @@ fn ray_buffer(device: &Arc<Device>, rays: u32) -> Result<Buffer> {
 
 impl Estimator for AoEstimator {
     const CHANNELS: usize = 1;
+    // packets of camera rays are of one pixel then
+    const SAMPLE_BITS: u32 = 6;
 
     fn keeps_first(&self) -> bool {
         self.dumps.is_some()

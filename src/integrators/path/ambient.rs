@@ -141,7 +141,7 @@ pub fn trace(
         background_only: true,
         ..options.clone()
     };
-    let mut paths = PathEstimator::new(tracer, flat, &options, max_rays(options.size, options.spp), false)?;
+    let mut paths = PathEstimator::new(tracer, flat, &options, max_rays(options.size, options.spp, MAX_SAMPLE_BITS), false)?;
     paths.find_camera_media(camera)?;
     let distance = tracer.stream(&shaders::PATH_DISTANCE_CLOSEST)?;
     let mut estimator = DistanceEstimator { paths, distance, block: None, width: options.size[0], take };

@@ -24,7 +24,7 @@ use glam::DMat3;
 use crate::accel::flatten::FlatScene;
 use crate::error::{Error, Result};
 use crate::film::Control;
-use crate::film::accumulate::{Accumulated, Estimator, Plan, accumulate, max_rays};
+use crate::film::accumulate::{Accumulated, Estimator, MAX_SAMPLE_BITS, Plan, accumulate, max_rays};
 use crate::film::block::BlockParams;
 use crate::film::camera::CameraRecord;
 use crate::gpu::{Buffer, Commands, ComputePipeline, Device, Memory, Specialization, Timing};
@@ -101,7 +101,7 @@ impl PathIntegrator {
     /// # Errors
     /// Those of the device; [`Error::Usage`] for a tracer that was built without the data that paths need.
     pub fn new(tracer: &Tracer, flat: &FlatScene, options: &PathOptions) -> Result<Self> {
-        let capacity = max_rays(options.size, options.spp);
+        let capacity = max_rays(options.size, options.spp, MAX_SAMPLE_BITS);
         Ok(Self { paths: PathEstimator::new(tracer, flat, options, capacity, false)?, options: options.clone() })
     }
 

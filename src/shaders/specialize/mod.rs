@@ -10,6 +10,7 @@
 mod constants;
 mod flow;
 mod fold;
+mod hoist;
 mod rewrite;
 mod sweep;
 
@@ -23,11 +24,11 @@ use flow::Flow;
 /// Specializes a module.
 ///
 /// `spirv`: the module; `values`: ids of specialization constants and what they are set to, a bool as 0 or 1; a constant without one takes its default.
-/// Returns words.
+/// `hoists`: reads of parameters are moved to where the shader begins (`hoist.rs`), which is right for CPU drivers. Returns words.
 ///
 /// # Errors
 /// A message, if it is no SPIR-V.
-pub fn specialize(spirv: &[u8], values: &[(u32, u32)]) -> Result<Vec<u32>, String> {
+pub fn specialize(spirv: &[u8], values: &[(u32, u32)], hoists: bool) -> Result<Vec<u32>, String> {
     let mut module = rspirv::dr::load_bytes(spirv).map_err(|e| e.to_string())?;
     let bound = module.header.as_ref().ok_or("it has no header")?.bound;
     freeze(&mut module, values);
@@ -40,6 +41,9 @@ pub fn specialize(spirv: &[u8], values: &[(u32, u32)]) -> Result<Vec<u32>, Strin
     }
     module.functions = functions;
     let bound = constants.append_to(&mut module);
+    if hoists {
+        hoist::hoist(&mut module);
+    }
     sweep::sweep(&mut module);
     if let Some(header) = &mut module.header {
         header.bound = bound;

@@ -68,16 +68,43 @@ fn every_value_of_the_constants_leaves_valid_modules() {
         let spirv = shader.spirv().unwrap();
         for value in [0, 1, 8, u32::MAX] {
             let what = format!("{:?} with {value}", shader.source());
-            let specialized = specialize(&spirv, &all(value)).unwrap();
+            assert_valid(&specialize(&spirv, &all(value), true).unwrap(), &what);
+            let specialized = specialize(&spirv, &all(value), false).unwrap();
             assert_valid(&specialized, &what);
             let module = rspirv::dr::load_words(&specialized).unwrap();
             let is_open =
                 |i: &&Instruction| matches!(i.class.opcode, Op::SpecConstant | Op::SpecConstantTrue | Op::SpecConstantFalse);
             assert_eq!(module.all_inst_iter().filter(is_open).count(), 0, "{what}");
             // there is nothing left to do
-            let again = specialize(bytemuck::cast_slice(&specialized), &[]).unwrap();
+            let again = specialize(bytemuck::cast_slice(&specialized), &[], false).unwrap();
             assert!(again.len() <= specialized.len(), "{what}");
         }
+    }
+}
+
+/// Numbers of reads in the first block, and in all others.
+fn reads(spirv: &[u8], hoists: bool) -> [usize; 2] {
+    let module = rspirv::dr::load_words(specialize(spirv, &[], hoists).unwrap()).unwrap();
+    let entry = module.entry_points[0].operands[1].id_ref_any().unwrap();
+    let function = module.functions.iter().find(|f| f.def.as_ref().unwrap().result_id == Some(entry)).unwrap();
+    let count = |b: &Block| b.instructions.iter().filter(|i| i.class.opcode == Op::Load).count();
+    [count(&function.blocks[0]), function.blocks[1..].iter().map(count).sum()]
+}
+
+#[test]
+fn parameters_are_read_once_before_the_first_branch() {
+    for shader in [shaders::RESOLVE.variant(true), shaders::TEMPORAL.variant(true), shaders::GATHER.variant(false)] {
+        let spirv = shader.spirv().unwrap();
+        let ([first, others], [first_hoisted, others_hoisted]) = (reads(&spirv, false), reads(&spirv, true));
+        let what = format!("{:?}: {first} + {others} reads, then {first_hoisted} + {others_hoisted}", shader.source());
+        assert!(first_hoisted > first && others_hoisted < others, "{what}");
+        assert!(first_hoisted + others_hoisted <= first + others, "{what}");
+        // moved once, they stay where they are
+        let hoisted = specialize(&spirv, &[], true).unwrap();
+        let again = specialize(bytemuck::cast_slice(&hoisted), &[], true).unwrap();
+        assert_eq!(hoisted.len(), again.len(), "{what}");
+        // what the pass writes is not read early
+        assert!(others_hoisted > 0, "{what}");
     }
 }
 
@@ -85,7 +112,7 @@ fn every_value_of_the_constants_leaves_valid_modules() {
 fn features_that_are_off_are_gone() {
     let shader = shaders::PATH_CAMERA_CLOSEST.variant(shaders::Variant::Deliver64).unwrap();
     let spirv = shader.spirv().unwrap();
-    let off = 4 * specialize(&spirv, &all(0)).unwrap().len();
+    let off = 4 * specialize(&spirv, &all(0), false).unwrap().len();
     assert!(5 * off < spirv.len(), "{off} bytes of {}", spirv.len());
 }
 
@@ -93,13 +120,13 @@ fn features_that_are_off_are_gone() {
 fn a_constant_that_is_not_set_has_its_default() {
     let shader = shaders::wide_kernel(shaders::Mode::Any, true);
     let spirv = shader.spirv().unwrap();
-    let default = specialize(&spirv, &[]).unwrap();
-    let set = specialize(&spirv, &[(constants::WATERTIGHT.id, 1), (constants::SINGLE_LEVEL.id, 0)]).unwrap();
+    let default = specialize(&spirv, &[], false).unwrap();
+    let set = specialize(&spirv, &[(constants::WATERTIGHT.id, 1), (constants::SINGLE_LEVEL.id, 0)], false).unwrap();
     assert_eq!(default, set);
-    let other = specialize(&spirv, &[(constants::WATERTIGHT.id, 0)]).unwrap();
+    let other = specialize(&spirv, &[(constants::WATERTIGHT.id, 0)], false).unwrap();
     assert!(other.len() < default.len());
     // what is set last holds
-    let twice = specialize(&spirv, &[(constants::WATERTIGHT.id, 1), (constants::WATERTIGHT.id, 0)]).unwrap();
+    let twice = specialize(&spirv, &[(constants::WATERTIGHT.id, 1), (constants::WATERTIGHT.id, 0)], false).unwrap();
     assert_eq!(twice, other);
 }
 
@@ -107,6 +134,6 @@ fn a_constant_that_is_not_set_has_its_default() {
 fn what_is_no_spirv_is_refused() {
     let damaged: [&[u32]; 3] = [&[], &[0], &[0x0723_0203, 0x0001_0600, 0, 8, 0, 0xffff_ffff]];
     for words in damaged {
-        assert!(specialize(bytemuck::cast_slice(words), &[]).is_err(), "{words:x?}");
+        assert!(specialize(bytemuck::cast_slice(words), &[], false).is_err(), "{words:x?}");
     }
 }
