@@ -64,7 +64,7 @@ pub(super) struct Module<'a> {
 impl<'a> Module<'a> {
     /// With its specialization constants set: pipelines need not set them.
     pub(super) fn new(device: &'a Device, name: &str, shader: &Shader, specialization: &Specialization) -> Result<Self> {
-        let words = specialize(&shader.spirv()?, &specialization.entries)
+        let words = specialize(&shader.spirv()?, &specialization.entries, device.info.is_cpu())
             .map_err(|e| Error::Vulkan(format!("shader {name} is not SPIR-V: {e}")))?;
         // SAFETY: SPIR-V from the build script's compiler, and valid after specialization: the validation layer looks at it in tests
         let raw = unsafe { device.raw.create_shader_module(&vk::ShaderModuleCreateInfo::default().code(&words), None) }

@@ -1,3 +1,5 @@
+use std::collections::HashSet;
+
 use rspirv::dr::{Block, Function};
 
 use super::*;
@@ -32,14 +34,22 @@ fn blocks(module: &Module) -> impl Iterator<Item = (&Function, &Block)> {
 fn assert_valid(words: &[u32], what: &str) {
     let module = rspirv::dr::load_words(words).unwrap_or_else(|e| panic!("{what}: {e}"));
     let bound = module.header.as_ref().unwrap().bound;
-    let mut defined = std::collections::HashSet::new();
+    let mut defined = HashSet::new();
     for id in module.all_inst_iter().filter_map(|i| i.result_id) {
         assert!(id < bound && defined.insert(id), "{what}: id {id} is defined twice or beyond the bound {bound}");
     }
     for i in module.all_inst_iter() {
         assert!(ids(i).all(|id| defined.contains(&id)), "{what}: {:?} names what is not there", i.class.opcode);
     }
-    let mut merges = std::collections::HashSet::new();
+    // blocks are in the order in which they dominate each other
+    let inside: HashSet<u32> = blocks(&module).flat_map(|(_, b)| &b.instructions).filter_map(|i| i.result_id).collect();
+    let mut computed = HashSet::new();
+    for i in blocks(&module).flat_map(|(_, b)| &b.instructions) {
+        let is_early = |id: u32| i.class.opcode == Op::Phi || !inside.contains(&id) || computed.contains(&id);
+        assert!(ids(i).all(is_early), "{what}: {:?} uses what is computed later", i.class.opcode);
+        computed.extend(i.result_id);
+    }
+    let mut merges = HashSet::new();
     for (function, block) in blocks(&module) {
         let label = flow::label(block);
         let before = function.blocks.iter().filter(|b| flow::targets(b.instructions.last().unwrap()).any(|t| t == label));
@@ -68,14 +78,14 @@ fn every_value_of_the_constants_leaves_valid_modules() {
         let spirv = shader.spirv().unwrap();
         for value in [0, 1, 8, u32::MAX] {
             let what = format!("{:?} with {value}", shader.source());
-            let specialized = specialize(&spirv, &all(value)).unwrap();
+            let specialized = specialize(&spirv, &all(value), true).unwrap();
             assert_valid(&specialized, &what);
             let module = rspirv::dr::load_words(&specialized).unwrap();
             let is_open =
                 |i: &&Instruction| matches!(i.class.opcode, Op::SpecConstant | Op::SpecConstantTrue | Op::SpecConstantFalse);
             assert_eq!(module.all_inst_iter().filter(is_open).count(), 0, "{what}");
             // there is nothing left to do
-            let again = specialize(bytemuck::cast_slice(&specialized), &[]).unwrap();
+            let again = specialize(bytemuck::cast_slice(&specialized), &[], true).unwrap();
             assert!(again.len() <= specialized.len(), "{what}");
         }
     }
@@ -85,7 +95,7 @@ fn every_value_of_the_constants_leaves_valid_modules() {
 fn features_that_are_off_are_gone() {
     let shader = shaders::PATH_CAMERA_CLOSEST.variant(shaders::Variant::Deliver64).unwrap();
     let spirv = shader.spirv().unwrap();
-    let off = 4 * specialize(&spirv, &all(0)).unwrap().len();
+    let off = 4 * specialize(&spirv, &all(0), true).unwrap().len();
     assert!(5 * off < spirv.len(), "{off} bytes of {}", spirv.len());
 }
 
@@ -93,13 +103,13 @@ fn features_that_are_off_are_gone() {
 fn a_constant_that_is_not_set_has_its_default() {
     let shader = shaders::wide_kernel(shaders::Mode::Any, true);
     let spirv = shader.spirv().unwrap();
-    let default = specialize(&spirv, &[]).unwrap();
-    let set = specialize(&spirv, &[(constants::WATERTIGHT.id, 1), (constants::SINGLE_LEVEL.id, 0)]).unwrap();
+    let default = specialize(&spirv, &[], false).unwrap();
+    let set = specialize(&spirv, &[(constants::WATERTIGHT.id, 1), (constants::SINGLE_LEVEL.id, 0)], false).unwrap();
     assert_eq!(default, set);
-    let other = specialize(&spirv, &[(constants::WATERTIGHT.id, 0)]).unwrap();
+    let other = specialize(&spirv, &[(constants::WATERTIGHT.id, 0)], false).unwrap();
     assert!(other.len() < default.len());
     // what is set last holds
-    let twice = specialize(&spirv, &[(constants::WATERTIGHT.id, 1), (constants::WATERTIGHT.id, 0)]).unwrap();
+    let twice = specialize(&spirv, &[(constants::WATERTIGHT.id, 1), (constants::WATERTIGHT.id, 0)], false).unwrap();
     assert_eq!(twice, other);
 }
 
@@ -107,6 +117,28 @@ fn a_constant_that_is_not_set_has_its_default() {
 fn what_is_no_spirv_is_refused() {
     let damaged: [&[u32]; 3] = [&[], &[0], &[0x0723_0203, 0x0001_0600, 0, 8, 0, 0xffff_ffff]];
     for words in damaged {
-        assert!(specialize(bytemuck::cast_slice(words), &[]).is_err(), "{words:x?}");
+        assert!(specialize(bytemuck::cast_slice(words), &[], false).is_err(), "{words:x?}");
+    }
+}
+
+/// Loads outside of the first block of the only function.
+fn later_loads(words: &[u32]) -> usize {
+    let module = rspirv::dr::load_words(words).unwrap();
+    let later = module.functions[0].blocks[1..].iter().flat_map(|b| &b.instructions);
+    later.filter(|i| i.class.opcode == Op::Load).count()
+}
+
+#[test]
+fn what_is_the_same_for_all_invocations_is_read_first() {
+    for shader in [&shaders::PATH_BOUNCE_CLOSEST, &shaders::AO_TRACE_ANY] {
+        let spirv = shader.variant(shaders::Variant::Deliver64).unwrap().spirv().unwrap();
+        let [as_written, first] = [false, true].map(|reads_first| specialize(&spirv, &[], reads_first).unwrap());
+        assert!(
+            3 * later_loads(&first) < 2 * later_loads(&as_written),
+            "{} of {}",
+            later_loads(&first),
+            later_loads(&as_written)
+        );
+        assert!(first.len() < as_written.len());
     }
 }
