@@ -7,9 +7,9 @@ Ray ray(uint index) {
 
 void closest(uint index, Hit hit) {
     BlockParams block = BlockParams(push.pass);
-    PathParams p = PathParams(block.path);
+    PathParams p = path_params();
     uint k = Words(p.tags).v[index];
-    PathState state = load_state(p.states, index);
+    PathState state = load_state(p, index);
     if (HAS_COVERAGE) {
         uvec2 pixel = path_pixel(block, state.index);
         next_ray_seed = ray_seed(block.seed, pixel, sample_index(state.index), state.depth + state.passes + 1u);

@@ -5,7 +5,7 @@
 
 // Where a ray through a lens starts, and where it goes: to the point that the ray through the lens' middle meets in the plane of focus.
 Ray lens_ray(BlockParams p, Ray r, vec2 u) {
-    PathParams path = PathParams(p.path);
+    PathParams path = path_params();
     vec4 rows[3] = p.camera_to_world;
     vec3 right = vec3(rows[0].x, rows[1].x, rows[2].x), up = vec3(rows[0].y, rows[1].y, rows[2].y), back = vec3(rows[0].z, rows[1].z, rows[2].z);
     vec2 lens = path.lens_radius * concentric_disk(u).xy;
@@ -37,10 +37,10 @@ void closest(uint index, Hit hit) {
     uint k = index - push.first;
     Ray r = camera_sample(p, index);
     if (!is_ray(r)) {
-        store_quad(PathParams(p.path).radiance, k, vec4(0.0));
+        store_quad(path_params().radiance, k, vec4(0.0));
         return;
     }
-    PathParams path = PathParams(p.path);
+    PathParams path = path_params();
     if (WITH_SIGNAL) clear_signal(path, k);
     // divided by the albedo, so that one bounce gives ambient visibility; Russian roulette uses the throughput without this factor
     float scale = WITH_CONSTANT_ALBEDO ? path.albedo : 1.0;

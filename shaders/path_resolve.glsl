@@ -5,8 +5,9 @@
 #include "path/params.glsl"
 
 bool add_sample(inout FilmPixel pixel, BlockParams p, uint k) {
-    vec4 sample_ = load_quad(PathParams(p.path).radiance, k);
-    sample_.rgb *= occluded_share(PathParams(p.path), sample_);
+    PathParams path = path_params();
+    vec4 sample_ = load_quad(path.radiance, k);
+    sample_.rgb *= occluded_share(path, sample_);
     // also false for NaN
     if (!(max(abs(sample_.r), max(abs(sample_.g), abs(sample_.b))) < 1e30)) {
         pixel.not_finite++;

@@ -7,7 +7,7 @@ Ray ray(uint index) {
 
 void any(uint index, bool occluded) {
     if (occluded) return;
-    PathParams p = PathParams(BlockParams(push.pass).path);
+    PathParams p = path_params();
     uint k = Words(p.shadow.tags).v[index];
     store_quad(p.radiance, k, load_quad(p.radiance, k) + load_quad(p.contributions, index));
     if (!is_null(p.diffuse_contributions)) add_diffuse(p, k, load_quad(p.diffuse_contributions, index).rgb);

@@ -7,7 +7,7 @@ Ray ray(uint index) {
 }
 
 void closest(uint index, Hit hit) {
-    PathParams p = PathParams(BlockParams(push.pass).path);
+    PathParams p = path_params();
     uint k = Words(p.shadow.tags).v[index];
     vec4 c = load_quad(p.contributions, index);
     if (!is_hit(hit)) {

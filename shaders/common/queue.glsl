@@ -18,7 +18,8 @@ uint claim(uvec2 counter) {
     // one atomic for all lanes, because a CPU driver locks the bus for each
     uvec4 lanes = subgroupBallot(true);
     uint first = 0u;
-    if (subgroupElect()) first = atomicAdd(QueueCount(counter).v[0], subgroupBallotBitCount(lanes));
+    // subgroupElect() would be one more loop over lanes
+    if (gl_SubgroupInvocationID == subgroupBallotFindLSB(lanes)) first = atomicAdd(QueueCount(counter).v[0], subgroupBallotBitCount(lanes));
     return subgroupBroadcastFirst(first) + subgroupBallotExclusiveBitCount(lanes);
 #else
     return atomicAdd(QueueCount(counter).v[0], 1u);

@@ -34,14 +34,21 @@ layout(buffer_reference, std430, buffer_reference_align = 8) readonly buffer Wor
 
 bool is_null(uvec2 address) { return (address.x | address.y) == 0u; }
 
-vec3 load_vec3(uvec2 base, uint index) {
-    Floats f = Floats(base);
-    return vec3(f.v[3u * index], f.v[3u * index + 1u], f.v[3u * index + 2u]);
+// Three words of an array of such, which begins and ends at multiples of 8 bytes, as all buffers do. As two pairs they are one gather less than word by word.
+uvec3 load_triple(uvec2 base, uint index) {
+#ifdef LOAD64
+    uint word = 3u * index;
+    uvec2 a = LOAD_PAIR(base, word >> 1), b = LOAD_PAIR(base, (word >> 1) + 1u);
+    return (word & 1u) == 0u ? uvec3(a, b.x) : uvec3(a.y, b);
+#else
+    Words w = Words(base);
+    return uvec3(w.v[3u * index], w.v[3u * index + 1u], w.v[3u * index + 2u]);
+#endif
 }
 
-vec2 load_vec2(uvec2 base, uint index) {
-    return uintBitsToFloat(Pairs(base).v[index]);
-}
+vec3 load_vec3(uvec2 base, uint index) { return uintBitsToFloat(load_triple(base, index)); }
+
+vec2 load_vec2(uvec2 base, uint index) { return uintBitsToFloat(LOAD_PAIR(base, index)); }
 
 // Two words at once: one access where 64-bit integers exist. A CPU driver stores lane by lane and word by word.
 #ifdef LOAD64

@@ -8,7 +8,13 @@
 // Radiance of the environment from direction w.
 vec3 environment_radiance(PathParams p, vec3 w) {
     if (!WITH_ENVIRONMENT_MAP) return p.environment;
-    return p.environment * map_radiance(p.map, w);
+    return p.environment * map_radiance(map_point(p.map, w));
+}
+
+// The same, of a map, and the density with which its directions are sampled.
+vec4 environment_and_pdf(PathParams p, vec3 w) {
+    MapPoint at = map_point(p.map, w);
+    return vec4(p.environment * map_radiance(at), p.environment_probability * map_pdf(p.map, at));
 }
 
 // Can light from behind the surface be scattered to the viewer?
@@ -34,7 +40,7 @@ vec4 sample_constant_environment(Shading m, vec2 u) {
 const bool SKY_PDF_OF_SURFACE = HAS_ENVIRONMENT_LIGHTS && !WITH_ENVIRONMENT_MAP || HAS_PORTAL_LIGHTS;
 
 float sky_pdf(PathParams p, Shading m, vec3 from, vec3 wi) {
-    float all_ = LightRecords(p.lights).v[p.environment_light].probability * (WITH_ENVIRONMENT_MAP ? map_pdf(p.map, wi) : constant_environment_pdf(m, wi));
+    float all_ = p.environment_probability * (WITH_ENVIRONMENT_MAP ? map_pdf(p.map, map_point(p.map, wi)) : constant_environment_pdf(m, wi));
     if (HAS_PORTAL_LIGHTS) all_ += portals_pdf(p, from, wi);
     return all_;
 }

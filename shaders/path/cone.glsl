@@ -44,7 +44,7 @@ Cone cone_after(Cone c, float length_) {
 // log2 of the footprint's side on the triangle, over the root of the triangle's doubled area; SHARP where there is nothing to look up. On a texture,
 // of which the triangle covers some doubled area in texels, that is a level plus a constant of the triangle.
 float footprint(Cone c, Surface s, vec3 direction) {
-    SubmeshRecord submesh = SubmeshRecords(SceneRoot(push.scene).submeshes).v[s.submesh];
+    SubmeshRecord submesh = load_submesh_record(SceneRoot(push.scene).submeshes, s.submesh);
     if (HAS_SPHERES && is_null(submesh.indices)) return SHARP;
     uvec3 corners = triangle_indices(submesh, s.primitive);
     vec3 v0 = load_vec3(submesh.positions, corners.x);
@@ -68,7 +68,7 @@ float footprint(Cone c, Surface s, vec3 direction) {
 // Curvature: rotation of the interpolated normal along the surface, per scene unit: the mean over the triangle's edges. Positive: it bulges out at the front.
 // Normal maps are ignored.
 float curvature(Surface s) {
-    SubmeshRecord submesh = SubmeshRecords(SceneRoot(push.scene).submeshes).v[s.submesh];
+    SubmeshRecord submesh = load_submesh_record(SceneRoot(push.scene).submeshes, s.submesh);
     InstanceRecord instance;
     if (!SINGLE_LEVEL) instance = InstanceRecords(SceneRoot(push.scene).instances).v[s.tlas_instance];
     if (HAS_SPHERES && is_null(submesh.indices)) {
@@ -112,7 +112,7 @@ Cone scattered_cone(Cone c, Surface s, bool front, BsdfSample b, bool passes) {
 }
 
 Cone load_cone(PathParams p, uint k) {
-    vec2 c = uintBitsToFloat(Pairs(p.cones).v[k]);
+    vec2 c = load_vec2(p.cones, k);
     return Cone(c.x, c.y);
 }
 

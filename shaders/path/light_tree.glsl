@@ -30,14 +30,13 @@ float light_importance(LightNode node, vec3 from) {
 
 // A light, and the probability with which it is chosen; 0: no light reaches the point. u: in [0, 1), and what is left of it.
 float sample_leaf(uvec2 tree, vec3 from, inout float u, out uint light) {
-    LightNodes nodes = LightNodes(tree);
-    LightNode node = nodes.v[0];
+    LightNode node = load_light_node(tree, 0u);
     float probability = 1.0, share = 1.0;
     uint seed = floatBitsToUint(u);
     light = 0u;
     for (uint level = 0u; (node.link & LIGHT_LEAF) == 0u; level++) {
         uint child = node.link & LIGHT_LINK;
-        LightNode first = nodes.v[child], second = nodes.v[child + 1u];
+        LightNode first = load_light_node(tree, child), second = load_light_node(tree, child + 1u);
         float a = light_importance(first, from), b = light_importance(second, from);
         if (!(a + b > 0.0)) return 0.0;
         float p = a / (a + b);
@@ -59,12 +58,11 @@ float sample_leaf(uvec2 tree, vec3 from, inout float u, out uint light) {
 
 // Probability with which sample_leaf samples a light; `trail`: bit k is set if the light is in the second child at level k.
 float leaf_probability(uvec2 tree, vec3 from, uint trail) {
-    LightNodes nodes = LightNodes(tree);
-    LightNode node = nodes.v[0];
+    LightNode node = load_light_node(tree, 0u);
     float probability = 1.0;
     while ((node.link & LIGHT_LEAF) == 0u) {
         uint child = node.link & LIGHT_LINK;
-        LightNode first = nodes.v[child], second = nodes.v[child + 1u];
+        LightNode first = load_light_node(tree, child), second = load_light_node(tree, child + 1u);
         float a = light_importance(first, from), b = light_importance(second, from);
         if (!(a + b > 0.0)) return 0.0;
         bool takes_second = (trail & 1u) != 0u;

@@ -24,17 +24,19 @@ uint choose_light(PathParams p, uint bits, out float u) {
 
 // A light for a point of a surface, and a point on it. bits: a point of a two-dimensional sequence.
 LightSample sample_light(PathParams p, vec3 from, Shading m, uvec2 bits) {
-    LightRecords lights = LightRecords(p.lights);
     vec2 u = vec2(bits >> 8) * (1.0 / 16777216.0);
-    uint k = WITH_LIGHT_CHOICE ? choose_light(p, bits.x, u.x) : p.light_first;
-    LightRecord light = lights.v[k];
+    LightRecord light = p.only_light;
+    uint k = p.light_first;
+    if (WITH_LIGHT_CHOICE) {
+        k = choose_light(p, bits.x, u.x);
+        light = load_light_record(p.lights, k);
+    }
     // the last of those that are chosen by power is the tree
     if (WITH_LIGHT_TREE && k == p.light_first + p.light_count - 1u) {
-        float of_tree = light.probability;
         float of_leaf = sample_leaf(p.light_tree, from, u.x, k);
         if (!(of_leaf > 0.0)) return NO_LIGHT_SAMPLE;
-        light = lights.v[k];
-        light.probability = of_tree * of_leaf;
+        light = load_light_record(p.lights, k);
+        light.probability = p.tree_probability * of_leaf;
     }
     return light_sample(p, light, from, m, u);
 }
@@ -46,11 +48,9 @@ float met_light_pdf(PathParams p, Hit hit, vec3 from, vec3 wi) {
     if (first == INVALID) return 0.0;
     uint k = Words(p.light_of).v[first + hit.primitive];
     if (k == INVALID) return 0.0;
-    LightRecord light = LightRecords(p.lights).v[k];
-    if (WITH_LIGHT_TREE) {
-        float of_tree = LightRecords(p.lights).v[p.light_first + p.light_count - 1u].probability;
-        light.probability = of_tree * leaf_probability(p.light_tree, from, light.trail);
-    }
+    LightRecord light = p.only_light;
+    if (WITH_LIGHT_CHOICE) light = load_light_record(p.lights, k);
+    if (WITH_LIGHT_TREE) light.probability = p.tree_probability * leaf_probability(p.light_tree, from, light.trail);
     return light_pdf(light, from, wi, hit.t);
 }
 

@@ -23,20 +23,6 @@ vec4 map_texel(EnvironmentRecord map, int x, int y) {
     return load_quad(map.texels, uint(clamp(y, 0, int(map.height) - 1) * w + x));
 }
 
-vec3 map_lookup(EnvironmentRecord map, vec2 uv) {
-    vec2 p = uv * vec2(map.width, map.height) - 0.5;
-    ivec2 i = to_int(floor(p));
-    vec2 f = p - vec2(i);
-    return mix(
-        mix(map_texel(map, i.x, i.y).rgb, map_texel(map, i.x + 1, i.y).rgb, f.x),
-        mix(map_texel(map, i.x, i.y + 1).rgb, map_texel(map, i.x + 1, i.y + 1).rgb, f.x),
-        f.y);
-}
-
-vec3 map_radiance(EnvironmentRecord map, vec3 w) {
-    return map_lookup(map, map_coordinates(map_direction(map, w)));
-}
-
 // The four texels of a patch, and a position in it.
 struct Patch {
     vec4 a, b, c, d;  // upper left, upper right, lower left, lower right: radiance, weight
@@ -67,16 +53,29 @@ float map_density(EnvironmentRecord map, Patch q, uint row, vec2 rows, vec2 colu
     return density * (float(map.width) * float(map.height) / (2.0 * PI * PI * sin_theta));
 }
 
-float map_pdf(EnvironmentRecord map, vec3 w) {
+// Where a direction meets a map: the patch, its row and column, and the sine of the angle to the poles.
+struct MapPoint {
+    Patch patch_;
+    uint row;
+    uint column;
+    float sin_theta;
+};
+
+MapPoint map_point(EnvironmentRecord map, vec3 w) {
     vec3 d = map_direction(map, w);
     vec2 p = map_coordinates(d) * vec2(map.width, map.height) - 0.5;
     ivec2 i = to_int(floor(p));
     // a patch is indexed by the row of its lower texels and the column of its left ones
     i.y = clamp(i.y + 1, 0, int(map.height));
-    Patch q = map_patch(map, i, p - floor(p));
-    uint column = uint(i.x < 0 ? i.x + int(map.width) : i.x), row = uint(i.y);
-    vec2 columns = map_interval(map, map_columns(map, row) + min(column, map.width - 1u));
-    return map_density(map, q, row, map_interval(map, row), columns, sqrt(max(1.0 - d.y * d.y, 0.0)));
+    uint column = uint(i.x < 0 ? i.x + int(map.width) : i.x);
+    return MapPoint(map_patch(map, i, p - floor(p)), uint(i.y), min(column, map.width - 1u), sqrt(max(1.0 - d.y * d.y, 0.0)));
+}
+
+vec3 map_radiance(MapPoint at) { return patch_value(at.patch_).rgb; }
+
+float map_pdf(EnvironmentRecord map, MapPoint at) {
+    vec2 columns = map_interval(map, map_columns(map, at.row) + at.column);
+    return map_density(map, at.patch_, at.row, map_interval(map, at.row), columns, at.sin_theta);
 }
 
 // Direction (world), radiance and density.

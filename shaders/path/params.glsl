@@ -4,8 +4,18 @@
 #include "common/camera.glsl"
 #include "interface/path.glsl"
 #include "interface/path_features.glsl"
+#include "interface/bsdf_models.glsl"
+#include "bsdf/features.glsl"
 
 const uint NO_MEDIUM = 0xffffffffu;
+
+// The parameters of a pass of paths. They lie behind those of its block: their address then follows from push constants alone, and a CPU driver reads them once for all lanes
+// (src/shaders/specialize/uniform.rs).
+PathParams path_params() {
+    uint carry;
+    uint low = uaddCarry(push.pass.x, BLOCK_PARAMS_BYTES, carry);
+    return PathParams(uvec2(low, push.pass.y + carry));
+}
 
 // A path between two bounces, in memory a PathRecord.
 struct PathState {
@@ -19,16 +29,21 @@ struct PathState {
 };
 
 // What a bounce reads and writes lies in the order of its queue, one vector of paths after the other: fetched ahead, where by path each would be a wait.
-PathState load_state(uvec2 states, uint k) {
-    uvec4 a = LOAD_QUAD(states, 2u * k), b = LOAD_QUAD(states, 2u * k + 1u);
-    return PathState(uintBitsToFloat(a.xyz), uintBitsToFloat(a.w), b.x, b.y & 0xffffu, b.y >> 16, uintBitsToFloat(b.z), b.w);
+// What refraction alone changes is stored where something refracts.
+const bool WITH_REFRACTION = HAS_DIELECTRIC || HAS_VOLUMES || WITH_MEDIA;
+
+PathState load_state(PathParams p, uint k) {
+    uvec4 a = LOAD_QUAD(p.states, 2u * k);
+    uvec2 b = LOAD_PAIR(p.states, 4u * k + 2u), c = uvec2(floatBitsToUint(WITH_CONSTANT_ALBEDO ? p.albedo : 1.0), NO_MEDIUM);
+    if (WITH_REFRACTION) c = LOAD_PAIR(p.states, 4u * k + 3u);
+    return PathState(uintBitsToFloat(a.xyz), uintBitsToFloat(a.w), b.x, b.y & 0xffffu, b.y >> 16, uintBitsToFloat(c.x), c.y);
 }
 
 void store_state(uvec2 states, uint k, PathState s) {
     STORE_PAIR(states, 4u * k, floatBitsToUint(s.throughput.xy));
     STORE_PAIR(states, 4u * k + 1u, floatBitsToUint(vec2(s.throughput.z, s.pdf)));
     STORE_PAIR(states, 4u * k + 2u, uvec2(s.index, s.depth | s.passes << 16));
-    STORE_PAIR(states, 4u * k + 3u, uvec2(floatBitsToUint(s.eta_scale), s.medium));
+    if (WITH_REFRACTION) STORE_PAIR(states, 4u * k + 3u, uvec2(floatBitsToUint(s.eta_scale), s.medium));
 }
 
 layout(buffer_reference, std430, buffer_reference_align = 4) writeonly buffer StoredFloats { float v[]; };

@@ -46,7 +46,7 @@ float emission_weight(PathParams p, PathState state, float light) {
 vec3 disks_met(PathParams p, PathState state, vec3 w) {
     vec3 c = vec3(0.0);
     for (uint k = 0u; k < p.disk_count; k++) {
-        LightRecord light = LightRecords(p.lights).v[p.first_disk + k];
+        LightRecord light = load_light_record(p.lights, p.first_disk + k);
         if (light.radius == 0.0 || !meets_disk(light, w)) continue;
         c += disk_radiance(light) * emission_weight(p, state, WITH_LIGHT_SAMPLES ? disk_pdf(light) : 0.0);
     }
@@ -175,17 +175,22 @@ bool is_straight(Bsdf b, BsdfSample s, float side) {
 
 // k: the path. Returns what the vertex itself adds to its radiance; what light samples add comes with their rays.
 vec3 path_vertex(BlockParams block, uint k, PathState state, Ray ray, Hit hit) {
-    PathParams p = PathParams(block.path);
+    PathParams p = path_params();
     state.throughput *= transmittance(state.medium, hit.t);
     if (!is_hit(hit)) {
         // as with ambient occlusion, what shows nothing counts nothing
         if ((WITH_CONSTANT_ALBEDO || WITH_VIEW) && state.depth == 0u) return vec3(0.0);
         float light = 0.0;
-        if (WITH_LIGHT_SAMPLES && HAS_ENVIRONMENT_LIGHTS && state.depth > 0u) {
-            if (SKY_PDF_OF_SURFACE) light = Floats(p.sky_pdfs).v[k];
-            else light = LightRecords(p.lights).v[p.environment_light].probability * map_pdf(p.map, ray.direction);
+        vec3 c;
+        if (WITH_LIGHT_SAMPLES && HAS_ENVIRONMENT_LIGHTS && !SKY_PDF_OF_SURFACE) {
+            vec4 met = environment_and_pdf(p, ray.direction);
+            c = met.rgb;
+            if (state.depth > 0u) light = met.a;
+        } else {
+            c = environment_radiance(p, ray.direction);
+            if (WITH_LIGHT_SAMPLES && HAS_ENVIRONMENT_LIGHTS && state.depth > 0u) light = Floats(p.sky_pdfs).v[k];
         }
-        vec3 c = environment_radiance(p, ray.direction) * emission_weight(p, state, light);
+        c *= emission_weight(p, state, light);
         if (WITH_BACKGROUND_ONLY && state.depth > 0u) c = vec3(0.0);
         if (WITH_DISTANT_DISKS) c += disks_met(p, state, ray.direction);
         return counted_radiance(p, state.throughput * c, state.depth);

@@ -12,6 +12,9 @@
 // The record of a material, whose fields are loaded on use, so that branches that are not taken load nothing.
 #define SHADING_OF(material) ShadingRecords(SceneRoot(push.scene).shading).v[material]
 
+// Its first four words, which every surface needs: emission and model.
+uvec4 shading_head(uint material) { return LOAD_QUAD(SceneRoot(push.scene).shading, SHADING_RECORD_BYTES / 16u * material); }
+
 // Twice the area of a triangle on a texture of one by one, before the use's own transform.
 float texcoord_area(SubmeshRecord submesh, uvec3 corners, uint set) {
     uvec2 base = set == 1u ? submesh.texcoords1 : submesh.texcoords0;
@@ -54,7 +57,7 @@ vec3 shown_color(Surface s, SubmeshRecord submesh, MaterialRecord m, float log_s
 vec3 emission_texture(uint instance, uint primitive, vec2 uv) {
     if (!has_use(USE_EMISSION)) return vec3(1.0);
     SceneRoot root = SceneRoot(push.scene);
-    SubmeshRecord submesh = SubmeshRecords(root.submeshes).v[Pairs(root.scene_instances).v[instance].y];
+    SubmeshRecord submesh = load_submesh_record(root.submeshes, Pairs(root.scene_instances).v[instance].y);
     TextureUse use = SHADING_OF(submesh.material).uses[USE_EMISSION];
     // unfiltered: texture filtering applies to hits of paths only
     return sample_use(use, submesh, primitive + submesh.first_primitive, uv, TEXELS_SRGB, SHARP).rgb;
@@ -63,7 +66,7 @@ vec3 emission_texture(uint instance, uint primitive, vec2 uv) {
 // Alpha of an emitter at a point of a primitive of an instance of the scene: the fraction of rays that hit it there.
 float emitter_alpha(uint instance, uint primitive, vec2 uv) {
     SceneRoot root = SceneRoot(push.scene);
-    SubmeshRecord submesh = SubmeshRecords(root.submeshes).v[Pairs(root.scene_instances).v[instance].y];
+    SubmeshRecord submesh = load_submesh_record(root.submeshes, Pairs(root.scene_instances).v[instance].y);
     MaterialRecord m = MaterialRecords(root.materials).v[submesh.material];
     float alpha = base_color(submesh, m, primitive + submesh.first_primitive, uv).a;
     if (HAS_COVERAGE && m.coverage != 0u) return clamp(alpha, 0.0, 1.0);
@@ -152,7 +155,7 @@ Shading grey_shading(Surface s, vec3 wo, float grey) {
 // The surface hit by a ray along -wo, with textures filtered over a footprint().
 Shading shade(Surface s, vec3 wo, float log_side) {
     SceneRoot root = SceneRoot(push.scene);
-    SubmeshRecord submesh = SubmeshRecords(root.submeshes).v[s.submesh];
+    SubmeshRecord submesh = load_submesh_record(root.submeshes, s.submesh);
     uint m = submesh.material;
     bool front = dot(s.ng, wo) > 0.0;
     float side = front ? 1.0 : -1.0;
@@ -160,11 +163,12 @@ Shading shade(Surface s, vec3 wo, float log_side) {
     out_.material = submesh.material;
     vec3 n = out_.frame.n;
     MaterialTextures textures = look_up(s, submesh, log_side);
-    if (HAS_EMISSION && SHADING_OF(m).emission != vec3(0.0) && (front || SHADING_OF(m).emits_back != 0u)) {
-        out_.emission = SHADING_OF(m).emission * textures.at[USE_EMISSION].rgb;
-    }
-    vec3 base = shown_color(s, submesh, MaterialRecords(root.materials).v[submesh.material], log_side);
-    if (HAS_UNLIT && SHADING_OF(m).model == BSDF_NONE) {
+    uvec4 head = shading_head(m);
+    vec3 emission = uintBitsToFloat(head.xyz);
+    uint model = head.w;
+    if (HAS_EMISSION && emission != vec3(0.0) && (front || SHADING_OF(m).emits_back != 0u)) out_.emission = emission * textures.at[USE_EMISSION].rgb;
+    vec3 base = shown_color(s, submesh, load_material_record(root.materials, submesh.material), log_side);
+    if (HAS_UNLIT && model == BSDF_NONE) {
         // unlit materials show their base colour, and their emission is ignored
         out_.unlit = true;
         out_.emission = base;
@@ -179,7 +183,7 @@ Shading shade(Surface s, vec3 wo, float log_side) {
     }
     float cos_o = max(dot(n, wo), MIN_COSINE);
     MaterialPoint point = MaterialPoint(m, base, front, cos_o, textures, vec2(1.0, 0.0));
-    out_.bsdf.kind = SHADING_OF(m).model;
+    out_.bsdf.kind = model;
     bsdf_setup(out_.bsdf, point);
     if (is_bsdf(out_.bsdf, BSDF_GLTF, HAS_GLTF)) {
         if (HAS_ANISOTROPY && SHADING_OF(m).anisotropy != vec2(0.0) && tangent.w != 0.0) {

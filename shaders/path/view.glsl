@@ -6,7 +6,7 @@
 
 // Base colour, linear; of mirrors, glass and conductors the reflectance at normal incidence.
 vec3 surface_albedo(Surface s, float log_side) {
-    SubmeshRecord submesh = SubmeshRecords(SceneRoot(push.scene).submeshes).v[s.submesh];
+    SubmeshRecord submesh = load_submesh_record(SceneRoot(push.scene).submeshes, s.submesh);
     ShadingRecord m = SHADING_OF(submesh.material);
     bool coloured = m.model == BSDF_MIRROR || m.model == BSDF_DIELECTRIC || m.model == BSDF_CONDUCTOR;
     vec3 base = shown_color(s, submesh, MaterialRecords(SceneRoot(push.scene).materials).v[submesh.material], log_side);

@@ -5,10 +5,7 @@
 #include "common/ray_seed.glsl"
 
 // Vertex indices of a triangle in its group. `primitive` is an index in the group.
-uvec3 triangle_indices(SubmeshRecord submesh, uint primitive) {
-    Words w = Words(submesh.indices);
-    return uvec3(w.v[3u * primitive], w.v[3u * primitive + 1u], w.v[3u * primitive + 2u]);
-}
+uvec3 triangle_indices(SubmeshRecord submesh, uint primitive) { return load_triple(submesh.indices, primitive); }
 
 vec2 texcoord_at(SubmeshRecord submesh, uvec3 corners, vec2 uv, uint set) {
     uvec2 base = set == 1u ? submesh.texcoords1 : submesh.texcoords0;
@@ -20,9 +17,7 @@ vec2 texcoord_at(SubmeshRecord submesh, uvec3 corners, vec2 uv, uint set) {
 vec4 vertex_color(SubmeshRecord submesh, uvec3 corners, vec2 uv) {
     if (is_null(submesh.colors)) return vec4(1.0);
     corners -= submesh.first_vertex;
-    Quads q = Quads(submesh.colors);
-    return uintBitsToFloat(q.v[corners.x]) * (1.0 - uv.x - uv.y) + uintBitsToFloat(q.v[corners.y]) * uv.x +
-           uintBitsToFloat(q.v[corners.z]) * uv.y;
+    return load_quad(submesh.colors, corners.x) * (1.0 - uv.x - uv.y) + load_quad(submesh.colors, corners.y) * uv.x + load_quad(submesh.colors, corners.z) * uv.y;
 }
 
 // Linear base colour with alpha at barycentrics uv of a primitive (an index in the group). Spheres have no texture coordinates.

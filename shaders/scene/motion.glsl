@@ -7,8 +7,8 @@
 vec3 previous_position(Hit hit, Surface s) {
     SceneRoot root = SceneRoot(push.scene);
     if (is_null(root.motion)) return s.position;
-    uvec2 records = Pairs(root.scene_instances).v[hit.instance];
-    InstanceRecord instance = InstanceRecords(root.instances).v[records.x];
+    uvec2 records = LOAD_PAIR(root.scene_instances, hit.instance);
+    InstanceRecord instance = load_instance_record(root.instances, records.x);
     MotionRecord motion = MotionRecords(root.motion).v[records.x];
     vec3 p;
     if (is_null(motion.previous_positions)) {

@@ -43,11 +43,11 @@ Surface surface_at(Ray ray, Hit hit) {
     SubmeshRecord submesh;
     // a scene of one submesh: read uniformly, without a gather
     if (root.submesh_count == 1u) {
-        submesh = SubmeshRecords(root.submeshes).v[0];
-        records.x = SINGLE_LEVEL ? 0u : Pairs(root.scene_instances).v[hit.instance].x;
+        submesh = load_submesh_record(root.submeshes, 0u);
+        records.x = SINGLE_LEVEL ? 0u : LOAD_PAIR(root.scene_instances, hit.instance).x;
     } else {
-        records = Pairs(root.scene_instances).v[hit.instance];
-        submesh = SubmeshRecords(root.submeshes).v[records.y];
+        records = LOAD_PAIR(root.scene_instances, hit.instance);
+        submesh = load_submesh_record(root.submeshes, records.y);
         if (SINGLE_LEVEL && !HAS_SPHERES) {
             // submeshes of one group share its arrays, which are uniform too
             submesh.indices = SubmeshRecords(root.submeshes).v[0].indices;
@@ -60,7 +60,7 @@ Surface surface_at(Ray ray, Hit hit) {
         instance.group_to_world = vec4[3](vec4(1.0, 0.0, 0.0, 0.0), vec4(0.0, 1.0, 0.0, 0.0), vec4(0.0, 0.0, 1.0, 0.0));
         instance.world_to_group = instance.group_to_world;
     } else {
-        instance = InstanceRecords(root.instances).v[records.x];
+        instance = load_instance_record(root.instances, records.x);
     }
     Surface s;
     s.submesh = records.y;
@@ -71,7 +71,7 @@ Surface surface_at(Ray ray, Hit hit) {
     vec3 p, normal, error;
     vec3 shading = vec3(0.0);
     if (HAS_SPHERES && is_null(submesh.indices)) {
-        vec4 sphere = uintBitsToFloat(Quads(submesh.positions).v[s.primitive]);
+        vec4 sphere = load_quad(submesh.positions, s.primitive);
         vec3 at = transform_point(instance.world_to_group, ray.origin) + hit.t * transform_vector(instance.world_to_group, ray.direction);
         normal = normalize(at - sphere.xyz);
         p = sphere.xyz + sphere.w * normal;
@@ -113,9 +113,8 @@ Surface surface_at(Ray ray, Hit hit) {
 // front. w = 0 without a tangent.
 vec4 tangent_at(Surface s, SubmeshRecord submesh) {
     uvec3 corners = triangle_indices(submesh, s.primitive) - submesh.first_vertex;
-    Quads q = Quads(submesh.tangents);
-    vec4 a = uintBitsToFloat(q.v[corners.x]);
-    vec3 t = a.xyz * (1.0 - s.uv.x - s.uv.y) + uintBitsToFloat(q.v[corners.y]).xyz * s.uv.x + uintBitsToFloat(q.v[corners.z]).xyz * s.uv.y;
+    vec4 a = load_quad(submesh.tangents, corners.x);
+    vec3 t = a.xyz * (1.0 - s.uv.x - s.uv.y) + load_quad(submesh.tangents, corners.y).xyz * s.uv.x + load_quad(submesh.tangents, corners.z).xyz * s.uv.y;
     float w = a.w;
     if (!SINGLE_LEVEL) {
         vec4 rows[3] = InstanceRecords(SceneRoot(push.scene).instances).v[s.tlas_instance].group_to_world;

@@ -27,8 +27,8 @@ vec4 unorm16(uvec2 rgba) { return vec4(unpackUnorm2x16(rgba.x), unpackUnorm2x16(
 // Texel i as stored, without decoding sRGB.
 vec4 texel(TextureRecord texture, uint i) {
     if (HAS_DEEP_TEXELS) {
-        if (texture.format == FORMAT_UNORM16) return unorm16(Pairs(texture.texels).v[i]);
-        if (texture.format == FORMAT_FLOAT) return uintBitsToFloat(Quads(texture.texels).v[i]);
+        if (texture.format == FORMAT_UNORM16) return unorm16(LOAD_PAIR(texture.texels, i));
+        if (texture.format == FORMAT_FLOAT) return load_quad(texture.texels, i);
     }
     return unpackUnorm4x8(Words(texture.texels).v[i]);
 }
@@ -48,7 +48,7 @@ vec2 fold(vec2 uv, TextureRecord texture) {
 
 // Filtered value at uv (v down). sRGB is decoded before filtering.
 vec4 sample_texture(uint index, vec2 uv, bool srgb) {
-    TextureRecord texture = TextureRecords(SceneRoot(push.scene).textures).v[index];
+    TextureRecord texture = load_texture_record(SceneRoot(push.scene).textures, index);
     bool nearest = texture.nearest != 0u;
     vec2 p = fold(uv, texture) * vec2(texture.width, texture.height);
     if (!nearest) p -= 0.5;

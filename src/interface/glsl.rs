@@ -20,7 +20,8 @@ pub fn files() -> Vec<(String, String)> {
     );
     files.extend(records::FILES.iter().map(|f| {
         let includes: String = f.includes.iter().map(|name| format!("#include \"interface/{name}.glsl\"\n")).collect();
-        file(f.name, &(includes + &record_file(f)))
+        let loads: String = f.records.iter().filter_map(load).collect();
+        file(f.name, &(includes + &record_file(f) + &loads))
     }));
     files
 }
@@ -195,6 +196,47 @@ fn record(record: &Record) -> String {
     text
 }
 
+/// Declares a function that loads a record of an array by pairs of words: a CPU driver gathers 64 bits at the cost of 32, and what is not used is not loaded. For records without others in
+/// them.
+fn load(record: &Record) -> Option<String> {
+    let Form::Array { align, access: "readonly", .. } = record.form else { return None };
+    if align < 8 || record.size % 8 != 0 {
+        return None;
+    }
+    let values: Option<Vec<String>> = record.fields.iter().map(loaded).collect();
+    let (name, pairs) = (record.name, record.size / 8);
+    let mut text = format!("{name} load_{}(uvec2 base, uint k) {{\n", constant_name(name).to_lowercase());
+    for pair in 0..pairs {
+        let _ = writeln!(text, "    uvec2 w{pair} = LOAD_PAIR(base, {pairs}u * k + {pair}u);");
+    }
+    let _ = writeln!(text, "    return {name}({});\n}}", values?.join(", "));
+    Some(text)
+}
+
+/// The value of a field, from pairs of words `w0`, `w1`, ...; none for another record.
+fn loaded(field: &Field) -> Option<String> {
+    let elements: usize = field.counts.iter().product();
+    let words = field.size / 4 / elements;
+    let (kind, is_float) = match field.kind {
+        "address" | "bytes8" | "uvec2" => ("uvec2", false),
+        "uint" | "uvec3" | "uvec4" => (field.kind, false),
+        "float" | "vec2" | "vec3" | "vec4" => (field.kind, true),
+        _ => return None,
+    };
+    let value = |element: usize| {
+        let first = field.offset / 4 + element * words;
+        let parts = (first..first + words).map(|word| format!("w{}.{}", word / 2, ["x", "y"][word % 2]));
+        let parts = parts.map(|part| if is_float { format!("uintBitsToFloat({part})") } else { part });
+        format!("{kind}({})", parts.collect::<Vec<_>>().join(", "))
+    };
+    let values: Vec<String> = (0..elements).map(value).collect();
+    match &field.counts {
+        [] => values.into_iter().next(),
+        [_] => Some(format!("{kind}[]({})", values.join(", "))),
+        _ => None,
+    }
+}
+
 fn member(field: &Field) -> String {
     let kind = match field.kind {
         "address" | "bytes8" => "uvec2",
@@ -260,6 +302,14 @@ mod tests {
         let scene = text("scene");
         assert!(scene.contains("readonly buffer InstanceRecords { InstanceRecord v[]; };"), "{scene}");
         assert!(scene.contains("    vec4 group_to_world[3];"), "{scene}");
+        assert!(scene.contains("uvec2 w9 = LOAD_PAIR(base, 10u * k + 9u);"), "{scene}");
+        assert!(scene.contains("    return SubmeshRecord(uvec2(w0.x, w0.y), "), "{scene}");
+        assert!(
+            text("lights")
+                .contains("LightRecord(vec3(uintBitsToFloat(w0.x), uintBitsToFloat(w0.y), uintBitsToFloat(w1.x)), float(")
+        );
+        // a record with others in it
+        assert!(!text("shading").contains("load_"));
         assert!(
             text("block").starts_with("// Generated from") && text("block").contains("#include \"interface/queue.glsl\"\n")
         );

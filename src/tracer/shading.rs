@@ -11,6 +11,9 @@ use crate::interface::{
 use crate::scene::material::MaterialKind;
 use crate::scene::{Geometry, Material, TextureSlot};
 
+// shaders/path/shading.glsl loads the first four words together
+const _: () = assert!(std::mem::offset_of!(ShadingRecord, emission) == 0 && std::mem::offset_of!(ShadingRecord, model) == 12);
+
 /// Number of textures of a material beside that of the base colour, in the order of [`TextureFeature`].
 pub(super) const SLOTS: usize = TextureFeature::ALL.len();
 

@@ -47,6 +47,9 @@ const BOUNCES: u32 = 4;
 /// Launches that are made beyond those of the bounces, for surfaces that paths pass straight through: what is left then ends. A path counts such surfaces in 16 bits
 /// (`PathRecord::depth_passes`).
 const MAX_STRAIGHT: u32 = 4096;
+/// Where the parameters of paths lie behind those of their block, bytes.
+const PARAMS_BYTES: u64 = size_of::<BlockParams>() as u64;
+
 /// An image and statistics of its rays.
 #[derive(Clone, Debug, Default)]
 pub struct PathResult {
@@ -210,8 +213,8 @@ struct PathEstimator {
     queues: [RayQueue; 2],
     shadow_queue: RayQueue,
     /// Parameters for filling either queue of bounces; then those for tracing either queue of shadow rays behind walls.
+    /// Each has the parameters of the block, and behind them those of paths.
     block_params: Vec<Buffer>,
-    path_params: Vec<Buffer>,
     records: Vec<PathParams>,
     walls: Option<TransmittedShadowRays>,
     ambient: Option<AmbientRays>,
@@ -375,14 +378,13 @@ impl PathEstimator {
             });
             AmbientRays { queue, params: records.len() - 1 }
         });
-        let path_params = records
-            .iter()
-            .map(|record| Buffer::from_slice(device, "path parameters", &[*record]))
-            .collect::<Result<Vec<_>>>()?;
-        let block_params = records
-            .iter()
-            .map(|_| Buffer::new(device, "block parameters", size_of::<BlockParams>() as u64, Memory::Upload))
-            .collect::<Result<Vec<_>>>()?;
+        let block_params = records.iter().map(|record| {
+            let mut buffer =
+                Buffer::new(device, "block parameters", PARAMS_BYTES + size_of::<PathParams>() as u64, Memory::Upload)?;
+            buffer.write(PARAMS_BYTES, bytemuck::bytes_of(record))?;
+            Ok(buffer)
+        });
+        let block_params = block_params.collect::<Result<Vec<_>>>()?;
         Ok(Self {
             camera: tracer.specialized(&shaders::PATH_CAMERA_CLOSEST, &constants)?,
             bounce: tracer.specialized(&shaders::PATH_BOUNCE_CLOSEST, &constants)?,
@@ -391,7 +393,6 @@ impl PathEstimator {
             queues,
             shadow_queue,
             block_params,
-            path_params,
             records,
             walls,
             ambient,
@@ -418,6 +419,15 @@ impl PathEstimator {
         self.change_records(|record| record.camera_media = camera_media)
     }
 
+    /// Writes the parameters of a block.
+    fn write_block(&mut self, params: &BlockParams) -> Result<()> {
+        for buffer in &mut self.block_params {
+            let path = buffer.address() + PARAMS_BYTES;
+            buffer.write(0, bytemuck::bytes_of(&BlockParams { path, ..*params }))?;
+        }
+        Ok(())
+    }
+
     /// Turns the environment map.
     fn turn_environment(&mut self, to_map: &DMat3) -> Result<()> {
         let rows = environment::rows(to_map);
@@ -441,17 +451,17 @@ impl PathEstimator {
         }
         self.lights.check_fits(&lights, self.features, self.light_kinds)?;
         self.lights = DeviceLights::new(device, lights)?;
-        for (record, buffer) in self.records.iter_mut().zip(&mut self.path_params) {
+        for (record, buffer) in self.records.iter_mut().zip(&mut self.block_params) {
             *record = self.lights.params(*record);
-            buffer.write(0, bytemuck::bytes_of(record))?;
+            buffer.write(PARAMS_BYTES, bytemuck::bytes_of(record))?;
         }
         Ok(true)
     }
 
     fn change_records(&mut self, change: impl Fn(&mut PathParams)) -> Result<()> {
-        for (record, buffer) in self.records.iter_mut().zip(&mut self.path_params) {
+        for (record, buffer) in self.records.iter_mut().zip(&mut self.block_params) {
             change(record);
-            buffer.write(0, bytemuck::bytes_of(record))?;
+            buffer.write(PARAMS_BYTES, bytemuck::bytes_of(record))?;
         }
         Ok(())
     }
@@ -596,9 +606,7 @@ impl Estimator for PathEstimator {
     const CHANNELS: usize = 3;
 
     fn begin(&mut self, params: BlockParams, _: bool) -> Result<u64> {
-        for (buffer, path) in self.block_params.iter_mut().zip(&self.path_params) {
-            buffer.write(0, bytemuck::bytes_of(&BlockParams { path: path.address(), ..params }))?;
-        }
+        self.write_block(&params)?;
         Ok(self.block_params[0].address())
     }
 

@@ -97,7 +97,7 @@ impl SignalPaths {
 
     /// Device address of the parameters of paths, for other shaders.
     pub fn params_address(&self) -> u64 {
-        self.paths.path_params[0].address()
+        self.paths.block_params[0].address() + super::PARAMS_BYTES
     }
 
     /// Turns the environment map: `to_map` is the rotation from world directions to the map's.
@@ -125,10 +125,7 @@ impl SignalPaths {
         self.paths.traced = super::PathCounts::default();
         let BlockParams { hemisphere, falloff_log2, radius, .. } = self.ambient;
         let params = BlockParams { hemisphere, falloff_log2, radius, ..*params };
-        for (buffer, path) in self.paths.block_params.iter_mut().zip(&self.paths.path_params) {
-            buffer.write(0, bytemuck::bytes_of(&BlockParams { path: path.address(), ..params }))?;
-        }
-        Ok(())
+        self.paths.write_block(&params)
     }
 
     /// Traces the paths of a launch; then `path_gather` with the parameters at address `gather` adds them to the images of the frame.

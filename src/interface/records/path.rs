@@ -1,10 +1,11 @@
 //! Parameters of the path tracer's passes, and the state of each path.
 
+use super::lights::LightRecord;
 use super::path_options::PathOptionsRecord;
 use super::queue::QueueRecord;
 
 records! {
-    "path" includes "queue" "path_options" values {
+    "path" includes "queue" "path_options" "lights" values {
         /// Phase of a path: what it has met so far are mirrors and glass, where it went on as the G-buffer's rays do.
         SIGNAL_SEEN: float = 0.0;
         /// Phase of a path: as before, but it went another way.
@@ -35,10 +36,12 @@ records! {
         to_map: vec4[3],
     }
 
-    /// Parameters of the path tracer.
+    /// Parameters of the path tracer. They lie behind the `BlockParams` of its passes.
     PathParams: block readonly 16 {
         /// The environment map.
         map: EnvironmentRecord,
+        /// The light that is sampled, where there is but one.
+        only_light: LightRecord,
         /// Radiance of a constant environment; scale factor of an environment map. Linear RGB.
         environment: vec3,
         /// Number of lights that are chosen by power.
@@ -118,6 +121,10 @@ records! {
         light_first: uint,
         /// Padding to a multiple of 8 bytes.
         reserved: uint,
+        /// Probability with which the environment is chosen among the lights.
+        environment_probability: float,
+        /// Probability with which the light tree is chosen.
+        tree_probability: float,
     }
 
     /// What a path of a frame in real time brings, beside its radiance, of which the part that is seen directly is left out. The vertex in question is the first

@@ -10,9 +10,9 @@
 mod constants;
 mod flow;
 mod fold;
-mod hoist;
 mod rewrite;
 mod sweep;
+mod uniform;
 
 use rspirv::binary::Assemble;
 use rspirv::dr::{Instruction, Module, Operand};
@@ -23,12 +23,12 @@ use flow::Flow;
 
 /// Specializes a module.
 ///
-/// `spirv`: the module; `values`: ids of specialization constants and what they are set to, a bool as 0 or 1; a constant without one takes its default.
-/// `hoists`: reads of parameters are moved to where the shader begins (`hoist.rs`), which is right for CPU drivers. Returns words.
+/// `spirv`: the module; `values`: ids of specialization constants and what they are set to, a bool as 0 or 1; a constant without one takes its default; `reads_first`: what is the same
+/// for all invocations is read at the start, for drivers of CPUs (`uniform.rs`). Returns words.
 ///
 /// # Errors
 /// A message, if it is no SPIR-V.
-pub fn specialize(spirv: &[u8], values: &[(u32, u32)], hoists: bool) -> Result<Vec<u32>, String> {
+pub fn specialize(spirv: &[u8], values: &[(u32, u32)], reads_first: bool) -> Result<Vec<u32>, String> {
     let mut module = rspirv::dr::load_bytes(spirv).map_err(|e| e.to_string())?;
     let bound = module.header.as_ref().ok_or("it has no header")?.bound;
     freeze(&mut module, values);
@@ -41,8 +41,8 @@ pub fn specialize(spirv: &[u8], values: &[(u32, u32)], hoists: bool) -> Result<V
     }
     module.functions = functions;
     let bound = constants.append_to(&mut module);
-    if hoists {
-        hoist::hoist(&mut module);
+    if reads_first {
+        uniform::read_first(&mut module);
     }
     sweep::sweep(&mut module);
     if let Some(header) = &mut module.header {

@@ -1,3 +1,5 @@
+use std::collections::HashSet;
+
 use rspirv::dr::{Block, Function};
 
 use super::*;
@@ -32,14 +34,22 @@ fn blocks(module: &Module) -> impl Iterator<Item = (&Function, &Block)> {
 fn assert_valid(words: &[u32], what: &str) {
     let module = rspirv::dr::load_words(words).unwrap_or_else(|e| panic!("{what}: {e}"));
     let bound = module.header.as_ref().unwrap().bound;
-    let mut defined = std::collections::HashSet::new();
+    let mut defined = HashSet::new();
     for id in module.all_inst_iter().filter_map(|i| i.result_id) {
         assert!(id < bound && defined.insert(id), "{what}: id {id} is defined twice or beyond the bound {bound}");
     }
     for i in module.all_inst_iter() {
         assert!(ids(i).all(|id| defined.contains(&id)), "{what}: {:?} names what is not there", i.class.opcode);
     }
-    let mut merges = std::collections::HashSet::new();
+    // blocks are in the order in which they dominate each other
+    let inside: HashSet<u32> = blocks(&module).flat_map(|(_, b)| &b.instructions).filter_map(|i| i.result_id).collect();
+    let mut computed = HashSet::new();
+    for i in blocks(&module).flat_map(|(_, b)| &b.instructions) {
+        let is_early = |id: u32| i.class.opcode == Op::Phi || !inside.contains(&id) || computed.contains(&id);
+        assert!(ids(i).all(is_early), "{what}: {:?} uses what is computed later", i.class.opcode);
+        computed.extend(i.result_id);
+    }
+    let mut merges = HashSet::new();
     for (function, block) in blocks(&module) {
         let label = flow::label(block);
         let before = function.blocks.iter().filter(|b| flow::targets(b.instructions.last().unwrap()).any(|t| t == label));
@@ -83,8 +93,8 @@ fn every_value_of_the_constants_leaves_valid_modules() {
 }
 
 /// Numbers of reads in the first block, and in all others.
-fn reads(spirv: &[u8], hoists: bool) -> [usize; 2] {
-    let module = rspirv::dr::load_words(specialize(spirv, &[], hoists).unwrap()).unwrap();
+fn reads(spirv: &[u8], reads_first: bool) -> [usize; 2] {
+    let module = rspirv::dr::load_words(specialize(spirv, &[], reads_first).unwrap()).unwrap();
     let entry = module.entry_points[0].operands[1].id_ref_any().unwrap();
     let function = module.functions.iter().find(|f| f.def.as_ref().unwrap().result_id == Some(entry)).unwrap();
     let count = |b: &Block| b.instructions.iter().filter(|i| i.class.opcode == Op::Load).count();
@@ -93,7 +103,14 @@ fn reads(spirv: &[u8], hoists: bool) -> [usize; 2] {
 
 #[test]
 fn parameters_are_read_once_before_the_first_branch() {
-    for shader in [shaders::RESOLVE.variant(true), shaders::TEMPORAL.variant(true), shaders::GATHER.variant(false)] {
+    let deliver = |stream: &'static shaders::StreamShaders| stream.variant(shaders::Variant::Deliver64).unwrap();
+    for shader in [
+        shaders::RESOLVE.variant(true),
+        shaders::TEMPORAL.variant(true),
+        shaders::GATHER.variant(false),
+        deliver(&shaders::PATH_BOUNCE_CLOSEST),
+        deliver(&shaders::AO_TRACE_ANY),
+    ] {
         let spirv = shader.spirv().unwrap();
         let ([first, others], [first_hoisted, others_hoisted]) = (reads(&spirv, false), reads(&spirv, true));
         let what = format!("{:?}: {first} + {others} reads, then {first_hoisted} + {others_hoisted}", shader.source());

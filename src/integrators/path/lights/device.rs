@@ -46,6 +46,9 @@ impl DeviceLights {
             first_disk: directional.start,
             disk_count: directional.end - directional.start,
             environment_light: environment.unwrap_or(INVALID),
+            only_light: self.lights.only().unwrap_or_default(),
+            environment_probability: environment.map_or(0.0, |k| self.lights.records[k as usize].probability),
+            tree_probability: self.lights.tree_probability(),
             ..params
         }
     }

@@ -110,6 +110,16 @@ impl Lights {
         self.records.len() as u32 - self.first
     }
 
+    /// The light that is sampled, if there is but one.
+    pub fn only(&self) -> Option<LightRecord> {
+        (self.choices() == 1).then(|| self.records[self.first as usize])
+    }
+
+    /// Probability with which the tree is chosen, the last of what is chosen by power; 0 without one.
+    pub fn tree_probability(&self) -> f32 {
+        self.records.last().filter(|_| !self.tree.is_empty()).map_or(0.0, |tree| tree.probability)
+    }
+
     /// Number of lights, the environment and each portal included.
     pub fn count(&self) -> u32 {
         self.sampled().len() as u32
