@@ -11,8 +11,8 @@ use skylit::oracle::Oracle;
 use skylit::scene::builtin::{SceneTransform, analytic, by_name, shapes};
 use skylit::scene::{Geometry, Scene, TriangleMesh};
 use skylit::stress::{
-    Check, Quiet, SECTIONS, Session, Setup, Verdict, Watch, contact, degenerate, determinism, display, long_runs, sampling,
-    scale, scene, transparency, watertight,
+    Check, Quiet, SECTIONS, Session, Setup, Verdict, Watch, contact, counters, degenerate, determinism, direct_light, display,
+    hot_pixel, long_runs, sampling, scale, scene, transparency, watertight,
 };
 use skylit::tracer::TracerKind;
 
@@ -76,9 +76,13 @@ fn gpu_stress_scenes_hold() {
 #[test]
 fn gpu_stress_coincident_triangles_hold() {
     let mut quiet = Quiet;
-    let check = degenerate::check_coincident(&setup(), TracerKind::Compute, "coincident", 100_000, &mut Watch::new(&mut quiet))
-        .unwrap();
-    assert_eq!(check.verdict, Verdict::Holds, "{check:?}");
+    for own_vertices in [false, true] {
+        let mut watch = Watch::new(&mut quiet);
+        let check =
+            degenerate::check_coincident(&setup(), TracerKind::Compute, "coincident", 100_000, own_vertices, &mut watch)
+                .unwrap();
+        assert_eq!(check.verdict, Verdict::Holds, "{check:?}");
+    }
 }
 
 /// Section 1: a sheet over a plane that should not occlude itself, a groove that is narrower than its closed form, and detail that positions do not hold.
@@ -98,6 +102,24 @@ fn gpu_stress_catches_a_wrong_scale() {
     let coarse = scale::georeferenced_scene(true).unwrap();
     let step = scale::traced_step(&setup.tracer(TracerKind::Compute, &coarse).unwrap(), &coarse, &mut watch).unwrap();
     assert!((step - 1e-3).abs() > 5e-4, "{step}");
+}
+
+/// Section 1: a light that is a hundred-thousandth stronger than its closed form has it, and one that nested nodes turn.
+#[test]
+fn gpu_stress_catches_wrong_direct_light() {
+    let (setup, mut quiet) = (setup(), Quiet);
+    let options = skylit::integrators::path::PathOptions { size: [16, 16], spp: 16, seed: 5, ..Default::default() };
+    let mut check = |scene: &Scene, expected: f64| {
+        let mut watch = Watch::new(&mut quiet);
+        sampling::check_mean(&setup, TracerKind::Compute, "light", scene, &options, expected, 2e-6, &mut watch).unwrap()
+    };
+    let (_, floor, expected) = direct_light::lit_floors(1.0).into_iter().find(|f| f.0 == "directional light").unwrap();
+    let nested = direct_light::nested(&floor).unwrap();
+    assert_eq!((nested.lights.len(), check(&nested, expected).verdict), (1, Verdict::Holds));
+    fails(&check(&nested, expected * (1.0 + 1e-5)));
+    let mut moved = nested;
+    moved.lights[0].direction = (moved.lights[0].direction + DVec3::X * 1e-4).normalize();
+    fails(&check(&moved, expected));
 }
 
 /// Section 2: a body with a hole that is called closed.
@@ -203,6 +225,59 @@ fn stress_catches_drift() {
     planes[0][3] ^= 1;
     let other = FilmState::from_planes([8, 8], 1, &planes, &state.samples_plane()).unwrap();
     assert_eq!((long_runs::different_words(&state, &state), long_runs::different_words(&state, &other)), (0, 1));
+}
+
+/// Section 7: a film that has added up in single precision, samples that repeat or come from elsewhere, and frames that stand still.
+#[test]
+fn gpu_stress_catches_a_counter_that_stops() {
+    let (setup, mut quiet) = (setup(), Quiet);
+    let (first, last) = ((1u32 << 24) - 8, (1 << 24) + 8);
+    let mut drift = |factor: f32| {
+        let film = counters::film_after(counters::SIZE, first, [0.1, 0.7, 3.3].map(|x| x * factor));
+        counters::film_drift(&setup, TracerKind::Compute, film, last, &mut Watch::new(&mut quiet)).unwrap()
+    };
+    let (right, wrong) = (drift(1.0), drift(1.0 + 3e-6));
+    assert!(right < 1e-6 && wrong > 1e-6, "{right} {wrong}");
+    // samples 0 and 1 in turn, of 100 pixels
+    let count = 64;
+    let of = |share: f64, varied: bool| {
+        let sum = share * f64::from(count);
+        let squares = if varied { sum } else { sum * share };
+        counters::Sampled::of(&[sum; 100], &[squares; 100], count)
+    };
+    assert!(of(0.5, true).distance(&of(0.51, true)) < 4.5);
+    assert!(of(0.5, true).distance(&of(0.6, true)) > 4.5);
+    assert!(of(0.5, false).distance(&of(0.5, true)).is_nan());
+    let frames = |level: f32, stands: bool| -> Vec<Vec<f32>> {
+        (0..16).map(|k| vec![level + if stands { 0.0 } else { 0.01 * (k * 7 % 5) as f32 }; 4]).collect()
+    };
+    assert!(counters::frame_distance(&frames(0.5, false), &frames(0.501, false)) < 4.5);
+    assert!(counters::frame_distance(&frames(0.5, false), &frames(0.6, false)) > 4.5);
+    assert!(counters::frame_distance(&frames(0.5, true), &frames(0.5, false)).is_nan());
+}
+
+/// Section 8: what a filter may not make of a hot pixel, and a spot larger than the filter is said to reach.
+#[test]
+fn gpu_stress_catches_a_hot_pixel_that_spreads() {
+    let mut image = vec![0.25f32; 3 * 49];
+    image[3 * 24] = 7.0;
+    let is_far = |k: usize| k < 7;
+    let of = |image: &[f32]| hot_pixel::Spread::of(image, 0.25, 10.0, is_far);
+    assert_eq!((of(&image).unsound, of(&image).far), (0, 0));
+    for (at, value, expected) in [(80, f32::NAN, (1, 0)), (80, 11.0, (1, 0)), (80, 0.2, (1, 0)), (3, 0.3, (0, 1))] {
+        let mut bad = image.clone();
+        bad[at] = value;
+        let found = of(&bad);
+        assert_eq!((found.unsound, found.far), expected, "{value}");
+    }
+    let settings = display::filters()[0].1;
+    let spread = |hot: f32, said: f32| {
+        let (mut scene, radius) = hot_pixel::spotlit(hot);
+        scene.lights[0].intensity *= hot / said;
+        hot_pixel::frames_of(&setup(), TracerKind::Compute, &scene, radius, &settings, said, 4).unwrap()
+    };
+    let (right, wrong) = (spread(100.0, 100.0), spread(100.0, 10.0));
+    assert!(right.unsound == 0 && right.total > 0.0 && wrong.unsound > 0, "{right:?} {wrong:?}");
 }
 
 /// Section 8: curves that fall, or let NaN through, and a filter that darkens.

@@ -7,7 +7,7 @@ use crate::ray::Ray;
 use crate::sampling::sobol::hash_combine;
 use crate::sampling::{AO_DIRECTION, CAMERA_FILM, Sampler, to_unit, warp};
 use crate::scene::builtin::{self, SceneTransform};
-use crate::scene::{Camera, Scene};
+use crate::scene::{Camera, Geometry, Scene};
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -126,6 +126,28 @@ pub fn leak_scenes() -> Vec<(String, Scene)> {
         }
     }
     out
+}
+
+/// Closed convex meshes beside [`leak_scenes`]: many triangles, needles (`segments` of them around a point), and nearly flat ones.
+pub fn hard_leak_scenes(levels: u32, segments: u32) -> Vec<(String, Scene)> {
+    let body = |geometry: Geometry| {
+        let mut scene = builtin::analytic::closed_box(1.0, SceneTransform::default());
+        scene.meshes[0].geometry = geometry;
+        scene
+    };
+    let mut flat = builtin::shapes::icosphere(1.0, 4);
+    if let Geometry::Triangles(mesh) = &mut flat {
+        mesh.positions.iter_mut().for_each(|p| p.y *= 1e-4);
+        mesh.normals.clear();
+    }
+    let round = builtin::shapes::icosphere(1.0, levels);
+    let name = format!("round body of {} triangles", round.primitive_count());
+    vec![
+        (name, body(round)),
+        ("cylinder of needles".into(), body(builtin::shapes::cylinder(0.02, 4.0, 60))),
+        ("disk of needle fans".into(), body(builtin::shapes::cylinder(1.0, 0.01, segments))),
+        ("nearly flat ellipsoid".into(), body(flat)),
+    ]
 }
 
 /// Rays that must hit a closed convex mesh (or a union of them), aimed at its shared vertices and edges: even ones from inside,

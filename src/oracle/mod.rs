@@ -218,6 +218,17 @@ impl Oracle {
         found
     }
 
+    /// Every primitive that a ray meets, at its nearest hit, in no order.
+    pub fn all(&self, ray: impl Into<OracleRay>, mut see: impl FnMut(&OracleHit)) {
+        let ray = ray.into();
+        self.bvh.visit(&ray, self.pad(&ray), ray.tmax, |index| {
+            if let Some(hit) = self.hit(index, &ray) {
+                see(&hit);
+            }
+            std::ops::ControlFlow::Continue(ray.tmax)
+        });
+    }
+
     /// [`Oracle::closest`] without the BVH.
     pub fn brute_force_closest(&self, ray: impl Into<OracleRay>) -> OracleHit {
         let ray = ray.into();

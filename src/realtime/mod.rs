@@ -271,8 +271,13 @@ impl Realtime {
 
     /// Discards the history as [`Realtime::reset`] does, and restarts the sampler at the first frame.
     pub fn rewind(&mut self) {
+        self.start_at(0);
+    }
+
+    /// Discards the history, and gives the next frame this number, by which samples are chosen. After the last number of 32 bits comes 0.
+    pub fn start_at(&mut self, frame: u32) {
         self.reset();
-        self.state.frame = 0;
+        self.state.frame = frame;
     }
 
     /// Renders the next frame. `moved` is what has moved in the scene since the previous one ([`crate::tracer::UpdateStats::moved`]).

@@ -112,7 +112,7 @@ impl Inventory {
 }
 
 /// Edges of one triangle only, where vertices at the same place are one.
-fn open_edges(mesh: &TriangleMesh) -> u64 {
+pub(crate) fn open_edges(mesh: &TriangleMesh) -> u64 {
     let mut places: HashMap<[u32; 3], u32> = HashMap::with_capacity(mesh.positions.len());
     // 0 and -0 are one place
     let key = |p: Vec3| (p + Vec3::ZERO).to_array().map(f32::to_bits);

@@ -212,12 +212,17 @@ pub fn coarse_coordinates(rays: usize) -> (Scene, Vec<Ray>) {
     (scene, set)
 }
 
-/// `count` times the same triangle: no plane divides them. The second scene has it once.
-pub fn coincident(count: u32) -> [Scene; 2] {
+/// `count` times the same triangle, of the same vertices or each of its own: no plane divides them. The second scene has it once.
+pub fn coincident(count: u32, own_vertices: bool) -> [Scene; 2] {
     let corners = [DVec3::new(-1.0, -0.5, 0.1), DVec3::new(1.0, -0.4, -0.2), DVec3::new(0.1, 1.0, 0.3)];
-    let mut mesh = TriangleMesh { positions: corners.map(|p| p.as_vec3()).to_vec(), ..Default::default() };
-    mesh.indices = vec![[0, 1, 2]; count as usize];
-    [here(Geometry::Triangles(mesh)), here(triangles([corners]))]
+    let once = triangles([corners]);
+    let mut many = once.clone();
+    match &mut many {
+        _ if own_vertices => many = triangles(std::iter::repeat_n(corners, count as usize)),
+        Geometry::Triangles(mesh) => mesh.indices = vec![[0, 1, 2]; count as usize],
+        Geometry::Spheres(_) => {}
+    }
+    [here(many), here(once)]
 }
 
 /// Answers of the oracle that tests every primitive.
@@ -377,9 +382,16 @@ const SECONDS: f64 = 60.0;
 ///
 /// # Errors
 /// Those of tracing: some drivers end long traversals early.
-pub fn check_coincident(setup: &Setup, kind: TracerKind, name: &str, count: u32, watch: &mut Watch) -> Result<Check> {
+pub fn check_coincident(
+    setup: &Setup,
+    kind: TracerKind,
+    name: &str,
+    count: u32,
+    own_vertices: bool,
+    watch: &mut Watch,
+) -> Result<Check> {
     let start = Instant::now();
-    let [many, one] = coincident(count);
+    let [many, one] = coincident(count, own_vertices);
     let oracle = Oracle::new(&one, DVec3::ZERO);
     // few: a ray that meets one meets them all
     let rays = random_rays(&oracle, setup.effort().pick(500, 2000), 4);
@@ -401,8 +413,10 @@ fn coincident_triangles(session: &mut Session) -> Result<()> {
         // drivers test them all
         let most = if kind == TracerKind::Compute { 100_000 } else { effort.pick(10_000, 100_000) };
         for count in [3000, most] {
-            let name = format!("{count} coincident triangles");
-            session.measure(&name, Some(kind), |s, w| check_coincident(s, kind, &name, count, w))?;
+            for (own_vertices, how) in [(false, ""), (true, ", vertices of their own")] {
+                let name = format!("{count} coincident triangles{how}");
+                session.measure(&name, Some(kind), |s, w| check_coincident(s, kind, &name, count, own_vertices, w))?;
+            }
         }
     }
     Ok(())
@@ -450,8 +464,9 @@ pub const FILES: &[(&str, [&str; 3], bool)] = &[
     ("1e38", ["1e38 0 0", "0 1e38 0", "0 0 1e38"], true),
     ("1e39, which overflows", ["1e39 0 0", "0 1 0", "0 0 1"], true),
     ("1e12", ["1e12 0 0", "0 1e12 0", "0 0 1e12"], false),
-    ("1e-30", ["1e-30 0 0", "0 1e-30 0", "0 0 1e-30"], false),
-    ("denormal 1e-40", ["1e-40 0 0", "0 1e-40 0", "0 0 1e-40"], false),
+    ("2e-12", ["2e-12 0 0", "0 2e-12 0", "0 0 2e-12"], false),
+    ("1e-30", ["1e-30 0 0", "0 1e-30 0", "0 0 1e-30"], true),
+    ("denormal 1e-40", ["1e-40 0 0", "0 1e-40 0", "0 0 1e-40"], true),
 ];
 
 /// The right answer, or an error that names the file: what may not load must not, and what loads renders to numbers.
@@ -475,10 +490,7 @@ pub fn check_file(
         Ok(_) if must_fail => return Ok(Check::failed(name, "loaded, and should have been refused")),
         Ok(scene) => unsound_values(&full_tracer(setup, kind, &scene)?, &scene, watch)?,
     };
-    // squares of lengths underflow: what a driver's triangle test makes of that is its affair
-    let is_ours = kind == TracerKind::Compute || !name.contains("1e-30");
-    let sentence = "loaded; values of its images that are no numbers";
-    Ok(Check::none_of(name, bad as u64, "values", is_ours).says(sentence))
+    Ok(Check::none_of(name, bad as u64, "values", true).says("loaded; values of its images that are no numbers"))
 }
 
 fn files(session: &mut Session) -> Result<()> {

@@ -1,4 +1,4 @@
-//! Section 8, filters and display: constants through every filter, extreme radiance and NaN through every tone map and the sRGB transfer function.
+//! Section 8, filters and display: constants and hot pixels ([`super::hot_pixel`]) through every filter, extreme radiance and NaN through every tone map and the sRGB transfer function.
 
 use glam::DVec3;
 
@@ -18,7 +18,7 @@ use crate::tracer::{Tracer, TracerKind};
 pub const SECTION: Section = Section {
     name: "display",
     title: "Filters and display",
-    about: "constants through filters bit for bit, radiance of 1e30, negative and NaN, monotone tone maps",
+    about: "constants and single hot pixels through filters, radiance of 1e30, negative and NaN, monotone tone maps",
     of_scene: false,
     run,
 };
@@ -82,6 +82,7 @@ fn run(session: &mut Session) -> Result<()> {
         Ok(Check::at_most(name, value, "of 1", 1e-6).says(format!("NaN becomes {}, infinity {}", bytes[0], bytes[6])))
     })?;
     constants(session)?;
+    super::hot_pixel::run(session)?;
     extremes(session)
 }
 

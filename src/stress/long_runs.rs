@@ -1,4 +1,4 @@
-//! Section 7, long runs: films of very many samples, films that are stopped and resumed, and histories of many frames.
+//! Section 7, long runs: films of very many samples, films that are stopped and resumed, histories of many frames, and counters ([`super::counters`]).
 
 use std::sync::Arc;
 
@@ -24,7 +24,7 @@ use crate::tracer::{Tracer, TracerKind};
 pub const SECTION: Section = Section {
     name: "long-runs",
     title: "Long runs",
-    about: "films of a million samples against f64, films stopped and resumed, histories of many frames on constant and alternating input",
+    about: "films of a million samples against f64, films stopped and resumed, histories of many frames on constant and alternating input, counters past 2^24 and up to 2^32",
     of_scene: false,
     run,
 };
@@ -33,7 +33,7 @@ pub const SECTION: Section = Section {
 const DRIFT: f64 = 1e-6;
 
 /// Radiance of the environment of [`constant`].
-const RADIANCE: [f32; 3] = [0.1, 0.7, 3.3];
+pub(super) const RADIANCE: [f32; 3] = [0.1, 0.7, 3.3];
 
 /// Pixels that see the same all the time, a radiance that single precision forgets most of when it is added often.
 pub fn constant() -> Scene {
@@ -135,7 +135,8 @@ fn run(session: &mut Session) -> Result<()> {
 
     let turns = effort.pick(20, 5000);
     let name = format!("{} frames to and fro", turns * 20);
-    session.measure_each(&name, &kinds, |s, kind, w| level(s, kind, &name, turns, w))
+    session.measure_each(&name, &kinds, |s, kind, w| level(s, kind, &name, turns, w))?;
+    super::counters::run(session)
 }
 
 /// Sums that differ between a film in one go and one that was stopped `stops` times.

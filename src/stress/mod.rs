@@ -16,12 +16,16 @@
 
 pub mod closed_forms;
 pub mod contact;
+pub mod counters;
 pub mod degenerate;
 pub mod determinism;
+pub mod direct_light;
 pub mod display;
+pub mod hot_pixel;
 #[cfg(feature = "report")]
 pub mod html;
 pub mod long_runs;
+pub mod overlaps;
 pub mod sampling;
 pub mod scale;
 pub mod scene;

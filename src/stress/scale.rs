@@ -5,17 +5,15 @@ use base64::Engine as _;
 use glam::{DAffine3, DMat3, DQuat, DVec3, Vec3};
 
 use super::closed_forms::{self, Case, on_plane, options};
-use super::sampling;
 use super::{Check, Section, Session, Setup, Watch};
 use crate::accel::flatten::FlatScene;
 use crate::error::{Error, Result};
-use crate::integrators::path::PathOptions;
 use crate::integrators::rays::{Mode, trace};
 use crate::oracle::OracleRay;
 use crate::oracle::closed_form as exact;
 use crate::ray::Ray;
-use crate::scene::builtin::{self, SceneTransform, analytic, shapes};
-use crate::scene::{Camera, Geometry, Light, LightKind, Scene, load};
+use crate::scene::builtin::{self, SceneTransform, analytic};
+use crate::scene::{Camera, Geometry, Scene, load};
 use crate::tracer::{Needs, Tracer, TracerKind};
 
 /// See the module's text.
@@ -70,11 +68,15 @@ pub fn linear_maps() -> Vec<(&'static str, DMat3)> {
 /// The same scene in the world, but for rounding, with `map` in the transforms of its triangle meshes and its inverse in their vertices.
 pub fn through(scene: &Scene, map: &DMat3) -> Scene {
     let mut out = scene.clone();
-    let (inverse, map) = (map.inverse(), DAffine3::from_mat3(*map));
+    let (inverse, mirrors, map) = (map.inverse(), map.determinant() < 0.0, DAffine3::from_mat3(*map));
     for mesh in &mut out.meshes {
         if let Geometry::Triangles(t) = &mut mesh.geometry {
             t.positions.iter_mut().for_each(|p| *p = (inverse * p.as_dvec3()).as_vec3());
             t.normals.clear();
+            // such a transform turns faces over
+            if mirrors {
+                t.indices.iter_mut().for_each(|t| t.swap(1, 2));
+            }
         }
     }
     for instance in &mut out.instances {
@@ -252,58 +254,8 @@ fn run(session: &mut Session) -> Result<()> {
             session.measure_each(&name, &kinds, |s, kind, w| check_form(s, kind, &name, &form, effort.pick(256, 4096), w))?;
         }
     }
-    lights(session)?;
+    super::direct_light::run(session)?;
     georeferenced(session)
-}
-
-const ALBEDO: f64 = 0.6;
-
-/// A floor of `scale` units that a light of each kind meets, and the radiance that it reflects. The camera sees its middle.
-pub fn lit_floors(scale: f64) -> Vec<(&'static str, Scene, f64)> {
-    let at = DVec3::new(0.6, 0.8, 0.0) * scale;
-    let lit = |kind: LightKind, intensity: f64| {
-        let camera = Camera::look_at(DVec3::new(0.0, 0.1 * scale, 0.0), DVec3::ZERO, DVec3::Z, 0.02);
-        let mut scene =
-            sampling::scene_of(vec![(shapes::floor(DVec3::ZERO, 10.0 * scale), sampling::matte(ALBEDO as f32))], camera);
-        let direction = -at.normalize();
-        let intensity = Vec3::splat(intensity as f32);
-        scene.lights.push(Light { name: String::new(), kind, intensity, position: at, direction, range: f64::INFINITY });
-        scene
-    };
-    let reflected = ALBEDO / std::f64::consts::PI * 3.0 * 0.8;
-    let far = 3.0 * scale * scale;
-    let spot = LightKind::Spot { inner_angle: 0.2, outer_angle: 0.4 };
-    // a sphere under a half angle a, its centre at angle t from the normal: pi L sin^2 a cos t
-    let (mut ball, radius) = (lit(LightKind::Point, 0.0), 0.2);
-    ball.lights.clear();
-    let emitter = sampling::emitter(5.0);
-    sampling::add(&mut ball, shapes::sphere(at, radius * scale), emitter);
-    let of_ball = ALBEDO * 5.0 * radius * radius * 0.8;
-    vec![
-        ("point light", lit(LightKind::Point, far), reflected),
-        ("spot light", lit(spot, far), reflected),
-        ("directional light", lit(LightKind::Directional { angle: 0.0 }, 3.0), reflected),
-        ("emitting sphere", ball, of_ball),
-    ]
-}
-
-fn lights(session: &mut Session) -> Result<()> {
-    let (kinds, effort) = (session.setup().shading_tracers(), session.setup().effort());
-    for scale in [1e-6, 1e-3, 1.0, 1e3, 1e6] {
-        for (what, scene, expected) in lit_floors(scale) {
-            let name = format!("{what}, scale {scale:e}");
-            let options = PathOptions { size: [16, 16], spp: effort.pick(16, 1024), seed: 5, ..Default::default() };
-            session.measure_each(&name, &kinds, |s, kind, w| {
-                sampling::check_mean(s, kind, &name, &scene, &options, expected, 2e-6, w)
-            })?;
-        }
-        let furnace = sampling::furnace(scale, sampling::matte(1.0));
-        let name = format!("furnace, matte, scale {scale:e}");
-        let options = PathOptions { size: [16, 16], spp: effort.pick(16, 1024), seed: 5, ..Default::default() };
-        session
-            .measure_each(&name, &kinds, |s, kind, w| sampling::check_mean(s, kind, &name, &furnace, &options, 1.0, 2e-6, w))?;
-    }
-    Ok(())
 }
 
 /// A glTF file with two horizontal squares a millimetre apart, 4e6 metres from the origin: in translations of nested nodes, or (`in_vertices`) in positions.
@@ -342,8 +294,16 @@ pub fn georeferenced_scene(in_vertices: bool) -> Result<Scene> {
         "bufferViews":[{{"buffer":0,"byteLength":96}},{{"buffer":0,"byteOffset":96,"byteLength":48}}],
         "buffers":[{{"uri":"data:application/octet-stream;base64,{data}","byteLength":144}}]}}"#
     );
+    load_text("georeferenced.gltf", &text)
+}
+
+/// Loads a file of this name with this text.
+///
+/// # Errors
+/// [`Error::Output`]; those of the loader.
+pub(super) fn load_text(name: &str, text: &str) -> Result<Scene> {
     let dir = tempfile::tempdir().map_err(|e| Error::write("a temporary folder", &e))?;
-    let file = dir.path().join("georeferenced.gltf");
+    let file = dir.path().join(name);
     std::fs::write(&file, text).map_err(|e| Error::write(&file, &e))?;
     load::load(&file.to_string_lossy())
 }

@@ -10,6 +10,7 @@ use rayon::prelude::*;
 
 use super::closed_forms::{self, options};
 use super::degenerate::{judge, parity_check};
+use super::overlaps::Overlaps;
 use super::sampling::{mean_of, not_finite, render};
 use super::{Check, Section, Session, Setup, Watch, number};
 use crate::accel::flatten::FlatScene;
@@ -436,6 +437,33 @@ pub fn self_hits(
     Ok(Some((same.count(), spawned.len())))
 }
 
+const OVERLAP: &str = "surfaces on one another";
+
+/// Which part of the surface lies on another one.
+fn overlap(scene: &Scene, oracle: &Oracle, points: u32) -> Check {
+    let found = Overlaps::of(oracle, points, 3);
+    let percent = 100.0 * found.covered as f64 / found.points.max(1) as f64;
+    let sentence = match found.example {
+        None => "no triangle lies on another in the same plane".to_owned(),
+        Some(pair) => {
+            let [a, b] = pair.map(|(instance, primitive)| {
+                let at = &scene.instances[instance as usize];
+                let name = if at.name.is_empty() { &scene.meshes[at.mesh].name } else { &at.name };
+                format!("triangle {primitive} of {}", name_or_number(name, instance))
+            });
+            format!(
+                "{} of {} points lie within a rounding of another triangle in their plane, as {a} and {b} do: which one a ray meets is not said",
+                found.covered, found.points
+            )
+        }
+    };
+    Check::reported(OVERLAP, percent, "% of the area").says(sentence)
+}
+
+fn name_or_number(name: &str, number: u32) -> String {
+    if name.is_empty() { format!("instance {number}") } else { format!("`{name}`") }
+}
+
 fn rays(session: &mut Session, kinds: &[TracerKind]) -> Result<()> {
     let effort = session.setup().effort();
     let parity_name = "hits against the f64 oracle";
@@ -452,6 +480,7 @@ fn rays(session: &mut Session, kinds: &[TracerKind]) -> Result<()> {
         session.measure(parity_name, None, |_, _| Ok(Check::not_applicable(parity_name, why)))?;
     } else {
         let oracle = Oracle::new(&scene, scene.origin());
+        session.measure(OVERLAP, None, |s, _| Ok(overlap(&scene, &oracle, s.effort().pick(50_000, 10_000_000))))?;
         let set = mixed_rays(&oracle, &view, effort.pick(30_000, 10_000_000), 1);
         let truth = oracle.trace_closest(&set);
         session.measure_each(parity_name, kinds, |s, kind, w| {

@@ -6,11 +6,10 @@ use super::{Check, Section, Session};
 use crate::error::Result;
 use crate::film::Control;
 use crate::integrators::rays::{Mode, trace};
-use crate::measure::ray_sets::{leak_rays, leak_scenes};
+use crate::measure::ray_sets::{hard_leak_scenes, leak_rays, leak_scenes};
 use crate::oracle::Oracle;
 use crate::ray::{Hit, Ray};
 use crate::scene::builtin::{self, SceneTransform, analytic, shapes};
-use crate::scene::{Geometry, Scene};
 use crate::tracer::{Tracer, TracerKind};
 
 /// See the module's text.
@@ -21,28 +20,6 @@ pub const SECTION: Section = Section {
     of_scene: false,
     run,
 };
-
-/// Closed convex meshes beside [`leak_scenes`]: many triangles, needles (`segments` of them around a point), and nearly flat ones.
-pub fn hard_scenes(levels: u32, segments: u32) -> Vec<(String, Scene)> {
-    let body = |geometry: Geometry| {
-        let mut scene = analytic::closed_box(1.0, SceneTransform::default());
-        scene.meshes[0].geometry = geometry;
-        scene
-    };
-    let mut flat = shapes::icosphere(1.0, 4);
-    if let Geometry::Triangles(mesh) = &mut flat {
-        mesh.positions.iter_mut().for_each(|p| p.y *= 1e-4);
-        mesh.normals.clear();
-    }
-    let round = shapes::icosphere(1.0, levels);
-    let name = format!("round body of {} triangles", round.primitive_count());
-    vec![
-        (name, body(round)),
-        ("cylinder of needles".into(), body(shapes::cylinder(0.02, 4.0, 60))),
-        ("disk of needle fans".into(), body(shapes::cylinder(1.0, 0.01, segments))),
-        ("nearly flat ellipsoid".into(), body(flat)),
-    ]
-}
 
 /// Rays along the axes, from the middle of a closed body that is its own mirror image in each axis out through each of its vertices: two components of each direction are
 /// zero or negative zero, and every plane between triangles is met exactly.
@@ -87,7 +64,7 @@ fn run(session: &mut Session) -> Result<()> {
         let place = SceneTransform { scale, offset: DVec3::splat(offset) };
         scenes.push((format!("box, placed, scale {scale:e}, offset {offset:e}"), analytic::closed_box(1.0, place)));
     }
-    scenes.extend(hard_scenes(effort.pick(6, 8), effort.pick(200, 5000)));
+    scenes.extend(hard_leak_scenes(effort.pick(6, 8), effort.pick(200, 5000)));
     // drivers' own tracers are slower on CPUs, and their leaks are theirs
     let count =
         |kind| if kind == TracerKind::Compute { effort.pick(1_000_000, 100_000_000) } else { effort.pick(150_000, 10_000_000) };

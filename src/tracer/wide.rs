@@ -16,7 +16,7 @@ use super::kernel::Kernel;
 use super::stream::{LAUNCH_RAYS, LaunchMemory};
 use crate::accel::build::{self, MAX_DEPTH};
 use crate::accel::cache::KeyBuilder;
-use crate::accel::flatten::{BlasGroup, FlatScene};
+use crate::accel::flatten::{BlasGroup, FlatScene, TlasInstance};
 use crate::accel::pairs::{self, Fan, Pair};
 use crate::accel::wide::{self, Block, WideBvh};
 use crate::accel::{Aabb, BuildPreset};
@@ -46,10 +46,16 @@ impl Trees {
         let start = Instant::now();
         let top = (!flat.is_single_level()).then(|| {
             let bounds: Vec<_> = groups.iter().map(|g| g.bounds.unwrap_or(Aabb::EMPTY)).collect();
-            tree(instance_boxes(flat, &bounds), options.preset(flat.instances.len()), None, |entry| {
-                // upload() fills in the root, once the groups have their ranges in the array
-                bytemuck::cast(instance_leaf(entry, &flat.instances[entry as usize], 0))
-            })
+            let boxes = instance_boxes(flat, &bounds);
+            // upload() fills in the root, once the groups have their ranges in the array
+            let leaf = |entry: u32| bytemuck::cast(instance_leaf(entry, &flat.instances[entry as usize], 0));
+            match unique_instances(flat) {
+                None => tree(boxes, options.preset(flat.instances.len()), None, leaf),
+                Some(kept) => {
+                    let boxes = kept.iter().map(|&k| boxes[k as usize]).collect();
+                    tree(boxes, options.preset(kept.len()), None, |entry| leaf(kept[entry as usize]))
+                }
+            }
         });
         Self { groups, top, seconds, top_seconds: start.elapsed().as_secs_f64() }
     }
@@ -152,7 +158,7 @@ fn collapse(binary: Bvh2, depth: Option<u32>, leaf: impl Fn(u32) -> Block + Sync
 
 /// Version of cached BVHs. Raise it with every change that makes other blocks of the same input: in builders, pairs, collapse, or the
 /// layout of nodes and leaves.
-const LAYOUT_VERSION: u32 = 4;
+const LAYOUT_VERSION: u32 = 5;
 
 /// The header of a cached BVH, beside its blocks.
 #[repr(C)]
@@ -202,11 +208,21 @@ fn sphere_tree(flat: &FlatScene, group: &BlasGroup, options: &BuildOptions) -> W
         })
         .collect();
     load_or_build(options, preset, &[b"spheres", bytemuck::cast_slice(&spheres)], || {
-        tree(primitive_boxes(flat, group).collect(), preset, None, |primitive| {
+        let leaf = |primitive: u32| {
             let [x, y, z, radius] = spheres[primitive as usize];
             let primitives = [primitive | SPHERE, pairs::NONE];
             bytemuck::cast(SphereLeaf { center: [x, y, z], radius, primitives, ..Default::default() })
-        })
+        };
+        let boxes: Vec<Aabb> = primitive_boxes(flat, group).collect();
+        let opaque = group.opaque_count == group.primitive_count && flat.motion.is_none();
+        let kept = if opaque { firsts(spheres.len() as u32, |k| spheres[k as usize].map(bits)) } else { None };
+        match kept {
+            None => tree(boxes, preset, None, leaf),
+            Some(kept) => {
+                let boxes = kept.iter().map(|&k| boxes[k as usize]).collect();
+                tree(boxes, preset, None, |k| leaf(kept[k as usize]))
+            }
+        }
     })
 }
 
@@ -245,22 +261,13 @@ fn triangle_tree(flat: &FlatScene, group: &BlasGroup, options: &BuildOptions) ->
     })
 }
 
-/// A tree that has opaque triangles of the same three vertices once, the first of them: a ray that meets one meets all of them at the same point, and nothing tells them
-/// apart. Very many would make a traversal that some drivers do not finish.
+/// A tree that has opaque triangles with the same three corners once, the first of them: a ray that meets one meets all of them at the same distance, and which of them it meets is
+/// not said. Very many would make a traversal that some drivers do not finish.
 fn unique_triangle_tree(triangles: &Triangles, opaque: u32, preset: BuildPreset) -> WideBvh {
     let all = &triangles.indices;
-    // a look at some of them: duplicates too rare for it are too few to matter
-    let stride = all.len().div_ceil(SAMPLED_TRIANGLES).max(1);
-    let mut some: Vec<[u32; 3]> = all[..opaque as usize].iter().step_by(stride).map(same_from_first).collect();
-    some.sort_unstable();
-    if !some.windows(2).any(|w| w[0] == w[1]) {
+    let Some(mut numbers) = firsts(opaque, |k| same_from_first(triangles.corners(all[k as usize]))) else {
         return triangle_tree_of(triangles, opaque, preset, None);
-    }
-    let mut order: Vec<(u32, [u32; 3])> = (0..opaque).map(|k| (k, same_from_first(&all[k as usize]))).collect();
-    order.par_sort_unstable_by_key(|(k, t)| (*t, *k));
-    order.dedup_by_key(|(_, t)| *t);
-    let mut numbers: Vec<u32> = order.into_iter().map(|(k, _)| k).collect();
-    numbers.sort_unstable();
+    };
     let kept = numbers.len() as u32;
     numbers.extend(opaque..all.len() as u32);
     let indices = numbers.iter().map(|&k| all[k as usize]).collect();
@@ -275,11 +282,50 @@ fn unique_triangle_tree(triangles: &Triangles, opaque: u32, preset: BuildPreset)
     tree
 }
 
-/// Triangles that are looked at for duplicates.
-const SAMPLED_TRIANGLES: usize = 4096;
+/// Instances of which each is the first of its group at its place; `None`: all of them. As with triangles, rays would meet all of those in one place. Where something may move or
+/// alpha decides, each is held.
+fn unique_instances(flat: &FlatScene) -> Option<Vec<u32>> {
+    let is_opaque = |i: &TlasInstance| {
+        let group = &flat.groups[i.group];
+        group.opaque_count == group.primitive_count
+    };
+    if !flat.motion.is_none() || !flat.instances.iter().all(is_opaque) {
+        return None;
+    }
+    firsts(flat.instances.len() as u32, |k| {
+        let instance = &flat.instances[k as usize];
+        // zero is not two numbers
+        (instance.group, instance.to_world.to_cols_array().map(|x| (x + 0.0).to_bits()))
+    })
+}
 
-/// The triangle's vertices in their order, the smallest first.
-fn same_from_first(t: &[u32; 3]) -> [u32; 3] {
+/// Things that are looked at for duplicates.
+const SAMPLED: usize = 4096;
+
+/// Numbers of the things that are the first with their key, in order; `None` if a look at some of `count` finds no two alike: duplicates too rare for it are too few to matter.
+fn firsts<K: Ord + Send>(count: u32, key: impl Fn(u32) -> K + Sync) -> Option<Vec<u32>> {
+    let stride = (count as usize).div_ceil(SAMPLED).max(1);
+    let mut some: Vec<K> = (0..count).step_by(stride).map(&key).collect();
+    some.sort_unstable();
+    if !some.windows(2).any(|w| w[0] == w[1]) {
+        return None;
+    }
+    let mut order: Vec<(K, u32)> = (0..count).into_par_iter().map(|k| (key(k), k)).collect();
+    order.par_sort_unstable();
+    order.dedup_by(|a, b| a.0 == b.0);
+    let mut numbers: Vec<u32> = order.into_iter().map(|(_, k)| k).collect();
+    numbers.par_sort_unstable();
+    Some(numbers)
+}
+
+/// Bits of a number, the same for both zeros.
+fn bits(x: f32) -> u32 {
+    (x + 0.0).to_bits()
+}
+
+/// The triangle's corners in their order, one and the same of them first.
+fn same_from_first(corners: [Vec3; 3]) -> [[u32; 3]; 3] {
+    let t = corners.map(|p| p.to_array().map(bits));
     let k = (0..3).min_by_key(|k| t[*k]).unwrap_or(0);
     [t[k], t[(k + 1) % 3], t[(k + 2) % 3]]
 }
@@ -393,12 +439,51 @@ mod tests {
         // those that are tested are kept, each
         indices.extend([[0, 1, 2]; 5]);
         let triangles = Triangles { positions, indices };
-        let tree = unique_triangle_tree(&triangles, opaque, BuildPreset::Default);
+        let expected: Vec<u32> = [0, 1, 3].into_iter().chain((opaque..opaque + 5).map(|k| k | ALPHA_TESTED)).collect();
+        assert_eq!(held(&unique_triangle_tree(&triangles, opaque, BuildPreset::Default)), expected);
+        // and where each has vertices of its own, and a zero is negative
+        let mut own = Triangles { positions: Vec::new(), indices: Vec::new() };
+        for (k, t) in triangles.indices.iter().enumerate() {
+            let first = own.positions.len() as u32;
+            own.indices.push([first, first + 1, first + 2]);
+            own.positions.extend(triangles.corners(*t).map(|p| if k % 2 == 0 { p } else { -Vec3::ZERO + p * Vec3::ONE }));
+        }
+        own.positions.iter_mut().skip(9).step_by(4).for_each(|p| p.z = if p.z == 0.0 { -0.0 } else { p.z });
+        assert_eq!(held(&unique_triangle_tree(&own, opaque, BuildPreset::Default)), expected);
+    }
+
+    /// Numbers of the triangles that a tree holds, with their flags.
+    fn held(tree: &WideBvh) -> Vec<u32> {
         let leaves = tree.blocks.iter().filter(|b| wide::is_leaf(b)).map(|b| *bytemuck::cast_ref::<Block, TriangleLeaf>(b));
-        let mut held: Vec<u32> = leaves.flat_map(|l| l.primitives).filter(|id| *id != pairs::NONE).collect();
+        let mut held: Vec<u32> = leaves.flat_map(|l: TriangleLeaf| l.primitives).filter(|id| *id != pairs::NONE).collect();
         held.sort_unstable_by_key(|id| id & !ALPHA_TESTED);
-        let tested = (opaque..opaque + 5).map(|k| k | ALPHA_TESTED);
-        assert_eq!(held, [0, 1, 3].into_iter().chain(tested).collect::<Vec<_>>());
+        held
+    }
+
+    /// Of instances in one place, and of spheres that are the same, the first is held.
+    #[test]
+    fn the_same_instance_and_sphere_is_held_once() {
+        use crate::scene::{Instance, Sphere};
+        let mut scene = builtin::by_name("cornell-box").unwrap();
+        let one =
+            Instance { object_to_world: glam::DAffine3::from_scale(glam::DVec3::splat(1.5)), ..scene.instances[0].clone() };
+        let moved = |x: f64| Instance { object_to_world: glam::DAffine3::from_translation(glam::DVec3::X * x), ..one.clone() };
+        scene.instances = [vec![moved(1.0)], vec![one.clone(); 500], vec![moved(2.0)], vec![moved(1.0)]].concat();
+        let trees = Trees::build(&FlatScene::new(&scene), &BuildOptions::default());
+        let top = trees.top.unwrap();
+        let leaves = top.blocks.iter().filter(|b| wide::is_leaf(b));
+        let mut held: Vec<u32> = leaves.map(|b| bytemuck::cast_ref::<Block, InstanceLeaf>(b).instance).collect();
+        held.sort_unstable();
+        assert_eq!(held, [0, 1, 501]);
+        let sphere = |x: f32| Sphere { center: Vec3::X * x, radius: 1.0 };
+        scene.meshes[0].geometry = Geometry::Spheres([vec![sphere(3.0)], vec![sphere(0.0); 700], vec![sphere(-0.0)]].concat());
+        scene.instances.truncate(1);
+        let flat = FlatScene::new(&scene);
+        let tree = sphere_tree(&flat, &flat.groups[0], &BuildOptions::default());
+        let leaves = tree.blocks.iter().filter(|b| wide::is_leaf(b)).map(|b| *bytemuck::cast_ref::<Block, SphereLeaf>(b));
+        let mut held: Vec<u32> = leaves.map(|l| l.primitives[0] & !SPHERE).collect();
+        held.sort_unstable();
+        assert_eq!(held, [0, 1]);
     }
 
     #[test]

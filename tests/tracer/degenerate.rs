@@ -219,17 +219,18 @@ fn gpu_degenerate_largest_coordinates() {
 /// Many times the same triangle: no plane divides them. The tree must stay shallow, and the answer is any of them.
 #[test]
 fn gpu_degenerate_coincident_triangles() {
-    coincident(3000);
+    coincident(3000, false);
+    coincident(3000, true);
 }
 
 #[test]
 fn gpu_degenerate_very_many_coincident_triangles() {
-    coincident(100_000);
+    coincident(100_000, false);
 }
 
-fn coincident(count: u32) {
+fn coincident(count: u32, own_vertices: bool) {
     let device = device();
-    let [scene, one] = degenerate::coincident(count);
+    let [scene, one] = degenerate::coincident(count, own_vertices);
     let oracle = Oracle::new(&one, DVec3::ZERO);
     // few: a ray that meets one meets them all
     let rays = random_rays(&oracle, rays_or_quarter(2000), 4);

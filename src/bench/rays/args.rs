@@ -21,7 +21,8 @@ const EXAMPLES: &str = "\
 Examples:
   skylit bench rays --quick                              # does everything work?
   skylit bench rays scene.glb --plot rays.svg --json rays.json
-  skylit bench rays --baseline rays.json                 # is anything slower than then?";
+  skylit bench rays --baseline rays.json                 # is anything slower than then?
+  skylit bench rays --edges --rays 10000000              # does anything get through closed meshes?";
 
 /// `skylit bench rays`.
 #[derive(Clone, Debug, Args)]
@@ -51,6 +52,10 @@ pub struct BenchRaysArgs {
     /// Also compare all hits with those of the first kernel; fail on any difference beyond rounding
     #[arg(long)]
     pub check: bool,
+    /// Instead of measuring, send rays at shared edges and vertices of closed meshes through every contestant, as many as --rays says in all, and count those that get through and those
+    /// whose answers the double-precision oracle does not explain; fail on any of the compute tracer's
+    #[arg(long, conflicts_with_all = ["scenes", "streams", "repeats", "baseline", "check", "alpha", "ao_radius"])]
+    pub edges: bool,
     /// Keep alpha masks; otherwise they are treated as opaque, because peers do not support them
     #[arg(long)]
     pub alpha: bool,
@@ -82,6 +87,11 @@ impl BenchRaysArgs {
     /// Timed repeats.
     pub fn repeats(&self) -> u32 {
         self.common.setting(self.repeats, DEFAULT_REPEATS, QUICK_REPEATS)
+    }
+
+    /// Rays of all closed meshes together, with [`BenchRaysArgs::edges`].
+    pub fn edge_rays(&self) -> usize {
+        self.common.setting(self.rays, DEFAULT_RAYS, QUICK_RAYS) as usize
     }
 
     /// Pixels of the image whose rays are traced: 16:9, multiples of 8.

@@ -3,6 +3,7 @@
 
 mod args;
 mod contestant;
+mod edges;
 mod peer;
 mod scenes;
 mod streams;
@@ -61,7 +62,7 @@ pub fn run(args: &BenchRaysArgs) -> Result<(), Failure> {
     let measured = measure(&mut session, &scenes.sources, specs);
     session.record.find_scaling();
     let shown = session.show(&table::scaling(&session.record));
-    let agreed = check_agreement(args, &session.record);
+    let agreed = check_agreement(args, &session.record).and(edges::verdict(&session.record.edges));
     session.finish(measured, !args.scenes.is_empty(), shown.and(agreed))
 }
 
@@ -97,6 +98,9 @@ fn measure(session: &mut RaySession, scenes: &[String], specs: Result<Vec<PeerSp
     session.record.peers = session.peer_titles();
     let title = table::title(&session.record);
     session.show(&[Block::Line(title)])?;
+    if session.args.edges {
+        return session.edges();
+    }
     session.expect_jobs(scenes.len());
     for source in scenes {
         session.job(source, |session| {

@@ -6,7 +6,7 @@ use crate::bench::table::{Block, header, number, optional, thousands};
 /// All tables of a record.
 pub fn blocks(record: &RayBenchmark) -> Vec<Block> {
     let scenes = record.scenes.iter().flat_map(|s| scene(s, &record.baselines));
-    [Block::Line(title(record))].into_iter().chain(scenes).chain(scaling(record)).collect()
+    [Block::Line(title(record))].into_iter().chain(scenes).chain(scaling(record)).chain(edges(record)).collect()
 }
 
 /// Device and settings.
@@ -114,4 +114,18 @@ pub fn scaling(benchmark: &RayBenchmark) -> Vec<Block> {
         ]);
     }
     vec![Block::gap(), Block::Table { title: "How rates fall with size", rows, left: 3 }]
+}
+
+/// What became of rays at edges.
+pub fn edges(benchmark: &RayBenchmark) -> Vec<Block> {
+    if benchmark.edges.is_empty() {
+        return Vec::new();
+    }
+    let titles = ["at edges", "meshes", "rays", "leaks, any", "leaks, closest", "agree", "ties", "unexplained"];
+    let mut rows = vec![header(&titles)];
+    rows.extend(benchmark.edges.iter().map(|e| {
+        let counts = [u64::from(e.meshes), e.rays, e.leaks_any, e.leaks_closest, e.agree, e.ties, e.unexplained];
+        [vec![e.contestant.clone()], counts.map(thousands).to_vec()].concat()
+    }));
+    vec![Block::gap(), Block::Table { title: "Rays at shared edges and vertices of closed meshes", rows, left: 1 }]
 }

@@ -32,6 +32,9 @@ pub struct RayBenchmark {
     pub scenes: Vec<SceneRecord>,
     /// How rates fall with size, over families of scenes.
     pub scaling: Vec<ScalingRecord>,
+    /// What became of rays at edges of closed meshes, with `--edges`.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub edges: Vec<EdgeRecord>,
     /// What is missing.
     #[serde(flatten)]
     pub completeness: Completeness,
@@ -181,6 +184,41 @@ impl CheckRecord {
     }
 }
 
+/// What became of a contestant's rays at shared edges and vertices of closed meshes.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct EdgeRecord {
+    /// Name of the contestant.
+    pub contestant: String,
+    /// Meshes.
+    pub meshes: u32,
+    /// Rays; fewer than the set's for slow tracers.
+    pub rays: u64,
+    /// Rays that met nothing, asked for any hit.
+    pub leaks_any: u64,
+    /// Rays that met nothing, asked for the closest.
+    pub leaks_closest: u64,
+    /// Closest hits that are the oracle's: the same primitive at the same distance but for rounding.
+    pub agree: u64,
+    /// Other answers that rounding allows: at an edge, either side of it, or none.
+    pub ties: u64,
+    /// All other answers.
+    pub unexplained: u64,
+    /// Whether leaks are a failure: those of the compute tracer are.
+    pub is_watertight: bool,
+    /// Whether unexplained answers are a failure.
+    pub strict: bool,
+    /// The first of the unexplained.
+    pub examples: Vec<String>,
+}
+
+impl EdgeRecord {
+    /// Is it a failure?
+    pub fn fails(&self) -> bool {
+        self.is_watertight && self.leaks_any + self.leaks_closest > 0 || self.strict && self.unexplained > 0
+    }
+}
+
 /// How one contestant's rate on one stream falls over a family of scenes.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct ScalingRecord {
@@ -246,7 +284,7 @@ impl BenchRecord for RayBenchmark {
     }
 
     fn is_empty(&self) -> bool {
-        self.rows().next().is_none()
+        self.rows().next().is_none() && self.edges.is_empty()
     }
 
     /// A ratio column for each baseline.
@@ -381,6 +419,15 @@ mod tests {
         assert!(!check(true, 0, 0) && !check(false, 3, 0));
         // the reference's own answers count whoever is beside it
         assert!(check(true, 1, 0) && check(false, 1, 1));
+    }
+
+    #[test]
+    fn who_fails_at_edges() {
+        let record = |is_watertight, strict, leaks_any, unexplained| {
+            EdgeRecord { is_watertight, strict, leaks_any, unexplained, ..Default::default() }.fails()
+        };
+        assert!(!record(true, true, 0, 0) && !record(false, true, 7, 0) && !record(false, false, 0, 3));
+        assert!(record(true, true, 1, 0) && record(false, true, 0, 1));
     }
 
     #[test]

@@ -8,6 +8,7 @@ use rayon::prelude::*;
 use super::rays::camera_ray;
 use super::{Survey, Trace, VisibleSurface};
 use crate::error::{Error, Result};
+use crate::scene::inventory::open_edges;
 use crate::scene::{Camera, Geometry, Scene};
 use crate::settings::choices;
 
@@ -83,13 +84,14 @@ const MAX_POINTS: u64 = 8_000_000;
 
 /// Chooses a camera for images of `aspect` = width / height, with this vertical field of view in radians, if one is given. Inside means: from the middle of the scene there is something in
 /// nearly all horizontal directions, seen from its front, and none of it close. Then it is the place and direction with the longest view; else the camera sees
-/// the whole scene, from the side that shows most fronts and most directions of surfaces.
+/// the whole scene, from the side that shows most fronts and most directions of surfaces. A hollow body that shows its fronts to the outside, as a bottle does, is seen from there.
 ///
 /// # Errors
 /// Those of `trace`; [`Error::Scene`] for a scene without geometry.
 pub fn choose(scene: &Scene, aspect: f64, fov_y: Option<f64>, trace: &Trace) -> Result<Camera> {
     let bounds = scene.bounds().ok_or_else(no_geometry)?;
-    if !is_room(bounds, trace)? {
+    let is_room = is_room(bounds, trace)?;
+    if !is_room || is_body(scene) {
         let (outside, score) = outside(scene, aspect, fov_y, trace)?;
         if score >= 0.0 {
             return Ok(outside);
@@ -191,6 +193,15 @@ fn is_room((lo, hi): (DVec3, DVec3), trace: &Trace) -> Result<bool> {
         }
     }
     Ok(true)
+}
+
+/// Whether the scene is one thing with walls that have a thickness: a mesh without open edges, in one place. Rooms are made of several, or their walls are sheets that face inwards.
+fn is_body(scene: &Scene) -> bool {
+    let [instance] = &scene.instances[..] else { return false };
+    match &scene.meshes[instance.mesh].geometry {
+        Geometry::Triangles(mesh) => open_edges(mesh) == 0,
+        Geometry::Spheres(_) => false,
+    }
 }
 
 /// What the rays of a view see.
@@ -341,6 +352,35 @@ mod tests {
             let eye = of_scene(&Survey::new(&scene), 1.5, None).unwrap().camera_to_world.translation;
             assert_eq!(eye.cmpgt(lo).all() && eye.cmplt(hi).all(), inside, "{name}: {eye}");
         }
+    }
+
+    /// A box in a box, one mesh whose inner side faces what is between its walls.
+    #[test]
+    fn hollow_bodies_are_seen_from_outside() {
+        let mut scene = builtin::by_name("closed-box").unwrap();
+        let Geometry::Triangles(mesh) = &mut scene.meshes[0].geometry else { panic!("no triangles") };
+        let count = mesh.positions.len() as u32;
+        let middle = mesh.positions.iter().sum::<glam::Vec3>() / count as f32;
+        let inner: Vec<glam::Vec3> = mesh.positions.iter().map(|p| middle + (*p - middle) * 0.9).collect();
+        mesh.positions.extend(inner);
+        let turned: Vec<[u32; 3]> = mesh.indices.iter().map(|&[a, b, c]| [a, c, b].map(|k| k + count)).collect();
+        mesh.indices.extend(turned);
+        mesh.normals.clear();
+        mesh.texcoords.iter_mut().for_each(|t| t.clear());
+        let (lo, hi) = scene.bounds().unwrap();
+        let eye = |scene: &Scene| of_scene(&Survey::new(scene), 1.5, None).unwrap().camera_to_world.translation;
+        let is_inside = |p: DVec3| p.cmpgt(lo).all() && p.cmplt(hi).all();
+        assert!(!is_inside(eye(&scene)));
+        // as two meshes it is a room with thick walls
+        let mut walls = scene.clone();
+        let Geometry::Triangles(mesh) = &mut walls.meshes[0].geometry else { panic!("no triangles") };
+        let inside = mesh.indices.split_off(mesh.indices.len() / 2);
+        let mut second = walls.meshes[0].clone();
+        let Geometry::Triangles(mesh) = &mut second.geometry else { panic!("no triangles") };
+        mesh.indices = inside;
+        walls.meshes.push(second);
+        walls.instances.push(Instance { mesh: 1, ..walls.instances[0].clone() });
+        assert!(is_inside(eye(&walls)));
     }
 
     #[test]

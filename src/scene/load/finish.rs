@@ -15,6 +15,9 @@ use crate::scene::{AnimationRig, Geometry, Instance, Material, Mesh, Scene, Tria
 /// and rays would miss.
 const MAX_COORDINATE: f64 = 1e12;
 
+/// Smallest extent of a scene: below it products of lengths are lost in single precision, those of drivers' triangle tests first.
+const MIN_EXTENT: f64 = 1e-12;
+
 /// Largest element of an inverse transform, for the same reason.
 const MAX_INVERSE: f64 = 1e30;
 
@@ -299,8 +302,18 @@ fn extent(scene: &Scene, path: &Path) -> Result<()> {
         let name = path.display();
         return Err(Error::Scene(format!("{name}: the scene has no triangles and no spheres{why}: nothing to render")));
     };
-    if lo.abs().max(hi.abs()).max_element() <= MAX_COORDINATE {
-        return Ok(());
+    if lo.abs().max(hi.abs()).max_element() > MAX_COORDINATE {
+        return Err(Error::Scene(format!(
+            "{}: the scene reaches beyond {MAX_COORDINATE:e} units: scale it down",
+            path.display()
+        )));
     }
-    Err(Error::Scene(format!("{}: the scene reaches beyond {MAX_COORDINATE:e} units: scale it down", path.display())))
+    let size = (hi - lo).max_element();
+    if size < MIN_EXTENT {
+        return Err(Error::Scene(format!(
+            "{}: the scene is {size:.1e} units large, and single precision has the products of three lengths from {MIN_EXTENT:e} on: scale it up",
+            path.display()
+        )));
+    }
+    Ok(())
 }

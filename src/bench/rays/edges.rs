@@ -1,0 +1,134 @@
+//! `skylit bench rays --edges`: rays aimed at shared edges and vertices of closed meshes, through our tracers and those of others. None may get through; and what is met is held against the
+//! double-precision oracle.
+
+use super::contestant::Contestant;
+use super::{RaySession, table};
+use crate::accel::flatten::FlatScene;
+use crate::bench::peers::process::PeerError;
+use crate::bench::record::rays::EdgeRecord;
+use crate::error::{Error, Result};
+use crate::integrators::rays::Mode;
+use crate::measure::parity::judge_closest;
+use crate::measure::ray_sets::{hard_leak_scenes, leak_rays, leak_scenes};
+use crate::oracle::rounding::Rounding;
+use crate::oracle::{Oracle, OracleHit};
+use crate::ray::{Hit, Ray};
+use crate::scene::Scene;
+use crate::terminal::interrupt;
+use crate::tracer::TracerKind;
+
+/// Seed of the rays.
+const SEED: u32 = 7;
+/// On a CPU, drivers' own tracers get one in this many rays.
+const SLOW: usize = 16;
+/// Examples of answers that nothing explains, by contestant.
+const MAX_EXAMPLES: usize = 4;
+/// Levels of the round body and segments of the disk, of many triangles each.
+const HARD: (u32, u32) = (7, 1000);
+
+impl RaySession<'_> {
+    /// Sends the rays, and leaves the result in the record.
+    ///
+    /// # Errors
+    /// Those of our own side; Ctrl-C.
+    pub(super) fn edges(&mut self) -> Result<()> {
+        let mut scenes = leak_scenes();
+        scenes.extend(hard_leak_scenes(HARD.0, HARD.1));
+        let each = (self.args.edge_rays() / scenes.len()).max(1);
+        self.expect_jobs(scenes.len());
+        for (name, scene) in &scenes {
+            self.job(name, |session| session.edges_of(name, scene, each))?;
+        }
+        self.show(&table::edges(&self.record))
+    }
+
+    fn edges_of(&mut self, name: &str, scene: &Scene, count: usize) -> Result<()> {
+        let flat = FlatScene::new(scene);
+        let contestants = self.contestants(name, &flat)?;
+        self.phase(format!("{name}: rays and what they meet in double precision"));
+        let oracle = Oracle::new(scene, scene.origin());
+        let rays = leak_rays(&oracle, count, SEED);
+        let truth = oracle.trace_closest(&rays);
+        // double precision is no exact arithmetic: at a vertex it may miss, too
+        let missed = truth.iter().filter(|h| !h.is_hit()).count();
+        if missed > 0 {
+            self.note(format!("{name}: the oracle itself misses {missed} of {} rays", rays.len()));
+        }
+        for (done, contestant) in contestants.iter().enumerate() {
+            self.phase(format!("{name}: '{}'", contestant.name));
+            match self.edges_by(contestant, &oracle, &rays, &truth) {
+                Ok(found) => self.add_edges(found),
+                Err(PeerError::Ours(e)) => return Err(e),
+                Err(PeerError::Failed(why)) => self.note(format!("{name}: '{}' left out: {why}", contestant.name)),
+            }
+            interrupt::check()?;
+            self.advance((done + 1) as f64 / contestants.len() as f64);
+        }
+        Ok(())
+    }
+
+    fn edges_by(
+        &mut self,
+        contestant: &Contestant,
+        oracle: &Oracle,
+        rays: &[Ray],
+        truth: &[OracleHit],
+    ) -> Result<EdgeRecord, PeerError> {
+        let own = contestant.tracer();
+        let is_watertight = own.is_some_and(|t| t.kind() == TracerKind::Compute);
+        let is_slow = own.is_some() && !is_watertight && self.device.info().is_cpu();
+        let count = if is_slow { rays.len().div_ceil(SLOW) } else { rays.len() };
+        let (rays, truth) = (&rays[..count], &truth[..count]);
+        let missed = |hits: &[Hit]| hits.iter().filter(|h| !h.is_hit()).count() as u64;
+        let any = contestant.hits(&mut self.peers, rays, Mode::Any, &mut self.control)?;
+        let closest = contestant.hits(&mut self.peers, rays, Mode::Closest, &mut self.control)?;
+        let report = judge_closest(oracle, rays, &closest, truth, Rounding::default());
+        let examples = report.to_string().lines().skip(1).take(MAX_EXAMPLES).map(|l| l.trim().to_owned()).collect();
+        Ok(EdgeRecord {
+            contestant: contestant.name.clone(),
+            meshes: 1,
+            rays: report.rays,
+            leaks_any: missed(&any),
+            leaks_closest: missed(&closest),
+            agree: report.agree,
+            ties: report.ties,
+            unexplained: report.unexplained,
+            is_watertight,
+            strict: is_watertight,
+            examples,
+        })
+    }
+
+    fn add_edges(&mut self, found: EdgeRecord) {
+        match self.record.edges.iter_mut().find(|e| e.contestant == found.contestant) {
+            None => self.record.edges.push(found),
+            Some(sum) => {
+                sum.meshes += found.meshes;
+                sum.rays += found.rays;
+                sum.leaks_any += found.leaks_any;
+                sum.leaks_closest += found.leaks_closest;
+                sum.agree += found.agree;
+                sum.ties += found.ties;
+                sum.unexplained += found.unexplained;
+                sum.examples.extend(found.examples);
+                sum.examples.truncate(MAX_EXAMPLES);
+            }
+        }
+    }
+}
+
+/// Leaks of the compute tracer, and answers of it that nothing explains, are a failure.
+pub(super) fn verdict(edges: &[EdgeRecord]) -> Result<()> {
+    match edges.iter().find(|e| e.fails()) {
+        None => Ok(()),
+        Some(e) => Err(Error::CheckFailed(format!(
+            "'{}': of {} rays at edges of closed meshes {} leave them asked for any hit, {} asked for the closest, and {} meet what rounding does not explain ({})",
+            e.contestant,
+            e.rays,
+            e.leaks_any,
+            e.leaks_closest,
+            e.unexplained,
+            e.examples.first().map_or("no example", String::as_str)
+        ))),
+    }
+}

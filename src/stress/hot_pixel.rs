@@ -1,0 +1,241 @@
+//! A single hot pixel through every filter, of stills and of frames. Part of section 8, [`super::display`].
+//!
+//! A filter averages: what it makes of a pixel that is far brighter than the others is nowhere brighter than that pixel was nor darker than the others were, no farther away than
+//! the filter reaches, and a number, up to the radiance at which a sample counts as infinite.
+
+use glam::{DAffine3, DVec3};
+
+use super::sampling::{self, emitter, matte, scene_of};
+use super::{Check, Session, Setup, Watch};
+use crate::accel::flatten::FlatScene;
+use crate::denoise::{self, DenoiseInput, Denoiser, Features};
+use crate::error::Result;
+use crate::film::Film;
+use crate::film::camera::CameraRecord;
+use crate::integrators::path::PathOptions;
+use crate::realtime::{Filter, FilterKind, Realtime, Settings};
+use crate::scene::builtin::{SceneTransform, analytic, shapes};
+use crate::scene::{Camera, Light, LightKind, Scene};
+use crate::tracer::{Tracer, TracerKind};
+
+/// Radiance of hot pixels beside one of [`COLD`]: what a firefly has, and nearly what counts as infinite.
+pub const HOT: [f32; 3] = [1e3, 1e10, 4e29];
+/// Radiance of the other pixels of a still.
+pub const COLD: f32 = 0.25;
+/// Frames in which the camera moves before it rests.
+const MOVES: u32 = 6;
+/// Albedo of the floors.
+const ALBEDO: f32 = 0.5;
+/// Rounding, relative to the hot pixel or to the others.
+const ROUNDING: f32 = 1e-4;
+
+/// What became of a hot pixel.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Spread {
+    /// Values that are no numbers, brighter than the hot pixel or darker than the others.
+    pub unsound: usize,
+    /// Values beyond the filter's reach that are not those of the others.
+    pub far: usize,
+    /// Radiance above that of the others, of all pixels together, over that of the hot pixel.
+    pub total: f64,
+}
+
+impl Spread {
+    /// Counts an image of which pixel `k` is beyond reach where `is_far(k)`.
+    pub fn of(image: &[f32], cold: f32, hot: f32, is_far: impl Fn(usize) -> bool) -> Self {
+        let mut out = Self::default();
+        for (k, pixel) in image.chunks(3).enumerate() {
+            for &value in pixel {
+                out.unsound += usize::from(!(value >= cold * (1.0 - ROUNDING) && value <= hot * (1.0 + ROUNDING)));
+                out.far += usize::from(is_far(k) && !((value - cold).abs() <= cold * ROUNDING));
+                out.total += f64::from(value - cold) / f64::from(hot - cold) / 3.0;
+            }
+        }
+        out
+    }
+
+    fn check(&self, name: &str) -> Check {
+        Check::at_most(name, (self.unsound + self.far) as f64, "values", 0.0).says(format!(
+            "{} are no numbers or out of range, {} changed beyond its reach; what is brighter adds up to {:.3} of the hot pixel",
+            self.unsound, self.far, self.total
+        ))
+    }
+}
+
+/// How far a filter reaches, in pixels along each axis.
+fn reach(filter: &Filter) -> u32 {
+    let steps = filter.steps();
+    let along = |axis: usize| steps.iter().filter(|s| s.sides[axis]).map(|s| s.radius * s.stride).sum::<u32>();
+    along(0).max(along(1))
+}
+
+/// A film of [`COLD`] with one hot pixel in its middle. With noise, a variance is that of a pixel of which one sample is all there is, as films have it: that of the
+/// hottest overflows.
+pub fn film(size: u32, hot: f32, noisy: bool) -> Film {
+    let spp = 16u32;
+    let mut film = Film::new(size, size, 3);
+    film.mean.fill(COLD);
+    film.samples.fill(spp);
+    film.coverage.fill(1.0);
+    if noisy {
+        film.variance.fill(0.01);
+    }
+    let middle = (size * size / 2) as usize;
+    for c in 0..3 {
+        film.mean[3 * middle + c] = hot;
+        film.variance[3 * middle + c] = if noisy { (f64::from(hot).powi(2) * f64::from(spp)) as f32 } else { 0.0 };
+    }
+    film
+}
+
+/// What a still's filter makes of a film with a hot pixel.
+///
+/// # Errors
+/// Those of rendering and filtering.
+pub fn still(setup: &Setup, kind: TracerKind, filter: FilterKind, hot: f32, noisy: bool, watch: &mut Watch) -> Result<Spread> {
+    const SIZE: u32 = 33;
+    let camera = Camera::look_at(DVec3::new(0.0, 10.0, 0.0), DVec3::ZERO, DVec3::Z, 0.6);
+    let scene = scene_of(vec![(shapes::floor(DVec3::ZERO, 100.0), matte(ALBEDO))], camera);
+    let flat = FlatScene::for_paths(&scene);
+    let tracer = super::scale::path_tracer(setup, kind, &flat)?;
+    let record = CameraRecord::new(&scene.cameras[0], flat.origin, 1.0);
+    let options = PathOptions { size: [SIZE, SIZE], ..Default::default() };
+    let shot = DenoiseInput { tracer: &tracer, scene: &scene, camera: &record, options: &options };
+    let features = Features::render(&shot, watch)?;
+    let settings = denoise::Settings { kind: filter, ..Default::default() };
+    let film = film(SIZE, hot, noisy);
+    let image = Denoiser::Filter(settings).denoise(&shot, &film, &features, watch)?;
+    let reach = reach(&Filter { kind: filter, radius: settings.radius, samples: f32::MAX });
+    let is_far = |k: usize| [k as u32 % SIZE, k as u32 / SIZE].into_iter().any(|x| x.abs_diff(SIZE / 2) > reach);
+    Ok(Spread::of(&image, COLD, hot, is_far))
+}
+
+/// A dark floor of which a spotlight lights a circle, less than a pixel of [`frames`] large, to the radiance `hot`.
+pub fn spotlit(hot: f32) -> (Scene, f64) {
+    let (height, radius) = (5.0, 0.1f64);
+    let camera = Camera::look_at(DVec3::new(0.0, 10.0, 0.0), DVec3::ZERO, DVec3::Z, 0.6);
+    let mut scene = scene_of(vec![(shapes::floor(DVec3::ZERO, 100.0), matte(ALBEDO))], camera);
+    let angle = (radius / height).atan();
+    let intensity = f64::from(hot) / f64::from(ALBEDO) * std::f64::consts::PI * height * height;
+    scene.lights.push(Light {
+        name: String::new(),
+        kind: LightKind::Spot { inner_angle: 0.99 * angle as f32, outer_angle: angle as f32 },
+        intensity: glam::Vec3::splat(intensity as f32),
+        position: DVec3::new(0.03, height, 0.02),
+        direction: DVec3::NEG_Y,
+        range: f64::INFINITY,
+    });
+    (scene, radius)
+}
+
+/// What the filters of frames make of a spot less than a pixel large while the camera moves: the sum of what became of it in all frames, whose `total` is of the last.
+///
+/// # Errors
+/// Those of the frames.
+pub fn frames(setup: &Setup, kind: TracerKind, settings: &Settings, hot: f32, frames: u32) -> Result<Spread> {
+    let (scene, radius) = spotlit(hot);
+    frames_of(setup, kind, &scene, radius, settings, hot, frames)
+}
+
+/// See [`frames`]: those of a scene of [`spotlit`].
+///
+/// # Errors
+/// Those of the frames.
+pub fn frames_of(
+    setup: &Setup,
+    kind: TracerKind,
+    scene: &Scene,
+    radius: f64,
+    settings: &Settings,
+    hot: f32,
+    frames: u32,
+) -> Result<Spread> {
+    let size = [48, 27];
+    let flat = FlatScene::for_paths(scene);
+    let tracer = super::scale::path_tracer(setup, kind, &flat)?;
+    let options = PathOptions { size, max_depth: 1, ..Default::default() };
+    let mut realtime = Realtime::radiance(&tracer, &flat, size, settings, &options)?;
+    let spot = scene.lights[0].position - flat.origin;
+    let footprint: f64 = 2.0 * 10.0 * 0.3f64.tan() / f64::from(size[1]);
+    // the spot's own pixel and, in every frame in which the camera moves, a tap between two pixels of the frame before
+    let limit = radius + footprint * f64::from(reach(&settings.filter) + 2 + MOVES);
+    let mut out = Spread::default();
+    for frame in 0..frames {
+        let mut camera = scene.cameras[0].clone();
+        let step = DVec3::new(0.05, 0.02, 0.01) * f64::from(frame.min(MOVES));
+        camera.camera_to_world = DAffine3::from_translation(step) * camera.camera_to_world;
+        let record = CameraRecord::new(&camera, flat.origin, f64::from(size[0]) / f64::from(size[1]));
+        realtime.frame(&tracer, &record, &[])?;
+        let surfaces = realtime.surfaces()?;
+        let is_far = |k: usize| {
+            surfaces[k].is_none_or(|s: crate::realtime::Surface| {
+                let off = glam::Vec3::from(s.position).as_dvec3() - spot;
+                off.x.abs().max(off.z.abs()) > limit
+            })
+        };
+        // a sample in the circle may be all of a pixel's
+        let now = Spread::of(&realtime.result()?, 0.0, hot, is_far);
+        out = Spread { unsound: out.unsound + now.unsound, far: out.far + now.far, total: now.total };
+    }
+    Ok(out)
+}
+
+/// Occlusion in frames of a floor under a small far sheet, one sample in a hundred, over that in the same frames without a filter.
+///
+/// # Errors
+/// Those of the frames.
+pub fn rare_occlusion(setup: &Setup, kind: TracerKind, settings: &Settings, frames: u32) -> Result<f64> {
+    let mut scene = analytic::plane(20.0, SceneTransform::default());
+    sampling::add(&mut scene, shapes::rectangle(DVec3::Y * 6.0, DVec3::X * 1.1, DVec3::Z * 1.1), emitter(0.0));
+    scene.cameras[0] = Camera::look_at(DVec3::new(0.0, 3.0, 0.0), DVec3::ZERO, DVec3::Z, 0.6);
+    let tracer = Tracer::new(setup.device(), kind, &FlatScene::new(&scene), super::degenerate::NEEDS)?;
+    let size = [48, 27];
+    let lost = |filter: FilterKind| -> Result<f64> {
+        let settings = Settings { filter: Filter { kind: filter, ..settings.filter }, history: 1, ..*settings };
+        let mut realtime = Realtime::new(&tracer, size, &settings, &[])?;
+        let mut sum = 0.0;
+        for frame in 0..frames {
+            let mut camera = scene.cameras[0].clone();
+            camera.camera_to_world = DAffine3::from_translation(DVec3::X * 1e-3 * f64::from(frame)) * camera.camera_to_world;
+            realtime.frame(&tracer, &CameraRecord::new(&camera, scene.origin(), 16.0 / 9.0), &[])?;
+            sum += realtime.result()?.iter().map(|v| 1.0 - f64::from(*v)).sum::<f64>();
+        }
+        Ok(sum)
+    };
+    Ok(lost(settings.filter.kind)? / lost(FilterKind::None)?)
+}
+
+/// The checks of the section.
+///
+/// # Errors
+/// Those of [`Session::measure_all`].
+pub(super) fn run(session: &mut Session) -> Result<()> {
+    let (kinds, effort) = (session.setup().shading_tracers(), session.setup().effort());
+    for filter in [FilterKind::Box, FilterKind::Separable, FilterKind::Atrous] {
+        for hot in HOT {
+            for (noisy, how) in [(true, "noisy"), (false, "without noise")] {
+                let name = format!("{filter} filter of a still with one pixel of {hot:e}, {how}");
+                session.measure_each(&name, &kinds, |s, kind, w| Ok(still(s, kind, filter, hot, noisy, w)?.check(&name)))?;
+            }
+        }
+    }
+    let count = effort.pick(24, 240);
+    for (what, settings) in super::display::filters() {
+        for hot in HOT {
+            let name = format!("{what} of {count} frames with one pixel of {hot:e}");
+            session.measure_each(&name, &kinds, |s, kind, _| Ok(frames(s, kind, &settings, hot, count)?.check(&name)))?;
+        }
+        let name = format!("{what} of a rare occluder, no history");
+        session.measure_each(&name, &kinds, |s, kind, _| {
+            let ratio = rare_occlusion(s, kind, &settings, effort.pick(8, 64))?;
+            let sentence = format!("{ratio:.3} of the occlusion that frames without a filter have");
+            // filters of several steps weigh what a step keeps as it is by its own few samples in the next
+            let check = match settings.filter.kind {
+                FilterKind::Box => Check::at_most(name.as_str(), (ratio - 1.0).abs(), "of its occlusion", 0.02),
+                _ => Check::reported(name.as_str(), (ratio - 1.0).abs(), "of its occlusion"),
+            };
+            Ok(check.says(sentence))
+        })?;
+    }
+    Ok(())
+}
