@@ -200,7 +200,7 @@ fn record(record: &Record) -> String {
 /// them.
 fn load(record: &Record) -> Option<String> {
     let Form::Array { align, access: "readonly", .. } = record.form else { return None };
-    if align < 8 || record.size % 8 != 0 {
+    if align < 8 || !record.size.is_multiple_of(8) {
         return None;
     }
     let values: Option<Vec<String>> = record.fields.iter().map(loaded).collect();

@@ -47,7 +47,9 @@ impl Spread {
         for (k, pixel) in image.chunks(3).enumerate() {
             for &value in pixel {
                 out.unsound += usize::from(!(value >= cold * (1.0 - ROUNDING) && value <= hot * (1.0 + ROUNDING)));
-                out.far += usize::from(is_far(k) && !((value - cold).abs() <= cold * ROUNDING));
+                // false for NaN
+                let is_cold = (value - cold).abs() <= cold * ROUNDING;
+                out.far += usize::from(is_far(k) && !is_cold);
                 out.total += f64::from(value - cold) / f64::from(hot - cold) / 3.0;
             }
         }
