@@ -49,7 +49,8 @@ float met_light_pdf(PathParams p, Hit hit, vec3 from, vec3 wi) {
     uint k = Words(p.light_of).v[first + hit.primitive];
     if (k == INVALID) return 0.0;
     LightRecord light = p.only_light;
-    if (WITH_LIGHT_CHOICE) light = load_light_record(p.lights, k);
+    // the only choice may be the tree, which is no light itself
+    if (WITH_LIGHT_CHOICE || WITH_LIGHT_TREE) light = load_light_record(p.lights, k);
     if (WITH_LIGHT_TREE) light.probability = p.tree_probability * leaf_probability(p.light_tree, from, light.trail);
     return light_pdf(light, from, wi, hit.t);
 }

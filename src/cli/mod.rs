@@ -120,6 +120,12 @@ pub fn run() -> ExitCode {
     run_from(std::env::args_os().collect())
 }
 
+/// Starts the threads that commands share: without memory for them the first use would panic.
+fn start_threads() -> crate::error::Result<()> {
+    let outcome = rayon::ThreadPoolBuilder::new().build_global();
+    outcome.map_err(|e| Error::OutOfMemory(format!("the system has no room for more threads of this process: {e}")))
+}
+
 fn run_from(arguments: Vec<OsString>) -> ExitCode {
     let start = Instant::now();
     // before parsing: usage errors must be reported as JSON, too
@@ -132,7 +138,7 @@ fn run_from(arguments: Vec<OsString>) -> ExitCode {
         }
         let is_long_version = arguments.get(1).is_some_and(|a| a == "--version");
         match Cli::parse_from(with_view(arguments)) {
-            Ok(cli) => dispatch(cli.command, start),
+            Ok(cli) => start_threads().map_err(Failure::from).and_then(|()| dispatch(cli.command, start)),
             Err(e) if e.kind() == ErrorKind::DisplayVersion && is_long_version => Ok(console::print(&version::long())?),
             Err(e) => explain(&e).map_err(Failure::from),
         }

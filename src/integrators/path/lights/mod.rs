@@ -110,7 +110,7 @@ impl Lights {
         self.records.len() as u32 - self.first
     }
 
-    /// The light that is sampled, if there is but one.
+    /// The light that is sampled, if there is but one choice; it may be the tree, which is no light itself.
     pub fn only(&self) -> Option<LightRecord> {
         (self.choices() == 1).then(|| self.records[self.first as usize])
     }
