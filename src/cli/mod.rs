@@ -121,7 +121,7 @@ pub fn run() -> ExitCode {
 }
 
 /// Starts the threads that commands share: without memory for them the first use would panic.
-fn start_threads() -> crate::error::Result<()> {
+fn start_threads() -> Result<()> {
     let outcome = rayon::ThreadPoolBuilder::new().build_global();
     outcome.map_err(|e| Error::OutOfMemory(format!("the system has no room for more threads of this process: {e}")))
 }

@@ -147,13 +147,12 @@ impl FrameSettings {
         self.frames.unwrap_or(FrameRange { first: 0, end: 1 })
     }
 
-    /// The settings of the pipeline: the preset's, for frames of radiance or of ambient occlusion with settings `ao`, with the settings given.
+    /// The settings of the pipeline: the preset's, with the settings given, for ambient occlusion with settings `ao`.
     ///
     /// # Errors
     /// [`Error::Usage`] for what has no effect together.
-    pub fn settings(&self, is_radiance: bool, ao: &AoSettings, seed: u32) -> Result<Settings> {
-        let preset = self.preset.unwrap_or_default();
-        let mut s = if is_radiance { preset.radiance_settings() } else { preset.settings() };
+    pub fn settings(&self, ao: &AoSettings, seed: u32) -> Result<Settings> {
+        let mut s = self.preset.unwrap_or_default().settings();
         let technique = self.technique.unwrap_or(s.technique);
         if technique == Technique::Larsen && s.technique != Technique::Larsen {
             return Err(Error::Usage("--technique larsen: use --preset larsen, which fixes its settings".into()));

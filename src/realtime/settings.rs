@@ -326,16 +326,6 @@ impl Preset {
         matches!(self, Self::Fast | Self::Balanced | Self::Quality)
     }
 
-    /// The settings of the preset for frames of radiance. A path costs many rays, so `fast` traces one for every fourth pixel, and filters as widely as `balanced`.
-    pub fn radiance_settings(self) -> Settings {
-        match self {
-            Self::Fast => {
-                Settings { resolution: Resolution::Half, filter: Self::Balanced.settings().filter, ..self.settings() }
-            }
-            _ => self.settings(),
-        }
-    }
-
     /// Bounces before Russian roulette may end a path of the preset, unless the settings of paths say so. With `fast` it may end at the first: that halves the time of rays, and the filter takes
     /// away more noise than it adds.
     pub fn rr_depth(self) -> u32 {

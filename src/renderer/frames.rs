@@ -335,7 +335,7 @@ impl Frames<'_> {
 /// [`Error::Usage`] for settings that have no effect together.
 pub fn frame_settings(settings: &RenderSettings) -> Result<Settings> {
     let is_radiance = !is_ambient_occlusion(settings.integrator());
-    let mut how = settings.frames.settings(is_radiance, &settings.integrators.ao, settings.seed())?;
+    let mut how = settings.frames.settings(&settings.integrators.ao, settings.seed())?;
     let shown = settings.frames.show.unwrap_or_default();
     // buffers of surfaces are looked at with one place in each pixel; bent normals are not averaged over places
     let shows_buffers = shown != DisplayMode::Result || Aov::Bent.is_in(&settings.image.aov);
