@@ -4,8 +4,9 @@
 // blurs less than a line, and clipped to this frame's values nearby (Karis, "High-Quality Temporal Supersampling", SIGGRAPH 2014 courses; Salvi, "An Excursion in
 // Temporal Supersampling", GDC 2016). At rest frames are averaged, later ones with more weight, because their histories are longer.
 //
-// The mean of all samples since the image came to rest has neither the bias of filters nor that of clamps, but noise. It takes over where it differs from the filtered image
-// by more than its noise explains (Lee 1980, as in common/filter.glsl), and everywhere in the end.
+// The mean of all samples of ambient visibility since the image came to rest has neither the bias of filters nor that of clamps, but noise, most of which non-local means take away (common/nlmeans.glsl).
+// It takes over as samples become many, and sooner where it differs from the filtered image by more than its noise explains (Lee 1980, as in common/filter.glsl). The filter of radiance has the mean at
+// rest for its input.
 #include "common/radiance.glsl"
 #include "common/reprojection.glsl"
 #include "common/rest.glsl"
@@ -19,8 +20,8 @@ const int BIAS_RADIUS = 2;
 const float FEW_FRAMES = 8.0;
 // Where values nearby differ by less than this share of their mean, the clipped history is no different from this frame.
 const float FLAT = 1.0 / 512.0;
-// Samples at rest from which their mean counts at least as much as the filtered image.
-const float TAKE_OVER_SAMPLES = 1024.0;
+// Samples at rest from which their denoised mean counts at least as much as the filtered image.
+const float TAKE_OVER_SAMPLES = 16.0;
 
 // What taps read, fetched once: each use of a field of a record is a load.
 struct Images {
@@ -182,9 +183,9 @@ void main() {
     }
     store_resolved(p, at, resolved, frames);
 
-    if (!is_null(p.rest)) {
+    if (!is_null(p.denoised)) {
         Rest own = load_rest(p.rest, at);
-        float differences = 0.0, error = 0.0, n = 0.0;
+        float differences = 0.0, error = 0.0;
         ivec2 lower = max(pixel - BIAS_RADIUS, ivec2(0)), upper = min(pixel + BIAS_RADIUS, m.size - 1);
         uvec2 rests = p.rest;
         for (int y = lower.y; y <= upper.y; y++) {
@@ -195,16 +196,13 @@ void main() {
                 vec3 d = value_at(m, LOAD_PAIR(m.guide, tap), tap).rgb - r.mean;
                 differences += dot(d, d);
                 error += rest_error(r);
-                n += 1.0;
             }
         }
-        if (n > 0.0 && own.frames >= 2.0) {
-            // of the filtered image: what noise does not explain of the differences; a few equal samples say little about noise
-            float share = differences > error ? (differences - error) / differences : 0.0;
-            share *= clamp((own.frames - FEW_FRAMES) / FEW_FRAMES, 0.0, 1.0);
-            share = max(share, own.samples / (own.samples + TAKE_OVER_SAMPLES));
-            resolved = mix(resolved, vec4(own.mean, own.coverage), share);
-        }
+        // of the filtered image: what noise does not explain of the differences; a few equal samples say little about noise
+        float share = differences > error ? (differences - error) / differences : 0.0;
+        share *= clamp((own.frames - FEW_FRAMES) / FEW_FRAMES, 0.0, 1.0);
+        share = max(share, own.samples / (own.samples + TAKE_OVER_SAMPLES));
+        resolved = mix(resolved, vec4(vec3(FloatImage(p.denoised).v[at]), own.coverage), share);
     }
     store_quad(p.resolved, at, resolved);
 }

@@ -57,6 +57,14 @@ struct Guided {
     divisors: Vec<Vec3>,
 }
 
+/// A filtered film.
+pub struct Filtered {
+    /// Means, channels interleaved, rows from the top.
+    pub means: Vec<f32>,
+    /// Depth of each pixel's surface, scene units; negative where it shows several, 0 where it is left alone.
+    pub depths: Vec<f32>,
+}
+
 /// See [`super::Denoiser::denoise`].
 pub fn filter(
     shot: &DenoiseInput,
@@ -64,15 +72,18 @@ pub fn filter(
     features: &Features,
     settings: &Settings,
     control: &mut dyn Control,
-) -> Result<Vec<f32>> {
+) -> Result<Filtered> {
     let guided = guide(shot, film, features);
     let filtered = run(shot, [film.width, film.height], &guided, settings, control)?;
-    let mut out = film.mean.clone();
+    let mut means = film.mean.clone();
+    let mut depths = vec![0.0; film.samples.len()];
     for (k, divisor) in guided.divisors.iter().enumerate().filter(|(_, d)| **d != Vec3::ZERO) {
         let radiance = Vec3::from(filtered[k].mean) * *divisor;
-        out[3 * k..][..3].copy_from_slice(&radiance.to_array());
+        means[3 * k..][..3].copy_from_slice(&radiance.to_array());
+        let depth = f32::from_bits(guided.guides[k][0]);
+        depths[k] = if features.content[k] == PixelContent::SeveralSurfaces { -depth } else { depth };
     }
-    Ok(out)
+    Ok(Filtered { means, depths })
 }
 
 fn rgb(image: &[f32], pixel: usize) -> Vec3 {

@@ -3,6 +3,7 @@
 
 mod features;
 mod filter;
+mod nlmeans;
 
 pub use crate::gpu::oidn::Oidn;
 pub use features::{Features, GRID, PixelContent};
@@ -71,14 +72,23 @@ impl Denoiser {
         features: &Features,
         control: &mut dyn Control,
     ) -> Result<Vec<f32>> {
-        if film.channels == 1 {
-            // three equal channels
-            let grey = film.as_grey();
-            return Ok(self.denoise(shot, &grey, features, control)?.into_iter().step_by(3).collect());
-        }
+        // both filter three channels: ambient visibility is three equal ones
+        let grey = (film.channels == 1).then(|| film.as_grey());
+        let colour = grey.as_ref().unwrap_or(film);
+        let own = |means: Vec<f32>| match film.channels {
+            1 => means.into_iter().step_by(3).collect(),
+            _ => means,
+        };
         match self {
-            Denoiser::Filter(settings) => filter::filter(shot, film, features, settings, control),
-            Denoiser::Oidn(oidn) => oidn.denoise([film.width, film.height], &film.mean, &features.albedo, &features.normals),
+            Denoiser::Filter(settings) => {
+                let filtered = filter::filter(shot, colour, features, settings, control)?;
+                let mut means = own(filtered.means);
+                nlmeans::refine(shot.tracer.device(), film, &filtered.depths, &mut means, control)?;
+                Ok(means)
+            }
+            Denoiser::Oidn(oidn) => {
+                Ok(own(oidn.denoise([film.width, film.height], &colour.mean, &features.albedo, &features.normals)?))
+            }
         }
     }
 }

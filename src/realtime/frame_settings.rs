@@ -134,7 +134,7 @@ settings! {
         filter_radius: Option<u32>, option(value_name = "PIXELS", value_parser = clap::value_parser!(u32).range(0..=16)), applies(FRAMES), research;
         /// Antialias edges by samples at different places within the pixels from frame to frame [default: the preset's]
         antialias: Option<Antialias>, option(value_enum), applies(FRAMES);
-        /// What the image does while neither the camera nor the scene moves [default: the preset's]
+        /// What the image does while neither the camera nor the scene moves [default: converge where it is antialiased, and of light]
         at_rest: Option<AtRest>, option(value_enum), applies(FRAMES);
         /// What .png and .apng outputs show [default: result]
         show: Option<DisplayMode>, option(value_name = "NAME", value_enum), applies(FRAMES);

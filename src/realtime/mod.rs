@@ -33,6 +33,7 @@ use display::{Display, DisplayMode};
 use graph::{Frame, Graph, Params};
 use params::{FrameParams, moved_records};
 pub use passes::display;
+pub(crate) use passes::nlmeans;
 pub use passes::nodes::NodeVisits;
 use passes::{debug, debug_view};
 use resources::{Extent, Resource, SURFACE_BYTES};

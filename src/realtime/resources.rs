@@ -95,6 +95,10 @@ pub enum Resource {
     Composed,
     /// Samples since the image came to rest.
     Rest,
+    /// Their mean and the variance of that: the input of non-local means.
+    RestNoise,
+    /// Their mean after non-local means.
+    Denoised,
     /// Radiance: the parts of which those samples consist.
     RestParts,
     /// The mean over frames whose samples lie at different places within the pixels.
@@ -185,6 +189,8 @@ impl Resource {
             Self::FilteredRadiance(_) => device("filtered radiance", RADIANCE_BYTES * pixels, Frame),
             Self::Composed => device("composed image", QUAD_BYTES * pixels, Frame),
             Self::Rest => device("samples at rest", RADIANCE_BYTES * pixels, Kept),
+            Self::RestNoise => device("noise at rest", PAIR_BYTES * pixels, Frame),
+            Self::Denoised => device("denoised samples at rest", 4 * pixels, Kept),
             Self::RestParts => device("parts at rest", REST_PARTS_BYTES * pixels, Kept),
             Self::ResolvedHistory => device("resolved history", QUAD_BYTES * pixels, Pair),
             Self::Resolved => readback("resolved image", QUAD_BYTES * pixels),

@@ -184,6 +184,8 @@ pub struct Settings {
     pub antialias: bool,
     /// At rest the image converges to the still: the mean of all samples since then takes over. Else it stays as the filter leaves it.
     pub converge: bool,
+    /// Samples per pixel at rest after which an image that converges counts as converged, and no more are taken.
+    pub rest_samples: u32,
     /// Also compute bent normals: the mean unoccluded direction.
     pub bent: bool,
     /// Maximum rays of a launch. Small launches let a frame be interrupted soon ([`super::Realtime::frame_with`]); images do not depend on it.
@@ -207,8 +209,8 @@ impl Settings {
     /// Maximum history length in samples: the largest number up to which half floats represent all integers.
     pub const MAX_SAMPLES: u32 = 2048;
 
-    /// Samples per pixel at rest after which the image counts as converged, and no more are taken.
-    pub const REST_SAMPLES: u32 = 4096;
+    /// [`Settings::rest_samples`] of radiance.
+    pub const RADIANCE_REST_SAMPLES: u32 = 4096;
 
     /// Returns true if the image converges at rest.
     pub fn converges(&self) -> bool {
@@ -222,7 +224,7 @@ impl Settings {
     pub fn frames_to_rest(&self) -> Option<u32> {
         let period = self.resolution.period();
         if self.converges() {
-            Some(Self::REST_SAMPLES.div_ceil(self.rays_per_pixel) * period)
+            Some(self.rest_samples.div_ceil(self.rays_per_pixel) * period)
         } else if self.antialias && self.rest && self.history > 1 {
             Some(self.history.min(Self::MAX_SAMPLES) * period + Self::PLACES)
         } else {
@@ -355,6 +357,7 @@ impl Preset {
             unit: 1.0,
             antialias: false,
             converge: false,
+            rest_samples: 1024,
             bent: false,
             launch_rays: LAUNCH_RAYS,
         };

@@ -346,9 +346,9 @@ pub fn frame_settings(settings: &RenderSettings) -> Result<Settings> {
     }
     if is_radiance {
         how.check_radiance()?;
-        // there is no image of before that differs
-        how.converge |= settings.frames.at_rest.is_none();
+        how.rest_samples = Settings::RADIANCE_REST_SAMPLES;
     }
+    how.converge |= settings.frames.at_rest.is_none() && (is_radiance || how.antialias);
     how.bent = Aov::Bent.is_in(&settings.image.aov) || shown == DisplayMode::Bent;
     how.check()?;
     shown.check(&how)?;

@@ -40,11 +40,14 @@ registry! {
         LARSEN_BLUR = "larsen_blur";
         LARSEN_SUM = "larsen_sum";
         LARSEN_TEMPORAL = "larsen_temporal";
+        NLMEANS = "nlmeans";
+        NLMEANS_RADIANCE = "nlmeans_radiance";
         PATH_GATHER = "path_gather";
         PATH_RESOLVE = "path_resolve";
         RADIANCE_TEMPORAL = "radiance_temporal";
         RESOLVE = "resolve";
         REST = "rest";
+        REST_NOISE = "rest_noise";
         TEMPORAL = "temporal";
     }
     stages {

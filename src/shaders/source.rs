@@ -218,7 +218,7 @@ impl Source {
     /// Whether its SPIR-V is optimized before it reaches the driver. The optimizer leaves the loops over a thread's four pixels in common/filter.glsl rolled up in a
     /// form that lavapipe's does not unroll; the pixels' sums are then in memory, which every thread of a vector accesses by itself, and filters take three times as long.
     pub fn is_optimized(&self) -> bool {
-        !matches!(self, Self::Compute { pass: "filter" | "denoise", .. })
+        !matches!(self, Self::Compute { pass: "filter" | "denoise" | "nlmeans" | "nlmeans_radiance", .. })
     }
 
     /// The GLSL text, with unresolved includes. `shaders`: the folder.

@@ -136,6 +136,41 @@ fn gpu_constants_stay_and_nothing_crosses_an_edge() {
     assert_validation_clean(&device);
 }
 
+/// Detail that no plane explains: stripes of two pixels, of a contrast well above the noise, on one surface.
+#[test]
+fn gpu_noise_is_taken_out_of_detail() {
+    let device = device();
+    let corners = [[-9.0, -9.0], [9.0, -9.0], [9.0, 9.0], [-9.0, 9.0]];
+    let scene = scene_of(
+        vec![(shapes::quads(&[corners.map(|[x, y]| DVec3::new(x, y, -4.0))]), matte(0.5))],
+        Camera::look_at(DVec3::ZERO, DVec3::new(0.0, 0.0, -1.0), DVec3::Y, 0.8),
+    );
+    let flat = FlatScene::for_paths(&scene);
+    let pixels = (SIZE[0] * SIZE[1]) as usize;
+    const DEVIATION: f32 = 0.05;
+    const SAMPLES: u32 = 64;
+    let truth: Vec<f32> = (0..3 * pixels).map(|k| if k / 3 % 4 < 2 { 0.2 } else { 0.8 }).collect();
+    let mut film = Film::new(SIZE[0], SIZE[1], 3);
+    film.samples.fill(SAMPLES);
+    film.coverage.fill(1.0);
+    // of even samples, whose mean is better known than that of random ones
+    film.variance.fill(DEVIATION * DEVIATION * (SAMPLES as f32).powf(1.33));
+    // uniform noise of that deviation
+    let noise = |k: usize| (((k as f64).sin() * 43758.5453).fract().abs() as f32 - 0.5) * 12f32.sqrt() * DEVIATION;
+    film.mean = truth.iter().enumerate().map(|(k, v)| v + noise(k)).collect();
+    for kind in picked(&device) {
+        let tracer = tracer(&device, kind, &flat);
+        let (image, _) = filter(&tracer, &flat, &options(SAMPLES, 0), &film);
+        let (before, after) = (error(&film.mean, &truth), error(&image, &truth));
+        println!("{kind}: {before:.4} before, {after:.4} after");
+        // the filter that is guided by surfaces alone keeps all of it
+        assert!(after < 0.6 * before, "{kind}: {after} of {before}");
+        let contrast = image[3 * (pixels / 2 + 26)] - image[3 * (pixels / 2 + 25)];
+        assert!((contrast.abs() - 0.6).abs() < 0.1, "{kind}: stripes of 0.6 differ by {contrast}");
+    }
+    assert_validation_clean(&device);
+}
+
 fn planes(path: &str) -> impl Fn(&str) -> Vec<u32> + use<> {
     let image = output::load(path.as_ref()).unwrap();
     move |name| match image.channels.iter().find(|c| c.name == name).map(|c| &c.samples) {

@@ -19,6 +19,7 @@ mod integers;
 mod larsen;
 mod long_run;
 mod motion;
+mod rest;
 mod sequence;
 mod settings;
 mod skips;

@@ -1,7 +1,12 @@
 //! Estimates of radiance: input and output of the denoiser's filter, and the signals of frames in real time.
 
 records! {
-    "denoise";
+    "denoise" values {
+        /// Side of the square of pixels that a thread of `nlmeans` filters.
+        NLMEANS_BLOCK: uint = 4;
+        /// The same of `nlmeans_radiance`.
+        NLMEANS_RADIANCE_BLOCK: uint = 2;
+    };
 
     /// Statistics of a pixel's radiance samples.
     RadianceRecord: words {
@@ -13,5 +18,21 @@ records! {
         variance: vec3,
         /// By how much the filter's box is narrowed here: 0 not at all, 1 to the pixel itself.
         narrowed: float,
+    }
+
+    /// Parameters of `nlmeans` and `nlmeans_radiance`.
+    NlMeansParams: block readonly 8 {
+        /// Image size, pixels.
+        size: uvec2,
+        /// Input: of each pixel its value and the variance of that, two floats; of radiance four.
+        from: address,
+        /// Output, a float per pixel; of radiance a `vec4`.
+        to: address,
+        /// A float per pixel: depth of its surface, scene units; negative where it shows several, 0 where it is left alone. Pixels of different surfaces are not averaged. 0: all may be.
+        depths: address,
+        /// How much pixels may differ, as a factor of the variance of their difference, for their weight to fall to 1/e.
+        sameness: float,
+        /// Padding to a multiple of 8 bytes.
+        reserved: float,
     }
 }

@@ -127,6 +127,8 @@ records! {
         previous_history: address,
         /// Samples since the image came to rest (`GatherParams`); 0: none.
         rest: address,
+        /// Their mean after non-local means, a float per pixel; 0: there is none, or not yet.
+        denoised: address,
         /// Output, a `vec4` per pixel: value, and coverage.
         resolved: address,
         /// 1: there is a history.
@@ -137,6 +139,20 @@ records! {
         clamp_width: float,
         /// Minimum weight of a frame at rest.
         least_weight: float,
+    }
+
+    /// Parameters of `rest_noise`.
+    RestNoiseParams: block readonly 8 {
+        /// Address of the `FrameParams`.
+        frame: address,
+        /// Two `vec4` per pixel: samples since the image came to rest.
+        rest: address,
+        /// Output: of each pixel the mean of those samples and the variance of the mean, two floats.
+        to: address,
+        /// Convergence of the sampler: the variance of the mean over n frames falls as `n^-(1 + evenness)`.
+        evenness: float,
+        /// Padding to a multiple of 8 bytes.
+        reserved: float,
     }
 
     /// Parameters of `rest`.

@@ -1,5 +1,6 @@
 //! `antialias`: the mean over frames whose samples lie at different places within the pixels, and at rest what the image converges to.
 
+use super::nlmeans;
 use crate::error::Result;
 use crate::gpu::{ComputePipeline, Recorder};
 use crate::interface::records::radiance::AntialiasParams;
@@ -42,8 +43,8 @@ pub fn stage(tracer: &Tracer, pixels: u32, input: Resource, has_rest: bool) -> R
 
 impl Pass for Antialias {
     fn uses(&self, _: Option<&Display>) -> ResourceUse {
-        use Resource::{FrameNumber, Guide, PreviousPosition, Resolved, ResolvedHistory, Rest, Surface};
-        let rest: &[Resource] = if self.has_rest { &[Rest] } else { &[] };
+        use Resource::{Denoised, FrameNumber, Guide, PreviousPosition, Resolved, ResolvedHistory, Rest, Surface};
+        let rest: &[Resource] = if self.has_rest { &[Rest, Denoised] } else { &[] };
         ResourceUse::new(&[FrameNumber, Guide, Surface, PreviousPosition, self.input], &[ResolvedHistory, Resolved])
             .previous(&[ResolvedHistory])
             .and_reads(rest)
@@ -58,7 +59,8 @@ impl Pass for Antialias {
             visibility: if is_composed { 0 } else { input },
             history: resources.address(Resource::ResolvedHistory),
             previous_history: resources.previous_address(Resource::ResolvedHistory),
-            rest: if self.has_rest && !is_composed { resources.address(Resource::Rest) } else { 0 },
+            rest: resources.address(Resource::Rest),
+            denoised: if self.has_rest && frame.resting >= nlmeans::FIRST_FRAME { resources.address(Resource::Denoised) } else { 0 },
             resolved: resources.address(Resource::Resolved),
             has_history: frame.has_resolved.into(),
             most_frames: match frame.settings.antialias {

@@ -11,6 +11,7 @@ mod gather;
 mod gbuffer;
 mod gtao;
 mod larsen;
+pub mod nlmeans;
 mod paths;
 mod radiance_filter;
 mod radiance_temporal;
@@ -88,6 +89,7 @@ pub fn stages(tracer: &Tracer, block: Block, settings: &Settings, primary: Prima
     let has_rest = settings.converges();
     if has_rest {
         stages.push(rest::stage(tracer, pixels)?);
+        stages.extend(nlmeans::stages(tracer, block.size)?);
     }
     if has_rest || settings.antialias {
         stages.push(antialias::stage(tracer, pixels, Resource::Result, has_rest)?);
