@@ -8,6 +8,7 @@ use glam::{DVec3, Vec3};
 use skylit::film::{Film, NoControl};
 use skylit::measure::ray_sets::{leak_rays, random_rays};
 use skylit::oracle::Oracle;
+use skylit::realtime::{Filter, FilterKind, Settings};
 use skylit::scene::builtin::{SceneTransform, analytic, by_name, shapes};
 use skylit::scene::{Geometry, Scene, TriangleMesh};
 use skylit::stress::{
@@ -278,6 +279,20 @@ fn gpu_stress_catches_a_hot_pixel_that_spreads() {
     };
     let (right, wrong) = (spread(100.0, 100.0), spread(100.0, 10.0));
     assert!(right.unsound == 0 && right.total > 0.0 && wrong.unsound > 0, "{right:?} {wrong:?}");
+}
+
+/// Section 8: filters keep the mean of what few samples meet, in one step or several, and a sheet that is smaller than it is said to be does not.
+#[test]
+fn gpu_stress_catches_a_filter_that_loses_rare_occlusion() {
+    let of =
+        |settings: &Settings, side: f64| hot_pixel::rare_occlusion(&setup(), TracerKind::Compute, settings, side, 8).unwrap();
+    let with = |settings: &Settings, kind| Settings { filter: Filter { kind, ..settings.filter }, ..*settings };
+    for (what, settings) in display::filters() {
+        let plain = of(&with(&settings, FilterKind::None), hot_pixel::SHEET);
+        let check = hot_pixel::check_rare_occlusion(what, of(&settings, hot_pixel::SHEET), plain);
+        assert_eq!(check.verdict, Verdict::Holds, "{check:?}");
+        fails(&hot_pixel::check_rare_occlusion(what, of(&settings, 0.97 * hot_pixel::SHEET), plain));
+    }
 }
 
 /// Section 8: curves that fall, or let NaN through, and a filter that darkens.
