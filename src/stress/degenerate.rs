@@ -411,7 +411,7 @@ pub fn check_as_one(
     let start = Instant::now();
     let oracle = Oracle::new(one, DVec3::ZERO);
     // few: a ray that meets one meets them all
-    let (most, tests) = setup.effort().pick((500, 20_000_000), (2000, 1_000_000_000));
+    let (most, tests) = setup.effort().pick((500, 20_000_000), (2000, 300_000_000));
     let rays = random_rays(&oracle, most.min(tests / count as usize), 4);
     let truth = oracle.trace_closest(&rays);
     let tracer = setup.tracer(kind, many)?;
