@@ -8,6 +8,7 @@ use glam::{DVec3, Vec3};
 use skylit::film::{Film, NoControl};
 use skylit::measure::ray_sets::{leak_rays, random_rays};
 use skylit::oracle::Oracle;
+use skylit::realtime::{Filter, FilterKind, Settings};
 use skylit::scene::builtin::{SceneTransform, analytic, by_name, shapes};
 use skylit::scene::{Geometry, Scene, TriangleMesh};
 use skylit::stress::{
@@ -72,17 +73,39 @@ fn gpu_stress_scenes_hold() {
     }
 }
 
-/// A ray that meets one of 100,000 coincident triangles meets them all: that is more turns of a loop than some drivers make.
+/// A ray that meets one of 100,000 coincident triangles, or of as many triangles or instances in one plane around one another, meets them all: that is more
+/// iterations of a loop than some drivers make.
 #[test]
-fn gpu_stress_coincident_triangles_hold() {
+fn gpu_stress_surfaces_in_one_place_hold() {
+    const COUNT: u32 = 100_000;
     let mut quiet = Quiet;
-    for own_vertices in [false, true] {
+    for (what, scenes) in [
+        ("same vertices", degenerate::coincident(COUNT, false)),
+        ("vertices of their own", degenerate::coincident(COUNT, true)),
+        ("triangles around one another", degenerate::overlapping(COUNT, false)),
+        ("instances around one another", degenerate::overlapping(COUNT, true)),
+    ] {
         let mut watch = Watch::new(&mut quiet);
-        let check =
-            degenerate::check_coincident(&setup(), TracerKind::Compute, "coincident", 100_000, own_vertices, &mut watch)
-                .unwrap();
+        let check = degenerate::check_as_one(&setup(), TracerKind::Compute, what, COUNT, &scenes, &mut watch).unwrap();
         assert_eq!(check.verdict, Verdict::Holds, "{check:?}");
     }
+}
+
+/// Section 3: one of many triangles in a plane that lies a thousandth before it, the last that a ray would come to.
+#[test]
+fn gpu_stress_catches_a_triangle_that_is_passed_over() {
+    const COUNT: u32 = 20_000;
+    let mut quiet = Quiet;
+    let mut judge = |scenes: &[Scene; 2]| {
+        let mut watch = Watch::new(&mut quiet);
+        degenerate::check_as_one(&setup(), TracerKind::Compute, "moved", COUNT, scenes, &mut watch).unwrap()
+    };
+    let mut scenes = degenerate::overlapping(COUNT, false);
+    assert_eq!(judge(&scenes).verdict, Verdict::Holds);
+    let mesh = triangles(&mut scenes[0].meshes[0].geometry);
+    let last = mesh.indices[COUNT as usize - 1];
+    last.into_iter().for_each(|i| mesh.positions[i as usize].z += 1e-3);
+    fails(&judge(&scenes));
 }
 
 /// Section 1: a sheet over a plane that should not occlude itself, a groove that is narrower than its closed form, and detail that positions do not hold.
@@ -227,6 +250,20 @@ fn stress_catches_drift() {
     assert_eq!((long_runs::different_words(&state, &state), long_runs::different_words(&state, &other)), (0, 1));
 }
 
+/// Section 7: a view that is said to be open and is closed, every second time.
+#[test]
+fn gpu_stress_catches_the_history_of_another_view() {
+    let (scene, views) = long_runs::open_and_closed();
+    let tracer = common::tracer(&device(), TracerKind::Compute, &scene);
+    let settings = display::filters()[0].1;
+    let off = |shift: usize| {
+        let in_turn = |frame: u32| (views[frame as usize % 2].0.clone(), views[(frame as usize + shift) % 2].1);
+        long_runs::views_off(&tracer, &scene, &settings, 8, in_turn).unwrap()
+    };
+    let (right, wrong) = (off(0), off(1));
+    assert!(right.0 == 0 && right.1 > 0 && wrong.0 == wrong.1, "{right:?} {wrong:?}");
+}
+
 /// Section 7: a film that has added up in single precision, samples that repeat or come from elsewhere, and frames that stand still.
 #[test]
 fn gpu_stress_catches_a_counter_that_stops() {
@@ -278,6 +315,20 @@ fn gpu_stress_catches_a_hot_pixel_that_spreads() {
     };
     let (right, wrong) = (spread(100.0, 100.0), spread(100.0, 10.0));
     assert!(right.unsound == 0 && right.total > 0.0 && wrong.unsound > 0, "{right:?} {wrong:?}");
+}
+
+/// Section 8: filters keep the mean of what few samples meet, in one step or several, and a sheet that is smaller than it is said to be does not.
+#[test]
+fn gpu_stress_catches_a_filter_that_loses_rare_occlusion() {
+    let of =
+        |settings: &Settings, side: f64| hot_pixel::rare_occlusion(&setup(), TracerKind::Compute, settings, side, 8).unwrap();
+    let with = |settings: &Settings, kind| Settings { filter: Filter { kind, ..settings.filter }, ..*settings };
+    for (what, settings) in display::filters() {
+        let plain = of(&with(&settings, FilterKind::None), hot_pixel::SHEET);
+        let check = hot_pixel::check_rare_occlusion(what, of(&settings, hot_pixel::SHEET), plain);
+        assert_eq!(check.verdict, Verdict::Holds, "{check:?}");
+        fails(&hot_pixel::check_rare_occlusion(what, of(&settings, 0.97 * hot_pixel::SHEET), plain));
+    }
 }
 
 /// Section 8: curves that fall, or let NaN through, and a filter that darkens.

@@ -14,6 +14,9 @@
 #include "trace/slab.glsl"
 #include "trace/spread.glsl"
 #include "trace/stack.glsl"
+#ifndef COUNT_VISITS
+#include "trace/suspend.glsl"
+#endif
 #ifdef BALLOT
 #include "trace/reduce.glsl"
 #endif
@@ -21,7 +24,7 @@
 layout(local_size_x = LANES) in;
 
 // MAX_ITERATIONS is for drivers that leave any loop after 65,535 iterations. With one ray per lane of a work-group every ray is still traced, because each
-// lane fetches at least one.
+// lane fetches at least one; what is not done when the loop is about to end is suspended (suspend.glsl).
 
 // Storing a hit and taking the next ray cost a vector of lanes the same whether one lane does it or all. So a lane whose ray is done waits until the number of
 // iterations is a multiple of this. A power of two; 4 measured best on CPUs (docs/traversal.md).
@@ -133,7 +136,19 @@ void main() {
     if (in_subgroup && gl_SubgroupID != 0u) return;
     index = begin + lane;
 #endif
-    TAKE_RAY
+#ifndef COUNT_VISITS
+    bool is_resumed = MAX_ITERATIONS > 0u && push.first == RESUMED;
+    uvec2 suspended = MAX_ITERATIONS > 0u ? root.suspended : uvec2(0u);
+    // of this lane among suspended rays, and the first of its words
+    uint place = ray_of_dispatch(), state = SUSPENDED_START + SUSPENDED_STRIDE * place;
+    if (is_resumed) {
+        if (place >= min(LaunchFlags(suspended).v[0], SUSPENDED_RAYS) || SUSPENDED_WORD(0u) == INVALID) return;
+        LOAD_SUSPENDED
+    } else
+#endif
+    {
+        TAKE_RAY
+    }
 
     uint turns = 0u;
     bool has_ray = !in_subgroup || index < end;
@@ -160,10 +175,11 @@ void main() {
 #ifndef COUNT_VISITS
         if (!in_subgroup && !has_ray && (MAX_ITERATIONS > 0u || turns % REFILL_INTERVAL == 0u)) {
             STORE_HIT
-            if (MAX_ITERATIONS > 0u && turns > MAX_ITERATIONS) return;
+            if (MAX_ITERATIONS > 0u && (is_resumed || turns > MAX_ITERATIONS)) return;
             TAKE_RAY
             has_ray = true;
         }
+        if (MAX_ITERATIONS > 0u && turns > SUSPEND_ITERATION) break;
 #endif
         if (has_ray) {
             Block8 b = Block8(block_address(blocks, block));
@@ -286,6 +302,16 @@ void main() {
             block = base + bitCount((group >> 16) & 0xffu & ((1u << (slot & 31u)) - 1u));
         }
     }
+#ifndef COUNT_VISITS
+    // after the loop, because CPU drivers go through all branches in every iteration, whether a lane takes them or not
+    if (MAX_ITERATIONS > 0u && !is_null(suspended)) {
+        if (!is_resumed) {
+            place = suspend_new(suspended);
+            state = SUSPENDED_START + SUSPENDED_STRIDE * place;
+        }
+        if (place < SUSPENDED_RAYS) { STORE_SUSPENDED }
+    }
+#endif
 }
 
 #endif

@@ -249,6 +249,24 @@ impl Recorder<'_> {
         }
     }
 
+    /// As [`Recorder::dispatch`], over as many work-groups along x, y and z as the three words say that lie at `offset`, a multiple of 4, when the device executes
+    /// this command. What writes them keeps to the device's limits.
+    pub fn dispatch_indirect<P: bytemuck::NoUninit>(
+        &mut self,
+        pipeline: &ComputePipeline,
+        push: &P,
+        groups: &Buffer,
+        offset: u64,
+    ) {
+        assert!(offset.is_multiple_of(4) && offset + 12 <= groups.size());
+        // SAFETY: as above; the words lie within the buffer, which was made for it
+        unsafe {
+            self.device.raw.cmd_bind_pipeline(self.buffer, vk::PipelineBindPoint::COMPUTE, pipeline.raw());
+            self.push(pipeline.layout(), vk::ShaderStageFlags::COMPUTE, push);
+            self.device.raw.cmd_dispatch_indirect(self.buffer, groups.raw, offset);
+        }
+    }
+
     /// Traces with a ray-tracing pipeline over `rays` invocations; see [`Recorder::dispatch`] for `push`.
     pub fn trace_rays<P: bytemuck::NoUninit>(&mut self, pipeline: &RayTracingPipeline, push: &P, rays: u32) {
         let (Some(functions), Some(table)) = (&self.device.pipelines, pipeline.table()) else { return };

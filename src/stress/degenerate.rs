@@ -225,6 +225,21 @@ pub fn coincident(count: u32, own_vertices: bool) -> [Scene; 2] {
     [here(many), here(once)]
 }
 
+/// `count` triangles in one plane, each a little larger than the one before and around it, as triangles of one mesh or as instances of a small one: a ray that meets
+/// the smallest has to be tested against all of them, because no one is nearer. The second scene has the largest alone.
+pub fn overlapping(count: u32, as_instances: bool) -> [Scene; 2] {
+    let corners = [DVec3::new(-0.5, -0.25, 0.0), DVec3::new(0.5, -0.3, 0.0), DVec3::new(0.05, 0.5, 0.0)];
+    let size = |k: u32| 1.0 + f64::from(k) / f64::from(count);
+    let sized = |k: u32| triangles([corners.map(|c| c * size(k))]);
+    let many = if as_instances {
+        let places = (0..count).map(|k| DAffine3::from_scale(DVec3::new(size(k), size(k), 1.0)));
+        scene_of(vec![(triangles([corners]), places.collect())])
+    } else {
+        here(triangles((0..count).map(|k| corners.map(|c| c * size(k)))))
+    };
+    [many, here(sized(count - 1))]
+}
+
 /// Answers of the oracle that tests every primitive.
 pub fn truth(oracle: &Oracle, rays: &[Ray]) -> Vec<OracleHit> {
     rays.par_iter().map(|r| oracle.brute_force_closest(r)).collect()
@@ -378,32 +393,47 @@ fn needles(session: &mut Session) -> Result<()> {
 /// Seconds that a hard scene may take, to build and to trace, with the compiling of its shaders.
 const SECONDS: f64 = 60.0;
 
-/// The check of [`coincident`] triangles: as if there were one.
+/// Bytes of device memory that a primitive or an instance of a hard scene may take.
+const BYTES: u64 = 1024;
+
+/// The check of `count` surfaces in one place, by [`coincident`] or [`overlapping`]: hits are those of the second scene, which has one. Time and memory are bounded.
 ///
 /// # Errors
 /// Those of tracing: some drivers end long traversals early.
-pub fn check_coincident(
+pub fn check_as_one(
     setup: &Setup,
     kind: TracerKind,
     name: &str,
     count: u32,
-    own_vertices: bool,
+    [many, one]: &[Scene; 2],
     watch: &mut Watch,
 ) -> Result<Check> {
     let start = Instant::now();
-    let [many, one] = coincident(count, own_vertices);
-    let oracle = Oracle::new(&one, DVec3::ZERO);
+    let oracle = Oracle::new(one, DVec3::ZERO);
     // few: a ray that meets one meets them all
-    let rays = random_rays(&oracle, setup.effort().pick(500, 2000), 4);
+    let (most, tests) = setup.effort().pick((500, 20_000_000), (2000, 300_000_000));
+    let rays = random_rays(&oracle, most.min(tests / count as usize), 4);
     let truth = oracle.trace_closest(&rays);
-    let tracer = setup.tracer(kind, &many)?;
+    let tracer = setup.tracer(kind, many)?;
     let mut hits = trace(&tracer, &rays, Mode::Closest, 1, watch)?.0;
     // which of them is met is not said: as if all had the first's number
-    hits.iter_mut().filter(|h| h.is_hit() && h.primitive < count).for_each(|h| h.primitive = 0);
-    let report = judge_closest(&oracle, &rays, &hits, &truth, Rounding::default());
-    let seconds = start.elapsed().as_secs_f64();
-    let value = if seconds > SECONDS { f64::NAN } else { report.unexplained as f64 };
-    let sentence = format!("of {} rays; a stack of {}, {seconds:.1} s", report.rays, tracer.stats().stack_entries);
+    for h in hits.iter_mut().filter(|h| h.is_hit() && h.primitive < count && h.instance < count) {
+        (h.instance, h.primitive) = (0, 0);
+    }
+    let any: Vec<bool> = trace(&tracer, &rays, Mode::Any, 1, watch)?.0.iter().map(Hit::is_hit).collect();
+    let occluded: Vec<bool> = truth.iter().map(OracleHit::is_hit).collect();
+    let rounding = Rounding::default();
+    let closest = judge_closest(&oracle, &rays, &hits, &truth, rounding);
+    let any = judge_any(&oracle, &rays, &any, &occluded, rounding);
+    let (seconds, stats) = (start.elapsed().as_secs_f64(), tracer.stats());
+    let bytes = (stats.structure_bytes + stats.scene_bytes) / u64::from(count);
+    let met = occluded.iter().filter(|&&hit| hit).count();
+    let is_bounded = seconds <= SECONDS && bytes <= BYTES && met > 0;
+    let value = if is_bounded { (closest.unexplained + any.unexplained) as f64 } else { f64::NAN };
+    let sentence = format!(
+        "of {} rays, {met} of which meet them; a stack of {}, {bytes} bytes each, {seconds:.1} s",
+        closest.rays, stats.stack_entries
+    );
     Ok(Check::at_most(name, value, "unexplained", 0.0).says(sentence))
 }
 
@@ -415,34 +445,30 @@ fn coincident_triangles(session: &mut Session) -> Result<()> {
         for count in [3000, most] {
             for (own_vertices, how) in [(false, ""), (true, ", vertices of their own")] {
                 let name = format!("{count} coincident triangles{how}");
-                session.measure(&name, Some(kind), |s, w| check_coincident(s, kind, &name, count, own_vertices, w))?;
+                session.measure(&name, Some(kind), |s, w| {
+                    check_as_one(s, kind, &name, count, &coincident(count, own_vertices), w)
+                })?;
             }
         }
+        let name = format!("{most} triangles around one another in a plane");
+        session.measure(&name, Some(kind), |s, w| check_as_one(s, kind, &name, most, &overlapping(most, false), w))?;
     }
     Ok(())
 }
 
-/// Instances in one place, of a triangle.
+/// Instances in one place, of a triangle: all alike, and each of its own size.
 fn one_place(session: &mut Session) -> Result<()> {
     let kinds = session.setup().shading_tracers();
     let count = session.setup().effort().pick(10_000, 1_000_000);
-    let name = format!("{count} instances in one place");
     let one = triangles([[DVec3::new(-1.0, -0.5, 0.1), DVec3::new(1.0, -0.4, -0.2), DVec3::new(0.1, 1.0, 0.3)]]);
-    let many = scene_of(vec![(one.clone(), vec![DAffine3::from_scale(DVec3::splat(1.5)); count])]);
-    let single = scene_of(vec![(one, vec![DAffine3::from_scale(DVec3::splat(1.5))])]);
-    session.measure_each(&name, &kinds, |s, kind, w| {
-        let start = Instant::now();
-        let oracle = oracle_of(&single);
-        let rays = random_rays(&oracle, 200, 4);
-        let truth = oracle.trace_closest(&rays);
-        let tracer = s.tracer(kind, &many)?;
-        let mut hits = trace(&tracer, &rays, Mode::Closest, 1, w)?.0;
-        hits.iter_mut().filter(|h| h.is_hit() && (h.instance as usize) < count).for_each(|h| h.instance = 0);
-        let report = judge_closest(&oracle, &rays, &hits, &truth, Rounding::default());
-        let seconds = start.elapsed().as_secs_f64();
-        let value = if seconds > SECONDS { f64::NAN } else { report.unexplained as f64 };
-        Ok(Check::at_most(name.as_str(), value, "unexplained", 0.0).says(format!("of {} rays; {seconds:.1} s", report.rays)))
-    })
+    let place = DAffine3::from_scale(DVec3::splat(1.5));
+    let scenes = [scene_of(vec![(one.clone(), vec![place; count as usize])]), scene_of(vec![(one, vec![place])])];
+    let name = format!("{count} instances in one place");
+    session.measure_each(&name, &kinds, |s, kind, w| check_as_one(s, kind, &name, count, &scenes, w))?;
+    // as many as a quick run has triangles in one place
+    let count = count.max(100_000);
+    let name = format!("{count} instances around one another in a plane");
+    session.measure_each(&name, &kinds, |s, kind, w| check_as_one(s, kind, &name, count, &overlapping(count, true), w))
 }
 
 /// Loads a Wavefront OBJ file of one triangle with these corners.

@@ -37,8 +37,24 @@ pub(super) fn lane_budget(device: &DeviceInfo) -> (u32, u32) {
 /// Stack entries beyond those in registers that suffice for most scenes.
 pub(super) const USUAL_STACK: u32 = 16;
 
-/// Number of iterations after which some drivers leave any loop: [`DeviceInfo::cuts_long_loops`].
-const CUT_LOOP_TURNS: u32 = 65_535;
+/// Number of iterations after which some drivers leave any loop: [`DeviceInfo::cuts_long_loops`]. It is of all loops of an invocation together, and where shaders are not
+/// optimized, short ones are not unrolled: up to twenty iterations in one of traversal.
+const CUT_LOOP_TURNS: u32 = if cfg!(feature = "live-shaders") { 65_535 / 20 } else { 65_535 };
+
+/// Iterations after which rays are not resumed any more: enough for one that passes a million instances.
+const MAX_RESUMED_ITERATIONS: u64 = 1 << 22;
+
+/// How often rays have to be resumed of which none visits more than `visits` blocks; 0 where no driver ends a loop before such a ray is done.
+pub(super) fn resumptions(device: &DeviceInfo, visits: u64) -> u32 {
+    let (_, last_fetch) = lane_budget(device);
+    // SUSPEND_ITERATION in shaders/trace/suspend.glsl
+    let suspended_at = u64::from(2 * last_fetch - (last_fetch >> 3));
+    match suspended_at.saturating_sub(u64::from(last_fetch)) {
+        0 => 0,
+        left if visits < left => 0,
+        _ => visits.min(MAX_RESUMED_ITERATIONS).div_ceil(suspended_at) as u32,
+    }
+}
 
 /// Hierarchies on the host.
 pub(super) enum Trees {
@@ -75,7 +91,8 @@ impl Hierarchy {
         self.unfinished.read_with(0, 4, 4, |_, bytes| count = bytemuck::pod_read_unaligned(bytes))?;
         let (what, remedy) = match self.kernel {
             Kernel::Packet => ("packets of rays", "--traversal wide, or a newer driver"),
-            _ => ("rays", "a newer driver, or fewer overlapping surfaces"),
+            Kernel::Auto | Kernel::Wide => ("rays", "a newer driver, or fewer overlapping surfaces"),
+            _ => ("rays", "--traversal wide, or a newer driver"),
         };
         match count {
             0 => Ok(()),
@@ -94,10 +111,7 @@ impl Hierarchy {
     /// rounded up, so that scenes share compiled shaders.
     pub fn stack_constant(&self) -> u32 {
         match self.kernel {
-            Kernel::Auto | Kernel::Wide | Kernel::Packet => match self.stack_entries.saturating_sub(STACK_IN_REGISTERS) {
-                0 => 0,
-                n => n.next_power_of_two().max(USUAL_STACK),
-            },
+            Kernel::Auto | Kernel::Wide | Kernel::Packet => stack_constant(self.stack_entries),
             _ => self.stack_entries.max(1),
         }
     }
@@ -167,6 +181,14 @@ impl Trees {
             Trees::Binary(trees, kernel) => trees.upload(device, flat, kernel),
             Trees::None => brute::upload(device, flat),
         }
+    }
+}
+
+/// Entries of a stack of the fast kernels beyond those in registers.
+pub(super) fn stack_constant(stack_entries: u32) -> u32 {
+    match stack_entries.saturating_sub(STACK_IN_REGISTERS) {
+        0 => 0,
+        n => n.next_power_of_two().max(USUAL_STACK),
     }
 }
 

@@ -6,7 +6,7 @@ use crate::accel::features::SceneFeatures;
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, ComputePipeline, Device, HitShaders, RayTracingPipeline, Recorder, Specialization};
 use crate::interface::constants;
-use crate::interface::records::hierarchy::{LaunchHit, UNFINISHED};
+use crate::interface::records::hierarchy::{LaunchHit, RESUMED, UNFINISHED};
 pub use crate::interface::records::ray::Push;
 use crate::ray::Ray;
 use crate::shaders::{self, LANES, Mode, PACKET_RAYS, RUN, Rays, SPREAD, StreamShaders, Variant};
@@ -44,6 +44,17 @@ pub(super) struct LaunchMemory {
     pub hits: Arc<Buffer>,
     /// A u32 per work-group: number of rays that its lanes have fetched.
     pub counters: Arc<Buffer>,
+    /// Where drivers end loops before some ray may be done.
+    pub suspended: Option<SuspendedRays>,
+}
+
+/// Rays whose traversal is not done when the driver ends a loop (shaders/trace/suspend.glsl).
+#[derive(Clone)]
+pub(super) struct SuspendedRays {
+    /// Their number, the work-groups that resume them, and they.
+    pub memory: Arc<Buffer>,
+    /// How often they are resumed.
+    pub resumptions: u32,
 }
 
 /// A stream, ready to run. Clones share what was compiled.
@@ -199,6 +210,10 @@ impl Stream {
                     recorder.barrier();
                     let groups = spread(push.count.div_ceil(*rays_per_group), 1);
                     recorder.fill(&memory.counters, 4 * groups.iter().map(|&n| u64::from(n)).product::<u64>(), 0);
+                    if let Some(suspended) = &memory.suspended {
+                        // none, in no work-group
+                        recorder.fill(&suspended.memory, 8, 0);
+                    }
                     match generate {
                         Some(generate) => {
                             push.rays = memory.rays.address();
@@ -210,7 +225,16 @@ impl Stream {
                         }
                     }
                     recorder.barrier();
-                    recorder.timed(tracing, |r| r.dispatch_3d(trace, &push, groups));
+                    recorder.timed(tracing, |r| {
+                        r.dispatch_3d(trace, &push, groups);
+                        if let Some(suspended) = &memory.suspended {
+                            let push = Push { first: RESUMED, ..push };
+                            for _ in 0..suspended.resumptions {
+                                r.barrier();
+                                r.dispatch_indirect(trace, &push, &suspended.memory, 4);
+                            }
+                        }
+                    });
                     recorder.barrier();
                     recorder.timed(delivering, |r| r.dispatch_3d(deliver, &push, spread(push.count.div_ceil(LANES), RUN)));
                 }

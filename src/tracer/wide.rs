@@ -9,11 +9,13 @@ use glam::Vec3;
 use obvhs::bvh2::Bvh2;
 use rayon::prelude::*;
 
-use super::compute::{Hierarchy, instance_boxes, padding, primitive_boxes, unfinished_counter, write_records};
+use super::compute::{
+    Hierarchy, instance_boxes, padding, primitive_boxes, resumptions, stack_constant, unfinished_counter, write_records,
+};
 use super::dynamic_trees::{DynamicTrees, instance_leaf, reserve};
 use super::kernel::BuildOptions;
 use super::kernel::Kernel;
-use super::stream::{LAUNCH_RAYS, LaunchMemory};
+use super::stream::{LAUNCH_RAYS, LaunchMemory, SuspendedRays};
 use crate::accel::build::{self, MAX_DEPTH};
 use crate::accel::cache::KeyBuilder;
 use crate::accel::flatten::{BlasGroup, FlatScene, TlasInstance};
@@ -22,7 +24,10 @@ use crate::accel::wide::{self, Block, WideBvh};
 use crate::accel::{Aabb, BuildPreset};
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, Device, Memory};
-use crate::interface::records::hierarchy::{ALPHA_TESTED, InstanceLeaf, LaunchHit, SPHERE, SphereLeaf, TriangleLeaf};
+use crate::interface::records::hierarchy::{
+    ALPHA_TESTED, InstanceLeaf, LaunchHit, SPHERE, STACK_IN_REGISTERS, SUSPENDED_RAYS, SUSPENDED_START, SUSPENDED_WORDS,
+    SphereLeaf, TriangleLeaf,
+};
 use crate::ray::Ray;
 use crate::scene::Geometry;
 
@@ -109,6 +114,12 @@ impl Trees {
         // an empty scene has a node without children
         let reserved = reserved.chain(std::iter::repeat_n(Block::default(), usize::from(count == 0)));
         let nodes = write_records(device, "hierarchy", count.max(1) as u64, &mut { reserved })?;
+        // a ray visits a block once, and those of a group once for each of its instances
+        let blocks_of = |i: &TlasInstance| capacities.groups[i.group] as u64;
+        let visits = match &self.top {
+            Some(_) => capacities.top as u64 + flat.instances.iter().map(blocks_of).sum::<u64>(),
+            None => count as u64,
+        };
         let launch = |name, bytes| Buffer::new(device, name, bytes * LAUNCH_RAYS as u64, Memory::Device).map(Arc::new);
         Ok(Hierarchy {
             kernel,
@@ -124,9 +135,27 @@ impl Trees {
                 rays: launch("launch rays", size_of::<Ray>() as u64)?,
                 hits: launch("launch hits", size_of::<LaunchHit>() as u64)?,
                 counters: launch("launch counters", 4)?,
+                suspended: match resumptions(&device.info, visits) {
+                    0 => None,
+                    n => Some(SuspendedRays { memory: suspended_rays(device, stack_entries)?, resumptions: n }),
+                },
             }),
         })
     }
+}
+
+/// Memory of suspended rays, none yet, each with its stack (shaders/trace/suspend.glsl).
+fn suspended_rays(device: &Arc<Device>, stack_entries: u32) -> Result<Arc<Buffer>> {
+    let stack = 2 * (STACK_IN_REGISTERS + stack_constant(stack_entries) + 1);
+    let words = SUSPENDED_START + SUSPENDED_RAYS * (SUSPENDED_WORDS + stack);
+    let mut buffer = Buffer::new(device, "suspended rays", 4 * u64::from(words), Memory::Device)?;
+    // none, in no work-group along x and one along y and z
+    buffer.fill(16, 4, |first, bytes| {
+        for (k, word) in bytes.chunks_exact_mut(4).enumerate() {
+            word.copy_from_slice(&u32::from(first as usize + k > 1).to_le_bytes());
+        }
+    })?;
+    Ok(Arc::new(buffer))
 }
 
 /// A tree over boxes, not yet padded. `depth`: maximum depth in nodes, if bounded.

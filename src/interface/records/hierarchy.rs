@@ -22,6 +22,14 @@ records! {
         /// Initial value of `LaunchHit.t`. Some CPU drivers leave any loop after 65,535 iterations: a ray to which this happens keeps this value, and is reported
         /// instead of returning the result of an earlier launch.
         UNFINISHED: uint = 0x7fc0_dead;
+        /// Maximum number of rays of a launch that are suspended where drivers end loops early (trace/suspend.glsl).
+        SUSPENDED_RAYS: uint = 0x4000;
+        /// First word of the first suspended ray. Before it are their number, and the numbers of work-groups along x, y and z that resume them.
+        SUSPENDED_START: uint = 4;
+        /// Words of a suspended ray before its traversal stack.
+        SUSPENDED_WORDS: uint = 20;
+        /// `Push.first` of a launch that resumes suspended rays.
+        RESUMED: uint = 0xffff_ffff;
     };
 
     /// A node or a leaf of the wide BVH before its kind is known: one cache line, 64 bytes.

@@ -53,8 +53,8 @@ records! {
         bounds_max: vec4,
         /// `MipRecord` of each texture; 0: unused.
         mips: address,
-        /// Padding to a multiple of 16 bytes.
-        reserved2: address,
+        /// Compute tracer: rays that are suspended where the driver ends loops early; 0: it does not.
+        suspended: address,
     }
 
     /// A TLAS instance.
