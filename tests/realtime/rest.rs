@@ -30,7 +30,10 @@ fn gpu_an_image_at_rest_is_denoised_and_converges() {
             assert_sound(&kind.to_string(), &realtime);
             rmse(&realtime.result().unwrap(), &truth, &all)
         });
-        println!("{kind}: the filter alone {:.4}, with the mean at rest {:.4}, after 256 frames {:.4}", errors[0], errors[1], errors[2]);
+        println!(
+            "{kind}: the filter alone {:.4}, with the mean at rest {:.4}, after 256 frames {:.4}",
+            errors[0], errors[1], errors[2]
+        );
         assert!(errors[1] < 0.85 * errors[0], "{kind}: {errors:?}");
         assert!(errors[2] < 0.7 * errors[1], "{kind}: {errors:?}");
     }

@@ -60,7 +60,11 @@ impl Pass for Antialias {
             history: resources.address(Resource::ResolvedHistory),
             previous_history: resources.previous_address(Resource::ResolvedHistory),
             rest: resources.address(Resource::Rest),
-            denoised: if self.has_rest && frame.resting >= nlmeans::FIRST_FRAME { resources.address(Resource::Denoised) } else { 0 },
+            denoised: if self.has_rest && frame.resting >= nlmeans::FIRST_FRAME {
+                resources.address(Resource::Denoised)
+            } else {
+                0
+            },
             resolved: resources.address(Resource::Resolved),
             has_history: frame.has_resolved.into(),
             most_frames: match frame.settings.antialias {
