@@ -15,7 +15,7 @@
 #include "interface/denoise.glsl"
 
 // Half width of the window, pixels.
-const int NLMEANS_RADIUS = 4;
+const int RADIUS = int(NLMEANS_RADIUS);
 // A block with the pixels around it that its patches have.
 const int PATCHES = BLOCK + 2;
 // Difference of depths, as a share of the nearer one, from which two pixels show different surfaces.
@@ -53,8 +53,8 @@ void main() {
         ivec2 at = min(corner + ivec2(k % BLOCK, k / BLOCK), size - 1);
         depth[k] = is_null(depths) ? 1.0 : Floats(depths).v[at.y * size.x + at.x];
     }
-    for (int dy = -NLMEANS_RADIUS; dy <= NLMEANS_RADIUS; dy++) {
-        for (int dx = -NLMEANS_RADIUS; dx <= NLMEANS_RADIUS; dx++) {
+    for (int dy = -RADIUS; dy <= RADIUS; dy++) {
+        for (int dx = -RADIUS; dx <= RADIUS; dx++) {
             float unlike[PATCHES * PATCHES];
             VALUE other[BLOCK * BLOCK];
             [[unroll]] for (int y = 0; y < PATCHES; y++) {

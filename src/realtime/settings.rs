@@ -357,7 +357,7 @@ impl Preset {
             unit: 1.0,
             antialias: false,
             converge: false,
-            rest_samples: 1024,
+            rest_samples: 256,
             bent: false,
             launch_rays: LAUNCH_RAYS,
         };
@@ -389,6 +389,7 @@ impl Preset {
             Preset::Quality => Settings {
                 rays_per_pixel: 4,
                 history: 128,
+                rest_samples: 768,
                 filter: Filter { radius: 4, samples: 1024.0, ..common.filter },
                 ..common
             },

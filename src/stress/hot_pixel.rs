@@ -13,6 +13,7 @@ use crate::error::Result;
 use crate::film::Film;
 use crate::film::camera::CameraRecord;
 use crate::integrators::path::PathOptions;
+use crate::interface::records::denoise::NLMEANS_RADIUS;
 use crate::realtime::{Filter, FilterKind, Realtime, Settings};
 use crate::scene::builtin::{SceneTransform, analytic, shapes};
 use crate::scene::{Camera, Light, LightKind, Scene};
@@ -107,7 +108,8 @@ pub fn still(setup: &Setup, kind: TracerKind, filter: FilterKind, hot: f32, nois
     let settings = denoise::Settings { kind: filter, ..Default::default() };
     let film = film(SIZE, hot, noisy);
     let image = Denoiser::Filter(settings).denoise(&shot, &film, &features, watch)?;
-    let reach = reach(&Filter { kind: filter, radius: settings.radius, samples: f32::MAX });
+    // non-local means follow
+    let reach = reach(&Filter { kind: filter, radius: settings.radius, samples: f32::MAX }).max(NLMEANS_RADIUS);
     let is_far = |k: usize| [k as u32 % SIZE, k as u32 / SIZE].into_iter().any(|x| x.abs_diff(SIZE / 2) > reach);
     Ok(Spread::of(&image, COLD, hot, is_far))
 }

@@ -2,6 +2,8 @@
 
 records! {
     "denoise" values {
+        /// How far non-local means look for pixels that are alike, pixels along each axis.
+        NLMEANS_RADIUS: uint = 4;
         /// Side of the square of pixels that a thread of `nlmeans` filters.
         NLMEANS_BLOCK: uint = 4;
         /// The same of `nlmeans_radiance`.
