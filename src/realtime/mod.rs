@@ -197,7 +197,11 @@ impl Realtime {
         let device = tracer.device();
         Ok(Self {
             size,
-            settings: Settings { primary: Some(Primary::Traced), ..*settings },
+            settings: Settings {
+                primary: Some(Primary::Traced),
+                rest_samples: settings.rest_samples.max(Settings::RADIANCE_REST_SAMPLES),
+                ..*settings
+            },
             graph: Graph::new(device, extent, passes::radiance_stages(tracer, flat, block, settings, options)?)?,
             params: Params::new(device, "frame parameters")?,
             display: None,

@@ -209,7 +209,7 @@ impl Settings {
     /// Maximum history length in samples: the largest number up to which half floats represent all integers.
     pub const MAX_SAMPLES: u32 = 2048;
 
-    /// [`Settings::rest_samples`] of radiance.
+    /// Minimum of [`Settings::rest_samples`] for radiance, which is noisier.
     pub const RADIANCE_REST_SAMPLES: u32 = 4096;
 
     /// Returns true if the image converges at rest.

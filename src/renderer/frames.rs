@@ -346,7 +346,6 @@ pub fn frame_settings(settings: &RenderSettings) -> Result<Settings> {
     }
     if is_radiance {
         how.check_radiance()?;
-        how.rest_samples = Settings::RADIANCE_REST_SAMPLES;
     }
     how.converge |= settings.frames.at_rest.is_none() && (is_radiance || how.antialias);
     how.bent = Aov::Bent.is_in(&settings.image.aov) || shown == DisplayMode::Bent;
