@@ -45,6 +45,12 @@ pub struct Frame<'a> {
     pub rest_starts: bool,
     /// Frames since the image came to rest, this one included; 0: it does not rest.
     pub resting: u32,
+    /// Radiance: paths of each pixel that is sampled in this frame.
+    pub paths: u32,
+    /// Radiance: paths of each pixel since the image came to rest, but for the first frame.
+    pub rest_paths: u64,
+    /// Radiance: index of the first of them in the pixel's sequence.
+    pub first_path: u32,
     /// Maximum samples of histories of radiance before this frame's.
     pub most_past: f32,
     /// The environment map has been turned: its new rotation from world directions to the map's.

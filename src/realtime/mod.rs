@@ -5,6 +5,7 @@
 //! history of the same surface, reprojected from the previous frame; `filter` averages over neighbours. Passes whose inputs have not changed
 //! are skipped (`graph`): while neither the camera nor the scene moves no camera rays are traced, nor occlusion rays of pixels with a full history.
 
+mod frame_paths;
 pub mod frame_settings;
 mod graph;
 pub(super) mod params;
@@ -30,6 +31,7 @@ use crate::shaders::StreamShaders;
 use crate::tracer::gpu_scene::rows;
 use crate::tracer::{MovedBounds, Tracer};
 use display::{Display, DisplayMode};
+use frame_paths::FramePaths;
 use graph::{Frame, Graph, Params};
 use params::{FrameParams, moved_records};
 pub use passes::display;
@@ -89,6 +91,7 @@ pub struct Realtime {
     primary_reason: String,
     state: State,
     is_radiance: bool,
+    paths: FramePaths,
 }
 
 /// Which pass writes the displayed image.
@@ -120,6 +123,11 @@ struct State {
     offset: [f32; 2],
     /// Frames since camera and scene last changed, this one included.
     resting: u32,
+    /// Radiance: index of the next path in a pixel's sequence. A pixel takes the samples of its sequence one after the other, also where it is sampled in every second or fourth frame only:
+    /// all samples of a sequence are more even than every fourth of them.
+    first_path: u32,
+    /// Radiance: maximum number of paths of a pixel since then. The other pixels of the pattern follow with samples of the same indices.
+    pattern_paths: u32,
     /// Lights or materials have changed: histories of radiance count little.
     has_new_light: bool,
     /// The rotation to the environment map, if it is not yet on the device.
@@ -173,6 +181,7 @@ impl Realtime {
             primary_reason,
             state: State::default(),
             is_radiance: false,
+            paths: FramePaths { few: settings.rays_per_pixel, many: settings.rays_per_pixel },
         })
     }
 
@@ -210,6 +219,7 @@ impl Realtime {
             primary_reason: "paths begin with a camera ray".into(),
             state: State::default(),
             is_radiance: true,
+            paths: FramePaths::new(settings, pixels),
         })
     }
 
@@ -262,6 +272,15 @@ impl Realtime {
         &self.settings
     }
 
+    /// Number of frames at rest after which the image no longer changes; `None`: with every frame, or it is pixels that come to rest, each on its own.
+    pub fn frames_to_rest(&self) -> Option<u32> {
+        if self.is_radiance && self.settings.converges() {
+            Some(self.paths.frames_for(self.settings.rest_samples) * self.settings.resolution.period())
+        } else {
+            self.settings.frames_to_rest()
+        }
+    }
+
     /// Why camera rays are traced or rasterized.
     pub fn primary_reason(&self) -> &str {
         &self.primary_reason
@@ -283,6 +302,8 @@ impl Realtime {
     pub fn start_at(&mut self, frame: u32) {
         self.reset();
         self.state.frame = frame;
+        self.state.first_path = (frame / self.settings.resolution.period()).wrapping_mul(self.settings.rays_per_pixel);
+        self.state.pattern_paths = 0;
     }
 
     /// Renders the next frame. `moved` is what has moved in the scene since the previous one ([`crate::tracer::UpdateStats::moved`]).
@@ -324,12 +345,10 @@ impl Realtime {
         // Larsen's pipeline skips no pass
         let still = moved.is_empty() && self.state.camera == Some(*camera) && !is_larsen && !self.state.has_new_light;
         let resting = if still { self.state.resting.saturating_add(1) } else { 0 };
-        let has_come_to_rest = self.settings.frames_to_rest().is_some_and(|frames| resting >= frames);
+        let has_come_to_rest = self.frames_to_rest().is_some_and(|frames| resting >= frames);
+        let paths = self.paths.of(resting);
         if has_come_to_rest && self.shown == Some(self.display) {
-            return Ok(FrameStats {
-                skipped_rays: self.pixels() * u64::from(self.settings.rays_per_pixel),
-                ..Default::default()
-            });
+            return Ok(FrameStats { skipped_rays: self.pixels() * u64::from(paths), ..Default::default() });
         }
         let offset = if self.settings.antialias { sample_offset(self.state.frame) } else { [0.0; 2] };
         // camera rays start elsewhere
@@ -356,6 +375,9 @@ impl Realtime {
             has_resolved: self.state.has_resolved,
             rest_starts: resting == 0 || !self.state.has_resolved,
             resting,
+            paths,
+            rest_paths: self.paths.since_rest(resting),
+            first_path: self.state.first_path,
             most_past: match self.state.has_new_light {
                 true => PAST_AFTER_NEW_LIGHT * self.settings.rays_per_pixel as f32,
                 false => f32::MAX,
@@ -369,8 +391,14 @@ impl Realtime {
         let count: Vec<u32> = self.graph.resources().read(Resource::RayCount, 1)?;
         let occlusion_rays = count.first().map_or(self.graph.rays(), |&n| u64::from(n));
         let pixels = self.pixels();
-        let all = pixels * u64::from(self.settings.rays_per_pixel) / u64::from(self.settings.resolution.period());
+        let period = self.settings.resolution.period();
+        let all = pixels * u64::from(paths) / u64::from(period);
         self.state.frame = self.state.frame.wrapping_add(1);
+        self.state.pattern_paths = self.state.pattern_paths.max(paths);
+        if self.state.frame.is_multiple_of(period) {
+            self.state.first_path = self.state.first_path.wrapping_add(self.state.pattern_paths);
+            self.state.pattern_paths = 0;
+        }
         self.state.camera = Some(*camera);
         self.state.has_history = self.settings.history > 1 || is_larsen;
         self.state.has_resolved = true;
@@ -384,7 +412,7 @@ impl Realtime {
             primary_rays: match self.settings.primary {
                 Some(Primary::Raster) => 0,
                 // for the G-buffer, and of each path
-                _ if self.is_radiance => pixels * (1 + u64::from(self.settings.rays_per_pixel)),
+                _ if self.is_radiance => pixels * (1 + u64::from(paths)),
                 _ if still && !has_moved_samples => 0,
                 _ => pixels,
             },

@@ -186,6 +186,8 @@ pub struct Settings {
     pub converge: bool,
     /// Samples per pixel at rest after which an image that converges counts as converged, and no more are taken.
     pub rest_samples: u32,
+    /// Radiance at rest: number of bounces after which Russian roulette may end paths, if more than in motion.
+    pub rest_rr_depth: u32,
     /// Also compute bent normals: the mean unoccluded direction.
     pub bent: bool,
     /// Maximum rays of a launch. Small launches let a frame be interrupted soon ([`super::Realtime::frame_with`]); images do not depend on it.
@@ -358,6 +360,7 @@ impl Preset {
             antialias: false,
             converge: false,
             rest_samples: 256,
+            rest_rr_depth: PathOptions::default().rr_depth,
             bent: false,
             launch_rays: LAUNCH_RAYS,
         };

@@ -346,6 +346,7 @@ pub fn frame_settings(settings: &RenderSettings) -> Result<Settings> {
     }
     if is_radiance {
         how.check_radiance()?;
+        how.rest_rr_depth = settings.integrators.path.rr_depth.unwrap_or(how.rest_rr_depth);
     }
     how.converge |= settings.frames.at_rest.is_none() && (is_radiance || how.antialias);
     how.bent = Aov::Bent.is_in(&settings.image.aov) || shown == DisplayMode::Bent;
@@ -436,8 +437,8 @@ pub(super) fn frame_display(settings: &RenderSettings, scene: &Scene) -> Display
 }
 
 /// Number of frames of a static view after which the image no longer changes.
-pub(super) fn settling_frames(settings: &Settings) -> u32 {
-    settings.frames_to_rest().unwrap_or_else(|| frames_of_history(settings))
+pub(super) fn settling_frames(realtime: &Realtime) -> u32 {
+    realtime.frames_to_rest().unwrap_or_else(|| frames_of_history(realtime.settings()))
 }
 
 /// Number of frames after which the histories of a static view are full.

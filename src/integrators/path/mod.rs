@@ -419,6 +419,14 @@ impl PathEstimator {
         self.change_records(|record| record.camera_media = camera_media)
     }
 
+    /// From now on Russian roulette may end paths after so many bounces.
+    fn begin_roulette_after(&mut self, bounces: u32) -> Result<()> {
+        if self.records[0].options.rr_depth == bounces {
+            return Ok(());
+        }
+        self.change_records(|record| record.options.rr_depth = bounces)
+    }
+
     /// Writes the parameters of a block.
     fn write_block(&mut self, params: &BlockParams) -> Result<()> {
         for buffer in &mut self.block_params {

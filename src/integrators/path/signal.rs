@@ -23,6 +23,7 @@ pub struct SignalPaths {
     capacity: u32,
     /// Parameters of ambient light; all other fields are 0.
     ambient: BlockParams,
+    rr_depth: u32,
 }
 
 /// Finds the surface behind each pixel that scatters light, seen directly or by mirrors and glass.
@@ -50,6 +51,7 @@ impl SignalPaths {
             paths: PathEstimator::new(tracer, flat, options, capacity, true)?,
             gather: shaders::PATH_GATHER.pipeline(tracer.device())?,
             capacity,
+            rr_depth: options.rr_depth,
             ambient: options.ambient.map(|a| a.block_params()).unwrap_or_default(),
         })
     }
@@ -116,11 +118,13 @@ impl SignalPaths {
         self.paths.move_lights(tracer.device(), scene)
     }
 
-    /// Begins a frame: the camera and its block, with [`BlockParams::frame`] and [`BlockParams::centre_offset`].
+    /// Begins a frame: the camera and its block, with [`BlockParams::frame`], [`BlockParams::centre_offset`] and [`BlockParams::pixel_filter`], which is `FILTER_CENTRE` for samples that all lie
+    /// there. Russian roulette begins after `rr_depth` bounces, if the options do not say later.
     ///
     /// # Errors
     /// Those of the device.
-    pub fn begin(&mut self, camera: &CameraRecord, params: &BlockParams) -> Result<()> {
+    pub fn begin(&mut self, camera: &CameraRecord, params: &BlockParams, rr_depth: u32) -> Result<()> {
+        self.paths.begin_roulette_after(rr_depth.max(self.rr_depth))?;
         self.paths.find_camera_media(camera)?;
         self.paths.traced = super::PathCounts::default();
         let BlockParams { hemisphere, falloff_log2, radius, .. } = self.ambient;

@@ -19,6 +19,7 @@ mod rest;
 mod surfaces;
 mod temporal;
 
+use super::frame_paths::FramePaths;
 use super::graph::{Range, Stage};
 use super::resources::Resource;
 use super::settings::{Budget, Settings, Technique};
@@ -108,7 +109,8 @@ pub fn radiance_stages(
     let pixels = block.size[0] * block.size[1];
     let most = settings.launch_rays.clamp(MAX_SAMPLES * TILE_PIXELS, LAUNCH_RAYS);
     let sampled = Block { size: settings.resolution.sampled_size(block.size), ..block };
-    let paths = sampled.rays().saturating_mul(settings.rays_per_pixel.min(MAX_SAMPLES).next_power_of_two()).min(most);
+    let spp = FramePaths::new(settings, pixels.into()).many.min(MAX_SAMPLES).next_power_of_two();
+    let paths = sampled.rays().saturating_mul(spp).min(most);
     let paths = SignalPaths::new(tracer, flat, options, paths)?;
     let has_rest = settings.converges();
     let mut stages = vec![

@@ -1,11 +1,13 @@
 //! `paths`: the paths of the pixels that are sampled in this frame, and the means of their parts. The host reads after some bounces how many paths are left.
 
 use crate::error::Result;
-use crate::film::block::{Block, TILE_PIXELS};
+use crate::film::block::{Block, BlockParams, TILE_PIXELS};
 use crate::gpu::{Commands, Recorder, Timing};
 use crate::integrators::path::signal::SignalPaths;
+use crate::interface::PixelFilter;
 use crate::interface::records::radiance::GatherParams;
 use crate::realtime::display::Display;
+use crate::realtime::frame_paths::FramePaths;
 use crate::realtime::graph::{Frame, Params, Pass, Range, ResourceUse, Stage};
 use crate::realtime::resources::{Resource, Resources};
 use crate::scene::Scene;
@@ -15,7 +17,6 @@ use crate::tracer::{Push, Tracer};
 const MAX_SAMPLE_BITS: u32 = 4;
 /// Maximum number of samples per pixel in a launch.
 pub const MAX_SAMPLES: u32 = 1 << MAX_SAMPLE_BITS;
-
 struct Paths {
     paths: SignalPaths,
     /// The pixels that are sampled in a frame, close together.
@@ -24,7 +25,7 @@ struct Paths {
     has_rest: bool,
 }
 
-/// The pass over the pixels that are sampled in a frame ([`Resolution::sampled_size`](crate::realtime::Resolution::sampled_size)), `spp` paths for each.
+/// The pass over the pixels that are sampled in a frame ([`Resolution::sampled_size`](crate::realtime::Resolution::sampled_size)). `spp`: paths of each in motion.
 pub fn stage(tracer: &Tracer, paths: SignalPaths, sampled: Block, spp: u32, has_rest: bool) -> Result<Stage> {
     // a range is a launch, or several of the same pixels
     let pixels = paths.capacity() / spp.min(MAX_SAMPLES).next_power_of_two();
@@ -33,11 +34,11 @@ pub fn stage(tracer: &Tracer, paths: SignalPaths, sampled: Block, spp: u32, has_
     Ok(Stage::new(vec![Box::new(pass)], ranges))
 }
 
-/// Parts of `n` samples per pixel that launches take: powers of two.
-fn sample_batches(n: u32) -> impl Iterator<Item = (u32, u32)> {
+/// Parts of `n` samples per pixel that launches take: powers of two, at most 2^`most_bits`.
+fn sample_batches(n: u32, most_bits: u32) -> impl Iterator<Item = (u32, u32)> {
     let mut done = 0;
     std::iter::from_fn(move || {
-        let bits = (n - done).checked_ilog2()?.min(MAX_SAMPLE_BITS);
+        let bits = (n - done).checked_ilog2()?.min(most_bits);
         let batch = (done, bits);
         done += 1 << bits;
         Some(batch)
@@ -55,7 +56,11 @@ impl Pass for Paths {
         if let Some(to_map) = &frame.environment_turn {
             self.paths.turn_environment(to_map)?;
         }
-        self.paths.begin(&frame.camera, &super::surfaces::block_params(frame, self.sampled))
+        let spreads = self.has_rest && frame.settings.antialias && !frame.rest_starts;
+        let pixel_filter = if spreads { PixelFilter::Box } else { PixelFilter::Centre };
+        let params = BlockParams { pixel_filter: pixel_filter as u32, ..super::surfaces::block_params(frame, self.sampled) };
+        let rr_depth = if FramePaths::is_long(frame.resting) { frame.settings.rest_rr_depth } else { 0 };
+        self.paths.begin(&frame.camera, &params, rr_depth)
     }
 
     fn record(&self, _: &mut Recorder, _: &Frame, _: &Resources, _: Range) -> Result<()> {
@@ -71,9 +76,9 @@ impl Pass for Paths {
     }
 
     fn run(&mut self, commands: &mut Commands, frame: &Frame, resources: &Resources, range: Range) -> Result<Vec<Timing>> {
-        let spp = frame.settings.rays_per_pixel;
         let mut timings = Vec::new();
-        for (earlier, sample_bits) in sample_batches(spp) {
+        let most_bits = (self.paths.capacity() / range.count.max(1)).checked_ilog2().unwrap_or(0).min(MAX_SAMPLE_BITS);
+        for (earlier, sample_bits) in sample_batches(frame.paths, most_bits) {
             self.gather.write(&GatherParams {
                 frame: frame.params,
                 path: self.paths.params_address(),
@@ -91,7 +96,7 @@ impl Pass for Paths {
                 scene: frame.tracer.scene_address(),
                 first: range.first << sample_bits,
                 count: range.count << sample_bits,
-                sample_index: super::surfaces::first_sample(frame).wrapping_add(earlier),
+                sample_index: frame.first_path.wrapping_add(earlier),
                 sample_bits,
                 ..Default::default()
             };
@@ -111,11 +116,11 @@ mod tests {
 
     #[test]
     fn batches_take_every_sample_once() {
-        for n in 1..100 {
+        for (n, most) in (1..100).zip([0, 1, 4].into_iter().cycle()) {
             let mut next = 0;
-            for (done, bits) in sample_batches(n) {
+            for (done, bits) in sample_batches(n, most) {
                 assert_eq!(done, next);
-                assert!(bits <= MAX_SAMPLE_BITS);
+                assert!(bits <= most);
                 next += 1 << bits;
             }
             assert_eq!(next, n);

@@ -37,12 +37,6 @@ pub(super) fn block_params(frame: &Frame, block: Block) -> BlockParams {
     }
 }
 
-/// Index of the first sample of a frame in a pixel that is sampled in it. A pixel takes the samples of its sequence one after the other, also where it is sampled in every second or fourth
-/// frame only: all samples of a sequence are more even than every fourth of them.
-pub(super) fn first_sample(frame: &Frame) -> u32 {
-    (frame.number / frame.settings.resolution.period()).wrapping_mul(frame.settings.rays_per_pixel)
-}
-
 impl Pass for Surfaces {
     fn uses(&self, _: Option<&Display>) -> ResourceUse {
         use Resource::{Camera, Direct, Guide, Materials, PreviousPosition, Scene, Surface};
@@ -59,7 +53,7 @@ impl Pass for Surfaces {
     fn record(&self, r: &mut Recorder, frame: &Frame, _: &Resources, range: Range) -> Result<()> {
         let Range { first, count } = range;
         let push =
-            Push { scene: frame.tracer.scene_address(), first, count, sample_index: first_sample(frame), ..Default::default() };
+            Push { scene: frame.tracer.scene_address(), first, count, sample_index: frame.first_path, ..Default::default() };
         self.rays.record(r, &push);
         Ok(())
     }

@@ -158,7 +158,7 @@ impl View {
         let display = frame_display(settings, session.scene);
         let shown = display.shown;
         realtime.display(&world.tracer, Some(display))?;
-        let settling = settling_frames(realtime.settings());
+        let settling = settling_frames(&realtime);
         let view = FramesView { realtime, shown, resting: 0, settling };
         Ok((world.number, Kind::Frames(Box::new(view))))
     }
