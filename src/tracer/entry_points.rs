@@ -4,7 +4,6 @@
 
 use super::{Push, Stream, Tracer};
 use crate::error::Result;
-use crate::film::camera::CameraRecord;
 use crate::gpu::{Buffer, ComputePipeline, Memory, Recorder};
 use crate::interface::records::block::{BUNDLE_BITS, ENTRY_LIST_BYTES};
 use crate::shaders::{self, PACKET_RAYS};
@@ -19,14 +18,20 @@ pub struct EntryPoints {
 
 impl EntryPoints {
     /// Entry points for the camera rays of `stream`, at most `rays` in a launch and at most 2^`sample_bits` of a pixel. `None` where they do not apply: only the packet kernel has
-    /// them, packets must be within bundles, and only the rays of a perspective camera start at one point. On GPUs they are not measured.
+    /// them, packets must be within bundles, and the rays must start at one point, as those of a
+    /// perspective camera do. On GPUs they are not measured, and Mesa's CPU driver before version 23 loses hits.
     ///
     /// # Errors
     /// Those of the device.
-    pub fn new(tracer: &Tracer, stream: &Stream, camera: &CameraRecord, rays: u32, sample_bits: u32) -> Result<Option<Self>> {
+    pub fn new(tracer: &Tracer, stream: &Stream, from_one_point: bool, rays: u32, sample_bits: u32) -> Result<Option<Self>> {
         let device = tracer.device();
         let least = least_sample_bits(device.info.limits.subgroup_size);
-        if !stream.traces_packets() || !device.info.is_cpu() || camera.orthographic || sample_bits < least {
+        if !stream.traces_packets()
+            || !device.info.is_cpu()
+            || device.info.cuts_long_loops()
+            || !from_one_point
+            || sample_bits < least
+        {
             return Ok(None);
         }
         // a launch may begin and end within a bundle

@@ -260,7 +260,7 @@ pub fn render(tracer: &Tracer, camera: &CameraRecord, options: &AoOptions, contr
     let primary = tracer.stream(primary)?;
     let sample_bits = options.spp.max(1).ilog2().min(AoEstimator::SAMPLE_BITS);
     let mut estimator = AoEstimator {
-        entry_points: EntryPoints::new(tracer, &primary, camera, most, sample_bits)?,
+        entry_points: EntryPoints::new(tracer, &primary, !camera.orthographic, most, sample_bits)?,
         primary,
         occlusion: tracer.stream(occlusion)?,
         resolve: shaders::RESOLVE.pipeline(device)?,
