@@ -2,8 +2,30 @@
 // there is appended to the queue (ao/sample.glsl). A sample without a hit has no further cost.
 #include "ao/hemisphere.glsl"
 #include "ao/sample.glsl"
+#include "common/entry_points.glsl"
 #include "common/pixel_filter.glsl"
 #include "common/warp.glsl"
+#include "trace/block.glsl"
+
+#ifdef PACKET_RAYS
+// What the packet kernel does for this stream (trace/packet.glsl): it starts at entry points, passes hits on with its own ids, and claims the places of occlusion rays in the
+// queue for all hits of a packet together.
+#define HAS_ENTRY_POINTS
+#define TAKES_TRACER_HITS
+#define APPENDS_RAY_PER_HIT
+
+// Address of the list for a packet of rays, or null: the root. A packet has a list if its pixels are in one bundle. The host writes lists under the same condition.
+uvec2 entry_list(uint index) {
+    uvec2 lists = BlockParams(push.pass).entry_points;
+    bool has_list = !is_null(lists) && (1u << (push.sample_bits + BUNDLE_BITS)) >= SUBGROUP_SIZE * PACKET_RAYS;
+    return has_list ? offset_address(lists, (bundle_of(index) - first_bundle()) * ENTRY_LIST_BYTES) : uvec2(0u);
+}
+
+uvec2 queue_counter() { return BlockParams(push.pass).queue.count; }
+
+// The place in the queue of the ray that the next hit adds.
+uint claimed_slot = 0u;
+#endif
 
 // The index is that of the block.
 Ray camera_sample(BlockParams p, uint index) {
@@ -35,9 +57,27 @@ void closest(uint index, Hit hit) {
         dump_ray(p.occlusion_dump, index, no_ray());
         return;
     }
-    // the point on a triangle follows from its corners; only a sphere needs the ray again
-    Surface s = surface_at(HAS_SPHERES ? camera_sample(p, index) : no_ray(), hit);
+    Surface s;
+#ifdef TAKES_TRACER_HITS
+    // A geometric normal that is turned to the viewer follows from the corners alone, unless the surface is seen exactly from the side.
+    bool needs_submesh = !SINGLE_LEVEL || HAS_SPHERES || p.hemisphere != 0u;
+    if (!needs_submesh) {
+        s = surface_of_corners(hit);
+        needs_submesh = !(abs(dot(s.ng, view_direction(p, s.position))) > 0.0);
+    }
+    if (needs_submesh) {
+        hit = scene_hit(hit.t, hit.instance, hit.primitive, vec2(hit.u, hit.v));
+#else
+    {
+#endif
+        // the point on a triangle follows from its corners; only a sphere needs the ray again
+        s = surface_at(HAS_SPHERES ? camera_sample(p, index) : no_ray(), hit);
+    }
     Ray r = sample_occlusion(p, index, s);
     dump_ray(p.occlusion_dump, index, r);
+#ifdef APPENDS_RAY_PER_HIT
+    store_in_queue(p.queue, claimed_slot, r, index - push.first);
+#else
     append_ray(p.queue, r, index - push.first);
+#endif
 }

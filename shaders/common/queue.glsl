@@ -29,6 +29,12 @@ uint claim(uvec2 counter) {
 // Seed of the next ray that is appended (common/ray_seed.glsl); 0 for rays without one.
 uint next_ray_seed = 0u;
 
+// Stores a ray and its tag in a place that is claimed already.
+void store_in_queue(QueueRecord queue, uint slot, Ray ray, uint tag) {
+    store_ray(queue.rays, slot, ray);
+    QueueTags(queue.tags).v[slot] = tag;
+}
+
 // Returns the index of the ray in the queue, with which a stream over the queue calls ray().
 uint append_ray(QueueRecord queue, Ray ray, uint tag) {
     uint slot = claim(queue.count);
@@ -36,8 +42,7 @@ uint append_ray(QueueRecord queue, Ray ray, uint tag) {
         ray.tmin = tmin_of_seed(next_ray_seed);
         next_ray_seed = hash(next_ray_seed);
     }
-    store_ray(queue.rays, slot, ray);
-    QueueTags(queue.tags).v[slot] = tag;
+    store_in_queue(queue, slot, ray, tag);
     return slot;
 }
 

@@ -35,6 +35,53 @@ float spawn_offset(vec4 group_to_world[3], vec4 world_to_group[3], vec3 p, vec3 
     return dot(error, abs(normal)) * scale + dot(world_error, abs(ng));
 }
 
+// A point of a triangle in its group's space: with its unit normal, and bounds on the rounding of the reconstruction and of the intersection test.
+struct TrianglePoint {
+    vec3 p;
+    vec3 normal;
+    vec3 error;
+};
+
+TrianglePoint triangle_point(Corners c, vec2 uv) {
+    vec3 v0 = c.p[0], edge1 = c.p[1] - v0, edge2 = c.p[2] - v0;
+    TrianglePoint point;
+    // the base corner last: its rounding is the smallest that way
+    point.p = v0 + (uv.x * edge1 + uv.y * edge2);
+    vec3 normal = cross(edge1, edge2);
+    vec3 extents = abs(edge1) + abs(edge2) + abs(abs(edge1) - abs(edge2));
+    float extent = max(max(extents.x, extents.y), extents.z);
+    point.error = C0 * abs(v0) + vec3(C1 * extent);
+    // a tiny triangle's cross product underflows: normalise before the transform
+    float largest = max(max(abs(normal.x), abs(normal.y)), abs(normal.z));
+    point.normal = largest > 0.0 ? normalize(normal / largest) : vec3(0.0, 0.0, 1.0);
+    return point;
+}
+
+vec4[3] identity_rows() {
+    return vec4[3](vec4(1.0, 0.0, 0.0, 0.0), vec4(0.0, 1.0, 0.0, 0.0), vec4(0.0, 0.0, 1.0, 0.0));
+}
+
+#ifdef KEEPS_CORNERS
+// Position, geometric normal and offset of the triangle that the kernel has hit in a scene of one level, without the records of its submesh: a mirrored one's normal
+// points to its back.
+Surface surface_of_corners(Hit hit) {
+    Surface s;
+    s.uv = vec2(hit.u, hit.v);
+    TrianglePoint point = triangle_point(hit_corners, s.uv);
+    vec4 rows[3] = identity_rows();
+    s.position = transform_point(rows, point.p);
+    vec3 n = transform_transposed(rows, point.normal);
+    float scale = inversesqrt(dot(n, n));
+    s.ng = n * scale;
+    s.ns = s.ng;
+    s.offset = spawn_offset(rows, rows, point.p, s.position, point.error, point.normal, s.ng, scale);
+    s.submesh = INVALID;
+    s.tlas_instance = 0u;
+    s.primitive = INVALID;
+    return s;
+}
+#endif
+
 // The surface point of a hit. It is computed from the triangle's vertices, not from origin + t * direction, whose error
 // grows with t.
 Surface surface_at(Ray ray, Hit hit) {
@@ -57,8 +104,8 @@ Surface surface_at(Ray ray, Hit hit) {
     InstanceRecord instance;
     if (SINGLE_LEVEL) {
         // one TLAS instance without a transform
-        instance.group_to_world = vec4[3](vec4(1.0, 0.0, 0.0, 0.0), vec4(0.0, 1.0, 0.0, 0.0), vec4(0.0, 0.0, 1.0, 0.0));
-        instance.world_to_group = instance.group_to_world;
+        instance.group_to_world = identity_rows();
+        instance.world_to_group = identity_rows();
     } else {
         instance = load_instance_record(root.instances, records.x);
     }
@@ -78,22 +125,15 @@ Surface surface_at(Ray ray, Hit hit) {
         // pbrt-v4 6.8.5 for the reprojected point, and the rounding of the centre's sum
         error = 5.0 * C0 * (abs(p) + vec3(sphere.w)) + 4.0 * C0 * abs(sphere.xyz);
     } else {
-        Corners c = corners_of_hit(submesh, s.primitive);
-        vec3 v0 = c.p[0], edge1 = c.p[1] - v0, edge2 = c.p[2] - v0;
-        // the base corner last: its rounding is the smallest that way
-        p = v0 + (s.uv.x * edge1 + s.uv.y * edge2);
-        normal = cross(edge1, edge2);
-        vec3 extents = abs(edge1) + abs(edge2) + abs(abs(edge1) - abs(edge2));
-        float extent = max(max(extents.x, extents.y), extents.z);
-        error = C0 * abs(v0) + vec3(C1 * extent);
+        TrianglePoint point = triangle_point(corners_of_hit(submesh, s.primitive), s.uv);
+        p = point.p;
+        normal = point.normal;
+        error = point.error;
         if (!is_null(submesh.normals)) {
             uvec3 corners = triangle_indices(submesh, s.primitive) - submesh.first_vertex;
             shading = load_vec3(submesh.normals, corners.x) * (1.0 - s.uv.x - s.uv.y) + load_vec3(submesh.normals, corners.y) * s.uv.x +
                       load_vec3(submesh.normals, corners.z) * s.uv.y;
         }
-        // a tiny triangle's cross product underflows: normalise before the transform
-        float largest = max(max(abs(normal.x), abs(normal.y)), abs(normal.z));
-        normal = largest > 0.0 ? normalize(normal / largest) : vec3(0.0, 0.0, 1.0);
     }
     s.position = transform_point(instance.group_to_world, p);
     vec3 n = transform_transposed(instance.world_to_group, normal);

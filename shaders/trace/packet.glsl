@@ -3,6 +3,9 @@
 // blocks it reads). A block is fetched once for all and decoded once per lane, and control flow is uniform. So a visit
 // costs a lane a fraction of a visit in `wide.glsl`, but the packet visits every block that any of its rays would. The nearest hits are the same.
 //
+// A stream may define before it includes this file: HAS_ENTRY_POINTS, with entry_list(), to start traversal elsewhere than at the root; TAKES_TRACER_HITS, to get hits with the
+// tracer's own ids; APPENDS_RAY_PER_HIT, with queue_counter() and claimed_slot, if each hit adds one ray to a queue.
+//
 // Rays are generated and hits delivered here, without ray and hit buffers. The host uses this kernel only for coherent streams,
 // on devices whose subgroups have at least eight lanes, broadcasts and arithmetic.
 #ifndef TRACE_PACKET
@@ -120,6 +123,19 @@ void main() {
     uint world_class = class_;
     uint block = root.root, base = 0u, group = 0u;
     bool finished = class_ == NO_CLASS;
+#ifdef HAS_ENTRY_POINTS
+    // the packet's entry points (entry_points.glsl), and the number of the one below which it is
+    uvec2 list = entry_list(push.first + first - lane);
+    bool has_list = !is_null(list);
+    uint entry = 0u, first_entry = root.root;
+    if (has_list) {
+        first_entry = LOAD_PAIR(list, 0u).x;
+        finished = finished || first_entry == INVALID;
+    }
+    block = first_entry;
+#else
+    uint first_entry = root.root;
+#endif
     // Some CPU drivers leave any loop after 65,535 turns; then `finished` is not set, and the host reports it.
     while (!finished) {
         // lane k fetches the k-th pair of words, and broadcasts it
@@ -245,12 +261,29 @@ void main() {
         // the instance is done: back to the top level, or on to the waiting rays
         while (!has_siblings(group) && !finished) {
             if (depth == 0u) {
-                // the tree is done for this class of rays
-                NEXT_CLASS
-                finished = class_ == NO_CLASS;
-                octant = 7u - (class_ & 7u);
-                world_class = class_;
-                base = root.root;
+                bool has_next = false;
+#ifdef HAS_ENTRY_POINTS
+                if (has_list) {
+                    entry++;
+                    uvec2 next = LOAD_PAIR(list, entry);
+                    float farthest = limit[0];
+                    FOR_RAYS farthest = max(farthest, limit[j]);
+                    // beyond the nearest hits of all rays are this entry and all after it
+                    has_next = next.x != INVALID && all_or(farthest > uintBitsToFloat(next.y) ? 1u : 0u) != 0u;
+                    base = next.x;
+                }
+#endif
+                if (!has_next) {
+                    // the tree is done for this class of rays
+                    NEXT_CLASS
+                    finished = class_ == NO_CLASS;
+                    octant = 7u - (class_ & 7u);
+                    world_class = class_;
+                    base = first_entry;
+#ifdef HAS_ENTRY_POINTS
+                    entry = 0u;
+#endif
+                }
                 group = ROOT_GROUP;
                 nearest = INVALID;
             } else {
@@ -289,6 +322,27 @@ void main() {
     }
 
     if (!finished && lane == 0u) atomicAdd(Counter(root.unfinished).v, 1u);
+#ifdef APPENDS_RAY_PER_HIT
+    // Places in the stream's queue for all hits of the packet by one atomic operation. All lanes take part, so no ballot is needed: a CPU driver makes a loop over lanes of both.
+    uint slots[PACKET_RAYS], claimed = 0u;
+    FOR_RAYS {
+        bool appends = best_primitive[j] != INVALID;
+        uint before, all_hits;
+        if (SUBGROUP_SIZE > 16u) {
+            before = subgroupExclusiveAdd(appends ? 1u : 0u);
+            all_hits = subgroupAdd(appends ? 1u : 0u);
+        } else {
+            uint hits = all_or(appends ? 1u << lane : 0u);
+            before = bitCount(hits & ((1u << lane) - 1u));
+            all_hits = bitCount(hits);
+        }
+        slots[j] = claimed + before;
+        claimed += all_hits;
+    }
+    uint first_slot = 0u;
+    if (lane == 0u) first_slot = atomicAdd(QueueCount(queue_counter()).v[0], claimed);
+    first_slot = subgroupBroadcast(first_slot, 0);
+#endif
     // not unrolled: the stream's code, which may be all of a path's, exists once. Places in arrays stay constants, as CPU drivers keep arrays with others in memory.
     [[dont_unroll]] for (int ray = 0; ray < PACKET_RAYS; ray++) {
         uint k = first + uint(ray) * SUBGROUP_SIZE;
@@ -304,13 +358,20 @@ void main() {
                     hit_t = best[j];
                     hit_uv = best_uv[j];
                     hit_corners = best_corners[j];
+#ifdef APPENDS_RAY_PER_HIT
+                    claimed_slot = first_slot + slots[j];
+#endif
                 }
             }
 #ifdef STREAM_ANY
             any(push.first + k, hit_primitive != INVALID);
 #else
             Hit hit = miss();
+#ifdef TAKES_TRACER_HITS
+            if (hit_primitive != INVALID) hit = Hit(hit_t, hit_instance, hit_primitive, hit_uv.x, hit_uv.y);
+#else
             if (hit_primitive != INVALID) hit = scene_hit(hit_t, hit_instance, hit_primitive, hit_uv);
+#endif
             closest(push.first + k, hit);
 #endif
         }

@@ -34,6 +34,7 @@ registry! {
         COMPOSE = "compose";
         DENOISE = "denoise";
         DISPLAY = "display";
+        ENTRY_POINTS = "entry_points";
         FILTER = "filter";
         GATHER = "gather";
         GTAO = "gtao";

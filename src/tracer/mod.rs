@@ -10,6 +10,7 @@ mod brute;
 mod compute;
 mod dynamic;
 mod dynamic_trees;
+pub mod entry_points;
 pub mod gpu_scene;
 mod hardware;
 mod kernel;

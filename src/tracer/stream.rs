@@ -21,6 +21,8 @@ enum Pipeline {
         pipeline: Arc<ComputePipeline>,
         rays_per_group: u32,
     },
+    /// The compute tracer's packet kernel: one shader over all rays.
+    Packets(Arc<ComputePipeline>),
     /// Generate, trace, deliver.
     Steps {
         // `None`: the rays are in a ray buffer already
@@ -134,7 +136,12 @@ impl Stream {
 
     /// A stream for the compute tracer's packet kernel.
     pub(super) fn packets(pipeline: ComputePipeline, shaders: &'static StreamShaders) -> Self {
-        Self { pipeline: Pipeline::Single { pipeline: Arc::new(pipeline), rays_per_group: LANES * PACKET_RAYS }, shaders }
+        Self { pipeline: Pipeline::Packets(Arc::new(pipeline)), shaders }
+    }
+
+    /// Whether the packet kernel traces it.
+    pub(super) fn traces_packets(&self) -> bool {
+        matches!(self.pipeline, Pipeline::Packets(_))
     }
 
     /// A stream for the compute tracer's binary BVH.
@@ -201,6 +208,10 @@ impl Stream {
             Pipeline::Single { pipeline, rays_per_group } => {
                 let run = if *rays_per_group == LANES { RUN } else { 1 };
                 recorder.timed(pass, |r| r.dispatch_3d(pipeline, push, spread(push.count.div_ceil(*rays_per_group), run)));
+            }
+            Pipeline::Packets(pipeline) => {
+                let groups = spread(push.count.div_ceil(LANES * PACKET_RAYS), 1);
+                recorder.timed(pass, |r| r.dispatch_3d(pipeline, push, groups));
             }
             Pipeline::Steps { generate, trace, deliver, rays_per_group, memory, record } => {
                 let [generating, tracing, delivering] = self.shaders.steps;

@@ -29,6 +29,7 @@ use crate::gpu::{Buffer, Commands, ComputePipeline, Device, Memory, Timing};
 use crate::interface::PixelFilter;
 use crate::output::Image;
 use crate::ray::Ray;
+use crate::tracer::entry_points::EntryPoints;
 use crate::tracer::queue::RayQueue;
 
 use crate::tracer::{Needs, Push, Stream, Tracer};
@@ -219,6 +220,8 @@ pub struct AoResult {
     pub occlusion_rays: u64,
     /// Occlusion rays not traced because their camera ray missed.
     pub skipped_rays: u64,
+    /// Camera rays started below the root of the hierarchy in launches of enough samples.
+    pub has_entry_points: bool,
     /// Camera rays of the first sample, if [`AoOptions::keep_rays`] is set.
     pub kept_primary: Vec<Ray>,
     /// Occlusion rays of the first sample, if [`AoOptions::keep_rays`] is set.
@@ -229,6 +232,7 @@ pub struct AoResult {
 struct AoEstimator {
     primary: Stream,
     occlusion: Stream,
+    entry_points: Option<EntryPoints>,
     resolve: ComputePipeline,
     queue: RayQueue,
     samples: Buffer,
@@ -253,8 +257,11 @@ pub fn render(tracer: &Tracer, camera: &CameraRecord, options: &AoOptions, contr
     let device = tracer.device();
     let most = max_rays(options.size, options.spp, AoEstimator::SAMPLE_BITS);
     let [primary, occlusion] = streams(options);
+    let primary = tracer.stream(primary)?;
+    let sample_bits = options.spp.max(1).ilog2().min(AoEstimator::SAMPLE_BITS);
     let mut estimator = AoEstimator {
-        primary: tracer.stream(primary)?,
+        entry_points: EntryPoints::new(tracer, &primary, !camera.orthographic, most, sample_bits)?,
+        primary,
         occlusion: tracer.stream(occlusion)?,
         resolve: shaders::RESOLVE.pipeline(device)?,
         queue: RayQueue::new(device, most)?,
@@ -281,13 +288,15 @@ pub fn render(tracer: &Tracer, camera: &CameraRecord, options: &AoOptions, contr
         pixel_filter: options.pixel_filter as u32,
         samples: estimator.samples.address(),
         queue: estimator.queue.record(),
+        entry_points: estimator.entry_points.as_ref().map_or(0, EntryPoints::address),
         ..Default::default()
     };
     let image = accumulate(tracer, camera, &plan, &params, &mut estimator, control)?;
+    let has_entry_points = estimator.entry_points.is_some();
     let [kept_primary, kept_occlusion] = estimator.kept;
     let occlusion_rays = image.covered;
     let skipped_rays = image.primary_rays + image.skipped_primary_rays - occlusion_rays;
-    Ok(AoResult { image, occlusion_rays, skipped_rays, kept_primary, kept_occlusion })
+    Ok(AoResult { image, occlusion_rays, skipped_rays, has_entry_points, kept_primary, kept_occlusion })
 }
 
 fn ray_buffer(device: &Arc<Device>, rays: u32) -> Result<Buffer> {
@@ -316,6 +325,9 @@ impl Estimator for AoEstimator {
         let timings = commands.run(|r| {
             for push in launches {
                 queue.clear(r);
+                if let Some(entry_points) = &self.entry_points {
+                    entry_points.record(r, push);
+                }
                 r.fill(samples, size_of::<f32>() as u64 * push.count as u64, NO_HIT.to_bits());
                 r.barrier();
                 self.primary.record(r, push);

@@ -5,6 +5,7 @@ use serde_json::{Value, json};
 use super::{AoOptions, AoResult};
 use crate::film::Film;
 use crate::integrators::IntegratorReport;
+use crate::interface::records::block::MAX_ENTRY_POINTS;
 
 /// Composes the report of an ambient occlusion image.
 pub(super) fn report(options: &AoOptions, result: &AoResult) -> IntegratorReport {
@@ -39,6 +40,11 @@ pub(super) fn report(options: &AoOptions, result: &AoResult) -> IntegratorReport
         }
         _ => "occlusion rays are infinite: neither --ao-radius nor --ao-falloff is given".into(),
     });
+    if result.has_entry_points {
+        explanations.push(format!(
+            "entry points: camera rays of 2x2 pixels start at up to {MAX_ENTRY_POINTS} blocks of the hierarchy, the levels above are skipped"
+        ));
+    }
     let all = result.occlusion_rays + result.skipped_rays;
     explanations.push(format!(
         "{} of {all} occlusion rays ({:.1} %) not traced: their camera ray missed",

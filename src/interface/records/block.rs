@@ -6,6 +6,12 @@ records! {
     "block" includes "queue" values {
         /// Pixels along a side of the tiles in which the pixels of a block are numbered.
         TILE: uint = 8;
+        /// Log2 of the pixels of a bundle, whose camera rays share a list of entry points: 2x2, which follow one another in the order of pixels.
+        BUNDLE_BITS: uint = 2;
+        /// Maximum number of entry points of a bundle.
+        MAX_ENTRY_POINTS: uint = 12;
+        /// Bytes of a bundle's list: a pair of words per entry point, the block and the least distance to it, near to far, and a pair of `INVALID` at the end.
+        ENTRY_LIST_BYTES: uint = 128;
     };
 
     /// A block of an image, its camera, and what its passes read and write.
@@ -56,6 +62,8 @@ records! {
         reserved: uint,
         /// Address of the `SurfacesParams`, or 0.
         surfaces: address,
+        /// The entry points of each bundle of pixels of a launch (entry_points.glsl), or 0: camera rays start at the root.
+        entry_points: address,
         /// Offset of rays through the centres of pixels from there, pixels.
         centre_offset: vec2,
     }
