@@ -69,7 +69,7 @@ mod tests {
                 let mut sum = 0;
                 for resting in 1..100 {
                     sum += paths.of(resting);
-                    assert_eq!(paths.since_rest(resting), sum.into());
+                    assert_eq!(paths.since_rest(resting), u64::from(sum));
                     assert_eq!(paths.frames_for(sum), resting, "{paths:?}");
                     assert_eq!(paths.frames_for(sum + 1), resting + 1, "{paths:?}");
                 }
