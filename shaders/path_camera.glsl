@@ -20,7 +20,7 @@ Ray camera_sample(BlockParams p, uint index) {
     uvec2 pixel = path_pixel(p, index);
     if (WITH_SIGNAL && any(greaterThanEqual(pixel, p.image_size))) return no_ray();
     vec2 u = sample_2d(p.seed, pixel, sample_index(index), CAMERA_FILM);
-    // In motion all pixels of a frame have their samples at the same place, where its G-buffer has them: histories are of surfaces. At rest each sample has a place of its own, as in a still.
+    // In motion all pixels of a frame have their samples at the same place, where its G-buffer has them: histories are of surfaces. At rest, where a frame has several, each has a place of its own, as in a still.
     vec2 offset = WITH_SIGNAL && p.pixel_filter == FILTER_CENTRE ? p.centre_offset : !WITH_SIGNAL && WITH_PIXEL_FILTER ? filter_offset(p.pixel_filter, u) : u - 0.5;
     Ray r = camera_ray(p, vec2(pixel) + 0.5 + offset);
     if (HAS_COVERAGE) r.tmin = tmin_of_seed(ray_seed(p.seed, pixel, sample_index(index), 0u));

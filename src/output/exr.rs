@@ -267,6 +267,23 @@ pub fn read(path: &Path) -> Result<Image> {
     std::panic::catch_unwind(|| decode(path)).unwrap_or_else(|_| Err(Error::input(path, "not a readable EXR: it is damaged")))
 }
 
+/// Pixels for which a channel that is subsampled may have one value.
+const MOST_SUBSAMPLED: u64 = 16;
+
+/// Bytes that a part's pixels take at least, whatever they are: a few damaged bytes of a header must not make the decoder take gigabytes. An entry of the table of blocks has 8 bytes, a
+/// block's own header as many or more; run lengths are of at most 128 bytes in two, and deflate (RFC 1951) copies at most 258 bytes in two bits.
+fn least_bytes(header: &Header) -> u64 {
+    let ratio = match header.compression {
+        Compression::Uncompressed => 1,
+        Compression::RLE => 64,
+        Compression::ZIP1 | Compression::ZIP16 | Compression::PXR24 => 1032,
+        // wavelets and blocks have no such bound that is easily said
+        _ => 4096,
+    };
+    let pixels = header.layer_size.0 as u64 * header.layer_size.1 as u64;
+    (16 * header.chunk_count as u64).max(pixels / MOST_SUBSAMPLED / ratio)
+}
+
 fn decode(path: &Path) -> Result<Image> {
     let broken = |e: exr::error::Error| match e {
         exr::error::Error::Io(e) => Error::read(path, &e),
@@ -281,6 +298,10 @@ fn decode(path: &Path) -> Result<Image> {
         if pixels == 0 || pixels > u128::from(super::MAX_PIXELS) {
             return Err(Error::input(path, format!("an image of {} x {} pixels", header.layer_size.0, header.layer_size.1)));
         }
+    }
+    let bytes = std::fs::metadata(path).map_err(|e| Error::read(path, &e))?.len();
+    if meta.headers.iter().map(least_bytes).sum::<u64>() > bytes {
+        return Err(Error::input(path, format!("not a readable EXR: {bytes} bytes are too few for what its header says")));
     }
     let reader = exr::prelude::read().no_deep_data().largest_resolution_level().all_channels().all_layers().all_attributes();
     // a panic in one of the decoder's threads would end the process: what decoders of these methods do to damaged blocks is not checked
@@ -340,5 +361,37 @@ fn normalize(image: &mut Image) {
     let is_grey = bits("Y").is_some_and(|grey| ["R", "G", "B"].iter().all(|name| bits(name) == Some(grey)));
     if is_grey {
         image.channels.retain(|c| !matches!(c.name.as_str(), "R" | "G" | "B"));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A header is a few hundred bytes; what it says must not decide how much memory is taken.
+    #[test]
+    fn files_are_as_large_as_their_headers_say() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("image.exr");
+        let channel = Channel { name: "R".into(), samples: Samples::F32(vec![0.5; 64 * 64]) };
+        let image = Image { width: 64, height: 64, channels: vec![channel], metadata: Vec::new() };
+        crate::output::save(&image, &path).unwrap();
+        assert_eq!(read(&path).unwrap().width, 64);
+        let bytes = std::fs::read(&path).unwrap();
+        for name in [&b"dataWindow\0box2i\0"[..], b"displayWindow\0box2i\0"] {
+            assert!(bytes.windows(name.len()).any(|w| w == name));
+        }
+        for size in [4096_u32, 16_384] {
+            let mut damaged = bytes.clone();
+            for name in [&b"dataWindow\0box2i\0"[..], b"displayWindow\0box2i\0"] {
+                let at = damaged.windows(name.len()).position(|w| w == name).unwrap() + name.len() + 4 + 8;
+                for corner in 0..2 {
+                    damaged[at + 4 * corner..][..4].copy_from_slice(&(size - 1).to_le_bytes());
+                }
+            }
+            std::fs::write(&path, damaged).unwrap();
+            let error = read(&path).unwrap_err().to_string();
+            assert!(error.contains("too few"), "{size}: {error}");
+        }
     }
 }

@@ -56,7 +56,8 @@ impl Pass for Paths {
         if let Some(to_map) = &frame.environment_turn {
             self.paths.turn_environment(to_map)?;
         }
-        let spreads = self.has_rest && frame.settings.antialias && !frame.rest_starts;
+        // one path a frame: places of frames are more even than those of the first few points of a sequence
+        let spreads = self.has_rest && frame.settings.antialias && !frame.rest_starts && frame.paths > 1;
         let pixel_filter = if spreads { PixelFilter::Box } else { PixelFilter::Centre };
         let params = BlockParams { pixel_filter: pixel_filter as u32, ..super::surfaces::block_params(frame, self.sampled) };
         let rr_depth = if FramePaths::is_long(frame.resting) { frame.settings.rest_rr_depth } else { 0 };
