@@ -71,7 +71,7 @@ void main() {
     if (done) block[0] = INVALID;
     for (uint turn = 0u; turn < MAX_EXPANSIONS && !done; turn++) {
         // the nearest entry that can be expanded: the lowest bit of a distance says that one cannot
-        uint at = MAX_ENTRY_POINTS, number = 0u, entered = 0u;
+        uint at = MAX_ENTRY_POINTS, number = 0u;
         FOR_ENTRIES {
             bool open = (distance_[i] & 1u) == 0u && at == MAX_ENTRY_POINTS;
             number = open ? block[i] : number;

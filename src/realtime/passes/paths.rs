@@ -17,6 +17,7 @@ use crate::tracer::{Push, Tracer};
 const MAX_SAMPLE_BITS: u32 = 4;
 /// Maximum number of samples per pixel in a launch.
 pub const MAX_SAMPLES: u32 = 1 << MAX_SAMPLE_BITS;
+
 struct Paths {
     paths: SignalPaths,
     /// The pixels that are sampled in a frame, close together.
