@@ -21,7 +21,7 @@ const float FEW_FRAMES = 8.0;
 // Where values nearby differ by less than this share of their mean, the clipped history is no different from this frame.
 const float FLAT = 1.0 / 512.0;
 // Samples at rest from which their denoised mean counts at least as much as the filtered image.
-const float TAKE_OVER_SAMPLES = 16.0;
+const float TAKE_OVER_SAMPLES = 4.0;
 
 // What taps read, fetched once: each use of a field of a record is a load.
 struct Images {
@@ -164,7 +164,10 @@ void main() {
     Images m = Images(ivec2(f.size), f.guide, p.composed, p.visibility, p.previous_history);
     vec4 now = value_at(m, LOAD_PAIR(m.guide, at), at), resolved = now;
     float frames = 1.0;
-    if (p.has_history != 0u && p.most_frames > 1.0 && f.still != 0u) {
+    if (p.holds != 0u) {
+        // no frame adds to it any more
+        resolved = load_resolved(m.history, at, frames);
+    } else if (p.has_history != 0u && p.most_frames > 1.0 && f.still != 0u) {
         vec4 history = load_resolved(m.history, at, frames);
         frames += 1.0;
         resolved = mix(history, now, max(2.0 / (frames + 1.0), p.least_weight));

@@ -7,8 +7,8 @@
 struct Rest {
     vec3 mean;
     float samples;
-    float variance;   // of the mean of a frame's samples, summed over channels
-    float frames;
+    float variance;   // of the means of groups of samples (a frame's, or fewer) about their common mean, weighted by samples; summed over channels
+    float frames;     // number of groups
     float coverage;
 };
 
@@ -24,7 +24,7 @@ void store_rest(uvec2 image, uint at, Rest r) {
     store_quad(image, 2u * at + 1u, vec4(r.variance, r.frames, r.coverage, 0.0));
 }
 
-// Adds samples of a frame with this mean and coverage.
+// Adds a group of samples with this mean and coverage.
 Rest add_rest(Rest r, vec3 mean, float samples, float coverage) {
     if (!(samples > 0.0)) return r;
     r.samples += samples;
@@ -33,8 +33,7 @@ Rest add_rest(Rest r, vec3 mean, float samples, float coverage) {
     vec3 difference = mean - r.mean;
     r.mean += share * difference;
     r.coverage += share * (coverage - r.coverage);
-    // of frames about their common mean
-    r.variance += (dot(difference, mean - r.mean) - r.variance) / r.frames;
+    r.variance += share * (dot(difference, mean - r.mean) - r.variance);
     return r;
 }
 

@@ -45,12 +45,18 @@ pub struct Frame<'a> {
     pub rest_starts: bool,
     /// Frames since the image came to rest, this one included; 0: it does not rest.
     pub resting: u32,
-    /// Radiance: paths of each pixel that is sampled in this frame.
-    pub paths: u32,
-    /// Radiance: paths of each pixel since the image came to rest, but for the first frame.
-    pub rest_paths: u64,
-    /// Radiance: index of the first of them in the pixel's sequence.
-    pub first_path: u32,
+    /// The frame is a long one ([`super::frame_samples`]).
+    pub is_long: bool,
+    /// Samples of each pixel that is sampled in this frame.
+    pub samples: u32,
+    /// Samples of each pixel since the image came to rest, but for the first frame.
+    pub rest_samples: u64,
+    /// Index of the first of this frame's samples in the pixel's sequence. (The passes of ambient visibility in short frames go by [`Frame::number`].)
+    pub first_sample: u32,
+    /// The mean of ambient visibility at rest is denoised in this frame.
+    pub denoises: bool,
+    /// In this frame, or in an earlier one at rest.
+    pub has_denoised: bool,
     /// Maximum samples of histories of radiance before this frame's.
     pub most_past: f32,
     /// The environment map has been turned: its new rotation from world directions to the map's.
@@ -191,10 +197,19 @@ pub trait Pass {
     }
 }
 
+/// The frames in which a stage runs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Frames {
+    All,
+    Short,
+    Long,
+}
+
 /// Passes that are recorded one after another for each of several ranges; mostly one pass and one range.
 pub struct Stage {
     passes: Vec<Box<dyn Pass>>,
     ranges: Vec<Range>,
+    frames: Frames,
     /// Versions of the resources read when the stage was last recorded.
     versions: Vec<u64>,
 }
@@ -202,7 +217,17 @@ pub struct Stage {
 impl Stage {
     /// Creates a stage of passes that hand results on within a range.
     pub fn new(passes: Vec<Box<dyn Pass>>, ranges: Vec<Range>) -> Self {
-        Self { passes, ranges, versions: Vec::new() }
+        Self { passes, ranges, frames: Frames::All, versions: Vec::new() }
+    }
+
+    /// Has the stage run in long frames alone ([`super::frame_samples`]).
+    pub fn of_long_frames(self) -> Self {
+        Self { frames: Frames::Long, ..self }
+    }
+
+    /// Has the stage run in all frames but long ones.
+    pub fn of_short_frames(self) -> Self {
+        Self { frames: Frames::Short, ..self }
     }
 
     fn is_run_by_host(&self) -> bool {
@@ -275,9 +300,10 @@ impl Graph {
     /// Chooses the stages to record in this frame: those that read a resource that has changed since they were last recorded, or one of the
     /// previous frame, and those that write a transient resource. Double-buffered resources that are written again are swapped, so
     /// [`Graph::resources`] is valid for this frame from here on.
-    pub fn begin(&mut self, display: Option<&Display>) -> Vec<usize> {
+    pub fn begin(&mut self, display: Option<&Display>, is_long: bool) -> Vec<usize> {
         let mut recorded = Vec::new();
-        for (k, stage) in self.stages.iter_mut().enumerate() {
+        let others = if is_long { Frames::Short } else { Frames::Long };
+        for (k, stage) in self.stages.iter_mut().enumerate().filter(|(_, s)| s.frames != others) {
             let enabled = || stage.passes.iter().filter(|p| p.is_enabled(display));
             let uses: Vec<ResourceUse> = enabled().map(|p| p.uses(display)).collect();
             if uses.is_empty() {

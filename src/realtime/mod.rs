@@ -3,9 +3,10 @@
 //! `gbuffer` finds the surface at each pixel's centre; `ao_trace` traces occlusion rays of the pixels that are sampled in this
 //! frame; `gather` averages the samples of a pixel if there are several; `temporal` adds them to the
 //! history of the same surface, reprojected from the previous frame; `filter` averages over neighbours. Passes whose inputs have not changed
-//! are skipped (`graph`): while neither the camera nor the scene moves no camera rays are traced, nor occlusion rays of pixels with a full history.
+//! are skipped (`graph`): while neither the camera nor the scene moves no camera rays are traced, nor occlusion rays of pixels with a full history. At rest, where the image converges,
+//! `rest_samples` takes the place of the passes up to `filter` after a few frames.
 
-mod frame_paths;
+mod frame_samples;
 pub mod frame_settings;
 mod graph;
 pub(super) mod params;
@@ -31,7 +32,7 @@ use crate::shaders::StreamShaders;
 use crate::tracer::gpu_scene::rows;
 use crate::tracer::{MovedBounds, Tracer};
 use display::{Display, DisplayMode};
-use frame_paths::FramePaths;
+use frame_samples::FrameSamples;
 use graph::{Frame, Graph, Params};
 use params::{FrameParams, moved_records};
 pub use passes::display;
@@ -91,7 +92,7 @@ pub struct Realtime {
     primary_reason: String,
     state: State,
     is_radiance: bool,
-    paths: FramePaths,
+    frame_samples: FrameSamples,
 }
 
 /// Which pass writes the displayed image.
@@ -123,6 +124,8 @@ struct State {
     offset: [f32; 2],
     /// Frames since camera and scene last changed, this one included.
     resting: u32,
+    /// Ambient visibility: mean number of samples of a pixel at rest when they were last denoised.
+    denoised_samples: u64,
     /// Radiance: index of the next path in a pixel's sequence. A pixel takes the samples of its sequence one after the other, also where it is sampled in every second or fourth frame only:
     /// all samples of a sequence are more even than every fourth of them.
     first_path: u32,
@@ -170,10 +173,12 @@ impl Realtime {
             most_rays: settings.most_rays().into(),
         };
         let device = tracer.device();
+        let frame_samples = FrameSamples::of_visibility(settings, pixels(size));
+        let stages = passes::stages(tracer, block, settings, primary, lights, frame_samples)?;
         Ok(Self {
             size,
             settings: Settings { primary: Some(primary), ..*settings },
-            graph: Graph::new(device, extent, passes::stages(tracer, block, settings, primary, lights)?)?,
+            graph: Graph::new(device, extent, stages)?,
             params: Params::new(device, "frame parameters")?,
             display: None,
             shown: None,
@@ -181,7 +186,7 @@ impl Realtime {
             primary_reason,
             state: State::default(),
             is_radiance: false,
-            paths: FramePaths { few: settings.rays_per_pixel, many: settings.rays_per_pixel },
+            frame_samples,
         })
     }
 
@@ -204,6 +209,8 @@ impl Realtime {
         let extent =
             Extent { pixels, tiled_pixels: block.rays().into(), half_pixels: pixels.div_ceil(4), ..Default::default() };
         let device = tracer.device();
+        let frame_samples = FrameSamples::of_radiance(settings, pixels);
+        let stages = passes::radiance_stages(tracer, flat, block, settings, options, frame_samples)?;
         Ok(Self {
             size,
             settings: Settings {
@@ -211,7 +218,7 @@ impl Realtime {
                 rest_samples: settings.rest_samples.max(Settings::RADIANCE_REST_SAMPLES),
                 ..*settings
             },
-            graph: Graph::new(device, extent, passes::radiance_stages(tracer, flat, block, settings, options)?)?,
+            graph: Graph::new(device, extent, stages)?,
             params: Params::new(device, "frame parameters")?,
             display: None,
             shown: None,
@@ -219,7 +226,7 @@ impl Realtime {
             primary_reason: "paths begin with a camera ray".into(),
             state: State::default(),
             is_radiance: true,
-            paths: FramePaths::new(settings, pixels),
+            frame_samples,
         })
     }
 
@@ -274,10 +281,23 @@ impl Realtime {
 
     /// Number of frames at rest after which the image no longer changes; `None`: with every frame, or it is pixels that come to rest, each on its own.
     pub fn frames_to_rest(&self) -> Option<u32> {
-        if self.is_radiance && self.settings.converges() {
-            Some(self.paths.frames_for(self.settings.rest_samples) * self.settings.resolution.period())
+        if !self.settings.converges() {
+            return self.settings.frames_to_rest();
+        }
+        let frames = self.frame_samples.frames_for(self.settings.rest_samples);
+        // frames of a pattern of radiance have samples of the same indices
+        Some(if self.is_radiance { frames * self.settings.resolution.period() } else { frames })
+    }
+
+    /// Samples of a pixel that the last frame shows: since the image came to rest, or of the longest history.
+    pub fn shown_samples(&self) -> u32 {
+        let (s, resting) = (&self.settings, self.state.resting);
+        if s.converges() {
+            let since_rest = self.frame_samples.since_rest(resting);
+            let period = if self.is_radiance { s.resolution.period() } else { 1 };
+            u32::try_from(since_rest / u64::from(period)).unwrap_or(u32::MAX).saturating_add(s.rays_per_pixel)
         } else {
-            self.settings.frames_to_rest()
+            resting.saturating_add(1).min(s.history).saturating_mul(s.rays_per_pixel)
         }
     }
 
@@ -346,11 +366,16 @@ impl Realtime {
         let still = moved.is_empty() && self.state.camera == Some(*camera) && !is_larsen && !self.state.has_new_light;
         let resting = if still { self.state.resting.saturating_add(1) } else { 0 };
         let has_come_to_rest = self.frames_to_rest().is_some_and(|frames| resting >= frames);
-        let paths = self.paths.of(resting);
+        let (is_long, samples) = (self.frame_samples.is_long(resting), self.frame_samples.of(resting));
         if has_come_to_rest && self.shown == Some(self.display) {
-            return Ok(FrameStats { skipped_rays: self.pixels() * u64::from(paths), ..Default::default() });
+            return Ok(FrameStats { skipped_rays: self.pixels() * u64::from(samples), ..Default::default() });
         }
-        let offset = if self.settings.antialias { sample_offset(self.state.frame) } else { [0.0; 2] };
+        let offset = match self.settings.antialias {
+            // what is known of surfaces is of the last short frame
+            true if is_long && !self.is_radiance => self.state.offset,
+            true => sample_offset(self.state.frame),
+            false => [0.0; 2],
+        };
         // camera rays start elsewhere
         let has_moved_samples = offset != self.state.offset;
         for (resource, changed) in [
@@ -362,7 +387,13 @@ impl Realtime {
                 self.graph.touch(resource);
             }
         }
-        let stages = self.graph.begin(self.display.as_ref());
+        let stages = self.graph.begin(self.display.as_ref(), is_long);
+        let rest_samples = self.frame_samples.since_rest(resting);
+        let denoised = if resting == 0 { 0 } else { self.state.denoised_samples };
+        let denoises = !self.is_radiance
+            && rest_samples >= nlmeans::MIN_SAMPLES
+            && resting >= nlmeans::MIN_FRAMES
+            && rest_samples >= denoised + denoised / 16;
         self.params.write(&self.frame_params(camera, still, offset))?;
         let frame = Frame {
             tracer,
@@ -375,9 +406,16 @@ impl Realtime {
             has_resolved: self.state.has_resolved,
             rest_starts: resting == 0 || !self.state.has_resolved,
             resting,
-            paths,
-            rest_paths: self.paths.since_rest(resting),
-            first_path: self.state.first_path,
+            is_long,
+            samples,
+            rest_samples,
+            first_sample: match self.is_radiance {
+                true => self.state.first_path,
+                false if is_long => self.frame_samples.in_long_before(resting),
+                false => 0,
+            },
+            denoises,
+            has_denoised: denoises || denoised > 0,
             most_past: match self.state.has_new_light {
                 true => PAST_AFTER_NEW_LIGHT * self.settings.rays_per_pixel as f32,
                 false => f32::MAX,
@@ -392,9 +430,10 @@ impl Realtime {
         let occlusion_rays = count.first().map_or(self.graph.rays(), |&n| u64::from(n));
         let pixels = self.pixels();
         let period = self.settings.resolution.period();
-        let all = pixels * u64::from(paths) / u64::from(period);
+        let all = pixels * u64::from(samples) / u64::from(if is_long && !self.is_radiance { 1 } else { period });
         self.state.frame = self.state.frame.wrapping_add(1);
-        self.state.pattern_paths = self.state.pattern_paths.max(paths);
+        self.state.pattern_paths = self.state.pattern_paths.max(samples);
+        self.state.denoised_samples = if denoises { rest_samples } else { denoised };
         if self.state.frame.is_multiple_of(period) {
             self.state.first_path = self.state.first_path.wrapping_add(self.state.pattern_paths);
             self.state.pattern_paths = 0;
@@ -410,9 +449,10 @@ impl Realtime {
         Ok(FrameStats {
             timings,
             primary_rays: match self.settings.primary {
-                Some(Primary::Raster) => 0,
-                // for the G-buffer, and of each path
-                _ if self.is_radiance => pixels * (1 + u64::from(paths)),
+                Some(Primary::Raster) if !is_long => 0,
+                // for the G-buffer, and of each sample
+                _ if self.is_radiance => pixels * (1 + u64::from(samples)),
+                _ if is_long => pixels * u64::from(samples),
                 _ if still && !has_moved_samples => 0,
                 _ => pixels,
             },

@@ -48,6 +48,7 @@ registry! {
         RADIANCE_TEMPORAL = "radiance_temporal";
         RESOLVE = "resolve";
         REST = "rest";
+        REST_SAMPLES = "rest_samples";
         REST_NOISE = "rest_noise";
         TEMPORAL = "temporal";
     }

@@ -17,21 +17,16 @@ pub struct EntryPoints {
 }
 
 impl EntryPoints {
-    /// Entry points for the camera rays of `stream`, at most `rays` in a launch and at most 2^`sample_bits` of a pixel. `None` where they do not apply: only the packet kernel has
-    /// them, packets must be within bundles, and the rays must start at one point, as those of a
-    /// perspective camera do. On GPUs they are not measured, and Mesa's CPU driver before version 23 loses hits.
+    /// Entry points for the camera rays of `stream`, at most `rays` in a launch and at most 2^`sample_bits` of a pixel. They are for rays that start at one point, as those of a
+    /// perspective camera do. `None` where they do not apply: only the packet kernel has them, and packets must be within bundles. On GPUs they are not measured, and Mesa's CPU driver
+    /// before version 23 loses hits.
     ///
     /// # Errors
     /// Those of the device.
-    pub fn new(tracer: &Tracer, stream: &Stream, from_one_point: bool, rays: u32, sample_bits: u32) -> Result<Option<Self>> {
+    pub fn new(tracer: &Tracer, stream: &Stream, rays: u32, sample_bits: u32) -> Result<Option<Self>> {
         let device = tracer.device();
         let least = least_sample_bits(device.info.limits.subgroup_size);
-        if !stream.traces_packets()
-            || !device.info.is_cpu()
-            || device.info.cuts_long_loops()
-            || !from_one_point
-            || sample_bits < least
-        {
+        if !stream.traces_packets() || !device.info.is_cpu() || device.info.cuts_long_loops() || sample_bits < least {
             return Ok(None);
         }
         // a launch may begin and end within a bundle

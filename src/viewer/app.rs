@@ -112,6 +112,8 @@ pub struct App {
     /// Number of the last request, and of the last one for which nothing is left to do.
     sent_number: u64,
     idle: u64,
+    /// Names of the two images in the last request, and the number of the first request with each.
+    titles: [(String, u64); 2],
     load: u64,
     /// The load of the scene that is shown.
     loaded: u64,
@@ -210,6 +212,7 @@ impl App {
             sent: Request::default(),
             sent_number: 1,
             idle: 0,
+            titles: Default::default(),
             load: 0,
             loaded: 0,
             last_load: 0,
@@ -532,6 +535,11 @@ impl App {
             *r = request;
             r.tasks = before.into_iter().chain(tasks).collect();
         });
+        for (k, title) in [false, true].map(|is_second| self.title(is_second)).into_iter().enumerate() {
+            if self.titles[k].0 != title {
+                self.titles[k] = (title, self.sent_number);
+            }
+        }
     }
 
     /// Ends the thread that renders.
@@ -581,14 +589,25 @@ impl App {
         }
     }
 
-    /// Error of the first image, or of the second.
-    pub fn error(&self, is_second: bool) -> Option<&String> {
-        let slot = match (is_second, self.second) {
+    /// Returns true while an image is not yet what its name says: another technique was chosen, and its first picture is to come.
+    pub fn is_title_ahead(&self, is_second: bool) -> bool {
+        let (title, first) = &self.titles[usize::from(is_second)];
+        let shown = self.panes[self.pane(is_second)].progress.as_ref();
+        shown.is_some_and(|p| p.request < *first || *title != self.title(is_second))
+    }
+
+    /// Index of the first image, or of the second.
+    fn pane(&self, is_second: bool) -> usize {
+        match (is_second, self.second) {
             (false, _) => 0,
             (true, Second::Technique(_)) => 1,
             (true, _) => TRUTH,
-        };
-        self.panes[slot].error.as_ref()
+        }
+    }
+
+    /// Error of the first image, or of the second.
+    pub fn error(&self, is_second: bool) -> Option<&String> {
+        self.panes[self.pane(is_second)].error.as_ref()
     }
 
     /// Settings of the image in front, with the lights that apply to it.

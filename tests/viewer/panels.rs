@@ -8,7 +8,9 @@ use skylit::renderer::RenderSettings;
 use skylit::renderer::interactive::{Pick, ViewPicture};
 use skylit::viewer::ViewOptions;
 use skylit::viewer::app::{App, Arrangement, Second};
-use skylit::viewer::request::{Comparison, DeviceSummary, Event, EventSender, Mailbox, PickPurpose, SceneSummary, Task};
+use skylit::viewer::request::{
+    Comparison, DeviceSummary, Event, EventSender, Mailbox, PickPurpose, Progress, SceneSummary, Task,
+};
 
 /// The viewer without a renderer: what it requests goes to a mailbox, what it is told comes from the sender.
 struct Alone {
@@ -275,6 +277,28 @@ fn a_tracer_that_is_not_there_yet_is_told() {
     alone.events.send(Event::Device(device("query")));
     alone.harness.run_steps(2);
     assert!(alone.harness.query_by_label("Tracer query: a reason").is_some());
+}
+
+/// Until the first picture of another technique is there, its name says so.
+#[test]
+fn a_name_is_not_that_of_the_picture_before() {
+    let mut alone = loaded();
+    let picture = Arc::new(ViewPicture { size: [1, 1], rgba: vec![255; 4] });
+    let arrives = |alone: &mut Alone, request: u64| {
+        let progress = Progress { picture: picture.clone(), request, ..Default::default() };
+        alone.events.send(Event::Picture(Box::new(progress)));
+        alone.harness.run_steps(3);
+        alone.harness.state().is_title_ahead(false)
+    };
+    let before = alone.mailbox.number();
+    assert!(!arrives(&mut alone, before));
+    alone.press(egui::Key::Num4);
+    let after = alone.mailbox.number();
+    assert!(after > before && alone.harness.state().is_title_ahead(false));
+    assert!(arrives(&mut alone, before), "a picture of the technique before came late");
+    assert!(!arrives(&mut alone, after));
+    alone.press(egui::Key::T);
+    assert!(!alone.harness.state().is_title_ahead(false), "the first image has its technique as before");
 }
 
 /// What is to be saved is requested until it is done, whatever else is requested, but not of another scene; the heat map is saved as it is shown.

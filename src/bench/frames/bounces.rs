@@ -79,7 +79,7 @@ fn one(session: &FramesSession, published: &PublishedScene, preset: Preset) -> R
     let mut points = Vec::new();
     for (bounces, fps) in (1..).zip(published.fps) {
         let stage = Stage::new(session, &loaded, &flat, Some(bounces), None)?;
-        let mut realtime = stage.realtime(preset)?;
+        let mut realtime = stage.realtime_as_in_motion(preset)?;
         let mut log = FrameLog::default();
         let camera = stage.still_camera();
         for _ in 0..FRAMES {

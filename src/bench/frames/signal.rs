@@ -80,12 +80,19 @@ impl Signal {
         Ok(frame_streams(&self.settings, &self.frame_settings(Preset::Balanced)?))
     }
 
-    /// Makes frames of a preset.
+    /// Makes frames of a preset, as `how` says, which is [`Signal::frame_settings`] of it or near it.
     ///
     /// # Errors
     /// Those of the device.
-    pub fn realtime(&self, tracer: &Tracer, flat: &FlatScene, camera: &Camera, preset: Preset) -> Result<Realtime> {
-        let (settings, how) = (self.of(preset), self.frame_settings(preset)?);
+    pub fn realtime(
+        &self,
+        tracer: &Tracer,
+        flat: &FlatScene,
+        camera: &Camera,
+        preset: Preset,
+        how: Settings,
+    ) -> Result<Realtime> {
+        let settings = self.of(preset);
         let options = frame_path_options(&settings, flat.scene, camera, self.size, &how)?;
         pipeline(tracer, flat, self.size, &how, options.as_ref())
     }

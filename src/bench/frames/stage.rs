@@ -16,7 +16,7 @@ use crate::denoise::{DenoiseInput, Features, Oidn};
 use crate::error::Result;
 use crate::film::camera::CameraRecord;
 use crate::realtime::sequence::FrameSequence;
-use crate::realtime::{Preset, Realtime};
+use crate::realtime::{Preset, Realtime, Settings};
 use crate::scene::{Camera, Environment, EnvironmentMap, Orbit, Scene};
 use crate::terminal::interrupt::SilentControl;
 use crate::tracer::{BuildOptions, Changes, ComputeOptions, MovedBounds, Tracer};
@@ -212,7 +212,17 @@ impl<'a> Stage<'a> {
     /// # Errors
     /// Those of the device.
     pub fn realtime(&self, preset: Preset) -> Result<Realtime> {
-        self.signal.realtime(&self.tracer, self.flat, self.camera, preset)
+        let how = self.signal.frame_settings(preset)?;
+        self.signal.realtime(&self.tracer, self.flat, self.camera, preset, how)
+    }
+
+    /// As [`Stage::realtime`], but frames at rest take as many paths as those in motion.
+    ///
+    /// # Errors
+    /// Those of the device.
+    pub fn realtime_as_in_motion(&self, preset: Preset) -> Result<Realtime> {
+        let how = Settings { converge: false, ..self.signal.frame_settings(preset)? };
+        self.signal.realtime(&self.tracer, self.flat, self.camera, preset, how)
     }
 
     /// Paths, or rays, of a pixel in a frame of a preset.

@@ -6,6 +6,7 @@
 
 mod attenuation;
 use crate::settings::{Capability, choices};
+mod rays;
 mod report;
 pub mod settings;
 
@@ -14,6 +15,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 pub use attenuation::Attenuation;
+pub use rays::AoRays;
 
 use super::{Integrator, IntegratorSettings, PictureOptions, RenderJob, Rendered};
 use crate::accel::features::Blend;
@@ -29,10 +31,7 @@ use crate::gpu::{Buffer, Commands, ComputePipeline, Device, Memory, Timing};
 use crate::interface::PixelFilter;
 use crate::output::Image;
 use crate::ray::Ray;
-use crate::tracer::entry_points::EntryPoints;
-use crate::tracer::queue::RayQueue;
-
-use crate::tracer::{Needs, Push, Stream, Tracer};
+use crate::tracer::{Needs, Push, Tracer};
 
 /// Value of a sample whose camera ray missed; ambient visibility is never negative.
 const NO_HIT: f32 = -1.0;
@@ -230,12 +229,9 @@ pub struct AoResult {
 
 /// Streams and buffers of all launches.
 struct AoEstimator {
-    primary: Stream,
-    occlusion: Stream,
-    entry_points: Option<EntryPoints>,
+    rays: AoRays,
+    has_entry_points: bool,
     resolve: ComputePipeline,
-    queue: RayQueue,
-    samples: Buffer,
     params: Buffer,
     dumps: Option<[Buffer; 2]>,
     kept: [Vec<Ray>; 2],
@@ -243,10 +239,7 @@ struct AoEstimator {
 
 /// The streams that [`render`] traces.
 pub fn streams(options: &AoOptions) -> [&'static StreamShaders; 2] {
-    [
-        &shaders::PRIMARY_CLOSEST,
-        if options.attenuation().is_binary() { &shaders::OCCLUSION_ANY } else { &shaders::OCCLUSION_CLOSEST },
-    ]
+    rays::streams(options.attenuation())
 }
 
 /// Renders ambient occlusion. [`accumulate`](crate::film::accumulate) says when it stops.
@@ -256,16 +249,11 @@ pub fn streams(options: &AoOptions) -> [&'static StreamShaders; 2] {
 pub fn render(tracer: &Tracer, camera: &CameraRecord, options: &AoOptions, control: &mut dyn Control) -> Result<AoResult> {
     let device = tracer.device();
     let most = max_rays(options.size, options.spp, AoEstimator::SAMPLE_BITS);
-    let [primary, occlusion] = streams(options);
-    let primary = tracer.stream(primary)?;
     let sample_bits = options.spp.max(1).ilog2().min(AoEstimator::SAMPLE_BITS);
     let mut estimator = AoEstimator {
-        entry_points: EntryPoints::new(tracer, &primary, !camera.orthographic, most, sample_bits)?,
-        primary,
-        occlusion: tracer.stream(occlusion)?,
+        rays: AoRays::new(tracer, options.attenuation(), most, sample_bits)?,
+        has_entry_points: false,
         resolve: shaders::RESOLVE.pipeline(device)?,
-        queue: RayQueue::new(device, most)?,
-        samples: Buffer::new(device, "samples", size_of::<f32>() as u64 * most as u64, Memory::Device)?,
         params: Buffer::new(device, "block parameters", size_of::<BlockParams>() as u64, Memory::Upload)?,
         dumps: match options.keep_rays {
             true => Some([ray_buffer(device, most)?, ray_buffer(device, most)?]),
@@ -281,18 +269,17 @@ pub fn render(tracer: &Tracer, camera: &CameraRecord, options: &AoOptions, contr
         tile_mask: options.tile_mask.as_deref(),
         film: &options.film,
     };
-    let params = BlockParams {
+    let params = estimator.rays.params(BlockParams {
+        orthographic: camera.orthographic.into(),
         hemisphere: (options.hemisphere == Hemisphere::Shading) as u32,
         falloff_log2: options.attenuation().falloff_log2() as f32,
         radius: options.attenuation().reach() as f32,
         pixel_filter: options.pixel_filter as u32,
-        samples: estimator.samples.address(),
-        queue: estimator.queue.record(),
-        entry_points: estimator.entry_points.as_ref().map_or(0, EntryPoints::address),
         ..Default::default()
-    };
+    });
+    estimator.has_entry_points = estimator.rays.has_entry_points(&params);
     let image = accumulate(tracer, camera, &plan, &params, &mut estimator, control)?;
-    let has_entry_points = estimator.entry_points.is_some();
+    let has_entry_points = estimator.has_entry_points;
     let [kept_primary, kept_occlusion] = estimator.kept;
     let occlusion_rays = image.covered;
     let skipped_rays = image.primary_rays + image.skipped_primary_rays - occlusion_rays;
@@ -321,18 +308,9 @@ impl Estimator for AoEstimator {
     }
 
     fn launch(&mut self, commands: &mut Commands, launches: &[Push], keep: bool) -> Result<Vec<Timing>> {
-        let (queue, samples) = (&self.queue, &self.samples);
         let timings = commands.run(|r| {
             for push in launches {
-                queue.clear(r);
-                if let Some(entry_points) = &self.entry_points {
-                    entry_points.record(r, push);
-                }
-                r.fill(samples, size_of::<f32>() as u64 * push.count as u64, NO_HIT.to_bits());
-                r.barrier();
-                self.primary.record(r, push);
-                r.barrier();
-                self.occlusion.record(r, &queue.push(*push, push.count));
+                self.rays.record(r, push, self.has_entry_points);
                 r.barrier();
                 let groups = (push.count >> push.sample_bits).div_ceil(shaders::LANES);
                 r.timed("resolve", |r| r.dispatch(&self.resolve, push, groups));

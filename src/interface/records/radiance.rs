@@ -139,6 +139,10 @@ records! {
         clamp_width: float,
         /// Minimum weight of a frame at rest.
         least_weight: float,
+        /// 1: the mean over frames stays as it is.
+        holds: uint,
+        /// Padding to a multiple of 8 bytes.
+        reserved: uint,
     }
 
     /// Parameters of `rest_noise`.
@@ -167,5 +171,19 @@ records! {
         starts: uint,
         /// Padding to a multiple of 8 bytes.
         reserved: uint,
+    }
+
+    /// Parameters of `rest_samples`.
+    RestSamplesParams: block readonly 8 {
+        /// Address of the `FrameParams`.
+        frame: address,
+        /// Ambient visibility of each sample of the launch, a float; negative where its camera ray missed.
+        samples: address,
+        /// In and out, two `vec4` per pixel: samples since the image came to rest.
+        rest: address,
+        /// Out, 8 bytes per pixel: the history of the pixel's surface.
+        history: address,
+        /// In and out: number of occlusion rays of the frame.
+        ray_count: address,
     }
 }

@@ -1,6 +1,5 @@
 //! `antialias`: the mean over frames whose samples lie at different places within the pixels, and at rest what the image converges to.
 
-use super::nlmeans;
 use crate::error::Result;
 use crate::gpu::{ComputePipeline, Recorder};
 use crate::interface::records::radiance::AntialiasParams;
@@ -60,11 +59,7 @@ impl Pass for Antialias {
             history: resources.address(Resource::ResolvedHistory),
             previous_history: resources.previous_address(Resource::ResolvedHistory),
             rest: resources.address(Resource::Rest),
-            denoised: if self.has_rest && frame.resting >= nlmeans::FIRST_FRAME {
-                resources.address(Resource::Denoised)
-            } else {
-                0
-            },
+            denoised: if frame.has_denoised { resources.address(Resource::Denoised) } else { 0 },
             resolved: resources.address(Resource::Resolved),
             has_history: frame.has_resolved.into(),
             most_frames: match frame.settings.antialias {
@@ -74,6 +69,8 @@ impl Pass for Antialias {
                 false => 1.0,
             },
             clamp_width: CLAMP_WIDTH,
+            holds: (!is_composed && frame.is_long).into(),
+            reserved: 0,
             least_weight: if is_composed && self.has_rest { LEAST_WEIGHT } else { 0.0 },
         })
     }

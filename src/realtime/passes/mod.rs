@@ -16,10 +16,11 @@ mod paths;
 mod radiance_filter;
 mod radiance_temporal;
 mod rest;
+mod rest_samples;
 mod surfaces;
 mod temporal;
 
-use super::frame_paths::FramePaths;
+use super::frame_samples::FrameSamples;
 use super::graph::{Range, Stage};
 use super::resources::Resource;
 use super::settings::{Budget, Settings, Technique};
@@ -59,7 +60,14 @@ pub fn streams(settings: &Settings) -> [&'static StreamShaders; 2] {
 }
 
 /// The stages of a frame, in order. `lights`: positions of point lights relative to the scene's origin.
-pub fn stages(tracer: &Tracer, block: Block, settings: &Settings, primary: Primary, lights: &[[f32; 3]]) -> Result<Vec<Stage>> {
+pub fn stages(
+    tracer: &Tracer,
+    block: Block,
+    settings: &Settings,
+    primary: Primary,
+    lights: &[[f32; 3]],
+    samples: FrameSamples,
+) -> Result<Vec<Stage>> {
     let pixels = block.size[0] * block.size[1];
     let mut stages = vec![gbuffer::stage(tracer, block, settings, primary)?];
     match (settings.technique, settings.budget) {
@@ -90,6 +98,10 @@ pub fn stages(tracer: &Tracer, block: Block, settings: &Settings, primary: Prima
     let has_rest = settings.converges();
     if has_rest {
         stages.push(rest::stage(tracer, pixels)?);
+        if samples.has_long() {
+            stages = stages.into_iter().map(Stage::of_short_frames).collect();
+            stages.push(rest_samples::stage(block, samples.many, settings.launch_rays));
+        }
         stages.extend(nlmeans::stages(tracer, block.size)?);
     }
     if has_rest || settings.antialias {
@@ -105,11 +117,12 @@ pub fn radiance_stages(
     block: Block,
     settings: &Settings,
     options: &PathOptions,
+    samples: FrameSamples,
 ) -> Result<Vec<Stage>> {
     let pixels = block.size[0] * block.size[1];
     let most = settings.launch_rays.clamp(MAX_SAMPLES * TILE_PIXELS, LAUNCH_RAYS);
     let sampled = Block { size: settings.resolution.sampled_size(block.size), ..block };
-    let spp = FramePaths::new(settings, pixels.into()).many.min(MAX_SAMPLES).next_power_of_two();
+    let spp = samples.many.min(MAX_SAMPLES).next_power_of_two();
     let paths = sampled.rays().saturating_mul(spp).min(most);
     let paths = SignalPaths::new(tracer, flat, options, paths)?;
     let has_rest = settings.converges();

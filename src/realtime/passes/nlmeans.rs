@@ -11,8 +11,10 @@ use crate::realtime::resources::{Resource, Resources};
 use crate::shaders::{self, ComputeShader};
 use crate::tracer::Tracer;
 
-/// First frame at rest that is filtered: of fewer samples too little is known of their noise.
-pub const FIRST_FRAME: u32 = 8;
+/// Minimum number of frames at rest before they are filtered, and of samples of a pixel: of fewer too little is known of their noise.
+pub const MIN_FRAMES: u32 = 4;
+/// The samples.
+pub const MIN_SAMPLES: u64 = 8;
 
 /// Assumed convergence of samplers: the variance of the mean of n samples falls as `n^-(1 + EVENNESS)`. Of 64 samples of ambient occlusion it is between a half and 1.5 times
 /// that in six scenes (docs/denoising.md); weights need to know it no better.
@@ -38,12 +40,6 @@ pub fn params(size: [u32; 2], channels: u32, [from, to, depths]: [u64; 3]) -> Nl
 
 /// Channels of ambient visibility.
 const CHANNELS: u32 = 1;
-
-/// Returns true for frames that are filtered: those in which samples have become a sixteenth more.
-fn is_due(frame: &Frame) -> bool {
-    let every = (frame.resting / 16).max(1);
-    frame.resting >= FIRST_FRAME && frame.resting.is_multiple_of(every)
-}
 
 struct Noise {
     pipeline: ComputePipeline,
@@ -84,7 +80,7 @@ impl Pass for Noise {
     }
 
     fn record(&self, r: &mut Recorder, frame: &Frame, _: &Resources, range: Range) -> Result<()> {
-        if is_due(frame) {
+        if frame.denoises {
             self.params.dispatch(r, "rest_noise", &self.pipeline, frame, range);
         }
         Ok(())
@@ -102,7 +98,7 @@ impl Pass for NlMeans {
     }
 
     fn record(&self, r: &mut Recorder, frame: &Frame, _: &Resources, range: Range) -> Result<()> {
-        if is_due(frame) {
+        if frame.denoises {
             self.params.dispatch(r, "nlmeans", &self.pipeline, frame, range);
         }
         Ok(())

@@ -7,7 +7,6 @@ use crate::integrators::path::signal::SignalPaths;
 use crate::interface::PixelFilter;
 use crate::interface::records::radiance::GatherParams;
 use crate::realtime::display::Display;
-use crate::realtime::frame_paths::FramePaths;
 use crate::realtime::graph::{Frame, Params, Pass, Range, ResourceUse, Stage};
 use crate::realtime::resources::{Resource, Resources};
 use crate::scene::Scene;
@@ -58,10 +57,10 @@ impl Pass for Paths {
             self.paths.turn_environment(to_map)?;
         }
         // one path a frame: places of frames are more even than those of the first few points of a sequence
-        let spreads = self.has_rest && frame.settings.antialias && !frame.rest_starts && frame.paths > 1;
+        let spreads = self.has_rest && frame.settings.antialias && !frame.rest_starts && frame.samples > 1;
         let pixel_filter = if spreads { PixelFilter::Box } else { PixelFilter::Centre };
         let params = BlockParams { pixel_filter: pixel_filter as u32, ..super::surfaces::block_params(frame, self.sampled) };
-        let rr_depth = if FramePaths::is_long(frame.resting) { frame.settings.rest_rr_depth } else { 0 };
+        let rr_depth = if frame.is_long { frame.settings.rest_rr_depth } else { 0 };
         self.paths.begin(&frame.camera, &params, rr_depth)
     }
 
@@ -80,7 +79,7 @@ impl Pass for Paths {
     fn run(&mut self, commands: &mut Commands, frame: &Frame, resources: &Resources, range: Range) -> Result<Vec<Timing>> {
         let mut timings = Vec::new();
         let most_bits = (self.paths.capacity() / range.count.max(1)).checked_ilog2().unwrap_or(0).min(MAX_SAMPLE_BITS);
-        for (earlier, sample_bits) in sample_batches(frame.paths, most_bits) {
+        for (earlier, sample_bits) in sample_batches(frame.samples, most_bits) {
             self.gather.write(&GatherParams {
                 frame: frame.params,
                 path: self.paths.params_address(),
@@ -98,7 +97,7 @@ impl Pass for Paths {
                 scene: frame.tracer.scene_address(),
                 first: range.first << sample_bits,
                 count: range.count << sample_bits,
-                sample_index: frame.first_path.wrapping_add(earlier),
+                sample_index: frame.first_sample.wrapping_add(earlier),
                 sample_bits,
                 ..Default::default()
             };

@@ -53,7 +53,7 @@ impl Pass for RadianceFilter {
             frame: frame.params,
             from: resources.address(self.from),
             to: resources.address(self.to),
-            samples: frame.settings.filter.samples.max(LEAST_PIXELS * frame.rest_paths as f32),
+            samples: frame.settings.filter.samples.max(LEAST_PIXELS * frame.rest_samples as f32),
             ..self.step.params()
         })
     }

@@ -53,7 +53,7 @@ impl Pass for Surfaces {
     fn record(&self, r: &mut Recorder, frame: &Frame, _: &Resources, range: Range) -> Result<()> {
         let Range { first, count } = range;
         let push =
-            Push { scene: frame.tracer.scene_address(), first, count, sample_index: frame.first_path, ..Default::default() };
+            Push { scene: frame.tracer.scene_address(), first, count, sample_index: frame.first_sample, ..Default::default() };
         self.rays.record(r, &push);
         Ok(())
     }

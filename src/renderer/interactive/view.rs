@@ -74,7 +74,7 @@ pub struct ViewStep {
     pub timings: Vec<Timing>,
     /// Rays traced: camera rays, and all others as far as they are known.
     pub rays: [u64; 2],
-    /// Samples per pixel so far: the minimum of a still, the number of frames at rest of frames in real time.
+    /// Samples per pixel so far: as [`View::samples`].
     pub samples: u32,
     /// More steps do not change the image.
     pub is_settled: bool,
@@ -176,12 +176,10 @@ impl View {
         self.size
     }
 
-    /// Samples per pixel so far: the minimum of a still, or of frames in real time those of the longest history.
+    /// Samples per pixel so far: the minimum of a still, or of frames in real time those at rest, or of the longest history.
     pub fn samples(&self) -> u32 {
         match &self.kind {
-            Kind::Frames(view) => {
-                ((view.resting + 1).min(view.realtime.settings().history)) * view.realtime.settings().rays_per_pixel
-            }
+            Kind::Frames(view) => view.realtime.shown_samples(),
             Kind::Still(view) => view.film.samples.iter().copied().min().unwrap_or(0),
         }
     }
@@ -374,7 +372,7 @@ impl FramesView {
         Ok(ViewStep {
             timings,
             rays: [primary_rays, occlusion_rays],
-            samples: self.resting + 1,
+            samples: self.realtime.shown_samples(),
             is_settled: self.resting >= self.settling,
             nodes: nodes.filter(|_| self.shown == DisplayMode::Nodes).map(|n| (n.mean, n.max)),
         })

@@ -16,7 +16,7 @@ pub fn show(app: &mut App, ui: &mut Ui) {
             ui.separator();
             let state = if progress.step.is_settled { "settled" } else { "converging" };
             ui.label(format!("{} samples, {state}", progress.step.samples))
-                .on_hover_text("Frames since the camera came to rest, or samples per pixel of a still");
+                .on_hover_text("Samples per pixel since the camera came to rest, or those of the history");
             ui.separator();
         }
         if let Some(figures) = app.figures() {

@@ -214,17 +214,21 @@ fn titles(app: &App, ui: &Ui, rect: Rect, split: Option<f32>) {
         painter.rect_filled(place.expand(3.0), CornerRadius::same(3), Color32::from_black_alpha(150));
         painter.galley(place.min, galley, Color32::WHITE);
     };
+    let title = |is_second: bool| {
+        let name = app.title(is_second);
+        if app.is_title_ahead(is_second) { format!("{name}: rendering …") } else { name }
+    };
     let margin = Vec2::splat(10.0);
     match split {
         Some(x) => {
-            text(rect.left_top() + margin, Align2::LEFT_TOP, app.title(false));
-            text(Pos2::new(x, rect.top()) + margin, Align2::LEFT_TOP, app.title(true));
+            text(rect.left_top() + margin, Align2::LEFT_TOP, title(false));
+            text(Pos2::new(x, rect.top()) + margin, Align2::LEFT_TOP, title(true));
             if let Some(c) = &app.comparison {
                 let error = format!("RMSE {:.4}, bias {:+.4}", c.rmse, c.bias);
                 text(rect.left_bottom() + Vec2::new(10.0, -10.0), Align2::LEFT_BOTTOM, error);
             }
         }
-        None => text(rect.left_top() + margin, Align2::LEFT_TOP, app.title(app.shows_second)),
+        None => text(rect.left_top() + margin, Align2::LEFT_TOP, title(app.shows_second)),
     }
 }
 

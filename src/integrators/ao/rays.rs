@@ -1,0 +1,80 @@
+//! The rays of samples of ambient occlusion: camera rays, and from where they meet the scene occlusion rays (`primary`, `occlusion`).
+
+use super::{Attenuation, NO_HIT};
+use crate::error::Result;
+use crate::gpu::{Buffer, Memory, Recorder};
+use crate::interface::records::block::BlockParams;
+use crate::shaders::{self, StreamShaders};
+use crate::tracer::entry_points::EntryPoints;
+use crate::tracer::queue::RayQueue;
+use crate::tracer::{Push, Stream, Tracer};
+
+/// Streams and memory of launches of samples.
+pub struct AoRays {
+    primary: Stream,
+    occlusion: Stream,
+    entry_points: Option<EntryPoints>,
+    queue: RayQueue,
+    samples: Buffer,
+}
+
+/// The streams that samples need: without a falloff any hit ends an occlusion ray.
+pub fn streams(attenuation: Attenuation) -> [&'static StreamShaders; 2] {
+    let occlusion = if attenuation.is_binary() { &shaders::OCCLUSION_ANY } else { &shaders::OCCLUSION_CLOSEST };
+    [&shaders::PRIMARY_CLOSEST, occlusion]
+}
+
+impl AoRays {
+    /// For launches of at most `most` samples, and at most 2^`sample_bits` of a pixel.
+    ///
+    /// # Errors
+    /// Those of the device.
+    pub fn new(tracer: &Tracer, attenuation: Attenuation, most: u32, sample_bits: u32) -> Result<Self> {
+        let device = tracer.device();
+        let [primary, occlusion] = streams(attenuation);
+        let primary = tracer.stream(primary)?;
+        Ok(Self {
+            entry_points: EntryPoints::new(tracer, &primary, most, sample_bits)?,
+            primary,
+            occlusion: tracer.stream(occlusion)?,
+            queue: RayQueue::new(device, most)?,
+            samples: Buffer::new(device, "samples", size_of::<f32>() as u64 * u64::from(most), Memory::Device)?,
+        })
+    }
+
+    /// Device address of the launch's samples: ambient visibility, a float each; negative where the camera ray missed.
+    pub fn samples(&self) -> u64 {
+        self.samples.address()
+    }
+
+    /// Returns true if camera rays start below the root of the hierarchy, in launches of enough samples: `params` are of [`AoRays::params`].
+    pub fn has_entry_points(&self, params: &BlockParams) -> bool {
+        self.entry_points.is_some() && params.orthographic == 0
+    }
+
+    /// `params` with the addresses that the streams read.
+    pub fn params(&self, params: BlockParams) -> BlockParams {
+        BlockParams {
+            samples: self.samples.address(),
+            queue: self.queue.record(),
+            entry_points: match &self.entry_points {
+                Some(lists) if self.has_entry_points(&params) => lists.address(),
+                _ => 0,
+            },
+            ..params
+        }
+    }
+
+    /// Records the rays of a launch. Commands before and after it need a barrier in between.
+    pub fn record(&self, r: &mut Recorder, push: &Push, has_entry_points: bool) {
+        self.queue.clear(r);
+        if let Some(entry_points) = self.entry_points.as_ref().filter(|_| has_entry_points) {
+            entry_points.record(r, push);
+        }
+        r.fill(&self.samples, size_of::<f32>() as u64 * u64::from(push.count), NO_HIT.to_bits());
+        r.barrier();
+        self.primary.record(r, push);
+        r.barrier();
+        self.occlusion.record(r, &self.queue.push(*push, push.count));
+    }
+}
