@@ -60,6 +60,10 @@ const HEIGHTS: [f64; 2] = [0.2, 0.35];
 const HEADINGS: usize = 12;
 /// Rays of a view that is compared, along its width and height.
 const VIEW: [usize; 2] = [12, 8];
+/// Share of backs in a view from which on it is not from a room.
+const MOST_BACKS: f64 = 0.1;
+/// Share of the rays of a view that see a plane of their own, from which on it shows enough.
+const ENOUGH_DETAIL: f64 = 0.25;
 /// Vertical field of view inside, and outside, radians.
 const INSIDE_FOV_Y: f64 = 1.05;
 const OUTSIDE_FOV_Y: f64 = std::f64::consts::FRAC_PI_4;
@@ -83,7 +87,7 @@ const OUTSIDE: [([f64; 2], f64); 12] = [
 const MAX_POINTS: u64 = 8_000_000;
 
 /// Chooses a camera for images of `aspect` = width / height, with this vertical field of view in radians, if one is given. Inside means: from the middle of the scene there is something in
-/// nearly all horizontal directions, seen from its front, and none of it close. Then it is the place and direction with the longest view; else the camera sees
+/// nearly all horizontal directions, seen from its front, and none of it close. Then it is the place and direction with the longest view that shows more than bare walls; else the camera sees
 /// the whole scene, from the side that shows most fronts and most directions of surfaces. A hollow body that shows its fronts to the outside, as a bottle does, is seen from there.
 ///
 /// # Errors
@@ -204,14 +208,30 @@ fn is_body(scene: &Scene) -> bool {
     }
 }
 
-/// What the rays of a view see.
-fn seen(cameras: &[Camera], aspect: f64, trace: &Trace) -> Result<Vec<Vec<Option<VisibleSurface>>>> {
+/// The rays of a view.
+fn view_rays(camera: &Camera, aspect: f64) -> Vec<(DVec3, DVec3)> {
     let [columns, rows] = VIEW;
     let at = |k: usize| [((k % columns) as f64 + 0.5) / columns as f64, ((k / columns) as f64 + 0.5) / rows as f64];
-    let rays_of =
-        |camera: &Camera| -> Vec<(DVec3, DVec3)> { (0..columns * rows).map(|k| camera_ray(camera, at(k), aspect)).collect() };
-    let rays: Vec<(DVec3, DVec3)> = cameras.iter().flat_map(rays_of).collect();
-    Ok(trace(&rays)?.chunks_exact(columns * rows).map(<[_]>::to_vec).collect())
+    (0..columns * rows).map(|k| camera_ray(camera, at(k), aspect)).collect()
+}
+
+/// What the rays of views see.
+fn seen(cameras: &[Camera], aspect: f64, trace: &Trace) -> Result<Vec<Vec<Option<VisibleSurface>>>> {
+    let rays: Vec<(DVec3, DVec3)> = cameras.iter().flat_map(|c| view_rays(c, aspect)).collect();
+    Ok(trace(&rays)?.chunks_exact(VIEW[0] * VIEW[1]).map(<[_]>::to_vec).collect())
+}
+
+/// Share of the rays of a view that see a plane of their own, from 0 to 1: a corridor has few planes, a furnished room many. Planes count as one whose normals and whose places, in fiftieths of
+/// `size`, are nearly the same.
+fn detail(rays: &[(DVec3, DVec3)], seen: &[Option<VisibleSurface>], size: f64) -> f64 {
+    let plane = |((from, along), s): (&(DVec3, DVec3), &Option<VisibleSurface>)| {
+        s.as_ref().map(|s| {
+            let at = s.normal.dot(*from + *along * s.distance);
+            ((s.normal * 3.0).round().as_ivec3(), (50.0 * at / size).round() as i64)
+        })
+    };
+    let planes: std::collections::HashSet<_> = rays.iter().zip(seen).filter_map(plane).collect();
+    planes.len() as f64 / rays.len() as f64
 }
 
 /// The camera with the highest score, and the score; of equal ones the first.
@@ -220,7 +240,7 @@ fn best(cameras: Vec<Camera>, scores: impl Iterator<Item = f64>) -> Result<(Came
     best.and_then(|(k, score)| Some((cameras.into_iter().nth(k)?, score))).ok_or_else(no_geometry)
 }
 
-/// The camera inside with the longest view.
+/// The camera inside with the longest view, if it shows enough.
 fn inside((lo, hi): (DVec3, DVec3), aspect: f64, fov_y: Option<f64>, trace: &Trace) -> Result<(Camera, f64)> {
     let extent = hi - lo;
     let along = |k: usize| (k as f64 + 1.0) / (PLACES as f64 + 1.0);
@@ -234,19 +254,24 @@ fn inside((lo, hi): (DVec3, DVec3), aspect: f64, fov_y: Option<f64>, trace: &Tra
         }
     }
     let size = extent.length();
-    let score = |seen: Vec<Option<VisibleSurface>>| {
-        // a back is seen from within a body
-        if seen.iter().flatten().any(|s| !s.is_front) {
+    let score = |(camera, seen): (&Camera, Vec<Option<VisibleSurface>>)| {
+        // from within a body backs are seen; those of curtains and leaves are few
+        let fronts = seen.iter().flatten().filter(|s| s.is_front).count() as f64;
+        let backs = seen.iter().flatten().filter(|s| !s.is_front).count() as f64;
+        let flaws = backs / (fronts + backs).max(1.0) / MOST_BACKS;
+        if flaws >= 1.0 {
             return 0.0;
         }
         let distances: Vec<f64> = seen.iter().flatten().map(|s| s.distance / size).collect();
         let nearest = distances.iter().copied().fold(f64::INFINITY, f64::min);
         // long views of much, with nothing right before the camera; the sky is no view
         let sum: f64 = distances.iter().map(|d| d.sqrt()).sum();
+        let shown = (detail(&view_rays(camera, aspect), &seen, size) / ENOUGH_DETAIL).min(1.0);
+        let sum = (1.0 - flaws) * shown * sum;
         if nearest < 0.02 { 0.2 * sum } else { sum }
     };
-    let scores = seen(&cameras, aspect, trace)?.into_iter().map(score);
-    let (camera, score) = best(cameras, scores)?;
+    let scores: Vec<f64> = cameras.iter().zip(seen(&cameras, aspect, trace)?).map(score).collect();
+    let (camera, score) = best(cameras, scores.into_iter())?;
     Ok((Camera { name: ViewName::Inside.to_string(), ..camera }, score))
 }
 
@@ -336,6 +361,20 @@ mod tests {
         assert!(is_inside(&camera) && forward.x.abs() > 0.8, "{camera:?}");
         // a courtyard is open above
         assert!(is_inside(&chosen(&|rays| inside(rays, |d| d.y > 0.5))));
+    }
+
+    #[test]
+    fn bare_walls_show_little() {
+        let rays = view_rays(&Camera::look_at(DVec3::ZERO, DVec3::X, DVec3::Y, 1.0), 1.0);
+        let wall = vec![hit(2.0); rays.len()];
+        // planes across the view, each at a distance of its own
+        let steps: Vec<_> =
+            (0..rays.len()).map(|k| hit(2.0 + k as f64)).map(|s| s.map(|s| VisibleSurface { normal: DVec3::X, ..s })).collect();
+        let flat: Vec<_> = rays.iter().map(|(_, d)| hit(-1.6 / d.y)).collect();
+        let of = |seen: &[Option<VisibleSurface>]| detail(&rays, seen, 100.0);
+        assert_eq!(of(&flat), 1.0 / rays.len() as f64, "a floor is one plane");
+        assert!(of(&wall) < 0.1 && of(&steps) > 2.0 * of(&wall), "{} {}", of(&wall), of(&steps));
+        assert_eq!(of(&vec![None; rays.len()]), 0.0);
     }
 
     #[test]
