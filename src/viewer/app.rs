@@ -112,8 +112,8 @@ pub struct App {
     /// Number of the last request, and of the last one for which nothing is left to do.
     sent_number: u64,
     idle: u64,
-    /// Names of the two images in the last request, and the number of the first request with each.
-    titles: [(String, u64); 2],
+    /// The technique of each image in the last request with it, by name, and the number of the first such request.
+    techniques: [(String, u64); TRUTH + 1],
     load: u64,
     /// The load of the scene that is shown.
     loaded: u64,
@@ -212,7 +212,7 @@ impl App {
             sent: Request::default(),
             sent_number: 1,
             idle: 0,
-            titles: Default::default(),
+            techniques: Default::default(),
             load: 0,
             loaded: 0,
             last_load: 0,
@@ -535,9 +535,10 @@ impl App {
             *r = request;
             r.tasks = before.into_iter().chain(tasks).collect();
         });
-        for (k, title) in [false, true].map(|is_second| self.title(is_second)).into_iter().enumerate() {
-            if self.titles[k].0 != title {
-                self.titles[k] = (title, self.sent_number);
+        for is_second in [false, true] {
+            let (pane, name) = (self.pane(is_second), self.technique_of(is_second));
+            if self.techniques[pane].0 != name {
+                self.techniques[pane] = (name, self.sent_number);
             }
         }
     }
@@ -591,9 +592,19 @@ impl App {
 
     /// Returns true while an image is not yet what its name says: another technique was chosen, and its first picture is to come.
     pub fn is_title_ahead(&self, is_second: bool) -> bool {
-        let (title, first) = &self.titles[usize::from(is_second)];
-        let shown = self.panes[self.pane(is_second)].progress.as_ref();
-        shown.is_some_and(|p| p.request < *first || *title != self.title(is_second))
+        let pane = self.pane(is_second);
+        let (name, first) = &self.techniques[pane];
+        let shown = self.panes[pane].progress.as_ref();
+        shown.is_some_and(|p| p.request < *first || *name != self.technique_of(is_second))
+    }
+
+    /// The technique of the first image, or of the second; a heat map is of the truth's.
+    fn technique_of(&self, is_second: bool) -> String {
+        match (is_second, self.second) {
+            (false, _) => self.first.label(),
+            (true, Second::Technique(t)) => t.label(),
+            (true, _) => self.truth.label(),
+        }
     }
 
     /// Index of the first image, or of the second.

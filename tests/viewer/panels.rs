@@ -9,7 +9,7 @@ use skylit::renderer::interactive::{Pick, ViewPicture};
 use skylit::viewer::ViewOptions;
 use skylit::viewer::app::{App, Arrangement, Second};
 use skylit::viewer::request::{
-    Comparison, DeviceSummary, Event, EventSender, Mailbox, PickPurpose, Progress, SceneSummary, Task,
+    Comparison, DeviceSummary, Event, EventSender, Mailbox, PickPurpose, Progress, SceneSummary, TRUTH, Task,
 };
 
 /// The viewer without a renderer: what it requests goes to a mailbox, what it is told comes from the sender.
@@ -299,6 +299,15 @@ fn a_name_is_not_that_of_the_picture_before() {
     assert!(!arrives(&mut alone, after));
     alone.press(egui::Key::T);
     assert!(!alone.harness.state().is_title_ahead(false), "the first image has its technique as before");
+    // the truth is there, and its heat map needs no other picture
+    let number = alone.mailbox.number();
+    let progress = Progress { pane: TRUTH, picture: picture.clone(), request: number, ..Default::default() };
+    alone.events.send(Event::Picture(Box::new(progress)));
+    for second in [Second::Truth, Second::HeatMap, Second::Truth] {
+        alone.harness.state_mut().second = second;
+        alone.harness.run_steps(3);
+        assert!(!alone.harness.state().is_title_ahead(true), "{second:?}");
+    }
 }
 
 /// What is to be saved is requested until it is done, whatever else is requested, but not of another scene; the heat map is saved as it is shown.
