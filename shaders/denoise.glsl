@@ -13,8 +13,8 @@ layout(local_size_x = LANES) in;
 const float PRIOR_SAMPLES = 4.0;
 // a pixel without neighbours on its surface has samples of its own
 const float LONELY = 0.0;
-
-uint first_pixel() { return push.first + FILTER_STRIP * gl_GlobalInvocationID.x; }
+// Samples from which a pixel's own variance counts more than that of its box: beside a glint's the box says that every pixel is as noisy.
+const float OWN_VARIANCE_SAMPLES = 16.0;
 
 RadianceEstimate load_estimate(uvec2 estimates, uint at) { return load_radiance(estimates, at); }
 
@@ -25,10 +25,14 @@ int limited(int radius, FilterParams p, RadianceEstimate own) { return min(radiu
 // The normals in guides are shading normals here, because lighting depends on them. The eight bits beside them are equal for
 // pixels that may be averaged.
 bool is_neighbour(EdgeTest edge, vec2 offset, uvec2 own_guide, uvec2 guide, vec3 normal) {
-    return (own_guide.y ^ guide.y) >> 24 == 0u && on_plane(edge, offset, guide) && dot(guide_normal(own_guide), normal) >= edge.cosine;
+    return (own_guide.y ^ guide.y) >> 24 == 0u && on_plane(edge, offset, guide) && dot(edge.normal, normal) >= edge.cosine;
 }
 
+vec3 edge_normal(vec3 normal, uvec2 guide) { return guide_normal(guide); }
+
 vec3 prior_variance(vec3 mean, vec3 spread, float samples) { return spread * samples; }
+
+vec3 noise_variance(RadianceEstimate own, vec3 variance) { return mix(variance, own.variance, own.samples / (own.samples + OWN_VARIANCE_SAMPLES)); }
 
 float total(vec3 value) { return value.r + value.g + value.b; }
 

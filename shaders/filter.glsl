@@ -12,13 +12,16 @@ layout(local_size_x = LANES) in;
 const float PRIOR_SAMPLES = 4.0;
 const float LONELY = 6.0;
 
-uint first_pixel() { return FILTER_STRIP * gl_GlobalInvocationID.x; }
-
 Estimate load_estimate(uvec2 estimates, uint at) { return unpack_estimate(LOAD_PAIR(estimates, at)); }
 
 bool is_neighbour(EdgeTest edge, vec2 offset, uvec2 own_guide, uvec2 guide, vec3 normal) { return same_surface(edge, offset, guide, normal); }
 
+vec3 edge_normal(vec3 normal, uvec2 guide) { return normal; }
+
 float prior_variance(float mean, float spread, float samples) { return mean * (1.0 - mean); }
+
+// Variances of samples that are 0 or 1 follow the mean: a pixel that happened to see no occluder has none.
+float noise_variance(Estimate own, float variance) { return variance; }
 
 float total(float value) { return value; }
 

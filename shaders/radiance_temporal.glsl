@@ -92,7 +92,7 @@ vec3 clamped(RadianceTemporalParams p, FrameParams f, uvec2 image, uvec2 pixel, 
 
 // The guide's normals are shading normals, by which lighting differs; planes are those of the true surface.
 EdgeTest with_normal(EdgeTest edge, uvec2 guide) {
-    edge.normal = unpackSnorm4x8(guide.y).xyz;
+    edge.normal = guide_normal(guide);
     return edge;
 }
 

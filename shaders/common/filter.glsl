@@ -11,13 +11,14 @@
 //
 // The including shader defines what is filtered, a VALUE of one or several channels, and an ESTIMATE of it, with a mean, the
 // number of samples behind it and the variance of one. Furthermore:
-//   uint first_pixel()                             the first of the FILTER_STRIP pixels of this thread
 //   ESTIMATE load_estimate(image, at)
 //   ESTIMATE estimate_of(own, mean, n, variance)   a pixel's estimate with another mean, number of samples and variance
 //   bool is_neighbour(edge, offset, own, guide, normal)   whether two pixels show the same surface; `normal`: guide_normal() of the second's
+//   vec3 edge_normal(normal, guide)                the normal that neighbours' normals are compared with: the surface's, or what the guide has
 //   VALUE prior_variance(mean, spread, samples)    the variance to assume while there are few samples: from the mean of a box,
 //                                                  the variance of its pixels and the samples per pixel
 //   int limited(radius, p, own)                    the radius, or a smaller one for this pixel
+//   VALUE noise_variance(own, variance)            the variance of a pixel's samples, from what its estimate says and from that of its box
 //   float total(value)                             a sum over channels
 //   ESTIMATE guess(p, f, image, pixel, own)        the value of a pixel without samples in its box
 //   void finish(p, f, at, estimate, bent)          writes the result; finish_nothing(p, f, at): for a pixel that is not filtered
@@ -54,7 +55,7 @@ struct Filtered {
     EdgeTest edge;
     VALUE sum, squares, variances;
     vec3 bent;
-    float n, count, noise;
+    float n, count;
 };
 
 bool is_active(Filtered e) { return e.lower.x <= e.upper.x; }
@@ -78,9 +79,10 @@ void finish_box(FilterParams p, FrameParams f, uvec2 estimates, uint at, ESTIMAT
     VALUE variance = (e.variances + prior_variance(mean, spread, e.n / max(e.count, 1.0)) * PRIOR_SAMPLES) / (max(e.n - e.count, 0.0) + PRIOR_SAMPLES);
     float keep = 0.0, noisier = 1.0;
     if (own.samples > 0.0) {
-        float own_noise = total(variance) * mean_variance(p, own.samples) / own.samples;
+        float own_noise = total(noise_variance(own, variance)) * mean_variance(p, own.samples) / own.samples;
         // of the pixel about the box: detail, which is what noise does not explain of the spread, and its own noise
-        float unlike = total(spread) * e.count / max(e.count - 1.0, 1.0) - total(variance) * e.noise / e.n + own_noise;
+        float box_noise = total(variance) * mean_variance(p, e.n / e.count) * e.count / e.n;
+        float unlike = total(spread) * e.count / max(e.count - 1.0, 1.0) - box_noise + own_noise;
         // with 3 of `count` pixels taken off, the sum of squared errors of what is kept is never above that of the pixels as they are;
         // so it is for histories that are as long as they get. For short ones it is too careful, and 1 does better.
         float careful = 1.0 + 2.0 * min(own.samples / f.most_samples, 1.0);
@@ -92,20 +94,24 @@ void finish_box(FilterParams p, FrameParams f, uvec2 estimates, uint at, ESTIMAT
     finish(p, f, at, estimate_of(own, mix(mean, own.mean, keep), e.n, variance * noisier), mix(e.bent / e.n, own_bent, keep));
 }
 
-// Each thread filters FILTER_STRIP pixels that follow one another, whose boxes overlap: a tap is loaded once for all of them. On a CPU driver loads are most of the time.
+// Each thread filters FILTER_STRIP pixels of a row, whose boxes overlap: a tap is loaded once for all of them. On a CPU driver loads are most of the time. Threads that run together filter tiles
+// rather than long rows: their boxes are about as large, and the largest says how long all take.
 void main() {
-    uint first = first_pixel();
-    if (first >= push.count) return;
+    uint index = push.first + FILTER_STRIP * gl_GlobalInvocationID.x;
+    if (index >= push.count) return;
     FilterParams p = FilterParams(push.pass);
     FrameParams f = FrameParams(p.frame);
+    ivec2 corner = ivec2(divide(index >> 6, f.tiles_x) * 8u + uvec2(index & 7u, index >> 3 & 7u));
+    if (any(greaterThanEqual(corner, ivec2(f.size)))) return;
+    uint first = image_index(f, uvec2(corner));
     uvec2 guides = f.guide, estimates = p.from;
-    int width = int(f.size.x), stride = int(p.stride), pixels = width * int(f.size.y);
+    int width = int(f.size.x), stride = int(p.stride);
     Filtered strip[FILTER_STRIP];
     uvec2 own_guides[FILTER_STRIP];
     [[unroll]] for (int k = 0; k < FILTER_STRIP; k++) {
         uint at = first + uint(k);
         stop(strip[k]);
-        if (at >= push.count) continue;
+        if (corner.x + k >= width) continue;
         own_guides[k] = LOAD_PAIR(guides, at);
         if (!is_surface(own_guides[k])) {
             finish_nothing(p, f, at);
@@ -118,8 +124,9 @@ void main() {
             finish(p, f, at, own, BENT_NORMALS ? load_bent(p, at) : vec3(0.0));
             continue;
         }
-        ivec2 pixel = ivec2(image_pixel(f, at));
+        ivec2 pixel = ivec2(corner.x + k, corner.y);
         strip[k].edge = edge_test(f, f.world_to_camera, f.view, f.orthographic != 0u, surface_position(f, at), surface_normal(f, at), sample_place(f, vec2(pixel)));
+        strip[k].edge.normal = edge_normal(strip[k].edge.normal, own_guides[k]);
         ivec2 reach = radius * ivec2(p.sides & STEP_HORIZONTAL, (p.sides & STEP_VERTICAL) >> 1);
         strip[k].lower = max(-reach, -(pixel / stride));
         strip[k].upper = min(reach, (ivec2(f.size) - 1 - pixel) / stride);
@@ -132,21 +139,18 @@ void main() {
             lower = min(lower, ivec2(stride * strip[k].lower.x + k, strip[k].lower.y));
             upper = max(upper, ivec2(stride * strip[k].upper.x + k, strip[k].upper.y));
             strip[k].sum = strip[k].squares = strip[k].variances = VALUE(0.0);
-            strip[k].n = strip[k].count = strip[k].noise = 0.0;
+            strip[k].n = strip[k].count = 0.0;
             strip[k].bent = vec3(0.0);
         }
         for (int y = lower.y; y <= upper.y; y++) {
+            int row = int(first) + y * stride * width;
             for (int x = lower.x; x <= upper.x; x++) {
-                // where a strip goes on in the next row, boxes of its pixels together may leave the image
-                int tap = int(first) + y * stride * width + x;
-                if (tap < 0 || tap >= pixels) continue;
-                uvec2 guide = LOAD_PAIR(guides, uint(tap));
-                ESTIMATE e = load_estimate(estimates, uint(tap));
-                vec3 normal = guide_normal(guide), bent = BENT_NORMALS ? load_bent(p, uint(tap)) * e.samples : vec3(0.0);
+                uint tap = uint(row + x);
+                uvec2 guide = LOAD_PAIR(guides, tap);
+                ESTIMATE e = load_estimate(estimates, tap);
+                vec3 normal = guide_normal(guide), bent = BENT_NORMALS ? load_bent(p, tap) * e.samples : vec3(0.0);
                 VALUE sum = e.mean * e.samples, squares = e.mean * e.mean * e.samples, variances = e.variance * e.samples;
                 float count = e.samples > 0.0 ? 1.0 : 0.0;
-                // its samples times the variance of their mean
-                float noise = e.samples > 0.0 ? mean_variance(p, e.samples) : 0.0;
                 [[unroll]] for (int k = 0; k < FILTER_STRIP; k++) {
                     int dx = x - k;
                     bool is_inside = dx >= stride * strip[k].lower.x && dx <= stride * strip[k].upper.x && (dx & stride - 1) == 0 && y >= strip[k].lower.y && y <= strip[k].upper.y;
@@ -157,7 +161,6 @@ void main() {
                     if (BENT_NORMALS) strip[k].bent += bent;
                     strip[k].n += e.samples;
                     strip[k].count += count;
-                    strip[k].noise += noise;
                 }
             }
         }

@@ -134,8 +134,11 @@ bool on_plane(EdgeTest e, vec2 offset, uvec2 guide) {
     return abs(off) <= e.tolerance;
 }
 
-// The normal in a guide, to be computed once for many tests.
-vec3 guide_normal(uvec2 guide) { return unpackSnorm4x8(guide.y).xyz; }
+// The normal in a guide, to be computed once for many tests. As unpackSnorm4x8 has it, but for its divisions and its clamps of -128, which pack_normal does not make.
+vec3 guide_normal(uvec2 guide) {
+    ivec3 bytes = ivec3(uvec3(guide.y << 24, guide.y << 16, guide.y << 8)) >> 24;
+    return vec3(bytes) * (1.0 / 127.0);
+}
 
 bool same_surface(EdgeTest e, vec2 offset, uvec2 guide, vec3 normal) {
     return on_plane(e, offset, guide) && dot(e.normal, normal) >= e.cosine;

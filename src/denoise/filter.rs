@@ -15,6 +15,7 @@ use super::features::{Features, PinholeView, PixelContent, is_uniform_emitter};
 use crate::error::Result;
 use crate::film::Control;
 use crate::film::Film;
+use crate::film::block::Block;
 use crate::film::pace::Pace;
 use crate::gpu::{Buffer, Commands, Memory};
 use crate::interface::records::denoise::RadianceRecord;
@@ -167,7 +168,7 @@ fn run(
     control: &mut dyn Control,
 ) -> Result<Vec<RadianceRecord>> {
     let (device, camera) = (shot.tracer.device(), shot.camera);
-    let pixels = guided.estimates.len() as u32;
+    let block = Block { origin: [0, 0], size };
     let surface = Buffer::from_slice(device, "surfaces", &guided.surfaces)?;
     let guide = Buffer::from_slice(device, "guide", &guided.guides)?;
     let given = Buffer::from_slice(device, "radiance", &guided.estimates)?;
@@ -181,6 +182,7 @@ fn run(
         view: camera.view,
         orthographic: camera.orthographic.into(),
         size,
+        tiles_x: block.tiles_x(),
         depth_tolerance: DEPTH_TOLERANCE,
         normal_tolerance: settings.cosine,
         // estimates are final: no later frame improves them
@@ -204,8 +206,8 @@ fn run(
         };
         let step = Buffer::from_slice(device, "filter parameters", &[step])?;
         let mut first = 0;
-        while first < pixels {
-            let n = pace.rays().min(pixels - first);
+        while first < block.rays() {
+            let n = pace.rays().min(block.rays() - first);
             let push = Push { pass: step.address(), first, count: first + n, ..Default::default() };
             let start = Instant::now();
             let timings =

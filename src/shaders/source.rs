@@ -217,8 +217,15 @@ impl Source {
 
     /// Whether its SPIR-V is optimized before it reaches the driver. The optimizer leaves the loops over a thread's four pixels in common/filter.glsl rolled up in a
     /// form that lavapipe's does not unroll; the pixels' sums are then in memory, which every thread of a vector accesses by itself, and filters take three times as long.
+    /// So it is with the loops over neighbours of `antialias`, which takes half as long without, and of the two that reproject histories (three quarters).
     pub fn is_optimized(&self) -> bool {
-        !matches!(self, Self::Compute { pass: "filter" | "denoise" | "nlmeans" | "nlmeans_radiance", .. })
+        !matches!(
+            self,
+            Self::Compute {
+                pass: "filter" | "denoise" | "nlmeans" | "nlmeans_radiance" | "antialias" | "temporal" | "radiance_temporal",
+                ..
+            }
+        )
     }
 
     /// The GLSL text, with unresolved includes. `shaders`: the folder.

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use crate::error::Result;
+use crate::film::block::Block;
 use crate::gpu::{ComputePipeline, Recorder, Specialization};
 use crate::interface::constants;
 use crate::interface::records::passes::{FILTER_STRIP, FilterParams};
@@ -24,8 +25,8 @@ struct Filter {
     has_bent: bool,
 }
 
-/// The steps of the filter over all pixels.
-pub fn stages(tracer: &Tracer, pixels: u32, settings: &Settings) -> Result<Vec<Stage>> {
+/// The steps of the filter over the tiles of the image.
+pub fn stages(tracer: &Tracer, block: Block, settings: &Settings) -> Result<Vec<Stage>> {
     let device = tracer.device();
     let specialization = Specialization::default().set(constants::BENT_NORMALS, settings.bent);
     let pipeline = Arc::new(shaders::FILTER.specialized(device, &specialization)?);
@@ -41,7 +42,7 @@ pub fn stages(tracer: &Tracer, pixels: u32, settings: &Settings) -> Result<Vec<S
             to: (k + 1 < steps.len()).then(|| after(k)),
             has_bent: settings.bent,
         };
-        Ok(Stage::new(vec![Box::new(pass)], Range::all(pixels)))
+        Ok(Stage::new(vec![Box::new(pass)], Range::all(block.rays())))
     };
     steps.iter().enumerate().map(stage).collect()
 }

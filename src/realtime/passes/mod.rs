@@ -94,7 +94,7 @@ pub fn stages(
         }
     }
     stages.push(temporal::stage(tracer, pixels, settings)?);
-    stages.extend(filter::stages(tracer, pixels, settings)?);
+    stages.extend(filter::stages(tracer, block, settings)?);
     let has_rest = settings.converges();
     if has_rest {
         stages.push(rest::stage(tracer, pixels)?);
@@ -132,7 +132,7 @@ pub fn radiance_stages(
         radiance_temporal::stage(tracer, pixels, has_rest)?,
     ];
     let is_diffuse = options.white_sky.is_some() || flat.scene.materials.iter().all(|m| m.kind == MaterialKind::Matte);
-    let (filters, filtered) = radiance_filter::stages(tracer, pixels, settings, !is_diffuse)?;
+    let (filters, filtered) = radiance_filter::stages(tracer, block, settings, !is_diffuse)?;
     stages.extend(filters);
     stages.push(compose::stage(tracer, pixels, filtered, has_rest)?);
     stages.push(antialias::stage(tracer, pixels, Resource::Composed, has_rest)?);

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use crate::error::Result;
+use crate::film::block::Block;
 use crate::gpu::{ComputePipeline, Recorder};
 use crate::interface::records::passes::{FILTER_STRIP, FilterParams};
 use crate::realtime::display::Display;
@@ -24,8 +25,8 @@ struct RadianceFilter {
     to: Resource,
 }
 
-/// The steps of the filter over all pixels (`has_specular`: of both parts, else the rest is black and is left alone), and the images that hold the results: diffuse reflection and the rest.
-pub fn stages(tracer: &Tracer, pixels: u32, settings: &Settings, has_specular: bool) -> Result<(Vec<Stage>, [Resource; 2])> {
+/// The steps of the filter over the tiles of the image (`has_specular`: of both parts, else the rest is black and is left alone), and the images that hold the results: diffuse reflection and the rest.
+pub fn stages(tracer: &Tracer, block: Block, settings: &Settings, has_specular: bool) -> Result<(Vec<Stage>, [Resource; 2])> {
     let device = tracer.device();
     let pipeline = Arc::new(shaders::DENOISE.pipeline(device)?);
     let steps = settings.filter.steps();
@@ -36,7 +37,7 @@ pub fn stages(tracer: &Tracer, pixels: u32, settings: &Settings, has_specular: b
             let to = Resource::FilteredRadiance(2 * part + k % 2);
             let params = Params::new(device, "parameters of the filter")?;
             let pass = RadianceFilter { pipeline: pipeline.clone(), params, step: *step, from: *from, to };
-            stages.push(Stage::new(vec![Box::new(pass)], Range::all(pixels)));
+            stages.push(Stage::new(vec![Box::new(pass)], Range::all(block.rays())));
             *from = to;
         }
     }
