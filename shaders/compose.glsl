@@ -16,7 +16,7 @@ void main() {
         // albedo and what is seen directly are means over all samples, too; where this frame's sample shows background, nothing has been filtered
         RestParts parts = load_parts(p.rest_parts, at);
         c = vec4(rest.mean, rest.coverage);
-        if (is_filtered) c.rgb = parts.direct + parts.albedo * load_radiance(p.diffuse, at).mean + rest.coverage * load_radiance(p.specular, at).mean;
+        if (is_filtered) c.rgb = direct_part(rest, parts) + parts.albedo * load_radiance(p.diffuse, at).mean + rest.coverage * load_radiance(p.specular, at).mean;
     } else if (is_filtered) {
         vec3 albedo = load_quad(p.materials, at).rgb;
         c.rgb += albedo * load_radiance(p.diffuse, at).mean + load_radiance(p.specular, at).mean;

@@ -58,11 +58,12 @@ void main() {
         if (!is_finite(c) || !is_finite(d.rgb) || !is_finite(direct.rgb)) continue;
         add_sample(diffuse, d.rgb);
         // rounding may leave less than nothing
-        add_sample(specular, max(c - d.rgb * albedo.rgb, vec3(0.0)));
+        vec3 rest = max(c - d.rgb * albedo.rgb, vec3(0.0));
+        add_sample(specular, rest);
         add_sample(whole, c + direct.rgb);
         parts.diffuse += d.rgb * albedo.rgb;
         parts.albedo += albedo.rgb;
-        parts.direct += direct.rgb;
+        parts.specular += rest;
         covered += direct.a;
         if (d.a >= 0.0) {
             distance_ += min(d.a, 1e30);
@@ -83,8 +84,8 @@ void main() {
     Rest before = begins ? NO_REST : load_rest(p.rest, at);
     RestParts past = begins ? NO_PARTS : load_parts(p.rest_parts, at);
     float samples = max(whole.samples, 1.0);
-    parts = RestParts(parts.diffuse / samples, 0.0, parts.albedo / samples, 0.0, parts.direct / samples);
+    parts = RestParts(parts.diffuse / samples, 0.0, parts.albedo / samples, 0.0, parts.specular / samples);
     Rest after = add_rest(before, whole.mean, whole.samples, covered / samples);
     store_rest(p.rest, at, after);
-    store_parts(p.rest_parts, at, add_parts(past, before, after, parts, whole.mean - parts.direct - parts.diffuse, covered / samples));
+    store_parts(p.rest_parts, at, add_parts(past, before, after, parts, covered / samples));
 }

@@ -1,6 +1,9 @@
 // The parts of which the samples at rest consist: what is filtered apart, and what is not filtered.
 //
 // The light of a pixel's samples, of which each has an albedo of its own, is the mean albedo times the mean of the diffuse part weighted by albedo: a ratio of two means. Likewise the rest is weighted by how much of the pixel has any.
+//
+// What is seen directly is the difference of the mean of all light and the two parts that are filtered: it is not filtered, so that rounding errors, relative to the largest part, stay in the pixel. Where a pixel beside the sun has a sliver
+// of a surface, the rest as a difference was rounding errors over next to no coverage, and the filter took it to its neighbours.
 #ifndef COMMON_REST_PARTS
 #define COMMON_REST_PARTS
 #include "common/radiance.glsl"
@@ -11,7 +14,7 @@ struct RestParts {
     float diffuse_variance;   // of one sample, divided by the albedo; summed over channels
     vec3 albedo;
     float specular_variance;  // of one sample where there is a surface
-    vec3 direct;              // seen directly
+    vec3 specular;            // neither diffuse nor seen directly
 };
 
 const RestParts NO_PARTS = RestParts(vec3(0.0), 0.0, vec3(0.0), 0.0, vec3(0.0));
@@ -24,27 +27,27 @@ RestParts load_parts(uvec2 image, uint at) {
 void store_parts(uvec2 image, uint at, RestParts p) {
     store_quad(image, 3u * at, vec4(p.diffuse, p.diffuse_variance));
     store_quad(image, 3u * at + 1u, vec4(p.albedo, p.specular_variance));
-    store_quad(image, 3u * at + 2u, vec4(p.direct, 0.0));
+    store_quad(image, 3u * at + 2u, vec4(p.specular, 0.0));
 }
 
 // Quotients; 0 where there is nothing to divide by.
 vec3 ratio(vec3 a, vec3 b) { return mix(vec3(0.0), a / max(b, vec3(1e-20)), greaterThan(b, vec3(1e-6))); }
 
-// The part that is neither diffuse nor seen directly. rest: of all.
-vec3 specular_part(Rest rest, RestParts p) { return rest.mean - p.direct - p.diffuse; }
+// The part that is seen directly.
+vec3 direct_part(Rest rest, RestParts p) { return max(rest.mean - p.diffuse - p.specular, vec3(0.0)); }
 
 // Adds the means over a frame's samples. before, after: the samples at rest without and with them.
-RestParts add_parts(RestParts past, Rest before, Rest after, RestParts now, vec3 now_specular, float now_coverage) {
+RestParts add_parts(RestParts past, Rest before, Rest after, RestParts now, float now_coverage) {
     if (!(after.samples > before.samples)) return past;
     float n = after.samples - before.samples, share = n / after.samples;
-    RestParts p = RestParts(mix(past.diffuse, now.diffuse, share), past.diffuse_variance, mix(past.albedo, now.albedo, share), past.specular_variance, mix(past.direct, now.direct, share));
+    RestParts p = RestParts(mix(past.diffuse, now.diffuse, share), past.diffuse_variance, mix(past.albedo, now.albedo, share), past.specular_variance, mix(past.specular, now.specular, share));
     if (after.frames < 2.0) return p;
     // residuals about the ratio before and after (Welford 1962)
     vec3 d = ratio(now.diffuse - ratio(past.diffuse, past.albedo) * now.albedo, p.albedo), e = ratio(now.diffuse - ratio(p.diffuse, p.albedo) * now.albedo, p.albedo);
     p.diffuse_variance += (n * dot(d, e) - p.diffuse_variance) / (after.frames - 1.0);
     vec3 c = vec3(after.coverage);
-    d = ratio(now_specular - ratio(specular_part(before, past), vec3(before.coverage)) * now_coverage, c);
-    e = ratio(now_specular - ratio(specular_part(after, p), c) * now_coverage, c);
+    d = ratio(now.specular - ratio(past.specular, vec3(before.coverage)) * now_coverage, c);
+    e = ratio(now.specular - ratio(p.specular, c) * now_coverage, c);
     p.specular_variance += (n * dot(d, e) - p.specular_variance) / (after.frames - 1.0);
     return p;
 }
@@ -57,7 +60,7 @@ RadianceEstimate diffuse_at_rest(Rest rest, RestParts p) {
 
 RadianceEstimate specular_at_rest(Rest rest, RestParts p) {
     if (rest.coverage <= 1e-6) return NO_RADIANCE;
-    return RadianceEstimate(max(specular_part(rest, p), vec3(0.0)) / rest.coverage, rest.samples, vec3(max(p.specular_variance, 0.0) / 3.0), 0.0);
+    return RadianceEstimate(p.specular / rest.coverage, rest.samples, vec3(max(p.specular_variance, 0.0) / 3.0), 0.0);
 }
 
 #endif

@@ -2,6 +2,10 @@
 
 use super::settings::Settings;
 
+/// Number of the first long frame at rest, from 1: who stops for a moment has pictures as often as before. Samples of short frames lie at the frame's place in all pixels, so more of them leave edges
+/// jagged.
+const FIRST_LONG: u32 = 4;
+
 /// Samples of a pixel in a frame: paths of radiance, occlusion rays of ambient visibility. Frames in motion are short. At rest, after a few of them, come long ones: what a frame costs besides its samples, and
 /// does not depend on their number, is a third to a half of the time of a short one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -10,7 +14,7 @@ pub struct FrameSamples {
     pub few: u32,
     /// In a long frame.
     pub many: u32,
-    /// Number of the first long frame at rest, from 1: who stops for a moment has pictures as often as before.
+    /// Number of the first long frame at rest, from 1.
     first_long: u32,
     /// Number of short frames in which each pixel is sampled once.
     period: u32,
@@ -25,7 +29,7 @@ impl FrameSamples {
         let few = settings.rays_per_pixel;
         let most = (MAX_PATHS / pixels.max(1)).min(MAX_PER_PIXEL) as u32;
         let many = if settings.converges() { few.max(power_of_two(most)) } else { few };
-        Self { few, many, first_long: 8, period: 1 }
+        Self { few, many, first_long: FIRST_LONG, period: 1 }
     }
 
     /// Those of ambient visibility. Long frames take them as stills do, which is faster from eight samples of a pixel on.
@@ -38,7 +42,7 @@ impl FrameSamples {
         let pixels = pixels.max(1);
         let most = (MANY_SAMPLES / pixels).clamp(8, MAX_PER_PIXEL).min(MAX_SAMPLES / pixels) as u32;
         let has_long = settings.converges() && !settings.bent && most >= few.max(4);
-        let (many, first_long) = if has_long { (power_of_two(most), 4) } else { (few, u32::MAX) };
+        let (many, first_long) = if has_long { (power_of_two(most), FIRST_LONG) } else { (few, u32::MAX) };
         Self { few, many, first_long, period }
     }
 
