@@ -2,8 +2,8 @@
 //
 // The light of a pixel's samples, of which each has an albedo of its own, is the mean albedo times the mean of the diffuse part weighted by albedo: a ratio of two means. Likewise the rest is weighted by how much of the pixel has any.
 //
-// What is seen directly is the difference of the mean of all light and the two parts that are filtered: it is not filtered, so that rounding errors, relative to the largest part, stay in the pixel. Where a pixel beside the sun has a sliver
-// of a surface, the rest as a difference was rounding errors over next to no coverage, and the filter took it to its neighbours.
+// What is seen directly is the difference of the mean of all light and the two parts that are filtered. It is not filtered itself, so rounding errors, which are relative to the largest part, stay in the pixel: beside the sun they may be large against
+// what a surface reflects.
 #ifndef COMMON_REST_PARTS
 #define COMMON_REST_PARTS
 #include "common/radiance.glsl"
