@@ -126,11 +126,11 @@ vec2 agreement(RadianceTemporalParams p, FrameParams f, uint at, vec2 share) {
     return clamp(share * vec2(diffuse.y, specular.y) / max(vec2(diffuse.x, specular.x), vec2(1e-20)), vec2(0.0), vec2(1.0));
 }
 
-// Samples at rest, and as much of older ones as `share` says.
-RadianceEstimate rested(RadianceEstimate history, RadianceEstimate rest, float share) {
+// Samples at rest, of `n` with those that met no surface, and as much of older ones as `share` says.
+RadianceEstimate rested(RadianceEstimate history, RadianceEstimate rest, float n, float share) {
     if (!(rest.samples > 0.0) || !(history.samples > 0.0)) return rest;
     // of the history: it has older samples besides those at rest
-    float k = clamp(share / max(1.0 - rest.samples / history.samples, 1e-6), 0.0, 1.0);
+    float k = clamp(share / max(1.0 - n / history.samples, 1e-6), 0.0, 1.0);
     return RadianceEstimate(mix(rest.mean, history.mean, k), rest.samples / max(1.0 - share, 1e-3), mix(rest.variance, history.variance, k), 0.0);
 }
 
@@ -212,8 +212,8 @@ void main() {
             RestParts parts = load_parts(p.rest_parts, at);
             vec2 share = vec2(old_share(diffuse, rest), old_share(specular, rest));
             share *= agreement(p, f, at, share);
-            diffuse = rested(diffuse, diffuse_at_rest(rest, parts), share.x);
-            specular = rested(specular, specular_at_rest(rest, parts), share.y);
+            diffuse = rested(diffuse, diffuse_at_rest(rest, parts), rest.samples, share.x);
+            specular = rested(specular, specular_at_rest(rest, parts), rest.samples, share.y);
         }
     }
     diffuse.narrowed = 0.0;

@@ -317,6 +317,20 @@ fn gpu_stress_catches_a_hot_pixel_that_spreads() {
     assert!(right.unsound == 0 && right.total > 0.0 && wrong.unsound > 0, "{right:?} {wrong:?}");
 }
 
+/// Section 8: pixels that know their radiance stay what they are beside a glint, if that is not of a single sample.
+#[test]
+fn gpu_stress_catches_a_glint_that_lights_quiet_pixels() {
+    for filter in [FilterKind::Box, FilterKind::Separable, FilterKind::Atrous] {
+        let moved = |hits: u32| {
+            let mut quiet = Quiet;
+            hot_pixel::beside_glint(&setup(), TracerKind::Compute, filter, hits, &mut Watch::new(&mut quiet)).unwrap()
+        };
+        let check = hot_pixel::check_beside_glint("glint", moved(hot_pixel::GLINT_HITS));
+        assert_eq!(check.verdict, Verdict::Holds, "{filter} {check:?}");
+        fails(&hot_pixel::check_beside_glint("glint", moved(1)));
+    }
+}
+
 /// Section 8: filters keep the mean of what few samples meet, in one step or several, and a sheet that is smaller than it is said to be does not.
 #[test]
 fn gpu_stress_catches_a_filter_that_loses_rare_occlusion() {

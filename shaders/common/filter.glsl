@@ -77,9 +77,11 @@ void finish_box(FilterParams p, FrameParams f, uvec2 estimates, uint at, ESTIMAT
     VALUE spread = max(e.squares / e.n - mean * mean, VALUE(0.0));
     // about their own pixels' means, so that each pixel has one less to tell
     VALUE variance = (e.variances + prior_variance(mean, spread, e.n / max(e.count, 1.0)) * PRIOR_SAMPLES) / (max(e.n - e.count, 0.0) + PRIOR_SAMPLES);
-    float keep = 0.0, noisier = 1.0;
+    float keep = 0.0;
+    VALUE kept = VALUE(0.0);
     if (own.samples > 0.0) {
-        float own_noise = total(noise_variance(own, variance)) * mean_variance(p, own.samples) / own.samples;
+        VALUE own_variance = noise_variance(own, variance);
+        float own_noise = total(own_variance) * mean_variance(p, own.samples) / own.samples;
         // of the pixel about the box: detail, which is what noise does not explain of the spread, and its own noise
         float box_noise = total(variance) * mean_variance(p, e.n / e.count) * e.count / e.n;
         float unlike = total(spread) * e.count / max(e.count - 1.0, 1.0) - box_noise + own_noise;
@@ -89,9 +91,9 @@ void finish_box(FilterParams p, FrameParams f, uvec2 estimates, uint at, ESTIMAT
         keep = unlike > 0.0 ? clamp(1.0 - max(e.count - careful, 0.0) / e.count * own_noise / unlike, 0.0, 1.0) : 0.0;
         // The next step weighs the result by all samples of the box, whatever it kept: what it keeps follows values, and weights that do are biased. That it is
         // noisier than their mean, to which its own samples belong, its variance says.
-        noisier += keep * keep * max(e.n / own.samples - 1.0, 0.0);
+        kept = keep * keep * (own_variance * max(e.n / own.samples, 1.0) - variance);
     }
-    finish(p, f, at, estimate_of(own, mix(mean, own.mean, keep), e.n, variance * noisier), mix(e.bent / e.n, own_bent, keep));
+    finish(p, f, at, estimate_of(own, mix(mean, own.mean, keep), e.n, variance + kept), mix(e.bent / e.n, own_bent, keep));
 }
 
 // Each thread filters FILTER_STRIP pixels of a row, whose boxes overlap: a tap is loaded once for all of them. On a CPU driver loads are most of the time. Threads that run together filter tiles

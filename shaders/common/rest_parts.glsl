@@ -52,15 +52,15 @@ RestParts add_parts(RestParts past, Rest before, Rest after, RestParts now, floa
     return p;
 }
 
-// What is filtered, of the samples at rest.
+// What is filtered, of the samples at rest: of those that met a surface, which at a silhouette may be few.
 RadianceEstimate diffuse_at_rest(Rest rest, RestParts p) {
     if (all(lessThanEqual(p.albedo, vec3(1e-6)))) return NO_RADIANCE;
-    return RadianceEstimate(ratio(p.diffuse, p.albedo), rest.samples, vec3(max(p.diffuse_variance, 0.0) / 3.0), 0.0);
+    return RadianceEstimate(ratio(p.diffuse, p.albedo), rest.samples * rest.coverage, vec3(max(p.diffuse_variance, 0.0) / 3.0), 0.0);
 }
 
 RadianceEstimate specular_at_rest(Rest rest, RestParts p) {
     if (rest.coverage <= 1e-6) return NO_RADIANCE;
-    return RadianceEstimate(p.specular / rest.coverage, rest.samples, vec3(max(p.specular_variance, 0.0) / 3.0), 0.0);
+    return RadianceEstimate(p.specular / rest.coverage, rest.samples * rest.coverage, vec3(max(p.specular_variance, 0.0) / 3.0), 0.0);
 }
 
 #endif

@@ -34,6 +34,15 @@ pub struct FrameLog {
     frames: Vec<TimedFrame>,
 }
 
+/// What a frame takes that is like others, noise of the clock aside.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TypicalFrame {
+    /// By the clock, milliseconds.
+    pub ms: f64,
+    /// Paths of a pixel, if its passes did nothing but trace: its own, in the time of all of its passes.
+    pub paths: f64,
+}
+
 struct TimedFrame {
     wall: f64,
     stats: FrameStats,
@@ -85,35 +94,57 @@ impl FrameLog {
 
     /// What a frame costs, of those from `first` on: the first ones compile and find their memory.
     pub fn cost(&self, first: usize) -> FrameCost {
-        let frames = &self.frames[first.min(self.frames.len())..];
-        let ms = |values: &mut dyn Iterator<Item = f64>| {
-            Percentiles::of(&values.map(|s| s * 1e3).collect::<Vec<_>>()).unwrap_or_default()
-        };
-        let mean =
-            |of: fn(&FrameStats) -> u64| frames.iter().map(|l| of(&l.stats)).sum::<u64>() as f64 / frames.len().max(1) as f64;
-        // steps and launches of a pass belong together: "PASS STEP"
-        let mut passes: Vec<&str> = Vec::new();
-        for label in frames.iter().flat_map(|l| &l.stats.timings).map(|t| pass(t.label)) {
-            if !passes.contains(&label) {
-                passes.push(label);
+        cost_of(&self.frames[first.min(self.frames.len())..].iter().collect::<Vec<_>>())
+    }
+
+    /// What each frame takes, by the median of those that have as many samples; of those from `first` on, where there are any.
+    pub fn typical(&self, first: usize) -> Vec<TypicalFrame> {
+        let mut kinds: Vec<(u32, TypicalFrame)> = Vec::new();
+        let of_frame = |frame: &TimedFrame| {
+            let samples = frame.stats.samples;
+            if let Some((_, typical)) = kinds.iter().find(|k| k.0 == samples) {
+                return *typical;
             }
-        }
-        let of_pass = |name: &str| {
-            let of_frame = |l: &TimedFrame| {
-                let here = l.stats.timings.iter().filter(|t| pass(t.label) == name).map(|t| t.seconds);
-                // a frame that has no need of it says nothing about it
-                here.reduce(|a, b| a + b)
-            };
-            PassTime { pass: name.to_owned(), ms: ms(&mut frames.iter().filter_map(of_frame)) }
+            let alike = |from: usize| self.frames.iter().skip(from).filter(|f| f.stats.samples == samples).collect::<Vec<_>>();
+            let late = alike(first);
+            let cost = cost_of(&if late.is_empty() { alike(0) } else { late });
+            let paths = f64::from(samples) / cost.sampling_share().unwrap_or(1.0);
+            let typical = TypicalFrame { ms: cost.wall_ms.median, paths };
+            kinds.push((samples, typical));
+            typical
         };
-        FrameCost {
-            passes: passes.iter().map(|name| of_pass(name)).collect(),
-            device_ms: ms(&mut frames.iter().map(|l| l.stats.timings.iter().map(|t| t.seconds).sum())),
-            wall_ms: ms(&mut frames.iter().map(|l| l.wall)),
-            camera_rays: mean(|s| s.primary_rays),
-            rays: mean(|s| s.occlusion_rays),
-            skipped_rays: mean(|s| s.skipped_rays),
+        self.frames.iter().map(of_frame).collect()
+    }
+}
+
+fn cost_of(frames: &[&TimedFrame]) -> FrameCost {
+    let ms = |values: &mut dyn Iterator<Item = f64>| {
+        Percentiles::of(&values.map(|s| s * 1e3).collect::<Vec<_>>()).unwrap_or_default()
+    };
+    let mean =
+        |of: fn(&FrameStats) -> u64| frames.iter().map(|l| of(&l.stats)).sum::<u64>() as f64 / frames.len().max(1) as f64;
+    // steps and launches of a pass belong together: "PASS STEP"
+    let mut passes: Vec<&str> = Vec::new();
+    for label in frames.iter().flat_map(|l| &l.stats.timings).map(|t| pass(t.label)) {
+        if !passes.contains(&label) {
+            passes.push(label);
         }
+    }
+    let of_pass = |name: &str| {
+        let of_frame = |l: &TimedFrame| {
+            let here = l.stats.timings.iter().filter(|t| pass(t.label) == name).map(|t| t.seconds);
+            // a frame that has no need of it says nothing about it
+            here.reduce(|a, b| a + b)
+        };
+        PassTime { pass: name.to_owned(), ms: ms(&mut frames.iter().copied().filter_map(of_frame)) }
+    };
+    FrameCost {
+        passes: passes.iter().map(|name| of_pass(name)).collect(),
+        device_ms: ms(&mut frames.iter().map(|l| l.stats.timings.iter().map(|t| t.seconds).sum())),
+        wall_ms: ms(&mut frames.iter().map(|l| l.wall)),
+        camera_rays: mean(|s| s.primary_rays),
+        rays: mean(|s| s.occlusion_rays),
+        skipped_rays: mean(|s| s.skipped_rays),
     }
 }
 

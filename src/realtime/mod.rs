@@ -51,6 +51,8 @@ const NORMAL_TOLERANCE: f32 = 0.9;
 pub struct FrameStats {
     /// Device seconds of each step of each pass, in order.
     pub timings: Vec<Timing>,
+    /// Samples of each pixel that is sampled in the frame.
+    pub samples: u32,
     /// Camera rays traced.
     pub primary_rays: u64,
     /// Occlusion rays traced.
@@ -448,6 +450,7 @@ impl Realtime {
         self.shown = Some(self.display);
         Ok(FrameStats {
             timings,
+            samples,
             primary_rays: match self.settings.primary {
                 Some(Primary::Raster) if !is_long => 0,
                 // for the G-buffer, and of each sample

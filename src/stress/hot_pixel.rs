@@ -23,6 +23,12 @@ use crate::tracer::{Tracer, TracerKind};
 pub const HOT: [f32; 3] = [1e3, 1e10, 4e29];
 /// Radiance of the other pixels of a still.
 pub const COLD: f32 = 0.25;
+/// Variance of a sample of the other pixels, where they have noise.
+const NOISE: f32 = 0.01;
+/// Samples of a pixel beside a glint ([`beside_glint`]).
+pub const GLINT_SAMPLES: u32 = 1024;
+/// Those that are bright.
+pub const GLINT_HITS: u32 = 16;
 /// Frames in which the camera moves before it rests.
 const MOVES: u32 = 6;
 /// Albedo of the floors.
@@ -75,18 +81,23 @@ fn reach(filter: &Filter) -> u32 {
 /// A film of [`COLD`] with one hot pixel in its middle. With noise, a variance is that of a pixel of which one sample is all there is, as films have it: that of the
 /// hottest overflows.
 pub fn film(size: u32, hot: f32, noisy: bool) -> Film {
-    let spp = 16u32;
+    film_of(size, 16, 1, hot, noisy)
+}
+
+// `hits`: samples of the hot pixel that have all of its radiance
+fn film_of(size: u32, spp: u32, hits: u32, hot: f32, noisy: bool) -> Film {
     let mut film = Film::new(size, size, 3);
     film.mean.fill(COLD);
     film.samples.fill(spp);
     film.coverage.fill(1.0);
     if noisy {
-        film.variance.fill(0.01);
+        film.variance.fill(NOISE);
     }
     let middle = (size * size / 2) as usize;
     for c in 0..3 {
         film.mean[3 * middle + c] = hot;
-        film.variance[3 * middle + c] = if noisy { (f64::from(hot).powi(2) * f64::from(spp)) as f32 } else { 0.0 };
+        film.variance[3 * middle + c] =
+            if noisy { (f64::from(hot).powi(2) * f64::from(spp) / f64::from(hits)) as f32 } else { 0.0 };
     }
     film
 }
@@ -96,7 +107,36 @@ pub fn film(size: u32, hot: f32, noisy: bool) -> Film {
 /// # Errors
 /// Those of rendering and filtering.
 pub fn still(setup: &Setup, kind: TracerKind, filter: FilterKind, hot: f32, noisy: bool, watch: &mut Watch) -> Result<Spread> {
-    const SIZE: u32 = 33;
+    let image = filtered(setup, kind, filter, &film(SIZE, hot, noisy), watch)?;
+    let settings = denoise::Settings { kind: filter, ..Default::default() };
+    // non-local means follow
+    let reach = reach(&Filter { kind: filter, radius: settings.radius, samples: f32::MAX }).max(NLMEANS_RADIUS);
+    let is_far = |k: usize| [k as u32 % SIZE, k as u32 / SIZE].into_iter().any(|x| x.abs_diff(SIZE / 2) > reach);
+    Ok(Spread::of(&image, COLD, hot, is_far))
+}
+
+/// How far a still's filter moves pixels of [`GLINT_SAMPLES`], which know their radiance well, towards a glint a thousand times as bright, which `hits` of its samples have: the farthest, in
+/// standard errors of its own. An image at rest in front of the sun has such pixels. (If one sample had it, any of the others might be as bright as often.)
+///
+/// # Errors
+/// Those of rendering and filtering.
+pub fn beside_glint(setup: &Setup, kind: TracerKind, filter: FilterKind, hits: u32, watch: &mut Watch) -> Result<f64> {
+    let spp = GLINT_SAMPLES;
+    let image = filtered(setup, kind, filter, &film_of(SIZE, spp, hits, 1e3 * COLD, true), watch)?;
+    let middle = 3 * (SIZE * SIZE / 2) as usize;
+    let others = image.iter().enumerate().filter(|(k, _)| !(middle..middle + 3).contains(k));
+    let worst = others.fold(0.0f64, |worst, (_, v)| {
+        let off = f64::from((v - COLD).abs());
+        if off.is_nan() { f64::NAN } else { worst.max(off) }
+    });
+    Ok(worst / f64::from(NOISE / spp as f32).sqrt())
+}
+
+/// Side of a still's film, pixels.
+const SIZE: u32 = 33;
+
+/// A film after a still's filter; its camera looks down at a floor.
+fn filtered(setup: &Setup, kind: TracerKind, filter: FilterKind, film: &Film, watch: &mut Watch) -> Result<Vec<f32>> {
     let camera = Camera::look_at(DVec3::new(0.0, 10.0, 0.0), DVec3::ZERO, DVec3::Z, 0.6);
     let scene = scene_of(vec![(shapes::floor(DVec3::ZERO, 100.0), matte(ALBEDO))], camera);
     let flat = FlatScene::for_paths(&scene);
@@ -106,12 +146,13 @@ pub fn still(setup: &Setup, kind: TracerKind, filter: FilterKind, hot: f32, nois
     let shot = DenoiseInput { tracer: &tracer, scene: &scene, camera: &record, options: &options };
     let features = Features::render(&shot, watch)?;
     let settings = denoise::Settings { kind: filter, ..Default::default() };
-    let film = film(SIZE, hot, noisy);
-    let image = Denoiser::Filter(settings).denoise(&shot, &film, &features, watch)?;
-    // non-local means follow
-    let reach = reach(&Filter { kind: filter, radius: settings.radius, samples: f32::MAX }).max(NLMEANS_RADIUS);
-    let is_far = |k: usize| [k as u32 % SIZE, k as u32 / SIZE].into_iter().any(|x| x.abs_diff(SIZE / 2) > reach);
-    Ok(Spread::of(&image, COLD, hot, is_far))
+    Denoiser::Filter(settings).denoise(&shot, film, &features, watch)
+}
+
+/// The check of [`beside_glint`].
+pub fn check_beside_glint(name: &str, moved: f64) -> Check {
+    Check::at_most(name, moved, "standard errors", 1.0)
+        .says(format!("pixels of {GLINT_SAMPLES} samples beside one that has its radiance from {GLINT_HITS}"))
 }
 
 /// A dark floor of which a spotlight lights a circle, less than a pixel of [`frames`] large, to the radiance `hot`.
@@ -228,6 +269,10 @@ pub(super) fn run(session: &mut Session) -> Result<()> {
                 session.measure_each(&name, &kinds, |s, kind, w| Ok(still(s, kind, filter, hot, noisy, w)?.check(&name)))?;
             }
         }
+        let name = format!("{filter} filter of a still, quiet pixels beside a glint");
+        session.measure_each(&name, &kinds, |s, kind, w| {
+            Ok(check_beside_glint(&name, beside_glint(s, kind, filter, GLINT_HITS, w)?))
+        })?;
     }
     let count = effort.pick(24, 240);
     for (what, settings) in super::display::filters() {

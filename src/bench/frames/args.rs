@@ -73,6 +73,12 @@ pub struct BenchFramesArgs {
     /// Frames of a run [default: 96; 16 with --quick]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(4..=10_000))]
     pub frames: Option<u32>,
+    /// Seed of the samples of frames; where nothing moves plain accumulation has the same
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub seed: u32,
+    /// Runs of a still camera, with seeds one after another, whose errors are averaged
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=64))]
+    pub runs: u32,
     /// Paths per pixel of the reference of a still camera; a quarter for those of frames in motion [default: 1024; 128 with --quick]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(8..=1 << 20))]
     pub reference_paths: Option<u32>,

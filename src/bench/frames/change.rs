@@ -6,11 +6,10 @@ use super::FramesSession;
 use super::displayed::{Displayed, FrameReference};
 use super::scenes::FramesScene;
 use super::signal::{EqualTime, PlainClock};
-use super::stage::{PLAIN_SEED, Stage, is_plain_timed, turned};
+use super::stage::{Stage, is_plain_timed, turned};
 use crate::bench::frame_log::FrameLog;
 use crate::bench::lag::add_ghost;
 use crate::bench::masks;
-use crate::bench::record::cost::FrameCost;
 use crate::bench::record::frames::{ChangedFrames, FramesChange, PlainPoint};
 use crate::error::Result;
 use crate::film::camera::CameraRecord;
@@ -96,10 +95,9 @@ fn turn(session: &mut FramesSession, name: &str, stage: &mut Stage, map: &Enviro
         let all = share(&old, &mut Ghosting::default());
         let mut ghosting = Ghosting::default();
         let lag = LagCurve::new(run.images.iter().map(|image| share(image, &mut ghosting) / all).collect());
-        let time = stage.equal_time(preset, &run.cost, &run.clock)?;
         Ok(ChangedFrames {
             preset: preset.to_string(),
-            plain: plain(stage, &camera, &time, frames, (&reference, None))?,
+            plain: plain(stage, &camera, &run.time, frames, (&reference, None))?,
             rmse: run.rmse,
             half_life: Some(lag.fitted_half_life()),
             gone: lag.gone(),
@@ -144,10 +142,9 @@ fn sidestep(session: &mut FramesSession, loaded: &FramesScene, stage: &mut Stage
         }
         let run = run(&mut realtime, stage, &camera, frames, (&reference, Some(&mask)))?;
         let settled = run.rmse.last().copied().unwrap_or(f64::NAN);
-        let time = stage.equal_time(preset, &run.cost, &run.clock)?;
         Ok(ChangedFrames {
             preset: preset.to_string(),
-            plain: plain(stage, &camera, &time, frames, (&reference, Some(&mask)))?,
+            plain: plain(stage, &camera, &run.time, frames, (&reference, Some(&mask)))?,
             recovery: recovery(&run.rmse, settled, RECOVERED),
             rmse: run.rmse,
             ..ChangedFrames::default()
@@ -165,8 +162,7 @@ fn frames_after(session: &FramesSession) -> u32 {
 struct Run {
     rmse: Vec<f64>,
     images: Vec<Displayed>,
-    cost: FrameCost,
-    clock: PlainClock,
+    time: EqualTime,
 }
 
 fn run(
@@ -187,7 +183,7 @@ fn run(
         rmse.push(reference.rmse_over(&image, mask)?);
         images.push(image);
     }
-    Ok(Run { rmse, images, cost: log.cost(0), clock })
+    Ok(Run { rmse, images, time: EqualTime::new(clock.time(), log.typical(0)) })
 }
 
 /// Errors of plain accumulation that starts with the change, after 1, 2, 4, ... frames.
@@ -200,7 +196,7 @@ fn plain(
 ) -> Result<Vec<PlainPoint>> {
     let mut points = Vec::new();
     for frame in (0..).map(|k| 1 << k).take_while(|f| *f <= frames) {
-        let image = stage.plain(camera, time.paths(frame), PLAIN_SEED)?;
+        let image = stage.plain(camera, time.paths(frame), stage.seed)?;
         points.push(PlainPoint { frame, rmse: reference.rmse_over(&Displayed::new(&image, stage.channels()), mask)? });
     }
     Ok(points)

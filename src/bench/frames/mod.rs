@@ -40,6 +40,8 @@ pub fn run(args: &BenchFramesArgs) -> Result<(), Failure> {
         integrator: args.integrator.name().to_owned(),
         size: args.size(),
         frames: args.frames(),
+        seed: args.seed,
+        runs: args.runs,
         reference_paths: args.reference_paths(),
         ..Default::default()
     })?;

@@ -2,7 +2,7 @@
 
 use super::FramesSession;
 use super::displayed::FrameReference;
-use super::signal::PlainClock;
+use super::signal::{EqualTime, PlainClock};
 use super::stage::{Motion, PLAIN_SEED, Stage, is_plain_timed};
 use crate::bench::frame_log::{FrameLog, first_timed, measured};
 use crate::bench::record::frames::{DenoisedImage, FrameErrors, MotionRecord, MovingFrames, PlainImage};
@@ -69,7 +69,7 @@ fn one(
         }
     }
     let cost = log.cost(first_timed(frames));
-    let time = stage.equal_time(preset, &cost, &clock)?;
+    let time = EqualTime::new(clock.time(), log.typical(first_timed(frames)));
     let (mut plain, mut denoised) = (Vec::new(), Vec::new());
     for (frame, reference) in references {
         let camera = stage.go(motion, *frame)?.camera;

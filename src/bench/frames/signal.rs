@@ -6,7 +6,7 @@ use glam::DMat3;
 
 use super::args::BenchFramesArgs;
 use crate::accel::flatten::FlatScene;
-use crate::bench::record::cost::FrameCost;
+use crate::bench::frame_log::TypicalFrame;
 use crate::error::Result;
 use crate::film::camera::CameraRecord;
 use crate::integrators::path::{PathIntegrator, PathOptions};
@@ -94,6 +94,7 @@ impl Signal {
     ) -> Result<Realtime> {
         let settings = self.of(preset);
         let options = frame_path_options(&settings, flat.scene, camera, self.size, &how)?;
+        let options = options.map(|options| PathOptions { seed: how.seed, ..options });
         pipeline(tracer, flat, self.size, &how, options.as_ref())
     }
 
@@ -246,21 +247,17 @@ impl PlainTime {
 }
 
 /// The time of a preset's frames, in paths of plain accumulation.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct EqualTime {
-    /// Median time of a frame.
-    pub ms: f64,
     plain: PlainTime,
-    /// Paths per pixel of a frame whose passes do nothing but trace: the preset's own, in the time of all of its passes.
-    paths_per_frame: f64,
+    /// In their order. At rest those after the first few are long.
+    frames: Vec<TypicalFrame>,
 }
 
 impl EqualTime {
-    /// Of frames of `rays_per_pixel` paths each that cost this.
-    pub fn new(plain: PlainTime, cost: &FrameCost, rays_per_pixel: u32) -> Self {
-        let paths_per_frame = f64::from(rays_per_pixel) / cost.sampling_share().unwrap_or(1.0);
-        // plain accumulation is timed by the clock, too
-        Self { ms: cost.wall_ms.median, plain, paths_per_frame }
+    /// Of these frames, at least one.
+    pub fn new(plain: PlainTime, frames: Vec<TypicalFrame>) -> Self {
+        Self { plain, frames }
     }
 
     /// Time of plain accumulation.
@@ -268,37 +265,40 @@ impl EqualTime {
         self.plain
     }
 
-    /// As many paths as fit into the time of so many frames, in an image as stills have it or in these frames, whichever are more: images cost more than their paths,
+    /// As many paths as fit into the time of the first frames, in an image as stills have it or in these frames, whichever are more: images cost more than their paths,
     /// and many paths at once cost less.
     pub fn paths(&self, frames: u32) -> u32 {
-        let frames = f64::from(frames);
-        self.plain.paths_in(self.ms * frames).max((frames * self.paths_per_frame) as u32)
+        let first = &self.frames[..self.frames.len().min(frames as usize)];
+        // plain accumulation is timed by the clock, too
+        let ms = first.iter().map(|f| f.ms).sum();
+        self.plain.paths_in(ms).max(first.iter().map(|f| f.paths).sum::<f64>() as u32)
     }
 
-    /// As many as fit into one frame beside what takes so many milliseconds.
+    /// As many as fit into the last frame beside what takes so many milliseconds.
     pub fn paths_beside(&self, ms: f64) -> u32 {
-        self.plain.paths_in(self.ms - ms).max((self.paths_per_frame * (1.0 - ms / self.ms)) as u32)
+        let Some(last) = self.frames.last() else { return 1 };
+        self.plain.paths_in(last.ms - ms).max((last.paths * (1.0 - ms / last.ms)) as u32)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::bench::record::cost::PassTime;
-    use crate::measure::stats::Percentiles;
 
     #[test]
     fn paths_that_fit_a_time() {
         let time = PlainTime::through([1, 9], [5.0, 21.0]);
         assert_eq!(time, PlainTime { per_image: 3.0, per_path: 2.0 });
         assert_eq!([1.0, 5.0, 10.9, 23.0].map(|ms| time.paths_in(ms)), [1, 1, 3, 10]);
-        let of = |ms: f64| Percentiles::of(&[ms]).unwrap();
-        let passes = [("path_bounce", 4.0), ("filter", 4.0)].map(|(pass, ms)| PassTime { pass: pass.into(), ms: of(ms) });
-        let cost = FrameCost { passes: passes.into(), wall_ms: of(10.0), ..FrameCost::default() };
-        let equal = EqualTime::new(time, &cost, 4);
-        // (10 - 3) / 2 of images; 4 * 8 / 4 of frames
+        let frame = TypicalFrame { ms: 10.0, paths: 8.0 };
+        let equal = EqualTime::new(time, vec![frame; 10]);
+        // (10 - 3) / 2 of images; 8 of frames
         assert_eq!([equal.paths(1), equal.paths_beside(5.0), equal.paths_beside(50.0)], [8, 4, 1]);
-        assert_eq!(EqualTime::new(time, &cost, 1).paths(10), 48);
+        assert_eq!(EqualTime::new(time, vec![TypicalFrame { paths: 2.0, ..frame }; 10]).paths(10), 48);
+        // short frames, then long ones
+        let short = TypicalFrame { ms: 5.0, paths: 0.5 };
+        let rest = EqualTime::new(time, vec![short, short, frame, frame]);
+        assert_eq!([1, 2, 3, 4, 5].map(|n| rest.paths(n)), [1, 3, 9, 17, 17]);
         // noise alone
         let odd = PlainTime::through([1, 9], [5.0, 4.0]);
         assert!(odd.per_path > 0.0 && odd.per_image >= 0.0);

@@ -10,7 +10,6 @@ use super::displayed::FrameReference;
 use super::scenes::FramesScene;
 use super::signal::{EqualTime, PlainClock, PlainTime, Sampler, Signal};
 use crate::accel::flatten::FlatScene;
-use crate::bench::record::cost::FrameCost;
 use crate::bench::record::frames::{DenoisedImage, PlainImage};
 use crate::denoise::{DenoiseInput, Features, Oidn};
 use crate::error::Result;
@@ -93,6 +92,8 @@ pub struct Stage<'a> {
     pub camera: &'a Camera,
     /// Pixels.
     pub size: [u32; 2],
+    /// Seed of the samples of frames.
+    pub seed: u32,
     /// Time of plain accumulation, before anything else is measured.
     pub plain_time: PlainTime,
     signal: Signal,
@@ -129,7 +130,7 @@ impl<'a> Stage<'a> {
         }
         let plain_time = clock.time();
         let oidn = oidn.filter(|_| signal.channels() == 3);
-        let mut stage = Self { tracer, flat, camera, size, plain_time, signal, sampler, oidn };
+        let mut stage = Self { tracer, flat, camera, size, seed: args.seed, plain_time, signal, sampler, oidn };
         // before the first update there are no vertices of before
         stage.rest()?;
         Ok(stage)
@@ -212,7 +213,15 @@ impl<'a> Stage<'a> {
     /// # Errors
     /// Those of the device.
     pub fn realtime(&self, preset: Preset) -> Result<Realtime> {
-        let how = self.signal.frame_settings(preset)?;
+        self.realtime_with_seed(preset, self.seed)
+    }
+
+    /// The same with other samples.
+    ///
+    /// # Errors
+    /// Those of the device.
+    pub fn realtime_with_seed(&self, preset: Preset, seed: u32) -> Result<Realtime> {
+        let how = Settings { seed, ..self.signal.frame_settings(preset)? };
         self.signal.realtime(&self.tracer, self.flat, self.camera, preset, how)
     }
 
@@ -221,7 +230,7 @@ impl<'a> Stage<'a> {
     /// # Errors
     /// Those of the device.
     pub fn realtime_as_in_motion(&self, preset: Preset) -> Result<Realtime> {
-        let how = Settings { converge: false, ..self.signal.frame_settings(preset)? };
+        let how = Settings { seed: self.seed, converge: false, ..self.signal.frame_settings(preset)? };
         self.signal.realtime(&self.tracer, self.flat, self.camera, preset, how)
     }
 
@@ -257,14 +266,6 @@ impl<'a> Stage<'a> {
     /// Those of the device; Ctrl-C.
     pub fn time_plain(&mut self, camera: &CameraRecord, clock: &mut PlainClock) -> Result<()> {
         self.sampler.time(&self.tracer, camera, clock)
-    }
-
-    /// The time of a preset's frames, in paths of plain accumulation.
-    ///
-    /// # Errors
-    /// Those of settings.
-    pub fn equal_time(&self, preset: Preset, cost: &FrameCost, clock: &PlainClock) -> Result<EqualTime> {
-        Ok(EqualTime::new(clock.time(), cost, self.rays_per_pixel(preset)?))
     }
 
     /// Plain accumulation of so many paths, and its errors.

@@ -2,22 +2,68 @@
 
 use super::FramesSession;
 use super::displayed::{Displayed, FlickerMeter, FrameReference};
-use super::signal::PlainClock;
-use super::stage::{PLAIN_SEED, Stage, is_plain_timed};
+use super::signal::{EqualTime, PlainClock};
+use super::stage::{Stage, is_plain_timed};
 use crate::bench::frame_log::{FrameLog, first_timed};
-use crate::bench::record::frames::{FramePoint, StillFrames};
+use crate::bench::record::frames::{FrameErrors, FramePoint, PlainImage, StillFrames};
 use crate::error::Result;
 use crate::realtime::Preset;
 
-/// Measures a preset.
+/// Measures a preset: errors are means over runs that differ in their samples alone. Time and flicker are those of the first.
 ///
 /// # Errors
 /// Those of the device; Ctrl-C.
 pub fn measure(session: &FramesSession, stage: &mut Stage, preset: Preset, reference: &FrameReference) -> Result<StillFrames> {
     let frames = session.args.frames();
     let camera = stage.still_camera();
-    let mut realtime = stage.realtime(preset)?;
-    let (mut log, mut flicker, mut curve) = (FrameLog::default(), FlickerMeter::new(frames), Vec::new());
+    let (first_seed, runs) = (session.args.seed, session.args.runs);
+    let seeds = || (0..runs).map(|k| first_seed.wrapping_add(k));
+    let first = run(stage, preset, reference, frames, first_seed)?;
+    let mut errors: Vec<Vec<FrameErrors>> = first.errors.iter().map(|e| vec![*e]).collect();
+    for seed in seeds().skip(1) {
+        for (of_frame, e) in errors.iter_mut().zip(run(stage, preset, reference, frames, seed)?.errors) {
+            of_frame.push(e);
+        }
+    }
+    let time = EqualTime::new(first.clock.time(), first.log.typical(first_timed(frames)));
+    let mut curve = Vec::new();
+    for (frame, of_frame) in points(frames).zip(&errors) {
+        let paths = time.paths(frame);
+        let mut plain = Vec::new();
+        // the same samples, as far as they go
+        for seed in seeds() {
+            plain.push(stage.plain_image(&camera, paths, reference, seed)?.errors);
+        }
+        let mean = |of: &[FrameErrors]| FrameErrors::mean(of).unwrap_or_default();
+        curve.push(FramePoint { frame, errors: mean(of_frame), plain: PlainImage { paths, errors: mean(&plain) } });
+    }
+    Ok(StillFrames {
+        preset: preset.to_string(),
+        rays_per_pixel: stage.rays_per_pixel(preset)?,
+        cost: first.log.cost(first_timed(frames)),
+        curve,
+        flicker: first.flicker.result(),
+        denoised: stage.denoised(&camera, (&time, frames, false), reference, first_seed)?,
+    })
+}
+
+/// Frames after which errors are measured: 1, 2, 4, ... and all.
+fn points(frames: u32) -> impl Iterator<Item = u32> {
+    (1..=frames).filter(move |f| f.is_power_of_two() || *f == frames)
+}
+
+struct Run {
+    log: FrameLog,
+    clock: PlainClock,
+    flicker: FlickerMeter,
+    errors: Vec<FrameErrors>,
+}
+
+/// Frames of a camera that stands still, from the first.
+fn run(stage: &mut Stage, preset: Preset, reference: &FrameReference, frames: u32, seed: u32) -> Result<Run> {
+    let camera = stage.still_camera();
+    let mut realtime = stage.realtime_with_seed(preset, seed)?;
+    let (mut log, mut flicker, mut errors) = (FrameLog::default(), FlickerMeter::new(frames), Vec::new());
     let mut clock = PlainClock::default();
     for frame in 1..=frames {
         log.frame(&mut realtime, &stage.tracer, &camera, &[])?;
@@ -26,21 +72,9 @@ pub fn measure(session: &FramesSession, stage: &mut Stage, preset: Preset, refer
         if is_plain_timed(frame - 1, first_timed(frames), frames) {
             stage.time_plain(&camera, &mut clock)?;
         }
-        if frame.is_power_of_two() || frame == frames {
-            curve.push(FramePoint { frame, errors: reference.errors_of(&image)?, ..FramePoint::default() });
+        if points(frames).any(|f| f == frame) {
+            errors.push(reference.errors_of(&image)?);
         }
     }
-    let cost = log.cost(first_timed(frames));
-    let time = stage.equal_time(preset, &cost, &clock)?;
-    for p in &mut curve {
-        p.plain = stage.plain_image(&camera, time.paths(p.frame), reference, PLAIN_SEED)?;
-    }
-    Ok(StillFrames {
-        preset: preset.to_string(),
-        rays_per_pixel: stage.rays_per_pixel(preset)?,
-        cost,
-        curve,
-        flicker: flicker.result(),
-        denoised: stage.denoised(&camera, (&time, frames, false), reference, PLAIN_SEED)?,
-    })
+    Ok(Run { log, clock, flicker, errors })
 }

@@ -27,6 +27,10 @@ pub struct FramesBenchmark {
     pub size: [u32; 2],
     /// Frames of a run.
     pub frames: u32,
+    /// Seed of the samples of frames.
+    pub seed: u32,
+    /// Runs of a still camera, with seeds one after another, whose errors are averaged.
+    pub runs: u32,
     /// Paths per pixel of the reference of a still camera, both halves together.
     pub reference_paths: u32,
     /// Scenes that are looked at.

@@ -241,6 +241,8 @@ impl Comparable for FramesBenchmark {
             ("integrator", self.integrator.clone()),
             ("size", format!("{}x{}", self.size[0], self.size[1])),
             ("frames", self.frames.to_string()),
+            ("seed", self.seed.to_string()),
+            ("runs", self.runs.to_string()),
             ("reference paths", self.reference_paths.to_string()),
         ];
         Snapshot { kind: BenchKind::Frames, host: self.host.clone(), settings, results }

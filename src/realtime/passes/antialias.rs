@@ -40,6 +40,16 @@ pub fn stage(tracer: &Tracer, pixels: u32, input: Resource, has_rest: bool) -> R
     Ok(Stage::new(vec![Box::new(pass)], Range::all(pixels)))
 }
 
+/// Minimum weight of a frame of radiance at rest. Frames count by the samples that they are means of: long ones soon have many times as many as those before, which lie at one place in all pixels.
+fn least_weight(frame: &Frame) -> f32 {
+    let after = frame.rest_samples as f32;
+    if !frame.is_long || after <= 0.0 {
+        return LEAST_WEIGHT;
+    }
+    let before = (after - frame.samples as f32).max(0.0);
+    (1.0 - (before / after).powi(2)).max(LEAST_WEIGHT)
+}
+
 impl Pass for Antialias {
     fn uses(&self, _: Option<&Display>) -> ResourceUse {
         use Resource::{Denoised, FrameNumber, Guide, PreviousPosition, Resolved, ResolvedHistory, Rest, Surface};
@@ -71,7 +81,7 @@ impl Pass for Antialias {
             clamp_width: CLAMP_WIDTH,
             holds: (!is_composed && frame.is_long).into(),
             reserved: 0,
-            least_weight: if is_composed && self.has_rest { LEAST_WEIGHT } else { 0.0 },
+            least_weight: if is_composed && self.has_rest { least_weight(frame) } else { 0.0 },
         })
     }
 
