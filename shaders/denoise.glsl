@@ -14,7 +14,9 @@ const float PRIOR_SAMPLES = 4.0;
 // a pixel without neighbours on its surface has samples of its own
 const float LONELY = 0.0;
 // Samples from which a pixel's own variance counts more than that of its box: beside a glint's the box says that every pixel is as noisy.
-const float OWN_VARIANCE_SAMPLES = 8.0;
+const float OWN_VARIANCE_SAMPLES = 4.0;
+// Noisy pixels in a box from which its variance counts more than a pixel's own: light that is rare everywhere has not yet reached some pixels, whose own samples then are all alike. Glints are few.
+const float RARE_LIGHT_PIXELS = 8.0;
 
 RadianceEstimate load_estimate(uvec2 estimates, uint at) { return load_radiance(estimates, at); }
 
@@ -32,10 +34,11 @@ vec3 edge_normal(vec3 normal, uvec2 guide) { return guide_normal(guide); }
 
 vec3 prior_variance(vec3 mean, vec3 spread, float samples) { return spread * samples; }
 
-// By the square of their number: a few samples that are all alike say little, and of many, whose glints are a thousand times as bright as they, a hundredth is still too much of the box's.
-vec3 noise_variance(RadianceEstimate own, vec3 variance) {
-    float q = own.samples / OWN_VARIANCE_SAMPLES;
-    return mix(variance, own.variance, q * q / (q * q + 1.0));
+// By the fourth power of their number: a few samples that are all alike say little, and of many, whose glints are ten thousand times as bright as they, a thousandth is still too much of the box's.
+vec3 noise_variance(RadianceEstimate own, vec3 variance, float noisy) {
+    float q = own.samples / OWN_VARIANCE_SAMPLES, r = noisy / RARE_LIGHT_PIXELS;
+    float known = q * q * q * q, rare = r * r * r * r;
+    return mix(variance, own.variance, known / (known + 1.0) / (1.0 + rare));
 }
 
 float total(vec3 value) { return value.r + value.g + value.b; }

@@ -18,7 +18,8 @@
 //   VALUE prior_variance(mean, spread, samples)    the variance to assume while there are few samples: from the mean of a box,
 //                                                  the variance of its pixels and the samples per pixel
 //   int limited(radius, p, own)                    the radius, or a smaller one for this pixel
-//   VALUE noise_variance(own, variance)            the variance of a pixel's samples, from what its estimate says and from that of its box
+//   VALUE noise_variance(own, variance, noisy)     the variance of a pixel's samples, from what its estimate says and from that of its box, which
+//                                                  is that of so many noisy pixels among quiet ones
 //   float total(value)                             a sum over channels
 //   ESTIMATE guess(p, f, image, pixel, own)        the value of a pixel without samples in its box
 //   void finish(p, f, at, estimate, bent)          writes the result; finish_nothing(p, f, at): for a pixel that is not filtered
@@ -32,6 +33,8 @@
 
 const float LONELY_COSINE = 0.5;
 const float LONELY_TOLERANCE = 2.0;
+// How many times less noise than those of its box a pixel has whose noise is another: estimates from a few samples differ by less.
+const float QUIET = 8.0;
 
 // n times the variance of the mean of n samples, by that of one: 1 of random ones, and less where a sequence fills the square evenly
 // and what is sampled is smooth, as it is with a falloff (Sequence::evenness in src/sampling/sequence.rs).
@@ -55,7 +58,7 @@ struct Filtered {
     EdgeTest edge;
     VALUE sum, squares, variances;
     vec3 bent;
-    float n, count;
+    float n, count, squared_variances;
 };
 
 bool is_active(Filtered e) { return e.lower.x <= e.upper.x; }
@@ -63,6 +66,12 @@ bool is_active(Filtered e) { return e.lower.x <= e.upper.x; }
 void stop(inout Filtered e) {
     e.lower = ivec2(1);
     e.upper = ivec2(0);
+}
+
+// From how many pixels of its box the variance comes: as many equally noisy ones among pixels without noise would have variances of the same mean and mean square.
+float noisy_pixels(Filtered e) {
+    float sum = total(e.variances);
+    return e.squared_variances > 0.0 ? e.count / e.n * sum * (sum / e.squared_variances) : 0.0;
 }
 
 // The result of a pixel from what its box adds up to.
@@ -80,7 +89,7 @@ void finish_box(FilterParams p, FrameParams f, uvec2 estimates, uint at, ESTIMAT
     float keep = 0.0;
     VALUE kept = VALUE(0.0);
     if (own.samples > 0.0) {
-        VALUE own_variance = noise_variance(own, variance);
+        VALUE own_variance = noise_variance(own, variance, noisy_pixels(e));
         float own_noise = total(own_variance) * mean_variance(p, own.samples) / own.samples;
         // of the pixel about the box: detail, which is what noise does not explain of the spread, and its own noise
         float box_noise = total(variance) * mean_variance(p, e.n / e.count) * e.count / e.n;
@@ -88,7 +97,10 @@ void finish_box(FilterParams p, FrameParams f, uvec2 estimates, uint at, ESTIMAT
         // with 3 of `count` pixels taken off, the sum of squared errors of what is kept is never above that of the pixels as they are;
         // so it is for histories that are as long as they get. For short ones it is too careful, and 1 does better.
         float careful = 1.0 + 2.0 * min(own.samples / f.most_samples, 1.0);
-        keep = unlike > 0.0 ? clamp(1.0 - max(e.count - careful, 0.0) / e.count * own_noise / unlike, 0.0, 1.0) : 0.0;
+        float noise = max(e.count - careful, 0.0) / e.count * own_noise;
+        // A few glints may explain all of the spread by their noise. A much quieter pixel is unlike their mean by at least that mean's own noise.
+        unlike = max(unlike, noise + max(box_noise - QUIET * own_noise, 0.0) / e.count);
+        keep = unlike > 0.0 ? clamp(1.0 - noise / unlike, 0.0, 1.0) : 0.0;
         // The next step weighs the result by all samples of the box, whatever it kept: what it keeps follows values, and weights that do are biased. That it is
         // noisier than their mean, to which its own samples belong, its variance says.
         kept = keep * keep * (own_variance * max(e.n / own.samples, 1.0) - variance);
@@ -141,7 +153,7 @@ void main() {
             lower = min(lower, ivec2(stride * strip[k].lower.x + k, strip[k].lower.y));
             upper = max(upper, ivec2(stride * strip[k].upper.x + k, strip[k].upper.y));
             strip[k].sum = strip[k].squares = strip[k].variances = VALUE(0.0);
-            strip[k].n = strip[k].count = 0.0;
+            strip[k].n = strip[k].count = strip[k].squared_variances = 0.0;
             strip[k].bent = vec3(0.0);
         }
         for (int y = lower.y; y <= upper.y; y++) {
@@ -152,7 +164,7 @@ void main() {
                 ESTIMATE e = load_estimate(estimates, tap);
                 vec3 normal = guide_normal(guide), bent = BENT_NORMALS ? load_bent(p, tap) * e.samples : vec3(0.0);
                 VALUE sum = e.mean * e.samples, squares = e.mean * e.mean * e.samples, variances = e.variance * e.samples;
-                float count = e.samples > 0.0 ? 1.0 : 0.0;
+                float count = e.samples > 0.0 ? 1.0 : 0.0, squared_variances = total(e.variance) * total(variances);
                 [[unroll]] for (int k = 0; k < FILTER_STRIP; k++) {
                     int dx = x - k;
                     bool is_inside = dx >= stride * strip[k].lower.x && dx <= stride * strip[k].upper.x && (dx & stride - 1) == 0 && y >= strip[k].lower.y && y <= strip[k].upper.y;
@@ -163,6 +175,7 @@ void main() {
                     if (BENT_NORMALS) strip[k].bent += bent;
                     strip[k].n += e.samples;
                     strip[k].count += count;
+                    strip[k].squared_variances += squared_variances;
                 }
             }
         }

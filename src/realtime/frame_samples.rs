@@ -18,6 +18,8 @@ pub struct FrameSamples {
     first_long: u32,
     /// Number of short frames in which each pixel is sampled once.
     period: u32,
+    /// Samples at rest start anew with the first long frame: those of the short ones lie at the frame's place in all pixels, and may all be bright there.
+    forgets_short: bool,
 }
 
 impl FrameSamples {
@@ -29,7 +31,9 @@ impl FrameSamples {
         let few = settings.rays_per_pixel;
         let most = (MAX_PATHS / pixels.max(1)).min(MAX_PER_PIXEL) as u32;
         let many = if settings.converges() { few.max(power_of_two(most)) } else { few };
-        Self { few, many, first_long: FIRST_LONG, period: 1 }
+        // several paths of a short frame lie anywhere in their pixels
+        let forgets_short = few == 1 && many >= FIRST_LONG;
+        Self { few, many, first_long: FIRST_LONG, period: 1, forgets_short }
     }
 
     /// Those of ambient visibility. Long frames take them as stills do, which is faster from eight samples of a pixel on.
@@ -43,7 +47,7 @@ impl FrameSamples {
         let most = (MANY_SAMPLES / pixels).clamp(8, MAX_PER_PIXEL).min(MAX_SAMPLES / pixels) as u32;
         let has_long = settings.converges() && !settings.bent && most >= few.max(4);
         let (many, first_long) = if has_long { (power_of_two(most), FIRST_LONG) } else { (few, u32::MAX) };
-        Self { few, many, first_long, period }
+        Self { few, many, first_long, period, forgets_short: false }
     }
 
     /// Returns true if there are long frames.
@@ -61,9 +65,22 @@ impl FrameSamples {
         if self.is_long(resting) { self.many } else { self.few }
     }
 
-    /// Mean number of samples of a pixel in all frames since the image came to rest, but for the first; rounded down.
+    /// Returns true if samples at rest start anew with this long frame.
+    pub fn starts_anew(&self, resting: u32) -> bool {
+        self.forgets_short && resting == self.first_long
+    }
+
+    /// Returns true if the samples of short frames no longer count.
+    pub fn has_forgotten_short(&self, resting: u32) -> bool {
+        self.forgets_short && self.is_long(resting)
+    }
+
+    /// Mean number of samples of a pixel that count in all frames since the image came to rest, but for the first; rounded down.
     pub fn since_rest(&self, resting: u32) -> u64 {
         let short = resting.min(self.first_long - 1);
+        if self.has_forgotten_short(resting) {
+            return u64::from(resting - short) * u64::from(self.many);
+        }
         u64::from(short) * u64::from(self.few) / u64::from(self.period) + u64::from(resting - short) * u64::from(self.many)
     }
 
@@ -80,6 +97,7 @@ impl FrameSamples {
             // no more than the short frames
             return (u64::from(samples) * u64::from(self.period)).div_ceil(u64::from(self.few)) as u32;
         }
+        let in_short = if self.forgets_short { 0 } else { in_short };
         short + (u64::from(samples) - in_short).div_ceil(u64::from(self.many)) as u32
     }
 }
@@ -105,7 +123,7 @@ mod tests {
                     assert!(few_or(1 << 25));
                     let mut sum = 0;
                     for resting in 1..100 {
-                        sum += samples.of(resting);
+                        sum = if samples.starts_anew(resting) { 0 } else { sum } + samples.of(resting);
                         assert_eq!(samples.since_rest(resting), u64::from(sum));
                         assert_eq!(samples.frames_for(sum), resting, "{samples:?}");
                         assert_eq!(samples.frames_for(sum + 1), resting + 1, "{samples:?}");

@@ -41,7 +41,7 @@ pub struct Frame<'a> {
     pub offset: [f32; 2],
     /// There is a resolved image of the previous frame.
     pub has_resolved: bool,
-    /// The image has not rested before: samples at rest start anew.
+    /// Samples at rest start anew: the image has not rested before, or those before this frame no longer count.
     pub rest_starts: bool,
     /// Frames since the image came to rest, this one included; 0: it does not rest.
     pub resting: u32,
@@ -49,7 +49,7 @@ pub struct Frame<'a> {
     pub is_long: bool,
     /// Samples of each pixel that is sampled in this frame.
     pub samples: u32,
-    /// Samples of each pixel since the image came to rest, but for the first frame.
+    /// Samples of each pixel that count since the image came to rest, but for the first frame.
     pub rest_samples: u64,
     /// Index of the first of this frame's samples in the pixel's sequence. (The passes of ambient visibility in short frames go by [`Frame::number`].)
     pub first_sample: u32,

@@ -131,6 +131,8 @@ struct State {
     /// Radiance: index of the next path in a pixel's sequence. A pixel takes the samples of its sequence one after the other, also where it is sampled in every second or fourth frame only:
     /// all samples of a sequence are more even than every fourth of them.
     first_path: u32,
+    /// Radiance: the samples since the image came to rest are of a block of the sequence, from its beginning.
+    in_block: bool,
     /// Radiance: maximum number of paths of a pixel since then. The other pixels of the pattern follow with samples of the same indices.
     pattern_paths: u32,
     /// Lights or materials have changed: histories of radiance count little.
@@ -138,6 +140,9 @@ struct State {
     /// The rotation to the environment map, if it is not yet on the device.
     environment_turn: Option<DMat3>,
 }
+
+/// Paths at rest begin at a multiple of this: a power of two of samples of a sequence are even only if the first has a multiple of their number as its index.
+const REST_BLOCK: u32 = 1 << 12;
 
 /// Samples for which a history of radiance counts after lights or materials have changed, per ray of a frame.
 const PAST_AFTER_NEW_LIGHT: f32 = 2.0;
@@ -297,7 +302,8 @@ impl Realtime {
         if s.converges() {
             let since_rest = self.frame_samples.since_rest(resting);
             let period = if self.is_radiance { s.resolution.period() } else { 1 };
-            u32::try_from(since_rest / u64::from(period)).unwrap_or(u32::MAX).saturating_add(s.rays_per_pixel)
+            let of_first = if self.frame_samples.has_forgotten_short(resting) { 0 } else { s.rays_per_pixel };
+            u32::try_from(since_rest / u64::from(period)).unwrap_or(u32::MAX).saturating_add(of_first)
         } else {
             resting.saturating_add(1).min(s.history).saturating_mul(s.rays_per_pixel)
         }
@@ -355,6 +361,18 @@ impl Realtime {
         stats
     }
 
+    /// Radiance: has paths at rest begin with a block of the sequence.
+    fn align_paths(&mut self, rest_starts: bool, resting: u32) {
+        if rest_starts {
+            self.state.in_block = false;
+        }
+        // in motion the frames together take a sequence from its beginning; a pattern has the same paths in all its frames
+        if resting > 0 && !self.state.in_block && self.state.frame.is_multiple_of(self.settings.resolution.period()) {
+            self.state.first_path = self.state.first_path.checked_next_multiple_of(REST_BLOCK).unwrap_or(0);
+            self.state.in_block = true;
+        }
+    }
+
     fn try_frame(
         &mut self,
         tracer: &Tracer,
@@ -371,6 +389,10 @@ impl Realtime {
         let (is_long, samples) = (self.frame_samples.is_long(resting), self.frame_samples.of(resting));
         if has_come_to_rest && self.shown == Some(self.display) {
             return Ok(FrameStats { skipped_rays: self.pixels() * u64::from(samples), ..Default::default() });
+        }
+        let rest_starts = resting == 0 || !self.state.has_resolved || self.frame_samples.starts_anew(resting);
+        if self.is_radiance {
+            self.align_paths(rest_starts, resting);
         }
         let offset = match self.settings.antialias {
             // what is known of surfaces is of the last short frame
@@ -406,7 +428,7 @@ impl Realtime {
             number: self.state.frame,
             offset,
             has_resolved: self.state.has_resolved,
-            rest_starts: resting == 0 || !self.state.has_resolved,
+            rest_starts,
             resting,
             is_long,
             samples,
