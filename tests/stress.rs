@@ -331,6 +331,20 @@ fn gpu_stress_catches_a_glint_that_lights_quiet_pixels() {
     }
 }
 
+/// Section 8: pixels that rare light has not reached take part in the mean of those that it has, if these are not a few glints.
+#[test]
+fn gpu_stress_catches_a_filter_that_keeps_what_is_dark_by_chance() {
+    for filter in [FilterKind::Box, FilterKind::Separable, FilterKind::Atrous] {
+        let left = |noise: f32| {
+            let mut quiet = Quiet;
+            hot_pixel::rare_light(&setup(), TracerKind::Compute, filter, noise, &mut Watch::new(&mut quiet)).unwrap()
+        };
+        let check = hot_pixel::check_rare_light("rare light", left(1.0));
+        assert_eq!(check.verdict, Verdict::Holds, "{filter} {check:?}");
+        fails(&hot_pixel::check_rare_light("rare light", left(0.0)));
+    }
+}
+
 /// Section 8: filters keep the mean of what few samples meet, in one step or several, and a sheet that is smaller than it is said to be does not.
 #[test]
 fn gpu_stress_catches_a_filter_that_loses_rare_occlusion() {

@@ -65,6 +65,11 @@ impl FrameSamples {
         if self.is_long(resting) { self.many } else { self.few }
     }
 
+    /// Samples of a pixel in the frames before the first long one.
+    pub fn in_short(&self) -> u32 {
+        self.first_long.saturating_mul(self.few)
+    }
+
     /// Returns true if samples at rest start anew with this long frame.
     pub fn starts_anew(&self, resting: u32) -> bool {
         self.forgets_short && resting == self.first_long

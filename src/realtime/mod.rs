@@ -363,12 +363,17 @@ impl Realtime {
 
     /// Radiance: has paths at rest begin with a block of the sequence.
     fn align_paths(&mut self, rest_starts: bool, resting: u32) {
+        let (taken, begins_pattern) =
+            (self.state.first_path % REST_BLOCK, self.state.frame.is_multiple_of(self.settings.resolution.period()));
         if rest_starts {
-            self.state.in_block = false;
+            self.state.in_block = taken == 0 && begins_pattern;
         }
         // in motion the frames together take a sequence from its beginning; a pattern has the same paths in all its frames
-        if resting > 0 && !self.state.in_block && self.state.frame.is_multiple_of(self.settings.resolution.period()) {
-            self.state.first_path = self.state.first_path.checked_next_multiple_of(REST_BLOCK).unwrap_or(0);
+        if resting > 0 && begins_pattern && !self.state.in_block {
+            // a camera that has stood still from the first frame has the paths of a still
+            let is_forgotten = self.frame_samples.has_forgotten_short(resting) && taken <= self.frame_samples.in_short();
+            let rest = if is_forgotten { 0 } else { REST_BLOCK };
+            self.state.first_path = (self.state.first_path - taken).wrapping_add(rest);
             self.state.in_block = true;
         }
     }

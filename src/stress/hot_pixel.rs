@@ -5,6 +5,7 @@
 
 use glam::{DAffine3, DVec3};
 
+use super::degenerate::random;
 use super::sampling::{self, emitter, matte, scene_of};
 use super::{Check, Session, Setup, Watch};
 use crate::accel::flatten::FlatScene;
@@ -25,10 +26,16 @@ pub const HOT: [f32; 3] = [1e3, 1e10, 4e29];
 pub const COLD: f32 = 0.25;
 /// Variance of a sample of the other pixels, where they have noise.
 const NOISE: f32 = 0.01;
+/// Side of a still's film, pixels.
+const SIZE: u32 = 33;
 /// Samples of a pixel beside a glint ([`beside_glint`]).
 pub const GLINT_SAMPLES: u32 = 1024;
 /// Those that are bright.
 pub const GLINT_HITS: u32 = 16;
+/// Samples of a pixel under rare light ([`rare_light`]).
+const RARE_SAMPLES: u32 = 64;
+/// Share of the pixels that have met it.
+const RARE_SHARE: f64 = 0.5;
 /// Frames in which the camera moves before it rests.
 const MOVES: u32 = 6;
 /// Albedo of the floors.
@@ -84,7 +91,7 @@ pub fn film(size: u32, hot: f32, noisy: bool) -> Film {
     film_of(size, 16, 1, hot, noisy)
 }
 
-// `hits`: samples of the hot pixel that have all of its radiance
+/// See [`film`]. `hits`: samples of the hot pixel that have all of its radiance.
 fn film_of(size: u32, spp: u32, hits: u32, hot: f32, noisy: bool) -> Film {
     let mut film = Film::new(size, size, 3);
     film.mean.fill(COLD);
@@ -132,8 +139,30 @@ pub fn beside_glint(setup: &Setup, kind: TracerKind, filter: FilterKind, hits: u
     Ok(worst / f64::from(NOISE / spp as f32).sqrt())
 }
 
-/// Side of a still's film, pixels.
-const SIZE: u32 = 33;
+/// How much a still's filter lowers the error of rare light: the error after it over that before, roots of mean squares. Half of the pixels, chosen at random, have met light in one of their
+/// [`RARE_SAMPLES`]. The samples of the others, which might have met it as often, are all alike, which is no reason to keep them. The film says `noise` times the variance that samples have.
+///
+/// # Errors
+/// Those of rendering and filtering.
+pub fn rare_light(setup: &Setup, kind: TracerKind, filter: FilterKind, noise: f32, watch: &mut Watch) -> Result<f64> {
+    let mut film = Film::new(SIZE, SIZE, 3);
+    film.samples.fill(RARE_SAMPLES);
+    film.coverage.fill(1.0);
+    for (k, (mean, variance)) in film.mean.chunks_mut(3).zip(film.variance.chunks_mut(3)).enumerate() {
+        let is_lit = random(k as u32, 0) < RARE_SHARE;
+        mean.fill(if is_lit { 2.0 * COLD } else { COLD });
+        variance.fill(if is_lit { noise * COLD * COLD * RARE_SAMPLES as f32 } else { 0.0 });
+    }
+    let truth = f64::from(COLD) * (1.0 + RARE_SHARE);
+    let error = |image: &[f32]| image.iter().map(|v| (f64::from(*v) - truth).powi(2)).sum::<f64>().sqrt();
+    Ok(error(&filtered(setup, kind, filter, &film, watch)?) / error(&film.mean))
+}
+
+/// The check of [`rare_light`].
+pub fn check_rare_light(name: &str, left: f64) -> Check {
+    Check::at_most(name, left, "of the error", 0.5)
+        .says(format!("{:.0} % of pixels have met light in one sample of {RARE_SAMPLES}", 100.0 * RARE_SHARE))
+}
 
 /// A film after a still's filter; its camera looks down at a floor.
 fn filtered(setup: &Setup, kind: TracerKind, filter: FilterKind, film: &Film, watch: &mut Watch) -> Result<Vec<f32>> {
@@ -273,6 +302,8 @@ pub(super) fn run(session: &mut Session) -> Result<()> {
         session.measure_each(&name, &kinds, |s, kind, w| {
             Ok(check_beside_glint(&name, beside_glint(s, kind, filter, GLINT_HITS, w)?))
         })?;
+        let name = format!("{filter} filter of a still, rare light");
+        session.measure_each(&name, &kinds, |s, kind, w| Ok(check_rare_light(&name, rare_light(s, kind, filter, 1.0, w)?)))?;
     }
     let count = effort.pick(24, 240);
     for (what, settings) in super::display::filters() {

@@ -96,6 +96,7 @@ fn gpu_frames_the_parts_of_radiance_add_up() {
 fn gpu_frames_at_rest_become_the_still() {
     let device = device();
     const FRAMES: [usize; 4] = [8, 64, 250, 1000];
+    const EARLY_RUNS: u32 = 8;
     let names = ["cornell-spheres", "leaf-cards", "cornell-box", "stairs"];
     for &name in if common::is_full() { &names[..] } else { &names[..2] } {
         let mut scene = scene(name);
@@ -111,8 +112,17 @@ fn gpu_frames_at_rest_become_the_still() {
         let mut still = |spp, seed| integrator.render(&tracer, &camera, spp, seed, &mut NoControl).unwrap().image.film.mean;
         let truth = still(8192, 1);
         let expected = rmse(&still(1024, 2), &truth);
-        // three short frames after the first, and four long ones
-        let early = rmse(&still(35, 3), &truth);
+        // Four long frames after as many short ones have 32 samples. The error of so few differs by a tenth from seed to seed.
+        let mean_error = |error: &mut dyn FnMut(u32) -> f64| (0..EARLY_RUNS).map(|k| error(10 + k).powi(2)).sum::<f64>().sqrt();
+        let early_still = mean_error(&mut |seed| rmse(&still(32, seed), &truth));
+        let early = mean_error(&mut |seed| {
+            let paths = PathOptions { seed, ..paths.clone() };
+            let mut frames = frames(&tracer, &flat, &converging(), &paths);
+            for _ in 0..FRAMES[0] {
+                frames.frame(&tracer, &camera, &[]).unwrap();
+            }
+            rmse(&frames.result().unwrap(), &truth)
+        });
         let mut frames = frames(&tracer, &flat, &converging(), &paths);
         let mut errors = Vec::new();
         for k in 1..=FRAMES[3] {
@@ -124,10 +134,11 @@ fn gpu_frames_at_rest_become_the_still() {
         let result = frames.result().unwrap();
         let bias = result.iter().zip(&truth).map(|(a, b)| f64::from(a - b)).sum::<f64>() / truth.len() as f64;
         println!(
-            "{name}: error after {FRAMES:?} frames {errors:.5?}; of stills of 35 and 1024 samples {early:.5}, {expected:.5}; bias {bias:+.6}"
+            "{name}: error after {FRAMES:?} frames {errors:.5?}; of a still of 1024 samples {expected:.5}; after 8 frames {:.3} of a still; bias {bias:+.6}",
+            early / early_still
         );
-        // the first frames, whose samples lie at one place in all pixels, are soon all but forgotten
-        assert!(errors[0] < early, "{name}: {errors:?}, of a still {early}");
+        // the first frames, whose samples lie at one place in all pixels, are soon forgotten (with them it was 1.8 times a still's); the filter does little for 18 rows of pixels
+        assert!(early < 1.25 * early_still, "{name}: after 8 frames {early}, of a still {early_still}");
         assert!(errors.windows(2).all(|e| e[1] < 1.02 * e[0]), "{name}: the error grows: {errors:?}");
         assert!(errors[3] < 1.6 * expected, "{name}: {errors:?}, of a still {expected}");
         assert!(errors[3] < 0.5 * errors[0], "{name}: {errors:?}");

@@ -18,14 +18,15 @@ pub fn measure(session: &FramesSession, stage: &mut Stage, preset: Preset, refer
     let camera = stage.still_camera();
     let (first_seed, runs) = (session.args.seed, session.args.runs);
     let seeds = || (0..runs).map(|k| first_seed.wrapping_add(k));
-    let first = run(stage, preset, reference, frames, first_seed)?;
+    let mut clock = PlainClock::default();
+    let first = run(stage, preset, reference, first_seed, frames, Some(&mut clock))?;
     let mut errors: Vec<Vec<FrameErrors>> = first.errors.iter().map(|e| vec![*e]).collect();
     for seed in seeds().skip(1) {
-        for (of_frame, e) in errors.iter_mut().zip(run(stage, preset, reference, frames, seed)?.errors) {
+        for (of_frame, e) in errors.iter_mut().zip(run(stage, preset, reference, seed, frames, None)?.errors) {
             of_frame.push(e);
         }
     }
-    let time = EqualTime::new(first.clock.time(), first.log.typical(first_timed(frames)));
+    let time = EqualTime::new(clock.time(), first.log.typical(first_timed(frames)));
     let mut curve = Vec::new();
     for (frame, of_frame) in points(frames).zip(&errors) {
         let paths = time.paths(frame);
@@ -54,27 +55,34 @@ fn points(frames: u32) -> impl Iterator<Item = u32> {
 
 struct Run {
     log: FrameLog,
-    clock: PlainClock,
     flicker: FlickerMeter,
     errors: Vec<FrameErrors>,
 }
 
-/// Frames of a camera that stands still, from the first.
-fn run(stage: &mut Stage, preset: Preset, reference: &FrameReference, frames: u32, seed: u32) -> Result<Run> {
+/// Frames of a camera that stands still, from the first. `clock`: plain accumulation is timed beside them.
+fn run(
+    stage: &mut Stage,
+    preset: Preset,
+    reference: &FrameReference,
+    seed: u32,
+    frames: u32,
+    mut clock: Option<&mut PlainClock>,
+) -> Result<Run> {
     let camera = stage.still_camera();
     let mut realtime = stage.realtime_with_seed(preset, seed)?;
     let (mut log, mut flicker, mut errors) = (FrameLog::default(), FlickerMeter::new(frames), Vec::new());
-    let mut clock = PlainClock::default();
     for frame in 1..=frames {
         log.frame(&mut realtime, &stage.tracer, &camera, &[])?;
         let image = realtime.result()?;
         flicker.add(&Displayed::new(&image, stage.channels()))?;
-        if is_plain_timed(frame - 1, first_timed(frames), frames) {
-            stage.time_plain(&camera, &mut clock)?;
+        if let Some(clock) = clock.as_deref_mut()
+            && is_plain_timed(frame - 1, first_timed(frames), frames)
+        {
+            stage.time_plain(&camera, clock)?;
         }
         if points(frames).any(|f| f == frame) {
             errors.push(reference.errors_of(&image)?);
         }
     }
-    Ok(Run { log, clock, flicker, errors })
+    Ok(Run { log, flicker, errors })
 }
