@@ -34,6 +34,8 @@ vec3 edge_normal(vec3 normal, uvec2 guide) { return guide_normal(guide); }
 
 vec3 prior_variance(vec3 mean, vec3 spread, float samples) { return spread * samples; }
 
+const bool COUNTS_NOISY_PIXELS = true;
+
 // By the fourth power of their number: a few samples that are all alike say little, and of many, whose glints are ten thousand times as bright as they, a thousandth is still too much of the box's.
 vec3 noise_variance(RadianceEstimate own, vec3 variance, float noisy) {
     float q = own.samples / OWN_VARIANCE_SAMPLES, r = noisy / RARE_LIGHT_PIXELS;

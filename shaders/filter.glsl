@@ -20,6 +20,8 @@ vec3 edge_normal(vec3 normal, uvec2 guide) { return normal; }
 
 float prior_variance(float mean, float spread, float samples) { return mean * (1.0 - mean); }
 
+const bool COUNTS_NOISY_PIXELS = false;
+
 // Variances of samples that are 0 or 1 follow the mean: a pixel that happened to see no occluder has none.
 float noise_variance(Estimate own, float variance, float noisy) { return variance; }
 

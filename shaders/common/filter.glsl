@@ -20,6 +20,7 @@
 //   int limited(radius, p, own)                    the radius, or a smaller one for this pixel
 //   VALUE noise_variance(own, variance, noisy)     the variance of a pixel's samples, from what its estimate says and from that of its box, which
 //                                                  is that of so many noisy pixels among quiet ones
+//   COUNTS_NOISY_PIXELS                            whether noise_variance needs their number
 //   float total(value)                             a sum over channels
 //   ESTIMATE guess(p, f, image, pixel, own)        the value of a pixel without samples in its box
 //   void finish(p, f, at, estimate, bent)          writes the result; finish_nothing(p, f, at): for a pixel that is not filtered
@@ -89,7 +90,7 @@ void finish_box(FilterParams p, FrameParams f, uvec2 estimates, uint at, ESTIMAT
     float keep = 0.0;
     VALUE kept = VALUE(0.0);
     if (own.samples > 0.0) {
-        VALUE own_variance = noise_variance(own, variance, noisy_pixels(e));
+        VALUE own_variance = noise_variance(own, variance, COUNTS_NOISY_PIXELS ? noisy_pixels(e) : 0.0);
         float own_noise = total(own_variance) * mean_variance(p, own.samples) / own.samples;
         // of the pixel about the box: detail, which is what noise does not explain of the spread, and its own noise
         float box_noise = total(variance) * mean_variance(p, e.n / e.count) * e.count / e.n;
@@ -164,7 +165,7 @@ void main() {
                 ESTIMATE e = load_estimate(estimates, tap);
                 vec3 normal = guide_normal(guide), bent = BENT_NORMALS ? load_bent(p, tap) * e.samples : vec3(0.0);
                 VALUE sum = e.mean * e.samples, squares = e.mean * e.mean * e.samples, variances = e.variance * e.samples;
-                float count = e.samples > 0.0 ? 1.0 : 0.0, squared_variances = total(e.variance) * total(variances);
+                float count = e.samples > 0.0 ? 1.0 : 0.0, squared_variances = COUNTS_NOISY_PIXELS ? total(e.variance) * total(variances) : 0.0;
                 [[unroll]] for (int k = 0; k < FILTER_STRIP; k++) {
                     int dx = x - k;
                     bool is_inside = dx >= stride * strip[k].lower.x && dx <= stride * strip[k].upper.x && (dx & stride - 1) == 0 && y >= strip[k].lower.y && y <= strip[k].upper.y;
@@ -175,7 +176,7 @@ void main() {
                     if (BENT_NORMALS) strip[k].bent += bent;
                     strip[k].n += e.samples;
                     strip[k].count += count;
-                    strip[k].squared_variances += squared_variances;
+                    if (COUNTS_NOISY_PIXELS) strip[k].squared_variances += squared_variances;
                 }
             }
         }
