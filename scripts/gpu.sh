@@ -28,7 +28,7 @@ say "building the program and the device tests"
 cargo build --release --locked
 target=${CARGO_TARGET_DIR:-target}
 # the tests with their debug assertions, in the profile of every day
-tests=(tracer ao path)
+tests=(tracer ao path realtime)
 binaries=$(cargo test --no-run --locked --message-format json "${tests[@]/#/--test=}" | sed -n 's/.*"name":"\([a-z_]*\)".*"executable":"\([^"]*\)".*/\1 \2/p')
 
 rm -rf "$kit" "$kit.tar.gz"
@@ -41,6 +41,10 @@ for name in "${tests[@]}"; do
 done
 cp scenes/parade.glb scenes/leaves.glb scenes/courtyard.* scenes/courtyard_*.png "$kit/scenes/"
 cp scripts/gpu/run.sh "$kit/"
+# modules of the tests, but for those that run the program from where it was built
+for name in "${tests[@]}"; do
+  "$kit/bin/tests-$name" --list 2>/dev/null | sed -n 's/^\([a-z_]*\)::.*: test$/\1/p' | sort -u | grep -vx cli | sed "s/^/$name /"
+done > "$kit/tests.txt"
 
 # carry FOLDER LIBRARY...: copies libraries of this machine, and what they need but for glibc's own; what is not here is left out
 carry() {

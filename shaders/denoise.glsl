@@ -45,6 +45,8 @@ vec3 noise_variance(RadianceEstimate own, vec3 variance, float noisy) {
 
 float total(vec3 value) { return value.r + value.g + value.b; }
 
+vec3 mean_of(vec3 sum, float n) { return sum / n; }
+
 void finish(FilterParams p, FrameParams f, uint at, RadianceEstimate e, vec3 bent) {
     store_radiance(p.to, at, e);
 }

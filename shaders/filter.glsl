@@ -27,6 +27,8 @@ float noise_variance(Estimate own, float variance, float noisy) { return varianc
 
 float total(float value) { return value; }
 
+float mean_of(float sum, float n) { return share_of(sum, n); }
+
 Estimate estimate_of(Estimate own, float mean, float n, float variance) { return Estimate(mean, n, variance); }
 
 int limited(int radius, FilterParams p, Estimate own) { return radius; }
@@ -64,7 +66,7 @@ Estimate guess(FilterParams p, FrameParams f, uvec2 estimates, ivec2 pixel, Esti
             n += e.samples;
         }
     }
-    return n > 0.0 ? Estimate(sum / n, n, 0.0) : Estimate(0.0, 0.0, 0.0);
+    return n > 0.0 ? Estimate(share_of(sum, n), n, 0.0) : Estimate(0.0, 0.0, 0.0);
 }
 
 #include "common/filter.glsl"

@@ -27,7 +27,7 @@ void main() {
         sum += x;
         squares += x * x;
     }
-    float mean = sum / float(n);
+    float mean = share_of(sum, float(n));
     float variance = n > 1u ? max(squares - sum * mean, 0.0) / float(n - 1u) : 0.0;
     STORE_PAIR(p.current, at, pack_estimate(Estimate(mean, float(n), variance)));
     if (BENT_NORMALS) {

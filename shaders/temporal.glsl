@@ -32,7 +32,7 @@ Estimate surroundings(TemporalParams p, FrameParams f, ivec2 pixel, EdgeTest edg
         }
     }
     if (n == 0.0) return Estimate(0.0, 0.0, 0.0);
-    float mean = sum / n;
+    float mean = share_of(sum, n);
     return Estimate(mean, n, (max(squares / n - mean * mean, 0.0) + MIN_VARIANCE) / n);
 }
 
@@ -57,7 +57,7 @@ Estimate reprojected(TemporalParams p, FrameParams f, vec3 before, vec3 normal, 
     }
     if (weight < MIN_TAP_WEIGHT) return none;
     if (BENT_NORMALS) bent = bents / weight;
-    return Estimate(mean / weight, samples / weight, variance / weight);
+    return Estimate(share_of(mean, weight), samples / weight, variance / weight);
 }
 
 void main() {

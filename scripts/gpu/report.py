@@ -186,6 +186,44 @@ def presets(folder: Path) -> list[str]:
     return lines + notes(record)
 
 
+def light(folder: Path) -> list[str]:
+    record = load(folder / "bench-frames.json")
+    if not record:
+        return []
+    width, height = record["size"]
+    lines = [f"## Path tracing in real time, {width}x{height}", "", f"Tracer `{record['tracer']}`, {record['frames']} frames, references of {record['reference_paths']} paths a pixel. Milliseconds a frame: by the device's clock, the median (what 95 % of frames keep within), and by the program's, with all that it does besides. RMSE: of the last frame, beside plain accumulation's at equal time.", ""]
+    cost = lambda c, clock: f"{number(c[clock]['median'])} ({number(c[clock]['p95'])})"
+    rmse = lambda e: number(((e or {}).get("errors") or {}).get("rmse"))
+    passes = lambda c: ", ".join(f"{p['pass']} {number(p['ms']['median'])}" for p in c["passes"])
+    for view in record["views"]:
+        rows = []
+        for r in view["still"]:
+            last = (r["curve"] or [{}])[-1]
+            rows.append([f"`{r['preset']}`", "still", cost(r["cost"], "device_ms"), cost(r["cost"], "wall_ms"), f"{rmse(last)} / {rmse(last.get('plain'))}", passes(r["cost"])])
+        for m in view["motions"]:
+            rows += [[f"`{r['preset']}`", m["motion"], cost(r["cost"], "device_ms"), cost(r["cost"], "wall_ms"), f"{rmse(r)} / {rmse(r.get('plain'))}", passes(r["cost"])] for r in m["results"]]
+        lines += [f"{view['scene']}: {view['primitives']:,} primitives", ""]
+        lines += table(["preset", "motion", "device ms", "wall ms", "RMSE / plain", "passes, ms"], rows)
+    return lines + notes(record)
+
+
+def stress(folder: Path) -> list[str]:
+    rows = []
+    for log in sorted(folder.glob("stress-*.log")):
+        # the record is the first line; what failed is said after it
+        try:
+            checks = json.loads(text(log).splitlines()[0])["checks"]
+        except (IndexError, KeyError, ValueError):
+            continue
+        count = lambda verdict: sum(c["verdict"] == verdict for c in checks)
+        failed = [f"{c['name']}: {number(c['value'])} {c['unit']}" for c in checks if c["verdict"] == "fails"]
+        rows.append([log.stem.removeprefix("stress-"), str(count("holds")), str(count("reported")), str(len(failed)), "; ".join(failed).replace("|", "/") or "none"])
+    if not rows:
+        return []
+    said = "Of `skylit stress`; what a ray-tracing driver answers for is reported, not judged."
+    return ["## Numerical stability", "", said, "", *table(["tracer", "hold", "reported", "fail", "which"], rows)]
+
+
 def rays(folder: Path) -> list[str]:
     record = load(folder / "bench-rays.json")
     if not record:
@@ -254,7 +292,7 @@ def main() -> None:
     if "cpu" in kinds:
         lines += ["**This is no GPU**: the kit found a driver that runs on the CPU, and did little of everything.", ""]
     lines += [*machine(folder), f"{passed} of {len(every)} steps passed.", "", *outcomes(folder)]
-    for part in [images, parity, leaks, closed_forms, presets, rays, paths]:
+    for part in [images, parity, leaks, closed_forms, stress, presets, light, rays, paths]:
         lines += part(folder)
     lines += gallery(folder, page)
     page.parent.mkdir(parents=True, exist_ok=True)

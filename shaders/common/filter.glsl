@@ -83,7 +83,7 @@ void finish_box(FilterParams p, FrameParams f, uvec2 estimates, uint at, ESTIMAT
         finish(p, f, at, guess(p, f, estimates, pixel, own), own_bent);
         return;
     }
-    VALUE mean = e.sum / e.n;
+    VALUE mean = mean_of(e.sum, e.n);
     VALUE spread = max(e.squares / e.n - mean * mean, VALUE(0.0));
     // about their own pixels' means, so that each pixel has one less to tell
     VALUE variance = (e.variances + prior_variance(mean, spread, e.n / max(e.count, 1.0)) * PRIOR_SAMPLES) / (max(e.n - e.count, 0.0) + PRIOR_SAMPLES);
@@ -98,15 +98,16 @@ void finish_box(FilterParams p, FrameParams f, uvec2 estimates, uint at, ESTIMAT
         // with 3 of `count` pixels taken off, the sum of squared errors of what is kept is never above that of the pixels as they are;
         // so it is for histories that are as long as they get. For short ones it is too careful, and 1 does better.
         float careful = 1.0 + 2.0 * min(own.samples / f.most_samples, 1.0);
-        float noise = max(e.count - careful, 0.0) / e.count * own_noise;
+        float taken = max(e.count - careful, 0.0) / e.count * own_noise;
         // A few glints may explain all of the spread by their noise. A much quieter pixel is unlike their mean by at least that mean's own noise.
-        unlike = max(unlike, noise + max(box_noise - QUIET * own_noise, 0.0) / e.count);
-        keep = unlike > 0.0 ? clamp(1.0 - noise / unlike, 0.0, 1.0) : 0.0;
+        unlike = max(unlike, taken + max(box_noise - QUIET * own_noise, 0.0) / e.count);
+        keep = unlike > 0.0 ? clamp(1.0 - taken / unlike, 0.0, 1.0) : 0.0;
         // The next step weighs the result by all samples of the box, whatever it kept: what it keeps follows values, and weights that do are biased. That it is
         // noisier than their mean, to which its own samples belong, its variance says.
         kept = keep * keep * (own_variance * max(e.n / own.samples, 1.0) - variance);
     }
-    finish(p, f, at, estimate_of(own, mix(mean, own.mean, keep), e.n, variance + kept), mix(e.bent / e.n, own_bent, keep));
+    // in two products, so that of a mean a billion times as bright nothing is left in what is kept whole
+    finish(p, f, at, estimate_of(own, (1.0 - keep) * mean + keep * own.mean, e.n, variance + kept), mix(e.bent / e.n, own_bent, keep));
 }
 
 // Each thread filters FILTER_STRIP pixels of a row, whose boxes overlap: a tap is loaded once for all of them. On a CPU driver loads are most of the time. Threads that run together filter tiles

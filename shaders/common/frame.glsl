@@ -146,6 +146,9 @@ bool same_surface(EdgeTest e, vec2 offset, uvec2 guide, vec3 normal) {
 
 bool same_surface(EdgeTest e, vec2 offset, uvec2 guide) { return same_surface(e, offset, guide, guide_normal(guide)); }
 
+// a / b, for 0 <= a <= b but for rounding, b > 0: from 0 to 1, and 1 where they are equal. Vulkan lets a quotient be 2.5 units in the last place off.
+float share_of(float a, float b) { return a >= b ? 1.0 : min(a / b, 1.0); }
+
 // A mean over samples: their number, and the variance of one.
 struct Estimate {
     float mean;

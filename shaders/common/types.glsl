@@ -8,6 +8,8 @@ const float INFINITY = 1.0 / 0.0;
 
 Ray no_ray() { return Ray(vec3(0.0), 0.0, vec3(0.0, 0.0, 1.0), -1.0); }
 bool is_ray(Ray ray) { return ray.tmax > ray.tmin; }
+// Vulkan leaves undefined what hardware does with other rays: some call neither a hit shader nor the miss shader.
+bool is_finite(Ray ray) { return all(lessThan(abs(ray.origin), vec3(INFINITY))) && all(lessThan(abs(ray.direction), vec3(INFINITY))); }
 Hit miss() { return Hit(INFINITY, INVALID, INVALID, 0.0, 0.0); }
 bool is_hit(Hit hit) { return hit.t < INFINITY; }
 

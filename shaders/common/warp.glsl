@@ -68,9 +68,9 @@ vec3 uniform_hemisphere(vec2 u) {
     return vec3(sqrt(max(1.0 - u.x * u.x, 0.0)) * on_circle(u.y), u.x);
 }
 
-// Duff et al. 2017, branchless
+// Duff et al. 2017, branchless. Their sign changes at z = 0, where walls have their normals: below it, rounding, which differs from device to device, decides about no axis.
 vec3 to_world(vec3 n, vec3 v) {
-    float s = n.z >= 0.0 ? 1.0 : -1.0;
+    float s = n.z >= -1e-4 ? 1.0 : -1.0;
     float a = -1.0 / (s + n.z);
     float b = n.x * n.y * a;
     return vec3(1.0 + s * n.x * n.x * a, s * b, -s * n.x) * v.x + vec3(b, s + n.y * n.y * a, -n.y) * v.y + n * v.z;

@@ -77,6 +77,34 @@ uint all_min(uint x) { return SUBGROUP_SIZE > 16u ? subgroupMin(x) : min_over_la
     best_primitive[j] = (id) & NUMBER;
 #endif
 
+// One ray of each lane against the triangles of a leaf. Text and not a loop: the optimizer unrolls a loop into copies whose `precise` arithmetic is not
+// precise any more, and their rays slip through edges on devices that fuse products into sums.
+#if PACKET_RAYS != 2
+#error MEET_TRIANGLES is written for two rays per lane
+#endif
+#define MEET_TRIANGLES(RAY) \
+    { \
+        const int j = RAY; \
+        vec3 o = origin[j], r = direction[j]; \
+        if (WATERTIGHT) { \
+            Shear s = Shear(axis, shear[j].s); \
+            Corner a = make_corner(s, o, v0), b = make_corner(s, o, v1), c = make_corner(s, o, v2), d = make_corner(s, o, v3); \
+            float ab = edge(b, a), bc = edge(c, b), ca = edge(a, c), cd = edge(d, c), da = edge(a, d); \
+            vec3 first = vec3(bc, ca, ab), second = vec3(cd, da, -ca); \
+            /* rays of another class compute meaningless values here */ \
+            bool live = limit[j] > tmin[j]; \
+            if (live && is_inside(first)) { \
+                if (meets_triangle(FIRST_ID, ORDER, instance, s, o, r, v0, v1, v2, a, b, c, first, tmin[j], limit[j], t, uv)) { ACCEPT_TRIANGLE(FIRST_ID, ORDER, v0, v1, v2) } \
+            } \
+            if (live && is_inside(second) && SECOND_ID != INVALID) { \
+                if (meets_triangle(SECOND_ID, ORDER >> 4, instance, s, o, r, v0, v2, v3, a, c, d, second, tmin[j], limit[j], t, uv)) { ACCEPT_TRIANGLE(SECOND_ID, ORDER >> 4, v0, v2, v3) } \
+            } \
+        } else { \
+            if (meets_moller_trumbore(FIRST_ID, ORDER, instance, o, r, v0, v1, v2, tmin[j], limit[j], t, uv)) { ACCEPT_TRIANGLE(FIRST_ID, ORDER, v0, v1, v2) } \
+            if (meets_moller_trumbore(SECOND_ID, ORDER >> 4, instance, o, r, v0, v2, v3, tmin[j], limit[j], t, uv)) { ACCEPT_TRIANGLE(SECOND_ID, ORDER >> 4, v0, v2, v3) } \
+        } \
+    }
+
 vec3 pick_corner(vec3 p0, vec3 p1, vec3 p2, uint k) {
     return k == 0u ? p0 : k == 1u ? p1 : p2;
 }
@@ -225,26 +253,8 @@ void main() {
                 uint axis = class_ >> 3;
                 vec3 v0 = uintBitsToFloat(TRIANGLE_LEAF_CORNERS_0(uvec3)), v1 = uintBitsToFloat(TRIANGLE_LEAF_CORNERS_1(uvec3));
                 vec3 v2 = uintBitsToFloat(TRIANGLE_LEAF_CORNERS_2(uvec3)), v3 = uintBitsToFloat(TRIANGLE_LEAF_CORNERS_3(uvec3));
-                FOR_RAYS {
-                    vec3 o = origin[j], r = direction[j];
-                    if (WATERTIGHT) {
-                        Shear s = Shear(axis, shear[j].s);
-                        Corner a = make_corner(s, o, v0), b = make_corner(s, o, v1), c = make_corner(s, o, v2), d = make_corner(s, o, v3);
-                        float ab = edge(b, a), bc = edge(c, b), ca = edge(a, c), cd = edge(d, c), da = edge(a, d);
-                        vec3 first = vec3(bc, ca, ab), second = vec3(cd, da, -ca);
-                        // rays of another class compute meaningless values here
-                        bool live = limit[j] > tmin[j];
-                        if (live && is_inside(first)) {
-                            if (meets_triangle(FIRST_ID, ORDER, instance, s, o, r, v0, v1, v2, a, b, c, first, tmin[j], limit[j], t, uv)) { ACCEPT_TRIANGLE(FIRST_ID, ORDER, v0, v1, v2) }
-                        }
-                        if (live && is_inside(second) && SECOND_ID != INVALID) {
-                            if (meets_triangle(SECOND_ID, ORDER >> 4, instance, s, o, r, v0, v2, v3, a, c, d, second, tmin[j], limit[j], t, uv)) { ACCEPT_TRIANGLE(SECOND_ID, ORDER >> 4, v0, v2, v3) }
-                        }
-                    } else {
-                        if (meets_moller_trumbore(FIRST_ID, ORDER, instance, o, r, v0, v1, v2, tmin[j], limit[j], t, uv)) { ACCEPT_TRIANGLE(FIRST_ID, ORDER, v0, v1, v2) }
-                        if (meets_moller_trumbore(SECOND_ID, ORDER >> 4, instance, o, r, v0, v2, v3, tmin[j], limit[j], t, uv)) { ACCEPT_TRIANGLE(SECOND_ID, ORDER >> 4, v0, v2, v3) }
-                    }
-                }
+                MEET_TRIANGLES(0)
+                MEET_TRIANGLES(1)
             }
 #ifdef STREAM_ANY
             // when all rays of the class are done, the rest of the tree is skipped

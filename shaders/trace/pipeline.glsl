@@ -15,7 +15,7 @@ void main() {
     if (k >= ray_count()) return;
     uint index = push.first + k;
     Ray world = ray(index);
-    if (!is_ray(world)) {
+    if (!is_ray(world) || !is_finite(world)) {
         deliver_miss(index);
         return;
     }

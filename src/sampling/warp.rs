@@ -57,9 +57,10 @@ pub fn uniform_hemisphere(u: [f32; 2]) -> [f32; 3] {
 pub const UNIFORM_HEMISPHERE_PDF: f32 = 0.5 * std::f32::consts::FRAC_1_PI;
 
 /// Two unit vectors that make a right-handed frame with the unit vector `n`: Duff et al., "Building an Orthonormal Basis,
-/// Revisited", JCGT 6(1), 2017. No singularity; error of a few ulp.
+/// Revisited", JCGT 6(1), 2017. No singularity; error of a few ulp. Their sign changes at z = 0, where walls have their normals: here a little below, so that
+/// rounding, which differs from device to device, decides about no axis.
 pub fn orthonormal_basis(n: [f32; 3]) -> ([f32; 3], [f32; 3]) {
-    let sign = if n[2] >= 0.0 { 1.0 } else { -1.0 };
+    let sign = if n[2] >= -1e-4 { 1.0 } else { -1.0 };
     let a = -1.0 / (sign + n[2]);
     let b = n[0] * n[1] * a;
     ([1.0 + sign * n[0] * n[0] * a, sign * b, -sign * n[0]], [b, sign + n[1] * n[1] * a, -n[1]])

@@ -8,6 +8,8 @@
 mod compiler;
 mod source;
 mod specialize;
+#[cfg(test)]
+mod unrolled;
 
 use std::borrow::Cow;
 

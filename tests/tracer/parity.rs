@@ -227,7 +227,8 @@ fn gpu_the_other_triangle_test_leaks() {
         let leaks = hits(&edges).iter().filter(|h| !h.is_hit()).count();
         let differ = hits(&anywhere).iter().zip(&truth).filter(|(h, t)| h.is_hit() != t.is_hit()).count();
         println!("{kernel}: {leaks} of {} rays leak, {differ} of {} others differ", edges.len(), anywhere.len());
-        assert!(leaks > 0 && leaks < edges.len() / 10, "{kernel}: {leaks} leaks");
+        // a seventeenth on CPUs, a ninth on a GPU that fuses products into sums
+        assert!(leaks > 0 && leaks < edges.len() / 5, "{kernel}: {leaks} leaks");
         assert!(differ < anywhere.len() / 1000, "{kernel}: {differ} differ");
     }
     assert_validation_clean(&device);
