@@ -247,10 +247,10 @@ step bench-frames 80 "Path tracing in real time" "$skylit" bench frames "${scene
   --frames "$(pick 8 32)" --reference-paths "$(pick 16 256)" --time-limit "$(pick 30 60)" --json="$out/bench-frames.json"
 
 # images to look at
-step image-courtyard 30 "Image: path tracing of the courtyard" "$skylit" render "$kit/scenes/courtyard.gltf" --integrator path --environment 1,1.1,1.3 \
+step image-courtyard 30 "Image: path tracing of the courtyard" "$skylit" render "$kit/scenes/courtyard.gltf" --integrator path --environment 1,1.1,1.3 --exposure -2 \
   --size "$size" --spp "$(pick 8 256)" --json -o "$out/image-courtyard.png"
 for preset in fast balanced quality; do
-  step "image-path-$preset" 30 "Image: path tracing, preset $preset" "$skylit" render "$kit/scenes/courtyard.gltf" --integrator path --environment 1,1.1,1.3 --preset $preset \
+  step "image-path-$preset" 30 "Image: path tracing, preset $preset" "$skylit" render "$kit/scenes/courtyard.gltf" --integrator path --environment 1,1.1,1.3 --exposure -2 --preset $preset \
     --warm-up 15 --size "$size" --json -o "$out/image-path-$preset.png"
 done
 for preset in larsen fast balanced quality; do

@@ -7,7 +7,7 @@ use crate::gpu::Timing;
 const TARGET: f64 = 0.05;
 /// Rays of the first launch. It is small because some drivers compile shaders at the first launch.
 const FIRST: u32 = 1 << 13;
-/// Maximum number of rays in a launch. Passes address results relative to a launch's first ray, so the tracer must not split launches.
+/// Maximum number of rays in a launch of a film. Passes address results relative to a launch's first ray, so the tracer must not split launches.
 pub const MAX_RAYS: u32 = crate::tracer::stream::LAUNCH_RAYS;
 
 /// Chooses the size of launches from the measured time of earlier ones.

@@ -79,7 +79,7 @@ pub fn visit(
     let mut commands = Commands::new(device)?;
     let record = size_of::<AovPixel>() as u64;
     let most = blocks.iter().map(Block::rays).max().unwrap_or(0).min(MAX_RAYS);
-    let target = Buffer::new(device, "auxiliary outputs", record * most as u64, Memory::Readback)?;
+    let target = Buffer::new(device, "auxiliary outputs", record * most as u64, Memory::Device)?;
     let mut params_buffer = Buffer::new(device, "block parameters", size_of::<BlockParams>() as u64, Memory::Upload)?;
     let mut pace = Pace::default();
     for block in &blocks {

@@ -103,7 +103,7 @@ impl<'t> PreparedRays<'t> {
             .filter(|&n| n < 1 << 28)
             .ok_or_else(|| Error::Usage(format!("{} rays: the maximum is 2^28", rays.len())))?;
         let source = Buffer::from_slice(device, "rays", rays)?;
-        let results = Buffer::new(device, "hits", Self::record(mode) * count as u64, Memory::Readback)?;
+        let results = Buffer::new(device, "hits", Self::record(mode) * count as u64, Memory::Device)?;
         let set = Buffer::from_slice(device, "ray set", &[RaySet { rays: source.address(), results: results.address() }])?;
         let commands = Commands::new(device)?;
         Ok(Self { tracer, stream, mode, count, results, set, _source: source, commands, pace: Pace::default(), passes: 0 })

@@ -17,7 +17,6 @@ use crate::gpu::{Buffer, Commands, ComputePipeline, Device, Memory, Recorder, Ti
 use crate::interface::records::frame::MovedRecord;
 use crate::scene::Scene;
 use crate::shaders::LANES;
-use crate::tracer::stream::LAUNCH_RAYS;
 use crate::tracer::{Push, Tracer};
 
 /// Maximum launches per submission, so that other users of the device are not blocked for long.
@@ -89,9 +88,9 @@ impl Range {
         vec![Self { first: 0, count }]
     }
 
-    /// Splits rays into launches of whole groups of `group` rays, at most `most` each (at least a group) and never more than the tracer's maximum.
+    /// Splits rays into launches of whole groups of `group` rays, at most `most` each (at least a group).
     pub fn launches(rays: u32, group: u32, most: u32) -> Vec<Self> {
-        let most = (most.min(LAUNCH_RAYS) / group).max(1) * group;
+        let most = (most / group).max(1) * group;
         (0..rays).step_by(most as usize).map(|first| Self { first, count: most.min(rays - first) }).collect()
     }
 }
@@ -245,6 +244,8 @@ pub struct Graph {
     stages: Vec<Stage>,
     resources: Resources,
     commands: Commands,
+    /// The number of rays, where the host cannot read that of the device.
+    ray_count: Option<Buffer>,
 }
 
 impl Graph {
@@ -252,7 +253,11 @@ impl Graph {
     pub fn new(device: &Arc<Device>, extent: Extent, stages: Vec<Stage>) -> Result<Self> {
         let mut resources = Resources::new(extent);
         resources.allocate(device, &stages)?;
-        Ok(Self { stages, resources, commands: Commands::new(device)? })
+        let ray_count = match resources.buffer(Resource::RayCount).is_some_and(|b| b.bytes().is_none()) {
+            true => Some(Buffer::new(device, "number of rays for the host", 4, Memory::Readback)?),
+            false => None,
+        };
+        Ok(Self { stages, resources, commands: Commands::new(device)?, ray_count })
     }
 
     /// Adds stages after all others. Returns false if that discarded the contents of all resources: stages that read transient ones have them allocated anew,
@@ -273,9 +278,15 @@ impl Graph {
         Ok(false)
     }
 
-    /// Rays of the last frame, of passes whose number of rays the host knows.
-    pub fn rays(&self) -> u64 {
-        self.stages.iter().flat_map(|s| &s.passes).map(|p| p.rays()).sum()
+    /// Rays of the last frame, as the device counted them, or of passes whose number of rays the host knows.
+    ///
+    /// # Errors
+    /// Those of the device.
+    pub fn rays(&self) -> Result<u64> {
+        if let Some(count) = self.ray_count.as_ref().or(self.resources.buffer(Resource::RayCount)) {
+            return Ok(bytemuck::pod_read_unaligned::<u32>(&count.read(0, 4)?).into());
+        }
+        Ok(self.stages.iter().flat_map(|s| &s.passes).map(|p| p.rays()).sum())
     }
 
     /// Moves the lights to where they are in `scene`. Returns true if any pass has lights that moved.
@@ -379,11 +390,16 @@ impl Graph {
                 continue;
             }
             let mut outcome = Ok(());
+            let counted = self.ray_count.as_ref().filter(|_| rest.is_empty()).zip(resources.buffer(Resource::RayCount));
             timings.extend(self.commands.run(|r| {
                 let mut hazards = Hazards::default();
                 outcome = submission
                     .iter()
                     .try_for_each(|&(stage, k)| record_range(r, frame, resources, &mut hazards, &self.stages[stage], k));
+                if let Some((to, from)) = counted {
+                    r.barrier();
+                    r.copy(from, 0, to, 0, 4);
+                }
             })?);
             outcome?;
         }
@@ -495,6 +511,7 @@ impl<T: bytemuck::NoUninit> Params<T> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::tracer::stream::LAUNCH_RAYS;
 
     #[test]
     fn hazards_are_writes_before_uses() {

@@ -30,6 +30,7 @@ use crate::raster::Primary;
 use crate::scene::Scene;
 use crate::shaders::StreamShaders;
 use crate::tracer::gpu_scene::rows;
+use crate::tracer::stream::launch_rays;
 use crate::tracer::{MovedBounds, Tracer};
 use display::{Display, DisplayMode};
 use frame_samples::FrameSamples;
@@ -141,7 +142,7 @@ struct State {
     environment_turn: Option<DMat3>,
 }
 
-/// Paths at rest begin at a multiple of this: a power of two of samples of a sequence are even only if the first has a multiple of their number as its index.
+/// Paths at rest begin at a multiple of this: 2^k samples of a sequence fill the square evenly only where the first one's index is a multiple of 2^k.
 const REST_BLOCK: u32 = 1 << 12;
 
 /// Samples for which a history of radiance counts after lights or materials have changed, per ray of a frame.
@@ -160,6 +161,7 @@ impl Realtime {
     /// [`Error::Usage`] for settings out of range, [`Error::OutOfMemory`], and those of compiling shaders.
     pub fn new(tracer: &Tracer, size: [u32; 2], settings: &Settings, lights: &[[f32; 3]]) -> Result<Self> {
         settings.check()?;
+        let settings = &settings.with_launches_of(&tracer.device().info);
         let block = Block { origin: [0, 0], size };
         let rays = u64::from(block.rays()) * u64::from(settings.most_rays().max(settings.rays_per_pixel));
         if rays > u64::from(u32::MAX) {
@@ -178,6 +180,7 @@ impl Realtime {
             tiled_pixels: block.rays().into(),
             half_pixels: pixels(size.map(|n| n.div_ceil(2))),
             most_rays: settings.most_rays().into(),
+            launch_rays: launch_rays(&tracer.device().info).into(),
         };
         let device = tracer.device();
         let frame_samples = FrameSamples::of_visibility(settings, pixels(size));
@@ -211,6 +214,7 @@ impl Realtime {
     ) -> Result<Self> {
         settings.check()?;
         settings.check_radiance()?;
+        let settings = &settings.with_launches_of(&tracer.device().info);
         let block = Block { origin: [0, 0], size };
         let pixels = u64::from(size[0]) * u64::from(size[1]);
         let extent =
@@ -455,8 +459,7 @@ impl Realtime {
         };
         let timings = self.graph.run(&frame, &stages, control)?;
         tracer.check_finished()?;
-        let count: Vec<u32> = self.graph.resources().read(Resource::RayCount, 1)?;
-        let occlusion_rays = count.first().map_or(self.graph.rays(), |&n| u64::from(n));
+        let occlusion_rays = self.graph.rays()?;
         let pixels = self.pixels();
         let period = self.settings.resolution.period();
         let all = pixels * u64::from(samples) / u64::from(if is_long && !self.is_radiance { 1 } else { period });

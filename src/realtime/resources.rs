@@ -7,7 +7,6 @@ use crate::error::Result;
 use crate::gpu::{Buffer, Device, Memory};
 use crate::interface::records::denoise::RadianceRecord;
 use crate::interface::records::frame::{SUMS_COUNT, SurfaceRecord};
-use crate::tracer::stream::LAUNCH_RAYS;
 
 /// Bytes of a `SurfaceRecord`.
 pub const SURFACE_BYTES: u64 = size_of::<SurfaceRecord>() as u64;
@@ -139,22 +138,23 @@ pub struct Extent {
     pub half_pixels: u64,
     /// With a variance budget the maximum rays per pixel; else 0.
     pub most_rays: u64,
+    /// Maximum rays of a launch.
+    pub launch_rays: u64,
 }
 
 /// Description of a resource's buffer.
 struct Description {
     name: &'static str,
     bytes: u64,
-    memory: Memory,
     lifetime: Lifetime,
 }
 
 impl Resource {
     fn describe(self, extent: &Extent) -> Description {
         use Lifetime::{Frame, Host, Kept, Pair};
-        let Extent { pixels, tiled_pixels, half_pixels, most_rays } = *extent;
-        let device = |name, bytes, lifetime| Description { name, bytes, memory: Memory::Device, lifetime };
-        let readback = |name, bytes| Description { name, bytes, memory: Memory::Readback, lifetime: Kept };
+        let Extent { pixels, tiled_pixels, half_pixels, most_rays, launch_rays } = *extent;
+        // all in the device's memory, also what the host reads: a GPU takes ten times as long to write to the host's, pixel by pixel
+        let device = |name, bytes, lifetime| Description { name, bytes, lifetime };
         match self {
             Self::Camera | Self::Scene | Self::FrameNumber | Self::DisplaySettings => device("host", 0, Host),
             Self::Guide => device("guide", PAIR_BYTES * pixels, Pair),
@@ -164,16 +164,16 @@ impl Resource {
             Self::Current => device("estimates of the frame", PAIR_BYTES * pixels, Frame),
             Self::CurrentBent => device("bent normals of the frame", VECTOR_BYTES * pixels, Frame),
             Self::Samples if most_rays > 0 => device("samples", 4 * most_rays * pixels, Frame),
-            Self::Samples => device("samples", 4 * u64::from(LAUNCH_RAYS), Frame),
-            Self::RayCount => readback("number of rays", 4),
+            Self::Samples => device("samples", 4 * launch_rays, Frame),
+            Self::RayCount => device("number of rays", 4, Kept),
             Self::History => device("history", PAIR_BYTES * pixels, Pair),
             Self::BentHistory => device("bent history", VECTOR_BYTES * pixels, Pair),
             Self::Filtered(_) => device("filtered estimates", PAIR_BYTES * pixels, Frame),
             Self::FilteredBent(_) => device("filtered bent normals", VECTOR_BYTES * pixels, Frame),
-            Self::Result => readback("ambient visibility", 4 * pixels),
+            Self::Result => device("ambient visibility", 4 * pixels, Kept),
             Self::BentResult => device("bent normals", VECTOR_BYTES * pixels, Kept),
             Self::DisplayImage => device("display", 4 * pixels, Kept),
-            Self::DebugCounts => readback("counts of a debug view", 4 * pixels),
+            Self::DebugCounts => device("counts of a debug view", 4 * pixels, Kept),
             Self::DesiredSamples => device("desired samples", 8 * tiled_pixels, Frame),
             Self::Sums => device("sums of desired samples", 4 * u64::from(SUMS_COUNT), Frame),
             Self::Plan => device("plan of rays", 8 * pixels, Frame),
@@ -193,7 +193,7 @@ impl Resource {
             Self::Denoised => device("denoised samples at rest", 4 * pixels, Kept),
             Self::RestParts => device("parts at rest", REST_PARTS_BYTES * pixels, Kept),
             Self::ResolvedHistory => device("resolved history", QUAD_BYTES * pixels, Pair),
-            Self::Resolved => readback("resolved image", QUAD_BYTES * pixels),
+            Self::Resolved => device("resolved image", QUAD_BYTES * pixels, Kept),
             Self::VisibleLights => device("visible lights", 4 * pixels, Frame),
             Self::Occlusion => device("occlusion", 4 * half_pixels, Frame),
             Self::Combined => device("combined", 4 * pixels, Frame),
@@ -256,7 +256,7 @@ impl Resources {
         // buffers of transient resources, with the last stage that uses them
         let mut shared: Vec<(usize, u64, usize)> = Vec::new();
         for (resource, [first, last]) in spans {
-            let Description { name, bytes, memory, lifetime } = resource.describe(&self.extent);
+            let Description { name, bytes, lifetime } = resource.describe(&self.extent);
             let free = shared.iter_mut().find(|s| lifetime == Lifetime::Frame && s.1 == bytes && s.2 < first);
             let buffers = match free {
                 Some(slot) => {
@@ -267,7 +267,7 @@ impl Resources {
                     let own = self.buffers.len();
                     let count = if lifetime == Lifetime::Pair { 2 } else { 1 };
                     for _ in 0..count {
-                        self.buffers.push(Buffer::new(device, name, bytes, memory)?);
+                        self.buffers.push(Buffer::new(device, name, bytes, Memory::Device)?);
                     }
                     if lifetime == Lifetime::Frame {
                         shared.push((own, bytes, last));

@@ -1,6 +1,7 @@
 //! Settings of the real-time pipeline, and presets.
 
 use crate::error::{Error, Result};
+use crate::gpu::DeviceInfo;
 use crate::integrators::ao::{Attenuation, Hemisphere};
 use crate::integrators::path::PathOptions;
 pub use crate::interface::Resolution;
@@ -9,7 +10,7 @@ use crate::interface::records::passes::FilterParams;
 use crate::raster::Primary;
 use crate::sampling::Sequence;
 use crate::settings::choices;
-use crate::tracer::stream::LAUNCH_RAYS;
+use crate::tracer::stream::launch_rays;
 
 choices! {
     /// How a pixel's ambient visibility is estimated.
@@ -190,7 +191,8 @@ pub struct Settings {
     pub rest_rr_depth: u32,
     /// Also compute bent normals: the mean unoccluded direction.
     pub bent: bool,
-    /// Maximum rays of a launch. Small launches let a frame be interrupted soon ([`super::Realtime::frame_with`]); images do not depend on it.
+    /// Maximum rays of a launch, if fewer than the device's ([`crate::tracer::stream::launch_rays`]). Small launches let a frame be interrupted soon
+    /// ([`super::Realtime::frame_with`]); images do not depend on it.
     #[serde(skip)]
     pub launch_rays: u32,
 }
@@ -287,6 +289,11 @@ impl Settings {
 }
 
 impl Settings {
+    /// The settings with launches no larger than a device takes.
+    pub(super) fn with_launches_of(&self, info: &DeviceInfo) -> Self {
+        Self { launch_rays: self.launch_rays.min(launch_rays(info)), ..*self }
+    }
+
     /// Checks that the settings fit frames of radiance.
     ///
     /// # Errors
@@ -362,7 +369,7 @@ impl Preset {
             rest_samples: 256,
             rest_rr_depth: PathOptions::default().rr_depth,
             bent: false,
-            launch_rays: LAUNCH_RAYS,
+            launch_rays: u32::MAX,
         };
         match self {
             // the paper traces closest hits up to 100 units, whatever the falloff

@@ -4,15 +4,24 @@ use std::sync::Arc;
 
 use crate::accel::features::SceneFeatures;
 use crate::error::{Error, Result};
-use crate::gpu::{Buffer, ComputePipeline, Device, HitShaders, RayTracingPipeline, Recorder, Specialization};
+use crate::gpu::{Buffer, ComputePipeline, Device, DeviceInfo, HitShaders, RayTracingPipeline, Recorder, Specialization};
 use crate::interface::constants;
 use crate::interface::records::hierarchy::{LaunchHit, RESUMED, UNFINISHED};
 pub use crate::interface::records::ray::Push;
 use crate::ray::Ray;
 use crate::shaders::{self, LANES, Mode, PACKET_RAYS, RUN, Rays, SPREAD, StreamShaders, Variant};
 
-/// Maximum number of rays in a launch of the compute tracer: the capacity of its ray and hit buffers.
+/// Number of rays that a launch may have on every device.
 pub const LAUNCH_RAYS: u32 = 1 << 19;
+
+/// Memory of a GPU in bytes from which launches are larger: rays and states of paths are about 250 bytes each.
+const MEMORY_OF_LARGE_LAUNCHES: u64 = 6 << 30;
+
+/// Maximum number of rays in a launch of frames on a device: the capacity of the compute tracer's ray and hit buffers. Between the steps of a launch a GPU is
+/// idle for a tenth of a millisecond, longer than it takes for half a million rays.
+pub fn launch_rays(info: &DeviceInfo) -> u32 {
+    if info.is_cpu() || info.limits.device_memory < MEMORY_OF_LARGE_LAUNCHES { LAUNCH_RAYS } else { 4 * LAUNCH_RAYS }
+}
 
 #[derive(Clone)]
 enum Pipeline {
@@ -42,6 +51,8 @@ enum Pipeline {
 /// Ray and hit buffers of a launch, between its steps.
 #[derive(Clone)]
 pub(super) struct LaunchMemory {
+    /// How many rays it is for.
+    pub capacity: u32,
     pub rays: Arc<Buffer>,
     pub hits: Arc<Buffer>,
     /// A u32 per work-group: number of rays that its lanes have fetched.
@@ -202,7 +213,6 @@ impl Stream {
         }
         let in_memory = self.shaders.rays == Rays::Queue || matches!(self.pipeline, Pipeline::Rasterized(_));
         debug_assert_eq!(in_memory, push.rays != 0, "{}: where are its rays?", self.shaders.name);
-        debug_assert!(in_memory || push.count <= LAUNCH_RAYS, "{}: results would overwrite each other", self.shaders.name);
         let pass = self.shaders.pass;
         match &self.pipeline {
             Pipeline::Single { pipeline, rays_per_group } => {
@@ -214,9 +224,11 @@ impl Stream {
                 recorder.timed(pass, |r| r.dispatch_3d(pipeline, push, groups));
             }
             Pipeline::Steps { generate, trace, deliver, rays_per_group, memory, record } => {
+                let most = memory.capacity;
+                debug_assert!(in_memory || push.count <= most, "{}: results would overwrite each other", self.shaders.name);
                 let [generating, tracing, delivering] = self.shaders.steps;
-                for first in (0..push.count).step_by(LAUNCH_RAYS as usize) {
-                    let mut push = Push { first: push.first + first, count: LAUNCH_RAYS.min(push.count - first), ..*push };
+                for first in (0..push.count).step_by(most as usize) {
+                    let mut push = Push { first: push.first + first, count: most.min(push.count - first), ..*push };
                     // the steps hand rays and hits on in memory, and so does one launch to the next
                     recorder.barrier();
                     let groups = spread(push.count.div_ceil(*rays_per_group), 1);

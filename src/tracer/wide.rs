@@ -15,7 +15,7 @@ use super::compute::{
 use super::dynamic_trees::{DynamicTrees, instance_leaf, reserve};
 use super::kernel::BuildOptions;
 use super::kernel::Kernel;
-use super::stream::{LAUNCH_RAYS, LaunchMemory, SuspendedRays};
+use super::stream::{LaunchMemory, SuspendedRays, launch_rays};
 use crate::accel::build::{self, MAX_DEPTH};
 use crate::accel::cache::KeyBuilder;
 use crate::accel::flatten::{BlasGroup, FlatScene, TlasInstance};
@@ -120,7 +120,8 @@ impl Trees {
             Some(_) => capacities.top as u64 + flat.instances.iter().map(blocks_of).sum::<u64>(),
             None => count as u64,
         };
-        let launch = |name, bytes| Buffer::new(device, name, bytes * LAUNCH_RAYS as u64, Memory::Device).map(Arc::new);
+        let capacity = launch_rays(&device.info);
+        let launch = |name, bytes| Buffer::new(device, name, bytes * u64::from(capacity), Memory::Device).map(Arc::new);
         Ok(Hierarchy {
             kernel,
             primitives: None,
@@ -132,6 +133,7 @@ impl Trees {
             dynamic: dynamic.map(|mut d| d.keep_copy(device, &nodes).map(|()| d)).transpose()?,
             nodes,
             launch: Some(LaunchMemory {
+                capacity,
                 rays: launch("launch rays", size_of::<Ray>() as u64)?,
                 hits: launch("launch hits", size_of::<LaunchHit>() as u64)?,
                 counters: launch("launch counters", 4)?,

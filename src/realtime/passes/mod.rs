@@ -35,7 +35,6 @@ use crate::raster::Primary;
 use crate::scene::material::MaterialKind;
 use crate::shaders::{self, ComputeShader, StreamShaders};
 use crate::tracer::Tracer;
-use crate::tracer::stream::LAUNCH_RAYS;
 use debug::DebugView;
 use paths::MAX_SAMPLES;
 
@@ -120,7 +119,7 @@ pub fn radiance_stages(
     samples: FrameSamples,
 ) -> Result<Vec<Stage>> {
     let pixels = block.size[0] * block.size[1];
-    let most = settings.launch_rays.clamp(MAX_SAMPLES * TILE_PIXELS, LAUNCH_RAYS);
+    let most = settings.launch_rays.max(MAX_SAMPLES * TILE_PIXELS);
     let sampled = Block { size: settings.resolution.sampled_size(block.size), ..block };
     let spp = samples.many.min(MAX_SAMPLES).next_power_of_two();
     let paths = sampled.rays().saturating_mul(spp).min(most);
