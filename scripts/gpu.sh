@@ -62,8 +62,8 @@ carry() {
 PATH=$PATH:/sbin:/usr/sbin
 carry "$kit/lib/loader" libvulkan.so.1
 carry "$kit/lib/gcc" libgcc_s.so.1
-# NVIDIA's libGLX_nvidia and libEGL_nvidia ask for these
-carry "$kit/lib/driver" libX11.so.6 libXext.so.6 libxcb.so.1 libGLdispatch.so.0
+# NVIDIA's libGLX_nvidia and libEGL_nvidia ask for these. With the first four alone driver 580 gave no entry point; with all of libglvnd it did.
+carry "$kit/lib/driver" libX11.so.6 libXext.so.6 libxcb.so.1 libGLdispatch.so.0 libEGL.so.1 libGLX.so.0 libGL.so.1 libOpenGL.so.0 libGLESv2.so.2
 layer=$(ldconfig -p | awk '$1 == "libVkLayer_khronos_validation.so" && !n++ {print $NF}')
 if [ -n "$layer" ] && [ -f /usr/share/vulkan/explicit_layer.d/VkLayer_khronos_validation.json ]; then
   strip -o "$kit/layer/libVkLayer_khronos_validation.so" "$layer"

@@ -278,6 +278,17 @@ def gallery(folder: Path, page: Path) -> list[str]:
     return ["## Images", "", *lines, ""] if lines else []
 
 
+# what is written by hand stays when the page is made anew
+NOTES = ["<!-- notes: what is between these two lines is written by hand, and kept -->", "<!-- end of notes -->"]
+
+
+def kept(page: Path) -> list[str]:
+    old = text(page)
+    if not all(mark in old for mark in NOTES):
+        return []
+    return [NOTES[0], *old.split(NOTES[0], 1)[1].split(NOTES[1], 1)[0].splitlines()[1:], NOTES[1], ""]
+
+
 def main() -> None:
     if len(sys.argv) != 3:
         sys.exit(__doc__)
@@ -291,7 +302,7 @@ def main() -> None:
     lines = ["# skylit on a GPU", "", "Written by `./scripts/gpu.sh report` from what the kit of `./scripts/gpu.sh` brought back.", ""]
     if "cpu" in kinds:
         lines += ["**This is no GPU**: the kit found a driver that runs on the CPU, and did little of everything.", ""]
-    lines += [*machine(folder), f"{passed} of {len(every)} steps passed.", "", *outcomes(folder)]
+    lines += [*kept(page), *machine(folder), f"{passed} of {len(every)} steps passed.", "", *outcomes(folder)]
     for part in [images, parity, leaks, closed_forms, stress, presets, light, rays, paths]:
         lines += part(folder)
     lines += gallery(folder, page)

@@ -5,6 +5,7 @@
 
 use std::cell::Cell;
 use std::collections::{HashMap, VecDeque};
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError, Weak};
 use std::time::Instant;
 
@@ -153,12 +154,14 @@ pub(super) struct LivePipelines {
     /// The pipelines compiled last, at most `max_kept`. They hold their device, which is then never closed.
     kept: Mutex<VecDeque<Arc<Compiled>>>,
     max_kept: usize,
+    /// How many have been compiled.
+    compiled: AtomicU64,
 }
 
 impl LivePipelines {
     /// `max_kept`: [`super::Options::keep_pipelines`].
     pub(super) fn new(max_kept: usize) -> Self {
-        Self { all: Mutex::default(), kept: Mutex::default(), max_kept }
+        Self { all: Mutex::default(), kept: Mutex::default(), max_kept, compiled: AtomicU64::new(0) }
     }
 
     /// The pipeline with this key, compiled by `make` if there is none.
@@ -169,6 +172,7 @@ impl LivePipelines {
         }
         // not under the lock: compiling takes seconds, and several threads compile at once
         let made = Arc::new(make()?);
+        self.compiled.fetch_add(1, Ordering::Relaxed);
         let mut all = all();
         all.retain(|_, pipeline| pipeline.strong_count() > 0);
         all.insert(key, Arc::downgrade(&made));
@@ -200,6 +204,11 @@ impl Device {
     pub fn live_pipelines(&self) -> KeptPipelines {
         let all = self.live.all.lock().unwrap_or_else(PoisonError::into_inner);
         KeptPipelines { pipelines: all.values().filter_map(Weak::upgrade).collect() }
+    }
+
+    /// Number of pipelines that have been compiled with this device, whether they came from the driver's cache or not.
+    pub fn compiled_pipelines(&self) -> u64 {
+        self.live.compiled.load(Ordering::Relaxed)
     }
 }
 

@@ -40,14 +40,16 @@ pub fn stage(tracer: &Tracer, pixels: u32, input: Resource, has_rest: bool) -> R
     Ok(Stage::new(vec![Box::new(pass)], Range::all(pixels)))
 }
 
-/// Minimum weight of a frame of radiance at rest. Frames count by the samples that they are means of: long ones soon have many times as many as those before, which lie at one place in all pixels.
+/// Minimum weight of a frame of radiance at rest, which is the filtered mean of all samples so far: those before it are of a part of its samples. By the third power of that part they
+/// soften what the filter does at edges and hide its specks, and the mean has nearly the noise of all samples: by the square 1.07 times that after four long frames, by higher powers less, and more
+/// specks.
 fn least_weight(frame: &Frame) -> f32 {
     let after = frame.rest_samples as f32;
     if !frame.is_long || after <= 0.0 {
         return LEAST_WEIGHT;
     }
     let before = (after - frame.samples as f32).max(0.0);
-    (1.0 - (before / after).powi(2)).max(LEAST_WEIGHT)
+    (1.0 - (before / after).powi(3)).max(LEAST_WEIGHT)
 }
 
 impl Pass for Antialias {
