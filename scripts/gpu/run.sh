@@ -129,7 +129,7 @@ say "tracers: ${tracers[*]:-none}"
 {
   cat "$kit/VERSION"
   printf 'quick %s\nvalidation layer %s\ntracers %s\n' "${quick:-no}" "$layer" "${tracers[*]:-none}"
-  printf 'date %s\nsystem %s\n' "$(date -u +%Y-%m-%d)" "$(uname -srm)"
+  printf 'date %s\nsystem %s\n' "$(date -u +%Y-%m-%d)" "$(uname -sm)"
   printf 'cpu %s, %s threads\n' "$(sed -n 's/^model name[^:]*: //p' /proc/cpuinfo | head -n 1)" "$(nproc)"
   printf 'glibc %s\n' "$(ldd --version 2>/dev/null | head -n 1)"
 } > "$out/about.txt"
