@@ -166,6 +166,19 @@ def differences(record: dict[str, Any]) -> str:
     return ", ".join(f"{c.get('name', c.get('channel'))} {number(c.get('rmse'))}" for c in channels if number(c.get("rmse")) != "-") or "-"
 
 
+def milliseconds(cost: Any, clock: str = "device_ms") -> str:
+    """The median, and what 95 % of frames keep within."""
+    return f"{number(cost[clock]['median'])} ({number(cost[clock]['p95'])})" if cost else "-"
+
+
+def rmse(record: Any) -> str:
+    return number(((record or {}).get("errors") or {}).get("rmse"))
+
+
+def passes(cost: Any) -> str:
+    return ", ".join(f"{p['pass']} {number(p['ms']['median'])}" for p in (cost or {}).get("passes", []))
+
+
 def presets(folder: Path) -> list[str]:
     record = load(folder / "bench-ao.json")
     if not record:
@@ -176,11 +189,9 @@ def presets(folder: Path) -> list[str]:
         rows = []
         for r in view["results"]:
             still, moving = r.get("still") or {}, r.get("moving") or {}
-            cost = lambda c: "-" if not c else f"{number(c['device_ms']['median'])} ({number(c['device_ms']['p95'])})"
-            curve = still.get("curve") or []
-            rmse = lambda e: number((e or {}).get("errors", {}).get("rmse")) if e else "-"
-            passes = ", ".join(f"{p['pass']} {number(p['ms']['median'])}" for p in (moving.get("cost") or still.get("cost") or {}).get("passes", []))
-            rows.append([f"`{r['preset']}`", r["primary"], cost(still.get("cost")), cost(moving.get("cost")), rmse(curve[0] if curve else None), rmse(curve[-1] if curve else None), rmse(moving), passes])
+            curve = still.get("curve") or [None]
+            costs = [still.get("cost"), moving.get("cost")]
+            rows.append([f"`{r['preset']}`", r["primary"], *map(milliseconds, costs), rmse(curve[0]), rmse(curve[-1]), rmse(moving), passes(costs[1] or costs[0])])
         lines += [f"{view['scene']}, {view['view']}: {view['primitives']:,} primitives", ""]
         lines += table(["preset", "camera rays", "still", "moving", "RMSE of frame 1", "RMSE settled", "RMSE moving", "passes"], rows)
     return lines + notes(record)
@@ -192,16 +203,13 @@ def light(folder: Path) -> list[str]:
         return []
     width, height = record["size"]
     lines = [f"## Path tracing in real time, {width}x{height}", "", f"Tracer `{record['tracer']}`, {record['frames']} frames, references of {record['reference_paths']} paths a pixel. Milliseconds a frame: by the device's clock, the median (what 95 % of frames keep within), and by the program's, with all that it does besides. RMSE: of the last frame, beside plain accumulation's at equal time.", ""]
-    cost = lambda c, clock: f"{number(c[clock]['median'])} ({number(c[clock]['p95'])})"
-    rmse = lambda e: number(((e or {}).get("errors") or {}).get("rmse"))
-    passes = lambda c: ", ".join(f"{p['pass']} {number(p['ms']['median'])}" for p in c["passes"])
     for view in record["views"]:
         rows = []
         for r in view["still"]:
             last = (r["curve"] or [{}])[-1]
-            rows.append([f"`{r['preset']}`", "still", cost(r["cost"], "device_ms"), cost(r["cost"], "wall_ms"), f"{rmse(last)} / {rmse(last.get('plain'))}", passes(r["cost"])])
+            rows.append([f"`{r['preset']}`", "still", milliseconds(r["cost"]), milliseconds(r["cost"], "wall_ms"), f"{rmse(last)} / {rmse(last.get('plain'))}", passes(r["cost"])])
         for m in view["motions"]:
-            rows += [[f"`{r['preset']}`", m["motion"], cost(r["cost"], "device_ms"), cost(r["cost"], "wall_ms"), f"{rmse(r)} / {rmse(r.get('plain'))}", passes(r["cost"])] for r in m["results"]]
+            rows += [[f"`{r['preset']}`", m["motion"], milliseconds(r["cost"]), milliseconds(r["cost"], "wall_ms"), f"{rmse(r)} / {rmse(r.get('plain'))}", passes(r["cost"])] for r in m["results"]]
         lines += [f"{view['scene']}: {view['primitives']:,} primitives", ""]
         lines += table(["preset", "motion", "device ms", "wall ms", "RMSE / plain", "passes, ms"], rows)
     return lines + notes(record)
