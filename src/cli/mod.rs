@@ -122,6 +122,7 @@ pub fn run() -> ExitCode {
 
 /// Starts the threads that commands share: without memory for them the first use would panic.
 fn start_threads() -> Result<()> {
+    crate::gpu::host_memory::check_room_to_start();
     let outcome = rayon::ThreadPoolBuilder::new().build_global();
     outcome.map_err(|e| Error::OutOfMemory(format!("the system has no room for more threads of this process: {e}")))
 }

@@ -44,6 +44,15 @@ unsafe extern "C" {
     safe fn exit_at_once(code: i32) -> !;
 }
 
+/// What threads and the C library take at the start of the program, in bytes, and more.
+const ROOM_TO_START: usize = 16 << 20;
+
+/// Ends the process with the line and the exit code of [`Error::OutOfMemory`] if there is no room for threads: where the C library has nothing left for what it keeps of each,
+/// it aborts. To be called before any thread is started.
+pub fn check_room_to_start() {
+    drop(std::hint::black_box(Vec::<u8>::with_capacity(ROOM_TO_START)));
+}
+
 #[cold]
 fn end(size: usize) -> ! {
     static ENDING: AtomicBool = AtomicBool::new(false);

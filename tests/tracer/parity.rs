@@ -227,8 +227,9 @@ fn gpu_the_other_triangle_test_leaks() {
         let leaks = hits(&edges).iter().filter(|h| !h.is_hit()).count();
         let differ = hits(&anywhere).iter().zip(&truth).filter(|(h, t)| h.is_hit() != t.is_hit()).count();
         println!("{kernel}: {leaks} of {} rays leak, {differ} of {} others differ", edges.len(), anywhere.len());
-        // a seventeenth on CPUs, a ninth on a GPU that fuses products into sums
-        assert!(leaks > 0 && leaks < edges.len() / 5, "{kernel}: {leaks} leaks");
+        // on a GPU that fuses products into sums it is more: a ninth of them
+        let most = edges.len() / if device.info.is_cpu() { 10 } else { 5 };
+        assert!(leaks > 0 && leaks < most, "{kernel}: {leaks} leaks");
         assert!(differ < anywhere.len() / 1000, "{kernel}: {differ} differ");
     }
     assert_validation_clean(&device);
