@@ -228,11 +228,12 @@ impl Buffer {
 
 impl Drop for Buffer {
     fn drop(&mut self) {
+        // before its memory is given back: else another thread's buffer has the same address while this one is still there
+        // SAFETY: submissions are waited for, so the device is not using it
+        unsafe { self.device.raw.destroy_buffer(self.raw, None) };
         if let Some(allocation) = self.allocation.take() {
             // a failed free can only leak
             let _ = self.device.allocator().free(allocation);
         }
-        // SAFETY: submissions are waited for, so the device is not using it
-        unsafe { self.device.raw.destroy_buffer(self.raw, None) };
     }
 }

@@ -1,9 +1,12 @@
 //! The validation layer that all device tests run with.
 
 use skylit::Error;
+use skylit::accel::flatten::FlatScene;
 use skylit::gpu::{Buffer, Commands, Memory};
+use skylit::scene::builtin::by_name;
+use skylit::tracer::Tracer;
 
-use crate::common::{assert_validation_clean, new_device};
+use crate::common::{ALL, assert_validation_clean, new_device, tracers};
 
 /// The layer does listen: copying no bytes is forbidden (VUID-VkBufferCopy-size-01988) and does nothing.
 #[test]
@@ -21,4 +24,23 @@ fn gpu_validation_layer_listens() {
     Commands::new(&device).unwrap().run(|r| r.copy(&a, 0, &b, 0, 0)).unwrap();
     assert!(matches!(device.check_validation(), Err(Error::Vulkan(_))));
     assert!(device.check_validation().is_ok());
+}
+
+/// Threads that share a device make and drop buffers in the same memory: one's is gone before its memory is another's. Builds of acceleration
+/// structures name their buffers by address, where the layer would find both.
+#[test]
+fn gpu_threads_share_memory() {
+    let device = new_device();
+    let scene = by_name("stairs").unwrap();
+    let flat = FlatScene::new(&scene);
+    std::thread::scope(|threads| {
+        for _ in 0..3 {
+            threads.spawn(|| {
+                for kind in tracers(&device).into_iter().cycle().take(120) {
+                    drop(Tracer::new(&device, kind, &flat, ALL).unwrap());
+                }
+            });
+        }
+    });
+    assert_validation_clean(&device);
 }
