@@ -82,17 +82,10 @@ impl Commands {
             let buffers = [self.buffer];
             let submit = [vk::SubmitInfo::default().command_buffers(&buffers)];
             super::faults::submission(&self.device.is_lost).context("submitting work")?;
-            let mut queue = Some(self.device.queue.lock().unwrap_or_else(|e| e.into_inner()));
-            if let Some(queue) = &queue {
-                raw.queue_submit(**queue, &submit, self.fence).context("submitting work")?;
-            }
-            // with the validation layer one submission at a time: where two threads wait for fences of their own, it (1.3.239) may still count a buffer as used
-            // by a submission whose fence was signaled, and report the buffer's destruction
-            if !self.device.is_validated() {
-                queue = None;
-            }
-            raw.wait_for_fences(&[self.fence], true, u64::MAX).context("waiting for the device")?;
+            let queue = self.device.queue.lock().unwrap_or_else(|e| e.into_inner());
+            raw.queue_submit(*queue, &submit, self.fence).context("submitting work")?;
             drop(queue);
+            raw.wait_for_fences(&[self.fence], true, u64::MAX).context("waiting for the device")?;
             raw.reset_fences(&[self.fence]).context("waiting for the device")?;
         }
         self.timings(&labels)

@@ -156,11 +156,6 @@ impl Device {
         }
     }
 
-    /// Returns true if the validation layer is enabled.
-    pub(super) fn is_validated(&self) -> bool {
-        self.validation.is_some()
-    }
-
     /// Takes the messages of the validation layer since the last call.
     pub fn validation_messages(&self) -> Vec<String> {
         self.validation.as_ref().map(|v| v.take()).unwrap_or_default()
