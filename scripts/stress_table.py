@@ -2,8 +2,11 @@
 """Makes the tables of docs/stress.md: every check of `skylit stress`, with its figure on each tracer and driver.
 
     skylit stress --json > new.json                                            # on the newest driver
+    for t in compute pipeline query; do skylit stress --json --tracer $t > $t.json; done   # sections that shade run on one tracer only
     VK_DRIVER_FILES=... VK_ICD_FILENAMES=... skylit stress --json > floor.json   # on the oldest
-    python3 scripts/stress_table.py new.json floor.json
+    python3 scripts/stress_table.py new.json compute.json pipeline.json query.json floor.json
+
+Records of one driver share their columns: the first that has a figure gives it.
 """
 
 import json
@@ -29,7 +32,14 @@ def bound(check):
 
 
 def main(files):
-    records = [json.load(open(f)) for f in files]
+    records = []
+    for r in (json.load(open(f)) for f in files):
+        before = next((b for b in records if b["driver"] == r["driver"] and b["device"] == r["device"]), None)
+        if before is None:
+            records.append(r)
+            continue
+        had = {(c["section"], c["name"], c["tracer"]) for c in before["checks"]}
+        before["checks"] += [c for c in r["checks"] if (c["section"], c["name"], c["tracer"]) not in had]
     columns = []
     for r in records:
         driver = re.search(r"Mesa [0-9.]+", r["driver"])
