@@ -246,6 +246,8 @@ pub struct Graph {
     commands: Commands,
     /// The number of rays, where the host cannot read that of the device.
     ray_count: Option<Buffer>,
+    /// What the frame that has begun, and is not finished, writes.
+    begun: Vec<Resource>,
 }
 
 impl Graph {
@@ -257,7 +259,7 @@ impl Graph {
             true => Some(Buffer::new(device, "number of rays for the host", 4, Memory::Readback)?),
             false => None,
         };
-        Ok(Self { stages, resources, commands: Commands::new(device)?, ray_count })
+        Ok(Self { stages, resources, commands: Commands::new(device)?, ray_count, begun: Vec::new() })
     }
 
     /// Adds stages after all others. Returns false if that discarded the contents of all resources: stages that read transient ones have them allocated anew,
@@ -313,6 +315,7 @@ impl Graph {
     /// [`Graph::resources`] is valid for this frame from here on.
     pub fn begin(&mut self, display: Option<&Display>, is_long: bool) -> Vec<usize> {
         let mut recorded = Vec::new();
+        self.begun.clear();
         let others = if is_long { Frames::Short } else { Frames::Long };
         for (k, stage) in self.stages.iter_mut().enumerate().filter(|(_, s)| s.frames != others) {
             let enabled = || stage.passes.iter().filter(|p| p.is_enabled(display));
@@ -334,6 +337,7 @@ impl Graph {
                     self.resources.swap(resource);
                 }
             }
+            self.begun.append(&mut written);
             recorded.push(k);
         }
         recorded
@@ -342,6 +346,15 @@ impl Graph {
     /// Forgets which stages have run, after a frame that was not finished: the next frame records all of them.
     pub fn invalidate(&mut self) {
         self.stages.iter_mut().for_each(|s| s.versions.clear());
+    }
+
+    /// After a frame that was not finished: double-buffered resources are those of the frame before again. What passes add to in place
+    /// ([`Resource::Rest`], [`Resource::RestParts`]) is in pieces.
+    pub fn take_back(&mut self) {
+        for resource in self.begun.drain(..) {
+            self.resources.swap(resource);
+        }
+        self.invalidate();
     }
 
     /// Records, submits and waits for the stages that [`Graph::begin`] chose. Returns the times of passes, in order. With `control` each launch is a submission
@@ -403,6 +416,7 @@ impl Graph {
             })?);
             outcome?;
         }
+        self.begun.clear();
         Ok(timings)
     }
 }

@@ -117,7 +117,7 @@ impl DisplayPassKind {
 }
 
 /// State that the next frame depends on.
-#[derive(Default)]
+#[derive(Clone, Default)]
 struct State {
     frame: u32,
     camera: Option<CameraRecord>,
@@ -140,6 +140,8 @@ struct State {
     has_new_light: bool,
     /// The rotation to the environment map, if it is not yet on the device.
     environment_turn: Option<DMat3>,
+    /// A frame was interrupted: the samples at rest are in pieces and start anew.
+    was_interrupted: bool,
 }
 
 /// Paths at rest begin at a multiple of this: 2^k samples of a sequence fill the square evenly only where the first one's index is a multiple of 2^k.
@@ -346,7 +348,8 @@ impl Realtime {
         self.frame_with(tracer, camera, moved, None)
     }
 
-    /// As [`Realtime::frame`]; `control` is asked between launches whether to stop. After an error, an interruption included, there is no history.
+    /// As [`Realtime::frame`]; `control` is asked between launches whether to stop. After an interruption the next frame is what it would have been without
+    /// the interrupted one, histories included; only samples at rest start anew. Where something had moved in the scene, with Larsen's pipeline and after other errors there is no history.
     ///
     /// # Errors
     /// Those of the device, and [`Error::Interrupted`] when `control` says so.
@@ -357,10 +360,19 @@ impl Realtime {
         moved: &[MovedBounds],
         control: Option<&mut dyn Control>,
     ) -> Result<FrameStats> {
+        let before = self.state.clone();
         let stats = self.try_frame(tracer, camera, moved, control);
-        if stats.is_err() {
-            self.graph.invalidate();
-            self.reset();
+        match &stats {
+            Ok(_) => {}
+            // where the scene was is known of the frame before only
+            Err(Error::Interrupted) if moved.is_empty() && self.settings.technique != Technique::Larsen => {
+                self.graph.take_back();
+                self.state = State { was_interrupted: true, ..before };
+            }
+            Err(_) => {
+                self.graph.invalidate();
+                self.reset();
+            }
         }
         stats
     }
@@ -392,7 +404,8 @@ impl Realtime {
         let moved = moved_records(moved);
         let is_larsen = self.settings.technique == Technique::Larsen;
         // Larsen's pipeline skips no pass
-        let still = moved.is_empty() && self.state.camera == Some(*camera) && !is_larsen && !self.state.has_new_light;
+        let is_undisturbed = !self.state.has_new_light && !self.state.was_interrupted;
+        let still = moved.is_empty() && self.state.camera == Some(*camera) && !is_larsen && is_undisturbed;
         let resting = if still { self.state.resting.saturating_add(1) } else { 0 };
         let has_come_to_rest = self.frames_to_rest().is_some_and(|frames| resting >= frames);
         let (is_long, samples) = (self.frame_samples.is_long(resting), self.frame_samples.of(resting));
@@ -477,6 +490,7 @@ impl Realtime {
         self.state.offset = offset;
         self.state.has_new_light = false;
         self.state.environment_turn = None;
+        self.state.was_interrupted = false;
         self.shown = Some(self.display);
         Ok(FrameStats {
             timings,

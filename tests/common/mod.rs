@@ -9,8 +9,8 @@ use std::sync::{Arc, OnceLock};
 
 use skylit::Error;
 use skylit::accel::flatten::FlatScene;
-use skylit::film::NoControl;
 use skylit::film::camera::CameraRecord;
+use skylit::film::{Control, NoControl};
 use skylit::gpu::{Device, Options};
 use skylit::integrators::rays::{Mode, trace};
 use skylit::ray::{Hit, Ray};
@@ -95,6 +95,61 @@ pub fn hits(tracer: &Tracer, rays: &[Ray], mode: Mode) -> Vec<Hit> {
 
 pub fn closest(tracer: &Tracer, rays: &[Ray]) -> Vec<Hit> {
     hits(tracer, rays, Mode::Closest)
+}
+
+/// Interrupts when it is asked for the `at`-th time, from 1; 0: never.
+#[derive(Default)]
+pub struct InterruptAt {
+    pub at: u32,
+    pub asked: u32,
+}
+
+impl Control for InterruptAt {
+    fn should_stop(&mut self) -> skylit::Result<bool> {
+        self.asked += 1;
+        if self.asked == self.at { Err(Error::Interrupted) } else { Ok(false) }
+    }
+}
+
+/// Frames that rest, move, and are interrupted at every launch of a long one: what is shown in motion is, bit for bit, what it is without interruptions. Returns the number
+/// of launches. `make` makes a pipeline, `cameras` has where it rests and two places beside that.
+pub fn assert_interruptions_leave_histories(
+    tracer: &Tracer,
+    cameras: &[CameraRecord; 3],
+    make: &dyn Fn() -> skylit::realtime::Realtime,
+) -> u32 {
+    const AT_REST: u32 = 6;
+    let rest = |frames: &mut skylit::realtime::Realtime| {
+        (0..AT_REST).for_each(|_| drop(frames.frame(tracer, &cameras[0], &[]).unwrap()));
+    };
+    let mut counted = make();
+    rest(&mut counted);
+    let mut never = InterruptAt::default();
+    counted.frame_with(tracer, &cameras[0], &[], Some(&mut never)).unwrap();
+    let launches = never.asked;
+    let (mut without, mut with) = (make(), make());
+    for at in 1..=launches {
+        let images = [false, true].map(|is_interrupted| {
+            let frames = if is_interrupted { &mut with } else { &mut without };
+            let interrupt = |frames: &mut skylit::realtime::Realtime, camera: usize, at: u32| {
+                let outcome = frames.frame_with(tracer, &cameras[camera], &[], Some(&mut InterruptAt { at, asked: 0 }));
+                assert!(matches!(outcome, Err(Error::Interrupted)), "{}, launch {at}", tracer.kind());
+            };
+            rest(frames);
+            if is_interrupted {
+                interrupt(frames, 0, at);
+                // again, in motion
+                interrupt(frames, 2, 2);
+            }
+            frames.frame(tracer, &cameras[1], &[]).unwrap();
+            let first = frames.result().unwrap();
+            frames.frame(tracer, &cameras[2], &[]).unwrap();
+            [first, frames.result().unwrap()].map(|image| image.iter().map(|v| v.to_bits()).collect::<Vec<_>>())
+        });
+        assert!(images[0][0] != images[0][1], "nothing moves");
+        assert!(images[0] == images[1], "{}: interrupted at launch {at} of {launches}, frames in motion differ", tracer.kind());
+    }
+    launches
 }
 
 /// The validation layer had nothing to say.

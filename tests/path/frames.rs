@@ -377,3 +377,26 @@ fn gpu_frames_lights_move() {
     }
     assert_validation_clean(&device);
 }
+
+/// Who moves while a frame at rest is computed, which is then interrupted, sees what they would have seen without it: with what mirrors show, too.
+#[test]
+fn gpu_frames_interrupted_leave_histories() {
+    let device = device();
+    let scene = scene("cornell-spheres");
+    let options = PathOptions { size: SIZE, ..Default::default() };
+    let flat = FlatScene::for_paths(&scene);
+    let cameras = [0.0, 0.01, 0.02].map(|x| {
+        let mut camera = scene.cameras[0].clone();
+        camera.camera_to_world *= glam::DAffine3::from_translation(glam::DVec3::X * x);
+        record(&scene, &camera)
+    });
+    for kind in tracers(&device) {
+        let tracer = tracer(&device, kind, &flat);
+        let settings = Settings { launch_rays: 2000, ..converging() };
+        let make = || frames(&tracer, &flat, &settings, &options);
+        let launches = crate::common::assert_interruptions_leave_histories(&tracer, &cameras, &make);
+        println!("{kind}: {launches} launches");
+        assert!(launches > 6, "{kind}: {launches}");
+    }
+    assert_validation_clean(&device);
+}

@@ -6,7 +6,9 @@ use skylit::realtime::{Preset, Resolution, Settings};
 use skylit::scene::Projection;
 use skylit::tracer::TracerKind;
 
-use crate::common::{assert_validation_clean, device, record, scene, tracer, tracers};
+use crate::common::{
+    InterruptAt, assert_interruptions_leave_histories, assert_validation_clean, device, record, scene, tracer, tracers,
+};
 use crate::{NO_FILTER, SIZE, assert_sound, bits, frames, realtime, rmse, stepped, traced};
 
 /// With few frames it is better than the preset's filter alone with many, and it does not stay there.
@@ -148,6 +150,60 @@ fn gpu_samples_at_rest_are_histories_in_motion() {
             errors[0], errors[1], errors[2]
         );
         assert!(errors[1] < 0.6 * errors[0] && errors[1] < 1.05 * errors[2], "{kind}: {errors:?}");
+    }
+    assert_validation_clean(&device);
+}
+
+/// Who moves while a frame at rest is computed, which is then interrupted, sees what they would have seen without it.
+#[test]
+fn gpu_interrupted_frames_leave_histories() {
+    let device = device();
+    let scene = scene("stairs");
+    let cameras = [0.0, 0.01, 0.02].map(|x| stepped(&scene, SIZE, DVec3::X * x));
+    for kind in tracers(&device) {
+        let tracer = tracer(&device, kind, &scene);
+        let settings = Settings { antialias: true, converge: true, launch_rays: 30_000, ..traced(Preset::Fast) };
+        let make = || realtime(&tracer, SIZE, &settings);
+        let launches = assert_interruptions_leave_histories(&tracer, &cameras, &make);
+        println!("{kind}: {launches} launches");
+        assert!(launches > 4, "{kind}: {launches}");
+    }
+    assert_validation_clean(&device);
+}
+
+/// An image that goes on to rest after interruptions counts no sample twice, and becomes what it would have become.
+#[test]
+fn gpu_an_interrupted_image_converges() {
+    let device = device();
+    let scene = scene("stairs");
+    let camera = stepped(&scene, SIZE, DVec3::ZERO);
+    let settings = Settings { antialias: true, converge: true, launch_rays: 20_000, rest_samples: 256, ..traced(Preset::Fast) };
+    let many = Settings { rays_per_pixel: 64, history: 1, filter: NO_FILTER, seed: 77, converge: false, ..settings };
+    let quick = tracer(&device, TracerKind::Compute, &scene);
+    let mut truth = realtime(&quick, SIZE, &many);
+    frames(&mut truth, &quick, &camera, 64);
+    let (truth, all) = (truth.result().unwrap(), vec![1.0; (SIZE[0] * SIZE[1]) as usize]);
+    for kind in tracers(&device) {
+        let tracer = tracer(&device, kind, &scene);
+        let errors = [false, true].map(|is_interrupted| {
+            let mut realtime = realtime(&tracer, SIZE, &settings);
+            frames(&mut realtime, &tracer, &camera, 8);
+            if is_interrupted {
+                // in the middle: half of the pixels have this frame's samples
+                let outcome = realtime.frame_with(&tracer, &camera, &[], Some(&mut InterruptAt { at: 3, asked: 0 }));
+                assert!(outcome.is_err(), "{kind}");
+                frames(&mut realtime, &tracer, &camera, 1);
+                assert!(realtime.shown_samples() < 8, "{kind}: {} samples", realtime.shown_samples());
+            }
+            let to_rest = realtime.frames_to_rest().unwrap();
+            frames(&mut realtime, &tracer, &camera, to_rest);
+            let samples = realtime.shown_samples();
+            assert!((240..300).contains(&samples), "{kind}: {samples}");
+            assert_sound(&kind.to_string(), &realtime);
+            rmse(&realtime.result().unwrap(), &truth, &all)
+        });
+        println!("{kind}: {:.4} without an interruption, {:.4} after one", errors[0], errors[1]);
+        assert!(errors[1] < 1.1 * errors[0], "{kind}: {errors:?}");
     }
     assert_validation_clean(&device);
 }

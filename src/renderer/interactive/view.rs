@@ -57,6 +57,8 @@ struct FramesView {
     resting: u32,
     /// Number of those after which the image no longer changes.
     settling: u32,
+    /// The last step was interrupted: at rest the image starts anew.
+    was_interrupted: bool,
 }
 
 /// A still that converges.
@@ -159,7 +161,7 @@ impl View {
         let shown = display.shown;
         realtime.display(&world.tracer, Some(display))?;
         let settling = settling_frames(&realtime);
-        let view = FramesView { realtime, shown, resting: 0, settling };
+        let view = FramesView { realtime, shown, resting: 0, settling, was_interrupted: false };
         Ok((world.number, Kind::Frames(Box::new(view))))
     }
 
@@ -210,8 +212,8 @@ impl View {
         }
     }
 
-    /// Renders the next step: a frame, or samples of a still for about `time`, at least one of each pixel. `control` may interrupt it, after which the
-    /// view starts anew.
+    /// Renders the next step: a frame, or samples of a still for about `time`, at least one of each pixel. `control` may interrupt it, after which a
+    /// still starts anew; frames have their histories ([`Realtime::frame_with`]).
     ///
     /// # Errors
     /// Those of the device and of `control`, usually [`Error::Interrupted`].
@@ -233,8 +235,10 @@ impl View {
                 let aspect = f64::from(self.size[0]) / f64::from(self.size[1]);
                 let record = CameraRecord::new(camera, world.flat.origin, aspect);
                 let moved = if has_moved { &world.moved[..] } else { &[] };
-                view.resting = if rests { view.resting.saturating_add(1) } else { 0 };
-                view.step(world, &record, moved, control)
+                view.resting = if rests && !view.was_interrupted { view.resting.saturating_add(1) } else { 0 };
+                let step = view.step(world, &record, moved, control);
+                view.was_interrupted = step.is_err();
+                step
             }
             Kind::Still(view) => {
                 if !rests {
