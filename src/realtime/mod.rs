@@ -11,6 +11,7 @@ pub mod frame_settings;
 mod graph;
 pub(super) mod params;
 mod passes;
+mod resample;
 mod resources;
 pub mod sequence;
 pub mod settings;

@@ -201,6 +201,12 @@ impl Resource {
         }
     }
 
+    /// Words of 32 bits of a pixel's record.
+    pub fn words(self) -> u32 {
+        let pixel = Extent { pixels: 1, ..Default::default() };
+        (self.describe(&pixel).bytes / 4) as u32
+    }
+
     /// Returns true if its contents are lost after its last pass in a frame.
     pub fn is_transient(self) -> bool {
         self.describe(&Extent::default()).lifetime == Lifetime::Frame

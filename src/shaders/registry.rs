@@ -46,10 +46,12 @@ registry! {
         PATH_GATHER = "path_gather";
         PATH_RESOLVE = "path_resolve";
         RADIANCE_TEMPORAL = "radiance_temporal";
+        RESAMPLE = "resample";
         RESOLVE = "resolve";
         REST = "rest";
         REST_SAMPLES = "rest_samples";
         REST_NOISE = "rest_noise";
+        SEEN = "seen";
         TEMPORAL = "temporal";
     }
     stages {

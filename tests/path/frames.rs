@@ -400,3 +400,67 @@ fn gpu_frames_interrupted_leave_histories() {
     }
     assert_validation_clean(&device);
 }
+
+/// An image whose resolution changes goes on with the histories of the one before, but for what it has seen itself when it comes to rest.
+#[test]
+fn gpu_frames_continue_in_another_size() {
+    let device = device();
+    let scene = scene("cornell-box");
+    let flat = FlatScene::for_paths(&scene);
+    let (full, half) = ([64, 36], [32, 18]);
+    let camera = |size: [u32; 2], step: f64| {
+        let mut camera = scene.cameras[0].clone();
+        camera.camera_to_world *= glam::DAffine3::from_translation(glam::DVec3::X * step);
+        CameraRecord::new(&camera, scene.origin(), f64::from(size[0]) / f64::from(size[1]))
+    };
+    // of what is displayed: else the lamp's edges were all of it
+    let error = |frames: &Realtime, truth: &[f32]| {
+        let shown = |image: &[f32]| image.iter().map(|v| v.min(1.0)).collect::<Vec<_>>();
+        rmse(&shown(&frames.result().unwrap()), &shown(truth))
+    };
+    for kind in tracers(&device) {
+        let tracer = tracer(&device, kind, &flat);
+        let pipeline = |size, seed| {
+            let options = PathOptions { size, ..Default::default() };
+            Realtime::radiance(&tracer, &flat, size, &Settings { seed, ..converging() }, &options).unwrap()
+        };
+        let frame = |frames: &mut Realtime, size, step| drop(frames.frame(&tracer, &camera(size, step), &[]).unwrap());
+        let at_rest = |size, seed, step, count| {
+            let mut frames = pipeline(size, seed);
+            (0..count).for_each(|_| frame(&mut frames, size, step));
+            frames
+        };
+        let truth = [(half, 0.02), (full, 0.1)].map(|(size, step)| at_rest(size, 77, step, 60).result().unwrap());
+        // at rest, then in motion at half the size
+        let mut rests = at_rest(full, 0, 0.0, 30);
+        let mut own = at_rest(full, 0, 0.0, 30);
+        let mut moves = pipeline(half, 0);
+        assert!(!rests.continue_from(&tracer, &moves, false).unwrap(), "{kind}: there is nothing to continue");
+        frame(&mut moves, half, 0.02);
+        let noisy = error(&moves, &truth[0]);
+        assert!(moves.continue_from(&tracer, &rests, false).unwrap());
+        frame(&mut moves, half, 0.02);
+        let continued = error(&moves, &truth[0]);
+        println!("{kind}: in motion {noisy:.4}, continued {continued:.4}");
+        assert!(continued < 0.4 * noisy, "{kind}: {continued}, and {noisy} without histories");
+        (2..=5).for_each(|k| frame(&mut moves, half, 0.02 * f64::from(k)));
+        // and at rest again, where nothing was seen before
+        let errors = [false, true].map(|continues| {
+            let mut frames = pipeline(full, 0);
+            assert!(!continues || frames.continue_from(&tracer, &moves, true).unwrap());
+            frame(&mut frames, full, 0.1);
+            error(&frames, &truth[1])
+        });
+        println!("{kind}: at rest {:.4}, continued {:.4}", errors[0], errors[1]);
+        assert!(errors[1] < 0.4 * errors[0], "{kind}: {errors:?}");
+        // where all was, and where it was another part of the scene
+        assert!(!rests.continue_from(&tracer, &moves, true).unwrap(), "{kind}: its own histories are better");
+        frame(&mut rests, full, 0.1);
+        frame(&mut own, full, 0.1);
+        assert!(rests.result().unwrap() == own.result().unwrap(), "{kind}: they are not what they were");
+        assert!(error(&rests, &truth[1]) < errors[1], "{kind}: coarse histories are better than {}", error(&rests, &truth[1]));
+        frame(&mut rests, full, 30.0);
+        assert!(rests.continue_from(&tracer, &moves, true).unwrap(), "{kind}: it has seen nothing of this");
+    }
+    assert_validation_clean(&device);
+}

@@ -207,3 +207,37 @@ fn gpu_an_interrupted_image_converges() {
     }
     assert_validation_clean(&device);
 }
+
+/// An image whose resolution changes goes on with the histories of the one before it.
+#[test]
+fn gpu_an_image_continues_in_another_size() {
+    let device = device();
+    let scene = scene("stairs");
+    let half = SIZE.map(|n| n / 2);
+    for kind in tracers(&device) {
+        let tracer = tracer(&device, kind, &scene);
+        let settings = Settings { antialias: true, converge: true, bent: true, ..traced(Preset::Fast) };
+        let at_rest = |size: [u32; 2], seed, step, count| {
+            let mut realtime = realtime(&tracer, size, &Settings { seed, ..settings });
+            frames(&mut realtime, &tracer, &stepped(&scene, size, DVec3::X * step), count);
+            realtime
+        };
+        for (from, to) in [(SIZE, half), (half, SIZE)] {
+            let (truth, before) = (at_rest(to, 77, 0.01, 64).result().unwrap(), at_rest(from, 0, 0.0, 30));
+            let all = vec![1.0; truth.len()];
+            let errors = [false, true].map(|continues| {
+                let mut realtime = realtime(&tracer, to, &settings);
+                assert!(!continues || realtime.continue_from(&tracer, &before, true).unwrap());
+                frames(&mut realtime, &tracer, &stepped(&scene, to, DVec3::X * 0.01), 1);
+                assert_sound(&kind.to_string(), &realtime);
+                rmse(&realtime.result().unwrap(), &truth, &all)
+            });
+            println!("{kind}, {to:?}: {:.4} without histories, {:.4} continued", errors[0], errors[1]);
+            assert!(errors[1] < 0.6 * errors[0], "{kind}, {to:?}: {errors:?}");
+        }
+        // of another kind
+        let mut larsen = realtime(&tracer, SIZE, &Preset::Larsen.settings());
+        assert!(!larsen.continue_from(&tracer, &at_rest(half, 0, 0.0, 1), false).unwrap(), "{kind}");
+    }
+    assert_validation_clean(&device);
+}

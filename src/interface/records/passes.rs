@@ -144,4 +144,28 @@ records! {
         /// Padding to a multiple of 8 bytes.
         reserved: float,
     }
+
+    /// Parameters of `resample`.
+    ResampleParams: block readonly 8 {
+        /// Input records.
+        from: address,
+        /// Output records.
+        to: address,
+        /// Size of the input image, pixels.
+        from_size: uvec2,
+        /// Size of the output image, pixels.
+        to_size: uvec2,
+        /// Words of a pixel's record.
+        words: uint,
+        /// Padding to a multiple of 8 bytes.
+        reserved: uint,
+    }
+
+    /// Parameters of `seen`.
+    SeenParams: block readonly 8 {
+        /// Address of a `FrameParams`: the G-buffer of this frame is the other image's, the previous frame is this image's last one.
+        frame: address,
+        /// Two `uint`: pixels of the other image that show a surface, and those of them whose surface this image shows as well.
+        counts: address,
+    }
 }

@@ -201,6 +201,22 @@ impl View {
         !session.traced.iter().any(|w| w.number == self.world)
     }
 
+    /// Has a view of frames continue those of another one of the same settings, and mostly of another size; with `keeps_own` only if it has not seen most of what that shows
+    /// ([`Realtime::continue_from`]). Stills are left as they are.
+    ///
+    /// # Errors
+    /// Those of the device.
+    pub fn continue_from(&mut self, session: &Interactive, other: &Self, keeps_own: bool) -> Result<()> {
+        let world = session.traced.iter().find(|w| w.number == self.world && w.number == other.world);
+        if let (Some(world), Kind::Frames(ours), Kind::Frames(theirs)) = (world, &mut self.kind, &other.kind)
+            && ours.realtime.continue_from(&world.tracer, &theirs.realtime, keeps_own)?
+        {
+            (self.camera, self.pose) = (other.camera.clone(), other.pose);
+            ours.was_interrupted = true;
+        }
+        Ok(())
+    }
+
     /// Discards what it knows of earlier frames.
     pub fn reset(&mut self) {
         match &mut self.kind {

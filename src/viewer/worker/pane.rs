@@ -149,15 +149,26 @@ impl Pane {
     ) -> Result<(ViewStep, Duration)> {
         let scales = pacing.moves && pacing.frame_time.is_some() && self.scale > 0;
         let size = if scales { self.scaled() } else { self.size };
-        let slot = if scales { &mut self.moving } else { &mut self.resting };
-        let is_usable = |v: &View| v.size() == size && !v.is_stale(session);
-        let is_new = !slot.as_ref().is_some_and(is_usable);
-        if is_new {
-            // the old one goes first: memory
-            *slot = None;
-            *slot = Some(View::new(session, &self.settings, size, control)?);
+        let (slot, other) = if scales { (&mut self.moving, &self.resting) } else { (&mut self.resting, &self.moving) };
+        let mut before = slot.take().filter(|v| !v.is_stale(session));
+        let is_new = before.as_ref().is_none_or(|v| v.size() != size);
+        let was_shown = self.shows_rest != scales;
+        let mut view = match before.take_if(|_| !is_new) {
+            Some(view) => view,
+            None => match View::new(session, &self.settings, size, control) {
+                // without the one before
+                Err(Error::OutOfMemory(_)) if before.take().is_some() => View::new(session, &self.settings, size, control)?,
+                made => made?,
+            },
+        };
+        // the image that was shown goes on
+        let shown = if was_shown { before.as_ref() } else { other.as_ref() };
+        if let Some(shown) = shown {
+            // at rest what was seen before is finer
+            view.continue_from(session, shown, !scales)?;
         }
-        let Some(view) = slot else { return Err(Error::Interrupted) };
+        drop(before);
+        let view = slot.insert(view);
         let time = match () {
             () if pacing.moves => Duration::from_millis(1),
             () if self.is_fresh => STILL_STEPS[0],

@@ -1,0 +1,104 @@
+//! Histories of a pipeline of another size, so that an image whose resolution changes does not begin with noise.
+
+use super::resources::Resource;
+use super::settings::Technique;
+use super::{FrameParams, Realtime, State};
+use crate::error::Result;
+use crate::film::camera::CameraRecord;
+use crate::gpu::{Buffer, Commands, Memory};
+use crate::interface::records::passes::{ResampleParams, SeenParams};
+use crate::shaders::{self, LANES};
+use crate::tracer::{Push, Tracer};
+
+/// What the next frame reads of the previous one.
+const REMEMBERED: [Resource; 6] = [
+    Resource::Guide,
+    Resource::History,
+    Resource::BentHistory,
+    Resource::DiffuseHistory,
+    Resource::SpecularHistory,
+    Resource::ResolvedHistory,
+];
+
+/// Share of the surfaces in view from which on own histories, of an image at rest, are the better ones: coarser ones are of motion, and so noisier. Of what own ones lack, mirrors and glass mostly, the
+/// others know little more.
+const SEEN_ENOUGH: f64 = 0.75;
+
+impl Realtime {
+    /// Has the next frame continue those of `other`, a pipeline of the same scene, tracer and settings, and mostly of another size: each pixel has the histories of the nearest pixel
+    /// there. Samples at rest start anew. Returns false, and changes nothing, where `other` has no histories or they are of another kind; with `keeps_own` also where this pipeline has histories of
+    /// its own of most surfaces that the other's last frame shows.
+    ///
+    /// # Errors
+    /// Those of the device.
+    pub fn continue_from(&mut self, tracer: &Tracer, other: &Self, keeps_own: bool) -> Result<bool> {
+        let Some(camera) = other.state.camera.filter(|_| other.state.has_history) else { return Ok(false) };
+        let is_like = self.is_radiance == other.is_radiance && self.settings.technique == other.settings.technique;
+        if !is_like || self.settings.technique == Technique::Larsen {
+            return Ok(false);
+        }
+        if keeps_own && self.share_seen(tracer, other, &camera)? >= SEEN_ENOUGH {
+            return Ok(false);
+        }
+        let (ours, theirs) = (self.graph.resources(), other.graph.resources());
+        let both = |r: &&Resource| ours.buffer(**r).is_some() && theirs.buffer(**r).is_some();
+        let images: Vec<Resource> = REMEMBERED.iter().filter(both).copied().collect();
+        let record = |&resource: &Resource| ResampleParams {
+            from: theirs.address(resource),
+            to: ours.address(resource),
+            from_size: other.size,
+            to_size: self.size,
+            words: resource.words(),
+            reserved: 0,
+        };
+        let records: Vec<ResampleParams> = images.iter().map(record).collect();
+        let device = tracer.device();
+        let params = Buffer::from_slice(device, "parameters of resampling", &records)?;
+        let pipeline = shaders::RESAMPLE.pipeline(device)?;
+        let count = self.pixels() as u32;
+        Commands::new(device)?.run(|r| {
+            for k in 0..records.len() {
+                let pass = params.address() + (k * size_of::<ResampleParams>()) as u64;
+                r.dispatch(&pipeline, &Push { pass, count, ..Default::default() }, count.div_ceil(LANES));
+            }
+        })?;
+        self.graph.invalidate();
+        self.state = State {
+            has_resolved: other.state.has_resolved && images.contains(&Resource::ResolvedHistory),
+            has_new_light: self.state.has_new_light || other.state.has_new_light,
+            environment_turn: self.state.environment_turn.take(),
+            resting: 0,
+            // samples at rest are not taken over
+            was_interrupted: true,
+            ..other.state.clone()
+        };
+        Ok(true)
+    }
+
+    /// Share of the surfaces in the last frame of `other`, by this camera, of which this pipeline has histories; 0 if it has none.
+    fn share_seen(&mut self, tracer: &Tracer, other: &Self, camera: &CameraRecord) -> Result<f64> {
+        if !self.state.has_history || self.state.camera.is_none() {
+            return Ok(0.0);
+        }
+        let (ours, theirs) = (self.graph.resources(), other.graph.resources());
+        let frame = FrameParams {
+            guide: theirs.address(Resource::Guide),
+            surface: theirs.address(Resource::Surface),
+            previous_guide: ours.address(Resource::Guide),
+            ..self.frame_params(camera, false, other.state.offset)
+        };
+        // of the next frame, which is not yet there
+        self.params.write(&frame)?;
+        let device = tracer.device();
+        let mut counts = Buffer::new(device, "surfaces seen", 8, Memory::Readback)?;
+        counts.write(0, &[0; 8])?;
+        let record = SeenParams { frame: self.params.address(), counts: counts.address() };
+        let params = Buffer::from_slice(device, "parameters of surfaces seen", &[record])?;
+        let pipeline = shaders::SEEN.pipeline(device)?;
+        let push = Push { pass: params.address(), count: other.pixels() as u32, ..Default::default() };
+        Commands::new(device)?.run(|r| r.dispatch(&pipeline, &push, push.count.div_ceil(LANES)))?;
+        let [surfaces, seen]: [u32; 2] = bytemuck::pod_read_unaligned(&counts.read(0, 8)?);
+        // an empty view has nothing to lack
+        Ok(if surfaces == 0 { 1.0 } else { f64::from(seen) / f64::from(surfaces) })
+    }
+}
