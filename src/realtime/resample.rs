@@ -90,7 +90,7 @@ impl Realtime {
         // of the next frame, which is not yet there
         self.params.write(&frame)?;
         let device = tracer.device();
-        let mut counts = Buffer::new(device, "surfaces seen", 8, Memory::Readback)?;
+        let mut counts = Buffer::new(device, "surfaces seen", 8, Memory::Device)?;
         counts.write(0, &[0; 8])?;
         let record = SeenParams { frame: self.params.address(), counts: counts.address() };
         let params = Buffer::from_slice(device, "parameters of surfaces seen", &[record])?;
