@@ -11,8 +11,8 @@ void main() {
     if (gl_GlobalInvocationID.x >= push.count) return;
     ResampleParams p = ResampleParams(push.pass);
     uvec2 pixel = divide(at, p.to_size.x);
-    // sizes have 16 bits
-    uvec2 nearest = (2u * pixel + 1u) * p.from_size / (2u * p.to_size);
+    // of (pixel + 1/2) * from_size / to_size the whole part; sides of up to 2^15 pixels do not overflow
+    uvec2 nearest = (pixel * p.from_size + p.from_size / 2u) / p.to_size;
     uint from = nearest.y * p.from_size.x + nearest.x;
     for (uint k = 0u; k < p.words; k++) ResampledWords(p.to).v[at * p.words + k] = Words(p.from).v[from * p.words + k];
 }

@@ -24,9 +24,12 @@ const REMEMBERED: [Resource; 6] = [
 /// others know little more.
 const SEEN_ENOUGH: f64 = 0.75;
 
+/// Largest side of images that are resampled, pixels: products of two are numbers of 32 bits in the shader.
+const MAX_SIDE: u32 = 1 << 15;
+
 impl Realtime {
     /// Has the next frame continue those of `other`, a pipeline of the same scene, tracer and settings, and mostly of another size: each pixel has the histories of the nearest pixel
-    /// there. Samples at rest start anew. Returns false, and changes nothing, where `other` has no histories or they are of another kind; with `keeps_own` also where this pipeline has histories of
+    /// there. Samples at rest start anew. Returns false, and changes nothing, where `other` has no histories or they are of another kind, and for sides of more than 2^15 pixels; with `keeps_own` also where this pipeline has histories of
     /// its own of most surfaces that the other's last frame shows.
     ///
     /// # Errors
@@ -34,7 +37,8 @@ impl Realtime {
     pub fn continue_from(&mut self, tracer: &Tracer, other: &Self, keeps_own: bool) -> Result<bool> {
         let Some(camera) = other.state.camera.filter(|_| other.state.has_history) else { return Ok(false) };
         let is_like = self.is_radiance == other.is_radiance && self.settings.technique == other.settings.technique;
-        if !is_like || self.settings.technique == Technique::Larsen {
+        let is_wide = self.size.iter().chain(&other.size).any(|n| *n > MAX_SIDE);
+        if !is_like || is_wide || self.settings.technique == Technique::Larsen {
             return Ok(false);
         }
         if keeps_own && self.share_seen(tracer, other, &camera)? >= SEEN_ENOUGH {

@@ -3,14 +3,14 @@
 use std::time::Duration;
 
 use skylit::Error;
-use skylit::film::{Control, NoControl};
+use skylit::film::NoControl;
 use skylit::renderer::interactive::{View, camera_settings, render_flags};
 use skylit::renderer::{RenderSettings, Renderer};
 use skylit::scene::{Camera, Geometry, builtin};
 use skylit::tracer::DeviceSettings;
 use skylit::viewer::technique::Technique;
 
-use crate::common::{assert_validation_clean, device, tracers};
+use crate::common::{InterruptAt, assert_validation_clean, device, tracers};
 
 const SIZE: [u32; 2] = [48, 32];
 const STEP: Duration = Duration::from_millis(20);
@@ -64,13 +64,6 @@ fn gpu_views_at_rest_are_what_render_makes() {
 /// A view that comes back to a camera knows nothing of the others; and an interrupted step leaves nothing behind.
 #[test]
 fn gpu_motion_and_interruptions_leave_nothing_behind() {
-    struct StopAfter(u32);
-    impl Control for StopAfter {
-        fn should_stop(&mut self) -> skylit::Result<bool> {
-            self.0 = self.0.saturating_sub(1);
-            if self.0 == 0 { Err(Error::Interrupted) } else { Ok(false) }
-        }
-    }
     let mut renderer = renderer("stairs", "compute");
     let camera = renderer.scene().cameras[0].clone();
     let other = Camera {
@@ -94,7 +87,7 @@ fn gpu_motion_and_interruptions_leave_nothing_behind() {
             assert!(image(&mut view, &session) == expected, "a still starts anew when the camera moves");
         }
         for launches in 1..6 {
-            let outcome = view.step(&session, &other, STEP, &mut StopAfter(launches));
+            let outcome = view.step(&session, &other, STEP, &mut InterruptAt { at: launches, asked: 0 });
             assert!(matches!(outcome, Err(Error::Interrupted)) || launches > 1, "{launches}");
         }
         view.reset();
