@@ -41,9 +41,9 @@ for name in "${tests[@]}"; do
 done
 cp scenes/parade.glb scenes/leaves.glb scenes/courtyard.* scenes/courtyard_*.png "$kit/scenes/"
 cp scripts/gpu/run.sh "$kit/"
-# modules of the tests, but for those that run the program from where it was built
+# modules of the tests
 for name in "${tests[@]}"; do
-  "$kit/bin/tests-$name" --list 2>/dev/null | sed -n 's/^\([a-z_]*\)::.*: test$/\1/p' | sort -u | grep -vx cli | sed "s/^/$name /"
+  "$kit/bin/tests-$name" --list 2>/dev/null | sed -n 's/^\([a-z_]*\)::.*: test$/\1/p' | sort -u | sed "s/^/$name /"
 done > "$kit/tests.txt"
 
 # carry FOLDER LIBRARY...: copies libraries of this machine, and what they need but for glibc's own; what is not here is left out
@@ -75,7 +75,7 @@ fi
 
 glibc=$(objdump -T "$kit"/bin/* "$kit"/lib/*/* "$kit"/layer/*.so 2>/dev/null | grep -o 'GLIBC_[0-9.]*' | sort -Vu | tail -n 1)
 {
-  printf 'skylit %s\n' "$("$kit/bin/skylit" --version | awk '{print $2}')"
+  printf 'skylit %s\n' "$("$kit/bin/skylit" --version | awk 'NR == 1 {print $2}')"
   printf 'commit %s%s\n' "$(git rev-parse --short=12 HEAD 2>/dev/null || echo unknown)" "$(git diff --quiet HEAD 2>/dev/null || echo ' and changes')"
   printf 'needs glibc %s or newer\n' "${glibc#GLIBC_}"
 } > "$kit/VERSION"

@@ -25,6 +25,8 @@ trap 'rm -rf "$cache"' EXIT
 # nothing of an earlier run: the first launch compiles, and says how long that takes
 export XDG_CACHE_HOME=$cache RUST_BACKTRACE=1
 skylit=$kit/bin/skylit
+# the tests run it, too
+export SKYLIT_PROGRAM=$skylit
 cd "$kit" || exit 4
 PATH=$PATH:/sbin:/usr/sbin
 

@@ -5,9 +5,10 @@ use std::process::{Command, Output, Stdio};
 
 use serde_json::Value;
 
-/// The program with these arguments, ready to run. It reads no defaults of whoever runs the tests.
+/// The program with these arguments, ready to run: the one that was built with the tests, or SKYLIT_PROGRAM where they run elsewhere. It reads no defaults of whoever runs the tests.
 pub fn skylit(args: &[&str]) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_skylit"));
+    let program = std::env::var_os("SKYLIT_PROGRAM").unwrap_or_else(|| env!("CARGO_BIN_EXE_skylit").into());
+    let mut command = Command::new(program);
     command.args(args).env("XDG_CONFIG_HOME", "/nonexistent").env_remove("RUST_BACKTRACE").stdin(Stdio::null());
     command
 }
