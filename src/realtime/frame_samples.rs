@@ -2,18 +2,26 @@
 
 use super::settings::Settings;
 
-/// Number of the first long frame at rest, from 1: who stops for a moment has pictures as often as before. Samples of short frames lie at the frame's place in all pixels, so more of them leave edges
-/// jagged.
+/// Number of the first long frame at rest, from 1, where long frames do not begin with few samples: who stops for a moment has pictures as often as before. Samples of short frames lie at the frame's place
+/// in all pixels, so more of them leave edges jagged.
 const FIRST_LONG: u32 = 4;
 
+/// A long frame after others has at most a part of so many of all samples at rest: who watches sees the image change as often as it changes visibly.
+const PARTS: u32 = 8;
+
 /// Samples of a pixel in a frame: paths of radiance, occlusion rays of ambient visibility. Frames in motion are short. At rest, after a few of them, come long ones: what a frame costs besides its samples, and
-/// does not depend on their number, is a third to a half of the time of a short one.
+/// does not depend on their number, is a third to a half of the time of a short one. Those of radiance become longer with the samples there are: by powers of two, so that each begins at a multiple of its
+/// number and together they fill the sequence evenly. First each has as many as all before it (2, 2, 4, 8), then as many for some time, and then a part of those before it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FrameSamples {
     /// In a short frame.
     pub few: u32,
-    /// In a long frame.
-    pub many: u32,
+    /// In long frames, after the first few.
+    many: u32,
+    /// The first long frame has this power of two less.
+    ramp: u32,
+    /// Times that the number of samples of a long frame doubles after that.
+    doublings: u32,
     /// Number of the first long frame at rest, from 1.
     first_long: u32,
     /// Number of short frames in which each pixel is sampled once.
@@ -23,17 +31,27 @@ pub struct FrameSamples {
 }
 
 impl FrameSamples {
-    /// Those of radiance in images of so many pixels. `period` is left to the paths, whose frames at rest all sample the same pattern.
-    pub fn of_radiance(settings: &Settings, pixels: u64) -> Self {
-        // a tenth of a frame's time is then for other things, and with twice as many a twentieth; all paths together take about a second on two cores
-        const MAX_PER_PIXEL: u64 = 8;
-        const MAX_PATHS: u64 = 1 << 20;
+    /// Those of radiance in images of so many pixels. `period` is left to the paths, whose frames at rest all sample the same pattern, and so have the same number. `is_cpu`: the device is a processor, as opposed to a GPU.
+    pub fn of_radiance(settings: &Settings, pixels: u64, is_cpu: bool) -> Self {
+        // a tenth of a frame's time is then for other things
+        const FIRST_PER_PIXEL: u64 = 8;
+        // a fortieth
+        const MAX_PER_PIXEL: u64 = 32;
+        // the first long frames take about a second on two cores, and a tenth of that on a GPU that traces 160 times as many
+        const FIRST_PATHS: u64 = 1 << 20;
+        const FIRST_GPU_PATHS: u64 = 1 << 24;
+        const GROWTH: u64 = 4;
         let few = settings.rays_per_pixel;
-        let most = (MAX_PATHS / pixels.max(1)).min(MAX_PER_PIXEL) as u32;
-        let many = if settings.converges() { few.max(power_of_two(most)) } else { few };
+        let most_paths = if is_cpu { FIRST_PATHS } else { FIRST_GPU_PATHS };
+        let per_pixel = |paths: u64, most: u64| (paths / pixels.max(1)).min(most) as u32;
+        let many = if settings.converges() { few.max(power_of_two(per_pixel(most_paths, FIRST_PER_PIXEL))) } else { few };
         // several paths of a short frame lie anywhere in their pixels
-        let forgets_short = few == 1 && many >= FIRST_LONG;
-        Self { few, many, first_long: FIRST_LONG, period: 1, forgets_short }
+        let forgets_short = few == 1 && many >= 4;
+        let grows = settings.converges() && settings.resolution.period() == 1;
+        let (ramp, first_long) = if forgets_short && grows { (many.ilog2() - 1, 1) } else { (0, FIRST_LONG) };
+        let times = per_pixel(GROWTH * most_paths, MAX_PER_PIXEL) / many;
+        let doublings = if grows { times.checked_ilog2().unwrap_or(0) } else { 0 };
+        Self { few, many, ramp, doublings, first_long, period: 1, forgets_short }
     }
 
     /// Those of ambient visibility. Long frames take them as stills do, which is faster from eight samples of a pixel on.
@@ -47,7 +65,7 @@ impl FrameSamples {
         let most = (MANY_SAMPLES / pixels).clamp(8, MAX_PER_PIXEL).min(MAX_SAMPLES / pixels) as u32;
         let has_long = settings.converges() && !settings.bent && most >= few.max(4);
         let (many, first_long) = if has_long { (power_of_two(most), FIRST_LONG) } else { (few, u32::MAX) };
-        Self { few, many, first_long, period, forgets_short: false }
+        Self { few, many, ramp: 0, doublings: 0, first_long, period, forgets_short: false }
     }
 
     /// Returns true if there are long frames.
@@ -62,7 +80,52 @@ impl FrameSamples {
 
     /// Samples of a pixel in the frame.
     pub fn of(&self, resting: u32) -> u32 {
-        if self.is_long(resting) { self.many } else { self.few }
+        let Some(long) = resting.checked_sub(self.first_long) else { return self.few };
+        if long <= self.ramp {
+            (self.many >> self.ramp) << long.saturating_sub(1)
+        } else {
+            self.many << self.doublings_before(long - self.ramp)
+        }
+    }
+
+    /// Frames at rest that have as many samples as so many frames without growth.
+    pub fn frames_for_first(&self, frames: u32) -> u32 {
+        self.frames_for(frames.saturating_mul(self.many))
+    }
+
+    /// Maximum number of samples of a pixel in a frame.
+    pub fn most(&self) -> u32 {
+        self.many << self.doublings
+    }
+
+    /// How often the number of samples has doubled by the long frame with this index, those with fewer than `many` counted as one; it has a part of [`PARTS`] of those before it, or less.
+    fn doublings_before(&self, long: u32) -> u32 {
+        (long.saturating_sub(PARTS) / PARTS).min(self.doublings)
+    }
+
+    /// Samples of a pixel in so many long frames.
+    fn in_long(&self, frames: u32) -> u64 {
+        if frames <= self.ramp {
+            return if frames == 0 { 0 } else { u64::from(self.many >> self.ramp) << (frames - 1) };
+        }
+        // all that have fewer have as many together as one
+        let frames = frames - self.ramp;
+        let doublings = self.doublings_before(frames);
+        // 2 PARTS frames have as many together as PARTS of the next number, and all that follow likewise
+        (u64::from(self.many) * u64::from(frames - PARTS * doublings)) << doublings
+    }
+
+    /// Number of long frames that have so many samples in all, one at least.
+    fn long_for(&self, samples: u64) -> u32 {
+        let many = u64::from(self.many);
+        if samples <= many {
+            let times = samples.div_ceil(many >> self.ramp);
+            return if times <= 1 { 1 } else { 1 + times.next_power_of_two().ilog2() };
+        }
+        let frames = |doublings: u32| samples.div_ceil(many << doublings) + u64::from(PARTS * doublings);
+        // the last frame is of the first number of samples that reaches so far
+        let last = (0..self.doublings).find(|&d| frames(d) <= u64::from(PARTS * (d + 2))).unwrap_or(self.doublings);
+        self.ramp + frames(last) as u32
     }
 
     /// Samples of a pixel in the frames before the first long one.
@@ -84,14 +147,14 @@ impl FrameSamples {
     pub fn since_rest(&self, resting: u32) -> u64 {
         let short = resting.min(self.first_long - 1);
         if self.has_forgotten_short(resting) {
-            return u64::from(resting - short) * u64::from(self.many);
+            return self.in_long(resting - short);
         }
-        u64::from(short) * u64::from(self.few) / u64::from(self.period) + u64::from(resting - short) * u64::from(self.many)
+        u64::from(short) * u64::from(self.few) / u64::from(self.period) + self.in_long(resting - short)
     }
 
     /// Samples of a pixel in the long frames before a long frame.
     pub fn in_long_before(&self, resting: u32) -> u32 {
-        (resting - self.first_long).saturating_mul(self.many)
+        u32::try_from(self.in_long(resting - self.first_long)).unwrap_or(u32::MAX)
     }
 
     /// Number of frames at rest that have so many samples in all.
@@ -103,7 +166,7 @@ impl FrameSamples {
             return (u64::from(samples) * u64::from(self.period)).div_ceil(u64::from(self.few)) as u32;
         }
         let in_short = if self.forgets_short { 0 } else { in_short };
-        short + (u64::from(samples) - in_short).div_ceil(u64::from(self.many)) as u32
+        short + self.long_for(u64::from(samples) - in_short)
     }
 }
 
@@ -121,25 +184,60 @@ mod tests {
     fn frames_at_rest_have_the_samples_that_are_counted() {
         for pixels in [1, 14_400, 518_400, 10_000_000] {
             for settings in [Preset::Fast, Preset::Quality].map(Preset::settings) {
+                let all = |settings: &Settings| {
+                    let of_radiance = [true, false].map(|is_cpu| FrameSamples::of_radiance(settings, pixels, is_cpu));
+                    of_radiance.into_iter().chain([FrameSamples::of_visibility(settings, pixels)])
+                };
                 let settings = Settings { converge: true, ..settings };
-                for samples in [FrameSamples::of_radiance(&settings, pixels), FrameSamples::of_visibility(&settings, pixels)] {
+                for samples in all(&settings) {
                     assert!(samples.many >= samples.few);
-                    let few_or = |most: u64| samples.many == samples.few || u64::from(samples.many) * pixels <= most;
-                    assert!(few_or(1 << 25));
-                    let mut sum = 0;
+                    let few_or = |most: u64| samples.most() == samples.few || u64::from(samples.most()) * pixels <= most;
+                    assert!(few_or(1 << 26));
+                    let (mut sum, mut in_long) = (0, 0);
                     for resting in 1..100 {
-                        sum = if samples.starts_anew(resting) { 0 } else { sum } + samples.of(resting);
+                        let now = samples.of(resting);
+                        if samples.is_long(resting) {
+                            assert_eq!(samples.in_long_before(resting), in_long);
+                            // a block of the sequence, and a small part of all, or as few as at first
+                            assert!(in_long.is_multiple_of(now), "{samples:?}");
+                            let is_part = if now <= samples.many {
+                                in_long == 0 || now <= in_long.max(samples.few)
+                            } else {
+                                PARTS * now <= in_long
+                            };
+                            assert!(is_part && now <= samples.most(), "{samples:?}");
+                            // and no smaller part than that, while they grow
+                            assert!(now == samples.most() || PARTS * 2 * now > in_long, "{samples:?}");
+                            in_long += now;
+                        }
+                        sum = if samples.starts_anew(resting) { 0 } else { sum } + now;
                         assert_eq!(samples.since_rest(resting), u64::from(sum));
                         assert_eq!(samples.frames_for(sum), resting, "{samples:?}");
                         assert_eq!(samples.frames_for(sum + 1), resting + 1, "{samples:?}");
                     }
                 }
-                let held = Settings { converge: false, ..settings };
-                for samples in [FrameSamples::of_radiance(&held, pixels), FrameSamples::of_visibility(&held, pixels)] {
-                    assert_eq!(samples.many, samples.few);
+                for samples in all(&Settings { converge: false, ..settings }) {
+                    assert_eq!(samples.most(), samples.few);
                 }
             }
         }
+    }
+
+    #[test]
+    fn frames_at_rest_become_longer() {
+        let settings = Settings { converge: true, ..Preset::Balanced.settings() };
+        let samples = FrameSamples::of_radiance(&settings, 14_400, true);
+        assert_eq!(
+            [0, 1, 2, 3, 4, 18, 19, 26, 27, 1000].map(|resting| samples.of(resting)),
+            [1, 2, 2, 4, 8, 8, 16, 16, 32, 32]
+        );
+        assert_eq!([samples.frames_for_first(10), samples.frames_for_first(64)], [12, 34]);
+        // a GPU has time for several paths in a large image
+        let large = |is_cpu| FrameSamples::of_radiance(&settings, 1920 * 1080, is_cpu);
+        assert_eq!([large(true).of(4), large(false).of(4), large(true).most(), large(false).most()], [1, 8, 2, 32]);
+        // all pixels of a pattern have the same number
+        let half = FrameSamples::of_radiance(&Settings { resolution: Resolution::Half, ..settings }, 14_400, true);
+        assert_eq!([3, 4, 100].map(|resting| half.of(resting)), [1, 8, 8]);
     }
 
     #[test]
@@ -147,7 +245,7 @@ mod tests {
         let half = Settings { converge: true, resolution: Resolution::Half, ..Preset::Fast.settings() };
         let samples = FrameSamples::of_visibility(&half, 14_400);
         let short = samples.first_long - 1;
-        assert_eq!(samples.since_rest(short + 2), u64::from(short / samples.period + 2 * samples.many));
+        assert_eq!(samples.since_rest(short + 2), u64::from(short / samples.period + 2 * samples.most()));
         for wanted in 1..100 {
             let frames = samples.frames_for(wanted);
             assert!(samples.since_rest(frames) >= wanted.into());

@@ -111,7 +111,7 @@ settings! {
         orbit: Option<u32>,
             option(value_name = "FRAMES", num_args = 0..=1, default_missing_value = "240", value_parser = clap::value_parser!(u32).range(1..)),
             applies(TIMELINE), basic;
-        /// Warm-up frames, identical to the first, that are rendered and discarded [default: for a single frame, the history length; else 0]
+        /// Warm-up frames, identical to the first, that are rendered and discarded [default: for a single frame, until histories are full; else 0]
         warm_up: Option<u32>, option(value_name = "N"), applies(FRAMES);
         /// AO technique [default: the preset's]
         technique: Option<Technique>, option(value_enum), applies(FRAMES);

@@ -223,7 +223,7 @@ impl Realtime {
         let extent =
             Extent { pixels, tiled_pixels: block.rays().into(), half_pixels: pixels.div_ceil(4), ..Default::default() };
         let device = tracer.device();
-        let frame_samples = FrameSamples::of_radiance(settings, pixels);
+        let frame_samples = FrameSamples::of_radiance(settings, pixels, device.info.is_cpu());
         let stages = passes::radiance_stages(tracer, flat, block, settings, options, frame_samples)?;
         Ok(Self {
             size,
@@ -301,6 +301,16 @@ impl Realtime {
         let frames = self.frame_samples.frames_for(self.settings.rest_samples);
         // frames of a pattern of radiance have samples of the same indices
         Some(if self.is_radiance { frames * self.settings.resolution.period() } else { frames })
+    }
+
+    /// Number of frames at rest, the one before them not counted, that have as many samples of a pixel as so many frames of those that a frame at rest begins with: fewer where frames become longer.
+    pub fn frames_for(settings: &Settings, size: [u32; 2], is_radiance: bool, is_cpu: bool, frames: u32) -> u32 {
+        let pixels = u64::from(size[0]) * u64::from(size[1]);
+        let samples = match is_radiance {
+            true => FrameSamples::of_radiance(settings, pixels, is_cpu),
+            false => FrameSamples::of_visibility(settings, pixels),
+        };
+        samples.frames_for_first(frames).min(frames)
     }
 
     /// Samples of a pixel that the last frame shows: since the image came to rest, or of the longest history.

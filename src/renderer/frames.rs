@@ -101,7 +101,8 @@ impl Renderer {
         let blend = if is_radiance { integrator.get().blend() } else { Blend::Masked };
         let flat = FlatScene::with_motion_and_blend(scene, sequence.motion()?, blend)?;
         // a single frame is one of a history that is full, and not what it converges to
-        let settling = || frames_of_history(&how);
+        let is_cpu = self.device.info.is_cpu();
+        let settling = || Realtime::frames_for(&how, size, is_radiance, is_cpu, frames_of_history(&how));
         let warm_up = timeline.warm_up.unwrap_or_else(|| if range.end - range.first > 1 { 0 } else { settling() });
         let frames = u64::from(range.end - range.first) + u64::from(warm_up);
         let request = TracerRequest {

@@ -18,7 +18,7 @@ const DEFAULT_SIZE: [u32; 2] = [160, 90];
 /// The default with `--quick`.
 const QUICK_SIZE: [u32; 2] = [64, 36];
 /// Default frames of a run: some are left after the 64 that flicker has to end.
-const DEFAULT_FRAMES: u32 = 96;
+const DEFAULT_FRAMES: u32 = 72;
 /// The default with `--quick`.
 const QUICK_FRAMES: u32 = 16;
 /// Default paths per pixel of the reference of a still camera.
@@ -70,7 +70,7 @@ pub struct BenchFramesArgs {
     /// Image size in pixels [default: 160x90; 64x36 with --quick]
     #[arg(long, value_name = "WxH", value_parser = parse_size)]
     pub size: Option<[u32; 2]>,
-    /// Frames of a run [default: 96; 16 with --quick]
+    /// Frames of a run [default: 72; 16 with --quick]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(4..=10_000))]
     pub frames: Option<u32>,
     /// Seed of the samples of frames; where nothing moves plain accumulation has the same

@@ -67,7 +67,7 @@ fn turn(session: &mut FramesSession, name: &str, stage: &mut Stage, map: &Enviro
     let wrong = stage.reference(&camera, paths)?;
     stage.turn_environment(&after)?;
     let reference = stage.reference(&camera, paths)?;
-    let (before_frames, frames) = (session.args.frames(), frames_after(session));
+    let frames = frames_after(session);
     let pixels = u64::from(stage.size[0]) * u64::from(stage.size[1]);
     let mut record =
         FramesChange { change: "turn".into(), frames, pixels, reference_rmse: reference.rmse, results: Vec::new() };
@@ -75,7 +75,7 @@ fn turn(session: &mut FramesSession, name: &str, stage: &mut Stage, map: &Enviro
         let mut realtime = stage.realtime(preset)?;
         realtime.turn_environment(map.to_map);
         let mut log = FrameLog::default();
-        for _ in 0..before_frames {
+        for _ in 0..frames {
             log.frame(&mut realtime, &stage.tracer, &camera, &[])?;
         }
         let old = Displayed::new(&realtime.result()?, stage.channels());
@@ -83,7 +83,7 @@ fn turn(session: &mut FramesSession, name: &str, stage: &mut Stage, map: &Enviro
         let run = run(&mut realtime, stage, &camera, frames, (&reference, None))?;
         // what it ends at without any past
         realtime.reset();
-        for _ in 0..before_frames.max(frames) {
+        for _ in 0..frames {
             log.frame(&mut realtime, &stage.tracer, &camera, &[])?;
         }
         let settled = Displayed::new(&realtime.result()?, stage.channels());
@@ -126,7 +126,7 @@ fn sidestep(session: &mut FramesSession, loaded: &FramesScene, stage: &mut Stage
         return Ok(None);
     }
     let reference = stage.reference(&camera, session.args.reference_paths())?;
-    let (before_frames, frames) = (session.args.frames(), frames_after(session));
+    let frames = frames_after(session);
     let mut record = FramesChange {
         change: "sidestep".into(),
         frames,
@@ -137,7 +137,7 @@ fn sidestep(session: &mut FramesSession, loaded: &FramesScene, stage: &mut Stage
     presets(session, &name, &mut record, |preset| {
         let mut realtime = stage.realtime(preset)?;
         let mut log = FrameLog::default();
-        for _ in 0..before_frames {
+        for _ in 0..frames {
             log.frame(&mut realtime, &stage.tracer, &from, &[])?;
         }
         let run = run(&mut realtime, stage, &camera, frames, (&reference, Some(&mask)))?;
@@ -153,9 +153,9 @@ fn sidestep(session: &mut FramesSession, loaded: &FramesScene, stage: &mut Stage
     Ok(Some(record))
 }
 
-/// Frames that are looked at after a change.
+/// Frames that are looked at after a change, and frames at rest before it.
 fn frames_after(session: &FramesSession) -> u32 {
-    (session.args.frames() / 2).max(8)
+    (session.args.frames() * 2 / 3).max(8)
 }
 
 /// Frames after a change.

@@ -40,16 +40,20 @@ pub fn stage(tracer: &Tracer, pixels: u32, input: Resource, has_rest: bool) -> R
     Ok(Stage::new(vec![Box::new(pass)], Range::all(pixels)))
 }
 
-/// Minimum weight of a frame of radiance at rest, which is the filtered mean of all samples so far: those before it are of a part of its samples. By the third power of that part they
+/// Samples that the image counts for as which the camera came to rest.
+const IN_MOTION: f32 = 4.0;
+
+/// Minimum weight of a frame of radiance at rest, which is the filtered mean of all samples so far: those before it are of a part r of its samples. By the third power of that part they
 /// soften what the filter does at edges and hide its specks, and the mean has nearly the noise of all samples: by the square 1.07 times that after four long frames, by higher powers less, and more
-/// specks.
+/// specks. Where samples are many there are none, and frames that add a constant part would leave sqrt(2p / (2p - 1)) times their noise: 1.095 by the third power, 1.02 by the twelfth.
 fn least_weight(frame: &Frame) -> f32 {
     let after = frame.rest_samples as f32;
     if !frame.is_long || after <= 0.0 {
         return LEAST_WEIGHT;
     }
     let before = (after - frame.samples as f32).max(0.0);
-    (1.0 - (before / after).powi(3)).max(LEAST_WEIGHT)
+    let power = (after / 16.0).clamp(3.0, 12.0);
+    (1.0 - ((before + IN_MOTION) / (after + IN_MOTION)).powf(power)).max(LEAST_WEIGHT)
 }
 
 impl Pass for Antialias {

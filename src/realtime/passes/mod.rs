@@ -99,7 +99,7 @@ pub fn stages(
         stages.push(rest::stage(tracer, pixels)?);
         if samples.has_long() {
             stages = stages.into_iter().map(Stage::of_short_frames).collect();
-            stages.push(rest_samples::stage(block, samples.many, settings.launch_rays));
+            stages.push(rest_samples::stage(block, samples.most(), settings.launch_rays));
         }
         stages.extend(nlmeans::stages(tracer, block.size)?);
     }
@@ -121,7 +121,7 @@ pub fn radiance_stages(
     let pixels = block.size[0] * block.size[1];
     let most = settings.launch_rays.max(MAX_SAMPLES * TILE_PIXELS);
     let sampled = Block { size: settings.resolution.sampled_size(block.size), ..block };
-    let spp = samples.many.min(MAX_SAMPLES).next_power_of_two();
+    let spp = samples.most().min(MAX_SAMPLES).next_power_of_two();
     let paths = sampled.rays().saturating_mul(spp).min(most);
     let paths = SignalPaths::new(tracer, flat, options, paths)?;
     let has_rest = settings.converges();
