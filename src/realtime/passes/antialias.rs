@@ -41,7 +41,7 @@ pub fn stage(tracer: &Tracer, pixels: u32, input: Resource, has_rest: bool) -> R
 }
 
 /// Samples that the image counts for as which the camera came to rest.
-const IN_MOTION: f32 = 4.0;
+const IN_MOTION: f32 = 8.0;
 
 /// Minimum weight of a frame of radiance at rest, which is the filtered mean of all samples so far: those before it are of a part r of its samples. By the third power of that part they
 /// soften what the filter does at edges and hide its specks, and the mean has nearly the noise of all samples: by the square 1.07 times that after four long frames, by higher powers less, and more
