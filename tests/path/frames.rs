@@ -112,9 +112,9 @@ fn gpu_frames_at_rest_become_the_still() {
         let mut still = |spp, seed| integrator.render(&tracer, &camera, spp, seed, &mut NoControl).unwrap().image.film.mean;
         let truth = still(8192, 1);
         let expected = rmse(&still(1024, 2), &truth);
-        // Four long frames after as many short ones have 32 samples: no worse than a still of 35. The error of so few differs by a tenth from seed to seed.
+        // Frames of 2, 2, 4, 8, 8, 8 and 8 samples after the first: about as good as a still of 40. The error of so few differs by a tenth from seed to seed.
         let mean_error = |error: &mut dyn FnMut(u32) -> f64| (0..EARLY_RUNS).map(|k| error(10 + k).powi(2)).sum::<f64>().sqrt();
-        let early_still = mean_error(&mut |seed| rmse(&still(35, seed), &truth));
+        let early_still = mean_error(&mut |seed| rmse(&still(40, seed), &truth));
         let early = mean_error(&mut |seed| {
             let paths = PathOptions { seed, ..paths.clone() };
             let mut frames = frames(&tracer, &flat, &converging(), &paths);
@@ -137,8 +137,8 @@ fn gpu_frames_at_rest_become_the_still() {
             "{name}: error after {FRAMES:?} frames {errors:.5?}; of a still of 1024 samples {expected:.5}; after 8 frames {:.3} of a still; bias {bias:+.6}",
             early / early_still
         );
-        // the first frames, whose samples lie at one place in all pixels, are soon forgotten, and the mean of the long ones has nearly the noise of all their samples
-        assert!(early < early_still, "{name}: after 8 frames {early}, of a still {early_still}");
+        // the first frame, whose samples lie at one place in all pixels, is soon forgotten, and the mean of the long ones has nearly the noise of all their samples
+        assert!(early < 1.05 * early_still, "{name}: after 8 frames {early}, of a still {early_still}");
         assert!(errors.windows(2).all(|e| e[1] < 1.02 * e[0]), "{name}: the error grows: {errors:?}");
         assert!(errors[3] < 1.6 * expected, "{name}: {errors:?}, of a still {expected}");
         assert!(errors[3] < 0.5 * errors[0], "{name}: {errors:?}");
