@@ -303,7 +303,7 @@ impl Realtime {
         Some(if self.is_radiance { frames * self.settings.resolution.period() } else { frames })
     }
 
-    /// Number of frames at rest, the one before them not counted, that have as many samples of a pixel as so many frames of those that a frame at rest begins with: fewer where frames become longer.
+    /// Number of frames at rest, the one before them not counted, that have as many samples of a pixel as so many long frames that do not grow: fewer where they do.
     pub fn frames_for(settings: &Settings, size: [u32; 2], is_radiance: bool, is_cpu: bool, frames: u32) -> u32 {
         let pixels = u64::from(size[0]) * u64::from(size[1]);
         let samples = match is_radiance {
