@@ -112,9 +112,9 @@ fn gpu_frames_at_rest_become_the_still() {
         let mut still = |spp, seed| integrator.render(&tracer, &camera, spp, seed, &mut NoControl).unwrap().image.film.mean;
         let truth = still(8192, 1);
         let expected = rmse(&still(1024, 2), &truth);
-        // Frames of 2, 2, 4, 8, 8, 8 and 8 samples after the first: about as good as a still of 40. The error of so few differs by a tenth from seed to seed.
+        // Frames of 2, 2, 4, 8, 8, 8 and 8 samples after the first: no worse than a still of 35, and about as good as one of 40. The error of so few differs by a tenth from seed to seed.
         let mean_error = |error: &mut dyn FnMut(u32) -> f64| (0..EARLY_RUNS).map(|k| error(10 + k).powi(2)).sum::<f64>().sqrt();
-        let early_still = mean_error(&mut |seed| rmse(&still(40, seed), &truth));
+        let [early_least, early_still] = [35, 40].map(|spp| mean_error(&mut |seed| rmse(&still(spp, seed), &truth)));
         let early = mean_error(&mut |seed| {
             let paths = PathOptions { seed, ..paths.clone() };
             let mut frames = frames(&tracer, &flat, &converging(), &paths);
@@ -138,7 +138,7 @@ fn gpu_frames_at_rest_become_the_still() {
             early / early_still
         );
         // the first frame, whose samples lie at one place in all pixels, is soon forgotten, and the mean of the long ones has nearly the noise of all their samples
-        assert!(early < 1.05 * early_still, "{name}: after 8 frames {early}, of a still {early_still}");
+        assert!(early < early_least.min(1.05 * early_still), "{name}: after 8 frames {early}, of stills {early_least} and {early_still}");
         assert!(errors.windows(2).all(|e| e[1] < 1.02 * e[0]), "{name}: the error grows: {errors:?}");
         assert!(errors[3] < 1.6 * expected, "{name}: {errors:?}, of a still {expected}");
         assert!(errors[3] < 0.5 * errors[0], "{name}: {errors:?}");

@@ -40,7 +40,7 @@ pub fn stage(tracer: &Tracer, pixels: u32, input: Resource, has_rest: bool) -> R
     Ok(Stage::new(vec![Box::new(pass)], Range::all(pixels)))
 }
 
-/// Samples that the image counts for as which the camera came to rest.
+/// Number of samples as which the image of the last frame in motion counts at rest.
 const IN_MOTION: f32 = 8.0;
 
 /// Minimum weight of a frame of radiance at rest, which is the filtered mean of all samples so far: those before it are of a part r of its samples. By the third power of that part they
