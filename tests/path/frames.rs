@@ -138,7 +138,10 @@ fn gpu_frames_at_rest_become_the_still() {
             early / early_still
         );
         // the first frame, whose samples lie at one place in all pixels, is soon forgotten, and the mean of the long ones has nearly the noise of all their samples
-        assert!(early < early_least.min(1.05 * early_still), "{name}: after 8 frames {early}, of stills {early_least} and {early_still}");
+        assert!(
+            early < early_least.min(1.05 * early_still),
+            "{name}: after 8 frames {early}, of stills {early_least} and {early_still}"
+        );
         assert!(errors.windows(2).all(|e| e[1] < 1.02 * e[0]), "{name}: the error grows: {errors:?}");
         assert!(errors[3] < 1.6 * expected, "{name}: {errors:?}, of a still {expected}");
         assert!(errors[3] < 0.5 * errors[0], "{name}: {errors:?}");
