@@ -198,9 +198,11 @@ def presets(folder: Path) -> list[str]:
 
 
 def light(folder: Path) -> list[str]:
-    record = load(folder / "bench-frames.json")
-    if not record:
-        return []
+    records = [load(path) for path in sorted(folder.glob("bench-frames*.json"))]
+    return [line for record in records if record for line in frames_of_light(record)]
+
+
+def frames_of_light(record: dict[str, Any]) -> list[str]:
     width, height = record["size"]
     lines = [f"## Path tracing in real time, {width}x{height}", "", f"Tracer `{record['tracer']}`, {record['frames']} frames, references of {record['reference_paths']} paths a pixel. Milliseconds a frame: by the device's clock, the median (what 95 % of frames keep within), and by the program's, with all that it does besides. RMSE: of the last frame, beside plain accumulation's at equal time.", ""]
     for view in record["views"]:
