@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use super::block::{Block, BlockParams, TILE_PIXELS};
 use super::camera::CameraRecord;
 use super::convergence::{TileCount, TileErrors};
-use super::pace::{MAX_RAYS, Pace};
+use super::pace::Pace;
 use super::schedule::{FilmOptions, Step};
 use super::state::{FilmState, tiles};
 use super::tile_mask::TileMask;
@@ -17,6 +17,7 @@ use super::{Film, FilmPixel, MAX_CHANNELS, record_bytes, record_words};
 use crate::error::{Error, Result};
 use crate::film::Control;
 use crate::gpu::{Buffer, Commands, Device, Memory, Timing};
+use crate::tracer::stream::launch_rays;
 use crate::tracer::{Push, Tracer};
 
 /// Log2 of the maximum number of samples per pixel in a launch, unless an estimator takes more. Samples of a pixel are neighbouring rays, which are coherent.
@@ -87,11 +88,11 @@ pub struct Accumulated {
     pub trace_seconds: f64,
 }
 
-/// Maximum number of rays in a launch: the capacity that an estimator's buffers need. `sample_bits`: [`Estimator::SAMPLE_BITS`].
-pub(crate) fn max_rays(size: [u32; 2], spp: u32, sample_bits: u32) -> u32 {
+/// Maximum number of rays in a launch, the capacity that an estimator's buffers need, where the device's is `most`. `sample_bits`: [`Estimator::SAMPLE_BITS`].
+pub(crate) fn max_rays(most: u32, size: [u32; 2], spp: u32, sample_bits: u32) -> u32 {
     let max_pixels = Block::cut(size).iter().map(Block::rays).max().unwrap_or(0) as u64;
     let bits = spp.max(1).ilog2().min(sample_bits);
-    (max_pixels << bits).min(MAX_RAYS as u64) as u32
+    (max_pixels << bits).min(most.into()) as u32
 }
 
 /// Tiles of a block with the same number of samples, which are sampled together.
@@ -179,7 +180,12 @@ pub(crate) fn accumulate<E: Estimator>(
         out.state = Some(state);
     }
     let blocks = Block::cut(plan.size);
-    let launcher = Launcher { tracer, estimator, commands: Commands::new(tracer.device())?, pace: Pace::default() };
+    let launcher = Launcher {
+        tracer,
+        estimator,
+        commands: Commands::new(tracer.device())?,
+        pace: Pace::up_to(launch_rays(&tracer.device().info)),
+    };
     let rates = vec![Rate::default(); blocks.len()];
     let mut run = Run { launcher, camera, plan, params, start, blocks, rates, tile_samples, out };
     let mut next = options.next(plan.spp, &run.tile_samples, &run.out.film);
@@ -437,7 +443,7 @@ impl<E: Estimator> Launcher<'_, E> {
         while first < (pixel_batch.pixels as u64) << batch.bits {
             let all = (pixel_batch.pixels as u64) << batch.bits;
             // launches contain all samples of a pixel
-            let rays = self.pace.rays().min(MAX_RAYS);
+            let rays = self.pace.rays();
             let wanted = if keep { 1 } else { self.pace.launches() };
             let (begin, start) = (first, Instant::now());
             let mut launches = Vec::new();
@@ -541,6 +547,7 @@ impl Accumulated {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::tracer::stream::LAUNCH_RAYS;
 
     #[test]
     fn batches_take_every_sample_once() {
@@ -559,7 +566,7 @@ mod tests {
             while first < spp {
                 let b = Batch::next(first, spp, most, bits);
                 assert_eq!(b.first, first);
-                assert!(b.samples() <= max_rays([1, 1], spp, bits), "{spp}");
+                assert!(b.samples() <= max_rays(LAUNCH_RAYS, [1, 1], spp, bits), "{spp}");
                 got.push(b.samples());
                 first += b.samples();
             }

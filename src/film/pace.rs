@@ -7,23 +7,29 @@ use crate::gpu::Timing;
 const TARGET: f64 = 0.05;
 /// Rays of the first launch. It is small because some drivers compile shaders at the first launch.
 const FIRST: u32 = 1 << 13;
-/// Maximum number of rays in a launch of a film. Passes address results relative to a launch's first ray, so the tracer must not split launches.
+/// Maximum number of rays in a launch on every device. Passes address results relative to a launch's first ray, so the tracer must not split launches.
 pub const MAX_RAYS: u32 = crate::tracer::stream::LAUNCH_RAYS;
 
 /// Chooses the size of launches from the measured time of earlier ones.
 #[derive(Clone, Debug)]
 pub struct Pace {
     rays: u32,
+    most: u32,
     seen: bool,
 }
 
 impl Default for Pace {
     fn default() -> Self {
-        Self { rays: FIRST, seen: false }
+        Self::up_to(MAX_RAYS)
     }
 }
 
 impl Pace {
+    /// For launches of at most `most` rays.
+    pub fn up_to(most: u32) -> Self {
+        Self { rays: FIRST.min(most), most, seen: false }
+    }
+
     /// Rays of the next launch; a multiple of 64.
     pub fn rays(&self) -> u32 {
         self.rays
@@ -32,7 +38,7 @@ impl Pace {
     /// Number of launches in one submission, so that the host regains control about ten times a second.
     pub fn launches(&self) -> u32 {
         // a launch takes at most TARGET once the pace is found
-        if self.rays < MAX_RAYS { 2 } else { 4 }
+        if self.rays < self.most { 2 } else { 4 }
     }
 
     /// Learns from the longest region of a submission whose launches had at most `rays` rays.
@@ -43,7 +49,7 @@ impl Pace {
         let fit = rays as f64 * TARGET / seconds.max(1e-6);
         // the first launch may have compiled the shader: its time is an upper bound that says little
         let growth = if self.seen { 2.0 } else { 4.0 };
-        let next = fit.clamp(self.rays as f64 * 0.25, self.rays as f64 * growth).clamp(64.0 * 16.0, MAX_RAYS as f64);
+        let next = fit.clamp(self.rays as f64 * 0.25, self.rays as f64 * growth).clamp(64.0 * 16.0, self.most as f64);
         self.rays = (next as u32) & !63;
         self.seen = true;
     }
@@ -55,15 +61,15 @@ mod tests {
 
     #[test]
     fn converges_to_the_target_from_below_and_above() {
-        for rate in [1e5, 5e6, 1e12] {
-            let mut pace = Pace::default();
+        for (rate, most) in [(1e5, MAX_RAYS), (5e6, MAX_RAYS), (1e12, MAX_RAYS), (1e12, 4 * MAX_RAYS)] {
+            let mut pace = Pace::up_to(most);
             for _ in 0..40 {
                 let rays = pace.rays();
                 pace.learn(rays, &[Timing { label: "x", seconds: rays as f64 / rate }], 0.0, 1);
             }
             let seconds = pace.rays() as f64 / rate;
             assert!(seconds <= 0.06, "{rate}: {seconds}");
-            assert!(pace.rays() == MAX_RAYS || seconds > 0.03, "{rate}: {seconds}");
+            assert!(pace.rays() == most || seconds > 0.03, "{rate}: {seconds}");
             assert_eq!(pace.rays() % 64, 0);
         }
     }

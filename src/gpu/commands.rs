@@ -31,6 +31,8 @@ pub struct Commands {
     buffer: vk::CommandBuffer,
     fence: vk::Fence,
     queries: Option<vk::QueryPool>,
+    /// Queries that the last submission wrote.
+    written: u32,
     device: Arc<Device>,
 }
 
@@ -47,6 +49,7 @@ impl Commands {
             buffer: vk::CommandBuffer::null(),
             fence: vk::Fence::null(),
             queries: None,
+            written: 2 * MAX_REGIONS,
             device: device.clone(),
         };
         let info = vk::CommandBufferAllocateInfo::default().command_pool(commands.pool).command_buffer_count(1);
@@ -66,8 +69,8 @@ impl Commands {
         // SAFETY (all calls below): the buffer is not in use, because every submission was waited for; recording and
         // submission follow the specification's order; the queue is locked
         unsafe {
-            if let Some(queries) = self.queries {
-                raw.reset_query_pool(queries, 0, 2 * MAX_REGIONS);
+            if let Some(queries) = self.queries.filter(|_| self.written > 0) {
+                raw.reset_query_pool(queries, 0, self.written);
             }
             let begin = vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
             raw.begin_command_buffer(self.buffer, &begin).context("recording commands")?;
@@ -77,6 +80,7 @@ impl Commands {
         record(&mut recorder);
         recorder.final_barrier();
         let labels = recorder.labels;
+        self.written = 2 * labels.len() as u32;
         unsafe {
             raw.end_command_buffer(self.buffer).context("recording commands")?;
             let buffers = [self.buffer];

@@ -185,11 +185,18 @@ pub trait Pass {
         0
     }
 
-    /// Runs the pass over a range in submissions of its own, and waits for them. Returns their times.
+    /// Runs the pass over a range in submissions of its own, and waits for them. `control` is asked between launches whether to stop. Returns their times.
     ///
     /// # Errors
-    /// Those of the device.
-    fn run(&mut self, commands: &mut Commands, frame: &Frame, resources: &Resources, range: Range) -> Result<Vec<Timing>> {
+    /// Those of the device; [`Error::Interrupted`] when `control` says so.
+    fn run(
+        &mut self,
+        commands: &mut Commands,
+        frame: &Frame,
+        resources: &Resources,
+        range: Range,
+        _control: Option<&mut dyn Control>,
+    ) -> Result<Vec<Timing>> {
         let mut outcome = Ok(());
         let timings = commands.run(|r| outcome = self.record(r, frame, resources, range))?;
         outcome.map(|()| timings)
@@ -398,7 +405,8 @@ impl Graph {
             {
                 let Stage { passes, ranges, .. } = &mut self.stages[stage];
                 for pass in passes.iter_mut().filter(|p| p.is_enabled(display)) {
-                    timings.extend(pass.run(&mut self.commands, frame, resources, ranges[k])?);
+                    let control = control.as_mut().map(|c| &mut **c as &mut dyn Control);
+                    timings.extend(pass.run(&mut self.commands, frame, resources, ranges[k], control)?);
                 }
                 continue;
             }

@@ -31,6 +31,7 @@ use crate::gpu::{Buffer, Commands, ComputePipeline, Device, Memory, Timing};
 use crate::interface::PixelFilter;
 use crate::output::Image;
 use crate::ray::Ray;
+use crate::tracer::stream::launch_rays;
 use crate::tracer::{Needs, Push, Tracer};
 
 /// Value of a sample whose camera ray missed; ambient visibility is never negative.
@@ -248,7 +249,7 @@ pub fn streams(options: &AoOptions) -> [&'static StreamShaders; 2] {
 /// Those of the device, and [`crate::Error::Interrupted`] when `control` says so.
 pub fn render(tracer: &Tracer, camera: &CameraRecord, options: &AoOptions, control: &mut dyn Control) -> Result<AoResult> {
     let device = tracer.device();
-    let most = max_rays(options.size, options.spp, AoEstimator::SAMPLE_BITS);
+    let most = max_rays(launch_rays(&device.info), options.size, options.spp, AoEstimator::SAMPLE_BITS);
     let sample_bits = options.spp.max(1).ilog2().min(AoEstimator::SAMPLE_BITS);
     let mut estimator = AoEstimator {
         rays: AoRays::new(tracer, options.attenuation(), most, sample_bits)?,

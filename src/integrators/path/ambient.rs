@@ -17,6 +17,7 @@ use crate::integrators::IntegratorSettings;
 use crate::integrators::ao::{Attenuation, Hemisphere};
 use crate::settings::choices;
 use crate::shaders;
+use crate::tracer::stream::launch_rays;
 use crate::tracer::{Push, Stream, Tracer};
 
 choices! {
@@ -141,7 +142,8 @@ pub fn trace(
         background_only: true,
         ..options.clone()
     };
-    let mut paths = PathEstimator::new(tracer, flat, &options, max_rays(options.size, options.spp, MAX_SAMPLE_BITS), false)?;
+    let capacity = max_rays(launch_rays(&tracer.device().info), options.size, options.spp, MAX_SAMPLE_BITS);
+    let mut paths = PathEstimator::new(tracer, flat, &options, capacity, false)?;
     paths.find_camera_media(camera)?;
     let distance = tracer.stream(&shaders::PATH_DISTANCE_CLOSEST)?;
     let mut estimator = DistanceEstimator { paths, distance, block: None, width: options.size[0], take };

@@ -27,13 +27,14 @@ use crate::film::Control;
 use crate::film::accumulate::{Accumulated, Estimator, MAX_SAMPLE_BITS, Plan, accumulate, max_rays};
 use crate::film::block::BlockParams;
 use crate::film::camera::CameraRecord;
-use crate::gpu::{Buffer, Commands, ComputePipeline, Device, Memory, Specialization, Timing};
+use crate::gpu::{Buffer, Commands, ComputePipeline, Device, Memory, Recorder, Specialization, Timing};
 use crate::interface::records::path::SignalRecord;
 use crate::interface::{LightKind, LightKinds, MaterialFeature, PathFeature, PathFeatures};
 pub use crate::interface::{PixelFilter, View};
 use crate::scene::{Environment, Scene};
 use crate::shaders::{self, StreamShaders};
 use crate::tracer::queue::RayQueue;
+use crate::tracer::stream::launch_rays;
 use crate::tracer::{Push, Stream, Tracer};
 use environment::DeviceEnvironment;
 use lights::device::DeviceLights;
@@ -42,8 +43,10 @@ use media::ClosedVolumes;
 use params::{CONE_BYTES, INVALID, MEDIA_BYTES, PathParams, QUAD_BYTES, SKY_PDF_BYTES, STATE_BYTES, STRAIGHT_BYTES};
 pub use settings::{Lens, MAX_DEPTH, PathOptions, Strategy, TextureFilter};
 
-/// Bounces per submission, after which the host reads how many paths are left.
-const BOUNCES: u32 = 4;
+/// Minimum number of bounces per submission, after which the host reads how many paths are left.
+const MIN_BOUNCES: u32 = 4;
+/// Maximum number of bounces per submission.
+const MAX_BOUNCES: u32 = 32;
 /// Launches that are made beyond those of the bounces, for surfaces that paths pass straight through: what is left then ends. A path counts such surfaces in 16 bits
 /// (`PathRecord::depth_passes`).
 const MAX_STRAIGHT: u32 = 4096;
@@ -104,7 +107,7 @@ impl PathIntegrator {
     /// # Errors
     /// Those of the device; [`Error::Usage`] for a tracer that was built without the data that paths need.
     pub fn new(tracer: &Tracer, flat: &FlatScene, options: &PathOptions) -> Result<Self> {
-        let capacity = max_rays(options.size, options.spp, MAX_SAMPLE_BITS);
+        let capacity = max_rays(launch_rays(&tracer.device().info), options.size, options.spp, MAX_SAMPLE_BITS);
         Ok(Self { paths: PathEstimator::new(tracer, flat, options, capacity, false)?, options: options.clone() })
     }
 
@@ -397,7 +400,7 @@ impl PathEstimator {
             walls,
             ambient,
             volumes: has_media.then(|| ClosedVolumes::new(flat)),
-            counts: Buffer::new(device, "ray counts", 4 * u64::from(COUNTS * (BOUNCES + 1)), Memory::Readback)?,
+            counts: Buffer::new(device, "ray counts", 4 * u64::from(COUNTS * (MAX_BOUNCES + 1)), Memory::Readback)?,
             max_depth: options.bounces(),
             samples_lights,
             traced: PathCounts::default(),
@@ -475,7 +478,7 @@ impl PathEstimator {
     }
 
     /// Records the shadow rays that a vertex generated; their number is read back from `slot`.
-    fn record_shadow(&self, r: &mut crate::gpu::Recorder, push: Push, most: u32, slot: u32) {
+    fn record_shadow(&self, r: &mut Recorder, push: Push, most: u32, slot: u32) {
         if !self.samples_lights {
             return;
         }
@@ -496,7 +499,7 @@ impl PathEstimator {
     }
 
     /// Records the rays of ambient light that a vertex generated; their number is read back from `slot`.
-    fn record_ambient(&self, r: &mut crate::gpu::Recorder, push: Push, most: u32, slot: u32) {
+    fn record_ambient(&self, r: &mut Recorder, push: Push, most: u32, slot: u32) {
         let Some(ambient) = &self.ambient else { return };
         r.barrier();
         let push = Push { pass: self.block_params[ambient.params].address(), ..push };
@@ -540,15 +543,13 @@ impl PathEstimator {
 
     /// Traces all bounces of a launch, and adds the paths to the film.
     fn launch_one(&mut self, commands: &mut Commands, push: Push) -> Result<Vec<Timing>> {
-        let mut timings = self.trace(commands, push)?;
-        let push = Push { pass: self.block_params[0].address(), ..push };
+        let resolved = Push { pass: self.block_params[0].address(), ..push };
         let groups = (push.count >> push.sample_bits).div_ceil(shaders::LANES);
-        timings.extend(commands.run(|r| r.timed("path_resolve", |r| r.dispatch(&self.resolve, &push, groups)))?);
-        Ok(timings)
+        self.trace(commands, push, |paths, r| r.timed("path_resolve", |r| r.dispatch(&paths.resolve, &resolved, groups)))
     }
 
-    /// Traces all bounces of a launch, `BOUNCES` per submission; with thin walls that transmit, one.
-    fn trace(&mut self, commands: &mut Commands, push: Push) -> Result<Vec<Timing>> {
+    /// Traces all bounces of a launch, several per submission ([`bounces_of_submission`]); with thin walls that transmit, one. Then records `finish`, which reads the paths.
+    fn trace(&mut self, commands: &mut Commands, push: Push, finish: impl Fn(&Self, &mut Recorder)) -> Result<Vec<Timing>> {
         let passes = [0, 1].map(|k| self.block_params[k].address());
         let push = |fills: usize| Push { pass: passes[fills], ..push };
         // a surface that a path passes straight through is no bounce, but needs a launch
@@ -558,8 +559,10 @@ impl PathEstimator {
         // vertex `depth` fills queue `depth % 2`
         loop {
             // rays behind walls are traced before the next vertices append others
-            let bounces = if self.walls.is_some() { u32::from(started) } else { BOUNCES };
-            let (begin, last) = (depth, depth + bounces);
+            let bounces = if self.walls.is_some() { u32::from(started) } else { bounces_of_submission(push(0).count, left) };
+            let (begin, last) = (depth, (depth + bounces).min(max_launches));
+            // known before the host reads anything
+            let finishes = last == max_launches && self.walls.is_none();
             timings.extend(commands.run(|r| {
                 r.fill(&self.counts, self.counts.size(), 0);
                 if !started {
@@ -567,10 +570,11 @@ impl PathEstimator {
                     self.clear_light_queues(r);
                     r.barrier();
                     self.camera.record(r, &push(0));
-                    self.record_shadow(r, push(0), left, BOUNCES);
-                    self.record_ambient(r, push(0), left, BOUNCES);
+                    self.record_shadow(r, push(0), left, MAX_BOUNCES);
+                    self.record_ambient(r, push(0), left, MAX_BOUNCES);
                 }
-                while depth < last.min(max_launches) {
+                while depth < last {
+                    let slot = depth - begin;
                     depth += 1;
                     let (fills, traced) = (depth as usize % 2, (depth as usize + 1) % 2);
                     r.barrier();
@@ -578,22 +582,25 @@ impl PathEstimator {
                     self.clear_light_queues(r);
                     r.barrier();
                     self.bounce.record(r, &self.queues[traced].push(push(fills), left));
-                    r.copy(self.queues[traced].count(), 0, &self.counts, 4 * u64::from(COUNTS * ((depth - 1) % BOUNCES)), 4);
-                    self.record_shadow(r, push(fills), left, (depth - 1) % BOUNCES);
+                    r.copy(self.queues[traced].count(), 0, &self.counts, 4 * u64::from(COUNTS * slot), 4);
+                    self.record_shadow(r, push(fills), left, slot);
                     // what lies behind surfaces that paths pass straight through is a first surface, too
                     if straight {
-                        self.record_ambient(r, push(fills), left, (depth - 1) % BOUNCES);
+                        self.record_ambient(r, push(fills), left, slot);
                     }
                 }
                 r.barrier();
                 // number of rays that are left for the next submission
-                r.copy(self.queues[depth as usize % 2].count(), 0, &self.counts, 4 * u64::from(COUNTS * BOUNCES), 4);
+                r.copy(self.queues[depth as usize % 2].count(), 0, &self.counts, 4 * u64::from(COUNTS * MAX_BOUNCES), 4);
+                if finishes {
+                    finish(self, r);
+                }
             })?);
             started = true;
             timings.extend(self.trace_behind_walls(commands, push(0))?);
             let counts: Vec<u32> = bytemuck::pod_collect_to_vec(&self.counts.read(0, self.counts.size())?);
             for k in begin..depth {
-                let rays = counts[(COUNTS * (k % BOUNCES)) as usize];
+                let rays = counts[(COUNTS * (k - begin)) as usize];
                 self.traced.bounce_rays += u64::from(rays);
                 if rays > 0 {
                     self.traced.longest_path = self.traced.longest_path.max(k + 1);
@@ -602,12 +609,22 @@ impl PathEstimator {
             let sum = |of: usize| counts.iter().skip(of).step_by(COUNTS as usize).map(|&n| u64::from(n)).sum::<u64>();
             self.traced.shadow_rays += sum(1);
             self.traced.ambient_rays += sum(2);
-            left = counts[(COUNTS * BOUNCES) as usize];
+            left = counts[(COUNTS * MAX_BOUNCES) as usize];
+            if finishes {
+                return Ok(timings);
+            }
             if left == 0 || depth >= max_launches {
+                timings.extend(commands.run(|r| finish(self, r))?);
                 return Ok(timings);
             }
         }
     }
+}
+
+/// Number of bounces in a submission of a launch of `all` paths of which `left` are left. A launch is as large as the paths that were left when it was recorded, and a submission costs some tenths of a
+/// millisecond on a GPU: the fewer are left, the more bounces. Few paths of millions go on for tens of bounces.
+fn bounces_of_submission(all: u32, left: u32) -> u32 {
+    (u64::from(MIN_BOUNCES) * u64::from(all) / u64::from(left.max(1))).min(u64::from(MAX_BOUNCES)) as u32
 }
 
 impl Estimator for PathEstimator {

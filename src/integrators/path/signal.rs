@@ -137,11 +137,9 @@ impl SignalPaths {
     /// # Errors
     /// Those of the device.
     pub fn launch(&mut self, commands: &mut Commands, push: Push, gather: u64) -> Result<Vec<Timing>> {
-        let mut timings = self.paths.trace(commands, push)?;
-        let push = Push { pass: gather, ..push };
+        let gathered = Push { pass: gather, ..push };
         let groups = (push.count >> push.sample_bits).div_ceil(LANES);
-        timings.extend(commands.run(|r| r.timed("path_gather", |r| r.dispatch(&self.gather, &push, groups)))?);
-        Ok(timings)
+        self.paths.trace(commands, push, |_, r| r.timed("path_gather", |r| r.dispatch(&self.gather, &gathered, groups)))
     }
 
     /// Number of rays since [`SignalPaths::begin`], but for camera rays.

@@ -1,6 +1,7 @@
 //! `paths`: the paths of the pixels that are sampled in this frame, and the means of their parts. The host reads after some bounces how many paths are left.
 
-use crate::error::Result;
+use crate::error::{Error, Result};
+use crate::film::Control;
 use crate::film::block::{Block, BlockParams, TILE_PIXELS};
 use crate::gpu::{Commands, Recorder, Timing};
 use crate::integrators::path::signal::SignalPaths;
@@ -76,10 +77,23 @@ impl Pass for Paths {
         true
     }
 
-    fn run(&mut self, commands: &mut Commands, frame: &Frame, resources: &Resources, range: Range) -> Result<Vec<Timing>> {
+    fn run(
+        &mut self,
+        commands: &mut Commands,
+        frame: &Frame,
+        resources: &Resources,
+        range: Range,
+        mut control: Option<&mut dyn Control>,
+    ) -> Result<Vec<Timing>> {
         let mut timings = Vec::new();
         let most_bits = (self.paths.capacity() / range.count.max(1)).checked_ilog2().unwrap_or(0).min(MAX_SAMPLE_BITS);
         for (earlier, sample_bits) in sample_batches(frame.samples, most_bits) {
+            if earlier > 0
+                && let Some(control) = &mut control
+                && control.should_stop()?
+            {
+                return Err(Error::Interrupted);
+            }
             self.gather.write(&GatherParams {
                 frame: frame.params,
                 path: self.paths.params_address(),
