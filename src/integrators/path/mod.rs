@@ -228,6 +228,8 @@ struct PathEstimator {
     max_depth: u32,
     samples_lights: bool,
     traced: PathCounts,
+    /// Bounces of the longest path of the launch before.
+    bounces_before: u32,
     lights: DeviceLights,
     /// Makes the lights again where they move; `None` where they do not depend on the scene.
     light_builder: Option<LightBuilder>,
@@ -404,6 +406,7 @@ impl PathEstimator {
             max_depth: options.bounces(),
             samples_lights,
             traced: PathCounts::default(),
+            bounces_before: 0,
             lights,
             light_builder: builder,
             features,
@@ -556,10 +559,15 @@ impl PathEstimator {
         let straight = self.volumes.is_some() || self.features.contains(PathFeature::ClearWalls);
         let max_launches = if straight { self.max_depth.saturating_add(MAX_STRAIGHT) } else { self.max_depth };
         let (mut timings, mut depth, mut left, mut started) = (Vec::new(), 0, push(0).count, false);
+        let mut longest = 0;
         // vertex `depth` fills queue `depth % 2`
         loop {
             // rays behind walls are traced before the next vertices append others
-            let bounces = if self.walls.is_some() { u32::from(started) } else { bounces_of_submission(push(0).count, left) };
+            let before = self.bounces_before.saturating_sub(depth);
+            let bounces = match self.walls {
+                Some(_) => u32::from(started),
+                None => bounces_of_submission(push(0).count, left, before),
+            };
             let (begin, last) = (depth, (depth + bounces).min(max_launches));
             // known before the host reads anything
             let finishes = last == max_launches && self.walls.is_none();
@@ -601,30 +609,32 @@ impl PathEstimator {
             let counts: Vec<u32> = bytemuck::pod_collect_to_vec(&self.counts.read(0, self.counts.size())?);
             for k in begin..depth {
                 let rays = counts[(COUNTS * (k - begin)) as usize];
-                self.traced.bounce_rays += u64::from(rays);
                 if rays > 0 {
-                    self.traced.longest_path = self.traced.longest_path.max(k + 1);
+                    longest = k + 1;
                 }
+                self.traced.bounce_rays += u64::from(rays);
             }
             let sum = |of: usize| counts.iter().skip(of).step_by(COUNTS as usize).map(|&n| u64::from(n)).sum::<u64>();
             self.traced.shadow_rays += sum(1);
             self.traced.ambient_rays += sum(2);
             left = counts[(COUNTS * MAX_BOUNCES) as usize];
-            if finishes {
-                return Ok(timings);
-            }
             if left == 0 || depth >= max_launches {
-                timings.extend(commands.run(|r| finish(self, r))?);
+                if !finishes {
+                    timings.extend(commands.run(|r| finish(self, r))?);
+                }
+                self.bounces_before = longest;
+                self.traced.longest_path = self.traced.longest_path.max(longest);
                 return Ok(timings);
             }
         }
     }
 }
 
-/// Number of bounces in a submission of a launch of `all` paths of which `left` are left. A launch is as large as the paths that were left when it was recorded, and a submission costs some tenths of a
-/// millisecond on a GPU: the fewer are left, the more bounces. Few paths of millions go on for tens of bounces.
-fn bounces_of_submission(all: u32, left: u32) -> u32 {
-    (u64::from(MIN_BOUNCES) * u64::from(all) / u64::from(left.max(1))).min(u64::from(MAX_BOUNCES)) as u32
+/// Number of bounces in the next submission of a launch of `all` paths of which `left` are left, where the launch before took `before` more bounces. A launch is as large as the paths that were left when it was
+/// recorded, and a submission costs some tenths of a millisecond on a GPU: the fewer are left, the more bounces. A few paths of millions go on for tens of bounces.
+fn bounces_of_submission(all: u32, left: u32, before: u32) -> u32 {
+    let fit = u64::from(MIN_BOUNCES) * u64::from(all) / u64::from(left.max(1));
+    fit.min(before.into()).clamp(MIN_BOUNCES.into(), MAX_BOUNCES.into()) as u32
 }
 
 impl Estimator for PathEstimator {
@@ -641,5 +651,22 @@ impl Estimator for PathEstimator {
             timings.extend(self.launch_one(commands, *push)?);
         }
         Ok(timings)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn submissions_grow_as_paths_end() {
+        let all = 1 << 21;
+        // of the first launch nothing is known
+        assert_eq!(bounces_of_submission(all, all, 0), MIN_BOUNCES);
+        assert_eq!(bounces_of_submission(all, 100, 0), MIN_BOUNCES);
+        // as many groups of threads as the first submission has, and no more bounces than there were before
+        assert_eq!(bounces_of_submission(all, all / 3, 23), 12);
+        assert_eq!(bounces_of_submission(all, all / 50, 11), 11);
+        assert_eq!(bounces_of_submission(all, 0, 1000), MAX_BOUNCES);
     }
 }
