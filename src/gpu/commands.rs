@@ -31,7 +31,7 @@ pub struct Commands {
     buffer: vk::CommandBuffer,
     fence: vk::Fence,
     queries: Option<vk::QueryPool>,
-    /// Queries that the last submission wrote.
+    /// Number of queries to reset: those that the last submission wrote, and all before the first.
     written: u32,
     device: Arc<Device>,
 }
