@@ -11,7 +11,7 @@ const PARTS: u32 = 8;
 
 /// Samples of a pixel in a frame: paths of radiance, occlusion rays of ambient visibility. Frames in motion are short. At rest, after a few of them, come long ones: what a frame costs besides its samples, and
 /// does not depend on their number, is a third to a half of the time of a short one. Those of radiance become longer with the samples there are: by powers of two, so that each begins at a multiple of its
-/// number and together they fill the sequence evenly. First each has as many as all before it (2, 2, 4, 8), then as many for some time, and then a part of those before it.
+/// number and together they fill the sequence evenly. First each has as many as all before it (2, 2, 4, 8; where short ones have 4, 4, 4, 8), then as many for some time, and then a part of those before it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FrameSamples {
     /// In a short frame.
@@ -45,10 +45,13 @@ impl FrameSamples {
         let most_paths = if is_cpu { FIRST_PATHS } else { FIRST_GPU_PATHS };
         let per_pixel = |paths: u64, most: u64| (paths / pixels.max(1)).min(most) as u32;
         let many = if settings.converges() { few.max(power_of_two(per_pixel(most_paths, FIRST_PER_PIXEL))) } else { few };
-        // several paths of a short frame lie anywhere in their pixels
-        let forgets_short = few == 1 && many >= 4;
         let grows = settings.converges() && settings.resolution.period() == 1;
-        let (ramp, first_long) = if forgets_short && grows { (many.ilog2() - 1, 1) } else { (0, FIRST_LONG) };
+        // several paths of a short frame after the first at rest lie anywhere in their pixels
+        let forgets_short = many >= 4 && (few == 1 || grows);
+        let (ramp, first_long) = match forgets_short && grows {
+            true => ((many / few.next_power_of_two().max(2)).checked_ilog2().unwrap_or(0), 1),
+            false => (0, FIRST_LONG),
+        };
         let times = per_pixel(GROWTH * most_paths, MAX_PER_PIXEL) / many;
         let doublings = if grows { times.checked_ilog2().unwrap_or(0) } else { 0 };
         Self { few, many, ramp, doublings, first_long, period: 1, forgets_short }
@@ -232,6 +235,9 @@ mod tests {
             [1, 2, 2, 4, 8, 8, 16, 16, 32, 32]
         );
         assert_eq!([samples.frames_for_first(10), samples.frames_for_first(64)], [12, 34]);
+        let quality = Settings { converge: true, ..Preset::Quality.settings() };
+        let quality = FrameSamples::of_radiance(&quality, 14_400, true);
+        assert_eq!([0, 1, 2, 3, 4, 1000].map(|resting| quality.of(resting)), [4, 4, 4, 8, 8, 32]);
         // a GPU has time for several paths in a large image
         let large = |is_cpu| FrameSamples::of_radiance(&settings, 1920 * 1080, is_cpu);
         assert_eq!([large(true).of(4), large(false).of(4), large(true).most(), large(false).most()], [1, 8, 2, 32]);

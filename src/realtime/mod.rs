@@ -126,8 +126,10 @@ struct State {
     has_resolved: bool,
     /// Where samples lay in their pixels.
     offset: [f32; 2],
-    /// Frames since camera and scene last changed, this one included.
+    /// Frames since camera and scene last changed, this one included; of an image that begins at rest its first frame, too.
     resting: u32,
+    /// There have been frames that did not rest.
+    was_in_motion: bool,
     /// Ambient visibility: mean number of samples of a pixel at rest when they were last denoised.
     denoised_samples: u64,
     /// Radiance: index of the next path in a pixel's sequence. A pixel takes the samples of its sequence one after the other, also where it is sampled in every second or fourth frame only:
@@ -417,7 +419,9 @@ impl Realtime {
         // Larsen's pipeline skips no pass
         let is_undisturbed = !self.state.has_new_light && !self.state.was_interrupted;
         let still = moved.is_empty() && self.state.camera == Some(*camera) && !is_larsen && is_undisturbed;
-        let resting = if still { self.state.resting.saturating_add(1) } else { 0 };
+        // an image of which nothing is known yet begins as if it had come to rest: there are no histories to go on with, and places of their own for all paths say more
+        let begins_at_rest = self.is_radiance && !self.state.has_resolved && self.frame_samples.starts_anew(1);
+        let resting = if still { self.state.resting.saturating_add(1) } else { u32::from(begins_at_rest) };
         let has_come_to_rest = self.frames_to_rest().is_some_and(|frames| resting >= frames);
         let (is_long, samples) = (self.frame_samples.is_long(resting), self.frame_samples.of(resting));
         if has_come_to_rest && self.shown == Some(self.display) {
@@ -427,9 +431,16 @@ impl Realtime {
         if self.is_radiance {
             self.align_paths(rest_starts, resting);
         }
+        // one path a frame: places of frames are more even than those of the first few points of a sequence
+        let spreads = self.is_radiance
+            && self.settings.converges()
+            && self.settings.antialias
+            && samples > 1
+            && (is_long || !rest_starts || !self.state.has_resolved);
+        let was_in_motion = self.state.has_resolved && (resting == 0 || self.state.was_in_motion);
         let offset = match self.settings.antialias {
-            // what is known of surfaces is of the last short frame
-            true if is_long && !self.is_radiance => self.state.offset,
+            // what is known of surfaces is of the last frame whose samples lay at one place
+            true if still && (spreads || is_long && !self.is_radiance) => self.state.offset,
             true => sample_offset(self.state.frame),
             false => [0.0; 2],
         };
@@ -462,10 +473,12 @@ impl Realtime {
             offset,
             has_resolved: self.state.has_resolved,
             rest_starts,
+            spreads,
             resting,
             is_long,
             samples,
             rest_samples,
+            was_in_motion,
             first_sample: match self.is_radiance {
                 true => self.state.first_path,
                 false if is_long => self.frame_samples.in_long_before(resting),
@@ -496,6 +509,7 @@ impl Realtime {
         }
         self.state.camera = Some(*camera);
         self.state.has_history = self.settings.history > 1 || is_larsen;
+        self.state.was_in_motion = was_in_motion;
         self.state.has_resolved = true;
         self.state.resting = resting;
         self.state.offset = offset;
@@ -508,8 +522,8 @@ impl Realtime {
             samples,
             primary_rays: match self.settings.primary {
                 Some(Primary::Raster) if !is_long => 0,
-                // for the G-buffer, and of each sample
-                _ if self.is_radiance => pixels * (1 + u64::from(samples)),
+                // of each sample, and for the G-buffer
+                _ if self.is_radiance => pixels * (u64::from(samples) + u64::from(!still || has_moved_samples)),
                 _ if is_long => pixels * u64::from(samples),
                 _ if still && !has_moved_samples => 0,
                 _ => pixels,

@@ -58,13 +58,19 @@ fn gpu_a_scene_at_rest_in_motion_and_changing() {
     for number in ["rmse_corrected", "rel_mse", "bias", "flip"] {
         assert!(curve[4]["errors"][number].is_f64(), "{number}");
     }
-    let passes = still["cost"]["passes"].as_array().unwrap();
-    assert!(passes.iter().any(|p| p["pass"] == "path_surface"), "{passes:?}");
+    let passes = |cost: &Value| -> Vec<String> {
+        cost["passes"].as_array().unwrap().iter().map(|p| p["pass"].as_str().unwrap().to_owned()).collect()
+    };
+    // surfaces are known from the first frame
+    let at_rest = passes(&still["cost"]);
+    assert!(at_rest.iter().any(|p| p == "path_camera") && !at_rest.iter().any(|p| p == "path_surface"), "{at_rest:?}");
     assert!(still["cost"]["rays"].as_f64().unwrap() > 0.0 && view["ms_per_path"].as_f64().unwrap() > 0.0);
     let flicker = still["flicker"]["rms"].as_f64().unwrap();
     assert!(flicker > 0.0 && flicker < 0.05, "{flicker}");
     let motions = view["motions"].as_array().unwrap();
     assert_eq!(motions.iter().map(|m| m["motion"].as_str().unwrap()).collect::<Vec<_>>(), ["orbit", "sun", "animation"]);
+    let in_motion = passes(&motions[0]["results"][0]["cost"]);
+    assert!(in_motion.iter().any(|p| p == "path_surface"), "{in_motion:?}");
     let ratio = |m: &Value| {
         let r = &m["results"][0];
         let corrected = |e: &Value| e["rmse_corrected"].as_f64().unwrap();

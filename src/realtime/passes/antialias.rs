@@ -45,15 +45,16 @@ const IN_MOTION: f32 = 8.0;
 
 /// Minimum weight of a frame of radiance at rest, which is the filtered mean of all samples so far: those before it are of a part r of its samples. By the third power of that part they
 /// soften what the filter does at edges and hide its specks, and the mean has nearly the noise of all samples: by the square 1.07 times that after four long frames, by higher powers less, and more
-/// specks. Where samples are many there are none, and frames that add a constant part would leave sqrt(2p / (2p - 1)) times their noise: 1.095 by the third power, 1.02 by the twelfth.
+/// specks. Where samples are many there are none, and frames that add a constant part would leave sqrt(2p / (2p - 1)) times their noise: 1.095 by the third power, 1.02 by the twelfth, 1.01 by the twenty-fourth.
 fn least_weight(frame: &Frame) -> f32 {
     let after = frame.rest_samples as f32;
     if !frame.is_long || after <= 0.0 {
         return LEAST_WEIGHT;
     }
     let before = (after - frame.samples as f32).max(0.0);
-    let power = (after / 16.0).clamp(3.0, 12.0);
-    (1.0 - ((before + IN_MOTION) / (after + IN_MOTION)).powf(power)).max(LEAST_WEIGHT)
+    let power = (after / 16.0).clamp(3.0, 24.0);
+    let in_motion = if frame.was_in_motion { IN_MOTION } else { 0.0 };
+    (1.0 - ((before + in_motion) / (after + in_motion)).powf(power)).max(LEAST_WEIGHT)
 }
 
 impl Pass for Antialias {

@@ -57,9 +57,7 @@ impl Pass for Paths {
         if let Some(to_map) = &frame.environment_turn {
             self.paths.turn_environment(to_map)?;
         }
-        // one path a frame: places of frames are more even than those of the first few points of a sequence
-        let spreads = self.has_rest && frame.settings.antialias && (frame.is_long || !frame.rest_starts) && frame.samples > 1;
-        let pixel_filter = if spreads { PixelFilter::Box } else { PixelFilter::Centre };
+        let pixel_filter = if frame.spreads { PixelFilter::Box } else { PixelFilter::Centre };
         let params = BlockParams { pixel_filter: pixel_filter as u32, ..super::surfaces::block_params(frame, self.sampled) };
         let rr_depth = if frame.is_long { frame.settings.rest_rr_depth } else { 0 };
         self.paths.begin(&frame.camera, &params, rr_depth)
