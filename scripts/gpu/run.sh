@@ -245,9 +245,9 @@ read -ra more <<< "$(pick "--quick --strategies mis --reference-seconds 3" "--st
 step bench-path 60 "Path tracing: error against time" "$skylit" bench path "${scenes[@]}" "${more[@]}" --peers none --time-limit "$(pick 30 40)" --json="$out/bench-path.json"
 
 # one scene in a large image; errors of other scenes and motions in small ones, where a reference of many paths takes little
-step bench-frames 80 "Path tracing in real time" "$skylit" bench frames builtin:cornell-box --parts still,moving --size "$(pick 64x36 1920x1080)" \
+step bench-frames 80 "Path tracing in real time" "$skylit" bench frames builtin:cornell-box --peers none --parts still,moving --size "$(pick 64x36 1920x1080)" \
   --frames "$(pick 8 32)" --reference-paths "$(pick 16 256)" --time-limit "$(pick 30 70)" --json="$out/bench-frames.json"
-step bench-frames-scenes 80 "Path tracing in real time: mirror, parade" "$skylit" bench frames builtin:cornell-mirror builtin:parade --presets fast,balanced \
+step bench-frames-scenes 80 "Path tracing in real time: mirror, parade" "$skylit" bench frames builtin:cornell-mirror builtin:parade --peers none --presets fast,balanced \
   --parts still,moving,animation --size "$(pick 64x36 640x360)" --frames "$(pick 8 32)" --reference-paths "$(pick 16 1024)" --time-limit "$(pick 30 60)" \
   --json="$out/bench-frames-scenes.json"
 

@@ -4,6 +4,8 @@ use std::process::Output;
 use crate::common::command::{device, fails, json, skylit, stderr};
 use serde_json::Value;
 
+use super::bench_path::Place;
+
 const TINY: [&str; 6] = ["--quick", "--size", "64x36", "--frames", "12", "--quiet"];
 
 fn run(args: &[&str]) -> Output {
@@ -22,8 +24,42 @@ fn wrong_usage() {
     fails(&run(&["--integrator", "normals"]), 64, &["normals", "no frames in real time"]);
     fails(&run(&["--frames", "1"]), 64, &["--frames"]);
     fails(&run(&["--reference-paths", "1"]), 64, &["--reference-paths"]);
+    fails(&run(&["--peers", "/nonexistent.toml"]), 3, &["/nonexistent.toml"]);
     fails(&run(&["builtin:nothing"]), 64, &["nothing"]);
     fails(&run(&["no-such-scene.glb"]), 3, &["no such file"]);
+}
+
+/// A peer renders paths in the time of the frames, and is held against its own reference; one that fails is left out with a note, and one without anything to show is not asked.
+#[test]
+fn gpu_peers_beside_a_still_camera() {
+    if !device() {
+        return;
+    }
+    let run = |place: &Place, args: &[&str]| {
+        let peers = place.at("peers.toml");
+        let of = ["builtin:cornell-box", "--presets", "fast", "--peers", peers.to_str().unwrap()];
+        record(&[&of[..], args].concat())
+    };
+    let place = Place::new("", 64 * 36);
+    let beside = run(&place, &["--parts", "still"]);
+    assert_eq!(beside["peers"], serde_json::json!(["Fake"]));
+    let still = &beside["views"][0]["still"][0];
+    let peers = still["peers"].as_array().unwrap();
+    assert_eq!(peers.iter().map(|p| p["peer"].as_str().unwrap()).collect::<Vec<_>>(), ["fake k", "fake l"]);
+    for peer in peers {
+        assert_eq!(peer["reference_rmse"], 0.0, "its images are all the same");
+        // half a second an image, however many paths
+        let ms = ["ms_per_image", "ms_per_path"].map(|name| peer[name].as_f64().unwrap());
+        assert!((ms[0] + ms[1] - 500.0).abs() < 1e-6, "{peer}");
+        let points = peer["points"].as_array().unwrap();
+        assert_eq!(points.iter().map(|p| p["frame"].as_u64().unwrap()).collect::<Vec<_>>(), [1, 2, 4, 8, 12]);
+        assert!(points.iter().all(|p| p["paths"].as_u64().unwrap() >= 1 && p["errors"]["rmse"] == 0.0), "{points:?}");
+    }
+    let dies = run(&Place::new("render", 64 * 36), &["--parts", "still"]);
+    assert_eq!(dies["views"][0]["still"][0]["peers"], serde_json::json!([]));
+    assert!(dies["notes"].to_string().contains("peer 'fake' left out"), "{}", dies["notes"]);
+    let others = run(&place, &["--integrator", "direct", "--parts", "still"]);
+    assert_eq!(others["peers"], serde_json::json!([]));
 }
 
 /// Everything that a scene can do: numbers where there must be some, a row a result, and files that are whole and are read again.
@@ -36,7 +72,7 @@ fn gpu_a_scene_at_rest_in_motion_and_changing() {
     let at = |name: &str| dir.path().join(name).to_str().unwrap().to_owned();
     let (csv, plot, json) = (at("a.csv"), at("a.svg"), at("a.json"));
     let files = ["--csv", &csv, "--plot", &plot, "--json", &json];
-    let out = run(&[&["builtin:parade", "--presets", "balanced"], &TINY[..5], &files].concat());
+    let out = run(&[&["builtin:parade", "--presets", "balanced", "--peers", "none"], &TINY[..5], &files].concat());
     assert!(out.status.success(), "{}", stderr(&out));
     let text = String::from_utf8(out.stdout).unwrap();
     for word in ["builtin:parade", "over plain", "balanced, orbit: ", "balanced: flicker after 8 frames", "turn: 2,304 pixels"]

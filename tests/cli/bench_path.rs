@@ -23,12 +23,14 @@ done
 
 const TINY: [&str; 8] = ["--quick", "--size", "12x8", "--seconds", "0.02", "--reference-seconds", "0.05", "--quiet"];
 
-struct Place {
+/// A peers file with a peer that renders paths, and what it keeps.
+pub struct Place {
     dir: tempfile::TempDir,
 }
 
 impl Place {
-    fn new(dies_at: &str, pixels: u32) -> Self {
+    /// `dies_at`: a command at which it ends; `pixels`: of its images.
+    pub fn new(dies_at: &str, pixels: u32) -> Self {
         let dir = tempfile::tempdir().unwrap();
         std::fs::write(dir.path().join("fake.sh"), FAKE).unwrap();
         let peers = format!(
@@ -39,7 +41,8 @@ impl Place {
         Self { dir }
     }
 
-    fn at(&self, name: &str) -> PathBuf {
+    /// A file of it.
+    pub fn at(&self, name: &str) -> PathBuf {
         self.dir.path().join(name)
     }
 

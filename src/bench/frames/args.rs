@@ -85,6 +85,9 @@ pub struct BenchFramesArgs {
     /// Environment map for scenes without lights, an equirectangular .hdr or .exr [default: the shared sun map if available, or a built-in one]
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub environment: Option<PathBuf>,
+    /// Peers that render paths, beside a still camera: a file like benches/peers.toml, or `none` [default: benches/peers.toml if it exists]
+    #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
+    pub peers: Option<String>,
     /// Tracer
     #[arg(long, value_enum, default_value = "auto")]
     pub tracer: TracerChoice,
@@ -123,6 +126,11 @@ impl BenchFramesArgs {
     /// Is any part requested that looks at scenes?
     pub fn wants_views(&self) -> bool {
         Part::value_variants().iter().any(|p| *p != Part::Bounces && self.wants(*p))
+    }
+
+    /// Does any part show what peers render, the paths of a still camera?
+    pub fn wants_peers(&self) -> bool {
+        self.integrator.name() == "path" && self.wants(Part::Still)
     }
 
     fn has(&self, preset: Preset) -> bool {

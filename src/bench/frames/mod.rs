@@ -6,6 +6,7 @@ mod bounces;
 mod change;
 mod displayed;
 mod moving;
+mod peers;
 mod scenes;
 mod signal;
 mod stage;
@@ -16,6 +17,7 @@ mod views;
 pub use args::BenchFramesArgs;
 use args::Part;
 
+use super::peers::file::{self, Measures, PeerSpec};
 use super::record::frames::FramesBenchmark;
 use super::session::Session;
 use super::table::Block;
@@ -33,6 +35,7 @@ pub fn run(args: &BenchFramesArgs) -> Result<(), Failure> {
     args.check()?;
     let scenes = scenes::choose(args);
     // before anything that takes long
+    let specs = if args.wants_peers() { file::choose(args.peers.as_deref(), Measures::Paths)? } else { Ok(Vec::new()) };
     scenes.sources.iter().try_for_each(|s| scenes::check(s))?;
     let mut session = Session::start(args, &args.common, |device| FramesBenchmark {
         host: device.host_info(),
@@ -46,12 +49,14 @@ pub fn run(args: &BenchFramesArgs) -> Result<(), Failure> {
         ..Default::default()
     })?;
     scenes.notes.into_iter().for_each(|n| session.note(n));
-    let measured = measure(&mut session, &scenes.sources);
+    let measured = measure(&mut session, &scenes.sources, specs);
     session.finish(measured, !args.scenes.is_empty(), Ok(()))
 }
 
 /// All jobs. One that fails does not stop the others.
-fn measure(session: &mut FramesSession, scenes: &[String]) -> Result<()> {
+fn measure(session: &mut FramesSession, scenes: &[String], specs: Result<Vec<PeerSpec>, String>) -> Result<()> {
+    session.start_peers(specs)?;
+    session.record.peers = session.peer_titles();
     let title = table::title(&session.record);
     session.show(&[Block::Line(title)])?;
     let (views, bounces) = (session.args.wants_views(), session.args.wants(Part::Bounces));

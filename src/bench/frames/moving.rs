@@ -69,7 +69,9 @@ fn one(
         }
     }
     let cost = log.cost(first_timed(frames));
-    let time = EqualTime::new(clock.time(), log.typical(first_timed(frames)));
+    // the last one: the first has other samples
+    let typical = log.typical(first_timed(frames)).pop();
+    let time = EqualTime::new(clock.time(), typical.into_iter().collect());
     let (mut plain, mut denoised) = (Vec::new(), Vec::new());
     for (frame, reference) in references {
         let camera = stage.go(motion, *frame)?.camera;

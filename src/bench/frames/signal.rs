@@ -201,10 +201,7 @@ impl Sampler {
     /// # Errors
     /// Those of [`Sampler::render`].
     pub fn time(&mut self, tracer: &Tracer, camera: &CameraRecord, clock: &mut PlainClock) -> Result<()> {
-        for (seconds, paths) in clock.seconds.iter_mut().zip(TIMED_PATHS) {
-            seconds.push(self.render(tracer, camera, paths, 0)?.1);
-        }
-        Ok(())
+        clock.take(|paths| Ok(self.render(tracer, camera, paths, 0)?.1))
     }
 }
 
@@ -215,6 +212,17 @@ pub struct PlainClock {
 }
 
 impl PlainClock {
+    /// Takes the times of an image of few and one of many paths. `image` renders one, and returns its seconds.
+    ///
+    /// # Errors
+    /// Those of `image`.
+    pub fn take<E>(&mut self, mut image: impl FnMut(u32) -> Result<f64, E>) -> Result<(), E> {
+        for (seconds, paths) in self.seconds.iter_mut().zip(TIMED_PATHS) {
+            seconds.push(image(paths)?);
+        }
+        Ok(())
+    }
+
     /// By the medians of all times.
     pub fn time(&self) -> PlainTime {
         let ms = [0, 1].map(|k| 1e3 * median(&self.seconds[k]).unwrap_or(f64::NAN));
@@ -268,10 +276,17 @@ impl EqualTime {
     /// As many paths as fit into the time of the first frames, in an image as stills have it or in these frames, whichever are more: images cost more than their paths,
     /// and many paths at once cost less.
     pub fn paths(&self, frames: u32) -> u32 {
-        let first = &self.frames[..self.frames.len().min(frames as usize)];
         // plain accumulation is timed by the clock, too
-        let ms = first.iter().map(|f| f.ms).sum();
-        self.plain.paths_in(ms).max(first.iter().map(|f| f.paths).sum::<f64>() as u32)
+        self.plain.paths_in(self.ms(frames)).max(self.first(frames).iter().map(|f| f.paths).sum::<f64>() as u32)
+    }
+
+    /// Time of the first frames, milliseconds.
+    pub fn ms(&self, frames: u32) -> f64 {
+        self.first(frames).iter().map(|f| f.ms).sum()
+    }
+
+    fn first(&self, frames: u32) -> &[TypicalFrame] {
+        &self.frames[..self.frames.len().min(frames as usize)]
     }
 
     /// As many as fit into the last frame beside what takes so many milliseconds.

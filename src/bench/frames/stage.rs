@@ -21,11 +21,11 @@ use crate::terminal::interrupt::SilentControl;
 use crate::tracer::{BuildOptions, Changes, ComputeOptions, MovedBounds, Tracer};
 
 /// Seeds of the halves of a reference; no preset has them.
-const REFERENCE_SEEDS: [u32; 2] = [0x5eed_000a, 0x5eed_000b];
+pub const REFERENCE_SEEDS: [u32; 2] = [0x5eed_000a, 0x5eed_000b];
 /// Seed of plain accumulation.
 pub const PLAIN_SEED: u32 = 0x5eed_0100;
 /// Images of plain accumulation whose time is taken before anything else.
-const TIMED_IMAGES: u32 = 9;
+pub const TIMED_IMAGES: u32 = 9;
 /// Times of plain accumulation that are taken between frames.
 const TIMES_BETWEEN: usize = 4;
 /// How far the environment map turns in a frame, degrees: as far as the camera on its orbit.

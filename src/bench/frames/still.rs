@@ -2,6 +2,7 @@
 
 use super::FramesSession;
 use super::displayed::{Displayed, FlickerMeter, FrameReference};
+use super::peers::{self, PeerImages};
 use super::signal::{EqualTime, PlainClock};
 use super::stage::{Stage, is_plain_timed};
 use crate::bench::frame_log::{FrameLog, first_timed};
@@ -9,11 +10,17 @@ use crate::bench::record::frames::{FrameErrors, FramePoint, PlainImage, StillFra
 use crate::error::Result;
 use crate::realtime::Preset;
 
-/// Measures a preset: errors are means over runs that differ in their samples alone. Time and flicker are those of the first.
+/// Measures a preset, and the peers `beside` it: errors are means over runs that differ in their samples alone. Time and flicker are those of the first.
 ///
 /// # Errors
 /// Those of the device; Ctrl-C.
-pub fn measure(session: &FramesSession, stage: &mut Stage, preset: Preset, reference: &FrameReference) -> Result<StillFrames> {
+pub fn measure(
+    session: &mut FramesSession,
+    stage: &mut Stage,
+    preset: Preset,
+    reference: &FrameReference,
+    beside: &mut Vec<PeerImages>,
+) -> Result<StillFrames> {
     let frames = session.args.frames();
     let camera = stage.still_camera();
     let (first_seed, runs) = (session.args.seed, session.args.runs);
@@ -38,7 +45,9 @@ pub fn measure(session: &FramesSession, stage: &mut Stage, preset: Preset, refer
         let mean = |of: &[FrameErrors]| FrameErrors::mean(of).unwrap_or_default();
         curve.push(FramePoint { frame, errors: mean(of_frame), plain: PlainImage { paths, errors: mean(&plain) } });
     }
+    let ms: Vec<(u32, f64)> = points(frames).map(|frame| (frame, time.ms(frame))).collect();
     Ok(StillFrames {
+        peers: peers::beside(session, beside, &ms)?,
         preset: preset.to_string(),
         rays_per_pixel: stage.rays_per_pixel(preset)?,
         cost: first.log.cost(first_timed(frames)),

@@ -3,7 +3,7 @@
 use crate::bench::record::cost::FrameCost;
 use crate::bench::record::frames::{
     BouncePoint, BouncesRecord, ChangedFrames, DenoisedImage, Flicker, FrameErrors, FramePoint, FramesBenchmark, FramesChange,
-    FramesView, MotionRecord, StillFrames,
+    FramesView, MotionRecord, PeerPoint, StillFrames,
 };
 use crate::bench::table::{Block, header, number, optional, thousands};
 
@@ -41,6 +41,11 @@ pub fn view(record: &FramesView) -> Vec<Block> {
     if !record.still.is_empty() {
         blocks.push(Block::line(format!("  still camera; reference good to {}", error(record.reference_rmse))));
         blocks.push(Block::Table { title: "Still camera", rows: still(&record.still), left: 1 });
+        let beside = peers(&record.still);
+        if beside.len() > 1 {
+            blocks.push(Block::line("  still camera, beside other renderers in the same time: error / theirs (their paths)"));
+            blocks.push(Block::Table { title: "Still camera, other renderers", rows: beside, left: 2 });
+        }
     }
     for m in &record.motions {
         blocks.push(Block::line(format!("  {}; references good to {}", m.motion, error(m.reference_rmse))));
@@ -130,6 +135,30 @@ fn still(results: &[StillFrames]) -> Vec<Vec<String>> {
         );
     }
     filled(rows)
+}
+
+/// Errors of presets and of peers, after 1, 2, 4, ... frames.
+fn peers(results: &[StillFrames]) -> Vec<Vec<String>> {
+    let frames: Vec<u32> = results.first().map(|r| r.curve.iter().map(|p| p.frame).collect()).unwrap_or_default();
+    let titles: Vec<String> = frames.iter().map(|f| format!("frame {f}")).collect();
+    let titles: Vec<&str> = titles.iter().map(String::as_str).collect();
+    let mut rows = vec![header(&[&["preset", "peer", "ms an image", "ms a path", "reference"], &titles[..]].concat())];
+    for r in results {
+        for peer in &r.peers {
+            let mut row = vec![r.preset.clone(), peer.peer.clone(), number(peer.ms_per_image), number(peer.ms_per_path)];
+            row.push(error(peer.reference_rmse));
+            row.extend(frames.iter().map(|f| {
+                let ours = r.curve.iter().find(|p| p.frame == *f);
+                let theirs = peer.points.iter().find(|p| p.frame == *f);
+                optional(ours.zip(theirs), |(ours, theirs): (&FramePoint, &PeerPoint)| {
+                    let [ours, of_peer] = [&ours.errors, &theirs.image.errors].map(|e| error(e.rmse_corrected));
+                    format!("{ours} / {of_peer} ({})", theirs.image.paths)
+                })
+            }));
+            rows.push(row);
+        }
+    }
+    rows
 }
 
 fn motion(record: &MotionRecord) -> Vec<Vec<String>> {

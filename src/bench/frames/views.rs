@@ -3,7 +3,7 @@
 use super::args::Part;
 use super::scenes::{self, FramesScene};
 use super::stage::{Motion, Stage};
-use super::{FramesSession, change, moving, still, table};
+use super::{FramesSession, change, moving, peers, still, table};
 use crate::accel::flatten::FlatScene;
 use crate::bench::frame_log::FRAMES_PER_TURN;
 use crate::bench::record::frames::FramesView;
@@ -80,13 +80,14 @@ fn fill<'a>(
         session.phase(format!("{}: reference", loaded.name));
         let reference = stage.reference(&stage.still_camera(), args.reference_paths())?;
         record.reference_rmse = reference.rmse;
+        let mut beside = peers::prepare(session, loaded)?;
         for preset in args.presets() {
             if session.is_late() && !record.still.is_empty() {
                 session.leave_out(&format!("{}, still: {preset}", loaded.name));
                 continue;
             }
             session.phase(format!("{}, still: {preset}", loaded.name));
-            record.still.push(still::measure(session, stage, preset, &reference)?);
+            record.still.push(still::measure(session, stage, preset, &reference, &mut beside)?);
         }
     }
     let is_late = |session: &mut FramesSession, record: &FramesView, what: &str| {

@@ -33,6 +33,8 @@ pub struct FramesBenchmark {
     pub runs: u32,
     /// Paths per pixel of the reference of a still camera, both halves together.
     pub reference_paths: u32,
+    /// Peers, as they introduce themselves.
+    pub peers: Vec<String>,
     /// Scenes that are looked at.
     pub views: Vec<FramesView>,
     /// Times by number of bounces.
@@ -140,6 +142,36 @@ pub struct FramePoint {
     pub plain: PlainImage,
 }
 
+/// Images of paths that a peer renders, in the time that a preset takes, held against a reference of its own: its materials have other formulas.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[serde(default)]
+pub struct PeerFrames {
+    /// Its name, and that of what it renders with.
+    pub peer: String,
+    /// Standard error of its reference.
+    #[serde(deserialize_with = "number_or_nan")]
+    pub reference_rmse: f64,
+    /// Time of an image besides its paths, by its own clock.
+    #[serde(deserialize_with = "number_or_nan")]
+    pub ms_per_image: f64,
+    /// Time of each path per pixel.
+    #[serde(deserialize_with = "number_or_nan")]
+    pub ms_per_path: f64,
+    /// After as many frames as the preset's errors are of.
+    pub points: Vec<PeerPoint>,
+}
+
+/// A peer's image.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct PeerPoint {
+    /// Frames of the preset whose time it has.
+    pub frame: u32,
+    /// The image.
+    #[serde(flatten)]
+    pub image: PlainImage,
+}
+
 /// Differences between consecutive frames of a camera that stands still.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
@@ -182,6 +214,8 @@ pub struct StillFrames {
     pub flicker: Option<Flicker>,
     /// Plain accumulation with Open Image Denoise after as many frames, where the library is there.
     pub denoised: Option<DenoisedImage>,
+    /// Images of peers in the same time.
+    pub peers: Vec<PeerFrames>,
 }
 
 impl StillFrames {
@@ -386,6 +420,11 @@ impl Row {
         self.text("pass", "oidn").number("plain paths", f64::from(d.paths)).number("wall ms", d.ms).errors(&d.errors)
     }
 
+    fn peer(self, p: &PeerPoint) -> Self {
+        let row = self.number("frame", f64::from(p.frame)).number("plain paths", f64::from(p.image.paths));
+        row.errors(&p.image.errors)
+    }
+
     fn cost(self, c: &FrameCost) -> Self {
         let row = self.number("device ms", c.device_ms.median).number("device ms p95", c.device_ms.p95);
         row.number("wall ms", c.wall_ms.median).number("camera rays", c.camera_rays).number("rays", c.rays)
@@ -413,6 +452,10 @@ impl FramesView {
             }
             rows.extend(head.passes(&r.cost));
             rows.extend(r.denoised.iter().map(|d| head.clone().denoised(d)));
+            for peer in &r.peers {
+                let head = head.clone().text("pass", &peer.peer).number("reference rmse", peer.reference_rmse);
+                rows.extend(peer.points.iter().map(|p| head.clone().peer(p)));
+            }
         }
         for m in &self.motions {
             for r in &m.results {
