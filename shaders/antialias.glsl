@@ -148,6 +148,13 @@ bool previous_pixel(FrameParams f, ivec2 pixel, Neighbourhood around, out vec2 a
     return all(greaterThan(at, vec2(-0.5))) && all(lessThan(at, vec2(f.size) - 0.5));
 }
 
+// The weight of a frame of all samples at rest, most of which those before it have had, too. `frames`: in the mean, this one included; those in motion are the ones before the image came to rest.
+float long_weight(AntialiasParams p, float frames) {
+    if (p.rest_after <= 0.0) return 0.0;
+    float past = p.motion_samples * max(frames - p.resting, 0.0);
+    return 1.0 - pow((p.rest_before + past) / (p.rest_after + past), p.power);
+}
+
 // A history as near to the neighbourhood's mean as the clamp allows, on the line between them.
 vec4 clipped(vec4 history, vec4 mean, vec4 width) {
     vec4 off = (history - mean) / max(width, vec4(1e-6));
@@ -170,7 +177,7 @@ void main() {
     } else if (p.has_history != 0u && p.most_frames > 1.0 && f.still != 0u) {
         vec4 history = load_resolved(m.history, at, frames);
         frames += 1.0;
-        resolved = mix(history, now, max(2.0 / (frames + 1.0), p.least_weight));
+        resolved = mix(history, now, max(max(2.0 / (frames + 1.0), p.least_weight), long_weight(p, frames)));
     } else if (p.has_history != 0u && p.most_frames > 1.0) {
         Neighbourhood around = neighbourhood(m, pixel);
         vec4 width = p.clamp_width * around.deviation;

@@ -44,8 +44,6 @@ pub struct Frame<'a> {
     pub rest_starts: bool,
     /// Each path has a place of its own within its pixel, in place of that of the frame.
     pub spreads: bool,
-    /// The image has been in motion: what is shown is of samples before those at rest, too.
-    pub was_in_motion: bool,
     /// Frames since the image came to rest, this one included; 0: it does not rest.
     pub resting: u32,
     /// The frame is a long one ([`super::frame_samples`]).

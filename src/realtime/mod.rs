@@ -128,8 +128,6 @@ struct State {
     offset: [f32; 2],
     /// Frames since camera and scene last changed, this one included; of an image that begins at rest its first frame, too.
     resting: u32,
-    /// There have been frames that did not rest.
-    was_in_motion: bool,
     /// Ambient visibility: mean number of samples of a pixel at rest when they were last denoised.
     denoised_samples: u64,
     /// Radiance: index of the next path in a pixel's sequence. A pixel takes the samples of its sequence one after the other, also where it is sampled in every second or fourth frame only:
@@ -437,7 +435,6 @@ impl Realtime {
             && self.settings.antialias
             && samples > 1
             && (is_long || !rest_starts || !self.state.has_resolved);
-        let was_in_motion = self.state.has_resolved && (resting == 0 || self.state.was_in_motion);
         let offset = match self.settings.antialias {
             // what is known of surfaces is of the last frame whose samples lay at one place
             true if still && (spreads || is_long && !self.is_radiance) => self.state.offset,
@@ -478,7 +475,6 @@ impl Realtime {
             is_long,
             samples,
             rest_samples,
-            was_in_motion,
             first_sample: match self.is_radiance {
                 true => self.state.first_path,
                 false if is_long => self.frame_samples.in_long_before(resting),
@@ -509,7 +505,6 @@ impl Realtime {
         }
         self.state.camera = Some(*camera);
         self.state.has_history = self.settings.history > 1 || is_larsen;
-        self.state.was_in_motion = was_in_motion;
         self.state.has_resolved = true;
         self.state.resting = resting;
         self.state.offset = offset;

@@ -6,7 +6,7 @@ use std::rc::Rc;
 use super::FramesSession;
 use super::displayed::FrameReference;
 use super::scenes::FramesScene;
-use super::signal::PlainClock;
+use super::signal::{PlainClock, PlainTime, TIMED_PATHS};
 use super::stage::{REFERENCE_SEEDS, TIMED_IMAGES};
 use crate::bench::peers::process::{Peer, PeerError};
 use crate::bench::record::frames::{FrameErrors, PeerFrames, PeerPoint, PlainImage};
@@ -26,9 +26,21 @@ pub struct PeerImages {
     seed: u32,
     reference: Rc<FrameReference>,
     clock: PlainClock,
-    /// Errors of images by their number of paths: presets take similar times.
-    errors: HashMap<u32, FrameErrors>,
+    /// Images by their number of paths: presets take similar times.
+    images: HashMap<u32, Image>,
 }
+
+/// An image that was rendered.
+#[derive(Clone, Copy)]
+struct Image {
+    ms: f64,
+    errors: FrameErrors,
+}
+
+/// Images that are rendered to find the number of paths that takes a time.
+const TRIES: usize = 3;
+/// A number of paths that is so near to the right one is right.
+const NEAR: f64 = 0.05;
 
 /// Gives all peers a scene, has them render their references, and takes their times. Those that fail are left out with a note.
 ///
@@ -93,7 +105,7 @@ fn of_peer(session: &mut FramesSession, loaded: &FramesScene, k: usize) -> Resul
             seed,
             reference: reference.clone(),
             clock: PlainClock::default(),
-            errors: HashMap::new(),
+            images: HashMap::new(),
         };
         // the first images compile
         images.time(peer, &mut PlainClock::default())?;
@@ -112,6 +124,36 @@ impl PeerImages {
         clock.take(|paths| Ok(peer.render(&self.kernel, paths, self.seed, self.size)?.0))
     }
 
+    /// The image of as many paths as take so many milliseconds. Those of many paths take less time for each than the few that the clock is of.
+    fn image_in(&mut self, peer: &mut Peer, time: PlainTime, ms: f64) -> Result<PlainImage, PeerError> {
+        let mut paths = time.paths_in(ms);
+        for _ in 0..TRIES {
+            if paths <= TIMED_PATHS[1] {
+                break;
+            }
+            let took = self.image(peer, paths)?.ms;
+            let tracing = |ms: f64| (ms - time.per_image).max(0.1 * ms);
+            let better = f64::from(paths) * (tracing(ms) / tracing(took)).clamp(0.25, 4.0);
+            if (better / f64::from(paths) - 1.0).abs() <= NEAR {
+                break;
+            }
+            paths = (better as u32).max(1);
+        }
+        Ok(PlainImage { paths, errors: self.image(peer, paths)?.errors })
+    }
+
+    fn image(&mut self, peer: &mut Peer, paths: u32) -> Result<Image, PeerError> {
+        if let Some(image) = self.images.get(&paths) {
+            return Ok(*image);
+        }
+        // the first may compile
+        let (first, _) = peer.render(&self.kernel, paths, self.seed, self.size)?;
+        let (second, rgb) = peer.render(&self.kernel, paths, self.seed, self.size)?;
+        let image = Image { ms: 1e3 * first.min(second), errors: self.reference.errors_of(&rgb)? };
+        self.images.insert(paths, image);
+        Ok(image)
+    }
+
     fn beside(&mut self, peer: &mut Peer, ms: &[(u32, f64)]) -> Result<PeerFrames, PeerError> {
         // beside the frames that it is compared with, too
         let mut clock = std::mem::take(&mut self.clock);
@@ -120,13 +162,7 @@ impl PeerImages {
         let time = self.clock.time();
         let mut points = Vec::new();
         for &(frame, ms) in ms {
-            let paths = time.paths_in(ms);
-            let errors = match self.errors.get(&paths) {
-                Some(errors) => *errors,
-                None => self.reference.errors_of(&peer.render(&self.kernel, paths, self.seed, self.size)?.1)?,
-            };
-            self.errors.insert(paths, errors);
-            points.push(PeerPoint { frame, image: PlainImage { paths, errors } });
+            points.push(PeerPoint { frame, image: self.image_in(peer, time, ms)? });
         }
         Ok(PeerFrames {
             peer: self.title.clone(),

@@ -25,7 +25,7 @@ const MAX_PATHS: u32 = 1 << 16;
 /// Occlusion rays of a pixel in one launch at most.
 const MAX_RAYS: u32 = 256;
 /// Paths of a pixel in the images whose times are taken: what an image costs besides its paths is told by two numbers of them.
-const TIMED_PATHS: [u32; 2] = [1, 9];
+pub const TIMED_PATHS: [u32; 2] = [1, 9];
 
 /// What frames of one scene show.
 pub struct Signal {

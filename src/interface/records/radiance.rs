@@ -141,8 +141,16 @@ records! {
         least_weight: float,
         /// 1: the mean over frames stays as it is.
         holds: uint,
-        /// Padding to a multiple of 8 bytes.
-        reserved: uint,
+        /// Frames since the image came to rest, this one included.
+        resting: float,
+        /// Samples of a pixel since then, without this frame's.
+        rest_before: float,
+        /// With them; 0: the weight of a frame at rest does not depend on them.
+        rest_after: float,
+        /// Samples as which each frame in motion counts at rest.
+        motion_samples: float,
+        /// Power of the part of a frame's samples that were there before.
+        power: float,
     }
 
     /// Parameters of `rest_noise`.

@@ -40,21 +40,27 @@ pub fn stage(tracer: &Tracer, pixels: u32, input: Resource, has_rest: bool) -> R
     Ok(Stage::new(vec![Box::new(pass)], Range::all(pixels)))
 }
 
-/// Number of samples as which the image of the last frame in motion counts at rest.
-const IN_MOTION: f32 = 8.0;
+/// Number of samples as which a frame in motion counts at rest: 8 in all, as many as a history in motion has frames.
+const MOTION_SAMPLES: f32 = 8.0 / RADIANCE_FRAMES;
 
-/// Minimum weight of a frame of radiance at rest, which is the filtered mean of all samples so far: those before it are of a part r of its samples. By the third power of that part they
+/// How much a long frame of radiance at rest counts, which is the filtered mean of all samples so far: those before it are of a part r of its samples. By the third power of that part they
 /// soften what the filter does at edges and hide its specks, and the mean has nearly the noise of all samples: by the square 1.07 times that after four long frames, by higher powers less, and more
 /// specks. Where samples are many there are none, and frames that add a constant part would leave sqrt(2p / (2p - 1)) times their noise: 1.095 by the third power, 1.02 by the twelfth, 1.01 by the twenty-fourth.
-fn least_weight(frame: &Frame) -> f32 {
-    let after = frame.rest_samples as f32;
-    if !frame.is_long || after <= 0.0 {
-        return LEAST_WEIGHT;
+struct LongFrame {
+    before: f32,
+    after: f32,
+    power: f32,
+}
+
+impl LongFrame {
+    fn of(frame: &Frame) -> Option<Self> {
+        let after = frame.rest_samples as f32;
+        (frame.is_long && after > 0.0).then(|| Self {
+            before: (after - frame.samples as f32).max(0.0),
+            after,
+            power: (after / 16.0).clamp(3.0, 24.0),
+        })
     }
-    let before = (after - frame.samples as f32).max(0.0);
-    let power = (after / 16.0).clamp(3.0, 24.0);
-    let in_motion = if frame.was_in_motion { IN_MOTION } else { 0.0 };
-    (1.0 - ((before + in_motion) / (after + in_motion)).powf(power)).max(LEAST_WEIGHT)
 }
 
 impl Pass for Antialias {
@@ -69,6 +75,9 @@ impl Pass for Antialias {
     fn prepare(&mut self, frame: &Frame, resources: &Resources) -> Result<()> {
         let input = resources.address(self.input);
         let is_composed = self.input == Resource::Composed;
+        let is_light_at_rest = is_composed && self.has_rest;
+        let long = LongFrame::of(frame).filter(|_| is_light_at_rest);
+        let of_long = |f: fn(&LongFrame) -> f32| long.as_ref().map_or(0.0, f);
         self.params.write(&AntialiasParams {
             frame: frame.params,
             composed: if is_composed { input } else { 0 },
@@ -87,8 +96,12 @@ impl Pass for Antialias {
             },
             clamp_width: CLAMP_WIDTH,
             holds: (!is_composed && frame.is_long).into(),
-            reserved: 0,
-            least_weight: if is_composed && self.has_rest { least_weight(frame) } else { 0.0 },
+            resting: frame.resting as f32,
+            rest_before: of_long(|l| l.before),
+            rest_after: of_long(|l| l.after),
+            motion_samples: MOTION_SAMPLES,
+            power: of_long(|l| l.power),
+            least_weight: if is_light_at_rest { LEAST_WEIGHT } else { 0.0 },
         })
     }
 
