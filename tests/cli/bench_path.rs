@@ -29,7 +29,7 @@ pub struct Place {
 }
 
 impl Place {
-    /// `dies_at`: a command at which it ends; `pixels`: of its images.
+    /// `dies_at`: the command that it answers with an error; `pixels`: of its images.
     pub fn new(dies_at: &str, pixels: u32) -> Self {
         let dir = tempfile::tempdir().unwrap();
         std::fs::write(dir.path().join("fake.sh"), FAKE).unwrap();

@@ -37,9 +37,9 @@ struct Image {
     errors: FrameErrors,
 }
 
-/// Images that are rendered to find the number of paths that takes a time.
+/// Maximum number of images that are rendered to find the number of paths that takes a time.
 const TRIES: usize = 3;
-/// A number of paths that is so near to the right one is right.
+/// Relative difference from the right number of paths that is small enough.
 const NEAR: f64 = 0.05;
 
 /// Gives all peers a scene, has them render their references, and takes their times. Those that fail are left out with a note.

@@ -40,7 +40,7 @@ pub fn stage(tracer: &Tracer, pixels: u32, input: Resource, has_rest: bool) -> R
     Ok(Stage::new(vec![Box::new(pass)], Range::all(pixels)))
 }
 
-/// Number of samples as which a frame in motion counts at rest: 8 in all, as many as a history in motion has frames.
+/// Number of samples as which each frame in motion counts at rest: 8 where the history has its maximum number of frames.
 const MOTION_SAMPLES: f32 = 8.0 / RADIANCE_FRAMES;
 
 /// How much a long frame of radiance at rest counts, which is the filtered mean of all samples so far: those before it are of a part r of its samples. By the third power of that part they
