@@ -11,7 +11,9 @@ use std::path::Path;
 use exr::block::lines::LineRefMut;
 use exr::image::write::samples::{SamplesWriter, WritableSamples};
 use exr::math::{RoundingMode, Vec2};
-use exr::meta::attribute::{AttributeValue, Chromaticities, LevelMode, LineOrder, Matrix4x4, SampleType, Text};
+use exr::meta::attribute::{
+    AttributeValue, ChannelDescription, Chromaticities, LevelMode, LineOrder, Matrix4x4, SampleType, Text,
+};
 use exr::meta::{MetaData, header::Header};
 use exr::prelude::{
     AnyChannel, AnyChannels, Blocks, Compression, Encoding, FlatSamples, Layer, LayerAttributes, ReadChannels, ReadLayers,
@@ -267,21 +269,37 @@ pub fn read(path: &Path) -> Result<Image> {
     std::panic::catch_unwind(|| decode(path)).unwrap_or_else(|_| Err(Error::input(path, "not a readable EXR: it is damaged")))
 }
 
-/// Pixels for which a channel that is subsampled may have one value.
-const MOST_SUBSAMPLED: u64 = 16;
-
 /// Bytes that a part's pixels take at least, whatever they are: a few damaged bytes of a header must not make the decoder take gigabytes. An entry of the table of blocks has 8 bytes, a
-/// block's own header as many or more; run lengths are of at most 128 bytes in two, and deflate (RFC 1951) copies at most 258 bytes in two bits.
+/// block's own header as many or more.
 fn least_bytes(header: &Header) -> u64 {
-    let ratio = match header.compression {
-        Compression::Uncompressed => 1,
-        Compression::RLE => 64,
-        Compression::ZIP1 | Compression::ZIP16 | Compression::PXR24 => 1032,
-        // wavelets and blocks have no such bound that is easily said
-        _ => 4096,
-    };
     let pixels = header.layer_size.0 as u64 * header.layer_size.1 as u64;
-    (16 * header.chunk_count as u64).max(pixels / MOST_SUBSAMPLED / ratio)
+    let of_channel = |c: &ChannelDescription| {
+        let samples = pixels / (c.sampling.0 as u64 * c.sampling.1 as u64).max(1);
+        samples * c.sample_type.bytes_per_sample() as u64 / most_of_byte(header.compression, c.sample_type)
+    };
+    (16 * header.chunk_count as u64).max(header.channels.list.iter().map(of_channel).sum())
+}
+
+/// Bytes of samples that a byte may hold at most.
+fn most_of_byte(compression: Compression, samples: SampleType) -> u64 {
+    // at most 128 bytes in two
+    const RUN_LENGTHS: u64 = 64;
+    // RFC 1951: copies at most 258 bytes in two bits
+    const DEFLATE: u64 = 258 * 4;
+    match compression {
+        Compression::Uncompressed => 1,
+        Compression::RLE => RUN_LENGTHS,
+        Compression::ZIP1 | Compression::ZIP16 => DEFLATE,
+        // floats are cut to three bytes first
+        Compression::PXR24 => DEFLATE * 4 / 3,
+        // Huffman codes of words of two bytes: a run of at most 255 is a code of a bit or more, and eight
+        Compression::PIZ => (255_u64 * 2 * 8).div_ceil(9),
+        // blocks of 4 x 4 halves that are all alike take three bytes; other samples are not compressed
+        Compression::B44 | Compression::B44A if samples == SampleType::F16 => 32_u64.div_ceil(3),
+        Compression::B44 | Compression::B44A => 1,
+        // some channels have run lengths, deflated
+        _ => RUN_LENGTHS * DEFLATE,
+    }
 }
 
 fn decode(path: &Path) -> Result<Image> {
@@ -373,25 +391,36 @@ mod tests {
     fn files_are_as_large_as_their_headers_say() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("image.exr");
-        let channel = Channel { name: "R".into(), samples: Samples::F32(vec![0.5; 64 * 64]) };
-        let image = Image { width: 64, height: 64, channels: vec![channel], metadata: Vec::new() };
-        crate::output::save(&image, &path).unwrap();
-        assert_eq!(read(&path).unwrap().width, 64);
-        let bytes = std::fs::read(&path).unwrap();
-        for name in [&b"dataWindow\0box2i\0"[..], b"displayWindow\0box2i\0"] {
-            assert!(bytes.windows(name.len()).any(|w| w == name));
-        }
-        for size in [4096_u32, 16_384] {
-            let mut damaged = bytes.clone();
-            for name in [&b"dataWindow\0box2i\0"[..], b"displayWindow\0box2i\0"] {
-                let at = damaged.windows(name.len()).position(|w| w == name).unwrap() + name.len() + 4 + 8;
-                for corner in 0..2 {
-                    damaged[at + 4 * corner..][..4].copy_from_slice(&(size - 1).to_le_bytes());
+        let name = "R".to_owned();
+        let image = |samples| {
+            let channels = vec![Channel { name: name.clone(), samples: Samples::F32(samples) }];
+            Image { width: 512, height: 512, channels, metadata: Vec::new() }
+        };
+        use ExrCompression as C;
+        for compression in [C::None, C::Rle, C::Zips, C::Zip, C::Piz, C::Pxr24, C::B44, C::B44a] {
+            for half in [false, true] {
+                let options = ExrOptions { half, compression, ..Default::default() };
+                // the samples that compress best are read, whatever the method
+                for samples in [vec![0.0; 512 * 512], vec![0.5; 512 * 512]] {
+                    write_with(&image(samples.clone()), &path, &options).unwrap();
+                    let again = read(&path).unwrap_or_else(|e| panic!("{compression:?}: {e}"));
+                    let Samples::F32(read) = &again.channels[0].samples else { panic!("not floats") };
+                    assert_eq!(*read, samples, "{compression:?}");
+                }
+                let bytes = std::fs::read(&path).unwrap();
+                for size in [8192_u32, 16_384] {
+                    let mut damaged = bytes.clone();
+                    for name in [&b"dataWindow\0box2i\0"[..], b"displayWindow\0box2i\0"] {
+                        let at = damaged.windows(name.len()).position(|w| w == name).unwrap() + name.len() + 4 + 8;
+                        for corner in 0..2 {
+                            damaged[at + 4 * corner..][..4].copy_from_slice(&(size - 1).to_le_bytes());
+                        }
+                    }
+                    std::fs::write(&path, damaged).unwrap();
+                    let error = read(&path).unwrap_err().to_string();
+                    assert!(error.contains("too few"), "{compression:?}, {size}: {error}");
                 }
             }
-            std::fs::write(&path, damaged).unwrap();
-            let error = read(&path).unwrap_err().to_string();
-            assert!(error.contains("too few"), "{size}: {error}");
         }
     }
 }
