@@ -16,15 +16,15 @@ Ray lens_ray(BlockParams p, Ray r, vec2 u) {
 }
 
 Ray camera_sample(BlockParams p, uint index) {
-    if (!in_block(p, block_pixel(p, pixel_index(index)))) return no_ray();
+    if (!in_block(p, block_pixel(p, path_cell(p, index)))) return no_ray();
     uvec2 pixel = path_pixel(p, index);
     if (WITH_SIGNAL && any(greaterThanEqual(pixel, p.image_size))) return no_ray();
-    vec2 u = sample_2d(p.seed, pixel, sample_index(index), CAMERA_FILM);
+    vec2 u = sample_2d(p.seed, pixel, path_sample(p, index), CAMERA_FILM);
     // In motion all pixels of a frame have their samples at the same place, where its G-buffer has them: histories are of surfaces. At rest, where a frame has several, each has a place of its own, as in a still.
     vec2 offset = WITH_SIGNAL && p.pixel_filter == FILTER_CENTRE ? p.centre_offset : !WITH_SIGNAL && WITH_PIXEL_FILTER ? filter_offset(p.pixel_filter, u) : u - 0.5;
     Ray r = camera_ray(p, vec2(pixel) + 0.5 + offset);
-    if (HAS_COVERAGE) r.tmin = tmin_of_seed(ray_seed(p.seed, pixel, sample_index(index), 0u));
-    if (WITH_LENS) return lens_ray(p, r, sample_2d(p.seed, pixel, sample_index(index), CAMERA_LENS));
+    if (HAS_COVERAGE) r.tmin = tmin_of_seed(ray_seed(p.seed, pixel, path_sample(p, index), 0u));
+    if (WITH_LENS) return lens_ray(p, r, sample_2d(p.seed, pixel, path_sample(p, index), CAMERA_LENS));
     return r;
 }
 
@@ -46,7 +46,7 @@ void closest(uint index, Hit hit) {
     float scale = WITH_CONSTANT_ALBEDO ? path.albedo : 1.0;
     PathState state = PathState(vec3(1.0 / scale), -1.0, index, 0u, 0u, scale, NO_MEDIUM);
     if (WITH_MEDIA) state.medium = current_medium(path.camera_media);
-    if (HAS_COVERAGE) next_ray_seed = ray_seed(p.seed, path_pixel(p, index), sample_index(index), 1u);
+    if (HAS_COVERAGE) next_ray_seed = ray_seed(p.seed, path_pixel(p, index), path_sample(p, index), 1u);
     vec3 seen = path_vertex(p, k, state, r, hit);
     float covered = is_hit(hit) ? 1.0 : 0.0;
     if (WITH_SIGNAL) {

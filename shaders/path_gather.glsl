@@ -25,7 +25,8 @@ void main() {
     GatherParams p = GatherParams(push.pass);
     FrameParams f = FrameParams(p.frame);
     PathParams path = PathParams(p.path);
-    uvec2 cell = tile_pixel((push.first >> push.sample_bits) + k >> 6, p.tiles_x, k & 63u), size = pattern_cell(f);
+    uint sampled = is_null(p.listed) ? (push.first >> push.sample_bits) + k : Words(p.listed).v[k];
+    uvec2 cell = tile_pixel(sampled >> 6, p.tiles_x, sampled & 63u), size = pattern_cell(f);
     bool is_first = p.earlier == 0u;
     uvec2 pixel = sampled_pixel(f, cell);
     // the others of its cell have no samples in this frame
@@ -49,7 +50,7 @@ void main() {
     RestParts parts = NO_PARTS;
     float covered = 0.0, distance_ = 0.0, distances = 0.0;
     for (uint s = 0u; s < n; s++) {
-        uint i = k * n + s;
+        uint i = p.first_path + k * n + s;
         vec4 direct = load_signal(path, i, SIGNAL_DIRECT), d = load_signal(path, i, SIGNAL_DIFFUSE), albedo = load_signal(path, i, SIGNAL_ALBEDO);
         vec4 radiance = load_quad(path.radiance, i);
         float share = occluded_share(path, radiance);

@@ -90,12 +90,6 @@ vec3 clamped(RadianceTemporalParams p, FrameParams f, uvec2 image, uvec2 pixel, 
     return clamp(history, mean - width, mean + width);
 }
 
-// The guide's normals are shading normals, by which lighting differs; planes are those of the true surface.
-EdgeTest with_normal(EdgeTest edge, uvec2 guide) {
-    edge.normal = guide_normal(guide);
-    return edge;
-}
-
 // The share of a history that is older than the samples at rest.
 float old_share(RadianceEstimate history, Rest rest) { return clamp(1.0 - rest.samples / max(history.samples, 1e-6), 0.0, 1.0); }
 

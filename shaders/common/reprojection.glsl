@@ -31,6 +31,12 @@ EdgeTest previous_edge(FrameParams f, vec3 before, vec3 normal, vec2 at) {
     return edge_test(f, f.previous_world_to_camera, f.previous_view, f.previous_orthographic != 0u, before, normal, at + 0.5 + f.previous_offset);
 }
 
+// The guide's normals of radiance are shading normals, by which lighting differs; planes are those of the true surface.
+EdgeTest with_normal(EdgeTest edge, uvec2 guide) {
+    edge.normal = guide_normal(guide);
+    return edge;
+}
+
 // The pixels around `at` that show the surface which `edge` tells, and which was at `surface_at`.
 Taps taps_around(FrameParams f, vec2 at, vec2 surface_at, EdgeTest edge, uint id) {
     Taps taps = NO_TAPS;

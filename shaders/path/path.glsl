@@ -243,7 +243,7 @@ vec3 path_vertex(BlockParams block, uint k, PathState state, Ray ray, Hit hit) {
     }
     if (m.bsdf.kind == BSDF_NONE) return added;
     uvec2 pixel = path_pixel(block, state.index);
-    uint n = sample_index(state.index), dimension = PATH_FIRST + (state.depth + state.passes) * PATH_STRIDE;
+    uint n = path_sample(block, state.index), dimension = PATH_FIRST + (state.depth + state.passes) * PATH_STRIDE;
     SignalVertex v = SignalVertex(SIGNAL_SEEN, false, vec3(0.0));
     if (WITH_SIGNAL) v = signal_vertex(p, k, state.depth + state.passes == 0u, m);
     if (WITH_AMBIENT && state.depth == 0u) add_ambient_light(block, p, k, state, v, s, m, log_side, pixel, n);

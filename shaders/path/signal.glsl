@@ -15,9 +15,25 @@ struct SignalVertex {
     vec3 share;      // of light that comes from here: the diffuse part of the surface where it was apart, divided by the albedo
 };
 
+// Paths beside the one or few that each pixel has in a frame: indices of samples that those do not come to.
+const uint LISTED_SAMPLES = 0x80000000u;
+
+// Number of a path's pixel in the block. The pixels beyond the block's are of listed ones.
+uint path_cell(BlockParams p, uint ray_index) {
+    uint pixel = pixel_index(ray_index);
+    return WITH_SIGNAL && pixel >= p.cells ? Words(p.listed).v[pixel - p.cells >> p.listed_bits] : pixel;
+}
+
+// The index of a path in the sequence of its pixel.
+uint path_sample(BlockParams p, uint ray_index) {
+    if (!WITH_SIGNAL || pixel_index(ray_index) < p.cells) return sample_index(ray_index);
+    uint bits = p.listed_bits + push.sample_bits, k = ray_index - (p.cells << push.sample_bits);
+    return LISTED_SAMPLES | (push.sample_index << bits) + (k & (1u << bits) - 1u);
+}
+
 // The pixel of the image that a path belongs to. Frames in real time count the pixels that are sampled in a frame alone, so that neighbouring rays are of pixels that are close to each other.
 uvec2 path_pixel(BlockParams p, uint ray_index) {
-    uvec2 pixel = block_pixel(p, pixel_index(ray_index)) + p.block_origin;
+    uvec2 pixel = block_pixel(p, path_cell(p, ray_index)) + p.block_origin;
     return WITH_SIGNAL ? sampled_pixel(FrameParams(p.frame), pixel) : pixel;
 }
 

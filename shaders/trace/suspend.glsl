@@ -12,13 +12,23 @@ const uint SUSPEND_ITERATION = 2u * MAX_ITERATIONS - (MAX_ITERATIONS >> 3);
 
 const uint SUSPENDED_STRIDE = SUSPENDED_WORDS + 2u * (STACK_IN_REGISTERS + STACK_SIZE + 1u);
 
+// Rays that a work-group resumes at most: as many as the widest vectors of processors have lanes.
+const uint RESUMED_LANES = 16u;
+// The number of work-groups that resume rays is a multiple of this, so that all threads of a processor have as many.
+const uint RESUMED_GROUPS = 4u;
+
 #define SUSPENDED_WORD(k) LaunchFlags(suspended).v[state + (k)]
 
 // The place of a ray that is suspended for the first time. Beyond the last it is not stored, and stays unfinished.
 uint suspend_new(uvec2 suspended) {
     uint place = atomicAdd(LaunchFlags(suspended).v[0], 1u);
-    if (place < SUSPENDED_RAYS) atomicMax(LaunchFlags(suspended).v[1], place / LANES + 1u);
+    if (place < SUSPENDED_RAYS) atomicMax(LaunchFlags(suspended).v[1], (place / (RESUMED_LANES * RESUMED_GROUPS) + 1u) * RESUMED_GROUPS);
     return place;
+}
+
+// The place of the ray that an invocation resumes, or none. Each work-group has its share of them.
+uint resumed_place() {
+    return gl_LocalInvocationID.x < RESUMED_LANES ? gl_LocalInvocationID.x * gl_NumWorkGroups.x + part_of_dispatch() : INVALID;
 }
 
 #define STORE_SUSPENDED                                                                        \

@@ -140,7 +140,7 @@ void main() {
     bool is_resumed = MAX_ITERATIONS > 0u && push.first == RESUMED;
     uvec2 suspended = MAX_ITERATIONS > 0u ? root.suspended : uvec2(0u);
     // of this lane among suspended rays, and the first of its words
-    uint place = ray_of_dispatch(), state = SUSPENDED_START + SUSPENDED_STRIDE * place;
+    uint place = resumed_place(), state = SUSPENDED_START + SUSPENDED_STRIDE * place;
     if (is_resumed) {
         if (place >= min(LaunchFlags(suspended).v[0], SUSPENDED_RAYS) || SUSPENDED_WORD(0u) == INVALID) return;
         LOAD_SUSPENDED

@@ -38,6 +38,8 @@ pub struct Frame<'a> {
     pub number: u32,
     /// Where samples lie in their pixels: offset from the centre, pixels.
     pub offset: [f32; 2],
+    /// The camera or objects have moved since the previous frame.
+    pub has_moved: bool,
     /// There is a resolved image of the previous frame.
     pub has_resolved: bool,
     /// Samples at rest start anew: the image has not rested before, or those before this frame no longer count.

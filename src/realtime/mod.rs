@@ -416,7 +416,8 @@ impl Realtime {
         let is_larsen = self.settings.technique == Technique::Larsen;
         // Larsen's pipeline skips no pass
         let is_undisturbed = !self.state.has_new_light && !self.state.was_interrupted;
-        let still = moved.is_empty() && self.state.camera == Some(*camera) && !is_larsen && is_undisturbed;
+        let has_moved = !moved.is_empty() || self.state.camera != Some(*camera);
+        let still = !has_moved && !is_larsen && is_undisturbed;
         // an image of which nothing is known yet begins as if it had come to rest: there are no histories to go on with, and places of their own for all paths say more
         let begins_at_rest = self.is_radiance && !self.state.has_resolved && self.frame_samples.starts_anew(1);
         let resting = if still { self.state.resting.saturating_add(1) } else { u32::from(begins_at_rest) };
@@ -468,6 +469,7 @@ impl Realtime {
             moved: &moved,
             number: self.state.frame,
             offset,
+            has_moved,
             has_resolved: self.state.has_resolved,
             rest_starts,
             spreads,

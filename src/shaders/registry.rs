@@ -53,6 +53,7 @@ registry! {
         REST_NOISE = "rest_noise";
         SEEN = "seen";
         TEMPORAL = "temporal";
+        UNCOVERED = "uncovered";
     }
     stages {
         MISS = "trace/miss.rmiss", Miss;

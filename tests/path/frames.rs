@@ -209,9 +209,58 @@ fn gpu_frames_forget_what_has_changed_and_no_more() {
     frames.frame(&tracer, &record(&scene, &jumped), &[]).unwrap();
     let (samples, covered) = (frames.samples().unwrap(), frames.coverage().unwrap());
     let seen = |test: &dyn Fn(f32) -> bool| samples.iter().zip(&covered).filter(|(n, c)| **c > 0.0 && test(**n)).count();
-    let (kept, new) = (seen(&|n| n > 10.0), seen(&|n| n == 1.0));
+    let (kept, new) = (seen(&|n| n > 10.0), seen(&|n| n == 5.0));
     println!("{kept} pixels kept their history, {new} show another surface");
+    // one path, and four more because nothing is known of them
     assert!(kept > 20 * new && new > 0, "{kept} kept, {new} new");
+    assert_eq!(seen(&|n| n < 5.0), 0);
+    assert_validation_clean(&device);
+}
+
+/// What a camera that jumps uncovers has five paths, without bias, and others of each seed; in all tracers the same pixels have them.
+#[test]
+fn gpu_frames_uncovered_pixels_have_more_paths() {
+    const SEEDS: u32 = 24;
+    let device = device();
+    let scene = scene("cornell-box");
+    let flat = FlatScene::for_paths(&scene);
+    let camera = record(&scene, &scene.cameras[0]);
+    let mut jumped = scene.cameras[0].clone();
+    jumped.camera_to_world *= DAffine3::from_translation(DVec3::new(1.0, 0.0, 0.0));
+    let jumped = record(&scene, &jumped);
+    let mut uncovered: Option<Vec<bool>> = None;
+    for kind in tracers(&device) {
+        let tracer = tracer(&device, kind, &flat);
+        let truth = PathIntegrator::new(&tracer, &flat, &options(2048)).unwrap();
+        let truth = { truth }.render(&tracer, &jumped, 2048, 9, &mut NoControl).unwrap().image.film.mean;
+        let (mut squares, mut differences) = ([0.0, 0.0], Vec::new());
+        for seed in 0..SEEDS {
+            let [with_history, plain] = [32, 1].map(|history| {
+                let settings = Settings { history, antialias: false, seed, ..plain(1) };
+                let mut frames = frames(&tracer, &flat, &settings, &PathOptions { seed, ..options(1) });
+                frames.frame(&tracer, &camera, &[]).unwrap();
+                frames.frame(&tracer, &jumped, &[]).unwrap();
+                frames
+            });
+            let is_new: Vec<bool> = with_history.samples().unwrap().iter().map(|n| *n == 5.0).collect();
+            assert_eq!(*uncovered.get_or_insert_with(|| is_new.clone()), is_new, "{kind}, seed {seed}");
+            let results = [with_history, plain].map(|f| f.result().unwrap());
+            for k in (0..truth.len()).filter(|k| is_new[k / 3]) {
+                for (sum, result) in squares.iter_mut().zip(&results) {
+                    *sum += f64::from(result[k] - truth[k]).powi(2);
+                }
+                differences.push(f64::from(results[0][k] - truth[k]));
+            }
+        }
+        let n = differences.len() as f64;
+        let [five, one] = squares.map(|sum| (sum / n).sqrt());
+        let bias = differences.iter().sum::<f64>() / n;
+        println!("{kind}: {} values, RMSE of five paths {five:.4}, of one {one:.4}, bias {bias:+.4}", differences.len());
+        // 0.45 where paths are independent
+        assert!(five < 0.6 * one, "{kind}: {five} of {one}");
+        // channels of a pixel are not independent
+        assert!(bias.abs() < 4.0 * five / (n / 3.0).sqrt(), "{kind}: bias {bias}");
+    }
     assert_validation_clean(&device);
 }
 

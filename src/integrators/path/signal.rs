@@ -24,6 +24,8 @@ pub struct SignalPaths {
     /// Parameters of ambient light; all other fields are 0.
     ambient: BlockParams,
     rr_depth: u32,
+    /// Of the frame.
+    block: BlockParams,
 }
 
 /// Finds the surface behind each pixel that scatters light, seen directly or by mirrors and glass.
@@ -52,6 +54,7 @@ impl SignalPaths {
             gather: shaders::PATH_GATHER.pipeline(tracer.device())?,
             capacity,
             rr_depth: options.rr_depth,
+            block: BlockParams::default(),
             ambient: options.ambient.map(|a| a.block_params()).unwrap_or_default(),
         })
     }
@@ -128,18 +131,35 @@ impl SignalPaths {
         self.paths.find_camera_media(camera)?;
         self.paths.traced = super::PathCounts::default();
         let BlockParams { hemisphere, falloff_log2, radius, .. } = self.ambient;
-        let params = BlockParams { hemisphere, falloff_log2, radius, ..*params };
-        self.paths.write_block(&params)
+        self.block = BlockParams { hemisphere, falloff_log2, radius, ..*params };
+        self.paths.write_block(&self.block)
     }
 
-    /// Traces the paths of a launch; then `path_gather` with the parameters at address `gather` adds them to the images of the frame.
+    /// The launches that follow have `1 << bits` pixels of each listed one ([`BlockParams::listed`]) beyond [`BlockParams::cells`].
     ///
     /// # Errors
     /// Those of the device.
-    pub fn launch(&mut self, commands: &mut Commands, push: Push, gather: u64) -> Result<Vec<Timing>> {
-        let gathered = Push { pass: gather, ..push };
-        let groups = (push.count >> push.sample_bits).div_ceil(LANES);
-        self.paths.trace(commands, push, |_, r| r.timed("path_gather", |r| r.dispatch(&self.gather, &gathered, groups)))
+    pub fn list(&mut self, bits: u32) -> Result<()> {
+        self.block.listed_bits = bits;
+        self.paths.write_block(&self.block)
+    }
+
+    /// Traces the paths of a launch; then `path_gather` adds them to the images of the frame, with each of `gathers`: the paths that it gathers, and its parameters.
+    ///
+    /// # Errors
+    /// Those of the device.
+    pub fn launch(&mut self, commands: &mut Commands, push: Push, gathers: &[Push]) -> Result<Vec<Timing>> {
+        let gather = &self.gather;
+        self.paths.trace(commands, push, |_, r| {
+            for (k, push) in gathers.iter().enumerate() {
+                if k > 0 {
+                    // they are of pixels that the first one wrote
+                    r.barrier();
+                }
+                let groups = (push.count >> push.sample_bits).div_ceil(LANES);
+                r.timed("path_gather", |r| r.dispatch(gather, push, groups));
+            }
+        })
     }
 
     /// Number of rays since [`SignalPaths::begin`], but for camera rays.

@@ -58,13 +58,19 @@ records! {
         path: address,
         /// One of `FILTER_*`: the reconstruction filter.
         pixel_filter: uint,
-        /// Padding to a multiple of 8 bytes.
-        reserved: uint,
+        /// Frames in real time: number of pixels that are sampled in a frame. Rays of pixels beyond are of listed ones, `1 << listed_bits` after another of each.
+        cells: uint,
         /// Address of the `SurfacesParams`, or 0.
         surfaces: address,
         /// The entry points of each bundle of pixels of a launch (entry_points.glsl), or 0: camera rays start at the root.
         entry_points: address,
         /// Offset of rays through the centres of pixels from there, pixels.
         centre_offset: vec2,
+        /// Frames in real time: the listed pixels among those that are sampled, a `uint` each (`ListParams`).
+        listed: address,
+        /// Log2 of the number of pixels beyond `cells` that are of a listed one.
+        listed_bits: uint,
+        /// Padding to a multiple of 8 bytes.
+        reserved: uint,
     }
 }

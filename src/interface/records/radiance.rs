@@ -6,6 +6,8 @@ records! {
     "radiance" includes "queue" values {
         /// Mirrors and panes of glass that the G-buffer's rays follow.
         MAX_GUIDE_BOUNCES: uint = 8;
+        /// One of so many pixels is counted to know how many show a surface.
+        LIST_PART: uint = 16;
     };
 
     /// A ray of the G-buffer on its way behind mirrors and glass.
@@ -51,6 +53,20 @@ records! {
         starts: uint,
         /// Samples per pixel of earlier launches of this frame.
         earlier: uint,
+        /// Tiles in a row of the pixels that are sampled in a frame.
+        tiles_x: uint,
+        /// The first path of the launch that is gathered.
+        first_path: uint,
+        /// The pixels that are gathered, among those that are sampled in a frame: a `uint` each; 0: those of the launch.
+        listed: address,
+    }
+
+    /// Parameters of `uncovered`.
+    ListParams: block readonly 8 {
+        /// Address of the `FrameParams`.
+        frame: address,
+        /// Output: the number of listed pixels, that of pixels that show a surface, counted in one of `LIST_PART`, and each listed one.
+        list: address,
         /// Tiles in a row of the pixels that are sampled in a frame.
         tiles_x: uint,
         /// Padding.

@@ -19,6 +19,7 @@ mod rest;
 mod rest_samples;
 mod surfaces;
 mod temporal;
+mod uncovered;
 
 use super::frame_samples::FrameSamples;
 use super::graph::{Range, Stage};
@@ -122,12 +123,15 @@ pub fn radiance_stages(
     let most = settings.launch_rays.max(MAX_SAMPLES * TILE_PIXELS);
     let sampled = Block { size: settings.resolution.sampled_size(block.size), ..block };
     let spp = samples.most().min(MAX_SAMPLES).next_power_of_two();
-    let paths = sampled.rays().saturating_mul(spp).min(most);
+    let few = settings.rays_per_pixel.min(MAX_SAMPLES);
+    let in_motion =
+        sampled.rays().saturating_mul(few.next_power_of_two()).saturating_add(uncovered::most_paths(sampled.rays(), few));
+    let paths = sampled.rays().saturating_mul(spp).max(in_motion).min(most);
     let paths = SignalPaths::new(tracer, flat, options, paths)?;
     let has_rest = settings.converges();
     let mut stages = vec![
         surfaces::stage(tracer, flat.scene, &paths, block, settings.launch_rays)?,
-        paths::stage(tracer, paths, sampled, settings.rays_per_pixel, has_rest)?,
+        paths::stage(tracer, paths, sampled, settings, has_rest)?,
         radiance_temporal::stage(tracer, pixels, has_rest)?,
     ];
     let is_diffuse = options.white_sky.is_some() || flat.scene.materials.iter().all(|m| m.kind == MaterialKind::Matte);

@@ -1,5 +1,6 @@
 //! `paths`: the paths of the pixels that are sampled in this frame, and the means of their parts. The host reads after some bounces how many paths are left.
 
+use super::uncovered::{Counts, Uncovered};
 use crate::error::{Error, Result};
 use crate::film::Control;
 use crate::film::block::{Block, BlockParams, TILE_PIXELS};
@@ -7,6 +8,7 @@ use crate::gpu::{Commands, Recorder, Timing};
 use crate::integrators::path::signal::SignalPaths;
 use crate::interface::PixelFilter;
 use crate::interface::records::radiance::GatherParams;
+use crate::realtime::Settings;
 use crate::realtime::display::Display;
 use crate::realtime::graph::{Frame, Params, Pass, Range, ResourceUse, Stage};
 use crate::realtime::resources::{Resource, Resources};
@@ -23,15 +25,22 @@ struct Paths {
     /// The pixels that are sampled in a frame, close together.
     sampled: Block,
     gather: Params<GatherParams>,
+    /// Where there are histories.
+    uncovered: Option<(Uncovered, Params<GatherParams>)>,
     has_rest: bool,
 }
 
-/// The pass over the pixels that are sampled in a frame ([`Resolution::sampled_size`](crate::realtime::Resolution::sampled_size)). `spp`: paths of each in motion.
-pub fn stage(tracer: &Tracer, paths: SignalPaths, sampled: Block, spp: u32, has_rest: bool) -> Result<Stage> {
+/// The pass over the pixels that are sampled in a frame ([`Resolution::sampled_size`](crate::realtime::Resolution::sampled_size)).
+pub fn stage(tracer: &Tracer, paths: SignalPaths, sampled: Block, settings: &Settings, has_rest: bool) -> Result<Stage> {
     // a range is a launch, or several of the same pixels
-    let pixels = paths.capacity() / spp.min(MAX_SAMPLES).next_power_of_two();
+    let pixels = paths.capacity() / settings.rays_per_pixel.min(MAX_SAMPLES).next_power_of_two();
     let ranges = Range::launches(sampled.rays(), TILE_PIXELS, pixels);
-    let pass = Paths { paths, sampled, gather: Params::new(tracer.device(), "parameters of gathering")?, has_rest };
+    let gather = || Params::new(tracer.device(), "parameters of gathering");
+    let uncovered = match settings.history > 1 {
+        true => Some((Uncovered::new(tracer.device(), sampled)?, gather()?)),
+        false => None,
+    };
+    let pass = Paths { paths, sampled, gather: gather()?, uncovered, has_rest };
     Ok(Stage::new(vec![Box::new(pass)], ranges))
 }
 
@@ -48,9 +57,17 @@ fn sample_batches(n: u32, most_bits: u32) -> impl Iterator<Item = (u32, u32)> {
 
 impl Pass for Paths {
     fn uses(&self, _: Option<&Display>) -> ResourceUse {
-        use Resource::{CurrentDiffuse, CurrentSpecular, FrameNumber, Guide, ReflectedDistance, Rest, RestParts, Scene};
-        ResourceUse::new(&[FrameNumber, Scene, Guide], &[CurrentDiffuse, CurrentSpecular, ReflectedDistance])
-            .and_writes(self.has_rest, &[Rest, RestParts])
+        use Resource::{
+            CurrentDiffuse, CurrentSpecular, FrameNumber, Guide, PreviousPosition, ReflectedDistance, Rest, RestParts, Scene,
+            Surface,
+        };
+        let previous: &[Resource] = if self.uncovered.is_some() { &[Guide] } else { &[] };
+        ResourceUse::new(
+            &[FrameNumber, Scene, Guide, Surface, PreviousPosition],
+            &[CurrentDiffuse, CurrentSpecular, ReflectedDistance],
+        )
+        .previous(previous)
+        .and_writes(self.has_rest, &[Rest, RestParts])
     }
 
     fn prepare(&mut self, frame: &Frame, _: &Resources) -> Result<()> {
@@ -58,7 +75,12 @@ impl Pass for Paths {
             self.paths.turn_environment(to_map)?;
         }
         let pixel_filter = if frame.spreads { PixelFilter::Box } else { PixelFilter::Centre };
-        let params = BlockParams { pixel_filter: pixel_filter as u32, ..super::surfaces::block_params(frame, self.sampled) };
+        let params = BlockParams {
+            pixel_filter: pixel_filter as u32,
+            cells: self.sampled.rays(),
+            listed: self.uncovered.as_ref().map_or(0, |(u, _)| u.address()),
+            ..super::surfaces::block_params(frame, self.sampled)
+        };
         let rr_depth = if frame.is_long { frame.settings.rest_rr_depth } else { 0 };
         self.paths.begin(&frame.camera, &params, rr_depth)
     }
@@ -85,6 +107,12 @@ impl Pass for Paths {
     ) -> Result<Vec<Timing>> {
         let mut timings = Vec::new();
         let most_bits = (self.paths.capacity() / range.count.max(1)).checked_ilog2().unwrap_or(0).min(MAX_SAMPLE_BITS);
+        // with the last launch
+        let has_uncovered = frame.has_moved && frame.has_resolved && range.first + range.count == self.sampled.rays();
+        let uncovered = match &mut self.uncovered {
+            Some((uncovered, _)) if has_uncovered => uncovered.find(commands, frame, &mut timings)?,
+            _ => Counts::default(),
+        };
         for (earlier, sample_bits) in sample_batches(frame.samples, most_bits) {
             if earlier > 0
                 && let Some(control) = &mut control
@@ -92,7 +120,7 @@ impl Pass for Paths {
             {
                 return Err(Error::Interrupted);
             }
-            self.gather.write(&GatherParams {
+            let gathered = GatherParams {
                 frame: frame.params,
                 path: self.paths.params_address(),
                 diffuse: resources.address(Resource::CurrentDiffuse),
@@ -103,9 +131,10 @@ impl Pass for Paths {
                 starts: frame.rest_starts.into(),
                 earlier,
                 tiles_x: self.sampled.tiles_x(),
-                reserved: 0,
-            })?;
-            let push = Push {
+                ..Default::default()
+            };
+            self.gather.write(&gathered)?;
+            let mut push = Push {
                 scene: frame.tracer.scene_address(),
                 first: range.first << sample_bits,
                 count: range.count << sample_bits,
@@ -113,7 +142,22 @@ impl Pass for Paths {
                 sample_bits,
                 ..Default::default()
             };
-            timings.extend(self.paths.launch(commands, push, self.gather.address())?);
+            let mut gathers = vec![Push { pass: self.gather.address(), ..push }];
+            if let Some((list, gather)) = &mut self.uncovered
+                && earlier + (1 << sample_bits) == frame.samples
+                && let Some(bits) = uncovered.listed_bits(sample_bits, self.paths.capacity() - push.count)
+            {
+                self.paths.list(bits)?;
+                // samples at rest are as many for all pixels
+                let (rest, rest_parts, earlier) = (0, 0, frame.samples);
+                let first_path = push.count;
+                gather.write(&GatherParams { listed: list.address(), first_path, earlier, rest, rest_parts, ..gathered })?;
+                let sample_bits = sample_bits + bits;
+                let count = uncovered.uncovered << sample_bits;
+                gathers.push(Push { pass: gather.address(), first: 0, count, sample_bits, ..push });
+                push.count += count;
+            }
+            timings.extend(self.paths.launch(commands, push, &gathers)?);
         }
         Ok(timings)
     }

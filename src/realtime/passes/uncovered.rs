@@ -1,0 +1,108 @@
+//! `uncovered`: a list of the pixels whose surface was not seen in the previous image. Where a camera or an object in motion uncovers something, one path would have to do; these pixels
+//! have some more ([`Counts::listed_bits`]), in the same launch as those of all pixels.
+
+use std::sync::Arc;
+
+use crate::error::Result;
+use crate::film::block::Block;
+use crate::gpu::{Buffer, Commands, ComputePipeline, Device, Memory, Timing};
+use crate::interface::records::radiance::{LIST_PART, ListParams};
+use crate::realtime::graph::{Frame, Params};
+use crate::shaders::{self, LANES};
+use crate::tracer::Push;
+
+/// All paths of surfaces over those that uncovered pixels have besides: what a frame costs stays the same where much is uncovered.
+const SHARE: u32 = 8;
+/// Log2 of the number of paths that uncovered pixels have besides, where there are few.
+const MOST_BITS: u32 = 2;
+
+/// Lists uncovered pixels.
+pub struct Uncovered {
+    pipeline: ComputePipeline,
+    params: Params<ListParams>,
+    sampled: Block,
+    /// Their number, a part of the number of pixels that show a surface, and each.
+    list: Buffer,
+    counts: Buffer,
+}
+
+/// Numbers of pixels of a frame.
+#[derive(Clone, Copy, Default)]
+pub struct Counts {
+    /// Pixels that it uncovers.
+    pub uncovered: u32,
+    /// Pixels that show a surface, about.
+    pub surfaces: u32,
+}
+
+/// Number of paths that uncovered pixels have at most besides, in frames of `samples` of each of so many pixels.
+pub fn most_paths(pixels: u32, samples: u32) -> u32 {
+    pixels.saturating_mul(samples) / SHARE
+}
+
+impl Uncovered {
+    /// Creates it for the pixels that are sampled in a frame.
+    ///
+    /// # Errors
+    /// Those of the device.
+    pub fn new(device: &Arc<Device>, sampled: Block) -> Result<Self> {
+        Ok(Self {
+            pipeline: shaders::UNCOVERED.pipeline(device)?,
+            params: Params::new(device, "parameters of uncovered pixels")?,
+            sampled,
+            list: Buffer::new(device, "uncovered pixels", 4 * (2 + u64::from(sampled.rays())), Memory::Device)?,
+            counts: Buffer::new(device, "number of uncovered pixels", 8, Memory::Readback)?,
+        })
+    }
+
+    /// Address of the list: where each pixel is among those that are sampled.
+    pub fn address(&self) -> u64 {
+        self.list.address() + 8
+    }
+
+    /// Lists the pixels that a frame in motion uncovers, and counts them.
+    ///
+    /// # Errors
+    /// Those of the device.
+    pub fn find(&mut self, commands: &mut Commands, frame: &Frame, timings: &mut Vec<Timing>) -> Result<Counts> {
+        let (list, tiles_x) = (self.list.address(), self.sampled.tiles_x());
+        self.params.write(&ListParams { frame: frame.params, list, tiles_x, reserved: 0 })?;
+        let push = Push { pass: self.params.address(), count: self.sampled.rays(), ..Default::default() };
+        timings.extend(commands.run(|r| {
+            r.fill(&self.list, 8, 0);
+            r.barrier();
+            r.timed("uncovered", |r| r.dispatch(&self.pipeline, &push, push.count.div_ceil(LANES)));
+            r.barrier();
+            r.copy(&self.list, 0, &self.counts, 0, 8);
+        })?);
+        let [uncovered, surfaces]: [u32; 2] = bytemuck::pod_read_unaligned(&self.counts.read(0, 8)?);
+        Ok(Counts { uncovered, surfaces: surfaces * LIST_PART })
+    }
+}
+
+impl Counts {
+    /// Log2 of how often each uncovered pixel is in a launch besides, where a pixel has `1 << sample_bits` paths and there is room for so many paths more. `None`: there are none, or
+    /// too many.
+    pub fn listed_bits(self, sample_bits: u32, room: u32) -> Option<u32> {
+        let all = |bits: u32| u64::from(self.uncovered) << bits;
+        let fits = |bits: &u32| all(*bits) <= u64::from(self.surfaces / SHARE) && all(bits + sample_bits) <= u64::from(room);
+        (0..=MOST_BITS.saturating_sub(sample_bits)).rev().find(fits).filter(|_| self.uncovered > 0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn uncovered_pixels_have_few_of_all_paths() {
+        let bits = |uncovered, sample_bits, room| Counts { uncovered, surfaces: 3200 }.listed_bits(sample_bits, room);
+        let room = most_paths(3200, 1);
+        let expected = [None, Some(2), Some(2), Some(1), Some(1), Some(0), Some(0), None];
+        assert_eq!([0, 1, 100, 101, 200, 201, 400, 401].map(|n| bits(n, 0, room)), expected);
+        // of four paths each
+        let room = most_paths(3200, 4);
+        assert_eq!([1, 400, 401].map(|n| bits(n, 2, room)), [Some(0), Some(0), None]);
+        assert_eq!([100, 101].map(|n| bits(n, 2, 400)), [Some(0), None]);
+    }
+}
