@@ -13,7 +13,14 @@ bool is_uncovered(FrameParams f, uint at, uvec2 guide) {
     vec2 place;
     if (!previous_place(f, before, place)) return true;
     EdgeTest edge = with_normal(previous_edge(f, before, normal, place), guide);
-    Taps taps = taps_around(f, place + f.previous_offset - f.offset, place, edge, guide.y >> 24);
+    vec2 around = place + f.previous_offset - f.offset;
+    // of most pixels the nearest one shows the surface, and counts for a quarter at least
+    ivec2 nearest = ivec2(round(around));
+    if (all(greaterThanEqual(nearest, ivec2(0))) && all(lessThan(nearest, ivec2(f.size)))) {
+        uvec2 seen = LOAD_PAIR(f.previous_guide, image_index(f, uvec2(nearest)));
+        if (seen.y >> 24 == guide.y >> 24 && same_surface(edge, vec2(nearest) - place, seen)) return false;
+    }
+    Taps taps = taps_around(f, around, place, edge, guide.y >> 24);
     return taps.weight[0] + taps.weight[1] + taps.weight[2] + taps.weight[3] < MIN_TAP_WEIGHT;
 }
 
@@ -26,7 +33,7 @@ void main() {
     if (any(greaterThanEqual(pixel, f.size))) return;
     uint at = image_index(f, pixel);
     uvec2 guide = LOAD_PAIR(f.guide, at);
-    if (!is_surface(guide)) return;
+    if (f.has_history == 0u || !is_surface(guide)) return;
     PixelList list = PixelList(p.list);
     if (k % LIST_PART == 0u) atomicAdd(list.v[1], 1u);
     if (is_uncovered(f, at, guide)) list.v[2u + atomicAdd(list.v[0], 1u)] = k;
