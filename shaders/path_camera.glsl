@@ -1,5 +1,6 @@
 // path_camera: one camera ray per sample, and the first vertex of each path (shaders/path/path.glsl).
 #include "common/pixel_filter.glsl"
+#include "path/known_hit.glsl"
 #include "path/path.glsl"
 #include "common/frame.glsl"
 
@@ -26,6 +27,15 @@ Ray camera_sample(BlockParams p, uint index) {
     if (HAS_COVERAGE) r.tmin = tmin_of_seed(ray_seed(p.seed, pixel, path_sample(p, index), 0u));
     if (WITH_LENS) return lens_ray(p, r, sample_2d(p.seed, pixel, path_sample(p, index), CAMERA_LENS));
     return r;
+}
+
+// Where it has been traced for the G-buffer.
+Hit known_hit(uint index) {
+    BlockParams p = BlockParams(push.pass);
+    if (!in_block(p, block_pixel(p, path_cell(p, index)))) return miss();
+    uvec2 pixel = path_pixel(p, index);
+    if (any(greaterThanEqual(pixel, p.image_size))) return miss();
+    return load_known_hit(p.known_hits, image_index(FrameParams(p.frame), pixel));
 }
 
 Ray ray(uint index) {

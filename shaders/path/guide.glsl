@@ -6,6 +6,7 @@
 #define PATH_GUIDE
 #include "common/frame.glsl"
 #include "interface/radiance.glsl"
+#include "path/known_hit.glsl"
 #include "path/path.glsl"
 #include "scene/motion.glsl"
 
@@ -63,6 +64,7 @@ void guide_vertex(BlockParams block, uint at, GuideRay g, Ray ray, Hit hit) {
     FrameParams f = FrameParams(block.frame);
     SurfacesParams q = SurfacesParams(block.surfaces);
     PathParams p = PathParams(block.path);
+    if (g.bounces == 0u && !is_null(q.known_hits)) store_known_hit(q.known_hits, at, hit);
     if (!is_hit(hit)) {
         // behind mirrors the last one is what the pixel shows
         if (g.bounces > 0u) return;

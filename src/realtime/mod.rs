@@ -519,8 +519,11 @@ impl Realtime {
             samples,
             primary_rays: match self.settings.primary {
                 Some(Primary::Raster) if !is_long => 0,
-                // of each sample, and for the G-buffer
-                _ if self.is_radiance => pixels * (u64::from(samples) + u64::from(!still || has_moved_samples)),
+                // of each sample, unless they are those of the G-buffer
+                _ if self.is_radiance => {
+                    let has_own = spreads || self.graph.resources().buffer(Resource::KnownHits).is_none();
+                    pixels * (if has_own { u64::from(samples) } else { 0 } + u64::from(!still || has_moved_samples))
+                }
                 _ if is_long => pixels * u64::from(samples),
                 _ if still && !has_moved_samples => 0,
                 _ => pixels,

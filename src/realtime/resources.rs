@@ -7,6 +7,7 @@ use crate::error::Result;
 use crate::gpu::{Buffer, Device, Memory};
 use crate::interface::records::denoise::RadianceRecord;
 use crate::interface::records::frame::{SUMS_COUNT, SurfaceRecord};
+use crate::interface::records::radiance::KnownHit;
 
 /// Bytes of a `SurfaceRecord`.
 pub const SURFACE_BYTES: u64 = size_of::<SurfaceRecord>() as u64;
@@ -78,6 +79,8 @@ pub enum Resource {
     Materials,
     /// Radiance: emission and background seen directly.
     Direct,
+    /// Radiance: what the ray through each pixel hits, where paths can begin there.
+    KnownHits,
     /// Radiance: this frame's samples of diffuse reflection, divided by the albedo.
     CurrentDiffuse,
     /// Radiance: this frame's samples of the rest.
@@ -181,6 +184,7 @@ impl Resource {
             Self::TotalRays => device("rays taken", 4 * pixels, Kept),
             Self::Materials => device("materials of surfaces", QUAD_BYTES * pixels, Kept),
             Self::Direct => device("direct view", QUAD_BYTES * pixels, Kept),
+            Self::KnownHits => device("hits of camera rays", size_of::<KnownHit>() as u64 * pixels, Kept),
             Self::CurrentDiffuse => device("diffuse samples of the frame", RADIANCE_BYTES * pixels, Frame),
             Self::CurrentSpecular => device("other samples of the frame", RADIANCE_BYTES * pixels, Frame),
             Self::ReflectedDistance => device("reflected distances", 4 * pixels, Frame),

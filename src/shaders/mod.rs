@@ -100,7 +100,7 @@ pub struct StreamShaders {
     /// Source of its rays.
     pub rays: Rays,
     // in the order of Variant::ALL; the source of a variant that does not apply is never compiled
-    variants: [Shader; 10],
+    variants: [Shader; 12],
 }
 
 impl StreamShaders {
@@ -205,6 +205,8 @@ macro_rules! registry {
                     variant!($pass, $mode, Query),
                     variant!($pass, $mode, Raygen),
                     variant!($pass, $mode, Visibility),
+                    variant!($pass, $mode, Known),
+                    variant!($pass, $mode, Known64),
                 ],
             };
         )*
@@ -247,10 +249,11 @@ mod tests {
     fn variants_are_numbered_in_order() {
         for (k, variant) in Variant::ALL.into_iter().enumerate() {
             assert_eq!(variant as usize, k);
-            let Some(shader) = PRIMARY_CLOSEST.variant(variant) else { panic!("{variant:?}") };
-            assert_eq!(*shader.source(), Source::Stream { pass: "primary", mode: Mode::Closest, variant });
+            let Some(shader) = PATH_CAMERA_CLOSEST.variant(variant) else { panic!("{variant:?}") };
+            assert_eq!(*shader.source(), Source::Stream { pass: "path_camera", mode: Mode::Closest, variant });
         }
         assert!(OCCLUSION_ANY.variant(Variant::Packet).is_none() && OCCLUSION_ANY.variant(Variant::Generate64).is_none());
+        assert!(PRIMARY_CLOSEST.variant(Variant::Known).is_none() && PRIMARY_CLOSEST.variant(Variant::Visibility).is_some());
         assert!(RAYS_ANY.variant(Variant::Visibility).is_none() && RAYS_ANY.variant(Variant::Packet).is_some());
     }
 

@@ -4,6 +4,7 @@
 // streams: passes that trace rays. CONSTANT = file, any or closest hit, and the source of rays:
 //     generated   the pass generates them
 //     camera      the pass generates coherent rays: neighbours are traced as packets, and primary visibility can be rasterized instead
+//     camera_or_known  as camera; or another pass has traced the same rays, and the hits are in memory
 //     queue       they are in memory before the pass begins
 // compute: passes that trace no rays; those of debug views are in src/interface/debug_views.rs.
 // stages: shaders that streams of the pipeline tracer share, and shaders of rasterization.
@@ -18,7 +19,7 @@ registry! {
         OCCLUSION_ANY = "occlusion", any, queue;
         OCCLUSION_CLOSEST = "occlusion", closest, queue;
         PATH_BOUNCE_CLOSEST = "path_bounce", closest, queue;
-        PATH_CAMERA_CLOSEST = "path_camera", closest, camera;
+        PATH_CAMERA_CLOSEST = "path_camera", closest, camera_or_known;
         PATH_DISTANCE_CLOSEST = "path_distance", closest, queue;
         PATH_REFLECTION_CLOSEST = "path_reflection", closest, queue;
         PATH_SHADOW_ANY = "path_shadow", any, queue;

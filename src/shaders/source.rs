@@ -56,8 +56,17 @@ pub enum Rays {
     Generated,
     /// The pass generates coherent rays: neighbours are traced as packets, and primary visibility can be rasterized instead.
     Camera,
+    /// As [`Rays::Camera`]; or another pass has traced the same rays, and the hits are in memory (shaders/trace/known.glsl).
+    CameraOrKnown,
     /// They are in memory before the pass begins.
     Queue,
+}
+
+impl Rays {
+    /// Returns true for rays of which neighbours are alike.
+    pub fn are_coherent(self) -> bool {
+        matches!(self, Self::Camera | Self::CameraOrKnown)
+    }
 }
 
 /// Kind of a shader.
@@ -97,11 +106,15 @@ pub enum Variant {
     Raygen,
     /// No tracer: reads a rasterized visibility buffer.
     Visibility,
+    /// No tracer: reads the hits that another pass has found.
+    Known,
+    /// The same for devices with 64-bit integers and subgroup ballots.
+    Known64,
 }
 
 impl Variant {
     /// All of them, in the order of their numbers.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 12] = [
         Self::Generate,
         Self::Generate64,
         Self::Deliver,
@@ -112,13 +125,16 @@ impl Variant {
         Self::Query,
         Self::Raygen,
         Self::Visibility,
+        Self::Known,
+        Self::Known64,
     ];
 
     /// Returns true if streams with this source of rays have this variant.
     pub fn applies_to(self, rays: Rays) -> bool {
         match self {
             Self::Generate | Self::Generate64 | Self::Packet => rays != Rays::Queue,
-            Self::Visibility => rays == Rays::Camera,
+            Self::Visibility => rays.are_coherent(),
+            Self::Known | Self::Known64 => rays == Rays::CameraOrKnown,
             _ => true,
         }
     }
@@ -133,12 +149,13 @@ impl Variant {
             Self::Query => "trace/query.glsl",
             Self::Raygen => "trace/pipeline.glsl",
             Self::Visibility => "trace/visibility.glsl",
+            Self::Known | Self::Known64 => "trace/known.glsl",
         }
     }
 
     fn head(self) -> String {
         match self {
-            Self::Generate64 | Self::Deliver64 => format!("{HEAD_64}{HEAD_BALLOT}"),
+            Self::Generate64 | Self::Deliver64 | Self::Known64 => format!("{HEAD_64}{HEAD_BALLOT}"),
             Self::Packet => format!(
                 "#define KEEPS_CORNERS\n{HEAD_64}{HEAD_BALLOT}#extension GL_KHR_shader_subgroup_arithmetic : require\n#define PACKET_RAYS {PACKET_RAYS}\n"
             ),
@@ -287,6 +304,9 @@ macro_rules! rays {
     };
     (camera) => {
         Rays::Camera
+    };
+    (camera_or_known) => {
+        Rays::CameraOrKnown
     };
     (queue) => {
         Rays::Queue

@@ -265,12 +265,34 @@ impl Tracer {
     /// # Errors
     /// Those of the device.
     pub fn specialized(&self, shaders: &'static StreamShaders, constants: &Specialization) -> Result<Stream> {
+        self.kept(shaders, constants, false, || self.compile(shaders, constants))
+    }
+
+    /// As [`Tracer::specialized`], for rays that another pass has traced: the shader reads the hits ([`crate::shaders::Rays::CameraOrKnown`]).
+    ///
+    /// # Errors
+    /// Those of the device.
+    pub fn with_known_hits(&self, shaders: &'static StreamShaders, constants: &Specialization) -> Result<Stream> {
+        let all = || stream::scene_specialization(self.features).and(constants);
+        self.kept(shaders, constants, true, || Stream::known(&self.device, shaders, &all()))
+    }
+
+    /// A stream that was made before, or is made now.
+    fn kept(
+        &self,
+        shaders: &'static StreamShaders,
+        constants: &Specialization,
+        knows_hits: bool,
+        make: impl FnOnce() -> Result<Stream>,
+    ) -> Result<Stream> {
         let all = || self.streams.lock().unwrap_or_else(PoisonError::into_inner);
-        let is = |(of, stream): &&(Specialization, Stream)| of == constants && std::ptr::eq(stream.shaders(), shaders);
+        let is = |(of, stream): &&(Specialization, Stream)| {
+            of == constants && std::ptr::eq(stream.shaders(), shaders) && stream.knows_hits() == knows_hits
+        };
         if let Some((_, stream)) = all().iter().find(is) {
             return Ok(stream.clone());
         }
-        let stream = self.compile(shaders, constants)?;
+        let stream = make()?;
         all().push((constants.clone(), stream.clone()));
         Ok(stream)
     }

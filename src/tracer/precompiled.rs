@@ -10,7 +10,7 @@ use crate::accel::features::SceneFeatures;
 use crate::error::Result;
 use crate::gpu::{ComputePipeline, Device, DeviceInfo, Specialization};
 use crate::interface::constants;
-use crate::shaders::{Rays, Shader, StreamShaders, Variant, wide_kernel};
+use crate::shaders::{Shader, StreamShaders, Variant, wide_kernel};
 
 /// Minimum number of primitives for compiling ahead: the BVH of a smaller scene is built sooner than a pipeline is compiled.
 const MIN_PRIMITIVES: usize = 100_000;
@@ -103,7 +103,7 @@ pub(super) fn specialization(
 
 /// Whether the stream is traced in packets.
 pub(super) fn in_packets(info: &DeviceInfo, kernel: Kernel, shaders: &StreamShaders) -> bool {
-    let wanted = kernel == Kernel::Packet || shaders.rays == Rays::Camera;
+    let wanted = kernel == Kernel::Packet || shaders.rays.are_coherent();
     shaders.variant(Variant::Packet).is_some() && wanted && kernel.for_coherent(info) == Kernel::Packet
 }
 

@@ -46,6 +46,8 @@ enum Pipeline {
     RayTracing(Arc<RayTracingPipeline>),
     /// One compute shader over all rays, whose hit primitives are known from rasterization.
     Rasterized(Arc<ComputePipeline>),
+    /// One compute shader over all rays, whose hits another pass has found.
+    Known(Arc<ComputePipeline>),
 }
 
 /// Ray and hit buffers of a launch, between its steps.
@@ -98,6 +100,11 @@ fn spread(parts: u32, run: u32) -> [u32; 3] {
     [run, parts.div_ceil(run * SPREAD), SPREAD]
 }
 
+/// Whether a device has the 64-bit integers and subgroup ballots that some variants need.
+fn has_ballots(info: &DeviceInfo) -> bool {
+    info.int64 && info.limits.subgroup_ballot
+}
+
 /// Compiles one of a stream's shaders.
 fn compile(
     device: &Arc<Device>,
@@ -125,16 +132,14 @@ impl Stream {
         rays_per_lane: u32,
         memory: LaunchMemory,
     ) -> Result<Self> {
-        let int64 = device.info.int64;
-        let ballot = int64 && device.info.limits.subgroup_ballot;
-        let (generate, deliver) = match ballot {
+        let (generate, deliver) = match has_ballots(&device.info) {
             true => (Variant::Generate64, Variant::Deliver64),
             false => (Variant::Generate, Variant::Deliver),
         };
         let pipeline = Pipeline::Steps {
             generate: match shaders.rays {
                 Rays::Queue => None,
-                Rays::Generated | Rays::Camera => Some(compile(device, shaders, generate, s)?),
+                Rays::Generated | Rays::Camera | Rays::CameraOrKnown => Some(compile(device, shaders, generate, s)?),
             },
             trace,
             deliver: compile(device, shaders, deliver, s)?,
@@ -148,6 +153,11 @@ impl Stream {
     /// A stream for the compute tracer's packet kernel.
     pub(super) fn packets(pipeline: ComputePipeline, shaders: &'static StreamShaders) -> Self {
         Self { pipeline: Pipeline::Packets(Arc::new(pipeline)), shaders }
+    }
+
+    /// Whether its shader reads hits that another pass has found.
+    pub(super) fn knows_hits(&self) -> bool {
+        matches!(self.pipeline, Pipeline::Known(_))
     }
 
     /// Whether the packet kernel traces it.
@@ -203,6 +213,12 @@ impl Stream {
         }
         let pipeline = compile(device, shaders, Variant::Visibility, s)?;
         Ok(Self { pipeline: Pipeline::Rasterized(pipeline), shaders })
+    }
+
+    /// A stream whose hits another pass has found: the shader knows where they are.
+    pub(super) fn known(device: &Arc<Device>, shaders: &'static StreamShaders, s: &Specialization) -> Result<Self> {
+        let variant = if has_ballots(&device.info) { Variant::Known64 } else { Variant::Known };
+        Ok(Self { pipeline: Pipeline::Known(compile(device, shaders, variant, s)?), shaders })
     }
 
     /// Records the tracing of rays `push.first .. push.first + push.count`, timed under the names of the stream's shaders. `push` must
@@ -261,6 +277,9 @@ impl Stream {
                     recorder.barrier();
                     recorder.timed(delivering, |r| r.dispatch_3d(deliver, &push, spread(push.count.div_ceil(LANES), RUN)));
                 }
+            }
+            Pipeline::Known(pipeline) => {
+                recorder.timed(pass, |r| r.dispatch_3d(pipeline, push, spread(push.count.div_ceil(LANES), RUN)));
             }
             Pipeline::Rasterized(pipeline) => recorder.timed(pass, |r| r.dispatch(pipeline, push, push.count.div_ceil(LANES))),
             Pipeline::RayTracing(pipeline) => {

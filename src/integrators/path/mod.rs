@@ -209,6 +209,10 @@ struct TransmittedShadowRays {
 
 struct PathEstimator {
     camera: Stream,
+    /// The same for camera rays that another pass has traced; `None` where each path has its own.
+    known: Option<Stream>,
+    /// The launches that follow begin at known hits ([`BlockParams::known_hits`]).
+    begins_at_known: bool,
     bounce: Stream,
     shadow: Stream,
     resolve: ComputePipeline,
@@ -392,6 +396,11 @@ impl PathEstimator {
         let block_params = block_params.collect::<Result<Vec<_>>>()?;
         Ok(Self {
             camera: tracer.specialized(&shaders::PATH_CAMERA_CLOSEST, &constants)?,
+            known: match has_signal && !tracer.features().stochastic_alpha && !features.contains(PathFeature::Lens) {
+                true => Some(tracer.with_known_hits(&shaders::PATH_CAMERA_CLOSEST, &constants)?),
+                false => None,
+            },
+            begins_at_known: false,
             bounce: tracer.specialized(&shaders::PATH_BOUNCE_CLOSEST, &constants)?,
             shadow: tracer.stream(&shaders::PATH_SHADOW_ANY)?,
             resolve: shaders::PATH_RESOLVE.pipeline(device)?,
@@ -577,7 +586,7 @@ impl PathEstimator {
                     self.queues[0].clear(r);
                     self.clear_light_queues(r);
                     r.barrier();
-                    self.camera.record(r, &push(0));
+                    self.known.as_ref().filter(|_| self.begins_at_known).unwrap_or(&self.camera).record(r, &push(0));
                     self.record_shadow(r, push(0), left, MAX_BOUNCES);
                     self.record_ambient(r, push(0), left, MAX_BOUNCES);
                 }

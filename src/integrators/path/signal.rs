@@ -121,6 +121,11 @@ impl SignalPaths {
         self.paths.move_lights(tracer.device(), scene)
     }
 
+    /// Returns true if paths can begin at [`BlockParams::known_hits`]. They cannot where each has a camera ray of its own: through a lens, or through surfaces of stochastic alpha.
+    pub fn can_begin_at_known(&self) -> bool {
+        self.paths.known.is_some()
+    }
+
     /// Begins a frame: the camera and its block, with [`BlockParams::frame`], [`BlockParams::centre_offset`] and [`BlockParams::pixel_filter`], which is `FILTER_CENTRE` for samples that all lie
     /// there. Russian roulette begins after `rr_depth` bounces, if the options do not say later.
     ///
@@ -130,6 +135,7 @@ impl SignalPaths {
         self.paths.begin_roulette_after(rr_depth.max(self.rr_depth))?;
         self.paths.find_camera_media(camera)?;
         self.paths.traced = super::PathCounts::default();
+        self.paths.begins_at_known = params.known_hits != 0;
         let BlockParams { hemisphere, falloff_log2, radius, .. } = self.ambient;
         self.block = BlockParams { hemisphere, falloff_log2, radius, ..*params };
         self.paths.write_block(&self.block)
@@ -170,22 +176,22 @@ impl SignalPaths {
 }
 
 impl GuideRays {
-    /// Writes the parameters of a frame. `params`: those of the block, with [`BlockParams::frame`], [`BlockParams::path`] and [`BlockParams::centre_offset`].
+    /// Writes the parameters of a frame. `params`: those of the block, with [`BlockParams::frame`], [`BlockParams::path`] and [`BlockParams::centre_offset`]. `outputs`: what is written for each
+    /// pixel; its other fields are 0.
     ///
     /// # Errors
     /// Those of the device.
-    pub fn prepare(&mut self, params: &BlockParams, materials: u64, direct: u64) -> Result<()> {
+    pub fn prepare(&mut self, params: &BlockParams, outputs: &SurfacesParams) -> Result<()> {
         for k in 0..2 {
             // parameters k fill queue k, and read the states of the other
             let surfaces = match &self.behind {
-                None => SurfacesParams { materials, direct, ..Default::default() },
+                None => *outputs,
                 Some(behind) => SurfacesParams {
                     next: behind.queues[k].record(),
                     states: behind.states[k ^ 1].address(),
                     next_states: behind.states[k].address(),
                     tags: behind.queues[k ^ 1].record().tags,
-                    materials,
-                    direct,
+                    ..*outputs
                 },
             };
             self.params[k].write(0, bytemuck::bytes_of(&surfaces))?;

@@ -68,9 +68,11 @@ records! {
         centre_offset: vec2,
         /// Frames in real time: the listed pixels among those that are sampled, a `uint` each (`ListParams`).
         listed: address,
+        /// Frames in real time: what the ray through each pixel of the image hits, a `KnownHit` each (`path_surface`), or 0: paths trace their camera rays themselves.
+        known_hits: address,
         /// Log2 of the number of pixels beyond `cells` that are of a listed one.
         listed_bits: uint,
-        /// Padding to a multiple of 8 bytes.
-        reserved: uint,
+        /// Padding to a multiple of 16 bytes.
+        reserved: uint[3],
     }
 }

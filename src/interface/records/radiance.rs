@@ -17,6 +17,20 @@ records! {
         rows: vec4[3],
     }
 
+    /// What a pixel's ray hits, with the ids of the scene.
+    KnownHit: words {
+        /// Ray parameter; infinite for a miss, which has no other fields.
+        t: float,
+        /// Index of the instance.
+        instance: uint,
+        /// Index of the primitive in its mesh.
+        primitive: uint,
+        /// Barycentric coordinates: weights of the second and third vertex.
+        uv: vec2,
+        /// Padding to a multiple of 8 bytes.
+        reserved: uint,
+    }
+
     /// Parameters of `path_surface` and `path_reflection`, beside those of the block.
     SurfacesParams: block readonly 8 {
         /// The queue of rays behind mirrors and glass.
@@ -31,6 +45,8 @@ records! {
         materials: address,
         /// Output, a `vec4` per pixel: emission and background seen directly, linear, and coverage.
         direct: address,
+        /// Output, a `KnownHit` per pixel: what is seen directly; or 0.
+        known_hits: address,
     }
 
     /// Parameters of `path_gather`.

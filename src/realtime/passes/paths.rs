@@ -58,8 +58,8 @@ fn sample_batches(n: u32, most_bits: u32) -> impl Iterator<Item = (u32, u32)> {
 impl Pass for Paths {
     fn uses(&self, _: Option<&Display>) -> ResourceUse {
         use Resource::{
-            CurrentDiffuse, CurrentSpecular, FrameNumber, Guide, PreviousPosition, ReflectedDistance, Rest, RestParts, Scene,
-            Surface,
+            CurrentDiffuse, CurrentSpecular, FrameNumber, Guide, KnownHits, PreviousPosition, ReflectedDistance, Rest,
+            RestParts, Scene, Surface,
         };
         let previous: &[Resource] = if self.uncovered.is_some() { &[Guide] } else { &[] };
         ResourceUse::new(
@@ -67,15 +67,19 @@ impl Pass for Paths {
             &[CurrentDiffuse, CurrentSpecular, ReflectedDistance],
         )
         .previous(previous)
+        .and_reads(if self.paths.can_begin_at_known() { &[KnownHits] } else { &[] })
         .and_writes(self.has_rest, &[Rest, RestParts])
     }
 
-    fn prepare(&mut self, frame: &Frame, _: &Resources) -> Result<()> {
+    fn prepare(&mut self, frame: &Frame, resources: &Resources) -> Result<()> {
         if let Some(to_map) = &frame.environment_turn {
             self.paths.turn_environment(to_map)?;
         }
         let pixel_filter = if frame.spreads { PixelFilter::Box } else { PixelFilter::Centre };
+        // paths that lie where the G-buffer's rays do begin at what those hit
+        let begins_at_known = !frame.spreads && self.paths.can_begin_at_known();
         let params = BlockParams {
+            known_hits: if begins_at_known { resources.address(Resource::KnownHits) } else { 0 },
             pixel_filter: pixel_filter as u32,
             cells: self.sampled.rays(),
             listed: self.uncovered.as_ref().map_or(0, |(u, _)| u.address()),

@@ -5,6 +5,7 @@ use crate::error::Result;
 use crate::film::block::{Block, BlockParams};
 use crate::gpu::Recorder;
 use crate::integrators::path::signal::{GuideRays, SignalPaths};
+use crate::interface::records::radiance::SurfacesParams;
 use crate::realtime::display::Display;
 use crate::realtime::graph::{Frame, Pass, Range, ResourceUse, Stage};
 use crate::realtime::resources::{Resource, Resources};
@@ -15,6 +16,8 @@ struct Surfaces {
     rays: GuideRays,
     path: u64,
     is_dynamic: bool,
+    /// Paths can begin at what its rays hit.
+    keeps_hits: bool,
 }
 
 /// The pass over all pixels of an image.
@@ -24,6 +27,7 @@ pub fn stage(tracer: &Tracer, scene: &Scene, paths: &SignalPaths, block: Block, 
         rays: paths.surfaces(tracer, scene, ranges.iter().map(|r| r.count).max().unwrap_or(0))?,
         path: paths.params_address(),
         is_dynamic: tracer.is_dynamic(),
+        keeps_hits: paths.can_begin_at_known(),
     };
     Ok(Stage::new(vec![Box::new(pass)], ranges))
 }
@@ -39,15 +43,18 @@ pub(super) fn block_params(frame: &Frame, block: Block) -> BlockParams {
 
 impl Pass for Surfaces {
     fn uses(&self, _: Option<&Display>) -> ResourceUse {
-        use Resource::{Camera, Direct, Guide, Materials, PreviousPosition, Scene, Surface};
+        use Resource::{Camera, Direct, Guide, KnownHits, Materials, PreviousPosition, Scene, Surface};
         ResourceUse::new(&[Camera, Scene], &[Guide, Surface, Materials, Direct])
             .and_writes(self.is_dynamic, &[PreviousPosition])
+            .and_writes(self.keeps_hits, &[KnownHits])
             .clears(Guide, f32::INFINITY.to_bits())
     }
 
     fn prepare(&mut self, frame: &Frame, resources: &Resources) -> Result<()> {
-        let [materials, direct] = [Resource::Materials, Resource::Direct].map(|r| resources.address(r));
-        self.rays.prepare(&BlockParams { path: self.path, ..block_params(frame, frame.block) }, materials, direct)
+        let [materials, direct, known_hits] =
+            [Resource::Materials, Resource::Direct, Resource::KnownHits].map(|r| resources.address(r));
+        let outputs = SurfacesParams { materials, direct, known_hits, ..Default::default() };
+        self.rays.prepare(&BlockParams { path: self.path, ..block_params(frame, frame.block) }, &outputs)
     }
 
     fn record(&self, r: &mut Recorder, frame: &Frame, _: &Resources, range: Range) -> Result<()> {
