@@ -25,4 +25,10 @@ uvec2 tile_pixel(uint tile, uint tiles_x, uint k) {
     return divide(tile, tiles_x) * 8u + morton_pixel(k);
 }
 
+// The inverse: the index of a pixel that counts the image in such tiles.
+uint tile_index(uvec2 pixel, uint tiles_x) {
+    uvec2 tile = pixel >> 3u;
+    return (tile.y * tiles_x + tile.x) << 6 | morton(pixel & 7u);
+}
+
 #endif

@@ -7,6 +7,7 @@
 #include "common/frame.glsl"
 #include "interface/radiance.glsl"
 #include "path/known_hit.glsl"
+#include "path/uncovered.glsl"
 #include "path/path.glsl"
 #include "scene/motion.glsl"
 
@@ -15,9 +16,10 @@ struct GuideRay {
     vec3 mirrored[3];  // rows of the product of reflections so far, which takes directions from where things are to where they seem to be
     float far;         // distance from the camera, scene units
     uint bounces;
+    bool is_uncovered; // its pixel shows a surface that the previous image did not show
 };
 
-const GuideRay GUIDE_START = GuideRay(vec3[3](vec3(1.0, 0.0, 0.0), vec3(0.0, 1.0, 0.0), vec3(0.0, 0.0, 1.0)), 0.0, 0u);
+const GuideRay GUIDE_START = GuideRay(vec3[3](vec3(1.0, 0.0, 0.0), vec3(0.0, 1.0, 0.0), vec3(0.0, 0.0, 1.0)), 0.0, 0u, false);
 const uint GUIDE_QUADS = GUIDE_RAY_RECORD_PAIRS / 2u;
 // A number of evenly distributed ones that selects transmission where there is any.
 const float TRANSMITTED = 0.99999994;
@@ -33,13 +35,14 @@ GuideRay load_guide_ray(SurfacesParams q, uint k) {
     }
     g.far = rows[0].w;
     g.bounces = floatBitsToUint(rows[1].w);
+    g.is_uncovered = rows[2].w != 0.0;
     return g;
 }
 
 void store_guide_ray(SurfacesParams q, uint k, GuideRay g) {
     store_quad(q.next_states, GUIDE_QUADS * k, vec4(g.mirrored[0], g.far));
     store_quad(q.next_states, GUIDE_QUADS * k + 1u, vec4(g.mirrored[1], uintBitsToFloat(g.bounces)));
-    store_quad(q.next_states, GUIDE_QUADS * k + 2u, vec4(g.mirrored[2], 0.0));
+    store_quad(q.next_states, GUIDE_QUADS * k + 2u, vec4(g.mirrored[2], g.is_uncovered ? 1.0 : 0.0));
 }
 
 // Roughness by which reflections are judged: 0 for mirrors, 1 for surfaces that reflect diffusely only.
@@ -59,6 +62,17 @@ vec3 background(PathParams p, vec3 w) {
     return counted_radiance(p, c, 0u);
 }
 
+// The surface that a pixel shows is known: counts it, and lists the pixel where the previous image did not show it.
+void list_surface(FrameParams f, SurfacesParams q, uint at, bool is_uncovered) {
+    if (is_null(q.list)) return;
+    uvec2 pixel = image_pixel(f, at);
+    if (!is_sampled(f, pixel)) return;
+    PixelList list = PixelList(q.list);
+    uint k = tile_index(pixel / pattern_cell(f), q.tiles_x);
+    if (k % LIST_PART == 0u) atomicAdd(list.v[1], 1u);
+    if (is_uncovered) list.v[2u + atomicAdd(list.v[0], 1u)] = k;
+}
+
 // One vertex of a pixel's ray: writes the G-buffer, or continues.
 void guide_vertex(BlockParams block, uint at, GuideRay g, Ray ray, Hit hit) {
     FrameParams f = FrameParams(block.frame);
@@ -67,7 +81,10 @@ void guide_vertex(BlockParams block, uint at, GuideRay g, Ray ray, Hit hit) {
     if (g.bounces == 0u && !is_null(q.known_hits)) store_known_hit(q.known_hits, at, hit);
     if (!is_hit(hit)) {
         // behind mirrors the last one is what the pixel shows
-        if (g.bounces > 0u) return;
+        if (g.bounces > 0u) {
+            list_surface(f, q, at, g.is_uncovered);
+            return;
+        }
         STORE_PAIR(f.guide, at, uvec2(floatBitsToUint(INFINITY), 0u));
         store_quad(q.direct, at, vec4(background(p, ray.direction), 0.0));
         return;
@@ -92,7 +109,8 @@ void guide_vertex(BlockParams block, uint at, GuideRay g, Ray ray, Hit hit) {
     vec4 back = f.world_to_camera[2];
     float depth = -(dot(back.xyz, position) + back.w);
     vec3 normal = where_it_seems(g, m.frame.n);
-    STORE_PAIR(f.guide, at, make_guide(depth, normal, hit.instance + 0x10001u * g.bounces));
+    uvec2 guide = make_guide(depth, normal, hit.instance + 0x10001u * g.bounces);
+    STORE_PAIR(f.guide, at, guide);
     STORE_PAIR(f.surface, 4u * at, floatBitsToUint(position.xy));
     STORE_PAIR(f.surface, 4u * at + 1u, floatBitsToUint(vec2(position.z, s.offset)));
     vec3 ng = where_it_seems(g, m.ng);
@@ -103,15 +121,20 @@ void guide_vertex(BlockParams block, uint at, GuideRay g, Ray ray, Hit hit) {
         for (uint k = 0u; k < 3u; k++) previous.v[3u * at + k] = position[k] + before[k];
     }
     store_quad(q.materials, at, vec4(m.bsdf.diffuse, scatters ? reflection_roughness(m.bsdf) : 0.0));
-    if (scatters || g.bounces >= MAX_GUIDE_BOUNCES || is_null(q.states)) return;
-
-    vec3 wo = to_frame(m.frame, towards_viewer);
-    wo.z = max(wo.z, MIN_COSINE);
-    BsdfSample b = bsdf_sample(m.bsdf, wo, vec2(0.5), TRANSMITTED);
-    if (!(b.pdf > 0.0)) return;
-    vec3 w = normalize(from_frame(m.frame, b.wi));
+    if (!is_null(q.list)) g.is_uncovered = is_uncovered(f, position + before, ng, guide);
+    bool goes_on = !scatters && g.bounces < MAX_GUIDE_BOUNCES && !is_null(q.states);
+    vec3 w = vec3(0.0);
+    if (goes_on) {
+        vec3 wo = to_frame(m.frame, towards_viewer);
+        wo.z = max(wo.z, MIN_COSINE);
+        BsdfSample b = bsdf_sample(m.bsdf, wo, vec2(0.5), TRANSMITTED);
+        if (b.pdf > 0.0) w = normalize(from_frame(m.frame, b.wi));
+    }
     float side = dot(m.ng, w);
-    if (side == 0.0) return;
+    if (side == 0.0) {
+        list_surface(f, q, at, g.is_uncovered);
+        return;
+    }
     if (side > 0.0) {
         vec3 n = m.frame.n;
         [[unroll]] for (uint row = 0u; row < 3u; row++) g.mirrored[row] -= 2.0 * dot(g.mirrored[row], n) * n;

@@ -54,7 +54,6 @@ registry! {
         REST_NOISE = "rest_noise";
         SEEN = "seen";
         TEMPORAL = "temporal";
-        UNCOVERED = "uncovered";
     }
     stages {
         MISS = "trace/miss.rmiss", Miss;

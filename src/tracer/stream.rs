@@ -17,10 +17,18 @@ pub const LAUNCH_RAYS: u32 = 1 << 19;
 /// Memory of a GPU in bytes from which launches are larger: rays and states of paths are about 250 bytes each.
 const MEMORY_OF_LARGE_LAUNCHES: u64 = 6 << 30;
 
-/// Maximum number of rays in a launch of films and frames on a device: the capacity of the compute tracer's ray and hit buffers. Between the steps of a launch a GPU is
+/// Maximum number of rays in a launch of films and frames on a device; the compute tracer's ray and hit buffers have room for [`with_uncovered`] as many. Between the steps of a launch a GPU is
 /// idle for a tenth of a millisecond, longer than it takes for half a million rays.
 pub fn launch_rays(info: &DeviceInfo) -> u32 {
     if info.is_cpu() || info.limits.device_memory < MEMORY_OF_LARGE_LAUNCHES { LAUNCH_RAYS } else { 4 * LAUNCH_RAYS }
+}
+
+/// All paths of surfaces in a frame over those that uncovered pixels have besides, in the same launch: what a frame costs stays the same where much is uncovered.
+pub const UNCOVERED_SHARE: u32 = 8;
+
+/// Maximum number of rays in a launch with which a frame ends: of `rays`, and of uncovered pixels.
+pub fn with_uncovered(rays: u32) -> u32 {
+    rays.saturating_add(rays / UNCOVERED_SHARE)
 }
 
 #[derive(Clone)]

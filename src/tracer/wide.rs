@@ -15,7 +15,7 @@ use super::compute::{
 use super::dynamic_trees::{DynamicTrees, instance_leaf, reserve};
 use super::kernel::BuildOptions;
 use super::kernel::Kernel;
-use super::stream::{LaunchMemory, SuspendedRays, launch_rays};
+use super::stream::{LaunchMemory, SuspendedRays, launch_rays, with_uncovered};
 use crate::accel::build::{self, MAX_DEPTH};
 use crate::accel::cache::KeyBuilder;
 use crate::accel::flatten::{BlasGroup, FlatScene, TlasInstance};
@@ -120,7 +120,7 @@ impl Trees {
             Some(_) => capacities.top as u64 + flat.instances.iter().map(blocks_of).sum::<u64>(),
             None => count as u64,
         };
-        let capacity = launch_rays(&device.info);
+        let capacity = with_uncovered(launch_rays(&device.info));
         let launch = |name, bytes| Buffer::new(device, name, bytes * u64::from(capacity), Memory::Device).map(Arc::new);
         Ok(Hierarchy {
             kernel,

@@ -217,10 +217,11 @@ fn gpu_frames_forget_what_has_changed_and_no_more() {
     assert_validation_clean(&device);
 }
 
-/// What a camera that jumps uncovers has five paths, without bias, and others of each seed; in all tracers the same pixels have them.
+/// What a camera that jumps uncovers has five paths, without bias, and others of each seed; in all tracers the same pixels have them, also where the pixels of a frame fill a launch.
 #[test]
 fn gpu_frames_uncovered_pixels_have_more_paths() {
     const SEEDS: u32 = 24;
+    let all = SIZE.map(|n| n.next_multiple_of(8)).iter().product();
     let device = device();
     let scene = scene("cornell-box");
     let flat = FlatScene::for_paths(&scene);
@@ -236,7 +237,8 @@ fn gpu_frames_uncovered_pixels_have_more_paths() {
         let (mut squares, mut differences) = ([0.0, 0.0], Vec::new());
         for seed in 0..SEEDS {
             let [with_history, plain] = [32, 1].map(|history| {
-                let settings = Settings { history, antialias: false, seed, ..plain(1) };
+                let launch_rays = if seed % 2 == 0 { u32::MAX } else { all };
+                let settings = Settings { history, antialias: false, seed, launch_rays, ..plain(1) };
                 let mut frames = frames(&tracer, &flat, &settings, &PathOptions { seed, ..options(1) });
                 frames.frame(&tracer, &camera, &[]).unwrap();
                 frames.frame(&tracer, &jumped, &[]).unwrap();

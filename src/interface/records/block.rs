@@ -66,7 +66,7 @@ records! {
         entry_points: address,
         /// Offset of rays through the centres of pixels from there, pixels.
         centre_offset: vec2,
-        /// Frames in real time: the listed pixels among those that are sampled, a `uint` each (`ListParams`).
+        /// Frames in real time: the listed pixels among those that are sampled, a `uint` each (`SurfacesParams.list`).
         listed: address,
         /// Frames in real time: what the ray through each pixel of the image hits, a `KnownHit` each (`path_surface`), or 0: paths trace their camera rays themselves.
         known_hits: address,

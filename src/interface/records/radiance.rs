@@ -47,6 +47,12 @@ records! {
         direct: address,
         /// Output, a `KnownHit` per pixel: what is seen directly; or 0.
         known_hits: address,
+        /// Output: the number of pixels whose surface was not seen in the previous image, that of pixels that show a surface, counted in one of `LIST_PART`, and each of the former; or 0.
+        list: address,
+        /// Tiles in a row of the pixels that are sampled in a frame.
+        tiles_x: uint,
+        /// Padding.
+        reserved: uint,
     }
 
     /// Parameters of `path_gather`.
@@ -75,18 +81,6 @@ records! {
         first_path: uint,
         /// The pixels that are gathered, among those that are sampled in a frame: a `uint` each; 0: those of the launch.
         listed: address,
-    }
-
-    /// Parameters of `uncovered`.
-    ListParams: block readonly 8 {
-        /// Address of the `FrameParams`.
-        frame: address,
-        /// Output: the number of listed pixels, that of pixels that show a surface, counted in one of `LIST_PART`, and each listed one.
-        list: address,
-        /// Tiles in a row of the pixels that are sampled in a frame.
-        tiles_x: uint,
-        /// Padding.
-        reserved: uint,
     }
 
     /// Parameters of `radiance_temporal`.

@@ -21,6 +21,8 @@ mod surfaces;
 mod temporal;
 mod uncovered;
 
+use std::sync::Arc;
+
 use super::frame_samples::FrameSamples;
 use super::graph::{Range, Stage};
 use super::resources::Resource;
@@ -36,8 +38,10 @@ use crate::raster::Primary;
 use crate::scene::material::MaterialKind;
 use crate::shaders::{self, ComputeShader, StreamShaders};
 use crate::tracer::Tracer;
+use crate::tracer::stream::with_uncovered;
 use debug::DebugView;
 use paths::MAX_SAMPLES;
+use uncovered::Uncovered;
 
 macro_rules! debug_view_modules {
     ($($(#[doc = $doc:literal])+ $view:ident = $name:literal, $glsl:literal, mod $module:ident, shader $shader:ident;)*) => {
@@ -120,7 +124,7 @@ pub fn radiance_stages(
     samples: FrameSamples,
 ) -> Result<Vec<Stage>> {
     let pixels = block.size[0] * block.size[1];
-    let most = settings.launch_rays.max(MAX_SAMPLES * TILE_PIXELS);
+    let most = with_uncovered(settings.launch_rays.max(MAX_SAMPLES * TILE_PIXELS));
     let sampled = Block { size: settings.resolution.sampled_size(block.size), ..block };
     let spp = samples.most().min(MAX_SAMPLES).next_power_of_two();
     let few = settings.rays_per_pixel.min(MAX_SAMPLES);
@@ -129,9 +133,13 @@ pub fn radiance_stages(
     let paths = sampled.rays().saturating_mul(spp).max(in_motion).min(most);
     let paths = SignalPaths::new(tracer, flat, options, paths)?;
     let has_rest = settings.converges();
+    let uncovered = match settings.history > 1 {
+        true => Some(Arc::new(Uncovered::new(tracer.device(), sampled)?)),
+        false => None,
+    };
     let mut stages = vec![
-        surfaces::stage(tracer, flat.scene, &paths, block, settings.launch_rays)?,
-        paths::stage(tracer, paths, sampled, settings, has_rest)?,
+        surfaces::stage(tracer, flat.scene, &paths, block, uncovered.clone(), settings.launch_rays)?,
+        paths::stage(tracer, paths, sampled, uncovered, settings, has_rest)?,
         radiance_temporal::stage(tracer, pixels, has_rest)?,
     ];
     let is_diffuse = options.white_sky.is_some() || flat.scene.materials.iter().all(|m| m.kind == MaterialKind::Matte);

@@ -1,5 +1,7 @@
 //! `paths`: the paths of the pixels that are sampled in this frame, and the means of their parts. The host reads after some bounces how many paths are left.
 
+use std::sync::Arc;
+
 use super::uncovered::{Counts, Uncovered};
 use crate::error::{Error, Result};
 use crate::film::Control;
@@ -26,20 +28,24 @@ struct Paths {
     sampled: Block,
     gather: Params<GatherParams>,
     /// Where there are histories.
-    uncovered: Option<(Uncovered, Params<GatherParams>)>,
+    uncovered: Option<(Arc<Uncovered>, Params<GatherParams>)>,
     has_rest: bool,
 }
 
 /// The pass over the pixels that are sampled in a frame ([`Resolution::sampled_size`](crate::realtime::Resolution::sampled_size)).
-pub fn stage(tracer: &Tracer, paths: SignalPaths, sampled: Block, settings: &Settings, has_rest: bool) -> Result<Stage> {
-    // a range is a launch, or several of the same pixels
-    let pixels = paths.capacity() / settings.rays_per_pixel.min(MAX_SAMPLES).next_power_of_two();
+pub fn stage(
+    tracer: &Tracer,
+    paths: SignalPaths,
+    sampled: Block,
+    uncovered: Option<Arc<Uncovered>>,
+    settings: &Settings,
+    has_rest: bool,
+) -> Result<Stage> {
+    // a range is a launch, or several of the same pixels; beyond it there is room for paths of uncovered pixels
+    let pixels = settings.launch_rays.min(paths.capacity()) / settings.rays_per_pixel.min(MAX_SAMPLES).next_power_of_two();
     let ranges = Range::launches(sampled.rays(), TILE_PIXELS, pixels);
     let gather = || Params::new(tracer.device(), "parameters of gathering");
-    let uncovered = match settings.history > 1 {
-        true => Some((Uncovered::new(tracer.device(), sampled)?, gather()?)),
-        false => None,
-    };
+    let uncovered = uncovered.map(|list| Ok::<_, Error>((list, gather()?))).transpose()?;
     let pass = Paths { paths, sampled, gather: gather()?, uncovered, has_rest };
     Ok(Stage::new(vec![Box::new(pass)], ranges))
 }
@@ -61,12 +67,10 @@ impl Pass for Paths {
             CurrentDiffuse, CurrentSpecular, FrameNumber, Guide, KnownHits, PreviousPosition, ReflectedDistance, Rest,
             RestParts, Scene, Surface,
         };
-        let previous: &[Resource] = if self.uncovered.is_some() { &[Guide] } else { &[] };
         ResourceUse::new(
             &[FrameNumber, Scene, Guide, Surface, PreviousPosition],
             &[CurrentDiffuse, CurrentSpecular, ReflectedDistance],
         )
-        .previous(previous)
         .and_reads(if self.paths.can_begin_at_known() { &[KnownHits] } else { &[] })
         .and_writes(self.has_rest, &[Rest, RestParts])
     }
@@ -112,9 +116,9 @@ impl Pass for Paths {
         let mut timings = Vec::new();
         let most_bits = (self.paths.capacity() / range.count.max(1)).checked_ilog2().unwrap_or(0).min(MAX_SAMPLE_BITS);
         // with the last launch
-        let has_uncovered = frame.has_moved && frame.has_resolved && range.first + range.count == self.sampled.rays();
-        let uncovered = match &mut self.uncovered {
-            Some((uncovered, _)) if has_uncovered => uncovered.find(commands, frame, &mut timings)?,
+        let has_uncovered = Uncovered::are_listed(frame) && range.first + range.count == self.sampled.rays();
+        let uncovered = match &self.uncovered {
+            Some((uncovered, _)) if has_uncovered => uncovered.counts()?,
             _ => Counts::default(),
         };
         for (earlier, sample_bits) in sample_batches(frame.samples, most_bits) {

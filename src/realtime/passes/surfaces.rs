@@ -1,6 +1,9 @@
 //! `surfaces`: the G-buffer of frames of radiance: the surface behind each pixel that scatters light, seen directly or by mirrors and glass, its material, and what is seen
 //! directly.
 
+use std::sync::Arc;
+
+use super::uncovered::Uncovered;
 use crate::error::Result;
 use crate::film::block::{Block, BlockParams};
 use crate::gpu::Recorder;
@@ -18,16 +21,27 @@ struct Surfaces {
     is_dynamic: bool,
     /// Paths can begin at what its rays hit.
     keeps_hits: bool,
+    uncovered: Option<Arc<Uncovered>>,
+    pixels: u32,
 }
 
-/// The pass over all pixels of an image.
-pub fn stage(tracer: &Tracer, scene: &Scene, paths: &SignalPaths, block: Block, launch_rays: u32) -> Result<Stage> {
+/// The pass over all pixels of an image. It lists those that are `uncovered`, where there are histories.
+pub fn stage(
+    tracer: &Tracer,
+    scene: &Scene,
+    paths: &SignalPaths,
+    block: Block,
+    uncovered: Option<Arc<Uncovered>>,
+    launch_rays: u32,
+) -> Result<Stage> {
     let ranges = Range::launches(block.rays(), 1, launch_rays);
     let pass = Surfaces {
         rays: paths.surfaces(tracer, scene, ranges.iter().map(|r| r.count).max().unwrap_or(0))?,
         path: paths.params_address(),
         is_dynamic: tracer.is_dynamic(),
         keeps_hits: paths.can_begin_at_known(),
+        uncovered,
+        pixels: block.rays(),
     };
     Ok(Stage::new(vec![Box::new(pass)], ranges))
 }
@@ -53,7 +67,8 @@ impl Pass for Surfaces {
     fn prepare(&mut self, frame: &Frame, resources: &Resources) -> Result<()> {
         let [materials, direct, known_hits] =
             [Resource::Materials, Resource::Direct, Resource::KnownHits].map(|r| resources.address(r));
-        let outputs = SurfacesParams { materials, direct, known_hits, ..Default::default() };
+        let lists = self.uncovered.as_ref().map(|u| u.outputs(frame)).unwrap_or_default();
+        let outputs = SurfacesParams { materials, direct, known_hits, ..lists };
         self.rays.prepare(&BlockParams { path: self.path, ..block_params(frame, frame.block) }, &outputs)
     }
 
@@ -61,7 +76,16 @@ impl Pass for Surfaces {
         let Range { first, count } = range;
         let push =
             Push { scene: frame.tracer.scene_address(), first, count, sample_index: frame.first_sample, ..Default::default() };
+        let uncovered = self.uncovered.as_ref().filter(|_| Uncovered::are_listed(frame));
+        if let Some(uncovered) = uncovered.filter(|_| first == 0) {
+            uncovered.clear(r);
+            r.barrier();
+        }
         self.rays.record(r, &push);
+        if let Some(uncovered) = uncovered.filter(|_| first + count == self.pixels) {
+            r.barrier();
+            uncovered.copy_counts(r);
+        }
         Ok(())
     }
 }

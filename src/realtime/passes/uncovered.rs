@@ -1,25 +1,20 @@
-//! `uncovered`: a list of the pixels whose surface was not seen in the previous image. Where a camera or an object in motion uncovers something, one path would have to do; these pixels
-//! have some more ([`Counts::listed_bits`]), in the same launch as those of all pixels.
+//! Pixels whose surface was not seen in the previous image. Where a camera or an object in motion uncovers something, one path would have to do; these pixels have some more
+//! ([`Counts::listed_bits`]), in the same launch as those of all pixels. The pass `surfaces` lists them, and `paths` reads the list.
 
 use std::sync::Arc;
 
 use crate::error::Result;
 use crate::film::block::Block;
-use crate::gpu::{Buffer, Commands, ComputePipeline, Device, Memory, Timing};
-use crate::interface::records::radiance::{LIST_PART, ListParams};
-use crate::realtime::graph::{Frame, Params};
-use crate::shaders::{self, LANES};
-use crate::tracer::Push;
+use crate::gpu::{Buffer, Device, Memory, Recorder};
+use crate::interface::records::radiance::{LIST_PART, SurfacesParams};
+use crate::realtime::graph::Frame;
+use crate::tracer::stream::UNCOVERED_SHARE;
 
-/// All paths of surfaces over those that uncovered pixels have besides: what a frame costs stays the same where much is uncovered.
-const SHARE: u32 = 8;
 /// Log2 of the number of paths that uncovered pixels have besides, where there are few.
 const MOST_BITS: u32 = 2;
 
-/// Lists uncovered pixels.
+/// A list of uncovered pixels.
 pub struct Uncovered {
-    pipeline: ComputePipeline,
-    params: Params<ListParams>,
     sampled: Block,
     /// Their number, a part of the number of pixels that show a surface, and each.
     list: Buffer,
@@ -37,44 +32,53 @@ pub struct Counts {
 
 /// Number of paths that uncovered pixels have at most besides, in frames of `samples` of each of so many pixels.
 pub fn most_paths(pixels: u32, samples: u32) -> u32 {
-    pixels.saturating_mul(samples) / SHARE
+    pixels.saturating_mul(samples) / UNCOVERED_SHARE
 }
 
 impl Uncovered {
-    /// Creates it for the pixels that are sampled in a frame.
+    /// Creates the list for the pixels that are sampled in a frame.
     ///
     /// # Errors
     /// Those of the device.
     pub fn new(device: &Arc<Device>, sampled: Block) -> Result<Self> {
         Ok(Self {
-            pipeline: shaders::UNCOVERED.pipeline(device)?,
-            params: Params::new(device, "parameters of uncovered pixels")?,
             sampled,
             list: Buffer::new(device, "uncovered pixels", 4 * (2 + u64::from(sampled.rays())), Memory::Device)?,
             counts: Buffer::new(device, "number of uncovered pixels", 8, Memory::Readback)?,
         })
     }
 
-    /// Address of the list: where each pixel is among those that are sampled.
+    /// Whether uncovered pixels of a frame are listed: it is in motion, and there is a previous image.
+    pub fn are_listed(frame: &Frame) -> bool {
+        frame.has_moved && frame.has_resolved
+    }
+
+    /// Device address of the list: where each pixel is among those that are sampled.
     pub fn address(&self) -> u64 {
         self.list.address() + 8
     }
 
-    /// Lists the pixels that a frame in motion uncovers, and counts them.
+    /// What the pass that lists them writes to in a frame.
+    pub fn outputs(&self, frame: &Frame) -> SurfacesParams {
+        let list = if Self::are_listed(frame) { self.list.address() } else { 0 };
+        SurfacesParams { list, tiles_x: self.sampled.tiles_x(), ..Default::default() }
+    }
+
+    /// Empties the list.
+    pub fn clear(&self, r: &mut Recorder) {
+        r.fill(&self.list, 8, 0);
+    }
+
+    /// Hands the numbers of pixels to the host.
+    pub fn copy_counts(&self, r: &mut Recorder) {
+        r.copy(&self.list, 0, &self.counts, 0, 8);
+    }
+
+    /// The numbers of pixels, after a submission with [`Uncovered::copy_counts`].
     ///
     /// # Errors
     /// Those of the device.
-    pub fn find(&mut self, commands: &mut Commands, frame: &Frame, timings: &mut Vec<Timing>) -> Result<Counts> {
-        let (list, tiles_x) = (self.list.address(), self.sampled.tiles_x());
-        self.params.write(&ListParams { frame: frame.params, list, tiles_x, reserved: 0 })?;
-        let push = Push { pass: self.params.address(), count: self.sampled.rays(), ..Default::default() };
-        timings.extend(commands.run(|r| {
-            r.fill(&self.list, 8, 0);
-            r.barrier();
-            r.timed("uncovered", |r| r.dispatch(&self.pipeline, &push, push.count.div_ceil(LANES)));
-            r.barrier();
-            r.copy(&self.list, 0, &self.counts, 0, 8);
-        })?);
+    pub fn counts(&self) -> Result<Counts> {
         let [uncovered, surfaces]: [u32; 2] = bytemuck::pod_read_unaligned(&self.counts.read(0, 8)?);
         Ok(Counts { uncovered, surfaces: surfaces * LIST_PART })
     }
@@ -85,7 +89,8 @@ impl Counts {
     /// too many.
     pub fn listed_bits(self, sample_bits: u32, room: u32) -> Option<u32> {
         let all = |bits: u32| u64::from(self.uncovered) << bits;
-        let fits = |bits: &u32| all(*bits) <= u64::from(self.surfaces / SHARE) && all(bits + sample_bits) <= u64::from(room);
+        let fits =
+            |bits: &u32| all(*bits) <= u64::from(self.surfaces / UNCOVERED_SHARE) && all(bits + sample_bits) <= u64::from(room);
         (0..=MOST_BITS.saturating_sub(sample_bits)).rev().find(fits).filter(|_| self.uncovered > 0)
     }
 }
