@@ -53,9 +53,12 @@ vec3 load_bent(FilterParams p, uint at) {
     return load_vec3(p.bent_from, at);
 }
 
+// Where a pixel of a thread is: in a square of four, or with strides in a row.
+ivec2 place_in_strip(int k) { return FILTER_STRIDES ? ivec2(k, 0) : ivec2(k & 1, k >> 1); }
+
 // A pixel, and what its box adds up to.
 struct Filtered {
-    ivec2 lower, upper;   // taps within its box and the image; lower.x > upper.x: none, or no more
+    ivec2 lower, upper;   // taps within its box and the image, x in pixels from the thread's first one, y in strides; lower.x > upper.x: none, or no more
     EdgeTest edge;
     VALUE sum, squares, variances;
     vec3 bent;
@@ -110,24 +113,26 @@ void finish_box(FilterParams p, FrameParams f, uvec2 estimates, uint at, ESTIMAT
     finish(p, f, at, estimate_of(own, (1.0 - keep) * mean + keep * own.mean, e.n, variance + kept), mix(e.bent / e.n, own_bent, keep));
 }
 
-// Each thread filters FILTER_STRIP pixels of a row, whose boxes overlap: a tap is loaded once for all of them. On a CPU driver loads are most of the time. Threads that run together filter tiles
+// Each thread filters FILTER_STRIP pixels, whose boxes overlap: a tap is loaded once for all of them. On a CPU driver loads are most of the time. Threads that run together filter tiles
 // rather than long rows: their boxes are about as large, and the largest says how long all take.
 void main() {
     uint index = push.first + FILTER_STRIP * gl_GlobalInvocationID.x;
     if (index >= push.count) return;
     FilterParams p = FilterParams(push.pass);
     FrameParams f = FrameParams(p.frame);
-    ivec2 corner = ivec2(divide(index >> 6, f.tiles_x) * 8u + uvec2(index & 7u, index >> 3 & 7u));
+    ivec2 corner = ivec2(divide(index >> 6, f.tiles_x) * 8u + (FILTER_STRIDES ? uvec2(index & 7u, index >> 3 & 7u) : morton_pixel(index & 63u)));
     if (any(greaterThanEqual(corner, ivec2(f.size)))) return;
     uint first = image_index(f, uvec2(corner));
     uvec2 guides = f.guide, estimates = p.from;
-    int width = int(f.size.x), stride = int(p.stride);
+    // strides are powers of two: quotients would be taken one lane at a time
+    int width = int(f.size.x), stride = int(p.stride), stride_bits = findMSB(stride);
     Filtered strip[FILTER_STRIP];
     uvec2 own_guides[FILTER_STRIP];
     [[unroll]] for (int k = 0; k < FILTER_STRIP; k++) {
-        uint at = first + uint(k);
+        ivec2 pixel = corner + place_in_strip(k);
+        uint at = image_index(f, uvec2(pixel));
         stop(strip[k]);
-        if (corner.x + k >= width) continue;
+        if (any(greaterThanEqual(pixel, ivec2(f.size)))) continue;
         own_guides[k] = LOAD_PAIR(guides, at);
         if (!is_surface(own_guides[k])) {
             finish_nothing(p, f, at);
@@ -140,26 +145,29 @@ void main() {
             finish(p, f, at, own, BENT_NORMALS ? load_bent(p, at) : vec3(0.0));
             continue;
         }
-        ivec2 pixel = ivec2(corner.x + k, corner.y);
         strip[k].edge = edge_test(f, f.world_to_camera, f.view, f.orthographic != 0u, surface_position(f, at), surface_normal(f, at), sample_place(f, vec2(pixel)));
         strip[k].edge.normal = edge_normal(strip[k].edge.normal, own_guides[k]);
         ivec2 reach = radius * ivec2(p.sides & STEP_HORIZONTAL, (p.sides & STEP_VERTICAL) >> 1);
-        strip[k].lower = max(-reach, -(pixel / stride));
-        strip[k].upper = min(reach, (ivec2(f.size) - 1 - pixel) / stride);
+        ivec2 lower = max(-reach, -(pixel >> stride_bits)), upper = min(reach, (ivec2(f.size) - 1 - pixel) >> stride_bits);
+        strip[k].lower = place_in_strip(k) + ivec2(lower.x << stride_bits, lower.y);
+        strip[k].upper = place_in_strip(k) + ivec2(upper.x << stride_bits, upper.y);
     }
     for (int attempt = 0; attempt < 2; attempt++) {
-        // taps of all, x in pixels from the first one, y in strides
+        // taps of all
         ivec2 lower = ivec2(1 << 20), upper = ivec2(-(1 << 20));
         [[unroll]] for (int k = 0; k < FILTER_STRIP; k++) {
             if (!is_active(strip[k])) continue;
-            lower = min(lower, ivec2(stride * strip[k].lower.x + k, strip[k].lower.y));
-            upper = max(upper, ivec2(stride * strip[k].upper.x + k, strip[k].upper.y));
+            lower = min(lower, strip[k].lower);
+            upper = max(upper, strip[k].upper);
             strip[k].sum = strip[k].squares = strip[k].variances = VALUE(0.0);
             strip[k].n = strip[k].count = strip[k].squared_variances = 0.0;
             strip[k].bent = vec3(0.0);
         }
         for (int y = lower.y; y <= upper.y; y++) {
             int row = int(first) + y * stride * width;
+            // numbers of taps in this row
+            uint counts[FILTER_STRIP];
+            [[unroll]] for (int k = 0; k < FILTER_STRIP; k++) counts[k] = y >= strip[k].lower.y && y <= strip[k].upper.y ? uint(strip[k].upper.x + 1 - strip[k].lower.x) : 0u;
             for (int x = lower.x; x <= upper.x; x++) {
                 uint tap = uint(row + x);
                 uvec2 guide = LOAD_PAIR(guides, tap);
@@ -168,9 +176,9 @@ void main() {
                 VALUE sum = e.mean * e.samples, squares = e.mean * e.mean * e.samples, variances = e.variance * e.samples;
                 float count = e.samples > 0.0 ? 1.0 : 0.0, squared_variances = COUNTS_NOISY_PIXELS ? total(e.variance) * total(variances) : 0.0;
                 [[unroll]] for (int k = 0; k < FILTER_STRIP; k++) {
-                    int dx = x - k;
-                    bool is_inside = dx >= stride * strip[k].lower.x && dx <= stride * strip[k].upper.x && (dx & stride - 1) == 0 && y >= strip[k].lower.y && y <= strip[k].upper.y;
-                    if (!is_inside || !is_neighbour(strip[k].edge, vec2(dx, y * stride), own_guides[k], guide, normal)) continue;
+                    int dx = x - place_in_strip(k).x;
+                    bool is_inside = uint(x - strip[k].lower.x) < counts[k] && (!FILTER_STRIDES || (dx & stride - 1) == 0);
+                    if (!is_inside || !is_neighbour(strip[k].edge, vec2(dx, (y - place_in_strip(k).y) * stride), own_guides[k], guide, normal)) continue;
                     strip[k].sum += sum;
                     strip[k].squares += squares;
                     strip[k].variances += variances;
@@ -185,7 +193,7 @@ void main() {
         [[unroll]] for (int k = 0; k < FILTER_STRIP; k++) {
             if (!is_active(strip[k])) continue;
             if (attempt > 0 || strip[k].n >= LONELY) {
-                uint at = first + uint(k);
+                uint at = first + uint(place_in_strip(k).y * width + place_in_strip(k).x);
                 finish_box(p, f, estimates, at, load_estimate(estimates, at), strip[k]);
                 stop(strip[k]);
                 continue;

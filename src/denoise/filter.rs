@@ -192,7 +192,7 @@ fn run(
         ..Default::default()
     };
     let params = Buffer::from_slice(device, "frame parameters", &[params])?;
-    let pipeline = shaders::DENOISE.pipeline(device)?;
+    let pipeline = shaders::DENOISE.specialized(device, &filter.specialization())?;
     let (mut commands, mut pace) = (Commands::new(device)?, Pace::default());
     let mut from = &given;
     for (k, step) in steps.iter().enumerate() {

@@ -62,4 +62,6 @@ constants! {
     MAX_ITERATIONS: uint = 0;
     #[doc = "Bent normals are computed."]
     BENT_NORMALS: bool = false;
+    #[doc = "Steps of the filter have strides: pixels between taps are left out."]
+    FILTER_STRIDES: bool = false;
 }

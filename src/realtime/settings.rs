@@ -1,10 +1,11 @@
 //! Settings of the real-time pipeline, and presets.
 
 use crate::error::{Error, Result};
-use crate::gpu::DeviceInfo;
+use crate::gpu::{DeviceInfo, Specialization};
 use crate::integrators::ao::{Attenuation, Hemisphere};
 use crate::integrators::path::PathOptions;
 pub use crate::interface::Resolution;
+use crate::interface::constants;
 use crate::interface::records::frame::{STEP_HORIZONTAL, STEP_VERTICAL};
 use crate::interface::records::passes::FilterParams;
 use crate::raster::Primary;
@@ -101,6 +102,11 @@ pub struct Filter {
 }
 
 impl Filter {
+    /// Constants of the filter's shader that its steps share.
+    pub fn specialization(&self) -> Specialization {
+        Specialization::default().set(constants::FILTER_STRIDES, self.steps().iter().any(|s| s.stride > 1))
+    }
+
     /// The steps of the filter, in order; at least one, because the last step converts estimates to the result.
     pub fn steps(&self) -> Vec<FilterStep> {
         let step = |sides, radius, stride| FilterStep { sides, radius, stride };

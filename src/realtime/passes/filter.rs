@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use crate::error::Result;
 use crate::film::block::Block;
-use crate::gpu::{ComputePipeline, Recorder, Specialization};
+use crate::gpu::{ComputePipeline, Recorder};
 use crate::interface::constants;
 use crate::interface::records::passes::{FILTER_STRIP, FilterParams};
 use crate::realtime::display::Display;
@@ -28,7 +28,7 @@ struct Filter {
 /// The steps of the filter over the tiles of the image.
 pub fn stages(tracer: &Tracer, block: Block, settings: &Settings) -> Result<Vec<Stage>> {
     let device = tracer.device();
-    let specialization = Specialization::default().set(constants::BENT_NORMALS, settings.bent);
+    let specialization = settings.filter.specialization().set(constants::BENT_NORMALS, settings.bent);
     let pipeline = Arc::new(shaders::FILTER.specialized(device, &specialization)?);
     let steps = settings.filter.steps();
     // steps alternate between two images

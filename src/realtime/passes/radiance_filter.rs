@@ -28,7 +28,7 @@ struct RadianceFilter {
 /// The steps of the filter over the tiles of the image (`has_specular`: of both parts, else the rest is black and is left alone), and the images that hold the results: diffuse reflection and the rest.
 pub fn stages(tracer: &Tracer, block: Block, settings: &Settings, has_specular: bool) -> Result<(Vec<Stage>, [Resource; 2])> {
     let device = tracer.device();
-    let pipeline = Arc::new(shaders::DENOISE.pipeline(device)?);
+    let pipeline = Arc::new(shaders::DENOISE.specialized(device, &settings.filter.specialization())?);
     let steps = settings.filter.steps();
     let mut stages = Vec::new();
     let mut filtered = [Resource::DiffuseHistory, Resource::SpecularHistory];
