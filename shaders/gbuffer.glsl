@@ -23,10 +23,7 @@ void closest(uint index, Hit hit) {
     float depth = -(dot(back.xyz, s.position) + back.w);
     Hemisphere h = hemisphere_at(p, s);
     STORE_PAIR(f.guide, at, make_guide(depth, h.ng, hit.instance));
-    STORE_PAIR(f.surface, 4u * at, floatBitsToUint(s.position.xy));
-    STORE_PAIR(f.surface, 4u * at + 1u, floatBitsToUint(vec2(s.position.z, s.offset)));
-    STORE_PAIR(f.surface, 4u * at + 2u, floatBitsToUint(h.ng.xy));
-    STORE_PAIR(f.surface, 4u * at + 3u, floatBitsToUint(vec2(h.ng.z, 0.0)));
+    store_surface(f, at, s.position, s.offset, h.ng);
     if (p.hemisphere != 0u) {
         FloatImage axes = FloatImage(f.axes);
         for (uint k = 0u; k < 3u; k++) axes.v[3u * at + k] = h.axis[k];

@@ -49,7 +49,7 @@ void main() {
     vec2 plane = image_plane(f, f.view, centre);
     vec3 p = unproject(orthographic, plane, depth);
     vec3 v = orthographic ? vec3(0.0, 0.0, 1.0) : normalize(-p);
-    vec3 normal = linear(f.world_to_camera, uintBitsToFloat(Quads(f.surface).v[2u * at + 1u].xyz));
+    vec3 normal = linear(f.world_to_camera, uintBitsToFloat(Quads(f.normals).v[at].xyz));
     // perpendicular to the view ray
     vec3 right = normalize(vec3(v.z, 0.0, -v.x)), up = cross(v, right);
     float radius = g.radius_scale * f.reach / footprint(f, f.view, orthographic, depth);

@@ -8,7 +8,7 @@ Ray ray(uint index) {
     if (any(greaterThanEqual(pixel, f.size))) return no_ray();
     uint at = image_index(f, pixel);
     if (larsen_nothing(f, at)) return no_ray();
-    vec3 p = uintBitsToFloat(Quads(f.surface).v[2u * at].xyz), n = uintBitsToFloat(Quads(f.surface).v[2u * at + 1u].xyz);
+    vec3 p = uintBitsToFloat(Quads(f.surface).v[at].xyz), n = uintBitsToFloat(Quads(f.normals).v[at].xyz);
     vec3 origin = p + LARSEN_BIAS * l.unit * n;
     vec3 to = uintBitsToFloat(Quads(l.lights).v[index % l.light_count].xyz) - origin;
     float d = length(to);

@@ -36,7 +36,7 @@ Ray ray(uint index) {
     uvec2 pixel = occlusion_pixel(l, index);
     if (!is_traced(l, f, pixel)) return no_ray();
     uint at = image_index(f, min(2u * pixel, f.size - 1u));
-    vec3 p = uintBitsToFloat(Quads(f.surface).v[2u * at].xyz), n = uintBitsToFloat(Quads(f.surface).v[2u * at + 1u].xyz);
+    vec3 p = uintBitsToFloat(Quads(f.surface).v[at].xyz), n = uintBitsToFloat(Quads(f.normals).v[at].xyz);
     float noise = Floats(l.noise).v[(pixel.y % LARSEN_NOISE) * LARSEN_NOISE + pixel.x % LARSEN_NOISE];
     float angle = 6.28318530718 * fract(noise + 1.61803398875 * float(l.frame_parity));
     vec3 w = align(n, cosine_hemisphere(table_point(l, index % LARSEN_RAYS, angle)));

@@ -16,7 +16,7 @@ void main() {
     uint at = gl_GlobalInvocationID.x;
     float now = Floats(l.combined).v[at];
     if (f.has_history != 0u && !larsen_nothing(f, at)) {
-        vec3 c = affine(f.previous_world_to_camera, uintBitsToFloat(Quads(f.surface).v[2u * at].xyz));
+        vec3 c = affine(f.previous_world_to_camera, uintBitsToFloat(Quads(f.surface).v[at].xyz));
         vec2 plane = f.previous_orthographic != 0u ? c.xy : c.xy / -c.z;
         vec2 q = image_point(f, f.previous_view, plane) - 0.5;
         // clamp to edge

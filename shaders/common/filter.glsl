@@ -145,7 +145,7 @@ void main() {
             finish(p, f, at, own, BENT_NORMALS ? load_bent(p, at) : vec3(0.0));
             continue;
         }
-        strip[k].edge = edge_test(f, f.world_to_camera, f.view, f.orthographic != 0u, surface_position(f, at), surface_normal(f, at), sample_place(f, vec2(pixel)));
+        strip[k].edge = edge_test(f, own_guides[k], surface_normal(f, at), sample_place(f, vec2(pixel)));
         strip[k].edge.normal = edge_normal(strip[k].edge.normal, own_guides[k]);
         ivec2 reach = radius * ivec2(p.sides & STEP_HORIZONTAL, (p.sides & STEP_VERTICAL) >> 1);
         ivec2 lower = max(-reach, -(pixel >> stride_bits)), upper = min(reach, (ivec2(f.size) - 1 - pixel) >> stride_bits);

@@ -47,15 +47,22 @@ bool is_surface(uvec2 guide) {
 }
 
 vec3 surface_position(FrameParams f, uint at) {
-    return uintBitsToFloat(uvec3(LOAD_PAIR(f.surface, 4u * at), LOAD_PAIR(f.surface, 4u * at + 1u).x));
+    return uintBitsToFloat(uvec3(LOAD_PAIR(f.surface, 2u * at), LOAD_PAIR(f.surface, 2u * at + 1u).x));
 }
 
 vec3 surface_normal(FrameParams f, uint at) {
-    return uintBitsToFloat(uvec3(LOAD_PAIR(f.surface, 4u * at + 2u), LOAD_PAIR(f.surface, 4u * at + 3u).x));
+    return uintBitsToFloat(uvec3(LOAD_PAIR(f.normals, 2u * at), LOAD_PAIR(f.normals, 2u * at + 1u).x));
 }
 
 float spawn_offset_at(FrameParams f, uint at) {
-    return uintBitsToFloat(LOAD_PAIR(f.surface, 4u * at + 1u).y);
+    return uintBitsToFloat(LOAD_PAIR(f.surface, 2u * at + 1u).y);
+}
+
+void store_surface(FrameParams f, uint at, vec3 position, float spawn_offset, vec3 normal) {
+    STORE_PAIR(f.surface, 2u * at, floatBitsToUint(position.xy));
+    STORE_PAIR(f.surface, 2u * at + 1u, floatBitsToUint(vec2(position.z, spawn_offset)));
+    STORE_PAIR(f.normals, 2u * at, floatBitsToUint(normal.xy));
+    STORE_PAIR(f.normals, 2u * at + 1u, floatBitsToUint(vec2(normal.z, 0.0)));
 }
 
 // Where in the image a pixel's sample lies in this frame.
@@ -108,11 +115,10 @@ struct EdgeTest {
     bool orthographic;
 };
 
-// `centre`: position of the point in the image, in pixels; position and normal in world space.
-EdgeTest edge_test(FrameParams f, vec4 world_to_camera[3], vec2 view, bool orthographic, vec3 position, vec3 normal, vec2 centre) {
+// `plane`: position of the point on the image plane; `c`: in camera space; `n`: the normal there; `normal`: in world space.
+EdgeTest edge_test(FrameParams f, vec2 view, bool orthographic, vec2 plane, vec3 c, vec3 n, vec3 normal) {
     EdgeTest e;
-    vec3 c = affine(world_to_camera, position), n = linear(world_to_camera, normal);
-    vec2 plane = image_plane(f, view, centre), step = 2.0 * view / vec2(f.size);
+    vec2 step = 2.0 * view / vec2(f.size);
     e.normal = normal;
     e.cosine = f.normal_tolerance;
     e.distance = dot(n, c);
@@ -123,6 +129,20 @@ EdgeTest edge_test(FrameParams f, vec4 world_to_camera[3], vec2 view, bool ortho
     e.by_depth = -n.z;
     e.orthographic = orthographic;
     return e;
+}
+
+// `centre`: position of the point in the image, in pixels; position and normal in world space.
+EdgeTest edge_test(FrameParams f, vec4 world_to_camera[3], vec2 view, bool orthographic, vec3 position, vec3 normal, vec2 centre) {
+    vec3 c = affine(world_to_camera, position), n = linear(world_to_camera, normal);
+    return edge_test(f, view, orthographic, image_plane(f, view, centre), c, n, normal);
+}
+
+// The same for the surface that a pixel of this frame shows, whose guide says how far away it is.
+EdgeTest edge_test(FrameParams f, uvec2 guide, vec3 normal, vec2 centre) {
+    bool orthographic = f.orthographic != 0u;
+    vec2 plane = image_plane(f, f.view, centre);
+    vec3 c = unproject(orthographic, plane, uintBitsToFloat(guide.x)), n = linear(f.world_to_camera, normal);
+    return edge_test(f, f.view, orthographic, plane, c, n, normal);
 }
 
 // `offset`: from the point to the neighbour, in pixels.

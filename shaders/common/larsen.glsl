@@ -15,7 +15,7 @@ uvec2 larsen_pixel(uvec2 size, uint k) {
 
 // Position 0 marks the background, and also a surface that happens to be there.
 bool larsen_nothing(FrameParams f, uint at) {
-    return !is_surface(Pairs(f.guide).v[at]) || uintBitsToFloat(Quads(f.surface).v[2u * at].xyz) == vec3(0.0);
+    return !is_surface(Pairs(f.guide).v[at]) || uintBitsToFloat(Quads(f.surface).v[at].xyz) == vec3(0.0);
 }
 
 #endif

@@ -111,11 +111,8 @@ void guide_vertex(BlockParams block, uint at, GuideRay g, Ray ray, Hit hit) {
     vec3 normal = where_it_seems(g, m.frame.n);
     uvec2 guide = make_guide(depth, normal, hit.instance + 0x10001u * g.bounces);
     STORE_PAIR(f.guide, at, guide);
-    STORE_PAIR(f.surface, 4u * at, floatBitsToUint(position.xy));
-    STORE_PAIR(f.surface, 4u * at + 1u, floatBitsToUint(vec2(position.z, s.offset)));
     vec3 ng = where_it_seems(g, m.ng);
-    STORE_PAIR(f.surface, 4u * at + 2u, floatBitsToUint(ng.xy));
-    STORE_PAIR(f.surface, 4u * at + 3u, floatBitsToUint(vec2(ng.z, 0.0)));
+    store_surface(f, at, position, s.offset, ng);
     if (!is_null(f.previous_position)) {
         FloatImage previous = FloatImage(f.previous_position);
         for (uint k = 0u; k < 3u; k++) previous.v[3u * at + k] = position[k] + before[k];

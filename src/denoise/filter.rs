@@ -19,7 +19,6 @@ use crate::film::block::Block;
 use crate::film::pace::Pace;
 use crate::gpu::{Buffer, Commands, Memory};
 use crate::interface::records::denoise::RadianceRecord;
-use crate::interface::records::frame::SurfaceRecord;
 use crate::interface::records::passes::{FILTER_STRIP, FilterParams};
 use crate::realtime::params::FrameParams;
 use crate::realtime::settings::FilterStep;
@@ -51,7 +50,7 @@ const MIN_ALBEDO: f32 = 0.01;
 const POLISHED: f32 = 0.25;
 /// The shader's inputs per pixel.
 struct Guided {
-    surfaces: Vec<SurfaceRecord>,
+    normals: Vec<[f32; 4]>,
     guides: Vec<[u32; 2]>,
     estimates: Vec<RadianceRecord>,
     /// Albedo by which each pixel is divided; zero for pixels that are not filtered.
@@ -114,7 +113,7 @@ fn guide(shot: &DenoiseInput, film: &Film, features: &Features) -> Guided {
     let DenoiseInput { scene, camera, options, .. } = *shot;
     let pixels = film.samples.len();
     let mut out = Guided {
-        surfaces: vec![SurfaceRecord::default(); pixels],
+        normals: vec![[0.0; 4]; pixels],
         guides: vec![[f32::INFINITY.to_bits(), 0]; pixels],
         estimates: vec![RadianceRecord::default(); pixels],
         divisors: vec![Vec3::ZERO; pixels],
@@ -143,7 +142,8 @@ fn guide(shot: &DenoiseInput, film: &Film, features: &Features) -> Guided {
             variance: variance.to_array(),
             narrowed: 0.0,
         };
-        out.surfaces[k] = SurfaceRecord { position: centre.position, normal: centre.ng, ..Default::default() };
+        let [x, y, z] = centre.ng;
+        out.normals[k] = [x, y, z, 0.0];
         // eight bits: seven of a hash of the material, and one that is set for several surfaces
         let class =
             (centre.material.wrapping_mul(0x9e37_79b1) >> 25) << 1 | u32::from(content == PixelContent::SeveralSurfaces);
@@ -169,7 +169,7 @@ fn run(
 ) -> Result<Vec<RadianceRecord>> {
     let (device, camera) = (shot.tracer.device(), shot.camera);
     let block = Block { origin: [0, 0], size };
-    let surface = Buffer::from_slice(device, "surfaces", &guided.surfaces)?;
+    let normals = Buffer::from_slice(device, "normals", &guided.normals)?;
     let guide = Buffer::from_slice(device, "guide", &guided.guides)?;
     let given = Buffer::from_slice(device, "radiance", &guided.estimates)?;
     let image = || Buffer::new(device, "filtered radiance", given.size(), Memory::Device);
@@ -187,7 +187,7 @@ fn run(
         normal_tolerance: settings.cosine,
         // estimates are final: no later frame improves them
         most_samples: 1.0,
-        surface: surface.address(),
+        normals: normals.address(),
         guide: guide.address(),
         ..Default::default()
     };

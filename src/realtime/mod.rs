@@ -709,6 +709,7 @@ impl Realtime {
             has_history: self.state.has_history.into(),
             rest: (s.rest && still && self.state.has_history && !s.converges()).into(),
             surface: resources.address(Resource::Surface),
+            normals: resources.address(Resource::Normals),
             axes: resources.address(Resource::Axes),
             guide: resources.address(Resource::Guide),
             previous_guide: resources.previous_address(Resource::Guide),

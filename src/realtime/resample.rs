@@ -88,6 +88,7 @@ impl Realtime {
         let frame = FrameParams {
             guide: theirs.address(Resource::Guide),
             surface: theirs.address(Resource::Surface),
+            normals: theirs.address(Resource::Normals),
             previous_guide: ours.address(Resource::Guide),
             ..self.frame_params(camera, false, other.state.offset)
         };

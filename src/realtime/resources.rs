@@ -37,6 +37,8 @@ pub enum Resource {
     Guide,
     /// `SurfaceRecord` of each pixel.
     Surface,
+    /// Geometric normal of each pixel's surface.
+    Normals,
     /// Axis of each pixel's hemisphere.
     Axes,
     /// Position of each pixel's surface in the previous frame.
@@ -162,6 +164,7 @@ impl Resource {
             Self::Camera | Self::Scene | Self::FrameNumber | Self::DisplaySettings => device("host", 0, Host),
             Self::Guide => device("guide", PAIR_BYTES * pixels, Pair),
             Self::Surface => device("surfaces", SURFACE_BYTES * pixels, Kept),
+            Self::Normals => device("normals", QUAD_BYTES * pixels, Kept),
             Self::Axes => device("axes of hemispheres", VECTOR_BYTES * pixels, Kept),
             Self::PreviousPosition => device("previous positions", VECTOR_BYTES * pixels, Kept),
             Self::Current => device("estimates of the frame", PAIR_BYTES * pixels, Frame),

@@ -4,7 +4,8 @@
 //!
 //! | image | bytes | what |
 //! |---|---|---|
-//! | surface | 32 | `SurfaceRecord` |
+//! | surface | 16 | `SurfaceRecord` |
+//! | normals | 16 | unit geometric normal, on the viewer's side, and padding: of its own, because filters need the position no more than its depth |
 //! | guide | 8 | view depth (infinite for background), packed normal and id: for edge tests between neighbours |
 //! | history | 8 | mean ambient visibility; number of samples, and variance of one sample |
 //! | current | 8 | the same for this frame's samples alone; 0 samples where a pixel has none |
@@ -87,6 +88,8 @@ records! {
         rest: uint,
         /// `SurfaceRecord` of each pixel.
         surface: address,
+        /// Normal of each pixel's surface.
+        normals: address,
         /// Axis of each pixel's hemisphere, 3 floats; 0: the geometric normal is the axis.
         axes: address,
         /// Guide image of this frame, for edge tests.
@@ -117,9 +120,5 @@ records! {
         position: vec3,
         /// Distance along the normal at which a ray must start to avoid self-intersection, scene units.
         spawn_offset: float,
-        /// Unit geometric normal, on the viewer's side.
-        normal: vec3,
-        /// Padding to a multiple of 16 bytes.
-        reserved: float,
     }
 }

@@ -47,6 +47,7 @@ pub const READS: &[Resource] = &[
     Resource::Scene,
     Resource::Guide,
     Resource::Surface,
+    Resource::Normals,
     Resource::Axes,
     Resource::Plan,
     Resource::RayPixels,

@@ -45,11 +45,11 @@ pub fn stages(tracer: &Tracer, tiled_pixels: u32, _: &Settings) -> Result<Vec<St
 impl Pass for Budget {
     fn uses(&self, _: Option<&Display>) -> ResourceUse {
         use Resource::{
-            DesiredSamples, FrameNumber, Guide, History, Plan, PreviousPosition, RayPixels, Sums, Surface, TotalRays,
+            DesiredSamples, FrameNumber, Guide, History, Normals, Plan, PreviousPosition, RayPixels, Sums, Surface, TotalRays,
         };
         match self.stage {
             BudgetStage::DesiredSamples => {
-                ResourceUse::new(&[FrameNumber, Guide, Surface, PreviousPosition], &[DesiredSamples])
+                ResourceUse::new(&[FrameNumber, Guide, Surface, Normals, PreviousPosition], &[DesiredSamples])
                     .previous(&[Guide, History])
             }
             BudgetStage::Coarse => ResourceUse::new(&[FrameNumber, DesiredSamples], &[Sums]).clears(Sums, 0),

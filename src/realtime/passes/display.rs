@@ -103,7 +103,7 @@ pub fn stage(tracer: &Tracer, pixels: u32, shows_rays: bool) -> Result<Stage> {
 impl Pass for DisplayPass {
     fn uses(&self, display: Option<&Display>) -> ResourceUse {
         use Resource::{
-            BentResult, Camera, Current, DisplayImage, DisplaySettings, FrameNumber, Guide, History, PreviousPosition,
+            BentResult, Camera, Current, DisplayImage, DisplaySettings, FrameNumber, Guide, History, Normals, PreviousPosition,
             Resolved, Result, Surface,
         };
         let uses = ResourceUse::new(&[DisplaySettings], &[DisplayImage]);
@@ -119,7 +119,8 @@ impl Pass for DisplayPass {
             DisplayMode::Depth | DisplayMode::Ids => uses.and_reads(&[Guide]),
             // what moved in the previous frame rests in this one
             DisplayMode::Motion => uses.and_reads(&[Camera, FrameNumber, Guide, Surface, PreviousPosition]),
-            DisplayMode::Normal | DisplayMode::Position => uses.and_reads(&[Guide, Surface]),
+            DisplayMode::Normal => uses.and_reads(&[Guide, Normals]),
+            DisplayMode::Position => uses.and_reads(&[Guide, Surface]),
             DisplayMode::Bent => uses.and_reads(&[Guide, BentResult]),
             // another pass writes the image
             _ => uses,

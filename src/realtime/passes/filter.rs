@@ -57,7 +57,7 @@ impl Filter {
 impl Pass for Filter {
     fn uses(&self, _: Option<&Display>) -> ResourceUse {
         let [values, bent] = self.targets();
-        ResourceUse::new(&[Resource::Camera, Resource::Guide, Resource::Surface], &[values])
+        ResourceUse::new(&[Resource::Camera, Resource::Guide, Resource::Normals], &[values])
             .and_reads(&self.from)
             .and_writes(self.has_bent, &[bent])
     }

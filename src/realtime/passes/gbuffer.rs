@@ -36,7 +36,7 @@ pub fn stage(tracer: &Tracer, block: Block, settings: &Settings, primary: Primar
 
 impl Pass for Gbuffer {
     fn uses(&self, _: Option<&Display>) -> ResourceUse {
-        ResourceUse::new(&[Resource::Camera, Resource::Scene], &[Resource::Guide, Resource::Surface])
+        ResourceUse::new(&[Resource::Camera, Resource::Scene], &[Resource::Guide, Resource::Surface, Resource::Normals])
             .and_writes(self.has_axes, &[Resource::Axes])
             .and_writes(self.is_dynamic, &[Resource::PreviousPosition])
             .clears(Resource::Guide, f32::INFINITY.to_bits())

@@ -87,9 +87,9 @@ pub fn stages(tracer: &Tracer, size: [u32; 2], settings: &Settings, lights: &[[f
 impl Pass for Larsen {
     fn uses(&self, _: Option<&Display>) -> ResourceUse {
         use Resource::{
-            Combined, FrameNumber, Guide, Occlusion, PreviousResult, RayCount, Result, Samples, Surface, VisibleLights,
+            Combined, FrameNumber, Guide, Normals, Occlusion, PreviousResult, RayCount, Result, Samples, Surface, VisibleLights,
         };
-        let surfaces = [FrameNumber, Guide, Surface];
+        let surfaces = [FrameNumber, Guide, Surface, Normals];
         match self.work {
             Work::Keep => ResourceUse::new(&[Result], &[PreviousResult]),
             Work::Light(_) => ResourceUse::new(&surfaces, &[VisibleLights]).clears(VisibleLights, 0),

@@ -64,15 +64,11 @@ fn sample_batches(n: u32, most_bits: u32) -> impl Iterator<Item = (u32, u32)> {
 impl Pass for Paths {
     fn uses(&self, _: Option<&Display>) -> ResourceUse {
         use Resource::{
-            CurrentDiffuse, CurrentSpecular, FrameNumber, Guide, KnownHits, PreviousPosition, ReflectedDistance, Rest,
-            RestParts, Scene, Surface,
+            CurrentDiffuse, CurrentSpecular, FrameNumber, Guide, KnownHits, ReflectedDistance, Rest, RestParts, Scene,
         };
-        ResourceUse::new(
-            &[FrameNumber, Scene, Guide, Surface, PreviousPosition],
-            &[CurrentDiffuse, CurrentSpecular, ReflectedDistance],
-        )
-        .and_reads(if self.paths.can_begin_at_known() { &[KnownHits] } else { &[] })
-        .and_writes(self.has_rest, &[Rest, RestParts])
+        ResourceUse::new(&[FrameNumber, Scene, Guide], &[CurrentDiffuse, CurrentSpecular, ReflectedDistance])
+            .and_reads(if self.paths.can_begin_at_known() { &[KnownHits] } else { &[] })
+            .and_writes(self.has_rest, &[Rest, RestParts])
     }
 
     fn prepare(&mut self, frame: &Frame, resources: &Resources) -> Result<()> {

@@ -46,7 +46,7 @@ pub fn stages(tracer: &Tracer, block: Block, settings: &Settings, has_specular: 
 
 impl Pass for RadianceFilter {
     fn uses(&self, _: Option<&Display>) -> ResourceUse {
-        ResourceUse::new(&[Resource::Camera, Resource::Guide, Resource::Surface, self.from], &[self.to])
+        ResourceUse::new(&[Resource::Camera, Resource::Guide, Resource::Normals, self.from], &[self.to])
     }
 
     fn prepare(&mut self, frame: &Frame, resources: &Resources) -> Result<()> {

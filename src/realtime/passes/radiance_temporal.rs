@@ -36,7 +36,7 @@ pub fn stage(tracer: &Tracer, pixels: u32, has_rest: bool) -> Result<Stage> {
 impl Pass for RadianceTemporal {
     fn uses(&self, _: Option<&Display>) -> ResourceUse {
         use Resource::{
-            CurrentDiffuse, CurrentSpecular, DiffuseHistory, FrameNumber, Guide, Materials, PreviousPosition,
+            CurrentDiffuse, CurrentSpecular, DiffuseHistory, FrameNumber, Guide, Materials, Normals, PreviousPosition,
             ReflectedDistance, Scene, SpecularHistory, Surface,
         };
         let reads = [
@@ -44,6 +44,7 @@ impl Pass for RadianceTemporal {
             Scene,
             Guide,
             Surface,
+            Normals,
             Materials,
             PreviousPosition,
             CurrentDiffuse,

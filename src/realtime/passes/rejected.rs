@@ -7,7 +7,14 @@ use crate::realtime::settings::Technique;
 
 /// The view.
 pub const VIEW: DebugView = DebugView {
-    reads: &[Resource::Camera, Resource::Scene, Resource::Guide, Resource::Surface, Resource::PreviousPosition],
+    reads: &[
+        Resource::Camera,
+        Resource::Scene,
+        Resource::Guide,
+        Resource::Surface,
+        Resource::Normals,
+        Resource::PreviousPosition,
+    ],
     previous: &[Resource::Guide, Resource::History],
     check: |settings| match settings.technique {
         Technique::Larsen => Err(Error::Usage(

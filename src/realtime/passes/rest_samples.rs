@@ -56,8 +56,8 @@ impl Traced {
 
 impl Pass for RestSamples {
     fn uses(&self, _: Option<&Display>) -> ResourceUse {
-        use Resource::{Camera, FrameNumber, Guide, History, RayCount, Rest, Scene, Surface};
-        ResourceUse::new(&[FrameNumber, Camera, Scene, Guide, Surface], &[Rest, History, RayCount])
+        use Resource::{Camera, FrameNumber, Guide, History, Normals, RayCount, Rest, Scene, Surface};
+        ResourceUse::new(&[FrameNumber, Camera, Scene, Guide, Surface, Normals], &[Rest, History, RayCount])
             .previous(&[History])
             .clears(RayCount, 0)
     }

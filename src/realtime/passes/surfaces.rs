@@ -57,8 +57,8 @@ pub(super) fn block_params(frame: &Frame, block: Block) -> BlockParams {
 
 impl Pass for Surfaces {
     fn uses(&self, _: Option<&Display>) -> ResourceUse {
-        use Resource::{Camera, Direct, Guide, KnownHits, Materials, PreviousPosition, Scene, Surface};
-        ResourceUse::new(&[Camera, Scene], &[Guide, Surface, Materials, Direct])
+        use Resource::{Camera, Direct, Guide, KnownHits, Materials, Normals, PreviousPosition, Scene, Surface};
+        ResourceUse::new(&[Camera, Scene], &[Guide, Surface, Normals, Materials, Direct])
             .and_writes(self.is_dynamic, &[PreviousPosition])
             .and_writes(self.keeps_hits, &[KnownHits])
             .clears(Guide, f32::INFINITY.to_bits())

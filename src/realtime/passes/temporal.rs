@@ -36,11 +36,14 @@ pub fn stage(tracer: &Tracer, pixels: u32, settings: &Settings) -> Result<Stage>
 impl Pass for Temporal {
     fn uses(&self, _: Option<&Display>) -> ResourceUse {
         use Resource::{
-            BentHistory, Current, CurrentBent, FrameNumber, Guide, History, Plan, PreviousPosition, Scene, Surface,
+            BentHistory, Current, CurrentBent, FrameNumber, Guide, History, Normals, Plan, PreviousPosition, Scene, Surface,
         };
-        ResourceUse::new(&[FrameNumber, Scene, Guide, Surface, PreviousPosition, Current, CurrentBent, Plan], &[History])
-            .previous(&[Guide, History, BentHistory])
-            .and_writes(self.has_bent, &[BentHistory])
+        ResourceUse::new(
+            &[FrameNumber, Scene, Guide, Surface, Normals, PreviousPosition, Current, CurrentBent, Plan],
+            &[History],
+        )
+        .previous(&[Guide, History, BentHistory])
+        .and_writes(self.has_bent, &[BentHistory])
     }
 
     fn prepare(&mut self, frame: &Frame, resources: &Resources) -> Result<()> {
