@@ -178,7 +178,9 @@ void main() {
                 [[unroll]] for (int k = 0; k < FILTER_STRIP; k++) {
                     int dx = x - place_in_strip(k).x;
                     bool is_inside = uint(x - strip[k].lower.x) < counts[k] && (!FILTER_STRIDES || (dx & stride - 1) == 0);
-                    if (!is_inside || !is_neighbour(strip[k].edge, vec2(dx, (y - place_in_strip(k).y) * stride), own_guides[k], guide, normal)) continue;
+                    // apart: what no lane of a subgroup does is skipped
+                    if (!is_inside) continue;
+                    if (!is_neighbour(strip[k].edge, vec2(dx, (y - place_in_strip(k).y) * stride), own_guides[k], guide, normal)) continue;
                     strip[k].sum += sum;
                     strip[k].squares += squares;
                     strip[k].variances += variances;
