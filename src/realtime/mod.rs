@@ -299,8 +299,8 @@ impl Realtime {
             return self.settings.frames_to_rest();
         }
         let frames = self.frame_samples.frames_for(self.settings.rest_samples);
-        // frames of a pattern of radiance have samples of the same indices
-        Some(if self.is_radiance { frames * self.settings.resolution.period() } else { frames })
+        // frames of a pattern of radiance have samples of the same indices; the frame before those at rest counts besides
+        Some(if self.is_radiance { frames * self.settings.resolution.period() + 1 } else { frames })
     }
 
     /// Number of frames at rest, the one before them not counted, that have as many samples of a pixel as so many long frames that do not grow: fewer where they do.
