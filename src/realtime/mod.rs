@@ -225,6 +225,11 @@ impl Realtime {
         let device = tracer.device();
         let frame_samples = FrameSamples::of_radiance(settings, pixels, device.info.is_cpu());
         let stages = passes::radiance_stages(tracer, flat, block, settings, options, frame_samples)?;
+        let graph = Graph::new(device, extent, stages)?;
+        let primary_reason = match graph.resources().buffer(Resource::KnownHits) {
+            Some(_) => "paths begin with a camera ray; in motion at what those of the G-buffer hit, which are traced once",
+            None => "paths begin with a camera ray",
+        };
         Ok(Self {
             size,
             settings: Settings {
@@ -232,12 +237,12 @@ impl Realtime {
                 rest_samples: settings.rest_samples.max(Settings::RADIANCE_REST_SAMPLES),
                 ..*settings
             },
-            graph: Graph::new(device, extent, stages)?,
+            graph,
             params: Params::new(device, "frame parameters")?,
             display: None,
             shown: None,
             displays: Vec::new(),
-            primary_reason: "paths begin with a camera ray".into(),
+            primary_reason: primary_reason.into(),
             state: State::default(),
             is_radiance: true,
             frame_samples,
