@@ -113,7 +113,7 @@ void finish_box(FilterParams p, FrameParams f, uvec2 estimates, uint at, ESTIMAT
     finish(p, f, at, estimate_of(own, (1.0 - keep) * mean + keep * own.mean, e.n, variance + kept), mix(e.bent / e.n, own_bent, keep));
 }
 
-// Each thread filters FILTER_STRIP pixels, whose boxes overlap: a tap is loaded once for all of them. On a CPU driver loads are most of the time. Threads that run together filter tiles
+// Each thread filters FILTER_STRIP pixels, whose boxes overlap: a tap is loaded once for all of them. Threads that run together filter tiles
 // rather than long rows: their boxes are about as large, and the largest says how long all take.
 void main() {
     uint index = push.first + FILTER_STRIP * gl_GlobalInvocationID.x;

@@ -112,7 +112,7 @@ pub(super) fn large(info: &DeviceInfo, kernel: Kernel, shaders: &'static StreamS
     let packet = shaders.variant(Variant::Packet).filter(|_| in_packets(info, kernel, shaders));
     let (name, shader) = match packet {
         Some(shader) => (shaders.name, shader),
-        None => ("wide kernel", wide_kernel(shaders.mode, info.int64 && info.limits.subgroup_ballot)),
+        None => ("wide kernel", wide_kernel(shaders.mode, stream::has_ballots(info))),
     };
     PipelineSpec { name, shader, specialization: s.clone(), packets: packet.is_some() }
 }

@@ -109,7 +109,7 @@ fn spread(parts: u32, run: u32) -> [u32; 3] {
 }
 
 /// Whether a device has the 64-bit integers and subgroup ballots that some variants need.
-fn has_ballots(info: &DeviceInfo) -> bool {
+pub(super) fn has_ballots(info: &DeviceInfo) -> bool {
     info.int64 && info.limits.subgroup_ballot
 }
 

@@ -13,7 +13,7 @@ records! {
     /// A ray of the G-buffer on its way behind mirrors and glass.
     GuideRayRecord: words {
         /// Rows of the product of reflections so far, each with a number besides: the distance from the camera in scene units, the number of bounces (bits of a
-        /// `uint`), and padding.
+        /// `uint`), and 1 where the previous image did not show what the pixel does, else 0.
         rows: vec4[3],
     }
 
