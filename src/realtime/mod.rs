@@ -149,7 +149,7 @@ struct State {
 const REST_BLOCK: u32 = 1 << 12;
 
 /// Samples for which a history of radiance counts after lights or materials have changed, per ray of a frame.
-const PAST_AFTER_NEW_LIGHT: f32 = 2.0;
+const PAST_AFTER_NEW_LIGHT: f32 = 8.0;
 
 impl Realtime {
     /// The streams that it traces.
@@ -491,7 +491,7 @@ impl Realtime {
             has_denoised: denoises || denoised > 0,
             most_past: match self.state.has_new_light {
                 true => PAST_AFTER_NEW_LIGHT * self.settings.rays_per_pixel as f32,
-                false => f32::MAX,
+                false => f32::INFINITY,
             },
             environment_turn: self.state.environment_turn,
             params: self.params.address(),
