@@ -423,6 +423,8 @@ impl Realtime {
         let is_undisturbed = !self.state.has_new_light && !self.state.was_interrupted;
         let has_moved = !moved.is_empty() || self.state.camera != Some(*camera);
         let still = !has_moved && !is_larsen && is_undisturbed;
+        // histories are of the same pixels then, wherever in them samples lie
+        let only_light_is_new = !has_moved && self.state.has_new_light && self.state.has_resolved;
         // an image of which nothing is known yet begins as if it had come to rest: there are no histories to go on with, and places of their own for all paths say more
         let begins_at_rest = self.is_radiance && !self.state.has_resolved && self.frame_samples.starts_anew(1);
         let resting = if still { self.state.resting.saturating_add(1) } else { u32::from(begins_at_rest) };
@@ -440,9 +442,10 @@ impl Realtime {
             && self.settings.converges()
             && self.settings.antialias
             && samples > 1
-            && (is_long || !rest_starts || !self.state.has_resolved);
+            && (is_long || !rest_starts || !self.state.has_resolved || only_light_is_new);
         let offset = match self.settings.antialias {
             // what is known of surfaces is of the last frame whose samples lay at one place
+            true if only_light_is_new && spreads => self.state.offset,
             true if still && (spreads || is_long && !self.is_radiance) => self.state.offset,
             true => sample_offset(self.state.frame),
             false => [0.0; 2],
