@@ -312,7 +312,7 @@ fn gpu_frames_under_a_map_that_turns() {
     assert_validation_clean(&device);
 }
 
-/// Where the sun jumps, the first frame after it has hardly more error than one without any history, and much less than what was shown.
+/// Where the sun jumps, histories have no part in the first frame after it: it has hardly more error than one that has none. Antialiasing's mean, which is clipped to the pixels around, has.
 #[test]
 fn gpu_frames_follow_a_sun_that_jumps() {
     let device = device();
@@ -320,39 +320,41 @@ fn gpu_frames_follow_a_sun_that_jumps() {
     let [before, turned] = [DMat3::IDENTITY, after].map(stairs_in_the_sun);
     let [flat, turned] = [&before, &turned].map(FlatScene::for_paths);
     let tracer = tracer(&device, TracerKind::Compute, &flat);
-    let truth = {
-        let tracer = self::tracer(&device, TracerKind::Compute, &turned);
-        render(&tracer, &turned, &PathOptions { pixel_filter: PixelFilter::Box, ..options(1024) }).image.film.mean
-    };
+    let turned_tracer = self::tracer(&device, TracerKind::Compute, &turned);
     let camera = record(flat.scene, &flat.scene.cameras[0]);
     let pixels = u64::from(SIZE[0] * SIZE[1]);
-    // several paths of a frame lie at places of their own, as where an image begins
-    for rays_per_pixel in [1, 4] {
-        let (mut errors, seeds) = ([0.0; 3], 4);
-        for seed in 0..seeds {
-            let settings = Settings { seed, rays_per_pixel, ..converging() };
-            let mut frames = frames(&tracer, &flat, &settings, &PathOptions { seed, ..options(1) });
-            for _ in 0..16 {
+    for (antialias, pixel_filter) in [(false, PixelFilter::Centre), (true, PixelFilter::Box)] {
+        let options = |spp| PathOptions { pixel_filter, ..options(spp) };
+        let truth = render(&turned_tracer, &turned, &options(1024)).image.film.mean;
+        for rays_per_pixel in [1, 4] {
+            let (mut errors, seeds) = ([0.0; 3], 4);
+            for seed in 0..seeds {
+                let settings = Settings { seed, rays_per_pixel, antialias, ..converging() };
+                let mut frames = frames(&tracer, &flat, &settings, &PathOptions { seed, ..options(1) });
+                for _ in 0..16 {
+                    frames.frame(&tracer, &camera, &[]).unwrap();
+                }
+                let old = frames.result().unwrap();
+                frames.turn_environment(after);
+                let stats = frames.frame(&tracer, &camera, &[]).unwrap();
+                // several paths lie at places of their own, as where an image begins
+                let have_own = antialias && rays_per_pixel > 1;
+                assert_eq!((stats.samples, stats.primary_rays > pixels), (rays_per_pixel, have_own));
+                let new = frames.result().unwrap();
+                // where a frame has one path it has two then
+                frames.reset();
                 frames.frame(&tracer, &camera, &[]).unwrap();
+                let fresh = frames.result().unwrap();
+                for (error, image) in errors.iter_mut().zip([old, new, fresh]) {
+                    *error += rmse(&image, &truth) / f64::from(seeds);
+                }
             }
-            let old = frames.result().unwrap();
-            frames.turn_environment(after);
-            let stats = frames.frame(&tracer, &camera, &[]).unwrap();
-            assert_eq!((stats.samples, stats.primary_rays > pixels), (rays_per_pixel, rays_per_pixel > 1));
-            let new = frames.result().unwrap();
-            // where a frame has one path it has two then
-            frames.reset();
-            frames.frame(&tracer, &camera, &[]).unwrap();
-            let fresh = frames.result().unwrap();
-            for (error, image) in errors.iter_mut().zip([old, new, fresh]) {
-                *error += rmse(&image, &truth) / f64::from(seeds);
-            }
+            let [old, new, fresh] = errors;
+            println!(
+                "{rays_per_pixel} paths: RMSE of what was shown {old:.4}, after the jump {new:.4}, without histories {fresh:.4}"
+            );
+            assert!(if antialias { new < 0.6 * old } else { new < 1.2 * fresh }, "{new} of {old}, {fresh}");
         }
-        let [old, new, fresh] = errors;
-        println!(
-            "{rays_per_pixel} paths: RMSE of what was shown {old:.4}, after the jump {new:.4}, without histories {fresh:.4}"
-        );
-        assert!(new < 0.6 * old && new < 1.5 * fresh, "{new} of {old}, {fresh}");
     }
     assert_validation_clean(&device);
 }
