@@ -26,7 +26,7 @@ const float SHARP_ROUGHNESS = 0.04;
 const float BLUR_WEIGHT = 0.1;
 // Strength with which a change of view shortens histories of what is not reflected diffusely: change of the signal, relative to it, where the view turns by the width of the lobe.
 const float TURN_WEIGHT = 8.0;
-// How many times as much as by the noise of the samples nearby a history may be off by a change of light.
+// Frames for which a history counts that light has changed by as much as the noise of the mean by which that is told.
 const float CHANGE_TOLERANCE = 4.0;
 // Pixels with samples below which nothing is known of that, and frames for which a history counts there.
 const float FEW_PIXELS = 4.0;
@@ -116,7 +116,9 @@ float frames_worth(FrameParams f, uvec2 image, uvec2 previous, uvec2 pixel, ivec
     if (n < FEW_PIXELS) return UNKNOWN_FRAMES;
     vec3 mean = sum / n;
     float noise = dot(max(squares / n - mean * mean, variance / n), vec3(1.0 / n));
-    return CHANGE_TOLERANCE * noise / max(dot(mean, mean) - noise, 1e-20);
+    float bias = dot(mean, mean) - noise;
+    // also of equal values without noise, and of squares beyond what floats hold
+    return bias > 0.0 ? CHANGE_TOLERANCE * noise / bias : INFINITY;
 }
 
 // The share of a history that is older than the samples at rest.

@@ -137,7 +137,7 @@ struct State {
     in_block: bool,
     /// Radiance: maximum number of paths of a pixel since then. The other pixels of the pattern follow with samples of the same indices.
     pattern_paths: u32,
-    /// Lights or materials have changed: histories of radiance count little.
+    /// Lights or materials have changed: histories of radiance count less.
     has_new_light: bool,
     /// The rotation to the environment map, if it is not yet on the device.
     environment_turn: Option<DMat3>,
@@ -148,7 +148,7 @@ struct State {
 /// Paths at rest begin at a multiple of this: 2^k samples of a sequence fill the square evenly only where the first one's index is a multiple of 2^k.
 const REST_BLOCK: u32 = 1 << 12;
 
-/// Samples for which a history of radiance counts after lights or materials have changed, per ray of a frame.
+/// Maximum samples for which a history of radiance counts after lights or materials have changed, per ray of a frame.
 const PAST_AFTER_NEW_LIGHT: f32 = 8.0;
 
 impl Realtime {
@@ -259,7 +259,7 @@ impl Realtime {
         if self.is_radiance { 3 } else { 1 }
     }
 
-    /// Lights or materials have changed since the last frame: histories of radiance count little in the next one. Those of ambient visibility do not depend on them.
+    /// Lights or materials have changed since the last frame: histories of radiance count in the next one as far as its samples do not differ from them, and for eight frames at most. Those of ambient visibility do not depend on them.
     pub fn change_light(&mut self) {
         if self.is_radiance {
             self.state.has_new_light = true;
