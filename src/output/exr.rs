@@ -8,6 +8,7 @@ use std::fs::File;
 use std::io::{self, BufReader, BufWriter, Read, Seek, SeekFrom, Write};
 use std::path::Path;
 
+use exr::block::chunk::CompressedBlock;
 use exr::block::lines::LineRefMut;
 use exr::image::write::samples::{SamplesWriter, WritableSamples};
 use exr::math::{RoundingMode, Vec2};
@@ -302,6 +303,42 @@ fn most_of_byte(compression: Compression, samples: SampleType) -> u64 {
     }
 }
 
+/// Blocks of the methods DWAA and DWAB begin with eleven numbers of 64 bits, of which the second to the tenth say how many bytes and values follow; the decoder takes memory for as many. `Err(None)` where
+/// that is more than the pixels of the block can have.
+fn check_announced(file: File, meta: &MetaData) -> std::result::Result<(), Option<exr::error::Error>> {
+    let is_announced = |h: &Header| matches!(h.compression, Compression::DWAA(_) | Compression::DWAB(_));
+    if !meta.headers.iter().any(is_announced) {
+        return Ok(());
+    }
+    for chunk in exr::block::read(BufReader::new(file), false)?.all_chunks(false)? {
+        let chunk = chunk?;
+        let Some(header) = meta.headers.get(chunk.layer_index).filter(|h| is_announced(h)) else { continue };
+        let (size, bytes) = match &chunk.compressed_block {
+            CompressedBlock::ScanLine(block) => {
+                let from_top = block.y_coordinate.saturating_sub(header.own_attributes.layer_position.1).max(0) as usize;
+                let lines = header.compression.scan_lines_per_block().min(header.layer_size.1.saturating_sub(from_top));
+                (Vec2(header.layer_size.0, lines), &block.compressed_pixels_le)
+            }
+            CompressedBlock::Tile(block) => {
+                (header.get_absolute_block_pixel_coordinates(block.coordinates)?.size, &block.compressed_pixels_le)
+            }
+            CompressedBlock::DeepScanLine(_) | CompressedBlock::DeepTile(_) => continue,
+        };
+        // pixels that would take more bytes otherwise are stored as they are
+        if bytes.len() == size.area() * header.channels.bytes_per_pixel {
+            continue;
+        }
+        // cosine transforms are of 8 x 8 pixels; of four bytes a value, and what deflating adds where nothing is gained
+        let values = (size.0.next_multiple_of(8) * size.1.next_multiple_of(8) * header.channels.list.len()) as u64;
+        let most = 8 * values + 4096;
+        let mut announced = bytes.chunks_exact(8).take(10).skip(1);
+        if announced.any(|b| b.try_into().map_or(u64::MAX, u64::from_le_bytes) > most) {
+            return Err(None);
+        }
+    }
+    Ok(())
+}
+
 fn decode(path: &Path) -> Result<Image> {
     let broken = |e: exr::error::Error| match e {
         exr::error::Error::Io(e) => Error::read(path, &e),
@@ -321,6 +358,10 @@ fn decode(path: &Path) -> Result<Image> {
     if meta.headers.iter().map(least_bytes).sum::<u64>() > bytes {
         return Err(Error::input(path, format!("not a readable EXR: {bytes} bytes are too few for what its header says")));
     }
+    check_announced(open()?, &meta).map_err(|e| {
+        let announces_too_much = || Error::input(path, "not a readable EXR: a block announces more than its pixels can have");
+        e.map_or_else(announces_too_much, broken)
+    })?;
     let reader = exr::prelude::read().no_deep_data().largest_resolution_level().all_channels().all_layers().all_attributes();
     // a panic in one of the decoder's threads would end the process: what decoders of these methods do to damaged blocks is not checked
     let is_simple = |h: &Header| {
@@ -420,6 +461,36 @@ mod tests {
                     let error = read(&path).unwrap_err().to_string();
                     assert!(error.contains("too few"), "{compression:?}, {size}: {error}");
                 }
+            }
+        }
+    }
+
+    /// Blocks of cosine transforms say how many values they have, of which the decoder takes memory for all.
+    #[test]
+    fn blocks_have_as_many_values_as_their_pixels() {
+        use exr::prelude::{Blocks, Encoding, Layer, LineOrder, SpecificChannels, WritableImage};
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("image.exr");
+        for compression in [Compression::DWAA(None), Compression::DWAB(None)] {
+            // blocks that are not a multiple of eight pixels, and the last one is not whole
+            let encoding = Encoding { compression, blocks: Blocks::ScanLines, line_order: LineOrder::Increasing };
+            let colours = SpecificChannels::rgb(|at: Vec2<usize>| (at.x() as f32 / 41.0, at.y() as f32 / 300.0, 0.5_f32));
+            let layer = Layer::new((41, 300), LayerAttributes::named("colours"), encoding, colours);
+            exr::prelude::Image::from_layer(layer).write().to_file(&path).unwrap();
+            let image = read(&path).unwrap();
+            assert_eq!((image.width, image.height, image.channels.len()), (41, 300, 3));
+            let chunks = exr::block::read(BufReader::new(File::open(&path).unwrap()), false).unwrap();
+            let chunk = chunks.all_chunks(false).unwrap().next().unwrap().unwrap();
+            let CompressedBlock::ScanLine(block) = chunk.compressed_block else { panic!("not of lines") };
+            let bytes = std::fs::read(&path).unwrap();
+            let data = &block.compressed_pixels_le[..88];
+            let at = bytes.windows(data.len()).position(|w| w == data).unwrap();
+            for counter in 1..10 {
+                let mut damaged = bytes.clone();
+                damaged[at + 8 * counter..][..8].copy_from_slice(&(1_u64 << 40).to_le_bytes());
+                std::fs::write(&path, damaged).unwrap();
+                let error = read(&path).unwrap_err().to_string();
+                assert!(error.contains("announces more"), "{compression:?}, {counter}: {error}");
             }
         }
     }
