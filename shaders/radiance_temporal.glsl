@@ -26,7 +26,7 @@ const float SHARP_ROUGHNESS = 0.04;
 const float BLUR_WEIGHT = 0.1;
 // Strength with which a change of view shortens histories of what is not reflected diffusely: change of the signal, relative to it, where the view turns by the width of the lobe.
 const float TURN_WEIGHT = 8.0;
-// Frames for which a history counts that light has changed by as much as the noise of the mean by which that is told.
+// Frames for which a history counts that is off by as much as the noise of the mean which tells that.
 const float CHANGE_TOLERANCE = 4.0;
 // Pixels with samples below which nothing is known of that, and frames for which a history counts there.
 const float FEW_PIXELS = 4.0;
@@ -95,16 +95,16 @@ vec3 clamped(RadianceTemporalParams p, FrameParams f, uvec2 image, uvec2 pixel, 
     return clamp(history, mean - width, mean + width);
 }
 
-// For how many frames a history counts after lights or materials have changed: its bias b is what the mean of all differences nearby between this frame's samples and histories has beyond its
-// noise e, and it counts as often as that mean may be wrong for as much, e / b^2. The noise is that of the differences, or that of the samples before where it is more: all samples of rare light may miss it. `moved`: pixels from a pixel to where its history is.
-float frames_worth(FrameParams f, uvec2 image, uvec2 previous, uvec2 pixel, ivec2 moved, EdgeTest edge) {
+// For how many frames a history counts after lights or materials have changed: CHANGE_TOLERANCE e / b^2. The bias b is the mean of the differences between this frame's samples and histories in the pixels nearby, without what
+// the noise e of that mean explains. The noise is that of the differences, or what the variance of earlier samples leads to expect where that is more: where light is rare, all samples of a frame may miss it. `motion`: pixels from a pixel to where its history is.
+float frames_worth(FrameParams f, uvec2 image, uvec2 previous, uvec2 pixel, ivec2 motion, EdgeTest edge) {
     vec3 sum = vec3(0.0), squares = vec3(0.0), variance = vec3(0.0);
     float n = 0.0;
-    ivec2 last = ivec2(f.size) - 1, lower = max(ivec2(pixel) - CLAMP_RADIUS, max(-moved, ivec2(0))), upper = min(ivec2(pixel) + CLAMP_RADIUS, min(last - moved, last));
+    ivec2 last = ivec2(f.size) - 1, lower = max(ivec2(pixel) - CLAMP_RADIUS, max(-motion, ivec2(0))), upper = min(ivec2(pixel) + CLAMP_RADIUS, min(last - motion, last));
     for (int y = lower.y; y <= upper.y; y++) {
         for (int x = lower.x; x <= upper.x; x++) {
             uint tap = image_index(f, uvec2(x, y));
-            RadianceEstimate now = load_radiance(image, tap), then = load_radiance(previous, image_index(f, uvec2(ivec2(x, y) + moved)));
+            RadianceEstimate now = load_radiance(image, tap), then = load_radiance(previous, image_index(f, uvec2(ivec2(x, y) + motion)));
             if (now.samples == 0.0 || then.samples == 0.0 || !same_surface(edge, vec2(ivec2(x, y) - ivec2(pixel)), LOAD_PAIR(f.guide, tap))) continue;
             vec3 difference = now.mean - then.mean;
             sum += difference;
@@ -116,9 +116,9 @@ float frames_worth(FrameParams f, uvec2 image, uvec2 previous, uvec2 pixel, ivec
     if (n < FEW_PIXELS) return UNKNOWN_FRAMES;
     vec3 mean = sum / n;
     float noise = dot(max(squares / n - mean * mean, variance / n), vec3(1.0 / n));
-    float bias = dot(mean, mean) - noise;
+    float squared_bias = dot(mean, mean) - noise;
     // also of equal values without noise, and of squares beyond what floats hold
-    return bias > 0.0 ? CHANGE_TOLERANCE * noise / bias : INFINITY;
+    return squared_bias > 0.0 ? CHANGE_TOLERANCE * noise / squared_bias : INFINITY;
 }
 
 // The share of a history that is older than the samples at rest.
@@ -192,12 +192,12 @@ void main() {
         vec3 before = is_null(f.previous_position) ? position : load_vec3(f.previous_position, at);
         uint id = guide.y >> 24;
         vec2 place, shift = f.previous_offset - f.offset;
-        ivec2 diffuse_moved = ivec2(0), specular_moved = ivec2(0);
+        ivec2 diffuse_motion = ivec2(0), specular_motion = ivec2(0);
         if (previous_place(f, before, place)) {
             EdgeTest edge = with_normal(previous_edge(f, before, normal, place), guide);
             Taps taps = taps_around(f, place + shift, place, edge, id);
             diffuse = less_blurred(f, history_at(p.previous_diffuse, taps), place + shift);
-            diffuse_moved = to_int(round(place + shift)) - ivec2(pixel);
+            diffuse_motion = to_int(round(place + shift)) - ivec2(pixel);
             float reflected = FloatImage(p.distances).v[at];
             if (roughness < MIRROR_ROUGHNESS && reflected >= 0.0) {
                 vec3 eye = vec3(f.camera_to_world[0].w, f.camera_to_world[1].w, f.camera_to_world[2].w);
@@ -209,13 +209,13 @@ void main() {
                 place = there;
             }
             specular = less_blurred(f, history_at(p.previous_specular, taps), place + shift);
-            specular_moved = to_int(round(place + shift)) - ivec2(pixel);
+            specular_motion = to_int(round(place + shift)) - ivec2(pixel);
         }
         EdgeTest edge = with_normal(edge_test(f, f.world_to_camera, f.view, f.orthographic != 0u, position, normal, sample_place(f, vec2(pixel))), guide);
         if (p.most_past < INFINITY) {
             float samples = float(f.rays_per_pixel);
-            if (diffuse.samples > 0.0) diffuse.samples = min(diffuse.samples, samples * frames_worth(f, p.diffuse, p.previous_diffuse, pixel, diffuse_moved, edge));
-            if (specular.samples > 0.0) specular.samples = min(specular.samples, samples * frames_worth(f, p.specular, p.previous_specular, pixel, specular_moved, edge));
+            if (diffuse.samples > 0.0) diffuse.samples = min(diffuse.samples, samples * frames_worth(f, p.diffuse, p.previous_diffuse, pixel, diffuse_motion, edge));
+            if (specular.samples > 0.0) specular.samples = min(specular.samples, samples * frames_worth(f, p.specular, p.previous_specular, pixel, specular_motion, edge));
         }
         float change = p.moved_count > 0u ? p.moved_weight * possible_change(p.moved, p.moved_count, f, position, normal) : 0.0;
         if (change > 0.0 && diffuse.samples > 0.0) {

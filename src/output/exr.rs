@@ -303,16 +303,16 @@ fn most_of_byte(compression: Compression, samples: SampleType) -> u64 {
     }
 }
 
-/// Blocks of the methods DWAA and DWAB begin with eleven numbers of 64 bits, of which the second to the tenth say how many bytes and values follow; the decoder takes memory for as many. `Err(None)` where
-/// that is more than the pixels of the block can have.
-fn check_announced(file: File, meta: &MetaData) -> std::result::Result<(), Option<exr::error::Error>> {
-    let is_announced = |h: &Header| matches!(h.compression, Compression::DWAA(_) | Compression::DWAB(_));
-    if !meta.headers.iter().any(is_announced) {
-        return Ok(());
+/// Whether a block has more in its header than its pixels can. Blocks of the methods DWAA and DWAB begin with eleven numbers of 64 bits, of which the second to the tenth are numbers of bytes and values;
+/// the decoder takes memory for as many.
+fn has_block_that_is_too_large(file: File, meta: &MetaData) -> exr::error::Result<bool> {
+    let has_sizes = |h: &Header| matches!(h.compression, Compression::DWAA(_) | Compression::DWAB(_));
+    if !meta.headers.iter().any(has_sizes) {
+        return Ok(false);
     }
     for chunk in exr::block::read(BufReader::new(file), false)?.all_chunks(false)? {
         let chunk = chunk?;
-        let Some(header) = meta.headers.get(chunk.layer_index).filter(|h| is_announced(h)) else { continue };
+        let Some(header) = meta.headers.get(chunk.layer_index).filter(|h| has_sizes(h)) else { continue };
         let (size, bytes) = match &chunk.compressed_block {
             CompressedBlock::ScanLine(block) => {
                 let from_top = block.y_coordinate.saturating_sub(header.own_attributes.layer_position.1).max(0) as usize;
@@ -331,12 +331,12 @@ fn check_announced(file: File, meta: &MetaData) -> std::result::Result<(), Optio
         // cosine transforms are of 8 x 8 pixels; of four bytes a value, and what deflating adds where nothing is gained
         let values = (size.0.next_multiple_of(8) * size.1.next_multiple_of(8) * header.channels.list.len()) as u64;
         let most = 8 * values + 4096;
-        let mut announced = bytes.chunks_exact(8).take(10).skip(1);
-        if announced.any(|b| b.try_into().map_or(u64::MAX, u64::from_le_bytes) > most) {
-            return Err(None);
+        let mut sizes = bytes.chunks_exact(8).take(10).skip(1);
+        if sizes.any(|b| b.try_into().map_or(u64::MAX, u64::from_le_bytes) > most) {
+            return Ok(true);
         }
     }
-    Ok(())
+    Ok(false)
 }
 
 fn decode(path: &Path) -> Result<Image> {
@@ -358,10 +358,9 @@ fn decode(path: &Path) -> Result<Image> {
     if meta.headers.iter().map(least_bytes).sum::<u64>() > bytes {
         return Err(Error::input(path, format!("not a readable EXR: {bytes} bytes are too few for what its header says")));
     }
-    check_announced(open()?, &meta).map_err(|e| {
-        let announces_too_much = || Error::input(path, "not a readable EXR: a block announces more than its pixels can have");
-        e.map_or_else(announces_too_much, broken)
-    })?;
+    if has_block_that_is_too_large(open()?, &meta).map_err(broken)? {
+        return Err(Error::input(path, "not a readable EXR: the header of a block has more than its pixels can"));
+    }
     let reader = exr::prelude::read().no_deep_data().largest_resolution_level().all_channels().all_layers().all_attributes();
     // a panic in one of the decoder's threads would end the process: what decoders of these methods do to damaged blocks is not checked
     let is_simple = |h: &Header| {
@@ -490,7 +489,7 @@ mod tests {
                 damaged[at + 8 * counter..][..8].copy_from_slice(&(1_u64 << 40).to_le_bytes());
                 std::fs::write(&path, damaged).unwrap();
                 let error = read(&path).unwrap_err().to_string();
-                assert!(error.contains("announces more"), "{compression:?}, {counter}: {error}");
+                assert!(error.contains("more than its pixels can"), "{compression:?}, {counter}: {error}");
             }
         }
     }

@@ -73,7 +73,7 @@ pub struct Frame<'a> {
 impl Frame<'_> {
     /// Lights or materials have changed.
     pub fn has_new_light(&self) -> bool {
-        self.most_past < f32::MAX
+        self.most_past.is_finite()
     }
 }
 

@@ -445,8 +445,8 @@ impl Realtime {
             && (is_long || !rest_starts || !self.state.has_resolved || only_light_is_new);
         let offset = match self.settings.antialias {
             // what is known of surfaces is of the last frame whose samples lay at one place
-            true if only_light_is_new && spreads => self.state.offset,
-            true if still && (spreads || is_long && !self.is_radiance) => self.state.offset,
+            true if spreads && (still || only_light_is_new) => self.state.offset,
+            true if still && is_long && !self.is_radiance => self.state.offset,
             true => sample_offset(self.state.frame),
             false => [0.0; 2],
         };
