@@ -5,6 +5,8 @@
 //! are halves. A row is sampled by its weight, then a patch of the row by its own, both by inversion. The remainder of each number
 //! then samples the bilinear function within the patch, which preserves stratification.
 
+use rayon::prelude::*;
+
 /// Cumulative distribution of the rows, and of the patches in each row.
 #[derive(Clone, Debug, Default)]
 pub struct BilinearDistribution {
@@ -14,40 +16,41 @@ pub struct BilinearDistribution {
 }
 
 impl BilinearDistribution {
-    /// Builds the distribution of texel values, finite and not negative, rows from the pole at +y.
-    pub fn new(width: usize, height: usize, values: &[f64]) -> Self {
-        let at = |x: usize, y: isize| values[y.clamp(0, height as isize - 1) as usize * width + x % width];
-        let mut rows = Vec::with_capacity(height + 1);
-        let mut columns = Vec::with_capacity((height + 1) * (width + 1));
-        for row in 0..=height {
-            let weights: Vec<f64> = (0..width)
-                .map(|x| {
-                    let [above, below] = [row as isize - 1, row as isize];
-                    0.25 * (at(x, above) + at(x + 1, above) + at(x, below) + at(x + 1, below))
-                })
-                .collect();
+    /// Builds the distribution of texel values, finite and not negative: `texels(y, out)` writes the `width` values of row `y`, rows from the pole at +y. It is asked for each row
+    /// twice, by several threads: values that are cheap to compute need not be kept, of which a map of 16384x8192 texels has a gigabyte.
+    pub fn new(width: usize, height: usize, texels: impl Fn(usize, &mut [f64]) + Sync) -> Self {
+        let mut table = vec![0.0; height + 2 + (height + 1) * (width + 1)];
+        let (starts, columns) = table.split_at_mut(height + 2);
+        let row_of = |row: usize, [above, below, weights]: &mut [Vec<f64>; 3], out: &mut [f32]| {
+            texels(row.saturating_sub(1), above);
+            texels(row.min(height - 1), below);
+            for (x, weight) in weights.iter_mut().enumerate() {
+                let next = if x + 1 < width { x + 1 } else { 0 };
+                *weight = 0.25 * (above[x] + above[next] + below[x] + below[next]);
+            }
+            write_intervals(out, weights);
             // weighted by the solid angle between the centers of two rows of texels
             let cos = |y: f64| (y.clamp(0.0, height as f64) / height as f64 * std::f64::consts::PI).cos();
-            rows.push(weights.iter().sum::<f64>() * (cos(row as f64 - 0.5) - cos(row as f64 + 0.5)));
-            push_intervals(&mut columns, &weights);
-        }
-        let mut table = Vec::with_capacity(height + 2 + columns.len());
-        push_intervals(&mut table, &rows);
-        table.extend(columns);
+            weights.iter().sum::<f64>() * (cos(row as f64 - 0.5) - cos(row as f64 + 0.5))
+        };
+        let scratch = || [(); 3].map(|()| vec![0.0; width]);
+        let rows = columns.par_chunks_exact_mut(width + 1).enumerate();
+        let rows: Vec<f64> = rows.map_init(scratch, |scratch, (row, out)| row_of(row, scratch, out)).collect();
+        write_intervals(starts, &rows);
         Self { table }
     }
 }
 
-/// Appends the start of each interval, and 1. Without any weight all intervals are equal.
-fn push_intervals(table: &mut Vec<f32>, weights: &[f64]) {
+/// Writes the start of each interval, and 1. Without any weight all intervals are equal.
+fn write_intervals(table: &mut [f32], weights: &[f64]) {
     let total: f64 = weights.iter().sum();
     let mut sum = 0.0;
-    for (k, weight) in weights.iter().enumerate() {
+    for (k, (start, weight)) in table.iter_mut().zip(weights).enumerate() {
         let begins = if total > 0.0 { sum / total } else { k as f64 / weights.len() as f64 };
-        table.push((begins as f32).min(1.0));
+        *start = (begins as f32).min(1.0);
         sum += weight;
     }
-    table.push(1.0);
+    table[weights.len()] = 1.0;
 }
 
 #[cfg(test)]
@@ -61,7 +64,7 @@ mod tests {
     #[test]
     fn an_even_image_is_even_over_the_sphere() {
         let (w, h) = (8, 4);
-        let patches = BilinearDistribution::new(w, h, &vec![3.0; w * h]);
+        let patches = BilinearDistribution::new(w, h, |_, out| out.fill(3.0));
         assert_eq!(patches.table.len(), h + 2 + (h + 1) * (w + 1));
         let rows = widths(&patches.table[..h + 2]);
         for (row, width) in rows.iter().enumerate() {
@@ -80,7 +83,7 @@ mod tests {
         let (w, h) = (4, 3);
         let mut values = vec![0.0; w * h];
         values[w + 3] = 1.0;
-        let patches = BilinearDistribution::new(w, h, &values);
+        let patches = BilinearDistribution::new(w, h, |y, out| out.copy_from_slice(&values[y * w..][..w]));
         let rows = widths(&patches.table[..h + 2]);
         // rows of patches above and below the middle one of three rows of texels, and none at the poles
         assert_eq!((rows[0], rows[3]), (0.0, 0.0));
@@ -91,6 +94,6 @@ mod tests {
             assert_eq!(widths(&patches.table[first..first + w + 1]), [0.0, 0.0, 0.5, 0.5]);
         }
         // nothing at all: no interval is broken
-        assert!(BilinearDistribution::new(2, 1, &[0.0; 2]).table.iter().all(|v| (0.0..=1.0).contains(v)));
+        assert!(BilinearDistribution::new(2, 1, |_, out| out.fill(0.0)).table.iter().all(|v| (0.0..=1.0).contains(v)));
     }
 }

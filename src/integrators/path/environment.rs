@@ -3,11 +3,12 @@
 use std::sync::Arc;
 
 use glam::{DMat3, Vec3};
+use rayon::prelude::*;
 
 use super::lights::brightness;
 use super::params::EnvironmentRecord;
 use crate::error::Result;
-use crate::gpu::{Buffer, Device};
+use crate::gpu::{Buffer, Device, Memory};
 use crate::sampling::BilinearDistribution;
 use crate::scene::{Environment, EnvironmentMap};
 
@@ -31,15 +32,22 @@ impl DeviceEnvironment {
             Environment::Map(map) => map,
         };
         let (width, height) = (map.width as usize, map.height as usize);
-        let mut weights: Vec<f64> = map.radiance.iter().map(|c| brightness(*c)).collect();
-        if compensated {
-            let mean = mean(map, &weights);
-            compensate(&mut weights, mean);
-        }
-        let distribution = BilinearDistribution::new(width, height, &weights);
-        let texels: Vec<[f32; 4]> = map.radiance.iter().zip(&weights).map(|(c, &l)| c.extend(l as f32).to_array()).collect();
-        let texels = Buffer::from_slice(device, "environment", &texels)?;
+        let totals = Totals::of(map);
+        let subtracted = if compensated { totals.compensation() } else { 0.0 };
+        // computed again where it is needed: the weights of all texels would be a gigabyte of a large map
+        let weight = |c: &Vec3| if subtracted > 0.0 { (brightness(*c) - subtracted).max(0.0) } else { brightness(*c) };
+        let distribution = BilinearDistribution::new(width, height, |y, out| {
+            out.iter_mut().zip(&map.radiance[y * width..][..width]).for_each(|(w, c)| *w = weight(c));
+        });
         let table = Buffer::from_slice(device, "environment distribution", &distribution.table)?;
+        drop(distribution);
+        let bytes = size_of::<[f32; 4]>() as u64;
+        let mut texels = Buffer::new(device, "environment", bytes * map.radiance.len() as u64, Memory::Device)?;
+        texels.fill(texels.size(), bytes, |first, out| {
+            let out: &mut [[f32; 4]] = bytemuck::cast_slice_mut(out);
+            let radiance = &map.radiance[first as usize..][..out.len()];
+            out.par_iter_mut().zip(radiance).for_each(|(texel, c)| *texel = c.extend(weight(c) as f32).to_array());
+        })?;
         let record = EnvironmentRecord {
             texels: texels.address(),
             table: table.address(),
@@ -48,7 +56,7 @@ impl DeviceEnvironment {
             to_map: rows(&map.to_map),
             ..Default::default()
         };
-        Ok(Self { map: record, factor: map.factor, mean: mean_radiance(map) * map.factor, _buffers: vec![texels, table] })
+        Ok(Self { map: record, factor: map.factor, mean: totals.mean_radiance * map.factor, _buffers: vec![texels, table] })
     }
 }
 
@@ -57,49 +65,69 @@ pub(super) fn rows(m: &DMat3) -> [[f32; 4]; 3] {
     [0, 1, 2].map(|k| [m.x_axis[k] as f32, m.y_axis[k] as f32, m.z_axis[k] as f32, 0.0])
 }
 
-/// Subtracts the mean over the sphere from the weights and clamps at 0: "MIS compensation" (Karlik, Sik, Vevoda, Skrivan, Krivanek, SIGGRAPH Asia 2019, section
-/// 5). Directions below the mean are left to BSDF sampling, which knows the surface. A constant map keeps its weights.
-fn compensate(weights: &mut [f64], mean: f64) {
-    if weights.iter().any(|&w| w > mean * 1.0001) {
-        weights.iter_mut().for_each(|w| *w = (*w - mean).max(0.0));
-    }
+/// What is known of a map as a whole.
+struct Totals {
+    /// Radiance averaged over the sphere.
+    mean_radiance: Vec3,
+    /// Importance ([`brightness`]) averaged over the sphere, and the largest.
+    mean: f64,
+    most: f64,
 }
 
-/// Radiance averaged over the sphere.
-fn mean_radiance(map: &EnvironmentMap) -> Vec3 {
-    let channel = |k: usize| mean(map, &map.radiance.iter().map(|c| f64::from(c[k])).collect::<Vec<_>>()) as f32;
-    Vec3::new(channel(0), channel(1), channel(2))
-}
-
-/// Mean of the texels' values over the sphere.
-fn mean(map: &EnvironmentMap, values: &[f64]) -> f64 {
-    let (mut sum, mut total) = (0.0, 0.0);
-    for (y, row) in values.chunks_exact(map.width as usize).enumerate() {
-        let sin = ((y as f64 + 0.5) / f64::from(map.height) * std::f64::consts::PI).sin();
-        sum += row.iter().sum::<f64>() * sin;
-        total += row.len() as f64 * sin;
+impl Totals {
+    fn of(map: &EnvironmentMap) -> Self {
+        let rows: Vec<[f64; 5]> = (map.radiance.par_chunks_exact(map.width as usize))
+            .map(|row| {
+                row.iter().fold([0.0; 5], |[r, g, b, sum, most], c| {
+                    let (importance, [x, y, z]) = (brightness(*c), c.as_dvec3().to_array());
+                    [r + x, g + y, b + z, sum + importance, importance.max(most)]
+                })
+            })
+            .collect();
+        let (mut sums, mut total, mut most) = ([0.0; 4], 0.0, 0.0f64);
+        for (y, row) in rows.iter().enumerate() {
+            let sin = ((y as f64 + 0.5) / f64::from(map.height) * std::f64::consts::PI).sin();
+            sums.iter_mut().zip(row).for_each(|(sum, value)| *sum += value * sin);
+            total += f64::from(map.width) * sin;
+            most = most.max(row[4]);
+        }
+        let [r, g, b, mean] = sums.map(|sum| sum / total.max(1e-300));
+        Self { mean_radiance: Vec3::new(r as f32, g as f32, b as f32), mean, most }
     }
-    sum / total.max(1e-300)
+
+    /// What light samples leave to BSDF samples of each texel's importance, the mean: "MIS compensation" (Karlik, Sik, Vevoda, Skrivan, Krivanek, SIGGRAPH Asia 2019, section 5).
+    /// Directions below it are left to BSDF sampling, which knows the surface. A constant map keeps its weights.
+    fn compensation(&self) -> f64 {
+        if self.most > self.mean * 1.0001 { self.mean } else { 0.0 }
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    fn map(width: u32, radiance: &[Vec3]) -> EnvironmentMap {
+        EnvironmentMap {
+            name: String::new(),
+            width,
+            height: radiance.len() as u32 / width,
+            radiance: radiance.into(),
+            factor: Vec3::ONE,
+            to_map: DMat3::IDENTITY,
+        }
+    }
+
     #[test]
     fn what_is_above_the_mean_is_left_to_light_samples() {
-        let mut weights = vec![1.0, 1.0, 1.0, 9.0];
-        compensate(&mut weights, 3.0);
-        assert_eq!(weights, [0.0, 0.0, 0.0, 6.0]);
+        let compensation = |values: &[f32]| {
+            let radiance: Vec<Vec3> = values.iter().map(|v| Vec3::splat(*v)).collect();
+            Totals::of(&map(2, &radiance)).compensation()
+        };
+        assert!((compensation(&[1.0, 1.0, 1.0, 9.0]) - 3.0).abs() < 1e-6);
         // a constant map is nowhere above its mean, whatever the rounding
-        for even in [vec![2.0; 4], vec![2.0, 2.0, 2.0, 2.0 + 1e-6]] {
-            let mut weights = even.clone();
-            compensate(&mut weights, 2.0);
-            assert_eq!(weights, even);
-        }
-        let mut black = vec![0.0; 4];
-        compensate(&mut black, 0.0);
-        assert_eq!(black, [0.0; 4]);
+        assert_eq!(compensation(&[2.0; 4]), 0.0);
+        assert_eq!(compensation(&[2.0, 2.0, 2.0, 2.0 + 1e-6]), 0.0);
+        assert_eq!(compensation(&[0.0; 4]), 0.0);
     }
 
     #[test]
@@ -107,17 +135,10 @@ mod tests {
         // rows at the poles are small
         let radiance: Vec<Vec3> =
             (0..8).map(|k| if (2..6).contains(&k) { Vec3::ONE } else { Vec3::new(0.0, 2.0, 1.0) }).collect();
-        let map = EnvironmentMap {
-            name: String::new(),
-            width: 2,
-            height: 4,
-            radiance: radiance.into(),
-            factor: Vec3::ONE,
-            to_map: glam::DMat3::IDENTITY,
-        };
+        let map = map(2, &radiance);
         let share = (0.375f64 * std::f64::consts::PI).sin()
             / ((0.125f64 * std::f64::consts::PI).sin() + (0.375f64 * std::f64::consts::PI).sin());
-        let mean = mean_radiance(&map);
+        let mean = Totals::of(&map).mean_radiance;
         assert!(
             (f64::from(mean.x) - share).abs() < 1e-6
                 && (f64::from(mean.y) - (2.0 - share)).abs() < 1e-6

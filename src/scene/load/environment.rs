@@ -3,6 +3,7 @@
 mod cube;
 
 use std::path::Path;
+use std::sync::Arc;
 
 use glam::{DMat3, Vec3};
 use image::{ImageFormat, ImageReader, Limits};
@@ -18,7 +19,8 @@ const MAX_SIDE: u32 = 16384;
 struct Pixels {
     width: u32,
     height: u32,
-    radiance: Vec<Vec3>,
+    /// What a map keeps, so that nothing is copied: a map of 16384x8192 has 1.6 GB.
+    radiance: Arc<[Vec3]>,
 }
 
 /// Reads an environment: an equirectangular image, or a folder that holds the faces of a cube as `px`, `nx`, `py`, `ny`, `pz`, `nz` (.hdr, .exr, .png, .jpg). Colours
@@ -32,7 +34,7 @@ pub fn load_environment(path: &Path) -> Result<EnvironmentMap> {
         name: path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default(),
         width,
         height,
-        radiance: radiance.into(),
+        radiance,
         factor: Vec3::ONE,
         to_map: DMat3::IDENTITY,
     })
@@ -46,7 +48,9 @@ fn read(path: &Path) -> Result<Pixels> {
         let (x, y) = (k as u32 % pixels.width, k as u32 / pixels.width);
         return Err(Error::input(path, format!("pixel {x}, {y} is not finite: an environment must be")));
     }
-    pixels.radiance.iter_mut().for_each(|c| *c = c.max(Vec3::ZERO));
+    if pixels.radiance.iter().any(|c| c.min_element() < 0.0) {
+        pixels.radiance = pixels.radiance.iter().map(|c| c.max(Vec3::ZERO)).collect();
+    }
     Ok(pixels)
 }
 
@@ -60,8 +64,9 @@ fn read_hdr(path: &Path) -> Result<Pixels> {
     limits.max_alloc = Some(4 << 30);
     reader.limits(limits);
     let image = reader.decode().map_err(bad)?.into_rgb32f();
-    let radiance = image.pixels().map(|p| Vec3::from_array(p.0)).collect();
-    Ok(Pixels { width: image.width(), height: image.height(), radiance })
+    let (width, height) = image.dimensions();
+    let radiance = image.into_raw().chunks_exact(3).map(Vec3::from_slice).collect();
+    Ok(Pixels { width, height, radiance })
 }
 
 fn read_exr(path: &Path) -> Result<Pixels> {

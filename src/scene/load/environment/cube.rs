@@ -99,7 +99,7 @@ mod tests {
     #[test]
     fn directions_find_their_faces() {
         let faces: Vec<Pixels> =
-            (0..6).map(|k| Pixels { width: 4, height: 4, radiance: vec![Vec3::splat(k as f32); 16] }).collect();
+            (0..6).map(|k| Pixels { width: 4, height: 4, radiance: vec![Vec3::splat(k as f32); 16].into() }).collect();
         let axes = [DVec3::X, DVec3::NEG_X, DVec3::Y, DVec3::NEG_Y, DVec3::Z, DVec3::NEG_Z];
         for (k, axis) in axes.into_iter().enumerate() {
             assert_eq!(look_up(&faces, (axis + DVec3::new(0.1, 0.2, -0.15)).normalize()).x, k as f32);
@@ -116,7 +116,7 @@ mod tests {
     fn faces_are_the_right_way_round() {
         let mut radiance = vec![Vec3::ZERO; 16];
         radiance[0] = Vec3::ONE;
-        let faces: Vec<Pixels> = (0..6).map(|_| Pixels { width: 4, height: 4, radiance: radiance.clone() }).collect();
+        let faces: Vec<Pixels> = (0..6).map(|_| Pixels { width: 4, height: 4, radiance: radiance.clone().into() }).collect();
         assert_eq!(look_up(&faces, DVec3::new(0.9, 0.9, -1.0)).x, 1.0);
         assert_eq!(look_up(&faces, DVec3::new(-0.9, 0.9, 1.0)).x, 1.0);
         assert_eq!(look_up(&faces, DVec3::new(1.0, 0.9, 0.9)).x, 1.0);
