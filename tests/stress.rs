@@ -321,13 +321,16 @@ fn gpu_stress_catches_a_hot_pixel_that_spreads() {
 #[test]
 fn gpu_stress_catches_a_glint_that_lights_quiet_pixels() {
     for filter in [FilterKind::Box, FilterKind::Separable, FilterKind::Atrous] {
-        let moved = |hits: u32| {
-            let mut quiet = Quiet;
-            hot_pixel::beside_glint(&setup(), TracerKind::Compute, filter, hits, &mut Watch::new(&mut quiet)).unwrap()
+        let moved = |hits: u32, detail: f32| {
+            let mut watch = Quiet;
+            let mut watch = Watch::new(&mut watch);
+            hot_pixel::beside_glint(&setup(), TracerKind::Compute, filter, hits, detail, &mut watch).unwrap()
         };
-        let check = hot_pixel::check_beside_glint("glint", moved(hot_pixel::GLINT_HITS));
-        assert_eq!(check.verdict, Verdict::Holds, "{filter} {check:?}");
-        fails(&hot_pixel::check_beside_glint("glint", moved(1)));
+        for detail in [0.0, hot_pixel::GLINT_DETAIL] {
+            let check = hot_pixel::check_beside_glint("glint", moved(hot_pixel::GLINT_HITS, detail));
+            assert_eq!(check.verdict, Verdict::Holds, "{filter} {detail} {check:?}");
+            fails(&hot_pixel::check_beside_glint("glint", moved(1, detail)));
+        }
     }
 }
 

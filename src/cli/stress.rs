@@ -17,6 +17,7 @@ Examples:
   skylit stress                                   # try to break the tracers, sampling, films and filters, in a minute
   skylit stress scene.glb                         # find out what single precision does to a scene of yours
   skylit stress --sections watertight --full      # a hundred million rays at edges
+  skylit stress --checks \"needle fans\"            # one of the checks again
   skylit stress scene.glb --tracer compute --html report";
 
 /// Ends `--help` of the command.
@@ -44,6 +45,9 @@ pub struct StressArgs {
     /// Only these sections, separated by commas: scale, watertight, degenerate, contact, transparency, sampling, long-runs, display, determinism
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     pub sections: Vec<String>,
+    /// Only checks whose name contains this text, as a line of the output has it; may be given several times
+    #[arg(long, value_name = "TEXT")]
+    pub checks: Vec<String>,
     /// Write a report, an HTML page that needs no network, into this folder
     #[cfg(feature = "report")]
     #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath)]
@@ -67,6 +71,7 @@ impl StressArgs {
             scene: self.scene.clone(),
             effort: if self.full { Effort::Full } else { Effort::Quick },
             sections: self.sections.clone(),
+            checks: self.checks.clone(),
             program: std::env::current_exe().ok(),
         })
     }

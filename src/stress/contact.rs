@@ -252,8 +252,9 @@ fn run(session: &mut Session) -> Result<()> {
 
     for (what, scene, normal, point) in slack_planes() {
         let scale = scene.instances[0].object_to_world.matrix3.x_axis.length();
+        let (offset, gap) = (format!("spawn offset: {what}"), format!("gap bridged: {what}"));
         for kind in &kinds {
-            session.measure_all(&format!("spawn offset: {what}"), Some(*kind), |s, w| {
+            session.measure_these(&[&offset, &gap], Some(*kind), |s, w| {
                 let slack = slack(&s.tracer(*kind, &scene)?, &scene, normal, point, 1.0, w)?;
                 let missed = bridged(*kind, s, &scene, normal, 2.0 * slack.largest.max(1e-9 * scale), w)?;
                 let could = match slack.factor {
@@ -262,8 +263,8 @@ fn run(session: &mut Session) -> Result<()> {
                 };
                 let sentence = format!("of the spawned rays; {could}, {:.0} roundings at most", slack.roundings);
                 Ok(vec![
-                    Check::at_most(format!("spawn offset: {what}"), slack.self_hits as f64, "self-hits", 0.0).says(sentence),
-                    Check::at_most(format!("gap bridged: {what}"), slack.largest / scale, "of the scale", GAP * 10.0)
+                    Check::at_most(offset.as_str(), slack.self_hits as f64, "self-hits", 0.0).says(sentence),
+                    Check::at_most(gap.as_str(), slack.largest / scale, "of the scale", GAP * 10.0)
                         .says(format!("the largest offset of a plane of 10 by 10; {missed} rays miss a sheet at twice that")),
                 ])
             })?;

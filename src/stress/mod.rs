@@ -263,6 +263,8 @@ pub struct Options {
     pub effort: Effort,
     /// Names of the sections that run; empty: all.
     pub sections: Vec<String>,
+    /// Only checks whose name contains one of these texts are made; empty: all.
+    pub checks: Vec<String>,
     /// The program, which determinism starts again; `None`: what needs it is not applicable.
     pub program: Option<PathBuf>,
 }
@@ -425,13 +427,19 @@ pub struct Session<'a> {
     setup: Setup,
     observer: &'a mut dyn Observer,
     section: &'static str,
+    /// Parts of names, as in [`Options::checks`].
+    wanted: Vec<String>,
     checks: Vec<Check>,
 }
 
 impl<'a> Session<'a> {
-    /// A session without checks.
+    /// A session that makes all checks, and has made none.
     pub fn new(setup: Setup, observer: &'a mut dyn Observer) -> Self {
-        Self { setup, observer, section: "", checks: Vec::new() }
+        Self { setup, observer, section: "", wanted: Vec::new(), checks: Vec::new() }
+    }
+
+    fn is_wanted(&self, name: &str) -> bool {
+        self.wanted.is_empty() || self.wanted.iter().any(|text| name.contains(text.as_str()))
     }
 
     /// What it measures with.
@@ -449,7 +457,7 @@ impl<'a> Session<'a> {
         Ok(std::mem::take(&mut self.checks))
     }
 
-    /// Makes checks. An error of `measure` is a check that fails.
+    /// Makes checks whose names are only known then, and keeps those that are wanted. An error of `measure` is a check with this name that fails.
     ///
     /// # Errors
     /// Interruption, and a device that was lost.
@@ -471,6 +479,9 @@ impl<'a> Session<'a> {
         };
         let seconds = start.elapsed().as_secs_f64() / checks.len().max(1) as f64;
         for check in checks {
+            if !self.is_wanted(&check.name) {
+                continue;
+            }
             let check = Check { section: self.section, tracer, seconds, ..check };
             self.observer.check(&check)?;
             self.checks.push(check);
@@ -478,7 +489,23 @@ impl<'a> Session<'a> {
         Ok(())
     }
 
-    /// Makes one check.
+    /// Makes checks with these names together, if one of them is wanted.
+    ///
+    /// # Errors
+    /// Those of [`Session::measure_all`].
+    pub fn measure_these(
+        &mut self,
+        names: &[&str],
+        tracer: Option<TracerKind>,
+        measure: impl FnOnce(&Setup, &mut Watch) -> Result<Vec<Check>>,
+    ) -> Result<()> {
+        match names.iter().find(|name| self.is_wanted(name)) {
+            Some(name) => self.measure_all(name, tracer, measure),
+            None => Ok(()),
+        }
+    }
+
+    /// Makes one check, which has this name, if it is wanted.
     ///
     /// # Errors
     /// Those of [`Session::measure_all`].
@@ -488,7 +515,7 @@ impl<'a> Session<'a> {
         tracer: Option<TracerKind>,
         measure: impl FnOnce(&Setup, &mut Watch) -> Result<Check>,
     ) -> Result<()> {
-        self.measure_all(name, tracer, |setup, watch| Ok(vec![measure(setup, watch)?]))
+        self.measure_these(&[name], tracer, |setup, watch| Ok(vec![measure(setup, watch)?]))
     }
 
     /// Makes a check of each of these tracers.
@@ -538,11 +565,12 @@ fn tracers(info: &DeviceInfo, settings: &DeviceSettings) -> Result<Vec<TracerKin
 /// Runs the sections that options name.
 ///
 /// # Errors
-/// [`Error::Usage`] for a section that does not exist or that is about the other kind of scene; those of loading the scene and opening the device; interruption.
+/// [`Error::Usage`] for a section that does not exist or that is about the other kind of scene, and where no check has a name that is wanted; those of loading the scene and opening the device; interruption.
 pub fn run(options: &Options, settings: &DeviceSettings, observer: &mut dyn Observer) -> Result<Summary> {
     let start = Instant::now();
     let sections = sections(options)?;
     let mut session = Session::new(Setup::open(options, settings)?, observer);
+    session.wanted.clone_from(&options.checks);
     let mut checks = Vec::new();
     for (k, section) in sections.iter().enumerate() {
         session.observer.section(section, k, sections.len());
@@ -550,6 +578,10 @@ pub fn run(options: &Options, settings: &DeviceSettings, observer: &mut dyn Obse
         session.setup.device.check_validation()?;
     }
     session.setup.device.save_pipeline_cache();
+    if checks.is_empty() && !options.checks.is_empty() {
+        let texts: Vec<_> = options.checks.iter().map(|text| format!("'{text}'")).collect();
+        return Err(Error::Usage(format!("--checks: no check of these sections has {} in its name", texts.join(" or "))));
+    }
     let info = &session.setup.device.info;
     Ok(Summary {
         schema: SCHEMA,

@@ -51,9 +51,13 @@ pub fn leaks(tracer: &Tracer, rays: &[Ray], control: &mut dyn Control) -> Result
 /// # Errors
 /// Those of tracing.
 pub fn check(tracer: &Tracer, name: &str, rays: &[Ray], control: &mut dyn Control) -> Result<Check> {
-    let [any, closest] = leaks(tracer, rays, control)?;
-    let sentence = format!("of {}; {any} asked for any hit, {closest} for the closest", rays.len());
-    Ok(Check::none_of(name, any.max(closest) as u64, "leaks", tracer.kind() == TracerKind::Compute).says(sentence))
+    Ok(held(tracer.kind(), name, leaks(tracer, rays, control)?, rays.len()))
+}
+
+/// See [`check`]: how many of `rays` leaked, asked for any hit and for the closest.
+fn held(kind: TracerKind, name: &str, [any, closest]: [usize; 2], rays: usize) -> Check {
+    Check::none_of(name, any.max(closest) as u64, "leaks", kind == TracerKind::Compute)
+        .says(format!("of {rays}; {any} asked for any hit, {closest} for the closest"))
 }
 
 fn run(session: &mut Session) -> Result<()> {
@@ -76,24 +80,26 @@ fn run(session: &mut Session) -> Result<()> {
         for (kind, sum) in kinds.iter().zip(&mut sums) {
             session.measure(&name, Some(*kind), |s, w| {
                 let (tracer, each) = (s.tracer(*kind, scene)?, count(*kind) / scenes.len());
-                let mut total: Option<Check> = None;
+                let (mut found, mut asked) = ([0, 0], 0);
                 // in parts, which fit into memory
                 for part in 0..each.div_ceil(PART) {
                     let rays = leak_rays(&oracle, PART.min(each - part * PART), 7 + part as u32);
-                    let check = check(&tracer, &name, &rays, w)?;
-                    *sum = (sum.0 + check.value as u64, sum.1 + rays.len() as u64);
-                    let before = total.as_ref().map_or(0.0, |t| t.value);
-                    let count = (before + check.value) as u64;
-                    let is_ours = *kind == TracerKind::Compute;
-                    total = Some(Check::none_of(name.as_str(), count, "leaks", is_ours).says(check.sentence));
+                    let [any, closest] = leaks(&tracer, &rays, w)?;
+                    found = [found[0] + any, found[1] + closest];
+                    asked += rays.len();
                 }
-                total.map_or_else(|| Ok(Check::not_applicable(name.as_str(), "no rays")), Ok)
+                let check = held(*kind, &name, found, asked);
+                *sum = (sum.0 + check.value as u64, sum.1 + asked as u64);
+                Ok(check)
             })?;
         }
     }
     for (kind, (leaks, rays)) in kinds.iter().zip(sums) {
         let name = "edges and vertices: all";
         session.measure(name, Some(*kind), |_, _| {
+            if rays == 0 {
+                return Ok(Check::not_applicable(name, "none of the checks that it sums up was made"));
+            }
             let is_ours = *kind == TracerKind::Compute;
             Ok(Check::none_of(name, leaks, "leaks", is_ours).says(format!("of {rays} rays")))
         })?;

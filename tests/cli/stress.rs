@@ -12,6 +12,26 @@ fn sections_that_do_not_exist_are_refused() {
 }
 
 #[test]
+fn gpu_checks_are_chosen_by_their_names() {
+    if !device() {
+        return;
+    }
+    fn of<'a>(more: &[&'a str]) -> Vec<&'a str> {
+        [&["stress", "--sections", "display,determinism", "--tracer", "compute"], more].concat()
+    }
+    // the second is compared with an image of a check that is left out
+    let out = run(&of(&["--json", "--checks", "agx", "--checks", "LP_NUM_THREADS=1"]));
+    let record = json(&out);
+    let names: Vec<_> = record["checks"].as_array().unwrap().iter().map(|c| c["name"].as_str().unwrap()).collect();
+    let agx = ["tone map agx is monotone", "tone map agx of NaN, infinity and 1e30"];
+    // of CPU drivers alone
+    let threads = ["LP_NUM_THREADS=1"];
+    assert!(names[..2] == agx && (names.len() == 2 || names[2..] == threads), "{names:?}");
+    assert_eq!(out.status.code(), Some(0), "{record}");
+    refuses(&of(&["--checks", "no such check"]), 64, "'no such check' in its name");
+}
+
+#[test]
 fn gpu_a_scene_is_examined() {
     if !device() {
         return;
