@@ -8,7 +8,7 @@
 //! has its own cache folder, and the file names of the pipeline cache contain the width (`cache.rs`).
 
 use std::ffi::{OsStr, OsString};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Once;
 use std::sync::atomic::{AtomicU32, Ordering};
 
@@ -36,7 +36,15 @@ pub(super) fn prepare() {
         if is_loaded() {
             return;
         }
-        let changes = changes(std::env::var_os(WIDTH), std::env::var_os(CACHE), preferred_bits(), crate::files::cache_folder());
+        let (cache, folder) = (std::env::var_os(CACHE), crate::files::cache_folder());
+        let mut changes = changes(std::env::var_os(WIDTH), cache.clone(), preferred_bits(), folder.clone());
+        if changes.is_empty() {
+            // the driver's own width, and its own cache, beside ours
+            let base = cache.map(PathBuf::from).or_else(|| folder.and_then(|f| f.parent().map(Path::to_path_buf)));
+            if base.is_some_and(|base| !can_hold_default_cache(&base)) {
+                changes.push((NO_CACHE, "true".into()));
+            }
+        }
         for (mut name, mut value) in changes {
             if name == CACHE {
                 // older versions of Mesa create only the last folder of the path
@@ -53,6 +61,15 @@ pub(super) fn prepare() {
             unsafe { std::env::set_var(name, value) };
         }
     });
+}
+
+/// Whether Mesa can write its shader cache below a folder: it would print a line otherwise, for either of the two folders that its versions use.
+fn can_hold_default_cache(base: &Path) -> bool {
+    let is_writable = |name: &str| {
+        let folder = base.join(name);
+        crate::files::check_writable(&if folder.is_dir() { folder.join("any") } else { base.join("any") }).is_ok()
+    };
+    std::fs::create_dir_all(base).is_ok() && ["mesa_shader_cache", "mesa_shader_cache_db"].into_iter().all(is_writable)
 }
 
 /// The vector width to request if the user has set none; `None` for the driver's default.
@@ -125,5 +142,19 @@ mod tests {
         // a program that one of us has started changes nothing
         assert_eq!(of(Some("512"), Some("/c/mesa-512"), Some(512)), []);
         assert!(changes(None, None, Some(512), None).is_empty());
+    }
+
+    #[test]
+    fn a_cache_that_cannot_be_written_is_known() {
+        let dir = tempfile::tempdir().unwrap();
+        assert!(can_hold_default_cache(&dir.path().join("missing/.cache")));
+        // files where folders should be, of the cache itself and of what is above it
+        std::fs::write(dir.path().join("file"), "").unwrap();
+        assert!(!can_hold_default_cache(&dir.path().join("file")));
+        assert!(!can_hold_default_cache(&dir.path().join("file/.cache")));
+        // what is there already is asked itself
+        std::fs::create_dir(dir.path().join("mesa_shader_cache_db")).unwrap();
+        assert!(can_hold_default_cache(dir.path()));
+        assert_eq!(std::fs::read_dir(dir.path().join("mesa_shader_cache_db")).unwrap().count(), 0);
     }
 }
