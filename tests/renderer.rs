@@ -74,8 +74,7 @@ fn gpu_a_still_of_pixel_centres_is_the_image_that_frames_approach() {
     assert_validation_clean(&device);
 }
 
-/// A renderer keeps its pipelines. Of what it has made once, only small passes that go with their still are compiled again: that which adds samples to a film, and, where camera rays
-/// have entry points, which depends on the width of vectors, that which finds them.
+/// A renderer keeps its pipelines. Of what it has made once, only the pass that adds samples to a film, which goes with its still, is compiled again.
 #[test]
 fn gpu_pipelines_are_compiled_once() {
     // of its own: what other tests compile would be counted
@@ -89,7 +88,7 @@ fn gpu_pipelines_are_compiled_once() {
     let first = [compiled("path"), compiled("ao")];
     assert!(first[0] < first[1], "{first:?}");
     let again = [compiled("path"), compiled("ao")];
-    assert!(first[0] > 4 && again[0] <= first[1] + 2 && again[1] <= again[0] + 2, "{first:?} {again:?}");
+    assert!(first[0] > 4 && again[0] <= first[1] + 1 && again[1] <= again[0] + 1, "{first:?} {again:?}");
     drop(renderer);
     assert_validation_clean(&device);
 }

@@ -33,7 +33,7 @@ impl EntryPoints {
         let bundles = u64::from(rays >> (least + BUNDLE_BITS)) + 2;
         Ok(Some(Self {
             lists: Buffer::new(device, "entry points", u64::from(ENTRY_LIST_BYTES) * bundles, Memory::Device)?,
-            pass: shaders::ENTRY_POINTS.pipeline(device)?,
+            pass: tracer.entry_pass()?,
             sample_bits: least,
         }))
     }

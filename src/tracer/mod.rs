@@ -42,7 +42,7 @@ use crate::accel::features::SceneFeatures;
 use crate::accel::flatten::FlatScene;
 use crate::error::{Error, Result};
 use crate::gpu::{ComputePipeline, Device, Specialization};
-use crate::shaders::{ComputeShader, Mode, StreamShaders};
+use crate::shaders::{self, ComputeShader, Mode, StreamShaders};
 use gpu_scene::GpuScene;
 use precompiled::{PipelineSpec, PrecompiledPipelines};
 
@@ -97,6 +97,8 @@ pub struct Tracer {
     dynamic: Option<Box<dynamic::Dynamic>>,
     // by mode
     kernels: [OnceLock<Arc<ComputePipeline>>; 2],
+    // of [`entry_points`]
+    entry_pass: OnceLock<ComputePipeline>,
     prepared: PrecompiledPipelines,
     // compiled streams, so that rendering twice compiles once
     streams: Mutex<Vec<(Specialization, Stream)>>,
@@ -198,6 +200,7 @@ impl Tracer {
             stats,
             dynamic: dynamic::Dynamic::new(flat).map(Box::new),
             kernels: Default::default(),
+            entry_pass: OnceLock::new(),
             streams: Default::default(),
             prepared,
         })
@@ -351,6 +354,15 @@ impl Tracer {
     /// The TLAS instances for rasterization, as they are since the last [`Tracer::update`].
     pub fn raster_instances(&self) -> impl Iterator<Item = RasterInstance<'_>> {
         self.scene.raster_instances()
+    }
+
+    /// The pass that finds entry points, compiled once for all images.
+    fn entry_pass(&self) -> Result<ComputePipeline> {
+        if let Some(pass) = self.entry_pass.get() {
+            return Ok(pass.clone());
+        }
+        let pass = shaders::ENTRY_POINTS.pipeline(&self.device)?;
+        Ok(self.entry_pass.get_or_init(|| pass).clone())
     }
 
     /// The fast kernel, compiled once for all streams of a mode.

@@ -35,7 +35,7 @@ impl DeviceEnvironment {
         let totals = Totals::of(map);
         let subtracted = if compensated { totals.compensation() } else { 0.0 };
         // computed again where it is needed: the weights of all texels would be a gigabyte of a large map
-        let weight = |c: &Vec3| if subtracted > 0.0 { (brightness(*c) - subtracted).max(0.0) } else { brightness(*c) };
+        let weight = |c: &Vec3| weight(brightness(*c), subtracted);
         let distribution = BilinearDistribution::new(width, height, |y, out| {
             out.iter_mut().zip(&map.radiance[y * width..][..width]).for_each(|(w, c)| *w = weight(c));
         });
@@ -63,6 +63,11 @@ impl DeviceEnvironment {
 /// A rotation as shaders read it.
 pub(super) fn rows(m: &DMat3) -> [[f32; 4]; 3] {
     [0, 1, 2].map(|k| [m.x_axis[k] as f32, m.y_axis[k] as f32, m.z_axis[k] as f32, 0.0])
+}
+
+/// What light samples go by: a texel's importance without what they leave to BSDF samples ([`Totals::compensation`]).
+fn weight(importance: f64, subtracted: f64) -> f64 {
+    (importance - subtracted).max(0.0)
 }
 
 /// What is known of a map as a whole.
@@ -119,15 +124,16 @@ mod tests {
 
     #[test]
     fn what_is_above_the_mean_is_left_to_light_samples() {
-        let compensation = |values: &[f32]| {
-            let radiance: Vec<Vec3> = values.iter().map(|v| Vec3::splat(*v)).collect();
-            Totals::of(&map(2, &radiance)).compensation()
+        let weights = |values: [f32; 4]| {
+            let subtracted = Totals::of(&map(2, &values.map(Vec3::splat))).compensation();
+            values.map(|v| weight(brightness(Vec3::splat(v)), subtracted) as f32)
         };
-        assert!((compensation(&[1.0, 1.0, 1.0, 9.0]) - 3.0).abs() < 1e-6);
+        assert_eq!(weights([1.0, 1.0, 1.0, 9.0]), [0.0, 0.0, 0.0, 6.0]);
         // a constant map is nowhere above its mean, whatever the rounding
-        assert_eq!(compensation(&[2.0; 4]), 0.0);
-        assert_eq!(compensation(&[2.0, 2.0, 2.0, 2.0 + 1e-6]), 0.0);
-        assert_eq!(compensation(&[0.0; 4]), 0.0);
+        for even in [[2.0; 4], [2.0, 2.0, 2.0, 2.0 + 1e-6]] {
+            assert_eq!(weights(even), even);
+        }
+        assert_eq!(weights([0.0; 4]), [0.0; 4]);
     }
 
     #[test]
