@@ -38,6 +38,47 @@ fn target(path: &Path) -> io::Result<Target> {
     }
 }
 
+/// Opens a regular file to read. A device, FIFO or socket, which may never end or never answer, is an error at once, and so is a folder.
+///
+/// # Errors
+/// Those of the system, and [`io::ErrorKind::InvalidInput`] for what is no regular file.
+pub fn open_regular(path: &Path) -> io::Result<File> {
+    let mut options = OpenOptions::new();
+    options.read(true);
+    // a FIFO without a writer does not block
+    #[cfg(target_os = "linux")]
+    {
+        use std::os::unix::fs::OpenOptionsExt;
+        options.custom_flags(i32::try_from(rustix::fs::OFlags::NONBLOCK.bits()).unwrap_or_default());
+    }
+    let file = options.open(path)?;
+    let kind = file.metadata()?;
+    match (kind.is_file(), kind.is_dir()) {
+        (true, _) => Ok(file),
+        (_, true) => Err(io::ErrorKind::IsADirectory.into()),
+        _ => Err(io::Error::new(io::ErrorKind::InvalidInput, "not a regular file")),
+    }
+}
+
+/// Whether a file belongs to this process's user or to root; true where files have no owners.
+pub fn is_own(path: &Path) -> bool {
+    fs::metadata(path).is_ok_and(|m| is_owned(&m))
+}
+
+/// Whether what this describes belongs to this process's user or to root; true where files have no owners.
+pub fn is_owned(metadata: &fs::Metadata) -> bool {
+    #[cfg(target_os = "linux")]
+    {
+        use std::os::unix::fs::MetadataExt;
+        metadata.uid() == 0 || metadata.uid() == rustix::process::geteuid().as_raw()
+    }
+    #[cfg(not(target_os = "linux"))]
+    {
+        let _ = metadata;
+        true
+    }
+}
+
 /// The folder of a file.
 fn folder_of(path: &Path) -> &Path {
     path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."))

@@ -5,10 +5,10 @@
 //! written beside and renamed, so several writers may race: each file is complete, and all files of one key are identical.
 //!
 //! XXH3 (`xxhash-rust`) makes keys and checksums: some ten GB a second, where a cryptographic hash would take as long as the
-//! build that it saves. Anyone who can write to the folder can
-//! replace a hierarchy: the folder must be as trusted as the program.
+//! build that it saves. A checksum tells damage, not malice: files of other users are not read, and whoever loads a hierarchy checks it against the geometry
+//! that it is for (`tracer::wide`).
 
-use std::io::Write;
+use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -98,8 +98,12 @@ impl Cache {
     /// Loads the arrays of a key; `None` if it is not cached or the file is damaged.
     pub fn load(&self, key: Key) -> Option<Entries> {
         let path = self.path(key);
-        let bytes = match std::fs::read(&path) {
-            Ok(b) => b,
+        let bytes = match read_own(&path) {
+            Ok(Some(b)) => b,
+            Ok(None) => {
+                self.warn(format!("{}: not a file of this user; rebuilding the hierarchy", path.display()));
+                return None;
+            }
             Err(e) if e.kind() == std::io::ErrorKind::NotFound => return None,
             Err(e) => {
                 self.warn(format!("{}: cannot read ({e}); rebuilding the hierarchy", path.display()));
@@ -111,6 +115,11 @@ impl Cache {
             self.warn(format!("{}: damaged or of another version; rebuilding the hierarchy", path.display()));
         }
         entries
+    }
+
+    /// Says that what was loaded for a key is not what it should be, and what is wrong with it.
+    pub fn reject(&self, key: Key, defect: &str) {
+        self.warn(format!("{}: not the hierarchy of this geometry ({defect}); rebuilding it", self.path(key).display()));
     }
 
     /// Stores arrays under a key, replacing an existing file. A failure becomes a warning.
@@ -142,6 +151,17 @@ impl Cache {
             parts().try_for_each(|p| file.write_all(p))
         })
     }
+}
+
+/// Bytes of a regular file that belongs to this process's user or to root; `None` for another.
+fn read_own(path: &Path) -> std::io::Result<Option<Vec<u8>>> {
+    let mut file = files::open_regular(path)?;
+    if !files::is_owned(&file.metadata()?) {
+        return Ok(None);
+    }
+    let mut bytes = Vec::new();
+    file.read_to_end(&mut bytes)?;
+    Ok(Some(bytes))
 }
 
 /// Parses a cache file; `None` if it is damaged.

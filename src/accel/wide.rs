@@ -15,6 +15,7 @@ use obvhs::bvh2::Bvh2;
 use rayon::prelude::*;
 
 use super::Aabb;
+use super::build::MAX_DEPTH;
 pub use crate::interface::records::hierarchy::{Block, LEAF, WideNode};
 
 /// Maximum number of children of a node.
@@ -110,42 +111,56 @@ impl WideBvh {
         out
     }
 
-    /// Checks that every leaf is reached once, within the boxes above it, and that the depth is as recorded. `bounds_of` returns the
-    /// boxes of a leaf's primitives.
+    /// Checks that every block is reached once and every child exists, that leaves lie within the boxes above them, and that the depth is as recorded and at most
+    /// [`MAX_DEPTH`]. Nothing in the tree is trusted; the time is linear in its size. `bounds_of` returns the bounds of a leaf's primitives, or the empty box where
+    /// they may stick out (a leaf that holds a part of them).
     ///
     /// # Errors
     /// A description of the first defect.
-    pub fn validate(&self, bounds_of: impl Fn(&Block) -> Vec<Aabb>) -> Result<(), String> {
-        let mut seen = vec![0u32; self.blocks.len()];
-        let mut work = vec![(0usize, 1u32, Vec::<[[f64; 2]; 3]>::new())];
+    pub fn validate(&self, bounds_of: impl Fn(&Block) -> Aabb) -> Result<(), String> {
+        // parents before children: each block's parent, and its slot there
+        let mut seen = vec![false; self.blocks.len()];
+        let mut order = Vec::new();
+        let mut work = vec![(0u32, 0u32, 0usize, 1u32)];
         let mut deepest = 0;
-        while let Some((at, level, chain)) = work.pop() {
-            let block = self.blocks.get(at).ok_or_else(|| format!("block {at} is out of range"))?;
-            seen[at] += 1;
-            if seen[at] > 1 {
+        while let Some((at, parent, slot, level)) = work.pop() {
+            let block = self.blocks.get(at as usize).ok_or_else(|| format!("block {at} is out of range"))?;
+            if std::mem::replace(&mut seen[at as usize], true) {
                 return Err(format!("block {at} is reached twice"));
             }
-            if is_leaf(block) {
-                for b in bounds_of(block) {
-                    let inside = |c: &[[f64; 2]; 3]| (0..3).all(|a| c[a][0] <= b.min[a] as f64 && c[a][1] >= b.max[a] as f64);
-                    if !chain.iter().all(inside) {
-                        return Err(format!("a primitive of leaf {at} sticks out of a box above it"));
-                    }
+            order.push((at, parent, slot));
+            if !is_leaf(block) {
+                deepest = deepest.max(level);
+                if as_node(block).first_child.checked_add(WIDTH as u32).is_none() {
+                    return Err(format!("children of block {at} are out of range"));
                 }
-                continue;
-            }
-            deepest = deepest.max(level);
-            for (slot, child) in children(block) {
-                let mut chain = chain.clone();
-                chain.push(child_box(block, slot));
-                work.push((child as usize, level + 1, chain));
+                work.extend(children(block).map(|(slot, child)| (child, at, slot, level + 1)));
             }
         }
-        if let Some(at) = seen.iter().position(|&s| s == 0) {
+        if let Some(at) = seen.iter().position(|s| !s) {
             return Err(format!("block {at} is never reached"));
         }
-        if deepest != self.depth {
-            return Err(format!("depth is {deepest}, recorded as {}", self.depth));
+        if deepest != self.depth || deepest > MAX_DEPTH {
+            return Err(format!("depth is {deepest}, recorded as {}; at most {MAX_DEPTH}", self.depth));
+        }
+
+        // children before parents: what is below a block lies within the box that its parent has for it
+        let mut below = vec![Aabb::EMPTY; self.blocks.len()];
+        for &(at, parent, slot) in order.iter().rev() {
+            let block = &self.blocks[at as usize];
+            if is_leaf(block) {
+                below[at as usize] = bounds_of(block);
+            }
+            if at == 0 {
+                continue;
+            }
+            let own = below[at as usize];
+            let planes = child_box(&self.blocks[parent as usize], slot);
+            // a comparison with a plane that is no number fails
+            if !(0..3).all(|a| planes[a][0] <= f64::from(own.min[a]) && planes[a][1] >= f64::from(own.max[a])) {
+                return Err(format!("a primitive below block {at} sticks out of its box"));
+            }
+            below[parent as usize] = below[parent as usize].union(own);
         }
         Ok(())
     }
@@ -154,6 +169,12 @@ impl WideBvh {
 /// Is the block a leaf?
 pub fn is_leaf(block: &Block) -> bool {
     block.flags & LEAF != 0
+}
+
+/// A block with the flag of leaves.
+pub fn as_leaf(mut block: Block) -> Block {
+    block.flags |= LEAF;
+    block
 }
 
 /// A block that is a node.
@@ -298,9 +319,7 @@ impl Piece {
                 let number = locals[child].node;
                 let binary = &tree.nodes[number as usize];
                 if binary.is_leaf() {
-                    let mut block = leaf(tree.primitive_indices[binary.first_index as usize]);
-                    block.flags |= LEAF;
-                    out.blocks.push(block);
+                    out.blocks.push(as_leaf(leaf(tree.primitive_indices[binary.first_index as usize])));
                     continue;
                 }
                 out.blocks.push(Block::default());
@@ -419,7 +438,7 @@ pub(super) mod tests {
         if items != (0..boxes.len() as u32).collect::<Vec<_>>() {
             return Err("not every item has one leaf".into());
         }
-        tree.validate(|b| vec![boxes[b.body[0] as usize]])
+        tree.validate(|b| boxes[b.body[0] as usize])
     }
 
     #[test]

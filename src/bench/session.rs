@@ -86,7 +86,7 @@ impl<'a, A, R: BenchRecord> Session<'a, A, R> {
         };
         for spec in &specs {
             let activity = if spec.is_built() { "starting" } else { "compiling" };
-            self.phase(format!("{activity} peer '{}'", spec.name));
+            self.phase(format!("{activity} peer '{}': `{}`", spec.name, spec.command_line()));
             match Peer::start(spec) {
                 Ok(peer) => self.peers.push(peer),
                 Err(PeerError::Ours(e)) => return Err(e),

@@ -18,6 +18,22 @@ use crate::tracer::DeviceSettings;
 /// Name of the files.
 pub const FILE_NAME: &str = "skylit.toml";
 
+/// Settings that a file beside a scene may have: how the scene is looked at, lit and sampled. An entry that ends with a dot is a table, with all that is in it. What
+/// comes with a scene comes from strangers: it does not choose what is written, what is loaded besides images and camera paths, or on which device.
+const SCENE_SETTINGS: [&str; 11] = [
+    "integrator",
+    "image.spp",
+    "image.size",
+    "image.seed",
+    "image.pixel_filter",
+    "camera.",
+    "integrators.",
+    "lighting.",
+    "picture.",
+    "film.target_rmse",
+    "frames.",
+];
+
 /// A file of defaults.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct DefaultsFile {
@@ -73,15 +89,17 @@ pub struct Resolved {
 /// The files of defaults that exist: of the configuration folder, then of the folder of `scene`. Later ones replace what earlier ones say.
 ///
 /// # Errors
-/// Those of [`DefaultsFile::load`].
+/// Those of [`DefaultsFile::load`], and [`Error::Input`] for a setting that a scene's folder may not choose.
 pub fn find(scene: Option<&str>) -> Result<Vec<DefaultsFile>> {
     let folder = |scene: &str| Path::new(scene).parent().map(Path::to_owned);
     let beside = scene.filter(|s| !s.starts_with("builtin:")).and_then(folder);
-    let own = config_folder().map(|f| f.join("skylit"));
-    own.into_iter()
-        .chain(beside)
-        .filter_map(|folder| DefaultsFile::load_if_exists(&folder.join(FILE_NAME)).transpose())
-        .collect()
+    let load = |folder: PathBuf| DefaultsFile::load_if_exists(&folder.join(FILE_NAME));
+    let own = config_folder().map(|f| load(f.join("skylit"))).transpose()?.flatten();
+    let of_scene = beside.map(load).transpose()?.flatten();
+    if let Some(file) = &of_scene {
+        file.check_scene_settings()?;
+    }
+    Ok(own.into_iter().chain(of_scene).collect())
 }
 
 /// `$XDG_CONFIG_HOME`, or `~/.config`.
@@ -98,6 +116,22 @@ impl DefaultsFile {
             Err(e) if matches!(e.kind(), ErrorKind::NotFound | ErrorKind::NotADirectory) => Ok(None),
             Err(e) => Err(Error::read(path, &e)),
         }
+    }
+
+    /// Checks that a file beside a scene has the settings alone that a scene may choose ([`SCENE_SETTINGS`]).
+    fn check_scene_settings(&self) -> Result<()> {
+        let may = |key: &str| SCENE_SETTINGS.iter().any(|s| if s.ends_with('.') { key.starts_with(s) } else { key == *s });
+        let refused: Vec<_> = leaves(&self.settings, &self.device).into_keys().filter(|key| !may(key)).collect();
+        if refused.is_empty() {
+            return Ok(());
+        }
+        let what = refused.join(", ");
+        Err(Error::input(
+            &self.path,
+            format!(
+                "a file beside a scene cannot set {what}: take it out, give it as an option or in your own {FILE_NAME}, or ignore this file with --no-config"
+            ),
+        ))
     }
 
     /// Reads a file of defaults. Relative paths in it start at its folder.
@@ -347,6 +381,30 @@ mod tests {
         assert_eq!((device(None).bvh_cache, device(None).validation), (None, true));
         assert_eq!(device(Some("compute")).bvh_cache, Some("/u/bvh".into()));
         assert_eq!(device(Some("query")).bvh_cache, None);
+    }
+
+    /// What comes with a scene says how it looks, and nothing about files, devices or code.
+    #[test]
+    fn a_scene_chooses_how_it_looks_and_no_more() {
+        let allowed = "integrator = \"path\"\n[image]\nspp = 4\nsize = [8, 8]\nseed = 1\npixel_filter = \"box\"\n[camera]\neye = [1, 2, 3]\ntarget = [0, 0, 0]\n\
+            [integrators.ao]\nao_radius = 1\n[lighting]\nenvironment = \"sky.hdr\"\n[picture]\nexposure = 1\n[film]\ntarget_rmse = 0.1\n[frames]\nhistory = 4";
+        assert!(file("/s/skylit.toml", allowed).check_scene_settings().is_ok());
+        for (text, key) in [
+            ("[device]\nbvh_cache = \".\"", "device.bvh_cache"),
+            ("[device]\ndevice = \"1\"", "device.device"),
+            ("[device]\nvalidation = true", "device.validation"),
+            ("[film]\nintervals = true", "film.intervals"),
+            ("[film]\nresume = \"a.exr\"", "film.resume"),
+            ("[film]\nresumable = true", "film.resumable"),
+            ("[image]\ndenoise = \"oidn\"", "image.denoise"),
+            ("[image]\naov = [\"depth\"]", "image.aov"),
+            ("[image]\ntime_limit = 1", "image.time_limit"),
+        ] {
+            let error = file("/s/skylit.toml", text).check_scene_settings().unwrap_err();
+            let message = error.to_string();
+            assert!(message.contains(key) && message.contains("--no-config") && !message.contains('\n'), "{message}");
+            assert_eq!(error.exit_code(), 3);
+        }
     }
 
     #[test]

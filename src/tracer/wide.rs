@@ -17,7 +17,7 @@ use super::kernel::BuildOptions;
 use super::kernel::Kernel;
 use super::stream::{LaunchMemory, SuspendedRays, launch_rays, with_uncovered};
 use crate::accel::build::{self, MAX_DEPTH};
-use crate::accel::cache::KeyBuilder;
+use crate::accel::cache::{Entries, KeyBuilder};
 use crate::accel::flatten::{BlasGroup, FlatScene, TlasInstance};
 use crate::accel::pairs::{self, Fan, Pair};
 use crate::accel::wide::{self, Block, WideBvh};
@@ -189,7 +189,7 @@ fn collapse(binary: Bvh2, depth: Option<u32>, leaf: impl Fn(u32) -> Block + Sync
 
 /// Version of cached BVHs. Raise it with every change that makes other blocks of the same input: in builders, pairs, collapse, or the
 /// layout of nodes and leaves.
-const LAYOUT_VERSION: u32 = 5;
+const LAYOUT_VERSION: u32 = 6;
 
 /// The header of a cached BVH, beside its blocks.
 #[repr(C)]
@@ -201,23 +201,98 @@ struct CachedTree {
     sah_cost: f64,
 }
 
+/// What a group's BVH is built from, as leaves hold it: what a BVH from the cache is checked against.
+trait LeafSource: Sync {
+    /// Number of primitives.
+    fn primitive_count(&self) -> usize;
+    /// The leaf of two primitives, the second of which may be [`pairs::NONE`]; `None` if there is no such leaf.
+    fn leaf(&self, numbers: [u32; 2]) -> Option<Block>;
+    /// Bounds of a primitive.
+    fn bounds(&self, number: u32) -> Aabb;
+    /// The same for two primitives of which a BVH holds the first alone; `None` for one that each BVH holds.
+    fn duplicate_key(&self, number: u32) -> Option<[[u32; 4]; 3]>;
+}
+
+/// Checks a BVH from the cache as input: each leaf is the one that its primitives make, every primitive is held, the tree is one, and boxes contain what is below them. So whatever
+/// wrote the file, the device reads nothing beyond the scene, and the image is that of a BVH built here; with spatial splits (`Best`), whose leaves hold parts of primitives, boxes
+/// are not compared.
+fn check_loaded(tree: &WideBvh, source: &impl LeafSource, preset: BuildPreset) -> Result<(), String> {
+    let numbers = |b: &Block| {
+        bytemuck::cast_ref::<Block, TriangleLeaf>(b).primitives.map(|id| match id {
+            pairs::NONE => id,
+            id => id & !(ALPHA_TESTED | SPHERE),
+        })
+    };
+    let count = source.primitive_count();
+    let exists = |number: u32| (number as usize) < count;
+
+    // each leaf by itself
+    let is_right = |b: &Block| {
+        let [first, second] = numbers(b);
+        let exist = exists(first) && (second == pairs::NONE || exists(second));
+        exist && source.leaf([first, second]).is_some_and(|own| wide::as_leaf(own) == *b)
+    };
+    let wrong = tree.blocks.par_iter().enumerate().find_any(|(_, b)| wide::is_leaf(b) && !is_right(b));
+    if let Some((at, _)) = wrong {
+        return Err(format!("leaf {at} is not that of its primitives"));
+    }
+
+    // all of them: every primitive, or one that is the same
+    let mut held = vec![false; count];
+    let leaves = || tree.blocks.iter().filter(|b| wide::is_leaf(b));
+    leaves().flat_map(numbers).filter(|n| *n != pairs::NONE).for_each(|n| held[n as usize] = true);
+    if held.contains(&false) {
+        let held = &held;
+        let keys = |is_held: bool| (0..count as u32).filter(move |&n| held[n as usize] == is_held);
+        let known: std::collections::HashSet<_> = keys(true).filter_map(|n| source.duplicate_key(n)).collect();
+        if let Some(n) = keys(false).find(|&n| source.duplicate_key(n).is_none_or(|key| !known.contains(&key))) {
+            return Err(format!("primitive {n} is missing"));
+        }
+    }
+
+    // the tree above them
+    let bounds = |b: &Block| {
+        numbers(b).into_iter().filter(|n| *n != pairs::NONE).map(|n| source.bounds(n)).fold(Aabb::EMPTY, Aabb::union)
+    };
+    match preset {
+        BuildPreset::Best => tree.validate(|_| Aabb::EMPTY)?,
+        _ => tree.validate(bounds)?,
+    }
+    let all = leaves().map(bounds).fold(Aabb::EMPTY, Aabb::union);
+    let is_within = tree.bounds.is_some_and(|b| b.contains(&all) && b.min.is_finite() && b.max.is_finite());
+    if is_within && tree.sah_cost >= 0.0 && tree.sah_cost.is_finite() {
+        Ok(())
+    } else {
+        Err("its bounds or its cost are wrong".into())
+    }
+}
+
 /// The BVH of the geometry that `content` describes: from the cache if available, otherwise built and stored there.
-fn load_or_build(options: &BuildOptions, preset: BuildPreset, content: &[&[u8]], build: impl FnOnce() -> WideBvh) -> WideBvh {
+fn load_or_build(
+    options: &BuildOptions,
+    preset: BuildPreset,
+    content: &[&[u8]],
+    source: &impl LeafSource,
+    build: impl FnOnce() -> WideBvh,
+) -> WideBvh {
     let Some(cache) = &options.cache else { return build() };
     let head = KeyBuilder::default().with(&LAYOUT_VERSION.to_le_bytes()).with(format!("{preset:?}").as_bytes());
     let key = content.iter().fold(head, |k, bytes| k.with(bytes)).finish();
-    let loaded = cache.load(key).and_then(|entries| {
+    let tree_of = |entries: Entries| {
         let kept = *entries.get::<CachedTree>("tree")?.first()?;
         let [min, max] = kept.bounds.map(Vec3::from);
-        Some(WideBvh {
-            blocks: entries.get("blocks")?,
-            depth: kept.depth,
-            bounds: Some(Aabb { min, max }),
-            sah_cost: kept.sah_cost,
-        })
-    });
-    if let Some(wide) = loaded {
-        return wide;
+        let bounds = Some(Aabb { min, max });
+        Some(WideBvh { blocks: entries.get("blocks")?, depth: kept.depth, bounds, sah_cost: kept.sah_cost })
+    };
+    if let Some(entries) = cache.load(key) {
+        let checked = tree_of(entries).ok_or_else(|| "it lacks an array".to_owned()).and_then(|tree| {
+            check_loaded(&tree, source, preset)?;
+            Ok(tree)
+        });
+        match checked {
+            Ok(tree) => return tree,
+            Err(defect) => cache.reject(key, &defect),
+        }
     }
     let wide = build();
     if let Some(b) = wide.bounds {
@@ -238,15 +313,13 @@ fn sphere_tree(flat: &FlatScene, group: &BlasGroup, options: &BuildOptions) -> W
             [s.center.x, s.center.y, s.center.z, s.radius]
         })
         .collect();
-    load_or_build(options, preset, &[b"spheres", bytemuck::cast_slice(&spheres)], || {
-        let leaf = |primitive: u32| {
-            let [x, y, z, radius] = spheres[primitive as usize];
-            let primitives = [primitive | SPHERE, pairs::NONE];
-            bytemuck::cast(SphereLeaf { center: [x, y, z], radius, primitives, ..Default::default() })
-        };
+    // whether spheres that are the same are held once
+    let once = group.opaque_count == group.primitive_count && flat.motion.is_none();
+    let source = Spheres { spheres: &spheres, once };
+    load_or_build(options, preset, &[b"spheres", &[u8::from(once)], bytemuck::cast_slice(&spheres)], &source, || {
+        let leaf = |primitive: u32| source.block(primitive);
         let boxes: Vec<Aabb> = primitive_boxes(flat, group).collect();
-        let opaque = group.opaque_count == group.primitive_count && flat.motion.is_none();
-        let kept = if opaque { firsts(spheres.len() as u32, |k| spheres[k as usize].map(bits)) } else { None };
+        let kept = if once { firsts(spheres.len() as u32, |k| spheres[k as usize].map(bits)) } else { None };
         match kept {
             None => tree(boxes, preset, None, leaf),
             Some(kept) => {
@@ -255,6 +328,41 @@ fn sphere_tree(flat: &FlatScene, group: &BlasGroup, options: &BuildOptions) -> W
             }
         }
     })
+}
+
+/// A group's spheres: centre and radius, BLAS space.
+struct Spheres<'a> {
+    spheres: &'a [[f32; 4]],
+    /// Whether those that are the same are held once.
+    once: bool,
+}
+
+impl Spheres<'_> {
+    fn block(&self, number: u32) -> Block {
+        let [x, y, z, radius] = self.spheres[number as usize];
+        let primitives = [number | SPHERE, pairs::NONE];
+        bytemuck::cast(SphereLeaf { center: [x, y, z], radius, primitives, ..Default::default() })
+    }
+}
+
+impl LeafSource for Spheres<'_> {
+    fn primitive_count(&self) -> usize {
+        self.spheres.len()
+    }
+
+    fn leaf(&self, [number, second]: [u32; 2]) -> Option<Block> {
+        (second == pairs::NONE).then(|| self.block(number))
+    }
+
+    fn bounds(&self, number: u32) -> Aabb {
+        let [x, y, z, radius] = self.spheres[number as usize];
+        let center = Vec3::new(x, y, z);
+        Aabb { min: center - radius, max: center + radius }
+    }
+
+    fn duplicate_key(&self, number: u32) -> Option<[[u32; 4]; 3]> {
+        self.once.then(|| [self.spheres[number as usize].map(bits), [0; 4], [0; 4]])
+    }
 }
 
 /// A group's triangles, gathered from its parts.
@@ -284,12 +392,46 @@ fn triangle_tree(flat: &FlatScene, group: &BlasGroup, options: &BuildOptions) ->
     let triangles = Triangles::of(flat, group);
     let preset = options.preset(triangles.indices.len());
     let opaque = group.opaque_count as u32;
-    let content: [&[u8]; 3] =
-        [&opaque.to_le_bytes(), bytemuck::cast_slice(&triangles.positions), bytemuck::cast_slice(&triangles.indices)];
-    load_or_build(options, preset, &content, || match flat.motion.is_none() {
+    let is_fixed = flat.motion.is_none();
+    let content: [&[u8]; 4] = [
+        &opaque.to_le_bytes(),
+        &[u8::from(is_fixed)],
+        bytemuck::cast_slice(&triangles.positions),
+        bytemuck::cast_slice(&triangles.indices),
+    ];
+    let source = TriangleSource { triangles: &triangles, opaque, once: if is_fixed { opaque } else { 0 } };
+    load_or_build(options, preset, &content, &source, || match is_fixed {
         true => unique_triangle_tree(&triangles, opaque, preset),
         false => triangle_tree_of(&triangles, opaque, preset, None),
     })
+}
+
+/// A group's triangles as leaves hold them.
+struct TriangleSource<'a> {
+    triangles: &'a Triangles,
+    /// Triangles before the first alpha-tested one.
+    opaque: u32,
+    /// Triangles before the first that is held even where another is the same.
+    once: u32,
+}
+
+impl LeafSource for TriangleSource<'_> {
+    fn primitive_count(&self) -> usize {
+        self.triangles.indices.len()
+    }
+
+    fn leaf(&self, triangles: [u32; 2]) -> Option<Block> {
+        pair_block(self.triangles, Pair { triangles }, self.opaque)
+    }
+
+    fn bounds(&self, number: u32) -> Aabb {
+        Aabb::of_points(&self.triangles.corners(self.triangles.indices[number as usize]))
+    }
+
+    fn duplicate_key(&self, number: u32) -> Option<[[u32; 4]; 3]> {
+        let corners = || same_from_first(self.triangles.corners(self.triangles.indices[number as usize]));
+        (number < self.once).then(|| corners().map(|[x, y, z]| [x, y, z, 0]))
+    }
 }
 
 /// A tree that has opaque triangles with the same three corners once, the first of them: a ray that meets one meets all of them at the same distance, and which of them it meets is
@@ -384,17 +526,14 @@ pub(super) fn triangle_tree_of(triangles: &Triangles, opaque: u32, preset: Build
     };
     let binary = build::tree_with_splits(&boxes, &of_pair, preset, pad);
     drop(boxes);
-    collapse(binary, depth, |pair| pair_block(triangles, pairs[pair as usize], opaque))
+    collapse(binary, depth, |pair| pair_block(triangles, pairs[pair as usize], opaque).expect("a pair shares an edge"))
 }
 
-fn pair_block(triangles: &Triangles, pair: Pair, opaque: u32) -> Block {
+/// The leaf of a pair of triangles; `None` if they share no edge.
+fn pair_block(triangles: &Triangles, pair: Pair, opaque: u32) -> Option<Block> {
     let [a, b] = pair.triangles;
     let corners = |t: u32| triangles.indices[t as usize];
-    let fan = if b == pairs::NONE {
-        Fan::single(corners(a))
-    } else {
-        Fan::of(corners(a), corners(b)).expect("a pair shares an edge")
-    };
+    let fan = if b == pairs::NONE { Fan::single(corners(a)) } else { Fan::of(corners(a), corners(b))? };
     let number = |t: u32| {
         if t == pairs::NONE {
             t
@@ -405,12 +544,12 @@ fn pair_block(triangles: &Triangles, pair: Pair, opaque: u32) -> Block {
         }
     };
     let places = fan.second_third.map(|[second, third]| (second | third << 2) as u32);
-    bytemuck::cast(TriangleLeaf {
+    Some(bytemuck::cast(TriangleLeaf {
         corners: fan.corners.map(|v| triangles.positions[v as usize].to_array()),
         primitives: [a, b].map(number),
         order: places[0] | places[1] << 4,
         ..Default::default()
-    })
+    }))
 }
 
 #[cfg(test)]
@@ -431,7 +570,8 @@ mod tests {
             let leaf = |b: &Block| *bytemuck::cast_ref::<Block, TriangleLeaf>(b);
             let held = |b: &Block| leaf(b).primitives.into_iter().filter(|&id| id != pairs::NONE);
             let number = |id: u32| (id & !(ALPHA_TESTED | SPHERE)) as usize;
-            tree.validate(|b| held(b).map(|id| boxes[number(id)]).collect()).unwrap_or_else(|e| panic!("{name}: {e}"));
+            tree.validate(|b| held(b).map(|id| boxes[number(id)]).fold(Aabb::EMPTY, Aabb::union))
+                .unwrap_or_else(|e| panic!("{name}: {e}"));
             let mut seen = vec![0; group.primitive_count];
             for block in tree.blocks.iter().filter(|b| wide::is_leaf(b)) {
                 let leaf = leaf(block);
@@ -455,7 +595,7 @@ mod tests {
         if let Some(top) = &trees.top {
             let bounds: Vec<_> = trees.groups.iter().map(|g| g.bounds.unwrap_or(Aabb::EMPTY)).collect();
             let boxes = instance_boxes(&flat, &bounds);
-            top.validate(|b| vec![boxes[bytemuck::cast_ref::<Block, InstanceLeaf>(b).instance as usize]])
+            top.validate(|b| boxes[bytemuck::cast_ref::<Block, InstanceLeaf>(b).instance as usize])
                 .unwrap_or_else(|e| panic!("{name}: {e}"));
         }
     }
@@ -515,6 +655,100 @@ mod tests {
         let mut held: Vec<u32> = leaves.map(|l| l.primitives[0] & !SPHERE).collect();
         held.sort_unstable();
         assert_eq!(held, [0, 1]);
+    }
+
+    /// Damage in a tree: what is wrong with it, and how it gets there.
+    type Damage = (&'static str, fn(&mut WideBvh));
+
+    fn node(tree: &mut WideBvh) -> &mut wide::WideNode {
+        bytemuck::cast_mut(&mut tree.blocks[0])
+    }
+
+    fn last_leaf(tree: &mut WideBvh) -> &mut TriangleLeaf {
+        let at = tree.blocks.iter().rposition(wide::is_leaf).unwrap();
+        bytemuck::cast_mut(&mut tree.blocks[at])
+    }
+
+    const DAMAGE: [Damage; 14] = [
+        ("a child beyond the end", |t| node(t).first_child = 0x7fff_0000),
+        ("children beyond 2^32", |t| node(t).first_child = u32::MAX - 2),
+        ("a loop", |t| node(t).first_child = 0),
+        ("children of another", |t| node(t).first_child += 1),
+        ("a box elsewhere", |t| node(t).corner[0] = 1e9),
+        ("a box that is no number", |t| node(t).corner[1] = f32::NAN),
+        ("a scale that is infinite", |t| node(t).lower_z[7] = 255),
+        ("a primitive that does not exist", |t| last_leaf(t).primitives[0] = 0x0fff_ffff),
+        ("a primitive twice, another missing", |t| last_leaf(t).primitives[0] ^= 1),
+        ("another flag", |t| last_leaf(t).primitives[0] ^= ALPHA_TESTED),
+        ("a corner elsewhere", |t| last_leaf(t).corners[1][0] += 1.0),
+        ("a node for a leaf", |t| last_leaf(t).flags = 0),
+        ("a depth that takes all memory", |t| t.depth = 1 << 31),
+        ("bounds that are too small", |t| t.bounds.as_mut().unwrap().max.y -= 0.5),
+    ];
+
+    /// Writes a tree over the only file of a cache, with the checksum that belongs to it.
+    fn plant(folder: &std::path::Path, tree: &WideBvh) {
+        let path = std::fs::read_dir(folder).unwrap().next().unwrap().unwrap().path();
+        let good = std::fs::read(&path).unwrap();
+        let bounds = tree.bounds.unwrap();
+        let bounds = [bounds.min.to_array(), bounds.max.to_array()];
+        let kept = CachedTree { bounds, depth: tree.depth, reserved: 0, sah_cost: tree.sah_cost };
+        let arrays = [bytemuck::bytes_of(&kept), bytemuck::cast_slice(&tree.blocks)].concat();
+        // magic, length, checksum; then the table and the arrays
+        let body = [&good[32..good.len() - arrays.len()], &arrays].concat();
+        let sum = xxhash_rust::xxh3::xxh3_128(&body).to_le_bytes();
+        std::fs::write(&path, [&good[..16], &sum, &body].concat()).unwrap();
+    }
+
+    /// A file in the cache that says anything else than what would be built is not taken, whoever wrote it: a warning, and the BVH is built.
+    #[test]
+    fn a_cached_hierarchy_is_checked_against_the_geometry() {
+        for name in ["stairs", "spheres:300"] {
+            let scene = builtin::by_name(name).unwrap();
+            let flat = FlatScene::new(&scene);
+            let folder = tempfile::tempdir().unwrap();
+            let cache = crate::accel::cache::Cache::new(folder.path());
+            let options = BuildOptions { cache: Some(cache.clone()), ..Default::default() };
+            let build = || Trees::build(&flat, &options).groups.swap_remove(0);
+            let good = build();
+            let same = |tree: &WideBvh| tree.blocks == good.blocks && tree.depth == good.depth;
+            // what was stored is taken
+            assert!(same(&build()) && cache.take_warnings().is_empty(), "{name}");
+            for (what, damage) in DAMAGE {
+                let mut bad = good.clone();
+                damage(&mut bad);
+                plant(folder.path(), &bad);
+                assert!(same(&build()), "{name}: {what}");
+                let warnings = cache.take_warnings();
+                assert!(matches!(&warnings[..], [one] if one.contains("rebuilding")), "{name}: {what}: {warnings:?}");
+                // and replaced by what is right
+                assert!(same(&build()) && cache.take_warnings().is_empty(), "{name}: {what}");
+            }
+        }
+    }
+
+    /// Any one bit of the blocks turned: the tree is refused, or it is one that gives the same hits (a box that is larger).
+    #[test]
+    fn no_bit_of_a_cached_hierarchy_is_trusted() {
+        let scene = builtin::by_name("stairs").unwrap();
+        let flat = FlatScene::new(&scene);
+        let triangles = Triangles::of(&flat, &flat.groups[0]);
+        let opaque = flat.groups[0].opaque_count as u32;
+        let source = TriangleSource { triangles: &triangles, opaque, once: opaque };
+        let good = triangle_tree(&flat, &flat.groups[0], &BuildOptions::default());
+        check_loaded(&good, &source, BuildPreset::Default).unwrap();
+        let bits = good.blocks.len() * 512;
+        let accepted = (0..bits).step_by(7).filter(|bit| {
+            let mut bad = good.clone();
+            let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut bad.blocks);
+            bytes[bit / 8] ^= 1 << (bit % 8);
+            let is_leaf = wide::is_leaf(&good.blocks[bit / 512]);
+            let taken = check_loaded(&bad, &source, BuildPreset::Default).is_ok();
+            assert!(!(taken && is_leaf), "bit {bit} of a leaf");
+            taken
+        });
+        // bits of planes that make a box larger, and planes of slots that hold nothing
+        assert!(accepted.count() < bits / 7 / 4);
     }
 
     #[test]

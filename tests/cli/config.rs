@@ -119,6 +119,12 @@ fn wrong_files_are_named_with_the_key() {
     std::fs::write(place.at("scenes/skylit.toml"), "spp = 3").unwrap();
     fails(&place.run("render @scenes/stairs.glb -o @a.exr"), 3, &["scenes/skylit.toml: ", "unknown field `spp`"]);
     fails(&place.run("render builtin:stairs --settings @scenes/skylit.toml -o @a.exr"), 3, &["unknown field `spp`"]);
+    // what comes with a scene chooses neither files nor devices
+    std::fs::write(place.at("scenes/skylit.toml"), "[device]\ntracer = \"compute\"\nbvh_cache = \"../../x\"").unwrap();
+    let refused = ["scenes/skylit.toml: ", "device.bvh_cache, device.tracer", "--no-config"];
+    fails(&place.run("render @scenes/stairs.glb -o @a.exr"), 3, &refused);
+    fails(&place.run("render @scenes/stairs.glb -o @a.exr --quiet"), 3, &refused);
+    assert!(!place.dir.path().join("../x").exists());
     // a setting that is given has to have an effect, a default has not
     fails(&place.run("render builtin:stairs --max-depth 3 -o @a.exr"), 64, &["--max-depth has no effect"]);
     assert_eq!(wrote(place.dir.path()), 0);

@@ -85,7 +85,7 @@ pub struct BenchFramesArgs {
     /// Environment map for scenes without lights, an equirectangular .hdr or .exr [default: the shared sun map if available, or a built-in one]
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub environment: Option<PathBuf>,
-    /// Peers that render paths, beside a still camera: a file like benches/peers.toml, or `none` [default: benches/peers.toml if it exists]
+    /// Peers that render paths, beside a still camera: a file like benches/peers.toml, or `none`: its commands are run [default: benches/peers.toml if it is the one of this version]
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub peers: Option<String>,
     /// Tracer

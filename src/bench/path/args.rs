@@ -62,7 +62,7 @@ pub struct BenchPathArgs {
     /// Build quality of the compute tracer's hierarchy
     #[arg(long, value_enum, default_value = "default")]
     pub build: BuildChoice,
-    /// Peers to compare with: a file like benches/peers.toml, or `none` [default: benches/peers.toml if it exists]
+    /// Peers to compare with: a file like benches/peers.toml, or `none`: its commands are run [default: benches/peers.toml if it is the one of this version]
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub peers: Option<String>,
     /// Options of every benchmark

@@ -2,7 +2,7 @@
 
 use std::collections::hash_map::DefaultHasher;
 use std::hash::{Hash, Hasher};
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 use std::process::{Command, Stdio};
 
 use serde::Deserialize;
@@ -11,6 +11,13 @@ use crate::error::{Error, Result};
 
 /// Default peers file.
 pub const DEFAULT: &str = "benches/peers.toml";
+
+/// The project's own peers file, and the files in its folder that its commands run or compile: a peers file runs commands, so by default only this one is taken.
+const OWN: [(&str, &str); 3] = [
+    ("peers.toml", include_str!("../../../benches/peers.toml")),
+    ("peers/embree.cpp", include_str!("../../../benches/peers/embree.cpp")),
+    ("peers/mitsuba_paths.py", include_str!("../../../benches/peers/mitsuba_paths.py")),
+];
 
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -73,9 +80,25 @@ pub fn choose(requested: Option<&str>, measures: Measures) -> Result<Result<Vec<
         None if !Path::new(DEFAULT).is_file() => {
             return Ok(Err(format!("no peers: {DEFAULT} does not exist (use --peers FILE)")));
         }
+        None if !is_own(Path::new(DEFAULT)) => {
+            return Ok(Err(format!(
+                "no peers: {DEFAULT} here is not the one that this program was built with, and its commands are not run (--peers {DEFAULT} runs them)"
+            )));
+        }
         file => file.unwrap_or(DEFAULT),
     };
     Ok(Ok(read(Path::new(file))?.into_iter().filter(|p| p.measures == measures).collect()))
+}
+
+/// Whether a peers file, and what its commands run, are those that this program was built with.
+fn is_own(path: &Path) -> bool {
+    let folder = path.parent().unwrap_or(Path::new("."));
+    OWN.iter().all(|(name, text)| std::fs::read(folder.join(name)).is_ok_and(|own| own == text.as_bytes()))
+}
+
+/// Whether a name can be part of a file's name, and leads nowhere else.
+fn is_plain_name(name: &str) -> bool {
+    !name.starts_with('.') && !name.is_empty() && name.chars().all(|c| c.is_ascii_alphanumeric() || "._+-".contains(c))
 }
 
 /// Reads a peers file.
@@ -96,8 +119,11 @@ pub fn read(path: &Path) -> Result<Vec<PeerSpec>> {
         let peer = PeerSpec { folder: folder.clone(), ..entry.into_inner() };
         let word = |s: &String| !s.is_empty() && !s.contains(char::is_whitespace);
         let unknown = peer.baselines.iter().chain(&peer.strict).find(|b| !peer.kernels.contains(b));
-        let problem = if !word(&peer.name) {
-            Some(format!("`name = {:?}`: a peer's name is one word", peer.name))
+        let is_below = |path: &PathBuf| path.components().all(|c| matches!(c, Component::Normal(_) | Component::CurDir));
+        let problem = if !is_plain_name(&peer.name) {
+            Some(format!("`name = {:?}`: a peer's name is one word of letters, digits, `.`, `_`, `+` and `-`", peer.name))
+        } else if let Some(source) = peer.sources.iter().find(|s| !is_below(s)) {
+            Some(format!("peer `{}`: the source {source:?} is not below the folder of this file", peer.name))
         } else if peers.iter().any(|p| p.name == peer.name) {
             Some(format!("there are two peers called `{}`", peer.name))
         } else if peer.run.is_empty() {
@@ -127,6 +153,12 @@ impl PeerSpec {
         format!("peer '{}' is missing: {why}{needs}", self.name)
     }
 
+    /// The next command that is run for it, as the file has it: the one that builds it, where that is needed.
+    pub fn command_line(&self) -> String {
+        let words = if self.is_built() { &self.run } else { &self.build };
+        words.join(" ").replace(char::is_control, " ")
+    }
+
     /// Is there nothing to build, or did an earlier run build it?
     pub fn is_built(&self) -> bool {
         self.build.is_empty() || self.output().is_ok_and(|out| out.exists())
@@ -138,6 +170,9 @@ impl PeerSpec {
     /// A sentence that says why it cannot be built.
     pub fn prepare(&self) -> Result<Command, String> {
         let out = self.output()?;
+        if !self.build.is_empty() && out.exists() && !crate::files::is_own(&out) {
+            return Err(format!("{}: another user's file, which is not run: remove it", out.display()));
+        }
         if !self.build.is_empty() && !out.exists() {
             self.build_to(&out)?;
         }
@@ -155,7 +190,8 @@ impl PeerSpec {
             let path = self.folder.join(source);
             std::fs::read(&path).map_err(|e| format!("{}: {e}", path.display()))?.hash(&mut hash);
         }
-        let cache = crate::files::cache_folder().unwrap_or_else(std::env::temp_dir);
+        // a folder that others can write to holds no programs of ours
+        let cache = crate::files::cache_folder().ok_or("there is no folder to build it in: set HOME or XDG_CACHE_HOME")?;
         Ok(cache.join("peers").join(format!("{}-{:016x}", self.name, hash.finish())))
     }
 
@@ -209,6 +245,31 @@ mod tests {
         }
     }
 
+    /// A file of another folder under the default name runs nothing.
+    #[test]
+    fn only_our_own_file_is_taken_by_default() {
+        let ours = Path::new(env!("CARGO_MANIFEST_DIR")).join(DEFAULT);
+        assert!(is_own(&ours));
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::create_dir(folder.path().join("peers")).unwrap();
+        let copy = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
+        OWN.iter().for_each(|(name, text)| copy(name, text));
+        let file = folder.path().join("peers.toml");
+        assert!(is_own(&file));
+        // a script of it, or the file itself, is another
+        copy(OWN[2].0, "import os");
+        assert!(!is_own(&file));
+        copy(OWN[2].0, OWN[2].1);
+        copy("peers.toml", "[[peer]]\nname = 'a'\nrun = ['touch', 'x']\nkernels = ['k']\n");
+        assert!(!is_own(&file));
+        // whatever it runs or compiles is among the files that are compared
+        for peer in read(&ours).unwrap() {
+            for word in peer.build.iter().chain(&peer.run).filter_map(|w| w.strip_prefix("{dir}/")) {
+                assert!(OWN.iter().any(|(name, _)| *name == word), "{word}");
+            }
+        }
+    }
+
     #[test]
     fn errors_name_the_line() {
         let peer = "[[peer]]\nname = 'a'\nrun = ['a']\nkernels = ['k']\n";
@@ -216,6 +277,13 @@ mod tests {
         assert!(error_of("\n\n[[peer]\n").starts_with("FILE: line 3: "));
         assert!(error_of(&format!("{peer}\n{peer}")).starts_with("FILE: line 6: there are two peers called `a`"));
         assert!(error_of(&format!("{peer}baselines = ['x']\n")).contains("`x` is not among its kernels"));
+        for name in ["../a", "a/b", ".a", "a\u{1b}[31m"] {
+            assert!(
+                error_of(&format!("[[peer]]\nname = {name:?}\nrun = ['a']\nkernels = ['k']\n").replace("\\u{1b}", "\\u001b"))
+                    .contains("one word")
+            );
+        }
+        assert!(error_of(&format!("{peer}sources = ['../../x']\n")).contains("not below"));
         assert!(error_of("[[peer]]\nname = 'a b'\nrun = ['a']\nkernels = ['k']\n").contains("one word"));
         assert!(error_of("[[peer]]\nname = 'a'\nrun = []\nkernels = ['k']\n").contains("no command"));
         assert!(error_of("[[peer]]\nname = 'a'\nrun = ['a']\n").contains("kernels"));

@@ -59,7 +59,7 @@ pub struct BenchRaysArgs {
     /// Keep alpha masks; otherwise they are treated as opaque, because peers do not support them
     #[arg(long)]
     pub alpha: bool,
-    /// Peers to compare with: a file like benches/peers.toml, or `none` [default: benches/peers.toml if it exists]
+    /// Peers to compare with: a file like benches/peers.toml, or `none`: its commands are run [default: benches/peers.toml if it is the one of this version]
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub peers: Option<String>,
     /// Options of every benchmark
