@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, ValueHint};
 
 use crate::integrators::rays::Mode;
+use crate::scene::SceneSettings;
 use crate::settings::parse::parse_limit;
 use crate::terminal::console::Verbosity;
 use crate::tracer::DeviceSettings;
@@ -57,6 +58,9 @@ pub struct ExportArgs {
     /// File to write: .bin (triangle soup in world space), .glb or .gltf
     #[arg(value_hint = ValueHint::FilePath)]
     pub output: PathBuf,
+    /// Meaning of the file
+    #[command(flatten)]
+    pub meaning: SceneSettings,
     /// How results are shown
     #[command(flatten)]
     pub verbosity: Verbosity,

@@ -22,7 +22,8 @@ pub fn run(args: &ExportArgs) -> Result<()> {
         }
     };
     files::check_writable(&args.output)?;
-    let scene = load::load(&args.scene)?;
+    let mut scene = load::load(&args.scene)?;
+    args.meaning.apply(&mut scene);
     let mut warnings = Warnings::new(console);
     warnings_of(&scene).iter().for_each(|w| warnings.add(w));
     let written = write(&scene, &args.output)?;

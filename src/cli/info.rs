@@ -10,7 +10,7 @@ use crate::renderer::interactive::camera_settings;
 use crate::renderer::settings::CameraSettings;
 use crate::renderer::{RenderSettings, Renderer};
 use crate::scene::inventory::Inventory;
-use crate::scene::{Camera, Scene, load};
+use crate::scene::{Camera, Scene, SceneSettings, load};
 use crate::settings::Length;
 use crate::terminal::console::Failure;
 use crate::terminal::interrupt::{self, SilentControl};
@@ -37,6 +37,9 @@ pub struct InfoArgs {
     /// Describe the file alone: no device is opened, and nothing is rendered
     #[arg(long)]
     pub no_device: bool,
+    /// Meaning of the file
+    #[command(flatten)]
+    pub meaning: SceneSettings,
     /// Device and tracer
     #[command(flatten)]
     pub device: DeviceSettings,
@@ -76,7 +79,8 @@ struct OnDevice {
 pub fn run(args: &InfoArgs) -> Result<(), Failure> {
     interrupt::install();
     let console = crate::terminal::console::Console { json: args.json, quiet: false };
-    let scene = load::load(&args.scene)?;
+    let mut scene = load::load(&args.scene)?;
+    args.meaning.apply(&mut scene);
     let mut warnings = Warnings::new(console);
     warnings_of(&scene).iter().for_each(|w| warnings.add(w));
     let inventory = Inventory::of(&scene);
@@ -216,7 +220,7 @@ fn on_device(args: &InfoArgs, scene: Scene, progress: &mut Progress) -> Result<(
     let device = crate::gpu::Device::open(&args.device.options())?;
     let mut renderer = Renderer::new(device, scene, &args.device)?.with_name(&args.scene);
     let mut control = SilentControl;
-    let mut settings = RenderSettings::default();
+    let mut settings = RenderSettings { scene: args.meaning.clone(), ..Default::default() };
     settings.image.size = Some(SKETCH_SIZE);
     settings.image.spp = Some(SKETCH_SPP);
 
@@ -240,7 +244,7 @@ fn on_device(args: &InfoArgs, scene: Scene, progress: &mut Progress) -> Result<(
     let choices = by_itself.choices.into_iter().chain(path.setup.choices).collect();
 
     progress.set(3, 4);
-    let mut frames = RenderSettings { camera: settings.camera.clone(), ..Default::default() };
+    let mut frames = RenderSettings { scene: args.meaning.clone(), camera: settings.camera.clone(), ..Default::default() };
     frames.image.size = Some(FRAME_SIZE);
     frames.frames.preset = Some(crate::realtime::Preset::Balanced);
     frames.frames.warm_up = Some(1);

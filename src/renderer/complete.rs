@@ -25,11 +25,12 @@ pub struct Completed {
 }
 
 impl Renderer {
-    /// Lights the scene as settings say and completes them. `camera`: instead of that of the settings.
+    /// Understands and lights the scene as settings say and completes them. `camera`: instead of that of the settings.
     ///
     /// # Errors
     /// Those of the settings that do not fit the scene.
     pub fn complete(&mut self, settings: &RenderSettings, camera: Option<Camera>) -> Result<Completed> {
+        self.understand(&settings.scene);
         let is_default = settings.lighting == LightingSettings::default();
         let integrator = settings.integrator().get();
         let capabilities = integrator.capabilities();

@@ -46,7 +46,7 @@ use crate::film::Control;
 use crate::gpu::{Device, KeptPipelines};
 use crate::integrators::lighting::LightingSettings;
 use crate::output::Image;
-use crate::scene::{Environment, Scene, load};
+use crate::scene::{Environment, Scene, SceneSettings, load};
 use crate::shaders::StreamShaders;
 use crate::tracer::{ComputeOptions, DeviceSettings, Needs, Tracer, TracerKind};
 
@@ -221,6 +221,14 @@ impl Renderer {
     fn keep_pipelines(&mut self) {
         self.pipelines = self.device.live_pipelines();
         self.device.save_pipeline_cache();
+    }
+
+    /// Gives the scene's file the meaning that settings say.
+    pub(crate) fn understand(&mut self, settings: &SceneSettings) {
+        if settings.apply(&mut self.scene) {
+            // the traced scene changes
+            self.tracer = None;
+        }
     }
 
     /// Adds the lights of the settings to the scene, and removes those of the previous settings.

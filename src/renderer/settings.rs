@@ -21,7 +21,7 @@ use crate::output::tone_map::ToneMap;
 #[cfg(feature = "cli")]
 use crate::realtime::Preset;
 use crate::realtime::frame_settings::FrameSettings;
-use crate::scene::{Camera, Projection, Scene};
+use crate::scene::{Camera, Projection, Scene, SceneSettings};
 #[cfg(feature = "cli")]
 use crate::settings::parse::{parse_fov, parse_number, parse_target, parse_time, parse_vector, usage_message};
 use crate::settings::{AppliesTo, Capability, GivenSetting, Setting, settings};
@@ -226,6 +226,10 @@ pub struct RenderSettings {
     /// The image.
     #[cfg_attr(feature = "cli", command(flatten))]
     pub image: ImageSettings,
+    /// Meaning of the scene's file.
+    #[serde(skip_serializing_if = "crate::settings::is_default")]
+    #[cfg_attr(feature = "cli", command(flatten))]
+    pub scene: SceneSettings,
     /// The camera.
     #[cfg_attr(feature = "cli", command(flatten))]
     pub camera: CameraSettings,
@@ -305,6 +309,7 @@ impl RenderSettings {
         let mut out = self.without_replaced(other);
         out.integrator = other.integrator.or(out.integrator);
         out.image.override_with(&other.image);
+        out.scene.override_with(&other.scene);
         out.camera.override_with(&other.camera);
         out.integrators.ao.override_with(&other.integrators.ao);
         out.integrators.path.override_with(&other.integrators.path);
@@ -342,6 +347,7 @@ impl RenderSettings {
     pub(super) fn retain(&mut self, keeps: &dyn Fn(&str) -> bool) {
         let keeps = |name: &str, _: AppliesTo| keeps(name);
         self.image.retain(&keeps);
+        self.scene.retain(&keeps);
         self.camera.retain(&keeps);
         self.integrators.ao.retain(&keeps);
         self.integrators.path.retain(&keeps);
@@ -360,6 +366,7 @@ impl RenderSettings {
     pub fn given(&self) -> Vec<GivenSetting> {
         [
             self.image.given(),
+            self.scene.given(),
             self.camera.given(),
             self.integrators.given(),
             self.lighting.given(),
@@ -408,6 +415,7 @@ impl RenderSettings {
     /// All settings but the integrator, for editors.
     pub fn editable(&mut self) -> Vec<Setting<'_>> {
         let mut all = self.image.editable();
+        all.extend(self.scene.editable());
         all.extend(self.camera.editable());
         all.extend(self.integrators.ao.editable());
         all.extend(self.integrators.path.editable());
@@ -533,7 +541,7 @@ mod tests {
             <Alone as clap::Parser>::try_parse_from(args).unwrap().settings
         };
         let given = "--integrator path --spp 3 --size 20x10 --aov depth,ids --eye -1,2.5,3e-7 --target 0,0,0 --fov-y 30 --max-depth 4 \
-            --energy-compensation --tone-map agx --exposure -1.5 --environment 1,1,1 --resumable --ao-radius 1.25 --preset fast --frames 2..5 --show depth";
+            --energy-compensation --tone-map agx --exposure -1.5 --environment 1,1,1 --resumable --ao-radius 1.25 --preset fast --frames 2..5 --show depth --mtl-dissolve glass";
         let mut given: Vec<String> = given.split_whitespace().map(str::to_owned).collect();
         for light in ["sphere position=1,2,3 radius=0.5 radiance=4", "sun direction=0,-1,0 irradiance=2"] {
             given.extend(["--light".to_owned(), light.to_owned()]);

@@ -182,6 +182,8 @@ pub struct Material {
     pub specular_color: Vec3,
     /// Transmitted colour of MTL/.brhan (`Tf`, `transmittance[]`).
     pub transmittance: Vec3,
+    /// `d` of an MTL material where it is below 1 and nothing else says glass: what it means is a setting ([`super::SceneSettings`]).
+    pub mtl_dissolve: Option<f32>,
     /// KHR_materials_unlit.
     pub unlit: bool,
     /// KHR_materials_clearcoat.
@@ -223,6 +225,7 @@ impl Default for Material {
             ior: 1.5,
             specular_color: Vec3::ZERO,
             transmittance: Vec3::ZERO,
+            mtl_dissolve: None,
             unlit: false,
             clearcoat: Clearcoat::default(),
             sheen: Sheen::default(),

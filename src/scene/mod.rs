@@ -19,6 +19,7 @@ pub mod material;
 pub mod mesh;
 pub mod motion;
 pub mod orbit;
+pub mod settings;
 pub mod texture;
 
 pub use animation::AnimationRig;
@@ -30,6 +31,7 @@ pub use material::{AlphaMode, Material, TextureSlot};
 pub use mesh::{Geometry, Mesh, Sphere, TriangleMesh};
 pub use motion::Motion;
 pub use orbit::Orbit;
+pub use settings::SceneSettings;
 pub use texture::{Filter, TexelData, Texture, Wrap};
 
 use std::path::PathBuf;
@@ -177,9 +179,13 @@ impl Scene {
     /// centre of the bounds for one that lies far away from it compared with its size, so that single precision is spent
     /// on the scene and not on its distance. Rounded to f32, so that subtracting it is exact where it can be.
     pub fn origin(&self) -> DVec3 {
-        let Some((lo, hi)) = self.bounds() else { return DVec3::ZERO };
-        let (centre, extent) = ((lo + hi) * 0.5, (hi - lo).max_element());
-        // up to four times its own size away costs two bits; leave such scenes where they are
-        if centre.abs().max_element() <= 4.0 * extent { DVec3::ZERO } else { centre.as_vec3().as_dvec3() }
+        self.bounds().map_or(DVec3::ZERO, |(lo, hi)| distant_centre(lo, hi))
     }
+}
+
+/// The centre of bounds that are far from the origin for their size, rounded to f32; zero for others.
+pub(crate) fn distant_centre(lo: DVec3, hi: DVec3) -> DVec3 {
+    let (centre, extent) = ((lo + hi) * 0.5, (hi - lo).max_element());
+    // up to four times its own size away costs two bits; leave such scenes where they are
+    if centre.abs().max_element() <= 4.0 * extent { DVec3::ZERO } else { centre.as_vec3().as_dvec3() }
 }

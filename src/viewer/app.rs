@@ -502,6 +502,7 @@ impl App {
             scene: self.source.clone(),
             load: self.load,
             device: self.device_settings.clone(),
+            meaning: self.settings.scene.clone(),
             lighting: self.lighting.clone(),
             animation: self.playback.animation,
             time: self.playback.time,

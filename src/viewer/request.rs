@@ -12,7 +12,7 @@ use crate::renderer::RenderSettings;
 use crate::renderer::interactive::{Pick, ViewPicture, ViewStep};
 use crate::renderer::settings::CameraSettings;
 use crate::renderer::survey::radius::Openness;
-use crate::scene::Camera;
+use crate::scene::{Camera, SceneSettings};
 use crate::tracer::DeviceSettings;
 
 /// Index of an image: the first, the second or the truth ([`TRUTH`]).
@@ -30,6 +30,8 @@ pub struct Request {
     pub load: u64,
     /// Device and tracer.
     pub device: DeviceSettings,
+    /// Meaning of the scene's file.
+    pub meaning: SceneSettings,
     /// Lights beside the scene's.
     pub lighting: LightingSettings,
     /// The animation to play, an index.

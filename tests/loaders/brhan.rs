@@ -118,3 +118,21 @@ fn errors_name_the_line() {
     let text = folder.load("a.brhan", "Model file[m.obj]").map(|_| ()).unwrap_err().to_string();
     assert!(text.contains("m.obj: line 1"), "{text}");
 }
+
+/// Eight digits are kept, whatever the text is encoded in and its lines end with.
+#[test]
+fn far_from_the_origin() {
+    let folder = Folder::new();
+    folder.write("m.obj", OBJ);
+    let text =
+        "Sphere center[448262.387 35.5 -5411932.75] radius[0.1]\rModel file[M.obj] translate[448262.387 35.5 -5411932.75]\r";
+    let scene = folder.load("a.brhan", format!("\u{feff}{text}")).unwrap();
+    let place = DVec3::new(448_262.387, 35.5, -5_411_932.75);
+    for instance in &scene.instances {
+        let centre = instance.object_to_world.transform_point3(DVec3::ZERO);
+        assert!((centre - place).length() < 1e-9, "{centre}");
+    }
+    let Geometry::Spheres(spheres) = &scene.meshes[0].geometry else { panic!() };
+    assert_eq!(spheres[0].center, Vec3::ZERO);
+    assert!(scene.report.warnings.is_empty(), "{:?}", scene.report.warnings);
+}

@@ -86,7 +86,8 @@ fn check_cut(outline: &[[f32; 2]]) {
             sum += signed.abs();
             // texture coordinates stay with their corners
             for &i in t {
-                assert_eq!(m.positions[i as usize].to_array(), place(m.texcoords[0][i as usize].into()));
+                let position = scene.instances[0].object_to_world.transform_point3(m.positions[i as usize].as_dvec3());
+                assert_eq!(position.as_vec3().to_array(), place(m.texcoords[0][i as usize].into()));
             }
         }
         // all turn the same way and add up: they cover the polygon once
@@ -157,16 +158,219 @@ fn faces_without_area_are_left_out() {
     assert!(error("v 0 0 0\nf 1 9\n").contains("vertex 9"));
 }
 
-/// Text that is no UTF-8 is named for what it is.
+/// A triangle that is red by a material of its name alone.
+const RED: &str = "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl red\nf 1 2 3\n";
+
+/// The colour of the first mesh.
+fn color(scene: &Scene) -> [f32; 3] {
+    scene.materials[scene.meshes[0].material].base_color.truncate().to_array()
+}
+
 #[test]
-fn utf_16_is_refused() {
+fn encodings_and_byte_order_marks() {
     let folder = Folder::new();
-    for mark in [[0xfe, 0xff], [0xff, 0xfe]] {
-        let units = "v 0 0 0\nf 1 1 1\n".encode_utf16();
-        let text = units.flat_map(|u| if mark[0] == 0xfe { u.to_be_bytes() } else { u.to_le_bytes() });
-        let error = folder.load("a.obj", mark.into_iter().chain(text).collect::<Vec<u8>>()).err().unwrap().to_string();
-        assert!(error.contains("UTF-16 text; save it as UTF-8"), "{error}");
+    for first in ["", "v 9 9 9\n"] {
+        let text = format!("{first}{RED}");
+        let mtl = "newmtl red\nKd 1 0 0\n";
+        for encode in [
+            |t: &str| [b"\xef\xbb\xbf", t.as_bytes()].concat(),
+            |t: &str| [b"\xfe\xff".to_vec(), t.encode_utf16().flat_map(u16::to_be_bytes).collect()].concat(),
+            |t: &str| [b"\xff\xfe".to_vec(), t.encode_utf16().flat_map(u16::to_le_bytes).collect()].concat(),
+            |t: &str| t.encode_utf16().flat_map(u16::to_le_bytes).collect(),
+            |t: &str| t.replace('\n', "\r").into_bytes(),
+            |t: &str| t.replace('\n', "\r\n").into_bytes(),
+            |t: &str| format!("{}\0\0\0", t.replace(' ', "\t")).into_bytes(),
+        ] {
+            folder.write("a.mtl", encode(mtl));
+            let scene = folder.load("a.obj", encode(&text)).unwrap();
+            assert_eq!((color(&scene), scene.report.warnings.len()), ([1.0, 0.0, 0.0], 0), "{:?}", scene.report.warnings);
+        }
     }
+}
+
+/// Names are bytes; so are those of files.
+#[test]
+fn names_that_are_no_utf_8() {
+    let folder = Folder::new();
+    let names = [&b"r\xe9d"[..], b"r\xe8d", b"r\xc3\xa9d", b"\xc4\xbe\xcd\xb7", b"\xc4\xbe\xcd\xb8", b"\x95\x5c"];
+    let mut mtl = Vec::new();
+    let mut obj = b"mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\n".to_vec();
+    for (k, name) in names.iter().enumerate() {
+        mtl.extend([b"newmtl ", *name, format!("\nKd 0.{k} 0 0\n").as_bytes()].concat());
+        obj.extend([b"o ", *name, b"\nusemtl ", *name, b"\nf 1 2 3\n"].concat());
+    }
+    folder.write("a.mtl", mtl);
+    let scene = folder.load("a.obj", obj).unwrap();
+    let colors: Vec<f32> = scene.meshes.iter().map(|m| scene.materials[m.material].base_color.x).collect();
+    assert_eq!(colors, [0.0, 0.1, 0.2, 0.3, 0.4, 0.5]);
+    assert_eq!((scene.meshes[0].name.as_str(), scene.meshes[5].name.as_str()), ("réd", "\\x95\\"));
+
+    // a picture whose name is UTF-8 on this disk and Latin-1 in the file, and one that is Latin-1 on both
+    folder.write("t\u{e9}.png", png(1, 1, [1, 2, 3, 255]));
+    folder.write("a.mtl", b"newmtl m\nmap_Kd t\xe9.png\n");
+    let text = "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl m\nf 1 2 3\n";
+    assert_eq!(folder.load("a.obj", text).unwrap().textures.len(), 1);
+}
+
+#[test]
+fn lists_of_libraries() {
+    let folder = Folder::new();
+    folder.write("blue.mtl", "newmtl blue\nKd 0 0 1\nnewmtl both\nKd 0 0 1\n");
+    folder.write("red.mtl", "newmtl red\nKd 1 0 0\nnewmtl both\nKd 1 0 0\n");
+    folder.write("my own lib.mtl", "newmtl green\nKd 0 1 0\n");
+    let load = |libraries: &str, material: &str| {
+        let text = RED.replace("mtllib a.mtl", libraries).replace("usemtl red", &format!("usemtl {material}"));
+        let scene = folder.load("a.obj", text).unwrap();
+        assert!(scene.report.warnings.is_empty(), "{libraries}: {:?}", scene.report.warnings);
+        color(&scene)
+    };
+    let (red, green, blue) = ([1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]);
+    assert_eq!(load("mtllib blue.mtl red.mtl", "red"), red);
+    // the first file that has the name counts
+    assert_eq!(load("mtllib blue.mtl red.mtl", "both"), blue);
+    assert_eq!(load("mtllib red.mtl\nmtllib blue.mtl\nmtllib red.mtl", "both"), red);
+    assert_eq!(load("mtllib \"red.mtl\"", "red"), red);
+    for list in
+        ["my own lib.mtl", "\"my own lib.mtl\"", "red.mtl my own lib.mtl blue.mtl", "\"red.mtl\" \"my own lib.mtl\" # all"]
+    {
+        assert_eq!(load(&format!("mtllib {list}"), "green"), green, "{list}");
+    }
+    assert_eq!(load("mtllib C:\\models\\red.mtl", "red"), red);
+    assert_eq!(load("mtllib RED.MTL", "red"), red);
+    let text = RED.replace("a.mtl", "red.mtl gone.mtl");
+    let scene = folder.load("b.obj", text).unwrap();
+    assert_eq!(color(&scene), red);
+    assert!(scene.report.warnings[0].contains("`gone.mtl` was not found"), "{:?}", scene.report.warnings);
+}
+
+#[test]
+fn a_library_of_the_same_name_needs_no_mention() {
+    let folder = Folder::new();
+    folder.write("Model.MTL", "newmtl red\nKd 1 0 0\n");
+    let scene = folder.load("model.obj", RED.replace("mtllib a.mtl\n", "")).unwrap();
+    assert_eq!((color(&scene), scene.report.warnings.len()), ([1.0, 0.0, 0.0], 0));
+    let scene = folder.load("model.obj", RED.replace("a.mtl", "lost.mtl")).unwrap();
+    assert_eq!(color(&scene), [1.0, 0.0, 0.0]);
+    assert!(scene.report.warnings[0].ends_with("model.mtl is read in its place"), "{:?}", scene.report.warnings);
+    // without materials, none is looked for
+    let scene = folder.load("model.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
+    assert_eq!(scene.materials.len(), 1);
+}
+
+#[test]
+fn names_of_materials() {
+    let folder = Folder::new();
+    let mtl =
+        "newmtl Material #25\nKd 1 0 0\nnewmtl Material #26\nKd 0 1 0\nnewmtl \"a b\"\nKd 0 0 1\nnewmtl x # note\nKd 1 1 0\n";
+    folder.write("a.mtl", mtl);
+    let of = |name: &str| {
+        let scene = folder.load("a.obj", RED.replace("usemtl red", &format!("usemtl {name}"))).unwrap();
+        (color(&scene), scene.report.warnings.len())
+    };
+    assert_eq!(of("Material #25"), ([1.0, 0.0, 0.0], 0));
+    assert_eq!(of("Material #26 # a comment"), ([0.0, 1.0, 0.0], 0));
+    assert_eq!((of("a b"), of("\"a b\"")), (([0.0, 0.0, 1.0], 0), ([0.0, 0.0, 1.0], 0)));
+    assert_eq!((of("x"), of("X\t")), (([1.0, 1.0, 0.0], 0), ([1.0, 1.0, 0.0], 0)));
+    // no name is no material, and nothing to be said
+    assert_eq!((of(""), of("other").1), (([0.8; 3], 0), 1));
+}
+
+#[test]
+fn numbers_as_programs_write_them() {
+    let text = "v 1.0e+03 -5. .5\nv 1,5 2,25 -0,5\nv 1.0D+1 0 0\nvt nan(ind) -1.#IND\nvn 1.#QNAN 0 0\nf 1/1/1 2/1/1 3/0/0\n";
+    let scene = Folder::new().load("a.obj", text).unwrap();
+    assert_eq!(corners(mesh(&scene, 0)), [[[1000.0, -5.0, 0.5], [1.5, 2.25, -0.5], [10.0, 0.0, 0.0]]]);
+    assert!(scene.report.warnings.iter().any(|w| w.contains("3 numbers have a decimal comma")), "{:?}", scene.report.warnings);
+    assert!(mesh(&scene, 0).normals.iter().all(|n| n.is_normalized()));
+    assert!(error("v 1,2,3 0 0\n").contains("`1,2,3` is not a number"));
+    assert!(error("v 1.#INF 0 0\n").contains("is not finite"));
+}
+
+/// A comment may end with the backslash of a folder.
+#[test]
+fn comments_are_not_continued() {
+    let scene = Folder::new().load("a.obj", "# C:\\models\\\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 \\\n3\n").unwrap();
+    assert_eq!(corners(mesh(&scene, 0)), [TRIANGLE]);
+}
+
+#[test]
+fn far_from_the_origin() {
+    let at = |x: f64, y: f64, z: f64| {
+        let mut text = String::new();
+        for [dx, dy, dz] in [[0.0, 0.0, 0.0], [0.137, 0.0, 0.0], [0.137, 0.0831, 1.5]] {
+            text += &format!("v {:.4} {:.4} {:.4}\n", x + dx, y + dy, z + dz);
+        }
+        text + "v 0 0 0\ng a\nf 1 2 3\ng b\nf 3 2 1\n"
+    };
+    let folder = Folder::new();
+    let near = folder.load("near.obj", at(0.0, 0.0, 0.0)).unwrap();
+    let far = folder.load("far.obj", at(448_262.25, 35.5, -5_411_932.75)).unwrap();
+    assert_eq!(near.instances[0].object_to_world, glam::DAffine3::IDENTITY);
+    // the vertex that nothing uses does not count, and meshes that touch have one place
+    assert_eq!(far.instances[0].object_to_world, far.instances[1].object_to_world);
+    let place =
+        |scene: &Scene, k: usize| scene.instances[0].object_to_world.transform_point3(mesh(scene, 0).positions[k].as_dvec3());
+    for k in 0..3 {
+        let expected = place(&near, k) + glam::DVec3::new(448_262.25, 35.5, -5_411_932.75);
+        assert!((place(&far, k) - expected).length() < 1e-6, "{} {expected}", place(&far, k));
+    }
+    assert!((far.origin() - place(&far, 0)).length() < 2.0);
+}
+
+/// An octahedron whose faces are in a smoothing group, but for the first.
+#[test]
+fn smoothing_groups() {
+    let vertices = "v 1 0 0\nv -1 0 0\nv 0 1 0\nv 0 -1 0\nv 0 0 1\nv 0 0 -1\n";
+    let faces = "f 1 3 5\ns 1\nf 3 2 5\nf 2 4 5\nf 4 1 5\nf 3 1 6\nusemtl other\nf 2 3 6\nf 4 2 6\nf 1 4 6\n";
+    let scene = Folder::new().load("a.obj", format!("{vertices}{faces}")).unwrap();
+    let m = mesh(&scene, 0);
+    let normals = |t: usize| m.indices[t].map(|i| m.normals[i as usize]);
+    // flat, with corners of its own
+    let flat = Vec3::splat(1.0 / 3f32.sqrt());
+    assert!(normals(0).iter().all(|n| n.abs_diff_eq(flat, 1e-6)), "{:?}", normals(0));
+    // what is around (0, -1, 0) is in the group, also beyond the change of material
+    let around = m.indices[2].iter().zip(normals(2)).find(|(i, _)| m.positions[**i as usize] == Vec3::NEG_Y).unwrap().1;
+    assert!(around.abs_diff_eq(Vec3::NEG_Y, 1e-6), "{around}");
+    assert_eq!(scene.report.normals_computed, 2);
+    // `off`, no group, and normals that the file has
+    for faces in ["s off\nf 1 3 5\nf 3 2 5\n", "f 1 3 5\nf 3 2 5\n", "s 1\ns 0\nf 1 3 5\nf 3 2 5\n"] {
+        let scene = Folder::new().load("a.obj", format!("{vertices}{faces}")).unwrap();
+        assert!(mesh(&scene, 0).normals.is_empty(), "{faces}");
+    }
+    let scene = Folder::new().load("a.obj", format!("{vertices}vn 1 0 0\ns 1\nf 1//1 3//1 5//1\nf 3//1 2//1 5//1\n")).unwrap();
+    assert!(mesh(&scene, 0).normals.iter().all(|n| *n == Vec3::X));
+}
+
+/// Sixty thousand corners of one position are no matter of squares.
+#[test]
+fn many_corners_at_a_position() {
+    let mut text = "v 0 0 0\nv 1 0 0\nv 0 1 0\n".to_owned();
+    for i in 0..60_000 {
+        text += &format!("vt {} {i}\ns {i}\nf 1/{c} 2/{c} 3/{c}\nf 1 2 3\n", i % 1000, c = i + 1);
+    }
+    let start = std::time::Instant::now();
+    let scene = Folder::new().load("a.obj", text).unwrap();
+    assert_eq!(scene.triangle_count(), 120_000);
+    assert!(start.elapsed().as_secs() < 10, "{:?}", start.elapsed());
+}
+
+/// A kind of warning is said once with a count, however large the file is.
+#[test]
+fn warnings_are_bounded() {
+    let folder = Folder::new();
+    let mut mtl = String::new();
+    for i in 0..2000 {
+        mtl += &format!("newmtl m{i}\nmap_Kd gone {i}.png\nmap_Ks s.png\nKd x\n");
+    }
+    folder.write("a.mtl", mtl);
+    let mut text = "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\n".to_owned();
+    for i in 0..2000 {
+        text += &format!("mtllib gone{i}.mtl\nusemtl {}{i}\nf 1 2 3\nf 1 1 1\n", "long".repeat(1000));
+    }
+    let scene = folder.load("a.obj", text).unwrap();
+    let warnings = &scene.report.warnings;
+    assert!(warnings.len() < 10 && warnings.iter().all(|w| w.len() < 2000), "{} warnings: {:.500?}", warnings.len(), warnings);
+    assert!(warnings.iter().any(|w| w.contains("map_Ks is not used (and 1999 more of this kind)")), "{warnings:?}");
 }
 
 #[test]
@@ -198,22 +402,77 @@ fn materials() {
     assert!(scene.report.warnings.is_empty(), "{:?}", scene.report.warnings);
 }
 
+/// `d` is coverage, and `Tr` is 1 - d.
 #[test]
 fn opacity_in_its_many_spellings() {
     let folder = Folder::new();
-    let kind = |mtl: &str| {
+    let material = |mtl: &str| {
         let scene = with_mtl(&folder, &format!("newmtl m\n{mtl}\n"));
-        let m = &scene.materials[0];
-        assert_eq!((m.alpha_mode, m.base_color.w), (AlphaMode::Opaque, 1.0), "{mtl}");
-        m.kind
+        scene.materials[0].clone()
     };
-    for opaque in ["d 1", "d 1\nTr 0", "d 1\nTr 1", "Tr 1", "Tr 0", ""] {
-        assert_eq!(kind(opaque), MaterialKind::MetallicRoughness, "{opaque}");
+    for opaque in ["d 1", "d 1\nTr 0", "d 1\nTr 1", "Tr 1", "Tr 0", "", "d 2", "d -halo 1"] {
+        let m = material(opaque);
+        assert_eq!(
+            (m.kind, m.alpha_mode, m.base_color.w),
+            (MaterialKind::MetallicRoughness, AlphaMode::Opaque, 1.0),
+            "{opaque}"
+        );
     }
-    for glass in ["d 0", "Tr 0.9", "d 0.5\nillum 2", "illum 7\nTf 0.1 0.1 0.1", "d -halo 0.5"] {
-        assert_eq!(kind(glass), MaterialKind::Glass, "{glass}");
+    for (mtl, alpha) in [
+        ("d 0", 0.0),
+        ("d 0.999", 0.999),
+        ("Tr 0.75", 0.25),
+        ("d 0.5\nTr 0.25", 0.5),
+        ("d 0.5\nillum 2\nNi 1.5", 0.5),
+        ("d -halo 0.5", 0.5),
+        ("d -1", 0.0),
+        ("d 0.5\nTf 1 1 1", 0.5),
+        ("d 0.5\nTf 0 0 0\nNi 1.5", 0.5),
+        // 3ds Max: Tf is a copy of d
+        ("Ni 1.5\nd 0.25\nTr 0.75\nTf 0.25 0.25 0.25\nillum 2", 0.25),
+    ] {
+        let m = material(&format!("Kd 1 0.5 0\n{mtl}"));
+        assert_eq!((m.kind, m.alpha_mode), (MaterialKind::MetallicRoughness, AlphaMode::Blend), "{mtl}");
+        assert_eq!(m.base_color, Vec4::new(1.0, 0.5, 0.0, alpha), "{mtl}");
     }
-    assert_eq!(kind("Kd 0 0 0\nKs 0.95 0.95 0.95\nillum 5"), MaterialKind::Mirror);
+    for glass in [
+        "illum 7\nTf 0.1 0.1 0.1",
+        "illum 4",
+        "illum 6\nd 0.5",
+        "illum 9\nNi 1.3",
+        "Tf 0.9 0.9 0.9\nNi 1.5",
+        "d 0\nTf 1 1 1\nNi 1.5\nillum 2",
+    ] {
+        let m = material(glass);
+        assert_eq!((m.kind, m.alpha_mode, m.base_color.w), (MaterialKind::Glass, AlphaMode::Opaque, 1.0), "{glass}");
+    }
+    // what 3ds Max and Maya write of every opaque surface
+    for opaque in ["Ni 1.5\nd 1\nTr 0\nTf 1 1 1\nillum 2", "illum 4\nKd 0.5 0.5 0.5\nTf 1.00 1.00 1.00\nNi 1.00"] {
+        assert_eq!((material(opaque).kind, material(opaque).alpha_mode), (MaterialKind::MetallicRoughness, AlphaMode::Opaque));
+    }
+    assert_eq!(material("Kd 0 0 0\nKs 0.95 0.95 0.95\nillum 5").kind, MaterialKind::Mirror);
+    // a library in which all is hidden has d for Tr; one in which something shows has not
+    let scene = with_mtl(&folder, "newmtl m\nTr 1\nnewmtl n\nTr 0\n");
+    assert_eq!((scene.materials[0].alpha_mode, scene.materials[0].base_color.w), (AlphaMode::Blend, 0.0));
+}
+
+/// Exporters that write `d` for glass have a setting, which can be changed at any time.
+#[test]
+fn dissolve_as_glass() {
+    use skylit::scene::settings::{MtlDissolve, SceneSettings};
+    let folder = Folder::new();
+    let mut scene = with_mtl(&folder, "newmtl m\nKd 1 0 0\nd 0.5\nTf 0.5 0.5 0.5\nnewmtl n\nnewmtl k\nillum 7\n");
+    let before = scene.materials.clone();
+    let glass = SceneSettings { mtl_dissolve: Some(MtlDissolve::Glass) };
+    assert!(glass.apply(&mut scene) && !glass.apply(&mut scene));
+    let m = &scene.materials[0];
+    assert_eq!(
+        (m.kind, m.alpha_mode, m.base_color.w, m.transmission.factor),
+        (MaterialKind::Glass, AlphaMode::Opaque, 1.0, 1.0)
+    );
+    assert_eq!((m.transmittance, &scene.materials[1..]), (Vec3::splat(0.5), &before[1..]));
+    assert!(SceneSettings::default().apply(&mut scene));
+    assert_eq!(scene.materials, before);
 }
 
 #[test]
@@ -230,20 +489,98 @@ fn textures_are_found_where_they_may_lie() {
     assert!(scene.report.warnings[0].contains("gone.png"), "{:?}", scene.report.warnings);
 }
 
+/// Paths of other machines, and names that are not spelled as on this disk.
 #[test]
-fn opacity_maps_become_masks() {
+fn textures_with_names_of_other_machines() {
+    let folder = Folder::new();
+    for name in ["t.png", "maps/wood bark.png", "100%.png", "Gr\u{fc}n.png", "sharp #1.png"] {
+        folder.write(name, png(1, 1, [10, 20, 30, 255]));
+    }
+    for name in [
+        "C:\\Users\\me\\maps\\t.png",
+        "/home/someone/t.png",
+        "\\\\server\\share\\maps\\wood bark.png",
+        "D:/project/maps/wood bark.png",
+        "elsewhere/t.png",
+        "..\\..\\textures\\t.png",
+        "T.PNG",
+        "MAPS\\Wood Bark.PNG",
+        "maps/wood%20bark.png",
+        "\"maps/wood bark.png\"",
+        "100%.png",
+        "gr\u{fc}n.png",
+        "sharp #1.png",
+        "t.png # the bark",
+        "-bm 1 -o 0 0 0 -s 1 1 1 maps/wood bark.png",
+        "./t.png",
+    ] {
+        let scene = with_mtl(&folder, &format!("newmtl m\nmap_Kd {name}\n"));
+        assert!(scene.report.warnings.is_empty() && scene.textures.len() == 1, "{name}: {:?}", scene.report.warnings);
+    }
+    let scene = with_mtl(&folder, "newmtl m\nmap_Kd C:\\me\\other.png\n");
+    assert!(
+        scene.report.warnings[0].contains("the texture `C:\\me\\other.png` was not found in"),
+        "{:?}",
+        scene.report.warnings
+    );
+}
+
+#[test]
+fn opacity_maps() {
     let folder = Folder::new();
     folder.write("color.png", png(4, 4, [10, 20, 30, 255]));
     folder.write("alpha.png", png(2, 8, [200, 200, 200, 255]));
+    folder.write("holes.png", png(2, 2, [0, 0, 0, 255]));
     let scene = with_mtl(&folder, "newmtl m\nKd 1 1 1\nd 0.9\nmap_Kd color.png\nmap_d alpha.png\n");
     let m = &scene.materials[0];
-    assert_eq!((m.alpha_mode, m.kind), (AlphaMode::Mask { cutoff: 0.5 }, MaterialKind::MetallicRoughness));
+    assert_eq!((m.alpha_mode, m.kind, m.base_color.w), (AlphaMode::Blend, MaterialKind::MetallicRoughness, 0.9));
     let texture = &scene.textures[m.base_color_texture.unwrap().texture];
     assert_eq!((texture.width, texture.height), (4, 8));
     assert!(texture.texels.as_bytes().chunks(4).all(|p| p == [10, 20, 30, 200]));
     let scene = with_mtl(&folder, "newmtl m\nmap_d alpha.png\n");
-    let texture = &scene.textures[scene.materials[0].base_color_texture.unwrap().texture];
+    let m = &scene.materials[0];
+    assert_eq!((m.alpha_mode, m.base_color.w), (AlphaMode::Blend, 1.0));
+    let texture = &scene.textures[m.base_color_texture.unwrap().texture];
     assert!(texture.texels.as_bytes().chunks(4).all(|p| p == [255, 255, 255, 200]));
+    // yes or no is a mask, as leaves have it
+    let scene = with_mtl(&folder, "newmtl m\nmap_Kd color.png\nmap_d holes.png\n");
+    assert_eq!(scene.materials[0].alpha_mode, AlphaMode::Mask { cutoff: 0.5 });
+}
+
+/// Maps are used, or named.
+#[test]
+fn maps_of_surfaces() {
+    let folder = Folder::new();
+    folder.write("half.png", png(1, 1, [128, 128, 128, 255]));
+    folder.write("dark.png", png(2, 1, [51, 51, 51, 255]));
+    folder.write("normals.png", png(1, 1, [128, 128, 255, 255]));
+    let scene = with_mtl(&folder, "newmtl m\nPr 0.5\nmap_Pr half.png\nmap_Pm dark.png\nmap_Bump -bm 0.5 normals.png\n");
+    let m = &scene.materials[0];
+    assert_eq!((m.roughness, m.metallic, m.normal_scale), (0.5, 1.0, 0.5));
+    let texels = |slot: Option<skylit::scene::TextureSlot>| scene.textures[slot.unwrap().texture].texels.as_bytes();
+    assert_eq!(texels(m.metallic_roughness_texture), [255, 128, 51, 255, 255, 128, 51, 255]);
+    assert_eq!(texels(m.normal_texture), [128, 128, 255, 255]);
+    assert!(scene.report.warnings.is_empty(), "{:?}", scene.report.warnings);
+    // exponents: 51 / 255 of 1000
+    let scene = with_mtl(&folder, "newmtl m\nKs 1 1 1\nNs 1000\nmap_Ns dark.png\n");
+    let m = &scene.materials[0];
+    let expected = ((2.0f32 / 202.0).powf(0.25) * 255.0).round() as u8;
+    assert_eq!((m.roughness, scene.textures[0].texels.as_bytes()[1]), (1.0, expected));
+    // -mm is a base and a gain
+    let scene = with_mtl(&folder, "newmtl m\nKd 1 1 1\nmap_Kd -mm 0.2 0.5 dark.png\nmap_Ke half.png\n");
+    assert_eq!(scene.textures[0].texels.as_bytes()[..4], [77, 77, 77, 255]);
+    assert_eq!(scene.materials[0].emissive, Vec3::ONE);
+    // what is not used is named, and what says nothing new is not
+    let scene = with_mtl(
+        &folder,
+        "newmtl m\nmap_Ka half.png\nmap_Kd half.png\nmap_Ks s.png\nmap_Ns n.png\nrefl -type sphere r.png\ndisp h.png\n\
+         decal d.png\nmap_refl r.png\nbump -bm 2 half.png\nmap_RMA x.png\nmap_aat on\n",
+    );
+    let said = scene.report.warnings.join("\n");
+    for key in ["map_Ks", "map_Ns", "refl", "disp", "decal", "map_refl", "map_bump holds", "map_RMA"] {
+        assert!(said.contains(&format!("{key} ")), "{key}: {said}");
+    }
+    assert!(!said.contains("map_Ka") && !said.contains("map_aat"), "{said}");
 }
 
 #[test]

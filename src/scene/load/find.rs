@@ -1,40 +1,153 @@
 //! Search for files that are referenced by other files, possibly with paths of another machine.
 
+use std::collections::HashMap;
+use std::ffi::OsString;
 use std::path::{Path, PathBuf};
+
+use super::text;
 
 /// Number of parent folders to search above the referencing file's folder.
 const ANCESTORS: usize = 3;
 
-/// Looks for `name` beside the files in `beside` and in up to three folders above each, with and without a leading
-/// `models/`. Backslashes count as slashes. The first that exists wins.
-///
-/// # Errors
-/// The folders that were searched, each once, for the message.
-pub(super) fn find(name: &str, beside: &[&Path]) -> Result<PathBuf, Vec<PathBuf>> {
-    let name = name.replace('\\', "/");
-    let mut names = vec![name.clone()];
-    match name.strip_prefix("models/") {
-        Some(short) => names.push(short.to_owned()),
-        None => names.push(format!("models/{name}")),
-    }
-    let mut searched: Vec<PathBuf> = Vec::new();
-    for file in beside {
-        // absolute, because "scene.obj" has no ancestors to climb to
-        let file = std::path::absolute(file).unwrap_or_else(|_| file.to_path_buf());
-        for folder in file.ancestors().skip(1).take(1 + ANCESTORS) {
-            if searched.iter().any(|s| s == folder) {
-                continue;
-            }
-            if let Some(found) = names.iter().map(|n| folder.join(n)).find(|p| p.is_file()) {
-                return Ok(found);
-            }
-            searched.push(folder.to_owned());
-        }
-    }
-    Err(searched)
+/// Parts at the end of a path of another machine that are looked for: `t.png`, `maps/t.png`, ...
+const MAX_PARTS: usize = 4;
+
+/// Searches folders, which it lists once each.
+#[derive(Default)]
+pub(super) struct Finder {
+    /// Of each folder that was listed: its entries by their names in lower case, sorted.
+    listings: HashMap<PathBuf, HashMap<String, Vec<OsString>>>,
 }
 
-/// The folders of a failed [`find`] as words.
+impl Finder {
+    /// Looks for a file that is referred to as one of `names` (texts of [`text`]), by the files in `beside`. The first that
+    /// exists wins, of these:
+    ///
+    /// 1. The name as it is written, in the folders of `beside` and up to three above each, with and without a leading
+    ///    `models/`; then with backslashes as slashes, without percent-encoding, and from Latin-1.
+    /// 2. The same in another case of letters.
+    /// 3. The end of the name, `maps/t.png` of `C:\me\maps\t.png`; its last part alone beside the files only.
+    ///
+    /// # Errors
+    /// The folders that were searched, each once, for the message.
+    pub(super) fn find(&mut self, names: &[&str], beside: &[&Path]) -> Result<PathBuf, Vec<PathBuf>> {
+        let spellings = spellings(names);
+        let (mut folders, mut own) = (Vec::new(), Vec::new());
+        for file in beside {
+            // absolute, because "scene.obj" has no ancestors to climb to
+            let file = std::path::absolute(file).unwrap_or_else(|_| file.to_path_buf());
+            for (above, folder) in file.ancestors().skip(1).take(1 + ANCESTORS).enumerate() {
+                if !folders.iter().any(|f| f == folder) {
+                    folders.push(folder.to_owned());
+                }
+                if above == 0 && !own.iter().any(|f| f == folder) {
+                    own.push(folder.to_owned());
+                }
+            }
+        }
+        let mut models: Vec<PathBuf> = Vec::new();
+        for spelling in spellings.iter().map(|s| text::path(s)) {
+            let other = spelling.strip_prefix("models").map_or_else(|_| Path::new("models").join(&spelling), Path::to_owned);
+            models.extend([spelling, other]);
+        }
+        let exact = folders.iter().flat_map(|folder| models.iter().map(move |name| folder.join(name)));
+        if let Some(found) = exact.into_iter().find(|p| p.is_file()) {
+            return Ok(found);
+        }
+        for folder in &folders {
+            if let Some(found) = models.iter().find_map(|name| self.in_any_case(folder, name)) {
+                return Ok(found);
+            }
+        }
+        for spelling in &spellings {
+            let parts: Vec<&[u8]> = spelling.split(|b| *b == b'/').filter(|p| !p.is_empty() && *p != b".").collect();
+            let longest = parts.len().saturating_sub(1).min(MAX_PARTS);
+            for count in (1..=longest).rev() {
+                let end = text::path(&parts[parts.len() - count..].join(&b"/"[..]));
+                let searched = if count == 1 { &own } else { &folders };
+                if let Some(found) = searched.iter().find_map(|folder| self.in_any_case(folder, &end)) {
+                    return Ok(found);
+                }
+            }
+        }
+        Err(folders)
+    }
+
+    /// A file below a folder, whatever the case of the letters of its name; the exact name comes first.
+    fn in_any_case(&mut self, folder: &Path, name: &Path) -> Option<PathBuf> {
+        use std::path::Component;
+        let exact = folder.join(name);
+        if exact.is_file() {
+            return Some(exact);
+        }
+        let mut path = folder.to_owned();
+        for component in name.components() {
+            match component {
+                Component::CurDir => {}
+                Component::ParentDir => path.push(".."),
+                Component::Normal(part) if path.join(part).exists() => path.push(part),
+                Component::Normal(part) => {
+                    let entry = self.listing(&path).get(&lower_case(part))?.first()?;
+                    path.push(entry);
+                }
+                Component::RootDir | Component::Prefix(_) => return None,
+            }
+        }
+        path.is_file().then_some(path)
+    }
+
+    fn listing(&mut self, folder: &Path) -> &HashMap<String, Vec<OsString>> {
+        self.listings.entry(folder.to_owned()).or_insert_with(|| {
+            let mut names: Vec<OsString> =
+                std::fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.file_name()).collect();
+            names.sort();
+            let mut listing: HashMap<String, Vec<OsString>> = HashMap::new();
+            for name in names {
+                listing.entry(lower_case(&name)).or_default().push(name);
+            }
+            listing
+        })
+    }
+}
+
+fn lower_case(name: &std::ffi::OsStr) -> String {
+    text::from_bytes(name.as_encoded_bytes()).to_lowercase()
+}
+
+/// The ways in which names may be spelled on disk, the likeliest first, each once.
+fn spellings(names: &[&str]) -> Vec<Vec<u8>> {
+    let mut all: Vec<Vec<u8>> = Vec::new();
+    let mut add = |spelling: Vec<u8>| {
+        if !spelling.is_empty() && !all.contains(&spelling) {
+            all.push(spelling);
+        }
+    };
+    for name in names {
+        add(text::bytes_of(name).into_owned());
+        let slashes = name.replace('\\', "/");
+        add(text::bytes_of(&slashes).into_owned());
+        add(percent_decoded(&text::bytes_of(&slashes)));
+        if text::is_foreign(name) {
+            add(text::shown(&slashes).into_bytes());
+        }
+    }
+    all
+}
+
+/// `%41` to `A`; what is no escape stays as it is.
+fn percent_decoded(bytes: &[u8]) -> Vec<u8> {
+    let mut out = Vec::with_capacity(bytes.len());
+    let mut i = 0;
+    while i < bytes.len() {
+        let digits = bytes.get(i + 1..i + 3).filter(|d| bytes[i] == b'%' && d.iter().all(u8::is_ascii_hexdigit));
+        let byte = digits.and_then(|d| std::str::from_utf8(d).ok()).and_then(|d| u8::from_str_radix(d, 16).ok());
+        out.push(byte.unwrap_or(bytes[i]));
+        i += if byte.is_some() { 3 } else { 1 };
+    }
+    out
+}
+
+/// The folders of a failed [`Finder::find`] as words.
 pub(super) fn list(searched: &[PathBuf]) -> String {
     searched.iter().map(|p| p.display().to_string()).collect::<Vec<_>>().join(", ")
 }

@@ -11,6 +11,8 @@ mod normals;
 mod obj;
 mod picture;
 mod tangents;
+mod text;
+mod warnings;
 
 use std::path::Path;
 
@@ -102,6 +104,7 @@ fn load_file_with(path: &Path, options: &LoadOptions) -> Result<Scene> {
     scene.report.files.insert(0, path.to_owned());
     scene.name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     finish::finish(&mut scene, path)?;
+    scene.report.warnings = warnings::bounded(std::mem::take(&mut scene.report.warnings));
     Ok(scene)
 }
 

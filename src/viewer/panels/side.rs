@@ -19,6 +19,9 @@ pub fn show(app: &mut App, ui: &mut Ui) {
     section(ui, "Picture", false, |ui| {
         editor::edit(ui, app.settings.picture.editable(), &serde_json::json!({ "tone_map": "linear", "exposure": 0.0 }));
     });
+    section(ui, "Scene file", false, |ui| {
+        editor::edit(ui, app.settings.scene.editable(), &serde_json::json!({ "mtl_dissolve": "alpha" }));
+    });
     section(ui, "Light", false, |ui| light(app, ui));
     section(ui, "Camera", false, |ui| camera(app, ui));
     section(ui, "Animation", false, |ui| animation(app, ui));

@@ -259,6 +259,7 @@ impl Worker {
         let animations = open.renderer.scene().rig.as_ref().map_or(0, |rig| rig.animations().len());
         let animation = first.animation.filter(|k| *k < animations);
         let (mailbox, events) = (&self.mailbox, &self.events);
+        open.renderer.understand(&first.meaning);
         let interactive = match open.renderer.interactive(&first.lighting, animation) {
             Ok(interactive) => interactive,
             Err(e @ (Error::Usage(_) | Error::Input { .. })) => {
@@ -343,7 +344,7 @@ impl Session<'_> {
 
     /// Returns true if this session can do what is requested.
     fn serves(&self, request: &Request) -> bool {
-        let of = |r: &Request| (r.scene.clone(), r.load, r.device.clone(), r.lighting.clone(), r.animation);
+        let of = |r: &Request| (r.scene.clone(), r.load, r.device.clone(), r.meaning.clone(), r.lighting.clone(), r.animation);
         of(request) == of(&self.first)
     }
 

@@ -13,7 +13,8 @@ use glam::{DAffine3, DMat3, DVec3, Vec3};
 
 use parse::Statement;
 
-use super::{LoadOptions, find, finish};
+use super::find::Finder;
+use super::{LoadOptions, find, finish, text};
 use crate::error::{Error, Result};
 use crate::scene::material::{Material, MaterialKind, Transmission};
 use crate::scene::{AnimationRig, Camera, Geometry, Instance, Mesh, Scene, Sphere};
@@ -21,12 +22,14 @@ use crate::scene::{AnimationRig, Camera, Geometry, Instance, Mesh, Scene, Sphere
 /// Reads a `.brhan` file and the models that it names.
 pub(super) fn read(path: &Path, options: &LoadOptions) -> Result<Scene> {
     let bytes = std::fs::read(path).map_err(|e| Error::read(path, &e))?;
-    let text = String::from_utf8_lossy(&bytes);
-    let statements = parse::statements(&text).map_err(|e| Error::input(path, e))?;
-    let mut loader = Loader { path, options, scene: Scene::default(), models: HashMap::new() };
+    let text = text::decode(&bytes);
+    let wrong = |e: String| Error::input(path, text::shown(&e));
+    let statements = parse::statements(&text).map_err(wrong)?;
+    let (scene, models, finder) = (Scene::default(), HashMap::new(), Finder::default());
+    let mut loader = Loader { path, options, scene, models, finder };
     for mut statement in statements {
         loader.statement(&mut statement)?;
-        statement.done().map_err(|e| Error::input(path, e))?;
+        statement.done().map_err(wrong)?;
     }
     Ok(loader.scene)
 }
@@ -37,6 +40,7 @@ struct Loader<'a> {
     scene: Scene,
     /// The instances of each loaded model with each material, relative to the model.
     models: HashMap<(PathBuf, Option<String>), Vec<Instance>>,
+    finder: Finder,
 }
 
 impl Loader<'_> {
@@ -64,7 +68,7 @@ impl Loader<'_> {
                 s.line
             )),
         };
-        made.map_err(|e| Error::input(self.path, e))
+        made.map_err(|e| Error::input(self.path, text::shown(&e)))
     }
 
     fn camera(&mut self, s: &mut Statement) -> Result<(), String> {
@@ -96,25 +100,26 @@ impl Loader<'_> {
     }
 
     fn sphere(&mut self, s: &mut Statement) -> Result<(), String> {
-        let sphere = sphere(s)?;
+        let (sphere, place) = sphere(s)?;
         let material = material(s)?.unwrap_or_else(|| Material { kind: MaterialKind::Matte, ..Material::default() });
-        self.push_sphere("Sphere", sphere, material);
+        self.push_sphere("Sphere", sphere, place, material);
         Ok(())
     }
 
     fn light(&mut self, s: &mut Statement) -> Result<(), String> {
-        let sphere = sphere(s)?;
+        let (sphere, place) = sphere(s)?;
         let emissive = s.color("emittance")?.unwrap_or(Vec3::ONE);
         let black = Vec3::ZERO.extend(1.0);
         let material = Material { kind: MaterialKind::Matte, base_color: black, emissive, ..Material::default() };
-        self.push_sphere("SphericalLight", sphere, material);
+        self.push_sphere("SphericalLight", sphere, place, material);
         Ok(())
     }
 
-    fn push_sphere(&mut self, name: &str, sphere: Sphere, material: Material) {
+    fn push_sphere(&mut self, name: &str, sphere: Sphere, place: DVec3, material: Material) {
         let scene = &mut self.scene;
         let mesh = scene.meshes.len();
-        scene.instances.push(Instance { name: name.to_owned(), mesh, object_to_world: DAffine3::IDENTITY });
+        let object_to_world = DAffine3::from_translation(place);
+        scene.instances.push(Instance { name: name.to_owned(), mesh, object_to_world });
         scene.meshes.push(Mesh {
             name: name.to_owned(),
             geometry: Geometry::Spheres(vec![sphere]),
@@ -124,11 +129,11 @@ impl Loader<'_> {
     }
 
     fn model(&mut self, s: &mut Statement) -> Result<()> {
-        let here = |e: String| Error::input(self.path, e);
+        let here = |e: String| Error::input(self.path, text::shown(&e));
         let file = s.need("file").map_err(here)?;
         let to_world = transform(s).map_err(here)?;
         let material = material(s).map_err(here)?;
-        let found = find::find(file, &[self.path]).map_err(|searched| {
+        let found = self.finder.find(&[file], &[self.path]).map_err(|searched| {
             let searched = find::list(&searched);
             here(format!("line {}: the model {file} does not exist; searched in {searched}", s.line))
         })?;
@@ -140,6 +145,7 @@ impl Loader<'_> {
                 // its nodes are not this scene's
                 AnimationRig::apply_rest_pose(&mut model);
                 model.rig = None;
+                let file = text::shown(file);
                 self.scene.report.warnings.push(format!("{file}: animations of models are not played"));
             }
             finish::check(&model, &key.0)?;
@@ -178,14 +184,18 @@ fn append(scene: &mut Scene, model: Scene) -> Vec<Instance> {
     model.instances.into_iter().map(|i| Instance { mesh: i.mesh + meshes, ..i }).collect()
 }
 
-fn sphere(s: &mut Statement) -> Result<Sphere, String> {
+/// A sphere, and the point that its centre is relative to: the centre itself where single precision would move it by more
+/// than it rounds the sphere's own extent, and zero else.
+fn sphere(s: &mut Statement) -> Result<(Sphere, DVec3), String> {
     let line = s.line;
-    let center = s.vector("center")?.unwrap_or(DVec3::ZERO).as_vec3();
+    let center = s.vector("center")?.unwrap_or(DVec3::ZERO);
     let radius = s.number("radius")?.unwrap_or(1.0) as f32;
     if !(radius > 0.0 && radius.is_finite()) {
         return Err(format!("line {line}: {}: radius[{radius}]: a number above zero expected", s.key));
     }
-    Ok(Sphere { center, radius })
+    let rounded = (center - center.as_vec3().as_dvec3()).abs().max_element();
+    let place = if rounded > f64::from(radius * f32::EPSILON) { center } else { DVec3::ZERO };
+    Ok((Sphere { center: (center - place).as_vec3(), radius }, place))
 }
 
 /// `translate * rotate_z * rotate_y * rotate_x * scale`: a point is scaled, turned about x, y and z in the order in which

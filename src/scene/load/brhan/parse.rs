@@ -2,6 +2,8 @@
 
 use glam::{DVec3, Vec3};
 
+use crate::scene::load::text;
+
 /// One line: a key with its own values (`SaveIntervals[4]`) and named values.
 #[derive(Debug)]
 pub(super) struct Statement<'a> {
@@ -19,9 +21,9 @@ pub(super) struct Statement<'a> {
 ///
 /// # Errors
 /// Line and what is wrong with it.
-pub(super) fn statements(text: &str) -> Result<Vec<Statement<'_>>, String> {
+pub(super) fn statements(source: &str) -> Result<Vec<Statement<'_>>, String> {
     let mut all = Vec::new();
-    for (number, line) in text.lines().enumerate() {
+    for (number, line) in text::lines(source).enumerate() {
         if let Some(s) = statement(line, number + 1).map_err(|e| format!("line {}: {e}", number + 1))? {
             all.push(s);
         }
@@ -30,7 +32,7 @@ pub(super) fn statements(text: &str) -> Result<Vec<Statement<'_>>, String> {
 }
 
 fn statement(line: &str, number: usize) -> Result<Option<Statement<'_>>, String> {
-    let mut rest = line.trim();
+    let mut rest = text::trim(line);
     let mut statement: Option<Statement> = None;
     while !rest.is_empty() && !rest.starts_with('#') {
         let end = rest.find(|c: char| c.is_whitespace() || c == '[' || c == '#').unwrap_or(rest.len());

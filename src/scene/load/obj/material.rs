@@ -5,13 +5,14 @@ use std::path::{Path, PathBuf};
 
 use glam::{Vec3, Vec4};
 
-use super::mtl::{self, Map, MtlMaterial};
+use super::mtl::{self, MtlMaterial, unused};
+use super::texture::{Textures, is_cut_out, is_normal_map, roughness};
 use crate::error::{Error, Result};
-use crate::scene::load::find;
-use crate::scene::load::picture::{self, DecodedImage};
-use crate::scene::load::{ImagesDecoded, LoadOptions};
-use crate::scene::material::{AlphaMode, Material, MaterialKind, TextureSlot, Transmission};
-use crate::scene::{Filter, LoadReport, Scene, TexelData, Texture, Wrap};
+use crate::scene::Scene;
+use crate::scene::load::LoadOptions;
+use crate::scene::load::text::{self, unquoted, without_comment};
+use crate::scene::material::{AlphaMode, Material, MaterialKind};
+use crate::scene::settings::MtlDissolve;
 
 /// What faces without a (known) material look like: matte, a little darker than white.
 pub(super) fn grey(name: String) -> Material {
@@ -20,43 +21,78 @@ pub(super) fn grey(name: String) -> Material {
 
 /// The materials of all libraries of a file, by name.
 pub(super) struct MaterialLibrary<'a> {
-    options: LoadOptions<'a>,
-    /// Indices into [`Scene::materials`].
-    pub index: HashMap<String, usize>,
-    pictures: HashMap<PathBuf, Option<DecodedImage>>,
-    textures: HashMap<(PathBuf, Option<PathBuf>, bool), usize>,
+    /// Indices into [`Scene::materials`], by names as they are written.
+    exact: HashMap<String, usize>,
+    /// The same by [`loose`] names.
+    loose: HashMap<String, usize>,
+    textures: Textures<'a>,
+}
+
+/// A name without what exporters disagree on: comments, quotation marks, white space and the case of letters.
+fn loose(name: &str) -> String {
+    unquoted(without_comment(name)).split_ascii_whitespace().collect::<Vec<_>>().join(" ").to_ascii_lowercase()
 }
 
 impl<'a> MaterialLibrary<'a> {
     /// No material yet.
     pub(super) fn new(options: LoadOptions<'a>) -> Self {
-        Self { options, index: HashMap::new(), pictures: HashMap::new(), textures: HashMap::new() }
+        Self { exact: HashMap::new(), loose: HashMap::new(), textures: Textures::new(options) }
     }
 
-    /// Reads the library `mtl` of the model `obj` and appends its materials and textures to `scene`.
+    /// The file that the model `obj` refers to as one of `names`.
+    ///
+    /// # Errors
+    /// The folders that were searched.
+    pub(super) fn find(&mut self, names: &[&str], obj: &Path) -> Result<PathBuf, Vec<PathBuf>> {
+        self.textures.finder.find(names, &[obj])
+    }
+
+    /// The material that a model calls `name`: the one of just that name if there is one.
+    pub(super) fn get(&self, name: &str) -> Option<usize> {
+        let exact = text::uncommented(name).find_map(|name| self.exact.get(name));
+        exact.or_else(|| self.loose.get(&loose(name))).copied()
+    }
+
+    /// Reads the library `mtl` of the model `obj` and appends its materials and textures to `scene`. What libraries before
+    /// it have defined stays.
     pub(super) fn read(&mut self, mtl: &Path, obj: &Path, scene: &mut Scene) -> Result<()> {
         let bytes = std::fs::read(mtl).map_err(|e| Error::read(mtl, &e))?;
         let file = mtl.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let warnings = &mut scene.report.warnings;
-        for parsed in mtl::parse(&String::from_utf8_lossy(&bytes), &mut |w| warnings.push(format!("{file}, {w}"))) {
-            let material = self.convert(&parsed, [mtl, obj], scene);
-            self.index.insert(parsed.name, scene.materials.len());
-            scene.materials.push(material);
+        let mut parsed = mtl::parse(&text::decode(&bytes), &mut |w| warnings.push(format!("{file}, {w}")));
+        if vanishes(&parsed) {
+            warnings.push(format!("{file}: `Tr 1` would hide every material: taken for a copy of `d`, opaque"));
+            parsed.iter_mut().for_each(|m| m.transparency = None);
+        }
+        // of two with one name in a file the last counts, in two files the first
+        let mut own: HashMap<String, usize> = HashMap::new();
+        for material in parsed {
+            let converted = self.convert(&material, &file, [mtl, obj], scene);
+            own.insert(material.name, scene.materials.len());
+            scene.materials.push(converted);
+        }
+        let mut own: Vec<_> = own.into_iter().collect();
+        own.sort_by_key(|(_, index)| *index);
+        for (name, index) in own {
+            self.loose.entry(loose(&name)).or_insert(index);
+            self.exact.entry(name).or_insert(index);
         }
         Ok(())
     }
 
-    fn convert(&mut self, m: &MtlMaterial, beside: [&Path; 2], scene: &mut Scene) -> Material {
+    /// `file`: the library's name in warnings.
+    fn convert(&mut self, m: &MtlMaterial, file: &str, beside: [&Path; 2], scene: &mut Scene) -> Material {
+        // numbers
         let diffuse = m.diffuse.unwrap_or(Vec3::splat(0.8));
         let specular = m.specular.unwrap_or(Vec3::ZERO);
-        let filter = m.transmission_filter.unwrap_or(Vec3::ONE);
         let kind = kind(m, diffuse, specular);
+        let of_exponent = || m.shininess.filter(|_| specular.max_element() > 0.0).map_or(1.0, roughness);
         let mut out = Material {
-            name: m.name.clone(),
+            name: text::shown(&m.name),
             kind,
             base_color: diffuse.extend(1.0),
             metallic: m.metallic.unwrap_or(0.0).clamp(0.0, 1.0),
-            roughness: m.roughness.unwrap_or_else(|| roughness(m.shininess, specular)).clamp(0.0, 1.0),
+            roughness: m.roughness.unwrap_or_else(of_exponent).clamp(0.0, 1.0),
             emissive: m.emissive.unwrap_or(Vec3::ZERO),
             ior: m.ior.filter(|&i| i >= 1.0).unwrap_or(1.5),
             specular_color: specular,
@@ -64,127 +100,127 @@ impl<'a> MaterialLibrary<'a> {
             parameters: m.parameters.clone(),
             ..Material::default()
         };
-        if kind == MaterialKind::Glass {
-            out.transmittance = filter;
-            out.transmission = Transmission { factor: 1.0, ..Default::default() };
-        }
-        let map = |lib: &mut Self, map: &Option<Map>, alpha: &Option<Map>, scene: &mut Scene| {
-            (map.is_some() || alpha.is_some()).then(|| lib.slot(map.as_ref(), alpha.as_ref(), beside, scene)).flatten()
-        };
-        out.base_color_texture = map(self, &m.map_diffuse, &m.map_dissolve, scene);
-        out.emissive_texture = map(self, &m.map_emissive, &None, scene);
-        out.normal_texture = map(self, &m.map_normal, &None, scene);
-        out.normal_scale = m.map_normal.as_ref().map_or(1.0, |n| n.multiplier);
-        if m.map_dissolve.is_some() && out.base_color_texture.is_some() {
-            out.alpha_mode = AlphaMode::Mask { cutoff: 0.5 };
-        }
-        // Kd is often left black where map_Kd says it all
+
+        // textures; a factor is often left black where a map says it all
+        out.base_color_texture = self.textures.color(m.map_diffuse.as_ref(), m.map_dissolve.as_ref(), beside, scene);
+        out.emissive_texture = self.textures.color(m.map_emissive.as_ref(), None, beside, scene);
         if m.map_diffuse.is_some() && out.base_color_texture.is_some() && diffuse == Vec3::ZERO {
             out.base_color = Vec4::ONE;
+        }
+        if out.emissive_texture.is_some() && out.emissive == Vec3::ZERO {
+            out.emissive = Vec3::ONE;
+        }
+        self.normal_map(&mut out, m, file, beside, scene);
+        self.surface_maps(&mut out, m, file, beside, scene);
+        if let Some(ambient) = &m.map_ambient
+            && m.map_diffuse.as_ref().is_none_or(|d| d.file != ambient.file)
+        {
+            scene.report.warnings.push(format!("{file}: {}", unused("map_Ka")));
+        }
+
+        // glass, or alpha: what dissolves is blended, and a map of holes is a mask
+        let opacity = opacity(m);
+        if kind == MaterialKind::Glass {
+            out.transmittance = m.transmission_filter.unwrap_or(Vec3::ONE);
+            out.transmission.factor = 1.0;
+        } else if m.map_dissolve.is_some() {
+            let texels = out.base_color_texture.map(|slot| &scene.textures[slot.texture].texels);
+            out.base_color.w = opacity;
+            out.alpha_mode = match texels {
+                Some(texels) if opacity == 1.0 && is_cut_out(texels) => AlphaMode::Mask { cutoff: 0.5 },
+                None if opacity == 1.0 => AlphaMode::Opaque,
+                _ => AlphaMode::Blend,
+            };
+        } else if opacity < 1.0 && kind == MaterialKind::MetallicRoughness {
+            out.mtl_dissolve = Some(opacity);
+            out.transmittance = m.transmission_filter.unwrap_or(Vec3::ONE);
+            MtlDissolve::Alpha.apply_to(&mut out);
+        } else if opacity < 1.0 {
+            (out.base_color.w, out.alpha_mode) = (opacity, AlphaMode::Blend);
         }
         out
     }
 
-    /// The texture of `color`, with its alpha from `alpha`. `None`, with a warning, if it cannot be read.
-    fn slot(&mut self, color: Option<&Map>, alpha: Option<&Map>, beside: [&Path; 2], scene: &mut Scene) -> Option<TextureSlot> {
-        let options = color.or(alpha)?;
-        let mut get = |map: Option<&Map>| map.and_then(|m| self.picture(m, beside, &mut scene.report));
-        let (color, alpha) = (get(color), get(alpha));
-        let path = color.as_ref().or(alpha.as_ref())?.0.clone();
-        let key = (path.clone(), alpha.as_ref().map(|a| a.0.clone()), options.clamp);
-        if let Some(&texture) = self.textures.get(&key) {
-            return Some(TextureSlot { texture, texcoord: 0, transform: options.transform });
+    /// The normal map: `norm`, or what is called a bump map and holds normals, as Blender writes it.
+    fn normal_map(&mut self, out: &mut Material, m: &MtlMaterial, file: &str, beside: [&Path; 2], scene: &mut Scene) {
+        let bump = m.map_bump.as_ref().filter(|_| m.map_normal.is_none());
+        if let Some(bump) = bump {
+            match self.textures.picture(bump, beside, &mut scene.report) {
+                Some(picture) if is_normal_map(&picture.texels) => {}
+                Some(_) => {
+                    let what = "map_bump holds heights, which are not used: bake them into a normal map, norm";
+                    scene.report.warnings.push(format!("{file}: {what}"));
+                    return;
+                }
+                None => return,
+            }
         }
-        let picture = match (color, alpha) {
-            (Some((same, p)), Some((also, a))) if same == also && has_alpha(&a) => p,
-            (color, Some((_, alpha))) => with_alpha(color.map(|c| c.1), &alpha),
-            // alpha of a diffuse map means nothing in MTL
-            (color, None) => color?.1,
-        };
-        let wrap = [if options.clamp { Wrap::Clamp } else { Wrap::Repeat }; 2];
-        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        let DecodedImage { width, height, texels } = picture;
-        let texture = scene.textures.len();
-        scene.textures.push(Texture { name, width, height, texels, wrap, filter: Filter::Linear });
-        self.textures.insert(key, texture);
-        Some(TextureSlot { texture, texcoord: 0, transform: options.transform })
+        if let Some(map) = m.map_normal.as_ref().or(bump) {
+            out.normal_texture = self.textures.color(Some(map), None, beside, scene);
+            out.normal_scale = map.multiplier;
+        }
     }
 
-    fn picture(&mut self, map: &Map, beside: [&Path; 2], report: &mut LoadReport) -> Option<(PathBuf, DecodedImage)> {
-        let warnings = &mut report.warnings;
-        let path = match find::find(&map.file, &beside) {
-            Ok(path) => path,
-            Err(searched) => {
-                let text = format!("the texture {} was not found in {}", map.file, find::list(&searched));
-                if !warnings.contains(&text) {
-                    warnings.push(text);
-                }
-                return None;
-            }
-        };
-        let (options, done) = (self.options, self.pictures.len() + 1);
-        let picture = self.pictures.entry(path.clone()).or_insert_with(|| {
-            report.files.push(path.clone());
-            if !options.textures {
-                report.skipped_images += 1;
-                return None;
-            }
-            let bytes = std::fs::read(&path).map_err(|e| Error::read(&path, &e).to_string());
-            let name = path.to_string_lossy();
-            let decoded = bytes.and_then(|b| picture::decode(&b, &name).map_err(|e| format!("{name} {e}")));
-            (options.progress)(ImagesDecoded { done, of: None });
-            decoded.map_err(|e| warnings.push(format!("{e}: shown without it"))).ok()
-        });
-        picture.clone().map(|p| (path, p))
+    /// Roughness and metalness by maps: `map_Pr`, or the exponents of `map_Ns`, and `map_Pm`.
+    fn surface_maps(&mut self, out: &mut Material, m: &MtlMaterial, file: &str, beside: [&Path; 2], scene: &mut Scene) {
+        // exponents are of no use without a highlight, or beside a roughness
+        let shines = m.specular.is_some_and(|s| s.max_element() > 0.0);
+        let shininess = m.shininess.filter(|_| shines && m.roughness.is_none() && m.map_roughness.is_none());
+        let exponents = m.map_shininess.as_ref().filter(|_| shininess.is_some());
+        if m.map_shininess.is_some() && exponents.is_none() {
+            scene.report.warnings.push(format!("{file}: {}", unused("map_Ns")));
+        }
+        let maps = [m.map_roughness.as_ref().or(exponents), m.map_metallic.as_ref()];
+        let shininess = shininess.filter(|_| exponents.is_some());
+        out.metallic_roughness_texture = self.textures.surface(maps, shininess, beside, scene);
+        if out.metallic_roughness_texture.is_none() {
+            return;
+        }
+        // as with colours: a factor that is missing or zero leaves it to the map
+        if exponents.is_some() || m.map_roughness.is_some() && m.roughness.is_none_or(|r| r == 0.0) {
+            out.roughness = 1.0;
+        }
+        if m.map_metallic.is_some() && m.metallic.is_none_or(|x| x == 0.0) {
+            out.metallic = 1.0;
+        }
     }
 }
 
-/// MTL says in several ways, none of them binding, that a material is glass or a mirror.
-///
-/// `d` is how opaque it is; `Tr` should be 1 - d but is also found as a copy of d, so it only counts where `d` is absent,
-/// and 1, which would make the thing vanish, does not count at all. With a `map_d` the texture decides instead.
+/// How opaque a material is: `d`, or 1 - `Tr`.
+fn opacity(m: &MtlMaterial) -> f32 {
+    m.dissolve.or(m.transparency.map(|t| 1.0 - t)).unwrap_or(1.0).clamp(0.0, 1.0)
+}
+
+/// Whether a library says `Tr 1` of all its materials: `Tr` is 1 - d, but some exporters write d.
+fn vanishes(materials: &[MtlMaterial]) -> bool {
+    let is_hidden = |m: &MtlMaterial| m.dissolve.is_none() && m.transparency.is_some_and(|t| t >= 1.0);
+    !materials.is_empty() && materials.iter().all(is_hidden)
+}
+
+/// MTL says in several ways, none of them binding, that a material is glass or a mirror. `d` alone is none of them: it is
+/// coverage, and so is a `map_d`, which excludes glass.
 fn kind(m: &MtlMaterial, diffuse: Vec3, specular: Vec3) -> MaterialKind {
-    let opacity = m.dissolve.or(m.transparency.filter(|&t| t < 1.0).map(|t| 1.0 - t)).unwrap_or(1.0);
     let dark = diffuse.max_element() <= 0.05 && m.map_diffuse.is_none();
     match m.illum {
         _ if m.map_dissolve.is_some() => MaterialKind::MetallicRoughness,
-        Some(4 | 6 | 7 | 9) => MaterialKind::Glass,
-        _ if opacity < 1.0 => MaterialKind::Glass,
+        Some(4 | 6 | 7 | 9) if !is_unrefracting(m) => MaterialKind::Glass,
+        _ if is_filter(m) => MaterialKind::Glass,
         Some(3 | 5 | 8) if dark && specular.max_element() > 0.0 => MaterialKind::Mirror,
         _ => MaterialKind::MetallicRoughness,
     }
 }
 
-/// Perceptual roughness of a Blinn-Phong exponent (alpha^2 = 2 / (n + 2), roughness = sqrt(alpha)).
-fn roughness(shininess: Option<f32>, specular: Vec3) -> f32 {
-    match shininess {
-        Some(n) if specular.max_element() > 0.0 => (2.0 / (n.max(0.0) + 2.0)).powf(0.25),
-        _ => 1.0,
-    }
+/// Whether glass would be nothing at all: it does not refract and filters nothing. Maya writes so of every matte surface:
+/// `illum 4`, `Tf 1 1 1`, `Ni 1`.
+fn is_unrefracting(m: &MtlMaterial) -> bool {
+    m.ior == Some(1.0) && m.transmission_filter.is_none_or(|f| f == Vec3::ONE)
 }
 
-fn has_alpha(picture: &DecodedImage) -> bool {
-    picture.texels.iter().any(|[_, _, _, alpha]| alpha < 1.0)
-}
-
-/// `color` (or white) with the alpha of `alpha`, or its red where it is opaque; the size is that of the larger one.
-fn with_alpha(color: Option<DecodedImage>, alpha: &DecodedImage) -> DecodedImage {
-    let channel = if has_alpha(alpha) { 3 } else { 0 };
-    let color = color.unwrap_or_else(|| DecodedImage { width: 1, height: 1, texels: vec![255u8; 4].into() });
-    let (width, height) = (color.width.max(alpha.width), color.height.max(alpha.height));
-    let texel = |p: &DecodedImage, x: u32, y: u32| {
-        let x = u64::from(x) * u64::from(p.width) / u64::from(width);
-        let y = u64::from(y) * u64::from(p.height) / u64::from(height);
-        p.texels.get((y * u64::from(p.width) + x) as usize)
-    };
-    let all = (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).flat_map(|(x, y)| {
-        let [r, g, b, _] = texel(&color, x, y);
-        [r, g, b, texel(alpha, x, y)[channel]]
-    });
-    let texels = match (&color.texels, &alpha.texels) {
-        (TexelData::Float(_), _) => all.collect::<Vec<f32>>().into(),
-        (TexelData::Unorm8(_), TexelData::Unorm8(_)) => all.map(|v| (v * 255.0).round() as u8).collect::<Vec<u8>>().into(),
-        _ => all.map(|v| (v * 65535.0).round() as u16).collect::<Vec<u16>>().into(),
-    };
-    DecodedImage { width, height, texels }
+/// Whether `Tf` says that light goes through and `Ni` how it is refracted. 3ds Max writes both of every material, with `Tf`
+/// a copy of `d`: white for what is opaque.
+fn is_filter(m: &MtlMaterial) -> bool {
+    let Some(filter) = m.transmission_filter.filter(|f| f.max_element() > 0.0) else { return false };
+    let is_copy = |f: Vec3| (f - Vec3::splat(opacity(m))).abs().max_element() < 1e-3;
+    let says_opacity = m.dissolve.is_some() || m.transparency.is_some();
+    m.ior.is_some_and(|n| n > 1.0) && !(says_opacity && is_copy(filter))
 }

@@ -1,73 +1,77 @@
 //! Wavefront OBJ with MTL.
 //!
-//! Read by a parser of our own, because no crate is fit for what users have: tobj and obj-rs name no line of an error, and
-//! tobj panics on `Kd 1 2` and refuses continued lines, wavefront_obj refuses vertex colours and relative indices, and
-//! nobject-rs and wavefront take broken numbers without a word.
+//! Read by a parser of our own, because no crate is fit for what users have; docs/formats.md has what tobj, the one that is kept
+//! best, reads of it. obj-rs names no line of an error, wavefront_obj refuses vertex colours and relative indices, and nobject-rs and
+//! wavefront take broken numbers without a word.
 //!
 //! Each run of faces with one object or group name and one material becomes a mesh. Polygons are cut into fans, or by ear
-//! clipping where a fan would reach outside of them. A mesh without `vn` is shaded flat.
+//! clipping where a fan would reach outside of them. Corners without `vn` are shaded smoothly in a smoothing group, and
+//! flat outside of one.
 
+mod keys;
 mod material;
 mod mtl;
 mod parse;
 mod polygon;
+mod smooth;
+mod texture;
 
-use std::collections::HashMap;
-use std::path::Path;
+use std::collections::{HashMap, HashSet};
+use std::path::{Path, PathBuf};
 
-use glam::{DAffine3, Vec2, Vec3, Vec4};
+use glam::{DAffine3, DVec3, Vec2, Vec3, Vec4};
 
-use parse::{Corner, Group, NONE, ObjFile};
+use keys::PositionKeys;
+use material::MaterialLibrary;
+use parse::{Group, NONE, ObjFile};
 
+use super::text::{self, unquoted, without_comment};
 use super::{LoadOptions, find};
 use crate::error::Result;
-use crate::scene::{Geometry, Instance, Material, Mesh, Scene, TriangleMesh};
+use crate::scene::{Geometry, Instance, Material, Mesh, Scene, TriangleMesh, distant_centre};
 
 /// Reads an `.obj` file and the material libraries that it names.
 pub(super) fn read(path: &Path, options: &LoadOptions) -> Result<Scene> {
+    // the file, and what is odd about it
     let mut file = parse::parse(path)?;
     let mut scene = Scene::default();
     if file.open_faces > 0 {
         scene.report.warnings.push(format!("{} faces with fewer than three corners: left out", file.open_faces));
     }
-    let mut materials = material::MaterialLibrary::new(*options);
-    let mut complete = true;
-    for name in std::mem::take(&mut file.libraries) {
-        match find::find(&name, &[path]) {
-            Ok(mtl) => {
-                materials.read(&mtl, path, &mut scene)?;
-                scene.report.files.push(mtl);
-            }
-            Err(searched) => {
-                complete = false;
-                let searched = find::list(&searched);
-                scene.report.warnings.push(format!(
-                    "the material library {name} was not found in {searched}: its materials are replaced by grey"
-                ));
-            }
-        }
+    if file.decimal_commas > 0 {
+        scene.report.warnings.push(format!("{} numbers have a decimal comma: read as a point", file.decimal_commas));
     }
+
+    // materials
+    let mut materials = MaterialLibrary::new(*options);
+    let is_complete = read_libraries(&file, path, &mut materials, &mut scene)?;
     let mut grey = None;
     let mut unknown: HashMap<String, usize> = HashMap::new();
-    let mut welder = Welder::new(file.positions.len());
+
+    // meshes
+    let origin = origin(&file);
+    scene.report.normals_computed += smooth::smooth(&mut file);
+    let mut keys = PositionKeys::new(file.positions.len());
     for group in std::mem::take(&mut file.groups) {
         let material = match &group.material {
             None => *grey.get_or_insert_with(|| push(&mut scene, material::grey(String::new()))),
-            Some(name) => match materials.index.get(name) {
-                Some(&index) => index,
+            Some(name) => match materials.get(name) {
+                Some(index) => index,
                 None => *unknown.entry(name.clone()).or_insert_with(|| {
+                    let shown = text::shown(without_comment(name));
                     // a missing library says it all
-                    if complete {
-                        scene.report.warnings.push(format!("the material `{name}` is not defined: replaced by grey"));
+                    if is_complete {
+                        scene.report.warnings.push(format!("the material `{shown}` is not defined: replaced by grey"));
                     }
-                    push(&mut scene, material::grey(name.clone()))
+                    push(&mut scene, material::grey(shown))
                 }),
             },
         };
-        let triangles = welder.weld(&file, &group);
-        let name = group.name;
+        let triangles = weld(&file, &group, origin, &mut keys);
+        let name = text::shown(&group.name);
         let mesh = scene.meshes.len();
-        scene.instances.push(Instance { name: name.clone(), mesh, object_to_world: DAffine3::IDENTITY });
+        let object_to_world = DAffine3::from_translation(origin);
+        scene.instances.push(Instance { name: name.clone(), mesh, object_to_world });
         scene.meshes.push(Mesh { name, geometry: Geometry::Triangles(triangles), material });
     }
     Ok(scene)
@@ -78,40 +82,125 @@ fn push(scene: &mut Scene, material: Material) -> usize {
     scene.materials.len() - 1
 }
 
-/// Makes one vertex of each combination of position, texture coordinate and normal in a mesh. The vertices of each
-/// position form a chain, whose heads are kept from mesh to mesh: a file of many small meshes must not clear them all.
-struct Welder {
-    /// Of each position of the file: the mesh that used it last, and its first vertex there.
-    heads: Vec<(u32, u32)>,
-    mesh: u32,
+/// Reads the material libraries that a file names, or the one that is called as it is. Returns false if one is missing.
+fn read_libraries(file: &ObjFile, path: &Path, materials: &mut MaterialLibrary, scene: &mut Scene) -> Result<bool> {
+    // each once, however often it is named
+    let (mut said, mut read) = (HashSet::new(), HashSet::new());
+    let mut missing: Vec<(String, Vec<PathBuf>)> = Vec::new();
+    for statement in file.libraries.iter().filter(|statement| said.insert(statement.as_str())) {
+        for (name, found) in libraries(statement, path, materials) {
+            match found {
+                Ok(mtl) if read.contains(&mtl) => {}
+                Ok(mtl) => {
+                    materials.read(&mtl, path, scene)?;
+                    scene.report.files.push(mtl.clone());
+                    read.insert(mtl);
+                }
+                Err(searched) => missing.push((text::shown(name), searched)),
+            }
+        }
+    }
+    let is_complete = missing.is_empty();
+    let mut instead = "its materials are replaced by grey".to_owned();
+    if read.is_empty() && file.groups.iter().any(|g| g.material.is_some()) {
+        let same = path.with_extension("mtl");
+        let name = same.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        // beside the model alone: in the folders above, it would be another's
+        if let Some(mtl) = materials.find(&[&name], path).ok().filter(|mtl| mtl.parent() == absolute(&same).parent()) {
+            materials.read(&mtl, path, scene)?;
+            scene.report.files.push(mtl);
+            instead = format!("{name} is read in its place");
+        }
+    }
+    for (name, searched) in missing {
+        let searched = find::list(&searched);
+        scene.report.warnings.push(format!("the material library `{name}` was not found in {searched}: {instead}"));
+    }
+    Ok(is_complete)
 }
 
-impl Welder {
-    fn new(positions: usize) -> Self {
-        Self { heads: vec![(0, 0); positions], mesh: 0 }
-    }
+fn absolute(path: &Path) -> PathBuf {
+    std::path::absolute(path).unwrap_or_else(|_| path.to_owned())
+}
 
-    fn weld(&mut self, file: &ObjFile, group: &Group) -> TriangleMesh {
-        self.mesh += 1;
-        let corners = || group.triangles.iter().flatten();
-        let with_normals = corners().any(|c| c.normal != NONE);
-        let with_texcoords = corners().any(|c| c.texcoord != NONE);
-        let mut mesh = TriangleMesh::default();
-        let mut chain: Vec<(Corner, u32)> = Vec::new();
-        for triangle in &group.triangles {
-            let indices = triangle.map(|corner| {
-                let head = &mut self.heads[corner.position as usize];
-                let mut at = if head.0 == self.mesh { head.1 } else { NONE };
-                while at != NONE && chain[at as usize].0 != corner {
-                    at = chain[at as usize].1;
-                }
-                if at != NONE {
-                    return at;
-                }
-                let new = chain.len() as u32;
-                chain.push((corner, if head.0 == self.mesh { head.1 } else { NONE }));
-                *head = (self.mesh, new);
-                mesh.positions.push(file.positions[corner.position as usize]);
+/// A library's name, and its file or where that was searched for.
+type FoundLibrary<'a> = (&'a str, Result<PathBuf, Vec<PathBuf>>);
+
+/// The libraries of a statement: one whose name may hold spaces, if there is such a file, or a list of names, of which some
+/// may hold spaces or be in quotation marks.
+fn libraries<'a>(statement: &'a str, path: &Path, materials: &mut MaterialLibrary) -> Vec<FoundLibrary<'a>> {
+    let list = without_comment(statement);
+    let whole = materials.find(&[statement, list, unquoted(list)], path);
+    let words = word_ranges(list);
+    if whole.is_ok() || words.len() < 2 {
+        return vec![(unquoted(list), whole)];
+    }
+    let mut found = Vec::new();
+    let mut next = 0;
+    while let Some(&(start, end)) = words.get(next) {
+        // the longest run of words that is a file; longer ones are nobody's name
+        let runs = words[next..].iter().take(MAX_WORDS).enumerate().rev();
+        let run = runs
+            .map(|(more, &(_, end))| (more, unquoted(&list[start..end])))
+            .find_map(|(more, name)| Some((more, name, materials.find(&[name], path).ok()?)));
+        match run {
+            Some((more, name, mtl)) => {
+                found.push((name, Ok(mtl)));
+                next += more + 1;
+            }
+            None => {
+                let name = unquoted(&list[start..end]);
+                found.push((name, materials.find(&[name], path)));
+                next += 1;
+            }
+        }
+    }
+    found
+}
+
+/// Most words of a library's name in a list.
+const MAX_WORDS: usize = 6;
+
+/// Where the words of a text are; what stands in quotation marks is one.
+fn word_ranges(text: &str) -> Vec<(usize, usize)> {
+    let (mut ranges, mut start, mut is_quoted) = (Vec::new(), None, false);
+    for (i, c) in text.char_indices() {
+        if c == '"' {
+            is_quoted = !is_quoted;
+        }
+        match start {
+            None if !c.is_ascii_whitespace() => start = Some(i),
+            Some(from) if c.is_ascii_whitespace() && !is_quoted => {
+                ranges.push((from, i));
+                start = None;
+            }
+            _ => {}
+        }
+    }
+    ranges.extend(start.map(|from| (from, text.len())));
+    ranges
+}
+
+/// The point that meshes are relative to: zero, or the centre of a model that is far from its origin for its size, so that
+/// single precision is spent on the model. It is the same for all meshes: those that share a vertex still do.
+fn origin(file: &ObjFile) -> DVec3 {
+    let used = file.groups.iter().flat_map(|g| g.triangles.iter().flatten()).map(|c| file.positions[c.position as usize]);
+    let bounds = used.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(lo, hi), p| (lo.min(p), hi.max(p)));
+    if bounds.0.x <= bounds.1.x { distant_centre(bounds.0, bounds.1) } else { DVec3::ZERO }
+}
+
+/// Makes one vertex of each combination of position, texture coordinate and normal in a mesh.
+fn weld(file: &ObjFile, group: &Group, origin: DVec3, keys: &mut PositionKeys) -> TriangleMesh {
+    keys.clear();
+    let corners = || group.triangles.iter().flatten();
+    let with_normals = corners().any(|c| c.normal != NONE);
+    let with_texcoords = corners().any(|c| c.texcoord != NONE);
+    let mut mesh = TriangleMesh::default();
+    for triangle in &group.triangles {
+        let indices = triangle.map(|corner| {
+            let index = keys.index(corner.position, [corner.texcoord, corner.normal]);
+            if index as usize == mesh.positions.len() {
+                mesh.positions.push((file.positions[corner.position as usize] - origin).as_vec3());
                 if with_normals {
                     // corners without one get it from the triangles around them, later
                     mesh.normals.push(file.normals.get(corner.normal as usize).copied().unwrap_or(Vec3::ZERO));
@@ -122,10 +211,23 @@ impl Welder {
                 if !file.colors.is_empty() {
                     mesh.colors.push(file.colors.get(corner.position as usize).copied().unwrap_or(Vec4::ONE));
                 }
-                new
-            });
-            mesh.indices.push(indices);
-        }
-        mesh
+            }
+            index
+        });
+        mesh.indices.push(indices);
+    }
+    mesh
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn words_and_quotation_marks() {
+        let words = |text: &'static str| word_ranges(text).into_iter().map(|(a, b)| &text[a..b]).collect::<Vec<_>>();
+        assert_eq!(words("a.mtl \t\"b c.mtl\" d"), ["a.mtl", "\"b c.mtl\"", "d"]);
+        assert_eq!(words(" \"open b"), ["\"open b"]);
+        assert!(words(" ").is_empty());
     }
 }

@@ -4,10 +4,13 @@ use std::collections::BTreeMap;
 
 use glam::{Affine2, Mat2, Vec2, Vec3};
 
+use super::parse::float;
+use crate::scene::load::text::{self, trim, unquoted, without_comment};
+
 /// A texture map with its options.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Map {
-    /// As written.
+    /// As written, a comment included: a name may hold ` #`.
     pub file: String,
     /// `-clamp on`.
     pub clamp: bool,
@@ -15,11 +18,21 @@ pub(super) struct Map {
     pub transform: Affine2,
     /// `-bm`.
     pub multiplier: f32,
+    /// `-mm`: base and gain of texels.
+    pub range: [f32; 2],
+}
+
+impl Map {
+    /// What the file may be called.
+    pub(super) fn names(&self) -> Vec<&str> {
+        text::uncommented(&self.file).map(unquoted).collect()
+    }
 }
 
 /// A material as written; what is absent is `None`.
 #[derive(Clone, Debug, Default)]
 pub(super) struct MtlMaterial {
+    /// A text of [`text`].
     pub name: String,
     pub diffuse: Option<Vec3>,
     pub specular: Option<Vec3>,
@@ -32,54 +45,75 @@ pub(super) struct MtlMaterial {
     pub illum: Option<u32>,
     pub roughness: Option<f32>,
     pub metallic: Option<f32>,
+    pub map_ambient: Option<Map>,
     pub map_diffuse: Option<Map>,
     pub map_emissive: Option<Map>,
     pub map_dissolve: Option<Map>,
     pub map_normal: Option<Map>,
+    /// Heights by the format; exporters write normal maps, too.
+    pub map_bump: Option<Map>,
+    pub map_roughness: Option<Map>,
+    pub map_metallic: Option<Map>,
+    pub map_shininess: Option<Map>,
     /// Numbers of statements that are not the format's.
     pub parameters: BTreeMap<String, f32>,
 }
 
 /// Parses a library. Lines that make no sense are noted with their number and skipped: a broken material must not hide
 /// the model.
-pub(super) fn parse(text: &str, warn: &mut dyn FnMut(String)) -> Vec<MtlMaterial> {
+pub(super) fn parse(source: &str, warn: &mut dyn FnMut(String)) -> Vec<MtlMaterial> {
     let mut materials: Vec<MtlMaterial> = Vec::new();
-    for (number, line) in text.lines().enumerate() {
-        let line = line.trim();
+    for (number, line) in text::lines(source).enumerate() {
+        let line = trim(line);
         let (key, rest) = line.split_once(|c: char| c.is_ascii_whitespace()).unwrap_or((line, ""));
-        let rest = rest.split(" #").next().unwrap_or("").trim();
+        let rest = trim(rest);
         if key == "newmtl" {
             materials.push(MtlMaterial { name: rest.to_owned(), ..Default::default() });
         } else if let Some(material) = materials.last_mut()
+            && !key.starts_with('#')
             && let Err(e) = statement(material, key, rest)
         {
-            warn(format!("line {}: {e}: ignored", number + 1));
+            warn(format!("line {}: {e}", number + 1));
         }
     }
     materials
 }
 
 fn statement(material: &mut MtlMaterial, key: &str, rest: &str) -> Result<(), String> {
-    match key {
-        "Kd" => material.diffuse = Some(color(rest)?),
-        "Ks" => material.specular = Some(color(rest)?),
-        "Ke" => material.emissive = Some(color(rest)?),
-        "Tf" => material.transmission_filter = Some(color(rest)?),
-        "Ns" => material.shininess = Some(number(rest)?),
-        "Ni" => material.ior = Some(number(rest)?),
-        // `d -halo x` fades towards the silhouette: x is the middle
-        "d" => material.dissolve = Some(number(rest.strip_prefix("-halo").unwrap_or(rest))?),
-        "Tr" => material.transparency = Some(number(rest)?),
-        "illum" => material.illum = Some(number(rest)? as u32),
-        "Pr" => material.roughness = Some(number(rest)?),
-        "Pm" => material.metallic = Some(number(rest)?),
-        "map_Kd" => material.map_diffuse = Some(map(rest)?),
-        "map_Ke" => material.map_emissive = Some(map(rest)?),
+    let values = without_comment(rest);
+    match key.to_ascii_lowercase().as_str() {
+        "kd" => material.diffuse = Some(color(values)?),
+        "ks" => material.specular = Some(color(values)?),
+        "ke" => material.emissive = Some(color(values)?),
+        "tf" => material.transmission_filter = Some(color(values)?),
+        "ns" => material.shininess = Some(number(values)?),
+        "ni" => material.ior = Some(number(values)?),
+        "d" => match values.strip_prefix("-halo") {
+            Some(middle) => {
+                material.dissolve = Some(number(middle)?);
+                return Err("`d -halo` is opaque at the silhouette: it is read as `d`, the same everywhere".into());
+            }
+            None => material.dissolve = Some(number(values)?),
+        },
+        "tr" => material.transparency = Some(number(values)?),
+        "illum" => material.illum = Some(number(values)? as u32),
+        "pr" => material.roughness = Some(number(values)?),
+        "pm" => material.metallic = Some(number(values)?),
+        "map_ka" => material.map_ambient = Some(map(rest)?),
+        "map_kd" => material.map_diffuse = Some(map(rest)?),
+        "map_ke" => material.map_emissive = Some(map(rest)?),
         "map_d" => material.map_dissolve = Some(map(rest)?),
-        // `bump` holds heights, not normals
-        "norm" => material.map_normal = Some(map(rest)?),
+        "map_pr" => material.map_roughness = Some(map(rest)?),
+        "map_pm" => material.map_metallic = Some(map(rest)?),
+        "map_ns" => material.map_shininess = Some(map(rest)?),
+        "norm" | "map_norm" | "map_kn" => material.map_normal = Some(map(rest)?),
+        "bump" | "map_bump" => material.map_bump = Some(map(rest)?),
+        // whether textures are smoothed
+        "map_aat" => {}
+        "refl" | "disp" | "decal" => return Err(unused(key)),
+        other if other.starts_with("map_") => return Err(unused(key)),
         _ => {
-            if let Ok(value) = number(rest) {
+            if let Ok(value) = number(values) {
                 material.parameters.insert(key.to_owned(), value);
             }
         }
@@ -87,64 +121,106 @@ fn statement(material: &mut MtlMaterial, key: &str, rest: &str) -> Result<(), St
     Ok(())
 }
 
+/// What is said of a map that has no effect. The key is outside of quotation marks, so that each kind is said once.
+pub(super) fn unused(key: &str) -> String {
+    let key: String = key.chars().filter(|c| c.is_ascii_alphanumeric() || *c == '_').collect();
+    format!("{key} is not used")
+}
+
 fn number(text: &str) -> Result<f32, String> {
     let word = text.split_ascii_whitespace().next().unwrap_or("");
-    match word.parse::<f32>() {
-        Ok(x) if x.is_finite() => Ok(x),
-        _ => Err(format!("`{text}` is not a number")),
+    match float(word) {
+        Some(x) if x.is_finite() => Ok(x as f32),
+        _ => Err(format!("`{}` is not a number: ignored", text::shown(text))),
     }
 }
 
 /// One or three numbers; one stands for grey.
 fn color(text: &str) -> Result<Vec3, String> {
-    let all: Option<Vec<f32>> = text.split_ascii_whitespace().take(3).map(|w| w.parse().ok()).collect();
+    let all: Option<Vec<f32>> = text.split_ascii_whitespace().take(3).map(|w| float(w).map(|x| x as f32)).collect();
     match all.as_deref() {
         Some([r, g, b]) if Vec3::new(*r, *g, *b).is_finite() => Ok(Vec3::new(*r, *g, *b)),
         Some([y]) if y.is_finite() => Ok(Vec3::splat(*y)),
-        _ => Err(format!("`{text}` is not a colour (three numbers)")),
+        _ => Err(format!("`{}` is not a colour (three numbers): ignored", text::shown(text))),
     }
 }
 
-/// `[-option values]... file name`, where the file name may hold spaces.
+/// Options of maps and how many values each has at most.
+const OPTIONS: [(&str, usize); 13] = [
+    ("-blendu", 1),
+    ("-blendv", 1),
+    ("-bm", 1),
+    ("-boost", 1),
+    ("-cc", 1),
+    ("-clamp", 1),
+    ("-imfchan", 1),
+    ("-mm", 2),
+    ("-o", 3),
+    ("-s", 3),
+    ("-t", 3),
+    ("-texres", 1),
+    ("-type", 1),
+];
+
+/// `[-option values]... file name`, where the file name may hold spaces; some put options behind it.
 fn map(text: &str) -> Result<Map, String> {
-    let mut map = Map { file: String::new(), clamp: false, transform: Affine2::IDENTITY, multiplier: 1.0 };
+    let transform = Affine2::IDENTITY;
+    let mut map = Map { file: String::new(), clamp: false, transform, multiplier: 1.0, range: [0.0, 1.0] };
     let (mut scale, mut offset) = (Vec2::ONE, Vec2::ZERO);
     let mut rest = text;
-    while rest.starts_with('-') {
+    let mut name_end = None;
+    while !rest.is_empty() {
         let (option, after) = word(rest);
-        let (value, after_value) = word(after);
-        rest = after_value;
-        match option {
-            "-clamp" => map.clamp = value == "on",
-            "-bm" => map.multiplier = number(value)?,
-            "-s" | "-o" | "-t" => {
-                let mut values = [number(value)?; 3];
-                if option == "-o" {
-                    values[1] = 0.0;
-                }
-                for slot in &mut values[1..] {
-                    let (next, after) = word(rest);
-                    let Ok(value) = number(next) else { break };
-                    (*slot, rest) = (value, after);
-                }
-                match option {
-                    "-s" => scale = Vec2::new(values[0], values[1]),
-                    "-o" => offset = Vec2::new(values[0], values[1]),
-                    _ => {}
-                }
+        let Some((count, values, after_values)) = option_values(option, after) else {
+            if name_end.is_none() && map.file.is_empty() {
+                map.file = rest.to_owned();
+                name_end = Some(rest);
             }
-            "-mm" => rest = word(rest).1,
-            // -blendu, -blendv, -boost, -cc, -imfchan, -texres, -type: one value each
+            // options behind the name, if that is what follows
+            match rest.find(" -") {
+                Some(at) => rest = &rest[at + 1..],
+                None => break,
+            }
+            continue;
+        };
+        if let Some(name) = name_end.take() {
+            map.file = trim(&name[..name.len() - rest.len()]).to_owned();
+        }
+        rest = after_values;
+        match option {
+            "-clamp" => map.clamp = word(after).0 == "on",
+            "-bm" => map.multiplier = values[0],
+            "-mm" => map.range = [values[0], if count > 1 { values[1] } else { 1.0 }],
+            "-s" => scale = Vec2::new(values[0], if count > 1 { values[1] } else { 1.0 }),
+            "-o" => offset = Vec2::new(values[0], if count > 1 { values[1] } else { 0.0 }),
             _ => {}
         }
     }
-    if rest.is_empty() {
-        return Err(format!("`{text}` names no file"));
+    if map.file.is_empty() {
+        return Err(format!("`{}` names no file: ignored", text::shown(text)));
     }
-    rest.clone_into(&mut map.file);
     // (u, v) -> scale * (u, v) + offset with v up; ours has v down on both sides: v' = 1 - (s (1 - v) + o)
     map.transform = Affine2::from_mat2_translation(Mat2::from_diagonal(scale), Vec2::new(offset.x, 1.0 - scale.y - offset.y));
     Ok(map)
+}
+
+/// The values of an option and what follows them, if it is one: how many numbers there are, and the numbers. `None` for
+/// part of a name.
+fn option_values<'a>(option: &str, after: &'a str) -> Option<(usize, [f32; 3], &'a str)> {
+    let (_, most) = OPTIONS.iter().find(|(name, _)| *name == option)?;
+    let mut values = [0.0; 3];
+    if !matches!(option, "-bm" | "-boost" | "-mm" | "-o" | "-s" | "-t" | "-texres") {
+        let (value, rest) = word(after);
+        return (!value.is_empty()).then_some((1, values, rest));
+    }
+    let (mut count, mut rest) = (0, after);
+    while count < *most {
+        let (value, next) = word(rest);
+        let Ok(value) = number(value) else { break };
+        values[count] = value;
+        (count, rest) = (count + 1, next);
+    }
+    (count > 0).then_some((count, values, rest))
 }
 
 /// The first word and what follows it.
@@ -164,6 +240,20 @@ mod tests {
         // v up: (0.5, 0.5) -> (1.25, 1.5), so v down: 1 - 1.5
         assert!(m.transform.transform_point2(Vec2::splat(0.5)).abs_diff_eq(Vec2::new(1.25, -0.5), 1e-6));
         assert!(map("-s 1 1 1").is_err());
+        let m = map("-bm 0.5 -o 0 0 0 -mm 0.1 0.9 -imfchan l name with spaces.png").unwrap();
+        assert_eq!((m.file.as_str(), m.multiplier, m.range), ("name with spaces.png", 0.5, [0.1, 0.9]));
+    }
+
+    #[test]
+    fn names_that_look_like_options() {
+        let file = |text: &str| map(text).unwrap().file;
+        assert_eq!(file("-wood.png"), "-wood.png");
+        assert_eq!(file("wood -s 2.png"), "wood -s 2.png");
+        assert_eq!(file("-s 1 1 1 2 planks - old.png"), "2 planks - old.png");
+        // options behind the name
+        let m = map("wood bark.png -clamp on -bm 2").unwrap();
+        assert_eq!((m.file.as_str(), m.clamp, m.multiplier), ("wood bark.png", true, 2.0));
+        assert_eq!(map("\"a b.png\" # comment").unwrap().names()[1], "a b.png");
     }
 
     #[test]
@@ -171,5 +261,9 @@ mod tests {
         let mut warnings = Vec::new();
         let m = parse("newmtl a\nKd 1 2\nKs 0.5\nd nan\nillum x", &mut |w| warnings.push(w));
         assert_eq!((m.len(), warnings.len(), m[0].specular), (1, 3, Some(Vec3::splat(0.5))), "{warnings:?}");
+        let mut warnings = Vec::new();
+        let m = parse("newmtl a\rKD 1 0,5 0 # red\rmap_Ks s.png\rdisp h.png\rmap_aat on\r#map_Ks", &mut |w| warnings.push(w));
+        assert_eq!(m[0].diffuse, Some(Vec3::new(1.0, 0.5, 0.0)));
+        assert_eq!(warnings, ["line 3: map_Ks is not used", "line 4: disp is not used"]);
     }
 }

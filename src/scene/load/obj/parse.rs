@@ -1,14 +1,14 @@
 //! The statements of an OBJ file.
 
 use std::fs::File;
-use std::io::{BufRead, BufReader};
 use std::path::Path;
 use std::str::SplitAsciiWhitespace;
 
-use glam::{Vec2, Vec3, Vec4};
+use glam::{DVec3, Vec2, Vec3, Vec4};
 
 use super::polygon::PolygonTriangulator;
 use crate::error::{Error, Result};
+use crate::scene::load::text::{self, Lines, trim};
 
 /// No such index.
 pub(super) const NONE: u32 = u32::MAX;
@@ -21,18 +21,21 @@ pub(super) struct Corner {
     pub normal: u32,
 }
 
-/// Consecutive faces with one name and one material.
+/// Consecutive faces with one name and one material. Names are texts of [`text`].
 #[derive(Debug)]
 pub(super) struct Group {
     pub name: String,
     pub material: Option<String>,
     pub triangles: Vec<[Corner; 3]>,
+    /// Where a smoothing group begins: index of a triangle, and the group's number; 0 for none, and before the first.
+    pub smoothing: Vec<(u32, u32)>,
 }
 
 /// A whole file.
 #[derive(Debug, Default)]
 pub(super) struct ObjFile {
-    pub positions: Vec<Vec3>,
+    /// In double precision: how far the model is from its origin is not known yet.
+    pub positions: Vec<DVec3>,
     /// Empty, or as long as `positions` from the last coloured vertex back.
     pub colors: Vec<Vec4>,
     /// glTF convention: v down.
@@ -42,45 +45,22 @@ pub(super) struct ObjFile {
     pub groups: Vec<Group>,
     /// Faces of fewer than three corners, which are left out.
     pub open_faces: usize,
+    /// Numbers with a decimal comma.
+    pub decimal_commas: usize,
 }
 
 /// Parses a file; errors name the line.
 pub(super) fn parse(path: &Path) -> Result<ObjFile> {
-    let file = File::open(path).map_err(|e| Error::read(path, &e))?;
-    let mut lines = Lines { reader: BufReader::with_capacity(1 << 18, file), number: 0, buffer: Vec::new() };
+    let unread = |e: std::io::Error| Error::read(path, &e);
+    let mut lines = Lines::new(File::open(path).map_err(unread)?).map_err(unread)?;
     let mut parser = Parser::default();
-    while lines.next().map_err(|e| Error::read(path, &e))? {
-        if lines.number == 1 && matches!(lines.buffer.get(..2), Some([0xfe, 0xff] | [0xff, 0xfe])) {
-            return Err(Error::input(path, "is UTF-16 text; save it as UTF-8"));
-        }
-        // other encodings occur in names only, and there they do not matter
-        let line = String::from_utf8_lossy(&lines.buffer);
-        parser.line(&line).map_err(|e| Error::input(path, format!("line {}: {e}", lines.number)))?;
-    }
-    Ok(parser.file)
-}
-
-/// Lines, with those that end in a backslash joined.
-struct Lines<R> {
-    reader: R,
-    number: usize,
-    buffer: Vec<u8>,
-}
-
-impl<R: BufRead> Lines<R> {
-    fn next(&mut self) -> std::io::Result<bool> {
-        self.buffer.clear();
-        loop {
-            if self.reader.read_until(b'\n', &mut self.buffer)? == 0 {
-                return Ok(!self.buffer.is_empty());
-            }
-            self.number += 1;
-            let end = self.buffer.trim_ascii_end().len();
-            if self.buffer[..end].last() != Some(&b'\\') {
-                return Ok(true);
-            }
-            self.buffer.truncate(end - 1);
-            self.buffer.push(b' ');
+    loop {
+        let failed = match lines.next().map_err(unread)? {
+            Some(line) => parser.line(&line).err(),
+            None => return Ok(parser.file),
+        };
+        if let Some(e) = failed {
+            return Err(Error::input(path, format!("line {}: {}", lines.number, text::shown(&e))));
         }
     }
 }
@@ -92,62 +72,94 @@ struct Parser {
     material: Option<String>,
     /// Whether name or material changed since the last face.
     changed: bool,
+    /// Number of the smoothing group; 0: flat.
+    smoothing: u32,
     polygon: Vec<Corner>,
     cutter: PolygonTriangulator,
 }
 
 impl Parser {
     fn line(&mut self, line: &str) -> Result<(), String> {
-        let line = line.trim();
+        let line = trim(line);
         let (key, rest) = line.split_once(|c: char| c.is_ascii_whitespace()).unwrap_or((line, ""));
-        let rest = rest.trim();
+        let rest = trim(rest);
         match key {
             "v" => self.vertex(rest),
             "vt" => {
                 // v is often left out by one-dimensional textures
-                let [u, v, _] = floats(&mut words(rest), 1)?;
+                let [u, v, _]: [f32; 3] = self.floats(&mut words(rest), 1)?;
                 self.file.texcoords.push(Vec2::new(u, 1.0 - v));
                 Ok(())
             }
             "vn" => {
-                self.file.normals.push(floats(&mut words(rest), 3)?.into());
+                let normal: [f32; 3] = self.floats(&mut words(rest), 3)?;
+                self.file.normals.push(normal.into());
                 Ok(())
             }
-            "f" => self.face(rest),
+            "f" | "fo" => self.face(rest),
             "o" | "g" => {
-                self.name = rest.to_owned();
+                rest.clone_into(&mut self.name);
                 self.changed = true;
                 Ok(())
             }
+            "s" => {
+                self.smoothing = smoothing_group(rest);
+                Ok(())
+            }
             "usemtl" => {
-                self.material = Some(strip_comment(rest).to_owned());
+                self.material = (!rest.is_empty()).then(|| rest.to_owned());
                 self.changed = true;
                 Ok(())
             }
             "mtllib" => {
-                self.file.libraries.push(strip_comment(rest).to_owned());
+                self.file.libraries.push(rest.to_owned());
                 Ok(())
             }
-            // points, lines, smoothing groups, curves, comments: nothing to show
+            // points, lines, curves, comments: nothing to show
             _ => Ok(()),
         }
     }
 
     fn vertex(&mut self, rest: &str) -> Result<(), String> {
         let mut words = words(rest);
-        let p = Vec3::from(floats(&mut words, 3)?);
-        if !p.is_finite() {
+        let p: [f64; 3] = self.floats(&mut words, 3)?;
+        let p = DVec3::from(p);
+        // false for NaN, too
+        if !(p.abs().max_element() <= f64::from(f32::MAX) && p.is_finite()) {
             return Err(format!("the vertex position `{rest}` is not finite: repair the model and export it again"));
         }
         self.file.positions.push(p);
         // x y z w has a weight for curves, which says nothing here; x y z r g b has a colour
         let more = words.clone().take_while(|w| !w.starts_with('#')).count();
         if more == 3 {
-            let c = Vec3::from(floats(&mut words, 3)?);
+            let c: [f32; 3] = self.floats(&mut words, 3)?;
             self.file.colors.resize(self.file.positions.len() - 1, Vec4::ONE);
-            self.file.colors.push(c.extend(1.0));
+            self.file.colors.push(Vec3::from(c).extend(1.0));
         }
         Ok(())
+    }
+
+    /// Up to three numbers, of which the first `needed` must be there; the others are zero if missing.
+    fn floats<T: Number>(&mut self, words: &mut SplitAsciiWhitespace, needed: usize) -> Result<[T; 3], String> {
+        let mut out = [T::default(); 3];
+        for (i, value) in out.iter_mut().enumerate() {
+            match words.clone().next() {
+                Some(word) if i < needed || !word.starts_with('#') => {
+                    words.next();
+                    *value = match word.parse() {
+                        Ok(value) => value,
+                        Err(_) => {
+                            let value = float(word).ok_or_else(|| format!("`{word}` is not a number"))?;
+                            self.file.decimal_commas += usize::from(word.contains(','));
+                            T::rounded(value)
+                        }
+                    };
+                }
+                _ if i < needed => return Err(format!("{needed} numbers are needed, {i} found")),
+                _ => break,
+            }
+        }
+        Ok(out)
     }
 
     fn face(&mut self, rest: &str) -> Result<(), String> {
@@ -165,10 +177,13 @@ impl Parser {
             self.changed = false;
             let (name, material) = (self.name.clone(), self.material.clone());
             if self.file.groups.last().is_none_or(|g| g.name != name || g.material != material) {
-                self.file.groups.push(Group { name, material, triangles: Vec::new() });
+                self.file.groups.push(Group { name, material, triangles: Vec::new(), smoothing: Vec::new() });
             }
         }
         if let Some(group) = self.file.groups.last_mut() {
+            if group.smoothing.last().map_or(0, |s| s.1) != self.smoothing {
+                group.smoothing.push((group.triangles.len() as u32, self.smoothing));
+            }
             let (polygon, positions) = (&self.polygon, &self.file.positions);
             match self.cutter.cut(polygon.iter().map(|c| positions[c.position as usize])) {
                 Some(triangles) => group.triangles.extend(triangles.map(|t| t.map(|i| polygon[i]))),
@@ -183,7 +198,8 @@ impl Parser {
         let mut parts = word.split('/');
         let mut index = |what: &str, count: usize| -> Result<u32, String> {
             let part = parts.next().unwrap_or("");
-            if part.is_empty() {
+            // 0 is how some write that there is none
+            if part.is_empty() || part == "0" && what != "vertex" {
                 return Ok(NONE);
             }
             let i: i64 = part.parse().map_err(|_| format!("`{word}` is not a corner of a face"))?;
@@ -210,23 +226,39 @@ fn words(text: &str) -> SplitAsciiWhitespace<'_> {
     text.split_ascii_whitespace()
 }
 
-/// Names may hold spaces, so that only ` #` ends them.
-fn strip_comment(text: &str) -> &str {
-    text.split(" #").next().unwrap_or("").trim()
+/// A number of the file's arrays.
+trait Number: Default + Copy + std::str::FromStr {
+    /// The nearest one.
+    fn rounded(value: f64) -> Self;
 }
 
-/// Up to three numbers, of which the first `needed` must be there; the others are zero if missing.
-fn floats(words: &mut SplitAsciiWhitespace, needed: usize) -> Result<[f32; 3], String> {
-    let mut out = [0.0; 3];
-    for (i, value) in out.iter_mut().enumerate() {
-        match words.clone().next() {
-            Some(word) if i < needed || !word.starts_with('#') => {
-                words.next();
-                *value = word.parse().map_err(|_| format!("`{word}` is not a number"))?;
-            }
-            _ if i < needed => return Err(format!("{needed} numbers are needed, {i} found")),
-            _ => break,
-        }
+impl Number for f32 {
+    fn rounded(value: f64) -> Self {
+        value as f32
     }
-    Ok(out)
+}
+
+impl Number for f64 {
+    fn rounded(value: f64) -> Self {
+        value
+    }
+}
+
+/// A number as programs write it: with a decimal comma, with Fortran's exponent, or as Windows writes what is none.
+pub(super) fn float(word: &str) -> Option<f64> {
+    word.parse().ok().or_else(|| {
+        let number = word.replacen(',', ".", 1).replacen(['d', 'D'], "e", 1);
+        let is_none = ["#IND", "#QNAN", "#SNAN", "#INF", "nan("].iter().any(|mark| word.contains(mark));
+        if is_none { Some(f64::NAN) } else { number.parse().ok() }
+    })
+}
+
+/// The number of a smoothing group; 0 for `off`.
+fn smoothing_group(rest: &str) -> u32 {
+    let word = words(rest).next().unwrap_or("off");
+    match word.parse::<f64>() {
+        // what is no number is `off` or `on`
+        Err(_) => u32::from(!word.eq_ignore_ascii_case("off")),
+        Ok(number) => number as u32,
+    }
 }

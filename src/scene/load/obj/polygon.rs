@@ -1,7 +1,7 @@
 //! Polygons to triangles.
 
 use earcut::Earcut;
-use glam::{DVec3, Vec3};
+use glam::DVec3;
 
 /// Cuts concave polygons; keeps its buffers from one to the next.
 #[derive(Default)]
@@ -15,7 +15,7 @@ impl PolygonTriangulator {
     /// The triangles of a polygon of finite corners that no fan from its first corner can fill, as indices of corners and
     /// with the polygon's orientation. `None` where the fan is right, or nothing is: the polygon is a triangle, convex, a
     /// quad whose fan starts at the dent, or has no area.
-    pub(super) fn cut(&mut self, corners: impl Iterator<Item = Vec3> + Clone) -> Option<impl Iterator<Item = [usize; 3]>> {
+    pub(super) fn cut(&mut self, corners: impl Iterator<Item = DVec3> + Clone) -> Option<impl Iterator<Item = [usize; 3]>> {
         self.project(corners)?;
         let area = |[a, b, c]: [[f64; 2]; 3]| (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
         let points = &self.points;
@@ -34,10 +34,10 @@ impl PolygonTriangulator {
 
     /// Drops the axis along which the polygon's normal (by Newell's method) is longest, so that the polygon turns
     /// counter-clockwise. `None` for triangles, and if there is no normal.
-    fn project(&mut self, corners: impl Iterator<Item = Vec3> + Clone) -> Option<()> {
+    fn project(&mut self, corners: impl Iterator<Item = DVec3> + Clone) -> Option<()> {
         // relative to a corner, so that no digits are lost far from the origin
-        let origin = corners.clone().next()?.as_dvec3();
-        let relative = corners.map(|p| p.as_dvec3() - origin);
+        let origin = corners.clone().next()?;
+        let relative = corners.map(|p| p - origin);
         let next = relative.clone().skip(1);
         // the last corner and the first, which is the origin, add nothing
         let normal: DVec3 = relative.clone().zip(next).map(|(p, q)| p.cross(q)).sum();

@@ -1,0 +1,223 @@
+//! Maps of MTL materials to the scene's textures.
+
+use std::collections::{HashMap, HashSet};
+use std::path::{Path, PathBuf};
+
+use super::mtl::Map;
+use crate::error::Error;
+use crate::scene::load::find::{self, Finder};
+use crate::scene::load::picture::{self, DecodedImage};
+use crate::scene::load::{ImagesDecoded, LoadOptions, text};
+use crate::scene::material::TextureSlot;
+use crate::scene::{Filter, LoadReport, Scene, TexelData, Texture, Wrap};
+
+/// What texels of a texture are made of, so that no two textures are alike.
+#[derive(Clone, Copy, PartialEq, Eq, Hash)]
+enum Texels {
+    /// Colour of the first map, alpha of the second.
+    ColorAndAlpha,
+    /// Roughness of the first map (green), metalness of the second (blue).
+    Surface,
+    /// The same, with Blinn-Phong exponents in the first map: bits of the largest one.
+    SurfaceOfExponents(u32),
+}
+
+/// What identifies a texture: its texels, its files with the bits of their `-mm`, and whether it is clamped.
+type TextureKey = (Texels, [Option<(PathBuf, [u32; 2])>; 2], bool);
+
+/// The pictures and textures of a model's materials.
+pub(super) struct Textures<'a> {
+    options: LoadOptions<'a>,
+    pub finder: Finder,
+    pictures: HashMap<PathBuf, Option<DecodedImage>>,
+    textures: HashMap<TextureKey, usize>,
+    /// Names that were not found.
+    missing: HashSet<String>,
+}
+
+impl<'a> Textures<'a> {
+    /// No texture yet.
+    pub(super) fn new(options: LoadOptions<'a>) -> Self {
+        let (pictures, textures) = (HashMap::new(), HashMap::new());
+        Self { options, finder: Finder::default(), pictures, textures, missing: HashSet::new() }
+    }
+
+    /// The texture of `color`, with its alpha from `alpha`. `None`, with a warning, if neither can be read.
+    pub(super) fn color(
+        &mut self,
+        color: Option<&Map>,
+        alpha: Option<&Map>,
+        beside: [&Path; 2],
+        scene: &mut Scene,
+    ) -> Option<TextureSlot> {
+        self.slot([color, alpha], Texels::ColorAndAlpha, beside, scene, |[color, alpha]| match (color, alpha) {
+            // alpha of a diffuse map means nothing in MTL
+            (Some((map, picture)), None) if map.range == [0.0, 1.0] => picture.clone(),
+            (Some((map, picture)), Some((alpha, same)))
+                if map.range == alpha.range && map.range == [0.0, 1.0] && map.file == alpha.file && has_alpha(same) =>
+            {
+                picture.clone()
+            }
+            (color, alpha) => {
+                let channel = if alpha.is_some_and(|(_, picture)| has_alpha(picture)) { 3 } else { 0 };
+                combined([color, alpha].map(|p| p.map(|(_, picture)| picture)), |[c, a]| {
+                    let [r, g, b, _] = c.zip(color).map_or([1.0; 4], |(texel, (map, _))| texel.map(|v| ranged(map, v)));
+                    [r, g, b, a.zip(alpha).map_or(1.0, |(texel, (map, _))| ranged(map, texel[channel]))]
+                })
+            }
+        })
+    }
+
+    /// The texture of roughness and metalness. `shininess`: the first map holds shares of this Blinn-Phong exponent.
+    pub(super) fn surface(
+        &mut self,
+        [rough, metal]: [Option<&Map>; 2],
+        shininess: Option<f32>,
+        beside: [&Path; 2],
+        scene: &mut Scene,
+    ) -> Option<TextureSlot> {
+        let texels = shininess.map_or(Texels::Surface, |n| Texels::SurfaceOfExponents(n.to_bits()));
+        self.slot([rough, metal], texels, beside, scene, |[rough, metal]| {
+            combined([rough, metal].map(|p| p.map(|(_, picture)| picture)), |[r, m]| {
+                let of = |texel: Option<[f32; 4]>, p: Option<(&Map, &DecodedImage)>| {
+                    texel.zip(p).map_or(1.0, |(texel, (map, _))| ranged(map, texel[0]))
+                };
+                let rough = of(r, rough);
+                let rough = shininess.filter(|_| r.is_some()).map_or(rough, |n| roughness(n * rough));
+                [1.0, rough, of(m, metal), 1.0]
+            })
+        })
+    }
+
+    /// The texture that `make` makes of the maps that can be read, with the options of the first.
+    fn slot(
+        &mut self,
+        maps: [Option<&Map>; 2],
+        texels: Texels,
+        beside: [&Path; 2],
+        scene: &mut Scene,
+        make: impl Fn([Option<(&Map, &DecodedImage)>; 2]) -> DecodedImage,
+    ) -> Option<TextureSlot> {
+        let options = maps[0].or(maps[1])?;
+        let files = maps.map(|map| map.and_then(|map| Some((map, self.path(map, beside, &mut scene.report)?))));
+        let key = files.clone().map(|file| file.map(|(map, path)| (path, map.range.map(f32::to_bits))));
+        let key = (texels, key, options.clamp);
+        if let Some(&texture) = self.textures.get(&key) {
+            return Some(TextureSlot { texture, texcoord: 0, transform: options.transform });
+        }
+        for (_, path) in files.iter().flatten() {
+            self.decode(path, &mut scene.report);
+        }
+        let pictures = files.each_ref().map(|file| {
+            let (map, path) = file.as_ref()?;
+            Some((*map, self.pictures.get(path)?.as_ref()?))
+        });
+        let named = files.iter().zip(&pictures).find_map(|(file, picture)| file.as_ref().filter(|_| picture.is_some()));
+        let name = named?.1.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let DecodedImage { width, height, texels } = make(pictures);
+        let wrap = [if options.clamp { Wrap::Clamp } else { Wrap::Repeat }; 2];
+        let texture = scene.textures.len();
+        scene.textures.push(Texture { name, width, height, texels, wrap, filter: Filter::Linear });
+        self.textures.insert(key, texture);
+        Some(TextureSlot { texture, texcoord: 0, transform: options.transform })
+    }
+
+    /// The picture of a map as it is in its file, if it can be read.
+    pub(super) fn picture(&mut self, map: &Map, beside: [&Path; 2], report: &mut LoadReport) -> Option<&DecodedImage> {
+        let path = self.path(map, beside, report)?;
+        self.decode(&path, report);
+        self.pictures.get(&path)?.as_ref()
+    }
+
+    /// The file of a map.
+    fn path(&mut self, map: &Map, beside: [&Path; 2], report: &mut LoadReport) -> Option<PathBuf> {
+        match self.finder.find(&map.names(), &beside) {
+            Ok(path) => Some(path),
+            Err(searched) => {
+                if self.missing.insert(map.file.clone()) {
+                    let (name, searched) = (text::shown(&map.file), find::list(&searched));
+                    report.warnings.push(format!("the texture `{name}` was not found in {searched}"));
+                }
+                None
+            }
+        }
+    }
+
+    /// Decodes a picture, once.
+    fn decode(&mut self, path: &Path, report: &mut LoadReport) {
+        if self.pictures.contains_key(path) {
+            return;
+        }
+        report.files.push(path.to_owned());
+        let picture = if self.options.textures {
+            let bytes = std::fs::read(path).map_err(|e| Error::read(path, &e).to_string());
+            let name = path.to_string_lossy();
+            let decoded = bytes.and_then(|b| picture::decode(&b, &name).map_err(|e| format!("{name} {e}")));
+            (self.options.progress)(ImagesDecoded { done: self.pictures.len() + 1, of: None });
+            decoded.map_err(|e| report.warnings.push(format!("{e}: shown without it"))).ok()
+        } else {
+            report.skipped_images += 1;
+            None
+        };
+        self.pictures.insert(path.to_owned(), picture);
+    }
+}
+
+/// Perceptual roughness of a Blinn-Phong exponent (alpha^2 = 2 / (n + 2), roughness = sqrt(alpha)).
+pub(super) fn roughness(shininess: f32) -> f32 {
+    (2.0 / (shininess.max(0.0) + 2.0)).powf(0.25)
+}
+
+/// A texel's value in the range that `-mm` gives.
+fn ranged(map: &Map, value: f32) -> f32 {
+    let [base, gain] = map.range;
+    if map.range == [0.0, 1.0] { value } else { (base + gain * value).clamp(0.0, 1.0) }
+}
+
+fn has_alpha(picture: &DecodedImage) -> bool {
+    picture.texels.iter().any(|[_, _, _, alpha]| alpha < 1.0)
+}
+
+/// Whether alpha is a matter of yes or no: at most a tenth of the texels, those along edges, are between.
+pub(super) fn is_cut_out(texels: &TexelData) -> bool {
+    let (between, all) = texels
+        .iter()
+        .fold((0, 0), |(between, all), [_, _, _, alpha]| (between + usize::from(alpha > 0.1 && alpha < 0.9), all + 1));
+    between * 10 <= all
+}
+
+/// Whether texels are directions, most of them outwards, and not heights, which are grey.
+pub(super) fn is_normal_map(texels: &TexelData) -> bool {
+    let (mut length_error, mut outwards, mut spread, mut count) = (0.0, 0.0, 0.0, 0.0_f32);
+    for [r, g, b, _] in texels.iter() {
+        let [x, y, z] = [r, g, b].map(|v| 2.0 * v - 1.0);
+        length_error += ((x * x + y * y + z * z).sqrt() - 1.0).abs();
+        outwards += z;
+        spread += r.max(g).max(b) - r.min(g).min(b);
+        count += 1.0;
+    }
+    length_error < 0.15 * count && outwards > 0.4 * count && spread > 0.1 * count
+}
+
+/// A picture of the size of the larger one, each of whose texels `f` makes of those at the same place.
+fn combined(pictures: [Option<&DecodedImage>; 2], f: impl Fn([Option<[f32; 4]>; 2]) -> [f32; 4]) -> DecodedImage {
+    let size = |side: fn(&DecodedImage) -> u32| pictures.iter().flatten().map(|p| side(p)).max().unwrap_or(1);
+    let (width, height) = (size(|p| p.width), size(|p| p.height));
+    let texel = |p: &DecodedImage, x: u32, y: u32| {
+        let x = u64::from(x) * u64::from(p.width) / u64::from(width);
+        let y = u64::from(y) * u64::from(p.height) / u64::from(height);
+        p.texels.get((y * u64::from(p.width) + x) as usize)
+    };
+    let all = (0..height)
+        .flat_map(|y| (0..width).map(move |x| (x, y)))
+        .flat_map(|(x, y)| f(pictures.map(|p| p.map(|p| texel(p, x, y)))));
+    let of = |kind: fn(&TexelData) -> bool| pictures.iter().flatten().map(move |p| kind(&p.texels));
+    let texels = if of(|t| matches!(t, TexelData::Float(_))).any(|is| is) {
+        all.collect::<Vec<f32>>().into()
+    } else if of(|t| matches!(t, TexelData::Unorm8(_))).all(|is| is) {
+        all.map(|v| (v * 255.0).round() as u8).collect::<Vec<u8>>().into()
+    } else {
+        all.map(|v| (v * 65535.0).round() as u16).collect::<Vec<u16>>().into()
+    };
+    DecodedImage { width, height, texels }
+}
