@@ -44,9 +44,9 @@ pub struct RaysArgs {
 
 const EXPORT_EXAMPLES: &str = "\
 Examples:
-  skylit export scene.obj scene.glb
-  skylit export builtin:atrium atrium.gltf
-  skylit export scene.glb triangles.bin";
+  skylit export scene.obj -o scene.glb
+  skylit export builtin:atrium -o atrium.gltf
+  skylit export scene.glb -o triangles.bin";
 
 /// `skylit export`.
 #[derive(Clone, Debug, Args)]
@@ -56,8 +56,11 @@ pub struct ExportArgs {
     #[arg(value_hint = ValueHint::FilePath)]
     pub scene: String,
     /// File to write: .bin (triangle soup in world space), .glb or .gltf
-    #[arg(value_hint = ValueHint::FilePath)]
-    pub output: PathBuf,
+    #[arg(long, short, value_name = "FILE", value_hint = ValueHint::FilePath, required_unless_present = "output_argument")]
+    pub output: Option<PathBuf>,
+    /// The same without -o
+    #[arg(value_name = "OUTPUT", value_hint = ValueHint::FilePath, conflicts_with = "output")]
+    pub output_argument: Option<PathBuf>,
     /// Meaning of the file
     #[command(flatten)]
     pub meaning: SceneSettings,

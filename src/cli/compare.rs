@@ -1,5 +1,6 @@
 //! `skylit compare`: images, or renders made on the spot, against a reference.
 
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -8,14 +9,17 @@ use serde_json::json;
 
 use super::compare_ao::{self, AoVsPathArgs};
 use crate::compare::picture::{self, PictureKind};
-use crate::compare::{Entry, ImageSet, check_count, letter, page, parse_letter, render, short_names};
+use crate::compare::render::{self, Rendered};
+use crate::compare::{Entry, ImageSet, MAX_IMAGES, check_count, letter, page, parse_letter, short_names};
 use crate::error::{Error, Result};
 use crate::files;
 use crate::film::Control;
+use crate::integrators::IntegratorSettings;
 use crate::integrators::lighting::LightingSettings;
 use crate::measure::comparison::CompareOptions;
 use crate::measure::mask::MaskOptions;
-use crate::output;
+use crate::output::{self, Image};
+use crate::realtime::frame_settings::FrameSettings;
 use crate::renderer::settings::{CameraSettings, ImageSettings};
 use crate::renderer::{RenderSettings, Renderer};
 use crate::report;
@@ -59,10 +63,11 @@ pub struct CompareArgs {
     /// Images (.exr, .png, .jpg, .webp): A, which is judged; B, the reference; C and more, which are judged, too. Those of --a, --b and --c take their letters first
     #[arg(value_name = "IMAGE", value_hint = ValueHint::FilePath)]
     pub images: Vec<PathBuf>,
-    /// Scene to render: a .gltf, .glb, .obj or .brhan file, or builtin:NAME. Options of the groups Image, Camera and Light apply to each render that they have an effect on
+    /// Scene to render: a .gltf, .glb, .obj or .brhan file, or builtin:NAME. Options of `skylit render` beside it apply to each render that they have an effect on
     #[arg(long, value_name = "SCENE", value_hint = ValueHint::FilePath)]
     pub scene: Option<String>,
-    /// Render image A of --scene: an integrator or a preset of frames in real time, then options of `skylit render`, like "ao --ao-radius 2" or "balanced --history 16"
+    /// Render image A of --scene: an integrator or a preset of frames in real time, then options of `skylit render`, like "ao --ao-radius 2" or "balanced --history 16". A preset alone is shown at rest,
+    /// when histories are full, and its first frame besides, as another image
     #[arg(long, value_name = "RENDER", requires = "scene", allow_hyphen_values = true)]
     pub a: Option<String>,
     /// Render image B, like --a
@@ -95,6 +100,9 @@ pub struct CompareArgs {
     /// Write a report into this folder: a page that needs no network, with all images, differences and numbers
     #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath)]
     pub html: Option<PathBuf>,
+    /// Write all numbers into a table, a row for each image that is compared with the reference
+    #[arg(long, value_name = "FILE.csv", value_hint = ValueHint::FilePath)]
+    pub csv: Option<PathBuf>,
     /// Save the renders into this folder, as a.exr, b.exr, ...
     #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath, requires = "scene")]
     pub save: Option<PathBuf>,
@@ -104,9 +112,15 @@ pub struct CompareArgs {
     /// The camera.
     #[command(flatten)]
     pub camera: CameraSettings,
+    /// Settings of integrators.
+    #[command(flatten)]
+    pub integrators: IntegratorSettings,
     /// Light besides the scene's.
     #[command(flatten)]
     pub lighting: LightingSettings,
+    /// Settings of real-time frames.
+    #[command(flatten)]
+    pub frames: FrameSettings,
     /// Device and tracer
     #[command(flatten)]
     pub device: DeviceSettings,
@@ -152,13 +166,15 @@ impl CompareArgs {
         RenderSettings {
             image: self.image.clone(),
             camera: self.camera.clone(),
+            integrators: self.integrators.clone(),
             lighting: self.lighting.clone(),
+            frames: self.frames.clone(),
             ..RenderSettings::default()
         }
     }
 
-    /// Checks what can be checked before anything is loaded or rendered, and returns the settings of the renders.
-    fn check(&self, sources: &[Source]) -> Result<Vec<RenderSettings>> {
+    /// Checks what can be checked before anything is loaded or rendered, and returns the settings of the renders. Adds first frames to the sources.
+    fn check(&self, sources: &mut Vec<Source>) -> Result<Vec<RenderSettings>> {
         // `--c` or `--b` alone would otherwise move up
         if self.b.is_some() && sources.len() == 1 {
             return Err(Error::Usage("--b: image A is missing: name a file, or render it with --a".into()));
@@ -174,17 +190,37 @@ impl CompareArgs {
             return Err(Error::Usage(format!("{} is for renders, and all images are files: leave it out", setting.option())));
         }
         self.device.check()?;
+        let mut settings = render::settings(&words, &shared)?;
+        if self.instance.is_some() {
+            settings.iter_mut().for_each(render::add_ids);
+        }
+        self.add_first_frames(sources, &mut settings);
         for path in self.difference.iter().chain(&self.flip) {
             picture::paths(sources.len(), self.reference, path)?.iter().try_for_each(|p| files::check_writable(p))?;
         }
         for folder in self.html.iter().chain(&self.save) {
             std::fs::create_dir_all(folder).map_err(|e| Error::write(folder, &e))?;
         }
-        let mut settings = render::settings(&words, &shared)?;
-        if self.instance.is_some() {
-            settings.iter_mut().for_each(render::add_ids);
-        }
+        self.csv.iter().try_for_each(|path| files::check_writable(path))?;
         Ok(settings)
+    }
+
+    /// Adds the first frame of each preset that is judged at rest: what filters and histories do shows there.
+    fn add_first_frames(&self, sources: &mut Vec<Source>, settings: &mut Vec<RenderSettings>) {
+        let renders =
+            sources.iter().enumerate().filter_map(|(k, s)| if let Source::Render(w) = s { Some((k, w)) } else { None });
+        let firsts: Vec<(String, RenderSettings)> = renders
+            .zip(settings.iter())
+            .filter(|((k, _), _)| *k != self.reference)
+            .filter_map(|((_, words), settings)| Some((format!("{words} --warm-up 0"), render::first_frame(settings)?)))
+            .take(MAX_IMAGES.saturating_sub(sources.len()))
+            .collect();
+        for (words, first) in firsts {
+            if !settings.contains(&first) {
+                sources.push(Source::Render(words));
+                settings.push(first);
+            }
+        }
     }
 }
 
@@ -193,8 +229,8 @@ pub fn run(args: &CompareArgs, start: Instant) -> Result<(), Failure> {
     if let Some(OtherComparison::AoVsPath(args)) = &args.comparison {
         return Ok(compare_ao::run(args, start)?);
     }
-    let sources = args.sources();
-    let settings = args.check(&sources)?;
+    let mut sources = args.sources();
+    let settings = args.check(&mut sources)?;
     let console = args.verbosity.console();
     let mut warnings = Warnings::new(console);
     let entries = entries(args, &sources, settings, console, &mut warnings)?;
@@ -203,6 +239,10 @@ pub fn run(args: &CompareArgs, start: Instant) -> Result<(), Failure> {
     set.warnings.clone_from(&warnings.list);
     for line in set.lines() {
         console.line(&line)?;
+    }
+    if let Some(path) = &args.csv {
+        let table = set.csv()?;
+        files::write_atomically(path, |file| file.write_all(&table))?;
     }
     let mut pictures = Vec::new();
     for (kind, path) in [(PictureKind::Difference, &args.difference), (PictureKind::Flip, &args.flip)] {
@@ -241,7 +281,8 @@ fn entries(
         _ => None,
     };
     let mut settings = settings.into_iter();
-    let mut entries = Vec::new();
+    let mut entries: Vec<Entry> = Vec::new();
+    let mut rendered: Vec<(usize, RenderSettings)> = Vec::new();
     for (k, source) in sources.iter().enumerate() {
         entries.push(match (source, &mut renderer) {
             (Source::Render(words), Some(renderer)) => {
@@ -251,21 +292,44 @@ fn entries(
                     progress: ProgressControl { progress: Progress::new(label, &console), keep_partial: false },
                     warnings,
                 };
-                let image = renderer.image(&settings, &mut control)?;
+                let Rendered { image, frame, choices, without_effect } = render::render(renderer, &settings, &mut control)?;
                 drop(control);
                 if let Some(folder) = &args.save {
                     output::save(&image, &folder.join(format!("{}.exr", letter(k).to_ascii_lowercase())))?;
                 }
-                Entry { name: words.clone(), description: renderer.name().to_owned(), image }
+                if let Some(what) = without_effect {
+                    warnings.add(&format!("{} ({words}): {what}", letter(k)));
+                }
+                rendered.push((k, settings));
+                let description =
+                    [Some(renderer.name().to_owned()), frame].into_iter().flatten().collect::<Vec<_>>().join(", ");
+                Entry { name: words.clone(), description, choices, image }
             }
             _ => {
                 let Some((image, (path, name))) = loaded.next() else { continue };
                 let description = path.display().to_string();
-                Entry { description: if description == name { String::new() } else { description }, name, image }
+                let description = if description == name { String::new() } else { description };
+                Entry { description, name, choices: Vec::new(), image }
             }
         });
     }
+    for (n, (k, ours)) in rendered.iter().enumerate() {
+        let twin = rendered[..n].iter().find(|(j, theirs)| ours != theirs && is_same(&entries[*k].image, &entries[*j].image));
+        if let Some((j, _)) = twin {
+            warnings.add(&format!(
+                "{} and {} are the same in every bit: the options in which they differ have no effect on this image",
+                letter(*j),
+                letter(*k)
+            ));
+        }
+    }
     Ok(entries)
+}
+
+/// Returns true if two images have the same colours, bit for bit.
+fn is_same(a: &Image, b: &Image) -> bool {
+    let bits = |image: &Image, name: &str| image.f32(name).map(|v| v.iter().map(|v| v.to_bits()).collect::<Vec<_>>());
+    ["R", "G", "B", "Y", "A"].iter().all(|name| bits(a, name) == bits(b, name))
 }
 
 /// Progress bar and interruption by Ctrl-C of a render; warnings are printed once.

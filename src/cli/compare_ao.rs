@@ -10,7 +10,6 @@ use crate::error::{Error, Result};
 use crate::film::Control;
 use crate::integrators::ao::Hemisphere;
 use crate::integrators::lighting::LightingSettings;
-use crate::integrators::path::ambient::EnvironmentLight;
 use crate::output::{self, ImageFormat, parse_size};
 use crate::renderer::Renderer;
 use crate::renderer::settings::CameraSettings;
@@ -89,17 +88,7 @@ pub fn run(args: &AoVsPathArgs, start: Instant) -> Result<()> {
         progress: ProgressControl { progress: Progress::new("comparing", &console), keep_partial: false },
         warnings: Warnings::new(console),
     };
-    let mut settings = args.settings();
-    if renderer.scene().is_dark() && settings.lighting == LightingSettings::default() {
-        settings.lighting = ao_versus_path::default_light(&mut renderer, &settings, &mut control)?;
-        control.warning(match settings.lighting.environment {
-            Some(_) => {
-                "the scene has no light: it gets a white environment of radiance 1 (--environment and --light choose others)"
-            }
-            None => "the scene has no light and is closed: it gets a sphere that emits, in its middle (--light chooses others)",
-        });
-    }
-    let found = ao_versus_path::run(&mut renderer, &settings, &mut control)?;
+    let found = ao_versus_path::run(&mut renderer, &args.settings(), &mut control)?;
     let CompareControl { progress, warnings } = control;
     drop(progress);
     if let Some(path) = &args.output {
@@ -210,24 +199,24 @@ fn lines(report: &Report, seconds: f64) -> Vec<String> {
             percent(light.bounces)
         ),
     ];
+    lines.extend(report.choices.iter().cloned());
     for fit in report.path.iter().chain(&report.sky) {
         lines.push(String::new());
         lines.extend(fit_lines(fit));
     }
     if let Some(fit) = report.path.first() {
         lines.push(String::new());
-        lines.push(format!("skylit render {} --integrator lit {}", report.scene, render_options(fit)));
+        lines.push(match fit.best.rmse > 0.0 {
+            true => format!(
+                "two images that differ by the RMSE of the best, {}, over the pixels that show surfaces, and by their noise:",
+                significant(fit.best.rmse)
+            ),
+            false => "two images that differ by less than the noise of these samples tells:".to_owned(),
+        });
+        lines.extend(report.commands.iter().cloned());
     }
     lines.push(format!("{:.1} s: {:.1} s of rendering, {:.1} s of search", seconds, report.render_seconds, report.fit_seconds));
     lines
-}
-
-fn render_options(fit: &FitRecord) -> String {
-    let environment = match fit.environment_light {
-        Some(EnvironmentLight::Ambient) => " --environment-light ambient",
-        _ => "",
-    };
-    format!("{} --ambient {}{environment}", fit.best.options(), fit.best.color()).trim_start().to_owned()
 }
 
 fn fit_lines(fit: &FitRecord) -> Vec<String> {
@@ -247,9 +236,9 @@ fn fit_lines(fit: &FitRecord) -> Vec<String> {
     }
     lines.push(format!("  best radius {}; error within 5 % for {}", choice_text(&fit.binary), interval(fit.good_radii)));
     lines.push(format!("  best falloff {}", choice_text(&fit.falloff)));
-    if let Some(parts) = &fit.parts {
-        let all = parts.transport + parts.occlusion + parts.cross;
-        let share = |x: f64| format!("{:+.0} %", 100.0 * x / all.max(f64::MIN_POSITIVE));
+    // none of a sum that noise makes negative
+    if let Some((parts, all)) = fit.parts.as_ref().map(|p| (p, p.transport + p.occlusion + p.cross)).filter(|p| p.1 > 0.0) {
+        let share = |x: f64| format!("{:+.0} %", 100.0 * x / all);
         lines.push(format!(
             "  squared error of the best: {} left by ao-sky in place of AO, {} AO against ao-sky, {} both together",
             share(parts.transport),
@@ -295,9 +284,10 @@ fn interval([low, high]: [Option<f64>; 2]) -> String {
 mod plot {
     use std::path::Path;
 
-    use super::{EnvironmentLight, FitRecord, Report, Result, page, significant};
+    use super::{FitRecord, Report, Result, page, significant};
     use crate::bench::plot::panel::{Panel, Plot, Point, Series};
     use crate::bench::plot::picture::{self, PlotFormat};
+    use crate::integrators::path::ambient::EnvironmentLight;
 
     /// Checks before anything is rendered that the plot can be written.
     pub fn check(path: &Path) -> Result<()> {

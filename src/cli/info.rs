@@ -1,16 +1,17 @@
 //! `skylit info`: what a scene is made of, and how to begin with it.
 
 use clap::{Args, ValueHint};
-use glam::DVec3;
 use serde_json::json;
 
 use crate::error::{Error, Result};
 use crate::film::{Control, NoControl};
+use crate::output::parse_size;
 use crate::renderer::interactive::camera_settings;
-use crate::renderer::settings::CameraSettings;
+use crate::renderer::report::milliseconds;
+use crate::renderer::settings::options_text;
 use crate::renderer::{RenderSettings, Renderer};
 use crate::scene::inventory::Inventory;
-use crate::scene::{Camera, Scene, SceneSettings, load};
+use crate::scene::{Scene, SceneSettings, load};
 use crate::settings::Length;
 use crate::terminal::console::Failure;
 use crate::terminal::interrupt::{self, SilentControl};
@@ -40,6 +41,9 @@ pub struct InfoArgs {
     /// Meaning of the file
     #[command(flatten)]
     pub meaning: SceneSettings,
+    /// Image size for which a camera, an AO radius and light are suggested [default: the scene's, or 1280x720]
+    #[arg(long, value_name = "WxH", value_parser = parse_size, conflicts_with = "no_device")]
+    pub size: Option<[u32; 2]>,
     /// Device and tracer
     #[command(flatten)]
     pub device: DeviceSettings,
@@ -51,15 +55,19 @@ pub struct InfoArgs {
 /// How to begin with a scene.
 #[derive(Clone, Debug, serde::Serialize)]
 struct Suggestions {
+    /// Size of the images that the rest is about, pixels.
+    size: [u32; 2],
     /// Options of `skylit render` that choose the camera that it chooses by itself.
     camera: String,
+    /// Options of `skylit render --integrator path` that light the scene as it does by itself; absent for a scene that has light.
+    light: Option<String>,
     /// Share of occlusion rays of surfaces in view that get out of the scene.
     ao_mean: Option<f64>,
     /// What `--ao-radius auto` is, scene units; absent for no limit.
     ao_radius: Option<f64>,
     /// Exposure of path-traced images, stops.
     exposure: Option<f64>,
-    /// What `skylit render` chooses where options leave it open, a sentence each.
+    /// What `skylit render` chooses for images of this size where options leave it open, a sentence each, and the options that choose the same.
     choices: Vec<String>,
 }
 
@@ -180,10 +188,10 @@ fn describe(i: &Inventory, scene: &Scene, format: &str) -> Vec<String> {
         add(
             "textures",
             format!(
-                "{} of {} images, {:.1} MiB decoded, the largest {}x{}",
+                "{} of {} images, {} decoded, the largest {}x{}",
                 t.count,
                 t.images,
-                mib(t.bytes),
+                bytes_text(t.bytes),
                 t.largest[0],
                 t.largest[1]
             ),
@@ -220,28 +228,40 @@ fn on_device(args: &InfoArgs, scene: Scene, progress: &mut Progress) -> Result<(
     let device = crate::gpu::Device::open(&args.device.options())?;
     let mut renderer = Renderer::new(device, scene, &args.device)?.with_name(&args.scene);
     let mut control = SilentControl;
-    let mut settings = RenderSettings { scene: args.meaning.clone(), ..Default::default() };
-    settings.image.size = Some(SKETCH_SIZE);
-    settings.image.spp = Some(SKETCH_SPP);
+    let mut asked = RenderSettings { scene: args.meaning.clone(), ..Default::default() };
+    asked.image.size = args.size;
 
-    let by_itself = renderer.complete(&settings, None)?;
-    settings.camera = camera_settings(&renderer.scene().cameras, &by_itself.camera);
-    let camera = camera_text(&settings.camera, &by_itself.camera);
+    // what is chosen for images of this size
+    let by_itself = renderer.complete(&asked, None)?;
+    let size = by_itself.settings.size(renderer.scene());
+    let mut settings =
+        RenderSettings { scene: args.meaning.clone(), camera: by_itself.chosen.camera.clone(), ..Default::default() };
+    if !settings.camera.chooses() {
+        settings.camera = camera_settings(&renderer.scene().cameras, &by_itself.camera);
+    }
+    let camera = options_text(&settings);
+    let mut auto = asked.clone();
+    auto.integrators.ao.ao_radius = Some(Length::Auto);
+    let auto_radius = renderer.complete(&auto, None)?.settings.integrators.ao.radius();
+    let lit = renderer.complete(&RenderSettings { integrator: Some("path".parse()?), ..asked.clone() }, None)?;
+    let light = options_text(&RenderSettings { lighting: lit.chosen.lighting.clone(), ..Default::default() });
     progress.set(1, 4);
+
+    // sketches of the same view
+    settings.image.size = Some(sketch_size(size));
+    settings.image.spp = Some(SKETCH_SPP);
     let mut open = settings.clone();
     open.integrators.ao.ao_radius = Some(Length::Units(f64::INFINITY));
     let ao_mean = renderer.still(&open, &mut Quiet(&mut control))?.report.surface_mean;
-    let mut auto = settings.clone();
-    auto.integrators.ao.ao_radius = Some(Length::Auto);
-    let auto_radius = renderer.complete(&auto, None)?.settings.integrators.ao.radius();
     progress.set(2, 4);
-    let mut path = settings.clone();
+    let mut path = RenderSettings { lighting: lit.chosen.lighting, ..settings.clone() };
     path.integrator = Some("path".parse()?);
     let path = renderer.still(&path, &mut Quiet(&mut control))?.report;
     // less than two stops are a matter of taste
     let stops = |mean: f64| Some((MIDDLE_GREY / mean).log2().round() + 0.0).filter(|s: &f64| s.abs() >= 2.0).unwrap_or(0.0);
     let exposure = path.surface_mean.filter(|m| *m > 0.0).map(stops);
-    let choices = by_itself.choices.into_iter().chain(path.setup.choices).collect();
+    let mut choices = by_itself.choices;
+    choices.extend(lit.choices.into_iter().filter(|c| c.starts_with("light")));
 
     progress.set(3, 4);
     let mut frames = RenderSettings { scene: args.meaning.clone(), camera: settings.camera.clone(), ..Default::default() };
@@ -262,7 +282,15 @@ fn on_device(args: &InfoArgs, scene: Scene, progress: &mut Progress) -> Result<(
         frame_ms: report.frame_ms().0,
     };
     let ao_radius = Some(auto_radius).filter(|r| r.is_finite());
-    Ok((Suggestions { camera, ao_mean, ao_radius, exposure, choices }, on_device))
+    let light = Some(light).filter(|text| !text.is_empty());
+    Ok((Suggestions { size, camera, light, ao_mean, ao_radius, exposure, choices }, on_device))
+}
+
+/// Size of a sketch of images of this size: as many pixels as [`SKETCH_SIZE`] has.
+fn sketch_size(size: [u32; 2]) -> [u32; 2] {
+    let pixels = f64::from(SKETCH_SIZE[0] * SKETCH_SIZE[1]);
+    let scale = (pixels / (f64::from(size[0]) * f64::from(size[1]).max(1.0))).sqrt();
+    size.map(|n| (f64::from(n) * scale).round().clamp(1.0, pixels) as u32)
 }
 
 /// Interruption without progress and warnings: what is rendered here is not the user's image.
@@ -276,7 +304,9 @@ impl Control for Quiet<'_> {
 
 impl Suggestions {
     fn lines(&self, scene: &str) -> Vec<String> {
-        let mut lines = vec![format!("{:<12}{}", "camera", self.camera)];
+        let [width, height] = self.size;
+        let mut lines = vec![format!("{:<12}{} for {width}x{height} pixels", "camera", self.camera)];
+        lines.extend(self.light.iter().map(|light| format!("{:<12}{light}", "light")));
         let radius = match self.ao_radius {
             Some(radius) => format!("--ao-radius {radius}"),
             None => "no AO radius is needed".into(),
@@ -304,19 +334,24 @@ impl OnDevice {
         vec![
             format!("{:<12}{}, tracer {}", "device", self.device, self.tracer),
             format!(
-                "{:<12}{:.1} MiB: acceleration structures {:.1}, the rest of the scene {:.1} (with materials and textures)",
+                "{:<12}{}: acceleration structures {}, the rest of the scene {} (with materials and textures)",
                 "memory",
-                mib(self.structure_bytes + self.scene_bytes),
-                mib(self.structure_bytes),
-                mib(self.scene_bytes)
+                bytes_text(self.structure_bytes + self.scene_bytes),
+                bytes_text(self.structure_bytes),
+                bytes_text(self.scene_bytes)
             ),
-            format!("{:<12}{:.0} ms a frame of the preset balanced at 1280x720", "time", self.frame_ms),
+            format!("{:<12}{} a frame of the preset balanced at 1280x720", "time", milliseconds(self.frame_ms)),
         ]
     }
 }
 
-fn mib(bytes: u64) -> f64 {
-    bytes as f64 / (1u64 << 20) as f64
+/// Bytes in the unit that suits them.
+fn bytes_text(bytes: u64) -> String {
+    match bytes {
+        b if b < 1 << 10 => format!("{b} bytes"),
+        b if b < 1 << 20 => format!("{:.1} KiB", b as f64 / 1024.0),
+        b => format!("{:.1} MiB", b as f64 / (1u64 << 20) as f64),
+    }
 }
 
 /// A number with four significant digits, without noise.
@@ -324,19 +359,6 @@ fn significant(value: f64) -> String {
     let rounded: f64 = format!("{value:.3e}").parse().unwrap_or(value);
     // no negative zero
     (rounded + 0.0).to_string()
-}
-
-/// Options that choose a camera.
-fn camera_text(settings: &CameraSettings, camera: &Camera) -> String {
-    if let Some(name) = &settings.camera {
-        return format!("--camera {name}");
-    }
-    let (eye, forward) = (camera.camera_to_world.translation, -camera.camera_to_world.matrix3.z_axis);
-    let vector = |v: DVec3| v.to_array().map(significant).join(",");
-    // as far away as directions need to survive the rounding
-    let target = eye + forward * eye.abs().max_element().max(1.0);
-    let fov_y = settings.fov_y.map_or_else(String::new, |f| format!(" --fov-y {}", significant(f)));
-    format!("--eye={} --target={}{fov_y}", vector(eye), vector(target))
 }
 
 /// One, or several of something.
@@ -361,6 +383,7 @@ mod tests {
     #[test]
     fn numbers_are_readable() {
         assert_eq!([0, 12, 1234, 1_234_567].map(grouped), ["0", "12", "1,234", "1,234,567"]);
+        assert_eq!([12, 2048, 3 << 20].map(bytes_text), ["12 bytes", "2.0 KiB", "3.0 MiB"]);
         assert_eq!([0.123456, -0.0, 12345.678, -1e-9].map(significant), ["0.1235", "0", "12350", "-0.000000001"]);
         assert_eq!(
             ["a/b.GLB", "x.gltf", "builtin:stairs", "stairs"].map(format_of)[..3],

@@ -13,7 +13,7 @@ use crate::terminal::interrupt;
 use crate::terminal::lines::Lines;
 use crate::tracer::DeviceSettings;
 use crate::verify::bless::Change;
-use crate::verify::manifest::{Manifest, Tracers, parse_tracers};
+use crate::verify::manifest::{Frame, Manifest, Tracers, parse_tracers};
 use crate::verify::selection::{Selection, Shard};
 use crate::verify::{Action, FrameResult, Observer, Options, Outcome, Summary, html, junit, plural};
 
@@ -22,7 +22,8 @@ const AFTER_HELP: &str = "\
 Exit codes:
   0    all frames hold
   1    a frame differs from its golden image
-  2    a frame, or all of them, could not be rendered or judged
+  2    a frame, or all of them, could not be rendered or judged; the others were
+  4    the results (--junit, --html) or a golden image cannot be written
 
 docs/ci.md describes the manifest, frames.toml, and what makes images differ between machines.
 Files of defaults (skylit.toml) are not read: golden images do not depend on them.";
@@ -103,45 +104,67 @@ impl VerifyArgs {
     }
 }
 
-/// Renders, compares or blesses, and reports.
+/// Renders, compares or blesses, and reports. Whatever ends the run early is in the results, too: those of an earlier run must not stay.
 pub fn run(args: &VerifyArgs) -> Result<(), Failure> {
-    let options = args.options()?;
-    run_with(args, &options).map_err(|failure| match failure.error {
-        // whatever keeps frames from being judged is one code for scripts
-        Error::Usage(_) | Error::CheckFailed(_) | Error::NotVerified(_) | Error::Interrupted => failure,
-        error => Failure { error: Error::NotVerified(error.to_string()), ..failure },
-    })
-}
-
-fn run_with(args: &VerifyArgs, options: &Options) -> Result<(), Failure> {
-    let manifest = Manifest::load(&args.folder)?;
     if let Some(path) = &args.junit {
         files::check_writable(path)?;
+        junit::write_failure("the run did not end: it was killed, or is not done", &suite(args), path)?;
     }
+    let (manifest, summary) = match judge(args) {
+        Ok(judged) => judged,
+        Err(error) => {
+            let summary = Summary::of_failure(&one_line(&error.to_string()));
+            write(args, &[], &summary)?;
+            return Err(exit_error(error).into());
+        }
+    };
+    let console = args.verbosity.console();
+    let report = write(args, &manifest.frames, &summary)?;
+    console.line(&total(&summary))?;
+    if let Some(index) = &report {
+        console.line(&format!("report: {}", report::address(index)))?;
+    }
+    let mut record = json!(summary);
+    record["folder"] = json!(args.folder.to_string_lossy());
+    record["report"] = json!(report.as_ref().map(|path| path.to_string_lossy()));
+    console.close(&record, summary.verdict())
+}
+
+/// Renders the frames and judges them.
+fn judge(args: &VerifyArgs) -> Result<(Manifest, Summary)> {
+    let options = args.options()?;
     if let Some(folder) = &args.html {
         std::fs::create_dir_all(folder).map_err(|e| Error::write(folder, &e))?;
     }
+    let manifest = Manifest::load(&args.folder)?;
     interrupt::install();
     let console = args.verbosity.console();
     for orphan in manifest.orphans() {
         console.warning(&format!("{}: an image of no frame; remove it", orphan.display()));
     }
     let mut observer = Lines::new("verifying", console);
-    let summary = crate::verify::run(&manifest, options, &args.device, &mut observer)?;
-    drop(observer);
+    let summary = crate::verify::run(&manifest, &options, &args.device, &mut observer)?;
+    Ok((manifest, summary))
+}
+
+/// Writes the results as JUnit XML and as a report, as far as they are asked for; returns the report's page.
+fn write(args: &VerifyArgs, frames: &[Frame], summary: &Summary) -> Result<Option<PathBuf>> {
     if let Some(path) = &args.junit {
-        junit::write(&summary, &args.folder.display().to_string(), path)?;
+        junit::write(summary, &suite(args), path)?;
     }
-    console.line(&total(&summary))?;
-    let report = args.html.as_ref().map(|dir| html::write(&summary, &manifest, &command_line(), dir)).transpose()?;
-    if let Some(index) = &report {
-        console.line(&format!("report: {}", report::address(index)))?;
+    args.html.as_ref().map(|dir| html::write(summary, frames, &args.folder, &command_line(), dir)).transpose()
+}
+
+fn suite(args: &VerifyArgs) -> String {
+    args.folder.display().to_string()
+}
+
+/// Whatever keeps frames from being judged has one exit code for scripts.
+fn exit_error(error: Error) -> Error {
+    match error {
+        Error::Usage(_) | Error::CheckFailed(_) | Error::NotVerified(_) | Error::Interrupted | Error::Output { .. } => error,
+        error => Error::NotVerified(error.to_string()),
     }
-    let verdict = summary.verdict();
-    let mut record = json!(summary);
-    record["folder"] = json!(args.folder.to_string_lossy());
-    record["report"] = json!(report.as_ref().map(|path| path.to_string_lossy()));
-    console.close(&record, verdict)
 }
 
 impl Observer for Lines {
@@ -163,7 +186,8 @@ fn line(result: &FrameResult) -> String {
         Outcome::Blessed(Change::Changed { text }) => ("blessed", text.clone()),
     };
     let tracer = result.tracer.map(|t| t.name()).unwrap_or_default();
-    let line = format!("{word:8} {:28} {tracer:8} {:6.2} s  {}", result.frame, result.seconds, one_line(&text));
+    let note = result.note.as_ref().map_or_else(String::new, |note| format!("; {note}"));
+    let line = format!("{word:8} {:28} {tracer:8} {:6.2} s  {}{note}", result.frame, result.seconds, one_line(&text));
     line.trim_end().to_owned()
 }
 
@@ -180,5 +204,8 @@ fn total(summary: &Summary) -> String {
     let parts: Vec<_> = parts.iter().filter(|p| p.0 > 0).map(|(n, what)| format!("{n} {what}")).collect();
     let parts = if parts.is_empty() { "nothing to do".to_owned() } else { parts.join(", ") };
     let renders = plural(summary.frames.len(), "render", "renders");
-    format!("{renders}: {parts} (on {}, {}, {:.1} s)", summary.device, summary.driver, summary.seconds)
+    match summary.device.is_empty() {
+        true => format!("{renders}: {parts} (no device was needed)"),
+        false => format!("{renders}: {parts} (on {}, {}, {:.1} s)", summary.device, summary.driver, summary.seconds),
+    }
 }

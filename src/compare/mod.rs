@@ -26,6 +26,8 @@ pub struct Entry {
     pub name: String,
     /// More about it, a line: the path of its file, or the scene.
     pub description: String,
+    /// What the settings of a render left open and the scene decided, a sentence each.
+    pub choices: Vec<String>,
     /// The image.
     pub image: Image,
 }
@@ -139,7 +141,7 @@ mod tests {
     fn entry(name: &str, width: u32, value: f32) -> Entry {
         let samples = Samples::F32(vec![value; 2 * width as usize]);
         let image = Image { width, height: 2, channels: vec![Channel { name: "Y".into(), samples }], metadata: Vec::new() };
-        Entry { name: name.into(), description: String::new(), image }
+        Entry { name: name.into(), image, ..Entry::default() }
     }
 
     #[test]

@@ -100,7 +100,7 @@ mod tests {
             let samples = Samples::F32(vec![value, value, value, 0.5]);
             let metadata = vec![("scene".into(), "s".into()), ("integrator".into(), name.into())];
             let image = Image { width: 2, height: 2, channels: vec![Channel { name: "Y".into(), samples }], metadata };
-            Entry { name: name.into(), description: String::new(), image }
+            Entry { name: name.into(), image, ..Entry::default() }
         };
         let set = ImageSet::new(vec![entry("ao", 0.25), entry("path", 0.5)], 1, &CompareOptions::default()).unwrap();
         let page = page(&set, "skylit compare").unwrap();

@@ -1,9 +1,12 @@
 //! Images that are rendered on the spot: settings from a line of words, and settings that all renders share.
 
 use crate::error::{Error, Result};
+use crate::film::Control;
 use crate::integrators;
 use crate::integrators::aov::Aov;
-use crate::renderer::RenderSettings;
+use crate::output::Image;
+use crate::renderer::frames::frame_settings;
+use crate::renderer::{RenderSettings, Renderer};
 use crate::settings::GivenSetting;
 
 /// The settings of renders: each line of words, like `ao --ao-radius 2 --spp 64`, over the settings that are shared. Of those each render has the ones that have an effect on it.
@@ -16,17 +19,23 @@ pub fn settings(words: &[&str], shared: &RenderSettings) -> Result<Vec<RenderSet
     let mut is_used = vec![own.is_empty(); given.len()];
     let mut all = Vec::new();
     for (settings, words) in own.iter().zip(words) {
-        let unused: Vec<&'static str> = given
-            .iter()
-            .enumerate()
-            .filter_map(|(k, setting)| {
-                let applies = applies(setting, settings);
-                is_used[k] |= applies;
-                (!applies).then_some(setting.name)
-            })
-            .collect();
-        let merged = without(shared, &unused)?.overridden_by(settings);
-        merged.check().map_err(|e| Error::Usage(format!("\"{words}\": {e}")))?;
+        let wrong = |e: String| Error::Usage(format!("\"{words}\": {e}"));
+        let mut unused: Vec<&'static str> = Vec::new();
+        for (setting, is_used) in given.iter().zip(&mut is_used) {
+            let applies = applies(setting, settings);
+            *is_used |= applies;
+            if !applies {
+                unused.push(setting.name);
+            }
+        }
+        let mut kept = shared.clone();
+        kept.retain(&|name| !unused.contains(&name));
+        let merged = kept.overridden_by(settings);
+        if let (None, Some(made)) = (settings.realtime_setting(), merged.realtime_setting()) {
+            let option = made.option();
+            return Err(wrong(format!("{option} makes a still of each frame: say with --spp how many samples each has")));
+        }
+        merged.check().map_err(|e| wrong(e.to_string()))?;
         all.push(merged);
     }
     match given.iter().zip(&is_used).find(|(_, used)| !**used) {
@@ -40,20 +49,90 @@ pub fn settings(words: &[&str], shared: &RenderSettings) -> Result<Vec<RenderSet
 /// Does a setting have an effect on what these settings render?
 fn applies(setting: &GivenSetting, settings: &RenderSettings) -> bool {
     let frames = settings.realtime_setting();
-    integrators::check(std::slice::from_ref(setting), settings.integrator(), frames.as_ref()).is_ok()
+    // what only frames in real time have does not make a still one of them
+    (setting.applies.stills || frames.is_some())
+        && integrators::check(std::slice::from_ref(setting), settings.integrator(), frames.as_ref()).is_ok()
 }
 
-/// Settings without those of these names.
-fn without(settings: &RenderSettings, names: &[&str]) -> Result<RenderSettings> {
-    let wrong = |e: serde_json::Error| Error::Usage(format!("settings cannot be put together: {e}"));
-    let mut groups = serde_json::to_value(settings).map_err(wrong)?;
-    for group in groups.as_object_mut().into_iter().flat_map(|g| g.values_mut()).filter_map(|g| g.as_object_mut()) {
-        names.iter().for_each(|name| {
-            group.remove(*name);
-        });
-    }
-    serde_json::from_value(groups).map_err(wrong)
+/// The settings of the first frame, where these settings show one picture of frames in real time, which is the last of many: as many as fill histories. `None` where settings say which frame, and of
+/// stills.
+pub fn first_frame(settings: &RenderSettings) -> Option<RenderSettings> {
+    settings.realtime_setting()?;
+    let mut first = settings.clone();
+    let is_open = settings.frames.frames.is_none() && settings.frames.warm_up.is_none();
+    first.frames.warm_up = Some(0);
+    is_open.then_some(first)
 }
+
+/// A render, and what there is to say of it.
+pub struct Rendered {
+    /// The image.
+    pub image: Image,
+    /// Which frame it is, of frames in real time.
+    pub frame: Option<String>,
+    /// What settings left open and the scene decided, a sentence each.
+    pub choices: Vec<String>,
+    /// Settings that were given and that the image hardly depends on, and what to do about it, in a sentence.
+    pub without_effect: Option<String>,
+}
+
+/// Renders what settings describe: a still, the last one of a time line, or the last of frames in real time.
+///
+/// # Errors
+/// Those of [`Renderer::still`] and [`Renderer::frames`].
+pub fn render(renderer: &mut Renderer, settings: &RenderSettings, control: &mut dyn Control) -> Result<Rendered> {
+    if settings.is_still_sequence() {
+        let mut stills = renderer.still_sequence(settings)?;
+        let (last, choices) = (stills.range().end - 1, stills.choices().to_vec());
+        let image = stills.render(last, control)?.image;
+        return Ok(Rendered { image, frame: Some(format!("frame {last}")), choices, without_effect: None });
+    }
+    if settings.realtime_setting().is_none() {
+        let still = renderer.still(settings, control)?;
+        return Ok(Rendered { image: still.image, frame: None, choices: still.report.setup.choices, without_effect: None });
+    }
+    let converges = frame_settings(settings)?.converges();
+    let mut frames = renderer.frames(settings, false, control)?;
+    let (mut done, count) = (0u32, frames.count());
+    let mut number = 0;
+    while let Some(frame) = frames.advance()? {
+        (done, number) = (done + 1, frame.number);
+        control.progress(u64::from(done), u64::from(count));
+        if control.should_stop()? {
+            return Err(Error::Interrupted);
+        }
+    }
+    let image = frames.image(control)?;
+    let choices = frames.report().setup.choices;
+    // the frames before are identical to it
+    let is_at_rest = settings.frames.range().end - settings.frames.range().first == 1;
+    let frame = match (count, is_at_rest) {
+        (1, _) => "the first frame".to_owned(),
+        (_, true) => format!("frame {count}, at rest"),
+        (_, false) => format!("frame {number}, after {} others", count - 1),
+    };
+    let has_converged = is_at_rest && converges && count > CONVERGED_FRAMES;
+    let idle: Vec<String> = settings
+        .frames
+        .given()
+        .iter()
+        .filter(|s| has_converged && ["filter", "filter_radius"].contains(&s.name))
+        .map(GivenSetting::option)
+        .collect();
+    let without_effect = (!idle.is_empty()).then(|| {
+        format!(
+            "{} next to no effect on {frame}, which has all but converged: compare the first frame (--warm-up 0), frames in motion (--frames 0..8 --orbit 120), or an image that keeps its history (--at-rest hold)",
+            match &idle[..] {
+                [one] => format!("{one} has"),
+                all => format!("{} have", all.join(" and ")),
+            }
+        )
+    });
+    Ok(Rendered { image, frame: Some(frame), choices, without_effect })
+}
+
+/// After more frames at rest than these, spatial filters of an image that converges reach no farther than a pixel.
+const CONVERGED_FRAMES: u32 = 16;
 
 /// Adds the ids of pixels to what is rendered, for masks by instance.
 pub fn add_ids(settings: &mut RenderSettings) {
@@ -87,6 +166,26 @@ mod tests {
                 .contains("\"ao --max-depth 3\": --max-depth has no effect")
         );
         assert!(error(&["oa"], &RenderSettings::default()).contains("oa"));
+    }
+
+    #[test]
+    fn frames_have_what_is_for_frames_and_stills_a_time() {
+        let shared = RenderSettings::from_words("--ao-radius 2 --frames 0..8 --orbit 120 --at-rest hold --spp 4").unwrap();
+        let [frames, still] = &settings(&["balanced", "ao"], &shared).unwrap()[..] else { panic!() };
+        assert_eq!((frames.integrators.ao.radius(), still.integrators.ao.radius()), (2.0, 2.0));
+        assert!(frames.frames.at_rest.is_some() && frames.realtime_setting().is_some() && frames.image.spp.is_none());
+        assert!(still.is_still_sequence() && still.frames.orbit == Some(120) && still.frames.at_rest.is_none());
+        let shared = RenderSettings::from_words("--frames 0..8").unwrap();
+        assert!(settings(&["balanced", "ao"], &shared).unwrap_err().to_string().contains("\"ao\": --frames makes a still"));
+    }
+
+    #[test]
+    fn a_preset_alone_has_a_first_frame() {
+        let of = |words: &str| first_frame(&RenderSettings::from_words(words).unwrap());
+        assert_eq!(of("balanced --filter none").unwrap().frames.warm_up, Some(0));
+        for words in ["ao --spp 4", "balanced --warm-up 0", "balanced --frames 0..8", "ao --spp 4 --frames 0..2"] {
+            assert!(of(words).is_none(), "{words}");
+        }
     }
 
     #[test]

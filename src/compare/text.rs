@@ -2,7 +2,10 @@
 
 use serde_json::{Value, json};
 
-use super::{ImageSet, letter};
+use super::{Entry, ImageSet, letter};
+use crate::error::{Error, Result};
+use crate::measure::comparison::Comparison;
+use crate::renderer::CHOSEN;
 use crate::report::comparison::metrics;
 
 /// Characters between two columns.
@@ -17,6 +20,7 @@ impl ImageSet {
             let description = if entry.description.is_empty() { String::new() } else { format!(", {}", entry.description) };
             lines.push(format!("{}{role}: {}{description}", letter(k), entry.name));
         }
+        lines.extend(self.choices());
         let judged: Vec<_> = self.judged().map(|(k, _, c)| (k, c, metrics(c))).collect();
         if let Some((_, c, _)) = judged.first() {
             let [width, height] = [self.entries[0].image.width, self.entries[0].image.height];
@@ -42,6 +46,48 @@ impl ImageSet {
         lines
     }
 
+    /// What settings left open and the scene decided, a line each with the images that it is about.
+    fn choices(&self) -> Vec<String> {
+        let mut choices: Vec<(&str, String)> = Vec::new();
+        for (k, entry) in self.entries.iter().enumerate() {
+            for choice in &entry.choices {
+                match choices.iter_mut().find(|(text, _)| text == choice) {
+                    Some((_, letters)) => *letters += &format!(", {}", letter(k)),
+                    None => choices.push((choice, letter(k).to_string())),
+                }
+            }
+        }
+        choices.into_iter().map(|(text, letters)| format!("{letters}: {text}")).collect()
+    }
+
+    /// All metrics as CSV: a head, and a row for each image that was compared with the reference.
+    ///
+    /// # Errors
+    /// None.
+    pub fn csv(&self) -> Result<Vec<u8>> {
+        let reference = letter(self.reference).to_string();
+        let row = |(k, entry, comparison): (usize, &Entry, &Comparison)| {
+            let mut row = vec![
+                ("image".to_owned(), letter(k).to_string()),
+                ("name".to_owned(), entry.name.clone()),
+                ("description".to_owned(), entry.description.clone()),
+                ("reference".to_owned(), reference.clone()),
+            ];
+            flatten("", &json!(comparison), &mut row);
+            row
+        };
+        let rows: Vec<Vec<(String, String)>> = self.judged().map(row).collect();
+        let wrong = |e: String| Error::CheckFailed(format!("cannot express the result as CSV: {e}"));
+        let mut csv = csv::Writer::from_writer(Vec::new());
+        let head = || rows.first().into_iter().flatten().map(|(name, _)| name);
+        csv.write_record(head()).map_err(|e| wrong(e.to_string()))?;
+        for row in &rows {
+            let cell = |name: &String| row.iter().find(|(n, _)| n == name).map_or("", |(_, value)| value.as_str());
+            csv.write_record(head().map(cell)).map_err(|e| wrong(e.to_string()))?;
+        }
+        csv.into_inner().map_err(|e| wrong(e.to_string()))
+    }
+
     /// The images and all metrics, as a JSON object.
     pub fn record(&self) -> Value {
         let images = self.entries.iter().zip(&self.comparisons).enumerate().map(|(k, (entry, comparison))| {
@@ -49,6 +95,8 @@ impl ImageSet {
                 "letter": letter(k).to_string(),
                 "name": entry.name,
                 "description": entry.description,
+                "choices": entry.choices,
+                "chosen": entry.image.metadata(CHOSEN),
                 "is_reference": k == self.reference,
                 "metrics": comparison,
             })
@@ -58,9 +106,24 @@ impl ImageSet {
     }
 }
 
+/// The values of an object as columns: those of objects within it have a dot in their names, lists are in one column each.
+fn flatten(name: &str, value: &Value, row: &mut Vec<(String, String)>) {
+    let text = |value: &Value| match value {
+        Value::Null => String::new(),
+        Value::String(text) => text.clone(),
+        other => other.to_string(),
+    };
+    match value {
+        Value::Object(all) => all.iter().for_each(|(key, value)| {
+            flatten(&if name.is_empty() { key.clone() } else { format!("{name}.{key}") }, value, row);
+        }),
+        Value::Array(all) => row.push((name.to_owned(), all.iter().map(text).collect::<Vec<_>>().join(" "))),
+        value => row.push((name.to_owned(), text(value))),
+    }
+}
+
 #[cfg(test)]
 mod tests {
-    use super::super::Entry;
     use super::*;
     use crate::measure::comparison::CompareOptions;
     use crate::output::{Channel, Image, Samples};
@@ -70,7 +133,7 @@ mod tests {
         let entry = |name: &str, value: f32| {
             let channels = vec![Channel { name: "Y".into(), samples: Samples::F32(vec![value; 4]) }];
             let image = Image { width: 2, height: 2, channels, metadata: Vec::new() };
-            Entry { name: name.into(), description: "d".into(), image }
+            Entry { name: name.into(), description: "d".into(), image, ..Entry::default() }
         };
         let entries = vec![entry("a.exr", 0.5), entry("b.exr", 0.25), entry("c.exr", 0.0)];
         let set = ImageSet::new(entries, 1, &CompareOptions::default()).unwrap();
@@ -84,6 +147,10 @@ mod tests {
         assert_eq!(rmse, ["RMSE", "0.2500", "0.2500"]);
         // images without variances have no outliers
         assert!(!lines.iter().any(|l| l.starts_with("Outliers") || l.starts_with("Error of the reference")));
+        let csv = String::from_utf8(set.csv().unwrap()).unwrap();
+        let table: Vec<Vec<&str>> = csv.lines().map(|line| line.split(',').collect()).collect();
+        let column = table[0].iter().position(|name| *name == "rmse").unwrap();
+        assert_eq!((table.len(), table[1][column], table[2][0], table[2][column]), (3, "0.25", "C", "0.25"), "{csv}");
         let record = set.record();
         assert_eq!(record["images"][2]["metrics"]["rmse"], 0.25);
         assert!(record["images"][1]["metrics"].is_null() && record["images"][0]["metrics"]["maps"].is_null());

@@ -29,7 +29,7 @@ macro_rules! lighting_settings {
             pub struct LightingSettings {
                 /// Environment light: an equirectangular map (.hdr, .exr), a constant radiance R,G,B, or `none` [default: the scene's]
                 ///
-                /// A scene without any light gets a grey sky and a soft sun, or a lamp if the camera is in a closed room; `none` leaves it dark.
+                /// A scene without any light gets a grey sky and a soft sun, or a lamp if the camera is in a closed room, and the render prints them as options; `none` leaves it dark.
                 environment: Option<String>, option(value_name = "FILE|R,G,B|none"), applies(LIT), basic;
                 /// Rotate the environment map about the vertical axis by this angle, counter-clockwise from above
                 environment_turn: Option<f64>,

@@ -1,8 +1,9 @@
 //! A camera as numbers, for metadata and reports: position and direction as settings have them, and the matrices of the OpenEXR standard.
 
-use glam::DMat4;
+use glam::{DMat4, DVec3};
 use serde_json::{Value, json};
 
+use super::settings::CameraSettings;
 use crate::output::exr::{WORLD_TO_CAMERA, WORLD_TO_NDC, matrix_text};
 use crate::scene::{Camera, Projection};
 
@@ -25,6 +26,19 @@ pub fn pose(camera: &Camera) -> Value {
         Projection::Orthographic { half_height } => pose["half_height"] = json!(half_height),
     }
     pose
+}
+
+/// The settings that choose the perspective camera of a [`pose`] as metadata hold it; `None` if it is none.
+pub fn settings(pose: &str) -> Option<CameraSettings> {
+    let pose: Value = serde_json::from_str(pose).ok()?;
+    let vector = |key: &str| serde_json::from_value(pose[key].clone()).ok().map(DVec3::from_array);
+    Some(CameraSettings {
+        eye: Some(vector("eye")?),
+        target: Some(vector("target")?),
+        up: Some(vector("up")?),
+        fov_y: Some(pose["fov_y"].as_f64()?),
+        ..CameraSettings::default()
+    })
 }
 
 /// The matrices from world space to camera space, and to normalized device coordinates of an image of `aspect` = width / height. They multiply columns; z / w is 1 - 1 / distance in
@@ -60,7 +74,7 @@ pub fn metadata(camera: &Camera, aspect: f64) -> [(&'static str, String); 3] {
 
 #[cfg(test)]
 mod tests {
-    use glam::{DVec3, DVec4};
+    use glam::DVec4;
 
     use super::*;
 
@@ -89,6 +103,9 @@ mod tests {
             (&pose["eye"], &pose["target"], &pose["up"]),
             (&json!([0.0, 0.0, 1.0]), &json!([0.0, 0.0, 0.0]), &json!([0.0, 1.0, 0.0]))
         );
+        let typed = settings(&pose.to_string()).unwrap();
+        assert_eq!((typed.eye, typed.target, typed.up), (Some(DVec3::Z), Some(DVec3::ZERO), Some(DVec3::Y)));
+        assert!(settings("{}").is_none() && settings("").is_none());
         assert!((pose["fov_y"].as_f64().unwrap() - 1f64.to_degrees()).abs() < 1e-12);
     }
 }

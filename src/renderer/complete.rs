@@ -1,15 +1,23 @@
 //! What settings leave open, completed by the scene: the camera, the AO radius, and light where there is none.
+//!
+//! This is the one rule for all commands. What is chosen is also known as options ([`Completed::chosen`]): with them the same image is made, whatever becomes of the scene.
 
+use super::settings::options_text;
 use super::survey::radius::{CLOSED, TARGET};
-use super::survey::{Survey, framing, light, radius};
+use super::survey::{Survey, framing, light, radius, significant};
 use super::{RenderSettings, Renderer};
 use crate::error::Result;
 use crate::integrators::lighting::LightingSettings;
 use crate::scene::Camera;
 use crate::settings::{Capability, Length};
 
+/// Metadata key of the options that were chosen ([`Completed::chosen`]).
+pub const CHOSEN: &str = "chosen";
+
 /// AO radius of scenes that are too large to be looked at, as a share of the diagonal.
 const LARGE_SCENE_RADIUS: f64 = 0.05;
+/// Significant digits of an AO radius that is a share of the diagonal.
+const RADIUS_DIGITS: usize = 6;
 
 /// Width over height of a window whose size is not known yet.
 const ASPECT: f64 = 16.0 / 9.0;
@@ -20,8 +28,17 @@ pub struct Completed {
     pub camera: Camera,
     /// The settings, whose AO radius is a number of scene units.
     pub settings: RenderSettings,
+    /// Of camera, AO radius and light what the scene decided: as settings they choose the same.
+    pub chosen: RenderSettings,
     /// What was chosen, and how to choose otherwise, a sentence each.
     pub choices: Vec<String>,
+}
+
+impl Completed {
+    /// What the scene decided, as options of `skylit render`; `None` if that is nothing.
+    pub fn options(&self) -> Option<String> {
+        Some(options_text(&self.chosen)).filter(|text| !text.is_empty())
+    }
 }
 
 impl Renderer {
@@ -45,25 +62,45 @@ impl Renderer {
         crate::output::check_size(size[0], size[1])?;
         let aspect = f64::from(size[0]) / f64::from(size[1]);
         let survey = Survey::new(&self.scene);
+        let (mut chosen, mut choices) = (RenderSettings::default(), Vec::new());
+        let mut settings = settings.clone();
+
+        // the camera, by which the others are chosen
+        let found = if camera.is_some() { None } else { settings.camera.automatic(&survey, aspect)? };
+        if let Some(found) = found {
+            chosen.camera = found.settings();
+            let none = if settings.camera.view.is_some() { "" } else { "the scene has none and is seen " };
+            let options = options_text(&RenderSettings { camera: found.settings(), ..Default::default() });
+            choices.push(format!("camera: {none}{} ({options})", found.words));
+            settings.camera.view = None;
+            settings.camera.override_with(&found.settings());
+        }
         let camera = match camera {
             Some(camera) => camera,
             None => settings.camera.choose(&survey, aspect)?,
         };
-        let mut choices = Vec::new();
-        let mut settings = settings.clone();
+
+        // the AO radius
         if capabilities.contains(&Capability::AmbientOcclusion) {
-            let chosen = ao_radius(settings.integrators.ao.ao_radius, &survey, &camera, aspect)?;
-            settings.integrators.ao.ao_radius = chosen.units.map(Length::Units);
-            choices.extend(chosen.sentence);
+            let wanted = settings.integrators.ao.ao_radius;
+            let found = ao_radius(wanted, &survey, &camera, aspect)?;
+            settings.integrators.ao.ao_radius = found.units.map(Length::Units);
+            if settings.integrators.ao.ao_radius != wanted {
+                chosen.integrators.ao.ao_radius = settings.integrators.ao.ao_radius;
+            }
+            choices.extend(found.sentence);
         }
+
+        // light
         if is_default && needs_light && (self.lighting.is_automatic || self.scene.is_dark()) {
             let (lighting, words) = light::choose(&survey, &camera, aspect)?;
-            let options = super::settings::light_options(&lighting);
+            let options = options_text(&RenderSettings { lighting: lighting.clone(), ..Default::default() });
             choices.push(format!("light: the scene has none and gets {words} ({options}); --environment none leaves it dark"));
+            chosen.lighting = lighting.clone();
             self.light(&lighting)?;
             self.lighting.is_automatic = true;
         }
-        Ok(Completed { camera, settings, choices })
+        Ok(Completed { camera, settings, chosen, choices })
     }
 
     /// Light for a dark scene that is looked at from many places, by integrators of which some need it.
@@ -79,7 +116,7 @@ impl Renderer {
                 Some(camera) => camera.clone(),
                 // from the middle of a scene it is found out whether it is a closed room, without a hierarchy
                 None if survey.is_small() && survey.walls((lo + hi) * 0.5).is_some() => {
-                    framing::of_scene(&survey, ASPECT, None)?
+                    framing::of_scene(&survey, ASPECT, None)?.camera()
                 }
                 None => Camera::framing(lo, hi, ASPECT),
             };
@@ -98,30 +135,25 @@ struct ChosenRadius {
     sentence: Option<String>,
 }
 
-/// A length with four significant digits.
-fn shown(length: f64) -> f64 {
-    format!("{length:.3e}").parse().unwrap_or(length)
-}
-
 fn ao_radius(wanted: Option<Length>, survey: &Survey, camera: &Camera, aspect: f64) -> Result<ChosenRadius> {
-    let say = |units: f64, sentence: String| Ok(ChosenRadius { units: Some(units), sentence: Some(sentence) });
+    let say = |units: f64, why: String| {
+        Ok(ChosenRadius { units: Some(units), sentence: Some(format!("AO radius: {units} scene units, {why}")) })
+    };
     let unlimited = || Ok(ChosenRadius { units: None, sentence: None });
     let diagonal = survey.diagonal();
+    let share = |share: f64| significant(share * diagonal, RADIUS_DIGITS);
     match wanted {
         Some(Length::Units(units)) => return Ok(ChosenRadius { units: Some(units), sentence: None }),
-        Some(length @ Length::OfDiagonal(share)) => {
-            let units = share * diagonal;
-            return say(units, format!("AO radius: {} scene units, {length} of the scene's diagonal", shown(units)));
+        Some(length @ Length::OfDiagonal(part)) => {
+            let units = share(part);
+            return say(units, format!("{length} of the scene's diagonal (--ao-radius {units})"));
         }
         None if !survey.is_small() || survey.walls(camera.camera_to_world.translation).is_none() => return unlimited(),
         Some(Length::Auto) if !survey.is_small() => {
-            let units = LARGE_SCENE_RADIUS * diagonal;
+            let units = share(LARGE_SCENE_RADIUS);
             return say(
                 units,
-                format!(
-                    "AO radius: {} scene units, 5% of the scene's diagonal, for the scene is too large to be looked at",
-                    shown(units)
-                ),
+                format!("5% of the scene's diagonal, for the scene is too large to be looked at (--ao-radius {units})"),
             );
         }
         Some(Length::Auto) | None => {}
@@ -130,16 +162,16 @@ fn ao_radius(wanted: Option<Length>, survey: &Survey, camera: &Camera, aspect: f
     if wanted.is_none() && seen.open >= CLOSED {
         return unlimited();
     }
-    let target = 100.0 * TARGET;
     let open = format!("{:.0} % of occlusion rays get out of the scene", 100.0 * seen.open);
-    match seen.radius.is_finite() {
-        true => say(
-            seen.radius,
-            format!(
-                "AO radius: {} scene units, at which surfaces in view are {target} % open on average; without a radius {open} (--ao-radius inf)",
-                seen.radius
-            ),
-        ),
-        false => say(f64::INFINITY, format!("AO radius: no limit, for {open}")),
+    if !seen.radius.is_finite() {
+        let sentence = Some(format!("AO radius: no limit, for {open} (--ao-radius inf)"));
+        return Ok(ChosenRadius { units: Some(f64::INFINITY), sentence });
     }
+    let (units, target) = (seen.radius, 100.0 * TARGET);
+    say(
+        units,
+        format!(
+            "at which surfaces in view are {target} % open on average (--ao-radius {units}); without a radius {open} (--ao-radius inf)"
+        ),
+    )
 }

@@ -20,8 +20,9 @@ pub const FILE_NAME: &str = "skylit.toml";
 
 /// Settings that a file beside a scene may have: how the scene is looked at, lit and sampled. An entry that ends with a dot is a table, with all that is in it. What
 /// comes with a scene comes from strangers: it does not choose what is written, what is loaded besides images and camera paths, or on which device.
-const SCENE_SETTINGS: [&str; 11] = [
+const SCENE_SETTINGS: [&str; 12] = [
     "integrator",
+    "scene.",
     "image.spp",
     "image.size",
     "image.seed",

@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use super::brightness;
-use super::complete::Completed;
+use super::complete::{CHOSEN, Completed};
 use super::laps::{self, Laps};
 use super::report::{FrameReport, FramesReport, Seconds, Setup};
 use super::still::{aov_needs, camera_text, scene_warnings, spp_text};
@@ -83,7 +83,9 @@ impl Renderer {
         let range = timeline.range();
         let path = timeline.camera_path.as_deref().map(load_camera_path).transpose()?;
         let first_of_path = path.as_ref().map(|path| path.camera_at(f64::from(range.first)));
-        let Completed { camera, settings, choices } = self.complete(settings, first_of_path)?;
+        let completed = self.complete(settings, first_of_path)?;
+        let chosen = completed.options();
+        let Completed { camera, settings, choices, .. } = completed;
         laps.lap(laps::SURVEY);
         let how = frame_settings(&settings)?;
         let scene = &self.scene;
@@ -123,7 +125,7 @@ impl Renderer {
         if displays {
             realtime.display(&tracer, Some(frame_display(&settings, scene)))?;
         }
-        let setup = Setup::new(self, &tracer, &flat, &camera, choices, warnings);
+        let setup = Setup::new(self, &tracer, &flat, &camera, (choices, chosen.clone()), warnings);
         let primary = realtime.settings().primary.unwrap_or_default();
         let preset = timeline.preset.unwrap_or_default();
         let mut metadata = match &options {
@@ -156,6 +158,7 @@ impl Renderer {
             ("tracer", setup.tracer.to_string()),
             ("version", env!("CARGO_PKG_VERSION").into()),
         ]);
+        metadata.extend(chosen.map(|options| (CHOSEN, options)));
         let report = FramesReport {
             integrator: integrator.name(),
             quantity: if is_radiance { integrator.get().quantity() } else { "ambient visibility" },

@@ -50,7 +50,7 @@ use crate::scene::{Environment, Scene, SceneSettings, load};
 use crate::shaders::StreamShaders;
 use crate::tracer::{ComputeOptions, DeviceSettings, Needs, Tracer, TracerKind};
 
-pub use complete::Completed;
+pub use complete::{CHOSEN, Completed};
 pub use frames::{FrameOutput, Frames};
 pub use interactive::{Interactive, View};
 pub use report::{FramesReport, StillReport};

@@ -7,6 +7,7 @@ use serde_json::{Map, Value, json};
 use super::denoising::DenoiseReport;
 use super::settings::FilmSettings;
 use super::still::{camera_text, spp_text};
+use super::survey::significant;
 use super::{Renderer, camera_numbers};
 use crate::accel::flatten::FlatScene;
 use crate::film::accumulate::Accumulated;
@@ -69,6 +70,8 @@ pub struct Setup {
     pub camera: String,
     /// What settings left open and the scene decided, a sentence each.
     pub choices: Vec<String>,
+    /// The same as options of `skylit render`; `None` if nothing was left open.
+    pub chosen: Option<String>,
     /// The camera in numbers ([`camera_numbers::pose`]).
     pub camera_pose: Value,
     /// Name of the device.
@@ -97,7 +100,7 @@ impl Setup {
         tracer: &Tracer,
         flat: &FlatScene,
         camera: &Camera,
-        choices: Vec<String>,
+        (choices, chosen): (Vec<String>, Option<String>),
         warnings: Vec<String>,
     ) -> Self {
         let (scene, info) = (flat.scene, &renderer.device.info);
@@ -109,6 +112,7 @@ impl Setup {
             camera: camera_text(camera),
             camera_pose: camera_numbers::pose(camera),
             choices,
+            chosen,
             device: info.name.clone(),
             driver: info.driver.clone(),
             tracer: renderer.kind,
@@ -129,6 +133,7 @@ impl Setup {
             "degenerate_triangles": self.degenerate_triangles,
             "camera": self.camera,
             "choices": self.choices,
+            "chosen": self.chosen,
             "camera_pose": self.camera_pose,
             "device": self.device,
             "driver": self.driver,
@@ -178,8 +183,11 @@ impl FilmReport {
         }
         if let (Some(tiles), Some(target)) = (image.converged, options.target_rmse) {
             lines.push(format!(
-                "estimated rmse {estimated:.3e} (target {target:e}): {} of {} tiles done; {min} to {max} samples per pixel, {mean:.1} on average",
-                tiles.done, tiles.all
+                "estimated rmse {} (target {}): {} of {} tiles done; {min} to {max} samples per pixel, {mean:.1} on average",
+                significant(estimated, 3),
+                significant(target, 3),
+                tiles.done,
+                tiles.all
             ));
         }
         if !options.intervals && hints.save_intervals.iter().any(|&n| n < spp) {
@@ -356,6 +364,31 @@ pub struct FrameReport {
     pub stats: FrameStats,
 }
 
+impl FrameReport {
+    /// Nothing was to be done: the image had converged, and neither the camera nor the scene had moved.
+    pub fn is_skipped(&self) -> bool {
+        self.stats.timings.is_empty() && self.stats.primary_rays + self.stats.occlusion_rays == 0
+    }
+}
+
+/// The frames before those that are kept, in words.
+fn warm_up_text(warm_up: usize) -> String {
+    let frames = if warm_up == 1 { "frame" } else { "frames" };
+    match warm_up {
+        0 => String::new(),
+        n => format!(", after {n} warm-up {frames} of the same view (--warm-up 0: none)"),
+    }
+}
+
+/// Milliseconds with three significant digits at most.
+pub fn milliseconds(ms: f64) -> String {
+    match ms {
+        ms if ms >= 100.0 => format!("{ms:.0} ms"),
+        ms if ms >= 1.0 => format!("{ms:.1} ms"),
+        ms => format!("{ms:.2} ms"),
+    }
+}
+
 /// The report of real-time frames.
 #[derive(Clone, Debug)]
 pub struct FramesReport {
@@ -408,11 +441,31 @@ impl FramesReport {
         out
     }
 
-    /// Median and 95th percentile of the milliseconds per frame.
+    /// Median and 95th percentile of the milliseconds per frame. Frames in which nothing was to be done, because the image had converged, do not count unless all are of them.
     pub fn frame_ms(&self) -> (f64, f64) {
         let from = usize::from(self.frames.len() > 1);
-        let ms: Vec<f64> = self.frames[from..].iter().map(|f| 1e3 * f.seconds).collect();
+        let of = |frames: &mut dyn Iterator<Item = &FrameReport>| -> Vec<f64> { frames.map(|f| 1e3 * f.seconds).collect() };
+        let worked = of(&mut self.frames[from..].iter().filter(|f| !f.is_skipped()));
+        let first = of(&mut self.frames.iter().filter(|f| !f.is_skipped()));
+        let all = of(&mut self.frames[from..].iter());
+        let ms = [worked, first, all].into_iter().find(|ms| !ms.is_empty()).unwrap_or_default();
         (Summary::of(&ms).map_or(0.0, |s| s.median), percentile(&ms, 0.95).unwrap_or(0.0))
+    }
+
+    /// How long frames take, in a line.
+    fn time_line(&self) -> String {
+        let (median, p95) = self.frame_ms();
+        let skipped = self.frames.iter().filter(|f| f.is_skipped()).count();
+        let skipped = match skipped {
+            0 => String::new(),
+            n => format!("; {n} of {} frames had nothing to do: the image had converged", self.frames.len()),
+        };
+        if median <= 0.0 || self.frames.iter().all(FrameReport::is_skipped) {
+            return format!("frame time: none{skipped}");
+        }
+        let rate = 1e3 / median;
+        let rate = if rate < 10.0 { format!("{rate:.1}") } else { format!("{rate:.0}") };
+        format!("frame time: {} (95 %: {}), {rate} frames per second{skipped}", milliseconds(median), milliseconds(p95))
     }
 
     fn rays(&self) -> [u64; 3] {
@@ -423,21 +476,20 @@ impl FramesReport {
     /// Lines for people. `outputs`: names of the files; `explain`: add lines about skipped work.
     pub fn lines(&self, outputs: &str, explain: bool) -> Vec<String> {
         let (kept, all) = (self.frames.iter().filter(|f| f.kept).count(), self.frames.len());
-        let (median, p95) = self.frame_ms();
         let [primary, occlusion, skipped] = self.rays();
         let mut lines = vec![
             format!(
-                "{outputs}: {kept} frame{} of {} (warm-up: {}), {}, tracer {} on {}; mean {} {:.5} over the scene's pixels",
+                "{outputs}: {kept} frame{} of {}, {}{}, tracer {} on {}; mean {} {:.5} over the scene's pixels",
                 if kept == 1 { "" } else { "s" },
                 self.technique_text(),
-                all - kept,
                 self.preset,
+                warm_up_text(all - kept),
                 self.setup.tracer,
                 self.setup.device,
                 self.quantity,
                 self.mean,
             ),
-            format!("frame time: {median:.1} ms (95 %: {p95:.1}), {:.1} frames per second", 1e3 / median.max(1e-6)),
+            self.time_line(),
             format!(
                 "rays per frame: {} camera, {} {}, {} not traced",
                 primary / all.max(1) as u64,
@@ -479,9 +531,11 @@ impl FramesReport {
             return lines;
         }
         lines.push(match (s.attenuation().is_binary(), s.attenuation().reach()) {
-            (true, r) if r.is_finite() => format!("binary occlusion: any hit within {r} ends a ray"),
+            (true, r) if r.is_finite() => format!("binary occlusion: any hit within {} ends a ray", significant(r, 4)),
             (true, _) => "binary occlusion: any hit ends a ray".into(),
-            (false, r) => format!("occlusion rays end at distance {r:.4}: hits beyond do not occlude visibly"),
+            (false, r) => {
+                format!("occlusion rays end at distance {}: hits beyond do not occlude visibly", significant(r, 4))
+            }
         });
         let resting = self.frames.iter().filter(|f| f.stats.primary_rays == 0).count();
         lines.push(format!(

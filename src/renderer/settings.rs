@@ -4,9 +4,9 @@ use glam::DVec3;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use super::interactive::view::quoted;
+pub use super::interactive::view::quoted;
 use super::survey::Survey;
-use super::survey::framing::{self, ViewName};
+use super::survey::framing::{self, ChosenCamera, ViewName};
 use crate::denoise::DenoiseChoice;
 use crate::error::{Error, Result};
 use crate::film::camera::{self, Choice};
@@ -115,6 +115,20 @@ impl CameraSettings {
         Ok(())
     }
 
+    /// The camera for images of `aspect` = width / height that is chosen by what it would see, because the settings and the scene leave it open, or name a view; else `None`.
+    ///
+    /// # Errors
+    /// [`Error::Scene`] if the scene has no geometry.
+    pub fn automatic(&self, survey: &Survey, aspect: f64) -> Result<Option<ChosenCamera>> {
+        let fov_y = self.fov_y.map(f64::to_radians);
+        let is_automatic = self.eye.is_none() && self.camera.is_none() && survey.scene().cameras.is_empty();
+        match self.view {
+            Some(name) => framing::named(survey, name, aspect, fov_y).map(Some),
+            None if is_automatic => framing::of_scene(survey, aspect, fov_y).map(Some),
+            None => Ok(None),
+        }
+    }
+
     /// Chooses the camera for images of `aspect` = width / height, by what it would see where the settings and the scene leave it open.
     ///
     /// # Errors
@@ -122,12 +136,8 @@ impl CameraSettings {
     pub fn choose(&self, survey: &Survey, aspect: f64) -> Result<Camera> {
         let scene = survey.scene();
         let fov_y = self.fov_y.map(f64::to_radians);
-        let is_automatic = self.eye.is_none() && self.camera.is_none() && scene.cameras.is_empty();
-        if let Some(name) = self.view {
-            return framing::named(survey, name, aspect, fov_y);
-        }
-        if is_automatic {
-            return framing::of_scene(survey, aspect, fov_y);
+        if let Some(chosen) = self.automatic(survey, aspect)? {
+            return Ok(chosen.camera());
         }
         let choice = match (self.eye, self.target, &self.camera) {
             (Some(eye), Some(target), _) => Choice::LookAt {
@@ -194,10 +204,23 @@ impl FilmSettings {
     }
 }
 
-/// Lights as options of `skylit render`, quoted as a shell needs them.
-pub(super) fn light_options(lighting: &LightingSettings) -> String {
-    let flags = RenderSettings { lighting: lighting.clone(), ..Default::default() }.flags();
-    flags.iter().map(|flag| quoted(flag)).collect::<Vec<_>>().join(" ")
+/// Settings as options of `skylit render`, quoted as a shell needs them, with numbers as people write them: `2`, not `2.0`.
+pub fn options_text(settings: &RenderSettings) -> String {
+    let short = |flag: String| {
+        let numbers: Option<Vec<f64>> = flag.split(',').map(|n| n.parse().ok()).collect();
+        let is_plain = flag.chars().all(|c| c.is_ascii_digit() || "+-.,e".contains(c));
+        match numbers.filter(|_| is_plain) {
+            Some(numbers) => numbers.iter().map(|x| number_text(*x)).collect::<Vec<_>>().join(","),
+            None => flag,
+        }
+    };
+    settings.flags().into_iter().map(|flag| quoted(&short(flag))).collect::<Vec<_>>().join(" ")
+}
+
+/// A number with all its digits, as a power of ten where it would have many zeros.
+fn number_text(x: f64) -> String {
+    let plain = x.to_string();
+    if plain.len() > 12 { Some(format!("{x:e}")).filter(|text| text.len() < plain.len()).unwrap_or(plain) } else { plain }
 }
 
 /// Values of an option of the command line, one for each time that it is given; `None` for an option without a value.
@@ -344,7 +367,7 @@ impl RenderSettings {
 
     /// Removes the settings whose names `keeps` returns false for; the integrator stays.
     #[cfg(feature = "cli")]
-    pub(super) fn retain(&mut self, keeps: &dyn Fn(&str) -> bool) {
+    pub(crate) fn retain(&mut self, keeps: &dyn Fn(&str) -> bool) {
         let keeps = |name: &str, _: AppliesTo| keeps(name);
         self.image.retain(&keeps);
         self.scene.retain(&keeps);
@@ -504,6 +527,18 @@ impl RenderSettings {
 #[cfg(all(test, feature = "cli"))]
 mod tests {
     use super::*;
+
+    #[test]
+    fn options_are_as_people_write_them() {
+        let text = |line: &str| options_text(&RenderSettings::from_words(line).unwrap());
+        assert_eq!(text("ao --eye 1.0,-2.50,0 --target 0,0,1e-3"), "--integrator ao --eye 1,-2.5,0 --target 0,0,0.001");
+        assert_eq!(text("ao --ao-falloff 6.763e26 --ao-radius 5.0"), "--integrator ao --ao-falloff 6.763e26 --ao-radius 5");
+        assert_eq!(
+            text("path --light 'sun direction=0,-1,0 irradiance=2'"),
+            "--integrator path --light 'sun direction=0,-1,0 irradiance=2'"
+        );
+        assert_eq!(text(""), "");
+    }
 
     #[test]
     fn lines_of_words() {

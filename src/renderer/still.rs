@@ -7,7 +7,7 @@ use std::time::Instant;
 use glam::DVec3;
 
 use super::brightness;
-use super::complete::Completed;
+use super::complete::{CHOSEN, Completed};
 use super::denoising::{self, Denoising};
 use super::film_file::{self, Identity, Maker};
 use super::laps::{self, Laps};
@@ -149,7 +149,8 @@ impl Renderer {
         control: &mut dyn Control,
         save: &mut dyn FnMut(&IntermediateImage) -> Result<()>,
     ) -> Result<Still> {
-        let Completed { camera, settings, choices } = completed;
+        let Completed { camera, settings, choices, .. } = completed;
+        let chosen = completed.options();
         let (start, mut laps) = begun;
         let denoiser = denoising::choose(settings.image.denoise)?;
         let integrator = settings.integrator().get();
@@ -223,6 +224,7 @@ impl Renderer {
             identity: &identity,
             maker: &maker,
             target_rmse: settings.film.target_rmse,
+            chosen: chosen.as_deref(),
             denoising: denoising.as_ref(),
         };
         let picture = settings.picture.options();
@@ -252,7 +254,7 @@ impl Renderer {
         warnings.extend(rendered.report.warnings.iter().chain(&brightness).cloned());
         let (mean, mean_standard_error) = rendered.image.film.mean_and_error();
         let mut report = StillReport {
-            setup: Setup::new(self, tracer, &flat, camera, choices.clone(), warnings),
+            setup: Setup::new(self, tracer, &flat, camera, (choices.clone(), chosen.clone()), warnings),
             integrator: integrator.name(),
             quantity: integrator.quantity(),
             size,
@@ -369,6 +371,7 @@ struct Composer<'a> {
     identity: &'a Identity,
     maker: &'a Maker,
     target_rmse: Option<f64>,
+    chosen: Option<&'a str>,
     denoising: Option<&'a Denoising<'a>>,
 }
 
@@ -410,6 +413,7 @@ impl Composer<'_> {
         if let Some(target) = self.target_rmse {
             out.push(("target_rmse", target.to_string()));
         }
+        out.extend(self.chosen.map(|options| (CHOSEN, options.to_owned())));
         out.into_iter().map(|(k, v)| (k.to_owned(), v)).collect()
     }
 }

@@ -79,6 +79,11 @@ impl StillSequence<'_> {
         self.range
     }
 
+    /// What settings left open and the scene decided, a sentence each.
+    pub fn choices(&self) -> &[String] {
+        &self.completed.choices
+    }
+
     /// Frame rate, frames per second.
     pub fn fps(&self) -> f64 {
         self.fps

@@ -91,11 +91,12 @@ pub fn metrics(c: &Comparison) -> Vec<Metric> {
         ),
         count("Pixels that differ", "Compared pixels whose values are not the same", Some(c.differing)),
         count("Pixels compared", "Pixels of the mask that are finite in both images", Some(c.pixels)),
-        metric(
-            "Error of the reference",
-            "Root mean square of the standard errors of its pixels: its own noise",
-            c.reference_standard_error,
-        ),
+        Metric {
+            name: "Error of the reference",
+            help: "Root mean square of the standard errors of its pixels, were their samples independent: its own noise is at most that, and mostly less, for samples are stratified",
+            value: c.reference_standard_error,
+            text: c.reference_standard_error.map_or_else(|| "-".to_owned(), |e| format!("at most {}", format_number(e))),
+        },
     ]
 }
 

@@ -9,6 +9,7 @@ use crate::gpu::DeviceInfo;
 use crate::measure::comparison::{CompareOptions, compare};
 use crate::measure::z_test::{Estimate, ZTest};
 use crate::output::Samples;
+use crate::report::format_number;
 use crate::tracer::TracerKind;
 
 /// What became of a golden image.
@@ -68,10 +69,10 @@ pub fn render(
 ) -> Result<Golden> {
     let (path, maker) = (manifest.golden(frame), Maker::new(session.info(), kind));
     let Some(limit) = &frame.tolerance.z_test else {
-        return Golden::of_image(&path, frame, session.render(frame, kind, None, control)?, &maker);
+        return Golden::of_image(&path, frame, session.render(frame, kind, None, None, control)?, &maker);
     };
     let seeds = FIRST_SEED..FIRST_SEED + REPLICATES;
-    let images = seeds.map(|seed| session.render(frame, kind, Some(seed), control)).collect::<Result<Vec<_>>>()?;
+    let images = seeds.map(|seed| session.render(frame, kind, Some(seed), None, control)).collect::<Result<Vec<_>>>()?;
     let golden = Golden::of_replicates(&path, frame, &images, &maker)?;
     if let (Some(bias), Some(reference)) = (limit.bias, &golden.reference) {
         let verdict = ZTest { false_alarms: limit.false_alarms }.compare(&Estimate::of(&images[0])?, reference)?;
@@ -151,7 +152,9 @@ fn changes(before: &Golden, after: &Golden) -> Result<String> {
             true => parts.push("the same colours".to_owned()),
             false => {
                 let flip = c.flip.map(|f| format!(", FLIP {f:.4}")).unwrap_or_default();
-                let text = format!("rmse {:.3e}, bias {:+.3e}, largest difference {:.3e}{flip}", c.rmse, c.bias, c.max);
+                let sign = if c.bias > 0.0 { "+" } else { "" };
+                let [rmse, bias, max] = [c.rmse, c.bias, c.max].map(format_number);
+                let text = format!("rmse {rmse}, bias {sign}{bias}, largest difference {max}{flip}");
                 parts.push(text);
             }
         }
@@ -163,6 +166,10 @@ fn changes(before: &Golden, after: &Golden) -> Result<String> {
     let entries = |g: &Golden| g.image.metadata("verify.render").unwrap_or("other settings").to_owned();
     if entries(before) != entries(after) {
         parts.push(format!("{:?} in place of {:?}", entries(after), entries(before)));
+    }
+    let chosen = |g: &Golden| g.chosen().unwrap_or("nothing").to_owned();
+    if chosen(before) != chosen(after) {
+        parts.push(format!("chosen by the scene: {:?} in place of {:?}", chosen(after), chosen(before)));
     }
     Ok(parts.join("; "))
 }

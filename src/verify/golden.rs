@@ -10,6 +10,8 @@ use crate::integrators::IntegratorName;
 use crate::measure::z_test::{Estimate, MIN_REPLICATES, Reference, Region, TILE, channels_with_variance};
 use crate::output::exr::ExrOptions;
 use crate::output::{self, Channel, Image, Samples, png_text};
+use crate::renderer::{CHOSEN, RenderSettings, camera_numbers};
+use crate::settings::{Capability, Length};
 use crate::tracer::TracerKind;
 
 /// Renders with seeds of their own that the golden image of a Z-test is the mean of.
@@ -25,6 +27,7 @@ const TILE_PREFIX: &str = "tile_variance.";
 
 /// Keys of the metadata.
 mod key {
+    pub const AO_RADIUS: &str = "ao.radius";
     pub const DEVICE: &str = "verify.device";
     pub const DRIVER: &str = "verify.driver";
     pub const RENDER: &str = "verify.render";
@@ -133,6 +136,44 @@ impl Golden {
     /// The driver that it was made on, if it says so.
     pub fn driver(&self) -> Option<&str> {
         self.image.metadata(key::DRIVER)
+    }
+
+    /// The options that the scene decided when it was made: camera, AO radius and light that the frame's settings leave open; `None` if it names none.
+    pub fn chosen(&self) -> Option<&str> {
+        self.image.metadata(CHOSEN)
+    }
+
+    /// Puts what was chosen when it was made into the settings of its frame. Images of earlier versions name camera and AO radius alone. `has_camera`: the scene's file has a camera.
+    ///
+    /// # Errors
+    /// [`Error::Input`] for metadata that do not make sense.
+    pub fn freeze(&self, settings: &mut RenderSettings, has_camera: bool) -> Result<()> {
+        let broken =
+            |what: &str| Error::input(&self.path, format!("its metadata {what} cannot be read: make it again with --bless"));
+        let named = match self.chosen() {
+            Some(words) => RenderSettings::from_words(words).map_err(|_| broken(CHOSEN))?,
+            None => RenderSettings::default(),
+        };
+        // nothing else of what the file says
+        let mut chosen = RenderSettings { camera: named.camera, lighting: named.lighting, ..RenderSettings::default() };
+        chosen.integrators.ao.ao_radius = named.integrators.ao.ao_radius;
+        let frames = &settings.frames;
+        let is_moving = frames.orbit.is_some() || frames.camera_path.is_some();
+        let is_open = !settings.camera.chooses() && !has_camera || settings.camera.view.is_some();
+        if let (false, true, false, Some(pose)) =
+            (chosen.camera.chooses(), is_open, is_moving, self.image.metadata(camera_numbers::POSE))
+        {
+            chosen.camera = camera_numbers::settings(pose).ok_or_else(|| broken(camera_numbers::POSE))?;
+        }
+        let has_occlusion = settings.integrator().get().capabilities().contains(&Capability::AmbientOcclusion);
+        if let (None, true, Some(radius)) =
+            (chosen.integrators.ao.ao_radius, has_occlusion, self.image.metadata(key::AO_RADIUS))
+        {
+            let radius = radius.parse::<f64>().ok().filter(|r| *r > 0.0).ok_or_else(|| broken(key::AO_RADIUS))?;
+            chosen.integrators.ao.ao_radius = Some(Length::Units(radius));
+        }
+        *settings = settings.overridden_by(&chosen);
+        Ok(())
     }
 
     /// Why it is not what this frame is to be compared with, in a sentence; `None` if it is.

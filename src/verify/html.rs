@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::golden::shown_image;
-use super::manifest::{Frame, GoldenFormat, Manifest};
+use super::manifest::{Frame, GoldenFormat};
 use super::{FrameResult, Outcome, Summary, plural};
 use crate::error::Result;
 use crate::measure::comparison::{CompareOptions, compare};
@@ -11,18 +11,18 @@ use crate::output::{Image, Samples};
 use crate::report::comparison::{NamedImage, section};
 use crate::report::{self, Cell, Page, Part, Row, Section, Status, Table};
 
-/// Writes the page into a folder, and returns its path. `command`: the command that was typed.
+/// Writes the page into a folder, and returns its path. `frames` and `folder`: of the manifest. `command`: the command that was typed.
 ///
 /// # Errors
 /// [`crate::Error::Output`].
-pub fn write(summary: &Summary, manifest: &Manifest, command: &str, dir: &Path) -> Result<PathBuf> {
+pub fn write(summary: &Summary, frames: &[Frame], folder: &Path, command: &str, dir: &Path) -> Result<PathBuf> {
     let mut sections = vec![Section::default()];
     let mut table = Table::new(&["frame", "tracer", "result", "seconds", "what was found"]);
     for result in &summary.frames {
         let (word, status, text) = words(result);
         let mut name = Cell::from(result.frame.as_str());
         if let Outcome::Differs(_) = result.outcome {
-            sections.push(difference(result, manifest, &text)?);
+            sections.push(difference(result, frames, &text)?);
             name = name.to_section(sections.len() - 1);
         }
         let mut verdict = Cell::from(word);
@@ -37,7 +37,7 @@ pub fn write(summary: &Summary, manifest: &Manifest, command: &str, dir: &Path) 
     let failed = summary.count(|o| matches!(o, Outcome::Failed(_)));
     let all = plural(summary.frames.len(), "render", "renders");
     let page = Page {
-        title: format!("Reference frames of {}", manifest.folder.display()),
+        title: format!("Reference frames of {}", folder.display()),
         summary: match (differ, failed) {
             (0, 0) => format!("{all}: none differs from its golden image."),
             (0, failed) => format!("{all}: none differs from its golden image; {failed} could not be judged."),
@@ -56,9 +56,10 @@ pub fn write(summary: &Summary, manifest: &Manifest, command: &str, dir: &Path) 
 
 /// An outcome in a word, with its colour, and what was found.
 fn words(result: &FrameResult) -> (&'static str, Option<Status>, String) {
+    let note = result.note.as_ref().map_or_else(String::new, |note| format!("; {note}"));
     match &result.outcome {
-        Outcome::Holds(judgement) => ("holds", Some(Status::Good), judgement.text()),
-        Outcome::Differs(judgement) => ("differs", Some(Status::Bad), judgement.text()),
+        Outcome::Holds(judgement) => ("holds", Some(Status::Good), judgement.text() + &note),
+        Outcome::Differs(judgement) => ("differs", Some(Status::Bad), judgement.text() + &note),
         Outcome::Failed(why) => ("failed", Some(Status::Bad), why.clone()),
         Outcome::Skipped(why) => ("skipped", None, why.clone()),
         Outcome::Blessed(_) => ("blessed", None, String::new()),
@@ -66,14 +67,14 @@ fn words(result: &FrameResult) -> (&'static str, Option<Status>, String) {
 }
 
 /// The section of a frame that differs.
-fn difference(result: &FrameResult, manifest: &Manifest, text: &str) -> Result<Section> {
+fn difference(result: &FrameResult, frames: &[Frame], text: &str) -> Result<Section> {
     let title = match result.tracer {
         Some(tracer) => format!("{} ({})", result.frame, tracer.name()),
         None => result.frame.clone(),
     };
-    let frame = manifest.frames.iter().find(|f| f.name == result.frame);
+    let frame = frames.iter().find(|f| f.name == result.frame);
     let (Some(images), Some(frame)) = (&result.images, frame) else {
-        return Ok(with_text(Section::new(title, Vec::new()), text, frame));
+        return Ok(with_text(Section::new(title, Vec::new()), text, frame, result));
     };
     let (image, golden) = (&images.0, &images.1);
     // a picture is compared with a picture
@@ -91,7 +92,7 @@ fn difference(result: &FrameResult, manifest: &Manifest, text: &str) -> Result<S
         // of different sizes, say: the text has it
         Err(e) => Section::new(title, vec![Part::Text(format!("The images are not shown: {e}."))]),
     };
-    Ok(with_text(section, text, Some(frame)))
+    Ok(with_text(section, text, Some(frame), result))
 }
 
 /// An image with values as 8 bits hold them, 0 to 1.
@@ -104,11 +105,12 @@ fn clamped(mut image: Image) -> Image {
     image
 }
 
-fn with_text(mut section: Section, text: &str, frame: Option<&Frame>) -> Section {
+fn with_text(mut section: Section, text: &str, frame: Option<&Frame>, result: &FrameResult) -> Section {
     section.status = Some(Status::Bad);
     section.parts.insert(0, Part::Text(text.to_owned()));
     if let Some(frame) = frame {
-        section.parts.insert(1, Part::Text(format!("skylit render {} {}", frame.scene, frame.render_text())));
+        let chosen = result.chosen.as_ref().map_or_else(String::new, |options| format!(" {options}"));
+        section.parts.insert(1, Part::Text(format!("skylit render {} {}{chosen}", frame.scene, frame.render_text())));
     }
     section
 }

@@ -14,6 +14,7 @@ use crate::measure::metrics::ImagePair;
 use crate::measure::stats::percentile;
 use crate::measure::z_test::{Estimate, Scale, TILE, Verdict, ZTest};
 use crate::output::{Image, Samples, png};
+use crate::report::format_number;
 
 /// Difference of a shown value, of 255, beyond which a pixel is bad.
 pub const BAD_DIFFERENCE: u8 = 25;
@@ -170,7 +171,8 @@ fn exact(frame: &Frame, image: &Image, golden: &Golden) -> Result<Check> {
         return Ok(Check::new("exact", true, "bit for bit", values));
     }
     let channel = if worst.is_empty() { String::new() } else { format!(" ({worst})") };
-    let mut text = format!("{pixels} of {} pixels are not the same, by up to {largest:.3e}{channel}", differing.len());
+    let mut text =
+        format!("{pixels} of {} pixels are not the same, by up to {}{channel}", differing.len(), format_number(largest));
     if let Some(driver) = golden.driver() {
         text += &format!("; the golden image was made on {driver}");
     }

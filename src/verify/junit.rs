@@ -19,6 +19,14 @@ pub fn write(summary: &Summary, suite: &str, path: &Path) -> Result<()> {
     write_atomically(path, |file| file.write_all(xml.as_bytes()))
 }
 
+/// Writes a file with one error: the run ended before frames could be judged. What an earlier run wrote must not be taken for the result of this one.
+///
+/// # Errors
+/// [`Error::Output`].
+pub fn write_failure(why: &str, suite: &str, path: &Path) -> Result<()> {
+    write(&Summary::of_failure(why), suite, path)
+}
+
 fn text(summary: &Summary, suite: &str) -> std::result::Result<String, String> {
     let mut tests = TestSuite::new(suite);
     tests.set_time(Duration::from_secs_f64(summary.seconds));
@@ -55,8 +63,10 @@ fn case(result: &FrameResult, suite: &str) -> TestCase {
     };
     let mut case = TestCase::new(name, status);
     case.set_classname(suite).set_time(Duration::from_secs_f64(result.seconds));
-    if let Outcome::Holds(judgement) = &result.outcome {
-        case.set_system_out(judgement.text());
+    let found = if let Outcome::Holds(judgement) = &result.outcome { Some(judgement.text()) } else { None };
+    let told: Vec<String> = found.into_iter().chain(result.note.clone()).collect();
+    if !told.is_empty() {
+        case.set_system_out(told.join("; "));
     }
     case
 }
@@ -77,6 +87,8 @@ mod tests {
             tracer: Some(TracerKind::Compute),
             outcome,
             seconds: 0.25,
+            chosen: None,
+            note: None,
             images: None,
         };
         let frames = vec![

@@ -52,6 +52,8 @@ pub struct Frame {
     pub drivers: Vec<String>,
     /// Line of the manifest at which it begins.
     pub line: usize,
+    /// Why it cannot be rendered, in a sentence that names the line; what is above is then not all that the manifest says.
+    pub problem: Option<String>,
 }
 
 /// Which tracers render a frame.
@@ -144,10 +146,10 @@ impl Source<'_> {
 }
 
 impl Manifest {
-    /// Reads the manifest of a folder.
+    /// Reads the manifest of a folder. What is wrong with one frame is a problem of that frame alone.
     ///
     /// # Errors
-    /// [`Error::Input`], naming the line, for a file that cannot be read or does not make sense.
+    /// [`Error::Input`], naming the line, for a file that cannot be read or is no manifest.
     pub fn load(folder: &Path) -> Result<Self> {
         let path = folder.join(NAME);
         let text = std::fs::read_to_string(&path).map_err(|e| match e.kind() {
@@ -162,16 +164,17 @@ impl Manifest {
             None => Error::input(&path, e.message()),
         })?;
         let defaults = &file.defaults;
-        let frames = file.frame.iter().map(|entry| frame(&source, folder, defaults, entry)).collect::<Result<Vec<_>>>()?;
+        let mut frames: Vec<Frame> = file.frame.iter().map(|entry| frame(&source, folder, defaults, entry)).collect();
         if frames.is_empty() {
             return Err(Error::input(&path, "it has no frames: add a [[frame]] with name, scene, render and tolerance"));
         }
         let mut names = BTreeSet::new();
-        for (frame, entry) in frames.iter().zip(&file.frame) {
+        for (frame, entry) in frames.iter_mut().zip(&file.frame) {
             // file systems that ignore case keep one of two such images
             if !names.insert(frame.name.to_lowercase()) {
                 let span = entry.get_ref().name.span();
-                return Err(source.error(span, format!("two frames are called {}", frame.name)));
+                let message = format!("two frames are called {}: the first one is rendered", frame.name);
+                frame.problem = Some(source.error(span, message).to_string());
             }
         }
         Ok(Self { folder: folder.to_owned(), pinned: file.drivers.pinned, frames })
@@ -241,34 +244,55 @@ pub fn names_driver(beginnings: &[String], driver: &str) -> bool {
     beginnings.iter().any(names)
 }
 
-fn frame(source: &Source, folder: &Path, defaults: &Defaults, entry: &Spanned<Entry>) -> Result<Frame> {
+fn frame(source: &Source, folder: &Path, defaults: &Defaults, entry: &Spanned<Entry>) -> Frame {
     let (span, entry) = (entry.span(), entry.get_ref());
-    let name = entry.name.get_ref().clone();
+    let mut frame = Frame {
+        name: one_line(entry.name.get_ref()),
+        scene: entry.scene.get_ref().clone(),
+        settings: RenderSettings::default(),
+        tracers: Tracers::Auto,
+        tolerance: entry.tolerance.or(defaults.tolerance).unwrap_or_default(),
+        format: entry.golden.or(defaults.golden).unwrap_or_default(),
+        drivers: entry.drivers.clone().or_else(|| defaults.drivers.clone()).unwrap_or_default(),
+        line: source.line(span.start),
+        problem: None,
+    };
+    if let Err(e) = complete(&mut frame, source, folder, defaults, (span, entry)) {
+        frame.problem = Some(e.to_string());
+    }
+    frame
+}
+
+/// Reads what may be wrong with a frame.
+fn complete(
+    frame: &mut Frame,
+    source: &Source,
+    folder: &Path,
+    defaults: &Defaults,
+    (span, entry): (Range<usize>, &Entry),
+) -> Result<()> {
+    let name = entry.name.get_ref();
     let is_plain = |c: char| c.is_ascii_alphanumeric() || matches!(c, '-' | '_' | '.');
     if name.is_empty() || name.len() > 100 || name.starts_with('.') || !name.chars().all(is_plain) {
         let message = format!("the name {name:?} is no file name: use up to 100 letters, digits, - and _");
         return Err(source.error(entry.name.span(), message));
     }
     check_scene(source, folder, &entry.scene)?;
-    let settings = settings(source, folder, defaults, entry)?;
+    frame.settings = settings(source, folder, defaults, entry)?;
     let tracers = entry.tracers.as_ref().or(defaults.tracers.as_ref());
-    let tracers = tracers.map_or(Ok(Tracers::Auto), |t| parse_tracers(t.get_ref()).map_err(|e| source.error(t.span(), e)))?;
-    let Some(tolerance) = entry.tolerance.or(defaults.tolerance) else {
+    if let Some(names) = tracers {
+        frame.tracers = parse_tracers(names.get_ref()).map_err(|e| source.error(names.span(), e))?;
+    }
+    if entry.tolerance.or(defaults.tolerance).is_none() {
         let message = format!("{name} has no tolerance: add one, such as tolerance = \"z_test\", to it or to [defaults]");
         return Err(source.error(span, message));
-    };
-    let frame = Frame {
-        name,
-        scene: entry.scene.get_ref().clone(),
-        settings,
-        tracers,
-        tolerance,
-        format: entry.golden.or(defaults.golden).unwrap_or_default(),
-        drivers: entry.drivers.clone().or_else(|| defaults.drivers.clone()).unwrap_or_default(),
-        line: source.line(span.start),
-    };
-    check(&frame).map_err(|message| source.error(span, format!("{}: {message}", frame.name)))?;
-    Ok(frame)
+    }
+    check(frame).map_err(|message| source.error(span, format!("{name}: {message}")))
+}
+
+/// A name with spaces in place of what would break a line.
+fn one_line(name: &str) -> String {
+    name.replace(char::is_control, " ")
 }
 
 fn check_scene(source: &Source, folder: &Path, name: &Spanned<String>) -> Result<()> {

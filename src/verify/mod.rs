@@ -25,6 +25,7 @@ use session::Session;
 use crate::error::{Error, Result};
 use crate::film::Control;
 use crate::output::Image;
+use crate::renderer::CHOSEN;
 use crate::tracer::{DeviceSettings, TracerKind};
 
 /// What is done with frames.
@@ -84,6 +85,12 @@ pub struct FrameResult {
     pub outcome: Outcome,
     /// Seconds that it took.
     pub seconds: f64,
+    /// Camera, AO radius and light that its settings leave open and that were chosen when its golden image was made, as options of `skylit render`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub chosen: Option<String>,
+    /// What to know besides, a sentence.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub note: Option<String>,
     /// The image of a frame that differs, and its golden image, if they are kept.
     #[serde(skip)]
     pub images: Option<Box<(Image, Golden)>>,
@@ -111,7 +118,20 @@ pub trait Observer: Control {
     fn result(&mut self, result: &FrameResult, done: usize, total: usize) -> Result<()>;
 }
 
+impl FrameResult {
+    fn new(frame: &str, tracer: Option<TracerKind>, done: Done, seconds: f64) -> Self {
+        let Done { outcome, images, chosen, note } = done;
+        Self { frame: frame.to_owned(), tracer, outcome, seconds, chosen, note, images }
+    }
+}
+
 impl Summary {
+    /// The results of a run that ended before frames could be judged.
+    pub fn of_failure(why: &str) -> Self {
+        let result = FrameResult::new(manifest::NAME, None, Outcome::Failed(why.to_owned()).into(), 0.0);
+        Self { device: String::new(), driver: String::new(), frames: vec![result], seconds: 0.0 }
+    }
+
     /// Number of results for which `is` is true.
     pub fn count(&self, is: impl Fn(&Outcome) -> bool) -> usize {
         self.frames.iter().filter(|f| is(&f.outcome)).count()
@@ -164,7 +184,20 @@ pub fn plural(count: usize, one: &str, many: &str) -> String {
 /// wrong with one frame is its outcome.
 pub fn run(manifest: &Manifest, options: &Options, device: &DeviceSettings, observer: &mut dyn Observer) -> Result<Summary> {
     let start = Instant::now();
-    let mut frames = options.selection.frames(manifest)?;
+    let frames = options.selection.frames(manifest)?;
+    let (broken, mut frames): (Vec<&Frame>, Vec<&Frame>) = frames.into_iter().partition(|f| f.problem.is_some());
+    let mut results = Vec::new();
+    for frame in &broken {
+        let outcome = Outcome::Failed(frame.problem.clone().unwrap_or_default());
+        let result = FrameResult::new(&frame.name, None, outcome.into(), 0.0);
+        observer.result(&result, results.len() + 1, broken.len() + frames.len())?;
+        results.push(result);
+    }
+    // a device is for frames that can be rendered
+    if frames.is_empty() {
+        let (device, driver) = (String::new(), String::new());
+        return Ok(Summary { device, driver, frames: results, seconds: start.elapsed().as_secs_f64() });
+    }
     let mut session = Session::open(manifest, device)?;
     if let Action::Bless { missing, force } = options.action {
         if missing {
@@ -175,25 +208,23 @@ pub fn run(manifest: &Manifest, options: &Options, device: &DeviceSettings, obse
         }
     }
     let jobs = jobs(&session, &frames, options);
-    let mut results = Vec::new();
     for (k, (frame, job)) in jobs.iter().enumerate() {
         let begin = Instant::now();
-        let (tracer, outcome, images) = match job {
-            Job::Skip(kind, why) => (*kind, Outcome::Skipped(why.clone()), None),
-            Job::Fail(kind, why) => (*kind, Outcome::Failed(why.clone()), None),
+        let (tracer, done): (Option<TracerKind>, Done) = match job {
+            Job::Skip(kind, why) => (*kind, Outcome::Skipped(why.clone()).into()),
+            Job::Fail(kind, why) => (*kind, Outcome::Failed(why.clone()).into()),
             Job::Do(kind) => {
-                let (outcome, images) = match one(&mut session, manifest, frame, *kind, options, observer) {
+                let done = match one(&mut session, manifest, frame, *kind, options, observer) {
                     Ok(done) => done,
                     // nothing else can be done either
                     Err(e @ (Error::Interrupted | Error::DeviceLost(_) | Error::Output { .. })) => return Err(e),
-                    Err(e) => (Outcome::Failed(e.to_string()), None),
+                    Err(e) => Outcome::Failed(e.to_string()).into(),
                 };
-                (Some(*kind), outcome, images)
+                (Some(*kind), done)
             }
         };
-        let seconds = begin.elapsed().as_secs_f64();
-        let result = FrameResult { frame: frame.name.clone(), tracer, outcome, seconds, images };
-        observer.result(&result, k + 1, jobs.len())?;
+        let result = FrameResult::new(&frame.name, tracer, done, begin.elapsed().as_secs_f64());
+        observer.result(&result, broken.len() + k + 1, broken.len() + jobs.len())?;
         results.push(result);
     }
     let info = session.info();
@@ -245,7 +276,19 @@ fn jobs<'m>(session: &Session, frames: &[&'m Frame], options: &Options) -> Vec<(
     jobs
 }
 
-type Images = Option<Box<(Image, Golden)>>;
+/// What became of a frame, and what to say of it.
+struct Done {
+    outcome: Outcome,
+    images: Option<Box<(Image, Golden)>>,
+    chosen: Option<String>,
+    note: Option<String>,
+}
+
+impl From<Outcome> for Done {
+    fn from(outcome: Outcome) -> Self {
+        Self { outcome, images: None, chosen: None, note: None }
+    }
+}
 
 fn one(
     session: &mut Session,
@@ -254,28 +297,34 @@ fn one(
     kind: TracerKind,
     options: &Options,
     observer: &mut dyn Observer,
-) -> Result<(Outcome, Images)> {
+) -> Result<Done> {
     if let Action::Bless { .. } = options.action {
         let golden = bless::render(session, manifest, frame, kind, observer)?;
         session.check_validation()?;
-        return Ok((Outcome::Blessed(bless::update(&golden)?), None));
+        let outcome = Outcome::Blessed(bless::update(&golden)?);
+        return Ok(Done { chosen: golden.chosen().map(str::to_owned), ..outcome.into() });
     }
     let path = manifest.golden(frame);
     if !path.exists() {
         let file = path.display();
-        return Ok((Outcome::Failed(format!("{file}: no golden image yet; make it with --update-missing")), None));
+        return Ok(Outcome::Failed(format!("{file}: no golden image yet; make it with --update-missing")).into());
     }
     let golden = Golden::load(&path)?;
     if let Some(misfit) = golden.misfit(frame) {
-        return Ok((Outcome::Failed(format!("{misfit}; make it again with --bless --filter {}", frame.name)), None));
+        return Ok(Outcome::Failed(format!("{misfit}; make it again with --bless --filter {}", frame.name)).into());
     }
     let seed = options.seed.filter(|_| frame.tolerance.allows_other_seeds());
-    let image = session.render(frame, kind, seed, observer)?;
+    let image = session.render(frame, kind, seed, Some(&golden), observer)?;
     session.check_validation()?;
     let judgement = judge::judge(frame, &image, &golden)?;
+    let chosen = golden.chosen().map(str::to_owned);
+    // what was not frozen: it followed the scene
+    let note = image.metadata(CHOSEN).map(|now| {
+        format!("its golden image does not say what was chosen for it, and now {now} is chosen; make it again with --bless --filter {}", frame.name)
+    });
     if judgement.holds() {
-        return Ok((Outcome::Holds(judgement), None));
+        return Ok(Done { chosen, note, ..Outcome::Holds(judgement).into() });
     }
     let images = options.keep_images.then(|| Box::new((image, golden)));
-    Ok((Outcome::Differs(judgement), images))
+    Ok(Done { outcome: Outcome::Differs(judgement), images, chosen, note })
 }

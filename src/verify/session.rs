@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use super::golden::Golden;
 use super::manifest::{Frame, Manifest, Tracers};
 use crate::error::{Error, Result};
 use crate::film::Control;
@@ -54,14 +55,26 @@ impl<'m> Session<'m> {
         }
     }
 
-    /// Renders a frame: a still, or the last of its frames in real time. `seed`: one in place of its own.
+    /// Renders a frame: a still, or the last of its frames in real time. `seed`: one in place of its own. `golden`: the image that it is to be compared with; what was chosen when that was made
+    /// (camera, AO radius, light) is not chosen anew, so that a scene which has moved makes another image.
     ///
     /// # Errors
     /// Those of the renderer.
-    pub fn render(&mut self, frame: &Frame, kind: TracerKind, seed: Option<u32>, control: &mut dyn Control) -> Result<Image> {
+    pub fn render(
+        &mut self,
+        frame: &Frame,
+        kind: TracerKind,
+        seed: Option<u32>,
+        golden: Option<&Golden>,
+        control: &mut dyn Control,
+    ) -> Result<Image> {
         let mut settings = self.manifest.settings(frame);
         settings.image.seed = seed.or(settings.image.seed);
-        let image = self.renderer(frame, kind)?.image(&settings, control);
+        let renderer = self.renderer(frame, kind)?;
+        if let Some(golden) = golden {
+            golden.freeze(&mut settings, !renderer.scene().cameras.is_empty())?;
+        }
+        let image = renderer.image(&settings, control);
         if image.is_err() {
             // what it left half-made is not used again
             self.open = None;

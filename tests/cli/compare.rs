@@ -126,6 +126,13 @@ fn wrong_usage() {
     refuses(&["compare", "--scene", "builtin:plane", "--a", "ao", "--b", "oa"], 64, "oa");
     refuses(&["compare", "--scene", "builtin:plane", "--a", "ao", "--b", "ao --max-depth 2"], 64, "--max-depth has no effect");
     refuses(
+        &["compare", "--scene", "builtin:plane", "--a", "fast", "--b", "ao", "--frames", "0..4"],
+        64,
+        "\"ao\": --frames makes a still of each frame",
+    );
+    refuses(&["compare", "a.exr", "b.exr", "--ao-radius", "2"], 64, "--ao-radius is for renders");
+    refuses(&["compare", "a.exr", "b.exr", "--csv", "/dev/null/a.csv"], 4, "/dev/null/a.csv");
+    refuses(
         &["compare", "--scene", "builtin:plane", "--a", "ao", "--b", "ao", "--environment", "1,1,1"],
         64,
         "on any of the renders",
@@ -172,4 +179,51 @@ fn gpu_renders() {
     assert!(of("c.exr").f32("G").is_some() && of("d.exr").metadata("preset") == Some("fast"));
     assert!(!Path::new(&saved).join("a.exr").exists());
     assert!(std::fs::read_to_string(Path::new(&report).join("index.html")).unwrap().contains("pixel filter"));
+}
+
+/// What filters and histories do shows in the first frame, or in motion: at rest an image has converged.
+#[test]
+fn gpu_presets_have_a_first_frame() {
+    if !device() {
+        return;
+    }
+    let dir = tempfile::tempdir().unwrap();
+    let [csv, saved] = ["table.csv", "saved"].map(|n| place(&dir, n));
+    let scene = ["compare", "--scene", "builtin:stairs", "--size", "48x27", "--ao-radius", "2", "--json"];
+    let of = |options: &[&str]| json(&run(&[&scene[..], options].concat()));
+    let record =
+        of(&["--a", "balanced --filter none", "--c", "balanced", "--b", "ao --spp 64", "--csv", &csv, "--save", &saved]);
+    let images = record["images"].as_array().unwrap();
+    let names: Vec<&str> = images.iter().map(|i| i["name"].as_str().unwrap()).collect();
+    let first = ["balanced --filter none --warm-up 0", "balanced --warm-up 0"];
+    assert_eq!(names, ["balanced --filter none", "ao --spp 64", "balanced", first[0], first[1]]);
+    let rmse = |k: usize| images[k]["metrics"]["rmse"].as_f64().unwrap();
+    let description = |k: usize| images[k]["description"].as_str().unwrap();
+    assert!(description(0).contains("at rest") && description(3).contains("the first frame"), "{record}");
+    // filters: all but the same at rest, and what makes the first frame clean
+    assert!((rmse(0) / rmse(2) - 1.0).abs() < 0.3 && rmse(3) > 1.5 * rmse(4) && rmse(3) > 3.0 * rmse(0), "{record}");
+    let warnings = record["warnings"].to_string();
+    assert!(warnings.contains("A (balanced --filter none): --filter has next to no effect on frame "), "{warnings}");
+    // the radius is that of all
+    for k in ["a", "b", "e"] {
+        let image = output::load(&Path::new(&saved).join(format!("{k}.exr"))).unwrap();
+        assert_eq!(image.metadata("ao.radius"), Some("2"), "{k}");
+    }
+    // the same numbers as a table
+    let table = std::fs::read_to_string(&csv).unwrap();
+    let rows: Vec<Vec<&str>> = table.lines().map(|l| l.split(',').collect()).collect();
+    let column = rows[0].iter().position(|c| *c == "rmse").unwrap();
+    assert!(rows.len() == 5 && rows[1][column].parse::<f64>().unwrap() == rmse(0), "{table}");
+
+    // as asked: in motion all have the same camera, and a history that is kept has its filter
+    let motion =
+        ["--a", "balanced", "--b", "ao", "--c", "balanced --filter none", "--frames", "0..4", "--orbit", "40", "--spp", "16"];
+    let record = of(&motion);
+    assert_eq!(record["images"].as_array().unwrap().len(), 3, "{record}");
+    assert!(!record["warnings"].to_string().contains("differ in their camera"), "{record}");
+    let record = of(&["--a", "balanced --filter none", "--b", "ao --spp 64", "--at-rest", "hold"]);
+    assert!(!record["warnings"].to_string().contains("next to no effect"), "{record}");
+    // an option that does nothing
+    let record = of(&["--a", "fast --warm-up 0", "--b", "ao --spp 4", "--c", "fast --warm-up 0 --at-rest hold"]);
+    assert!(record["warnings"].to_string().contains("A and C are the same in every bit"), "{record}");
 }

@@ -16,7 +16,9 @@ fn gpu_compare_ao_says_what_fits_best() {
     let out = run(&[&["compare", "ao-vs-path", "builtin:stairs"], &outputs[..], &SMALL].concat());
     let record = json(&out);
     assert!(stderr(&out).is_empty(), "{}", stderr(&out));
-    assert!(record["warnings"][0].as_str().unwrap().contains("no light"), "{record}");
+    let choices = record["choices"].as_array().unwrap();
+    assert!(choices.len() == 1 && choices[0].as_str().unwrap().starts_with("light: the scene has none"), "{record}");
+    assert!(record["chosen"].as_str().unwrap().contains("--light 'sun"), "{record}");
     let fits = record["path"].as_array().unwrap();
     let stands_for: Vec<_> = fits.iter().map(|f| f["environment_light"].as_str().unwrap()).collect();
     assert_eq!(stands_for, ["ambient", "traced"]);

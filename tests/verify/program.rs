@@ -60,7 +60,10 @@ fn manifests_that_are_wrong_name_the_line() {
     ];
     for (manifest, says) in cases {
         let dir = folder(&manifest);
-        fails(&run(&["verify", text(dir.path())]), 2, &["frames.toml", says]);
+        let out = run(&["verify", text(dir.path())]);
+        // of a frame in its line, of the manifest in the error
+        let said = stderr(&out) + &String::from_utf8_lossy(&out.stdout);
+        assert!(out.status.code() == Some(2) && said.contains("frames.toml") && said.contains(says), "{says}: {said}");
     }
     let dir = tempfile::tempdir().unwrap();
     fails(
@@ -85,6 +88,80 @@ fn options_that_have_no_effect() {
     refuse(&["--tracer", "compute"], "use --tracers");
     refuse(&["--shard", "3/2"], "I/N");
     refuse(&["--filter", "nothing"], "no frame has such a name");
+}
+
+/// What is wrong with one frame keeps no other from being rendered, and no result of an earlier run stays.
+#[test]
+fn gpu_a_broken_frame_stops_no_other() {
+    if !device() {
+        return;
+    }
+    let dir = folder(TWO);
+    let path = dir.path();
+    let verify = |options: &[&str]| run(&[&["verify", text(path)], options].concat());
+    let (junit, page) = (path.join("out.xml"), path.join("report"));
+    let results = || std::fs::read_to_string(&junit).unwrap();
+    assert!(verify(&["--update-missing", "--force"]).status.success());
+    assert!(verify(&["--junit", text(&junit)]).status.success() && results().contains("errors=\"0\""));
+
+    // scenes, options, tracers and names that are wrong, and a golden image that is none
+    let broken = [
+        ("scene = \"gone.glb\"", "no scene"),
+        ("scene = \"builtin:gone\"", "no built-in scene gone"),
+        ("scene = \"builtin:plane\"\nrender = \"ao --ssp 3\"", "--ssp"),
+        ("scene = \"builtin:plane\"\nsettings = \"gone.json\"", "gone.json"),
+        ("scene = \"builtin:plane\"\ntracers = [\"magic\"]", "unknown tracer magic"),
+        ("scene = \"broken.gltf\"", "broken.gltf"),
+        ("scene = \"builtin:plane\"\nname = \"PLANE\"", "two frames are called PLANE"),
+        ("scene = \"builtin:plane\"\nname = \"torn\"", "torn.exr"),
+    ];
+    std::fs::write(path.join("broken.gltf"), "{").unwrap();
+    std::fs::write(path.join("frame-5.exr"), "no image").unwrap();
+    std::fs::write(path.join("torn.exr"), "no image").unwrap();
+    let mut manifest = TWO.to_owned();
+    for (k, (lines, _)) in broken.iter().enumerate() {
+        let name = if lines.contains("name =") { String::new() } else { format!("name = \"frame-{k}\"\n") };
+        manifest += &format!("\n[[frame]]\n{name}{lines}\n");
+    }
+    std::fs::write(path.join("frames.toml"), &manifest).unwrap();
+    let out = verify(&["--junit", text(&junit), "--html", text(&page)]);
+    fails(&out, 2, &["8 frames could not be judged"]);
+    let lines = String::from_utf8(out.stdout).unwrap();
+    let xml = results();
+    assert!(lines.contains("10 renders: 2 hold, 8 failed") && xml.contains("errors=\"8\""), "{lines}{xml}");
+    for (_, says) in broken {
+        assert!(lines.contains(says), "{says}: {lines}");
+    }
+    let page = std::fs::read_to_string(page.join("index.html")).unwrap();
+    assert!(page.contains("8 could not be judged"), "{page}");
+    // one that differs besides counts more
+    let differs = manifest.replace("builtin:stairs", "builtin:cornell-box");
+    std::fs::write(path.join("frames.toml"), differs).unwrap();
+    assert!(verify(&["--filter", "stairs"]).status.code() == Some(2));
+
+    // without any frame that could be rendered there is a result, too: one error
+    let failure = |manifest: &str, options: &[&str], code: i32, says: &str| {
+        std::fs::write(&junit, "<testsuites errors=\"0\"/>").unwrap();
+        std::fs::write(path.join("frames.toml"), manifest).unwrap();
+        fails(&verify(&[&["--junit", text(&junit)], options].concat()), code, &[says]);
+        assert!(results().contains("errors=\"1\"") && results().contains(says), "{}", results());
+    };
+    failure("name = \"", &[], 2, "line 1");
+    failure(TWO, &["--filter", "nothing"], 64, "no frame has such a name");
+    failure(TWO, &["--tracers", "magic"], 64, "unknown tracer magic");
+    failure(TWO, &["--device", "no such device"], 2, "no such device");
+}
+
+#[cfg(unix)]
+#[test]
+fn results_that_cannot_be_written_are_exit_code_4() {
+    let dir = folder(TWO);
+    for option in ["--junit", "--html"] {
+        fails(&run(&["verify", text(dir.path()), option, "/dev/null/out"]), 4, &["/dev/null"]);
+    }
+    // whatever else is wrong
+    std::fs::write(dir.path().join("frames.toml"), "name = \"").unwrap();
+    fails(&run(&["verify", text(dir.path()), "--junit", "/dev/null/out.xml"]), 4, &["/dev/null"]);
 }
 
 #[test]

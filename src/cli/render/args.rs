@@ -27,7 +27,7 @@ Examples:
 
 /// `skylit render`.
 #[derive(Clone, Debug, Args)]
-#[command(before_help = EXAMPLES)]
+#[command(before_help = EXAMPLES, args_override_self = true)]
 pub struct RenderArgs {
     /// Scene: a .gltf, .glb, .obj or .brhan file, or builtin:NAME (`skylit scenes` lists them)
     #[arg(value_hint = ValueHint::FilePath)]

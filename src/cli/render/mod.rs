@@ -54,6 +54,7 @@ fn stills(args: &RenderArgs, defaults: &[DefaultsReport], start: Instant) -> Res
     let mut stills = renderer.still_sequence(&args.settings)?;
     let mut progress = Progress::new("rendering frames", &console);
     let (mut records, mut warnings, mut finished) = (Vec::new(), Vec::new(), 0);
+    let choices = stills.choices().to_vec();
     for number in range.first..range.end {
         interrupt::check()?;
         progress.set(u64::from(number - range.first), u64::from(range.end - range.first));
@@ -89,6 +90,7 @@ fn stills(args: &RenderArgs, defaults: &[DefaultsReport], start: Instant) -> Res
         args.settings.integrator().name(),
         args.settings.image.spp.unwrap_or(0)
     ))?;
+    choices.iter().try_for_each(|choice| console.line(choice))?;
     let record = serde_json::json!({
         "stills": records,
         "finished_before": finished,

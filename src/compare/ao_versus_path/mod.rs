@@ -8,7 +8,6 @@
 //! Where the scene has an environment there are two questions: ambient light in place of bounces, with the environment traced as direct light; and in place of environment and bounces,
 //! which is what renderers do that cannot trace the environment. A third compares V itself with `ao-sky`, grey surfaces under a white sky.
 
-mod light;
 pub mod page;
 mod references;
 mod report;
@@ -18,7 +17,8 @@ mod sums;
 
 use std::time::Instant;
 
-pub use light::default_light;
+use glam::DVec3;
+
 pub use report::{ChoiceRecord, CurveRecord, ErrorParts, FitRecord, LightShares, Metrics, Report, Row, significant};
 
 use crate::error::{Error, Result};
@@ -27,8 +27,9 @@ use crate::integrators::ao::{Attenuation, Hemisphere};
 use crate::integrators::lighting::LightingSettings;
 use crate::integrators::path::ambient::EnvironmentLight;
 use crate::output::{Channel, Image, Samples as Values};
-use crate::renderer::Renderer;
-use crate::renderer::settings::CameraSettings;
+use crate::renderer::settings::{CameraSettings, options_text, quoted};
+use crate::renderer::{Completed, RenderSettings, Renderer};
+use crate::settings::Length;
 use references::{Halves, References};
 use report::fit_record;
 use search::{Found, search};
@@ -85,6 +86,43 @@ impl AoVersusPathSettings {
     fn ao_samples_per_half(&self) -> u32 {
         self.ao_samples.div_ceil(2).max(1)
     }
+
+    /// These settings with nothing left open, and what was chosen.
+    fn completed(&self, renderer: &mut Renderer) -> Result<(Self, Completed)> {
+        let mut path = RenderSettings { camera: self.camera.clone(), lighting: self.lighting.clone(), ..Default::default() };
+        path.integrator = Some("path".parse()?);
+        path.image.size = Some(self.size);
+        let completed = renderer.complete(&path, None)?;
+        let all = path.overridden_by(&completed.chosen);
+        Ok((Self { camera: all.camera, lighting: all.lighting, ..self.clone() }, completed))
+    }
+
+    /// The commands that render the best `lit` image and the path-traced one that it is compared with.
+    fn commands(&self, scene: &str, fits: &[FitRecord]) -> Result<Vec<String>> {
+        let Some(fit) = fits.first() else { return Ok(Vec::new()) };
+        let mut shared = RenderSettings { camera: self.camera.clone(), lighting: self.lighting.clone(), ..Default::default() };
+        (shared.image.size, shared.image.spp) = (Some(self.size), Some(COMMAND_SPP));
+
+        let best = &fit.best;
+        let mut lit = RenderSettings { integrator: Some("lit".parse()?), ..shared.clone() };
+        lit.integrators.ao.ao_radius = Some(Length::Units(best.radius.map_or(f64::INFINITY, rounded)));
+        lit.integrators.ao.ao_falloff = report::significant_falloff(best.falloff).parse().ok().filter(|f| *f > 1.0);
+        lit.integrators.ao.ao_normal = self.ao_normal;
+        lit.integrators.path.ambient = <[f64; 3]>::try_from(&best.ambient[..]).ok().map(|c| DVec3::from(c.map(rounded)));
+        lit.integrators.path.environment_light = fit.environment_light.filter(|e| *e == EnvironmentLight::Ambient);
+
+        let mut path = RenderSettings { integrator: Some("path".parse()?), ..shared };
+        (path.integrators.path.max_depth, path.integrators.path.firefly_clamp) = (self.max_depth, self.firefly_clamp);
+        let command = |settings: &RenderSettings, name: &str| {
+            format!("skylit render {} {} -o {name}.exr", quoted(scene), options_text(settings))
+        };
+        Ok(vec![command(&lit, "lit"), command(&path, "path")])
+    }
+}
+
+/// A number as it is printed.
+fn rounded(x: f64) -> f64 {
+    crate::renderer::survey::significant(x, 4)
 }
 
 /// Part of the progress of a run.
@@ -124,12 +162,16 @@ pub struct AoVersusPath {
     pub counted: Vec<f32>,
 }
 
-/// Compares ambient light with path tracing.
+/// Samples per pixel of the images that commands of the report make: their noise is then less than most errors.
+const COMMAND_SPP: u32 = 256;
+
+/// Compares ambient light with path tracing. Camera and light that settings leave open are chosen as [`Renderer::complete`] does for `path`, and the report names them.
 ///
 /// # Errors
 /// Those of [`Renderer::still`]; [`Error::Scene`] if no pixel shows a surface, or if there is no light that ambient light could stand for.
 pub fn run(renderer: &mut Renderer, settings: &AoVersusPathSettings, control: &mut dyn Control) -> Result<AoVersusPath> {
     let start = Instant::now();
+    let (settings, completed) = &settings.completed(renderer)?;
     let references = References::render(renderer, settings, control)?;
     let render_seconds = start.elapsed().as_secs_f64();
     let fit_start = Instant::now();
@@ -184,6 +226,9 @@ pub fn run(renderer: &mut Renderer, settings: &AoVersusPathSettings, control: &m
         spp: 2 * settings.spp_per_half(),
         ao_samples: 2 * settings.ao_samples_per_half(),
         seed: settings.seed,
+        choices: completed.choices.clone(),
+        chosen: completed.options(),
+        commands: settings.commands(renderer.name(), &fits)?,
         diagonal,
         covered: covered.len() as f64 / references.samples.pixels() as f64,
         light: shares,

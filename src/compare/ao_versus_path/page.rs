@@ -59,6 +59,7 @@ fn images(found: &AoVersusPath) -> Result<Section> {
     let entry = |name: &str, prefix: &str| Entry {
         name: name.into(),
         description: String::new(),
+        choices: Vec::new(),
         image: layer(&found.image, prefix, &found.counted),
     };
     let entries = vec![entry("lit, best fit", ""), entry("direct light", "direct."), entry("path tracing", "path.")];
@@ -105,7 +106,7 @@ fn choice(choice: &ChoiceRecord) -> String {
 
 fn facts(report: &Report) -> Vec<(String, String)> {
     let fact = |name: &str, value: String| (name.to_owned(), value);
-    vec![
+    let mut facts = vec![
         fact("size", format!("{}x{} pixels", report.size[0], report.size[1])),
         fact("paths per pixel", report.spp.to_string()),
         fact("occlusion rays per pixel", report.ao_samples.to_string()),
@@ -114,7 +115,10 @@ fn facts(report: &Report) -> Vec<(String, String)> {
         fact("environment, directly", percent(report.light.environment)),
         fact("two bounces or more", percent(report.light.bounces)),
         fact("diagonal", format!("{} scene units", significant(report.diagonal))),
-    ]
+    ];
+    facts.extend(report.choices.iter().map(|c| fact("chosen", c.clone())));
+    facts.extend(report.commands.iter().map(|c| fact("to render it", c.clone())));
+    facts
 }
 
 fn section(fit: &FitRecord) -> Section {
@@ -136,8 +140,8 @@ fn section(fit: &FitRecord) -> Section {
         ]));
     }
     parts.push(Part::Table(table));
-    if let Some(p) = &fit.parts {
-        let all = (p.transport + p.occlusion + p.cross).max(f64::MIN_POSITIVE);
+    // none of a sum that noise makes negative
+    if let Some((p, all)) = fit.parts.as_ref().map(|p| (p, p.transport + p.occlusion + p.cross)).filter(|p| p.1 > 0.0) {
         parts.push(Part::Text(format!(
             "Of the mean squared error of the best, {} is left with ao-sky in place of AO: light that no ambient radiance describes. {} is the difference of AO from ao-sky, and {} both together, where they add up or compensate each other.",
             percent(p.transport / all),

@@ -138,6 +138,12 @@ pub struct Report {
     pub ao_samples: u32,
     /// Seed of the sampler.
     pub seed: u32,
+    /// What settings left open and the scene decided, a sentence each.
+    pub choices: Vec<String>,
+    /// The same as options of `skylit render`; `None` if nothing was left open.
+    pub chosen: Option<String>,
+    /// Commands that render the best `lit` image of the first fit, and the path-traced one.
+    pub commands: Vec<String>,
     /// Diagonal of the scene's bounding box, scene units.
     pub diagonal: f64,
     /// Share of pixels that show surfaces.
@@ -214,7 +220,10 @@ pub fn significant(x: f64) -> String {
 }
 
 /// A falloff with four significant digits of what is above 1.
-fn significant_falloff(falloff: f64) -> String {
+pub(super) fn significant_falloff(falloff: f64) -> String {
+    if falloff <= 1.0 {
+        return "1".to_owned();
+    }
     if falloff >= 1e6 {
         return format!("{falloff:.3e}");
     }

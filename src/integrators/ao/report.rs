@@ -36,7 +36,9 @@ pub(super) fn report(options: &AoOptions, result: &AoResult) -> IntegratorReport
     }];
     explanations.push(match options.attenuation().reach() {
         r if r.is_finite() => {
-            format!("occlusion rays end at distance {r:.6}: hits beyond do not occlude visibly")
+            // four digits, however small the scene is
+            let reach: f64 = format!("{r:.3e}").parse().unwrap_or(r);
+            format!("occlusion rays end at distance {reach}: hits beyond do not occlude visibly")
         }
         _ => "occlusion rays are infinite: neither --ao-radius nor --ao-falloff is given".into(),
     });

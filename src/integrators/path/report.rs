@@ -36,9 +36,17 @@ pub(super) fn report(
     let (image, stats) = (&result.image, tracer.stats());
     let (paths, rays) =
         (image.primary_rays, image.primary_rays + result.bounce_rays + result.shadow_rays + result.ambient_rays);
-    let per_second = |n: u64| n as f64 / image.trace_seconds.max(1e-9) / 1e6;
+    let per_second = |n: u64| {
+        let millions = n as f64 / image.trace_seconds.max(1e-9) / 1e6;
+        // of small images on a busy machine, too
+        if millions < 0.1 {
+            format!("{millions:.1e}").parse().unwrap_or(millions).to_string()
+        } else {
+            format!("{millions:.2}")
+        }
+    };
     let mut lines = vec![format!(
-        "{:.2} Mpaths/s, {:.2} Mrays/s; {:.2} rays per path, {:.2} of them shadow rays; longest path {} bounces ({})",
+        "{} Mpaths/s, {} Mrays/s; {:.2} rays per path, {:.2} of them shadow rays; longest path {} bounces ({})",
         per_second(paths),
         per_second(rays),
         rays as f64 / paths.max(1) as f64,

@@ -163,7 +163,7 @@ impl<'r> Interactive<'r> {
         if self.traced.is_empty() {
             self.traced_scene(Blend::Masked, Needs::default(), Vec::new(), control)?;
         }
-        framing::choose(self.scene, aspect, None, &|rays| self.visible_surfaces(rays))
+        Ok(framing::choose(self.scene, aspect, None, &|rays| self.visible_surfaces(rays))?.camera())
     }
 
     /// How open the surfaces are that a camera sees, by which an AO radius is chosen; `None` if it sees none.

@@ -6,10 +6,11 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::rays::camera_ray;
-use super::{Survey, Trace, VisibleSurface};
+use super::{Survey, Trace, VisibleSurface, significant};
 use crate::error::{Error, Result};
+use crate::renderer::settings::CameraSettings;
 use crate::scene::inventory::open_edges;
-use crate::scene::{Camera, Geometry, Scene};
+use crate::scene::{Camera, Geometry, Projection, Scene};
 use crate::settings::choices;
 
 choices! {
@@ -83,8 +84,82 @@ const OUTSIDE: [([f64; 2], f64); 12] = [
     ([161.0, 16.0], 0.85),
     ([-161.0, 35.0], 0.85),
 ];
+/// From where chosen cameras look.
+const OUTSIDE_WORDS: &str = "from outside";
+const INSIDE_WORDS: &str = "from inside";
 /// Above this number of points, the corners of each instance's box stand for its vertices.
 const MAX_POINTS: u64 = 8_000_000;
+
+/// A camera that was chosen, as options of the command line give it: numbers short enough to be typed, and the camera that follows from them.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ChosenCamera {
+    /// From where it looks, in words: `from outside`.
+    pub words: String,
+    /// Position, world space.
+    pub eye: DVec3,
+    /// Point in the middle of the image.
+    pub target: DVec3,
+    /// Up vector.
+    pub up: DVec3,
+    /// Vertical field of view, degrees.
+    pub fov_y: f64,
+}
+
+impl ChosenCamera {
+    /// A perspective camera with its position and direction to a ten-thousandth of the scene's diagonal: about a tenth of a pixel. `up` is what it was made with, `fov_y` (radians) what it
+    /// was asked for.
+    fn rounded(camera: &Camera, up: DVec3, fov_y: Option<f64>, bounds: (DVec3, DVec3), words: impl Into<String>) -> Self {
+        let (lo, hi) = bounds;
+        let (eye, forward) = (camera.camera_to_world.translation, -camera.camera_to_world.matrix3.z_axis);
+        let diagonal = (hi - lo).length();
+        // the middle of the scene where that is ahead, and far enough for the direction to survive the rounding
+        let distance = ((lo + hi) * 0.5 - eye).dot(forward).max(0.5 * diagonal);
+        let distance = if distance > 0.0 { distance } else { 1.0 };
+        let angle = match camera.projection {
+            Projection::Perspective { fov_y } => fov_y.to_degrees(),
+            Projection::Orthographic { .. } => OUTSIDE_FOV_Y.to_degrees(),
+        };
+        let digits = if fov_y.is_some() { 12 } else { 4 };
+        Self {
+            words: words.into(),
+            eye: rounded(eye, diagonal),
+            target: rounded(eye + forward * distance, diagonal),
+            up,
+            fov_y: significant(angle, digits),
+        }
+    }
+
+    /// The camera.
+    pub fn camera(&self) -> Camera {
+        Camera::look_at(self.eye, self.target, self.up, self.fov_y.to_radians())
+    }
+
+    /// The settings that choose it.
+    pub fn settings(&self) -> CameraSettings {
+        CameraSettings {
+            eye: Some(self.eye),
+            target: Some(self.target),
+            up: Some(self.up).filter(|up| *up != DVec3::Y),
+            fov_y: Some(self.fov_y),
+            ..CameraSettings::default()
+        }
+    }
+}
+
+/// A point with as many decimals as tell a ten-thousandth of this size, or more.
+pub(in crate::renderer) fn rounded(point: DVec3, size: f64) -> DVec3 {
+    if !(size > 0.0 && size.is_finite()) {
+        return point;
+    }
+    let decimals = 4 - size.log10().floor() as i32;
+    let step = 10f64.powi(-decimals);
+    let round = |x: f64| match usize::try_from(decimals) {
+        // the number that is nearest to what is printed
+        Ok(decimals) => format!("{x:.decimals$}").parse().unwrap_or(x) + 0.0,
+        Err(_) => (x / step).round() * step + 0.0,
+    };
+    DVec3::from_array(point.to_array().map(round))
+}
 
 /// Chooses a camera for images of `aspect` = width / height, with this vertical field of view in radians, if one is given. Inside means: from the middle of the scene there is something in
 /// nearly all horizontal directions, seen from its front, and none of it close. Then it is the place and direction with the longest view that shows more than bare walls; else the camera sees
@@ -92,26 +167,28 @@ const MAX_POINTS: u64 = 8_000_000;
 ///
 /// # Errors
 /// Those of `trace`; [`Error::Scene`] for a scene without geometry.
-pub fn choose(scene: &Scene, aspect: f64, fov_y: Option<f64>, trace: &Trace) -> Result<Camera> {
+pub fn choose(scene: &Scene, aspect: f64, fov_y: Option<f64>, trace: &Trace) -> Result<ChosenCamera> {
     let bounds = scene.bounds().ok_or_else(no_geometry)?;
+    let chosen = |camera: &Camera, words: &str| ChosenCamera::rounded(camera, DVec3::Y, fov_y, bounds, words);
     let is_room = is_room(bounds, trace)?;
     if !is_room || is_body(scene) {
         let (outside, score) = outside(scene, aspect, fov_y, trace)?;
         if score >= 0.0 {
-            return Ok(outside);
+            return Ok(chosen(&outside, OUTSIDE_WORDS));
         }
         // from all sides it shows backs more than fronts: walls that face what is between them
         let (inside, score) = inside(bounds, aspect, fov_y, trace)?;
-        return Ok(if score > 0.0 { inside } else { outside });
+        return Ok(if score > 0.0 { chosen(&inside, INSIDE_WORDS) } else { chosen(&outside, OUTSIDE_WORDS) });
     }
-    Ok(inside(bounds, aspect, fov_y, trace)?.0)
+    Ok(chosen(&inside(bounds, aspect, fov_y, trace)?.0, INSIDE_WORDS))
 }
 
 /// The camera with this name, for images of `aspect` = width / height.
 ///
 /// # Errors
 /// [`Error::Scene`] for a scene without geometry, or too large to be looked at from inside.
-pub fn named(survey: &Survey, name: ViewName, aspect: f64, fov_y: Option<f64>) -> Result<Camera> {
+pub fn named(survey: &Survey, name: ViewName, aspect: f64, fov_y: Option<f64>) -> Result<ChosenCamera> {
+    let bounds = survey.bounds()?;
     let camera = match name.direction() {
         Some((from, up)) => enclosing(survey.scene, from, up, aspect, fov_y)?,
         None if !survey.is_small() => {
@@ -119,21 +196,23 @@ pub fn named(survey: &Survey, name: ViewName, aspect: f64, fov_y: Option<f64>) -
                 "--view inside: the scene has too many triangles to look for a place; give --eye and --target".into(),
             ));
         }
-        None => inside(survey.bounds()?, aspect, fov_y, &|rays| survey.trace(rays))?.0,
+        None => inside(bounds, aspect, fov_y, &|rays| survey.trace(rays))?.0,
     };
-    Ok(Camera { name: name.to_string(), ..camera })
+    let up = name.direction().map_or(DVec3::Y, |(_, up)| up);
+    Ok(ChosenCamera::rounded(&camera, up, fov_y, bounds, format!("as --view {name} has it")))
 }
 
 /// The camera of a scene that has none, as [`choose`] finds it by rays that are traced on the host.
 ///
 /// # Errors
 /// [`Error::Scene`] for a scene without geometry.
-pub fn of_scene(survey: &Survey, aspect: f64, fov_y: Option<f64>) -> Result<Camera> {
+pub fn of_scene(survey: &Survey, aspect: f64, fov_y: Option<f64>) -> Result<ChosenCamera> {
     if survey.is_small() {
         return choose(survey.scene, aspect, fov_y, &|rays| survey.trace(rays));
     }
     let (from, _) = OUTSIDE[0];
-    enclosing(survey.scene, direction(from), DVec3::Y, aspect, fov_y)
+    let camera = enclosing(survey.scene, direction(from), DVec3::Y, aspect, fov_y)?;
+    Ok(ChosenCamera::rounded(&camera, DVec3::Y, fov_y, survey.bounds()?, OUTSIDE_WORDS))
 }
 
 fn no_geometry() -> Error {
@@ -271,8 +350,7 @@ fn inside((lo, hi): (DVec3, DVec3), aspect: f64, fov_y: Option<f64>, trace: &Tra
         if nearest < 0.02 { 0.2 * sum } else { sum }
     };
     let scores: Vec<f64> = cameras.iter().zip(seen(&cameras, aspect, trace)?).map(score).collect();
-    let (camera, score) = best(cameras, scores.into_iter())?;
-    Ok((Camera { name: ViewName::Inside.to_string(), ..camera }, score))
+    best(cameras, scores.into_iter())
 }
 
 /// The camera outside that shows most.
@@ -312,6 +390,7 @@ mod tests {
     use glam::DAffine3;
 
     use super::*;
+    use crate::renderer::RenderSettings;
     use crate::scene::builtin::{self, shapes};
     use crate::scene::{Instance, Material, Mesh};
 
@@ -333,7 +412,7 @@ mod tests {
     }
 
     fn chosen(trace: &Trace) -> Camera {
-        choose(&scene(), 1.5, None, trace).unwrap()
+        choose(&scene(), 1.5, None, trace).unwrap().camera()
     }
 
     fn hit(distance: f64) -> Option<VisibleSurface> {
@@ -388,7 +467,7 @@ mod tests {
                 mesh.indices.iter_mut().for_each(|t| t.swap(1, 2));
             }
             let (lo, hi) = scene.bounds().unwrap();
-            let eye = of_scene(&Survey::new(&scene), 1.5, None).unwrap().camera_to_world.translation;
+            let eye = of_scene(&Survey::new(&scene), 1.5, None).unwrap().camera().camera_to_world.translation;
             assert_eq!(eye.cmpgt(lo).all() && eye.cmplt(hi).all(), inside, "{name}: {eye}");
         }
     }
@@ -407,7 +486,7 @@ mod tests {
         mesh.normals.clear();
         mesh.texcoords.iter_mut().for_each(|t| t.clear());
         let (lo, hi) = scene.bounds().unwrap();
-        let eye = |scene: &Scene| of_scene(&Survey::new(scene), 1.5, None).unwrap().camera_to_world.translation;
+        let eye = |scene: &Scene| of_scene(&Survey::new(scene), 1.5, None).unwrap().camera().camera_to_world.translation;
         let is_inside = |p: DVec3| p.cmpgt(lo).all() && p.cmplt(hi).all();
         assert!(!is_inside(eye(&scene)));
         // as two meshes it is a room with thick walls
@@ -449,9 +528,21 @@ mod tests {
             if flip {
                 mesh.indices.iter_mut().for_each(|t| t.swap(1, 2));
             }
-            let camera = of_scene(&Survey::new(&scene), 1.0, None).unwrap();
+            let camera = of_scene(&Survey::new(&scene), 1.0, None).unwrap().camera();
             assert_eq!(camera.camera_to_world.translation.x < 0.0, left, "{camera:?}");
         }
+    }
+
+    #[test]
+    fn chosen_numbers_can_be_typed() {
+        // whatever the size of a scene, and wherever it is
+        for (size, at, digits) in [(1.0, 0.0, 6), (2e-3, 0.0, 9), (3e5, 0.0, 6), (1.0, 4.5e6, 13), (7e7, -1e9, 11)] {
+            let point = rounded(DVec3::splat(at + size * 0.123_456_789), size);
+            assert!((point.x - at - size * 0.123_456_789).abs() <= 1e-4 * size, "{size} {at}: {point}");
+            assert!(point.x.to_string().trim_start_matches('-').len() <= digits + 1, "{size} {at}: {}", point.x);
+        }
+        assert_eq!(rounded(DVec3::splat(0.1), 0.0), DVec3::splat(0.1));
+        assert!(rounded(DVec3::splat(-1e-9), 1.0).x.is_sign_positive());
     }
 
     #[test]
@@ -460,9 +551,12 @@ mod tests {
         scene.cameras.clear();
         let survey = Survey::new(&scene);
         let eye = |name| {
-            let camera = named(&survey, name, 1.5, None).unwrap();
-            assert_eq!(camera.name, name.name());
-            camera.camera_to_world.translation
+            let chosen = named(&survey, name, 1.5, None).unwrap();
+            assert!(chosen.words.contains(name.name()));
+            // what is printed is the camera
+            let typed = RenderSettings { camera: chosen.settings(), ..Default::default() };
+            assert_eq!(typed.camera.choose(&survey, 1.5).unwrap(), chosen.camera());
+            chosen.camera().camera_to_world.translation
         };
         let (lo, hi) = survey.bounds().unwrap();
         use ViewName::{Back, Front, Inside, Iso, Left, Right, Top};
@@ -471,7 +565,7 @@ mod tests {
         let inside = eye(Inside);
         assert!(inside.cmpgt(lo).all() && inside.cmplt(hi).all());
         // a narrow field of view sees the same from farther away
-        let far = named(&survey, Front, 1.5, Some(0.1)).unwrap().camera_to_world.translation;
+        let far = named(&survey, Front, 1.5, Some(0.1)).unwrap().camera().camera_to_world.translation;
         assert!(far.z > 3.0 * eye(Front).z);
     }
 }

@@ -2,8 +2,9 @@
 
 use glam::DVec3;
 
-use super::Survey;
+use super::framing::rounded;
 use super::rays::camera_ray;
+use super::{Survey, significant};
 use crate::error::{Error, Result};
 use crate::integrators::lighting::LightingSettings;
 use crate::scene::{Camera, Material, light_spec};
@@ -30,7 +31,7 @@ pub fn choose(survey: &Survey, camera: &Camera, aspect: f64) -> Result<(Lighting
         return Ok((light, "a grey sky and a soft sun".into()));
     };
     // above the camera, so that there are shadows; the first direction is upwards
-    let lamp = eye + DVec3::Y * (0.5 * walls[0]);
+    let lamp = rounded(eye + DVec3::Y * (0.5 * walls[0]), survey.diagonal());
     let [columns, rows] = VIEW;
     let at = |k: usize| [((k % columns) as f64 + 0.5) / columns as f64, ((k / columns) as f64 + 0.5) / rows as f64];
     let views: Vec<(DVec3, DVec3)> = (0..columns * rows).map(|k| camera_ray(camera, at(k), aspect)).collect();
@@ -51,7 +52,8 @@ pub fn choose(survey: &Survey, camera: &Camera, aspect: f64) -> Result<(Lighting
     let reflectance = lit.iter().map(|l| l.1).sum::<f64>() / lit.len().max(1) as f64;
     // light that walls reflect onto each other adds up to 1 + r + r^2 + ... times the lamp's
     let intensity = LAMP * std::f64::consts::PI / median * (1.0 - reflectance);
-    let text = format!("point position={},{},{} intensity={intensity:.4}", lamp.x as f32, lamp.y as f32, lamp.z as f32);
+    let intensity = significant(intensity, 4);
+    let text = format!("point position={},{},{} intensity={intensity}", lamp.x, lamp.y, lamp.z);
     Ok((LightingSettings { light: vec![parse(&text)?], ..Default::default() }, "a lamp above the camera".into()))
 }
 

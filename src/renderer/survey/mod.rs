@@ -126,6 +126,11 @@ impl<'s> Survey<'s> {
     }
 }
 
+/// A number with so many significant digits: what is chosen is what is printed.
+pub fn significant(value: f64, digits: usize) -> f64 {
+    format!("{value:.*e}", digits.saturating_sub(1)).parse().unwrap_or(value)
+}
+
 /// Number of directions of [`Survey::walls`].
 pub const AROUND: usize = 16;
 

@@ -4,8 +4,8 @@ use std::f64::consts::TAU;
 
 use glam::DVec3;
 
-use super::Trace;
 use super::rays::camera_ray;
+use super::{Trace, significant};
 use crate::error::Result;
 use crate::scene::Camera;
 
@@ -61,7 +61,7 @@ pub fn measure(camera: &Camera, aspect: f64, size: f64, trace: &Trace) -> Result
     let open = 1.0 - hits as f64 / distances.len() as f64;
     // at a radius just below this distance, all beyond are open
     let radius = distances[((1.0 - TARGET) * distances.len() as f64) as usize];
-    Ok(Some(Openness { open, radius: if radius.is_finite() { two_digits(radius) } else { f64::INFINITY } }))
+    Ok(Some(Openness { open, radius: if radius.is_finite() { significant(radius, 2) } else { f64::INFINITY } }))
 }
 
 /// The `k`-th direction of a low-discrepancy sequence (Roberts' R2), distributed as the cosine with a normal.
@@ -72,11 +72,6 @@ fn cosine_direction(normal: DVec3, k: usize) -> DVec3 {
     let (sin, cos) = (TAU * v).sin_cos();
     let radius = u.sqrt();
     (tangent * (radius * cos) + bitangent * (radius * sin) + normal * (1.0 - u).sqrt()).normalize_or(normal)
-}
-
-/// Rounded to two significant digits.
-fn two_digits(value: f64) -> f64 {
-    format!("{value:.1e}").parse().unwrap_or(value)
 }
 
 #[cfg(test)]
@@ -91,7 +86,7 @@ mod tests {
         assert!(cosines.iter().all(|c| *c >= 0.0));
         // the mean of the cosine under its own density is 2/3
         assert!((cosines.iter().sum::<f64>() / 20_000.0 - 2.0 / 3.0).abs() < 1e-3);
-        assert_eq!([0.01234, 5.678, 1234.0, 0.999].map(two_digits), [0.012, 5.7, 1200.0, 1.0]);
+        assert_eq!([0.01234, 5.678, 1234.0, 0.999].map(|v| significant(v, 2)), [0.012, 5.7, 1200.0, 1.0]);
     }
 
     #[test]
