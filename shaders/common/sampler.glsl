@@ -52,9 +52,11 @@ uvec2 sample_choice_bits(uint seed, uvec2 pixel, uint sample_index, uint dimensi
     return uvec2(p.x ^ hash_combine(seed, 0u), owen_scramble(p.y, hash_combine(seed, 1u)));
 }
 
-// In [0, 1): the upper 24 bits, exactly
+// Bits as a point in [0, 1): the upper 24, exactly.
+vec2 to_unit(uvec2 bits) { return vec2(bits >> 8) * (1.0 / 16777216.0); }
+
 vec2 sample_2d(uint seed, uvec2 pixel, uint sample_index, uint dimension) {
-    return vec2(sample_2d_bits(seed, pixel, sample_index, dimension) >> 8) * (1.0 / 16777216.0);
+    return to_unit(sample_2d_bits(seed, pixel, sample_index, dimension));
 }
 
 #endif

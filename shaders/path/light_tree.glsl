@@ -28,24 +28,29 @@ float light_importance(LightNode node, vec3 from) {
     return left.x > node.cos_e ? node.intensity * max(left.x, 1e-4) / d2 : 0.0;
 }
 
-// A light, and the probability with which it is chosen; 0: no light reaches the point. u: in [0, 1), and what is left of it.
-float sample_leaf(uvec2 tree, vec3 from, inout float u, out uint light) {
+// Bit trail of a placed light.
+uvec2 light_trail(uvec2 lights, uint k) { return uvec2(LightRecords(lights).v[k].trail_low, LightRecords(lights).v[k].trail_high); }
+
+// Descends to a light, and returns the probability with which the tree chooses it; 0: it does not reach the point. u: in [0, 1), chooses, and is what is left of it;
+// or, if `follows`, bit k of the trail says whether the light is in the second child at level k.
+float descend_light_tree(uvec2 tree, vec3 from, bool follows, uvec2 trail, inout float u, out uint light) {
     LightNode node = load_light_node(tree, 0u);
-    float probability = 1.0, share = 1.0;
+    float probability = light_importance(node, from) > 0.0 ? 1.0 : 0.0, share = 1.0;
     uint seed = floatBitsToUint(u);
     light = 0u;
-    for (uint level = 0u; (node.link & LIGHT_LEAF) == 0u; level++) {
+    for (uint level = 0u; (node.link & LIGHT_LEAF) == 0u && probability > 0.0; level++) {
         uint child = node.link & LIGHT_LINK;
         LightNode first = load_light_node(tree, child), second = load_light_node(tree, child + 1u);
         float a = light_importance(first, from), b = light_importance(second, from);
         if (!(a + b > 0.0)) return 0.0;
         float p = a / (a + b);
-        bool takes_first = u < p;
-        u = min(takes_first ? u / p : (u - p) / (1.0 - p), 0.99999994);
+        bool takes_first = follows ? (trail.x & 1u) == 0u : u < p;
+        trail = uvec2(trail.x >> 1 | trail.y << 31, trail.y >> 1);
+        if (!follows) u = min(takes_first ? u / p : (u - p) / (1.0 - p), 0.99999994);
         p = takes_first ? p : 1.0 - p;
         probability *= p;
         share *= p;
-        if (share < MIN_STRETCH) {
+        if (!follows && share < MIN_STRETCH) {
             u = float(hash_combine(seed, level) >> 8) * (1.0 / 16777216.0);
             share = 1.0;
         }
@@ -53,24 +58,6 @@ float sample_leaf(uvec2 tree, vec3 from, inout float u, out uint light) {
         else node = second;
     }
     light = node.link & LIGHT_LINK;
-    return probability;
-}
-
-// Probability with which sample_leaf samples a light; `trail`: bit k is set if the light is in the second child at level k.
-float leaf_probability(uvec2 tree, vec3 from, uint trail) {
-    LightNode node = load_light_node(tree, 0u);
-    float probability = 1.0;
-    while ((node.link & LIGHT_LEAF) == 0u) {
-        uint child = node.link & LIGHT_LINK;
-        LightNode first = load_light_node(tree, child), second = load_light_node(tree, child + 1u);
-        float a = light_importance(first, from), b = light_importance(second, from);
-        if (!(a + b > 0.0)) return 0.0;
-        bool takes_second = (trail & 1u) != 0u;
-        probability *= takes_second ? b / (a + b) : a / (a + b);
-        if (takes_second) node = second;
-        else node = first;
-        trail >>= 1;
-    }
     return probability;
 }
 

@@ -1,4 +1,8 @@
-// Light samples: how a light is chosen (by power, or from a tree) and sampled, and with which density.
+// Light samples: which light a sample is for, where on it, and with which density.
+//
+// Lights form two groups (src/integrators/path/lights): placed ones, among which a tree chooses by what each may bring to a point, and distant ones, which are chosen by
+// the irradiance that they bring. The first vertex of a path samples a light of each group, others one of both: by irradiance, but each group gets a share whatever
+// it brings, because what is thought bright may be hidden.
 //
 // One two-dimensional sample does it all: its first number chooses the light, and what is left of it places the point. Every light then gets points
 // that are as evenly distributed as the samples are, where a choice by a number of its own would give each light a random subset of them.
@@ -7,10 +11,38 @@
 #include "path/light_tree.glsl"
 #include "interface/light_dispatch.glsl"
 
-// Chooses a light by its power. bits: uniformly distributed; u: what is left of them, in [0, 1).
-uint choose_light(PathParams p, uint bits, out float u) {
+// Fraction of a vertex's light samples that go to both groups in equal parts.
+const float EVEN_GROUPS = 0.5;
+// Fraction of the samples of placed lights that go to all of them in equal parts.
+const float EVEN_LIGHTS = 0.125;
+// With more placed lights than this, the number that chooses one is scrambled as suits a choice among many.
+const uint MANY_LIGHTS = 64u;
+const float BELOW_1 = 0.99999994;
+
+// Probabilities with which a light sample of a vertex is one of a placed light, and of a distant one. Where there is a sample of each, both are 1.
+struct LightShares {
+    float placed;
+    float distant;
+};
+
+const LightShares ONE_OF_EACH = LightShares(1.0, 1.0);
+
+// Shares of one sample at a point.
+LightShares light_shares(PathParams p, vec3 from) {
+    if (!WITH_LIGHT_GROUPS) return ONE_OF_EACH;
+    float placed = light_importance(load_light_node(p.light_tree, 0u), from);
+    // no placed light reaches the point
+    if (!(placed > 0.0)) return LightShares(0.0, 1.0);
+    placed = mix(1.0 / (1.0 + p.distant_irradiance / placed), 0.5, EVEN_GROUPS);
+    return LightShares(placed, 1.0 - placed);
+}
+
+// Chooses a distant light. u: uniformly distributed in [0, 1), and what is left of it.
+uint choose_distant_light(PathParams p, inout float u) {
+    if (!WITH_LIGHT_CHOICE) return p.placed_lights;
     Words starts = Words(p.light_starts);
-    uint low = 0u, count = p.light_count;
+    uint bits = uint(u * 4294967296.0);
+    uint low = 0u, count = p.distant_lights;
     while (count > 1u) {
         uint half_ = count >> 1;
         if (starts.v[low + half_] <= bits) low += half_;
@@ -18,41 +50,78 @@ uint choose_light(PathParams p, uint bits, out float u) {
     }
     uint start = starts.v[low];
     // the last ends at 2^32, which is 0
-    u = min(float(bits - start) / float(starts.v[low + 1u] - start), 0.99999994);
-    return p.light_first + low;
+    u = min(float(bits - start) / float(starts.v[low + 1u] - start), BELOW_1);
+    return p.placed_lights + low;
 }
 
-// A light for a point of a surface, and a point on it. bits: a point of a two-dimensional sequence.
-LightSample sample_light(PathParams p, vec3 from, Shading m, uvec2 bits) {
-    vec2 u = vec2(bits >> 8) * (1.0 / 16777216.0);
+// Probability with which a placed light is chosen that the tree chooses with this one. A light that the tree knows not to reach the point is never chosen.
+float placed_probability(PathParams p, float of_tree) {
+    return of_tree > 0.0 ? mix(of_tree, 1.0 / float(p.placed_lights), EVEN_LIGHTS) : 0.0;
+}
+
+// Chooses a placed light. Returns its probability; 0: none reaches the point. u: as above.
+float choose_placed_light(PathParams p, vec3 from, inout float u, out uint light) {
+    light = 0u;
+    if (!WITH_LIGHT_TREE) return WITH_LIGHT_GROUPS && !(light_importance(load_light_node(p.light_tree, 0u), from) > 0.0) ? 0.0 : 1.0;
+    bool is_even = u < EVEN_LIGHTS;
+    uvec2 trail = uvec2(0u);
+    if (is_even) {
+        u *= float(p.placed_lights) / EVEN_LIGHTS;
+        uint k = min(uint(u), p.placed_lights - 1u);
+        u = min(u - float(k), BELOW_1);
+        trail = light_trail(p.lights, k);
+    } else {
+        u = min((u - EVEN_LIGHTS) / (1.0 - EVEN_LIGHTS), BELOW_1);
+    }
+    return placed_probability(p, descend_light_tree(p.light_tree, from, is_even, trail, u, light));
+}
+
+// What a light sample is for.
+const uint ANY_LIGHT = 0u;
+const uint PLACED_LIGHT = 1u;
+const uint DISTANT_LIGHT = 2u;
+
+// A light for a point of a surface, and a point on it. u: a point of a two-dimensional sequence. shares: those of one sample, or ONE_OF_EACH.
+LightSample sample_light(PathParams p, vec3 from, Shading m, vec2 u, uint wanted, LightShares shares) {
     LightRecord light = p.only_light;
-    uint k = p.light_first;
-    if (WITH_LIGHT_CHOICE) {
-        k = choose_light(p, bits.x, u.x);
+    float probability = 1.0;
+    if (WITH_LIGHT_GROUPS || WITH_LIGHT_CHOICE || WITH_LIGHT_TREE) {
+        bool is_distant = WITH_LIGHT_GROUPS ? wanted == DISTANT_LIGHT : WITH_LIGHT_CHOICE;
+        if (WITH_LIGHT_GROUPS && wanted == ANY_LIGHT) {
+            is_distant = u.x >= shares.placed;
+            u.x = min(is_distant ? (u.x - shares.placed) / shares.distant : u.x / shares.placed, BELOW_1);
+        }
+        uint k;
+        if (is_distant) {
+            k = choose_distant_light(p, u.x);
+            probability = shares.distant;
+        } else {
+            probability = shares.placed * choose_placed_light(p, from, u.x, k);
+            if (!(probability > 0.0)) return NO_LIGHT_SAMPLE;
+        }
         light = load_light_record(p.lights, k);
     }
-    // the last of those that are chosen by power is the tree
-    if (WITH_LIGHT_TREE && k == p.light_first + p.light_count - 1u) {
-        float of_leaf = sample_leaf(p.light_tree, from, u.x, k);
-        if (!(of_leaf > 0.0)) return NO_LIGHT_SAMPLE;
-        light = load_light_record(p.lights, k);
-        light.probability = p.tree_probability * of_leaf;
-    }
-    return light_sample(p, light, from, m, u);
+    LightSample l = light_sample(p, light, from, m, u);
+    l.pdf *= probability;
+    return l;
 }
 
 // Density per solid angle with which sample_light samples the emitter that a ray from a point hit; 0: it cannot.
-float met_light_pdf(PathParams p, Hit hit, vec3 from, vec3 wi) {
+float met_light_pdf(PathParams p, Hit hit, vec3 from, vec3 wi, LightShares shares) {
     if (!WITH_SURFACE_LIGHTS) return 0.0;
     uint first = Words(p.light_of).v[hit.instance];
     if (first == INVALID) return 0.0;
     uint k = Words(p.light_of).v[first + hit.primitive];
     if (k == INVALID) return 0.0;
     LightRecord light = p.only_light;
-    // the only choice may be the tree, which is no light itself
-    if (WITH_LIGHT_CHOICE || WITH_LIGHT_TREE) light = load_light_record(p.lights, k);
-    if (WITH_LIGHT_TREE) light.probability = p.tree_probability * leaf_probability(p.light_tree, from, light.trail);
-    return light_pdf(light, from, wi, hit.t);
+    if (WITH_LIGHT_GROUPS || WITH_LIGHT_TREE) light = load_light_record(p.lights, k);
+    float probability = shares.placed;
+    if (WITH_LIGHT_TREE) {
+        float u = 0.0;
+        uint leaf;
+        probability *= placed_probability(p, descend_light_tree(p.light_tree, from, true, uvec2(light.trail_low, light.trail_high), u, leaf));
+    }
+    return probability > 0.0 ? probability * light_pdf(light, from, wi, hit.t) : 0.0;
 }
 
 #endif

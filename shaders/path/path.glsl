@@ -14,6 +14,7 @@
 const uint BSDF_DIRECTION = 0u;
 const uint BSDF_LOBE = 1u;     // and Russian roulette
 const uint LIGHT_POINT_ON = 2u;  // which light, and where on it
+const uint DISTANT_LIGHT_ON = 3u; // the same of the sample of a distant light, where there is one of each group
 
 // A path survives a bounce at most this often, however bright: closed white rooms end, too.
 const float MAX_SURVIVAL = 0.95;
@@ -42,13 +43,13 @@ float emission_weight(PathParams p, PathState state, float light) {
     return WITH_LIGHT_SAMPLES ? 0.0 : 1.0;
 }
 
-// Radiance, weighted, of the directional lights whose disks a ray that leaves the scene meets.
-vec3 disks_met(PathParams p, PathState state, vec3 w) {
+// Radiance, weighted, of the directional lights whose disks a ray that leaves the scene meets. share: that of distant lights in the light samples that compete.
+vec3 disks_met(PathParams p, PathState state, float share, vec3 w) {
     vec3 c = vec3(0.0);
     for (uint k = 0u; k < p.disk_count; k++) {
         LightRecord light = load_light_record(p.lights, p.first_disk + k);
         if (light.radius == 0.0 || !meets_disk(light, w)) continue;
-        c += disk_radiance(light) * emission_weight(p, state, WITH_LIGHT_SAMPLES ? disk_pdf(light) : 0.0);
+        c += disk_radiance(light) * emission_weight(p, state, WITH_LIGHT_SAMPLES ? share * disk_pdf(light) : 0.0);
     }
     return c;
 }
@@ -114,11 +115,26 @@ void add_ambient_light(BlockParams block, PathParams p, uint k, PathState state,
     }
 }
 
-// Next-event estimation: a shadow ray to a light, and its contribution.
-void sample_direct_light(BlockParams block, PathParams p, uint k, PathState state, SignalVertex v, Surface s, Shading m, vec3 wo, uint beyond, uvec2 pixel, uint n, uint dimension) {
-    dimension += LIGHT_POINT_ON;
-    uvec2 bits = WITH_LIGHT_TREE ? sample_choice_bits(block.seed, pixel, n, dimension) : sample_2d_bits(block.seed, pixel, n, dimension);
-    LightSample l = sample_light(p, s.position, m, bits);
+// Does the first vertex of a path sample a light of each group?
+bool splits_lights(PathState state) { return WITH_LIGHT_SPLIT && state.depth == 0u; }
+
+// Shares of the light samples at the path's last bounce.
+LightShares last_shares(PathParams p, uint k, PathState state) {
+    if (!WITH_LIGHT_GROUPS || state.depth == 0u || WITH_LIGHT_SPLIT && state.depth == 1u) return ONE_OF_EACH;
+    float placed = Floats(p.placed_shares).v[k];
+    return LightShares(placed, 1.0 - placed);
+}
+
+// Next-event estimation: a shadow ray to a light of those that are wanted, and its contribution.
+void sample_direct_light(BlockParams block, PathParams p, uint k, PathState state, SignalVertex v, Surface s, Shading m, vec3 wo, uint beyond, uvec2 pixel, uint n, uint dimension,
+                         uint wanted, LightShares shares) {
+    bool is_second = WITH_LIGHT_SPLIT && wanted == DISTANT_LIGHT;
+    dimension += is_second ? DISTANT_LIGHT_ON : LIGHT_POINT_ON;
+    bool chooses_among_many = WITH_LIGHT_TREE && p.placed_lights > MANY_LIGHTS && !is_second;
+    uvec2 bits;
+    if (chooses_among_many) bits = sample_choice_bits(block.seed, pixel, n, dimension);
+    else bits = sample_2d_bits(block.seed, pixel, n, dimension);
+    LightSample l = sample_light(p, s.position, m, to_unit(bits), wanted, shares);
     if (!(l.pdf > 0.0)) return;
     BsdfValue value = vertex_at(m, wo, l.wi);
     vec3 c = state.throughput * value.f * l.radiance / l.pdf;
@@ -134,12 +150,15 @@ void sample_direct_light(BlockParams block, PathParams p, uint k, PathState stat
         shadow.tmax = d * (1.0 - SHADOW_EPSILON);
     }
     c *= transmittance(side > 0.0 ? state.medium : beyond, l.distance);
-    uint slot = append_ray(p.shadow, shadow, k);
     c = counted_radiance(p, c, state.depth + 1u);
-    store_quad(p.contributions, slot, vec4(c, 0.0));
+    // two rays that add to a path at the same time would depend on their order: each has its own queue
+    uint slot;
+    if (is_second) slot = append_ray(p.distant_shadow, shadow, k);
+    else slot = append_ray(p.shadow, shadow, k);
+    store_quad(is_second ? p.distant_contributions : p.contributions, slot, vec4(c, 0.0));
     if (WITH_SIGNAL) {
         vec3 share = v.is_apart ? diffuse_share(m, wo, l.wi, value.f) : v.share;
-        store_quad(p.diffuse_contributions, slot, vec4(c * share, 0.0));
+        store_quad(is_second ? p.distant_diffuse_contributions : p.diffuse_contributions, slot, vec4(c * share, 0.0));
     }
 }
 
@@ -180,7 +199,7 @@ vec3 path_vertex(BlockParams block, uint k, PathState state, Ray ray, Hit hit) {
     if (!is_hit(hit)) {
         // as with ambient occlusion, what shows nothing counts nothing
         if ((WITH_CONSTANT_ALBEDO || WITH_VIEW) && state.depth == 0u) return vec3(0.0);
-        float light = 0.0;
+        float light = 0.0, share = last_shares(p, k, state).distant;
         vec3 c;
         if (WITH_LIGHT_SAMPLES && HAS_ENVIRONMENT_LIGHTS && !SKY_PDF_OF_SURFACE) {
             vec4 met = environment_and_pdf(p, ray.direction);
@@ -190,9 +209,9 @@ vec3 path_vertex(BlockParams block, uint k, PathState state, Ray ray, Hit hit) {
             c = environment_radiance(p, ray.direction);
             if (WITH_LIGHT_SAMPLES && HAS_ENVIRONMENT_LIGHTS && state.depth > 0u) light = Floats(p.sky_pdfs).v[k];
         }
-        c *= emission_weight(p, state, light);
+        c *= emission_weight(p, state, share * light);
         if (WITH_BACKGROUND_ONLY && state.depth > 0u) c = vec3(0.0);
-        if (WITH_DISTANT_DISKS) c += disks_met(p, state, ray.direction);
+        if (WITH_DISTANT_DISKS) c += disks_met(p, state, share, ray.direction);
         return counted_radiance(p, state.throughput * c, state.depth);
     }
     Surface s = surface_at(ray, hit);
@@ -218,7 +237,7 @@ vec3 path_vertex(BlockParams block, uint k, PathState state, Ray ray, Hit hit) {
             float before = straight_length(p, k, state);
             Hit seen = hit;
             seen.t += before;
-            light = met_light_pdf(p, seen, ray.origin - before * ray.direction, ray.direction);
+            light = met_light_pdf(p, seen, ray.origin - before * ray.direction, ray.direction, last_shares(p, k, state));
         }
         added = counted_radiance(p, state.throughput * m.emission * emission_weight(p, state, light), state.depth);
     }
@@ -261,8 +280,15 @@ vec3 path_vertex(BlockParams block, uint k, PathState state, Ray ray, Hit hit) {
 
     vec3 wo = to_frame(m.frame, towards_viewer);
     wo.z = max(wo.z, MIN_COSINE);
+    bool splits = splits_lights(state);
+    LightShares shares = ONE_OF_EACH;
+    if (WITH_LIGHT_SAMPLES && !splits) shares = light_shares(p, s.position);
     if (WITH_LIGHT_SAMPLES && has_rough_part(m.bsdf)) {
-        sample_direct_light(block, p, k, state, v, s, m, wo, boundary.medium, pixel, n, dimension);
+        // a loop, so that drivers compile its body once
+        uint last = splits ? DISTANT_LIGHT : ANY_LIGHT;
+        for (uint wanted = splits ? PLACED_LIGHT : ANY_LIGHT; wanted <= last; wanted++) {
+            sample_direct_light(block, p, k, state, v, s, m, wo, boundary.medium, pixel, n, dimension, wanted, shares);
+        }
     }
 
     // after the last bounce only emission at the hit counts
@@ -285,6 +311,7 @@ vec3 path_vertex(BlockParams block, uint k, PathState state, Ray ray, Hit hit) {
         state.eta_scale *= b.eta * b.eta;
         state.depth++;
         if (WITH_CLEAR_WALLS) StoredFloats(p.straight).v[k] = 0.0;
+        if (WITH_LIGHT_SAMPLES && WITH_LIGHT_GROUPS && !splits) StoredFloats(p.placed_shares).v[k] = shares.placed;
         if (WITH_LIGHT_SAMPLES && SKY_PDF_OF_SURFACE) StoredFloats(p.sky_pdfs).v[k] = sky_pdf(p, m, s.position, b.wi);
         if (state.depth >= p.options.rr_depth) {
             float survival = min(brightest * state.eta_scale, MAX_SURVIVAL);

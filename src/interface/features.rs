@@ -169,8 +169,10 @@ macro_rules! path_features {
             PathFeatures of /// A feature that lights and options may require of paths.
             PathFeature: "path_features", from PATH_FIRST, full false, indexed false, PATH;
             LightTree = "WITH_LIGHT_TREE", "light tree";
+            LightGroups = "WITH_LIGHT_GROUPS", "placed and distant lights";
+            LightSplit = "WITH_LIGHT_SPLIT", "a light sample of each group at first vertices";
             SurfaceLights = "WITH_SURFACE_LIGHTS", "surfaces that light samples find";
-            LightChoice = "WITH_LIGHT_CHOICE", "a choice among lights";
+            LightChoice = "WITH_LIGHT_CHOICE", "a choice among distant lights";
             EnvironmentMap = "WITH_ENVIRONMENT_MAP", "environment map";
             LightSamples = "WITH_LIGHT_SAMPLES", "light samples";
             Mis = "WITH_MIS", "multiple importance sampling";

@@ -5,7 +5,7 @@
 
 use glam::Vec3;
 
-use super::{PathEstimator, PathOptions, Strategy};
+use super::{AMBIENT_COUNT, FirstSurfaceRays, PathEstimator, PathOptions, Strategy};
 use crate::accel::flatten::FlatScene;
 use crate::error::Result;
 use crate::film::Control;
@@ -198,7 +198,8 @@ impl Estimator for DistanceEstimator<'_, '_> {
 impl PathEstimator {
     /// Traces camera rays, then the distances of the rays of ambient light that they leave.
     fn launch_distances(&self, commands: &mut Commands, push: Push, distance: &Stream) -> Result<Vec<Timing>> {
-        let Some(ambient) = &self.ambient else { return Ok(Vec::new()) };
+        let of_ambient = |rays: &&FirstSurfaceRays| rays.count == AMBIENT_COUNT;
+        let Some(ambient) = self.of_first_surface.iter().find(of_ambient) else { return Ok(Vec::new()) };
         let [camera, occlusion] = [0, ambient.params].map(|k| Push { pass: self.block_params[k].address(), ..push });
         commands.run(|r| {
             self.queues[0].clear(r);

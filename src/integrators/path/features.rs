@@ -15,18 +15,21 @@ pub(super) fn features(
     cones: bool,
 ) -> (PathFeatures, LightKinds) {
     let plain = options.white_sky.is_some() || options.view.is_some();
+    let clear_walls = !plain && flat.scene.materials.iter().any(shading::has_clear_walls);
     let samples_lights = options.strategy.samples_lights() && !lights.records.is_empty();
     let features = [
-        (PathFeature::LightTree, samples_lights && !lights.tree.is_empty()),
+        (PathFeature::LightTree, samples_lights && lights.placed > 1),
+        (PathFeature::LightGroups, samples_lights && lights.has_both_groups()),
+        (PathFeature::LightSplit, samples_lights && lights.has_both_groups() && !clear_walls),
         (PathFeature::SurfaceLights, samples_lights && !lights.light_of.is_empty()),
-        (PathFeature::LightChoice, samples_lights && lights.choices() > 1),
+        (PathFeature::LightChoice, samples_lights && lights.distant() > 1),
         (PathFeature::EnvironmentMap, map),
         (PathFeature::LightSamples, samples_lights),
         (PathFeature::Mis, samples_lights && options.strategy == Strategy::Mis),
         (PathFeature::RayCones, cones),
         (PathFeature::DistantDisks, lights.has_disks),
         (PathFeature::Media, !plain && media::need_tracking(flat)),
-        (PathFeature::ClearWalls, !plain && flat.scene.materials.iter().any(shading::has_clear_walls)),
+        (PathFeature::ClearWalls, clear_walls),
     ];
     let all =
         features.into_iter().chain(options.features()).filter_map(|(feature, required)| required.then_some(feature)).collect();

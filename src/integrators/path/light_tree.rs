@@ -9,10 +9,10 @@ use glam::DVec3;
 
 use crate::interface::records::lights::{LIGHT_BOTH_WAYS, LIGHT_LEAF, LightNode};
 
-/// Levels below which lights are split into halves without evaluating costs: a bit trail has 32 bits.
-const MEASURED_LEVELS: u32 = 12;
-/// Maximum number of lights in a tree: with the levels above, no bit trail is longer than 32.
-pub(super) const MAX_LIGHTS: usize = 1 << 19;
+/// Levels below which lights are split into halves without evaluating costs: with the levels of [`MAX_LIGHTS`] lights, no bit trail is longer than 64.
+const MEASURED_LEVELS: u32 = 32;
+/// Maximum number of lights in a tree: an index of a node has 30 bits.
+const MAX_LIGHTS: usize = 1 << 29;
 /// Bins per axis for split candidates.
 const BINS: usize = 12;
 
@@ -101,7 +101,7 @@ fn cone_union(a: (DVec3, f64), b: (DVec3, f64)) -> (DVec3, f64) {
 }
 
 /// Builds the nodes, root first, and each light's bit trail: bit k is set where the light is in the second child at level k.
-pub(super) fn build(lights: &[Bounds]) -> (Vec<LightNode>, Vec<u32>) {
+pub(super) fn build(lights: &[Bounds]) -> (Vec<LightNode>, Vec<u64>) {
     assert!(!lights.is_empty() && lights.len() <= MAX_LIGHTS, "{} lights", lights.len());
     let mut tree = Tree { lights, nodes: vec![LightNode::default()], trails: vec![0; lights.len()] };
     let mut all: Vec<u32> = (0..lights.len() as u32).collect();
@@ -109,15 +109,20 @@ pub(super) fn build(lights: &[Bounds]) -> (Vec<LightNode>, Vec<u32>) {
     (tree.nodes, tree.trails)
 }
 
+/// The root of a tree without lights.
+pub(super) fn no_lights() -> LightNode {
+    LightNode { link: LIGHT_LEAF, ..Default::default() }
+}
+
 struct Tree<'a> {
     lights: &'a [Bounds],
     nodes: Vec<LightNode>,
-    trails: Vec<u32>,
+    trails: Vec<u64>,
 }
 
 impl Tree<'_> {
     /// Fills node `at` with the lights `of`.
-    fn fill(&mut self, at: usize, of: &mut [u32], trail: u32, level: u32) -> Bounds {
+    fn fill(&mut self, at: usize, of: &mut [u32], trail: u64, level: u32) -> Bounds {
         if let [light] = *of {
             self.trails[light as usize] = trail;
             let bounds = self.lights[light as usize];

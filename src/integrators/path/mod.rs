@@ -40,7 +40,9 @@ use environment::DeviceEnvironment;
 use lights::device::DeviceLights;
 use lights::{LightBuilder, Lights};
 use media::ClosedVolumes;
-use params::{CONE_BYTES, INVALID, MEDIA_BYTES, PathParams, QUAD_BYTES, SKY_PDF_BYTES, STATE_BYTES, STRAIGHT_BYTES};
+use params::{
+    CONE_BYTES, INVALID, MEDIA_BYTES, PathParams, QUAD_BYTES, SHARE_BYTES, SKY_PDF_BYTES, STATE_BYTES, STRAIGHT_BYTES,
+};
 pub use settings::{Lens, MAX_DEPTH, PathOptions, Strategy, TextureFilter};
 
 /// Minimum number of bounces per submission, after which the host reads how many paths are left.
@@ -187,15 +189,19 @@ struct PathCounts {
     longest_path: u32,
 }
 
-/// Words of [`PathEstimator::counts`] for each vertex: numbers of rays, of shadow rays, and of rays of ambient light.
-const COUNTS: u32 = 3;
+/// Words of [`PathEstimator::counts`] for each vertex: numbers of rays, of shadow rays, of rays of ambient light, and of shadow rays to distant lights alone.
+const COUNTS: u32 = 4;
+const AMBIENT_COUNT: u32 = 2;
+const DISTANT_COUNT: u32 = 3;
 
-/// Resources of the occlusion rays of ambient light. They are traced as shadow rays are, from a queue of their own: two rays that add to a path at the same time
-/// would depend on their order.
-struct AmbientRays {
+/// Resources of rays of a path's first surface beside the shadow rays of all of them: occlusion rays of ambient light, and shadow rays to distant lights where each
+/// group of lights is sampled. They are traced as shadow rays are, from a queue of their own: two rays that add to a path at the same time would depend on their order.
+struct FirstSurfaceRays {
     queue: RayQueue,
     /// Index of the parameters with which they are traced.
     params: usize,
+    /// Word of [`PathEstimator::counts`] in which their number is read back.
+    count: u32,
 }
 
 /// Resources of shadow rays that pass straight through thin walls.
@@ -224,7 +230,8 @@ struct PathEstimator {
     block_params: Vec<Buffer>,
     records: Vec<PathParams>,
     walls: Option<TransmittedShadowRays>,
-    ambient: Option<AmbientRays>,
+    /// Rays of first surfaces, each kind on its own.
+    of_first_surface: Vec<FirstSurfaceRays>,
     /// The volumes that paths may be in, if they must be tracked.
     volumes: Option<ClosedVolumes>,
     /// Numbers of rays traced at each bounce, and of its shadow rays.
@@ -294,6 +301,8 @@ impl PathEstimator {
         let shadow_queue = RayQueue::new(device, most)?;
         let (radiance, contributions) = (quads("radiance of paths")?, quads("shadow ray contributions")?);
         let ambient_queue = options.ambient.map(|_| RayQueue::new(device, most)).transpose()?;
+        let splits = features.contains(PathFeature::LightSplit);
+        let distant_queue = splits.then(|| RayQueue::new(device, most)).transpose()?;
         let states = || Buffer::new(device, "paths", STATE_BYTES * most as u64, Memory::Device);
         let mut buffers = Vec::new();
         let mut keep = |buffer: Buffer| {
@@ -308,6 +317,7 @@ impl PathEstimator {
         let diffuse_contributions = diffuse_part(true)?;
         let later_diffuse_contributions = diffuse_part(has_clear_walls)?;
         let ambient_diffuse_contributions = diffuse_part(options.ambient.is_some())?;
+        let distant_diffuse_contributions = diffuse_part(splits)?;
         let signal_bytes = size_of::<SignalRecord>() as u64 * u64::from(most);
         let lights = DeviceLights::new(device, lights)?;
         let base = PathParams {
@@ -332,6 +342,16 @@ impl PathEstimator {
                 true => keep(Buffer::new(device, "environment densities", SKY_PDF_BYTES * most as u64, Memory::Device)?),
                 false => 0,
             },
+            placed_shares: match features.contains(PathFeature::LightGroups) {
+                true => keep(Buffer::new(device, "shares of placed lights", SHARE_BYTES * most as u64, Memory::Device)?),
+                false => 0,
+            },
+            distant_shadow: distant_queue.as_ref().map(RayQueue::record).unwrap_or_default(),
+            distant_contributions: match splits {
+                true => keep(quads("contributions of distant lights")?),
+                false => 0,
+            },
+            distant_diffuse_contributions,
             camera_media: [INVALID; 4],
             ambient: ambient_queue.as_ref().map(RayQueue::record).unwrap_or_default(),
             ambient_contributions: match &ambient_queue {
@@ -378,15 +398,25 @@ impl PathEstimator {
                 ..base
             });
         }
-        let ambient = ambient_queue.map(|queue| {
+        let mut of_first_surface = Vec::new();
+        if let Some(queue) = ambient_queue {
+            of_first_surface.push(FirstSurfaceRays { queue, params: records.len(), count: AMBIENT_COUNT });
             records.push(PathParams {
                 shadow: base.ambient,
                 contributions: base.ambient_contributions,
                 diffuse_contributions: base.ambient_diffuse_contributions,
                 ..base
             });
-            AmbientRays { queue, params: records.len() - 1 }
-        });
+        }
+        if let Some(queue) = distant_queue {
+            of_first_surface.push(FirstSurfaceRays { queue, params: records.len(), count: DISTANT_COUNT });
+            records.push(PathParams {
+                shadow: base.distant_shadow,
+                contributions: base.distant_contributions,
+                diffuse_contributions: base.distant_diffuse_contributions,
+                ..base
+            });
+        }
         let block_params = records.iter().map(|record| {
             let mut buffer =
                 Buffer::new(device, "block parameters", PARAMS_BYTES + size_of::<PathParams>() as u64, Memory::Upload)?;
@@ -409,7 +439,7 @@ impl PathEstimator {
             block_params,
             records,
             walls,
-            ambient,
+            of_first_surface,
             volumes: has_media.then(|| ClosedVolumes::new(flat)),
             counts: Buffer::new(device, "ray counts", 4 * u64::from(COUNTS * (MAX_BOUNCES + 1)), Memory::Readback)?,
             max_depth: options.bounces(),
@@ -510,22 +540,21 @@ impl PathEstimator {
         r.copy(self.shadow_queue.count(), 0, &self.counts, 4 * u64::from(COUNTS * slot + 1), 4);
     }
 
-    /// Records the rays of ambient light that a vertex generated; their number is read back from `slot`.
-    fn record_ambient(&self, r: &mut Recorder, push: Push, most: u32, slot: u32) {
-        let Some(ambient) = &self.ambient else { return };
-        r.barrier();
-        let push = Push { pass: self.block_params[ambient.params].address(), ..push };
-        self.shadow.record(r, &ambient.queue.push(push, most));
-        r.barrier();
-        r.copy(ambient.queue.count(), 0, &self.counts, 4 * u64::from(COUNTS * slot + 2), 4);
+    /// Records the rays of first surfaces that a vertex generated; their number is read back from `slot`.
+    fn record_first_surface(&self, r: &mut Recorder, push: Push, most: u32, slot: u32) {
+        for FirstSurfaceRays { queue, params, count } in &self.of_first_surface {
+            r.barrier();
+            let push = Push { pass: self.block_params[*params].address(), ..push };
+            self.shadow.record(r, &queue.push(push, most));
+            r.barrier();
+            r.copy(queue.count(), 0, &self.counts, 4 * u64::from(COUNTS * slot + count), 4);
+        }
     }
 
     /// Empties the queues of the rays that a vertex leaves for lights.
     fn clear_light_queues(&self, r: &mut crate::gpu::Recorder) {
         self.shadow_queue.clear(r);
-        if let Some(ambient) = &self.ambient {
-            ambient.queue.clear(r);
-        }
+        self.of_first_surface.iter().for_each(|rays| rays.queue.clear(r));
     }
 
     /// Traces shadow rays that have passed a thin wall, wall after wall, until none is left.
@@ -588,7 +617,7 @@ impl PathEstimator {
                     r.barrier();
                     self.known.as_ref().filter(|_| self.begins_at_known).unwrap_or(&self.camera).record(r, &push(0));
                     self.record_shadow(r, push(0), left, MAX_BOUNCES);
-                    self.record_ambient(r, push(0), left, MAX_BOUNCES);
+                    self.record_first_surface(r, push(0), left, MAX_BOUNCES);
                 }
                 while depth < last {
                     let slot = depth - begin;
@@ -603,7 +632,7 @@ impl PathEstimator {
                     self.record_shadow(r, push(fills), left, slot);
                     // what lies behind surfaces that paths pass straight through is a first surface, too
                     if straight {
-                        self.record_ambient(r, push(fills), left, slot);
+                        self.record_first_surface(r, push(fills), left, slot);
                     }
                 }
                 r.barrier();
@@ -624,8 +653,8 @@ impl PathEstimator {
                 self.traced.bounce_rays += u64::from(rays);
             }
             let sum = |of: usize| counts.iter().skip(of).step_by(COUNTS as usize).map(|&n| u64::from(n)).sum::<u64>();
-            self.traced.shadow_rays += sum(1);
-            self.traced.ambient_rays += sum(2);
+            self.traced.shadow_rays += sum(1) + sum(DISTANT_COUNT as usize);
+            self.traced.ambient_rays += sum(AMBIENT_COUNT as usize);
             left = counts[(COUNTS * MAX_BOUNCES) as usize];
             if left == 0 || depth >= max_launches {
                 if !finishes {

@@ -16,3 +16,5 @@ pub(super) const MEDIA_BYTES: u64 = 16;
 pub(super) const STRAIGHT_BYTES: u64 = 4;
 /// Bytes of the probability density of light sampling for the environment in a path's direction.
 pub(super) const SKY_PDF_BYTES: u64 = 4;
+/// Bytes of the share of placed lights in the light samples of a path's last bounce.
+pub(super) const SHARE_BYTES: u64 = 4;

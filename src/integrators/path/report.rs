@@ -6,6 +6,7 @@ use super::settings::MAX_DEPTH;
 use super::{PathOptions, PathResult, TextureFilter};
 use crate::accel::flatten::FlatScene;
 use crate::integrators::{IntegratorReport, RenderJob};
+use crate::interface::PathFeature;
 use crate::scene::{Environment, Scene};
 use crate::tracer::{BuildStats, Tracer};
 
@@ -64,8 +65,7 @@ pub(super) fn report(
     ];
     explanations.push(match result.lights {
         0 => "no light sampling: there are no lights, or --sampling does not use it".into(),
-        n if result.light_tree => format!("{n} lights, sampled by a light tree"),
-        n => format!("{n} lights, sampled by power"),
+        n => format!("{n} lights, sampled by {}", chosen_by(result)),
     });
     let record = json!({
         "environment": environment_text(job.scene, o),
@@ -86,6 +86,19 @@ pub(super) fn report(
     });
     let record = o.record().into_iter().chain(record.as_object().cloned().unwrap_or_default()).collect();
     IntegratorReport { lines, explanations, record, warnings: warnings(flat, o, image.film.not_finite, image.spp) }
+}
+
+/// How lights are chosen.
+fn chosen_by(result: &PathResult) -> String {
+    let has = |feature| result.features.contains(feature);
+    let ways = [
+        (result.light_tree, "a light tree"),
+        (has(PathFeature::LightChoice), "the irradiance of distant ones"),
+        (has(PathFeature::LightGroups) && !has(PathFeature::LightSplit), "the irradiance of placed and of distant ones"),
+        (has(PathFeature::LightSplit), "one placed and one distant light at first vertices, by irradiance at others"),
+    ];
+    let ways: Vec<_> = ways.into_iter().filter_map(|(is_used, way)| is_used.then_some(way)).collect();
+    if ways.is_empty() { "no choice".into() } else { ways.join("; ") }
 }
 
 fn warnings(flat: &FlatScene, o: &PathOptions, not_finite: u64, spp: u32) -> Vec<String> {

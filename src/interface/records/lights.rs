@@ -34,12 +34,12 @@ records! {
         intensity: vec3,
         /// Lights from a position: range beyond which the light has no effect, scene units.
         range: float,
-        /// Probability of being chosen by power.
+        /// Distant lights: probability of being chosen among them; placed ones: 1.
         probability: float,
-        /// Bit trail of a light in the tree: bit k is set where the light is in the second child at level k.
-        trail: uint,
-        /// Padding to a multiple of 16 bytes.
-        reserved: uint,
+        /// Bit trail of a placed light in the tree: bit k is set where the light is in the second child at level k. Lower 32 bits.
+        trail_low: uint,
+        /// Upper 32 bits.
+        trail_high: uint,
         /// One of `LIGHT_*` of interface/light_kinds.glsl.
         kind: uint,
         /// Triangle, rectangle, sphere: index of its instance; else `INVALID`.

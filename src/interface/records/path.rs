@@ -44,9 +44,9 @@ records! {
         only_light: LightRecord,
         /// Radiance of a constant environment; scale factor of an environment map. Linear RGB.
         environment: vec3,
-        /// Number of lights that are chosen by power.
-        light_count: uint,
-        /// The `LightRecord`s.
+        /// Number of distant lights: the environment, its portals, directional lights.
+        distant_lights: uint,
+        /// The `LightRecord`s: placed lights, then distant ones.
         lights: address,
         /// Uints: for each instance of the scene the index in this table at which the lights of its primitives begin, or `INVALID`; then the light of each
         /// primitive, or `INVALID`.
@@ -77,11 +77,11 @@ records! {
         focus: float,
         /// One of `VIEW_*`: the surface property that is rendered in place of radiance; 0: radiance.
         view: uint,
-        /// `LightNode`s of the tree over the lights before `light_first`.
+        /// `LightNode`s of the tree over placed lights.
         light_tree: address,
         /// A `vec2` per path: width and spread of its ray cone (path/cone.glsl).
         cones: address,
-        /// The cumulative distribution of lights by power, `light_count + 1` uints.
+        /// The cumulative distribution of distant lights, `distant_lights + 1` uints.
         light_starts: address,
         /// Index of the first directional light.
         first_disk: uint,
@@ -115,16 +115,24 @@ records! {
         later_diffuse_contributions: address,
         /// `diffuse_contributions` of the queue `ambient`.
         ambient_diffuse_contributions: address,
+        /// The queue of shadow rays to distant lights, with `WITH_LIGHT_SPLIT`.
+        distant_shadow: QueueRecord,
+        /// `contributions` of the queue `distant_shadow`.
+        distant_contributions: address,
+        /// `diffuse_contributions` of the queue `distant_shadow`.
+        distant_diffuse_contributions: address,
+        /// A float per path, with `WITH_LIGHT_GROUPS`: share of placed lights in the light samples of its last bounce.
+        placed_shares: address,
         /// The options that are numbers.
         options: PathOptionsRecord,
-        /// Index of the first light that is chosen by power.
-        light_first: uint,
+        /// Number of placed lights, which is the index of the first distant one.
+        placed_lights: uint,
+        /// Irradiance of distant lights, by which points choose between the groups.
+        distant_irradiance: float,
+        /// Probability with which the environment is chosen among distant lights.
+        environment_probability: float,
         /// Padding to a multiple of 8 bytes.
         reserved: uint,
-        /// Probability with which the environment is chosen among the lights.
-        environment_probability: float,
-        /// Probability with which the light tree is chosen.
-        tree_probability: float,
     }
 
     /// What a path of a frame in real time brings, beside its radiance, of which the part that is seen directly is left out. The vertex in question is the first

@@ -1,7 +1,7 @@
 //! Lights at a position whose intensity is a power of the cosine of the angle from an axis, as data sheets describe LEDs and downlights: by the angle at which it
 //! is half. An angle of 60 degrees is a small Lambertian emitter; a beam angle is twice that angle.
 
-use std::f64::consts::{FRAC_PI_2, LN_2, PI};
+use std::f64::consts::{FRAC_PI_2, LN_2};
 
 use super::keys::{Keys, degrees, direction, position};
 use super::{Emission, LightKind, LightType, PlacedLight};
@@ -21,32 +21,21 @@ fn read(keys: &mut Keys) -> Result<PlacedLight, String> {
 /// How it emits. The first parameter is the exponent of the cosine.
 pub fn emission(half_angle: f32) -> Emission {
     let exponent = LN_2 / -f64::from(half_angle).cos().ln();
-    Emission::Placed {
-        solid_angle: 2.0 * PI / (exponent + 1.0),
-        spread: 0.0,
-        falloff: FRAC_PI_2,
-        parameters: [exponent as f32, 0.0],
-    }
+    Emission::Placed { spread: 0.0, falloff: FRAC_PI_2, parameters: [exponent as f32, 0.0] }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    /// The integral of the intensity over the hemisphere, in rings; and half of the intensity at the angle.
     #[test]
-    fn power_is_the_integral_of_intensity() {
+    fn half_of_the_intensity_is_at_the_half_angle() {
         for degrees in [1.0f32, 15.0, 60.0, 89.0] {
-            let Emission::Placed { solid_angle, parameters: [exponent, _], .. } = emission(degrees.to_radians()) else {
+            let Emission::Placed { parameters: [exponent, _], .. } = emission(degrees.to_radians()) else {
                 panic!("it has a position")
             };
             let share = |angle: f64| angle.cos().powf(f64::from(exponent));
             assert!((share(f64::from(degrees.to_radians())) - 0.5).abs() < 1e-6, "{degrees}");
-            let rings = 200_000;
-            let step = FRAC_PI_2 / f64::from(rings);
-            let ring = |k| step * (f64::from(k) + 0.5);
-            let sum: f64 = (0..rings).map(|k| share(ring(k)) * ring(k).sin() * step).sum();
-            assert!((2.0 * PI * sum / solid_angle - 1.0).abs() < 1e-4, "{degrees}: {} and {solid_angle}", 2.0 * PI * sum);
         }
     }
 }

@@ -38,9 +38,6 @@ pub struct PlacedLight {
 pub enum Emission {
     /// From a position.
     Placed {
-        /// Power over intensity, in steradians: the integral over all directions of the share of the intensity that is emitted there. Lights are chosen by it, so an
-        /// approximation is enough.
-        solid_angle: f64,
         /// Angle from the axis up to which the intensity is all emitted, 0 to pi radians.
         spread: f64,
         /// Angle beyond that at which emission ends, in radians.

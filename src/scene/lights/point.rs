@@ -16,5 +16,5 @@ fn read(keys: &mut Keys) -> Result<PlacedLight, String> {
 
 /// How it emits.
 pub fn emission() -> Emission {
-    Emission::Placed { solid_angle: 4.0 * PI, spread: PI, falloff: 0.5 * PI, parameters: [0.0; 2] }
+    Emission::Placed { spread: PI, falloff: 0.5 * PI, parameters: [0.0; 2] }
 }

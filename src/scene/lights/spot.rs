@@ -1,6 +1,6 @@
 //! Lights at a position, in a cone (KHR_lights_punctual).
 
-use std::f64::consts::{FRAC_PI_4, PI};
+use std::f64::consts::FRAC_PI_4;
 
 use super::keys::{Keys, degrees, direction, position};
 use super::{Emission, LightKind, LightType, PlacedLight};
@@ -22,7 +22,5 @@ fn read(keys: &mut Keys) -> Result<PlacedLight, String> {
 pub fn emission(inner_angle: f32, outer_angle: f32) -> Emission {
     let (inner, outer) = (inner_angle.cos(), outer_angle.cos());
     let (spread, reach) = (f64::from(inner_angle), f64::from(outer_angle));
-    // approximates the falloff by a step half-way between the inner and the outer angle
-    let solid_angle = 2.0 * PI * (1.0 - 0.5 * f64::from(inner + outer));
-    Emission::Placed { solid_angle, spread, falloff: reach - spread, parameters: [inner, outer] }
+    Emission::Placed { spread, falloff: reach - spread, parameters: [inner, outer] }
 }

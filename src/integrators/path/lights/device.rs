@@ -25,7 +25,7 @@ impl DeviceLights {
     pub fn new(device: &Arc<Device>, lights: Lights) -> Result<Self> {
         Ok(Self {
             records: upload(device, "lights", &lights.records)?,
-            starts: upload(device, "light distribution", &lights.starts)?,
+            starts: upload(device, "distribution of distant lights", &lights.starts)?,
             tree: upload(device, "light tree", &lights.tree)?,
             light_of: upload(device, "light indices", &lights.light_of)?,
             lights,
@@ -35,10 +35,11 @@ impl DeviceLights {
     /// `params` with these lights.
     pub fn params(&self, params: PathParams) -> PathParams {
         let address = |buffer: &Option<Buffer>| buffer.as_ref().map_or(0, Buffer::address);
-        let Lights { directional, environment, first, .. } = &self.lights;
+        let Lights { directional, environment, placed, .. } = &self.lights;
         PathParams {
-            light_count: self.lights.choices(),
-            light_first: *first,
+            placed_lights: *placed,
+            distant_lights: self.lights.distant(),
+            distant_irradiance: self.lights.distant_irradiance as f32,
             light_tree: address(&self.tree),
             lights: address(&self.records),
             light_of: address(&self.light_of),
@@ -46,9 +47,8 @@ impl DeviceLights {
             first_disk: directional.start,
             disk_count: directional.end - directional.start,
             environment_light: environment.unwrap_or(INVALID),
-            only_light: self.lights.only().unwrap_or_default(),
+            only_light: self.lights.records.first().copied().unwrap_or_default(),
             environment_probability: environment.map_or(0.0, |k| self.lights.records[k as usize].probability),
-            tree_probability: self.lights.tree_probability(),
             ..params
         }
     }
@@ -73,8 +73,9 @@ impl DeviceLights {
         // where lights are not sampled nothing is read but those that rays can hit
         let fits = !has(PathFeature::LightSamples)
             || !lights.records.is_empty()
-                && (lights.choices() == 1 || has(PathFeature::LightChoice))
-                && lights.tree.is_empty() != has(PathFeature::LightTree)
+                && (lights.placed <= 1 || has(PathFeature::LightTree))
+                && (lights.distant() <= 1 || has(PathFeature::LightChoice))
+                && (!lights.has_both_groups() || has(PathFeature::LightGroups))
                 && lights.light_of.is_empty() != has(PathFeature::SurfaceLights)
                 && lights.environment.is_some() == self.lights.environment.is_some()
                 && lights.kinds().is_subset(kinds);

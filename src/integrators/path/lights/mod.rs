@@ -1,5 +1,10 @@
-//! The lights of a scene as the path tracer samples them: [`LightRecord`]. Few lights are chosen by power; among many, a tree
-//! chooses by a bound of their contribution at a point ([`super::light_tree`]).
+//! The lights of a scene as the path tracer samples them: [`LightRecord`]. They form two groups. Among *placed* lights, whose effect depends on the distance to
+//! them, a tree chooses by a bound of their contribution at a point ([`super::light_tree`]). *Distant* ones, the environment with its portals and directional
+//! lights, light all points alike and are chosen by the irradiance that they bring. Power decides nothing: that of what lights a whole scene grows with the
+//! scene, and a lamp beside it would get no samples where it is the brightest light there is.
+//!
+//! What is chosen by irradiance may be hidden where another light is not, so that each choice leaves a share to all: no light is sampled so rarely that few
+//! samples do not tell of it.
 
 pub(super) mod device;
 mod portals;
@@ -22,19 +27,23 @@ use crate::sampling::CumulativeTable;
 use crate::scene::lights::Emission;
 use crate::scene::{Geometry, Light, Scene};
 
-/// With more positional lights than this, a light tree chooses among them.
-const MAX_BY_POWER: usize = 256;
+/// Fraction of the samples of distant lights that go to the environment and to directional lights in equal parts, and to each of these in equal parts,
+/// whatever irradiance they bring.
+const EVEN_SHARE: f64 = 0.5;
 
 /// The lights of a scene.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Lights {
+    /// Placed lights, then distant ones.
     pub records: Vec<LightRecord>,
-    /// Index of the first record that is chosen by power, as all records from there on are.
-    pub first: u32,
-    /// [`CumulativeTable::starts`] of the power of the lights that are chosen by power.
+    /// Number of placed lights.
+    pub placed: u32,
+    /// [`CumulativeTable::starts`] of the distant lights.
     pub starts: Vec<u32>,
-    /// The tree over positional lights, if there are many: the tree is then the last choice by power.
+    /// The tree over placed lights; without any a leaf that emits nothing.
     pub tree: Vec<LightNode>,
+    /// Irradiance that distant lights bring to a surface that faces them, if nothing is in the way ([`brightness`]).
+    pub distant_irradiance: f64,
     /// For each instance of the scene the index in this table at which the lights of its primitives begin, or [`INVALID`]; then the light of each primitive, or
     /// [`INVALID`]. Empty if no surface emits.
     pub light_of: Vec<u32>,
@@ -55,8 +64,6 @@ pub(super) fn brightness(c: Vec3) -> f64 {
 /// Makes the lights of a scene, again and again if they move: what does not depend on where they are is found once.
 pub(super) struct LightBuilder {
     origin: DVec3,
-    /// Of the scene's bounding sphere.
-    radius: f64,
     /// Radiance of what surrounds the scene, averaged over the sphere.
     environment: Vec3,
     alpha: Vec<AlphaClass>,
@@ -66,24 +73,34 @@ pub(super) struct LightBuilder {
     means: HashMap<Option<usize>, Vec4>,
 }
 
-/// Collects lights, with the power of each, and bounds of positional ones.
+/// Collects lights: placed ones with their bounds, then distant ones with the weights by which they are chosen.
 #[derive(Default)]
 struct LightCollector {
     records: Vec<LightRecord>,
-    powers: Vec<f64>,
     bounds: Vec<Bounds>,
+    weights: Vec<f64>,
 }
 
 impl LightCollector {
-    /// Adds a light and returns its index. A light without power is not sampled: [`INVALID`].
-    fn push(&mut self, record: LightRecord, power: f64, bounds: Option<Bounds>) -> u32 {
-        debug_assert!(bounds.is_none() || self.bounds.len() == self.records.len(), "lights with a position come first");
-        if power.is_nan() || power <= 0.0 {
+    /// Adds a placed light and returns its index. A light that emits nothing is not sampled: [`INVALID`].
+    fn push_placed(&mut self, record: LightRecord, bounds: Bounds) -> u32 {
+        debug_assert!(self.weights.is_empty(), "placed lights come first");
+        if bounds.intensity.is_nan() || bounds.intensity <= 0.0 {
+            return INVALID;
+        }
+        self.records.push(LightRecord { probability: 1.0, ..record });
+        self.bounds.push(bounds);
+        self.records.len() as u32 - 1
+    }
+
+    /// Adds a distant light and returns its index. `weight`: irradiance that it brings, by which it is chosen among its like. Without any it is not sampled:
+    /// [`INVALID`].
+    fn push_distant(&mut self, record: LightRecord, weight: f64) -> u32 {
+        if weight.is_nan() || weight <= 0.0 {
             return INVALID;
         }
         self.records.push(record);
-        self.powers.push(power);
-        self.bounds.extend(bounds);
+        self.weights.push(weight);
         self.records.len() as u32 - 1
     }
 }
@@ -92,37 +109,28 @@ impl Lights {
     /// No lights but the environment.
     pub fn environment_only() -> Self {
         let record = LightRecord { kind: Kind::Environment as u32, instance: INVALID, probability: 1.0, ..Default::default() };
-        Self { records: vec![record], starts: vec![0; 2], environment: Some(0), ..Default::default() }
+        let tree = vec![light_tree::no_lights()];
+        Self { records: vec![record], starts: vec![0; 2], tree, environment: Some(0), ..Default::default() }
     }
 
     /// The kinds of lights that are sampled.
     pub fn kinds(&self) -> LightKinds {
-        self.sampled().iter().map(|r| Kind::ALL[r.kind as usize]).collect()
+        self.records.iter().map(|r| Kind::ALL[r.kind as usize]).collect()
     }
 
-    /// All records but the tree, which stands for the positional lights and is the last choice.
-    fn sampled(&self) -> &[LightRecord] {
-        &self.records[..self.records.len() - usize::from(!self.tree.is_empty())]
+    /// Number of distant lights.
+    pub fn distant(&self) -> u32 {
+        self.count() - self.placed
     }
 
-    /// Number of lights that are chosen by power.
-    pub fn choices(&self) -> u32 {
-        self.records.len() as u32 - self.first
-    }
-
-    /// The light that is sampled, if there is but one choice; it may be the tree, which is no light itself.
-    pub fn only(&self) -> Option<LightRecord> {
-        (self.choices() == 1).then(|| self.records[self.first as usize])
-    }
-
-    /// Probability with which the tree is chosen, the last of what is chosen by power; 0 without one.
-    pub fn tree_probability(&self) -> f32 {
-        self.records.last().filter(|_| !self.tree.is_empty()).map_or(0.0, |tree| tree.probability)
+    /// Returns true if there are placed lights and distant ones.
+    pub fn has_both_groups(&self) -> bool {
+        self.placed > 0 && self.distant() > 0
     }
 
     /// Number of lights, the environment and each portal included.
     pub fn count(&self) -> u32 {
-        self.sampled().len() as u32
+        self.records.len() as u32
     }
 }
 
@@ -133,7 +141,6 @@ impl LightBuilder {
         let moves = |(k, mesh): (usize, usize)| flat.motion.instances.contains(&k) || flat.motion.meshes.contains(&mesh);
         Self {
             origin: flat.origin,
-            radius: radius(scene),
             environment,
             alpha: alpha_classes(scene, flat.blend),
             moves: scene.instances.iter().map(|i| i.mesh).enumerate().map(moves).collect(),
@@ -155,30 +162,29 @@ impl LightBuilder {
         let is_far = |light: &&Light| matches!(light.kind.emission(), Emission::Distant { .. });
         scene.lights.iter().filter(|l| !is_far(l)).for_each(|l| punctual::add(&mut all, self, l));
         let light_of = surfaces::add(&mut all, self, scene);
-        let first_far = all.records.len() as u32;
-        scene.lights.iter().filter(is_far).for_each(|l| punctual::add(&mut all, self, l));
-        let directional = first_far..all.records.len() as u32;
-        let has_disks = all.records[first_far as usize..].iter().any(|r| r.radius > 0.0);
-        let mut lights = Lights { light_of, directional, has_disks, ..Default::default() };
-        if self.environment != Vec3::ZERO {
-            // the power that crosses the scene's bounding disk, from all directions
-            let power = 4.0 * PI.powi(2) * self.radius.powi(2) * brightness(self.environment);
-            lights.environment = portals::add_environment(&mut all, self, scene, power);
-        }
-        let placed = all.bounds.len();
-        if placed > MAX_BY_POWER && placed <= light_tree::MAX_LIGHTS {
-            let (nodes, trails) = light_tree::build(&all.bounds);
+        let placed = all.records.len();
+        let mut lights = Lights { light_of, placed: placed as u32, ..Default::default() };
+        if placed > 0 {
+            let trails;
+            (lights.tree, trails) = light_tree::build(&all.bounds);
             for (record, trail) in all.records.iter_mut().zip(trails) {
-                record.trail = trail;
+                [record.trail_low, record.trail_high] = [trail as u32, (trail >> 32) as u32];
             }
-            let power = all.powers[..placed].iter().sum();
-            all.push(LightRecord { kind: INVALID, instance: INVALID, ..Default::default() }, power, None);
-            (lights.tree, lights.first) = (nodes, placed as u32);
+        } else {
+            lights.tree.push(light_tree::no_lights());
         }
+        scene.lights.iter().filter(is_far).for_each(|l| punctual::add(&mut all, self, l));
+        lights.directional = placed as u32..all.records.len() as u32;
+        lights.has_disks = all.records[placed..].iter().any(|r| r.radius > 0.0);
+        let directional = all.weights.len();
+        if self.environment != Vec3::ZERO {
+            lights.environment = portals::add_environment(&mut all, self, scene);
+        }
+        let sky = PI * brightness(self.environment);
+        lights.distant_irradiance = all.weights[..directional].iter().sum::<f64>() + sky;
+        let table = CumulativeTable::new(&distant_probabilities(&all.weights, directional, sky));
         lights.records = all.records;
-        let first = lights.first as usize;
-        let table = CumulativeTable::new(&all.powers[first..]);
-        for (record, &probability) in lights.records[first..].iter_mut().zip(&table.probabilities) {
+        for (record, &probability) in lights.records[placed..].iter_mut().zip(&table.probabilities) {
             record.probability = probability;
         }
         lights.starts = table.starts;
@@ -186,9 +192,21 @@ impl LightBuilder {
     }
 }
 
-/// Radius of the bounding sphere of the scene.
-fn radius(scene: &Scene) -> f64 {
-    scene.bounds().map_or(1.0, |(lo, hi)| 0.5 * (hi - lo).length()).max(1e-30)
+/// Probabilities of distant lights, of which the first `directional` are directional lights and the others the environment and its portals. `sky`: irradiance
+/// that the environment brings.
+fn distant_probabilities(weights: &[f64], directional: usize, sky: f64) -> Vec<f64> {
+    let (suns, openings) = weights.split_at(directional);
+    let sun: f64 = suns.iter().sum();
+    let even = |share: f64, equal: f64| (1.0 - EVEN_SHARE) * share + EVEN_SHARE * equal;
+    let of_suns = match (suns.len(), openings.len()) {
+        (0, _) => 0.0,
+        (_, 0) => 1.0,
+        _ => even(sun / (sun + sky), 0.5),
+    };
+    let through: f64 = openings.iter().sum();
+    let suns_alike = 1.0 / suns.len() as f64;
+    let suns = suns.iter().map(|w| of_suns * even(w / sun, suns_alike));
+    suns.chain(openings.iter().map(|w| (1.0 - of_suns) * w / through)).collect()
 }
 
 #[cfg(test)]
@@ -196,6 +214,18 @@ mod tests {
     use super::*;
 
     /// The importance of a light does not depend on the channel of its radiance.
+    #[test]
+    fn no_distant_light_is_left_out() {
+        // one sun, 1e6 times as bright as the other, and a sky of 1e-6 of it
+        let p = distant_probabilities(&[1e6, 1.0, 1.0], 2, 1.0);
+        assert!((p.iter().sum::<f64>() - 1.0).abs() < 1e-12 && p[0] > 0.5 && p[1] > 0.18 && p[2] > 0.24, "{p:?}");
+        assert_eq!(distant_probabilities(&[3.0], 0, 3.0), [1.0]);
+        assert_eq!(distant_probabilities(&[3.0], 1, 0.0), [1.0]);
+        // portals share what the environment gets
+        assert_eq!(distant_probabilities(&[1.0, 3.0], 0, 7.0), [0.25, 0.75]);
+        assert!(distant_probabilities(&[], 0, 0.0).is_empty());
+    }
+
     #[test]
     fn colours_count_alike() {
         let colours = [Vec3::X, Vec3::Y, Vec3::Z, Vec3::ONE];

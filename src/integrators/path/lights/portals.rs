@@ -11,21 +11,20 @@ use crate::scene::Scene;
 /// Fraction of the environment's samples that do not use portals, because light may enter elsewhere.
 const ENVIRONMENT_SHARE: f64 = 0.2;
 
-/// Adds the environment, of this power, followed by the scene's portals; returns its index. With portals its power is that of the light
-/// which enters through them, as if they were area lights: with the power of the whole environment, the other lights of a room would get too few samples.
-pub(super) fn add_environment(all: &mut LightCollector, builder: &LightBuilder, scene: &Scene, power: f64) -> Option<u32> {
+/// Adds the environment, followed by the scene's portals; returns its index. Portals are chosen by the light that enters through them.
+pub(super) fn add_environment(all: &mut LightCollector, builder: &LightBuilder, scene: &Scene) -> Option<u32> {
     let brightness = brightness(builder.environment);
     let portals: Vec<_> = scene.portals.iter().filter(|p| p.area() > 0.0).collect();
     let through = |area: f64| PI * area * brightness;
     let of_portals: f64 = portals.iter().map(|p| through(p.area())).sum();
-    let own = if portals.is_empty() { power } else { of_portals * ENVIRONMENT_SHARE / (1.0 - ENVIRONMENT_SHARE) };
+    let own = if portals.is_empty() { PI * brightness } else { of_portals * ENVIRONMENT_SHARE / (1.0 - ENVIRONMENT_SHARE) };
     let record = LightRecord {
         kind: Kind::Environment as u32,
         instance: INVALID,
         primitive: portals.len() as u32,
         ..Default::default()
     };
-    let index = all.push(record, own, None);
+    let index = all.push_distant(record, own);
     if index == INVALID {
         return None;
     }
@@ -38,7 +37,7 @@ pub(super) fn add_environment(all: &mut LightCollector, builder: &LightBuilder, 
             edge: portal.edges[1].as_vec3().to_array(),
             ..Default::default()
         };
-        all.push(record, through(portal.area()), None);
+        all.push_distant(record, through(portal.area()));
     }
     Some(index)
 }

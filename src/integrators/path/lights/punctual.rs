@@ -25,7 +25,7 @@ pub(super) fn add(all: &mut LightCollector, builder: &LightBuilder, light: &Ligh
         ..Default::default()
     };
     match light.kind.emission() {
-        Emission::Placed { solid_angle, spread, falloff, parameters: [parameter_0, parameter_1] } => {
+        Emission::Placed { spread, falloff, parameters: [parameter_0, parameter_1] } => {
             let bounds = Bounds {
                 lo: position,
                 hi: position,
@@ -36,12 +36,12 @@ pub(super) fn add(all: &mut LightCollector, builder: &LightBuilder, light: &Ligh
                 two_sided: false,
                 intensity: brightness,
             };
-            all.push(LightRecord { parameter_0, parameter_1, ..base }, solid_angle * brightness, Some(bounds));
+            all.push_placed(LightRecord { parameter_0, parameter_1, ..base }, bounds);
         }
         Emission::Distant { angle } => {
             // 1 - cos, without cancellation
             let one_minus_cos = 2.0 * (0.25 * f64::from(angle)).sin().powi(2);
-            all.push(LightRecord { radius: one_minus_cos as f32, ..base }, PI * builder.radius.powi(2) * brightness, None);
+            all.push_distant(LightRecord { radius: one_minus_cos as f32, ..base }, brightness);
         }
     }
 }

@@ -78,7 +78,7 @@ pub(super) fn add(all: &mut LightCollector, builder: &mut LightBuilder, scene: &
                         two_sided: false,
                         intensity: PI * radius * radius * brightness,
                     };
-                    of_primitives.push(all.push(record, 4.0 * PI.powi(2) * radius * radius * brightness, Some(bounds)));
+                    of_primitives.push(all.push_placed(record, bounds));
                 }
             }
         }
@@ -129,7 +129,7 @@ fn add_triangles(
             two_sided,
             intensity: area * brightness,
         };
-        all.push(record, if two_sided { 2.0 } else { 1.0 } * PI * area * brightness, Some(bounds))
+        all.push_placed(record, bounds)
     };
     let mut k = 0;
     while k < mesh.indices.len() {
