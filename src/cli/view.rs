@@ -73,7 +73,6 @@ fn check_has_effect(settings: &RenderSettings) -> Result<()> {
     let frames = FrameSettings {
         frames: s.frames,
         fps: s.fps,
-        animate: s.animate.clone(),
         camera_path: s.camera_path.clone(),
         orbit: s.orbit,
         warm_up: s.warm_up,
@@ -93,6 +92,7 @@ fn check_has_effect(settings: &RenderSettings) -> Result<()> {
 /// here, nor put frames in real time in the place of an integrator.
 fn is_shown(settings: &RenderSettings, given: &RenderSettings) -> bool {
     let is_frames = |s: &RenderSettings| s.realtime_setting().is_some();
+    // an animation to start with, and its time, select no kind of image
     let keeps_integrator = settings.integrator.is_none() || is_frames(settings) == is_frames(given);
     keeps_integrator
         && settings.image.size == given.image.size

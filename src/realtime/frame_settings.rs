@@ -10,7 +10,7 @@ use crate::realtime::display::DisplayMode;
 use crate::realtime::{Budget, FilterKind, Preset, Resolution, Settings, Technique};
 use crate::sampling::Sequence;
 #[cfg(feature = "cli")]
-use crate::settings::parse::parse_rate;
+use crate::settings::parse::{parse_playback_time, parse_rate};
 use crate::settings::{AppliesTo, Capability, Editable, Value, choices, settings};
 
 /// Settings of real-time frames.
@@ -103,6 +103,8 @@ settings! {
         fps: Option<f64>, option(value_name = "N", value_parser = parse_rate), applies(TIMELINE);
         /// Play an animation of the scene, by index or name [default: the first]
         animate: Option<String>, option(value_name = "INDEX|NAME", num_args = 0..=1, default_missing_value = "0"), applies(TIMELINE);
+        /// Hold the animation at this time, in seconds since its start [default: frames play it]
+        time: Option<f64>, option(value_name = "SECONDS", value_parser = parse_playback_time), applies(TIMELINE), basic;
         /// Animate the camera along the key frames of a file (docs/sequences.md)
         camera_path: Option<PathBuf>,
             option(value_name = "FILE", value_hint = clap::ValueHint::FilePath, conflicts_with_all = ["orbit", "eye", "camera", "fov_y"]),
@@ -145,6 +147,11 @@ impl FrameSettings {
     /// The range of frames that are kept.
     pub fn range(&self) -> FrameRange {
         self.frames.unwrap_or(FrameRange { first: 0, end: 1 })
+    }
+
+    /// The animation to play, an index or a name; the first one where only a time is given.
+    pub fn animation(&self) -> Option<&str> {
+        self.animate.as_deref().or(self.time.map(|_| "0"))
     }
 
     /// The settings of the pipeline: the preset's, with the settings given, for ambient occlusion with settings `ao`.

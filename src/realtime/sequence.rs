@@ -52,6 +52,8 @@ pub struct FrameSequence<'a> {
     motion: CameraMotion,
     played: Option<AnimationPlayback<'a>>,
     frames_per_second: f64,
+    /// Seconds since the animation's start at which it is held.
+    held: Option<f64>,
 }
 
 /// Index of the animation with this name or index.
@@ -103,7 +105,13 @@ impl<'a> FrameSequence<'a> {
                 Some(AnimationPlayback { rig, animation, pose: Pose::default(), posed })
             }
         };
-        Ok(Self { camera, file_camera, motion, played, frames_per_second })
+        Ok(Self { camera, file_camera, motion, played, frames_per_second, held: None })
+    }
+
+    /// The same with the animation held at a time, in seconds since its start, if one is given; the camera's motion goes on.
+    #[must_use]
+    pub fn held_at(self, seconds: Option<f64>) -> Self {
+        Self { held: seconds, ..self }
     }
 
     /// The motion that the scene must be flattened with ([`crate::accel::flatten::FlatScene::with_motion`]).
@@ -122,7 +130,12 @@ impl<'a> FrameSequence<'a> {
         let mut camera = self.camera.clone();
         let mut stats = UpdateStats::default();
         if let Some(p) = &mut self.played {
-            p.rig.pose(p.animation, frame / self.frames_per_second, Playback::Loop, &mut p.pose)?;
+            let (seconds, end) = match self.held {
+                // its end is not its beginning
+                Some(held) => (held, Playback::Once),
+                None => (frame / self.frames_per_second, Playback::Loop),
+            };
+            p.rig.pose(p.animation, seconds, end, &mut p.pose)?;
             let posed = p.pose.cameras.iter().find(|(k, _)| Some(*k) == self.file_camera);
             if let Some(&(_, camera_to_world)) = posed {
                 camera.camera_to_world = camera_to_world;

@@ -95,9 +95,9 @@ impl Renderer {
         let size = settings.size(scene);
         let fps = timeline.fps.or(path.as_ref().map(|p| p.fps())).unwrap_or(DEFAULT_FPS);
         let motion = camera_motion(scene, path, timeline.orbit)?;
-        let animation = timeline.animate.as_deref().map(|a| sequence::find_animation(scene, a)).transpose()?;
+        let animation = timeline.animation().map(|a| sequence::find_animation(scene, a)).transpose()?;
         let file_camera = scene.cameras.iter().position(|c| *c == camera);
-        let sequence = FrameSequence::new(scene, camera.clone(), file_camera, motion, animation, fps)?;
+        let sequence = FrameSequence::new(scene, camera.clone(), file_camera, motion, animation, fps)?.held_at(timeline.time);
         let integrator = settings.integrator();
         let is_radiance = !is_ambient_occlusion(integrator);
         let blend = if is_radiance { integrator.get().blend() } else { Blend::Masked };

@@ -29,6 +29,8 @@ pub struct StillSequence<'r> {
     animation: Option<PosedAnimation>,
     range: FrameRange,
     fps: f64,
+    /// Seconds since the animation's start at which it is held.
+    held: Option<f64>,
 }
 
 /// An animation, and the scene at rest.
@@ -61,7 +63,7 @@ impl Renderer {
         let completed = self.complete(settings, first_of_path)?;
         let motion = camera_motion(&self.scene, path, timeline.orbit)?;
         let file_camera = self.scene.cameras.iter().position(|c| *c == completed.camera);
-        let animation = match timeline.animate.as_deref() {
+        let animation = match timeline.animation() {
             None => None,
             Some(name) => {
                 let index = find_animation(&self.scene, name)?;
@@ -69,7 +71,7 @@ impl Renderer {
             }
         };
         let camera = completed.camera.clone();
-        Ok(StillSequence { renderer: self, completed, camera, motion, file_camera, animation, range, fps })
+        Ok(StillSequence { renderer: self, completed, camera, motion, file_camera, animation, range, fps, held: timeline.time })
     }
 }
 
@@ -130,7 +132,12 @@ impl StillSequence<'_> {
         let mut camera = self.camera.clone();
         if let Some(PosedAnimation { index, pose, rest }) = &mut self.animation {
             let none = || Error::Usage("the scene has no animations".into());
-            rest.rig.as_ref().ok_or_else(none)?.pose(*index, frame / self.fps, Playback::Loop, pose)?;
+            let (seconds, end) = match self.held {
+                // its end is not its beginning
+                Some(held) => (held, Playback::Once),
+                None => (frame / self.fps, Playback::Loop),
+            };
+            rest.rig.as_ref().ok_or_else(none)?.pose(*index, seconds, end, pose)?;
             pose.apply(&mut self.renderer.scene);
             if !pose.instances.is_empty() || !pose.meshes.is_empty() {
                 self.renderer.tracer = None;

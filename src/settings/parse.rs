@@ -73,6 +73,11 @@ pub fn parse_time(text: &str) -> Parsed<f64> {
     parse_where(text, |v| v > 0.0 && v <= 1e9, "must be above 0 seconds")
 }
 
+/// Seconds, 0 or above.
+pub fn parse_playback_time(text: &str) -> Parsed<f64> {
+    parse_where(text, |v| (0.0..=1e9).contains(&v), "must be a number of seconds, not negative")
+}
+
 /// A time above 0, given in seconds.
 pub fn parse_seconds(text: &str) -> Parsed<Duration> {
     parse_time(text).map(Duration::from_secs_f64)

@@ -1,7 +1,7 @@
 //! The state of the viewer, and how events of the renderer and input of the user change it. `panels/` show it.
 
 use std::collections::VecDeque;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::Child;
 use std::sync::Arc;
 use std::sync::mpsc::Receiver;
@@ -12,17 +12,19 @@ use super::camera::CameraControl;
 use super::layer::Layer;
 use super::request::{Comparison, DeviceSummary, Event, Mailbox, PickPurpose, Progress, Request, SceneSummary, TRUTH, Task};
 use super::technique::Technique;
-use super::{ViewOptions, panels};
+use super::{FileKind, ViewOptions, panels};
+use crate::error::{Error, Result};
 use crate::integrators::IntegratorName;
 use crate::integrators::lighting::LightingSettings;
 use crate::interface::PixelFilter;
 use crate::realtime::Preset;
-use crate::realtime::frame_settings::Antialias;
+use crate::realtime::frame_settings::{Antialias, FrameRange};
 use crate::renderer::RenderSettings;
 use crate::renderer::frames::frame_settings;
-use crate::renderer::interactive::{Pick, ViewPicture, render_flags};
-use crate::scene::Camera;
-use crate::settings::Length;
+use crate::renderer::interactive::{Pick, ViewPicture, camera_placement, camera_settings, render_command};
+use crate::renderer::settings::{CameraSettings, ImageSettings};
+use crate::scene::{Camera, Projection};
+use crate::settings::{Capability, Length};
 use crate::tracer::DeviceSettings;
 
 /// Frames whose times are kept for the plot and the figures.
@@ -31,6 +33,15 @@ const KEPT_FRAMES: usize = 120;
 const KEPT_MESSAGES: usize = 100;
 /// Time for which a new message is shown over the image.
 const MESSAGE_TIME: Duration = Duration::from_secs(8);
+
+/// Samples per pixel of stills that are rendered, unless the settings say otherwise.
+const STILL_SPP: u32 = 64;
+/// Frames of a turntable that is rendered.
+const TURNTABLE_FRAMES: u32 = 120;
+/// Frames per second of an animation that is rendered, the default of `skylit render`.
+const ANIMATION_FPS: f64 = 30.0;
+/// What is added to the seed for the truth.
+const TRUTH_SEED: u32 = 0x7275_7468;
 
 /// What the second image shows.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -59,6 +70,8 @@ pub struct PaneState {
     pub progress: Option<Arc<Progress>>,
     /// Why there is none.
     pub error: Option<String>,
+    /// Why it is black, if it is.
+    pub black: Option<String>,
 }
 
 /// A window that asks for something.
@@ -72,8 +85,19 @@ pub enum Dialog {
     LoadSettings(String),
     /// For a file of settings to write.
     SaveSettings(String),
-    /// For the output of `skylit render`, with these options besides.
-    Render(String, Vec<String>),
+    /// For the output of `skylit render`.
+    Render(String, RenderedMotion),
+}
+
+/// What moves in the frames of `skylit render`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum RenderedMotion {
+    /// Nothing: one image of the moment that is shown.
+    Nothing,
+    /// The camera, around the moment that is shown.
+    Turntable,
+    /// The animation.
+    Animation,
 }
 
 impl Dialog {
@@ -102,6 +126,16 @@ pub struct Playback {
     pub speed: f64,
     /// Whether it starts again at its end.
     pub repeats: bool,
+}
+
+impl Playback {
+    /// Plays or stops an animation that lasts so many seconds. At its end it starts anew.
+    pub fn toggle(&mut self, duration: f64) {
+        self.runs = !self.runs;
+        if self.runs && self.time >= duration {
+            self.time = 0.0;
+        }
+    }
 }
 
 /// The viewer.
@@ -137,8 +171,8 @@ pub struct App {
     pub first: Technique,
     /// What the second image shows.
     pub second: Second,
-    /// What the first image is compared with.
-    pub truth: Technique,
+    /// What first images of an integrator are compared with, if it was chosen; else see [`Technique::truth`].
+    chosen_truth: Option<(IntegratorName, Technique)>,
     /// Whether it is compared.
     pub compares: bool,
     /// Where the images are.
@@ -147,8 +181,12 @@ pub struct App {
     pub shows_second: bool,
     /// The images: first, second, truth.
     pub panes: [PaneState; 3],
-    /// The last comparison.
+    /// The last comparison, of what is requested now.
     pub comparison: Option<Box<Comparison>>,
+    /// The first request whose images it may be of.
+    comparable: u64,
+    /// The first request of the first image whose times are among the figures.
+    measured: u64,
     /// The camera, once the scene is loaded.
     pub control: Option<CameraControl>,
     /// Index of the file's camera that is followed while an animation moves it.
@@ -171,6 +209,8 @@ pub struct App {
     pub devices: Vec<String>,
     /// Why there are no images.
     pub failure: Option<String>,
+    /// Why scenes could not be loaded, the last one last.
+    pub load_failures: Vec<String>,
     /// Messages, the last one first.
     pub messages: VecDeque<(Instant, String, bool)>,
     /// The open dialog.
@@ -183,6 +223,10 @@ pub struct App {
     pub shows_panel: bool,
     /// Frames of the first image, the last one last.
     pub frames: VecDeque<Arc<Progress>>,
+    /// What the program was started with, or a file of settings said: lengths and places of one scene are not those of the next.
+    given: RenderSettings,
+    /// The animation to start with, by index or name, and its time.
+    first_animation: Option<(String, f64)>,
     /// Text to be put on the clipboard.
     pub copied: Option<String>,
     /// The window is to be closed.
@@ -198,14 +242,6 @@ pub struct App {
 impl App {
     /// The viewer as it starts.
     pub fn new(options: &ViewOptions, mailbox: Arc<Mailbox>, events: Receiver<Event>) -> Self {
-        let preset = options.settings.frames.preset.unwrap_or(Preset::Balanced);
-        let first = match options.settings.integrator {
-            Some(integrator) if options.settings.realtime_setting().is_none() => Technique::Still(integrator),
-            Some(integrator) if integrator != IntegratorName::default() && options.settings.frames.show.is_none() => {
-                Technique::Frames(integrator)
-            }
-            _ => options.settings.frames.show.map_or(Technique::Preset(preset), Technique::Buffer),
-        };
         let mut app = Self {
             mailbox,
             events,
@@ -222,16 +258,18 @@ impl App {
             scene: None,
             device: DeviceSummary::default(),
             device_settings: options.device.clone(),
-            settings: options.settings.clone(),
-            lighting: options.settings.lighting.clone(),
-            first,
+            settings: RenderSettings::default(),
+            lighting: LightingSettings::default(),
+            first: Technique::Preset(Preset::Balanced),
             second: Second::Truth,
-            truth: Technique::Converged,
+            chosen_truth: None,
             compares: false,
             arrangement: Arrangement::Single,
             shows_second: false,
             panes: Default::default(),
             comparison: None,
+            comparable: 0,
+            measured: 0,
             control: None,
             followed: None,
             bookmarks: Vec::new(),
@@ -243,12 +281,15 @@ impl App {
             loading: None,
             devices: Vec::new(),
             failure: None,
+            load_failures: Vec::new(),
             messages: VecDeque::new(),
             dialog: None,
             browsing: None,
             shows_help: false,
             shows_panel: true,
             frames: VecDeque::new(),
+            given: RenderSettings::default(),
+            first_animation: None,
             copied: None,
             closes: false,
             default_frame_rate: options.frame_rate.unwrap_or(super::CPU_FRAME_RATE),
@@ -257,10 +298,74 @@ impl App {
             layers: Vec::new(),
             renders: Vec::new(),
         };
+        app.take_settings(&options.settings);
         if let Some(scene) = &options.scene {
             app.open(scene);
         }
         app
+    }
+
+    /// Takes settings over: those of images, the technique that they select, light, and the animation to start with. The camera is for the next scene.
+    fn take_settings(&mut self, settings: &RenderSettings) {
+        self.settings = settings.clone();
+        let frames = &mut self.settings.frames;
+        let animation = frames.animation().map(|name| (name.to_owned(), frames.time.unwrap_or(0.0)));
+        (frames.animate, frames.time) = (None, None);
+        self.first_animation = animation;
+        self.first = Technique::of_settings(&self.settings);
+        self.lighting = settings.lighting.clone();
+        self.given = self.settings.clone();
+    }
+
+    /// Reads a file of settings and shows what it says, of the scene that is open.
+    ///
+    /// # Errors
+    /// Those of [`RenderSettings::load`]; [`Error::Usage`] for a camera that is chosen in two ways.
+    pub fn load_settings(&mut self, path: &Path) -> Result<()> {
+        let settings = RenderSettings::load(path)?;
+        settings.camera.check()?;
+        self.take_settings(&settings);
+        if let Some(scene) = &self.scene {
+            let animations = scene.animations.clone();
+            self.start_animation(&animations);
+            if self.settings.camera.chooses() {
+                // as at the start: by what the settings say
+                (self.control, self.followed, self.sent.camera) = (None, None, None);
+            }
+        }
+        Ok(())
+    }
+
+    /// Shows the animation to start with, at its time.
+    fn start_animation(&mut self, animations: &[(String, f64)]) {
+        let Some((name, time)) = self.first_animation.take() else { return };
+        let by_index = name.parse::<usize>().ok().filter(|k| *k < animations.len());
+        match by_index.or_else(|| animations.iter().position(|a| a.0 == name)) {
+            Some(k) => {
+                self.playback = Playback { animation: Some(k), runs: false, time: time.min(animations[k].1), ..self.playback }
+            }
+            None => self.report(format!("--animate {name}: the scene has no such animation"), true),
+        }
+    }
+
+    /// Opens a file by what it is: a scene, an environment, or settings.
+    pub fn open_file(&mut self, path: &str) {
+        match FileKind::of(path) {
+            FileKind::Scene => self.open(path),
+            FileKind::Environment => {
+                self.lighting.environment = Some(path.to_owned());
+                // of the one before
+                (self.lighting.environment_turn, self.lighting.environment_scale) = (None, None);
+                let capabilities = self.first.integrator().get().capabilities();
+                let is_lit = capabilities.contains(&Capability::SceneLights);
+                let hint = if is_lit { "" } else { ", which lights path, direct, lit and whitted (4: path)" };
+                self.report(format!("environment: {path}{hint}"), false);
+            }
+            FileKind::Settings => match self.load_settings(Path::new(path)) {
+                Ok(()) => self.report(format!("loaded {path}"), false),
+                Err(e) => self.report(e.to_string(), true),
+            },
+        }
     }
 
     /// Opens a scene.
@@ -286,8 +391,16 @@ impl App {
         self.loading.is_some() && self.load != self.loaded
     }
 
-    /// Loads the scene anew; the camera stays.
+    /// Loads the scene anew, as the user wants it. The camera stays, unless it sees nothing but black.
     pub fn reload(&mut self) {
+        if self.source.is_some() {
+            self.load_anew();
+            self.task(Task::CheckView { frames: false });
+        }
+    }
+
+    /// Loads the scene anew; the camera stays.
+    fn load_anew(&mut self) {
         if let Some(source) = self.source.clone() {
             // what changes while it is being loaded is noticed
             let modified = self.modified.take();
@@ -351,12 +464,15 @@ impl App {
                 Event::LoadFailed(load, text) => {
                     (self.loading, self.loaded) = (None, load);
                     self.report(text.clone(), true);
+                    self.load_failures.push(text.clone());
                     if self.scene.is_none() {
                         self.failure = Some(text);
                     }
                 }
                 Event::Camera(camera, openness) => {
                     if let (None, Some(scene)) = (&self.control, self.scene.clone()) {
+                        // as `skylit render` does
+                        self.followed = scene.cameras.iter().position(|c| *c == *camera);
                         let control = CameraControl::new(*camera, scene.bounds);
                         let ao = &mut self.settings.integrators.ao;
                         let radius = match ao.ao_radius {
@@ -378,19 +494,37 @@ impl App {
                 Event::Picture(progress) => {
                     self.failure = None;
                     let (pane, progress) = (progress.pane, Arc::new(*progress));
-                    if pane == 0 {
+                    if pane == 0 && progress.request >= self.measured {
                         self.frames.push_back(progress.clone());
                         while self.frames.len() > KEPT_FRAMES {
                             self.frames.pop_front();
                         }
                     }
-                    self.panes[pane] = PaneState { progress: Some(progress), error: None };
+                    let black = self.panes[pane].black.take();
+                    self.panes[pane] = PaneState { progress: Some(progress), error: None, black };
                 }
                 Event::PaneError(pane, error) => {
                     self.panes[pane].error = error;
                 }
                 Event::Idle(number) => self.idle = number,
+                Event::Black(pane, reason) => self.panes[pane].black = reason,
+                // of what was shown before
+                Event::Compared(comparison) if comparison.request < self.comparable || !self.compares_now() => {}
                 Event::Compared(comparison) => self.comparison = Some(comparison),
+                Event::Framed(cameras) => {
+                    let [from, to] = *cameras;
+                    if self.control.as_ref().is_some_and(|c| *c.camera() == from) {
+                        self.set_camera(to, None);
+                        self.report("framed what can be seen: from where the camera was everything is black", false);
+                    }
+                }
+                Event::LightingRefused(lights, text) => {
+                    let [refused, kept] = *lights;
+                    self.report(format!("{text}; the light stays as it was"), true);
+                    if self.lighting == refused {
+                        self.lighting = kept;
+                    }
+                }
                 Event::Picked(purpose, pick) => self.picked(purpose, *pick),
                 Event::Saved(Ok(path)) => self.report(format!("saved {}", path.display()), false),
                 Event::Saved(Err(text)) => self.report(text, true),
@@ -406,6 +540,7 @@ impl App {
 
     fn loaded(&mut self, summary: SceneSummary) {
         let is_same = self.scene.as_ref().is_some_and(|s| s.source == summary.source);
+        let is_same_load = self.scene.as_ref().is_some_and(|s| s.load == summary.load);
         let lacked_images = self.scene.as_ref().is_some_and(|s| s.load == summary.load && !s.is_complete);
         let what = match lacked_images && summary.is_complete {
             true => format!("loaded the images of {}", summary.source),
@@ -415,7 +550,18 @@ impl App {
         super::recent::add(&mut self.recent, &summary.source);
         self.loaded = summary.load;
         self.loading = (!summary.is_complete).then(|| ("loading images".to_owned(), None));
-        self.panes.iter_mut().for_each(|p| p.error = None);
+        self.panes.iter_mut().for_each(|p| (p.error, p.black) = (None, None));
+        if !is_same_load {
+            // indices and names of what was there before
+            self.pick = None;
+        }
+        if !is_same && self.scene.is_some() {
+            // lengths and places of the scene before
+            self.settings.camera = CameraSettings::default();
+            let (ao, given) = (&mut self.settings.integrators.ao, &self.given.integrators.ao);
+            (ao.ao_radius, ao.ao_falloff) = (given.ao_radius, given.ao_falloff);
+            self.lighting.light.clone_from(&self.given.lighting.light);
+        }
         if !is_same {
             (self.control, self.followed, self.pick, self.comparison) = (None, None, None, None);
             self.playback = Playback { animation: None, runs: false, time: 0.0, ..self.playback };
@@ -423,6 +569,16 @@ impl App {
             self.bookmarks.clear();
             self.turntable = 0.0;
             self.sent.camera = None;
+            self.frames.clear();
+            self.start_animation(&summary.animations);
+        }
+        let durations = |k: usize| summary.animations.get(k).map(|a| a.1);
+        if let Some(k) = self.playback.animation {
+            // the file has changed
+            match durations(k) {
+                Some(duration) => self.playback.time = self.playback.time.min(duration),
+                None => (self.playback.animation, self.playback.runs) = (None, false),
+            }
         }
         self.scene = Some(summary);
     }
@@ -431,9 +587,9 @@ impl App {
         match (purpose, pick) {
             (PickPurpose::Describe, pick) => self.pick = pick,
             (PickPurpose::Focus, Some(pick)) => {
+                self.leave_followed();
                 if let Some(control) = &mut self.control {
                     control.focus(pick.position);
-                    self.followed = None;
                 }
             }
             (PickPurpose::Focus, None) => {}
@@ -453,7 +609,7 @@ impl App {
         let before = self.modified.replace((Instant::now(), now.clone())).map(|m| m.1);
         // a file that is being replaced is gone for a moment
         if before.is_some_and(|before| before.iter().zip(&now).any(|(before, now)| now.is_some() && now != before)) {
-            self.reload();
+            self.load_anew();
         }
     }
 
@@ -471,11 +627,55 @@ impl App {
             }
             context.request_repaint();
         }
-        if let (Some(control), true) = (&mut self.control, self.turntable != 0.0) {
-            control.turntable(self.turntable * seconds);
-            self.followed = None;
-            context.request_repaint();
+        if self.turntable != 0.0 {
+            self.leave_followed();
+            if let Some(control) = &mut self.control {
+                control.turntable(self.turntable * seconds);
+                context.request_repaint();
+            }
         }
+    }
+
+    /// Moves the camera to another one; `followed`: the file's camera that it is.
+    pub fn set_camera(&mut self, camera: Camera, followed: Option<usize>) {
+        let centre = self.scene.as_ref().map(|s| (s.bounds.0 + s.bounds.1) * 0.5).unwrap_or_default();
+        if let Some(control) = &mut self.control {
+            control.set_camera(camera, centre);
+            self.followed = followed;
+        }
+    }
+
+    /// No longer follows a camera of the file: the user's goes on from where the animation has moved it.
+    pub fn leave_followed(&mut self) {
+        if self.followed.is_some() {
+            let shown = self.shown_camera();
+            shown.into_iter().for_each(|camera| self.set_camera(camera, None));
+            self.followed = None;
+        }
+    }
+
+    /// The camera of the image: where an animation has moved it, if it is followed.
+    pub fn shown_camera(&self) -> Option<Camera> {
+        let moved = self.panes[0].progress.as_ref().and_then(|p| p.camera.clone()).filter(|_| self.followed.is_some());
+        moved.or_else(|| self.control.as_ref().map(|c| c.camera().clone()))
+    }
+
+    /// What the first image is compared with.
+    pub fn truth(&self) -> Technique {
+        match self.chosen_truth {
+            Some((of, truth)) if of == self.first.integrator() => truth,
+            _ => self.first.truth(),
+        }
+    }
+
+    /// Whether the truth was chosen, and does not follow the first image.
+    pub fn has_chosen_truth(&self) -> bool {
+        self.chosen_truth.is_some_and(|(of, _)| of == self.first.integrator())
+    }
+
+    /// Chooses what images of the first image's integrator are compared with; `None`: what they approximate.
+    pub fn choose_truth(&mut self, truth: Option<Technique>) {
+        self.chosen_truth = truth.map(|truth| (self.first.integrator(), truth));
     }
 
     /// Sends what has changed.
@@ -486,7 +686,9 @@ impl App {
         }
         let shown = panes.len();
         if self.compares_now() {
-            let mut truth = self.truth.settings(&self.settings);
+            let mut truth = self.truth().settings(&self.settings);
+            // samples of its own: of the same ones a truth of the same integrator would be the same image
+            truth.image.seed = Some(truth.seed().wrapping_add(TRUTH_SEED));
             if panes[0].realtime_setting().is_some() {
                 // what differs shall not be the samples' place in the pixel
                 let is_antialiased = frame_settings(&panes[0]).is_ok_and(|s| s.antialias);
@@ -521,12 +723,28 @@ impl App {
         if request == self.sent && self.tasks.is_empty() {
             return;
         }
-        let panes_changed = request.panes != self.sent.panes;
-        if panes_changed || request.camera != self.sent.camera || request.size != self.sent.size {
+        let (before, first) = (std::mem::take(&mut self.sent), |r: &Request| r.panes.first().cloned());
+        let is_another_view = !request.shows_same_view(&before);
+        let is_another_image = is_another_view || first(&request) != first(&before);
+        let compared = |r: &Request| r.panes.last().filter(|_| r.compares).cloned();
+        let is_another_comparison = is_another_image || compared(&request) != compared(&before);
+        let is_measured_anew = (request.load, request.size, &request.device) != (before.load, before.size, &before.device)
+            || self.techniques[0].0 != self.first.label();
+        if is_another_comparison {
             self.comparison = None;
         }
-        if panes_changed {
+        if is_measured_anew {
+            self.frames.clear();
+        }
+        if request.panes != before.panes {
             self.panes.iter_mut().for_each(|p| p.error = None);
+        }
+        // what is not requested is not kept up to date
+        let requested: Vec<_> = (0..request.panes.len()).map(|k| request.pane(k)).collect();
+        for (k, pane) in self.panes.iter_mut().enumerate() {
+            if is_another_view && !requested.contains(&k) {
+                *pane = PaneState::default();
+            }
         }
         let tasks = std::mem::take(&mut self.tasks);
         self.sent = request.clone();
@@ -536,6 +754,12 @@ impl App {
             *r = request;
             r.tasks = before.into_iter().chain(tasks).collect();
         });
+        if is_another_comparison {
+            self.comparable = self.sent_number;
+        }
+        if is_measured_anew {
+            self.measured = self.sent_number;
+        }
         for is_second in [false, true] {
             let (pane, name) = (self.pane(is_second), self.technique_of(is_second));
             if self.techniques[pane].0 != name {
@@ -586,8 +810,8 @@ impl App {
         match (is_second, self.second) {
             (false, _) => self.first.label(),
             (true, Second::Technique(t)) => t.label(),
-            (true, Second::Truth) => format!("Truth: {}", self.truth.label()),
-            (true, Second::HeatMap) => format!("FLIP against {}", self.truth.label()),
+            (true, Second::Truth) => format!("Truth: {}", self.truth().label()),
+            (true, Second::HeatMap) => format!("FLIP against {}", self.truth().label()),
         }
     }
 
@@ -604,7 +828,7 @@ impl App {
         match (is_second, self.second) {
             (false, _) => self.first.label(),
             (true, Second::Technique(t)) => t.label(),
-            (true, _) => self.truth.label(),
+            (true, _) => self.truth().label(),
         }
     }
 
@@ -617,6 +841,12 @@ impl App {
         }
     }
 
+    /// Why the first image, or the second, is black, if it is.
+    pub fn black(&self, is_second: bool) -> Option<&String> {
+        let has_picture = !(is_second && self.second == Second::HeatMap);
+        self.panes[self.pane(is_second)].black.as_ref().filter(|_| has_picture)
+    }
+
     /// Error of the first image, or of the second.
     pub fn error(&self, is_second: bool) -> Option<&String> {
         self.panes[self.pane(is_second)].error.as_ref()
@@ -626,10 +856,15 @@ impl App {
     pub fn shown_settings(&self) -> RenderSettings {
         let technique = match (self.shows_second, self.second) {
             (true, Second::Technique(t)) => t,
-            (true, _) => self.truth,
+            (true, _) => self.truth(),
             (false, _) => self.first,
         };
         let mut settings = technique.settings(&self.settings);
+        let capabilities = settings.integrator().get().capabilities();
+        if capabilities.contains(&Capability::AmbientOcclusion) {
+            // without one `skylit render` would choose one in a closed room
+            settings.integrators.ao.ao_radius.get_or_insert(Length::Units(f64::INFINITY));
+        }
         settings.lighting = self.lighting.clone();
         let lit = settings.integrator().get().capabilities().contains(&crate::settings::Capability::SceneLights);
         if !lit {
@@ -638,10 +873,61 @@ impl App {
         settings
     }
 
+    /// Settings of `skylit render` for what is shown: its camera, its moment of the animation, and samples of a still.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for a camera that options cannot say, and before there is one.
+    pub fn render_settings(&self, motion: RenderedMotion) -> Result<RenderSettings> {
+        let none = || Error::Usage("there is no image to render yet".into());
+        let (scene, control) = self.scene.as_ref().zip(self.control.as_ref()).ok_or_else(none)?;
+        let mut settings = self.shown_settings();
+        let is_still = settings.realtime_setting().is_none();
+        let camera = control.camera();
+        let is_orthographic = matches!(camera.projection, Projection::Orthographic { .. });
+        settings.camera = match (self.playback.animation, self.followed) {
+            // by its index an animation would move it
+            (Some(_), None) if !is_orthographic => camera_placement(camera),
+            _ => camera_settings(&scene.cameras, camera),
+        };
+        if settings.camera.camera.is_none() && is_orthographic {
+            return Err(Error::Usage(
+                "an orthographic camera that has been moved cannot be given to `skylit render`: choose one of the file, or F"
+                    .into(),
+            ));
+        }
+        if is_still {
+            settings.image.spp = Some(self.settings.image.spp.unwrap_or(STILL_SPP));
+        }
+        let frames = &mut settings.frames;
+        if let (Some(k), false) = (self.playback.animation, motion == RenderedMotion::Animation) {
+            (frames.animate, frames.time) = (Some(k.to_string()), Some(self.playback.time));
+        }
+        match motion {
+            RenderedMotion::Nothing => {}
+            RenderedMotion::Turntable => {
+                (frames.orbit, frames.frames) = (Some(TURNTABLE_FRAMES), Some(FrameRange { first: 0, end: TURNTABLE_FRAMES }));
+            }
+            RenderedMotion::Animation => {
+                let animation = self.playback.animation.and_then(|k| Some((k, scene.animations.get(k)?.1)));
+                let (k, duration) = animation.ok_or_else(|| Error::Usage("no animation is chosen".into()))?;
+                let end = (ANIMATION_FPS * duration).ceil().max(1.0) as u32;
+                (frames.animate, frames.frames) = (Some(k.to_string()), Some(FrameRange { first: 0, end }));
+            }
+        }
+        Ok(settings)
+    }
+
     /// The command that renders what is shown.
-    pub fn command(&self) -> Option<String> {
-        let (scene, control) = (self.scene.as_ref()?, self.control.as_ref()?);
-        Some(render_flags(&scene.source, &self.shown_settings(), &scene.cameras, control.camera(), self.size))
+    ///
+    /// # Errors
+    /// Those of [`App::render_settings`].
+    pub fn command(&self) -> Result<String> {
+        let settings = self.render_settings(RenderedMotion::Nothing)?;
+        let source = self.scene.as_ref().map_or("", |s| s.source.as_str());
+        Ok(render_command(
+            source,
+            &RenderSettings { image: ImageSettings { size: Some(self.size), ..settings.image }, ..settings },
+        ))
     }
 
     /// The frame rate to hold unless another is chosen.
@@ -649,23 +935,21 @@ impl App {
         self.default_frame_rate
     }
 
-    /// Runs `skylit render` with what is shown, these options and this output, as a program of its own.
-    pub fn render(&mut self, output: &str, options: &[String]) {
-        let (Some(scene), Some(control)) = (&self.scene, &self.control) else { return };
-        let mut settings = self.shown_settings();
+    /// Runs `skylit render` with what is shown and this output, as a program of its own.
+    pub fn render(&mut self, output: &str, motion: RenderedMotion) {
+        let mut settings = match self.render_settings(motion) {
+            Ok(settings) => settings,
+            Err(e) => return self.report(e.to_string(), true),
+        };
         settings.image.size = Some(self.size);
-        settings.camera = crate::renderer::interactive::camera_settings(&scene.cameras, control.camera());
-        if settings.realtime_setting().is_none() && settings.image.spp.is_none() {
-            settings.image.spp = Some(self.settings.image.spp.unwrap_or(64));
-        }
+        let source = self.scene.as_ref().map_or("", |s| s.source.as_str());
         let program = std::env::current_exe().unwrap_or_else(|_| PathBuf::from("skylit"));
         let child = std::process::Command::new(program)
             .arg("render")
-            .arg(&scene.source)
+            .arg(source)
             // defaults are among the settings already
             .args(["--quiet", "--no-config", "-o", output])
             .args(settings.flags())
-            .args(options)
             .stdin(std::process::Stdio::null())
             .stderr(std::process::Stdio::piped())
             .spawn();

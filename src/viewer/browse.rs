@@ -16,7 +16,9 @@ impl Browsing {
     /// Opens the system's dialog for what `dialog` asks for. `wake` is called when it closes.
     pub fn start(mut dialog: Dialog, wake: impl FnOnce() + Send + 'static) -> Self {
         let (title, kinds): (_, &[(&str, &[&str])]) = match &dialog {
-            Dialog::Open(_) => ("Open a scene", &[("Scenes", &["gltf", "glb", "obj", "brhan"])]),
+            Dialog::Open(_) => {
+                ("Open a scene", &[("Scenes", &["gltf", "glb", "obj", "brhan"]), ("Environments", &["hdr", "exr"])])
+            }
             Dialog::Save(_) => ("Save the image", &[("Image as shown", &["png", "jpg", "webp"]), ("All channels", &["exr"])]),
             Dialog::LoadSettings(_) => ("Load settings", &[("Settings", &["json"])]),
             Dialog::SaveSettings(_) => ("Save settings", &[("Settings", &["json"])]),

@@ -54,9 +54,37 @@ pub struct ViewOptions {
     pub device_name: Option<String>,
 }
 
-/// Opens the last scene among files that were dropped on the window.
+/// Opens the last scene among files that were dropped on the window, and takes over the last environment and the last settings.
 fn drop_files(app: &mut app::App, files: &[egui::DroppedFile]) {
-    if let Some(path) = files.iter().rev().find_map(|f| f.path.as_ref()) {
-        app.open(&path.to_string_lossy());
+    let paths: Vec<String> = files.iter().filter_map(|f| f.path.as_ref()).map(|p| p.to_string_lossy().into_owned()).collect();
+    for kind in [FileKind::Scene, FileKind::Environment, FileKind::Settings] {
+        if let Some(path) = paths.iter().rev().find(|path| FileKind::of(path) == kind) {
+            app.open_file(path);
+        }
+    }
+}
+
+/// What a file that is opened or dropped is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FileKind {
+    /// A scene, or what only a loader can tell.
+    Scene,
+    /// An image, or a folder with the faces of a cube: light from all around.
+    Environment,
+    /// Settings as the viewer saves them.
+    Settings,
+}
+
+impl FileKind {
+    /// The kind of a file by its name.
+    pub fn of(path: &str) -> Self {
+        let extension = std::path::Path::new(path).extension().unwrap_or_default().to_ascii_lowercase();
+        match extension.to_str() {
+            _ if path.starts_with("builtin:") => Self::Scene,
+            Some("hdr" | "rgbe" | "pic" | "exr" | "png" | "jpg" | "jpeg" | "webp" | "tga" | "bmp") => Self::Environment,
+            Some("json" | "toml") => Self::Settings,
+            Some("") if std::path::Path::new(path).is_dir() => Self::Environment,
+            _ => Self::Scene,
+        }
     }
 }

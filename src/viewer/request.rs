@@ -67,6 +67,18 @@ impl Request {
     pub fn pane(&self, k: usize) -> Pane {
         if k < self.shown { k } else { TRUTH }
     }
+
+    /// Returns true if another request is of the same scene in the same pose and light, seen by the same camera at the same size on the same device.
+    pub fn shows_same_view(&self, other: &Self) -> bool {
+        let of = |r: &Self| (r.load, r.animation, r.time, r.followed_camera, r.size);
+        let lit = |r: &Self| (r.scene.clone(), r.device.clone(), r.lighting.clone(), r.camera.clone());
+        of(self) == of(other) && lit(self) == lit(other)
+    }
+
+    /// Width over height of the view.
+    pub fn aspect(&self) -> f64 {
+        f64::from(self.size[0]) / f64::from(self.size[1])
+    }
 }
 
 /// Work to be done once.
@@ -78,6 +90,11 @@ pub enum Task {
         at: [f64; 2],
         /// What it is for.
         purpose: PickPurpose,
+    },
+    /// Find a camera that sees something, if this one sees nothing or all of it is black.
+    CheckView {
+        /// Whether it is to show the scene from its front, too: it was framed, not chosen.
+        frames: bool,
     },
     /// Save an image with all its channels.
     Save {
@@ -106,6 +123,12 @@ pub enum Event {
     Loaded(Box<SceneSummary>),
     /// The camera to start with was chosen, and whether it is inside a room.
     Camera(Box<Camera>, Option<Openness>),
+    /// The first camera sees nothing but black, the second shows something.
+    Framed(Box<[Camera; 2]>),
+    /// These lights could not be had: those that are in effect instead, and why.
+    LightingRefused(Box<[LightingSettings; 2]>, String),
+    /// Why an image that is black is black; `None` once it is not.
+    Black(Pane, Option<String>),
     /// The scene of this [`Request::load`] could not be loaded; the previous one stays.
     LoadFailed(u64, String),
     /// Names of the Vulkan devices, by index.
@@ -181,6 +204,8 @@ pub struct Progress {
     pub pane: Pane,
     /// What to show.
     pub picture: Arc<ViewPicture>,
+    /// The camera that it was rendered with: an animation may have moved it.
+    pub camera: Option<Camera>,
     /// The step's work.
     pub step: ViewStep,
     /// Wall-clock time of the step.
@@ -194,6 +219,8 @@ pub struct Progress {
 /// An image compared with the truth.
 #[derive(Clone, Debug, Default)]
 pub struct Comparison {
+    /// Number of the request whose images were compared.
+    pub request: u64,
     /// Root of the mean squared difference over pixels that show the scene.
     pub rmse: f64,
     /// Mean difference.

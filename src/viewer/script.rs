@@ -22,7 +22,10 @@ const SCROLLING: Duration = Duration::from_millis(200);
 /// The commands, for help and docs/viewer.md.
 pub const COMMANDS: &[(&str, &str)] = &[
     ("wait SECONDS", "let time pass"),
-    ("wait picture|settled [SECONDS]", "until the first image has a picture, or all have settled; at most so long [120]"),
+    (
+        "wait picture|settled [SECONDS]",
+        "until the first image has a picture, or all have settled; at most so long [120]; fails at once where a scene or an image cannot be had",
+    ),
     ("wait compared [SECONDS]", "until there is a comparison with the truth"),
     ("wait text:TEXT", "until a control or label contains the text; at most 120 seconds"),
     ("key [Ctrl+|Shift+]NAME [SECONDS]", "press a key, and hold it"),
@@ -75,6 +78,17 @@ enum Condition {
     Text(String),
 }
 
+impl Condition {
+    fn name(&self) -> String {
+        match self {
+            Self::Picture => "a picture".into(),
+            Self::Settled => "images that have settled".into(),
+            Self::Compared => "a comparison".into(),
+            Self::Text(text) => format!("the text \"{text}\""),
+        }
+    }
+}
+
 /// What a script requests of its host.
 #[derive(Clone, Debug, Default)]
 pub struct HostRequests {
@@ -122,6 +136,8 @@ pub struct Script {
     tree: Vec<(NodeId, accesskit::Node)>,
     messages_seen: usize,
     errors: Vec<String>,
+    /// Number of scenes that could not be loaded, as the script has expected.
+    known_failures: usize,
 }
 
 struct Current {
@@ -213,6 +229,7 @@ impl Script {
             tree: Vec::new(),
             messages_seen: 0,
             errors: Vec::new(),
+            known_failures: 0,
         })
     }
 
@@ -305,10 +322,19 @@ impl Script {
                     Condition::Compared => app.comparison.is_some(),
                     Condition::Text(text) => self.contains(text),
                 };
+                // a frame at least, so that what was done before is requested
+                if step > 1
+                    && let Some(why) = self.hopeless(condition, app)
+                {
+                    return Err(format!("{} will not come: {why}", condition.name()));
+                }
                 match (holds, elapsed > *most) {
-                    (false, true) => Err(format!("waited {most:?} for {condition:?}{}", self.shown_errors(app))),
-                    // a frame at least, so that what was done before is requested
-                    (holds, _) => Ok(holds && step > 1),
+                    (false, true) => Err(format!("waited {most:?} for {}{}", condition.name(), self.shown_errors(app))),
+                    (holds, _) if holds && step > 1 => {
+                        self.acknowledge(condition, app);
+                        Ok(true)
+                    }
+                    _ => Ok(false),
                 }
             }
             Command::Key(modifiers, key, time) => {
@@ -410,12 +436,37 @@ impl Script {
                 self.section.last_picture = app.panes[0].progress.clone();
                 Ok(true)
             }
-            Command::Expect(text) if self.contains(text) => Ok(true),
+            Command::Expect(text) if self.contains(text) => {
+                self.known_failures = app.load_failures.len();
+                Ok(true)
+            }
             Command::Expect(text) => Err(format!("nothing on the screen contains \"{text}\"{}", self.shown_errors(app))),
             Command::ExpectNoErrors => match self.errors.first() {
                 None => Ok(true),
                 Some(error) => Err(format!("an error was shown: {error}")),
             },
+        }
+    }
+
+    /// Why a wait for an image would be in vain.
+    fn hopeless(&self, condition: &Condition, app: &App) -> Option<String> {
+        if matches!(condition, Condition::Text(_)) {
+            return None;
+        }
+        let failed_load = (app.load_failures.len() > self.known_failures).then(|| app.load_failures.last().cloned());
+        let compares = !matches!(condition, Condition::Compared) || app.compares_now();
+        app.failure
+            .clone()
+            .or_else(|| failed_load.flatten())
+            .or_else(|| app.source.is_none().then(|| "no scene is open".into()))
+            .or_else(|| app.panes[0].error.clone())
+            .or_else(|| (!compares).then(|| "nothing is compared".into()))
+    }
+
+    /// A script that waits for a text knows of the scenes that could not be loaded before.
+    fn acknowledge(&mut self, condition: &Condition, app: &App) {
+        if matches!(condition, Condition::Text(_)) {
+            self.known_failures = app.load_failures.len();
         }
     }
 

@@ -90,6 +90,33 @@ impl Technique {
         capabilities.contains(&Capability::LightTransport) && capabilities.contains(&Capability::RealTimeFrames)
     }
 
+    /// The technique that settings select: what the viewer shows first with them.
+    pub fn of_settings(settings: &RenderSettings) -> Self {
+        let preset = settings.frames.preset.unwrap_or(Preset::Balanced);
+        let buffer = settings.frames.show.filter(|show| *show != DisplayMode::Result);
+        match (settings.integrator, buffer) {
+            (Some(integrator), _) if settings.realtime_setting().is_none() => Self::Still(integrator),
+            (Some(integrator), None) if integrator != IntegratorName::default() => Self::Frames(integrator),
+            (_, Some(buffer)) => Self::Buffer(buffer),
+            _ if settings.frames.technique == Some(AoTechnique::Gtao) => Self::Gtao,
+            _ => Self::Preset(preset),
+        }
+    }
+
+    /// The integrator of its values; of a buffer it is that of the ambient occlusion behind it.
+    pub fn integrator(self) -> IntegratorName {
+        match self {
+            Self::Still(integrator) | Self::Frames(integrator) => integrator,
+            Self::Preset(_) | Self::Gtao | Self::Buffer(_) | Self::Converged => IntegratorName::default(),
+        }
+    }
+
+    /// What it is an estimate of: the truth that it is compared with unless another is chosen.
+    pub fn truth(self) -> Self {
+        let integrator = self.integrator();
+        if integrator == IntegratorName::default() { Self::Converged } else { Self::Still(integrator) }
+    }
+
     /// Returns true for images of ambient occlusion or of another quantity from 0 to 1 of the same meaning.
     pub fn is_occlusion(self) -> bool {
         match self {
@@ -114,6 +141,7 @@ impl Technique {
             frames: None,
             fps: None,
             animate: None,
+            time: None,
             camera_path: None,
             orbit: None,
             warm_up: None,

@@ -6,11 +6,13 @@ use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT, Queryable};
 use skylit::renderer::RenderSettings;
 use skylit::renderer::interactive::{Pick, ViewPicture};
-use skylit::viewer::ViewOptions;
-use skylit::viewer::app::{App, Arrangement, Second};
+use skylit::settings::Length;
+use skylit::viewer::app::{App, Arrangement, RenderedMotion, Second};
 use skylit::viewer::request::{
     Comparison, DeviceSummary, Event, EventSender, Mailbox, PickPurpose, Progress, SceneSummary, TRUTH, Task,
 };
+use skylit::viewer::technique::Technique;
+use skylit::viewer::{FileKind, ViewOptions};
 
 /// The viewer without a renderer: what it requests goes to a mailbox, what it is told comes from the sender.
 struct Alone {
@@ -20,11 +22,15 @@ struct Alone {
 }
 
 fn alone(scene: Option<&str>) -> Alone {
+    alone_with(scene, RenderSettings::default())
+}
+
+fn alone_with(scene: Option<&str>, settings: RenderSettings) -> Alone {
     let mailbox = Arc::new(Mailbox::default());
     let (sender, events) = std::sync::mpsc::channel();
     let options = ViewOptions {
         scene: scene.map(str::to_owned),
-        settings: RenderSettings::default(),
+        settings,
         device: Default::default(),
         size: [1000, 700],
         frame_rate: Some(10.0),
@@ -38,7 +44,11 @@ fn alone(scene: Option<&str>) -> Alone {
 }
 
 fn loaded() -> Alone {
-    let mut alone = alone(Some("builtin:stairs"));
+    loaded_with(RenderSettings::default())
+}
+
+fn loaded_with(settings: RenderSettings) -> Alone {
+    let mut alone = alone_with(Some("builtin:stairs"), settings);
     let scene = skylit::scene::builtin::by_name("stairs").unwrap();
     alone.events.send(Event::Loaded(Box::new(SceneSummary {
         load: 1,
@@ -46,6 +56,7 @@ fn loaded() -> Alone {
         source: "builtin:stairs".into(),
         bounds: scene.bounds().unwrap(),
         cameras: scene.cameras.clone(),
+        animations: vec![("turn".into(), 2.0), ("bend".into(), 3.0)],
         ..Default::default()
     })));
     alone.events.send(Event::Camera(Box::new(scene.cameras[0].clone()), None));
@@ -62,6 +73,16 @@ impl Alone {
     fn press(&mut self, key: egui::Key) {
         self.harness.key_press(key);
         self.harness.run_steps(3);
+    }
+
+    fn change(&mut self, change: impl FnOnce(&mut App)) -> skylit::viewer::request::Request {
+        change(self.harness.state_mut());
+        self.harness.run_steps(2);
+        self.mailbox.peek()
+    }
+
+    fn shows(&self, text: &str) -> bool {
+        self.harness.query_all_by_label_contains(text).count() > 0
     }
 }
 
@@ -341,10 +362,265 @@ fn saving_waits_but_not_for_another_scene() {
     let path = save(&mut alone, "heat.png");
     assert!(alone.harness.query_all_by_label_contains("there is no comparison").count() > 0);
     let heat_map = Arc::new(ViewPicture { size: [2, 1], rgba: vec![9, 8, 7, 255, 1, 2, 3, 255] });
-    alone.events.send(Event::Compared(Box::new(Comparison { heat_map, ..Default::default() })));
+    let request = alone.mailbox.number();
+    alone.events.send(Event::Compared(Box::new(Comparison { request, heat_map, ..Default::default() })));
     alone.harness.run_steps(2);
     save(&mut alone, "heat.png");
     let image = skylit::output::load(&path).unwrap();
     assert_eq!((image.width, image.height), (2, 1));
     assert!(alone.mailbox.latest().0.tasks.is_empty());
+}
+
+/// The truth is of the integrator that is shown, with samples of its own, unless another was chosen for it.
+#[test]
+fn the_truth_is_of_what_is_shown() {
+    let mut alone = loaded();
+    alone.press(egui::Key::T);
+    let truth = |alone: &Alone| alone.mailbox.peek().panes.last().unwrap().clone();
+    assert_eq!(alone.harness.state().truth(), Technique::Converged);
+    alone.press(egui::Key::Num4);
+    let path = truth(&alone);
+    assert_eq!(path.integrator().name(), "path");
+    assert!(path.realtime_setting().is_none(), "a still, which converges");
+    assert_ne!(path.image.seed, alone.mailbox.peek().panes[0].image.seed);
+    let sky = Technique::Still("ao-sky".parse().unwrap());
+    alone.change(|app| app.first = Technique::Preset(Default::default()));
+    alone.change(|app| app.choose_truth(Some(sky)));
+    alone.press(egui::Key::Num3);
+    assert_eq!(truth(&alone).integrator().name(), "ao-sky", "of every preset");
+    for name in ["direct", "lit", "whitted", "ao-sky"] {
+        alone.change(|app| app.first = Technique::Frames(name.parse().unwrap()));
+        assert_eq!(truth(&alone).integrator().name(), name);
+    }
+}
+
+/// A comparison is shown as long as it is one of what is requested, and says what with.
+#[test]
+fn comparisons_go_with_what_they_were_of() {
+    let compared = || {
+        let mut alone = loaded();
+        alone.press(egui::Key::T);
+        let request = alone.mailbox.number();
+        alone.events.send(Event::Compared(Box::new(Comparison { request, rmse: 0.125, ..Default::default() })));
+        alone.harness.run_steps(2);
+        assert!(alone.shows("RMSE 0.1250") && alone.shows("against AO converged"));
+        (alone, request)
+    };
+    type Change = (&'static str, fn(&mut App));
+    let changes: [Change; 9] = [
+        ("light", |app| app.lighting.environment = Some("1,1,1".into())),
+        ("animation", |app| app.playback.animation = Some(1)),
+        ("technique", |app| app.first = Technique::Gtao),
+        ("truth", |app| app.choose_truth(Some(Technique::Still("path".parse().unwrap())))),
+        ("radius", |app| app.settings.integrators.ao.ao_radius = Some(Length::Units(0.3))),
+        ("camera", |app| app.control.as_mut().unwrap().orbit(10.0, 0.0)),
+        ("reload", |app| app.reload()),
+        ("tracer", |app| app.device_settings.tracer = Some(skylit::tracer::TracerChoice::Query)),
+        ("no comparison", |app| app.compares = false),
+    ];
+    for (name, change) in changes {
+        let (mut alone, before) = compared();
+        alone.change(change);
+        assert!(!alone.shows("RMSE 0.1250"), "{name}");
+        // one that was on its way
+        alone.events.send(Event::Compared(Box::new(Comparison { request: before, rmse: 0.125, ..Default::default() })));
+        alone.harness.run_steps(2);
+        assert!(!alone.shows("RMSE 0.1250"), "{name}: late");
+    }
+    // the time of an animation
+    let (mut alone, _) = compared();
+    alone.change(|app| app.playback.animation = Some(0));
+    let request = alone.mailbox.number();
+    alone.events.send(Event::Compared(Box::new(Comparison { request, rmse: 0.125, ..Default::default() })));
+    alone.harness.run_steps(2);
+    assert!(alone.shows("RMSE 0.1250"));
+    alone.change(|app| app.playback.time = 1.0);
+    assert!(!alone.shows("RMSE 0.1250"));
+}
+
+/// What is rendered or copied is the moment of the animation that is shown, with the camera and the radius that are.
+#[test]
+fn what_is_rendered_is_what_is_shown() {
+    let mut alone = loaded();
+    alone.change(|app| app.playback.animation = Some(1));
+    alone.change(|app| app.playback.time = 1.25);
+    let app = alone.harness.state();
+    let command = app.command().unwrap();
+    for part in ["--animate 1", "--time 1.25", "--camera 0", "--ao-radius inf"] {
+        assert!(command.contains(part), "{part}: {command}");
+    }
+    let turntable = app.render_settings(RenderedMotion::Turntable).unwrap().frames;
+    assert_eq!((turntable.animation(), turntable.time, turntable.orbit), (Some("1"), Some(1.25), Some(120)));
+    let animation = app.render_settings(RenderedMotion::Animation).unwrap().frames;
+    assert_eq!((animation.animation(), animation.time), (Some("1"), None));
+    assert_eq!(animation.range().end, 90, "three seconds");
+    // a still of a moment is one of a sequence of one
+    alone.change(|app| app.first = Technique::Still("path".parse().unwrap()));
+    let still = alone.harness.state().render_settings(RenderedMotion::Nothing).unwrap();
+    assert!(still.is_still_sequence() && still.frames.time == Some(1.25) && still.image.spp.is_some());
+    still.check().unwrap();
+    // a camera that the user has left where the animation would move it
+    alone.change(|app| app.followed = None);
+    let command = alone.harness.state().command().unwrap();
+    assert!(command.contains("--eye") && !command.contains("--camera"), "{command}");
+    // what is saved is what is shown when it is read again
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("settings.json");
+    let saved = alone.harness.state().render_settings(RenderedMotion::Nothing).unwrap();
+    std::fs::write(&path, serde_json::to_vec(&saved).unwrap()).unwrap();
+    let mut other = loaded();
+    other.change(|app| app.open_file(&path.to_string_lossy()));
+    let app = other.harness.state();
+    assert_eq!(app.first, Technique::Still("path".parse().unwrap()));
+    assert_eq!((app.playback.animation, app.playback.time, app.control.is_none()), (Some(1), 1.25, true));
+    assert_eq!(other.mailbox.peek().first_camera, saved.camera, "the renderer chooses it");
+    let started = loaded_with(saved);
+    assert_eq!((started.mailbox.peek().animation, started.mailbox.peek().time), (Some(1), 1.25));
+}
+
+/// A camera that an animation moves is left where it is, not where it would be without.
+#[test]
+fn a_followed_camera_is_left_where_it_is() {
+    let mut alone = loaded();
+    assert_eq!(alone.mailbox.peek().followed_camera, Some(0), "as skylit render does");
+    let mut moved = alone.harness.state().control.as_ref().unwrap().camera().clone();
+    moved.camera_to_world.translation += glam::DVec3::new(3.0, 4.0, 5.0);
+    let number = alone.mailbox.number();
+    let progress = Progress { camera: Some(moved.clone()), request: number, ..Default::default() };
+    alone.events.send(Event::Picture(Box::new(progress)));
+    alone.harness.run_steps(2);
+    alone.press(egui::Key::B);
+    assert_eq!(alone.harness.state().bookmarks[0].1, moved);
+    let request = alone.change(App::leave_followed);
+    assert_eq!((request.camera, request.followed_camera), (Some(moved), None));
+}
+
+/// Where everything is black a line says why, and F and Ctrl+R have a camera found that sees something.
+#[test]
+fn black_views_are_explained_and_left() {
+    let mut alone = loaded();
+    alone.events.send(Event::Black(0, Some("Nothing of the scene is in view".into())));
+    alone.harness.run_steps(2);
+    assert!(alone.shows("Nothing of the scene is in view"));
+    alone.press(egui::Key::F);
+    let request = alone.mailbox.peek();
+    assert_eq!(request.tasks, [Task::CheckView { frames: true }]);
+    let from = request.camera.unwrap();
+    let mut to = from.clone();
+    to.camera_to_world.translation.x += 1.0;
+    alone.events.send(Event::Framed(Box::new([from.clone(), to.clone()])));
+    alone.events.send(Event::Black(0, None));
+    alone.harness.run_steps(2);
+    assert_eq!(alone.mailbox.peek().camera, Some(to.clone()));
+    assert!(!alone.shows("Nothing of the scene is in view"));
+    // the user has moved on
+    alone.events.send(Event::Framed(Box::new([from.clone(), from])));
+    alone.harness.run_steps(2);
+    assert_eq!(alone.mailbox.peek().camera, Some(to));
+    alone.mailbox.done(&Task::CheckView { frames: true });
+    alone.harness.key_press_modifiers(egui::Modifiers::COMMAND, egui::Key::R);
+    alone.harness.run_steps(2);
+    let request = alone.mailbox.peek();
+    assert_eq!((request.load, request.tasks), (2, vec![Task::CheckView { frames: false }]));
+}
+
+/// An image that is dropped becomes the environment; one that cannot be read leaves the light as it was.
+#[test]
+fn images_are_environments() {
+    for (path, kind) in [
+        ("a/sky.hdr", FileKind::Environment),
+        ("a/SKY.EXR", FileKind::Environment),
+        ("pano.jpg", FileKind::Environment),
+        ("settings.json", FileKind::Settings),
+        ("builtin:stairs", FileKind::Scene),
+        ("scene.glb", FileKind::Scene),
+        ("no extension", FileKind::Scene),
+    ] {
+        assert_eq!(FileKind::of(path), kind, "{path}");
+    }
+    let mut alone = loaded();
+    alone.change(|app| app.lighting.environment_turn = Some(90.0));
+    let good = alone.change(|app| app.open_file("sky.hdr")).lighting;
+    assert_eq!((good.environment.as_deref(), good.environment_turn), (Some("sky.hdr"), None));
+    assert_eq!(alone.mailbox.peek().scene.as_deref(), Some("builtin:stairs"), "the scene stays");
+    assert!(alone.shows("environment: sky.hdr"));
+    let bad = alone.change(|app| app.open_file("broken.exr")).lighting;
+    alone.events.send(Event::LightingRefused(Box::new([bad, good.clone()]), "broken.exr: not an image".into()));
+    alone.harness.run_steps(2);
+    assert_eq!(alone.mailbox.peek().lighting, good);
+    assert!(alone.shows("broken.exr: not an image"));
+}
+
+/// Lengths start from the scene's size, and those that were given are not changed by being shown.
+#[test]
+fn lengths_are_sane_and_stay() {
+    let mut alone = loaded();
+    // its slider has the same name
+    let tick = |alone: &mut Alone| {
+        alone.harness.get_by_role_and_label(egui::accesskit::Role::CheckBox, "Falloff").click();
+        alone.harness.run_steps(3);
+    };
+    tick(&mut alone);
+    let size = alone.harness.state().control.as_ref().unwrap().scene_size();
+    let half = |alone: &Alone| 1.0 / alone.mailbox.peek().panes[0].integrators.ao.ao_falloff.unwrap().log2();
+    assert!((0.02 * size..0.2 * size).contains(&half(&alone)), "without a radius {} of {size}", half(&alone));
+    tick(&mut alone);
+    alone.change(|app| app.settings.integrators.ao.ao_radius = Some(Length::Units(0.02)));
+    tick(&mut alone);
+    assert!((half(&alone) - 0.01).abs() < 1e-4, "half of the radius, {}", half(&alone));
+    // a scene of a millimetre has a falloff, too, that can be computed with
+    alone.change(|app| app.settings.integrators.ao.ao_falloff = Some(1e300));
+    assert_eq!(alone.mailbox.peek().panes[0].integrators.ao.ao_falloff, Some(1e300));
+
+    for radius in [1e-7, 1e7] {
+        let mut settings = RenderSettings::default();
+        settings.integrators.ao.ao_radius = Some(Length::Units(radius));
+        let mut alone = loaded_with(settings);
+        alone.harness.get_all_by_label("Camera").last().unwrap().click();
+        let request = alone.change(|app| app.control.as_mut().unwrap().set_fov_y(0.01));
+        assert_eq!(request.panes[0].integrators.ao.radius(), radius);
+        let skylit::scene::Projection::Perspective { fov_y } = request.camera.unwrap().projection else { panic!() };
+        assert!((fov_y - 0.01).abs() < 1e-12, "{fov_y}");
+    }
+}
+
+/// Lengths and places of one scene are not those of the next; what the command line says of all of them is.
+#[test]
+fn another_scene_starts_afresh() {
+    let mut settings = RenderSettings::default();
+    settings.camera.eye = Some(glam::DVec3::ONE);
+    settings.camera.target = Some(glam::DVec3::ZERO);
+    settings.integrators.ao.ao_falloff = Some(2.0);
+    let mut alone = loaded_with(settings);
+    let light = skylit::scene::light_spec::parse("sphere position=1,2,3 radius=0.5 radiance=4").unwrap();
+    alone.change(|app| {
+        app.settings.integrators.ao.ao_radius = Some(Length::Units(7.0));
+        app.settings.integrators.ao.ao_falloff = Some(9.0);
+        app.lighting.light.push(light);
+        app.lighting.environment = Some("1,1,1".into());
+        app.playback.animation = Some(1);
+    });
+    alone.change(|app| app.open("builtin:cornell-box"));
+    let summary = SceneSummary { load: 2, is_complete: true, source: "builtin:cornell-box".into(), ..Default::default() };
+    alone.events.send(Event::Loaded(Box::new(summary)));
+    alone.harness.run_steps(2);
+    let request = alone.mailbox.peek();
+    let ao = &request.panes[0].integrators.ao;
+    assert_eq!((ao.ao_radius, ao.ao_falloff), (None, Some(2.0)));
+    assert_eq!((request.first_camera.eye, request.animation), (None, None));
+    assert!(request.lighting.light.is_empty() && request.lighting.environment.is_some());
+}
+
+/// Play at the end starts anew; Space shows one image of two.
+#[test]
+fn play_and_flicker_have_an_effect() {
+    let mut alone = loaded();
+    alone.change(|app| (app.playback.animation, app.playback.time, app.playback.repeats) = (Some(0), 2.0, false));
+    alone.press(egui::Key::P);
+    let playback = &alone.harness.state().playback;
+    assert!(playback.runs && playback.time < 1.0, "{playback:?}");
+    alone.press(egui::Key::X);
+    alone.press(egui::Key::Space);
+    let app = alone.harness.state();
+    assert_eq!((app.arrangement, app.shows_second), (Arrangement::Single, true));
 }

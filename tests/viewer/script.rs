@@ -161,10 +161,67 @@ fn gpu_scripts_fail_where_they_should() {
     for (text, expected) in [
         ("wait 0.1\nexpect no such text", "line 2: nothing on the screen"),
         ("wait 0.1\nclick No such button", "line 2: no control is called"),
-        ("drop no/such/file.glb\nwait picture 2", "no/such/file.glb"),
+        ("wait settled", "no scene is open"),
+        ("drop no/such/file.glb\nwait picture", "no/such/file.glb"),
+        ("drop no/such/file.glb\nwait settled", "no/such/file.glb"),
+        ("drop builtin:plane\nwait picture\nwait compared", "nothing is compared"),
+        ("drop builtin:plane\nwait picture\ndrop no/such/file.glb\nwait settled", "no/such/file.glb"),
     ] {
+        let start = Instant::now();
         let error = run(None, folder.path(), text).unwrap_err();
         assert!(matches!(error, Error::CheckFailed(_)) && error.to_string().contains(expected), "{error}");
+        assert!(start.elapsed().as_secs() < 60, "{text}: the reason is known at once");
     }
     assert!(matches!(headless::run(&options(None), Path::new("no such script")), Err(Error::Input { .. })));
+}
+
+/// From behind the walls of a dark room nothing is to be seen: a line says so, F finds the place from which there is, and so does Ctrl+R. An environment that is dropped lights
+/// it from outside, and one that cannot be read changes nothing.
+#[test]
+fn gpu_black_views_are_left() {
+    let folder = tempfile::tempdir().unwrap();
+    let sky = skylit::output::Image {
+        width: 4,
+        height: 2,
+        channels: ["R", "G", "B"]
+            .map(|name| skylit::output::Channel { name: name.into(), samples: skylit::output::Samples::F32(vec![0.5; 8]) })
+            .to_vec(),
+        metadata: Vec::new(),
+    };
+    skylit::output::save(&sky, &folder.path().join("sky.exr")).unwrap();
+    std::fs::write(folder.path().join("broken.hdr"), "no image").unwrap();
+    let script = folder.path().join("script.txt");
+    let text = "wait picture 90
+wheel 200 200 -12
+wait text:Black
+screenshot FOLDER/black.png
+key F
+wait text:framed what can be seen
+wait 1
+screenshot FOLDER/framed.png
+wheel 200 200 -12
+wait text:Black
+key Ctrl+R
+wait text:framed what can be seen
+drop FOLDER/broken.hdr
+wait text:the light stays
+drop FOLDER/sky.exr
+wait text:environment: FOLDER/sky.exr
+wheel 200 200 -12
+wait 2
+screenshot FOLDER/lit.png";
+    std::fs::write(&script, text.replace("FOLDER", &folder.path().to_string_lossy())).unwrap();
+    let mut options = options(Some("builtin:closed-box"));
+    options.settings.integrator = Some("direct".parse().unwrap());
+    headless::run(&options, &script).unwrap();
+    let mean = |name: &str| {
+        let image = skylit::output::load(&folder.path().join(name)).unwrap();
+        let red = image.f32("R").unwrap();
+        // the middle of the image, without titles and the line
+        let row = |y: usize| &red[y * image.width as usize..][100..400];
+        let values: Vec<f32> = (150..300).flat_map(|y| row(y).iter().copied()).collect();
+        values.iter().sum::<f32>() / values.len() as f32
+    };
+    let means = ["black.png", "framed.png", "lit.png"].map(mean);
+    assert!(means[0] < 0.01 && means[1] > 0.05 && means[2] > 0.05, "{means:?}");
 }

@@ -158,6 +158,20 @@ fn gpu_animations_are_those_of_render() {
     while sequence.advance().unwrap().is_some() {}
     let expected = sequence.displayed().unwrap().read(0, u64::from(4 * SIZE[0] * SIZE[1])).unwrap();
     drop(sequence);
+    // one moment: of frames, and of a still
+    let moment = |time: f64| {
+        let frames = serde_json::json!({ "preset": "fast", "frames": "0..1", "warm_up": 0, "time": time });
+        settings(serde_json::json!({ "image": { "size": SIZE }, "frames": frames }))
+    };
+    let mut held = |time: f64| {
+        let mut sequence = renderer.frames(&moment(time), true, &mut NoControl).unwrap();
+        while sequence.advance().unwrap().is_some() {}
+        sequence.displayed().unwrap().read(0, u64::from(4 * SIZE[0] * SIZE[1])).unwrap()
+    };
+    let (moments, end, after) = ([0.0, 0.625].map(&mut held), held(2.0), held(5.0));
+    assert!(moments[0] != moments[1] && end == after, "after its end an animation holds its last pose");
+    let still = serde_json::json!({ "integrator": "ao", "image": { "size": SIZE, "spp": 1 }, "frames": { "time": 0.625 } });
+    let still = renderer.still_sequence(&settings(still)).unwrap().render(0, &mut NoControl).unwrap().image;
     let mut session = renderer.interactive(&Default::default(), Some(0)).unwrap();
     let preset = settings(serde_json::json!({ "frames": { "preset": "fast" } }));
     let mut view = View::new(&mut session, &preset, SIZE, &mut NoControl).unwrap();
@@ -167,6 +181,15 @@ fn gpu_animations_are_those_of_render() {
         view.step(&session, &followed, STEP, &mut NoControl).unwrap();
     }
     assert!(view.picture().unwrap().unwrap().rgba == expected);
+    // the last of the six is at 0.625 s
+    let followed = session.animated_camera(0).unwrap_or_else(|| camera.clone());
+    let mut fresh = View::new(&mut session, &preset, SIZE, &mut NoControl).unwrap();
+    fresh.step(&session, &followed, STEP, &mut NoControl).unwrap();
+    assert!(fresh.picture().unwrap().unwrap().rgba == moments[1]);
+    let mut fresh =
+        View::new(&mut session, &settings(serde_json::json!({ "integrator": "ao" })), SIZE, &mut NoControl).unwrap();
+    fresh.step(&session, &followed, Duration::from_micros(1), &mut NoControl).unwrap();
+    assert_eq!(fresh.values().unwrap().values, still.f32("Y").unwrap());
     assert_validation_clean(&device());
 }
 

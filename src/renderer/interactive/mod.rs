@@ -23,7 +23,7 @@ use crate::shaders::StreamShaders;
 use crate::tracer::{BuildStats, ComputeOptions, DeviceSettings, MovedBounds, Needs, Tracer, TracerKind};
 
 pub use pick::Pick;
-pub use view::{View, ViewPicture, ViewStep, ViewValues, camera_settings, render_flags};
+pub use view::{View, ViewPicture, ViewStep, ViewValues, camera_placement, camera_settings, render_command, render_flags};
 
 /// A scene with its tracers, for views that change ([`Renderer::interactive`]).
 pub struct Interactive<'r> {
@@ -128,7 +128,7 @@ impl<'r> Interactive<'r> {
         std::mem::take(&mut self.warnings)
     }
 
-    /// Moves the scene to a time of its animation, in seconds since its start; animations loop. Returns true if anything moved.
+    /// Moves the scene to a time of its animation, in seconds since its start; after its end it holds its last pose. Returns true if anything moved.
     ///
     /// # Errors
     /// Those of [`Tracer::update`].
@@ -138,7 +138,7 @@ impl<'r> Interactive<'r> {
             return Ok(false);
         }
         animation.time = Some(seconds);
-        animation.rig.pose(animation.index, seconds, Playback::Loop, &mut animation.pose)?;
+        animation.rig.pose(animation.index, seconds, Playback::Once, &mut animation.pose)?;
         for world in &mut self.traced {
             world.update(&animation.pose)?;
         }
@@ -157,9 +157,17 @@ impl<'r> Interactive<'r> {
     /// # Errors
     /// Those of the device; [`Error::Scene`] for a scene without geometry.
     pub fn choose_camera(&mut self, aspect: f64, control: &mut dyn Control) -> Result<Camera> {
-        if let Some(camera) = self.scene.cameras.first() {
-            return Ok(camera.clone());
+        match self.scene.cameras.first() {
+            Some(camera) => Ok(camera.clone()),
+            None => self.automatic_camera(aspect, control),
         }
+    }
+
+    /// The camera that is chosen by what it would see, whatever cameras the file has ([`framing::choose`]).
+    ///
+    /// # Errors
+    /// As [`Self::choose_camera`].
+    pub fn automatic_camera(&mut self, aspect: f64, control: &mut dyn Control) -> Result<Camera> {
         if self.traced.is_empty() {
             self.traced_scene(Blend::Masked, Needs::default(), Vec::new(), control)?;
         }

@@ -68,8 +68,11 @@ impl Interactive<'_> {
         }
     }
 
-    /// What rays see, to choose a camera.
-    pub(super) fn visible_surfaces(&self, rays: &[(DVec3, DVec3)]) -> Result<Vec<Option<VisibleSurface>>> {
+    /// What rays (origins and unit directions in world space) see; nothing before the first view.
+    ///
+    /// # Errors
+    /// Those of the device.
+    pub fn visible_surfaces(&self, rays: &[(DVec3, DVec3)]) -> Result<Vec<Option<VisibleSurface>>> {
         Ok(visible_surfaces(self.scene, rays, self.closest_hits(rays)?))
     }
 

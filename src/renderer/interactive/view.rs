@@ -440,9 +440,13 @@ pub fn render_flags(name: &str, settings: &RenderSettings, cameras: &[Camera], c
     let mut settings = settings.clone();
     settings.image.size = Some(size);
     settings.camera = camera_settings(cameras, camera);
-    let is_frames = settings.realtime_setting().is_some();
-    let output = if is_frames || settings.integrator().name() == "ao" { "ao" } else { settings.integrator().name() };
-    let words = ["skylit".into(), "render".into(), name.to_owned(), "-o".into(), format!("{output}.png")];
+    render_command(name, &settings)
+}
+
+/// The command that renders a scene with these settings: `skylit render SCENE ...`, quoted for a shell.
+pub fn render_command(name: &str, settings: &RenderSettings) -> String {
+    let output = format!("{}.png", settings.integrator().name());
+    let words = ["skylit".into(), "render".into(), name.to_owned(), "-o".into(), output];
     words.into_iter().chain(settings.flags()).map(|w| quoted(&w)).collect::<Vec<_>>().join(" ")
 }
 
@@ -452,6 +456,11 @@ pub fn camera_settings(cameras: &[Camera], camera: &Camera) -> CameraSettings {
     if let Some(index) = cameras.iter().position(|c| c == camera) {
         return CameraSettings { camera: Some(index.to_string()), ..Default::default() };
     }
+    camera_placement(camera)
+}
+
+/// Position, target, up vector and field of view of a camera.
+pub fn camera_placement(camera: &Camera) -> CameraSettings {
     let to_world = &camera.camera_to_world;
     let fov_y = match camera.projection {
         Projection::Perspective { fov_y } => Some(fov_y.to_degrees()),

@@ -7,8 +7,7 @@ use std::task::Poll;
 use egui::{Align2, Context, Key, Ui};
 
 use crate::error::{Error, Result};
-use crate::renderer::RenderSettings;
-use crate::viewer::app::{App, Dialog, Second};
+use crate::viewer::app::{App, Dialog, RenderedMotion, Second};
 use crate::viewer::browse::Browsing;
 use crate::viewer::request::Task;
 
@@ -80,7 +79,9 @@ pub fn show(app: &mut App, context: &Context) {
 
 fn show_dialog(app: &mut App, context: &Context, mut dialog: Dialog) {
     let (title, label, action) = match &dialog {
-        Dialog::Open(_) => ("Open a scene", "A file (.gltf, .glb, .obj, .brhan) or builtin:NAME", "Open"),
+        Dialog::Open(_) => {
+            ("Open a scene", "A file (.gltf, .glb, .obj, .brhan), builtin:NAME, or an environment (.hdr, .exr)", "Open")
+        }
         Dialog::Save(_) => ("Save the image", "A file: .png, .jpg or .webp as shown, .exr with all channels", "Save"),
         Dialog::LoadSettings(_) => ("Load settings", "A file of settings (.json)", "Load"),
         Dialog::SaveSettings(_) => ("Save settings", "A file of settings (.json)", "Save"),
@@ -124,16 +125,12 @@ fn show_dialog(app: &mut App, context: &Context, mut dialog: Dialog) {
 fn act(app: &mut App, dialog: Dialog) {
     match dialog {
         Dialog::Open(text) if text.trim().is_empty() => {}
-        Dialog::Open(text) => app.open(text.trim()),
+        Dialog::Open(text) => app.open_file(text.trim()),
         Dialog::Save(text) if app.shows_second && app.second == Second::HeatMap => save_heat_map(app, Path::new(text.trim())),
         Dialog::Save(text) => app.task(Task::Save { pane: usize::from(app.shows_second), path: PathBuf::from(text.trim()) }),
-        Dialog::Render(text, options) => app.render(text.trim(), &options),
-        Dialog::LoadSettings(text) => match RenderSettings::load(Path::new(text.trim())) {
-            Ok(settings) => {
-                app.lighting = settings.lighting.clone();
-                app.settings = settings;
-                app.report(format!("loaded {}", text.trim()), false);
-            }
+        Dialog::Render(text, motion) => app.render(text.trim(), motion),
+        Dialog::LoadSettings(text) => match app.load_settings(Path::new(text.trim())) {
+            Ok(()) => app.report(format!("loaded {}", text.trim()), false),
             Err(e) => app.report(e.to_string(), true),
         },
         Dialog::SaveSettings(text) => match save_settings(app, Path::new(text.trim())) {
@@ -153,10 +150,10 @@ fn save_heat_map(app: &mut App, path: &Path) {
 }
 
 fn save_settings(app: &App, path: &Path) -> Result<()> {
-    let mut settings = app.shown_settings();
-    if let (Some(scene), Some(control)) = (&app.scene, &app.control) {
-        settings.camera = crate::renderer::interactive::camera_settings(&scene.cameras, control.camera());
-    }
+    // without a scene there is no camera to say
+    let settings = app
+        .render_settings(RenderedMotion::Nothing)
+        .or_else(|e| if app.control.is_none() { Ok(app.shown_settings()) } else { Err(e) })?;
     crate::files::write_atomically(path, |file| {
         let mut text = serde_json::to_vec_pretty(&settings)?;
         text.push(b'\n');

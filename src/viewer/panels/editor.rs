@@ -2,6 +2,10 @@
 
 use egui::{ComboBox, DragValue, Response, Ui};
 
+use clap::Args;
+use clap::error::ErrorKind;
+
+use crate::renderer::RenderSettings;
 use crate::settings::{Setting, Value};
 
 /// Name of a setting for people: `Max depth`.
@@ -50,8 +54,8 @@ pub fn edit(ui: &mut Ui, settings: Vec<Setting>, effective: &serde_json::Value) 
                     return;
                 }
                 let response = match &mut setting.value {
-                    Value::Count(count) => number(ui, count, default, 0.2, 0..=u32::MAX),
-                    Value::Number(value) => number(ui, value, default, 0.01, f64::NEG_INFINITY..=f64::INFINITY),
+                    Value::Count(count) => number(ui, name, count, default, 0.2, 0..=u32::MAX),
+                    Value::Number(value) => number(ui, name, value, default, 0.01, f64::NEG_INFINITY..=f64::INFINITY),
                     Value::Choice(choice) => {
                         let all = choice.alternatives();
                         let selected = choice.selected();
@@ -78,9 +82,18 @@ pub fn edit(ui: &mut Ui, settings: Vec<Setting>, effective: &serde_json::Value) 
     changed
 }
 
-/// A number that is dragged or typed; changing it gives it, from the default on.
+/// Returns true if the command line takes a value of a setting, by its own range.
+fn is_accepted(name: &str, value: f64) -> bool {
+    let command = RenderSettings::augment_args(clap::Command::new("settings").no_binary_name(true));
+    let outcome = command.try_get_matches_from([format!("--{}={value}", name.replace('_', "-"))]);
+    // what it lacks besides is no matter of the value
+    !outcome.is_err_and(|e| matches!(e.kind(), ErrorKind::ValueValidation | ErrorKind::InvalidValue))
+}
+
+/// A number that is dragged or typed; changing it gives it, from the default on, unless the command line would refuse it.
 fn number<T: egui::emath::Numeric>(
     ui: &mut Ui,
+    name: &str,
     given: &mut Option<T>,
     default: Option<&serde_json::Value>,
     speed: f64,
@@ -93,8 +106,26 @@ fn number<T: egui::emath::Numeric>(
         drag = drag.custom_formatter(|_, _| "default".into());
     }
     let response = ui.add(drag);
-    if response.changed() {
+    if response.changed() && is_accepted(name, value.to_f64()) {
         *given = Some(value);
     }
     response
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_have_the_ranges_of_the_command_line() {
+        for (name, good, bad) in [
+            ("rays_per_pixel", 2.0, 0.0),
+            ("history", 8.0, 0.0),
+            ("filter_radius", 16.0, 17.0),
+            ("environment_scale", 0.5, -1.0),
+            ("sky_albedo", 0.5, 1.5),
+        ] {
+            assert!(is_accepted(name, good) && !is_accepted(name, bad), "{name}");
+        }
+    }
 }

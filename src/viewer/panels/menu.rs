@@ -3,7 +3,8 @@
 use egui::{Button, KeyboardShortcut, Ui};
 
 use crate::scene::builtin;
-use crate::viewer::app::{App, Arrangement, Dialog};
+use crate::viewer::app::{App, Arrangement, Dialog, RenderedMotion};
+use crate::viewer::request::Task;
 
 /// Keys of the commands in menus.
 pub mod shortcuts {
@@ -85,20 +86,15 @@ fn file(app: &mut App, ui: &mut Ui) {
         app.dialog = Some(Dialog::Save(format!("{}.png", stem(app))));
     }
     if item(ui, "Render this view…", None, "") {
-        app.dialog = Some(Dialog::Render(format!("{}.exr", stem(app)), Vec::new()));
+        app.dialog = Some(Dialog::Render(format!("{}.exr", stem(app)), RenderedMotion::Nothing));
     }
     ui.add_enabled_ui(app.shown_settings().realtime_setting().is_some(), |ui| {
         if item(ui, "Render a turntable…", None, "") {
-            let options = ["--orbit", "120", "--frames", "0..120"].map(str::to_owned).to_vec();
-            app.dialog = Some(Dialog::Render(format!("{}.turntable.apng", stem(app)), options));
+            app.dialog = Some(Dialog::Render(format!("{}.turntable.apng", stem(app)), RenderedMotion::Turntable));
         }
-        let animation = app.playback.animation.and_then(|k| Some((k, app.scene.as_ref()?.animations.get(k)?.1)));
-        ui.add_enabled_ui(animation.is_some(), |ui| {
+        ui.add_enabled_ui(app.playback.animation.is_some(), |ui| {
             if item(ui, "Render the animation…", None, "") {
-                let (k, duration) = animation.unwrap_or_default();
-                let frames = (30.0 * duration).ceil().max(1.0) as u32;
-                let options = ["--animate".into(), k.to_string(), "--frames".into(), format!("0..{frames}")].to_vec();
-                app.dialog = Some(Dialog::Render(format!("{}.apng", stem(app)), options));
+                app.dialog = Some(Dialog::Render(format!("{}.apng", stem(app)), RenderedMotion::Animation));
             }
         });
     });
@@ -120,9 +116,12 @@ fn file(app: &mut App, ui: &mut Ui) {
 
 /// Puts the command that renders what is shown on the clipboard.
 pub fn copy_command(app: &mut App) {
-    if let Some(command) = app.command() {
-        app.report(format!("copied: {command}"), false);
-        app.copied = Some(command);
+    match app.command() {
+        Ok(command) => {
+            app.report(format!("copied: {command}"), false);
+            app.copied = Some(command);
+        }
+        Err(e) => app.report(e.to_string(), true),
     }
 }
 
@@ -140,7 +139,7 @@ fn view(app: &mut App, ui: &mut Ui) {
         toggle_split(app);
     }
     if item(ui, "Flicker: show the other image", None, "Space") {
-        app.shows_second = !app.shows_second;
+        flicker(app);
     }
     if item(ui, "Compare with the truth", None, "T") {
         app.compares = !app.compares;
@@ -192,7 +191,7 @@ fn camera(app: &mut App, ui: &mut Ui) {
         for (k, camera) in scene.cameras.iter().enumerate() {
             let name = if camera.name.is_empty() { format!("Camera {k}") } else { camera.name.clone() };
             if item(ui, &name, None, "") {
-                set_camera(app, camera.clone(), Some(k));
+                app.set_camera(camera.clone(), Some(k));
             }
         }
     }
@@ -202,34 +201,47 @@ fn camera(app: &mut App, ui: &mut Ui) {
     }
     for (name, camera) in app.bookmarks.clone() {
         if item(ui, &name, None, "") {
-            set_camera(app, camera, None);
+            app.set_camera(camera, None);
         }
     }
 }
 
 /// Keeps the camera as a bookmark.
 pub fn keep_camera(app: &mut App) {
-    if let Some(control) = &app.control {
+    if let Some(camera) = app.shown_camera() {
         let name = format!("Kept camera {}", app.bookmarks.len() + 1);
-        app.bookmarks.push((name.clone(), control.camera().clone()));
+        app.bookmarks.push((name.clone(), camera));
         app.report(format!("{name}: in the menu Camera"), false);
     }
 }
 
-/// Moves the camera to another one.
-pub fn set_camera(app: &mut App, camera: crate::scene::Camera, followed: Option<usize>) {
-    let centre = app.scene.as_ref().map(|s| (s.bounds.0 + s.bounds.1) * 0.5).unwrap_or_default();
-    if let Some(control) = &mut app.control {
-        control.set_camera(camera, centre);
-        app.followed = followed;
+/// Shows the other image; of two side by side that one alone.
+pub fn flicker(app: &mut App) {
+    app.shows_second = match app.arrangement {
+        Arrangement::Single => !app.shows_second,
+        Arrangement::Split(_) => true,
+    };
+    app.arrangement = Arrangement::Single;
+}
+
+/// Plays or stops the animation, the first one unless another is chosen.
+pub fn play(app: &mut App) {
+    let Some(scene) = &app.scene else { return };
+    let playback = &mut app.playback;
+    if playback.animation.is_none() && !scene.animations.is_empty() {
+        (playback.animation, playback.time) = (Some(0), 0.0);
+    }
+    if let Some(animation) = playback.animation.and_then(|k| scene.animations.get(k)) {
+        playback.toggle(animation.1);
     }
 }
 
-/// Moves the camera to where it sees the whole scene from outside.
+/// Moves the camera to where it sees the whole scene from outside; to another place if that shows nothing.
 pub fn frame_all(app: &mut App) {
     let [width, height] = app.size();
     if let Some(scene) = &app.scene {
         let (lo, hi) = scene.bounds;
-        set_camera(app, crate::scene::Camera::framing(lo, hi, f64::from(width.max(1)) / f64::from(height.max(1))), None);
+        app.set_camera(crate::scene::Camera::framing(lo, hi, f64::from(width.max(1)) / f64::from(height.max(1))), None);
+        app.task(Task::CheckView { frames: true });
     }
 }

@@ -1,12 +1,12 @@
 //! The panel at the side: techniques, settings, light, animation, device, performance, selection.
 
-use egui::{CollapsingHeader, ComboBox, Slider, Ui};
+use egui::{CollapsingHeader, ComboBox, Slider, SliderClamping, Ui};
 
 use super::{editor, performance, round};
 use crate::integrators::{Integrator, IntegratorName};
 use crate::settings::{Capability, Length, Setting};
 use crate::tracer::TracerChoice;
-use crate::viewer::app::{App, Second};
+use crate::viewer::app::{App, RenderedMotion, Second};
 use crate::viewer::technique::{GROUPS, Technique};
 
 /// Shows all sections.
@@ -104,7 +104,7 @@ fn images(app: &mut App, ui: &mut Ui) {
             app.frame_rate = holds.then_some(app.default_frame_rate());
         }
         if let Some(rate) = &mut app.frame_rate {
-            let drag = egui::DragValue::new(rate).range(1.0..=240.0).speed(0.5).suffix(" frames/s");
+            let drag = egui::DragValue::new(rate).range(1.0..=240.0).clamp_existing_to_range(false).speed(0.5).suffix(" frames/s");
             ui.add(drag).labelled_by(response.id);
         }
     });
@@ -123,26 +123,60 @@ fn occlusion(app: &mut App, ui: &mut Ui) {
             ao.ao_radius = is_limited.then(|| Length::Units(round(0.1 * size)));
         }
         if let (true, Some(Length::Units(radius))) = (is_limited, &mut ao.ao_radius) {
-            let slider = Slider::new(radius, round(1e-3 * size)..=round(2.0 * size)).logarithmic(true).suffix(" units");
-            ui.add(slider).labelled_by(check.id);
+            ui.add(length(radius, size)).labelled_by(check.id);
         }
     });
     ui.horizontal(|ui| {
         let mut falls_off = ao.ao_falloff.is_some();
         let check = ui
             .checkbox(&mut falls_off, "Falloff")
-            .on_hover_text("A hit at distance d occludes by C^-d instead of wholly; 1 is binary, the cheapest\n--ao-falloff");
+            .on_hover_text(
+                "Hits occlude by half at this distance, by a quarter at twice the distance; without it wholly at any distance, the cheapest\n--ao-falloff C: a hit at distance d occludes by C^-d",
+            );
         if check.changed() {
-            // halved over a twentieth of the scene
-            ao.ao_falloff = falls_off.then(|| 2f64.powf((20.0 / size).min(30.0)));
+            // corners keep their darkness, what is at the radius has lost most of its own
+            let half = if ao.radius().is_finite() { 0.5 * ao.radius() } else { 0.05 * size };
+            ao.ao_falloff = falls_off.then(|| falloff_of(round(half)));
         }
         if let Some(falloff) = &mut ao.ao_falloff {
-            let most = 2f64.powf((1000.0 / size).min(40.0)).max(2.0);
-            ui.add(Slider::new(falloff, 1.0..=most).logarithmic(true)).labelled_by(check.id);
+            let mut half = half_distance(*falloff).min(1e3 * size);
+            let slider = ui.add(length(&mut half, size)).labelled_by(check.id);
+            if slider.changed() {
+                *falloff = falloff_of(half);
+            }
         }
     });
+    if let Some(falloff) = ao.ao_falloff {
+        ui.weak(format!("Occlusion is halved at this distance: --ao-falloff {}", in_short(falloff)));
+    }
     let rest = ao.editable().into_iter().filter(|s| s.name == "ao_normal").collect();
     editor::edit(ui, rest, &serde_json::json!({ "ao_normal": "geometric" }));
+}
+
+/// A slider of a length in a scene of this size. A value beyond its ends stays as it is until it is dragged.
+fn length(value: &mut f64, size: f64) -> Slider<'_> {
+    let slider = Slider::new(value, round(1e-3 * size)..=round(2.0 * size)).logarithmic(true);
+    slider.clamping(SliderClamping::Edits).suffix(" units")
+}
+
+/// The falloff C at which a hit at distance `half` occludes by half: C^-half is 1/2.
+fn falloff_of(half: f64) -> f64 {
+    // finite also where a scene is small
+    let falloff = (1.0 / half.max(1e-300)).min(1000.0).exp2();
+    // four digits are enough, and fewer to read in a command
+    format!("{falloff:.3e}").parse().unwrap_or(falloff).max(1.0)
+}
+
+/// The distance at which a falloff halves occlusion, to four digits.
+fn half_distance(falloff: f64) -> f64 {
+    let half = 1.0 / falloff.max(1.0).log2();
+    format!("{half:.3e}").parse().unwrap_or(half)
+}
+
+/// A number as it is typed, or in exponential form if that is shorter.
+fn in_short(value: f64) -> String {
+    let (plain, short) = (value.to_string(), format!("{value:e}"));
+    if short.len() < plain.len() { short } else { plain }
 }
 
 fn truth(app: &mut App, ui: &mut Ui) {
@@ -157,10 +191,17 @@ fn truth(app: &mut App, ui: &mut Ui) {
     if !is_shown {
         app.compares = compares;
     }
-    let shown = app.truth.label();
+    let shown = app.truth().label();
     let is_truth = |t: Technique| matches!(t, Technique::Converged | Technique::Still(_));
-    if let Some(technique) = choose_technique(ui, "Truth", &shown, Some(app.truth), &is_truth) {
-        app.truth = technique;
+    if let Some(technique) = choose_technique(ui, "Truth", &shown, Some(app.truth()), &is_truth) {
+        app.choose_truth(Some(technique));
+    }
+    let mut follows = !app.has_chosen_truth();
+    let check = ui.checkbox(&mut follows, "The truth follows the first image");
+    check.clone().on_hover_text("What the first image approximates: of the same integrator, converged");
+    if check.changed() {
+        let truth = (!follows).then(|| app.truth());
+        app.choose_truth(truth);
     }
     if !app.compares_now() {
         return;
@@ -183,8 +224,10 @@ fn truth(app: &mut App, ui: &mut Ui) {
         row("Truth's own error, at most", error, help);
         row("Samples of the truth", c.truth_samples.to_string(), "Samples per pixel of the truth so far");
     });
-    if !app.first.is_occlusion() && app.truth.is_occlusion() {
-        ui.label("The first image is not ambient occlusion: its luminance is compared.");
+    if matches!(app.first, Technique::Buffer(_)) {
+        ui.label("The first image is a buffer: the ambient occlusion behind it is compared.");
+    } else if app.first.integrator() != app.truth().integrator() {
+        ui.label(format!("{} is not what the first image approximates: the difference is not its error.", app.truth().label()));
     }
 }
 
@@ -232,16 +275,18 @@ fn light(app: &mut App, ui: &mut Ui) {
         ui.label("Environment: a map (.hdr, .exr) or R,G,B").on_hover_text("Enter applies it; empty: the scene's own");
     let id = ui.make_persistent_id("environment text");
     let current = app.lighting.environment.clone().unwrap_or_default();
-    let mut text = ui.data_mut(|d| d.get_temp::<String>(id)).unwrap_or_else(|| current.clone());
+    // what is typed is of the environment that there was, unless it has been replaced: by a file that was dropped, say
+    let typed = ui.data_mut(|d| d.get_temp::<(String, String)>(id)).filter(|(of, _)| *of == current);
+    let mut text = typed.map_or_else(|| current.clone(), |(_, text)| text);
     let edit = ui.text_edit_singleline(&mut text).labelled_by(heading.id);
-    if edit.lost_focus() {
+    if edit.lost_focus() && text.trim() != current {
         let trimmed = text.trim();
         app.lighting.environment = (!trimmed.is_empty()).then(|| trimmed.to_owned());
         if app.lighting.environment.is_none() {
             (app.lighting.environment_turn, app.lighting.environment_scale) = (None, None);
         }
     }
-    ui.data_mut(|d| d.insert_temp(id, text));
+    ui.data_mut(|d| d.insert_temp(id, (current, text)));
     ui.add_enabled_ui(app.lighting.environment.is_some(), |ui| {
         editor::edit(ui, app.lighting.editable(), &serde_json::json!({ "environment_turn": 0.0, "environment_scale": 1.0 }));
     });
@@ -276,19 +321,22 @@ fn light(app: &mut App, ui: &mut Ui) {
 }
 
 fn camera(app: &mut App, ui: &mut Ui) {
-    let Some(control) = &mut app.control else { return };
-    let to_world = control.camera().camera_to_world;
+    let Some(shown) = app.shown_camera() else { return };
+    let to_world = shown.camera_to_world;
     ui.label(format!("Eye {:.3}, {:.3}, {:.3}", to_world.translation.x, to_world.translation.y, to_world.translation.z));
-    if let crate::scene::Projection::Perspective { fov_y } = control.camera().projection {
+    if let crate::scene::Projection::Perspective { fov_y } = shown.projection {
         let mut degrees = fov_y.to_degrees();
         ui.horizontal(|ui| {
             let heading = ui.label("Field of view");
-            if ui.add(Slider::new(&mut degrees, 5.0..=120.0).suffix("°")).labelled_by(heading.id).changed() {
-                control.set_fov_y(degrees.to_radians());
-                app.followed = None;
+            // a camera of a file may have another
+            let slider = Slider::new(&mut degrees, 5.0..=120.0).clamping(SliderClamping::Edits).suffix("°");
+            if ui.add(slider).labelled_by(heading.id).changed() {
+                app.leave_followed();
+                app.control.iter_mut().for_each(|control| control.set_fov_y(degrees.to_radians()));
             }
         });
     }
+    let Some(control) = &mut app.control else { return };
     ui.horizontal(|ui| {
         let heading = ui.label("Speed of flight");
         ui.add(Slider::new(&mut control.speed, 0.01..=10.0).logarithmic(true)).labelled_by(heading.id);
@@ -297,13 +345,15 @@ fn camera(app: &mut App, ui: &mut Ui) {
         let heading = ui.label("Turntable");
         ui.add(Slider::new(&mut app.turntable, -2.0..=2.0).suffix(" rad/s")).labelled_by(heading.id);
     });
-    if ui.button("Copy the camera").on_hover_text("Copies the options of skylit render that choose this camera").clicked()
-        && let (Some(scene), Some(control)) = (&app.scene, &app.control)
-    {
-        let camera = crate::renderer::interactive::camera_settings(&scene.cameras, control.camera());
-        let settings = crate::renderer::RenderSettings { camera, ..Default::default() };
-        app.copied = Some(settings.flags().join(" "));
-        app.report("copied the camera", false);
+    if ui.button("Copy the camera").on_hover_text("Copies the options of skylit render that choose this camera").clicked() {
+        match app.render_settings(RenderedMotion::Nothing) {
+            Ok(shown) => {
+                let settings = crate::renderer::RenderSettings { camera: shown.camera, ..Default::default() };
+                app.copied = Some(settings.flags().join(" "));
+                app.report("copied the camera", false);
+            }
+            Err(e) => app.report(e.to_string(), true),
+        }
     }
 }
 
@@ -314,6 +364,7 @@ fn animation(app: &mut App, ui: &mut Ui) {
         return;
     }
     let playback = &mut app.playback;
+    let before = playback.animation;
     let name = |k: Option<usize>| k.and_then(|k| animations.get(k)).map_or("none", |a| a.0.as_str());
     ui.horizontal(|ui| {
         let heading = ui.label("Animation");
@@ -326,10 +377,14 @@ fn animation(app: &mut App, ui: &mut Ui) {
         });
         response.response.labelled_by(heading.id);
     });
+    if playback.animation != before {
+        // of another one
+        (playback.time, playback.runs) = (0.0, playback.runs && playback.animation.is_some());
+    }
     let Some(duration) = playback.animation.and_then(|k| animations.get(k)).map(|a| a.1) else { return };
     ui.horizontal(|ui| {
         if ui.button(if playback.runs { "Stop" } else { "Play" }).on_hover_text("P").clicked() {
-            playback.runs = !playback.runs;
+            playback.toggle(duration);
         }
         ui.checkbox(&mut playback.repeats, "Loop");
     });

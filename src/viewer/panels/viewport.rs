@@ -55,7 +55,7 @@ pub fn keys(app: &mut App, context: &Context) {
         menu::toggle_split(app);
     }
     if is_free && pressed(Key::Space) {
-        app.shows_second = !app.shows_second;
+        menu::flicker(app);
     }
     if pressed(Key::T) {
         app.compares = !app.compares;
@@ -76,10 +76,7 @@ pub fn keys(app: &mut App, context: &Context) {
         app.is_paused = !app.is_paused;
     }
     if pressed(Key::P) {
-        if app.playback.animation.is_none() && app.scene.as_ref().is_some_and(|s| !s.animations.is_empty()) {
-            app.playback.animation = Some(0);
-        }
-        app.playback.runs = app.playback.animation.is_some() && !app.playback.runs;
+        menu::play(app);
     }
     if context.input(|i| i.key_pressed(Key::Questionmark) || i.key_pressed(Key::F1)) {
         app.shows_help = !app.shows_help;
@@ -89,7 +86,6 @@ pub fn keys(app: &mut App, context: &Context) {
 
 /// Keys that are held move the camera.
 fn fly(app: &mut App, context: &Context, is_free: bool) {
-    let Some(control) = &mut app.control else { return };
     let (held, turned, seconds, faster) = context.input(|i| {
         let axis = |up: Key, down: Key| f64::from(i8::from(i.key_down(up)) - i8::from(i.key_down(down)));
         let free = !i.modifiers.command && !i.modifiers.alt;
@@ -97,15 +93,18 @@ fn fly(app: &mut App, context: &Context, is_free: bool) {
         let turned = [axis(Key::ArrowRight, Key::ArrowLeft), axis(Key::ArrowUp, Key::ArrowDown)];
         (held, turned, f64::from(i.stable_dt.min(0.1)), i.modifiers.shift)
     });
+    let turned = if is_free { turned } else { [0.0; 2] };
+    if held == [0.0; 3] && turned == [0.0; 2] {
+        return;
+    }
+    app.leave_followed();
+    let Some(control) = &mut app.control else { return };
+    context.request_repaint();
     if held != [0.0; 3] {
         control.fly(held, seconds * if faster { 4.0 } else { 1.0 });
-        app.followed = None;
-        context.request_repaint();
     }
-    if is_free && turned != [0.0; 2] {
+    if turned != [0.0; 2] {
         control.orbit(turned[0] * 300.0 * seconds, -turned[1] * 300.0 * seconds);
-        app.followed = None;
-        context.request_repaint();
     }
 }
 
@@ -166,31 +165,29 @@ fn divider(app: &mut App, ui: &mut Ui, rect: Rect, share: f32) -> f32 {
 }
 
 fn mouse(app: &mut App, ui: &Ui, response: &egui::Response) {
-    let Some(control) = &mut app.control else { return };
     let delta = response.drag_delta();
     let (dx, dy) = (f64::from(delta.x), f64::from(delta.y));
     let shift = ui.input(|i| i.modifiers.shift);
-    let mut moved = false;
+    let (scroll, pinch) = match response.hovered() {
+        true => ui.input(|i| (f64::from(i.smooth_scroll_delta.y), f64::from(i.zoom_delta()))),
+        false => (0.0, 1.0),
+    };
+    if delta != Vec2::ZERO || scroll != 0.0 || pinch != 1.0 {
+        app.leave_followed();
+    }
+    let Some(control) = &mut app.control else { return };
     if delta != Vec2::ZERO {
-        moved = true;
         match () {
             () if response.dragged_by(PointerButton::Middle) || shift && response.dragged_by(PointerButton::Primary) => {
                 control.pan(dx, dy, f64::from(response.rect.height()));
             }
             () if response.dragged_by(PointerButton::Secondary) => control.look(dx, dy),
             () if response.dragged_by(PointerButton::Primary) => control.orbit(-dx, dy),
-            () => moved = false,
+            () => {}
         }
     }
-    if response.hovered() {
-        let (scroll, pinch) = ui.input(|i| (f64::from(i.smooth_scroll_delta.y), f64::from(i.zoom_delta())));
-        if scroll != 0.0 || pinch != 1.0 {
-            control.zoom((-0.003 * scroll).exp() / pinch);
-            moved = true;
-        }
-    }
-    if moved {
-        app.followed = None;
+    if scroll != 0.0 || pinch != 1.0 {
+        control.zoom((-0.003 * scroll).exp() / pinch);
     }
     let at = response.interact_pointer_pos().map(|p| {
         let p = (p - response.rect.min) / response.rect.size();
@@ -224,7 +221,7 @@ fn titles(app: &App, ui: &Ui, rect: Rect, split: Option<f32>) {
             text(rect.left_top() + margin, Align2::LEFT_TOP, title(false));
             text(Pos2::new(x, rect.top()) + margin, Align2::LEFT_TOP, title(true));
             if let Some(c) = &app.comparison {
-                let error = format!("RMSE {:.4}, bias {:+.4}", c.rmse, c.bias);
+                let error = format!("RMSE {:.4}, bias {:+.4} against {}", c.rmse, c.bias, app.truth().label());
                 text(rect.left_bottom() + Vec2::new(10.0, -10.0), Align2::LEFT_BOTTOM, error);
             }
         }
@@ -242,6 +239,8 @@ fn notices(app: &mut App, ui: &mut Ui, rect: Rect) {
         share = *part;
     } else if is_loading {
         lines.push(("building acceleration structures and shaders …".into(), false));
+    } else if app.is_paused && app.source.is_some() && app.picture(app.shows_second).is_none() {
+        lines.push(("Rendering is paused: F5 resumes it.".into(), false));
     } else if app.source.is_some()
         && app.failure.is_none()
         && app.picture(app.shows_second).is_none()
@@ -255,6 +254,7 @@ fn notices(app: &mut App, ui: &mut Ui, rect: Rect) {
     lines.extend(app.failure.iter().map(|t| (t.clone(), true)));
     lines.extend(app.error(app.shows_second).map(|t| (t.clone(), true)));
     if app.failure.is_none() {
+        lines.extend(app.black(app.shows_second).map(|t| (t.clone(), false)));
         lines.extend(app.new_message().filter(|m| m.2).map(|m| (m.1.clone(), true)));
     }
     if lines.is_empty() {

@@ -1,5 +1,6 @@
 //! The thread that loads scenes and renders what the window requests.
 
+mod black;
 mod compare;
 mod loader;
 mod pane;
@@ -12,11 +13,13 @@ use std::time::{Duration, Instant};
 use loader::{Loaded, Loader};
 use pane::{Pacing, Pane};
 
-use super::request::{Comparison, DeviceSummary, Event, EventSender, Mailbox, Progress, Request, SceneSummary, Task};
+use super::request::{Comparison, DeviceSummary, Event, EventSender, Mailbox, Progress, Request, SceneSummary, TRUTH, Task};
 use crate::error::{Error, Result};
 use crate::film::{Control, NoControl};
 use crate::gpu::{self, Device};
+use crate::integrators::lighting::LightingSettings;
 use crate::output::{self, ImageFormat};
+use crate::renderer::interactive::View;
 use crate::renderer::survey::Survey;
 use crate::renderer::{Interactive, Renderer};
 use crate::scene::{Camera, Scene};
@@ -42,7 +45,14 @@ const COMPARISON_SHARE: u32 = 5;
 pub fn spawn(mailbox: Arc<Mailbox>, events: EventSender) -> Result<JoinHandle<()>> {
     let run = move || {
         let reporter = events.clone();
-        let worker = Worker { mailbox, events, open: None, device_losses: 0, listed_devices: false };
+        let worker = Worker {
+            mailbox,
+            events,
+            open: None,
+            device_losses: 0,
+            listed_devices: false,
+            lighting: LightingSettings::default(),
+        };
         // the window stays open and says so
         if let Err(bug) = panic::catch(move || worker.run()) {
             reporter.send(Event::Failed(bug));
@@ -60,6 +70,8 @@ struct Worker {
     open: Option<OpenScene>,
     device_losses: u32,
     listed_devices: bool,
+    /// Lights that could be had last.
+    lighting: LightingSettings,
 }
 
 /// A loaded scene on a device.
@@ -260,11 +272,18 @@ impl Worker {
         let animation = first.animation.filter(|k| *k < animations);
         let (mailbox, events) = (&self.mailbox, &self.events);
         open.renderer.understand(&first.meaning);
+        // the light may be a file that cannot be read: then there is the one before
+        let (mut first, mut refused) = (first.clone(), None);
         let interactive = match open.renderer.interactive(&first.lighting, animation) {
-            Ok(interactive) => interactive,
+            Ok(interactive) => {
+                self.lighting = first.lighting.clone();
+                interactive
+            }
             Err(e @ (Error::Usage(_) | Error::Input { .. })) => {
-                events.send(Event::Warning(e.to_string()));
-                open.renderer.interactive(&Default::default(), None)?
+                let lights = [first.lighting.clone(), self.lighting.clone()];
+                events.send(Event::LightingRefused(Box::new(lights), crate::terminal::console::one_line(&e.to_string())));
+                refused = Some(std::mem::replace(&mut first.lighting, self.lighting.clone()));
+                open.renderer.interactive(&first.lighting, animation)?
             }
             Err(e) => return Err(e),
         };
@@ -281,7 +300,9 @@ impl Worker {
             compared: None,
             device: DeviceSummary::default(),
             chose_camera: false,
-            first: first.clone(),
+            first,
+            refused,
+            black: [Blackness::Unknown; TRUTH + 1],
         };
         session.run()
     }
@@ -304,6 +325,18 @@ struct Session<'a> {
     /// The camera to start with was sent.
     chose_camera: bool,
     first: Request,
+    /// Lights that were requested and could not be had.
+    refused: Option<LightingSettings>,
+    /// What is known of each image at rest.
+    black: [Blackness; TRUTH + 1],
+}
+
+/// Whether an image at rest is black.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Blackness {
+    Unknown,
+    Black,
+    Visible,
 }
 
 impl Session<'_> {
@@ -333,19 +366,20 @@ impl Session<'_> {
                 // what was moving comes to rest
                 None if moves => self.mailbox.wait(number, REST),
                 None => {
-                    self.compare(&request, true)?;
+                    self.compare(&request, number, true)?;
                     self.events.send(Event::Idle(number));
                     self.mailbox.wait(number, Duration::from_secs(60));
                 }
             }
-            self.compare(&request, false)?;
+            self.compare(&request, number, false)?;
         }
     }
 
     /// Returns true if this session can do what is requested.
     fn serves(&self, request: &Request) -> bool {
-        let of = |r: &Request| (r.scene.clone(), r.load, r.device.clone(), r.meaning.clone(), r.lighting.clone(), r.animation);
-        of(request) == of(&self.first)
+        let of = |r: &Request| (r.scene.clone(), r.load, r.device.clone(), r.meaning.clone(), r.animation);
+        let is_lit = request.lighting == self.first.lighting || Some(&request.lighting) == self.refused.as_ref();
+        is_lit && of(request) == of(&self.first)
     }
 
     /// Moves the scene and the camera to where they are requested to be.
@@ -360,6 +394,7 @@ impl Session<'_> {
             }
             self.panes.iter_mut().for_each(Pane::restart);
             self.compared = None;
+            self.black = [Blackness::Unknown; TRUTH + 1];
         }
         self.camera = camera;
         Ok(())
@@ -376,6 +411,7 @@ impl Session<'_> {
                     new.inherit_pace(pane);
                     *pane = new;
                     self.compared = None;
+                    self.black[request.pane(k)] = Blackness::Unknown;
                 }
                 None => self.panes.push(Pane::new(settings, size)),
             }
@@ -400,15 +436,20 @@ impl Session<'_> {
         match pane.step(&mut self.interactive, camera, &pacing, &mut control) {
             Ok((step, time)) => {
                 let Some(picture) = pane.shown().map(|v| v.picture()).transpose()?.flatten() else { return Ok(()) };
+                let is_black = !moves && black::is_black(&picture);
                 let progress = Progress {
                     pane: request.pane(k),
                     picture: Arc::new(picture),
+                    camera: Some(camera.clone()),
                     step,
                     time,
                     latency: changed.elapsed(),
                     request: number,
                 };
                 self.events.send(Event::Picture(Box::new(progress)));
+                if !moves {
+                    self.explain_black(k, request, camera, is_black)?;
+                }
                 if self.panes[k].steps() == 1 {
                     self.events.send(Event::PaneError(request.pane(k), None));
                     self.interactive.device().save_pipeline_cache();
@@ -426,6 +467,39 @@ impl Session<'_> {
             self.events.send(Event::Warning(warning));
         }
         self.describe_device();
+        Ok(())
+    }
+
+    /// Says why an image at rest is black, once for each place; and that it is no longer.
+    fn explain_black(&mut self, k: usize, request: &Request, camera: &Camera, is_black: bool) -> Result<()> {
+        let pane = request.pane(k);
+        let now = if is_black { Blackness::Black } else { Blackness::Visible };
+        if std::mem::replace(&mut self.black[pane], now) == now {
+            return Ok(());
+        }
+        let reason = match is_black {
+            false => None,
+            true => {
+                let values = self.panes[k].shown().map(View::values).transpose()?.unwrap_or_default().values;
+                let brightest = values.into_iter().fold(0.0, f32::max);
+                black::reason(&self.interactive, camera, request.aspect(), &request.panes[k], brightest)?
+            }
+        };
+        self.events.send(Event::Black(pane, reason));
+        Ok(())
+    }
+
+    /// Finds another camera if this one sees nothing but black.
+    fn check_view(&mut self, camera: &Camera, request: &Request, frames: bool) -> Result<()> {
+        let Some(settings) = request.panes.first() else { return Ok(()) };
+        let (aspect, scene) = (request.aspect(), self.interactive.scene());
+        let automatic = self.interactive.automatic_camera(aspect, &mut NoControl)?;
+        let framed = scene.bounds().map(|(lo, hi)| Camera::framing(lo, hi, aspect));
+        let cameras = [camera.clone(), automatic].into_iter().chain(scene.cameras.first().cloned()).chain(framed).collect();
+        let visible = black::first_visible(&mut self.interactive, settings, aspect, cameras, frames, &mut NoControl)?;
+        if let Some(visible) = visible.filter(|visible| visible != camera) {
+            self.events.send(Event::Framed(Box::new([camera.clone(), visible])));
+        }
         Ok(())
     }
 
@@ -454,7 +528,7 @@ impl Session<'_> {
         if self.chose_camera || request.camera.is_some() || request.size == [0; 2] {
             return Ok(());
         }
-        let aspect = f64::from(request.size[0]) / f64::from(request.size[1]);
+        let aspect = request.aspect();
         let given = &request.first_camera;
         let chosen = match given.chooses().then(|| given.choose(&Survey::new(self.interactive.scene()), aspect)) {
             Some(Err(e)) => {
@@ -475,10 +549,14 @@ impl Session<'_> {
 
     /// Performs a task, unless it has to wait for an image: then it returns false.
     fn perform(&mut self, task: &Task, camera: &Camera, request: &Request) -> Result<bool> {
-        let size = request.size;
         match task {
+            Task::CheckView { frames } => match self.check_view(camera, request, *frames) {
+                // the settings cannot be rendered, which the image says
+                Err(Error::Usage(_)) => {}
+                outcome => outcome?,
+            },
             Task::Pick { at, purpose } => {
-                let pick = self.interactive.pick(camera, *at, f64::from(size[0]) / f64::from(size[1]))?;
+                let pick = self.interactive.pick(camera, *at, request.aspect())?;
                 self.events.send(Event::Picked(*purpose, Box::new(pick)));
             }
             // of a new tracer, say
@@ -506,7 +584,7 @@ impl Session<'_> {
     }
 
     /// Compares the first image with the last, if that is requested and both have changed; not too often unless it is the `last` time.
-    fn compare(&mut self, request: &Request, last: bool) -> Result<()> {
+    fn compare(&mut self, request: &Request, number: u64, last: bool) -> Result<()> {
         if !request.compares || self.panes.len() < 2 || self.last_motion.elapsed() < REST {
             return Ok(());
         }
@@ -521,8 +599,8 @@ impl Session<'_> {
             return Ok(());
         }
         let start = Instant::now();
-        let comparison: Comparison = compare::compare(&image.values()?, &truth.values()?, truth.samples())?;
-        self.events.send(Event::Compared(Box::new(comparison)));
+        let comparison = compare::compare(&image.values()?, &truth.values()?, truth.samples())?;
+        self.events.send(Event::Compared(Box::new(Comparison { request: number, ..comparison })));
         self.compared = Some((Instant::now(), start.elapsed(), steps));
         Ok(())
     }

@@ -38,6 +38,8 @@ pub struct Pane {
     is_fresh: bool,
     /// The last step was of the resting view.
     shows_rest: bool,
+    /// It has not been stepped since the scene or the camera has moved.
+    is_outdated: bool,
     is_settled: bool,
     /// Wall-clock time of its steps since it came to rest.
     spent: Duration,
@@ -67,6 +69,7 @@ impl Pane {
             frames_at_scale: 0,
             is_fresh: true,
             shows_rest: false,
+            is_outdated: false,
             is_settled: false,
             spent: Duration::ZERO,
             steps: 0,
@@ -103,7 +106,7 @@ impl Pane {
 
     /// The scene or the camera has moved.
     pub fn restart(&mut self) {
-        (self.is_settled, self.is_fresh, self.spent) = (false, true, Duration::ZERO);
+        (self.is_settled, self.is_fresh, self.is_outdated, self.spent) = (false, true, true, Duration::ZERO);
     }
 
     /// Wall-clock time of its steps since it came to rest.
@@ -118,12 +121,13 @@ impl Pane {
 
     /// The view at full resolution, once it has been rendered.
     pub fn rest(&self) -> Option<&View> {
-        self.resting.as_ref().filter(|_| self.shows_rest)
+        // before its first step it is of another camera
+        self.resting.as_ref().filter(|_| self.shows_rest && !self.is_fresh)
     }
 
-    /// There is no image yet, but there will be one.
+    /// There is no image of where scene and camera are, but there will be one.
     pub fn is_to_come(&self) -> bool {
-        self.shown().is_none() && !self.failed
+        (self.is_outdated || self.shown().is_none()) && !self.failed
     }
 
     /// The view that was rendered last.
@@ -187,6 +191,7 @@ impl Pane {
         let elapsed = start.elapsed();
         self.shows_rest = !scales;
         self.is_settled = step.is_settled;
+        self.is_outdated = false;
         self.is_fresh &= scales;
         self.steps += 1;
         self.spent += elapsed;
