@@ -303,3 +303,31 @@ fn gpu_ambient_occlusion_is_denoised() {
     }
     assert_validation_clean(&device);
 }
+
+/// A floor seen from below a card with `d 0`: it is not there, also for ambient occlusion; where it is set to be glass it is.
+#[test]
+fn gpu_dissolve_is_coverage_unless_it_is_set_to_be_glass() {
+    let device = device();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.obj");
+    std::fs::write(folder.path().join("a.mtl"), "newmtl floor\nnewmtl card\nd 0\n").unwrap();
+    let corners = |y: f32| format!("v -50 {y} 50\nv 50 {y} 50\nv 50 {y} -50\nv -50 {y} -50\n");
+    let faces = "usemtl floor\nf 1 2 3 4\nusemtl card\nf 5 6 7 8\n";
+    std::fs::write(&path, format!("mtllib a.mtl\n{}{}{faces}", corners(0.0), corners(1.0))).unwrap();
+    let camera = serde_json::json!({ "eye": [0, 0.5, 0], "target": [0, 0, 0], "up": [0, 0, -1] });
+    for kind in tracers(&device) {
+        let scene = skylit::scene::load::load_file(&path).unwrap();
+        let mut renderer = Renderer::new(device.clone(), scene, &choice(kind)).unwrap();
+        for (meaning, expected) in [(None, 1.0), (Some("glass"), 0.0), (Some("alpha"), 1.0)] {
+            let scene = meaning.map_or_else(|| serde_json::json!({}), |m| serde_json::json!({ "mtl_dissolve": m }));
+            let image = serde_json::json!({ "size": [4, 4], "spp": 16 });
+            let ao = serde_json::json!({ "ao": { "ao_radius": "inf" } });
+            let how = settings(serde_json::json!({ "image": image, "scene": scene, "camera": camera, "integrators": ao }));
+            let image = renderer.still(&how, &mut NoControl).unwrap().image;
+            let values = image.f32("Y").unwrap();
+            let mean = values.iter().sum::<f32>() / values.len() as f32;
+            assert!((mean - expected).abs() < 0.02, "{kind}, {meaning:?}: {mean}, not {expected}");
+        }
+    }
+    assert_validation_clean(&device);
+}
