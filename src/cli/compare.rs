@@ -23,6 +23,7 @@ use crate::realtime::frame_settings::FrameSettings;
 use crate::renderer::settings::{CameraSettings, ImageSettings};
 use crate::renderer::{RenderSettings, Renderer};
 use crate::report;
+use crate::scene::SceneSettings;
 use crate::settings::parse::Parsed;
 use crate::terminal::console::{Console, Failure, Verbosity, command_line, one_line};
 use crate::terminal::interrupt::{self, ProgressControl};
@@ -109,6 +110,9 @@ pub struct CompareArgs {
     /// The image.
     #[command(flatten)]
     pub image: ImageSettings,
+    /// Meaning of the scene's file.
+    #[command(flatten)]
+    pub meaning: SceneSettings,
     /// The camera.
     #[command(flatten)]
     pub camera: CameraSettings,
@@ -165,6 +169,7 @@ impl CompareArgs {
     fn shared(&self) -> RenderSettings {
         RenderSettings {
             image: self.image.clone(),
+            scene: self.meaning.clone(),
             camera: self.camera.clone(),
             integrators: self.integrators.clone(),
             lighting: self.lighting.clone(),

@@ -14,6 +14,7 @@ use crate::output::{self, ImageFormat, parse_size};
 use crate::renderer::Renderer;
 use crate::renderer::settings::CameraSettings;
 use crate::report;
+use crate::scene::SceneSettings;
 use crate::settings::parse::{parse_albedo, parse_positive};
 use crate::terminal::console::{Verbosity, command_line};
 use crate::terminal::interrupt::{self, ProgressControl};
@@ -67,6 +68,8 @@ pub struct AoVsPathArgs {
     #[cfg(feature = "bench")]
     #[arg(long, value_name = "FILE.png|.svg", value_hint = ValueHint::FilePath)]
     plot: Option<PathBuf>,
+    #[command(flatten)]
+    meaning: SceneSettings,
     #[command(flatten)]
     camera: CameraSettings,
     #[command(flatten)]
@@ -144,6 +147,7 @@ impl AoVsPathArgs {
             spp: self.spp,
             ao_samples: self.ao_samples,
             seed: self.seed,
+            scene: self.meaning.clone(),
             camera: self.camera.clone(),
             lighting: self.lighting.clone(),
             max_depth: self.max_depth,

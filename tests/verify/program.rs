@@ -101,6 +101,10 @@ fn gpu_a_broken_frame_stops_no_other() {
     let verify = |options: &[&str]| run(&[&["verify", text(path)], options].concat());
     let (junit, page) = (path.join("out.xml"), path.join("report"));
     let results = || std::fs::read_to_string(&junit).unwrap();
+    let scene = path.join("broken.gltf");
+    assert!(run(&["export", "builtin:plane", "-o", text(&scene)]).status.success());
+    let sound = "\n[[frame]]\nname = \"frame-5\"\nscene = \"broken.gltf\"\n";
+    std::fs::write(path.join("frames.toml"), TWO.to_owned() + sound).unwrap();
     assert!(verify(&["--update-missing", "--force"]).status.success());
     assert!(verify(&["--junit", text(&junit)]).status.success() && results().contains("errors=\"0\""));
 
@@ -115,8 +119,7 @@ fn gpu_a_broken_frame_stops_no_other() {
         ("scene = \"builtin:plane\"\nname = \"PLANE\"", "two frames are called PLANE"),
         ("scene = \"builtin:plane\"\nname = \"torn\"", "torn.exr"),
     ];
-    std::fs::write(path.join("broken.gltf"), "{").unwrap();
-    std::fs::write(path.join("frame-5.exr"), "no image").unwrap();
+    std::fs::write(&scene, "{").unwrap();
     std::fs::write(path.join("torn.exr"), "no image").unwrap();
     let mut manifest = TWO.to_owned();
     for (k, (lines, _)) in broken.iter().enumerate() {

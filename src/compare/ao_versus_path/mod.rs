@@ -29,6 +29,7 @@ use crate::integrators::path::ambient::EnvironmentLight;
 use crate::output::{Channel, Image, Samples as Values};
 use crate::renderer::settings::{CameraSettings, options_text, quoted};
 use crate::renderer::{Completed, RenderSettings, Renderer};
+use crate::scene::SceneSettings;
 use crate::settings::Length;
 use references::{Halves, References};
 use report::fit_record;
@@ -46,6 +47,8 @@ pub struct AoVersusPathSettings {
     pub ao_samples: u32,
     /// Seed of the sampler.
     pub seed: u32,
+    /// Meaning of the scene's file.
+    pub scene: SceneSettings,
     /// The camera.
     pub camera: CameraSettings,
     /// Lights in addition to the scene's.
@@ -68,6 +71,7 @@ impl Default for AoVersusPathSettings {
             spp: 16,
             ao_samples: 32,
             seed: 0,
+            scene: SceneSettings::default(),
             camera: CameraSettings::default(),
             lighting: LightingSettings::default(),
             max_depth: None,
@@ -87,9 +91,15 @@ impl AoVersusPathSettings {
         self.ao_samples.div_ceil(2).max(1)
     }
 
+    /// What all renders have in common.
+    fn shared(&self) -> RenderSettings {
+        let (scene, camera, lighting) = (self.scene.clone(), self.camera.clone(), self.lighting.clone());
+        RenderSettings { scene, camera, lighting, ..Default::default() }
+    }
+
     /// These settings with nothing left open, and what was chosen.
     fn completed(&self, renderer: &mut Renderer) -> Result<(Self, Completed)> {
-        let mut path = RenderSettings { camera: self.camera.clone(), lighting: self.lighting.clone(), ..Default::default() };
+        let mut path = self.shared();
         path.integrator = Some("path".parse()?);
         path.image.size = Some(self.size);
         let completed = renderer.complete(&path, None)?;
@@ -100,7 +110,7 @@ impl AoVersusPathSettings {
     /// The commands that render the best `lit` image and the path-traced one that it is compared with.
     fn commands(&self, scene: &str, fits: &[FitRecord]) -> Result<Vec<String>> {
         let Some(fit) = fits.first() else { return Ok(Vec::new()) };
-        let mut shared = RenderSettings { camera: self.camera.clone(), lighting: self.lighting.clone(), ..Default::default() };
+        let mut shared = self.shared();
         (shared.image.size, shared.image.spp) = (Some(self.size), Some(COMMAND_SPP));
 
         let best = &fit.best;

@@ -98,7 +98,7 @@ impl References {
 
 impl Reference {
     fn settings(self, from: &AoVersusPathSettings, half: usize) -> Result<RenderSettings> {
-        let mut out = RenderSettings { camera: from.camera.clone(), ..Default::default() };
+        let mut out = RenderSettings { scene: from.scene.clone(), camera: from.camera.clone(), ..Default::default() };
         let (name, samples) = match self {
             Self::Indirect => ("path", from.spp_per_half()),
             Self::Direct => ("direct", from.spp_per_half()),
