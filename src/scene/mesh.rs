@@ -57,6 +57,18 @@ impl Geometry {
         b.map(|(l, h)| (l.as_dvec3(), h.as_dvec3()))
     }
 
+    /// The vertices that triangles use, each once with 0, or the centres of spheres with their radii.
+    pub fn points(&self) -> Vec<Vec4> {
+        match self {
+            Geometry::Triangles(t) => {
+                let mut is_used = vec![false; t.positions.len()];
+                t.indices.iter().flatten().for_each(|&i| is_used[i as usize] = true);
+                t.positions.iter().zip(is_used).filter(|(_, used)| *used).map(|(p, _)| p.extend(0.0)).collect()
+            }
+            Geometry::Spheres(spheres) => spheres.iter().map(|s| s.center.extend(s.radius)).collect(),
+        }
+    }
+
     /// Number of triangles or spheres.
     pub fn primitive_count(&self) -> usize {
         match self {

@@ -5,6 +5,7 @@
 
 pub mod animation;
 pub mod blackbody;
+mod bounds;
 pub mod builtin;
 pub mod camera;
 pub mod camera_path;
@@ -153,20 +154,9 @@ impl Scene {
         self.environment == Environment::Black && self.lights.is_empty() && !self.instances.iter().any(shines)
     }
 
-    /// World-space bounds `(min, max)` over all instances, or `None` for an empty scene.
+    /// World-space bounds `(min, max)` of the vertices and spheres of all instances, or `None` for an empty scene.
     pub fn bounds(&self) -> Option<(DVec3, DVec3)> {
-        let local: Vec<_> = self.meshes.iter().map(|m| m.geometry.bounds()).collect();
-        let mut world: Option<(DVec3, DVec3)> = None;
-        for i in &self.instances {
-            let Some((lo, hi)) = local[i.mesh] else { continue };
-            for k in 0..8 {
-                let pick = |b: u32, l: f64, h: f64| if k >> b & 1 == 0 { l } else { h };
-                let corner = DVec3::new(pick(0, lo.x, hi.x), pick(1, lo.y, hi.y), pick(2, lo.z, hi.z));
-                let p = i.object_to_world.transform_point3(corner);
-                world = Some(world.map_or((p, p), |(a, b)| (a.min(p), b.max(p))));
-            }
-        }
-        world
+        bounds::of_scene(self)
     }
 
     /// Whether a ray that leaves the scene may see an emitter: an environment, or a directional light with an angular diameter.

@@ -244,14 +244,14 @@ fn hull(scene: &Scene) -> Vec<(DVec3, f64)> {
             let to_world = &instance.object_to_world;
             let place = |p: DVec3| to_world.transform_point3(p);
             let geometry = &scene.meshes[instance.mesh].geometry;
-            let points: Vec<(DVec3, f64)> = match geometry {
-                Geometry::Triangles(t) if exact => t.positions.iter().map(|p| (place(p.as_dvec3()), 0.0)).collect(),
-                Geometry::Spheres(spheres) if exact => {
+            let points: Vec<(DVec3, f64)> = match exact {
+                true => {
                     let m = &to_world.matrix3;
                     let scale = m.x_axis.length().max(m.y_axis.length()).max(m.z_axis.length());
-                    spheres.iter().map(|s| (place(s.center.as_dvec3()), scale * f64::from(s.radius))).collect()
+                    let point = |p: glam::Vec4| (place(p.truncate().as_dvec3()), scale * f64::from(p.w));
+                    geometry.points().into_iter().map(point).collect()
                 }
-                _ => geometry.bounds().map_or_else(Vec::new, |(lo, hi)| {
+                false => geometry.bounds().map_or_else(Vec::new, |(lo, hi)| {
                     let corner = |k: u32| DVec3::from_array([0, 1, 2].map(|a| if k >> a & 1 == 0 { lo[a] } else { hi[a] }));
                     (0..8).map(|k| (place(corner(k)), 0.0)).collect()
                 }),
