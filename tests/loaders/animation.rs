@@ -177,7 +177,7 @@ fn a_skin_against_its_closed_form() {
     assert!(mesh(&scene, 0).normals.is_empty());
     // animated elsewhere: still no cost
     animate(&mut doc, 0, "translation", "LINEAR", &[0.0, 1.0], &[[0.0; 3], [1.0; 3]]);
-    assert!(doc.load().rig.is_none(), "its node's transform is ignored");
+    assert!(rig(&doc.load()).motion(0).unwrap().is_none(), "its node's transform is ignored");
 }
 
 #[test]
@@ -303,7 +303,12 @@ fn keys_that_change_nothing_move_nothing() {
     animate(&mut doc, 0, "translation", "LINEAR", &[0.0, 5.0], &[[0.1, 0.2, 0.3]; 2]);
     animate(&mut doc, 0, "rotation", "STEP", &[0.0, 1.0], &[[0.0, -0.6, 0.0, -0.8]; 2]);
     animate(&mut doc, 0, "scale", "CUBICSPLINE", &[0.0], &[zero, [1.0, 2.0, 3.0], zero]);
-    assert!(doc.load().rig.is_none());
+    let scene = doc.load();
+    let mut pose = Pose::default();
+    rig(&scene).pose(0, 1.0, Playback::Loop, &mut pose).unwrap();
+    // listed, and without an effect
+    assert!(rig(&scene).motion(0).unwrap().is_none() && pose.instances.is_empty());
+    assert_eq!((rig(&scene).animations().len(), rig(&scene).animations()[0].duration), (1, 5.0));
     animate(&mut doc, 1, "scale", "CUBICSPLINE", &[0.0, 1.0], &[zero, [1.0; 3], zero, [0.1; 3], [1.0; 3], zero]);
     let scene = doc.load();
     assert_eq!(rig(&scene).motion(0).unwrap().instances, [1]);
@@ -448,7 +453,8 @@ fn broken_channels_are_left_out() {
     let left_out = |doc: &Doc, says: &str| {
         let scene = doc.load();
         let warnings = scene.report.warnings.join("; ");
-        assert!(scene.rig.is_none() && warnings.contains("animation 0 `move`, channel 0"), "{warnings}");
+        assert!(rig(&scene).motion(0).unwrap().is_none(), "{warnings}");
+        assert!(warnings.contains("animation 0 `move`, channel 0"), "{warnings}");
         assert!(warnings.contains(says) && !warnings.contains('\n'), "{says}: {warnings}");
     };
     let change = |path: &str, value: Value| {
@@ -467,16 +473,11 @@ fn broken_channels_are_left_out() {
     left_out(&change("/accessors/1/count", json!(0)), "no keys");
     left_out(&change("/accessors/1/count", json!(500)), "accessor 1");
     let mut doc = good();
-    doc.json["nodes"][0]["matrix"] = json!([1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]);
-    left_out(&doc, "matrix");
-    for (times, says) in [([1.0, 1.0], "not after"), ([2.0, 1.0], "not after"), ([0.0, f32::NAN], "time of key 1")] {
-        let mut doc = Doc::triangle();
-        animate(&mut doc, 0, "translation", "LINEAR", &times, &[[0.0; 3], [1.0; 3]]);
-        left_out(&doc, says);
-    }
+    doc.json["nodes"][0]["matrix"] = json!([1, 0, 0, 0, 1, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]);
+    left_out(&doc, "matrix that shears");
     let mut doc = Doc::triangle();
-    animate(&mut doc, 0, "translation", "LINEAR", &[0.0, 1.0], &[[0.0; 3], [1.0, f32::INFINITY, 1.0]]);
-    left_out(&doc, "value of key 1");
+    animate(&mut doc, 0, "translation", "LINEAR", &[f32::NAN, f32::INFINITY], &[[0.0; 3], [1.0; 3]]);
+    left_out(&doc, "no keys");
     // a second channel for one target
     let mut doc = good();
     animate(&mut doc, 0, "translation", "LINEAR", &[0.0, 1.0], &[[0.0; 3], [9.0; 3]]);
@@ -489,6 +490,40 @@ fn broken_channels_are_left_out() {
     doc.json["animations"][0]["channels"].as_array_mut().unwrap().push(pointer);
     let scene = doc.load();
     assert!(scene.rig.is_some() && scene.report.warnings[0].contains("`pointer`"), "{:?}", scene.report.warnings);
+}
+
+/// Not valid and common: played, and said.
+#[test]
+fn keys_of_careless_exporters_are_played() {
+    let two = [[0.0; 3], [1.0; 3]];
+    let at = |doc: &Doc, seconds: f64, says: &str| {
+        let scene = doc.load();
+        let warnings = scene.report.warnings.join("; ");
+        assert!(warnings.contains(says), "{says}: {warnings}");
+        let mut pose = Pose::default();
+        rig(&scene).pose(0, seconds, Playback::Once, &mut pose).unwrap();
+        pose.instances.first().map(|i| i.1.translation.x)
+    };
+    let playing = |times: &[f32], values: &[[f32; 3]]| {
+        let mut doc = Doc::triangle();
+        animate(&mut doc, 0, "translation", "LINEAR", times, values);
+        doc
+    };
+    // two keys at one time are a jump
+    let jump = playing(&[0.0, 1.0, 1.0, 2.0], &[[0.0; 3], [4.0; 3], [6.0; 3], [8.0; 3]]);
+    for (seconds, x) in [(0.5, 2.0), (1.0, 6.0), (1.5, 7.0)] {
+        assert_eq!(at(&jump, seconds, "more than one key at 1 s"), Some(x));
+    }
+    assert_eq!(at(&playing(&[2.0, 1.0], &[[3.0; 3], [1.0; 3]]), 1.5, "not in the order"), Some(2.0));
+    let three = [[0.0; 3], [9.0; 3], [2.0; 3]];
+    assert_eq!(at(&playing(&[0.0, f32::NAN, 2.0], &three), 1.0, "1 keys have a time"), Some(1.0));
+    assert_eq!(at(&playing(&[0.0, 1.0, 2.0], &[two[0], [f32::NAN; 3], [2.0; 3]]), 1.0, "not finite: left out"), Some(1.0));
+    // the matrix of a node that is animated is one of a translation, a rotation and a scale
+    let mut doc = playing(&[0.0, 1.0], &two);
+    doc.json["nodes"][0]["matrix"] = json!([0, 2, 0, 0, -2, 0, 0, 0, 0, 0, 2, 0, 7, 0, 0, 1]);
+    let scene = doc.load();
+    near(scene.instances[0].object_to_world.transform_vector3(DVec3::X), DVec3::new(0.0, 2.0, 0.0));
+    assert_eq!(at(&doc, 0.25, "taken apart"), Some(0.25));
 }
 
 /// Geometry that makes no sense is refused, as it is elsewhere.

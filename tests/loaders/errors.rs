@@ -40,7 +40,7 @@ fn truncated_glb() {
     let mut other = glb.clone();
     other[4] = 1;
     assert!(message(folder.load("v1.glb", &other)).contains("version 1"));
-    assert!(message(folder.load("json.glb", Doc::triangle().gltf())).contains("is not a .glb"));
+    assert!(message(folder.load("text.glb", "hello")).contains("is not a .glb"));
 }
 
 #[test]

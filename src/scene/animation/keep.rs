@@ -59,14 +59,4 @@ impl AnimationRig {
             deformation.mesh = index[deformation.mesh];
         }
     }
-
-    /// Whether no animation changes anything.
-    pub(in crate::scene) fn is_idle(&self) -> bool {
-        (0..self.parts.animations.len()).all(|a| {
-            self.motion(a).is_ok_and(|m| m.is_none())
-                && [self.moving_cameras(a), self.moving_lights(a)]
-                    .iter()
-                    .all(|moving| moving.as_ref().is_ok_and(|m| m.is_empty()))
-        })
-    }
 }

@@ -57,6 +57,16 @@ impl LocalTransform {
             Self::Matrix(m) => m,
         }
     }
+
+    /// The same as translation, rotation and scale; `None` for a matrix that is no product of these.
+    pub(in crate::scene) fn taken_apart(&self) -> Option<Self> {
+        let Self::Matrix(matrix) = *self else { return Some(*self) };
+        let (scale, rotation, translation) = matrix.to_scale_rotation_translation();
+        let parts = Self::Trs { translation, rotation, scale };
+        let largest = matrix.matrix3.to_cols_array().into_iter().fold(0.0, |m: f64, x| m.max(x.abs()));
+        // files hold single precision
+        parts.affine().matrix3.abs_diff_eq(matrix.matrix3, 1e-5 * largest).then_some(parts)
+    }
 }
 
 /// A node of the hierarchy, in its rest pose.

@@ -21,7 +21,7 @@ pub enum Interpolation {
 pub struct Sampler {
     /// Interpolation between keys.
     pub interpolation: Interpolation,
-    /// Times of the keys in seconds, increasing. Channels of a file often share them.
+    /// Times of the keys in seconds, in order; of two keys at one time the second counts from then on: a jump. Channels of a file often share them.
     pub times: Arc<[f32]>,
     /// The numbers of each key, one key after the other; for splines those of the incoming tangent, the value and the outgoing
     /// tangent (per second).
@@ -37,7 +37,36 @@ struct KeyInterval {
 }
 
 impl Sampler {
-    /// Checks that there are keys, with increasing times, and a value of `width` numbers for each, all finite.
+    /// Brings the keys of a file into order: those whose time or value is not finite are removed, the others sorted by their times. Returns what there is to say about them, in
+    /// words; nothing about keys that cannot be told apart because there are not as many values as times.
+    pub(in crate::scene) fn repair(&mut self, width: usize) -> Vec<String> {
+        let mut said = Vec::new();
+        let size = width * self.stride();
+        if size == 0 || self.times.len().checked_mul(size) != Some(self.values.len()) {
+            return said;
+        }
+        let is_finite =
+            |key: usize| self.times[key].is_finite() && self.values[key * size..][..size].iter().all(|v| v.is_finite());
+        let mut order: Vec<usize> = (0..self.times.len()).filter(|&key| is_finite(key)).collect();
+        let removed = self.times.len() - order.len();
+        if removed > 0 {
+            said.push(format!("{removed} keys have a time or a value that is not finite: left out"));
+        }
+        if !order.is_sorted_by(|&a, &b| self.times[a] <= self.times[b]) {
+            said.push("its keys are not in the order of their times: sorted".to_owned());
+            order.sort_by(|&a, &b| self.times[a].total_cmp(&self.times[b]));
+        }
+        if let Some(pair) = order.windows(2).find(|pair| self.times[pair[0]] == self.times[pair[1]]) {
+            said.push(format!("has more than one key at {} s: it jumps there", self.times[pair[0]]));
+        }
+        if !order.iter().copied().eq(0..self.times.len()) {
+            self.values = order.iter().flat_map(|&key| &self.values[key * size..][..size]).copied().collect();
+            self.times = order.iter().map(|&key| self.times[key]).collect();
+        }
+        said
+    }
+
+    /// Checks that there are keys, with times that do not decrease, and a value of `width` numbers for each, all finite.
     ///
     /// # Errors
     /// What is wrong, in words.
@@ -49,8 +78,8 @@ impl Sampler {
         if let Some(k) = self.times.iter().position(|t| !t.is_finite()) {
             return Err(format!("the time of key {k} is not finite"));
         }
-        if let Some(k) = self.times.windows(2).position(|t| t[0] >= t[1]) {
-            return Err(format!("the time of key {} ({} s) is not after the one before", k + 1, self.times[k + 1]));
+        if let Some(k) = self.times.windows(2).position(|t| t[0] > t[1]) {
+            return Err(format!("the time of key {} ({} s) is before that of the key before it", k + 1, self.times[k + 1]));
         }
         let wanted = keys.checked_mul(width * self.stride());
         if wanted != Some(self.values.len()) {
@@ -226,11 +255,54 @@ mod tests {
     }
 
     #[test]
+    fn keys_at_one_time_are_a_jump() {
+        let s = sampler(Interpolation::Linear, &[0.0, 1.0, 1.0, 1.0, 2.0], &[0.0, 4.0, 5.0, 6.0, 8.0]);
+        assert_eq!(s.check(1), Ok(()));
+        let at = |t| {
+            let mut out = [0.0];
+            s.weights(t, &mut out);
+            out[0]
+        };
+        assert_eq!((at(0.5), at(1.0), at(1.5), at(2.0)), (2.0, 6.0, 7.0, 8.0));
+        assert!((at(1.0 - 1e-9) - 4.0).abs() < 1e-6);
+        // at the ends, too
+        let s = sampler(Interpolation::Linear, &[0.0, 0.0, 1.0, 1.0], &[7.0, 1.0, 2.0, 9.0]);
+        let at = |t| {
+            let mut out = [0.0];
+            s.weights(t, &mut out);
+            out[0]
+        };
+        assert_eq!((at(0.0), at(0.5), at(1.0)), (1.0, 1.5, 9.0));
+    }
+
+    #[test]
+    fn keys_are_repaired_and_it_is_said() {
+        let mut good = sampler(Interpolation::Linear, &[0.0, 1.0], &[1.0, 2.0]);
+        assert!(good.repair(1).is_empty());
+        let mut bad = sampler(
+            Interpolation::Step,
+            &[2.0, f32::NAN, 0.0, 1.0, 1.0, 3.0],
+            &[20.0, 20.5, 0.5, 0.0, 1.0, 1.5, 10.0, 10.5, 11.0, 11.5, f32::INFINITY, 0.0],
+        );
+        let said = bad.repair(2);
+        assert_eq!(said.len(), 3, "{said:?}");
+        assert_eq!(&bad.times[..], [0.0, 1.0, 1.0, 2.0]);
+        // keys of one time stay in the file's order
+        assert_eq!(bad.values, [1.0, 1.5, 10.0, 10.5, 11.0, 11.5, 20.0, 20.5]);
+        assert_eq!(bad.check(2), Ok(()));
+        let mut spline = sampler(Interpolation::CubicSpline, &[1.0, 0.0], &[1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
+        assert_eq!(spline.repair(1).len(), 1);
+        assert_eq!(spline.values, [4.0, 5.0, 6.0, 1.0, 2.0, 3.0]);
+        // values that belong to no key
+        assert!(sampler(Interpolation::Linear, &[1.0, 0.0], &[1.0]).repair(1).is_empty());
+    }
+
+    #[test]
     fn what_is_wrong_is_said() {
         let check = |times: &[f32], values: &[f32]| sampler(Interpolation::Linear, times, values).check(1).unwrap_err();
         assert!(check(&[], &[]).contains("no keys"));
         assert!(check(&[0.0, f32::NAN], &[0.0, 0.0]).contains("time of key 1"));
-        assert!(check(&[0.0, 1.0, 1.0], &[0.0; 3]).contains("key 2 (1 s) is not after"));
+        assert!(check(&[0.0, 1.0, 0.5], &[0.0; 3]).contains("key 2 (0.5 s) is before"));
         assert!(check(&[0.0, 1.0], &[0.0; 3]).contains("3 numbers for 2 keys of 1"));
         assert!(check(&[0.0, 1.0], &[0.0, f32::INFINITY]).contains("value of key 1"));
     }

@@ -49,9 +49,6 @@ pub(super) fn finish(scene: &mut Scene, path: &Path) -> Result<()> {
         check(scene, path)?;
     }
     drop_empty(scene);
-    if scene.rig.as_ref().is_some_and(AnimationRig::is_idle) {
-        scene.rig = None;
-    }
     extent(scene, path)
 }
 

@@ -1,10 +1,9 @@
 //! Typed arrays in buffers. Every range is checked against the buffer view and the buffer before a byte is read.
 
-use std::borrow::Cow;
-
 use ::gltf::json::accessor::{Accessor, ComponentType, Type};
 use ::gltf::json::{Index, Root, buffer};
 
+use super::container::BufferBytes;
 use super::valid;
 
 /// Elements that an accessor without data (all zeros, or sparse over zeros) may have; nothing in the file bounds them.
@@ -13,7 +12,7 @@ const MAX_EMPTY: u64 = 1 << 24;
 /// Reads accessors. Errors are in words and name the accessor; the caller adds the file.
 pub(super) struct Reader<'a> {
     pub document: &'a Root,
-    pub buffers: &'a [Cow<'a, [u8]>],
+    pub buffers: &'a [BufferBytes<'a>],
 }
 
 /// Reads one component of an element.
@@ -112,6 +111,12 @@ impl<'a> Reader<'a> {
         Ok(valid(self.accessor(index)?.type_))
     }
 
+    /// Whether the file has values for it: without, they are zeros.
+    pub(super) fn has_data(&self, index: Index<Accessor>) -> Result<bool, String> {
+        let accessor = self.accessor(index)?;
+        Ok(accessor.buffer_view.is_some() || accessor.sparse.is_some())
+    }
+
     /// The bytes and stride of a buffer view.
     pub(super) fn view(&self, index: Index<buffer::View>) -> Result<(&'a [u8], Option<usize>), String> {
         let views = &self.document.buffer_views;
@@ -121,7 +126,9 @@ impl<'a> Reader<'a> {
         let buffer = self
             .buffers
             .get(view.buffer.value())
-            .ok_or_else(|| format!("buffer view {index} refers to buffer {}, which does not exist", view.buffer))?;
+            .ok_or_else(|| format!("buffer view {index} refers to buffer {}, which does not exist", view.buffer))?
+            .as_ref()
+            .map_err(Clone::clone)?;
         // the declared length counts, not the padding that may follow
         let declared = self.document.buffers[view.buffer.value()].byte_length.0.min(buffer.len() as u64);
         let (offset, length) = (view.byte_offset.unwrap_or_default().0, view.byte_length.0);

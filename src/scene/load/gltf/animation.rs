@@ -1,6 +1,6 @@
 //! Reading of animations.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use ::gltf::json::Index;
@@ -41,6 +41,12 @@ struct SamplerJson {
     interpolation: Option<String>,
 }
 
+/// The nodes of the file whose translation, rotation or scale a channel changes.
+pub(super) fn transformed(animations: &[Animation]) -> BTreeSet<usize> {
+    let transforms = |channel: &&ChannelJson| matches!(channel.target.path.as_str(), "translation" | "rotation" | "scale");
+    animations.iter().flat_map(|a| &a.channels).filter(transforms).filter_map(|channel| channel.target.node).collect()
+}
+
 /// All animations, whose channels refer to `nodes`; `index` has the index there of each node of the file. Invalid channels are left out,
 /// with a warning each.
 pub(super) fn read(
@@ -57,8 +63,13 @@ pub(super) fn read(
         let name = animation.name.clone().unwrap_or_default();
         let mut channels: Vec<Channel> = Vec::new();
         for (c, channel) in animation.channels.iter().enumerate() {
+            let mut repairs = Vec::new();
+            let channel = read_channel(reader, animation, channel, nodes, index, &mut times, &mut repairs);
+            for said in repairs {
+                warn(format!("animation {a} `{name}`, channel {c}: {said}"));
+            }
             let mut leave_out = |e: String| warn(format!("animation {a} `{name}`, channel {c}: {e}: left out"));
-            match read_channel(reader, animation, channel, nodes, index, &mut times) {
+            match channel {
                 Ok(Some(channel)) if channels.iter().any(|k| (k.node, k.property) == (channel.node, channel.property)) => {
                     leave_out("another channel has the same target".to_owned());
                 }
@@ -72,7 +83,7 @@ pub(super) fn read(
     out
 }
 
-/// `None` for a channel of a node that is not in the scene.
+/// `None` for a channel of a node that is not in the scene. `repairs`: what was wrong with it and could be mended.
 fn read_channel(
     reader: &Reader,
     animation: &Animation,
@@ -80,6 +91,7 @@ fn read_channel(
     nodes: &[Node],
     index: &[Option<usize>],
     times: &mut BTreeMap<u32, Arc<[f32]>>,
+    repairs: &mut Vec<String>,
 ) -> Result<Option<Channel>, String> {
     let target = channel.target.node.ok_or_else(|| format!("names no node (its path is `{}`)", channel.target.path))?;
     let Some(node) = *index.get(target).ok_or_else(|| format!("node {target} does not exist"))? else { return Ok(None) };
@@ -95,7 +107,9 @@ fn read_channel(
             return Err(format!("node {target} has no mesh with morph targets"));
         }
         (Property::Weights, _) => nodes[node].weights.len(),
-        (_, LocalTransform::Matrix(_)) => return Err(format!("node {target} has a matrix, which cannot be animated")),
+        (_, LocalTransform::Matrix(_)) => {
+            return Err(format!("node {target} has a matrix that shears, which cannot be animated"));
+        }
         (Property::Rotation, _) => 4,
         _ => 3,
     };
@@ -125,7 +139,10 @@ fn read_channel(
         Type::Vec3 => reader.floats(output, shape, |v: [f32; 3]| v).map(|v| v.as_flattened().to_vec()),
         _ => reader.floats(output, shape, |v: [f32; 4]| v).map(|v| v.as_flattened().to_vec()),
     };
-    let sampler = Sampler { interpolation, times, values: values.map_err(within)? };
+    let mut sampler = Sampler { interpolation, times, values: values.map_err(within)? };
+    for said in sampler.repair(width) {
+        repairs.push(within(said));
+    }
     sampler.check(width).map_err(within)?;
     Ok(Some(Channel { node, property, sampler }))
 }

@@ -3,7 +3,6 @@
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
-use ::gltf::binary::{self, Glb};
 use ::gltf::json::{Buffer, Root};
 use serde_json::{Value, json};
 
@@ -14,46 +13,83 @@ use crate::error::{Error, Result};
 /// A file's JSON and, in a `.glb`, the binary chunk.
 pub(super) struct Chunks<'a> {
     pub json: Cow<'a, [u8]>,
-    pub bin: Option<Cow<'a, [u8]>>,
+    pub bin: Option<&'a [u8]>,
 }
 
-/// Splits a `.glb`; anything that does not start with its magic is taken for JSON.
+/// Splits a `.glb`; anything else that may be JSON is taken for it, whatever the file's name.
 pub(super) fn split<'a>(file: &'a [u8], path: &Path) -> Result<Chunks<'a>> {
-    let is_glb = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("glb"));
     if !file.starts_with(b"glTF") {
-        return match is_glb {
+        let is_glb = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("glb"));
+        let json = utf8(file);
+        let is_json = json.iter().find(|b| !b.is_ascii_whitespace()) == Some(&b'{');
+        return match is_glb && !is_json {
             true => Err(Error::input(path, "is not a .glb file (it does not begin with `glTF`)")),
-            false => Ok(Chunks { json: file.into(), bin: None }),
+            false => Ok(Chunks { json, bin: None }),
         };
     }
-    let word = |at: usize| file.get(at..at + 4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]) as usize);
     let truncated = || Error::input(path, "is truncated: the .glb ends before its header says so");
-    if let Some(version) = word(4).filter(|&v| v != 2) {
+    if let Some(version) = word(file, 4).filter(|&v| v != 2) {
         return Err(Error::input(path, format!("is a .glb of version {version}; skylit reads version 2 (glTF 2.0)")));
     }
-    // the crate subtracts the header's size from the length without a look, which panics below 12; and it takes what
-    // follows the length for a chunk
-    let whole = word(8).filter(|&length| length >= 12).and_then(|length| file.get(..length)).ok_or_else(truncated)?;
-    let broken = |what: &str| Error::input(path, format!("is broken: {what}"));
-    match Glb::from_slice(whole) {
-        Ok(glb) => Ok(Chunks { json: glb.json, bin: glb.bin }),
-        Err(::gltf::Error::Binary(e)) => match e {
-            binary::Error::Io(_) | binary::Error::Length { .. } | binary::Error::ChunkLength { .. } => Err(truncated()),
-            // chunks of other kinds must be skipped, says the specification; the crate refuses one in the place of the
-            // binary chunk, though it has found the JSON
-            binary::Error::UnknownChunkType(_) if whole.get(16..20) == Some(b"JSON") => {
-                let json = word(12).and_then(|size| whole[20..].get(..size)).ok_or_else(truncated)?;
-                Ok(Chunks { json: json.into(), bin: None })
-            }
-            binary::Error::UnknownChunkType(_) => Err(broken("the first chunk of the .glb is not JSON")),
-            e => Err(broken(&e.to_string())),
-        },
-        Err(e) => Err(broken(&e.to_string())),
+    // what follows the length is no chunk
+    let whole = word(file, 8).and_then(|length| file.get(..length)).ok_or_else(truncated)?;
+    if whole.len() < 20 {
+        return Err(truncated());
     }
+    if &whole[16..20] != b"JSON" {
+        return Err(Error::input(path, "is broken: the first chunk of the .glb is not JSON"));
+    }
+    let body = |at: usize| word(whole, at).and_then(|size| whole[at + 8..].get(..size));
+    let json = body(12).ok_or_else(truncated)?;
+    let bin = match binary_chunk(whole, 20 + json.len()) {
+        None => None,
+        Some(at) => {
+            let size = word(whole, at).unwrap_or_default();
+            let rest = &whole[at + 8..];
+            // some writers count padding that they leave out
+            if size > rest.len() + 3 {
+                return Err(truncated());
+            }
+            Some(&rest[..size.min(rest.len())])
+        }
+    };
+    Ok(Chunks { json: utf8(json), bin })
+}
+
+/// Where the binary chunk begins; `at`: the end of the chunk before. Chunks of other kinds are skipped, as the specification wants, and padding that no chunk counts.
+fn binary_chunk(whole: &[u8], mut at: usize) -> Option<usize> {
+    loop {
+        let is_binary = |at: &usize| whole.get(at + 4..at + 8) == Some(b"BIN\0");
+        if let Some(found) = [at, at.next_multiple_of(4)].into_iter().find(is_binary) {
+            return Some(found);
+        }
+        at = at.checked_add(8)?.checked_add(word(whole, at)?)?;
+    }
+}
+
+/// The little-endian number in four bytes.
+fn word(bytes: &[u8], at: usize) -> Option<usize> {
+    bytes.get(at..at + 4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]) as usize)
+}
+
+/// JSON as UTF-8 without what some writers put around it: a byte order mark, the zeros of padding, the two bytes a character of other encodings.
+fn utf8(text: &[u8]) -> Cow<'_, [u8]> {
+    let wide = |pair: fn([u8; 2]) -> u16| {
+        let units: Vec<u16> = text[2..].as_chunks().0.iter().map(|&b| pair(b)).collect();
+        Cow::Owned(String::from_utf16_lossy(&units).trim_end_matches('\0').to_owned().into_bytes())
+    };
+    match text {
+        [0xff, 0xfe, ..] => return wide(u16::from_le_bytes),
+        [0xfe, 0xff, ..] => return wide(u16::from_be_bytes),
+        _ => {}
+    }
+    let text = text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(text);
+    let end = text.iter().rposition(|&b| b != 0).map_or(0, |last| last + 1);
+    Cow::Borrowed(&text[..end])
 }
 
 /// Parses the JSON and refuses other versions of glTF.
-pub(super) fn document(json: &[u8], path: &Path) -> Result<(Root, Doubles)> {
+pub(super) fn document(text: &[u8], path: &Path) -> Result<(Root, Doubles)> {
     #[derive(serde::Deserialize)]
     struct AssetOnly {
         #[serde(default)]
@@ -65,8 +101,6 @@ pub(super) fn document(json: &[u8], path: &Path) -> Result<(Root, Doubles)> {
         #[serde(default)]
         version: serde_json::Value,
     }
-    // the crate leaves a byte order mark to us
-    let text = json.strip_prefix(b"\xef\xbb\xbf").unwrap_or(json);
     let document = Root::from_slice(text).or_else(|e| lenient(text).ok_or(e));
     let document = match document.and_then(|document| Ok((document, serde_json::from_slice(text)?))) {
         Ok(document) => document,
@@ -114,8 +148,8 @@ fn lenient(text: &[u8]) -> Option<Root> {
 pub(super) fn read_uri(uri: &str, gltf: &Path) -> Result<Vec<u8>, String> {
     match uri::parse(uri)? {
         Uri::Data(bytes) => Ok(bytes),
-        Uri::Path(relative) => {
-            let file = gltf.parent().unwrap_or(Path::new("")).join(relative);
+        Uri::Paths(paths) => {
+            let file = uri::resolve(&paths, folder(gltf));
             std::fs::read(&file).map_err(|e| match Error::read(&file, &e) {
                 Error::Input { path, message } => format!("{}: {message}", path.display()),
                 other => other.to_string(),
@@ -124,12 +158,17 @@ pub(super) fn read_uri(uri: &str, gltf: &Path) -> Result<Vec<u8>, String> {
     }
 }
 
+fn folder(gltf: &Path) -> &Path {
+    gltf.parent().unwrap_or(Path::new(""))
+}
+
 /// The files beside the glTF file that its buffers and images are in.
 pub(super) fn files(document: &Root, gltf: &Path) -> Vec<PathBuf> {
     let uris = document.buffers.iter().map(|b| &b.uri).chain(document.images.iter().map(|i| &i.uri)).flatten();
     let mut files: Vec<_> = uris
+        .filter(|uri| !uri::is_data(uri))
         .filter_map(|uri| match uri::parse(uri) {
-            Ok(Uri::Path(relative)) => Some(gltf.parent().unwrap_or(Path::new("")).join(relative)),
+            Ok(Uri::Paths(paths)) => Some(uri::resolve(&paths, folder(gltf))),
             _ => None,
         })
         .collect();
@@ -137,21 +176,48 @@ pub(super) fn files(document: &Root, gltf: &Path) -> Vec<PathBuf> {
     files
 }
 
-/// The bytes of every buffer, each as long as it declares.
-pub(super) fn buffers<'a>(document: &Root, bin: Option<&'a [u8]>, path: &Path) -> Result<Vec<Cow<'a, [u8]>>> {
-    let buffer = |(i, buffer): (usize, &Buffer)| -> Result<Cow<'a, [u8]>> {
-        let bytes: Cow<'a, [u8]> = match (&buffer.uri, bin) {
-            (Some(uri), _) => {
-                read_uri(uri, path).map(Cow::Owned).map_err(|e| Error::input(path, format!("buffer {i}: {e}")))?
-            }
-            (None, Some(bin)) if i == 0 => Cow::Borrowed(bin),
-            (None, _) => return Err(Error::input(path, format!("buffer {i} has neither a URI nor a binary chunk"))),
-        };
-        if (bytes.len() as u64) < buffer.byte_length.0 {
-            let (have, want) = (bytes.len(), buffer.byte_length.0);
-            return Err(Error::input(path, format!("buffer {i} is truncated: {have} bytes of {want}")));
+/// The bytes of a buffer as long as it declares, or what is wrong with it, in words: an error for whoever needs it.
+pub(super) type BufferBytes<'a> = std::result::Result<Cow<'a, [u8]>, String>;
+
+/// The bytes of every buffer that a buffer view refers to; others are not read.
+pub(super) fn buffers<'a>(document: &Root, bin: Option<&'a [u8]>, path: &Path) -> Vec<BufferBytes<'a>> {
+    let mut used = vec![false; document.buffers.len()];
+    for view in &document.buffer_views {
+        if let Some(used) = used.get_mut(view.buffer.value()) {
+            *used = true;
         }
-        Ok(bytes)
+    }
+    let read = |(i, buffer): (usize, &Buffer)| match used[i] {
+        true => read_buffer(i, buffer, bin, path).map_err(|e| format!("buffer {i} {e}")),
+        false => Err(format!("buffer {i} is not used by a buffer view")),
     };
-    document.buffers.iter().enumerate().map(buffer).collect()
+    document.buffers.iter().enumerate().map(read).collect()
+}
+
+/// Extensions that replace the content of buffers.
+const COMPRESSION: [&str; 2] = ["EXT_meshopt_compression", "KHR_meshopt_compression"];
+
+fn read_buffer<'a>(
+    index: usize,
+    buffer: &Buffer,
+    bin: Option<&'a [u8]>,
+    path: &Path,
+) -> std::result::Result<Cow<'a, [u8]>, String> {
+    let bytes: Cow<'a, [u8]> = match (&buffer.uri, bin) {
+        (Some(uri), _) => read_uri(uri, path).map(Cow::Owned).map_err(|e| format!("cannot be read: {e}"))?,
+        (None, Some(bin)) if index == 0 => bin.into(),
+        (None, _) => {
+            let others = buffer.extensions.as_ref().map(|e| &e.others);
+            return Err(match COMPRESSION.iter().find(|name| others.is_some_and(|o| o.contains_key(**name))) {
+                Some(name) => format!(
+                    "has no bytes of its own: the extension {name} fills it, which skylit does not support: export the file without mesh compression"
+                ),
+                None => "has neither a URI nor a binary chunk".to_owned(),
+            });
+        }
+    };
+    match (bytes.len() as u64, buffer.byte_length.0) {
+        (have, want) if have < want => Err(format!("is truncated: {have} bytes of {want}")),
+        _ => Ok(bytes),
+    }
 }

@@ -35,6 +35,13 @@ pub(super) fn read(
         warn("has no positions: skipped".to_owned());
         return Ok(None);
     };
+    const DRACO: &str = "KHR_draco_mesh_compression";
+    let compressed = primitive.extensions.as_ref().is_some_and(|e| e.others.contains_key(DRACO));
+    if compressed && !reader.has_data(position)? {
+        return Err(format!(
+            "accessor {position} has no data of its own: the extension {DRACO} fills it, which skylit does not support: export the file without mesh compression"
+        ));
+    }
     let mut mesh = TriangleMesh { positions: reader.floats(position, Type::Vec3, Vec3::from_array)?, ..Default::default() };
     let vertices = mesh.positions.len();
     if u32::try_from(vertices).is_err() {

@@ -1,7 +1,7 @@
 //! glTF 2.0: `.gltf` with external files or data URIs, and `.glb`.
 //!
-//! The crate `gltf` reads the JSON and takes `.glb` files apart. Its validation is left out: it would refuse quantised
-//! meshes and every extension that it does not know. Hence indices are checked where they are used, values that it calls
+//! The crate `gltf` reads the JSON. Its validation is left out: it would refuse quantised
+//! meshes and every extension that it does not know; so are its chunks of `.glb` files, which refuse what the specification wants skipped. Hence indices are checked where they are used, values that it calls
 //! invalid are told where they matter, extensions that it does not model come from the maps in which it keeps them, and
 //! accessors are read by a reader of our own, which checks every range.
 //!
@@ -69,11 +69,10 @@ pub(super) fn read(path: &Path, options: &LoadOptions) -> Result<Scene> {
     let file = std::fs::read(path).map_err(|e| Error::read(path, &e))?;
     let chunks = container::split(&file, path)?;
     let (document, doubles) = container::document(&chunks.json, path)?;
-    let buffers = container::buffers(&document, chunks.bin.as_deref(), path)?;
-    let reader = Reader { document: &document, buffers: &buffers };
-
     let mut scene = Scene::default();
     extensions(&document, path, &mut scene)?;
+    let buffers = container::buffers(&document, chunks.bin, path);
+    let reader = Reader { document: &document, buffers: &buffers };
     scene.report.files = container::files(&document, path);
     let placed = node::place(&document, &doubles, !doubles.skins.is_empty()).map_err(|e| Error::input(path, e))?;
 
@@ -127,7 +126,9 @@ fn extensions(document: &Root, path: &Path, scene: &mut Scene) -> Result<()> {
     let unknown = |names: &[String]| names.iter().find(|n| !KNOWN.contains(&n.as_str())).cloned();
     if let Some(name) = unknown(&document.extensions_required) {
         let remedy = match name.as_str() {
-            "KHR_draco_mesh_compression" | "EXT_meshopt_compression" => "export the file without mesh compression",
+            "KHR_draco_mesh_compression" | "EXT_meshopt_compression" | "KHR_meshopt_compression" => {
+                "export the file without mesh compression"
+            }
             "KHR_texture_basisu" | "EXT_texture_webp" => "export the file with PNG or JPEG textures",
             _ => "export the file without it",
         };

@@ -8,7 +8,7 @@ use glam::{DAffine3, DVec3};
 use super::accessor::Reader;
 use super::node::{Doubles, PlacedNode};
 use super::{animation, skin, text};
-use crate::scene::animation::{Animation, Deformation, Node, Property, RigParts, Skin, VertexData, anchor};
+use crate::scene::animation::{Animation, Deformation, LocalTransform, Node, Property, RigParts, Skin, VertexData, anchor};
 use crate::scene::{AnimationRig, Scene, TriangleMesh};
 
 /// A glTF mesh with the skin and morph weights of a node. Nodes with the same variant share the scene's meshes.
@@ -68,16 +68,28 @@ impl<'a> RigBuilder<'a> {
         for (at, p) in placed.iter().enumerate() {
             index[p.node] = Some(at);
         }
+        let transformed = animation::transformed(&doubles.animations);
+        let mut taken_apart = Vec::new();
         let node = |p: &PlacedNode| {
+            // exporters write matrices for nodes that they animate, which the specification forbids
+            let is_matrix = matches!(p.local, LocalTransform::Matrix(_));
+            let parts = (is_matrix && transformed.contains(&p.node)).then(|| p.local.taken_apart()).flatten();
+            if parts.is_some() {
+                taken_apart.push(p.node);
+            }
+            let local = parts.unwrap_or(p.local);
             let node = &document.nodes[p.node];
             let mesh = node.mesh.and_then(|m| document.meshes.get(m.value()));
             let targets = |m: &::gltf::json::Mesh| m.primitives.iter().filter_map(|p| Some(p.targets.as_ref()?.len())).max();
             let mut weights = node.weights.clone().or_else(|| mesh?.weights.clone()).unwrap_or_default();
             weights.resize(mesh.and_then(targets).unwrap_or(0), 0.0);
             weights.iter_mut().filter(|w| !w.is_finite()).for_each(|w| *w = 0.0);
-            Node { name: text(&node.name).to_owned(), parent: p.parent, local: p.local, weights }
+            Node { name: text(&node.name).to_owned(), parent: p.parent, local, weights }
         };
         let nodes: Vec<Node> = placed.iter().map(node).collect();
+        for node in taken_apart {
+            warn(format!("node {node} is animated and has a matrix: taken apart into translation, rotation and scale"));
+        }
         let animations = animation::read(reader, &doubles.animations, &nodes, &index, warn);
         let (mut moves, mut morphs) = (vec![false; nodes.len()], vec![false; nodes.len()]);
         for channel in animations.iter().flat_map(|a| &a.channels).filter(|c| !c.is_constant(&nodes[c.node])) {

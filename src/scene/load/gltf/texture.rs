@@ -10,7 +10,7 @@ use ::gltf::json::{self, Index, Root};
 use rayon::prelude::*;
 
 use super::accessor::Reader;
-use super::{container, text, valid};
+use super::{container, text, uri, valid};
 use crate::scene::load::picture::{self, DecodedImage};
 use crate::scene::load::{ImagesDecoded, LoadOptions};
 use crate::scene::{Filter, Material, Texture, Wrap};
@@ -66,8 +66,8 @@ pub(super) fn resolve(
         let Some(Ok(picture)) = decoded.get(&source) else { continue };
         let (wrap, filter) = sampler(document, texture.sampler);
         let image = &document.images[source];
-        let uri = image.uri.as_deref().filter(|u| !u.starts_with("data:")).unwrap_or_default();
-        let name = [text(&texture.name), text(&image.name), uri].into_iter().find(|n| !n.is_empty()).unwrap_or_default();
+        let file = image.uri.as_deref().filter(|u| !uri::is_data(u)).unwrap_or_default();
+        let name = [text(&texture.name), text(&image.name), file].into_iter().find(|n| !n.is_empty()).unwrap_or_default();
         *place = Some(textures.len());
         textures.push(Texture {
             name: name.to_owned(),
@@ -93,9 +93,9 @@ fn image(reader: &Reader, path: &Path, index: usize) -> Result<DecodedImage, Str
     let image = reader.document.images.get(index).ok_or("does not exist")?;
     match (&image.uri, image.buffer_view) {
         (_, Some(view)) => picture::decode(reader.view(view)?.0, text(&image.name)),
-        (Some(uri), None) => {
-            let bytes = container::read_uri(uri, path).map_err(|e| format!("cannot be read ({e})"))?;
-            let name = if uri.starts_with("data:") { text(&image.name) } else { uri };
+        (Some(file), None) => {
+            let bytes = container::read_uri(file, path).map_err(|e| format!("cannot be read ({e})"))?;
+            let name = if uri::is_data(file) { text(&image.name) } else { file };
             picture::decode(&bytes, name)
         }
         (None, None) => Err("has neither a URI nor a buffer view".to_owned()),
