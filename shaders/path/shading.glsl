@@ -176,22 +176,28 @@ Shading shade(Surface s, vec3 wo, float log_side) {
     }
     vec4 tangent = vec4(0.0);
     bool mapped = has_map(m, USE_NORMAL), clearcoat_mapped = HAS_CLEARCOAT && has_map(m, USE_CLEARCOAT_NORMAL);
-    if ((mapped || clearcoat_mapped || HAS_ANISOTROPY) && !is_null(submesh.tangents)) tangent = tangent_at(s, submesh);
+    if ((mapped || clearcoat_mapped || HAS_ANISOTROPY) && !is_null(submesh.tangents)) tangent = tangent_at(s, submesh, submesh.tangents);
     if (mapped && tangent.w != 0.0) {
         n = towards(mapped_normal(textures.at[USE_NORMAL], SHADING_OF(m).normal_scale, s.ns, tangent) * side, wo);
         out_.frame = frame_about(n);
+    }
+    vec4 clearcoat_tangent = tangent, anisotropy_tangent = tangent;
+    if (HAS_SEPARATE_TANGENTS) {
+        if (!is_null(submesh.clearcoat_tangents)) clearcoat_tangent = tangent_at(s, submesh, submesh.clearcoat_tangents);
+        if (!is_null(submesh.anisotropy_tangents)) anisotropy_tangent = tangent_at(s, submesh, submesh.anisotropy_tangents);
     }
     float cos_o = max(dot(n, wo), MIN_COSINE);
     MaterialPoint point = MaterialPoint(m, base, front, cos_o, textures, vec2(1.0, 0.0));
     out_.bsdf.kind = model;
     bsdf_setup(out_.bsdf, point);
     if (is_bsdf(out_.bsdf, BSDF_GLTF, HAS_GLTF)) {
-        if (HAS_ANISOTROPY && SHADING_OF(m).anisotropy != vec2(0.0) && tangent.w != 0.0) {
-            vec3 d = tangent.xyz * point.along.x + cross(s.ns, tangent.xyz) * (tangent.w * point.along.y);
+        if (HAS_ANISOTROPY && SHADING_OF(m).anisotropy != vec2(0.0) && anisotropy_tangent.w != 0.0) {
+            vec4 t = anisotropy_tangent;
+            vec3 d = t.xyz * point.along.x + cross(s.ns, t.xyz) * (t.w * point.along.y);
             out_.frame = frame_along(n, d);
         }
-        if (clearcoat_mapped && tangent.w != 0.0) {
-            vec3 nc = mapped_normal(textures.at[USE_CLEARCOAT_NORMAL], SHADING_OF(m).clearcoat_normal_scale, s.ns, tangent) * side;
+        if (clearcoat_mapped && clearcoat_tangent.w != 0.0) {
+            vec3 nc = mapped_normal(textures.at[USE_CLEARCOAT_NORMAL], SHADING_OF(m).clearcoat_normal_scale, s.ns, clearcoat_tangent) * side;
             out_.bsdf.clearcoat.normal = to_frame(out_.frame, towards(nc, wo));
         } else if (HAS_CLEARCOAT && mapped) {
             // the clearcoat has its own normals, or none

@@ -14,10 +14,16 @@ vec3 surface_albedo(Surface s, float log_side) {
     return m.model == BSDF_CONDUCTOR ? m.specular_color * fresnel_conductor(1.0, m.eta, m.k) : m.specular_color;
 }
 
+// Ambient visibility by the material's occlusion texture, weighted by its strength; 1 without one.
+float baked_visibility(Surface s, float log_side) {
+    SubmeshRecord submesh = SubmeshRecords(SceneRoot(push.scene).submeshes).v[s.submesh];
+    return 1.0 + SHADING_OF(submesh.material).occlusion_strength * (look_up(s, submesh, log_side).at[USE_OCCLUSION].r - 1.0);
+}
+
 vec3 view_value(uint view, Surface s, Shading shown, float distance_, float log_side) {
     if (view == VIEW_DEPTH) return vec3(distance_);
     if (view == VIEW_NORMALS) return shown.frame.n;
-    if (view == VIEW_BAKED_OCCLUSION) return vec3(look_up(s, SubmeshRecords(SceneRoot(push.scene).submeshes).v[s.submesh], log_side).at[USE_OCCLUSION].r);
+    if (view == VIEW_BAKED_OCCLUSION) return vec3(baked_visibility(s, log_side));
     return surface_albedo(s, log_side);
 }
 

@@ -150,11 +150,11 @@ Surface surface_at(Ray ray, Hit hit) {
 }
 
 // Unit tangent (world space, not yet orthogonal to the normal) with handedness in w: the bitangent is w * cross(normal, tangent) about the normal of the
-// front. w = 0 without a tangent.
-vec4 tangent_at(Surface s, SubmeshRecord submesh) {
+// front. w = 0 without a tangent. `tangents`: one of the submesh's arrays.
+vec4 tangent_at(Surface s, SubmeshRecord submesh, uvec2 tangents) {
     uvec3 corners = triangle_indices(submesh, s.primitive) - submesh.first_vertex;
-    vec4 a = load_quad(submesh.tangents, corners.x);
-    vec3 t = a.xyz * (1.0 - s.uv.x - s.uv.y) + load_quad(submesh.tangents, corners.y).xyz * s.uv.x + load_quad(submesh.tangents, corners.z).xyz * s.uv.y;
+    vec4 a = load_quad(tangents, corners.x);
+    vec3 t = a.xyz * (1.0 - s.uv.x - s.uv.y) + load_quad(tangents, corners.y).xyz * s.uv.x + load_quad(tangents, corners.z).xyz * s.uv.y;
     float w = a.w;
     if (!SINGLE_LEVEL) {
         vec4 rows[3] = InstanceRecords(SceneRoot(push.scene).instances).v[s.tlas_instance].group_to_world;

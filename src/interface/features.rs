@@ -137,6 +137,7 @@ feature_set! {
     ShadingNormals = "HAS_SHADING_NORMALS", "shading normals";
     White = "IS_WHITE", "white surfaces";
     RayCones = "HAS_RAY_CONES", "ray cones";
+    SeparateTangents = "HAS_SEPARATE_TANGENTS", "tangents of more than one texture";
 }
 
 feature_set! {

@@ -14,11 +14,21 @@ pub fn of_scene(scene: &Scene) -> String {
     for Mesh { name: _, geometry, material } in &scene.meshes {
         hash.count(*material);
         match geometry {
-            Geometry::Triangles(TriangleMesh { positions, indices, normals, tangents, texcoords, colors }) => {
+            Geometry::Triangles(TriangleMesh {
+                positions,
+                indices,
+                normals,
+                tangents,
+                clearcoat_tangents,
+                anisotropy_tangents,
+                texcoords,
+                colors,
+            }) => {
                 hash.slice(positions);
                 hash.slice(indices);
                 hash.slice(normals);
                 hash.slice(tangents);
+                [clearcoat_tangents, anisotropy_tangents].iter().filter(|t| !t.is_empty()).for_each(|t| hash.slice(t));
                 texcoords.iter().for_each(|t| hash.slice(t));
                 hash.slice(colors);
             }

@@ -167,6 +167,8 @@ pub struct Material {
     pub normal_scale: f32,
     /// Baked occlusion (red): for the AOV only, never used in light transport.
     pub occlusion_texture: Option<TextureSlot>,
+    /// How much of the occlusion texture applies, 0 to 1: visibility is 1 + strength (texture - 1).
+    pub occlusion_strength: f32,
     /// Linear emitted radiance, KHR_materials_emissive_strength included.
     pub emissive: Vec3,
     /// Multiplies `emissive` (sRGB texture).
@@ -218,6 +220,7 @@ impl Default for Material {
             normal_texture: None,
             normal_scale: 1.0,
             occlusion_texture: None,
+            occlusion_strength: 1.0,
             emissive: Vec3::ZERO,
             emissive_texture: None,
             alpha_mode: AlphaMode::default(),

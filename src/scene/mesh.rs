@@ -13,6 +13,10 @@ pub struct TriangleMesh {
     pub normals: Vec<Vec3>,
     /// Unit tangents with handedness in w (glTF convention); empty unless a normal map needs them.
     pub tangents: Vec<Vec4>,
+    /// Tangents of the clearcoat's normal map; empty where they are the same.
+    pub clearcoat_tangents: Vec<Vec4>,
+    /// Tangents of the anisotropy texture; empty where they are the same.
+    pub anisotropy_tangents: Vec<Vec4>,
     /// Texture coordinate sets 0 and 1, glTF convention (v down).
     pub texcoords: [Vec<Vec2>; 2],
     /// Linear vertex colours with alpha.

@@ -137,7 +137,9 @@ impl GpuScene {
                     scene_instance: part.scene_instance.map_or(INVALID, |i| i as u32),
                     mirrored: part.mirrored as u32,
                     reserved: 0,
-                    tangents: attributes.address(part, k, Attribute::Tangents),
+                    tangents: attributes.address(part, k, Attribute::Tangents(0)),
+                    clearcoat_tangents: attributes.address(part, k, Attribute::Tangents(1)),
+                    anisotropy_tangents: attributes.address(part, k, Attribute::Tangents(2)),
                 });
             }
         }
@@ -464,7 +466,8 @@ fn concatenate(device: &Arc<Device>, name: &str, arrays: &[Cow<[u8]>]) -> Result
 #[derive(Clone, Copy, PartialEq, Eq, Hash)]
 enum Attribute {
     Normals,
-    Tangents,
+    /// Those of the mesh, of its clearcoat, of its anisotropy.
+    Tangents(usize),
     Texcoords(usize),
     Colors,
 }
@@ -480,7 +483,7 @@ impl Attributes {
     /// Baked normals and tangents differ between submeshes of one mesh; all other attributes are shared.
     fn key(part: &Submesh, index: usize, attribute: Attribute) -> (usize, Option<usize>, Attribute) {
         let baked =
-            matches!(attribute, Attribute::Normals | Attribute::Tangents) && part.to_group.matrix3 != glam::DMat3::IDENTITY;
+            matches!(attribute, Attribute::Normals | Attribute::Tangents(_)) && part.to_group.matrix3 != glam::DMat3::IDENTITY;
         (part.mesh, baked.then_some(index), attribute)
     }
 
@@ -496,7 +499,9 @@ impl Attributes {
                 || shading::slots(material, needs).into_iter().any(|slot| slot.is_some());
             for (attribute, wanted) in [
                 (Attribute::Normals, needs.normals),
-                (Attribute::Tangents, needs.shading && !needs.white),
+                (Attribute::Tangents(0), needs.shading && !needs.white),
+                (Attribute::Tangents(1), needs.shading && !needs.white),
+                (Attribute::Tangents(2), needs.shading && !needs.white),
                 (Attribute::Texcoords(0), textured),
                 (Attribute::Texcoords(1), textured),
                 (Attribute::Colors, color),
@@ -518,6 +523,10 @@ impl Attributes {
     }
 }
 
+fn tangents(t: &TriangleMesh, which: usize) -> &[Vec4] {
+    [&t.tangents, &t.clearcoat_tangents, &t.anisotropy_tangents][which]
+}
+
 fn attribute_bytes<'a>(t: &'a TriangleMesh, part: &Submesh, attribute: Attribute) -> Cow<'a, [u8]> {
     match attribute {
         Attribute::Normals if part.to_group.matrix3 == glam::DMat3::IDENTITY => Cow::Borrowed(bytemuck::cast_slice(&t.normals)),
@@ -526,15 +535,15 @@ fn attribute_bytes<'a>(t: &'a TriangleMesh, part: &Submesh, attribute: Attribute
             let baked: Vec<Vec3> = t.normals.iter().map(|n| (m * n.as_dvec3()).as_vec3()).collect();
             Cow::Owned(bytemuck::cast_slice(&baked).to_vec())
         }
-        Attribute::Tangents if part.to_group.matrix3 == glam::DMat3::IDENTITY => {
-            Cow::Borrowed(bytemuck::cast_slice(&t.tangents))
+        Attribute::Tangents(k) if part.to_group.matrix3 == glam::DMat3::IDENTITY => {
+            Cow::Borrowed(bytemuck::cast_slice(tangents(t, k)))
         }
-        Attribute::Tangents => {
+        Attribute::Tangents(k) => {
             let m = part.to_group.matrix3;
             // a mirroring transform reverses the bitangent relative to the cross product
             let side = if part.mirrored { -1.0 } else { 1.0 };
             let bake = |t: &Vec4| (m * t.truncate().as_dvec3()).normalize_or_zero().as_vec3().extend(side * t.w);
-            Cow::Owned(bytemuck::cast_slice(&t.tangents.iter().map(bake).collect::<Vec<_>>()).to_vec())
+            Cow::Owned(bytemuck::cast_slice(&tangents(t, k).iter().map(bake).collect::<Vec<_>>()).to_vec())
         }
         Attribute::Texcoords(set) => Cow::Borrowed(bytemuck::cast_slice(&t.texcoords[set])),
         Attribute::Colors => Cow::Borrowed(bytemuck::cast_slice(&t.colors)),

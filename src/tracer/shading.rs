@@ -149,6 +149,7 @@ pub(super) fn features(flat: &FlatScene, needs: Needs) -> ShadingFeatures {
             None => materials.insert(MaterialFeature::Unlit),
         }
         let normal_maps = m.normal_texture.is_some() || m.clearcoat.factor > 0.0 && m.clearcoat.normal_texture.is_some();
+        let separate = matches!(&mesh.geometry, Geometry::Triangles(t) if !t.clearcoat_tangents.is_empty() || !t.anisotropy_tangents.is_empty());
         let varies = matches!(&mesh.geometry, Geometry::Triangles(t) if !t.colors.is_empty() || m.base_color_texture.is_some());
         for (slot, &feature) in slots(m, needs).iter().zip(TextureFeature::ALL) {
             textures.insert_if(slot.is_some(), feature);
@@ -161,6 +162,7 @@ pub(super) fn features(flat: &FlatScene, needs: Needs) -> ShadingFeatures {
             (absorbs(m), MaterialFeature::Absorption),
             (gltf && m.anisotropy.strength > 0.0, MaterialFeature::Anisotropy),
             (normal_maps, MaterialFeature::ShadingNormals),
+            (separate, MaterialFeature::SeparateTangents),
             (varies, MaterialFeature::BaseColors),
             (m.emissive.max_element() > 0.0 && !m.unlit, MaterialFeature::Emission),
         ] {
@@ -207,6 +209,8 @@ pub(super) fn record(
         glass_layer: indices.iter().position(|&ior| ior == m.ior).unwrap_or(0) as u32,
         priority: m.dielectric_priority,
         parameters: parameters(m),
+        occlusion_strength: m.occlusion_strength,
+        reserved: [0; 3],
         uses: slots(m, needs).map(texture),
     }
 }

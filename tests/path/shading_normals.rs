@@ -1,8 +1,9 @@
 //! Shading normals that are not the surface's, interpolated or from a map: no light is made, none comes through the surface, and all strategies agree.
 
 use super::*;
-use glam::{Affine2, Vec2, Vec4};
+use glam::{Affine2, DQuat, Vec2, Vec4};
 use skylit::scene::builtin::shapes;
+use skylit::scene::material::{Anisotropy, Clearcoat};
 use skylit::scene::{Filter, Texture, TextureSlot, TriangleMesh, Wrap};
 use std::f64::consts::PI;
 
@@ -151,5 +152,44 @@ fn gpu_strategies_agree_about_leaning_normals() {
         holds_on_compute(4.0 * error / bsdf + 1e-5, &device, what, &scene, &options(1024), bsdf, 5e-3);
         let light = PathOptions { strategy: Strategy::Light, ..options(4096) };
         holds_but_for(4.0 * error / bsdf + 1e-5, &device, what, &scene, &light, bsdf, 1e-2);
+    }
+}
+
+/// A clearcoat's map and an anisotropy texture may have tangents of their own beside a normal map's.
+#[test]
+fn gpu_textures_have_tangents_of_their_own() {
+    let device = device();
+    let slot = |texture| Some(TextureSlot { texture, texcoord: 0, transform: Affine2::IDENTITY });
+    // light that a coat reflects to the camera if its normals lean towards y
+    let light = Light {
+        name: String::new(),
+        kind: LightKind::Directional { angle: 0.0 },
+        intensity: Vec3::ONE,
+        position: DVec3::ZERO,
+        direction: -DQuat::from_rotation_x(-40f64.to_radians()).mul_vec3(DVec3::Z),
+        range: f64::INFINITY,
+    };
+    let mean = |has_normal_map: bool, tangents: [Option<Vec4>; 3]| {
+        let coat = Clearcoat { factor: 1.0, roughness: 0.3, normal_texture: slot(0), ..Clearcoat::default() };
+        let anisotropy = Anisotropy { strength: 0.8, ..Anisotropy::default() };
+        let material = Material { metallic: 1.0, roughness: 0.5, clearcoat: coat, anisotropy, ..Material::default() };
+        let mut scene = sheet(tilted(20.0), true, material);
+        scene.materials[0].normal_texture = slot(1).filter(|_| has_normal_map);
+        let flat_map = Texture { texels: vec![128u8, 128, 255, 255].into(), ..scene.textures[0].clone() };
+        scene.textures.push(flat_map);
+        scene.lights.push(light.clone());
+        let Geometry::Triangles(mesh) = &mut scene.meshes[0].geometry else { unreachable!() };
+        let [own, coat, stretched] = tangents.map(|t| t.map_or_else(Vec::new, |t| vec![t; 4]));
+        (mesh.tangents, mesh.clearcoat_tangents, mesh.anisotropy_tangents) = (own, coat, stretched);
+        let flat = FlatScene::for_paths(&scene);
+        let film = render(&tracer(&device, TracerKind::Compute, &flat), &flat, &options(4)).image.film;
+        film.mean.iter().map(|&m| f64::from(m)).sum::<f64>() / film.mean.len() as f64
+    };
+    let (x, y) = (Some(Vec4::new(1.0, 0.0, 0.0, 1.0)), Some(Vec4::new(0.0, 1.0, 0.0, 1.0)));
+    let (all, separate) = (mean(false, [y, None, None]), mean(true, [x, y, y]));
+    assert!((separate / all - 1.0).abs() < 0.03, "{separate}, expected {all}");
+    for tangents in [[x, None, None], [x, y, None], [x, None, y]] {
+        let other = mean(true, tangents);
+        assert!((other / all - 1.0).abs() > 0.1, "{tangents:?}: {other}, as {all}");
     }
 }

@@ -67,6 +67,26 @@ fn albedo(spp: u32, texture_filter: TextureFilter) -> PathOptions {
     PathOptions { view: Some(View::Albedo), ..options(spp, texture_filter) }
 }
 
+/// 1 + strength (texture - 1), and 1 without a texture.
+#[test]
+fn gpu_baked_occlusion_has_a_strength() {
+    let device = device();
+    let image = texture(1, 1, |_, _| grey(51));
+    let mut scene = wall(image, 1.0);
+    let view = PathOptions { view: Some(View::BakedOcclusion), ..options(1, TextureFilter::Bilinear) };
+    for kind in picked(&device) {
+        for (strength, occlusion_texture, expected) in [(1.0, SLOT, 0.2), (0.25, SLOT, 0.8), (0.0, SLOT, 1.0), (0.5, None, 1.0)]
+        {
+            let material = &mut scene.materials[0];
+            (material.occlusion_texture, material.occlusion_strength) = (occlusion_texture, strength);
+            let flat = FlatScene::for_paths(&scene);
+            let film = render(&with_levels(&device, kind, &flat), &flat, &view).image.film;
+            assert!(film.mean.iter().all(|m| (m - expected).abs() < 1e-6), "{kind}, {strength}: {:?}", &film.mean[..3]);
+        }
+    }
+    assert_validation_clean(&device);
+}
+
 /// Levels of textures of 16 bits and of floats have the mean of the texture: four texels to a pixel's side.
 #[test]
 fn gpu_levels_of_deep_textures() {

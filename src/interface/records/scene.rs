@@ -107,6 +107,10 @@ records! {
         reserved: uint,
         /// 4 floats per vertex of the submesh: tangents; 0: required by no material.
         tangents: address,
+        /// Tangents of the clearcoat's normal map, likewise; 0: `tangents`.
+        clearcoat_tangents: address,
+        /// Tangents of the anisotropy texture, likewise; 0: `tangents`.
+        anisotropy_tangents: address,
     }
 
     /// The properties of a material that traversal needs: base colour and alpha.

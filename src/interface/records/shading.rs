@@ -56,6 +56,10 @@ records! {
         priority: int,
         /// Further parameters of the reflection model; its file in shaders/bsdf says what they are.
         parameters: vec2,
+        /// Strength of the occlusion texture, 0 to 1.
+        occlusion_strength: float,
+        /// Padding to a multiple of 16 bytes.
+        reserved: uint[3],
         /// Textures other than the base colour's, indexed by `TextureFeature`.
         uses: TextureUse[TextureFeature::ALL.len()],
     }

@@ -46,21 +46,22 @@ pub struct VertexData {
     pub positions: Vec<Vec3>,
     /// Unit normals.
     pub normals: Vec<Vec3>,
-    /// Unit tangents, handedness in w.
-    pub tangents: Vec<Vec4>,
+    /// Unit tangents, handedness in w: those of normal maps, and those of clearcoats and of anisotropy where they differ.
+    pub tangents: [Vec<Vec4>; 3],
 }
 
 impl VertexData {
     /// Takes the vertices out of a mesh.
     pub(in crate::scene) fn take(mesh: &mut TriangleMesh) -> Self {
-        let TriangleMesh { positions, normals, tangents, .. } = mesh;
+        let TriangleMesh { positions, normals, tangents, clearcoat_tangents, anisotropy_tangents, .. } = mesh;
         let (positions, normals) = (std::mem::take(positions), std::mem::take(normals));
-        Self { positions, normals, tangents: std::mem::take(tangents) }
+        Self { positions, normals, tangents: [tangents, clearcoat_tangents, anisotropy_tangents].map(std::mem::take) }
     }
 
     /// Puts the vertices into a mesh.
     pub(in crate::scene) fn give(self, mesh: &mut TriangleMesh) {
-        (mesh.positions, mesh.normals, mesh.tangents) = (self.positions, self.normals, self.tangents);
+        (mesh.positions, mesh.normals) = (self.positions, self.normals);
+        [mesh.tangents, mesh.clearcoat_tangents, mesh.anisotropy_tangents] = self.tangents;
     }
 }
 
@@ -148,14 +149,15 @@ impl Deformation {
             });
             both.unzip_into_vecs(&mut out.positions, &mut out.normals);
         }
-        out.tangents.clear();
-        if !tangents {
-            return;
+        for (out, base) in out.tangents.iter_mut().zip(&base.tangents) {
+            out.clear();
+            if tangents {
+                out.extend(base.iter().enumerate().map(|(v, t)| {
+                    let turned = matrix(v).transform_vector3(t.truncate().as_dvec3()).try_normalize();
+                    turned.map_or(*t, |d| d.as_vec3().extend(t.w))
+                }));
+            }
         }
-        out.tangents.extend(base.tangents.iter().enumerate().map(|(v, t)| {
-            let turned = matrix(v).transform_vector3(t.truncate().as_dvec3()).try_normalize();
-            turned.map_or(*t, |d| d.as_vec3().extend(t.w))
-        }));
     }
 
     /// The skinning matrix of a vertex: the weighted mean of its joint matrices.

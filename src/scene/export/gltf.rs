@@ -251,7 +251,8 @@ impl Writer {
         if !mesh.normals.is_empty() {
             attributes["NORMAL"] = json!(self.floats(mesh.normals.iter().map(|n| n.to_array()), false));
         }
-        if !mesh.tangents.is_empty() {
+        // tangents of a file are those of all its textures: where they differ, readers compute them
+        if !mesh.tangents.is_empty() && mesh.clearcoat_tangents.is_empty() && mesh.anisotropy_tangents.is_empty() {
             attributes["TANGENT"] = json!(self.floats(mesh.tangents.iter().map(|t| t.to_array()), false));
         }
         for (key, set) in ["TEXCOORD_0", "TEXCOORD_1"].into_iter().zip(&mesh.texcoords) {
@@ -354,8 +355,8 @@ fn sampler(texture: &Texture) -> Value {
 
 /// A copy of a posed mesh with its undeformed vertices.
 fn undeformed(posed: &TriangleMesh, shape: &VertexData) -> TriangleMesh {
-    let VertexData { positions, normals, tangents } = shape.clone();
-    TriangleMesh { positions, normals, tangents, ..posed.clone() }
+    let VertexData { positions, normals, tangents: [tangents, clearcoat_tangents, anisotropy_tangents] } = shape.clone();
+    TriangleMesh { positions, normals, tangents, clearcoat_tangents, anisotropy_tangents, ..posed.clone() }
 }
 
 /// Spheres as one smooth mesh.

@@ -27,6 +27,9 @@ pub(super) fn material(material: &Material, used: &mut BTreeSet<&'static str>) -
     if material.normal_texture.is_some() && material.normal_scale != 1.0 {
         out["normalTexture"]["scale"] = json!(material.normal_scale);
     }
+    if material.occlusion_texture.is_some() && material.occlusion_strength != 1.0 {
+        out["occlusionTexture"]["strength"] = json!(material.occlusion_strength);
+    }
     match material.alpha_mode {
         AlphaMode::Opaque => {}
         AlphaMode::Mask { cutoff } => {

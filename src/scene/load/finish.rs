@@ -108,7 +108,7 @@ fn materials(scene: &mut Scene) {
                 .push(format!("material `{name}` has an index of refraction of {ior}, which is below 1: 1 instead"));
             material.ior = 1.0;
         }
-        for share in [&mut material.metallic, &mut material.roughness] {
+        for share in [&mut material.metallic, &mut material.roughness, &mut material.occlusion_strength] {
             *share = share.clamp(0.0, 1.0);
         }
         for slot in material.texture_slots_mut().into_iter().flatten().filter(|s| !s.transform.is_finite()) {
@@ -221,8 +221,7 @@ fn repair(mesh: &mut Mesh, material: &Material, deformation: Option<&mut Deforma
             let text = "is anisotropic and has neither tangents nor texture coordinates: stretched around its y axis";
             notes.warnings.push(format!("mesh `{}`: {text}", mesh.name));
         }
-        let slot = material.normal_texture.or(material.clearcoat.normal_texture).or(material.anisotropy.texture);
-        let source = tangents::compute(triangles, slot.map_or(0, |s| s.texcoord));
+        let source = tangents::compute(triangles, material);
         if let Some(deformation) = deformation {
             deformation.reorder(&source);
         }

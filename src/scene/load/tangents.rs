@@ -1,10 +1,10 @@
 //! Tangents by MikkTSpace, the space that normal maps are baked in. <http://www.mikktspace.com>
 
 use bevy_mikktspace::{Geometry, TangentSpace, generate_tangents};
-use glam::{Vec2, Vec3, Vec4};
+use glam::{Affine2, Vec2, Vec3, Vec4};
 
 use super::normals;
-use crate::scene::TriangleMesh;
+use crate::scene::{Material, TextureSlot, TriangleMesh};
 
 /// Brings the file's tangents to unit length with a handedness of -1 or 1. False when there are none, or unusable ones.
 pub(super) fn normalize(mesh: &mut TriangleMesh) -> bool {
@@ -18,10 +18,27 @@ pub(super) fn normalize(mesh: &mut TriangleMesh) -> bool {
     !mesh.tangents.is_empty() && !mesh.normals.is_empty()
 }
 
-/// Computes tangents from set `set` of the texture coordinates, or from the other set where that one is empty or the same everywhere. Where neither
-/// has a gradient, tangents are [`horizontal`]. Vertices whose triangles disagree are split; a mesh without normals becomes explicitly flat. Returns which vertex each vertex
-/// was before.
-pub(super) fn compute(mesh: &mut TriangleMesh, set: usize) -> Vec<u32> {
+/// Textures whose values are directions, in the order of [`TriangleMesh`]'s tangents: the one that the mesh's tangents are those of, and that of the clearcoat and that of anisotropy
+/// where they lie differently.
+fn textures(material: &Material) -> (Option<TextureSlot>, [Option<TextureSlot>; 2]) {
+    let clearcoat = material.clearcoat.normal_texture.filter(|_| material.clearcoat.factor > 0.0);
+    let anisotropy = material.anisotropy.texture.filter(|_| material.anisotropy.strength > 0.0);
+    // without a texture of its own anisotropy follows the normal map
+    let first = material.normal_texture.or(material.clearcoat.normal_texture).or(material.anisotropy.texture);
+    (first, [clearcoat, anisotropy].map(|slot| slot.filter(|s| first.is_some_and(|f| !lie_alike(&f, s)))))
+}
+
+/// Whether the tangents of two textures are the same: their coordinates differ by scales of u and v above zero, and by where they begin.
+fn lie_alike(a: &TextureSlot, b: &TextureSlot) -> bool {
+    let between = b.transform.matrix2 * a.transform.matrix2.inverse();
+    let (x, y) = (between.x_axis, between.y_axis);
+    let is_scale = x.x > 0.0 && y.y > 0.0 && x.y.abs().max(y.x.abs()) <= 1e-5 * x.x.min(y.y);
+    a.texcoord == b.texcoord && (is_scale || a.transform.matrix2 == b.transform.matrix2)
+}
+
+/// Computes tangents for the textures of a material ([`corner_tangents`]). Vertices whose triangles disagree are split; a mesh without normals becomes explicitly flat. Returns which
+/// vertex each vertex was before.
+pub(super) fn compute(mesh: &mut TriangleMesh, material: &Material) -> Vec<u32> {
     let mut source: Vec<u32> = match mesh.normals.is_empty() {
         true => mesh.indices.iter().flatten().copied().collect(),
         false => (0..mesh.positions.len() as u32).collect(),
@@ -29,10 +46,25 @@ pub(super) fn compute(mesh: &mut TriangleMesh, set: usize) -> Vec<u32> {
     if mesh.normals.is_empty() {
         normals::make_flat(mesh);
     }
-    let set = [set, 1 - set].into_iter().find(|&s| varies(&mesh.texcoords[s]));
-    let mut corners = Corners { mesh, set: set.unwrap_or(0), tangents: vec![Vec4::ZERO; mesh.indices.len() * 3] };
+    let (first, others) = textures(material);
+    let first = corner_tangents(mesh, first);
+    let [clearcoat, anisotropy] = others.map(|slot| slot.map_or_else(Vec::new, |slot| corner_tangents(mesh, Some(slot))));
+    for original in weld(mesh, [&first, &clearcoat, &anisotropy]) {
+        source.push(source[original as usize]);
+    }
+    source
+}
+
+/// The tangent at each corner of each triangle, from the texture coordinates of a texture, transformed as the texture's are: what a map says about right and up is of its own image.
+/// Where these are the same everywhere, or there is no texture, from the first set that is not. Where none has a gradient, tangents are [`horizontal`].
+fn corner_tangents(mesh: &TriangleMesh, texture: Option<TextureSlot>) -> Vec<Vec4> {
+    let own = texture.map(|t| (t.texcoord, t.transform)).filter(|(_, transform)| transform.matrix2.determinant() != 0.0);
+    let candidates = own.into_iter().chain([0, 1].map(|set| (set, Affine2::IDENTITY)));
+    let chosen = candidates.into_iter().find(|(set, _)| varies(&mesh.texcoords[*set]));
+    let (set, transform) = chosen.unwrap_or_default();
+    let mut corners = Corners { mesh, set, transform, tangents: vec![Vec4::ZERO; mesh.indices.len() * 3] };
     // its error type has no values
-    let made = set.is_some() && generate_tangents(&mut corners).is_ok();
+    let made = chosen.is_some() && generate_tangents(&mut corners).is_ok();
     let mut tangents = corners.tangents;
     for (corner, tangent) in tangents.iter_mut().enumerate() {
         let normal = mesh.normals[mesh.indices[corner / 3][corner % 3] as usize];
@@ -45,10 +77,7 @@ pub(super) fn compute(mesh: &mut TriangleMesh, set: usize) -> Vec<u32> {
             *tangent = horizontal(normal);
         }
     }
-    for original in weld(mesh, &tangents) {
-        source.push(source[original as usize]);
-    }
-    source
+    tangents
 }
 
 /// Texture coordinates that are not all the same.
@@ -65,6 +94,8 @@ fn horizontal(normal: Vec3) -> Vec4 {
 struct Corners<'a> {
     mesh: &'a TriangleMesh,
     set: usize,
+    /// Applied to the coordinates of the set.
+    transform: Affine2,
     tangents: Vec<Vec4>,
 }
 
@@ -93,7 +124,7 @@ impl Geometry for Corners<'_> {
 
     fn tex_coord(&self, face: usize, vert: usize) -> [f32; 2] {
         // glTF's v points down, the algorithm's up; the sign of the bitangent depends on it
-        let uv = self.mesh.texcoords[self.set][self.vertex(face, vert)];
+        let uv = self.transform.transform_point2(self.mesh.texcoords[self.set][self.vertex(face, vert)]);
         [uv.x, 1.0 - uv.y]
     }
 
@@ -104,23 +135,27 @@ impl Geometry for Corners<'_> {
     }
 }
 
-/// Gives each vertex the tangent of its corners (three per triangle), with a copy of the vertex for each other tangent.
+/// Gives each vertex the tangents of its corners (three per triangle, for each array that is not empty), with a copy of the vertex for each other tangents.
 /// Returns what each copy is one of.
-fn weld(mesh: &mut TriangleMesh, corners: &[Vec4]) -> Vec<u32> {
+fn weld(mesh: &mut TriangleMesh, corners: [&[Vec4]; 3]) -> Vec<u32> {
     const NONE: u32 = u32::MAX;
-    let mut tangents = vec![Vec4::ZERO; mesh.positions.len()];
+    type Tangents = [Vec4; 3];
+    let at = |corner: usize| corners.map(|c| c.get(corner).copied().unwrap_or_default());
+    let differ = |a: &Tangents, b: &Tangents| a.iter().zip(b).any(|(a, b)| (*a - *b).abs().max_element() > 1e-5);
+    let mut tangents: Vec<Tangents> = vec![Tangents::default(); mesh.positions.len()];
     let mut taken = vec![false; mesh.positions.len()];
     // chains of copies: next[v] is another copy of the vertex that v copies
     let mut next = vec![NONE; mesh.positions.len()];
     let mut copies: Vec<u32> = Vec::new();
-    for (index, &tangent) in mesh.indices.iter_mut().flatten().zip(corners) {
+    for (corner, index) in mesh.indices.iter_mut().flatten().enumerate() {
+        let tangent = at(corner);
         let mut v = *index as usize;
-        while taken[v] && (tangents[v] - tangent).abs().max_element() > 1e-5 && next[v] != NONE {
+        while taken[v] && differ(&tangents[v], &tangent) && next[v] != NONE {
             v = next[v] as usize;
         }
         if !taken[v] {
             (taken[v], tangents[v]) = (true, tangent);
-        } else if (tangents[v] - tangent).abs().max_element() > 1e-5 {
+        } else if differ(&tangents[v], &tangent) {
             let copy = tangents.len();
             next[v] = copy as u32;
             copies.push(*index);
@@ -145,9 +180,13 @@ fn weld(mesh: &mut TriangleMesh, corners: &[Vec4]) -> Vec<u32> {
         extend(set, &copies);
     }
     // vertices that no triangle uses
-    for (tangent, normal) in tangents.iter_mut().zip(&mesh.normals).filter(|(t, _)| t.w == 0.0) {
-        *tangent = horizontal(*normal);
+    for ((tangents, normal), _) in tangents.iter_mut().zip(&mesh.normals).zip(&taken).filter(|(_, taken)| !**taken) {
+        *tangents = [horizontal(*normal); 3];
     }
-    mesh.tangents = tangents;
+    let array = |k: usize| match corners[k].is_empty() {
+        true => Vec::new(),
+        false => tangents.iter().map(|t| t[k]).collect(),
+    };
+    (mesh.tangents, mesh.clearcoat_tangents, mesh.anisotropy_tangents) = (array(0), array(1), array(2));
     copies
 }

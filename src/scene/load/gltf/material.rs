@@ -131,6 +131,7 @@ pub(super) fn convert(material: &json::Material) -> Result<Material, String> {
         normal_texture: normal_slot(&material.normal_texture)?,
         normal_scale: material.normal_texture.as_ref().map_or(1.0, |t| t.scale),
         occlusion_texture: occlusion_slot(&material.occlusion_texture)?,
+        occlusion_strength: material.occlusion_texture.as_ref().map_or(1.0, |t| t.strength.0),
         emissive: Vec3::from(material.emissive_factor.0) * strength,
         emissive_texture: slot(&material.emissive_texture),
         alpha_mode: alpha_mode(material),
